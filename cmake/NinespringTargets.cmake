@@ -1,0 +1,62 @@
+# How every target of the project is declared: same warnings, same options, one line a library.
+
+option(NINESPRING_SANITIZE "Build with address and undefined-behaviour sanitizers" OFF)
+option(NINESPRING_COVERAGE "Build with coverage counters" OFF)
+option(NINESPRING_WERROR "Treat warnings as errors" ON)
+
+add_library(ninespring_options INTERFACE)
+target_compile_options(ninespring_options INTERFACE
+    -Wall -Wextra -Wconversion -Wsign-conversion -Wshadow
+    $<$<BOOL:${NINESPRING_WERROR}>:-Werror>
+    $<$<NOT:$<STREQUAL:${CMAKE_SYSTEM_PROCESSOR},avr>>:-Wdouble-promotion>
+    $<$<COMPILE_LANGUAGE:C>:-Wstrict-prototypes -Wmissing-prototypes>)
+if(NINESPRING_SANITIZE)
+    target_compile_options(ninespring_options INTERFACE
+        -fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer)
+    target_link_options(ninespring_options INTERFACE -fsanitize=address,undefined)
+endif()
+if(NINESPRING_COVERAGE)
+    target_compile_options(ninespring_options INTERFACE --coverage)
+    target_link_options(ninespring_options INTERFACE --coverage)
+endif()
+
+# ninespring_add_library(NAME [COLD] SOURCES... [DEPENDS other...])
+# COLD: runs seldom, so that small code counts more than fast code (NINESPRING_COLD_OPTIONS of the toolchain).
+# One portable library of lib/: C99, headers beside its sources.
+function(ninespring_add_library name)
+    cmake_parse_arguments(ARG "COLD" "" "SOURCES;DEPENDS" ${ARGN})
+    add_library(${name} STATIC ${ARG_SOURCES})
+    target_include_directories(${name} PUBLIC ${CMAKE_CURRENT_SOURCE_DIR})
+    target_link_libraries(${name} PUBLIC ${ARG_DEPENDS} PRIVATE ninespring_options)
+    if(ARG_COLD)
+        target_compile_options(${name} PRIVATE ${NINESPRING_COLD_OPTIONS})
+    endif()
+endfunction()
+
+# ninespring_add_unity_test(NAME SOURCES... DEPENDS lib... [LABELS label...])
+# A Unity test that ctest runs. Call it from test/<name>/CMakeLists.txt.
+function(ninespring_add_unity_test name)
+    cmake_parse_arguments(ARG "" "TIMEOUT" "SOURCES;DEPENDS;LABELS" ${ARGN})
+    add_executable(${name} ${ARG_SOURCES})
+    target_link_libraries(${name} PRIVATE ${ARG_DEPENDS} unity::framework ninespring_options)
+    add_test(NAME ${name} COMMAND ${name})
+    if(ARG_LABELS)
+        set_tests_properties(${name} PROPERTIES LABELS "${ARG_LABELS}")
+    endif()
+    if(ARG_TIMEOUT)
+        set_tests_properties(${name} PROPERTIES TIMEOUT ${ARG_TIMEOUT})
+    endif()
+endfunction()
+
+# Adds every subdirectory of the current one that has a CMakeLists.txt, in name order.
+function(ninespring_add_subdirectories)
+    file(GLOB listings CONFIGURE_DEPENDS */CMakeLists.txt)
+    list(SORT listings)
+    foreach(listing IN LISTS listings)
+        cmake_path(GET listing PARENT_PATH directory)
+        cmake_path(GET directory FILENAME name)
+        if(NOT name IN_LIST ARGN) # names given as arguments are left out
+            add_subdirectory(${name})
+        endif()
+    endforeach()
+endfunction()

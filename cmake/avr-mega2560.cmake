@@ -1,0 +1,17 @@
+# Toolchain file: avr-gcc for the Arduino Mega 2560 (ATmega2560, 16 MHz).
+set(CMAKE_SYSTEM_NAME Generic)
+set(CMAKE_SYSTEM_PROCESSOR avr)
+set(CMAKE_C_COMPILER avr-gcc)
+set(CMAKE_CXX_COMPILER avr-g++)
+set(CMAKE_TRY_COMPILE_TARGET_TYPE STATIC_LIBRARY)
+set(CMAKE_EXECUTABLE_SUFFIX .elf)
+# -fno-tree-switch-conversion: the tables that it makes of switches sit in RAM.
+set(NINESPRING_MCU_FLAGS "-mmcu=atmega2560 -DF_CPU=16000000UL -ffunction-sections -fdata-sections -mrelax -fno-tree-switch-conversion")
+set(CMAKE_C_FLAGS_INIT "${NINESPRING_MCU_FLAGS}")
+set(CMAKE_CXX_FLAGS_INIT "${NINESPRING_MCU_FLAGS}")
+set(CMAKE_ASM_FLAGS_INIT "-mmcu=atmega2560")
+set(CMAKE_EXE_LINKER_FLAGS_INIT "-mmcu=atmega2560 -mrelax -Wl,--gc-sections")
+# Not ..._INIT: CMake would put its own -O3 behind it.
+set(CMAKE_C_FLAGS_RELEASE "-Os" CACHE STRING "Flags of a release build")
+set(CMAKE_CXX_FLAGS_RELEASE "-Os" CACHE STRING "Flags of a release build")
+set(NINESPRING_COLD_OPTIONS -mcall-prologues)
