@@ -1,0 +1,988 @@
+#include "console.h"
+
+#include <stddef.h>
+#include <string.h>
+
+#define MAX_ARGUMENTS       2u
+#define SELFTEST_CURRENT_MA 300u
+#define SELFTEST_TICKS                                                                             \
+    30u /* 0.6 s a spring: the current has settled, the spring warmed by 0.1 K                     \
+         */
+
+typedef enum {
+    JOB_NONE = 0,
+    JOB_HELP,
+    JOB_VERSION,
+    JOB_MODEL,
+    JOB_FAULTS,
+    JOB_SETTINGS,
+    JOB_SAVE,
+    JOB_TELEMETRY,
+    JOB_SELFTEST
+} job_t;
+
+/* --- lines out ------------------------------------------------------------------------------ */
+
+typedef struct {
+    text_line_t line;
+    char bytes[CONSOLE_ROOM_BYTES];
+} out_t;
+
+static void out_start(out_t *out)
+{
+    text_line_start(&out->line, out->bytes, CONSOLE_ROOM_BYTES - 2u);
+}
+
+static void out_end(const console_t *console, out_t *out)
+{
+    out->line.size = CONSOLE_ROOM_BYTES;
+    text_add_flash(&out->line, FLASH_TEXT("\r\n"));
+    console->output.write(console->output.context, out->line.bytes, out->line.length);
+}
+
+static void answer(const console_t *console, console_error_t error)
+{
+    out_t out;
+    out_start(&out);
+    if (error == CONSOLE_OK) {
+        text_add_flash(&out.line, FLASH_TEXT("ok"));
+    } else {
+        text_add_flash(&out.line, FLASH_TEXT("error:"));
+        text_add_decimal(&out.line, error, 0);
+        text_add_char(&out.line, ' ');
+        text_add_flash(&out.line, console_error_text(error));
+    }
+    out_end(console, &out);
+}
+
+static bool room_for(const console_t *console, uint16_t bytes)
+{
+    return console->output.room(console->output.context) >= bytes;
+}
+
+static void add_setting_name(text_line_t *line, const settings_entry_t *entry, uint8_t element)
+{
+    text_add(line, entry->name);
+    if (entry->count > 1) {
+        text_add_char(line, '_');
+        text_add_decimal(line, element + 1, 0);
+    }
+}
+
+static void add_spring(text_line_t *line, uint8_t spring)
+{
+    text_add_flash(line, FLASH_TEXT("spring "));
+    text_add_decimal(line, spring + 1, 0);
+    text_add_flash(line, FLASH_TEXT(": "));
+}
+
+/* --- settings ------------------------------------------------------------------------------- */
+
+/* Activates the settings as they are set. Where they do not fit together the active ones stay, and
+ * the console says which value is in the way: `$$` of another board can only be pasted line by
+ * line. */
+static void apply_settings(console_t *console)
+{
+    uint16_t offset = 0;
+    console->conflict =
+        !controller_apply_settings(console->controller, &console->settings->controller, &offset);
+    if (!console->conflict) {
+        return;
+    }
+    out_t out;
+    settings_entry_t entry;
+    if (!settings_find_offset(offset, &console->conflict_index, &console->conflict_element)) {
+        console->conflict_index = 0;
+        console->conflict_element = 0;
+    }
+    settings_entry(console->conflict_index, &entry);
+    out_start(&out);
+    text_add_flash(&out.line, FLASH_TEXT("[not active yet: "));
+    add_setting_name(&out.line, &entry, console->conflict_element);
+    text_add_flash(&out.line, FLASH_TEXT(" does not fit the others]"));
+    out_end(console, &out);
+}
+
+static void print_setting(const console_t *console, uint8_t index, uint8_t element)
+{
+    out_t out;
+    settings_entry_t entry;
+    settings_entry(index, &entry);
+    out_start(&out);
+    text_add_char(&out.line, '$');
+    add_setting_name(&out.line, &entry, element);
+    text_add_char(&out.line, '=');
+    text_add_decimal(&out.line, settings_get(console->settings, index, element), entry.decimals);
+    out_end(console, &out);
+}
+
+static console_error_t error_of(settings_result_t result)
+{
+    switch (result) {
+    case SETTINGS_OK:
+        return CONSOLE_OK;
+    case SETTINGS_UNKNOWN_NAME:
+        return CONSOLE_ERROR_UNKNOWN_SETTING;
+    case SETTINGS_OUT_OF_RANGE:
+        return CONSOLE_ERROR_OUT_OF_RANGE;
+    default:
+        return CONSOLE_ERROR_BAD_ARGUMENT;
+    }
+}
+
+/* Telemetry and policy can be set by word or as a setting: one truth, the setting. */
+static void follow_board_settings(console_t *console)
+{
+    const board_settings_t *const board = &console->settings->board;
+    if (console->telemetry->format != board->telemetry_format ||
+        console->telemetry->hz != board->telemetry_hz) {
+        telemetry_set(console->telemetry, board->telemetry_format, board->telemetry_hz);
+    }
+}
+
+static console_error_t assign(console_t *console, const char *name, const char *value)
+{
+    const settings_t before = *console->settings;
+    const console_error_t error = error_of(settings_assign(console->settings, name, value));
+    if (error != CONSOLE_OK) {
+        return error;
+    }
+    if (memcmp(&before.controller, &console->settings->controller, sizeof before.controller) != 0 ||
+        console->conflict) {
+        apply_settings(console);
+    }
+    follow_board_settings(console);
+    return CONSOLE_OK;
+}
+
+static void start_job(console_t *console, job_t job)
+{
+    console->job = (uint8_t)job;
+    console->step = 0;
+    console->element = 0;
+    console->failures = 0;
+}
+
+/* A line that starts with '$'. */
+static console_error_t settings_line(console_t *console, char *line)
+{
+    uint8_t index;
+    uint8_t element;
+    char *const equals = strchr(line, '=');
+    if (equals != NULL) {
+        *equals = '\0';
+        return assign(console, line + 1, equals + 1);
+    }
+    if (flash_equal(line, FLASH_TEXT("$$"))) {
+        start_job(console, JOB_SETTINGS);
+        return CONSOLE_OK;
+    }
+    if (flash_equal(line, FLASH_TEXT("$save"))) {
+        if (console->conflict) {
+            return CONSOLE_ERROR_SETTINGS_CONFLICT;
+        }
+        settings_save_start(console->store, console->settings, 0);
+        start_job(console, JOB_SAVE);
+        return CONSOLE_OK;
+    }
+    if (flash_equal(line, FLASH_TEXT("$defaults"))) {
+        settings_default(console->settings);
+        apply_settings(console);
+        follow_board_settings(console);
+        return CONSOLE_OK;
+    }
+    if (!settings_find(line + 1, &index, &element)) {
+        return CONSOLE_ERROR_UNKNOWN_SETTING;
+    }
+    print_setting(console, index, element);
+    return CONSOLE_OK;
+}
+
+/* --- words ---------------------------------------------------------------------------------- */
+
+typedef struct {
+    uint8_t count;
+    const char *argument[MAX_ARGUMENTS];
+} arguments_t;
+
+static console_error_t parse_number(const char *text, uint8_t decimals, int32_t lowest,
+                                    int32_t highest, int32_t *value)
+{
+    int32_t number;
+    switch (text_parse_decimal(text, decimals, &number)) {
+    case TEXT_OK:
+        break;
+    case TEXT_TOO_LARGE:
+        return CONSOLE_ERROR_OUT_OF_RANGE;
+    default:
+        return CONSOLE_ERROR_BAD_ARGUMENT;
+    }
+    if (number < lowest || number > highest) {
+        return CONSOLE_ERROR_OUT_OF_RANGE;
+    }
+    *value = number;
+    return CONSOLE_OK;
+}
+
+/* "all" or a spring's number; first..last count from 0. */
+static console_error_t parse_springs(const console_t *console, const char *text, uint8_t *first,
+                                     uint8_t *last)
+{
+    const uint8_t springs = controller_springs(console->controller);
+    int32_t number;
+    *first = 0;
+    *last = (uint8_t)(springs - 1u);
+    if (flash_equal(text, FLASH_TEXT("all"))) {
+        return CONSOLE_OK;
+    }
+    const console_error_t error = parse_number(text, 0, 1, springs, &number);
+    if (error == CONSOLE_OK) {
+        *first = *last = (uint8_t)(number - 1);
+    }
+    return error;
+}
+
+/* Whether anything may be switched on at all. */
+static console_error_t may_drive(const console_t *console)
+{
+    if (controller_is_locked(console->controller)) {
+        return CONSOLE_ERROR_LOCKED;
+    }
+    return controller_board_fault(console->controller) == SAFETY_FAULT_NONE ? CONSOLE_OK
+                                                                            : CONSOLE_ERROR_FAULT;
+}
+
+static console_error_t word_on(console_t *console, const arguments_t *arguments)
+{
+    uint8_t first;
+    uint8_t last;
+    int32_t percent = 100;
+    console_error_t error = parse_springs(console, arguments->argument[0], &first, &last);
+    if (error == CONSOLE_OK && arguments->count > 1) {
+        error = parse_number(arguments->argument[1], 0, 0, 100, &percent);
+    }
+    if (error == CONSOLE_OK) {
+        error = may_drive(console);
+    }
+    if (error == CONSOLE_OK && first == last &&
+        controller_fault(console->controller, first) != SAFETY_FAULT_NONE) {
+        error = CONSOLE_ERROR_FAULT;
+    }
+    if (error != CONSOLE_OK) {
+        return error;
+    }
+    for (uint8_t k = first; k <= last; k++) {
+        controller_set_target(console->controller, k, (uint16_t)(percent * 10));
+    }
+    return CONSOLE_OK;
+}
+
+static console_error_t word_off(console_t *console, const arguments_t *arguments)
+{
+    uint8_t first;
+    uint8_t last;
+    const console_error_t error = parse_springs(console, arguments->argument[0], &first, &last);
+    if (error != CONSOLE_OK) {
+        return error;
+    }
+    for (uint8_t k = first; k <= last; k++) {
+        controller_set_target(console->controller, k, 0);
+    }
+    return CONSOLE_OK;
+}
+
+static console_error_t word_pattern(console_t *console, const arguments_t *arguments)
+{
+    bool on[CONTROLLER_MAX_SPRINGS] = {false};
+    bool any = false;
+    const char *const bits = arguments->argument[0];
+    const uint8_t springs = controller_springs(console->controller);
+    if (strlen(bits) != springs || strspn(bits, "01") != springs) {
+        return CONSOLE_ERROR_BAD_ARGUMENT;
+    }
+    for (uint8_t k = 0; k < springs; k++) {
+        on[k] = bits[k] == '1';
+        any = any || on[k];
+    }
+    const console_error_t error = any ? may_drive(console) : CONSOLE_OK;
+    if (error == CONSOLE_OK) {
+        controller_set_pattern(console->controller, on);
+    }
+    return error;
+}
+
+static console_error_t word_policy(console_t *console, const arguments_t *arguments)
+{
+    drive_policy_kind_t kind;
+    if (flash_equal(arguments->argument[0], FLASH_TEXT("open"))) {
+        kind = DRIVE_POLICY_OPEN;
+    } else if (flash_equal(arguments->argument[0], FLASH_TEXT("precompensate"))) {
+        kind = DRIVE_POLICY_PRECOMPENSATE;
+    } else {
+        return CONSOLE_ERROR_BAD_ARGUMENT;
+    }
+    if (!controller_set_policy(console->controller, kind)) {
+        return CONSOLE_ERROR_NOT_AVAILABLE;
+    }
+    console->settings->controller.policy.policy = (uint8_t)kind;
+    return CONSOLE_OK;
+}
+
+static console_error_t word_fan(console_t *console, const arguments_t *arguments)
+{
+    int32_t percent = 0;
+    const console_error_t error = parse_number(arguments->argument[0], 0, 0, 100, &percent);
+    if (error == CONSOLE_OK) {
+        controller_set_fan(console->controller, (uint8_t)percent);
+    }
+    return error;
+}
+
+static console_error_t word_ambient(console_t *console, const arguments_t *arguments)
+{
+    return error_of(settings_assign(console->settings, "ambient_c", arguments->argument[0]));
+}
+
+static console_error_t word_telemetry(console_t *console, const arguments_t *arguments)
+{
+    static const char names[TELEMETRY_FORMAT_COUNT][9] FLASH_MEMORY = {"off", "csv", "teleplot"};
+    int32_t hz = console->settings->board.telemetry_hz;
+    uint8_t format = 0;
+    while (format < TELEMETRY_FORMAT_COUNT && !flash_equal(arguments->argument[0], names[format])) {
+        format++;
+    }
+    if (format == TELEMETRY_FORMAT_COUNT) {
+        return CONSOLE_ERROR_BAD_ARGUMENT;
+    }
+    if (arguments->count > 1) {
+        const console_error_t error =
+            parse_number(arguments->argument[1], 0, 1, TELEMETRY_TICKS_PER_S, &hz);
+        if (error != CONSOLE_OK) {
+            return error;
+        }
+    }
+    console->next_format = format;
+    console->next_hz = (uint8_t)hz;
+    telemetry_set(console->telemetry, TELEMETRY_OFF, (uint8_t)hz);
+    start_job(console, JOB_TELEMETRY);
+    return CONSOLE_OK;
+}
+
+static console_error_t word_clear(console_t *console, const arguments_t *arguments)
+{
+    (void)arguments;
+    controller_clear_faults(console->controller);
+    return CONSOLE_OK;
+}
+
+static console_error_t word_unlock(console_t *console, const arguments_t *arguments)
+{
+    (void)arguments;
+    controller_unlock(console->controller);
+    return CONSOLE_OK;
+}
+
+static bool any_spring_on(const console_t *console)
+{
+    for (uint8_t k = 0; k < controller_springs(console->controller); k++) {
+        if (controller_level_permille(console->controller, k) != 0) {
+            return true;
+        }
+    }
+    return false;
+}
+
+static console_error_t word_selftest(console_t *console, const arguments_t *arguments)
+{
+    (void)arguments;
+    if (any_spring_on(console)) {
+        return CONSOLE_ERROR_SPRINGS_ON;
+    }
+    const console_error_t error = may_drive(console);
+    if (error == CONSOLE_OK) {
+        (void)controller_set_policy(console->controller,
+                                    DRIVE_POLICY_OPEN); /* a level is a current */
+        start_job(console, JOB_SELFTEST);
+    }
+    return error;
+}
+
+static console_error_t word_help(console_t *console, const arguments_t *arguments)
+{
+    (void)arguments;
+    start_job(console, JOB_HELP);
+    return CONSOLE_OK;
+}
+
+static console_error_t word_version(console_t *console, const arguments_t *arguments)
+{
+    (void)arguments;
+    start_job(console, JOB_VERSION);
+    return CONSOLE_OK;
+}
+
+static console_error_t word_model(console_t *console, const arguments_t *arguments)
+{
+    if (arguments->count == 0) {
+        start_job(console, JOB_MODEL);
+        return CONSOLE_OK;
+    }
+    if (!flash_equal(arguments->argument[0], FLASH_TEXT("cold"))) {
+        return CONSOLE_ERROR_BAD_ARGUMENT;
+    }
+    if (any_spring_on(console)) {
+        return CONSOLE_ERROR_SPRINGS_ON;
+    }
+    thermal_model_reset(&console->controller->model, console->status->ambient_c7);
+    thermal_model_set_ambient(&console->controller->model, console->status->ambient_c7);
+    return CONSOLE_OK;
+}
+
+static console_error_t word_faults(console_t *console, const arguments_t *arguments)
+{
+    (void)arguments;
+    start_job(console, JOB_FAULTS);
+    return CONSOLE_OK;
+}
+
+/* X(word, least arguments, most arguments, usage after the word) */
+#define WORDS(X)                                                                                   \
+    X(help, 0, 0, "  this list")                                                                   \
+    X(version, 0, 0, "  what runs here, why it started, how it is doing")                          \
+    X(on, 1, 2, " K|all [0..100]  drive a spring or all, at a level in percent")                   \
+    X(off, 1, 1, " K|all")                                                                         \
+    X(pattern, 1, 1, " 111101111  all springs at once, row by row")                                \
+    X(policy, 1, 1, " open|precompensate")                                                         \
+    X(fan, 1, 1, " 0..100  in percent")                                                            \
+    X(ambient, 1, 1, " C  air temperature, where no sensor measures it")                           \
+    X(model, 0, 1, " [cold]  temperatures as the model has them; cold: at ambient")                \
+    X(faults, 0, 0, "  what is latched")                                                           \
+    X(clear, 0, 0, "  forget faults; all springs off")                                             \
+    X(unlock, 0, 0, "  after a watchdog or brown-out reset")                                       \
+    X(selftest, 0, 0, "  each sensor, and each spring with 0.3 A")                                 \
+    X(telemetry, 1, 2, " off|csv|teleplot [1..50]  lines per second")
+
+#define WORD_USAGE(word, least, most, usage) static const char usage_##word[] FLASH_MEMORY = usage;
+WORDS(WORD_USAGE)
+
+typedef struct {
+    char word[10];
+    uint8_t least; /* arguments */
+    uint8_t most;
+    console_error_t (*function)(console_t *console, const arguments_t *arguments);
+    const char *usage; /* in flash */
+} word_t;
+
+#define WORD_ROW(word, least, most, usage) {#word, least, most, word_##word, usage_##word},
+static const word_t words[] FLASH_MEMORY = {WORDS(WORD_ROW)};
+#define WORD_COUNT ((uint8_t)(sizeof words / sizeof words[0]))
+
+static console_error_t execute(console_t *console)
+{
+    if (console->line[0] == '$') {
+        return settings_line(console, console->line);
+    }
+    word_t word;
+    arguments_t arguments = {0, {NULL, NULL}};
+    uint8_t given = 0;
+    const char *const name = strtok(console->line, " ");
+    if (name == NULL) {
+        return CONSOLE_OK; /* blanks only */
+    }
+    for (const char *next = strtok(NULL, " "); next != NULL; next = strtok(NULL, " ")) {
+        if (given < MAX_ARGUMENTS) {
+            arguments.argument[given] = next;
+        }
+        given++;
+    }
+    for (uint8_t i = 0; i < WORD_COUNT; i++) {
+        flash_copy(&word, &words[i], sizeof word);
+        if (strcmp(name, word.word) != 0) {
+            continue;
+        }
+        if (given < word.least) {
+            return CONSOLE_ERROR_MISSING_ARGUMENT;
+        }
+        if (given > word.most) {
+            return CONSOLE_ERROR_SURPLUS_ARGUMENT;
+        }
+        arguments.count = given;
+        return word.function(console, &arguments);
+    }
+    return CONSOLE_ERROR_UNKNOWN_WORD;
+}
+
+/* --- answers of several lines --------------------------------------------------------------- */
+
+static bool help_line(const console_t *console, out_t *out)
+{
+    static const char more[4][56] FLASH_MEMORY = {
+        "$$  all settings   $NAME  one   $NAME=VALUE  set it",
+        "$save  keep them   $defaults  the built-in ones",
+        "!  all springs off at once, at any moment",
+        "?  one line of status, at any moment",
+    };
+    word_t word;
+    if (console->step < WORD_COUNT) {
+        flash_copy(&word, &words[console->step], sizeof word);
+        text_add(&out->line, word.word);
+        text_add_flash(&out->line, word.usage);
+        return true;
+    }
+    const uint8_t rest = (uint8_t)(console->step - WORD_COUNT);
+    if (rest < 4u) {
+        text_add_flash(&out->line, more[rest]);
+        return true;
+    }
+    return false;
+}
+
+static const char *loaded_text(const console_status_t *status)
+{
+    if (status->settings_conflict_at_boot) {
+        return FLASH_TEXT("stored ones do not fit together, defaults are active");
+    }
+    switch (status->loaded) {
+    case SETTINGS_LOADED:
+        return FLASH_TEXT("loaded");
+    case SETTINGS_LOADED_MIGRATED:
+        return FLASH_TEXT("loaded from an earlier version, new ones are at their defaults");
+    case SETTINGS_LOADED_OTHER:
+        return FLASH_TEXT("loaded; the other copy is damaged or was cut short");
+    case SETTINGS_EMPTY:
+        return FLASH_TEXT("none saved, defaults");
+    case SETTINGS_FOREIGN:
+        return FLASH_TEXT("stored by another version, defaults");
+    default:
+        return FLASH_TEXT("stored ones damaged, defaults");
+    }
+}
+
+static bool version_line(const console_t *console, out_t *out)
+{
+    const console_status_t *const status = console->status;
+    text_line_t *const line = &out->line;
+    switch (console->step) {
+    case 0:
+        text_add_flash(line, FLASH_TEXT("ninespring "));
+        text_add_flash(line, status->version);
+        text_add_flash(line, FLASH_TEXT(" mega2560, sensors "));
+        text_add_flash(line, status->sensors);
+        return true;
+    case 1:
+        text_add_flash(line, FLASH_TEXT("reset "));
+        text_add_flash(line, status->reset_cause);
+        text_add_flash(line, FLASH_TEXT("; settings "));
+        text_add_flash(line, loaded_text(status));
+        return true;
+    case 2:
+        text_add_flash(line, FLASH_TEXT("ticks late "));
+        text_add_decimal(line, status->ticks_late, 0);
+        text_add_flash(line, FLASH_TEXT(", longest tick "));
+        text_add_decimal(line, status->tick_longest_us, 0);
+        text_add_flash(line, FLASH_TEXT(" us, load "));
+        text_add_decimal(line, status->load_percent, 0);
+        text_add_flash(line, FLASH_TEXT(" %, telemetry dropped "));
+        text_add_decimal(line, console->telemetry->dropped, 0);
+        text_add_flash(line, FLASH_TEXT(", stack unused "));
+        text_add_decimal(line, status->stack_unused_bytes, 0);
+        return true;
+    default:
+        return false;
+    }
+}
+
+static bool model_line(const console_t *console, out_t *out)
+{
+    const controller_t *const controller = console->controller;
+    text_line_t *const line = &out->line;
+    const uint8_t k = console->step;
+    if (k == controller_springs(controller)) {
+        text_add_flash(line, FLASH_TEXT("ambient: "));
+        text_add_decimal(line, text_centi_from_c7(console->status->ambient_c7), 2);
+        text_add_flash(line, FLASH_TEXT(" C"));
+        return true;
+    }
+    if (k > controller_springs(controller)) {
+        return false;
+    }
+    add_spring(line, k);
+    text_add_decimal(line, text_centi_from_c7(controller_temperature_c7(controller, k)), 2);
+    text_add_flash(line, FLASH_TEXT(" C, austenite "));
+    text_add_decimal(line, controller_austenite_permille(controller, k), 1);
+    text_add_flash(line, FLASH_TEXT(" %, "));
+    text_add_decimal(line, controller_measured_ma(controller, k), 3);
+    text_add_flash(line, FLASH_TEXT(" A, "));
+    text_add_decimal(line, controller_measured_mv(controller, k), 3);
+    text_add_flash(line, FLASH_TEXT(" V, "));
+    text_add_decimal(line, (int32_t)(controller_power_uw(controller, k) & 0x7FFFFFFFul), 6);
+    text_add_flash(line, FLASH_TEXT(" W, target "));
+    text_add_decimal(line, controller_target_ma(controller, k), 3);
+    text_add_flash(line, FLASH_TEXT(" A"));
+    return true;
+}
+
+static void add_fault(text_line_t *line, safety_fault_t fault)
+{
+    text_add_flash(line, FLASH_TEXT("fault "));
+    text_add_decimal(line, fault, 0);
+    text_add_char(line, ' ');
+    text_add_flash(line, safety_fault_name(fault));
+}
+
+/* Steps: the lock, the board, each spring; lines only where there is something. */
+static bool faults_line(const console_t *console, out_t *out)
+{
+    const controller_t *const controller = console->controller;
+    text_line_t *const line = &out->line;
+    if (console->step == 0) {
+        if (controller_is_locked(controller)) {
+            text_add_flash(line, FLASH_TEXT("locked"));
+        }
+    } else if (console->step == 1) {
+        const safety_fault_t fault = controller_board_fault(controller);
+        if (fault != SAFETY_FAULT_NONE) {
+            text_add_flash(line, FLASH_TEXT("board: "));
+            add_fault(line, fault);
+        }
+    } else {
+        const uint8_t k = (uint8_t)(console->step - 2u);
+        if (k >= controller_springs(controller)) {
+            return false;
+        }
+        const safety_fault_t fault = controller_fault(controller, k);
+        if (fault != SAFETY_FAULT_NONE) {
+            add_spring(line, k);
+            add_fault(line, fault);
+        }
+    }
+    return true;
+}
+
+/* --- jobs ----------------------------------------------------------------------------------- */
+
+static void end_job(console_t *console, console_error_t error)
+{
+    if (console->job == JOB_SELFTEST) {
+        const uint8_t policy = console->settings->controller.policy.policy;
+        controller_stop(console->controller);
+        (void)controller_set_policy(console->controller, (drive_policy_kind_t)policy);
+    }
+    console->job = JOB_NONE;
+    answer(console, error);
+}
+
+static void list_settings(console_t *console)
+{
+    settings_entry_t entry;
+    if (console->step == settings_count()) {
+        end_job(console, CONSOLE_OK);
+        return;
+    }
+    settings_entry(console->step, &entry);
+    print_setting(console, console->step, console->element);
+    if (++console->element >= entry.count) {
+        console->element = 0;
+        console->step++;
+    }
+}
+
+static void start_telemetry(console_t *console)
+{
+    const uint8_t springs = controller_springs(console->controller);
+    uint8_t piece = 0;
+    if (console->next_format == TELEMETRY_CSV) {
+        if (!room_for(console, TELEMETRY_LINE_BYTES((uint16_t)springs))) {
+            return;
+        }
+        out_t out;
+        out_start(&out);
+        while (telemetry_header(springs, piece++, &out.line)) {
+            console->output.write(console->output.context, out.line.bytes, out.line.length);
+            out.line.length = 0;
+        }
+    }
+    console->settings->board.telemetry_format = console->next_format;
+    console->settings->board.telemetry_hz = console->next_hz;
+    telemetry_set(console->telemetry, console->next_format, console->next_hz);
+    end_job(console, CONSOLE_OK);
+}
+
+/* Level at which the open policy gives SELFTEST_CURRENT_MA. */
+static uint16_t selftest_level(const console_t *console)
+{
+    const uint16_t full_ma = console->settings->controller.policy.open_current_ma;
+    if (full_ma <= SELFTEST_CURRENT_MA) {
+        return 1000;
+    }
+    return (uint16_t)((uint32_t)SELFTEST_CURRENT_MA * 1000u / full_ma);
+}
+
+static const char *sensor_text(uint8_t status)
+{
+    switch (status) {
+    case CONTROLLER_SENSOR_OK:
+        return FLASH_TEXT("sensor ok");
+    case CONTROLLER_SENSOR_ABSENT:
+        return FLASH_TEXT("sensor absent");
+    case CONTROLLER_SENSOR_BUS:
+        return FLASH_TEXT("sensor bus stuck");
+    case CONTROLLER_SENSOR_STALE:
+        return FLASH_TEXT("sensor stale");
+    default:
+        return FLASH_TEXT("sensor was reset");
+    }
+}
+
+/* One spring after the other is driven with a small current; then its line is printed. */
+static void selftest(console_t *console)
+{
+    controller_t *const controller = console->controller;
+    const uint8_t k = console->step;
+    if (k >= controller_springs(controller)) {
+        end_job(console, console->failures == 0 ? CONSOLE_OK : CONSOLE_ERROR_SELFTEST_FAILED);
+        return;
+    }
+    if (console->element == 0) { /* not yet driven */
+        controller_set_target(controller, k, selftest_level(console));
+        console->tick = console->status->ticks;
+        console->element = 1;
+        return;
+    }
+    if (console->status->ticks - console->tick < SELFTEST_TICKS) {
+        return;
+    }
+    const int16_t current_ma = controller_measured_ma(controller, k);
+    const int16_t voltage_mv = controller_measured_mv(controller, k);
+    const uint8_t status = console->status->sensor_status[k];
+    const safety_fault_t fault = controller_fault(controller, k);
+    const bool sound = status == CONTROLLER_SENSOR_OK && fault == SAFETY_FAULT_NONE &&
+                       current_ma > (int16_t)(SELFTEST_CURRENT_MA / 2u);
+    out_t out;
+    out_start(&out);
+    add_spring(&out.line, k);
+    text_add_flash(&out.line, sensor_text(status));
+    if (fault != SAFETY_FAULT_NONE) {
+        text_add_flash(&out.line, FLASH_TEXT(", "));
+        add_fault(&out.line, fault);
+    } else if (sound) {
+        text_add_flash(&out.line, FLASH_TEXT(", "));
+        text_add_decimal(&out.line, (int32_t)voltage_mv * 1000 / current_ma, 3);
+        text_add_flash(&out.line, FLASH_TEXT(" ohm"));
+    } else if (status == CONTROLLER_SENSOR_OK) {
+        text_add_flash(&out.line, FLASH_TEXT(", too little current"));
+    }
+    out_end(console, &out);
+    console->failures = (uint8_t)(console->failures + (sound ? 0u : 1u));
+    controller_set_target(controller, k, 0);
+    console->element = 0;
+    console->step++;
+}
+
+static void save(console_t *console)
+{
+    switch (settings_save_step(console->store)) {
+    case SETTINGS_SAVE_BUSY:
+        break;
+    case SETTINGS_SAVE_DONE:
+        end_job(console, CONSOLE_OK);
+        break;
+    default:
+        end_job(console, CONSOLE_ERROR_SAVE_FAILED);
+        break;
+    }
+}
+
+static void print_job_line(console_t *console)
+{
+    out_t out;
+    bool more;
+    out_start(&out);
+    switch (console->job) {
+    case JOB_HELP:
+        more = help_line(console, &out);
+        break;
+    case JOB_VERSION:
+        more = version_line(console, &out);
+        break;
+    case JOB_MODEL:
+        more = model_line(console, &out);
+        break;
+    default:
+        more = faults_line(console, &out);
+        break;
+    }
+    if (!more) {
+        end_job(console, CONSOLE_OK);
+        return;
+    }
+    if (out.line.length > 0) {
+        out_end(console, &out);
+    }
+    console->step++;
+}
+
+void console_service(console_t *console)
+{
+    if (console->job == JOB_NONE || !room_for(console, CONSOLE_ROOM_BYTES)) {
+        return;
+    }
+    switch (console->job) {
+    case JOB_SETTINGS:
+        list_settings(console);
+        break;
+    case JOB_SAVE:
+        save(console);
+        break;
+    case JOB_TELEMETRY:
+        start_telemetry(console);
+        break;
+    case JOB_SELFTEST:
+        selftest(console);
+        break;
+    default:
+        print_job_line(console);
+        break;
+    }
+}
+
+bool console_busy(const console_t *console)
+{
+    return console->job != JOB_NONE;
+}
+
+/* --- lines in ------------------------------------------------------------------------------- */
+
+bool console_ready(const console_t *console)
+{
+    /* a refused setting says two lines */
+    return console->job == JOB_NONE && room_for(console, 2u * CONSOLE_ROOM_BYTES);
+}
+
+void console_break_line(console_t *console, console_error_t error)
+{
+    console->broken = (uint8_t)error;
+}
+
+void console_stop(console_t *console)
+{
+    if (console->job != JOB_NONE && console->job != JOB_SAVE) {
+        end_job(console, CONSOLE_ERROR_STOPPED);
+    }
+    if (console->length > 0 || console->broken != CONSOLE_OK) {
+        console->broken = CONSOLE_ERROR_STOPPED;
+    }
+}
+
+void console_receive(console_t *console, uint8_t octet)
+{
+    if (octet == '\n' || octet == '\r') {
+        const uint8_t length = console->length;
+        console_error_t error = (console_error_t)console->broken;
+        console->line[length] = '\0';
+        console->length = 0;
+        console->broken = CONSOLE_OK;
+        if (length == 0 && error == CONSOLE_OK) {
+            return;
+        }
+        if (error == CONSOLE_OK) {
+            error = execute(console);
+        }
+        if (console->job == JOB_NONE) {
+            answer(console, error);
+        }
+        return;
+    }
+    if (octet < ' ' || octet > '~') {
+        if (console->broken == CONSOLE_OK) {
+            console->broken = CONSOLE_ERROR_BAD_CHARACTER;
+        }
+        return;
+    }
+    if (console->length == CONSOLE_LINE_BYTES) {
+        if (console->broken == CONSOLE_OK) {
+            console->broken = CONSOLE_ERROR_LINE_TOO_LONG;
+        }
+        return;
+    }
+    console->line[console->length++] = (char)octet;
+}
+
+/* --- start and status ----------------------------------------------------------------------- */
+
+void console_init(console_t *console, const text_output_t *output, controller_t *controller,
+                  settings_t *settings, settings_store_t *store, telemetry_t *telemetry,
+                  const console_status_t *status)
+{
+    memset(console, 0, sizeof *console);
+    console->output = *output;
+    console->controller = controller;
+    console->settings = settings;
+    console->store = store;
+    console->telemetry = telemetry;
+    console->status = status;
+}
+
+void console_greet(console_t *console)
+{
+    for (console->step = 0; console->step < 2u; console->step++) {
+        out_t out;
+        out_start(&out);
+        (void)version_line(console, &out);
+        out_end(console, &out);
+    }
+    if (controller_is_locked(console->controller)) {
+        out_t out;
+        out_start(&out);
+        text_add_flash(&out.line, FLASH_TEXT("locked: outputs stay off until unlock"));
+        out_end(console, &out);
+    }
+}
+
+void console_print_status(const console_t *console)
+{
+    const controller_t *const controller = console->controller;
+    int32_t sum_ma = 0;
+    int16_t hottest_c7 = INT16_MIN;
+    uint8_t hottest = 0;
+    uint8_t fault = (uint8_t)controller_board_fault(controller);
+    bool on = false;
+    out_t out;
+    text_line_t *const line = &out.line;
+    const uint8_t springs = controller_springs(controller);
+    for (uint8_t k = 0; k < springs; k++) {
+        sum_ma += controller_measured_ma(controller, k);
+        on = on || controller_level_permille(controller, k) != 0;
+        if (fault == 0) {
+            fault = (uint8_t)controller_fault(controller, k);
+        }
+        if (controller_temperature_c7(controller, k) > hottest_c7) {
+            hottest_c7 = controller_temperature_c7(controller, k);
+            hottest = k;
+        }
+    }
+    out_start(&out);
+    text_add_char(line, '<');
+    text_add_flash(line, controller_is_locked(controller) ? FLASH_TEXT("locked")
+                         : fault != 0                     ? FLASH_TEXT("fault")
+                         : on                             ? FLASH_TEXT("on")
+                                                          : FLASH_TEXT("off"));
+    text_add_flash(line, FLASH_TEXT("|t:"));
+    text_add_decimal(line, (int32_t)(console->status->time_ms & 0x7FFFFFFFul), 3);
+    text_add_flash(line, FLASH_TEXT("|sum_a:"));
+    text_add_decimal(line, sum_ma, 3);
+    text_add_flash(line, FLASH_TEXT("|hottest_c:"));
+    text_add_decimal(line, text_centi_from_c7(hottest_c7), 2);
+    text_add_char(line, '@');
+    text_add_decimal(line, hottest + 1, 0);
+    text_add_flash(line, FLASH_TEXT("|fan:"));
+    text_add_decimal(line, controller_fan_percent(controller), 0);
+    text_add_flash(line, FLASH_TEXT("|fault:"));
+    text_add_decimal(line, fault, 0);
+    text_add_flash(line, FLASH_TEXT("|late:"));
+    text_add_decimal(line, console->status->ticks_late, 0);
+    text_add_flash(line, FLASH_TEXT("|load:"));
+    text_add_decimal(line, console->status->load_percent, 0);
+    text_add_char(line, '>');
+    out_end(console, &out);
+}

@@ -1,0 +1,486 @@
+#include "controller.h"
+
+#include <stddef.h>
+#include <string.h>
+
+#include "fixed_point.h"
+
+#define MODEL_STEP_MS  100u
+#define TICKS_PER_STEP (MODEL_STEP_MS / CONTROLLER_TICK_MS)
+#define POWER_LIMIT_UW THERMAL_MODEL_HIGHEST_POWER_UW /* a step's sum stays below 2^26 */
+
+static bool refuse(uint16_t *bad, size_t offset)
+{
+    if (bad != NULL) {
+        *bad = (uint16_t)offset;
+    }
+    return false;
+}
+
+void controller_settings_default(controller_settings_t *settings)
+{
+    thermal_model_parameters_default(&settings->model);
+    current_control_parameters_default(&settings->current);
+    safety_parameters_default(&settings->safety);
+    drive_policy_parameters_default(&settings->policy);
+}
+
+#define MODEL_OFFSET(field) (uint8_t) offsetof(thermal_model_parameters_t, field)
+
+/* Where each thermal_model_parameter_t is; a switch, because a table would take the Mega's RAM. */
+static uint8_t model_offset(thermal_model_parameter_t parameter)
+{
+    switch (parameter) {
+    case THERMAL_MODEL_ROWS:
+        return MODEL_OFFSET(rows);
+    case THERMAL_MODEL_COLUMNS:
+        return MODEL_OFFSET(columns);
+    case THERMAL_MODEL_STEP:
+        return MODEL_OFFSET(step_ms);
+    case THERMAL_MODEL_HEAT_CAPACITY:
+        return MODEL_OFFSET(heat_capacity_mj_per_k);
+    case THERMAL_MODEL_LOSS:
+        return MODEL_OFFSET(loss_uw_per_k);
+    case THERMAL_MODEL_LOSS_FAN:
+        return MODEL_OFFSET(loss_fan_uw_per_k);
+    case THERMAL_MODEL_ORTHOGONAL:
+        return MODEL_OFFSET(orthogonal_uw_per_k);
+    case THERMAL_MODEL_ORTHOGONAL_FAN:
+        return MODEL_OFFSET(orthogonal_fan_uw_per_k);
+    case THERMAL_MODEL_DIAGONAL:
+        return MODEL_OFFSET(diagonal_uw_per_k);
+    case THERMAL_MODEL_DIAGONAL_FAN:
+        return MODEL_OFFSET(diagonal_fan_uw_per_k);
+    case THERMAL_MODEL_LOSS_RISE:
+        return MODEL_OFFSET(loss_rise_ppm_per_k);
+    case THERMAL_MODEL_RADIATING_AREA:
+        return MODEL_OFFSET(radiating_area_cmm2);
+    case THERMAL_MODEL_LATENT_HEAT:
+        return MODEL_OFFSET(latent_heat_mj);
+    case THERMAL_MODEL_MARTENSITE_FINISH:
+        return MODEL_OFFSET(martensite_finish_cc);
+    case THERMAL_MODEL_MARTENSITE_START:
+        return MODEL_OFFSET(martensite_start_cc);
+    case THERMAL_MODEL_AUSTENITE_START:
+        return MODEL_OFFSET(austenite_start_cc);
+    case THERMAL_MODEL_AUSTENITE_FINISH:
+        return MODEL_OFFSET(austenite_finish_cc);
+    case THERMAL_MODEL_RESISTANCE_MARTENSITE:
+        return MODEL_OFFSET(resistance_martensite_uohm);
+    case THERMAL_MODEL_RESISTANCE_AUSTENITE:
+        return MODEL_OFFSET(resistance_austenite_uohm);
+    case THERMAL_MODEL_AIR_HEAT_CAPACITY:
+        return MODEL_OFFSET(air_heat_capacity_mj_per_k);
+    case THERMAL_MODEL_AIR_EXCHANGE:
+        return MODEL_OFFSET(air_exchange_uw_per_k);
+    case THERMAL_MODEL_PLATE_COUPLING:
+        return MODEL_OFFSET(plate_coupling_uw_per_k);
+    case THERMAL_MODEL_PLATE_HEAT_CAPACITY:
+        return MODEL_OFFSET(plate_heat_capacity_mj_per_k);
+    case THERMAL_MODEL_PLATE_LOSS:
+        return MODEL_OFFSET(plate_loss_uw_per_k);
+    case THERMAL_MODEL_WAKE:
+        return MODEL_OFFSET(wake_uw_per_k);
+    case THERMAL_MODEL_WAKE_TOWARDS:
+        return MODEL_OFFSET(wake_direction);
+    case THERMAL_MODEL_LOSS_SCALE:
+        return MODEL_OFFSET(loss_scale_permille);
+    case THERMAL_MODEL_HEAT_CAPACITY_SCALE:
+        return MODEL_OFFSET(heat_capacity_scale_permille);
+    case THERMAL_MODEL_PARAMETER_COUNT:
+        break;
+    }
+    return 0;
+}
+
+static bool move(uint16_t *bad, size_t offset)
+{
+    if (bad != NULL) {
+        *bad = (uint16_t)(*bad + offset);
+    }
+    return false;
+}
+
+/* All parts but the model, which checks itself when it takes its parameters. */
+static bool check(const controller_settings_t *settings, uint16_t *bad)
+{
+    if (settings->model.step_ms != MODEL_STEP_MS) {
+        return refuse(bad, offsetof(controller_settings_t, model) +
+                               offsetof(thermal_model_parameters_t, step_ms));
+    }
+    if (!current_control_check(&settings->current, bad)) {
+        return move(bad, offsetof(controller_settings_t, current));
+    }
+    if (!safety_check(&settings->safety, bad)) {
+        return move(bad, offsetof(controller_settings_t, safety));
+    }
+    if (!drive_policy_check(&settings->policy, bad)) {
+        return move(bad, offsetof(controller_settings_t, policy));
+    }
+    return true;
+}
+
+static bool init_model(thermal_model_t *model, const thermal_model_parameters_t *parameters,
+                       uint16_t *bad)
+{
+    thermal_model_parameter_t refused = THERMAL_MODEL_ROWS;
+    if (thermal_model_init(model, parameters, &refused) != THERMAL_MODEL_OK) {
+        return refuse(bad, offsetof(controller_settings_t, model) + model_offset(refused));
+    }
+    return true;
+}
+
+/* martensite + austenite x difference, in mohm: below 16 ohm each. */
+static void tell_resistance(controller_t *controller, uint8_t spring)
+{
+    uint16_t austenite = thermal_model_austenite(&controller->model, spring); /* Q0.15 */
+    int32_t change_q15 = (int32_t)fixed_point_mac_s16_u16(0, controller->change_mohm, austenite);
+    current_control_set_resistance(
+        &controller->current, spring,
+        (uint16_t)(controller->martensite_mohm + (uint16_t)((uint32_t)change_q15 * 2u >> 16)));
+}
+
+static void tell_all_resistances(controller_t *controller)
+{
+    const thermal_model_parameters_t *p = &controller->model.parameters;
+    controller->martensite_mohm = (uint16_t)(p->resistance_martensite_uohm / 1000u);
+    controller->change_mohm =
+        (int16_t)((int32_t)(p->resistance_austenite_uohm / 1000u) - controller->martensite_mohm);
+    for (uint8_t k = 0; k < controller->springs; k++) {
+        tell_resistance(controller, k);
+    }
+}
+
+/* After check and init_model nothing can be refused any more. */
+static void start(controller_t *controller, const controller_settings_t *settings,
+                  int16_t ambient_c7)
+{
+    thermal_model_t *model = &controller->model;
+    memset((uint8_t *)controller + sizeof *model, 0, sizeof *controller - sizeof *model);
+    controller->ambient_c7 = ambient_c7;
+    controller->springs = (uint8_t)(settings->model.rows * settings->model.columns);
+    thermal_model_set_ambient(model, ambient_c7);
+    thermal_model_reset(model, ambient_c7);
+    (void)current_control_init(&controller->current, &settings->current, NULL);
+    (void)safety_init(&controller->safety, &settings->safety, controller->springs, NULL);
+    (void)drive_policy_init(&controller->policy, &settings->policy, controller->springs, NULL);
+    drive_policy_prepare(&controller->policy, model);
+    tell_all_resistances(controller);
+}
+
+bool controller_init(controller_t *controller, const controller_settings_t *settings,
+                     int16_t ambient_c7, uint16_t *bad)
+{
+    if (!check(settings, bad) || !init_model(&controller->model, &settings->model, bad)) {
+        return false;
+    }
+    start(controller, settings, ambient_c7);
+    return true;
+}
+
+/* The remembered state suits the new parameters as it is, or temperature by temperature. */
+static void restore(thermal_model_t *model, const thermal_model_state_t *state, uint8_t springs)
+{
+    if (thermal_model_set_state(model, state)) {
+        return;
+    }
+    for (uint8_t k = 0; k < springs; k++) {
+        thermal_model_set_temperature(model, k, (int16_t)(state->spring[k].temperature_c23 >> 16));
+    }
+}
+
+bool controller_apply_settings(controller_t *controller, const controller_settings_t *settings,
+                               uint16_t *bad)
+{
+    const thermal_model_parameters_t *old = &controller->model.parameters;
+    bool same_size = settings->model.rows == old->rows && settings->model.columns == old->columns;
+    thermal_model_state_t state;
+    thermal_model_get_state(&controller->model, &state);
+    if (!check(settings, bad) || !init_model(&controller->model, &settings->model, bad)) {
+        return false;
+    }
+    if (same_size) {
+        thermal_model_set_ambient(&controller->model, controller->ambient_c7);
+        restore(&controller->model, &state, controller->springs);
+        (void)current_control_apply(&controller->current, &settings->current, NULL);
+        (void)safety_apply(&controller->safety, &settings->safety, NULL);
+        (void)drive_policy_apply(&controller->policy, &settings->policy, NULL);
+        drive_policy_prepare(&controller->policy, &controller->model);
+        tell_all_resistances(controller);
+        return true;
+    }
+    uint8_t board_fault = controller->safety.board_fault;
+    bool locked = controller->safety.locked;
+    uint8_t fan_percent = controller->fan_percent;
+    start(controller, settings, controller->ambient_c7);
+    controller->safety.board_fault = board_fault;
+    controller->safety.locked = locked;
+    controller->fan_percent = fan_percent;
+    return true;
+}
+
+/* A fifth, to 4e-6 and 1 uW: 52429 = 2^18 / 5. For sum < 2^26. */
+static uint32_t fifth(uint32_t sum)
+{
+    uint32_t low = fixed_point_mac_u16(0, (uint16_t)sum, 52429u);
+    return fixed_point_mac_u16(low >> 16, (uint16_t)(sum >> 16), 52429u) >> 2;
+}
+
+/* Takes the readings and has them judged; returns the sum of what flows. */
+static uint32_t take_sensors(controller_t *controller, const controller_inputs_t *inputs,
+                             bool valid[])
+{
+    uint32_t sum_ma = 0;
+    const controller_sensor_t *sensor = inputs->sensor;
+    for (uint8_t k = 0; k < controller->springs; k++, sensor++) {
+        safety_sample_t sample = {
+            .sensor_status = (uint8_t)sensor->status,
+            .current_ma = sensor->current_ma,
+            .voltage_mv = sensor->voltage_mv,
+            .expected_ma = current_control_reference_ma(&controller->current, k),
+            .temperature_c7 = thermal_model_temperature_c7(&controller->model, k)};
+        safety_tick_spring(&controller->safety, k, &sample);
+
+        bool good = sample.sensor_status == CONTROLLER_SENSOR_OK;
+        valid[k] = good;
+        int16_t current_ma = sample.current_ma;
+        uint32_t power_uw = 0;
+        if (good) {
+            controller->measured_ma[k] = current_ma;
+            controller->measured_mv[k] = sample.voltage_mv;
+            if (current_ma > 0) {
+                sum_ma += (uint16_t)current_ma;
+                if (sample.voltage_mv > 0) {
+                    power_uw =
+                        fixed_point_mac_u16(0, (uint16_t)current_ma, (uint16_t)sample.voltage_mv);
+                    if (power_uw > POWER_LIMIT_UW) {
+                        power_uw = POWER_LIMIT_UW;
+                    }
+                }
+            }
+            controller->power_uw[k] = power_uw;
+        } else if (controller->duty[k] != 0) {
+            power_uw = controller->power_uw[k];
+            current_ma = controller->measured_ma[k];
+            sum_ma += current_ma > 0 ? (uint16_t)current_ma : 0u;
+        } else {
+            controller->power_uw[k] = 0;
+        }
+        if (power_uw != 0) {
+            controller->power_sum_uw[k] += power_uw;
+        }
+    }
+    safety_tick_board(&controller->safety, sum_ma);
+    return sum_ma;
+}
+
+static void step_model(controller_t *controller, const controller_inputs_t *inputs)
+{
+    /* One spring in each tick: the phase moves slowly, looking it up costs. */
+    uint8_t turn = controller->resistance_turn;
+    tell_resistance(controller, turn);
+    turn++;
+    controller->resistance_turn = turn < controller->springs ? turn : 0;
+    if (++controller->model_tick < TICKS_PER_STEP) {
+        return;
+    }
+    controller->model_tick = 0;
+    for (uint8_t k = 0; k < controller->springs; k++) {
+        controller->power_sum_uw[k] =
+            drive_policy_model_power_uw(&controller->policy, k, fifth(controller->power_sum_uw[k]));
+    }
+    controller->ambient_c7 = inputs->ambient_c7;
+    thermal_model_set_ambient(&controller->model, inputs->ambient_c7);
+    thermal_model_set_fan(&controller->model, inputs->fan_percent);
+    thermal_model_step(&controller->model, controller->power_sum_uw);
+    memset(controller->power_sum_uw, 0, sizeof controller->power_sum_uw);
+}
+
+static void drive(controller_t *controller, const controller_inputs_t *inputs, const bool valid[],
+                  uint32_t sum_ma)
+{
+    bool allowed[CONTROLLER_MAX_SPRINGS];
+    for (uint8_t k = 0; k < controller->springs; k++) {
+        allowed[k] = safety_allows(&controller->safety, k);
+    }
+    const safety_parameters_t *limits = &controller->safety.parameters;
+    drive_policy_input_t input = {.model = &controller->model,
+                                  .level_permille = controller->level_permille,
+                                  .allowed = allowed,
+                                  .maximum_current_ma =
+                                      controller->current.parameters.maximum_current_ma,
+                                  .supply_limit_ma = limits->supply_limit_ma,
+                                  .measured_ma = controller->measured_ma,
+                                  .measured_mv = controller->measured_mv,
+                                  .valid = valid};
+    drive_policy_tick(&controller->policy, &input, controller->target_ma);
+
+    /* Targets fit the budget; while loops still settle, what flows may not: then none rises
+     * further. */
+    bool may_rise =
+        sum_ma + controller->policy.parameters.supply_reserve_ma <= limits->supply_limit_ma;
+    for (uint8_t k = 0; k < controller->springs; k++) {
+        if ((drive_policy_limits(&controller->policy, k) & DRIVE_POLICY_LIMIT_TRIP) != 0) {
+            safety_trip_limit(&controller->safety, k);
+        }
+        if (!allowed[k]) {
+            current_control_reset(&controller->current, k);
+        }
+        current_control_input_t channel = {.target_ma = controller->target_ma[k],
+                                           .measured_ma = inputs->sensor[k].current_ma,
+                                           .valid = valid[k],
+                                           .may_rise = may_rise};
+        controller->duty[k] = current_control_tick(&controller->current, k, &channel);
+    }
+}
+
+void controller_tick(controller_t *controller, const controller_inputs_t *inputs,
+                     controller_outputs_t *outputs)
+{
+    bool valid[CONTROLLER_MAX_SPRINGS];
+    uint32_t sum_ma = take_sensors(controller, inputs, valid);
+    step_model(controller, inputs);
+    drive(controller, inputs, valid, sum_ma);
+    memcpy(outputs->duty, controller->duty, sizeof outputs->duty);
+    outputs->fan_percent = controller->fan_percent;
+}
+
+bool controller_set_target(controller_t *controller, uint8_t spring, uint16_t level_permille)
+{
+    if (spring >= controller->springs || level_permille > DRIVE_POLICY_LEVEL_FULL) {
+        return false;
+    }
+    controller->level_permille[spring] = level_permille;
+    return true;
+}
+
+void controller_set_pattern(controller_t *controller, const bool on[])
+{
+    for (uint8_t k = 0; k < controller->springs; k++) {
+        controller->level_permille[k] = on[k] ? DRIVE_POLICY_LEVEL_FULL : 0;
+    }
+}
+
+bool controller_set_policy(controller_t *controller, drive_policy_kind_t kind)
+{
+    drive_policy_parameters_t parameters = controller->policy.parameters;
+    parameters.policy = (uint8_t)kind;
+    if (!drive_policy_apply(&controller->policy, &parameters, NULL)) {
+        return false;
+    }
+    drive_policy_prepare(&controller->policy, &controller->model);
+    return true;
+}
+
+bool controller_set_fan(controller_t *controller, uint8_t percent)
+{
+    if (percent > 100) {
+        return false;
+    }
+    controller->fan_percent = percent;
+    return true;
+}
+
+void controller_stop(controller_t *controller)
+{
+    memset(controller->level_permille, 0, sizeof controller->level_permille);
+}
+
+void controller_emergency_stop(controller_t *controller)
+{
+    controller_stop(controller);
+    safety_emergency_stop(&controller->safety);
+}
+
+void controller_clear_faults(controller_t *controller)
+{
+    controller_stop(controller);
+    safety_clear(&controller->safety);
+    drive_policy_clear(&controller->policy);
+}
+
+void controller_lock(controller_t *controller)
+{
+    safety_lock(&controller->safety);
+}
+
+void controller_unlock(controller_t *controller)
+{
+    controller_stop(controller);
+    safety_unlock(&controller->safety);
+}
+
+uint8_t controller_springs(const controller_t *controller)
+{
+    return controller->springs;
+}
+
+uint16_t controller_level_permille(const controller_t *controller, uint8_t spring)
+{
+    return controller->level_permille[spring];
+}
+
+uint16_t controller_target_ma(const controller_t *controller, uint8_t spring)
+{
+    return controller->target_ma[spring];
+}
+
+int16_t controller_measured_ma(const controller_t *controller, uint8_t spring)
+{
+    return controller->measured_ma[spring];
+}
+
+int16_t controller_measured_mv(const controller_t *controller, uint8_t spring)
+{
+    return controller->measured_mv[spring];
+}
+
+uint32_t controller_power_uw(const controller_t *controller, uint8_t spring)
+{
+    return controller->power_uw[spring];
+}
+
+uint16_t controller_duty(const controller_t *controller, uint8_t spring)
+{
+    return controller->duty[spring];
+}
+
+int16_t controller_temperature_c7(const controller_t *controller, uint8_t spring)
+{
+    return thermal_model_temperature_c7(&controller->model, spring);
+}
+
+uint16_t controller_austenite_permille(const controller_t *controller, uint8_t spring)
+{
+    return (uint16_t)((thermal_model_austenite(&controller->model, spring) * 1000ul) >> 15);
+}
+
+safety_fault_t controller_fault(const controller_t *controller, uint8_t spring)
+{
+    return safety_fault(&controller->safety, spring);
+}
+
+safety_fault_t controller_board_fault(const controller_t *controller)
+{
+    return safety_board_fault(&controller->safety);
+}
+
+uint8_t controller_limits(const controller_t *controller, uint8_t spring)
+{
+    return drive_policy_limits(&controller->policy, spring);
+}
+
+bool controller_is_locked(const controller_t *controller)
+{
+    return safety_is_locked(&controller->safety);
+}
+
+uint8_t controller_fan_percent(const controller_t *controller)
+{
+    return controller->fan_percent;
+}
+
+drive_policy_kind_t controller_policy(const controller_t *controller)
+{
+    return (drive_policy_kind_t)controller->policy.parameters.policy;
+}

@@ -1,0 +1,147 @@
+/* What it is for: one control tick of the whole board: measured inputs in, duties out.
+ * What it owns: the order in which safety, model, policy and current loops run.
+ * What it never does: touch hardware, keep time, print. Same inputs, same outputs, everywhere. */
+#ifndef CONTROLLER_H
+#define CONTROLLER_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "current_control.h"
+#include "drive_policy.h"
+#include "safety.h"
+#include "thermal_model.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define CONTROLLER_MAX_SPRINGS THERMAL_MODEL_MAX_SPRINGS
+#define CONTROLLER_TICK_MS     20   /* 50 Hz */
+#define CONTROLLER_DUTY_MAX    800u /* duty steps: timer counts of the 20 kHz PWM */
+
+/* What one current sensor said since the last tick. A failed read is a status, never a number. */
+typedef enum {
+    CONTROLLER_SENSOR_OK = 0,
+    CONTROLLER_SENSOR_ABSENT, /* no acknowledge */
+    CONTROLLER_SENSOR_BUS,    /* bus stuck or timed out */
+    CONTROLLER_SENSOR_STALE,  /* no new conversion */
+    CONTROLLER_SENSOR_RESET   /* the sensor lost its configuration */
+} controller_sensor_status_t;
+
+typedef struct {
+    controller_sensor_status_t status;
+    int16_t current_ma; /* mean current */
+    int16_t voltage_mv; /* across the spring */
+} controller_sensor_t;
+
+typedef struct {
+    controller_sensor_t sensor[CONTROLLER_MAX_SPRINGS];
+    int16_t ambient_c7;  /* degC in Q9.7 */
+    uint8_t fan_percent; /* what the fan is doing */
+} controller_inputs_t;
+
+typedef struct {
+    /* Whole duty steps, 0..800, already dithered. 0 = output off and low. */
+    uint16_t duty[CONTROLLER_MAX_SPRINGS];
+    uint8_t fan_percent;
+} controller_outputs_t;
+
+/* Everything a user can set. lib/settings holds the one table of names, limits and units over these
+ * fields. */
+typedef struct {
+    thermal_model_parameters_t model;
+    current_control_parameters_t current;
+    safety_parameters_t safety;
+    drive_policy_parameters_t policy;
+} controller_settings_t;
+
+typedef struct {
+    thermal_model_t model;
+    current_control_t current;
+    safety_t safety;
+    drive_policy_t policy;
+    uint8_t springs;
+    int16_t ambient_c7;      /* of the last model step */
+    uint8_t model_tick;      /* ticks since the last model step */
+    uint8_t fan_percent;     /* wanted */
+    uint8_t resistance_turn; /* whose resistance the current loop is told in the next tick */
+    uint16_t martensite_mohm;
+    int16_t change_mohm; /* from martensite to austenite */
+    uint16_t level_permille[CONTROLLER_MAX_SPRINGS];
+    uint16_t target_ma[CONTROLLER_MAX_SPRINGS];
+    uint16_t duty[CONTROLLER_MAX_SPRINGS];
+    int16_t measured_ma[CONTROLLER_MAX_SPRINGS]; /* last valid reading */
+    int16_t measured_mv[CONTROLLER_MAX_SPRINGS];
+    uint32_t power_uw[CONTROLLER_MAX_SPRINGS];     /* of the last tick */
+    uint32_t power_sum_uw[CONTROLLER_MAX_SPRINGS]; /* over the ticks of the running model step */
+} controller_t;
+
+/* The paper's spring and 3 x 3 array on the reference board. */
+void controller_settings_default(controller_settings_t *settings);
+
+/* Everything off, all temperatures at ambient_c7, no faults, unlocked. Fails (false, *controller
+ * unchanged) if and only if a part refuses its settings or model.step_ms is not 100; then *bad
+ * is the byte offset of the refused field in *settings (bad may be NULL). */
+bool controller_init(controller_t *controller, const controller_settings_t *settings,
+                     int16_t ambient_c7, uint16_t *bad);
+
+/* Replaces the settings while running. If rows and columns stay, so do temperatures, phases,
+ * current loops, faults, levels and fan; else as controller_init at the last ambient, but faults of
+ * the board, lock and fan stay. Fails as controller_init does, and then nothing is changed.
+ * Divides. */
+bool controller_apply_settings(controller_t *controller, const controller_settings_t *settings,
+                               uint16_t *bad);
+
+/* One tick of 20 ms: sensors, safety, model (every 5th tick, with the mean power of the ticks),
+ * policy, current loops. inputs are of the tick that just ended, outputs are for the one that
+ * starts. outputs of springs that do not exist are 0. Power is v x i of a valid reading. Without
+ * one it is the last valid power if the output was on in the tick, else 0: the duty is not raised
+ * while a channel is blind, so that is not too low. */
+void controller_tick(controller_t *controller, const controller_inputs_t *inputs,
+                     controller_outputs_t *outputs);
+
+/* Commands. Springs count from 0. They take effect in the next tick. */
+
+/* level in permille, 0 off .. 1000 on. Fails if and only if there is no such spring or level is
+ * above 1000. */
+bool controller_set_target(controller_t *controller, uint8_t spring, uint16_t level_permille);
+/* All springs at once: level 1000 where on[spring], else 0. */
+void controller_set_pattern(controller_t *controller, const bool on[]);
+/* Fails if and only if the policy does not exist in this version. */
+bool controller_set_policy(controller_t *controller, drive_policy_kind_t kind);
+/* Fails if and only if percent is above 100. */
+bool controller_set_fan(controller_t *controller, uint8_t percent);
+/* All levels to 0; no fault, the fan stays. */
+void controller_stop(controller_t *controller);
+/* All levels to 0 and SAFETY_FAULT_EMERGENCY_STOP until cleared. */
+void controller_emergency_stop(controller_t *controller);
+/* Faults are forgotten and all levels set to 0: nothing starts by clearing. */
+void controller_clear_faults(controller_t *controller);
+void controller_lock(controller_t *controller);
+/* Levels are set to 0: nothing starts by unlocking. */
+void controller_unlock(controller_t *controller);
+
+/* For telemetry; spring must be below controller_springs. */
+uint8_t controller_springs(const controller_t *controller);
+uint16_t controller_level_permille(const controller_t *controller, uint8_t spring);
+uint16_t controller_target_ma(const controller_t *controller, uint8_t spring);
+int16_t controller_measured_ma(const controller_t *controller,
+                               uint8_t spring); /* last valid reading */
+int16_t controller_measured_mv(const controller_t *controller, uint8_t spring);
+uint32_t controller_power_uw(const controller_t *controller, uint8_t spring); /* of the last tick */
+uint16_t controller_duty(const controller_t *controller, uint8_t spring);
+int16_t controller_temperature_c7(const controller_t *controller, uint8_t spring);
+uint16_t controller_austenite_permille(const controller_t *controller, uint8_t spring);
+safety_fault_t controller_fault(const controller_t *controller, uint8_t spring);
+safety_fault_t controller_board_fault(const controller_t *controller);
+uint8_t controller_limits(const controller_t *controller,
+                          uint8_t spring); /* drive_policy_limit_t bits */
+bool controller_is_locked(const controller_t *controller);
+uint8_t controller_fan_percent(const controller_t *controller); /* wanted */
+drive_policy_kind_t controller_policy(const controller_t *controller);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,237 @@
+#include "current_control.h"
+
+#include <stddef.h>
+
+#include "fixed_point.h"
+
+#define MEASURED_LIMIT_MA 4095  /* keeps current times gain below 2^27; the sensor ends at 3200 */
+#define ESTIMATE_LIMIT    24575 /* loop gain, duty steps per mA in Q16: the sum of both fits int16 */
+#define TRIM_LIMIT        8191u
+
+#ifdef __AVR__
+#define HOT __attribute__((noinline, optimize("O2"))) /* 40 of 620 cycles a channel */
+#else
+#define HOT
+#endif
+
+static bool refuse(uint16_t *bad, size_t offset)
+{
+    if (bad != NULL) {
+        *bad = (uint16_t)offset;
+    }
+    return false;
+}
+
+void current_control_parameters_default(current_control_parameters_t *parameters)
+{
+    *parameters = (current_control_parameters_t){.supply_mv = 5000,
+                                                 .freewheel_mv = 0,
+                                                 .shunt_mohm = 100,
+                                                 .wiring_mohm = 80,
+                                                 .proportional_permille = 150,
+                                                 .integral_permille = 350,
+                                                 .slew_ma_per_tick = 60,
+                                                 .maximum_current_ma = 3000,
+                                                 .maximum_duty_steps = 760,
+                                                 .trim_limit_mohm = 150,
+                                                 .hold_ticks = 10};
+}
+
+bool current_control_check(const current_control_parameters_t *p, uint16_t *bad)
+{
+    if (p->supply_mv < 1000 || p->supply_mv > 16000) {
+        return refuse(bad, offsetof(current_control_parameters_t, supply_mv));
+    }
+    if (p->freewheel_mv > 1000) {
+        return refuse(bad, offsetof(current_control_parameters_t, freewheel_mv));
+    }
+    if (p->shunt_mohm > 1000) {
+        return refuse(bad, offsetof(current_control_parameters_t, shunt_mohm));
+    }
+    if (p->wiring_mohm > 1000) {
+        return refuse(bad, offsetof(current_control_parameters_t, wiring_mohm));
+    }
+    if (p->proportional_permille > 1000) {
+        return refuse(bad, offsetof(current_control_parameters_t, proportional_permille));
+    }
+    if (p->integral_permille < 1 || p->integral_permille > 1000) {
+        return refuse(bad, offsetof(current_control_parameters_t, integral_permille));
+    }
+    if (p->slew_ma_per_tick < 1 || p->slew_ma_per_tick > 3200) {
+        return refuse(bad, offsetof(current_control_parameters_t, slew_ma_per_tick));
+    }
+    if (p->maximum_current_ma < 1 || p->maximum_current_ma > 3200) {
+        return refuse(bad, offsetof(current_control_parameters_t, maximum_current_ma));
+    }
+    if (p->maximum_duty_steps < 1 || p->maximum_duty_steps > CURRENT_CONTROL_DUTY_STEPS) {
+        return refuse(bad, offsetof(current_control_parameters_t, maximum_duty_steps));
+    }
+    if (p->trim_limit_mohm > 1000) {
+        return refuse(bad, offsetof(current_control_parameters_t, trim_limit_mohm));
+    }
+    if (p->hold_ticks > 250) {
+        return refuse(bad, offsetof(current_control_parameters_t, hold_ticks));
+    }
+    return true;
+}
+
+bool current_control_apply(current_control_t *control, const current_control_parameters_t *p,
+                           uint16_t *bad)
+{
+    if (!current_control_check(p, bad)) {
+        return false;
+    }
+    control->parameters = *p;
+    /* mean voltage behind the switch: duty x supply - (1 - duty) x drop */
+    uint16_t swing_mv = (uint16_t)(p->supply_mv + p->freewheel_mv);
+    /* 800 steps / (1000 x swing) per mA mohm, in Q24 */
+    control->gain_q24_per_mohm = (uint16_t)(13421773ul / swing_mv);
+    control->fixed_mohm = (uint16_t)(p->shunt_mohm + p->wiring_mohm);
+    control->offset_q16 = (int32_t)(p->freewheel_mv * 51200ul / swing_mv * 1024ul); /* 800 steps */
+    uint32_t trim_q16 = ((uint32_t)p->trim_limit_mohm * control->gain_q24_per_mohm) >> 8;
+    control->trim_limit_q24 = (int32_t)(trim_q16 > TRIM_LIMIT ? TRIM_LIMIT : trim_q16) * 256;
+    control->proportional_q8 = (uint16_t)((p->proportional_permille * 256ul + 500u) / 1000u);
+    control->integral_q16 = (uint16_t)(p->integral_permille * 65535ul / 1000u);
+    return true;
+}
+
+bool current_control_init(current_control_t *control,
+                          const current_control_parameters_t *parameters, uint16_t *bad)
+{
+    if (!current_control_apply(control, parameters, bad)) {
+        return false;
+    }
+    for (uint8_t k = 0; k < CURRENT_CONTROL_MAX_CHANNELS; k++) {
+        control->channel[k] = (current_control_channel_t){0};
+        current_control_set_resistance(control, k, 0);
+    }
+    return true;
+}
+
+void current_control_reset(current_control_t *control, uint8_t channel)
+{
+    current_control_channel_t *c = &control->channel[channel];
+    *c = (current_control_channel_t){.estimate_q16 = c->estimate_q16};
+}
+
+void current_control_set_resistance(current_control_t *control, uint8_t channel,
+                                    uint16_t resistance_mohm)
+{
+    uint16_t sum_mohm = (uint16_t)(resistance_mohm + control->fixed_mohm);
+    if (sum_mohm < resistance_mohm) {
+        sum_mohm = UINT16_MAX;
+    }
+    uint32_t gain_q16 = ((uint32_t)sum_mohm * control->gain_q24_per_mohm) >> 8;
+    control->channel[channel].estimate_q16 =
+        gain_q16 > ESTIMATE_LIMIT ? ESTIMATE_LIMIT : (int16_t)gain_q16;
+}
+
+/* Duty steps per mA in Q16: the estimated loop and what was learnt beyond it. */
+static inline uint16_t loop_gain_q16(int16_t estimate_q16, int32_t trim_q24)
+{
+    int16_t gain = (int16_t)(estimate_q16 + (int16_t)((uint32_t)trim_q24 >> 8));
+    return gain < 1 ? 1u : (uint16_t)gain;
+}
+
+static inline int16_t to_q8(int32_t value_q16)
+{
+    int16_t high = (int16_t)(value_q16 >> 16);
+    return high < INT8_MIN ? INT16_MIN : high > INT8_MAX ? INT16_MAX : (int16_t)(value_q16 >> 8);
+}
+
+/* trim + integral x error / reference, the reference rounded up to a power of two of at least
+ * 256 mA. */
+static inline int32_t learnt_q24(const current_control_t *control, int32_t trim_q24,
+                                 uint16_t reference_ma, int16_t error_q8)
+{
+    uint16_t integral_q16 = control->integral_q16;
+    for (uint8_t reference_256ma = (uint8_t)((uint16_t)(reference_ma - 1u) >> 8);
+         reference_256ma != 0; reference_256ma >>= 1) {
+        integral_q16 >>= 1;
+    }
+    trim_q24 += (int32_t)fixed_point_mac_s16_u16(0, error_q8, integral_q16) >> 8;
+    int32_t limit_q24 = control->trim_limit_q24;
+    if (trim_q24 < 0) {
+        return trim_q24 < -limit_q24 ? -limit_q24 : trim_q24;
+    }
+    return trim_q24 > limit_q24 ? limit_q24 : trim_q24;
+}
+
+/* A channel that is on and has a target. A call of its own: the channel's address stays in a
+ * register. */
+static HOT uint16_t tick_driven(const current_control_t *control, current_control_channel_t *c,
+                                uint16_t target_ma, const current_control_input_t *input)
+{
+    uint16_t reference_ma = c->reference_ma;
+    int16_t error_q8 = 0;
+    if (input->valid && reference_ma != 0) {
+        int16_t measured_ma = input->measured_ma;
+        if (measured_ma > MEASURED_LIMIT_MA) {
+            measured_ma = MEASURED_LIMIT_MA;
+        } else if (measured_ma < -MEASURED_LIMIT_MA) {
+            measured_ma = -MEASURED_LIMIT_MA;
+        }
+        int16_t short_ma = (int16_t)((int16_t)reference_ma - measured_ma);
+        uint32_t owed_q16 = (uint32_t)-c->excess_q16;
+        error_q8 = to_q8((int32_t)fixed_point_mac_s16_u16(
+            owed_q16, short_ma, loop_gain_q16(c->estimate_q16, c->trim_q24)));
+        c->trim_q24 = learnt_q24(control, c->trim_q24, reference_ma, error_q8);
+    }
+
+    if (target_ma <= reference_ma) {
+        reference_ma = target_ma;
+    } else if (input->may_rise && input->valid) {
+        uint16_t rise_ma = (uint16_t)(target_ma - reference_ma);
+        uint16_t slew_ma = control->parameters.slew_ma_per_tick;
+        reference_ma = (uint16_t)(reference_ma + (rise_ma < slew_ma ? rise_ma : slew_ma));
+    }
+    c->reference_ma = reference_ma;
+    if (reference_ma == 0) {
+        return 0; /* not started yet: excess and residue are still 0 */
+    }
+
+    uint32_t sum_q16 = fixed_point_mac_u16((uint32_t)control->offset_q16, reference_ma,
+                                           loop_gain_q16(c->estimate_q16, c->trim_q24));
+    int32_t wanted_q16 =
+        (int32_t)fixed_point_mac_s16_u16(sum_q16, error_q8, control->proportional_q8);
+    uint16_t duty = 0;
+    if (wanted_q16 >= 0) {
+        uint32_t dithered_q16 = (uint32_t)wanted_q16 + c->residue_q16;
+        duty = (uint16_t)(dithered_q16 >> 16);
+        uint16_t most = control->parameters.maximum_duty_steps;
+        if (duty < most) {
+            c->residue_q16 = (uint16_t)dithered_q16;
+        } else {
+            duty = most;
+        }
+    }
+    c->excess_q16 = (int32_t)((uint32_t)wanted_q16 - ((uint32_t)duty << 16));
+    return duty;
+}
+
+uint16_t current_control_tick(current_control_t *control, uint8_t channel,
+                              const current_control_input_t *input)
+{
+    current_control_channel_t *c = &control->channel[channel];
+    if (input->valid) {
+        c->blind_ticks = 0;
+    } else if (c->blind_ticks < UINT8_MAX) {
+        c->blind_ticks++;
+    }
+    uint16_t target_ma = input->target_ma;
+    if (target_ma > control->parameters.maximum_current_ma) {
+        target_ma = control->parameters.maximum_current_ma;
+    }
+    if (target_ma == 0 || c->blind_ticks > control->parameters.hold_ticks) {
+        c->reference_ma = 0;
+        c->excess_q16 = 0;
+        c->residue_q16 = 0;
+        return 0;
+    }
+    return tick_driven(control, c, target_ma, input);
+}
+
+uint16_t current_control_reference_ma(const current_control_t *control, uint8_t channel)
+{
+    return control->channel[channel].reference_ma;
+}

@@ -1,0 +1,187 @@
+/* What it is for: turns wanted levels into target currents, within the limits of springs and
+ * supply.
+ * What it owns: the choice of policy, each spring's stage (heat, hold, lower), the observer of its
+ * resistance, the derating and the queue for the shared supply.
+ * What it never does: close a current loop, switch an output, divide or use floating point in a
+ * tick. */
+#ifndef DRIVE_POLICY_H
+#define DRIVE_POLICY_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "resistance_observer.h"
+#include "supply_share.h"
+#include "thermal_model.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define DRIVE_POLICY_MAX_SPRINGS THERMAL_MODEL_MAX_SPRINGS
+#define DRIVE_POLICY_LEVEL_FULL  1000u /* permille */
+
+typedef enum {
+    DRIVE_POLICY_OPEN = 0,         /* a set current while on, nothing while off: the paper's way */
+    DRIVE_POLICY_PRECOMPENSATE = 1 /* boost, then hold by the model's inverse */
+} drive_policy_kind_t;
+
+/* Which limit holds a spring's target below what its level asks for; bits. */
+typedef enum {
+    DRIVE_POLICY_LIMIT_NONE = 0,
+    DRIVE_POLICY_LIMIT_SAFETY = 1,      /* locked or faulted: not driven */
+    DRIVE_POLICY_LIMIT_CURRENT = 2,     /* maximum current of one spring */
+    DRIVE_POLICY_LIMIT_SUPPLY = 4,      /* sum of currents */
+    DRIVE_POLICY_LIMIT_TEMPERATURE = 8, /* its own temperature */
+    DRIVE_POLICY_LIMIT_UNDRIVEN = 16,   /* an undriven neighbour would come near austenite start */
+    DRIVE_POLICY_LIMIT_OVERLOAD = 32, /* the board was above its continuous current for too long */
+    DRIVE_POLICY_LIMIT_TRIP = 64,     /* a limit stayed fully derated: off until cleared */
+    DRIVE_POLICY_LIMIT_BLIND = 128    /* not a limit: the resistance is not trusted here, phase
+                                         and level are the model's alone */
+} drive_policy_limit_t;
+
+/* What a spring is doing under DRIVE_POLICY_PRECOMPENSATE. */
+typedef enum {
+    DRIVE_POLICY_STAGE_OFF = 0,
+    DRIVE_POLICY_STAGE_HEAT, /* up to the wanted phase, as fast as the limits allow, in turn */
+    DRIVE_POLICY_STAGE_HOLD, /* inside the hysteresis band, just above martensite start */
+    DRIVE_POLICY_STAGE_LOWER /* cooling to a lower wanted phase */
+} drive_policy_stage_t;
+
+typedef struct {
+    uint8_t policy;             /* drive_policy_kind_t */
+    uint16_t open_current_ma;   /* open: current of a spring that is fully on, 0..3200 */
+    uint16_t supply_reserve_ma; /* kept free of supply_limit_ma for ripple and settling, 0..10000 */
+    /* precompensate */
+    uint16_t boost_current_ma; /* heating, 100..3200 */
+    uint16_t probe_current_ma; /* least current of a driven spring: its resistance stays readable,
+                                  100..1000 */
+    uint16_t dither_ma;        /* the current sweeps down by this and back, so that the average of
+                                  coarse voltage readings is a fine one, 0..400 */
+    uint16_t hold_margin_cc; /* above martensite start once the loss is known, 1/100 K, 50..3000 */
+    uint16_t unsure_margin_cc; /* while it is not, hold_margin_cc..5000 */
+    uint16_t search_mk_per_s;  /* how fast the margin narrows until martensite start is seen in the
+                                  resistance, mK/s, 0 (never) .. 1000 */
+    uint8_t observer;          /* 0 off, 1 the resistance corrects phase, temperature and loss */
+    uint8_t probe_period_s;    /* undriven springs get a pulse this often, 0 never .. 250 */
+    int16_t temperature_limit_cc; /* no current above, 1/100 degC, -4000..20000 */
+    uint16_t temperature_band_cc; /* derating begins this far below, 1/100 K, 100..5000 */
+    uint16_t undriven_margin_cc;  /* undriven springs stay this far below austenite start, 1/100 K,
+                                     0..5000 */
+    uint16_t overload_current_ma; /* sum of currents that the board stands for ever, 100..60000 */
+    uint16_t overload_time_s;     /* and how long more than that, 1..3000 */
+    uint16_t trip_time_s; /* fully derated for so long: off until cleared, 1..600; 0 never */
+} drive_policy_parameters_t;
+
+typedef struct {
+    resistance_observer_t observer;
+    uint16_t inverse_q14;   /* 1 / ratio of resistances */
+    uint16_t reference_q14; /* slow ratio before this hold began to lose phase */
+    uint16_t before_q14;    /* ratio half a second ago */
+    uint16_t floor_ma;      /* while it heats: what it has comes before other boosts */
+    uint16_t wanted_ma;     /* before limits */
+    uint16_t ceiling_ma;    /* by derating */
+    uint16_t target_ma;     /* given in the last tick */
+    int16_t bias_64uw;      /* loss beyond the model's, at 60 K above ambient */
+    int16_t bias_now_64uw;  /* the same at the present temperature */
+    int16_t corrected_c7;   /* sum of the observer's corrections in this heating */
+    int16_t margin_c7;      /* of the hold, above martensite start */
+    int16_t last_c7;        /* temperature one update ago */
+    int16_t lost_permille;  /* most phase that this hold was seen to lose */
+    uint16_t derated_updates;
+    uint8_t stage;     /* drive_policy_stage_t */
+    uint8_t flags;     /* internal */
+    uint8_t fresh;     /* windows since current flows without a gap, saturating */
+    uint8_t reference; /* windows that went into reference_q14 */
+    uint8_t plateau;   /* half seconds of constant resistance */
+    uint8_t suspicion; /* windows in which this hold may be losing phase */
+    uint8_t seen;      /* windows in which it does for certain */
+    uint8_t severity;  /* undriven: 255 at its limit */
+    uint8_t derating;  /* limits behind ceiling_ma */
+    uint8_t limits;    /* of the last tick */
+} drive_policy_spring_t;
+
+typedef struct {
+    drive_policy_parameters_t parameters;
+    uint8_t springs;
+    uint8_t columns;
+    uint8_t slot;  /* a fifth of the springs is updated in each tick */
+    uint8_t sweep; /* of the dither */
+    uint8_t soft;  /* ticks in which no target jumps: the policy has just changed */
+    bool prepared;
+    uint8_t probed; /* spring whose pulse it is */
+    uint16_t probe_ticks;
+    uint32_t overload_ticks;
+    supply_queue_t queue; /* springs that heat */
+    drive_policy_spring_t spring[DRIVE_POLICY_MAX_SPRINGS];
+    /* derived, see drive_policy_prepare */
+    resistance_alloy_t alloy;
+    uint32_t overload_half_ticks;
+    uint32_t overload_gain_q24;
+    uint16_t feedback_q4;   /* 64 uW per Q9.7 K */
+    uint16_t correction_q8; /* Q9.7 K per permille of phase */
+    uint16_t derating_gain; /* 2^16 over the band */
+    int16_t bias_limit_64uw;
+    int16_t event_c7; /* how far below martensite start its crossing is seen */
+    int16_t hold_margin_c7;
+    int16_t unsure_margin_c7;
+    int16_t search_c7; /* per second */
+    int16_t limit_c7;
+    int16_t undriven_c7; /* undriven springs stay below */
+} drive_policy_t;
+
+typedef struct {
+    thermal_model_t *model; /* temperatures as of the last model step; the observer corrects them */
+    const uint16_t *level_permille; /* wanted per spring, 0..1000 */
+    const bool *allowed;            /* by safety, per spring */
+    uint16_t maximum_current_ma;    /* of one spring */
+    uint16_t supply_limit_ma;       /* of the sum */
+    const int16_t *measured_ma;     /* of the last tick; NULL: nothing is measured */
+    const int16_t *measured_mv;
+    const bool *valid; /* per spring: the two are readings of the last tick */
+} drive_policy_input_t;
+
+void drive_policy_parameters_default(drive_policy_parameters_t *parameters);
+
+/* Fails if and only if a parameter is outside the range above; then *bad is its byte
+ * offset in *parameters (bad may be NULL). */
+bool drive_policy_check(const drive_policy_parameters_t *parameters, uint16_t *bad);
+
+/* Fails (false, nothing changed) if and only if springs is 0 or above DRIVE_POLICY_MAX_SPRINGS or a
+ * parameter is outside the range above; then *bad names it (bad may be NULL). */
+bool drive_policy_init(drive_policy_t *policy, const drive_policy_parameters_t *parameters,
+                       uint8_t springs, uint16_t *bad);
+/* Replaces the parameters. Fails as drive_policy_init does. */
+bool drive_policy_apply(drive_policy_t *policy, const drive_policy_parameters_t *parameters,
+                        uint16_t *bad);
+
+/* What the ticks need of the model's parameters, worked out with divisions: call it after init,
+ * after apply and whenever the model's parameters change. Without it only DRIVE_POLICY_OPEN drives.
+ */
+void drive_policy_prepare(drive_policy_t *policy, const thermal_model_t *model);
+
+/* One tick (20 ms). The targets' sum never exceeds supply_limit_ma - supply_reserve_ma. */
+void drive_policy_tick(drive_policy_t *policy, const drive_policy_input_t *input,
+                       uint16_t target_ma[]);
+
+/* Measured power of a spring less the loss that the observer found beyond the model's: what the
+ * model must be stepped with, uW. */
+uint32_t drive_policy_model_power_uw(const drive_policy_t *policy, uint8_t spring,
+                                     uint32_t power_uw);
+
+/* Bits of drive_policy_limit_t that acted on the spring in the last tick. */
+uint8_t drive_policy_limits(const drive_policy_t *policy, uint8_t spring);
+/* By how much they cut the current that it asked for, mA. */
+uint16_t drive_policy_cut_ma(const drive_policy_t *policy, uint8_t spring);
+drive_policy_stage_t drive_policy_stage(const drive_policy_t *policy, uint8_t spring);
+/* The resistance of this spring is plausible, quiet and agrees with the model. */
+bool drive_policy_observes(const drive_policy_t *policy, uint8_t spring);
+/* Austenite as the resistance says, permille; outside 0..1000 by noise. */
+int16_t drive_policy_phase_permille(const drive_policy_t *policy, uint8_t spring);
+/* Trips are forgotten. */
+void drive_policy_clear(drive_policy_t *policy);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,131 @@
+/* What it is for: decides whether each output may be on: limits, faults that latch, the lock.
+ * What it owns: the fault numbers (docs/codes.csv holds the same), counters, latches, lock.
+ * What it never does: switch an output, clamp or derate (drive_policy does), clear by itself. */
+#ifndef SAFETY_H
+#define SAFETY_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#ifndef SAFETY_MAX_SPRINGS
+#ifdef __AVR__
+#define SAFETY_MAX_SPRINGS 9
+#else
+#define SAFETY_MAX_SPRINGS 64
+#endif
+#endif
+
+/* The numbers are part of the console's contract: never renumber, only add. */
+typedef enum {
+    SAFETY_FAULT_NONE = 0,
+    /* of one spring: that spring is off until cleared */
+    SAFETY_FAULT_OVER_CURRENT = 1,
+    SAFETY_FAULT_OPEN_SPRING = 2,     /* driven, no current */
+    SAFETY_FAULT_SHORT_SPRING = 3,    /* resistance below resistance_minimum_mohm */
+    SAFETY_FAULT_HIGH_RESISTANCE = 4, /* resistance above resistance_maximum_mohm */
+    SAFETY_FAULT_SENSOR_ABSENT = 5,   /* no acknowledge */
+    SAFETY_FAULT_SENSOR_BUS = 6,      /* I2C bus stuck or timed out */
+    SAFETY_FAULT_SENSOR_STALE = 7,    /* no new conversions */
+    SAFETY_FAULT_SENSOR_RESET = 8, /* the sensor lost its configuration and did not take it again */
+    SAFETY_FAULT_OVER_TEMPERATURE = 9, /* the model says so */
+    SAFETY_FAULT_ON_TIME = 10,         /* on for longer than maximum_on_s */
+    /* of the board: every spring is off until cleared */
+    SAFETY_FAULT_STUCK_ON = 11,       /* current flows in a spring that is off: cut the supply */
+    SAFETY_FAULT_SUPPLY_CURRENT = 12, /* sum of currents above supply_limit_ma */
+    SAFETY_FAULT_EMERGENCY_STOP = 13, /* '!' or safety_emergency_stop */
+    /* of one spring */
+    SAFETY_FAULT_LIMIT_TRIP = 14, /* the policy gave up: safety_trip_limit */
+    SAFETY_FAULT_COUNT
+} safety_fault_t;
+
+typedef struct {
+    uint16_t over_current_ma;         /* trips above, 100..3200 (the sensor's full scale) */
+    uint16_t supply_limit_ma;         /* sum of all springs, 100..60000 */
+    uint16_t check_current_ma;        /* open and resistance checks need at least this expected
+                                         current, 50..3200 */
+    uint16_t resistance_minimum_mohm; /* below: short, 0..10000; 0 off */
+    uint16_t resistance_maximum_mohm; /* above: high resistance, 0..10000; 0 off */
+    uint16_t stuck_on_ma;             /* current in an output that is off, 10..3200 */
+    int16_t temperature_trip_cc;      /* of the model, 1/100 degC, 0..25000 */
+    uint16_t maximum_on_s;            /* longest time an output may be on without a pause; 0 none */
+    uint8_t bad_samples;              /* a fault needs this many bad ticks in a row, 1..250 */
+} safety_parameters_t;
+
+/* Conditions that are counted per spring; internal order of safety_t.count. */
+#define SAFETY_SPRING_CHECKS 7
+
+typedef struct {
+    safety_parameters_t parameters;
+    int16_t temperature_trip_c7;
+    uint16_t quick_ma;      /* derived: above, a sample is looked at closely */
+    uint16_t quick_low_q16; /* resistance limits, ohm */
+    uint16_t quick_high_q16;
+    uint8_t springs;
+    uint8_t board_fault; /* safety_fault_t, first one since the last clear */
+    uint8_t supply_count;
+    uint8_t second_ticks; /* ticks in the running second of the on-times */
+    bool locked;
+    uint8_t fault[SAFETY_MAX_SPRINGS];    /* safety_fault_t, first one since the last clear */
+    uint8_t counting[SAFETY_MAX_SPRINGS]; /* bit k: count k is not 0 */
+    uint8_t count[SAFETY_MAX_SPRINGS][SAFETY_SPRING_CHECKS];
+    uint16_t on_s[SAFETY_MAX_SPRINGS];
+} safety_t;
+
+/* What is known about one spring in this tick. */
+typedef struct {
+    uint8_t sensor_status;  /* 0 valid, else 1 absent, 2 bus, 3 stale, 4 reset
+                               (controller_sensor_status_t) */
+    int16_t current_ma;     /* any value; ignored unless valid */
+    int16_t voltage_mv;     /* any value; ignored unless valid */
+    uint16_t expected_ma;   /* reference of the current loop in the measured tick; 0: it was off */
+    int16_t temperature_c7; /* of the model, degC in Q9.7 */
+} safety_sample_t;
+
+void safety_parameters_default(safety_parameters_t *parameters);
+
+/* Fails if and only if a parameter is outside the range above; then *bad is its
+ * byte offset in *parameters (bad may be NULL). */
+bool safety_check(const safety_parameters_t *parameters, uint16_t *bad);
+
+/* No faults, unlocked. Fails (false, nothing changed) if and only if springs is 0 or above
+ * SAFETY_MAX_SPRINGS or a parameter is outside the range above; then *bad is its
+ * byte offset in *parameters (bad may be NULL). */
+bool safety_init(safety_t *safety, const safety_parameters_t *parameters, uint8_t springs,
+                 uint16_t *bad);
+
+/* Replaces the parameters, keeps faults and counters. Fails as safety_init does. */
+bool safety_apply(safety_t *safety, const safety_parameters_t *parameters, uint16_t *bad);
+
+/* One tick (20 ms): every spring once, then the board once with the sum of the valid currents. */
+void safety_tick_spring(safety_t *safety, uint8_t spring, const safety_sample_t *sample);
+void safety_tick_board(safety_t *safety, uint32_t sum_ma);
+
+/* True if and only if the output may be on: not locked, no board fault, no fault of this spring. */
+bool safety_allows(const safety_t *safety, uint8_t spring);
+
+safety_fault_t safety_fault(const safety_t *safety, uint8_t spring);
+safety_fault_t safety_board_fault(const safety_t *safety);
+/* A fault's name, in flash, as in docs/codes.csv ("open_spring"); "none" and, out of range,
+ * "unknown". */
+const char *safety_fault_name(safety_fault_t fault);
+
+/* Forgets all faults and counters. A condition that persists trips again after bad_samples ticks.
+ * Not the lock. */
+void safety_clear(safety_t *safety);
+/* Latches SAFETY_FAULT_LIMIT_TRIP: the policy held this spring at nothing for too long. */
+void safety_trip_limit(safety_t *safety, uint8_t spring);
+/* Latches SAFETY_FAULT_EMERGENCY_STOP. */
+void safety_emergency_stop(safety_t *safety);
+/* After a watchdog or brown-out reset: nothing is driven until unlocked. */
+void safety_lock(safety_t *safety);
+void safety_unlock(safety_t *safety);
+bool safety_is_locked(const safety_t *safety);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

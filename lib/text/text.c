@@ -1,0 +1,135 @@
+#include "text.h"
+
+#define LARGEST     2147483647ul
+#define MOST_DIGITS 10u
+
+static const uint32_t powers[MOST_DIGITS] FLASH_MEMORY = {
+    1ul, 10ul, 100ul, 1000ul, 10000ul, 100000ul, 1000000ul, 10000000ul, 100000000ul, 1000000000ul};
+
+/* size = 10 size + digit. Fails if and only if that is above LARGEST; then size is as before. */
+static bool append_digit(uint32_t *size, uint8_t digit)
+{
+    if (*size > LARGEST / 10u || (*size == LARGEST / 10u && digit > LARGEST % 10u)) {
+        return false;
+    }
+    *size = *size * 10u + digit;
+    return true;
+}
+
+text_result_t text_parse_decimal(const char *text, uint8_t decimals, int32_t *value)
+{
+    bool any_digit = false;
+    bool point = false;
+    bool fits = true;
+    uint32_t size = 0;
+    uint8_t given = 0; /* decimals seen */
+    const bool negative = *text == '-';
+
+    if (*text == '-' || *text == '+') {
+        text++;
+    }
+    for (; *text != '\0'; text++) {
+        if (*text == '.' && !point) {
+            point = true;
+            continue;
+        }
+        if (*text < '0' || *text > '9') {
+            return TEXT_NOT_A_NUMBER;
+        }
+        any_digit = true;
+        const uint8_t digit = (uint8_t)(*text - '0');
+        if (!point) {
+            fits = fits && append_digit(&size, digit);
+        } else if (given < decimals) {
+            given++;
+            fits = fits && append_digit(&size, digit);
+        } else if (digit != 0) {
+            return TEXT_NOT_A_NUMBER; /* finer than wanted: dropping it would be silent */
+        }
+    }
+    if (!any_digit) {
+        return TEXT_NOT_A_NUMBER;
+    }
+    for (; given < decimals; given++) {
+        fits = fits && append_digit(&size, 0);
+    }
+    if (!fits) {
+        return TEXT_TOO_LARGE;
+    }
+    *value = negative ? -(int32_t)size : (int32_t)size;
+    return TEXT_OK;
+}
+
+uint8_t text_format_decimal(int32_t value, uint8_t decimals, char *text)
+{
+    uint8_t length = 0;
+    uint32_t rest = value < 0 ? 0u - (uint32_t)value : (uint32_t)value;
+    uint32_t power;
+    bool started = false;
+
+    if (value < 0) {
+        text[length++] = '-';
+    }
+    for (uint8_t place = MOST_DIGITS; place-- > 0;) {
+        flash_copy(&power, &powers[place], sizeof power);
+        char digit = '0';
+        while (rest >= power) {
+            rest -= power;
+            digit++;
+        }
+        started = started || digit != '0' || place <= decimals;
+        if (!started) {
+            continue;
+        }
+        text[length++] = digit;
+        if (place == decimals && decimals > 0) {
+            text[length++] = '.';
+        }
+    }
+    text[length] = '\0';
+    return length;
+}
+
+void text_line_start(text_line_t *line, char *bytes, uint8_t size)
+{
+    line->bytes = bytes;
+    line->size = size;
+    line->length = 0;
+}
+
+void text_add_char(text_line_t *line, char character)
+{
+    if (line->length < line->size) {
+        line->bytes[line->length++] = character;
+    }
+}
+
+void text_add(text_line_t *line, const char *text)
+{
+    for (; *text != '\0'; text++) {
+        text_add_char(line, *text);
+    }
+}
+
+void text_add_flash(text_line_t *line, const char *text)
+{
+    for (;; text++) {
+        const char character = (char)flash_byte(text);
+        if (character == '\0') {
+            return;
+        }
+        text_add_char(line, character);
+    }
+}
+
+void text_add_decimal(text_line_t *line, int32_t value, uint8_t decimals)
+{
+    char digits[TEXT_DECIMAL_SIZE];
+    text_format_decimal(value, decimals, digits);
+    text_add(line, digits);
+}
+
+int16_t text_centi_from_c7(int16_t temperature_c7)
+{
+    return (int16_t)(((int32_t)temperature_c7 * 25 + 16) >> 5); /* x 100 / 128 */
+}

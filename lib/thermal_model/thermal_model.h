@@ -1,0 +1,321 @@
+/* What it is for: a lumped thermal network of an array of NiTi springs, in integers, one step per
+ * 0.1 s.
+ * What it owns: the temperature, enthalpy and phase of each spring, of the shared air and of the
+ * plate.
+ * What it never does: measure, decide a current, divide or use floating point in a step, allocate.
+ */
+#ifndef THERMAL_MODEL_H
+#define THERMAL_MODEL_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#ifndef THERMAL_MODEL_MAX_SPRINGS
+#ifdef __AVR__
+#define THERMAL_MODEL_MAX_SPRINGS 9
+#else
+#define THERMAL_MODEL_MAX_SPRINGS 64
+#endif
+#endif
+
+/* The array lies in a frame of fixed width, its shorter side along the row: 3 of 9 (or of 15), 8 of
+ * 64 (or of 80). */
+#if THERMAL_MODEL_MAX_SPRINGS <= 15
+#define THERMAL_MODEL_FRAME_STRIDE 5
+#elif THERMAL_MODEL_MAX_SPRINGS <= 80
+#define THERMAL_MODEL_FRAME_STRIDE 10
+#else
+#error "THERMAL_MODEL_MAX_SPRINGS above 80"
+#endif
+
+/* Where the fan's air goes: towards the next column, the next row, ... (row 1 is at the top). */
+typedef enum {
+    THERMAL_MODEL_WAKE_EAST = 0,
+    THERMAL_MODEL_WAKE_SOUTH,
+    THERMAL_MODEL_WAKE_WEST,
+    THERMAL_MODEL_WAKE_NORTH
+} thermal_model_wake_t;
+
+/* Physical parameters, all integers. 0 switches the effect of a parameter off where it says so.
+ * Springs are row-major, spring 0 is row 1, column 1. */
+typedef struct {
+    uint8_t rows;
+    uint8_t columns;
+    uint16_t step_ms;                /* length of one step */
+    uint16_t heat_capacity_mj_per_k; /* of one spring */
+    uint16_t loss_uw_per_k;          /* one spring to the air around it, fan off */
+    uint16_t loss_fan_uw_per_k;      /* the same, fan at 100 % */
+    uint16_t orthogonal_uw_per_k;    /* between neighbours in a row or column, fan off */
+    uint16_t orthogonal_fan_uw_per_k;
+    uint16_t diagonal_uw_per_k;
+    uint16_t diagonal_fan_uw_per_k;
+    uint16_t loss_rise_ppm_per_k; /* natural_convection: loss conductance rises
+                                     with (T - air); 0 off */
+    uint16_t radiating_area_cmm2; /* radiation: emissivity times surface, 1/100
+                                     mm2; 0 off */
+    uint16_t latent_heat_mj;      /* latent_heat: of one spring's full transformation;
+                                     0 off */
+    int16_t martensite_finish_cc; /* transformation temperatures, 1/100 degC */
+    int16_t martensite_start_cc;
+    int16_t austenite_start_cc;
+    int16_t austenite_finish_cc;
+    uint32_t resistance_martensite_uohm;
+    uint32_t resistance_austenite_uohm;  /* may be above or below the martensite's */
+    uint32_t air_heat_capacity_mj_per_k; /* shared_air: the air between the springs */
+    uint32_t air_exchange_uw_per_k;      /* shared_air: that air to ambient; 0: no
+                                            shared air (it is ambient) */
+    uint16_t plate_coupling_uw_per_k;    /* plate_conduction: each spring to the
+                                            plate; 0 off */
+    uint32_t plate_heat_capacity_mj_per_k;
+    uint16_t plate_loss_uw_per_k; /* plate to ambient */
+    uint16_t wake_uw_per_k;       /* fan_wake: heat received per K of the upstream
+                                     spring above air, fan       at 100 %; 0 off */
+    uint8_t wake_direction;       /* thermal_model_wake_t */
+    uint16_t loss_scale_permille[THERMAL_MODEL_MAX_SPRINGS];          /* edge_loss,
+                                                                         spring_mismatch */
+    uint16_t heat_capacity_scale_permille[THERMAL_MODEL_MAX_SPRINGS]; /* spring_mismatch
+                                                                       */
+} thermal_model_parameters_t;
+
+/* What a parameter can be refused for. */
+typedef enum {
+    THERMAL_MODEL_OK = 0,
+    THERMAL_MODEL_ERROR_RANGE = -1,    /* outside the parameter's own limits */
+    THERMAL_MODEL_ERROR_OVERFLOW = -2, /* heat flows would not fit the accumulator */
+    THERMAL_MODEL_ERROR_UNSTABLE =
+        -3, /* the step is too long for this heat capacity and these losses */
+    THERMAL_MODEL_ERROR_ORDER = -4 /* transformation temperatures out of order */
+} thermal_model_status_t;
+
+/* One for each field of thermal_model_parameters_t, in order. */
+typedef enum {
+    THERMAL_MODEL_ROWS = 0,
+    THERMAL_MODEL_COLUMNS,
+    THERMAL_MODEL_STEP,
+    THERMAL_MODEL_HEAT_CAPACITY,
+    THERMAL_MODEL_LOSS,
+    THERMAL_MODEL_LOSS_FAN,
+    THERMAL_MODEL_ORTHOGONAL,
+    THERMAL_MODEL_ORTHOGONAL_FAN,
+    THERMAL_MODEL_DIAGONAL,
+    THERMAL_MODEL_DIAGONAL_FAN,
+    THERMAL_MODEL_LOSS_RISE,
+    THERMAL_MODEL_RADIATING_AREA,
+    THERMAL_MODEL_LATENT_HEAT,
+    THERMAL_MODEL_MARTENSITE_FINISH,
+    THERMAL_MODEL_MARTENSITE_START,
+    THERMAL_MODEL_AUSTENITE_START,
+    THERMAL_MODEL_AUSTENITE_FINISH,
+    THERMAL_MODEL_RESISTANCE_MARTENSITE,
+    THERMAL_MODEL_RESISTANCE_AUSTENITE,
+    THERMAL_MODEL_AIR_HEAT_CAPACITY,
+    THERMAL_MODEL_AIR_EXCHANGE,
+    THERMAL_MODEL_PLATE_COUPLING,
+    THERMAL_MODEL_PLATE_HEAT_CAPACITY,
+    THERMAL_MODEL_PLATE_LOSS,
+    THERMAL_MODEL_WAKE,
+    THERMAL_MODEL_WAKE_TOWARDS,
+    THERMAL_MODEL_LOSS_SCALE,
+    THERMAL_MODEL_HEAT_CAPACITY_SCALE,
+    THERMAL_MODEL_PARAMETER_COUNT
+} thermal_model_parameter_t;
+
+/* Temperatures are held within these, degC in Q9.7: -40 .. 215. What lies outside counts as the
+ * limit. A spring's upper limit is 255 degC less latent heat over heat capacity where that is
+ * lower. */
+#define THERMAL_MODEL_LOWEST_C7  (-40 * 128)
+#define THERMAL_MODEL_HIGHEST_C7 (215 * 128)
+#define THERMAL_MODEL_HIGHEST_POWER_UW                                                             \
+    8388607u                                /* 8.4 W: more counts as this                          \
+                                             */
+#define THERMAL_MODEL_AUSTENITE_FULL 32768u /* Q0.15 of thermal_model_austenite */
+
+typedef enum {
+    THERMAL_MODEL_BRANCH_COOLING = 0, /* austenite = amplitude S((M_s - turn) / (M_s - M_f)) */
+    THERMAL_MODEL_BRANCH_HEATING = 1  /* austenite = 1 - amplitude S((turn - A_s) / (A_f - A_s)) */
+} thermal_model_branch_t;             /* S(x) = (1 + cos(pi x)) / 2, Liang and Rogers 1990
+                                       */
+
+/* What one spring remembers. */
+typedef struct {
+    int32_t temperature_c23; /* Q9.23 degC */
+    int32_t latent_c23;      /* Q9.23 K: latent heat taken up over heat capacity; the
+                                sum of both is the enthalpy */
+    int16_t heating_c7;      /* above this, austenite forms; the upper limit when none
+                                is left to form */
+    int16_t cooling_c7;      /* below this, martensite forms; the lower limit when none
+                                is left to form */
+    uint16_t amplitude;      /* Q0.15, of the branch */
+    uint8_t gain;            /* 1/256: dT/dh where the branch was left */
+    uint8_t branch;          /* thermal_model_branch_t */
+} thermal_model_spring_state_t;
+
+/* What a model remembers: plain data, can be kept over a warm reset. */
+typedef struct {
+    int32_t air_c23;
+    int32_t plate_c23;
+    thermal_model_spring_state_t spring[THERMAL_MODEL_MAX_SPRINGS];
+} thermal_model_state_t;
+
+/* Derived from the parameters: internal, read it through the functions. */
+typedef struct {
+    uint32_t step_gain;   /* 2^41 1e-6 step / heat capacity */
+    int32_t gain_c23;     /* enthalpy gained in this step */
+    int16_t block_offset; /* the same, in bytes from this struct */
+    uint16_t frame;       /* where in the frame the block of 3 x 3 around it begins */
+    uint16_t orthogonal;  /* uW/K at the present fan; the same for all, kept here
+                             for the step's speed */
+    uint16_t diagonal;
+    uint16_t conduction; /* all of this spring's couplings and the plate's */
+    uint16_t loss;
+    uint16_t loss_rise;    /* uW/K per 1024 K */
+    uint16_t loss_natural; /* uW/K, scaled for this spring: fan off, fan full */
+    uint16_t loss_fan;
+    uint16_t loss_rise_natural;
+    uint16_t branch_latent; /* Q8.8 K: amplitude times latent heat over heat
+                               capacity */
+    uint16_t branch_slope;  /* of the branch, for the slope table */
+    uint8_t orthogonals;    /* neighbours */
+    uint8_t diagonals;
+    bool upstream;   /* a spring from which the fan blows */
+    uint8_t pending; /* this step took it past a threshold: its phase is still to
+                        follow */
+} thermal_model_spring_t;
+
+/* What a pass over the springs takes and gives back. Internal. */
+typedef struct {
+    uint32_t common;   /* flow into every spring, 1/64 uW, rounding included */
+    int32_t air_flow;  /* from the springs, 4 uW: added to */
+    uint32_t lead_sum; /* of all springs */
+#ifdef THERMAL_MODEL_CHIP_LAYOUT
+    uint16_t power_uw; /* for who reads the chip's memory from outside: its pointers have 16 bits */
+#else
+    const uint32_t *power_uw;
+#endif
+    uint16_t air_lead; /* 1/64 K above just under the lowest */
+    uint8_t count;
+    uint8_t flags;   /* 1: every gain_c23 holds a flow of its own to begin with; 2:
+                        some loss_rise is not 0 */
+    uint8_t pending; /* out: some spring is */
+} thermal_model_pass_t;
+
+/* Air or plate: how flow becomes temperature. Internal. */
+typedef struct {
+    uint32_t gain; /* 2^-16, or 2^-8 where `wide`, of 2^-23 K a unit of flow */
+    uint16_t loss; /* to ambient: uW/K; 256 uW/K where SLOW_NODE_COARSE */
+    uint8_t units; /* SLOW_NODE_... bits; a unit of flow is 4 uW, 64 uW where SLOW_NODE_MANY */
+    bool wide;
+    bool leads; /* its own time is long against a step: taken half a step ahead,
+                 * as the springs are
+                 */
+} thermal_model_slow_node_t;
+
+typedef struct {
+    thermal_model_parameters_t parameters;
+    thermal_model_state_t state;
+    thermal_model_spring_t spring[THERMAL_MODEL_MAX_SPRINGS];
+    /* temperatures half a step ahead, 1/64 K above just under the lowest; 0 where there is no
+     * spring */
+    uint16_t lead[THERMAL_MODEL_FRAME_STRIDE * (THERMAL_MODEL_MAX_SPRINGS + 2)];
+    thermal_model_pass_t pass;
+    thermal_model_slow_node_t air;
+    thermal_model_slow_node_t plate;
+    int32_t latent_full_c23;    /* latent heat over heat capacity */
+    uint32_t ambient_radiation; /* 1/64 uW */
+    uint16_t ambient_lead;      /* 1/64 K above just under the lowest */
+    uint16_t plate_lead;
+    uint16_t radiation_factor;
+    uint16_t wake;
+    int16_t martensite_finish_c7;
+    int16_t martensite_start_c7;
+    int16_t austenite_start_c7;
+    int16_t austenite_finish_c7;
+    uint16_t heating_position; /* 2^21 / width of the transformation */
+    uint16_t cooling_position;
+    uint16_t heating_slope;
+    uint16_t cooling_slope;
+    int16_t ambient_c7;
+    int16_t highest_c7; /* of a spring: temperature plus latent heat must fit */
+    int8_t wake_offset; /* to the upstream spring in the frame */
+    uint8_t fan_percent;
+} thermal_model_t;
+
+/* The paper's spring at 4 mm pitch, 3 x 3, 0.1 s, no optional effect but phase and latent heat
+ * (docs/physics.md). */
+void thermal_model_parameters_default(thermal_model_parameters_t *parameters);
+
+/* The field's name as it is written in thermal_model_parameters_t, "" for no parameter. */
+const char *thermal_model_parameter_name(thermal_model_parameter_t parameter);
+
+/* Takes the parameters; then fan off, ambient 20 degC, everything at 20 degC and martensite. On
+ * refusal the model is unchanged and *bad (may be NULL) says which parameter. O(n); divides: for
+ * start-up, not for the tick. Fails if and only if
+ *
+ * RANGE: rows x columns not in 1..THERMAL_MODEL_MAX_SPRINGS; step_ms not in 1..1000; a scale not in
+ * 1..8000 permille; heat capacity times scale below 1 mJ/K, or so small that a step of the highest
+ * power exceeds 64 K; latent heat over heat capacity above 80 K or above 20 times either width; a
+ * transformation narrower than 2 K or wider than 100 K; martensite finish below -30 degC; austenite
+ * finish, or that plus latent heat over heat capacity, above 200 degC; a resistance of 0 or above
+ * 16 ohm; loss rise above 20000 ppm/K; wake direction above 3; wake above the fan's loss (heat from
+ * nothing); air or plate above 2 kJ/K; a plate coupled but without heat capacity.
+ *
+ * ORDER: not martensite finish < martensite start <= austenite start < austenite finish.
+ *
+ * OVERFLOW: one spring's couplings and plate above 65.5 mW/K, its loss (at 255 K if it rises) above
+ * 65.5 mW/K, all of it with wake and radiation above 98 mW/K, or its loss rising by more than
+ * 64 uW/K per K.
+ *
+ * UNSTABLE: step times conductance above half the heat capacity of a spring, or of the plate. */
+thermal_model_status_t thermal_model_init(thermal_model_t *model,
+                                          const thermal_model_parameters_t *parameters,
+                                          thermal_model_parameter_t *bad);
+
+/* Springs, air and plate to one temperature, reached from cold: martensite below austenite start.
+ * O(n). */
+void thermal_model_reset(thermal_model_t *model, int16_t temperature_c7);
+/* O(1). */
+void thermal_model_set_ambient(thermal_model_t *model, int16_t ambient_c7);
+/* Conductances between fan off (0) and full (100, more counts as 100). O(n) on a change, else O(1);
+ * no division. */
+void thermal_model_set_fan(thermal_model_t *model, uint8_t percent);
+
+/* One step of step_ms with power_uw[i] into spring i. O(n), 32-bit products, no division. */
+void thermal_model_step(thermal_model_t *model, const uint32_t power_uw[]);
+
+/* Getters, O(1). An index out of range reads as spring 0. */
+int16_t thermal_model_temperature_c7(const thermal_model_t *model, uint8_t spring);
+uint16_t thermal_model_austenite(const thermal_model_t *model,
+                                 uint8_t spring); /* Q0.15, 0..32768 */
+uint32_t thermal_model_resistance_uohm(const thermal_model_t *model, uint8_t spring);
+int16_t
+thermal_model_air_c7(const thermal_model_t *model); /* ambient where there is no shared air */
+int16_t thermal_model_plate_c7(const thermal_model_t *model);
+
+/* Takes one spring to a temperature as if slowly: on the way its phase transforms as it would.
+ * O(1). */
+void thermal_model_set_temperature(thermal_model_t *model, uint8_t spring, int16_t temperature_c7);
+/* The same by a difference: an observer's correction. Saturates. */
+void thermal_model_add_temperature(thermal_model_t *model, uint8_t spring, int16_t difference_c7);
+
+/* The steady power that holds that spring at that temperature while its neighbours, air and plate
+ * are as they are now; negative where it would have to be cooled. O(1), no division. */
+int32_t thermal_model_power_to_hold_uw(const thermal_model_t *model, uint8_t spring,
+                                       int16_t temperature_c7);
+
+/* O(n). */
+void thermal_model_get_state(const thermal_model_t *model, thermal_model_state_t *state);
+/* False, and the model unchanged, if and only if the state is not one this model could be in. O(n).
+ */
+bool thermal_model_set_state(thermal_model_t *model, const thermal_model_state_t *state);
+
+/* Everything remembered is within its limits and fits together. O(n). */
+bool thermal_model_is_consistent(const thermal_model_t *model);
+
+#ifdef __cplusplus
+}
+#endif
+#endif
