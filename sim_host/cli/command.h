@@ -1,0 +1,57 @@
+/* What it is for: one subcommand of ninespring-sim a file; this is how they are added and what
+ * they share.
+ * What it owns: the checks of output files, the progress line, the JSON form.
+ * What it never does: decide an exit code: it throws input_error (2) or work_error (1). */
+#ifndef COMMAND_H
+#define COMMAND_H
+
+#include <CLI/CLI.hpp>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "plant.h"
+#include "text_file.h"
+
+namespace ninespring
+{
+
+/* Each adds its subcommand; it runs in the subcommand's callback. */
+void add_command_run(CLI::App &app);
+void add_command_paper(CLI::App &app);
+void add_command_replay(CLI::App &app);
+void add_command_parameters(CLI::App &app);
+void add_command_hil(CLI::App &app);
+void add_command_board(CLI::App &app); /* only where libsimavr is */
+
+struct plant_deleter {
+    void operator()(plant_t *plant) const { plant_destroy(plant); }
+};
+using plant_pointer = std::unique_ptr<plant_t, plant_deleter>;
+
+/* Before the work: an output in a missing folder, or over an input, is refused (input_error). Empty
+ * paths are skipped. */
+void check_outputs(const std::vector<std::string> &outputs, const std::vector<std::string> &inputs);
+
+/* The JSON as it is written everywhere: two blanks of indent, NaN as null, a line end. */
+std::string json_text(const nlohmann::ordered_json &value);
+
+/* A line on stderr that says how far the work is; silent where stderr is not a terminal. */
+class progress_line
+{
+public:
+    explicit progress_line(std::string what);
+    ~progress_line();
+    progress_line(const progress_line &) = delete;
+    progress_line &operator=(const progress_line &) = delete;
+    void show(double fraction);
+
+private:
+    std::string what_;
+    bool terminal_;
+    int shown_percent_ = -1;
+};
+
+} // namespace ninespring
+#endif

@@ -1,0 +1,163 @@
+/* ninespring-sim board: the firmware's ELF in a simulated Mega, in real time, behind a
+ * pseudo-terminal. */
+#include <chrono>
+#include <cmath>
+#include <csignal>
+#include <cstring>
+#include <fmt/format.h>
+#include <fstream>
+#include <thread>
+
+#include "board.h"
+#include "board_pty.h"
+#include "command.h"
+#include "simulated_board.h"
+
+namespace ninespring
+{
+
+namespace
+{
+
+volatile std::sig_atomic_t interrupted = 0;
+
+void on_signal(int)
+{
+    interrupted = 1;
+}
+
+struct board_arguments {
+    std::string elf;
+    std::string speed = "1";
+    std::string eeprom;
+    double duration_s = 0.0; /* 0: until interrupted */
+};
+
+/* 0 is as fast as it goes. */
+double speed_of(const std::string &text)
+{
+    if (text == "max") {
+        return 0.0;
+    }
+    double speed = 0.0;
+    const std::string problem = parse_number(text, speed);
+    if (!problem.empty() || !(speed >= 0.01 && speed <= 100.0)) {
+        throw input_error(
+            fmt::format("--speed {}: write max, or a number from 0.01 to 100", in_quotes(text)));
+    }
+    return speed;
+}
+
+/* Keeps simulated time from running ahead of the clock on the wall. */
+class pace
+{
+public:
+    explicit pace(double speed) : speed_(speed), begun_(std::chrono::steady_clock::now()) {}
+
+    void wait(double simulated_s)
+    {
+        if (speed_ == 0.0) {
+            return;
+        }
+        const double now_s = elapsed_s();
+        const double ahead_s = (simulated_s - shift_s_) / speed_ - now_s;
+        if (ahead_s > 0.0) {
+            std::this_thread::sleep_for(std::chrono::duration<double>(ahead_s));
+        } else if (ahead_s < -MAX_BEHIND_S) {
+            shift_s_ = simulated_s - now_s * speed_; /* does not hurry after a pause */
+            lost_s_ -= ahead_s;
+        }
+    }
+    [[nodiscard]] double lost_s() const { return lost_s_; }
+
+private:
+    static constexpr double MAX_BEHIND_S = 0.2;
+    [[nodiscard]] double elapsed_s() const
+    {
+        return std::chrono::duration<double>(std::chrono::steady_clock::now() - begun_).count();
+    }
+    double speed_;
+    std::chrono::steady_clock::time_point begun_;
+    double shift_s_ = 0.0;
+    double lost_s_ = 0.0;
+};
+
+class terminal
+{
+public:
+    terminal()
+    {
+        if (board_pty_open(&pty_) != 0) {
+            throw work_error(fmt::format("no pseudo-terminal to be had: {}", std::strerror(errno)));
+        }
+    }
+    ~terminal() { board_pty_close(&pty_); }
+    terminal(const terminal &) = delete;
+    terminal &operator=(const terminal &) = delete;
+    board_pty_t *get() { return &pty_; }
+
+private:
+    board_pty_t pty_{};
+};
+
+void run_board(const board_arguments &arguments)
+{
+    const double speed = speed_of(arguments.speed);
+    const plant_pointer plant(plant_create(3, 3));
+    if (!plant) {
+        throw std::bad_alloc();
+    }
+    simulated_board board(arguments.elf, plant.get(), 1);
+    eeprom_file eeprom(arguments.eeprom, board.get());
+    terminal port;
+    std::signal(SIGINT, on_signal);
+    std::signal(SIGTERM, on_signal);
+    fmt::print("{}\n", port.get()->name);
+    fmt::print(stderr, "board on {} at 115200 baud, {}; Ctrl-C ends it\n", port.get()->name,
+               speed == 0.0 ? std::string("as fast as it goes")
+                            : fmt::format("{} x real time", speed));
+    std::fflush(stdout);
+
+    pace clock(speed);
+    std::uint8_t bytes[256];
+    while (interrupted == 0 &&
+           (arguments.duration_s == 0.0 || board_time_s(board.get()) < arguments.duration_s)) {
+        if (board_send_backlog(board.get()) < sizeof bytes) {
+            board_send(board.get(), bytes, board_pty_read(port.get(), bytes, sizeof bytes));
+        }
+        board.run_ms(1.0);
+        const std::string text = board.take_output();
+        board_pty_write(port.get(), reinterpret_cast<const std::uint8_t *>(text.data()),
+                        text.size());
+        eeprom.save_when_idle();
+        clock.wait(board_time_s(board.get()));
+    }
+    eeprom.save();
+    if (clock.lost_s() > 0.0) {
+        fmt::print(stderr, "this machine was too slow: {:.1f} s were lost against the wall clock\n",
+                   clock.lost_s());
+    }
+}
+
+} // namespace
+
+void add_command_board(CLI::App &app)
+{
+    auto arguments = std::make_shared<board_arguments>();
+    arguments->elf = default_elf("firmware.elf");
+    CLI::App *command =
+        app.add_subcommand("board", "A simulated board on a pseudo-terminal, for any serial "
+                                    "terminal: prints its name and runs until Ctrl-C");
+    command->add_option("--elf", arguments->elf, "The firmware")->capture_default_str();
+    command->add_option("--speed", arguments->speed, "Times real time, or max")
+        ->capture_default_str();
+    command->add_option("--eeprom", arguments->eeprom,
+                        "File that keeps the EEPROM; made if it is not there");
+    command
+        ->add_option("--duration", arguments->duration_s,
+                     "Simulated seconds after which it ends; 0: never")
+        ->check(CLI::NonNegativeNumber);
+    command->callback([arguments] { run_board(*arguments); });
+}
+
+} // namespace ninespring

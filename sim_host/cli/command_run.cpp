@@ -1,0 +1,444 @@
+#include "command.h"
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <fmt/format.h>
+#include <optional>
+
+#include "chip_mapping.h"
+#include "electrics.h"
+#include "log_file.h"
+#include "model_file.h"
+#include "paper.h"
+#include "runner.h"
+#include "scenario_file.h"
+
+namespace ninespring
+{
+
+namespace
+{
+
+struct run_options {
+    std::string scenario_path;
+    std::string board = "native";
+    std::string elf;
+    std::string policy;
+    std::vector<std::string> sets;
+    std::optional<std::uint64_t> seed;
+    std::string output;
+    std::string json_path;
+};
+
+plant_pointer make_plant(const scenario &plan)
+{
+    plant_pointer plant(plant_create(plan.rows, plan.cols));
+    if (plant == nullptr) {
+        throw input_error(plan.name, 0, 0, "there is no plant of these rows and cols");
+    }
+    /* The pitch gives the paper's loss and couplings; what [plant] says comes after it. */
+    if (plan.pitch_mm && paper_configure(plant.get(), *plan.pitch_mm) != PLANT_OK) {
+        throw input_error(plan.name, 0, 0,
+                          "[array] pitch_mm: the spacing law holds for 1 to 100 mm");
+    }
+    for (const scenario_entry &effect : plan.effects) {
+        set_plant_effect(plant.get(), effect.key, effect.place);
+    }
+    /* What is said of all springs first, so that the order in the file does not matter. */
+    for (const bool one_spring : {false, true}) {
+        for (const scenario_entry &entry : plan.plant) {
+            if ((entry.key.find('[') != std::string::npos) != one_spring) {
+                continue;
+            }
+            double value = 0.0;
+            const std::string problem = parse_number(entry.value, value);
+            if (!problem.empty()) {
+                throw entry.place.error(fmt::format("{}: {}", entry.key, problem));
+            }
+            const std::string_view name =
+                std::string_view(entry.key).substr(0, entry.key.find('['));
+            set_plant_parameter(plant.get(), entry.key, value,
+                                find_plant_parameter(name) == nullptr ? entry.key_place
+                                                                      : entry.place);
+        }
+    }
+    const char *message = nullptr;
+    if (plant_check(plant.get(), &message) != PLANT_OK) {
+        throw input_error(plan.name, 0, 0,
+                          fmt::format("[plant] {}", message == nullptr ? "is refused" : message));
+    }
+    plant_reset(plant.get());
+    return plant;
+}
+
+/* What the chip is told of the array: the plant's own numbers, its defaults, or a fitted model's.
+ */
+void set_chip_model(const scenario &plan, const plant_t *plant, settings_t &settings)
+{
+    thermal_model_parameters_t &model = settings.controller.model;
+    std::string path = plan.model_path.empty() ? "plant" : plan.model_path;
+    char message[256] = "";
+    if (path == "defaults") {
+        model.rows = static_cast<std::uint8_t>(plan.rows);
+        model.columns = static_cast<std::uint8_t>(plan.cols);
+        return;
+    }
+    if (path == "plant") {
+        if (chip_mapping_from_plant(plant, &model, message, sizeof message) != CHIP_MAPPING_OK) {
+            throw input_error(plan.name, 0, 0,
+                              fmt::format("the chip cannot hold the plant's parameters: {}; write "
+                                          "[chip] model = defaults, or a model.toml",
+                                          message));
+        }
+        return;
+    }
+    const std::filesystem::path folder = std::filesystem::path(plan.name).parent_path();
+    const model_description fitted = read_model((folder / path).string());
+    if (fitted.array.rows != plan.rows || fitted.array.cols != plan.cols) {
+        throw plan.model_place.error(
+            fmt::format("{} is of {} x {} springs, the scenario of {} x {}", path,
+                        fitted.array.rows, fitted.array.cols, plan.rows, plan.cols));
+    }
+    plant_pointer described(plant_create(plan.rows, plan.cols));
+    if (described == nullptr) {
+        throw work_error("memory is out");
+    }
+    apply_model(described.get(), fitted);
+    if (chip_mapping_from_plant(described.get(), &model, message, sizeof message) !=
+        CHIP_MAPPING_OK) {
+        throw plan.model_place.error(fmt::format("the chip cannot hold {}: {}", path, message));
+    }
+}
+
+void set_chip(const scenario &plan, const plant_t *plant, settings_t &settings)
+{
+    settings_default(&settings);
+    set_chip_model(plan, plant, settings);
+    for (const scenario_entry &entry : plan.settings) {
+        switch (settings_assign(&settings, entry.key.c_str(), entry.value.c_str())) {
+        case SETTINGS_OK:
+            break;
+        case SETTINGS_UNKNOWN_NAME: {
+            std::vector<std::string> names;
+            for (std::uint8_t k = 0; k < settings_count(); ++k) {
+                settings_entry_t known{};
+                settings_entry(k, &known);
+                names.emplace_back(known.name);
+            }
+            throw entry.key_place.error(
+                fmt::format("the chip has no setting {}{}; the console's $$ "
+                            "lists them",
+                            in_quotes(entry.key), did_you_mean(entry.key, names)));
+        }
+        case SETTINGS_NOT_A_NUMBER:
+            throw entry.place.error(fmt::format(
+                "${}: {} is not a number with a point and as many decimals as the setting has",
+                entry.key, in_quotes(entry.value)));
+        case SETTINGS_OUT_OF_RANGE: {
+            std::uint8_t index = 0;
+            std::uint8_t element = 0;
+            settings_entry_t known{};
+            settings_find(entry.key.c_str(), &index, &element);
+            settings_entry(index, &known);
+            const double scale = std::pow(10.0, known.decimals);
+            throw entry.place.error(fmt::format("${} is {}; it must be {} to {} {}", entry.key,
+                                                in_quotes(entry.value), known.minimum / scale,
+                                                known.maximum / scale, known.unit));
+        }
+        }
+    }
+    if (plan.policy == "precompensate") {
+        settings.controller.policy.policy = DRIVE_POLICY_PRECOMPENSATE;
+    } else if (plan.policy == "open") {
+        settings.controller.policy.policy = DRIVE_POLICY_OPEN;
+    }
+}
+
+/* Mean readings over one log interval. Voltage is weighted with current, so that v x i is the mean
+ * power. */
+struct interval_mean {
+    double current = 0.0;
+    double voltage = 0.0;
+    double power = 0.0;
+    int count = 0;
+
+    void add(const runner_spring &reading)
+    {
+        current += reading.current_a;
+        voltage += reading.voltage_v;
+        power += reading.current_a * reading.voltage_v;
+        ++count;
+    }
+    [[nodiscard]] double mean_current() const { return current / count; }
+    [[nodiscard]] double mean_voltage() const
+    {
+        return std::fabs(current) > 1e-9 && power > 0.0 ? power / current : voltage / count;
+    }
+};
+
+struct spring_summary {
+    double highest_c = -1000.0;
+    double error_square_sum = 0.0;
+    double energy_j = 0.0;
+    std::string fault = "none";
+};
+
+class recorder
+{
+public:
+    recorder(const scenario &plan, const std::string &board, const run_options &options)
+        : plan_(plan), springs_(plan.rows * plan.cols), summary_(static_cast<std::size_t>(springs_))
+    {
+        electrics_noise_seed(&noise_, plan.seed ^ 0x6e696e65737072ULL);
+        log_.comment("tool", "ninespring-sim " NINESPRING_VERSION);
+        log_.comment("scenario", std::filesystem::path(plan.name).filename().string());
+        log_.comment("array", fmt::format("{} x {}", plan.rows, plan.cols));
+        if (plan.pitch_mm) {
+            log_.comment("pitch_mm", fmt::format("{}", *plan.pitch_mm));
+        }
+        log_.comment("board", board);
+        log_.comment("seed", fmt::format("{}", plan.seed));
+        for (const std::string &set : options.sets) {
+            log_.comment("set", set);
+        }
+        log_.column("time_s", 2);
+        each("i{}_a", 4);
+        each("v{}_v", 4);
+        each("t{}_c", 3);
+        log_.column("fan", 2);
+        log_.column("ambient_c", 3);
+        each("m{}_c", 3);
+        each("x{}", 3);
+        each("p{}_c", 3);
+        each("px{}", 4);
+        each("s{}_a", 3);
+        begin_row_values_.resize(static_cast<std::size_t>(springs_) * 6);
+    }
+
+    /* What is known at the row's own time; its currents are those of the interval that begins. */
+    void begin_row(double time_s, const runner &board)
+    {
+        time_s_ = time_s;
+        means_.assign(static_cast<std::size_t>(springs_), interval_mean());
+        fan_ = board.fan();
+        ambient_c_ = board.ambient_c();
+        for (int k = 0; k < springs_; ++k) {
+            const runner_spring reading = board.spring(k);
+            double *values = &begin_row_values_[static_cast<std::size_t>(k) * 6];
+            values[0] = plant_measured_c(board.plant(), k) +
+                        plan_.noise_temperature_c * electrics_noise_normal(&noise_);
+            values[1] = reading.model_c;
+            values[2] = reading.model_austenite;
+            values[3] = plant_temperature_c(board.plant(), k);
+            values[4] = plant_austenite(board.plant(), k);
+            values[5] = reading.target_a;
+        }
+    }
+
+    void after_tick(const runner &board)
+    {
+        ++ticks_;
+        for (int k = 0; k < springs_; ++k) {
+            const auto at = static_cast<std::size_t>(k);
+            const runner_spring reading = board.spring(k);
+            means_[at].add(reading);
+            spring_summary &summary = summary_[at];
+            const double true_c = plant_temperature_c(board.plant(), k);
+            const double error = reading.model_c - true_c;
+            summary.highest_c = std::max(summary.highest_c, true_c);
+            summary.error_square_sum += error * error;
+            summary.energy_j += plant_power_w(board.plant(), k) * RUNNER_TICK_S;
+            if (summary.fault == "none") {
+                summary.fault = reading.fault;
+            }
+        }
+        if (board_fault_ == "none") {
+            board_fault_ = board.board_fault();
+        }
+    }
+
+    /* The last row has no interval of its own: its inputs are the last readings. */
+    void end_row(const runner &board)
+    {
+        if (means_[0].count == 0) {
+            for (int k = 0; k < springs_; ++k) {
+                means_[static_cast<std::size_t>(k)].add(board.spring(k));
+            }
+        }
+        std::vector<double> row{time_s_};
+        for (const interval_mean &mean : means_) {
+            row.push_back(mean.mean_current());
+        }
+        for (const interval_mean &mean : means_) {
+            row.push_back(mean.mean_voltage());
+        }
+        column_of(row, 0);
+        row.push_back(fan_);
+        row.push_back(ambient_c_);
+        for (std::size_t which = 1; which < 6; ++which) {
+            column_of(row, which);
+        }
+        log_.row(row);
+    }
+
+    [[nodiscard]] const std::string &text() const { return log_.text(); }
+
+    [[nodiscard]] nlohmann::ordered_json result(const runner &board,
+                                                const std::string &board_name) const
+    {
+        nlohmann::ordered_json springs = nlohmann::ordered_json::array();
+        for (int k = 0; k < springs_; ++k) {
+            const spring_summary &summary = summary_[static_cast<std::size_t>(k)];
+            springs.push_back(
+                {{"spring", k + 1},
+                 {"final_c", plant_temperature_c(board.plant(), k)},
+                 {"highest_c", summary.highest_c},
+                 {"austenite", plant_austenite(board.plant(), k)},
+                 {"energy_j", summary.energy_j},
+                 {"model_c", board.spring(k).model_c},
+                 {"model_rmse_c", std::sqrt(summary.error_square_sum / std::max(ticks_, 1))},
+                 {"fault", summary.fault}});
+        }
+        return {{"schema", "ninespring.run/1"},
+                {"scenario", std::filesystem::path(plan_.name).filename().string()},
+                {"board", board_name},
+                {"seed", plan_.seed},
+                {"duration_s", plan_.duration_s},
+                {"board_fault", board_fault_},
+                {"springs", springs}};
+    }
+
+private:
+    void each(const char *form, int decimals)
+    {
+        for (int k = 1; k <= springs_; ++k) {
+            log_.column(fmt::format(fmt::runtime(form), k), decimals);
+        }
+    }
+
+    void column_of(std::vector<double> &row, std::size_t which) const
+    {
+        for (std::size_t k = 0; k < static_cast<std::size_t>(springs_); ++k) {
+            row.push_back(begin_row_values_[k * 6 + which]);
+        }
+    }
+
+    const scenario &plan_;
+    int springs_;
+    log_writer log_;
+    electrics_noise_t noise_{};
+    double time_s_ = 0.0;
+    double fan_ = 0.0;
+    double ambient_c_ = 0.0;
+    int ticks_ = 0;
+    std::vector<double> begin_row_values_;
+    std::vector<interval_mean> means_;
+    std::vector<spring_summary> summary_;
+    std::string board_fault_ = "none";
+};
+
+void print_summary(const nlohmann::ordered_json &result)
+{
+    fmt::print("{:>6} {:>9} {:>10} {:>10} {:>9} {:>9} {:>12}  {}\n", "spring", "final", "highest",
+               "austenite", "energy", "chip", "chip's error", "fault");
+    fmt::print("{:>6} {:>9} {:>10} {:>10} {:>9} {:>9} {:>12}\n", "", "degC", "degC", "0..1", "J",
+               "degC", "degC rms");
+    for (const auto &one : result["springs"]) {
+        fmt::print("{:>6} {:>9.2f} {:>10.2f} {:>10.3f} {:>9.1f} {:>9.2f} {:>12.3f}  {}\n",
+                   one["spring"].get<int>(), one["final_c"].get<double>(),
+                   one["highest_c"].get<double>(), one["austenite"].get<double>(),
+                   one["energy_j"].get<double>(), one["model_c"].get<double>(),
+                   one["model_rmse_c"].get<double>(), one["fault"].get<std::string>());
+    }
+    if (result["board_fault"] != "none") {
+        fmt::print("board fault: {}\n", result["board_fault"].get<std::string>());
+    }
+}
+
+void run(const run_options &options)
+{
+    check_outputs({options.output, options.json_path}, {options.scenario_path});
+    scenario plan = read_scenario(options.scenario_path, options.sets);
+    if (options.seed) {
+        plan.seed = *options.seed;
+    }
+    if (!options.policy.empty()) {
+        plan.policy = options.policy;
+    }
+    const plant_pointer plant = make_plant(plan);
+    settings_t settings{};
+    set_chip(plan, plant.get(), settings);
+    const std::unique_ptr<runner> board =
+        make_runner(options.board, {&plan, plant.get(), &settings, options.elf});
+
+    recorder record(plan, options.board, options);
+    progress_line progress("run");
+    const long long ticks = std::llround(plan.duration_s / RUNNER_TICK_S);
+    const long long row_ticks = std::llround(plan.log_interval_s / RUNNER_TICK_S);
+    std::size_t next_event = 0;
+    for (long long tick = 0; tick <= ticks; ++tick) {
+        const double time_s = static_cast<double>(tick) * RUNNER_TICK_S;
+        const bool row = tick % row_ticks == 0 || tick == ticks;
+        if (row && tick > 0) {
+            record.end_row(*board);
+        }
+        while (next_event < plan.events.size() &&
+               plan.events[next_event].time_s <= time_s + 0.5 * RUNNER_TICK_S) {
+            board->act(plan.events[next_event]);
+            ++next_event;
+        }
+        if (row) {
+            record.begin_row(time_s, *board);
+        }
+        if (tick < ticks) {
+            board->tick();
+            record.after_tick(*board);
+        }
+        if (tick % 1024 == 0) {
+            progress.show(static_cast<double>(tick) / static_cast<double>(ticks));
+        }
+    }
+    record.end_row(*board);
+
+    const nlohmann::ordered_json result = record.result(*board, options.board);
+    write_file_whole(options.output, record.text());
+    if (!options.json_path.empty()) {
+        write_file_whole(options.json_path, json_text(result));
+    }
+    if (options.output != "-") {
+        print_summary(result);
+    }
+}
+
+} // namespace
+
+void add_command_run(CLI::App &app)
+{
+    CLI::App *command =
+        app.add_subcommand("run", "Runs a scenario: the controller around the simulated array");
+    auto options = std::make_shared<run_options>();
+    command->add_option("scenario", options->scenario_path, "The scenario (docs/files.md)")
+        ->required();
+    command->add_option("-o,--output", options->output, "The log to write, '-' for standard output")
+        ->required();
+    command
+        ->add_option("--board", options->board,
+                     "native: controller and plant in one process; "
+                     "avr: the firmware's ELF in a simulated Mega")
+        ->check(CLI::IsMember({"native", "avr"}))
+        ->capture_default_str();
+    command->add_option("--elf", options->elf, "The firmware for --board avr");
+    command->add_option("--policy", options->policy, "Overrides the scenario's policy")
+        ->check(CLI::IsMember({"open", "precompensate"}));
+    command
+        ->add_option("--set", options->sets,
+                     "key=value as if the scenario said so: a plant parameter, or section.key")
+        ->take_all()
+        ->allow_extra_args(false);
+    command->add_option("--seed", options->seed, "Overrides the scenario's seed");
+    command->add_option("--json", options->json_path, "Write the summary to this JSON file");
+    command->callback([options] { run(*options); });
+}
+
+} // namespace ninespring

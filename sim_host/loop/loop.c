@@ -1,0 +1,393 @@
+#include "loop.h"
+
+#include <math.h>
+#include <stddef.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "electrics.h"
+
+typedef struct {
+    electrics_ina219_t sensor;
+    electrics_fault_t fault;
+    controller_sensor_status_t status; /* lasting failure of the sensor */
+    bool lost_configuration;           /* told once, then written again */
+    double loop_ohm;                   /* of the stage beyond the spring */
+    double resistance_ohm;             /* of the spring, since the plant's last step */
+    double current_a;
+    double voltage_v;
+    double power_w;
+    double energy_j; /* into the spring since the plant's last step */
+} channel_t;
+
+struct loop {
+    controller_t controller;
+    controller_settings_t settings;
+    controller_inputs_t inputs;
+    controller_outputs_t outputs;
+    plant_t *plant;
+    loop_options_t options;
+    int springs;
+    uint64_t ticks;
+    unsigned plant_tick;
+    bool bus_stuck;
+    bool fan_stopped;
+    uint8_t fan_percent;
+    double ambient_c; /* since the plant's last step */
+    double supply_v;
+    double source_ohm;
+    double freewheel_drop_v;
+    double highest_sum_a;
+    channel_t channel[PLANT_MAX_SPRINGS];
+};
+
+static const char *const action_name[LOOP_ACTION_COUNT] = {
+    "open_spring",  "short_spring", "spring_good", "sensor_nack", "sensor_bus", "sensor_stale",
+    "sensor_reset", "sensor_good",  "fan_stop",    "fan_good",    "watchdog",   "brown_out"};
+
+const char *loop_action_name(loop_action_t action)
+{
+    return (unsigned)action < LOOP_ACTION_COUNT ? action_name[action] : NULL;
+}
+
+bool loop_action_needs_spring(loop_action_t action)
+{
+    return action != LOOP_ACTION_SENSOR_BUS && ((unsigned)action <= LOOP_ACTION_SENSOR_GOOD);
+}
+
+void loop_options_default(loop_options_t *options)
+{
+    *options = (loop_options_t){
+        .sensor_samples = 8, .shunt_noise_v = 10e-6, .bus_noise_v = 1e-3, .plant_ticks = 5};
+}
+
+static bool options_are_good(const loop_options_t *options)
+{
+    return options->plant_ticks >= 1 && options->plant_ticks <= 5 &&
+           fabs(options->ambient_error_c) <= 100.0;
+}
+
+static double parameter(const plant_t *plant, const char *name, int spring)
+{
+    double value = 0.0;
+    (void)plant_get_index(plant, (size_t)plant_parameter_index(name), spring, &value);
+    return value;
+}
+
+static int16_t to_c7(double temperature_c)
+{
+    double scaled = temperature_c * 128.0;
+    return (int16_t)lround(scaled < -32768.0 ? -32768.0 : scaled > 32767.0 ? 32767.0 : scaled);
+}
+
+static void read_plant(loop_t *loop)
+{
+    for (int k = 0; k < loop->springs; k++) {
+        loop->channel[k].resistance_ohm = plant_resistance_ohm(loop->plant, k);
+    }
+    loop->ambient_c = plant_ambient_c(loop->plant);
+}
+
+loop_t *loop_create(const controller_settings_t *settings, const plant_t *plant,
+                    const loop_options_t *options, uint64_t seed, uint16_t *bad)
+{
+    loop_options_t chosen;
+    loop_options_default(&chosen);
+    if (options != NULL) {
+        chosen = *options;
+    }
+    uint16_t refused = UINT16_MAX;
+    loop_t *loop = calloc(1, sizeof *loop);
+    if (loop == NULL || !options_are_good(&chosen)) {
+        goto fail;
+    }
+    loop->settings = *settings;
+    loop->options = chosen;
+    if (!controller_init(&loop->controller, settings,
+                         to_c7(plant_ambient_c(plant) + chosen.ambient_error_c), &refused)) {
+        goto fail;
+    }
+    if (plant_rows(plant) != settings->model.rows ||
+        plant_columns(plant) != settings->model.columns) {
+        refused = (uint16_t)offsetof(controller_settings_t, model.rows);
+        goto fail;
+    }
+    loop->springs = controller_springs(&loop->controller);
+    for (int k = 0; k < loop->springs; k++) {
+        if (!electrics_ina219_init(&loop->channel[k].sensor, chosen.sensor_samples,
+                                   chosen.shunt_noise_v, chosen.bus_noise_v,
+                                   seed + (uint64_t)k * UINT64_C(0x100000001))) {
+            goto fail;
+        }
+    }
+    loop->plant = plant_copy(plant);
+    if (loop->plant == NULL) {
+        goto fail;
+    }
+    loop->supply_v = parameter(plant, "supply_v", -1);
+    loop->freewheel_drop_v = parameter(plant, "freewheel_drop_v", -1);
+    int sag = plant_effect_index("supply_sag");
+    if (sag >= 0 && plant_effect_is_on(plant, (size_t)sag)) {
+        loop->source_ohm = parameter(plant, "supply_resistance_ohm", -1);
+    }
+    for (int k = 0; k < loop->springs; k++) {
+        loop->channel[k].loop_ohm = parameter(plant, "loop_resistance_ohm", k);
+        (void)plant_drive(loop->plant, k, PLANT_DRIVE_POWER, 0.0);
+    }
+    (void)plant_set_fan(loop->plant, 0.0);
+    read_plant(loop);
+    return loop;
+fail:
+    free(loop);
+    if (bad != NULL) {
+        *bad = refused;
+    }
+    return NULL;
+}
+
+void loop_destroy(loop_t *loop)
+{
+    if (loop != NULL) {
+        plant_destroy(loop->plant);
+        free(loop);
+    }
+}
+
+/* Registers to mA and mV as the firmware does. */
+static void read_sensor(loop_t *loop, int k)
+{
+    channel_t *c = &loop->channel[k];
+    controller_sensor_t *seen = &loop->inputs.sensor[k];
+    double current_a;
+    double bus_v;
+    *seen = (controller_sensor_t){.status = CONTROLLER_SENSOR_OK};
+    if (loop->bus_stuck) {
+        seen->status = CONTROLLER_SENSOR_BUS;
+    } else if (c->status != CONTROLLER_SENSOR_OK) {
+        seen->status = c->status;
+    } else if (c->lost_configuration) {
+        c->lost_configuration = false;
+        seen->status = CONTROLLER_SENSOR_RESET;
+    } else if (!electrics_ina219_take(&c->sensor, &current_a, &bus_v)) {
+        seen->status = CONTROLLER_SENSOR_STALE;
+    } else {
+        int reading = c->sensor.shunt_register; /* 0.1 mA */
+        seen->current_ma = (int16_t)((reading + (reading < 0 ? -5 : 5)) / 10);
+        seen->voltage_mv = (int16_t)(c->sensor.bus_register * 4);
+    }
+}
+
+/* Currents of the tick that starts, from the duties. */
+static void flow(loop_t *loop)
+{
+    double duty[PLANT_MAX_SPRINGS];
+    double spring_ohm[PLANT_MAX_SPRINGS];
+    double load_s = 0.0;
+    for (int k = 0; k < loop->springs; k++) {
+        const channel_t *c = &loop->channel[k];
+        duty[k] = c->fault == ELECTRICS_FAULT_OPEN
+                      ? 0.0
+                      : (double)loop->outputs.duty[k] / CONTROLLER_DUTY_MAX;
+        spring_ohm[k] = c->fault == ELECTRICS_FAULT_SHORT ? ELECTRICS_SHORT_OHM : c->resistance_ohm;
+        load_s += duty[k] * duty[k] / (spring_ohm[k] + c->loop_ohm);
+    }
+    double bus_v = loop->source_ohm > 0.0
+                       ? electrics_supply_v(loop->supply_v, loop->source_ohm, load_s, 0.0)
+                       : loop->supply_v;
+    double sum_a = 0.0;
+    for (int k = 0; k < loop->springs; k++) {
+        channel_t *c = &loop->channel[k];
+        c->current_a = 0.0;
+        if (duty[k] > 0.0) {
+            c->current_a = electrics_buck_current_a(duty[k], bus_v, loop->freewheel_drop_v,
+                                                    spring_ohm[k], c->loop_ohm);
+        }
+        c->voltage_v = c->current_a * spring_ohm[k];
+        c->power_w = c->fault == ELECTRICS_FAULT_NONE ? c->current_a * c->voltage_v : 0.0;
+        c->energy_j += c->power_w * LOOP_TICK_S;
+        electrics_ina219_advance(&c->sensor, LOOP_TICK_S, c->current_a, c->voltage_v);
+        sum_a += c->current_a;
+    }
+    if (sum_a > loop->highest_sum_a) {
+        loop->highest_sum_a = sum_a;
+    }
+}
+
+static void heat(loop_t *loop)
+{
+    if (++loop->plant_tick < loop->options.plant_ticks) {
+        return;
+    }
+    double dt_s = loop->plant_tick * LOOP_TICK_S;
+    loop->plant_tick = 0;
+    for (int k = 0; k < loop->springs; k++) {
+        channel_t *c = &loop->channel[k];
+        (void)plant_drive(loop->plant, k, PLANT_DRIVE_POWER, c->energy_j / dt_s);
+        c->energy_j = 0.0;
+    }
+    (void)plant_step(loop->plant, dt_s);
+    read_plant(loop);
+}
+
+void loop_tick(loop_t *loop)
+{
+    for (int k = 0; k < loop->springs; k++) {
+        if (loop->ticks != 0) { /* at power-up the sensors have not converted yet: nothing flows */
+            read_sensor(loop, k);
+        }
+    }
+    loop->inputs.ambient_c7 = to_c7(loop->ambient_c + loop->options.ambient_error_c);
+    loop->inputs.fan_percent = loop->outputs.fan_percent;
+    controller_tick(&loop->controller, &loop->inputs, &loop->outputs);
+    uint8_t fan_percent = loop->fan_stopped ? 0 : loop->outputs.fan_percent;
+    if (fan_percent != loop->fan_percent) {
+        loop->fan_percent = fan_percent;
+        (void)plant_set_fan(loop->plant, fan_percent / 100.0);
+    }
+    flow(loop);
+    heat(loop);
+    loop->ticks++;
+}
+
+void loop_advance(loop_t *loop, double seconds)
+{
+    double ticks = floor(seconds / LOOP_TICK_S + 0.5);
+    for (double n = 0.0; n < ticks; n += 1.0) {
+        loop_tick(loop);
+    }
+}
+
+/* The board boots: locked, all off, what it was told to do forgotten, settings from its EEPROM. */
+static void boot(loop_t *loop, bool keeps_memory)
+{
+    thermal_model_state_t state;
+    thermal_model_get_state(&loop->controller.model, &state);
+    (void)controller_init(&loop->controller, &loop->settings,
+                          to_c7(loop->ambient_c + loop->options.ambient_error_c), NULL);
+    if (!keeps_memory || !thermal_model_set_state(&loop->controller.model, &state)) {
+        /* as the firmware: as hot as they could be, just below the trip */
+        int32_t hot_cc = (int32_t)loop->settings.safety.temperature_trip_cc - 500;
+        thermal_model_reset(&loop->controller.model, (int16_t)(hot_cc * 32 / 25));
+    }
+    controller_lock(&loop->controller);
+}
+
+bool loop_act(loop_t *loop, loop_action_t action, int spring)
+{
+    if ((unsigned)action >= LOOP_ACTION_COUNT ||
+        (loop_action_needs_spring(action) && (spring < 0 || spring >= loop->springs))) {
+        return false;
+    }
+    channel_t *c = loop_action_needs_spring(action) ? &loop->channel[spring] : NULL;
+    switch (action) {
+    case LOOP_ACTION_OPEN_SPRING:
+        c->fault = ELECTRICS_FAULT_OPEN;
+        break;
+    case LOOP_ACTION_SHORT_SPRING:
+        c->fault = ELECTRICS_FAULT_SHORT;
+        break;
+    case LOOP_ACTION_SPRING_GOOD:
+        c->fault = ELECTRICS_FAULT_NONE;
+        break;
+    case LOOP_ACTION_SENSOR_NACK:
+        c->status = CONTROLLER_SENSOR_ABSENT;
+        break;
+    case LOOP_ACTION_SENSOR_BUS:
+        loop->bus_stuck = true;
+        break;
+    case LOOP_ACTION_SENSOR_STALE:
+        c->status = CONTROLLER_SENSOR_STALE;
+        break;
+    case LOOP_ACTION_SENSOR_RESET:
+        c->lost_configuration = true;
+        break;
+    case LOOP_ACTION_SENSOR_GOOD:
+        c->status = CONTROLLER_SENSOR_OK;
+        loop->bus_stuck = false;
+        break;
+    case LOOP_ACTION_FAN_STOP:
+        loop->fan_stopped = true;
+        break;
+    case LOOP_ACTION_FAN_GOOD:
+        loop->fan_stopped = false;
+        break;
+    case LOOP_ACTION_WATCHDOG:
+        boot(loop, true);
+        break;
+    case LOOP_ACTION_BROWN_OUT:
+        boot(loop, false);
+        break;
+    case LOOP_ACTION_COUNT:
+        break;
+    }
+    return true;
+}
+
+bool loop_set_ambient(loop_t *loop, double ambient_c)
+{
+    if (plant_set_ambient(loop->plant, ambient_c) != PLANT_OK) {
+        return false;
+    }
+    loop->ambient_c = plant_ambient_c(loop->plant);
+    return true;
+}
+
+controller_t *loop_controller(loop_t *loop)
+{
+    return &loop->controller;
+}
+
+plant_t *loop_plant(loop_t *loop)
+{
+    return loop->plant;
+}
+
+double loop_time_s(const loop_t *loop)
+{
+    return (double)loop->ticks * LOOP_TICK_S;
+}
+
+static const channel_t *channel(const loop_t *loop, int spring)
+{
+    static const channel_t none;
+    return spring >= 0 && spring < loop->springs ? &loop->channel[spring] : &none;
+}
+
+double loop_current_a(const loop_t *loop, int spring)
+{
+    return channel(loop, spring)->current_a;
+}
+
+double loop_voltage_v(const loop_t *loop, int spring)
+{
+    return channel(loop, spring)->voltage_v;
+}
+
+double loop_power_w(const loop_t *loop, int spring)
+{
+    return channel(loop, spring)->power_w;
+}
+
+double loop_sum_current_a(const loop_t *loop)
+{
+    double sum_a = 0.0;
+    for (int k = 0; k < loop->springs; k++) {
+        sum_a += loop->channel[k].current_a;
+    }
+    return sum_a;
+}
+
+double loop_highest_sum_current_a(const loop_t *loop)
+{
+    return loop->highest_sum_a;
+}
+
+const controller_inputs_t *loop_inputs(const loop_t *loop)
+{
+    return &loop->inputs;
+}
+
+const controller_outputs_t *loop_outputs(const loop_t *loop)
+{
+    return &loop->outputs;
+}
