@@ -1,0 +1,26 @@
+/* What it is for: the Arduino core's headers, without this project's warnings, which they were not
+ * written for. (-isystem does not do: this compiler then takes C++ headers for C.) */
+#ifndef ARDUINO_HEADERS_H
+#define ARDUINO_HEADERS_H
+
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wconversion"
+#pragma GCC diagnostic ignored "-Wsign-conversion"
+#pragma GCC diagnostic ignored "-Wshadow"
+#pragma GCC diagnostic ignored "-Wunused-parameter"
+#ifndef __cplusplus
+#pragma GCC diagnostic ignored "-Wstrict-prototypes"
+#endif
+#include <Arduino.h>
+#ifdef __cplusplus
+#include <Wire.h>
+extern "C" {
+#include <utility/twi.h>
+}
+#ifdef NINESPRING_SENSOR_ADAFRUIT
+#include <Adafruit_INA219.h>
+#endif
+#endif
+#pragma GCC diagnostic pop
+
+#endif

@@ -1,0 +1,526 @@
+#include "board.h"
+
+#include "arduino_headers.h"
+#include <avr/eeprom.h>
+#include <avr/interrupt.h>
+#include <avr/io.h>
+#include <avr/sleep.h>
+#include <avr/wdt.h>
+#include <util/atomic.h>
+
+#define SERIAL_RECEIVE_BYTES 128u /* 11 ms of input: more than the longest time away, a tick */
+#define SERIAL_TRANSMIT_BYTES                                                                      \
+    432u /* one telemetry line of nine springs (297) and an answer (128) */
+#define PWM_TOP (BOARD_DUTY_MAX - 1u)
+#define FAN_TOP 499u /* 16 MHz / 1024 / 500 = 31 Hz: right for a fan with two wires */
+
+/* Fast PWM mode 14: WGMn1 in TCCRnA, WGMn3 and WGMn2 in TCCRnB; prescaler 1. */
+#define PWM_A_OFF _BV(WGM31)
+#define PWM_B     (_BV(WGM33) | _BV(WGM32) | _BV(CS30))
+#define PWM_COM_A _BV(COM3A1)
+#define PWM_COM_B _BV(COM3B1)
+#define PWM_COM_C _BV(COM3C1)
+
+/* What survives a reset. start_check tells RAM that kept its content from RAM that woke up random.
+ */
+#define START_CHECK 0x9A5B1E27ul
+static volatile uint32_t start_check __attribute__((section(".noinit")));
+static volatile uint16_t ms_since_kick __attribute__((section(".noinit")));
+static volatile uint8_t driving __attribute__((section(".noinit")));
+
+static uint8_t reset_flags __attribute__((section(".noinit"))); /* MCUSR, read before main */
+static uint8_t reset_cause;
+
+static volatile uint32_t time_ms;
+static volatile uint8_t ms_of_tick;
+static volatile uint8_t ticks_due;
+
+static volatile bool stop_pending; /* outputs stay off while true */
+static volatile bool stop_received;
+static volatile uint8_t stop_head; /* receive position of the last '!' */
+static volatile bool stop_queued;  /* bytes before stop_head may still be queued */
+static volatile bool status_requested;
+static volatile bool receive_lost;
+
+static volatile uint8_t receive_buffer[SERIAL_RECEIVE_BYTES];
+static volatile uint8_t receive_head;
+static volatile uint8_t receive_tail;
+static volatile char transmit_buffer[SERIAL_TRANSMIT_BYTES];
+static volatile uint16_t transmit_head;
+static volatile uint16_t transmit_tail;
+
+/* Before main and before RAM is initialised: the watchdog stays on through its own reset and would
+ * bite again within 16 ms. */
+static void read_reset_flags(void) __attribute__((naked, used, section(".init3")));
+static void read_reset_flags(void)
+{
+    reset_flags = MCUSR;
+    MCUSR = 0;
+    wdt_disable();
+}
+
+/* Stack high-water mark: the free RAM is painted before main. */
+#define STACK_PAINT 0xC5u
+extern uint8_t __heap_start;
+static void paint_stack(void) __attribute__((naked, used, section(".init3")));
+static void paint_stack(void)
+{
+    __asm__ volatile("ldi r30, lo8(__heap_start)\n\t"
+                     "ldi r31, hi8(__heap_start)\n\t"
+                     "ldi r24, %0\n\t"
+                     "ldi r25, hi8(%1)\n"
+                     "1: st Z+, r24\n\t"
+                     "cpi r30, lo8(%1)\n\t"
+                     "cpc r31, r25\n\t"
+                     "brlo 1b\n\t" ::"M"(STACK_PAINT),
+                     "i"(RAMEND - 15)
+                     : "r24", "r25", "r30", "r31", "memory");
+}
+
+uint16_t board_stack_unused(void)
+{
+    /* The longest run of painted bytes below the stack: locals that were never set stay painted
+     * above it, and a library's heap grows over the paint from below. */
+    uint16_t run = 0;
+    uint16_t longest = 0;
+    for (const uint8_t *at = &__heap_start; at < (const uint8_t *)SP; at++) {
+        run = *at == STACK_PAINT ? run + 1u : 0u;
+        if (run > longest) {
+            longest = run;
+        }
+    }
+    return longest;
+}
+
+/* --- reset -------------------------------------------------------------------------------- */
+
+static uint8_t find_reset_cause(void)
+{
+    uint8_t cause = 0;
+    const bool warm = start_check == START_CHECK && !(reset_flags & _BV(PORF));
+    if (reset_flags & _BV(PORF)) {
+        cause |= BOARD_RESET_POWER_ON;
+    }
+    if (reset_flags & _BV(EXTRF)) {
+        cause |= BOARD_RESET_EXTERNAL;
+    }
+    if ((reset_flags & _BV(BORF)) && !(reset_flags & _BV(PORF))) {
+        cause |= BOARD_RESET_BROWN_OUT; /* at power-on this flag is set too, and means nothing */
+    }
+    if (reset_flags & _BV(WDRF)) {
+        cause |= BOARD_RESET_WATCHDOG;
+    }
+    if (cause == 0) {
+        /* The Mega's boot loader reads MCUSR, clears it and passes nothing on. What is left: a RAM
+         * that kept its content, how long ago the watchdog was last kicked, and whether an output
+         * was on. */
+        if (!warm) {
+            cause = BOARD_RESET_POWER_ON;
+        } else if (ms_since_kick >= 200u) {
+            cause = BOARD_RESET_WATCHDOG;
+        } else {
+            cause = driving ? BOARD_RESET_UNKNOWN : BOARD_RESET_EXTERNAL;
+        }
+    }
+    if (warm) {
+        cause |= BOARD_RESET_WARM;
+    }
+    return cause;
+}
+
+uint8_t board_reset_cause(void)
+{
+    return reset_cause;
+}
+
+/* --- outputs ------------------------------------------------------------------------------ */
+
+/* Called with interrupts off. */
+static void outputs_off(void)
+{
+    TCCR3A = PWM_A_OFF;
+    TCCR4A = PWM_A_OFF;
+    TCCR5A = PWM_A_OFF;
+    driving = 0;
+}
+
+static void outputs_init(void)
+{
+    /* Pins low before they become outputs. OC3A D5 PE3, OC3B D2 PE4, OC3C D3 PE5; OC4A D6 PH3, OC4B
+     * D7 PH4, OC4C D8 PH5; OC5A D46 PL3, OC5B D45 PL4, OC5C D44 PL5; fan OC1A D11 PB5. */
+    const uint8_t three = _BV(3) | _BV(4) | _BV(5);
+    PORTE &= (uint8_t)~three;
+    PORTH &= (uint8_t)~three;
+    PORTL &= (uint8_t)~three;
+    PORTB &= (uint8_t)~_BV(5);
+    DDRE |= three;
+    DDRH |= three;
+    DDRL |= three;
+    DDRB |= _BV(5);
+
+    GTCCR = _BV(TSM) | _BV(PSRSYNC); /* the three timers start on the same clock */
+    TCCR3B = 0;
+    TCCR4B = 0;
+    TCCR5B = 0;
+    outputs_off();
+    ICR3 = PWM_TOP;
+    ICR4 = PWM_TOP;
+    ICR5 = PWM_TOP;
+    OCR3A = OCR3B = OCR3C = 0;
+    OCR4A = OCR4B = OCR4C = 0;
+    OCR5A = OCR5B = OCR5C = 0;
+    TCNT3 = 0;
+    TCNT4 = 0;
+    TCNT5 = 0;
+    TCCR3B = PWM_B;
+    TCCR4B = PWM_B;
+    TCCR5B = PWM_B;
+    GTCCR = 0;
+
+    TCCR1A = _BV(WGM11);
+    TCCR1B = _BV(WGM13) | _BV(WGM12) | _BV(CS12) | _BV(CS10);
+    ICR1 = FAN_TOP;
+    OCR1A = 0;
+}
+
+/* COM bit for an output that is on, after its compare value has been set: a fast PWM output is high
+ * for OCR + 1 counts, so 0 cannot be had from the timer: there the COM bit is cleared and the pin
+ * is low. */
+static uint8_t set_compare(volatile uint16_t *compare, uint16_t duty, uint8_t com)
+{
+    if (duty == 0 || duty > BOARD_DUTY_MAX) {
+        return 0;
+    }
+    *compare = duty - 1u; /* takes effect at the next period */
+    return com;
+}
+
+void board_set_duties(const uint16_t duty[BOARD_SPRINGS])
+{
+    const uint8_t three = (uint8_t)(PWM_A_OFF | set_compare(&OCR3A, duty[0], PWM_COM_A) |
+                                    set_compare(&OCR3B, duty[1], PWM_COM_B) |
+                                    set_compare(&OCR3C, duty[2], PWM_COM_C));
+    const uint8_t four = (uint8_t)(PWM_A_OFF | set_compare(&OCR4A, duty[3], PWM_COM_A) |
+                                   set_compare(&OCR4B, duty[4], PWM_COM_B) |
+                                   set_compare(&OCR4C, duty[5], PWM_COM_C));
+    const uint8_t five = (uint8_t)(PWM_A_OFF | set_compare(&OCR5A, duty[6], PWM_COM_A) |
+                                   set_compare(&OCR5B, duty[7], PWM_COM_B) |
+                                   set_compare(&OCR5C, duty[8], PWM_COM_C));
+    ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
+    {
+        if (!stop_pending) {
+            TCCR3A = three;
+            TCCR4A = four;
+            TCCR5A = five;
+            driving = (three | four | five) != PWM_A_OFF;
+        }
+    }
+}
+
+void board_set_fan(uint8_t percent)
+{
+    if (percent == 0) {
+        TCCR1A = _BV(WGM11);
+        return;
+    }
+    OCR1A = percent >= 100u ? FAN_TOP : (uint16_t)(percent * 5u - 1u);
+    TCCR1A = _BV(WGM11) | _BV(COM1A1);
+}
+
+bool board_stop_take(void)
+{
+    bool received;
+    ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
+    {
+        received = stop_received;
+        stop_received = false;
+        stop_pending = false;
+    }
+    return received;
+}
+
+/* --- time --------------------------------------------------------------------------------- */
+
+ISR(TIMER2_COMPA_vect)
+{
+    time_ms++;
+    ms_since_kick++;
+    if (++ms_of_tick >= BOARD_TICK_MS) {
+        ms_of_tick = 0;
+        if (ticks_due < 255u) {
+            ticks_due++;
+        }
+    }
+}
+
+uint32_t board_time_ms(void)
+{
+    uint32_t copy;
+    ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
+    {
+        copy = time_ms;
+    }
+    return copy;
+}
+
+uint32_t board_time_us(void)
+{
+    return micros();
+}
+
+bool board_tick_take(uint8_t *behind)
+{
+    bool due = false;
+    *behind = 0;
+    ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
+    {
+        if (ticks_due > 0) {
+            ticks_due--;
+            *behind = ticks_due;
+            due = true;
+        }
+    }
+    return due;
+}
+
+/* --- serial ------------------------------------------------------------------------------- */
+
+ISR(USART0_RX_vect)
+{
+    const uint8_t errors = UCSR0A & (_BV(FE0) | _BV(DOR0));
+    const uint8_t octet = UDR0;
+    if (errors) {
+        receive_lost = true;
+        if (errors & _BV(FE0)) {
+            return; /* not a byte anyone sent */
+        }
+    }
+    if (octet == '!') {
+        outputs_off();
+        stop_pending = true;
+        stop_received = true;
+        stop_head = receive_head;
+        stop_queued = true;
+        return;
+    }
+    if (octet == '?') {
+        status_requested = true;
+        return;
+    }
+    const uint8_t next = (uint8_t)((receive_head + 1u) % SERIAL_RECEIVE_BYTES);
+    if (next == receive_tail) {
+        receive_lost = true;
+        return;
+    }
+    receive_buffer[receive_head] = octet;
+    receive_head = next;
+}
+
+static inline uint16_t transmit_next(uint16_t position)
+{
+    return position + 1u == SERIAL_TRANSMIT_BYTES ? 0u : position + 1u;
+}
+
+ISR(USART0_UDRE_vect)
+{
+    if (transmit_head == transmit_tail) {
+        UCSR0B &= (uint8_t)~_BV(UDRIE0);
+        return;
+    }
+    UDR0 = (uint8_t)transmit_buffer[transmit_tail];
+    transmit_tail = transmit_next(transmit_tail);
+}
+
+static bool take_flag(volatile bool *flag)
+{
+    bool was;
+    ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
+    {
+        was = *flag;
+        *flag = false;
+    }
+    return was;
+}
+
+int16_t board_serial_read(void)
+{
+    int16_t octet = -1;
+    ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
+    {
+        if (receive_tail != receive_head) {
+            octet = receive_buffer[receive_tail];
+            receive_tail = (uint8_t)((receive_tail + 1u) % SERIAL_RECEIVE_BYTES);
+        }
+    }
+    return octet;
+}
+
+bool board_serial_before_stop(void)
+{
+    bool before;
+    ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
+    {
+        if (receive_tail == stop_head) {
+            stop_queued = false;
+        }
+        before = stop_queued;
+    }
+    return before;
+}
+
+bool board_serial_status_take(void)
+{
+    return take_flag(&status_requested);
+}
+
+bool board_serial_lost_take(void)
+{
+    return take_flag(&receive_lost);
+}
+
+uint16_t board_serial_room(void)
+{
+    uint16_t tail;
+    ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
+    {
+        tail = transmit_tail;
+    }
+    const uint16_t head = transmit_head; /* no interrupt changes it */
+    return (uint16_t)((tail > head ? 0u : SERIAL_TRANSMIT_BYTES) + tail - head - 1u);
+}
+
+void board_serial_write(const char *bytes, uint8_t length)
+{
+    if (length > board_serial_room()) {
+        return;
+    }
+    uint16_t head = transmit_head;
+    for (uint8_t i = 0; i < length; i++) {
+        transmit_buffer[head] = bytes[i];
+        head = transmit_next(head);
+    }
+    ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
+    {
+        transmit_head = head;
+        UCSR0B |= _BV(UDRIE0);
+    }
+}
+
+/* --- EEPROM ------------------------------------------------------------------------------- */
+
+bool board_eeprom_ready(void)
+{
+    return eeprom_is_ready();
+}
+
+uint8_t board_eeprom_read(uint16_t address)
+{
+    return eeprom_read_byte((const uint8_t *)address);
+}
+
+void board_eeprom_write(uint16_t address, uint8_t octet)
+{
+    if (board_eeprom_read(address) == octet) {
+        return;
+    }
+    EEAR = address;
+    EEDR = octet;
+    ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
+    {
+        EECR = _BV(EEMPE); /* erase and write in one; the second write within four clocks */
+        EECR |= _BV(EEPE);
+    }
+}
+
+/* --- the rest ----------------------------------------------------------------------------- */
+
+void board_watchdog_start(void)
+{
+    ms_since_kick = 0;
+    wdt_enable(WDTO_250MS);
+}
+
+void board_watchdog_kick(void)
+{
+    wdt_reset();
+    ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
+    {
+        ms_since_kick = 0;
+    }
+}
+
+void board_restart(void)
+{
+    cli();
+    outputs_off();
+    wdt_enable(WDTO_15MS);
+    for (;;) {
+    }
+}
+
+static uint32_t idle_us;
+
+void board_idle(bool busy)
+{
+    for (;;) {
+        cli();
+        if (ticks_due != 0 || receive_tail != receive_head || stop_received || status_requested) {
+            break;
+        }
+        const uint8_t begin = TCNT0; /* runs through in 1.024 ms, and its overflow wakes */
+        SMCR = _BV(SE);              /* idle mode: timers and serial port go on */
+        sei(); /* the instruction after sei still runs before any interrupt: no wake-up is lost */
+        sleep_cpu();
+        SMCR = 0;
+        idle_us += (uint16_t)((uint8_t)(TCNT0 - begin) << 2);
+        if (busy) {
+            break;
+        }
+    }
+    sei();
+}
+
+uint32_t board_idle_us_take(void)
+{
+    const uint32_t slept_us = idle_us;
+    idle_us = 0;
+    return slept_us;
+}
+
+uint16_t board_ambient_adc(void)
+{
+    static uint16_t mean_q4;
+    static bool running;
+    if (running && !(ADCSRA & _BV(ADSC))) {
+        const uint16_t now = ADC;
+        mean_q4 = mean_q4 == 0 ? (uint16_t)(now << 4) : (uint16_t)(mean_q4 + now - (mean_q4 >> 4));
+        running = false;
+    }
+    if (!running) {
+        ADMUX = _BV(REFS0); /* reference AVCC, channel 0 */
+        ADCSRA |= _BV(ADSC);
+        running = true;
+    }
+    return (uint16_t)(mean_q4 >> 4);
+}
+
+void board_init(void)
+{
+    cli();
+    reset_cause = find_reset_cause();
+    start_check = START_CHECK;
+    ms_since_kick = 0;
+    outputs_init();
+
+    TCCR2A = _BV(WGM21); /* compare match 1000 times a second */
+    TCCR2B = _BV(CS22);  /* 16 MHz / 64 / 250 */
+    OCR2A = 249;
+    TCNT2 = 0;
+    TIMSK2 = _BV(OCIE2A);
+
+    UBRR0 = 16; /* 117647 baud with U2X, +2.1 %: the Mega's usual way to 115200 */
+    UCSR0A = _BV(U2X0);
+    UCSR0C = _BV(UCSZ01) | _BV(UCSZ00);
+    UCSR0B = _BV(RXEN0) | _BV(TXEN0) | _BV(RXCIE0);
+    sei();
+}

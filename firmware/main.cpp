@@ -1,0 +1,276 @@
+// The firmware: sensors, one call of controller_tick, outputs, 50 times a second; in between the
+// console.
+#include <avr/pgmspace.h>
+#include <string.h>
+
+#include "arduino_headers.h"
+#include "board.h"
+#include "console.h"
+#include "controller.h"
+#include "crc16.h"
+#include "current_sensor.h"
+#include "ntc.h"
+#include "settings.h"
+#include "telemetry.h"
+#ifdef NINESPRING_HIL
+#include "current_sensor_hil.h"
+#endif
+
+#ifndef NINESPRING_VERSION
+#define NINESPRING_VERSION "0.1.0"
+#endif
+
+// Not static: debugger and simulator look at it by name.
+controller_t controller;
+
+static settings_t settings;
+static settings_store_t store;
+static telemetry_t telemetry;
+static console_t console;
+static console_status_t status;
+static controller_inputs_t inputs;
+static controller_outputs_t outputs;
+
+// The model's state over a warm reset.
+typedef struct {
+    thermal_model_state_t state;
+    uint16_t crc;
+} kept_t;
+static kept_t kept __attribute__((section(".noinit")));
+
+static uint8_t tick_of_step;
+static bool status_wanted;
+
+static uint16_t serial_room(void *)
+{
+    return board_serial_room();
+}
+static void serial_write(void *, const char *bytes, uint8_t length)
+{
+    board_serial_write(bytes, length);
+}
+static const text_output_t serial_output = {nullptr, serial_room, serial_write};
+
+static uint8_t eeprom_read(void *, uint16_t address)
+{
+    return board_eeprom_read(address);
+}
+static bool eeprom_ready(void *)
+{
+    return board_eeprom_ready();
+}
+static void eeprom_write(void *, uint16_t address, uint8_t value)
+{
+    board_eeprom_write(address, value);
+}
+static const settings_storage_t eeprom = {nullptr, eeprom_read, eeprom_ready, eeprom_write};
+
+static const char *reset_text(uint8_t cause)
+{
+    if (cause & BOARD_RESET_WATCHDOG) {
+        return PSTR("watchdog");
+    }
+    if (cause & BOARD_RESET_BROWN_OUT) {
+        return PSTR("brown-out");
+    }
+    if (cause & BOARD_RESET_POWER_ON) {
+        return PSTR("power-on");
+    }
+    if (cause & BOARD_RESET_EXTERNAL) {
+        return PSTR("external");
+    }
+    return PSTR("unknown while driving");
+}
+
+static int16_t ambient_c7(void)
+{
+    if (settings.board.ambient_source == SETTINGS_AMBIENT_NTC) {
+        int16_t measured_c7;
+        if (ntc_temperature_c7(board_ambient_adc(), &measured_c7)) {
+            return measured_c7;
+        }
+        // wire off or short: the setting is the better guess
+    }
+    return (int16_t)(((int32_t)settings.board.ambient_cc * 32 + 12) / 25); // x 128 / 100
+}
+
+static void keep_model(void)
+{
+    thermal_model_get_state(&controller.model, &kept.state);
+    kept.crc = crc16_add_bytes(CRC16_START, &kept.state, sizeof kept.state);
+}
+
+// Without a state that survived, the springs are taken to be as hot as they could be: just below
+// the trip. From there the model lets them cool; `model cold` says that they are cold. The
+// precedent is a motor relay's thermal memory (IEC 60255-149).
+static void start_model(uint8_t cause)
+{
+    const bool whole = kept.crc == crc16_add_bytes(CRC16_START, &kept.state, sizeof kept.state);
+    if ((cause & BOARD_RESET_WARM) && whole &&
+        thermal_model_set_state(&controller.model, &kept.state)) {
+        return;
+    }
+    const int32_t hot_cc = (int32_t)settings.controller.safety.temperature_trip_cc - 500;
+    thermal_model_reset(&controller.model, (int16_t)(hot_cc * 32 / 25)); // x 128 / 100
+}
+
+static void run_tick(uint8_t behind)
+{
+    const uint32_t begin_us = board_time_us();
+    if (behind > 0 && status.ticks_late < UINT16_MAX) {
+        status.ticks_late++;
+    }
+    status.ticks++;
+    status.time_ms = board_time_ms();
+#ifdef NINESPRING_HIL
+    current_sensor_hil_tick((uint16_t)status.ticks);
+#endif
+    current_sensor_read(inputs.sensor, CONTROLLER_MAX_SPRINGS);
+    for (uint8_t k = 0; k < CONTROLLER_MAX_SPRINGS; k++) {
+        status.sensor_status[k] = (uint8_t)inputs.sensor[k].status;
+    }
+    inputs.ambient_c7 = ambient_c7();
+#ifdef NINESPRING_HIL
+    current_sensor_hil_ambient(&inputs.ambient_c7);
+#endif
+    status.ambient_c7 = inputs.ambient_c7;
+    inputs.fan_percent = outputs.fan_percent;
+
+    controller_tick(&controller, &inputs, &outputs);
+
+#ifdef NINESPRING_HIL
+    current_sensor_hil_send((uint16_t)status.ticks, &outputs);
+#endif
+    board_set_duties(outputs.duty);
+    board_set_fan(outputs.fan_percent);
+    if (++tick_of_step == 5u) {
+        tick_of_step = 0;
+        keep_model();
+    }
+    board_watchdog_kick();
+    const uint32_t tick_us = board_time_us() - begin_us;
+    if (tick_us > status.tick_longest_us) {
+        status.tick_longest_us = tick_us > UINT16_MAX ? UINT16_MAX : (uint16_t)tick_us;
+    }
+    telemetry_tick(&telemetry, &controller, status.time_ms, inputs.ambient_c7, &serial_output);
+}
+
+#ifdef NINESPRING_HIL
+static int16_t held = -1; // a console octet that was met while looking for frames
+
+// Readings fill the receive buffer in 11 ms, so they are taken in while the console is busy, too.
+static void take_frames(void)
+{
+    while (held < 0) {
+        const int16_t octet = board_serial_read();
+        if (octet < 0) {
+            return;
+        }
+        if (!current_sensor_hil_receive((uint8_t)octet)) {
+            held = octet;
+        }
+    }
+}
+#endif
+
+static int16_t next_console_octet(void)
+{
+#ifdef NINESPRING_HIL
+    take_frames();
+    const int16_t octet = held;
+    held = -1;
+    return octet;
+#else
+    return board_serial_read();
+#endif
+}
+
+static void take_input(void)
+{
+    if (board_serial_lost_take()) {
+        console_break_line(&console, CONSOLE_ERROR_INPUT_LOST);
+    }
+#ifdef NINESPRING_HIL
+    take_frames();
+#endif
+    while (console_ready(&console)) {
+        const bool obsolete = board_serial_before_stop();
+        const int16_t octet = next_console_octet();
+        if (octet < 0) {
+            return;
+        }
+        if (obsolete) {
+            console_break_line(&console, CONSOLE_ERROR_STOPPED);
+        }
+        console_receive(&console, (uint8_t)octet);
+        if (octet == '\n' || octet == '\r') {
+            return; // a tick may be due
+        }
+    }
+}
+
+static void measure_load(void)
+{
+    static uint32_t second_ms;
+    const uint32_t now_ms = board_time_ms();
+    if (now_ms - second_ms < 1000u) {
+        return;
+    }
+    second_ms = now_ms;
+    const uint32_t idle_us = board_idle_us_take();
+    status.load_percent = idle_us >= 1000000ul ? 0u : (uint8_t)(100u - idle_us / 10000u);
+    status.stack_unused_bytes = board_stack_unused();
+}
+
+void setup()
+{
+    board_init();
+    const uint8_t cause = board_reset_cause();
+    status.reset_cause = reset_text(cause);
+    static const char version[] PROGMEM = NINESPRING_VERSION;
+    status.version = version;
+    status.sensors = current_sensor_name();
+    status.loaded = settings_load(&store, &eeprom, &settings);
+    status.stack_unused_bytes = board_stack_unused();
+
+    if (!controller_init(&controller, &settings.controller, ambient_c7(), nullptr)) {
+        status.settings_conflict_at_boot = true;
+        settings_default(&settings);
+        controller_init(&controller, &settings.controller, ambient_c7(), nullptr);
+    }
+    start_model(cause);
+    if (cause & (BOARD_RESET_WATCHDOG | BOARD_RESET_BROWN_OUT | BOARD_RESET_UNKNOWN)) {
+        controller_lock(&controller);
+    }
+    telemetry_init(&telemetry);
+    telemetry_set(&telemetry, settings.board.telemetry_format, settings.board.telemetry_hz);
+    console_init(&console, &serial_output, &controller, &settings, &store, &telemetry, &status);
+    console_greet(&console);
+    board_watchdog_start();
+    current_sensor_begin(settings.board.sensor_averaging);
+    uint8_t behind;
+    while (board_tick_take(&behind)) { // what became due meanwhile is not late
+    }
+}
+
+void loop()
+{
+    uint8_t behind;
+    if (board_stop_take()) {
+        controller_emergency_stop(&controller);
+        memset(outputs.duty, 0, sizeof outputs.duty);
+        console_stop(&console);
+    }
+    if (board_tick_take(&behind)) {
+        run_tick(behind);
+    }
+    console_service(&console);
+    take_input();
+    status_wanted = board_serial_status_take() || status_wanted;
+    if (status_wanted && board_serial_room() >= CONSOLE_ROOM_BYTES) {
+        status_wanted = false;
+        console_print_status(&console);
+    }
+    measure_load();
+    board_idle(console_busy(&console) || status_wanted);
+}
