@@ -1,0 +1,5 @@
+"""`python -m ninespring`."""
+
+from .cli import main
+
+main()

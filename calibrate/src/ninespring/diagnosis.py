@@ -1,0 +1,586 @@
+"""The diagnosis: fit what is declared, look at what is left, find what is missing, say what cannot be told apart."""
+
+from __future__ import annotations
+
+import json
+import math
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from . import __version__, effects, experiments, native, search, statistics
+from .fitting import FOLDS, Fit, Problem, Spec, fold_of_rows
+from .logs import Run
+from .models import Array, Model
+
+SCHEMA = "ninespring.diagnosis/1"
+
+
+@dataclass
+class Diagnosis:
+    """Everything a diagnosis found: the result for programs and what the report draws."""
+
+    result: dict[str, Any]
+    model: Model
+    problem: Problem
+    baseline: Fit
+    final: Fit
+    contenders: list[dict[str, Any]] = field(default_factory=list)
+
+
+def declared_from_model(model: Model) -> tuple[Array, dict[str, float]]:
+    """Return a model's array and parameters as declared values."""
+    return model.array, dict(model.parameters)
+
+
+def prepare(array: Array, runs: Sequence[Run], declared: Mapping[str, float] | None = None) -> Problem:
+    """Return the problem of these runs, condensed where they are long."""
+    from .logs import condense
+
+    share = max(600, 8000 // max(1, len(runs)))
+    return Problem(array, [condense(run, share) for run in runs], declared)
+
+
+def first_fit(problem: Problem, spec: Spec) -> Fit:
+    """Fit the declared model: once, then starts projected out and spikes left out, then again."""
+    fit = problem.fit(spec, tolerance=1e-3)
+    if problem.mask_spikes(fit.residual):
+        fit = problem.fit(spec, fit.as_dict(), tolerance=1e-3)
+    problem.learn_starts(fit.spec, fit.values)
+    noise = [statistics.noise_floor(left, run.starts) for left, run in zip(fit.residual, problem.runs, strict=True)]
+    problem.noise = [np.fmin(a, b) for a, b in zip(problem.noise, noise, strict=True)]
+    problem._tidy_noise()
+    return problem.fit(spec, fit.as_dict(), tolerance=1e-5, errors=True)
+
+
+def holdout_rmse(problem: Problem, fit: Fit) -> float:
+    """Return the rms error, degC, on blocks held out of the fit, one fold after the other."""
+    return problem.holdout_rmse(fit)
+
+
+def parameters_of(problem: Problem, fit: Fit, effect: str | None = None) -> dict[str, Any]:
+    """Return numbers with standard errors and units; of one effect, or those of the declared model."""
+    errors = fit.stderr()
+    bounds = set(fit.at_bounds())
+    out: dict[str, Any] = {}
+    for free, value in zip(fit.spec.free, fit.values, strict=True):
+        if free.effect != effect:
+            continue
+        error = errors[free.key]
+        entry: dict[str, Any] = {
+            "value": float(value),
+            "stderr": float(error) if math.isfinite(error) else None,
+            "unit": free.unit,
+        }
+        if free.key in fit.stuck:
+            entry["note"] = "the data cannot fix it: held"
+        elif free.key in bounds:
+            entry["note"] = "at its bound"
+        out[free.key] = entry
+    return out
+
+
+def _finish(problem: Problem, fit: Fit) -> Fit:
+    if fit.covariance is None:
+        again = problem.fit(fit.spec, fit.as_dict(), tolerance=1e-6, errors=True)
+        return again if again.chi2 <= fit.chi2 * (1 + 1e-6) else fit
+    return fit
+
+
+def in_order(found: search.Search, base: Fit, final: Fit, adopted: Sequence[str]) -> list[tuple[str, Fit]]:
+    """Return adopted effects, the one that explains most first, each with the fit of all up to it."""
+    out: list[tuple[str, Fit]] = []
+    rest = list(adopted)
+    while rest:
+        options = []
+        for effect in rest:
+            spec = final.spec
+            for other in rest:
+                if other != effect:
+                    spec = spec.without(other)
+            key = found.key(spec)
+            if len(rest) == 1:
+                fit = final
+            elif key in found.fits:
+                fit = found.fits[key]
+            else:
+                fit = found.fits[key] = found.problem.fit(spec, final.as_dict(), tolerance=1e-3, max_steps=14)
+            options.append((fit.sse, effect, fit))
+        _, effect, fit = min(options, key=lambda one: one[0])
+        rest.remove(effect)
+        out.append((effect, fit))
+    return out
+
+
+def variant_of(fit: Fit, effect: str) -> str:
+    """Return which variant of an effect a fit has."""
+    return dict(fit.spec.variant).get(effect, "")
+
+
+def diagnose(
+    array: Array,
+    runs: Sequence[Run],
+    *,
+    model: Model | None = None,
+    frozen: bool = False,
+    progress: Callable[[str], None] = lambda text: None,
+) -> Diagnosis:
+    """Diagnose logs. `model` gives declared values and effects already on; `frozen` keeps them as they are."""
+    # Simulations run in threads of their own: a linear algebra that starts more only gets in their way.
+    with threadpool_limits(1):
+        return _diagnose(array, runs, model, frozen, progress)
+
+
+def _diagnose(
+    array: Array, runs: Sequence[Run], model: Model | None, frozen: bool, progress: Callable[[str], None]
+) -> Diagnosis:
+    begun = time.monotonic()
+    declared = dict(model.parameters) if model else {}
+    problem = prepare(model.array if model else array, runs, declared)
+    progress("fitting what is declared")
+    spec = effects.base_spec(problem, frozen)
+    known = effects.candidates(problem)
+    if model:
+        for effect in model.effects:
+            options = [c for c in known if c.effect == effect]
+            free = () if frozen or not options else options[0].free
+            spec = spec.with_effect(effect, free, (), options[0].variant if options else "")
+    base = first_fit(problem, spec)
+    found = search.Search(problem, [c for c in known if c.effect not in spec.effects], base, progress)
+    final, without, contenders = found.run()
+    progress("held-out blocks")
+    final = _finish(problem, final)
+    left_over = search.unexplained(problem, final)
+    if left_over and without:
+        # Structure remains: keep only what explains most of what was there.
+        kept, without = found.backward(final, search.MIN_SHARE_UNEXPLAINED)
+        explained = (base.sse - kept.sse) / base.count
+        if explained < search.MIN_TOTAL_UNEXPLAINED * search.excess(problem, base):
+            kept, without = base, {}
+        if kept is not final:
+            final = _finish(problem, kept)
+            contenders = found.rivals(final, without)
+        left_over = search.unexplained(problem, final)
+    adopted = [e for e in final.spec.effects if e not in base.spec.effects]
+    strength = {e: search.log_evidence(problem, final, without[e]) for e in adopted}
+    base_out, final_out = holdout_rmse(problem, base), holdout_rmse(problem, final)
+
+    listed = []
+    steps = in_order(found, base, final, adopted)
+    adopted = [effect for effect, _ in steps]
+    for effect, growing in steps:
+        entry = {
+            "name": effect,
+            "rmse_c": statistics.rms(growing.residual),
+            "holdout_rmse_c": holdout_rmse(problem, growing),
+            "evidence": strength[effect],
+            "parameters": parameters_of(problem, final, effect),
+            "on_chip": effect in effects.ON_CHIP,
+            "in_words": effects.IN_WORDS[effect],
+        }
+        if variant := variant_of(final, effect):
+            entry["variant"] = variant
+        if effect in effects.WHY_NOT_ON_CHIP:
+            entry["why_not_on_chip"] = effects.WHY_NOT_ON_CHIP[effect]
+        listed.append(entry)
+
+    rivals, seen = [], set()
+    for instead, other in sorted(contenders, key=lambda one: one[1].chi2):
+        extra = [e for e in other.spec.effects if e not in final.spec.effects]
+        if instead not in adopted or not extra or (instead, extra[0]) in seen:
+            continue
+        apart = search.difference(problem, final, other)
+        ahead = search.log_evidence(problem, final, other)
+        if ahead >= search.TOLD_APART and apart >= search.EQUIVALENT:
+            continue
+        seen.add((instead, extra[0]))
+        progress(f"how to tell {extra[0]} from {instead}")
+        trial = experiments.separate(problem, final, other)
+        other = _finish(problem, other)
+        rivals.append(
+            {
+                "instead_of": instead,
+                "name": extra[0],
+                "variant": variant_of(other, extra[0]),
+                "rmse_c": statistics.rms(other.residual),
+                "holdout_rmse_c": holdout_rmse(problem, other),
+                "evidence": ahead,
+                "predictions_differ_c": apart * problem.noise_c,
+                "parameters": parameters_of(problem, other, extra[0]),
+                "separating_experiment": trial.text,
+                "experiment": trial.as_dict(),
+            }
+        )
+
+    candidates = []
+    for key, fit in found.fits.items():
+        candidates.append(
+            {
+                "effects": [f"{e} ({v})" if v else e for e, v in key],
+                "rmse_c": statistics.rms(fit.residual),
+                "evidence_over_baseline": search.log_evidence(problem, fit, base),
+                "adopted": fit.spec.variant == final.spec.variant,
+            }
+        )
+    candidates.sort(key=lambda one: -one["evidence_over_baseline"])
+    rho = statistics.autocorrelation([r / n for r, n in zip(final.residual, problem.noise, strict=True)], 1)
+    depends, note = depends_on(problem, final)
+    warnings = [f"{Path(run.name).name}: {text}" for run in problem.runs for text in run.notes]
+    warnings += swapped(problem)
+    if left_over:
+        warnings += shifted_clock(problem, base)
+    if left_over:
+        note = ("structure well above the noise remains that no effect of the library explains. " + note).strip()
+    else:
+        note = note or "white at the noise floor"
+    result: dict[str, Any] = {
+        "schema": SCHEMA,
+        "tool": f"ninespring {__version__}",
+        "logs": [{"file": Path(r.name).name, "sha256": r.sha256, "rows": len(r.time_s)} for r in runs],
+        "baseline": {
+            "rmse_c": statistics.rms(base.residual),
+            "holdout_rmse_c": base_out,
+            "noise_c": problem.noise_c,
+            "parameters": parameters_of(problem, base),
+            "effects": list(base.spec.effects),
+        },
+        "effects": listed,
+        "rivals": rivals,
+        "after": {
+            "rmse_c": statistics.rms(final.residual),
+            "holdout_rmse_c": final_out,
+            "parameters": parameters_of(problem, final),
+        },
+        "unexplained": bool(left_over),
+        "residual": {
+            "autocorrelation_lag1": float(rho[1]),
+            "structure_c": math.sqrt(search.excess(problem, final)) * problem.noise_c,
+            "rmse_per_spring_c": [_finite(v) for v in _per_spring(final.residual)],
+            "noise_per_spring_c": [
+                _finite(v) for v in np.sqrt(np.nanmean(np.square(np.asarray(problem.noise)), axis=0))
+            ],
+            "depends_on": depends,
+            "note": note,
+        },
+        "candidates": candidates[:40],
+        "identifiability": {
+            "not_identifiable": sorted(set(final.stuck)),
+            "at_bounds": final.at_bounds(),
+            "correlated": [{"a": a, "b": b, "correlation": r} for a, b, r in final.correlations()],
+        },
+        "warnings": warnings,
+        "seconds": round(time.monotonic() - begun, 2),
+        "simulations": problem.simulations,
+    }
+    made = model_of(problem, final, runs, result)
+    validate(result)
+    return Diagnosis(result, made, problem, base, final, contenders=[])
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None
+
+
+def _per_spring(residual: Sequence[np.ndarray]) -> np.ndarray:
+    total = sum(np.nansum(r**2, axis=0) for r in residual)
+    count = sum(np.isfinite(r).sum(axis=0) for r in residual)
+    return np.sqrt(np.where(count > 0, total / np.maximum(count, 1), np.nan))
+
+
+def model_of(problem: Problem, fit: Fit, runs: Sequence[Run], result: Mapping[str, Any] | None = None) -> Model:
+    """Return the model.toml of a fit: declared, fixed and fitted numbers, effects, provenance."""
+    table = native.parameter_table()
+    model = Model(problem.array)
+    model.effects = [e for e in fit.spec.plant_effects if e in native.effect_names()]
+    model.parameters = dict(problem.declared) | {k: v for k, v in fit.spec.fixed}
+    errors = fit.stderr()
+    for free, value in zip(fit.spec.free, fit.values, strict=True):
+        for name in free.names:
+            if name.partition("[")[0] in table:
+                model.parameters[name] = float(value)
+                if math.isfinite(errors[free.key]):
+                    model.stderr[name] = errors[free.key]
+    constants = [fit.value(f.key) for f in fit.spec.free if f.key.startswith("ambient_c@")]
+    if constants:
+        model.parameters["ambient_c"] = float(np.mean(constants))
+    drifts = [k for k, f in enumerate(fit.spec.free) if f.knot is not None]
+    if drifts:
+        # A drift of these very runs has no place in a model of the array.
+        model.effects.remove("ambient_drift")
+        for name in ("ambient_amplitude_k", "ambient_ramp_k_per_h"):
+            model.parameters.pop(name, None)
+    on = set(model.effects)
+    model.parameters = {
+        k: v
+        for k, v in model.parameters.items()
+        if table[k.partition("[")[0]].effect is None or table[k.partition("[")[0]].effect in on
+    }
+    model.stderr = {k: v for k, v in model.stderr.items() if k in model.parameters}
+    model.provenance = {
+        "logs": [{"file": Path(run.name).name, "sha256": run.sha256} for run in runs],
+        "rmse_after_c": statistics.rms(fit.residual),
+    }
+    if result:
+        model.provenance["rmse_before_c"] = result["baseline"]["rmse_c"]
+    if drifts:
+        model.provenance["note"] = "the ambient drifted during the runs; the drift itself is in diagnosis.json"
+    return model
+
+
+def schema() -> dict[str, Any]:
+    """Return the JSON schema of diagnosis.json."""
+    return json.loads((resources.files("ninespring") / "diagnosis.schema.json").read_text("utf-8"))
+
+
+def validate(result: Mapping[str, Any]) -> None:
+    """Check a result against the schema."""
+    jsonschema.validate(result, schema())
+
+
+def depends_on(problem: Problem, fit: Fit) -> tuple[list[str], str]:
+    """Return what the residual depends on, strongest first, and a sentence; nothing where it is white."""
+    structure = search.excess(problem, fit)
+    width = 10
+    blocks, owners, times, runs_of = [], [], [], []
+    for r, (run, left, noise) in enumerate(zip(problem.runs, fit.residual, problem.noise, strict=True)):
+        mean, _, begins = statistics.block_means(left / noise, width, run.starts)
+        blocks.append(mean)
+        times.append(run.time_s[begins])
+        owners.append(begins)
+        runs_of.append(r)
+    if structure < 0.5 * search.UNEXPLAINED**2:
+        return [], ""
+    out: list[tuple[float, str]] = []
+    per_spring = np.nanmean([np.nanmean(b**2, axis=0) - 1.0 / width for b in blocks], axis=0)
+    share = np.maximum(per_spring, 0) / max(1e-12, float(np.nansum(np.maximum(per_spring, 0))))
+    spread = 1.0 / len(share)
+    for k in np.argsort(-share)[:2]:
+        if share[k] > max(2.0 * spread, 0.3) and len(share) > 1:
+            out.append((float(share[k]), f"spring {k + 1} ({100 * share[k]:.0f} % of the structure)"))
+    series: dict[str, list[np.ndarray]] = {}
+    for r, run in enumerate(problem.runs):
+        drive = np.add.reduceat(run.drive, owners[r], axis=0) / width
+        fan = np.add.reduceat(run.fan, owners[r]) / width
+        for j in range(run.springs):
+            series.setdefault(f"drive of spring {j + 1}", []).append(drive[:, j])
+        series.setdefault("total drive", []).append(drive.sum(axis=1))
+        series.setdefault("fan", []).append(fan)
+        series.setdefault("time", []).append(times[r] - times[r].mean())
+    for name, parts in series.items():
+        best = (0.0, 0, -1)
+        if all(np.ptp(p) < 1e-12 for p in parts):
+            continue
+        for lag in (0, 1, 2, 3, 6, 12) if name != "time" else (0,):
+            for k in range(problem.runs[0].springs):
+                x, y = [], []
+                for p, b in zip(parts, blocks, strict=True):
+                    x.append(p[: len(p) - lag] - p.mean())
+                    y.append(b[lag:, k])
+                xs, ys = np.concatenate(x), np.concatenate(y)
+                good = np.isfinite(ys)
+                if good.sum() < 10 or np.std(xs[good]) < 1e-12 or np.std(ys[good]) < 1e-12:
+                    continue
+                rho = float(np.corrcoef(xs[good], ys[good])[0, 1]) * math.sqrt(
+                    float(np.nanmean(ys**2)) / max(1e-12, float(np.nanmax([np.nanmean(b**2) for b in blocks])))
+                )
+                if abs(rho) > abs(best[0]):
+                    best = (rho, lag, k)
+        if abs(best[0]) > 0.3:
+            step = float(np.median(np.diff(problem.runs[0].time_s))) * width
+            lag_text = f", {best[1] * step:.0f} s later" if best[1] else ""
+            out.append((abs(best[0]), f"{name} (seen at spring {best[2] + 1}{lag_text}, r = {best[0]:+.2f})"))
+    together = [np.nanmean(b, axis=1) for b in blocks]
+    common = np.mean([np.nanmean(t**2) for t in together]) / max(1e-12, np.mean([np.nanmean(b**2) for b in blocks]))
+    if common > 0.4 and problem.runs[0].springs > 2:
+        out.append((float(common), f"all springs move together ({100 * common:.0f} % of it is common)"))
+    worst = max(
+        (
+            (float(np.nanmean(b[i] ** 2)), r, float(times[r][i]))
+            for r, b in enumerate(blocks)
+            for i in range(len(b))
+            if np.isfinite(b[i]).any()
+        ),
+        default=(0.0, 0, 0.0),
+    )
+    typical = np.mean([np.nanmean(b**2) for b in blocks])
+    if worst[0] > 8 * typical:
+        out.append((0.3, f"time: most at {worst[2]:.0f} s of run {worst[1] + 1}"))
+    out.sort(key=lambda one: -one[0])
+    names = [text for _, text in out[:6]]
+    return names, ("It depends on " + "; ".join(names) + "." if names else "No single input goes with it.")
+
+
+def swapped(problem: Problem) -> list[str]:
+    """Return warnings where a spring's temperature follows another spring's drive: columns swapped."""
+    from scipy.optimize import linear_sum_assignment
+
+    springs = problem.runs[0].springs
+    if springs < 2:
+        return []
+    score = np.zeros((springs, springs))
+    weight = np.zeros((springs, springs))
+    for run in problem.runs:
+        heat = run.drive**2 if run.mode == "current" else run.drive
+        width = max(1, round(10.0 / float(np.median(np.diff(run.time_s)))))
+        mean, _, begins = statistics.block_means(run.temperature_c, width)
+        power = np.add.reduceat(heat, begins, axis=0) / width
+        rise = np.diff(mean, axis=0)
+        for j in range(springs):
+            for k in range(springs):
+                x, y = power[:-1, j], rise[:, k]
+                good = np.isfinite(y)
+                if good.sum() > 10 and np.std(x[good]) > 1e-9 and np.std(y[good]) > 1e-9:
+                    score[j, k] += np.corrcoef(x[good], y[good])[0, 1]
+                    weight[j, k] += 1
+    score = score / np.maximum(weight, 1)
+    inputs, outputs = linear_sum_assignment(-score)
+    wrong = [
+        (int(j), int(k))
+        for j, k in zip(inputs, outputs, strict=True)
+        if j != k and score[j, k] > 0.35 and score[j, k] > 2.0 * abs(score[k, k]) and score[j, k] > score[j, j] + 0.3
+    ]
+    # a swap is closed: what one spring shows, another one lacks
+    if {j for j, _ in wrong} != {k for _, k in wrong}:
+        return []
+    return [
+        f"t{k + 1}_c follows the drive of spring {j + 1}, not its own: columns swapped? Correct the log's header"
+        for j, k in wrong
+    ]
+
+
+def shifted_clock(problem: Problem, fit: Fit) -> list[str]:
+    """Return a warning where the temperatures come before the inputs that cause them: no physics does that.
+
+    Tried only where structure is left: the temperatures are moved later by 1 to 32 rows and fitted again.
+    """
+    best: tuple[float, float] | None = None
+    for rows in (1, 2, 4, 6, 8, 12, 16, 32):
+        moved = []
+        for run in problem.runs:
+            later = run.temperature_c.copy()
+            later[rows:] = run.temperature_c[:-rows]
+            later[:rows] = run.temperature_c[0]
+            moved.append(replace(run, temperature_c=later))
+        trial = Problem(problem.array, moved, problem.declared)
+        again = trial.fit(fit.spec, fit.as_dict(), tolerance=1e-3, max_steps=8)
+        error = statistics.rms(again.residual)
+        step = float(np.median(np.diff(problem.runs[0].time_s)))
+        if best is None or error < best[0]:
+            best = (error, rows * step)
+    if best and best[0] ** 2 < 0.5 * statistics.rms(fit.residual) ** 2:
+        return [
+            f"the temperatures come about {best[1]:.0f} s before the inputs that cause them (moved later, the error "
+            f"falls from {statistics.rms(fit.residual):.2f} to {best[0]:.2f} K): correct the clock of one of them"
+        ]
+    return []
+
+
+def fit_effects(
+    array: Array, runs: Sequence[Run], wanted: Sequence[str], progress: Callable[[str], None] = lambda text: None
+) -> tuple[Problem, Fit, Fit]:
+    """Fit the declared model with the effects named; return the problem, the fit and the declared model's fit."""
+    with threadpool_limits(1):
+        problem = prepare(array, runs)
+        known = effects.candidates(problem)
+        base = first_fit(problem, effects.base_spec(problem))
+        found = search.Search(problem, known, base, progress)
+        fit = base
+        for effect in wanted:
+            screen = found.screen(fit)
+            options = [k for k, c in enumerate(screen.candidates) if c.effect == effect]
+            if not options:
+                from .errors import InputError
+
+                raise InputError(f"{effect} cannot show in these logs: nothing in them depends on it")
+            best = max(options, key=lambda k: screen.forecast([k])[0])
+            progress(f"fitting {effect}")
+            fit = found.refit(fit, [screen.candidates[best]], [screen.forecast([best])[1].get(best, 1.0)])
+        return problem, _finish(problem, fit), base
+
+
+def plant_of(model: Model) -> native.Plant:
+    """Return the plant that a model.toml describes."""
+    from .fitting import array_parameters
+
+    plant = native.Plant(model.array.rows, model.array.cols)
+    plant.set_all(array_parameters(model.array))
+    plant.set_effects(model.effects)
+    plant.set_all(model.parameters)
+    return plant
+
+
+def predict(model: Model, run: Run, chip: bool = False) -> np.ndarray:
+    """Return what the sensors (or, by the on-chip model, the springs) should show, (rows, springs), degC."""
+    from .fitting import simulate_run
+
+    plant = plant_of(model)
+    if not chip:
+        return simulate_run(plant, run, run.ambient_c, {})
+    ambient = run.ambient_c if run.ambient_c is not None else np.full(len(run.time_s), plant.get("ambient_c"))
+    power = run.drive
+    if run.mode == "current":
+        power = run.drive**2 * plant.get("resistance_ohm")
+    elif run.mode == "command":
+        power = run.drive * np.array([plant.get(f"command_power_w[{k + 1}]") for k in range(run.springs)])
+    first = np.where(np.isfinite(run.temperature_c[0]), run.temperature_c[0], ambient[0])
+    return native.chip_simulate(plant, run.time_s, power, run.fan, ambient, first)
+
+
+def chip_settings(model: Model) -> tuple[str, str]:
+    """Return console lines `$name=value` of a model, and what was left out and why."""
+    return native.chip_export(plant_of(model))
+
+
+def surrogate(problem: Problem, fit: Fit) -> dict[str, Any]:
+    """Return how far an empirical model of the residual would get. Not physics; it is never exported.
+
+    Ridge regression of each spring's residual on every drive, filtered with time constants of 3 to 300 s, on
+    the fan and on time; the strength of the ridge and the error by held-out fifths of the runs.
+    """
+    from scipy.signal import lfilter
+
+    tables = []
+    for run in problem.runs:
+        step = float(np.median(np.diff(run.time_s)))
+        columns = [np.ones(len(run.time_s)), run.fan, run.time_s / 1000.0]
+        for tau in (3.0, 10.0, 30.0, 100.0, 300.0):
+            keep = math.exp(-step / tau)
+            for k in range(run.springs):
+                columns.append(lfilter([1 - keep], [1, -keep], run.drive[:, k]))
+        tables.append(np.column_stack(columns))
+    x = np.concatenate(tables)
+    x = (x - x.mean(axis=0)) / np.where(x.std(axis=0) > 0, x.std(axis=0), 1.0)
+    x[:, 0] = 1.0
+    y = np.concatenate(fit.residual)
+    folds = np.concatenate([fold_of_rows(run) for run in problem.runs])
+    best: tuple[float, float] | None = None
+    for strength in (10.0, 100.0, 1e3, 1e4):
+        total, count = 0.0, 0
+        for fold in range(FOLDS):
+            for k in range(y.shape[1]):
+                good = np.isfinite(y[:, k])
+                train, test = good & (folds != fold), good & (folds == fold)
+                if not train.any() or not test.any():
+                    continue
+                a = x[train]
+                weights = np.linalg.solve(a.T @ a + strength * np.eye(a.shape[1]), a.T @ y[train, k])
+                total += float(((y[test, k] - x[test] @ weights) ** 2).sum())
+                count += int(test.sum())
+        error = math.sqrt(total / max(1, count))
+        if best is None or error < best[0]:
+            best = (error, strength)
+    assert best is not None
+    return {
+        "empirical": True,
+        "what": "ridge regression of the residual on filtered drives, fan and time: no physics, not exported",
+        "holdout_before_c": statistics.rms(fit.residual),
+        "holdout_after_c": best[0],
+        "ridge": best[1],
+    }

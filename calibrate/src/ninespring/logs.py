@@ -1,0 +1,617 @@
+"""Logs (design, section 4): reading, checking, writing.
+
+A log that cannot be used is refused whole with file, line, column and advice. What can be mended without
+guessing (repeated rows, gaps, glitches, a saturated or dead sensor) is mended and said in `Run.notes`.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import os
+import re
+import tempfile
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+import pandas as pd
+
+from .errors import InputError
+from .statistics import noise_floor
+
+DriveMode = Literal["power", "current", "command"]
+
+MAX_LINE = 100_000
+"""A line longer than this (characters) is not a log."""
+MAX_SPRINGS = 64
+COLUMN = re.compile(r"^(?:time_s|fan|ambient_c|([ivtu])([1-9][0-9]?)_([avc])|u([1-9][0-9]?))$")
+EXTRA = re.compile(r"^(?:[mpy][1-9][0-9]?_c|[xd][1-9][0-9]?|px[1-9][0-9]?|s[1-9][0-9]?_a|state|note_.*)$")
+"""Columns that the simulator and the board write beside the measured ones: skipped."""
+UNIT_OF = {"i": "a", "v": "v", "t": "c"}
+LIMITS = {
+    "i": (-0.5, 20.0, "A", "looks like milliamperes: divide by 1000 (`ninespring import --map`)"),
+    "v": (-0.5, 60.0, "V", "looks like millivolts: divide by 1000 (`ninespring import --map`)"),
+    "u": (-1e-9, 1.0 + 1e-9, "", "commands run from 0 to 1: a command in % is divided by 100"),
+    "t": (-60.0, 400.0, "degC", "not a spring's temperature: leave the cell empty if not measured"),
+    "fan": (-1e-9, 1.0 + 1e-9, "", "the fan runs from 0 to 1: a fan in % is divided by 100"),
+    "ambient_c": (-40.0, 60.0, "degC", "looks like Fahrenheit or kelvin: give degC"),
+}
+"""Per kind of column: lowest, highest, unit, and what to do about a value beyond them."""
+
+
+@dataclass
+class Run:
+    """One log, checked. Arrays have one row per time (n) and one column per spring (k)."""
+
+    name: str
+    sha256: str
+    time_s: np.ndarray
+    mode: DriveMode
+    drive: np.ndarray
+    """(n, k): W, A or 0..1 by `mode`; row r holds until time r + 1."""
+    temperature_c: np.ndarray
+    """(n, k), NaN where not measured or not trusted."""
+    fan: np.ndarray
+    ambient_c: np.ndarray | None
+    """(n,) or None where the log has none."""
+    current_a: np.ndarray | None = None
+    voltage_v: np.ndarray | None = None
+    notes: list[str] = field(default_factory=list)
+    warm: bool = False
+    """The run begins warm and steady: hidden heat is in balance with the first inputs."""
+    starts: list[int] = field(default_factory=lambda: [0])
+    """Rows at which a simulation starts again from the measured temperatures (the first; after gaps)."""
+
+    @property
+    def springs(self) -> int:
+        """Number of springs."""
+        return self.temperature_c.shape[1]
+
+    @property
+    def duration_s(self) -> float:
+        """From the first row to the last, s."""
+        return float(self.time_s[-1] - self.time_s[0])
+
+
+def sha256_of(path: str | Path) -> str:
+    """Return the SHA-256 of a file, hexadecimal."""
+    digest = hashlib.sha256()
+    with open(path, "rb") as stream:
+        while block := stream.read(1 << 20):
+            digest.update(block)
+    return digest.hexdigest()
+
+
+def write_atomically(path: str | Path, text: str) -> None:
+    """Write a text file whole or not at all (temporary file beside it, then rename)."""
+    path = Path(path)
+    if not path.parent.is_dir():
+        raise InputError(f"the folder {path.parent} does not exist: create it first", path)
+    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    try:
+        with os.fdopen(handle, "w", encoding="utf-8", newline="\n") as stream:
+            stream.write(text)
+        umask = os.umask(0)
+        os.umask(umask)
+        os.chmod(temporary, 0o666 & ~umask)
+        os.replace(temporary, path)
+    except BaseException:
+        os.unlink(temporary)
+        raise
+
+
+def read_bytes(path: str | Path) -> bytes:
+    """Return the file's bytes, or refuse with what the system says."""
+    try:
+        with open(path, "rb") as stream:
+            return stream.read()
+    except OSError as error:
+        raise InputError(f"cannot be read: {error.strerror}", path) from None
+
+
+@dataclass
+class Table:
+    """A comma-separated file of numbers: columns by name, and where each row stood in the file."""
+
+    path: str
+    header_line: int
+    names: list[str]
+    header_columns: list[int]
+    """1-based character column of each name."""
+    frame: pd.DataFrame
+    lines: np.ndarray
+    """1-based line of each row."""
+    keys: dict[str, str]
+    """What `# key: value` lines said."""
+    unfinished: bool = False
+    """The last line has no end: the file may have been cut off in it."""
+
+    def where(self, row: int, name: str) -> tuple[int, int]:
+        """Line and 1-based character column of a cell."""
+        line = int(self.lines[row])
+        with open(self.path, encoding="utf-8-sig", errors="replace", newline="") as stream:
+            for number, text in enumerate(stream, start=1):
+                if number == line:
+                    cells = text.rstrip("\r\n").split(",")
+                    return line, 1 + sum(len(c) + 1 for c in cells[: self.names.index(name)])
+        return line, 1
+
+
+def read_table(path: str | Path, text_columns: Iterable[str] = ()) -> Table:
+    """Read a comma-separated file with a header, `#` comments, and numbers or empty cells."""
+    raw = read_bytes(path)
+    if not raw.strip():
+        raise InputError("the file is empty", path)
+    if b"\0" in raw[: 1 << 16]:
+        raise InputError("not a text file (it holds NUL bytes): give a CSV log", path, 1)
+    try:
+        text = raw.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = raw.count(b"\n", 0, error.start) + 1
+        raise InputError("not UTF-8 text: save the log as UTF-8 CSV", path, line) from None
+    if "\r" in text:
+        text = text.replace("\r\n", "\n").replace("\r", "\n")
+    lines = text.split("\n")
+    if lines and lines[-1] == "":
+        lines.pop()
+    longest = max(map(len, lines))
+    if longest > MAX_LINE:
+        number = next(k for k, one in enumerate(lines, start=1) if len(one) > MAX_LINE)
+        raise InputError(f"a line of {longest} characters: not a log (line ends missing?)", path, number)
+    keys: dict[str, str] = {}
+    kept: list[str] = []
+    numbers: list[int] = []
+    for number, line in enumerate(lines, start=1):
+        if line.startswith("#"):
+            name, colon, value = line[1:].partition(":")
+            if colon:
+                keys.setdefault(name.strip().lower(), value.strip())
+        elif line.strip():
+            kept.append(line)
+            numbers.append(number)
+    if not kept:
+        raise InputError("only comments: there is no header line", path, 1)
+    header, header_line = kept[0], numbers[0]
+    for separator, called in ((";", "semicolons"), ("\t", "tabs")):
+        if separator in header and "," not in header:
+            raise InputError(
+                f"columns are separated by {called}: save with commas and decimal points "
+                "(`ninespring import --map` converts)",
+                path,
+                header_line,
+                header.index(separator) + 1,
+            )
+    names = [name.strip().strip('"') for name in header.split(",")]
+    starts = [1]
+    for cell in header.split(",")[:-1]:
+        starts.append(starts[-1] + len(cell) + 1)
+    for k, name in enumerate(names):
+        if name == "":
+            raise InputError(f"column {k + 1} has no name", path, header_line, starts[k])
+        if name in names[:k]:
+            raise InputError(f"column '{name}' is there twice", path, header_line, starts[k])
+    wanted = header.count(",")
+    body = kept[1:]
+    if not body:
+        raise InputError("there is a header but no row", path, header_line)
+    for row, line in enumerate(body):
+        if (found := line.count(",")) != wanted:
+            advice = (
+                "cut off here?"
+                if row == len(body) - 1
+                else "decimal commas? write 20.5, not 20,5"
+                if found > wanted
+                else "a cell is missing: leave it empty between two commas"
+            )
+            raise InputError(
+                f"{found + 1} cells where the header has {wanted + 1}: {advice}",
+                path,
+                numbers[row + 1],
+                len(line) + 1,
+            )
+    words = set(text_columns)
+    types = {name: (str if name in words else np.float64) for name in names}
+    try:
+        frame = pd.read_csv(
+            io.StringIO("\n".join(body)),
+            header=None,
+            names=names,
+            dtype=types,
+            na_values=[""],
+            keep_default_na=False,
+            skipinitialspace=True,
+            skip_blank_lines=False,
+            quoting=3,
+            index_col=False,
+            low_memory=False,
+        )
+    except (ValueError, OverflowError):
+        frame = None
+    table = Table(str(path), header_line, names, starts, frame, np.asarray(numbers[1:], dtype=np.int64), keys)
+    table.unfinished = not text.endswith("\n")
+    numeric = [name for name in names if name not in words]
+    if frame is None or np.isfinite(frame[numeric].to_numpy(float)).sum() != int(
+        frame[numeric].notna().to_numpy().sum()
+    ):
+        _refuse_first_bad_cell(path, names, words, body, numbers[1:])
+    return table
+
+
+def _refuse_first_bad_cell(
+    path: str | Path, names: list[str], words: set[str], body: list[str], numbers: list[int]
+) -> None:
+    for row, line in enumerate(body):
+        at = 1
+        for name, cell in zip(names, line.split(","), strict=True):
+            value = cell.strip()
+            if name not in words and value:
+                try:
+                    good = bool(np.isfinite(float(value))) and "_" not in value
+                except ValueError:
+                    good = False
+                if not good:
+                    shown = value if len(value) <= 20 else value[:17] + "..."
+                    raise InputError(
+                        f"{name} is '{shown}', not a number: leave the cell empty if not measured",
+                        path,
+                        numbers[row],
+                        at,
+                    )
+            at += len(cell) + 1
+    raise InputError("a cell is not a number", path)
+
+
+def _check_range(table: Table, name: str, kind: str) -> None:
+    low, high, unit, advice = LIMITS[kind]
+    values = table.frame[name].to_numpy()
+    bad = np.flatnonzero((values < low) | (values > high))
+    if bad.size:
+        line, column = table.where(int(bad[0]), name)
+        raise InputError(f"{name} = {values[bad[0]]:g} {unit}".rstrip() + f": {advice}", table.path, line, column)
+
+
+def read_log(path: str | Path, springs: int | None = None, temperatures: bool = True) -> Run:
+    """Read and check one log; `springs` is the array's number, None to take what the header says."""
+    table = read_table(path, text_columns=("state",))
+    groups: dict[str, set[int]] = {"i": set(), "v": set(), "t": set(), "u": set()}
+    for name, at in zip(table.names, table.header_columns, strict=True):
+        if EXTRA.match(name):
+            continue
+        match = COLUMN.match(name)
+        kind, number = None, 0
+        if match and match[1]:
+            kind, number = match[1], int(match[2])
+            if UNIT_OF.get(kind) != match[3]:
+                match = None
+        elif match and match[4]:
+            kind, number = "u", int(match[4])
+        if not match:
+            raise InputError(
+                f"unknown column '{name}': a log has time_s, i1_a, v1_v, u1, t1_c ..., fan, ambient_c "
+                "(`ninespring import --map` renames)",
+                path,
+                table.header_line,
+                at,
+            )
+        if kind is not None:
+            if number > MAX_SPRINGS or (springs is not None and number > springs):
+                raise InputError(
+                    f"column '{name}' but the array has {springs or MAX_SPRINGS} springs",
+                    path,
+                    table.header_line,
+                    at,
+                )
+            groups[kind].add(number)
+    if "time_s" not in table.names:
+        raise InputError("no column time_s", path, table.header_line, 1)
+    if temperatures and not groups["t"]:
+        raise InputError("no temperature column (t1_c ...)", path, table.header_line, 1)
+    count = springs or max(set().union(*groups.values()))
+    everyone = set(range(1, count + 1))
+    mode: DriveMode
+    if groups["i"]:
+        driving, letter, example = groups["i"], "i", "i{}_a"
+    elif groups["u"]:
+        driving, letter, example = groups["u"], "u", "u{}"
+    else:
+        raise InputError("neither currents (i1_a ...) nor commands (u1 ...)", path, table.header_line, 1)
+    if missing := sorted(everyone - driving):
+        raise InputError(
+            f"spring {missing[0]} has no column {example.format(missing[0])}: "
+            "add it (0 where the spring is not driven)",
+            path,
+            table.header_line,
+            1,
+        )
+    if letter == "i" and groups["v"] and (missing := sorted(everyone - groups["v"])):
+        raise InputError(
+            f"spring {missing[0]} has no column v{missing[0]}_v but others have: log all voltages or none",
+            path,
+            table.header_line,
+            1,
+        )
+    frame = table.frame
+    for name in table.names:
+        if EXTRA.match(name):
+            continue
+        if name != "time_s":
+            kind = name if name in LIMITS else name[0]
+            _check_range(table, name, kind)
+        if name == "time_s" or name[0] in "iu" or name == "fan" or name[0] == "v":
+            holes = np.flatnonzero(frame[name].isna().to_numpy())
+            if holes.size:
+                line, column = table.where(int(holes[0]), name)
+                raise InputError(f"{name} is empty: only temperatures and ambient_c may be", path, line, column)
+    notes: list[str] = []
+    keep = _rising_rows(table, notes)
+    if table.unfinished and len(frame) > 3:
+        keep[-1] = False
+        notes.append("the last line has no end, it may be cut off: left out")
+    frame = frame.iloc[keep]
+    if len(frame) < 3:
+        raise InputError(f"{len(frame)} rows: too short to say anything", path, int(table.lines[-1]))
+
+    def matrix(pattern: str) -> np.ndarray:
+        return np.ascontiguousarray(
+            np.column_stack(
+                [
+                    frame[pattern.format(k)].to_numpy(float)
+                    if pattern.format(k) in frame
+                    else np.full(len(frame), np.nan)
+                    for k in range(1, count + 1)
+                ]
+            )
+        )
+
+    time_s = frame["time_s"].to_numpy(float)
+    temperature = matrix("t{}_c")
+    current = voltage = None
+    if letter == "i":
+        current = matrix("i{}_a")
+        if groups["v"]:
+            voltage = matrix("v{}_v")
+            mode, drive = "power", current * voltage
+        else:
+            mode, drive = "current", current
+    else:
+        mode, drive = "command", matrix("u{}")
+    ambient = None
+    if "ambient_c" in frame and frame["ambient_c"].notna().any():
+        ambient = frame["ambient_c"].ffill().bfill().to_numpy(float)
+    fan = frame["fan"].to_numpy(float) if "fan" in frame else np.zeros(len(frame))
+    run = Run(
+        name=str(path),
+        sha256=sha256_of(path),
+        time_s=time_s,
+        mode=mode,
+        drive=drive,
+        temperature_c=temperature,
+        fan=np.clip(fan, 0.0, 1.0),
+        ambient_c=ambient,
+        current_a=current,
+        voltage_v=voltage,
+        notes=notes,
+    )
+    if mode == "command":
+        run.drive = np.clip(run.drive, 0.0, 1.0)
+    _refuse_wrong_units(run, table)
+    _mask_bad_sensors(run)
+    _mask_glitches(run)
+    _find_gaps(run)
+    run.warm = _begins_warm(run)
+    if temperatures and not np.isfinite(run.temperature_c).any():
+        raise InputError("no usable temperature in the whole log", path)
+    return run
+
+
+def _rising_rows(table: Table, notes: list[str]) -> np.ndarray:
+    """Rows whose time rises. Exact repeats are dropped and said; anything else is refused."""
+    time_s = table.frame["time_s"].to_numpy(float)
+    step = np.diff(time_s)
+    keep = np.ones(len(time_s), dtype=bool)
+    for row in np.flatnonzero(step <= 0) + 1:
+        before, now = table.frame.iloc[row - 1], table.frame.iloc[row]
+        if step[row - 1] == 0 and now.equals(before):
+            keep[row] = False
+            continue
+        line, column = table.where(int(row), "time_s")
+        said = (
+            f"time_s repeats {time_s[row]:g} with other values"
+            if step[row - 1] == 0
+            else f"time_s falls from {time_s[row - 1]:g} to {time_s[row]:g}"
+        )
+        raise InputError(f"{said}: times must rise strictly", table.path, line, column)
+    if dropped := int((~keep).sum()):
+        notes.append(f"{dropped} repeated rows dropped")
+    return keep
+
+
+def _refuse_wrong_units(run: Run, table: Table) -> None:
+    """A cold start above 45 degC is Fahrenheit: nothing is driven, everything is equally 'warm'."""
+    first = run.temperature_c[: min(5, len(run.time_s))]
+    if not np.isfinite(first).any():
+        return
+    lowest = float(np.nanmin(run.temperature_c))
+    quiet = not np.any(run.drive[0] > 0)
+    suspicious = (
+        lowest > 45.0
+        and quiet
+        and float(np.nanmax(first) - np.nanmin(first)) < 8.0
+        and (run.ambient_c is None or abs(lowest - float(run.ambient_c[0])) > 20.0)
+    )
+    kelvin = lowest > 240.0
+    if suspicious or kelvin:
+        name = next(n for n in table.names if n.startswith("t") and n != "time_s")
+        line, column = table.where(0, name)
+        raise InputError(
+            f"nothing is driven yet the springs start at {lowest:.0f}: "
+            f"looks like {'kelvin' if kelvin else 'degrees Fahrenheit'}, a log has degC "
+            "(`ninespring import --map` converts)",
+            run.name,
+            line,
+            column,
+        )
+
+
+def _mask_bad_sensors(run: Run) -> None:
+    """Saturated and dead sensors are not measurements: masked, and said."""
+    for k in range(run.springs):
+        values = run.temperature_c[:, k]
+        seen = np.flatnonzero(np.isfinite(values))
+        if seen.size < 10:
+            continue
+        measured = values[seen]
+        if np.all(measured == measured[0]) and np.ptp(run.drive.sum(axis=1)) > 0:
+            others = [
+                np.nanmax(run.temperature_c[:, j]) - np.nanmin(run.temperature_c[:, j])
+                for j in range(run.springs)
+                if j != k and np.isfinite(run.temperature_c[:, j]).any()
+            ]
+            if np.ptp(run.drive[:, k]) > 0 or (others and max(others) > 5.0):
+                run.temperature_c[:, k] = np.nan
+                run.notes.append(f"t{k + 1}_c never moves ({measured[0]:g} degC): dead sensor, left out")
+                continue
+        for edge, extreme in (("highest", measured.max()), ("lowest", measured.min())):
+            flat = measured == extreme
+            longest = _longest_run(flat)
+            typical = _longest_run(np.diff(measured) == 0) + 1
+            inner = measured[~flat]
+            if inner.size < 10:
+                continue
+            # Ordinary quantisation also repeats values; a clipped sensor stays at ITS extreme far longer
+            # than it ever stays at any other value.
+            elsewhere = _longest_run(np.diff(inner) == 0) + 1
+            if longest >= 15 and longest > 4 * elsewhere and longest >= typical:
+                run.temperature_c[seen[flat], k] = np.nan
+                run.notes.append(
+                    f"t{k + 1}_c stays at its {edge} value {extreme:g} degC for {longest} rows: "
+                    "saturated, those rows left out"
+                )
+
+
+def _longest_run(flags: np.ndarray) -> int:
+    if not flags.any():
+        return 0
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], flags.astype(np.int8), [0]))))
+    return int((edges[1::2] - edges[::2]).max())
+
+
+def _mask_glitches(run: Run) -> None:
+    """Single samples far from the straight line between their neighbours: no spring moves like that."""
+    noise = noise_floor(run.temperature_c)
+    for k in range(run.springs):
+        values = run.temperature_c[:, k]
+        if np.isfinite(values).sum() < 30 or not np.isfinite(noise[k]):
+            continue
+        before, after = values[:-2], values[2:]
+        away = np.abs(values[1:-1] - 0.5 * (before + after))
+        limit = 10.0 * max(float(noise[k]), 0.02) + 2.0 * np.abs(after - before)
+        bad = np.flatnonzero(away > limit) + 1
+        # a spike of one sample also lifts its neighbours' distance: keep the largest of three in a row
+        peak = np.zeros(len(values))
+        peak[1:-1] = np.nan_to_num(away)
+        bad = bad[(peak[bad] >= peak[bad - 1]) & (peak[bad] >= peak[np.minimum(bad + 1, len(values) - 1)])]
+        if 0 < bad.size <= max(3, 0.01 * len(values)):
+            run.temperature_c[bad, k] = np.nan
+            run.notes.append(
+                f"t{k + 1}_c: {bad.size} isolated spike(s) left out, the first at {run.time_s[bad[0]]:g} s"
+            )
+
+
+def _begins_warm(run: Run) -> bool:
+    """Driven from the first row on, the same for half a minute, and no spring moves by more than half a degree."""
+    first = run.time_s - run.time_s[0] <= 30.0
+    if first.sum() < 5 or not np.any(run.drive[0] > 0) or np.ptp(run.drive[first], axis=0).max() > 0:
+        return False
+    seen = run.temperature_c[first]
+    seen = seen[:, np.isfinite(seen).all(axis=0)]
+    if not seen.shape[1]:
+        return False
+    third = max(1, len(seen) // 3)
+    moved = np.abs(seen[-third:].mean(axis=0) - seen[:third].mean(axis=0))
+    return bool(moved.max() < 0.5)
+
+
+def _find_gaps(run: Run) -> None:
+    step = np.diff(run.time_s)
+    usual = float(np.median(step))
+    limit = max(10.0, 5.0 * usual)
+    gaps = np.flatnonzero(step > limit)
+    for row in gaps:
+        run.starts.append(int(row) + 1)
+    if gaps.size:
+        longest = float(step[gaps].max())
+        run.notes.append(
+            f"{gaps.size} gap(s) in time, the longest {longest:.0f} s: "
+            "the simulation starts again from the measured temperatures after each"
+        )
+
+
+def log_text(
+    time_s: np.ndarray,
+    columns: dict[str, np.ndarray],
+    keys: dict[str, str] | None = None,
+    decimals: int = 4,
+) -> str:
+    """Return a log as text: `# key: value` lines, header, rows; NaN becomes an empty cell."""
+    frame = pd.DataFrame({"time_s": np.round(time_s, 6)} | columns)
+    head = "".join(f"# {key}: {value}\n" for key, value in (keys or {}).items())
+    return head + frame.to_csv(index=False, float_format=f"%.{decimals}f", lineterminator="\n")
+
+
+def condense(run: Run, max_rows: int = 4000) -> Run:
+    """Return the run with at most about `max_rows` rows: bins of equal row count, averaged.
+
+    Drives and fan are averaged over the bin they act in; the temperature of a bin is the mean of the
+    measurements around its first time, so noise falls and nothing is shifted.
+    """
+    n = len(run.time_s)
+    factor = -(-n // max_rows)
+    if factor <= 1:
+        return run
+    usual = float(np.median(np.diff(run.time_s)))
+    factor = max(1, min(factor, int(10.0 / usual)))
+    if factor <= 1:
+        return run
+    pieces: dict[str, list[np.ndarray]] = {k: [] for k in ("t", "d", "y", "f", "a")}
+    starts: list[int] = []
+    half = factor // 2
+    smooth = pd.DataFrame(run.temperature_c).rolling(2 * half + 1, center=True, min_periods=1).mean().to_numpy()
+    bounds = [*run.starts, n]
+    total = 0
+    for begin, end in zip(bounds[:-1], bounds[1:], strict=True):
+        edges = np.arange(begin, end, factor)
+        starts.append(total)
+        total += len(edges)
+        weight = np.diff(run.time_s, append=run.time_s[-1] + usual)[begin:end]
+        bins = np.arange(end - begin) // factor
+        norm = np.bincount(bins, weight)
+        for key, source in (("d", run.drive), ("f", run.fan[:, None])):
+            pieces[key].append(
+                np.column_stack(
+                    [np.bincount(bins, weight * source[begin:end, k]) / norm for k in range(source.shape[1])]
+                )
+            )
+        first = run.temperature_c[begin : begin + 1]
+        block = smooth[edges].copy()
+        block[0] = np.where(np.isfinite(first[0]), smooth[begin], np.nan)
+        pieces["y"].append(block)
+        pieces["t"].append(run.time_s[edges])
+        if run.ambient_c is not None:
+            pieces["a"].append(run.ambient_c[edges])
+    return Run(
+        name=run.name,
+        sha256=run.sha256,
+        time_s=np.concatenate(pieces["t"]),
+        mode=run.mode,
+        drive=np.ascontiguousarray(np.concatenate(pieces["d"])),
+        temperature_c=np.ascontiguousarray(np.concatenate(pieces["y"])),
+        fan=np.concatenate(pieces["f"])[:, 0],
+        ambient_c=None if run.ambient_c is None else np.concatenate(pieces["a"]),
+        warm=run.warm,
+        notes=[*run.notes, f"{n} rows averaged {factor} by {factor} for the fit"],
+        starts=starts,
+    )

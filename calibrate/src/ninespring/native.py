@@ -1,0 +1,370 @@
+"""The project's C code, called from Python: the plant (double precision) and the on-chip model (integers).
+
+The functions release the interpreter's lock while they run, so simulations run in parallel threads.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from importlib import resources
+
+import numpy as np
+
+MAX_SPRINGS = 64
+POWER, CURRENT, DUTY, COMMAND, TEMPERATURE = range(5)
+MODES = {"power": POWER, "current": CURRENT, "command": COMMAND}
+
+_ERRORS = {
+    -1: "no parameter or effect of that name",
+    -2: "value outside its limits",
+    -3: "no such spring",
+    -4: "rows x columns not in 1..64",
+    -5: "out of memory",
+    -6: "time step not positive, or no steady state",
+}
+_double_p = ctypes.POINTER(ctypes.c_double)
+_int_p = ctypes.POINTER(ctypes.c_int)
+
+
+class NativeError(RuntimeError):
+    """The C code refused; `status` is its number."""
+
+    def __init__(self, status: int, what: str) -> None:
+        self.status = status
+        super().__init__(f"{what}: {_ERRORS.get(status, f'status {status}')}")
+
+
+class _Parameter(ctypes.Structure):
+    _fields_ = (
+        ("name", ctypes.c_char_p),
+        ("unit", ctypes.c_char_p),
+        ("effect", ctypes.c_char_p),
+        ("description", ctypes.c_char_p),
+        ("default_value", ctypes.c_double),
+        ("minimum", ctypes.c_double),
+        ("maximum", ctypes.c_double),
+        ("per_spring", ctypes.c_bool),
+    )
+
+
+@dataclass(frozen=True)
+class PlantParameter:
+    """One entry of the plant's parameter table."""
+
+    index: int
+    name: str
+    unit: str
+    effect: str | None
+    description: str
+    default: float
+    minimum: float
+    maximum: float
+    per_spring: bool
+
+
+@functools.cache
+def library() -> ctypes.CDLL:
+    """Load the shared library that the package was built with."""
+    name = "libninespring_native.so"
+    path = resources.files("ninespring") / name
+    try:
+        lib = ctypes.CDLL(str(path))
+    except OSError as error:
+        raise RuntimeError(
+            f"the compiled part of ninespring is missing ({error}): run `pip install ./calibrate`"
+        ) from None
+    pointer, integer, size, real = (
+        ctypes.c_void_p,
+        ctypes.c_int,
+        ctypes.c_size_t,
+        ctypes.c_double,
+    )
+    text = ctypes.c_char_p
+    signatures: dict[str, tuple[object, Sequence[object]]] = {
+        "plant_parameter_count": (size, ()),
+        "plant_parameter": (ctypes.POINTER(_Parameter), (size,)),
+        "plant_effect_count": (size, ()),
+        "plant_effect_name": (text, (size,)),
+        "plant_create": (pointer, (integer, integer)),
+        "plant_destroy": (None, (pointer,)),
+        "plant_copy": (pointer, (pointer,)),
+        "plant_set": (integer, (pointer, text, real)),
+        "plant_get": (integer, (pointer, text, _double_p)),
+        "plant_set_effect": (integer, (pointer, text, ctypes.c_bool)),
+        "plant_effect_is_on": (ctypes.c_bool, (pointer, size)),
+        "plant_check": (integer, (pointer, ctypes.POINTER(text))),
+        "plant_reset": (None, (pointer,)),
+        "plant_set_temperature": (integer, (pointer, integer, real)),
+        "plant_drive": (integer, (pointer, integer, integer, real)),
+        "plant_set_fan": (integer, (pointer, real)),
+        "plant_set_ambient": (integer, (pointer, real)),
+        "plant_step": (integer, (pointer, real)),
+        "plant_settle": (integer, (pointer, real)),
+        "plant_simulate": (
+            integer,
+            (
+                pointer,
+                size,
+                _double_p,
+                _int_p,
+                _double_p,
+                _double_p,
+                _double_p,
+                _double_p,
+                _double_p,
+            ),
+        ),
+        "plant_temperature_c": (real, (pointer, integer)),
+        "plant_measured_c": (real, (pointer, integer)),
+        "plant_austenite": (real, (pointer, integer)),
+        "plant_resistance_ohm": (real, (pointer, integer)),
+        "plant_power_w": (real, (pointer, integer)),
+        "plant_air_c": (real, (pointer,)),
+        "plant_plate_c": (real, (pointer,)),
+    }
+    for function, (result, arguments) in signatures.items():
+        entry = getattr(lib, function)
+        entry.restype = result
+        entry.argtypes = arguments
+    return lib
+
+
+@functools.cache
+def parameter_table() -> dict[str, PlantParameter]:
+    """Return the plant's parameters by name, in its order."""
+    lib = library()
+    table = {}
+    for k in range(lib.plant_parameter_count()):
+        one = lib.plant_parameter(k).contents
+        name = one.name.decode()
+        table[name] = PlantParameter(
+            k,
+            name,
+            one.unit.decode() if one.unit else "",
+            one.effect.decode() if one.effect else None,
+            one.description.decode() if one.description else "",
+            one.default_value,
+            one.minimum,
+            one.maximum,
+            one.per_spring,
+        )
+    return table
+
+
+@functools.cache
+def effect_names() -> tuple[str, ...]:
+    """Return the names of the effects, in the plant's order."""
+    lib = library()
+    return tuple(lib.plant_effect_name(k).decode() for k in range(lib.plant_effect_count()))
+
+
+def _pointer(array: np.ndarray | None) -> object:
+    return None if array is None else array.ctypes.data_as(_double_p)
+
+
+class Plant:
+    """One simulated array. Not for two threads at once; make a `copy` for each."""
+
+    def __init__(self, rows: int, cols: int) -> None:
+        self._lib = library()
+        self.rows, self.cols = rows, cols
+        self._plant = self._lib.plant_create(rows, cols)
+        if not self._plant:
+            raise NativeError(-4, f"{rows} x {cols} springs")
+
+    @property
+    def springs(self) -> int:
+        """Number of springs."""
+        return self.rows * self.cols
+
+    def __del__(self) -> None:
+        if getattr(self, "_plant", None):
+            self._lib.plant_destroy(self._plant)
+            self._plant = None
+
+    def copy(self) -> Plant:
+        """Return an independent plant in the same state."""
+        twin = object.__new__(Plant)
+        twin._lib, twin.rows, twin.cols = self._lib, self.rows, self.cols
+        twin._plant = self._lib.plant_copy(self._plant)
+        if not twin._plant:
+            raise NativeError(-5, "copy of a plant")
+        return twin
+
+    def _check(self, status: int, what: str) -> None:
+        if status:
+            raise NativeError(status, what)
+
+    def set(self, name: str, value: float) -> None:
+        """Set a parameter, `name` or `name[k]`."""
+        self._check(self._lib.plant_set(self._plant, name.encode(), float(value)), f"{name} = {value:g}")
+
+    def set_all(self, values: Mapping[str, float]) -> None:
+        """Set many; what is said of all springs before what is said of one."""
+        for one in (False, True):
+            for name, value in values.items():
+                if ("[" in name) == one:
+                    self.set(name, value)
+
+    def get(self, name: str) -> float:
+        """Return a parameter."""
+        out = ctypes.c_double()
+        self._check(self._lib.plant_get(self._plant, name.encode(), ctypes.byref(out)), name)
+        return out.value
+
+    def set_effects(self, names: Iterable[str]) -> None:
+        """Switch these effects on and all others off."""
+        wanted = set(names)
+        for name in effect_names():
+            self._check(self._lib.plant_set_effect(self._plant, name.encode(), name in wanted), name)
+            wanted.discard(name)
+        if wanted:
+            raise NativeError(-1, sorted(wanted)[0])
+
+    def check(self) -> str | None:
+        """Return what is inconsistent among the parameters, None if nothing is."""
+        message = ctypes.c_char_p()
+        status = self._lib.plant_check(self._plant, ctypes.byref(message))
+        return None if status == 0 else (message.value or b"inconsistent").decode()
+
+    def reset(self) -> None:
+        """Everything to ambient, martensite, time 0."""
+        self._lib.plant_reset(self._plant)
+
+    def set_ambient(self, ambient_c: float) -> None:
+        """Set the ambient temperature, degC."""
+        self._check(self._lib.plant_set_ambient(self._plant, float(ambient_c)), "ambient")
+
+    def set_fan(self, fraction: float) -> None:
+        """Set the fan, 0..1."""
+        self._check(self._lib.plant_set_fan(self._plant, float(fraction)), "fan")
+
+    def set_temperature(self, spring: int, temperature_c: float) -> None:
+        """Put a spring (0-based) to a temperature, degC."""
+        self._check(
+            self._lib.plant_set_temperature(self._plant, spring, float(temperature_c)),
+            f"temperature {temperature_c:g}",
+        )
+
+    def drive(self, spring: int, mode: int, quantity: float) -> None:
+        """Drive a spring (0-based) by POWER (W), CURRENT (A), COMMAND (0..1) or TEMPERATURE (degC)."""
+        self._check(self._lib.plant_drive(self._plant, spring, mode, float(quantity)), f"drive {quantity:g}")
+
+    def settle(self, limit_s: float = 1e6) -> None:
+        """Run to the steady state."""
+        self._check(self._lib.plant_settle(self._plant, float(limit_s)), "steady state")
+
+    def settle_without(self, effect: str, limit_s: float) -> None:
+        """Run to the steady state with one effect off meanwhile."""
+        on = self._lib.plant_effect_is_on(self._plant, effect_names().index(effect))
+        self._check(self._lib.plant_set_effect(self._plant, effect.encode(), False), effect)
+        self.settle(limit_s)
+        self._check(self._lib.plant_set_effect(self._plant, effect.encode(), on), effect)
+
+    def measured_c(self) -> np.ndarray:
+        """Return what the sensors show now, (springs,), degC."""
+        return np.array([self._lib.plant_measured_c(self._plant, k) for k in range(self.springs)])
+
+    def temperature_c(self) -> np.ndarray:
+        """Return the springs' temperatures now, (springs,), degC."""
+        return np.array([self._lib.plant_temperature_c(self._plant, k) for k in range(self.springs)])
+
+    def start_from_measured(self, first_c: np.ndarray) -> None:
+        """Put the springs where the sensors would show `first_c` (NaN: stays where it is)."""
+        seen = np.flatnonzero(np.isfinite(first_c))
+        if not seen.size:
+            return
+        wanted = np.clip(first_c, -60.0, 500.0)
+        guess = wanted.copy()
+        for attempt in range(3):
+            for k in seen:
+                self.set_temperature(int(k), guess[k])
+            shown = self.measured_c()
+            off = wanted[seen] - shown[seen]
+            if np.abs(off).max() < 1e-3 or attempt == 2:
+                break
+            guess[seen] = np.clip(guess[seen] + off, -60.0, 500.0)
+
+    def simulate(
+        self,
+        time_s: np.ndarray,
+        mode: int,
+        drive: np.ndarray,
+        fan: np.ndarray | None = None,
+        ambient_c: np.ndarray | None = None,
+        true_c: bool = False,
+    ) -> np.ndarray:
+        """Run a whole log; return what the sensors show (or the springs have), (rows, springs), degC."""
+        rows, n = drive.shape
+        if n != self.springs or len(time_s) != rows:
+            raise ValueError(f"drive is {drive.shape}, the plant has {self.springs} springs")
+        time_s = np.ascontiguousarray(time_s, dtype=float)
+        drive = np.ascontiguousarray(drive, dtype=float)
+        fan = None if fan is None else np.ascontiguousarray(fan, dtype=float)
+        ambient_c = None if ambient_c is None else np.ascontiguousarray(ambient_c, dtype=float)
+        modes = (ctypes.c_int * n)(*([mode] * n))
+        out = np.empty((rows, n))
+        self._check(
+            self._lib.plant_simulate(
+                self._plant,
+                rows,
+                _pointer(time_s),
+                modes,
+                _pointer(drive),
+                _pointer(fan),
+                _pointer(ambient_c),
+                None if true_c else _pointer(out),
+                _pointer(out) if true_c else None,
+            ),
+            "simulation",
+        )
+        return out
+
+
+def chip_export(plant: Plant) -> tuple[str, str]:
+    """Return the console lines of the on-chip model with this plant's numbers, and what was left out."""
+    from .errors import WorkError
+
+    text, message = ctypes.create_string_buffer(16384), ctypes.create_string_buffer(512)
+    call = library().chip_export
+    call.restype = ctypes.c_int
+    call.argtypes = (ctypes.c_void_p, ctypes.c_char_p, ctypes.c_size_t, ctypes.c_char_p, ctypes.c_size_t)
+    if call(plant._plant, text, len(text), message, len(message)):
+        raise WorkError(f"the model does not fit the chip: {message.value.decode()}")
+    return text.value.decode(), message.value.decode()
+
+
+def chip_simulate(
+    plant: Plant,
+    time_s: np.ndarray,
+    power_w: np.ndarray,
+    fan: np.ndarray,
+    ambient_c: np.ndarray,
+    first_c: np.ndarray,
+) -> np.ndarray:
+    """Run a log through the on-chip fixed-point model; return its temperatures, (rows, springs), degC."""
+    from .errors import WorkError
+
+    power_w = np.ascontiguousarray(power_w, dtype=float)
+    arrays = [np.ascontiguousarray(a, dtype=float) for a in (time_s, power_w, fan, ambient_c, first_c)]
+    out = np.empty_like(power_w)
+    message = ctypes.create_string_buffer(512)
+    call = library().chip_simulate
+    call.restype = ctypes.c_int
+    call.argtypes = (ctypes.c_void_p, ctypes.c_size_t, *(_double_p,) * 6, ctypes.c_char_p, ctypes.c_size_t)
+    pointers = [_pointer(a) for a in arrays]
+    if call(plant._plant, len(time_s), *pointers, _pointer(out), message, len(message)):
+        raise WorkError(f"the model does not fit the chip: {message.value.decode()}")
+    return out
+
+
+def paper_configure(plant: Plant, pitch_mm: float) -> None:
+    """Give a plant the paper's loss and couplings at a pitch (sim_host/plant/paper.h)."""
+    call = library().paper_configure
+    call.restype = ctypes.c_int
+    call.argtypes = (ctypes.c_void_p, ctypes.c_double)
+    if status := call(plant._plant, float(pitch_mm)):
+        raise NativeError(status, f"pitch {pitch_mm:g} mm")

@@ -1,0 +1,152 @@
+"""Statistics of residuals: noise floor, autocorrelation, structure. Series are (rows, springs), NaN where missing.
+
+Nothing here knows what a spring is.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+
+import numpy as np
+
+_CLIPPED_STD = 0.9866
+"""Standard deviation of a unit normal cut at +-3."""
+
+
+def clipped_std(values: np.ndarray) -> float:
+    """Return the standard deviation of `values` about zero, blind to outliers (cut at 3 sigma, iterated)."""
+    values = values[np.isfinite(values)]
+    if values.size < 4:
+        return float("nan")
+    scale = float(np.sqrt(np.mean(values**2)))
+    middle = 1.4826 * float(np.median(np.abs(values)))
+    if middle > 0:
+        scale = min(scale, 3.0 * middle)
+    for _ in range(20):
+        inside = values[np.abs(values) <= 3.0 * scale]
+        if inside.size < 4:
+            return scale
+        new = float(np.sqrt(np.mean(inside**2))) / _CLIPPED_STD
+        if abs(new - scale) <= 1e-6 * scale:
+            break
+        scale = new
+    return scale
+
+
+def noise_floor(series: np.ndarray, starts: Sequence[int] = (0,)) -> np.ndarray:
+    """Return the white noise of each column, from third differences, same unit as `series`.
+
+    Third differences remove anything smooth; white noise of variance s^2 leaves 20 s^2 in them. Outliers
+    and the few kinks where an input steps are cut. Columns with too few values give NaN.
+    """
+    rows, columns = series.shape
+    bounds = [*starts, rows]
+    out = np.full(columns, np.nan)
+    for k in range(columns):
+        pieces = []
+        for begin, end in zip(bounds[:-1], bounds[1:], strict=True):
+            part = series[begin:end, k]
+            if len(part) > 3:
+                pieces.append(part[3:] - 3 * part[2:-1] + 3 * part[1:-2] - part[:-3])
+        if pieces:
+            out[k] = clipped_std(np.concatenate(pieces)) / np.sqrt(20.0)
+    return out
+
+
+def autocorrelation(series: Sequence[np.ndarray], lags: int) -> np.ndarray:
+    """Return the autocorrelation at lags 0..lags pooled over all columns of all runs, about zero mean.
+
+    Missing values count as absent. A model's residual must have mean zero too, so the mean is not removed.
+    """
+    top = np.zeros(lags + 1)
+    count = np.zeros(lags + 1)
+    for run in series:
+        good = np.isfinite(run)
+        value = np.where(good, run, 0.0)
+        size = 1 << int(np.ceil(np.log2(max(2, len(run) + lags + 1))))
+        for source, total in ((value, top), (good.astype(float), count)):
+            spectrum = np.abs(np.fft.rfft(source, size, axis=0)) ** 2
+            lagged = np.fft.irfft(spectrum, size, axis=0)[: lags + 1].sum(axis=1)
+            total[: len(lagged)] += lagged
+    with np.errstate(invalid="ignore", divide="ignore"):
+        moment = top / np.maximum(count, 1.0)
+    return moment / moment[0] if moment[0] > 0 else np.concatenate(([1.0], np.zeros(lags)))
+
+
+def correlation_factor(series: Sequence[np.ndarray], lags: int) -> float:
+    """Return how many samples carry the information of one independent sample (>= 1).
+
+    The integrated autocorrelation, summed over pairs of lags while their sum stays positive (Geyer 1992).
+    """
+    rho = autocorrelation(series, lags)
+    total = 1.0
+    for k in range(1, len(rho) - 1, 2):
+        pair = rho[k] + rho[k + 1]
+        if pair <= 0:
+            break
+        total += 2.0 * pair
+    return max(1.0, total)
+
+
+def block_means(series: np.ndarray, width: int, starts: Sequence[int] = (0,)) -> tuple:
+    """Return means over blocks of `width` rows, their counts and first rows: (b, columns), (b, columns), (b,)."""
+    rows = len(series)
+    bounds = [*starts, rows]
+    begins = np.concatenate([np.arange(a, b, width) for a, b in zip(bounds[:-1], bounds[1:], strict=True)])
+    good = np.isfinite(series)
+    total = np.add.reduceat(np.where(good, series, 0.0), begins, axis=0)
+    count = np.add.reduceat(good.astype(float), begins, axis=0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.where(count > 0, total / np.maximum(count, 1), np.nan), count, begins
+
+
+def structure(
+    series: Sequence[np.ndarray],
+    noise: Sequence[np.ndarray],
+    width: int,
+    starts: Sequence[Sequence[int]],
+) -> np.ndarray:
+    """Return the variance of what is slower than `width` rows, per run and column, in units of noise^2.
+
+    Variance of block means less what white noise would leave in them: (runs, columns). About zero (it may
+    be slightly negative) where the residual is white; structure well above the noise is of order one.
+    """
+    out = []
+    for run, sigma, begins in zip(series, noise, starts, strict=True):
+        mean, count, _ = block_means(run / sigma, width, begins)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            excess = np.where(count > 0, mean**2 - 1.0 / np.maximum(count, 1), np.nan)
+        weight = np.where(np.isfinite(excess), count, 0.0)
+        total = weight.sum(axis=0)
+        out.append(
+            np.where(
+                total > 0,
+                np.nansum(np.where(weight > 0, excess, 0.0) * weight, axis=0) / np.maximum(total, 1),
+                np.nan,
+            )
+        )
+    return np.asarray(out)
+
+
+def rms(series: Sequence[np.ndarray]) -> float:
+    """Return the root mean square over everything that is there."""
+    total = sum(float(np.nansum(run**2)) for run in series)
+    count = sum(int(np.isfinite(run).sum()) for run in series)
+    return float(np.sqrt(total / count)) if count else float("nan")
+
+
+def spikes(residual: np.ndarray, noise: np.ndarray, limit: float = 6.0) -> np.ndarray:
+    """Return a mask (rows, columns) of isolated outliers: far from the median of the eight around them."""
+    rows, columns = residual.shape
+    out = np.zeros((rows, columns), dtype=bool)
+    if rows < 9:
+        return out
+    padded = np.pad(residual, ((4, 4), (0, 0)), mode="edge")
+    windows = np.lib.stride_tricks.sliding_window_view(padded, 9, axis=0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)
+        middle = np.nanmedian(windows, axis=2)
+        spread = 1.4826 * np.nanmedian(np.abs(windows - middle[:, :, None]), axis=2)
+    away = np.abs(residual - middle)
+    return np.isfinite(away) & (away > limit * noise) & (away > 4.0 * spread)
