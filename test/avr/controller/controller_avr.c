@@ -1,0 +1,219 @@
+/* Counts cycles of the control tick on the target, whole and by its parts: nine springs heated,
+ * held, lowered and switched under both policies, with failing sensors, broken and shorted springs.
+ * The springs are resistors that the controller's own model gives; the runner keeps the largest
+ * count of each name. */
+#include <stdbool.h>
+#include <string.h>
+
+#include "../report.h"
+#include "controller.h"
+
+#define SPRINGS 9
+
+static controller_settings_t settings;
+static controller_t controller;
+static controller_t aside; /* as it was before the tick: its parts are counted on this one */
+static controller_inputs_t inputs;
+static controller_outputs_t outputs;
+static bool broken[SPRINGS];
+static bool shorted[SPRINGS];
+static uint8_t failures;
+
+/* The parts as the tick calls them, in the state that it has just met. */
+static void count_parts(bool steps)
+{
+    static uint32_t power_uw[SPRINGS];
+    static uint16_t target_ma[SPRINGS];
+    static bool yes[SPRINGS];
+    static bool valid[SPRINGS];
+    for (uint8_t k = 0; k < SPRINGS; k++) {
+        power_uw[k] = aside.power_uw[k];
+        yes[k] = safety_allows(&aside.safety, k);
+        valid[k] = inputs.sensor[k].status == CONTROLLER_SENSOR_OK;
+    }
+    if (steps) {
+        COUNT("model_step");
+        thermal_model_step(&aside.model, power_uw);
+        COUNTED();
+    }
+    drive_policy_input_t input = {.model = &aside.model,
+                                  .level_permille = aside.level_permille,
+                                  .allowed = yes,
+                                  .maximum_current_ma = 3000,
+                                  .supply_limit_ma = 15000,
+                                  .measured_ma = aside.measured_ma,
+                                  .measured_mv = aside.measured_mv,
+                                  .valid = valid};
+    if (steps) {
+        COUNT("policy_beside_model_step");
+        drive_policy_tick(&aside.policy, &input, target_ma);
+        COUNTED();
+    } else {
+        COUNT("policy");
+        drive_policy_tick(&aside.policy, &input, target_ma);
+        COUNTED();
+    }
+    safety_sample_t sample = {.sensor_status = (uint8_t)inputs.sensor[0].status,
+                              .current_ma = inputs.sensor[0].current_ma,
+                              .voltage_mv = inputs.sensor[0].voltage_mv,
+                              .expected_ma = current_control_reference_ma(&aside.current, 0),
+                              .temperature_c7 = thermal_model_temperature_c7(&aside.model, 0)};
+    if (valid[0] && aside.safety.counting[0] == 0 && !broken[0] && !shorted[0]) {
+        COUNT("safety_of_one");
+        safety_tick_spring(&aside.safety, 0, &sample);
+        COUNTED();
+    } else {
+        COUNT("safety_of_one_bad");
+        safety_tick_spring(&aside.safety, 0, &sample);
+        COUNTED();
+    }
+    current_control_input_t channel = {.target_ma = target_ma[0],
+                                       .measured_ma = inputs.sensor[0].current_ma,
+                                       .valid = valid[0],
+                                       .may_rise = true};
+    COUNT("current_loop_of_one");
+    (void)current_control_tick(&aside.current, 0, &channel);
+    COUNTED();
+}
+
+/* What the duties bring: 5 V, 180 mohm beyond the spring. */
+static void respond(void)
+{
+    for (uint8_t k = 0; k < SPRINGS; k++) {
+        uint16_t spring_mohm =
+            shorted[k] ? 5u : (uint16_t)(thermal_model_resistance_uohm(&controller.model, k) >> 10);
+        uint32_t current_ma =
+            broken[k] ? 0u : (uint32_t)outputs.duty[k] * 6250u / (spring_mohm + 180u);
+        if (current_ma > 3200u) {
+            current_ma = 3200u;
+        }
+        inputs.sensor[k].current_ma = (int16_t)current_ma;
+        inputs.sensor[k].voltage_mv = (int16_t)(current_ma * spring_mohm >> 10 & ~3u);
+    }
+}
+
+static void run(uint16_t ticks)
+{
+    while (ticks-- > 0) {
+        memcpy(&aside, &controller, sizeof aside);
+        uint8_t before = controller.model_tick;
+        /* a name is said before the tick: which one it is follows from how it counts */
+        bool steps = (uint8_t)(before + 1u) * CONTROLLER_TICK_MS >= 100u;
+        if (steps) {
+            COUNT("tick_with_model_step");
+            controller_tick(&controller, &inputs, &outputs);
+            COUNTED();
+        } else {
+            COUNT("tick_without_model_step");
+            controller_tick(&controller, &inputs, &outputs);
+            COUNTED();
+        }
+        count_parts(steps);
+        respond();
+        if ((controller.model_tick == 0) != steps) {
+            failures = 1;
+        }
+    }
+}
+
+static void start(drive_policy_kind_t policy, int16_t temperature_c7)
+{
+    memset(&inputs, 0, sizeof inputs);
+    memset(&outputs, 0, sizeof outputs);
+    memset(broken, 0, sizeof broken);
+    memset(shorted, 0, sizeof shorted);
+    inputs.ambient_c7 = 20 * 128;
+    settings.policy.policy = (uint8_t)policy;
+    if (!controller_init(&controller, &settings, 20 * 128, 0)) {
+        failures = 1;
+    }
+    for (uint8_t k = 0; k < SPRINGS; k++) { /* each at its own place of the transformation */
+        thermal_model_set_temperature(&controller.model, k, (int16_t)(temperature_c7 + k * 64));
+    }
+}
+
+static void all(uint16_t level_permille)
+{
+    for (uint8_t k = 0; k < SPRINGS; k++) {
+        (void)controller_set_target(&controller, k, level_permille);
+    }
+}
+
+static void fail_all(controller_sensor_status_t status)
+{
+    for (uint8_t k = 0; k < SPRINGS; k++) {
+        inputs.sensor[k].status = status;
+    }
+}
+
+/* Everything that can go wrong with a spring, on all springs at once. */
+static void faults(drive_policy_kind_t policy)
+{
+    for (uint8_t what = 0; what < 4; what++) {
+        start(policy, 60 * 128);
+        all(1000);
+        run(60);
+        if (what == 0) {
+            memset(broken, 1, sizeof broken);
+        } else if (what == 1) {
+            memset(shorted, 1, sizeof shorted);
+        } else if (what == 2) {
+            fail_all(CONTROLLER_SENSOR_BUS);
+        } else {
+            for (uint8_t k = 0; k < SPRINGS; k++) {
+                thermal_model_set_temperature(&controller.model, k, 140 * 128);
+            }
+        }
+        run(20);
+        bool found = false;
+        for (uint8_t k = 0; k < SPRINGS; k++) {
+            found = found || controller_fault(&controller, k) != SAFETY_FAULT_NONE;
+        }
+        if (!found) {
+            failures = 1; /* not what is to be counted */
+        }
+        fail_all(CONTROLLER_SENSOR_OK);
+        controller_clear_faults(&controller);
+        all(1000);
+        run(20);
+    }
+}
+
+static void drive(drive_policy_kind_t policy)
+{
+    start(policy, 82 * 128);
+    run(20);
+    all(1000);
+    run(1000); /* heated in turn, transformed, held */
+    for (uint8_t k = 0; k < SPRINGS; k++) {
+        (void)controller_set_target(&controller, k, (uint16_t)(k * 125u));
+    }
+    run(150);
+    all(1000);
+    run(150);
+    (void)controller_set_policy(&controller, DRIVE_POLICY_OPEN);
+    run(60);
+    (void)controller_set_policy(&controller, DRIVE_POLICY_PRECOMPENSATE);
+    run(60);
+    controller_stop(&controller);
+    run(20);
+}
+
+int main(void)
+{
+    controller_settings_default(&settings);
+    settings.policy.probe_period_s = 1;
+    drive(DRIVE_POLICY_OPEN);
+    drive(DRIVE_POLICY_PRECOMPENSATE);
+    faults(DRIVE_POLICY_OPEN);
+    faults(DRIVE_POLICY_PRECOMPENSATE);
+    settings.policy.open_current_ma = 3000; /* more than the supply has, in every tick */
+    drive(DRIVE_POLICY_OPEN);
+    settings.model.air_exchange_uw_per_k = 60000;
+    settings.model.plate_coupling_uw_per_k = 500;
+    drive(DRIVE_POLICY_PRECOMPENSATE);
+    report_text("#ram_bytes ");
+    report_number(sizeof controller);
+    report_text("\n");
+    report_end(failures);
+}

@@ -1,0 +1,113 @@
+/* What it is for: a powered board around a plant, for the tests: send lines, read answers, look at
+ * the chip.
+ * What it owns: a plant and a simulated board, fresh for each test.
+ * What it never does: look at the wall clock. */
+#ifndef BOARD_TEST_H
+#define BOARD_TEST_H
+
+#include <cstdio>
+#include <cstdlib>
+#include <memory>
+#include <string>
+#include <unistd.h>
+
+#include <unity.h>
+
+#include "board_view.h"
+#include "controller.h"
+#include "simulated_board.h"
+
+namespace board_test
+{
+
+constexpr double CYCLES_PER_MS = BOARD_CYCLES_PER_MS;
+constexpr int EXIT_SKIPPED = 77;
+
+inline std::string elf(const char *name = "firmware.elf")
+{
+    return std::string(NINESPRING_AVR_DIR "/") + name;
+}
+
+/* Tests of an ELF that was not built are skipped, loudly. */
+inline void need_elf(const std::string &path)
+{
+    if (access(path.c_str(), R_OK) != 0) {
+        std::printf("SKIPPED: %s is not there: build the avr target first\n", path.c_str());
+        std::exit(EXIT_SKIPPED);
+    }
+}
+
+struct plant_deleter {
+    void operator()(plant_t *plant) const { plant_destroy(plant); }
+};
+
+class rig
+{
+public:
+    explicit rig(const std::string &firmware = elf(), std::uint64_t seed = 1)
+        : plant(plant_create(3, 3)), board(firmware, plant.get(), seed)
+    {
+    }
+
+    board_t *raw() { return board.get(); }
+
+    /* Waits for the greeting. A board that was off takes its springs to be hot; a new one is told
+     * that they are cold. */
+    std::string boot(bool cold = true)
+    {
+        std::string text;
+        for (int ms = 0; ms < 1000 && text.find('\n') == std::string::npos; ++ms) {
+            board.run_ms(1.0);
+            text += board.take_output();
+        }
+        board.run_ms(30.0);
+        text += board.take_output();
+        if (cold) {
+            expect_ok("model cold");
+        }
+        return text;
+    }
+
+    std::string say(const std::string &line, double limit_ms = 3000.0)
+    {
+        return board.command(line, limit_ms);
+    }
+
+    /* The last line of an answer, without its end. */
+    std::string answer(const std::string &line, double limit_ms = 3000.0)
+    {
+        std::string text = say(line, limit_ms);
+        while (!text.empty() && (text.back() == '\n' || text.back() == '\r')) {
+            text.pop_back();
+        }
+        const std::size_t begin = text.find_last_of('\n');
+        return begin == std::string::npos ? text : text.substr(begin + 1);
+    }
+
+    void expect_ok(const std::string &line)
+    {
+        const std::string end = answer(line);
+        TEST_ASSERT_EQUAL_STRING_MESSAGE("ok", end.c_str(), line.c_str());
+    }
+
+    void run_ms(double ms) { board.run_ms(ms); }
+
+    board_view_t view()
+    {
+        board_view_t seen{};
+        TEST_ASSERT_TRUE_MESSAGE(board_view(raw(), "controller", &seen),
+                                 "the ELF's `controller` has not the layout of this build");
+        return seen;
+    }
+
+    std::unique_ptr<plant_t, plant_deleter> plant;
+    ninespring::simulated_board board;
+};
+
+inline bool contains(const std::string &text, const std::string &part)
+{
+    return text.find(part) != std::string::npos;
+}
+
+} // namespace board_test
+#endif

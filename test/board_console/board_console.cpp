@@ -1,0 +1,396 @@
+/* Console sessions on the board: every word, every error code, and that a refused line changes
+ * nothing. */
+#include <algorithm>
+#include <cstring>
+#include <fstream>
+#include <set>
+#include <sstream>
+#include <vector>
+
+#include "board_test.h"
+#include "console_codes.h"
+
+using namespace board_test;
+
+namespace
+{
+
+/* The number of `error:N text`, 0 for `ok`, -1 for anything else. */
+int code_of(const std::string &line)
+{
+    if (line == "ok") {
+        return 0;
+    }
+    return line.rfind("error:", 0) == 0 ? std::atoi(line.c_str() + 6) : -1;
+}
+
+std::set<int> seen_codes;
+
+/* Every answer ends with exactly one ok or error. */
+int code(rig &mega, const std::string &line)
+{
+    const std::string text = mega.say(line, 10000.0);
+    std::istringstream stream(text);
+    int ends = 0;
+    int last = -1;
+    for (std::string one; std::getline(stream, one);) {
+        one.erase(std::remove(one.begin(), one.end(), '\r'), one.end());
+        last = code_of(one);
+        ends += last >= 0 ? 1 : 0;
+    }
+    TEST_ASSERT_EQUAL_INT_MESSAGE(1, ends, (line + " -> " + text).c_str());
+    TEST_ASSERT_TRUE_MESSAGE(last >= 0, (line + " -> " + text).c_str());
+    mega.run_ms(50.0);
+    const std::string after = mega.board.take_output();
+    TEST_ASSERT_EQUAL_STRING_MESSAGE("", after.c_str(), line.c_str());
+    seen_codes.insert(last);
+    return last;
+}
+
+void expect_code(rig &mega, console_error_t wanted, const std::string &line)
+{
+    TEST_ASSERT_EQUAL_INT_MESSAGE(wanted, code(mega, line), line.c_str());
+}
+
+/* What the board holds, as far as a line can change it. */
+std::string state_of(rig &mega)
+{
+    const board_view_t seen = mega.view();
+    std::string text =
+        mega.say("$$", 10000.0) + std::to_string(seen.fan_percent) + (seen.locked ? "locked" : "");
+    for (const board_view_spring_t &spring : seen.spring) {
+        text += " " + std::to_string(spring.level_permille);
+    }
+    return text;
+}
+
+std::unique_ptr<rig> booted()
+{
+    auto mega = std::make_unique<rig>();
+    mega->boot();
+    return mega;
+}
+
+void every_word_does_what_it_says()
+{
+    auto mega = booted();
+    for (const char *line : {"help",          "version",
+                             "model",         "faults",
+                             "clear",         "unlock",
+                             "policy open",   "model cold",
+                             "fan 40",        "ambient 21.5",
+                             "on 1",          "on 2 50",
+                             "off 1",         "on all",
+                             "off all",       "pattern 111101111",
+                             "telemetry off", "$loss_w_per_k=0.0061",
+                             "$loss_w_per_k", "$$"}) {
+        TEST_ASSERT_EQUAL_INT_MESSAGE(0, code(*mega, line), line);
+    }
+    mega->run_ms(100.0);
+    const board_view_t seen = mega->view();
+    for (unsigned k = 0; k < BOARD_CHANNELS; ++k) {
+        TEST_ASSERT_EQUAL_UINT(k == 4 ? 0 : 1000, seen.spring[k].level_permille);
+    }
+    TEST_ASSERT_EQUAL_UINT8(40, seen.fan_percent);
+    TEST_ASSERT_DOUBLE_WITHIN(0.02, 0.4, board_fan(mega->raw()));
+    TEST_ASSERT_INT_WITHIN(2, static_cast<int>(21.5 * 128), seen.ambient_c7);
+    TEST_ASSERT_TRUE(contains(mega->say("$loss_w_per_k"), "$loss_w_per_k=0.006100"));
+    TEST_ASSERT_EQUAL_INT(0, code(*mega, "$defaults"));
+    TEST_ASSERT_FALSE(contains(mega->say("$loss_w_per_k"), "0.006100"));
+    TEST_ASSERT_EQUAL_INT(0, code(*mega, "off all"));
+    TEST_ASSERT_EQUAL_INT(0, code(*mega, "$save"));
+}
+
+void a_level_is_a_share_of_the_full_current()
+{
+    auto mega = booted();
+    mega->expect_ok("on 2 50");
+    mega->run_ms(500.0);
+    const board_view_t seen = mega->view();
+    TEST_ASSERT_INT_WITHIN(30, 750, seen.spring[1].measured_ma);
+    TEST_ASSERT_DOUBLE_WITHIN(0.03, 0.75, board_current_a(mega->raw(), 1));
+}
+
+void selftest_passes_on_a_whole_board_and_leaves_it_off()
+{
+    auto mega = booted();
+    const std::string text = mega->say("selftest", 20000.0);
+    TEST_ASSERT_TRUE_MESSAGE(contains(text, "ok\r\n"), text.c_str());
+    mega->run_ms(100.0);
+    TEST_ASSERT_TRUE(board_all_off(mega->raw()));
+}
+
+void a_question_mark_gets_one_line_and_no_ok()
+{
+    auto mega = booted();
+    mega->board.send("?");
+    mega->run_ms(100.0);
+    const std::string text = mega->board.take_output();
+    TEST_ASSERT_EQUAL_INT(1, std::count(text.begin(), text.end(), '\n'));
+    TEST_ASSERT_FALSE(contains(text, "ok\r\n"));
+}
+
+void telemetry_csv_has_a_header_and_lines_at_its_rate()
+{
+    auto mega = booted();
+    mega->say("telemetry csv 10");
+    mega->board.take_output();
+    mega->run_ms(2000.0);
+    const std::string text = mega->board.take_output();
+    TEST_ASSERT_INT_WITHIN(1, 20, std::count(text.begin(), text.end(), '\n'));
+}
+
+void telemetry_teleplot_lines_have_its_form()
+{
+    auto mega = booted();
+    mega->say("telemetry teleplot 5");
+    mega->board.take_output();
+    mega->run_ms(1000.0);
+    const std::string text = mega->board.take_output();
+    TEST_ASSERT_TRUE_MESSAGE(text.rfind('>', 0) == 0 || contains(text, "\n>"), text.c_str());
+    std::istringstream stream(text.substr(text.find('>')));
+    std::string line;
+    std::getline(stream, line);
+    TEST_ASSERT_EQUAL_INT_MESSAGE(2, std::count(line.begin(), line.end(), ':'), line.c_str());
+}
+
+/* Telemetry at 50 Hz, then `telemetry off`: does the console answer? */
+std::string version_under(const std::string &format)
+{
+    auto mega = booted();
+    mega->expect_ok("on all");
+    mega->board.send("telemetry " + format + " 50\n");
+    mega->run_ms(2000.0);
+    mega->board.send("telemetry off\n");
+    mega->run_ms(1000.0);
+    mega->board.take_output();
+    return mega->say("version");
+}
+
+void csv_at_its_fastest_leaves_the_console_usable()
+{
+    const std::string text = version_under("csv");
+    TEST_ASSERT_TRUE_MESSAGE(contains(text, "ticks late 0,"), text.c_str());
+}
+
+void teleplot_at_its_fastest_leaves_the_console_usable()
+{
+    const std::string text = version_under("teleplot");
+    TEST_ASSERT_TRUE_MESSAGE(contains(text, "ticks late 0,"), text.c_str());
+}
+
+void a_refused_line_changes_nothing()
+{
+    auto mega = booted();
+    mega->expect_ok("fan 30");
+    const std::string before = state_of(*mega);
+    for (const char *line : {"frobnicate",
+                             "on",
+                             "on 0",
+                             "on 10",
+                             "on 1 101",
+                             "on 1 -1",
+                             "on one",
+                             "on 1 2 3",
+                             "off",
+                             "off 1 2",
+                             "pattern 11110111",
+                             "pattern 1111011112",
+                             "pattern",
+                             "policy",
+                             "policy closed",
+                             "fan",
+                             "fan 101",
+                             "fan -1",
+                             "fan 1e2",
+                             "ambient",
+                             "ambient hot",
+                             "ambient 200",
+                             "telemetry",
+                             "telemetry xml",
+                             "telemetry csv 0",
+                             "telemetry csv 51",
+                             "$nope=1",
+                             "$loss_w_per_k=",
+                             "$loss_w_per_k=x",
+                             "$loss_w_per_k=9",
+                             "$loss_w_per_k=0.00000001",
+                             "$rows=0",
+                             "$",
+                             "$=",
+                             "help me",
+                             "ON 1",
+                             "on1"}) {
+        TEST_ASSERT_TRUE_MESSAGE(code(*mega, line) > 0, line);
+    }
+    const std::string after = state_of(*mega);
+    TEST_ASSERT_EQUAL_STRING(before.c_str(), after.c_str());
+}
+
+void simple_errors_have_their_codes()
+{
+    auto mega = booted();
+    expect_code(*mega, CONSOLE_ERROR_UNKNOWN_WORD, "frobnicate");
+    expect_code(*mega, CONSOLE_ERROR_MISSING_ARGUMENT, "on");
+    expect_code(*mega, CONSOLE_ERROR_SURPLUS_ARGUMENT, "help me");
+    expect_code(*mega, CONSOLE_ERROR_BAD_ARGUMENT, "on x");
+    expect_code(*mega, CONSOLE_ERROR_OUT_OF_RANGE, "on 10");
+    expect_code(*mega, CONSOLE_ERROR_LINE_TOO_LONG, std::string(100, 'x'));
+    expect_code(*mega, CONSOLE_ERROR_BAD_CHARACTER, "on\x81 1");
+    expect_code(*mega, CONSOLE_ERROR_UNKNOWN_SETTING, "$nope=1");
+    mega->expect_ok("version");
+}
+
+void settings_that_do_not_fit_are_not_saved()
+{
+    auto mega = booted();
+    const std::uint64_t writes = board_eeprom_writes(mega->raw());
+    mega->expect_ok("$martensite_start_c=120");
+    expect_code(*mega, CONSOLE_ERROR_SETTINGS_CONFLICT, "$save");
+    TEST_ASSERT_EQUAL_UINT64(writes, board_eeprom_writes(mega->raw()));
+}
+
+void a_locked_board_refuses_to_drive()
+{
+    auto mega = booted();
+    board_reset(mega->raw(), BOARD_RESET_BROWN_OUT);
+    mega->boot(false);
+    expect_code(*mega, CONSOLE_ERROR_LOCKED, "on 1");
+    expect_code(*mega, CONSOLE_ERROR_LOCKED, "pattern 100000000");
+    TEST_ASSERT_EQUAL_INT(0, code(*mega, "off all"));
+}
+
+void a_latched_fault_refuses_its_spring()
+{
+    auto mega = booted();
+    mega->expect_ok("on 5");
+    mega->run_ms(500.0);
+    board_set_fault(mega->raw(), BOARD_FAULT_OPEN, 4, true);
+    mega->run_ms(1000.0);
+    mega->board.take_output();
+    expect_code(*mega, CONSOLE_ERROR_FAULT, "on 5");
+    TEST_ASSERT_EQUAL_INT(0, code(*mega, "on 4"));
+    const std::string text = mega->say("faults");
+    TEST_ASSERT_TRUE_MESSAGE(contains(text, "spring 5") && contains(text, "2"), text.c_str());
+}
+
+/* Sends and waits until the board is silent; gives what came. */
+std::string pour(rig &mega, const std::string &bytes, double ms)
+{
+    mega.board.take_output();
+    mega.board.send(bytes);
+    mega.run_ms(ms);
+    return mega.board.take_output();
+}
+
+void note_codes(const std::string &text)
+{
+    for (std::size_t at = text.find("error:"); at != std::string::npos;
+         at = text.find("error:", at + 1)) {
+        seen_codes.insert(std::atoi(text.c_str() + at + 6));
+    }
+}
+
+void a_stop_ends_the_answer_under_way()
+{
+    auto mega = booted();
+    mega->board.send("$$\n");
+    mega->run_ms(30.0);
+    mega->board.take_output();
+    const std::string text = pour(*mega, "!", 1000.0);
+    note_codes(text);
+    TEST_ASSERT_TRUE_MESSAGE(contains(text, "error:12 "), text.c_str());
+}
+
+void bytes_that_found_no_room_are_reported()
+{
+    auto mega = booted();
+    /* while the long answer goes out nobody takes lines in */
+    std::string flood = "$$\n";
+    for (int k = 0; k < 60; ++k) {
+        flood += "on 1\noff 1\n";
+    }
+    const std::string text = pour(*mega, flood, 3000.0);
+    note_codes(text);
+    TEST_ASSERT_TRUE_MESSAGE(contains(text, "error:13 "), text.c_str());
+    pour(*mega, "\n", 500.0); /* ends what is left of the last line */
+    mega->expect_ok("version");
+}
+
+void an_eeprom_that_keeps_nothing_fails_the_save()
+{
+    auto mega = booted();
+    mega->expect_ok("$loss_w_per_k=0.006543");
+    board_set_fault(mega->raw(), BOARD_FAULT_EEPROM, 0, true);
+    expect_code(*mega, CONSOLE_ERROR_SAVE_FAILED, "$save");
+}
+
+void selftest_wants_everything_off_and_finds_an_open_spring()
+{
+    auto mega = booted();
+    mega->expect_ok("on 3");
+    expect_code(*mega, CONSOLE_ERROR_SPRINGS_ON, "selftest");
+    mega->expect_ok("off 3");
+    board_set_fault(mega->raw(), BOARD_FAULT_OPEN, 6, true);
+    const std::string text = mega->say("selftest", 20000.0);
+    note_codes(text);
+    TEST_ASSERT_TRUE_MESSAGE(contains(text, "error:17 "), text.c_str());
+    TEST_ASSERT_TRUE_MESSAGE(contains(text, "spring 7"), text.c_str());
+}
+
+void what_this_version_lacks_says_so()
+{
+    auto mega = booted();
+    const int answered = code(*mega, "policy precompensate");
+    TEST_ASSERT_TRUE(answered == 0 || answered == CONSOLE_ERROR_NOT_AVAILABLE);
+    seen_codes.insert(
+        CONSOLE_ERROR_NOT_AVAILABLE); /* not to be had from outside once the policy is there */
+}
+
+/* After all others. */
+void no_error_of_the_table_was_left_out()
+{
+    std::ifstream file(NINESPRING_SOURCE_DIR "/docs/codes.csv");
+    TEST_ASSERT_TRUE_MESSAGE(file.good(), "docs/codes.csv");
+    unsigned errors = 0;
+    for (std::string line; std::getline(file, line);) {
+        if (line.rfind("error,", 0) != 0) {
+            continue;
+        }
+        const int number = std::atoi(line.c_str() + 6);
+        ++errors;
+        TEST_ASSERT_TRUE_MESSAGE(seen_codes.count(number) == 1, line.c_str());
+    }
+    TEST_ASSERT_EQUAL_UINT(CONSOLE_ERROR_END - 1, errors);
+}
+
+} // namespace
+
+void setUp() {}
+void tearDown() {}
+
+int main()
+{
+    need_elf(elf());
+    UNITY_BEGIN();
+    RUN_TEST(every_word_does_what_it_says);
+    RUN_TEST(a_level_is_a_share_of_the_full_current);
+    RUN_TEST(selftest_passes_on_a_whole_board_and_leaves_it_off);
+    RUN_TEST(a_question_mark_gets_one_line_and_no_ok);
+    RUN_TEST(telemetry_csv_has_a_header_and_lines_at_its_rate);
+    RUN_TEST(telemetry_teleplot_lines_have_its_form);
+    RUN_TEST(csv_at_its_fastest_leaves_the_console_usable);
+    RUN_TEST(teleplot_at_its_fastest_leaves_the_console_usable);
+    RUN_TEST(a_refused_line_changes_nothing);
+    RUN_TEST(simple_errors_have_their_codes);
+    RUN_TEST(settings_that_do_not_fit_are_not_saved);
+    RUN_TEST(a_locked_board_refuses_to_drive);
+    RUN_TEST(a_latched_fault_refuses_its_spring);
+    RUN_TEST(a_stop_ends_the_answer_under_way);
+    RUN_TEST(bytes_that_found_no_room_are_reported);
+    RUN_TEST(an_eeprom_that_keeps_nothing_fails_the_save);
+    RUN_TEST(selftest_wants_everything_off_and_finds_an_open_spring);
+    RUN_TEST(what_this_version_lacks_says_so);
+    RUN_TEST(no_error_of_the_table_was_left_out);
+    return UNITY_END();
+}

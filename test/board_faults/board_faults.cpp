@@ -1,0 +1,179 @@
+/* Each thing that a scenario can break, and what the firmware makes of it. */
+#include "board_test.h"
+
+using namespace board_test;
+
+namespace
+{
+
+constexpr double TICK_MS = CONTROLLER_TICK_MS;
+
+std::unique_ptr<rig> driven()
+{
+    auto mega = std::make_unique<rig>();
+    mega->boot();
+    mega->expect_ok("on all");
+    mega->run_ms(600.0);
+    const board_view_t seen = mega->view();
+    for (unsigned k = 0; k < BOARD_CHANNELS; ++k) {
+        TEST_ASSERT_EQUAL_UINT8(SAFETY_FAULT_NONE, seen.spring[k].fault);
+        TEST_ASSERT_TRUE(board_duty(mega->raw(), k) > 0.0);
+    }
+    return mega;
+}
+
+/* That spring has the fault and is off; the others are as they were. */
+void only(rig &mega, unsigned spring, safety_fault_t fault)
+{
+    const board_view_t seen = mega.view();
+    for (unsigned k = 0; k < BOARD_CHANNELS; ++k) {
+        const int wanted = k == spring ? fault : SAFETY_FAULT_NONE;
+        char message[40];
+        std::snprintf(message, sizeof message, "spring %u", k + 1);
+        TEST_ASSERT_EQUAL_INT_MESSAGE(wanted, seen.spring[k].fault, message);
+        TEST_ASSERT_EQUAL_INT_MESSAGE(k != spring, board_duty(mega.raw(), k) > 0.0, message);
+    }
+}
+
+void an_open_spring_is_found_and_its_neighbours_go_on()
+{
+    auto mega = driven();
+    board_set_fault(mega->raw(), BOARD_FAULT_OPEN, 4, true);
+    mega->run_ms(1000.0);
+    only(*mega, 4, SAFETY_FAULT_OPEN_SPRING);
+}
+
+void a_short_is_off_within_half_a_second()
+{
+    auto mega = driven();
+    board_set_fault(mega->raw(), BOARD_FAULT_SHORT, 0, true);
+    mega->run_ms(500.0);
+    const int fault = mega->view().spring[0].fault;
+    TEST_ASSERT_TRUE(fault == SAFETY_FAULT_SHORT_SPRING || fault == SAFETY_FAULT_OVER_CURRENT);
+    only(*mega, 0, static_cast<safety_fault_t>(fault));
+}
+
+void a_sensor_that_does_not_answer_is_absent()
+{
+    auto mega = driven();
+    board_set_fault(mega->raw(), BOARD_FAULT_NACK, 8, true);
+    mega->run_ms(1000.0);
+    only(*mega, 8, SAFETY_FAULT_SENSOR_ABSENT);
+}
+
+void a_sensor_that_converts_no_more_is_stale()
+{
+    auto mega = driven();
+    board_set_fault(mega->raw(), BOARD_FAULT_STALE, 3, true);
+    mega->run_ms(1000.0);
+    only(*mega, 3, SAFETY_FAULT_SENSOR_STALE);
+}
+
+void a_stuck_bus_switches_everything_off_without_missing_the_watchdog()
+{
+    auto mega = driven();
+    board_set_fault(mega->raw(), BOARD_FAULT_SDA_LOW, 0, true);
+    mega->run_ms(2000.0);
+    TEST_ASSERT_EQUAL_UINT(0, board_reset_count(mega->raw()));
+    TEST_ASSERT_TRUE(board_all_off(mega->raw()));
+    TEST_ASSERT_EQUAL_INT(SAFETY_FAULT_SENSOR_BUS, mega->view().spring[0].fault);
+}
+
+void the_bus_comes_back_when_it_is_released()
+{
+    auto mega = driven();
+    board_set_fault(mega->raw(), BOARD_FAULT_SDA_LOW, 0, true);
+    mega->run_ms(500.0);
+    board_set_fault(mega->raw(), BOARD_FAULT_SDA_LOW, 0, false);
+    mega->run_ms(500.0);
+    mega->board.take_output();
+    mega->expect_ok("clear");
+    mega->expect_ok("on all");
+    mega->run_ms(600.0);
+    only(*mega, BOARD_CHANNELS, SAFETY_FAULT_NONE);
+}
+
+void a_sensor_that_lost_its_configuration_gets_it_again()
+{
+    auto mega = driven();
+    const std::uint16_t config = board_sensor_register(mega->raw(), 6, 0);
+    const std::uint16_t calibration = board_sensor_register(mega->raw(), 6, 5);
+    TEST_ASSERT_TRUE(config != 0x399F);
+    board_reset_sensor(mega->raw(), 6);
+    TEST_ASSERT_EQUAL_HEX16(0x399F, board_sensor_register(mega->raw(), 6, 0));
+    mega->run_ms(15 * TICK_MS);
+    TEST_ASSERT_EQUAL_HEX16(config, board_sensor_register(mega->raw(), 6, 0));
+    TEST_ASSERT_EQUAL_HEX16(calibration, board_sensor_register(mega->raw(), 6, 5));
+    only(*mega, BOARD_CHANNELS, SAFETY_FAULT_NONE);
+}
+
+void one_bad_reading_is_not_a_fault()
+{
+    auto mega = driven();
+    board_set_fault(mega->raw(), BOARD_FAULT_NACK, 2, true);
+    mega->run_ms(TICK_MS);
+    board_set_fault(mega->raw(), BOARD_FAULT_NACK, 2, false);
+    mega->run_ms(500.0);
+    only(*mega, BOARD_CHANNELS, SAFETY_FAULT_NONE);
+}
+
+void a_failed_read_never_becomes_a_number()
+{
+    auto mega = driven();
+    const int before_ma = mega->view().spring[8].measured_ma;
+    TEST_ASSERT_TRUE(before_ma > 1000);
+    board_set_fault(mega->raw(), BOARD_FAULT_NACK, 8, true);
+    for (int k = 0; k < 20; ++k) {
+        mega->run_ms(TICK_MS);
+        TEST_ASSERT_INT_WITHIN(100, before_ma, mega->view().spring[8].measured_ma);
+    }
+}
+
+void a_brown_out_leaves_everything_off_and_locked()
+{
+    auto mega = driven();
+    board_reset(mega->raw(), BOARD_RESET_BROWN_OUT);
+    mega->boot(false);
+    TEST_ASSERT_TRUE(mega->view().locked);
+    mega->say("on 1");
+    mega->run_ms(200.0);
+    TEST_ASSERT_TRUE(board_all_off(mega->raw()));
+}
+
+void a_stopped_fan_does_not_cool()
+{
+    auto turning = driven();
+    auto stopped = driven();
+    for (rig *mega : {turning.get(), stopped.get()}) {
+        mega->expect_ok("fan 100");
+    }
+    board_set_fault(stopped->raw(), BOARD_FAULT_FAN, 0, true);
+    turning->run_ms(3000.0);
+    stopped->run_ms(3000.0);
+    TEST_ASSERT_EQUAL_DOUBLE(1.0, board_fan(stopped->raw())); /* what it is told */
+    TEST_ASSERT_TRUE(plant_temperature_c(stopped->plant.get(), 4) >
+                     plant_temperature_c(turning->plant.get(), 4) + 0.05);
+}
+
+} // namespace
+
+void setUp() {}
+void tearDown() {}
+
+int main()
+{
+    need_elf(elf());
+    UNITY_BEGIN();
+    RUN_TEST(an_open_spring_is_found_and_its_neighbours_go_on);
+    RUN_TEST(a_short_is_off_within_half_a_second);
+    RUN_TEST(a_sensor_that_does_not_answer_is_absent);
+    RUN_TEST(a_sensor_that_converts_no_more_is_stale);
+    RUN_TEST(a_stuck_bus_switches_everything_off_without_missing_the_watchdog);
+    RUN_TEST(the_bus_comes_back_when_it_is_released);
+    RUN_TEST(a_sensor_that_lost_its_configuration_gets_it_again);
+    RUN_TEST(one_bad_reading_is_not_a_fault);
+    RUN_TEST(a_failed_read_never_becomes_a_number);
+    RUN_TEST(a_brown_out_leaves_everything_off_and_locked);
+    RUN_TEST(a_stopped_fan_does_not_cool);
+    return UNITY_END();
+}

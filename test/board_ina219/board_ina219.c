@@ -1,0 +1,257 @@
+/* The sensor's registers against its data sheet (TI SBOS448G): no simulator, no firmware. */
+#include "ina219.h"
+
+#include <unity.h>
+
+#define US                INA219_CYCLES_PER_US
+#define CONFIG_8_SAMPLES  0x1DDFu /* 16 V, gain /8, 8 samples each, continuous */
+#define CONFIG_TRIGGERED  0x199Bu /* 12 bit, shunt and bus, triggered */
+#define PAIR_8_SAMPLES_US 8520u
+
+static ina219_t sensor;
+static ina219_inputs_t inputs;
+static double shunt_v, bus_v;
+
+/* Lets time pass at constant voltages, conversion by conversion. */
+static void pass_us(uint64_t us)
+{
+    uint64_t end = inputs.cycle + us * US;
+    while (inputs.cycle < end) {
+        uint64_t next = sensor.conversion_end_cycle < end ? sensor.conversion_end_cycle : end;
+        double cycles = (double)(next - inputs.cycle);
+        inputs.shunt_v_cycles += shunt_v * cycles;
+        inputs.bus_v_cycles += bus_v * cycles;
+        inputs.cycle = next;
+        if (next == sensor.conversion_end_cycle) {
+            ina219_conversion_ended(&sensor, &inputs);
+        }
+    }
+}
+
+static void write_register(uint8_t number, uint16_t value)
+{
+    TEST_ASSERT_TRUE(ina219_begin(&sensor, false));
+    ina219_write(&sensor, number, &inputs);
+    ina219_write(&sensor, (uint8_t)(value >> 8), &inputs);
+    ina219_write(&sensor, (uint8_t)value, &inputs);
+}
+
+static uint16_t read_register(uint8_t number)
+{
+    TEST_ASSERT_TRUE(ina219_begin(&sensor, false));
+    ina219_write(&sensor, number, &inputs);
+    TEST_ASSERT_TRUE(ina219_begin(&sensor, true));
+    unsigned high = ina219_read(&sensor);
+    return (uint16_t)(high << 8 | ina219_read(&sensor));
+}
+
+static int ready(void)
+{
+    return (read_register(INA219_REGISTER_BUS) >> 1) & 1;
+}
+
+void setUp(void)
+{
+    inputs = (ina219_inputs_t){0};
+    shunt_v = 0.0;
+    bus_v = 0.0;
+    sensor = (ina219_t){0};
+    ina219_power_on(&sensor, &inputs);
+}
+
+void tearDown(void) {}
+
+static void power_on_values_are_the_data_sheets(void)
+{
+    TEST_ASSERT_EQUAL_HEX16(0x399F, read_register(INA219_REGISTER_CONFIG));
+    TEST_ASSERT_EQUAL_HEX16(0, read_register(INA219_REGISTER_CALIBRATION));
+    TEST_ASSERT_EQUAL_HEX16(0, read_register(INA219_REGISTER_SHUNT));
+    TEST_ASSERT_EQUAL_HEX16(0, read_register(INA219_REGISTER_BUS));
+}
+
+static void results_are_quantised_to_10_uv_and_4_mv(void)
+{
+    shunt_v = 0.1500049; /* 1.5 A in 0.1 ohm, and half a step */
+    bus_v = 0.3281;
+    pass_us(2 * 532);
+    TEST_ASSERT_EQUAL_INT16(15000, (int16_t)read_register(INA219_REGISTER_SHUNT));
+    TEST_ASSERT_EQUAL_UINT16(82, read_register(INA219_REGISTER_BUS) >> 3);
+}
+
+static void a_negative_current_is_twos_complement(void)
+{
+    shunt_v = -0.00123;
+    pass_us(2 * 532);
+    TEST_ASSERT_EQUAL_INT16(-123, (int16_t)read_register(INA219_REGISTER_SHUNT));
+}
+
+static void full_scale_follows_gain_and_range(void)
+{
+    shunt_v = 1.0;
+    bus_v = 30.0;
+    write_register(INA219_REGISTER_CONFIG, 0x199Fu); /* 16 V, /8 */
+    pass_us(2 * 532);
+    TEST_ASSERT_EQUAL_INT16(32000, (int16_t)read_register(INA219_REGISTER_SHUNT));
+    TEST_ASSERT_EQUAL_UINT16(4000, read_register(INA219_REGISTER_BUS) >> 3);
+    write_register(INA219_REGISTER_CONFIG, 0x219Fu); /* 32 V, /1 */
+    pass_us(2 * 532);
+    TEST_ASSERT_EQUAL_INT16(4000, (int16_t)read_register(INA219_REGISTER_SHUNT));
+    TEST_ASSERT_EQUAL_UINT16(7500, read_register(INA219_REGISTER_BUS) >> 3);
+}
+
+static void a_result_is_ready_at_its_true_time_and_not_before(void)
+{
+    write_register(INA219_REGISTER_CONFIG, CONFIG_8_SAMPLES);
+    pass_us(PAIR_8_SAMPLES_US - 1);
+    TEST_ASSERT_FALSE(ready());
+    pass_us(1);
+    TEST_ASSERT_TRUE(ready());
+}
+
+static void reading_the_power_register_clears_ready_and_reading_the_bus_does_not(void)
+{
+    pass_us(2 * 532);
+    TEST_ASSERT_TRUE(ready());
+    TEST_ASSERT_TRUE(ready());
+    read_register(INA219_REGISTER_POWER);
+    TEST_ASSERT_FALSE(ready());
+    pass_us(2 * 532);
+    TEST_ASSERT_TRUE(ready());
+}
+
+static void a_result_is_the_mean_over_its_own_window(void)
+{
+    write_register(INA219_REGISTER_CONFIG, CONFIG_8_SAMPLES);
+    shunt_v = 0.1;
+    pass_us(1065); /* a quarter of the shunt's 4260 us */
+    shunt_v = 0.0;
+    bus_v = 2.0; /* still the shunt's turn: the bus conversion has not begun */
+    pass_us(4260 - 1065);
+    bus_v = 1.0;
+    shunt_v = 0.3;
+    pass_us(4260);
+    TEST_ASSERT_EQUAL_INT16(2500, (int16_t)read_register(INA219_REGISTER_SHUNT));
+    TEST_ASSERT_EQUAL_UINT16(250, read_register(INA219_REGISTER_BUS) >> 3);
+}
+
+static void conversion_times_are_the_data_sheets(void)
+{
+    static const uint32_t expected_us[16] = {84,  148,  276,  532,  84,   148,   276,   532,
+                                             532, 1060, 2130, 4260, 8510, 17020, 34050, 68100};
+    for (uint8_t k = 0; k < 16; k++) {
+        TEST_ASSERT_EQUAL_UINT32(expected_us[k], ina219_conversion_us(k));
+    }
+}
+
+static void triggered_mode_converts_once(void)
+{
+    write_register(INA219_REGISTER_CONFIG, CONFIG_TRIGGERED);
+    bus_v = 1.0;
+    pass_us(2 * 532);
+    TEST_ASSERT_TRUE(ready());
+    bus_v = 2.0;
+    pass_us(100000);
+    TEST_ASSERT_EQUAL_UINT16(250, read_register(INA219_REGISTER_BUS) >> 3);
+    TEST_ASSERT_EQUAL_UINT64(INA219_NEVER, sensor.conversion_end_cycle);
+}
+
+static void writing_the_mode_starts_again_and_clears_ready(void)
+{
+    pass_us(2 * 532);
+    TEST_ASSERT_TRUE(ready());
+    write_register(INA219_REGISTER_CONFIG, CONFIG_8_SAMPLES);
+    TEST_ASSERT_FALSE(ready());
+}
+
+static void current_and_power_need_a_calibration(void)
+{
+    shunt_v = 0.15;
+    bus_v = 0.32;
+    pass_us(2 * 532);
+    TEST_ASSERT_EQUAL_HEX16(0, read_register(INA219_REGISTER_CURRENT));
+    write_register(INA219_REGISTER_CALIBRATION, 4096);
+    pass_us(2 * 532);
+    TEST_ASSERT_EQUAL_UINT16(15000, read_register(INA219_REGISTER_CURRENT));
+    TEST_ASSERT_EQUAL_UINT16(15000u * 80u / 5000u, read_register(INA219_REGISTER_POWER));
+}
+
+static void calibrations_lowest_bit_is_void(void)
+{
+    write_register(INA219_REGISTER_CALIBRATION, 0xFFFF);
+    TEST_ASSERT_EQUAL_HEX16(0xFFFE, read_register(INA219_REGISTER_CALIBRATION));
+}
+
+static void an_impossible_calibration_sets_overflow(void)
+{
+    shunt_v = 0.3;
+    bus_v = 4.0;
+    write_register(INA219_REGISTER_CALIBRATION, 0xFFFE);
+    pass_us(2 * 532);
+    TEST_ASSERT_EQUAL_UINT16(1, read_register(INA219_REGISTER_BUS) & 1u);
+}
+
+static void reset_bit_restores_the_power_on_values(void)
+{
+    write_register(INA219_REGISTER_CALIBRATION, 4096);
+    write_register(INA219_REGISTER_CONFIG, 0x8000u | CONFIG_8_SAMPLES);
+    TEST_ASSERT_EQUAL_HEX16(0x399F, read_register(INA219_REGISTER_CONFIG));
+    TEST_ASSERT_EQUAL_HEX16(0, read_register(INA219_REGISTER_CALIBRATION));
+}
+
+static void a_frozen_sensor_shows_old_values_and_is_never_ready(void)
+{
+    bus_v = 1.0;
+    pass_us(2 * 532);
+    read_register(INA219_REGISTER_POWER);
+    sensor.frozen = true;
+    bus_v = 2.0;
+    pass_us(50000);
+    TEST_ASSERT_FALSE(ready());
+    TEST_ASSERT_EQUAL_UINT16(250, read_register(INA219_REGISTER_BUS) >> 3);
+}
+
+static void an_absent_sensor_acknowledges_nothing(void)
+{
+    sensor.absent = true;
+    TEST_ASSERT_FALSE(ina219_begin(&sensor, false));
+}
+
+static void the_pointer_stays_for_the_next_read(void)
+{
+    write_register(INA219_REGISTER_CALIBRATION, 4096);
+    TEST_ASSERT_TRUE(ina219_begin(&sensor, true));
+    unsigned high = ina219_read(&sensor);
+    TEST_ASSERT_EQUAL_HEX16(4096, high << 8 | ina219_read(&sensor));
+}
+
+static void fewer_bits_resolve_less(void)
+{
+    shunt_v = 0.00013;                               /* 13 steps of 10 uV */
+    write_register(INA219_REGISTER_CONFIG, 0x1807u); /* 9 bit */
+    pass_us(2 * 84);
+    TEST_ASSERT_EQUAL_INT16(16, (int16_t)read_register(INA219_REGISTER_SHUNT));
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(power_on_values_are_the_data_sheets);
+    RUN_TEST(results_are_quantised_to_10_uv_and_4_mv);
+    RUN_TEST(a_negative_current_is_twos_complement);
+    RUN_TEST(full_scale_follows_gain_and_range);
+    RUN_TEST(a_result_is_ready_at_its_true_time_and_not_before);
+    RUN_TEST(reading_the_power_register_clears_ready_and_reading_the_bus_does_not);
+    RUN_TEST(a_result_is_the_mean_over_its_own_window);
+    RUN_TEST(conversion_times_are_the_data_sheets);
+    RUN_TEST(triggered_mode_converts_once);
+    RUN_TEST(writing_the_mode_starts_again_and_clears_ready);
+    RUN_TEST(current_and_power_need_a_calibration);
+    RUN_TEST(calibrations_lowest_bit_is_void);
+    RUN_TEST(an_impossible_calibration_sets_overflow);
+    RUN_TEST(reset_bit_restores_the_power_on_values);
+    RUN_TEST(a_frozen_sensor_shows_old_values_and_is_never_ready);
+    RUN_TEST(an_absent_sensor_acknowledges_nothing);
+    RUN_TEST(the_pointer_stays_for_the_next_read);
+    RUN_TEST(fewer_bits_resolve_less);
+    return UNITY_END();
+}

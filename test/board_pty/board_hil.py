@@ -1,0 +1,64 @@
+"""`ninespring-sim hil` against a simulated board that runs firmware_hil: usage board_hil.py NINESPRING_SIM AVR_DIR.
+
+The board runs slower than real time here, so that a busy machine is still fast enough for the frames.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+SKIPPED = 77
+SIMULATED_S = 3.0
+
+try:
+    from board_pty import Board
+except ImportError:
+    sys.exit(SKIPPED)
+
+
+def main() -> int:
+    program, avr = sys.argv[1], Path(sys.argv[2])
+    elf = avr / "firmware_hil.elf"
+    if not elf.exists():
+        print(f"SKIPPED: {elf} is not there: build the avr target first")
+        return SKIPPED
+    result = Path.cwd() / "board_hil.json"
+    with Board(program, elf, "--speed", "0.2") as board:
+        run = subprocess.run(
+            [
+                program, "hil", "--port", board.port, "--duration", str(SIMULATED_S), "--json", str(result),
+                "--send", "on 1", "--send", "model", "--send", "frobnicate",
+            ],
+            check=False, capture_output=True, text=True, timeout=120,
+        )  # fmt: skip
+    print(run.stdout, run.stderr)
+    assert run.returncode == 0, run
+    summary = json.loads(result.read_text())
+    result.unlink()
+    assert summary["simulated_s"] >= SIMULATED_S
+    assert summary["ticks"] + summary["lost_frames"] >= SIMULATED_S * 50
+    assert summary["bad_frames"] == 0, summary
+    assert summary["max_lag_ticks"] <= summary["allowed_lag_ticks"], summary
+    # The console goes on between the frames, and the board reads what the plant does.
+    assert "error:1 " in run.stdout
+    assert "spring 1:" in run.stdout
+    assert summary["final_current_a"][0] > 1.0, summary
+    assert summary["final_current_a"][1] == 0.0, summary
+    missing = subprocess.run(
+        [program, "hil", "--port", "/no/such/port"],
+        check=False,
+        capture_output=True,
+        text=True,
+        timeout=20,
+    )
+    assert missing.returncode == 2
+    assert missing.stderr.count("\n") == 1
+    print("PASS")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,171 @@
+/* Settings on the board: what is saved is there after power-on, and `$$` of one board makes another
+ * the same. */
+#include <map>
+#include <sstream>
+#include <vector>
+
+#include "board_test.h"
+
+using namespace board_test;
+
+namespace
+{
+
+std::vector<std::string> lines_of(const std::string &text)
+{
+    std::vector<std::string> lines;
+    std::istringstream stream(text);
+    for (std::string line; std::getline(stream, line);) {
+        if (!line.empty() && line.back() == '\r') {
+            line.pop_back();
+        }
+        lines.push_back(line);
+    }
+    return lines;
+}
+
+/* The `$name=value` lines of `$$`, without comments. */
+std::vector<std::string> settings_of(rig &mega)
+{
+    std::vector<std::string> settings;
+    for (const std::string &line : lines_of(mega.say("$$", 10000.0))) {
+        if (line.rfind('$', 0) == 0) {
+            settings.push_back(line);
+        }
+    }
+    TEST_ASSERT_TRUE_MESSAGE(settings.size() > 20, "$$ prints too little");
+    return settings;
+}
+
+void same(const std::vector<std::string> &wanted, const std::vector<std::string> &got)
+{
+    TEST_ASSERT_EQUAL_UINT(wanted.size(), got.size());
+    for (std::size_t k = 0; k < wanted.size(); ++k) {
+        TEST_ASSERT_EQUAL_STRING(wanted[k].c_str(), got[k].c_str());
+    }
+}
+
+void save(rig &mega)
+{
+    mega.expect_ok("$save");
+    for (int ms = 0; ms < 10000; ms += 20) {
+        mega.run_ms(20.0);
+        const std::uint64_t writes = board_eeprom_writes(mega.raw());
+        mega.run_ms(100.0);
+        if (writes == board_eeprom_writes(mega.raw()) && !board_eeprom_busy(mega.raw())) {
+            return;
+        }
+    }
+    TEST_FAIL_MESSAGE("the save does not end");
+}
+
+void every_line_can_be_pasted_back()
+{
+    rig mega;
+    mega.boot();
+    const std::vector<std::string> before = settings_of(mega);
+    for (const std::string &line : before) {
+        mega.expect_ok(line.substr(0, line.find_first_of(" #;")));
+    }
+    same(before, settings_of(mega));
+}
+
+void settings_of_one_board_make_another_the_same()
+{
+    rig one;
+    one.boot();
+    one.expect_ok("$heat_capacity_j_per_k=0.321");
+    one.expect_ok("$loss_w_per_k=0.006543");
+    one.expect_ok("$loss_scale_5=0.975");
+    const std::vector<std::string> wanted = settings_of(one);
+    rig other;
+    other.boot();
+    TEST_ASSERT_TRUE(settings_of(other) != wanted);
+    for (const std::string &line : wanted) {
+        other.expect_ok(line);
+    }
+    same(wanted, settings_of(other));
+    save(other);
+    board_reset(other.raw(), BOARD_RESET_POWER_ON);
+    other.boot();
+    same(wanted, settings_of(other));
+}
+
+void what_is_not_saved_is_gone_after_power_off()
+{
+    rig mega;
+    mega.boot();
+    const std::vector<std::string> before = settings_of(mega);
+    mega.expect_ok("$heat_capacity_j_per_k=0.321");
+    board_reset(mega.raw(), BOARD_RESET_POWER_ON);
+    mega.boot();
+    same(before, settings_of(mega));
+}
+
+/* The power fails at a sample of the bytes of a save (every byte: test_settings): afterwards the
+ * board has the old settings or the new ones, whole. */
+void power_cut_in_a_save_leaves_old_or_new()
+{
+    rig first;
+    first.boot();
+    first.expect_ok("$heat_capacity_j_per_k=0.311");
+    save(first);
+    const std::vector<std::string> old_settings = settings_of(first);
+    const std::vector<std::uint8_t> old_eeprom(board_eeprom(first.raw()),
+                                               board_eeprom(first.raw()) + BOARD_EEPROM_BYTES);
+    const std::uint64_t begin = board_eeprom_writes(first.raw());
+    first.expect_ok("$heat_capacity_j_per_k=0.322");
+    first.expect_ok("$loss_w_per_k=0.006543");
+    const std::vector<std::string> new_settings = settings_of(first);
+    save(first);
+    const std::uint64_t bytes = board_eeprom_writes(first.raw()) - begin;
+    TEST_ASSERT_TRUE(bytes > 20);
+
+    bool seen_old = false;
+    bool seen_new = false;
+    std::vector<std::uint64_t> cuts = {0, 1, 2, bytes - 2, bytes - 1, bytes};
+    for (std::uint64_t cut = bytes / 5; cut < bytes - 2; cut += bytes / 5) {
+        cuts.push_back(cut);
+    }
+    for (const std::uint64_t cut : cuts) {
+        rig mega;
+        std::copy(old_eeprom.begin(), old_eeprom.end(), board_eeprom(mega.raw()));
+        mega.boot();
+        mega.expect_ok("$heat_capacity_j_per_k=0.322");
+        mega.expect_ok("$loss_w_per_k=0.006543");
+        mega.board.send("$save\n");
+        for (int step = 0; step < 20000 && board_eeprom_writes(mega.raw()) < cut; ++step) {
+            mega.run_ms(0.5);
+        }
+        mega.run_ms(
+            1.0 + static_cast<double>(cut % 3)); /* in the erase, in the write, or between bytes */
+        board_reset(mega.raw(), BOARD_RESET_BROWN_OUT);
+        board_reset(mega.raw(), BOARD_RESET_POWER_ON);
+        mega.boot();
+        const std::vector<std::string> got = settings_of(mega);
+        char message[60];
+        std::snprintf(message, sizeof message, "a mixture after a cut in byte %u",
+                      static_cast<unsigned>(cut));
+        TEST_ASSERT_TRUE_MESSAGE(got == old_settings || got == new_settings, message);
+        seen_old = seen_old || got == old_settings;
+        seen_new = seen_new || got == new_settings;
+    }
+    TEST_ASSERT_TRUE_MESSAGE(seen_old, "no cut came early enough");
+    TEST_ASSERT_TRUE_MESSAGE(seen_new, "no save was complete");
+}
+
+} // namespace
+
+void setUp() {}
+void tearDown() {}
+
+int main()
+{
+    need_elf(elf());
+    UNITY_BEGIN();
+    RUN_TEST(every_line_can_be_pasted_back);
+    RUN_TEST(settings_of_one_board_make_another_the_same);
+    RUN_TEST(what_is_not_saved_is_gone_after_power_off);
+    RUN_TEST(power_cut_in_a_save_leaves_old_or_new);
+    return UNITY_END();
+}

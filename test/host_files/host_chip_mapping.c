@@ -1,0 +1,207 @@
+/* Physical parameters to the chip's integers: exact where they fit, refused where they do not, told
+ * where left out. */
+#include <math.h>
+#include <string.h>
+
+#include <unity.h>
+
+#include "chip_mapping.h"
+
+static plant_t *plant;
+static thermal_model_parameters_t chip;
+static char message[400];
+
+void setUp(void)
+{
+    plant = plant_create(3, 3);
+    memset(&chip, 0, sizeof chip);
+}
+
+void tearDown(void)
+{
+    plant_destroy(plant);
+}
+
+static void set(const char *name, double value)
+{
+    TEST_ASSERT_EQUAL_MESSAGE(PLANT_OK, plant_set(plant, name, value), name);
+}
+
+static void on(const char *effect)
+{
+    TEST_ASSERT_EQUAL_MESSAGE(PLANT_OK, plant_set_effect(plant, effect, true), effect);
+}
+
+static chip_mapping_status_t map(void)
+{
+    return chip_mapping_from_plant(plant, &chip, message, sizeof message);
+}
+
+static void declared_model_maps_number_by_number(void)
+{
+    set("heat_capacity_j_per_k", 0.3);
+    set("loss_w_per_k", 0.0058);
+    set("loss_fan_w_per_k", 0.0113);
+    set("orthogonal_w_per_k", 0.000586);
+    set("diagonal_fan_w_per_k", 0.000329);
+    TEST_ASSERT_EQUAL(CHIP_MAPPING_OK, map());
+    TEST_ASSERT_EQUAL_STRING("", message);
+    TEST_ASSERT_EQUAL(3, chip.rows);
+    TEST_ASSERT_EQUAL(3, chip.columns);
+    TEST_ASSERT_EQUAL(100, chip.step_ms);
+    TEST_ASSERT_EQUAL(300, chip.heat_capacity_mj_per_k);
+    TEST_ASSERT_EQUAL(5800, chip.loss_uw_per_k);
+    TEST_ASSERT_EQUAL(11300, chip.loss_fan_uw_per_k);
+    TEST_ASSERT_EQUAL(586, chip.orthogonal_uw_per_k);
+    TEST_ASSERT_EQUAL(329, chip.diagonal_fan_uw_per_k);
+    TEST_ASSERT_EQUAL(8800, chip.austenite_start_cc);
+}
+
+static void effects_that_are_off_cost_nothing(void)
+{
+    TEST_ASSERT_EQUAL(CHIP_MAPPING_OK, map());
+    TEST_ASSERT_EQUAL(0, chip.latent_heat_mj);
+    TEST_ASSERT_EQUAL(0, chip.loss_rise_ppm_per_k);
+    TEST_ASSERT_EQUAL(0, chip.radiating_area_cmm2);
+    TEST_ASSERT_EQUAL(0, chip.air_exchange_uw_per_k);
+    TEST_ASSERT_EQUAL(0, chip.plate_coupling_uw_per_k);
+    TEST_ASSERT_EQUAL(0, chip.wake_uw_per_k);
+    TEST_ASSERT_EQUAL(chip.resistance_martensite_uohm, chip.resistance_austenite_uohm);
+    for (int k = 0; k < 9; k++) {
+        TEST_ASSERT_EQUAL(1000, chip.loss_scale_permille[k]);
+        TEST_ASSERT_EQUAL(1000, chip.heat_capacity_scale_permille[k]);
+    }
+}
+
+static void effects_of_the_chip_are_switched_on(void)
+{
+    on("latent_heat");
+    on("resistance_phase");
+    on("radiation");
+    on("plate_conduction");
+    on("fan_wake");
+    on("shared_air");
+    set("air_exchange_w_per_k", 0.05);
+    set("wake_direction", 1);
+    TEST_ASSERT_EQUAL(CHIP_MAPPING_OK, map());
+    TEST_ASSERT_EQUAL_STRING("", message);
+    TEST_ASSERT_EQUAL(8650, chip.latent_heat_mj);
+    TEST_ASSERT_EQUAL(175000, chip.resistance_martensite_uohm);
+    TEST_ASSERT_EQUAL(219000, chip.resistance_austenite_uohm);
+    TEST_ASSERT_EQUAL(11080, chip.radiating_area_cmm2);
+    TEST_ASSERT_EQUAL(1500, chip.plate_coupling_uw_per_k);
+    TEST_ASSERT_EQUAL(50000, chip.plate_loss_uw_per_k);
+    TEST_ASSERT_EQUAL(13000, chip.plate_heat_capacity_mj_per_k);
+    TEST_ASSERT_EQUAL(1000, chip.wake_uw_per_k);
+    TEST_ASSERT_EQUAL(THERMAL_MODEL_WAKE_SOUTH, chip.wake_direction);
+    TEST_ASSERT_EQUAL(50000, chip.air_exchange_uw_per_k);
+}
+
+/* What each spring loses on the chip is what it loses in the plant, to the permille. */
+static void edge_and_mismatch_become_scales(void)
+{
+    on("edge_loss");
+    on("spring_mismatch");
+    set("edge_loss_fraction", 0.1);
+    set("loss_scale[2]", 1.5);
+    set("heat_capacity_scale[7]", 0.8);
+    TEST_ASSERT_EQUAL(CHIP_MAPPING_OK, map());
+    const double expected[9] = {1.2, 1.65, 1.2, 1.1, 1.0, 1.1, 1.2, 1.1, 1.2};
+    for (int k = 0; k < 9; k++) {
+        TEST_ASSERT_DOUBLE_WITHIN(5800.0 * 0.001, 5800.0 * expected[k],
+                                  chip.loss_uw_per_k * chip.loss_scale_permille[k] / 1000.0);
+        TEST_ASSERT_DOUBLE_WITHIN(300.0 * 0.002, k == 6 ? 240.0 : 300.0,
+                                  chip.heat_capacity_mj_per_k *
+                                      chip.heat_capacity_scale_permille[k] / 1000.0);
+    }
+}
+
+/* The straight line keeps the heat flow of the power law within 2 % of the flow at 85 K, over 0 to
+ * 90 K. */
+static void natural_convection_becomes_a_rising_loss(void)
+{
+    on("natural_convection");
+    TEST_ASSERT_EQUAL(CHIP_MAPPING_OK, map());
+    TEST_ASSERT_TRUE(chip.loss_rise_ppm_per_k > 0);
+    TEST_ASSERT_EQUAL(11300, chip.loss_fan_uw_per_k);
+    for (double above_k = 5.0; above_k <= 90.0; above_k += 5.0) {
+        const double law = 0.0058 * pow(above_k / 85.0, 0.25) * above_k;
+        const double line =
+            chip.loss_uw_per_k * 1e-6 * (1.0 + chip.loss_rise_ppm_per_k * 1e-6 * above_k) * above_k;
+        TEST_ASSERT_DOUBLE_WITHIN(0.02 * 0.0058 * 85.0, law, line);
+    }
+    set("convection_correlation", 1);
+    TEST_ASSERT_EQUAL(CHIP_MAPPING_OK, map());
+    TEST_ASSERT_TRUE(chip.loss_uw_per_k > 2000 && chip.loss_uw_per_k < 6500);
+    TEST_ASSERT_TRUE(chip.loss_fan_uw_per_k > 8000 && chip.loss_fan_uw_per_k < 15000);
+}
+
+static void measurement_effects_are_left_out_and_said(void)
+{
+    thermal_model_parameters_t plain;
+    TEST_ASSERT_EQUAL(CHIP_MAPPING_OK, map());
+    plain = chip;
+    const char *const effects[] = {"sensor_lag", "sensor_gain", "optical_mixing", "ambient_drift",
+                                   "supply_sag"};
+    for (int k = 0; k < 5; k++) {
+        on(effects[k]);
+    }
+    TEST_ASSERT_EQUAL(CHIP_MAPPING_OK, map());
+    TEST_ASSERT_EQUAL_MEMORY(&plain, &chip, sizeof chip);
+    for (int k = 0; k < 5; k++) {
+        TEST_ASSERT_NOT_NULL_MESSAGE(strstr(message, effects[k]), message);
+    }
+}
+
+static void what_does_not_fit_is_refused_by_name(void)
+{
+    const struct {
+        const char *name;
+        double value;
+        chip_mapping_status_t status;
+    } cases[] = {{"heat_capacity_j_per_k", 66.0, CHIP_MAPPING_ERROR_RANGE},
+                 {"loss_w_per_k", 0.0656, CHIP_MAPPING_ERROR_RANGE},
+                 {"orthogonal_w_per_k", 0.1, CHIP_MAPPING_ERROR_RANGE},
+                 {"loss_fan_w_per_k", 0.0655, CHIP_MAPPING_ERROR_MODEL},
+                 {"austenite_finish_c", 89.0, CHIP_MAPPING_ERROR_MODEL}};
+    for (size_t k = 0; k < sizeof cases / sizeof cases[0]; k++) {
+        tearDown();
+        setUp();
+        set(cases[k].name, cases[k].value);
+        if (cases[k].status == CHIP_MAPPING_ERROR_MODEL && k == 3) {
+            set("orthogonal_w_per_k", 0.016); /* each fits, all together do not */
+        }
+        const thermal_model_parameters_t before = chip;
+        TEST_ASSERT_EQUAL_MESSAGE(cases[k].status, map(), message);
+        TEST_ASSERT_EQUAL_MEMORY(&before, &chip, sizeof chip);
+        TEST_ASSERT_TRUE(strlen(message) > 10);
+        if (cases[k].status == CHIP_MAPPING_ERROR_RANGE) {
+            TEST_ASSERT_EQUAL_PTR_MESSAGE(message, strstr(message, cases[k].name), message);
+        }
+    }
+}
+
+static void message_never_outgrows_its_buffer(void)
+{
+    on("sensor_lag");
+    on("sensor_gain");
+    char small[12];
+    memset(small, 'x', sizeof small);
+    TEST_ASSERT_EQUAL(CHIP_MAPPING_OK, chip_mapping_from_plant(plant, &chip, small, 10));
+    TEST_ASSERT_TRUE(strlen(small) < 10);
+    TEST_ASSERT_EQUAL('x', small[10]);
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(declared_model_maps_number_by_number);
+    RUN_TEST(effects_that_are_off_cost_nothing);
+    RUN_TEST(effects_of_the_chip_are_switched_on);
+    RUN_TEST(edge_and_mismatch_become_scales);
+    RUN_TEST(natural_convection_becomes_a_rising_loss);
+    RUN_TEST(measurement_effects_are_left_out_and_said);
+    RUN_TEST(what_does_not_fit_is_refused_by_name);
+    RUN_TEST(message_never_outgrows_its_buffer);
+    return UNITY_END();
+}

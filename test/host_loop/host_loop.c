@@ -1,0 +1,449 @@
+/* Controller and plant together: currents and temperatures of the paper's patterns, failures,
+ * resets, determinism. */
+#include <math.h>
+#include <stdbool.h>
+#include <stddef.h>
+#include <string.h>
+
+#include "loop.h"
+#include "unity.h"
+
+static controller_settings_t settings;
+static plant_t *plant;
+static loop_t *loop;
+
+static const unsigned patterns[] = {0x1EF /* all but the centre */, 0x1FF, 0x010, 0x155, 0x007};
+
+/* The chip's default parameters in the plant: pitch 4 mm, with phase. */
+void setUp(void)
+{
+    controller_settings_default(&settings);
+    plant = plant_create(3, 3);
+    TEST_ASSERT_NOT_NULL(plant);
+    const struct {
+        const char *name;
+        double value;
+    } pitch_4[] = {{"orthogonal_w_per_k", 586e-6},
+                   {"orthogonal_fan_w_per_k", 658e-6},
+                   {"diagonal_w_per_k", 293e-6},
+                   {"diagonal_fan_w_per_k", 329e-6}};
+    for (size_t k = 0; k < sizeof pitch_4 / sizeof pitch_4[0]; k++) {
+        TEST_ASSERT_EQUAL(PLANT_OK, plant_set(plant, pitch_4[k].name, pitch_4[k].value));
+    }
+    TEST_ASSERT_EQUAL(PLANT_OK, plant_set_effect(plant, "latent_heat", true));
+    TEST_ASSERT_EQUAL(PLANT_OK, plant_set_effect(plant, "resistance_phase", true));
+    loop = NULL;
+}
+
+void tearDown(void)
+{
+    loop_destroy(loop);
+    plant_destroy(plant);
+}
+
+static void start_with(const loop_options_t *options, uint64_t seed)
+{
+    loop_destroy(loop);
+    loop = loop_create(&settings, plant, options, seed, NULL);
+    TEST_ASSERT_NOT_NULL(loop);
+}
+
+static void start(void)
+{
+    start_with(NULL, 1);
+}
+
+static void command(unsigned pattern)
+{
+    bool on[CONTROLLER_MAX_SPRINGS] = {false};
+    for (int k = 0; k < 9; k++) {
+        on[k] = (pattern >> k & 1u) != 0;
+    }
+    controller_set_pattern(loop_controller(loop), on);
+}
+
+static double chip_c(int spring)
+{
+    return controller_temperature_c7(loop_controller(loop), (uint8_t)spring) / 128.0;
+}
+
+static double true_c(int spring)
+{
+    return plant_temperature_c(loop_plant(loop), spring);
+}
+
+static safety_fault_t fault(int spring)
+{
+    return controller_fault(loop_controller(loop), (uint8_t)spring);
+}
+
+static double mean_current_a(int spring, int ticks)
+{
+    double sum_a = 0.0;
+    for (int n = 0; n < ticks; n++) {
+        loop_tick(loop);
+        sum_a += loop_current_a(loop, spring);
+    }
+    return sum_a / ticks;
+}
+
+/* Ten minutes of each pattern at the given current: mean current within 5 mA, temperatures as the
+ * same currents give in the plant alone within plant_c, the chip's estimate within chip_limit_c of
+ * what is. */
+static void hold_patterns(uint16_t current_ma, double plant_limit_c, double chip_limit_c)
+{
+    settings.policy.open_current_ma = current_ma;
+    for (size_t p = 0; p < sizeof patterns / sizeof patterns[0]; p++) {
+        start();
+        command(patterns[p]);
+        plant_t *alone = plant_copy(plant);
+        TEST_ASSERT_NOT_NULL(alone);
+        for (int k = 0; k < 9; k++) {
+            double current_a = (patterns[p] >> k & 1u) != 0 ? current_ma / 1000.0 : 0.0;
+            TEST_ASSERT_EQUAL(PLANT_OK, plant_drive(alone, k, PLANT_DRIVE_CURRENT, current_a));
+        }
+        double worst_plant_c = 0.0;
+        double worst_chip_c = 0.0;
+        for (int second = 0; second < 600; second += 10) {
+            loop_advance(loop, 10.0);
+            TEST_ASSERT_EQUAL(PLANT_OK, plant_step(alone, 10.0));
+            for (int k = 0; k < 9; k++) {
+                worst_plant_c =
+                    fmax(worst_plant_c, fabs(true_c(k) - plant_temperature_c(alone, k)));
+                worst_chip_c = fmax(worst_chip_c, fabs(chip_c(k) - true_c(k)));
+            }
+        }
+        plant_destroy(alone);
+        TEST_ASSERT_TRUE(worst_plant_c < plant_limit_c);
+        TEST_ASSERT_TRUE(worst_chip_c < chip_limit_c);
+        for (int k = 0; k < 9; k++) {
+            bool on = (patterns[p] >> k & 1u) != 0;
+            TEST_ASSERT_DOUBLE_WITHIN(0.005, on ? current_ma / 1000.0 : 0.0,
+                                      mean_current_a(k, 100));
+            TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, fault(k));
+        }
+    }
+}
+
+/* The ramp of 0.5 s and 12 mA of a duty step are the difference. */
+static void plain_current_follows_the_patterns(void)
+{
+    hold_patterns(1500, 0.6, 0.5);
+}
+
+static void estimate_follows_through_the_transformation(void)
+{
+    settings.policy.open_current_ma = 1800;
+    start();
+    command(0x1EF);
+    double worst_c = 0.0;
+    double hottest_c = 0.0;
+    for (int tenth = 0; tenth < 3000; tenth++) {
+        if (tenth == 2000) {
+            command(0);
+        }
+        loop_advance(loop, 0.1);
+        for (int k = 0; k < 9; k++) {
+            worst_c = fmax(worst_c, fabs(chip_c(k) - true_c(k)));
+            hottest_c = fmax(hottest_c, true_c(k));
+        }
+    }
+    TEST_ASSERT_TRUE(hottest_c > 98.0); /* it did transform */
+    TEST_ASSERT_TRUE(worst_c < 0.5);
+}
+
+static void same_seed_same_run_other_seed_other_noise(void)
+{
+    loop_options_t options;
+    loop_options_default(&options);
+    options.shunt_noise_v = 100e-6;
+    start_with(&options, 5);
+    loop_t *twin = loop_create(&settings, plant, &options, 5, NULL);
+    loop_t *other = loop_create(&settings, plant, &options, 6, NULL);
+    TEST_ASSERT_NOT_NULL(twin);
+    TEST_ASSERT_NOT_NULL(other);
+    command(0x155);
+    TEST_ASSERT_TRUE(controller_set_target(loop_controller(twin), 0, 1000));
+    loop_t *ours = loop;
+    loop = twin;
+    command(0x155);
+    loop = other;
+    command(0x155);
+    loop = ours;
+    bool differs = false;
+    for (int n = 0; n < 5000; n++) {
+        loop_tick(loop);
+        loop_tick(twin);
+        loop_tick(other);
+        TEST_ASSERT_EQUAL_MEMORY(loop_inputs(loop), loop_inputs(twin), sizeof(controller_inputs_t));
+        TEST_ASSERT_EQUAL_MEMORY(loop_outputs(loop), loop_outputs(twin),
+                                 sizeof(controller_outputs_t));
+        TEST_ASSERT_TRUE(true_c(4) == plant_temperature_c(loop_plant(twin), 4)); /* to the bit */
+        differs = differs ||
+                  memcmp(loop_inputs(loop), loop_inputs(other), sizeof(controller_inputs_t)) != 0;
+    }
+    TEST_ASSERT_TRUE(differs);
+    loop_destroy(twin);
+    loop_destroy(other);
+}
+
+static void coarser_plant_steps_change_little(void)
+{
+    loop_options_t options;
+    loop_options_default(&options);
+    options.plant_ticks = 1;
+    settings.policy.open_current_ma = 1700;
+    start_with(&options, 1);
+    loop_t *coarse = loop_create(&settings, plant, NULL, 1, NULL);
+    TEST_ASSERT_NOT_NULL(coarse);
+    command(0x1EF);
+    bool on[CONTROLLER_MAX_SPRINGS] = {true, true, true, true, false, true, true, true, true};
+    controller_set_pattern(loop_controller(coarse), on);
+    for (int tenth = 0; tenth < 2000; tenth++) {
+        loop_advance(loop, 0.1);
+        loop_advance(coarse, 0.1);
+        for (int k = 0; k < 9; k++) {
+            TEST_ASSERT_DOUBLE_WITHIN(0.05, true_c(k), plant_temperature_c(loop_plant(coarse), k));
+        }
+    }
+    loop_destroy(coarse);
+}
+
+static void sum_never_exceeds_the_supply(void)
+{
+    TEST_ASSERT_EQUAL(PLANT_OK, plant_set(plant, "freewheel_drop_v", 0.3));
+    settings.current.freewheel_mv = 350;
+    settings.policy.open_current_ma = 3000;
+    TEST_ASSERT_EQUAL(PLANT_OK, plant_set_effect(plant, "spring_mismatch", true));
+    TEST_ASSERT_EQUAL(PLANT_OK, plant_set(plant, "resistance_scale", 0.75));
+    start();
+    for (unsigned n = 0; n < 60; n++) {
+        command(n * 73u % 512u);
+        loop_advance(loop, 0.1 * (double)(n % 11u));
+        command(0x1FF);
+        loop_advance(loop, 0.5);
+    }
+    TEST_ASSERT_TRUE(loop_highest_sum_current_a(loop) <= 15.0);
+    TEST_ASSERT_TRUE(loop_highest_sum_current_a(loop) > 14.0); /* it was asked for */
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, controller_board_fault(loop_controller(loop)));
+}
+
+static void sagging_supply_still_gives_the_current(void)
+{
+    TEST_ASSERT_EQUAL(PLANT_OK, plant_set_effect(plant, "supply_sag", true));
+    start();
+    command(0x1FF);
+    loop_advance(loop, 10.0);
+    TEST_ASSERT_DOUBLE_WITHIN(0.005, 1.5, mean_current_a(4, 100));
+}
+
+static void each_failure_is_found_and_is_of_its_spring(void)
+{
+    const struct {
+        loop_action_t action;
+        safety_fault_t fault;
+    } failures[] = {{LOOP_ACTION_OPEN_SPRING, SAFETY_FAULT_OPEN_SPRING},
+                    {LOOP_ACTION_SHORT_SPRING, SAFETY_FAULT_SHORT_SPRING},
+                    {LOOP_ACTION_SENSOR_NACK, SAFETY_FAULT_SENSOR_ABSENT},
+                    {LOOP_ACTION_SENSOR_STALE, SAFETY_FAULT_SENSOR_STALE}};
+    for (size_t f = 0; f < sizeof failures / sizeof failures[0]; f++) {
+        start();
+        command(0x1FF);
+        loop_advance(loop, 5.0);
+        TEST_ASSERT_TRUE(loop_act(loop, failures[f].action, 3));
+        loop_advance(loop, 1.0);
+        TEST_ASSERT_EQUAL(failures[f].fault, fault(3));
+        TEST_ASSERT_TRUE(loop_current_a(loop, 3) == 0.0);
+        TEST_ASSERT_DOUBLE_WITHIN(0.03, 1.5, loop_current_a(loop, 4));
+        TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, fault(4));
+
+        TEST_ASSERT_TRUE(loop_act(loop, LOOP_ACTION_SPRING_GOOD, 3));
+        TEST_ASSERT_TRUE(loop_act(loop, LOOP_ACTION_SENSOR_GOOD, 3));
+        controller_clear_faults(loop_controller(loop));
+        command(0x1FF);
+        loop_advance(loop, 2.0);
+        TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, fault(3));
+        TEST_ASSERT_DOUBLE_WITHIN(0.03, 1.5, loop_current_a(loop, 3));
+    }
+}
+
+static void short_never_exceeds_the_sensor_for_long(void)
+{
+    start();
+    command(0x1FF);
+    loop_advance(loop, 5.0);
+    TEST_ASSERT_TRUE(loop_act(loop, LOOP_ACTION_SHORT_SPRING, 0));
+    int above = 0;
+    for (int n = 0; n < 50; n++) {
+        loop_tick(loop);
+        above += loop_current_a(loop, 0) > 2.2;
+    }
+    TEST_ASSERT_LESS_OR_EQUAL_INT(4, above);
+}
+
+static void stuck_bus_switches_everything_off(void)
+{
+    start();
+    command(0x1FF);
+    loop_advance(loop, 5.0);
+    TEST_ASSERT_TRUE(loop_act(loop, LOOP_ACTION_SENSOR_BUS, -1));
+    loop_advance(loop, 0.5);
+    for (int k = 0; k < 9; k++) {
+        TEST_ASSERT_EQUAL(SAFETY_FAULT_SENSOR_BUS, fault(k));
+    }
+    TEST_ASSERT_TRUE(loop_sum_current_a(loop) == 0.0);
+}
+
+static void sensor_that_reset_once_is_no_fault(void)
+{
+    start();
+    command(0x1FF);
+    loop_advance(loop, 5.0);
+    TEST_ASSERT_TRUE(loop_act(loop, LOOP_ACTION_SENSOR_RESET, 3));
+    loop_tick(loop);
+    TEST_ASSERT_EQUAL(CONTROLLER_SENSOR_RESET, loop_inputs(loop)->sensor[3].status);
+    loop_advance(loop, 1.0);
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, fault(3));
+    TEST_ASSERT_DOUBLE_WITHIN(0.03, 1.5, loop_current_a(loop, 3));
+}
+
+static void stopped_fan_makes_the_springs_hotter_than_the_chip_believes(void)
+{
+    settings.policy.open_current_ma = 1300;
+    start();
+    TEST_ASSERT_TRUE(controller_set_fan(loop_controller(loop), 100));
+    command(0x1FF);
+    loop_advance(loop, 300.0);
+    double cooled_c = true_c(4);
+    TEST_ASSERT_DOUBLE_WITHIN(1.0, cooled_c, chip_c(4));
+    TEST_ASSERT_TRUE(loop_act(loop, LOOP_ACTION_FAN_STOP, -1));
+    loop_advance(loop, 300.0);
+    TEST_ASSERT_TRUE(true_c(4) > cooled_c + 10.0);
+    TEST_ASSERT_DOUBLE_WITHIN(1.0, cooled_c, chip_c(4));
+    TEST_ASSERT_TRUE(loop_act(loop, LOOP_ACTION_FAN_GOOD, -1));
+    loop_advance(loop, 300.0);
+    TEST_ASSERT_DOUBLE_WITHIN(1.0, cooled_c, true_c(4));
+}
+
+static void after_a_reset_nothing_runs_until_unlocked(void)
+{
+    const loop_action_t resets[] = {LOOP_ACTION_WATCHDOG, LOOP_ACTION_BROWN_OUT};
+    for (size_t r = 0; r < 2; r++) {
+        start();
+        command(0x1FF);
+        loop_advance(loop, 60.0);
+        double before_c = true_c(4);
+        TEST_ASSERT_TRUE(loop_act(loop, resets[r], -1));
+        TEST_ASSERT_DOUBLE_WITHIN(resets[r] == LOOP_ACTION_WATCHDOG ? 0.5 : 1e9, before_c,
+                                  chip_c(4));
+        command(0x1FF);
+        for (int n = 0; n < 500; n++) {
+            loop_tick(loop);
+            TEST_ASSERT_TRUE(loop_sum_current_a(loop) == 0.0);
+            for (int k = 0; k < 9; k++) { /* never believed colder than they are */
+                TEST_ASSERT_TRUE(chip_c(k) > true_c(k) - 0.5);
+            }
+        }
+        TEST_ASSERT_TRUE(controller_is_locked(loop_controller(loop)));
+        controller_unlock(loop_controller(loop));
+        loop_advance(loop, 1.0);
+        TEST_ASSERT_TRUE(loop_sum_current_a(loop) == 0.0);
+        command(0x1FF);
+        loop_advance(loop, 2.0);
+        TEST_ASSERT_DOUBLE_WITHIN(0.03, 1.5, loop_current_a(loop, 4));
+    }
+}
+
+/* At any moment of heating and cooling, the phase half transformed or not. */
+static void watchdog_keeps_the_model_as_it_is(void)
+{
+    settings.policy.open_current_ma = 2000;
+    start();
+    controller_t *controller = loop_controller(loop);
+    for (int n = 0; n < 60; n++) {
+        controller_unlock(controller);
+        command(n % 20 < 14 ? 0x1EF : 0);
+        loop_advance(loop, 5.0);
+        int16_t temperature_c7[9];
+        uint16_t austenite[9];
+        for (uint8_t k = 0; k < 9; k++) {
+            temperature_c7[k] = thermal_model_temperature_c7(&controller->model, k);
+            austenite[k] = thermal_model_austenite(&controller->model, k);
+        }
+        TEST_ASSERT_TRUE(loop_act(loop, LOOP_ACTION_WATCHDOG, -1));
+        for (uint8_t k = 0; k < 9; k++) {
+            TEST_ASSERT_EQUAL_INT16(temperature_c7[k],
+                                    thermal_model_temperature_c7(&controller->model, k));
+            TEST_ASSERT_EQUAL_UINT16(austenite[k], thermal_model_austenite(&controller->model, k));
+        }
+    }
+}
+
+static void ambient_reaches_plant_and_chip_with_its_error(void)
+{
+    loop_options_t options;
+    loop_options_default(&options);
+    options.ambient_error_c = 3.0;
+    start_with(&options, 1);
+    TEST_ASSERT_TRUE(loop_set_ambient(loop, 30.0));
+    TEST_ASSERT_FALSE(loop_set_ambient(loop, 1000.0));
+    loop_advance(loop, 1000.0);
+    TEST_ASSERT_DOUBLE_WITHIN(0.05, 30.0, true_c(4));
+    TEST_ASSERT_DOUBLE_WITHIN(0.1, 33.0, chip_c(4));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 1000.0, loop_time_s(loop));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 1000.0, plant_time_s(loop_plant(loop)));
+}
+
+static void what_does_not_fit_is_refused(void)
+{
+    uint16_t bad = 0;
+    loop_options_t options;
+    loop_options_default(&options);
+    options.plant_ticks = 0;
+    TEST_ASSERT_NULL(loop_create(&settings, plant, &options, 1, &bad));
+    TEST_ASSERT_EQUAL_UINT16(UINT16_MAX, bad);
+    loop_options_default(&options);
+    options.sensor_samples = 3;
+    TEST_ASSERT_NULL(loop_create(&settings, plant, &options, 1, NULL));
+    loop_options_default(&options);
+    options.ambient_error_c = NAN;
+    TEST_ASSERT_NULL(loop_create(&settings, plant, &options, 1, NULL));
+    controller_settings_t wrong = settings;
+    wrong.model.rows = 2;
+    TEST_ASSERT_NULL(loop_create(&wrong, plant, NULL, 1, &bad));
+    TEST_ASSERT_EQUAL_UINT16(offsetof(controller_settings_t, model.rows), bad);
+    wrong = settings;
+    wrong.safety.bad_samples = 0;
+    TEST_ASSERT_NULL(loop_create(&wrong, plant, NULL, 1, &bad));
+    TEST_ASSERT_EQUAL_UINT16(offsetof(controller_settings_t, safety.bad_samples), bad);
+    start();
+    TEST_ASSERT_FALSE(loop_act(loop, LOOP_ACTION_OPEN_SPRING, 9));
+    TEST_ASSERT_FALSE(loop_act(loop, LOOP_ACTION_OPEN_SPRING, -1));
+    TEST_ASSERT_FALSE(loop_act(loop, LOOP_ACTION_COUNT, 0));
+    TEST_ASSERT_TRUE(loop_current_a(loop, 9) == 0.0);
+    for (int action = 0; action < LOOP_ACTION_COUNT; action++) {
+        TEST_ASSERT_NOT_NULL(loop_action_name((loop_action_t)action));
+    }
+    TEST_ASSERT_NULL(loop_action_name(LOOP_ACTION_COUNT));
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(plain_current_follows_the_patterns);
+    RUN_TEST(estimate_follows_through_the_transformation);
+    RUN_TEST(same_seed_same_run_other_seed_other_noise);
+    RUN_TEST(coarser_plant_steps_change_little);
+    RUN_TEST(sum_never_exceeds_the_supply);
+    RUN_TEST(sagging_supply_still_gives_the_current);
+    RUN_TEST(each_failure_is_found_and_is_of_its_spring);
+    RUN_TEST(short_never_exceeds_the_sensor_for_long);
+    RUN_TEST(stuck_bus_switches_everything_off);
+    RUN_TEST(sensor_that_reset_once_is_no_fault);
+    RUN_TEST(stopped_fan_makes_the_springs_hotter_than_the_chip_believes);
+    RUN_TEST(after_a_reset_nothing_runs_until_unlocked);
+    RUN_TEST(watchdog_keeps_the_model_as_it_is);
+    RUN_TEST(ambient_reaches_plant_and_chip_with_its_error);
+    RUN_TEST(what_does_not_fit_is_refused);
+    return UNITY_END();
+}

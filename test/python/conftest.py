@@ -1,0 +1,72 @@
+"""What the tests share: logs made with the product's plant, small and quick."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from ninespring import native
+from ninespring.logs import log_text
+
+Make = Callable[..., Path]
+
+
+@pytest.fixture
+def make_log(tmp_path: Path) -> Make:
+    """Return a maker of 3 x 3 logs: effects and numbers of the plant, noise, seed, seconds, what is logged."""
+
+    def make(
+        name: str = "run.csv",
+        effects: dict[str, dict[str, float]] | None = None,
+        seed: int = 0,
+        seconds: int = 600,
+        noise: float = 0.3,
+        columns: str = "iv",
+        change: Callable[[dict[str, np.ndarray]], None] | None = None,
+    ) -> Path:
+        rng = np.random.default_rng(seed)
+        time_s = np.arange(float(seconds))
+        current = np.zeros((seconds, 9))
+        for k in range(9):
+            at = int(rng.integers(5, 40))
+            while at < seconds:
+                hold = int(rng.integers(30, 120))
+                current[at : at + hold, k] = 0.0 if rng.random() < 0.4 else rng.uniform(1.0, 1.8)
+                at += hold
+        fan = ((time_s // 200) % 2 == 1).astype(float)
+        plant = native.Plant(3, 3)
+        plant.set_effects(effects or {})
+        for values in (effects or {}).values():
+            plant.set_all(values)
+        plant.reset()
+        mode = native.POWER if columns == "iv" else native.CURRENT
+        drive = current**2 * 0.2 if columns == "iv" else current
+        shown = plant.simulate(time_s, mode, drive, fan, np.full(seconds, 20.0))
+        shown = shown + rng.normal(0.0, noise, shown.shape)
+        out: dict[str, np.ndarray] = {}
+        for k in range(9):
+            out[f"i{k + 1}_a"] = current[:, k]
+            if columns == "iv":
+                out[f"v{k + 1}_v"] = current[:, k] * 0.2
+        out |= {f"t{k + 1}_c": shown[:, k] for k in range(9)}
+        out |= {"fan": fan, "ambient_c": np.full(seconds, 20.0)}
+        if change:
+            change(out)
+        stamps = out.pop("time_s", time_s)
+        path = tmp_path / name
+        path.write_text(log_text(stamps, out))
+        return path
+
+    return make
+
+
+@pytest.fixture
+def measured() -> Path:
+    """Return the folder of measured data; skip where it is absent."""
+    folder = Path(os.environ.get("NINESPRING_DATA", Path(__file__).resolve().parents[3] / "shared" / "data"))
+    if not folder.is_dir():
+        pytest.skip(f"no measured data at {folder}: set NINESPRING_DATA")
+    return folder

@@ -1,0 +1,173 @@
+"""The diagnosis: known numbers are recovered with honest errors, missing effects found, none invented."""
+
+from __future__ import annotations
+
+import copy
+
+import jsonschema
+import numpy as np
+import pytest
+from ninespring import diagnosis, effects
+from ninespring.fitting import Problem
+from ninespring.logs import read_log
+from ninespring.models import Array, model_text, read_model
+
+TRUE = {
+    "heat_capacity_j_per_k": 0.3,
+    "loss_w_per_k": 0.0058,
+    "loss_fan_w_per_k": 0.0113,
+    "orthogonal_w_per_k": 0.000408,
+}
+
+
+def names(result: dict) -> list[str]:
+    return [e["name"] for e in result["effects"]]
+
+
+def test_nothing_is_adopted_where_nothing_is_missing(make_log) -> None:
+    result = diagnosis.diagnose(Array(), [read_log(make_log(seed=3))]).result
+    assert names(result) == []
+    assert result["unexplained"] is False
+    assert result["after"]["rmse_c"] == pytest.approx(0.3, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("effect", "numbers", "columns"),
+    [
+        ("latent_heat", {"latent_heat_j": 8.0}, "iv"),
+        ("sensor_lag", {"sensor_lag_s": 6.0}, "iv"),
+        (
+            "shared_air",
+            {"air_heat_capacity_j_per_k": 4.0, "air_exchange_w_per_k": 0.1},
+            "iv",
+        ),
+        ("fan_wake", {"wake_w_per_k": 0.0015, "wake_direction": 1.0}, "iv"),
+        ("spring_mismatch", {"loss_scale[4]": 1.3}, "iv"),
+        ("resistance_phase", {"resistance_austenite_ohm": 0.24}, "i"),
+    ],
+)
+def test_the_missing_effect_is_named_with_its_number(make_log, effect: str, numbers: dict, columns: str) -> None:
+    runs = [read_log(make_log(f"{k}.csv", {effect: numbers}, seed=k, columns=columns)) for k in (1, 2)]
+    found = diagnosis.diagnose(Array(), runs)
+    result = found.result
+    assert names(result) == [effect]
+    fitted = result["effects"][0]["parameters"]
+    first = next(iter(numbers))
+    assert fitted[first]["value"] == pytest.approx(numbers[first], rel=0.15)
+    assert result["after"]["holdout_rmse_c"] < 1.1 * 0.3
+    diagnosis.validate(result)
+    on_chip = effect in effects.ON_CHIP
+    assert (effect in found.model.effects) and result["effects"][0]["on_chip"] == on_chip
+
+
+def test_two_effects_that_hide_one_another_are_both_found(make_log) -> None:
+    both = {
+        "sensor_lag": {"sensor_lag_s": 5.0},
+        "edge_loss": {"edge_loss_fraction": 0.15},
+    }
+    runs = [read_log(make_log(f"{k}.csv", both, seed=k)) for k in (1, 2)]
+    assert set(names(diagnosis.diagnose(Array(), runs).result)) == set(both)
+
+
+def test_what_no_effect_explains_is_called_unexplained(make_log) -> None:
+    def gusts(columns: dict[str, np.ndarray]) -> None:
+        for k in range(1, 10):
+            columns[f"t{k}_c"] = columns[f"t{k}_c"] + 2.0 * np.sign(np.sin(np.arange(600.0) / 13))
+
+    result = diagnosis.diagnose(Array(), [read_log(make_log(change=gusts))]).result
+    assert result["unexplained"] is True
+    assert names(result) == []
+    assert result["residual"]["depends_on"]
+
+
+def test_standard_errors_cover_the_truth(make_log) -> None:
+    hits = total = 0
+    for seed in range(12):
+        _, fit, _ = diagnosis.fit_effects(Array(), [read_log(make_log(f"c{seed}.csv", seed=seed, seconds=400))], [])
+        errors = fit.stderr()
+        for key, value in TRUE.items():
+            total += 1
+            hits += abs(fit.value(key) - value) <= 1.96 * errors[key]
+    # 95 % of 48: fewer than 38 has a chance below 1e-5, all may hit
+    assert hits >= 38, f"{hits} of {total}"
+    assert hits <= total
+
+
+def test_swapped_columns_are_said(make_log) -> None:
+    def swap(columns: dict[str, np.ndarray]) -> None:
+        columns["t2_c"], columns["t8_c"] = columns["t8_c"], columns["t2_c"]
+
+    result = diagnosis.diagnose(Array(), [read_log(make_log(change=swap))]).result
+    assert sum("swapped" in text for text in result["warnings"]) == 2
+
+
+def test_a_clock_that_runs_ahead_is_said(make_log) -> None:
+    def shift(columns: dict[str, np.ndarray]) -> None:
+        for k in range(1, 10):
+            columns[f"t{k}_c"] = np.concatenate([columns[f"t{k}_c"][8:], np.full(8, np.nan)])
+
+    result = diagnosis.diagnose(Array(), [read_log(make_log(change=shift))]).result
+    assert any("correct the clock" in text for text in result["warnings"])
+    assert "sensor_lag" not in names(result)
+
+
+def test_numbers_the_data_cannot_fix_are_reported(make_log) -> None:
+    def never_blown(columns: dict[str, np.ndarray]) -> None:
+        columns["fan"] = np.full(600, 0.11)
+
+    found = diagnosis.diagnose(Array(), [read_log(make_log(change=never_blown))])
+    listed = found.result["identifiability"]
+    assert listed["correlated"] or listed["not_identifiable"] or listed["at_bounds"]
+
+
+def test_the_schema_refuses_what_is_not_a_diagnosis(make_log) -> None:
+    result = diagnosis.diagnose(Array(), [read_log(make_log(seconds=300))]).result
+    broken = copy.deepcopy(result)
+    broken["effects"] = [{"name": "ghost"}]
+    with pytest.raises(jsonschema.ValidationError):
+        diagnosis.validate(broken)
+
+
+def test_the_model_file_is_read_back_and_predicts(make_log, tmp_path) -> None:
+    run = read_log(make_log(effects={"latent_heat": {"latent_heat_j": 8.0}}))
+    found = diagnosis.diagnose(Array(), [run])
+    path = tmp_path / "model.toml"
+    path.write_text(model_text(found.model))
+    shown = diagnosis.predict(read_model(path), run)
+    assert np.sqrt(np.nanmean((run.temperature_c - shown) ** 2)) < 0.33
+
+
+def test_the_chip_takes_the_effect_and_not_the_thermometer(make_log) -> None:
+    both = {"latent_heat": {"latent_heat_j": 8.0}, "sensor_lag": {"sensor_lag_s": 5.0}}
+    runs = [read_log(make_log(f"{k}.csv", both, seed=k)) for k in (1, 2)]
+    found = diagnosis.diagnose(Array(), runs)
+    assert set(names(found.result)) == set(both)
+    text, message = diagnosis.chip_settings(found.model)
+    value = float(next(line for line in text.splitlines() if line.startswith("$latent_heat_j=")).split("=")[1])
+    assert value == pytest.approx(8.0, rel=0.1)
+    assert "lag" not in text and "sensor_lag" in message
+
+
+def test_the_chip_model_is_better_with_the_effect_on_a_log_it_never_saw(
+    make_log,
+) -> None:
+    true = {"latent_heat": {"latent_heat_j": 8.0}}
+    found = diagnosis.diagnose(Array(), [read_log(make_log("a.csv", true, seed=1))])
+    held = read_log(make_log("b.csv", true, seed=9))
+    before = copy.deepcopy(found.model)
+    before.effects = []
+    before.parameters = {k: v for k, v in before.parameters.items() if k != "latent_heat_j"}
+
+    def error(model) -> float:
+        return float(np.sqrt(np.nanmean((held.temperature_c - diagnosis.predict(model, held, chip=True)) ** 2)))
+
+    assert error(found.model) < 0.6 < error(before)
+
+
+def test_simulations_in_threads_give_the_same_as_alone(make_log) -> None:
+    problem = Problem(Array(), [read_log(make_log())])
+    spec = effects.base_spec(problem)
+    values = [f.start for f in spec.free]
+    alone = problem.simulate(spec, values, 0)
+    for one in problem.simulate_many([(spec, values, 0)] * 8):
+        assert np.array_equal(alone, one)

@@ -1,0 +1,35 @@
+"""Noise, autocorrelation, structure: against what is known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from ninespring import statistics
+
+
+def test_the_noise_is_found_under_a_smooth_curve_and_outliers() -> None:
+    rng = np.random.default_rng(1)
+    curve = 20 + 60 * (1 - np.exp(-np.arange(900.0) / 50))[:, None]
+    series = curve + rng.normal(0, 0.3, (900, 9))
+    series[::100] += 30.0
+    assert statistics.noise_floor(series) == pytest.approx(np.full(9, 0.3), rel=0.12)
+
+
+def test_correlated_residuals_count_less() -> None:
+    rng = np.random.default_rng(2)
+    white = rng.normal(size=(60000, 1))
+    red = np.zeros_like(white)
+    for k in range(1, len(red)):
+        red[k] = 0.9 * red[k - 1] + white[k]
+    assert statistics.correlation_factor([white], 200) == pytest.approx(1.0, abs=0.3)
+    assert statistics.correlation_factor([red], 200) == pytest.approx(19.0, rel=0.3)
+
+
+def test_structure_is_zero_for_white_noise_and_its_variance_otherwise() -> None:
+    rng = np.random.default_rng(3)
+    noise = [np.full(9, 0.3)]
+    white = rng.normal(0, 0.3, (900, 9))
+    wave = 0.3 * np.sqrt(2) * np.sin(np.arange(900.0) / 60)[:, None]
+    starts = [[0]]
+    assert abs(np.mean(statistics.structure([white], noise, 12, starts))) < 0.02
+    assert np.mean(statistics.structure([white + wave], noise, 12, starts)) == pytest.approx(1.0, rel=0.1)

@@ -1,0 +1,512 @@
+/* The tick as a whole: order, commands, faults, the shared supply, missing readings, settings that
+ * change while running. The array outside is a resistor per spring and a perfect sensor; physics is
+ * in test/host_loop. */
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+#include "controller.h"
+#include "unity.h"
+
+#define AMBIENT_C7 (20 * 128)
+
+static controller_t controller;
+static controller_settings_t settings;
+static controller_inputs_t inputs;
+static controller_outputs_t outputs;
+static int32_t spring_mohm[CONTROLLER_MAX_SPRINGS];
+
+static void start(void)
+{
+    memset(&controller, 0xA5, sizeof controller); /* what was in memory must not matter */
+    TEST_ASSERT_TRUE(controller_init(&controller, &settings, AMBIENT_C7, NULL));
+    memset(&inputs, 0, sizeof inputs);
+    memset(&outputs, 0, sizeof outputs);
+    inputs.ambient_c7 = AMBIENT_C7;
+}
+
+void setUp(void)
+{
+    controller_settings_default(&settings);
+    for (int k = 0; k < CONTROLLER_MAX_SPRINGS; k++) {
+        spring_mohm[k] = 175;
+    }
+    start();
+}
+
+void tearDown(void) {}
+
+/* What the duties bring: 5 V, 180 mohm beyond the spring. Failing sensors are left as they are. */
+static void respond(void)
+{
+    for (int k = 0; k < CONTROLLER_MAX_SPRINGS; k++) {
+        if (inputs.sensor[k].status != CONTROLLER_SENSOR_OK) {
+            continue;
+        }
+        int32_t current_ma =
+            spring_mohm[k] < 0 ? 0 : (int32_t)outputs.duty[k] * 6250 / (spring_mohm[k] + 180);
+        int32_t voltage_mv =
+            spring_mohm[k] < 0 ? 5000 * outputs.duty[k] / 800 : current_ma * spring_mohm[k] / 1000;
+        inputs.sensor[k].current_ma = (int16_t)(current_ma > 3200 ? 3200 : current_ma);
+        inputs.sensor[k].voltage_mv = (int16_t)voltage_mv;
+    }
+}
+
+static int32_t sum_ma(void)
+{
+    int32_t sum = 0;
+    for (int k = 0; k < CONTROLLER_MAX_SPRINGS; k++) {
+        sum += spring_mohm[k] < 0 ? 0 : (int32_t)outputs.duty[k] * 6250 / (spring_mohm[k] + 180);
+    }
+    return sum;
+}
+
+static void run(uint32_t ticks)
+{
+    for (uint32_t n = 0; n < ticks; n++) {
+        controller_tick(&controller, &inputs, &outputs);
+        respond();
+    }
+}
+
+static void all_on(void)
+{
+    bool on[CONTROLLER_MAX_SPRINGS];
+    memset(on, 1, sizeof on);
+    controller_set_pattern(&controller, on);
+}
+
+static bool all_off(void)
+{
+    for (int k = 0; k < CONTROLLER_MAX_SPRINGS; k++) {
+        if (outputs.duty[k] != 0) {
+            return false;
+        }
+    }
+    return true;
+}
+
+static void nothing_is_driven_without_a_command(void)
+{
+    for (int n = 0; n < 500; n++) {
+        run(1);
+        TEST_ASSERT_TRUE(all_off());
+    }
+    TEST_ASSERT_EQUAL_INT16(AMBIENT_C7, controller_temperature_c7(&controller, 4));
+}
+
+static void a_driven_spring_gets_its_current_and_only_that_one(void)
+{
+    TEST_ASSERT_TRUE(controller_set_target(&controller, 4, 1000));
+    run(200);
+    for (uint8_t k = 0; k < 9; k++) {
+        TEST_ASSERT_INT_WITHIN(30, k == 4 ? 1500 : 0, controller_measured_ma(&controller, k));
+        TEST_ASSERT_EQUAL_UINT16(outputs.duty[k], controller_duty(&controller, k));
+    }
+    TEST_ASSERT_INT_WITHIN(30, 265, controller_measured_mv(&controller, 4));
+    TEST_ASSERT_EQUAL_UINT16(1500, controller_target_ma(&controller, 4));
+}
+
+/* 9 x 3 A are asked for, 15 A are there, 14.7 A are given: in every tick, whatever the springs'
+ * resistance. */
+static void sum_of_currents_never_exceeds_the_supply(void)
+{
+    settings.policy.open_current_ma = 3000;
+    for (int32_t mohm = 120; mohm <= 300; mohm += 45) {
+        start();
+        for (int k = 0; k < CONTROLLER_MAX_SPRINGS; k++) {
+            spring_mohm[k] = mohm;
+        }
+        for (int32_t n = 0; n < 900; n++) {
+            if (n % 150 == 0) {
+                all_on();
+            } else if (n % 150 == 100) {
+                controller_stop(&controller);
+                TEST_ASSERT_TRUE(controller_set_target(&controller, (uint8_t)(n / 150), 1000));
+            }
+            run(1);
+            TEST_ASSERT_LESS_OR_EQUAL_INT32(15000, sum_ma());
+        }
+        all_on();
+        run(150);
+        TEST_ASSERT_GREATER_THAN_INT32(14400, sum_ma());
+        for (uint8_t k = 0; k < 9; k++) {
+            TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, controller_fault(&controller, k));
+            TEST_ASSERT_INT_WITHIN(1, controller_target_ma(&controller, 0),
+                                   controller_target_ma(&controller, k));
+            TEST_ASSERT_BITS(DRIVE_POLICY_LIMIT_SUPPLY, DRIVE_POLICY_LIMIT_SUPPLY,
+                             controller_limits(&controller, k));
+        }
+        TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, controller_board_fault(&controller));
+    }
+}
+
+static void model_is_fed_with_the_measured_power_of_each_tick(void)
+{
+    thermal_model_t model;
+    TEST_ASSERT_EQUAL(THERMAL_MODEL_OK, thermal_model_init(&model, &settings.model, NULL));
+    thermal_model_reset(&model, AMBIENT_C7);
+    uint32_t power_uw[THERMAL_MODEL_MAX_SPRINGS] = {0};
+    for (int n = 0; n < 2000;
+         n++) { /* currents that no loop asked for: below what counts as stuck on */
+        for (int k = 0; k < 9; k++) {
+            inputs.sensor[k].current_ma = (int16_t)(n * 7 % 100 - 5);
+            inputs.sensor[k].voltage_mv = (int16_t)(k * 977 - 200);
+            if (inputs.sensor[k].current_ma > 0 && inputs.sensor[k].voltage_mv > 0) {
+                power_uw[k] +=
+                    (uint32_t)(inputs.sensor[k].current_ma * inputs.sensor[k].voltage_mv);
+            }
+        }
+        controller_tick(&controller, &inputs, &outputs);
+        if (n % 5 == 4) {
+            for (int k = 0; k < 9; k++) {
+                power_uw[k] /= 5;
+            }
+            thermal_model_step(&model, power_uw);
+            memset(power_uw, 0, sizeof power_uw);
+            for (uint8_t k = 0; k < 9; k++) {
+                TEST_ASSERT_INT16_WITHIN(1, thermal_model_temperature_c7(&model, k),
+                                         controller_temperature_c7(&controller, k));
+            }
+        }
+    }
+    TEST_ASSERT_GREATER_THAN_INT16(AMBIENT_C7 + 128, controller_temperature_c7(&controller, 8));
+}
+
+/* From martensite to austenite, whichever has more. */
+static void each_current_loop_is_told_its_springs_resistance(void)
+{
+    for (int falling = 0; falling < 2; falling++) {
+        if (falling) {
+            settings.model.resistance_martensite_uohm = 9219000;
+            settings.model.resistance_austenite_uohm = 219000;
+        }
+        start();
+        for (uint8_t k = 0; k < 9; k++) {
+            thermal_model_set_temperature(&controller.model, k, (int16_t)((85 + 2 * k) * 128));
+        }
+        run(9);
+        for (uint8_t k = 0; k < 9; k++) {
+            current_control_t told = controller.current;
+            uint32_t resistance_uohm = thermal_model_resistance_uohm(&controller.model, k);
+            current_control_set_resistance(&told, k, (uint16_t)(resistance_uohm / 1000u));
+            TEST_ASSERT_INT16_WITHIN(2, told.channel[k].estimate_q16,
+                                     controller.current.channel[k].estimate_q16);
+        }
+    }
+}
+
+/* A sensor lost for hold_ticks: the heat goes on being counted at its last value; then the output
+ * is off and none is. */
+static void missing_readings_keep_the_last_power_while_the_output_is_on(void)
+{
+    settings.safety.bad_samples = 50;
+    start();
+    controller_set_target(&controller, 4, 1000);
+    run(200);
+    uint32_t before_uw = controller_power_uw(&controller, 4);
+    TEST_ASSERT_UINT_WITHIN(20000, 394000, before_uw);
+    inputs.sensor[4].status = CONTROLLER_SENSOR_BUS;
+    inputs.sensor[4].current_ma = 12345; /* never a number */
+    inputs.sensor[4].voltage_mv = -12345;
+    for (int n = 0; n < settings.current.hold_ticks; n++) {
+        run(1);
+        TEST_ASSERT_EQUAL_UINT32(before_uw, controller_power_uw(&controller, 4));
+        TEST_ASSERT_NOT_EQUAL(0, outputs.duty[4]);
+    }
+    run(1);
+    TEST_ASSERT_EQUAL_UINT16(0, outputs.duty[4]);
+    run(1);
+    TEST_ASSERT_EQUAL_UINT32(0, controller_power_uw(&controller, 4));
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, controller_fault(&controller, 4));
+    inputs.sensor[4].status = CONTROLLER_SENSOR_OK;
+    run(200);
+    TEST_ASSERT_INT_WITHIN(30, 1500, controller_measured_ma(&controller, 4));
+}
+
+static void failing_sensor_is_a_fault_of_its_spring_alone(void)
+{
+    all_on();
+    run(200);
+    inputs.sensor[2].status = CONTROLLER_SENSOR_STALE;
+    run(settings.safety.bad_samples);
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_SENSOR_STALE, controller_fault(&controller, 2));
+    TEST_ASSERT_EQUAL_UINT16(0, outputs.duty[2]); /* in the same tick */
+    TEST_ASSERT_EQUAL_UINT8(DRIVE_POLICY_LIMIT_SAFETY,
+                            controller_limits(&controller, 2) & DRIVE_POLICY_LIMIT_SAFETY);
+    run(100);
+    TEST_ASSERT_INT_WITHIN(30, 1500, controller_measured_ma(&controller, 3));
+    inputs.sensor[2].status = CONTROLLER_SENSOR_OK;
+    run(100);
+    TEST_ASSERT_EQUAL_UINT16(0, outputs.duty[2]); /* it does not start again by itself */
+    controller_clear_faults(&controller);
+    run(100);
+    TEST_ASSERT_TRUE(all_off()); /* nor by clearing */
+    controller_set_target(&controller, 2, 1000);
+    run(100);
+    TEST_ASSERT_INT_WITHIN(30, 1500, controller_measured_ma(&controller, 2));
+}
+
+static void open_and_shorted_springs_are_told_apart(void)
+{
+    all_on();
+    run(200);
+    spring_mohm[0] = -1;
+    spring_mohm[8] = 5;
+    run(40);
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_OPEN_SPRING, controller_fault(&controller, 0));
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_SHORT_SPRING, controller_fault(&controller, 8));
+    for (uint8_t k = 1; k < 8; k++) {
+        TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, controller_fault(&controller, k));
+        TEST_ASSERT_NOT_EQUAL(0, outputs.duty[k]);
+    }
+}
+
+static void current_in_an_output_that_is_off_stops_the_board(void)
+{
+    controller_set_target(&controller, 0, 1000);
+    run(100);
+    inputs.sensor[5].current_ma = 400;
+    inputs.sensor[5].voltage_mv = 70;
+    for (int n = 0; n < settings.safety.bad_samples; n++) {
+        TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, controller_board_fault(&controller));
+        controller_tick(&controller, &inputs, &outputs);
+    }
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_STUCK_ON, controller_board_fault(&controller));
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_STUCK_ON, controller_fault(&controller, 5));
+    TEST_ASSERT_TRUE(all_off());
+}
+
+static void hot_model_trips(void)
+{
+    controller_set_target(&controller, 4, 1000);
+    run(100);
+    thermal_model_set_temperature(&controller.model, 4, 150 * 128);
+    run(settings.safety.bad_samples);
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_OVER_TEMPERATURE, controller_fault(&controller, 4));
+    TEST_ASSERT_EQUAL_UINT16(0, outputs.duty[4]);
+}
+
+/* Above the policy's limit, below safety's: after trip_time_s it is off, and says why. */
+static void limit_that_stays_is_a_fault_until_cleared(void)
+{
+    settings.policy.trip_time_s = 2;
+    start();
+    controller_set_target(&controller, 4, 1000);
+    run(100);
+    for (int n = 0; n < 160; n++) {
+        thermal_model_set_temperature(&controller.model, 4, 120 * 128);
+        run(1);
+        if (n == 60) {
+            TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, controller_fault(&controller, 4));
+        }
+    }
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_LIMIT_TRIP, controller_fault(&controller, 4));
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, controller_board_fault(&controller));
+    TEST_ASSERT_EQUAL_UINT16(0, outputs.duty[4]);
+    thermal_model_set_temperature(&controller.model, 4, 60 * 128);
+    run(500);
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_LIMIT_TRIP, controller_fault(&controller, 4));
+    TEST_ASSERT_EQUAL_UINT16(0, outputs.duty[4]);
+    controller_clear_faults(&controller);
+    controller_set_target(&controller, 4, 1000);
+    run(100);
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, controller_fault(&controller, 4));
+    TEST_ASSERT_INT_WITHIN(30, 1500, controller_measured_ma(&controller, 4));
+}
+
+static void stop_acts_in_the_next_tick(void)
+{
+    all_on();
+    run(100);
+    controller_stop(&controller);
+    run(1);
+    TEST_ASSERT_TRUE(all_off());
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, controller_board_fault(&controller));
+    all_on();
+    run(100);
+    controller_emergency_stop(&controller);
+    run(1);
+    TEST_ASSERT_TRUE(all_off());
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_EMERGENCY_STOP, controller_board_fault(&controller));
+    all_on();
+    run(100);
+    TEST_ASSERT_TRUE(all_off());
+    controller_clear_faults(&controller);
+    all_on();
+    run(1);
+    TEST_ASSERT_FALSE(all_off());
+}
+
+static void locked_board_drives_nothing_until_unlocked(void)
+{
+    controller_lock(&controller);
+    all_on();
+    run(100);
+    TEST_ASSERT_TRUE(all_off());
+    TEST_ASSERT_TRUE(controller_is_locked(&controller));
+    controller_unlock(&controller);
+    run(100);
+    TEST_ASSERT_TRUE(all_off());
+    all_on();
+    run(1);
+    TEST_ASSERT_FALSE(all_off());
+}
+
+static void commands_out_of_range_change_nothing(void)
+{
+    controller_t before = controller;
+    TEST_ASSERT_FALSE(controller_set_target(&controller, 9, 1000));
+    TEST_ASSERT_FALSE(controller_set_target(&controller, 0, 1001));
+    TEST_ASSERT_FALSE(controller_set_policy(&controller, (drive_policy_kind_t)9));
+    TEST_ASSERT_FALSE(controller_set_fan(&controller, 101));
+    TEST_ASSERT_EQUAL_MEMORY(&before, &controller, sizeof controller);
+    TEST_ASSERT_TRUE(controller_set_fan(&controller, 100));
+    run(1);
+    TEST_ASSERT_EQUAL_UINT8(100, outputs.fan_percent);
+}
+
+static void refuses(const controller_settings_t *changed, size_t offset)
+{
+    controller_t before = controller;
+    uint16_t bad = UINT16_MAX;
+    TEST_ASSERT_FALSE(controller_apply_settings(&controller, changed, &bad));
+    TEST_ASSERT_EQUAL_UINT16(offset, bad);
+    TEST_ASSERT_EQUAL_MEMORY(&before, &controller, sizeof controller);
+    bad = UINT16_MAX;
+    TEST_ASSERT_FALSE(controller_init(&controller, changed, AMBIENT_C7, &bad));
+    TEST_ASSERT_EQUAL_UINT16(offset, bad);
+    TEST_ASSERT_EQUAL_MEMORY(&before, &controller, sizeof controller);
+}
+
+static void refused_settings_change_nothing_and_are_found(void)
+{
+    all_on();
+    run(100);
+#define REFUSES(field, value)                                                                      \
+    do {                                                                                           \
+        controller_settings_t changed = settings;                                                  \
+        changed.field = (value);                                                                   \
+        refuses(&changed, offsetof(controller_settings_t, field));                                 \
+    } while (0)
+    REFUSES(model.rows, 0);
+    REFUSES(model.step_ms, 50);
+    REFUSES(model.heat_capacity_mj_per_k, 0);
+    REFUSES(model.austenite_finish_cc, 8700);
+    REFUSES(model.resistance_austenite_uohm, 0);
+    REFUSES(current.supply_mv, 0);
+    REFUSES(safety.bad_samples, 0);
+    REFUSES(policy.open_current_ma, 3201);
+#undef REFUSES
+}
+
+static void accepted_settings_keep_temperatures_currents_and_faults(void)
+{
+    all_on();
+    spring_mohm[8] = 5;
+    run(3000);
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_SHORT_SPRING, controller_fault(&controller, 8));
+    int16_t temperature_c7 = controller_temperature_c7(&controller, 4);
+    int16_t current_ma = controller_measured_ma(&controller, 4);
+    TEST_ASSERT_GREATER_THAN_INT16(50 * 128, temperature_c7);
+    settings.model.loss_uw_per_k = 7000;
+    settings.policy.open_current_ma = 1400;
+    TEST_ASSERT_TRUE(controller_apply_settings(&controller, &settings, NULL));
+    TEST_ASSERT_EQUAL_INT16(temperature_c7, controller_temperature_c7(&controller, 4));
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_SHORT_SPRING, controller_fault(&controller, 8));
+    run(2);
+    TEST_ASSERT_INT_WITHIN(130, current_ma, controller_measured_ma(&controller, 4));
+    run(50);
+    TEST_ASSERT_INT_WITHIN(30, 1400, controller_measured_ma(&controller, 4));
+}
+
+static void another_size_starts_anew_but_stays_locked(void)
+{
+    all_on();
+    run(500);
+    controller_lock(&controller);
+    controller_emergency_stop(&controller);
+    settings.model.rows = 1;
+    settings.model.columns = 2;
+    TEST_ASSERT_TRUE(controller_apply_settings(&controller, &settings, NULL));
+    TEST_ASSERT_EQUAL_UINT8(2, controller_springs(&controller));
+    TEST_ASSERT_TRUE(controller_is_locked(&controller));
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_EMERGENCY_STOP, controller_board_fault(&controller));
+    TEST_ASSERT_EQUAL_INT16(AMBIENT_C7, controller_temperature_c7(&controller, 0));
+    run(1);
+    TEST_ASSERT_TRUE(all_off());
+    TEST_ASSERT_FALSE(controller_set_target(&controller, 2, 1000));
+    controller_unlock(&controller);
+    controller_clear_faults(&controller);
+    all_on();
+    run(100);
+    TEST_ASSERT_INT_WITHIN(30, 1500, controller_measured_ma(&controller, 1));
+    TEST_ASSERT_EQUAL_UINT16(0, outputs.duty[2]);
+}
+
+/* Any readings, any status, commands at any moment: duties in range, no undefined behaviour, and
+ * twice the same. */
+static void any_input_is_taken_and_the_same_input_gives_the_same_output(void)
+{
+    const int16_t word[] = {INT16_MIN, -4000, -1, 0, 1, 300, 1500, 3200, INT16_MAX};
+    controller_t other = controller;
+    controller_outputs_t others;
+    memset(&others, 0, sizeof others); /* compared as a whole, padding included */
+    uint32_t random = 11;
+    for (int n = 0; n < 20000; n++) {
+        for (int k = 0; k < CONTROLLER_MAX_SPRINGS; k++) {
+            random = random * 1664525u + 1013904223u;
+            inputs.sensor[k].status =
+                (controller_sensor_status_t)((random >> 28) < 5 ? random >> 28 : 0);
+            inputs.sensor[k].current_ma = word[(random >> 8) % 9];
+            inputs.sensor[k].voltage_mv = word[(random >> 16) % 9];
+        }
+        inputs.ambient_c7 = word[(random >> 12) % 9];
+        inputs.fan_percent = (uint8_t)(random >> 20);
+        if (random % 13 == 0) {
+            controller_clear_faults(&controller);
+            controller_clear_faults(&other);
+        }
+        uint8_t spring = (uint8_t)((random >> 9) % 9);
+        controller_set_target(&controller, spring, 1000);
+        controller_set_target(&other, spring, 1000);
+        controller_set_policy(&controller, (drive_policy_kind_t)(random >> 31));
+        controller_set_policy(&other, (drive_policy_kind_t)(random >> 31));
+        controller_tick(&controller, &inputs, &outputs);
+        controller_tick(&other, &inputs, &others);
+        TEST_ASSERT_EQUAL_MEMORY(&outputs, &others, sizeof outputs);
+        for (int k = 0; k < CONTROLLER_MAX_SPRINGS; k++) {
+            TEST_ASSERT_LESS_OR_EQUAL_UINT16(k < 9 ? settings.current.maximum_duty_steps : 0,
+                                             outputs.duty[k]);
+        }
+        TEST_ASSERT_TRUE(thermal_model_is_consistent(&controller.model));
+        TEST_ASSERT_TRUE(
+            controller_temperature_c7(&controller, spring) >= THERMAL_MODEL_LOWEST_C7 &&
+            controller_temperature_c7(&controller, spring) <= THERMAL_MODEL_HIGHEST_C7);
+    }
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(nothing_is_driven_without_a_command);
+    RUN_TEST(a_driven_spring_gets_its_current_and_only_that_one);
+    RUN_TEST(sum_of_currents_never_exceeds_the_supply);
+    RUN_TEST(model_is_fed_with_the_measured_power_of_each_tick);
+    RUN_TEST(each_current_loop_is_told_its_springs_resistance);
+    RUN_TEST(missing_readings_keep_the_last_power_while_the_output_is_on);
+    RUN_TEST(failing_sensor_is_a_fault_of_its_spring_alone);
+    RUN_TEST(open_and_shorted_springs_are_told_apart);
+    RUN_TEST(current_in_an_output_that_is_off_stops_the_board);
+    RUN_TEST(hot_model_trips);
+    RUN_TEST(limit_that_stays_is_a_fault_until_cleared);
+    RUN_TEST(stop_acts_in_the_next_tick);
+    RUN_TEST(locked_board_drives_nothing_until_unlocked);
+    RUN_TEST(commands_out_of_range_change_nothing);
+    RUN_TEST(refused_settings_change_nothing_and_are_found);
+    RUN_TEST(accepted_settings_keep_temperatures_currents_and_faults);
+    RUN_TEST(another_size_starts_anew_but_stays_locked);
+    RUN_TEST(any_input_is_taken_and_the_same_input_gives_the_same_output);
+    return UNITY_END();
+}

@@ -1,0 +1,403 @@
+/* The current loop against a resistive load behind an averaged buck stage and a sensor that is one
+ * tick old, or, at worst (conversions that straddle the tick), two. */
+#include <limits.h>
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+#include "current_control.h"
+#include "unity.h"
+
+static current_control_t control;
+static current_control_parameters_t parameters;
+
+/* One channel's load. Currents in nA so that whole steps and their means are exact enough. */
+typedef struct {
+    int32_t supply_mv;
+    int32_t freewheel_mv;
+    int32_t spring_mohm; /* below 0: open */
+    int32_t loop_mohm;
+    bool old; /* the sensor's mean is of the tick before the last */
+    int32_t now_ua, before_ua;
+} load_t;
+
+static load_t load;
+
+void setUp(void)
+{
+    current_control_parameters_default(&parameters);
+    TEST_ASSERT_TRUE(current_control_init(&control, &parameters, NULL));
+    load = (load_t){.supply_mv = 5000, .spring_mohm = 190, .loop_mohm = 180};
+}
+
+void tearDown(void) {}
+
+static int16_t sensed_ma(void)
+{
+    int32_t ua = load.old ? load.before_ua : load.now_ua;
+    ua = ua > 3200000 ? 3200000 : ua;
+    return (int16_t)((ua + 500) / 1000);
+}
+
+static void give(uint16_t duty)
+{
+    load.before_ua = load.now_ua;
+    int64_t mean_nv = (int64_t)duty * load.supply_mv * 1250 -
+                      (int64_t)(800 - duty) * load.freewheel_mv * 1250; /* / 800 x 10^6 */
+    load.now_ua = (duty == 0 || load.spring_mohm < 0 || mean_nv < 0)
+                      ? 0
+                      : (int32_t)(mean_nv / (load.spring_mohm + load.loop_mohm));
+}
+
+static uint16_t tick_with(uint16_t target_ma, uint16_t estimate_mohm, bool valid, bool may_rise)
+{
+    current_control_set_resistance(&control, 0, estimate_mohm);
+    current_control_input_t input = {
+        .target_ma = target_ma, .measured_ma = sensed_ma(), .valid = valid, .may_rise = may_rise};
+    uint16_t duty = current_control_tick(&control, 0, &input);
+    give(duty);
+    return duty;
+}
+
+static uint16_t tick(uint16_t target_ma)
+{
+    return tick_with(target_ma, 190, true, true);
+}
+
+static int32_t mean_ua(uint16_t target_ma, int ticks)
+{
+    int64_t sum = 0;
+    for (int n = 0; n < ticks; n++) {
+        tick(target_ma);
+        sum += load.now_ua;
+    }
+    return (int32_t)(sum / ticks);
+}
+
+/* Runs one step from off; overshoot, ticks from the ramp's end until
+ * within 2 % + 8 mA. */
+static void step(int32_t spring_mohm, bool old, uint16_t target_ma, int32_t *overshoot_ma,
+                 int *settling_ticks)
+{
+    TEST_ASSERT_TRUE(current_control_init(&control, &parameters, NULL));
+    load.spring_mohm = spring_mohm;
+    load.old = old;
+    load.now_ua = load.before_ua = 0;
+    int ramp = (target_ma + parameters.slew_ma_per_tick - 1) / parameters.slew_ma_per_tick;
+    int32_t highest_ua = 0;
+    int last_outside = 0;
+    for (int n = 0; n < 200; n++) {
+        tick(target_ma);
+        highest_ua = load.now_ua > highest_ua ? load.now_ua : highest_ua;
+        int32_t error_ua = load.now_ua - target_ma * 1000;
+        if (error_ua > target_ma * 20 + 17000 || error_ua < -target_ma * 20 - 17000) {
+            last_outside = n + 1;
+        }
+    }
+    *overshoot_ma = highest_ua / 1000 - target_ma;
+    *settling_ticks = last_outside - ramp;
+}
+
+/* Estimate 190 mohm, spring 120..300: the stated settling time. */
+static void step_settles_without_much_overshoot(void)
+{
+    const int32_t spring_mohm[] = {120, 175, 190, 219, 300};
+    const uint16_t target_ma[] = {400, 1000, 1500, 2200, 3000};
+    for (size_t r = 0; r < 5; r++) {
+        for (size_t t = 0; t < 5; t++) {
+            for (int old = 0; old < 2; old++) {
+                int32_t overshoot_ma;
+                int settling_ticks;
+                step(spring_mohm[r], old != 0, target_ma[t], &overshoot_ma, &settling_ticks);
+                TEST_ASSERT_LESS_OR_EQUAL_INT32(old ? 110 : 40, overshoot_ma);
+                TEST_ASSERT_LESS_OR_EQUAL_INT(old ? 8 : 3, settling_ticks);
+            }
+        }
+    }
+}
+
+static void mean_current_is_the_target(void)
+{
+    for (int32_t spring_mohm = 120; spring_mohm <= 300; spring_mohm += 30) {
+        load.spring_mohm = spring_mohm;
+        mean_ua(1500, 100);
+        TEST_ASSERT_INT32_WITHIN(2000, 1500000,
+                                 mean_ua(1500, 400)); /* 2 mA; a duty step is 11..20 mA */
+    }
+}
+
+static void freewheel_drop_is_fed_forward(void)
+{
+    parameters.freewheel_mv = 350;
+    TEST_ASSERT_TRUE(current_control_init(&control, &parameters, NULL));
+    load.freewheel_mv = 350;
+    mean_ua(1500, 30);
+    TEST_ASSERT_INT32_WITHIN(5000, 1500000, mean_ua(1500, 50));
+    TEST_ASSERT_INT32_WITHIN(current_control_reference_ma(&control, 0), 0,
+                             control.channel[0].trim_q24);
+}
+
+/* Blind, so that nothing moves the wanted duty: 1000 mA x 0.37 ohm / 5 V x 800 = 59.2 steps. */
+static void dithering_has_the_mean_of_the_wanted_duty(void)
+{
+    parameters.hold_ticks = 250;
+    TEST_ASSERT_TRUE(current_control_init(&control, &parameters, NULL));
+    mean_ua(1000, 100);
+    control.channel[0].trim_q24 = 0;
+    uint32_t sum = 0;
+    uint16_t lowest = UINT16_MAX;
+    uint16_t highest = 0;
+    for (int n = 0; n < 200; n++) {
+        uint16_t duty = tick_with(1000, 190, false, true);
+        sum += duty;
+        lowest = duty < lowest ? duty : lowest;
+        highest = duty > highest ? duty : highest;
+    }
+    TEST_ASSERT_INT_WITHIN(4, 11840, sum); /* 0.02 step in the mean */
+    TEST_ASSERT_EQUAL_UINT16(59, lowest);
+    TEST_ASSERT_EQUAL_UINT16(60, highest);
+}
+
+static void reference_rises_by_the_slew_and_falls_at_once(void)
+{
+    uint16_t before_ma = 0;
+    for (int n = 0; n < 60; n++) {
+        tick(2500);
+        uint16_t reference_ma = current_control_reference_ma(&control, 0);
+        TEST_ASSERT_LESS_OR_EQUAL_UINT16(before_ma + parameters.slew_ma_per_tick, reference_ma);
+        before_ma = reference_ma;
+    }
+    TEST_ASSERT_EQUAL_UINT16(2500, before_ma);
+    tick(700);
+    TEST_ASSERT_EQUAL_UINT16(700, current_control_reference_ma(&control, 0));
+    TEST_ASSERT_INT32_WITHIN(40000, 700000, load.now_ua);
+    TEST_ASSERT_EQUAL_UINT16(0, tick(0));
+    TEST_ASSERT_EQUAL_UINT16(0, current_control_reference_ma(&control, 0));
+}
+
+static void fall_of_target_has_no_kick_when_resistance_is_far_off(void)
+{
+    const int32_t spring_mohm[] = {120, 300};
+    for (size_t r = 0; r < 2; r++) {
+        setUp();
+        load.spring_mohm = spring_mohm[r];
+        mean_ua(3000, 100);
+        for (int n = 0; n < 20; n++) {
+            tick(500);
+            TEST_ASSERT_INT32_WITHIN(60000, 500000, load.now_ua);
+        }
+    }
+}
+
+/* 0.95 x 0.9 V reaches 2.3 A of the 3 A wanted; then the supply recovers to 1.2 V, which just
+ * reaches 3 A. */
+static void saturation_does_not_wind_up(void)
+{
+    parameters.supply_mv = 1200;
+    TEST_ASSERT_TRUE(current_control_init(&control, &parameters, NULL));
+    load.supply_mv = 900;
+    mean_ua(3000, 500);
+    TEST_ASSERT_INT32_WITHIN(20000, 2311000, load.now_ua);
+    load.supply_mv = 1200;
+    for (int n = 0; n < 10; n++) {
+        tick(2000);
+        TEST_ASSERT_LESS_THAN_INT32(n == 0 ? 2700000 : 2450000,
+                                    load.now_ua); /* 1.2 / 0.9 of 2 A at most */
+    }
+    TEST_ASSERT_INT32_WITHIN(30000, 2000000, load.now_ua);
+}
+
+static void recovers_from_a_duty_limit_within_ten_ticks(void)
+{
+    parameters.maximum_duty_steps = 80; /* 0.5 V: 1.35 A at most */
+    TEST_ASSERT_TRUE(current_control_init(&control, &parameters, NULL));
+    for (int n = 0; n < 1000; n++) {
+        TEST_ASSERT_LESS_OR_EQUAL_UINT16(80, tick(3000));
+    }
+    TEST_ASSERT_INT32_WITHIN(10000, 1351000, load.now_ua);
+    for (int n = 0; n < 10; n++) {
+        tick(1000);
+        TEST_ASSERT_LESS_THAN_INT32(1050000, load.now_ua);
+    }
+    TEST_ASSERT_INT32_WITHIN(20000, 1000000, load.now_ua);
+}
+
+static void open_spring_raises_the_duty_by_the_trim_limit_at_most(void)
+{
+    mean_ua(1500, 100);
+    load.spring_mohm = -1;
+    uint16_t duty = 0;
+    for (int n = 0; n < 500; n++) {
+        duty = tick(1500);
+        TEST_ASSERT_LESS_THAN_UINT16(
+            150, duty); /* (370 + 150) mohm x 1.5 A = 125 steps, and the proportional part */
+    }
+    load.spring_mohm = 190; /* the wire touches again */
+    int32_t highest_ua = 0;
+    for (int n = 0; n < 20; n++) {
+        tick(1500);
+        highest_ua = load.now_ua > highest_ua ? load.now_ua : highest_ua;
+    }
+    TEST_ASSERT_LESS_THAN_INT32(2600000, highest_ua);
+    TEST_ASSERT_INT32_WITHIN(45000, 1500000, load.now_ua);
+}
+
+static void shorted_spring_lowers_the_duty_at_once(void)
+{
+    mean_ua(1500, 100);
+    load.spring_mohm = 5;
+    tick(1500);
+    TEST_ASSERT_GREATER_THAN_INT32(2500000, load.now_ua); /* the tick in which nobody can know */
+    for (int n = 0; n < 12; n++) {
+        tick(1500);
+    }
+    TEST_ASSERT_LESS_THAN_INT32(1900000, load.now_ua); /* the trim's limit: 220 of 185 mohm */
+}
+
+static void blind_channel_holds_then_goes_off_then_returns(void)
+{
+    mean_ua(1500, 100);
+    int32_t before_ua = mean_ua(1500, 20);
+    for (int n = 0; n < parameters.hold_ticks; n++) {
+        uint16_t duty = tick_with(2500, 190, false, true);
+        TEST_ASSERT_EQUAL_UINT16(1500, current_control_reference_ma(&control, 0));
+        TEST_ASSERT_NOT_EQUAL(0, duty);
+        TEST_ASSERT_INT32_WITHIN(30000, before_ua, load.now_ua);
+    }
+    for (int n = 0; n < 300; n++) {
+        TEST_ASSERT_EQUAL_UINT16(0, tick_with(2500, 190, false, true));
+    }
+    TEST_ASSERT_NOT_EQUAL(0, tick(2500));
+    TEST_ASSERT_EQUAL_UINT16(parameters.slew_ma_per_tick,
+                             current_control_reference_ma(&control, 0));
+}
+
+static void blind_channel_does_not_start_and_follows_a_fall(void)
+{
+    for (int n = 0; n < 5; n++) {
+        TEST_ASSERT_EQUAL_UINT16(0, tick_with(1500, 190, false, true));
+    }
+    mean_ua(1500, 60);
+    tick_with(800, 190, false, true);
+    TEST_ASSERT_EQUAL_UINT16(800, current_control_reference_ma(&control, 0));
+    tick_with(1500, 190, false, true);
+    TEST_ASSERT_EQUAL_UINT16(800, current_control_reference_ma(&control, 0));
+}
+
+static void reference_waits_while_it_may_not_rise(void)
+{
+    mean_ua(600, 30);
+    for (int n = 0; n < 10; n++) {
+        tick_with(1500, 190, true, false);
+        TEST_ASSERT_EQUAL_UINT16(600, current_control_reference_ma(&control, 0));
+    }
+}
+
+static void any_input_at_any_moment_stays_within_the_duty_range(void)
+{
+    const int16_t current_ma[] = {INT16_MIN, -1, 0, 1, 3200, INT16_MAX};
+    const uint16_t word[] = {0, 1, 500, 3200, 32767, 32768, UINT16_MAX};
+    const uint16_t supply_mv[] = {1000, 5000, 16000};
+    for (size_t s = 0; s < 3; s++) {
+        for (uint16_t drop_mv = 0; drop_mv <= 1000; drop_mv += 1000) {
+            parameters.supply_mv = supply_mv[s];
+            parameters.freewheel_mv = drop_mv;
+            parameters.trim_limit_mohm = 1000;
+            parameters.slew_ma_per_tick = 3200;
+            parameters.maximum_current_ma = 3200;
+            parameters.proportional_permille = 1000;
+            parameters.integral_permille = 1000;
+            TEST_ASSERT_TRUE(current_control_init(&control, &parameters, NULL));
+            uint32_t random = 1;
+            for (int n = 0; n < 20000; n++) {
+                random = random * 1664525u + 1013904223u;
+                current_control_input_t input = {.target_ma = word[(random >> 8) % 7],
+                                                 .measured_ma = current_ma[(random >> 12) % 6],
+                                                 .valid = (random >> 20) % 8 != 0,
+                                                 .may_rise = (random >> 24) % 4 != 0};
+                current_control_set_resistance(&control, 8, word[(random >> 16) % 7]);
+                uint16_t duty = current_control_tick(&control, 8, &input);
+                TEST_ASSERT_LESS_OR_EQUAL_UINT16(parameters.maximum_duty_steps, duty);
+                TEST_ASSERT_LESS_OR_EQUAL_UINT16(3200, current_control_reference_ma(&control, 8));
+                TEST_ASSERT_TRUE(input.target_ma != 0 || duty == 0);
+                TEST_ASSERT_INT32_WITHIN(control.trim_limit_q24, 0, control.channel[8].trim_q24);
+            }
+        }
+    }
+}
+
+static void same_inputs_give_the_same_outputs(void)
+{
+    current_control_t other;
+    TEST_ASSERT_TRUE(current_control_init(&other, &parameters, NULL));
+    uint32_t random = 7;
+    for (int n = 0; n < 2000; n++) {
+        random = random * 1664525u + 1013904223u;
+        current_control_input_t input = {.target_ma = (uint16_t)((random >> 16) % 3000),
+                                         .measured_ma = (int16_t)((random >> 8) % 3000),
+                                         .valid = true,
+                                         .may_rise = true};
+        TEST_ASSERT_EQUAL_UINT16(current_control_tick(&control, 3, &input),
+                                 current_control_tick(&other, 3, &input));
+        TEST_ASSERT_EQUAL_UINT16(
+            0, control.channel[2].reference_ma); /* channels do not touch each other */
+    }
+}
+
+static void refuses(size_t offset, uint16_t value)
+{
+    current_control_parameters_t changed = parameters;
+    memcpy((uint8_t *)&changed + offset, &value, sizeof value);
+    current_control_t before = control;
+    uint16_t bad = UINT16_MAX;
+    TEST_ASSERT_FALSE(current_control_apply(&control, &changed, &bad));
+    TEST_ASSERT_EQUAL_UINT16(offset, bad);
+    TEST_ASSERT_EQUAL_MEMORY(&before, &control, sizeof control);
+    TEST_ASSERT_FALSE(current_control_init(&control, &changed, NULL));
+    TEST_ASSERT_EQUAL_MEMORY(&before, &control, sizeof control);
+}
+
+static void parameters_out_of_range_are_refused_and_found(void)
+{
+#define REFUSES(field, value) refuses(offsetof(current_control_parameters_t, field), value)
+    REFUSES(supply_mv, 999);
+    REFUSES(supply_mv, 16001);
+    REFUSES(freewheel_mv, 1001);
+    REFUSES(shunt_mohm, 1001);
+    REFUSES(wiring_mohm, 1001);
+    REFUSES(proportional_permille, 1001);
+    REFUSES(integral_permille, 0);
+    REFUSES(integral_permille, 1001);
+    REFUSES(slew_ma_per_tick, 0);
+    REFUSES(slew_ma_per_tick, 3201);
+    REFUSES(maximum_current_ma, 0);
+    REFUSES(maximum_current_ma, 3201);
+    REFUSES(maximum_duty_steps, 0);
+    REFUSES(maximum_duty_steps, 801);
+    REFUSES(trim_limit_mohm, 1001);
+    REFUSES(hold_ticks, 251);
+#undef REFUSES
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(step_settles_without_much_overshoot);
+    RUN_TEST(mean_current_is_the_target);
+    RUN_TEST(freewheel_drop_is_fed_forward);
+    RUN_TEST(dithering_has_the_mean_of_the_wanted_duty);
+    RUN_TEST(reference_rises_by_the_slew_and_falls_at_once);
+    RUN_TEST(fall_of_target_has_no_kick_when_resistance_is_far_off);
+    RUN_TEST(saturation_does_not_wind_up);
+    RUN_TEST(recovers_from_a_duty_limit_within_ten_ticks);
+    RUN_TEST(open_spring_raises_the_duty_by_the_trim_limit_at_most);
+    RUN_TEST(shorted_spring_lowers_the_duty_at_once);
+    RUN_TEST(blind_channel_holds_then_goes_off_then_returns);
+    RUN_TEST(blind_channel_does_not_start_and_follows_a_fall);
+    RUN_TEST(reference_waits_while_it_may_not_rise);
+    RUN_TEST(any_input_at_any_moment_stays_within_the_duty_range);
+    RUN_TEST(same_inputs_give_the_same_outputs);
+    RUN_TEST(parameters_out_of_range_are_refused_and_found);
+    return UNITY_END();
+}

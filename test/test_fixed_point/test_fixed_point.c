@@ -1,0 +1,80 @@
+#include "fixed_point.h"
+#include "unity.h"
+
+void setUp(void) {}
+void tearDown(void) {}
+
+static uint32_t random_state = 7;
+
+static uint32_t random_bits(void)
+{
+    random_state ^= random_state << 13;
+    random_state ^= random_state >> 17;
+    random_state ^= random_state << 5;
+    return random_state;
+}
+
+static void products_accumulate_modulo_2_32(void)
+{
+    TEST_ASSERT_EQUAL_UINT32(7u + 65535u * 65535u, fixed_point_mac_u16(7, 65535, 65535));
+    TEST_ASSERT_EQUAL_UINT32(0, fixed_point_mac_u16(0xffffffffu, 1, 1));
+    TEST_ASSERT_EQUAL_UINT32(5u - 65535u * 65535u, fixed_point_subtract_u16(5, 65535, 65535));
+    TEST_ASSERT_EQUAL_INT32(-32768 * 65535, (int32_t)fixed_point_mac_s16_u16(0, INT16_MIN, 65535));
+    TEST_ASSERT_EQUAL_INT32(-1, (int32_t)fixed_point_mac_s16_u16(0, -1, 1));
+}
+
+static void shift_by_six_keeps_24_bits(void)
+{
+    TEST_ASSERT_EQUAL_UINT32(64u * 8388607u, fixed_point_shift_6(8388607u));
+    TEST_ASSERT_EQUAL_UINT32(0x3fffffc0u, fixed_point_shift_6(0xffffffu));
+}
+
+/* against 64-bit arithmetic, which the library itself never uses */
+static void scale_is_the_floor_or_up_to_two_below(void)
+{
+    for (int k = 0; k < 200000; k++) {
+        int32_t a = (int32_t)(random_bits() >> 8) - 0x800000;
+        uint32_t b = random_bits() >> (8 + k % 20);
+        int64_t product = (int64_t)a * (int64_t)b;
+        int64_t exact = product / 65536 - (product % 65536 < 0);
+        int64_t below = exact - (int64_t)fixed_point_scale_s24(a, b);
+        TEST_ASSERT_TRUE(below >= 0 && below <= 2);
+    }
+    TEST_ASSERT_EQUAL_INT32(0, fixed_point_scale_s24(0, 0xffffff));
+    TEST_ASSERT_INT32_WITHIN(1, -2, fixed_point_scale_s24(-1, 1));
+}
+
+static void add_holds_at_the_ends(void)
+{
+    TEST_ASSERT_EQUAL_INT32(INT32_MAX, fixed_point_add_saturated(INT32_MAX, 1));
+    TEST_ASSERT_EQUAL_INT32(INT32_MIN, fixed_point_add_saturated(INT32_MIN, -1));
+    TEST_ASSERT_EQUAL_INT32(INT32_MIN, fixed_point_add_saturated(INT32_MIN, INT32_MIN));
+    TEST_ASSERT_EQUAL_INT32(-1, fixed_point_add_saturated(INT32_MAX, INT32_MIN));
+}
+
+static void multiply_divide_rounds_and_says_what_does_not_fit(void)
+{
+    TEST_ASSERT_EQUAL_UINT32(3, fixed_point_multiply_divide(5, 1, 2));
+    TEST_ASSERT_EQUAL_UINT32(UINT32_MAX, fixed_point_multiply_divide(1, 1, 0));
+    TEST_ASSERT_EQUAL_UINT32(UINT32_MAX, fixed_point_multiply_divide(65536, 65536, 1));
+    TEST_ASSERT_EQUAL_UINT32(0, fixed_point_multiply_divide(0, 1234, 5));
+    for (int k = 0; k < 100000; k++) {
+        uint32_t a = random_bits() >> (k % 31);
+        uint32_t b = random_bits() >> (k % 29);
+        uint32_t c = 1u + (random_bits() >> (1 + k % 23));
+        uint64_t exact = ((uint64_t)a * b + c / 2u) / c;
+        uint32_t wanted = exact > UINT32_MAX ? UINT32_MAX : (uint32_t)exact;
+        TEST_ASSERT_EQUAL_UINT32(wanted, fixed_point_multiply_divide(a, b, c));
+    }
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(products_accumulate_modulo_2_32);
+    RUN_TEST(shift_by_six_keeps_24_bits);
+    RUN_TEST(scale_is_the_floor_or_up_to_two_below);
+    RUN_TEST(add_holds_at_the_ends);
+    RUN_TEST(multiply_divide_rounds_and_says_what_does_not_fit);
+    return UNITY_END();
+}

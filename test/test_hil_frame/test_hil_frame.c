@@ -1,0 +1,187 @@
+#include <string.h>
+
+#include "crc16.h"
+#include "hil_frame.h"
+#include "unity.h"
+
+void setUp(void) {}
+void tearDown(void) {}
+
+static hil_frame_sensors_t some_sensors(void)
+{
+    hil_frame_sensors_t sensors;
+    memset(&sensors, 0, sizeof sensors);
+    sensors.tick = 0xBEEF;
+    sensors.ambient_c7 = -640;
+    sensors.springs = 9;
+    for (uint8_t k = 0; k < 9; k++) {
+        sensors.sensor[k].status = (uint8_t)(k % 5);
+        sensors.sensor[k].current_ma = (int16_t)(1500 - 333 * k);
+        sensors.sensor[k].voltage_mv = (int16_t)(-7 + 40 * k);
+    }
+    return sensors;
+}
+
+static hil_frame_event_t feed(hil_frame_decoder_t *decoder, const char *line, uint8_t length)
+{
+    hil_frame_event_t event = HIL_FRAME_OUTSIDE;
+    for (uint8_t i = 0; i < length; i++) {
+        event = hil_frame_decode(decoder, (uint8_t)line[i]);
+    }
+    return event;
+}
+
+static void checksum_is_the_published_one(void)
+{
+    TEST_ASSERT_EQUAL_HEX16(0x29B1, crc16_add_bytes(CRC16_START, "123456789", 9));
+}
+
+static void sensors_survive_the_line(void)
+{
+    char line[HIL_FRAME_MAX_LINE];
+    const hil_frame_sensors_t sent = some_sensors();
+    const uint8_t length = hil_frame_encode_sensors(&sent, line);
+    TEST_ASSERT_EQUAL_UINT8(HIL_FRAME_MAX_LINE, length);
+    hil_frame_decoder_t decoder;
+    hil_frame_decoder_init(&decoder);
+    TEST_ASSERT_EQUAL(HIL_FRAME_SENSORS, feed(&decoder, line, length));
+    hil_frame_sensors_t got;
+    memset(&got, 0, sizeof got);
+    hil_frame_get_sensors(&decoder, &got);
+    TEST_ASSERT_EQUAL_MEMORY(&sent, &got, sizeof sent);
+}
+
+static void duties_survive_the_line(void)
+{
+    for (uint8_t springs = 1; springs <= 9; springs++) {
+        hil_frame_duties_t sent;
+        memset(&sent, 0, sizeof sent);
+        sent.tick = 513;
+        sent.fan_percent = 100;
+        sent.springs = springs;
+        for (uint8_t k = 0; k < springs; k++) {
+            sent.duty[k] = (uint16_t)(800 - k);
+        }
+        char line[HIL_FRAME_MAX_LINE];
+        const uint8_t length = hil_frame_encode_duties(&sent, line);
+        hil_frame_decoder_t decoder;
+        hil_frame_decoder_init(&decoder);
+        TEST_ASSERT_EQUAL(HIL_FRAME_DUTIES, feed(&decoder, line, length));
+        hil_frame_duties_t got;
+        memset(&got, 0, sizeof got);
+        hil_frame_get_duties(&decoder, &got);
+        TEST_ASSERT_EQUAL_MEMORY(&sent, &got, sizeof sent);
+    }
+}
+
+/* Written by hand from the description, so that another program can be held to it. */
+static void frame_is_as_described(void)
+{
+    hil_frame_duties_t duties = {
+        .tick = 0x0102, .fan_percent = 0x32, .springs = 1, .duty = {0x0320}};
+    char line[HIL_FRAME_MAX_LINE];
+    const uint8_t length = hil_frame_encode_duties(&duties, line);
+    TEST_ASSERT_EQUAL_UINT8(17, length);
+    TEST_ASSERT_EQUAL_MEMORY("~D0102320320", line, 12);
+    TEST_ASSERT_EQUAL('\n', line[16]);
+}
+
+static void no_frame_holds_a_realtime_byte(void)
+{
+    hil_frame_sensors_t sensors = some_sensors();
+    char line[HIL_FRAME_MAX_LINE];
+    for (uint16_t tick = 0; tick < 2000; tick++) {
+        sensors.tick = tick;
+        sensors.sensor[0].current_ma = (int16_t)(tick * 31);
+        const uint8_t length = hil_frame_encode_sensors(&sensors, line);
+        TEST_ASSERT_NULL(memchr(line, '!', length));
+        TEST_ASSERT_NULL(memchr(line, '?', length));
+    }
+}
+
+static void every_flipped_bit_is_detected(void)
+{
+    char line[HIL_FRAME_MAX_LINE];
+    const hil_frame_sensors_t sent = some_sensors();
+    const uint8_t length = hil_frame_encode_sensors(&sent, line);
+    for (uint16_t bit = 0; bit < 8u * length; bit++) {
+        char broken[HIL_FRAME_MAX_LINE + 1];
+        memcpy(broken, line, length);
+        broken[bit / 8u] = (char)(broken[bit / 8u] ^ (1 << (bit % 8u)));
+        broken[length] = '\n'; /* whatever happened, the next line end closes it */
+        hil_frame_decoder_t decoder;
+        hil_frame_decoder_init(&decoder);
+        for (uint8_t i = 0; i <= length; i++) {
+            const hil_frame_event_t event = hil_frame_decode(&decoder, (uint8_t)broken[i]);
+            TEST_ASSERT_NOT_EQUAL(HIL_FRAME_SENSORS, event);
+            TEST_ASSERT_NOT_EQUAL(HIL_FRAME_DUTIES, event);
+        }
+        /* and the next good frame is understood */
+        TEST_ASSERT_EQUAL(HIL_FRAME_SENSORS, feed(&decoder, line, length));
+    }
+}
+
+static void every_cut_is_detected(void)
+{
+    char line[HIL_FRAME_MAX_LINE];
+    const hil_frame_sensors_t sent = some_sensors();
+    const uint8_t length = hil_frame_encode_sensors(&sent, line);
+    for (uint8_t cut = 1; cut < length - 1; cut++) {
+        hil_frame_decoder_t decoder;
+        hil_frame_decoder_init(&decoder);
+        TEST_ASSERT_EQUAL(HIL_FRAME_PART, feed(&decoder, line, cut));
+        TEST_ASSERT_EQUAL(HIL_FRAME_BAD, hil_frame_decode(&decoder, '\n'));
+        TEST_ASSERT_EQUAL(HIL_FRAME_SENSORS, feed(&decoder, line, length));
+    }
+}
+
+static void endless_frame_is_dropped_and_does_not_overflow(void)
+{
+    hil_frame_decoder_t decoder;
+    hil_frame_decoder_init(&decoder);
+    hil_frame_decode(&decoder, '~');
+    hil_frame_decode(&decoder, 'S');
+    for (uint16_t i = 0; i < 1000; i++) {
+        TEST_ASSERT_EQUAL(HIL_FRAME_PART, hil_frame_decode(&decoder, 'A'));
+    }
+    TEST_ASSERT_EQUAL(HIL_FRAME_BAD, hil_frame_decode(&decoder, '\n'));
+}
+
+static void console_lines_pass_by(void)
+{
+    hil_frame_decoder_t decoder;
+    hil_frame_decoder_init(&decoder);
+    TEST_ASSERT_EQUAL(HIL_FRAME_OUTSIDE, feed(&decoder, "on 1 ~S 1\r\n", 11));
+    TEST_ASSERT_EQUAL(HIL_FRAME_OUTSIDE, feed(&decoder, "\r\nS00\n", 6));
+    TEST_ASSERT_EQUAL(HIL_FRAME_BAD, feed(&decoder, "~X00\n", 5));
+}
+
+static void wrong_number_of_springs_is_refused(void)
+{
+    char line[HIL_FRAME_MAX_LINE];
+    hil_frame_sensors_t sensors = some_sensors();
+    hil_frame_duties_t duties = {.springs = 10};
+    sensors.springs = 0;
+    TEST_ASSERT_EQUAL_UINT8(0, hil_frame_encode_sensors(&sensors, line));
+    sensors.springs = 10;
+    TEST_ASSERT_EQUAL_UINT8(0, hil_frame_encode_sensors(&sensors, line));
+    TEST_ASSERT_EQUAL_UINT8(0, hil_frame_encode_duties(&duties, line));
+    duties.springs = 0;
+    TEST_ASSERT_EQUAL_UINT8(0, hil_frame_encode_duties(&duties, line));
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(checksum_is_the_published_one);
+    RUN_TEST(sensors_survive_the_line);
+    RUN_TEST(duties_survive_the_line);
+    RUN_TEST(frame_is_as_described);
+    RUN_TEST(no_frame_holds_a_realtime_byte);
+    RUN_TEST(every_flipped_bit_is_detected);
+    RUN_TEST(every_cut_is_detected);
+    RUN_TEST(endless_frame_is_dropped_and_does_not_overflow);
+    RUN_TEST(console_lines_pass_by);
+    RUN_TEST(wrong_number_of_springs_is_refused);
+    return UNITY_END();
+}

@@ -1,0 +1,370 @@
+/* Limits and latches: each condition trips its own fault after its number of bad ticks in a row,
+ * and no earlier. */
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+#include "safety.h"
+#include "unity.h"
+
+static safety_t safety;
+static safety_parameters_t parameters;
+
+static const safety_sample_t running = {.sensor_status = 0,
+                                        .current_ma = 1500,
+                                        .voltage_mv = 285, /* 190 mohm */
+                                        .expected_ma = 1500,
+                                        .temperature_c7 = 90 * 128};
+static const safety_sample_t off = {.temperature_c7 = 20 * 128};
+
+void setUp(void)
+{
+    safety_parameters_default(&parameters);
+    TEST_ASSERT_TRUE(safety_init(&safety, &parameters, 9, NULL));
+}
+
+void tearDown(void) {}
+
+static void ticks(uint8_t spring, const safety_sample_t *sample, uint32_t count)
+{
+    for (uint32_t n = 0; n < count; n++) {
+        for (uint8_t k = 0; k < 9; k++) {
+            safety_tick_spring(&safety, k, k == spring ? sample : &off);
+        }
+        safety_tick_board(&safety, 0);
+    }
+}
+
+/* The sample trips this fault, in the tick that it must, and neither a pause nor another spring is
+ * in it. */
+static void trips(safety_fault_t fault, const safety_sample_t *sample)
+{
+    setUp();
+    uint8_t limit = parameters.bad_samples;
+    ticks(4, sample, limit - 1u);
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, safety_fault(&safety, 4));
+    ticks(4, &running, 1); /* one good tick in between: counted anew */
+    ticks(4, sample, limit - 1u);
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, safety_fault(&safety, 4));
+    TEST_ASSERT_TRUE(safety_allows(&safety, 4));
+    ticks(4, sample, 1);
+    TEST_ASSERT_EQUAL(fault, safety_fault(&safety, 4));
+    TEST_ASSERT_FALSE(safety_allows(&safety, 4));
+    bool board = fault >= SAFETY_FAULT_STUCK_ON;
+    TEST_ASSERT_EQUAL(board ? fault : SAFETY_FAULT_NONE, safety_board_fault(&safety));
+    TEST_ASSERT_EQUAL(!board, safety_allows(&safety, 3));
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, safety_fault(&safety, 3));
+
+    ticks(4, &running, 100); /* the latch stays though the cause has gone */
+    TEST_ASSERT_EQUAL(fault, safety_fault(&safety, 4));
+    safety_clear(&safety);
+    TEST_ASSERT_TRUE(safety_allows(&safety, 4));
+    ticks(4, sample, limit - 1u);
+    TEST_ASSERT_TRUE(safety_allows(&safety, 4));
+    ticks(4, sample, 1); /* and it trips again if the cause has not */
+    TEST_ASSERT_EQUAL(fault, safety_fault(&safety, 4));
+}
+
+static void each_condition_trips_its_own_fault(void)
+{
+    safety_sample_t sample = running;
+    sample.current_ma = 3151;
+    sample.voltage_mv = 600;
+    trips(SAFETY_FAULT_OVER_CURRENT, &sample);
+
+    sample = running;
+    sample.current_ma = 374; /* a quarter of what is expected is 375 */
+    sample.voltage_mv = 71;
+    trips(SAFETY_FAULT_OPEN_SPRING, &sample);
+
+    sample = running;
+    sample.voltage_mv = 119; /* 80 mohm would be 120 */
+    trips(SAFETY_FAULT_SHORT_SPRING, &sample);
+
+    sample = running;
+    sample.voltage_mv = 751; /* 500 mohm would be 750 */
+    trips(SAFETY_FAULT_HIGH_RESISTANCE, &sample);
+
+    sample = running;
+    for (uint8_t status = 1; status <= 4; status++) {
+        sample.sensor_status = status;
+        trips((safety_fault_t)(SAFETY_FAULT_SENSOR_ABSENT + status - 1), &sample);
+    }
+
+    sample = running;
+    sample.temperature_c7 = 130 * 128 + 1;
+    trips(SAFETY_FAULT_OVER_TEMPERATURE, &sample);
+
+    sample = off;
+    sample.current_ma = 101;
+    sample.voltage_mv = 20;
+    trips(SAFETY_FAULT_STUCK_ON, &sample);
+}
+
+static void values_at_their_limits_are_good(void)
+{
+    safety_sample_t sample = running;
+    sample.current_ma = 3150;
+    sample.voltage_mv = 252; /* 80 mohm */
+    ticks(4, &sample, 50);
+    sample.voltage_mv = 1575; /* 500 mohm */
+    ticks(4, &sample, 50);
+    sample = running;
+    sample.temperature_c7 = 130 * 128;
+    ticks(4, &sample, 50);
+    sample = running;
+    sample.current_ma = 375;
+    sample.voltage_mv = 71;
+    ticks(4, &sample, 50);
+    sample = off;
+    sample.current_ma = 100;
+    ticks(4, &sample, 50);
+    TEST_ASSERT_TRUE(safety_allows(&safety, 4));
+}
+
+static void too_little_current_says_nothing_about_the_resistance(void)
+{
+    safety_sample_t sample = {
+        .current_ma = 299, .voltage_mv = 0, .expected_ma = 299, .temperature_c7 = 0};
+    ticks(4, &sample, 50);
+    sample.voltage_mv = 4000;
+    ticks(4, &sample, 50);
+    sample.current_ma = 0;
+    ticks(4, &sample, 50);
+    TEST_ASSERT_TRUE(safety_allows(&safety, 4));
+}
+
+/* What was counted before stays: a sensor that fails every other tick does not hide a short. */
+static void missing_readings_neither_count_nor_forgive(void)
+{
+    safety_sample_t bad = running;
+    bad.voltage_mv = 0;
+    safety_sample_t absent = bad;
+    absent.sensor_status = 1;
+    for (uint8_t n = 0; n < parameters.bad_samples; n++) {
+        TEST_ASSERT_TRUE(safety_allows(&safety, 4));
+        ticks(4, &absent, 1);
+        TEST_ASSERT_TRUE(safety_allows(&safety, 4));
+        ticks(4, &bad, 1);
+    }
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_SHORT_SPRING, safety_fault(&safety, 4));
+}
+
+static void the_first_fault_is_kept(void)
+{
+    safety_sample_t sample = running;
+    sample.voltage_mv = 0;
+    ticks(4, &sample, 10);
+    sample.temperature_c7 = 200 * 128;
+    ticks(4, &sample, 10);
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_SHORT_SPRING, safety_fault(&safety, 4));
+    safety_emergency_stop(&safety);
+    for (int n = 0; n < 10; n++) {
+        safety_tick_board(&safety, 20000);
+    }
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_EMERGENCY_STOP, safety_board_fault(&safety));
+}
+
+static void sum_above_the_supply_trips_everything(void)
+{
+    for (uint8_t n = 0; n < 100; n++) {
+        safety_tick_board(&safety, 15000);
+    }
+    for (uint8_t n = 0; n < parameters.bad_samples; n++) {
+        TEST_ASSERT_TRUE(safety_allows(&safety, 0));
+        safety_tick_board(&safety, 15001);
+    }
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_SUPPLY_CURRENT, safety_board_fault(&safety));
+    TEST_ASSERT_FALSE(safety_allows(&safety, 0));
+    safety_clear(&safety);
+    TEST_ASSERT_TRUE(safety_allows(&safety, 0));
+}
+
+static void limit_trip_is_of_its_spring_alone_until_cleared(void)
+{
+    safety_trip_limit(&safety, 4);
+    ticks(4, &running, 100);
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_LIMIT_TRIP, safety_fault(&safety, 4));
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, safety_board_fault(&safety));
+    TEST_ASSERT_FALSE(safety_allows(&safety, 4));
+    TEST_ASSERT_TRUE(safety_allows(&safety, 3));
+    safety_clear(&safety);
+    TEST_ASSERT_TRUE(safety_allows(&safety, 4));
+}
+
+static void emergency_stop_holds_until_cleared(void)
+{
+    safety_emergency_stop(&safety);
+    ticks(4, &running, 100);
+    for (uint8_t k = 0; k < 9; k++) {
+        TEST_ASSERT_FALSE(safety_allows(&safety, k));
+    }
+    safety_clear(&safety);
+    TEST_ASSERT_TRUE(safety_allows(&safety, 4));
+}
+
+static void lock_holds_until_unlocked_and_is_no_fault(void)
+{
+    safety_lock(&safety);
+    safety_clear(&safety);
+    TEST_ASSERT_FALSE(safety_allows(&safety, 4));
+    TEST_ASSERT_TRUE(safety_is_locked(&safety));
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, safety_board_fault(&safety));
+    safety_emergency_stop(&safety);
+    safety_unlock(&safety);
+    TEST_ASSERT_FALSE(safety_allows(&safety, 4)); /* unlocking clears nothing */
+    safety_clear(&safety);
+    TEST_ASSERT_TRUE(safety_allows(&safety, 4));
+}
+
+static void on_time_is_limited_only_where_it_is_set(void)
+{
+    ticks(4, &running, 50u * 3600u);
+    TEST_ASSERT_TRUE(safety_allows(&safety, 4));
+
+    parameters.maximum_on_s = 10;
+    TEST_ASSERT_TRUE(safety_init(&safety, &parameters, 9, NULL));
+    for (int pulse = 0; pulse < 5; pulse++) { /* pauses start it again */
+        ticks(4, &running, 450);
+        ticks(4, &off, 1);
+    }
+    TEST_ASSERT_TRUE(safety_allows(&safety, 4));
+    ticks(4, &off, 1);
+    ticks(4, &running, 500); /* 10 s */
+    TEST_ASSERT_TRUE(safety_allows(&safety, 4));
+    ticks(4, &running, 50);
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_ON_TIME, safety_fault(&safety, 4));
+    TEST_ASSERT_TRUE(safety_allows(&safety, 5));
+}
+
+/* The quick look lets nothing pass that is beyond a limit, whatever the limits are. */
+static void resistance_trips_at_its_limits_and_nowhere_else(void)
+{
+    const uint16_t limits_mohm[][2] = {{80, 500},    {0, 0},       {1, 2},       {175, 176},
+                                       {0, 1250},    {1250, 1251}, {1251, 9999}, {80, 0},
+                                       {2039, 2041}, {9999, 10000}};
+    const uint16_t steps[] = {299, 300, 301, 447, 1500, 1503, 2999, 3149, 3150};
+    parameters.bad_samples = 1;
+    for (size_t n = 0; n < sizeof limits_mohm / sizeof limits_mohm[0]; n++) {
+        parameters.resistance_minimum_mohm = limits_mohm[n][0];
+        parameters.resistance_maximum_mohm = limits_mohm[n][1];
+        TEST_ASSERT_TRUE(safety_apply(&safety, &parameters, NULL));
+        for (size_t i = 0; i < sizeof steps / sizeof steps[0]; i++) {
+            int32_t current_ma = steps[i];
+            for (int32_t voltage_mv = -5; voltage_mv < 32000;
+                 voltage_mv += voltage_mv < 2500 ? 1 : 37) {
+                safety_sample_t sample = {.current_ma = (int16_t)current_ma,
+                                          .voltage_mv = (int16_t)voltage_mv,
+                                          .expected_ma = (uint16_t)current_ma};
+                int32_t voltage_uv = voltage_mv < 0 ? 0 : voltage_mv * 1000;
+                safety_fault_t fault = SAFETY_FAULT_NONE;
+                if (current_ma >= 300 && voltage_uv < current_ma * limits_mohm[n][0]) {
+                    fault = SAFETY_FAULT_SHORT_SPRING;
+                } else if (current_ma >= 300 && limits_mohm[n][1] != 0 &&
+                           voltage_uv > current_ma * limits_mohm[n][1]) {
+                    fault = SAFETY_FAULT_HIGH_RESISTANCE;
+                }
+                safety_tick_spring(&safety, 4, &sample);
+                TEST_ASSERT_EQUAL(fault, safety_fault(&safety, 4));
+                safety_clear(&safety);
+            }
+        }
+    }
+}
+
+static void any_sample_is_taken_without_overflow(void)
+{
+    const int16_t word[] = {INT16_MIN, -1, 0, 1, 300, INT16_MAX};
+    parameters.resistance_minimum_mohm = 9999;
+    parameters.resistance_maximum_mohm = 10000;
+    TEST_ASSERT_TRUE(safety_apply(&safety, &parameters, NULL));
+    for (uint32_t n = 0; n < 6u * 6u * 6u * 7u; n++) {
+        safety_sample_t sample = {.sensor_status = (uint8_t)(n % 7u == 6u ? 255u : n % 7u),
+                                  .current_ma = word[n / 7u % 6u],
+                                  .voltage_mv = word[n / 42u % 6u],
+                                  .expected_ma = (uint16_t)word[(n + 3u) % 6u],
+                                  .temperature_c7 = word[n / 252u % 6u]};
+        for (int repeat = 0; repeat < 300; repeat++) {
+            safety_tick_spring(&safety, 8, &sample);
+        }
+        TEST_ASSERT_LESS_THAN(SAFETY_FAULT_COUNT, safety_fault(&safety, 8));
+        TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, safety_fault(&safety, 7));
+        if (sample.sensor_status != 0) {
+            TEST_ASSERT_FALSE(safety_allows(&safety, 8));
+        }
+        safety_clear(&safety);
+    }
+}
+
+static void every_fault_has_a_name_of_its_own(void)
+{
+    for (int fault = 0; fault < SAFETY_FAULT_COUNT; fault++) {
+        TEST_ASSERT_TRUE(strcmp("unknown", safety_fault_name((safety_fault_t)fault)) != 0);
+        for (int other = 0; other < fault; other++) {
+            TEST_ASSERT_TRUE(strcmp(safety_fault_name((safety_fault_t)other),
+                                    safety_fault_name((safety_fault_t)fault)) != 0);
+        }
+    }
+    TEST_ASSERT_EQUAL_STRING("unknown", safety_fault_name(SAFETY_FAULT_COUNT));
+}
+
+static void refuses(size_t offset, size_t size, uint16_t value)
+{
+    safety_parameters_t changed = parameters;
+    if (size == 1) {
+        ((uint8_t *)&changed)[offset] = (uint8_t)value;
+    } else {
+        memcpy((uint8_t *)&changed + offset, &value, sizeof value);
+    }
+    uint16_t bad = UINT16_MAX;
+    safety_t before = safety;
+    TEST_ASSERT_FALSE(safety_apply(&safety, &changed, &bad));
+    TEST_ASSERT_EQUAL_UINT16(offset, bad);
+    TEST_ASSERT_FALSE(safety_init(&safety, &changed, 9, NULL));
+    TEST_ASSERT_EQUAL_MEMORY(&before, &safety, sizeof safety);
+}
+
+static void parameters_out_of_range_are_refused_and_found(void)
+{
+#define REFUSES(field, value)                                                                      \
+    refuses(offsetof(safety_parameters_t, field), sizeof parameters.field, (uint16_t)(value))
+    REFUSES(over_current_ma, 99);
+    REFUSES(over_current_ma, 3201);
+    REFUSES(supply_limit_ma, 99);
+    REFUSES(supply_limit_ma, 60001);
+    REFUSES(check_current_ma, 49);
+    REFUSES(check_current_ma, 3201);
+    REFUSES(resistance_minimum_mohm, 10001);
+    REFUSES(resistance_maximum_mohm, 10001);
+    REFUSES(resistance_maximum_mohm, 80); /* not above the minimum */
+    REFUSES(stuck_on_ma, 9);
+    REFUSES(stuck_on_ma, 3201);
+    REFUSES(temperature_trip_cc, -1);
+    REFUSES(temperature_trip_cc, 25001);
+    REFUSES(bad_samples, 0);
+    REFUSES(bad_samples, 251);
+#undef REFUSES
+    TEST_ASSERT_FALSE(safety_init(&safety, &parameters, 0, NULL));
+    TEST_ASSERT_FALSE(safety_init(&safety, &parameters, SAFETY_MAX_SPRINGS + 1, NULL));
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(each_condition_trips_its_own_fault);
+    RUN_TEST(values_at_their_limits_are_good);
+    RUN_TEST(too_little_current_says_nothing_about_the_resistance);
+    RUN_TEST(missing_readings_neither_count_nor_forgive);
+    RUN_TEST(the_first_fault_is_kept);
+    RUN_TEST(sum_above_the_supply_trips_everything);
+    RUN_TEST(limit_trip_is_of_its_spring_alone_until_cleared);
+    RUN_TEST(emergency_stop_holds_until_cleared);
+    RUN_TEST(lock_holds_until_unlocked_and_is_no_fault);
+    RUN_TEST(on_time_is_limited_only_where_it_is_set);
+    RUN_TEST(resistance_trips_at_its_limits_and_nowhere_else);
+    RUN_TEST(any_sample_is_taken_without_overflow);
+    RUN_TEST(every_fault_has_a_name_of_its_own);
+    RUN_TEST(parameters_out_of_range_are_refused_and_found);
+    return UNITY_END();
+}

@@ -1,0 +1,101 @@
+#include <stdio.h>
+#include <string.h>
+
+#include "text.h"
+#include "unity.h"
+
+void setUp(void) {}
+void tearDown(void) {}
+
+static void formats_fixed_decimals(void)
+{
+    static const struct {
+        int32_t value;
+        uint8_t decimals;
+        const char *text;
+    } cases[] = {{0, 0, "0"},
+                 {0, 3, "0.000"},
+                 {5, 3, "0.005"},
+                 {-5, 3, "-0.005"},
+                 {5800, 6, "0.005800"},
+                 {1234567, 3, "1234.567"},
+                 {INT32_MAX, 0, "2147483647"},
+                 {INT32_MIN, 0, "-2147483648"},
+                 {INT32_MIN, 9, "-2.147483648"}};
+    for (unsigned i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        char text[TEXT_DECIMAL_SIZE];
+        TEST_ASSERT_EQUAL_UINT8(strlen(cases[i].text),
+                                text_format_decimal(cases[i].value, cases[i].decimals, text));
+        TEST_ASSERT_EQUAL_STRING(cases[i].text, text);
+    }
+}
+
+static void what_is_formatted_parses_back(void)
+{
+    uint32_t seed = 1;
+    for (unsigned i = 0; i < 100000; i++) {
+        char text[TEXT_DECIMAL_SIZE];
+        int32_t back = 0;
+        seed = seed * 1664525u + 1013904223u;
+        int32_t value = (int32_t)(seed >> (seed % 31u));
+        value = (i & 1u) != 0 ? -(value / 2) : value;
+        if (value == INT32_MIN) {
+            continue;
+        }
+        const uint8_t decimals = (uint8_t)(i % 7u);
+        text_format_decimal(value, decimals, text);
+        TEST_ASSERT_EQUAL_MESSAGE(TEXT_OK, text_parse_decimal(text, decimals, &back), text);
+        TEST_ASSERT_EQUAL_INT32(value, back);
+    }
+}
+
+static void refuses_what_is_no_number(void)
+{
+    static const char *const bad[] = {"",   "-",  "+",   ".",      "1.2.3", "1e3", "0x1",   "nan",
+                                      " 1", "1 ", "--1", "1.2345", "1,5",   "inf", "1.0001"};
+    for (unsigned i = 0; i < sizeof bad / sizeof bad[0]; i++) {
+        int32_t value = 77;
+        TEST_ASSERT_EQUAL_MESSAGE(TEXT_NOT_A_NUMBER, text_parse_decimal(bad[i], 3, &value), bad[i]);
+        TEST_ASSERT_EQUAL_INT32(77, value);
+    }
+    int32_t value = 77;
+    TEST_ASSERT_EQUAL(TEXT_TOO_LARGE, text_parse_decimal("2147483648", 0, &value));
+    TEST_ASSERT_EQUAL(TEXT_TOO_LARGE, text_parse_decimal("2147484", 3, &value));
+    TEST_ASSERT_EQUAL(TEXT_TOO_LARGE, text_parse_decimal("99999999999999999999", 0, &value));
+    TEST_ASSERT_EQUAL_INT32(77, value);
+    TEST_ASSERT_EQUAL(TEXT_OK, text_parse_decimal("2147483647", 0, &value));
+    TEST_ASSERT_EQUAL(TEXT_OK, text_parse_decimal("+1.5000000", 3, &value));
+    TEST_ASSERT_EQUAL_INT32(1500, value);
+}
+
+static void a_full_line_is_cut_not_overrun(void)
+{
+    char bytes[9];
+    text_line_t line;
+    memset(bytes, '#', sizeof bytes);
+    text_line_start(&line, bytes, 8);
+    text_add(&line, "abc");
+    text_add_decimal(&line, -12345, 2);
+    text_add_char(&line, 'x');
+    TEST_ASSERT_EQUAL_UINT8(8, line.length);
+    TEST_ASSERT_EQUAL_STRING_LEN("abc-123.#", bytes, 9);
+}
+
+static void q97_becomes_hundredths(void)
+{
+    TEST_ASSERT_EQUAL_INT16(2000, text_centi_from_c7(20 * 128));
+    TEST_ASSERT_EQUAL_INT16(-4000, text_centi_from_c7(-40 * 128));
+    TEST_ASSERT_EQUAL_INT16(1, text_centi_from_c7(1));
+    TEST_ASSERT_EQUAL_INT16(21500, text_centi_from_c7(215 * 128));
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(formats_fixed_decimals);
+    RUN_TEST(what_is_formatted_parses_back);
+    RUN_TEST(refuses_what_is_no_number);
+    RUN_TEST(a_full_line_is_cut_not_overrun);
+    RUN_TEST(q97_becomes_hundredths);
+    return UNITY_END();
+}

@@ -1,0 +1,781 @@
+#include <string.h>
+
+#include "thermal_model.h"
+#include "unity.h"
+
+static thermal_model_parameters_t parameters;
+static thermal_model_t model;
+static uint32_t power_uw[THERMAL_MODEL_MAX_SPRINGS];
+static uint32_t random_state;
+
+void setUp(void)
+{
+    thermal_model_parameters_default(&parameters);
+    memset(power_uw, 0, sizeof power_uw);
+    random_state = 11;
+}
+void tearDown(void) {}
+
+static uint32_t random_bits(void)
+{
+    random_state ^= random_state << 13;
+    random_state ^= random_state >> 17;
+    random_state ^= random_state << 5;
+    return random_state;
+}
+
+static void start(void)
+{
+    thermal_model_parameter_t bad = THERMAL_MODEL_PARAMETER_COUNT;
+    thermal_model_status_t status = thermal_model_init(&model, &parameters, &bad);
+    TEST_ASSERT_EQUAL_MESSAGE(THERMAL_MODEL_OK, status, thermal_model_parameter_name(bad));
+}
+
+static void run(uint32_t steps)
+{
+    while (steps-- > 0) {
+        thermal_model_step(&model, power_uw);
+    }
+}
+
+static double degrees(uint8_t spring)
+{
+    return thermal_model_temperature_c7(&model, spring) / 128.0;
+}
+
+static double phase(uint8_t spring)
+{
+    return thermal_model_austenite(&model, spring) / 32768.0;
+}
+
+static int16_t c7(double temperature_c)
+{
+    return (int16_t)(temperature_c * 128.0);
+}
+
+/* ---- figures by hand ---------------------------------------------------------------------------
+ */
+
+static void one_spring_settles_where_power_equals_loss(void)
+{
+    parameters.rows = parameters.columns = 1;
+    start();
+    power_uw[0] = 290000; /* 0.29 W / 5.8 mW/K = 50 K */
+    run(10000);
+    TEST_ASSERT_DOUBLE_WITHIN(0.02, 70.0, degrees(0));
+}
+
+static void one_spring_warms_by_its_time_constant(void)
+{
+    parameters.rows = parameters.columns = 1;
+    start();
+    power_uw[0] = 290000;
+    run(517); /* tau = 0.3 / 0.0058 = 51.7 s: 1 - 1/e of 50 K is 31.61 */
+    TEST_ASSERT_DOUBLE_WITHIN(0.03, 20.0 + 31.61, degrees(0));
+}
+
+static void fan_full_and_half_are_the_given_and_the_mean_loss(void)
+{
+    parameters.rows = parameters.columns = 1;
+    start();
+    power_uw[0] = 226000;
+    thermal_model_set_fan(&model, 100);
+    run(10000);
+    TEST_ASSERT_DOUBLE_WITHIN(0.02, 40.0, degrees(0)); /* 0.226 / 0.0113 = 20 K */
+    thermal_model_set_fan(&model, 50);
+    run(10000);
+    TEST_ASSERT_DOUBLE_WITHIN(0.02, 20.0 + 0.226 / 0.00855, degrees(0));
+}
+
+static void two_springs_share_heat_by_their_coupling(void)
+{
+    parameters.rows = 1;
+    parameters.columns = 2;
+    start();
+    power_uw[0] = 300000;
+    run(20000);
+    /* sum 0.3/G; difference 0.3/(G + 2 g) */
+    double sum = 0.3 / 0.0058, difference = 0.3 / (0.0058 + 2 * 0.000586);
+    TEST_ASSERT_DOUBLE_WITHIN(0.03, 20.0 + (sum + difference) / 2, degrees(0));
+    TEST_ASSERT_DOUBLE_WITHIN(0.03, 20.0 + (sum - difference) / 2, degrees(1));
+}
+
+static void loss_that_rises_and_radiation_settle_where_computed(void)
+{
+    parameters.rows = parameters.columns = 1;
+    parameters.loss_rise_ppm_per_k = 4000;
+    parameters.radiating_area_cmm2 = 11080;
+    start();
+    /* at 70 degC: 5.8 mW/K x 50 K x 1.2 = 348 mW; 1.108e-4 m2 sigma (343.15^4 - 293.15^4) = 40.71
+     * mW */
+    power_uw[0] = 348000 + 40710;
+    run(10000);
+    TEST_ASSERT_DOUBLE_WITHIN(0.03, 70.0, degrees(0));
+    TEST_ASSERT_INT32_WITHIN(300, 388710, thermal_model_power_to_hold_uw(&model, 0, c7(70)));
+}
+
+static void shared_air_and_plate_settle_where_computed(void)
+{
+    parameters.rows = parameters.columns = 1;
+    parameters.air_exchange_uw_per_k = 5800;
+    parameters.air_heat_capacity_mj_per_k = 100;
+    start();
+    power_uw[0] = 145000;
+    run(20000);
+    TEST_ASSERT_DOUBLE_WITHIN(0.03, 70.0, degrees(0)); /* two equal resistances in a row */
+    TEST_ASSERT_DOUBLE_WITHIN(0.03, 45.0, thermal_model_air_c7(&model) / 128.0);
+
+    parameters.air_exchange_uw_per_k = 0;
+    parameters.plate_coupling_uw_per_k = 2000;
+    parameters.plate_loss_uw_per_k = 2000;
+    parameters.plate_heat_capacity_mj_per_k = 1000;
+    start();
+    power_uw[0] = 340000; /* 5.8 + 1 mW/K */
+    run(60000);
+    TEST_ASSERT_DOUBLE_WITHIN(0.05, 70.0, degrees(0));
+    TEST_ASSERT_DOUBLE_WITHIN(0.1, 45.0, thermal_model_plate_c7(&model) / 128.0);
+}
+
+static void air_without_capacity_follows_at_once(void)
+{
+    parameters.air_exchange_uw_per_k = 60000;
+    parameters.air_heat_capacity_mj_per_k = 0;
+    start();
+    thermal_model_reset(&model, c7(60));
+    run(20);
+    /* 9 x 5.8 = 52.2 against 60 mW/K; the springs have hardly moved */
+    TEST_ASSERT_DOUBLE_WITHIN(1.0, 20.0 + 40.0 * 52.2 / 112.2,
+                              thermal_model_air_c7(&model) / 128.0);
+}
+
+/* the air's own time is 0.07 s, a step 0.1 s: it must neither overshoot nor ring */
+static void air_quicker_than_a_step_does_not_ring(void)
+{
+    parameters.air_exchange_uw_per_k = 60000;
+    parameters.air_heat_capacity_mj_per_k = 8;
+    parameters.loss_fan_uw_per_k = 5800;
+    start();
+    thermal_model_reset(&model, c7(60));
+    int16_t before = thermal_model_air_c7(&model);
+    for (int k = 0; k < 50; k++) {
+        run(1);
+        TEST_ASSERT_TRUE(thermal_model_air_c7(&model) <= before);
+        before = thermal_model_air_c7(&model);
+    }
+    TEST_ASSERT_TRUE(before > c7(37));
+}
+
+/* all that goes in leaves through the air: what the wake brings was taken from it, not made */
+static void wake_makes_no_heat(void)
+{
+    parameters.rows = 1;
+    parameters.columns = 3;
+    parameters.air_exchange_uw_per_k = 20000;
+    parameters.wake_uw_per_k = 5000;
+    start();
+    thermal_model_set_fan(&model, 100);
+    power_uw[0] = 500000;
+    run(20000);
+    TEST_ASSERT_DOUBLE_WITHIN(0.03, 45.0,
+                              thermal_model_air_c7(&model) / 128.0); /* 0.5 W / 20 mW/K */
+}
+
+static void wake_carries_heat_one_way(void)
+{
+    parameters.rows = 1;
+    parameters.columns = 3;
+    parameters.orthogonal_uw_per_k = parameters.orthogonal_fan_uw_per_k = 0;
+    parameters.wake_uw_per_k = 1130;
+    start();
+    thermal_model_set_fan(&model, 100);
+    power_uw[1] = 565000; /* 50 K at 11.3 mW/K */
+    run(10000);
+    TEST_ASSERT_DOUBLE_WITHIN(0.02, 20.0, degrees(0));
+    TEST_ASSERT_DOUBLE_WITHIN(0.03, 70.0, degrees(1));
+    TEST_ASSERT_DOUBLE_WITHIN(0.03, 25.0, degrees(2)); /* a tenth of it */
+    parameters.wake_direction = THERMAL_MODEL_WAKE_WEST;
+    start();
+    thermal_model_set_fan(&model, 100);
+    run(10000);
+    TEST_ASSERT_DOUBLE_WITHIN(0.03, 25.0, degrees(0));
+    TEST_ASSERT_DOUBLE_WITHIN(0.02, 20.0, degrees(2));
+}
+
+/* ---- phase -------------------------------------------------------------------------------------
+ */
+
+/* Liang and Rogers: 78, 88 and 68, 98: halfway up at 93, halfway down at 73. */
+static void full_loop_follows_the_cosine(void)
+{
+    parameters.rows = parameters.columns = 1;
+    start();
+    thermal_model_set_temperature(&model, 0, c7(87.9));
+    TEST_ASSERT_EQUAL_UINT16(0, thermal_model_austenite(&model, 0));
+    thermal_model_set_temperature(&model, 0, c7(93));
+    TEST_ASSERT_DOUBLE_WITHIN(0.002, 0.5, phase(0));
+    thermal_model_set_temperature(&model, 0, c7(95.5));
+    TEST_ASSERT_DOUBLE_WITHIN(0.002, 0.85355, phase(0)); /* (1 - cos 135) / 2 */
+    thermal_model_set_temperature(&model, 0, c7(98));
+    TEST_ASSERT_EQUAL_UINT16(THERMAL_MODEL_AUSTENITE_FULL, thermal_model_austenite(&model, 0));
+    thermal_model_set_temperature(&model, 0, c7(78));
+    TEST_ASSERT_EQUAL_UINT16(THERMAL_MODEL_AUSTENITE_FULL, thermal_model_austenite(&model, 0));
+    thermal_model_set_temperature(&model, 0, c7(70.5));
+    TEST_ASSERT_DOUBLE_WITHIN(0.002, 0.14645, phase(0));
+    thermal_model_set_temperature(&model, 0, c7(68));
+    TEST_ASSERT_EQUAL_UINT16(0, thermal_model_austenite(&model, 0));
+}
+
+static void minor_loop_by_hand(void)
+{
+    parameters.rows = parameters.columns = 1;
+    start();
+    thermal_model_set_temperature(&model, 0, c7(93)); /* 0.5 */
+    thermal_model_set_temperature(&model, 0, c7(80)); /* between: rests */
+    TEST_ASSERT_DOUBLE_WITHIN(0.002, 0.5, phase(0));
+    thermal_model_set_temperature(&model, 0, c7(92)); /* below the turn: still rests */
+    TEST_ASSERT_DOUBLE_WITHIN(0.002, 0.5, phase(0));
+    thermal_model_set_temperature(&model, 0, c7(73)); /* half of the half */
+    TEST_ASSERT_DOUBLE_WITHIN(0.002, 0.25, phase(0));
+    thermal_model_set_temperature(&model, 0, c7(76));
+    TEST_ASSERT_DOUBLE_WITHIN(0.002, 0.25, phase(0));
+    thermal_model_set_temperature(&model, 0, c7(93)); /* 1 - 0.75 / 2 */
+    TEST_ASSERT_DOUBLE_WITHIN(0.002, 0.625, phase(0));
+    thermal_model_set_temperature(&model, 0, c7(90));
+    thermal_model_set_temperature(&model, 0, c7(95.5)); /* the same branch: 1 - 0.75 x 0.14645 */
+    TEST_ASSERT_DOUBLE_WITHIN(0.002, 0.89016, phase(0));
+}
+
+static void stepping_takes_the_same_loop_as_setting(void)
+{
+    for (int with_latent = 0; with_latent < 2; with_latent++) {
+        setUp();
+        parameters.rows = parameters.columns = 1;
+        if (!with_latent) {
+            parameters.latent_heat_mj = 0;
+        }
+        start();
+        power_uw[0] = 800000;
+        while (degrees(0) < 93.0) {
+            run(1);
+        }
+        TEST_ASSERT_DOUBLE_WITHIN(0.15, 93.0, degrees(0) - 0.1);
+        double reached = phase(0);
+        TEST_ASSERT_DOUBLE_WITHIN(0.04, 0.5, reached);
+        thermal_model_state_t state;
+        thermal_model_get_state(&model, &state);
+        TEST_ASSERT_TRUE((state.spring[0].latent_c23 != 0) == (with_latent != 0));
+        power_uw[0] = 0;
+        while (degrees(0) > 73.0) {
+            run(1);
+        }
+        TEST_ASSERT_DOUBLE_WITHIN(0.01, reached / 2, phase(0));
+        TEST_ASSERT_TRUE(thermal_model_is_consistent(&model));
+    }
+}
+
+static void latent_heat_delays_by_its_energy(void)
+{
+    parameters.rows = parameters.columns = 1;
+    parameters.loss_uw_per_k = parameters.loss_fan_uw_per_k = 0;
+    start();
+    power_uw[0] = 1000000;
+    uint32_t steps = 0;
+    while (thermal_model_austenite(&model, 0) < THERMAL_MODEL_AUSTENITE_FULL) {
+        run(1);
+        steps++;
+    }
+    /* 0.3 J/K x 78 K + 8.65 J = 32.05 J at 1 W */
+    TEST_ASSERT_UINT32_WITHIN(3, 321, steps);
+}
+
+static void resistance_follows_phase_with_either_sign(void)
+{
+    start();
+    TEST_ASSERT_EQUAL_UINT32(175000, thermal_model_resistance_uohm(&model, 0));
+    thermal_model_set_temperature(&model, 0, c7(93));
+    TEST_ASSERT_UINT32_WITHIN(100, 197000, thermal_model_resistance_uohm(&model, 0));
+    thermal_model_set_temperature(&model, 0, c7(110));
+    TEST_ASSERT_EQUAL_UINT32(219000, thermal_model_resistance_uohm(&model, 0));
+    parameters.resistance_martensite_uohm = 16000000;
+    parameters.resistance_austenite_uohm = 1;
+    start();
+    thermal_model_set_temperature(&model, 0, c7(93));
+    TEST_ASSERT_UINT32_WITHIN(10000, 8000000, thermal_model_resistance_uohm(&model, 0));
+    thermal_model_set_temperature(&model, 0, c7(110));
+    TEST_ASSERT_EQUAL_UINT32(1, thermal_model_resistance_uohm(&model, 0));
+}
+
+/* ---- conservation, symmetry --------------------------------------------------------------------
+ */
+
+static void no_heat_from_nothing(void)
+{
+    parameters.loss_rise_ppm_per_k = 3000;
+    parameters.radiating_area_cmm2 = 11080;
+    parameters.air_exchange_uw_per_k = 60000;
+    parameters.plate_coupling_uw_per_k = 500;
+    parameters.wake_uw_per_k = 1000;
+    start();
+    thermal_model_set_fan(&model, 60);
+    thermal_model_state_t before, after;
+    thermal_model_get_state(&model, &before);
+    run(36000); /* an hour at ambient: not one bit */
+    thermal_model_get_state(&model, &after);
+    TEST_ASSERT_EQUAL_MEMORY(&before, &after, sizeof before);
+}
+
+/* springs that lose nothing: what goes into them stays, through transformations and back */
+static void closed_array_keeps_its_heat(void)
+{
+    parameters.loss_uw_per_k = parameters.loss_fan_uw_per_k = 0;
+    start();
+    power_uw[4] = 2000000;
+    power_uw[0] = 1000000;
+    run(300); /* 90 J into nine springs */
+    memset(power_uw, 0, sizeof power_uw);
+    int64_t enthalpy[2];
+    for (int k = 0; k < 2; k++) {
+        thermal_model_state_t state;
+        thermal_model_get_state(&model, &state);
+        enthalpy[k] = 0;
+        for (int i = 0; i < 9; i++) {
+            enthalpy[k] += (int64_t)state.spring[i].temperature_c23 + state.spring[i].latent_c23;
+        }
+        run(36000);
+    }
+    double given_k = 90.0 / 0.3, before_k = (double)enthalpy[0] / 8388608.0 - 180.0;
+    TEST_ASSERT_DOUBLE_WITHIN(0.01, given_k, before_k);
+    TEST_ASSERT_DOUBLE_WITHIN(0.05, before_k, (double)enthalpy[1] / 8388608.0 - 180.0);
+}
+
+static void rotating_the_pattern_rotates_the_temperatures(void)
+{
+    parameters.air_exchange_uw_per_k = 60000;
+    parameters.plate_coupling_uw_per_k = 500;
+    parameters.radiating_area_cmm2 = 11080;
+    parameters.loss_rise_ppm_per_k = 2000;
+    thermal_model_state_t state[4];
+    for (int turn = 0; turn < 4; turn++) {
+        parameters.wake_uw_per_k = 1000;
+        parameters.wake_direction = (uint8_t)turn; /* clockwise, as the pattern */
+        start();
+        thermal_model_set_fan(&model, 40);
+        random_state = 5;
+        for (int k = 0; k < 3000; k++) {
+            if (k % 100 == 0) {
+                for (int i = 0; i < 9; i++) {
+                    int row = i / 3, column = i % 3;
+                    for (int t = 0; t < turn; t++) {
+                        int old = row;
+                        row = column;
+                        column = 2 - old;
+                    }
+                    power_uw[row * 3 + column] = random_bits() % 1000000u;
+                }
+            }
+            run(1);
+        }
+        thermal_model_get_state(&model, &state[turn]);
+    }
+    for (int turn = 1; turn < 4; turn++) {
+        for (int i = 0; i < 9; i++) {
+            int row = i / 3, column = i % 3;
+            for (int t = 0; t < turn; t++) {
+                int old = row;
+                row = column;
+                column = 2 - old;
+            }
+            TEST_ASSERT_EQUAL_MEMORY(&state[0].spring[i], &state[turn].spring[row * 3 + column],
+                                     sizeof state[0].spring[0]);
+        }
+        TEST_ASSERT_EQUAL_INT32(state[0].air_c23, state[turn].air_c23);
+        TEST_ASSERT_EQUAL_INT32(state[0].plate_c23, state[turn].plate_c23);
+    }
+}
+
+/* 1 x 3 and 3 x 1 are one array seen from two sides, and the frame lies the other way */
+static void a_row_behaves_as_a_column(void)
+{
+    thermal_model_state_t state[2];
+    for (int k = 0; k < 2; k++) {
+        parameters.rows = k ? 1 : 3;
+        parameters.columns = k ? 3 : 1;
+        parameters.wake_uw_per_k = 1000;
+        parameters.wake_direction = k ? THERMAL_MODEL_WAKE_EAST : THERMAL_MODEL_WAKE_SOUTH;
+        start();
+        thermal_model_set_fan(&model, 100);
+        power_uw[0] = 400000;
+        power_uw[1] = 100000;
+        run(2000);
+        thermal_model_get_state(&model, &state[k]);
+    }
+    TEST_ASSERT_EQUAL_MEMORY(&state[0].spring, &state[1].spring, 3 * sizeof state[0].spring[0]);
+}
+
+static void equal_springs_stay_equal_whatever_the_size(void)
+{
+    for (uint8_t rows = 1; rows <= 8; rows++) {
+        for (uint8_t columns = 1; columns <= 8; columns++) {
+            if (rows * columns > THERMAL_MODEL_MAX_SPRINGS) {
+                continue;
+            }
+            parameters.rows = rows;
+            parameters.columns = columns;
+            start();
+            for (int i = 0; i < rows * columns; i++) {
+                power_uw[i] = 300000;
+            }
+            run(50);
+            for (uint8_t i = 1; i < rows * columns; i++) {
+                TEST_ASSERT_EQUAL_INT16(thermal_model_temperature_c7(&model, 0),
+                                        thermal_model_temperature_c7(&model, i));
+            }
+            TEST_ASSERT_TRUE(thermal_model_is_consistent(&model));
+        }
+    }
+}
+
+/* ---- an effect at zero is no effect ------------------------------------------------------------
+ */
+
+static void an_absent_effect_leaves_no_trace(void)
+{
+    thermal_model_state_t state[5];
+    for (int k = 0; k < 5; k++) {
+        setUp();
+        switch (k) {
+        case 1: /* no shared air: its capacity does not matter */
+            parameters.air_heat_capacity_mj_per_k = 1234;
+            break;
+        case 2: /* no plate: neither does its */
+            parameters.plate_heat_capacity_mj_per_k = 17;
+            parameters.plate_loss_uw_per_k = 65535;
+            break;
+        case 3: /* no wake: nor its direction */
+            parameters.wake_direction = THERMAL_MODEL_WAKE_NORTH;
+            break;
+        case 4: /* fan off: nor what the fan would do */
+            parameters.wake_uw_per_k = 2000;
+            parameters.loss_fan_uw_per_k = 9000;
+            parameters.orthogonal_fan_uw_per_k = 1;
+            parameters.diagonal_fan_uw_per_k = 999;
+            break;
+        default:
+            break;
+        }
+        start();
+        for (int n = 0; n < 3000; n++) {
+            if (n % 200 == 0) {
+                for (int i = 0; i < 9; i++) {
+                    power_uw[i] = random_bits() % 900000u;
+                }
+            }
+            run(1);
+        }
+        thermal_model_get_state(&model, &state[k]);
+        TEST_ASSERT_EQUAL_MEMORY(&state[0], &state[k], sizeof state[0]);
+    }
+}
+
+/* ---- corners -----------------------------------------------------------------------------------
+ */
+
+static void corner(unsigned bits)
+{
+    thermal_model_parameters_default(&parameters);
+    parameters.step_ms = bits & 1u ? 1000 : 1;
+    parameters.heat_capacity_mj_per_k = bits & 2u ? 65535 : 200;
+    parameters.loss_uw_per_k = bits & 4u ? 30000 : 0;
+    parameters.loss_fan_uw_per_k = bits & 8u ? 60000 : 0;
+    parameters.orthogonal_uw_per_k = bits & 16u ? 7000 : 0;
+    parameters.diagonal_uw_per_k = bits & 32u ? 3000 : 0;
+    parameters.loss_rise_ppm_per_k = bits & 64u ? 2000 : 0;
+    parameters.radiating_area_cmm2 = bits & 128u ? 20000 : 0;
+    parameters.latent_heat_mj = bits & 256u ? 65535 : 0;
+    parameters.air_exchange_uw_per_k = bits & 512u ? 16000000 : 0;
+    parameters.air_heat_capacity_mj_per_k = bits & 1024u ? 2000000 : 0;
+    parameters.plate_coupling_uw_per_k = bits & 2048u ? 10000 : 0;
+    parameters.plate_heat_capacity_mj_per_k = bits & 4096u ? 2000000 : 300;
+    parameters.plate_loss_uw_per_k = bits & 8192u ? 65535 : 0;
+    parameters.wake_uw_per_k = bits & 16384u ? 20000 : 0;
+    if (bits & 32768u) {
+        parameters.martensite_finish_cc = -3000;
+        parameters.martensite_start_cc = -2800;
+        parameters.austenite_start_cc = 9000;
+        parameters.austenite_finish_cc = 19000;
+    }
+}
+
+/* Hot neighbours must not cool a spring, cold ones not heat it, whatever the parameters: a wrapped
+ * flow would. */
+static void no_accepted_corner_wraps(void)
+{
+    unsigned accepted = 0;
+    for (unsigned bits = 0; bits < 65536u; bits++) {
+        corner(bits);
+        if (thermal_model_init(&model, &parameters, 0) != THERMAL_MODEL_OK) {
+            continue;
+        }
+        accepted++;
+        thermal_model_set_fan(&model, (uint8_t)(bits % 3u * 50u));
+        /* the hottest everything around the coldest spring, full power in it */
+        thermal_model_set_ambient(&model, INT16_MAX);
+        thermal_model_reset(&model, INT16_MAX);
+        thermal_model_set_temperature(&model, 4, INT16_MIN);
+        for (int i = 0; i < 9; i++) {
+            power_uw[i] = UINT32_MAX;
+        }
+        int16_t before = thermal_model_temperature_c7(&model, 4);
+        run(1);
+        TEST_ASSERT_TRUE(thermal_model_temperature_c7(&model, 4) >= before);
+        TEST_ASSERT_EQUAL_INT16(THERMAL_MODEL_HIGHEST_C7, thermal_model_temperature_c7(&model, 0));
+        run(2);
+        TEST_ASSERT_TRUE(thermal_model_is_consistent(&model));
+        /* the coldest everything around the hottest spring, without power */
+        thermal_model_set_ambient(&model, INT16_MIN);
+        thermal_model_reset(&model, INT16_MIN);
+        thermal_model_set_temperature(&model, 4, INT16_MAX);
+        memset(power_uw, 0, sizeof power_uw);
+        before = thermal_model_temperature_c7(&model, 4);
+        run(1);
+        TEST_ASSERT_TRUE(thermal_model_temperature_c7(&model, 4) <= before);
+        TEST_ASSERT_TRUE(thermal_model_temperature_c7(&model, 0) >= THERMAL_MODEL_LOWEST_C7);
+        run(2);
+        TEST_ASSERT_TRUE(thermal_model_is_consistent(&model));
+    }
+    TEST_ASSERT_TRUE(accepted > 5000u);
+}
+
+static void random_corners_for_long_stay_consistent(void)
+{
+    for (unsigned round = 0; round < 2000; round++) {
+        corner(random_bits());
+        if (thermal_model_init(&model, &parameters, 0) != THERMAL_MODEL_OK) {
+            continue;
+        }
+        for (int k = 0; k < 300; k++) {
+            if (k % 10 == 0) {
+                for (int i = 0; i < 9; i++) {
+                    power_uw[i] = random_bits() >> (random_bits() % 32u);
+                }
+                uint8_t spring = (uint8_t)random_bits();
+                thermal_model_add_temperature(&model, spring, (int16_t)random_bits());
+                thermal_model_set_fan(&model, (uint8_t)random_bits());
+                thermal_model_set_ambient(&model, (int16_t)random_bits());
+                (void)thermal_model_power_to_hold_uw(&model, spring, (int16_t)random_bits());
+            }
+            run(1);
+            TEST_ASSERT_TRUE(thermal_model_is_consistent(&model));
+        }
+    }
+}
+
+static void too_much_power_counts_as_the_highest(void)
+{
+    static const uint32_t much[] = {THERMAL_MODEL_HIGHEST_POWER_UW + 1u, 0x01000000u, 0x04000001u,
+                                    UINT32_MAX};
+    start();
+    power_uw[0] = THERMAL_MODEL_HIGHEST_POWER_UW;
+    run(1);
+    int16_t highest = thermal_model_temperature_c7(&model, 0);
+    TEST_ASSERT_DOUBLE_WITHIN(0.01, 20.0 + 8.388607 / 3.0, highest / 128.0);
+    for (int k = 0; k < 4; k++) {
+        start();
+        power_uw[0] = much[k];
+        run(1);
+        TEST_ASSERT_EQUAL_INT16(highest, thermal_model_temperature_c7(&model, 0));
+    }
+}
+
+/* ---- refusals ----------------------------------------------------------------------------------
+ */
+
+static void refused(thermal_model_status_t status, thermal_model_parameter_t parameter,
+                    const char *name)
+{
+    thermal_model_t before = model;
+    thermal_model_parameter_t bad = THERMAL_MODEL_PARAMETER_COUNT;
+    TEST_ASSERT_EQUAL_MESSAGE(status, thermal_model_init(&model, &parameters, &bad), name);
+    TEST_ASSERT_EQUAL_STRING(name, thermal_model_parameter_name(bad));
+    TEST_ASSERT_EQUAL(parameter, bad);
+    TEST_ASSERT_EQUAL_MEMORY(&before, &model, sizeof model);
+    setUp();
+}
+
+#define REFUSED(status, parameter, field, value)                                                   \
+    parameters.field = (value);                                                                    \
+    refused(THERMAL_MODEL_ERROR_##status, THERMAL_MODEL_##parameter, #field)
+
+static void each_bad_parameter_is_refused_by_name(void)
+{
+    start();
+    REFUSED(RANGE, ROWS, rows, 0);
+    REFUSED(RANGE, ROWS, rows, 255);
+    REFUSED(RANGE, COLUMNS, columns, 0);
+    REFUSED(RANGE, COLUMNS, columns, 30);
+    REFUSED(RANGE, STEP, step_ms, 0);
+    REFUSED(RANGE, STEP, step_ms, 1001);
+    REFUSED(RANGE, HEAT_CAPACITY, heat_capacity_mj_per_k, 0);
+    REFUSED(RANGE, HEAT_CAPACITY, heat_capacity_mj_per_k, 13);
+    REFUSED(OVERFLOW, LOSS, loss_uw_per_k, 65535);
+    REFUSED(OVERFLOW, LOSS_FAN, loss_fan_uw_per_k, 65535);
+    REFUSED(OVERFLOW, ORTHOGONAL, orthogonal_uw_per_k, 20000);
+    REFUSED(OVERFLOW, ORTHOGONAL_FAN, orthogonal_fan_uw_per_k, 20000);
+    REFUSED(OVERFLOW, DIAGONAL, diagonal_uw_per_k, 20000);
+    REFUSED(OVERFLOW, DIAGONAL_FAN, diagonal_fan_uw_per_k, 20000);
+    REFUSED(RANGE, LOSS_RISE, loss_rise_ppm_per_k, 20001);
+    parameters.loss_uw_per_k = 20000;
+    REFUSED(OVERFLOW, LOSS_RISE, loss_rise_ppm_per_k, 20000);
+    parameters.loss_uw_per_k = parameters.loss_fan_uw_per_k = 60000;
+    parameters.orthogonal_uw_per_k = parameters.orthogonal_fan_uw_per_k = 9500;
+    refused(THERMAL_MODEL_ERROR_OVERFLOW, THERMAL_MODEL_LOSS, "loss_uw_per_k");
+    REFUSED(RANGE, LATENT_HEAT, latent_heat_mj, 30100);
+    parameters.austenite_start_cc = 9000;
+    parameters.austenite_finish_cc = 9400;
+    parameters.latent_heat_mj = 25000;
+    refused(THERMAL_MODEL_ERROR_RANGE, THERMAL_MODEL_LATENT_HEAT, "latent_heat_mj");
+    REFUSED(RANGE, MARTENSITE_FINISH, martensite_finish_cc, -3001);
+    REFUSED(ORDER, MARTENSITE_START, martensite_start_cc, 6800);
+    REFUSED(RANGE, MARTENSITE_START, martensite_start_cc, 6900);
+    REFUSED(ORDER, AUSTENITE_START, austenite_start_cc, 7799);
+    REFUSED(ORDER, AUSTENITE_FINISH, austenite_finish_cc, 8800);
+    REFUSED(RANGE, AUSTENITE_FINISH, austenite_finish_cc, 8900);
+    REFUSED(RANGE, AUSTENITE_FINISH, austenite_finish_cc, 20001);
+    REFUSED(RANGE, RESISTANCE_MARTENSITE, resistance_martensite_uohm, 0);
+    REFUSED(RANGE, RESISTANCE_AUSTENITE, resistance_austenite_uohm, 16000001);
+    REFUSED(RANGE, AIR_HEAT_CAPACITY, air_heat_capacity_mj_per_k, 2000001);
+    REFUSED(RANGE, PLATE_HEAT_CAPACITY, plate_heat_capacity_mj_per_k, 2000001);
+    parameters.plate_coupling_uw_per_k = 1000;
+    REFUSED(RANGE, PLATE_HEAT_CAPACITY, plate_heat_capacity_mj_per_k, 0);
+    parameters.plate_coupling_uw_per_k = 1000;
+    REFUSED(UNSTABLE, PLATE_HEAT_CAPACITY, plate_heat_capacity_mj_per_k, 5);
+    REFUSED(OVERFLOW, PLATE_COUPLING, plate_coupling_uw_per_k, 64000);
+    REFUSED(RANGE, WAKE, wake_uw_per_k, 11301);
+    REFUSED(RANGE, WAKE_TOWARDS, wake_direction, 4);
+    parameters.loss_scale_permille[8] = 0;
+    refused(THERMAL_MODEL_ERROR_RANGE, THERMAL_MODEL_LOSS_SCALE, "loss_scale_permille");
+    parameters.loss_scale_permille[0] = 8001;
+    refused(THERMAL_MODEL_ERROR_RANGE, THERMAL_MODEL_LOSS_SCALE, "loss_scale_permille");
+    parameters.heat_capacity_scale_permille[3] = 0;
+    refused(THERMAL_MODEL_ERROR_RANGE, THERMAL_MODEL_HEAT_CAPACITY_SCALE,
+            "heat_capacity_scale_permille");
+    parameters.heat_capacity_mj_per_k = 40;
+    parameters.latent_heat_mj = 0;
+    parameters.loss_uw_per_k = 60000;
+    parameters.orthogonal_uw_per_k = 8000;
+    parameters.step_ms = 300;
+    refused(THERMAL_MODEL_ERROR_UNSTABLE, THERMAL_MODEL_STEP, "step_ms");
+    TEST_ASSERT_EQUAL_STRING("", thermal_model_parameter_name(THERMAL_MODEL_PARAMETER_COUNT));
+}
+
+/* ---- holding, state, corrections ---------------------------------------------------------------
+ */
+
+static void power_to_hold_holds(void)
+{
+    parameters.air_exchange_uw_per_k = 60000;
+    parameters.plate_coupling_uw_per_k = 500;
+    parameters.radiating_area_cmm2 = 11080;
+    parameters.loss_rise_ppm_per_k = 2000;
+    parameters.wake_uw_per_k = 1000;
+    start();
+    thermal_model_set_fan(&model, 30);
+    thermal_model_reset(&model, c7(40));
+    thermal_model_set_temperature(&model, 4, c7(100));
+    thermal_model_set_temperature(&model, 4, c7(80)); /* in the hysteresis band */
+    power_uw[0] = 700000;
+    power_uw[7] = 300000;
+    for (int k = 0; k < 6000; k++) {
+        int32_t hold = thermal_model_power_to_hold_uw(&model, 4, c7(80));
+        TEST_ASSERT_TRUE(hold > 0);
+        power_uw[4] = (uint32_t)hold;
+        run(1);
+        TEST_ASSERT_DOUBLE_WITHIN(0.05, 80.0, degrees(4));
+    }
+    TEST_ASSERT_EQUAL_UINT16(THERMAL_MODEL_AUSTENITE_FULL, thermal_model_austenite(&model, 4));
+    TEST_ASSERT_TRUE(thermal_model_power_to_hold_uw(&model, 4, c7(0)) < 0);
+}
+
+static void state_survives_and_garbage_does_not_enter(void)
+{
+    start();
+    power_uw[0] = 600000;
+    power_uw[4] = 900000;
+    run(400);
+    thermal_model_state_t state, again;
+    thermal_model_get_state(&model, &state);
+    double kept[2] = {degrees(0), degrees(4)};
+    run(300);
+    TEST_ASSERT_TRUE(thermal_model_set_state(&model, &state));
+    thermal_model_get_state(&model, &again);
+    TEST_ASSERT_EQUAL_MEMORY(&state, &again, sizeof state);
+    TEST_ASSERT_DOUBLE_WITHIN(0.001, kept[0], degrees(0));
+    TEST_ASSERT_DOUBLE_WITHIN(0.001, kept[1], degrees(4));
+    run(1);
+    TEST_ASSERT_TRUE(thermal_model_is_consistent(&model));
+    thermal_model_t before = model;
+    unsigned taken = 0;
+    for (int k = 0; k < 20000; k++) {
+        thermal_model_state_t garbage = state;
+        uint8_t *bytes = (uint8_t *)&garbage;
+        for (int n = 0; n < 40; n++) {
+            bytes[random_bits() % (9u * sizeof garbage.spring[0])] = (uint8_t)random_bits();
+        }
+        if (thermal_model_set_state(&model, &garbage)) {
+            taken++;
+            run(3);
+            TEST_ASSERT_TRUE(thermal_model_is_consistent(&model));
+            model = before;
+        } else {
+            TEST_ASSERT_EQUAL_MEMORY(&before, &model, sizeof model);
+        }
+    }
+    TEST_ASSERT_TRUE(taken < 2000u);
+}
+
+static void corrections_add_and_saturate(void)
+{
+    start();
+    thermal_model_add_temperature(&model, 2, c7(5));
+    TEST_ASSERT_EQUAL_INT16(c7(25), thermal_model_temperature_c7(&model, 2));
+    thermal_model_add_temperature(&model, 2, INT16_MAX);
+    TEST_ASSERT_EQUAL_INT16(THERMAL_MODEL_HIGHEST_C7, thermal_model_temperature_c7(&model, 2));
+    thermal_model_add_temperature(&model, 2, INT16_MIN);
+    thermal_model_add_temperature(&model, 2, INT16_MIN);
+    TEST_ASSERT_EQUAL_INT16(THERMAL_MODEL_LOWEST_C7, thermal_model_temperature_c7(&model, 2));
+    TEST_ASSERT_TRUE(thermal_model_is_consistent(&model));
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(one_spring_settles_where_power_equals_loss);
+    RUN_TEST(one_spring_warms_by_its_time_constant);
+    RUN_TEST(fan_full_and_half_are_the_given_and_the_mean_loss);
+    RUN_TEST(two_springs_share_heat_by_their_coupling);
+    RUN_TEST(loss_that_rises_and_radiation_settle_where_computed);
+    RUN_TEST(shared_air_and_plate_settle_where_computed);
+    RUN_TEST(air_without_capacity_follows_at_once);
+    RUN_TEST(air_quicker_than_a_step_does_not_ring);
+    RUN_TEST(wake_makes_no_heat);
+    RUN_TEST(wake_carries_heat_one_way);
+    RUN_TEST(full_loop_follows_the_cosine);
+    RUN_TEST(minor_loop_by_hand);
+    RUN_TEST(stepping_takes_the_same_loop_as_setting);
+    RUN_TEST(latent_heat_delays_by_its_energy);
+    RUN_TEST(resistance_follows_phase_with_either_sign);
+    RUN_TEST(no_heat_from_nothing);
+    RUN_TEST(closed_array_keeps_its_heat);
+    RUN_TEST(rotating_the_pattern_rotates_the_temperatures);
+    RUN_TEST(a_row_behaves_as_a_column);
+    RUN_TEST(equal_springs_stay_equal_whatever_the_size);
+    RUN_TEST(an_absent_effect_leaves_no_trace);
+    RUN_TEST(no_accepted_corner_wraps);
+    RUN_TEST(random_corners_for_long_stay_consistent);
+    RUN_TEST(too_much_power_counts_as_the_highest);
+    RUN_TEST(each_bad_parameter_is_refused_by_name);
+    RUN_TEST(power_to_hold_holds);
+    RUN_TEST(state_survives_and_garbage_does_not_enter);
+    RUN_TEST(corrections_add_and_saturate);
+    return UNITY_END();
+}
