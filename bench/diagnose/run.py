@@ -1,0 +1,347 @@
+"""Does the diagnosis find what it is not told? Confusion matrix, held-out errors and times, over many seeds.
+
+    .venv/bin/python bench/diagnose/run.py [--seeds N] [--quick] [--json FILE] [--markdown]
+
+Data come from `world.py`, which shares nothing with the product's plant. The thresholds of the diagnosis were
+chosen on seeds 0 to 999; what is printed comes from seeds 100000 up, which were used for nothing else.
+"""
+
+from __future__ import annotations
+
+import argparse
+import concurrent.futures
+import json
+import math
+import sys
+import tempfile
+import time
+from collections import Counter, defaultdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from cases import (
+    DEVELOPMENT_SEEDS,
+    NOISE_C,
+    REPORTING_SEEDS,
+    make_case,
+    plan,
+    write_logs,
+)
+from ninespring import diagnosis, fitting, native, search
+from ninespring.effects import candidates
+from ninespring.logs import read_log
+from ninespring.models import Array
+from world import EFFECTS, OUTSIDE
+
+MATTERS = 0.5
+"""An effect counts where it leaves at least this much structure, rms in units of the noise."""
+
+
+def marginal(found: diagnosis.Diagnosis, truth: tuple[str, ...], effect: str) -> float:
+    """Return the structure (noise units) that remains when all of the truth but one effect is fitted."""
+    problem = found.problem
+    hunt = search.Search(problem, candidates(problem), found.baseline)
+    fit = found.baseline
+    for other in truth:
+        if other == effect:
+            continue
+        screen = hunt.screen(fit)
+        options = [k for k, c in enumerate(screen.candidates) if c.effect == other]
+        if not options:
+            continue
+        best = max(options, key=lambda k: screen.forecast([k])[0])
+        size = screen.forecast([best])[1].get(best, 1.0)
+        fit = hunt.refit(fit, [screen.candidates[best]], [size])
+    return math.sqrt(search.excess(problem, fit))
+
+
+def run_case(job: tuple[str, tuple[str, ...], int]) -> dict[str, Any]:
+    """Make one case, diagnose it, compare."""
+    group, truth, seed = job
+    case = make_case(group, truth, seed)
+    with tempfile.TemporaryDirectory() as folder:
+        train, held, _ = write_logs(case, Path(folder))
+        runs = [read_log(path, 9) for path in train]
+        begun = time.monotonic()
+        found = diagnosis.diagnose(Array(), runs)
+        seconds = time.monotonic() - begun
+        third = read_log(held, 9)
+    result = found.result
+    adopted = [e["name"] for e in result["effects"]]
+    rivals = [(r["instead_of"], r["name"]) for r in result["rivals"]]
+    plant = native.Plant(3, 3)
+    plant.set_effects(found.model.effects)
+    plant.set_all(found.model.parameters)
+    shown = fitting.simulate_run(plant, third, third.ambient_c, {})
+    third_rmse = float(np.sqrt(np.nanmean((third.temperature_c - shown) ** 2)))
+    if group == "pair":
+        sizes = {e: marginal(found, truth, e) for e in truth}
+    elif group == "single":
+        sizes = {truth[0]: math.sqrt(search.excess(found.problem, found.baseline))}
+    else:
+        sizes = {"": math.sqrt(search.excess(found.problem, found.baseline))}
+    return {
+        "group": group,
+        "truth": list(truth),
+        "seed": seed,
+        "columns": case.columns,
+        "adopted": adopted,
+        "rivals": rivals,
+        "matters": [e for e in truth if group in ("single", "pair") and sizes[e] >= MATTERS],
+        "outside_size": sizes.get("", 0.0),
+        "unexplained": result["unexplained"],
+        "baseline_rmse_c": result["baseline"]["rmse_c"],
+        "baseline_holdout_c": result["baseline"]["holdout_rmse_c"],
+        "after_rmse_c": result["after"]["rmse_c"],
+        "after_holdout_c": result["after"]["holdout_rmse_c"],
+        "third_log_c": third_rmse,
+        "noise_c": result["baseline"]["noise_c"],
+        "structure": result["residual"]["structure_c"] / result["baseline"]["noise_c"],
+        "seconds": seconds,
+    }
+
+
+def named(case: dict[str, Any], effect: str) -> bool:
+    """Return whether an effect was adopted or named as a rival of an adopted one."""
+    return effect in case["adopted"] or any(name == effect for _, name in case["rivals"])
+
+
+def ratio(cases: list[dict[str, Any]], good: Any) -> tuple[float, int, int]:
+    """Return the percentage, hits and total."""
+    hits = sum(bool(good(c)) for c in cases)
+    return (100.0 * hits / len(cases) if cases else float("nan"), hits, len(cases))
+
+
+def figures(cases: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Return the issue's figures."""
+    command = "python bench/diagnose/run.py"
+    single = [c for c in cases if c["group"] == "single" and c["matters"]]
+    pairs = [c for c in cases if c["group"] == "pair" and len(c["matters"]) == 2]
+    none = [c for c in cases if c["group"] == "none"]
+    small = [c for c in cases if c["group"] == "single" and not c["matters"]]
+    outside = [c for c in cases if c["group"] == "outside" and c["outside_size"] >= MATTERS]
+
+    def floor(case: dict[str, Any]) -> bool:
+        drifting = "ambient_drift" in case["truth"]
+        error = case["after_holdout_c"] if drifting else case["third_log_c"]
+        return error <= 1.15 * NOISE_C
+
+    rows: list[tuple[str, tuple[float, int, int], str]] = [
+        (
+            "single effect adopted or named as a rival",
+            ratio(single, lambda c: named(c, c["truth"][0])),
+            ">= 95",
+        ),
+        (
+            "single effect adopted itself",
+            ratio(single, lambda c: c["truth"][0] in c["adopted"]),
+            "",
+        ),
+        (
+            "single: nothing adopted beside it",
+            ratio(single, lambda c: len(c["adopted"]) <= 1),
+            "",
+        ),
+        (
+            "both effects of a pair",
+            ratio(pairs, lambda c: all(named(c, e) for e in c["truth"])),
+            ">= 85",
+        ),
+        (
+            "held-out error within 1.15 of the noise, singles",
+            ratio(single, floor),
+            ">= 90",
+        ),
+        (
+            "held-out error within 1.15 of the noise, pairs",
+            ratio(pairs, floor),
+            ">= 90",
+        ),
+        (
+            "nothing adopted where nothing is missing",
+            ratio(none, lambda c: not c["adopted"]),
+            ">= 95",
+        ),
+        (
+            "nothing adopted, or the true effect, where it is too small to matter",
+            ratio(small, lambda c: not set(c["adopted"]) - set(c["truth"])),
+            "",
+        ),
+        (
+            "flagged unexplained, effect outside the library",
+            ratio(outside, lambda c: c["unexplained"]),
+            ">= 90",
+        ),
+        (
+            "outside the library: nothing adopted",
+            ratio(outside, lambda c: not c["adopted"]),
+            "",
+        ),
+        (
+            "explained cases wrongly flagged unexplained",
+            ratio([*single, *pairs, *none], lambda c: c["unexplained"]),
+            "",
+        ),
+    ]
+    out = [
+        {
+            "figure": f"{name} ({hits} of {total})",
+            "value": round(value, 1),
+            "unit": "%",
+            "target": target,
+            "command": command,
+        }
+        for name, (value, hits, total), target in rows
+        if total
+    ]
+    seconds = sorted(c["seconds"] for c in cases)
+    for name, value in (
+        ("median", seconds[len(seconds) // 2]),
+        ("longest", seconds[-1]),
+    ):
+        out.append(
+            {
+                "figure": f"time of one diagnosis, {name}",
+                "value": round(value, 1),
+                "unit": "s",
+                "target": "<= 30",
+                "command": command,
+            }
+        )
+    return out
+
+
+def confusion(cases: list[dict[str, Any]]) -> list[list[str]]:
+    """Return rows: truth, cases, what was adopted how often, rivals, errors."""
+    groups: dict[tuple[str, str], list[dict[str, Any]]] = defaultdict(list)
+    for case in cases:
+        if case["group"] != "pair":
+            groups[case["group"], "+".join(case["truth"]) or "none"].append(case)
+    order = {name: k for k, name in enumerate((*EFFECTS, "none", *OUTSIDE))}
+    rows = []
+    for (_, truth), some in sorted(groups.items(), key=lambda one: order[one[0][1]]):
+        counts = Counter("+".join(sorted(c["adopted"])) or "nothing" for c in some)
+        rivals = Counter(name for c in some for name in {n for _, n in c["rivals"]})
+        rows.append(
+            [
+                truth,
+                str(len(some)),
+                ", ".join(f"{name} {n}" for name, n in counts.most_common(5)),
+                ", ".join(f"{name} {n}" for name, n in rivals.most_common(3)),
+                str(sum(c["unexplained"] for c in some)),
+                f"{np.median([c['baseline_holdout_c'] for c in some]):.2f}",
+                f"{np.median([c['after_holdout_c'] for c in some]):.2f}",
+                f"{np.median([c['third_log_c'] for c in some]):.2f}",
+            ]
+        )
+    return rows
+
+
+HEADER = [
+    "truth",
+    "cases",
+    "adopted",
+    "rivals",
+    "unexplained",
+    "held out before",
+    "after",
+    "third log",
+]
+
+
+def table(found: list[dict[str, Any]], rows: list[list[str]], count: int, seeds: str) -> str:
+    """Return figures and confusion matrix as Markdown."""
+    lines = [f"### Diagnosis of effects it is not told ({count} cases, {seeds})", ""]
+    lines += ["| figure | value | target |", "|---|---|---|"]
+    lines += [f"| {one['figure']} | {one['value']} {one['unit']} | {one['target']} |" for one in found]
+    lines += ["", "| " + " | ".join(HEADER) + " |", "|" + "---|" * len(HEADER)]
+    lines += ["| " + " | ".join(row) + " |" for row in rows]
+    lines += [
+        "",
+        (
+            "Errors are medians, degC; the noise is 0.3. 'Held out' are blocks of the two logs, 'third log' is one never "
+            "shown. Thresholds were chosen on seeds 0 to 999. An effect counts as one where it leaves at least half the "
+            "noise in the residual. Where the ambient drifts, the held-out figure is that of the blocks: the drift of "
+            "another log cannot be known."
+        ),
+    ]
+    return "\n".join(lines)
+
+
+def main() -> int:
+    """Run the benchmark."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument(
+        "--seeds",
+        type=int,
+        default=10,
+        help="seeds; each makes 14 singles, 12 pairs, 4 none, 8 outside",
+    )
+    parser.add_argument(
+        "--first",
+        type=int,
+        default=None,
+        help="first seed (default: the reporting range)",
+    )
+    parser.add_argument("--quick", action="store_true", help="one seed of singles and none, for CI")
+    parser.add_argument("--development", action="store_true", help="seeds of the development range")
+    parser.add_argument("--groups", default="single,pair,none,outside")
+    parser.add_argument(
+        "--only",
+        default="",
+        help="only cases with one of these effects, comma-separated",
+    )
+    parser.add_argument("--processes", type=int, default=2)
+    parser.add_argument("--json", type=Path)
+    parser.add_argument("--cases", type=Path, help="write every case, for study")
+    parser.add_argument("--markdown", nargs="?", const="-", help="write tables as Markdown here")
+    options = parser.parse_args()
+    first = options.first
+    if first is None:
+        first = (DEVELOPMENT_SEEDS if options.development else REPORTING_SEEDS).start
+    groups = ("single", "none") if options.quick else tuple(options.groups.split(","))
+    jobs = plan(range(first, first + (1 if options.quick else options.seeds)), groups)
+    if options.only:
+        wanted = set(options.only.split(","))
+        jobs = [job for job in jobs if wanted & set(job[1])]
+    cases = []
+    fitting.WORKERS = 1
+    with concurrent.futures.ProcessPoolExecutor(options.processes) as pool:
+        for done, case in enumerate(pool.map(run_case, jobs, chunksize=1), start=1):
+            cases.append(case)
+            if sys.stderr.isatty() or options.cases:
+                print(
+                    f"{done}/{len(jobs)} {'+'.join(case['truth']) or 'none'} s{case['seed']} {case['columns']} -> "
+                    f"{'+'.join(case['adopted']) or 'nothing'} rivals {case['rivals']} matters {case['matters']}"
+                    f" {case['baseline_rmse_c']:.2f}"
+                    f" -> {case['after_rmse_c']:.3f} third {case['third_log_c']:.3f} s {case['structure']:.2f}"
+                    f" {'UNEXPLAINED' if case['unexplained'] else ''} {case['seconds']:.0f} s",
+                    file=sys.stderr,
+                    flush=True,
+                )
+    found = figures(cases)
+    text = table(
+        found,
+        confusion(cases),
+        len(cases),
+        f"seeds {first} to {first + options.seeds - 1}",
+    )
+    if options.markdown == "-":
+        print(text)
+    else:
+        for one in found:
+            print(f"{one['figure']:75} {one['value']:8} {one['unit']:2} {one['target']}")
+        for row in confusion(cases):
+            print("  ".join(f"{cell:<{w}}" for cell, w in zip(row, (20, 3, 60, 40, 3, 6, 6, 6), strict=True)))
+        if options.markdown:
+            Path(options.markdown).write_text(text + "\n")
+    if options.json:
+        options.json.write_text(json.dumps(found, indent=1) + "\n")
+    if options.cases:
+        options.cases.write_text(json.dumps(cases, indent=1) + "\n")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
