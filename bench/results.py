@@ -14,7 +14,9 @@ from __future__ import annotations
 import argparse
 import datetime
 import json
+import operator
 import platform
+import re
 import shlex
 import subprocess
 import sys
@@ -25,6 +27,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 KEPT = ROOT / "docs" / "results"
 PAGE = ROOT / "docs" / "results.md"
+TARGET = re.compile(r"(?P<sign><=|>=|<|>|)\s*(?P<limit>[-+0-9.e]+)")
 
 
 @dataclass(frozen=True)
@@ -35,7 +38,7 @@ class Section:
     title: str
     command: str
     json: bool = True
-    markdown: bool = False
+    markdown: bool = False  # tables of its own; its figures are then kept for programs, but shown there only
 
 
 HOST = "build/host"
@@ -82,15 +85,48 @@ def number(value: object) -> str:
     return f"{value:,.0f}" if abs(value) >= 1000 else f"{value:.4g}"
 
 
+def figures_of(section: Section) -> list[dict[str, object]]:
+    path = KEPT / f"{section.name}.json"
+    return json.loads(path.read_text(encoding="utf-8")) if section.json and path.exists() else []
+
+
+def meets(row: dict[str, object]) -> bool | None:
+    """Whether the figure meets its target: ``<= 5``, ``>= 5``, ``< 5``, ``> 5`` or ``0``; None: only for scale."""
+    match = TARGET.fullmatch(str(row.get("target")))
+    if match is None or not isinstance(row["value"], (int, float)):
+        return None
+    if match["none"]:
+        return row["value"] == 0
+    compare = {"<=": operator.le, ">=": operator.ge, "<": operator.lt, ">": operator.gt}
+    return compare[match["sign"]](row["value"], float(match["limit"]))
+
+
+def measured(row: dict[str, object]) -> str:
+    unit = "" if row["unit"] == "1" else f" {row['unit']}"
+    return f"{number(row['value'])}{unit}"
+
+
 def table(section: Section) -> list[str]:
-    figures = json.loads((KEPT / f"{section.name}.json").read_text(encoding="utf-8"))
-    lines = ["| figure | measured | target |", "|---|---|---|"]
-    for row in figures:
+    lines = ["| figure | measured | target | |", "|---|---|---|---|"]
+    for row in figures_of(section):
         target = row.get("target")
         wanted = "" if target in (None, "") else number(target)
-        unit = "" if row["unit"] == "1" else f" {row['unit']}"
-        lines.append(f"| {row['figure']} | {number(row['value'])}{unit} | {wanted} |")
+        verdict = {True: "met", False: "**missed**", None: ""}[meets(row)]
+        lines.append(f"| {row['figure']} | {measured(row)} | {wanted} | {verdict} |")
     return [*lines, "", f"    {section.command}", ""]
+
+
+def summary() -> list[str]:
+    """How many targets are met, and each that is missed."""
+    verdicts = [(section, row, meets(row)) for section in SECTIONS for row in figures_of(section)]
+    met = sum(verdict is True for _, _, verdict in verdicts)
+    missed = [(section, row) for section, row, verdict in verdicts if verdict is False]
+    lines = [f"Of {met + len(missed)} figures with a target, {met} meet it." + (" Missed:" if missed else ""), ""]
+    if missed:
+        lines += ["| missed | measured | target | section |", "|---|---|---|---|"]
+        lines += [f"| {row['figure']} | {measured(row)} | {row['target']} | {at.title} |" for at, row in missed]
+        lines.append("")
+    return lines
 
 
 def page() -> str:
@@ -100,15 +136,17 @@ def page() -> str:
         "Written by `script/results`: every figure below was measured by the command under its table.",
         "Times are of one machine and are given as ratios where they can be; cycles and bytes are exact.",
         "",
+        *summary(),
     ]
     for section in SECTIONS:
         lines += [f"## {section.title}", ""]
         found = False
-        if section.json and (KEPT / f"{section.name}.json").exists():
+        if figures_of(section) and not section.markdown:
             lines += table(section)
             found = True
         if section.markdown and (KEPT / f"{section.name}.md").exists():
             lines += [(KEPT / f"{section.name}.md").read_text(encoding="utf-8").rstrip(), ""]
+            lines += [f"    {section.command}", ""]
             found = True
         if not found:
             lines += [f"Not measured yet: `{section.command}`.", ""]
