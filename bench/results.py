@@ -27,7 +27,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 KEPT = ROOT / "docs" / "results"
 PAGE = ROOT / "docs" / "results.md"
-TARGET = re.compile(r"(?P<sign><=|>=|<|>|)\s*(?P<limit>[-+0-9.e]+)")
+TARGET = re.compile(r"(?P<sign><=|>=|<|>)\s*(?P<limit>[-+0-9.e]+)|(?P<none>0)")
 
 
 @dataclass(frozen=True)
