@@ -102,6 +102,8 @@
       "of a spring's resistance; of its power where it is commanded")                              \
     X(SUPPLY_OHM, "supply_resistance_ohm", "ohm", "supply_sag", 0.2, 0, 100, false,                \
       "source resistance of the supply")                                                           \
+    X(SUPPLY_CHOPPED, "supply_chopped", "1", "supply_sag", 0, 0, 1, false,                         \
+      "commands: 0 loads draw their mean; 1 they are chopped, at a constant current")              \
     X(AMBIENT_RAMP, "ambient_ramp_k_per_h", "K/h", "ambient_drift", 2, -100, 100, false,           \
       "steady rise of the ambient")                                                                \
     X(AMBIENT_AMPLITUDE, "ambient_amplitude_k", "K", "ambient_drift", 1, 0, 50, false,             \
@@ -443,15 +445,17 @@ static double command_w(const plant_t *p, int i)
     return p->quantity[i] * p->value[P_COMMAND_POWER][i] * p->resistance_scale[i];
 }
 
-/* Voltage of the supply under all that is drawn. Stages in duty and command mode load it like
- * conductances, power and current mode draw their power whatever the voltage is. */
+/* Mean voltage of the supply under all that is drawn. Stages in duty and command mode load it like
+ * conductances (chopped commands like current sinks), power and current mode draw their power
+ * whatever the voltage is. */
 static double supply_voltage(const plant_t *p, const double *t, const double *austenite)
 {
     const double open_v = scalar(p, P_SUPPLY_V);
     const double source_ohm = scalar(p, P_SUPPLY_OHM);
     if (!p->on[E_SUPPLY_SAG] || source_ohm == 0.0)
         return open_v;
-    double conductance = 0.0, power = 0.0;
+    const bool chopped = scalar(p, P_SUPPLY_CHOPPED) != 0.0;
+    double conductance = 0.0, power = 0.0, sunk_a = 0.0;
     for (int i = 0; i < p->n; i++) {
         if (p->fault[i] == PLANT_FAULT_OPEN)
             continue;
@@ -468,13 +472,17 @@ static double supply_voltage(const plant_t *p, const double *t, const double *au
             conductance += p->quantity[i] * p->quantity[i] / (spring_ohm + loop_ohm);
             break;
         case PLANT_DRIVE_COMMAND:
-            conductance += command_w(p, i) / (open_v * open_v);
+            if (chopped)
+                sunk_a += command_w(p, i) / open_v;
+            else
+                conductance += command_w(p, i) / (open_v * open_v);
             break;
         case PLANT_DRIVE_TEMPERATURE:
             break; /* held by whatever holds it */
         }
     }
-    return electrics_supply_v(open_v, source_ohm, conductance, power);
+    return electrics_supply_v(fmax(open_v - source_ohm * sunk_a, 0.0), source_ohm, conductance,
+                              power);
 }
 
 static double stage_current(const plant_t *p, int i, double supply_v, double t, double austenite)
@@ -498,8 +506,15 @@ static double heating(const plant_t *p, int i, double supply_v, double t, double
         return current * current * resistance_at(p, i, t, austenite);
     }
     case PLANT_DRIVE_COMMAND: {
-        const double ratio = supply_v / scalar(p, P_SUPPLY_V);
-        return command_w(p, i) * ratio * ratio;
+        const double open_v = scalar(p, P_SUPPLY_V), wanted_w = command_w(p, i);
+        if (p->on[E_SUPPLY_SAG] && scalar(p, P_SUPPLY_CHOPPED) != 0.0) {
+            /* While it is on it draws all of its current, whatever its command: only the others'
+             * mean counts. The power is at constant current. */
+            const double own_v = scalar(p, P_SUPPLY_OHM) * wanted_w / open_v;
+            return wanted_w * fmin((supply_v + own_v) / open_v, 1.0);
+        }
+        const double ratio = supply_v / open_v;
+        return wanted_w * ratio * ratio;
     }
     case PLANT_DRIVE_TEMPERATURE:
         break;
@@ -999,7 +1014,8 @@ plant_status_t plant_set_index(plant_t *p, size_t k, int spring, double value)
         return PLANT_ERROR_INDEX;
     if (!within(value, parameter->minimum, parameter->maximum))
         return PLANT_ERROR_RANGE;
-    if ((k == P_WAKE_DIRECTION || k == P_CONVECTION) && value != floor(value))
+    if ((k == P_WAKE_DIRECTION || k == P_CONVECTION || k == P_SUPPLY_CHOPPED) &&
+        value != floor(value))
         return PLANT_ERROR_RANGE;
     if (spring < 0)
         for (int i = 0; i < MAX_SPRINGS; i++)

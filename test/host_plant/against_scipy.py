@@ -171,6 +171,8 @@ class Model:
         loop = ohm + v["loop_resistance_ohm"]
         wanted = u * v["command_power_w"] * self.ohm_scale
         supply = v["supply_v"]
+        chopped = "supply_sag" in self.on and v["supply_chopped"]
+        sunk = np.where(m == COMMAND, wanted / supply, 0.0) * v["supply_resistance_ohm"]
         if "supply_sag" in self.on:
 
             def excess(volt: float) -> float:
@@ -180,7 +182,11 @@ class Model:
                     np.where(
                         m == CURRENT,
                         u * u * loop / volt,
-                        np.where(m == DUTY, u * u * volt / loop, wanted * volt / v["supply_v"] ** 2),
+                        np.where(
+                            m == DUTY,
+                            u * u * volt / loop,
+                            wanted * (v["supply_v"] if chopped else volt) / v["supply_v"] ** 2,
+                        ),
                     ),
                 )
                 return volt + v["supply_resistance_ohm"] * amps.sum() - v["supply_v"]
@@ -193,7 +199,11 @@ class Model:
             np.where(
                 m == CURRENT,
                 u * u * ohm,
-                np.where(m == DUTY, amps * amps * ohm, wanted * (supply / v["supply_v"]) ** 2),
+                np.where(
+                    m == DUTY,
+                    amps * amps * ohm,
+                    wanted * ((supply + sunk) / v["supply_v"] if chopped else (supply / v["supply_v"]) ** 2),
+                ),
             ),
         )
 
@@ -297,6 +307,7 @@ def compare(lib: ctypes.CDLL, seed: int) -> tuple[float, float, str]:
     drive = rng.uniform(0, 1, (points, n)) * top * (rng.random((points, n)) < 0.75)
     fan = np.where(rng.random(points) < 0.5, 0.0, rng.random(points)).round(3)
     ambient = np.full(points, np.nan)
+    values["supply_chopped"] = float(rng.integers(0, 2))
 
     plant = lib.plant_create(rows, columns)
     for name, value in values.items():

@@ -662,6 +662,30 @@ static void sag_takes_the_square_of_the_voltage_from_a_commanded_spring(void)
     TEST_ASSERT_DOUBLE_WITHIN(1e-12, 3.0, plant_power_w(plant, 1));
 }
 
+/* A chopped load draws all of its current while it is on: its own command costs it nothing. */
+static void chopped_loads_lose_only_by_the_others(void)
+{
+    on("supply_sag");
+    set("supply_resistance_ohm", 2.0);
+    set("supply_chopped", 1.0);
+    set("command_power_w[2]", 1.0);
+    for (double command = 0.1; command < 1.05; command += 0.3) {
+        drive(0, PLANT_DRIVE_COMMAND, command);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.5 * command, plant_power_w(plant, 0));
+    }
+    drive(1, PLANT_DRIVE_COMMAND, 0.6);
+    drive(0, PLANT_DRIVE_COMMAND, 0.8);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, 5.0 - 2.0 * (0.8 * 0.1 + 0.6 * 0.2), plant_supply_v(plant));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.4 * (1.0 - 2.0 * 0.6 * 0.2 / 5.0), plant_power_w(plant, 0));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.6 * (1.0 - 2.0 * 0.8 * 0.1 / 5.0), plant_power_w(plant, 1));
+    /* the others' load bends a mixed drive too, and never lifts a spring above what it has alone */
+    drive(2, PLANT_DRIVE_POWER, 1.0);
+    const double v = plant_supply_v(plant);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, v, 5.0 - 2.0 * (0.2 + 1.0 / v));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.4 * (v + 2.0 * 0.08) / 5.0, plant_power_w(plant, 0));
+    TEST_ASSERT_EQUAL_INT(PLANT_ERROR_RANGE, plant_set(plant, "supply_chopped", 0.5));
+}
+
 static void ambient_drifts_and_springs_follow(void)
 {
     on("ambient_drift");
@@ -1015,6 +1039,7 @@ int main(void)
     RUN_TEST(mismatch_is_of_one_spring);
     RUN_TEST(supply_sags_while_others_draw);
     RUN_TEST(sag_takes_the_square_of_the_voltage_from_a_commanded_spring);
+    RUN_TEST(chopped_loads_lose_only_by_the_others);
     RUN_TEST(ambient_drifts_and_springs_follow);
     RUN_TEST(sensor_lags_by_its_time_constant);
     RUN_TEST(sensor_lags_behind_an_exponential_in_long_steps);
