@@ -26,6 +26,9 @@ static void view_spring(const controller_t *chip, unsigned k, board_view_spring_
     view->level_permille = chip->level_permille[k];
     view->temperature_c7 = (int16_t)(state->temperature_c23 >> 16);
     view->fault = chip->safety.fault[k];
+    view->stage = chip->policy.spring[k].stage;
+    view->limits = chip->policy.spring[k].limits;
+    view->wanted_ma = chip->policy.spring[k].wanted_ma;
     view->heating_c7 = state->heating_c7;
     view->cooling_c7 = state->cooling_c7;
     view->amplitude = state->amplitude;
