@@ -144,7 +144,7 @@ private:
             action = good ? LOOP_ACTION_SENSOR_GOOD : LOOP_ACTION_SENSOR_STALE;
             break;
         case scenario_failure::sda_low:
-            action = good ? LOOP_ACTION_SENSOR_GOOD : LOOP_ACTION_SENSOR_BUS;
+            action = good ? LOOP_ACTION_BUS_GOOD : LOOP_ACTION_SENSOR_BUS;
             break;
         case scenario_failure::ina_reset:
             action = LOOP_ACTION_SENSOR_RESET;

@@ -16,7 +16,6 @@ typedef struct {
     double resistance_ohm;             /* of the spring, since the plant's last step */
     double current_a;
     double voltage_v;
-    double power_w;
     double energy_j; /* into the spring since the plant's last step */
 } channel_t;
 
@@ -41,18 +40,9 @@ struct loop {
     channel_t channel[PLANT_MAX_SPRINGS];
 };
 
-static const char *const action_name[LOOP_ACTION_COUNT] = {
-    "open_spring",  "short_spring", "spring_good", "sensor_nack", "sensor_bus", "sensor_stale",
-    "sensor_reset", "sensor_good",  "fan_stop",    "fan_good",    "watchdog",   "brown_out"};
-
-const char *loop_action_name(loop_action_t action)
+static bool is_of_one_spring(loop_action_t action)
 {
-    return (unsigned)action < LOOP_ACTION_COUNT ? action_name[action] : NULL;
-}
-
-bool loop_action_needs_spring(loop_action_t action)
-{
-    return action != LOOP_ACTION_SENSOR_BUS && ((unsigned)action <= LOOP_ACTION_SENSOR_GOOD);
+    return action != LOOP_ACTION_SENSOR_BUS && (unsigned)action <= LOOP_ACTION_SENSOR_GOOD;
 }
 
 void loop_options_default(loop_options_t *options)
@@ -78,6 +68,11 @@ static int16_t to_c7(double temperature_c)
 {
     double scaled = temperature_c * 128.0;
     return (int16_t)lround(scaled < -32768.0 ? -32768.0 : scaled > 32767.0 ? 32767.0 : scaled);
+}
+
+static int16_t told_ambient_c7(const loop_t *loop)
+{
+    return to_c7(loop->ambient_c + loop->options.ambient_error_c);
 }
 
 static void read_plant(loop_t *loop)
@@ -136,6 +131,7 @@ loop_t *loop_create(const controller_settings_t *settings, const plant_t *plant,
     }
     (void)plant_set_fan(loop->plant, 0.0);
     read_plant(loop);
+    loop->inputs.ambient_c7 = told_ambient_c7(loop); /* what is known before the first tick */
     return loop;
 fail:
     free(loop);
@@ -203,8 +199,9 @@ static void flow(loop_t *loop)
                                                     spring_ohm[k], c->loop_ohm);
         }
         c->voltage_v = c->current_a * spring_ohm[k];
-        c->power_w = c->fault == ELECTRICS_FAULT_NONE ? c->current_a * c->voltage_v : 0.0;
-        c->energy_j += c->power_w * LOOP_TICK_S;
+        if (c->fault == ELECTRICS_FAULT_NONE) {
+            c->energy_j += c->current_a * c->voltage_v * LOOP_TICK_S;
+        }
         electrics_ina219_advance(&c->sensor, LOOP_TICK_S, c->current_a, c->voltage_v);
         sum_a += c->current_a;
     }
@@ -236,7 +233,7 @@ void loop_tick(loop_t *loop)
             read_sensor(loop, k);
         }
     }
-    loop->inputs.ambient_c7 = to_c7(loop->ambient_c + loop->options.ambient_error_c);
+    loop->inputs.ambient_c7 = told_ambient_c7(loop);
     loop->inputs.fan_percent = loop->outputs.fan_percent;
     controller_tick(&loop->controller, &loop->inputs, &loop->outputs);
     uint8_t fan_percent = loop->fan_stopped ? 0 : loop->outputs.fan_percent;
@@ -262,8 +259,7 @@ static void boot(loop_t *loop, bool keeps_memory)
 {
     thermal_model_state_t state;
     thermal_model_get_state(&loop->controller.model, &state);
-    (void)controller_init(&loop->controller, &loop->settings,
-                          to_c7(loop->ambient_c + loop->options.ambient_error_c), NULL);
+    (void)controller_init(&loop->controller, &loop->settings, told_ambient_c7(loop), NULL);
     if (!keeps_memory || !thermal_model_set_state(&loop->controller.model, &state)) {
         /* as the firmware: as hot as they could be, just below the trip */
         int32_t hot_cc = (int32_t)loop->settings.safety.temperature_trip_cc - 500;
@@ -275,10 +271,10 @@ static void boot(loop_t *loop, bool keeps_memory)
 bool loop_act(loop_t *loop, loop_action_t action, int spring)
 {
     if ((unsigned)action >= LOOP_ACTION_COUNT ||
-        (loop_action_needs_spring(action) && (spring < 0 || spring >= loop->springs))) {
+        (is_of_one_spring(action) && (spring < 0 || spring >= loop->springs))) {
         return false;
     }
-    channel_t *c = loop_action_needs_spring(action) ? &loop->channel[spring] : NULL;
+    channel_t *c = is_of_one_spring(action) ? &loop->channel[spring] : NULL;
     switch (action) {
     case LOOP_ACTION_OPEN_SPRING:
         c->fault = ELECTRICS_FAULT_OPEN;
@@ -303,6 +299,8 @@ bool loop_act(loop_t *loop, loop_action_t action, int spring)
         break;
     case LOOP_ACTION_SENSOR_GOOD:
         c->status = CONTROLLER_SENSOR_OK;
+        break;
+    case LOOP_ACTION_BUS_GOOD:
         loop->bus_stuck = false;
         break;
     case LOOP_ACTION_FAN_STOP:
@@ -361,11 +359,6 @@ double loop_current_a(const loop_t *loop, int spring)
 double loop_voltage_v(const loop_t *loop, int spring)
 {
     return channel(loop, spring)->voltage_v;
-}
-
-double loop_power_w(const loop_t *loop, int spring)
-{
-    return channel(loop, spring)->power_w;
 }
 
 double loop_sum_current_a(const loop_t *loop)

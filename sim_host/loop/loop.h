@@ -29,18 +29,14 @@ typedef enum {
     LOOP_ACTION_SENSOR_BUS,   /* all sensors: SDA stuck low */
     LOOP_ACTION_SENSOR_STALE, /* one sensor: no new conversions */
     LOOP_ACTION_SENSOR_RESET, /* one sensor: lost its configuration once; it is written again */
-    LOOP_ACTION_SENSOR_GOOD,  /* one sensor; also ends LOOP_ACTION_SENSOR_BUS */
+    LOOP_ACTION_SENSOR_GOOD,  /* one sensor: answers and converts again */
+    LOOP_ACTION_BUS_GOOD,     /* ends LOOP_ACTION_SENSOR_BUS */
     LOOP_ACTION_FAN_STOP,     /* the fan stands whatever it is told */
     LOOP_ACTION_FAN_GOOD,
     LOOP_ACTION_WATCHDOG,  /* reset: boots locked, the model's state survives */
     LOOP_ACTION_BROWN_OUT, /* supply lost and back: boots locked, the model assumes hot springs */
     LOOP_ACTION_COUNT
 } loop_action_t;
-
-/* The action's name in scenario files ("open_spring"), NULL out of range. */
-const char *loop_action_name(loop_action_t action);
-/* True if the action is of one spring (or its sensor), false if of the whole board. */
-bool loop_action_needs_spring(loop_action_t action);
 
 typedef struct {
     unsigned sensor_samples; /* averaged conversions of the INA219s: 1, 2, 4 .. 128 */
@@ -84,7 +80,6 @@ double loop_time_s(const loop_t *loop);
  */
 double loop_current_a(const loop_t *loop, int spring);
 double loop_voltage_v(const loop_t *loop, int spring);
-double loop_power_w(const loop_t *loop, int spring);
 double loop_sum_current_a(const loop_t *loop);
 /* Highest sum of currents since loop_create, A. */
 double loop_highest_sum_current_a(const loop_t *loop);
