@@ -8,12 +8,52 @@
 namespace ninespring
 {
 
-void check_outputs(const std::vector<std::string> &outputs, const std::vector<std::string> &inputs)
+CLI::Option *add_output_option(CLI::App &command, const std::string &names, std::string &path,
+                               const std::string &text)
+{
+    return command.add_option(names, path, text)
+        ->check(CLI::Validator(
+            [](const std::string &value) {
+                return std::string(value.empty() ? "is empty; name a file to write" : "");
+            },
+            ""));
+}
+
+void add_seconds_option(CLI::App &command, const std::string &name, double &seconds,
+                        const std::string &text)
+{
+    command.add_option(name, seconds, text)
+        ->check(CLI::Validator(
+            [](const std::string &value) {
+                double parsed = 0.0;
+                std::string problem = parse_number(value, parsed);
+                if (problem.empty() && parsed < 0.0) {
+                    problem = fmt::format("{} is negative; write 0 or more seconds", value);
+                }
+                return problem;
+            },
+            ""));
+}
+
+bool check_outputs(const std::vector<std::string> &outputs, const std::vector<std::string> &inputs)
 {
     namespace fs = std::filesystem;
     std::error_code ignored;
+    const auto whole = [&](const std::string &path) {
+        return path == "-" ? fs::path(path) : fs::weakly_canonical(fs::absolute(path), ignored);
+    };
+    bool table = true;
     for (const std::string &output : outputs) {
-        if (output.empty() || output == "-") {
+        if (output.empty()) {
+            continue;
+        }
+        for (const std::string &other : outputs) {
+            if (&other != &output && !other.empty() && whole(other) == whole(output)) {
+                throw input_error(output, 0, 0, "is named for two outputs; use two files");
+            }
+        }
+        if (output == "-") {
+            table = false;
             continue;
         }
         const fs::path folder = fs::absolute(output, ignored).parent_path();
@@ -29,12 +69,24 @@ void check_outputs(const std::vector<std::string> &outputs, const std::vector<st
                                   "is an input of this command; write to another file");
             }
         }
-        for (const std::string &other : outputs) {
-            if (&other != &output && other == output) {
-                throw input_error(output, 0, 0, "is named for two outputs; use two files");
-            }
+    }
+    return table;
+}
+
+bool mentions(std::string_view message, std::string_view name)
+{
+    const auto of_a_name = [](char c) {
+        return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '_';
+    };
+    for (std::size_t at = message.find(name); at != std::string_view::npos;
+         at = message.find(name, at + 1)) {
+        const std::size_t end = at + name.size();
+        if ((at == 0 || !of_a_name(message[at - 1])) &&
+            (end == message.size() || !of_a_name(message[end]))) {
+            return true;
         }
     }
+    return false;
 }
 
 std::string json_text(const nlohmann::ordered_json &value)

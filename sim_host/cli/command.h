@@ -9,6 +9,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "plant.h"
@@ -30,9 +31,20 @@ struct plant_deleter {
 };
 using plant_pointer = std::unique_ptr<plant_t, plant_deleter>;
 
-/* Before the work: an output in a missing folder, or over an input, is refused (input_error). Empty
- * paths are skipped. */
-void check_outputs(const std::vector<std::string> &outputs, const std::vector<std::string> &inputs);
+/* An option that names a file to write (an empty name is refused), or `-` for standard output. */
+CLI::Option *add_output_option(CLI::App &command, const std::string &names, std::string &path,
+                               const std::string &text);
+/* An option of seconds, 0 or more; anything else is refused. */
+void add_seconds_option(CLI::App &command, const std::string &name, double &seconds,
+                        const std::string &text);
+
+/* Before the work: an output in a missing folder, over an input, or named for two, is refused
+ * (input_error). Empty paths are skipped. True if standard output is free for a table: no output is
+ * `-`. */
+bool check_outputs(const std::vector<std::string> &outputs, const std::vector<std::string> &inputs);
+
+/* True if `message` holds `name` as a whole word: by it a refusal finds its place in a file. */
+bool mentions(std::string_view message, std::string_view name);
 
 /* The JSON as it is written everywhere: two blanks of indent, NaN as null, a line end. */
 std::string json_text(const nlohmann::ordered_json &value);

@@ -10,7 +10,7 @@
 
 #include "board.h"
 #include "board_pty.h"
-#include "command.h"
+#include "scenario_plant.h"
 #include "simulated_board.h"
 
 namespace ninespring
@@ -27,6 +27,7 @@ void on_signal(int)
 }
 
 struct board_arguments {
+    plant_arguments array;
     std::string elf;
     std::string speed = "1";
     std::string eeprom;
@@ -103,11 +104,9 @@ private:
 void run_board(const board_arguments &arguments)
 {
     const double speed = speed_of(arguments.speed);
-    const plant_pointer plant(plant_create(3, 3));
-    if (!plant) {
-        throw std::bad_alloc();
-    }
-    simulated_board board(arguments.elf, plant.get(), 1);
+    const described_plant array = describe_plant(arguments.array);
+    simulated_board board(arguments.elf, array.plant.get(), array.seed, array.shunt_noise_v,
+                          array.bus_noise_v);
     eeprom_file eeprom(arguments.eeprom, board.get());
     terminal port;
     std::signal(SIGINT, on_signal);
@@ -153,10 +152,9 @@ void add_command_board(CLI::App &app)
         ->capture_default_str();
     command->add_option("--eeprom", arguments->eeprom,
                         "File that keeps the EEPROM; made if it is not there");
-    command
-        ->add_option("--duration", arguments->duration_s,
-                     "Simulated seconds after which it ends; 0: never")
-        ->check(CLI::NonNegativeNumber);
+    add_plant_options(*command, arguments->array);
+    add_seconds_option(*command, "--duration", arguments->duration_s,
+                       "Simulated seconds after which it ends; 0: never");
     command->callback([arguments] { run_board(*arguments); });
 }
 

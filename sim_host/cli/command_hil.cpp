@@ -12,10 +12,10 @@
 #include <termios.h>
 #include <unistd.h>
 
-#include "command.h"
 #include "controller.h"
 #include "electrics.h"
 #include "hil_frame.h"
+#include "scenario_plant.h"
 
 namespace ninespring
 {
@@ -115,13 +115,16 @@ struct hil_statistics {
 class hil_world
 {
 public:
-    hil_world() : plant_(plant_create(3, 3))
+    explicit hil_world(described_plant array)
+        : plant_(std::move(array.plant)), springs_(plant_spring_count(plant_.get()))
     {
-        if (!plant_) {
-            throw std::bad_alloc();
+        if (springs_ > SPRINGS) {
+            throw input_error(
+                fmt::format("the board drives {} springs, the plant has {}", SPRINGS, springs_));
         }
         for (unsigned k = 0; k < SPRINGS; ++k) {
-            electrics_ina219_init(&sensors_[k], SENSOR_SAMPLES, 0.0, 0.0, k + 1);
+            electrics_ina219_init(&sensors_[k], SENSOR_SAMPLES, array.shunt_noise_v,
+                                  array.bus_noise_v, array.seed + k);
         }
     }
 
@@ -130,17 +133,17 @@ public:
         const auto parts = static_cast<unsigned>(std::lround(ticks * TICK_S / PART_S));
         for (unsigned part = 0; part < parts; ++part) {
             plant_step(plant_.get(), PART_S);
-            for (int k = 0; k < SPRINGS; ++k) {
+            for (int k = 0; k < SPRINGS; ++k) { /* nothing flows where no spring is connected */
                 electrics_ina219_advance(&sensors_[static_cast<std::size_t>(k)], PART_S,
-                                         plant_current_a(plant_.get(), k),
-                                         plant_voltage_v(plant_.get(), k));
+                                         current_a(k),
+                                         k < springs_ ? plant_voltage_v(plant_.get(), k) : 0.0);
             }
         }
     }
 
     void drive(const hil_frame_duties_t &duties)
     {
-        for (int k = 0; k < std::min<int>(SPRINGS, duties.springs); ++k) {
+        for (int k = 0; k < std::min<int>(springs_, duties.springs); ++k) {
             const double steps = std::min<double>(duties.duty[k], CONTROLLER_DUTY_MAX);
             plant_drive(plant_.get(), k, PLANT_DRIVE_DUTY, steps / CONTROLLER_DUTY_MAX);
         }
@@ -166,17 +169,25 @@ public:
         return {line, hil_frame_encode_sensors(&frame, line)};
     }
 
-    plant_t *plant() { return plant_.get(); }
+    [[nodiscard]] double current_a(int k) const
+    {
+        return k < springs_ ? plant_current_a(plant_.get(), k) : 0.0;
+    }
+    [[nodiscard]] double time_s() const { return plant_time_s(plant_.get()); }
 
 private:
     plant_pointer plant_;
+    int springs_;
     electrics_ina219_t sensors_[SPRINGS];
 };
 
 class hil_session
 {
 public:
-    explicit hil_session(serial_port &port) : port_(port) { hil_frame_decoder_init(&decoder_); }
+    hil_session(serial_port &port, described_plant array) : port_(port), world_(std::move(array))
+    {
+        hil_frame_decoder_init(&decoder_);
+    }
 
     /* Takes what has come; answers the newest duties. */
     void turn()
@@ -213,7 +224,6 @@ public:
     }
 
     [[nodiscard]] const hil_statistics &statistics() const { return statistics_; }
-    hil_world &world() { return world_; }
     /* Lines that the board's console has answered: `ok` or `error:...`. */
     [[nodiscard]] std::size_t answers() const { return answers_; }
 
@@ -246,10 +256,9 @@ private:
         world_.drive(duties);
         tick_ = duties.tick;
         ++statistics_.ticks;
-        statistics_.simulated_s = plant_time_s(world_.plant());
+        statistics_.simulated_s = world_.time_s();
         for (int k = 0; k < SPRINGS; ++k) {
-            statistics_.final_current_a[static_cast<std::size_t>(k)] =
-                plant_current_a(world_.plant(), k);
+            statistics_.final_current_a[static_cast<std::size_t>(k)] = world_.current_a(k);
         }
     }
 
@@ -264,6 +273,7 @@ private:
 };
 
 struct hil_arguments {
+    plant_arguments array;
     std::string port;
     std::vector<std::string> lines;
     double duration_s = 0.0;
@@ -306,9 +316,10 @@ void forward_typed(serial_port &port)
 
 void run_hil(const hil_arguments &arguments)
 {
-    check_outputs({arguments.json}, {});
+    check_outputs({arguments.json}, {arguments.array.scenario_path});
+    described_plant array = describe_plant(arguments.array);
     serial_port port(arguments.port);
-    hil_session session(port);
+    hil_session session(port, std::move(array));
     std::signal(SIGINT, on_signal);
     std::signal(SIGTERM, on_signal);
     const bool typed = isatty(STDIN_FILENO) != 0;
@@ -348,11 +359,10 @@ void add_command_hil(CLI::App &app)
         ->add_option("--send", arguments->lines,
                      "Console line for the board, half a second apart; may be repeated")
         ->allow_extra_args(false);
-    command
-        ->add_option("--duration", arguments->duration_s,
-                     "Simulated seconds after which it ends; 0: Ctrl-C")
-        ->check(CLI::NonNegativeNumber);
-    command->add_option("--json", arguments->json, "Frames, losses and lag for programs");
+    add_plant_options(*command, arguments->array);
+    add_seconds_option(*command, "--duration", arguments->duration_s,
+                       "Simulated seconds after which it ends; 0: Ctrl-C");
+    add_output_option(*command, "--json", arguments->json, "Frames, losses and lag for programs");
     command->callback([arguments] { run_hil(*arguments); });
 }
 

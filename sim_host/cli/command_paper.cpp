@@ -35,7 +35,7 @@ struct square_sum {
 
 void paper(const paper_options &options)
 {
-    check_outputs({options.output, options.json_path}, {});
+    const bool wants_table = check_outputs({options.output, options.json_path}, {});
     plant_pointer plant(plant_create(3, 3));
     if (plant == nullptr) {
         throw work_error("memory is out");
@@ -86,7 +86,7 @@ void paper(const paper_options &options)
             options.json_path,
             json_text({{"schema", "ninespring.paper/1"}, {"errors", rms}, {"cases", cases}}));
     }
-    if (options.output != "-") {
+    if (wants_table) {
         fmt::print(
             "{}"
             "COMSOL: {:.2f} degC rms, largest {:.2f}\n"
@@ -106,11 +106,10 @@ void add_command_paper(CLI::App &app)
         "paper",
         "The paper's conditions: 3 pitches, fan off and on, against COMSOL and the camera");
     auto options = std::make_shared<paper_options>();
-    command
-        ->add_option("-o,--output", options->output,
-                     "The table to write (CSV), '-' for standard output")
+    add_output_option(*command, "-o,--output", options->output,
+                      "The table to write (CSV), '-' for standard output")
         ->required();
-    command->add_option("--json", options->json_path, "Write the table to this JSON file");
+    add_output_option(*command, "--json", options->json_path, "Write the table to this JSON file");
     command->callback([options] { paper(*options); });
 }
 

@@ -12,21 +12,23 @@ namespace
 
 void list_parameters(const std::string &json_path)
 {
-    check_outputs({json_path}, {});
+    const bool wants_table = check_outputs({json_path}, {});
+    std::string table = fmt::format("{:<34} {:>12} {:<8} {:>10} {:>10}  {}\n", "parameter",
+                                    "default", "unit", "least", "most", "what it is");
     nlohmann::ordered_json list = nlohmann::ordered_json::array();
-    fmt::print("{:<34} {:>12} {:<8} {:>10} {:>10}  {}\n", "parameter", "default", "unit", "least",
-               "most", "what it is");
     std::string effect = "-";
     for (std::size_t k = 0; k < plant_parameter_count(); ++k) {
         const plant_parameter_t &one = *plant_parameter(k);
         const std::string own = one.effect == nullptr ? "" : one.effect;
         if (own != effect) {
             effect = own;
-            fmt::print("{}\n", effect.empty() ? "[always]" : fmt::format("[effect {}]", effect));
+            table += fmt::format("{}\n",
+                                 effect.empty() ? "[always]" : fmt::format("[effect {}]", effect));
         }
-        fmt::print("{:<34} {:>12.6g} {:<8} {:>10.4g} {:>10.4g}  {}\n",
-                   fmt::format("{}{}", one.name, one.per_spring ? "[K]" : ""), one.default_value,
-                   one.unit, one.minimum, one.maximum, one.description);
+        table +=
+            fmt::format("{:<34} {:>12.6g} {:<8} {:>10.4g} {:>10.4g}  {}\n",
+                        fmt::format("{}{}", one.name, one.per_spring ? "[K]" : ""),
+                        one.default_value, one.unit, one.minimum, one.maximum, one.description);
         list.push_back({{"name", one.name},
                         {"unit", one.unit},
                         {"effect", own.empty() ? nlohmann::ordered_json(nullptr)
@@ -42,6 +44,9 @@ void list_parameters(const std::string &json_path)
                                                {"effects", plant_effect_names()},
                                                {"parameters", list}}));
     }
+    if (wants_table) {
+        fmt::print("{}", table);
+    }
 }
 
 } // namespace
@@ -51,7 +56,7 @@ void add_command_parameters(CLI::App &app)
     CLI::App *command = app.add_subcommand(
         "parameters", "Lists the plant's parameters: names, units, limits, and their effects");
     auto json_path = std::make_shared<std::string>();
-    command->add_option("--json", *json_path, "Write the list to this JSON file");
+    add_output_option(*command, "--json", *json_path, "Write the list to this JSON file");
     command->callback([json_path] { list_parameters(*json_path); });
 }
 

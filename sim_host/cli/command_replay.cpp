@@ -226,6 +226,18 @@ void check_command_power(const log_data &log, const plant_t *plant, const std::s
     }
 }
 
+/* Where the model sets a parameter that `message` names: the last one, or the file. */
+source_place place_of(const model_description &model, std::string_view message)
+{
+    source_place found{model.name, 0, 0};
+    for (const model_parameter &one : model.parameters) {
+        if (mentions(message, one.name)) {
+            found = one.place;
+        }
+    }
+    return found;
+}
+
 void write_columns(log_writer &writer, const log_data &log, bool shown)
 {
     const std::size_t springs = log.springs.size();
@@ -277,7 +289,8 @@ void print_errors(const replay_options &options, const std::vector<error_sum> &e
 
 void replay(const replay_options &options)
 {
-    check_outputs({options.output, options.json_path}, {options.log_path, options.model_path});
+    const bool wants_table =
+        check_outputs({options.output, options.json_path}, {options.log_path, options.model_path});
     const model_description model = read_model(options.model_path);
     const auto springs = static_cast<std::size_t>(model.array.rows * model.array.cols);
     const log_data log = read_log(options.log_path, springs);
@@ -294,14 +307,14 @@ void replay(const replay_options &options)
     apply_model(plant.get(), model);
     const char *why = nullptr;
     if (plant_check(plant.get(), &why) != PLANT_OK) {
-        throw input_error(options.model_path, 0, 0, why == nullptr ? "is refused" : why);
+        throw place_of(model, why == nullptr ? "" : why).error(why == nullptr ? "is refused" : why);
     }
     plant_reset(plant.get());
     check_command_power(log, plant.get(), options.model_path);
     thermal_model_parameters_t chip{};
     char message[256] = "";
     if (chip_mapping_from_plant(plant.get(), &chip, message, sizeof message) != CHIP_MAPPING_OK) {
-        throw input_error(options.model_path, 0, 0, message);
+        throw place_of(model, message).error(message);
     }
 
     /* The plant is only the sensor here: its springs are held at the chip's temperatures. */
@@ -386,7 +399,7 @@ void replay(const replay_options &options)
                        {"left_out", message},
                        {"springs", list}}));
     }
-    if (options.output != "-") {
+    if (wants_table) {
         print_errors(options, errors, shown_errors, shown, all.rms());
         if (message[0] != '\0') {
             fmt::print("{}\n", message);
@@ -404,11 +417,10 @@ void add_command_replay(CLI::App &app)
     command->add_option("log", options->log_path, "The log (docs/files.md)")->required();
     command->add_option("--model", options->model_path, "The model.toml that describes the array")
         ->required();
-    command
-        ->add_option("-o,--output", options->output,
-                     "The log to write, with the model's m1_c, x1, ...; '-' for standard output")
+    add_output_option(*command, "-o,--output", options->output,
+                      "The log to write, with the model's m1_c, x1, ...; '-' for standard output")
         ->required();
-    command->add_option("--json", options->json_path, "Write the errors to this JSON file");
+    add_output_option(*command, "--json", options->json_path, "Write the errors to this JSON file");
     command->callback([options] { replay(*options); });
 }
 

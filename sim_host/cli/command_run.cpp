@@ -4,15 +4,13 @@
 #include <cmath>
 #include <filesystem>
 #include <fmt/format.h>
-#include <optional>
 
 #include "chip_mapping.h"
 #include "electrics.h"
 #include "log_file.h"
 #include "model_file.h"
-#include "paper.h"
 #include "runner.h"
-#include "scenario_file.h"
+#include "scenario_plant.h"
 
 namespace ninespring
 {
@@ -26,55 +24,23 @@ struct run_options {
     std::string elf;
     std::string policy;
     std::vector<std::string> sets;
-    std::optional<std::uint64_t> seed;
+    std::string seed;
     std::string output;
     std::string json_path;
 };
 
-plant_pointer make_plant(const scenario &plan)
+/* The model.toml that [chip] names, from the scenario's folder; empty if it names none. */
+std::string model_path(const scenario &plan)
 {
-    plant_pointer plant(plant_create(plan.rows, plan.cols));
-    if (plant == nullptr) {
-        throw input_error(plan.name, 0, 0, "there is no plant of these rows and cols");
+    if (plan.model_path.empty() || plan.model_path == "plant" || plan.model_path == "defaults") {
+        return {};
     }
-    /* The pitch gives the paper's loss and couplings; what [plant] says comes after it. */
-    if (plan.pitch_mm && paper_configure(plant.get(), *plan.pitch_mm) != PLANT_OK) {
-        throw input_error(plan.name, 0, 0,
-                          "[array] pitch_mm: the spacing law holds for 1 to 100 mm");
-    }
-    for (const scenario_entry &effect : plan.effects) {
-        set_plant_effect(plant.get(), effect.key, effect.place);
-    }
-    /* What is said of all springs first, so that the order in the file does not matter. */
-    for (const bool one_spring : {false, true}) {
-        for (const scenario_entry &entry : plan.plant) {
-            if ((entry.key.find('[') != std::string::npos) != one_spring) {
-                continue;
-            }
-            double value = 0.0;
-            const std::string problem = parse_number(entry.value, value);
-            if (!problem.empty()) {
-                throw entry.place.error(fmt::format("{}: {}", entry.key, problem));
-            }
-            const std::string_view name =
-                std::string_view(entry.key).substr(0, entry.key.find('['));
-            set_plant_parameter(plant.get(), entry.key, value,
-                                find_plant_parameter(name) == nullptr ? entry.key_place
-                                                                      : entry.place);
-        }
-    }
-    const char *message = nullptr;
-    if (plant_check(plant.get(), &message) != PLANT_OK) {
-        throw input_error(plan.name, 0, 0,
-                          fmt::format("[plant] {}", message == nullptr ? "is refused" : message));
-    }
-    plant_reset(plant.get());
-    return plant;
+    return (std::filesystem::path(plan.name).parent_path() / plan.model_path).string();
 }
 
 /* What the chip is told of the array: the plant's own numbers, its defaults, or a fitted model's.
- */
-void set_chip_model(const scenario &plan, const plant_t *plant, settings_t &settings)
+ * Gives what of it the chip leaves out, in words; mostly nothing. */
+std::string set_chip_model(const scenario &plan, const plant_t *plant, settings_t &settings)
 {
     thermal_model_parameters_t &model = settings.controller.model;
     std::string path = plan.model_path.empty() ? "plant" : plan.model_path;
@@ -82,19 +48,18 @@ void set_chip_model(const scenario &plan, const plant_t *plant, settings_t &sett
     if (path == "defaults") {
         model.rows = static_cast<std::uint8_t>(plan.rows);
         model.columns = static_cast<std::uint8_t>(plan.cols);
-        return;
+        return {};
     }
     if (path == "plant") {
         if (chip_mapping_from_plant(plant, &model, message, sizeof message) != CHIP_MAPPING_OK) {
-            throw input_error(plan.name, 0, 0,
-                              fmt::format("the chip cannot hold the plant's parameters: {}; write "
-                                          "[chip] model = defaults, or a model.toml",
-                                          message));
+            throw place_of(plan, message)
+                .error(fmt::format("the chip cannot hold the plant's parameters: {}; write "
+                                   "[chip] model = defaults, or a model.toml",
+                                   message));
         }
-        return;
+        return message;
     }
-    const std::filesystem::path folder = std::filesystem::path(plan.name).parent_path();
-    const model_description fitted = read_model((folder / path).string());
+    const model_description fitted = read_model(model_path(plan));
     if (fitted.array.rows != plan.rows || fitted.array.cols != plan.cols) {
         throw plan.model_place.error(
             fmt::format("{} is of {} x {} springs, the scenario of {} x {}", path,
@@ -109,12 +74,13 @@ void set_chip_model(const scenario &plan, const plant_t *plant, settings_t &sett
         CHIP_MAPPING_OK) {
         throw plan.model_place.error(fmt::format("the chip cannot hold {}: {}", path, message));
     }
+    return message;
 }
 
-void set_chip(const scenario &plan, const plant_t *plant, settings_t &settings)
+std::string set_chip(const scenario &plan, const plant_t *plant, settings_t &settings)
 {
     settings_default(&settings);
-    set_chip_model(plan, plant, settings);
+    std::string left_out = set_chip_model(plan, plant, settings);
     for (const scenario_entry &entry : plan.settings) {
         switch (settings_assign(&settings, entry.key.c_str(), entry.value.c_str())) {
         case SETTINGS_OK:
@@ -153,6 +119,7 @@ void set_chip(const scenario &plan, const plant_t *plant, settings_t &settings)
     } else if (plan.policy == "open") {
         settings.controller.policy.policy = DRIVE_POLICY_OPEN;
     }
+    return left_out;
 }
 
 /* Mean readings over one log interval. Voltage is weighted with current, so that v x i is the mean
@@ -354,21 +321,28 @@ void print_summary(const nlohmann::ordered_json &result)
     if (result["board_fault"] != "none") {
         fmt::print("board fault: {}\n", result["board_fault"].get<std::string>());
     }
+    if (result["left_out"] != "") {
+        fmt::print("{}\n", result["left_out"].get<std::string>());
+    }
 }
 
 void run(const run_options &options)
 {
-    check_outputs({options.output, options.json_path}, {options.scenario_path});
+    if (!options.elf.empty() && options.board != "avr") {
+        throw input_error("--elf: the native board runs no ELF; add --board avr");
+    }
     scenario plan = read_scenario(options.scenario_path, options.sets);
-    if (options.seed) {
-        plan.seed = *options.seed;
+    const bool table = check_outputs({options.output, options.json_path},
+                                     {options.scenario_path, options.elf, model_path(plan)});
+    if (!options.seed.empty()) {
+        plan.seed = parse_seed(options.seed, {"--seed", 0, 0});
     }
     if (!options.policy.empty()) {
         plan.policy = options.policy;
     }
-    const plant_pointer plant = make_plant(plan);
+    const plant_pointer plant = scenario_plant(plan);
     settings_t settings{};
-    set_chip(plan, plant.get(), settings);
+    const std::string left_out = set_chip(plan, plant.get(), settings);
     const std::unique_ptr<runner> board =
         make_runner(options.board, {&plan, plant.get(), &settings, options.elf});
 
@@ -401,12 +375,13 @@ void run(const run_options &options)
     }
     record.end_row(*board);
 
-    const nlohmann::ordered_json result = record.result(*board, options.board);
+    nlohmann::ordered_json result = record.result(*board, options.board);
+    result["left_out"] = left_out;
     write_file_whole(options.output, record.text());
     if (!options.json_path.empty()) {
         write_file_whole(options.json_path, json_text(result));
     }
-    if (options.output != "-") {
+    if (table) {
         print_summary(result);
     }
 }
@@ -420,7 +395,8 @@ void add_command_run(CLI::App &app)
     auto options = std::make_shared<run_options>();
     command->add_option("scenario", options->scenario_path, "The scenario (docs/files.md)")
         ->required();
-    command->add_option("-o,--output", options->output, "The log to write, '-' for standard output")
+    add_output_option(*command, "-o,--output", options->output,
+                      "The log to write, '-' for standard output")
         ->required();
     command
         ->add_option("--board", options->board,
@@ -437,7 +413,8 @@ void add_command_run(CLI::App &app)
         ->take_all()
         ->allow_extra_args(false);
     command->add_option("--seed", options->seed, "Overrides the scenario's seed");
-    command->add_option("--json", options->json_path, "Write the summary to this JSON file");
+    add_output_option(*command, "--json", options->json_path,
+                      "Write the summary to this JSON file");
     command->callback([options] { run(*options); });
 }
 

@@ -21,6 +21,17 @@ int refuse(const std::string &message, int code)
     return code;
 }
 
+/* What CLI11 only calls a missing subcommand. */
+std::string no_command(CLI::App &app, const std::string &word)
+{
+    std::vector<std::string> names;
+    for (const CLI::App *sub : app.get_subcommands(nullptr)) {
+        names.push_back(sub->get_name());
+    }
+    return fmt::format("there is no command {}{}; see ninespring-sim --help",
+                       ninespring::in_quotes(word), ninespring::did_you_mean(word, names));
+}
+
 } // namespace
 
 int main(int argc, char **argv)
@@ -51,6 +62,9 @@ int main(int argc, char **argv)
         std::string command;
         for (const CLI::App *sub : app.get_subcommands()) {
             command = " " + sub->get_name();
+        }
+        if (command.empty() && argc > 1 && argv[1][0] != '-') {
+            return refuse(no_command(app, argv[1]), 2);
         }
         return refuse(fmt::format("{}; see ninespring-sim{} --help", error.what(), command), 2);
     } catch (const input_error &error) {

@@ -9,11 +9,12 @@
 #include "convection.h"
 
 /* Rise above the air over which the chip's straight line replaces the law of natural convection. */
-#define CONVECTION_SPAN_K 90
-#define STEP_MS           100
-#define SAME              1e-3 /* relative: springs nearer than this to each other count as equal */
-#define FAN_FULL          1.0
-#define CAPACITY_LONGEST  4294967295.0
+#define CONVECTION_SPAN_K  90
+#define STEP_MS            100
+#define SAME               1e-3 /* relative: springs nearer than this to each other count as equal */
+#define FAN_FULL           1.0
+#define CAPACITY_LONGEST   4294967295.0
+#define RESISTANCE_HIGHEST 16e6 /* uohm */
 
 typedef struct {
     const plant_t *plant;
@@ -215,6 +216,8 @@ static void map_capacity(mapping_t *m, thermal_model_parameters_t *p)
 static void map_resistance(mapping_t *m, thermal_model_parameters_t *p)
 {
     const bool phase = is_on(m, "resistance_phase"), mismatch = is_on(m, "spring_mismatch");
+    const char *martensite_name = phase ? "resistance_martensite_ohm" : "resistance_ohm";
+    const char *austenite_name = phase ? "resistance_austenite_ohm" : "resistance_ohm";
     double martensite[PLANT_MAX_SPRINGS], austenite[PLANT_MAX_SPRINGS];
     /* The chip's resistance does not depend on temperature: taken where it matters, between the
      * phases. */
@@ -224,18 +227,14 @@ static void map_resistance(mapping_t *m, thermal_model_parameters_t *p)
         phase ? 1.0 + array_value(m, "resistance_coefficient_per_k") * (middle_c - 20.0) : 1.0;
     for (int i = 0; i < m->springs; i++) {
         const double scale = warm * (mismatch ? value_of(m, "resistance_scale", i) : 1.0);
-        martensite[i] =
-            scale * value_of(m, phase ? "resistance_martensite_ohm" : "resistance_ohm", i);
-        austenite[i] =
-            scale * value_of(m, phase ? "resistance_austenite_ohm" : "resistance_ohm", i);
+        martensite[i] = scale * value_of(m, martensite_name, i);
+        austenite[i] = scale * value_of(m, austenite_name, i);
     }
     double spread = 0.0, other_spread = 0.0;
-    p->resistance_martensite_uohm =
-        (uint32_t)fitted(m, "resistance_martensite_ohm", mean_of(m, martensite, &spread), 1e-6, 1.0,
-                         CAPACITY_LONGEST);
-    p->resistance_austenite_uohm =
-        (uint32_t)fitted(m, "resistance_austenite_ohm", mean_of(m, austenite, &other_spread), 1e-6,
-                         1.0, CAPACITY_LONGEST);
+    p->resistance_martensite_uohm = (uint32_t)fitted(
+        m, martensite_name, mean_of(m, martensite, &spread), 1e-6, 1.0, RESISTANCE_HIGHEST);
+    p->resistance_austenite_uohm = (uint32_t)fitted(
+        m, austenite_name, mean_of(m, austenite, &other_spread), 1e-6, 1.0, RESISTANCE_HIGHEST);
     if (fmax(spread, other_spread) > SAME && !m->failed) {
         say(m, "resistance differs between springs: the chip takes the mean, and measures v x i");
     }
@@ -298,6 +297,23 @@ static const char *reason_of(thermal_model_status_t status)
     return "refused";
 }
 
+/* The chip's parameter as the plant calls it: they differ in the unit. */
+static void plant_name(thermal_model_parameter_t parameter, char *name, size_t size)
+{
+    static const char *const units[][2] = {
+        {"_uw_per_k", "_w_per_k"}, {"_mj", "_j"}, {"_cc", "_c"}, {"_permille", ""}};
+    const char *own = thermal_model_parameter_name(parameter);
+    for (size_t k = 0; k < sizeof units / sizeof units[0]; k++) {
+        const char *unit = strstr(own, units[k][0]);
+        if (unit != NULL) {
+            (void)snprintf(name, size, "%.*s%s%s", (int)(unit - own), own, units[k][1],
+                           unit + strlen(units[k][0]));
+            return;
+        }
+    }
+    (void)snprintf(name, size, "%s", own);
+}
+
 chip_mapping_status_t chip_mapping_from_plant(const plant_t *plant,
                                               thermal_model_parameters_t *parameters, char *message,
                                               size_t message_size)
@@ -338,7 +354,9 @@ chip_mapping_status_t chip_mapping_from_plant(const plant_t *plant,
     const thermal_model_status_t status = thermal_model_init(&model, &p, &bad);
     if (status != THERMAL_MODEL_OK) {
         message[0] = '\0';
-        say(&m, "%s is %s", thermal_model_parameter_name(bad), reason_of(status));
+        char name[64];
+        plant_name(bad, name, sizeof name);
+        say(&m, "%s is %s", name, reason_of(status));
         return CHIP_MAPPING_ERROR_MODEL;
     }
     static const char *const measurement[] = {"sensor_lag", "sensor_gain", "optical_mixing",

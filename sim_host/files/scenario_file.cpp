@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <fmt/format.h>
 #include <ini.h>
+#include <limits>
 #include <set>
 #include <sstream>
 
@@ -20,6 +21,7 @@ namespace
 /* inih's line buffer holds 200 bytes with line end and zero. */
 constexpr std::size_t MAX_LINE = 197;
 constexpr std::size_t MAX_EVENTS = 100000;
+constexpr double MOST_LOGGED = 2e7; /* rows times springs: about a gigabyte in memory */
 
 struct raw_entry {
     std::string section;
@@ -338,19 +340,13 @@ void read_scenario_key(scenario &result, const raw_entry &entry)
                 "log_interval_s must be a multiple of 0.02 (one control tick)");
         }
     } else if (entry.key == "seed") {
-        const char *end = entry.value.data() + entry.value.size();
-        const auto [stop, status] = std::from_chars(entry.value.data(), end, result.seed);
-        if (status != std::errc() || stop != end) {
-            throw entry.value_place.error(
-                fmt::format("seed {} must be a whole number, 0 or more", in_quotes(entry.value)));
-        }
+        result.seed = parse_seed(entry.value, entry.value_place);
     } else if (entry.key == "policy") {
         if (entry.value != "open" && entry.value != "precompensate") {
             throw entry.value_place.error(fmt::format(
                 "there is no policy {}; write open or precompensate", in_quotes(entry.value)));
         }
         result.policy = entry.value;
-        result.policy_place = entry.value_place;
     } else {
         refuse_key(entry, {"duration_s", "log_interval_s", "seed", "policy"});
     }
@@ -395,6 +391,7 @@ void read_entry(scenario &result, const raw_entry &entry)
             result.cols = whole(entry, 1, 64);
         } else if (entry.key == "pitch_mm") {
             result.pitch_mm = number(entry, 0.1, 1000.0);
+            result.pitch_place = entry.value_place;
         } else {
             refuse_key(entry, {"rows", "cols", "pitch_mm"});
         }
@@ -496,20 +493,16 @@ raw_entry argument_entry(const std::string &argument)
 
 } // namespace
 
-const char *failure_name(scenario_failure what)
+std::uint64_t parse_seed(const std::string &text, const source_place &place)
 {
-    for (const failure_word &one : FAILURES) {
-        if (one.what == what) {
-            return one.name;
-        }
+    std::uint64_t seed = 0;
+    const char *end = text.data() + text.size();
+    const auto [stop, status] = std::from_chars(text.data(), end, seed);
+    if (status != std::errc() || stop != end) {
+        throw place.error(fmt::format("seed {} must be a whole number, 0 to {}", in_quotes(text),
+                                      std::numeric_limits<std::uint64_t>::max()));
     }
-    return "none";
-}
-
-bool is_plant_word(scenario_word word)
-{
-    return word == scenario_word::room || word == scenario_word::fail ||
-           word == scenario_word::repair;
+    return seed;
 }
 
 scenario parse_scenario(const text_file &file, const std::vector<std::string> &arguments)
@@ -550,6 +543,13 @@ scenario parse_scenario(const text_file &file, const std::vector<std::string> &a
     if (result.duration_s <= 0.0) {
         throw input_error(file.name, 1, 1,
                           "[scenario] is without duration_s; add how long to run, in seconds");
+    }
+    const double values = result.duration_s / result.log_interval_s * result.rows * result.cols;
+    if (values > MOST_LOGGED) {
+        throw input_error(file.name, 1, 1,
+                          fmt::format("[scenario] the log would hold {:.3g} rows of springs, at "
+                                      "most {:.3g}; make log_interval_s longer",
+                                      values, MOST_LOGGED));
     }
     if (result.rows * result.cols > 64) {
         throw input_error(

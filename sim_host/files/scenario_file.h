@@ -68,10 +68,10 @@ struct scenario {
     double log_interval_s = 1.0;
     std::uint64_t seed = 1;
     std::string policy; /* empty: as the settings say */
-    source_place policy_place;
     int rows = 3;
     int cols = 3;
     std::optional<double> pitch_mm;
+    source_place pitch_place;
     std::string model_path; /* [chip] model: "plant", "defaults" or a model.toml, from the
                                scenario's folder */
     source_place model_place;
@@ -90,9 +90,8 @@ struct scenario {
 scenario read_scenario(const std::string &path, const std::vector<std::string> &arguments = {});
 scenario parse_scenario(const text_file &file, const std::vector<std::string> &arguments = {});
 
-const char *failure_name(scenario_failure what);
-/* True for the words that act on the plant, not on the board. */
-bool is_plant_word(scenario_word word);
+/* A whole number, 0 or more; anything else fails (input_error) at `place`. */
+std::uint64_t parse_seed(const std::string &text, const source_place &place);
 
 } // namespace ninespring
 #endif

@@ -30,7 +30,8 @@ def main() -> int:
         run = subprocess.run(
             [
                 program, "hil", "--port", board.port, "--duration", str(SIMULATED_S), "--json", str(result),
-                "--send", "on 1", "--send", "model", "--send", "frobnicate",
+                "--set", "array.rows=1", "--set", "array.cols=2",
+                "--send", "on 1", "--send", "on 3", "--send", "model", "--send", "frobnicate",
             ],
             check=False, capture_output=True, text=True, timeout=120,
         )  # fmt: skip
@@ -47,6 +48,8 @@ def main() -> int:
     assert "spring 1:" in run.stdout
     assert summary["final_current_a"][0] > 1.0, summary
     assert summary["final_current_a"][1] == 0.0, summary
+    # A 1 x 2 array: nothing is connected to channel 3.
+    assert summary["final_current_a"][2] == 0.0, summary
     missing = subprocess.run(
         [program, "hil", "--port", "/no/such/port"],
         check=False,

@@ -103,17 +103,33 @@ class Arguments(Case):
 
     def test_wrong_arguments(self) -> None:
         self.refused("", "--help")
-        self.refused("", "--help", "dance")
+        self.refused("there is no command 'dance'", "--help", "dance")
+        self.refused("there is no command 'pape'", "did you mean paper?", "pape")
         self.refused("", "run --help", "run")
         self.refused("", "--best", "run", "x.ini", "-o", "y.csv", "--best")
-        self.refused("", "--seed", "run", "x.ini", "-o", "y.csv", "--seed", "many")
         self.refused("", "--policy", "run", "x.ini", "-o", "y.csv", "--policy", "best")
+        scenario = self.file("s.ini", SCENARIO)
+        for seed in ("-1", "1.5", "99999999999999999999", "0x10", "many"):
+            self.refused("--seed: ", "whole number", "run", scenario, "-o", "y.csv", "--seed", seed)
+        self.refused("--elf: ", "--board avr", "run", scenario, "-o", "y.csv", "--elf", "x.elf")
+        self.refused("--output: ", "name a file", "run", scenario, "-o", "")
+        self.refused("--json: ", "name a file", "paper", "-o", "y.csv", "--json", "")
+        for seconds in ("-1", "nan", "soon"):
+            self.refused("--duration", seconds, "hil", "--port", "/dev/null", "--duration", seconds)
+        self.refused("", "not a serial port", "hil", "--port", "/dev/null")
+        self.refused("none.ini: ", "cannot be read", "hil", "--port", "/dev/null", "--scenario", "none.ini")
+        self.refused("--set 'loss=1': ", "loss", "hil", "--port", "/dev/null", "--set", "loss=1")
 
     def test_outputs_are_checked_before_the_work(self) -> None:
         scenario = self.file("s.ini", SCENARIO)
         self.refused("no/out.csv: ", "folder", "run", scenario, "-o", "no/out.csv")
         self.refused("s.ini: ", "is an input", "run", scenario, "-o", "s.ini")
         self.refused("a.csv: ", "two outputs", "run", scenario, "-o", "a.csv", "--json", "a.csv")
+        self.refused("a.csv: ", "two outputs", "run", scenario, "-o", "a.csv", "--json", self.folder / "a.csv")
+        self.refused("-: ", "two outputs", "paper", "-o", "-", "--json", "-")
+        self.file("m.toml", MODEL)
+        fitted = self.file("f.ini", SCENARIO.replace("[chip]", "[chip]\nmodel = m.toml"))
+        self.refused("m.toml: ", "is an input", "run", fitted, "-o", "m.toml")
         self.refused(f"{self.folder}: ", "is a folder", "paper", "-o", self.folder)
 
     def test_parameters_are_listed(self) -> None:
@@ -121,6 +137,10 @@ class Arguments(Case):
         listed = json.loads(self.json.read_text())
         self.assertIn("plate_conduction", listed["effects"])
         self.assertTrue(all(one["minimum"] <= one["default"] <= one["maximum"] for one in listed["parameters"]))
+
+    def test_standard_output_holds_one_thing(self) -> None:
+        for command in (("paper", "-o", self.output), ("parameters",)):
+            json.loads(self.works(*command, "--json", "-"))
 
     def test_a_disk_that_refuses_is_failed_work(self) -> None:
         if not Path("/dev/full").exists():
@@ -188,6 +208,7 @@ class Run(Case):
             "p5_c",
         ):
             self.assertIn(column, rows[0])
+        self.assertEqual({row["ambient_c"] for row in rows}, {"20.000"})
         middle = rows[20]
         self.assertAlmostEqual(float(middle["i1_a"]), 1.5, delta=0.01)
         self.assertAlmostEqual(float(middle["i5_a"]), 0.0, delta=0.001)
@@ -228,6 +249,15 @@ class Run(Case):
         self.run_it("a.csv", "--json", self.json, scenario=SCENARIO + "at 5 = fail open 3\n")
         faults = [spring["fault"] for spring in json.loads(self.json.read_text())["springs"]]
         self.assertEqual(faults, ["none", "none", "open_spring"] + ["none"] * 6)
+
+    def test_what_the_chip_leaves_out_is_told(self) -> None:
+        path = self.file("s.ini", SCENARIO)
+        for set_to, told in (("0.5", "latent_cooling_ratio is not on the chip"), ("1", "")):
+            arguments = ("--set", f"latent_cooling_ratio={set_to}", "--json", self.json)
+            table = self.works("run", path, "-o", self.output, *arguments)
+            self.assertIn(told, table)
+            self.assertIn(told, json.loads(self.json.read_text())["left_out"])
+        self.assertEqual(json.loads(self.json.read_text())["left_out"], "")
 
     def test_a_model_file_is_what_the_chip_believes(self) -> None:
         cold = MODEL.replace("cols = 2", "cols = 3").replace("rows = 1", "rows = 3").replace("2.0", "3.0")
@@ -295,8 +325,18 @@ class BadScenario(Case):
         self.scenario_refused("none.toml: ", "cannot be read", chip.format("model = none.toml"))
 
     def test_what_the_chip_cannot_hold(self) -> None:
-        plant = "[plant]\nheat_capacity_j_per_k = 100\n[scenario]\nduration_s = 1\n"
-        self.scenario_refused("s.ini: ", "heat_capacity_j_per_k is 100, the chip holds", plant)
+        plant = "[plant]\nplate_loss_w_per_k = 1\n{}\n[scenario]\nduration_s = 1\n"
+        refused = self.scenario_refused
+        refused("s.ini:3:25: ", "is 100, the chip holds", plant.format("heat_capacity_j_per_k = 100"))
+        refused("s.ini:3:16: ", "loss_w_per_k is 1, the chip holds", plant.format("loss_w_per_k = 1"))
+        refused("s.ini:3:18: ", "resistance_ohm is 900, the chip", plant.format("resistance_ohm = 900"))
+        refused("s.ini:3:21: ", "must be below", plant.format("austenite_start_c = 120"))
+        pitch = "[array]\npitch_mm = 0.5\n[scenario]\nduration_s = 1\n"
+        refused("s.ini:2:12: ", "spacing law", pitch)
+
+    def test_a_log_that_memory_could_not_hold(self) -> None:
+        long = SCENARIO.replace("= 20", "= 1000000").replace("= 0.5", "= 0.02")
+        self.scenario_refused("s.ini:1:1: ", "make log_interval_s longer", long)
 
     def test_missing_file(self) -> None:
         self.refused("none.ini: ", "cannot be read", "run", "none.ini", "-o", self.output)
@@ -447,7 +487,7 @@ class Replay(Case):
             "no command_power_w",
             model=MODEL.replace("value = 1.0", "value = 0.0"),
         )
-        refused("m.toml: ", "the chip holds", model=MODEL.replace("2.0", "200.0"))
+        refused("m.toml:8:9: ", "the chip holds", model=MODEL.replace("2.0", "200.0"))
 
     def test_missing_files(self) -> None:
         self.refused(

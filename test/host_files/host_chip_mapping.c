@@ -163,6 +163,7 @@ static void what_does_not_fit_is_refused_by_name(void)
                  {"loss_w_per_k", 0.0656, CHIP_MAPPING_ERROR_RANGE},
                  {"orthogonal_w_per_k", 0.1, CHIP_MAPPING_ERROR_RANGE},
                  {"loss_fan_w_per_k", 0.0655, CHIP_MAPPING_ERROR_MODEL},
+                 {"resistance_ohm", 900.0, CHIP_MAPPING_ERROR_RANGE},
                  {"austenite_finish_c", 89.0, CHIP_MAPPING_ERROR_MODEL}};
     for (size_t k = 0; k < sizeof cases / sizeof cases[0]; k++) {
         tearDown();

@@ -1,0 +1,85 @@
+#include "scenario_plant.h"
+
+#include <fmt/format.h>
+
+#include "electrics.h"
+#include "model_file.h"
+#include "paper.h"
+
+namespace ninespring
+{
+
+source_place place_of(const scenario &plan, std::string_view message)
+{
+    source_place found{plan.name, 0, 0};
+    for (const scenario_entry &entry : plan.plant) {
+        if (mentions(message, std::string_view(entry.key).substr(0, entry.key.find('[')))) {
+            found = entry.place;
+        }
+    }
+    return found;
+}
+
+plant_pointer scenario_plant(const scenario &plan)
+{
+    plant_pointer plant(plant_create(plan.rows, plan.cols));
+    if (plant == nullptr) {
+        throw input_error(plan.name, 0, 0, "there is no plant of these rows and cols");
+    }
+    /* The pitch gives the paper's loss and couplings; what [plant] says comes after it. */
+    if (plan.pitch_mm && paper_configure(plant.get(), *plan.pitch_mm) != PLANT_OK) {
+        throw plan.pitch_place.error("pitch_mm: the spacing law holds for 1 to 100 mm");
+    }
+    for (const scenario_entry &effect : plan.effects) {
+        set_plant_effect(plant.get(), effect.key, effect.place);
+    }
+    /* What is said of all springs first, so that the order in the file does not matter. */
+    for (const bool one_spring : {false, true}) {
+        for (const scenario_entry &entry : plan.plant) {
+            if ((entry.key.find('[') != std::string::npos) != one_spring) {
+                continue;
+            }
+            double value = 0.0;
+            const std::string problem = parse_number(entry.value, value);
+            if (!problem.empty()) {
+                throw entry.place.error(fmt::format("{}: {}", entry.key, problem));
+            }
+            const std::string_view name =
+                std::string_view(entry.key).substr(0, entry.key.find('['));
+            set_plant_parameter(plant.get(), entry.key, value,
+                                find_plant_parameter(name) == nullptr ? entry.key_place
+                                                                      : entry.place);
+        }
+    }
+    const char *message = nullptr;
+    if (plant_check(plant.get(), &message) != PLANT_OK) {
+        throw place_of(plan, message == nullptr ? "" : message)
+            .error(fmt::format("[plant] {}", message == nullptr ? "is refused" : message));
+    }
+    plant_reset(plant.get());
+    return plant;
+}
+
+void add_plant_options(CLI::App &command, plant_arguments &arguments)
+{
+    command.add_option("--scenario", arguments.scenario_path,
+                       "The array around the board: [array], [plant], [noise] and seed of this "
+                       "scenario; its events and [chip] are the console's business here");
+    command
+        .add_option("--set", arguments.sets, "key=value as if the scenario said so, as with run")
+        ->take_all()
+        ->allow_extra_args(false);
+}
+
+described_plant describe_plant(const plant_arguments &arguments)
+{
+    const scenario plan =
+        arguments.scenario_path.empty()
+            ? parse_scenario(make_text_file("(no scenario)", "[scenario]\nduration_s = 1\n"),
+                             arguments.sets)
+            : read_scenario(arguments.scenario_path, arguments.sets);
+    return {scenario_plant(plan), plan.seed, plan.noise_current_a * ELECTRICS_INA219_SHUNT_OHM,
+            plan.noise_voltage_v};
+}
+
+} // namespace ninespring
