@@ -6,6 +6,7 @@
 #ifndef SETS
 #define SETS 200
 #endif
+#define SETS_WITHOUT_LATENT (SETS >= 50 ? SETS / 5 : SETS) /* fewer do not reach 120 degC */
 
 void setUp(void) {}
 void tearDown(void) {}
@@ -27,7 +28,7 @@ static void an_hour_of_random_drive_with_latent_heat(void)
 }
 static void an_hour_of_random_drive_without_latent_heat(void)
 {
-    hold_to_the_figure(SETS / 5, false);
+    hold_to_the_figure(SETS_WITHOUT_LATENT, false);
 }
 
 int main(void)
