@@ -6,7 +6,7 @@ import json
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,7 @@ import jsonschema
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from . import __version__, effects, experiments, native, search, statistics
+from . import __version__, effects, experiments, native, plausibility, search, statistics
 from .fitting import FOLDS, Fit, Problem, Spec, fold_of_rows
 from .logs import Run
 from .models import Array, Model
@@ -233,9 +233,10 @@ def _diagnose(
     rho = statistics.autocorrelation([r / n for r, n in zip(final.residual, problem.noise, strict=True)], 1)
     depends, note = depends_on(problem, final)
     warnings = [f"{Path(run.name).name}: {text}" for run in problem.runs for text in run.notes]
-    warnings += swapped(problem)
+    warnings += plausibility.swapped(problem.runs)
+    warnings += [text for run in problem.runs for text in plausibility.undriven_but_hottest(run)]
     if left_over:
-        warnings += shifted_clock(problem, base)
+        warnings += plausibility.shifted_clock(problem, (base,) if final is base else (base, final))
     if left_over:
         note = ("structure well above the noise remains that no effect of the library explains. " + note).strip()
     else:
@@ -260,7 +261,7 @@ def _diagnose(
         },
         "unexplained": bool(left_over),
         "residual": {
-            "autocorrelation_lag1": float(rho[1]),
+            "autocorrelation_lag1": float(np.clip(rho[1], -1.0, 1.0)),
             "structure_c": math.sqrt(search.excess(problem, final)) * problem.noise_c,
             "rmse_per_spring_c": [_finite(v) for v in _per_spring(final.residual)],
             "noise_per_spring_c": [
@@ -415,71 +416,6 @@ def depends_on(problem: Problem, fit: Fit) -> tuple[list[str], str]:
     out.sort(key=lambda one: -one[0])
     names = [text for _, text in out[:6]]
     return names, ("It depends on " + "; ".join(names) + "." if names else "No single input goes with it.")
-
-
-def swapped(problem: Problem) -> list[str]:
-    """Return warnings where a spring's temperature follows another spring's drive: columns swapped."""
-    from scipy.optimize import linear_sum_assignment
-
-    springs = problem.runs[0].springs
-    if springs < 2:
-        return []
-    score = np.zeros((springs, springs))
-    weight = np.zeros((springs, springs))
-    for run in problem.runs:
-        heat = run.drive**2 if run.mode == "current" else run.drive
-        width = max(1, round(10.0 / float(np.median(np.diff(run.time_s)))))
-        mean, _, begins = statistics.block_means(run.temperature_c, width)
-        power = np.add.reduceat(heat, begins, axis=0) / width
-        rise = np.diff(mean, axis=0)
-        for j in range(springs):
-            for k in range(springs):
-                x, y = power[:-1, j], rise[:, k]
-                good = np.isfinite(y)
-                if good.sum() > 10 and np.std(x[good]) > 1e-9 and np.std(y[good]) > 1e-9:
-                    score[j, k] += np.corrcoef(x[good], y[good])[0, 1]
-                    weight[j, k] += 1
-    score = score / np.maximum(weight, 1)
-    inputs, outputs = linear_sum_assignment(-score)
-    wrong = [
-        (int(j), int(k))
-        for j, k in zip(inputs, outputs, strict=True)
-        if j != k and score[j, k] > 0.35 and score[j, k] > 2.0 * abs(score[k, k]) and score[j, k] > score[j, j] + 0.3
-    ]
-    # a swap is closed: what one spring shows, another one lacks
-    if {j for j, _ in wrong} != {k for _, k in wrong}:
-        return []
-    return [
-        f"t{k + 1}_c follows the drive of spring {j + 1}, not its own: columns swapped? Correct the log's header"
-        for j, k in wrong
-    ]
-
-
-def shifted_clock(problem: Problem, fit: Fit) -> list[str]:
-    """Return a warning where the temperatures come before the inputs that cause them: no physics does that.
-
-    Tried only where structure is left: the temperatures are moved later by 1 to 32 rows and fitted again.
-    """
-    best: tuple[float, float] | None = None
-    for rows in (1, 2, 4, 6, 8, 12, 16, 32):
-        moved = []
-        for run in problem.runs:
-            later = run.temperature_c.copy()
-            later[rows:] = run.temperature_c[:-rows]
-            later[:rows] = run.temperature_c[0]
-            moved.append(replace(run, temperature_c=later))
-        trial = Problem(problem.array, moved, problem.declared)
-        again = trial.fit(fit.spec, fit.as_dict(), tolerance=1e-3, max_steps=8)
-        error = statistics.rms(again.residual)
-        step = float(np.median(np.diff(problem.runs[0].time_s)))
-        if best is None or error < best[0]:
-            best = (error, rows * step)
-    if best and best[0] ** 2 < 0.5 * statistics.rms(fit.residual) ** 2:
-        return [
-            f"the temperatures come about {best[1]:.0f} s before the inputs that cause them (moved later, the error "
-            f"falls from {statistics.rms(fit.residual):.2f} to {best[0]:.2f} K): correct the clock of one of them"
-        ]
-    return []
 
 
 def fit_effects(
