@@ -4,37 +4,14 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
+#include "figures.h"
 #include "loop.h"
 
 #define MINUTES  10
 #define TICKS    (MINUTES * 60 * 50)
 #define REPEATS  5
-#define MAXIMUM  8
 #define TARGET_X ">= 5000"
-
-typedef struct {
-    const char *figure;
-    double value;
-    const char *unit;
-    const char *target;
-} figure_t;
-static figure_t figures[MAXIMUM];
-static size_t figure_count;
-
-static void note(const char *figure, double value, const char *unit, const char *target)
-{
-    figures[figure_count++] = (figure_t){figure, value, unit, target};
-    printf("%-66s %10.4g %-14s %s\n", figure, value, unit, target);
-}
-
-static double now_s(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t); /* other users of the machine do not count */
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
 
 static plant_t *make_plant(void)
 {
@@ -69,12 +46,12 @@ static double run_loop_s(const controller_settings_t *settings, const plant_t *p
         if (loop == NULL) {
             exit(1);
         }
-        double start_s = now_s();
+        double start_s = figures_cpu_s();
         for (int tick = 0; tick < TICKS; tick++) {
             command(loop_controller(loop), tick);
             loop_tick(loop);
         }
-        double spent_s = now_s() - start_s;
+        double spent_s = figures_cpu_s() - start_s;
         best_s = spent_s < best_s ? spent_s : best_s;
         loop_destroy(loop);
     }
@@ -102,12 +79,12 @@ static double run_controller_s(const controller_settings_t *settings, const plan
         if (!controller_init(&controller, settings, 20 * 128, NULL)) {
             exit(1);
         }
-        double start_s = now_s();
+        double start_s = figures_cpu_s();
         for (int tick = 0; tick < TICKS; tick++) {
             command(&controller, tick);
             controller_tick(&controller, &recorded[tick % 500], &outputs);
         }
-        double spent_s = now_s() - start_s;
+        double spent_s = figures_cpu_s() - start_s;
         best_s = spent_s < best_s ? spent_s : best_s;
     }
     return best_s;
@@ -121,7 +98,7 @@ static double run_plant_s(const plant_t *plant, int ticks_per_step)
         if (copy == NULL) {
             exit(1);
         }
-        double start_s = now_s();
+        double start_s = figures_cpu_s();
         for (int tick = 0; tick < TICKS; tick += ticks_per_step) {
             for (int k = 0; k < 9; k++) {
                 double power_w = ((unsigned)tick / 500u * 73u >> k & 1u) != 0 ? 0.45 : 0.0;
@@ -129,40 +106,11 @@ static double run_plant_s(const plant_t *plant, int ticks_per_step)
             }
             (void)plant_step(copy, ticks_per_step * LOOP_TICK_S);
         }
-        double spent_s = now_s() - start_s;
+        double spent_s = figures_cpu_s() - start_s;
         best_s = spent_s < best_s ? spent_s : best_s;
         plant_destroy(copy);
     }
     return best_s;
-}
-
-static int write_json(const char *path)
-{
-    char partial[4096];
-    if (snprintf(partial, sizeof partial, "%s.part", path) >= (int)sizeof partial) {
-        return 2;
-    }
-    FILE *file = fopen(partial, "w");
-    if (file == NULL) {
-        fprintf(stderr, "bench_loop: cannot write %s\n", partial);
-        return 2;
-    }
-    fprintf(file, "[");
-    for (size_t k = 0; k < figure_count; k++) {
-        fprintf(file,
-                "%s\n {\"figure\": \"%s\", \"value\": %.6g, \"unit\": \"%s\", \"target\": \"%s\", "
-                "\"command\": \"bench_loop\"}",
-                k == 0 ? "" : ",", figures[k].figure, figures[k].value, figures[k].unit,
-                figures[k].target);
-    }
-    bool failed = fprintf(file, "\n]\n") < 0;
-    failed = fclose(file) != 0 || failed;
-    if (failed || rename(partial, path) != 0) {
-        fprintf(stderr, "bench_loop: cannot write %s\n", path);
-        (void)remove(partial);
-        return 1;
-    }
-    return 0;
 }
 
 int main(int count, char **arguments)
@@ -183,20 +131,22 @@ int main(int count, char **arguments)
     fine.plant_ticks = 1;
 
     const double simulated_s = MINUTES * 60.0;
-    note("controller + plant, native, 9 springs", simulated_s / run_loop_s(&settings, plant, NULL),
-         "x real time", TARGET_X);
+    figures_add("controller + plant, native, 9 springs",
+                simulated_s / run_loop_s(&settings, plant, NULL), "x real time", TARGET_X);
     settings.policy.policy = DRIVE_POLICY_PRECOMPENSATE;
-    note("the same, policy precompensate", simulated_s / run_loop_s(&settings, plant, NULL),
-         "x real time", TARGET_X);
+    figures_add("the same, policy precompensate", simulated_s / run_loop_s(&settings, plant, NULL),
+                "x real time", TARGET_X);
     settings.policy.policy = DRIVE_POLICY_OPEN;
-    note("the same, sensors without noise", simulated_s / run_loop_s(&settings, plant, &quiet),
-         "x real time", "");
-    note("the same, plant stepped every tick", simulated_s / run_loop_s(&settings, plant, &fine),
-         "x real time", "");
-    note("of one tick: controller_tick", run_controller_s(&settings, plant) * 1e9 / TICKS, "ns",
-         "");
-    note("of one tick: plant, stepped every 5th", run_plant_s(plant, 5) * 1e9 / TICKS, "ns", "");
-    note("of one tick: plant, stepped every tick", run_plant_s(plant, 1) * 1e9 / TICKS, "ns", "");
+    figures_add("the same, sensors without noise",
+                simulated_s / run_loop_s(&settings, plant, &quiet), "x real time", "");
+    figures_add("the same, plant stepped every tick",
+                simulated_s / run_loop_s(&settings, plant, &fine), "x real time", "");
+    figures_add("of one tick: controller_tick", run_controller_s(&settings, plant) * 1e9 / TICKS,
+                "ns", "");
+    figures_add("of one tick: plant, stepped every 5th", run_plant_s(plant, 5) * 1e9 / TICKS, "ns",
+                "");
+    figures_add("of one tick: plant, stepped every tick", run_plant_s(plant, 1) * 1e9 / TICKS, "ns",
+                "");
     plant_destroy(plant);
-    return count == 3 ? write_json(arguments[2]) : 0;
+    return count == 1 || figures_save(arguments[2], "bench_loop") ? 0 : 1;
 }

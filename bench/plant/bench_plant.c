@@ -7,8 +7,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
+#include "figures.h"
 #include "plant.h"
 
 #define SPRINGS 9
@@ -18,28 +18,6 @@
 static double time_s[ROWS], drive[ROWS * SPRINGS], fan[ROWS];
 static double shown_c[ROWS * SPRINGS], exact_c[ROWS * SPRINGS];
 static plant_drive_mode_t mode[SPRINGS];
-
-typedef struct {
-    const char *figure;
-    double value;
-    const char *unit;
-    const char *target;
-} figure_t;
-static figure_t figures[32];
-static size_t figure_count;
-
-static void note(const char *figure, double value, const char *unit, const char *target)
-{
-    figures[figure_count++] = (figure_t){figure, value, unit, target};
-    printf("%-58s %12.4g %-12s %s\n", figure, value, unit, target);
-}
-
-static double now_s(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t); /* other users of the machine do not count */
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
 
 static unsigned state = 2024;
 static double uniform(void)
@@ -74,9 +52,9 @@ static double simulate_s(plant_t *plant, size_t rows, double *out)
     double best = 1e9;
     for (int k = 0; k < REPEATS; k++) {
         plant_reset(plant);
-        const double start = now_s();
+        const double start = figures_cpu_s();
         must(plant_simulate(plant, rows, time_s, mode, drive, fan, NULL, out, NULL));
-        best = fmin(best, now_s() - start);
+        best = fmin(best, figures_cpu_s() - start);
     }
     return best;
 }
@@ -94,27 +72,12 @@ static double largest_error(const plant_t *plant)
     return largest;
 }
 
-static const char *save(const char *name)
+static void add(const char *what, const char *network, double value, const char *unit,
+                const char *target)
 {
-    char unfinished[4096];
-    if (snprintf(unfinished, sizeof unfinished, "%s.part", name) >= (int)sizeof unfinished)
-        return "name too long";
-    FILE *file = fopen(unfinished, "w");
-    if (!file)
-        return "cannot be written";
-    fputs("[\n", file);
-    for (size_t k = 0; k < figure_count; k++)
-        fprintf(file,
-                "  {\"figure\": \"%s\", \"value\": %.6g, \"unit\": \"%s\", \"target\": \"%s\", "
-                "\"command\": \"bench_plant\"}%s\n",
-                figures[k].figure, figures[k].value, figures[k].unit, figures[k].target,
-                k + 1 < figure_count ? "," : "");
-    fputs("]\n", file);
-    if (ferror(file) | fclose(file) || rename(unfinished, name) != 0) {
-        remove(unfinished);
-        return "cannot be written";
-    }
-    return NULL;
+    char figure[100];
+    (void)snprintf(figure, sizeof figure, "%s, %s", what, network);
+    figures_add(figure, value, unit, target);
 }
 
 int main(int argc, char **argv)
@@ -139,9 +102,7 @@ int main(int argc, char **argv)
                  {"latent heat and the chip's effects, current", PLANT_DRIVE_CURRENT, 2.4, 1},
                  {"all 14 effects, duty", PLANT_DRIVE_DUTY, 0.24, 2},
                  {"all 14 effects and correlations, duty", PLANT_DRIVE_DUTY, 0.24, 3}};
-    static char names[4][4][80];
-    printf("%-58s %12s %-12s %s\n", "figure (3 x 3 springs, 1 h at rows of 1 s)", "value", "unit",
-           "target");
+    printf("3 x 3 springs, 1 h at rows of 1 s\n");
     for (int c = 0; c < 4; c++) {
         plant_t *plant = plant_create(3, 3);
         if (!plant)
@@ -156,20 +117,13 @@ int main(int argc, char **argv)
             must(plant_set(plant, "convection_correlation", 1));
         make_log(cases[c].largest, cases[c].mode);
         const double hour_s = simulate_s(plant, ROWS, shown_c);
-        static const char *const what[4] = {"speed", "error", "1800 rows", "energy"};
-        for (int k = 0; k < 4; k++)
-            snprintf(names[c][k], sizeof names[c][k], "%s, %s", what[k], cases[c].name);
-        note(names[c][0], (ROWS - 1) / hour_s, "x real time", ">= 50000");
-        note(names[c][1], largest_error(plant), "degC", "<= 0.01");
-        note(names[c][3], fabs(plant_energy_balance_j(plant)) / plant_energy_input_j(plant),
-             "of the input", "<= 1e-6");
-        note(names[c][2], 1e3 * simulate_s(plant, 1800, shown_c), "ms", "2");
+        add("speed", cases[c].name, (ROWS - 1) / hour_s, "x real time", ">= 50000");
+        add("error", cases[c].name, largest_error(plant), "degC", "<= 0.01");
+        add("energy", cases[c].name,
+            fabs(plant_energy_balance_j(plant)) / plant_energy_input_j(plant), "of the input",
+            "<= 1e-6");
+        add("1800 rows", cases[c].name, 1e3 * simulate_s(plant, 1800, shown_c), "ms", "");
         plant_destroy(plant);
     }
-    const char *wrong = json ? save(json) : NULL;
-    if (wrong) {
-        fprintf(stderr, "bench_plant: %s: %s\n", json, wrong);
-        return 1;
-    }
-    return 0;
+    return json == NULL || figures_save(json, "bench_plant") ? 0 : 1;
 }

@@ -3,40 +3,15 @@
  *
  *   bench_thermal_model [--sets N] [--json FILE]      N parameter sets of an hour each, default 200
  */
-#include <errno.h>
 #include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "comparison.h"
+#include "figures.h"
 
-#define FIGURES_MAX   32
 #define STEPS_AN_HOUR 36000u
-
-typedef struct {
-    char figure[120];
-    double value;
-    const char *unit;
-    const char *target;
-} row_t;
-
-static row_t rows[FIGURES_MAX];
-static int row_count;
-
-static void add(const char *figure, double value, const char *unit, const char *target)
-{
-    if (row_count == FIGURES_MAX) {
-        return;
-    }
-    row_t *row = &rows[row_count++];
-    snprintf(row->figure, sizeof row->figure, "%s", figure);
-    row->value = value;
-    row->unit = unit;
-    row->target = target;
-    printf("%-76s %10.5g %-7s %s\n", row->figure, value, unit, target);
-    fflush(stdout);
-}
 
 #ifdef AVR_RUNNER
 typedef struct {
@@ -77,8 +52,8 @@ static bool count_cycles(const char *elf)
         int fields = sscanf(line, "%63s %lf %lf", name, &least, &most);
         for (size_t k = 0; fields >= 2 && k < sizeof counted / sizeof counted[0]; k++) {
             if (strcmp(name, counted[k].name) == 0) {
-                add(counted[k].figure, fields == 3 ? most : least, counted[k].unit,
-                    counted[k].target);
+                figures_add(counted[k].figure, fields == 3 ? most : least, counted[k].unit,
+                            counted[k].target);
             }
         }
     }
@@ -99,38 +74,10 @@ static bool add_flash(const char *archive, const char *figure)
     if (pclose(pipe) != 0 || !read) {
         return false;
     }
-    add(figure, text + data, "bytes", "");
+    figures_add(figure, text + data, "bytes", "");
     return true;
 }
 #endif
-
-static bool write_json(const char *path)
-{
-    char temporary[1024];
-    snprintf(temporary, sizeof temporary, "%s.part", path);
-    FILE *file = fopen(temporary, "w");
-    if (file == NULL) {
-        fprintf(stderr, "%s: %s\n", temporary, strerror(errno));
-        return false;
-    }
-    fputs("[\n", file);
-    for (int k = 0; k < row_count; k++) {
-        fprintf(file,
-                "  {\"figure\": \"%s\", \"value\": %.10g, \"unit\": \"%s\", \"target\": \"%s\", "
-                "\"command\": \"build/host/bench/thermal_model/bench_thermal_model\"}%s\n",
-                rows[k].figure, rows[k].value, rows[k].unit, rows[k].target,
-                k + 1 < row_count ? "," : "");
-    }
-    fputs("]\n", file);
-    bool written = ferror(file) == 0;
-    written = fclose(file) == 0 && written;
-    if (!written || rename(temporary, path) != 0) {
-        fprintf(stderr, "%s: %s\n", path, strerror(errno));
-        remove(temporary);
-        return false;
-    }
-    return true;
-}
 
 int main(int argc, char **argv)
 {
@@ -164,15 +111,15 @@ int main(int argc, char **argv)
         char figure[120];
         snprintf(figure, sizeof figure, "fixed point against double, %lu sets x 1 h, %s: rms", sets,
                  what);
-        add(figure, result.rms_c, "degC", "<= 0.05");
+        figures_add(figure, result.rms_c, "degC", "<= 0.05");
         snprintf(figure, sizeof figure, "fixed point against double, %lu sets x 1 h, %s: max", sets,
                  what);
-        add(figure, result.max_c, "degC", "<= 0.15");
+        figures_add(figure, result.max_c, "degC", "<= 0.15");
         snprintf(figure, sizeof figure,
                  "largest error after the two remembered a turn differently, %s", what);
-        add(figure, result.max_parted_c, "degC", "");
+        figures_add(figure, result.max_parted_c, "degC", "");
         snprintf(figure, sizeof figure, "share of samples after that, %s", what);
-        add(figure, 1e6 * (double)result.parted / (double)result.samples, "ppm", "");
+        figures_add(figure, 1e6 * (double)result.parted / (double)result.samples, "ppm", "");
     }
-    return json == NULL || write_json(json) ? 0 : 1;
+    return json == NULL || figures_save(json, "bench_thermal_model") ? 0 : 1;
 }
