@@ -64,11 +64,6 @@ bool csv_reader::next_data_line(std::string_view &text)
         if (content.front() != '#') {
             return true;
         }
-        const std::size_t colon = content.find(':');
-        if (colon != std::string_view::npos) {
-            metadata_.emplace(trimmed(content.substr(1, colon - 1)),
-                              trimmed(content.substr(colon + 1)));
-        }
     }
     return false;
 }
@@ -134,16 +129,6 @@ bool csv_reader::next(std::vector<csv_field> &fields)
                                     : "complete the row or remove it"));
     }
     return true;
-}
-
-double csv_reader::number(const csv_field &field, std::string_view name) const
-{
-    double value = 0.0;
-    const std::string problem = parse_number(field.text, value);
-    if (!problem.empty()) {
-        throw error(field.column, fmt::format("column {}: {}", name, problem));
-    }
-    return value;
 }
 
 } // namespace ninespring

@@ -1,11 +1,10 @@
 /* What it is for: rows of a comma-separated file, each field with its place.
- * What it owns: comments, `# key: value` lines, quotes, blank lines, and the refusal of uneven
+ * What it owns: comments, quotes, blank lines, and the refusal of uneven
  * rows.
  * What it never does: know what a column means. */
 #ifndef CSV_READER_H
 #define CSV_READER_H
 
-#include <map>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -29,9 +28,6 @@ public:
 
     [[nodiscard]] const std::vector<csv_field> &header() const { return header_; }
     [[nodiscard]] std::size_t header_line() const { return header_line_; }
-    /* The `# key: value` lines read so far. */
-    [[nodiscard]] const std::map<std::string, std::string> &metadata() const { return metadata_; }
-
     /* The next row; false at the end. Fails (input_error) if it has another number of fields than
      * the header. */
     bool next(std::vector<csv_field> &fields);
@@ -40,8 +36,6 @@ public:
     {
         return input_error(file_.name, line_, column, message);
     }
-    /* The field as a number, or an error at its place that names the column `name`. */
-    [[nodiscard]] double number(const csv_field &field, std::string_view name) const;
 
 private:
     bool next_data_line(std::string_view &text);
@@ -52,7 +46,6 @@ private:
     std::size_t line_ = 0;
     std::size_t header_line_ = 0;
     std::vector<csv_field> header_;
-    std::map<std::string, std::string> metadata_;
 };
 
 } // namespace ninespring

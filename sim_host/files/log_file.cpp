@@ -197,6 +197,27 @@ std::vector<double> *values_of(log_data &log, const column &which)
     return nullptr;
 }
 
+/* A column that the simulator writes beside the measured ones (m{k}_c, x{k}, p{k}_c, px{k}, s{k}_a,
+ * y{k}_c), or note_...: skipped. */
+bool is_skipped(std::string_view name)
+{
+    if (name.substr(0, 5) == "note_") {
+        return true;
+    }
+    struct form {
+        const char *prefix;
+        const char *suffix;
+    };
+    static constexpr std::array<form, 6> forms = {
+        {{"m", "_c"}, {"x", ""}, {"p", "_c"}, {"px", ""}, {"s", "_a"}, {"y", "_c"}}};
+    for (const form &one : forms) {
+        if (numbered(name, one.prefix, one.suffix) != 0) {
+            return true;
+        }
+    }
+    return false;
+}
+
 /* Which columns there are, checked against each other: each spring must say what drove it. */
 std::vector<column> identify_header(const csv_reader &reader, const std::string &file,
                                     std::size_t &springs)
@@ -206,7 +227,7 @@ std::vector<column> identify_header(const csv_reader &reader, const std::string 
     std::size_t highest = 0;
     for (const csv_field &field : reader.header()) {
         column found = identify(field.text);
-        if (found.what == kind::extra && !log_extra_column(field.text)) {
+        if (found.what == kind::extra && !is_skipped(field.text)) {
             throw reader.error(field.column,
                                fmt::format("column {} is not one of a log's; {}",
                                            in_quotes(field.text), advice(field.text)));
@@ -268,25 +289,6 @@ std::vector<column> identify_header(const csv_reader &reader, const std::string 
 }
 
 } // namespace
-
-bool log_extra_column(std::string_view name)
-{
-    if (name.substr(0, 5) == "note_") {
-        return true;
-    }
-    struct form {
-        const char *prefix;
-        const char *suffix;
-    };
-    static constexpr std::array<form, 6> forms = {
-        {{"m", "_c"}, {"x", ""}, {"p", "_c"}, {"px", ""}, {"s", "_a"}, {"y", "_c"}}};
-    for (const form &one : forms) {
-        if (numbered(name, one.prefix, one.suffix) != 0) {
-            return true;
-        }
-    }
-    return false;
-}
 
 log_data parse_log(const text_file &file, std::size_t springs)
 {
@@ -352,7 +354,6 @@ log_data parse_log(const text_file &file, std::size_t springs)
     if (log.fan.empty()) {
         log.fan.assign(log.time_s.size(), 0.0);
     }
-    log.metadata = reader.metadata();
     return log;
 }
 

@@ -5,7 +5,6 @@
 #ifndef LOG_FILE_H
 #define LOG_FILE_H
 
-#include <map>
 #include <string>
 #include <utility>
 #include <vector>
@@ -31,19 +30,14 @@ struct log_data {
     std::vector<log_spring> springs;
     std::vector<double> fan;       /* 0..1; always filled, 0 where there is no column */
     std::vector<double> ambient_c; /* empty: no such column */
-    std::map<std::string, std::string> metadata;
 };
 
 /* Reads a log. Columns i, v, u, t per spring, fan, ambient_c; the columns that `ninespring-sim`
- * adds (log_extra_column) and any `note_...` column are skipped. springs: how many the array has, 0
+ * adds and any `note_...` column are skipped. springs: how many the array has, 0
  * to take the highest number found. Fails (input_error) if and only if the file breaks
  * docs/files.md; the message names line and column. */
 log_data read_log(const std::string &path, std::size_t springs = 0);
 log_data parse_log(const text_file &file, std::size_t springs = 0);
-
-/* True for a column that the simulator writes beside the measured ones: m{k}_c, x{k}, p{k}_c,
- * px{k}, s{k}_a, d{k}, state, and note_*. */
-bool log_extra_column(std::string_view name);
 
 /* Collects rows and gives the text of a log. Numbers have a fixed count of decimals, so equal runs
  * give equal bytes. */

@@ -510,19 +510,6 @@ void apply_array(plant_t *plant, const array_description &array)
     set("resistance_ohm", ohm_per_uohm_cm * spring.resistivity_austenite_uohm_cm);
 }
 
-array_description parse_array(const text_file &file)
-{
-    const toml::table table = parse(file);
-    const reader root(file.name, table, "the file");
-    root.refuse_unknown({"array", "spring", "material", "sensor"});
-    return read_array_tables(root);
-}
-
-array_description read_array(const std::string &path)
-{
-    return parse_array(read_text_file(path));
-}
-
 model_description parse_model(const text_file &file)
 {
     const toml::table table = parse(file);

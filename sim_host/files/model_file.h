@@ -1,6 +1,6 @@
-/* What it is for: array.toml (what was built) and model.toml (what was fitted), read whole
+/* What it is for: model.toml (what was built, and what was fitted to it), read whole
  * (docs/files.md).
- * What it owns: the keys of both files, their units and limits, and the advice when they are
+ * What it owns: the keys of the file, their units and limits, and the advice when they are
  * wrong.
  * What it never does: fit, or hold a parameter table of its own: names, units and limits are the
  * plant's. */
@@ -53,8 +53,6 @@ struct model_description {
 };
 
 /* Fails (input_error) if and only if the file breaks docs/files.md. */
-array_description read_array(const std::string &path);
-array_description parse_array(const text_file &file);
 model_description read_model(const std::string &path);
 model_description parse_model(const text_file &file);
 

@@ -15,7 +15,6 @@ extern "C" {
 #include "log_file.h"
 #include "model_file.h"
 #include "scenario_file.h"
-#include "steady_file.h"
 #include "text_file.h"
 
 using namespace ninespring;
@@ -69,7 +68,6 @@ void log_of_two_springs_is_read(void)
                  "0.5,\"1.25\",0.25,1,20.5,30,1,21.5,x,you"));
     TEST_ASSERT_EQUAL(2, log.springs.size());
     TEST_ASSERT_EQUAL(2, log.time_s.size());
-    TEST_ASSERT_EQUAL_STRING("7", log.metadata.at("board").c_str());
     TEST_ASSERT_EQUAL_DOUBLE(1.25, log.springs[0].current_a[1]);
     TEST_ASSERT_EQUAL_DOUBLE(0.25, log.springs[0].voltage_v[1]);
     TEST_ASSERT_EQUAL(0, log.springs[0].command.size());
@@ -209,26 +207,6 @@ void file_is_written_whole_or_not_at_all(void)
     TEST_ASSERT_TRUE(failed);
     TEST_ASSERT_EQUAL(1, std::distance(fs::directory_iterator(folder), fs::directory_iterator()));
     fs::remove_all(folder);
-}
-
-void steady_table_is_read_and_checked(void)
-{
-    const auto states =
-        parse_steady(make_text_file("t.csv", "case,pitch_mm,fan,ambient_c,hold1_c,i2_a,t2_c\n"
-                                             "comsol 4,4,0,20,105,0,52\nother,5,1,20,,1.5,\n"));
-    TEST_ASSERT_EQUAL(2, states.size());
-    TEST_ASSERT_EQUAL_STRING("comsol 4", states[0].name.c_str());
-    TEST_ASSERT_EQUAL_DOUBLE(105.0, states[0].hold_c[0]);
-    TEST_ASSERT_TRUE((std::isnan)(states[1].hold_c[0]));
-    TEST_ASSERT_TRUE((std::isnan)(states[1].temperature_c[1]));
-    const auto refuses = [](const char *text, const char *begin, const char *part) {
-        expect(error_of([&] { parse_steady(make_text_file("t.csv", text)); }), begin, part);
-    };
-    refuses("case,t1_f\n", "t.csv:1:6: ", "degC");
-    refuses("case,t1_c\na,5O\n", "t.csv:2:3: ", "not a number");
-    refuses("case,i1_a,hold1_c,t1_c\na,1,105,20\n", "t.csv:2:1: ", "both i1_a and hold1_c");
-    refuses("case,fan\na,1\n", "t.csv:1:1: ", "no spring");
-    refuses("case,fan,t1_c\na,50,20\n", "t.csv:2:3: ", "0..1");
 }
 
 const std::string MODEL = "schema = \"ninespring.model/1\"\n"
@@ -387,21 +365,21 @@ void scenario_arguments_with_errors_are_refused(void)
     refuses("scenario.colour=1", "no key 'colour'");
 }
 
-void array_file_is_read_and_checked(void)
+void array_of_a_model_is_read_and_checked(void)
 {
-    const array_description array = parse_array(
-        make_text_file("a.toml", "[array]\nrows = 2\ncols = 3\npitch_mm = 4\n[spring]\n"
-                                 "wire_diameter_mm = 0.8\n[sensor]\nkind = \"camera\"\n"));
+    const std::string schema = "schema = \"ninespring.model/1\"\n";
+    const array_description array =
+        parse_model(make_text_file("m.toml", schema + "[array]\nrows = 2\ncols = 3\npitch_mm = 4\n"
+                                                      "[spring]\nwire_diameter_mm = 0.8\n"
+                                                      "[sensor]\nkind = \"camera\"\n"))
+            .array;
     TEST_ASSERT_EQUAL(2, array.rows);
     TEST_ASSERT_EQUAL_DOUBLE(4.0, *array.pitch_mm);
     TEST_ASSERT_EQUAL(1, array.spring.size());
     TEST_ASSERT_EQUAL_STRING("camera", array.sensor_kind.c_str());
-    expect(error_of([] { parse_array(make_text_file("a.toml", "[array]\nrows = 2\n")); }),
-           "a.toml:1:1: ", "without cols");
-    expect(error_of([] {
-               parse_array(make_text_file("a.toml", "[array]\nrows = 2\ncols = 2\n[colour]\n"));
-           }),
-           "a.toml:4:2: ", "no key 'colour'");
+    refuses_model(schema + "[array]\nrows = 2\n", "m.toml:2:1: ", "without cols");
+    refuses_model(schema + "[array]\nrows = 2\ncols = 2\n[colour]\n",
+                  "m.toml:5:2: ", "no key 'colour'");
 }
 
 } // namespace
@@ -421,10 +399,9 @@ int main(void)
     RUN_TEST(files_that_are_not_text_are_refused);
     RUN_TEST(written_log_is_read_back);
     RUN_TEST(file_is_written_whole_or_not_at_all);
-    RUN_TEST(steady_table_is_read_and_checked);
     RUN_TEST(model_is_read);
     RUN_TEST(model_with_errors_is_refused);
-    RUN_TEST(array_file_is_read_and_checked);
+    RUN_TEST(array_of_a_model_is_read_and_checked);
     RUN_TEST(scenario_is_read);
     RUN_TEST(scenario_with_errors_is_refused);
     RUN_TEST(scenario_events_with_errors_are_refused);

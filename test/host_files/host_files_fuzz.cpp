@@ -12,7 +12,6 @@ extern "C" {
 #include "log_file.h"
 #include "model_file.h"
 #include "scenario_file.h"
-#include "steady_file.h"
 
 using namespace ninespring;
 
@@ -98,12 +97,6 @@ void log_reader_survives(void)
            [](const text_file &file) { parse_log(file); });
 }
 
-void steady_reader_survives(void)
-{
-    attack("case,pitch_mm,fan,ambient_c,hold1_c,i2_a,t2_c\ncomsol 4,4,0,20,105,0,52\n",
-           [](const text_file &file) { parse_steady(file); });
-}
-
 void scenario_reader_survives(void)
 {
     attack("[scenario]\nduration_s = 60\nseed=7\n[array]\nrows = 1\ncols = 3 ; inline\n"
@@ -132,7 +125,6 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(log_reader_survives);
-    RUN_TEST(steady_reader_survives);
     RUN_TEST(scenario_reader_survives);
     RUN_TEST(model_reader_survives);
     return UNITY_END();
