@@ -184,8 +184,8 @@ def simulate(world: World, runs: list[Inputs]) -> dict[str, np.ndarray]:
             over = t - around
             lost = loss * over
             if convection:
-                # only the natural part rises with temperature; blown air does not care
-                rise = (np.maximum(over, 0.0) / 60.0) ** convection["power"]
+                # only the natural part rises with the difference, either way; blown air does not care
+                rise = (np.abs(over) / 60.0) ** convection["power"]
                 lost = lost + (1 - fan_now) * still * (rise - 1.0) * over
             to_air = lost.sum(axis=1)
             if radiation:
@@ -216,7 +216,7 @@ def simulate(world: World, runs: list[Inputs]) -> dict[str, np.ndarray]:
             if bridge.any():
                 flow = flow + t @ bridge.T - t * bridge.sum(axis=1)
             if wake.any():
-                flow = flow + fan_now * (np.maximum(over, 0.0) @ wake.T)
+                flow = flow + fan_now * (over @ wake.T)
             if plume.any():
                 flow = flow + np.maximum(over, 0.0) @ plume.T
             rate_a = np.zeros_like(a)

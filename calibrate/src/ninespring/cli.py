@@ -250,6 +250,8 @@ def predict(log: Path, model_path: Path, output: Path, chip: bool, json_path: Pa
     rmse = float(np.sqrt(np.nanmean(error**2))) if np.isfinite(error).any() else None
     _write_json(json_path, {"rmse_c": rmse, "rows": len(run.time_s)})
     out.print(f"{len(run.time_s)} rows" + ("" if rmse is None else f", error {rmse:.3f} K rms") + f" -> {output}")
+    if note := model.provenance.get("note"):
+        out.print(f"note: {note}")
 
 
 @cli.command()

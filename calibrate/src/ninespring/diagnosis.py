@@ -21,6 +21,11 @@ from .logs import Run
 from .models import Array, Model
 
 SCHEMA = "ninespring.diagnosis/1"
+DRIFT_LEFT_OUT = (
+    "the ambient drifted during the runs that this was fitted to. The drift belongs to those runs: it is in "
+    "diagnosis.json, not in this model, and no prediction has it"
+)
+"""Why a model.toml is without a drift of several knots: no other log has it, and a log's own is no prediction."""
 
 
 @dataclass
@@ -44,7 +49,7 @@ def prepare(array: Array, runs: Sequence[Run], declared: Mapping[str, float] | N
     """Return the problem of these runs, condensed where they are long."""
     from .logs import condense
 
-    share = max(600, 8000 // max(1, len(runs)))
+    share = max(600, 6000 // max(1, len(runs)))
     return Problem(array, [condense(run, share) for run in runs], declared)
 
 
@@ -160,13 +165,12 @@ def _diagnose(
     left_over = search.unexplained(problem, final)
     if left_over and without:
         # Structure remains: keep only what explains most of what was there.
-        kept, without = found.backward(final, search.MIN_SHARE_UNEXPLAINED)
+        kept, without, rest = found.settle(final, search.MIN_SHARE_UNEXPLAINED, grow=False)
         explained = (base.sse - kept.sse) / base.count
         if explained < search.MIN_TOTAL_UNEXPLAINED * search.excess(problem, base):
-            kept, without = base, {}
+            kept, without, rest = base, {}, []
         if kept is not final:
-            final = _finish(problem, kept)
-            contenders = found.rivals(final, without)
+            final, contenders = _finish(problem, kept), rest
         left_over = search.unexplained(problem, final)
     adopted = [e for e in final.spec.effects if e not in base.spec.effects]
     strength = {e: search.log_evidence(problem, final, without[e]) for e in adopted}
@@ -331,7 +335,7 @@ def model_of(problem: Problem, fit: Fit, runs: Sequence[Run], result: Mapping[st
     if result:
         model.provenance["rmse_before_c"] = result["baseline"]["rmse_c"]
     if drifts:
-        model.provenance["note"] = "the ambient drifted during the runs; the drift itself is in diagnosis.json"
+        model.provenance["note"] = DRIFT_LEFT_OUT
     return model
 
 

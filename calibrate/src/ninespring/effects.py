@@ -216,15 +216,17 @@ def candidates(problem: Problem) -> list[Candidate]:
             signed=True,
             more_starts=({name: 0.85 * martensite}, {name: 1.25 * martensite}),
         )
+    # Air or a plate that answers faster than a spring's tenth is in balance with them: its bounds end there.
+    loss = springs * get("loss_w_per_k")
+    least = 0.1 * springs * get("heat_capacity_j_per_k")
     if springs > 1:
-        loss = springs * get("loss_w_per_k")
         capacity, exchange = "air_heat_capacity_j_per_k", "air_exchange_w_per_k"
         add(
             "shared_air",
             "",
             [
-                positive(capacity, 0.01, 3000.0, 3.0, "shared_air"),
-                positive(exchange, 1e-3, 50.0, 2 * loss, "shared_air"),
+                positive(capacity, least, 3000.0, 3.0, "shared_air"),
+                positive(exchange, 0.01 * loss, 50.0 * loss, 2 * loss, "shared_air"),
             ],
             [
                 {capacity: 3.0, exchange: 3.0 * loss},
@@ -241,9 +243,9 @@ def candidates(problem: Problem) -> list[Candidate]:
         "plate_conduction",
         "",
         [
-            positive(coupling, 1e-6, 1.0, 1e-3, "plate_conduction"),
-            positive(heat, 0.05, 5000.0, 8.0, "plate_conduction"),
-            positive(away, 1e-5, 5.0, 0.02, "plate_conduction"),
+            positive(coupling, 1e-6, 20.0 * get("loss_w_per_k"), 1e-3, "plate_conduction"),
+            positive(heat, least, 5000.0, 8.0, "plate_conduction"),
+            positive(away, 1e-5, 50.0 * loss, 0.02, "plate_conduction"),
         ],
         [
             {coupling: 1e-3, heat: 6.0, away: 0.01},
@@ -320,14 +322,16 @@ def candidates(problem: Problem) -> list[Candidate]:
         total = power * springs
         resistance = "supply_resistance_ohm"
         size = 0.1 * supply**2 / total
-        add(
-            "supply_sag",
-            "",
-            [linear(resistance, 0.0, 100.0, size, size, "supply_sag")],
-            [{resistance: size}],
-            most=6.0,
-            more_starts=({resistance: 0.3 * size},),
-        )
+        for chopped, variant in enumerate(("loads that draw their mean", "chopped loads")):
+            add(
+                "supply_sag",
+                variant,
+                [linear(resistance, 0.0, 100.0, size, size, "supply_sag")],
+                [{resistance: size}],
+                fixed=(("supply_chopped", float(chopped)),),
+                most=6.0,
+                more_starts=({resistance: 0.3 * size},),
+            )
     duration = max(run.duration_s for run in runs)
     add(
         "ambient_drift",

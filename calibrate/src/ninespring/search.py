@@ -32,11 +32,18 @@ MIN_TOTAL_UNEXPLAINED = 0.7
 """... and what is adopted must together explain this part of what the declared model left."""
 EQUIVALENT = 0.3
 """Two models whose predictions differ by less than this (rms, in units of the noise) are the same in practice."""
-UNEXPLAINED = 0.3
-"""Structure left, rms in units of the noise, above which the rest counts as unexplained."""
-UNEXPLAINED_LOCAL = 0.6
-"""The same for one spring of one run."""
+UNEXPLAINED = 0.5
+"""Structure left, rms in units of the noise, above which the rest counts as unexplained: less does not matter."""
+UNEXPLAINED_LOCAL = 1.0
+"""The same for one spring of one run, where the two laws of a phase change may differ for a while."""
 MAX_EFFECTS = 4
+DRIFTS = ("free", "slow")
+"""Variants of ambient_drift that follow anything slow. They must beat a physical cause by TOLD_APART, not just by 0."""
+
+
+def handicap(fit: Fit) -> float:
+    """Return the nats by which a fit must win against one that has a physical cause in its place."""
+    return TOLD_APART if dict(fit.spec.variant).get("ambient_drift") in DRIFTS else 0.0
 
 
 def log_evidence(problem: Problem, better: Fit, other: Fit) -> float:
@@ -246,6 +253,13 @@ class Search:
             and explained >= share * beyond
         )
 
+    def preferred(self, one: Fit, other: Fit) -> bool:
+        """Return whether `one` takes the place of `other`, which has as many effects."""
+        ahead = (
+            log_evidence(self.problem, one, other) if one.chi2 < other.chi2 else -log_evidence(self.problem, other, one)
+        )
+        return ahead > handicap(one) - handicap(other)
+
     def holds_out(self, better: Fit, other: Fit) -> bool:
         """Return whether `better` also predicts blocks better that neither was fitted to."""
         noise = self.problem.noise_c
@@ -308,9 +322,8 @@ class Search:
             )
         return out
 
-    def forward(self) -> Fit:
+    def forward(self, current: Fit) -> Fit:
         """Add effects, one or two at a time, while they earn their place."""
-        current = self.base
         while len(current.spec.effects) - len(self.base.spec.effects) < MAX_EFFECTS:
             if excess(self.problem, current) < 0.5 * MIN_GAIN**2:
                 break
@@ -324,7 +337,7 @@ class Search:
                     if self.worth(fit, current, added):
                         best, best_added = fit, added
                 elif added == best_added:
-                    if log_evidence(self.problem, fit, best) > 0 and fit.chi2 < best.chi2:
+                    if self.preferred(fit, best):
                         best = fit
                 elif self.worth(fit, best, 1):
                     best, best_added = fit, added
@@ -362,13 +375,19 @@ class Search:
         return self.fits[key]
 
     def rivals(self, fit: Fit, without: dict[str, Fit], most: int = 3) -> list[tuple[str, Fit]]:
-        """Return models that put another effect in the place of one of `fit`'s, best first, whatever their merit."""
+        """Return models that put another effect in the place of one of `fit`'s, best first, whatever their merit.
+
+        Another variant of the same effect counts too: what was the better start is not always the better end.
+        """
         out = []
         for effect, other in without.items():
             screen = self.screen(other)
             forecasts = []
+            variant = dict(fit.spec.variant)[effect]
             for k, candidate in enumerate(screen.candidates):
-                if candidate.effect == effect or candidate.effect in fit.spec.effects:
+                if (candidate.effect, candidate.variant) == (effect, variant):
+                    continue
+                if candidate.effect != effect and candidate.effect in fit.spec.effects:
                     continue
                 drop, sizes = screen.forecast([k])
                 forecasts.append((drop, k, sizes))
@@ -391,22 +410,27 @@ class Search:
                 )
         return out
 
+    def settle(
+        self, fit: Fit, share: float = MIN_SHARE, grow: bool = True
+    ) -> tuple[Fit, dict[str, Fit], list[tuple[str, Fit]]]:
+        """Drop what is not needed and swap what another explains better, until neither changes anything.
+
+        Return the fit that stays, the fits without each effect, and the contenders.
+        """
+        for turn in range(4):
+            fit, without = self.backward(fit, share)
+            contenders = self.rivals(fit, without)
+            better = [(other.chi2, k) for k, (_, other) in enumerate(contenders) if self.preferred(other, fit)]
+            if turn == 3 or not better:
+                break
+            fit = contenders[min(better)[1]][1]
+            if grow:
+                fit = self.forward(fit)
+        return fit, without, contenders
+
     def run(self) -> tuple[Fit, dict[str, Fit], list[tuple[str, Fit]]]:
         """Search; return the chosen fit, the fits without each effect, and the contenders."""
-        fit = self.forward()
-        fit, without = self.backward(fit)
-        contenders = self.rivals(fit, without)
-        for _ in range(3):
-            better = [
-                (other.chi2, k)
-                for k, (_, other) in enumerate(contenders)
-                if other.chi2 < fit.chi2 and log_evidence(self.problem, other, fit) > 0
-            ]
-            if not better:
-                break
-            fit, without = self.backward(contenders[min(better)[1]][1])
-            contenders = self.rivals(fit, without)
-        return fit, without, contenders
+        return self.settle(self.forward(self.base))
 
 
 def unexplained(problem: Problem, fit: Fit) -> bool:
