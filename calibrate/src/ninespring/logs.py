@@ -11,8 +11,9 @@ import io
 import os
 import re
 import tempfile
+import warnings
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
@@ -27,6 +28,12 @@ DriveMode = Literal["power", "current", "command"]
 MAX_LINE = 100_000
 """A line longer than this (characters) is not a log."""
 MAX_SPRINGS = 64
+RUN_IN_S = 120.0
+"""After a gap: how long the noise of the temperatures that the simulation starts from is still felt."""
+FINEST_S = 1.0
+"""Rows closer than this are averaged where a log is too long to be simulated row by row."""
+STRETCH_S = 1500.0
+"""Length of the stretches that are taken of a log that is still too long, about."""
 COLUMN = re.compile(r"^(?:time_s|fan|ambient_c|([ivtu])([1-9][0-9]?)_([avc])|u([1-9][0-9]?))$")
 EXTRA = re.compile(r"^(?:[mpy][1-9][0-9]?_c|[xd][1-9][0-9]?|px[1-9][0-9]?|s[1-9][0-9]?_a|state|note_.*)$")
 """Columns that the simulator and the board write beside the measured ones: skipped."""
@@ -127,7 +134,9 @@ class Table:
     keys: dict[str, str]
     """What `# key: value` lines said."""
     unfinished: bool = False
-    """The last line has no end: the file may have been cut off in it."""
+    """The last line has no end: its last number may have been cut off."""
+    cut_off: bool = False
+    """The last line was cut off in the middle and is left out."""
 
     def where(self, row: int, name: str) -> tuple[int, int]:
         """Line and 1-based character column of a cell."""
@@ -145,8 +154,9 @@ def read_table(path: str | Path, text_columns: Iterable[str] = ()) -> Table:
     raw = read_bytes(path)
     if not raw.strip():
         raise InputError("the file is empty", path)
-    if b"\0" in raw[: 1 << 16]:
-        raise InputError("not a text file (it holds NUL bytes): give a CSV log", path, 1)
+    if b"\0" in raw:
+        kind = "UTF-16 text" if raw[:2] in (b"\xff\xfe", b"\xfe\xff") else "not a text file (it holds NUL bytes)"
+        raise InputError(f"{kind}: save the log as UTF-8 CSV", path, 1)
     try:
         text = raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -184,7 +194,18 @@ def read_table(path: str | Path, text_columns: Iterable[str] = ()) -> Table:
                 header_line,
                 header.index(separator) + 1,
             )
-    names = [name.strip().strip('"') for name in header.split(",")]
+    if '"' in text:
+        # Quotes around plain cells mean nothing. A comma inside of them shows in the count of cells below.
+        kept = [line.replace('"', "") for line in kept]
+        header = kept[0]
+    names = [name.strip() for name in header.split(",")]
+    if all(_is_number(name) for name in names):
+        raise InputError(
+            "the first line holds numbers: begin the file with a line of column names (time_s,i1_a,t1_c,...)",
+            path,
+            header_line,
+            1,
+        )
     starts = [1]
     for cell in header.split(",")[:-1]:
         starts.append(starts[-1] + len(cell) + 1)
@@ -195,6 +216,10 @@ def read_table(path: str | Path, text_columns: Iterable[str] = ()) -> Table:
             raise InputError(f"column '{name}' is there twice", path, header_line, starts[k])
     wanted = header.count(",")
     body = kept[1:]
+    unfinished = not text.endswith("\n")
+    cut_off = unfinished and len(body) > 3 and body[-1].count(",") < wanted
+    if cut_off:
+        body.pop()
     if not body:
         raise InputError("there is a header but no row", path, header_line)
     for row, line in enumerate(body):
@@ -230,8 +255,10 @@ def read_table(path: str | Path, text_columns: Iterable[str] = ()) -> Table:
         )
     except (ValueError, OverflowError):
         frame = None
-    table = Table(str(path), header_line, names, starts, frame, np.asarray(numbers[1:], dtype=np.int64), keys)
-    table.unfinished = not text.endswith("\n")
+    places = np.asarray(numbers[1 : len(body) + 1], dtype=np.int64)
+    table = Table(str(path), header_line, names, starts, frame, places, keys)
+    table.unfinished = unfinished and not cut_off
+    table.cut_off = cut_off
     numeric = [name for name in names if name not in words]
     if frame is None or np.isfinite(frame[numeric].to_numpy(float)).sum() != int(
         frame[numeric].notna().to_numpy().sum()
@@ -240,11 +267,21 @@ def read_table(path: str | Path, text_columns: Iterable[str] = ()) -> Table:
     return table
 
 
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
 def _refuse_first_bad_cell(
     path: str | Path, names: list[str], words: set[str], body: list[str], numbers: list[int]
 ) -> None:
     for row, line in enumerate(body):
         at = 1
+        if [cell.strip() for cell in line.split(",")] == names:
+            raise InputError("the header is there again: two logs in one file? Make two files", path, numbers[row], 1)
         for name, cell in zip(names, line.split(","), strict=True):
             value = cell.strip()
             if name not in words and value:
@@ -349,6 +386,7 @@ def read_log(path: str | Path, springs: int | None = None, temperatures: bool = 
     keep = _rising_rows(table, notes)
     if table.unfinished and len(frame) > 3:
         keep[-1] = False
+    if table.cut_off or (table.unfinished and len(frame) > 3):
         notes.append("the last line has no end, it may be cut off: left out")
     frame = frame.iloc[keep]
     if len(frame) < 3:
@@ -402,62 +440,99 @@ def read_log(path: str | Path, springs: int | None = None, temperatures: bool = 
     _mask_glitches(run)
     _find_gaps(run)
     run.warm = _begins_warm(run)
+    _doubt_units(run)
     if temperatures and not np.isfinite(run.temperature_c).any():
-        raise InputError("no usable temperature in the whole log", path)
+        why = f" ({notes[-1]})" if notes else ""
+        raise InputError(f"no usable temperature in the whole log{why}", path)
     return run
 
 
 def _rising_rows(table: Table, notes: list[str]) -> np.ndarray:
     """Rows whose time rises. Exact repeats are dropped and said; anything else is refused."""
     time_s = table.frame["time_s"].to_numpy(float)
-    step = np.diff(time_s)
     keep = np.ones(len(time_s), dtype=bool)
-    for row in np.flatnonzero(step <= 0) + 1:
-        before, now = table.frame.iloc[row - 1], table.frame.iloc[row]
-        if step[row - 1] == 0 and now.equals(before):
-            keep[row] = False
-            continue
-        line, column = table.where(int(row), "time_s")
+    if (np.diff(time_s) > 0).all():
+        return keep
+    keep = ~table.frame.duplicated().to_numpy()
+    rows = np.flatnonzero(keep)
+    step = np.diff(time_s[rows])
+    if (step <= 0).any():
+        at = int(np.flatnonzero(step <= 0)[0])
+        before, now = time_s[rows[at]], time_s[rows[at + 1]]
+        line, column = table.where(int(rows[at + 1]), "time_s")
         said = (
-            f"time_s repeats {time_s[row]:g} with other values"
-            if step[row - 1] == 0
-            else f"time_s falls from {time_s[row - 1]:g} to {time_s[row]:g}"
+            f"time_s repeats {now:.10g} with other values"
+            if now == before
+            else f"time_s falls from {before:.10g} to {now:.10g}"
         )
         raise InputError(f"{said}: times must rise strictly", table.path, line, column)
-    if dropped := int((~keep).sum()):
-        notes.append(f"{dropped} repeated rows dropped")
+    notes.append(f"{int((~keep).sum())} repeated rows dropped")
     return keep
 
 
 def _refuse_wrong_units(run: Run, table: Table) -> None:
-    """A cold start above 45 degC is Fahrenheit: nothing is driven, everything is equally 'warm'."""
-    first = run.temperature_c[: min(5, len(run.time_s))]
-    if not np.isfinite(first).any():
+    """Springs that start above 45 degC though nothing is driven, and never get colder: Fahrenheit or kelvin."""
+    if not np.isfinite(run.temperature_c[:5]).any():
         return
-    lowest = float(np.nanmin(run.temperature_c))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # a column may be empty
+        lowest = np.nanmin(run.temperature_c, axis=0)
+        first = np.nanmedian(run.temperature_c[:5], axis=0)
     quiet = not np.any(run.drive[0] > 0)
-    suspicious = (
-        lowest > 45.0
-        and quiet
-        and float(np.nanmax(first) - np.nanmin(first)) < 8.0
-        and (run.ambient_c is None or abs(lowest - float(run.ambient_c[0])) > 20.0)
-    )
-    kelvin = lowest > 240.0
-    if suspicious or kelvin:
-        name = next(n for n in table.names if n.startswith("t") and n != "time_s")
-        line, column = table.where(0, name)
-        raise InputError(
-            f"nothing is driven yet the springs start at {lowest:.0f}: "
-            f"looks like {'kelvin' if kelvin else 'degrees Fahrenheit'}, a log has degC "
-            "(`ninespring import --map` converts)",
-            run.name,
-            line,
-            column,
-        )
+    ambient = None if run.ambient_c is None else float(run.ambient_c[0])
+
+    def refuse(k: int, said: str) -> InputError:
+        line, column = table.where(0, f"t{k + 1}_c")
+        return InputError(f"{said}, a log has degC (`ninespring import --map` converts)", run.name, line, column)
+
+    seen = np.flatnonzero(np.isfinite(lowest))
+    coldest = float(lowest[seen].min())
+    begins = f"nothing is driven yet the springs start at {coldest:.0f}: looks like"
+    if coldest > 240.0:
+        raise refuse(int(seen[0]), f"{begins} kelvin")
+    together = float(np.nanmax(first) - np.nanmin(first)) < 8.0
+    if quiet and coldest > 45.0 and together and (ambient is None or abs(coldest - ambient) > 20.0):
+        raise refuse(int(seen[0]), f"{begins} degrees Fahrenheit")
+    for k in seen:
+        others = first[seen[seen != k]]
+        usual = ambient if ambient is not None else float(np.nanmedian(others)) if len(others) > 1 else None
+        if not quiet or usual is None or lowest[k] - usual < 20.0:
+            continue
+        for name, celsius in (("degrees Fahrenheit", (lowest[k] - 32.0) / 1.8), ("kelvin", lowest[k] - 273.15)):
+            if abs(celsius - usual) < 8.0:
+                raise refuse(
+                    int(k),
+                    f"nothing is driven, the rest is at {usual:.0f} degC, yet spring {k + 1} starts at "
+                    f"{first[k]:.0f} and never falls below {lowest[k]:.0f}: looks like {name}",
+                )
+
+
+def _doubt_units(run: Run) -> None:
+    """Say what is possible but unlikely: it may be so, or a unit or a column is wrong."""
+    usual = float(np.median(np.diff(run.time_s)))
+    if usual > 100.0:
+        run.notes.append(f"the rows are {usual:g} s apart: is the time in milliseconds?")
+    if run.duration_s < 60.0 and len(run.time_s) >= 60:
+        run.notes.append(f"the whole log lasts {run.duration_s:.3g} s: is the time in minutes or hours?")
+    if run.ambient_c is not None and np.isfinite(run.temperature_c).any():
+        coldest, ambient = float(np.nanmin(run.temperature_c)), float(np.median(run.ambient_c))
+        if coldest > 45.0 and abs((coldest - 32.0) / 1.8 - ambient) < 5.0:
+            run.notes.append(
+                f"no spring is ever below {coldest:.0f}, which in Fahrenheit would be the ambient, {ambient:.0f} degC: "
+                "are the temperatures in Fahrenheit?"
+            )
+    if run.voltage_v is not None and run.current_a is not None and np.any(driven := run.current_a > 0.05):
+        ohm = float(np.median(run.voltage_v[driven] / run.current_a[driven]))
+        if not 0.02 < ohm < 2.0:
+            run.notes.append(
+                f"v/i is {ohm:.2g} ohm, and a spring like the paper's has 0.2: if yours has not, currents and voltages "
+                "are swapped or in another unit"
+            )
 
 
 def _mask_bad_sensors(run: Run) -> None:
     """Saturated and dead sensors are not measurements: masked, and said."""
+    noise = np.nan_to_num(noise_floor(run.temperature_c))
     for k in range(run.springs):
         values = run.temperature_c[:, k]
         seen = np.flatnonzero(np.isfinite(values))
@@ -485,7 +560,8 @@ def _mask_bad_sensors(run: Run) -> None:
             # than it ever stays at any other value.
             elsewhere = _longest_run(np.diff(inner) == 0) + 1
             if longest >= 15 and longest > 4 * elsewhere and longest >= typical:
-                run.temperature_c[seen[flat], k] = np.nan
+                # near the limit only what the noise carried down is seen: those rows would pull the fit
+                run.temperature_c[seen[np.abs(measured - extreme) <= 4.0 * noise[k]], k] = np.nan
                 run.notes.append(
                     f"t{k + 1}_c stays at its {edge} value {extreme:g} degC for {longest} rows: "
                     "saturated, those rows left out"
@@ -542,12 +618,25 @@ def _find_gaps(run: Run) -> None:
     gaps = np.flatnonzero(step > limit)
     for row in gaps:
         run.starts.append(int(row) + 1)
+        _mask_run_in(run, int(row) + 1)
     if gaps.size:
         longest = float(step[gaps].max())
         run.notes.append(
-            f"{gaps.size} gap(s) in time, the longest {longest:.0f} s: "
-            "the simulation starts again from the measured temperatures after each"
+            f"{gaps.size} gap(s) in time, the longest {longest:.0f} s: the simulation starts again from the measured "
+            f"temperatures after each, and what is measured in the first {RUN_IN_S:.0f} s does not count"
         )
+    missing = int(np.rint(step[(step > 1.5 * usual) & (step <= limit)] / usual - 1.0).sum())
+    if missing:
+        run.notes.append(
+            f"about {missing} rows are missing here and there: an input that changed meanwhile is taken for the old one "
+            "until the next row"
+        )
+
+
+def _mask_run_in(run: Run, begin: int) -> None:
+    """Leave out what is measured while a simulation that starts at row `begin` forgets how it started."""
+    end = int(np.searchsorted(run.time_s, run.time_s[begin] + RUN_IN_S))
+    run.temperature_c[begin + 1 : end] = np.nan
 
 
 def log_text(
@@ -563,55 +652,97 @@ def log_text(
 
 
 def condense(run: Run, max_rows: int = 4000) -> Run:
-    """Return the run with at most about `max_rows` rows: bins of equal row count, averaged.
+    """Return the run with at most about `max_rows` rows, and say how.
 
-    Drives and fan are averaged over the bin they act in; the temperature of a bin is the mean of the
-    measurements around its first time, so noise falls and nothing is shifted.
+    First rows are averaged to FINEST_S. What is then still too long is cut to stretches, evenly spread from beginning to
+    end, at full rate: averaging further would blur what the springs were given. Each stretch starts from the measured
+    temperatures, as after a gap; between two of them one row holds the mean of what was given, for air and plate.
+    """
+    run = _averaged(run, max_rows)
+    n = len(run.time_s)
+    usual = float(np.median(np.diff(run.time_s)))
+    pieces = max(2, round(max_rows * usual / STRETCH_S))
+    each = max_rows // pieces
+    if n <= max_rows or each < 50:
+        return run
+    begins = np.linspace(0, n - each, pieces).round().astype(int)
+    rows: list[np.ndarray] = []
+    starts: list[int] = []
+    bridges: list[tuple[int, int, int]] = []
+    total = 0
+    for begin, following in zip(begins, [*begins[1:], n], strict=True):
+        end = int(begin) + each
+        starts += [total, *(total + one - int(begin) for one in run.starts if begin < one < end)]
+        rows.append(np.arange(begin, min(end + 1, following)))
+        total += len(rows[-1])
+        if following > end and following < n:
+            bridges.append((total - 1, end, int(following)))
+    pick = np.concatenate(rows)
+    out = replace(
+        run,
+        time_s=run.time_s[pick],
+        drive=run.drive[pick],
+        temperature_c=run.temperature_c[pick],
+        fan=run.fan[pick],
+        ambient_c=None if run.ambient_c is None else run.ambient_c[pick],
+        current_a=None,
+        voltage_v=None,
+        starts=starts,
+        notes=[
+            *run.notes,
+            f"{n} rows: the fit takes {pieces} stretches of {each * usual / 60.0:.0f} min, evenly spread; "
+            "what was given between them counts as its mean",
+        ],
+    )
+    weight = np.diff(run.time_s, append=run.time_s[-1] + usual)
+    for at, begin, end in bridges:
+        span = slice(begin, end)
+        out.temperature_c[at] = np.nan
+        out.drive[at] = weight[span] @ run.drive[span] / weight[span].sum()
+        out.fan[at] = weight[span] @ run.fan[span] / weight[span].sum()
+        if out.ambient_c is not None and run.ambient_c is not None:
+            out.ambient_c[at] = weight[span] @ run.ambient_c[span] / weight[span].sum()
+    for begin in starts[1:]:
+        _mask_run_in(out, begin)
+    return out
+
+
+def _averaged(run: Run, max_rows: int) -> Run:
+    """Return the run with rows averaged to at most FINEST_S, no more than `max_rows` asks for.
+
+    A row's drive and fan are the means over the time until the next one; its temperature is the mean of an odd number of
+    readings around its time, none of them used twice: nothing is shifted, and the noise stays white.
     """
     n = len(run.time_s)
-    factor = -(-n // max_rows)
-    if factor <= 1:
-        return run
     usual = float(np.median(np.diff(run.time_s)))
-    factor = max(1, min(factor, int(10.0 / usual)))
+    factor = min(-(-n // max_rows), int(FINEST_S / usual + 1e-9))
     if factor <= 1:
         return run
-    pieces: dict[str, list[np.ndarray]] = {k: [] for k in ("t", "d", "y", "f", "a")}
+    weight = np.diff(run.time_s, append=run.time_s[-1] + usual)
+    pieces: dict[str, list[np.ndarray]] = {"row": [], "drive": [], "fan": [], "temperature": []}
     starts: list[int] = []
-    half = factor // 2
-    smooth = pd.DataFrame(run.temperature_c).rolling(2 * half + 1, center=True, min_periods=1).mean().to_numpy()
-    bounds = [*run.starts, n]
-    total = 0
-    for begin, end in zip(bounds[:-1], bounds[1:], strict=True):
-        edges = np.arange(begin, end, factor)
-        starts.append(total)
-        total += len(edges)
-        weight = np.diff(run.time_s, append=run.time_s[-1] + usual)[begin:end]
-        bins = np.arange(end - begin) // factor
-        norm = np.bincount(bins, weight)
-        for key, source in (("d", run.drive), ("f", run.fan[:, None])):
-            pieces[key].append(
-                np.column_stack(
-                    [np.bincount(bins, weight * source[begin:end, k]) / norm for k in range(source.shape[1])]
-                )
-            )
-        first = run.temperature_c[begin : begin + 1]
-        block = smooth[edges].copy()
-        block[0] = np.where(np.isfinite(first[0]), smooth[begin], np.nan)
-        pieces["y"].append(block)
-        pieces["t"].append(run.time_s[edges])
-        if run.ambient_c is not None:
-            pieces["a"].append(run.ambient_c[edges])
-    return Run(
-        name=run.name,
-        sha256=run.sha256,
-        time_s=np.concatenate(pieces["t"]),
-        mode=run.mode,
-        drive=np.ascontiguousarray(np.concatenate(pieces["d"])),
-        temperature_c=np.ascontiguousarray(np.concatenate(pieces["y"])),
-        fan=np.concatenate(pieces["f"])[:, 0],
-        ambient_c=None if run.ambient_c is None else np.concatenate(pieces["a"]),
-        warm=run.warm,
-        notes=[*run.notes, f"{n} rows averaged {factor} by {factor} for the fit"],
+    for begin, end in zip(run.starts, [*run.starts[1:], n], strict=True):
+        starts.append(sum(map(len, pieces["row"])))
+        rows = np.arange(begin, end, factor)
+        span = np.add.reduceat(weight[begin:end], rows - begin)
+        pieces["row"].append(rows)
+        pieces["drive"].append(
+            np.add.reduceat(weight[begin:end, None] * run.drive[begin:end], rows - begin, axis=0) / span[:, None]
+        )
+        pieces["fan"].append(np.add.reduceat(weight[begin:end] * run.fan[begin:end], rows - begin) / span)
+        measured = pd.DataFrame(run.temperature_c[begin:end])
+        smooth = measured.rolling(factor - (factor + 1) % 2, center=True, min_periods=1).mean().to_numpy()
+        pieces["temperature"].append(smooth[rows - begin])
+    row = np.concatenate(pieces["row"])
+    return replace(
+        run,
+        time_s=run.time_s[row],
+        drive=np.ascontiguousarray(np.concatenate(pieces["drive"])),
+        temperature_c=np.ascontiguousarray(np.concatenate(pieces["temperature"])),
+        fan=np.concatenate(pieces["fan"]),
+        ambient_c=None if run.ambient_c is None else run.ambient_c[row],
+        current_a=None,
+        voltage_v=None,
         starts=starts,
+        notes=[*run.notes, f"{n} rows averaged {factor} by {factor} for the fit"],
     )
