@@ -47,6 +47,50 @@ def rows_of(path: Path) -> list[dict[str, str]]:
         return list(csv.DictReader(line for line in stream if not line.startswith("#")))
 
 
+# One thing after the other; what the rows after it show is in Run.test_events_do_what_they_say.
+EVENTS = """[scenario]
+duration_s = 40
+log_interval_s = 1
+[chip]
+open_current_a = 1
+[events]
+at 1 = on 1 50
+at 2 = on all
+at 3 = off 2
+at 4 = pattern 010000001
+at 5 = !
+at 6 = on 1
+at 7 = clear
+at 8 = on all
+at 9 = fan 50
+at 10 = room 30
+at 12 = fail open 1
+at 12 = fail short 2
+at 12 = fail nack 3
+at 12 = fail stale 4
+at 12 = fail ina_reset 5
+at 14 = repair open 1
+at 14 = repair short 2
+at 14 = repair nack 3
+at 14 = repair stale 4
+at 14 = clear
+at 14 = on all
+at 16 = fail nack 1
+at 16 = fail sda_low
+at 18 = repair sda_low
+at 18 = clear
+at 18 = on all
+at 20 = repair nack 1
+at 20 = clear
+at 20 = on all
+at 22 = fail brown_out
+at 23 = on all
+at 24 = unlock
+at 25 = on all
+at 30 = off all
+"""
+
+
 class Case(unittest.TestCase):
     def setUp(self) -> None:
         folder = tempfile.TemporaryDirectory()
@@ -258,6 +302,102 @@ class Run(Case):
             self.assertIn(told, table)
             self.assertIn(told, json.loads(self.json.read_text())["left_out"])
         self.assertEqual(json.loads(self.json.read_text())["left_out"], "")
+
+    def test_the_log_and_the_summary_agree(self) -> None:
+        scenario = SCENARIO.replace("[noise]\ntemperature_c = 0.3\ncurrent_a = 0.001\n", "")
+        scenario = scenario.replace("= 1.5", "= 2.8").replace("= 0.5", "= 4").replace("at 15", "at 26")
+        scenario = scenario.replace("at 1 = pattern 111101111", "at 2 = on 1")
+        more = ("--json", self.json, "--set", "scenario.duration_s=40.3")
+        coarse = rows_of_text(self.run_it("a.csv", *more, scenario=scenario))
+        first = json.loads(self.json.read_text())["springs"][0]
+        self.assertEqual(coarse[-1]["time_s"], "40.30")
+        fine = rows_of_text(self.run_it("b.csv", *more, "--set", "scenario.log_interval_s=0.02", scenario=scenario))
+        self.assertEqual(json.loads(self.json.read_text())["springs"][0], first)
+
+        # v i of a row is the mean power until the next, also where the current was on for half of the row.
+        def electrical_j(rows: list[dict[str, str]]) -> float:
+            times = [float(row["time_s"]) for row in rows]
+            power = [float(row["i1_a"]) * float(row["v1_v"]) for row in rows]
+            return sum(w * (b - a) for w, a, b in zip(power, times, times[1:], strict=False))
+
+        self.assertAlmostEqual(electrical_j(coarse), first["energy_j"], delta=0.02 * first["energy_j"])
+        self.assertAlmostEqual(electrical_j(fine), first["energy_j"], delta=0.02 * first["energy_j"])
+        self.assertGreater(first["energy_j"], 10)
+        highest = max(float(row["p1_c"]) for row in fine)
+        self.assertAlmostEqual(first["highest_c"], highest, delta=0.01)
+        self.assertGreater(highest, float(fine[-1]["p1_c"]) + 5)
+        squares = [(float(row["m1_c"]) - float(row["p1_c"])) ** 2 for row in fine]
+        self.assertAlmostEqual(first["model_rmse_c"], (sum(squares) / len(squares)) ** 0.5, delta=0.003)
+        for column in ("px1", "x1"):
+            self.assertEqual(fine[0][column].rstrip("0"), "0.")
+            self.assertGreater(max(float(row[column]) for row in fine), 0.3)
+        self.assertAlmostEqual(first["austenite"], float(fine[-1]["px1"]), delta=1e-4)
+        self.assertEqual({row["px5"] for row in fine}, {"0.0000"})
+
+    def test_noise_is_what_was_asked_for(self) -> None:
+        columns = {"temperature_c": "t2_c", "current_a": "i1_a", "voltage_v": "v1_v"}
+        for key, column in columns.items():
+            scenario = SCENARIO[: SCENARIO.index("[noise]")] + "[noise]\n{}\n[events]\nat 1 = on 1\n"
+            spread = {}
+            for noise in ("0", "0.2"):
+                runs = [
+                    rows_of_text(self.run_it("a.csv", "--seed", seed, scenario=scenario.format(f"{key} = {noise}")))
+                    for seed in (3, 4)
+                ]
+                both = [[float(row[column]) for row in run[10:]] for run in runs]
+                spread[noise] = max(abs(a - b) for a, b in zip(*both, strict=True))
+            self.assertEqual(spread["0"], 0.0, key)
+            self.assertGreater(spread["0.2"], 0.005, key)
+
+    def test_events_do_what_they_say(self) -> None:
+        rows = rows_of_text(self.run_it("a.csv", "--json", self.json, scenario=EVENTS))
+        result = json.loads(self.json.read_text())
+
+        def targets(second: int) -> str:
+            """One digit a spring: its target in tenths of an ampere, A for 1."""
+            return "".join(f"{round(10 * float(rows[second][f's{k}_a'])):X}" for k in range(1, 10))
+
+        on_at = {2: "500000000", 3: "A" * 9, 4: "A0AAAAAAA", 5: "0A000000A", 6: "0" * 9, 7: "0" * 9, 8: "0" * 9}
+        on_at |= {9: "A" * 9, 13: "0000AAAAA", 15: "A" * 9, 17: "0" * 9, 19: "0AAAAAAAA", 21: "A" * 9}
+        on_at |= {23: "0" * 9, 24: "0" * 9, 25: "0" * 9, 26: "A" * 9, 30: "A" * 9, 31: "0" * 9}
+        self.assertEqual({second: targets(second) for second in on_at}, on_at)
+        self.assertEqual([rows[second]["fan"] for second in (8, 9, 21)], ["0.00", "0.50", "0.50"])
+        self.assertEqual([rows[second]["ambient_c"] for second in (9, 11)], ["20.000", "30.000"])
+        # After a brown-out nothing is known: the springs are taken to be as hot as they may be.
+        self.assertLess(float(rows[21]["m9_c"]), 40)
+        self.assertGreater(float(rows[23]["m9_c"]), 100)
+        faults = [spring["fault"] for spring in result["springs"]]
+        named = ["open_spring", "short_spring", "sensor_absent", "sensor_stale"]
+        self.assertEqual(faults, named + ["sensor_bus"] * 5)
+        self.assertEqual(result["board_fault"], "emergency_stop")
+
+    def test_a_fan_that_stands_does_not_cool(self) -> None:
+        scenario = SCENARIO + "at 2 = fan 100\n{}"
+        cooled = rows_of_text(self.run_it("a.csv", scenario=scenario.format("")))
+        stands = rows_of_text(self.run_it("b.csv", scenario=scenario.format("at 3 = fail fan_stop\n")))
+        again = rows_of_text(
+            self.run_it("c.csv", scenario=scenario.format("at 3 = fail fan_stop\nat 4 = repair fan_stop\n"))
+        )
+        self.assertEqual([rows[-1]["fan"] for rows in (cooled, stands, again)], ["1.00"] * 3)
+        rise = float(stands[-1]["p1_c"]) - float(cooled[-1]["p1_c"])
+        self.assertGreater(rise, 1.0)
+        self.assertLess(float(again[-1]["p1_c"]) - float(cooled[-1]["p1_c"]), 0.3 * rise)
+
+    def test_policy_from_the_command_line_the_file_and_an_event(self) -> None:
+        def targets(text: str, *more: object) -> list[str]:
+            return [row["s1_a"] for row in rows_of_text(self.run_it("a.csv", *more, scenario=text))]
+
+        named = SCENARIO.replace("seed = 5", "seed = 5\npolicy = precompensate")
+        precompensate = targets(named)
+        self.assertNotEqual(precompensate, targets(SCENARIO))
+        self.assertEqual(precompensate, targets(SCENARIO, "--policy", "precompensate"))
+        self.assertEqual(targets(SCENARIO), targets(named, "--policy", "open"))
+        self.assertEqual(precompensate, targets(SCENARIO + "at 0 = policy precompensate\n"))
+
+    def test_a_model_of_another_array_is_refused(self) -> None:
+        self.file("m.toml", MODEL)
+        scenario = SCENARIO.replace("[chip]", "[chip]\nmodel = m.toml")
+        self.scenario_refused("s.ini:8:9: ", "1 x 2 springs, the scenario of 3 x 3", scenario)
 
     def test_a_model_file_is_what_the_chip_believes(self) -> None:
         cold = MODEL.replace("cols = 2", "cols = 3").replace("rows = 1", "rows = 3").replace("2.0", "3.0")

@@ -1,6 +1,7 @@
 /* Physical parameters to the chip's integers: exact where they fit, refused where they do not, told
  * where left out. */
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 #include <unity.h>
@@ -43,7 +44,11 @@ static void declared_model_maps_number_by_number(void)
     set("loss_w_per_k", 0.0058);
     set("loss_fan_w_per_k", 0.0113);
     set("orthogonal_w_per_k", 0.000586);
+    set("orthogonal_fan_w_per_k", 0.000658);
+    set("diagonal_w_per_k", 0.000293);
     set("diagonal_fan_w_per_k", 0.000329);
+    set("martensite_finish_c", 61.5);
+    set("martensite_start_c", 72.25);
     TEST_ASSERT_EQUAL(CHIP_MAPPING_OK, map());
     TEST_ASSERT_EQUAL_STRING("", message);
     TEST_ASSERT_EQUAL(3, chip.rows);
@@ -53,8 +58,13 @@ static void declared_model_maps_number_by_number(void)
     TEST_ASSERT_EQUAL(5800, chip.loss_uw_per_k);
     TEST_ASSERT_EQUAL(11300, chip.loss_fan_uw_per_k);
     TEST_ASSERT_EQUAL(586, chip.orthogonal_uw_per_k);
+    TEST_ASSERT_EQUAL(658, chip.orthogonal_fan_uw_per_k);
+    TEST_ASSERT_EQUAL(293, chip.diagonal_uw_per_k);
     TEST_ASSERT_EQUAL(329, chip.diagonal_fan_uw_per_k);
+    TEST_ASSERT_EQUAL(6150, chip.martensite_finish_cc);
+    TEST_ASSERT_EQUAL(7225, chip.martensite_start_cc);
     TEST_ASSERT_EQUAL(8800, chip.austenite_start_cc);
+    TEST_ASSERT_EQUAL(9800, chip.austenite_finish_cc);
 }
 
 static void effects_that_are_off_cost_nothing(void)
@@ -82,7 +92,8 @@ static void effects_of_the_chip_are_switched_on(void)
     on("fan_wake");
     on("shared_air");
     set("air_exchange_w_per_k", 0.05);
-    set("wake_direction", 1);
+    set("air_heat_capacity_j_per_k", 1.25);
+    set("wake_direction", 3);
     TEST_ASSERT_EQUAL(CHIP_MAPPING_OK, map());
     TEST_ASSERT_EQUAL_STRING("", message);
     TEST_ASSERT_EQUAL(8650, chip.latent_heat_mj);
@@ -93,8 +104,54 @@ static void effects_of_the_chip_are_switched_on(void)
     TEST_ASSERT_EQUAL(50000, chip.plate_loss_uw_per_k);
     TEST_ASSERT_EQUAL(13000, chip.plate_heat_capacity_mj_per_k);
     TEST_ASSERT_EQUAL(1000, chip.wake_uw_per_k);
-    TEST_ASSERT_EQUAL(THERMAL_MODEL_WAKE_SOUTH, chip.wake_direction);
+    TEST_ASSERT_EQUAL(3, chip.wake_direction);
     TEST_ASSERT_EQUAL(50000, chip.air_exchange_uw_per_k);
+    TEST_ASSERT_EQUAL(1250, chip.air_heat_capacity_mj_per_k);
+}
+
+/* The chip's resistance does not depend on temperature: it is the plant's at 83 degC, between M_s
+ * and A_s. */
+static void resistance_is_taken_between_the_phases(void)
+{
+    on("resistance_phase");
+    set("resistance_coefficient_per_k", 0.001);
+    TEST_ASSERT_EQUAL(CHIP_MAPPING_OK, map());
+    TEST_ASSERT_EQUAL(186025, chip.resistance_martensite_uohm); /* 0.175 (1 + 0.001 x 63) */
+    TEST_ASSERT_EQUAL(232797, chip.resistance_austenite_uohm);
+}
+
+/* One value on the chip, one for each spring in the plant: the mean, and it is said. */
+static void what_the_chip_averages_is_said(void)
+{
+    const struct {
+        const char *effect, *name;
+        double value;
+    } cases[] = {{"plate_conduction", "plate_coupling_w_per_k", 0.0024},
+                 {"latent_heat", "latent_heat_j", 13.15},
+                 {"resistance_phase", "resistance_austenite_ohm", 0.264}};
+    for (size_t k = 0; k < sizeof cases / sizeof cases[0]; k++) {
+        tearDown();
+        setUp();
+        on(cases[k].effect);
+        char one_spring[64];
+        (void)snprintf(one_spring, sizeof one_spring, "%s[5]", cases[k].name);
+        set(one_spring, cases[k].value);
+        TEST_ASSERT_EQUAL(CHIP_MAPPING_OK, map());
+        TEST_ASSERT_NOT_NULL_MESSAGE(strstr(message, "the chip takes the mean"), cases[k].name);
+    }
+    TEST_ASSERT_EQUAL(224000, chip.resistance_austenite_uohm);
+    tearDown();
+    setUp();
+    on("plate_conduction");
+    on("latent_heat");
+    set("plate_coupling_w_per_k[5]", 0.0024);
+    set("latent_heat_j[5]", 13.15);
+    TEST_ASSERT_EQUAL(CHIP_MAPPING_OK, map());
+    TEST_ASSERT_EQUAL(1600, chip.plate_coupling_uw_per_k);
+    TEST_ASSERT_EQUAL(9150, chip.latent_heat_mj);
+    set("loss_w_per_k[5]", 0.0116);
+    TEST_ASSERT_EQUAL(CHIP_MAPPING_OK, map());
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(message, "the chip takes the ratio without"), message);
 }
 
 /* What each spring loses on the chip is what it loses in the plant, to the permille. */
@@ -199,6 +256,8 @@ int main(void)
     RUN_TEST(declared_model_maps_number_by_number);
     RUN_TEST(effects_that_are_off_cost_nothing);
     RUN_TEST(effects_of_the_chip_are_switched_on);
+    RUN_TEST(resistance_is_taken_between_the_phases);
+    RUN_TEST(what_the_chip_averages_is_said);
     RUN_TEST(edge_and_mismatch_become_scales);
     RUN_TEST(natural_convection_becomes_a_rising_loss);
     RUN_TEST(measurement_effects_are_left_out_and_said);

@@ -403,7 +403,10 @@ static void ambient_reaches_plant_and_chip_with_its_error(void)
     TEST_ASSERT_EQUAL_INT16(23 * 128, loop_inputs(loop)->ambient_c7); /* before any tick */
     TEST_ASSERT_TRUE(loop_set_ambient(loop, 30.0));
     TEST_ASSERT_FALSE(loop_set_ambient(loop, 1000.0));
-    loop_advance(loop, 1000.0);
+    loop_tick(loop);
+    TEST_ASSERT_EQUAL_INT16(33 * 128, loop_inputs(loop)->ambient_c7);
+    TEST_ASSERT_EQUAL(CONTROLLER_SENSOR_OK, loop_inputs(loop)->sensor[0].status); /* at power-up */
+    loop_advance(loop, 1000.0 - LOOP_TICK_S);
     TEST_ASSERT_DOUBLE_WITHIN(0.05, 30.0, true_c(4));
     TEST_ASSERT_DOUBLE_WITHIN(0.1, 33.0, chip_c(4));
     TEST_ASSERT_DOUBLE_WITHIN(1e-6, 1000.0, loop_time_s(loop));
@@ -418,6 +421,8 @@ static void what_does_not_fit_is_refused(void)
     options.plant_ticks = 0;
     TEST_ASSERT_NULL(loop_create(&settings, plant, &options, 1, &bad));
     TEST_ASSERT_EQUAL_UINT16(UINT16_MAX, bad);
+    options.plant_ticks = 6;
+    TEST_ASSERT_NULL(loop_create(&settings, plant, &options, 1, NULL));
     loop_options_default(&options);
     options.sensor_samples = 3;
     TEST_ASSERT_NULL(loop_create(&settings, plant, &options, 1, NULL));

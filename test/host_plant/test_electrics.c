@@ -12,6 +12,7 @@ static void compare_register_zero_is_a_pulse_of_one_clock(void)
     TEST_ASSERT_EQUAL_DOUBLE(1.0 / 800.0, electrics_pwm_fraction(true, 0, 799));
     TEST_ASSERT_EQUAL_DOUBLE(0.5, electrics_pwm_fraction(true, 399, 799));
     TEST_ASSERT_EQUAL_DOUBLE(1.0, electrics_pwm_fraction(true, 799, 799));
+    TEST_ASSERT_EQUAL_DOUBLE(1.0, electrics_pwm_fraction(true, 800, 799));
     TEST_ASSERT_EQUAL_DOUBLE(1.0, electrics_pwm_fraction(true, 5000, 799));
 }
 
@@ -41,11 +42,14 @@ static void registers_have_the_data_sheets_steps_and_ends(void)
 {
     TEST_ASSERT_EQUAL_INT16(15000, electrics_ina219_shunt_register(1.5));
     TEST_ASSERT_EQUAL_INT16(1, electrics_ina219_shunt_register(0.00014));
+    TEST_ASSERT_EQUAL_INT16(2, electrics_ina219_shunt_register(0.00016));
+    TEST_ASSERT_EQUAL_INT16(-2, electrics_ina219_shunt_register(-0.00016));
     TEST_ASSERT_EQUAL_INT16(0, electrics_ina219_shunt_register(0.00004));
     TEST_ASSERT_EQUAL_INT16(32000, electrics_ina219_shunt_register(3.2));
     TEST_ASSERT_EQUAL_INT16(32000, electrics_ina219_shunt_register(12.5));
     TEST_ASSERT_EQUAL_INT16(-32000, electrics_ina219_shunt_register(-12.5));
     TEST_ASSERT_EQUAL_UINT16(82, electrics_ina219_bus_register(0.3285));
+    TEST_ASSERT_EQUAL_UINT16(83, electrics_ina219_bus_register(0.3305));
     TEST_ASSERT_EQUAL_UINT16(4000, electrics_ina219_bus_register(30.0));
     TEST_ASSERT_EQUAL_UINT16(0, electrics_ina219_bus_register(-1.0));
 }
@@ -69,22 +73,26 @@ static void sensor_reports_the_mean_over_its_own_windows(void)
 
 static void averaging_takes_the_root_of_n_off_the_noise(void)
 {
-    double spread[2];
+    double spread[2], bus_spread[2];
     for (int k = 0; k < 2; k++) {
         electrics_ina219_t sensor;
-        TEST_ASSERT_TRUE(electrics_ina219_init(&sensor, k ? 16 : 1, 1e-3, 0.0, 7));
-        double sum = 0.0, squares = 0.0;
+        TEST_ASSERT_TRUE(electrics_ina219_init(&sensor, k ? 16 : 1, 1e-3, 0.1, 7));
+        double sum = 0.0, squares = 0.0, bus_squares = 0.0;
         for (int n = 0; n < 4000; n++) {
             double current, voltage;
             electrics_ina219_advance(&sensor, 1.0000001 * electrics_ina219_period_s(&sensor), 1.5,
-                                     0.3);
+                                     3.0);
             electrics_ina219_take(&sensor, &current, &voltage);
             sum += current - 1.5;
             squares += (current - 1.5) * (current - 1.5);
+            bus_squares += (voltage - 3.0) * (voltage - 3.0);
         }
         TEST_ASSERT_DOUBLE_WITHIN(1e-3, 0.0, sum / 4000);
         spread[k] = sqrt(squares / 4000);
+        bus_spread[k] = sqrt(bus_squares / 4000);
     }
+    TEST_ASSERT_DOUBLE_WITHIN(3e-3, 0.1, bus_spread[0]);
+    TEST_ASSERT_DOUBLE_WITHIN(0.3, 4.0, bus_spread[0] / bus_spread[1]);
     TEST_ASSERT_DOUBLE_WITHIN(3e-4, 0.01, spread[0]); /* 1 mV over 0.1 ohm */
     TEST_ASSERT_DOUBLE_WITHIN(0.3, 4.0, spread[0] / spread[1]);
 }
