@@ -349,6 +349,10 @@ def validate(result: Mapping[str, Any]) -> None:
     jsonschema.validate(result, schema())
 
 
+WHITE = 0.2
+"""Structure, rms in units of the noise, below which a residual is called white."""
+
+
 def depends_on(problem: Problem, fit: Fit) -> tuple[list[str], str]:
     """Return what the residual depends on, strongest first, and a sentence; nothing where it is white."""
     structure = search.excess(problem, fit)
@@ -360,7 +364,7 @@ def depends_on(problem: Problem, fit: Fit) -> tuple[list[str], str]:
         times.append(run.time_s[begins])
         owners.append(begins)
         runs_of.append(r)
-    if structure < 0.5 * search.UNEXPLAINED**2:
+    if structure < WHITE**2:
         return [], ""
     out: list[tuple[float, str]] = []
     per_spring = np.nanmean([np.nanmean(b**2, axis=0) - 1.0 / width for b in blocks], axis=0)
@@ -378,8 +382,9 @@ def depends_on(problem: Problem, fit: Fit) -> tuple[list[str], str]:
         series.setdefault("total drive", []).append(drive.sum(axis=1))
         series.setdefault("fan", []).append(fan)
         series.setdefault("time", []).append(times[r] - times[r].mean())
+    largest = max(1e-12, float(np.nanmax(np.nanmean([np.nanmean(b**2, axis=0) for b in blocks], axis=0))))
     for name, parts in series.items():
-        best = (0.0, 0, -1)
+        best = (0.0, 0.0, 0, -1)
         if all(np.ptp(p) < 1e-12 for p in parts):
             continue
         for lag in (0, 1, 2, 3, 6, 12) if name != "time" else (0,):
@@ -392,15 +397,15 @@ def depends_on(problem: Problem, fit: Fit) -> tuple[list[str], str]:
                 good = np.isfinite(ys)
                 if good.sum() < 10 or np.std(xs[good]) < 1e-12 or np.std(ys[good]) < 1e-12:
                     continue
-                rho = float(np.corrcoef(xs[good], ys[good])[0, 1]) * math.sqrt(
-                    float(np.nanmean(ys**2)) / max(1e-12, float(np.nanmax([np.nanmean(b**2) for b in blocks])))
-                )
-                if abs(rho) > abs(best[0]):
-                    best = (rho, lag, k)
-        if abs(best[0]) > 0.3:
+                rho = float(np.corrcoef(xs[good], ys[good])[0, 1])
+                # a spring that shows little counts for little, however well it correlates
+                weight = abs(rho) * min(1.0, math.sqrt(float(np.nanmean(ys**2)) / largest))
+                if weight > best[0]:
+                    best = (weight, rho, lag, k)
+        if best[0] > 0.3:
             step = float(np.median(np.diff(problem.runs[0].time_s))) * width
-            lag_text = f", {best[1] * step:.0f} s later" if best[1] else ""
-            out.append((abs(best[0]), f"{name} (seen at spring {best[2] + 1}{lag_text}, r = {best[0]:+.2f})"))
+            lag_text = f", {best[2] * step:.0f} s later" if best[2] else ""
+            out.append((best[0], f"{name} (seen at spring {best[3] + 1}{lag_text}, r = {best[1]:+.2f})"))
     together = [np.nanmean(b, axis=1) for b in blocks]
     common = np.mean([np.nanmean(t**2) for t in together]) / max(1e-12, np.mean([np.nanmean(b**2) for b in blocks]))
     if common > 0.4 and problem.runs[0].springs > 2:
@@ -414,6 +419,18 @@ def depends_on(problem: Problem, fit: Fit) -> tuple[list[str], str]:
         ),
         default=(0.0, 0, 0.0),
     )
+    for r, (run, left, noise) in enumerate(zip(problem.runs, fit.residual, problem.noise, strict=True)):
+        first = run.time_s <= run.time_s[0] + 0.1 * run.duration_s
+        size = np.nan_to_num(left / noise) ** 2
+        begins_badly = float(size[first].sum()) / max(1e-12, float(size.sum()))
+        if begins_badly > 0.25:
+            out.append(
+                (
+                    begins_badly,
+                    f"the start of run {r + 1} ({100 * begins_badly:.0f} % of what is left is in its first "
+                    f"{0.1 * run.duration_s:.0f} s: its state or its first inputs are not as logged)",
+                )
+            )
     typical = np.mean([np.nanmean(b**2) for b in blocks])
     if worst[0] > 8 * typical:
         out.append((0.3, f"time: most at {worst[2]:.0f} s of run {worst[1] + 1}"))
