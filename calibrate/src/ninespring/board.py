@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
+import math
 import re
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from types import TracebackType
 
 import serial
@@ -89,50 +92,144 @@ class Board:
                 if time.monotonic() < until:
                     raise WorkError(f"{self.port}: no telemetry for 5 s")
                 return
+            if match := ERROR.match(line):
+                raise WorkError(f"the board refuses what it was sent: error {match[1]} {match[2]}".rstrip())
             if line and line[0] not in "[<>" and line != "ok":
                 yield line
 
+    def send(self, line: str) -> None:
+        """Send one line whose answer comes among the telemetry."""
+        try:
+            self._serial.write(line.encode("ascii") + b"\n")
+        except (serial.SerialException, OSError):
+            raise WorkError(f"{self.port}: the board went away") from None
+
+    def off(self) -> None:
+        """Switch all springs off, if the board is still there."""
+        with contextlib.suppress(WorkError):
+            self.send("off all")
+
     def stop(self) -> None:
         """Switch telemetry off, whatever is still under way."""
-        try:
+        with contextlib.suppress(WorkError, serial.SerialException, OSError):
             self._serial.reset_input_buffer()
             self.ask("telemetry off")
-        except WorkError:
-            pass
 
 
-def record(board: Board, hz: int, duration_s: float, say: Callable[[str], None] = lambda text: None) -> list[str]:
-    """Return a log's lines from a board's telemetry: header and rows that are whole and rise in time."""
-    lines: list[str] = []
-    last, dropped = float("-inf"), 0
+@dataclass
+class Step:
+    """A console line to send so many seconds after the first row (None: before the recording)."""
+
+    line: str
+    at_s: float | None = None
+
+
+@dataclass
+class Recording:
+    """What came of a recording."""
+
+    rows: int = 0
+    dropped: int = 0
+    ended: str = ""
+    """Why it ended early where that was nobody's wish."""
+
+
+def script_lines(text: str, name: str) -> list[Step]:
+    """Return the steps of a script: console lines, or `at SECONDS = line` as in scenarios; # and ; begin comments."""
+    steps: list[Step] = []
+    for number, raw in enumerate(text.splitlines(), start=1):
+        line = re.split("[#;]", raw, maxsplit=1)[0].strip()
+        if not line:
+            continue
+        if not line.isascii():
+            raise InputError("the console takes plain ASCII", name, number, 1)
+        step = Step(line)
+        if re.match(r"at\b", line):
+            match = re.fullmatch(r"at\s+(\d+(?:\.\d*)?)\s*=\s*(\S.*)", line)
+            if not match:
+                raise InputError(f"'{line[:40]}' is not `at SECONDS = console line`", name, number, 1)
+            step = Step(match[2], float(match[1]))
+            if steps and steps[-1].at_s is not None and steps[-1].at_s > float(match[1]):
+                raise InputError("times of a script must not fall", name, number, 1)
+        elif steps and steps[-1].at_s is not None:
+            raise InputError(
+                f"'{line[:40]}' comes after timed lines: give it a time, `at SECONDS = ...`", name, number, 1
+            )
+        steps.append(step)
+    return steps
+
+
+def record(
+    board: Board,
+    hz: int,
+    duration_s: float,
+    steps: Sequence[Step] = (),
+    write: Callable[[str], None] = lambda line: None,
+    say: Callable[[int, float], None] = lambda rows, seconds: None,
+) -> Recording:
+    """Write a log's lines from a board's telemetry as they come: header and rows that are whole and rise in time.
+
+    Steps without a time are sent first; timed ones in between, by the board's clock. What is driven by steps is switched
+    off at the end. WorkError where no row came.
+    """
+    got = Recording()
+    header, first, last = "", math.nan, -math.inf
+    for step in steps:
+        if step.at_s is None:
+            board.ask(step.line)
+    waiting = [step for step in steps if step.at_s is not None]
     until = time.monotonic() + duration_s
     try:
         for line in board.telemetry(hz, until):
             if line.startswith("time_s,"):
-                if not lines:
-                    lines.append(line)
+                if not header:
+                    header = line
+                    write(line)
                 continue
-            if not lines:
+            if not header:
                 continue
             try:
                 now = float(line.split(",", 1)[0])
             except ValueError:
-                dropped += 1
-                continue
-            if line.count(",") != lines[0].count(",") or now <= last:
-                dropped += 1
+                now = math.nan
+            if now < last - 1.0:
+                got.ended = "the board has started again"
+                break
+            if line.count(",") != header.count(",") or not now > last:
+                got.dropped += 1
                 continue
             last = now
-            lines.append(line)
-            say(f"{len(lines) - 1} rows")
+            first = now if got.rows == 0 else first
+            got.rows += 1
+            write(line)
+            say(got.rows, now - first)
+            while waiting and waiting[0].at_s is not None and waiting[0].at_s <= now - first:
+                board.send(waiting.pop(0).line)
     except KeyboardInterrupt:
         pass
+    except WorkError as error:
+        if not got.rows:
+            raise
+        got.ended = str(error)
+    if steps:
+        board.off()
     board.stop()
-    if len(lines) < 2:
+    if not got.rows:
         raise WorkError(f"{board.port}: no telemetry came")
-    if dropped:
-        lines.insert(0, f"# dropped_lines: {dropped}")
-    return lines
+    return got
+
+
+def settings_that_differ(sent: Sequence[str], shown: Sequence[str]) -> list[str]:
+    """Return what a board shows otherwise than it was sent, in words; both as lines `$name=value`."""
+    has = dict(line[1:].split("=", 1) for line in shown if line.startswith("$") and "=" in line)
+    out = []
+    for line in sent:
+        name, value = line[1:].split("=", 1)
+        if name not in has:
+            out.append(f"{name} is missing")
+        elif float(has[name].split()[0]) != float(value):
+            out.append(f"{name} is {has[name]}, not {value}")
+    return out
 
 
 def settings_lines(text: str, name: str) -> list[str]:

@@ -2,42 +2,56 @@
 
 from __future__ import annotations
 
+import datetime
 import json
+import os
+import signal
 import sys
 import time
-from collections.abc import Callable, Iterator
+import warnings
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import click
+import jsonschema
 import numpy as np
 from rich.console import Console
-from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from . import __version__
 from .errors import InputError, WorkError
-from .logs import Run, log_text, read_log, write_atomically
+from .logs import Run, check_folder, log_text, read_bytes, read_log, sha256_of, write_atomically
 
-out = Console(highlight=False)
-err = Console(stderr=True, highlight=False)
+WIDE = 160
+"""Columns of a table that goes to a file or a pipe."""
+FEWEST_ROWS = 50
+"""Logs with fewer rows than this, all together, are no measurement to fit to."""
+SHAPES = {1: (1, 1), 2: (1, 2), 4: (2, 2), 9: (3, 3), 16: (4, 4), 25: (5, 5), 36: (6, 6), 49: (7, 7), 64: (8, 8)}
+"""Springs of a log, and the array they are taken for where no array.toml says it."""
+
+out = Console(highlight=False, width=None if sys.stdout.isatty() else WIDE)
+err = Console(stderr=True, highlight=False, width=None if sys.stderr.isatty() else WIDE)
 FILE = click.Path(dir_okay=False, path_type=Path)
 
 
 @contextmanager
-def _working(text: str) -> Iterator[Callable[[str], None]]:
-    """Show that work goes on, on the terminal's error stream."""
+def _working(text: str, total: float | None = None) -> Iterator[Callable[..., None]]:
+    """Show that work goes on, on the terminal's error stream: say(words), say(words, done) with a total."""
     with Progress(
         SpinnerColumn(),
+        *(() if total is None else (BarColumn(),)),
         TextColumn("{task.description}"),
         TimeElapsedColumn(),
         console=err,
         transient=True,
         disable=not err.is_terminal,
     ) as progress:
-        task = progress.add_task(text)
-        yield lambda now: progress.update(task, description=now)
+        task = progress.add_task(text, total=total)
+        yield lambda now, done=None: progress.update(task, description=now, completed=done)
 
 
 def _array_and_runs(array_path: Path | None, logs: tuple[Path, ...], model: Any = None) -> tuple[Any, list[Run]]:
@@ -45,81 +59,131 @@ def _array_and_runs(array_path: Path | None, logs: tuple[Path, ...], model: Any 
 
     array = model.array if model else read_array(array_path) if array_path else None
     runs = [read_log(path, array.springs if array else None) for path in logs]
+    for k, run in enumerate(runs):
+        for other in runs[:k]:
+            if run.sha256 == other.sha256:
+                raise InputError(f"is the same as {other.name}: it would count twice, give it once", run.name)
     counts = {run.springs for run in runs}
     if len(counts) > 1:
         raise InputError(f"the logs have {' and '.join(map(str, sorted(counts)))} springs: give logs of one array")
     if array is None:
         count = counts.pop()
-        shapes = {
-            1: (1, 1),
-            2: (1, 2),
-            4: (2, 2),
-            9: (3, 3),
-            16: (4, 4),
-            25: (5, 5),
-            36: (6, 6),
-            49: (7, 7),
-            64: (8, 8),
-        }
-        if count not in shapes:
-            raise InputError(f"{count} springs: say how they are arranged (--array array.toml)", logs[0])
-        array = Array(*shapes[count])
+        if count not in SHAPES:
+            raise InputError(
+                f"{count} springs: say how they are arranged, `--array array.toml` with [array] rows and cols",
+                logs[0],
+                1,
+            )
+        array = Array(*SHAPES[count])
     modes = {run.mode for run in runs}
     if len(modes) > 1:
         raise InputError(f"the logs are driven by {' and '.join(sorted(modes))}: diagnose one kind at a time")
-    for run in runs:
-        for note in run.notes:
-            err.print(f"[yellow]{Path(run.name).name}: {note}[/]")
+    if (rows := sum(len(run.time_s) for run in runs)) < FEWEST_ROWS:
+        raise InputError(f"{rows} rows are too few to fit to: log some minutes (docs/calibrating.md)", logs[0])
+    if not any(np.any(run.drive) for run in runs):
+        raise InputError("no spring is ever driven: log what the springs were given (i1_a ... or u1 ...)", logs[0], 1)
     return array, runs
 
 
-def _write_json(path: Path | None, data: Any) -> None:
-    if path:
-        write_atomically(path, json.dumps(data, indent=1, allow_nan=False) + "\n")
+def _say_notes(runs: list[Run]) -> None:
+    for run in runs:
+        for note in run.notes:
+            err.print(f"{Path(run.name).name}: {note}", style="yellow", markup=False)
 
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+def checked(data: Mapping[str, Any]) -> str:
+    """Return a command's result as JSON text, held to its schema (results.schema.json, diagnosis.schema.json)."""
+    name = "diagnosis" if str(data.get("schema", "")).startswith("ninespring.diagnosis/") else "results"
+    schema = json.loads((resources.files("ninespring") / f"{name}.schema.json").read_text("utf-8"))
+    jsonschema.validate(data, schema)
+    return json.dumps(data, indent=1, allow_nan=False) + "\n"
+
+
+def _result(name: str, **more: Any) -> dict[str, Any]:
+    return {"schema": f"ninespring.{name}/1", "tool": f"ninespring {__version__}"} | more
+
+
+def _write(files: Mapping[Path | None, str]) -> None:
+    """Write a command's files, all or none as far as a file system goes; a file named None is not wanted."""
+    write_atomically({path: text for path, text in files.items() if path})
+
+
+def _logs_of(runs: list[Run]) -> list[dict[str, Any]]:
+    return [{"file": Path(r.name).name, "sha256": r.sha256, "rows": len(r.time_s), "notes": r.notes} for r in runs]
+
+
+@click.group(
+    context_settings={"help_option_names": ["-h", "--help"]},
+    epilog="Logs, models and their units: docs/files.md. From bench to calibrated chip in one page: docs/calibrating.md. "
+    "Exit code 0: done; 1: the work failed; 2: the input or the arguments are wrong, and one line says what and where.",
+)
 @click.version_option(__version__)
 def cli() -> None:
     """Calibrate the thermal model of an array of NiTi springs, and say what the model lacks."""
 
 
-@cli.command()
+ARRAY = click.option(
+    "--array", "array_path", type=FILE, help="array.toml; left out: a square (or 1 x 2) of the paper's spring"
+)
+MODEL = click.option("--model", "model_path", type=FILE, required=True, help="model.toml that fit or diagnose wrote")
+JSON = click.option("--json", "json_path", type=FILE, help="write the result for programs")
+PORT = click.option("--port", required=True, help="serial port, e.g. /dev/ttyACM0; 115200 baud")
+
+
+@cli.command(
+    epilog="""\b
+Examples:
+  ninespring fit run1.csv run2.csv -o model.toml
+  ninespring fit --effects latent_heat,shared_air run1.csv -o model.toml
+"""
+)
 @click.argument("logs", nargs=-1, required=True, type=FILE)
-@click.option("--array", "array_path", type=FILE, help="array.toml; 3 x 3 of the paper's spring if left out")
+@ARRAY
 @click.option("--effects", default="", help="effects to switch on and fit, comma-separated")
 @click.option("-o", "--output", type=FILE, required=True, help="model.toml to write")
-@click.option("--json", "json_path", type=FILE, help="write the result for programs")
+@JSON
 def fit(logs: tuple[Path, ...], array_path: Path | None, effects: str, output: Path, json_path: Path | None) -> None:
-    """Fit the declared model, with the effects named, to logs."""
-    from . import diagnosis, native
+    """Fit the declared model, with the effects named, to logs.
+
+    Errors are root mean squares in K; numbers are in J/K, W/K, J, s as the table says. Held out: on blocks of two and a
+    half minutes that the numbers were not fitted to.
+    """
+    from . import diagnosis, native, steady
     from . import effects as library
     from .models import model_text
     from .statistics import rms
 
-    wanted = [e.strip() for e in effects.split(",") if e.strip()]
+    check_folder(output, json_path)
+    wanted = list(dict.fromkeys(e.strip() for e in effects.split(",") if e.strip()))
     for name in wanted:
         if name not in native.effect_names():
             raise InputError(f"there is no effect '{name}': {', '.join(native.effect_names())}")
+    for path in logs:
+        if steady.is_steady(path):
+            raise InputError("a steady table: `ninespring diagnose` fits it, effect by effect", path, 1)
     array, runs = _array_and_runs(array_path, logs)
+    _say_notes(runs)
     with _working("fitting") as say:
         problem, chosen, base = diagnosis.fit_effects(array, runs, wanted, say)
+        say("held-out blocks")
         held = diagnosis.holdout_rmse(problem, chosen)
     model = diagnosis.model_of(problem, chosen, runs)
     model.provenance["rmse_before_c"] = rms(base.residual)
-    write_atomically(output, model_text(model))
-    result = {
-        "rmse_c": rms(chosen.residual),
-        "holdout_rmse_c": held,
-        "noise_c": problem.noise_c,
-        "effects": list(chosen.spec.effects),
-        "parameters": {
+    result = _result(
+        "fit",
+        logs=_logs_of(runs),
+        rmse_before_c=rms(base.residual),
+        rmse_c=rms(chosen.residual),
+        holdout_rmse_c=held,
+        noise_c=problem.noise_c,
+        effects=list(chosen.spec.effects),
+        parameters={
             k: v for e in (None, *chosen.spec.effects) for k, v in diagnosis.parameters_of(problem, chosen, e).items()
         },
-        "not_identifiable": chosen.stuck,
-        "at_bounds": chosen.at_bounds(),
-    }
-    _write_json(json_path, result)
+        not_identifiable=sorted(chosen.stuck),
+        at_bounds=chosen.at_bounds(),
+    )
+    _write({output: model_text(model), json_path: checked(result)})
     _print_parameters(result["parameters"])
     out.print(f"error {result['rmse_c']:.3f} K, held out {held:.3f} K, noise {problem.noise_c:.3f} K -> {output}")
     for effect in wanted:
@@ -135,12 +199,26 @@ def _print_parameters(parameters: dict[str, Any]) -> None:
     out.print(table)
 
 
-@cli.command()
+@cli.command(
+    epilog="""\b
+Examples:
+  ninespring diagnose run1.csv run2.csv -o diagnosis
+  ninespring diagnose --array array.toml tclab.csv -o diagnosis
+  ninespring diagnose --model model.toml --frozen run3.csv -o check
+  ninespring diagnose --model model.toml --frozen steady.csv -o steady
+"""
+)
 @click.argument("logs", nargs=-1, required=True, type=FILE)
-@click.option("--array", "array_path", type=FILE, help="array.toml; 3 x 3 of the paper's spring if left out")
+@ARRAY
 @click.option("--model", "model_path", type=FILE, help="model.toml: declared values and effects already on")
 @click.option("--frozen", is_flag=True, help="keep the model's values as they are; fit effects only")
-@click.option("-o", "--output", type=click.Path(file_okay=False, path_type=Path), required=True, help="folder")
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(file_okay=False, path_type=Path),
+    required=True,
+    help="folder for diagnosis.json, report.html, model.toml",
+)
 @click.option("--json", "json_path", type=FILE, help="write diagnosis.json here too")
 @click.option("--surrogate", is_flag=True, help="also try an empirical model of what is left (never exported)")
 def diagnose(
@@ -152,10 +230,15 @@ def diagnose(
     json_path: Path | None,
     surrogate: bool,
 ) -> None:
-    """Find the effect that the model lacks: writes diagnosis.json, report.html, model.toml."""
+    """Find the effect that the model lacks: writes diagnosis.json, report.html, model.toml.
+
+    LOGS are logs of one array, or one steady table (docs/files.md). Errors are root mean squares in K; evidence is in
+    nats, the logarithm of how many times likelier the data are with the effect.
+    """
     from . import diagnosis, report, steady
     from .models import model_text, read_model
 
+    check_folder(json_path)
     if frozen and not model_path:
         raise InputError("--frozen needs --model")
     model = read_model(model_path) if model_path else None
@@ -164,32 +247,45 @@ def diagnose(
             raise InputError("give one steady table, or logs")
         with _working("fitting") as say:
             result = steady.diagnose_table(logs[0], model, array_path, frozen, say)
-        _make(output)
-        _write_json(output / "diagnosis.json", result)
-        write_atomically(output / "report.html", steady.html_report(result))
-        write_atomically(output / "model.toml", model_text(steady.model_after(result, model, array_path)))
-        _write_json(json_path, result)
+        page, made = steady.html_report(result), steady.model_after(result, model, array_path)
+    else:
+        array, runs = _array_and_runs(array_path, logs, model)
+        with _working("fitting") as say:
+            found = diagnosis.diagnose(array, runs, model=model, frozen=frozen, progress=say)
+            if surrogate:
+                say("empirical surrogate")
+                found.result["surrogate"] = diagnosis.surrogate(found.problem, found.final)
+            say("writing the report")
+            page = report.html_report(found)
+        result, made = found.result, found.model
+    text = checked(result)
+    files: dict[Path | None, str] = {
+        output / "diagnosis.json": text,
+        output / "report.html": page,
+        output / "model.toml": model_text(made),
+        json_path: text,
+    }
+    try:
+        output.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"cannot be made a folder: {error.strerror}", output) from None
+    _write(files)
+    if "cases" in result:
         steady.print_result(out, result)
-        return
-    array, runs = _array_and_runs(array_path, logs, model)
-    with _working("fitting") as say:
-        found = diagnosis.diagnose(array, runs, model=model, frozen=frozen, progress=say)
-        if surrogate:
-            say("empirical surrogate")
-            found.result["surrogate"] = diagnosis.surrogate(found.problem, found.final)
-        say("writing the report")
-        page = report.html_report(found)
-    _make(output)
-    _write_json(output / "diagnosis.json", found.result)
-    write_atomically(output / "report.html", page)
-    write_atomically(output / "model.toml", model_text(found.model))
-    _write_json(json_path, found.result)
-    result = found.result
-    out.print(report.verdict(result))
+    else:
+        _print_diagnosis(result, report.verdict(result))
+    out.print(f"-> {output / 'report.html'}", soft_wrap=True)
+
+
+def _print_diagnosis(result: dict[str, Any], verdict: str) -> None:
+    for text in result["warnings"]:
+        if "isolated spike" not in text:
+            out.print(f"note: {text}", style="yellow", markup=False)
+    out.print(verdict, style="bold", markup=False)
     if result["effects"]:
         table = Table("effect", "error, K", "held out, K", "evidence, nats", "numbers", "chip")
         for one in result["effects"]:
-            numbers = ", ".join(
+            numbers = "\n".join(
                 f"{k} {v['value']:.4g}" + ("" if v["stderr"] is None else f" +- {v['stderr']:.2g}") + f" {v['unit']}"
                 for k, v in list(one["parameters"].items())[:4]
             )
@@ -203,84 +299,150 @@ def diagnose(
                 "yes" if one["on_chip"] else "no",
             )
         out.print(table)
-    for one in result["rivals"]:
-        out.print(f"{one['instead_of']} or {one['name']}: these data cannot tell. {one['separating_experiment']}")
+    lines = [
+        f"{one['instead_of']} or {one['name']}: these data cannot tell. {one['separating_experiment']}"
+        for one in result["rivals"]
+    ]
     if result["unexplained"]:
-        out.print(f"unexplained: {result['residual']['note']}")
-    for one in result["effects"]:
-        if "why_not_on_chip" in one:
-            out.print(f"{one['name']} is not exported: {one['why_not_on_chip']}")
-    for text in result["warnings"]:
-        if "isolated spike" not in text:
-            out.print(f"note: {text}")
-    if surrogate:
+        lines.append(f"unexplained: {result['residual']['note']}")
+    lines += [
+        f"{one['name']} is not exported: {one['why_not_on_chip']}"
+        for one in result["effects"]
+        if "why_not_on_chip" in one
+    ]
+    if "surrogate" in result:
         s = result["surrogate"]
-        out.print(
+        lines.append(
             "empirical surrogate (not physics, never exported): "
             f"held out {s['holdout_before_c']:.3f} -> {s['holdout_after_c']:.3f} K"
         )
-    out.print(f"-> {output / 'report.html'}")
+    for line in lines:
+        out.print(line, markup=False)
 
 
-def _make(folder: Path) -> None:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"cannot be made a folder: {error.strerror}", folder) from None
-
-
-@cli.command()
+@cli.command(
+    epilog="""\b
+Examples:
+  ninespring predict --model diagnosis/model.toml run3.csv -o predicted.csv
+  ninespring predict --chip --model diagnosis/model.toml run3.csv -o predicted.csv
+"""
+)
 @click.argument("log", type=FILE)
-@click.option("--model", "model_path", type=FILE, required=True)
-@click.option("-o", "--output", type=FILE, required=True, help="time_s, t1_c..tn_c")
+@MODEL
+@click.option("-o", "--output", type=FILE, required=True, help="log to write: time_s (s), t1_c..tn_c (degC)")
 @click.option("--chip", is_flag=True, help="by the on-chip fixed-point model instead of the plant")
-@click.option("--json", "json_path", type=FILE)
+@JSON
 def predict(log: Path, model_path: Path, output: Path, chip: bool, json_path: Path | None) -> None:
-    """Predict the temperatures of a log."""
+    """Predict the temperatures of a log, and tell the error where it has some.
+
+    The array is the model's; the log needs no temperatures, and starts at the first ones where it has them.
+    """
     from . import diagnosis
     from .models import read_model
 
+    check_folder(output, json_path)
     model = read_model(model_path)
-    run = read_log(log, model.array.springs, temperatures=False)
+    array = model.array
+    run = read_log(log, array.springs, temperatures=False, why=f"{model_path.name} is of {array.rows} x {array.cols}")
+    _say_notes([run])
     with _working("simulating"):
         shown = diagnosis.predict(model, run, chip)
     columns = {f"t{k + 1}_c": shown[:, k] for k in range(run.springs)}
-    write_atomically(output, log_text(run.time_s, columns))
-    error = run.temperature_c - shown
-    rmse = float(np.sqrt(np.nanmean(error**2))) if np.isfinite(error).any() else None
-    _write_json(json_path, {"rmse_c": rmse, "rows": len(run.time_s)})
+    square = (run.temperature_c - shown) ** 2
+    seen = np.isfinite(square)
+    rmse = float(np.sqrt(square[seen].mean())) if seen.any() else None
+    each = [float(np.sqrt(square[seen[:, k], k].mean())) if seen[:, k].any() else None for k in range(run.springs)]
+    note = model.provenance.get("note")
+    result = _result(
+        "predict",
+        logs=_logs_of([run]),
+        model={"file": model_path.name, "sha256": sha256_of(model_path)},
+        by="chip" if chip else "plant",
+        rows=len(run.time_s),
+        rmse_c=rmse,
+        rmse_per_spring_c=each,
+        **({"note": note} if note else {}),
+    )
+    _write({output: log_text(run.time_s, columns), json_path: checked(result)})
     out.print(f"{len(run.time_s)} rows" + ("" if rmse is None else f", error {rmse:.3f} K rms") + f" -> {output}")
-    if note := model.provenance.get("note"):
-        out.print(f"note: {note}")
+    if note:
+        out.print(f"note: {note}", markup=False)
 
 
-@cli.command()
-@click.option("--model", "model_path", type=FILE, required=True)
-@click.option("-o", "--output", type=FILE, required=True, help="console lines, `$name=value`")
-def export(model_path: Path, output: Path) -> None:
-    """Write the console lines that put a model into the chip."""
+@cli.command(
+    epilog="""\b
+Example:
+  ninespring export --model diagnosis/model.toml -o settings.txt
+"""
+)
+@MODEL
+@click.option("-o", "--output", type=FILE, required=True, help="console lines to write, `$name=value`")
+@JSON
+def export(model_path: Path, output: Path, json_path: Path | None) -> None:
+    """Write the console lines that put a model into the chip.
+
+    Effects of the thermometers, of the surroundings and of the supply are left out: the file says why.
+    """
     from . import diagnosis
     from .effects import WHY_NOT_ON_CHIP
     from .models import read_model
 
+    check_folder(output, json_path)
     model = read_model(model_path)
     text, message = diagnosis.chip_settings(model)
-    left = [f"# {e} is left out: {WHY_NOT_ON_CHIP[e]}" for e in model.effects if e in WHY_NOT_ON_CHIP]
-    write_atomically(output, "\n".join([f"# from {model_path.name}", *left, text]))
+    left = {e: WHY_NOT_ON_CHIP[e] for e in model.effects if e in WHY_NOT_ON_CHIP}
+    settings = dict(line[1:].split("=", 1) for line in text.splitlines())
+    result = _result(
+        "export",
+        model={"file": model_path.name, "sha256": sha256_of(model_path)},
+        settings={name: float(value) for name, value in settings.items()},
+        left_out=left,
+    )
+    head = [f"# from {model_path.name}", *(f"# {e} is left out: {why}" for e, why in left.items())]
+    _write({output: "\n".join([*head, text]), json_path: checked(result)})
     if message:
-        out.print(message)
-    out.print(f"{text.count(chr(10))} settings -> {output} (`ninespring upload` sends them)")
+        out.print(message, markup=False)
+    out.print(f"{len(settings)} settings -> {output} (`ninespring upload` sends them)")
 
 
-@cli.command("import")
+@cli.command(
+    "import",
+    epilog="""\b
+Examples:
+  ninespring import logger.csv --map map.toml -o run1.csv
+  ninespring import data.txt --map tclab -o tclab.csv
+  ninespring import frames.npy --regions regions.toml --interval 0.5 --log board1.csv -o run1.csv
+  ninespring import frames/ --regions regions.toml --times times.txt -o camera.csv
+\b
+map.toml:                                          regions.toml (pixels):
+  [file]                                             [grid]
+  separator = ";"                                    rows = 3
+  decimal = ","                                      cols = 3
+  [columns]                                          left = 12     # centre of spring 1
+  time_s = { column = "Time", unit = "min" }         top = 10
+  i1_a = { column = "Heater 1", unit = "mA" }        step_x = 20
+  t1_c = { column = "TC 1", unit = "degF" }          step_y = 20
+  [constants]                                        width = 6
+  ambient_c = 21.5                                   height = 6
+""",
+)
 @click.argument("source", type=click.Path(path_type=Path))
-@click.option("--map", "mapping", help="mapping file (TOML), or a built-in one: tclab, tclab-prbs")
-@click.option("--regions", type=FILE, help="thermal-camera frames: regions file (TOML)")
-@click.option("--interval", type=float, default=1.0, show_default=True, help="seconds between frames")
+@click.option("--map", "mapping", help="mapping file (TOML) of columns and units, or built in: tclab, tclab-prbs")
+@click.option("--regions", type=FILE, help="regions file (TOML) for thermal-camera frames: pixels of each spring")
+@click.option(
+    "--interval", type=click.FloatRange(min=0, min_open=True), default=1.0, show_default=True, help="s a frame"
+)
 @click.option("--times", type=FILE, help="times of the frames, s, one a line")
-@click.option("--statistic", type=click.Choice(["mean", "median", "max"]), default="mean", show_default=True)
-@click.option("--log", "log_path", type=FILE, help="log of currents to put the frames' temperatures into")
-@click.option("-o", "--output", type=FILE, required=True)
+@click.option(
+    "--statistic",
+    type=click.Choice(["mean", "median", "max"]),
+    default="mean",
+    show_default=True,
+    help="of the pixels of a region",
+)
+@click.option("--log", "log_path", type=FILE, help="log of currents to put the frames' temperatures into, same clock")
+@click.option("-o", "--output", type=FILE, required=True, help="log to write")
+@JSON
 def import_(
     source: Path,
     mapping: str | None,
@@ -290,83 +452,158 @@ def import_(
     statistic: str,
     log_path: Path | None,
     output: Path,
+    json_path: Path | None,
 ) -> None:
-    """Make a log of another logger's file (--map) or of thermal-camera frames (--regions)."""
+    """Make a log of another logger's file (--map) or of thermal-camera frames (--regions).
+
+    SOURCE is a table with a header; or frames in degC: a .npy of (frames, height, width), a .csv, or a folder of .csv.
+    """
     from . import importing
 
+    check_folder(output, json_path)
     if bool(mapping) == bool(regions):
         raise InputError("give either --map (a table) or --regions (camera frames)")
+    if mapping and (log_path or times):
+        raise InputError("--log and --times go with --regions, not with --map")
     if mapping:
         text = importing.import_table(source, mapping)
     else:
         assert regions is not None
-        stamps = None
-        if times:
-            try:
-                stamps = np.loadtxt(times, ndmin=1)
-            except ValueError as error:
-                raise InputError(f"not one time a line: {error}", times) from None
-        with _working("reading frames"):
-            when, columns = importing.import_frames(
-                source, importing.read_regions(regions), stamps, interval, statistic
+        places = importing.read_regions(regions)
+        stamps = importing.read_times(times) if times else None
+        count, frames = importing.frames_of(source)
+        with _working("reading frames", count) as say:
+            when, columns = importing.reduce_frames(
+                source,
+                count,
+                frames,
+                places,
+                stamps,
+                interval,
+                statistic,
+                lambda row: say(f"frame {row} of {count}", row),
             )
         text = (
             importing.merge_into_log(log_path, when, columns)
             if log_path
             else log_text(when, columns, {"imported_from": source.name})
         )
-    write_atomically(output, text)
-    out.print(f"{text.count(chr(10)) - 1} lines -> {output}")
+    header, *rows = [line for line in text.splitlines() if not line.startswith("#")]
+    result = _result("import", source=source.name, columns=header.split(","), rows=len(rows))
+    _write({output: text, json_path: checked(result)})
+    out.print(f"{len(rows)} rows of {header} -> {output}", soft_wrap=True, markup=False)
 
 
-@cli.command()
-@click.option("--port", required=True)
-@click.option("-o", "--output", type=FILE, required=True)
-@click.option("--hz", type=click.IntRange(1, 50), default=1, show_default=True)
-@click.option("--duration", type=float, default=900.0, show_default=True, help="s; Ctrl-C ends it earlier")
-@click.option("--run", "script", type=FILE, help="console lines to send first, one a line")
-def record(port: str, output: Path, hz: int, duration: float, script: Path | None) -> None:
-    """Log a board's telemetry to a file."""
-    from .board import Board
+@cli.command(
+    epilog="""\b
+Example:
+  ninespring record --port /dev/ttyACM0 --hz 1 --duration 900 --run steps.txt -o board1.csv
+\b
+steps.txt (console words; `at S` waits until so many seconds after the first row):
+  ambient 21.5
+  at 5 pattern 101000101
+  at 300 fan 100
+  at 600 off all
+"""
+)
+@PORT
+@click.option("-o", "--output", type=FILE, required=True, help="log to write")
+@click.option("--hz", type=click.IntRange(1, 50), default=1, show_default=True, help="rows a second")
+@click.option(
+    "--duration",
+    type=click.FloatRange(min=0, min_open=True),
+    default=900.0,
+    show_default=True,
+    help="s; Ctrl-C ends it earlier",
+)
+@click.option("--run", "script", type=FILE, help="console lines to send, one a line, each at its time")
+@JSON
+def record(port: str, output: Path, hz: int, duration: float, script: Path | None, json_path: Path | None) -> None:
+    """Log a board's telemetry: currents (A), voltages (V), the model's temperatures (degC).
+
+    What has come is kept, whatever ends the recording: Ctrl-C, a cable, a reset of the board. While it runs, rows go to
+    OUTPUT.part; at the end that becomes OUTPUT.
+    """
+    from .board import Board, script_lines
     from .board import record as record_board
 
-    with Board(port) as board, _working(f"recording from {port}") as say:
-        board.greet()
-        for line in script.read_text().splitlines() if script else []:
-            if line.strip() and not line.startswith("#"):
-                board.ask(line.strip())
-        lines = record_board(board, hz, duration, say)
-    write_atomically(output, "\n".join(lines) + "\n")
-    out.print(f"{len(lines) - 1} rows -> {output}")
+    check_folder(output, json_path)
+    steps = script_lines(read_bytes(script).decode("utf-8", "replace"), str(script)) if script else []
+    started = datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
+    part = output.with_name(output.name + ".part")
+    with Board(port) as board, _working(f"recording from {port}", duration) as say, part.open("w") as stream:
+        try:
+            board.greet()
+            got = record_board(
+                board,
+                hz,
+                duration,
+                steps,
+                write=lambda line: print(line, file=stream, flush=True),
+                say=lambda rows, seconds: say(f"{rows} rows", seconds),
+            )
+        except BaseException:
+            part.unlink()
+            raise
+    head = [f"# recorded: {started}", f"# port: {port}", f"# tool: ninespring {__version__}"]
+    if got.dropped:
+        head.append(f"# dropped_lines: {got.dropped}")
+    result = _result("record", rows=got.rows, dropped_lines=got.dropped, ended=got.ended)
+    _write({output: "\n".join([*head, part.read_text().rstrip("\n")]) + "\n", json_path: checked(result)})
+    part.unlink()
+    out.print(f"{got.rows} rows -> {output}" + (f", {got.dropped} lines dropped" if got.dropped else ""))
+    if got.ended:
+        raise WorkError(f"{got.ended}; what had come until then is in {output}")
 
 
-@cli.command()
+@cli.command(
+    epilog="""\b
+Example:
+  ninespring upload --port /dev/ttyACM0 settings.txt
+"""
+)
 @click.argument("settings", type=FILE)
-@click.option("--port", required=True)
+@PORT
 @click.option("--save/--no-save", default=True, show_default=True, help="keep them in the EEPROM")
-def upload(settings: Path, port: str, save: bool) -> None:
-    """Send exported settings to a board."""
-    from .board import Board, settings_lines
-    from .logs import read_bytes
+@JSON
+def upload(settings: Path, port: str, save: bool, json_path: Path | None) -> None:
+    """Send exported settings to a board, read them back, save them.
 
-    lines = settings_lines(read_bytes(settings).decode("ascii", "replace"), str(settings))
-    with Board(port) as board, _working("sending") as say:
+    Nothing is saved unless the board took every line and shows every value in `$$`.
+    """
+    from .board import Board, settings_lines, settings_that_differ
+
+    check_folder(json_path)
+    lines = settings_lines(read_bytes(settings).decode("utf-8", "replace"), str(settings))
+    with Board(port) as board, _working("sending", len(lines)) as say:
         board.greet()
         remarks: list[str] = []
-        for line in lines:
-            say(line)
-            remarks = board.ask(line)
+        for k, line in enumerate(lines):
+            say(line, k)
+            try:
+                remarks = board.ask(line)
+            except WorkError as error:
+                raise WorkError(f"{error}: nothing is saved, a reset of the board gives back what it had") from None
         if remarks:
             raise WorkError(f"the board does not take them together: {remarks[-1]}")
+        say("reading back", len(lines))
+        if wrong := settings_that_differ(lines, board.ask("$$", 10.0)):
+            raise WorkError(f"the board shows other values than were sent, nothing is saved: {'; '.join(wrong)}")
         if save:
             board.ask("$save", 10.0)
-    out.print(f"{len(lines)} settings sent{' and saved' if save else ''}")
+    _write({json_path: checked(_result("upload", settings=len(lines), saved=save))})
+    out.print(f"{len(lines)} settings sent and read back{', saved' if save else ''}")
 
 
-@cli.command()
-@click.option("--port", required=True)
-@click.option("--hz", type=click.IntRange(1, 50), default=2, show_default=True)
-@click.option("--duration", type=float, default=1e9, help="s; Ctrl-C ends it")
+@cli.command(
+    epilog="""\b
+Example:
+  ninespring monitor --port /dev/ttyACM0
+"""
+)
+@PORT
+@click.option("--hz", type=click.IntRange(1, 50), default=2, show_default=True, help="updates a second")
+@click.option("--duration", type=click.FloatRange(min=0, min_open=True), default=1e9, help="s; Ctrl-C ends it")
 def monitor(port: str, hz: int, duration: float) -> None:
     """Show a board's temperatures and currents as they are."""
     from rich.live import Live
@@ -405,23 +642,33 @@ def _board_table(row: dict[str, str]) -> Table:
     return table
 
 
+def _end(message: str, code: int) -> NoReturn:
+    err.print(f"ninespring: {message}", style="red", soft_wrap=True, markup=False)
+    sys.exit(code)
+
+
 def main() -> None:
     """Run the command line: exit code 0 done, 1 the work failed, 2 the input or arguments are wrong."""
+    # What a numerical library warns about (an empty column has no mean) says nothing to a user.
+    warnings.simplefilter("ignore", RuntimeWarning)
+    # Ended from outside: temporary files go, as with Ctrl-C.
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         code = cli(standalone_mode=False)
         sys.exit(code if isinstance(code, int) else 0)
     except InputError as error:
-        err.print(f"ninespring: {error}", style="red", soft_wrap=True, markup=False)
-        sys.exit(2)
+        _end(str(error), 2)
     except click.ClickException as error:
-        err.print(f"ninespring: {error.format_message()}", style="red", soft_wrap=True, markup=False)
-        sys.exit(2)
+        _end(error.format_message(), 2)
     except (WorkError, RuntimeError, MemoryError, OSError) as error:
-        err.print(f"ninespring: {error}", style="red", soft_wrap=True, markup=False)
-        sys.exit(1)
+        _end(str(error) or type(error).__name__, 1)
     except (click.Abort, KeyboardInterrupt):
-        err.print("ninespring: stopped")
-        sys.exit(1)
+        _end("stopped", 1)
+    except Exception as error:
+        if os.environ.get("NINESPRING_TRACEBACK"):
+            raise
+        said = (str(error).splitlines() or [""])[0]
+        _end(f"a defect of the tool: {type(error).__name__}: {said} (NINESPRING_TRACEBACK=1 shows where)", 1)
 
 
 if __name__ == "__main__":

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import io
+import math
 import re
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,7 @@ import numpy as np
 import pandas as pd
 
 from .errors import InputError
-from .logs import COLUMN, MAX_SPRINGS, log_text, read_bytes
+from .logs import COLUMN, LIMITS, MAX_SPRINGS, log_text, read_bytes
 
 UNITS: dict[str, tuple[float, float]] = {
     "": (1.0, 0.0),
@@ -284,23 +285,43 @@ def _read_frame(file: Path) -> np.ndarray:
     return np.asarray(frame)
 
 
-def import_frames(
+def read_times(path: str | Path) -> np.ndarray:
+    """Read times of frames, s, one a line, rising; # begins a comment."""
+    out: list[float] = []
+    for number, raw in enumerate(read_bytes(path).decode("utf-8-sig", "replace").splitlines(), 1):
+        text = raw.partition("#")[0].strip()
+        if not text:
+            continue
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.nan
+        if not math.isfinite(value):
+            raise InputError(f"'{text[:20]}' is not a time in s", path, number, 1)
+        if out and value <= out[-1]:
+            raise InputError(f"{value:g} s after {out[-1]:g} s: times must rise strictly", path, number, 1)
+        out.append(value)
+    return np.asarray(out)
+
+
+def reduce_frames(
     path: str | Path,
+    count: int,
+    frames: Iterator[np.ndarray],
     regions: list[Region],
     times_s: np.ndarray | None,
     interval_s: float,
     statistic: str = "mean",
-    progress: Any = iter,
+    say: Callable[[int], None] = lambda row: None,
 ) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     """Return times (n,) and {t{k}_c: (n,)} of a frame sequence, a region a spring; `statistic` mean, median, max."""
-    count, frames = frames_of(path)
     if times_s is None:
         times_s = np.arange(count) * interval_s
     elif len(times_s) != count:
         raise InputError(f"{len(times_s)} times for {count} frames", path)
-    reduce = {"mean": np.nanmean, "median": np.nanmedian, "max": np.nanmax}[statistic]
+    reduce = {"mean": np.mean, "median": np.median, "max": np.max}[statistic]
     out = np.full((count, len(regions)), np.nan)
-    for row, frame in enumerate(progress(frames)):
+    for row, frame in enumerate(frames):
         height, width = frame.shape
         for k, one in enumerate(regions):
             if one.left < 0 or one.top < 0 or one.right > width or one.bottom > height:
@@ -310,8 +331,19 @@ def import_frames(
                     path,
                 )
             pixels = frame[one.top : one.bottom, one.left : one.right]
-            if np.isfinite(pixels).any():
-                out[row, k] = reduce(pixels)
+            good = pixels[np.isfinite(pixels)]
+            if good.size:
+                out[row, k] = reduce(good)
+        say(row + 1)
+    low, high, unit, _ = LIMITS["t"]
+    for k, one in enumerate(regions):
+        if np.any(bad := (out[:, k] < low) | (out[:, k] > high)):
+            row = int(np.flatnonzero(bad)[0])
+            raise InputError(
+                f"spring {one.spring} shows {out[row, k]:g} in frame {row + 1}: frames are in {unit} (raw counts, "
+                "or kelvin times 100?)",
+                path,
+            )
     return times_s, {f"t{one.spring}_c": out[:, k] for k, one in enumerate(regions)}
 
 

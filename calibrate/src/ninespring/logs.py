@@ -12,7 +12,7 @@ import os
 import re
 import tempfile
 import warnings
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
@@ -92,22 +92,36 @@ def sha256_of(path: str | Path) -> str:
     return digest.hexdigest()
 
 
-def write_atomically(path: str | Path, text: str) -> None:
-    """Write a text file whole or not at all (temporary file beside it, then rename)."""
-    path = Path(path)
-    if not path.parent.is_dir():
-        raise InputError(f"the folder {path.parent} does not exist: create it first", path)
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+def check_folder(*paths: Path | None) -> None:
+    """Refuse output files whose folder is not there or cannot be written, before any work is done."""
+    for path in paths:
+        if path is None:
+            continue
+        if not path.parent.is_dir():
+            raise InputError(f"the folder {path.parent} does not exist: create it first", path)
+        if not os.access(path.parent, os.W_OK):
+            raise InputError(f"the folder {path.parent} cannot be written", path)
+
+
+def write_atomically(files: Mapping[Path, str]) -> None:
+    """Write text files whole or not at all: temporary files beside them, all of them renamed at the end."""
+    check_folder(*files)
+    umask = os.umask(0)
+    os.umask(umask)
+    made: list[tuple[str, Path]] = []
     try:
-        with os.fdopen(handle, "w", encoding="utf-8", newline="\n") as stream:
-            stream.write(text)
-        umask = os.umask(0)
-        os.umask(umask)
-        os.chmod(temporary, 0o666 & ~umask)
-        os.replace(temporary, path)
-    except BaseException:
-        os.unlink(temporary)
-        raise
+        for path, text in files.items():
+            handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+            made.append((temporary, path))
+            with os.fdopen(handle, "w", encoding="utf-8", newline="\n") as stream:
+                stream.write(text)
+            os.chmod(temporary, 0o666 & ~umask)
+        while made:
+            os.replace(*made[0])
+            made.pop(0)
+    finally:
+        for temporary, _ in made:
+            os.unlink(temporary)
 
 
 def read_bytes(path: str | Path) -> bytes:
@@ -149,7 +163,11 @@ class Table:
         return line, 1
 
 
-def read_table(path: str | Path, text_columns: Iterable[str] = ()) -> Table:
+Header = Callable[[list[str], int, list[int]], None]
+"""Takes names, line and columns of a header; raises InputError where it is not the right one."""
+
+
+def read_table(path: str | Path, text_columns: Iterable[str] = (), header_check: Header | None = None) -> Table:
     """Read a comma-separated file with a header, `#` comments, and numbers or empty cells."""
     raw = read_bytes(path)
     if not raw.strip():
@@ -214,6 +232,8 @@ def read_table(path: str | Path, text_columns: Iterable[str] = ()) -> Table:
             raise InputError(f"column {k + 1} has no name", path, header_line, starts[k])
         if name in names[:k]:
             raise InputError(f"column '{name}' is there twice", path, header_line, starts[k])
+    if header_check:
+        header_check(names, header_line, starts)
     wanted = header.count(",")
     body = kept[1:]
     unfinished = not text.endswith("\n")
@@ -310,11 +330,13 @@ def _check_range(table: Table, name: str, kind: str) -> None:
         raise InputError(f"{name} = {values[bad[0]]:g} {unit}".rstrip() + f": {advice}", table.path, line, column)
 
 
-def read_log(path: str | Path, springs: int | None = None, temperatures: bool = True) -> Run:
-    """Read and check one log; `springs` is the array's number, None to take what the header says."""
-    table = read_table(path, text_columns=("state",))
+def _driving_columns(
+    path: str | Path, names: list[str], line: int, columns: list[int], springs: int | None, temperatures: bool, why: str
+) -> tuple[str, int, bool]:
+    """Return by what a log is driven ('i' or 'u'), its number of springs, whether it has voltages; refuse a wrong header."""
     groups: dict[str, set[int]] = {"i": set(), "v": set(), "t": set(), "u": set()}
-    for name, at in zip(table.names, table.header_columns, strict=True):
+    because = f" ({why})" if why else ""
+    for name, at in zip(names, columns, strict=True):
         if EXTRA.match(name):
             continue
         match = COLUMN.match(name)
@@ -330,46 +352,52 @@ def read_log(path: str | Path, springs: int | None = None, temperatures: bool = 
                 f"unknown column '{name}': a log has time_s, i1_a, v1_v, u1, t1_c ..., fan, ambient_c "
                 "(`ninespring import --map` renames)",
                 path,
-                table.header_line,
+                line,
                 at,
             )
         if kind is not None:
             if number > MAX_SPRINGS or (springs is not None and number > springs):
                 raise InputError(
-                    f"column '{name}' but the array has {springs or MAX_SPRINGS} springs",
-                    path,
-                    table.header_line,
-                    at,
+                    f"column '{name}' but the array has {springs or MAX_SPRINGS} springs{because}", path, line, at
                 )
             groups[kind].add(number)
-    if "time_s" not in table.names:
-        raise InputError("no column time_s", path, table.header_line, 1)
+    if "time_s" not in names:
+        raise InputError("no column time_s", path, line, 1)
     if temperatures and not groups["t"]:
-        raise InputError("no temperature column (t1_c ...)", path, table.header_line, 1)
-    count = springs or max(set().union(*groups.values()))
+        raise InputError("no temperature column (t1_c ...)", path, line, 1)
+    count = springs or max(set().union(*groups.values()), default=0)
     everyone = set(range(1, count + 1))
-    mode: DriveMode
-    if groups["i"]:
-        driving, letter, example = groups["i"], "i", "i{}_a"
-    elif groups["u"]:
-        driving, letter, example = groups["u"], "u", "u{}"
-    else:
-        raise InputError("neither currents (i1_a ...) nor commands (u1 ...)", path, table.header_line, 1)
-    if missing := sorted(everyone - driving):
+    letter = "i" if groups["i"] else "u"
+    if not groups[letter]:
+        raise InputError("neither currents (i1_a ...) nor commands (u1 ...)", path, line, 1)
+    if missing := sorted(everyone - groups[letter]):
+        example = f"i{missing[0]}_a" if letter == "i" else f"u{missing[0]}"
         raise InputError(
-            f"spring {missing[0]} has no column {example.format(missing[0])}: "
-            "add it (0 where the spring is not driven)",
+            f"spring {missing[0]} has no column {example}: add it (0 where the spring is not driven){because}",
             path,
-            table.header_line,
+            line,
             1,
         )
     if letter == "i" and groups["v"] and (missing := sorted(everyone - groups["v"])):
         raise InputError(
             f"spring {missing[0]} has no column v{missing[0]}_v but others have: log all voltages or none",
             path,
-            table.header_line,
+            line,
             1,
         )
+    return letter, count, bool(groups["v"])
+
+
+def read_log(path: str | Path, springs: int | None = None, temperatures: bool = True, why: str = "") -> Run:
+    """Read and check one log; `springs` is the array's number (`why` says whose), None to take what the header says."""
+    found: list[tuple[str, int, bool]] = []
+
+    def check(names: list[str], line: int, columns: list[int]) -> None:
+        found.append(_driving_columns(path, names, line, columns, springs, temperatures, why))
+
+    table = read_table(path, ("state",), check)
+    letter, count, has_voltages = found[0]
+    mode: DriveMode
     frame = table.frame
     for name in table.names:
         if EXTRA.match(name):
@@ -409,7 +437,7 @@ def read_log(path: str | Path, springs: int | None = None, temperatures: bool = 
     current = voltage = None
     if letter == "i":
         current = matrix("i{}_a")
-        if groups["v"]:
+        if has_voltages:
             voltage = matrix("v{}_v")
             mode, drive = "power", current * voltage
         else:
