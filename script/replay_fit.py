@@ -201,6 +201,12 @@ def main() -> int:
         return work(arguments.sim, source, folder, arguments.json)
 
 
+def figure(text: str, rms_c: float) -> dict:
+    """A row of docs/results.md."""
+    command = ".venv/bin/python script/replay_fit.py"
+    return {"figure": text, "value": rms_c, "unit": "degC rms", "target": "", "command": command}
+
+
 def work(sim: Path, source: Path, folder: Path, json_path: Path | None) -> int:
     logs, models, figures = {}, {}, []
     for file in LOGS:
@@ -218,7 +224,8 @@ def work(sim: Path, source: Path, folder: Path, json_path: Path | None) -> int:
             'note = "plain network; standard errors take the residuals for independent, which they are not"\n'
         )
         write_model(models[name], values, errors, provenance)
-        print(f"{name}")
+        print(f"{name}: {before:.2f} degC rms with the textbook's values, {after:.2f} with the fitted ones")
+        figures.append(figure(f"on-chip model with the textbook's values, replayed on {name}", before))
         for free, value, error in zip(FREE, values, errors, strict=True):
             label = free.name + (f"[{free.spring}]" if free.spring else "")
             print(f"    {label:<22} {value:10.5g} +- {error:.2g} {free.unit}")
@@ -231,15 +238,7 @@ def work(sim: Path, source: Path, folder: Path, json_path: Path | None) -> int:
             each = [spring["rmse_c"] for spring in summary["springs"]]
             note = "" if fitted == replayed else "  other room, other day"
             print(f"{fitted:<24} {replayed:<24} {summary['rmse_c']:9.2f}  ({each[0]:.2f}, {each[1]:.2f}){note}")
-            figures.append(
-                {
-                    "figure": f"on-chip model fitted to {fitted}, replayed on {replayed}",
-                    "value": summary["rmse_c"],
-                    "unit": "degC rms",
-                    "target": "",
-                    "command": ".venv/bin/python script/replay_fit.py",
-                }
-            )
+            figures.append(figure(f"on-chip model fitted to {fitted}, replayed on {replayed}", summary["rmse_c"]))
     print("\nNot good yet: a sensor resolves 0.3 degC. What is missing is for `ninespring diagnose` to find.")
     if json_path is not None:
         json_path.write_text(json.dumps(figures, indent=2) + "\n")
