@@ -140,6 +140,11 @@ static void what_the_chip_averages_is_said(void)
         TEST_ASSERT_NOT_NULL_MESSAGE(strstr(message, "the chip takes the mean"), cases[k].name);
     }
     TEST_ASSERT_EQUAL(224000, chip.resistance_austenite_uohm);
+    on("spring_mismatch");
+    set("resistance_scale", 1.1);
+    TEST_ASSERT_EQUAL(CHIP_MAPPING_OK, map());
+    TEST_ASSERT_EQUAL(246400, chip.resistance_austenite_uohm);
+    TEST_ASSERT_EQUAL(192500, chip.resistance_martensite_uohm);
     tearDown();
     setUp();
     on("plate_conduction");
