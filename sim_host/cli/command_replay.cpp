@@ -30,14 +30,14 @@ struct replay_options {
 struct error_sum {
     double sum = 0.0;
     double square_sum = 0.0;
-    double highest = 0.0;
+    double highest = std::numeric_limits<double>::quiet_NaN();
     long count = 0;
 
     void add(double error)
     {
         sum += error;
         square_sum += error * error;
-        highest = std::max(highest, std::fabs(error));
+        highest = std::fmax(highest, std::fabs(error)); /* takes the number beside a NaN */
         ++count;
     }
     [[nodiscard]] double rms() const
@@ -284,7 +284,8 @@ void print_errors(const replay_options &options, const std::vector<error_sum> &e
                    errors[k].rms(), errors[k].mean(), errors[k].highest,
                    shown ? fmt::format("  {:.3f}", shown_errors[k].rms()) : "");
     }
-    fmt::print("all: {:.3f} degC rms\n", rms);
+    fmt::print("{}\n", std::isfinite(rms) ? fmt::format("all: {:.3f} degC rms", rms)
+                                          : "the log holds no temperature to compare with");
 }
 
 void replay(const replay_options &options)
@@ -296,7 +297,7 @@ void replay(const replay_options &options)
     const log_data log = read_log(options.log_path, springs);
     if (log.time_s.back() - log.time_s.front() > LONGEST_LOG_S) {
         throw input_error(log.name, 0, 0,
-                          fmt::format("the log spans {:.0f} days; if its time is in ms, divide by "
+                          fmt::format("the log spans {:.3g} days; if its time is in ms, divide by "
                                       "1000",
                                       (log.time_s.back() - log.time_s.front()) / 86400.0));
     }

@@ -567,6 +567,15 @@ class Replay(Case):
         self.works("replay", "log.csv", "--model", "m.toml", "-o", self.output)
         self.assertAlmostEqual(float(rows_of(self.output)[1]["m1_c"]), 20 + 4 * 0.219 * 4 / 2, delta=0.05)
 
+    def test_a_log_without_temperatures_is_simulated(self) -> None:
+        self.file("log.csv", "time_s,u1,u2\n0,1,0\n10,0,0\n")
+        self.file("m.toml", MODEL)
+        table = self.works("replay", "log.csv", "--model", "m.toml", "-o", self.output, "--json", self.json)
+        self.assertIn("no temperature to compare with", table)
+        self.assertAlmostEqual(float(rows_of(self.output)[1]["m1_c"]), 25, delta=0.2)
+        result = json.loads(self.json.read_text())
+        self.assertEqual((result["rmse_c"], result["springs"][0]["largest_error_c"]), (None, None))
+
     def test_bad_logs(self) -> None:
         refused = self.replay_refused
         refused(
