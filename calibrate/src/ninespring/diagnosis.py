@@ -237,6 +237,8 @@ def _diagnose(
     rho = statistics.autocorrelation([r / n for r, n in zip(final.residual, problem.noise, strict=True)], 1)
     depends, note = depends_on(problem, final)
     warnings = [f"{Path(run.name).name}: {text}" for run in problem.runs for text in run.notes]
+    if any(free.knot is not None for free in final.spec.free):
+        warnings.append(f"model.toml: {DRIFT_LEFT_OUT}; log ambient_c to have it predicted")
     warnings += plausibility.swapped(problem.runs)
     warnings += [text for run in problem.runs for text in plausibility.undriven_but_hottest(run)]
     if left_over:
@@ -358,7 +360,8 @@ def depends_on(problem: Problem, fit: Fit) -> tuple[list[str], str]:
     structure = search.excess(problem, fit)
     width = 10
     blocks, owners, times, runs_of = [], [], [], []
-    for r, (run, left, noise) in enumerate(zip(problem.runs, fit.residual, problem.noise, strict=True)):
+    residual = problem.without_starts(fit.residual)
+    for r, (run, left, noise) in enumerate(zip(problem.runs, residual, problem.noise, strict=True)):
         mean, _, begins = statistics.block_means(left / noise, width, run.starts)
         blocks.append(mean)
         times.append(run.time_s[begins])
@@ -419,7 +422,7 @@ def depends_on(problem: Problem, fit: Fit) -> tuple[list[str], str]:
         ),
         default=(0.0, 0, 0.0),
     )
-    for r, (run, left, noise) in enumerate(zip(problem.runs, fit.residual, problem.noise, strict=True)):
+    for r, (run, left, noise) in enumerate(zip(problem.runs, residual, problem.noise, strict=True)):
         first = run.time_s <= run.time_s[0] + 0.1 * run.duration_s
         size = np.nan_to_num(left / noise) ** 2
         begins_badly = float(size[first].sum()) / max(1e-12, float(size.sum()))

@@ -221,6 +221,7 @@ class Problem:
         self.mask = [np.isfinite(run.temperature_c) for run in self.runs]
         self.count = int(sum(mask.sum() for mask in self.mask))
         self.basis: list[np.ndarray | None] = [None] * len(self.runs)
+        self.start_response: list[np.ndarray | None] = [None] * len(self.runs)
         self.pool = concurrent.futures.ThreadPoolExecutor(WORKERS)
         self.simulations = 0
         self._count_lock = threading.Lock()
@@ -372,6 +373,24 @@ class Problem:
                 # whitening by the covariance 1 + S S', S the response to one sigma of each start
                 u, size, _ = np.linalg.svd(np.column_stack(columns), full_matrices=False)
                 self.basis[r] = u * np.sqrt(1.0 - 1.0 / np.sqrt(1.0 + size**2))
+                self.start_response[r] = np.column_stack(columns)
+
+    def without_starts(self, residual: Sequence[np.ndarray]) -> list[np.ndarray]:
+        """Return residuals less what errors of the first readings, as large as their noise makes them, leave in them.
+
+        The errors are estimated with the noise as their spread and cut at 3 of it: a start that is further off is
+        structure like any other.
+        """
+        out = []
+        for left, mask, noise, response in zip(residual, self.mask, self.noise, self.start_response, strict=True):
+            left = left.copy()
+            if response is not None:
+                scaled = (left / noise)[mask]
+                normal = response.T @ response + np.eye(response.shape[1])
+                size = np.clip(np.linalg.solve(normal, response.T @ scaled), -3.0, 3.0)
+                left[mask] -= (response @ size) * np.broadcast_to(noise, mask.shape)[mask]
+            out.append(left)
+        return out
 
     # ---- fitting ----------------------------------------------------------------------------------------
 

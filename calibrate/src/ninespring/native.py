@@ -279,12 +279,12 @@ class Plant:
             return
         wanted = np.clip(first_c, -60.0, 500.0)
         guess = wanted.copy()
-        for attempt in range(3):
+        for _ in range(8):
             for k in seen:
                 self.set_temperature(int(k), guess[k])
             shown = self.measured_c()
             off = wanted[seen] - shown[seen]
-            if np.abs(off).max() < 1e-3 or attempt == 2:
+            if np.abs(off).max() < 1e-3:
                 break
             guess[seen] = np.clip(guess[seen] + off, -60.0, 500.0)
 

@@ -97,8 +97,9 @@ def excess(problem: Problem, fit: Fit) -> float:
 def structure_by_width(problem: Problem, fit: Fit) -> np.ndarray:
     """Return pooled structure (mean square, noise units) at block widths of 4, 12 and 40 rows."""
     out = []
+    residual = problem.without_starts(fit.residual)
     for width in (4, 12, 40):
-        part = statistics.structure(fit.residual, problem.noise, width, [run.starts for run in problem.runs])
+        part = statistics.structure(residual, problem.noise, width, [run.starts for run in problem.runs])
         weight = np.array([mask.sum(axis=0) for mask in problem.mask], dtype=float)
         weight = np.where(np.isfinite(part), weight, 0.0)
         out.append(float(np.nansum(np.nan_to_num(part) * weight) / max(1.0, weight.sum())))
@@ -440,8 +441,9 @@ def unexplained(problem: Problem, fit: Fit) -> bool:
     pooled = structure_by_width(problem, fit)
     if math.sqrt(max(0.0, float(pooled.max()))) > UNEXPLAINED:
         return True
+    residual = problem.without_starts(fit.residual)
     for width in (12, 40):
-        local = statistics.structure(fit.residual, problem.noise, width, [run.starts for run in problem.runs])
+        local = statistics.structure(residual, problem.noise, width, [run.starts for run in problem.runs])
         blocks = np.array([mask.sum(axis=0) for mask in problem.mask]) / width
         spread = np.sqrt(2.0 / np.maximum(blocks, 1.0)) / width
         if np.any(local > np.maximum(UNEXPLAINED_LOCAL**2, 6 * spread)):

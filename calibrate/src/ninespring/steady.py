@@ -280,6 +280,10 @@ def diagnose_states(
         out = {r["parameter"]: {"value": r["value"], "stderr": r["stderr"], "unit": r["unit"]}}
         if r["at_bound"]:
             out[r["parameter"]]["note"] = "at its bound"
+        for name, value in r["set"].items():
+            if name != r["parameter"]:
+                unit = native.parameter_table()[name].unit
+                out[name] = {"value": value, "stderr": None, "unit": unit, "note": "set with it, not fitted"}
         return out
 
     rivals = []

@@ -1,0 +1,180 @@
+"""Fits: standard errors that cover, held-out blocks that are held out, starts whitened out, refusals survived."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from ninespring import diagnosis, effects, native, search, statistics
+from ninespring.fitting import FOLDS, Problem, fold_of_rows
+from ninespring.logs import read_log
+from ninespring.models import Array
+
+TRUE = {
+    "heat_capacity_j_per_k": 0.3,
+    "loss_w_per_k": 0.0058,
+    "loss_fan_w_per_k": 0.0113,
+    "orthogonal_w_per_k": 0.000408,
+}
+
+
+def deviations(make_log, effect: dict, wanted: list[str], true: dict[str, float], seeds: range) -> np.ndarray:
+    """Return (fitted - true) / standard error over seeds and numbers."""
+    out = []
+    for seed in seeds:
+        run = read_log(make_log(f"c{seed}.csv", effect, seed=seed, seconds=400))
+        _, fit, _ = diagnosis.fit_effects(Array(), [run], wanted)
+        errors = fit.stderr()
+        out += [(fit.value(key) - value) / errors[key] for key, value in true.items()]
+    return np.array(out)
+
+
+@pytest.mark.parametrize(
+    ("effect", "true"),
+    [
+        ({}, TRUE),
+        ({"sensor_lag": {"sensor_lag_s": 5.0}}, {"sensor_lag_s": 5.0} | TRUE),
+        ({"fan_wake": {"wake_w_per_k": 0.0015, "wake_direction": 1.0}}, {"wake_w_per_k": 0.0015} | TRUE),
+    ],
+)
+def test_the_95_percent_interval_covers_the_truth_95_times_in_100(make_log, effect: dict, true: dict) -> None:
+    z = deviations(make_log, effect, list(effect), true, range(20, 36))
+    inside = np.mean(np.abs(z) <= 1.96)
+    # 64 or 80 numbers at 95 %: outside of 0.85 has a chance of 2 in 1000; wider or narrower errors miss the spread
+    assert inside >= 0.85, f"{100 * inside:.0f} % of {len(z)}"
+    assert 0.75 < np.sqrt(np.mean(z**2)) < 1.3, "the errors are too wide or too narrow"
+
+
+def test_errors_grow_where_the_residual_remembers(make_log) -> None:
+    def wander(columns: dict[str, np.ndarray]) -> None:
+        rng = np.random.default_rng(5)
+        for k in range(1, 10):
+            slow = np.zeros(600)
+            for row in range(1, 600):
+                slow[row] = 0.98 * slow[row - 1] + rng.normal(0.0, 0.06)
+            columns[f"t{k}_c"] = columns[f"t{k}_c"] + slow
+
+    sizes = []
+    for change in (None, wander):
+        problem = Problem(Array(), [read_log(make_log(seed=4, change=change))])
+        fit = problem.fit(effects.base_spec(problem), errors=True)
+        sizes.append(fit.stderr()["loss_w_per_k"])
+    # 0.3 K white and 0.3 K that remembers 50 s: far more than the factor of 1.4 of the mere size
+    assert sizes[1] > 2.5 * sizes[0]
+
+
+def test_held_out_blocks_are_not_fitted(make_log) -> None:
+    """A step that only the held-out block has cannot be known: its error must show whole."""
+    run = read_log(make_log(seed=6, noise=0.05))
+    at = fold_of_rows(run) == 2
+    problem = Problem(Array(), [run])
+    fit = problem.fit(effects.base_spec(problem), errors=True)
+    clean = problem.holdout_rmse(fit)
+    assert clean == pytest.approx(0.05, rel=0.1)
+    # a number that is free in one block only: fitted in sample, unknown when the block is left out
+    drift = next(c for c in effects.candidates(problem) if c.effect == "ambient_drift" and c.variant == "free")
+    spec = fit.spec.with_effect("ambient_drift", drift.free, drift.fixed, "free")
+    run.temperature_c[at] += 2.0
+    freer = problem.fit(spec, fit.as_dict())
+    left_in = statistics.rms(freer.residual)
+    assert problem.holdout_rmse(freer) > 1.2 * left_in
+
+
+def test_every_row_is_in_one_fold_and_folds_are_alike(make_log) -> None:
+    for seconds in (120, 600, 900):
+        run = read_log(make_log(f"{seconds}.csv", seconds=seconds))
+        counts = np.bincount(fold_of_rows(run), minlength=FOLDS)
+        assert counts.sum() == seconds and len(counts) == FOLDS
+        assert counts.min() >= 0.5 * counts.max()
+
+
+def test_a_wrong_first_reading_is_kept_out_of_the_fit(make_log) -> None:
+    def off(columns: dict[str, np.ndarray]) -> None:
+        columns["t1_c"] = columns["t1_c"].copy()
+        columns["t1_c"][0] += 1.0
+
+    true = read_log(make_log("a.csv", seed=8))
+    wrong = read_log(make_log("b.csv", seed=8, change=off))
+    values = []
+    for run in (true, wrong):
+        problem = Problem(Array(), [run])
+        values.append(diagnosis.first_fit(problem, effects.base_spec(problem)))
+    errors = values[0].stderr()
+    for key, one in values[0].as_dict().items():
+        assert abs(one - values[1].value(key)) < errors[key], key
+
+
+def test_values_that_the_plant_refuses_are_merely_bad(make_log) -> None:
+    problem = Problem(Array(), [read_log(make_log(seconds=120))])
+    spec = effects.base_spec(problem)
+    values = [f.start for f in spec.free]
+    values[0] = -1.0
+    assert np.all(problem.simulate(spec, values, 0) == 1e3)
+
+
+def test_bounds_hold_and_are_reported(make_log) -> None:
+    problem = Problem(Array(), [read_log(make_log(effects={"edge_loss": {"edge_loss_fraction": -0.2}}))])
+    spec = effects.base_spec(problem)
+    side = next(c for c in effects.candidates(problem) if c.variant == "per free side")
+    spec = spec.with_effect(side.effect, side.free, (), side.variant)
+    fit = problem.fit(spec)
+    low = next(f.low for f in side.free)
+    assert fit.value("edge_loss_fraction") >= low
+    assert ("edge_loss_fraction" in fit.at_bounds()) == (fit.value("edge_loss_fraction") < low + 2e-3)
+    fit.values[-1] = low
+    assert fit.at_bounds() == ["edge_loss_fraction"]
+
+
+def test_what_is_said_of_all_springs_does_not_undo_what_is_said_of_one() -> None:
+    plant = native.Plant(1, 2)
+    plant.set_all({"loss_w_per_k[2]": 0.02, "loss_w_per_k": 0.01})
+    assert (plant.get("loss_w_per_k[1]"), plant.get("loss_w_per_k[2]")) == (0.01, 0.02)
+
+
+def test_a_copy_of_a_plant_leads_its_own_life() -> None:
+    plant = native.Plant(1, 1)
+    twin = plant.copy()
+    twin.set("loss_w_per_k", 0.02)
+    twin.set_temperature(0, 50.0)
+    assert plant.get("loss_w_per_k") == 0.0058 and plant.temperature_c()[0] == 20.0
+
+
+def test_springs_start_where_the_sensors_would_show_the_first_row() -> None:
+    plant = native.Plant(1, 2)
+    plant.set_effects(["sensor_gain", "optical_mixing"])
+    plant.set_all({"sensor_gain": 1.2, "sensor_offset_k": 1.5, "optical_orthogonal": 0.1})
+    plant.reset()
+    plant.start_from_measured(np.array([40.0, math.nan]))
+    assert plant.measured_c()[0] == pytest.approx(40.0, abs=0.001)
+    assert plant.temperature_c()[1] == 20.0
+
+
+def test_evidence_prices_numbers_and_counts_correlated_samples_for_less(make_log) -> None:
+    """A number that explains nothing costs; the same gain is worth less where the residual remembers."""
+    problem = Problem(Array(), [read_log(make_log(seed=2))])
+    base = diagnosis.first_fit(problem, effects.base_spec(problem))
+    known = effects.candidates(problem)
+    found = search.Search(problem, known, base)
+    lag = next(c for c in known if c.effect == "sensor_lag")
+    spare = found.refit(base, [lag], [0.1])
+    assert search.log_evidence(problem, spare, base) < 0
+    better = problem.fit(base.spec, base.as_dict(), errors=True)
+    better.chi2, better.sse = 0.9 * base.chi2, 0.9 * base.sse
+    white = search.log_evidence(problem, better, base)
+    better.factor = 20.0
+    better.innovation = search.innovation(problem, base)
+    assert 0 < search.log_evidence(problem, better, base) < 0.2 * white
+
+
+def test_only_what_the_noise_of_a_first_reading_leaves_is_taken_away(make_log) -> None:
+    problem = Problem(Array(), [read_log(make_log(seed=9))])
+    fit = diagnosis.first_fit(problem, effects.base_spec(problem))
+    response = problem.simulate(fit.spec, fit.values, 0, np.eye(9)[3]) - problem.simulate(fit.spec, fit.values, 0)
+    rest = problem.without_starts(fit.residual)[0]
+    for off, left in ((0.6, 0.0), (6.0, 6.0 - 0.9)):  # K: twice the noise, twenty times the noise
+        moved = problem.without_starts([fit.residual[0] + off * response])[0]
+        apart = np.nansum((moved - rest) * response) / np.nansum(response**2)
+        assert apart == pytest.approx(left, abs=0.45)
+    untouched = fit.residual[0][300:] - rest[300:]
+    assert np.nanmax(np.abs(untouched)) < 0.03

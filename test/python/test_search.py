@@ -1,0 +1,223 @@
+"""The search: what is a candidate, what is preferred to what, what a forecast may promise, what is unexplained."""
+
+from __future__ import annotations
+
+import copy
+from pathlib import Path
+
+import numpy as np
+import pytest
+from ninespring import diagnosis, effects, experiments, native, search
+from ninespring.fitting import Problem
+from ninespring.logs import log_text, read_log
+from ninespring.models import Array, Model
+
+
+def commanded(path: Path, on: dict[str, dict[str, float]], seed: int = 0) -> Path:
+    """Write a 1 x 2 log of 600 s at 1 Hz where only the command is known, as two heaters on an Arduino give it."""
+    rng = np.random.default_rng(seed)
+    time_s = np.arange(600.0)
+    drive = np.zeros((600, 2))
+    for k in range(2):
+        for at in range(10 + 35 * k, 600, 70):
+            drive[at : at + 70, k] = rng.choice([0.0, 0.3, 0.6, 1.0])
+    plant = native.Plant(1, 2)
+    plant.set_all({"heat_capacity_j_per_k": 2.0, "loss_w_per_k": 0.012, "orthogonal_w_per_k": 0.004})
+    plant.set_all({"command_power_w[1]": 0.8, "command_power_w[2]": 0.4})
+    plant.set_effects(on)
+    for values in on.values():
+        plant.set_all(values)
+    plant.reset()
+    shown = plant.simulate(time_s, native.COMMAND, drive) + rng.normal(0.0, 0.05, (600, 2))
+    columns = {f"u{k + 1}": drive[:, k] for k in range(2)} | {f"t{k + 1}_c": shown[:, k] for k in range(2)}
+    path.write_text(log_text(time_s, columns | {"ambient_c": np.full(600, 20.0)}))
+    return path
+
+
+def heaters() -> Model:
+    """Return what is declared of the two heaters."""
+    model = Model(Array(1, 2))
+    model.parameters = {"heat_capacity_j_per_k": 2.0, "loss_w_per_k": 0.01, "command_power_w": 0.6}
+    return model
+
+
+@pytest.mark.parametrize(("chopped", "variant"), [(1.0, "chopped loads"), (0.0, "loads that draw their mean")])
+def test_the_way_the_supply_sags_is_told_from_the_other(tmp_path: Path, chopped: float, variant: str) -> None:
+    sag = {"supply_sag": {"supply_resistance_ohm": 8.0, "supply_chopped": chopped}}
+    run = read_log(commanded(tmp_path / "log.csv", sag | {"sensor_lag": {"sensor_lag_s": 20.0}}), 2)
+    found = diagnosis.diagnose(Array(1, 2), [run], model=heaters())
+    listed = {e["name"]: e for e in found.result["effects"]}
+    assert set(listed) == {"supply_sag", "sensor_lag"}
+    assert listed["supply_sag"]["variant"] == variant
+    assert listed["supply_sag"]["parameters"]["supply_resistance_ohm"]["value"] == pytest.approx(8.0, rel=0.1)
+    assert found.model.parameters["supply_chopped"] == chopped
+    assert found.result["unexplained"] is False
+    shown = diagnosis.predict(found.model, run)
+    assert np.sqrt(np.nanmean((run.temperature_c - shown) ** 2)) < 0.06
+
+
+def names_of(problem: Problem) -> set[str]:
+    return {c.effect for c in effects.candidates(problem)}
+
+
+def test_only_what_the_log_could_show_is_a_candidate(make_log, tmp_path: Path) -> None:
+    def without_fan(columns: dict[str, np.ndarray]) -> None:
+        columns["fan"] = np.zeros(600)
+
+    def lukewarm(columns: dict[str, np.ndarray]) -> None:
+        for k in range(1, 10):
+            columns[f"t{k}_c"] = np.minimum(columns[f"t{k}_c"], 70.0)
+
+    everything = {*effects.IN_WORDS} - {"supply_sag", "resistance_phase"}  # power is logged
+    assert names_of(Problem(Array(), [read_log(make_log("a.csv"))])) == everything
+    assert names_of(Problem(Array(), [read_log(make_log("b.csv", change=without_fan))])) == everything - {"fan_wake"}
+    assert names_of(Problem(Array(), [read_log(make_log("c.csv", change=lukewarm))])) == everything - {"latent_heat"}
+    assert "resistance_phase" in names_of(Problem(Array(), [read_log(make_log("d.csv", columns="i"))]))
+    pair = names_of(Problem(Array(1, 2), [read_log(commanded(tmp_path / "u.csv", {}), 2)]))
+    assert "supply_sag" in pair and "edge_loss" not in pair
+
+
+def test_every_probe_is_within_its_bounds_and_moves_what_is_seen(make_log, tmp_path: Path) -> None:
+    for array, run in (
+        (Array(), read_log(make_log(columns="i", seconds=900))),
+        (Array(1, 2), read_log(commanded(tmp_path / "u.csv", {}), 2)),
+    ):
+        problem = Problem(array, [run])
+        base = problem.fit(effects.base_spec(problem))
+        still = problem.predictions(base.spec, base.values)[0]
+        for one in effects.candidates(problem):
+            spec = base.spec.with_effect(one.effect, one.free, one.fixed, one.variant, one.also_on)
+            for probe in (*one.probes, *one.more_starts):
+                for free in one.free:
+                    assert free.low <= probe.get(free.key, free.start) <= free.high, (one.effect, free.key)
+                values = np.concatenate([base.values, [probe.get(f.key, f.start) for f in one.free]])
+                moved = problem.simulate(spec, values, 0)
+                assert np.abs(moved - still).max() > 0.005, (one.effect, one.variant)
+                assert np.abs(moved).max() < 900, (one.effect, one.variant)
+
+
+@pytest.fixture
+def plain(make_log) -> search.Search:
+    """Return a search on a log of the declared model and nothing else."""
+    problem = Problem(Array(), [read_log(make_log(seed=11))])
+    base = diagnosis.first_fit(problem, effects.base_spec(problem))
+    return search.Search(problem, effects.candidates(problem), base)
+
+
+def with_effect(found: search.Search, effect: str, variant: str) -> search.Fit:
+    one = next(c for c in found.candidates if (c.effect, c.variant) == (effect, variant))
+    return found.refit(found.base, [one], [1.0])
+
+
+def test_a_drift_that_follows_anything_must_win_clearly(plain: search.Search) -> None:
+    drift, plate = with_effect(plain, "ambient_drift", "free"), with_effect(plain, "plate_conduction", "")
+    for one in (drift, plate):
+        one.factor, one.innovation = 1.0, 1.0
+
+    def ahead(fit: search.Fit, other: search.Fit, nats: float) -> None:
+        """Give `fit` the chi2 with which it is ahead of the other by so many nats."""
+        fit.chi2 = other.chi2
+        for _ in range(200):
+            fit.chi2 *= 1 - 1e-4 * np.sign(search.log_evidence(plain.problem, fit, other) - nats) * -1
+        assert search.log_evidence(plain.problem, fit, other) == pytest.approx(nats, abs=1.0)
+
+    ahead(drift, plate, 0.5 * search.TOLD_APART)
+    assert not plain.preferred(drift, plate) and plain.preferred(plate, drift)
+    ahead(drift, plate, 2.0 * search.TOLD_APART)
+    assert plain.preferred(drift, plate) and not plain.preferred(plate, drift)
+    ramp = with_effect(plain, "ambient_drift", "ramp")
+    assert search.handicap(ramp) == 0.0 < search.handicap(drift)
+
+
+def test_slow_nodes_are_tried_in_the_place_of_a_drift_whatever_the_forecast_says(plain: search.Search) -> None:
+    drift = with_effect(plain, "ambient_drift", "free")
+    tried = {other.spec.effects[-1] for _, other in plain.rivals(drift, {"ambient_drift": plain.base})}
+    assert set(search.SLOW_NODES) <= tried
+
+
+def test_another_variant_of_an_adopted_effect_is_tried(make_log) -> None:
+    problem = Problem(Array(), [read_log(make_log(effects={"spring_mismatch": {"loss_scale[4]": 1.4}}, seed=3))])
+    base = diagnosis.first_fit(problem, effects.base_spec(problem))
+    found = search.Search(problem, effects.candidates(problem), base)
+    wrong = with_effect(found, "spring_mismatch", "spring 5")
+    contenders = [other for _, other in found.rivals(wrong, {"spring_mismatch": base})]
+    right = next(other for other in contenders if dict(other.spec.variant) == {"spring_mismatch": "spring 4"})
+    assert found.preferred(right, wrong) and not found.preferred(wrong, right)
+
+
+def test_a_forecast_keeps_to_what_is_physical(plain: search.Search) -> None:
+    screen = plain.screen(plain.base)
+    k = next(k for k, c in enumerate(screen.candidates) if c.effect == "radiation")
+    column = int(np.flatnonzero(screen.owner == k)[0])
+    size = screen.gram[column, column]
+    for moment, drop in ((size, size), (-size, 0.0), (100 * size, None)):
+        screen.moment = screen.moment.copy()
+        screen.moment[column] = moment
+        found, sizes = screen.forecast([k])
+        if drop is not None:
+            assert found == pytest.approx(drop, rel=1e-4, abs=1e-9)
+        assert all(0 <= s <= screen.candidates[k].most for s in sizes.values())
+
+
+def test_an_effect_that_explains_less_than_half_the_noise_is_not_worth_it(plain: search.Search) -> None:
+    better = copy.copy(plain.base)
+    better.innovation = 0.5 * search.innovation(plain.problem, plain.base)  # statistical evidence without end
+    for share, worth in ((0.9 * search.MIN_GAIN, False), (1.5 * search.MIN_GAIN, True)):
+        better.sse = plain.base.sse - share**2 * plain.base.count
+        better.chi2 = plain.base.chi2 - share**2 * plain.base.count
+        assert plain.worth(better, plain.base) == worth
+
+
+def test_structure_of_half_the_noise_is_unexplained_and_less_is_not(plain: search.Search) -> None:
+    fit = copy.copy(plain.base)
+    wave = np.sqrt(2) * 0.3 * np.sin(np.arange(600.0) / 40)[:, None]
+    for share, expected in ((0.35, False), (0.65, True)):
+        fit.residual = [plain.base.residual[0] + share * wave]
+        assert search.unexplained(plain.problem, fit) == expected
+    one = np.zeros((600, 9))
+    one[:, 4:5] = 1.4 * wave
+    fit.residual = [plain.base.residual[0] + one]
+    assert search.unexplained(plain.problem, fit)
+
+
+def test_the_experiment_that_separates_is_one_in_which_both_models_differ(make_log) -> None:
+    problem = Problem(Array(), [read_log(make_log(effects={"latent_heat": {"latent_heat_j": 8.0}}))])
+    base = problem.fit(effects.base_spec(problem))
+    latent = next(c for c in effects.candidates(problem) if c.effect == "latent_heat")
+    spec = base.spec.with_effect(latent.effect, latent.free, latent.fixed, latent.variant)
+    with_heat = problem.fit(spec, base.as_dict())
+    same = experiments.separate(problem, base, base)
+    assert same.difference_c == 0.0 and "too little to see" in same.text
+    told = experiments.separate(problem, base, with_heat)
+    assert told.difference_c > 3.0 and 1 <= told.spring <= 9 and 0 < told.at_s <= told.duration_s
+    assert told.name in told.text and f"spring {told.spring}" in told.text
+
+
+def test_a_drift_of_these_runs_is_said_and_left_out_of_the_model(make_log, tmp_path: Path) -> None:
+    drift = {"ambient_drift": {"ambient_amplitude_k": 4.0, "ambient_period_s": 1100.0, "ambient_ramp_k_per_h": 0.0}}
+    found = diagnosis.diagnose(Array(), [read_log(make_log(effects=drift, seconds=900))])
+    effect = found.result["effects"][0]
+    assert (effect["name"], effect["variant"]) == ("ambient_drift", "free")
+    assert found.model.effects == []
+    assert found.model.provenance["note"] == diagnosis.DRIFT_LEFT_OUT
+    assert any(diagnosis.DRIFT_LEFT_OUT in text for text in found.result["warnings"])
+
+
+def test_a_run_that_does_not_begin_as_logged_is_said(make_log) -> None:
+    def late(columns: dict[str, np.ndarray]) -> None:
+        for k in range(1, 10):
+            columns[f"t{k}_c"] = columns[f"t{k}_c"] + 6.0 * np.exp(-((np.arange(600.0) - 30) ** 2) / 200)
+
+    result = diagnosis.diagnose(Array(), [read_log(make_log(change=late))]).result
+    assert result["unexplained"] is True
+    assert any("the start of run 1" in text for text in result["residual"]["depends_on"])
+
+
+def test_correlations_of_the_rest_are_correlations(make_log) -> None:
+    def pickup(columns: dict[str, np.ndarray]) -> None:
+        columns["t3_c"] = columns["t3_c"] + 3.0 * columns["i3_a"]
+
+    result = diagnosis.diagnose(Array(), [read_log(make_log(change=pickup))]).result
+    said = [text for text in result["residual"]["depends_on"] if "r = " in text]
+    assert any("drive of spring 3 (seen at spring 3" in text for text in said)
+    assert all(abs(float(text.split("r = ")[1].rstrip(")"))) <= 1.0 for text in said)

@@ -1,0 +1,69 @@
+"""Steady tables: the number behind an effect is found again, what is left out is foretold, bad tables are refused."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from ninespring import diagnosis, steady
+from ninespring.errors import InputError
+from ninespring.models import Array
+
+MIXING = {"optical_mixing": {"optical_orthogonal": 0.06, "optical_diagonal": 0.015}}
+
+
+def states(on: dict[str, dict[str, float]]) -> list[steady.State]:
+    """Return six states of held springs around an idle centre, as the paper has them, with effects on."""
+    out = []
+    for pitch in (4.0, 5.0, 6.0):
+        for fan in (0.0, 1.0):
+            hold = np.full(9, 99.0)
+            hold[4] = math.nan
+            empty = np.full(9, math.nan)
+            state = steady.State(f"{pitch:g} mm, fan {fan:g}", pitch, fan, 20.0, hold, empty, empty.copy())
+            state.measured_c[4] = steady.settle(Array(), {}, on, state)[4]
+            out.append(state)
+    return out
+
+
+def test_the_number_behind_six_states_is_found_again() -> None:
+    result = steady.diagnose_states(Array(), {}, states(MIXING))
+    found = result["effects"][0]
+    assert found["name"] == "optical_mixing"
+    assert found["parameters"]["optical_orthogonal"]["value"] == pytest.approx(0.06, rel=0.01)
+    assert found["parameters"]["optical_diagonal"]["value"] == pytest.approx(0.015, rel=0.01)
+    assert result["after"]["holdout_rmse_c"] < 0.1 < 5.0 < result["baseline"]["rmse_c"]
+    diagnosis.validate(result)
+
+
+def test_the_model_afterwards_has_everything_that_was_set() -> None:
+    truth = {"plate_conduction": {"plate_coupling_w_per_k": 0.004, "plate_loss_w_per_k": 0.01}}
+    table = states(truth)
+    result = steady.diagnose_states(Array(), {}, table)
+    assert result["effects"][0]["name"] == "plate_conduction"
+    model = steady.model_after(result, None, None)
+    on = {"plate_conduction": {k: v for k, v in model.parameters.items() if k.startswith("plate_")}}
+    assert np.abs(steady.errors(Array(), {}, on, table)).max() < 0.2
+
+
+def test_nothing_is_adopted_where_the_declared_model_is_right() -> None:
+    result = steady.diagnose_states(Array(), {}, states({}))
+    assert result["effects"] == [] and result["baseline"]["rmse_c"] < 1e-6
+
+
+@pytest.mark.parametrize(
+    ("text", "where", "words"),
+    [
+        ("case,pitch_mm,hold1_c,t5_c,t5_f\na,4,99,50,1\n", ":1:28:", "unknown column 't5_f'"),
+        ("case,hold1_c,i1_a,t5_c\na,99,1.5,50\n", ":2:3:", "both a current and a prescribed temperature"),
+        ("case,hold1_c,t5_c\na,99,\n", ":1:1:", "no measured temperature"),
+    ],
+)
+def test_a_wrong_table_is_refused_where_it_is_wrong(tmp_path: Path, text: str, where: str, words: str) -> None:
+    path = tmp_path / "steady.csv"
+    path.write_text(text)
+    with pytest.raises(InputError) as refused:
+        steady.read_steady(path)
+    assert where in str(refused.value) and words in str(refused.value)
