@@ -2,6 +2,7 @@
 
 import csv
 import json
+import math
 import os
 import subprocess
 import sys
@@ -494,86 +495,87 @@ class BadScenario(Case):
 
 
 class Replay(Case):
+    def replay(self, log: str = LOG, model: str = MODEL) -> tuple[str, list[dict[str, str]], dict]:
+        """What is printed, the rows that are written, the result for programs."""
+        self.file("log.csv", log)
+        self.file("m.toml", model)
+        table = self.works("replay", "log.csv", "--model", "m.toml", "-o", self.output, "--json", self.json)
+        return table, rows_of(self.output), json.loads(self.json.read_text())
+
+    def near(self, row: dict[str, str], column: str, expected: float, delta: float) -> None:
+        self.assertAlmostEqual(float(row[column]), expected, delta=delta)
+
     def test_model_follows_the_command(self) -> None:
-        self.file("log.csv", "\ufeff" + LOG.replace("\n", "\r\n"))
-        self.file("m.toml", MODEL)
-        table = self.works(
-            "replay",
-            "log.csv",
-            "--model",
-            "m.toml",
-            "-o",
-            self.output,
-            "--json",
-            self.json,
-        )
+        table, rows, result = self.replay("\ufeff" + LOG.replace("\n", "\r\n"))
         self.assertIn("degC rms", table)
-        rows = rows_of(self.output)
-        self.assertEqual(
-            [row["time_s"] for row in rows],
-            ["0.000", "1.000", "2.000", "10.000", "11.250"],
-        )
+        self.assertEqual([row["time_s"] for row in rows], ["0.000", "1.000", "2.000", "10.000", "11.250"])
         self.assertEqual(rows[4]["t1_c"], "")
         # 1 W into 2 J/K from 1 s to 10 s, little lost: half a kelvin a second.
-        self.assertAlmostEqual(float(rows[2]["m1_c"]), 20.5, delta=0.02)
-        self.assertAlmostEqual(float(rows[3]["m1_c"]), 24.45, delta=0.15)
-        self.assertAlmostEqual(float(rows[4]["m2_c"]) - float(rows[3]["m2_c"]), 0.3125, delta=0.03)
-        result = json.loads(self.json.read_text())
+        self.near(rows[2], "m1_c", 20.5, 0.02)
+        self.near(rows[3], "m1_c", 24.45, 0.15)
+        self.near(rows[4], "m2_c", float(rows[3]["m2_c"]) + 0.3125, 0.03)
         self.assertEqual([one["samples"] for one in result["springs"]], [4, 5])
 
+    def test_rows_between_two_steps(self) -> None:
+        model = MODEL.replace("2.0", "0.2")  # 5 K/s at 1 W: half a step of the chip is 0.25 K
+        _, rows, _ = self.replay("time_s,u1,u2,t1_c\n0,1,0.5,20\n1.05,1,0,\n1.1,0,0,\n", model)
+        rise = [(1 - math.exp(-seconds * 0.0058 / 0.2)) / 0.0058 for seconds in (0, 1.05, 1.1)]
+        for row, expected in zip(rows, rise, strict=True):
+            self.near(row, "m1_c", 20 + expected, 0.03)
+        self.near(rows[2], "m2_c", 20 + 0.5 * rise[1], 0.03)  # off in the middle of the step
+
+    def test_the_log_s_fan_and_air_count(self) -> None:
+        rows_in = "0,0,0,60,0,40\n100,0,0,,1,40\n200,0,0,,1,20\n300,0,0,,1,20\n"
+        model = MODEL + '[[parameter]]\nname = "orthogonal_w_per_k"\nvalue = 0\nunit = "W/K"\n'
+        model += '[[parameter]]\nname = "orthogonal_fan_w_per_k"\nvalue = 0\nunit = "W/K"\n'
+        _, rows, _ = self.replay("time_s,u1,u2,t1_c,fan,ambient_c\n" + rows_in, model)
+        warm = 40 + 20 * math.exp(-100 * 0.0058 / 2)
+        fanned = 40 + (warm - 40) * math.exp(-100 * 0.0113 / 2)
+        cooled = 20 + (fanned - 20) * math.exp(-100 * 0.0113 / 2)
+        for row, expected in zip(rows, (60, warm, fanned, cooled), strict=True):
+            self.near(row, "m1_c", expected, 0.05)
+        for row, expected in zip(rows, (40, 40, 40, 20 + 20 * math.exp(-0.565)), strict=True):
+            self.near(row, "m2_c", expected, 0.05)  # never measured: starts at the log's ambient
+
     def test_errors_are_those_of_the_file(self) -> None:
-        self.file("log.csv", LOG)
-        self.file("m.toml", MODEL)
-        self.works(
-            "replay",
-            "log.csv",
-            "--model",
-            "m.toml",
-            "-o",
-            self.output,
-            "--json",
-            self.json,
-        )
-        squares = [
-            (float(row[f"m{k}_c"]) - float(row[f"t{k}_c"])) ** 2
-            for row in rows_of(self.output)
-            for k in (1, 2)
-            if row[f"t{k}_c"]
-        ]
-        rms = (sum(squares) / len(squares)) ** 0.5
-        self.assertAlmostEqual(json.loads(self.json.read_text())["rmse_c"], rms, delta=0.001)
+        effects = 'effects = ["sensor_gain"]'
+        _, rows, result = self.replay(model=MODEL.replace("effects = []", effects))
+        everything = []
+        for k, spring in enumerate(result["springs"], 1):
+            for of, key in (("m", "rmse_c"), ("y", "shown_rmse_c")):
+                errors = [float(row[f"{of}{k}_c"]) - float(row[f"t{k}_c"]) for row in rows if row[f"t{k}_c"]]
+                rms = (sum(e * e for e in errors) / len(errors)) ** 0.5
+                self.assertAlmostEqual(spring[key], rms, delta=0.001)
+                if of == "m":
+                    everything += errors
+                    self.assertAlmostEqual(spring["mean_error_c"], sum(errors) / len(errors), delta=0.001)
+                    self.assertAlmostEqual(spring["largest_error_c"], max(map(abs, errors)), delta=0.001)
+        rms = (sum(e * e for e in everything) / len(everything)) ** 0.5
+        self.assertAlmostEqual(result["rmse_c"], rms, delta=0.001)
+        self.assertNotAlmostEqual(result["springs"][0]["shown_rmse_c"], result["springs"][0]["rmse_c"], delta=0.01)
 
     def test_measurement_effects_stay_off_the_chip(self) -> None:
-        self.file("log.csv", LOG)
-        self.file("m.toml", MODEL)
-        self.works("replay", "log.csv", "--model", "m.toml", "-o", self.output)
-        plain = [row["m1_c"] for row in rows_of(self.output)]
-        self.file(
-            "m.toml",
-            MODEL.replace("effects = []", 'effects = ["sensor_lag", "sensor_gain"]'),
-        )
-        table = self.works("replay", "log.csv", "--model", "m.toml", "-o", self.output)
-        self.assertEqual([row["m1_c"] for row in rows_of(self.output)], plain)
-        self.assertNotEqual([row["y1_c"] for row in rows_of(self.output)], plain)
+        warm = LOG.replace("0,0,0,20,20", "0,0,0,30,20")
+        plain = [row["m1_c"] for row in self.replay(warm)[1]]
+        effects = 'effects = ["sensor_lag"]'
+        table, rows, _ = self.replay(warm, MODEL.replace("effects = []", effects))
+        self.assertEqual([row["m1_c"] for row in rows], plain)
+        shown = [row["y1_c"] for row in rows]
+        self.assertEqual(shown[0], plain[0])  # the sensor starts where the spring does
+        self.assertLess(float(shown[3]), float(plain[3]) - 1)
         self.assertIn("sensor_lag belongs to the measurement", table)
 
     def test_current_and_voltage_are_power(self) -> None:
         model = MODEL.replace("cols = 2", "cols = 1")
-        self.file("m.toml", model)
-        self.file("log.csv", "time_s,i1_a,v1_v,t1_c\n0,2,0.5,20\n4,0,0,22\n")
-        self.works("replay", "log.csv", "--model", "m.toml", "-o", self.output)
-        self.assertAlmostEqual(float(rows_of(self.output)[1]["m1_c"]), 21.98, delta=0.03)
-        self.file("log.csv", "time_s,i1_a,t1_c\n0,2,20\n4,0,22\n")
-        self.works("replay", "log.csv", "--model", "m.toml", "-o", self.output)
-        self.assertAlmostEqual(float(rows_of(self.output)[1]["m1_c"]), 20 + 4 * 0.219 * 4 / 2, delta=0.05)
+        _, rows, _ = self.replay("time_s,i1_a,v1_v,t1_c\n0,2,0.5,20\n4,0,0,22\n", model)
+        self.near(rows[1], "m1_c", 21.98, 0.03)
+        _, rows, _ = self.replay("time_s,i1_a,t1_c\n0,2,20\n4,0,22\n", model)
+        self.near(rows[1], "m1_c", 20 + 4 * 0.219 * 4 / 2, 0.05)
 
     def test_a_log_without_temperatures_is_simulated(self) -> None:
-        self.file("log.csv", "time_s,u1,u2\n0,1,0\n10,0,0\n")
-        self.file("m.toml", MODEL)
-        table = self.works("replay", "log.csv", "--model", "m.toml", "-o", self.output, "--json", self.json)
+        table, rows, result = self.replay("time_s,u1,u2\n0,1,0\n10,0,0\n")
         self.assertIn("no temperature to compare with", table)
-        self.assertAlmostEqual(float(rows_of(self.output)[1]["m1_c"]), 25, delta=0.2)
-        result = json.loads(self.json.read_text())
+        self.near(rows[1], "m1_c", 25, 0.2)
         self.assertEqual((result["rmse_c"], result["springs"][0]["largest_error_c"]), (None, None))
 
     def test_bad_logs(self) -> None:
