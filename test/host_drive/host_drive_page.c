@@ -1,0 +1,71 @@
+/* docs/driving.md: every setting of the policy with unit and default, every limit with its bit. */
+#include <stddef.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "settings.h"
+#include "unity.h"
+
+static char page[65536];
+
+void setUp(void)
+{
+    FILE *file = fopen(NINESPRING_SOURCE_DIR "/docs/driving.md", "rb");
+    TEST_ASSERT_NOT_NULL(file);
+    size_t length = fread(page, 1, sizeof page - 1u, file);
+    (void)fclose(file);
+    page[length] = '\0';
+}
+
+void tearDown(void) {}
+
+static void every_setting_of_the_policy_is_there_with_unit_and_default(void)
+{
+    const size_t first = offsetof(settings_t, controller.policy);
+    settings_t defaults;
+    settings_default(&defaults);
+    unsigned found = 0;
+    for (uint8_t k = 0; k < settings_count(); k++) {
+        settings_entry_t entry;
+        settings_entry(k, &entry);
+        if (entry.offset < first || entry.offset >= first + sizeof defaults.controller.policy) {
+            continue;
+        }
+        double value = settings_get(&defaults, k, 0);
+        for (unsigned n = 0; n < entry.decimals; n++) {
+            value /= 10.0;
+        }
+        char wanted[120];
+        (void)snprintf(wanted, sizeof wanted, "| `%s` |%s%s | %.*f |", entry.name,
+                       entry.unit[0] != '\0' ? " " : "", entry.unit, (int)entry.decimals, value);
+        TEST_ASSERT_NOT_NULL_MESSAGE(strstr(page, wanted), wanted);
+        found++;
+    }
+    TEST_ASSERT_GREATER_THAN_UINT(10, found);
+}
+
+static void every_limit_is_there_with_its_bit(void)
+{
+    static const struct {
+        drive_policy_limit_t bit;
+        const char *name;
+    } limits[] = {
+        {DRIVE_POLICY_LIMIT_SAFETY, "safety"},     {DRIVE_POLICY_LIMIT_CURRENT, "current"},
+        {DRIVE_POLICY_LIMIT_SUPPLY, "supply"},     {DRIVE_POLICY_LIMIT_TEMPERATURE, "temperature"},
+        {DRIVE_POLICY_LIMIT_UNDRIVEN, "undriven"}, {DRIVE_POLICY_LIMIT_OVERLOAD, "overload"},
+        {DRIVE_POLICY_LIMIT_TRIP, "trip"},         {DRIVE_POLICY_LIMIT_BLIND, "blind"}};
+    for (unsigned k = 0; k < sizeof limits / sizeof limits[0]; k++) {
+        char wanted[40];
+        (void)snprintf(wanted, sizeof wanted, "| %u | `%s` |", (unsigned)limits[k].bit,
+                       limits[k].name);
+        TEST_ASSERT_NOT_NULL_MESSAGE(strstr(page, wanted), wanted);
+    }
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(every_setting_of_the_policy_is_there_with_unit_and_default);
+    RUN_TEST(every_limit_is_there_with_its_bit);
+    return UNITY_END();
+}
