@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ninespring import diagnosis, importing
+from ninespring.fitting import BLOCK_S
 from ninespring.logs import read_log
 from ninespring.models import Array, Model
 from paper import COMMAND, data
@@ -53,7 +54,18 @@ def section() -> tuple[str, list[dict[str, Any]]]:
     lines.append(
         "Declared: 4 g, 500 J/kgK, two nodes and a coupling; losses, powers and ambient fitted. Errors in K; held out"
     )
-    lines.append("are blocks of two and a half minutes, every fifth in turn. Effects are listed as they add up.\n")
+    lines.append(
+        f"are blocks of {BLOCK_S:g} s, or of a fifth of a shorter run, every fifth in turn: the numbers are fitted to the rest,"
+    )
+    lines.append(
+        "the whole run is simulated from its first reading, and the error counts in the block alone. Effects are listed as"
+    )
+    lines.append(
+        "they add up. 'Chopped loads': the heaters are transistors that share one supply and are switched on and off, so"
+    )
+    lines.append(
+        "what one draws takes power from the other, and its own command takes none from itself (docs/physics.md).\n"
+    )
     lines.append(
         "| log | noise | model | error | held out | numbers | textbook, in sample |\n|---|---|---|---|---|---|---|"
     )

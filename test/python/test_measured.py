@@ -21,13 +21,9 @@ def test_six_camera_values_are_explained_by_one_number_and_rivals_have_experimen
     assert all("apart" in r["separating_experiment"] for r in result["rivals"])
 
 
-@pytest.mark.parametrize(
-    ("file", "before", "after"),
-    [("energy_balance_600", 1.26, 0.63), ("second_order_mimo_201", 1.23, 0.58)],
-)
-def test_the_laboratory_is_explained_better_than_by_the_textbook(
-    measured: Path, tmp_path: Path, file: str, before: float, after: float
-) -> None:
+@pytest.mark.parametrize("file", ["energy_balance_600", "second_order_mimo_201"])
+def test_the_laboratory_is_explained_far_better_than_by_the_textbook(measured: Path, tmp_path: Path, file: str) -> None:
+    """Textbook, in sample: 1.26 and 1.23 K; with sensor lag and a fitted ambient 0.63 and 0.58."""
     path = tmp_path / "log.csv"
     path.write_text(importing.import_table(measured / "tclab_apm" / f"{file}.txt", "tclab"))
     model = Model(Array(1, 2))
@@ -37,9 +33,11 @@ def test_the_laboratory_is_explained_better_than_by_the_textbook(
         "command_power_w": 1.0,
     }
     result = diagnosis.diagnose(Array(1, 2), [read_log(path, 2)], model=model).result
-    assert "sensor_lag" in [e["name"] for e in result["effects"]]
-    assert result["after"]["rmse_c"] < after
-    assert result["after"]["holdout_rmse_c"] < before
+    effects = {e["name"]: e.get("variant") for e in result["effects"]}
+    assert "sensor_lag" in effects
+    assert effects["supply_sag"] == "chopped loads"
+    assert result["after"]["rmse_c"] < 0.25
+    assert result["after"]["holdout_rmse_c"] < 0.25
 
 
 def test_a_glitch_and_an_unlogged_drift_are_handled_without_being_told(measured: Path, tmp_path: Path) -> None:
@@ -53,5 +51,7 @@ def test_a_glitch_and_an_unlogged_drift_are_handled_without_being_told(measured:
         "loss_w_per_k": 0.012,
         "command_power_w": 1.0,
     }
-    result = diagnosis.diagnose(Array(1, 2), [run], model=model).result
-    assert {"ambient_drift", "sensor_lag"} <= {e["name"] for e in result["effects"]}
+    found = diagnosis.diagnose(Array(1, 2), [run], model=model)
+    assert {"ambient_drift", "sensor_lag"} <= {e["name"] for e in found.result["effects"]}
+    assert found.model.effects == ["sensor_lag"]
+    assert found.model.provenance["note"] == diagnosis.DRIFT_LEFT_OUT
