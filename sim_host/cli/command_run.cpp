@@ -166,6 +166,9 @@ public:
         }
         log_.comment("board", board);
         log_.comment("seed", fmt::format("{}", plan.seed));
+        if (!plan.policy.empty()) {
+            log_.comment("policy", plan.policy);
+        }
         for (const std::string &set : options.sets) {
             log_.comment("set", set);
         }

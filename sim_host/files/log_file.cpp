@@ -1,5 +1,6 @@
 #include "log_file.h"
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
@@ -197,19 +198,19 @@ std::vector<double> *values_of(log_data &log, const column &which)
     return nullptr;
 }
 
-/* A column that the simulator writes beside the measured ones (m{k}_c, x{k}, p{k}_c, px{k}, s{k}_a,
- * y{k}_c), or note_...: skipped. */
+/* A column that the simulator (m{k}_c, x{k}, p{k}_c, px{k}, s{k}_a, y{k}_c) or the board (m{k}_c,
+ * d{k}, state) writes beside the measured ones, or note_...: skipped. */
 bool is_skipped(std::string_view name)
 {
-    if (name.substr(0, 5) == "note_") {
+    if (name.substr(0, 5) == "note_" || name == "state") {
         return true;
     }
     struct form {
         const char *prefix;
         const char *suffix;
     };
-    static constexpr std::array<form, 6> forms = {
-        {{"m", "_c"}, {"x", ""}, {"p", "_c"}, {"px", ""}, {"s", "_a"}, {"y", "_c"}}};
+    static constexpr std::array<form, 7> forms = {
+        {{"m", "_c"}, {"x", ""}, {"p", "_c"}, {"px", ""}, {"s", "_a"}, {"y", "_c"}, {"d", ""}}};
     for (const form &one : forms) {
         if (numbered(name, one.prefix, one.suffix) != 0) {
             return true;
@@ -364,7 +365,9 @@ log_data read_log(const std::string &path, std::size_t springs)
 
 void log_writer::comment(std::string_view key, std::string_view value)
 {
-    text_ += fmt::format("# {}: {}\n", key, value);
+    std::string one_line(value);
+    std::replace(one_line.begin(), one_line.end(), '\n', ' ');
+    text_ += fmt::format("# {}: {}\n", key, one_line);
 }
 
 void log_writer::column(std::string name, int decimals)

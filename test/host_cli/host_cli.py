@@ -392,6 +392,7 @@ class Run(Case):
         precompensate = targets(named)
         self.assertNotEqual(precompensate, targets(SCENARIO))
         self.assertEqual(precompensate, targets(SCENARIO, "--policy", "precompensate"))
+        self.assertIn("# policy: precompensate\n", (self.folder / "a.csv").read_text())
         self.assertEqual(targets(SCENARIO), targets(named, "--policy", "open"))
         self.assertEqual(precompensate, targets(SCENARIO + "at 0 = policy precompensate\n"))
 

@@ -64,8 +64,8 @@ void log_of_two_springs_is_read(void)
 {
     const log_data log = parse_log(make_text_file(
         "a.csv", "\xEF\xBB\xBF# board: 7\r\n# no colon here\r\ntime_s, i1_a,v1_v,u2,t1_c,t2_c,fan,"
-                 "ambient_c,m1_c,note_who\r\n0,1.5,0.26,0.5,20,,0,21,20,me\r\n\r\n"
-                 "0.5,\"1.25\",0.25,1,20.5,30,1,21.5,x,you"));
+                 "ambient_c,m1_c,d1,state,note_who\r\n0,1.5,0.26,0.5,20,,0,21,20,0.5,ok,me\r\n\r\n"
+                 "0.5,\"1.25\",0.25,1,20.5,30,1,21.5,x,0.5,ok,you"));
     TEST_ASSERT_EQUAL(2, log.springs.size());
     TEST_ASSERT_EQUAL(2, log.time_s.size());
     TEST_ASSERT_EQUAL_DOUBLE(1.25, log.springs[0].current_a[1]);
@@ -172,13 +172,13 @@ void files_that_are_not_text_are_refused(void)
 void written_log_is_read_back(void)
 {
     log_writer writer;
-    writer.comment("scenario", "x");
+    writer.comment("scenario", "x\ny");
     writer.column("time_s", 2);
     writer.column("u1", 3);
     writer.column("t1_c", 3);
     writer.row({0.0, 0.5, -0.0001});
     writer.row({0.02, 1.0, std::nan("")});
-    TEST_ASSERT_EQUAL_STRING("# scenario: x\ntime_s,u1,t1_c\n0.00,0.500,0.000\n0.02,1.000,\n",
+    TEST_ASSERT_EQUAL_STRING("# scenario: x y\ntime_s,u1,t1_c\n0.00,0.500,0.000\n0.02,1.000,\n",
                              writer.text().c_str());
     const log_data log = parse_log(make_text_file("w.csv", writer.text()));
     TEST_ASSERT_EQUAL_DOUBLE(0.5, log.springs[0].command[0]);
