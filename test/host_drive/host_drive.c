@@ -190,13 +190,13 @@ static void spring_that_loses_its_turn_keeps_what_it_has(void)
     settings.safety.supply_limit_ma = 7000; /* little more than what holds them */
     TEST_ASSERT_TRUE(controller_apply_settings(loop_controller(loop), &settings, NULL));
     run(1.0); /* currents have fallen */
-    for (int n = 0; n < 150; n++) {
+    for (int n = 0; n < 40; n++) {
         run(0.2);
         for (int k = 0; k < 4; k++) {
             TEST_ASSERT_TRUE(phase(k) > 0.6);
             if (drive_policy_stage(&loop_controller(loop)->policy, (uint8_t)k) ==
                 DRIVE_POLICY_STAGE_HEAT) {
-                TEST_ASSERT_TRUE(target(k) > 1000);
+                TEST_ASSERT_TRUE(temperature(k) > 89.0);
             }
         }
     }
@@ -358,7 +358,7 @@ static void change_policy(drive_policy_kind_t kind)
     TEST_ASSERT_TRUE(controller_set_policy(loop_controller(loop), kind));
     settings.policy.policy = (uint8_t)kind;
     for (int quiet = 0, n = 0; quiet < 10; n++) {
-        TEST_ASSERT_LESS_THAN_INT(400, n);
+        TEST_ASSERT_LESS_THAN_INT(1000, n);
         unsigned before_ma[SPRINGS];
         double before_a[SPRINGS];
         for (int k = 0; k < SPRINGS; k++) {
@@ -635,7 +635,7 @@ static void voltage_that_becomes_noisy_in_a_hold_is_let_go_and_taken_again(void)
     run_liar(120.0, HONEST);
     TEST_ASSERT_FALSE(liar_is_blind());
     TEST_ASSERT_TRUE(plant_temperature_c(plant, CENTRE) < 86.0); /* the margin has narrowed */
-    run_liar(3.0, NOISY_VOLTAGE);
+    run_liar(10.0, NOISY_VOLTAGE);
     TEST_ASSERT_TRUE(liar_is_blind());
     TEST_ASSERT_TRUE(run_liar(200.0, NOISY_VOLTAGE) < 115.0);
     TEST_ASSERT_TRUE(liar_is_blind());
