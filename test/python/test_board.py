@@ -1,0 +1,134 @@
+"""The whole chain on the simulated board, the flashed ELF in simavr: measure, fit, export, upload, and the chip knows.
+
+Needs `ninespring-sim` and the firmware's ELF: NINESPRING_SIM and NINESPRING_AVR_DIR, or build/host and build/avr.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from ninespring.board import Board
+from ninespring.logs import read_log, read_table
+
+ROOT = Path(__file__).resolve().parents[2]
+SIM = Path(os.environ.get("NINESPRING_SIM", ROOT / "build" / "host" / "ninespring-sim"))
+ELF = Path(os.environ.get("NINESPRING_AVR_DIR", ROOT / "build" / "avr")) / "firmware.elf"
+
+LAB = """
+[scenario]
+duration_s = 600
+log_interval_s = 1
+seed = {seed}
+[plant]
+effects = latent_heat, resistance_phase, edge_loss
+edge_loss_fraction = 0.25
+[chip]
+open_current_a = 1.6
+[noise]
+temperature_c = 0.3
+[events]
+at {begin} = pattern 100010001
+at 120 = pattern 010101010
+at 200 = on 5
+at 240 = off 2
+at 300 = pattern 001110100
+at 330 = fan 100
+at 420 = pattern 110000011
+at 520 = off all
+"""
+
+
+def run(*words: object) -> str:
+    done = subprocess.run(list(map(str, words)), capture_output=True, text=True, timeout=300, check=False)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def ninespring(*words: object) -> str:
+    return run(sys.executable, "-m", "ninespring", *words)
+
+
+def measured(folder: Path, name: str, **values: object) -> Path:
+    """Return the log of a laboratory whose array loses more at its edge than the chip knows."""
+    (folder / f"{name}.ini").write_text(LAB.format(**values))
+    run(SIM, "run", folder / f"{name}.ini", "-o", folder / f"{name}.csv")
+    return folder / f"{name}.csv"
+
+
+@pytest.fixture
+def board() -> Iterator[str]:
+    """Return the port of a simulated board with its plant, ended at the end."""
+    with subprocess.Popen([SIM, "board", "--elf", ELF, "--speed", "max"], stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        port = process.stdout.readline().strip()
+        assert port.startswith("/dev/"), "no pty"
+        yield port
+        process.send_signal(signal.SIGINT)
+
+
+def settings_of(port: str) -> dict[str, float]:
+    with Board(port) as connection:
+        connection.greet()
+        lines = connection.ask("$$", 30.0)
+    return {name: float(value) for name, value in (line[1:].split("=", 1) for line in lines if line.startswith("$"))}
+
+
+@pytest.mark.skipif(not SIM.exists(), reason=f"SKIPPED: {SIM} is not there: build it, or set NINESPRING_SIM")
+@pytest.mark.skipif(not ELF.exists(), reason=f"SKIPPED: {ELF} is not there: build the avr target first")
+def test_an_effect_found_in_a_log_is_in_the_model_of_the_chip_that_it_was_uploaded_to(
+    board: str, tmp_path: Path
+) -> None:
+    log, held_out = measured(tmp_path, "lab", seed=1, begin=10), measured(tmp_path, "held", seed=2, begin=30)
+    ninespring("fit", log, "-o", tmp_path / "before.toml")
+    ninespring("diagnose", log, "-o", tmp_path / "d")
+    effects = json.loads((tmp_path / "d" / "diagnosis.json").read_text())["effects"]
+    assert [one["name"] for one in effects] == ["edge_loss"]
+    model = tmp_path / "d" / "model.toml"
+
+    # the fixed-point model on a log that the fit never saw: before, and with the effect
+    error = {}
+    for name, one in (("before", tmp_path / "before.toml"), ("after", model)):
+        run(SIM, "replay", held_out, "--model", one, "-o", tmp_path / "r.csv", "--json", tmp_path / "r.json")
+        error[name] = json.loads((tmp_path / "r.json").read_text())["rmse_c"]
+        said = ninespring("predict", "--chip", "--model", one, held_out, "-o", tmp_path / "p.csv")
+        assert f"error {error[name]:.3f} K" in said
+    assert error["after"] < 0.4 < 1.5 < error["before"]
+
+    # onto the board: what was sent is what `$$` shows, and not what it had
+    before = settings_of(board)
+    ninespring("export", "--model", model, "-o", tmp_path / "s.txt", "--json", tmp_path / "s.json")
+    ninespring("upload", "--port", board, tmp_path / "s.txt")
+    sent = json.loads((tmp_path / "s.json").read_text())["settings"]
+    after = settings_of(board)
+    assert {name: after[name] for name in sent} == sent
+    # edge loss is a scale of each spring's loss on the chip: corners 2 free sides, edges 1
+    scale = [after[f"loss_scale_{k}"] for k in (1, 2, 5)]
+    assert np.divide(scale, scale[2]) == pytest.approx([1.5, 1.25, 1.0], abs=0.02)
+    assert scale != [before[f"loss_scale_{k}"] for k in (1, 2, 5)]
+
+    # and the chip's model does what the model does: its telemetry, recorded, against a replay of what it measured
+    (tmp_path / "steps.txt").write_text("at 1 = pattern 111101111\nat 25 = off all\n")
+    record = ("record", "--port", board, "--hz", 2, "--duration", 12, "--run", tmp_path / "steps.txt")
+    ninespring(*record, "-o", tmp_path / "board.csv")
+    got = read_table(tmp_path / "board.csv", ("state",)).frame
+    assert len(got) > 15
+    assert read_log(tmp_path / "board.csv", 9, temperatures=False).current_a is not None
+    run(SIM, "replay", tmp_path / "board.csv", "--model", model, "-o", tmp_path / "again.csv")
+    again = read_table(tmp_path / "again.csv").frame
+    wrong = tmp_path / "wrong.csv"
+    run(SIM, "replay", tmp_path / "board.csv", "--model", tmp_path / "before.toml", "-o", wrong)
+    other = read_table(wrong).frame
+    columns = [f"m{k}_c" for k in range(1, 10)]
+    rise = got[columns].to_numpy(float).max() - 20.0
+    assert rise > 3.0
+    apart = np.abs(got[columns].to_numpy(float) - again[columns].to_numpy(float)).max()
+    assert apart < 0.1 * rise
+    assert apart < np.abs(got[columns].to_numpy(float) - other[columns].to_numpy(float)).max()
