@@ -247,7 +247,7 @@ def diagnose(
             raise InputError("give one steady table, or logs")
         with _working("fitting") as say:
             result = steady.diagnose_table(logs[0], model, array_path, frozen, say)
-        page, made = steady.html_report(result), steady.model_after(result, model, array_path)
+        page, made = report.steady_report(result), steady.model_after(result, model, array_path)
     else:
         array, runs = _array_and_runs(array_path, logs, model)
         with _working("fitting") as say:
@@ -270,6 +270,9 @@ def diagnose(
     except OSError as error:
         raise InputError(f"cannot be made a folder: {error.strerror}", output) from None
     _write(files)
+    for note in result["warnings"]:
+        if "isolated spike" not in note:
+            out.print(f"note: {note}", style="yellow", markup=False)
     if "cases" in result:
         steady.print_result(out, result)
     else:
@@ -278,17 +281,13 @@ def diagnose(
 
 
 def _print_diagnosis(result: dict[str, Any], verdict: str) -> None:
-    for text in result["warnings"]:
-        if "isolated spike" not in text:
-            out.print(f"note: {text}", style="yellow", markup=False)
+    from .report import with_unit
+
     out.print(verdict, style="bold", markup=False)
     if result["effects"]:
         table = Table("effect", "error, K", "held out, K", "evidence, nats", "numbers", "chip")
         for one in result["effects"]:
-            numbers = "\n".join(
-                f"{k} {v['value']:.4g}" + ("" if v["stderr"] is None else f" +- {v['stderr']:.2g}") + f" {v['unit']}"
-                for k, v in list(one["parameters"].items())[:4]
-            )
+            numbers = "\n".join(f"{k} {with_unit(v)}" for k, v in list(one["parameters"].items())[:4])
             name = one["name"] + (f" ({one['variant']})" if one.get("variant") else "")
             table.add_row(
                 name,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -426,7 +425,8 @@ def candidate_rows(result: Mapping[str, Any]) -> list[list[str]]:
     """Return the candidates as rows of text."""
     rows = []
     for one in result["candidates"]:
-        value = "" if one["value"] is None else f"{one['parameter']} = {one['value']:.4g} {one['unit']}"
+        unit = "" if one["unit"] in (None, "1") else f" {one['unit']}"
+        value = "" if one["value"] is None else f"{one['parameter']} = {one['value']:.4g}{unit}"
         if one.get("at_bound"):
             value += " (at its bound)"
         rows.append([one["name"], value, f"{one['rmse_c']:.2f}", f"{one['holdout_rmse_c']:.2f}", one.get("note") or ""])
@@ -447,29 +447,3 @@ def print_result(console: Console, result: Mapping[str, Any]) -> None:
         console.print(
             f"{one['instead_of']} or {one['name']}: these numbers cannot tell. {one['separating_experiment']}"
         )
-
-
-def html_report(result: Mapping[str, Any]) -> str:
-    """Return the report of a steady diagnosis as HTML."""
-    from .report import STYLE, _table
-
-    cases = [
-        [c["case"], f"{c['measured_c']:.1f}", f"{c['before_c']:.1f}", f"{c.get('after_c', math.nan):.1f}"]
-        for c in result["cases"]
-    ]
-    rivals = [[r["instead_of"], r["name"], f"{r['rmse_c']:.2f}", r["separating_experiment"]] for r in result["rivals"]]
-    body = (
-        f"<h1>Steady table: error {result['baseline']['rmse_c']:.2f} → {result['after']['rmse_c']:.2f} K</h1>"
-        f"<p class='lead'>{html.escape(', '.join(e['name'] for e in result['effects']) or 'no effect')} explains it best.</p>"
-        "<h2>Cases</h2>"
-        + _table(["case", "measured", "model before", "model after"], cases, {1, 2, 3})
-        + "<h2>Every effect with one number</h2>"
-        + _table(HEADER, candidate_rows(result), {2, 3})
-        + (
-            "<h2>What these numbers cannot tell apart</h2>"
-            + _table(["best", "could also be", "error, K", "the experiment that would tell"], rivals, {2})
-            if rivals
-            else ""
-        )
-    )
-    return f'<!doctype html><html lang="en"><head><meta charset="utf-8"><title>Ninespring diagnosis</title><style>{STYLE}</style></head><body><main>{body}</main></body></html>\n'
