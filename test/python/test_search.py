@@ -221,3 +221,48 @@ def test_correlations_of_the_rest_are_correlations(make_log) -> None:
     said = [text for text in result["residual"]["depends_on"] if "r = " in text]
     assert any("drive of spring 3 (seen at spring 3" in text for text in said)
     assert all(abs(float(text.split("r = ")[1].rstrip(")"))) <= 1.0 for text in said)
+
+
+def test_a_run_that_begins_warm_needs_no_effect(tmp_path: Path) -> None:
+    """Springs, air and plate start in balance with the first inputs, as after a long warm-up."""
+    rng = np.random.default_rng(3)
+    time_s = np.arange(600.0)
+    drive = np.full((600, 2), 0.3)
+    drive[200:400, 0], drive[300:500, 1] = 0.5, 0.1
+    plant = native.Plant(1, 2)
+    plant.set_all({"heat_capacity_j_per_k": 2.0, "loss_w_per_k": 0.012, "orthogonal_w_per_k": 0.004})
+    plant.set_effects(["plate_conduction"])
+    plant.set_all({"plate_coupling_w_per_k": 0.01, "plate_heat_capacity_j_per_k": 60.0, "plate_loss_w_per_k": 0.02})
+    plant.reset()
+    for k in range(2):
+        plant.drive(k, native.POWER, 0.3)
+    plant.settle(1e6)
+    shown = plant.simulate(time_s, native.POWER, drive) + rng.normal(0.0, 0.05, (600, 2))
+    columns = {f"i{k + 1}_a": drive[:, k] for k in range(2)} | {f"v{k + 1}_v": np.ones(600) for k in range(2)}
+    columns |= {f"t{k + 1}_c": shown[:, k] for k in range(2)} | {"ambient_c": np.full(600, 20.0)}
+    path = tmp_path / "warm.csv"
+    path.write_text(log_text(time_s, columns))
+    run = read_log(path, 2)
+    assert run.warm
+    problem = Problem(Array(1, 2), [run])
+    base = effects.base_spec(problem)
+    plate = next(c for c in effects.candidates(problem) if c.effect == "plate_conduction")
+    spec = base.with_effect(plate.effect, plate.free, (), "")
+    values = {"heat_capacity_j_per_k": 2.0, "loss_w_per_k": 0.012, "orthogonal_w_per_k": 0.004}
+    values |= {"plate_coupling_w_per_k": 0.01, "plate_heat_capacity_j_per_k": 60.0, "plate_loss_w_per_k": 0.02}
+    left = run.temperature_c - problem.simulate(spec, [values[f.key] for f in spec.free], 0)
+    assert np.abs(left[100:200].mean(axis=0)).max() < 0.08
+
+
+def test_the_empirical_model_finds_what_the_drives_explain_and_nothing_in_noise(make_log) -> None:
+    problem = Problem(Array(), [read_log(make_log(seed=5))])
+    fit = problem.fit(effects.base_spec(problem))
+    rng = np.random.default_rng(7)
+    white = [rng.normal(0.0, 0.3, (600, 9))]
+    fit.residual = white
+    nothing = diagnosis.surrogate(problem, fit)
+    assert nothing["holdout_after_c"] > 0.98 * nothing["holdout_before_c"]
+    fit.residual = [white[0] + 3.0 * problem.runs[0].drive[:, [3]]]
+    found = diagnosis.surrogate(problem, fit)
+    assert found["empirical"] is True
+    assert found["holdout_after_c"] < 0.7 * found["holdout_before_c"]

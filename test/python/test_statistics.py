@@ -33,3 +33,21 @@ def test_structure_is_zero_for_white_noise_and_its_variance_otherwise() -> None:
     starts = [[0]]
     assert abs(np.mean(statistics.structure([white], noise, 12, starts))) < 0.02
     assert np.mean(statistics.structure([white + wave], noise, 12, starts)) == pytest.approx(1.0, rel=0.1)
+
+
+def test_a_spike_is_found_and_a_step_is_not() -> None:
+    rng = np.random.default_rng(4)
+    series = rng.normal(0, 0.1, (400, 2))
+    series[200:, 1] += 5.0
+    series[77, 0] += 3.0
+    found = statistics.spikes(series, np.full(2, 0.1))
+    assert found[77, 0] and found.sum() == 1
+
+
+def test_missing_values_count_as_absent() -> None:
+    rng = np.random.default_rng(6)
+    white = rng.normal(0, 0.3, (3000, 3))
+    white[rng.random(white.shape) < 0.3] = np.nan
+    assert statistics.autocorrelation([white], 5)[1:] == pytest.approx(np.zeros(5), abs=0.05)
+    assert statistics.rms([white]) == pytest.approx(0.3, rel=0.05)
+    assert abs(np.nanmean(statistics.structure([white], [np.full(3, 0.3)], 12, [[0]]))) < 0.03

@@ -28,7 +28,7 @@ MIN_SHARE = 0.2
 """Of what the residual holds beyond the noise, the part an effect must explain to be adopted on the way."""
 MIN_SHARE_UNEXPLAINED = 0.35
 """The same where structure remains at the end: nothing is adopted just because it helps a little ..."""
-MIN_TOTAL_UNEXPLAINED = 0.7
+MIN_TOTAL_UNEXPLAINED = 0.75
 """... and what is adopted must together explain this part of what the declared model left."""
 EQUIVALENT = 0.3
 """Two models whose predictions differ by less than this (rms, in units of the noise) are the same in practice."""
