@@ -184,32 +184,6 @@ static inline __attribute__((always_inline)) int32_t fixed_point_scale_s24(int32
 
 #endif
 
-/* a 2^6, for a below 2^24, modulo 2^32. On the AVR three multiplications
- * instead of 24 shifts. */
-static inline uint32_t fixed_point_shift_6(uint32_t a)
-{
-#ifdef __AVR__
-    uint32_t result;
-    uint8_t factor = 64;
-    __asm__("mul %A[a], %[factor]\n\t"
-            "movw %A[p], r0\n\t"
-            "mul %C[a], %[factor]\n\t"
-            "movw %C[p], r0\n\t"
-            "mul %B[a], %[factor]\n\t"
-            "clr %[factor]\n\t"
-            "add %B[p], r0\n\t"
-            "adc %C[p], r1\n\t"
-            "adc %D[p], %[factor]\n\t"
-            "clr r1"
-            : [p] "=&r"(result), [factor] "+r"(factor)
-            : [a] "r"(a)
-            : "r0");
-    return result;
-#else
-    return a << 6;
-#endif
-}
-
 /* floor(a b / 2^16). */
 static inline uint16_t fixed_point_high_u16(uint16_t a, uint16_t b)
 {

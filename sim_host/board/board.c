@@ -578,11 +578,6 @@ double board_current_a(const board_t *board, unsigned channel)
     return board->current_a[channel];
 }
 
-double board_voltage_v(const board_t *board, unsigned channel)
-{
-    return board->voltage_v[channel];
-}
-
 void board_set_fault(board_t *board, board_fault_t fault, unsigned channel, bool on)
 {
     plant_fault_t wanted = fault == BOARD_FAULT_OPEN ? PLANT_FAULT_OPEN : PLANT_FAULT_SHORT;
@@ -638,11 +633,6 @@ void board_set_analog_v(board_t *board, unsigned input, double volt)
     avr_raise_irq(irq, (uint32_t)(volt * 1000.0 + 0.5));
 }
 
-uint64_t board_i2c_transactions(const board_t *board)
-{
-    return board->twi.transactions;
-}
-
 uint8_t *board_eeprom(board_t *board)
 {
     return board->eeprom.cell;
@@ -669,11 +659,6 @@ const uint8_t *board_variable(const board_t *board, const char *symbol, uint32_t
         *size = entry->size;
     }
     return board->avr->data + (entry->address - BOARD_RAM_OFFSET);
-}
-
-bool board_has_symbol(const board_t *board, const char *symbol)
-{
-    return board_elf_symbol(board->elf, symbol) != NULL;
 }
 
 uint32_t board_flash_bytes(const board_t *board)

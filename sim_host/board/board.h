@@ -104,7 +104,6 @@ double board_fan(const board_t *board); /* what the pin says, 0..1 */
 
 /* What flows at this moment, from the plant and the faults. */
 double board_current_a(const board_t *board, unsigned channel);
-double board_voltage_v(const board_t *board, unsigned channel);
 
 void board_set_fault(board_t *board, board_fault_t fault, unsigned channel, bool on);
 /* The INA219 loses its configuration. */
@@ -112,18 +111,15 @@ void board_reset_sensor(board_t *board, unsigned channel);
 /* A register (0..5) of an INA219, without side effects. */
 uint16_t board_sensor_register(const board_t *board, unsigned channel, unsigned number);
 void board_set_analog_v(board_t *board, unsigned input, double volt);
-/* START conditions on the I2C bus so far. */
-uint64_t board_i2c_transactions(const board_t *board);
 
 /* BOARD_EEPROM_BYTES bytes; may be written between runs. */
 uint8_t *board_eeprom(board_t *board);
 uint64_t board_eeprom_writes(const board_t *board);
 bool board_eeprom_busy(const board_t *board);
 
-/* The program's memory, by symbol of the ELF. Fails (NULL or false) if and only if there is no such
+/* The program's memory, by symbol of the ELF. Fails (NULL) if and only if there is no such
  * symbol. */
 const uint8_t *board_variable(const board_t *board, const char *symbol, uint32_t *size);
-bool board_has_symbol(const board_t *board, const char *symbol);
 uint32_t board_flash_bytes(const board_t *board);
 uint32_t board_static_ram_bytes(const board_t *board);
 /* Most bytes of stack in use since power-on, from what the stack has overwritten. */

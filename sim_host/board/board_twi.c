@@ -104,7 +104,6 @@ static avr_cycle_count_t operation_done(avr_t *avr, avr_cycle_count_t when, void
     twi->operation = BOARD_TWI_NOTHING;
     switch (operation) {
     case BOARD_TWI_START:
-        twi->transactions++;
         report(twi, twi->owns_bus ? STATUS_REPEATED_START : STATUS_START);
         twi->owns_bus = true;
         twi->fresh = true;

@@ -44,7 +44,6 @@ typedef struct {
     bool acknowledge; /* TWEA when the byte began */
     uint8_t address;
     bool sda_stuck_low;
-    uint64_t transactions; /* STARTs seen: for tests */
 } board_twi_t;
 
 /* Takes the registers over from simavr's own model. */

@@ -296,6 +296,15 @@ std::vector<std::pair<std::string, source_place>> read_effects(const reader &roo
     return effects;
 }
 
+std::vector<std::string> plant_parameter_names()
+{
+    std::vector<std::string> names;
+    for (std::size_t k = 0; k < plant_parameter_count(); ++k) {
+        names.emplace_back(plant_parameter(k)->name);
+    }
+    return names;
+}
+
 model_parameter read_parameter(const reader &entry, int springs)
 {
     entry.refuse_unknown({"name", "value", "unit", "stderr", "spring", "effect"});
@@ -404,15 +413,6 @@ void check_provenance(const reader &root)
 
 } // namespace
 
-std::vector<std::string> plant_parameter_names()
-{
-    std::vector<std::string> names;
-    for (std::size_t k = 0; k < plant_parameter_count(); ++k) {
-        names.emplace_back(plant_parameter(k)->name);
-    }
-    return names;
-}
-
 std::vector<std::string> plant_effect_names()
 {
     std::vector<std::string> names;
@@ -466,6 +466,10 @@ void set_plant_effect(plant_t *plant, const std::string &name, const source_plac
     }
 }
 
+namespace
+{
+
+/* The springs of an array into a plant of the same rows and columns. */
 void apply_array(plant_t *plant, const array_description &array)
 {
     for (const array_description::entry &one : array.material) {
@@ -509,6 +513,8 @@ void apply_array(plant_t *plant, const array_description &array)
     set("resistance_austenite_ohm", ohm_per_uohm_cm * spring.resistivity_austenite_uohm_cm);
     set("resistance_ohm", ohm_per_uohm_cm * spring.resistivity_austenite_uohm_cm);
 }
+
+} // namespace
 
 model_description parse_model(const text_file &file)
 {

@@ -58,7 +58,6 @@ model_description parse_model(const text_file &file);
 
 /* The array's springs and the model's effects and parameters into a plant of the same rows and
  * columns. Fails (input_error) if the plant refuses a value; the message names its place. */
-void apply_array(plant_t *plant, const array_description &array);
 void apply_model(plant_t *plant, const model_description &model);
 
 /* One parameter `name` or `name[3]`, with the plant's own reason if it refuses. */
@@ -67,7 +66,6 @@ void set_plant_parameter(plant_t *plant, const std::string &name, double value,
 void set_plant_effect(plant_t *plant, const std::string &name, const source_place &place);
 /* The parameter's table entry, or null. */
 const plant_parameter_t *find_plant_parameter(std::string_view name);
-std::vector<std::string> plant_parameter_names();
 std::vector<std::string> plant_effect_names();
 
 } // namespace ninespring

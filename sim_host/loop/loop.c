@@ -15,7 +15,6 @@ typedef struct {
     double loop_ohm;                   /* of the stage beyond the spring */
     double resistance_ohm;             /* of the spring, since the plant's last step */
     double current_a;
-    double voltage_v;
     double energy_j; /* into the spring since the plant's last step */
 } channel_t;
 
@@ -198,11 +197,11 @@ static void flow(loop_t *loop)
             c->current_a = electrics_buck_current_a(duty[k], bus_v, loop->freewheel_drop_v,
                                                     spring_ohm[k], c->loop_ohm);
         }
-        c->voltage_v = c->current_a * spring_ohm[k];
+        const double voltage_v = c->current_a * spring_ohm[k];
         if (c->fault == ELECTRICS_FAULT_NONE) {
-            c->energy_j += c->current_a * c->voltage_v * LOOP_TICK_S;
+            c->energy_j += c->current_a * voltage_v * LOOP_TICK_S;
         }
-        electrics_ina219_advance(&c->sensor, LOOP_TICK_S, c->current_a, c->voltage_v);
+        electrics_ina219_advance(&c->sensor, LOOP_TICK_S, c->current_a, voltage_v);
         sum_a += c->current_a;
     }
     if (sum_a > loop->highest_sum_a) {
@@ -354,11 +353,6 @@ static const channel_t *channel(const loop_t *loop, int spring)
 double loop_current_a(const loop_t *loop, int spring)
 {
     return channel(loop, spring)->current_a;
-}
-
-double loop_voltage_v(const loop_t *loop, int spring)
-{
-    return channel(loop, spring)->voltage_v;
 }
 
 double loop_sum_current_a(const loop_t *loop)

@@ -79,7 +79,6 @@ double loop_time_s(const loop_t *loop);
 /* Of the last tick, as they are, not as they are measured. spring is 0-based, out of range reads 0.
  */
 double loop_current_a(const loop_t *loop, int spring);
-double loop_voltage_v(const loop_t *loop, int spring);
 double loop_sum_current_a(const loop_t *loop);
 /* Highest sum of currents since loop_create, A. */
 double loop_highest_sum_current_a(const loop_t *loop);

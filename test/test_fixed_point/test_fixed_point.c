@@ -23,12 +23,6 @@ static void products_accumulate_modulo_2_32(void)
     TEST_ASSERT_EQUAL_INT32(-1, (int32_t)fixed_point_mac_s16_u16(0, -1, 1));
 }
 
-static void shift_by_six_keeps_24_bits(void)
-{
-    TEST_ASSERT_EQUAL_UINT32(64u * 8388607u, fixed_point_shift_6(8388607u));
-    TEST_ASSERT_EQUAL_UINT32(0x3fffffc0u, fixed_point_shift_6(0xffffffu));
-}
-
 /* against 64-bit arithmetic, which the library itself never uses */
 static void scale_is_the_floor_or_up_to_two_below(void)
 {
@@ -72,7 +66,6 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(products_accumulate_modulo_2_32);
-    RUN_TEST(shift_by_six_keeps_24_bits);
     RUN_TEST(scale_is_the_floor_or_up_to_two_below);
     RUN_TEST(add_holds_at_the_ends);
     RUN_TEST(multiply_divide_rounds_and_says_what_does_not_fit);

@@ -32,6 +32,8 @@ static void check(const char *what, uint32_t got, uint32_t wanted)
 static void compare_16(uint32_t sum, uint16_t a, uint16_t b)
 {
     check("mac_u16", fixed_point_mac_u16(sum, a, b), fixed_point_mac_u16_in_c(sum, a, b));
+    check("subtract_u16", fixed_point_subtract_u16(sum, a, b),
+          fixed_point_subtract_u16_in_c(sum, a, b));
     check("mac_s16_u16", fixed_point_mac_s16_u16(sum, (int16_t)a, b),
           fixed_point_mac_s16_u16_in_c(sum, (int16_t)a, b));
 }
