@@ -7,7 +7,9 @@
 #include <cmath>
 #include <fmt/format.h>
 #include <fstream>
+#include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <set>
 
 #include "runs.h"
@@ -389,45 +391,70 @@ void robust_rows(table_t &table, const options_t &options, double change_spread,
         }
 }
 
+#ifdef POLICY_BENCH_BOARD
+/* The flashed program with nine springs driven for `after_s`. */
+class driven_board
+{
+public:
+    driven_board(const char *policy, double after_s, std::uint64_t seed)
+        : plant_(plant_create(3, 3), plant_destroy)
+    {
+        plant_set_effect(plant_.get(), "latent_heat", true);
+        plant_set_effect(plant_.get(), "resistance_phase", true);
+        board_.emplace(ninespring::default_elf("firmware.elf"), plant_.get(), seed);
+        board_->run_ms(100.0);
+        for (const char *line : {"model cold", policy, "on all"})
+            if (board_->command(line).find("ok") == std::string::npos)
+                throw std::runtime_error(fmt::format("the board refuses {}", line));
+        board_->run_ms(1000.0 * after_s);
+    }
+
+    double awake_cycles_per_tick()
+    {
+        constexpr double ticks = 250.0;
+        const auto cycles = board_cycle(board_->get());
+        const auto idle = board_idle_cycles(board_->get());
+        board_->run_ms(ticks * CONTROLLER_TICK_MS);
+        return (static_cast<double>(board_cycle(board_->get()) - cycles) -
+                static_cast<double>(board_idle_cycles(board_->get()) - idle)) /
+               ticks;
+    }
+
+    /* NaN if the linker left no such function. */
+    double longest_cycles(const char *function)
+    {
+        board_measurement_t seen{};
+        return board_measure(board_->get(), function, 100, 3000.0, &seen) && seen.calls > 0
+                   ? static_cast<double>(seen.maximum_cycles)
+                   : none;
+    }
+
+private:
+    std::unique_ptr<plant_t, void (*)(plant_t *)> plant_;
+    std::optional<ninespring::simulated_board> board_;
+};
+#endif
+
 /* Cycles of the flashed program, which are exact; B1.5's column is `policy open`. */
 void cost_rows(table_t &table, const options_t &options)
 {
 #ifdef POLICY_BENCH_BOARD
-    struct cost_t {
-        double mean = 0.0, longest = 0.0;
-    };
-    const auto measure = [&](const char *policy, const char *function) {
-        std::unique_ptr<plant_t, void (*)(plant_t *)> plant(plant_create(3, 3), plant_destroy);
-        plant_set_effect(plant.get(), "latent_heat", true);
-        plant_set_effect(plant.get(), "resistance_phase", true);
-        ninespring::simulated_board board(ninespring::default_elf("firmware.elf"), plant.get(),
-                                          options.seed);
-        board.run_ms(100.0);
-        for (const char *line : {"model cold", policy, "on all"})
-            if (board.command(line).find("ok") == std::string::npos)
-                throw std::runtime_error(fmt::format("the board refuses {}", line));
-        cost_t cost;
-        double calls = 0.0;
-        for (int minute = 0; minute < 2; minute++) { // while they heat, and while they hold
-            board_measurement_t seen{};
-            board.run_ms(minute == 0 ? 5000.0 : 90000.0);
-            if (!board_measure(board.get(), function, 100, 3000.0, &seen) || seen.calls == 0)
-                throw std::runtime_error(fmt::format("the ELF has no {}", function));
-            cost.mean += static_cast<double>(seen.total_cycles);
-            cost.longest = std::max(cost.longest, static_cast<double>(seen.maximum_cycles));
-            calls += seen.calls;
+    const std::string what = "on the chip, nine driven: ";
+    for (const auto &[when, after_s] : {std::pair("heating", 5.0), std::pair("holding", 90.0)}) {
+        driven_board policy("policy precompensate", after_s, options.seed);
+        driven_board open("policy open", after_s, options.seed);
+        table.add(fmt::format("{}awake in a 20 ms tick, I2C included, {}", what, when),
+                  std::round(policy.awake_cycles_per_tick()), "cycles", "<= 112000", none,
+                  std::round(open.awake_cycles_per_tick()));
+        for (const auto &[function, target] :
+             {std::pair("drive_policy_tick", ""), std::pair("controller_tick", "<= 16000")}) {
+            const double longest = policy.longest_cycles(function);
+            if (std::isnan(longest))
+                fmt::print(stderr, "bench_policy: the linker left no {}\n", function);
+            else
+                table.add(fmt::format("{}{}, longest of 100, {}", what, function, when), longest,
+                          "cycles", target, none, open.longest_cycles(function));
         }
-        cost.mean /= calls;
-        return cost;
-    };
-    for (const auto &[function, target] :
-         {std::pair("drive_policy_tick", ""), std::pair("controller_tick", "<= 16000")}) {
-        const cost_t policy = measure("policy precompensate", function);
-        const cost_t open = measure("policy open", function);
-        table.add(fmt::format("cost on the chip, nine driven: {}, mean", function),
-                  std::round(policy.mean), "cycles", "", none, std::round(open.mean));
-        table.add(fmt::format("cost on the chip, nine driven: {}, longest", function),
-                  policy.longest, "cycles", target, none, open.longest);
     }
 #else
     (void)table;
