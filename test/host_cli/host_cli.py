@@ -217,6 +217,10 @@ class Paper(Case):
             self.assertAlmostEqual(comsol[case], centre_c, delta=1.5)
         errors = json.loads(self.json.read_text())["errors"]
         self.assertLess(errors["comsol"]["rmse_c"], 1.5)
+        for source in ("comsol", "camera"):
+            off = [float(row["model_centre_c"]) - float(row["t_centre_c"]) for row in rows if row["source"] == source]
+            self.assertAlmostEqual(errors[source]["rmse_c"], (sum(e * e for e in off) / 6) ** 0.5, delta=0.006)
+            self.assertAlmostEqual(errors[source]["largest_error_c"], max(map(abs, off)), delta=0.006)
         # The camera is not explained by the same model: nothing here may be tuned to it.
         self.assertAlmostEqual(errors["camera_declared"]["rmse_c"], 14.2, delta=0.5)
         self.assertIn("camera: ", table)
@@ -284,6 +288,13 @@ class Run(Case):
         self.assertAlmostEqual(float(chip[20]["i1_a"]), 0.5, delta=0.01)
         short = rows_of_text(self.run_it("d.csv", "--set", "scenario.duration_s=16"))
         self.assertEqual(short[-1]["time_s"], "16.00")
+
+    def test_one_spring_s_value_holds_wherever_it_stands(self) -> None:
+        one, every = ("--set", "loss_w_per_k[1]=0.03"), ("--set", "loss_w_per_k=0.006")
+        first = self.run_it("a.csv", *one, *every)
+        rows = rows_of_text(first)
+        self.assertLess(float(rows[-1]["p1_c"]), float(rows[-1]["p3_c"]) - 1)
+        self.assertEqual(rows, rows_of_text(self.run_it("b.csv", *every, *one)))
 
     def test_pitch_decides_what_the_centre_gets(self) -> None:
         near = rows_of_text(self.run_it("a.csv", "--set", "array.pitch_mm=4"))
