@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import pty
+import re
+import signal
 import subprocess
 import sys
 import threading
@@ -12,10 +15,15 @@ import time
 import tty
 from pathlib import Path
 
+import jsonschema
 import numpy as np
 import pytest
-from ninespring import importing
-from ninespring.errors import InputError
+from click.testing import CliRunner
+from ninespring import cli, diagnosis, importing
+from ninespring.errors import InputError, WorkError
+from ninespring.logs import log_text, read_table, write_atomically
+from ninespring.models import Array, Model, model_text, read_model
+from rich.console import Console
 
 
 def ninespring(*arguments: object) -> subprocess.CompletedProcess[str]:
@@ -61,6 +69,153 @@ def test_fit_with_an_effect_writes_a_model(make_log, tmp_path: Path) -> None:
     assert value == pytest.approx(6.0, rel=0.1)
 
 
+STEADY = """case,pitch_mm,fan,ambient_c,hold1_c,hold2_c,hold3_c,hold4_c,hold6_c,hold7_c,hold8_c,hold9_c,t5_c
+a,4,0,20,99,99,99,99,99,99,99,99,63
+b,5,0,20,99,99,99,99,99,99,99,99,57
+c,6,1,20,99,99,99,99,99,99,99,99,49
+"""
+
+
+def test_a_steady_table_is_diagnosed_with_a_report_and_a_model(tmp_path: Path) -> None:
+    (tmp_path / "steady.csv").write_text(STEADY)
+    done = ninespring("diagnose", tmp_path / "steady.csv", "-o", tmp_path / "out", "--json", tmp_path / "d.json")
+    assert done.returncode == 0, done.stderr
+    result = json.loads((tmp_path / "d.json").read_text())
+    assert result == json.loads((tmp_path / "out" / "diagnosis.json").read_text())
+    assert [c["measured_c"] for c in result["cases"]] == [63, 57, 49]
+    page = (tmp_path / "out" / "report.html").read_text()
+    assert "<svg" in page and result["rivals"][0]["separating_experiment"] in page
+    assert read_model(tmp_path / "out" / "model.toml").effects == [result["effects"][0]["name"]]
+    assert result["warnings"][0] in done.stdout.replace("\n", " ")
+    refused = ninespring("fit", tmp_path / "steady.csv", "-o", tmp_path / "m.toml")
+    assert refused.returncode == 2 and "ninespring diagnose" in refused.stderr
+
+
+def test_every_result_is_held_to_its_schema(make_log, tmp_path: Path) -> None:
+    log = make_log(seconds=200)
+    (tmp_path / "map.toml").write_text(
+        '[columns]\ntime_s = "time_s"\n' + "".join(f'i{k}_a = "i{k}_a"\nt{k}_c = "t{k}_c"\n' for k in range(1, 10))
+    )
+    model = tmp_path / "m.toml"
+    commands = {
+        "fit": (log, "-o", model),
+        "predict": ("--model", model, log, "-o", tmp_path / "p.csv"),
+        "export": ("--model", model, "-o", tmp_path / "s.txt"),
+        "import": (log, "--map", tmp_path / "map.toml", "-o", tmp_path / "i.csv"),
+    }
+    for name, words in commands.items():
+        done = ninespring(name, *words, "--json", tmp_path / "r.json")
+        assert done.returncode == 0, done.stderr
+        result = json.loads((tmp_path / "r.json").read_text())
+        assert result["schema"] == f"ninespring.{name}/1"
+        cli.checked(result)
+        for key in result:
+            broken = dict(result)
+            del broken[key]
+            with pytest.raises(jsonschema.ValidationError):
+                cli.checked(broken)
+        with pytest.raises(jsonschema.ValidationError):
+            cli.checked(result | {"surplus": 1})
+
+
+@pytest.mark.parametrize(("rows", "cols"), [(1, 2), (1, 7)])
+def test_predict_takes_the_array_from_the_model(tmp_path: Path, rows: int, cols: int) -> None:
+    springs, seconds = rows * cols, 60
+    model = Model(Array(rows, cols))
+    model.parameters = {"loss_w_per_k": 0.006}
+    (tmp_path / "m.toml").write_text(model_text(model))
+    columns = {f"i{k}_a": np.full(seconds, 1.0 + 0.05 * k) for k in range(1, springs + 1)}
+    (tmp_path / "log.csv").write_text(log_text(np.arange(float(seconds)), columns))
+    for chip in ((), ("--chip",)):
+        words = ("--model", tmp_path / "m.toml", tmp_path / "log.csv", "-o", tmp_path / "p.csv")
+        done = ninespring("predict", *chip, *words)
+        assert done.returncode == 0, done.stderr
+        table = read_table(tmp_path / "p.csv").frame
+        assert list(table) == ["time_s", *(f"t{k}_c" for k in range(1, springs + 1))]
+        assert table.iloc[0, 1:].tolist() == pytest.approx([20.0] * springs, abs=0.01)
+        assert (table.iloc[-1, 1:] > 30).all()
+    refused = ninespring("predict", "--model", tmp_path / "m.toml", tmp_path / "p.csv", "-o", tmp_path / "q.csv")
+    assert refused.returncode == 2
+    model.array = Array(3, 3)
+    (tmp_path / "nine.toml").write_text(model_text(model))
+    refused = ninespring("predict", "--model", tmp_path / "nine.toml", tmp_path / "log.csv", "-o", tmp_path / "q.csv")
+    assert refused.returncode == 2
+    assert "nine.toml is of 3 x 3" in refused.stderr
+    assert not (tmp_path / "q.csv").exists()
+
+
+def test_what_cannot_be_fitted_is_refused_before_any_work(make_log, tmp_path: Path) -> None:
+    log, short = make_log(), make_log("short.csv", seconds=20)
+    idle = make_log("idle.csv", change=lambda c: c.update({n: c[n] * 0 for n in c if n[0] in "iv"}))
+    eight = make_log("eight.csv", change=lambda c: [c.pop(n) for n in ("i9_a", "v9_v", "t9_c")])
+    (tmp_path / "copy.csv").write_bytes(log.read_bytes())
+    for words, said in (
+        ((log, tmp_path / "copy.csv"), "it would count twice"),
+        ((short,), "20 rows are too few"),
+        ((idle,), "no spring is ever driven"),
+        ((eight,), "8 springs: say how they are arranged"),
+        ((log, "--effects", "ghosts"), "there is no effect 'ghosts'"),
+    ):
+        done = ninespring("fit", *words, "-o", tmp_path / "m.toml")
+        assert done.returncode == 2
+        assert said in done.stderr
+        assert len(done.stderr.strip().splitlines()) == 1
+    nowhere = tmp_path / "nowhere" / "m.toml"
+    for words in (("fit", log, "-o", nowhere), ("fit", log, "-o", tmp_path / "m.toml", "--json", nowhere)):
+        done = ninespring(*words)
+        assert done.returncode == 2
+        assert "create it first" in done.stderr
+    assert not (tmp_path / "m.toml").exists()
+
+
+@pytest.mark.parametrize(
+    ("raised", "said"),
+    [
+        (KeyboardInterrupt(), "ninespring: stopped"),
+        (KeyError("x\ny"), "a defect of the tool: KeyError"),
+        (WorkError("the port is gone"), "ninespring: the port is gone"),
+    ],
+)
+def test_work_that_ends_early_leaves_nothing_and_says_one_line(
+    make_log, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, raised: BaseException, said: str
+) -> None:
+    log = make_log(seconds=100)
+
+    def ends(*_: object) -> None:
+        raise raised
+
+    stream = io.StringIO()
+    monkeypatch.setattr(diagnosis, "model_of", ends)
+    monkeypatch.setattr(cli, "err", Console(file=stream, width=200))
+    monkeypatch.setattr(sys, "argv", ["ninespring", "fit", str(log), "-o", str(tmp_path / "m.toml")])
+    before = signal.getsignal(signal.SIGTERM)
+    with pytest.raises(SystemExit) as ended:
+        cli.main()
+    signal.signal(signal.SIGTERM, before)
+    assert ended.value.code == 1
+    assert stream.getvalue().count("\n") == 1 and said in stream.getvalue()
+    assert list(tmp_path.iterdir()) == [log]
+
+
+def test_files_are_written_together_or_not_at_all(tmp_path: Path) -> None:
+    write_atomically({tmp_path / "a": "1\n", tmp_path / "b": "2\n"})
+    assert [(tmp_path / name).read_text() for name in "ab"] == ["1\n", "2\n"]
+    with pytest.raises(UnicodeEncodeError):
+        write_atomically({tmp_path / "a": "3\n", tmp_path / "b": "\ud800"})
+    assert (tmp_path / "a").read_text() == "1\n"
+    assert sorted(one.name for one in tmp_path.iterdir()) == ["a", "b"]
+
+
+@pytest.mark.parametrize("command", ["fit", "diagnose", "predict", "export", "import", "record", "upload", "monitor"])
+def test_help_says_what_it_does_with_an_example(command: str) -> None:
+    runner = CliRunner()
+    text = runner.invoke(cli.cli, [command, "--help"]).output
+    assert f"ninespring {command} " in text.partition("Example")[2]
+    assert "  -o, --output" in text or command in ("upload", "monitor")
+    for line in re.findall(r"^  (?:-\w, )?--.*(?:\n {10,}.*)*", text, re.MULTILINE):
+        assert re.search(r"  +\S.*\w", line.lstrip().partition("  ")[1] + line.lstrip().partition("  ")[2]), line
+
+
 @pytest.mark.parametrize(
     "arguments",
     [
@@ -87,7 +242,7 @@ def test_wrong_input_ends_with_two_and_one_line(arguments: tuple[str, ...], tmp_
 
 def test_a_bad_log_leaves_nothing_half_written(make_log, tmp_path: Path) -> None:
     log = make_log()
-    log.write_text(log.read_text()[:5000].rsplit(",", 3)[0])
+    log.write_text(log.read_text()[:5000].rsplit(",", 3)[0] + "\n")
     before = set(tmp_path.iterdir())
     done = ninespring("diagnose", log, "-o", tmp_path / "out")
     assert done.returncode == 2

@@ -659,10 +659,10 @@ def main() -> None:
         _end(str(error), 2)
     except click.ClickException as error:
         _end(error.format_message(), 2)
-    except (WorkError, RuntimeError, MemoryError, OSError) as error:
-        _end(str(error) or type(error).__name__, 1)
     except (click.Abort, KeyboardInterrupt):
         _end("stopped", 1)
+    except (WorkError, RuntimeError, MemoryError, OSError) as error:
+        _end(str(error) or type(error).__name__, 1)
     except Exception as error:
         if os.environ.get("NINESPRING_TRACEBACK"):
             raise

@@ -1,0 +1,159 @@
+"""report.html: everything that was found, in one file that needs nothing else."""
+
+from __future__ import annotations
+
+import copy
+import re
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+from ninespring import diagnosis, report
+from ninespring.logs import read_log
+from ninespring.models import Array
+
+
+class Page(HTMLParser):
+    """Headings, tables as rows of cells, figures, and whatever would be fetched."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.headings: list[str] = []
+        self.rows: list[list[str]] = []
+        self.figures = 0
+        self.fetched: list[str] = []
+        self.open: list[str] = []
+        self.feed(text)
+        self.close()
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        values = dict(attrs)
+        self.open.append(tag)
+        if tag == "tr":
+            self.rows.append([])
+        elif tag in ("td", "th"):
+            self.rows[-1].append("")
+        elif tag in ("h1", "h2"):
+            self.headings.append("")
+        elif tag == "figure":
+            self.figures += 1
+        elif tag in ("script", "link", "iframe"):
+            self.fetched.append(tag)
+        self.fetched += [
+            v
+            for k, v in values.items()
+            if k in ("src", "href", "xlink:href") and v and not v.startswith(("#", "data:"))
+        ]
+
+    def handle_endtag(self, tag: str) -> None:
+        while self.open and self.open.pop() != tag:
+            pass
+
+    def handle_data(self, data: str) -> None:
+        if not self.open:
+            return
+        if self.open[-1] in ("td", "th"):
+            self.rows[-1][-1] += data
+        elif self.open[-1] in ("h1", "h2"):
+            self.headings[-1] += data
+
+    def row(self, first: str) -> list[str]:
+        return next(row for row in self.rows if row and row[0] == first)
+
+
+@pytest.fixture
+def found(make_log) -> diagnosis.Diagnosis:
+    """Return a diagnosis of two runs: phase change, a slow sensor, a spring that is not measured, a gap."""
+    effects = {"latent_heat": {"latent_heat_j": 8.0}, "sensor_lag": {"sensor_lag_s": 5.0}}
+
+    def gap(columns: dict[str, np.ndarray]) -> None:
+        keep = np.r_[0:250, 320:600]
+        for name in list(columns):
+            columns[name] = columns[name][keep]
+        columns["time_s"] = np.arange(600.0)[keep]
+
+    logs = [
+        make_log("a<b.csv", effects, seed=1, change=lambda c: c.pop("t5_c")),
+        make_log("gap.csv", effects, seed=2, change=lambda c: (gap(c), c.pop("t5_c"))),
+    ]
+    return diagnosis.diagnose(Array(), [read_log(log) for log in logs])
+
+
+def test_the_report_shows_what_was_found_and_needs_nothing_else(found: diagnosis.Diagnosis) -> None:
+    result = found.result
+    assert {e["name"] for e in result["effects"]} == {"latent_heat", "sensor_lag"}
+    text = report.html_report(found)
+    page = Page(text)
+    assert not page.fetched
+    assert not re.search(r"url\((?!#)", text)
+    assert page.headings == [
+        "What the array does that the model did not",
+        "Errors before and after",
+        "About the data",
+        "Effects adopted",
+        "Their numbers",
+        "Measured against model",
+        "Where the error sits",
+        "What is left",
+        "What was tried",
+        "The declared model's numbers",
+    ]
+    # two runs, temperatures and residuals; maps; autocorrelation; candidates
+    assert page.figures == 7
+    before, after = result["baseline"], result["after"]
+    for row, one in (("before: the declared model", before), ("after: with the effects adopted", after)):
+        assert page.row(row)[1:] == [f"{one['rmse_c']:.3f}", f"{one['holdout_rmse_c']:.3f}"]
+    assert page.row("noise of the sensors")[1] == f"{before['noise_c']:.3f}"
+    for effect in result["effects"]:
+        row = page.row(effect["name"])
+        assert row[2:5] == [f"{effect['rmse_c']:.3f}", f"{effect['holdout_rmse_c']:.3f}", f"{effect['evidence']:.0f}"]
+        assert row[5].startswith("yes" if effect["name"] == "latent_heat" else "no: ")
+    for name, one in (result["effects"][0]["parameters"] | after["parameters"]).items():
+        assert page.row(name)[1:4] == [f"{one['value']:.5g}", f"{one['stderr']:.2g}", one["unit"]]
+        assert page.row(name)[4]
+    # the spring without a thermometer is said to be, nowhere is a NaN shown
+    assert (text.count(">not measured<"), len(re.findall(r">\s*not\s*<", text))) == (4, 4)
+    assert not re.search(r">[+-]?nan", text)
+    # what was mended is told; names of files cannot break the page
+    assert "gap.csv: 1 gap(s) in time" in text
+    assert "a&lt;b.csv" in text and "a<b" not in text
+
+
+def test_the_report_shows_rivals_what_is_unexplained_and_what_is_not_determined(found: diagnosis.Diagnosis) -> None:
+    changed = copy.copy(found)
+    changed.result = copy.deepcopy(found.result)
+    rival = {"instead_of": "latent_heat", "name": "shared_air", "rmse_c": 0.4, "evidence": 3.0}
+    changed.result["rivals"] = [rival | {"separating_experiment": "all springs on for 60 min; watch spring 1"}]
+    changed.result["unexplained"] = True
+    changed.result["residual"]["note"] = "It depends on the moon."
+    changed.result["identifiability"] = {
+        "not_identifiable": ["latent_heat_j"],
+        "at_bounds": ["sensor_lag_s"],
+        "correlated": [{"a": "loss_w_per_k", "b": "sensor_lag_s", "correlation": 0.99}],
+    }
+    text = report.html_report(changed)
+    page = Page(text)
+    assert {"Unexplained", "What these data cannot tell apart", "Not determined by these data"} <= set(page.headings)
+    wanted = ["latent_heat", "shared_air", "0.400", "3.0", "all springs on for 60 min; watch spring 1"]
+    assert wanted in page.rows
+    for words in (
+        "depends on the moon",
+        "latent_heat_j: the data cannot",
+        "sensor_lag_s: at its",
+        "correlated at +0.990",
+    ):
+        assert words in text
+
+
+def test_the_verdict_says_the_outcome() -> None:
+    result = {
+        "baseline": {"holdout_rmse_c": 2.0, "noise_c": 0.3},
+        "after": {"holdout_rmse_c": 0.31},
+        "effects": [],
+        "unexplained": False,
+    }
+    assert report.verdict(result).startswith("Nothing is missing")
+    assert report.verdict(result | {"unexplained": True}).startswith("Something is missing that no effect")
+    named = result | {"effects": [{"name": "spring_mismatch", "variant": "spring 3"}, {"name": "sensor_lag"}]}
+    assert report.verdict(named).startswith("Missing: spring_mismatch (spring 3) and sensor_lag; held-out error 2.00 →")
+    assert "and something that no effect" in report.verdict(named | {"unexplained": True})
