@@ -291,6 +291,7 @@ void report(const hil_statistics &statistics, const std::string &json)
                HIL_FRAME_MAX_LAG_TICKS, statistics.max_answer_ms);
     if (!json.empty()) {
         nlohmann::ordered_json value;
+        value["schema"] = "ninespring.hil/1";
         value["ticks"] = statistics.ticks;
         value["simulated_s"] = statistics.simulated_s;
         value["lost_frames"] = statistics.lost_frames;

@@ -39,6 +39,7 @@ def main() -> int:
     assert run.returncode == 0, run
     summary = json.loads(result.read_text())
     result.unlink()
+    assert summary["schema"] == "ninespring.hil/1"
     assert summary["simulated_s"] >= SIMULATED_S
     assert summary["ticks"] + summary["lost_frames"] >= SIMULATED_S * 50
     assert summary["bad_frames"] == 0, summary

@@ -258,6 +258,8 @@ class Run(Case):
         ):
             self.assertIn(column, rows[0])
         self.assertEqual({row["ambient_c"] for row in rows}, {"20.000"})
+        for column, decimals in {"time_s": 2, "i1_a": 4, "v9_v": 4, "t5_c": 3, "m1_c": 3, "p5_c": 3}.items():
+            self.assertEqual({len(row[column].split(".")[1]) for row in rows}, {decimals}, column)
         middle = rows[20]
         self.assertAlmostEqual(float(middle["i1_a"]), 1.5, delta=0.01)
         self.assertAlmostEqual(float(middle["i5_a"]), 0.0, delta=0.001)
