@@ -148,5 +148,5 @@ int main(int count, char **arguments)
     figures_add("of one tick: plant, stepped every tick", run_plant_s(plant, 1) * 1e9 / TICKS, "ns",
                 "");
     plant_destroy(plant);
-    return count == 1 || figures_save(arguments[2], "bench_loop") ? 0 : 1;
+    return count == 1 || figures_save(arguments[2], "build/host/bench/loop/bench_loop") ? 0 : 1;
 }

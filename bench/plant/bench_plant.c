@@ -125,5 +125,5 @@ int main(int argc, char **argv)
         add("1800 rows", cases[c].name, 1e3 * simulate_s(plant, 1800, shown_c), "ms", "");
         plant_destroy(plant);
     }
-    return json == NULL || figures_save(json, "bench_plant") ? 0 : 1;
+    return json == NULL || figures_save(json, "build/host/bench/plant/bench_plant") ? 0 : 1;
 }

@@ -121,5 +121,7 @@ int main(int argc, char **argv)
         snprintf(figure, sizeof figure, "share of samples after that, %s", what);
         figures_add(figure, 1e6 * (double)result.parted / (double)result.samples, "ppm", "");
     }
-    return json == NULL || figures_save(json, "bench_thermal_model") ? 0 : 1;
+    return json == NULL || figures_save(json, "build/host/bench/thermal_model/bench_thermal_model")
+               ? 0
+               : 1;
 }
