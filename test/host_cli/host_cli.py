@@ -408,6 +408,7 @@ class Run(Case):
         self.assertIn("# policy: precompensate\n", (self.folder / "a.csv").read_text())
         self.assertEqual(targets(SCENARIO), targets(named, "--policy", "open"))
         self.assertEqual(precompensate, targets(SCENARIO + "at 0 = policy precompensate\n"))
+        self.assertEqual(targets(SCENARIO), targets(named + "at 0 = policy open\n"))
 
     def test_a_model_of_another_array_is_refused(self) -> None:
         self.file("m.toml", MODEL)
