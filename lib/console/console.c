@@ -592,6 +592,32 @@ static bool version_line(const console_t *console, out_t *out)
     }
 }
 
+/* ", limits supply temperature: 1.200 A less"; nothing where none acts. */
+static void add_limits(text_line_t *line, const controller_t *controller, uint8_t spring)
+{
+    static const char names[] FLASH_MEMORY =
+        " safety\0 current\0 supply\0 temperature\0 undriven\0 overload\0 trip\0 blind";
+    uint8_t limits = controller_limits(controller, spring);
+    if (limits == 0) {
+        return;
+    }
+    text_add_flash(line, FLASH_TEXT(", limits"));
+    for (const char *name = names; limits != 0; limits >>= 1) {
+        if ((limits & 1u) != 0) {
+            text_add_flash(line, name);
+        }
+        while (flash_byte(name) != 0) {
+            name++;
+        }
+        name++;
+    }
+    if (controller_cut_ma(controller, spring) != 0) {
+        text_add_flash(line, FLASH_TEXT(": "));
+        text_add_decimal(line, controller_cut_ma(controller, spring), 3);
+        text_add_flash(line, FLASH_TEXT(" A less"));
+    }
+}
+
 static bool model_line(const console_t *console, out_t *out)
 {
     const controller_t *const controller = console->controller;
@@ -619,6 +645,7 @@ static bool model_line(const console_t *console, out_t *out)
     text_add_flash(line, FLASH_TEXT(" W, target "));
     text_add_decimal(line, controller_target_ma(controller, k), 3);
     text_add_flash(line, FLASH_TEXT(" A"));
+    add_limits(line, controller, k);
     return true;
 }
 

@@ -470,6 +470,11 @@ uint8_t controller_limits(const controller_t *controller, uint8_t spring)
     return drive_policy_limits(&controller->policy, spring);
 }
 
+uint16_t controller_cut_ma(const controller_t *controller, uint8_t spring)
+{
+    return drive_policy_cut_ma(&controller->policy, spring);
+}
+
 bool controller_is_locked(const controller_t *controller)
 {
     return safety_is_locked(&controller->safety);

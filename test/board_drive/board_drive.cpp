@@ -155,6 +155,9 @@ void own_temperature_derates_then_trips_until_cleared()
     TEST_ASSERT_BITS_HIGH(DRIVE_POLICY_LIMIT_TEMPERATURE, derated.limits);
     TEST_ASSERT_TRUE(derated.target_ma > 500 && derated.target_ma < 2000);
     TEST_ASSERT_UINT_WITHIN(30, 3000, derated.wanted_ma);
+    const std::string said = mega->say("model");
+    TEST_ASSERT_TRUE_MESSAGE(contains(said, "A, limits temperature: 1."), said.c_str());
+    TEST_ASSERT_TRUE_MESSAGE(contains(said, " A less"), said.c_str());
 
     mega->expect_ok("$temperature_limit_c=40");
     run(*mega, 1.0);
