@@ -19,9 +19,9 @@ import jsonschema
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from ninespring import cli, diagnosis, importing
-from ninespring.errors import InputError, WorkError
-from ninespring.logs import log_text, read_table, write_atomically
+from ninespring import cli, diagnosis
+from ninespring.errors import WorkError
+from ninespring.logs import log_text, read_log, read_table, write_atomically
 from ninespring.models import Array, Model, model_text, read_model
 from rich.console import Console
 
@@ -116,6 +116,22 @@ def test_every_result_is_held_to_its_schema(make_log, tmp_path: Path) -> None:
                 cli.checked(broken)
         with pytest.raises(jsonschema.ValidationError):
             cli.checked(result | {"surplus": 1})
+
+
+def test_the_chip_starts_again_after_gaps_and_is_seen_by_the_same_sensors(make_log) -> None:
+    def gap(columns: dict[str, np.ndarray]) -> None:
+        keep = np.r_[0:250, 400:600]
+        for name in list(columns):
+            columns[name] = columns[name][keep]
+        columns["time_s"] = np.arange(600.0)[keep]
+
+    true = {"sensor_lag": {"sensor_lag_s": 8.0}, "edge_loss": {"edge_loss_fraction": 0.2}}
+    run = read_log(make_log(effects=true, change=gap))
+    model = Model(Array(), list(true), {k: v for one in true.values() for k, v in one.items()})
+    plant, chip = diagnosis.predict(model, run), diagnosis.predict(model, run, chip=True)
+    assert np.abs(plant - chip).max() < 0.1
+    left = run.temperature_c - chip
+    assert np.sqrt(np.nanmean(left**2)) < 0.35
 
 
 @pytest.mark.parametrize(("rows", "cols"), [(1, 2), (1, 7)])
@@ -247,40 +263,6 @@ def test_a_bad_log_leaves_nothing_half_written(make_log, tmp_path: Path) -> None
     done = ninespring("diagnose", log, "-o", tmp_path / "out")
     assert done.returncode == 2
     assert set(tmp_path.iterdir()) == before
-
-
-def test_percent_fahrenheit_and_decimal_commas_are_imported(tmp_path: Path) -> None:
-    source = tmp_path / "logger.csv"
-    source.write_text("t/min;heat;temp\n0;50;68,0\n0,5;50;69,8\n1;0;71,6\n")
-    mapping = tmp_path / "map.toml"
-    mapping.write_text(
-        '[file]\nseparator = ";"\ndecimal = ","\n[columns]\ntime_s = {column = "t/min", unit = "min"}\n'
-        'u1 = {column = "heat", unit = "%"}\nt1_c = {column = "temp", unit = "degF"}\n'
-    )
-    rows = [line.split(",") for line in importing.import_table(source, mapping).splitlines()[-3:]]
-    assert [float(r[0]) for r in rows] == [0, 30, 60]
-    assert [float(r[1]) for r in rows] == [0.5, 0.5, 0.0]
-    assert [float(r[2]) for r in rows] == pytest.approx([20.0, 21.0, 22.0])
-
-
-def test_frames_of_any_size_become_a_temperature_a_spring(tmp_path: Path) -> None:
-    frames = np.full((5, 24, 32), 20.0)
-    for k in range(9):
-        frames[:, 2 + 7 * (k // 3) : 6 + 7 * (k // 3), 3 + 9 * (k % 3) : 8 + 9 * (k % 3)] = 30.0 + k
-    np.save(tmp_path / "frames.npy", frames)
-    regions = tmp_path / "regions.toml"
-    regions.write_text("[grid]\nrows = 3\ncols = 3\nleft = 5\ntop = 4\nstep_x = 9\nstep_y = 7\nwidth = 2\nheight = 2\n")
-
-    def spring_temperatures() -> dict[str, np.ndarray]:
-        source = tmp_path / "frames.npy"
-        count, read = importing.frames_of(source)
-        return importing.reduce_frames(source, count, read, importing.read_regions(regions), None, 1.0)[1]
-
-    columns = spring_temperatures()
-    assert [float(columns[f"t{k + 1}_c"][0]) for k in range(9)] == [30.0 + k for k in range(9)]
-    regions.write_text("[[region]]\nspring = 1\nleft = 30\ntop = 0\nwidth = 5\nheight = 2\n")
-    with pytest.raises(InputError, match="leaves frame 1"):
-        spring_temperatures()
 
 
 class FakeBoard:

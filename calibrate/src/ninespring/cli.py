@@ -431,7 +431,8 @@ map.toml:                                          regions.toml (pixels):
 @click.option(
     "--interval", type=click.FloatRange(min=0, min_open=True), default=1.0, show_default=True, help="s a frame"
 )
-@click.option("--times", type=FILE, help="times of the frames, s, one a line")
+@click.option("--times", type=FILE, help="times of the frames, s on the log's clock, one a line")
+@click.option("--offset", type=float, default=0.0, show_default=True, help="s to add to the frames' times")
 @click.option(
     "--statistic",
     type=click.Choice(["mean", "median", "max"]),
@@ -439,7 +440,12 @@ map.toml:                                          regions.toml (pixels):
     show_default=True,
     help="of the pixels of a region",
 )
-@click.option("--log", "log_path", type=FILE, help="log of currents to put the frames' temperatures into, same clock")
+@click.option(
+    "--log",
+    "log_path",
+    type=FILE,
+    help="log of currents to put the frames' temperatures into; without --times the first frame is at its first row",
+)
 @click.option("-o", "--output", type=FILE, required=True, help="log to write")
 @JSON
 def import_(
@@ -447,6 +453,7 @@ def import_(
     mapping: str | None,
     regions: Path | None,
     interval: float,
+    offset: float,
     times: Path | None,
     statistic: str,
     log_path: Path | None,
@@ -471,26 +478,22 @@ def import_(
         places = importing.read_regions(regions)
         stamps = importing.read_times(times) if times else None
         count, frames = importing.frames_of(source)
+        if stamps is not None and len(stamps) != count:
+            raise InputError(f"{len(stamps)} times for {count} frames", times)
         with _working("reading frames", count) as say:
-            when, columns = importing.reduce_frames(
-                source,
-                count,
-                frames,
-                places,
-                stamps,
-                interval,
-                statistic,
-                lambda row: say(f"frame {row} of {count}", row),
+            columns = importing.reduce_frames(
+                source, count, frames, places, statistic, lambda row: say(f"frame {row} of {count}", row)
             )
-        text = (
-            importing.merge_into_log(log_path, when, columns)
-            if log_path
-            else log_text(when, columns, {"imported_from": source.name})
-        )
+        if log_path:
+            text = importing.merge_into_log(log_path, stamps, interval, offset, columns)
+        else:
+            when = (np.arange(count) * interval if stamps is None else stamps) + offset
+            text = log_text(when, columns, {"imported_from": source.name})
     header, *rows = [line for line in text.splitlines() if not line.startswith("#")]
     result = _result("import", source=source.name, columns=header.split(","), rows=len(rows))
     _write({output: text, json_path: checked(result)})
-    out.print(f"{len(rows)} rows of {header} -> {output}", soft_wrap=True, markup=False)
+    seen = sum(name.startswith("t") for name in result["columns"][1:])
+    out.print(f"{len(rows)} rows, temperatures of {seen} springs -> {output}", soft_wrap=True, markup=False)
 
 
 @cli.command(

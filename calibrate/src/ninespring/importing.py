@@ -15,7 +15,7 @@ import numpy as np
 import pandas as pd
 
 from .errors import InputError
-from .logs import COLUMN, LIMITS, MAX_SPRINGS, log_text, read_bytes
+from .logs import COLUMN, LIMITS, MAX_SPRINGS, log_text, read_bytes, read_table
 
 UNITS: dict[str, tuple[float, float]] = {
     "": (1.0, 0.0),
@@ -78,6 +78,142 @@ def line_of(path: str | Path, text: str) -> int | None:
     return None
 
 
+@dataclass
+class _Rule:
+    """Where one of the log's columns comes from: names to look for, value = factor * number + offset, or ISO times."""
+
+    sources: list[str]
+    factor: float
+    offset: float
+    iso: bool
+
+
+@dataclass
+class _Mapping:
+    """A mapping, checked."""
+
+    columns: dict[str, _Rule]
+    constants: dict[str, float]
+    separator: str = ","
+    decimal: str = "."
+    skip_lines: int = 0
+
+
+def _read_mapping(mapping: str | Path) -> _Mapping:
+    """Read a mapping file, or take a built-in mapping; refused with file and line where it is wrong."""
+    built_in = str(mapping) in BUILT_IN
+    rules = BUILT_IN[str(mapping)] if built_in else read_toml(mapping)
+
+    def refuse(message: str, near: str) -> InputError:
+        return InputError(message, mapping, None if built_in else line_of(mapping, near), 1)
+
+    def number(value: Any, what: str, near: str) -> float:
+        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+            raise refuse(f"{what} must be a number, without quotes", near)
+        return float(value)
+
+    def known(table: Any, names: tuple[str, ...], what: str) -> dict[str, Any]:
+        if not isinstance(table, dict):
+            raise refuse(f"{what} must be a table", what.strip("[]"))
+        for key in table:
+            if key not in names:
+                raise refuse(f"{what} has no key '{key}'; it has {', '.join(names)}", key)
+        return table
+
+    for name in rules:
+        if name not in ("columns", "file", "constants"):
+            raise refuse(f"unknown table [{name}]: a mapping has [columns], [file], [constants]", name)
+    file = known(rules.get("file", {}), ("separator", "decimal", "skip_lines"), "[file]")
+    for key, default in (("separator", ","), ("decimal", ".")):
+        if not isinstance(file.get(key, default), str) or len(file.get(key, default)) != 1:
+            raise refuse(f'{key} must be one character in quotes, as in {key} = "{default}"', key)
+    out = _Mapping({}, {}, file.get("separator", ","), file.get("decimal", "."))
+    if out.separator == out.decimal:
+        raise refuse("separator and decimal cannot be the same", "separator")
+    skip = number(file.get("skip_lines", 0), "skip_lines", "skip_lines")
+    if skip < 0 or skip != int(skip):
+        raise refuse("skip_lines must be a whole number of lines", "skip_lines")
+    out.skip_lines = int(skip)
+    for kind in ("columns", "constants"):
+        table = rules.get(kind, {})
+        if not isinstance(table, dict):
+            raise refuse(f"[{kind}] must be a table", kind)
+        for name, rule in table.items():
+            if not COLUMN.match(name):
+                raise refuse(f"'{name}' is not a log's column (time_s, i1_a, v1_v, u1, t1_c, fan, ambient_c)", name)
+            if kind == "constants":
+                out.constants[name] = number(rule, name, name)
+                continue
+            full = (
+                known(rule, ("column", "unit", "scale", "offset"), name) if isinstance(rule, dict) else {"column": rule}
+            )
+            sources = full.get("column")
+            sources = sources if isinstance(sources, list) else [sources]
+            if not sources or not all(isinstance(one, str) for one in sources):
+                raise refuse(f'{name} needs the source\'s column: {name} = {{ column = "its name" }}', name)
+            unit = full.get("unit", "")
+            iso = name == "time_s" and unit == "iso"
+            if unit not in UNITS and not iso:
+                raise refuse(
+                    f"unknown unit '{unit}' for {name}: " + ", ".join(filter(None, UNITS)) + "; time_s: iso", name
+                )
+            factor, offset = (1.0, 0.0) if iso else UNITS[unit]
+            scale = number(full.get("scale", 1.0), "scale", name)
+            shift = number(full.get("offset", 0.0), "offset", name)
+            out.columns[name] = _Rule(sources, factor * scale, offset * scale + shift, iso)
+    if "time_s" not in out.columns:
+        raise refuse("the mapping has no time_s under [columns]", "[columns]")
+    return out
+
+
+def _split(path: str | Path, rules: _Mapping) -> tuple[pd.DataFrame, list[str], list[int]]:
+    """Return another logger's cells as text, its lines and their numbers; the header is the first of either."""
+    raw = read_bytes(path)
+    try:
+        text = raw.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        text = raw.decode("cp1252", "replace")
+    if not text.strip():
+        raise InputError("the file is empty", path)
+    numbered = enumerate(text.splitlines(), 1)
+    kept = [(n, one) for n, one in numbered if n > rules.skip_lines and one.strip() and one[0] != "#"]
+    if not kept:
+        raise InputError("only comments and skipped lines: there is no header", path, 1)
+    numbers, lines = [n for n, _ in kept], [one for _, one in kept]
+    if len(lines) < 2:
+        raise InputError("there is a header but no row", path, numbers[0])
+    wanted = lines[0].count(rules.separator)
+    if '"' not in text:
+        for number, line in kept:
+            if (found := line.count(rules.separator)) != wanted:
+                raise InputError(
+                    f"{found + 1} cells where the header has {wanted + 1} (separator '{rules.separator}')",
+                    path,
+                    number,
+                    len(line) + 1,
+                )
+    try:
+        frame = pd.read_csv(
+            io.StringIO("\n".join(lines)),
+            sep=re.escape(rules.separator) if rules.separator in "|.^$*+?" else rules.separator,
+            header=None,
+            skipinitialspace=True,
+            dtype=str,
+            keep_default_na=False,
+            index_col=False,
+        )
+    except (pd.errors.ParserError, pd.errors.EmptyDataError, ValueError) as error:
+        match = re.search(r"line (\d+)", str(error))
+        at = numbers[min(int(match[1]), len(numbers)) - 1] if match else numbers[0]
+        raise InputError(f"other cells than the header has (separator '{rules.separator}')", path, at, 1) from None
+    names = [str(name).strip() for name in frame.iloc[0]]
+    for name in names:
+        if names.count(name) > 1 and any(name in rule.sources for rule in rules.columns.values()):
+            raise InputError(f"column '{name}' is there twice", path, numbers[0], 1)
+    frame.columns = names
+    return frame.iloc[1:], lines, numbers
+
+
 def import_table(path: str | Path, mapping: str | Path) -> str:
     """Return the text of a log made from `path` by a mapping file or the name of a built-in mapping.
 
@@ -85,88 +221,36 @@ def import_table(path: str | Path, mapping: str | Path) -> str:
     {column, unit | scale, offset}; `[file]` may give `separator`, `decimal`, `skip_lines`; `[constants]`
     gives columns of one value.
     """
-    if str(mapping) in BUILT_IN:
-        rules, place = BUILT_IN[str(mapping)], None
-    else:
-        rules, place = read_toml(mapping), mapping
-    if unknown := set(rules) - {"columns", "file", "constants"}:
-        raise InputError(
-            f"unknown table [{sorted(unknown)[0]}]: a mapping has [columns], [file], [constants]",
-            place,
-            line_of(mapping, sorted(unknown)[0]) if place else None,
-        )
-    options = rules.get("file", {})
-    separator = options.get("separator", ",")
-    decimal = options.get("decimal", ".")
-    skip = int(options.get("skip_lines", 0))
-    text = read_bytes(path).decode("utf-8-sig", "replace")
-    if not text.strip():
-        raise InputError("the file is empty", path)
-    try:
-        frame = pd.read_csv(
-            io.StringIO(text),
-            sep=separator,
-            decimal=decimal,
-            skiprows=skip,
-            skipinitialspace=True,
-            comment="#",
-            dtype=str,
-            index_col=False,
-        )
-    except (pd.errors.ParserError, pd.errors.EmptyDataError) as error:
-        match = re.search(r"line (\d+)", str(error))
-        raise InputError(
-            f"cannot be split into columns by '{separator}'", path, int(match[1]) if match else None
-        ) from None
-    frame.columns = [str(name).strip() for name in frame.columns]
+    rules = _read_mapping(mapping)
+    frame, lines, numbers = _split(path, rules)
     out: dict[str, np.ndarray] = {}
-    for name, rule in rules.get("columns", {}).items():
-        if not COLUMN.match(name):
-            raise InputError(
-                f"'{name}' is not a log's column (time_s, i1_a, v1_v, u1, t1_c, fan, ambient_c)",
-                place,
-                line_of(mapping, name) if place else None,
-            )
-        if not isinstance(rule, dict):
-            rule = {"column": rule}
-        sources = rule["column"] if isinstance(rule["column"], list) else [rule["column"]]
-        found = next((one for one in sources if one in frame.columns), None)
+    for name, rule in rules.columns.items():
+        found = next((one for one in rule.sources if one in frame.columns), None)
         if found is None:
-            raise InputError(
-                f"no column '{sources[0]}' for {name}: the file has "
-                + ", ".join(f"'{one}'" for one in frame.columns[:12]),
-                path,
-                skip + 1,
-            )
-        unit = rule.get("unit", "")
-        if unit not in UNITS:
-            raise InputError(
-                f"unknown unit '{unit}' for {name}: " + ", ".join(filter(None, UNITS)),
-                place,
-                line_of(mapping, name) if place else None,
-            )
-        factor, offset = UNITS[unit]
-        factor, offset = (
-            factor * rule.get("scale", 1.0),
-            offset * rule.get("scale", 1.0) + (rule.get("offset", 0.0)),
-        )
-        cells = frame[found].astype(str).str.strip()
-        if decimal != ".":
-            cells = cells.str.replace(decimal, ".", regex=False)
+            has = ", ".join(f"'{one}'" for one in frame.columns[:12])
+            raise InputError(f"no column '{rule.sources[0]}' for {name}: the file has {has}", path, numbers[0], 1)
+        cells = frame[found].str.strip()
         empty = cells.isin(["", "nan", "NaN", "NA", "-", "None"])
-        values = pd.to_numeric(cells.where(~empty), errors="coerce")
-        bad = np.flatnonzero((values.isna() & ~empty).to_numpy())
+        if rule.iso:
+            stamps = pd.to_datetime(cells.where(~empty), errors="coerce", format="ISO8601", utc=True)
+            values = (stamps - stamps.iloc[0]).dt.total_seconds()
+        else:
+            plain = cells.str.replace(rules.decimal, ".", regex=False) if rules.decimal != "." else cells
+            values = pd.to_numeric(plain.where(~empty), errors="coerce").replace([math.inf, -math.inf], math.nan)
+        bad = np.flatnonzero((values.isna() & (~empty | (name == "time_s"))).to_numpy())
         if bad.size:
+            row = int(bad[0]) + 1
+            before = lines[row].split(rules.separator)[: list(frame.columns).index(found)]
             raise InputError(
-                f"'{cells.iloc[bad[0]]}' in column '{found}' is not a number",
+                f"'{cells.iloc[row - 1]}' in column '{found}' is not a {'time' if rule.iso else 'number'}"
+                + ("" if rule.iso or rules.decimal == "," or "," not in cells.iloc[row - 1] else ' (decimal = ","?)'),
                 path,
-                skip + 2 + int(bad[0]),
+                numbers[row],
+                1 + sum(len(one) + 1 for one in before),
             )
-        out[name] = values.to_numpy(float) * factor + offset
-    if "time_s" not in out:
-        raise InputError("the mapping has no time_s under [columns]", place or str(mapping))
-    for name, value in rules.get("constants", {}).items():
-        out[name] = np.full(len(frame), float(value))
+        out[name] = values.to_numpy(float) * rule.factor + rule.offset
+    for name, value in rules.constants.items():
+        out[name] = np.full(len(frame), value)
     time_s = out.pop("time_s")
     return log_text(time_s, out, {"imported_from": Path(path).name, "mapping": Path(str(mapping)).name}, 5)
 
@@ -190,50 +274,44 @@ def read_regions(path: str | Path) -> list[Region]:
     data = read_toml(path)
     regions: list[Region] = []
 
-    def number(table: dict[str, Any], key: str, where: str) -> float:
+    def number(table: dict[str, Any], key: str, where: str, low: float) -> float:
         value = table.get(key)
-        if not isinstance(value, int | float) or isinstance(value, bool):
-            raise InputError(f"{where} needs a number '{key}'", path, line_of(path, where))
+        if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= 1e5:
+            what = "" if key not in table else f", not {value!r}"
+            raise InputError(
+                f"{where} needs a number '{key}' from {low:g} to 100000{what}", path, line_of(path, where), 1
+            )
         return float(value)
 
-    if grid := data.get("grid"):
-        rows, cols = int(number(grid, "rows", "[grid]")), int(number(grid, "cols", "[grid]"))
-        half_w, half_h = (
-            number(grid, "width", "[grid]") / 2,
-            number(grid, "height", "[grid]") / 2,
-        )
+    grid, boxes = data.get("grid"), data.get("region", [])
+    if grid is not None and not isinstance(grid, dict):
+        raise InputError("grid must be a table: [grid]", path, line_of(path, "grid"), 1)
+    if not isinstance(boxes, list) or not all(isinstance(one, dict) for one in boxes):
+        raise InputError("region must be a list of tables: [[region]]", path, line_of(path, "region"), 1)
+    if grid:
+        rows, cols = (int(number(grid, key, "[grid]", 1)) for key in ("rows", "cols"))
+        if rows * cols > MAX_SPRINGS:
+            raise InputError(f"{rows} x {cols} are more than {MAX_SPRINGS} springs", path, line_of(path, "rows"), 1)
+        half_w, half_h = (number(grid, key, "[grid]", 1) / 2 for key in ("width", "height"))
+        left, top = (number(grid, key, "[grid]", 0) for key in ("left", "top"))
+        step_x = number(grid, "step_x", "[grid]", 1) if cols > 1 else 0.0
+        step_y = number(grid, "step_y", "[grid]", 1) if rows > 1 else 0.0
         for k in range(rows * cols):
-            x = number(grid, "left", "[grid]") + (k % cols) * number(grid, "step_x", "[grid]")
-            y = number(grid, "top", "[grid]") + (k // cols) * number(grid, "step_y", "[grid]")
-            regions.append(
-                Region(
-                    k + 1,
-                    round(x - half_w),
-                    round(y - half_h),
-                    max(round(x + half_w), round(x - half_w) + 1),
-                    max(round(y + half_h), round(y - half_h) + 1),
-                )
-            )
-    for one in data.get("region", []):
-        left, top = int(number(one, "left", "[[region]]")), int(number(one, "top", "[[region]]"))
-        regions.append(
-            Region(
-                int(number(one, "spring", "[[region]]")),
-                left,
-                top,
-                left + int(number(one, "width", "[[region]]")),
-                top + int(number(one, "height", "[[region]]")),
-            )
-        )
+            x, y = left + (k % cols) * step_x, top + (k // cols) * step_y
+            x0, y0 = round(x - half_w), round(y - half_h)
+            regions.append(Region(k + 1, x0, y0, max(round(x + half_w), x0 + 1), max(round(y + half_h), y0 + 1)))
+    for one in boxes:
+        left, top = (int(number(one, key, "[[region]]", 0)) for key in ("left", "top"))
+        width, height = (int(number(one, key, "[[region]]", 1)) for key in ("width", "height"))
+        spring = int(number(one, "spring", "[[region]]", 1))
+        regions.append(Region(spring, left, top, left + width, top + height))
     if not regions:
         raise InputError("no region: give [grid] or [[region]] tables", path, 1)
     seen: set[int] = set()
     for one in regions:
         if not 1 <= one.spring <= MAX_SPRINGS or one.spring in seen:
-            raise InputError(f"spring {one.spring} is there twice or not in 1..64", path)
+            raise InputError(f"spring {one.spring} is there twice or not in 1..{MAX_SPRINGS}", path)
         seen.add(one.spring)
-        if one.right <= one.left or one.bottom <= one.top:
-            raise InputError(f"the region of spring {one.spring} is empty", path)
     return sorted(regions, key=lambda one: one.spring)
 
 
@@ -309,16 +387,10 @@ def reduce_frames(
     count: int,
     frames: Iterator[np.ndarray],
     regions: list[Region],
-    times_s: np.ndarray | None,
-    interval_s: float,
     statistic: str = "mean",
     say: Callable[[int], None] = lambda row: None,
-) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """Return times (n,) and {t{k}_c: (n,)} of a frame sequence, a region a spring; `statistic` mean, median, max."""
-    if times_s is None:
-        times_s = np.arange(count) * interval_s
-    elif len(times_s) != count:
-        raise InputError(f"{len(times_s)} times for {count} frames", path)
+) -> dict[str, np.ndarray]:
+    """Return {t{k}_c: (frames,)} of a frame sequence, a region a spring; `statistic` mean, median, max."""
     reduce = {"mean": np.mean, "median": np.median, "max": np.max}[statistic]
     out = np.full((count, len(regions)), np.nan)
     for row, frame in enumerate(frames):
@@ -344,20 +416,38 @@ def reduce_frames(
                 "or kelvin times 100?)",
                 path,
             )
-    return times_s, {f"t{one.spring}_c": out[:, k] for k, one in enumerate(regions)}
+    return {f"t{one.spring}_c": out[:, k] for k, one in enumerate(regions)}
 
 
-def merge_into_log(log_path: str | Path, times_s: np.ndarray, columns: dict[str, np.ndarray]) -> str:
-    """Return a log's text with camera temperatures put onto its times (straight lines between frames)."""
-    from .logs import read_table
+def merge_into_log(
+    log_path: str | Path,
+    times_s: np.ndarray | None,
+    interval_s: float,
+    offset_s: float,
+    columns: dict[str, np.ndarray],
+) -> str:
+    """Return a log's text with camera temperatures put onto its times (straight lines between frames).
 
+    Frames without times of their own begin with the log's first row; `offset_s` is added to either.
+    """
     table = read_table(log_path)
+    if "time_s" not in table.names:
+        raise InputError("no column time_s", log_path, table.header_line, 1)
     time_s = table.frame["time_s"].to_numpy(float)
-    merged = {n: table.frame[n].to_numpy(float) for n in table.names if n != "time_s"}
+    count = len(next(iter(columns.values())))
+    when = time_s[0] + np.arange(count) * interval_s if times_s is None else times_s
+    when = when + offset_s
+    if when[0] > time_s[-1] or when[-1] < time_s[0]:
+        raise InputError(
+            f"its times are {time_s[0]:g} to {time_s[-1]:g} s, the frames' {when[0]:g} to {when[-1]:g} s: "
+            "they never meet, `--offset` moves the frames",
+            log_path,
+        )
+    merged = {name: table.frame[name] for name in table.names if name != "time_s"}
     for name, values in columns.items():
         good = np.isfinite(values)
         merged[name] = (
-            np.interp(time_s, times_s[good], values[good], left=np.nan, right=np.nan)
+            np.interp(time_s, when[good], values[good], left=np.nan, right=np.nan)
             if good.any()
             else np.full(len(time_s), np.nan)
         )

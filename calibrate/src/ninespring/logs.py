@@ -257,7 +257,7 @@ def read_table(path: str | Path, text_columns: Iterable[str] = (), header_check:
                 numbers[row + 1],
                 len(line) + 1,
             )
-    words = set(text_columns)
+    words = {name for name in names if name == "state" or name.startswith("note_")} | set(text_columns)
     types = {name: (str if name in words else np.float64) for name in names}
     try:
         frame = pd.read_csv(
@@ -395,7 +395,7 @@ def read_log(path: str | Path, springs: int | None = None, temperatures: bool = 
     def check(names: list[str], line: int, columns: list[int]) -> None:
         found.append(_driving_columns(path, names, line, columns, springs, temperatures, why))
 
-    table = read_table(path, ("state",), check)
+    table = read_table(path, header_check=check)
     letter, count, has_voltages = found[0]
     mode: DriveMode
     frame = table.frame

@@ -1,0 +1,199 @@
+"""Other people's files: units and separators by a mapping, camera frames by a region a spring."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from ninespring import importing
+from ninespring.errors import InputError
+from ninespring.logs import log_text, read_log, read_table
+
+fuzzed = settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+
+GRID = ("rows", "cols", "left", "top", "step_x", "step_y", "width", "height")
+MAP = """[file]
+separator = ";"
+decimal = ","
+[columns]
+time_s = {column = "t/min", unit = "min"}
+i1_a = {column = "heat", unit = "mA"}
+t1_c = {column = "temp", unit = "degF"}
+[constants]
+ambient_c = 21.5
+"""
+
+
+def test_percent_fahrenheit_and_decimal_commas_are_imported(tmp_path: Path) -> None:
+    source = tmp_path / "logger.csv"
+    source.write_text("t/min;heat;temp\n0;50;68,0\n0,5;50;69,8\n1;0;71,6\n")
+    mapping = tmp_path / "map.toml"
+    mapping.write_text(
+        '[file]\nseparator = ";"\ndecimal = ","\n[columns]\ntime_s = {column = "t/min", unit = "min"}\n'
+        'u1 = {column = "heat", unit = "%"}\nt1_c = {column = "temp", unit = "degF"}\n'
+    )
+    rows = [line.split(",") for line in importing.import_table(source, mapping).splitlines()[-3:]]
+    assert [float(r[0]) for r in rows] == [0, 30, 60]
+    assert [float(r[1]) for r in rows] == [0.5, 0.5, 0.0]
+    assert [float(r[2]) for r in rows] == pytest.approx([20.0, 21.0, 22.0])
+
+
+def test_frames_of_any_size_become_a_temperature_a_spring(tmp_path: Path) -> None:
+    frames = np.full((5, 24, 32), 20.0)
+    for k in range(9):
+        frames[:, 2 + 7 * (k // 3) : 6 + 7 * (k // 3), 3 + 9 * (k % 3) : 8 + 9 * (k % 3)] = 30.0 + k
+    np.save(tmp_path / "frames.npy", frames)
+    regions = tmp_path / "regions.toml"
+    regions.write_text("[grid]\nrows = 3\ncols = 3\nleft = 5\ntop = 4\nstep_x = 9\nstep_y = 7\nwidth = 2\nheight = 2\n")
+
+    def spring_temperatures() -> dict[str, np.ndarray]:
+        source = tmp_path / "frames.npy"
+        count, read = importing.frames_of(source)
+        return importing.reduce_frames(source, count, read, importing.read_regions(regions))
+
+    columns = spring_temperatures()
+    assert [float(columns[f"t{k + 1}_c"][0]) for k in range(9)] == [30.0 + k for k in range(9)]
+    regions.write_text("[[region]]\nspring = 1\nleft = 30\ntop = 0\nwidth = 5\nheight = 2\n")
+    with pytest.raises(InputError, match="leaves frame 1"):
+        spring_temperatures()
+
+
+@fuzzed
+@given(
+    st.lists(st.tuples(st.floats(0.0, 3.0), st.floats(-10.0, 150.0)), min_size=4, max_size=12),
+    st.floats(0.5, 60.0).map(lambda s: round(s, 2)),
+)
+def test_a_logger_in_other_units_is_read_back_in_the_logs(
+    tmp_path: Path, rows: list[tuple[float, float]], step: float
+) -> None:
+    (tmp_path / "map.toml").write_text(MAP)
+    lines = [
+        f"{k * step / 60:.8f};{current * 1000:.5f};{celsius * 1.8 + 32:.6f}".replace(".", ",")
+        for k, (current, celsius) in enumerate(rows)
+    ]
+    (tmp_path / "logger.csv").write_text("\n".join(["t/min;heat;temp", *lines]) + "\n")
+    (tmp_path / "log.csv").write_text(importing.import_table(tmp_path / "logger.csv", tmp_path / "map.toml"))
+    frame = read_table(tmp_path / "log.csv").frame
+    assert frame["time_s"].to_numpy() == pytest.approx(np.arange(len(rows)) * step, abs=1e-4)
+    assert frame["i1_a"].to_numpy() == pytest.approx([r[0] for r in rows], abs=1e-4)
+    assert frame["t1_c"].to_numpy() == pytest.approx([r[1] for r in rows], abs=1e-4)
+    assert (frame["ambient_c"] == 21.5).all()
+
+
+@pytest.mark.parametrize(
+    ("mapping", "logger", "place", "word"),
+    [
+        ("[columns]\ntime = 1\n", "t\n1\n", "map.toml:2", "'time' is not a log's column"),
+        ('[columns]\ntime_s = "t"\n[more]\n', "t\n1\n", "map.toml:3", "unknown table"),
+        ('[columns]\ntime_s = {column = "t", unit = "furlong"}\n', "t\n1\n", "map.toml:2", "unknown unit"),
+        ('[columns]\ntime_s = {unit = "s"}\n', "t\n1\n", "map.toml:2", "column"),
+        ('[columns]\ntime_s = {column = "t", scale = "big"}\n', "t\n1\n", "map.toml:2", "scale"),
+        ('[columns]\ntime_s = {column = "t", units = "s"}\n', "t\n1\n", "map.toml:2", "units"),
+        ("[columns]\ntime_s = 7\n", "t\n1\n", "map.toml:2", "column"),
+        ('[columns]\ni1_a = "t"\n', "t\n1\n", "map.toml:1", "no time_s"),
+        ('[columns]\ntime_s = "t"\n[constants]\nwind = 1\n', "t\n1\n", "map.toml:4", "'wind' is not a log's column"),
+        ('[columns]\ntime_s = "t"\n[constants]\nfan = "on"\n', "t\n1\n", "map.toml:4", "number"),
+        ('[file]\nseparator = 5\n[columns]\ntime_s = "t"\n', "t\n1\n", "map.toml:2", "separator"),
+        ('[file]\nskip_lines = "2"\n[columns]\ntime_s = "t"\n', "t\n1\n", "map.toml:2", "skip_lines"),
+        ('[file]\nskip = 2\n[columns]\ntime_s = "t"\n', "t\n1\n", "map.toml:2", "skip"),
+        ("[columns\n", "t\n1\n", "map.toml:1", "TOML"),
+        ('[columns]\ntime_s = "t"\n', "", "logger.csv", "empty"),
+        ('[columns]\ntime_s = "t"\n', "u\n1\n", "logger.csv:1", "no column 't'"),
+        ('[columns]\ntime_s = "t"\n', "# by me\nt\n1\n\n2\nx\n", "logger.csv:6", "'x' in column 't' is not a number"),
+        ('[columns]\ntime_s = "t"\n', "t,u\n1,2\n2,3,4\n", "logger.csv:3", "cells"),
+        ('[columns]\ntime_s = "t"\n', "t,t\n1,2\n", "logger.csv:1", "twice"),
+        ('[columns]\ntime_s = "t"\n', "t\n", "logger.csv:1", "no row"),
+    ],
+)
+def test_wrong_mappings_and_loggers_are_refused_where_they_are_wrong(
+    tmp_path: Path, mapping: str, logger: str, place: str, word: str
+) -> None:
+    (tmp_path / "map.toml").write_text(mapping)
+    (tmp_path / "logger.csv").write_text(logger)
+    with pytest.raises(InputError) as caught:
+        importing.import_table(tmp_path / "logger.csv", tmp_path / "map.toml")
+    assert re.match(rf"{re.escape(str(tmp_path / place))}(:\d+)?: ", str(caught.value)), str(caught.value)
+    assert word in caught.value.message
+
+
+@fuzzed
+@given(st.text(alphabet='t/min;heatp,0123456789.-\n#[]="{}', max_size=200), st.booleans())
+def test_any_text_is_imported_or_refused_with_one_line(tmp_path: Path, text: str, as_mapping: bool) -> None:
+    good_logger = "t/min;heat;temp\n0;1;68\n"
+    (tmp_path / "map.toml").write_text("[columns]\n" + text if as_mapping else MAP)
+    (tmp_path / "logger.csv").write_text(good_logger if as_mapping else "t/min;heat;temp\n" + text)
+    try:
+        importing.import_table(tmp_path / "logger.csv", tmp_path / "map.toml")
+    except InputError as error:
+        assert "\n" not in str(error)
+
+
+@fuzzed
+@given(st.dictionaries(st.sampled_from(GRID), st.one_of(st.integers(-9, 90), st.floats(), st.just("x")), max_size=8))
+def test_any_grid_is_read_or_refused_with_one_line(tmp_path: Path, grid: dict[str, object]) -> None:
+    path = tmp_path / "regions.toml"
+    path.write_text("[grid]\n" + "".join(f"{k} = {v!r}\n".replace("'", '"') for k, v in grid.items()))
+    try:
+        regions = importing.read_regions(path)
+    except InputError as error:
+        assert "\n" not in str(error) and str(error).startswith(str(path))
+    else:
+        assert all(one.right > one.left and one.bottom > one.top for one in regions)
+
+
+def test_a_logger_with_dates_quotes_and_an_old_character_set_is_read(tmp_path: Path) -> None:
+    (tmp_path / "map.toml").write_text(
+        '[file]\nskip_lines = 1\n[columns]\ntime_s = {column = "Zeit", unit = "iso"}\n'
+        't1_c = "Temp (°C)"\nu1 = {column = "Duty", unit = "%"}\n',
+        encoding="utf-8",
+    )
+    (tmp_path / "logger.csv").write_bytes(
+        'Logger 7\n"Zeit","Temp (°C)","Duty"\n"2026-01-31 23:59:59.5","20.5","50"\n\n'
+        '"2026-02-01 00:00:01.0","21","0"\n'.encode("cp1252")
+    )
+    text = importing.import_table(tmp_path / "logger.csv", tmp_path / "map.toml")
+    rows = [line.split(",") for line in text.splitlines() if line[0] not in "#t"]
+    assert [[float(cell) for cell in row] for row in rows] == [[0, 20.5, 0.5], [1.5, 21, 0]]
+
+
+def test_frames_are_put_into_a_log_on_its_clock(tmp_path: Path) -> None:
+    log = tmp_path / "board.csv"
+    time_s = 30.0 + np.arange(10.0)
+    text = log_text(time_s, {"i1_a": np.ones(10)}, {"board": "7"})
+    log.write_text(re.sub(r"(?m)^(\d.*)$", r"\1,ok", text).replace("i1_a\n", "i1_a,state\n"))
+    rising = {"t1_c": 20.0 + 0.5 * np.arange(6.0)}
+    for times, offset, first in ((None, 0.0, 30), (None, 2.0, 32), (30.0 + 2 * np.arange(6.0), 0.0, 30)):
+        merged = tmp_path / "run.csv"
+        merged.write_text(importing.merge_into_log(log, times, 2.0, offset, rising))
+        run = read_log(merged)
+        assert np.flatnonzero(np.isfinite(run.temperature_c[:, 0]))[0] + 30 == first
+        assert run.temperature_c[-1, 0] == pytest.approx(20.0 + 0.25 * (39 - first))
+        assert "# board: 7" in merged.read_text()
+    with pytest.raises(InputError, match="never meet"):
+        importing.merge_into_log(log, None, 2.0, 900.0, rising)
+
+
+def test_frames_that_are_not_in_degrees_are_refused(tmp_path: Path) -> None:
+    regions = [importing.Region(3, 0, 0, 2, 2)]
+    raw = np.full((4, 4, 4), 20.0)
+    raw[2] = 29315.0
+    with pytest.raises(InputError, match=r"spring 3 shows 29315 in frame 3: frames are in degC"):
+        importing.reduce_frames("f.npy", 4, iter(raw), regions)
+    dead = raw[:2].copy()
+    dead[1, :2, :2] = np.nan
+    assert np.isnan(importing.reduce_frames("f.npy", 2, iter(dead), regions)["t3_c"]).tolist() == [False, True]
+
+
+@pytest.mark.parametrize(("text", "line"), [("0\n1\nx\n", 3), ("0\n0\n", 2), ("0\nnan\n", 2)])
+def test_wrong_times_of_frames_are_refused_with_their_line(tmp_path: Path, text: str, line: int) -> None:
+    path = tmp_path / "times.txt"
+    path.write_text(text)
+    with pytest.raises(InputError) as caught:
+        importing.read_times(path)
+    assert caught.value.line == line
+    path.write_text("# s\n0\n0.5  # late\n\n2\n")
+    assert importing.read_times(path).tolist() == [0, 0.5, 2]
