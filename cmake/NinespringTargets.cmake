@@ -20,17 +20,13 @@ if(NINESPRING_COVERAGE)
     target_link_options(ninespring_options INTERFACE --coverage)
 endif()
 
-# ninespring_add_library(NAME [COLD] SOURCES... [DEPENDS other...])
-# COLD: runs seldom, so that small code counts more than fast code (NINESPRING_COLD_OPTIONS of the toolchain).
+# ninespring_add_library(NAME SOURCES... [DEPENDS other...])
 # One portable library of lib/: C99, headers beside its sources.
 function(ninespring_add_library name)
-    cmake_parse_arguments(ARG "COLD" "" "SOURCES;DEPENDS" ${ARGN})
+    cmake_parse_arguments(ARG "" "" "SOURCES;DEPENDS" ${ARGN})
     add_library(${name} STATIC ${ARG_SOURCES})
     target_include_directories(${name} PUBLIC ${CMAKE_CURRENT_SOURCE_DIR})
     target_link_libraries(${name} PUBLIC ${ARG_DEPENDS} PRIVATE ninespring_options)
-    if(ARG_COLD)
-        target_compile_options(${name} PRIVATE ${NINESPRING_COLD_OPTIONS})
-    endif()
 endfunction()
 
 # ninespring_add_unity_test(NAME SOURCES... DEPENDS lib... [LABELS label...])

@@ -24,7 +24,8 @@ STORAGE = (r"eeprom_read", r"eeprom_ready", r"eeprom_write")
 WORDS = (r"^word_\w+",)
 NOTHING = (r"twi_onSlave\w+",)
 INDIRECT: tuple[tuple[str, tuple[str, ...]], ...] = (
-    (r"^(execute|console_receive)", WORDS + OUTPUT),
+    (r"^(execute|console_receive|take_input)", WORDS + OUTPUT),
+    (r"^(main|setup|loop|run_tick)", WORDS + OUTPUT + STORAGE),  # the linker's optimiser moves what is called once
     (
         r"^(console_|out_end|answer|room_for|list_settings|selftest|start_telemetry|end_job|save|print_|apply_settings)",
         OUTPUT,
@@ -34,7 +35,7 @@ INDIRECT: tuple[tuple[str, tuple[str, ...]], ...] = (
     (r"^__vector_39", NOTHING),
     (r"^__do_global_ctors|^__tablejump2__|^__do_global_dtors", (r"^_GLOBAL__sub_I",)),
     (
-        r"^(_ZN\d+Adafruit|_ZN7TwoWire|_ZN5Print|_ZN6Stream)",
+        r"^(_ZN\d+Adafruit|_ZN7TwoWire|_ZN5Print|_ZN6Stream|_ZL\d+read_|current_sensor_)",
         (r"^_ZN7TwoWire5writeEh$", r"^_ZN7TwoWire\d+(read|available|peek|flush)"),
     ),
 )
@@ -42,6 +43,7 @@ INDIRECT: tuple[tuple[str, tuple[str, ...]], ...] = (
 # soft-float's entry for special numbers lies behind the label that it calls. They count as one level that calls nothing.
 GUARDED = {
     ("_ZN18Adafruit_I2CDevice8detectedEv", "_ZN18Adafruit_I2CDevice5beginEb"),
+    ("_ZN18Adafruit_I2CDevice8detectedEv", "_ZN18Adafruit_I2CDevice8detectedEv"),  # begin() put into it
     ("__fp_splitA", "__fp_splitA"),
 }
 

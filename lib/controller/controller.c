@@ -334,8 +334,9 @@ static void drive(controller_t *controller, const controller_inputs_t *inputs, c
     }
 }
 
-void controller_tick(controller_t *controller, const controller_inputs_t *inputs,
-                     controller_outputs_t *outputs)
+__attribute__((noinline)) void controller_tick(controller_t *controller,
+                                               const controller_inputs_t *inputs,
+                                               controller_outputs_t *outputs)
 {
     bool valid[CONTROLLER_MAX_SPRINGS];
     uint32_t sum_ma = take_sensors(controller, inputs, valid);

@@ -34,6 +34,17 @@
 #define READ_BYTE(address) (*(address))
 #endif
 
+/* A phase that moves, and what it calls: fast, since nine may move at a time. */
+#define ALWAYS __attribute__((always_inline))
+#ifdef __AVR__
+#define HOT __attribute__((noinline, noclone))
+/* The address stays in a pointer register instead of being worked out anew for each field. */
+#define KEEP_ADDRESS(pointer) __asm__("" : "+b"(pointer))
+#else
+#define HOT
+#define KEEP_ADDRESS(pointer) (void)(pointer)
+#endif
+
 #define SEGMENTS         32
 #define GAIN_ONE         255u
 #define LATENT_SLACK_C23 0x1000000 /* 2 K: what Newton may leave for the next step */
@@ -64,7 +75,7 @@ static uint8_t clamp_index(const thermal_model_t *model, uint8_t spring)
 /* ---- phase ---- */
 
 /* S at a distance (c7) into a transformation: Q0.15, and by how much it falls in this segment. */
-static inline uint16_t branch_shape(uint16_t distance_c7, uint16_t position_factor, uint16_t *fall)
+static inline ALWAYS uint16_t shape_inline(uint16_t distance_c7, uint16_t position_factor, uint16_t *fall)
 {
     uint16_t position = (uint16_t)(fixed_point_mac_u16(0, distance_c7, position_factor) >> 8);
     uint8_t segment = (uint8_t)(position >> 8);
@@ -77,16 +88,21 @@ static inline uint16_t branch_shape(uint16_t distance_c7, uint16_t position_fact
     return (uint16_t)(left - (uint16_t)(fixed_point_mac_u16(0, *fall, (uint8_t)position) >> 8));
 }
 
+static uint16_t branch_shape(uint16_t distance_c7, uint16_t position_factor)
+{
+    uint16_t fall;
+    return shape_inline(distance_c7, position_factor, &fall);
+}
+
 static uint16_t austenite_of(const thermal_model_t *model,
                              const thermal_model_spring_state_t *state)
 {
-    uint16_t fall;
     if (state->branch == THERMAL_MODEL_BRANCH_HEATING) {
         if (state->heating_c7 >= model->austenite_finish_c7) {
             return THERMAL_MODEL_AUSTENITE_FULL;
         }
         uint16_t distance = (uint16_t)(state->heating_c7 - model->austenite_start_c7);
-        uint16_t shape = branch_shape(distance, model->heating_position, &fall);
+        uint16_t shape = branch_shape(distance, model->heating_position);
         return (uint16_t)(THERMAL_MODEL_AUSTENITE_FULL -
                           (fixed_point_mac_u16(0, shape, state->amplitude) >> 15));
     }
@@ -94,7 +110,7 @@ static uint16_t austenite_of(const thermal_model_t *model,
         return 0;
     }
     uint16_t distance = (uint16_t)(model->martensite_start_c7 - state->cooling_c7);
-    uint16_t shape = branch_shape(distance, model->cooling_position, &fall);
+    uint16_t shape = branch_shape(distance, model->cooling_position);
     return (uint16_t)(fixed_point_mac_u16(0, shape, state->amplitude) >> 15);
 }
 
@@ -110,9 +126,9 @@ static void refresh_branch(const thermal_model_t *model, thermal_model_spring_t 
                                                         : model->cooling_slope);
 }
 
-static int16_t high_word(int32_t value)
+static inline ALWAYS int16_t high_word(int32_t value)
 {
-    return (int16_t)(value >> 16);
+    return (int16_t)((uint32_t)value >> 16);
 }
 
 static void austenite_complete(const thermal_model_t *model, thermal_model_spring_state_t *state)
@@ -138,7 +154,7 @@ static void martensite_complete(const thermal_model_t *model, thermal_model_spri
 /* How far (c7) into a transformation the spring is now; `turn` is how far it was, `beyond` the
  * enthalpy added since. Solves distance - A S(distance) = enthalpy_past_start for the branch's
  * latent heat A; never goes back. */
-static int16_t newton(uint16_t turn, uint16_t beyond, uint16_t width, uint16_t position_factor,
+static inline ALWAYS int16_t newton(uint16_t turn, uint16_t beyond, uint16_t width, uint16_t position_factor,
                       const thermal_model_spring_t *spring, uint8_t *gain,
                       int16_t enthalpy_past_start)
 {
@@ -148,9 +164,9 @@ static int16_t newton(uint16_t turn, uint16_t beyond, uint16_t width, uint16_t p
     }
     for (uint8_t pass = 0; pass < 4; pass++) { /* nearly always one: see the end */
         uint16_t fall;
-        uint16_t shape = branch_shape(target, position_factor, &fall);
+        uint16_t shape = shape_inline(target, position_factor, &fall);
         uint32_t used = fixed_point_mac_u16(0, spring->branch_latent, shape); /* c23 */
-        uint8_t index = (uint8_t)fixed_point_high_u16(spring->branch_slope, fall);
+        uint8_t index = (uint8_t)(fixed_point_mac_u16(0, spring->branch_slope, fall) >> 16);
         if (index > 127u) {
             index = 127u;
         }
@@ -173,15 +189,13 @@ static int16_t newton(uint16_t turn, uint16_t beyond, uint16_t width, uint16_t p
     return (int16_t)target;
 }
 
-/* A spring with this enthalpy has passed a threshold with its phase held: lets the phase follow.
- * What is left in state is the phase's memory and the latent heat; the temperature is the rest of
- * the enthalpy. */
-static __attribute__((noinline)) void transform(const thermal_model_t *model,
-                                                thermal_model_spring_t *spring,
-                                                thermal_model_spring_state_t *state,
-                                                int32_t enthalpy_c23)
+/* A spring with this enthalpy passes a threshold if its phase is held, and comes to held_c7: lets the
+ * phase follow. What is left in state is the phase's memory and the latent heat; the temperature is
+ * the rest of the enthalpy. */
+static inline ALWAYS void transform(const thermal_model_t *model, thermal_model_spring_t *spring,
+                                    thermal_model_spring_state_t *state, int16_t held_c7,
+                                    int32_t enthalpy_c23)
 {
-    int16_t held_c7 = high_word(state->temperature_c23);
     uint16_t width, turn, beyond, position;
     int16_t past;
     bool heats = held_c7 > state->heating_c7;
@@ -336,33 +350,57 @@ static int32_t extra_flows(thermal_model_t *model)
     return taken;
 }
 
-/* The springs that a pass took past a threshold. */
-static void follow_phases(thermal_model_t *model)
+/* A spring that the pass left as it was, since the step takes it past a threshold. */
+static HOT void follow_phase(thermal_model_t *model, uint8_t i)
 {
-    for (uint8_t i = 0; i < model->pass.count; i++) {
-        thermal_model_spring_t *spring = &model->spring[i];
-        if (spring->pending == 0) {
-            continue;
-        }
-        spring->pending = 0;
-        thermal_model_spring_state_t *state = &model->state.spring[i];
-        int16_t before =
-            high_word((int32_t)((uint32_t)state->temperature_c23 - (uint32_t)spring->gain_c23));
-        int32_t enthalpy_c23 = fixed_point_add_saturated(state->temperature_c23, state->latent_c23);
-        transform(model, spring, state, enthalpy_c23);
-        int32_t temperature_c23 = enthalpy_c23 - state->latent_c23;
-        int16_t temperature_c7 = high_word(temperature_c23);
-        if (temperature_c7 > model->highest_c7 || temperature_c7 < THERMAL_MODEL_LOWEST_C7) {
-            temperature_c7 = temperature_c7 < 0 ? THERMAL_MODEL_LOWEST_C7 : model->highest_c7;
-            temperature_c23 = (int32_t)temperature_c7 * 65536;
-        }
-        state->temperature_c23 = temperature_c23;
-        set_lead(model, i, lead_ahead(temperature_c7, before));
+    thermal_model_spring_t *spring = &model->spring[i];
+    thermal_model_spring_state_t *state = &model->state.spring[i];
+    KEEP_ADDRESS(spring);
+    KEEP_ADDRESS(state);
+    int16_t before = high_word(state->temperature_c23);
+    int32_t held_c23 = fixed_point_add_saturated(state->temperature_c23, spring->gain_c23);
+    int32_t enthalpy_c23 = fixed_point_add_saturated(held_c23, state->latent_c23);
+    spring->pending = 0;
+    transform(model, spring, state, high_word(held_c23), enthalpy_c23);
+    int32_t temperature_c23 = enthalpy_c23 - state->latent_c23;
+    int16_t temperature_c7 = high_word(temperature_c23);
+    if (temperature_c7 > model->highest_c7 || temperature_c7 < THERMAL_MODEL_LOWEST_C7) {
+        temperature_c7 = temperature_c7 < 0 ? THERMAL_MODEL_LOWEST_C7 : model->highest_c7;
+        temperature_c23 = (int32_t)temperature_c7 * 65536;
+    }
+    state->temperature_c23 = temperature_c23;
+    set_lead(model, i, lead_ahead(temperature_c7, before));
+}
+
+/* What is set from outside is set after the step that is under way. */
+static void settle(thermal_model_t *model, uint8_t spring)
+{
+    if (model->spring[spring].pending != 0) {
+        follow_phase(model, spring);
     }
 }
 
-__attribute__((noinline)) void thermal_model_step(thermal_model_t *model, const uint32_t power_uw[])
+void thermal_model_follow_phases(thermal_model_t *model, uint8_t most)
 {
+    if (model->pass.pending == 0) {
+        return;
+    }
+    for (uint8_t i = 0; i < model->pass.count; i++) {
+        if (model->spring[i].pending == 0) {
+            continue;
+        }
+        if (most-- == 0) {
+            return;
+        }
+        follow_phase(model, i);
+    }
+    model->pass.pending = 0;
+}
+
+__attribute__((noinline)) void thermal_model_begin_step(thermal_model_t *model,
+                                                        const uint32_t power_uw[])
+{
+    thermal_model_follow_phases(model, UINT8_MAX);
     int32_t above_plate = (int32_t)(model->pass.lead_sum -
                                     fixed_point_mac_u16(0, model->plate_lead, model->pass.count));
     model->pass.common = common_flow(model) + 128u; /* half of what the shift drops */
@@ -372,9 +410,6 @@ __attribute__((noinline)) void thermal_model_step(thermal_model_t *model, const 
         model->pass.air_flow = -extra_flows(model);
     }
     thermal_model_pass(model);
-    if (model->pass.pending != 0) {
-        follow_phases(model);
-    }
     if (model->air.loss != 0) {
         relax(&model->air, &model->state.air_c23, &model->pass.air_lead, model->ambient_lead,
               model->pass.air_flow);
@@ -384,6 +419,12 @@ __attribute__((noinline)) void thermal_model_step(thermal_model_t *model, const 
               fixed_point_scale_s24(above_plate,
                                     (uint32_t)model->parameters.plate_coupling_uw_per_k << 8));
     }
+}
+
+void thermal_model_step(thermal_model_t *model, const uint32_t power_uw[])
+{
+    thermal_model_begin_step(model, power_uw);
+    thermal_model_follow_phases(model, UINT8_MAX);
 }
 
 /* ---- setting and reading ---- */
@@ -441,6 +482,7 @@ void thermal_model_reset(thermal_model_t *model, int16_t temperature_c7)
     model->plate_lead = model->pass.air_lead;
     thermal_model_refresh_ambient(model);
     for (uint8_t i = 0; i < model->pass.count; i++) {
+        model->spring[i].pending = 0;
         martensite_complete(model, &model->state.spring[i]);
         thermal_model_set_temperature(model, i, temperature_c7);
     }
@@ -449,6 +491,7 @@ void thermal_model_reset(thermal_model_t *model, int16_t temperature_c7)
 void thermal_model_set_temperature(thermal_model_t *model, uint8_t spring, int16_t temperature_c7)
 {
     spring = clamp_index(model, spring);
+    settle(model, spring);
     temperature_c7 = clamp_c7(temperature_c7);
     if (temperature_c7 > model->highest_c7) {
         temperature_c7 = model->highest_c7;
@@ -490,6 +533,7 @@ void thermal_model_set_temperature(thermal_model_t *model, uint8_t spring, int16
 void thermal_model_add_temperature(thermal_model_t *model, uint8_t spring, int16_t difference_c7)
 {
     spring = clamp_index(model, spring);
+    settle(model, spring);
     int32_t sum = (int32_t)high_word(model->state.spring[spring].temperature_c23) + difference_c7;
     if (sum < THERMAL_MODEL_LOWEST_C7) {
         sum = THERMAL_MODEL_LOWEST_C7;
@@ -601,6 +645,7 @@ bool thermal_model_set_state(thermal_model_t *model, const thermal_model_state_t
     model->plate_lead = lead_from_c7(high_word(state->plate_c23));
     thermal_model_refresh_ambient(model);
     for (uint8_t i = 0; i < model->pass.count; i++) {
+        model->spring[i].pending = 0;
         refresh_branch(model, &model->spring[i], &model->state.spring[i]);
         set_lead(model, i, lead_from_c7(high_word(state->spring[i].temperature_c23)));
     }

@@ -73,8 +73,8 @@ static inline uint32_t thermal_model_lost(int16_t above_air, const thermal_model
 #define PASS_RISES 2u
 
 /* All springs one step on: flows from the leads, gains, enthalpies; then temperatures and new
- * leads, but of those that pass a threshold only the enthalpy: they are marked pending. On the AVR
- * the second is assembly, held to the first. */
+ * leads; those that would pass a threshold stay as they were, but for gain_c23, and are marked
+ * pending. On the AVR the second is assembly, held to the first. */
 void thermal_model_pass_in_c(thermal_model_t *model);
 /* Every conductance that depends on the fan; model->fan_percent says how fast it is. */
 void thermal_model_apply_fan(thermal_model_t *model);

@@ -32,13 +32,14 @@ void thermal_model_pass_in_c(thermal_model_t *model)
         thermal_model_spring_state_t *state = &model->state.spring[i];
         uint16_t *block = (uint16_t *)(void *)((char *)spring + spring->block_offset);
         int16_t before = (int16_t)(state->temperature_c23 >> 16);
-        state->temperature_c23 =
+        int32_t temperature_c23 =
             fixed_point_add_saturated(state->temperature_c23, spring->gain_c23);
-        int16_t temperature_c7 = (int16_t)(state->temperature_c23 >> 16);
+        int16_t temperature_c7 = (int16_t)(temperature_c23 >> 16);
         if (temperature_c7 > state->heating_c7 || temperature_c7 < state->cooling_c7) {
             spring->pending = 1;
             pass->pending = 1;
         } else {
+            state->temperature_c23 = temperature_c23;
             block[BLOCK_CENTRE] = lead_ahead(temperature_c7, before);
         }
         pass->lead_sum += block[BLOCK_CENTRE];
