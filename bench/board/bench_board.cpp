@@ -121,8 +121,8 @@ void cycles(const std::string &elf, const std::string &driver)
     drive_all(board);
     mean_cycles(board, "controller_tick", 25, fmt::format("controller_tick ({} driver)", driver),
                 "<= 16000");
-    mean_cycles(board, "thermal_model_step", 5,
-                fmt::format("thermal_model_step ({} driver)", driver), "<= 4000");
+    mean_cycles(board, "thermal_model_begin_step", 5,
+                fmt::format("thermal_model_begin_step ({} driver)", driver), "<= 4000");
     mean_cycles(board, "current_sensor_read", 25,
                 fmt::format("nine sensors read over I2C ({} driver)", driver), "");
 }

@@ -5,9 +5,17 @@
 
 #include "fixed_point.h"
 
-#define MODEL_STEP_MS  100u
-#define TICKS_PER_STEP (MODEL_STEP_MS / CONTROLLER_TICK_MS)
-#define POWER_LIMIT_UW THERMAL_MODEL_HIGHEST_POWER_UW /* a step's sum stays below 2^26 */
+#define MODEL_STEP_MS   100u
+#define TICKS_PER_STEP  (MODEL_STEP_MS / CONTROLLER_TICK_MS)
+#define CURRENT_MOST_MA 4095 /* the sensor ends at 3200: a step's sum of power fits 32 bits */
+
+#ifdef __AVR__
+#define HOT    __attribute__((noinline, optimize("O2")))
+#define ALWAYS __attribute__((always_inline))
+#else
+#define HOT
+#define ALWAYS
+#endif
 
 static bool refuse(uint16_t *bad, size_t offset)
 {
@@ -195,6 +203,7 @@ bool controller_apply_settings(controller_t *controller, const controller_settin
     const thermal_model_parameters_t *old = &controller->model.parameters;
     bool same_size = settings->model.rows == old->rows && settings->model.columns == old->columns;
     thermal_model_state_t state;
+    thermal_model_follow_phases(&controller->model, UINT8_MAX);
     thermal_model_get_state(&controller->model, &state);
     if (!check(settings, bad) || !init_model(&controller->model, &settings->model, bad)) {
         return false;
@@ -219,55 +228,59 @@ bool controller_apply_settings(controller_t *controller, const controller_settin
     return true;
 }
 
-/* A fifth, to 4e-6 and 1 uW: 52429 = 2^18 / 5. For sum < 2^26. */
-static uint32_t fifth(uint32_t sum)
+/* A fifth, to 4e-6 and 1 uW: 52429 = 2^18 / 5. */
+static inline ALWAYS uint32_t fifth(uint32_t sum)
 {
     uint32_t low = fixed_point_mac_u16(0, (uint16_t)sum, 52429u);
     return fixed_point_mac_u16(low >> 16, (uint16_t)(sum >> 16), 52429u) >> 2;
 }
 
+/* v i, 0 where one of them is not positive. */
+static inline ALWAYS uint32_t add_power(uint32_t sum_uw, int16_t current_ma, int16_t voltage_mv)
+{
+    if (current_ma <= 0 || voltage_mv <= 0) {
+        return sum_uw;
+    }
+    return fixed_point_mac_u16(
+        sum_uw, current_ma > CURRENT_MOST_MA ? CURRENT_MOST_MA : (uint16_t)current_ma,
+        (uint16_t)voltage_mv);
+}
+
 /* Takes the readings and has them judged; returns the sum of what flows. */
-static uint32_t take_sensors(controller_t *controller, const controller_inputs_t *inputs,
-                             bool valid[])
+static HOT uint32_t take_sensors(controller_t *controller, const controller_sensor_t *sensor,
+                                 bool valid[])
 {
     uint32_t sum_ma = 0;
-    const controller_sensor_t *sensor = inputs->sensor;
     for (uint8_t k = 0; k < controller->springs; k++, sensor++) {
-        safety_sample_t sample = {
-            .sensor_status = (uint8_t)sensor->status,
-            .current_ma = sensor->current_ma,
-            .voltage_mv = sensor->voltage_mv,
-            .expected_ma = current_control_reference_ma(&controller->current, k),
-            .temperature_c7 = thermal_model_temperature_c7(&controller->model, k)};
-        safety_tick_spring(&controller->safety, k, &sample);
-
-        bool good = sample.sensor_status == CONTROLLER_SENSOR_OK;
-        valid[k] = good;
-        int16_t current_ma = sample.current_ma;
-        uint32_t power_uw = 0;
-        if (good) {
-            controller->measured_ma[k] = current_ma;
-            controller->measured_mv[k] = sample.voltage_mv;
-            if (current_ma > 0) {
-                sum_ma += (uint16_t)current_ma;
-                if (sample.voltage_mv > 0) {
-                    power_uw =
-                        fixed_point_mac_u16(0, (uint16_t)current_ma, (uint16_t)sample.voltage_mv);
-                    if (power_uw > POWER_LIMIT_UW) {
-                        power_uw = POWER_LIMIT_UW;
-                    }
-                }
-            }
-            controller->power_uw[k] = power_uw;
-        } else if (controller->duty[k] != 0) {
-            power_uw = controller->power_uw[k];
-            current_ma = controller->measured_ma[k];
-            sum_ma += current_ma > 0 ? (uint16_t)current_ma : 0u;
-        } else {
-            controller->power_uw[k] = 0;
+        uint8_t status = (uint8_t)sensor->status;
+        int16_t current_ma = sensor->current_ma;
+        int16_t voltage_mv = sensor->voltage_mv;
+        uint16_t expected_ma = controller->current.channel[k].reference_ma;
+        int16_t temperature_c7 =
+            (int16_t)((uint32_t)controller->model.state.spring[k].temperature_c23 >> 16);
+        if (!safety_tick_good(&controller->safety, &controller->safety.spring[k], status,
+                              current_ma, voltage_mv, expected_ma, temperature_c7)) {
+            safety_sample_t sample = {.sensor_status = status,
+                                      .current_ma = current_ma,
+                                      .voltage_mv = voltage_mv,
+                                      .expected_ma = expected_ma,
+                                      .temperature_c7 = temperature_c7};
+            safety_tick_spring(&controller->safety, k, &sample);
         }
-        if (power_uw != 0) {
-            controller->power_sum_uw[k] += power_uw;
+        valid[k] = status == CONTROLLER_SENSOR_OK;
+        if (valid[k]) {
+            controller->measured_ma[k] = current_ma;
+            controller->measured_mv[k] = voltage_mv;
+        } else if (controller->duty[k] != 0) {
+            current_ma = controller->measured_ma[k];
+            voltage_mv = controller->measured_mv[k];
+        } else {
+            continue;
+        }
+        if (current_ma > 0) {
+            sum_ma += (uint16_t)current_ma;
+            controller->power_sum_uw[k] =
+                add_power(controller->power_sum_uw[k], current_ma, voltage_mv);
         }
     }
     safety_tick_board(&controller->safety, sum_ma);
@@ -282,6 +295,11 @@ static void step_model(controller_t *controller, const controller_inputs_t *inpu
     turn++;
     controller->resistance_turn = turn < controller->springs ? turn : 0;
     if (++controller->model_tick < TICKS_PER_STEP) {
+        /* a quarter of them, and the policy settles its own: the last of the four finds as many
+         * left */
+        bool last = controller->model_tick == TICKS_PER_STEP - 1u;
+        thermal_model_follow_phases(&controller->model,
+                                    last ? UINT8_MAX : (uint8_t)(controller->springs / 4u));
         return;
     }
     controller->model_tick = 0;
@@ -292,16 +310,20 @@ static void step_model(controller_t *controller, const controller_inputs_t *inpu
     controller->ambient_c7 = inputs->ambient_c7;
     thermal_model_set_ambient(&controller->model, inputs->ambient_c7);
     thermal_model_set_fan(&controller->model, inputs->fan_percent);
-    thermal_model_step(&controller->model, controller->power_sum_uw);
+    thermal_model_begin_step(&controller->model, controller->power_sum_uw);
     memset(controller->power_sum_uw, 0, sizeof controller->power_sum_uw);
 }
 
-static void drive(controller_t *controller, const controller_inputs_t *inputs, const bool valid[],
-                  uint32_t sum_ma)
+static void drive(controller_t *controller, const bool valid[], uint32_t sum_ma)
 {
+    const safety_t *safety = &controller->safety;
+    const bool any_allowed = !safety->locked && safety->board_fault == SAFETY_FAULT_NONE;
     bool allowed[CONTROLLER_MAX_SPRINGS];
     for (uint8_t k = 0; k < controller->springs; k++) {
-        allowed[k] = safety_allows(&controller->safety, k);
+        allowed[k] = any_allowed && safety->spring[k].fault == SAFETY_FAULT_NONE;
+        if (!allowed[k]) {
+            current_control_reset(&controller->current, k);
+        }
     }
     const safety_parameters_t *limits = &controller->safety.parameters;
     drive_policy_input_t input = {.model = &controller->model,
@@ -319,18 +341,12 @@ static void drive(controller_t *controller, const controller_inputs_t *inputs, c
      * further. */
     bool may_rise =
         sum_ma + controller->policy.parameters.supply_reserve_ma <= limits->supply_limit_ma;
+    current_control_tick_all(&controller->current, controller->springs, controller->target_ma,
+                             controller->measured_ma, valid, may_rise, controller->duty);
     for (uint8_t k = 0; k < controller->springs; k++) {
-        if ((drive_policy_limits(&controller->policy, k) & DRIVE_POLICY_LIMIT_TRIP) != 0) {
+        if ((controller->policy.spring[k].limits & DRIVE_POLICY_LIMIT_TRIP) != 0) {
             safety_trip_limit(&controller->safety, k);
         }
-        if (!allowed[k]) {
-            current_control_reset(&controller->current, k);
-        }
-        current_control_input_t channel = {.target_ma = controller->target_ma[k],
-                                           .measured_ma = inputs->sensor[k].current_ma,
-                                           .valid = valid[k],
-                                           .may_rise = may_rise};
-        controller->duty[k] = current_control_tick(&controller->current, k, &channel);
     }
 }
 
@@ -339,9 +355,9 @@ __attribute__((noinline)) void controller_tick(controller_t *controller,
                                                controller_outputs_t *outputs)
 {
     bool valid[CONTROLLER_MAX_SPRINGS];
-    uint32_t sum_ma = take_sensors(controller, inputs, valid);
+    uint32_t sum_ma = take_sensors(controller, inputs->sensor, valid);
     step_model(controller, inputs);
-    drive(controller, inputs, valid, sum_ma);
+    drive(controller, valid, sum_ma);
     memcpy(outputs->duty, controller->duty, sizeof outputs->duty);
     outputs->fan_percent = controller->fan_percent;
 }
@@ -438,7 +454,12 @@ int16_t controller_measured_mv(const controller_t *controller, uint8_t spring)
 
 uint32_t controller_power_uw(const controller_t *controller, uint8_t spring)
 {
-    return controller->power_uw[spring];
+    if (controller->current.channel[spring].blind_ticks != 0 && controller->duty[spring] == 0) {
+        return 0;
+    }
+    uint32_t power_uw =
+        add_power(0, controller->measured_ma[spring], controller->measured_mv[spring]);
+    return power_uw < THERMAL_MODEL_HIGHEST_POWER_UW ? power_uw : THERMAL_MODEL_HIGHEST_POWER_UW;
 }
 
 uint16_t controller_duty(const controller_t *controller, uint8_t spring)

@@ -73,7 +73,6 @@ typedef struct {
     uint16_t duty[CONTROLLER_MAX_SPRINGS];
     int16_t measured_ma[CONTROLLER_MAX_SPRINGS]; /* last valid reading */
     int16_t measured_mv[CONTROLLER_MAX_SPRINGS];
-    uint32_t power_uw[CONTROLLER_MAX_SPRINGS];     /* of the last tick */
     uint32_t power_sum_uw[CONTROLLER_MAX_SPRINGS]; /* over the ticks of the running model step */
 } controller_t;
 
@@ -93,11 +92,12 @@ bool controller_init(controller_t *controller, const controller_settings_t *sett
 bool controller_apply_settings(controller_t *controller, const controller_settings_t *settings,
                                uint16_t *bad);
 
-/* One tick of 20 ms: sensors, safety, model (every 5th tick, with the mean power of the ticks),
- * policy, current loops. inputs are of the tick that just ended, outputs are for the one that
- * starts. outputs of springs that do not exist are 0. Power is v x i of a valid reading. Without
- * one it is the last valid power if the output was on in the tick, else 0: the duty is not raised
- * while a channel is blind, so that is not too low. */
+/* One tick of 20 ms: sensors, safety, model (every 5th tick, with the mean power of the ticks;
+ * phases that move follow in the next four, see thermal_model_begin_step), policy, current loops.
+ * inputs are of the tick that just ended, outputs are for the one that starts. outputs of springs
+ * that do not exist are 0. Power is v x i of a valid reading. Without one it is the last valid
+ * power if the output was on in the tick, else 0: the duty is not raised while a channel is blind,
+ * so that is not too low. */
 void controller_tick(controller_t *controller, const controller_inputs_t *inputs,
                      controller_outputs_t *outputs);
 

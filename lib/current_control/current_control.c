@@ -9,9 +9,14 @@
 #define TRIM_LIMIT        8191u
 
 #ifdef __AVR__
-#define HOT __attribute__((noinline, optimize("O2"))) /* 40 of 620 cycles a channel */
+#define HOT    __attribute__((noinline, optimize("O2")))
+#define ALWAYS __attribute__((always_inline))
+/* The address stays in a pointer register instead of being worked out anew for each field. */
+#define KEEP_ADDRESS(pointer) __asm__("" : "+b"(pointer))
 #else
 #define HOT
+#define ALWAYS
+#define KEEP_ADDRESS(pointer) (void)(pointer)
 #endif
 
 static bool refuse(uint16_t *bad, size_t offset)
@@ -157,15 +162,14 @@ static inline int32_t learnt_q24(const current_control_t *control, int32_t trim_
     return trim_q24 > limit_q24 ? limit_q24 : trim_q24;
 }
 
-/* A channel that is on and has a target. A call of its own: the channel's address stays in a
- * register. */
-static HOT uint16_t tick_driven(const current_control_t *control, current_control_channel_t *c,
-                                uint16_t target_ma, const current_control_input_t *input)
+/* A channel that is on and has a target. */
+static inline ALWAYS uint16_t tick_driven(const current_control_t *control,
+                                          current_control_channel_t *c, uint16_t target_ma,
+                                          int16_t measured_ma, bool valid, bool may_rise)
 {
     uint16_t reference_ma = c->reference_ma;
     int16_t error_q8 = 0;
-    if (input->valid && reference_ma != 0) {
-        int16_t measured_ma = input->measured_ma;
+    if (valid && reference_ma != 0) {
         if (measured_ma > MEASURED_LIMIT_MA) {
             measured_ma = MEASURED_LIMIT_MA;
         } else if (measured_ma < -MEASURED_LIMIT_MA) {
@@ -180,7 +184,7 @@ static HOT uint16_t tick_driven(const current_control_t *control, current_contro
 
     if (target_ma <= reference_ma) {
         reference_ma = target_ma;
-    } else if (input->may_rise && input->valid) {
+    } else if (may_rise && valid) {
         uint16_t rise_ma = (uint16_t)(target_ma - reference_ma);
         uint16_t slew_ma = control->parameters.slew_ma_per_tick;
         reference_ma = (uint16_t)(reference_ma + (rise_ma < slew_ma ? rise_ma : slew_ma));
@@ -209,16 +213,16 @@ static HOT uint16_t tick_driven(const current_control_t *control, current_contro
     return duty;
 }
 
-uint16_t current_control_tick(current_control_t *control, uint8_t channel,
-                              const current_control_input_t *input)
+static inline ALWAYS uint16_t tick(const current_control_t *control, current_control_channel_t *c,
+                                   uint16_t target_ma, int16_t measured_ma, bool valid,
+                                   bool may_rise)
 {
-    current_control_channel_t *c = &control->channel[channel];
-    if (input->valid) {
+    KEEP_ADDRESS(c);
+    if (valid) {
         c->blind_ticks = 0;
     } else if (c->blind_ticks < UINT8_MAX) {
         c->blind_ticks++;
     }
-    uint16_t target_ma = input->target_ma;
     if (target_ma > control->parameters.maximum_current_ma) {
         target_ma = control->parameters.maximum_current_ma;
     }
@@ -228,7 +232,24 @@ uint16_t current_control_tick(current_control_t *control, uint8_t channel,
         c->residue_q16 = 0;
         return 0;
     }
-    return tick_driven(control, c, target_ma, input);
+    return tick_driven(control, c, target_ma, measured_ma, valid, may_rise);
+}
+
+uint16_t current_control_tick(current_control_t *control, uint8_t channel,
+                              const current_control_input_t *input)
+{
+    return tick(control, &control->channel[channel], input->target_ma, input->measured_ma,
+                input->valid, input->may_rise);
+}
+
+HOT void current_control_tick_all(current_control_t *control, uint8_t channels,
+                                  const uint16_t target_ma[], const int16_t measured_ma[],
+                                  const bool valid[], bool may_rise, uint16_t duty[])
+{
+    current_control_channel_t *c = control->channel;
+    for (; channels != 0; channels--) {
+        *duty++ = tick(control, c++, *target_ma++, *measured_ma++, *valid++, may_rise);
+    }
 }
 
 uint16_t current_control_reference_ma(const current_control_t *control, uint8_t channel)

@@ -699,6 +699,7 @@ static void update(drive_policy_t *policy, const drive_policy_input_t *input, ui
     int16_t level = (int16_t)input->level_permille[k];
     bool driven = level != 0 && input->allowed[k];
 
+    thermal_model_settle(model, k);
     bool fresh = resistance_observer_update(&s->observer, &policy->alloy);
     if (fresh) {
         s->fresh = s->fresh < UINT8_MAX ? (uint8_t)(s->fresh + 1) : (uint8_t)(UINT8_MAX - 19);

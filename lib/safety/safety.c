@@ -9,27 +9,12 @@
 #define TICKS_PER_SECOND 50
 #define QUICK_LIMIT_MOHM 999u
 
-/* What is looked for in each tick of each spring. Each has a counter of bad ticks in a row. */
-typedef enum {
-    CHECK_OVER_CURRENT = 0,
-    CHECK_OPEN,
-    CHECK_SHORT,
-    CHECK_HIGH_RESISTANCE,
-    CHECK_STUCK_ON,
-    CHECK_SENSOR,
-    CHECK_TEMPERATURE
-} check_t;
-
-#define BIT(check) ((uint8_t)(1u << (check)))
-#define ELECTRICAL                                                                                 \
-    (BIT(CHECK_OVER_CURRENT) | BIT(CHECK_OPEN) | BIT(CHECK_SHORT) | BIT(CHECK_HIGH_RESISTANCE) |   \
-     BIT(CHECK_STUCK_ON))
-
-/* Which fault each check latches; CHECK_SENSOR adds the sensor's status to the first of four. */
-static const uint8_t check_fault[SAFETY_SPRING_CHECKS] = {
-    SAFETY_FAULT_OVER_CURRENT,    SAFETY_FAULT_OPEN_SPRING, SAFETY_FAULT_SHORT_SPRING,
-    SAFETY_FAULT_HIGH_RESISTANCE, SAFETY_FAULT_STUCK_ON,    SAFETY_FAULT_SENSOR_ABSENT,
-    SAFETY_FAULT_OVER_TEMPERATURE};
+/* Electrical conditions, bits of safety_spring_t.suspects; their order is that of blame. */
+#define OVER_CURRENT    1u
+#define OPEN            2u
+#define SHORT           4u
+#define HIGH_RESISTANCE 8u
+#define STUCK_ON        16u
 
 static bool refuse(uint16_t *bad, size_t offset)
 {
@@ -88,8 +73,7 @@ bool safety_check(const safety_parameters_t *p, uint16_t *bad)
     return true;
 }
 
-/* Bounds of the quick look: a reading within them is within the exact ones, too. Of the voltage
- * over the current, in 1/65536 ohm. */
+/* Bounds of safety_tick_good: a reading within them is within the exact ones, too. */
 static void prepare_quick(safety_t *safety)
 {
     const safety_parameters_t *p = &safety->parameters;
@@ -98,12 +82,16 @@ static void prepare_quick(safety_t *safety)
     if (high_mohm == 0 || high_mohm > QUICK_LIMIT_MOHM) {
         high_mohm = QUICK_LIMIT_MOHM;
     }
-    safety->quick_low_q16 = (uint16_t)((low_mohm * 65536ul + 999u) / 1000u);
-    safety->quick_high_q16 = (uint16_t)(high_mohm * 65536ul / 1000u);
-    /* a lower bound that does not fit: no current that says something is looked at quickly */
-    uint16_t most_ma =
-        low_mohm > QUICK_LIMIT_MOHM ? (uint16_t)(p->check_current_ma - 1u) : UINT16_MAX;
-    safety->quick_ma = most_ma < p->over_current_ma ? most_ma : p->over_current_ma;
+    safety->quick_low = 0;
+    safety->quick_high = (uint8_t)(high_mohm * 256ul / 1000u);
+    uint16_t most_ma = p->over_current_ma;
+    if (low_mohm <= QUICK_LIMIT_MOHM - 3u) {
+        safety->quick_low = (uint8_t)((low_mohm * 256ul + 999u) / 1000u);
+    } else if (most_ma >= p->check_current_ma) {
+        /* a lower bound that does not fit: no current that says something is looked at quickly */
+        most_ma = (uint16_t)(p->check_current_ma - 1u);
+    }
+    safety->quick_ma = most_ma;
 }
 
 bool safety_apply(safety_t *safety, const safety_parameters_t *parameters, uint16_t *bad)
@@ -139,13 +127,13 @@ static void latch_board(safety_t *safety, safety_fault_t fault)
     }
 }
 
-static void latch(safety_t *safety, uint8_t spring, safety_fault_t fault)
+static void latch(safety_t *safety, safety_spring_t *spring, safety_fault_t fault)
 {
     if (fault >= SAFETY_FAULT_STUCK_ON && fault <= SAFETY_FAULT_EMERGENCY_STOP) {
         latch_board(safety, fault);
     }
-    if (safety->fault[spring] == SAFETY_FAULT_NONE) {
-        safety->fault[spring] = (uint8_t)fault;
+    if (spring->fault == SAFETY_FAULT_NONE) {
+        spring->fault = (uint8_t)fault;
     }
 }
 
@@ -154,118 +142,92 @@ static uint8_t find_electrical(const safety_parameters_t *p, const safety_sample
     int16_t current_ma = s->current_ma;
     uint8_t found = 0;
     if (s->expected_ma >= p->check_current_ma && current_ma < (int16_t)(s->expected_ma >> 2)) {
-        found |= BIT(CHECK_OPEN);
+        found |= OPEN;
     }
     if (current_ma <= 0) {
         return found;
     }
     uint16_t amount_ma = (uint16_t)current_ma;
     if (amount_ma > p->over_current_ma) {
-        found |= BIT(CHECK_OVER_CURRENT);
+        found |= OVER_CURRENT;
     }
     if (s->expected_ma == 0 && amount_ma > p->stuck_on_ma) {
-        found |= BIT(CHECK_STUCK_ON);
+        found |= STUCK_ON;
     }
     if (amount_ma >= p->check_current_ma) {
         /* resistance against its limits without a division: u against i R */
-        uint32_t voltage_uv = s->voltage_mv > 0 ? (uint32_t)(uint16_t)s->voltage_mv * 1000u : 0u;
-        if (voltage_uv < (uint32_t)amount_ma * p->resistance_minimum_mohm) {
-            found |= BIT(CHECK_SHORT);
-        }
-        if (p->resistance_maximum_mohm != 0 &&
-            voltage_uv > (uint32_t)amount_ma * p->resistance_maximum_mohm) {
-            found |= BIT(CHECK_HIGH_RESISTANCE);
+        uint16_t voltage_mv = s->voltage_mv > 0 ? (uint16_t)s->voltage_mv : 0u;
+        uint32_t voltage_uv = fixed_point_mac_u16(0, voltage_mv, 1000u);
+        if (voltage_uv < fixed_point_mac_u16(0, amount_ma, p->resistance_minimum_mohm)) {
+            found |= SHORT;
+        } else if (p->resistance_maximum_mohm != 0 &&
+                   voltage_uv > fixed_point_mac_u16(0, amount_ma, p->resistance_maximum_mohm)) {
+            found |= HIGH_RESISTANCE;
         }
     }
     return found;
 }
 
-static void count_found(safety_t *safety, uint8_t spring, uint8_t found, uint8_t known,
-                        uint8_t sensor_status)
+static void latch_suspects(safety_t *safety, safety_spring_t *spring)
 {
-    uint8_t limit = safety->parameters.bad_samples;
-    uint8_t *count = safety->count[spring];
-    uint8_t counting = safety->counting[spring];
-    uint8_t to_do = (found | counting) & known; /* where nothing is known the count stays */
-    for (uint8_t check = 0; to_do != 0; check++, to_do >>= 1) {
-        if ((to_do & 1u) == 0) {
-            continue;
-        }
-        if ((found & BIT(check)) == 0) {
-            count[check] = 0;
-        } else if (++count[check] >= limit) {
-            count[check] = limit;
-            uint8_t fault = check_fault[check];
-            if (check == CHECK_SENSOR) {
-                fault = (uint8_t)(fault + (sensor_status <= 4 ? sensor_status - 1 : 0));
-            }
-            latch(safety, spring, (safety_fault_t)fault);
-        }
+    if ((spring->suspects & OVER_CURRENT) != 0) {
+        latch(safety, spring, SAFETY_FAULT_OVER_CURRENT);
     }
-    safety->counting[spring] = (uint8_t)((counting & (uint8_t)~known) | found);
+    if ((spring->suspects & OPEN) != 0) {
+        latch(safety, spring, SAFETY_FAULT_OPEN_SPRING);
+    }
+    if ((spring->suspects & SHORT) != 0) {
+        latch(safety, spring, SAFETY_FAULT_SHORT_SPRING);
+    }
+    if ((spring->suspects & HIGH_RESISTANCE) != 0) {
+        latch(safety, spring, SAFETY_FAULT_HIGH_RESISTANCE);
+    }
+    if ((spring->suspects & STUCK_ON) != 0) {
+        latch(safety, spring, SAFETY_FAULT_STUCK_ON);
+    }
 }
 
-/* A few compares that only a sample without any fault passes, in 16 bits. False says nothing. */
-static bool looks_good(const safety_t *safety, const safety_sample_t *s)
+static void count_electrical(safety_t *safety, safety_spring_t *spring, uint8_t found)
 {
-    const safety_parameters_t *p = &safety->parameters;
-    if (s->sensor_status != 0 || s->temperature_c7 > safety->temperature_trip_c7) {
-        return false;
+    uint8_t still = spring->suspects & found;
+    if (still == 0) { /* none, or another one: counted anew */
+        still = found;
+        spring->electrical = 0;
     }
-    uint16_t expected_ma = s->expected_ma;
-    int16_t current_ma = s->current_ma;
-    uint16_t amount_ma = current_ma > 0 ? (uint16_t)current_ma : 0;
-    if (expected_ma == 0) {
-        if (amount_ma > p->stuck_on_ma) {
-            return false;
-        }
-    } else if (expected_ma >= p->check_current_ma && current_ma < (int16_t)(expected_ma >> 2)) {
-        return false;
+    spring->suspects = still;
+    if (still != 0 && ++spring->electrical >= safety->parameters.bad_samples) {
+        spring->electrical = safety->parameters.bad_samples;
+        latch_suspects(safety, spring);
     }
-    if (amount_ma > safety->quick_ma) {
-        return false;
-    }
-    if (amount_ma < p->check_current_ma) {
-        return true;
-    }
-    uint16_t below_mv = fixed_point_high_u16(amount_ma, safety->quick_low_q16);
-    uint16_t most_mv = fixed_point_high_u16(amount_ma, safety->quick_high_q16);
-    return s->voltage_mv > (int16_t)below_mv && s->voltage_mv <= (int16_t)most_mv;
-}
-
-static __attribute__((noinline)) void look_closely(safety_t *safety, uint8_t spring,
-                                                   const safety_sample_t *sample)
-{
-    const safety_parameters_t *p = &safety->parameters;
-    uint8_t known = BIT(CHECK_SENSOR) | BIT(CHECK_TEMPERATURE);
-    uint8_t found = 0;
-    if (sample->sensor_status == 0) {
-        known |= ELECTRICAL;
-        found = find_electrical(p, sample);
-    } else {
-        found |= BIT(CHECK_SENSOR);
-    }
-    if (sample->temperature_c7 > safety->temperature_trip_c7) {
-        found |= BIT(CHECK_TEMPERATURE);
-    }
-
-    count_found(safety, spring, found, known, sample->sensor_status);
 }
 
 void safety_tick_spring(safety_t *safety, uint8_t spring, const safety_sample_t *sample)
 {
-    const safety_parameters_t *p = &safety->parameters;
-    /* A good tick after a good tick changes no count. */
-    if (safety->counting[spring] != 0 || !looks_good(safety, sample)) {
-        look_closely(safety, spring, sample);
+    safety_spring_t *s = &safety->spring[spring];
+    uint8_t limit = safety->parameters.bad_samples;
+    uint8_t status = sample->sensor_status;
+    if (status == 0) {
+        s->sensor = 0;
+        count_electrical(safety, s, find_electrical(&safety->parameters, sample));
+    } else if (++s->sensor >= limit) { /* nothing is known: the electrical count stays */
+        s->sensor = limit;
+        latch(safety, s,
+              (safety_fault_t)(SAFETY_FAULT_SENSOR_ABSENT + (status <= 4 ? status - 1 : 0)));
+    }
+    if (sample->temperature_c7 <= safety->temperature_trip_c7) {
+        s->temperature = 0;
+    } else if (++s->temperature >= limit) {
+        s->temperature = limit;
+        latch(safety, s, SAFETY_FAULT_OVER_TEMPERATURE);
     }
 
     if (sample->expected_ma == 0) {
-        safety->on_s[spring] = 0;
-    } else if (safety->second_ticks == 0 && safety->on_s[spring] < UINT16_MAX) {
-        safety->on_s[spring]++;
-        if (p->maximum_on_s != 0 && safety->on_s[spring] > p->maximum_on_s) {
-            latch(safety, spring, SAFETY_FAULT_ON_TIME);
+        s->on_s = 0;
+    } else if (safety->second_ticks == 0 && s->on_s < UINT16_MAX) {
+        s->on_s++;
+        uint16_t most_s = safety->parameters.maximum_on_s;
+        if (most_s != 0 && s->on_s > most_s) {
+            latch(safety, s, SAFETY_FAULT_ON_TIME);
         }
     }
 }
@@ -288,12 +250,12 @@ void safety_tick_board(safety_t *safety, uint32_t sum_ma)
 bool safety_allows(const safety_t *safety, uint8_t spring)
 {
     return !safety->locked && safety->board_fault == SAFETY_FAULT_NONE &&
-           safety->fault[spring] == SAFETY_FAULT_NONE;
+           safety->spring[spring].fault == SAFETY_FAULT_NONE;
 }
 
 safety_fault_t safety_fault(const safety_t *safety, uint8_t spring)
 {
-    return (safety_fault_t)safety->fault[spring];
+    return (safety_fault_t)safety->spring[spring].fault;
 }
 
 safety_fault_t safety_board_fault(const safety_t *safety)
@@ -344,15 +306,12 @@ void safety_clear(safety_t *safety)
 {
     safety->board_fault = SAFETY_FAULT_NONE;
     safety->supply_count = 0;
-    memset(safety->fault, 0, sizeof safety->fault);
-    memset(safety->count, 0, sizeof safety->count);
-    memset(safety->counting, 0, sizeof safety->counting);
-    memset(safety->on_s, 0, sizeof safety->on_s);
+    memset(safety->spring, 0, sizeof safety->spring);
 }
 
 void safety_trip_limit(safety_t *safety, uint8_t spring)
 {
-    latch(safety, spring, SAFETY_FAULT_LIMIT_TRIP);
+    latch(safety, &safety->spring[spring], SAFETY_FAULT_LIMIT_TRIP);
 }
 
 void safety_emergency_stop(safety_t *safety)

@@ -75,7 +75,8 @@ static uint8_t clamp_index(const thermal_model_t *model, uint8_t spring)
 /* ---- phase ---- */
 
 /* S at a distance (c7) into a transformation: Q0.15, and by how much it falls in this segment. */
-static inline ALWAYS uint16_t shape_inline(uint16_t distance_c7, uint16_t position_factor, uint16_t *fall)
+static inline ALWAYS uint16_t shape_inline(uint16_t distance_c7, uint16_t position_factor,
+                                           uint16_t *fall)
 {
     uint16_t position = (uint16_t)(fixed_point_mac_u16(0, distance_c7, position_factor) >> 8);
     uint8_t segment = (uint8_t)(position >> 8);
@@ -154,9 +155,9 @@ static void martensite_complete(const thermal_model_t *model, thermal_model_spri
 /* How far (c7) into a transformation the spring is now; `turn` is how far it was, `beyond` the
  * enthalpy added since. Solves distance - A S(distance) = enthalpy_past_start for the branch's
  * latent heat A; never goes back. */
-static inline ALWAYS int16_t newton(uint16_t turn, uint16_t beyond, uint16_t width, uint16_t position_factor,
-                      const thermal_model_spring_t *spring, uint8_t *gain,
-                      int16_t enthalpy_past_start)
+static inline ALWAYS int16_t newton(uint16_t turn, uint16_t beyond, uint16_t width,
+                                    uint16_t position_factor, const thermal_model_spring_t *spring,
+                                    uint8_t *gain, int16_t enthalpy_past_start)
 {
     uint16_t target = (uint16_t)(turn + (uint16_t)(fixed_point_mac_u16(0, beyond, *gain) >> 8));
     if (target >= width) {
@@ -189,9 +190,9 @@ static inline ALWAYS int16_t newton(uint16_t turn, uint16_t beyond, uint16_t wid
     return (int16_t)target;
 }
 
-/* A spring with this enthalpy passes a threshold if its phase is held, and comes to held_c7: lets the
- * phase follow. What is left in state is the phase's memory and the latent heat; the temperature is
- * the rest of the enthalpy. */
+/* A spring with this enthalpy passes a threshold if its phase is held, and comes to held_c7: lets
+ * the phase follow. What is left in state is the phase's memory and the latent heat; the
+ * temperature is the rest of the enthalpy. */
 static inline ALWAYS void transform(const thermal_model_t *model, thermal_model_spring_t *spring,
                                     thermal_model_spring_state_t *state, int16_t held_c7,
                                     int32_t enthalpy_c23)
@@ -372,9 +373,9 @@ static HOT void follow_phase(thermal_model_t *model, uint8_t i)
     set_lead(model, i, lead_ahead(temperature_c7, before));
 }
 
-/* What is set from outside is set after the step that is under way. */
-static void settle(thermal_model_t *model, uint8_t spring)
+void thermal_model_settle(thermal_model_t *model, uint8_t spring)
 {
+    spring = clamp_index(model, spring);
     if (model->spring[spring].pending != 0) {
         follow_phase(model, spring);
     }
@@ -491,7 +492,7 @@ void thermal_model_reset(thermal_model_t *model, int16_t temperature_c7)
 void thermal_model_set_temperature(thermal_model_t *model, uint8_t spring, int16_t temperature_c7)
 {
     spring = clamp_index(model, spring);
-    settle(model, spring);
+    thermal_model_settle(model, spring);
     temperature_c7 = clamp_c7(temperature_c7);
     if (temperature_c7 > model->highest_c7) {
         temperature_c7 = model->highest_c7;
@@ -533,7 +534,7 @@ void thermal_model_set_temperature(thermal_model_t *model, uint8_t spring, int16
 void thermal_model_add_temperature(thermal_model_t *model, uint8_t spring, int16_t difference_c7)
 {
     spring = clamp_index(model, spring);
-    settle(model, spring);
+    thermal_model_settle(model, spring);
     int32_t sum = (int32_t)high_word(model->state.spring[spring].temperature_c23) + difference_c7;
     if (sum < THERMAL_MODEL_LOWEST_C7) {
         sum = THERMAL_MODEL_LOWEST_C7;

@@ -286,15 +286,16 @@ void thermal_model_set_fan(thermal_model_t *model, uint8_t percent);
 /* One step of step_ms with power_uw[i] into spring i. O(n), 32-bit products, no division. */
 void thermal_model_step(thermal_model_t *model, const uint32_t power_uw[]);
 
-/* The same in portions, for who has little time at a stretch: begin_step, then follow_phases as often
- * as it takes. begin_step moves the network; a spring whose phase moves with it stays as it was
- * before the step, in every respect, until its turn in follow_phases, which takes `most` of them at a
- * time. Reading, and keeping the state, is right at any moment; who sets a spring's temperature
- * meanwhile sets it as after the step. What is left when the next step begins is done first, so that
- * after each whole step the model is the same as after thermal_model_step. power_uw is not read
- * later. O(n). */
+/* The same in portions, for who has little time at a stretch: begin_step, then follow_phases as
+ * often as it takes. begin_step moves the network, O(n); a spring whose phase moves with it stays
+ * as it was before the step, in every respect, until its turn in follow_phases, which takes `most`
+ * of them at a time, or in settle, which takes one. The model can be read, and its state be kept,
+ * at any moment. But who sets a temperature from what he reads calls settle first, or the step's
+ * heat is lost. What is left when the next step begins is done first: after each whole step the
+ * model is the same as after thermal_model_step. power_uw is not read later. */
 void thermal_model_begin_step(thermal_model_t *model, const uint32_t power_uw[]);
 void thermal_model_follow_phases(thermal_model_t *model, uint8_t most);
+void thermal_model_settle(thermal_model_t *model, uint8_t spring);
 
 /* Getters, O(1). An index out of range reads as spring 0. */
 int16_t thermal_model_temperature_c7(const thermal_model_t *model, uint8_t spring);

@@ -25,7 +25,7 @@ static void view_spring(const controller_t *chip, unsigned k, board_view_spring_
     view->duty = chip->duty[k];
     view->level_permille = chip->level_permille[k];
     view->temperature_c7 = (int16_t)(state->temperature_c23 >> 16);
-    view->fault = chip->safety.fault[k];
+    view->fault = chip->safety.spring[k].fault;
     view->stage = chip->policy.spring[k].stage;
     view->limits = chip->policy.spring[k].limits;
     view->wanted_ma = chip->policy.spring[k].wanted_ma;

@@ -380,6 +380,32 @@ static void parameters_out_of_range_are_refused_and_found(void)
 #undef REFUSES
 }
 
+static void all_at_once_is_one_after_the_other(void)
+{
+    current_control_t together = control;
+    for (uint32_t n = 0; n < 3000; n++) {
+        uint16_t target_ma[9], duty[9];
+        int16_t measured_ma[9];
+        bool valid[9];
+        bool may_rise = n % 7u != 0;
+        for (uint8_t k = 0; k < 9; k++) {
+            uint32_t mixed = (n + 1u) * (k + 3u) * 2654435761u;
+            target_ma[k] = mixed >> 29 != 0 ? (uint16_t)(500u + k * 300u) : 0u;
+            measured_ma[k] = (int16_t)(target_ma[k] + (mixed >> 20) % 200u - 100u);
+            valid[k] = (n + k) % 11u != 0 && (n / 40u + k) % 5u != 0;
+        }
+        current_control_tick_all(&together, 9, target_ma, measured_ma, valid, may_rise, duty);
+        for (uint8_t k = 0; k < 9; k++) {
+            current_control_input_t input = {.target_ma = target_ma[k],
+                                             .measured_ma = measured_ma[k],
+                                             .valid = valid[k],
+                                             .may_rise = may_rise};
+            TEST_ASSERT_EQUAL_UINT16(current_control_tick(&control, k, &input), duty[k]);
+        }
+    }
+    TEST_ASSERT_EQUAL_MEMORY(&control, &together, sizeof control);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -397,6 +423,7 @@ int main(void)
     RUN_TEST(blind_channel_does_not_start_and_follows_a_fall);
     RUN_TEST(reference_waits_while_it_may_not_rise);
     RUN_TEST(any_input_at_any_moment_stays_within_the_duty_range);
+    RUN_TEST(all_at_once_is_one_after_the_other);
     RUN_TEST(same_inputs_give_the_same_outputs);
     RUN_TEST(parameters_out_of_range_are_refused_and_found);
     return UNITY_END();

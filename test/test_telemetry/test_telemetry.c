@@ -88,7 +88,7 @@ static void the_longest_line_fits_what_is_asked_for(void)
         controller.measured_mv[k] = -32768;
         controller.duty[k] = 800;
         controller.model.state.spring[k].temperature_c23 = -40 * 8388608;
-        controller.safety.fault[k] = SAFETY_FAULT_EMERGENCY_STOP;
+        controller.safety.spring[k].fault = SAFETY_FAULT_EMERGENCY_STOP;
     }
     TEST_ASSERT_TRUE(telemetry_set(&telemetry, TELEMETRY_CSV, 50));
     room = TELEMETRY_LINE_BYTES(9);

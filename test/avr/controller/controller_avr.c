@@ -27,7 +27,7 @@ static void count_parts(bool steps)
     static bool yes[SPRINGS];
     static bool valid[SPRINGS];
     for (uint8_t k = 0; k < SPRINGS; k++) {
-        power_uw[k] = aside.power_uw[k];
+        power_uw[k] = controller_power_uw(&aside, k);
         yes[k] = safety_allows(&aside.safety, k);
         valid[k] = inputs.sensor[k].status == CONTROLLER_SENSOR_OK;
     }
@@ -58,7 +58,7 @@ static void count_parts(bool steps)
                               .voltage_mv = inputs.sensor[0].voltage_mv,
                               .expected_ma = current_control_reference_ma(&aside.current, 0),
                               .temperature_c7 = thermal_model_temperature_c7(&aside.model, 0)};
-    if (valid[0] && aside.safety.counting[0] == 0 && !broken[0] && !shorted[0]) {
+    if (valid[0] && aside.safety.spring[0].electrical == 0 && !broken[0] && !shorted[0]) {
         COUNT("safety_of_one");
         safety_tick_spring(&aside.safety, 0, &sample);
         COUNTED();
