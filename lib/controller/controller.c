@@ -247,8 +247,8 @@ static inline ALWAYS uint32_t add_power(uint32_t sum_uw, int16_t current_ma, int
 }
 
 /* Takes the readings and has them judged; returns the sum of what flows. */
-static HOT uint32_t take_sensors(controller_t *controller, const controller_sensor_t *sensor,
-                                 bool valid[])
+static uint32_t take_sensors(controller_t *controller, const controller_sensor_t *sensor,
+                             bool valid[])
 {
     uint32_t sum_ma = 0;
     for (uint8_t k = 0; k < controller->springs; k++, sensor++) {

@@ -201,7 +201,8 @@ static void count_electrical(safety_t *safety, safety_spring_t *spring, uint8_t 
     }
 }
 
-void safety_tick_spring(safety_t *safety, uint8_t spring, const safety_sample_t *sample)
+__attribute__((noinline)) void safety_tick_spring(safety_t *safety, uint8_t spring,
+                                                  const safety_sample_t *sample)
 {
     safety_spring_t *s = &safety->spring[spring];
     uint8_t limit = safety->parameters.bad_samples;

@@ -50,8 +50,9 @@ static void want_all_but(int spring)
     }
 }
 
-/* In every tick of every test: neither what is asked of the supply nor what flows is above its
- * limits, and a spring that is not to be driven gets nothing but a probing pulse. */
+/* In every tick of every test: what is asked of the supply is within its limit less the reserve,
+ * what flows is within its limit but for an overshoot of 1 % while loops settle (safety trips after
+ * five such ticks), and a spring that is not to be driven gets nothing but a probing pulse. */
 static void check_tick(void)
 {
     const controller_t *controller = loop_controller(loop);
@@ -67,7 +68,7 @@ static void check_tick(void)
         }
     }
     TEST_ASSERT_LESS_OR_EQUAL_UINT(limit_ma - settings.policy.supply_reserve_ma, sum_ma);
-    TEST_ASSERT_TRUE(loop_sum_current_a(loop) <= limit_ma / 1000.0);
+    TEST_ASSERT_TRUE(loop_sum_current_a(loop) <= 1.01 * limit_ma / 1000.0);
 }
 
 /* Advances and returns the highest temperature of any spring. */
