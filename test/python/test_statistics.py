@@ -42,6 +42,8 @@ def test_a_spike_is_found_and_a_step_is_not() -> None:
     series[77, 0] += 3.0
     found = statistics.spikes(series, np.full(2, 0.1))
     assert found[77, 0] and found.sum() == 1
+    restless = np.concatenate([rng.normal(0, 0.1, (200, 1)), rng.normal(0, 1.0, (200, 1))])
+    assert statistics.spikes(restless, np.array([0.1])).sum() <= 4
 
 
 def test_missing_values_count_as_absent() -> None:
@@ -49,5 +51,11 @@ def test_missing_values_count_as_absent() -> None:
     white = rng.normal(0, 0.3, (3000, 3))
     white[rng.random(white.shape) < 0.3] = np.nan
     assert statistics.autocorrelation([white], 5)[1:] == pytest.approx(np.zeros(5), abs=0.05)
+    red = np.zeros((30000, 2))
+    steps = rng.normal(size=red.shape)
+    for k in range(1, len(red)):
+        red[k] = 0.9 * red[k - 1] + steps[k]
+    red[rng.random(red.shape) < 0.3] = np.nan
+    assert statistics.autocorrelation([red], 2)[1:] == pytest.approx([0.9, 0.81], abs=0.03)
     assert statistics.rms([white]) == pytest.approx(0.3, rel=0.05)
     assert abs(np.nanmean(statistics.structure([white], [np.full(3, 0.3)], 12, [[0]]))) < 0.03

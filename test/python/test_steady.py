@@ -48,6 +48,14 @@ def test_the_model_afterwards_has_everything_that_was_set() -> None:
     assert np.abs(steady.errors(Array(), {}, on, table)).max() < 0.2
 
 
+def test_a_state_that_is_left_out_is_not_fitted() -> None:
+    table = states(MIXING)
+    table[0].measured_c[4] += 10.0
+    best = steady.diagnose_states(Array(), {}, table)["after"]
+    # one of six that no number explains: left out, it pulls the number no longer
+    assert best["holdout_rmse_c"] > 1.08 * best["rmse_c"]
+
+
 def test_nothing_is_adopted_where_the_declared_model_is_right() -> None:
     result = steady.diagnose_states(Array(), {}, states({}))
     assert result["effects"] == [] and result["baseline"]["rmse_c"] < 1e-6
