@@ -160,7 +160,7 @@ def _read_mapping(mapping: str | Path) -> _Mapping:
             factor, offset = (1.0, 0.0) if iso else UNITS[unit]
             scale = number(full.get("scale", 1.0), "scale", name)
             shift = number(full.get("offset", 0.0), "offset", name)
-            out.columns[name] = _Rule(sources, factor * scale, offset * scale + shift, iso)
+            out.columns[name] = _Rule(sources, factor * scale, offset + shift, iso)
     if "time_s" not in out.columns:
         raise refuse("the mapping has no time_s under [columns]", "[columns]")
     return out
@@ -217,9 +217,9 @@ def _split(path: str | Path, rules: _Mapping) -> tuple[pd.DataFrame, list[str], 
 def import_table(path: str | Path, mapping: str | Path) -> str:
     """Return the text of a log made from `path` by a mapping file or the name of a built-in mapping.
 
-    The mapping (TOML): `[columns]` gives for each of the log's columns the source's name, or a table
-    {column, unit | scale, offset}; `[file]` may give `separator`, `decimal`, `skip_lines`; `[constants]`
-    gives columns of one value.
+    The mapping (TOML): `[columns]` gives for each of the log's columns the source's name, or a table {column, unit, scale,
+    offset}: the number times `scale` is in `unit`, and `offset`, in the log's own unit, is added at the end. `[file]`
+    may give `separator`, `decimal`, `skip_lines`; `[constants]` gives columns of one value.
     """
     rules = _read_mapping(mapping)
     frame, lines, numbers = _split(path, rules)
