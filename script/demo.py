@@ -77,6 +77,10 @@ def draw_policies(runs: dict[str, list[dict[str, str]]]) -> Path:
             )
         axis.axhline(AUSTENITE_START_C, color="k", lw=0.7, ls=":")
         axis.text(time[-1], AUSTENITE_START_C + 1, "A$_s$", ha="right", fontsize=8)
+        if (off := switched_off(rows)) is not None:
+            axis.axvline(off, color="k", lw=0.7, ls="--")
+            axis.text(off + 8, 122, "safety switches off", fontsize=8, va="center")
+        axis.set_ylim(15, 126)
         axis.set_title(LABELS[policy])
         axis.set_xlabel("time, s")
     axes[0].set_ylabel("temperature, °C")
@@ -87,6 +91,14 @@ def draw_policies(runs: dict[str, list[dict[str, str]]]) -> Path:
     return path
 
 
+def switched_off(rows: list[dict[str, str]]) -> float | None:
+    """Return when the last current ended, s, where none flows at the end; None where the springs are still driven."""
+    driven = [any(float(row[f"i{k}_a"]) > 0 for k in range(1, 10)) for row in rows]
+    if driven[-1] or not any(driven):
+        return None
+    return float(rows[max(k for k, on in enumerate(driven) if on)]["time_s"])
+
+
 def energy_j(rows: list[dict[str, str]]) -> float:
     """Return the electrical energy of a run, J: v i over each row's interval."""
     time = column(rows, "time_s")
@@ -95,6 +107,7 @@ def energy_j(rows: list[dict[str, str]]) -> float:
 
 
 def main() -> int:
+    OUT.mkdir(exist_ok=True)
     simulate("paper", "-o", OUT / "paper.csv")
     runs = {}
     for policy in POLICIES:
