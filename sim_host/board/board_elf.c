@@ -147,10 +147,16 @@ void board_elf_free(board_elf_t *elf)
 
 const board_symbol_t *board_elf_symbol(const board_elf_t *elf, const char *name)
 {
+    const size_t length = strlen(name);
+    const board_symbol_t *clone = NULL;
     for (size_t k = 0; k < elf->symbol_count; k++) {
-        if (strcmp(elf->symbols[k].name, name) == 0) {
+        const char *found = elf->symbols[k].name;
+        if (strcmp(found, name) == 0) {
             return &elf->symbols[k];
         }
+        if (strncmp(found, name, length) == 0 && found[length] == '.') {
+            clone = &elf->symbols[k];
+        }
     }
-    return NULL;
+    return clone;
 }

@@ -33,7 +33,7 @@ typedef struct {
  * for this chip. */
 board_elf_t *board_elf_read(const char *path, char *error, size_t error_size);
 void board_elf_free(board_elf_t *elf);
-/* NULL if there is none of that name. */
+/* NULL if there is none of that name, nor NAME.something: a copy that the linker specialised. */
 const board_symbol_t *board_elf_symbol(const board_elf_t *elf, const char *name);
 
 #ifdef __cplusplus
