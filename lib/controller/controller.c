@@ -287,7 +287,8 @@ static uint32_t take_sensors(controller_t *controller, const controller_sensor_t
     return sum_ma;
 }
 
-static void step_model(controller_t *controller, const controller_inputs_t *inputs)
+/* True if a step of the model began. */
+static bool step_model(controller_t *controller, const controller_inputs_t *inputs)
 {
     /* One spring in each tick: the phase moves slowly, looking it up costs. */
     uint8_t turn = controller->resistance_turn;
@@ -300,7 +301,7 @@ static void step_model(controller_t *controller, const controller_inputs_t *inpu
         bool last = controller->model_tick == TICKS_PER_STEP - 1u;
         thermal_model_follow_phases(&controller->model,
                                     last ? UINT8_MAX : (uint8_t)(controller->springs / 4u));
-        return;
+        return false;
     }
     controller->model_tick = 0;
     for (uint8_t k = 0; k < controller->springs; k++) {
@@ -312,9 +313,10 @@ static void step_model(controller_t *controller, const controller_inputs_t *inpu
     thermal_model_set_fan(&controller->model, inputs->fan_percent);
     thermal_model_begin_step(&controller->model, controller->power_sum_uw);
     memset(controller->power_sum_uw, 0, sizeof controller->power_sum_uw);
+    return true;
 }
 
-static void drive(controller_t *controller, const bool valid[], uint32_t sum_ma)
+static void drive(controller_t *controller, const bool valid[], uint32_t sum_ma, bool model_stepped)
 {
     const safety_t *safety = &controller->safety;
     const bool any_allowed = !safety->locked && safety->board_fault == SAFETY_FAULT_NONE;
@@ -334,7 +336,8 @@ static void drive(controller_t *controller, const bool valid[], uint32_t sum_ma)
                                   .supply_limit_ma = limits->supply_limit_ma,
                                   .measured_ma = controller->measured_ma,
                                   .measured_mv = controller->measured_mv,
-                                  .valid = valid};
+                                  .valid = valid,
+                                  .model_stepped = model_stepped};
     drive_policy_tick(&controller->policy, &input, controller->target_ma);
 
     /* Targets fit the budget; while loops still settle, what flows may not: then none rises
@@ -356,8 +359,8 @@ __attribute__((noinline)) void controller_tick(controller_t *controller,
 {
     bool valid[CONTROLLER_MAX_SPRINGS];
     uint32_t sum_ma = take_sensors(controller, inputs->sensor, valid);
-    step_model(controller, inputs);
-    drive(controller, valid, sum_ma);
+    bool model_stepped = step_model(controller, inputs);
+    drive(controller, valid, sum_ma, model_stepped);
     memcpy(outputs->duty, controller->duty, sizeof outputs->duty);
     outputs->fan_percent = controller->fan_percent;
 }

@@ -2,9 +2,19 @@
 
 #include <stddef.h>
 
-#define UPDATE_TICKS                                                                               \
-    5u /* each spring is updated once in so many ticks, as the model is stepped                    \
-        */
+#include "fixed_point.h"
+
+#if defined(__AVR__) && !defined(__clang__)
+#define HOT __attribute__((noinline, optimize("O2"))) /* a third of its cycles */
+#else
+#define HOT
+#endif
+
+#define OWN __attribute__((noinline)) /* one function of all would spill its registers */
+
+/* Each spring is updated once in a round, 0.25 s. Counts of updates and windows below are of those
+ * quarters. */
+#define UPDATES_PER_S 4u
 
 /* A spring counts as wanted fully on from here: the last percent of a transformation has no level.
  */
@@ -25,19 +35,22 @@
 /* The slow ratio in a hold, permille of phase. */
 #define LOSS_SUSPECTED    3 /* the search pauses */
 #define LOSS_SEEN         6 /* for SEEN_WINDOWS: martensite start was passed */
-#define SEEN_WINDOWS      10
-#define PAUSE_WINDOWS     30
+#define SEEN_WINDOWS      4
+#define PAUSE_WINDOWS     12
 #define LOSS_CERTAIN      10  /* at once */
 #define SUSPICION_64UW    470 /* 30 mW stop a fall of 0.1 K/s */
-#define SETTLE_WINDOWS    50  /* after a loss was seen the average still moves */
+#define FOLLOWED_MOST     25  /* 2^-14 of the ratio: six permille */
+#define LOSS_CONFIRMED    4   /* what a true sighting comes to once the average has settled */
 #define LOSS_REHEAT       18
 #define GAIN_IMPLAUSIBLE  45
-#define REFERENCE_WINDOWS 100u
-#define FRESH_WINDOWS     8u
+#define REFERENCE_WINDOWS 40u
+#define FRESH_WINDOWS     4u
 
 #define KELVIN_C7          128
 #define TRUST_LIMIT_C7     (15 * KELVIN_C7) /* corrections beyond this: the reading is wrong */
 #define CERTAIN_C7         (20 * KELVIN_C7) /* below austenite start: martensite for certain */
+#define SHORT_MOST_C7      (20 * KELVIN_C7)
+#define KEPT_C7            (3 * KELVIN_C7) /* above austenite start what was reached is worth keeping */
 #define SETTLED_C7         (3 * KELVIN_C7 / 2)
 #define AFTER_BOOST_C7     (4 * KELVIN_C7) /* margin added until the heating has settled */
 #define BLIND_OVERSHOOT_C7 (4 * KELVIN_C7)
@@ -45,20 +58,22 @@
 #define PULL_C7            (KELVIN_C7 * 5 / 16) /* and the hold asks for so much less: 0.08 K/s */
 #define UNDRIVEN_BAND_C7   (5 * KELVIN_C7)
 #define UNDRIVEN_GAIN_Q8   102  /* 255 / UNDRIVEN_BAND_C7 */
-#define HORIZON_UPDATES    64   /* 6.4 s: undriven springs are predicted so far */
+#define HORIZON_UPDATES    24   /* 6 s: undriven springs are predicted so far */
 #define PARTIAL_POWER_64UW 6250 /* 0.4 W beyond the hold: heating to a level slows down */
 
-#define SOFT_MA         20                       /* per tick, after a change of policy */
-#define SOFT_TICKS      (2u * UPDATE_TICKS + 2u) /* every spring has had two turns */
-#define LEAST_BOOST_MA  200                      /* less is not worth waiting for */
-#define PROBE_TICKS     50u
+#define SOFT_MA         20                             /* per tick, after a change of policy */
+#define SOFT_TURNS      (2u * DRIVE_POLICY_ROUND + 1u) /* every spring has had two */
+#define LEAST_BOOST_MA  200u                           /* less is not worth waiting for */
+#define JUMP_MA         100u
+#define PROBE_TICKS     58u /* four windows */
 #define CURRENT_MOST_MA 3200
 
 enum {
     FLAG_LEARNT = 1,   /* martensite start was seen: the loss is known */
     FLAG_LET_GO = 2,   /* the resistance contradicts the model: not used until cold */
     FLAG_RELEASED = 4, /* switched off hot: no false actuation */
-    FLAG_TRIPPED = 8
+    FLAG_TRIPPED = 8,
+    FLAG_DOUBT = 16 /* martensite start was seen, but the average has not settled */
 };
 
 static int16_t clamp16(int32_t value, int16_t low, int16_t high)
@@ -136,10 +151,14 @@ bool drive_policy_apply(drive_policy_t *policy, const drive_policy_parameters_t 
         return false;
     }
     if (policy->parameters.policy != parameters->policy) {
-        policy->soft = SOFT_TICKS;
+        policy->soft = SOFT_TURNS;
+    }
+    if (policy->parameters.supply_reserve_ma != parameters->supply_reserve_ma) {
+        policy->supply_ma = 0; /* a lower budget holds at once */
     }
     policy->parameters = *parameters;
     policy->prepared = false;
+    policy->stale = true;
     return true;
 }
 
@@ -152,11 +171,11 @@ bool drive_policy_init(drive_policy_t *policy, const drive_policy_parameters_t *
     if (!drive_policy_check(parameters, bad)) {
         return false;
     }
-    *policy = (drive_policy_t){.parameters = *parameters, .springs = springs, .columns = springs};
+    *policy = (drive_policy_t){
+        .parameters = *parameters, .springs = springs, .columns = springs, .stale = true};
     for (uint8_t k = 0; k < springs; k++) {
         drive_policy_spring_t *s = &policy->spring[k];
         resistance_observer_reset(&s->observer);
-        s->inverse_q14 = RESISTANCE_OBSERVER_ONE_Q14;
         s->ceiling_ma = parameters->boost_current_ma;
     }
     return true;
@@ -176,14 +195,13 @@ void drive_policy_prepare(drive_policy_t *policy, const thermal_model_t *model)
     policy->columns = m->columns;
 
     /* a distance of 1 K is closed with a time constant of 4 s: C / 4 s */
-    uint32_t feedback = (uint32_t)m->heat_capacity_mj_per_k * 1000u / 2048u;
-    policy->feedback_q4 = feedback > 4095u ? 4095u : (uint16_t)feedback;
+    uint32_t feedback = (uint32_t)m->heat_capacity_mj_per_k * 1000u / (4u * KELVIN_C7);
+    policy->feedback_uw_per_c7 = feedback > 16383u ? 16383u : (uint16_t)feedback;
     int16_t width_cc = (int16_t)(m->austenite_finish_cc - m->austenite_start_cc);
-    policy->correction_q8 = (uint16_t)((uint32_t)c7_of_cc(width_cc) * 64u / 1000u);
+    /* half of the error in each update */
+    policy->correction_q8 = (uint16_t)((uint32_t)c7_of_cc(width_cc) * 128u / 1000u);
     /* 35 % of the declared loss */
-    uint32_t limit = (uint32_t)m->loss_uw_per_k * 21u / 64u;
-    policy->bias_limit_64uw = limit > 16000u ? 16000 : (int16_t)limit;
-    /* 1 - (1 + cos(pi d / w)) / 2 = LOSS_SEEN: d = 0.0533 w */
+    policy->bias_limit_uw_per_k = (int16_t)((uint32_t)m->loss_uw_per_k * 23u >> 6);
     width_cc = (int16_t)(m->martensite_start_cc - m->martensite_finish_cc);
     policy->event_c7 = c7_of_cc((int32_t)width_cc * 55 / 1000);
 
@@ -194,8 +212,8 @@ void drive_policy_prepare(drive_policy_t *policy, const thermal_model_t *model)
     uint16_t band_c7 = (uint16_t)c7_of_cc(p->temperature_band_cc);
     policy->derating_gain = (uint16_t)(65535u / band_c7);
     policy->undriven_c7 = c7_of_cc((int32_t)m->austenite_start_cc - p->undriven_margin_cc);
-    policy->overload_half_ticks = (uint32_t)p->overload_time_s * 25u;
-    policy->overload_gain_q24 = 16777215ul / policy->overload_half_ticks;
+    policy->overload_half_quarters = (uint16_t)(p->overload_time_s * 2u);
+    policy->overload_gain = (uint16_t)(65535u / policy->overload_half_quarters);
     policy->prepared = true;
 }
 
@@ -206,21 +224,23 @@ static int16_t model_permille(const thermal_model_t *model, uint8_t k)
     return (int16_t)(((uint32_t)thermal_model_austenite(model, k) * 125u) >> 12);
 }
 
-/* bias at a temperature: proportional to what it is above ambient, given at 60 K. */
-static int16_t bias_at(const thermal_model_t *model, int16_t bias_64uw, int16_t temperature_c7)
+/* The loss beyond the model's at a temperature, uW. */
+static int32_t bias_at(const thermal_model_t *model, int16_t bias_uw_per_k, int16_t temperature_c7)
 {
-    if (bias_64uw == 0) {
+    if (bias_uw_per_k == 0) {
         return 0;
     }
     int16_t above_c7 = (int16_t)(temperature_c7 - model->ambient_c7);
-    /* / 7680, as x 273 / 2^21 */
-    return (int16_t)((((int32_t)bias_64uw * above_c7 >> 9) * 273) >> 12);
+    if (above_c7 <= 0) {
+        return 0;
+    }
+    return (int32_t)fixed_point_mac_s16_u16(0, bias_uw_per_k, (uint16_t)above_c7) >> 7;
 }
 
 uint32_t drive_policy_model_power_uw(const drive_policy_t *policy, uint8_t spring,
                                      uint32_t power_uw)
 {
-    int32_t bias_uw = (int32_t)policy->spring[spring].bias_now_64uw * 64;
+    int32_t bias_uw = policy->spring[spring].bias_now_uw;
     if (bias_uw > 0 && (uint32_t)bias_uw > power_uw) {
         return 0;
     }
@@ -229,7 +249,7 @@ uint32_t drive_policy_model_power_uw(const drive_policy_t *policy, uint8_t sprin
 
 /* The model's spring to a temperature, its phase as if it came from martensite or from austenite.
  */
-static void rewind_to(thermal_model_t *model, uint8_t k, int16_t temperature_c7, bool from_cold)
+static OWN void rewind_to(thermal_model_t *model, uint8_t k, int16_t temperature_c7, bool from_cold)
 {
     thermal_model_set_temperature(model, k,
                                   from_cold ? (int16_t)(model->martensite_finish_c7 - KELVIN_C7)
@@ -247,11 +267,12 @@ static bool trusted(const drive_policy_t *policy, const drive_policy_spring_t *s
 }
 
 /* While it heats: where the resistance says the spring is, against where the model has it. */
-static void correct_heating(const drive_policy_t *policy, drive_policy_spring_t *s,
-                            thermal_model_t *model, uint8_t k, int16_t phase)
+/* True if the model was moved. */
+static OWN bool correct_heating(const drive_policy_t *policy, drive_policy_spring_t *s,
+                                thermal_model_t *model, uint8_t k, int16_t phase, int16_t permille)
 {
     int16_t now_c7 = thermal_model_temperature_c7(model, k);
-    int16_t error = (int16_t)(phase - model_permille(model, k));
+    int16_t error = (int16_t)(phase - permille);
     int16_t move_c7 = 0;
     if (phase > PHASE_SEEN && error > PHASE_DEADBAND && now_c7 < model->austenite_start_c7) {
         move_c7 = (int16_t)(model->austenite_start_c7 + KELVIN_C7 - now_c7);
@@ -262,7 +283,7 @@ static void correct_heating(const drive_policy_t *policy, drive_policy_spring_t 
         move_c7 = (int16_t)(((int32_t)error * policy->correction_q8) >> 8);
     }
     if (move_c7 == 0) {
-        return;
+        return false;
     }
     int16_t sum_c7 = (int16_t)(s->corrected_c7 + move_c7);
     if (sum_c7 > TRUST_LIMIT_C7 || sum_c7 < -TRUST_LIMIT_C7) {
@@ -276,6 +297,32 @@ static void correct_heating(const drive_policy_t *policy, drive_policy_spring_t 
     } else {
         rewind_to(model, k, (int16_t)(now_c7 + move_c7), true);
     }
+    return true;
+}
+
+/* How far into its width a transformation is, permille, that has made so much austenite:
+ * acos(1 - 2 x) / pi in three straight pieces to a half and their mirror, to 15 permille. */
+static int16_t place_of_phase(int16_t permille)
+{
+    bool upper = permille > 500;
+    uint16_t x = (uint16_t)(upper ? 1000 - permille : permille);
+    uint16_t place = x < 38    ? (uint16_t)((x * 13u) >> 2)
+                     : x < 146 ? (uint16_t)(125u + (((x - 38u) * 295u) >> 8))
+                               : (uint16_t)(250u + (((x - 146u) * 181u) >> 8));
+    return (int16_t)(upper ? 1000u - place : place);
+}
+
+/* Between martensite start and austenite start the phase rests: what the resistance says of it is
+ * the phase's memory, not the temperature. */
+static OWN void impose_phase(thermal_model_t *model, uint8_t k, int16_t permille)
+{
+    int16_t now_c7 = thermal_model_temperature_c7(model, k);
+    int16_t width_c7 = (int16_t)(model->austenite_finish_c7 - model->austenite_start_c7);
+    int32_t place_c7 = (int32_t)place_of_phase(clamp16(permille, 0, 1000)) * width_c7;
+    thermal_model_set_temperature(model, k, (int16_t)(model->martensite_finish_c7 - KELVIN_C7));
+    thermal_model_set_temperature(model, k,
+                                  (int16_t)(model->austenite_start_c7 + ((place_c7 * 131) >> 17)));
+    thermal_model_set_temperature(model, k, now_c7);
 }
 
 /* While it cools to a level, or is probed. */
@@ -298,8 +345,9 @@ static void correct_hold(const drive_policy_t *policy, drive_policy_spring_t *s,
     int16_t model_c7 = thermal_model_temperature_c7(model, k);
     int32_t difference_uw = thermal_model_power_to_hold_uw(model, k, model_c7) -
                             thermal_model_power_to_hold_uw(model, k, true_c7);
-    s->bias_64uw = clamp16(s->bias_64uw + (difference_uw >> 6), (int16_t)-policy->bias_limit_64uw,
-                           policy->bias_limit_64uw);
+    /* / 60 K, where springs are held above ambient */
+    s->bias_uw_per_k = clamp16(s->bias_uw_per_k + ((difference_uw * 273) >> 14),
+                               (int16_t)-policy->bias_limit_uw_per_k, policy->bias_limit_uw_per_k);
     if (full) {
         rewind_to(model, k, true_c7, false);
     } else {
@@ -312,10 +360,9 @@ static void correct_hold(const drive_policy_t *policy, drive_policy_spring_t *s,
 static void enter(drive_policy_t *policy, uint8_t k, drive_policy_stage_t stage)
 {
     drive_policy_spring_t *s = &policy->spring[k];
+    supply_queue_remove(&policy->queue, k);
     if (stage == DRIVE_POLICY_STAGE_HEAT) {
         supply_queue_add(&policy->queue, k);
-    } else {
-        supply_queue_remove(&policy->queue, k);
     }
     if (stage == DRIVE_POLICY_STAGE_HOLD) {
         s->margin_c7 = (s->flags & FLAG_LEARNT) != 0
@@ -323,7 +370,11 @@ static void enter(drive_policy_t *policy, uint8_t k, drive_policy_stage_t stage)
                            : policy->unsure_margin_c7;
     }
     s->stage = (uint8_t)stage;
+    s->wanted_ma = stage == DRIVE_POLICY_STAGE_HEAT  ? policy->parameters.boost_current_ma
+                   : stage == DRIVE_POLICY_STAGE_OFF ? 0
+                                                     : policy->parameters.probe_current_ma;
     s->corrected_c7 = 0;
+    s->flags &= (uint8_t)~FLAG_DOUBT;
     s->lost_permille = 0;
     s->reference = 0;
     s->plateau = 0;
@@ -334,25 +385,28 @@ static void enter(drive_policy_t *policy, uint8_t k, drive_policy_stage_t stage)
 
 /* What heats a spring at a temperature, against its neighbours as they are now, plus a correction
  * towards it. */
-static uint16_t hold_current_ma(const drive_policy_t *policy, const drive_policy_spring_t *s,
-                                const thermal_model_t *model, uint8_t k, int16_t target_c7,
-                                int16_t extra_64uw)
+static HOT uint16_t hold_current_ma(const drive_policy_t *policy, const drive_policy_spring_t *s,
+                                    const thermal_model_t *model, uint8_t k, int16_t target_c7,
+                                    int16_t extra_64uw)
 {
-    int16_t short_c7 =
-        clamp16((int32_t)target_c7 - thermal_model_temperature_c7(model, k), -2560, 2560);
-    int32_t power_64uw = (thermal_model_power_to_hold_uw(model, k, target_c7) >> 6) +
-                         bias_at(model, s->bias_64uw, target_c7) +
-                         (((int32_t)short_c7 * (int16_t)policy->feedback_q4) >> 4) + extra_64uw;
+    int16_t short_c7 = (int16_t)(target_c7 - thermal_model_temperature_c7(model, k));
+    short_c7 = short_c7 > SHORT_MOST_C7    ? SHORT_MOST_C7
+               : short_c7 < -SHORT_MOST_C7 ? -SHORT_MOST_C7
+                                           : short_c7;
+    int32_t power_uw = thermal_model_power_to_hold_uw(model, k, target_c7) +
+                       bias_at(model, s->bias_uw_per_k, target_c7);
+    power_uw += (int32_t)fixed_point_mac_s16_u16(0, short_c7, policy->feedback_uw_per_c7);
+    int32_t power_64uw = ((power_uw << 2) >> 8) + extra_64uw;
     if (power_64uw <= 0) {
         return 0;
     }
-    return resistance_current_for_power_ma(&policy->alloy, s->inverse_q14,
+    return resistance_current_for_power_ma(&policy->alloy, s->observer.inverse_q14,
                                            power_64uw > UINT16_MAX ? UINT16_MAX
                                                                    : (uint16_t)power_64uw);
 }
 
-static bool is_transformed(const drive_policy_t *policy, drive_policy_spring_t *s,
-                           thermal_model_t *model, uint8_t k, bool sees, int16_t phase)
+static OWN bool is_transformed(const drive_policy_t *policy, drive_policy_spring_t *s,
+                               thermal_model_t *model, uint8_t k, bool sees, int16_t phase)
 {
     int16_t now_c7 = thermal_model_temperature_c7(model, k);
     if (!sees) {
@@ -373,15 +427,14 @@ static bool is_transformed(const drive_policy_t *policy, drive_policy_spring_t *
 }
 
 /* Counts half seconds in which the ratio stood still. */
-static void watch_plateau(const drive_policy_t *policy, drive_policy_spring_t *s)
+static void watch_plateau(drive_policy_spring_t *s)
 {
-    if (s->fresh % UPDATE_TICKS != 0) {
+    if ((s->fresh & 1u) != 0) {
         return;
     }
-    int32_t change =
-        ((int32_t)s->observer.ratio_q14 - (int32_t)s->before_q14) * policy->alloy.phase_gain_q12;
-    change >>= 12;
-    s->before_q14 = s->observer.ratio_q14;
+    int16_t phase = s->observer.phase_permille;
+    int16_t change = (int16_t)(phase - s->before_permille);
+    s->before_permille = phase;
     if (change > PLATEAU_PERMILLE || change < -PLATEAU_PERMILLE) {
         s->plateau = 0;
     } else if (s->plateau < UINT8_MAX) {
@@ -389,38 +442,59 @@ static void watch_plateau(const drive_policy_t *policy, drive_policy_spring_t *s
     }
 }
 
-static void heat(drive_policy_t *policy, drive_policy_spring_t *s, thermal_model_t *model,
-                 uint8_t k, int16_t level, bool fresh)
+/* Where the resistance says that the heating is, and the model with it. True once the wanted phase
+ * is reached. */
+static OWN bool has_heated(drive_policy_t *policy, drive_policy_spring_t *s, thermal_model_t *model,
+                           uint8_t k, int16_t level, bool fresh)
 {
     int16_t now_c7 = thermal_model_temperature_c7(model, k);
-    if (fresh && s->fresh >= FRESH_WINDOWS && model_permille(model, k) == 0 &&
+    int16_t permille = model_permille(model, k);
+    if (fresh && s->fresh >= FRESH_WINDOWS && permille == 0 &&
         now_c7 < model->austenite_start_c7 - CERTAIN_C7) {
-        resistance_observer_learn_martensite(&s->observer);
+        resistance_observer_learn_martensite(&s->observer, &policy->alloy);
     }
     bool sees = trusted(policy, s);
-    int16_t phase = sees ? resistance_observer_phase_permille(&s->observer, &policy->alloy)
-                         : model_permille(model, k);
+    int16_t phase = sees ? s->observer.phase_permille : permille;
+    if (s->granted_ma < s->asked_ma) {
+        s->plateau = 0; /* it stands still because it waits */
+    } else if (fresh) {
+        watch_plateau(s);
+    }
     if (fresh) {
-        watch_plateau(policy, s);
-        if (sees) {
-            correct_heating(policy, s, model, k, phase);
+        if (sees && s->reference != 0) {
+            if (correct_heating(policy, s, model, k, phase, permille)) {
+                return false; /* next time: one of both is enough for a tick */
+            }
+        } else if (sees && now_c7 > model->martensite_start_c7) {
+            s->reference = 1; /* the first look at it, if it was not cold before */
+            if (now_c7 < model->austenite_start_c7 && s->target_ma != 0 &&
+                (phase > permille + PHASE_SEEN || phase < permille - PHASE_SEEN)) {
+                impose_phase(model, k, phase);
+                return false;
+            }
+        } else if (now_c7 < model->martensite_finish_c7) {
+            s->reference = 1;
         }
     }
-    s->wanted_ma = policy->parameters.boost_current_ma;
-    /* what it has is kept while it waits */
-    s->floor_ma = phase > level >> 1 ? hold_current_ma(policy, s, model, k, now_c7, 0) : 0;
-    if (level >= LEVEL_FULL_PERMILLE) {
-        if (is_transformed(policy, s, model, k, sees, phase)) {
-            enter(policy, k, DRIVE_POLICY_STAGE_HOLD);
+    return level >= LEVEL_FULL_PERMILLE ? is_transformed(policy, s, model, k, sees, phase)
+                                        : phase >= level;
+}
+
+static OWN void heat(drive_policy_t *policy, drive_policy_spring_t *s, thermal_model_t *model,
+                     uint8_t k, int16_t level, bool fresh)
+{
+    int16_t now_c7 = thermal_model_temperature_c7(model, k);
+    bool waits = s->granted_ma < s->asked_ma;
+    bool slows = level < LEVEL_FULL_PERMILLE && now_c7 > model->austenite_start_c7 - KELVIN_C7;
+    if ((waits || slows) && (policy->round & 1u) != 0) { /* every second time: a tick is short */
+        uint16_t keeps_ma =
+            hold_current_ma(policy, s, model, k, now_c7, slows ? PARTIAL_POWER_64UW : 0);
+        if (slows && keeps_ma < s->wanted_ma) {
+            s->wanted_ma = keeps_ma;
         }
-        return;
-    }
-    if (thermal_model_temperature_c7(model, k) > model->austenite_start_c7 - KELVIN_C7) {
-        uint16_t gentle_ma = hold_current_ma(
-            policy, s, model, k, thermal_model_temperature_c7(model, k), PARTIAL_POWER_64UW);
-        s->wanted_ma = gentle_ma < s->wanted_ma ? gentle_ma : s->wanted_ma;
-    }
-    if (phase >= level) {
+        /* what it has is kept while it waits */
+        s->floor_ma = waits && now_c7 > model->austenite_start_c7 + KEPT_C7 ? keeps_ma : 0;
+    } else if (has_heated(policy, s, model, k, level, fresh)) {
         enter(policy, k, DRIVE_POLICY_STAGE_HOLD);
     }
 }
@@ -429,7 +503,7 @@ static void heat(drive_policy_t *policy, drive_policy_spring_t *s, thermal_model
 static void let_go(const drive_policy_t *policy, drive_policy_spring_t *s)
 {
     s->flags = (uint8_t)((s->flags | FLAG_LET_GO) & ~FLAG_LEARNT);
-    s->bias_64uw = 0;
+    s->bias_uw_per_k = 0;
     s->margin_c7 = policy->unsure_margin_c7;
 }
 
@@ -439,18 +513,38 @@ static bool is_pausing(const drive_policy_spring_t *s)
     return s->suspicion != 0 && s->suspicion <= PAUSE_WINDOWS;
 }
 
+/* The average has settled. What was lost is lost for good, and by now the average shows all of it:
+ * a loss that it does not show was its own wandering. */
+static OWN void take_reference(drive_policy_t *policy, drive_policy_spring_t *s)
+{
+    if ((s->flags & FLAG_DOUBT) != 0) {
+        s->flags &= (uint8_t)~FLAG_DOUBT;
+        int16_t lost = (int16_t)-resistance_observer_drift_permille(&s->observer, &policy->alloy,
+                                                                    s->reference_q14);
+        if (lost < LOSS_CONFIRMED) {
+            s->flags &= (uint8_t)~FLAG_LEARNT;
+            lost = 0;
+        }
+        s->lost_permille = (int16_t)(s->lost_permille + lost);
+    }
+    s->followed = 0;
+    s->reference_q14 = (uint16_t)(s->observer.slow_q22 >> 8);
+}
+
 /* Looks for the first loss of phase: martensite start, seen as on a thermometer. */
-static void watch_hold(drive_policy_t *policy, drive_policy_spring_t *s, thermal_model_t *model,
-                       uint8_t k, bool full)
+static OWN void watch_hold(drive_policy_t *policy, drive_policy_spring_t *s, thermal_model_t *model,
+                           uint8_t k, bool full)
 {
     int16_t now_c7 = thermal_model_temperature_c7(model, k);
     int16_t target_c7 = (int16_t)(model->martensite_start_c7 + s->margin_c7);
     if (s->reference < REFERENCE_WINDOWS) {
         if (now_c7 < target_c7 + SETTLED_C7 && now_c7 > target_c7 - SETTLED_C7) {
             s->reference++;
-            s->reference_q14 = (uint16_t)(s->observer.slow_q22 >> 8);
-        } else if (s->reference == 0) {
+        } else if (s->reference == 0 && (s->flags & FLAG_DOUBT) == 0) {
             resistance_observer_restart_average(&s->observer);
+        }
+        if (s->reference == REFERENCE_WINDOWS) {
+            take_reference(policy, s);
         }
         return;
     }
@@ -461,37 +555,33 @@ static void watch_hold(drive_policy_t *policy, drive_policy_spring_t *s, thermal
         return;
     }
     int16_t start_c7 = model->martensite_start_c7;
-    if (loss >= LOSS_REHEAT && full) {
+    if (loss + s->lost_permille >= LOSS_REHEAT && full) {
         enter(policy, k, DRIVE_POLICY_STAGE_HEAT);
         return;
     }
-    if (s->plateau != 0) {
-        s->plateau--;
-        s->lost_permille = loss > s->lost_permille ? loss : s->lost_permille;
-        return;
-    }
-    if (now_c7 > model->martensite_start_c7 && (s->flags & FLAG_LEARNT) == 0 &&
-        s->fresh % 20u == 0) {
+    bool searches = (s->flags & FLAG_LEARNT) == 0;
+    if ((searches || now_c7 > start_c7) && s->suspicion == 0 && (s->fresh & 7u) == 0) {
         /* the sensor's steps let the average wander as the current changes: 0.1 permille a second
-         * is followed, a loss is ten times faster */
+         * is followed, a loss is ten times faster; once it is held still not for ever */
         uint16_t slow_q14 = (uint16_t)(s->observer.slow_q22 >> 8);
-        if (slow_q14 != s->reference_q14) {
-            s->reference_q14 = (uint16_t)(slow_q14 > s->reference_q14 ? s->reference_q14 + 1
-                                                                      : s->reference_q14 - 1);
+        if (slow_q14 > s->reference_q14 && (searches || s->followed < FOLLOWED_MOST)) {
+            s->reference_q14++;
+            s->followed = (int8_t)(s->followed + !searches);
+        } else if (slow_q14 < s->reference_q14 && (searches || s->followed > -FOLLOWED_MOST)) {
+            s->reference_q14--;
+            s->followed = (int8_t)(s->followed - !searches);
         }
     }
-    int16_t more = (int16_t)(loss - s->lost_permille);
-    s->suspicion = more < LOSS_SUSPECTED      ? 0
+    s->suspicion = loss < LOSS_SUSPECTED      ? 0
                    : s->suspicion < UINT8_MAX ? (uint8_t)(s->suspicion + 1)
                                               : UINT8_MAX;
-    s->seen = more < LOSS_SEEN ? 0 : (uint8_t)(s->seen + 1);
-    if (more >= LOSS_CERTAIN || s->seen > SEEN_WINDOWS) {
+    s->seen = loss < LOSS_SEEN ? 0 : (uint8_t)(s->seen + 1);
+    if (loss >= LOSS_CERTAIN || s->seen > SEEN_WINDOWS) {
         correct_hold(policy, s, model, k, (int16_t)(start_c7 - policy->event_c7), full);
-        s->lost_permille = loss;
-        s->plateau = SETTLE_WINDOWS;
+        s->reference = 0; /* the average lags: a new one once it has settled */
         s->suspicion = 0;
         s->seen = 0;
-        s->flags |= FLAG_LEARNT;
+        s->flags |= FLAG_LEARNT | FLAG_DOUBT;
         s->margin_c7 = policy->hold_margin_c7;
         return;
     }
@@ -501,12 +591,12 @@ static void watch_hold(drive_policy_t *policy, drive_policy_spring_t *s, thermal
 }
 
 /* The margin narrows: to the wanted one where the loss is known, else until the start is seen. */
-static void narrow_margin(drive_policy_t *policy, drive_policy_spring_t *s)
+static OWN void narrow_margin(drive_policy_t *policy, drive_policy_spring_t *s)
 {
     int16_t floor_c7 =
         (s->flags & FLAG_LEARNT) != 0 ? policy->hold_margin_c7 : (int16_t) - (PIN_C7 + PULL_C7);
     if (policy->search_c7 == 0 || is_pausing(s) || s->reference < REFERENCE_WINDOWS ||
-        s->fresh % 10u != 0) {
+        (s->fresh & 3u) != 0) {
         return;
     }
     if (s->margin_c7 > floor_c7) {
@@ -514,32 +604,44 @@ static void narrow_margin(drive_policy_t *policy, drive_policy_spring_t *s)
         if (s->margin_c7 < floor_c7) {
             s->margin_c7 = floor_c7;
         }
-    } else if ((s->flags & FLAG_LEARNT) == 0 && s->bias_64uw <= -policy->bias_limit_64uw) {
+    } else if ((s->flags & FLAG_LEARNT) == 0 && s->bias_uw_per_k <= -policy->bias_limit_uw_per_k) {
         let_go(policy, s); /* it must have been passed */
     }
 }
 
-static void hold(drive_policy_t *policy, drive_policy_spring_t *s, thermal_model_t *model,
-                 uint8_t k, int16_t level, bool fresh)
+static OWN void hold(drive_policy_t *policy, drive_policy_spring_t *s, thermal_model_t *model,
+                     uint8_t k, int16_t level, bool fresh)
 {
     bool full = level >= LEVEL_FULL_PERMILLE;
-    bool sees = trusted(policy, s);
-    if (sees && fresh) {
+    int16_t phase = s->observer.phase_permille;
+    if (!trusted(policy, s)) {
+        if (s->fresh >= FRESH_WINDOWS) {
+            s->margin_c7 = policy->unsure_margin_c7;
+        }
+        if ((policy->round & 1u) != 0) { /* every second time: a tick is short */
+            if (model_permille(model, k) < level - 2 * LEVEL_BAND_PERMILLE) {
+                enter(policy, k, DRIVE_POLICY_STAGE_HEAT);
+            }
+            return;
+        }
+        phase = level;
+    } else if (fresh) {
         watch_hold(policy, s, model, k, full);
         narrow_margin(policy, s);
-    } else if (!sees && s->fresh >= FRESH_WINDOWS) {
-        s->margin_c7 = policy->unsure_margin_c7;
+        if (s->stage != DRIVE_POLICY_STAGE_HOLD) {
+            return;
+        }
     }
-    if (s->stage != DRIVE_POLICY_STAGE_HOLD) {
+    /* while it settles the reading may be wrong a little */
+    int16_t least = (int16_t)(level - (full ? 2 : 1) * LEVEL_BAND_PERMILLE -
+                              (s->reference < REFERENCE_WINDOWS ? LEVEL_BAND_PERMILLE : 0));
+    if (phase < least) {
+        enter(policy, k, DRIVE_POLICY_STAGE_HEAT);
         return;
     }
-    int16_t phase = sees && s->reference >= REFERENCE_WINDOWS
-                        ? resistance_observer_phase_permille(&s->observer, &policy->alloy)
-                        : model_permille(model, k);
-    if (phase < level - (full ? 2 : 1) * LEVEL_BAND_PERMILLE) {
-        enter(policy, k, DRIVE_POLICY_STAGE_HEAT);
-    } else if (!full && phase > level + LEVEL_BAND_PERMILLE) {
+    if (!full && phase > level + LEVEL_BAND_PERMILLE) {
         enter(policy, k, DRIVE_POLICY_STAGE_LOWER);
+        return;
     }
     uint16_t wanted_ma =
         hold_current_ma(policy, s, model, k, (int16_t)(model->martensite_start_c7 + s->margin_c7),
@@ -551,13 +653,11 @@ static void hold(drive_policy_t *policy, drive_policy_spring_t *s, thermal_model
     s->wanted_ma = wanted_ma;
 }
 
-static void lower(drive_policy_t *policy, drive_policy_spring_t *s, thermal_model_t *model,
-                  uint8_t k, int16_t level, bool fresh)
+static OWN void lower(drive_policy_t *policy, drive_policy_spring_t *s, thermal_model_t *model,
+                      uint8_t k, int16_t level, bool fresh)
 {
-    s->wanted_ma = policy->parameters.probe_current_ma;
     bool sees = trusted(policy, s);
-    int16_t phase = sees ? resistance_observer_phase_permille(&s->observer, &policy->alloy)
-                         : model_permille(model, k);
+    int16_t phase = sees ? s->observer.phase_permille : model_permille(model, k);
     if (sees && fresh) {
         correct_cooling(policy, model, k, phase, PHASE_DEADBAND);
     }
@@ -569,16 +669,13 @@ static void lower(drive_policy_t *policy, drive_policy_spring_t *s, thermal_mode
 }
 
 /* Undriven: how near austenite start it is going to come, 255 at the limit. */
-static void off(const drive_policy_t *policy, drive_policy_spring_t *s, thermal_model_t *model,
-                uint8_t k, bool fresh)
+static OWN uint8_t off(const drive_policy_t *policy, drive_policy_spring_t *s,
+                       thermal_model_t *model, uint8_t k, bool fresh)
 {
     int16_t now_c7 = thermal_model_temperature_c7(model, k);
     int16_t from_c7 = (int16_t)(policy->undriven_c7 - UNDRIVEN_BAND_C7);
-    s->wanted_ma = 0;
     if (fresh && trusted(policy, s)) { /* a probing pulse */
-        correct_cooling(policy, model, k,
-                        resistance_observer_phase_permille(&s->observer, &policy->alloy),
-                        PHASE_PROBED);
+        correct_cooling(policy, model, k, s->observer.phase_permille, PHASE_PROBED);
     }
     if (now_c7 < from_c7) {
         s->flags &= (uint8_t)~FLAG_RELEASED;
@@ -586,36 +683,39 @@ static void off(const drive_policy_t *policy, drive_policy_spring_t *s, thermal_
             s->flags &= (uint8_t)~FLAG_LET_GO;
         }
     }
-    int32_t soon_c7 = now_c7 + (int32_t)(now_c7 - s->last_c7) * HORIZON_UPDATES;
-    int32_t over = soon_c7 - from_c7;
-    if (over <= 0 || (s->flags & FLAG_RELEASED) != 0) {
-        s->severity = 0;
-    } else {
-        s->severity =
-            over >= UNDRIVEN_BAND_C7 ? UINT8_MAX : (uint8_t)((over * UNDRIVEN_GAIN_Q8) >> 8);
+    int16_t rise_c7 = clamp16((int32_t)now_c7 - s->last_c7, -256, 256);
+    int16_t over_c7 = (int16_t)(now_c7 + rise_c7 * HORIZON_UPDATES - from_c7);
+    if (over_c7 <= 0 || (s->flags & FLAG_RELEASED) != 0) {
+        return 0;
     }
+    if (over_c7 >= UNDRIVEN_BAND_C7) {
+        return UINT8_MAX;
+    }
+    return (uint8_t)(((uint16_t)over_c7 * (uint16_t)UNDRIVEN_GAIN_Q8) >> 8);
 }
 
 /* ---- derating ---- */
 
-/* Worst of the undriven neighbours, itself not counted. */
-static uint8_t worst_neighbour(const drive_policy_t *policy, uint8_t k)
+/* Worst of the undriven neighbours; a driven spring has no severity. */
+static OWN uint8_t worst_neighbour(const drive_policy_t *policy, uint8_t k)
 {
     uint8_t columns = policy->columns;
-    uint8_t column = k;
-    while (column >= columns) {
-        column = (uint8_t)(column - columns);
+    uint8_t row_start = 0;
+    while ((uint8_t)(k - row_start) >= columns) {
+        row_start = (uint8_t)(row_start + columns);
     }
+    uint8_t column = (uint8_t)(k - row_start);
+    uint8_t left = column != 0 ? 1 : 0;
+    uint8_t width = (uint8_t)(left + (column + 1u < columns ? 2u : 1u));
+    uint8_t first = (uint8_t)(row_start == 0 ? k - left : k - left - columns);
     uint8_t worst = 0;
-    for (int8_t row_step = -1; row_step <= 1; row_step++) {
-        for (int8_t step = -1; step <= 1; step++) {
-            int16_t other = (int16_t)(k + row_step * (int16_t)columns + step);
-            if ((step < 0 && column == 0) || (step > 0 && column + 1 >= columns) || other < 0 ||
-                other >= policy->springs || other == k) {
-                continue;
+    for (uint16_t row = first; row <= (uint16_t)(k + columns) && row < policy->springs;
+         row = (uint16_t)(row + columns)) {
+        const drive_policy_spring_t *other = &policy->spring[row];
+        for (uint8_t n = width; n != 0; n--, other++) {
+            if (other->severity > worst) {
+                worst = other->severity;
             }
-            uint8_t severity = policy->spring[other].severity;
-            worst = severity > worst ? severity : worst;
         }
     }
     return worst;
@@ -623,23 +723,23 @@ static uint8_t worst_neighbour(const drive_policy_t *policy, uint8_t k)
 
 static uint16_t share_q8(uint16_t value, uint16_t share)
 {
-    return (uint16_t)(((uint32_t)value * share) >> 8);
+    return (uint16_t)(fixed_point_mac_u16(0, value, share) >> 8);
 }
 
-static void derate(const drive_policy_t *policy, drive_policy_spring_t *s,
-                   const thermal_model_t *model, uint8_t k, bool driven)
+static OWN void derate(const drive_policy_t *policy, drive_policy_spring_t *s,
+                       const thermal_model_t *model, uint8_t k, bool driven)
 {
     uint16_t full_ma = policy->parameters.boost_current_ma;
     uint16_t share = 256;
     uint8_t limits = DRIVE_POLICY_LIMIT_NONE;
     int16_t room_c7 =
         clamp16((int32_t)policy->limit_c7 - thermal_model_temperature_c7(model, k), 0, INT16_MAX);
-    uint32_t room_q16 = (uint32_t)(uint16_t)room_c7 * policy->derating_gain;
+    uint32_t room_q16 = fixed_point_mac_u16(0, (uint16_t)room_c7, policy->derating_gain);
     if (room_q16 < 65000u) {
         share = (uint16_t)(room_q16 >> 8);
         limits = DRIVE_POLICY_LIMIT_TEMPERATURE;
     }
-    uint16_t allowed = (uint16_t)(255u - worst_neighbour(policy, k));
+    uint16_t allowed = (uint16_t)(255u - (policy->severe != 0 ? worst_neighbour(policy, k) : 0u));
     if (allowed < 255u && allowed <= share) {
         share = allowed;
         limits |= DRIVE_POLICY_LIMIT_UNDRIVEN;
@@ -653,7 +753,7 @@ static void derate(const drive_policy_t *policy, drive_policy_spring_t *s,
     } else if (share == 0 && s->derated_updates < UINT16_MAX) {
         s->derated_updates++;
         if (policy->parameters.trip_time_s != 0 &&
-            s->derated_updates >= policy->parameters.trip_time_s * 10u) {
+            s->derated_updates >= policy->parameters.trip_time_s * UPDATES_PER_S) {
             s->flags |= FLAG_TRIPPED;
         }
     } else if (share != 0) {
@@ -661,252 +761,381 @@ static void derate(const drive_policy_t *policy, drive_policy_spring_t *s,
     }
 }
 
+/* ---- sharing the supply ---- */
+
+/* A quarter of a second's overload; at most twice the time that is free of it. It is worked off
+ * only once nobody asks for more: else what is derated would come and go. */
+static void count_overload(drive_policy_t *policy)
+{
+    if (policy->sum_ma > policy->parameters.overload_current_ma) {
+        if (policy->overload_quarters < 2u * policy->overload_half_quarters) {
+            policy->overload_quarters++;
+        }
+    } else if (policy->overload_quarters != 0 && !policy->waiting) {
+        policy->overload_quarters--;
+    }
+}
+
 /* The sum of targets that is allowed now; the overload's share is taken off. */
-static uint16_t budget_ma(drive_policy_t *policy, const drive_policy_input_t *input,
-                          uint32_t sum_ma, bool *overloaded)
+static uint16_t budget_ma(drive_policy_t *policy)
 {
     const drive_policy_parameters_t *p = &policy->parameters;
-    uint16_t budget = input->supply_limit_ma > p->supply_reserve_ma
-                          ? (uint16_t)(input->supply_limit_ma - p->supply_reserve_ma)
+    uint16_t budget = policy->supply_ma > p->supply_reserve_ma
+                          ? (uint16_t)(policy->supply_ma - p->supply_reserve_ma)
                           : 0;
-    *overloaded = false;
-    if (p->policy == DRIVE_POLICY_OPEN || !policy->prepared || budget <= p->overload_current_ma) {
+    policy->reason = DRIVE_POLICY_LIMIT_SUPPLY;
+    if (p->policy == DRIVE_POLICY_OPEN || !policy->prepared || budget <= p->overload_current_ma ||
+        policy->overload_quarters <= policy->overload_half_quarters) {
         return budget;
     }
-    uint32_t half = policy->overload_half_ticks;
-    if (sum_ma > p->overload_current_ma) {
-        if (policy->overload_ticks < 2u * half) {
-            policy->overload_ticks++;
-        }
-    } else if (policy->overload_ticks > 0) {
-        policy->overload_ticks--;
+    policy->reason = DRIVE_POLICY_LIMIT_OVERLOAD;
+    uint16_t over = (uint16_t)(policy->overload_quarters - policy->overload_half_quarters);
+    uint16_t excess_ma = (uint16_t)(budget - p->overload_current_ma);
+    uint16_t away_ma = excess_ma;
+    if (over < policy->overload_half_quarters) {
+        away_ma = fixed_point_high_u16(excess_ma, (uint16_t)(over * policy->overload_gain));
     }
-    if (policy->overload_ticks > half) {
-        uint32_t share_q16 = ((policy->overload_ticks - half) * policy->overload_gain_q24) >> 8;
-        uint16_t more = (uint16_t)(budget - p->overload_current_ma);
-        *overloaded = true;
-        budget = (uint16_t)(budget - ((more * (share_q16 > 65535u ? 65535u : share_q16)) >> 16));
-    }
-    return budget;
+    return (uint16_t)(budget - away_ma);
 }
 
-/* ---- one spring, once in five ticks ---- */
-
-static void update(drive_policy_t *policy, const drive_policy_input_t *input, uint8_t k)
+static OWN void grant(drive_policy_t *policy, drive_policy_spring_t *s, uint16_t granted_ma)
 {
-    drive_policy_spring_t *s = &policy->spring[k];
-    thermal_model_t *model = input->model;
-    int16_t level = (int16_t)input->level_permille[k];
-    bool driven = level != 0 && input->allowed[k];
-
-    thermal_model_settle(model, k);
-    bool fresh = resistance_observer_update(&s->observer, &policy->alloy);
-    if (fresh) {
-        s->fresh = s->fresh < UINT8_MAX ? (uint8_t)(s->fresh + 1) : (uint8_t)(UINT8_MAX - 19);
-        s->inverse_q14 = resistance_inverse_q14(s->inverse_q14, s->observer.ratio_q14);
-    } else if (s->target_ma == 0) {
-        s->fresh = 0;
+    if ((uint16_t)(granted_ma + JUMP_MA - s->granted_ma) > 2u * JUMP_MA) {
+        resistance_observer_disturb(&s->observer);
     }
-    if (driven && policy->parameters.policy == DRIVE_POLICY_PRECOMPENSATE) {
-        s->severity = 0;
-        switch ((drive_policy_stage_t)s->stage) {
-        case DRIVE_POLICY_STAGE_OFF:
-            enter(policy, k,
-                  model_permille(model, k) + LEVEL_BAND_PERMILLE < level ? DRIVE_POLICY_STAGE_HEAT
-                                                                         : DRIVE_POLICY_STAGE_HOLD);
-            break;
-        case DRIVE_POLICY_STAGE_HEAT:
-            heat(policy, s, model, k, level, fresh);
-            break;
-        case DRIVE_POLICY_STAGE_HOLD:
-            hold(policy, s, model, k, level, fresh);
-            break;
-        case DRIVE_POLICY_STAGE_LOWER:
-            lower(policy, s, model, k, level, fresh);
-            break;
-        }
-    } else if (!driven) {
-        off(policy, s, model, k, fresh);
+    s->granted_ma = granted_ma;
+    s->limits &= (uint8_t) ~(DRIVE_POLICY_LIMIT_SUPPLY | DRIVE_POLICY_LIMIT_OVERLOAD);
+    if (granted_ma < s->asked_ma) {
+        s->limits |= policy->reason;
+        policy->waiting = true;
     }
-    derate(policy, s, model, k, driven);
-    s->last_c7 = thermal_model_temperature_c7(model, k);
-    s->bias_now_64uw = bias_at(model, s->bias_64uw, s->last_c7);
 }
 
-/* ---- one tick ---- */
+/* Holds first, the largest cut to a common cap if they alone are too much; then those that heat,
+ * one after the other: heat grows with the square of current. */
+static HOT void share(drive_policy_t *policy)
+{
+    uint16_t budget = budget_ma(policy);
+    uint16_t fixed_ma[DRIVE_POLICY_MAX_SPRINGS];
+    uint32_t sum_ma = 0;
+    drive_policy_spring_t *s = policy->spring;
+    for (uint8_t k = 0; k < policy->springs; k++, s++) {
+        if (s->asked_ma > policy->maximum_ma) {
+            s->asked_ma = policy->maximum_ma;
+        }
+        uint16_t asked_ma = s->asked_ma;
+        if (s->stage == DRIVE_POLICY_STAGE_HEAT && s->floor_ma < asked_ma) {
+            asked_ma = s->floor_ma;
+        }
+        fixed_ma[k] = asked_ma;
+        sum_ma += asked_ma;
+    }
+    uint16_t cap_ma = UINT16_MAX;
+    if (sum_ma > budget) {
+        cap_ma = supply_share_cap_ma(fixed_ma, policy->springs, budget, policy->cap_ma);
+        policy->cap_ma = cap_ma;
+        sum_ma = budget;
+    }
+    uint16_t left_ma = (uint16_t)(budget - sum_ma);
+    policy->waiting = false;
+    s = policy->spring;
+    for (uint8_t k = 0; k < policy->springs; k++, s++) {
+        if (fixed_ma[k] > cap_ma) {
+            fixed_ma[k] = cap_ma;
+        }
+        if (s->stage != DRIVE_POLICY_STAGE_HEAT) {
+            grant(policy, s, fixed_ma[k]);
+        }
+    }
+    for (uint8_t n = 0; n < policy->queue.count; n++) {
+        uint8_t k = policy->queue.spring[n];
+        s = &policy->spring[k];
+        if (s->stage != DRIVE_POLICY_STAGE_HEAT) {
+            continue; /* just switched off */
+        }
+        uint16_t more_ma = (uint16_t)(s->asked_ma - fixed_ma[k]);
+        if (more_ma > left_ma) {
+            more_ma = left_ma >= LEAST_BOOST_MA ? left_ma : 0;
+        }
+        grant(policy, s, (uint16_t)(fixed_ma[k] + more_ma));
+        left_ma = (uint16_t)(left_ma - more_ma);
+    }
+    policy->left_ma = left_ma;
+    policy->budget_ma = budget;
+    policy->stale = false;
+}
 
-/* level / 1000 of current, without a division: 8389 / 2^23 is 1 / 1000 to 5e-5. */
+/* What one spring asks for now: less at once, more as far as nobody else is to have it. */
+static OWN void ask(drive_policy_t *policy, const drive_policy_input_t *input,
+                    drive_policy_spring_t *s)
+{
+    uint16_t asked_ma = s->wanted_ma;
+    uint8_t limits = DRIVE_POLICY_LIMIT_NONE;
+    if (policy->parameters.policy != DRIVE_POLICY_OPEN) {
+        if (s->ceiling_ma < asked_ma) {
+            asked_ma = s->ceiling_ma;
+            limits = s->derating;
+        }
+        if (s->fresh >= FRESH_WINDOWS && !trusted(policy, s)) {
+            limits |= DRIVE_POLICY_LIMIT_BLIND;
+        }
+    }
+    if (asked_ma > input->maximum_current_ma) {
+        asked_ma = input->maximum_current_ma;
+        limits |= DRIVE_POLICY_LIMIT_CURRENT;
+    }
+    s->asked_ma = asked_ma;
+    s->limits = limits;
+    uint16_t had_ma = s->granted_ma;
+    uint16_t gets_ma = asked_ma;
+    if (asked_ma > had_ma) {
+        uint16_t more_ma = (uint16_t)(asked_ma - had_ma);
+        if (more_ma > policy->left_ma) {
+            more_ma = policy->left_ma;
+        }
+        if (s->stage == DRIVE_POLICY_STAGE_HEAT &&
+            (policy->waiting || had_ma + more_ma < asked_ma)) {
+            more_ma = 0; /* in its turn */
+        }
+        gets_ma = (uint16_t)(had_ma + more_ma);
+    }
+    policy->left_ma = (uint16_t)(policy->left_ma + had_ma - gets_ma);
+    grant(policy, s, gets_ma);
+}
+
+/* ---- one spring, once in a round ---- */
+
+/* level / 1000 of current, without a division: to 1 mA. */
 static uint16_t share_ma(uint16_t current_ma, uint16_t level_permille)
 {
     if (level_permille >= DRIVE_POLICY_LEVEL_FULL) {
         return current_ma;
     }
-    uint32_t product = (uint32_t)current_ma * level_permille; /* < 3200 x 1000 */
-    return (uint16_t)(((product >> 3) * 8389u) >> 20);
+    /* x 65.53 */
+    uint16_t share_q16 =
+        (uint16_t)(level_permille * 65u + (level_permille >> 1) + (level_permille >> 5));
+    return fixed_point_high_u16(current_ma, share_q16);
 }
 
-static void listen(drive_policy_t *policy, const drive_policy_input_t *input)
+/* The rest of what leaving a stage means waits for the spring's turn. */
+static void stop(drive_policy_t *policy, drive_policy_spring_t *s)
 {
-    for (uint8_t k = 0; k < policy->springs; k++) {
-        if (input->valid[k]) {
-            resistance_observer_take(&policy->spring[k].observer, input->measured_ma[k],
-                                     input->measured_mv[k]);
-        }
-    }
-}
-
-static void update_some(drive_policy_t *policy, const drive_policy_input_t *input)
-{
-    uint8_t slot = policy->slot;
-    policy->slot = (uint8_t)(slot + 1 < (uint8_t)UPDATE_TICKS ? slot + 1 : 0);
-    for (uint16_t k = slot; k < policy->springs; k = (uint16_t)(k + UPDATE_TICKS)) {
-        /* who asks together is queued from a different spring each round */
-        update(policy, input, (uint8_t)k);
-    }
-}
-
-/* Off at once, whatever the update's turn. */
-static void stop(drive_policy_t *policy, uint8_t k)
-{
-    drive_policy_spring_t *s = &policy->spring[k];
     if (s->stage != DRIVE_POLICY_STAGE_OFF) {
-        enter(policy, k, DRIVE_POLICY_STAGE_OFF);
+        s->stage = DRIVE_POLICY_STAGE_OFF;
         s->flags |= FLAG_RELEASED;
     }
+    policy->left_ma = (uint16_t)(policy->left_ma + s->granted_ma);
     s->wanted_ma = 0;
+    s->asked_ma = 0;
+    s->granted_ma = 0;
 }
 
-/* A slow triangle below the target, each spring at another place of it. */
-static uint16_t dithered_ma(const drive_policy_t *policy, uint8_t k, uint16_t target_ma)
+static void precompensate(drive_policy_t *policy, const drive_policy_input_t *input,
+                          drive_policy_spring_t *s, uint8_t k, bool fresh)
 {
-    uint8_t place = (uint8_t)((policy->sweep + 7u * k) & 31u);
-    uint8_t height = (uint8_t)(place < 16u ? place : 31u - place);
-    uint16_t drop_ma = (uint16_t)((policy->parameters.dither_ma * height) >> 4);
-    if (policy->spring[k].stage == DRIVE_POLICY_STAGE_HEAT) {
-        drop_ma >>= 4; /* heat first */
+    thermal_model_t *model = input->model;
+    int16_t level = (int16_t)input->level_permille[k];
+    switch ((drive_policy_stage_t)s->stage) {
+    case DRIVE_POLICY_STAGE_OFF:
+        enter(policy, k,
+              model_permille(model, k) + LEVEL_BAND_PERMILLE < level ? DRIVE_POLICY_STAGE_HEAT
+                                                                     : DRIVE_POLICY_STAGE_HOLD);
+        break;
+    case DRIVE_POLICY_STAGE_HEAT:
+        heat(policy, s, model, k, level, fresh);
+        break;
+    case DRIVE_POLICY_STAGE_HOLD:
+        hold(policy, s, model, k, level, fresh);
+        break;
+    case DRIVE_POLICY_STAGE_LOWER:
+        lower(policy, s, model, k, level, fresh);
+        break;
     }
-    return target_ma > drop_ma ? (uint16_t)(target_ma - drop_ma) : target_ma;
 }
 
-static uint16_t want(drive_policy_t *policy, const drive_policy_input_t *input, uint8_t k,
-                     uint8_t *limits)
+static OWN void update(drive_policy_t *policy, const drive_policy_input_t *input,
+                       drive_policy_spring_t *s, uint8_t k)
 {
-    drive_policy_spring_t *s = &policy->spring[k];
+    bool open = policy->parameters.policy == DRIVE_POLICY_OPEN;
+    bool driven = input->level_permille[k] != 0 && input->allowed[k];
+    if (policy->prepared) {
+        thermal_model_t *model = input->model;
+        thermal_model_settle(model, k);
+        bool fresh =
+            resistance_observer_update(&s->observer, &policy->alloy, s->fresh >= FRESH_WINDOWS);
+        if (fresh) {
+            s->fresh = s->fresh < UINT8_MAX ? (uint8_t)(s->fresh + 1u) : (uint8_t)(UINT8_MAX - 7u);
+        } else if (s->target_ma == 0) {
+            s->fresh = 0;
+        }
+        uint8_t severity = 0;
+        if (!driven) {
+            supply_queue_remove(&policy->queue, k);
+            severity = off(policy, s, model, k, fresh);
+        } else if (!open) {
+            precompensate(policy, input, s, k, fresh);
+        }
+        policy->severe = (uint8_t)(policy->severe + (severity != 0) - (s->severity != 0));
+        s->severity = severity;
+        derate(policy, s, model, k, driven);
+        s->last_c7 = thermal_model_temperature_c7(model, k);
+        s->bias_now_uw = bias_at(model, s->bias_uw_per_k, s->last_c7);
+    }
+    if (driven && (s->flags & FLAG_TRIPPED) == 0) {
+        if (open) {
+            s->wanted_ma = share_ma(policy->parameters.open_current_ma, input->level_permille[k]);
+        }
+        ask(policy, input, s);
+    }
+}
+
+/* A hash of the levels tells that one has changed. */
+static OWN void watch_levels(drive_policy_t *policy, const uint16_t *level)
+{
+    uint16_t hash = 0;
+    for (uint8_t n = policy->springs; n != 0; n--) {
+        hash = (uint16_t)((uint16_t)(hash << 1) + *level++);
+    }
+    policy->stale = policy->stale || hash != policy->levels;
+    policy->levels = hash;
+}
+
+/* Limits, parameters or, under DRIVE_POLICY_OPEN, levels have changed: what all springs are given
+ * is worked out anew. */
+static OWN void restart(drive_policy_t *policy, const drive_policy_input_t *input)
+{
     const drive_policy_parameters_t *p = &policy->parameters;
-    uint16_t level = input->level_permille[k];
-    *limits = DRIVE_POLICY_LIMIT_NONE;
-    if (level == 0 || !input->allowed[k] || (s->flags & FLAG_TRIPPED) != 0) {
-        if (level != 0) {
-            *limits = input->allowed[k] ? DRIVE_POLICY_LIMIT_TRIP : DRIVE_POLICY_LIMIT_SAFETY;
-        }
-        stop(policy, k);
-        return 0;
-    }
-    uint16_t target_ma;
-    if (p->policy == DRIVE_POLICY_OPEN) {
-        if (s->stage != DRIVE_POLICY_STAGE_OFF) {
-            enter(policy, k, DRIVE_POLICY_STAGE_OFF);
-        }
-        s->wanted_ma = share_ma(p->open_current_ma, level);
-        target_ma = s->wanted_ma;
-    } else {
-        target_ma = s->wanted_ma;
-        if (s->ceiling_ma < target_ma) {
-            target_ma = s->ceiling_ma;
-            *limits |= s->derating;
-        }
-        if (!trusted(policy, s) && s->fresh >= FRESH_WINDOWS) {
-            *limits |= DRIVE_POLICY_LIMIT_BLIND;
+    drive_policy_spring_t *s = policy->spring;
+    for (uint8_t k = 0; p->policy == DRIVE_POLICY_OPEN && k < policy->springs; k++, s++) {
+        s->stage = DRIVE_POLICY_STAGE_OFF;
+        if (input->allowed[k] && (s->flags & FLAG_TRIPPED) == 0) {
+            s->wanted_ma = share_ma(p->open_current_ma, input->level_permille[k]);
+            s->asked_ma = s->wanted_ma;
         }
     }
-    if (target_ma > input->maximum_current_ma) {
-        target_ma = input->maximum_current_ma;
-        *limits |= DRIVE_POLICY_LIMIT_CURRENT;
-    }
-    if (p->policy != DRIVE_POLICY_OPEN) {
-        target_ma = dithered_ma(policy, k, target_ma);
-    }
-    return target_ma;
+    share(policy);
 }
 
-/* Holds first, the largest cut to a common cap if they alone are too much; then those that heat,
- * one after the other: heat grows with the square of current. */
-static void share(drive_policy_t *policy, uint16_t target_ma[], uint16_t budget, uint8_t reason)
+/* The work of this tick: one place of the round. */
+static OWN void take_turn(drive_policy_t *policy, const drive_policy_input_t *input)
 {
-    uint32_t sum_ma = 0;
-    uint16_t fixed_ma[DRIVE_POLICY_MAX_SPRINGS];
-    for (uint8_t k = 0; k < policy->springs; k++) {
-        const drive_policy_spring_t *s = &policy->spring[k];
-        fixed_ma[k] = target_ma[k];
-        if (s->stage == DRIVE_POLICY_STAGE_HEAT && s->floor_ma < target_ma[k]) {
-            fixed_ma[k] = s->floor_ma;
-        }
-        sum_ma += fixed_ma[k];
+    uint8_t slot = policy->slot;
+    if (policy->soft != 0) {
+        policy->soft--;
     }
-    uint16_t cap_ma = UINT16_MAX;
-    if (sum_ma > budget) {
-        cap_ma = supply_share_cap_ma(fixed_ma, policy->springs, budget);
-        sum_ma = budget;
+    policy->slot = (uint8_t)(slot + 1u);
+    if (policy->slot == DRIVE_POLICY_ROUND) {
+        policy->slot = 0;
+        policy->round++;
     }
-    uint16_t left_ma = (uint16_t)(budget - sum_ma);
-    for (uint8_t k = 0; k < policy->springs; k++) {
-        fixed_ma[k] = fixed_ma[k] > cap_ma ? cap_ma : fixed_ma[k];
-        if (policy->spring[k].stage != DRIVE_POLICY_STAGE_HEAT && target_ma[k] > cap_ma) {
-            target_ma[k] = cap_ma;
-            policy->spring[k].limits |= reason;
-        }
+    for (uint16_t k = slot; k < policy->springs; k = (uint16_t)(k + DRIVE_POLICY_ROUND)) {
+        update(policy, input, &policy->spring[k], (uint8_t)k);
     }
-    for (uint8_t n = 0; n < policy->queue.count; n++) {
-        uint8_t k = policy->queue.spring[n];
-        uint16_t more_ma = (uint16_t)(target_ma[k] - fixed_ma[k]);
-        if (more_ma > left_ma) {
-            more_ma = left_ma >= LEAST_BOOST_MA ? left_ma : 0;
-            policy->spring[k].limits |= reason;
+    if (policy->slot == 0) {
+        count_overload(policy);
+        if (policy->waiting || policy->reason == DRIVE_POLICY_LIMIT_OVERLOAD ||
+            policy->overload_quarters > policy->overload_half_quarters) {
+            share(policy);
         }
-        target_ma[k] = (uint16_t)(fixed_ma[k] + more_ma);
-        left_ma = (uint16_t)(left_ma - more_ma);
     }
 }
 
-/* After a change of policy each target walks from where it was; falls first, rises as they fit. */
-static void soften(drive_policy_t *policy, const drive_policy_input_t *input, uint16_t target_ma[],
-                   uint16_t budget)
+/* ---- one tick ---- */
+
+/* Not driven: off at once, whatever the update's turn. */
+static __attribute__((noinline)) void idle(drive_policy_t *policy, drive_policy_spring_t *s,
+                                           uint8_t reason)
 {
-    uint32_t sum_ma = 0;
-    bool done = true;
-    for (uint8_t k = 0; k < policy->springs; k++) {
-        uint16_t last_ma = policy->spring[k].target_ma;
-        if (input->level_permille[k] != 0 && input->allowed[k] &&
-            target_ma[k] + SOFT_MA < last_ma) {
-            target_ma[k] = (uint16_t)(last_ma - SOFT_MA);
-            done = false;
-        }
-        sum_ma += target_ma[k] < last_ma ? target_ma[k] : last_ma;
+    s->limits = reason;
+    if (s->wanted_ma != 0 || s->stage != DRIVE_POLICY_STAGE_OFF) {
+        stop(policy, s);
     }
-    uint16_t left_ma = (uint16_t)(sum_ma < budget ? budget - sum_ma : 0);
-    for (uint8_t k = 0; k < policy->springs; k++) {
-        uint16_t last_ma = policy->spring[k].target_ma;
-        if (target_ma[k] <= last_ma) {
-            continue;
+}
+
+/* A target between the last one and what is granted: after a change of policy it walks, up as far
+ * as there is room, which is what the last targets left of the budget. */
+static OWN uint16_t softened_ma(drive_policy_t *policy, uint16_t last_ma, uint16_t target_ma)
+{
+    if (target_ma <= last_ma) {
+        if (target_ma + SOFT_MA >= last_ma) {
+            return target_ma;
         }
-        uint16_t rise_ma = (uint16_t)(target_ma[k] - last_ma);
-        if (rise_ma > SOFT_MA) {
-            rise_ma = SOFT_MA;
-            done = false;
-        }
-        rise_ma = rise_ma < left_ma ? rise_ma : left_ma;
-        target_ma[k] = (uint16_t)(last_ma + rise_ma);
-        left_ma = (uint16_t)(left_ma - rise_ma);
+        policy->soft = SOFT_TURNS;
+        return (uint16_t)(last_ma - SOFT_MA);
     }
-    policy->soft = done ? (uint8_t)(policy->soft - 1u) : SOFT_TICKS;
+    uint16_t rise_ma = (uint16_t)(target_ma - last_ma);
+    if (rise_ma > SOFT_MA || rise_ma > policy->room_ma) {
+        rise_ma = policy->room_ma < SOFT_MA ? policy->room_ma : SOFT_MA;
+        policy->soft = SOFT_TURNS;
+    }
+    policy->room_ma = (uint16_t)(policy->room_ma - rise_ma);
+    return (uint16_t)(last_ma + rise_ma);
+}
+
+/* The dither is a slow triangle below what is granted, each spring at another place of it. Returns
+ * the targets' sum. */
+static HOT uint16_t give(drive_policy_t *policy, const uint16_t *level, const bool *allowed,
+                         uint16_t *target_ma)
+{
+    uint8_t place = policy->sweep;
+    policy->sweep = (uint8_t)(place + 1u);
+    bool dithers = policy->parameters.policy != DRIVE_POLICY_OPEN;
+    uint8_t step_ma = (uint8_t)(dithers ? policy->parameters.dither_ma >> 4 : 0u);
+    policy->room_ma =
+        policy->sum_ma < policy->budget_ma ? (uint16_t)(policy->budget_ma - policy->sum_ma) : 0;
+    bool soft = policy->soft != 0;
+    uint16_t sum_ma = 0;
+    drive_policy_spring_t *s = policy->spring;
+    for (uint8_t n = policy->springs; n != 0; n--) {
+        uint16_t target = 0;
+        bool on = *level++ != 0;
+        bool may = *allowed++;
+        if (!on) {
+            idle(policy, s, DRIVE_POLICY_LIMIT_NONE);
+        } else if (!may) {
+            idle(policy, s, DRIVE_POLICY_LIMIT_SAFETY);
+        } else if ((s->flags & FLAG_TRIPPED) != 0) {
+            idle(policy, s, DRIVE_POLICY_LIMIT_TRIP);
+        } else {
+            target = s->granted_ma;
+            if (s->stage != DRIVE_POLICY_STAGE_HEAT) { /* heat first */
+                uint8_t height = (place & 16u) != 0 ? (uint8_t)~place : place;
+                uint16_t drop_ma = (uint16_t)((height & 15u) * step_ma);
+                if (target > drop_ma) {
+                    target = (uint16_t)(target - drop_ma);
+                }
+            }
+            if (soft) {
+                target = softened_ma(policy, s->target_ma, target);
+            }
+        }
+        s->target_ma = target;
+        *target_ma++ = target;
+        sum_ma = (uint16_t)(sum_ma + target);
+        s++;
+        place = (uint8_t)(place + 7u);
+    }
+    return sum_ma;
+}
+
+/* Takes the readings of the last tick. */
+static HOT void listen(drive_policy_t *policy, const bool *valid, const int16_t *current_ma,
+                       const int16_t *voltage_mv)
+{
+    drive_policy_spring_t *s = policy->spring;
+    for (uint8_t n = policy->springs; n != 0; n--, s++, current_ma++, voltage_mv++) {
+        if (*valid++) {
+            resistance_observer_take(&s->observer, *current_ma, *voltage_mv);
+        }
+    }
 }
 
 /* Undriven springs one after the other, in what the budget leaves. */
-static void probe(drive_policy_t *policy, const drive_policy_input_t *input, uint16_t target_ma[],
-                  uint16_t budget)
+static OWN void probe(drive_policy_t *policy, const drive_policy_input_t *input,
+                      uint16_t target_ma[])
 {
     const drive_policy_parameters_t *p = &policy->parameters;
-    if (p->probe_period_s == 0 || p->policy == DRIVE_POLICY_OPEN) {
+    if (p->probe_period_s == 0 || p->policy == DRIVE_POLICY_OPEN || policy->soft != 0) {
         return;
     }
     uint16_t period = (uint16_t)(p->probe_period_s * 50u);
@@ -917,14 +1146,8 @@ static void probe(drive_policy_t *policy, const drive_policy_input_t *input, uin
             policy->probe_ticks >= PROBE_TICKS) {
             policy->probed++;
             policy->probe_ticks = 0;
-            return;
-        }
-        uint32_t sum_ma = p->probe_current_ma;
-        for (uint8_t n = 0; n < policy->springs; n++) {
-            sum_ma += target_ma[n];
-        }
-        if (sum_ma <= budget) {
-            target_ma[k] = p->probe_current_ma;
+        } else if (p->probe_current_ma <= policy->left_ma) {
+            policy->spring[k].target_ma = target_ma[k] = p->probe_current_ma;
         }
     } else if (policy->probe_ticks >= period) {
         policy->probed = 0;
@@ -935,29 +1158,28 @@ static void probe(drive_policy_t *policy, const drive_policy_input_t *input, uin
 void drive_policy_tick(drive_policy_t *policy, const drive_policy_input_t *input,
                        uint16_t target_ma[])
 {
-    if (policy->prepared && input->valid != NULL) {
-        listen(policy, input);
+    bool limits_changed = policy->supply_ma != input->supply_limit_ma ||
+                          policy->maximum_ma != input->maximum_current_ma;
+    if (limits_changed) {
+        policy->supply_ma = input->supply_limit_ma;
+        policy->maximum_ma = input->maximum_current_ma;
+        policy->soft = 0; /* a lower limit holds at once */
     }
-    if (policy->prepared) {
-        update_some(policy, input);
+    if (!input->model_stepped && policy->parameters.policy == DRIVE_POLICY_OPEN) {
+        watch_levels(policy, input->level_permille);
     }
-    uint32_t sum_ma = 0;
-    for (uint8_t k = 0; k < policy->springs; k++) {
-        sum_ma += policy->spring[k].target_ma;
-        target_ma[k] = want(policy, input, k, &policy->spring[k].limits);
+    if (limits_changed || (policy->stale && !input->model_stepped)) {
+        restart(policy, input); /* takes the time of all else */
+    } else {
+        if (policy->prepared && input->valid != NULL) {
+            listen(policy, input->valid, input->measured_ma, input->measured_mv);
+        }
+        if (!input->model_stepped) {
+            take_turn(policy, input);
+        }
     }
-    policy->sweep = (uint8_t)((policy->sweep + 1u) & 31u);
-    bool overloaded;
-    uint16_t budget = budget_ma(policy, input, sum_ma, &overloaded);
-    share(policy, target_ma, budget,
-          overloaded ? DRIVE_POLICY_LIMIT_OVERLOAD : DRIVE_POLICY_LIMIT_SUPPLY);
-    if (policy->soft != 0) {
-        soften(policy, input, target_ma, budget);
-    }
-    probe(policy, input, target_ma, budget);
-    for (uint8_t k = 0; k < policy->springs; k++) {
-        policy->spring[k].target_ma = target_ma[k];
-    }
+    policy->sum_ma = give(policy, input->level_permille, input->allowed, target_ma);
+    probe(policy, input, target_ma);
 }
 
 uint8_t drive_policy_limits(const drive_policy_t *policy, uint8_t spring)
@@ -987,13 +1209,14 @@ bool drive_policy_observes(const drive_policy_t *policy, uint8_t spring)
 
 int16_t drive_policy_phase_permille(const drive_policy_t *policy, uint8_t spring)
 {
-    return resistance_observer_phase_permille(&policy->spring[spring].observer, &policy->alloy);
+    return policy->spring[spring].observer.phase_permille;
 }
 
 void drive_policy_clear(drive_policy_t *policy)
 {
     for (uint8_t k = 0; k < policy->springs; k++) {
         policy->spring[k].flags &= (uint8_t)~FLAG_TRIPPED;
+        policy->spring[k].limits &= (uint8_t)~DRIVE_POLICY_LIMIT_TRIP;
         policy->spring[k].derated_updates = 0;
     }
 }

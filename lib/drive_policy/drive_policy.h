@@ -20,6 +20,7 @@ extern "C" {
 
 #define DRIVE_POLICY_MAX_SPRINGS THERMAL_MODEL_MAX_SPRINGS
 #define DRIVE_POLICY_LEVEL_FULL  1000u /* permille */
+#define DRIVE_POLICY_ROUND       10u /* updates, one a tick: a spring each, then the supply's share */
 
 typedef enum {
     DRIVE_POLICY_OPEN = 0,         /* a set current while on, nothing while off: the paper's way */
@@ -74,54 +75,69 @@ typedef struct {
 } drive_policy_parameters_t;
 
 typedef struct {
-    resistance_observer_t observer;
-    uint16_t inverse_q14;   /* 1 / ratio of resistances */
-    uint16_t reference_q14; /* slow ratio before this hold began to lose phase */
-    uint16_t before_q14;    /* ratio half a second ago */
-    uint16_t floor_ma;      /* while it heats: what it has comes before other boosts */
-    uint16_t wanted_ma;     /* before limits */
-    uint16_t ceiling_ma;    /* by derating */
-    uint16_t target_ma;     /* given in the last tick */
-    int16_t bias_64uw;      /* loss beyond the model's, at 60 K above ambient */
-    int16_t bias_now_64uw;  /* the same at the present temperature */
-    int16_t corrected_c7;   /* sum of the observer's corrections in this heating */
-    int16_t margin_c7;      /* of the hold, above martensite start */
-    int16_t last_c7;        /* temperature one update ago */
-    int16_t lost_permille;  /* most phase that this hold was seen to lose */
+    resistance_observer_t observer; /* first: what every tick touches */
+    uint16_t granted_ma;            /* share of the supply, before dither */
+    uint16_t target_ma;             /* given in the last tick */
+    uint8_t stage;                  /* drive_policy_stage_t */
+    uint8_t flags;                  /* internal */
+    uint8_t limits;                 /* that act */
+    uint8_t severity;               /* undriven: 255 at its limit */
+    uint8_t fresh;                  /* windows since current flows without a gap, saturating */
+    uint16_t wanted_ma;             /* before limits */
+    uint16_t asked_ma;              /* after all but the supply's */
+    uint16_t ceiling_ma;            /* by derating */
+    uint16_t floor_ma;              /* while it heats: what it has comes before other boosts */
+    uint16_t reference_q14;         /* slow ratio before this hold began to lose phase */
+    int16_t before_permille;        /* phase half a second ago */
+    int16_t bias_uw_per_k;          /* loss beyond the model's */
+    int32_t bias_now_uw;            /* the same at the present temperature */
+    int16_t corrected_c7;           /* sum of the observer's corrections in this heating */
+    int16_t margin_c7;              /* of the hold, above martensite start */
+    int16_t last_c7;                /* temperature one update ago */
+    int16_t lost_permille;          /* most phase that this hold was seen to lose */
     uint16_t derated_updates;
-    uint8_t stage;     /* drive_policy_stage_t */
-    uint8_t flags;     /* internal */
-    uint8_t fresh;     /* windows since current flows without a gap, saturating */
+    int8_t followed;   /* steps that reference_q14 has wandered */
     uint8_t reference; /* windows that went into reference_q14 */
     uint8_t plateau;   /* half seconds of constant resistance */
     uint8_t suspicion; /* windows in which this hold may be losing phase */
     uint8_t seen;      /* windows in which it does for certain */
-    uint8_t severity;  /* undriven: 255 at its limit */
     uint8_t derating;  /* limits behind ceiling_ma */
-    uint8_t limits;    /* of the last tick */
 } drive_policy_spring_t;
 
 typedef struct {
     drive_policy_parameters_t parameters;
     uint8_t springs;
     uint8_t columns;
-    uint8_t slot;  /* a fifth of the springs is updated in each tick */
-    uint8_t sweep; /* of the dither */
-    uint8_t soft;  /* ticks in which no target jumps: the policy has just changed */
+    uint8_t slot;   /* of the round in which each spring is updated once */
+    uint8_t round;  /* counts */
+    uint8_t sweep;  /* of the dither */
+    uint8_t soft;   /* turns in which no target jumps: the policy has just changed */
+    uint8_t severe; /* springs whose severity is not 0 */
+    uint8_t reason; /* limit behind the supply's share */
     bool prepared;
+    bool stale;     /* shares are worked out anew in the next tick */
+    bool waiting;   /* some spring has less than it asks for */
     uint8_t probed; /* spring whose pulse it is */
     uint16_t probe_ticks;
-    uint32_t overload_ticks;
-    supply_queue_t queue; /* springs that heat */
+    uint16_t maximum_ma; /* with which the shares were worked out */
+    uint16_t supply_ma;
+    uint16_t cap_ma;            /* of the holds, if the supply is too small for them */
+    uint16_t budget_ma;         /* with which the shares were worked out */
+    uint16_t levels;            /* hash of all wanted levels */
+    uint16_t room_ma;           /* soft: what the targets may rise in all */
+    uint16_t sum_ma;            /* of the last targets */
+    uint16_t left_ma;           /* of the budget: what no spring has been granted */
+    uint16_t overload_quarters; /* s */
+    supply_queue_t queue;       /* springs that heat */
     drive_policy_spring_t spring[DRIVE_POLICY_MAX_SPRINGS];
     /* derived, see drive_policy_prepare */
     resistance_alloy_t alloy;
-    uint32_t overload_half_ticks;
-    uint32_t overload_gain_q24;
-    uint16_t feedback_q4;   /* 64 uW per Q9.7 K */
+    uint16_t overload_half_quarters;
+    uint16_t overload_gain; /* 2^16 over that */
+    uint16_t feedback_uw_per_c7;
     uint16_t correction_q8; /* Q9.7 K per permille of phase */
     uint16_t derating_gain; /* 2^16 over the band */
-    int16_t bias_limit_64uw;
+    int16_t bias_limit_uw_per_k;
     int16_t event_c7; /* how far below martensite start its crossing is seen */
     int16_t hold_margin_c7;
     int16_t unsure_margin_c7;
@@ -138,7 +154,8 @@ typedef struct {
     uint16_t supply_limit_ma;       /* of the sum */
     const int16_t *measured_ma;     /* of the last tick; NULL: nothing is measured */
     const int16_t *measured_mv;
-    const bool *valid; /* per spring: the two are readings of the last tick */
+    const bool *valid;  /* per spring: the two are readings of the last tick */
+    bool model_stepped; /* in this tick, which has little time left: no spring is updated */
 } drive_policy_input_t;
 
 void drive_policy_parameters_default(drive_policy_parameters_t *parameters);
@@ -160,7 +177,9 @@ bool drive_policy_apply(drive_policy_t *policy, const drive_policy_parameters_t 
  */
 void drive_policy_prepare(drive_policy_t *policy, const thermal_model_t *model);
 
-/* One tick (20 ms). The targets' sum never exceeds supply_limit_ma - supply_reserve_ma. */
+/* One tick (20 ms). The targets' sum never exceeds supply_limit_ma - supply_reserve_ma. A spring is
+ * off in the tick in which its level is 0 or it is not allowed. What else it is given follows once
+ * in DRIVE_POLICY_ROUND ticks without a model step: four times a second. */
 void drive_policy_tick(drive_policy_t *policy, const drive_policy_input_t *input,
                        uint16_t target_ma[]);
 

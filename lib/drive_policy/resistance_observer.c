@@ -1,16 +1,22 @@
 #include "resistance_observer.h"
 
-#define LEAST_SUM_MA      (150u * RESISTANCE_OBSERVER_WINDOW)
-#define MOST_MOVE_MA      100
-#define HIGHEST_MA        3275  /* five of them, four quarters each, fit 16 bits */
-#define HIGHEST_MV        13107 /* five fit 16 bits */
-#define RATIO_LOWEST      2048u
-#define RATIO_HIGHEST     60000u
-#define NOISE_FLOOR_MV    18u /* summed over a window: 3.6 mV each, about one step of the sensor */
-#define LEARNT_ENOUGH     10u
+#include "fixed_point.h"
+
+#if defined(__AVR__) && !defined(__clang__)
+#define HOT __attribute__((noinline, optimize("O2"))) /* a third of its cycles */
+#else
+#define HOT
+#endif
+
+#define LEAST_MA          150u
+#define SCALE_LOWEST      2048
+#define SCALE_HIGHEST     60000
+#define NOISE_FLOOR_UV    3600u /* of one reading: about one step of the sensor */
+#define LEARNT_ENOUGH     4u
 #define PLAUSIBLE_LOWEST  (-250)
 #define PLAUSIBLE_HIGHEST 1350
 #define CURRENT_LIMIT_MA  3200u
+#define THROUGH_HIGHEST   (1ul << 30) /* Q13 */
 
 static int32_t clamp(int32_t value, int32_t low, int32_t high)
 {
@@ -20,9 +26,9 @@ static int32_t clamp(int32_t value, int32_t low, int32_t high)
 void resistance_alloy_prepare(resistance_alloy_t *alloy, uint32_t martensite_uohm,
                               uint32_t austenite_uohm)
 {
-    /* 15 bits of 4000000 / R_M by long division, R_M scaled by powers of two until the quotient is
+    /* 15 bits of 1000000 / R_M by long division, R_M scaled by powers of two until the quotient is
      * in 1..2 */
-    uint32_t rest = 4000000ul;
+    uint32_t rest = 1000000ul;
     uint32_t divisor = martensite_uohm;
     int8_t shift = 14;
     while (rest < divisor) {
@@ -47,87 +53,125 @@ void resistance_alloy_prepare(resistance_alloy_t *alloy, uint32_t martensite_uoh
 
     bool rises = austenite_uohm > martensite_uohm;
     uint32_t change = rises ? austenite_uohm - martensite_uohm : martensite_uohm - austenite_uohm;
-    /* 1000 permille / (ratio_A - 1) / 2^14 in Q12 is 250 R_M / (R_A - R_M) */
-    if (change == 0 || martensite_uohm / change >= 50u) {
-        alloy->phase_gain_q12 = 0;
-    } else {
-        int16_t gain = (int16_t)(250ul * martensite_uohm / change);
-        alloy->phase_gain_q12 = (int16_t)(rises ? gain : -gain);
-    }
-    uint32_t floor = shift >= 0 ? ((uint32_t)NOISE_FLOOR_MV * mantissa) >> shift : UINT16_MAX;
-    alloy->noise_floor = floor > UINT16_MAX ? UINT16_MAX : (uint16_t)floor;
+    /* 1000 permille / (ratio_A - 1) */
+    alloy->phase_gain = change == 0 || martensite_uohm / change >= 50u
+                            ? 0
+                            : (uint16_t)fixed_point_multiply_divide(1000u, martensite_uohm, change);
+    alloy->falls = !rises;
+    uint32_t floor_ma = (uint32_t)NOISE_FLOOR_UV * 1000u / martensite_uohm;
+    alloy->noise_floor_ma = floor_ma > 4095u ? 4095u : (uint16_t)floor_ma;
 }
 
 void resistance_observer_reset(resistance_observer_t *observer)
 {
     *observer = (resistance_observer_t){.slow_q22 = (uint32_t)RESISTANCE_OBSERVER_ONE_Q14 << 8,
                                         .ratio_q14 = RESISTANCE_OBSERVER_ONE_Q14,
+                                        .inverse_q14 = RESISTANCE_OBSERVER_ONE_Q14,
                                         .scale_q14 = RESISTANCE_OBSERVER_ONE_Q14};
 }
 
-void resistance_observer_take(resistance_observer_t *observer, int16_t current_ma,
-                              int16_t voltage_mv)
+/* a b / 2^14, at most UINT16_MAX. */
+static inline __attribute__((always_inline)) uint16_t product_q14(uint16_t a, uint16_t b)
 {
-    if (current_ma < 0 || voltage_mv < 0 || observer->readings >= RESISTANCE_OBSERVER_WINDOW) {
-        return;
-    }
-    uint16_t ma = current_ma > HIGHEST_MA ? HIGHEST_MA : (uint16_t)current_ma;
-    uint16_t mv = voltage_mv > HIGHEST_MV ? HIGHEST_MV : (uint16_t)voltage_mv;
-    if (observer->readings == 0) {
-        observer->first_ma = ma;
-    }
-    observer->last_ma = ma;
-    observer->current_sum_ma = (uint16_t)(observer->current_sum_ma + ma);
-    observer->voltage_sum_mv = (uint16_t)(observer->voltage_sum_mv + mv);
-    observer->readings++;
+    uint32_t product = fixed_point_mac_u16(0, a, b);
+    return (uint8_t)(product >> 24) >= 64u ? UINT16_MAX : (uint16_t)((product << 2) >> 16);
 }
 
-/* Voltage less ratio times current, both as quarter mA through the declared martensite. */
-static int32_t misfit(uint32_t through_q2, uint16_t ratio_q14, uint16_t sum_q2)
+/* Current that the window's voltage would drive through the declared martensite, Q13 mA. */
+static uint32_t through_q13(const resistance_alloy_t *alloy, uint16_t voltage_sum_mv)
 {
-    int32_t error = (int32_t)(through_q2 - (((uint32_t)ratio_q14 * sum_q2) >> 14));
-    return clamp(error, -32767, 32767);
+    uint32_t through = fixed_point_mac_u16(0, voltage_sum_mv, alloy->gain_mantissa);
+    int8_t shift = (int8_t)(13 - alloy->gain_shift);
+    for (; shift > 0 && through < THROUGH_HIGHEST; shift--) {
+        through <<= 1;
+    }
+    for (; shift < 0; shift++) {
+        through >>= 1;
+    }
+    return through < THROUGH_HIGHEST ? through : THROUGH_HIGHEST;
 }
 
-bool resistance_observer_update(resistance_observer_t *observer, const resistance_alloy_t *alloy)
+static int16_t as_permille(const resistance_alloy_t *alloy, uint16_t size_q14, bool above)
 {
-    int16_t move_ma = (int16_t)(observer->last_ma - observer->first_ma);
-    bool complete = observer->readings == RESISTANCE_OBSERVER_WINDOW &&
-                    observer->current_sum_ma >= LEAST_SUM_MA && move_ma <= MOST_MOVE_MA &&
-                    move_ma >= -MOST_MOVE_MA;
-    uint16_t sum_q2 = (uint16_t)(observer->current_sum_ma << 2);
-    uint32_t product = (uint32_t)observer->voltage_sum_mv * alloy->gain_mantissa;
+    uint16_t permille = product_q14(alloy->phase_gain, size_q14);
+    if (above != alloy->falls) {
+        return permille > 3000u ? 3000 : (int16_t)permille;
+    }
+    return permille > 2000u ? -2000 : (int16_t) - (int16_t)permille;
+}
+
+static inline void refresh_phase(resistance_observer_t *observer, const resistance_alloy_t *alloy)
+{
+    uint16_t ratio = product_q14(observer->ratio_q14, observer->scale_q14);
+    bool above = ratio >= RESISTANCE_OBSERVER_ONE_Q14;
+    observer->phase_permille = as_permille(alloy,
+                                           above ? (uint16_t)(ratio - RESISTANCE_OBSERVER_ONE_Q14)
+                                                 : (uint16_t)(RESISTANCE_OBSERVER_ONE_Q14 - ratio),
+                                           above);
+}
+
+/* One Newton step of 1 / ratio, from the last value. */
+static inline void refresh_inverse(resistance_observer_t *observer)
+{
+    uint16_t inverse = observer->inverse_q14;
+    uint16_t product = product_q14(inverse, observer->ratio_q14); /* 1 when right */
+    if (product >= 2u * RESISTANCE_OBSERVER_ONE_Q14) {
+        inverse = inverse >> 1;
+    } else {
+        inverse = product_q14((uint16_t)(2u * RESISTANCE_OBSERVER_ONE_Q14 - product), inverse);
+    }
+    observer->inverse_q14 = inverse != 0 ? inverse : 1u;
+}
+
+/* A ratio of fraction bits, after an error (Q13) over a norm: gain is 2^25 over it, Q0 for a ratio
+ * in Q14. */
+static inline __attribute__((always_inline)) uint32_t corrected(uint32_t ratio, int32_t error_q13,
+                                                                uint32_t gain, uint32_t one)
+{
+    int32_t sum = (int32_t)ratio + fixed_point_scale_s24(error_q13 >> 8, gain);
+    if (sum < (int32_t)(one >> 3)) {
+        return one >> 3;
+    }
+    return sum > (int32_t)(3u * one) ? 3u * one : (uint32_t)sum;
+}
+
+HOT bool resistance_observer_update(resistance_observer_t *observer,
+                                    const resistance_alloy_t *alloy, bool judges)
+{
+    uint8_t readings = observer->readings;
+    uint16_t sum_ma = observer->current_sum_ma;
+    uint16_t sum_mv = observer->voltage_sum_mv;
     observer->readings = 0;
     observer->current_sum_ma = 0;
     observer->voltage_sum_mv = 0;
-    if (!complete) {
+    if (readings < RESISTANCE_OBSERVER_LEAST_READINGS || sum_ma < (uint16_t)(LEAST_MA * readings)) {
         return false;
     }
-    uint32_t through_q2 = alloy->gain_shift >= 0 ? product >> alloy->gain_shift : UINT16_MAX;
-    if (through_q2 > (uint32_t)INT32_MAX >> 1) {
-        through_q2 = (uint32_t)INT32_MAX >> 1;
+    uint16_t gain = 0x8000; /* 2^25 over the norm, which is at least 2^10 */
+    for (uint8_t high = (uint8_t)((uint8_t)(sum_ma >> 8) >> 2); high != 0; high = high >> 1) {
+        gain = gain >> 1;
     }
-    uint8_t norm = 0;
-    while (sum_q2 >> norm != 0) {
-        norm++;
-    }
+    uint32_t through = through_q13(alloy, sum_mv);
+    int32_t fast = (int32_t)(through - (fixed_point_mac_u16(0, observer->ratio_q14, sum_ma) >> 1));
+    uint16_t slow_q14 = (uint16_t)(observer->slow_q22 >> 8);
+    int32_t slow = (int32_t)(through - (fixed_point_mac_u16(0, slow_q14, sum_ma) >> 1));
+    observer->ratio_q14 =
+        (uint16_t)corrected(observer->ratio_q14, fast, gain, RESISTANCE_OBSERVER_ONE_Q14);
+    observer->slow_q22 = corrected(observer->slow_q22, slow, (uint32_t)gain << 4,
+                                   (uint32_t)RESISTANCE_OBSERVER_ONE_Q14 << 8);
 
-    int32_t fast = misfit(through_q2, observer->ratio_q14, sum_q2);
-    int32_t slow = misfit(through_q2, (uint16_t)(observer->slow_q22 >> 8), sum_q2);
-    int32_t ratio = observer->ratio_q14 + ((fast * RESISTANCE_OBSERVER_ONE_Q14) >> norm >> 1);
-    observer->ratio_q14 = (uint16_t)clamp(ratio, RATIO_LOWEST, RATIO_HIGHEST);
-    int32_t average = (int32_t)observer->slow_q22 + (((slow * 16384) >> norm) * 8);
-    observer->slow_q22 =
-        (uint32_t)clamp(average, (int32_t)RATIO_LOWEST << 8, (int32_t)RATIO_HIGHEST << 8);
-
-    uint16_t size = (uint16_t)(fast < 0 ? -fast : fast);
-    observer->noise = (uint16_t)(observer->noise - (observer->noise >> 3) + (size >> 3));
-    uint16_t limit = (uint16_t)(sum_q2 >> 7);
-    limit = limit > UINT16_MAX - alloy->noise_floor ? UINT16_MAX
-                                                    : (uint16_t)(limit + alloy->noise_floor);
-    if (observer->learnt != 0) { /* before, the misfit is that of the start */
+    /* a steady ramp has a steady misfit: noise is what changes from one window to the next */
+    int16_t misfit = (int16_t)(fast >> 16); /* 8 mA */
+    int16_t change = (int16_t)(misfit - observer->misfit);
+    observer->misfit = misfit;
+    if (judges) {
+        uint16_t size = (uint16_t)(change < 0 ? -change : change);
+        observer->noise = (uint16_t)(observer->noise - (observer->noise >> 2) + size);
+        uint16_t limit = (uint16_t)((sum_ma >> 9) + (alloy->noise_floor_ma >> 1) * readings);
         observer->noisy = observer->noise > (observer->noisy ? limit >> 1 : limit);
     }
+    refresh_inverse(observer);
+    refresh_phase(observer, alloy);
     return true;
 }
 
@@ -136,88 +180,84 @@ void resistance_observer_restart_average(resistance_observer_t *observer)
     observer->slow_q22 = (uint32_t)observer->ratio_q14 << 8;
 }
 
-static int32_t normalised(const resistance_observer_t *observer, int32_t ratio_q14)
+void resistance_observer_learn_martensite(resistance_observer_t *observer,
+                                          const resistance_alloy_t *alloy)
 {
-    return (ratio_q14 * observer->scale_q14) >> 14;
-}
-
-void resistance_observer_learn_martensite(resistance_observer_t *observer)
-{
-    int32_t error = RESISTANCE_OBSERVER_ONE_Q14 - normalised(observer, observer->ratio_q14);
-    error >>= observer->learnt < LEARNT_ENOUGH ? 1 : 4;
-    observer->scale_q14 = (uint16_t)clamp(observer->scale_q14 + error, RATIO_LOWEST, RATIO_HIGHEST);
+    int32_t error = RESISTANCE_OBSERVER_ONE_Q14 -
+                    (int32_t)product_q14(observer->ratio_q14, observer->scale_q14);
+    error >>= observer->learnt < LEARNT_ENOUGH ? 1 : 3;
+    observer->scale_q14 = (uint16_t)clamp(observer->scale_q14 + error, SCALE_LOWEST, SCALE_HIGHEST);
     if (observer->learnt < UINT8_MAX) {
         observer->learnt++;
     }
-}
-
-static int16_t as_permille(const resistance_alloy_t *alloy, int32_t ratio_q14)
-{
-    int32_t phase = (clamp(ratio_q14, -65535, 65535) * alloy->phase_gain_q12) >> 12;
-    return (int16_t)clamp(phase, -2000, 3000);
-}
-
-int16_t resistance_observer_phase_permille(const resistance_observer_t *observer,
-                                           const resistance_alloy_t *alloy)
-{
-    return as_permille(alloy, normalised(observer, observer->ratio_q14) -
-                                  (int32_t)RESISTANCE_OBSERVER_ONE_Q14);
+    refresh_phase(observer, alloy);
 }
 
 int16_t resistance_observer_drift_permille(const resistance_observer_t *observer,
                                            const resistance_alloy_t *alloy, uint16_t reference_q14)
 {
-    int32_t drift = (int32_t)(observer->slow_q22 >> 8) - (int32_t)reference_q14;
-    return as_permille(alloy, normalised(observer, clamp(drift, -32767, 32767)));
+    uint16_t slow_q14 = (uint16_t)(observer->slow_q22 >> 8);
+    bool rises = slow_q14 >= reference_q14;
+    uint16_t size =
+        rises ? (uint16_t)(slow_q14 - reference_q14) : (uint16_t)(reference_q14 - slow_q14);
+    return as_permille(alloy, product_q14(size, observer->scale_q14), rises);
 }
 
 bool resistance_observer_is_plausible(const resistance_observer_t *observer,
                                       const resistance_alloy_t *alloy)
 {
-    int16_t phase = resistance_observer_phase_permille(observer, alloy);
-    return alloy->phase_gain_q12 != 0 && observer->learnt >= LEARNT_ENOUGH && !observer->noisy &&
-           phase >= PLAUSIBLE_LOWEST && phase <= PLAUSIBLE_HIGHEST;
+    return alloy->phase_gain != 0 && observer->learnt >= LEARNT_ENOUGH && !observer->noisy &&
+           observer->phase_permille >= PLAUSIBLE_LOWEST &&
+           observer->phase_permille <= PLAUSIBLE_HIGHEST;
 }
 
-/* Square root rounded down, bit by bit; 12 bits. */
-static uint16_t root(uint32_t square)
+/* Square root of 24 bits, rounded down: two bits of the square, from the top, make one of the
+ * root; the first four of it in 8 bits. */
+static HOT uint16_t root(uint32_t square)
 {
-    uint16_t result = 0;
-    for (uint16_t bit = 2048; bit != 0; bit = (uint16_t)(bit >> 1)) {
-        uint16_t trial = (uint16_t)(result | bit);
-        if ((uint32_t)trial * trial <= square) {
-            result = trial;
+    uint8_t bits = (uint8_t)(square >> 16);
+    uint8_t small = 0;
+    uint8_t small_rest = 0;
+    for (uint8_t pair = 4; pair != 0; pair--) {
+        small_rest = (uint8_t)(small_rest << 2 | bits >> 6);
+        bits = (uint8_t)(bits << 2);
+        uint8_t trial = (uint8_t)((uint8_t)(small << 2) | 1u);
+        small = (uint8_t)(small << 1);
+        if (small_rest >= trial) {
+            small_rest = (uint8_t)(small_rest - trial);
+            small |= 1u;
         }
     }
-    return result;
+    uint16_t low = (uint16_t)square;
+    uint16_t rest = small_rest;
+    uint16_t twice = (uint16_t)(small << 1); /* the root so far */
+    for (uint8_t pair = 8; pair != 0; pair--) {
+        rest = (uint16_t)((uint16_t)(rest << 2) | (uint8_t)((uint8_t)(low >> 8) >> 6));
+        low = (uint16_t)(low << 2);
+        twice = (uint16_t)(twice << 1);
+        if (rest > twice) {
+            rest = (uint16_t)(rest - twice - 1u);
+            twice = (uint16_t)(twice + 2u);
+        }
+    }
+    return twice >> 1;
 }
 
-uint16_t resistance_current_for_power_ma(const resistance_alloy_t *alloy, uint16_t inverse_q14,
-                                         uint16_t power_64uw)
+HOT uint16_t resistance_current_for_power_ma(const resistance_alloy_t *alloy, uint16_t inverse_q14,
+                                             uint16_t power_64uw)
 {
-    /* i^2 (mA^2) = 64000 P / (R_M ratio): the alloy's gain times 16 */
-    uint32_t conductance = ((uint32_t)alloy->gain_mantissa * inverse_q14) >> 14;
-    if (conductance > UINT16_MAX) {
-        conductance = UINT16_MAX;
-    }
-    uint32_t square = (uint32_t)power_64uw * (uint16_t)conductance;
-    int8_t shift = (int8_t)(alloy->gain_shift - 4);
+    /* i^2 (mA^2) = 64 1000 P / (R_M ratio) */
+    uint16_t conductance = product_q14(alloy->gain_mantissa, inverse_q14);
+    uint32_t square = fixed_point_mac_u16(0, power_64uw, conductance);
+    int8_t shift = (int8_t)(alloy->gain_shift - 6);
     if (shift < 0) {
         return CURRENT_LIMIT_MA;
     }
-    square >>= shift;
+    for (; shift > 0; shift--) {
+        square >>= 1;
+    }
     if (square >= (uint32_t)CURRENT_LIMIT_MA * CURRENT_LIMIT_MA) {
         return CURRENT_LIMIT_MA;
     }
     return root(square);
-}
-
-uint16_t resistance_inverse_q14(uint16_t inverse_q14, uint16_t ratio_q14)
-{
-    uint32_t product = ((uint32_t)inverse_q14 * ratio_q14) >> 14; /* 1 when right */
-    if (product >= 2u * RESISTANCE_OBSERVER_ONE_Q14) {
-        return (uint16_t)(inverse_q14 >> 1 != 0 ? inverse_q14 >> 1 : 1u);
-    }
-    uint32_t next = ((2u * RESISTANCE_OBSERVER_ONE_Q14 - product) * inverse_q14) >> 14;
-    return next > UINT16_MAX ? UINT16_MAX : next == 0 ? 1u : (uint16_t)next;
 }

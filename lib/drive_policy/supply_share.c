@@ -1,5 +1,11 @@
 #include "supply_share.h"
 
+#if defined(__AVR__) && !defined(__clang__)
+#define HOT __attribute__((noinline, optimize("O2"))) /* a third of its cycles */
+#else
+#define HOT
+#endif
+
 void supply_queue_add(supply_queue_t *queue, uint8_t spring)
 {
     for (uint8_t k = 0; k < queue->count; k++) {
@@ -23,23 +29,35 @@ void supply_queue_remove(supply_queue_t *queue, uint8_t spring)
     queue->count = kept;
 }
 
-static uint32_t sum_capped(const uint16_t target_ma[], uint8_t springs, uint16_t cap_ma)
+HOT uint16_t supply_share_cap_ma(const uint16_t target_ma[], uint8_t springs, uint16_t budget_ma,
+                                 uint16_t cap_ma)
 {
-    uint32_t sum_ma = 0;
-    for (uint8_t k = 0; k < springs; k++) {
-        sum_ma += target_ma[k] < cap_ma ? target_ma[k] : cap_ma;
-    }
-    return sum_ma;
-}
-
-uint16_t supply_share_cap_ma(const uint16_t target_ma[], uint8_t springs, uint16_t budget_ma)
-{
-    uint16_t cap_ma = 0;
-    for (uint16_t bit = 2048; bit != 0; bit = (uint16_t)(bit >> 1)) {
-        uint16_t trial_ma = (uint16_t)(cap_ma | bit);
-        if (sum_capped(target_ma, springs, trial_ma) <= budget_ma) {
-            cap_ma = trial_ma;
+    for (uint8_t pass = 0; pass < SUPPLY_SHARE_PASSES; pass++) {
+        uint16_t left_ma = budget_ma;
+        uint8_t capped = 0;
+        const uint16_t *target = target_ma;
+        for (uint8_t n = springs; n != 0; n--) {
+            uint16_t given_ma = *target++;
+            if (given_ma > cap_ma) {
+                given_ma = cap_ma;
+                capped++;
+            }
+            if (given_ma > left_ma) { /* the budget has fallen */
+                cap_ma = 0;
+                left_ma = budget_ma;
+                capped = springs;
+                break;
+            }
+            left_ma = (uint16_t)(left_ma - given_ma);
         }
+        /* as much more for each that it cannot be too much for all */
+        for (; capped != 0 && left_ma != 0; capped = capped >> 1) {
+            left_ma = left_ma >> 1;
+        }
+        if (left_ma == 0) {
+            break;
+        }
+        cap_ma = (uint16_t)(cap_ma + left_ma);
     }
     return cap_ma;
 }

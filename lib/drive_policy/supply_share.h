@@ -24,9 +24,12 @@ void supply_queue_add(supply_queue_t *queue, uint8_t spring);
 /* Nothing if it is not in. */
 void supply_queue_remove(supply_queue_t *queue, uint8_t spring);
 
-/* The largest cap, at most 4095 mA, under which the targets fit the budget (max-min fair); by
- * bisection, O(12 n). */
-uint16_t supply_share_cap_ma(const uint16_t target_ma[], uint8_t springs, uint16_t budget_ma);
+/* A cap under which the targets fit the budget (max-min fair): cap_ma (0, or what the last call
+ * gave) raised towards the largest one. What is left of the budget at least halves with each of
+ * SUPPLY_SHARE_PASSES, until it is below 1 mA for each capped spring. O(passes n). */
+#define SUPPLY_SHARE_PASSES 4u
+uint16_t supply_share_cap_ma(const uint16_t target_ma[], uint8_t springs, uint16_t budget_ma,
+                             uint16_t cap_ma);
 
 #ifdef __cplusplus
 }

@@ -335,7 +335,7 @@ static void stop_acts_in_the_next_tick(void)
     TEST_ASSERT_TRUE(all_off());
     controller_clear_faults(&controller);
     all_on();
-    run(1);
+    run(13); /* a round of the policy */
     TEST_ASSERT_FALSE(all_off());
 }
 
@@ -350,7 +350,7 @@ static void locked_board_drives_nothing_until_unlocked(void)
     run(100);
     TEST_ASSERT_TRUE(all_off());
     all_on();
-    run(1);
+    run(13); /* a round of the policy */
     TEST_ASSERT_FALSE(all_off());
 }
 

@@ -43,7 +43,8 @@ static void count_parts(bool steps)
                                   .supply_limit_ma = 15000,
                                   .measured_ma = aside.measured_ma,
                                   .measured_mv = aside.measured_mv,
-                                  .valid = valid};
+                                  .valid = valid,
+                                  .model_stepped = steps};
     if (steps) {
         COUNT("policy_beside_model_step");
         drive_policy_tick(&aside.policy, &input, target_ma);
