@@ -266,3 +266,26 @@ def test_the_empirical_model_finds_what_the_drives_explain_and_nothing_in_noise(
     found = diagnosis.surrogate(problem, fit)
     assert found["empirical"] is True
     assert found["holdout_after_c"] < 0.7 * found["holdout_before_c"]
+
+
+def test_a_model_with_effects_needs_no_other_on_the_log_it_came_from(make_log, tmp_path: Path) -> None:
+    """Also where an effect has variants: the one that the model's parameters speak of is taken, and from there."""
+    for name, array, declared, run in (
+        (
+            "chopped loads",
+            Array(1, 2),
+            heaters(),
+            read_log(
+                commanded(tmp_path / "u.csv", {"supply_sag": {"supply_resistance_ohm": 8.0, "supply_chopped": 1.0}}), 2
+            ),
+        ),
+        ("spring 4", Array(), None, read_log(make_log(effects={"spring_mismatch": {"loss_scale[4]": 1.4}}, seed=3))),
+    ):
+        first = diagnosis.diagnose(array, [run], model=declared)
+        assert [e.get("variant") for e in first.result["effects"]] == [name]
+        again = diagnosis.diagnose(array, [run], model=first.model)
+        assert again.result["effects"] == []
+        assert dict(again.baseline.spec.variant).popitem()[1] == name
+        assert again.result["baseline"]["rmse_c"] == pytest.approx(first.result["after"]["rmse_c"], rel=0.01)
+        frozen = diagnosis.diagnose(array, [run], model=first.model, frozen=True)
+        assert frozen.baseline.spec.free == () and frozen.result["effects"] == []

@@ -6,7 +6,7 @@ import json
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -143,6 +143,30 @@ def diagnose(
         return _diagnose(array, runs, model, frozen, progress)
 
 
+def with_effects_of(spec: Spec, model: Model, known: Sequence[effects.Candidate], frozen: bool) -> Spec:
+    """Return the spec with a model's effects on, each in the variant that the model's parameters speak of.
+
+    Its numbers start at the model's values; where frozen they stay there.
+    """
+    given = model.parameters
+
+    def matches(one: effects.Candidate) -> int:
+        numbers = sum(name in given for free in one.free for name in free.names)
+        return numbers + sum(1 if given.get(name) == value else -1 for name, value in one.fixed if name in given)
+
+    for effect in model.effects:
+        if effect in spec.plant_effects:
+            continue
+        options = [c for c in known if c.effect == effect]
+        if frozen or not options:
+            spec = spec.with_effect(effect, (), (), max(options, key=matches).variant if options else "")
+            continue
+        one = max(options, key=matches)
+        free = [replace(f, start=next((given[n] for n in f.names if n in given), f.start)) for f in one.free]
+        spec = spec.with_effect(effect, free, one.fixed, one.variant, one.also_on)
+    return spec
+
+
 def _diagnose(
     array: Array, runs: Sequence[Run], model: Model | None, frozen: bool, progress: Callable[[str], None]
 ) -> Diagnosis:
@@ -153,10 +177,7 @@ def _diagnose(
     spec = effects.base_spec(problem, frozen)
     known = effects.candidates(problem)
     if model:
-        for effect in model.effects:
-            options = [c for c in known if c.effect == effect]
-            free = () if frozen or not options else options[0].free
-            spec = spec.with_effect(effect, free, (), options[0].variant if options else "")
+        spec = with_effects_of(spec, model, known, frozen)
     base = first_fit(problem, spec)
     found = search.Search(problem, [c for c in known if c.effect not in spec.effects], base, progress)
     final, without, contenders = found.run()
