@@ -203,6 +203,7 @@ def test_a_hot_start_is_not_fahrenheit(make_log) -> None:
     [
         (lambda c: c.update(time_s=np.arange(600.0) * 1000), "milliseconds"),
         (lambda c: c.update(time_s=np.arange(600.0) / 60), "minutes"),
+        (lambda c: c["ambient_c"].__setitem__(0, 0.0), "jumps from 0 to 20"),
         (
             lambda c: c.update({f"{a}{k}_{b}": c[f"{x}{k}_{y}"].copy() for k in range(1, 10) for a, b, x, y in SWAP}),
             "currents and voltages are swapped",

@@ -549,6 +549,12 @@ def _doubt_units(run: Run) -> None:
                 f"no spring is ever below {coldest:.0f}, which in Fahrenheit would be the ambient, {ambient:.0f} degC: "
                 "are the temperatures in Fahrenheit?"
             )
+    if run.ambient_c is not None and np.any(jumps := np.abs(np.diff(run.ambient_c)) > 5.0):
+        at = int(np.flatnonzero(jumps)[0])
+        run.notes.append(
+            f"ambient_c jumps from {run.ambient_c[at]:g} to {run.ambient_c[at + 1]:g} degC at {run.time_s[at + 1]:g} s: "
+            "the air of a room does not, is the column right?"
+        )
     if run.voltage_v is not None and run.current_a is not None and np.any(driven := run.current_a > 0.05):
         ohm = float(np.median(run.voltage_v[driven] / run.current_a[driven]))
         if not 0.02 < ohm < 2.0:

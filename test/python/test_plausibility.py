@@ -1,0 +1,73 @@
+"""Mistakes in the making of a log are said, whatever else the array does; a good log is not suspected."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+from ninespring import diagnosis, plausibility
+from ninespring.logs import read_log
+from ninespring.models import Array
+
+TRUE = {"latent_heat": {"latent_heat_j": 8.0}, "shared_air": {"air_exchange_w_per_k": 0.2}}
+
+
+def later(columns: dict[str, np.ndarray], rows: int) -> None:
+    """Move the temperatures later by so many rows."""
+    time_s = np.arange(600.0)
+    for k in range(1, 10):
+        columns[f"t{k}_c"] = np.interp(time_s - rows, time_s, columns[f"t{k}_c"])
+
+
+@pytest.mark.parametrize("columns", ["iv", "i"])
+def test_a_good_log_is_not_suspected(make_log, columns: str) -> None:
+    for seed in range(4):
+        run = read_log(make_log(effects=TRUE, seed=seed, columns=columns))
+        assert plausibility.swapped([run]) == []
+        assert plausibility.undriven_but_hottest(run) == []
+
+
+@pytest.mark.parametrize("order", [{2: 8, 8: 2}, {1: 2, 2: 1, 5: 6, 6: 5}, {1: 2, 2: 3, 3: 1}])
+def test_swapped_columns_are_named_through_a_phase_change_and_warm_air(make_log, order: dict[int, int]) -> None:
+    for letters in (("t", "c"), ("i", "a")):
+
+        def swap(columns: dict[str, np.ndarray], letters: tuple[str, str] = letters) -> None:
+            kinds = [letters, ("v", "v")] if letters[0] == "i" else [letters]
+            for a, b in kinds:
+                columns.update({f"{a}{k}_{b}": v for k, v in [(k, columns[f"{a}{o}_{b}"]) for k, o in order.items()]})
+
+        found = plausibility.swapped([read_log(make_log(effects=TRUE, change=swap))])
+        pairs = order if letters[0] == "t" else {o: k for k, o in order.items()}
+        assert {text.split(",")[0] for text in found} == {
+            f"t{k}_c follows the drive of spring {o}" for k, o in pairs.items()
+        }
+
+
+def test_a_spring_that_is_hot_and_never_driven_is_said(make_log) -> None:
+    run = read_log(make_log(effects=TRUE, change=lambda c: c.update(i7_a=c["i7_a"] * 0, v7_v=c["v7_v"] * 0)))
+    (said,) = plausibility.undriven_but_hottest(run)
+    assert said.startswith("spring 7 is never driven, yet at ")
+
+
+def test_a_spring_that_begins_hot_and_cools_is_not_suspected(make_log) -> None:
+    def hot(columns: dict[str, np.ndarray]) -> None:
+        columns["t7_c"] = 20.0 + 120.0 * np.exp(-np.arange(600.0) / 50)
+        columns.update(i7_a=columns["i7_a"] * 0, v7_v=columns["v7_v"] * 0)
+
+    assert plausibility.undriven_but_hottest(read_log(make_log(change=hot))) == []
+
+
+@pytest.mark.parametrize(("rows", "word"), [(-2, "before"), (-8, "before"), (-40, "before"), (8, "after")])
+def test_a_shifted_clock_is_measured_both_ways(make_log, rows: int, word: str) -> None:
+    run = read_log(make_log(change=lambda c: later(c, rows)))
+    problem, fit, _ = diagnosis.fit_effects(Array(), [run], [])
+    (said,) = plausibility.shifted_clock(problem, (fit,))
+    match = re.search(rf"come about (\d+) s {word} the inputs", said)
+    assert match and abs(int(match[1]) - abs(rows)) <= 1
+
+
+def test_a_clock_that_is_right_is_not_suspected(make_log) -> None:
+    run = read_log(make_log(effects=TRUE))
+    problem, fit, _ = diagnosis.fit_effects(Array(), [run], [])
+    assert plausibility.shifted_clock(problem, (fit,)) == []
