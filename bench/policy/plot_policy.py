@@ -140,12 +140,12 @@ def levels(directory: Path) -> None:
     trace = read(directory, "levels")
     figure, axes = plt.subplots(2, 1, figsize=(9, 4.6), sharex=True)
     axes[0].plot(trace["time_s"], [100 * x for x in trace["x5"]], label="the spring")
-    axes[0].step([0, 120, 220, 320], [50, 25, 80, 80], where="post", label="wanted", linewidth=1)
+    axes[0].step([0, 120, 220, 320, 400], [50, 25, 80, 100, 100], where="post", label="wanted", linewidth=1)
     axes[0].set(ylabel="austenite, %", ylim=(-3, 108))
     axes[0].legend(loc="lower right")
     axes[1].plot(trace["time_s"], trace["t5_c"])
     mark_band(axes[1])
-    axes[1].set(xlabel="time, s", ylabel="temperature, degC", xlim=(0, 320))
+    axes[1].set(xlabel="time, s", ylabel="temperature, degC", xlim=(0, 400))
     save(figure, "levels")
 
 

@@ -74,11 +74,11 @@ void write_traces(const std::string &directory, std::uint64_t seed)
 
     run_t levels = base;
     levels.pattern = 0;
-    levels.duration_s = 320.0;
+    levels.duration_s = 400.0;
     levels.trace_s = 1.28;
     levels.command = [](controller_t &controller, double time_s) {
         const std::uint16_t level = time_s < 120.0 ? 500 : time_s < 220.0 ? 250 : 800;
-        controller_set_target(&controller, centre, level);
+        controller_set_target(&controller, centre, time_s < 320.0 ? level : 1000);
     };
     trace(directory, "levels", levels);
 
