@@ -213,6 +213,27 @@ def test_work_that_ends_early_leaves_nothing_and_says_one_line(
     assert list(tmp_path.iterdir()) == [log]
 
 
+def test_fit_and_predict_say_what_is_wrong_with_a_log_too(make_log, tmp_path: Path) -> None:
+    def swap(columns: dict[str, np.ndarray]) -> None:
+        columns["t2_c"], columns["t8_c"] = columns["t8_c"], columns["t2_c"]
+
+    def early(columns: dict[str, np.ndarray]) -> None:
+        for k in range(1, 10):
+            columns[f"t{k}_c"] = np.append(columns[f"t{k}_c"][8:], np.full(8, np.nan))
+        del columns["t5_c"]
+
+    model, said = tmp_path / "m.toml", {}
+    for name, change in (("swap", swap), ("early", early)):
+        log = make_log(f"{name}.csv", change=change)
+        said[name] = ninespring("fit", log, "-o", model, "--json", tmp_path / "f.json").stderr
+        assert json.loads((tmp_path / "f.json").read_text())["warnings"]
+    assert "t2_c follows the drive of spring 8" in said["swap"]
+    assert re.search(r"come about [789] s before the inputs", said["early"])
+    assert "early.csv: no temperature of spring 5" in said["early"]
+    done = ninespring("predict", "--model", model, tmp_path / "swap.csv", "-o", tmp_path / "p.csv")
+    assert "t2_c follows the drive of spring 8" in done.stderr
+
+
 def test_files_are_written_together_or_not_at_all(tmp_path: Path) -> None:
     write_atomically({tmp_path / "a": "1\n", tmp_path / "b": "2\n"})
     assert [(tmp_path / name).read_text() for name in "ab"] == ["1\n", "2\n"]

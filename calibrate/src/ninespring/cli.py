@@ -87,8 +87,12 @@ def _array_and_runs(array_path: Path | None, logs: tuple[Path, ...], model: Any 
 
 def _say_notes(runs: list[Run]) -> None:
     for run in runs:
-        for note in run.notes:
-            err.print(f"{Path(run.name).name}: {note}", style="yellow", markup=False)
+        _say(f"{Path(run.name).name}: ", run.notes)
+
+
+def _say(where: str, notes: list[str]) -> None:
+    for note in notes:
+        err.print(where + note, style="yellow", markup=False)
 
 
 def checked(data: Mapping[str, Any]) -> str:
@@ -148,7 +152,7 @@ def fit(logs: tuple[Path, ...], array_path: Path | None, effects: str, output: P
     Errors are root mean squares in K; numbers are in J/K, W/K, J, s as the table says. Held out: on blocks of two and a
     half minutes that the numbers were not fitted to.
     """
-    from . import diagnosis, native, steady
+    from . import diagnosis, native, plausibility, steady
     from . import effects as library
     from .models import model_text
     from .statistics import rms
@@ -167,6 +171,11 @@ def fit(logs: tuple[Path, ...], array_path: Path | None, effects: str, output: P
         problem, chosen, base = diagnosis.fit_effects(array, runs, wanted, say)
         say("held-out blocks")
         held = diagnosis.holdout_rmse(problem, chosen)
+        suspect = plausibility.swapped(runs)
+        suspect += [text for run in runs for text in plausibility.undriven_but_hottest(run)]
+        if rms(chosen.residual) > 1.5 * problem.noise_c:
+            say("is a clock off?")
+            suspect += plausibility.shifted_clock(problem, (chosen,))
     model = diagnosis.model_of(problem, chosen, runs)
     model.provenance["rmse_before_c"] = rms(base.residual)
     result = _result(
@@ -182,8 +191,10 @@ def fit(logs: tuple[Path, ...], array_path: Path | None, effects: str, output: P
         },
         not_identifiable=sorted(chosen.stuck),
         at_bounds=chosen.at_bounds(),
+        warnings=suspect,
     )
     _write({output: model_text(model), json_path: checked(result)})
+    _say("", suspect)
     _print_parameters(result["parameters"])
     out.print(f"error {result['rmse_c']:.3f} K, held out {held:.3f} K, noise {problem.noise_c:.3f} K -> {output}")
     for effect in wanted:
@@ -336,13 +347,14 @@ def predict(log: Path, model_path: Path, output: Path, chip: bool, json_path: Pa
 
     The array is the model's; the log needs no temperatures, and starts at the first ones where it has them.
     """
-    from . import diagnosis
+    from . import diagnosis, plausibility
     from .models import read_model
 
     check_folder(output, json_path)
     model = read_model(model_path)
     array = model.array
     run = read_log(log, array.springs, temperatures=False, why=f"{model_path.name} is of {array.rows} x {array.cols}")
+    run.notes += plausibility.swapped([run]) + plausibility.undriven_but_hottest(run)
     _say_notes([run])
     with _working("simulating"):
         shown = diagnosis.predict(model, run, chip)

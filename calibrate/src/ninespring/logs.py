@@ -463,6 +463,9 @@ def read_log(path: str | Path, springs: int | None = None, temperatures: bool = 
     )
     if mode == "command":
         run.drive = np.clip(run.drive, 0.0, 1.0)
+    without = [str(k) for k in range(1, count + 1) if f"t{k}_c" not in frame]
+    if without and temperatures:
+        notes.append(f"no temperature of spring {', '.join(without)}: simulated, but not compared")
     _refuse_wrong_units(run, table)
     _mask_bad_sensors(run)
     _mask_glitches(run)
