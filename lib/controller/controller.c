@@ -228,27 +228,37 @@ bool controller_apply_settings(controller_t *controller, const controller_settin
     return true;
 }
 
-/* A fifth, to 4e-6 and 1 uW: 52429 = 2^18 / 5. */
+/* A fifth, to 2e-5 and 1 uW: 13107 = 2^16 / 5. */
 static inline ALWAYS uint32_t fifth(uint32_t sum)
 {
-    uint32_t low = fixed_point_mac_u16(0, (uint16_t)sum, 52429u);
-    return fixed_point_mac_u16(low >> 16, (uint16_t)(sum >> 16), 52429u) >> 2;
+    uint32_t low = fixed_point_mac_u16(0, (uint16_t)sum, 13107u);
+    return fixed_point_mac_u16(low >> 16, (uint16_t)(sum >> 16), 13107u);
 }
 
-/* v i, 0 where one of them is not positive. */
-static inline ALWAYS uint32_t add_power(uint32_t sum_uw, int16_t current_ma, int16_t voltage_mv)
+/* What flows, 0..CURRENT_MOST_MA. */
+static inline ALWAYS uint16_t flowing_ma(int16_t current_ma)
 {
-    if (current_ma <= 0 || voltage_mv <= 0) {
-        return sum_uw;
+    if (current_ma <= 0) {
+        return 0;
     }
-    return fixed_point_mac_u16(
-        sum_uw, current_ma > CURRENT_MOST_MA ? CURRENT_MOST_MA : (uint16_t)current_ma,
-        (uint16_t)voltage_mv);
+    return current_ma > CURRENT_MOST_MA ? CURRENT_MOST_MA : (uint16_t)current_ma;
+}
+
+/* value / 2^16. The AVR's compiler would load all four bytes. */
+static inline ALWAYS int16_t upper_half(const int32_t *value)
+{
+#ifdef __AVR__
+    int16_t half;
+    memcpy(&half, (const uint8_t *)value + sizeof half, sizeof half);
+    return half;
+#else
+    return (int16_t)(*value >> 16);
+#endif
 }
 
 /* Takes the readings and has them judged; returns the sum of what flows. */
-static uint32_t take_sensors(controller_t *controller, const controller_sensor_t *sensor,
-                             bool valid[])
+static HOT uint32_t take_sensors(controller_t *controller, const controller_sensor_t *sensor,
+                                 bool valid[])
 {
     uint32_t sum_ma = 0;
     for (uint8_t k = 0; k < controller->springs; k++, sensor++) {
@@ -256,8 +266,7 @@ static uint32_t take_sensors(controller_t *controller, const controller_sensor_t
         int16_t current_ma = sensor->current_ma;
         int16_t voltage_mv = sensor->voltage_mv;
         uint16_t expected_ma = controller->current.channel[k].reference_ma;
-        int16_t temperature_c7 =
-            (int16_t)((uint32_t)controller->model.state.spring[k].temperature_c23 >> 16);
+        int16_t temperature_c7 = upper_half(&controller->model.state.spring[k].temperature_c23);
         if (!safety_tick_good(&controller->safety, &controller->safety.spring[k], status,
                               current_ma, voltage_mv, expected_ma, temperature_c7)) {
             safety_sample_t sample = {.sensor_status = status,
@@ -277,10 +286,11 @@ static uint32_t take_sensors(controller_t *controller, const controller_sensor_t
         } else {
             continue;
         }
-        if (current_ma > 0) {
-            sum_ma += (uint16_t)current_ma;
+        uint16_t amount_ma = flowing_ma(current_ma);
+        sum_ma += amount_ma;
+        if (voltage_mv > 0) {
             controller->power_sum_uw[k] =
-                add_power(controller->power_sum_uw[k], current_ma, voltage_mv);
+                fixed_point_mac_u16(controller->power_sum_uw[k], amount_ma, (uint16_t)voltage_mv);
         }
     }
     safety_tick_board(&controller->safety, sum_ma);
@@ -346,10 +356,10 @@ static void drive(controller_t *controller, const bool valid[], uint32_t sum_ma,
         sum_ma + controller->policy.parameters.supply_reserve_ma <= limits->supply_limit_ma;
     current_control_tick_all(&controller->current, controller->springs, controller->target_ma,
                              controller->measured_ma, valid, may_rise, controller->duty);
-    for (uint8_t k = 0; k < controller->springs; k++) {
-        if ((controller->policy.spring[k].limits & DRIVE_POLICY_LIMIT_TRIP) != 0) {
-            safety_trip_limit(&controller->safety, k);
-        }
+    /* the policy gives it nothing, so that its latch can wait for its turn */
+    uint8_t turn = controller->resistance_turn;
+    if ((controller->policy.spring[turn].limits & DRIVE_POLICY_LIMIT_TRIP) != 0) {
+        safety_trip_limit(&controller->safety, turn);
     }
 }
 
@@ -460,8 +470,9 @@ uint32_t controller_power_uw(const controller_t *controller, uint8_t spring)
     if (controller->current.channel[spring].blind_ticks != 0 && controller->duty[spring] == 0) {
         return 0;
     }
-    uint32_t power_uw =
-        add_power(0, controller->measured_ma[spring], controller->measured_mv[spring]);
+    int16_t voltage_mv = controller->measured_mv[spring];
+    uint32_t power_uw = fixed_point_mac_u16(0, flowing_ma(controller->measured_ma[spring]),
+                                            voltage_mv > 0 ? (uint16_t)voltage_mv : 0u);
     return power_uw < THERMAL_MODEL_HIGHEST_POWER_UW ? power_uw : THERMAL_MODEL_HIGHEST_POWER_UW;
 }
 
