@@ -1,6 +1,6 @@
-"""Prints the firmware's sizes: flash, static RAM, each module's share, worst-case stack.
+"""Prints the firmware's sizes (flash, static RAM, each module's share, worst-case stack) and its worst tick.
 
-.venv/bin/python bench/firmware/firmware.py [--avr-build build/avr] [--json FILE]
+.venv/bin/python bench/firmware/firmware.py [--avr-build build/avr] [--runner avr_runner] [--json FILE]
 """
 
 from __future__ import annotations
@@ -95,10 +95,45 @@ def measure(build: Path, elf: Path, label: str) -> list[dict[str, object]]:
     ]
 
 
+def worst_tick(build: Path, runner: Path) -> list[dict[str, object]]:
+    """Prints and returns the most cycles of a tick in the scenario of test/avr/controller; [] without a simulator.
+
+    All nine springs transform, are switched, lose their sensors, break and short, under both policies. The ordinary
+    tick, of the firmware at work, is bench_board's.
+    """
+    program = build / "test" / "avr" / "controller" / "controller_avr.elf"
+    if not runner.exists() or not program.exists():
+        print(f"worst tick: left out, no {runner if program.exists() else program}")
+        return []
+    names = {"tick_with_model_step": "with a model step", "tick_without_model_step": "without"}
+    found = []
+    print("worst tick of controller_tick, cycles")
+    for line in run(str(runner), str(program)).splitlines():
+        name, *counts = line.split()
+        if name in names:
+            print(f"  {names[name]:<32}{counts[-1]:>8}        <= 16000")
+            found.append(
+                {
+                    "figure": f"controller_tick, worst case, {names[name]}",
+                    "value": int(counts[-1]),
+                    "unit": "cycles",
+                    "target": "<= 16000",
+                    "command": COMMAND,
+                }
+            )
+    return found
+
+
 def main() -> int:
     """Exit code: 0 done, 1 no bound was found, 2 no firmware there."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--avr-build", type=Path, default=Path("build/avr"), help="CMake's build folder for the Mega")
+    parser.add_argument(
+        "--runner",
+        type=Path,
+        default=Path("build/host/test/board_thermal_model/avr_runner"),
+        help="the simulator that counts cycles",
+    )
     parser.add_argument("--json", type=Path, help="also write the figures to this file")
     arguments = parser.parse_args()
     elves = [(arguments.avr_build / name, label) for name, label in VARIANTS.items()]
@@ -115,6 +150,7 @@ def main() -> int:
     except ValueError as error:
         print(f"firmware.py: {error}", file=sys.stderr)
         return 1
+    figures += worst_tick(arguments.avr_build, arguments.runner)
     if arguments.json:
         new = arguments.json.with_suffix(".new")
         new.write_text(json.dumps(figures, indent=2) + "\n")

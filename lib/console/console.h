@@ -19,7 +19,7 @@
 extern "C" {
 #endif
 
-#define CONSOLE_LINE_BYTES 96u  /* longest line in, without its end */
+#define CONSOLE_LINE_BYTES 64u  /* longest line in, without its end */
 #define CONSOLE_ROOM_BYTES 128u /* longest line out, with its end */
 
 /* What the console shows but does not find in the controller; kept by whoever runs the loop. */

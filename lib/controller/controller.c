@@ -337,6 +337,7 @@ static void drive(controller_t *controller, const bool valid[], uint32_t sum_ma,
             current_control_reset(&controller->current, k);
         }
     }
+    uint16_t target_ma[CONTROLLER_MAX_SPRINGS];
     const safety_parameters_t *limits = &controller->safety.parameters;
     drive_policy_input_t input = {.model = &controller->model,
                                   .level_permille = controller->level_permille,
@@ -348,13 +349,13 @@ static void drive(controller_t *controller, const bool valid[], uint32_t sum_ma,
                                   .measured_mv = controller->measured_mv,
                                   .valid = valid,
                                   .model_stepped = model_stepped};
-    drive_policy_tick(&controller->policy, &input, controller->target_ma);
+    drive_policy_tick(&controller->policy, &input, target_ma);
 
     /* Targets fit the budget; while loops still settle, what flows may not: then none rises
      * further. */
     bool may_rise =
         sum_ma + controller->policy.parameters.supply_reserve_ma <= limits->supply_limit_ma;
-    current_control_tick_all(&controller->current, controller->springs, controller->target_ma,
+    current_control_tick_all(&controller->current, controller->springs, target_ma,
                              controller->measured_ma, valid, may_rise, controller->duty);
     /* the policy gives it nothing, so that its latch can wait for its turn */
     uint8_t turn = controller->resistance_turn;
@@ -452,7 +453,7 @@ uint16_t controller_level_permille(const controller_t *controller, uint8_t sprin
 
 uint16_t controller_target_ma(const controller_t *controller, uint8_t spring)
 {
-    return controller->target_ma[spring];
+    return controller->policy.spring[spring].target_ma;
 }
 
 int16_t controller_measured_ma(const controller_t *controller, uint8_t spring)

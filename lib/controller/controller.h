@@ -69,7 +69,6 @@ typedef struct {
     uint16_t martensite_mohm;
     int16_t change_mohm; /* from martensite to austenite */
     uint16_t level_permille[CONTROLLER_MAX_SPRINGS];
-    uint16_t target_ma[CONTROLLER_MAX_SPRINGS];
     uint16_t duty[CONTROLLER_MAX_SPRINGS];
     int16_t measured_ma[CONTROLLER_MAX_SPRINGS]; /* last valid reading */
     int16_t measured_mv[CONTROLLER_MAX_SPRINGS];

@@ -270,7 +270,7 @@ static uint32_t radiation_of(uint16_t lead, uint16_t factor)
  */
 static uint32_t brought(const thermal_model_t *model, const thermal_model_spring_t *spring)
 {
-    if (!spring->upstream) {
+    if (spring->upstream == 0) {
         return 0;
     }
     const uint16_t *own = &model->lead[spring->frame + BLOCK_CENTRE];

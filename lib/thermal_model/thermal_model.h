@@ -26,8 +26,10 @@ extern "C" {
  * 64 (or of 80). */
 #if THERMAL_MODEL_MAX_SPRINGS <= 15
 #define THERMAL_MODEL_FRAME_STRIDE 5
+typedef uint8_t thermal_model_place_t; /* index in the frame */
 #elif THERMAL_MODEL_MAX_SPRINGS <= 80
 #define THERMAL_MODEL_FRAME_STRIDE 10
+typedef uint16_t thermal_model_place_t;
 #else
 #error "THERMAL_MODEL_MAX_SPRINGS above 80"
 #endif
@@ -163,12 +165,12 @@ typedef struct {
 
 /* Derived from the parameters: internal, read it through the functions. */
 typedef struct {
-    uint32_t step_gain;   /* 2^41 1e-6 step / heat capacity */
-    int32_t gain_c23;     /* enthalpy gained in this step */
-    int16_t block_offset; /* the same, in bytes from this struct */
-    uint16_t frame;       /* where in the frame the block of 3 x 3 around it begins */
-    uint16_t orthogonal;  /* uW/K at the present fan; the same for all, kept here
-                             for the step's speed */
+    uint32_t step_gain;          /* 2^41 1e-6 step / heat capacity */
+    int32_t gain_c23;            /* enthalpy gained in this step */
+    int16_t block_offset;        /* the same, in bytes from this struct */
+    thermal_model_place_t frame; /* where the block of 3 x 3 around it begins */
+    uint16_t orthogonal;         /* uW/K at the present fan; the same for all, kept here
+                                    for the step's speed */
     uint16_t diagonal;
     uint16_t conduction; /* all of this spring's couplings and the plate's */
     uint16_t loss;
@@ -176,14 +178,14 @@ typedef struct {
     uint16_t loss_natural; /* uW/K, scaled for this spring: fan off, fan full */
     uint16_t loss_fan;
     uint16_t loss_rise_natural;
-    uint16_t branch_latent; /* Q8.8 K: amplitude times latent heat over heat
-                               capacity */
-    uint16_t branch_slope;  /* of the branch, for the slope table */
-    uint8_t orthogonals;    /* neighbours */
-    uint8_t diagonals;
-    bool upstream;   /* a spring from which the fan blows */
-    uint8_t pending; /* this step takes it past a threshold: its phase is still to
-                        follow */
+    uint16_t branch_latent;  /* Q8.8 K: amplitude times latent heat over heat
+                                capacity */
+    uint16_t branch_slope;   /* of the branch, for the slope table */
+    uint8_t orthogonals : 3; /* neighbours */
+    uint8_t diagonals : 3;
+    uint8_t upstream : 1; /* 1: there is a spring from which the fan blows */
+    uint8_t pending;      /* this step takes it past a threshold: its phase is still to
+                             follow */
 } thermal_model_spring_t;
 
 /* What a pass over the springs takes and gives back. Internal. */

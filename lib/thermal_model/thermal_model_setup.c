@@ -356,7 +356,9 @@ static void derive(thermal_model_t *model)
             (uint16_t)fixed_point_multiply_divide(p->loss_fan_uw_per_k, scale, 1000u);
         spring->loss_rise_natural = (uint16_t)fixed_point_multiply_divide(
             p->loss_uw_per_k * scale, (uint32_t)p->loss_rise_ppm_per_k * 1024u, 1000000000u);
-        spring->orthogonals = neighbours_of(p, i, &spring->diagonals);
+        uint8_t diagonals;
+        spring->orthogonals = neighbours_of(p, i, &diagonals) & 7u;
+        spring->diagonals = diagonals & 7u;
     }
     model->latent_full_c23 = (int32_t)fixed_point_multiply_divide((uint32_t)p->latent_heat_mj << 10,
                                                                   8192u, p->heat_capacity_mj_per_k);
@@ -393,8 +395,9 @@ static void derive(thermal_model_t *model)
     int8_t along_row = tall ? 1 : THERMAL_MODEL_FRAME_STRIDE;
     int8_t along_column = tall ? THERMAL_MODEL_FRAME_STRIDE : 1;
     for (uint8_t i = 0; i < model->pass.count; i++) {
-        model->spring[i].frame = (uint16_t)((uint16_t)(i / p->columns) * (uint8_t)along_column +
-                                            (uint16_t)(i % p->columns) * (uint8_t)along_row);
+        model->spring[i].frame =
+            (thermal_model_place_t)((uint16_t)(i / p->columns) * (uint8_t)along_column +
+                                    (uint16_t)(i % p->columns) * (uint8_t)along_row);
         model->spring[i].block_offset =
             (int16_t)((int32_t)(offsetof(thermal_model_t, lead) + 2u * model->spring[i].frame) -
                       (int32_t)(offsetof(thermal_model_t, spring) +
@@ -403,11 +406,12 @@ static void derive(thermal_model_t *model)
     for (uint8_t i = 0; i < model->pass.count; i++) {
         uint8_t row = (uint8_t)(i / p->columns);
         uint8_t column = (uint8_t)(i % p->columns);
-        model->spring[i].upstream = p->wake_direction == THERMAL_MODEL_WAKE_EAST    ? column > 0
-                                    : p->wake_direction == THERMAL_MODEL_WAKE_SOUTH ? row > 0
-                                    : p->wake_direction == THERMAL_MODEL_WAKE_WEST
-                                        ? column + 1 < p->columns
-                                        : row + 1 < p->rows;
+        const bool upstream = p->wake_direction == THERMAL_MODEL_WAKE_EAST    ? column > 0
+                              : p->wake_direction == THERMAL_MODEL_WAKE_SOUTH ? row > 0
+                              : p->wake_direction == THERMAL_MODEL_WAKE_WEST
+                                  ? column + 1 < p->columns
+                                  : row + 1 < p->rows;
+        model->spring[i].upstream = upstream ? 1u : 0u;
     }
     model->wake_offset = p->wake_direction == THERMAL_MODEL_WAKE_EAST    ? (int8_t)-along_row
                          : p->wake_direction == THERMAL_MODEL_WAKE_SOUTH ? (int8_t)-along_column

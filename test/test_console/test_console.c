@@ -82,7 +82,7 @@ static void tick(void)
 {
     for (uint8_t k = 0; k < 9; k++) {
         inputs.sensor[k].current_ma = (int16_t)controller_target_ma(&controller, k);
-        inputs.sensor[k].voltage_mv = (int16_t)(inputs.sensor[k].current_ma * 18 / 100);
+        inputs.sensor[k].voltage_mv = (int16_t)((inputs.sensor[k].current_ma * 18 + 50) / 100);
     }
     controller_tick(&controller, &inputs, &outputs);
     status.ticks++;
