@@ -3,7 +3,7 @@
     .venv/bin/python bench/diagnose/run.py [--seeds N] [--quick] [--json FILE] [--markdown]
 
 Data come from `world.py`, which shares nothing with the product's plant. The thresholds of the diagnosis were
-chosen on seeds 0 to 999; what is printed comes from seeds 200000 up, which were used for nothing else.
+chosen on seeds 0 to 999; what is printed comes from seeds 300000 up, which were used for nothing else.
 """
 
 from __future__ import annotations

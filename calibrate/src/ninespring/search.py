@@ -43,9 +43,15 @@ SLOW_NODES = ("shared_air", "plate_conduction")
 """Effects that are tried in the place of such a drift whatever the forecast says."""
 
 
-def handicap(fit: Fit) -> float:
-    """Return the nats by which a fit must win against one that has a physical cause in its place."""
-    return TOLD_APART if dict(fit.spec.variant).get("ambient_drift") in DRIFTS else 0.0
+def handicap(one: Fit, other: Fit) -> float:
+    """Return the nats by which `one` must be ahead of `other`: more where it has a drift in a physical cause's place.
+
+    Negative the other way round; 0 where both have a drift, bent or not.
+    """
+    drifts = [dict(fit.spec.variant).get("ambient_drift") for fit in (one, other)]
+    if None not in drifts:
+        return 0.0
+    return TOLD_APART * ((drifts[0] in DRIFTS) - (drifts[1] in DRIFTS))
 
 
 def log_evidence(problem: Problem, better: Fit, other: Fit) -> float:
@@ -261,7 +267,7 @@ class Search:
         ahead = (
             log_evidence(self.problem, one, other) if one.chi2 < other.chi2 else -log_evidence(self.problem, other, one)
         )
-        return ahead > handicap(one) - handicap(other)
+        return ahead > handicap(one, other)
 
     def holds_out(self, better: Fit, other: Fit) -> bool:
         """Return whether `better` also predicts blocks better that neither was fitted to."""
