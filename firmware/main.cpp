@@ -114,6 +114,17 @@ static void start_model(uint8_t cause)
     thermal_model_reset(&controller.model, (int16_t)(hot_cc * 32 / 25)); // x 128 / 100
 }
 
+// Configures the sensors at the start and when the setting has changed: they then convert anew, and
+// a reading or two is missing.
+static void follow_averaging()
+{
+    static uint8_t averaging;
+    if (averaging != settings.board.sensor_averaging) {
+        averaging = settings.board.sensor_averaging;
+        current_sensor_begin(averaging);
+    }
+}
+
 static void run_tick(uint8_t behind)
 {
     const uint32_t begin_us = board_time_us();
@@ -125,6 +136,7 @@ static void run_tick(uint8_t behind)
 #ifdef NINESPRING_HIL
     current_sensor_hil_tick((uint16_t)status.ticks);
 #endif
+    follow_averaging();
     current_sensor_read(inputs.sensor, CONTROLLER_MAX_SPRINGS);
     for (uint8_t k = 0; k < CONTROLLER_MAX_SPRINGS; k++) {
         status.sensor_status[k] = (uint8_t)inputs.sensor[k].status;
@@ -247,7 +259,7 @@ void setup()
     console_init(&console, &serial_output, &controller, &settings, &store, &telemetry, &status);
     console_greet(&console);
     board_watchdog_start();
-    current_sensor_begin(settings.board.sensor_averaging);
+    follow_averaging();
     uint8_t behind;
     while (board_tick_take(&behind)) { // what became due meanwhile is not late
     }

@@ -154,6 +154,26 @@ void power_cut_in_a_save_leaves_old_or_new()
     TEST_ASSERT_TRUE_MESSAGE(seen_new, "no save was complete");
 }
 
+/* At once and while springs are driven, without a fault. */
+void averaging_is_set_while_it_runs()
+{
+    rig mega;
+    mega.boot();
+    mega.expect_ok("on all");
+    mega.run_ms(500.0);
+    for (const char *samples : {"16", "8"}) {
+        mega.expect_ok(std::string("$sensor_averaging=") + samples);
+        mega.run_ms(300.0);
+        const board_view_t seen = mega.view();
+        for (unsigned k = 0; k < BOARD_CHANNELS; ++k) {
+            TEST_ASSERT_EQUAL_HEX16(samples[0] == '8' ? 0x1DDF : 0x1E67,
+                                    board_sensor_register(mega.raw(), k, 0));
+            TEST_ASSERT_EQUAL_UINT8(SAFETY_FAULT_NONE, seen.spring[k].fault);
+            TEST_ASSERT_INT_WITHIN(60, 1500, seen.spring[k].measured_ma);
+        }
+    }
+}
+
 } // namespace
 
 void setUp() {}
@@ -167,5 +187,6 @@ int main()
     RUN_TEST(settings_of_one_board_make_another_the_same);
     RUN_TEST(what_is_not_saved_is_gone_after_power_off);
     RUN_TEST(power_cut_in_a_save_leaves_old_or_new);
+    RUN_TEST(averaging_is_set_while_it_runs);
     return UNITY_END();
 }
