@@ -19,6 +19,8 @@
 /* A spring counts as wanted fully on from here: the last percent of a transformation has no level.
  */
 #define LEVEL_FULL_PERMILLE 960
+#define FULL_BAND_PERMILLE  60 /* less than it read when it had transformed: it is heated again */
+#define FULL_MOST_PERMILLE  250
 #define LEVEL_BAND_PERMILLE 50 /* a held level may be off by so much before it is sought again */
 
 /* What the fast ratio must show before it moves the model; permille. */
@@ -29,8 +31,9 @@
 
 #define MODEL_FULL_PERMILLE 985
 #define RATIO_FULL_PERMILLE 900
-#define PLATEAU_PERMILLE    15 /* less than this in half a second: the transformation is over */
-#define PLATEAU_TRUSTED     3  /* half seconds that end a heating against the model */
+#define PLATEAU_BOOST       12 /* less than this in a window: the transformation is over */
+#define PLATEAU_SLOW        5
+#define PLATEAU_TRUSTED     8 /* windows that end a heating against the model */
 
 /* The slow ratio in a hold, permille of phase. */
 #define LOSS_SUSPECTED    3 /* the search pauses */
@@ -39,8 +42,9 @@
 #define PAUSE_WINDOWS     12
 #define LOSS_CERTAIN      10  /* at once */
 #define SUSPICION_64UW    470 /* 30 mW stop a fall of 0.1 K/s */
-#define FOLLOWED_MOST     25  /* 2^-14 of the ratio: six permille */
-#define LOSS_CONFIRMED    4   /* what a true sighting comes to once the average has settled */
+#define FOLLOWED_MOST     12  /* 2^-14 of the ratio: three permille */
+#define FULL_MINUTE       60u
+#define LOSS_CONFIRMED    4 /* what a true sighting comes to once the average has settled */
 #define LOSS_REHEAT       18
 #define GAIN_IMPLAUSIBLE  45
 #define REFERENCE_WINDOWS 40u
@@ -51,6 +55,8 @@
 #define CERTAIN_C7         (20 * KELVIN_C7) /* below austenite start: martensite for certain */
 #define SHORT_MOST_C7      (20 * KELVIN_C7)
 #define KEPT_C7            (3 * KELVIN_C7) /* above austenite start what was reached is worth keeping */
+#define WAITING_C7         (9 * KELVIN_C7 / 2) /* margin while others wait for their boost */
+#define WAITING_RISE_C7    8                   /* and its rise in a second */
 #define SETTLED_C7         (3 * KELVIN_C7 / 2)
 #define AFTER_BOOST_C7     (4 * KELVIN_C7) /* margin added until the heating has settled */
 #define BLIND_OVERSHOOT_C7 (4 * KELVIN_C7)
@@ -177,6 +183,7 @@ bool drive_policy_init(drive_policy_t *policy, const drive_policy_parameters_t *
         drive_policy_spring_t *s = &policy->spring[k];
         resistance_observer_reset(&s->observer);
         s->ceiling_ma = parameters->boost_current_ma;
+        s->full_permille = 1000;
     }
     return true;
 }
@@ -267,8 +274,7 @@ static bool trusted(const drive_policy_t *policy, const drive_policy_spring_t *s
 }
 
 /* While it heats: where the resistance says the spring is, against where the model has it. */
-/* True if the model was moved. */
-static OWN bool correct_heating(const drive_policy_t *policy, drive_policy_spring_t *s,
+static OWN void correct_heating(const drive_policy_t *policy, drive_policy_spring_t *s,
                                 thermal_model_t *model, uint8_t k, int16_t phase, int16_t permille)
 {
     int16_t now_c7 = thermal_model_temperature_c7(model, k);
@@ -283,7 +289,7 @@ static OWN bool correct_heating(const drive_policy_t *policy, drive_policy_sprin
         move_c7 = (int16_t)(((int32_t)error * policy->correction_q8) >> 8);
     }
     if (move_c7 == 0) {
-        return false;
+        return;
     }
     int16_t sum_c7 = (int16_t)(s->corrected_c7 + move_c7);
     if (sum_c7 > TRUST_LIMIT_C7 || sum_c7 < -TRUST_LIMIT_C7) {
@@ -297,7 +303,6 @@ static OWN bool correct_heating(const drive_policy_t *policy, drive_policy_sprin
     } else {
         rewind_to(model, k, (int16_t)(now_c7 + move_c7), true);
     }
-    return true;
 }
 
 /* How far into its width a transformation is, permille, that has made so much austenite:
@@ -345,6 +350,11 @@ static void correct_hold(const drive_policy_t *policy, drive_policy_spring_t *s,
     int16_t model_c7 = thermal_model_temperature_c7(model, k);
     int32_t difference_uw = thermal_model_power_to_hold_uw(model, k, model_c7) -
                             thermal_model_power_to_hold_uw(model, k, true_c7);
+    /* A wrong loss shows with the spring's own time, some 50 s: seen early it is the greater. A
+     * hold that is too cold is worse than one too hot, so this counts for losses only. */
+    if (difference_uw > 0 && s->held < 2u * FULL_MINUTE) {
+        difference_uw += s->held < FULL_MINUTE ? difference_uw >> 1 : difference_uw >> 2;
+    }
     /* / 60 K, where springs are held above ambient */
     s->bias_uw_per_k = clamp16(s->bias_uw_per_k + ((difference_uw * 273) >> 14),
                                (int16_t)-policy->bias_limit_uw_per_k, policy->bias_limit_uw_per_k);
@@ -378,6 +388,7 @@ static void enter(drive_policy_t *policy, uint8_t k, drive_policy_stage_t stage)
     s->lost_permille = 0;
     s->reference = 0;
     s->plateau = 0;
+    s->held = 0;
     s->suspicion = 0;
     s->seen = 0;
     s->floor_ma = 0;
@@ -415,27 +426,27 @@ static OWN bool is_transformed(const drive_policy_t *policy, drive_policy_spring
                (derated && now_c7 >= model->austenite_finish_c7);
     }
     if (s->plateau >= PLATEAU_TRUSTED && phase > 600 &&
-        now_c7 > model->austenite_start_c7 + 2 * KELVIN_C7 &&
         s->target_ma >= policy->parameters.boost_current_ma >> 1) {
         if (now_c7 < model->austenite_finish_c7) {
             rewind_to(model, k, model->austenite_finish_c7, true);
         }
         return true;
     }
-    return s->plateau != 0 && phase >= RATIO_FULL_PERMILLE &&
+    return s->plateau >= 2 && phase >= RATIO_FULL_PERMILLE &&
            now_c7 >= model->austenite_finish_c7 - KELVIN_C7;
 }
 
-/* Counts half seconds in which the ratio stood still. */
-static void watch_plateau(drive_policy_spring_t *s)
+/* Counts windows in which the phase stood still: the last percent of a transformation is slow. What
+ * heats with less current is slower in all of it. */
+static void watch_plateau(const drive_policy_t *policy, drive_policy_spring_t *s)
 {
-    if ((s->fresh & 1u) != 0) {
-        return;
-    }
     int16_t phase = s->observer.phase_permille;
     int16_t change = (int16_t)(phase - s->before_permille);
+    bool boosts = s->target_ma >=
+                  policy->parameters.boost_current_ma - (policy->parameters.boost_current_ma >> 2);
+    int16_t most = boosts ? PLATEAU_BOOST : PLATEAU_SLOW;
     s->before_permille = phase;
-    if (change > PLATEAU_PERMILLE || change < -PLATEAU_PERMILLE) {
+    if (change > most || change < -most) {
         s->plateau = 0;
     } else if (s->plateau < UINT8_MAX) {
         s->plateau++;
@@ -455,16 +466,14 @@ static OWN bool has_heated(drive_policy_t *policy, drive_policy_spring_t *s, the
     }
     bool sees = trusted(policy, s);
     int16_t phase = sees ? s->observer.phase_permille : permille;
-    if (s->granted_ma < s->asked_ma) {
-        s->plateau = 0; /* it stands still because it waits */
+    if (s->granted_ma < s->asked_ma || now_c7 < model->austenite_start_c7 + 2 * KELVIN_C7) {
+        s->plateau = 0; /* it stands still because it waits, or has not begun */
     } else if (fresh) {
-        watch_plateau(s);
+        watch_plateau(policy, s);
     }
     if (fresh) {
         if (sees && s->reference != 0) {
-            if (correct_heating(policy, s, model, k, phase, permille)) {
-                return false; /* next time: one of both is enough for a tick */
-            }
+            correct_heating(policy, s, model, k, phase, permille);
         } else if (sees && now_c7 > model->martensite_start_c7) {
             s->reference = 1; /* the first look at it, if it was not cold before */
             if (now_c7 < model->austenite_start_c7 && s->target_ma != 0 &&
@@ -476,8 +485,16 @@ static OWN bool has_heated(drive_policy_t *policy, drive_policy_spring_t *s, the
             s->reference = 1;
         }
     }
-    return level >= LEVEL_FULL_PERMILLE ? is_transformed(policy, s, model, k, sees, phase)
-                                        : phase >= level;
+    if (level < LEVEL_FULL_PERMILLE) {
+        return phase >= level;
+    }
+    if (!is_transformed(policy, s, model, k, sees, phase)) {
+        return false;
+    }
+    if (sees) {
+        s->full_permille = clamp16(phase, 1000 - FULL_MOST_PERMILLE, 1000 + FULL_MOST_PERMILLE);
+    }
+    return true;
 }
 
 static OWN void heat(drive_policy_t *policy, drive_policy_spring_t *s, thermal_model_t *model,
@@ -595,6 +612,12 @@ static OWN void narrow_margin(drive_policy_t *policy, drive_policy_spring_t *s)
 {
     int16_t floor_c7 =
         (s->flags & FLAG_LEARNT) != 0 ? policy->hold_margin_c7 : (int16_t) - (PIN_C7 + PULL_C7);
+    if (policy->waiting && (s->flags & FLAG_LEARNT) == 0) {
+        if ((s->fresh & 3u) == 0 && s->margin_c7 < policy->unsure_margin_c7 - WAITING_RISE_C7) {
+            s->margin_c7 = (int16_t)(s->margin_c7 + WAITING_RISE_C7);
+        }
+        return; /* the model runs alone: what it says grows less certain */
+    }
     if (policy->search_c7 == 0 || is_pausing(s) || s->reference < REFERENCE_WINDOWS ||
         (s->fresh & 3u) != 0) {
         return;
@@ -614,6 +637,9 @@ static OWN void hold(drive_policy_t *policy, drive_policy_spring_t *s, thermal_m
 {
     bool full = level >= LEVEL_FULL_PERMILLE;
     int16_t phase = s->observer.phase_permille;
+    if ((policy->round & 3u) == 0 && s->held < UINT8_MAX) {
+        s->held++;
+    }
     if (!trusted(policy, s)) {
         if (s->fresh >= FRESH_WINDOWS) {
             s->margin_c7 = policy->unsure_margin_c7;
@@ -624,7 +650,7 @@ static OWN void hold(drive_policy_t *policy, drive_policy_spring_t *s, thermal_m
             }
             return;
         }
-        phase = level;
+        phase = full ? INT16_MAX : level;
     } else if (fresh) {
         watch_hold(policy, s, model, k, full);
         narrow_margin(policy, s);
@@ -632,9 +658,10 @@ static OWN void hold(drive_policy_t *policy, drive_policy_spring_t *s, thermal_m
             return;
         }
     }
-    /* while it settles the reading may be wrong a little */
-    int16_t least = (int16_t)(level - (full ? 2 : 1) * LEVEL_BAND_PERMILLE -
-                              (s->reference < REFERENCE_WINDOWS ? LEVEL_BAND_PERMILLE : 0));
+    /* fully on is what it read when it had transformed, whatever the declared resistances say */
+    int16_t least = full ? (int16_t)(s->full_permille - FULL_BAND_PERMILLE)
+                         : (int16_t)(level - LEVEL_BAND_PERMILLE -
+                                     (s->reference < REFERENCE_WINDOWS ? LEVEL_BAND_PERMILLE : 0));
     if (phase < least) {
         enter(policy, k, DRIVE_POLICY_STAGE_HEAT);
         return;
@@ -643,9 +670,13 @@ static OWN void hold(drive_policy_t *policy, drive_policy_spring_t *s, thermal_m
         enter(policy, k, DRIVE_POLICY_STAGE_LOWER);
         return;
     }
+    if (policy->waiting && s->margin_c7 == policy->unsure_margin_c7 && s->margin_c7 > WAITING_C7 &&
+        trusted(policy, s)) {
+        s->margin_c7 = WAITING_C7; /* it coasts on: others have use for the current */
+    }
+    int16_t target_c7 = (int16_t)(model->martensite_start_c7 + s->margin_c7);
     uint16_t wanted_ma =
-        hold_current_ma(policy, s, model, k, (int16_t)(model->martensite_start_c7 + s->margin_c7),
-                        is_pausing(s) ? SUSPICION_64UW : 0);
+        hold_current_ma(policy, s, model, k, target_c7, is_pausing(s) ? SUSPICION_64UW : 0);
     wanted_ma = (uint16_t)(wanted_ma + (policy->parameters.dither_ma >> 1));
     if (wanted_ma < policy->parameters.probe_current_ma) {
         wanted_ma = policy->parameters.probe_current_ma;
@@ -938,8 +969,11 @@ static void precompensate(drive_policy_t *policy, const drive_policy_input_t *in
     switch ((drive_policy_stage_t)s->stage) {
     case DRIVE_POLICY_STAGE_OFF:
         enter(policy, k,
-              model_permille(model, k) + LEVEL_BAND_PERMILLE < level ? DRIVE_POLICY_STAGE_HEAT
-                                                                     : DRIVE_POLICY_STAGE_HOLD);
+              model_permille(model, k) < (level >= LEVEL_FULL_PERMILLE
+                                              ? MODEL_FULL_PERMILLE
+                                              : level - LEVEL_BAND_PERMILLE)
+                  ? DRIVE_POLICY_STAGE_HEAT
+                  : DRIVE_POLICY_STAGE_HOLD);
         break;
     case DRIVE_POLICY_STAGE_HEAT:
         heat(policy, s, model, k, level, fresh);

@@ -91,11 +91,13 @@ typedef struct {
     int16_t before_permille;        /* phase half a second ago */
     int16_t bias_uw_per_k;          /* loss beyond the model's */
     int32_t bias_now_uw;            /* the same at the present temperature */
+    int16_t full_permille;          /* its phase as read when it had transformed */
     int16_t corrected_c7;           /* sum of the observer's corrections in this heating */
     int16_t margin_c7;              /* of the hold, above martensite start */
     int16_t last_c7;                /* temperature one update ago */
     int16_t lost_permille;          /* most phase that this hold was seen to lose */
     uint16_t derated_updates;
+    uint8_t held;      /* seconds in this hold, saturating */
     int8_t followed;   /* steps that reference_q14 has wandered */
     uint8_t reference; /* windows that went into reference_q14 */
     uint8_t plateau;   /* half seconds of constant resistance */

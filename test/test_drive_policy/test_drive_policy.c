@@ -86,6 +86,13 @@ static void put(uint8_t spring, int16_t temperature_c, bool austenite)
     thermal_model_set_temperature(&model, spring, (int16_t)(temperature_c * 128));
 }
 
+static uint32_t random_state = 7;
+static uint32_t random_below(uint32_t limit)
+{
+    random_state = random_state * 1664525u + 1013904223u;
+    return (random_state >> 8) % limit;
+}
+
 /* ---- inverse ---- */
 
 static void two_springs_hold_by_the_hand_computed_inverse(void)
@@ -208,6 +215,71 @@ static void holds_come_before_boosts(void)
     TEST_ASSERT_LESS_OR_EQUAL_UINT32(3800, (uint32_t)target_ma[0] + target_ma[8]);
 }
 
+static void no_spring_is_updated_beside_a_model_step(void)
+{
+    make(3, 3);
+    for (unsigned n = 0; n < 40; n++) {
+        model_tick = 4; /* the next tick is one with a step */
+        level[4] = 1000;
+        (void)tick();
+        TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_OFF, drive_policy_stage(&policy, 4));
+    }
+    ticks(13);
+    TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_HEAT, drive_policy_stage(&policy, 4));
+    level[4] = 0; /* off does not wait */
+    model_tick = 4;
+    (void)tick();
+    TEST_ASSERT_EQUAL_UINT16(0, target_ma[4]);
+}
+
+static void cap_fits_and_comes_within_a_milliampere_each(void)
+{
+    for (unsigned n = 0; n < 300; n++) {
+        uint16_t wanted_ma[SPRINGS];
+        uint32_t sum = 0;
+        for (uint8_t k = 0; k < SPRINGS; k++) {
+            wanted_ma[k] = (uint16_t)random_below(3201);
+            sum += wanted_ma[k];
+        }
+        uint16_t budget_ma = (uint16_t)(1000u + random_below(14000));
+        uint16_t cap_ma = (uint16_t)random_below(3201); /* what another call left */
+        for (unsigned call = 0; call < 8; call++) {
+            cap_ma = supply_share_cap_ma(wanted_ma, SPRINGS, budget_ma, cap_ma);
+            uint32_t given = 0;
+            for (uint8_t k = 0; k < SPRINGS; k++) {
+                given += wanted_ma[k] < cap_ma ? wanted_ma[k] : cap_ma;
+            }
+            TEST_ASSERT_LESS_OR_EQUAL_UINT32(budget_ma, given);
+            if (call == 7) {
+                uint32_t best = sum < budget_ma ? sum : budget_ma;
+                TEST_ASSERT_GREATER_OR_EQUAL_UINT32(best - 2u * SPRINGS, given);
+            }
+        }
+    }
+}
+
+static void held_springs_coast_on_while_others_wait(void)
+{
+    parameters.dither_ma = 0;
+    make(3, 3);
+    put(0, 88, true);
+    level[0] = 1000;
+    ticks(52);
+    TEST_ASSERT_EQUAL_INT(12 * 128, policy.spring[0].margin_c7);
+    TEST_ASSERT_GREATER_THAN_UINT16(1000, target_ma[0]);
+    policy.spring[0].observer.learnt = 100; /* its reading counts */
+    policy.spring[0].observer.ratio_q14 = (uint16_t)(16384u * 219u / 175u);
+    policy.spring[0].observer.phase_permille = 1000;
+    policy.spring[0].fresh = 100;
+    for (uint8_t k = 1; k < SPRINGS; k++) {
+        level[k] = 1000;
+    }
+    uint16_t held_ma = target_ma[0];
+    ticks(39);
+    TEST_ASSERT_LESS_THAN_INT(5 * 128, policy.spring[0].margin_c7);
+    TEST_ASSERT_LESS_THAN_UINT16(held_ma / 2, target_ma[0]); /* it is above that: it coasts */
+}
+
 static void own_temperature_derates_linearly_then_trips(void)
 {
     parameters.dither_ma = 0;
@@ -279,13 +351,6 @@ static void overload_takes_the_excess_away_in_time(void)
     ticks(100);
     TEST_ASSERT_LESS_OR_EQUAL_UINT32(6200, tick());
     TEST_ASSERT_BITS_HIGH(DRIVE_POLICY_LIMIT_OVERLOAD, drive_policy_limits(&policy, 8));
-}
-
-static uint32_t random_state = 7;
-static uint32_t random_below(uint32_t limit)
-{
-    random_state = random_state * 1664525u + 1013904223u;
-    return (random_state >> 8) % limit;
 }
 
 static void budget_holds_in_every_tick_whatever_is_asked(void)
@@ -481,6 +546,32 @@ static void window_that_no_longer_fits_keeps_what_it_has(void)
     TEST_ASSERT_INT_WITHIN(30, 0, observer.phase_permille);
 }
 
+/* Feeds spring 0 with what a resistance makes of its targets. */
+static void feed(double ohm, unsigned count)
+{
+    while (count-- != 0) {
+        valid[0] = true;
+        measured_ma[0] = (int16_t)target_ma[0];
+        measured_mv[0] = (int16_t)(4 * (int)(target_ma[0] * ohm / 4.0 + 0.5));
+        (void)tick();
+    }
+}
+
+static void heating_that_starts_half_way_takes_the_phase_from_the_resistance(void)
+{
+    make(3, 3);
+    level[0] = 1000;
+    feed(0.175, 200);  /* cold: learns its martensite */
+    put(0, 83, false); /* the model has it as martensite, in truth it is 60 % austenite */
+    level[0] = 0;
+    feed(0.2014, 20);
+    level[0] = 1000;
+    feed(0.2014, 100);
+    TEST_ASSERT_INT_WITHIN(60, 600, thermal_model_austenite(&model, 0) * 1000 / 32768);
+    TEST_ASSERT_EQUAL_INT16(83 * 128, thermal_model_temperature_c7(&model, 0));
+    TEST_ASSERT_TRUE(drive_policy_observes(&policy, 0));
+}
+
 static void alloy_without_a_change_of_resistance_is_never_trusted(void)
 {
     start_observer(175000, 176000, 1.0);
@@ -496,6 +587,9 @@ int main(void)
     RUN_TEST(boosts_are_staggered_not_diluted);
     RUN_TEST(who_waits_longest_is_next);
     RUN_TEST(holds_come_before_boosts);
+    RUN_TEST(no_spring_is_updated_beside_a_model_step);
+    RUN_TEST(cap_fits_and_comes_within_a_milliampere_each);
+    RUN_TEST(held_springs_coast_on_while_others_wait);
     RUN_TEST(own_temperature_derates_linearly_then_trips);
     RUN_TEST(hot_undriven_spring_derates_its_neighbours_only);
     RUN_TEST(spring_just_released_is_no_false_actuation);
@@ -510,6 +604,7 @@ int main(void)
     RUN_TEST(short_or_weak_window_says_nothing);
     RUN_TEST(readings_beside_a_jump_of_the_current_are_left_out);
     RUN_TEST(window_that_no_longer_fits_keeps_what_it_has);
+    RUN_TEST(heating_that_starts_half_way_takes_the_phase_from_the_resistance);
     RUN_TEST(alloy_without_a_change_of_resistance_is_never_trusted);
     return UNITY_END();
 }
