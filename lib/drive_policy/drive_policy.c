@@ -1076,38 +1076,9 @@ static OWN void take_turn(drive_policy_t *policy, const drive_policy_input_t *in
 
 /* ---- one tick ---- */
 
-/* Not driven: off at once, whatever the update's turn. */
-static __attribute__((noinline)) void idle(drive_policy_t *policy, drive_policy_spring_t *s,
-                                           uint8_t reason)
-{
-    s->limits = reason;
-    if (s->wanted_ma != 0 || s->stage != DRIVE_POLICY_STAGE_OFF) {
-        stop(policy, s);
-    }
-}
-
-/* A target between the last one and what is granted: after a change of policy it walks, up as far
- * as there is room, which is what the last targets left of the budget. */
-static OWN uint16_t softened_ma(drive_policy_t *policy, uint16_t last_ma, uint16_t target_ma)
-{
-    if (target_ma <= last_ma) {
-        if (target_ma + SOFT_MA >= last_ma) {
-            return target_ma;
-        }
-        policy->soft = SOFT_TURNS;
-        return (uint16_t)(last_ma - SOFT_MA);
-    }
-    uint16_t rise_ma = (uint16_t)(target_ma - last_ma);
-    if (rise_ma > SOFT_MA || rise_ma > policy->room_ma) {
-        rise_ma = policy->room_ma < SOFT_MA ? policy->room_ma : SOFT_MA;
-        policy->soft = SOFT_TURNS;
-    }
-    policy->room_ma = (uint16_t)(policy->room_ma - rise_ma);
-    return (uint16_t)(last_ma + rise_ma);
-}
-
-/* The dither is a slow triangle below what is granted, each spring at another place of it. Returns
- * the targets' sum. */
+/* What is granted, less the dither: a slow triangle below, each spring at another place of it. Not
+ * driven is off at once, whatever the update's turn. Returns the targets' sum. No calls in the
+ * loop: they would cost its registers. */
 static HOT uint16_t give(drive_policy_t *policy, const uint16_t *level, const bool *allowed,
                          uint16_t *target_ma)
 {
@@ -1115,39 +1086,100 @@ static HOT uint16_t give(drive_policy_t *policy, const uint16_t *level, const bo
     policy->sweep = (uint8_t)(place + 1u);
     bool dithers = policy->parameters.policy != DRIVE_POLICY_OPEN;
     uint8_t step_ma = (uint8_t)(dithers ? policy->parameters.dither_ma >> 4 : 0u);
-    policy->room_ma =
-        policy->sum_ma < policy->budget_ma ? (uint16_t)(policy->budget_ma - policy->sum_ma) : 0;
-    bool soft = policy->soft != 0;
+    bool keeps = policy->soft != 0; /* the last target, to walk from */
+    bool stops = false;
     uint16_t sum_ma = 0;
     drive_policy_spring_t *s = policy->spring;
     for (uint8_t n = policy->springs; n != 0; n--) {
         uint16_t target = 0;
+        uint8_t reason = DRIVE_POLICY_LIMIT_NONE;
         bool on = *level++ != 0;
         bool may = *allowed++;
-        if (!on) {
-            idle(policy, s, DRIVE_POLICY_LIMIT_NONE);
-        } else if (!may) {
-            idle(policy, s, DRIVE_POLICY_LIMIT_SAFETY);
-        } else if ((s->flags & FLAG_TRIPPED) != 0) {
-            idle(policy, s, DRIVE_POLICY_LIMIT_TRIP);
-        } else {
+        if (on && may && (s->flags & FLAG_TRIPPED) == 0) {
             target = s->granted_ma;
             if (s->stage != DRIVE_POLICY_STAGE_HEAT) { /* heat first */
-                uint8_t height = (place & 16u) != 0 ? (uint8_t)~place : place;
-                uint16_t drop_ma = (uint16_t)((height & 15u) * step_ma);
+                uint8_t height = place & 15u;
+                if ((place & 16u) != 0) {
+                    height ^= 15u;
+                }
+                uint16_t drop_ma = (uint16_t)((uint16_t)height * step_ma);
                 if (target > drop_ma) {
                     target = (uint16_t)(target - drop_ma);
                 }
             }
-            if (soft) {
-                target = softened_ma(policy, s->target_ma, target);
+            sum_ma = (uint16_t)(sum_ma + target);
+        } else {
+            if (on) {
+                reason = may ? DRIVE_POLICY_LIMIT_TRIP : DRIVE_POLICY_LIMIT_SAFETY;
+            }
+            s->limits = reason;
+            if (s->wanted_ma != 0 || s->stage != DRIVE_POLICY_STAGE_OFF) {
+                stops = true;
             }
         }
-        s->target_ma = target;
+        if (!keeps) {
+            s->target_ma = target;
+        }
         *target_ma++ = target;
-        sum_ma = (uint16_t)(sum_ma + target);
         s++;
         place = (uint8_t)(place + 7u);
+    }
+    policy->stops = stops;
+    return sum_ma;
+}
+
+/* Springs that are driven no longer. */
+static OWN void stop_some(drive_policy_t *policy, const uint16_t *level, const bool *allowed)
+{
+    drive_policy_spring_t *s = policy->spring;
+    for (uint8_t n = policy->springs; n != 0; n--, s++) {
+        bool on = *level++ != 0;
+        if (!*allowed++ || !on || (s->flags & FLAG_TRIPPED) != 0) {
+            stop(policy, s);
+        }
+    }
+}
+
+/* After a change of policy a target walks from where it was, up as far as there is room: what the
+ * last targets left of the budget. Returns the targets' sum. */
+static HOT uint16_t soften(drive_policy_t *policy, uint16_t *target_ma)
+{
+    uint16_t room_ma = 0;
+    if (policy->sum_ma < policy->budget_ma) {
+        room_ma = (uint16_t)(policy->budget_ma - policy->sum_ma);
+    }
+    bool walks = false;
+    uint16_t sum_ma = 0;
+    drive_policy_spring_t *s = policy->spring;
+    for (uint8_t n = policy->springs; n != 0; n--, s++, target_ma++) {
+        uint16_t last = s->target_ma;
+        uint16_t target = *target_ma;
+        if (s->wanted_ma == 0) {
+            target = 0; /* off */
+        } else if (target < last) {
+            if (target + SOFT_MA < last) {
+                target = (uint16_t)(last - SOFT_MA);
+                walks = true;
+            }
+        } else {
+            uint16_t rise_ma = (uint16_t)(target - last);
+            if (rise_ma > SOFT_MA) {
+                rise_ma = SOFT_MA;
+                walks = true;
+            }
+            if (rise_ma > room_ma) {
+                rise_ma = room_ma;
+                walks = true;
+            }
+            room_ma = (uint16_t)(room_ma - rise_ma);
+            target = (uint16_t)(last + rise_ma);
+        }
+        s->target_ma = target;
+        *target_ma = target;
+        sum_ma = (uint16_t)(sum_ma + target);
+    }
+    if (walks) {
+        policy->soft = SOFT_TURNS;
     }
     return sum_ma;
 }
@@ -1205,14 +1237,22 @@ void drive_policy_tick(drive_policy_t *policy, const drive_policy_input_t *input
     if (limits_changed || (policy->stale && !input->model_stepped)) {
         restart(policy, input); /* takes the time of all else */
     } else {
-        if (policy->prepared && input->valid != NULL) {
+        bool in_time = !input->model_stepped || policy->soft == 0;
+        if (in_time && policy->prepared && input->valid != NULL) {
             listen(policy, input->valid, input->measured_ma, input->measured_mv);
         }
         if (!input->model_stepped) {
             take_turn(policy, input);
         }
     }
-    policy->sum_ma = give(policy, input->level_permille, input->allowed, target_ma);
+    uint16_t sum_ma = give(policy, input->level_permille, input->allowed, target_ma);
+    if (policy->stops) {
+        stop_some(policy, input->level_permille, input->allowed);
+    }
+    if (policy->soft != 0) {
+        sum_ma = soften(policy, target_ma);
+    }
+    policy->sum_ma = sum_ma;
     probe(policy, input, target_ma);
 }
 

@@ -118,6 +118,7 @@ typedef struct {
     uint8_t reason; /* limit behind the supply's share */
     bool prepared;
     bool stale;     /* shares are worked out anew in the next tick */
+    bool stops;     /* some spring is driven no longer */
     bool waiting;   /* some spring has less than it asks for */
     uint8_t probed; /* spring whose pulse it is */
     uint16_t probe_ticks;
@@ -126,7 +127,6 @@ typedef struct {
     uint16_t cap_ma;            /* of the holds, if the supply is too small for them */
     uint16_t budget_ma;         /* with which the shares were worked out */
     uint16_t levels;            /* hash of all wanted levels */
-    uint16_t room_ma;           /* soft: what the targets may rise in all */
     uint16_t sum_ma;            /* of the last targets */
     uint16_t left_ma;           /* of the budget: what no spring has been granted */
     uint16_t overload_quarters; /* s */
