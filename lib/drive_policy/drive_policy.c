@@ -18,10 +18,11 @@
 
 /* A spring counts as wanted fully on from here: the last percent of a transformation has no level.
  */
-#define LEVEL_FULL_PERMILLE 960
-#define FULL_BAND_PERMILLE  60 /* less than it read when it had transformed: it is heated again */
-#define FULL_MOST_PERMILLE  250
-#define LEVEL_BAND_PERMILLE 50 /* a held level may be off by so much before it is sought again */
+#define LEVEL_FULL_PERMILLE  960
+#define FULL_BAND_PERMILLE   60  /* less than it read when it had transformed: it is heated again */
+#define COARSE_BAND_PERMILLE 150 /* the same where little current is a coarse reading */
+#define FULL_MOST_PERMILLE   250
+#define LEVEL_BAND_PERMILLE  50 /* a held level may be off by so much before it is sought again */
 
 /* What the fast ratio must show before it moves the model; permille. */
 #define PHASE_DEADBAND 40
@@ -510,7 +511,9 @@ static OWN void heat(drive_policy_t *policy, drive_policy_spring_t *s, thermal_m
             s->wanted_ma = keeps_ma;
         }
         /* what it has is kept while it waits */
-        s->floor_ma = waits && now_c7 > model->austenite_start_c7 + KEPT_C7 ? keeps_ma : 0;
+        bool has = trusted(policy, s) ? s->observer.phase_permille > level >> 1
+                                      : now_c7 > model->austenite_start_c7 + KEPT_C7;
+        s->floor_ma = waits && has ? keeps_ma : 0;
     } else if (has_heated(policy, s, model, k, level, fresh)) {
         enter(policy, k, DRIVE_POLICY_STAGE_HOLD);
     }
@@ -659,9 +662,11 @@ static OWN void hold(drive_policy_t *policy, drive_policy_spring_t *s, thermal_m
         }
     }
     /* fully on is what it read when it had transformed, whatever the declared resistances say */
-    int16_t least = full ? (int16_t)(s->full_permille - FULL_BAND_PERMILLE)
-                         : (int16_t)(level - LEVEL_BAND_PERMILLE -
-                                     (s->reference < REFERENCE_WINDOWS ? LEVEL_BAND_PERMILLE : 0));
+    bool coarse = s->granted_ma < 2u * policy->parameters.probe_current_ma; /* or still settling */
+    int16_t least =
+        full ? (int16_t)(s->full_permille - (coarse ? COARSE_BAND_PERMILLE : FULL_BAND_PERMILLE))
+             : (int16_t)(level - LEVEL_BAND_PERMILLE -
+                         (s->reference < REFERENCE_WINDOWS ? LEVEL_BAND_PERMILLE : 0));
     if (phase < least) {
         enter(policy, k, DRIVE_POLICY_STAGE_HEAT);
         return;
