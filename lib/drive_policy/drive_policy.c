@@ -25,10 +25,12 @@
 #define LEVEL_BAND_PERMILLE  50 /* a held level may be off by so much before it is sought again */
 
 /* What the fast ratio must show before it moves the model; permille. */
-#define PHASE_DEADBAND 40
-#define PHASE_SEEN     60
-#define PHASE_MISSING  100
-#define PHASE_PROBED   120
+#define PHASE_DEADBAND    40
+#define PHASE_SEEN        60
+#define PHASE_MISSING     100
+#define PHASE_PROBED      120
+#define PHASE_FALSE       (-1200) /* no such alloy: the voltage is wrong, and the power with it */
+#define PHASE_FALSE_NOISY (-250)  /* nor one that changes so from one window to the next */
 
 #define MODEL_FULL_PERMILLE 985
 #define RATIO_FULL_PERMILLE 900
@@ -47,12 +49,15 @@
 #define FULL_MINUTE       60u
 #define LOSS_CONFIRMED    4 /* what a true sighting comes to once the average has settled */
 #define LOSS_REHEAT       18
+#define LOSS_IMPOSSIBLE   250
 #define GAIN_IMPLAUSIBLE  45
 #define REFERENCE_WINDOWS 40u
 #define FRESH_WINDOWS     4u
 
-#define KELVIN_C7          128
-#define TRUST_LIMIT_C7     (15 * KELVIN_C7) /* corrections beyond this: the reading is wrong */
+#define KELVIN_C7 128
+#define TRUST_LIMIT_C7                                                                             \
+    (25 * KELVIN_C7) /* heat put right in one heating, over heat capacity; more: the reading is    \
+                      * wrong. A capacity that is 15 % off makes 16 K, a loss 4 K */
 #define CERTAIN_C7         (20 * KELVIN_C7) /* below austenite start: martensite for certain */
 #define SHORT_MOST_C7      (20 * KELVIN_C7)
 #define KEPT_C7            (3 * KELVIN_C7) /* above austenite start what was reached is worth keeping */
@@ -80,7 +85,9 @@ enum {
     FLAG_LET_GO = 2,   /* the resistance contradicts the model: not used until cold */
     FLAG_RELEASED = 4, /* switched off hot: no false actuation */
     FLAG_TRIPPED = 8,
-    FLAG_DOUBT = 16 /* martensite start was seen, but the average has not settled */
+    FLAG_DOUBT = 16, /* martensite start was seen, but the average has not settled */
+    FLAG_FALSE =
+        32 /* what is read is no resistance of this alloy: voltage times current is no power */
 };
 
 static int16_t clamp16(int32_t value, int16_t low, int16_t high)
@@ -248,7 +255,14 @@ static int32_t bias_at(const thermal_model_t *model, int16_t bias_uw_per_k, int1
 uint32_t drive_policy_model_power_uw(const drive_policy_t *policy, uint8_t spring,
                                      uint32_t power_uw)
 {
-    int32_t bias_uw = policy->spring[spring].bias_now_uw;
+    const drive_policy_spring_t *s = &policy->spring[spring];
+    if ((s->flags & FLAG_FALSE) != 0) { /* the current in the highest resistance that it can have */
+        uint32_t real_q14 = ((uint32_t)s->observer.inverse_q14 * policy->alloy.highest_q14) >> 14;
+        if (real_q14 > RESISTANCE_OBSERVER_ONE_Q14) {
+            power_uw = (power_uw >> 8) * (real_q14 > UINT16_MAX ? UINT16_MAX : real_q14) >> 6;
+        }
+    }
+    int32_t bias_uw = s->bias_now_uw;
     if (bias_uw > 0 && (uint32_t)bias_uw > power_uw) {
         return 0;
     }
@@ -292,17 +306,20 @@ static OWN void correct_heating(const drive_policy_t *policy, drive_policy_sprin
     if (move_c7 == 0) {
         return;
     }
-    int16_t sum_c7 = (int16_t)(s->corrected_c7 + move_c7);
-    if (sum_c7 > TRUST_LIMIT_C7 || sum_c7 < -TRUST_LIMIT_C7) {
-        s->flags |= FLAG_LET_GO; /* and what it did is undone */
-        move_c7 = (int16_t)-s->corrected_c7;
-        sum_c7 = 0;
-    }
-    s->corrected_c7 = sum_c7;
+    /* within a transformation a little temperature is much heat */
+    int16_t before_c7 = thermal_model_enthalpy_c7(model, k);
     if (move_c7 > 0) {
         thermal_model_add_temperature(model, k, move_c7);
     } else {
         rewind_to(model, k, (int16_t)(now_c7 + move_c7), true);
+    }
+    /* forgotten within minutes: in a long heating small errors add up */
+    s->corrected_c7 = (int16_t)(s->corrected_c7 - (s->corrected_c7 >> 8) +
+                                thermal_model_enthalpy_c7(model, k) - before_c7);
+    if (s->corrected_c7 > TRUST_LIMIT_C7 || s->corrected_c7 < -TRUST_LIMIT_C7) {
+        s->flags |= FLAG_LET_GO; /* and what it did is undone */
+        thermal_model_add_enthalpy(model, k, (int16_t)-s->corrected_c7);
+        s->corrected_c7 = 0;
     }
 }
 
@@ -519,12 +536,20 @@ static OWN void heat(drive_policy_t *policy, drive_policy_spring_t *s, thermal_m
     }
 }
 
-/* The reading cannot be right: the model alone, with the wide margin. */
-static void let_go(const drive_policy_t *policy, drive_policy_spring_t *s)
+/* The reading cannot be right: the model alone, with the wide margin. Whether a spring that is
+ * fully on has kept its phase is not known: its hold goes above austenite finish first, by power
+ * and not by boost, which takes it there, be it austenite or not. From there the margin narrows by
+ * 1 K a minute: at this power latent heat takes its time. */
+static void let_go(const drive_policy_t *policy, drive_policy_spring_t *s,
+                   const thermal_model_t *model, bool full)
 {
     s->flags = (uint8_t)((s->flags | FLAG_LET_GO) & ~FLAG_LEARNT);
     s->bias_uw_per_k = 0;
     s->margin_c7 = policy->unsure_margin_c7;
+    if (full) {
+        s->margin_c7 =
+            (int16_t)(model->austenite_finish_c7 + BLIND_OVERSHOOT_C7 - model->martensite_start_c7);
+    }
 }
 
 /* A first doubt stops the search for a while: what is seen then is seen with less delay. */
@@ -571,7 +596,7 @@ static OWN void watch_hold(drive_policy_t *policy, drive_policy_spring_t *s, the
     int16_t loss = (int16_t)-resistance_observer_drift_permille(&s->observer, &policy->alloy,
                                                                 s->reference_q14);
     if (loss < -GAIN_IMPLAUSIBLE) {
-        let_go(policy, s);
+        let_go(policy, s, model, full);
         return;
     }
     int16_t start_c7 = model->martensite_start_c7;
@@ -611,7 +636,8 @@ static OWN void watch_hold(drive_policy_t *policy, drive_policy_spring_t *s, the
 }
 
 /* The margin narrows: to the wanted one where the loss is known, else until the start is seen. */
-static OWN void narrow_margin(drive_policy_t *policy, drive_policy_spring_t *s)
+static OWN void narrow_margin(const drive_policy_t *policy, drive_policy_spring_t *s,
+                              const thermal_model_t *model, bool full)
 {
     int16_t floor_c7 =
         (s->flags & FLAG_LEARNT) != 0 ? policy->hold_margin_c7 : (int16_t) - (PIN_C7 + PULL_C7);
@@ -631,7 +657,7 @@ static OWN void narrow_margin(drive_policy_t *policy, drive_policy_spring_t *s)
             s->margin_c7 = floor_c7;
         }
     } else if ((s->flags & FLAG_LEARNT) == 0 && s->bias_uw_per_k <= -policy->bias_limit_uw_per_k) {
-        let_go(policy, s); /* it must have been passed */
+        let_go(policy, s, model, full); /* it must have been passed */
     }
 }
 
@@ -644,7 +670,9 @@ static OWN void hold(drive_policy_t *policy, drive_policy_spring_t *s, thermal_m
         s->held++;
     }
     if (!trusted(policy, s)) {
-        if (s->fresh >= FRESH_WINDOWS) {
+        if (s->margin_c7 > policy->unsure_margin_c7) {
+            s->margin_c7 = (int16_t)(s->margin_c7 - (int16_t)(policy->round & 1u));
+        } else if (s->fresh >= FRESH_WINDOWS) {
             s->margin_c7 = policy->unsure_margin_c7;
         }
         if ((policy->round & 1u) != 0) { /* every second time: a tick is short */
@@ -656,7 +684,7 @@ static OWN void hold(drive_policy_t *policy, drive_policy_spring_t *s, thermal_m
         phase = full ? INT16_MAX : level;
     } else if (fresh) {
         watch_hold(policy, s, model, k, full);
-        narrow_margin(policy, s);
+        narrow_margin(policy, s, model, full);
         if (s->stage != DRIVE_POLICY_STAGE_HOLD) {
             return;
         }
@@ -667,6 +695,10 @@ static OWN void hold(drive_policy_t *policy, drive_policy_spring_t *s, thermal_m
         full ? (int16_t)(s->full_permille - (coarse ? COARSE_BAND_PERMILLE : FULL_BAND_PERMILLE))
              : (int16_t)(level - LEVEL_BAND_PERMILLE -
                          (s->reference < REFERENCE_WINDOWS ? LEVEL_BAND_PERMILLE : 0));
+    if (full && phase < least - LOSS_IMPOSSIBLE) {
+        let_go(policy, s, model, true); /* no hold loses so much between two looks */
+        return;
+    }
     if (phase < least) {
         enter(policy, k, DRIVE_POLICY_STAGE_HEAT);
         return;
@@ -966,6 +998,17 @@ static void stop(drive_policy_t *policy, drive_policy_spring_t *s)
     s->granted_ma = 0;
 }
 
+/* Switched on: it has the wanted phase, and time to keep it until the current flows. */
+static bool is_there(const thermal_model_t *model, uint8_t k, int16_t level)
+{
+    int16_t permille = model_permille(model, k);
+    if (level >= LEVEL_FULL_PERMILLE) {
+        return permille >= MODEL_FULL_PERMILLE &&
+               thermal_model_temperature_c7(model, k) > model->martensite_start_c7 + KELVIN_C7;
+    }
+    return permille >= level - LEVEL_BAND_PERMILLE;
+}
+
 static void precompensate(drive_policy_t *policy, const drive_policy_input_t *input,
                           drive_policy_spring_t *s, uint8_t k, bool fresh)
 {
@@ -974,11 +1017,7 @@ static void precompensate(drive_policy_t *policy, const drive_policy_input_t *in
     switch ((drive_policy_stage_t)s->stage) {
     case DRIVE_POLICY_STAGE_OFF:
         enter(policy, k,
-              model_permille(model, k) < (level >= LEVEL_FULL_PERMILLE
-                                              ? MODEL_FULL_PERMILLE
-                                              : level - LEVEL_BAND_PERMILLE)
-                  ? DRIVE_POLICY_STAGE_HEAT
-                  : DRIVE_POLICY_STAGE_HOLD);
+              is_there(model, k, level) ? DRIVE_POLICY_STAGE_HOLD : DRIVE_POLICY_STAGE_HEAT);
         break;
     case DRIVE_POLICY_STAGE_HEAT:
         heat(policy, s, model, k, level, fresh);
@@ -1004,8 +1043,15 @@ static OWN void update(drive_policy_t *policy, const drive_policy_input_t *input
             resistance_observer_update(&s->observer, &policy->alloy, s->fresh >= FRESH_WINDOWS);
         if (fresh) {
             s->fresh = s->fresh < UINT8_MAX ? (uint8_t)(s->fresh + 1u) : (uint8_t)(UINT8_MAX - 7u);
+            s->flags &= (uint8_t)~FLAG_FALSE;
+            if (s->fresh >= FRESH_WINDOWS && policy->alloy.phase_gain != 0 &&
+                s->observer.phase_permille <
+                    (s->observer.noisy ? PHASE_FALSE_NOISY : PHASE_FALSE)) {
+                s->flags |= FLAG_FALSE;
+            }
         } else if (s->target_ma == 0) {
             s->fresh = 0;
+            s->flags &= (uint8_t)~FLAG_FALSE;
         }
         uint8_t severity = 0;
         if (!driven) {

@@ -58,6 +58,11 @@ void resistance_alloy_prepare(resistance_alloy_t *alloy, uint32_t martensite_uoh
                             ? 0
                             : (uint16_t)fixed_point_multiply_divide(1000u, martensite_uohm, change);
     alloy->falls = !rises;
+    uint32_t highest = RESISTANCE_OBSERVER_ONE_Q14;
+    if (rises) {
+        highest = (uint32_t)fixed_point_multiply_divide(highest, austenite_uohm, martensite_uohm);
+    }
+    alloy->highest_q14 = highest > UINT16_MAX ? UINT16_MAX : (uint16_t)highest;
     uint32_t floor_ma = (uint32_t)NOISE_FLOOR_UV * 1000u / martensite_uohm;
     alloy->noise_floor_ma = floor_ma > 4095u ? 4095u : (uint16_t)floor_ma;
 }

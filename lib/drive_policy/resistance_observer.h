@@ -23,6 +23,7 @@ typedef struct {
     uint16_t phase_gain;     /* permille of austenite per 1 of ratio; 0: no difference to see */
     bool falls;              /* the resistance, as austenite forms */
     uint16_t noise_floor_ma; /* of one reading, as current through R_M */
+    uint16_t highest_q14;    /* the larger of both resistances over the martensite's */
 } resistance_alloy_t;
 
 typedef struct {

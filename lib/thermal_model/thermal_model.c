@@ -545,6 +545,28 @@ void thermal_model_add_temperature(thermal_model_t *model, uint8_t spring, int16
     thermal_model_set_temperature(model, spring, (int16_t)sum);
 }
 
+int16_t thermal_model_enthalpy_c7(const thermal_model_t *model, uint8_t spring)
+{
+    const thermal_model_spring_state_t *state = &model->state.spring[clamp_index(model, spring)];
+    return high_word(fixed_point_add_saturated(state->temperature_c23, state->latent_c23));
+}
+
+void thermal_model_add_enthalpy(thermal_model_t *model, uint8_t spring, int16_t difference_c7)
+{
+    spring = clamp_index(model, spring);
+    thermal_model_settle(model, spring);
+    thermal_model_spring_state_t *state = &model->state.spring[spring];
+    int32_t difference_c23 = (int32_t)difference_c7 * 65536;
+    int32_t held_c23 = fixed_point_add_saturated(state->temperature_c23, difference_c23);
+    if (high_word(held_c23) > state->heating_c7 || high_word(held_c23) < state->cooling_c7) {
+        model->spring[spring].gain_c23 = difference_c23;
+        follow_phase(model, spring);
+    } else {
+        state->temperature_c23 = clamp_c23(held_c23);
+    }
+    set_lead(model, spring, lead_from_c7(high_word(state->temperature_c23)));
+}
+
 int16_t thermal_model_temperature_c7(const thermal_model_t *model, uint8_t spring)
 {
     return high_word(model->state.spring[clamp_index(model, spring)].temperature_c23);

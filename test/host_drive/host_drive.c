@@ -452,6 +452,7 @@ static void limit_that_takes_everything_trips_that_spring_until_cleared(void)
 static void undriven_spring_stays_below_its_limit_whatever_its_neighbours_want(void)
 {
     settings.policy.undriven_margin_cc = 5000; /* 38 degC; unlimited the centre comes to 43 */
+    settings.policy.trip_time_s = 0;
     start();
     want_all_but(CENTRE);
     bool limited = false;
@@ -705,6 +706,110 @@ static void spring_without_readings_is_off_and_the_others_are_held(void)
     }
 }
 
+static void spring_switched_on_again_after_seconds_is_austenite_again(void)
+{
+    for (int alone = 0; alone < 2; alone++) {
+        for (double off_s = 4.0; off_s <= 20.0; off_s += 1.0) {
+            start();
+            want_all_but(-1);
+            for (int k = 0; alone && k < SPRINGS; k++) {
+                want(k, k == CENTRE ? 1000 : 0);
+            }
+            run(120.0);
+            want(CENTRE, 0);
+            run(off_s);
+            want(CENTRE, 1000);
+            run(60.0);
+            char where[80];
+            (void)snprintf(where, sizeof where, "alone %d off %.0f s: phase %.3f", alone, off_s,
+                           phase(CENTRE));
+            TEST_ASSERT_TRUE_MESSAGE(phase(CENTRE) > 0.98, where);
+            loop_destroy(loop);
+        }
+    }
+    loop = NULL;
+}
+
+/* It may take until the search has gone past martensite start for nothing, and then the slow way
+ * back. */
+static void check_stuck_resistance(double from_s, double ohm)
+{
+    start();
+    want(CENTRE, 1000);
+    run(from_s);
+    plant_set(loop_plant(loop), "resistance_martensite_ohm[5]", ohm);
+    plant_set(loop_plant(loop), "resistance_austenite_ohm[5]", ohm + 1e-6);
+    double highest_c = run(1200.0);
+    char where[80];
+    (void)snprintf(where, sizeof where, "from %.0f s: highest %.1f phase %.3f blind %d", from_s,
+                   highest_c, phase(CENTRE), is_blind(CENTRE));
+    TEST_ASSERT_TRUE_MESSAGE(highest_c < 115.0 && phase(CENTRE) > 0.98 && is_blind(CENTRE), where);
+}
+
+static void resistance_that_sticks_at_austenite_in_a_hold_is_let_go(void)
+{
+    check_stuck_resistance(60.0, 0.219);
+}
+
+static void resistance_that_sticks_at_martensite_in_a_hold_is_let_go(void)
+{
+    check_stuck_resistance(60.0, 0.175);
+}
+
+static void resistance_that_sticks_between_in_a_hold_is_let_go(void)
+{
+    check_stuck_resistance(60.0, 0.190);
+}
+
+static void voltage_that_sticks_at_any_moment_of_a_hold_is_let_go(void)
+{
+    for (double from_s = 40.0; from_s < 300.0; from_s += 17.0) {
+        plant_reset(plant);
+        start_liar(0);
+        run_liar(from_s, HONEST);
+        double highest_c = run_liar(200.0, STUCK_VOLTAGE);
+        char where[80];
+        bool held = plant_austenite(plant, CENTRE) > 0.98 && liar_is_blind();
+        bool off = controller_fault(&liar.controller, CENTRE) == SAFETY_FAULT_HIGH_RESISTANCE;
+        (void)snprintf(where, sizeof where, "from %.0f s: highest %.1f phase %.3f blind %d off %d",
+                       from_s, highest_c, plant_austenite(plant, CENTRE), liar_is_blind(), off);
+        TEST_ASSERT_TRUE_MESSAGE(highest_c < 115.0 && (held || off), where);
+    }
+}
+
+static void voltage_that_was_noisy_is_no_false_crossing(void)
+{
+    for (double from_s = 40.0; from_s < 300.0; from_s += 17.0) {
+        plant_reset(plant);
+        start_liar(0);
+        run_liar(from_s, HONEST);
+        double highest_c = run_liar(200.0, NOISY_VOLTAGE);
+        run_liar(200.0, HONEST);
+        char where[80];
+        (void)snprintf(where, sizeof where, "from %.0f s: highest %.1f, then %.1f phase %.3f",
+                       from_s, highest_c, plant_temperature_c(plant, CENTRE),
+                       plant_austenite(plant, CENTRE));
+        TEST_ASSERT_TRUE_MESSAGE(highest_c < 115.0 && plant_austenite(plant, CENTRE) > 0.98 &&
+                                     plant_temperature_c(plant, CENTRE) < 95.0,
+                                 where);
+    }
+}
+
+static void smaller_change_of_resistance_does_not_overheat(void)
+{
+    for (double change = 0.85; change < 1.16; change += 0.05) { /* of the declared one */
+        plant_set(plant, "resistance_austenite_ohm", 0.175 + 0.044 * change);
+        start();
+        want(CENTRE, 1000);
+        double highest_c = run(600.0);
+        char where[80];
+        (void)snprintf(where, sizeof where, "change %.2f: highest %.1f", change, highest_c);
+        TEST_ASSERT_TRUE_MESSAGE(highest_c < 115.0, where);
+        loop_destroy(loop);
+    }
+    loop = NULL;
+}
+
 /* ---- all together ---- */
 
 static uint32_t random_state;
@@ -737,7 +842,7 @@ static void everything_at_once_stays_within_the_limits(void)
             want((int)random_below(SPRINGS), (uint16_t)(250 * random_below(5)));
             break;
         }
-        TEST_ASSERT_TRUE(run(0.02 * random_below(300)) < 130.0); /* safety's trip */
+        TEST_ASSERT_TRUE(run(0.02 * random_below(300)) < 115.0);
     }
     TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, controller_board_fault(controller));
 }
@@ -773,6 +878,13 @@ int main(void)
     RUN_TEST(voltage_that_sticks_in_a_hold_is_let_go);
     RUN_TEST(readings_that_fail_now_and_then_do_no_harm);
     RUN_TEST(spring_without_readings_is_off_and_the_others_are_held);
+    RUN_TEST(spring_switched_on_again_after_seconds_is_austenite_again);
+    RUN_TEST(resistance_that_sticks_at_austenite_in_a_hold_is_let_go);
+    RUN_TEST(resistance_that_sticks_at_martensite_in_a_hold_is_let_go);
+    RUN_TEST(resistance_that_sticks_between_in_a_hold_is_let_go);
+    RUN_TEST(voltage_that_sticks_at_any_moment_of_a_hold_is_let_go);
+    RUN_TEST(voltage_that_was_noisy_is_no_false_crossing);
+    RUN_TEST(smaller_change_of_resistance_does_not_overheat);
     RUN_TEST(everything_at_once_stays_within_the_limits);
     return UNITY_END();
 }

@@ -782,6 +782,38 @@ static void step_in_portions_is_the_same_step(void)
 }
 
 /* A correction between the portions is one after the step. */
+static void heat_added_at_once_is_kept_and_the_phase_follows(void)
+{
+    start();
+    for (uint8_t k = 0; k < 9; k++) {
+        power_uw[k] = 800000;
+    }
+    while (thermal_model_austenite(&model, 4) < 16384) {
+        run(1);
+    }
+    static const int16_t kelvin[] = {3, -2, 45, -30, -60, 20};
+    for (uint8_t n = 0; n < sizeof kelvin / sizeof kelvin[0]; n++) {
+        int16_t before_c7 = thermal_model_enthalpy_c7(&model, 4);
+        uint16_t austenite = thermal_model_austenite(&model, 4);
+        thermal_model_add_enthalpy(&model, 4, c7(kelvin[n]));
+        TEST_ASSERT_INT16_WITHIN(1, before_c7 + c7(kelvin[n]),
+                                 thermal_model_enthalpy_c7(&model, 4));
+        if (n == 0) {
+            TEST_ASSERT_GREATER_THAN(austenite, thermal_model_austenite(&model, 4));
+        } else if (n == 2) {
+            TEST_ASSERT_EQUAL_UINT16(THERMAL_MODEL_AUSTENITE_FULL,
+                                     thermal_model_austenite(&model, 4));
+        } else if (n == 4) {
+            TEST_ASSERT_EQUAL_UINT16(0, thermal_model_austenite(&model, 4));
+        }
+        TEST_ASSERT_TRUE(thermal_model_is_consistent(&model));
+    }
+    thermal_model_add_enthalpy(&model, 4, INT16_MAX);
+    thermal_model_add_enthalpy(&model, 4, INT16_MIN);
+    thermal_model_add_enthalpy(&model, 4, INT16_MIN);
+    TEST_ASSERT_TRUE(thermal_model_is_consistent(&model));
+}
+
 static void correction_in_between_comes_after_the_step(void)
 {
     start();
@@ -835,5 +867,6 @@ int main(void)
     RUN_TEST(corrections_add_and_saturate);
     RUN_TEST(step_in_portions_is_the_same_step);
     RUN_TEST(correction_in_between_comes_after_the_step);
+    RUN_TEST(heat_added_at_once_is_kept_and_the_phase_follows);
     return UNITY_END();
 }
