@@ -107,7 +107,7 @@ def section() -> tuple[str, list[dict[str, Any]]]:
             said += f" {rival['instead_of']} or {rival['name']}: not separable here; {rival['separating_experiment']}."
         if found["unexplained"]:
             said += (
-                f" Structure of {found['residual']['structure_c']:.2f} K rms remains above the sensor's noise; "
+                f" Structure of {found['residual']['structure_c']:.2f} K rms remains above the sensor's noise. "
                 + found["residual"]["note"].split(". ", 1)[-1]
             )
             empirical = diagnosis.surrogate(diagnosed.problem, diagnosed.final)
