@@ -10,7 +10,8 @@
 
 #define SERIAL_RECEIVE_BYTES 128u /* 11 ms of input: more than the longest time away, a tick */
 #define SERIAL_TRANSMIT_BYTES                                                                      \
-    432u /* one telemetry line of nine springs (297) and an answer (128) */
+    330u /* one telemetry line of nine springs (297), or an answer's line and room for another     \
+            (256) */
 #define PWM_TOP (BOARD_DUTY_MAX - 1u)
 #define FAN_TOP 499u /* 16 MHz / 1024 / 500 = 31 Hz: right for a fan with two wires */
 
