@@ -425,7 +425,7 @@ static HOT uint16_t hold_current_ma(const drive_policy_t *policy, const drive_po
     int32_t power_uw = thermal_model_power_to_hold_uw(model, k, target_c7) +
                        bias_at(model, s->bias_uw_per_k, target_c7);
     power_uw += (int32_t)fixed_point_mac_s16_u16(0, short_c7, policy->feedback_uw_per_c7);
-    int32_t power_64uw = ((power_uw << 2) >> 8) + extra_64uw;
+    int32_t power_64uw = ((int32_t)((uint32_t)power_uw << 2) >> 8) + extra_64uw;
     if (power_64uw <= 0) {
         return 0;
     }
