@@ -43,7 +43,7 @@ typedef struct {
 } resistance_observer_t;
 
 /* Works out the alloy's numbers, with divisions. Resistances 1000..16000000 uohm. Where the two
- * differ by less than 2 % of the martensite's, phase_gain_q12 is 0 and nothing is ever trusted. */
+ * differ by less than 2 % of the martensite's, phase_gain is 0 and nothing is ever trusted. */
 void resistance_alloy_prepare(resistance_alloy_t *alloy, uint32_t martensite_uohm,
                               uint32_t austenite_uohm);
 

@@ -781,8 +781,8 @@ static void step_in_portions_is_the_same_step(void)
     TEST_ASSERT_GREATER_THAN(100, left); /* it was not all done at once */
 }
 
-/* A correction between the portions is one after the step. */
-static void heat_added_at_once_is_kept_and_the_phase_follows(void)
+/* Nine springs, all driven, until the centre is half austenite. */
+static void heat_half_way(void)
 {
     start();
     for (uint8_t k = 0; k < 9; k++) {
@@ -791,6 +791,11 @@ static void heat_added_at_once_is_kept_and_the_phase_follows(void)
     while (thermal_model_austenite(&model, 4) < 16384) {
         run(1);
     }
+}
+
+static void heat_added_at_once_is_kept_and_the_phase_follows(void)
+{
+    heat_half_way();
     static const int16_t kelvin[] = {3, -2, 45, -30, -60, 20};
     for (uint8_t n = 0; n < sizeof kelvin / sizeof kelvin[0]; n++) {
         int16_t before_c7 = thermal_model_enthalpy_c7(&model, 4);
@@ -814,15 +819,10 @@ static void heat_added_at_once_is_kept_and_the_phase_follows(void)
     TEST_ASSERT_TRUE(thermal_model_is_consistent(&model));
 }
 
+/* A correction between the portions is one after the step. */
 static void correction_in_between_comes_after_the_step(void)
 {
-    start();
-    for (uint8_t k = 0; k < 9; k++) {
-        power_uw[k] = 800000;
-    }
-    while (thermal_model_austenite(&model, 4) < 16384) {
-        run(1);
-    }
+    heat_half_way();
     thermal_model_t portions = model;
     thermal_model_step(&model, power_uw);
     thermal_model_begin_step(&portions, power_uw);
