@@ -1,5 +1,6 @@
-/* What it is for: the Arduino core's headers, without this project's warnings, which they were not
- * written for. (-isystem does not do: this compiler then takes C++ headers for C.) */
+/* What it is for: the headers of Arduino libraries, without this project's warnings, which they
+ * were not written for. (-isystem does not do: this compiler then takes C++ headers for C.) Only
+ * for NINESPRING_SENSOR_ADAFRUIT: nothing else here needs Arduino's core. */
 #ifndef ARDUINO_HEADERS_H
 #define ARDUINO_HEADERS_H
 
@@ -13,13 +14,13 @@
 #endif
 #include <Arduino.h>
 #ifdef __cplusplus
+#include <Adafruit_INA219.h>
 #include <Wire.h>
 extern "C" {
 #include <utility/twi.h>
 }
-#ifdef NINESPRING_SENSOR_ADAFRUIT
-#include <Adafruit_INA219.h>
-#endif
+#else
+#include <utility/twi.h>
 #endif
 #pragma GCC diagnostic pop
 

@@ -1,7 +1,7 @@
 /* What it is for: everything that the firmware needs of an Arduino Mega 2560, behind a few
  * functions.
  * What it owns: timers, pins, serial port, EEPROM, watchdog, ADC. The only place that names a
- * register.
+ * register, with two_wire.c.
  * What it never does: decide. It switches outputs off by itself in one case: '!' in the receive
  * interrupt. */
 #ifndef BOARD_H
@@ -78,7 +78,6 @@ void board_eeprom_write(uint16_t address, uint8_t octet);
 
 void board_watchdog_start(void); /* 250 ms */
 void board_watchdog_kick(void);
-void board_restart(void); /* through the watchdog; does not return */
 
 /* Voltage at A0 in 1/1024 of the supply, mean of the last 16 conversions; starts the next one. */
 uint16_t board_ambient_adc(void);

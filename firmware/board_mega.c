@@ -1,6 +1,5 @@
 #include "board.h"
 
-#include "arduino_headers.h"
 #include <avr/eeprom.h>
 #include <avr/interrupt.h>
 #include <avr/io.h>
@@ -12,8 +11,10 @@
 #define SERIAL_TRANSMIT_BYTES                                                                      \
     330u /* one telemetry line of nine springs (297), or an answer's line and room for another     \
             (256) */
-#define PWM_TOP (BOARD_DUTY_MAX - 1u)
-#define FAN_TOP 499u /* 16 MHz / 1024 / 500 = 31 Hz: right for a fan with two wires */
+#define PWM_TOP       (BOARD_DUTY_MAX - 1u)
+#define COUNTS_PER_MS 250u /* of timer 2: 16 MHz / 64 */
+#define US_PER_COUNT  4u
+#define FAN_TOP       499u /* 16 MHz / 1024 / 500 = 31 Hz: right for a fan with two wires */
 
 /* Fast PWM mode 14: WGMn1 in TCCRnA, WGMn3 and WGMn2 in TCCRnB; prescaler 1. */
 #define PWM_A_OFF _BV(WGM31)
@@ -266,7 +267,17 @@ uint32_t board_time_ms(void)
 
 uint32_t board_time_us(void)
 {
-    return micros();
+    uint32_t ms;
+    uint8_t count;
+    ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
+    {
+        ms = time_ms;
+        count = TCNT2;
+        if ((TIFR2 & _BV(OCF2A)) != 0 && count < COUNTS_PER_MS / 2u) {
+            ms++; /* the interrupt is still to come */
+        }
+    }
+    return ms * 1000u + (uint16_t)(count * US_PER_COUNT);
 }
 
 bool board_tick_take(uint8_t *behind)
@@ -450,15 +461,6 @@ void board_watchdog_kick(void)
     }
 }
 
-void board_restart(void)
-{
-    cli();
-    outputs_off();
-    wdt_enable(WDTO_15MS);
-    for (;;) {
-    }
-}
-
 static uint32_t idle_us;
 
 void board_idle(bool busy)
@@ -468,12 +470,14 @@ void board_idle(bool busy)
         if (ticks_due != 0 || receive_tail != receive_head || stop_received || status_requested) {
             break;
         }
-        const uint8_t begin = TCNT0; /* runs through in 1.024 ms, and its overflow wakes */
+        const uint8_t begin = TCNT2; /* runs through in 1 ms, and its interrupt wakes */
         SMCR = _BV(SE);              /* idle mode: timers and serial port go on */
         sei(); /* the instruction after sei still runs before any interrupt: no wake-up is lost */
         sleep_cpu();
         SMCR = 0;
-        idle_us += (uint16_t)((uint8_t)(TCNT0 - begin) << 2);
+        const uint8_t end = TCNT2;
+        const uint8_t wrapped = end < begin ? COUNTS_PER_MS : 0;
+        idle_us += (uint16_t)((uint8_t)(end - begin + wrapped) * US_PER_COUNT);
         if (busy) {
             break;
         }
@@ -515,9 +519,11 @@ void board_init(void)
 
     TCCR2A = _BV(WGM21); /* compare match 1000 times a second */
     TCCR2B = _BV(CS22);  /* 16 MHz / 64 / 250 */
-    OCR2A = 249;
+    OCR2A = COUNTS_PER_MS - 1u;
     TCNT2 = 0;
     TIMSK2 = _BV(OCIE2A);
+
+    ADCSRA = _BV(ADEN) | _BV(ADPS2) | _BV(ADPS1) | _BV(ADPS0); /* 125 kHz */
 
     UBRR0 = 16; /* 117647 baud with U2X, +2.1 %: the Mega's usual way to 115200 */
     UCSR0A = _BV(U2X0);

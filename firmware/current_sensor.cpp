@@ -2,11 +2,13 @@
 
 #ifndef NINESPRING_HIL
 
-#include "arduino_headers.h"
+#include <avr/pgmspace.h>
 
 #include "ina219.h"
+#include "two_wire.h"
 
 #ifdef NINESPRING_SENSOR_ADAFRUIT
+#include "arduino_headers.h"
 
 /* The library serves the shunt's reading. It has no way to the conversion-ready bit, to averaging
  * or to a readback of the configuration, so those go through ina219.h on the same bus. */
@@ -44,8 +46,8 @@ static controller_sensor_status_t configure(uint8_t spring)
     controller_sensor_status_t status;
 #ifdef NINESPRING_SENSOR_ADAFRUIT
     const bool found = library[spring].begin(&Wire); /* goes back to 100 kHz */
-    twi_setFrequency(INA219_FAST_HZ);
-    if (!found && !ina219_timed_out()) {
+    twi_setFrequency(TWO_WIRE_HZ);
+    if (!found && !twi_manageTimeoutFlag(true)) {
         return CONTROLLER_SENSOR_ABSENT;
     }
 #endif
@@ -58,10 +60,10 @@ static controller_sensor_status_t configure(uint8_t spring)
 void current_sensor_begin(uint8_t averaging)
 {
     samples = averaging;
-    ina219_bus_begin();
+    two_wire_begin();
     for (uint8_t k = 0; k < CONTROLLER_MAX_SPRINGS; k++) {
         if (configure(k) == CONTROLLER_SENSOR_BUS) {
-            ina219_bus_recover();
+            two_wire_recover();
             return; /* the rest is tried in the ticks */
         }
     }
@@ -89,7 +91,7 @@ static controller_sensor_status_t read_shunt(uint8_t spring, int16_t *tenth_ma)
 #ifdef NINESPRING_SENSOR_ADAFRUIT
     const float shunt_mv = library[spring].getShuntVoltage_mV();
     if (!library[spring].success()) { /* then the number is whatever was on the stack */
-        return ina219_timed_out() ? CONTROLLER_SENSOR_BUS : CONTROLLER_SENSOR_ABSENT;
+        return twi_manageTimeoutFlag(true) ? CONTROLLER_SENSOR_BUS : CONTROLLER_SENSOR_ABSENT;
     }
     pointer[spring] = INA219_SHUNT;
     *tenth_ma = (int16_t)(shunt_mv * 100.0f + (shunt_mv < 0.0f ? -0.5f : 0.5f));
@@ -169,7 +171,7 @@ void current_sensor_read(controller_sensor_t sensor[], uint8_t count)
             configure(k);
         } else if (sensor[k].status == CONTROLLER_SENSOR_BUS && !stuck) {
             stuck = true;
-            ina219_bus_recover();
+            two_wire_recover();
         }
     }
     if (++checked >= count) {

@@ -4,7 +4,6 @@
 #ifndef INA219_H
 #define INA219_H
 
-#include <stdbool.h>
 #include <stdint.h>
 
 #include "controller.h"
@@ -20,14 +19,10 @@
 #define INA219_CALIBRATION_100UA         4096u   /* 0.04096 / (100 uA x 0.1 ohm) */
 #define INA219_BUS_READY                 0x0002u /* CNVR */
 
-#define INA219_FAST_HZ 400000ul
-/* A transfer takes 0.1 ms. The core waits inside its interrupt for a stop condition that a stuck
- * bus never finishes: this long nothing else runs, '!' included. */
-#define INA219_TIMEOUT_US 400ul
+#ifdef __cplusplus
+extern "C" {
+#endif
 
-void ina219_bus_begin(void);
-/* After BUS: clocks a sensor that holds SDA low until it lets go, and starts the bus again. */
-void ina219_bus_recover(void);
 controller_sensor_status_t ina219_read(uint8_t address, uint8_t reg, uint16_t *value);
 /* Reads the register that was read last: half the bytes. A sensor that has reset itself meanwhile
  * gives its configuration, INA219_CONFIGURATION_AT_POWER_ON, instead. */
@@ -40,7 +35,8 @@ controller_sensor_status_t ina219_configure(uint8_t address, uint8_t averaging);
 /* OK, or RESET where reg, INA219_CALIBRATION or INA219_CONFIGURATION, is not what ina219_configure
  * wrote. */
 controller_sensor_status_t ina219_check(uint8_t address, uint8_t averaging, uint8_t reg);
-/* True once after a transfer that timed out. */
-bool ina219_timed_out(void);
 
+#ifdef __cplusplus
+}
+#endif
 #endif

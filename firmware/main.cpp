@@ -3,7 +3,6 @@
 #include <avr/pgmspace.h>
 #include <string.h>
 
-#include "arduino_headers.h"
 #include "board.h"
 #include "console.h"
 #include "controller.h"
@@ -14,6 +13,9 @@
 #include "telemetry.h"
 #ifdef NINESPRING_HIL
 #include "current_sensor_hil.h"
+#endif
+#ifdef NINESPRING_SENSOR_ADAFRUIT
+#include "arduino_headers.h"
 #endif
 
 #ifndef NINESPRING_VERSION
@@ -234,8 +236,11 @@ static void measure_load(void)
     status.stack_unused_bytes = board_stack_unused();
 }
 
-void setup()
+static void start(void)
 {
+#ifdef NINESPRING_SENSOR_ADAFRUIT
+    init(); // Arduino's clock, which that library's timeouts need
+#endif
     board_init();
     const uint8_t cause = board_reset_cause();
     status.reset_cause = reset_text(cause);
@@ -265,7 +270,7 @@ void setup()
     }
 }
 
-void loop()
+static void turn(void)
 {
     uint8_t behind;
     if (board_stop_take()) {
@@ -285,4 +290,13 @@ void loop()
     }
     measure_load();
     board_idle(console_busy(&console) || status_wanted);
+}
+
+// In place of Arduino's own, whose start of every timer and clock would be undone at once.
+int main()
+{
+    start();
+    for (;;) {
+        turn();
+    }
 }

@@ -1,69 +1,25 @@
 #include "ina219.h"
 
-#include "arduino_headers.h"
-
-void ina219_bus_begin(void)
-{
-    twi_init();
-    twi_setFrequency(INA219_FAST_HZ); /* after every twi_init: it goes back to 100 kHz */
-    twi_setTimeoutInMicros(INA219_TIMEOUT_US, true);
-}
-
-void ina219_bus_recover(void)
-{
-    twi_disable();
-    pinMode(SCL, INPUT_PULLUP);
-    pinMode(SDA, INPUT_PULLUP);
-    for (uint8_t pulse = 0; pulse < 9u;
-         pulse++) { /* at most eight bits and the acknowledge are left */
-        digitalWrite(SCL, LOW);
-        pinMode(SCL, OUTPUT);
-        delayMicroseconds(5);
-        pinMode(SCL, INPUT_PULLUP);
-        delayMicroseconds(5);
-    }
-    ina219_bus_begin();
-}
-
-bool ina219_timed_out(void)
-{
-    return twi_manageTimeoutFlag(true);
-}
-
-/* What twi_writeTo's answer means. */
-static controller_sensor_status_t write_bytes(uint8_t address, uint8_t *bytes, uint8_t length)
-{
-    switch (twi_writeTo(address, bytes, length, true, true)) {
-    case 0:
-        return CONTROLLER_SENSOR_OK;
-    case 2: /* address not acknowledged */
-    case 3: /* data not acknowledged */
-        return CONTROLLER_SENSOR_ABSENT;
-    default: /* lost arbitration, bus error, timeout */
-        (void)ina219_timed_out();
-        return CONTROLLER_SENSOR_BUS;
-    }
-}
+#include "two_wire.h"
 
 controller_sensor_status_t ina219_write(uint8_t address, uint8_t reg, uint16_t value)
 {
     uint8_t bytes[3] = {reg, (uint8_t)(value >> 8), (uint8_t)(value & 0xFFu)};
-    return write_bytes(address, bytes, sizeof bytes);
+    return two_wire_transfer(address, TWO_WIRE_WRITE, bytes, sizeof bytes);
 }
 
 controller_sensor_status_t ina219_read_again(uint8_t address, uint16_t *value)
 {
-    uint8_t bytes[2];
-    if (twi_readFrom(address, bytes, sizeof bytes, true) != sizeof bytes) {
-        return ina219_timed_out() ? CONTROLLER_SENSOR_BUS : CONTROLLER_SENSOR_ABSENT;
-    }
+    uint8_t bytes[2] = {0, 0};
+    const controller_sensor_status_t status =
+        two_wire_transfer(address, TWO_WIRE_READ, bytes, sizeof bytes);
     *value = (uint16_t)((uint16_t)(bytes[0] << 8) | bytes[1]);
-    return CONTROLLER_SENSOR_OK;
+    return status;
 }
 
 controller_sensor_status_t ina219_read(uint8_t address, uint8_t reg, uint16_t *value)
 {
-    const controller_sensor_status_t status = write_bytes(address, &reg, 1);
+    const controller_sensor_status_t status = two_wire_transfer(address, TWO_WIRE_WRITE, &reg, 1);
     return status == CONTROLLER_SENSOR_OK ? ina219_read_again(address, value) : status;
 }
 
