@@ -355,8 +355,8 @@ static void drive(controller_t *controller, const bool valid[], uint32_t sum_ma,
      * further. */
     bool may_rise =
         sum_ma + controller->policy.parameters.supply_reserve_ma <= limits->supply_limit_ma;
-    current_control_tick_all(&controller->current, controller->springs, target_ma,
-                             controller->measured_ma, valid, may_rise, controller->duty);
+    current_control_tick(&controller->current, controller->springs, target_ma,
+                         controller->measured_ma, valid, may_rise, controller->duty);
     /* the policy gives it nothing, so that its latch can wait for its turn */
     uint8_t turn = controller->resistance_turn;
     if ((controller->policy.spring[turn].limits & DRIVE_POLICY_LIMIT_TRIP) != 0) {

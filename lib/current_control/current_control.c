@@ -7,6 +7,7 @@
 #define MEASURED_LIMIT_MA 4095  /* keeps current times gain below 2^27; the sensor ends at 3200 */
 #define ESTIMATE_LIMIT    24575 /* loop gain, duty steps per mA in Q16: the sum of both fits int16 */
 #define TRIM_LIMIT        8191u
+#define FIRST_MA          128u /* what a rise from off begins with */
 
 #ifdef __AVR__
 #define HOT    __attribute__((noinline, optimize("O2")))
@@ -33,9 +34,8 @@ void current_control_parameters_default(current_control_parameters_t *parameters
                                                  .freewheel_mv = 0,
                                                  .shunt_mohm = 100,
                                                  .wiring_mohm = 80,
-                                                 .proportional_permille = 150,
-                                                 .integral_permille = 350,
-                                                 .slew_ma_per_tick = 60,
+                                                 .integral_permille = 600,
+                                                 .slew_ma_per_tick = 120,
                                                  .maximum_current_ma = 3000,
                                                  .maximum_duty_steps = 760,
                                                  .trim_limit_mohm = 150,
@@ -55,9 +55,6 @@ bool current_control_check(const current_control_parameters_t *p, uint16_t *bad)
     }
     if (p->wiring_mohm > 1000) {
         return refuse(bad, offsetof(current_control_parameters_t, wiring_mohm));
-    }
-    if (p->proportional_permille > 1000) {
-        return refuse(bad, offsetof(current_control_parameters_t, proportional_permille));
     }
     if (p->integral_permille < 1 || p->integral_permille > 1000) {
         return refuse(bad, offsetof(current_control_parameters_t, integral_permille));
@@ -95,7 +92,6 @@ bool current_control_apply(current_control_t *control, const current_control_par
     control->offset_q16 = (int32_t)(p->freewheel_mv * 51200ul / swing_mv * 1024ul); /* 800 steps */
     uint32_t trim_q16 = ((uint32_t)p->trim_limit_mohm * control->gain_q24_per_mohm) >> 8;
     control->trim_limit_q24 = (int32_t)(trim_q16 > TRIM_LIMIT ? TRIM_LIMIT : trim_q16) * 256;
-    control->proportional_q8 = (uint16_t)((p->proportional_permille * 256ul + 500u) / 1000u);
     control->integral_q16 = (uint16_t)(p->integral_permille * 65535ul / 1000u);
     return true;
 }
@@ -106,6 +102,7 @@ bool current_control_init(current_control_t *control,
     if (!current_control_apply(control, parameters, bad)) {
         return false;
     }
+    control->even_turn = false;
     for (uint8_t k = 0; k < CURRENT_CONTROL_MAX_CHANNELS; k++) {
         control->channel[k] = (current_control_channel_t){0};
         current_control_set_resistance(control, k, 0);
@@ -144,111 +141,108 @@ static inline int16_t to_q8(int32_t value_q16)
     return high < INT8_MIN ? INT16_MIN : high > INT8_MAX ? INT16_MAX : (int16_t)(value_q16 >> 8);
 }
 
-/* trim + integral x error / reference, the reference rounded up to a power of two of at least
- * 256 mA. */
-static inline int32_t learnt_q24(const current_control_t *control, int32_t trim_q24,
-                                 uint16_t reference_ma, int16_t error_q8)
+/* The trim takes integral x error / reference, the reference rounded up to FIRST_MA times a power
+ * of two; error: the given duty less the one that what it has brought should have taken. */
+static HOT void learn(const current_control_t *control, current_control_channel_t *c,
+                      int16_t measured_ma)
 {
+    if (measured_ma > MEASURED_LIMIT_MA) {
+        measured_ma = MEASURED_LIMIT_MA;
+    } else if (measured_ma < -MEASURED_LIMIT_MA) {
+        measured_ma = -MEASURED_LIMIT_MA;
+    }
+    uint32_t given_q16 = ((uint32_t)c->duty << 16) - (uint32_t)control->offset_q16;
+    int16_t error_q8 = to_q8((int32_t)fixed_point_mac_s16_u16(
+        given_q16, (int16_t)-measured_ma, loop_gain_q16(c->estimate_q16, c->trim_q24)));
     uint16_t integral_q16 = control->integral_q16;
-    for (uint8_t reference_256ma = (uint8_t)((uint16_t)(reference_ma - 1u) >> 8);
-         reference_256ma != 0; reference_256ma >>= 1) {
+    for (uint8_t firsts = (uint8_t)((uint16_t)((uint16_t)(c->reference_ma - 1u) << 1) >> 8);
+         firsts != 0; firsts >>= 1) {
         integral_q16 >>= 1;
     }
-    trim_q24 += (int32_t)fixed_point_mac_s16_u16(0, error_q8, integral_q16) >> 8;
+    int32_t step_q23 = (int32_t)fixed_point_mac_s16_u16(0, error_q8, integral_q16) >> 8;
+    int32_t trim_q24 = c->trim_q24 + 2 * step_q23; /* 1 / FIRST_MA is 2 / 256 */
     int32_t limit_q24 = control->trim_limit_q24;
-    if (trim_q24 < 0) {
-        return trim_q24 < -limit_q24 ? -limit_q24 : trim_q24;
+    if (trim_q24 > limit_q24) {
+        trim_q24 = limit_q24;
+    } else if (trim_q24 < -limit_q24) {
+        trim_q24 = -limit_q24;
     }
-    return trim_q24 > limit_q24 ? limit_q24 : trim_q24;
+    c->trim_q24 = trim_q24;
 }
 
-/* A channel that is on and has a target. */
-static inline ALWAYS uint16_t tick_driven(const current_control_t *control,
-                                          current_control_channel_t *c, uint16_t target_ma,
-                                          int16_t measured_ma, bool valid, bool may_rise)
+static HOT uint16_t give(const current_control_t *control, current_control_channel_t *c)
 {
-    uint16_t reference_ma = c->reference_ma;
-    int16_t error_q8 = 0;
-    if (valid && reference_ma != 0) {
-        if (measured_ma > MEASURED_LIMIT_MA) {
-            measured_ma = MEASURED_LIMIT_MA;
-        } else if (measured_ma < -MEASURED_LIMIT_MA) {
-            measured_ma = -MEASURED_LIMIT_MA;
-        }
-        int16_t short_ma = (int16_t)((int16_t)reference_ma - measured_ma);
-        uint32_t owed_q16 = (uint32_t)-c->excess_q16;
-        error_q8 = to_q8((int32_t)fixed_point_mac_s16_u16(
-            owed_q16, short_ma, loop_gain_q16(c->estimate_q16, c->trim_q24)));
-        c->trim_q24 = learnt_q24(control, c->trim_q24, reference_ma, error_q8);
+    uint32_t wanted_q16 =
+        fixed_point_mac_u16((uint32_t)control->offset_q16 + c->residue_q16, c->reference_ma,
+                            loop_gain_q16(c->estimate_q16, c->trim_q24));
+    uint16_t duty = (uint16_t)(wanted_q16 >> 16);
+    uint16_t most = control->parameters.maximum_duty_steps;
+    if (duty < most) {
+        c->residue_q16 = (uint16_t)wanted_q16;
+    } else {
+        duty = most;
     }
-
-    if (target_ma <= reference_ma) {
-        reference_ma = target_ma;
-    } else if (may_rise && valid) {
-        uint16_t rise_ma = (uint16_t)(target_ma - reference_ma);
-        uint16_t slew_ma = control->parameters.slew_ma_per_tick;
-        reference_ma = (uint16_t)(reference_ma + (rise_ma < slew_ma ? rise_ma : slew_ma));
-    }
-    c->reference_ma = reference_ma;
-    if (reference_ma == 0) {
-        return 0; /* not started yet: excess and residue are still 0 */
-    }
-
-    uint32_t sum_q16 = fixed_point_mac_u16((uint32_t)control->offset_q16, reference_ma,
-                                           loop_gain_q16(c->estimate_q16, c->trim_q24));
-    int32_t wanted_q16 =
-        (int32_t)fixed_point_mac_s16_u16(sum_q16, error_q8, control->proportional_q8);
-    uint16_t duty = 0;
-    if (wanted_q16 >= 0) {
-        uint32_t dithered_q16 = (uint32_t)wanted_q16 + c->residue_q16;
-        duty = (uint16_t)(dithered_q16 >> 16);
-        uint16_t most = control->parameters.maximum_duty_steps;
-        if (duty < most) {
-            c->residue_q16 = (uint16_t)dithered_q16;
-        } else {
-            duty = most;
-        }
-    }
-    c->excess_q16 = (int32_t)((uint32_t)wanted_q16 - ((uint32_t)duty << 16));
+    c->duty = duty;
     return duty;
 }
 
-static inline ALWAYS uint16_t tick(const current_control_t *control, current_control_channel_t *c,
-                                   uint16_t target_ma, int16_t measured_ma, bool valid,
-                                   bool may_rise)
+/* What is not learnt yet at least halves from one rise to the next: so the reference may double. */
+static inline ALWAYS uint16_t raised_ma(const current_control_t *control, uint16_t reference_ma,
+                                        uint16_t target_ma)
 {
-    KEEP_ADDRESS(c);
-    if (valid) {
-        c->blind_ticks = 0;
-    } else if (c->blind_ticks < UINT8_MAX) {
-        c->blind_ticks++;
+    uint16_t rise_ma = reference_ma == 0 ? FIRST_MA : reference_ma;
+    uint16_t slew_ma = (uint16_t)(control->parameters.slew_ma_per_tick * 2u);
+    if (rise_ma > slew_ma) {
+        rise_ma = slew_ma;
     }
-    if (target_ma > control->parameters.maximum_current_ma) {
-        target_ma = control->parameters.maximum_current_ma;
-    }
-    if (target_ma == 0 || c->blind_ticks > control->parameters.hold_ticks) {
-        c->reference_ma = 0;
-        c->excess_q16 = 0;
-        c->residue_q16 = 0;
-        return 0;
-    }
-    return tick_driven(control, c, target_ma, measured_ma, valid, may_rise);
+    uint16_t left_ma = (uint16_t)(target_ma - reference_ma);
+    return left_ma < rise_ma ? target_ma : (uint16_t)(reference_ma + rise_ma);
 }
 
-uint16_t current_control_tick(current_control_t *control, uint8_t channel,
-                              const current_control_input_t *input)
+HOT void current_control_tick(current_control_t *control, uint8_t channels,
+                              const uint16_t target_ma[], const int16_t measured_ma[],
+                              const bool valid[], bool may_rise, uint16_t duty[])
 {
-    return tick(control, &control->channel[channel], input->target_ma, input->measured_ma,
-                input->valid, input->may_rise);
-}
-
-HOT void current_control_tick_all(current_control_t *control, uint8_t channels,
-                                  const uint16_t target_ma[], const int16_t measured_ma[],
-                                  const bool valid[], bool may_rise, uint16_t duty[])
-{
+    bool turn = !control->even_turn;
+    control->even_turn = turn;
     current_control_channel_t *c = control->channel;
-    for (; channels != 0; channels--) {
-        *duty++ = tick(control, c++, *target_ma++, *measured_ma++, *valid++, may_rise);
+    for (; channels != 0; channels--, c++, duty++, measured_ma++, turn = !turn) {
+        KEEP_ADDRESS(c);
+        bool knows = *valid++;
+        if (knows) {
+            c->blind_ticks = 0;
+        } else if (c->blind_ticks < UINT8_MAX) {
+            c->blind_ticks++;
+        }
+        uint16_t wanted_ma = *target_ma++;
+        if (wanted_ma > control->parameters.maximum_current_ma) {
+            wanted_ma = control->parameters.maximum_current_ma;
+        }
+        uint16_t reference_ma = c->reference_ma;
+        if (wanted_ma == 0 || c->blind_ticks > control->parameters.hold_ticks) {
+            c->reference_ma = 0;
+            c->residue_q16 = 0;
+            c->duty = 0;
+            *duty = 0;
+            continue;
+        }
+        if (wanted_ma < reference_ma) {
+            c->fell = true;
+            reference_ma = wanted_ma;
+        } else if (!turn || c->fell) {
+            c->fell = c->fell && turn;
+            *duty = c->duty;
+            continue;
+        } else if (knows) {
+            if (reference_ma != 0) {
+                learn(control, c, *measured_ma);
+            }
+            if (may_rise) {
+                reference_ma = raised_ma(control, reference_ma, wanted_ma);
+            }
+        }
+        c->reference_ma = reference_ma;
+        *duty = reference_ma == 0 ? 0 /* not started yet */ : give(control, c);
     }
 }
 

@@ -1,5 +1,5 @@
 /* What it is for: holds the mean current of each channel at its target by choosing a duty.
- * What it owns: per channel one integer PI loop, a slew-limited reference, a dither residue.
+ * What it owns: per channel a learnt loop resistance, a slew-limited reference, a dither residue.
  * What it never does: choose a target, read a sensor, decide a fault, divide in a tick. */
 #ifndef CURRENT_CONTROL_H
 #define CURRENT_CONTROL_H
@@ -22,12 +22,11 @@ extern "C" {
 #define CURRENT_CONTROL_DUTY_STEPS 800u /* timer counts of one PWM period */
 
 typedef struct {
-    uint16_t supply_mv;    /* what feeds the buck stages, 1000..16000 */
-    uint16_t freewheel_mv; /* drop of the freewheel diode, 0..1000; 0: synchronous or ideal */
-    uint16_t shunt_mohm;   /* 0..1000 */
-    uint16_t wiring_mohm;  /* inductor, switch and leads, 0..1000 */
-    uint16_t proportional_permille; /* of the loop's inverse gain, 0..1000 */
-    uint16_t integral_permille;     /* of the loop's inverse gain, per tick, 1..1000 */
+    uint16_t supply_mv;          /* what feeds the buck stages, 1000..16000 */
+    uint16_t freewheel_mv;       /* drop of the freewheel diode, 0..1000; 0: synchronous or ideal */
+    uint16_t shunt_mohm;         /* 0..1000 */
+    uint16_t wiring_mohm;        /* inductor, switch and leads, 0..1000 */
+    uint16_t integral_permille;  /* of an error, learnt in two ticks, 1..1000 */
     uint16_t slew_ma_per_tick;   /* how fast a reference may rise, 1..3200; falls are immediate */
     uint16_t maximum_current_ma; /* of one channel, 1..3200: a higher target is clamped */
     uint16_t maximum_duty_steps; /* 1..800 */
@@ -37,12 +36,13 @@ typedef struct {
 } current_control_parameters_t;
 
 typedef struct {
-    int32_t trim_q24;      /* integral part: learnt less estimated loop gain, duty steps per mA */
-    int32_t excess_q16;    /* duty wanted less duty given in the last tick: dither, clamp */
+    int32_t trim_q24;      /* learnt less estimated loop gain, duty steps per mA */
     int16_t estimate_q16;  /* estimated loop gain, duty steps per mA */
     uint16_t reference_ma; /* slew-limited target of the last tick */
     uint16_t residue_q16;  /* sub-step duty not given yet */
+    uint16_t duty;         /* given in the last tick */
     uint8_t blind_ticks;   /* ticks without a valid reading, in a row */
+    bool fell;             /* the target, in the last tick */
 } current_control_channel_t;
 
 typedef struct {
@@ -51,8 +51,8 @@ typedef struct {
     uint16_t fixed_mohm;        /* shunt and wiring */
     int32_t offset_q16;         /* duty that only overcomes the freewheel drop */
     int32_t trim_limit_q24;
-    uint16_t proportional_q8;
     uint16_t integral_q16;
+    bool even_turn; /* channels 0, 2, .. had their turn in the last tick */
     current_control_channel_t channel[CURRENT_CONTROL_MAX_CHANNELS];
 } current_control_t;
 
@@ -81,29 +81,27 @@ void current_control_set_resistance(current_control_t *control, uint8_t channel,
 /* The channel is off and forgets what it learnt, but not the estimate. */
 void current_control_reset(current_control_t *control, uint8_t channel);
 
-typedef struct {
-    uint16_t target_ma;  /* wanted mean current; 0 switches off in this very tick */
-    int16_t measured_ma; /* mean over the last tick; any value */
-    bool valid;          /* measured_ma is a reading of the last tick */
-    bool may_rise;       /* false: the reference may not rise in this tick (shared supply) */
-} current_control_input_t;
-
-/* One tick (20 ms) of one channel; returns the duty for the next tick in whole steps,
- * 0..maximum_duty_steps, dithered (first order) so that its mean over the ticks is the wanted one.
- * 0 means off. duty = reference x loop resistance / supply + proportional x error, loop resistance
- * = spring estimate + shunt + wiring + trim, the trim integrates error / reference, error = what
- * the given duty should have brought - what was measured, so neither dither nor clamping winds it
- * up. 1 / reference is taken to a power of two: the integral gain in effect is between half and all
- * of the setting. Without a valid reading nothing is learnt and the reference does not rise, and
- * after hold_ticks such ticks in a row the channel is off until a reading is valid again. */
-uint16_t current_control_tick(current_control_t *control, uint8_t channel,
-                              const current_control_input_t *input);
-
-/* The same for channels 0 .. channels - 1 at once: without a call for each, in a quarter less time.
- */
-void current_control_tick_all(current_control_t *control, uint8_t channels,
-                              const uint16_t target_ma[], const int16_t measured_ma[],
-                              const bool valid[], bool may_rise, uint16_t duty[]);
+/* One tick (20 ms) of channels 0 .. channels - 1. target_ma: wanted mean currents; 0 switches off
+ * in this very tick. measured_ma: means over the last tick, any values; valid: they are readings of
+ * the last tick. may_rise false: no reference may rise in this tick (shared supply). Gives the
+ * duties for the next tick in whole steps, 0..maximum_duty_steps, 0 means off; dithered (first
+ * order), so that their mean over the ticks is the wanted one.
+ *
+ * duty = reference x loop resistance / supply, loop resistance = spring estimate + shunt + wiring +
+ * trim. What a duty has brought corrects the trim, so that neither dither nor clamping winds it up.
+ * A duty is given for two ticks: a reading after the second, be it of this tick or of the one
+ * before, is of it alone (a fall of the target does not wait, and teaches nothing). Then the trim
+ * takes integral x error / reference, and the reference may rise: to 128 mA from off, to its double
+ * later, by two ticks of the slew at most. So what is not learnt yet shrinks as the current rises:
+ * a loop resistance that is a quarter off overshoots by no more than 40 mA. 1 / reference is taken
+ * to a power of two: the gain in effect is between half and all of the setting, below 128 mA less.
+ * Channels have their turns in alternate ticks.
+ *
+ * Without a valid reading nothing is learnt and the reference does not rise; after hold_ticks such
+ * ticks in a row the channel is off until a reading is valid again. */
+void current_control_tick(current_control_t *control, uint8_t channels, const uint16_t target_ma[],
+                          const int16_t measured_ma[], const bool valid[], bool may_rise,
+                          uint16_t duty[]);
 
 /* Slew-limited reference of the last tick, mA. */
 uint16_t current_control_reference_ma(const current_control_t *control, uint8_t channel);

@@ -48,7 +48,6 @@
     X(freewheel_v, V, 3, U16, 1, CURRENT(freewheel_mv), 0, 1000) \
     X(shunt_ohm, OHM, 3, U16, 1, CURRENT(shunt_mohm), 0, 1000) \
     X(wiring_ohm, OHM, 3, U16, 1, CURRENT(wiring_mohm), 0, 1000) \
-    X(current_proportional, NONE, 3, U16, 1, CURRENT(proportional_permille), 0, 1000) \
     X(current_integral, NONE, 3, U16, 1, CURRENT(integral_permille), 1, 1000) \
     X(current_slew_a_per_tick, A, 3, U16, 1, CURRENT(slew_ma_per_tick), 1, 3200) \
     X(maximum_current_a, A, 3, U16, 1, CURRENT(maximum_current_ma), 1, 3200) \

@@ -68,12 +68,9 @@ static void count_parts(bool steps)
         safety_tick_spring(&aside.safety, 0, &sample);
         COUNTED();
     }
-    current_control_input_t channel = {.target_ma = target_ma[0],
-                                       .measured_ma = inputs.sensor[0].current_ma,
-                                       .valid = valid[0],
-                                       .may_rise = true};
-    COUNT("current_loop_of_one");
-    (void)current_control_tick(&aside.current, 0, &channel);
+    uint16_t duty[SPRINGS];
+    COUNT("current_loops");
+    current_control_tick(&aside.current, SPRINGS, target_ma, aside.measured_ma, valid, true, duty);
     COUNTED();
 }
 
