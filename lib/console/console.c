@@ -60,10 +60,12 @@ static bool room_for(const console_t *console, uint16_t bytes)
     return console->output.room(console->output.context) >= bytes;
 }
 
-static void add_setting_name(text_line_t *line, const settings_entry_t *entry, uint8_t element)
+static void add_setting_name(text_line_t *line, uint8_t index, uint8_t element)
 {
-    text_add(line, entry->name);
-    if (entry->count > 1) {
+    settings_entry_t entry;
+    settings_entry(index, &entry);
+    text_add_flash(line, settings_name(index));
+    if (entry.count > 1) {
         text_add_char(line, '_');
         text_add_decimal(line, element + 1, 0);
     }
@@ -90,15 +92,13 @@ static void apply_settings(console_t *console)
         return;
     }
     out_t out;
-    settings_entry_t entry;
     if (!settings_find_offset(offset, &console->conflict_index, &console->conflict_element)) {
         console->conflict_index = 0;
         console->conflict_element = 0;
     }
-    settings_entry(console->conflict_index, &entry);
     out_start(&out);
     text_add_flash(&out.line, FLASH_TEXT("[not active yet: "));
-    add_setting_name(&out.line, &entry, console->conflict_element);
+    add_setting_name(&out.line, console->conflict_index, console->conflict_element);
     text_add_flash(&out.line, FLASH_TEXT(" does not fit the others]"));
     out_end(console, &out);
 }
@@ -110,7 +110,7 @@ static void print_setting(const console_t *console, uint8_t index, uint8_t eleme
     settings_entry(index, &entry);
     out_start(&out);
     text_add_char(&out.line, '$');
-    add_setting_name(&out.line, &entry, element);
+    add_setting_name(&out.line, index, element);
     text_add_char(&out.line, '=');
     text_add_decimal(&out.line, settings_get(console->settings, index, element), entry.decimals);
     out_end(console, &out);

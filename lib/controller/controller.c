@@ -33,74 +33,6 @@ void controller_settings_default(controller_settings_t *settings)
     drive_policy_parameters_default(&settings->policy);
 }
 
-#define MODEL_OFFSET(field) (uint8_t) offsetof(thermal_model_parameters_t, field)
-
-/* Where each thermal_model_parameter_t is; a switch, because a table would take the Mega's RAM. */
-static uint8_t model_offset(thermal_model_parameter_t parameter)
-{
-    switch (parameter) {
-    case THERMAL_MODEL_ROWS:
-        return MODEL_OFFSET(rows);
-    case THERMAL_MODEL_COLUMNS:
-        return MODEL_OFFSET(columns);
-    case THERMAL_MODEL_STEP:
-        return MODEL_OFFSET(step_ms);
-    case THERMAL_MODEL_HEAT_CAPACITY:
-        return MODEL_OFFSET(heat_capacity_mj_per_k);
-    case THERMAL_MODEL_LOSS:
-        return MODEL_OFFSET(loss_uw_per_k);
-    case THERMAL_MODEL_LOSS_FAN:
-        return MODEL_OFFSET(loss_fan_uw_per_k);
-    case THERMAL_MODEL_ORTHOGONAL:
-        return MODEL_OFFSET(orthogonal_uw_per_k);
-    case THERMAL_MODEL_ORTHOGONAL_FAN:
-        return MODEL_OFFSET(orthogonal_fan_uw_per_k);
-    case THERMAL_MODEL_DIAGONAL:
-        return MODEL_OFFSET(diagonal_uw_per_k);
-    case THERMAL_MODEL_DIAGONAL_FAN:
-        return MODEL_OFFSET(diagonal_fan_uw_per_k);
-    case THERMAL_MODEL_LOSS_RISE:
-        return MODEL_OFFSET(loss_rise_ppm_per_k);
-    case THERMAL_MODEL_RADIATING_AREA:
-        return MODEL_OFFSET(radiating_area_cmm2);
-    case THERMAL_MODEL_LATENT_HEAT:
-        return MODEL_OFFSET(latent_heat_mj);
-    case THERMAL_MODEL_MARTENSITE_FINISH:
-        return MODEL_OFFSET(martensite_finish_cc);
-    case THERMAL_MODEL_MARTENSITE_START:
-        return MODEL_OFFSET(martensite_start_cc);
-    case THERMAL_MODEL_AUSTENITE_START:
-        return MODEL_OFFSET(austenite_start_cc);
-    case THERMAL_MODEL_AUSTENITE_FINISH:
-        return MODEL_OFFSET(austenite_finish_cc);
-    case THERMAL_MODEL_RESISTANCE_MARTENSITE:
-        return MODEL_OFFSET(resistance_martensite_uohm);
-    case THERMAL_MODEL_RESISTANCE_AUSTENITE:
-        return MODEL_OFFSET(resistance_austenite_uohm);
-    case THERMAL_MODEL_AIR_HEAT_CAPACITY:
-        return MODEL_OFFSET(air_heat_capacity_mj_per_k);
-    case THERMAL_MODEL_AIR_EXCHANGE:
-        return MODEL_OFFSET(air_exchange_uw_per_k);
-    case THERMAL_MODEL_PLATE_COUPLING:
-        return MODEL_OFFSET(plate_coupling_uw_per_k);
-    case THERMAL_MODEL_PLATE_HEAT_CAPACITY:
-        return MODEL_OFFSET(plate_heat_capacity_mj_per_k);
-    case THERMAL_MODEL_PLATE_LOSS:
-        return MODEL_OFFSET(plate_loss_uw_per_k);
-    case THERMAL_MODEL_WAKE:
-        return MODEL_OFFSET(wake_uw_per_k);
-    case THERMAL_MODEL_WAKE_TOWARDS:
-        return MODEL_OFFSET(wake_direction);
-    case THERMAL_MODEL_LOSS_SCALE:
-        return MODEL_OFFSET(loss_scale_permille);
-    case THERMAL_MODEL_HEAT_CAPACITY_SCALE:
-        return MODEL_OFFSET(heat_capacity_scale_permille);
-    case THERMAL_MODEL_PARAMETER_COUNT:
-        break;
-    }
-    return 0;
-}
-
 static bool move(uint16_t *bad, size_t offset)
 {
     if (bad != NULL) {
@@ -133,7 +65,9 @@ static bool init_model(thermal_model_t *model, const thermal_model_parameters_t 
 {
     thermal_model_parameter_t refused = THERMAL_MODEL_ROWS;
     if (thermal_model_init(model, parameters, &refused) != THERMAL_MODEL_OK) {
-        return refuse(bad, offsetof(controller_settings_t, model) + model_offset(refused));
+        const parameter_range_t *const ranges = (const parameter_range_t *)&thermal_model_ranges;
+        return refuse(bad, offsetof(controller_settings_t, model) +
+                               parameter_range(&ranges[refused]).offset);
     }
     return true;
 }

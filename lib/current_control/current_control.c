@@ -1,7 +1,5 @@
 #include "current_control.h"
 
-#include <stddef.h>
-
 #include "fixed_point.h"
 
 #define MEASURED_LIMIT_MA 4095  /* keeps current times gain below 2^27; the sensor ends at 3200 */
@@ -20,14 +18,6 @@
 #define KEEP_ADDRESS(pointer) (void)(pointer)
 #endif
 
-static bool refuse(uint16_t *bad, size_t offset)
-{
-    if (bad != NULL) {
-        *bad = (uint16_t)offset;
-    }
-    return false;
-}
-
 void current_control_parameters_default(current_control_parameters_t *parameters)
 {
     *parameters = (current_control_parameters_t){.supply_mv = 5000,
@@ -42,39 +32,23 @@ void current_control_parameters_default(current_control_parameters_t *parameters
                                                  .hold_ticks = 10};
 }
 
+#define RANGE(field, type, minimum, maximum)                                                       \
+    PARAMETER_RANGE(current_control_parameters_t, field, type, minimum, maximum)
+const current_control_ranges_t current_control_ranges FLASH_MEMORY = {
+    RANGE(supply_mv, U16, 1000, 16000),
+    RANGE(freewheel_mv, U16, 0, 1000),
+    RANGE(shunt_mohm, U16, 0, 1000),
+    RANGE(wiring_mohm, U16, 0, 1000),
+    RANGE(integral_permille, U16, 1, 1000),
+    RANGE(slew_ma_per_tick, U16, 1, 3200),
+    RANGE(maximum_current_ma, U16, 1, 3200),
+    RANGE(maximum_duty_steps, U16, 1, CURRENT_CONTROL_DUTY_STEPS),
+    RANGE(trim_limit_mohm, U16, 0, 1000),
+    RANGE(hold_ticks, U8, 0, 250)};
+
 bool current_control_check(const current_control_parameters_t *p, uint16_t *bad)
 {
-    if (p->supply_mv < 1000 || p->supply_mv > 16000) {
-        return refuse(bad, offsetof(current_control_parameters_t, supply_mv));
-    }
-    if (p->freewheel_mv > 1000) {
-        return refuse(bad, offsetof(current_control_parameters_t, freewheel_mv));
-    }
-    if (p->shunt_mohm > 1000) {
-        return refuse(bad, offsetof(current_control_parameters_t, shunt_mohm));
-    }
-    if (p->wiring_mohm > 1000) {
-        return refuse(bad, offsetof(current_control_parameters_t, wiring_mohm));
-    }
-    if (p->integral_permille < 1 || p->integral_permille > 1000) {
-        return refuse(bad, offsetof(current_control_parameters_t, integral_permille));
-    }
-    if (p->slew_ma_per_tick < 1 || p->slew_ma_per_tick > 3200) {
-        return refuse(bad, offsetof(current_control_parameters_t, slew_ma_per_tick));
-    }
-    if (p->maximum_current_ma < 1 || p->maximum_current_ma > 3200) {
-        return refuse(bad, offsetof(current_control_parameters_t, maximum_current_ma));
-    }
-    if (p->maximum_duty_steps < 1 || p->maximum_duty_steps > CURRENT_CONTROL_DUTY_STEPS) {
-        return refuse(bad, offsetof(current_control_parameters_t, maximum_duty_steps));
-    }
-    if (p->trim_limit_mohm > 1000) {
-        return refuse(bad, offsetof(current_control_parameters_t, trim_limit_mohm));
-    }
-    if (p->hold_ticks > 250) {
-        return refuse(bad, offsetof(current_control_parameters_t, hold_ticks));
-    }
-    return true;
+    return parameter_check(p, &current_control_ranges, sizeof current_control_ranges, bad);
 }
 
 bool current_control_apply(current_control_t *control, const current_control_parameters_t *p,

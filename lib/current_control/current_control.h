@@ -7,6 +7,8 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "parameter.h"
+
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -34,6 +36,12 @@ typedef struct {
         trim_limit_mohm; /* how far the learnt loop resistance may be off the estimate, 0..1000 */
     uint8_t hold_ticks;  /* ticks that a channel may run without a reading, 0..250; then off */
 } current_control_parameters_t;
+
+typedef struct {
+    parameter_range_t supply_mv, freewheel_mv, shunt_mohm, wiring_mohm, integral_permille,
+        slew_ma_per_tick, maximum_current_ma, maximum_duty_steps, trim_limit_mohm, hold_ticks;
+} current_control_ranges_t;
+extern const current_control_ranges_t current_control_ranges FLASH_MEMORY;
 
 typedef struct {
     int32_t trim_q24;      /* learnt less estimated loop gain, duty steps per mA */

@@ -16,18 +16,17 @@
 #define HIGH_RESISTANCE 8u
 #define STUCK_ON        16u
 
-static bool refuse(uint16_t *bad, size_t offset)
-{
-    if (bad != NULL) {
-        *bad = (uint16_t)offset;
-    }
-    return false;
-}
-
-static bool within(uint16_t value, uint16_t low, uint16_t high)
-{
-    return value >= low && value <= high;
-}
+#define RANGE(field, type, minimum, maximum)                                                       \
+    PARAMETER_RANGE(safety_parameters_t, field, type, minimum, maximum)
+const safety_ranges_t safety_ranges FLASH_MEMORY = {RANGE(over_current_ma, U16, 100, 3200),
+                                                    RANGE(supply_limit_ma, U16, 100, 60000),
+                                                    RANGE(check_current_ma, U16, 50, 3200),
+                                                    RANGE(resistance_minimum_mohm, U16, 0, 10000),
+                                                    RANGE(resistance_maximum_mohm, U16, 0, 10000),
+                                                    RANGE(stuck_on_ma, U16, 10, 3200),
+                                                    RANGE(temperature_trip_cc, S16, 0, 25000),
+                                                    RANGE(maximum_on_s, U16, 0, 65535),
+                                                    RANGE(bad_samples, U8, 1, 250)};
 
 void safety_parameters_default(safety_parameters_t *parameters)
 {
@@ -44,31 +43,15 @@ void safety_parameters_default(safety_parameters_t *parameters)
 
 bool safety_check(const safety_parameters_t *p, uint16_t *bad)
 {
-    if (!within(p->over_current_ma, 100, 3200)) {
-        return refuse(bad, offsetof(safety_parameters_t, over_current_ma));
+    if (!parameter_check(p, &safety_ranges, sizeof safety_ranges, bad)) {
+        return false;
     }
-    if (!within(p->supply_limit_ma, 100, 60000)) {
-        return refuse(bad, offsetof(safety_parameters_t, supply_limit_ma));
-    }
-    if (!within(p->check_current_ma, 50, 3200)) {
-        return refuse(bad, offsetof(safety_parameters_t, check_current_ma));
-    }
-    if (p->resistance_minimum_mohm > 10000) {
-        return refuse(bad, offsetof(safety_parameters_t, resistance_minimum_mohm));
-    }
-    if (p->resistance_maximum_mohm > 10000 ||
-        (p->resistance_maximum_mohm != 0 &&
-         p->resistance_maximum_mohm <= p->resistance_minimum_mohm)) {
-        return refuse(bad, offsetof(safety_parameters_t, resistance_maximum_mohm));
-    }
-    if (!within(p->stuck_on_ma, 10, 3200)) {
-        return refuse(bad, offsetof(safety_parameters_t, stuck_on_ma));
-    }
-    if (p->temperature_trip_cc < 0 || p->temperature_trip_cc > 25000) {
-        return refuse(bad, offsetof(safety_parameters_t, temperature_trip_cc));
-    }
-    if (!within(p->bad_samples, 1, 250)) {
-        return refuse(bad, offsetof(safety_parameters_t, bad_samples));
+    if (p->resistance_maximum_mohm != 0 &&
+        p->resistance_maximum_mohm <= p->resistance_minimum_mohm) {
+        if (bad != NULL) {
+            *bad = offsetof(safety_parameters_t, resistance_maximum_mohm);
+        }
+        return false;
     }
     return true;
 }

@@ -7,6 +7,8 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "parameter.h"
+
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -54,6 +56,12 @@ typedef struct {
     uint16_t maximum_on_s;            /* longest time an output may be on without a pause; 0 none */
     uint8_t bad_samples;              /* a fault needs this many bad ticks in a row, 1..250 */
 } safety_parameters_t;
+
+typedef struct {
+    parameter_range_t over_current_ma, supply_limit_ma, check_current_ma, resistance_minimum_mohm,
+        resistance_maximum_mohm, stuck_on_ma, temperature_trip_cc, maximum_on_s, bad_samples;
+} safety_ranges_t;
+extern const safety_ranges_t safety_ranges FLASH_MEMORY;
 
 /* What is remembered of one spring: internal. Bad ticks in a row are counted up to bad_samples. */
 typedef struct {

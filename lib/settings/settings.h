@@ -10,6 +10,7 @@
 #include <stdint.h>
 
 #include "controller.h"
+#include "parameter.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -36,16 +37,11 @@ void settings_default(settings_t *settings);
 /* --- the table ------------------------------------------------------------------------------ */
 
 #define SETTINGS_NAME_SIZE 32 /* with the terminating zero */
-#define SETTINGS_UNIT_SIZE 10
 
-typedef enum { SETTINGS_U8 = 0, SETTINGS_U16, SETTINGS_S16, SETTINGS_U32 } settings_type_t;
-
-/* One setting. Its value is an integer in units of 10^-decimals of `unit`. */
+/* One setting. Its value is an integer in units of 10^-decimals of its unit. */
 typedef struct {
-    char name[SETTINGS_NAME_SIZE]; /* of an array: its elements are name_1, name_2, ... */
-    char unit[SETTINGS_UNIT_SIZE]; /* "" for a plain number */
     uint8_t decimals;
-    uint8_t type;    /* settings_type_t */
+    uint8_t type;    /* parameter_type_t */
     uint8_t count;   /* 1, or the elements of an array */
     uint16_t offset; /* of the first element in settings_t */
     int32_t minimum;
@@ -61,15 +57,21 @@ typedef enum {
 } settings_result_t;
 
 uint8_t settings_count(void); /* entries of the table */
-/* Copies one entry; index must be below settings_count(). */
+/* One entry; here and below, index must be below settings_count(). */
 void settings_entry(uint8_t index, settings_entry_t *entry);
+/* Both are texts in flash. O(index). Of an array: its elements are name_1, name_2, ... */
+const char *settings_name(uint8_t index);
+const char *settings_unit(uint8_t index); /* "" for a plain number */
+/* CRC-16 over what tells one table from another: the first `entries` names with their types,
+ * decimals and counts. */
+uint16_t settings_fingerprint(uint8_t entries);
 /* The setting of which offsetof(controller_settings_t, ...) is `offset`, as
  * controller_apply_settings names what it refused. Fails (false) if and only if no setting is
  * there. */
 bool settings_find_offset(uint16_t offset, uint8_t *index, uint8_t *element);
 /* Fails (false) if and only if no setting has that name; element counts from 0. */
 bool settings_find(const char *name, uint8_t *index, uint8_t *element);
-/* index and element must exist. */
+/* element must exist. */
 int32_t settings_get(const settings_t *settings, uint8_t index, uint8_t element);
 /* SETTINGS_OK or SETTINGS_OUT_OF_RANGE; then nothing is changed. */
 settings_result_t settings_set(settings_t *settings, uint8_t index, uint8_t element, int32_t value);

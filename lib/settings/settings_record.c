@@ -9,41 +9,13 @@
 #define ERASED     0xFFu
 #define CLEARED    0x00u
 
-static uint8_t width_of(uint8_t type)
-{
-    switch (type) {
-    case SETTINGS_U8:
-        return 1;
-    case SETTINGS_U32:
-        return 4;
-    default:
-        return 2;
-    }
-}
-
-/* What tells one table from another: the first `entries` names with their types, decimals and
- * counts. */
-static uint16_t fingerprint(uint8_t entries)
-{
-    uint16_t crc = CRC16_START;
-    settings_entry_t entry;
-    for (uint8_t i = 0; i < entries; i++) {
-        settings_entry(i, &entry);
-        crc = crc16_add_bytes(crc, entry.name, (uint16_t)(strlen(entry.name) + 1u));
-        crc = crc16_add(crc, entry.type);
-        crc = crc16_add(crc, entry.decimals);
-        crc = crc16_add(crc, entry.count);
-    }
-    return crc;
-}
-
 static uint16_t payload_bytes(uint8_t entries)
 {
     uint16_t bytes = 0;
     settings_entry_t entry;
     for (uint8_t i = 0; i < entries; i++) {
         settings_entry(i, &entry);
-        bytes = (uint16_t)(bytes + (uint16_t)entry.count * width_of(entry.type));
+        bytes = (uint16_t)(bytes + (uint16_t)entry.count * parameter_width(entry.type));
     }
     return bytes;
 }
@@ -77,14 +49,14 @@ static bool read_values(const settings_storage_t *storage, uint16_t address, uin
     settings_entry_t entry;
     for (uint8_t i = 0; i < entries; i++) {
         settings_entry(i, &entry);
-        const uint8_t width = width_of(entry.type);
+        const uint8_t width = parameter_width(entry.type);
         for (uint8_t element = 0; element < entry.count; element++) {
             uint32_t wide = 0;
             for (uint8_t octet = 0; octet < width; octet++) {
                 wide |= (uint32_t)storage->read(storage->context, address++) << (8u * octet);
             }
             const int32_t value =
-                entry.type == SETTINGS_S16 ? (int32_t)(int16_t)(uint16_t)wide : (int32_t)wide;
+                entry.type == PARAMETER_S16 ? (int32_t)(int16_t)(uint16_t)wide : (int32_t)wide;
             if (value < entry.minimum || value > entry.maximum) {
                 return false;
             }
@@ -124,7 +96,7 @@ static slot_t examine(const settings_storage_t *storage, uint16_t base)
     if (crc != read_word(storage, (uint16_t)(base + covered))) {
         return slot;
     }
-    if (read_word(storage, (uint16_t)(base + 4u)) != fingerprint(slot.entries)) {
+    if (read_word(storage, (uint16_t)(base + 4u)) != settings_fingerprint(slot.entries)) {
         slot.state = SLOT_FOREIGN;
         return slot;
     }
@@ -158,7 +130,7 @@ settings_loaded_t settings_load(settings_store_t *store, const settings_storage_
     store->base = base_of(found ? (uint8_t)(1u - chosen) : 0u);
     store->sequence = found ? (uint16_t)(slot[chosen].sequence + 1u) : 0u;
     store->entries = settings_count();
-    store->fingerprint = fingerprint(store->entries);
+    store->fingerprint = settings_fingerprint(store->entries);
 
     settings_default(settings);
     if (found) {
@@ -199,7 +171,7 @@ void settings_save_start(settings_store_t *store, const settings_t *settings, ui
     store->settings = settings;
     if (entries != 0 && entries < settings_count()) {
         store->entries = entries;
-        store->fingerprint = fingerprint(entries);
+        store->fingerprint = settings_fingerprint(entries);
     }
     rewind_cursor(store);
     store->phase = PHASE_CLEAR;
@@ -231,7 +203,7 @@ static uint8_t value_byte(settings_store_t *store)
     settings_entry(store->entry, &entry);
     const uint32_t value = (uint32_t)settings_get(store->settings, store->entry, store->element);
     const uint8_t out = (uint8_t)(value >> (8u * store->octet));
-    if (++store->octet == width_of(entry.type)) {
+    if (++store->octet == parameter_width(entry.type)) {
         store->octet = 0;
         if (++store->element == entry.count) {
             store->element = 0;

@@ -10,6 +10,8 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "parameter.h"
+
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -126,6 +128,19 @@ typedef enum {
     THERMAL_MODEL_PARAMETER_COUNT
 } thermal_model_parameter_t;
 
+/* Their own limits, in flash and in that order. */
+typedef struct {
+    parameter_range_t rows, columns, step_ms, heat_capacity_mj_per_k, loss_uw_per_k,
+        loss_fan_uw_per_k, orthogonal_uw_per_k, orthogonal_fan_uw_per_k, diagonal_uw_per_k,
+        diagonal_fan_uw_per_k, loss_rise_ppm_per_k, radiating_area_cmm2, latent_heat_mj,
+        martensite_finish_cc, martensite_start_cc, austenite_start_cc, austenite_finish_cc,
+        resistance_martensite_uohm, resistance_austenite_uohm, air_heat_capacity_mj_per_k,
+        air_exchange_uw_per_k, plate_coupling_uw_per_k, plate_heat_capacity_mj_per_k,
+        plate_loss_uw_per_k, wake_uw_per_k, wake_direction, loss_scale_permille,
+        heat_capacity_scale_permille;
+} thermal_model_ranges_t;
+extern const thermal_model_ranges_t thermal_model_ranges FLASH_MEMORY;
+
 /* Temperatures are held within these, degC in Q9.7: -40 .. 215. What lies outside counts as the
  * limit. A spring's upper limit is 255 degC less latent heat over heat capacity where that is
  * lower. */
@@ -216,13 +231,8 @@ typedef struct {
                  */
 } thermal_model_slow_node_t;
 
+/* The single values come first: the AVR reaches 64 bytes from a pointer in one instruction. */
 typedef struct {
-    thermal_model_parameters_t parameters;
-    thermal_model_state_t state;
-    thermal_model_spring_t spring[THERMAL_MODEL_MAX_SPRINGS];
-    /* temperatures half a step ahead, 1/64 K above just under the lowest; 0 where there is no
-     * spring */
-    uint16_t lead[THERMAL_MODEL_FRAME_STRIDE * (THERMAL_MODEL_MAX_SPRINGS + 2)];
     thermal_model_pass_t pass;
     thermal_model_slow_node_t air;
     thermal_model_slow_node_t plate;
@@ -244,6 +254,12 @@ typedef struct {
     int16_t highest_c7; /* of a spring: temperature plus latent heat must fit */
     int8_t wake_offset; /* to the upstream spring in the frame */
     uint8_t fan_percent;
+    thermal_model_state_t state;
+    thermal_model_spring_t spring[THERMAL_MODEL_MAX_SPRINGS];
+    /* temperatures half a step ahead, 1/64 K above just under the lowest; 0 where there is no
+     * spring */
+    uint16_t lead[THERMAL_MODEL_FRAME_STRIDE * (THERMAL_MODEL_MAX_SPRINGS + 2)];
+    thermal_model_parameters_t parameters;
 } thermal_model_t;
 
 /* The paper's spring at 4 mm pitch, 3 x 3, 0.1 s, no optional effect but phase and latent heat
@@ -259,11 +275,11 @@ const char *thermal_model_parameter_name(thermal_model_parameter_t parameter);
  *
  * RANGE: rows x columns not in 1..THERMAL_MODEL_MAX_SPRINGS; step_ms not in 1..1000; a scale not in
  * 1..8000 permille; heat capacity times scale below 1 mJ/K, or so small that a step of the highest
- * power exceeds 64 K; latent heat over heat capacity above 80 K or above 20 times either width; a
- * transformation narrower than 2 K or wider than 100 K; martensite finish below -30 degC; austenite
- * finish, or that plus latent heat over heat capacity, above 200 degC; a resistance of 0 or above
- * 16 ohm; loss rise above 20000 ppm/K; wake direction above 3; wake above the fan's loss (heat from
- * nothing); air or plate above 2 kJ/K; a plate coupled but without heat capacity.
+ * power exceeds 63 K; latent heat over heat capacity above 80 K or above 20 times either width; a
+ * transformation narrower than 2 K or wider than 100 K; a transformation temperature outside
+ * -30..200 degC; austenite finish plus latent heat over heat capacity above 200 degC; a resistance
+ * of 0 or above 16 ohm; loss rise above 20000 ppm/K; wake direction above 3; wake above the fan's
+ * loss (heat from nothing); air or plate above 2 kJ/K; a plate coupled but without heat capacity.
  *
  * ORDER: not martensite finish < martensite start <= austenite start < austenite finish.
  *

@@ -5,20 +5,48 @@
 
 #include "fixed_point.h"
 
-#define STEP_MAX_MS         1000u
-#define SCALE_MAX_PERMILLE  8000u
-#define LOSS_RISE_MAX_PPM   20000u
-#define RESISTANCE_MAX_UOHM 16000000u
-#define AIR_EXCHANGE_MAX    16000000u /* uW/K: 16 bits of 256 uW/K */
 #define CONDUCTANCE_MAX     65535u
-#define CONDUCTANCE_SUM_MAX                                                                        \
-    98000u /* (2^31 / 64 uW - highest power) / 256 K                                               \
-            */
-#define CAPACITY_MAX_MJ 2000000u
-#define FEW_SPRINGS     16
-#define GAIN_MAX        0xffffffu
-#define WIDTH_MIN_C7    (2 * 128)
-#define WIDTH_MAX_C7    (100 * 128)
+#define CONDUCTANCE_SUM_MAX 98000u    /* (2^31 / 64 uW - highest power) / 256 K */
+#define LOSS_RISE_MAX_E6    63999511u /* 1e-6 uW/K per K: loss_rise is 16 bits of uW/K per 1024 K */
+#define FEW_SPRINGS         16
+#define GAIN_MAX            0xffffffu
+#define STEP_GAIN_UJ_PER_MS 2199023256u /* 2^41 / 1e3: thermal_model_spring_t.step_gain */
+#define CAPACITY_UJ_PER_MS  132u        /* least: STEP_GAIN_UJ_PER_MS over this is below GAIN_MAX */
+#define WIDTH_MIN_CC        200
+#define WIDTH_MAX_CC        10000
+#define HIGHEST_CC          20000
+
+#define RANGE(field, type, minimum, maximum)                                                       \
+    PARAMETER_RANGE(thermal_model_parameters_t, field, type, minimum, maximum)
+const thermal_model_ranges_t thermal_model_ranges FLASH_MEMORY = {
+    RANGE(rows, U8, 1, THERMAL_MODEL_MAX_SPRINGS),
+    RANGE(columns, U8, 1, THERMAL_MODEL_MAX_SPRINGS),
+    RANGE(step_ms, U16, 1, 1000),
+    RANGE(heat_capacity_mj_per_k, U16, 1, 65535),
+    RANGE(loss_uw_per_k, U16, 0, 65535),
+    RANGE(loss_fan_uw_per_k, U16, 0, 65535),
+    RANGE(orthogonal_uw_per_k, U16, 0, 65535),
+    RANGE(orthogonal_fan_uw_per_k, U16, 0, 65535),
+    RANGE(diagonal_uw_per_k, U16, 0, 65535),
+    RANGE(diagonal_fan_uw_per_k, U16, 0, 65535),
+    RANGE(loss_rise_ppm_per_k, U16, 0, 20000),
+    RANGE(radiating_area_cmm2, U16, 0, 65535),
+    RANGE(latent_heat_mj, U16, 0, 65535),
+    RANGE(martensite_finish_cc, S16, -3000, HIGHEST_CC),
+    RANGE(martensite_start_cc, S16, -3000, HIGHEST_CC),
+    RANGE(austenite_start_cc, S16, -3000, HIGHEST_CC),
+    RANGE(austenite_finish_cc, S16, -3000, HIGHEST_CC),
+    RANGE(resistance_martensite_uohm, U32, 1, 16000),
+    RANGE(resistance_austenite_uohm, U32, 1, 16000),
+    RANGE(air_heat_capacity_mj_per_k, U32, 0, 2000),
+    RANGE(air_exchange_uw_per_k, U32, 0, 16000), /* 16 bits of 256 uW/K */
+    RANGE(plate_coupling_uw_per_k, U16, 0, 65535),
+    RANGE(plate_heat_capacity_mj_per_k, U32, 0, 2000),
+    RANGE(plate_loss_uw_per_k, U16, 0, 65535),
+    RANGE(wake_uw_per_k, U16, 0, 65535),
+    RANGE(wake_direction, U8, 0, THERMAL_MODEL_WAKE_NORTH),
+    RANGE(loss_scale_permille, U16, 1, 8000),
+    RANGE(heat_capacity_scale_permille, U16, 1, 8000)};
 
 void thermal_model_parameters_default(thermal_model_parameters_t *parameters)
 {
@@ -99,14 +127,22 @@ static int16_t c7_from_cc(int16_t cc)
     return (int16_t)((scaled + (scaled < 0 ? -12 : 12)) / 25);
 }
 
-static uint8_t neighbours_of(const thermal_model_parameters_t *p, uint8_t spring, uint8_t *diagonal)
+typedef struct {
+    uint8_t row;
+    uint8_t column;
+    uint8_t orthogonals; /* neighbours */
+    uint8_t diagonals;
+} place_t;
+
+static place_t place_of(const thermal_model_parameters_t *p, uint8_t spring)
 {
-    uint8_t row = (uint8_t)(spring / p->columns);
-    uint8_t column = (uint8_t)(spring % p->columns);
-    uint8_t vertical = (uint8_t)((row > 0) + (row + 1 < p->rows));
-    uint8_t horizontal = (uint8_t)((column > 0) + (column + 1 < p->columns));
-    *diagonal = (uint8_t)(vertical * horizontal);
-    return (uint8_t)(vertical + horizontal);
+    place_t place = {.row = (uint8_t)(spring / p->columns),
+                     .column = (uint8_t)(spring % p->columns)};
+    const uint8_t vertical = (uint8_t)((place.row > 0) + (place.row + 1 < p->rows));
+    const uint8_t horizontal = (uint8_t)((place.column > 0) + (place.column + 1 < p->columns));
+    place.diagonals = (uint8_t)(vertical * horizontal);
+    place.orthogonals = (uint8_t)(vertical + horizontal);
+    return place;
 }
 
 /* Radiation's slope at the highest temperature (488 K), uW/K: 4 sigma T^3 = 26.4 W/m2K. */
@@ -115,186 +151,172 @@ static uint32_t radiation_slope(const thermal_model_parameters_t *p)
     return ((uint32_t)p->radiating_area_cmm2 * 27u + 99u) / 100u;
 }
 
+/* Of the plate, to all springs and to ambient: below 2^32 / 1000 uW/K. */
+static uint32_t plate_conductance(const thermal_model_parameters_t *p)
+{
+    return (uint32_t)p->plate_coupling_uw_per_k * (uint8_t)(p->rows * p->columns) +
+           p->plate_loss_uw_per_k;
+}
+
 static uint32_t spring_capacity(const thermal_model_parameters_t *p, uint8_t i)
 {
     return (uint32_t)p->heat_capacity_mj_per_k * p->heat_capacity_scale_permille[i];
 }
 
-static thermal_model_status_t check_array(const thermal_model_parameters_t *p,
-                                          thermal_model_parameter_t *bad)
+/* Of one spring. */
+static uint32_t scaled_loss(uint16_t loss_uw_per_k, uint16_t permille)
 {
-    *bad = THERMAL_MODEL_ROWS;
-    if (p->rows == 0 || p->rows > THERMAL_MODEL_MAX_SPRINGS) {
-        return THERMAL_MODEL_ERROR_RANGE;
-    }
-    *bad = THERMAL_MODEL_COLUMNS;
-    if (p->columns == 0 || (uint16_t)p->rows * p->columns > THERMAL_MODEL_MAX_SPRINGS) {
-        return THERMAL_MODEL_ERROR_RANGE;
-    }
-    *bad = THERMAL_MODEL_STEP;
-    if (p->step_ms == 0 || p->step_ms > STEP_MAX_MS) {
-        return THERMAL_MODEL_ERROR_RANGE;
-    }
-    uint8_t count = (uint8_t)(p->rows * p->columns);
-    for (uint8_t i = 0; i < count; i++) {
-        *bad = THERMAL_MODEL_LOSS_SCALE;
-        if (p->loss_scale_permille[i] == 0 || p->loss_scale_permille[i] > SCALE_MAX_PERMILLE) {
-            return THERMAL_MODEL_ERROR_RANGE;
-        }
-        *bad = THERMAL_MODEL_HEAT_CAPACITY_SCALE;
-        if (p->heat_capacity_scale_permille[i] == 0 ||
-            p->heat_capacity_scale_permille[i] > SCALE_MAX_PERMILLE) {
-            return THERMAL_MODEL_ERROR_RANGE;
-        }
-        *bad = THERMAL_MODEL_HEAT_CAPACITY;
-        /* 1e3 2^41 / 1e6 step / (capacity scale): the gain of the step must fit 24 bits */
-        if (spring_capacity(p, i) < 1000u ||
-            fixed_point_multiply_divide(2199023256u, p->step_ms, spring_capacity(p, i)) >
-                GAIN_MAX) {
-            return THERMAL_MODEL_ERROR_RANGE;
-        }
-    }
-    return THERMAL_MODEL_OK;
+    return ((uint32_t)loss_uw_per_k * permille + 500u) / 1000u;
 }
 
-static thermal_model_status_t check_phase(const thermal_model_parameters_t *p,
-                                          thermal_model_parameter_t *bad)
+/* A refusal: the status and the parameter, in one value; 0 is none. */
+typedef uint16_t refusal_t;
+#define REFUSE(status, parameter)                                                                  \
+    return (refusal_t)((uint16_t)(THERMAL_MODEL_##parameter) << 8 | -THERMAL_MODEL_ERROR_##status)
+
+static refusal_t check_array(const thermal_model_parameters_t *p)
 {
-    *bad = THERMAL_MODEL_MARTENSITE_FINISH;
-    if (p->martensite_finish_cc < -3000) {
-        return THERMAL_MODEL_ERROR_RANGE;
+    const uint8_t outside =
+        parameter_first_outside(p, &thermal_model_ranges, THERMAL_MODEL_LOSS_SCALE);
+    if (outside < THERMAL_MODEL_LOSS_SCALE) {
+        return (refusal_t)((uint16_t)outside << 8 | -THERMAL_MODEL_ERROR_RANGE);
     }
-    int16_t finish_m = c7_from_cc(p->martensite_finish_cc);
-    int16_t start_m = c7_from_cc(p->martensite_start_cc);
-    int16_t start_a = c7_from_cc(p->austenite_start_cc);
-    int16_t finish_a = c7_from_cc(p->austenite_finish_cc);
-    *bad = THERMAL_MODEL_MARTENSITE_START;
-    if (p->martensite_start_cc <= p->martensite_finish_cc) {
-        return THERMAL_MODEL_ERROR_ORDER;
+    if ((uint16_t)p->rows * p->columns > THERMAL_MODEL_MAX_SPRINGS) {
+        REFUSE(RANGE, COLUMNS);
     }
-    int32_t width_m = (int32_t)start_m - finish_m;
-    if (width_m < WIDTH_MIN_C7 || width_m > WIDTH_MAX_C7) {
-        return THERMAL_MODEL_ERROR_RANGE;
+    const parameter_range_t scale = parameter_range(&thermal_model_ranges.loss_scale_permille);
+    for (uint8_t i = 0; i < (uint8_t)(p->rows * p->columns); i++) {
+        if (!parameter_is_within(&scale, p->loss_scale_permille[i])) {
+            REFUSE(RANGE, LOSS_SCALE);
+        }
+        if (!parameter_is_within(&scale, p->heat_capacity_scale_permille[i])) {
+            REFUSE(RANGE, HEAT_CAPACITY_SCALE);
+        }
+        const uint32_t capacity = spring_capacity(p, i);
+        if (capacity < 1000u || capacity < (uint32_t)p->step_ms * CAPACITY_UJ_PER_MS) {
+            REFUSE(RANGE, HEAT_CAPACITY);
+        }
     }
-    *bad = THERMAL_MODEL_AUSTENITE_START;
-    if (p->austenite_start_cc < p->martensite_start_cc) {
-        return THERMAL_MODEL_ERROR_ORDER;
-    }
-    *bad = THERMAL_MODEL_AUSTENITE_FINISH;
-    if (p->austenite_finish_cc <= p->austenite_start_cc) {
-        return THERMAL_MODEL_ERROR_ORDER;
-    }
-    int32_t width_a = (int32_t)finish_a - start_a;
-    if (width_a < WIDTH_MIN_C7 || width_a > WIDTH_MAX_C7 || p->austenite_finish_cc > 20000) {
-        return THERMAL_MODEL_ERROR_RANGE;
-    }
-    *bad = THERMAL_MODEL_LATENT_HEAT;
-    uint32_t latent_c7 =
-        fixed_point_multiply_divide(p->latent_heat_mj, 128u, p->heat_capacity_mj_per_k);
-    uint32_t narrower = (uint32_t)(width_m < width_a ? width_m : width_a);
-    if (latent_c7 > LATENT_MAX_K * 128u || latent_c7 > 20u * narrower ||
-        (int32_t)latent_c7 + finish_a > 200 * 128) {
-        return THERMAL_MODEL_ERROR_RANGE;
-    }
-    *bad = THERMAL_MODEL_RESISTANCE_MARTENSITE;
-    if (p->resistance_martensite_uohm == 0 || p->resistance_martensite_uohm > RESISTANCE_MAX_UOHM) {
-        return THERMAL_MODEL_ERROR_RANGE;
-    }
-    *bad = THERMAL_MODEL_RESISTANCE_AUSTENITE;
-    if (p->resistance_austenite_uohm == 0 || p->resistance_austenite_uohm > RESISTANCE_MAX_UOHM) {
-        return THERMAL_MODEL_ERROR_RANGE;
-    }
-    return THERMAL_MODEL_OK;
+    return 0;
 }
 
-static thermal_model_status_t check_flows(const thermal_model_parameters_t *p,
-                                          thermal_model_parameter_t *bad)
+static bool is_width(int16_t from_cc, int16_t to_cc)
 {
-    *bad = THERMAL_MODEL_AIR_EXCHANGE;
-    if (p->air_exchange_uw_per_k > AIR_EXCHANGE_MAX) {
-        return THERMAL_MODEL_ERROR_RANGE;
+    const int16_t width_cc = (int16_t)(to_cc - from_cc);
+    return width_cc >= WIDTH_MIN_CC && width_cc <= WIDTH_MAX_CC;
+}
+
+static refusal_t check_phase(const thermal_model_parameters_t *p)
+{
+    const int16_t finish_m = p->martensite_finish_cc;
+    const int16_t start_m = p->martensite_start_cc;
+    const int16_t start_a = p->austenite_start_cc;
+    const int16_t finish_a = p->austenite_finish_cc;
+    if (start_m <= finish_m) {
+        REFUSE(ORDER, MARTENSITE_START);
     }
-    *bad = THERMAL_MODEL_AIR_HEAT_CAPACITY;
-    if (p->air_heat_capacity_mj_per_k > CAPACITY_MAX_MJ) {
-        return THERMAL_MODEL_ERROR_RANGE;
+    if (!is_width(finish_m, start_m)) {
+        REFUSE(RANGE, MARTENSITE_START);
     }
-    *bad = THERMAL_MODEL_PLATE_HEAT_CAPACITY;
-    if (p->plate_heat_capacity_mj_per_k > CAPACITY_MAX_MJ) {
-        return THERMAL_MODEL_ERROR_RANGE;
+    if (start_a < start_m) {
+        REFUSE(ORDER, AUSTENITE_START);
     }
-    *bad = THERMAL_MODEL_LOSS_RISE;
-    if (p->loss_rise_ppm_per_k > LOSS_RISE_MAX_PPM) {
-        return THERMAL_MODEL_ERROR_RANGE;
+    if (finish_a <= start_a) {
+        REFUSE(ORDER, AUSTENITE_FINISH);
     }
-    *bad = THERMAL_MODEL_WAKE_TOWARDS;
-    if (p->wake_direction > THERMAL_MODEL_WAKE_NORTH) {
-        return THERMAL_MODEL_ERROR_RANGE;
+    if (!is_width(start_a, finish_a)) {
+        REFUSE(RANGE, AUSTENITE_FINISH);
     }
-    uint8_t count = (uint8_t)(p->rows * p->columns);
-    uint32_t orthogonal = larger(p->orthogonal_uw_per_k, p->orthogonal_fan_uw_per_k);
-    uint32_t diagonal = larger(p->diagonal_uw_per_k, p->diagonal_fan_uw_per_k);
-    for (uint8_t i = 0; i < count; i++) {
-        uint8_t diagonals;
-        uint8_t orthogonals = neighbours_of(p, i, &diagonals);
-        uint32_t scale = p->loss_scale_permille[i];
-        uint32_t natural = (uint32_t)p->loss_uw_per_k * scale / 1000u;
-        uint32_t natural_risen =
-            natural + fixed_point_multiply_divide(
-                          natural, (uint32_t)p->loss_rise_ppm_per_k * LEAD_SPAN_K, 1000000u);
-        uint32_t forced = (uint32_t)p->loss_fan_uw_per_k * scale / 1000u;
-        uint32_t loss = larger(natural_risen, forced) + 1u;
-        *bad = THERMAL_MODEL_WAKE;
-        if (p->wake_uw_per_k > forced) {
-            return THERMAL_MODEL_ERROR_RANGE;
+    const uint32_t latent_cc = p->latent_heat_mj * (uint32_t)100 / p->heat_capacity_mj_per_k;
+    if (latent_cc > LATENT_MAX_K * 100u) {
+        REFUSE(RANGE, LATENT_HEAT);
+    }
+    const int16_t least_width_cc = (int16_t)(((int16_t)latent_cc + 19) / 20);
+    if (least_width_cc > start_m - finish_m || least_width_cc > finish_a - start_a ||
+        (int16_t)latent_cc > HIGHEST_CC - finish_a) {
+        REFUSE(RANGE, LATENT_HEAT);
+    }
+    return 0;
+}
+
+static refusal_t check_spring(const thermal_model_parameters_t *p, uint8_t i)
+{
+    const uint32_t natural = scaled_loss(p->loss_uw_per_k, p->loss_scale_permille[i]);
+    const uint32_t forced = scaled_loss(p->loss_fan_uw_per_k, p->loss_scale_permille[i]);
+    if (natural >= CONDUCTANCE_MAX && natural >= forced) {
+        REFUSE(OVERFLOW, LOSS);
+    }
+    if (forced >= CONDUCTANCE_MAX) {
+        REFUSE(OVERFLOW, LOSS_FAN);
+    }
+    if (p->wake_uw_per_k > (uint16_t)forced) {
+        REFUSE(RANGE, WAKE);
+    }
+    const uint32_t rise_e6 = natural * p->loss_rise_ppm_per_k;
+    const uint32_t risen = natural + rise_e6 / (1000000u / LEAD_SPAN_K) + 1u;
+    if (rise_e6 > LOSS_RISE_MAX_E6 || risen > CONDUCTANCE_MAX) {
+        REFUSE(OVERFLOW, LOSS_RISE);
+    }
+    const place_t place = place_of(p, i);
+    const uint32_t orthogonal =
+        place.orthogonals * larger(p->orthogonal_uw_per_k, p->orthogonal_fan_uw_per_k);
+    const uint32_t diagonal =
+        place.diagonals * larger(p->diagonal_uw_per_k, p->diagonal_fan_uw_per_k);
+    const uint32_t conduction = orthogonal + diagonal + p->plate_coupling_uw_per_k;
+    const uint32_t loss = larger(risen, forced + 1u);
+    const uint32_t total = loss + conduction + p->wake_uw_per_k + radiation_slope(p);
+    if (conduction <= CONDUCTANCE_MAX && total > CONDUCTANCE_SUM_MAX && loss > conduction) {
+        if (forced > natural) {
+            REFUSE(OVERFLOW, LOSS_FAN);
         }
-        *bad = forced > natural_risen                                    ? THERMAL_MODEL_LOSS_FAN
-               : p->loss_rise_ppm_per_k > 0 && natural < CONDUCTANCE_MAX ? THERMAL_MODEL_LOSS_RISE
-                                                                         : THERMAL_MODEL_LOSS;
-        if (loss > CONDUCTANCE_MAX) {
-            return THERMAL_MODEL_ERROR_OVERFLOW;
+        REFUSE(OVERFLOW, LOSS);
+    }
+    if (conduction > CONDUCTANCE_MAX || total > CONDUCTANCE_SUM_MAX) {
+        if (p->plate_coupling_uw_per_k > orthogonal + diagonal) {
+            REFUSE(OVERFLOW, PLATE_COUPLING);
         }
-        /* loss_rise is kept as uW/K per 2^16/64 K: below 64 uW/K per K */
-        *bad = THERMAL_MODEL_LOSS_RISE;
-        if (fixed_point_multiply_divide(natural, (uint32_t)p->loss_rise_ppm_per_k * 1024u,
-                                        1000000u) > 65535u) {
-            return THERMAL_MODEL_ERROR_OVERFLOW;
-        }
-        uint32_t between = orthogonals * orthogonal + diagonals * diagonal;
-        uint32_t conduction = between + p->plate_coupling_uw_per_k;
-        *bad = p->plate_coupling_uw_per_k > between ? THERMAL_MODEL_PLATE_COUPLING
-               : diagonals * diagonal > orthogonals * orthogonal
-                   ? (p->diagonal_fan_uw_per_k > p->diagonal_uw_per_k ? THERMAL_MODEL_DIAGONAL_FAN
-                                                                      : THERMAL_MODEL_DIAGONAL)
-               : p->orthogonal_fan_uw_per_k > p->orthogonal_uw_per_k ? THERMAL_MODEL_ORTHOGONAL_FAN
-                                                                     : THERMAL_MODEL_ORTHOGONAL;
-        if (conduction > CONDUCTANCE_MAX) {
-            return THERMAL_MODEL_ERROR_OVERFLOW;
-        }
-        uint32_t total = loss + conduction + p->wake_uw_per_k + radiation_slope(p);
-        if (total > CONDUCTANCE_SUM_MAX) {
-            if (loss > conduction) {
-                *bad = forced > natural ? THERMAL_MODEL_LOSS_FAN : THERMAL_MODEL_LOSS;
+        if (diagonal > orthogonal) {
+            if (p->diagonal_fan_uw_per_k > p->diagonal_uw_per_k) {
+                REFUSE(OVERFLOW, DIAGONAL_FAN);
             }
-            return THERMAL_MODEL_ERROR_OVERFLOW;
+            REFUSE(OVERFLOW, DIAGONAL);
         }
-        *bad = THERMAL_MODEL_STEP;
-        /* step G <= C / 2 */
-        if (fixed_point_multiply_divide(total, p->step_ms, 500u) > spring_capacity(p, i)) {
-            return THERMAL_MODEL_ERROR_UNSTABLE;
+        if (p->orthogonal_fan_uw_per_k > p->orthogonal_uw_per_k) {
+            REFUSE(OVERFLOW, ORTHOGONAL_FAN);
         }
+        REFUSE(OVERFLOW, ORTHOGONAL);
     }
-    if (p->plate_coupling_uw_per_k > 0) {
-        *bad = THERMAL_MODEL_PLATE_HEAT_CAPACITY;
-        if (p->plate_heat_capacity_mj_per_k == 0) {
-            return THERMAL_MODEL_ERROR_RANGE;
-        }
-        uint32_t total = (uint32_t)p->plate_coupling_uw_per_k * count + p->plate_loss_uw_per_k;
-        if (fixed_point_multiply_divide(total, p->step_ms, 500000u) >
-            p->plate_heat_capacity_mj_per_k) {
-            return THERMAL_MODEL_ERROR_UNSTABLE;
-        }
+    if ((total * p->step_ms + 499u) / 500u > spring_capacity(p, i)) { /* step G <= C / 2 */
+        REFUSE(UNSTABLE, STEP);
     }
-    return THERMAL_MODEL_OK;
+    return 0;
+}
+
+static refusal_t check_plate(const thermal_model_parameters_t *p)
+{
+    if (p->plate_coupling_uw_per_k == 0) {
+        return 0;
+    }
+    if (p->plate_heat_capacity_mj_per_k == 0) {
+        REFUSE(RANGE, PLATE_HEAT_CAPACITY);
+    }
+    const uint32_t total = plate_conductance(p);
+    if ((total * p->step_ms + 499999u) / 500000u > p->plate_heat_capacity_mj_per_k) {
+        REFUSE(UNSTABLE, PLATE_HEAT_CAPACITY);
+    }
+    return 0;
+}
+
+static refusal_t check(const thermal_model_parameters_t *p)
+{
+    refusal_t refusal = check_array(p);
+    if (refusal == 0) {
+        refusal = check_phase(p);
+    }
+    for (uint8_t i = 0; refusal == 0 && i < (uint8_t)(p->rows * p->columns); i++) {
+        refusal = check_spring(p, i);
+    }
+    return refusal != 0 ? refusal : check_plate(p);
 }
 
 /* The node leads (see thermal_model.c) where a step is short against its own time; else its own
@@ -320,7 +342,7 @@ static void slow_node(thermal_model_slow_node_t *node, uint32_t capacity_mj_per_
     /* 24 bits of 4 uW hold 33 W: for a few springs; of 64 uW for many */
     uint32_t steps = (uint32_t)step_ms << (many ? 4 : 0);
     /* 4e-6 2^23 2^16 step[ms] 1e-3 / (capacity[uJ/K] 1e-6) */
-    node->gain = fixed_point_multiply_divide(2199023256u, steps, capacity);
+    node->gain = fixed_point_multiply_divide(STEP_GAIN_UJ_PER_MS, steps, capacity);
     node->wide = node->gain > GAIN_MAX;
     if (node->wide) {
         node->gain = fixed_point_multiply_divide(8589935u, steps, capacity);
@@ -341,25 +363,45 @@ static uint16_t slope_factor(uint32_t width_c7)
     return (uint16_t)(factor > 65535u ? 65535u : factor);
 }
 
+static void derive_springs(thermal_model_t *model)
+{
+    const thermal_model_parameters_t *p = &model->parameters;
+    const bool tall = p->rows >= p->columns;
+    const uint8_t along_row = tall ? 1 : THERMAL_MODEL_FRAME_STRIDE;
+    const uint8_t along_column = tall ? THERMAL_MODEL_FRAME_STRIDE : 1;
+    const bool by_row = (p->wake_direction & 1u) != 0; /* south, north */
+    const bool rises = p->wake_direction < THERMAL_MODEL_WAKE_WEST;
+    const int8_t upstream = (int8_t)(by_row ? along_column : along_row);
+    model->wake_offset = rises ? (int8_t)-upstream : upstream;
+    for (uint8_t i = 0; i < model->pass.count; i++) {
+        thermal_model_spring_t *spring = &model->spring[i];
+        const uint16_t scale = p->loss_scale_permille[i];
+        const place_t place = place_of(p, i);
+        spring->step_gain =
+            fixed_point_multiply_divide(STEP_GAIN_UJ_PER_MS, p->step_ms, spring_capacity(p, i));
+        spring->loss_natural = (uint16_t)scaled_loss(p->loss_uw_per_k, scale);
+        spring->loss_fan = (uint16_t)scaled_loss(p->loss_fan_uw_per_k, scale);
+        /* 1024 / 1e6 */
+        spring->loss_rise_natural =
+            (uint16_t)(((uint32_t)spring->loss_natural * p->loss_rise_ppm_per_k * 16u + 7812u) /
+                       15625u);
+        spring->orthogonals = place.orthogonals & 7u;
+        spring->diagonals = place.diagonals & 7u;
+        const uint8_t at = by_row ? place.row : place.column;
+        const uint8_t last = (uint8_t)((by_row ? p->rows : p->columns) - 1u);
+        spring->upstream = at != (rises ? 0 : last);
+        spring->frame =
+            (thermal_model_place_t)(place.row * along_column + place.column * along_row);
+        spring->block_offset =
+            (int16_t)((const char *)&model->lead[spring->frame] - (const char *)spring);
+    }
+}
+
 static void derive(thermal_model_t *model)
 {
     const thermal_model_parameters_t *p = &model->parameters;
     model->pass.count = (uint8_t)(p->rows * p->columns);
-    for (uint8_t i = 0; i < model->pass.count; i++) {
-        thermal_model_spring_t *spring = &model->spring[i];
-        uint32_t scale = p->loss_scale_permille[i];
-        spring->step_gain =
-            fixed_point_multiply_divide(2199023256u, p->step_ms, spring_capacity(p, i));
-        spring->loss_natural =
-            (uint16_t)fixed_point_multiply_divide(p->loss_uw_per_k, scale, 1000u);
-        spring->loss_fan =
-            (uint16_t)fixed_point_multiply_divide(p->loss_fan_uw_per_k, scale, 1000u);
-        spring->loss_rise_natural = (uint16_t)fixed_point_multiply_divide(
-            p->loss_uw_per_k * scale, (uint32_t)p->loss_rise_ppm_per_k * 1024u, 1000000000u);
-        uint8_t diagonals;
-        spring->orthogonals = neighbours_of(p, i, &diagonals) & 7u;
-        spring->diagonals = diagonals & 7u;
-    }
+    derive_springs(model);
     model->latent_full_c23 = (int32_t)fixed_point_multiply_divide((uint32_t)p->latent_heat_mj << 10,
                                                                   8192u, p->heat_capacity_mj_per_k);
     int16_t highest_c7 = (int16_t)(255 * 128 - (int16_t)(model->latent_full_c23 >> 16));
@@ -376,47 +418,19 @@ static void derive(thermal_model_t *model)
     model->heating_slope = slope_factor(heating);
     model->cooling_slope = slope_factor(cooling);
     model->pass.flags = p->loss_rise_ppm_per_k != 0 ? PASS_RISES : 0;
-    /* 1e-8 m2 sigma 512^4 K^4 64e6 / 2^16 = 0.0380535 a unit of area */
+    /* 1e-8 m2 sigma 512^4 K^4 64e6 / 2^16 = 0.0380535 a unit of area, to 1e-6 */
     model->radiation_factor =
-        (uint16_t)fixed_point_multiply_divide(p->radiating_area_cmm2, 380535u, 10000000u);
+        (uint16_t)((p->radiating_area_cmm2 * (uint32_t)39902 + 0x80000u) >> 20);
 
     uint32_t loss_sum = 0;
     for (uint8_t i = 0; i < model->pass.count; i++) {
-        loss_sum += (uint32_t)p->loss_scale_permille[i] *
-                    larger(p->loss_uw_per_k, p->loss_fan_uw_per_k) / 1000u;
+        const thermal_model_spring_t *spring = &model->spring[i];
+        loss_sum += larger(spring->loss_natural, spring->loss_fan);
     }
     slow_node(&model->air, p->air_heat_capacity_mj_per_k, loss_sum + p->air_exchange_uw_per_k,
               p->air_exchange_uw_per_k, p->step_ms, model->pass.count);
-    slow_node(&model->plate, p->plate_heat_capacity_mj_per_k,
-              (uint32_t)p->plate_coupling_uw_per_k * model->pass.count + p->plate_loss_uw_per_k,
+    slow_node(&model->plate, p->plate_heat_capacity_mj_per_k, plate_conductance(p),
               p->plate_loss_uw_per_k, p->step_ms, model->pass.count);
-
-    bool tall = p->rows >= p->columns;
-    int8_t along_row = tall ? 1 : THERMAL_MODEL_FRAME_STRIDE;
-    int8_t along_column = tall ? THERMAL_MODEL_FRAME_STRIDE : 1;
-    for (uint8_t i = 0; i < model->pass.count; i++) {
-        model->spring[i].frame =
-            (thermal_model_place_t)((uint16_t)(i / p->columns) * (uint8_t)along_column +
-                                    (uint16_t)(i % p->columns) * (uint8_t)along_row);
-        model->spring[i].block_offset =
-            (int16_t)((int32_t)(offsetof(thermal_model_t, lead) + 2u * model->spring[i].frame) -
-                      (int32_t)(offsetof(thermal_model_t, spring) +
-                                i * sizeof(thermal_model_spring_t)));
-    }
-    for (uint8_t i = 0; i < model->pass.count; i++) {
-        uint8_t row = (uint8_t)(i / p->columns);
-        uint8_t column = (uint8_t)(i % p->columns);
-        const bool upstream = p->wake_direction == THERMAL_MODEL_WAKE_EAST    ? column > 0
-                              : p->wake_direction == THERMAL_MODEL_WAKE_SOUTH ? row > 0
-                              : p->wake_direction == THERMAL_MODEL_WAKE_WEST
-                                  ? column + 1 < p->columns
-                                  : row + 1 < p->rows;
-        model->spring[i].upstream = upstream ? 1u : 0u;
-    }
-    model->wake_offset = p->wake_direction == THERMAL_MODEL_WAKE_EAST    ? (int8_t)-along_row
-                         : p->wake_direction == THERMAL_MODEL_WAKE_SOUTH ? (int8_t)-along_column
-                         : p->wake_direction == THERMAL_MODEL_WAKE_WEST  ? along_row
-                                                                         : along_column;
 }
 
 /* natural + (forced - natural) fan, fan in Q2.14 */
@@ -453,23 +467,15 @@ thermal_model_status_t thermal_model_init(thermal_model_t *model,
                                           const thermal_model_parameters_t *parameters,
                                           thermal_model_parameter_t *bad)
 {
-    thermal_model_parameter_t refused = THERMAL_MODEL_PARAMETER_COUNT;
-    thermal_model_status_t status = check_array(parameters, &refused);
-    if (status == THERMAL_MODEL_OK) {
-        status = check_phase(parameters, &refused);
-    }
-    if (status == THERMAL_MODEL_OK) {
-        status = check_flows(parameters, &refused);
-    }
-    if (status != THERMAL_MODEL_OK) {
+    const refusal_t refusal = check(parameters);
+    if (refusal != 0) {
         if (bad != NULL) {
-            *bad = refused;
+            *bad = (thermal_model_parameter_t)(refusal >> 8);
         }
-        return status;
+        return (thermal_model_status_t)(-(int)(refusal & 0xFFu));
     }
-    thermal_model_parameters_t copy = *parameters; /* may be the model's own */
-    memset(model, 0, sizeof *model);
-    model->parameters = copy;
+    memmove(&model->parameters, parameters, sizeof *parameters); /* may be the model's own */
+    memset(model, 0, offsetof(thermal_model_t, parameters));
     derive(model);
     thermal_model_apply_fan(model);
     model->ambient_c7 = 20 * 128;

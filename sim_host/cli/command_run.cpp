@@ -88,9 +88,7 @@ std::string set_chip(const scenario &plan, const plant_t *plant, settings_t &set
         case SETTINGS_UNKNOWN_NAME: {
             std::vector<std::string> names;
             for (std::uint8_t k = 0; k < settings_count(); ++k) {
-                settings_entry_t known{};
-                settings_entry(k, &known);
-                names.emplace_back(known.name);
+                names.emplace_back(settings_name(k));
             }
             throw entry.key_place.error(
                 fmt::format("the chip has no setting {}{}; the console's $$ "
@@ -110,7 +108,7 @@ std::string set_chip(const scenario &plan, const plant_t *plant, settings_t &set
             const double scale = std::pow(10.0, known.decimals);
             throw entry.place.error(fmt::format("${} is {}; it must be {} to {} {}", entry.key,
                                                 in_quotes(entry.value), known.minimum / scale,
-                                                known.maximum / scale, known.unit));
+                                                known.maximum / scale, settings_unit(index)));
         }
         }
     }

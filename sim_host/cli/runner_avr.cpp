@@ -168,8 +168,8 @@ private:
                 }
                 char text[TEXT_DECIMAL_SIZE];
                 text_format_decimal(value, entry.decimals, text);
-                set(entry.count == 1 ? std::string(entry.name)
-                                     : fmt::format("{}_{}", entry.name, element + 1),
+                set(entry.count == 1 ? std::string(settings_name(k))
+                                     : fmt::format("{}_{}", settings_name(k), element + 1),
                     text);
             }
         }

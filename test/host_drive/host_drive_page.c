@@ -36,8 +36,9 @@ static void every_setting_of_the_policy_is_there_with_unit_and_default(void)
             value /= 10.0;
         }
         char wanted[120];
-        (void)snprintf(wanted, sizeof wanted, "| `%s` |%s%s | %.*f |", entry.name,
-                       entry.unit[0] != '\0' ? " " : "", entry.unit, (int)entry.decimals, value);
+        (void)snprintf(wanted, sizeof wanted, "| `%s` |%s%s | %.*f |", settings_name(k),
+                       settings_unit(k)[0] != '\0' ? " " : "", settings_unit(k),
+                       (int)entry.decimals, value);
         TEST_ASSERT_NOT_NULL_MESSAGE(strstr(page, wanted), wanted);
         found++;
     }

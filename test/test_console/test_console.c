@@ -474,8 +474,8 @@ static void documentation_names_every_error_fault_setting_and_word(void)
         print_decimal(value, settings_get(&defaults, i, 0), entry.decimals);
         print_decimal(least, entry.minimum, entry.decimals);
         print_decimal(most, entry.maximum, entry.decimals);
-        snprintf(wanted, sizeof wanted, "| `%s%s` | %s | %s | %s .. %s |", entry.name,
-                 entry.count > 1 ? "_K" : "", entry.unit, value, least, most);
+        snprintf(wanted, sizeof wanted, "| `%s%s` | %s | %s | %s .. %s |", settings_name(i),
+                 entry.count > 1 ? "_K" : "", settings_unit(i), value, least, most);
         TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, wanted), wanted);
     }
     ask("help");

@@ -104,11 +104,12 @@ static void defaults_lie_within_the_limits_and_names_are_unique(void)
         char name[SETTINGS_NAME_SIZE + 4];
         for (uint8_t k = 0; k < entry.count; k++) {
             const int32_t value = settings_get(&settings, i, k);
-            TEST_ASSERT_TRUE_MESSAGE(value >= entry.minimum && value <= entry.maximum, entry.name);
+            TEST_ASSERT_TRUE_MESSAGE(value >= entry.minimum && value <= entry.maximum,
+                                     settings_name(i));
             if (entry.count > 1) {
-                snprintf(name, sizeof name, "%s_%d", entry.name, k + 1);
+                snprintf(name, sizeof name, "%s_%d", settings_name(i), k + 1);
             } else {
-                snprintf(name, sizeof name, "%s", entry.name);
+                snprintf(name, sizeof name, "%s", settings_name(i));
             }
             TEST_ASSERT_TRUE_MESSAGE(settings_find(name, &index, &element), name);
             TEST_ASSERT_EQUAL_MESSAGE(i, index, name);
@@ -131,9 +132,9 @@ static void every_byte_of_the_controller_settings_is_in_the_table(void)
     unsigned count = 0;
     for (uint8_t i = 0; i < settings_count(); i++) {
         settings_entry(i, &entry);
-        const uint8_t width = entry.type == SETTINGS_U8 ? 1 : entry.type == SETTINGS_U32 ? 4 : 2;
+        const uint8_t width = entry.type == PARAMETER_U8 ? 1 : entry.type == PARAMETER_U32 ? 4 : 2;
         for (unsigned b = 0; b < (unsigned)width * entry.count; b++) {
-            TEST_ASSERT_FALSE_MESSAGE(covered[entry.offset + b], entry.name);
+            TEST_ASSERT_FALSE_MESSAGE(covered[entry.offset + b], settings_name(i));
             covered[entry.offset + b] = true;
         }
     }
@@ -191,7 +192,7 @@ static void offset_names_the_setting(void)
     TEST_ASSERT_TRUE(settings_find_offset(
         (uint16_t)offsetof(controller_settings_t, model.loss_scale_permille[3]), &index, &element));
     settings_entry(index, &entry);
-    TEST_ASSERT_EQUAL_STRING("loss_scale", entry.name);
+    TEST_ASSERT_EQUAL_STRING("loss_scale", settings_name(index));
     TEST_ASSERT_EQUAL_UINT8(3, element);
     TEST_ASSERT_FALSE(settings_find_offset(60000, &index, &element));
 }

@@ -64,9 +64,10 @@ int chip_export(const plant_t *plant, char *text, size_t text_size, char *messag
             char line[SETTINGS_NAME_SIZE + TEXT_DECIMAL_SIZE + 8];
             (void)text_format_decimal(settings_get(&settings, k, element), entry.decimals, value);
             if (entry.count > 1) {
-                (void)snprintf(line, sizeof line, "$%s_%u=%s\n", entry.name, element + 1u, value);
+                (void)snprintf(line, sizeof line, "$%s_%u=%s\n", settings_name(k), element + 1u,
+                               value);
             } else {
-                (void)snprintf(line, sizeof line, "$%s=%s\n", entry.name, value);
+                (void)snprintf(line, sizeof line, "$%s=%s\n", settings_name(k), value);
             }
             if (!append(text, text_size, &used, line)) {
                 return -10;
