@@ -47,9 +47,8 @@ static void answer(const console_t *console, console_error_t error)
     if (error == CONSOLE_OK) {
         text_add_flash(&out.line, FLASH_TEXT("ok"));
     } else {
-        text_add_flash(&out.line, FLASH_TEXT("error:"));
-        text_add_decimal(&out.line, error, 0);
-        text_add_char(&out.line, ' ');
+        const int32_t number = (int32_t)error;
+        text_add_values(&out.line, FLASH_TEXT("error:#0 "), &number);
         text_add_flash(&out.line, console_error_text(error));
     }
     out_end(console, &out);
@@ -73,9 +72,8 @@ static void add_setting_name(text_line_t *line, uint8_t index, uint8_t element)
 
 static void add_spring(text_line_t *line, uint8_t spring)
 {
-    text_add_flash(line, FLASH_TEXT("spring "));
-    text_add_decimal(line, spring + 1, 0);
-    text_add_flash(line, FLASH_TEXT(": "));
+    const int32_t number = spring + 1;
+    text_add_values(line, FLASH_TEXT("spring #0: "), &number);
 }
 
 /* --- settings ------------------------------------------------------------------------------- */
@@ -407,20 +405,6 @@ static console_error_t word_selftest(console_t *console, const arguments_t *argu
     return error;
 }
 
-static console_error_t word_help(console_t *console, const arguments_t *arguments)
-{
-    (void)arguments;
-    start_job(console, JOB_HELP);
-    return CONSOLE_OK;
-}
-
-static console_error_t word_version(console_t *console, const arguments_t *arguments)
-{
-    (void)arguments;
-    start_job(console, JOB_VERSION);
-    return CONSOLE_OK;
-}
-
 static console_error_t word_model(console_t *console, const arguments_t *arguments)
 {
     if (arguments->count == 0) {
@@ -438,44 +422,48 @@ static console_error_t word_model(console_t *console, const arguments_t *argumen
     return CONSOLE_OK;
 }
 
-static console_error_t word_faults(console_t *console, const arguments_t *arguments)
-{
-    (void)arguments;
-    start_job(console, JOB_FAULTS);
-    return CONSOLE_OK;
-}
-
-/* X(word, least arguments, most arguments, usage after the word) */
+/* X(word, least arguments, most arguments, job or NONE, function or NULL, usage after the word) */
 #define WORDS(X)                                                                                   \
-    X(help, 0, 0, "  this list")                                                                   \
-    X(version, 0, 0, "  what runs here, why it started, how it is doing")                          \
-    X(on, 1, 2, " K|all [0..100]  drive a spring or all, at a level in percent")                   \
-    X(off, 1, 1, " K|all")                                                                         \
-    X(pattern, 1, 1, " 111101111  all springs at once, row by row")                                \
-    X(policy, 1, 1, " open|precompensate")                                                         \
-    X(fan, 1, 1, " 0..100  in percent")                                                            \
-    X(ambient, 1, 1, " C  air temperature, where no sensor measures it")                           \
-    X(model, 0, 1, " [cold]  temperatures as the model has them; cold: at ambient")                \
-    X(faults, 0, 0, "  what is latched")                                                           \
-    X(clear, 0, 0, "  forget faults; all springs off")                                             \
-    X(unlock, 0, 0, "  after a watchdog or brown-out reset")                                       \
-    X(selftest, 0, 0, "  each sensor, and each spring with 0.3 A")                                 \
-    X(telemetry, 1, 2, " off|csv|teleplot [1..50]  lines per second")
+    X(help, 0, 0, HELP, NULL, "  this list")                                                       \
+    X(version, 0, 0, VERSION, NULL, "  what runs here, why it started, how it is doing")           \
+    X(on, 1, 2, NONE, word_on, " K|all [0..100]  drive a spring or all, at a level in percent")    \
+    X(off, 1, 1, NONE, word_off, " K|all")                                                         \
+    X(pattern, 1, 1, NONE, word_pattern, " 111101111  all springs at once, row by row")            \
+    X(policy, 1, 1, NONE, word_policy, " open|precompensate")                                      \
+    X(fan, 1, 1, NONE, word_fan, " 0..100  in percent")                                            \
+    X(ambient, 1, 1, NONE, word_ambient, " C  air temperature, where no sensor measures it")       \
+    X(model, 0, 1, NONE, word_model,                                                               \
+      " [cold]  temperatures as the model has them; cold: at ambient")                             \
+    X(faults, 0, 0, FAULTS, NULL, "  what is latched")                                             \
+    X(clear, 0, 0, NONE, word_clear, "  forget faults; all springs off")                           \
+    X(unlock, 0, 0, NONE, word_unlock, "  after a watchdog or brown-out reset")                    \
+    X(selftest, 0, 0, NONE, word_selftest, "  each sensor, and each spring with 0.3 A")            \
+    X(telemetry, 1, 2, NONE, word_telemetry, " off|csv|teleplot [1..50]  lines per second")
 
-#define WORD_USAGE(word, least, most, usage) static const char usage_##word[] FLASH_MEMORY = usage;
-WORDS(WORD_USAGE)
+#define WORD_TEXT(word, least, most, job, function, usage) #word usage "\0"
+static const char word_texts[] FLASH_MEMORY = WORDS(WORD_TEXT);
 
 typedef struct {
-    char word[10];
     uint8_t least; /* arguments */
     uint8_t most;
+    uint8_t job; /* job_t that it starts, or JOB_NONE and a function */
     console_error_t (*function)(console_t *console, const arguments_t *arguments);
-    const char *usage; /* in flash */
 } word_t;
 
-#define WORD_ROW(word, least, most, usage) {#word, least, most, word_##word, usage_##word},
+#define WORD_ROW(word, least, most, job, function, usage) {least, most, JOB_##job, function},
 static const word_t words[] FLASH_MEMORY = {WORDS(WORD_ROW)};
 #define WORD_COUNT ((uint8_t)(sizeof words / sizeof words[0]))
+
+/* text, in flash, begins with this word and a blank. */
+static bool begins_with(const char *text, const char *word)
+{
+    for (; *word != '\0'; text++, word++) {
+        if (*word != (char)flash_byte(text)) {
+            return false;
+        }
+    }
+    return flash_byte(text) == ' ';
+}
 
 static console_error_t execute(console_t *console)
 {
@@ -495,11 +483,12 @@ static console_error_t execute(console_t *console)
         }
         given++;
     }
-    for (uint8_t i = 0; i < WORD_COUNT; i++) {
-        flash_copy(&word, &words[i], sizeof word);
-        if (strcmp(name, word.word) != 0) {
+    const char *text = word_texts;
+    for (uint8_t i = 0; i < WORD_COUNT; i++, text = text_item(text, 1)) {
+        if (!begins_with(text, name)) {
             continue;
         }
+        flash_copy(&word, &words[i], sizeof word);
         if (given < word.least) {
             return CONSOLE_ERROR_MISSING_ARGUMENT;
         }
@@ -507,6 +496,10 @@ static console_error_t execute(console_t *console)
             return CONSOLE_ERROR_SURPLUS_ARGUMENT;
         }
         arguments.count = given;
+        if (word.job != JOB_NONE) {
+            start_job(console, (job_t)word.job);
+            return CONSOLE_OK;
+        }
         return word.function(console, &arguments);
     }
     return CONSOLE_ERROR_UNKNOWN_WORD;
@@ -516,22 +509,17 @@ static console_error_t execute(console_t *console)
 
 static bool help_line(const console_t *console, out_t *out)
 {
-    static const char more[4][56] FLASH_MEMORY = {
-        "$$  all settings   $NAME  one   $NAME=VALUE  set it",
-        "$save  keep them   $defaults  the built-in ones",
-        "!  all springs off at once, at any moment",
-        "?  one line of status, at any moment",
-    };
-    word_t word;
+    static const char more[] FLASH_MEMORY = "$$  all settings   $NAME  one   $NAME=VALUE  set it\0"
+                                            "$save  keep them   $defaults  the built-in ones\0"
+                                            "!  all springs off at once, at any moment\0"
+                                            "?  one line of status, at any moment";
     if (console->step < WORD_COUNT) {
-        flash_copy(&word, &words[console->step], sizeof word);
-        text_add(&out->line, word.word);
-        text_add_flash(&out->line, word.usage);
+        text_add_flash(&out->line, text_item(word_texts, console->step));
         return true;
     }
     const uint8_t rest = (uint8_t)(console->step - WORD_COUNT);
     if (rest < 4u) {
-        text_add_flash(&out->line, more[rest]);
+        text_add_flash(&out->line, text_item(more, rest));
         return true;
     }
     return false;
@@ -542,20 +530,15 @@ static const char *loaded_text(const console_status_t *status)
     if (status->settings_conflict_at_boot) {
         return FLASH_TEXT("stored ones do not fit together, defaults are active");
     }
-    switch (status->loaded) {
-    case SETTINGS_LOADED:
-        return FLASH_TEXT("loaded");
-    case SETTINGS_LOADED_MIGRATED:
-        return FLASH_TEXT("loaded from an earlier version, new ones are at their defaults");
-    case SETTINGS_LOADED_OTHER:
-        return FLASH_TEXT("loaded; the other copy is damaged or was cut short");
-    case SETTINGS_EMPTY:
-        return FLASH_TEXT("none saved, defaults");
-    case SETTINGS_FOREIGN:
-        return FLASH_TEXT("stored by another version, defaults");
-    default:
-        return FLASH_TEXT("stored ones damaged, defaults");
-    }
+    /* as settings_loaded_t has them */
+    static const char texts[] FLASH_MEMORY =
+        "loaded\0"
+        "loaded from an earlier version, new ones are at their defaults\0"
+        "loaded; the other copy is damaged or was cut short\0"
+        "none saved, defaults\0"
+        "stored ones damaged, defaults\0"
+        "stored by another version, defaults";
+    return text_item(texts, (uint8_t)status->loaded);
 }
 
 static bool version_line(const console_t *console, out_t *out)
@@ -575,18 +558,15 @@ static bool version_line(const console_t *console, out_t *out)
         text_add_flash(line, FLASH_TEXT("; settings "));
         text_add_flash(line, loaded_text(status));
         return true;
-    case 2:
-        text_add_flash(line, FLASH_TEXT("ticks late "));
-        text_add_decimal(line, status->ticks_late, 0);
-        text_add_flash(line, FLASH_TEXT(", longest tick "));
-        text_add_decimal(line, status->tick_longest_us, 0);
-        text_add_flash(line, FLASH_TEXT(" us, load "));
-        text_add_decimal(line, status->load_percent, 0);
-        text_add_flash(line, FLASH_TEXT(" %, telemetry dropped "));
-        text_add_decimal(line, console->telemetry->dropped, 0);
-        text_add_flash(line, FLASH_TEXT(", stack unused "));
-        text_add_decimal(line, status->stack_unused_bytes, 0);
+    case 2: {
+        const int32_t values[] = {status->ticks_late, status->tick_longest_us, status->load_percent,
+                                  console->telemetry->dropped, status->stack_unused_bytes};
+        text_add_values(line,
+                        FLASH_TEXT("ticks late #0, longest tick #0 us, load #0 %, "
+                                   "telemetry dropped #0, stack unused #0"),
+                        values);
         return true;
+    }
     default:
         return false;
     }
@@ -602,19 +582,14 @@ static void add_limits(text_line_t *line, const controller_t *controller, uint8_
         return;
     }
     text_add_flash(line, FLASH_TEXT(", limits"));
-    for (const char *name = names; limits != 0; limits >>= 1) {
+    for (const char *name = names; limits != 0; limits >>= 1, name = text_item(name, 1)) {
         if ((limits & 1u) != 0) {
             text_add_flash(line, name);
         }
-        while (flash_byte(name) != 0) {
-            name++;
-        }
-        name++;
     }
     if (controller_cut_ma(controller, spring) != 0) {
-        text_add_flash(line, FLASH_TEXT(": "));
-        text_add_decimal(line, controller_cut_ma(controller, spring), 3);
-        text_add_flash(line, FLASH_TEXT(" A less"));
+        const int32_t cut_ma = controller_cut_ma(controller, spring);
+        text_add_values(line, FLASH_TEXT(": #3 A less"), &cut_ma);
     }
 }
 
@@ -624,36 +599,30 @@ static bool model_line(const console_t *console, out_t *out)
     text_line_t *const line = &out->line;
     const uint8_t k = console->step;
     if (k == controller_springs(controller)) {
-        text_add_flash(line, FLASH_TEXT("ambient: "));
-        text_add_decimal(line, text_centi_from_c7(console->status->ambient_c7), 2);
-        text_add_flash(line, FLASH_TEXT(" C"));
+        const int32_t ambient_cc = text_centi_from_c7(console->status->ambient_c7);
+        text_add_values(line, FLASH_TEXT("ambient: #2 C"), &ambient_cc);
         return true;
     }
     if (k > controller_springs(controller)) {
         return false;
     }
-    add_spring(line, k);
-    text_add_decimal(line, text_centi_from_c7(controller_temperature_c7(controller, k)), 2);
-    text_add_flash(line, FLASH_TEXT(" C, austenite "));
-    text_add_decimal(line, controller_austenite_permille(controller, k), 1);
-    text_add_flash(line, FLASH_TEXT(" %, "));
-    text_add_decimal(line, controller_measured_ma(controller, k), 3);
-    text_add_flash(line, FLASH_TEXT(" A, "));
-    text_add_decimal(line, controller_measured_mv(controller, k), 3);
-    text_add_flash(line, FLASH_TEXT(" V, "));
-    text_add_decimal(line, (int32_t)(controller_power_uw(controller, k) & 0x7FFFFFFFul), 6);
-    text_add_flash(line, FLASH_TEXT(" W, target "));
-    text_add_decimal(line, controller_target_ma(controller, k), 3);
-    text_add_flash(line, FLASH_TEXT(" A"));
+    const int32_t values[] = {k + 1,
+                              text_centi_from_c7(controller_temperature_c7(controller, k)),
+                              controller_austenite_permille(controller, k),
+                              controller_measured_ma(controller, k),
+                              controller_measured_mv(controller, k),
+                              (int32_t)controller_power_uw(controller, k),
+                              controller_target_ma(controller, k)};
+    text_add_values(
+        line, FLASH_TEXT("spring #0: #2 C, austenite #1 %, #3 A, #3 V, #6 W, target #3 A"), values);
     add_limits(line, controller, k);
     return true;
 }
 
 static void add_fault(text_line_t *line, safety_fault_t fault)
 {
-    text_add_flash(line, FLASH_TEXT("fault "));
-    text_add_decimal(line, fault, 0);
-    text_add_char(line, ' ');
+    const int32_t number = (int32_t)fault;
+    text_add_values(line, FLASH_TEXT("fault #0 "), &number);
     text_add_flash(line, safety_fault_name(fault));
 }
 
@@ -745,21 +714,12 @@ static uint16_t selftest_level(const console_t *console)
     return (uint16_t)((uint32_t)SELFTEST_CURRENT_MA * 1000u / full_ma);
 }
 
-static const char *sensor_text(uint8_t status)
-{
-    switch (status) {
-    case CONTROLLER_SENSOR_OK:
-        return FLASH_TEXT("sensor ok");
-    case CONTROLLER_SENSOR_ABSENT:
-        return FLASH_TEXT("sensor absent");
-    case CONTROLLER_SENSOR_BUS:
-        return FLASH_TEXT("sensor bus stuck");
-    case CONTROLLER_SENSOR_STALE:
-        return FLASH_TEXT("sensor stale");
-    default:
-        return FLASH_TEXT("sensor was reset");
-    }
-}
+/* As controller_sensor_status_t has them. */
+static const char sensor_texts[] FLASH_MEMORY = "sensor ok\0"
+                                                "sensor absent\0"
+                                                "sensor bus stuck\0"
+                                                "sensor stale\0"
+                                                "sensor was reset";
 
 /* One spring after the other is driven with a small current; then its line is printed. */
 static void selftest(console_t *console)
@@ -788,14 +748,13 @@ static void selftest(console_t *console)
     out_t out;
     out_start(&out);
     add_spring(&out.line, k);
-    text_add_flash(&out.line, sensor_text(status));
+    text_add_flash(&out.line, text_item(sensor_texts, status));
     if (fault != SAFETY_FAULT_NONE) {
         text_add_flash(&out.line, FLASH_TEXT(", "));
         add_fault(&out.line, fault);
     } else if (sound) {
-        text_add_flash(&out.line, FLASH_TEXT(", "));
-        text_add_decimal(&out.line, (int32_t)voltage_mv * 1000 / current_ma, 3);
-        text_add_flash(&out.line, FLASH_TEXT(" ohm"));
+        const int32_t resistance_mohm = (int32_t)voltage_mv * 1000 / current_ma;
+        text_add_values(&out.line, FLASH_TEXT(", #3 ohm"), &resistance_mohm);
     } else if (status == CONTROLLER_SENSOR_OK) {
         text_add_flash(&out.line, FLASH_TEXT(", too little current"));
     }
@@ -994,22 +953,16 @@ void console_print_status(const console_t *console)
                          : fault != 0                     ? FLASH_TEXT("fault")
                          : on                             ? FLASH_TEXT("on")
                                                           : FLASH_TEXT("off"));
-    text_add_flash(line, FLASH_TEXT("|t:"));
-    text_add_decimal(line, (int32_t)(console->status->time_ms & 0x7FFFFFFFul), 3);
-    text_add_flash(line, FLASH_TEXT("|sum_a:"));
-    text_add_decimal(line, sum_ma, 3);
-    text_add_flash(line, FLASH_TEXT("|hottest_c:"));
-    text_add_decimal(line, text_centi_from_c7(hottest_c7), 2);
-    text_add_char(line, '@');
-    text_add_decimal(line, hottest + 1, 0);
-    text_add_flash(line, FLASH_TEXT("|fan:"));
-    text_add_decimal(line, controller_fan_percent(controller), 0);
-    text_add_flash(line, FLASH_TEXT("|fault:"));
-    text_add_decimal(line, fault, 0);
-    text_add_flash(line, FLASH_TEXT("|late:"));
-    text_add_decimal(line, console->status->ticks_late, 0);
-    text_add_flash(line, FLASH_TEXT("|load:"));
-    text_add_decimal(line, console->status->load_percent, 0);
-    text_add_char(line, '>');
+    const int32_t values[] = {(int32_t)(console->status->time_ms & 0x7FFFFFFFul),
+                              sum_ma,
+                              text_centi_from_c7(hottest_c7),
+                              hottest + 1,
+                              controller_fan_percent(controller),
+                              fault,
+                              console->status->ticks_late,
+                              console->status->load_percent};
+    text_add_values(line,
+                    FLASH_TEXT("|t:#3|sum_a:#3|hottest_c:#2@#0|fan:#0|fault:#0|late:#0|load:#0>"),
+                    values);
     out_end(console, &out);
 }

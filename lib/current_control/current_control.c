@@ -20,16 +20,17 @@
 
 void current_control_parameters_default(current_control_parameters_t *parameters)
 {
-    *parameters = (current_control_parameters_t){.supply_mv = 5000,
-                                                 .freewheel_mv = 0,
-                                                 .shunt_mohm = 100,
-                                                 .wiring_mohm = 80,
-                                                 .integral_permille = 600,
-                                                 .slew_ma_per_tick = 120,
-                                                 .maximum_current_ma = 3000,
-                                                 .maximum_duty_steps = 760,
-                                                 .trim_limit_mohm = 150,
-                                                 .hold_ticks = 10};
+    static const current_control_parameters_t usual FLASH_MEMORY = {.supply_mv = 5000,
+                                                                    .freewheel_mv = 0,
+                                                                    .shunt_mohm = 100,
+                                                                    .wiring_mohm = 80,
+                                                                    .integral_permille = 600,
+                                                                    .slew_ma_per_tick = 120,
+                                                                    .maximum_current_ma = 3000,
+                                                                    .maximum_duty_steps = 760,
+                                                                    .trim_limit_mohm = 150,
+                                                                    .hold_ticks = 10};
+    flash_copy(parameters, &usual, sizeof usual);
 }
 
 #define RANGE(field, type, minimum, maximum)                                                       \

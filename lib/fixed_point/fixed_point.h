@@ -237,9 +237,8 @@ static inline int32_t fixed_point_add_saturated(int32_t a, int32_t b)
 #endif
 }
 
-/* a b / c rounded to the nearest, in 32-bit steps; UINT32_MAX where that does
- * not fit or c is 0 or above 2^31. O(32) additions: for start-up, not for the
- * tick. */
+/* a b / c rounded to the nearest, without a 64-bit division; UINT32_MAX where that does
+ * not fit or c is 0 or above 2^31. 32 shifts: for start-up, not for the tick. */
 uint32_t fixed_point_multiply_divide(uint32_t a, uint32_t b, uint32_t c);
 
 #ifdef __cplusplus

@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "fixed_point.h"
-#include "flash_memory.h"
+#include "text.h"
 
 #define TICKS_PER_SECOND 50
 #define QUICK_LIMIT_MOHM 999u
@@ -30,15 +30,16 @@ const safety_ranges_t safety_ranges FLASH_MEMORY = {RANGE(over_current_ma, U16, 
 
 void safety_parameters_default(safety_parameters_t *parameters)
 {
-    *parameters = (safety_parameters_t){.over_current_ma = 3150,
-                                        .supply_limit_ma = 15000,
-                                        .check_current_ma = 300,
-                                        .resistance_minimum_mohm = 80,
-                                        .resistance_maximum_mohm = 500,
-                                        .stuck_on_ma = 100,
-                                        .temperature_trip_cc = 13000,
-                                        .maximum_on_s = 0,
-                                        .bad_samples = 5};
+    static const safety_parameters_t usual FLASH_MEMORY = {.over_current_ma = 3150,
+                                                           .supply_limit_ma = 15000,
+                                                           .check_current_ma = 300,
+                                                           .resistance_minimum_mohm = 80,
+                                                           .resistance_maximum_mohm = 500,
+                                                           .stuck_on_ma = 100,
+                                                           .temperature_trip_cc = 13000,
+                                                           .maximum_on_s = 0,
+                                                           .bad_samples = 5};
+    flash_copy(parameters, &usual, sizeof usual);
 }
 
 bool safety_check(const safety_parameters_t *p, uint16_t *bad)
@@ -249,41 +250,23 @@ safety_fault_t safety_board_fault(const safety_t *safety)
 
 const char *safety_fault_name(safety_fault_t fault)
 {
-    switch (fault) {
-    case SAFETY_FAULT_NONE:
-        return FLASH_TEXT("none");
-    case SAFETY_FAULT_OVER_CURRENT:
-        return FLASH_TEXT("over_current");
-    case SAFETY_FAULT_OPEN_SPRING:
-        return FLASH_TEXT("open_spring");
-    case SAFETY_FAULT_SHORT_SPRING:
-        return FLASH_TEXT("short_spring");
-    case SAFETY_FAULT_HIGH_RESISTANCE:
-        return FLASH_TEXT("high_resistance");
-    case SAFETY_FAULT_SENSOR_ABSENT:
-        return FLASH_TEXT("sensor_absent");
-    case SAFETY_FAULT_SENSOR_BUS:
-        return FLASH_TEXT("sensor_bus");
-    case SAFETY_FAULT_SENSOR_STALE:
-        return FLASH_TEXT("sensor_stale");
-    case SAFETY_FAULT_SENSOR_RESET:
-        return FLASH_TEXT("sensor_reset");
-    case SAFETY_FAULT_OVER_TEMPERATURE:
-        return FLASH_TEXT("over_temperature");
-    case SAFETY_FAULT_ON_TIME:
-        return FLASH_TEXT("on_time");
-    case SAFETY_FAULT_STUCK_ON:
-        return FLASH_TEXT("stuck_on");
-    case SAFETY_FAULT_SUPPLY_CURRENT:
-        return FLASH_TEXT("supply_current");
-    case SAFETY_FAULT_EMERGENCY_STOP:
-        return FLASH_TEXT("emergency_stop");
-    case SAFETY_FAULT_LIMIT_TRIP:
-        return FLASH_TEXT("limit_trip");
-    case SAFETY_FAULT_COUNT:
-        break;
-    }
-    return FLASH_TEXT("unknown");
+    static const char names[] FLASH_MEMORY = "none\0"
+                                             "over_current\0"
+                                             "open_spring\0"
+                                             "short_spring\0"
+                                             "high_resistance\0"
+                                             "sensor_absent\0"
+                                             "sensor_bus\0"
+                                             "sensor_stale\0"
+                                             "sensor_reset\0"
+                                             "over_temperature\0"
+                                             "on_time\0"
+                                             "stuck_on\0"
+                                             "supply_current\0"
+                                             "emergency_stop\0"
+                                             "limit_trip\0"
+                                             "unknown";
+    return text_item(names, (uint8_t)(fault < SAFETY_FAULT_COUNT ? fault : SAFETY_FAULT_COUNT));
 }
 
 void safety_clear(safety_t *safety)

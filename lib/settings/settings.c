@@ -215,20 +215,9 @@ void settings_entry(uint8_t index, settings_entry_t *entry)
     entry->maximum = parameter_maximum(&range);
 }
 
-static const char *next_name(const char *name)
-{
-    while (flash_byte(name++) != '\0') {
-    }
-    return name;
-}
-
 const char *settings_name(uint8_t index)
 {
-    const char *name = (const char *)&names;
-    while (index-- > 0) {
-        name = next_name(name);
-    }
-    return name;
+    return text_item((const char *)&names, index);
 }
 
 #define UNIT(name, unit, ...) UNIT_##unit,
@@ -244,7 +233,7 @@ uint16_t settings_fingerprint(uint8_t entries)
     settings_entry_t entry;
     const char *name = (const char *)&names;
     for (uint8_t i = 0; i < entries; i++) {
-        for (const char *const end = next_name(name); name < end; name++) {
+        for (const char *const end = text_item(name, 1); name < end; name++) {
             crc = crc16_add(crc, flash_byte(name));
         }
         settings_entry(i, &entry);
@@ -289,7 +278,7 @@ bool settings_find(const char *name, uint8_t *index, uint8_t *element)
 {
     settings_entry_t entry;
     const char *known = (const char *)&names;
-    for (uint8_t i = 0; i < TABLE_COUNT; i++, known = next_name(known)) {
+    for (uint8_t i = 0; i < TABLE_COUNT; i++, known = text_item(known, 1)) {
         const char *const rest = after_name(name, known);
         if (rest == NULL) {
             continue;

@@ -55,8 +55,8 @@ static void add_state(text_line_t *line, const controller_t *controller)
 {
     const uint8_t fault = first_fault(controller);
     if (fault != 0) {
-        text_add_flash(line, FLASH_TEXT("fault_"));
-        text_add_decimal(line, fault, 0);
+        const int32_t value = fault;
+        text_add_values(line, FLASH_TEXT("fault_#0"), &value);
     } else {
         text_add_flash(line,
                        controller_is_locked(controller) ? FLASH_TEXT("locked") : FLASH_TEXT("ok"));
@@ -76,21 +76,15 @@ static void write_csv(telemetry_t *telemetry, const controller_t *controller, ui
     text_line_start(&line, bytes, sizeof bytes);
     text_add_decimal(&line, (int32_t)(time_ms & 0x7FFFFFFFul), 3);
     for (uint8_t k = 0; k < springs; k++) {
-        text_add_char(&line, ',');
-        text_add_decimal(&line, controller_measured_ma(controller, k), 3);
-        text_add_char(&line, ',');
-        text_add_decimal(&line, controller_measured_mv(controller, k), 3);
-        text_add_char(&line, ',');
-        text_add_decimal(&line, text_centi_from_c7(controller_temperature_c7(controller, k)), 2);
-        text_add_char(&line, ',');
-        text_add_decimal(&line, duty_permille(controller_duty(controller, k)), 3);
+        const int32_t values[] = {controller_measured_ma(controller, k),
+                                  controller_measured_mv(controller, k),
+                                  text_centi_from_c7(controller_temperature_c7(controller, k)),
+                                  duty_permille(controller_duty(controller, k))};
+        text_add_values(&line, FLASH_TEXT(",#3,#3,#2,#3"), values);
         flush(&line, output);
     }
-    text_add_char(&line, ',');
-    text_add_decimal(&line, controller_fan_percent(controller), 2);
-    text_add_char(&line, ',');
-    text_add_decimal(&line, text_centi_from_c7(ambient_c7), 2);
-    text_add_char(&line, ',');
+    const int32_t values[] = {controller_fan_percent(controller), text_centi_from_c7(ambient_c7)};
+    text_add_values(&line, FLASH_TEXT(",#2,#2,"), values);
     add_state(&line, controller);
     text_add_flash(&line, FLASH_TEXT("\r\n"));
     flush(&line, output);
@@ -163,18 +157,11 @@ void telemetry_tick(telemetry_t *telemetry, const controller_t *controller, uint
 
 bool telemetry_header(uint8_t springs, uint8_t piece, text_line_t *line)
 {
-    static const char columns[] FLASH_MEMORY = ",i#_a,v#_v,m#_c,d#";
     if (piece == 0) {
         text_add_flash(line, FLASH_TEXT("time_s"));
     } else if (piece <= springs) {
-        for (uint8_t i = 0; i + 1u < sizeof columns; i++) {
-            const char character = (char)flash_byte(&columns[i]);
-            if (character == '#') {
-                text_add_decimal(line, piece, 0);
-            } else {
-                text_add_char(line, character);
-            }
-        }
+        const int32_t number[] = {piece, piece, piece, piece};
+        text_add_values(line, FLASH_TEXT(",i#0_a,v#0_v,m#0_c,d#0"), number);
     } else if (piece == springs + 1u) {
         text_add_flash(line, FLASH_TEXT(",fan,ambient_c,state\r\n"));
     } else {

@@ -1,5 +1,7 @@
 #include "text.h"
 
+#include <stddef.h>
+
 #define LARGEST     2147483647ul
 #define MOST_DIGITS 10u
 
@@ -113,13 +115,7 @@ void text_add(text_line_t *line, const char *text)
 
 void text_add_flash(text_line_t *line, const char *text)
 {
-    for (;; text++) {
-        const char character = (char)flash_byte(text);
-        if (character == '\0') {
-            return;
-        }
-        text_add_char(line, character);
-    }
+    text_add_values(line, text, NULL);
 }
 
 void text_add_decimal(text_line_t *line, int32_t value, uint8_t decimals)
@@ -127,6 +123,32 @@ void text_add_decimal(text_line_t *line, int32_t value, uint8_t decimals)
     char digits[TEXT_DECIMAL_SIZE];
     text_format_decimal(value, decimals, digits);
     text_add(line, digits);
+}
+
+void text_add_values(text_line_t *line, const char *text, const int32_t values[])
+{
+    for (;; text++) {
+        const char character = (char)flash_byte(text);
+        if (character == '\0') {
+            return;
+        }
+        if (character == '#' && values != NULL) {
+            text++;
+            text_add_decimal(line, *values++, (uint8_t)(flash_byte(text) - '0'));
+        } else {
+            text_add_char(line, character);
+        }
+    }
+}
+
+const char *text_item(const char *texts, uint8_t index)
+{
+    while (index > 0) {
+        if (flash_byte(texts++) == '\0') {
+            index--;
+        }
+    }
+    return texts;
 }
 
 int16_t text_centi_from_c7(int16_t temperature_c7)

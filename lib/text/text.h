@@ -48,6 +48,12 @@ void text_add(text_line_t *line, const char *text);
 /* text as given by FLASH_TEXT or a FLASH_MEMORY array. */
 void text_add_flash(text_line_t *line, const char *text);
 void text_add_decimal(text_line_t *line, int32_t value, uint8_t decimals);
+/* The same as text_add_flash, but each "#" and the digit after it become the next of `values`, with
+ * so many decimals. */
+void text_add_values(text_line_t *line, const char *text, const int32_t values[]);
+
+/* Of texts in flash, one behind the other with its terminating zero, the one with that index. */
+const char *text_item(const char *texts, uint8_t index);
 
 /* Q9.7 degC in 1/100 degC, rounded. */
 int16_t text_centi_from_c7(int16_t temperature_c7);

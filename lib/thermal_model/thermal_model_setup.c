@@ -50,27 +50,28 @@ const thermal_model_ranges_t thermal_model_ranges FLASH_MEMORY = {
 
 void thermal_model_parameters_default(thermal_model_parameters_t *parameters)
 {
-    memset(parameters, 0, sizeof *parameters);
-    parameters->rows = 3;
-    parameters->columns = 3;
-    parameters->step_ms = 100;
-    parameters->heat_capacity_mj_per_k = 300;
-    parameters->loss_uw_per_k = 5800;
-    parameters->loss_fan_uw_per_k = 11300;
-    parameters->orthogonal_uw_per_k = 586;
-    parameters->orthogonal_fan_uw_per_k = 658;
-    parameters->diagonal_uw_per_k = 293;
-    parameters->diagonal_fan_uw_per_k = 329;
-    parameters->latent_heat_mj = 8650;
-    parameters->martensite_finish_cc = 6800;
-    parameters->martensite_start_cc = 7800;
-    parameters->austenite_start_cc = 8800;
-    parameters->austenite_finish_cc = 9800;
-    parameters->resistance_martensite_uohm = 175000;
-    parameters->resistance_austenite_uohm = 219000;
-    parameters->air_heat_capacity_mj_per_k = 50;
-    parameters->plate_heat_capacity_mj_per_k = 20000;
-    parameters->plate_loss_uw_per_k = 20000;
+    static const thermal_model_parameters_t usual FLASH_MEMORY = {
+        .rows = 3,
+        .columns = 3,
+        .step_ms = 100,
+        .heat_capacity_mj_per_k = 300,
+        .loss_uw_per_k = 5800,
+        .loss_fan_uw_per_k = 11300,
+        .orthogonal_uw_per_k = 586,
+        .orthogonal_fan_uw_per_k = 658,
+        .diagonal_uw_per_k = 293,
+        .diagonal_fan_uw_per_k = 329,
+        .latent_heat_mj = 8650,
+        .martensite_finish_cc = 6800,
+        .martensite_start_cc = 7800,
+        .austenite_start_cc = 8800,
+        .austenite_finish_cc = 9800,
+        .resistance_martensite_uohm = 175000,
+        .resistance_austenite_uohm = 219000,
+        .air_heat_capacity_mj_per_k = 50,
+        .plate_heat_capacity_mj_per_k = 20000,
+        .plate_loss_uw_per_k = 20000};
+    flash_copy(parameters, &usual, sizeof usual);
     for (uint8_t i = 0; i < THERMAL_MODEL_MAX_SPRINGS; i++) {
         parameters->loss_scale_permille[i] = 1000;
         parameters->heat_capacity_scale_permille[i] = 1000;

@@ -81,6 +81,25 @@ static void a_full_line_is_cut_not_overrun(void)
     TEST_ASSERT_EQUAL_STRING_LEN("abc-123.#", bytes, 9);
 }
 
+static void values_stand_where_the_text_has_marks(void)
+{
+    char bytes[40] = {0};
+    text_line_t line;
+    const int32_t values[] = {-5, 1234, 7};
+    text_line_start(&line, bytes, sizeof bytes - 1u);
+    text_add_values(&line, FLASH_TEXT("#0|t:#3 s, #1%"), values);
+    text_add_flash(&line, FLASH_TEXT(" #1"));
+    TEST_ASSERT_EQUAL_STRING("-5|t:1.234 s, 0.7% #1", bytes);
+}
+
+static void an_item_is_found_by_counting(void)
+{
+    static const char texts[] FLASH_MEMORY = "one\0\0three";
+    TEST_ASSERT_EQUAL_STRING("one", text_item(texts, 0));
+    TEST_ASSERT_EQUAL_STRING("", text_item(texts, 1));
+    TEST_ASSERT_EQUAL_STRING("three", text_item(texts, 2));
+}
+
 static void q97_becomes_hundredths(void)
 {
     TEST_ASSERT_EQUAL_INT16(2000, text_centi_from_c7(20 * 128));
@@ -96,6 +115,8 @@ int main(void)
     RUN_TEST(what_is_formatted_parses_back);
     RUN_TEST(refuses_what_is_no_number);
     RUN_TEST(a_full_line_is_cut_not_overrun);
+    RUN_TEST(values_stand_where_the_text_has_marks);
+    RUN_TEST(an_item_is_found_by_counting);
     RUN_TEST(q97_becomes_hundredths);
     return UNITY_END();
 }
