@@ -188,7 +188,8 @@ static void outputs_init(void)
 /* COM bit for an output that is on, after its compare value has been set: a fast PWM output is high
  * for OCR + 1 counts, so 0 cannot be had from the timer: there the COM bit is cleared and the pin
  * is low. */
-static uint8_t set_compare(volatile uint16_t *compare, uint16_t duty, uint8_t com)
+static __attribute__((noinline)) uint8_t set_compare(volatile uint16_t *compare, uint16_t duty,
+                                                     uint8_t com)
 {
     if (duty == 0 || duty > BOARD_DUTY_MAX) {
         return 0;
@@ -197,7 +198,7 @@ static uint8_t set_compare(volatile uint16_t *compare, uint16_t duty, uint8_t co
     return com;
 }
 
-void board_set_duties(const uint16_t duty[BOARD_SPRINGS])
+__attribute__((noinline)) void board_set_duties(const uint16_t duty[BOARD_SPRINGS])
 {
     const uint8_t three = (uint8_t)(PWM_A_OFF | set_compare(&OCR3A, duty[0], PWM_COM_A) |
                                     set_compare(&OCR3B, duty[1], PWM_COM_B) |

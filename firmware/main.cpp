@@ -127,7 +127,7 @@ static void follow_averaging()
     }
 }
 
-static void run_tick(uint8_t behind)
+static __attribute__((noinline)) void run_tick(uint8_t behind)
 {
     const uint32_t begin_us = board_time_us();
     if (behind > 0 && status.ticks_late < UINT16_MAX) {

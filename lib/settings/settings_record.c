@@ -42,33 +42,30 @@ typedef struct {
     uint8_t entries;
 } slot_t;
 
-/* The values are within the limits of the table, and go to settings unless that is NULL. */
+/* To settings. Fails (false), with some of it changed, if and only if a value is outside the limits
+ * of the table. */
 static bool read_values(const settings_storage_t *storage, uint16_t address, uint8_t entries,
                         settings_t *settings)
 {
     settings_entry_t entry;
     for (uint8_t i = 0; i < entries; i++) {
         settings_entry(i, &entry);
-        const uint8_t width = parameter_width(entry.type);
         for (uint8_t element = 0; element < entry.count; element++) {
-            uint32_t wide = 0;
-            for (uint8_t octet = 0; octet < width; octet++) {
-                wide |= (uint32_t)storage->read(storage->context, address++) << (8u * octet);
+            uint8_t bytes[4];
+            for (uint8_t octet = 0; octet < parameter_width(entry.type); octet++) {
+                bytes[octet] = storage->read(storage->context, address++);
             }
-            const int32_t value =
-                entry.type == PARAMETER_S16 ? (int32_t)(int16_t)(uint16_t)wide : (int32_t)wide;
-            if (value < entry.minimum || value > entry.maximum) {
+            if (settings_set(settings, i, element, parameter_get(bytes, entry.type)) !=
+                SETTINGS_OK) {
                 return false;
-            }
-            if (settings != NULL) {
-                settings_set(settings, i, element, value);
             }
         }
     }
     return true;
 }
 
-static slot_t examine(const settings_storage_t *storage, uint16_t base)
+/* settings is changed where there is a record. */
+static slot_t examine(const settings_storage_t *storage, uint16_t base, settings_t *settings)
 {
     slot_t slot = {SLOT_DAMAGED, 0, 0};
     const uint8_t complete = storage->read(storage->context, base);
@@ -100,7 +97,7 @@ static slot_t examine(const settings_storage_t *storage, uint16_t base)
         slot.state = SLOT_FOREIGN;
         return slot;
     }
-    if (read_values(storage, (uint16_t)(base + HEAD_BYTES), slot.entries, NULL)) {
+    if (read_values(storage, (uint16_t)(base + HEAD_BYTES), slot.entries, settings)) {
         slot.state = SLOT_WHOLE;
     }
     return slot;
@@ -121,7 +118,8 @@ static uint8_t newest(const slot_t slot[2])
 settings_loaded_t settings_load(settings_store_t *store, const settings_storage_t *storage,
                                 settings_t *settings)
 {
-    const slot_t slot[2] = {examine(storage, base_of(0)), examine(storage, base_of(1))};
+    const slot_t slot[2] = {examine(storage, base_of(0), settings),
+                            examine(storage, base_of(1), settings)};
     const uint8_t chosen = newest(slot);
     const bool found = slot[chosen].state == SLOT_WHOLE;
 
@@ -201,9 +199,10 @@ static uint8_t value_byte(settings_store_t *store)
 {
     settings_entry_t entry;
     settings_entry(store->entry, &entry);
-    const uint32_t value = (uint32_t)settings_get(store->settings, store->entry, store->element);
-    const uint8_t out = (uint8_t)(value >> (8u * store->octet));
-    if (++store->octet == parameter_width(entry.type)) {
+    const uint8_t width = parameter_width(entry.type);
+    const uint8_t out = ((const uint8_t *)store->settings)[(
+        uint16_t)(entry.offset + (uint8_t)(store->element * width) + store->octet)];
+    if (++store->octet == width) {
         store->octet = 0;
         if (++store->element == entry.count) {
             store->element = 0;

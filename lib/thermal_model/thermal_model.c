@@ -411,14 +411,17 @@ __attribute__((noinline)) void thermal_model_begin_step(thermal_model_t *model,
         model->pass.air_flow = -extra_flows(model);
     }
     thermal_model_pass(model);
-    if (model->air.loss != 0) {
-        relax(&model->air, &model->state.air_c23, &model->pass.air_lead, model->ambient_lead,
-              model->pass.air_flow);
-    }
-    if (model->parameters.plate_coupling_uw_per_k != 0) {
-        relax(&model->plate, &model->state.plate_c23, &model->plate_lead, model->ambient_lead,
-              fixed_point_scale_s24(above_plate,
-                                    (uint32_t)model->parameters.plate_coupling_uw_per_k << 8));
+    /* air, then plate, in a loop: the AVR's code for it is long */
+    for (uint8_t plate = 0; plate < 2; plate++) {
+        const uint16_t coupling = model->parameters.plate_coupling_uw_per_k;
+        if ((plate ? coupling : model->air.loss) == 0) {
+            continue;
+        }
+        relax(plate ? &model->plate : &model->air,
+              plate ? &model->state.plate_c23 : &model->state.air_c23,
+              plate ? &model->plate_lead : &model->pass.air_lead, model->ambient_lead,
+              plate ? fixed_point_scale_s24(above_plate, (uint32_t)coupling << 8)
+                    : model->pass.air_flow);
     }
 }
 

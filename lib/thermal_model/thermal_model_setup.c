@@ -435,7 +435,7 @@ static void derive(thermal_model_t *model)
 }
 
 /* natural + (forced - natural) fan, fan in Q2.14 */
-static uint16_t between(uint16_t natural, uint16_t forced, uint16_t fan)
+static __attribute__((noinline)) uint16_t between(uint16_t natural, uint16_t forced, uint16_t fan)
 {
     int32_t difference = ((int32_t)forced - (int32_t)natural) * (int32_t)fan;
     return (uint16_t)(natural + ((difference + 8192) >> 14));
