@@ -256,7 +256,7 @@ ISR(TIMER2_COMPA_vect)
     }
 }
 
-uint32_t board_time_ms(void)
+__attribute__((noinline)) uint32_t board_time_ms(void)
 {
     uint32_t copy;
     ATOMIC_BLOCK(ATOMIC_RESTORESTATE)

@@ -8,6 +8,7 @@
 #include "controller.h"
 #include "crc16.h"
 #include "current_sensor.h"
+#include "fixed_point.h"
 #include "ntc.h"
 #include "settings.h"
 #include "telemetry.h"
@@ -93,7 +94,7 @@ static int16_t ambient_c7(void)
         }
         // wire off or short: the setting is the better guess
     }
-    return (int16_t)(((int32_t)settings.board.ambient_cc * 32 + 12) / 25); // x 128 / 100
+    return fixed_point_c7_from_cc(settings.board.ambient_cc);
 }
 
 static void keep_model(void)
@@ -112,8 +113,8 @@ static void start_model(uint8_t cause)
         thermal_model_set_state(&controller.model, &kept.state)) {
         return;
     }
-    const int32_t hot_cc = (int32_t)settings.controller.safety.temperature_trip_cc - 500;
-    thermal_model_reset(&controller.model, (int16_t)(hot_cc * 32 / 25)); // x 128 / 100
+    const int16_t hot_cc = (int16_t)(settings.controller.safety.temperature_trip_cc - 500);
+    thermal_model_reset(&controller.model, fixed_point_c7_from_cc(hot_cc));
 }
 
 // Configures the sensors at the start and when the setting has changed: they then convert anew, and

@@ -426,7 +426,8 @@ uint16_t controller_austenite_permille(const controller_t *controller, uint8_t s
     return (uint16_t)((thermal_model_austenite(&controller->model, spring) * 1000ul) >> 15);
 }
 
-safety_fault_t controller_fault(const controller_t *controller, uint8_t spring)
+__attribute__((noinline)) safety_fault_t controller_fault(const controller_t *controller,
+                                                          uint8_t spring)
 {
     return safety_fault(&controller->safety, spring);
 }

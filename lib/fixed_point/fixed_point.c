@@ -24,3 +24,9 @@ uint32_t fixed_point_multiply_divide(uint32_t a, uint32_t b, uint32_t c)
     }
     return quotient;
 }
+
+int16_t fixed_point_c7_from_cc(int16_t cc)
+{
+    const int32_t scaled = (int32_t)cc * 32;
+    return (int16_t)((scaled + (scaled < 0 ? -12 : 12)) / 25);
+}

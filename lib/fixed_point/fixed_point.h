@@ -2,7 +2,8 @@
  * AVR.
  * What it owns: the meaning of each product (width, rounding, sign), in C and, for AVR, in
  * assembly held to the C.
- * What it never does: divide, branch on data, keep state, produce a 64-bit value. */
+ * What it never does: keep state; in what a tick calls: divide, branch on data, produce a 64-bit
+ * value. */
 #ifndef FIXED_POINT_H
 #define FIXED_POINT_H
 
@@ -240,6 +241,9 @@ static inline int32_t fixed_point_add_saturated(int32_t a, int32_t b)
 /* a b / c rounded to the nearest, without a 64-bit division; UINT32_MAX where that does
  * not fit or c is 0 or above 2^31. 32 shifts: for start-up, not for the tick. */
 uint32_t fixed_point_multiply_divide(uint32_t a, uint32_t b, uint32_t c);
+
+/* 1/100 degC to Q9.7, rounded; at most 255 degC either way. Divides: not for the tick. */
+int16_t fixed_point_c7_from_cc(int16_t cc);
 
 #ifdef __cplusplus
 }

@@ -26,12 +26,12 @@ void parameter_set(void *field, uint8_t type, int32_t value)
     memcpy(field, &value, parameter_width(type));
 }
 
-int32_t parameter_maximum(const parameter_range_t *range)
+__attribute__((noinline)) int32_t parameter_maximum(const parameter_range_t *range)
 {
     return range->type == PARAMETER_U32 ? range->maximum * (int32_t)1000 : range->maximum;
 }
 
-bool parameter_is_within(const parameter_range_t *range, int32_t value)
+__attribute__((noinline)) bool parameter_is_within(const parameter_range_t *range, int32_t value)
 {
     return value >= range->minimum && value <= parameter_maximum(range);
 }

@@ -78,14 +78,14 @@ static void prepare_quick(safety_t *safety)
     safety->quick_ma = most_ma;
 }
 
-bool safety_apply(safety_t *safety, const safety_parameters_t *parameters, uint16_t *bad)
+__attribute__((noinline)) bool safety_apply(safety_t *safety, const safety_parameters_t *parameters,
+                                            uint16_t *bad)
 {
     if (!safety_check(parameters, bad)) {
         return false;
     }
     safety->parameters = *parameters;
-    /* 1/100 degC to Q9.7: 128 / 100 */
-    safety->temperature_trip_c7 = (int16_t)((int32_t)parameters->temperature_trip_cc * 32 / 25);
+    safety->temperature_trip_c7 = fixed_point_c7_from_cc(parameters->temperature_trip_cc);
     prepare_quick(safety);
     return true;
 }

@@ -132,24 +132,42 @@ static inline ALWAYS int16_t high_word(int32_t value)
     return (int16_t)((uint32_t)value >> 16);
 }
 
-static void austenite_complete(const thermal_model_t *model, thermal_model_spring_state_t *state)
+/* Nothing is left to transform: all austenite, or all martensite. */
+static __attribute__((noinline)) void complete(const thermal_model_t *model,
+                                               thermal_model_spring_state_t *state, bool austenite)
 {
-    state->branch = THERMAL_MODEL_BRANCH_HEATING;
     state->amplitude = THERMAL_MODEL_AUSTENITE_FULL;
-    state->heating_c7 = model->highest_c7;
-    state->cooling_c7 = model->martensite_start_c7;
     state->gain = GAIN_ONE;
-    state->latent_c23 = model->latent_full_c23;
+    if (austenite) {
+        state->branch = THERMAL_MODEL_BRANCH_HEATING;
+        state->heating_c7 = model->highest_c7;
+        state->cooling_c7 = model->martensite_start_c7;
+        state->latent_c23 = model->latent_full_c23;
+    } else {
+        state->branch = THERMAL_MODEL_BRANCH_COOLING;
+        state->heating_c7 = model->austenite_start_c7;
+        state->cooling_c7 = THERMAL_MODEL_LOWEST_C7;
+        state->latent_c23 = 0;
+    }
 }
 
-static void martensite_complete(const thermal_model_t *model, thermal_model_spring_state_t *state)
+/* Onto the branch of heating or cooling, unless it is on that; what it has left to transform. */
+static uint16_t turn_to(const thermal_model_t *model, thermal_model_spring_state_t *state,
+                        bool heats)
 {
-    state->branch = THERMAL_MODEL_BRANCH_COOLING;
-    state->amplitude = THERMAL_MODEL_AUSTENITE_FULL;
-    state->heating_c7 = model->austenite_start_c7;
-    state->cooling_c7 = THERMAL_MODEL_LOWEST_C7;
-    state->gain = GAIN_ONE;
-    state->latent_c23 = 0;
+    const uint8_t branch = heats ? THERMAL_MODEL_BRANCH_HEATING : THERMAL_MODEL_BRANCH_COOLING;
+    if (state->branch != branch) {
+        const uint16_t austenite = austenite_of(model, state);
+        state->amplitude = heats ? (uint16_t)(THERMAL_MODEL_AUSTENITE_FULL - austenite) : austenite;
+        state->branch = branch;
+        state->gain = GAIN_ONE;
+        if (heats) {
+            state->cooling_c7 = model->martensite_start_c7;
+        } else {
+            state->heating_c7 = model->austenite_start_c7;
+        }
+    }
+    return state->amplitude;
 }
 
 /* How far (c7) into a transformation the spring is now; `turn` is how far it was, `beyond` the
@@ -201,22 +219,13 @@ static inline ALWAYS void transform(const thermal_model_t *model, thermal_model_
     int16_t past;
     bool heats = held_c7 > state->heating_c7;
     if (heats != (state->branch == THERMAL_MODEL_BRANCH_HEATING)) {
-        uint16_t austenite = austenite_of(model, state);
-        uint16_t left = heats ? (uint16_t)(THERMAL_MODEL_AUSTENITE_FULL - austenite) : austenite;
-        state->branch = heats ? THERMAL_MODEL_BRANCH_HEATING : THERMAL_MODEL_BRANCH_COOLING;
-        state->amplitude = left;
-        state->gain = GAIN_ONE;
-        if (heats) {
-            state->cooling_c7 = model->martensite_start_c7;
-        } else {
-            state->heating_c7 = model->austenite_start_c7;
-        }
+        (void)turn_to(model, state, heats);
         refresh_branch(model, spring, state);
     }
     if (heats) {
         int16_t austenitic_c7 = high_word(enthalpy_c23 - model->latent_full_c23);
         if (austenitic_c7 >= model->austenite_finish_c7 || state->amplitude == 0) {
-            austenite_complete(model, state);
+            complete(model, state, true);
             return;
         }
         if (model->latent_full_c23 == 0) {
@@ -231,7 +240,7 @@ static inline ALWAYS void transform(const thermal_model_t *model, thermal_model_
     } else {
         int16_t martensitic_c7 = high_word(enthalpy_c23);
         if (martensitic_c7 <= model->martensite_finish_c7 || state->amplitude == 0) {
-            martensite_complete(model, state);
+            complete(model, state, false);
             return;
         }
         if (model->latent_full_c23 == 0) {
@@ -285,7 +294,7 @@ static inline __attribute__((always_inline)) uint32_t common_flow(const thermal_
                                model->parameters.plate_coupling_uw_per_k);
 }
 
-static int32_t clamp_c23(int32_t value)
+static __attribute__((noinline)) int32_t clamp_c23(int32_t value)
 {
     int16_t c7 = high_word(value);
     if (c7 < THERMAL_MODEL_LOWEST_C7) {
@@ -449,7 +458,7 @@ void thermal_model_refresh_ambient(thermal_model_t *model)
     }
 }
 
-static int16_t clamp_c7(int16_t temperature_c7)
+static __attribute__((noinline)) int16_t clamp_c7(int16_t temperature_c7)
 {
     if (temperature_c7 < THERMAL_MODEL_LOWEST_C7) {
         return THERMAL_MODEL_LOWEST_C7;
@@ -487,7 +496,7 @@ void thermal_model_reset(thermal_model_t *model, int16_t temperature_c7)
     thermal_model_refresh_ambient(model);
     for (uint8_t i = 0; i < model->pass.count; i++) {
         model->spring[i].pending = 0;
-        martensite_complete(model, &model->state.spring[i]);
+        complete(model, &model->state.spring[i], false);
         thermal_model_set_temperature(model, i, temperature_c7);
     }
 }
@@ -501,28 +510,15 @@ void thermal_model_set_temperature(thermal_model_t *model, uint8_t spring, int16
         temperature_c7 = model->highest_c7;
     }
     thermal_model_spring_state_t *state = &model->state.spring[spring];
-    if (temperature_c7 > state->heating_c7) {
-        uint16_t martensite = (uint16_t)(THERMAL_MODEL_AUSTENITE_FULL - austenite_of(model, state));
-        if (temperature_c7 >= model->austenite_finish_c7 || martensite == 0) {
-            austenite_complete(model, state);
-        } else {
-            if (state->branch != THERMAL_MODEL_BRANCH_HEATING) {
-                state->branch = THERMAL_MODEL_BRANCH_HEATING;
-                state->amplitude = martensite;
-                state->cooling_c7 = model->martensite_start_c7;
-            }
+    const bool heats = temperature_c7 > state->heating_c7;
+    if (heats || temperature_c7 < state->cooling_c7) {
+        const bool beyond = heats ? temperature_c7 >= model->austenite_finish_c7
+                                  : temperature_c7 <= model->martensite_finish_c7;
+        if (beyond || turn_to(model, state, heats) == 0) {
+            complete(model, state, heats);
+        } else if (heats) {
             state->heating_c7 = temperature_c7;
-        }
-    } else if (temperature_c7 < state->cooling_c7) {
-        uint16_t austenite = austenite_of(model, state);
-        if (temperature_c7 <= model->martensite_finish_c7 || austenite == 0) {
-            martensite_complete(model, state);
         } else {
-            if (state->branch != THERMAL_MODEL_BRANCH_COOLING) {
-                state->branch = THERMAL_MODEL_BRANCH_COOLING;
-                state->amplitude = austenite;
-                state->heating_c7 = model->austenite_start_c7;
-            }
             state->cooling_c7 = temperature_c7;
         }
     }

@@ -116,16 +116,9 @@ const char *thermal_model_parameter_name(thermal_model_parameter_t parameter)
     return names[parameter];
 }
 
-static uint32_t larger(uint32_t a, uint32_t b)
+static __attribute__((noinline)) uint32_t larger(uint32_t a, uint32_t b)
 {
     return a > b ? a : b;
-}
-
-/* 1/100 degC to Q9.7, rounded. */
-static int16_t c7_from_cc(int16_t cc)
-{
-    int32_t scaled = (int32_t)cc * 32;
-    return (int16_t)((scaled + (scaled < 0 ? -12 : 12)) / 25);
 }
 
 typedef struct {
@@ -159,13 +152,14 @@ static uint32_t plate_conductance(const thermal_model_parameters_t *p)
            p->plate_loss_uw_per_k;
 }
 
-static uint32_t spring_capacity(const thermal_model_parameters_t *p, uint8_t i)
+static __attribute__((noinline)) uint32_t spring_capacity(const thermal_model_parameters_t *p,
+                                                          uint8_t i)
 {
     return (uint32_t)p->heat_capacity_mj_per_k * p->heat_capacity_scale_permille[i];
 }
 
 /* Of one spring. */
-static uint32_t scaled_loss(uint16_t loss_uw_per_k, uint16_t permille)
+static __attribute__((noinline)) uint32_t scaled_loss(uint16_t loss_uw_per_k, uint16_t permille)
 {
     return ((uint32_t)loss_uw_per_k * permille + 500u) / 1000u;
 }
@@ -358,7 +352,7 @@ static uint16_t position_factor(uint32_t width_c7)
     return (uint16_t)((0x200000u + width_c7 / 2u) / width_c7);
 }
 
-static uint16_t slope_factor(uint32_t width_c7)
+static __attribute__((noinline)) uint16_t slope_factor(uint32_t width_c7)
 {
     uint32_t factor = (0x1000000u + width_c7 / 2u) / width_c7; /* 2^17 / width in K */
     return (uint16_t)(factor > 65535u ? 65535u : factor);
@@ -408,10 +402,10 @@ static void derive(thermal_model_t *model)
     int16_t highest_c7 = (int16_t)(255 * 128 - (int16_t)(model->latent_full_c23 >> 16));
     model->highest_c7 =
         highest_c7 < THERMAL_MODEL_HIGHEST_C7 ? highest_c7 : (int16_t)THERMAL_MODEL_HIGHEST_C7;
-    model->martensite_finish_c7 = c7_from_cc(p->martensite_finish_cc);
-    model->martensite_start_c7 = c7_from_cc(p->martensite_start_cc);
-    model->austenite_start_c7 = c7_from_cc(p->austenite_start_cc);
-    model->austenite_finish_c7 = c7_from_cc(p->austenite_finish_cc);
+    model->martensite_finish_c7 = fixed_point_c7_from_cc(p->martensite_finish_cc);
+    model->martensite_start_c7 = fixed_point_c7_from_cc(p->martensite_start_cc);
+    model->austenite_start_c7 = fixed_point_c7_from_cc(p->austenite_start_cc);
+    model->austenite_finish_c7 = fixed_point_c7_from_cc(p->austenite_finish_cc);
     uint32_t heating = (uint32_t)(model->austenite_finish_c7 - model->austenite_start_c7);
     uint32_t cooling = (uint32_t)(model->martensite_start_c7 - model->martensite_finish_c7);
     model->heating_position = position_factor(heating);
