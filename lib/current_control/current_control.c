@@ -6,6 +6,7 @@
 #define ESTIMATE_LIMIT    24575 /* loop gain, duty steps per mA in Q16: the sum of both fits int16 */
 #define TRIM_LIMIT        8191u
 #define FIRST_MA          128u /* what a rise from off begins with */
+#define SMALL_MA          25u  /* a change that need not wait: a step of the policy's sweep */
 
 #ifdef __AVR__
 #define HOT    __attribute__((noinline, optimize("O2")))
@@ -180,6 +181,10 @@ HOT void current_control_tick(current_control_t *control, uint8_t channels,
 {
     bool turn = !control->even_turn;
     control->even_turn = turn;
+    uint16_t small_ma = control->parameters.slew_ma_per_tick;
+    if (small_ma > SMALL_MA) {
+        small_ma = SMALL_MA;
+    }
     current_control_channel_t *c = control->channel;
     for (; channels != 0; channels--, c++, duty++, measured_ma++, turn = !turn) {
         KEEP_ADDRESS(c);
@@ -201,23 +206,28 @@ HOT void current_control_tick(current_control_t *control, uint8_t channels,
             *duty = 0;
             continue;
         }
+        bool learns = turn && knows && !c->fell;
+        if (learns && reference_ma != 0) {
+            learn(control, c, *measured_ma);
+        }
+        uint16_t next_ma = reference_ma;
         if (wanted_ma < reference_ma) {
-            c->fell = true;
-            reference_ma = wanted_ma;
-        } else if (!turn || c->fell) {
-            c->fell = c->fell && turn;
-            *duty = c->duty;
-            continue;
-        } else if (knows) {
-            if (reference_ma != 0) {
-                learn(control, c, *measured_ma);
-            }
-            if (may_rise) {
-                reference_ma = raised_ma(control, reference_ma, wanted_ma);
+            next_ma = wanted_ma;
+        } else if (knows && may_rise) {
+            uint16_t rise_ma = (uint16_t)(wanted_ma - reference_ma);
+            if (rise_ma <= small_ma && reference_ma != 0) {
+                next_ma = wanted_ma;
+            } else if (learns) {
+                next_ma = raised_ma(control, reference_ma, wanted_ma);
             }
         }
-        c->reference_ma = reference_ma;
-        *duty = reference_ma == 0 ? 0 /* not started yet */ : give(control, c);
+        c->fell = reference_ma > (uint16_t)(next_ma + SMALL_MA);
+        if (next_ma == reference_ma && !turn) {
+            *duty = c->duty;
+            continue;
+        }
+        c->reference_ma = next_ma;
+        *duty = next_ma == 0 ? 0 /* not started yet */ : give(control, c);
     }
 }
 

@@ -50,7 +50,7 @@ typedef struct {
     uint16_t residue_q16;  /* sub-step duty not given yet */
     uint16_t duty;         /* given in the last tick */
     uint8_t blind_ticks;   /* ticks without a valid reading, in a row */
-    bool fell;             /* the target, in the last tick */
+    bool fell;             /* the target, in the last tick, by more than a little */
 } current_control_channel_t;
 
 typedef struct {
@@ -98,12 +98,13 @@ void current_control_reset(current_control_t *control, uint8_t channel);
  * duty = reference x loop resistance / supply, loop resistance = spring estimate + shunt + wiring +
  * trim. What a duty has brought corrects the trim, so that neither dither nor clamping winds it up.
  * A duty is given for two ticks: a reading after the second, be it of this tick or of the one
- * before, is of it alone (a fall of the target does not wait, and teaches nothing). Then the trim
- * takes integral x error / reference, and the reference may rise: to 128 mA from off, to its double
- * later, by two ticks of the slew at most. So what is not learnt yet shrinks as the current rises:
- * a loop resistance that is a quarter off overshoots by no more than 40 mA. 1 / reference is taken
- * to a power of two: the gain in effect is between half and all of the setting, below 128 mA less.
- * Channels have their turns in alternate ticks.
+ * before, is of it alone. Then the trim takes integral x error / reference, and the reference may
+ * rise: to 128 mA from off, to its double later, by two ticks of the slew at most. So what is not
+ * learnt yet shrinks as the current rises: a loop resistance that is a quarter off overshoots by no
+ * more than 40 mA. A fall of the target does not wait, and teaches nothing; nor do changes of up to
+ * 25 mA a tick, as small as they are a reading of the one before does no harm. 1 / reference is
+ * taken to a power of two: the gain in effect is between half and all of the setting, below 128 mA
+ * less. Channels have their turns in alternate ticks.
  *
  * Without a valid reading nothing is learnt and the reference does not rise; after hold_ticks such
  * ticks in a row the channel is off until a reading is valid again. */

@@ -215,6 +215,26 @@ static void old_readings_teach_nothing_false(void)
     }
 }
 
+/* The policy's sweep: 18 mA a tick, down and up. */
+static void small_changes_do_not_wait_and_do_not_keep_it_from_learning(void)
+{
+    for (int32_t old_percent = 0; old_percent <= 100; old_percent += 50) {
+        setUp();
+        load.spring_mohm = 150; /* 12 % of the loop less than estimated */
+        load.old_percent = old_percent;
+        mean_ua(100, 10);
+        for (uint16_t n = 0; n < 600; n++) {
+            uint16_t place = n % 32u;
+            uint16_t target_ma = (uint16_t)(800u - 18u * (place < 16 ? place : 31u - place));
+            tick(target_ma);
+            if (n >= 64) {
+                TEST_ASSERT_EQUAL_UINT16(target_ma, current_control_reference_ma(&control, 0));
+                TEST_ASSERT_INT32_WITHIN(45000, target_ma * 1000, load.now_ua);
+            }
+        }
+    }
+}
+
 static void channels_have_their_turns_in_alternate_ticks(void)
 {
     uint16_t target_ma[9], duty[9], before_ma[9] = {0};
@@ -344,15 +364,17 @@ static void blind_channel_does_not_start_and_follows_a_fall(void)
     mean_ua(1500, 60);
     tick_with(800, 190, false, true);
     TEST_ASSERT_EQUAL_UINT16(800, current_control_reference_ma(&control, 0));
-    tick_with(1500, 190, false, true);
-    TEST_ASSERT_EQUAL_UINT16(800, current_control_reference_ma(&control, 0));
+    for (int n = 0; n < 4; n++) { /* by little or by much */
+        tick_with(n < 2 ? 810 : 1500, 190, false, true);
+        TEST_ASSERT_EQUAL_UINT16(800, current_control_reference_ma(&control, 0));
+    }
 }
 
 static void reference_waits_while_it_may_not_rise(void)
 {
     mean_ua(600, 30);
     for (int n = 0; n < 10; n++) {
-        tick_with(1500, 190, true, false);
+        tick_with(n < 5 ? 610 : 1500, 190, true, false);
         TEST_ASSERT_EQUAL_UINT16(600, current_control_reference_ma(&control, 0));
     }
 }
@@ -471,6 +493,7 @@ int main(void)
     RUN_TEST(dithering_has_the_mean_of_the_wanted_duty);
     RUN_TEST(reference_rises_by_the_slew_and_falls_at_once);
     RUN_TEST(old_readings_teach_nothing_false);
+    RUN_TEST(small_changes_do_not_wait_and_do_not_keep_it_from_learning);
     RUN_TEST(channels_have_their_turns_in_alternate_ticks);
     RUN_TEST(fall_of_target_has_no_kick_when_resistance_is_far_off);
     RUN_TEST(saturation_does_not_wind_up);
