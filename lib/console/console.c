@@ -575,18 +575,12 @@ static bool version_line(const console_t *console, out_t *out)
 /* ", limits supply temperature: 1.200 A less"; nothing where none acts. */
 static void add_limits(text_line_t *line, const controller_t *controller, uint8_t spring)
 {
-    static const char names[] FLASH_MEMORY =
-        " safety\0 current\0 supply\0 temperature\0 undriven\0 overload\0 trip\0 blind";
-    uint8_t limits = controller_limits(controller, spring);
+    const uint8_t limits = controller_limits(controller, spring);
     if (limits == 0) {
         return;
     }
     text_add_flash(line, FLASH_TEXT(", limits"));
-    for (const char *name = names; limits != 0; limits >>= 1, name = text_item(name, 1)) {
-        if ((limits & 1u) != 0) {
-            text_add_flash(line, name);
-        }
-    }
+    telemetry_add_limits(line, limits, ' ');
     if (controller_cut_ma(controller, spring) != 0) {
         const int32_t cut_ma = controller_cut_ma(controller, spring);
         text_add_values(line, FLASH_TEXT(": #3 A less"), &cut_ma);

@@ -1,13 +1,15 @@
 #include "telemetry.h"
 
-#define PIECE_BYTES 40u
+#include <string.h>
+
+#define PIECE_BYTES 144u /* the last spring's Teleplot lines, with the array's */
+#define CUT_SHIFT   6u   /* cuts are remembered in 64 mA */
+#define CUT_STEPS   8u   /* and told again when they differ by more */
 
 void telemetry_init(telemetry_t *telemetry)
 {
-    telemetry->format = TELEMETRY_OFF;
-    telemetry->hz = 5;
-    telemetry->phase = 0;
     telemetry->dropped = 0;
+    (void)telemetry_set(telemetry, TELEMETRY_OFF, 5);
 }
 
 bool telemetry_set(telemetry_t *telemetry, uint8_t format, uint8_t hz)
@@ -18,14 +20,27 @@ bool telemetry_set(telemetry_t *telemetry, uint8_t format, uint8_t hz)
     telemetry->format = format;
     telemetry->hz = hz;
     telemetry->phase = 0;
+    telemetry->left = 0;
+    memset(telemetry->told, 0, sizeof telemetry->told);
     return true;
 }
 
-static void count_dropped(telemetry_t *telemetry)
+static void count_dropped(telemetry_t *telemetry, uint8_t lines)
 {
-    if (telemetry->dropped < UINT16_MAX) {
-        telemetry->dropped++;
-    }
+    const uint16_t dropped = (uint16_t)(telemetry->dropped + lines);
+    telemetry->dropped = dropped < lines ? UINT16_MAX : dropped;
+}
+
+/* In one struct, the large member last: the chip reaches only 63 bytes of a frame directly. */
+typedef struct {
+    text_line_t line;
+    int32_t values[4];
+    char bytes[PIECE_BYTES];
+} piece_t;
+
+static void start_piece(piece_t *piece)
+{
+    text_line_start(&piece->line, piece->bytes, PIECE_BYTES);
 }
 
 static void flush(text_line_t *line, const text_output_t *output)
@@ -66,75 +81,102 @@ static void add_state(text_line_t *line, const controller_t *controller)
 static void write_csv(telemetry_t *telemetry, const controller_t *controller, uint32_t time_ms,
                       int16_t ambient_c7, const text_output_t *output)
 {
-    char bytes[PIECE_BYTES];
-    text_line_t line;
+    piece_t piece;
+    text_line_t *const line = &piece.line;
     const uint8_t springs = controller_springs(controller);
     if (output->room(output->context) < TELEMETRY_LINE_BYTES((uint16_t)springs)) {
-        count_dropped(telemetry);
+        count_dropped(telemetry, 1);
         return;
     }
-    text_line_start(&line, bytes, sizeof bytes);
-    text_add_decimal(&line, (int32_t)(time_ms & 0x7FFFFFFFul), 3);
+    start_piece(&piece);
+    text_add_decimal(line, (int32_t)(time_ms & 0x7FFFFFFFul), 3);
     for (uint8_t k = 0; k < springs; k++) {
-        const int32_t values[] = {controller_measured_ma(controller, k),
-                                  controller_measured_mv(controller, k),
-                                  text_centi_from_c7(controller_temperature_c7(controller, k)),
-                                  duty_permille(controller_duty(controller, k))};
-        text_add_values(&line, FLASH_TEXT(",#3,#3,#2,#3"), values);
-        flush(&line, output);
+        piece.values[0] = controller_measured_ma(controller, k);
+        piece.values[1] = controller_measured_mv(controller, k);
+        piece.values[2] = text_centi_from_c7(controller_temperature_c7(controller, k));
+        piece.values[3] = duty_permille(controller_duty(controller, k));
+        text_add_values(line, FLASH_TEXT(",#3,#3,#2,#3"), piece.values);
+        flush(line, output);
     }
-    const int32_t values[] = {controller_fan_percent(controller), text_centi_from_c7(ambient_c7)};
-    text_add_values(&line, FLASH_TEXT(",#2,#2,"), values);
-    add_state(&line, controller);
-    text_add_flash(&line, FLASH_TEXT("\r\n"));
-    flush(&line, output);
+    piece.values[0] = controller_fan_percent(controller);
+    piece.values[1] = text_centi_from_c7(ambient_c7);
+    text_add_values(line, FLASH_TEXT(",#2,#2,"), piece.values);
+    add_state(line, controller);
+    text_add_flash(line, FLASH_TEXT("\r\n"));
+    flush(line, output);
 }
 
-typedef struct {
-    telemetry_t *telemetry;
-    const text_output_t *output;
-    uint32_t time_ms;
-} teleplot_t;
-
-/* number 0: a name without one. */
-static void write_teleplot_line(const teleplot_t *teleplot, const char *flash_name, uint8_t number,
-                                int32_t value, uint8_t decimals)
+void telemetry_add_limits(text_line_t *line, uint8_t limits, char separator)
 {
-    char bytes[PIECE_BYTES];
-    text_line_t line;
-    text_line_start(&line, bytes, sizeof bytes);
-    text_add_char(&line, '>');
-    text_add_flash(&line, flash_name);
-    if (number != 0) {
-        text_add_decimal(&line, number, 0);
+    static const char names[] FLASH_MEMORY =
+        "none\0safety\0current\0supply\0temperature\0undriven\0overload\0trip\0blind";
+    uint16_t named = limits == 0 ? 1u : (uint16_t)(limits << 1);
+    for (const char *name = names; named != 0; named >>= 1, name = text_item(name, 1)) {
+        if ((named & 1u) != 0) {
+            text_add_char(line, separator);
+            text_add_flash(line, name);
+        }
     }
-    text_add_char(&line, ':');
-    text_add_decimal(&line, (int32_t)(teleplot->time_ms & 0x7FFFFFFFul), 0);
-    text_add_char(&line, ':');
-    text_add_decimal(&line, value, decimals);
-    text_add_flash(&line, FLASH_TEXT("\r\n"));
-    if (teleplot->output->room(teleplot->output->context) <
-        line.length + TELEMETRY_LEAVES_FREE_BYTES) {
-        count_dropped(teleplot->telemetry);
-        return;
-    }
-    flush(&line, teleplot->output);
 }
 
-static void write_teleplot(telemetry_t *telemetry, const controller_t *controller, uint32_t time_ms,
-                           const text_output_t *output)
+/* What is due of the next spring: its round of Teleplot, or what is new of its limits. Gives
+ * whether the one after it may have its turn in this tick, too. */
+static bool write_spring(telemetry_t *telemetry, const controller_t *controller, uint32_t time_ms,
+                         const text_output_t *output)
 {
-    const teleplot_t teleplot = {telemetry, output, time_ms};
+    piece_t piece;
+    text_line_t *const line = &piece.line;
+    int32_t *const values = piece.values;
     const uint8_t springs = controller_springs(controller);
-    for (uint8_t k = 0; k < springs; k++) {
-        const uint8_t number = (uint8_t)(k + 1u);
-        write_teleplot_line(&teleplot, FLASH_TEXT("i"), number,
-                            controller_measured_ma(controller, k), 3);
-        write_teleplot_line(&teleplot, FLASH_TEXT("m"), number,
-                            text_centi_from_c7(controller_temperature_c7(controller, k)), 2);
+    const uint8_t k = telemetry->next < springs ? telemetry->next : 0;
+    const uint8_t number = (uint8_t)(k + 1u);
+    const bool csv = telemetry->format == TELEMETRY_CSV;
+    const uint8_t limits = controller_limits(controller, k);
+    const uint16_t cut_ma = controller_cut_ma(controller, k);
+    const uint8_t cut = (uint8_t)(cut_ma >> CUT_SHIFT);
+    telemetry_told_t *const told = &telemetry->told[k];
+    const uint8_t change = (uint8_t)(cut - told->cut);
+
+    start_piece(&piece);
+    values[0] = number;
+    values[1] = (int32_t)(time_ms & 0x7FFFFFFFul);
+    values[2] = cut_ma;
+    if (csv) {
+        if (limits != told->limits || (uint8_t)(change + CUT_STEPS) > 2u * CUT_STEPS) {
+            text_add_values(line, FLASH_TEXT("<limits|spring:#0|t:#3"), values);
+            telemetry_add_limits(line, limits, '|');
+            text_add_values(line, FLASH_TEXT("|cut_a:#3>\r\n"), &values[2]);
+        }
+    } else {
+        if ((limits | told->limits) != 0) {
+            text_add_values(line, FLASH_TEXT(">cut#0:#0:#3\r\n"), values);
+            values[2] = limits;
+            text_add_values(line, FLASH_TEXT(">limits#0:#0:#0\r\n"), values);
+        }
+        values[2] = controller_measured_ma(controller, k);
+        text_add_values(line, FLASH_TEXT(">i#0:#0:#3\r\n"), values);
+        values[2] = text_centi_from_c7(controller_temperature_c7(controller, k));
+        text_add_values(line, FLASH_TEXT(">m#0:#0:#2\r\n"), values);
+        if (number == springs) {
+            values[2] = controller_fan_percent(controller);
+            text_add_values(line, FLASH_TEXT(">fan:#0:#2\r\n"), &values[1]);
+            values[2] = first_fault(controller);
+            text_add_values(line, FLASH_TEXT(">fault:#0:#0\r\n"), &values[1]);
+        }
     }
-    write_teleplot_line(&teleplot, FLASH_TEXT("fan"), 0, controller_fan_percent(controller), 2);
-    write_teleplot_line(&teleplot, FLASH_TEXT("fault"), 0, first_fault(controller), 0);
+    const bool says = line->length != 0;
+    if (says) {
+        const uint16_t free = csv ? 0u : TELEMETRY_LEAVES_FREE_BYTES;
+        if (output->room(output->context) < (uint16_t)(line->length + free)) {
+            return false;
+        }
+        told->limits = limits;
+        told->cut = cut;
+        flush(line, output);
+    }
+    telemetry->next = number;
+    telemetry->left--;
+    return !csv || !says; /* of status at most one line a tick */
 }
 
 void telemetry_tick(telemetry_t *telemetry, const controller_t *controller, uint32_t time_ms,
@@ -144,14 +186,16 @@ void telemetry_tick(telemetry_t *telemetry, const controller_t *controller, uint
         return;
     }
     telemetry->phase = (uint8_t)(telemetry->phase + telemetry->hz);
-    if (telemetry->phase < TELEMETRY_TICKS_PER_S) {
-        return;
+    if (telemetry->phase >= TELEMETRY_TICKS_PER_S) {
+        telemetry->phase = (uint8_t)(telemetry->phase - TELEMETRY_TICKS_PER_S);
+        if (telemetry->format == TELEMETRY_CSV) {
+            write_csv(telemetry, controller, time_ms, ambient_c7, output);
+        } else {
+            count_dropped(telemetry, telemetry->left);
+        }
+        telemetry->left = controller_springs(controller);
     }
-    telemetry->phase = (uint8_t)(telemetry->phase - TELEMETRY_TICKS_PER_S);
-    if (telemetry->format == TELEMETRY_CSV) {
-        write_csv(telemetry, controller, time_ms, ambient_c7, output);
-    } else {
-        write_teleplot(telemetry, controller, time_ms, output);
+    while (telemetry->left != 0 && write_spring(telemetry, controller, time_ms, output)) {
     }
 }
 

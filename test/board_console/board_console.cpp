@@ -130,6 +130,15 @@ void a_question_mark_gets_one_line_and_no_ok()
     TEST_ASSERT_FALSE(contains(text, "ok\r\n"));
 }
 
+int occurrences(const std::string &text, const std::string &part)
+{
+    int count = 0;
+    for (std::size_t at = 0; (at = text.find(part, at)) != std::string::npos; ++at) {
+        ++count;
+    }
+    return count;
+}
+
 void telemetry_csv_has_a_header_and_lines_at_its_rate()
 {
     auto mega = booted();
@@ -152,15 +161,25 @@ void telemetry_teleplot_lines_have_its_form()
     std::string line;
     std::getline(stream, line);
     TEST_ASSERT_EQUAL_INT_MESSAGE(2, std::count(line.begin(), line.end(), ':'), line.c_str());
+    for (const char *name : {">i1:", ">m1:", ">i9:", ">m9:", ">fan:", ">fault:"}) {
+        TEST_ASSERT_INT_WITHIN_MESSAGE(1, 5, occurrences(text, name), name);
+    }
 }
 
-/* Telemetry at 50 Hz, then `telemetry off`: does the console answer? */
+/* Telemetry at 50 Hz while limits act, then `telemetry off`: does the console answer? */
 std::string version_under(const std::string &format)
 {
     auto mega = booted();
+    mega->expect_ok("policy precompensate");
     mega->expect_ok("on all");
     mega->board.send("telemetry " + format + " 50\n");
     mega->run_ms(2000.0);
+    const std::string told = mega->board.take_output();
+    for (const char *spring : {"6", "7", "8", "9"}) { /* they wait for their turn */
+        const std::string name = (format == "csv" ? "<limits|spring:" : ">m") + std::string(spring);
+        TEST_ASSERT_TRUE_MESSAGE(contains(told, name), name.c_str());
+    }
+    TEST_ASSERT_TRUE(contains(told, format == "csv" ? "|supply|cut_a:3.000>" : ">cut9:"));
     mega->board.send("telemetry off\n");
     mega->run_ms(1000.0);
     mega->board.take_output();

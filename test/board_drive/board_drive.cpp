@@ -158,6 +158,13 @@ void own_temperature_derates_then_trips_until_cleared()
     const std::string said = mega->say("model");
     TEST_ASSERT_TRUE_MESSAGE(contains(said, "A, limits temperature: 1."), said.c_str());
     TEST_ASSERT_TRUE_MESSAGE(contains(said, " A less"), said.c_str());
+    mega->expect_ok("telemetry csv 5");
+    mega->board.take_output();
+    run(*mega, 2.0);
+    const std::string status = mega->board.take_output();
+    TEST_ASSERT_TRUE_MESSAGE(contains(status, "\r\n<limits|spring:1|t:"), status.c_str());
+    TEST_ASSERT_TRUE_MESSAGE(contains(status, "|temperature|cut_a:1."), status.c_str());
+    TEST_ASSERT_EQUAL_UINT(status.find("<limits"), status.rfind("<limits")); /* told once */
 
     mega->expect_ok("$temperature_limit_c=40");
     run(*mega, 1.0);
@@ -165,6 +172,10 @@ void own_temperature_derates_then_trips_until_cleared()
     TEST_ASSERT_EQUAL_UINT8(SAFETY_FAULT_NONE, mega->view().spring[0].fault);
     run(*mega, 2.0);
     TEST_ASSERT_EQUAL_UINT8(SAFETY_FAULT_LIMIT_TRIP, mega->view().spring[0].fault);
+    const std::string tripped = mega->board.take_output();
+    TEST_ASSERT_TRUE_MESSAGE(contains(tripped, "|temperature|cut_a:3.000>\r\n"), tripped.c_str());
+    TEST_ASSERT_TRUE_MESSAGE(contains(tripped, ",fault_14\r\n"), tripped.c_str());
+    mega->expect_ok("telemetry off");
     TEST_ASSERT_TRUE(contains(mega->say("faults"), "limit_trip"));
 
     mega->expect_ok("$temperature_limit_c=110"); /* the cause is gone, the latch stays */

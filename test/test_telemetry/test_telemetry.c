@@ -17,6 +17,7 @@ static void out_write(void *context, const char *bytes, uint8_t length)
 {
     (void)context;
     TEST_ASSERT_LESS_OR_EQUAL_UINT(room, length);
+    TEST_ASSERT_LESS_THAN_UINT(sizeof said, said_length + (unsigned)length);
     memcpy(said + said_length, bytes, length);
     said_length = (uint16_t)(said_length + length);
     said[said_length] = '\0';
@@ -105,15 +106,8 @@ static void a_line_without_room_is_dropped_whole_and_counted(void)
     telemetry_tick(&telemetry, &controller, 0, 0, &output);
     TEST_ASSERT_EQUAL_UINT(0, said_length);
     TEST_ASSERT_EQUAL_UINT16(1, telemetry.dropped);
-    TEST_ASSERT_TRUE(telemetry_set(&telemetry, TELEMETRY_TELEPLOT, 50));
-    room = TELEMETRY_LEAVES_FREE_BYTES + 30; /* one line and a piece of the next */
-    telemetry_tick(&telemetry, &controller, 1000, 0, &output);
-    TEST_ASSERT_EQUAL('\n', said[said_length - 1u]);
-    TEST_ASSERT_GREATER_THAN_UINT16(15, telemetry.dropped);
-    TEST_ASSERT_TRUE(room >= TELEMETRY_LEAVES_FREE_BYTES);
     telemetry.dropped = 65535;
-    room = 0;
-    telemetry_tick(&telemetry, &controller, 1020, 0, &output);
+    telemetry_tick(&telemetry, &controller, 20, 0, &output);
     TEST_ASSERT_EQUAL_UINT16(65535, telemetry.dropped);
 }
 
@@ -143,6 +137,224 @@ static void teleplot_lines_are_name_ms_value(void)
     TEST_ASSERT_EQUAL_UINT(20, lines());
 }
 
+static unsigned occurrences(const char *part)
+{
+    unsigned count = 0;
+    for (const char *at = said; (at = strstr(at, part)) != NULL; at++) {
+        count++;
+    }
+    return count;
+}
+
+static void forget(void)
+{
+    said_length = 0;
+    said[0] = '\0';
+}
+
+static void a_round_of_teleplot_goes_on_where_it_found_no_room(void)
+{
+    TEST_ASSERT_TRUE(telemetry_set(&telemetry, TELEMETRY_TELEPLOT, 5));
+    for (uint32_t tick = 1; tick <= 14; tick++) { /* due in the tenth */
+        room = TELEMETRY_LEAVES_FREE_BYTES + 80;  /* two springs, and a piece of the third */
+        telemetry_tick(&telemetry, &controller, tick * 20u, 0, &output);
+        TEST_ASSERT_TRUE(room >= TELEMETRY_LEAVES_FREE_BYTES);
+        TEST_ASSERT_EQUAL_UINT(tick < 10 ? 0 : tick < 14 ? (tick - 9u) * 4u : 20u, lines());
+    }
+    TEST_ASSERT_NOT_NULL(strstr(said, ">i2:200:0.000\r\n"));
+    TEST_ASSERT_NOT_NULL(strstr(said, ">i3:220:0.000\r\n"));
+    TEST_ASSERT_NOT_NULL(strstr(said, ">fault:280:0\r\n"));
+    TEST_ASSERT_EQUAL_UINT16(0, telemetry.dropped);
+}
+
+static void what_of_a_round_found_no_room_is_dropped_and_every_spring_has_its_turn(void)
+{
+    TEST_ASSERT_TRUE(telemetry_set(&telemetry, TELEMETRY_TELEPLOT, 50));
+    for (uint32_t tick = 1; tick <= 45; tick++) {
+        room = TELEMETRY_LEAVES_FREE_BYTES + 80; /* two springs of nine */
+        telemetry_tick(&telemetry, &controller, tick * 20u, 0, &output);
+    }
+    TEST_ASSERT_EQUAL_UINT16(45u * 9u - occurrences(">i") - telemetry.left, telemetry.dropped);
+    TEST_ASSERT_UINT_WITHIN(1, 9, occurrences(">i1:"));
+    TEST_ASSERT_UINT_WITHIN(1, 9, occurrences(">m9:"));
+    TEST_ASSERT_UINT_WITHIN(1, 9, occurrences(">fault:"));
+    telemetry.dropped = 65533;
+    room = 0;
+    telemetry_tick(&telemetry, &controller, 1000, 0, &output);
+    TEST_ASSERT_EQUAL_UINT16(65535, telemetry.dropped);
+}
+
+/* As the policy would have it: these limits, and this much less than wanted. */
+static void limit(uint8_t spring, uint8_t limits, uint16_t cut_ma)
+{
+    controller.policy.spring[spring].limits = limits;
+    controller.policy.spring[spring].wanted_ma = 3000;
+    controller.policy.spring[spring].target_ma = (uint16_t)(3000u - cut_ma);
+}
+
+/* So many ticks with an empty transmit buffer at each, from time_ms on. */
+static void ticks(unsigned count, uint32_t time_ms)
+{
+    for (unsigned tick = 0; tick < count; tick++) {
+        room = 329;
+        telemetry_tick(&telemetry, &controller, time_ms + tick * 20u, 20 * 128, &output);
+    }
+}
+
+static void csv_tells_a_limit_once_when_it_begins_and_once_when_it_ends(void)
+{
+    TEST_ASSERT_TRUE(telemetry_set(&telemetry, TELEMETRY_CSV, 5));
+    ticks(50, 20);
+    TEST_ASSERT_EQUAL_UINT(0, occurrences("<"));
+    limit(4, DRIVE_POLICY_LIMIT_SUPPLY | DRIVE_POLICY_LIMIT_TEMPERATURE, 2610);
+    ticks(50, 12000);
+    TEST_ASSERT_EQUAL_UINT(1, occurrences("<"));
+    TEST_ASSERT_NOT_NULL(
+        strstr(said, "\r\n<limits|spring:5|t:12.180|supply|temperature|cut_a:2.610>\r\n"));
+    limit(4, DRIVE_POLICY_LIMIT_NONE, 0);
+    ticks(50, 13000);
+    TEST_ASSERT_EQUAL_UINT(2, occurrences("<"));
+    TEST_ASSERT_NOT_NULL(strstr(said, "\r\n<limits|spring:5|t:13.180|none|cut_a:0.000>\r\n"));
+    TEST_ASSERT_EQUAL_UINT(15, occurrences(",ok\r\n"));
+}
+
+static void csv_tells_again_when_the_cut_has_changed_by_half_an_ampere(void)
+{
+    TEST_ASSERT_TRUE(telemetry_set(&telemetry, TELEMETRY_CSV, 50));
+    for (uint16_t cut_ma = 10; cut_ma <= 1800; cut_ma = (uint16_t)(cut_ma + 10u)) {
+        limit(0, DRIVE_POLICY_LIMIT_TEMPERATURE, cut_ma);
+        ticks(1, 1000);
+        forget();
+        ticks(1, 1020);
+        TEST_ASSERT_EQUAL_UINT(0, occurrences("<"));
+    }
+    ticks(1, 5000);
+    forget();
+    limit(0, DRIVE_POLICY_LIMIT_TEMPERATURE, 1900);
+    ticks(2, 5020);
+    TEST_ASSERT_EQUAL_UINT(0, occurrences("<"));
+    limit(0, DRIVE_POLICY_LIMIT_TEMPERATURE, 1000);
+    ticks(2, 5060);
+    TEST_ASSERT_EQUAL_UINT(1, occurrences("|temperature|cut_a:1.000>"));
+    limit(0, DRIVE_POLICY_LIMIT_TEMPERATURE, 1700);
+    ticks(2, 5100);
+    TEST_ASSERT_EQUAL_UINT(1, occurrences("|temperature|cut_a:1.700>"));
+}
+
+static void limits_that_find_no_room_are_told_later(void)
+{
+    TEST_ASSERT_TRUE(telemetry_set(&telemetry, TELEMETRY_CSV, 5));
+    for (uint8_t k = 0; k < 9; k++) {
+        limit(k, DRIVE_POLICY_LIMIT_OVERLOAD, 500);
+    }
+    for (unsigned tick = 0; tick < 100; tick++) {
+        room = 40;
+        telemetry_tick(&telemetry, &controller, tick * 20u, 0, &output);
+    }
+    TEST_ASSERT_EQUAL_UINT(0, said_length);
+    TEST_ASSERT_EQUAL_UINT16(10, telemetry.dropped); /* CSV lines; what is told later is not */
+    for (unsigned n = 1; n <= 9; n++) {
+        ticks(1, 3000);
+        TEST_ASSERT_EQUAL_UINT(n, occurrences("<limits|spring:")); /* one a tick */
+    }
+    for (char k = '1'; k <= '9'; k++) {
+        char part[] = "<limits|spring:#|t:3.000|overload|cut_a:0.500>\r\n";
+        *strchr(part, '#') = k;
+        TEST_ASSERT_EQUAL_UINT(1, occurrences(part));
+    }
+    ticks(100, 4000);
+    TEST_ASSERT_EQUAL_UINT(9, occurrences("<"));
+}
+
+static void limits_that_toggle_are_told_once_a_period_and_take_no_other_springs_turn(void)
+{
+    for (uint8_t hz = 1; hz <= 50; hz = (uint8_t)(hz + 7u)) {
+        TEST_ASSERT_TRUE(telemetry_set(&telemetry, TELEMETRY_CSV, hz));
+        unsigned toggling = 0;
+        unsigned rows = 0;
+        unsigned last = 0;
+        limit(8, DRIVE_POLICY_LIMIT_NONE, 0);
+        for (unsigned tick = 0; tick < 500; tick++) {
+            for (uint8_t k = 0; k < 8; k++) {
+                const uint8_t now = controller.policy.spring[k].limits;
+                limit(k, now ^ DRIVE_POLICY_LIMIT_SUPPLY, 0);
+            }
+            if (tick == 300) {
+                limit(8, DRIVE_POLICY_LIMIT_CURRENT, 0);
+            }
+            forget();
+            ticks(1, tick * 20u);
+            TEST_ASSERT_LESS_OR_EQUAL_UINT(1, occurrences("<"));
+            rows += occurrences(",ok\r\n");
+            toggling += occurrences("<limits|spring:1|");
+            last += occurrences("<limits|spring:9|");
+        }
+        TEST_ASSERT_EQUAL_UINT(10u * hz, rows);
+        TEST_ASSERT_LESS_OR_EQUAL_UINT(10u * hz, toggling);
+        TEST_ASSERT_EQUAL_UINT(1, last);
+    }
+}
+
+static void all_limits_at_once_fit_and_are_told_whole(void)
+{
+    TEST_ASSERT_TRUE(telemetry_set(&telemetry, TELEMETRY_CSV, 1));
+    limit(8, 255, 3000);
+    ticks(60, 0x7FFFFFFFul - 49u * 20u);
+    TEST_ASSERT_EQUAL_UINT(1, occurrences("<limits|spring:9|t:"));
+    TEST_ASSERT_EQUAL_UINT(1, occurrences("|safety|current|supply|temperature|undriven|overload|"
+                                          "trip|blind|cut_a:3.000>\r\n"));
+}
+
+static void telemetry_that_starts_tells_what_acts(void)
+{
+    limit(1, DRIVE_POLICY_LIMIT_BLIND, 0);
+    for (unsigned n = 1; n <= 3; n++) {
+        TEST_ASSERT_TRUE(telemetry_set(&telemetry, TELEMETRY_CSV, 50));
+        ticks(4, 0);
+        TEST_ASSERT_EQUAL_UINT(n, occurrences("|blind|cut_a:0.000>\r\n"));
+    }
+}
+
+static void teleplot_has_limits_while_they_act_and_once_when_they_have_ended(void)
+{
+    TEST_ASSERT_TRUE(telemetry_set(&telemetry, TELEMETRY_TELEPLOT, 5));
+    ticks(50, 0);
+    TEST_ASSERT_EQUAL_UINT(0, occurrences(">limits") + occurrences(">cut"));
+    limit(8, DRIVE_POLICY_LIMIT_SUPPLY, 2610);
+    ticks(55, 1000); /* the last round needs two ticks */
+    TEST_ASSERT_EQUAL_UINT(5, occurrences(">limits9:"));
+    TEST_ASSERT_EQUAL_UINT(5, occurrences(":4\r\n"));
+    TEST_ASSERT_EQUAL_UINT(5, occurrences(">cut9:"));
+    TEST_ASSERT_EQUAL_UINT(5, occurrences(":2.610\r\n"));
+    limit(8, DRIVE_POLICY_LIMIT_NONE, 0);
+    forget();
+    ticks(50, 2000);
+    TEST_ASSERT_EQUAL_UINT(1, occurrences(">limits"));
+    TEST_ASSERT_NOT_NULL(strstr(said, ">limits9:2100:0\r\n"));
+    TEST_ASSERT_EQUAL_UINT(1, occurrences(">cut"));
+    TEST_ASSERT_NOT_NULL(strstr(said, ">cut9:2100:0.000\r\n"));
+    TEST_ASSERT_EQUAL_UINT16(0, telemetry.dropped);
+}
+
+/* The longest piece of it, whole. */
+static void teleplots_longest_lines_are_whole(void)
+{
+    controller.measured_ma[8] = -32768;
+    controller.model.state.spring[8].temperature_c23 = -40 * 8388608;
+    controller.safety.spring[8].fault = SAFETY_FAULT_EMERGENCY_STOP;
+    limit(8, 255, 3000);
+    TEST_ASSERT_TRUE(telemetry_set(&telemetry, TELEMETRY_TELEPLOT, 50));
+    room = 8000;
+    telemetry_tick(&telemetry, &controller, 0x7FFFFFFFul, 0, &output);
+    TEST_ASSERT_NOT_NULL(strstr(said, ">i9:2147483647:-32.768\r\n"));
+    TEST_ASSERT_NOT_NULL(strstr(said, ">m9:2147483647:-40.00\r\n"));
+    TEST_ASSERT_NOT_NULL(strstr(said, ">limits9:2147483647:255\r\n"));
+    TEST_ASSERT_NOT_NULL(strstr(said, ">cut9:2147483647:3.000\r\n"));
+    TEST_ASSERT_NOT_NULL(strstr(said, ">fan:2147483647:0.00\r\n"));
+    TEST_ASSERT_NOT_NULL(strstr(said, ">fault:2147483647:13\r\n"));
+    TEST_ASSERT_EQUAL_UINT(22, lines());
+}
+
 static void off_says_nothing_and_bad_settings_are_refused(void)
 {
     telemetry_tick(&telemetry, &controller, 0, 0, &output);
@@ -161,6 +373,16 @@ int main(void)
     RUN_TEST(a_line_without_room_is_dropped_whole_and_counted);
     RUN_TEST(every_rate_gives_that_many_lines_a_second);
     RUN_TEST(teleplot_lines_are_name_ms_value);
+    RUN_TEST(a_round_of_teleplot_goes_on_where_it_found_no_room);
+    RUN_TEST(what_of_a_round_found_no_room_is_dropped_and_every_spring_has_its_turn);
+    RUN_TEST(csv_tells_a_limit_once_when_it_begins_and_once_when_it_ends);
+    RUN_TEST(csv_tells_again_when_the_cut_has_changed_by_half_an_ampere);
+    RUN_TEST(limits_that_find_no_room_are_told_later);
+    RUN_TEST(limits_that_toggle_are_told_once_a_period_and_take_no_other_springs_turn);
+    RUN_TEST(all_limits_at_once_fit_and_are_told_whole);
+    RUN_TEST(telemetry_that_starts_tells_what_acts);
+    RUN_TEST(teleplot_has_limits_while_they_act_and_once_when_they_have_ended);
+    RUN_TEST(teleplots_longest_lines_are_whole);
     RUN_TEST(off_says_nothing_and_bad_settings_are_refused);
     return UNITY_END();
 }
