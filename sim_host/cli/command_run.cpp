@@ -149,6 +149,9 @@ struct spring_summary {
     std::string fault = "none";
 };
 
+/* Columns of a spring that are known when a row begins. */
+constexpr std::size_t BEGIN_VALUES = 8;
+
 class recorder
 {
 public:
@@ -181,7 +184,9 @@ public:
         each("p{}_c", 3);
         each("px{}", 4);
         each("s{}_a", 3);
-        begin_row_values_.resize(static_cast<std::size_t>(springs_) * 6);
+        each("limits{}", 0);
+        each("cut{}_a", 3);
+        begin_row_values_.resize(static_cast<std::size_t>(springs_) * BEGIN_VALUES);
     }
 
     /* What is known at the row's own time; its currents are those of the interval that begins. */
@@ -193,7 +198,7 @@ public:
         ambient_c_ = board.ambient_c();
         for (int k = 0; k < springs_; ++k) {
             const runner_spring reading = board.spring(k);
-            double *values = &begin_row_values_[static_cast<std::size_t>(k) * 6];
+            double *values = &begin_row_values_[static_cast<std::size_t>(k) * BEGIN_VALUES];
             values[0] = plant_measured_c(board.plant(), k) +
                         plan_.noise_temperature_c * electrics_noise_normal(&noise_);
             values[1] = reading.model_c;
@@ -201,6 +206,8 @@ public:
             values[3] = plant_temperature_c(board.plant(), k);
             values[4] = plant_austenite(board.plant(), k);
             values[5] = reading.target_a;
+            values[6] = reading.limits;
+            values[7] = reading.cut_a;
         }
     }
 
@@ -244,7 +251,7 @@ public:
         column_of(row, 0);
         row.push_back(fan_);
         row.push_back(ambient_c_);
-        for (std::size_t which = 1; which < 6; ++which) {
+        for (std::size_t which = 1; which < BEGIN_VALUES; ++which) {
             column_of(row, which);
         }
         log_.row(row);
@@ -288,7 +295,7 @@ private:
     void column_of(std::vector<double> &row, std::size_t which) const
     {
         for (std::size_t k = 0; k < static_cast<std::size_t>(springs_); ++k) {
-            row.push_back(begin_row_values_[k * 6 + which]);
+            row.push_back(begin_row_values_[k * BEGIN_VALUES + which]);
         }
     }
 

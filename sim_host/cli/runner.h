@@ -30,6 +30,8 @@ struct runner_spring {
     double target_a;
     double model_c;
     double model_austenite; /* 0..1 */
+    std::uint8_t limits;    /* bits of drive_policy_limit_t */
+    double cut_a;           /* by which they cut what the policy would give */
     std::string fault;      /* "none", or a name of docs/codes.csv */
 };
 

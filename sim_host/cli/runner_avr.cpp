@@ -28,7 +28,18 @@ struct plant_copy_deleter {
 /* A line worth the user's eye: neither the answer that all is well nor a line of telemetry. */
 bool is_news(const std::string &line)
 {
-    return !line.empty() && line != "ok" && line[0] != '>' && (line[0] < '0' || line[0] > '9');
+    return !line.empty() && line != "ok" && line[0] != '>' && (line[0] < '0' || line[0] > '9') &&
+           line.rfind("<limits|", 0) != 0;
+}
+
+/* By the policy's own function, from the few numbers that it looks at. */
+std::uint16_t cut_ma(const board_view_spring_t &seen)
+{
+    static drive_policy_t policy;
+    policy.spring[0].limits = seen.limits;
+    policy.spring[0].wanted_ma = seen.wanted_ma;
+    policy.spring[0].target_ma = seen.target_ma;
+    return drive_policy_cut_ma(&policy, 0);
 }
 
 class avr_runner : public runner
@@ -98,6 +109,8 @@ public:
                 seen.target_ma / 1000.0,
                 seen.temperature_c7 / 128.0,
                 austenite(k),
+                seen.limits,
+                cut_ma(seen) / 1000.0,
                 safety_fault_name(static_cast<safety_fault_t>(seen.fault))};
     }
 

@@ -105,6 +105,8 @@ public:
                 controller_target_ma(controller, index) / 1000.0,
                 controller_temperature_c7(controller, index) / 128.0,
                 controller_austenite_permille(controller, index) / 1000.0,
+                controller_limits(controller, index),
+                controller_cut_ma(controller, index) / 1000.0,
                 safety_fault_name(controller_fault(controller, index))};
     }
 

@@ -198,8 +198,8 @@ std::vector<double> *values_of(log_data &log, const column &which)
     return nullptr;
 }
 
-/* A column that the simulator (m{k}_c, x{k}, p{k}_c, px{k}, s{k}_a, y{k}_c) or the board (m{k}_c,
- * d{k}, state) writes beside the measured ones, or note_...: skipped. */
+/* A column that the simulator (m{k}_c, x{k}, p{k}_c, px{k}, s{k}_a, limits{k}, cut{k}_a, y{k}_c) or
+ * the board (m{k}_c, d{k}, state) writes beside the measured ones, or note_...: skipped. */
 bool is_skipped(std::string_view name)
 {
     if (name.substr(0, 5) == "note_" || name == "state") {
@@ -209,8 +209,15 @@ bool is_skipped(std::string_view name)
         const char *prefix;
         const char *suffix;
     };
-    static constexpr std::array<form, 7> forms = {
-        {{"m", "_c"}, {"x", ""}, {"p", "_c"}, {"px", ""}, {"s", "_a"}, {"y", "_c"}, {"d", ""}}};
+    static constexpr std::array<form, 9> forms = {{{"m", "_c"},
+                                                   {"x", ""},
+                                                   {"p", "_c"},
+                                                   {"px", ""},
+                                                   {"s", "_a"},
+                                                   {"limits", ""},
+                                                   {"cut", "_a"},
+                                                   {"y", "_c"},
+                                                   {"d", ""}}};
     for (const form &one : forms) {
         if (numbered(name, one.prefix, one.suffix) != 0) {
             return true;

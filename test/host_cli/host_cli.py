@@ -385,6 +385,16 @@ class Run(Case):
         self.assertEqual(faults, named + ["sensor_bus"] * 5)
         self.assertEqual(result["board_fault"], "emergency_stop")
 
+    def test_limits_and_what_they_cut_are_columns(self) -> None:
+        rows = rows_of_text(self.run_it("a.csv", "--policy", "precompensate"))
+        self.assertEqual({rows[1][f"limits{k}"] for k in range(1, 10)}, {"0"})
+        # 14.8 A are four boosts of 3 A and most of a fifth: the supply limits that one and the three that wait.
+        waiting = [k for k in range(1, 10) if int(rows[8][f"limits{k}"]) & 4]
+        self.assertEqual(len(waiting), 4)
+        cut = sorted(float(rows[8][f"cut{k}_a"]) for k in waiting)
+        self.assertTrue(0.1 < cut[0] < 0.4, cut)
+        self.assertEqual(cut[1:], [3.0] * 3)
+
     def test_a_fan_that_stands_does_not_cool(self) -> None:
         scenario = SCENARIO + "at 2 = fan 100\n{}"
         cooled = rows_of_text(self.run_it("a.csv", scenario=scenario.format("")))

@@ -64,8 +64,10 @@ void log_of_two_springs_is_read(void)
 {
     const log_data log = parse_log(make_text_file(
         "a.csv", "\xEF\xBB\xBF# board: 7\r\n# no colon here\r\ntime_s, i1_a,v1_v,u2,t1_c,t2_c,fan,"
-                 "ambient_c,m1_c,d1,state,note_who\r\n0,1.5,0.26,0.5,20,,0,21,20,0.5,ok,me\r\n\r\n"
-                 "0.5,\"1.25\",0.25,1,20.5,30,1,21.5,x,0.5,ok,you"));
+                 "ambient_c,m1_c,d1,limits1,cut1_a,state,note_who\r\n"
+                 "0,1.5,0.26,0.5,20,,0,21,20,0.5,0,0.000,ok,me\r\n\r\n"
+                 "# <limits|spring:1|t:0.480|supply|cut_a:0.500>\r\n"
+                 "0.5,\"1.25\",0.25,1,20.5,30,1,21.5,x,0.5,4,0.500,ok,you"));
     TEST_ASSERT_EQUAL(2, log.springs.size());
     TEST_ASSERT_EQUAL(2, log.time_s.size());
     TEST_ASSERT_EQUAL_DOUBLE(1.25, log.springs[0].current_a[1]);

@@ -364,7 +364,8 @@ def test_a_file_that_is_no_settings_is_refused_before_the_board_is_asked(tmp_pat
 
 def test_record_keeps_whole_rows_that_rise_and_sends_the_steps_in_their_time(tmp_path: Path) -> None:
     rows = [TELEMETRY, "ok", "7.0,1,0.2,20,0,20,ok", "7.5,1,0.2,20,0,20,ok", "7.5,1,0.2,20,0,20,ok", "8.0,1,0."]
-    board = FakeBoard({"telemetry csv 2": [*rows, "[remark]", "8.5,1,0.2,21,0,20,ok"]})
+    status = "<limits|spring:1|t:8.000|supply|cut_a:2.610>"
+    board = FakeBoard({"telemetry csv 2": [*rows, "[remark]", status, "<limits|spr", "8.5,1,0.2,21,0,20,ok"]})
     (tmp_path / "steps.txt").write_text("ambient 21.5\nat 0.5 = on 1   ; the first\nat 1.5 = fan 100\nat 90 = on 2\n")
     log = tmp_path / "log.csv"
     done = ninespring(
@@ -373,6 +374,7 @@ def test_record_keeps_whole_rows_that_rise_and_sends_the_steps_in_their_time(tmp
     assert done.returncode == 0, done.stderr
     lines = log.read_text().splitlines()
     assert "# dropped_lines: 2" in lines
+    assert lines[-2:] == [f"# {status}", "8.5,1,0.2,21,0,20,ok"]
     assert [line.split(",")[0] for line in lines if not line.startswith("#")] == ["time_s", "7.0", "7.5", "8.5"]
     at = [board.seen.index(word) for word in ("ambient 21.5", "telemetry csv 2", "on 1", "fan 100", "off all")]
     assert at == sorted(at)

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from ninespring import native
 from ninespring.errors import InputError
 from ninespring.fitting import simulate_run
-from ninespring.logs import condense, log_text, read_log
+from ninespring.logs import condense, log_text, read_log, read_table
 
 HEADER = "time_s,i1_a,t1_c\n"
 SWAP = (("i", "a", "v", "v"), ("v", "v", "i", "a"))
@@ -125,9 +125,21 @@ def test_a_glitch_is_left_out_and_nothing_else(make_log) -> None:
 def test_columns_of_the_simulator_are_skipped(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     path.write_text(
-        "time_s,i1_a,m1_c,d1,t1_c,state,note_x\n0,1,20,0.5,20,ok,1\n1,1,20,0.5,20,ok,1\n2,1,20,0.5,20,locked,1\n"
+        "time_s,i1_a,m1_c,d1,limits1,cut1_a,t1_c,state,note_x\n"
+        "0,1,20,0.5,4,1,20,ok,1\n1,1,20,0.5,0,0,20,ok,1\n2,1,20,0.5,0,0,20,locked,1\n"
     )
     assert read_log(path).springs == 1
+
+
+def test_status_between_the_rows_is_no_key_of_the_log(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text("# board: 7\n" + HEADER + "0,1,20\n# <limits|spring:1|t:0.900|supply|cut_a:2.610>\n1,1,20\n2,1,x\n")
+    with pytest.raises(InputError) as caught:
+        read_log(path)
+    assert caught.value.line == 6
+    path.write_text(path.read_text().replace("x", "21"))
+    assert read_log(path).temperature_c[:, 0].tolist() == [20, 20, 21]
+    assert read_table(path).keys == {"board": "7"}
 
 
 def test_fast_logs_are_averaged_without_a_shift_and_with_white_noise(tmp_path: Path) -> None:

@@ -82,7 +82,10 @@ class Board:
         raise WorkError(f"no answer to '{line}'")
 
     def telemetry(self, hz: int, until: float) -> Iterator[str]:
-        """Switch CSV telemetry on and yield its lines, the header first, until that monotonic time."""
+        """Switch CSV telemetry on and yield its lines, the header first, and status in angle brackets, until that time.
+
+        The time is monotonic.
+        """
         for line in self.ask(f"telemetry csv {hz}"):
             if line.startswith("time_s,"):
                 yield line
@@ -94,7 +97,8 @@ class Board:
                 return
             if match := ERROR.match(line):
                 raise WorkError(f"the board refuses what it was sent: error {match[1]} {match[2]}".rstrip())
-            if line and line[0] not in "[<>" and line != "ok":
+            status = line.startswith("<") and line.endswith(">")
+            if status or (line and line[0] not in "[<>" and line != "ok"):
                 yield line
 
     def send(self, line: str) -> None:
@@ -169,7 +173,7 @@ def record(
 ) -> Recording:
     """Write a log's lines from a board's telemetry as they come: header and rows that are whole and rise in time.
 
-    Steps without a time are sent first; timed ones in between, by the board's clock. What is driven by steps is switched
+    Status between the rows, such as which limits act on a spring, becomes comments. Steps without a time are sent first; timed ones in between, by the board's clock. What is driven by steps is switched
     off at the end. WorkError where no row came.
     """
     got = Recording()
@@ -187,6 +191,9 @@ def record(
                     write(line)
                 continue
             if not header:
+                continue
+            if line.startswith("<"):
+                write(f"# {line}")
                 continue
             try:
                 now = float(line.split(",", 1)[0])

@@ -35,7 +35,7 @@ FINEST_S = 1.0
 STRETCH_S = 1500.0
 """Length of the stretches that are taken of a log that is still too long, about."""
 COLUMN = re.compile(r"^(?:time_s|fan|ambient_c|([ivtu])([1-9][0-9]?)_([avc])|u([1-9][0-9]?))$")
-EXTRA = re.compile(r"^(?:[mpy][1-9][0-9]?_c|[xd][1-9][0-9]?|px[1-9][0-9]?|s[1-9][0-9]?_a|state|note_.*)$")
+EXTRA = re.compile(r"^(?:[mpy][1-9][0-9]?_c|(?:[xd]|px|limits)[1-9][0-9]?|(?:s|cut)[1-9][0-9]?_a|state|note_.*)$")
 """Columns that the simulator and the board write beside the measured ones: skipped."""
 UNIT_OF = {"i": "a", "v": "v", "t": "c"}
 LIMITS = {
@@ -146,7 +146,7 @@ class Table:
     lines: np.ndarray
     """1-based line of each row."""
     keys: dict[str, str]
-    """What `# key: value` lines said."""
+    """What `# key: value` lines said above the header."""
     unfinished: bool = False
     """The last line has no end: its last number may have been cut off."""
     cut_off: bool = False
@@ -195,7 +195,7 @@ def read_table(path: str | Path, text_columns: Iterable[str] = (), header_check:
     for number, line in enumerate(lines, start=1):
         if line.startswith("#"):
             name, colon, value = line[1:].partition(":")
-            if colon:
+            if colon and not kept:  # further down a board's status is kept
                 keys.setdefault(name.strip().lower(), value.strip())
         elif line.strip():
             kept.append(line)
