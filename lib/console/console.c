@@ -581,8 +581,8 @@ static void add_limits(text_line_t *line, const controller_t *controller, uint8_
     }
     text_add_flash(line, FLASH_TEXT(", limits"));
     telemetry_add_limits(line, limits, ' ');
-    if (controller_cut_ma(controller, spring) != 0) {
-        const int32_t cut_ma = controller_cut_ma(controller, spring);
+    const int32_t cut_ma = controller_cut_ma(controller, spring);
+    if (cut_ma != 0) {
         text_add_values(line, FLASH_TEXT(": #3 A less"), &cut_ma);
     }
 }

@@ -318,10 +318,10 @@ static void telemetry_that_starts_tells_what_acts(void)
 static void teleplot_has_limits_while_they_act_and_once_when_they_have_ended(void)
 {
     TEST_ASSERT_TRUE(telemetry_set(&telemetry, TELEMETRY_TELEPLOT, 5));
-    ticks(50, 0);
+    ticks(55, 0); /* the last round needs two ticks */
     TEST_ASSERT_EQUAL_UINT(0, occurrences(">limits") + occurrences(">cut"));
     limit(8, DRIVE_POLICY_LIMIT_SUPPLY, 2610);
-    ticks(55, 1000); /* the last round needs two ticks */
+    ticks(50, 1000);
     TEST_ASSERT_EQUAL_UINT(5, occurrences(">limits9:"));
     TEST_ASSERT_EQUAL_UINT(5, occurrences(":4\r\n"));
     TEST_ASSERT_EQUAL_UINT(5, occurrences(">cut9:"));
