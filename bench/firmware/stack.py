@@ -30,7 +30,7 @@ INDIRECT: tuple[tuple[str, tuple[str, ...]], ...] = (
         r"^(console_|out_end|answer|room_for|list_settings|selftest|start_telemetry|end_job|save|print_|apply_settings)",
         OUTPUT,
     ),
-    (r"^(telemetry_|flush|write_csv|write_teleplot)", OUTPUT),
+    (r"^(telemetry_|flush|write_csv|write_spring)", OUTPUT),
     (r"^(settings_|examine|read_values|read_word|next_byte|value_byte|finish)", STORAGE),
     (r"^__vector_39", NOTHING),
     (r"^__do_global_ctors|^__tablejump2__|^__do_global_dtors", (r"^_GLOBAL__sub_I",)),
