@@ -20,7 +20,6 @@
 #define PWM_A_OFF _BV(WGM31)
 #define PWM_B     (_BV(WGM33) | _BV(WGM32) | _BV(CS30))
 #define PWM_COM_A _BV(COM3A1)
-#define PWM_COM_B _BV(COM3B1)
 #define PWM_COM_C _BV(COM3C1)
 
 /* What survives a reset. start_check tells RAM that kept its content from RAM that woke up random.
@@ -168,9 +167,6 @@ static void outputs_init(void)
     ICR3 = PWM_TOP;
     ICR4 = PWM_TOP;
     ICR5 = PWM_TOP;
-    OCR3A = OCR3B = OCR3C = 0;
-    OCR4A = OCR4B = OCR4C = 0;
-    OCR5A = OCR5B = OCR5C = 0;
     TCNT3 = 0;
     TCNT4 = 0;
     TCNT5 = 0;
@@ -185,30 +181,28 @@ static void outputs_init(void)
     OCR1A = 0;
 }
 
-/* COM bit for an output that is on, after its compare value has been set: a fast PWM output is high
- * for OCR + 1 counts, so 0 cannot be had from the timer: there the COM bit is cleared and the pin
- * is low. */
-static __attribute__((noinline)) uint8_t set_compare(volatile uint16_t *compare, uint16_t duty,
-                                                     uint8_t com)
+/* Compare values of one timer's three outputs; returns its mode with the COM bits of those that are
+ * on. A fast PWM output is high for OCR + 1 counts, so 0 cannot be had from the timer: there the
+ * COM bit is cleared and the pin is low. The registers A, B, C follow one another, as do their
+ * bits. */
+static __attribute__((noinline)) uint8_t set_timer(volatile uint16_t *compare,
+                                                   const uint16_t duty[3])
 {
-    if (duty == 0 || duty > BOARD_DUTY_MAX) {
-        return 0;
+    uint8_t mode = PWM_A_OFF;
+    for (uint8_t com = PWM_COM_A; com >= PWM_COM_C; com >>= 2, compare++, duty++) {
+        if (*duty != 0 && *duty <= BOARD_DUTY_MAX) {
+            *compare = *duty - 1u; /* takes effect at the next period */
+            mode |= com;
+        }
     }
-    *compare = duty - 1u; /* takes effect at the next period */
-    return com;
+    return mode;
 }
 
-__attribute__((noinline)) void board_set_duties(const uint16_t duty[BOARD_SPRINGS])
+void board_set_duties(const uint16_t duty[BOARD_SPRINGS])
 {
-    const uint8_t three = (uint8_t)(PWM_A_OFF | set_compare(&OCR3A, duty[0], PWM_COM_A) |
-                                    set_compare(&OCR3B, duty[1], PWM_COM_B) |
-                                    set_compare(&OCR3C, duty[2], PWM_COM_C));
-    const uint8_t four = (uint8_t)(PWM_A_OFF | set_compare(&OCR4A, duty[3], PWM_COM_A) |
-                                   set_compare(&OCR4B, duty[4], PWM_COM_B) |
-                                   set_compare(&OCR4C, duty[5], PWM_COM_C));
-    const uint8_t five = (uint8_t)(PWM_A_OFF | set_compare(&OCR5A, duty[6], PWM_COM_A) |
-                                   set_compare(&OCR5B, duty[7], PWM_COM_B) |
-                                   set_compare(&OCR5C, duty[8], PWM_COM_C));
+    const uint8_t three = set_timer(&OCR3A, &duty[0]);
+    const uint8_t four = set_timer(&OCR4A, &duty[3]);
+    const uint8_t five = set_timer(&OCR5A, &duty[6]);
     ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
     {
         if (!stop_pending) {

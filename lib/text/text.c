@@ -11,10 +11,14 @@ static const uint32_t powers[MOST_DIGITS] FLASH_MEMORY = {
 /* size = 10 size + digit. Fails if and only if that is above LARGEST; then size is as before. */
 static bool append_digit(uint32_t *size, uint8_t digit)
 {
-    if (*size > LARGEST / 10u || (*size == LARGEST / 10u && digit > LARGEST % 10u)) {
+    if (*size > LARGEST / 10u) {
         return false;
     }
-    *size = *size * 10u + digit;
+    const uint32_t longer = *size * 10u + digit;
+    if (longer > LARGEST) {
+        return false;
+    }
+    *size = longer;
     return true;
 }
 
