@@ -32,6 +32,8 @@
 #define PHASE_FALSE       (-1200) /* no such alloy: the voltage is wrong, and the power with it */
 #define PHASE_FALSE_NOISY (-250)  /* nor one that changes so from one window to the next */
 
+#define LOW_WINDOWS 3 /* in a hold */
+
 #define MODEL_FULL_PERMILLE 985
 #define RATIO_FULL_PERMILLE 900
 #define PLATEAU_BOOST       12 /* less than this in a window: the transformation is over */
@@ -44,11 +46,13 @@
 #define SEEN_WINDOWS      4
 #define PAUSE_WINDOWS     12
 #define LOSS_CERTAIN      10  /* at once */
-#define SUSPICION_64UW    470 /* 30 mW stop a fall of 0.1 K/s */
+#define SUSPICION_64UW    600 /* 30 mW stop a fall of 0.1 K/s */
 #define FOLLOWED_MOST     12  /* 2^-14 of the ratio: three permille */
 #define FULL_MINUTE       60u
-#define LOSS_CONFIRMED    4 /* what a true sighting comes to once the average has settled */
+#define LOSS_PAUSED       4 /* still seen after the pause */
+#define LOSS_CONFIRMED    3 /* what a true sighting comes to once the average has settled */
 #define LOSS_REHEAT       18
+#define LOSS_RESTORED     8 /* heated again, once the loss is confirmed */
 #define LOSS_IMPOSSIBLE   250
 #define GAIN_IMPLAUSIBLE  45
 #define REFERENCE_WINDOWS 40u
@@ -61,8 +65,8 @@
 #define CERTAIN_C7         (20 * KELVIN_C7) /* below austenite start: martensite for certain */
 #define SHORT_MOST_C7      (20 * KELVIN_C7)
 #define KEPT_C7            (3 * KELVIN_C7) /* above austenite start what was reached is worth keeping */
-#define WAITING_C7         (9 * KELVIN_C7 / 2) /* margin while others wait for their boost */
-#define WAITING_RISE_C7    8                   /* and its rise in a second */
+#define WAITING_C7         (5 * KELVIN_C7) /* margin while others wait for their boost */
+#define WAITING_RISE_C7    8               /* and its rise in a second */
 #define SETTLED_C7         (3 * KELVIN_C7 / 2)
 #define AFTER_BOOST_C7     (4 * KELVIN_C7) /* margin added until the heating has settled */
 #define BLIND_OVERSHOOT_C7 (4 * KELVIN_C7)
@@ -85,9 +89,9 @@ enum {
     FLAG_LET_GO = 2,   /* the resistance contradicts the model: not used until cold */
     FLAG_RELEASED = 4, /* switched off hot: no false actuation */
     FLAG_TRIPPED = 8,
-    FLAG_DOUBT = 16, /* martensite start was seen, but the average has not settled */
-    FLAG_FALSE =
-        32 /* what is read is no resistance of this alloy: voltage times current is no power */
+    FLAG_DOUBT = 16,    /* martensite start was seen, but the average has not settled */
+    FLAG_FALSE = 32,    /* what is read is no resistance of this alloy, its product no power */
+    FLAG_SEEN_ONCE = 64 /* martensite start, and the average did not confirm it */
 };
 
 static int16_t clamp16(int32_t value, int16_t low, int16_t high)
@@ -217,6 +221,8 @@ void drive_policy_prepare(drive_policy_t *policy, const thermal_model_t *model)
     policy->correction_q8 = (uint16_t)((uint32_t)c7_of_cc(width_cc) * 128u / 1000u);
     /* 35 % of the declared loss */
     policy->bias_limit_uw_per_k = (int16_t)((uint32_t)m->loss_uw_per_k * 23u >> 6);
+    /* the heat of a fall of 0.04 K/s over the 60 K that correct_hold works with */
+    policy->falling_uw_per_k = (int16_t)((uint32_t)m->heat_capacity_mj_per_k * 170u >> 8);
     width_cc = (int16_t)(m->martensite_start_cc - m->martensite_finish_cc);
     policy->event_c7 = c7_of_cc((int32_t)width_cc * 55 / 1000);
 
@@ -295,8 +301,10 @@ static OWN void correct_heating(const drive_policy_t *policy, drive_policy_sprin
     int16_t now_c7 = thermal_model_temperature_c7(model, k);
     int16_t error = (int16_t)(phase - permille);
     int16_t move_c7 = 0;
-    if (phase > PHASE_SEEN && error > PHASE_DEADBAND && now_c7 < model->austenite_start_c7) {
-        move_c7 = (int16_t)(model->austenite_start_c7 + KELVIN_C7 - now_c7);
+    if (now_c7 < model->austenite_start_c7) {
+        if (error > PHASE_DEADBAND && phase > PHASE_SEEN) {
+            move_c7 = (int16_t)(model->austenite_start_c7 + KELVIN_C7 - now_c7);
+        } /* too little phase below austenite start is memory, and heating brings it */
     } else if (phase < 1000 - PHASE_MISSING && now_c7 > model->austenite_finish_c7) {
         move_c7 = (int16_t)(model->austenite_finish_c7 - KELVIN_C7 / 2 - now_c7);
     } else if (error > PHASE_DEADBAND || error < -PHASE_DEADBAND) {
@@ -397,19 +405,19 @@ static void enter(drive_policy_t *policy, uint8_t k, drive_policy_stage_t stage)
                            ? (int16_t)(policy->hold_margin_c7 + AFTER_BOOST_C7)
                            : policy->unsure_margin_c7;
     }
+    s->floor_ma = s->stage == DRIVE_POLICY_STAGE_HOLD ? s->wanted_ma : 0; /* until its turn */
     s->stage = (uint8_t)stage;
     s->wanted_ma = stage == DRIVE_POLICY_STAGE_HEAT  ? policy->parameters.boost_current_ma
                    : stage == DRIVE_POLICY_STAGE_OFF ? 0
                                                      : policy->parameters.probe_current_ma;
     s->corrected_c7 = 0;
-    s->flags &= (uint8_t)~FLAG_DOUBT;
+    s->flags &= (uint8_t) ~(FLAG_DOUBT | FLAG_SEEN_ONCE);
     s->lost_permille = 0;
     s->reference = 0;
     s->plateau = 0;
     s->held = 0;
     s->suspicion = 0;
     s->seen = 0;
-    s->floor_ma = 0;
 }
 
 /* What heats a spring at a temperature, against its neighbours as they are now, plus a correction
@@ -478,8 +486,8 @@ static OWN bool has_heated(drive_policy_t *policy, drive_policy_spring_t *s, the
 {
     int16_t now_c7 = thermal_model_temperature_c7(model, k);
     int16_t permille = model_permille(model, k);
-    if (fresh && s->fresh >= FRESH_WINDOWS && permille == 0 &&
-        now_c7 < model->austenite_start_c7 - CERTAIN_C7) {
+    bool certain = permille == 0 && now_c7 < model->austenite_start_c7 - CERTAIN_C7;
+    if (certain && fresh && s->fresh >= FRESH_WINDOWS) {
         resistance_observer_learn_martensite(&s->observer, &policy->alloy);
     }
     bool sees = trusted(policy, s);
@@ -490,7 +498,8 @@ static OWN bool has_heated(drive_policy_t *policy, drive_policy_spring_t *s, the
         watch_plateau(policy, s);
     }
     if (fresh) {
-        if (sees && s->reference != 0) {
+        if (sees && s->reference != 0 && !certain &&
+            s->target_ma >= 2u * policy->parameters.probe_current_ma) {
             correct_heating(policy, s, model, k, phase, permille);
         } else if (sees && now_c7 > model->martensite_start_c7) {
             s->reference = 1; /* the first look at it, if it was not cold before */
@@ -528,8 +537,8 @@ static OWN void heat(drive_policy_t *policy, drive_policy_spring_t *s, thermal_m
             s->wanted_ma = keeps_ma;
         }
         /* what it has is kept while it waits */
-        bool has = trusted(policy, s) ? s->observer.phase_permille > level >> 1
-                                      : now_c7 > model->austenite_start_c7 + KEPT_C7;
+        int16_t phase = trusted(policy, s) ? s->observer.phase_permille : model_permille(model, k);
+        bool has = phase > level >> 1 || now_c7 > model->austenite_start_c7 + KEPT_C7;
         s->floor_ma = waits && has ? keeps_ma : 0;
     } else if (has_heated(policy, s, model, k, level, fresh)) {
         enter(policy, k, DRIVE_POLICY_STAGE_HOLD);
@@ -563,14 +572,16 @@ static bool is_pausing(const drive_policy_spring_t *s)
 static OWN void take_reference(drive_policy_t *policy, drive_policy_spring_t *s)
 {
     if ((s->flags & FLAG_DOUBT) != 0) {
-        s->flags &= (uint8_t)~FLAG_DOUBT;
         int16_t lost = (int16_t)-resistance_observer_drift_permille(&s->observer, &policy->alloy,
                                                                     s->reference_q14);
-        if (lost < LOSS_CONFIRMED) {
-            s->flags &= (uint8_t)~FLAG_LEARNT;
-            lost = 0;
+        if ((s->flags & FLAG_SEEN_ONCE) != 0) {
+            s->lost_permille = LOSS_RESTORED; /* seen twice at one place: of both, too little */
+        } else if (lost >= LOSS_CONFIRMED) {
+            s->lost_permille = (int16_t)(s->lost_permille + lost);
+        } else {
+            s->flags = (uint8_t)((s->flags & ~FLAG_LEARNT) | FLAG_SEEN_ONCE);
         }
-        s->lost_permille = (int16_t)(s->lost_permille + lost);
+        s->flags &= (uint8_t)~FLAG_DOUBT;
     }
     s->followed = 0;
     s->reference_q14 = (uint16_t)(s->observer.slow_q22 >> 8);
@@ -590,6 +601,9 @@ static OWN void watch_hold(drive_policy_t *policy, drive_policy_spring_t *s, the
         }
         if (s->reference == REFERENCE_WINDOWS) {
             take_reference(policy, s);
+            if (full && s->lost_permille >= LOSS_RESTORED) {
+                enter(policy, k, DRIVE_POLICY_STAGE_HEAT);
+            }
         }
         return;
     }
@@ -605,24 +619,36 @@ static OWN void watch_hold(drive_policy_t *policy, drive_policy_spring_t *s, the
         return;
     }
     bool searches = (s->flags & FLAG_LEARNT) == 0;
+    /* from a boost, with a loss that is known: what the average does now is its own */
+    bool coasts = !searches && now_c7 > start_c7 + policy->hold_margin_c7 + KELVIN_C7;
     if ((searches || now_c7 > start_c7) && s->suspicion == 0 && (s->fresh & 7u) == 0) {
         /* the sensor's steps let the average wander as the current changes: 0.1 permille a second
          * is followed, a loss is ten times faster; once it is held still not for ever */
         uint16_t slow_q14 = (uint16_t)(s->observer.slow_q22 >> 8);
-        if (slow_q14 > s->reference_q14 && (searches || s->followed < FOLLOWED_MOST)) {
+        bool freely = searches || coasts;
+        if (slow_q14 > s->reference_q14 && (freely || s->followed < FOLLOWED_MOST)) {
             s->reference_q14++;
-            s->followed = (int8_t)(s->followed + !searches);
-        } else if (slow_q14 < s->reference_q14 && (searches || s->followed > -FOLLOWED_MOST)) {
+            s->followed = (int8_t)(s->followed + !freely);
+        } else if (slow_q14 < s->reference_q14 && (freely || s->followed > -FOLLOWED_MOST)) {
             s->reference_q14--;
-            s->followed = (int8_t)(s->followed - !searches);
+            s->followed = (int8_t)(s->followed - !freely);
         }
+    }
+    if (coasts) {
+        s->suspicion = 0;
+        return;
     }
     s->suspicion = loss < LOSS_SUSPECTED      ? 0
                    : s->suspicion < UINT8_MAX ? (uint8_t)(s->suspicion + 1)
                                               : UINT8_MAX;
     s->seen = loss < LOSS_SEEN ? 0 : (uint8_t)(s->seen + 1);
-    if (loss >= LOSS_CERTAIN || s->seen > SEEN_WINDOWS) {
+    if (loss >= LOSS_CERTAIN || s->seen > SEEN_WINDOWS ||
+        (searches && s->suspicion > PAUSE_WINDOWS && loss >= LOSS_PAUSED)) {
         correct_hold(policy, s, model, k, (int16_t)(start_c7 - policy->event_c7), full);
+        if (s->margin_c7 < 0 && s->bias_uw_per_k < 0) {
+            /* pulled below start it was falling: not all of the bias is steady loss */
+            s->bias_uw_per_k = clamp16(s->bias_uw_per_k + policy->falling_uw_per_k, INT16_MIN, 0);
+        }
         s->reference = 0; /* the average lags: a new one once it has settled */
         s->suspicion = 0;
         s->seen = 0;
@@ -695,12 +721,14 @@ static OWN void hold(drive_policy_t *policy, drive_policy_spring_t *s, thermal_m
         full ? (int16_t)(s->full_permille - (coarse ? COARSE_BAND_PERMILLE : FULL_BAND_PERMILLE))
              : (int16_t)(level - LEVEL_BAND_PERMILLE -
                          (s->reference < REFERENCE_WINDOWS ? LEVEL_BAND_PERMILLE : 0));
-    if (full && phase < least - LOSS_IMPOSSIBLE) {
-        let_go(policy, s, model, true); /* no hold loses so much between two looks */
-        return;
-    }
-    if (phase < least) {
-        enter(policy, k, DRIVE_POLICY_STAGE_HEAT);
+    if (phase >= least) {
+        s->plateau = 0;
+    } else if (fresh && ++s->plateau >= LOW_WINDOWS) { /* one alone may be a coarse reading */
+        if (full && phase < least - LOSS_IMPOSSIBLE) {
+            let_go(policy, s, model, true); /* no hold loses so much between two looks */
+        } else {
+            enter(policy, k, DRIVE_POLICY_STAGE_HEAT);
+        }
         return;
     }
     if (!full && phase > level + LEVEL_BAND_PERMILLE) {

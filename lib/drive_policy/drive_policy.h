@@ -100,7 +100,7 @@ typedef struct {
     uint8_t held;      /* seconds in this hold, saturating */
     int8_t followed;   /* steps that reference_q14 has wandered */
     uint8_t reference; /* windows that went into reference_q14 */
-    uint8_t plateau;   /* half seconds of constant resistance */
+    uint8_t plateau;   /* windows: of constant resistance; in a hold, of too little phase */
     uint8_t suspicion; /* windows in which this hold may be losing phase */
     uint8_t seen;      /* windows in which it does for certain */
     uint8_t derating;  /* limits behind ceiling_ma */
@@ -140,7 +140,8 @@ typedef struct {
     uint16_t correction_q8; /* Q9.7 K per permille of phase */
     uint16_t derating_gain; /* 2^16 over the band */
     int16_t bias_limit_uw_per_k;
-    int16_t event_c7; /* how far below martensite start its crossing is seen */
+    int16_t falling_uw_per_k; /* loss that a spring seems to lack while it is pulled below start */
+    int16_t event_c7;         /* how far below martensite start its crossing is seen */
     int16_t hold_margin_c7;
     int16_t unsure_margin_c7;
     int16_t search_c7; /* per second */
