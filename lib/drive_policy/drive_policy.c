@@ -696,6 +696,10 @@ static OWN void hold(drive_policy_t *policy, drive_policy_spring_t *s, thermal_m
         s->held++;
     }
     if (!trusted(policy, s)) {
+        if ((s->flags & FLAG_DOUBT) != 0) { /* what was seen last may have been the same lie */
+            s->flags &= (uint8_t) ~(FLAG_DOUBT | FLAG_LEARNT);
+            s->bias_uw_per_k = 0;
+        }
         if (s->margin_c7 > policy->unsure_margin_c7) {
             s->margin_c7 = (int16_t)(s->margin_c7 - (int16_t)(policy->round & 1u));
         } else if (s->fresh >= FRESH_WINDOWS) {
