@@ -138,7 +138,8 @@ void nominal_rows(table_t &table, const options_t &options)
     add_three(table, "the same, of B105's", "1", "<= 0.75",
               [&](std::size_t d) { return (eight[d].end_c[centre] - 20.0) / kept_k; });
 
-    for (const auto &[name, spring] : {std::pair("centre", centre), std::pair("corner", 0)}) {
+    for (const auto &[name, spring] :
+         {std::pair("centre", centre), std::pair("edge", 1), std::pair("corner", 0)}) {
         wanted.pattern = 1u << spring;
         const three_t one = run_three(wanted);
         add_three(table, fmt::format("one spring ({}) from 20 degC to 99 % austenite", name), "s",
@@ -150,6 +151,23 @@ void nominal_rows(table_t &table, const options_t &options)
     const three_t nine = run_three(wanted);
     add_three(table, "all nine, within 15 A (B105: 1.67 A each, B1.5: 1.5 A each)", "s", "<= 65",
               [&](std::size_t d) { return slowest_s(nine[d], all); });
+    wanted = {};
+    wanted.seed = options.seed;
+    wanted.pattern = 1u << centre;
+    wanted.band_from_s = 270.0; // the search is over
+    for (const bool neighbours : {false, true}) {
+        wanted.command = [=](controller_t &controller, double time_s) {
+            for (int k = 0; k < springs; k++)
+                if (k != centre)
+                    controller_set_target(&controller, static_cast<std::uint8_t>(k),
+                                          neighbours && time_s >= 300.0 && time_s < 500.0 ? 1000
+                                                                                          : 0);
+        };
+        const outcome_t one = run(wanted);
+        table.add(neighbours ? "  the same, all eight neighbours switched on, and off after 200 s"
+                             : "the centre, held: between its coldest and hottest, neighbours off",
+                  one.band_high_c - one.band_low_c, "K", "");
+    }
     table.add("release: centre of eight held, to 99 % martensite", nine[0].release_s, "s", "< B105",
               nine[1].release_s);
 }

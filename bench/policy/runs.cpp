@@ -59,11 +59,17 @@ outcome_t blank()
         result.full_s[k] = result.least_phase[k] = none;
     }
     result.release_s = none;
+    result.band_low_c = 1e9;
+    result.band_high_c = -1e9;
     return result;
 }
 
 void watch(outcome_t &result, const plant_t *plant, const run_t &wanted, double time_s, double dt_s)
 {
+    if (time_s >= wanted.band_from_s) {
+        result.band_low_c = std::min(result.band_low_c, plant_temperature_c(plant, centre));
+        result.band_high_c = std::max(result.band_high_c, plant_temperature_c(plant, centre));
+    }
     for (int k = 0; k < springs; k++) {
         const double phase = plant_austenite(plant, k);
         const double temperature_c = plant_temperature_c(plant, k);

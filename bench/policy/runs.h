@@ -52,6 +52,7 @@ struct outcome_t {
     double least_phase[springs]; // driven: least after 99 % was reached, NaN never
     double highest_c, highest_sum_a, energy_j, undriven_phase;
     double estimate_square_k2, estimate_count; // chip less plant, all springs, every second
+    double band_low_c, band_high_c;            // of the centre, from band_from_s
     double release_s;                          // centre from off to 99 % martensite
     int faults;
 };
@@ -67,7 +68,8 @@ struct run_t {
     release_t release = release_t::no; // the centre, at the end
     double current_a = 1.5;            // plain_current; kept_at_105: until it is there
     double supply_a = none;            // baselines: what the driven springs share evenly at most
-    std::uint64_t seed = 0;            // of the sensors
+    double band_from_s = none;
+    std::uint64_t seed = 0; // of the sensors
     // of a trace
     std::FILE *trace = nullptr;
     double trace_s = 1.0;
