@@ -101,64 +101,60 @@ static int16_t clamp16(int32_t value, int16_t low, int16_t high)
 
 /* ---- parameters ---- */
 
-static bool refuse(uint16_t *bad, size_t offset)
-{
-    if (bad != NULL) {
-        *bad = (uint16_t)offset;
-    }
-    return false;
-}
-
 void drive_policy_parameters_default(drive_policy_parameters_t *parameters)
 {
-    *parameters = (drive_policy_parameters_t){.policy = DRIVE_POLICY_OPEN,
-                                              .open_current_ma = 1500,
-                                              .supply_reserve_ma = 200,
-                                              .boost_current_ma = 3000,
-                                              .probe_current_ma = 400,
-                                              .dither_ma = 300,
-                                              .hold_margin_cc = 250,
-                                              .unsure_margin_cc = 1200,
-                                              .search_mk_per_s = 80,
-                                              .observer = 1,
-                                              .probe_period_s = 0,
-                                              .temperature_limit_cc = 11000,
-                                              .temperature_band_cc = 1000,
-                                              .undriven_margin_cc = 500,
-                                              .overload_current_ma = 14000,
-                                              .overload_time_s = 300,
-                                              .trip_time_s = 30};
+    static const drive_policy_parameters_t usual FLASH_MEMORY = {.policy = DRIVE_POLICY_OPEN,
+                                                                 .open_current_ma = 1500,
+                                                                 .supply_reserve_ma = 200,
+                                                                 .boost_current_ma = 3000,
+                                                                 .probe_current_ma = 400,
+                                                                 .dither_ma = 300,
+                                                                 .hold_margin_cc = 250,
+                                                                 .unsure_margin_cc = 1200,
+                                                                 .search_mk_per_s = 80,
+                                                                 .observer = 1,
+                                                                 .probe_period_s = 0,
+                                                                 .temperature_limit_cc = 11000,
+                                                                 .temperature_band_cc = 1000,
+                                                                 .undriven_margin_cc = 500,
+                                                                 .overload_current_ma = 14000,
+                                                                 .overload_time_s = 300,
+                                                                 .trip_time_s = 30};
+    flash_copy(parameters, &usual, sizeof usual);
 }
 
-static bool outside(int32_t value, int32_t low, int32_t high)
-{
-    return value < low || value > high;
-}
-
-#define REFUSE_UNLESS(field, low, high)                                                            \
-    if (outside(p->field, low, high)) {                                                            \
-        return refuse(bad, offsetof(drive_policy_parameters_t, field));                            \
-    }
+#define RANGE(field, type, minimum, maximum)                                                       \
+    PARAMETER_RANGE(drive_policy_parameters_t, field, type, minimum, maximum)
+const drive_policy_ranges_t drive_policy_ranges FLASH_MEMORY = {
+    RANGE(policy, U8, DRIVE_POLICY_OPEN, DRIVE_POLICY_PRECOMPENSATE),
+    RANGE(open_current_ma, U16, 0, CURRENT_MOST_MA),
+    RANGE(supply_reserve_ma, U16, 0, 10000),
+    RANGE(boost_current_ma, U16, 100, CURRENT_MOST_MA),
+    RANGE(probe_current_ma, U16, 100, 1000),
+    RANGE(dither_ma, U16, 0, 400),
+    RANGE(hold_margin_cc, U16, 50, 3000),
+    RANGE(unsure_margin_cc, U16, 50, 5000),
+    RANGE(search_mk_per_s, U16, 0, 1000),
+    RANGE(observer, U8, 0, 1),
+    RANGE(probe_period_s, U8, 0, 250),
+    RANGE(temperature_limit_cc, S16, -4000, 20000),
+    RANGE(temperature_band_cc, U16, 100, 5000),
+    RANGE(undriven_margin_cc, U16, 0, 5000),
+    RANGE(overload_current_ma, U16, 100, 60000),
+    RANGE(overload_time_s, U16, 1, 3000),
+    RANGE(trip_time_s, U16, 0, 600)};
 
 bool drive_policy_check(const drive_policy_parameters_t *p, uint16_t *bad)
 {
-    REFUSE_UNLESS(policy, DRIVE_POLICY_OPEN, DRIVE_POLICY_PRECOMPENSATE)
-    REFUSE_UNLESS(open_current_ma, 0, CURRENT_MOST_MA)
-    REFUSE_UNLESS(supply_reserve_ma, 0, 10000)
-    REFUSE_UNLESS(boost_current_ma, 100, CURRENT_MOST_MA)
-    REFUSE_UNLESS(probe_current_ma, 100, 1000)
-    REFUSE_UNLESS(dither_ma, 0, 400)
-    REFUSE_UNLESS(hold_margin_cc, 50, 3000)
-    REFUSE_UNLESS(unsure_margin_cc, p->hold_margin_cc, 5000)
-    REFUSE_UNLESS(search_mk_per_s, 0, 1000)
-    REFUSE_UNLESS(observer, 0, 1)
-    REFUSE_UNLESS(probe_period_s, 0, 250)
-    REFUSE_UNLESS(temperature_limit_cc, -4000, 20000)
-    REFUSE_UNLESS(temperature_band_cc, 100, 5000)
-    REFUSE_UNLESS(undriven_margin_cc, 0, 5000)
-    REFUSE_UNLESS(overload_current_ma, 100, 60000)
-    REFUSE_UNLESS(overload_time_s, 1, 3000)
-    REFUSE_UNLESS(trip_time_s, 0, 600)
+    if (!parameter_check(p, &drive_policy_ranges, sizeof drive_policy_ranges, bad)) {
+        return false;
+    }
+    if (p->unsure_margin_cc < p->hold_margin_cc) {
+        if (bad != NULL) {
+            *bad = offsetof(drive_policy_parameters_t, unsure_margin_cc);
+        }
+        return false;
+    }
     return true;
 }
 
@@ -200,11 +196,6 @@ bool drive_policy_init(drive_policy_t *policy, const drive_policy_parameters_t *
     return true;
 }
 
-static int16_t c7_of_cc(int32_t value_cc)
-{
-    return (int16_t)(value_cc * 32 / 25);
-}
-
 void drive_policy_prepare(drive_policy_t *policy, const thermal_model_t *model)
 {
     const drive_policy_parameters_t *p = &policy->parameters;
@@ -216,23 +207,24 @@ void drive_policy_prepare(drive_policy_t *policy, const thermal_model_t *model)
     /* a distance of 1 K is closed with a time constant of 4 s: C / 4 s */
     uint32_t feedback = (uint32_t)m->heat_capacity_mj_per_k * 1000u / (4u * KELVIN_C7);
     policy->feedback_uw_per_c7 = feedback > 16383u ? 16383u : (uint16_t)feedback;
-    int16_t width_cc = (int16_t)(m->austenite_finish_cc - m->austenite_start_cc);
-    /* half of the error in each update */
-    policy->correction_q8 = (uint16_t)((uint32_t)c7_of_cc(width_cc) * 128u / 1000u);
+    /* half of the error in each update: width / 2 / 1000 */
+    uint16_t width_c7 = (uint16_t)(model->austenite_finish_c7 - model->austenite_start_c7);
+    policy->correction_q8 = (uint16_t)((uint32_t)width_c7 * 131u >> 10);
     /* 35 % of the declared loss */
     policy->bias_limit_uw_per_k = (int16_t)((uint32_t)m->loss_uw_per_k * 23u >> 6);
-    /* the heat of a fall of 0.04 K/s over the 60 K that correct_hold works with */
-    policy->falling_uw_per_k = (int16_t)((uint32_t)m->heat_capacity_mj_per_k * 170u >> 8);
-    width_cc = (int16_t)(m->martensite_start_cc - m->martensite_finish_cc);
-    policy->event_c7 = c7_of_cc((int32_t)width_cc * 55 / 1000);
+    /* heat of a fall of 0.04 K/s over the 60 K that correct_hold works with */
+    policy->falling_uw_per_k = (int16_t)((uint32_t)policy->feedback_uw_per_c7 * 87u >> 8);
+    width_c7 = (uint16_t)(model->martensite_start_c7 - model->martensite_finish_c7);
+    policy->event_c7 = (int16_t)((uint32_t)width_c7 * 14u >> 8); /* 5.5 % */
 
-    policy->hold_margin_c7 = c7_of_cc(p->hold_margin_cc);
-    policy->unsure_margin_c7 = c7_of_cc(p->unsure_margin_cc);
-    policy->search_c7 = (int16_t)((int32_t)p->search_mk_per_s * KELVIN_C7 / 1000);
-    policy->limit_c7 = c7_of_cc(p->temperature_limit_cc);
-    uint16_t band_c7 = (uint16_t)c7_of_cc(p->temperature_band_cc);
+    policy->hold_margin_c7 = fixed_point_c7_from_cc((int16_t)p->hold_margin_cc);
+    policy->unsure_margin_c7 = fixed_point_c7_from_cc((int16_t)p->unsure_margin_cc);
+    policy->search_c7 = (int16_t)((uint32_t)p->search_mk_per_s * 131u >> 10);
+    policy->limit_c7 = fixed_point_c7_from_cc((int16_t)p->temperature_limit_cc);
+    uint16_t band_c7 = (uint16_t)fixed_point_c7_from_cc((int16_t)p->temperature_band_cc);
     policy->derating_gain = (uint16_t)(65535u / band_c7);
-    policy->undriven_c7 = c7_of_cc((int32_t)m->austenite_start_cc - p->undriven_margin_cc);
+    policy->undriven_c7 =
+        fixed_point_c7_from_cc((int16_t)(m->austenite_start_cc - (int16_t)p->undriven_margin_cc));
     policy->overload_half_quarters = (uint16_t)(p->overload_time_s * 2u);
     policy->overload_gain = (uint16_t)(65535u / policy->overload_half_quarters);
     policy->prepared = true;

@@ -10,6 +10,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "parameter.h"
 #include "resistance_observer.h"
 #include "supply_share.h"
 #include "thermal_model.h"
@@ -73,6 +74,14 @@ typedef struct {
     uint16_t overload_time_s;     /* and how long more than that, 1..3000 */
     uint16_t trip_time_s; /* fully derated for so long: off until cleared, 1..600; 0 never */
 } drive_policy_parameters_t;
+
+typedef struct {
+    parameter_range_t policy, open_current_ma, supply_reserve_ma, boost_current_ma,
+        probe_current_ma, dither_ma, hold_margin_cc, unsure_margin_cc, search_mk_per_s, observer,
+        probe_period_s, temperature_limit_cc, temperature_band_cc, undriven_margin_cc,
+        overload_current_ma, overload_time_s, trip_time_s;
+} drive_policy_ranges_t;
+extern const drive_policy_ranges_t drive_policy_ranges FLASH_MEMORY;
 
 typedef struct {
     resistance_observer_t observer; /* first: what every tick touches */

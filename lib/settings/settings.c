@@ -81,34 +81,6 @@
     X(trip_time_s, S, 0, POLICY, trip_time_s)
 /* clang-format on */
 
-typedef struct {
-    parameter_range_t policy, open_current_ma, supply_reserve_ma, boost_current_ma,
-        probe_current_ma, dither_ma, hold_margin_cc, unsure_margin_cc, search_mk_per_s, observer,
-        probe_period_s, temperature_limit_cc, temperature_band_cc, undriven_margin_cc,
-        overload_current_ma, overload_time_s, trip_time_s;
-} policy_ranges_t;
-#define RANGE(field, type, minimum, maximum)                                                       \
-    PARAMETER_RANGE(drive_policy_parameters_t, field, type, minimum, maximum)
-static const policy_ranges_t policy_ranges FLASH_MEMORY = {
-    RANGE(policy, U8, 0, 1),
-    RANGE(open_current_ma, U16, 0, 3200),
-    RANGE(supply_reserve_ma, U16, 0, 10000),
-    RANGE(boost_current_ma, U16, 100, 3200),
-    RANGE(probe_current_ma, U16, 100, 1000),
-    RANGE(dither_ma, U16, 0, 400),
-    RANGE(hold_margin_cc, U16, 50, 3000),
-    RANGE(unsure_margin_cc, U16, 50, 5000),
-    RANGE(search_mk_per_s, U16, 0, 1000),
-    RANGE(observer, U8, 0, 1),
-    RANGE(probe_period_s, U8, 0, 250),
-    RANGE(temperature_limit_cc, S16, -4000, 20000),
-    RANGE(temperature_band_cc, U16, 100, 5000),
-    RANGE(undriven_margin_cc, U16, 0, 5000),
-    RANGE(overload_current_ma, U16, 100, 60000),
-    RANGE(overload_time_s, U16, 1, 3000),
-    RANGE(trip_time_s, U16, 0, 600)};
-#undef RANGE
-
 /* The chip's own limits; the model takes larger arrays. */
 typedef struct {
     parameter_range_t rows, columns;
@@ -176,7 +148,7 @@ typedef struct {
 #define IN_ARRAY(field)      &array_ranges.field, .part = PART_MODEL
 #define IN_CURRENT(field)    &current_control_ranges.field, .part = PART_CURRENT
 #define IN_SAFETY(field)     &safety_ranges.field, .part = PART_SAFETY
-#define IN_POLICY(field)     &policy_ranges.field, .part = PART_POLICY
+#define IN_POLICY(field)     &drive_policy_ranges.field, .part = PART_POLICY
 #define IN_BOARD(field)      &board_ranges.field, .part = PART_BOARD
 #define ROW(name, unit, decimals_, part_, field)                                                   \
     {.range = IN_##part_(field), .decimals = (decimals_)},
