@@ -26,7 +26,7 @@ void current_control_parameters_default(current_control_parameters_t *parameters
                                                                     .shunt_mohm = 100,
                                                                     .wiring_mohm = 80,
                                                                     .integral_permille = 600,
-                                                                    .slew_ma_per_tick = 120,
+                                                                    .slew_ma_per_tick = 300,
                                                                     .maximum_current_ma = 3000,
                                                                     .maximum_duty_steps = 760,
                                                                     .trim_limit_mohm = 150,

@@ -56,6 +56,7 @@
 #define LOSS_IMPOSSIBLE   250
 #define GAIN_IMPLAUSIBLE  45
 #define REFERENCE_WINDOWS 40u
+#define LEARNING_WINDOWS  2u /* fast pulses leave no more while it is cold */
 #define FRESH_WINDOWS     4u
 
 #define KELVIN_C7 128
@@ -335,16 +336,21 @@ static int16_t place_of_phase(int16_t permille)
     return (int16_t)(upper ? 1000u - place : place);
 }
 
+/* Where heating goes on to transform a spring that is so much austenite. */
+static OWN int16_t goes_on_c7(const thermal_model_t *model, int16_t permille)
+{
+    int16_t width_c7 = (int16_t)(model->austenite_finish_c7 - model->austenite_start_c7);
+    int32_t place_c7 = (int32_t)place_of_phase(clamp16(permille, 0, 1000)) * width_c7;
+    return (int16_t)(model->austenite_start_c7 + ((place_c7 * 131) >> 17));
+}
+
 /* Between martensite start and austenite start the phase rests: what the resistance says of it is
  * the phase's memory, not the temperature. */
 static OWN void impose_phase(thermal_model_t *model, uint8_t k, int16_t permille)
 {
     int16_t now_c7 = thermal_model_temperature_c7(model, k);
-    int16_t width_c7 = (int16_t)(model->austenite_finish_c7 - model->austenite_start_c7);
-    int32_t place_c7 = (int32_t)place_of_phase(clamp16(permille, 0, 1000)) * width_c7;
     thermal_model_set_temperature(model, k, (int16_t)(model->martensite_finish_c7 - KELVIN_C7));
-    thermal_model_set_temperature(model, k,
-                                  (int16_t)(model->austenite_start_c7 + ((place_c7 * 131) >> 17)));
+    thermal_model_set_temperature(model, k, goes_on_c7(model, permille));
     thermal_model_set_temperature(model, k, now_c7);
 }
 
@@ -479,13 +485,14 @@ static OWN bool has_heated(drive_policy_t *policy, drive_policy_spring_t *s, the
     int16_t now_c7 = thermal_model_temperature_c7(model, k);
     int16_t permille = model_permille(model, k);
     bool certain = permille == 0 && now_c7 < model->austenite_start_c7 - CERTAIN_C7;
-    if (certain && fresh && s->fresh >= FRESH_WINDOWS) {
+    if (certain && fresh && s->fresh >= LEARNING_WINDOWS) {
         resistance_observer_learn_martensite(&s->observer, &policy->alloy);
     }
     bool sees = trusted(policy, s);
     int16_t phase = sees ? s->observer.phase_permille : permille;
-    if (s->granted_ma < s->asked_ma || now_c7 < model->austenite_start_c7 + 2 * KELVIN_C7) {
-        s->plateau = 0; /* it stands still because it waits, or has not begun */
+    if (s->granted_ma < s->asked_ma || now_c7 < model->austenite_start_c7 + 2 * KELVIN_C7 ||
+        now_c7 < goes_on_c7(model, permille) - KELVIN_C7) {
+        s->plateau = 0; /* it stands still because it waits, or has not begun to go on */
     } else if (fresh) {
         watch_plateau(policy, s);
     }
@@ -687,7 +694,12 @@ static OWN void hold(drive_policy_t *policy, drive_policy_spring_t *s, thermal_m
     if ((policy->round & 3u) == 0 && s->held < UINT8_MAX) {
         s->held++;
     }
-    if (!trusted(policy, s)) {
+    bool sees = trusted(policy, s);
+    if ((full || !sees) && model_permille(model, k) < level - 2 * LEVEL_BAND_PERMILLE) {
+        enter(policy, k, DRIVE_POLICY_STAGE_HEAT); /* more is wanted than before */
+        return;
+    }
+    if (!sees) {
         if ((s->flags & FLAG_DOUBT) != 0) { /* what was seen last may have been the same lie */
             s->flags &= (uint8_t) ~(FLAG_DOUBT | FLAG_LEARNT);
             s->bias_uw_per_k = 0;
@@ -696,12 +708,6 @@ static OWN void hold(drive_policy_t *policy, drive_policy_spring_t *s, thermal_m
             s->margin_c7 = (int16_t)(s->margin_c7 - (int16_t)(policy->round & 1u));
         } else if (s->fresh >= FRESH_WINDOWS) {
             s->margin_c7 = policy->unsure_margin_c7;
-        }
-        if ((policy->round & 1u) != 0) { /* every second time: a tick is short */
-            if (model_permille(model, k) < level - 2 * LEVEL_BAND_PERMILLE) {
-                enter(policy, k, DRIVE_POLICY_STAGE_HEAT);
-            }
-            return;
         }
         phase = full ? INT16_MAX : level;
     } else if (fresh) {

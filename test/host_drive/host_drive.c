@@ -732,6 +732,28 @@ static void spring_switched_on_again_after_seconds_is_austenite_again(void)
     loop = NULL;
 }
 
+/* From a level the phase goes on only where it left the transformation: until then nothing moves.
+ */
+static void full_is_reached_from_any_level_at_any_moment(void)
+{
+    for (uint16_t level = 300; level <= 800; level = (uint16_t)(level + 250u)) {
+        for (double from_s = 80.0; from_s < 290.0; from_s += 14.0) {
+            plant_reset(plant);
+            start();
+            want(CENTRE, level);
+            run(from_s);
+            want(CENTRE, 1000);
+            run(60.0);
+            char where[80];
+            (void)snprintf(where, sizeof where, "level %u for %.0f s: phase %.3f", level, from_s,
+                           phase(CENTRE));
+            TEST_ASSERT_TRUE_MESSAGE(phase(CENTRE) > 0.98, where);
+            loop_destroy(loop);
+        }
+    }
+    loop = NULL;
+}
+
 /* It may take until the search has gone past martensite start for nothing, and then the slow way
  * back. */
 static void check_stuck_resistance(double from_s, double ohm)
@@ -883,6 +905,7 @@ int main(void)
     RUN_TEST(readings_that_fail_now_and_then_do_no_harm);
     RUN_TEST(spring_without_readings_is_off_and_the_others_are_held);
     RUN_TEST(spring_switched_on_again_after_seconds_is_austenite_again);
+    RUN_TEST(full_is_reached_from_any_level_at_any_moment);
     RUN_TEST(resistance_that_sticks_at_austenite_in_a_hold_is_let_go);
     RUN_TEST(resistance_that_sticks_at_martensite_in_a_hold_is_let_go);
     RUN_TEST(resistance_that_sticks_between_in_a_hold_is_let_go);
