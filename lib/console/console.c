@@ -250,43 +250,41 @@ static console_error_t may_drive(const console_t *console)
                                                                             : CONSOLE_ERROR_FAULT;
 }
 
-static console_error_t word_on(console_t *console, const arguments_t *arguments)
+/* Springs off, or on at a level: what keeps one from being switched on does not keep it from being
+ * switched off. */
+static console_error_t switch_springs(console_t *console, const arguments_t *arguments, bool on)
 {
     uint8_t first;
     uint8_t last;
-    int32_t percent = 100;
+    int32_t percent = on ? 100 : 0;
     console_error_t error = parse_springs(console, arguments->argument[0], &first, &last);
     if (error == CONSOLE_OK && arguments->count > 1) {
         error = parse_number(arguments->argument[1], 0, 0, 100, &percent);
     }
-    if (error == CONSOLE_OK) {
+    if (error == CONSOLE_OK && on) {
         error = may_drive(console);
-    }
-    if (error == CONSOLE_OK && first == last &&
-        controller_fault(console->controller, first) != SAFETY_FAULT_NONE) {
-        error = CONSOLE_ERROR_FAULT;
+        if (error == CONSOLE_OK && first == last &&
+            controller_fault(console->controller, first) != SAFETY_FAULT_NONE) {
+            error = CONSOLE_ERROR_FAULT;
+        }
     }
     if (error != CONSOLE_OK) {
         return error;
     }
     for (uint8_t k = first; k <= last; k++) {
-        controller_set_target(console->controller, k, (uint16_t)(percent * 10));
+        controller_set_target(console->controller, k, (uint16_t)percent * 10u);
     }
     return CONSOLE_OK;
 }
 
+static console_error_t word_on(console_t *console, const arguments_t *arguments)
+{
+    return switch_springs(console, arguments, true);
+}
+
 static console_error_t word_off(console_t *console, const arguments_t *arguments)
 {
-    uint8_t first;
-    uint8_t last;
-    const console_error_t error = parse_springs(console, arguments->argument[0], &first, &last);
-    if (error != CONSOLE_OK) {
-        return error;
-    }
-    for (uint8_t k = first; k <= last; k++) {
-        controller_set_target(console->controller, k, 0);
-    }
-    return CONSOLE_OK;
+    return switch_springs(console, arguments, false);
 }
 
 static console_error_t word_pattern(console_t *console, const arguments_t *arguments)
@@ -295,12 +293,15 @@ static console_error_t word_pattern(console_t *console, const arguments_t *argum
     bool any = false;
     const char *const bits = arguments->argument[0];
     const uint8_t springs = controller_springs(console->controller);
-    if (strlen(bits) != springs || strspn(bits, "01") != springs) {
-        return CONSOLE_ERROR_BAD_ARGUMENT;
-    }
     for (uint8_t k = 0; k < springs; k++) {
+        if (bits[k] != '0' && bits[k] != '1') { /* the end, too */
+            return CONSOLE_ERROR_BAD_ARGUMENT;
+        }
         on[k] = bits[k] == '1';
         any = any || on[k];
+    }
+    if (bits[springs] != '\0') {
+        return CONSOLE_ERROR_BAD_ARGUMENT;
     }
     const console_error_t error = any ? may_drive(console) : CONSOLE_OK;
     if (error == CONSOLE_OK) {
@@ -465,6 +466,25 @@ static bool begins_with(const char *text, const char *word)
     return flash_byte(text) == ' ';
 }
 
+/* The next word of a line, which then ends with it; NULL where none is left. */
+static char *next_word(char **rest)
+{
+    char *word = *rest;
+    while (*word == ' ') {
+        word++;
+    }
+    char *end = word;
+    while (*end != ' ' && *end != '\0') {
+        end++;
+    }
+    *rest = end;
+    if (*end == ' ') {
+        *end = '\0';
+        (*rest)++;
+    }
+    return end == word ? NULL : word;
+}
+
 static console_error_t execute(console_t *console)
 {
     if (console->line[0] == '$') {
@@ -473,11 +493,12 @@ static console_error_t execute(console_t *console)
     word_t word;
     arguments_t arguments = {0, {NULL, NULL}};
     uint8_t given = 0;
-    const char *const name = strtok(console->line, " ");
+    char *rest = console->line;
+    const char *const name = next_word(&rest);
     if (name == NULL) {
         return CONSOLE_OK; /* blanks only */
     }
-    for (const char *next = strtok(NULL, " "); next != NULL; next = strtok(NULL, " ")) {
+    for (const char *next = next_word(&rest); next != NULL; next = next_word(&rest)) {
         if (given < MAX_ARGUMENTS) {
             arguments.argument[given] = next;
         }

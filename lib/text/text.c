@@ -28,36 +28,43 @@ text_result_t text_parse_decimal(const char *text, uint8_t decimals, int32_t *va
     bool point = false;
     bool fits = true;
     uint32_t size = 0;
-    uint8_t given = 0; /* decimals seen */
+    uint8_t missing = decimals;
     const bool negative = *text == '-';
 
     if (*text == '-' || *text == '+') {
         text++;
     }
-    for (; *text != '\0'; text++) {
-        if (*text == '.' && !point) {
+    for (;; text++) {
+        char digit = *text;
+        if (digit == '.' && !point) {
             point = true;
             continue;
         }
-        if (*text < '0' || *text > '9') {
+        if (digit == '\0') { /* decimals that are not written are 0 */
+            if (missing == 0) {
+                break;
+            }
+            digit = '0';
+            missing--;
+            text--;
+        } else if (digit < '0' || digit > '9') {
             return TEXT_NOT_A_NUMBER;
+        } else {
+            any_digit = true;
+            if (point) {
+                if (missing == 0) {
+                    if (digit != '0') {
+                        return TEXT_NOT_A_NUMBER; /* finer than wanted: not dropped silently */
+                    }
+                    continue;
+                }
+                missing--;
+            }
         }
-        any_digit = true;
-        const uint8_t digit = (uint8_t)(*text - '0');
-        if (!point) {
-            fits = fits && append_digit(&size, digit);
-        } else if (given < decimals) {
-            given++;
-            fits = fits && append_digit(&size, digit);
-        } else if (digit != 0) {
-            return TEXT_NOT_A_NUMBER; /* finer than wanted: dropping it would be silent */
-        }
+        fits = fits && append_digit(&size, (uint8_t)(digit - '0'));
     }
     if (!any_digit) {
         return TEXT_NOT_A_NUMBER;
-    }
-    for (; given < decimals; given++) {
-        fits = fits && append_digit(&size, 0);
     }
     if (!fits) {
         return TEXT_TOO_LARGE;
