@@ -29,7 +29,8 @@ typedef enum {
     BOARD_RESET_WARM = 32     /* the RAM kept its content */
 } board_reset_t;
 
-/* Outputs off, timers and serial port running, interrupts on, watchdog not yet started. */
+/* Outputs off, timers and serial port running, interrupts on, watchdog not yet started. What
+ * follows is called with interrupts on, and leaves them on. */
 void board_init(void);
 uint8_t board_reset_cause(void);
 

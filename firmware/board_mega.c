@@ -5,7 +5,6 @@
 #include <avr/io.h>
 #include <avr/sleep.h>
 #include <avr/wdt.h>
-#include <util/atomic.h>
 
 #define SERIAL_RECEIVE_BYTES 128u /* 11 ms of input: more than the longest time away, a tick */
 #define SERIAL_TRANSMIT_BYTES                                                                      \
@@ -203,15 +202,14 @@ void board_set_duties(const uint16_t duty[BOARD_SPRINGS])
     const uint8_t three = set_timer(&OCR3A, &duty[0]);
     const uint8_t four = set_timer(&OCR4A, &duty[3]);
     const uint8_t five = set_timer(&OCR5A, &duty[6]);
-    ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
-    {
-        if (!stop_pending) {
-            TCCR3A = three;
-            TCCR4A = four;
-            TCCR5A = five;
-            driving = (three | four | five) != PWM_A_OFF;
-        }
+    cli();
+    if (!stop_pending) {
+        TCCR3A = three;
+        TCCR4A = four;
+        TCCR5A = five;
+        driving = (three | four | five) != PWM_A_OFF;
     }
+    sei();
 }
 
 void board_set_fan(uint8_t percent)
@@ -227,12 +225,11 @@ void board_set_fan(uint8_t percent)
 bool board_stop_take(void)
 {
     bool received;
-    ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
-    {
-        received = stop_received;
-        stop_received = false;
-        stop_pending = false;
-    }
+    cli();
+    received = stop_received;
+    stop_received = false;
+    stop_pending = false;
+    sei();
     return received;
 }
 
@@ -253,10 +250,9 @@ ISR(TIMER2_COMPA_vect)
 __attribute__((noinline)) uint32_t board_time_ms(void)
 {
     uint32_t copy;
-    ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
-    {
-        copy = time_ms;
-    }
+    cli();
+    copy = time_ms;
+    sei();
     return copy;
 }
 
@@ -264,14 +260,13 @@ uint32_t board_time_us(void)
 {
     uint32_t ms;
     uint8_t count;
-    ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
-    {
-        ms = time_ms;
-        count = TCNT2;
-        if ((TIFR2 & _BV(OCF2A)) != 0 && count < COUNTS_PER_MS / 2u) {
-            ms++; /* the interrupt is still to come */
-        }
+    cli();
+    ms = time_ms;
+    count = TCNT2;
+    if ((TIFR2 & _BV(OCF2A)) != 0 && count < COUNTS_PER_MS / 2u) {
+        ms++; /* the interrupt is still to come */
     }
+    sei();
     return ms * 1000u + (uint16_t)(count * US_PER_COUNT);
 }
 
@@ -279,14 +274,13 @@ bool board_tick_take(uint8_t *behind)
 {
     bool due = false;
     *behind = 0;
-    ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
-    {
-        if (ticks_due > 0) {
-            ticks_due--;
-            *behind = ticks_due;
-            due = true;
-        }
+    cli();
+    if (ticks_due > 0) {
+        ticks_due--;
+        *behind = ticks_due;
+        due = true;
     }
+    sei();
     return due;
 }
 
@@ -341,37 +335,34 @@ ISR(USART0_UDRE_vect)
 static bool take_flag(volatile bool *flag)
 {
     bool was;
-    ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
-    {
-        was = *flag;
-        *flag = false;
-    }
+    cli();
+    was = *flag;
+    *flag = false;
+    sei();
     return was;
 }
 
 int16_t board_serial_read(void)
 {
     int16_t octet = -1;
-    ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
-    {
-        if (receive_tail != receive_head) {
-            octet = receive_buffer[receive_tail];
-            receive_tail = (uint8_t)((receive_tail + 1u) % SERIAL_RECEIVE_BYTES);
-        }
+    cli();
+    if (receive_tail != receive_head) {
+        octet = receive_buffer[receive_tail];
+        receive_tail = (uint8_t)((receive_tail + 1u) % SERIAL_RECEIVE_BYTES);
     }
+    sei();
     return octet;
 }
 
 bool board_serial_before_stop(void)
 {
     bool before;
-    ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
-    {
-        if (receive_tail == stop_head) {
-            stop_queued = false;
-        }
-        before = stop_queued;
+    cli();
+    if (receive_tail == stop_head) {
+        stop_queued = false;
     }
+    before = stop_queued;
+    sei();
     return before;
 }
 
@@ -388,10 +379,9 @@ bool board_serial_lost_take(void)
 uint16_t board_serial_room(void)
 {
     uint16_t tail;
-    ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
-    {
-        tail = transmit_tail;
-    }
+    cli();
+    tail = transmit_tail;
+    sei();
     const uint16_t head = transmit_head; /* no interrupt changes it */
     return (uint16_t)((tail > head ? 0u : SERIAL_TRANSMIT_BYTES) + tail - head - 1u);
 }
@@ -406,11 +396,10 @@ void board_serial_write(const char *bytes, uint8_t length)
         transmit_buffer[head] = bytes[i];
         head = transmit_next(head);
     }
-    ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
-    {
-        transmit_head = head;
-        UCSR0B |= _BV(UDRIE0);
-    }
+    cli();
+    transmit_head = head;
+    UCSR0B |= _BV(UDRIE0);
+    sei();
 }
 
 /* --- EEPROM ------------------------------------------------------------------------------- */
@@ -432,11 +421,10 @@ void board_eeprom_write(uint16_t address, uint8_t octet)
     }
     EEAR = address;
     EEDR = octet;
-    ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
-    {
-        EECR = _BV(EEMPE); /* erase and write in one; the second write within four clocks */
-        EECR |= _BV(EEPE);
-    }
+    cli();
+    EECR = _BV(EEMPE); /* erase and write in one; the second write within four clocks */
+    EECR |= _BV(EEPE);
+    sei();
 }
 
 /* --- the rest ----------------------------------------------------------------------------- */
@@ -450,10 +438,9 @@ void board_watchdog_start(void)
 void board_watchdog_kick(void)
 {
     wdt_reset();
-    ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
-    {
-        ms_since_kick = 0;
-    }
+    cli();
+    ms_since_kick = 0;
+    sei();
 }
 
 static uint32_t idle_us;
