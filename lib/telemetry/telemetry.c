@@ -118,7 +118,7 @@ void telemetry_add_limits(text_line_t *line, uint8_t limits, char separator)
 {
     static const char names[] FLASH_MEMORY =
         "none\0safety\0current\0supply\0temperature\0undriven\0overload\0trip\0blind";
-    uint16_t named = limits == 0 ? 1u : (uint16_t)(limits << 1);
+    uint16_t named = (uint16_t)(limits == 0 ? 1u : (unsigned)limits << 1);
     for (const char *name = names; named != 0; named >>= 1, name = text_item(name, 1)) {
         if ((named & 1u) != 0) {
             text_add_char(line, separator);
