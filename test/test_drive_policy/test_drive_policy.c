@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "drive_policy.h"
+#include "hold_tests.h"
 #include "unity.h"
 
 #define SPRINGS       9
@@ -606,5 +607,6 @@ int main(void)
     RUN_TEST(window_that_no_longer_fits_keeps_what_it_has);
     RUN_TEST(heating_that_starts_half_way_takes_the_phase_from_the_resistance);
     RUN_TEST(alloy_without_a_change_of_resistance_is_never_trusted);
+    run_hold_tests();
     return UNITY_END();
 }

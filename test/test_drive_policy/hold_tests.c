@@ -1,0 +1,598 @@
+/* What a hold and the end of a heating make of the resistance. Readings are those of a fine sensor;
+ * the model is not stepped: its temperature is what the test or a correction puts it to. */
+#include "hold_tests.h"
+
+#include <stddef.h>
+
+#include "drive_policy.h"
+#include "unity.h"
+
+#define KELVIN  128 /* of a temperature in 1/128 K */
+#define WINDOW  13u /* ticks in which each spring is updated once, at least */
+#define SPRINGS 3u
+
+static thermal_model_t model;
+static drive_policy_t policy;
+static drive_policy_parameters_t parameters;
+static uint16_t level[SPRINGS];
+static uint16_t target_ma[SPRINGS];
+static uint16_t supply_limit_ma;
+static uint8_t model_tick;
+static double left_mv; /* what the last voltage was rounded by */
+
+static drive_policy_spring_t *const spring = &policy.spring[0];
+
+static void make(uint8_t springs)
+{
+    thermal_model_parameters_t p;
+    thermal_model_parameters_default(&p);
+    p.rows = 1;
+    p.columns = springs;
+    TEST_ASSERT_EQUAL(THERMAL_MODEL_OK, thermal_model_init(&model, &p, NULL));
+    drive_policy_parameters_default(&parameters);
+    parameters.policy = DRIVE_POLICY_PRECOMPENSATE;
+    TEST_ASSERT_TRUE(drive_policy_init(&policy, &parameters, springs, NULL));
+    drive_policy_prepare(&policy, &model);
+    supply_limit_ma = 15000;
+    model_tick = 0;
+    left_mv = 0.0;
+    for (unsigned k = 0; k < SPRINGS; k++) {
+        level[k] = target_ma[k] = 0;
+    }
+}
+
+static void apply(void)
+{
+    TEST_ASSERT_TRUE(drive_policy_apply(&policy, &parameters, NULL));
+    drive_policy_prepare(&policy, &model);
+}
+
+static double ohm_of(int permille)
+{
+    return (175.0 + 44.0 * permille / 1000.0) / 1000.0;
+}
+
+/* One tick; spring 0 reads as a resistance. */
+static void tick(double ohm)
+{
+    bool allowed[SPRINGS] = {true, true, true};
+    bool valid[SPRINGS] = {true};
+    double mv = target_ma[0] * ohm + left_mv;
+    int16_t measured_ma[SPRINGS] = {(int16_t)target_ma[0]};
+    int16_t measured_mv[SPRINGS] = {(int16_t)mv};
+    left_mv = mv - measured_mv[0];
+    model_tick = (uint8_t)((model_tick + 1u) % 5u);
+    drive_policy_input_t input = {.model = &model,
+                                  .level_permille = level,
+                                  .allowed = allowed,
+                                  .maximum_current_ma = 3000,
+                                  .supply_limit_ma = supply_limit_ma,
+                                  .measured_ma = measured_ma,
+                                  .measured_mv = measured_mv,
+                                  .valid = valid,
+                                  .model_stepped = model_tick == 0};
+    drive_policy_tick(&policy, &input, target_ma);
+}
+
+/* Spring 0 reads a phase for so many windows. */
+static void read_phase(int permille, unsigned windows)
+{
+    for (unsigned n = windows * WINDOW; n != 0; n--) {
+        tick(ohm_of(permille));
+    }
+}
+
+/* The same while the spring is where its hold wants it. */
+static void hold_phase(int permille, unsigned windows)
+{
+    for (unsigned n = windows * WINDOW; n != 0; n--) {
+        if (spring->stage == DRIVE_POLICY_STAGE_HOLD) {
+            thermal_model_set_temperature(&model, 0,
+                                          (int16_t)(model.martensite_start_c7 + spring->margin_c7));
+        }
+        tick(ohm_of(permille));
+    }
+}
+
+/* Its own martensite is known, and all averages are at a phase. */
+static void knows(int permille)
+{
+    resistance_observer_t *observer = &spring->observer;
+    observer->learnt = 100;
+    observer->readings = 0;
+    observer->current_sum_ma = observer->voltage_sum_mv = 0;
+    observer->ratio_q14 = (uint16_t)(16384.0 * ohm_of(permille) / ohm_of(0));
+    observer->inverse_q14 = (uint16_t)(16384.0 * ohm_of(0) / ohm_of(permille));
+    resistance_observer_restart_average(observer);
+}
+
+/* The average now shows so much less phase than the hold began with. */
+static void lose(int permille)
+{
+    spring->observer.slow_q22 =
+        (uint32_t)(spring->reference_q14 - 16384.0 * 44.0 / 175.0 * permille / 1000.0) << 8;
+}
+
+static int loss(void)
+{
+    return -resistance_observer_drift_permille(&spring->observer, &policy.alloy,
+                                               spring->reference_q14);
+}
+
+/* A hold with the wide margin, just begun. */
+static void begin_hold(int permille)
+{
+    make(1);
+    thermal_model_set_temperature(&model, 0, 110 * KELVIN);
+    thermal_model_set_temperature(&model, 0,
+                                  (int16_t)(model.martensite_start_c7 + policy.unsure_margin_c7));
+    level[0] = 1000;
+    knows(permille);
+    read_phase(permille, 1);
+    TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_HOLD, spring->stage);
+}
+
+/* The average has settled, the margin narrows. */
+static void begin_search(void)
+{
+    begin_hold(1000);
+    hold_phase(1000, 60);
+    TEST_ASSERT_LESS_THAN_INT16(policy.unsure_margin_c7 - KELVIN / 8, spring->margin_c7);
+}
+
+static bool is_just_below_start(void)
+{
+    int16_t below_c7 =
+        (int16_t)(model.martensite_start_c7 - thermal_model_temperature_c7(&model, 0));
+    return below_c7 > 0 && below_c7 < 3 * KELVIN;
+}
+
+static bool has_sighted(void)
+{
+    return spring->margin_c7 == policy.hold_margin_c7 && is_just_below_start();
+}
+
+/* A search that has sighted martensite start. */
+static void sight(void)
+{
+    lose(15);
+    read_phase(985, 1);
+    TEST_ASSERT_TRUE(has_sighted());
+}
+
+/* The loss is known and confirmed. */
+static void learn(void)
+{
+    begin_search();
+    sight();
+    lose(6);
+    hold_phase(994, 60);
+    TEST_ASSERT_EQUAL_INT16(policy.hold_margin_c7, spring->margin_c7);
+}
+
+static void switch_off_and_on(int16_t temperature_c7)
+{
+    level[0] = 0;
+    read_phase(0, 4);
+    thermal_model_set_temperature(&model, 0, 110 * KELVIN);
+    thermal_model_set_temperature(&model, 0, temperature_c7);
+    level[0] = 1000;
+    read_phase(1000, 1);
+    TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_HOLD, spring->stage);
+}
+
+/* ---- sightings ---- */
+
+static void large_loss_is_martensite_start_at_once(void)
+{
+    begin_search();
+    lose(15);
+    read_phase(985, 1);
+    TEST_ASSERT_TRUE(has_sighted());
+    TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_HOLD, spring->stage);
+    TEST_ASSERT_GREATER_THAN_INT16(100, spring->bias_uw_per_k); /* it was colder than the model */
+}
+
+static void sighting_makes_the_model_austenite_whatever_it_had(void)
+{
+    begin_search();
+    int16_t there_c7 = thermal_model_temperature_c7(&model, 0);
+    for (int16_t t_c7 = model.martensite_start_c7; thermal_model_austenite(&model, 0) > 23000;
+         t_c7--) {
+        thermal_model_set_temperature(&model, 0, t_c7);
+    }
+    thermal_model_set_temperature(&model, 0, there_c7); /* with 70 % */
+    sight();
+    TEST_ASSERT_GREATER_THAN_UINT16(31000, thermal_model_austenite(&model, 0));
+}
+
+static void small_loss_is_martensite_start_only_when_seen_for_a_second(void)
+{
+    begin_search();
+    lose(8);
+    read_phase(992, 3);
+    TEST_ASSERT_FALSE(has_sighted());
+    read_phase(992, 4);
+    TEST_ASSERT_TRUE(has_sighted());
+}
+
+static void smaller_loss_is_martensite_start_only_if_it_outlasts_the_pause(void)
+{
+    begin_search();
+    lose(5);
+    read_phase(995, 10);
+    TEST_ASSERT_FALSE(has_sighted());
+    read_phase(995, 6);
+    TEST_ASSERT_TRUE(has_sighted());
+}
+
+static void least_loss_is_no_sighting_however_long(void)
+{
+    begin_search();
+    for (unsigned n = 0; n < 60; n++) {
+        lose(1);
+        hold_phase(999, 1);
+    }
+    TEST_ASSERT_EQUAL_INT16(0, spring->bias_uw_per_k);
+    TEST_ASSERT_GREATER_THAN_INT16(policy.hold_margin_c7, spring->margin_c7);
+}
+
+static void readings_of_a_spring_that_slowly_loses_phase_are_a_sighting(void)
+{
+    begin_search();
+    for (int permille = 1000; permille > 980 && !has_sighted(); permille--) {
+        read_phase(permille, 4); /* a permille a second */
+    }
+    TEST_ASSERT_TRUE(has_sighted());
+    TEST_ASSERT_GREATER_THAN_INT16(960, drive_policy_phase_permille(&policy, 0));
+}
+
+static void first_doubt_pauses_the_search_at_a_little_more_power(void)
+{
+    begin_search();
+    int16_t margin_c7 = spring->margin_c7;
+    hold_phase(1000, 10);
+    TEST_ASSERT_LESS_THAN_INT16(margin_c7, spring->margin_c7);
+    margin_c7 = spring->margin_c7;
+    int16_t there_c7 = (int16_t)(model.martensite_start_c7 + margin_c7);
+    thermal_model_set_temperature(&model, 0, there_c7);
+    read_phase(1000, 1);
+    margin_c7 = spring->margin_c7;
+    uint16_t before_ma = spring->wanted_ma;
+    lose(5);
+    read_phase(995, 10);
+    TEST_ASSERT_EQUAL_INT16(margin_c7, spring->margin_c7);
+    TEST_ASSERT_EQUAL_INT16(there_c7, thermal_model_temperature_c7(&model, 0));
+    TEST_ASSERT_GREATER_THAN_UINT16(before_ma + 20, spring->wanted_ma);
+    TEST_ASSERT_LESS_THAN_UINT16(before_ma + 150, spring->wanted_ma);
+    lose(0);
+    hold_phase(1000, 10);
+    TEST_ASSERT_LESS_THAN_INT16(margin_c7, spring->margin_c7);
+}
+
+/* ---- what becomes of a sighting once the average has settled ---- */
+
+static void loss_that_is_still_there_keeps_what_was_learnt(void)
+{
+    learn();
+    int16_t bias = spring->bias_uw_per_k;
+    TEST_ASSERT_GREATER_THAN_INT16(100, bias);
+    hold_phase(994, 200);
+    TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_HOLD, spring->stage);
+    TEST_ASSERT_EQUAL_INT16(policy.hold_margin_c7, spring->margin_c7);
+    TEST_ASSERT_EQUAL_INT16(bias, spring->bias_uw_per_k);
+}
+
+static void loss_that_is_gone_makes_the_search_go_on_until_seen_again(void)
+{
+    begin_search();
+    sight();
+    lose(0);
+    hold_phase(1000, 150);
+    TEST_ASSERT_LESS_THAN_INT16(policy.hold_margin_c7 - KELVIN, spring->margin_c7);
+    sight();
+    lose(0); /* and gone again: two at one place are no chance */
+    hold_phase(1000, 30);
+    TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_HOLD, spring->stage);
+    hold_phase(1000, 30);
+    TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_HEAT, spring->stage);
+}
+
+static void large_confirmed_loss_is_heated_back(void)
+{
+    begin_search();
+    sight();
+    lose(14);
+    hold_phase(986, 30);
+    TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_HOLD, spring->stage); /* not before it is confirmed */
+    hold_phase(986, 30);
+    TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_HEAT, spring->stage);
+}
+
+static void coasting_from_a_boost_with_a_known_loss_sights_nothing(void)
+{
+    learn();
+    switch_off_and_on((int16_t)(model.martensite_start_c7 + 6 * KELVIN));
+    TEST_ASSERT_GREATER_THAN_INT16(policy.hold_margin_c7 + 2 * KELVIN, spring->margin_c7);
+    knows(1000);
+    parameters.search_mk_per_s = 0; /* it stays where it coasts */
+    apply();
+    hold_phase(1000, 60);
+    int16_t temperature_c7 = thermal_model_temperature_c7(&model, 0);
+    int16_t bias = spring->bias_uw_per_k;
+    lose(8);
+    hold_phase(992, 100);
+    TEST_ASSERT_EQUAL_INT16(temperature_c7, thermal_model_temperature_c7(&model, 0));
+    TEST_ASSERT_EQUAL_INT16(bias, spring->bias_uw_per_k);
+    hold_phase(992, 300);
+    TEST_ASSERT_LESS_THAN_INT(3, loss()); /* the reference has followed, all the way */
+    TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_HOLD, spring->stage);
+}
+
+static void once_held_the_reference_follows_only_a_little(void)
+{
+    learn();
+    lose(-12); /* more phase than before: nothing that a hold can gain */
+    hold_phase(1006, 400);
+    TEST_ASSERT_LESS_THAN_INT(-6, loss());
+}
+
+static void doubt_when_readings_fail_takes_back_what_was_learnt(void)
+{
+    begin_search();
+    sight();
+    TEST_ASSERT_GREATER_THAN_INT16(100, spring->bias_uw_per_k);
+    for (unsigned n = 0; n < 8; n++) { /* nothing changes so from one window to the next */
+        read_phase(n % 2 == 0 ? -500 : 1000, 1);
+    }
+    TEST_ASSERT_FALSE(drive_policy_observes(&policy, 0));
+    TEST_ASSERT_EQUAL_INT16(0, spring->bias_uw_per_k);
+    switch_off_and_on((int16_t)(model.martensite_start_c7 + 12 * KELVIN));
+    TEST_ASSERT_EQUAL_INT16(policy.unsure_margin_c7, spring->margin_c7);
+}
+
+static void failing_readings_leave_a_confirmed_loss(void)
+{
+    learn();
+    int16_t bias = spring->bias_uw_per_k;
+    for (unsigned n = 0; n < 8; n++) {
+        read_phase(n % 2 == 0 ? -500 : 1000, 1);
+    }
+    TEST_ASSERT_FALSE(drive_policy_observes(&policy, 0));
+    TEST_ASSERT_EQUAL_INT16(bias, spring->bias_uw_per_k);
+    switch_off_and_on((int16_t)(model.martensite_start_c7 + 12 * KELVIN));
+    TEST_ASSERT_LESS_THAN_INT16(policy.unsure_margin_c7, spring->margin_c7);
+}
+
+/* A sighting with this margin and bias where the model already is right. */
+static int16_t bias_after_sighting(int16_t margin_c7, int16_t bias_uw_per_k)
+{
+    begin_search();
+    spring->margin_c7 = margin_c7;
+    spring->bias_uw_per_k = bias_uw_per_k;
+    thermal_model_set_temperature(&model, 0,
+                                  (int16_t)(model.martensite_start_c7 - policy.event_c7));
+    sight();
+    return spring->bias_uw_per_k;
+}
+
+static void bias_seen_while_pulled_below_start_is_less_by_the_fall(void)
+{
+    TEST_ASSERT_GREATER_THAN_INT16(50, policy.falling_uw_per_k);
+    TEST_ASSERT_INT16_WITHIN(2, -1000 + policy.falling_uw_per_k, bias_after_sighting(-90, -1000));
+    TEST_ASSERT_EQUAL_INT16(0, bias_after_sighting(-90, -30)); /* and no gain becomes a loss */
+    TEST_ASSERT_INT16_WITHIN(2, 500, bias_after_sighting(-90, 500));
+    TEST_ASSERT_INT16_WITHIN(2, -1000, bias_after_sighting(KELVIN, -1000)); /* not pulled */
+}
+
+/* ---- too little phase in a hold ---- */
+
+/* One window reads so much, whatever was read before. */
+static void glance(int permille)
+{
+    uint8_t fresh = spring->fresh;
+    uint32_t slow_q22 = spring->observer.slow_q22;
+    while (spring->fresh == fresh) {
+        spring->observer.ratio_q14 = (uint16_t)(16384.0 * ohm_of(permille) / ohm_of(0));
+        tick(ohm_of(permille));
+    }
+    spring->observer.slow_q22 = slow_q22;
+}
+
+static void one_window_of_too_little_phase_does_not_end_a_hold_several_do(void)
+{
+    begin_hold(1000);
+    hold_phase(1000, 8);
+    for (unsigned n = 0; n < 10; n++) {
+        glance(850);
+        TEST_ASSERT_LESS_THAN_INT16(900, drive_policy_phase_permille(&policy, 0));
+        glance(1000);
+        TEST_ASSERT_TRUE(drive_policy_observes(&policy, 0));
+    }
+    TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_HOLD, spring->stage);
+    for (unsigned n = 0; n < 6 && spring->stage == DRIVE_POLICY_STAGE_HOLD; n++) {
+        glance(850);
+    }
+    TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_HEAT, spring->stage);
+    TEST_ASSERT_TRUE(drive_policy_observes(&policy, 0));
+}
+
+static void impossible_loss_lets_go_of_the_reading_and_does_not_heat(void)
+{
+    begin_hold(300);
+    hold_phase(300, 12);
+    TEST_ASSERT_FALSE(drive_policy_observes(&policy, 0));
+    TEST_ASSERT_BITS_HIGH(DRIVE_POLICY_LIMIT_BLIND, drive_policy_limits(&policy, 0));
+    TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_HOLD, spring->stage);
+    /* above austenite finish first, where it is austenite whatever it was */
+    TEST_ASSERT_GREATER_THAN_INT16(model.austenite_finish_c7,
+                                   model.martensite_start_c7 + spring->margin_c7);
+}
+
+/* ---- the end of heating ---- */
+
+/* Heating from cold has come to a phase in the model and to another one in the reading. */
+static void begin_heating(int model_permille, int permille)
+{
+    make(1);
+    level[0] = 1000;
+    read_phase(0, 8);
+    knows(permille);
+    for (int16_t t_c7 = model.austenite_start_c7;
+         thermal_model_austenite(&model, 0) * 1000 / 32768 < model_permille; t_c7++) {
+        thermal_model_set_temperature(&model, 0, t_c7);
+    }
+    TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_HEAT, spring->stage);
+}
+
+static void resistance_that_stands_still_ends_a_heating_though_the_model_lags(void)
+{
+    begin_heating(800, 850);
+    read_phase(850, 4);
+    TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_HEAT, spring->stage);
+    TEST_ASSERT_LESS_THAN_INT16(model.austenite_finish_c7 - KELVIN,
+                                thermal_model_temperature_c7(&model, 0));
+    read_phase(850, 8);
+    TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_HOLD, spring->stage);
+    TEST_ASSERT_INT16_WITHIN(4, model.austenite_finish_c7, thermal_model_temperature_c7(&model, 0));
+}
+
+static void resistance_that_still_rises_does_not_end_a_heating(void)
+{
+    begin_heating(600, 600);
+    for (int permille = 600; permille < 840; permille += 20) { /* 25 permille a window and less */
+        read_phase(permille, 1);
+    }
+    TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_HEAT, spring->stage);
+}
+
+static void spring_that_waits_for_supply_has_not_finished_heating(void)
+{
+    begin_heating(800, 850);
+    supply_limit_ma = 2200; /* so that it has 2 A of 3 */
+    read_phase(850, 40);
+    TEST_ASSERT_GREATER_THAN_UINT16(1900, target_ma[0]);
+    TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_HEAT, spring->stage);
+}
+
+static void phase_that_rests_below_austenite_start_has_not_finished_heating(void)
+{
+    begin_heating(850, 850);
+    thermal_model_set_temperature(&model, 0, (int16_t)(model.austenite_start_c7 - 3 * KELVIN));
+    read_phase(850, 40);
+    TEST_ASSERT_TRUE(drive_policy_observes(&policy, 0));
+    TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_HEAT, spring->stage);
+}
+
+static void too_little_phase_below_austenite_start_changes_nothing(void)
+{
+    begin_heating(850, 600);
+    int16_t temperature_c7 = (int16_t)(model.austenite_start_c7 - 3 * KELVIN);
+    thermal_model_set_temperature(&model, 0, temperature_c7);
+    uint16_t austenite = thermal_model_austenite(&model, 0);
+    read_phase(600, 40);
+    TEST_ASSERT_TRUE(drive_policy_observes(&policy, 0));
+    TEST_ASSERT_EQUAL_INT16(temperature_c7, thermal_model_temperature_c7(&model, 0));
+    TEST_ASSERT_EQUAL_UINT16(austenite, thermal_model_austenite(&model, 0));
+}
+
+static void certain_martensite_teaches_the_scale_and_corrects_nothing(void)
+{
+    begin_heating(0, 300);
+    int16_t temperature_c7 = (int16_t)(model.austenite_start_c7 - 30 * KELVIN);
+    thermal_model_set_temperature(&model, 0, temperature_c7);
+    read_phase(300, 2);
+    TEST_ASSERT_TRUE(drive_policy_observes(&policy, 0));
+    TEST_ASSERT_GREATER_THAN_INT16(150, drive_policy_phase_permille(&policy, 0));
+    read_phase(300, 60);
+    TEST_ASSERT_INT16_WITHIN(15, 0, drive_policy_phase_permille(&policy, 0));
+    TEST_ASSERT_EQUAL_INT16(temperature_c7, thermal_model_temperature_c7(&model, 0));
+    TEST_ASSERT_EQUAL_UINT16(0, thermal_model_austenite(&model, 0));
+}
+
+/* Stage of a spring that read so much when it had transformed, and goes on to. */
+static drive_policy_stage_t stage_of_hold_at(int permille)
+{
+    begin_heating(permille, permille);
+    read_phase(permille, 12);
+    TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_HOLD, spring->stage);
+    hold_phase(permille, 8);
+    return (drive_policy_stage_t)spring->stage;
+}
+
+static void what_a_spring_reads_when_transformed_is_its_own_fully_on(void)
+{
+    TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_HOLD, stage_of_hold_at(900));
+    TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_HOLD, stage_of_hold_at(800));
+    TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_HEAT, stage_of_hold_at(640)); /* this is not fully on */
+}
+
+/* ---- heated again while others have the supply ---- */
+
+static void spring_that_waits_to_be_heated_again_keeps_its_holds_current(void)
+{
+    make(3);
+    parameters.dither_ma = 0;
+    apply();
+    level[1] = 1000;
+    read_phase(1000, 4);
+    thermal_model_set_temperature(&model, 0, 110 * KELVIN);
+    thermal_model_set_temperature(&model, 0, (int16_t)(model.martensite_start_c7 + 5 * KELVIN));
+    knows(1000);
+    level[0] = 1000;
+    hold_phase(1000, 8);
+    TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_HOLD, spring->stage);
+    uint16_t held_ma = spring->granted_ma;
+    TEST_ASSERT_GREATER_THAN_UINT16(1000, held_ma);
+    /* a boost and this hold */
+    supply_limit_ma =
+        (uint16_t)(parameters.boost_current_ma + held_ma + 100u + parameters.supply_reserve_ma);
+    level[2] = 1000; /* would take what is left */
+    hold_phase(1000, 4);
+    TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_HOLD, spring->stage);
+    knows(850);
+    for (unsigned n = 0; n < 8u * WINDOW && spring->stage == DRIVE_POLICY_STAGE_HOLD; n++) {
+        tick(ohm_of(850));
+    }
+    TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_HEAT, spring->stage);
+    for (unsigned n = 0; n < 40u * WINDOW; n++) {
+        tick(ohm_of(850));
+        TEST_ASSERT_UINT16_WITHIN(held_ma / 4, held_ma, target_ma[0]);
+        TEST_ASSERT_GREATER_THAN_UINT16(2900, target_ma[1]);
+        TEST_ASSERT_EQUAL_UINT16(0, target_ma[2]);
+    }
+    TEST_ASSERT_BITS_HIGH(DRIVE_POLICY_LIMIT_SUPPLY, drive_policy_limits(&policy, 0));
+    level[1] = level[2] = 0;
+    read_phase(850, 4);
+    TEST_ASSERT_GREATER_THAN_UINT16(2900, target_ma[0]);
+}
+
+void run_hold_tests(void)
+{
+    Unity.TestFile = __FILE__;
+    RUN_TEST(large_loss_is_martensite_start_at_once);
+    RUN_TEST(sighting_makes_the_model_austenite_whatever_it_had);
+    RUN_TEST(small_loss_is_martensite_start_only_when_seen_for_a_second);
+    RUN_TEST(smaller_loss_is_martensite_start_only_if_it_outlasts_the_pause);
+    RUN_TEST(least_loss_is_no_sighting_however_long);
+    RUN_TEST(readings_of_a_spring_that_slowly_loses_phase_are_a_sighting);
+    RUN_TEST(first_doubt_pauses_the_search_at_a_little_more_power);
+    RUN_TEST(loss_that_is_still_there_keeps_what_was_learnt);
+    RUN_TEST(loss_that_is_gone_makes_the_search_go_on_until_seen_again);
+    RUN_TEST(large_confirmed_loss_is_heated_back);
+    RUN_TEST(coasting_from_a_boost_with_a_known_loss_sights_nothing);
+    RUN_TEST(once_held_the_reference_follows_only_a_little);
+    RUN_TEST(doubt_when_readings_fail_takes_back_what_was_learnt);
+    RUN_TEST(failing_readings_leave_a_confirmed_loss);
+    RUN_TEST(bias_seen_while_pulled_below_start_is_less_by_the_fall);
+    RUN_TEST(one_window_of_too_little_phase_does_not_end_a_hold_several_do);
+    RUN_TEST(impossible_loss_lets_go_of_the_reading_and_does_not_heat);
+    RUN_TEST(resistance_that_stands_still_ends_a_heating_though_the_model_lags);
+    RUN_TEST(resistance_that_still_rises_does_not_end_a_heating);
+    RUN_TEST(spring_that_waits_for_supply_has_not_finished_heating);
+    RUN_TEST(phase_that_rests_below_austenite_start_has_not_finished_heating);
+    RUN_TEST(too_little_phase_below_austenite_start_changes_nothing);
+    RUN_TEST(certain_martensite_teaches_the_scale_and_corrects_nothing);
+    RUN_TEST(what_a_spring_reads_when_transformed_is_its_own_fully_on);
+    RUN_TEST(spring_that_waits_to_be_heated_again_keeps_its_holds_current);
+}
