@@ -197,13 +197,13 @@ static void sighting_makes_the_model_austenite_whatever_it_had(void)
 {
     begin_search();
     int16_t there_c7 = thermal_model_temperature_c7(&model, 0);
-    for (int16_t t_c7 = model.martensite_start_c7; thermal_model_austenite(&model, 0) > 23000;
+    for (int16_t t_c7 = model.martensite_start_c7; thermal_model_austenite(&model, 0) > 30500;
          t_c7--) {
         thermal_model_set_temperature(&model, 0, t_c7);
     }
-    thermal_model_set_temperature(&model, 0, there_c7); /* with 70 % */
+    thermal_model_set_temperature(&model, 0, there_c7); /* with 93 % */
     sight();
-    TEST_ASSERT_GREATER_THAN_UINT16(31000, thermal_model_austenite(&model, 0));
+    TEST_ASSERT_GREATER_THAN_UINT16(32000, thermal_model_austenite(&model, 0));
 }
 
 static void small_loss_is_martensite_start_only_when_seen_for_a_second(void)
@@ -475,13 +475,22 @@ static void spring_that_waits_for_supply_has_not_finished_heating(void)
     TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_HEAT, spring->stage);
 }
 
-static void phase_that_rests_below_austenite_start_has_not_finished_heating(void)
+/* The same at a temperature to which it has cooled with the phase that it has. */
+static drive_policy_stage_t stage_of_rest_at(int16_t temperature_c7)
 {
     begin_heating(850, 850);
-    thermal_model_set_temperature(&model, 0, (int16_t)(model.austenite_start_c7 - 3 * KELVIN));
+    thermal_model_set_temperature(&model, 0, temperature_c7);
     read_phase(850, 40);
     TEST_ASSERT_TRUE(drive_policy_observes(&policy, 0));
-    TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_HEAT, spring->stage);
+    return (drive_policy_stage_t)spring->stage;
+}
+
+static void phase_that_rests_until_heating_goes_on_has_not_finished(void)
+{
+    TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_HEAT,
+                      stage_of_rest_at((int16_t)(model.austenite_start_c7 - 3 * KELVIN)));
+    TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_HEAT,
+                      stage_of_rest_at((int16_t)(model.austenite_start_c7 + 4 * KELVIN)));
 }
 
 static void too_little_phase_below_austenite_start_changes_nothing(void)
@@ -508,6 +517,19 @@ static void certain_martensite_teaches_the_scale_and_corrects_nothing(void)
     TEST_ASSERT_INT16_WITHIN(15, 0, drive_policy_phase_permille(&policy, 0));
     TEST_ASSERT_EQUAL_INT16(temperature_c7, thermal_model_temperature_c7(&model, 0));
     TEST_ASSERT_EQUAL_UINT16(0, thermal_model_austenite(&model, 0));
+}
+
+static void spring_held_at_a_level_is_heated_once_fully_on_is_wanted(void)
+{
+    begin_heating(500, 500);
+    level[0] = 500;
+    read_phase(500, 1);
+    hold_phase(500, 20);
+    TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_HOLD, spring->stage);
+    level[0] = 1000;
+    read_phase(500, 8);
+    TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_HEAT, spring->stage);
+    TEST_ASSERT_TRUE(drive_policy_observes(&policy, 0));
 }
 
 /* Stage of a spring that read so much when it had transformed, and goes on to. */
@@ -590,9 +612,10 @@ void run_hold_tests(void)
     RUN_TEST(resistance_that_stands_still_ends_a_heating_though_the_model_lags);
     RUN_TEST(resistance_that_still_rises_does_not_end_a_heating);
     RUN_TEST(spring_that_waits_for_supply_has_not_finished_heating);
-    RUN_TEST(phase_that_rests_below_austenite_start_has_not_finished_heating);
+    RUN_TEST(phase_that_rests_until_heating_goes_on_has_not_finished);
     RUN_TEST(too_little_phase_below_austenite_start_changes_nothing);
     RUN_TEST(certain_martensite_teaches_the_scale_and_corrects_nothing);
+    RUN_TEST(spring_held_at_a_level_is_heated_once_fully_on_is_wanted);
     RUN_TEST(what_a_spring_reads_when_transformed_is_its_own_fully_on);
     RUN_TEST(spring_that_waits_to_be_heated_again_keeps_its_holds_current);
 }
