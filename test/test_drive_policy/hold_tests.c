@@ -259,8 +259,8 @@ static void first_doubt_pauses_the_search_at_a_little_more_power(void)
     read_phase(1000, 1);
     margin_c7 = spring->margin_c7;
     uint16_t before_ma = spring->wanted_ma;
-    lose(5);
-    read_phase(995, 10);
+    lose(4);
+    read_phase(996, 8);
     TEST_ASSERT_EQUAL_INT16(margin_c7, spring->margin_c7);
     TEST_ASSERT_EQUAL_INT16(there_c7, thermal_model_temperature_c7(&model, 0));
     TEST_ASSERT_GREATER_THAN_UINT16(before_ma + 20, spring->wanted_ma);
@@ -429,6 +429,41 @@ static void impossible_loss_lets_go_of_the_reading_and_does_not_heat(void)
                                    model.martensite_start_c7 + spring->margin_c7);
 }
 
+static void loss_beyond_what_a_search_costs_is_heated_back_at_once(void)
+{
+    begin_search();
+    lose(35);
+    read_phase(965, 1);
+    TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_HEAT, spring->stage);
+    TEST_ASSERT_TRUE(drive_policy_observes(&policy, 0));
+}
+
+static void phase_that_no_hold_can_gain_lets_go_of_the_reading(void)
+{
+    begin_search();
+    lose(-80);
+    read_phase(1080, 1);
+    TEST_ASSERT_FALSE(drive_policy_observes(&policy, 0));
+    TEST_ASSERT_BITS_HIGH(DRIVE_POLICY_LIMIT_BLIND, drive_policy_limits(&policy, 0));
+    TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_HOLD, spring->stage);
+}
+
+static void start_that_is_never_seen_lets_go_of_the_reading(void)
+{
+    begin_search();
+    for (unsigned n = 0; n < 1000 && spring->margin_c7 > 0; n++) {
+        hold_phase(1000, 1);
+    }
+    TEST_ASSERT_EQUAL_INT16(0, spring->bias_uw_per_k);
+    hold_phase(1000, 40); /* and on, half a kelvin below and more */
+    TEST_ASSERT_TRUE(drive_policy_observes(&policy, 0));
+    TEST_ASSERT_LESS_THAN_INT16(0, spring->bias_uw_per_k); /* the model falls more than it can */
+    hold_phase(1000, 1500);
+    TEST_ASSERT_FALSE(drive_policy_observes(&policy, 0));
+    TEST_ASSERT_EQUAL_INT16(0, spring->bias_uw_per_k);
+    TEST_ASSERT_GREATER_OR_EQUAL_INT16(policy.unsure_margin_c7, spring->margin_c7);
+}
+
 /* ---- the end of heating ---- */
 
 /* Heating from cold has come to a phase in the model and to another one in the reading. */
@@ -536,7 +571,9 @@ static void spring_held_at_a_level_is_heated_once_fully_on_is_wanted(void)
 static drive_policy_stage_t stage_of_hold_at(int permille)
 {
     begin_heating(permille, permille);
-    read_phase(permille, 12);
+    for (unsigned n = 0; n < 16u * WINDOW && spring->stage == DRIVE_POLICY_STAGE_HEAT; n++) {
+        tick(ohm_of(permille));
+    }
     TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_HOLD, spring->stage);
     hold_phase(permille, 8);
     return (drive_policy_stage_t)spring->stage;
@@ -609,6 +646,9 @@ void run_hold_tests(void)
     RUN_TEST(bias_seen_while_pulled_below_start_is_less_by_the_fall);
     RUN_TEST(one_window_of_too_little_phase_does_not_end_a_hold_several_do);
     RUN_TEST(impossible_loss_lets_go_of_the_reading_and_does_not_heat);
+    RUN_TEST(loss_beyond_what_a_search_costs_is_heated_back_at_once);
+    RUN_TEST(phase_that_no_hold_can_gain_lets_go_of_the_reading);
+    RUN_TEST(start_that_is_never_seen_lets_go_of_the_reading);
     RUN_TEST(resistance_that_stands_still_ends_a_heating_though_the_model_lags);
     RUN_TEST(resistance_that_still_rises_does_not_end_a_heating);
     RUN_TEST(spring_that_waits_for_supply_has_not_finished_heating);
