@@ -68,6 +68,9 @@
 #define KEPT_C7            (3 * KELVIN_C7) /* above austenite start what was reached is worth keeping */
 #define WAITING_C7         (5 * KELVIN_C7) /* margin while others wait for their boost */
 #define WAITING_RISE_C7    8               /* and its rise in a second */
+#define LIKELY_C7          (7 * KELVIN_C7) /* so far off is the model of a likely array: a loss of 15 % */
+#define TURN_C7            (6 * KELVIN_C7) /* colder than one that heats: it is its turn */
+#define GOES_ON_C7         (4 * KELVIN_C7) /* below austenite start: keeps its turn */
 #define SETTLED_C7         (3 * KELVIN_C7 / 2)
 #define AFTER_BOOST_C7     (4 * KELVIN_C7) /* margin added until the heating has settled */
 #define BLIND_OVERSHOOT_C7 (4 * KELVIN_C7)
@@ -642,7 +645,8 @@ static OWN void watch_hold(drive_policy_t *policy, drive_policy_spring_t *s, the
                                               : UINT8_MAX;
     s->seen = loss < LOSS_SEEN ? 0 : (uint8_t)(s->seen + 1);
     if (loss >= LOSS_CERTAIN || s->seen > SEEN_WINDOWS ||
-        (searches && s->suspicion > PAUSE_WINDOWS && loss >= LOSS_PAUSED)) {
+        (searches && s->suspicion > PAUSE_WINDOWS && loss >= LOSS_PAUSED &&
+         now_c7 < start_c7 + LIKELY_C7)) {
         correct_hold(policy, s, model, k, (int16_t)(start_c7 - policy->event_c7), full);
         if (s->margin_c7 < 0 && s->bias_uw_per_k < 0) {
             /* pulled below start it was falling: not all of the bias is steady loss */
@@ -963,6 +967,35 @@ static HOT void share(drive_policy_t *policy)
     policy->stale = false;
 }
 
+/* The last ones to heat take turns while they are cold: else the very last heats alone, with most
+ * of the supply unused. Far more that wait are better served one after the other. */
+static OWN void take_turns(drive_policy_t *policy, const thermal_model_t *model)
+{
+    int16_t coldest_c7 = INT16_MAX; /* of those that wait */
+    int16_t warmest_c7 = INT16_MIN; /* of those that heat, but have not begun to transform */
+    uint8_t warmest = 0;
+    int8_t room = 0; /* that heat, less twice those that wait */
+    for (uint8_t n = 0; n < policy->queue.count; n++) {
+        uint8_t k = policy->queue.spring[n];
+        const drive_policy_spring_t *s = &policy->spring[k];
+        int16_t now_c7 = thermal_model_temperature_c7(model, k);
+        if (s->granted_ma < s->asked_ma >> 1) {
+            room = (int8_t)(room - 2);
+            coldest_c7 = now_c7 < coldest_c7 ? now_c7 : coldest_c7;
+        } else {
+            room++;
+            if (now_c7 > warmest_c7 && now_c7 < model->austenite_start_c7 - GOES_ON_C7) {
+                warmest_c7 = now_c7;
+                warmest = k;
+            }
+        }
+    }
+    if (room >= 0 && warmest_c7 > TURN_C7 && warmest_c7 - TURN_C7 > coldest_c7) {
+        supply_queue_remove(&policy->queue, warmest);
+        supply_queue_add(&policy->queue, warmest);
+    }
+}
+
 /* What one spring asks for now: less at once, more as far as nobody else is to have it. */
 static OWN void ask(drive_policy_t *policy, const drive_policy_input_t *input,
                     drive_policy_spring_t *s)
@@ -1150,6 +1183,9 @@ static OWN void take_turn(drive_policy_t *policy, const drive_policy_input_t *in
         count_overload(policy);
         if (policy->waiting || policy->reason == DRIVE_POLICY_LIMIT_OVERLOAD ||
             policy->overload_quarters > policy->overload_half_quarters) {
+            if (policy->prepared) {
+                take_turns(policy, input->model);
+            }
             share(policy);
         }
     }

@@ -165,6 +165,7 @@ static void boosts_come_in_the_order_in_which_they_were_asked_for(void)
     want(5, 1000);
     run(1.0);
     want(2, 1000);
+    want(0, 1000);
     run(4.0);
     TEST_ASSERT_TRUE(target(7) > 2900 && target(5) > 1500);
     TEST_ASSERT_EQUAL_UINT(0, target(2));
@@ -175,6 +176,19 @@ static void boosts_come_in_the_order_in_which_they_were_asked_for(void)
     }
     run(1.0);
     TEST_ASSERT_TRUE(target(5) > 2900);
+}
+
+/* One after the other the sixth would be there at 48 s. */
+static void last_ones_to_heat_take_turns(void)
+{
+    start();
+    for (int k = 0; k < 6; k++) {
+        want(k, 1000);
+    }
+    run(44.0);
+    for (int k = 0; k < 6; k++) {
+        TEST_ASSERT_TRUE(phase(k) > 0.99);
+    }
 }
 
 static void spring_that_loses_its_turn_keeps_what_it_has(void)
@@ -880,6 +894,7 @@ int main(void)
     RUN_TEST(held_spring_does_not_feel_its_neighbours);
     RUN_TEST(all_nine_transform_in_turn_within_the_supply);
     RUN_TEST(boosts_come_in_the_order_in_which_they_were_asked_for);
+    RUN_TEST(last_ones_to_heat_take_turns);
     RUN_TEST(spring_that_loses_its_turn_keeps_what_it_has);
     RUN_TEST(array_that_loses_more_than_declared_is_held_in_the_band);
     RUN_TEST(array_that_loses_less_than_declared_is_held_in_the_band);

@@ -219,11 +219,21 @@ static void small_loss_is_martensite_start_only_when_seen_for_a_second(void)
 static void smaller_loss_is_martensite_start_only_if_it_outlasts_the_pause(void)
 {
     begin_search();
+    thermal_model_set_temperature(&model, 0, (int16_t)(model.martensite_start_c7 + 5 * 128));
     lose(5);
     read_phase(995, 10);
     TEST_ASSERT_FALSE(has_sighted());
     read_phase(995, 6);
     TEST_ASSERT_TRUE(has_sighted());
+}
+
+static void smaller_loss_far_above_martensite_start_is_no_sighting(void)
+{
+    begin_search();
+    thermal_model_set_temperature(&model, 0, (int16_t)(model.martensite_start_c7 + 9 * 128));
+    lose(5);
+    read_phase(995, 30);
+    TEST_ASSERT_FALSE(has_sighted());
 }
 
 static void least_loss_is_no_sighting_however_long(void)
@@ -633,6 +643,7 @@ void run_hold_tests(void)
     RUN_TEST(sighting_makes_the_model_austenite_whatever_it_had);
     RUN_TEST(small_loss_is_martensite_start_only_when_seen_for_a_second);
     RUN_TEST(smaller_loss_is_martensite_start_only_if_it_outlasts_the_pause);
+    RUN_TEST(smaller_loss_far_above_martensite_start_is_no_sighting);
     RUN_TEST(least_loss_is_no_sighting_however_long);
     RUN_TEST(readings_of_a_spring_that_slowly_loses_phase_are_a_sighting);
     RUN_TEST(first_doubt_pauses_the_search_at_a_little_more_power);
