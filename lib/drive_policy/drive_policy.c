@@ -46,7 +46,7 @@
 #define SEEN_WINDOWS      4
 #define PAUSE_WINDOWS     12
 #define LOSS_CERTAIN      10  /* at once */
-#define SUSPICION_64UW    600 /* 30 mW stop a fall of 0.1 K/s */
+#define SUSPICION_64UW    600 /* 38 mW stop a fall of 0.1 K/s */
 #define FOLLOWED_MOST     12  /* 2^-14 of the ratio: three permille */
 #define FULL_MINUTE       60u
 #define LOSS_PAUSED       4 /* still seen after the pause */
@@ -492,27 +492,26 @@ static OWN bool has_heated(drive_policy_t *policy, drive_policy_spring_t *s, the
         resistance_observer_learn_martensite(&s->observer, &policy->alloy);
     }
     bool sees = trusted(policy, s);
+    bool strong = s->target_ma >= 2u * policy->parameters.probe_current_ma; /* no coarse reading */
     int16_t phase = sees ? s->observer.phase_permille : permille;
-    if (s->granted_ma < s->asked_ma || now_c7 < model->austenite_start_c7 + 2 * KELVIN_C7 ||
-        now_c7 < goes_on_c7(model, permille) - KELVIN_C7) {
+    if (s->granted_ma < s->asked_ma || now_c7 < goes_on_c7(model, permille) - KELVIN_C7) {
         s->plateau = 0; /* it stands still because it waits, or has not begun to go on */
     } else if (fresh) {
         watch_plateau(policy, s);
     }
-    if (fresh) {
-        if (sees && s->reference != 0 && !certain &&
-            s->target_ma >= 2u * policy->parameters.probe_current_ma) {
-            correct_heating(policy, s, model, k, phase, permille);
-        } else if (sees && now_c7 > model->martensite_start_c7) {
+    if (fresh && s->reference == 0) {
+        if (now_c7 < model->martensite_finish_c7) {
+            s->reference = 1;
+        } else if (sees && strong && now_c7 > model->martensite_start_c7) {
             s->reference = 1; /* the first look at it, if it was not cold before */
-            if (now_c7 < model->austenite_start_c7 && s->target_ma != 0 &&
+            if (now_c7 < model->austenite_start_c7 &&
                 (phase > permille + PHASE_SEEN || phase < permille - PHASE_SEEN)) {
                 impose_phase(model, k, phase);
                 return false;
             }
-        } else if (now_c7 < model->martensite_finish_c7) {
-            s->reference = 1;
         }
+    } else if (fresh && sees && strong && !certain) {
+        correct_heating(policy, s, model, k, phase, permille);
     }
     if (level < LEVEL_FULL_PERMILLE) {
         return phase >= level;
