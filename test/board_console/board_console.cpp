@@ -139,6 +139,25 @@ int occurrences(const std::string &text, const std::string &part)
     return count;
 }
 
+/* The chip counts its sleep with a timer whose interrupt also wakes it. */
+void load_is_what_it_did_not_sleep()
+{
+    auto mega = booted();
+    mega->run_ms(1500.0);
+    const std::uint64_t begin = board_cycle(mega->raw());
+    const std::uint64_t idle = board_idle_cycles(mega->raw());
+    mega->run_ms(2500.0);
+    const double passed = static_cast<double>(board_cycle(mega->raw()) - begin);
+    const double slept = static_cast<double>(board_idle_cycles(mega->raw()) - idle);
+    mega->board.send("?");
+    mega->run_ms(100.0);
+    const std::string status = mega->board.take_output();
+    const std::size_t load = status.find("|load:");
+    TEST_ASSERT_TRUE_MESSAGE(load != std::string::npos, status.c_str());
+    TEST_ASSERT_DOUBLE_WITHIN(2.0, 100.0 * (1.0 - slept / passed),
+                              std::atof(status.c_str() + load + std::strlen("|load:")));
+}
+
 void telemetry_csv_has_a_header_and_lines_at_its_rate()
 {
     auto mega = booted();
@@ -396,6 +415,7 @@ int main()
     RUN_TEST(a_level_is_a_share_of_the_full_current);
     RUN_TEST(selftest_passes_on_a_whole_board_and_leaves_it_off);
     RUN_TEST(a_question_mark_gets_one_line_and_no_ok);
+    RUN_TEST(load_is_what_it_did_not_sleep);
     RUN_TEST(telemetry_csv_has_a_header_and_lines_at_its_rate);
     RUN_TEST(telemetry_teleplot_lines_have_its_form);
     RUN_TEST(csv_at_its_fastest_leaves_the_console_usable);

@@ -2,6 +2,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "crc16.h"
 #include "settings.h"
 #include "text.h"
 #include "unity.h"
@@ -350,6 +351,29 @@ static void a_later_version_gives_defaults_and_says_so(void)
     TEST_ASSERT_TRUE(same(&loaded, &defaults));
 }
 
+/* As a firmware would have left it whose table has as many entries, one of them another: whole, and
+ * each byte of it could be read as a value of ours. */
+static void a_record_of_another_table_is_not_read(void)
+{
+    settings_t loaded;
+    settings_t defaults;
+    settings_entry_t entry;
+    uint16_t size = 7;
+    fill(9);
+    save(0);
+    for (uint8_t i = 0; i < settings_count(); i++) {
+        settings_entry(i, &entry);
+        size = (uint16_t)(size + entry.count * parameter_width(entry.type));
+    }
+    memory[4] ^= 1u; /* the fingerprint */
+    const uint16_t crc = crc16_add_bytes(CRC16_START, &memory[1], (uint16_t)(size - 1u));
+    memory[size] = (uint8_t)(crc & 0xFFu);
+    memory[size + 1u] = (uint8_t)(crc >> 8);
+    TEST_ASSERT_EQUAL(SETTINGS_FOREIGN, settings_load(&store, &storage, &loaded));
+    settings_default(&defaults);
+    TEST_ASSERT_TRUE(same(&loaded, &defaults));
+}
+
 static void a_memory_that_does_not_keep_is_reported(void)
 {
     fill(4);
@@ -373,6 +397,7 @@ int main(void)
     RUN_TEST(a_damaged_newest_record_falls_back_to_the_older_and_says_so);
     RUN_TEST(an_earlier_version_migrates);
     RUN_TEST(a_later_version_gives_defaults_and_says_so);
+    RUN_TEST(a_record_of_another_table_is_not_read);
     RUN_TEST(a_memory_that_does_not_keep_is_reported);
     return UNITY_END();
 }
