@@ -26,7 +26,7 @@ typedef struct {
 } parameter_range_t;
 
 #define PARAMETER_RANGE(parameters, field, type_, minimum_, maximum_)                              \
-    .field = {.offset = (uint8_t)offsetof(parameters, field),                                      \
+    .field = {.offset = offsetof(parameters, field),                                               \
               .type = PARAMETER_##type_,                                                           \
               .minimum = (minimum_),                                                               \
               .maximum = (maximum_)}

@@ -173,8 +173,9 @@ def record(
 ) -> Recording:
     """Write a log's lines from a board's telemetry as they come: header and rows that are whole and rise in time.
 
-    Status between the rows, such as which limits act on a spring, becomes comments. Steps without a time are sent first; timed ones in between, by the board's clock. What is driven by steps is switched
-    off at the end. WorkError where no row came.
+    Status between the rows, such as which limits act on a spring, becomes comments. Steps without a time are sent first;
+    timed ones in between, by the board's clock. What is driven by steps is switched off at the end. WorkError where no
+    row came.
     """
     got = Recording()
     header, first, last = "", math.nan, -math.inf
