@@ -18,5 +18,5 @@ if(AVR_GCC)
         COMMENT "AVR build in ${NINESPRING_AVR_DIR}" USES_TERMINAL VERBATIM)
 else()
     message(WARNING "avr-gcc not found: the firmware and every board test are LEFT OUT of this build. "
-        "On Debian or Ubuntu: apt-get install gcc-avr avr-libc arduino-core-avr libsimavr-dev libelf-dev")
+        "On Debian or Ubuntu: apt-get install gcc-avr avr-libc libsimavr-dev libelf-dev")
 endif()

@@ -10,7 +10,7 @@ function(ninespring_add_board_test name)
             NINESPRING_AVR_DIR="${NINESPRING_AVR_DIR}" NINESPRING_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
     else()
         add_test(NAME ${name} COMMAND ${CMAKE_COMMAND} -E echo
-            "SKIPPED: ${name} needs avr-gcc and libsimavr: apt-get install gcc-avr avr-libc arduino-core-avr libsimavr-dev libelf-dev")
+            "SKIPPED: ${name} needs avr-gcc and libsimavr: apt-get install gcc-avr avr-libc libsimavr-dev libelf-dev")
         set_tests_properties(${name} PROPERTIES SKIP_REGULAR_EXPRESSION "SKIPPED")
     endif()
     if(NOT ARG_TIMEOUT)
