@@ -66,11 +66,11 @@
 #define CERTAIN_C7         (20 * KELVIN_C7) /* below austenite start: martensite for certain */
 #define SHORT_MOST_C7      (20 * KELVIN_C7)
 #define KEPT_C7            (3 * KELVIN_C7) /* above austenite start what was reached is worth keeping */
-#define WAITING_C7         (5 * KELVIN_C7) /* margin while others wait for their boost */
-#define WAITING_RISE_C7    8               /* and its rise in a second */
-#define LIKELY_C7          (7 * KELVIN_C7) /* so far off is the model of a likely array: a loss of 15 % */
-#define TURN_C7            (6 * KELVIN_C7) /* colder than one that heats: it is its turn */
-#define GOES_ON_C7         (4 * KELVIN_C7) /* below austenite start: keeps its turn */
+#define WAITING_C7         (5 * KELVIN_C7)     /* margin while others wait for their boost */
+#define WAITING_RISE_C7    8                   /* and its rise in a second */
+#define LIKELY_C7          (9 * KELVIN_C7 / 2) /* so far off is the model of a likely array */
+#define TURN_C7            (6 * KELVIN_C7)     /* colder than one that heats: it is its turn */
+#define GOES_ON_C7         (4 * KELVIN_C7)     /* below austenite start: keeps its turn */
 #define SETTLED_C7         (3 * KELVIN_C7 / 2)
 #define AFTER_BOOST_C7     (4 * KELVIN_C7) /* margin added until the heating has settled */
 #define BLIND_OVERSHOOT_C7 (4 * KELVIN_C7)

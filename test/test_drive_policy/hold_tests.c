@@ -219,7 +219,7 @@ static void small_loss_is_martensite_start_only_when_seen_for_a_second(void)
 static void smaller_loss_is_martensite_start_only_if_it_outlasts_the_pause(void)
 {
     begin_search();
-    thermal_model_set_temperature(&model, 0, (int16_t)(model.martensite_start_c7 + 5 * 128));
+    thermal_model_set_temperature(&model, 0, (int16_t)(model.martensite_start_c7 + 4 * 128));
     lose(5);
     read_phase(995, 10);
     TEST_ASSERT_FALSE(has_sighted());
