@@ -290,6 +290,26 @@ static bool trusted(const drive_policy_t *policy, const drive_policy_spring_t *s
            resistance_observer_is_plausible(&s->observer, &policy->alloy);
 }
 
+/* Austenite as the resistance says, or as the model does where that is not trusted; permille. */
+static OWN int16_t best_phase(const drive_policy_t *policy, const drive_policy_spring_t *s,
+                              const thermal_model_t *model, uint8_t k)
+{
+    return trusted(policy, s) ? s->observer.phase_permille : model_permille(model, k);
+}
+
+/* How far the model is to move for an error of its phase: half of what is beyond the deadband. */
+static OWN int16_t correction_c7(const drive_policy_t *policy, int16_t error, int16_t deadband)
+{
+    if (error > deadband) {
+        error = (int16_t)(error - deadband);
+    } else if (error < -deadband) {
+        error = (int16_t)(error + deadband);
+    } else {
+        return 0;
+    }
+    return (int16_t)(((int32_t)error * policy->correction_q8) >> 8);
+}
+
 /* While it heats: where the resistance says the spring is, against where the model has it. */
 static OWN void correct_heating(const drive_policy_t *policy, drive_policy_spring_t *s,
                                 thermal_model_t *model, uint8_t k, int16_t phase, int16_t permille)
@@ -303,9 +323,8 @@ static OWN void correct_heating(const drive_policy_t *policy, drive_policy_sprin
         } /* too little phase below austenite start is memory, and heating brings it */
     } else if (phase < 1000 - PHASE_MISSING && now_c7 > model->austenite_finish_c7) {
         move_c7 = (int16_t)(model->austenite_finish_c7 - KELVIN_C7 / 2 - now_c7);
-    } else if (error > PHASE_DEADBAND || error < -PHASE_DEADBAND) {
-        error = (int16_t)(error > 0 ? error - PHASE_DEADBAND : error + PHASE_DEADBAND);
-        move_c7 = (int16_t)(((int32_t)error * policy->correction_q8) >> 8);
+    } else {
+        move_c7 = correction_c7(policy, error, PHASE_DEADBAND);
     }
     if (move_c7 == 0) {
         return;
@@ -361,11 +380,9 @@ static OWN void impose_phase(thermal_model_t *model, uint8_t k, int16_t permille
 static void correct_cooling(const drive_policy_t *policy, thermal_model_t *model, uint8_t k,
                             int16_t phase, int16_t deadband)
 {
-    int16_t error = (int16_t)(phase - model_permille(model, k));
-    if (error > deadband || error < -deadband) {
-        error = (int16_t)(error > 0 ? error - deadband : error + deadband);
-        thermal_model_add_temperature(model, k,
-                                      (int16_t)(((int32_t)error * policy->correction_q8) >> 8));
+    int16_t move_c7 = correction_c7(policy, (int16_t)(phase - model_permille(model, k)), deadband);
+    if (move_c7 != 0) {
+        thermal_model_add_temperature(model, k, move_c7);
     }
 }
 
@@ -538,7 +555,7 @@ static OWN void heat(drive_policy_t *policy, drive_policy_spring_t *s, thermal_m
             s->wanted_ma = keeps_ma;
         }
         /* what it has is kept while it waits */
-        int16_t phase = trusted(policy, s) ? s->observer.phase_permille : model_permille(model, k);
+        int16_t phase = best_phase(policy, s, model, k);
         bool has = phase > level >> 1 || now_c7 > model->austenite_start_c7 + KEPT_C7;
         s->floor_ma = waits && has ? keeps_ma : 0;
     } else if (has_heated(policy, s, model, k, level, fresh)) {
@@ -757,9 +774,8 @@ static OWN void hold(drive_policy_t *policy, drive_policy_spring_t *s, thermal_m
 static OWN void lower(drive_policy_t *policy, drive_policy_spring_t *s, thermal_model_t *model,
                       uint8_t k, int16_t level, bool fresh)
 {
-    bool sees = trusted(policy, s);
-    int16_t phase = sees ? s->observer.phase_permille : model_permille(model, k);
-    if (sees && fresh) {
+    int16_t phase = best_phase(policy, s, model, k);
+    if (fresh && trusted(policy, s)) {
         correct_cooling(policy, model, k, phase, PHASE_DEADBAND);
     }
     if (phase <= level) {
@@ -968,7 +984,7 @@ static HOT void share(drive_policy_t *policy)
 
 /* The last ones to heat take turns while they are cold: else the very last heats alone, with most
  * of the supply unused. Far more that wait are better served one after the other. */
-static OWN void take_turns(drive_policy_t *policy, const thermal_model_t *model)
+static OWN void rotate_queue(drive_policy_t *policy, const thermal_model_t *model)
 {
     int16_t coldest_c7 = INT16_MAX; /* of those that wait */
     int16_t warmest_c7 = INT16_MIN; /* of those that heat, but have not begun to transform */
@@ -1103,9 +1119,11 @@ static OWN void update(drive_policy_t *policy, const drive_policy_input_t *input
         thermal_model_settle(model, k);
         bool fresh =
             resistance_observer_update(&s->observer, &policy->alloy, s->fresh >= FRESH_WINDOWS);
+        if (fresh || s->target_ma == 0) {
+            s->flags &= (uint8_t)~FLAG_FALSE;
+        }
         if (fresh) {
             s->fresh = s->fresh < UINT8_MAX ? (uint8_t)(s->fresh + 1u) : (uint8_t)(UINT8_MAX - 7u);
-            s->flags &= (uint8_t)~FLAG_FALSE;
             if (s->fresh >= FRESH_WINDOWS && policy->alloy.phase_gain != 0 &&
                 s->observer.phase_permille <
                     (s->observer.noisy ? PHASE_FALSE_NOISY : PHASE_FALSE)) {
@@ -1113,7 +1131,6 @@ static OWN void update(drive_policy_t *policy, const drive_policy_input_t *input
             }
         } else if (s->target_ma == 0) {
             s->fresh = 0;
-            s->flags &= (uint8_t)~FLAG_FALSE;
         }
         uint8_t severity = 0;
         if (!driven) {
@@ -1183,7 +1200,7 @@ static OWN void take_turn(drive_policy_t *policy, const drive_policy_input_t *in
         if (policy->waiting || policy->reason == DRIVE_POLICY_LIMIT_OVERLOAD ||
             policy->overload_quarters > policy->overload_half_quarters) {
             if (policy->prepared) {
-                take_turns(policy, input->model);
+                rotate_queue(policy, input->model);
             }
             share(policy);
         }
