@@ -24,9 +24,7 @@ std::string setting_name(std::size_t offset)
     for (std::uint8_t k = 0; k < settings_count(); ++k) {
         settings_entry_t entry{};
         settings_entry(k, &entry);
-        const std::size_t size = entry.type == PARAMETER_U8    ? 1U
-                                 : entry.type == PARAMETER_U32 ? 4U
-                                                               : 2U;
+        const std::size_t size = parameter_width(entry.type);
         if (offset >= entry.offset && offset < entry.offset + size * entry.count) {
             return entry.count == 1 ? fmt::format("${}", settings_name(k))
                                     : fmt::format("${}_{}", settings_name(k),
