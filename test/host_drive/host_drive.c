@@ -722,6 +722,17 @@ static void spring_without_readings_is_off_and_the_others_are_held(void)
     }
 }
 
+/* Ends the loop. The message has two numbers that say which case it is, and the phase. */
+static void check_full_in_a_minute(const char *format, double first, double second)
+{
+    want(CENTRE, 1000);
+    run(60.0);
+    char where[80];
+    (void)snprintf(where, sizeof where, format, first, second, phase(CENTRE));
+    TEST_ASSERT_TRUE_MESSAGE(phase(CENTRE) > 0.98, where);
+    loop_destroy(loop);
+}
+
 static void spring_switched_on_again_after_seconds_is_austenite_again(void)
 {
     for (int alone = 0; alone < 2; alone++) {
@@ -734,13 +745,7 @@ static void spring_switched_on_again_after_seconds_is_austenite_again(void)
             run(120.0);
             want(CENTRE, 0);
             run(off_s);
-            want(CENTRE, 1000);
-            run(60.0);
-            char where[80];
-            (void)snprintf(where, sizeof where, "alone %d off %.0f s: phase %.3f", alone, off_s,
-                           phase(CENTRE));
-            TEST_ASSERT_TRUE_MESSAGE(phase(CENTRE) > 0.98, where);
-            loop_destroy(loop);
+            check_full_in_a_minute("alone %.0f off %.0f s: phase %.3f", alone, off_s);
         }
     }
     loop = NULL;
@@ -756,13 +761,7 @@ static void full_is_reached_from_any_level_at_any_moment(void)
             start();
             want(CENTRE, level);
             run(from_s);
-            want(CENTRE, 1000);
-            run(60.0);
-            char where[80];
-            (void)snprintf(where, sizeof where, "level %u for %.0f s: phase %.3f", level, from_s,
-                           phase(CENTRE));
-            TEST_ASSERT_TRUE_MESSAGE(phase(CENTRE) > 0.98, where);
-            loop_destroy(loop);
+            check_full_in_a_minute("level %.0f for %.0f s: phase %.3f", level, from_s);
         }
     }
     loop = NULL;
