@@ -1,44 +1,23 @@
 /* What a hold and the end of a heating make of the resistance. Readings are those of a fine sensor;
  * the model is not stepped: its temperature is what the test or a correction puts it to. */
-#include "hold_tests.h"
-
 #include <stddef.h>
 
-#include "drive_policy.h"
+#include "fixture.h"
 #include "unity.h"
 
-#define KELVIN  128 /* of a temperature in 1/128 K */
-#define WINDOW  13u /* ticks in which each spring is updated once, at least */
-#define SPRINGS 3u
+#define KELVIN 128 /* of a temperature in 1/128 K */
+#define WINDOW 13u /* ticks in which each spring is updated once, at least */
 
-static thermal_model_t model;
-static drive_policy_t policy;
-static drive_policy_parameters_t parameters;
-static uint16_t level[SPRINGS];
-static uint16_t target_ma[SPRINGS];
-static uint16_t supply_limit_ma;
-static uint8_t model_tick;
 static double left_mv; /* what the last voltage was rounded by */
 
 static drive_policy_spring_t *const spring = &policy.spring[0];
 
-static void make(uint8_t springs)
+/* Anew, with the defaults. */
+static void make_row(uint8_t springs)
 {
-    thermal_model_parameters_t p;
-    thermal_model_parameters_default(&p);
-    p.rows = 1;
-    p.columns = springs;
-    TEST_ASSERT_EQUAL(THERMAL_MODEL_OK, thermal_model_init(&model, &p, NULL));
-    drive_policy_parameters_default(&parameters);
-    parameters.policy = DRIVE_POLICY_PRECOMPENSATE;
-    TEST_ASSERT_TRUE(drive_policy_init(&policy, &parameters, springs, NULL));
-    drive_policy_prepare(&policy, &model);
-    supply_limit_ma = 15000;
-    model_tick = 0;
+    setUp();
+    make(1, springs);
     left_mv = 0.0;
-    for (unsigned k = 0; k < SPRINGS; k++) {
-        level[k] = target_ma[k] = 0;
-    }
 }
 
 static void apply(void)
@@ -53,32 +32,21 @@ static double ohm_of(int permille)
 }
 
 /* One tick; spring 0 reads as a resistance. */
-static void tick(double ohm)
+static void read_ohm(double ohm)
 {
-    bool allowed[SPRINGS] = {true, true, true};
-    bool valid[SPRINGS] = {true};
     double mv = target_ma[0] * ohm + left_mv;
-    int16_t measured_ma[SPRINGS] = {(int16_t)target_ma[0]};
-    int16_t measured_mv[SPRINGS] = {(int16_t)mv};
+    valid[0] = true;
+    measured_ma[0] = (int16_t)target_ma[0];
+    measured_mv[0] = (int16_t)mv;
     left_mv = mv - measured_mv[0];
-    model_tick = (uint8_t)((model_tick + 1u) % 5u);
-    drive_policy_input_t input = {.model = &model,
-                                  .level_permille = level,
-                                  .allowed = allowed,
-                                  .maximum_current_ma = 3000,
-                                  .supply_limit_ma = supply_limit_ma,
-                                  .measured_ma = measured_ma,
-                                  .measured_mv = measured_mv,
-                                  .valid = valid,
-                                  .model_stepped = model_tick == 0};
-    drive_policy_tick(&policy, &input, target_ma);
+    (void)tick();
 }
 
 /* Spring 0 reads a phase for so many windows. */
 static void read_phase(int permille, unsigned windows)
 {
     for (unsigned n = windows * WINDOW; n != 0; n--) {
-        tick(ohm_of(permille));
+        read_ohm(ohm_of(permille));
     }
 }
 
@@ -90,7 +58,7 @@ static void hold_phase(int permille, unsigned windows)
             thermal_model_set_temperature(&model, 0,
                                           (int16_t)(model.martensite_start_c7 + spring->margin_c7));
         }
-        tick(ohm_of(permille));
+        read_ohm(ohm_of(permille));
     }
 }
 
@@ -122,7 +90,7 @@ static int loss(void)
 /* A hold with the wide margin, just begun. */
 static void begin_hold(int permille)
 {
-    make(1);
+    make_row(1);
     thermal_model_set_temperature(&model, 0, 110 * KELVIN);
     thermal_model_set_temperature(&model, 0,
                                   (int16_t)(model.martensite_start_c7 + policy.unsure_margin_c7));
@@ -404,7 +372,7 @@ static void glance(int permille)
     uint32_t slow_q22 = spring->observer.slow_q22;
     for (unsigned n = 0; n < 2u * WINDOW && spring->fresh == fresh; n++) {
         spring->observer.ratio_q14 = (uint16_t)(16384.0 * ohm_of(permille) / ohm_of(0));
-        tick(ohm_of(permille));
+        read_ohm(ohm_of(permille));
     }
     spring->observer.slow_q22 = slow_q22;
 }
@@ -479,7 +447,7 @@ static void start_that_is_never_seen_lets_go_of_the_reading(void)
 /* Heating from cold has come to a phase in the model and to another one in the reading. */
 static void begin_heating(int model_permille, int permille)
 {
-    make(1);
+    make_row(1);
     level[0] = 1000;
     read_phase(0, 8);
     knows(permille);
@@ -582,7 +550,7 @@ static drive_policy_stage_t stage_of_hold_at(int permille)
 {
     begin_heating(permille, permille);
     for (unsigned n = 0; n < 16u * WINDOW && spring->stage == DRIVE_POLICY_STAGE_HEAT; n++) {
-        tick(ohm_of(permille));
+        read_ohm(ohm_of(permille));
     }
     TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_HOLD, spring->stage);
     hold_phase(permille, 8);
@@ -600,7 +568,7 @@ static void what_a_spring_reads_when_transformed_is_its_own_fully_on(void)
 
 static void spring_that_waits_to_be_heated_again_keeps_its_holds_current(void)
 {
-    make(3);
+    make_row(3);
     parameters.dither_ma = 0;
     apply();
     level[1] = 1000;
@@ -621,11 +589,11 @@ static void spring_that_waits_to_be_heated_again_keeps_its_holds_current(void)
     TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_HOLD, spring->stage);
     knows(850);
     for (unsigned n = 0; n < 8u * WINDOW && spring->stage == DRIVE_POLICY_STAGE_HOLD; n++) {
-        tick(ohm_of(850));
+        read_ohm(ohm_of(850));
     }
     TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_HEAT, spring->stage);
     for (unsigned n = 0; n < 40u * WINDOW; n++) {
-        tick(ohm_of(850));
+        read_ohm(ohm_of(850));
         TEST_ASSERT_UINT16_WITHIN(held_ma / 4, held_ma, target_ma[0]);
         TEST_ASSERT_GREATER_THAN_UINT16(2900, target_ma[1]);
         TEST_ASSERT_EQUAL_UINT16(0, target_ma[2]);

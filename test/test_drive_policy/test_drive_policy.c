@@ -3,27 +3,25 @@
 #include <stddef.h>
 #include <string.h>
 
-#include "drive_policy.h"
-#include "hold_tests.h"
+#include "fixture.h"
 #include "unity.h"
 
-#define SPRINGS       9
 #define RESERVED_MA   14800u /* supply 15 A less the default reserve */
 #define FULL_BOOST_MA 3000u
 
-static thermal_model_t model;
-static drive_policy_t policy;
-static drive_policy_parameters_t parameters;
-static uint16_t level[SPRINGS];
+thermal_model_t model;
+drive_policy_t policy;
+drive_policy_parameters_t parameters;
+uint16_t level[SPRINGS];
 static bool allowed[SPRINGS];
-static bool valid[SPRINGS];
-static int16_t measured_ma[SPRINGS];
-static int16_t measured_mv[SPRINGS];
-static uint16_t target_ma[SPRINGS];
-static uint16_t supply_limit_ma;
+bool valid[SPRINGS];
+int16_t measured_ma[SPRINGS];
+int16_t measured_mv[SPRINGS];
+uint16_t target_ma[SPRINGS];
+uint16_t supply_limit_ma;
 static uint8_t model_tick; /* every fifth tick the model steps: no spring is updated */
 
-static void make(uint8_t rows, uint8_t columns)
+void make(uint8_t rows, uint8_t columns)
 {
     thermal_model_parameters_t p;
     thermal_model_parameters_default(&p);
@@ -51,7 +49,7 @@ void setUp(void)
 
 void tearDown(void) {}
 
-static uint32_t tick(void)
+uint32_t tick(void)
 {
     model_tick = (uint8_t)(model_tick + 1u < 5u ? model_tick + 1u : 0u);
     drive_policy_input_t input = {.model = &model,
