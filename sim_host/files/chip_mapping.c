@@ -149,7 +149,8 @@ static void map_loss(mapping_t *m, thermal_model_parameters_t *p)
 {
     const bool edge = is_on(m, "edge_loss"), mismatch = is_on(m, "spring_mismatch");
     const double per_side = array_value(m, "edge_loss_fraction");
-    double scale[PLANT_MAX_SPRINGS], natural[PLANT_MAX_SPRINGS], forced[PLANT_MAX_SPRINGS];
+    double scale[PLANT_MAX_SPRINGS];
+    double natural[PLANT_MAX_SPRINGS] = {0.0}, forced[PLANT_MAX_SPRINGS] = {0.0};
     double factor = 1.0, rise = 0.0, fan_loss = 0.0;
     const bool convection = is_on(m, "natural_convection");
     const bool correlation = convection && array_value(m, "convection_correlation") >= 0.5;
@@ -189,7 +190,7 @@ static void map_loss(mapping_t *m, thermal_model_parameters_t *p)
 static void map_capacity(mapping_t *m, thermal_model_parameters_t *p)
 {
     const bool latent = is_on(m, "latent_heat"), mismatch = is_on(m, "spring_mismatch");
-    double capacity[PLANT_MAX_SPRINGS], latent_k[PLANT_MAX_SPRINGS];
+    double capacity[PLANT_MAX_SPRINGS] = {0.0}, latent_k[PLANT_MAX_SPRINGS] = {0.0};
     for (int i = 0; i < m->springs; i++) {
         const double own = value_of(m, "heat_capacity_j_per_k", i);
         capacity[i] = own * (mismatch ? value_of(m, "heat_capacity_scale", i) : 1.0);

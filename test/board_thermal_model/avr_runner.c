@@ -47,7 +47,7 @@ static int figure_named(runner_t *runner, const char *name)
         return -1;
     }
     figure_t *figure = &runner->figures[runner->count];
-    snprintf(figure->name, sizeof figure->name, "%s", name);
+    memccpy(figure->name, name, '\0', sizeof figure->name - 1);
     figure->least = UINT64_MAX;
     figure->most = 0;
     return runner->count++;
