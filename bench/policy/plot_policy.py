@@ -94,11 +94,11 @@ def eight(directory: Path) -> None:
 
 
 def neighbours(directory: Path) -> None:
-    """The centre is held alone; after five minutes its eight neighbours are switched on."""
+    """The centre is held alone; at 350 s its eight neighbours are switched on."""
     trace = read(directory, "neighbours")
     figure, axes = plt.subplots(2, 1, figsize=(9, 4.6), sharex=True)
     axes[0].plot(trace["time_s"], trace["t5_c"], label="centre")
-    axes[0].plot(trace["time_s"], trace["t2_c"], label="neighbour, on from 300 s", linewidth=1)
+    axes[0].plot(trace["time_s"], trace["t2_c"], label="neighbour, on from 350 s", linewidth=1)
     mark_band(axes[0])
     axes[0].set(ylabel="temperature, degC", ylim=(15, 115))
     axes[0].legend(loc="lower right")

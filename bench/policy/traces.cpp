@@ -51,11 +51,11 @@ void write_traces(const std::string &directory, std::uint64_t seed)
     eight.drive = drive_t::plain_current;
     trace(directory, "b15", eight);
 
-    // the centre is held; after five minutes its neighbours are switched on
+    // the centre is held; at 350 s its neighbours are switched on
     run_t neighbours = base;
     neighbours.pattern = 1u << centre;
     neighbours.command = [](controller_t &controller, double time_s) {
-        for (std::uint8_t k = 0; time_s >= 300.0 && k < springs; k++)
+        for (std::uint8_t k = 0; time_s >= 350.0 && k < springs; k++)
             controller_set_target(&controller, k, 1000);
     };
     trace(directory, "neighbours", neighbours);

@@ -42,14 +42,11 @@
 
 /* The slow ratio in a hold, permille of phase. */
 #define LOSS_SUSPECTED    3 /* the search pauses */
-#define LOSS_SEEN         6 /* for SEEN_WINDOWS: martensite start was passed */
-#define SEEN_WINDOWS      4
+#define LOSS_SEEN         5 /* martensite start was passed */
 #define PAUSE_WINDOWS     12
-#define LOSS_CERTAIN      10  /* at once */
 #define SUSPICION_64UW    600 /* 38 mW stop a fall of 0.1 K/s */
 #define FOLLOWED_MOST     12  /* 2^-14 of the ratio: three permille */
 #define FULL_MINUTE       60u
-#define LOSS_PAUSED       4 /* still seen after the pause */
 #define LOSS_CONFIRMED    3 /* what a true sighting comes to once the average has settled */
 #define LOSS_REHEAT       18
 #define LOSS_RESTORED     8 /* heated again, once the loss is confirmed */
@@ -66,11 +63,10 @@
 #define CERTAIN_C7         (20 * KELVIN_C7) /* below austenite start: martensite for certain */
 #define SHORT_MOST_C7      (20 * KELVIN_C7)
 #define KEPT_C7            (3 * KELVIN_C7) /* above austenite start what was reached is worth keeping */
-#define WAITING_C7         (5 * KELVIN_C7)     /* margin while others wait for their boost */
-#define WAITING_RISE_C7    8                   /* and its rise in a second */
-#define LIKELY_C7          (9 * KELVIN_C7 / 2) /* so far off is the model of a likely array */
-#define TURN_C7            (6 * KELVIN_C7)     /* colder than one that heats: it is its turn */
-#define GOES_ON_C7         (4 * KELVIN_C7)     /* below austenite start: keeps its turn */
+#define COASTING_C7        (5 * KELVIN_C7) /* margin right after a boost while others heat */
+#define COASTING_RISE_C7   8               /* and its rise in a second */
+#define TURN_C7            (6 * KELVIN_C7) /* colder than one that heats: it is its turn */
+#define GOES_ON_C7         (4 * KELVIN_C7) /* below austenite start: keeps its turn */
 #define SETTLED_C7         (3 * KELVIN_C7 / 2)
 #define AFTER_BOOST_C7     (4 * KELVIN_C7) /* margin added until the heating has settled */
 #define BLIND_OVERSHOOT_C7 (4 * KELVIN_C7)
@@ -95,7 +91,7 @@ enum {
     FLAG_TRIPPED = 8,
     FLAG_DOUBT = 16,    /* martensite start was seen, but the average has not settled */
     FLAG_FALSE = 32,    /* what is read is no resistance of this alloy, its product no power */
-    FLAG_SEEN_ONCE = 64 /* martensite start, and the average did not confirm it */
+    FLAG_SEEN_ONCE = 64 /* martensite start: far off, or the average did not confirm it */
 };
 
 static int16_t clamp16(int32_t value, int16_t low, int16_t high)
@@ -290,11 +286,25 @@ static bool trusted(const drive_policy_t *policy, const drive_policy_spring_t *s
            resistance_observer_is_plausible(&s->observer, &policy->alloy);
 }
 
-/* Austenite as the resistance says, or as the model does where that is not trusted; permille. */
+/* Austenite as the resistance says, 0..1000 permille. Fully on is what it read when it had
+ * transformed, whatever the declared resistances say. */
+static OWN int16_t read_phase(const drive_policy_spring_t *s)
+{
+    int16_t phase = s->observer.phase_permille;
+    if (phase <= 0) {
+        return 0;
+    }
+    int16_t beyond = (int16_t)(1000 - s->full_permille);
+    uint32_t part = fixed_point_mac_s16_u16(0, beyond, (uint16_t)phase);
+    phase = (int16_t)(phase + ((int16_t)(part >> 8) >> 2));
+    return phase > 1000 ? 1000 : phase;
+}
+
+/* The same, or as the model says where the resistance is not trusted. */
 static OWN int16_t best_phase(const drive_policy_t *policy, const drive_policy_spring_t *s,
                               const thermal_model_t *model, uint8_t k)
 {
-    return trusted(policy, s) ? s->observer.phase_permille : model_permille(model, k);
+    return trusted(policy, s) ? read_phase(s) : model_permille(model, k);
 }
 
 /* How far the model is to move for an error of its phase: half of what is beyond the deadband. */
@@ -359,20 +369,22 @@ static int16_t place_of_phase(int16_t permille)
 }
 
 /* Where heating goes on to transform a spring that is so much austenite. */
-static OWN int16_t goes_on_c7(const thermal_model_t *model, int16_t permille)
+static OWN int16_t goes_on_c7(const drive_policy_t *policy, const thermal_model_t *model,
+                              int16_t permille)
 {
-    int16_t width_c7 = (int16_t)(model->austenite_finish_c7 - model->austenite_start_c7);
-    int32_t place_c7 = (int32_t)place_of_phase(clamp16(permille, 0, 1000)) * width_c7;
-    return (int16_t)(model->austenite_start_c7 + ((place_c7 * 131) >> 17));
+    uint16_t place = (uint16_t)place_of_phase(clamp16(permille, 0, 1000));
+    uint32_t place_q15 = fixed_point_mac_u16(0, place, policy->correction_q8) << 1;
+    return (int16_t)(model->austenite_start_c7 + (int16_t)(place_q15 >> 8));
 }
 
 /* Between martensite start and austenite start the phase rests: what the resistance says of it is
  * the phase's memory, not the temperature. */
-static OWN void impose_phase(thermal_model_t *model, uint8_t k, int16_t permille)
+static OWN void impose_phase(const drive_policy_t *policy, thermal_model_t *model, uint8_t k,
+                             int16_t permille)
 {
     int16_t now_c7 = thermal_model_temperature_c7(model, k);
     thermal_model_set_temperature(model, k, (int16_t)(model->martensite_finish_c7 - KELVIN_C7));
-    thermal_model_set_temperature(model, k, goes_on_c7(model, permille));
+    thermal_model_set_temperature(model, k, goes_on_c7(policy, model, permille));
     thermal_model_set_temperature(model, k, now_c7);
 }
 
@@ -419,7 +431,7 @@ static void enter(drive_policy_t *policy, uint8_t k, drive_policy_stage_t stage)
         supply_queue_add(&policy->queue, k);
     }
     if (stage == DRIVE_POLICY_STAGE_HOLD) {
-        s->margin_c7 = (s->flags & FLAG_LEARNT) != 0
+        s->margin_c7 = (s->flags & FLAG_LEARNT) != 0 || s->bias_uw_per_k != 0
                            ? (int16_t)(policy->hold_margin_c7 + AFTER_BOOST_C7)
                            : policy->unsure_margin_c7;
     }
@@ -429,13 +441,12 @@ static void enter(drive_policy_t *policy, uint8_t k, drive_policy_stage_t stage)
                    : stage == DRIVE_POLICY_STAGE_OFF ? 0
                                                      : policy->parameters.probe_current_ma;
     s->corrected_c7 = 0;
-    s->flags &= (uint8_t) ~(FLAG_DOUBT | FLAG_SEEN_ONCE);
+    s->flags &= (uint8_t)~FLAG_DOUBT;
     s->lost_permille = 0;
     s->reference = 0;
     s->plateau = 0;
     s->held = 0;
     s->suspicion = 0;
-    s->seen = 0;
 }
 
 /* What heats a spring at a temperature, against its neighbours as they are now, plus a correction
@@ -458,6 +469,12 @@ static HOT uint16_t hold_current_ma(const drive_policy_t *policy, const drive_po
     return resistance_current_for_power_ma(&policy->alloy, s->observer.inverse_q14,
                                            power_64uw > UINT16_MAX ? UINT16_MAX
                                                                    : (uint16_t)power_64uw);
+}
+
+/* It heats with much less than it asks for. */
+static bool waits_for_supply(const drive_policy_spring_t *s)
+{
+    return s->granted_ma < s->asked_ma - (s->asked_ma >> 2);
 }
 
 static OWN bool is_transformed(const drive_policy_t *policy, drive_policy_spring_t *s,
@@ -510,8 +527,10 @@ static OWN bool has_heated(drive_policy_t *policy, drive_policy_spring_t *s, the
     }
     bool sees = trusted(policy, s);
     bool strong = s->target_ma >= 2u * policy->parameters.probe_current_ma; /* no coarse reading */
-    int16_t phase = sees ? s->observer.phase_permille : permille;
-    if (s->granted_ma < s->asked_ma || now_c7 < goes_on_c7(model, permille) - KELVIN_C7) {
+    int16_t phase = sees ? read_phase(s) : permille;
+    /* until heating goes on, what it is, is memory */
+    bool rests = now_c7 < goes_on_c7(policy, model, permille) - KELVIN_C7;
+    if (waits_for_supply(s) || rests) {
         s->plateau = 0; /* it stands still because it waits, or has not begun to go on */
     } else if (fresh) {
         watch_plateau(policy, s);
@@ -523,11 +542,11 @@ static OWN bool has_heated(drive_policy_t *policy, drive_policy_spring_t *s, the
             s->reference = 1; /* the first look at it, if it was not cold before */
             if (now_c7 < model->austenite_start_c7 &&
                 (phase > permille + PHASE_SEEN || phase < permille - PHASE_SEEN)) {
-                impose_phase(model, k, phase);
+                impose_phase(policy, model, k, phase);
                 return false;
             }
         }
-    } else if (fresh && sees && strong && !certain) {
+    } else if (fresh && sees && strong && !certain && (!rests || phase > permille)) {
         correct_heating(policy, s, model, k, phase, permille);
     }
     if (level < LEVEL_FULL_PERMILLE) {
@@ -537,7 +556,8 @@ static OWN bool has_heated(drive_policy_t *policy, drive_policy_spring_t *s, the
         return false;
     }
     if (sees) {
-        s->full_permille = clamp16(phase, 1000 - FULL_MOST_PERMILLE, 1000 + FULL_MOST_PERMILLE);
+        s->full_permille = clamp16(s->observer.phase_permille, 1000 - FULL_MOST_PERMILLE,
+                                   1000 + FULL_MOST_PERMILLE);
     }
     return true;
 }
@@ -546,7 +566,7 @@ static OWN void heat(drive_policy_t *policy, drive_policy_spring_t *s, thermal_m
                      uint8_t k, int16_t level, bool fresh)
 {
     int16_t now_c7 = thermal_model_temperature_c7(model, k);
-    bool waits = s->granted_ma < s->asked_ma;
+    bool waits = waits_for_supply(s);
     bool slows = level < LEVEL_FULL_PERMILLE && now_c7 > model->austenite_start_c7 - KELVIN_C7;
     if ((waits || slows) && (policy->round & 1u) != 0) { /* every second time: a tick is short */
         uint16_t keeps_ma =
@@ -555,9 +575,9 @@ static OWN void heat(drive_policy_t *policy, drive_policy_spring_t *s, thermal_m
             s->wanted_ma = keeps_ma;
         }
         /* what it has is kept while it waits */
-        int16_t phase = best_phase(policy, s, model, k);
-        bool has = phase > level >> 1 || now_c7 > model->austenite_start_c7 + KEPT_C7;
-        s->floor_ma = waits && has ? keeps_ma : 0;
+        bool has = waits && (now_c7 > model->austenite_start_c7 + KEPT_C7 ||
+                             best_phase(policy, s, model, k) > level >> 1);
+        s->floor_ma = has ? keeps_ma : 0;
     } else if (has_heated(policy, s, model, k, level, fresh)) {
         enter(policy, k, DRIVE_POLICY_STAGE_HOLD);
     }
@@ -592,14 +612,16 @@ static OWN void take_reference(drive_policy_t *policy, drive_policy_spring_t *s)
     if ((s->flags & FLAG_DOUBT) != 0) {
         int16_t lost = (int16_t)-resistance_observer_drift_permille(&s->observer, &policy->alloy,
                                                                     s->reference_q14);
-        if ((s->flags & FLAG_SEEN_ONCE) != 0) {
-            s->lost_permille = LOSS_RESTORED; /* seen twice at one place: of both, too little */
-        } else if (lost >= LOSS_CONFIRMED) {
-            s->lost_permille = (int16_t)(s->lost_permille + lost);
-        } else {
-            s->flags = (uint8_t)((s->flags & ~FLAG_LEARNT) | FLAG_SEEN_ONCE);
-        }
         s->flags &= (uint8_t)~FLAG_DOUBT;
+        if ((s->flags & FLAG_LEARNT) != 0 &&
+            (lost >= LOSS_CONFIRMED || (s->flags & FLAG_SEEN_ONCE) != 0)) {
+            s->flags &= (uint8_t)~FLAG_SEEN_ONCE;
+            lost = (int16_t)(s->lost_permille + lost);
+        } else { /* who knows how much it was: all is heated back, and looked for again */
+            s->flags = FLAG_SEEN_ONCE; /* the others are not of a spring that is held and read */
+            lost = LOSS_RESTORED;
+        }
+        s->lost_permille = lost;
     }
     s->followed = 0;
     s->reference_q14 = (uint16_t)(s->observer.slow_q22 >> 8);
@@ -637,32 +659,29 @@ static OWN void watch_hold(drive_policy_t *policy, drive_policy_spring_t *s, the
         return;
     }
     bool searches = (s->flags & FLAG_LEARNT) == 0;
-    /* from a boost, with a loss that is known: what the average does now is its own */
-    bool coasts = !searches && now_c7 > start_c7 + policy->hold_margin_c7 + KELVIN_C7;
+    uint16_t slow_q14 = (uint16_t)(s->observer.slow_q22 >> 8);
+    int16_t unsure_c7 = policy->unsure_margin_c7;
+    if (now_c7 >
+        start_c7 + (searches ? unsure_c7 - (unsure_c7 >> 3) : policy->hold_margin_c7 + KELVIN_C7)) {
+        s->reference_q14 = slow_q14; /* so far off, what the average does is its own */
+        s->suspicion = 0;
+        return;
+    }
     if ((searches || now_c7 > start_c7) && s->suspicion == 0 && (s->fresh & 7u) == 0) {
         /* the sensor's steps let the average wander as the current changes: 0.1 permille a second
          * is followed, a loss is ten times faster; once it is held still not for ever */
-        uint16_t slow_q14 = (uint16_t)(s->observer.slow_q22 >> 8);
-        bool freely = searches || coasts;
-        if (slow_q14 > s->reference_q14 && (freely || s->followed < FOLLOWED_MOST)) {
+        if (slow_q14 > s->reference_q14 && (searches || s->followed < FOLLOWED_MOST)) {
             s->reference_q14++;
-            s->followed = (int8_t)(s->followed + !freely);
-        } else if (slow_q14 < s->reference_q14 && (freely || s->followed > -FOLLOWED_MOST)) {
+            s->followed = (int8_t)(s->followed + !searches);
+        } else if (slow_q14 < s->reference_q14 && (searches || s->followed > -FOLLOWED_MOST)) {
             s->reference_q14--;
-            s->followed = (int8_t)(s->followed - !freely);
+            s->followed = (int8_t)(s->followed - !searches);
         }
-    }
-    if (coasts) {
-        s->suspicion = 0;
-        return;
     }
     s->suspicion = loss < LOSS_SUSPECTED      ? 0
                    : s->suspicion < UINT8_MAX ? (uint8_t)(s->suspicion + 1)
                                               : UINT8_MAX;
-    s->seen = loss < LOSS_SEEN ? 0 : (uint8_t)(s->seen + 1);
-    if (loss >= LOSS_CERTAIN || s->seen > SEEN_WINDOWS ||
-        (searches && s->suspicion > PAUSE_WINDOWS && loss >= LOSS_PAUSED &&
-         now_c7 < start_c7 + LIKELY_C7)) {
+    if (loss >= LOSS_SEEN) {
         correct_hold(policy, s, model, k, (int16_t)(start_c7 - policy->event_c7), full);
         if (s->margin_c7 < 0 && s->bias_uw_per_k < 0) {
             /* pulled below start it was falling: not all of the bias is steady loss */
@@ -670,8 +689,10 @@ static OWN void watch_hold(drive_policy_t *policy, drive_policy_spring_t *s, the
         }
         s->reference = 0; /* the average lags: a new one once it has settled */
         s->suspicion = 0;
-        s->seen = 0;
-        s->flags |= FLAG_LEARNT | FLAG_DOUBT;
+        s->flags |= FLAG_DOUBT;
+        if (now_c7 < start_c7 + (policy->unsure_margin_c7 >> 1)) {
+            s->flags |= FLAG_LEARNT; /* farther off is hardly any array: it must be seen twice */
+        }
         s->margin_c7 = policy->hold_margin_c7;
         return;
     }
@@ -686,14 +707,8 @@ static OWN void narrow_margin(const drive_policy_t *policy, drive_policy_spring_
 {
     int16_t floor_c7 =
         (s->flags & FLAG_LEARNT) != 0 ? policy->hold_margin_c7 : (int16_t) - (PIN_C7 + PULL_C7);
-    if (policy->waiting && (s->flags & FLAG_LEARNT) == 0) {
-        if ((s->fresh & 3u) == 0 && s->margin_c7 < policy->unsure_margin_c7 - WAITING_RISE_C7) {
-            s->margin_c7 = (int16_t)(s->margin_c7 + WAITING_RISE_C7);
-        }
-        return; /* the model runs alone: what it says grows less certain */
-    }
-    if (policy->search_c7 == 0 || is_pausing(s) || s->reference < REFERENCE_WINDOWS ||
-        (s->fresh & 3u) != 0) {
+    if (policy->search_c7 == 0 || is_pausing(s) || (s->fresh & 3u) != 0 ||
+        (s->reference < REFERENCE_WINDOWS && s->granted_ma >= s->asked_ma)) {
         return;
     }
     if (s->margin_c7 > floor_c7) {
@@ -715,6 +730,10 @@ static OWN void hold(drive_policy_t *policy, drive_policy_spring_t *s, thermal_m
         s->held++;
     }
     bool sees = trusted(policy, s);
+    /* right after its boost the model is sure, each second less: others may have the current */
+    int16_t coasting_c7 = (int16_t)(COASTING_C7 + s->held * COASTING_RISE_C7);
+    bool coasts =
+        sees && policy->queue.count != 0 && s->reference == 0 && coasting_c7 < s->margin_c7;
     if ((full || !sees) && model_permille(model, k) < level - 2 * LEVEL_BAND_PERMILLE) {
         enter(policy, k, DRIVE_POLICY_STAGE_HEAT); /* more is wanted than before */
         return;
@@ -730,7 +749,7 @@ static OWN void hold(drive_policy_t *policy, drive_policy_spring_t *s, thermal_m
             s->margin_c7 = policy->unsure_margin_c7;
         }
         phase = full ? INT16_MAX : level;
-    } else if (fresh) {
+    } else if (fresh && !coasts) {
         watch_hold(policy, s, model, k, full);
         narrow_margin(policy, s, model, full);
         if (s->stage != DRIVE_POLICY_STAGE_HOLD) {
@@ -757,11 +776,8 @@ static OWN void hold(drive_policy_t *policy, drive_policy_spring_t *s, thermal_m
         enter(policy, k, DRIVE_POLICY_STAGE_LOWER);
         return;
     }
-    if (policy->waiting && s->margin_c7 == policy->unsure_margin_c7 && s->margin_c7 > WAITING_C7 &&
-        trusted(policy, s)) {
-        s->margin_c7 = WAITING_C7; /* it coasts on: others have use for the current */
-    }
-    int16_t target_c7 = (int16_t)(model->martensite_start_c7 + s->margin_c7);
+    int16_t target_c7 =
+        (int16_t)(model->martensite_start_c7 + (coasts ? coasting_c7 : s->margin_c7));
     uint16_t wanted_ma =
         hold_current_ma(policy, s, model, k, target_c7, is_pausing(s) ? SUSPICION_64UW : 0);
     wanted_ma = (uint16_t)(wanted_ma + (policy->parameters.dither_ma >> 1));

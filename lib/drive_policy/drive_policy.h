@@ -111,7 +111,6 @@ typedef struct {
     uint8_t reference; /* windows that went into reference_q14 */
     uint8_t plateau;   /* windows: of constant resistance; in a hold, of too little phase */
     uint8_t suspicion; /* windows in which this hold may be losing phase */
-    uint8_t seen;      /* windows in which it does for certain */
     uint8_t derating;  /* limits behind ceiling_ma */
 } drive_policy_spring_t;
 

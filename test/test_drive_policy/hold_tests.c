@@ -88,9 +88,9 @@ static int loss(void)
 }
 
 /* A hold with the wide margin, just begun. */
-static void begin_hold(int permille)
+static void begin_hold_in_row(uint8_t springs, int permille)
 {
-    make_row(1);
+    make_row(springs);
     thermal_model_set_temperature(&model, 0, 110 * KELVIN);
     thermal_model_set_temperature(&model, 0,
                                   (int16_t)(model.martensite_start_c7 + policy.unsure_margin_c7));
@@ -100,12 +100,30 @@ static void begin_hold(int permille)
     TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_HOLD, spring->stage);
 }
 
-/* The average has settled, the margin narrows. */
-static void begin_search(void)
+static void begin_hold(int permille)
+{
+    begin_hold_in_row(1, permille);
+}
+
+/* The average settles and the margin narrows to so much. */
+static void narrow_to(int16_t margin_c7)
+{
+    for (unsigned n = 0; n < 600 && spring->margin_c7 > margin_c7; n++) {
+        hold_phase(1000, 1);
+    }
+    TEST_ASSERT_INT16_WITHIN(KELVIN / 4, margin_c7, spring->margin_c7);
+    TEST_ASSERT_EQUAL_INT16(0, spring->bias_uw_per_k);
+}
+
+static void search_down_to(int16_t margin_c7)
 {
     begin_hold(1000);
-    hold_phase(1000, 60);
-    TEST_ASSERT_LESS_THAN_INT16(policy.unsure_margin_c7 - KELVIN / 8, spring->margin_c7);
+    narrow_to(margin_c7);
+}
+
+static void begin_search(void)
+{
+    search_down_to(6 * KELVIN);
 }
 
 static bool is_just_below_start(void)
@@ -174,34 +192,26 @@ static void sighting_makes_the_model_austenite_whatever_it_had(void)
     TEST_ASSERT_GREATER_THAN_UINT16(32000, thermal_model_austenite(&model, 0));
 }
 
-static void small_loss_is_martensite_start_only_when_seen_for_a_second(void)
+static void small_loss_is_martensite_start_and_a_smaller_one_is_not(void)
 {
     begin_search();
-    lose(8);
-    read_phase(992, 3);
+    lose(4);
+    read_phase(996, 30);
     TEST_ASSERT_FALSE(has_sighted());
-    read_phase(992, 4);
+    begin_search();
+    lose(7);
+    read_phase(993, 1);
     TEST_ASSERT_TRUE(has_sighted());
 }
 
-static void smaller_loss_is_martensite_start_only_if_it_outlasts_the_pause(void)
+static void loss_farther_off_than_any_array_is_followed_as_the_averages_own(void)
 {
-    begin_search();
-    thermal_model_set_temperature(&model, 0, (int16_t)(model.martensite_start_c7 + 4 * 128));
-    lose(5);
-    read_phase(995, 10);
+    search_down_to(11 * KELVIN);
+    lose(15);
+    read_phase(985, 2);
     TEST_ASSERT_FALSE(has_sighted());
-    read_phase(995, 6);
-    TEST_ASSERT_TRUE(has_sighted());
-}
-
-static void smaller_loss_far_above_martensite_start_is_no_sighting(void)
-{
-    begin_search();
-    thermal_model_set_temperature(&model, 0, (int16_t)(model.martensite_start_c7 + 9 * 128));
-    lose(5);
-    read_phase(995, 30);
-    TEST_ASSERT_FALSE(has_sighted());
+    TEST_ASSERT_LESS_THAN_INT(3, loss());
+    TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_HOLD, spring->stage);
 }
 
 static void least_loss_is_no_sighting_however_long(void)
@@ -261,18 +271,49 @@ static void loss_that_is_still_there_keeps_what_was_learnt(void)
     TEST_ASSERT_EQUAL_INT16(bias, spring->bias_uw_per_k);
 }
 
-static void loss_that_is_gone_makes_the_search_go_on_until_seen_again(void)
+/* A boost that ends at once, then the search down to a margin. */
+static void heat_back_and_search_down_to(int16_t margin_c7)
+{
+    TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_HEAT, spring->stage);
+    thermal_model_set_temperature(&model, 0, 110 * KELVIN);
+    knows(1000);
+    read_phase(1000, 8);
+    TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_HOLD, spring->stage);
+    TEST_ASSERT_LESS_THAN_INT16(policy.unsure_margin_c7, spring->margin_c7);
+    for (unsigned n = 0; n < 400 && spring->margin_c7 > margin_c7; n++) {
+        hold_phase(1000, 1);
+    }
+    TEST_ASSERT_INT16_WITHIN(KELVIN / 4, margin_c7, spring->margin_c7);
+}
+
+static void loss_that_is_gone_is_heated_back_and_believed_when_seen_again(void)
 {
     begin_search();
     sight();
     lose(0);
-    hold_phase(1000, 150);
-    TEST_ASSERT_LESS_THAN_INT16(policy.hold_margin_c7 - KELVIN, spring->margin_c7);
+    hold_phase(1000, 60);
+    heat_back_and_search_down_to(0);
     sight();
-    lose(0); /* and gone again: two at one place are no chance */
-    hold_phase(1000, 30);
+    lose(0); /* and gone again: two are no chance */
+    hold_phase(1000, 200);
     TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_HOLD, spring->stage);
-    hold_phase(1000, 30);
+    TEST_ASSERT_EQUAL_INT16(policy.hold_margin_c7, spring->margin_c7);
+    lose(6); /* a third is a first one again */
+    read_phase(994, 1);
+    TEST_ASSERT_TRUE(has_sighted());
+    lose(0);
+    hold_phase(1000, 60);
+    TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_HEAT, spring->stage);
+}
+
+static void doubtful_loss_after_a_confirmed_one_is_heated_back(void)
+{
+    learn();
+    lose(6);
+    read_phase(994, 1);
+    TEST_ASSERT_TRUE(has_sighted());
+    lose(0);
+    hold_phase(1000, 60);
     TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_HEAT, spring->stage);
 }
 
@@ -304,6 +345,37 @@ static void coasting_from_a_boost_with_a_known_loss_sights_nothing(void)
     TEST_ASSERT_EQUAL_INT16(bias, spring->bias_uw_per_k);
     hold_phase(992, 300);
     TEST_ASSERT_LESS_THAN_INT(3, loss()); /* the reference has followed, all the way */
+    TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_HOLD, spring->stage);
+}
+
+static void narrow_from(uint16_t unsure_margin_cc, uint16_t hold_margin_cc, int16_t margin_c7)
+{
+    begin_hold(1000);
+    parameters.unsure_margin_cc = unsure_margin_cc;
+    parameters.hold_margin_cc = hold_margin_cc;
+    apply();
+    spring->margin_c7 = policy.unsure_margin_c7;
+    narrow_to(margin_c7);
+}
+
+static void wide_and_narrow_margins_are_searched_as_far_as_they_reach(void)
+{
+    narrow_from(2000, 250, 16 * KELVIN);
+    sight();
+    narrow_from(50, 50, 0);
+    sight();
+}
+
+static void sighting_that_is_far_off_is_heated_back_and_looked_for_again(void)
+{
+    search_down_to(8 * KELVIN);
+    sight();
+    lose(5); /* this would confirm a nearer one */
+    hold_phase(995, 60);
+    TEST_ASSERT_GREATER_THAN_INT16(100, spring->bias_uw_per_k);
+    heat_back_and_search_down_to(0); /* past the margin of a loss that is known */
+    sight();
+    hold_phase(1000, 60);
     TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_HOLD, spring->stage);
 }
 
@@ -488,6 +560,43 @@ static void spring_that_waits_for_supply_has_not_finished_heating(void)
     TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_HEAT, spring->stage);
 }
 
+static void nearly_all_the_current_it_asks_for_is_enough_to_finish_heating(void)
+{
+    begin_heating(800, 850);
+    supply_limit_ma = 3000; /* so that it has 2.8 A of 3 */
+    read_phase(850, 12);
+    TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_HOLD, spring->stage);
+}
+
+static void more_than_fully_on_says_nothing_of_the_temperature(void)
+{
+    begin_heating(1000, 1100);
+    int16_t before_c7 = thermal_model_temperature_c7(&model, 0);
+    read_phase(1100, 1);
+    TEST_ASSERT_TRUE(drive_policy_observes(&policy, 0));
+    TEST_ASSERT_EQUAL_INT16(before_c7, thermal_model_temperature_c7(&model, 0));
+}
+
+static void what_it_read_when_it_had_transformed_is_fully_on_when_heated_again(void)
+{
+    begin_heating(985, 880);
+    spring->full_permille = 880;
+    int16_t before_c7 = thermal_model_temperature_c7(&model, 0);
+    read_phase(880, 1);
+    TEST_ASSERT_EQUAL_INT16(before_c7, thermal_model_temperature_c7(&model, 0));
+}
+
+static void too_little_phase_until_heating_goes_on_changes_nothing(void)
+{
+    begin_heating(950, 850);
+    int16_t temperature_c7 = (int16_t)(model.austenite_start_c7 + 2 * KELVIN);
+    thermal_model_set_temperature(&model, 0, temperature_c7);
+    uint16_t austenite = thermal_model_austenite(&model, 0);
+    read_phase(850, 8);
+    TEST_ASSERT_EQUAL_INT16(temperature_c7, thermal_model_temperature_c7(&model, 0));
+    TEST_ASSERT_EQUAL_UINT16(austenite, thermal_model_austenite(&model, 0));
+}
+
 /* The same at a temperature to which it has cooled with the phase that it has. */
 static drive_policy_stage_t stage_of_rest_at(int16_t temperature_c7)
 {
@@ -504,6 +613,28 @@ static void phase_that_rests_until_heating_goes_on_has_not_finished(void)
                       stage_of_rest_at((int16_t)(model.austenite_start_c7 - 3 * KELVIN)));
     TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_HEAT,
                       stage_of_rest_at((int16_t)(model.austenite_start_c7 + 4 * KELVIN)));
+}
+
+static void model_takes_half_of_what_the_phase_is_off_beyond_the_deadband(void)
+{
+    begin_heating(300, 330);
+    int16_t before_c7 = thermal_model_temperature_c7(&model, 0);
+    read_phase(330, 2);
+    TEST_ASSERT_EQUAL_INT16(before_c7, thermal_model_temperature_c7(&model, 0));
+    begin_heating(300, 500); /* 160 permille of 10 K */
+    before_c7 = thermal_model_temperature_c7(&model, 0);
+    read_phase(500, 1);
+    TEST_ASSERT_INT16_WITHIN(KELVIN / 2, 4 * KELVIN / 5,
+                             thermal_model_temperature_c7(&model, 0) - before_c7);
+}
+
+static void phase_below_austenite_start_shows_that_the_spring_is_hotter(void)
+{
+    begin_heating(0, 150);
+    thermal_model_set_temperature(&model, 0, (int16_t)(model.austenite_start_c7 - 5 * KELVIN));
+    read_phase(150, 1);
+    TEST_ASSERT_INT16_WITHIN(KELVIN, model.austenite_start_c7 + KELVIN,
+                             thermal_model_temperature_c7(&model, 0));
 }
 
 static void too_little_phase_below_austenite_start_changes_nothing(void)
@@ -564,7 +695,66 @@ static void what_a_spring_reads_when_transformed_is_its_own_fully_on(void)
     TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_HEAT, stage_of_hold_at(640)); /* this is not fully on */
 }
 
-/* ---- heated again while others have the supply ---- */
+/* ---- while others have the supply ---- */
+
+static uint16_t current_at(int16_t margin_c7)
+{
+    thermal_model_set_temperature(&model, 0, (int16_t)(model.martensite_start_c7 + margin_c7));
+    read_phase(1000, 2);
+    return spring->wanted_ma;
+}
+
+static void margin_of_a_spring_that_coasts_grows_with_what_the_model_does_not_know(void)
+{
+    begin_hold_in_row(2, 1000);
+    level[1] = 1000;
+    (void)current_at(6 * KELVIN);
+    uint16_t first_ma = current_at(6 * KELVIN);
+    for (unsigned n = 0; n < 120; n++) { /* half a minute: 2 K */
+        (void)current_at(6 * KELVIN);
+    }
+    TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_HEAT, policy.spring[1].stage);
+    TEST_ASSERT_GREATER_THAN_UINT16(first_ma + 50, spring->wanted_ma);
+    TEST_ASSERT_EQUAL_INT16(policy.unsure_margin_c7, spring->margin_c7);
+}
+
+static void spring_that_has_coasted_looks_for_a_reference_only_then(void)
+{
+    begin_hold_in_row(2, 1000);
+    level[1] = 1000;
+    hold_phase(1000, 80);
+    TEST_ASSERT_EQUAL_INT16(policy.unsure_margin_c7, spring->margin_c7);
+    level[1] = 0;
+    hold_phase(1000, 30);
+    TEST_ASSERT_EQUAL_INT16(policy.unsure_margin_c7, spring->margin_c7);
+    hold_phase(1000, 30);
+    TEST_ASSERT_LESS_THAN_INT16(policy.unsure_margin_c7, spring->margin_c7);
+}
+
+static void search_that_has_begun_goes_on_while_another_spring_heats(void)
+{
+    begin_hold_in_row(2, 1000);
+    hold_phase(1000, 60);
+    uint16_t before_ma = current_at(spring->margin_c7);
+    int16_t before_c7 = spring->margin_c7;
+    level[1] = 1000;
+    read_phase(1000, 4);
+    TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_HEAT, policy.spring[1].stage);
+    TEST_ASSERT_UINT16_WITHIN(60, before_ma, current_at(spring->margin_c7));
+    hold_phase(1000, 40);
+    TEST_ASSERT_LESS_THAN_INT16(before_c7 - KELVIN / 2, spring->margin_c7);
+}
+
+static void margin_that_the_supply_does_not_reach_narrows(void)
+{
+    begin_hold(1000);
+    supply_limit_ma = (uint16_t)(parameters.supply_reserve_ma + 1000u);
+    for (unsigned n = 0; n < 120; n++) {
+        (void)current_at(8 * KELVIN);
+    }
+    TEST_ASSERT_LESS_THAN_UINT16(spring->asked_ma, spring->granted_ma);
+    TEST_ASSERT_LESS_THAN_INT16(policy.unsure_margin_c7 - KELVIN, spring->margin_c7);
+}
 
 static void spring_that_waits_to_be_heated_again_keeps_its_holds_current(void)
 {
@@ -579,6 +769,8 @@ static void spring_that_waits_to_be_heated_again_keeps_its_holds_current(void)
     level[0] = 1000;
     hold_phase(1000, 8);
     TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_HOLD, spring->stage);
+    spring->margin_c7 = policy.hold_margin_c7; /* no more to coast */
+    hold_phase(1000, 4);
     uint16_t held_ma = spring->granted_ma;
     TEST_ASSERT_GREATER_THAN_UINT16(1000, held_ma);
     /* a boost and this hold */
@@ -609,16 +801,18 @@ void run_hold_tests(void)
     Unity.TestFile = __FILE__;
     RUN_TEST(large_loss_is_martensite_start_at_once);
     RUN_TEST(sighting_makes_the_model_austenite_whatever_it_had);
-    RUN_TEST(small_loss_is_martensite_start_only_when_seen_for_a_second);
-    RUN_TEST(smaller_loss_is_martensite_start_only_if_it_outlasts_the_pause);
-    RUN_TEST(smaller_loss_far_above_martensite_start_is_no_sighting);
+    RUN_TEST(small_loss_is_martensite_start_and_a_smaller_one_is_not);
+    RUN_TEST(loss_farther_off_than_any_array_is_followed_as_the_averages_own);
     RUN_TEST(least_loss_is_no_sighting_however_long);
     RUN_TEST(readings_of_a_spring_that_slowly_loses_phase_are_a_sighting);
     RUN_TEST(first_doubt_pauses_the_search_at_a_little_more_power);
     RUN_TEST(loss_that_is_still_there_keeps_what_was_learnt);
-    RUN_TEST(loss_that_is_gone_makes_the_search_go_on_until_seen_again);
+    RUN_TEST(loss_that_is_gone_is_heated_back_and_believed_when_seen_again);
+    RUN_TEST(doubtful_loss_after_a_confirmed_one_is_heated_back);
     RUN_TEST(large_confirmed_loss_is_heated_back);
     RUN_TEST(coasting_from_a_boost_with_a_known_loss_sights_nothing);
+    RUN_TEST(wide_and_narrow_margins_are_searched_as_far_as_they_reach);
+    RUN_TEST(sighting_that_is_far_off_is_heated_back_and_looked_for_again);
     RUN_TEST(once_held_the_reference_follows_only_a_little);
     RUN_TEST(doubt_when_readings_fail_takes_back_what_was_learnt);
     RUN_TEST(failing_readings_leave_a_confirmed_loss);
@@ -631,10 +825,20 @@ void run_hold_tests(void)
     RUN_TEST(resistance_that_stands_still_ends_a_heating_though_the_model_lags);
     RUN_TEST(resistance_that_still_rises_does_not_end_a_heating);
     RUN_TEST(spring_that_waits_for_supply_has_not_finished_heating);
+    RUN_TEST(nearly_all_the_current_it_asks_for_is_enough_to_finish_heating);
+    RUN_TEST(more_than_fully_on_says_nothing_of_the_temperature);
+    RUN_TEST(what_it_read_when_it_had_transformed_is_fully_on_when_heated_again);
+    RUN_TEST(too_little_phase_until_heating_goes_on_changes_nothing);
     RUN_TEST(phase_that_rests_until_heating_goes_on_has_not_finished);
+    RUN_TEST(model_takes_half_of_what_the_phase_is_off_beyond_the_deadband);
+    RUN_TEST(phase_below_austenite_start_shows_that_the_spring_is_hotter);
     RUN_TEST(too_little_phase_below_austenite_start_changes_nothing);
     RUN_TEST(certain_martensite_teaches_the_scale_and_corrects_nothing);
     RUN_TEST(spring_held_at_a_level_is_heated_once_fully_on_is_wanted);
     RUN_TEST(what_a_spring_reads_when_transformed_is_its_own_fully_on);
+    RUN_TEST(margin_of_a_spring_that_coasts_grows_with_what_the_model_does_not_know);
+    RUN_TEST(spring_that_has_coasted_looks_for_a_reference_only_then);
+    RUN_TEST(search_that_has_begun_goes_on_while_another_spring_heats);
+    RUN_TEST(margin_that_the_supply_does_not_reach_narrows);
     RUN_TEST(spring_that_waits_to_be_heated_again_keeps_its_holds_current);
 }
