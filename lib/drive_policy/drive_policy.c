@@ -575,9 +575,9 @@ static OWN void heat(drive_policy_t *policy, drive_policy_spring_t *s, thermal_m
             s->wanted_ma = keeps_ma;
         }
         /* what it has is kept while it waits */
-        bool has = waits && (now_c7 > model->austenite_start_c7 + KEPT_C7 ||
-                             best_phase(policy, s, model, k) > level >> 1);
-        s->floor_ma = has ? keeps_ma : 0;
+        bool has = now_c7 > model->austenite_start_c7 + KEPT_C7 ||
+                   best_phase(policy, s, model, k) > level >> 1;
+        s->floor_ma = waits && has ? keeps_ma : 0;
     } else if (has_heated(policy, s, model, k, level, fresh)) {
         enter(policy, k, DRIVE_POLICY_STAGE_HOLD);
     }
@@ -725,7 +725,7 @@ static OWN void hold(drive_policy_t *policy, drive_policy_spring_t *s, thermal_m
                      uint8_t k, int16_t level, bool fresh)
 {
     bool full = level >= LEVEL_FULL_PERMILLE;
-    int16_t phase = s->observer.phase_permille;
+    int16_t phase = full ? s->observer.phase_permille : read_phase(s);
     if ((policy->round & 3u) == 0 && s->held < UINT8_MAX) {
         s->held++;
     }

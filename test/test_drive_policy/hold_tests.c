@@ -108,17 +108,17 @@ static void begin_hold(int permille)
 /* The average settles and the margin narrows to so much. */
 static void narrow_to(int16_t margin_c7)
 {
-    for (unsigned n = 0; n < 600 && spring->margin_c7 > margin_c7; n++) {
+    for (unsigned n = 0; n < 1000 && spring->margin_c7 > margin_c7; n++) {
         hold_phase(1000, 1);
     }
     TEST_ASSERT_INT16_WITHIN(KELVIN / 4, margin_c7, spring->margin_c7);
-    TEST_ASSERT_EQUAL_INT16(0, spring->bias_uw_per_k);
 }
 
 static void search_down_to(int16_t margin_c7)
 {
     begin_hold(1000);
     narrow_to(margin_c7);
+    TEST_ASSERT_EQUAL_INT16(0, spring->bias_uw_per_k);
 }
 
 static void begin_search(void)
@@ -280,10 +280,7 @@ static void heat_back_and_search_down_to(int16_t margin_c7)
     read_phase(1000, 8);
     TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_HOLD, spring->stage);
     TEST_ASSERT_LESS_THAN_INT16(policy.unsure_margin_c7, spring->margin_c7);
-    for (unsigned n = 0; n < 400 && spring->margin_c7 > margin_c7; n++) {
-        hold_phase(1000, 1);
-    }
-    TEST_ASSERT_INT16_WITHIN(KELVIN / 4, margin_c7, spring->margin_c7);
+    narrow_to(margin_c7);
 }
 
 static void loss_that_is_gone_is_heated_back_and_believed_when_seen_again(void)
@@ -356,6 +353,7 @@ static void narrow_from(uint16_t unsure_margin_cc, uint16_t hold_margin_cc, int1
     apply();
     spring->margin_c7 = policy.unsure_margin_c7;
     narrow_to(margin_c7);
+    TEST_ASSERT_EQUAL_INT16(0, spring->bias_uw_per_k);
 }
 
 static void wide_and_narrow_margins_are_searched_as_far_as_they_reach(void)
@@ -500,11 +498,7 @@ static void phase_that_no_hold_can_gain_lets_go_of_the_reading(void)
 
 static void start_that_is_never_seen_lets_go_of_the_reading(void)
 {
-    begin_search();
-    for (unsigned n = 0; n < 1000 && spring->margin_c7 > 0; n++) {
-        hold_phase(1000, 1);
-    }
-    TEST_ASSERT_EQUAL_INT16(0, spring->bias_uw_per_k);
+    search_down_to(0);
     hold_phase(1000, 40); /* and on, half a kelvin below and more */
     TEST_ASSERT_TRUE(drive_policy_observes(&policy, 0));
     TEST_ASSERT_LESS_THAN_INT16(0, spring->bias_uw_per_k); /* the model falls more than it can */
@@ -676,6 +670,19 @@ static void spring_held_at_a_level_is_heated_once_fully_on_is_wanted(void)
     TEST_ASSERT_TRUE(drive_policy_observes(&policy, 0));
 }
 
+/* What it reads at half is as far from the declared as what it read when fully on. */
+static void level_is_held_of_what_the_spring_read_when_fully_on(void)
+{
+    begin_heating(500, 590);
+    spring->full_permille = 1150;
+    level[0] = 500;
+    read_phase(590, 1);
+    for (unsigned n = 0; n < 20; n++) {
+        hold_phase(590, 1);
+        TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_HOLD, spring->stage);
+    }
+}
+
 /* Stage of a spring that read so much when it had transformed, and goes on to. */
 static drive_policy_stage_t stage_of_hold_at(int permille)
 {
@@ -835,6 +842,7 @@ void run_hold_tests(void)
     RUN_TEST(too_little_phase_below_austenite_start_changes_nothing);
     RUN_TEST(certain_martensite_teaches_the_scale_and_corrects_nothing);
     RUN_TEST(spring_held_at_a_level_is_heated_once_fully_on_is_wanted);
+    RUN_TEST(level_is_held_of_what_the_spring_read_when_fully_on);
     RUN_TEST(what_a_spring_reads_when_transformed_is_its_own_fully_on);
     RUN_TEST(margin_of_a_spring_that_coasts_grows_with_what_the_model_does_not_know);
     RUN_TEST(spring_that_has_coasted_looks_for_a_reference_only_then);
