@@ -250,7 +250,7 @@ static bool step_model(controller_t *controller, const controller_inputs_t *inpu
     controller->model_tick = 0;
     for (uint8_t k = 0; k < controller->springs; k++) {
         controller->power_sum_uw[k] =
-            drive_policy_model_power_uw(&controller->policy, k, fifth(controller->power_sum_uw[k]));
+            drive_policy_model_power_uw(&controller->policy, &controller->model, k, fifth(controller->power_sum_uw[k]));
     }
     controller->ambient_c7 = inputs->ambient_c7;
     thermal_model_set_ambient(&controller->model, inputs->ambient_c7);

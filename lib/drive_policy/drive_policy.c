@@ -4,14 +4,6 @@
 
 #include "fixed_point.h"
 
-#if defined(__AVR__) && !defined(__clang__)
-#define HOT __attribute__((noinline, optimize("O2"))) /* a third of its cycles */
-#else
-#define HOT
-#endif
-
-#define OWN __attribute__((noinline)) /* one function of all would spill its registers */
-
 /* Each spring is updated once in a round, 0.25 s. Counts of updates and windows below are of those
  * quarters. */
 #define UPDATES_PER_S 4u
@@ -187,11 +179,10 @@ bool drive_policy_init(drive_policy_t *policy, const drive_policy_parameters_t *
     }
     *policy = (drive_policy_t){
         .parameters = *parameters, .springs = springs, .columns = springs, .stale = true};
+    spring_estimator_init(&policy->estimator, springs);
     for (uint8_t k = 0; k < springs; k++) {
         drive_policy_spring_t *s = &policy->spring[k];
-        resistance_observer_reset(&s->observer);
         s->ceiling_ma = parameters->boost_current_ma;
-        s->full_permille = 1000;
     }
     return true;
 }
@@ -200,26 +191,9 @@ void drive_policy_prepare(drive_policy_t *policy, const thermal_model_t *model)
 {
     const drive_policy_parameters_t *p = &policy->parameters;
     const thermal_model_parameters_t *m = &model->parameters;
-    resistance_alloy_prepare(&policy->alloy, m->resistance_martensite_uohm,
-                             m->resistance_austenite_uohm);
+    spring_estimator_prepare(&policy->estimator, model);
     policy->columns = m->columns;
 
-    /* a distance of 1 K is closed with a time constant of 4 s: C / 4 s */
-    uint32_t feedback = (uint32_t)m->heat_capacity_mj_per_k * 1000u / (4u * KELVIN_C7);
-    policy->feedback_uw_per_c7 = feedback > 16383u ? 16383u : (uint16_t)feedback;
-    /* half of the error in each update: width / 2 / 1000 */
-    uint16_t width_c7 = (uint16_t)(model->austenite_finish_c7 - model->austenite_start_c7);
-    policy->correction_q8 = (uint16_t)((uint32_t)width_c7 * 131u >> 10);
-    /* 35 % of the declared loss */
-    policy->bias_limit_uw_per_k = (int16_t)((uint32_t)m->loss_uw_per_k * 23u >> 6);
-    /* heat of a fall of 0.04 K/s over the 60 K that correct_hold works with */
-    policy->falling_uw_per_k = (int16_t)((uint32_t)policy->feedback_uw_per_c7 * 87u >> 8);
-    width_c7 = (uint16_t)(model->martensite_start_c7 - model->martensite_finish_c7);
-    policy->event_c7 = (int16_t)((uint32_t)width_c7 * 14u >> 8); /* 5.5 % */
-
-    policy->hold_margin_c7 = fixed_point_c7_from_cc((int16_t)p->hold_margin_cc);
-    policy->unsure_margin_c7 = fixed_point_c7_from_cc((int16_t)p->unsure_margin_cc);
-    policy->search_c7 = (int16_t)((uint32_t)p->search_mk_per_s * 131u >> 10);
     policy->limit_c7 = fixed_point_c7_from_cc((int16_t)p->temperature_limit_cc);
     uint16_t band_c7 = (uint16_t)fixed_point_c7_from_cc((int16_t)p->temperature_band_cc);
     policy->derating_gain = (uint16_t)(65535u / band_c7);
@@ -230,245 +204,66 @@ void drive_policy_prepare(drive_policy_t *policy, const thermal_model_t *model)
     policy->prepared = true;
 }
 
-/* ---- what the model says ---- */
+/* ---- stages ---- */
+
+static float now_c(const thermal_model_t *model, uint8_t k)
+{
+    return (float)thermal_model_temperature_c7(model, k) * (1.0f / 128.0f);
+}
 
 static int16_t model_permille(const thermal_model_t *model, uint8_t k)
 {
     return (int16_t)(((uint32_t)thermal_model_austenite(model, k) * 125u) >> 12);
 }
 
-/* The loss beyond the model's at a temperature, uW. */
-static int32_t bias_at(const thermal_model_t *model, int16_t bias_uw_per_k, int16_t temperature_c7)
-{
-    if (bias_uw_per_k == 0) {
-        return 0;
-    }
-    int16_t above_c7 = (int16_t)(temperature_c7 - model->ambient_c7);
-    if (above_c7 <= 0) {
-        return 0;
-    }
-    return (int32_t)fixed_point_mac_s16_u16(0, bias_uw_per_k, (uint16_t)above_c7) >> 7;
-}
-
-uint32_t drive_policy_model_power_uw(const drive_policy_t *policy, uint8_t spring,
+uint32_t drive_policy_model_power_uw(const drive_policy_t *policy, const thermal_model_t *model, uint8_t spring,
                                      uint32_t power_uw)
 {
-    const drive_policy_spring_t *s = &policy->spring[spring];
-    if ((s->flags & FLAG_FALSE) != 0) { /* the current in the highest resistance that it can have */
-        uint32_t real_q14 = ((uint32_t)s->observer.inverse_q14 * policy->alloy.highest_q14) >> 14;
-        if (real_q14 > RESISTANCE_OBSERVER_ONE_Q14) {
-            power_uw = (power_uw >> 8) * (real_q14 > UINT16_MAX ? UINT16_MAX : real_q14) >> 6;
-        }
-    }
-    int32_t bias_uw = s->bias_now_uw;
-    if (bias_uw > 0 && (uint32_t)bias_uw > power_uw) {
-        return 0;
-    }
-    return (uint32_t)((int32_t)power_uw - bias_uw);
+    return policy->prepared ? spring_estimator_model_power_uw(&policy->estimator, model, spring, power_uw)
+                            : power_uw;
 }
 
-/* The model's spring to a temperature, its phase as if it came from martensite or from austenite.
- */
-static OWN void rewind_to(thermal_model_t *model, uint8_t k, int16_t temperature_c7, bool from_cold)
+static int16_t phase_permille(const drive_policy_t *policy, const thermal_model_t *model, uint8_t k)
 {
-    thermal_model_set_temperature(model, k,
-                                  from_cold ? (int16_t)(model->martensite_finish_c7 - KELVIN_C7)
-                                            : (int16_t)(model->austenite_finish_c7 + KELVIN_C7));
-    thermal_model_set_temperature(model, k, temperature_c7);
+    return (int16_t)(1000.0f * spring_estimator_phase(&policy->estimator, model, k));
 }
 
-/* ---- the observer's corrections ---- */
-
-static bool trusted(const drive_policy_t *policy, const drive_policy_spring_t *s)
+/* The margin that the distance's uncertainty asks for. */
+static float margin_k(const drive_policy_t *policy, uint8_t k)
 {
-    return policy->parameters.observer != 0 && (s->flags & FLAG_LET_GO) == 0 &&
-           s->fresh >= FRESH_WINDOWS &&
-           resistance_observer_is_plausible(&s->observer, &policy->alloy);
+    const drive_policy_parameters_t *p = &policy->parameters;
+    const float hold_k = 0.01f * (float)p->hold_margin_cc;
+    const float unsure_k = 0.01f * (float)p->unsure_margin_cc;
+    const float margin = hold_k + 1.6f * (spring_estimator_sd_k(&policy->estimator, k) - 1.5f);
+    return margin < hold_k ? hold_k : margin > unsure_k ? unsure_k : margin;
 }
 
-/* Austenite as the resistance says, 0..1000 permille. Fully on is what it read when it had
- * transformed, whatever the declared resistances say. */
-static OWN int16_t read_phase(const drive_policy_spring_t *s)
-{
-    int16_t phase = s->observer.phase_permille;
-    if (phase <= 0) {
-        return 0;
-    }
-    int16_t beyond = (int16_t)(1000 - s->full_permille);
-    uint32_t part = fixed_point_mac_s16_u16(0, beyond, (uint16_t)phase);
-    phase = (int16_t)(phase + ((int16_t)(part >> 8) >> 2));
-    return phase > 1000 ? 1000 : phase;
-}
-
-/* The same, or as the model says where the resistance is not trusted. */
-static OWN int16_t best_phase(const drive_policy_t *policy, const drive_policy_spring_t *s,
-                              const thermal_model_t *model, uint8_t k)
-{
-    return trusted(policy, s) ? read_phase(s) : model_permille(model, k);
-}
-
-/* How far the model is to move for an error of its phase: half of what is beyond the deadband. */
-static OWN int16_t correction_c7(const drive_policy_t *policy, int16_t error, int16_t deadband)
-{
-    if (error > deadband) {
-        error = (int16_t)(error - deadband);
-    } else if (error < -deadband) {
-        error = (int16_t)(error + deadband);
-    } else {
-        return 0;
-    }
-    return (int16_t)(((int32_t)error * policy->correction_q8) >> 8);
-}
-
-/* While it heats: where the resistance says the spring is, against where the model has it. */
-static OWN void correct_heating(const drive_policy_t *policy, drive_policy_spring_t *s,
-                                thermal_model_t *model, uint8_t k, int16_t phase, int16_t permille)
-{
-    int16_t now_c7 = thermal_model_temperature_c7(model, k);
-    int16_t error = (int16_t)(phase - permille);
-    int16_t move_c7 = 0;
-    if (now_c7 < model->austenite_start_c7) {
-        if (error > PHASE_DEADBAND && phase > PHASE_SEEN) {
-            move_c7 = (int16_t)(model->austenite_start_c7 + KELVIN_C7 - now_c7);
-        } /* too little phase below austenite start is memory, and heating brings it */
-    } else if (phase < 1000 - PHASE_MISSING && now_c7 > model->austenite_finish_c7) {
-        move_c7 = (int16_t)(model->austenite_finish_c7 - KELVIN_C7 / 2 - now_c7);
-    } else {
-        move_c7 = correction_c7(policy, error, PHASE_DEADBAND);
-    }
-    if (move_c7 == 0) {
-        return;
-    }
-    /* within a transformation a little temperature is much heat */
-    int16_t before_c7 = thermal_model_enthalpy_c7(model, k);
-    if (move_c7 > 0) {
-        thermal_model_add_temperature(model, k, move_c7);
-    } else {
-        rewind_to(model, k, (int16_t)(now_c7 + move_c7), true);
-    }
-    /* forgotten within minutes: in a long heating small errors add up */
-    s->corrected_c7 = (int16_t)(s->corrected_c7 - (s->corrected_c7 >> 8) +
-                                thermal_model_enthalpy_c7(model, k) - before_c7);
-    if (s->corrected_c7 > TRUST_LIMIT_C7 || s->corrected_c7 < -TRUST_LIMIT_C7) {
-        s->flags |= FLAG_LET_GO; /* and what it did is undone */
-        thermal_model_add_enthalpy(model, k, (int16_t)-s->corrected_c7);
-        s->corrected_c7 = 0;
-    }
-}
-
-/* How far into its width a transformation is, permille, that has made so much austenite:
- * acos(1 - 2 x) / pi in three straight pieces to a half and their mirror, to 15 permille. */
-static int16_t place_of_phase(int16_t permille)
-{
-    bool upper = permille > 500;
-    uint16_t x = (uint16_t)(upper ? 1000 - permille : permille);
-    uint16_t place = x < 38    ? (uint16_t)((x * 13u) >> 2)
-                     : x < 146 ? (uint16_t)(125u + (((x - 38u) * 295u) >> 8))
-                               : (uint16_t)(250u + (((x - 146u) * 181u) >> 8));
-    return (int16_t)(upper ? 1000u - place : place);
-}
-
-/* Where heating goes on to transform a spring that is so much austenite. */
-static OWN int16_t goes_on_c7(const drive_policy_t *policy, const thermal_model_t *model,
-                              int16_t permille)
-{
-    uint16_t place = (uint16_t)place_of_phase(clamp16(permille, 0, 1000));
-    uint32_t place_q15 = fixed_point_mac_u16(0, place, policy->correction_q8) << 1;
-    return (int16_t)(model->austenite_start_c7 + (int16_t)(place_q15 >> 8));
-}
-
-/* Between martensite start and austenite start the phase rests: what the resistance says of it is
- * the phase's memory, not the temperature. */
-static OWN void impose_phase(const drive_policy_t *policy, thermal_model_t *model, uint8_t k,
-                             int16_t permille)
-{
-    int16_t now_c7 = thermal_model_temperature_c7(model, k);
-    thermal_model_set_temperature(model, k, (int16_t)(model->martensite_finish_c7 - KELVIN_C7));
-    thermal_model_set_temperature(model, k, goes_on_c7(policy, model, permille));
-    thermal_model_set_temperature(model, k, now_c7);
-}
-
-/* While it cools to a level, or is probed. */
-static void correct_cooling(const drive_policy_t *policy, thermal_model_t *model, uint8_t k,
-                            int16_t phase, int16_t deadband)
-{
-    int16_t move_c7 = correction_c7(policy, (int16_t)(phase - model_permille(model, k)), deadband);
-    if (move_c7 != 0) {
-        thermal_model_add_temperature(model, k, move_c7);
-    }
-}
-
-/* In a hold the true temperature was seen: the model takes it, and the power by which its loss was
- * wrong in steady state goes into the bias. */
-static void correct_hold(const drive_policy_t *policy, drive_policy_spring_t *s,
-                         thermal_model_t *model, uint8_t k, int16_t true_c7, bool full)
-{
-    int16_t model_c7 = thermal_model_temperature_c7(model, k);
-    int32_t difference_uw = thermal_model_power_to_hold_uw(model, k, model_c7) -
-                            thermal_model_power_to_hold_uw(model, k, true_c7);
-    /* A wrong loss shows with the spring's own time, some 50 s: seen early it is the greater. A
-     * hold that is too cold is worse than one too hot, so this counts for losses only. */
-    if (difference_uw > 0 && s->held < 2u * FULL_MINUTE) {
-        difference_uw += s->held < FULL_MINUTE ? difference_uw >> 1 : difference_uw >> 2;
-    }
-    /* / 60 K, where springs are held above ambient */
-    s->bias_uw_per_k = clamp16(s->bias_uw_per_k + ((difference_uw * 273) >> 14),
-                               (int16_t)-policy->bias_limit_uw_per_k, policy->bias_limit_uw_per_k);
-    if (full) {
-        rewind_to(model, k, true_c7, false);
-    } else {
-        thermal_model_add_temperature(model, k, (int16_t)(true_c7 - model_c7));
-    }
-}
-
-/* ---- stages ---- */
-
-static void enter(drive_policy_t *policy, uint8_t k, drive_policy_stage_t stage)
+static void enter(drive_policy_t *policy, const thermal_model_t *model, uint8_t k, drive_policy_stage_t stage)
 {
     drive_policy_spring_t *s = &policy->spring[k];
     supply_queue_remove(&policy->queue, k);
     if (stage == DRIVE_POLICY_STAGE_HEAT) {
         supply_queue_add(&policy->queue, k);
-    }
-    if (stage == DRIVE_POLICY_STAGE_HOLD) {
-        s->margin_c7 = (s->flags & FLAG_LEARNT) != 0 || s->bias_uw_per_k != 0
-                           ? (int16_t)(policy->hold_margin_c7 + AFTER_BOOST_C7)
-                           : policy->unsure_margin_c7;
+        spring_estimator_begin_heating(&policy->estimator, model, k);
     }
     s->floor_ma = s->stage == DRIVE_POLICY_STAGE_HOLD ? s->wanted_ma : 0; /* until its turn */
     s->stage = (uint8_t)stage;
     s->wanted_ma = stage == DRIVE_POLICY_STAGE_HEAT  ? policy->parameters.boost_current_ma
                    : stage == DRIVE_POLICY_STAGE_OFF ? 0
                                                      : policy->parameters.probe_current_ma;
-    s->corrected_c7 = 0;
-    s->flags &= (uint8_t)~FLAG_DOUBT;
-    s->lost_permille = 0;
-    s->reference = 0;
-    s->plateau = 0;
-    s->held = 0;
-    s->suspicion = 0;
+    s->margin_k = -1.0f;
 }
 
 /* What heats a spring at a temperature, against its neighbours as they are now, plus a correction
  * towards it. */
-static HOT uint16_t hold_current_ma(const drive_policy_t *policy, const drive_policy_spring_t *s,
-                                    const thermal_model_t *model, uint8_t k, int16_t target_c7,
-                                    int16_t extra_64uw)
+static uint16_t hold_current_ma(const drive_policy_t *policy, const thermal_model_t *model, uint8_t k,
+                                float target_c, float extra_w)
 {
-    int16_t short_c7 = (int16_t)(target_c7 - thermal_model_temperature_c7(model, k));
-    short_c7 = short_c7 > SHORT_MOST_C7    ? SHORT_MOST_C7
-               : short_c7 < -SHORT_MOST_C7 ? -SHORT_MOST_C7
-                                           : short_c7;
-    int32_t power_uw = thermal_model_power_to_hold_uw(model, k, target_c7) +
-                       bias_at(model, s->bias_uw_per_k, target_c7);
-    power_uw += (int32_t)fixed_point_mac_s16_u16(0, short_c7, policy->feedback_uw_per_c7);
-    int32_t power_64uw = ((int32_t)((uint32_t)power_uw << 2) >> 8) + extra_64uw;
-    if (power_64uw <= 0) {
-        return 0;
-    }
-    return resistance_current_for_power_ma(&policy->alloy, s->observer.inverse_q14,
-                                           power_64uw > UINT16_MAX ? UINT16_MAX
-                                                                   : (uint16_t)power_64uw);
+    float short_k = target_c - now_c(model, k);
+    short_k = short_k > 20.0f ? 20.0f : short_k < -20.0f ? -20.0f : short_k;
+    const float power_w = spring_estimator_hold_w(&policy->estimator, model, k, target_c) +
+                          short_k * policy->estimator.heat_capacity_j_per_k / 4.0f + extra_w;
+    return spring_estimator_current_ma(&policy->estimator, k, power_w);
 }
 
 /* It heats with much less than it asks for. */
@@ -477,309 +272,71 @@ static bool waits_for_supply(const drive_policy_spring_t *s)
     return s->granted_ma < s->asked_ma - (s->asked_ma >> 2);
 }
 
-static OWN bool is_transformed(const drive_policy_t *policy, drive_policy_spring_t *s,
-                               thermal_model_t *model, uint8_t k, bool sees, int16_t phase)
+static bool has_heated(const drive_policy_t *policy, const drive_policy_spring_t *s, const thermal_model_t *model,
+                       uint8_t k, int16_t level)
 {
-    int16_t now_c7 = thermal_model_temperature_c7(model, k);
-    if (!sees) {
-        bool derated = s->ceiling_ma < policy->parameters.boost_current_ma >> 1;
-        return now_c7 >= model->austenite_finish_c7 + BLIND_OVERSHOOT_C7 ||
-               (derated && now_c7 >= model->austenite_finish_c7);
-    }
-    if (s->plateau >= PLATEAU_TRUSTED && phase > 600 &&
-        s->target_ma >= policy->parameters.boost_current_ma >> 1) {
-        if (now_c7 < model->austenite_finish_c7) {
-            rewind_to(model, k, model->austenite_finish_c7, true);
-        }
-        return true;
-    }
-    return s->plateau >= 2 && phase >= RATIO_FULL_PERMILLE &&
-           now_c7 >= model->austenite_finish_c7 - KELVIN_C7;
-}
-
-/* Counts windows in which the phase stood still: the last percent of a transformation is slow. What
- * heats with less current is slower in all of it. */
-static void watch_plateau(const drive_policy_t *policy, drive_policy_spring_t *s)
-{
-    int16_t phase = s->observer.phase_permille;
-    int16_t change = (int16_t)(phase - s->before_permille);
-    bool boosts = s->target_ma >=
-                  policy->parameters.boost_current_ma - (policy->parameters.boost_current_ma >> 2);
-    int16_t most = boosts ? PLATEAU_BOOST : PLATEAU_SLOW;
-    s->before_permille = phase;
-    if (change > most || change < -most) {
-        s->plateau = 0;
-    } else if (s->plateau < UINT8_MAX) {
-        s->plateau++;
-    }
-}
-
-/* Where the resistance says that the heating is, and the model with it. True once the wanted phase
- * is reached. */
-static OWN bool has_heated(drive_policy_t *policy, drive_policy_spring_t *s, thermal_model_t *model,
-                           uint8_t k, int16_t level, bool fresh)
-{
-    int16_t now_c7 = thermal_model_temperature_c7(model, k);
-    int16_t permille = model_permille(model, k);
-    bool certain = permille == 0 && now_c7 < model->austenite_start_c7 - CERTAIN_C7;
-    if (certain && fresh && s->fresh >= LEARNING_WINDOWS) {
-        resistance_observer_learn_martensite(&s->observer, &policy->alloy);
-    }
-    bool sees = trusted(policy, s);
-    bool strong = s->target_ma >= 2u * policy->parameters.probe_current_ma; /* no coarse reading */
-    int16_t phase = sees ? read_phase(s) : permille;
-    /* until heating goes on, what it is, is memory */
-    bool rests = now_c7 < goes_on_c7(policy, model, permille) - KELVIN_C7;
-    if (waits_for_supply(s) || rests) {
-        s->plateau = 0; /* it stands still because it waits, or has not begun to go on */
-    } else if (fresh) {
-        watch_plateau(policy, s);
-    }
-    if (fresh && s->reference == 0) {
-        if (now_c7 < model->martensite_finish_c7) {
-            s->reference = 1;
-        } else if (sees && strong && now_c7 > model->martensite_start_c7) {
-            s->reference = 1; /* the first look at it, if it was not cold before */
-            if (now_c7 < model->austenite_start_c7 &&
-                (phase > permille + PHASE_SEEN || phase < permille - PHASE_SEEN)) {
-                impose_phase(policy, model, k, phase);
-                return false;
-            }
-        }
-    } else if (fresh && sees && strong && !certain && (!rests || phase > permille)) {
-        correct_heating(policy, s, model, k, phase, permille);
-    }
+    (void)s;
     if (level < LEVEL_FULL_PERMILLE) {
-        return phase >= level;
+        return phase_permille(policy, model, k) >= level;
     }
-    if (!is_transformed(policy, s, model, k, sees, phase)) {
-        return false;
-    }
-    if (sees) {
-        s->full_permille = clamp16(s->observer.phase_permille, 1000 - FULL_MOST_PERMILLE,
-                                   1000 + FULL_MOST_PERMILLE);
-    }
-    return true;
+    return spring_estimator_has_transformed(&policy->estimator, model, k);
 }
 
-static OWN void heat(drive_policy_t *policy, drive_policy_spring_t *s, thermal_model_t *model,
-                     uint8_t k, int16_t level, bool fresh)
+static void heat(drive_policy_t *policy, drive_policy_spring_t *s, thermal_model_t *model, uint8_t k, int16_t level)
 {
-    int16_t now_c7 = thermal_model_temperature_c7(model, k);
+    const float c = now_c(model, k);
     bool waits = waits_for_supply(s);
-    bool slows = level < LEVEL_FULL_PERMILLE && now_c7 > model->austenite_start_c7 - KELVIN_C7;
-    if ((waits || slows) && (policy->round & 1u) != 0) { /* every second time: a tick is short */
-        uint16_t keeps_ma =
-            hold_current_ma(policy, s, model, k, now_c7, slows ? PARTIAL_POWER_64UW : 0);
+    bool slows = level < LEVEL_FULL_PERMILLE && c > policy->estimator.austenite_start_c - 1.0f;
+    if (has_heated(policy, s, model, k, level)) {
+        policy->estimator.spring[k].lost = 0.0f;
+        if (level >= LEVEL_FULL_PERMILLE) {
+            policy->estimator.spring[k].possible = SPRING_PHASE_AUSTENITE;
+        }
+        enter(policy, model, k, DRIVE_POLICY_STAGE_HOLD);
+        return;
+    }
+    if (waits || slows) {
+        uint16_t keeps_ma = hold_current_ma(policy, model, k, c, slows ? 0.4f : 0.0f);
         if (slows && keeps_ma < s->wanted_ma) {
             s->wanted_ma = keeps_ma;
         }
-        /* what it has is kept while it waits */
-        bool has = now_c7 > model->austenite_start_c7 + KEPT_C7 ||
-                   best_phase(policy, s, model, k) > level >> 1;
+        bool has = c > policy->estimator.austenite_start_c + 3.0f || phase_permille(policy, model, k) > level >> 1;
         s->floor_ma = waits && has ? keeps_ma : 0;
-    } else if (has_heated(policy, s, model, k, level, fresh)) {
-        enter(policy, k, DRIVE_POLICY_STAGE_HOLD);
     }
 }
 
-/* The reading cannot be right: the model alone, with the wide margin. Whether a spring that is
- * fully on has kept its phase is not known: its hold goes above austenite finish first, by power
- * and not by boost, which takes it there, be it austenite or not. From there the margin narrows by
- * 1 K a minute: at this power latent heat takes its time. */
-static void let_go(const drive_policy_t *policy, drive_policy_spring_t *s,
-                   const thermal_model_t *model, bool full)
-{
-    s->flags = (uint8_t)((s->flags | FLAG_LET_GO) & ~FLAG_LEARNT);
-    s->bias_uw_per_k = 0;
-    s->margin_c7 = policy->unsure_margin_c7;
-    if (full) {
-        s->margin_c7 =
-            (int16_t)(model->austenite_finish_c7 + BLIND_OVERSHOOT_C7 - model->martensite_start_c7);
-    }
-}
-
-/* A first doubt stops the search for a while: what is seen then is seen with less delay. */
-static bool is_pausing(const drive_policy_spring_t *s)
-{
-    return s->suspicion != 0 && s->suspicion <= PAUSE_WINDOWS;
-}
-
-/* The average has settled. What was lost is lost for good, and by now the average shows all of it:
- * a loss that it does not show was its own wandering. */
-static OWN void take_reference(drive_policy_t *policy, drive_policy_spring_t *s)
-{
-    if ((s->flags & FLAG_DOUBT) != 0) {
-        int16_t lost = (int16_t)-resistance_observer_drift_permille(&s->observer, &policy->alloy,
-                                                                    s->reference_q14);
-        s->flags &= (uint8_t)~FLAG_DOUBT;
-        if ((s->flags & FLAG_LEARNT) != 0 &&
-            (lost >= LOSS_CONFIRMED || (s->flags & FLAG_SEEN_ONCE) != 0)) {
-            s->flags &= (uint8_t)~FLAG_SEEN_ONCE;
-            lost = (int16_t)(s->lost_permille + lost);
-        } else { /* who knows how much it was: all is heated back, and looked for again */
-            s->flags = FLAG_SEEN_ONCE; /* the others are not of a spring that is held and read */
-            lost = LOSS_RESTORED;
-        }
-        s->lost_permille = lost;
-    }
-    s->followed = 0;
-    s->reference_q14 = (uint16_t)(s->observer.slow_q22 >> 8);
-}
-
-/* Looks for the first loss of phase: martensite start, seen as on a thermometer. */
-static OWN void watch_hold(drive_policy_t *policy, drive_policy_spring_t *s, thermal_model_t *model,
-                           uint8_t k, bool full)
-{
-    int16_t now_c7 = thermal_model_temperature_c7(model, k);
-    int16_t target_c7 = (int16_t)(model->martensite_start_c7 + s->margin_c7);
-    if (s->reference < REFERENCE_WINDOWS) {
-        if (now_c7 < target_c7 + SETTLED_C7 && now_c7 > target_c7 - SETTLED_C7) {
-            s->reference++;
-        } else if (s->reference == 0 && (s->flags & FLAG_DOUBT) == 0) {
-            resistance_observer_restart_average(&s->observer);
-        }
-        if (s->reference == REFERENCE_WINDOWS) {
-            take_reference(policy, s);
-            if (full && s->lost_permille >= LOSS_RESTORED) {
-                enter(policy, k, DRIVE_POLICY_STAGE_HEAT);
-            }
-        }
-        return;
-    }
-    int16_t loss = (int16_t)-resistance_observer_drift_permille(&s->observer, &policy->alloy,
-                                                                s->reference_q14);
-    if (loss < -GAIN_IMPLAUSIBLE) {
-        let_go(policy, s, model, full);
-        return;
-    }
-    int16_t start_c7 = model->martensite_start_c7;
-    if (loss + s->lost_permille >= LOSS_REHEAT && full) {
-        enter(policy, k, DRIVE_POLICY_STAGE_HEAT);
-        return;
-    }
-    bool searches = (s->flags & FLAG_LEARNT) == 0;
-    uint16_t slow_q14 = (uint16_t)(s->observer.slow_q22 >> 8);
-    int16_t unsure_c7 = policy->unsure_margin_c7;
-    if (now_c7 >
-        start_c7 + (searches ? unsure_c7 - (unsure_c7 >> 3) : policy->hold_margin_c7 + KELVIN_C7)) {
-        s->reference_q14 = slow_q14; /* so far off, what the average does is its own */
-        s->suspicion = 0;
-        return;
-    }
-    if ((searches || now_c7 > start_c7) && s->suspicion == 0 && (s->fresh & 7u) == 0) {
-        /* the sensor's steps let the average wander as the current changes: 0.1 permille a second
-         * is followed, a loss is ten times faster; once it is held still not for ever */
-        if (slow_q14 > s->reference_q14 && (searches || s->followed < FOLLOWED_MOST)) {
-            s->reference_q14++;
-            s->followed = (int8_t)(s->followed + !searches);
-        } else if (slow_q14 < s->reference_q14 && (searches || s->followed > -FOLLOWED_MOST)) {
-            s->reference_q14--;
-            s->followed = (int8_t)(s->followed - !searches);
-        }
-    }
-    s->suspicion = loss < LOSS_SUSPECTED      ? 0
-                   : s->suspicion < UINT8_MAX ? (uint8_t)(s->suspicion + 1)
-                                              : UINT8_MAX;
-    if (loss >= LOSS_SEEN) {
-        correct_hold(policy, s, model, k, (int16_t)(start_c7 - policy->event_c7), full);
-        if (s->margin_c7 < 0 && s->bias_uw_per_k < 0) {
-            /* pulled below start it was falling: not all of the bias is steady loss */
-            s->bias_uw_per_k = clamp16(s->bias_uw_per_k + policy->falling_uw_per_k, INT16_MIN, 0);
-        }
-        s->reference = 0; /* the average lags: a new one once it has settled */
-        s->suspicion = 0;
-        s->flags |= FLAG_DOUBT;
-        if (now_c7 < start_c7 + (policy->unsure_margin_c7 >> 1)) {
-            s->flags |= FLAG_LEARNT; /* farther off is hardly any array: it must be seen twice */
-        }
-        s->margin_c7 = policy->hold_margin_c7;
-        return;
-    }
-    if (now_c7 < start_c7 - PIN_C7) {
-        correct_hold(policy, s, model, k, (int16_t)(start_c7 - PIN_C7), full);
-    }
-}
-
-/* The margin narrows: to the wanted one where the loss is known, else until the start is seen. */
-static OWN void narrow_margin(const drive_policy_t *policy, drive_policy_spring_t *s,
-                              const thermal_model_t *model, bool full)
-{
-    int16_t floor_c7 =
-        (s->flags & FLAG_LEARNT) != 0 ? policy->hold_margin_c7 : (int16_t) - (PIN_C7 + PULL_C7);
-    if (policy->search_c7 == 0 || is_pausing(s) || (s->fresh & 3u) != 0 ||
-        (s->reference < REFERENCE_WINDOWS && s->granted_ma >= s->asked_ma)) {
-        return;
-    }
-    if (s->margin_c7 > floor_c7) {
-        s->margin_c7 = (int16_t)(s->margin_c7 - policy->search_c7);
-        if (s->margin_c7 < floor_c7) {
-            s->margin_c7 = floor_c7;
-        }
-    } else if ((s->flags & FLAG_LEARNT) == 0 && s->bias_uw_per_k <= -policy->bias_limit_uw_per_k) {
-        let_go(policy, s, model, full); /* it must have been passed */
-    }
-}
-
-static OWN void hold(drive_policy_t *policy, drive_policy_spring_t *s, thermal_model_t *model,
-                     uint8_t k, int16_t level, bool fresh)
+static void hold(drive_policy_t *policy, drive_policy_spring_t *s, thermal_model_t *model, uint8_t k, int16_t level)
 {
     bool full = level >= LEVEL_FULL_PERMILLE;
-    int16_t phase = full ? s->observer.phase_permille : read_phase(s);
-    if ((policy->round & 3u) == 0 && s->held < UINT8_MAX) {
-        s->held++;
-    }
-    bool sees = trusted(policy, s);
-    /* right after its boost the model is sure, each second less: others may have the current */
-    int16_t coasting_c7 = (int16_t)(COASTING_C7 + s->held * COASTING_RISE_C7);
-    bool coasts =
-        sees && policy->queue.count != 0 && s->reference == 0 && coasting_c7 < s->margin_c7;
-    if ((full || !sees) && model_permille(model, k) < level - 2 * LEVEL_BAND_PERMILLE) {
-        enter(policy, k, DRIVE_POLICY_STAGE_HEAT); /* more is wanted than before */
-        return;
-    }
-    if (!sees) {
-        if ((s->flags & FLAG_DOUBT) != 0) { /* what was seen last may have been the same lie */
-            s->flags &= (uint8_t) ~(FLAG_DOUBT | FLAG_LEARNT);
-            s->bias_uw_per_k = 0;
-        }
-        if (s->margin_c7 > policy->unsure_margin_c7) {
-            s->margin_c7 = (int16_t)(s->margin_c7 - (int16_t)(policy->round & 1u));
-        } else if (s->fresh >= FRESH_WINDOWS) {
-            s->margin_c7 = policy->unsure_margin_c7;
-        }
-        phase = full ? INT16_MAX : level;
-    } else if (fresh && !coasts) {
-        watch_hold(policy, s, model, k, full);
-        narrow_margin(policy, s, model, full);
-        if (s->stage != DRIVE_POLICY_STAGE_HOLD) {
-            return;
-        }
-    }
-    /* fully on is what it read when it had transformed, whatever the declared resistances say */
-    bool coarse = s->granted_ma < 2u * policy->parameters.probe_current_ma; /* or still settling */
-    int16_t least =
-        full ? (int16_t)(s->full_permille - (coarse ? COARSE_BAND_PERMILLE : FULL_BAND_PERMILLE))
-             : (int16_t)(level - LEVEL_BAND_PERMILLE -
-                         (s->reference < REFERENCE_WINDOWS ? LEVEL_BAND_PERMILLE : 0));
-    if (phase >= least) {
-        s->plateau = 0;
-    } else if (fresh && ++s->plateau >= LOW_WINDOWS) { /* one alone may be a coarse reading */
-        if (full && phase < least - LOSS_IMPOSSIBLE) {
-            let_go(policy, s, model, true); /* no hold loses so much between two looks */
-        } else {
-            enter(policy, k, DRIVE_POLICY_STAGE_HEAT);
-        }
+    spring_belief_t *b = &policy->estimator.spring[k];
+    const float start_c = policy->estimator.martensite_start_c;
+    int16_t phase = phase_permille(policy, model, k);
+    if (phase < (full ? 1000 - 18 : level - 2 * LEVEL_BAND_PERMILLE) || (full && b->lost > 0.008f && b->quiet >= 30)) {
+        enter(policy, model, k, DRIVE_POLICY_STAGE_HEAT);
         return;
     }
     if (!full && phase > level + LEVEL_BAND_PERMILLE) {
-        enter(policy, k, DRIVE_POLICY_STAGE_LOWER);
+        enter(policy, model, k, DRIVE_POLICY_STAGE_LOWER);
         return;
     }
-    int16_t target_c7 =
-        (int16_t)(model->martensite_start_c7 + (coasts ? coasting_c7 : s->margin_c7));
-    uint16_t wanted_ma =
-        hold_current_ma(policy, s, model, k, target_c7, is_pausing(s) ? SUSPICION_64UW : 0);
+    const float wide_k = margin_k(policy, k);
+    if (s->margin_k < -0.5f || s->margin_k > wide_k) {
+        s->margin_k = wide_k;
+    }
+    /* the margin narrows until martensite start is seen */
+    const float least_k = b->crossings != 0 ? 0.01f * (float)policy->parameters.hold_margin_cc : -0.4f;
+    if (b->quiet > 30 && b->losing == 0 && s->margin_k > least_k) {
+        s->margin_k -= 0.25e-3f * (float)policy->parameters.search_mk_per_s;
+    }
+    if (s->margin_k < least_k) {
+        s->margin_k = least_k;
+    }
+    float target_c = start_c + s->margin_k;
+    bool coasts = policy->queue.count != 0 && b->crossings == 0 && s->margin_k > 5.0f;
+    if (coasts) {
+        target_c = start_c + 5.0f;
+    }
+    uint16_t wanted_ma = hold_current_ma(policy, model, k, target_c, b->losing != 0 ? 0.038f : 0.0f);
     wanted_ma = (uint16_t)(wanted_ma + (policy->parameters.dither_ma >> 1));
     if (wanted_ma < policy->parameters.probe_current_ma) {
         wanted_ma = policy->parameters.probe_current_ma;
@@ -787,34 +344,23 @@ static OWN void hold(drive_policy_t *policy, drive_policy_spring_t *s, thermal_m
     s->wanted_ma = wanted_ma;
 }
 
-static OWN void lower(drive_policy_t *policy, drive_policy_spring_t *s, thermal_model_t *model,
-                      uint8_t k, int16_t level, bool fresh)
+static void lower(drive_policy_t *policy, thermal_model_t *model, uint8_t k, int16_t level)
 {
-    int16_t phase = best_phase(policy, s, model, k);
-    if (fresh && trusted(policy, s)) {
-        correct_cooling(policy, model, k, phase, PHASE_DEADBAND);
-    }
+    int16_t phase = phase_permille(policy, model, k);
     if (phase <= level) {
-        enter(policy, k,
-              phase < level - LEVEL_BAND_PERMILLE ? DRIVE_POLICY_STAGE_HEAT
-                                                  : DRIVE_POLICY_STAGE_HOLD);
+        enter(policy, model, k,
+              phase < level - LEVEL_BAND_PERMILLE ? DRIVE_POLICY_STAGE_HEAT : DRIVE_POLICY_STAGE_HOLD);
     }
 }
 
 /* Undriven: how near austenite start it is going to come, 255 at the limit. */
-static OWN uint8_t off(const drive_policy_t *policy, drive_policy_spring_t *s,
-                       thermal_model_t *model, uint8_t k, bool fresh)
+static uint8_t off(const drive_policy_t *policy, drive_policy_spring_t *s,
+                       thermal_model_t *model, uint8_t k)
 {
     int16_t now_c7 = thermal_model_temperature_c7(model, k);
     int16_t from_c7 = (int16_t)(policy->undriven_c7 - UNDRIVEN_BAND_C7);
-    if (fresh && trusted(policy, s)) { /* a probing pulse */
-        correct_cooling(policy, model, k, s->observer.phase_permille, PHASE_PROBED);
-    }
     if (now_c7 < from_c7) {
         s->flags &= (uint8_t)~FLAG_RELEASED;
-        if (model_permille(model, k) == 0) {
-            s->flags &= (uint8_t)~FLAG_LET_GO;
-        }
     }
     int16_t rise_c7 = clamp16((int32_t)now_c7 - s->last_c7, -256, 256);
     int16_t over_c7 = (int16_t)(now_c7 + rise_c7 * HORIZON_UPDATES - from_c7);
@@ -830,7 +376,7 @@ static OWN uint8_t off(const drive_policy_t *policy, drive_policy_spring_t *s,
 /* ---- derating ---- */
 
 /* Worst of the undriven neighbours; a driven spring has no severity. */
-static OWN uint8_t worst_neighbour(const drive_policy_t *policy, uint8_t k)
+static uint8_t worst_neighbour(const drive_policy_t *policy, uint8_t k)
 {
     uint8_t columns = policy->columns;
     uint8_t row_start = 0;
@@ -859,7 +405,7 @@ static uint16_t share_q8(uint16_t value, uint16_t share)
     return (uint16_t)(fixed_point_mac_u16(0, value, share) >> 8);
 }
 
-static OWN void derate(const drive_policy_t *policy, drive_policy_spring_t *s,
+static void derate(const drive_policy_t *policy, drive_policy_spring_t *s,
                        const thermal_model_t *model, uint8_t k, bool driven)
 {
     uint16_t full_ma = policy->parameters.boost_current_ma;
@@ -931,10 +477,10 @@ static uint16_t budget_ma(drive_policy_t *policy)
     return (uint16_t)(budget - away_ma);
 }
 
-static OWN void grant(drive_policy_t *policy, drive_policy_spring_t *s, uint16_t granted_ma)
+static void grant(drive_policy_t *policy, drive_policy_spring_t *s, uint16_t granted_ma)
 {
     if ((uint16_t)(granted_ma + JUMP_MA - s->granted_ma) > 2u * JUMP_MA) {
-        resistance_observer_disturb(&s->observer);
+        spring_estimator_disturb(&policy->estimator, (uint8_t)(s - policy->spring));
     }
     s->granted_ma = granted_ma;
     s->limits &= (uint8_t) ~(DRIVE_POLICY_LIMIT_SUPPLY | DRIVE_POLICY_LIMIT_OVERLOAD);
@@ -946,7 +492,7 @@ static OWN void grant(drive_policy_t *policy, drive_policy_spring_t *s, uint16_t
 
 /* Holds first, the largest cut to a common cap if they alone are too much; then those that heat,
  * one after the other: heat grows with the square of current. */
-static HOT void share(drive_policy_t *policy)
+static void share(drive_policy_t *policy)
 {
     uint16_t budget = budget_ma(policy);
     uint16_t fixed_ma[DRIVE_POLICY_MAX_SPRINGS];
@@ -1000,7 +546,7 @@ static HOT void share(drive_policy_t *policy)
 
 /* The last ones to heat take turns while they are cold: else the very last heats alone, with most
  * of the supply unused. Far more that wait are better served one after the other. */
-static OWN void rotate_queue(drive_policy_t *policy, const thermal_model_t *model)
+static void rotate_queue(drive_policy_t *policy, const thermal_model_t *model)
 {
     int16_t coldest_c7 = INT16_MAX; /* of those that wait */
     int16_t warmest_c7 = INT16_MIN; /* of those that heat, but have not begun to transform */
@@ -1028,7 +574,7 @@ static OWN void rotate_queue(drive_policy_t *policy, const thermal_model_t *mode
 }
 
 /* What one spring asks for now: less at once, more as far as nobody else is to have it. */
-static OWN void ask(drive_policy_t *policy, const drive_policy_input_t *input,
+static void ask(drive_policy_t *policy, const drive_policy_input_t *input,
                     drive_policy_spring_t *s)
 {
     uint16_t asked_ma = s->wanted_ma;
@@ -1038,7 +584,7 @@ static OWN void ask(drive_policy_t *policy, const drive_policy_input_t *input,
             asked_ma = s->ceiling_ma;
             limits = s->derating;
         }
-        if (s->fresh >= FRESH_WINDOWS && !trusted(policy, s)) {
+        if (policy->estimator.spring[s - policy->spring].blind) {
             limits |= DRIVE_POLICY_LIMIT_BLIND;
         }
     }
@@ -1104,28 +650,28 @@ static bool is_there(const thermal_model_t *model, uint8_t k, int16_t level)
 }
 
 static void precompensate(drive_policy_t *policy, const drive_policy_input_t *input,
-                          drive_policy_spring_t *s, uint8_t k, bool fresh)
+                          drive_policy_spring_t *s, uint8_t k)
 {
     thermal_model_t *model = input->model;
     int16_t level = (int16_t)input->level_permille[k];
     switch ((drive_policy_stage_t)s->stage) {
     case DRIVE_POLICY_STAGE_OFF:
-        enter(policy, k,
+        enter(policy, model, k,
               is_there(model, k, level) ? DRIVE_POLICY_STAGE_HOLD : DRIVE_POLICY_STAGE_HEAT);
         break;
     case DRIVE_POLICY_STAGE_HEAT:
-        heat(policy, s, model, k, level, fresh);
+        heat(policy, s, model, k, level);
         break;
     case DRIVE_POLICY_STAGE_HOLD:
-        hold(policy, s, model, k, level, fresh);
+        hold(policy, s, model, k, level);
         break;
     case DRIVE_POLICY_STAGE_LOWER:
-        lower(policy, s, model, k, level, fresh);
+        lower(policy, model, k, level);
         break;
     }
 }
 
-static OWN void update(drive_policy_t *policy, const drive_policy_input_t *input,
+static void update(drive_policy_t *policy, const drive_policy_input_t *input,
                        drive_policy_spring_t *s, uint8_t k)
 {
     bool open = policy->parameters.policy == DRIVE_POLICY_OPEN;
@@ -1133,33 +679,18 @@ static OWN void update(drive_policy_t *policy, const drive_policy_input_t *input
     if (policy->prepared) {
         thermal_model_t *model = input->model;
         thermal_model_settle(model, k);
-        bool fresh =
-            resistance_observer_update(&s->observer, &policy->alloy, s->fresh >= FRESH_WINDOWS);
-        if (fresh || s->target_ma == 0) {
-            s->flags &= (uint8_t)~FLAG_FALSE;
-        }
-        if (fresh) {
-            s->fresh = s->fresh < UINT8_MAX ? (uint8_t)(s->fresh + 1u) : (uint8_t)(UINT8_MAX - 7u);
-            if (s->fresh >= FRESH_WINDOWS && policy->alloy.phase_gain != 0 &&
-                s->observer.phase_permille <
-                    (s->observer.noisy ? PHASE_FALSE_NOISY : PHASE_FALSE)) {
-                s->flags |= FLAG_FALSE;
-            }
-        } else if (s->target_ma == 0) {
-            s->fresh = 0;
-        }
+        spring_estimator_update(&policy->estimator, model, k);
         uint8_t severity = 0;
         if (!driven) {
             supply_queue_remove(&policy->queue, k);
-            severity = off(policy, s, model, k, fresh);
+            severity = off(policy, s, model, k);
         } else if (!open) {
-            precompensate(policy, input, s, k, fresh);
+            precompensate(policy, input, s, k);
         }
         policy->severe = (uint8_t)(policy->severe + (severity != 0) - (s->severity != 0));
         s->severity = severity;
         derate(policy, s, model, k, driven);
         s->last_c7 = thermal_model_temperature_c7(model, k);
-        s->bias_now_uw = bias_at(model, s->bias_uw_per_k, s->last_c7);
     }
     if (driven && (s->flags & FLAG_TRIPPED) == 0) {
         if (open) {
@@ -1170,7 +701,7 @@ static OWN void update(drive_policy_t *policy, const drive_policy_input_t *input
 }
 
 /* A hash of the levels tells that one has changed. */
-static OWN void watch_levels(drive_policy_t *policy, const uint16_t *level)
+static void watch_levels(drive_policy_t *policy, const uint16_t *level)
 {
     uint16_t hash = 0;
     for (uint8_t n = policy->springs; n != 0; n--) {
@@ -1182,7 +713,7 @@ static OWN void watch_levels(drive_policy_t *policy, const uint16_t *level)
 
 /* Limits, parameters or, under DRIVE_POLICY_OPEN, levels have changed: what all springs are given
  * is worked out anew. */
-static OWN void restart(drive_policy_t *policy, const drive_policy_input_t *input)
+static void restart(drive_policy_t *policy, const drive_policy_input_t *input)
 {
     const drive_policy_parameters_t *p = &policy->parameters;
     drive_policy_spring_t *s = policy->spring;
@@ -1197,7 +728,7 @@ static OWN void restart(drive_policy_t *policy, const drive_policy_input_t *inpu
 }
 
 /* The work of this tick: one place of the round. */
-static OWN void take_turn(drive_policy_t *policy, const drive_policy_input_t *input)
+static void take_turn(drive_policy_t *policy, const drive_policy_input_t *input)
 {
     uint8_t slot = policy->slot;
     if (policy->soft != 0) {
@@ -1228,7 +759,7 @@ static OWN void take_turn(drive_policy_t *policy, const drive_policy_input_t *in
 /* What is granted, less the dither: a slow triangle below, each spring at another place of it. Not
  * driven is off at once, whatever the update's turn. Returns the targets' sum. No calls in the
  * loop: they would cost its registers. */
-static HOT uint16_t give(drive_policy_t *policy, const uint16_t *level, const bool *allowed,
+static uint16_t give(drive_policy_t *policy, const uint16_t *level, const bool *allowed,
                          uint16_t *target_ma)
 {
     uint8_t place = policy->sweep;
@@ -1278,7 +809,7 @@ static HOT uint16_t give(drive_policy_t *policy, const uint16_t *level, const bo
 }
 
 /* Springs that are driven no longer. */
-static OWN void stop_some(drive_policy_t *policy, const uint16_t *level, const bool *allowed)
+static void stop_some(drive_policy_t *policy, const uint16_t *level, const bool *allowed)
 {
     drive_policy_spring_t *s = policy->spring;
     for (uint8_t n = policy->springs; n != 0; n--, s++) {
@@ -1291,7 +822,7 @@ static OWN void stop_some(drive_policy_t *policy, const uint16_t *level, const b
 
 /* After a change of policy a target walks from where it was, up as far as there is room: what the
  * last targets left of the budget. Returns the targets' sum. */
-static HOT uint16_t soften(drive_policy_t *policy, uint16_t *target_ma)
+static uint16_t soften(drive_policy_t *policy, uint16_t *target_ma)
 {
     uint16_t room_ma = 0;
     if (policy->sum_ma < policy->budget_ma) {
@@ -1334,19 +865,19 @@ static HOT uint16_t soften(drive_policy_t *policy, uint16_t *target_ma)
 }
 
 /* Takes the readings of the last tick. */
-static HOT void listen(drive_policy_t *policy, const bool *valid, const int16_t *current_ma,
+static void listen(drive_policy_t *policy, const bool *valid, const int16_t *current_ma,
                        const int16_t *voltage_mv)
 {
     drive_policy_spring_t *s = policy->spring;
     for (uint8_t n = policy->springs; n != 0; n--, s++, current_ma++, voltage_mv++) {
         if (*valid++) {
-            resistance_observer_take(&s->observer, *current_ma, *voltage_mv);
+            spring_estimator_take(&policy->estimator.spring[s - policy->spring], *current_ma, *voltage_mv);
         }
     }
 }
 
 /* Undriven springs one after the other, in what the budget leaves. */
-static OWN void probe(drive_policy_t *policy, const drive_policy_input_t *input,
+static void probe(drive_policy_t *policy, const drive_policy_input_t *input,
                       uint16_t target_ma[])
 {
     const drive_policy_parameters_t *p = &policy->parameters;
@@ -1427,12 +958,12 @@ drive_policy_stage_t drive_policy_stage(const drive_policy_t *policy, uint8_t sp
 
 bool drive_policy_observes(const drive_policy_t *policy, uint8_t spring)
 {
-    return trusted(policy, &policy->spring[spring]);
+    return spring_estimator_sees(&policy->estimator, spring);
 }
 
 int16_t drive_policy_phase_permille(const drive_policy_t *policy, uint8_t spring)
 {
-    return policy->spring[spring].observer.phase_permille;
+    return (int16_t)(1000.0f * policy->estimator.spring[spring].lost);
 }
 
 void drive_policy_clear(drive_policy_t *policy)

@@ -11,7 +11,7 @@
 #include <stdint.h>
 
 #include "parameter.h"
-#include "resistance_observer.h"
+#include "spring_estimator.h"
 #include "supply_share.h"
 #include "thermal_model.h"
 
@@ -84,33 +84,19 @@ typedef struct {
 extern const drive_policy_ranges_t drive_policy_ranges FLASH_MEMORY;
 
 typedef struct {
-    resistance_observer_t observer; /* first: what every tick touches */
     uint16_t granted_ma;            /* share of the supply, before dither */
     uint16_t target_ma;             /* given in the last tick */
     uint8_t stage;                  /* drive_policy_stage_t */
     uint8_t flags;                  /* internal */
     uint8_t limits;                 /* that act */
     uint8_t severity;               /* undriven: 255 at its limit */
-    uint8_t fresh;                  /* windows since current flows without a gap, saturating */
     uint16_t wanted_ma;             /* before limits */
     uint16_t asked_ma;              /* after all but the supply's */
     uint16_t ceiling_ma;            /* by derating */
     uint16_t floor_ma;              /* while it heats: what it has comes before other boosts */
-    uint16_t reference_q14;         /* slow ratio before this hold began to lose phase */
-    int16_t before_permille;        /* phase half a second ago */
-    int16_t bias_uw_per_k;          /* loss beyond the model's */
-    int32_t bias_now_uw;            /* the same at the present temperature */
-    int16_t full_permille;          /* its phase as read when it had transformed */
-    int16_t corrected_c7;           /* sum of the observer's corrections in this heating */
-    int16_t margin_c7;              /* of the hold, above martensite start */
+    float margin_k;
     int16_t last_c7;                /* temperature one update ago */
-    int16_t lost_permille;          /* most phase that this hold was seen to lose */
     uint16_t derated_updates;
-    uint8_t held;      /* seconds in this hold, saturating */
-    int8_t followed;   /* steps that reference_q14 has wandered */
-    uint8_t reference; /* windows that went into reference_q14 */
-    uint8_t plateau;   /* windows: of constant resistance; in a hold, of too little phase */
-    uint8_t suspicion; /* windows in which this hold may be losing phase */
     uint8_t derating;  /* limits behind ceiling_ma */
 } drive_policy_spring_t;
 
@@ -141,18 +127,10 @@ typedef struct {
     supply_queue_t queue;       /* springs that heat */
     drive_policy_spring_t spring[DRIVE_POLICY_MAX_SPRINGS];
     /* derived, see drive_policy_prepare */
-    resistance_alloy_t alloy;
+    spring_estimator_t estimator;
     uint16_t overload_half_quarters;
     uint16_t overload_gain; /* 2^16 over that */
-    uint16_t feedback_uw_per_c7;
-    uint16_t correction_q8; /* Q9.7 K per permille of phase */
     uint16_t derating_gain; /* 2^16 over the band */
-    int16_t bias_limit_uw_per_k;
-    int16_t falling_uw_per_k; /* loss that a spring seems to lack while it is pulled below start */
-    int16_t event_c7;         /* how far below martensite start its crossing is seen */
-    int16_t hold_margin_c7;
-    int16_t unsure_margin_c7;
-    int16_t search_c7; /* per second */
     int16_t limit_c7;
     int16_t undriven_c7; /* undriven springs stay below */
 } drive_policy_t;
@@ -196,7 +174,7 @@ void drive_policy_tick(drive_policy_t *policy, const drive_policy_input_t *input
 
 /* Measured power of a spring less the loss that the observer found beyond the model's: what the
  * model must be stepped with, uW. */
-uint32_t drive_policy_model_power_uw(const drive_policy_t *policy, uint8_t spring,
+uint32_t drive_policy_model_power_uw(const drive_policy_t *policy, const thermal_model_t *model, uint8_t spring,
                                      uint32_t power_uw);
 
 /* Bits of drive_policy_limit_t that acted on the spring in the last tick. */
