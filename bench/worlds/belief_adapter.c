@@ -1,0 +1,60 @@
+#include "belief_adapter.h"
+
+#include <math.h>
+
+static const belief_bounds_t unknown = {NAN, NAN};
+
+double belief_temperature_c(const controller_t *controller, int spring)
+{
+    return controller_temperature_c7(controller, (uint8_t)spring) / 128.0;
+}
+
+double belief_austenite(const controller_t *controller, int spring)
+{
+    return controller_austenite_permille(controller, (uint8_t)spring) / 1000.0;
+}
+
+/* The controller of this version believes points, without bounds. */
+belief_bounds_t belief_temperature_bounds_c(const controller_t *controller, int spring)
+{
+    (void)controller;
+    (void)spring;
+    return unknown;
+}
+
+belief_bounds_t belief_austenite_bounds(const controller_t *controller, int spring)
+{
+    (void)controller;
+    (void)spring;
+    return unknown;
+}
+
+belief_bounds_t belief_distance_bounds_k(const controller_t *controller, int spring)
+{
+    (void)controller;
+    (void)spring;
+    return unknown;
+}
+
+bool belief_reported(const controller_t *controller, int spring)
+{
+    /* 'current' only says that the spring heats as fast as it may, and 'blind' says how the spring
+     * is known, not that it is not where it was asked to be. */
+    const unsigned silent = DRIVE_POLICY_LIMIT_CURRENT | DRIVE_POLICY_LIMIT_BLIND;
+    return controller_fault(controller, (uint8_t)spring) != SAFETY_FAULT_NONE ||
+           controller_board_fault(controller) != SAFETY_FAULT_NONE ||
+           (controller_limits(controller, (uint8_t)spring) & ~silent) != 0;
+}
+
+/* The controller of this version keeps nothing over power-off. */
+void belief_keep(const controller_t *controller, belief_memory_t *memory)
+{
+    (void)controller;
+    memory->valid = false;
+}
+
+void belief_restore(controller_t *controller, const belief_memory_t *memory)
+{
+    (void)controller;
+    (void)memory;
+}

@@ -1,0 +1,34 @@
+/* What it is for: what the controller says publicly of each spring, in the campaign's units.
+ * What it owns: the one place that knows which of the controller's functions say it.
+ * What it never does: judge it, or look at the truth. */
+#ifndef BELIEF_ADAPTER_H
+#define BELIEF_ADAPTER_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "controller.h"
+
+/* Both NaN: nothing is said. */
+typedef struct {
+    double low, high;
+} belief_bounds_t;
+
+double belief_temperature_c(const controller_t *controller, int spring); /* best guess */
+double belief_austenite(const controller_t *controller, int spring);     /* 0..1, best guess */
+belief_bounds_t belief_temperature_bounds_c(const controller_t *controller, int spring);
+belief_bounds_t belief_austenite_bounds(const controller_t *controller, int spring);
+/* Temperature above martensite start, as the spring is loaded now, K. */
+belief_bounds_t belief_distance_bounds_k(const controller_t *controller, int spring);
+
+/* A fault, or a limit that says why the spring is not where it was asked to be. */
+bool belief_reported(const controller_t *controller, int spring);
+
+/* What is kept over power-off. */
+typedef struct {
+    bool valid;
+} belief_memory_t;
+void belief_keep(const controller_t *controller, belief_memory_t *memory);
+void belief_restore(controller_t *controller, const belief_memory_t *memory);
+
+#endif

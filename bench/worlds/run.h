@@ -1,0 +1,30 @@
+/* What it is for: one run of the controller in one world, from power-on, as a user would start it.
+ * What it owns: the words that are typed (pattern, policy), the reset, the score.
+ * What it never does: hint: the controller is told nothing that a user would not tell it. */
+#ifndef WORLDS_RUN_H
+#define WORLDS_RUN_H
+
+#include <stdbool.h>
+#include <stdio.h>
+
+#include "score.h"
+#include "world.h"
+
+typedef struct {
+    world_parameters_t world;
+    bool on[WORLD_SPRINGS_MAX];
+    double seconds;
+    double reset_s, reset_gap_s; /* power goes off then, for so long; 0: never */
+    bool learnt; /* the same array was driven before, and the board has kept what it learnt */
+} run_case_t;
+
+typedef struct {
+    score_t score;
+    double wall_s; /* processor time of this thread */
+} run_result_t;
+
+/* trace: CSV of truth and belief once a second, or NULL. False if and only if the world or the
+ * controller refuses its parameters. */
+bool run_case(const run_case_t *run, run_result_t *result, FILE *trace);
+
+#endif

@@ -1,0 +1,25 @@
+#include "ina219.h"
+
+static double measured(double true_value, double gain, double offset, double noise, double step,
+                       double low, double high)
+{
+    double value = true_value * gain + offset + noise;
+    return step * round(fmin(fmax(value, low), high) / step);
+}
+
+void ina219_read(const ina219_t *sensor, random_t *random, double current_a, double voltage_v,
+                 int16_t *current_ma, int16_t *voltage_mv)
+{
+    /* Drawn even if frozen: the other sensors' noise does not depend on this one's fault. */
+    double current_noise_a = sensor->current_noise_a * random_noise(random);
+    double voltage_noise_v = sensor->voltage_noise_v * random_noise(random);
+    if (sensor->frozen) {
+        return;
+    }
+    double a = measured(current_a, sensor->current_gain, sensor->current_offset_a, current_noise_a,
+                        INA219_CURRENT_STEP_A, -INA219_CURRENT_MAX_A, INA219_CURRENT_MAX_A);
+    double v = measured(voltage_v, sensor->voltage_gain, sensor->voltage_offset_v, voltage_noise_v,
+                        INA219_VOLTAGE_STEP_V, 0.0, INA219_VOLTAGE_MAX_V);
+    *current_ma = (int16_t)lround(1000.0 * a);
+    *voltage_mv = (int16_t)lround(1000.0 * v);
+}
