@@ -2,7 +2,6 @@
 
 #include <math.h>
 
-static const belief_bounds_t unknown = {NAN, NAN};
 
 double belief_temperature_c(const controller_t *controller, int spring)
 {
@@ -14,26 +13,23 @@ double belief_austenite(const controller_t *controller, int spring)
     return controller_austenite_permille(controller, (uint8_t)spring) / 1000.0;
 }
 
-/* The controller of this version believes points, without bounds. */
-belief_bounds_t belief_temperature_bounds_c(const controller_t *controller, int spring)
+static belief_bounds_t bounds(spring_bounds_t b)
 {
-    (void)controller;
-    (void)spring;
-    return unknown;
+    return (belief_bounds_t){(double)b.low, (double)b.high};
+}
+belief_bounds_t belief_temperature_bounds_c(const controller_t *c, int spring)
+{
+    return bounds(spring_estimator_temperature_c(&c->policy.estimator, &c->model, (uint8_t)spring));
 }
 
-belief_bounds_t belief_austenite_bounds(const controller_t *controller, int spring)
+belief_bounds_t belief_austenite_bounds(const controller_t *c, int spring)
 {
-    (void)controller;
-    (void)spring;
-    return unknown;
+    return bounds(spring_estimator_austenite(&c->policy.estimator, &c->model, (uint8_t)spring));
 }
 
-belief_bounds_t belief_distance_bounds_k(const controller_t *controller, int spring)
+belief_bounds_t belief_distance_bounds_k(const controller_t *c, int spring)
 {
-    (void)controller;
-    (void)spring;
-    return unknown;
+    return bounds(spring_estimator_distance_k(&c->policy.estimator, &c->model, (uint8_t)spring));
 }
 
 bool belief_reported(const controller_t *controller, int spring)

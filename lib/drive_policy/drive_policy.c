@@ -179,7 +179,6 @@ bool drive_policy_init(drive_policy_t *policy, const drive_policy_parameters_t *
     }
     *policy = (drive_policy_t){
         .parameters = *parameters, .springs = springs, .columns = springs, .stale = true};
-    spring_estimator_init(&policy->estimator, springs);
     for (uint8_t k = 0; k < springs; k++) {
         drive_policy_spring_t *s = &policy->spring[k];
         s->ceiling_ma = parameters->boost_current_ma;
@@ -191,6 +190,10 @@ void drive_policy_prepare(drive_policy_t *policy, const thermal_model_t *model)
 {
     const drive_policy_parameters_t *p = &policy->parameters;
     const thermal_model_parameters_t *m = &model->parameters;
+    if (policy->estimator.springs == 0) {
+        spring_estimator_init(&policy->estimator, (thermal_model_t *)model, 120.0f);
+        spring_estimator_cold(&policy->estimator, (thermal_model_t *)model);
+    }
     spring_estimator_prepare(&policy->estimator, model);
     policy->columns = m->columns;
 
@@ -206,9 +209,12 @@ void drive_policy_prepare(drive_policy_t *policy, const thermal_model_t *model)
 
 /* ---- stages ---- */
 
+#define PER_K (1.0f / 128.0f)
+#define SETTLED_TURNS 45
+
 static float now_c(const thermal_model_t *model, uint8_t k)
 {
-    return (float)thermal_model_temperature_c7(model, k) * (1.0f / 128.0f);
+    return (float)thermal_model_temperature_c7(model, k) * PER_K;
 }
 
 static int16_t model_permille(const thermal_model_t *model, uint8_t k)
@@ -225,33 +231,40 @@ uint32_t drive_policy_model_power_uw(const drive_policy_t *policy, const thermal
 
 static int16_t phase_permille(const drive_policy_t *policy, const thermal_model_t *model, uint8_t k)
 {
-    return (int16_t)(1000.0f * spring_estimator_phase(&policy->estimator, model, k));
+    return (int16_t)(1000.0f * spring_estimator_austenite(&policy->estimator, model, k).value);
 }
 
-/* The margin that the distance's uncertainty asks for. */
-static float margin_k(const drive_policy_t *policy, uint8_t k)
+/* The margin above martensite start that the uncertainty of the distance asks for. */
+static float safe_margin_k(const drive_policy_t *policy, uint8_t k, bool full)
 {
     const drive_policy_parameters_t *p = &policy->parameters;
+    const spring_belief_t *b = &policy->estimator.spring[k];
     const float hold_k = 0.01f * (float)p->hold_margin_cc;
-    const float unsure_k = 0.01f * (float)p->unsure_margin_cc;
-    const float margin = hold_k + 1.6f * (spring_estimator_sd_k(&policy->estimator, k) - 1.5f);
-    return margin < hold_k ? hold_k : margin > unsure_k ? unsure_k : margin;
+    const float band_k = policy->estimator.austenite_start_c - policy->estimator.martensite_start_c;
+    float most_k = 0.01f * (float)p->unsure_margin_cc;
+    if (!full && most_k > band_k - 1.0f) {
+        most_k = band_k - 1.0f; /* above it a level would rise */
+    }
+    const float margin_k = hold_k + 1.6f * (spring_estimator_sd_k(b) - 1.5f) + b->disturbance_k;
+    return margin_k < hold_k ? hold_k : margin_k > most_k ? most_k : margin_k;
 }
 
-static void enter(drive_policy_t *policy, const thermal_model_t *model, uint8_t k, drive_policy_stage_t stage)
+static void enter(drive_policy_t *policy, thermal_model_t *model, uint8_t k, drive_policy_stage_t stage, int16_t level)
 {
     drive_policy_spring_t *s = &policy->spring[k];
     supply_queue_remove(&policy->queue, k);
     if (stage == DRIVE_POLICY_STAGE_HEAT) {
         supply_queue_add(&policy->queue, k);
-        spring_estimator_begin_heating(&policy->estimator, model, k);
+        spring_estimator_begin_heating(&policy->estimator.spring[k]);
+    } else if (stage == DRIVE_POLICY_STAGE_HOLD) {
+        spring_estimator_begin_hold(&policy->estimator, model, k, level >= LEVEL_FULL_PERMILLE);
     }
     s->floor_ma = s->stage == DRIVE_POLICY_STAGE_HOLD ? s->wanted_ma : 0; /* until its turn */
     s->stage = (uint8_t)stage;
     s->wanted_ma = stage == DRIVE_POLICY_STAGE_HEAT  ? policy->parameters.boost_current_ma
                    : stage == DRIVE_POLICY_STAGE_OFF ? 0
                                                      : policy->parameters.probe_current_ma;
-    s->margin_k = -1.0f;
+    s->margin_k = 100.0f;
 }
 
 /* What heats a spring at a temperature, against its neighbours as they are now, plus a correction
@@ -272,10 +285,8 @@ static bool waits_for_supply(const drive_policy_spring_t *s)
     return s->granted_ma < s->asked_ma - (s->asked_ma >> 2);
 }
 
-static bool has_heated(const drive_policy_t *policy, const drive_policy_spring_t *s, const thermal_model_t *model,
-                       uint8_t k, int16_t level)
+static bool has_heated(const drive_policy_t *policy, const thermal_model_t *model, uint8_t k, int16_t level)
 {
-    (void)s;
     if (level < LEVEL_FULL_PERMILLE) {
         return phase_permille(policy, model, k) >= level;
     }
@@ -287,12 +298,9 @@ static void heat(drive_policy_t *policy, drive_policy_spring_t *s, thermal_model
     const float c = now_c(model, k);
     bool waits = waits_for_supply(s);
     bool slows = level < LEVEL_FULL_PERMILLE && c > policy->estimator.austenite_start_c - 1.0f;
-    if (has_heated(policy, s, model, k, level)) {
-        policy->estimator.spring[k].lost = 0.0f;
-        if (level >= LEVEL_FULL_PERMILLE) {
-            policy->estimator.spring[k].possible = SPRING_PHASE_AUSTENITE;
-        }
-        enter(policy, model, k, DRIVE_POLICY_STAGE_HOLD);
+    const bool derated = s->ceiling_ma < policy->parameters.boost_current_ma - (policy->parameters.boost_current_ma >> 2) && c > policy->estimator.austenite_finish_c;
+    if (has_heated(policy, model, k, level) || derated) {
+        enter(policy, model, k, DRIVE_POLICY_STAGE_HOLD, level);
         return;
     }
     if (waits || slows) {
@@ -308,35 +316,27 @@ static void heat(drive_policy_t *policy, drive_policy_spring_t *s, thermal_model
 static void hold(drive_policy_t *policy, drive_policy_spring_t *s, thermal_model_t *model, uint8_t k, int16_t level)
 {
     bool full = level >= LEVEL_FULL_PERMILLE;
-    spring_belief_t *b = &policy->estimator.spring[k];
-    const float start_c = policy->estimator.martensite_start_c;
+    const spring_belief_t *b = &policy->estimator.spring[k];
     int16_t phase = phase_permille(policy, model, k);
-    if (phase < (full ? 1000 - 18 : level - 2 * LEVEL_BAND_PERMILLE) || (full && b->lost > 0.008f && b->quiet >= 30)) {
-        enter(policy, model, k, DRIVE_POLICY_STAGE_HEAT);
+    if (full ? b->lost > 0.03f || (b->lost > 0.008f && b->quiet >= SETTLED_TURNS)
+             : phase < level - 2 * LEVEL_BAND_PERMILLE) {
+        enter(policy, model, k, DRIVE_POLICY_STAGE_HEAT, level);
         return;
     }
     if (!full && phase > level + LEVEL_BAND_PERMILLE) {
-        enter(policy, model, k, DRIVE_POLICY_STAGE_LOWER);
+        enter(policy, model, k, DRIVE_POLICY_STAGE_LOWER, level);
         return;
     }
-    const float wide_k = margin_k(policy, k);
-    if (s->margin_k < -0.5f || s->margin_k > wide_k) {
-        s->margin_k = wide_k;
-    }
-    /* the margin narrows until martensite start is seen */
-    const float least_k = b->crossings != 0 ? 0.01f * (float)policy->parameters.hold_margin_cc : -0.4f;
-    if (b->quiet > 30 && b->losing == 0 && s->margin_k > least_k) {
+    /* as wide as it must be, until martensite start is looked for: narrower and narrower */
+    const float safe_k = safe_margin_k(policy, k, full);
+    const bool searches = full && !b->blind && spring_estimator_sd_k(b) > 3.0f;
+    if (!searches || s->margin_k > safe_k) {
+        s->margin_k = safe_k;
+    } else if (b->quiet > SETTLED_TURNS && b->losing == 0 && s->margin_k > -1.0f) {
         s->margin_k -= 0.25e-3f * (float)policy->parameters.search_mk_per_s;
     }
-    if (s->margin_k < least_k) {
-        s->margin_k = least_k;
-    }
-    float target_c = start_c + s->margin_k;
-    bool coasts = policy->queue.count != 0 && b->crossings == 0 && s->margin_k > 5.0f;
-    if (coasts) {
-        target_c = start_c + 5.0f;
-    }
-    uint16_t wanted_ma = hold_current_ma(policy, model, k, target_c, b->losing != 0 ? 0.038f : 0.0f);
+    uint16_t wanted_ma = hold_current_ma(policy, model, k, policy->estimator.martensite_start_c + s->margin_k,
+                                         b->losing != 0 ? 0.038f : 0.0f);
     wanted_ma = (uint16_t)(wanted_ma + (policy->parameters.dither_ma >> 1));
     if (wanted_ma < policy->parameters.probe_current_ma) {
         wanted_ma = policy->parameters.probe_current_ma;
@@ -349,7 +349,7 @@ static void lower(drive_policy_t *policy, thermal_model_t *model, uint8_t k, int
     int16_t phase = phase_permille(policy, model, k);
     if (phase <= level) {
         enter(policy, model, k,
-              phase < level - LEVEL_BAND_PERMILLE ? DRIVE_POLICY_STAGE_HEAT : DRIVE_POLICY_STAGE_HOLD);
+              phase < level - LEVEL_BAND_PERMILLE ? DRIVE_POLICY_STAGE_HEAT : DRIVE_POLICY_STAGE_HOLD, level);
     }
 }
 
@@ -480,7 +480,7 @@ static uint16_t budget_ma(drive_policy_t *policy)
 static void grant(drive_policy_t *policy, drive_policy_spring_t *s, uint16_t granted_ma)
 {
     if ((uint16_t)(granted_ma + JUMP_MA - s->granted_ma) > 2u * JUMP_MA) {
-        spring_estimator_disturb(&policy->estimator, (uint8_t)(s - policy->spring));
+        spring_estimator_disturb(&policy->estimator.spring[s - policy->spring]);
     }
     s->granted_ma = granted_ma;
     s->limits &= (uint8_t) ~(DRIVE_POLICY_LIMIT_SUPPLY | DRIVE_POLICY_LIMIT_OVERLOAD);
@@ -657,7 +657,7 @@ static void precompensate(drive_policy_t *policy, const drive_policy_input_t *in
     switch ((drive_policy_stage_t)s->stage) {
     case DRIVE_POLICY_STAGE_OFF:
         enter(policy, model, k,
-              is_there(model, k, level) ? DRIVE_POLICY_STAGE_HOLD : DRIVE_POLICY_STAGE_HEAT);
+              is_there(model, k, level) ? DRIVE_POLICY_STAGE_HOLD : DRIVE_POLICY_STAGE_HEAT, level);
         break;
     case DRIVE_POLICY_STAGE_HEAT:
         heat(policy, s, model, k, level);
@@ -958,7 +958,7 @@ drive_policy_stage_t drive_policy_stage(const drive_policy_t *policy, uint8_t sp
 
 bool drive_policy_observes(const drive_policy_t *policy, uint8_t spring)
 {
-    return spring_estimator_sees(&policy->estimator, spring);
+    return spring_estimator_sees(&policy->estimator.spring[spring]);
 }
 
 int16_t drive_policy_phase_permille(const drive_policy_t *policy, uint8_t spring)

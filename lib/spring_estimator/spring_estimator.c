@@ -2,40 +2,73 @@
 
 #include <math.h>
 
-#define LEAST_READINGS 4
-#define SETTLING_TICKS 8
+#include "spring_estimator_internal.h"
 
-/* Tolerances of what is declared, as standard deviations: 15 and 30 % at the ends of a uniform spread. */
-#define CAPACITY_SD      0.09f
-#define LOSS_SD          0.12f
-#define LOSS_MOST        0.45f
-#define START_SD_K       3.0f /* at power-on, cold */
+#define LEAST_READINGS    4
+#define LEAST_MEAN_MA     50u
+#define SETTLING_TICKS    8
+#define SLOW_SHARE        0.0625f /* of a turn in the average: 4 s, six periods of the dither */
+#define NOISE_FIRST       0.002f
+#define NOISE_MOST        0.05f
+#define NOISE_SHARE       0.06f
+#define NOISE_SAME        0.1f /* a current that has moved by more tells nothing of the noise */
+#define THIRD_DIFFERENCES 2.449f /* sqrt(6): of a second difference over one reading's */
 
-/* The largest temperature coefficient of any NiTi in print, and some more for a heat capacity below the declared one. */
-#define COEFFICIENT_MOST 0.0018f
-#define STEP_K           3.0f  /* of heat between two comparisons */
-#define CHANGE_LEAST     0.03f /* of resistance: less is no transformation to be seen */
-#define STRONG_A         0.9f
+/* Standard deviations of a uniform tolerance of 15 and 20 %. */
+#define CAPACITY_SD       0.09f
+#define LOSS_SD           0.12f
+#define LOSS_MOST         0.45f /* of the declared loss: no more is ever believed */
+#define LOSS_DRIFT_SD     0.0005f /* of the declared loss, a second's: 3 % in a minute's root */
+#define NEIGHBOUR_SD      0.15f /* of the rise that neighbours have given */
+#define SHIFT_SD_K        3.0f  /* of a declared transformation, and of a light touch */
+#define SHIFT_MOST_K      30.0f
+#define SHIFT_DRIFT_K2    0.01f /* a second's */
+#define COLD_SD_K         4.0f  /* of ambient */
+#define BOUND_SDS         2.6f
+#define PROBABLE_SDS      0.7f
+#define LEAST_SD_K        0.6f /* nodes of one spring differ by so much */
+#define PHASE_SD          0.02f
+#define LOOK_SD           0.12f /* of phase by a resistance that was learnt at another current */
+#define LOOK_A            0.8f
 
-#define LINE_TURNS   240.0f /* 60 s: what the line follows */
-#define LOSS_STEP    0.0012f
-#define QUIET_TURNS  24
+static float clamp(float value, float low, float high)
+{
+    return value < low ? low : value > high ? high : value;
+}
 
-static float clampf(float v, float lo, float hi) { return v < lo ? lo : v > hi ? hi : v; }
-
-static float now_c(const thermal_model_t *model, uint8_t k)
+float spring_now_c(const thermal_model_t *model, uint8_t k)
 {
     return (float)thermal_model_temperature_c7(model, k) * (1.0f / 128.0f);
 }
 
-static int16_t as_c7(float c) { return (int16_t)(c * 128.0f); }
-
-static float ambient_c(const thermal_model_t *model) { return (float)model->ambient_c7 * (1.0f / 128.0f); }
-
-void spring_estimator_init(spring_estimator_t *e, uint8_t springs)
+static int16_t as_c7(float temperature_c)
 {
-    *e = (spring_estimator_t){.springs = springs};
+    return (int16_t)(clamp(temperature_c, -40.0f, 215.0f) * 128.0f);
 }
+
+static float ambient_c(const thermal_model_t *model)
+{
+    return (float)model->ambient_c7 * (1.0f / 128.0f);
+}
+
+static float hold_w(const thermal_model_t *model, uint8_t k, float temperature_c)
+{
+    return 1e-6f * (float)thermal_model_power_to_hold_uw(model, k, as_c7(temperature_c));
+}
+
+/* The temperature, its phase as if it came from martensite, or from austenite. */
+static void set_temperature(const spring_estimator_t *e, thermal_model_t *model, uint8_t k,
+                            float temperature_c, uint8_t from)
+{
+    if (from == SPRING_PHASE_AUSTENITE) {
+        thermal_model_set_temperature(model, k, as_c7(e->austenite_finish_c + 1.0f));
+    } else if (from == SPRING_PHASE_MARTENSITE) {
+        thermal_model_set_temperature(model, k, as_c7(e->martensite_finish_c - 1.0f));
+    }
+    thermal_model_set_temperature(model, k, as_c7(temperature_c));
+}
+
+/* ---- beginning ---- */
 
 void spring_estimator_prepare(spring_estimator_t *e, const thermal_model_t *model)
 {
@@ -43,302 +76,337 @@ void spring_estimator_prepare(spring_estimator_t *e, const thermal_model_t *mode
     e->heat_capacity_j_per_k = (float)p->heat_capacity_mj_per_k * 1e-3f;
     e->loss_w_per_k = (float)p->loss_uw_per_k * 1e-6f;
     e->martensite_ohm = (float)p->resistance_martensite_uohm * 1e-6f;
-    e->change = 1.0f - (float)p->resistance_martensite_uohm / (float)p->resistance_austenite_uohm;
+    e->change =
+        1.0f - (float)p->resistance_martensite_uohm / (float)p->resistance_austenite_uohm;
     e->martensite_finish_c = (float)p->martensite_finish_cc * 0.01f;
     e->martensite_start_c = (float)p->martensite_start_cc * 0.01f;
     e->austenite_start_c = (float)p->austenite_start_cc * 0.01f;
     e->austenite_finish_c = (float)p->austenite_finish_cc * 0.01f;
+}
+
+static void begin(const spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model,
+                  uint8_t k, float temperature_c, float sd_k, uint8_t possible)
+{
+    const spring_learnt_t learnt = b->learnt;
+    *b = (spring_belief_t){.variance_k2 = sd_k * sd_k + SHIFT_SD_K * SHIFT_SD_K,
+                           .shift_variance_k2 = SHIFT_SD_K * SHIFT_SD_K,
+                           .loss_variance = learnt.loss_sd_w_per_k * learnt.loss_sd_w_per_k,
+                           .possible = possible,
+                           .noise = NOISE_FIRST,
+                           .learnt = learnt,
+                           .last_c = temperature_c};
+    set_temperature(e, model, k, temperature_c, SPRING_PHASE_MARTENSITE);
+}
+
+static const spring_learnt_t *nothing_learnt(const spring_estimator_t *e, spring_learnt_t *learnt)
+{
+    *learnt = (spring_learnt_t){.change = e->change, .loss_sd_w_per_k = LOSS_SD * e->loss_w_per_k};
+    return learnt;
+}
+
+void spring_estimator_init(spring_estimator_t *e, thermal_model_t *model, float hottest_c)
+{
+    spring_learnt_t nothing;
+    const float coldest_c = ambient_c(model);
+    e->springs = (uint8_t)(model->parameters.rows * model->parameters.columns);
+    spring_estimator_prepare(e, model);
     for (uint8_t k = 0; k < e->springs; k++) {
-        spring_belief_t *b = &e->spring[k];
-        if (b->loss_variance == 0.0f) {
-            b->loss_variance = LOSS_SD * LOSS_SD * e->loss_w_per_k * e->loss_w_per_k;
-            b->variance_k2 = START_SD_K * START_SD_K;
-            b->possible = SPRING_PHASE_MARTENSITE;
-            b->last_c = now_c(model, k);
-            b->learnt.change = e->change;
-        }
+        e->spring[k].learnt = *nothing_learnt(e, &nothing);
+        begin(e, &e->spring[k], model, k, 0.5f * (coldest_c + hottest_c),
+              0.29f * (hottest_c - coldest_c), SPRING_PHASE_ANY);
     }
 }
 
-void spring_estimator_disturb(spring_estimator_t *e, uint8_t k)
+void spring_estimator_cold(spring_estimator_t *e, thermal_model_t *model)
 {
-    spring_belief_t *b = &e->spring[k];
+    for (uint8_t k = 0; k < e->springs; k++) {
+        begin(e, &e->spring[k], model, k, ambient_c(model), COLD_SD_K, SPRING_PHASE_MARTENSITE);
+    }
+}
+
+void spring_estimator_restore(spring_estimator_t *e, uint8_t k, const spring_learnt_t *learnt)
+{
+    if (learnt->austenite_ohm > 0.0f) {
+        e->spring[k].learnt = *learnt;
+        e->spring[k].loss_variance = learnt->loss_sd_w_per_k * learnt->loss_sd_w_per_k;
+    }
+}
+
+/* ---- one turn ---- */
+
+void spring_estimator_disturb(spring_belief_t *b)
+{
     b->settling = SETTLING_TICKS;
     b->current_sum_ma = b->voltage_sum_mv = 0;
     b->readings = 0;
     b->quiet = 0;
+    b->ohm_before[1] = 0.0f;
 }
 
-static void take_reading(spring_belief_t *b)
+/* Second differences of turns at the same current: neither a level nor a slope shows in them. */
+static void take_noise(spring_belief_t *b, float ohm, float current_a)
 {
-    b->read = false;
-    if (b->readings < LEAST_READINGS || b->current_sum_ma < 50u * b->readings) {
-        if (b->current_sum_ma == 0) {
-            b->fresh = 0;
-        }
-    } else {
-        const float r = (float)b->voltage_sum_mv / (float)b->current_sum_ma;
-        b->current_a = (float)b->current_sum_ma * 1e-3f / (float)b->readings;
-        if (b->fresh == 0) {
-            b->slow_ohm = r;
-        }
-        b->fresh = b->fresh < 255 ? (uint8_t)(b->fresh + 1) : 255;
-        b->slow_ohm += (r - b->slow_ohm) * 0.125f;
-        b->resistance_ohm = r;
-        b->read = true;
+    const bool same = fabsf(current_a - b->current_a) < NOISE_SAME * current_a;
+    if (same && b->ohm_before[1] > 0.0f) {
+        const float bend = (ohm - 2.0f * b->ohm_before[0] + b->ohm_before[1]) / ohm;
+        const float noise = clamp(fabsf(bend) / THIRD_DIFFERENCES * 1.25f, 0.0f, NOISE_MOST);
+        b->noise += (noise - b->noise) * NOISE_SHARE;
+    }
+    b->ohm_before[1] = same ? b->ohm_before[0] : 0.0f;
+    b->ohm_before[0] = ohm;
+}
+
+static void take_readings(spring_belief_t *b)
+{
+    b->reads = b->readings >= LEAST_READINGS && b->current_sum_ma >= LEAST_MEAN_MA * b->readings &&
+               b->voltage_sum_mv > 0;
+    if (b->reads) {
+        const float ohm = (float)b->voltage_sum_mv / (float)b->current_sum_ma;
+        const float current_a = (float)b->current_sum_ma * 1e-3f / (float)b->readings;
+        take_noise(b, ohm, current_a);
+        b->slow_ohm = b->fresh == 0 ? ohm : b->slow_ohm + (ohm - b->slow_ohm) * SLOW_SHARE;
+        b->current_a = current_a;
+        b->ohm = ohm;
+        b->fresh = b->fresh < UINT8_MAX ? (uint8_t)(b->fresh + 1) : UINT8_MAX;
+    } else if (b->current_sum_ma < LEAST_MEAN_MA) {
+        b->fresh = 0;
     }
     b->current_sum_ma = b->voltage_sum_mv = 0;
     b->readings = 0;
 }
 
-static void set_temperature(thermal_model_t *model, uint8_t k, float c, uint8_t phase,
-                            const spring_estimator_t *e)
+/* What this spring gives off beyond the model, at a temperature on the declared scale. */
+static float extra_loss_w(const spring_belief_t *b, const thermal_model_t *model,
+                          float temperature_c)
 {
-    if (phase == SPRING_PHASE_AUSTENITE) {
-        thermal_model_set_temperature(model, k, as_c7(e->austenite_finish_c + 1.0f));
-    } else if (phase == SPRING_PHASE_MARTENSITE) {
-        thermal_model_set_temperature(model, k, as_c7(e->martensite_finish_c - 1.0f));
-    }
-    thermal_model_set_temperature(model, k, as_c7(c));
+    return b->learnt.loss_w_per_k * (temperature_c - ambient_c(model)) +
+           b->stiffness_w_per_k * b->shift_k;
 }
 
-/* The spring is seen at a temperature of its transformation: the one update law of temperature and loss. */
-static float see(const spring_estimator_t *e, spring_belief_t *b, const thermal_model_t *model,
-                 uint8_t k, float seen_c, float sd_k)
-{
-    const float s = b->variance_k2 + sd_k * sd_k;
-    const float gain = b->variance_k2 / s;
-    const float loss_gain = b->covariance / s;
-    const float error = seen_c - now_c(model, k);
-    b->learnt.extra_loss_w_per_k =
-        clampf(b->learnt.extra_loss_w_per_k + loss_gain * error, -LOSS_MOST * e->loss_w_per_k,
-               LOSS_MOST * e->loss_w_per_k);
-    b->loss_variance -= loss_gain * b->covariance;
-    b->covariance *= 1.0f - gain;
-    b->variance_k2 *= 1.0f - gain;
-    return now_c(model, k) + gain * error;
-}
-
-static float own_loss_w(const spring_belief_t *b, const thermal_model_t *model, float c)
-{
-    return b->learnt.extra_loss_w_per_k * (c - ambient_c(model));
-}
-
-/* Error of temperature and loss over one turn; returns the heat taken up, K of heat capacity. */
+/* How the errors of distance and loss go on in a turn. Returns the heat taken up, K. */
 static float predict(const spring_estimator_t *e, spring_belief_t *b, const thermal_model_t *model,
                      uint8_t k, float power_w)
 {
-    const float c = now_c(model, k);
-    const float hold_w = 1e-6f * (float)thermal_model_power_to_hold_uw(model, k, as_c7(c));
-    const float stiff =
-        1e-6f * 0.125f *
-            (float)(thermal_model_power_to_hold_uw(model, k, as_c7(c + 8.0f)) - (int32_t)(1e6f * hold_w)) +
-        b->learnt.extra_loss_w_per_k;
+    const float now_c = spring_now_c(model, k);
+    const float balance_w = hold_w(model, k, now_c);
+    b->stiffness_w_per_k =
+        (hold_w(model, k, now_c + 8.0f) - balance_w) * 0.125f + b->learnt.loss_w_per_k;
     const float per_w = SPRING_ESTIMATOR_TURN_S / e->heat_capacity_j_per_k;
-    const float phi = 1.0f - per_w * stiff;
-    const float coupling = -per_w * (c - ambient_c(model));
-    const float moved = c - b->last_c;
-    b->variance_k2 = phi * phi * b->variance_k2 + 2.0f * phi * coupling * b->covariance +
-                     coupling * coupling * b->loss_variance;
-    b->covariance = phi * b->covariance + coupling * b->loss_variance;
-    const float rise_sd = CAPACITY_SD * fabsf(moved);
-    b->variance_k2 += 2.0f * sqrtf(b->variance_k2) * rise_sd + rise_sd * rise_sd;
-    b->last_c = c;
-    return per_w * (power_w - hold_w - own_loss_w(b, model, c));
+    const float keeps = 1.0f - per_w * b->stiffness_w_per_k;
+    const float above_k = now_c - ambient_c(model);
+    const float by_loss = -per_w * above_k;
+    const float drift = LOSS_DRIFT_SD * e->loss_w_per_k;
+    b->variance_k2 = keeps * (keeps * b->variance_k2 + 2.0f * by_loss * b->covariance) +
+                     by_loss * by_loss * b->loss_variance;
+    b->covariance = keeps * b->covariance + by_loss * b->loss_variance;
+    b->loss_variance += SPRING_ESTIMATOR_TURN_S * drift * drift;
+    if (b->shift_variance_k2 < SHIFT_SD_K * SHIFT_SD_K) {
+        b->variance_k2 += SPRING_ESTIMATOR_TURN_S * SHIFT_DRIFT_K2;
+        b->shift_variance_k2 += SPRING_ESTIMATOR_TURN_S * SHIFT_DRIFT_K2;
+    }
+    /* an error of the heat capacity is the same on the whole way: standard deviations add */
+    const float by_capacity_k = CAPACITY_SD * fabsf(now_c - b->last_c);
+    b->variance_k2 += (2.0f * sqrtf(b->variance_k2) + by_capacity_k) * by_capacity_k;
+    b->last_c = now_c;
+    return per_w * (power_w - balance_w - extra_loss_w(b, model, now_c));
 }
 
-void spring_estimator_begin_heating(spring_estimator_t *e, const thermal_model_t *model, uint8_t k)
+static void limit_loss(const spring_estimator_t *e, spring_belief_t *b)
 {
-    spring_belief_t *b = &e->spring[k];
-    (void)model;
-    b->heat_k = b->mark_k = 0.0f;
-    b->mark_ohm = b->onset_ohm = b->cold_ohm = 0.0f;
-    b->steep = b->flat = 0;
-    if (b->possible == SPRING_PHASE_AUSTENITE) {
-        b->possible = SPRING_PHASE_BETWEEN | SPRING_PHASE_AUSTENITE;
-    }
-    b->line_ohm = 0.0f;
+    const float most = LOSS_MOST * e->loss_w_per_k;
+    b->learnt.loss_w_per_k = clamp(b->learnt.loss_w_per_k, -most, most);
 }
 
-/* Slope of the resistance over heat: more than any temperature coefficient is a transformation. */
-static void compare(spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model, uint8_t k)
+float spring_see(const spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model, uint8_t k,
+                 float seen_c, float sd_k, uint8_t from)
 {
-    const float c = now_c(model, k);
-    if (b->cold_ohm == 0.0f) {
-        b->cold_ohm = b->resistance_ohm;
-        b->cold_c = c;
-    }
-    if (b->mark_ohm == 0.0f) {
-        b->mark_ohm = b->resistance_ohm;
-        b->mark_k = b->heat_k;
-        return;
-    }
-    const float heat_k = b->heat_k - b->mark_k;
-    if (heat_k < STEP_K) {
-        return;
-    }
-    const float per_k = (b->resistance_ohm / b->mark_ohm - 1.0f) / heat_k;
-    if (fabsf(per_k) > COEFFICIENT_MOST) {
-        if (b->steep == 0) {
-            b->onset_ohm = b->mark_ohm;
-        }
-        b->steep = b->steep < 255 ? (uint8_t)(b->steep + 1) : 255;
-        b->flat = 0;
-        if (b->steep == 2) { /* two comparisons are 6 K of heat, 1.5 K of temperature */
-            b->possible = SPRING_PHASE_BETWEEN;
-            if (b->cold_ohm > 0.0f && c > b->cold_c + 20.0f) {
-                const float rise = (b->onset_ohm / b->cold_ohm - 1.0f) / (c - b->cold_c);
-                b->learnt.martensite_rise_per_k = rise;
-                b->learnt.martensite_ohm = b->cold_ohm / (1.0f + rise * (b->cold_c - 20.0f));
-            }
-            set_temperature(model, k, see(e, b, model, k, e->austenite_start_c + 2.0f, 3.0f),
-                            SPRING_PHASE_MARTENSITE, e);
-        }
-        if (b->steep >= 2 && now_c(model, k) > e->austenite_finish_c - 1.0f) {
-            set_temperature(model, k, e->austenite_finish_c - 1.0f, SPRING_PHASE_MARTENSITE, e);
-        }
-    } else if (b->steep == 1) {
-        b->steep = 0;
-    } else if (b->steep >= 2) {
-        b->flat++;
-        if (b->flat >= 2 && fabsf(b->resistance_ohm / b->onset_ohm - 1.0f) > CHANGE_LEAST) {
-            b->possible = SPRING_PHASE_AUSTENITE;
-            b->blind = false;
-            b->learnt.austenite_ohm = b->resistance_ohm;
-            if (fabsf(1.0f - b->onset_ohm / b->resistance_ohm) > 0.5f * fabsf(b->learnt.change)) {
-                b->learnt.change = 1.0f - b->onset_ohm / b->resistance_ohm;
-            }
-            set_temperature(model, k, see(e, b, model, k, e->austenite_finish_c + 4.0f, 3.0f),
-                            SPRING_PHASE_AUSTENITE, e);
-            b->lost = 0.0f;
-            b->crossings = 0;
-        }
-    }
-    b->mark_ohm = b->resistance_ohm;
-    b->mark_k = b->heat_k;
+    const float error_k = seen_c - spring_now_c(model, k);
+    const float total = b->variance_k2 + sd_k * sd_k;
+    const float gain = b->variance_k2 / total;
+    const float shift = fminf(b->shift_variance_k2 / total, gain);
+    const float loss = b->covariance / total;
+    set_temperature(e, model, k, seen_c - (1.0f - gain) * error_k, from);
+    b->last_c = spring_now_c(model, k);
+    b->shift_k = clamp(b->shift_k - shift * error_k, -SHIFT_MOST_K, SHIFT_MOST_K);
+    b->learnt.loss_w_per_k += loss * error_k;
+    limit_loss(e, b);
+    b->loss_variance -= loss * b->covariance;
+    b->covariance *= 1.0f - gain;
+    b->shift_variance_k2 *= 1.0f - gain;
+    b->variance_k2 = fmaxf(b->variance_k2 * (1.0f - gain), LEAST_SD_K * LEAST_SD_K);
+    return error_k;
 }
 
-/* Phase is lost where the resistance leaves what it read while it was kept: martensite start. */
-static void watch(spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model, uint8_t k, float moved_k)
+void spring_keep(const spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model, uint8_t k,
+                 float limit_c, uint8_t from)
 {
-    if (fabsf(moved_k) > 0.08f) {
-        b->quiet = 0;
-    } else if (b->quiet < 255) {
-        b->quiet++;
-    }
-    if (b->quiet < QUIET_TURNS) {
-        if (b->quiet == 0) {
-            b->slow_ohm = b->resistance_ohm;
-        }
+    const float error_k = limit_c - spring_now_c(model, k);
+    b->learnt.loss_w_per_k += b->covariance / b->variance_k2 * error_k;
+    limit_loss(e, b);
+    set_temperature(e, model, k, limit_c, from);
+    b->last_c = spring_now_c(model, k);
+}
+
+/* What was learnt at power-on before tells the phase at the first look. */
+static void look(const spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model, uint8_t k)
+{
+    const spring_learnt_t *l = &b->learnt;
+    const float most = LOOK_SD + 3.0f * b->noise / fabsf(l->change);
+    if (b->possible != SPRING_PHASE_ANY || l->austenite_ohm == 0.0f || b->current_a < LOOK_A ||
+        b->fresh < 3 || most > 0.4f) {
         return;
     }
-    if (b->quiet == QUIET_TURNS || b->line_ohm == 0.0f) {
-        b->line_ohm = b->slow_ohm;
-        b->line_c = now_c(model, k);
-        b->losing = 0;
-        return;
+    const float austenite = 1.0f - (1.0f - b->slow_ohm / l->austenite_ohm) / l->change;
+    if (austenite < most) {
+        begin(e, b, model, k, 0.5f * (ambient_c(model) + e->austenite_start_c),
+              0.29f * (e->austenite_start_c - ambient_c(model)), SPRING_PHASE_MARTENSITE);
+    } else if (austenite > 1.0f - most) {
+        begin(e, b, model, k, e->austenite_start_c, 8.0f, SPRING_PHASE_AUSTENITE);
+        set_temperature(e, model, k, e->austenite_start_c, SPRING_PHASE_AUSTENITE);
+    } else {
+        begin(e, b, model, k, 0.5f * (e->martensite_finish_c + e->austenite_finish_c), 8.0f,
+              SPRING_PHASE_BETWEEN);
     }
-    const float turn = (b->resistance_ohm - b->slow_ohm) / b->slow_ohm;
-    b->noise += (fabsf(turn) - b->noise) * 0.03f;
-    const float rise = b->learnt.martensite_rise_per_k;
-    const float c = now_c(model, k);
-    const float line = b->line_ohm * (1.0f + rise * (c - b->line_c));
-    const float left = b->slow_ohm / line - 1.0f;
-    float lost = -left / b->learnt.change;
-    b->line_ohm += b->line_ohm * left / LINE_TURNS;
-    const float step = fmaxf(LOSS_STEP, 1.5f * b->noise) / fabsf(b->learnt.change);
-    b->losing = lost > 0.6f * step ? (uint8_t)(b->losing < 255 ? b->losing + 1 : 255) : 0;
-    if (lost > step && b->losing >= 2) {
-        const float width_k = e->martensite_start_c - e->martensite_finish_c;
-        if (lost > 0.04f) {
-            b->variance_k2 += 25.0f;
-        }
-        const float depth_k = width_k * sqrtf(lost) * 0.64f;
-        set_temperature(model, k, see(e, b, model, k, e->martensite_start_c - depth_k, 1.0f),
-                        SPRING_PHASE_AUSTENITE, e);
-        b->last_c = now_c(model, k);
-        b->lost += lost;
-        b->crossings = b->crossings < 255 ? (uint8_t)(b->crossings + 1) : 255;
-        b->quiet = 0;
-        b->losing = 0;
-    }
+    b->fresh = 4;
 }
 
 void spring_estimator_update(spring_estimator_t *e, thermal_model_t *model, uint8_t k)
 {
     spring_belief_t *b = &e->spring[k];
     const float before_c = b->last_c;
-    take_reading(b);
-    const float power_w = b->read ? b->current_a * b->current_a * b->resistance_ohm : 0.0f;
+    take_readings(b);
+    const float power_w = b->reads ? b->current_a * b->current_a * b->ohm : 0.0f;
     const float heat_k = predict(e, b, model, k, power_w);
     const float moved_k = b->last_c - before_c;
-    if (heat_k > 0.2f) {
+    b->disturbance_k *= 0.9998f; /* forgotten within 20 minutes */
+    if (b->reads) {
+        look(e, b, model, k);
         b->heat_k += heat_k;
-        if (b->read && b->current_a > STRONG_A) {
-            compare(e, b, model, k);
+        if (!b->blind) {
+            spring_heating_watch(e, b, model, k);
+            spring_holding_watch(e, b, model, k, moved_k);
         }
     } else {
-        b->mark_ohm = 0.0f;
+        b->mark_ohm = b->line_ohm = 0.0f;
+        b->quiet = 0;
     }
-    if (b->possible == SPRING_PHASE_AUSTENITE && b->read && !b->blind) {
-        watch(e, b, model, k, moved_k);
-    }
-    /* colder than martensite finish for certain */
-    if (now_c(model, k) + 2.0f * sqrtf(b->variance_k2) < e->martensite_finish_c) {
+    if (spring_now_c(model, k) + BOUND_SDS * sqrtf(b->variance_k2) < e->martensite_finish_c) {
         b->possible = SPRING_PHASE_MARTENSITE;
+        b->lost = 0.0f;
     }
 }
 
-bool spring_estimator_sees(const spring_estimator_t *e, uint8_t k)
+/* ---- what is believed ---- */
+
+void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, uint8_t k,
+                                 bool full)
 {
-    const spring_belief_t *b = &e->spring[k];
-    return b->read && !b->blind;
+    spring_belief_t *b = &e->spring[k];
+    if (full && b->possible != SPRING_PHASE_AUSTENITE) {
+        b->blind = b->blind || b->possible == SPRING_PHASE_MARTENSITE;
+        b->possible = SPRING_PHASE_AUSTENITE;
+        set_temperature(e, model, k, spring_now_c(model, k), SPRING_PHASE_AUSTENITE);
+    }
+    b->lost = 0.0f;
+    b->crossings = 0;
+    b->quiet = 0;
 }
 
-float spring_estimator_sd_k(const spring_estimator_t *e, uint8_t k)
-{
-    return sqrtf(e->spring[k].variance_k2);
-}
-
-bool spring_estimator_has_transformed(const spring_estimator_t *e, const thermal_model_t *model, uint8_t k)
+bool spring_estimator_has_transformed(const spring_estimator_t *e, const thermal_model_t *model,
+                                      uint8_t k)
 {
     const spring_belief_t *b = &e->spring[k];
+    /* Where the transformation is known to show, and has still to come, it is waited for as long as
+     * it may be; else no longer than it probably takes. */
+    const bool to_come = (b->possible & SPRING_PHASE_AUSTENITE) == 0;
+    const bool shows = b->reads && !b->blind && (b->onset || b->learnt.austenite_ohm > 0.0f);
+    const float sds = b->onset ? 1.3f : to_come && shows ? BOUND_SDS : PROBABLE_SDS;
     return b->possible == SPRING_PHASE_AUSTENITE ||
-           now_c(model, k) - 1.3f * sqrtf(b->variance_k2) > e->austenite_finish_c;
+           spring_now_c(model, k) - sds * sqrtf(b->variance_k2) > e->austenite_finish_c;
 }
 
-float spring_estimator_phase(const spring_estimator_t *e, const thermal_model_t *model, uint8_t k)
+bool spring_estimator_is_cold(const spring_belief_t *b)
+{
+    return b->possible == SPRING_PHASE_MARTENSITE;
+}
+
+bool spring_estimator_sees(const spring_belief_t *b)
+{
+    return b->reads && !b->blind;
+}
+
+float spring_estimator_sd_k(const spring_belief_t *b)
+{
+    return sqrtf(b->variance_k2);
+}
+
+spring_bounds_t spring_estimator_temperature_c(const spring_estimator_t *e,
+                                               const thermal_model_t *model, uint8_t k)
 {
     const spring_belief_t *b = &e->spring[k];
+    const float value_c = spring_now_c(model, k) + b->shift_k;
+    const float neighbours_k = NEIGHBOUR_SD * (value_c - ambient_c(model));
+    const float own = b->possible == SPRING_PHASE_MARTENSITE ? neighbours_k * neighbours_k : 0.0f;
+    const float most_k = BOUND_SDS * sqrtf(b->variance_k2 + SHIFT_SD_K * SHIFT_SD_K + own);
+    return (spring_bounds_t){value_c, value_c - most_k, value_c + most_k};
+}
+
+spring_bounds_t spring_estimator_distance_k(const spring_estimator_t *e,
+                                            const thermal_model_t *model, uint8_t k)
+{
+    const float value_k = spring_now_c(model, k) - e->martensite_start_c;
+    const float most_k = BOUND_SDS * sqrtf(e->spring[k].variance_k2);
+    return (spring_bounds_t){value_k, value_k - most_k, value_k + most_k};
+}
+
+spring_bounds_t spring_estimator_austenite(const spring_estimator_t *e,
+                                           const thermal_model_t *model, uint8_t k)
+{
+    const spring_belief_t *b = &e->spring[k];
+    float value = (float)thermal_model_austenite(model, k) * (1.0f / 32768.0f);
+    float sd = 0.3f;
     if (b->possible == SPRING_PHASE_AUSTENITE) {
-        return clampf(1.0f - b->lost, 0.0f, 1.0f);
+        value = clamp(1.0f - b->lost, 0.0f, 1.0f);
+        sd = b->blind ? 0.3f : PHASE_SD;
+    } else if (b->possible == SPRING_PHASE_MARTENSITE) {
+        sd = PHASE_SD;
+        value = spring_now_c(model, k) < e->austenite_start_c ? 0.0f : value;
+        if (spring_now_c(model, k) + BOUND_SDS * sqrtf(b->variance_k2) > e->austenite_start_c) {
+            sd = 0.4f;
+        }
+    } else if (b->reads && !b->blind && b->learnt.austenite_ohm > 0.0f) {
+        value = clamp(1.0f - (1.0f - b->ohm / b->learnt.austenite_ohm) / b->learnt.change, 0.0f,
+                      1.0f);
+        sd = 0.08f;
+    } else if (b->reads && !b->blind && b->onset) {
+        value = clamp((1.0f - b->onset_ohm / b->ohm) / b->learnt.change, 0.0f, 1.0f);
+        sd = 0.12f;
     }
-    if (b->read && b->onset_ohm > 0.0f && b->steep >= 2 && !b->blind) {
-        return clampf((1.0f - b->onset_ohm / b->resistance_ohm) / b->learnt.change, 0.0f, 1.0f);
-    }
-    return (float)thermal_model_austenite(model, k) / 32768.0f;
+    return (spring_bounds_t){value, clamp(value - BOUND_SDS * sd, 0.0f, 1.0f),
+                             clamp(value + BOUND_SDS * sd, 0.0f, 1.0f)};
 }
 
-uint32_t spring_estimator_model_power_uw(const spring_estimator_t *e, const thermal_model_t *model, uint8_t k,
-                                         uint32_t power_uw)
+uint32_t spring_estimator_model_power_uw(const spring_estimator_t *e, const thermal_model_t *model,
+                                         uint8_t k, uint32_t power_uw)
 {
-    const float extra = 1e6f * own_loss_w(&e->spring[k], model, now_c(model, k));
-    const float p = (float)power_uw - extra;
-    return p <= 0.0f ? 0 : (uint32_t)p;
+    const float own_uw =
+        (float)power_uw - 1e6f * extra_loss_w(&e->spring[k], model, spring_now_c(model, k));
+    return own_uw <= 0.0f ? 0 : (uint32_t)own_uw;
 }
 
-float spring_estimator_hold_w(const spring_estimator_t *e, const thermal_model_t *model, uint8_t k, float c)
+float spring_estimator_hold_w(const spring_estimator_t *e, const thermal_model_t *model, uint8_t k,
+                              float temperature_c)
 {
-    return 1e-6f * (float)thermal_model_power_to_hold_uw(model, k, as_c7(c)) + own_loss_w(&e->spring[k], model, c);
+    return hold_w(model, k, temperature_c) + extra_loss_w(&e->spring[k], model, temperature_c);
 }
 
 uint16_t spring_estimator_current_ma(const spring_estimator_t *e, uint8_t k, float power_w)
 {
     const spring_belief_t *b = &e->spring[k];
-    const float r = b->slow_ohm > 0.05f ? b->resistance_ohm : e->martensite_ohm;
     if (power_w <= 0.0f) {
         return 0;
     }
-    const float ma = 1000.0f * sqrtf(power_w / r);
-    return ma > 3200.0f ? 3200 : (uint16_t)ma;
+    const float current_ma =
+        1000.0f * sqrtf(power_w / (b->fresh != 0 ? b->slow_ohm : e->martensite_ohm));
+    return current_ma > 3200.0f ? 3200 : (uint16_t)current_ma;
 }
