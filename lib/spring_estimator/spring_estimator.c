@@ -1,6 +1,7 @@
 #include "spring_estimator.h"
 
 #include <math.h>
+#include <stdio.h>
 
 #include "spring_estimator_internal.h"
 
@@ -22,7 +23,7 @@
 #define NEIGHBOUR_SD      0.15f /* of the rise that neighbours have given */
 #define SHIFT_SD_K        3.0f  /* of a declared transformation, and of a light touch */
 #define SHIFT_MOST_K      30.0f
-#define SHIFT_DRIFT_K2    0.01f /* a second's */
+#define SHIFT_DRIFT_K2    1e-4f /* a second's */
 #define COLD_SD_K         4.0f  /* of ambient */
 #define BOUND_SDS         2.6f
 #define PROBABLE_SDS      0.7f
@@ -66,6 +67,11 @@ static void set_temperature(const spring_estimator_t *e, thermal_model_t *model,
         thermal_model_set_temperature(model, k, as_c7(e->martensite_finish_c - 1.0f));
     }
     thermal_model_set_temperature(model, k, as_c7(temperature_c));
+}
+
+static float distance_k2(const spring_belief_t *b)
+{
+    return b->variance_k2 + b->capacity_k * b->capacity_k;
 }
 
 /* ---- beginning ---- */
@@ -179,8 +185,7 @@ static void take_readings(spring_belief_t *b)
 static float extra_loss_w(const spring_belief_t *b, const thermal_model_t *model,
                           float temperature_c)
 {
-    return b->learnt.loss_w_per_k * (temperature_c - ambient_c(model)) +
-           b->stiffness_w_per_k * b->shift_k;
+    return b->learnt.loss_w_per_k * (temperature_c - ambient_c(model));
 }
 
 /* How the errors of distance and loss go on in a turn. Returns the heat taken up, K. */
@@ -200,13 +205,8 @@ static float predict(const spring_estimator_t *e, spring_belief_t *b, const ther
                      by_loss * by_loss * b->loss_variance;
     b->covariance = keeps * b->covariance + by_loss * b->loss_variance;
     b->loss_variance += SPRING_ESTIMATOR_TURN_S * drift * drift;
-    if (b->shift_variance_k2 < SHIFT_SD_K * SHIFT_SD_K) {
-        b->variance_k2 += SPRING_ESTIMATOR_TURN_S * SHIFT_DRIFT_K2;
-        b->shift_variance_k2 += SPRING_ESTIMATOR_TURN_S * SHIFT_DRIFT_K2;
-    }
-    /* an error of the heat capacity is the same on the whole way: standard deviations add */
-    const float by_capacity_k = CAPACITY_SD * fabsf(now_c - b->last_c);
-    b->variance_k2 += (2.0f * sqrtf(b->variance_k2) + by_capacity_k) * by_capacity_k;
+    b->capacity_k = keeps * b->capacity_k + CAPACITY_SD * (now_c - b->last_c);
+    {static int n; extern char *getenv(const char*); if (k==2 && getenv("DBG2") && n++%80==0) fprintf(stderr,"%d sd %.2f cap %.2f lossd %.1f%% loss %.1f%% cov %.5f stiff %.2f dist %.1f lost %.3f cross %d T %.1f\n",n/4,sqrtf(b->variance_k2),b->capacity_k,100*sqrtf(b->loss_variance)/e->loss_w_per_k,100*b->learnt.loss_w_per_k/e->loss_w_per_k,b->covariance,1e3*b->stiffness_w_per_k,b->disturbance_k,b->lost,b->crossings,now_c);}
     b->last_c = now_c;
     return per_w * (power_w - balance_w - extra_loss_w(b, model, now_c));
 }
@@ -221,8 +221,9 @@ float spring_see(const spring_estimator_t *e, spring_belief_t *b, thermal_model_
                  float seen_c, float sd_k, uint8_t from)
 {
     const float error_k = seen_c - spring_now_c(model, k);
-    const float total = b->variance_k2 + sd_k * sd_k;
-    const float gain = b->variance_k2 / total;
+    const float own_k2 = b->variance_k2 + b->capacity_k * b->capacity_k;
+    const float total = own_k2 + sd_k * sd_k;
+    const float gain = own_k2 / total;
     const float shift = fminf(b->shift_variance_k2 / total, gain);
     const float loss = b->covariance / total;
     set_temperature(e, model, k, seen_c - (1.0f - gain) * error_k, from);
@@ -232,6 +233,7 @@ float spring_see(const spring_estimator_t *e, spring_belief_t *b, thermal_model_
     limit_loss(e, b);
     b->loss_variance -= loss * b->covariance;
     b->covariance *= 1.0f - gain;
+    b->capacity_k *= 1.0f - gain;
     b->shift_variance_k2 *= 1.0f - gain;
     b->variance_k2 = fmaxf(b->variance_k2 * (1.0f - gain), LEAST_SD_K * LEAST_SD_K);
     return error_k;
@@ -290,7 +292,7 @@ void spring_estimator_update(spring_estimator_t *e, thermal_model_t *model, uint
         b->mark_ohm = b->line_ohm = 0.0f;
         b->quiet = 0;
     }
-    if (spring_now_c(model, k) + BOUND_SDS * sqrtf(b->variance_k2) < e->martensite_finish_c) {
+    if (spring_now_c(model, k) + BOUND_SDS * spring_estimator_sd_k(b) < e->martensite_finish_c) {
         b->possible = SPRING_PHASE_MARTENSITE;
         b->lost = 0.0f;
     }
@@ -310,6 +312,8 @@ void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, 
     b->lost = 0.0f;
     b->crossings = 0;
     b->quiet = 0;
+    b->full_ohm = full && b->reads && b->current_a > 0.8f ? b->ohm : 0.0f;
+    b->full_c = spring_now_c(model, k);
 }
 
 bool spring_estimator_has_transformed(const spring_estimator_t *e, const thermal_model_t *model,
@@ -322,7 +326,8 @@ bool spring_estimator_has_transformed(const spring_estimator_t *e, const thermal
     const bool shows = b->reads && !b->blind && (b->onset || b->learnt.austenite_ohm > 0.0f);
     const float sds = b->onset ? 1.3f : to_come && shows ? BOUND_SDS : PROBABLE_SDS;
     return b->possible == SPRING_PHASE_AUSTENITE ||
-           spring_now_c(model, k) - sds * sqrtf(b->variance_k2) > e->austenite_finish_c;
+           (!b->steep &&
+           spring_now_c(model, k) - sds * spring_estimator_sd_k(b) > e->austenite_finish_c);
 }
 
 bool spring_estimator_is_cold(const spring_belief_t *b)
@@ -337,7 +342,7 @@ bool spring_estimator_sees(const spring_belief_t *b)
 
 float spring_estimator_sd_k(const spring_belief_t *b)
 {
-    return sqrtf(b->variance_k2);
+    return sqrtf(distance_k2(b));
 }
 
 spring_bounds_t spring_estimator_temperature_c(const spring_estimator_t *e,
@@ -347,7 +352,7 @@ spring_bounds_t spring_estimator_temperature_c(const spring_estimator_t *e,
     const float value_c = spring_now_c(model, k) + b->shift_k;
     const float neighbours_k = NEIGHBOUR_SD * (value_c - ambient_c(model));
     const float own = b->possible == SPRING_PHASE_MARTENSITE ? neighbours_k * neighbours_k : 0.0f;
-    const float most_k = BOUND_SDS * sqrtf(b->variance_k2 + SHIFT_SD_K * SHIFT_SD_K + own);
+    const float most_k = BOUND_SDS * sqrtf(distance_k2(b) + SHIFT_SD_K * SHIFT_SD_K + own);
     return (spring_bounds_t){value_c, value_c - most_k, value_c + most_k};
 }
 
@@ -355,7 +360,7 @@ spring_bounds_t spring_estimator_distance_k(const spring_estimator_t *e,
                                             const thermal_model_t *model, uint8_t k)
 {
     const float value_k = spring_now_c(model, k) - e->martensite_start_c;
-    const float most_k = BOUND_SDS * sqrtf(e->spring[k].variance_k2);
+    const float most_k = BOUND_SDS * spring_estimator_sd_k(&e->spring[k]);
     return (spring_bounds_t){value_k, value_k - most_k, value_k + most_k};
 }
 
@@ -371,7 +376,7 @@ spring_bounds_t spring_estimator_austenite(const spring_estimator_t *e,
     } else if (b->possible == SPRING_PHASE_MARTENSITE) {
         sd = PHASE_SD;
         value = spring_now_c(model, k) < e->austenite_start_c ? 0.0f : value;
-        if (spring_now_c(model, k) + BOUND_SDS * sqrtf(b->variance_k2) > e->austenite_start_c) {
+        if (spring_now_c(model, k) + BOUND_SDS * spring_estimator_sd_k(b) > e->austenite_start_c) {
             sd = 0.4f;
         }
     } else if (b->reads && !b->blind && b->learnt.austenite_ohm > 0.0f) {

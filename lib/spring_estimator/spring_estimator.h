@@ -43,6 +43,7 @@ typedef struct {
      * degC on the declared scale; shift_k is what is believed to be the transformation's own. */
     float shift_k;
     float variance_k2; /* of the distance to the transformation */
+    float capacity_k;  /* standard deviation of that, by the heat capacity alone; signed */
     float shift_variance_k2;
     float loss_variance;
     float covariance;      /* of distance and loss, W */
@@ -79,7 +80,10 @@ typedef struct {
     float cold_c;
     float excess; /* change that no temperature coefficient explains; signed */
     float flat_k; /* heat since, without such a change */
+    bool steep;   /* it changed so when it was last compared */
     /* the running hold */
+    float full_ohm; /* at its beginning, fully on */
+    float full_c;
     float line_ohm; /* what it reads while it keeps its phase, at line_c; 0: none yet */
     float line_c;
 } spring_belief_t;

@@ -20,7 +20,7 @@ void spring_estimator_begin_heating(spring_belief_t *b)
 {
     b->heat_k = b->mark_k = b->flat_k = b->excess = 0.0f;
     b->mark_ohm = b->onset_ohm = b->cold_ohm = b->line_ohm = 0.0f;
-    b->onset = false;
+    b->onset = b->steep = false;
     if (b->possible == SPRING_PHASE_AUSTENITE && b->lost < CHANGE_PART) {
         b->possible = SPRING_PHASE_BETWEEN | SPRING_PHASE_AUSTENITE;
     } else if (b->possible == SPRING_PHASE_AUSTENITE) {
@@ -101,11 +101,13 @@ void spring_heating_watch(const spring_estimator_t *e, spring_belief_t *b, therm
         }
         b->excess += excess;
         b->flat_k = 0.0f;
+        b->steep = fabsf(excess) > 2.0f * b->noise;
         if (!b->onset && fabsf(b->excess) > EXCESS_SEEN + 4.0f * b->noise) {
             see_onset(e, b, model, k);
         }
     } else if (b->onset) {
         b->flat_k += step_k;
+        b->steep = false;
         if (b->flat_k >= FLAT_K && fabsf(b->ohm / b->onset_ohm - 1.0f) > CHANGE_LEAST) {
             see_finish(e, b, model, k);
         }
