@@ -205,8 +205,7 @@ void add_figures(figures_t &figures, const options_t &options, const named_t &ro
         options.learnt ? "<= 120" : "<= 210");
     add("driven springs below 90 % for more than 20 s, unreported", s.silent, "springs", "0");
     add("undriven springs above 5 %", s.undriven_over, "springs", "0");
-    add("mean true hold temperature", s.hold_c / s.hold_s, unit_c,
-        structural ? "<= 95" : "<= 86");
+    add("mean true hold temperature", s.hold_c / s.hold_s, unit_c, structural ? "<= 95" : "<= 86");
     add("reheats per held spring and hour", s.reheats / s.settled_h, "1/h", "<= 2");
     add("temperature and phase within bounds", 100.0 * s.inside_s / s.known_s, "%", ">= 99");
     add("temperature within bounds", 100.0 * s.inside_c_s / s.known_s, "%", "");
@@ -327,8 +326,8 @@ void do_campaign(const options_t &options, const std::vector<int> &worlds)
     for (const named_t &row : rows) {
         print_row(row.name, row.sum);
         const bool structural =
-            &row == &rows.back() || campaign_is_structural(worlds[static_cast<std::size_t>(
-                                        &row - rows.data())]);
+            &row == &rows.back() ||
+            campaign_is_structural(worlds[static_cast<std::size_t>(&row - rows.data())]);
         add_figures(figures, options, row, structural);
     }
     fmt::print("{:.0f} x real time on one core, controller included\n",
@@ -342,12 +341,14 @@ std::string footer()
     std::string page = "Worlds:\n";
     for (int w = 0; w < campaign_worlds(); w++)
         page += fmt::format("  {:<14} {}\n", campaign_name(w), campaign_says(w));
-    return page +
-           "Columns: 'late' springs were neither at 95 % austenite nor reported in time (180 s, nine "
-           "springs 210 s;\nwith --learnt 90 and 120 s), 'never' ones in the whole run; 'silent' ones "
-           "were below 90 % for more than 20 s,\nunreported, for 'silent s' beyond that; '-': nothing "
-           "is said, or nothing was held.\n"
-           "Seeds: 1 to 99 are for development. Results are reported for seed 2026, once.\n";
+    return page + "Columns: 'late' springs were neither at 95 % austenite nor reported in time "
+                  "(180 s, nine "
+                  "springs 210 s;\nwith --learnt 90 and 120 s), 'never' ones in the whole run; "
+                  "'silent' ones "
+                  "were below 90 % for more than 20 s,\nunreported, for 'silent s' beyond that; "
+                  "'-': nothing "
+                  "is said, or nothing was held.\n"
+                  "Seeds: 1 to 99 are for development. Results are reported for seed 2026, once.\n";
 }
 
 } // namespace
