@@ -93,7 +93,8 @@ static void energy_closes_in_every_law(void)
         }
         world_energy_t energy = world_energy(world);
         TEST_ASSERT_TRUE(energy.supplied_j > 500.0);
-        TEST_ASSERT_DOUBLE_WITHIN(1e-6, before_j, energy.stored_j - energy.supplied_j + energy.lost_j);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-6, before_j,
+                                  energy.stored_j - energy.supplied_j + energy.lost_j);
         tearDown();
     }
     world = NULL;
@@ -218,7 +219,8 @@ static double austenite_after(kinetics_law_t law, const double path_c[], int poi
     return grain_after(law, path_c, points).austenite;
 }
 
-/* What is left half way: cosine and the relays' distribution 1/2, a line 1/2, 1 % to the power 1/2. */
+/* What is left half way: cosine and the relays' distribution 1/2, a line 1/2, 1 % to the power 1/2.
+ */
 static void each_law_has_its_own_major_loop(void)
 {
     const double up[] = {20, 93}, over[] = {20, 98}, below[] = {20, 88};
@@ -279,7 +281,8 @@ static void the_r_phase_comes_on_cooling_only(void)
     TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.0, grain_after(KINETICS_R_PHASE, cold, 3).r_phase);
     TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.0, grain_after(KINETICS_R_PHASE, cold, 3).latent);
     /* its own hysteresis: 3 K back brings no austenite, 6 K does */
-    const double back_3[] = {20, 120, 70, 73}, back_6[] = {20, 120, 70, 76}, at_70[] = {20, 120, 70};
+    const double back_3[] = {20, 120, 70, 73}, back_6[] = {20, 120, 70, 76},
+                 at_70[] = {20, 120, 70};
     double at = austenite_after(KINETICS_R_PHASE, at_70, 3);
     TEST_ASSERT_DOUBLE_WITHIN(1e-9, at, austenite_after(KINETICS_R_PHASE, back_3, 4));
     TEST_ASSERT_TRUE(austenite_after(KINETICS_R_PHASE, back_6, 4) > at + 0.01);
