@@ -9,7 +9,7 @@
 #define FIRST_START_S 180.0 /* what one to eight springs may take; nine share the supply */
 #define LATER_START_S 90.0
 #define NINE_MORE_S   30.0
-#define TRACE_TICKS   TICKS_PER_S
+#define TRACE_TICKS   10 /* 0.2 s */
 
 typedef struct {
     const run_case_t *run;

@@ -164,8 +164,8 @@ static void an_array_is_the_same_specimen_in_every_world(void)
         TEST_ASSERT_EQUAL_DOUBLE(declared.world.spring[3].heat_capacity_j_per_k,
                                  other.world.spring[3].heat_capacity_j_per_k);
         TEST_ASSERT_TRUE(memcmp(&declared, &other, sizeof declared) != 0);
-        springs_differ += memcmp(declared.world.spring, other.world.spring,
-                                 sizeof declared.world.spring) != 0;
+        springs_differ +=
+            memcmp(declared.world.spring, other.world.spring, sizeof declared.world.spring) != 0;
     }
     TEST_ASSERT_TRUE(springs_differ > 5);
     campaign_draw(0, 1, 8, 900.0, &other);
