@@ -382,7 +382,11 @@ int main(int argc, char **argv)
     app.add_option("--trace", options.trace,
                    "Only the first array of the first world: truth and belief, every 0.2 s, CSV");
     app.footer(footer());
-    CLI11_PARSE(app, argc, argv);
+    try {
+        app.parse(argc, argv);
+    } catch (const CLI::ParseError &error) {
+        return app.exit(error) == 0 ? 0 : 2;
+    }
     options.command = fmt::format("build/host/bench/worlds/bench_worlds --seed {} --arrays {}{}",
                                   options.seed, options.arrays, options.learnt ? " --learnt" : "");
     try {
