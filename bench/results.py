@@ -53,8 +53,14 @@ SECTIONS: tuple[Section, ...] = (
     Section("policy", "Driving with the neighbours in mind", f"{HOST}/bench/policy/bench_policy", markdown=True),
     Section(
         "worlds",
-        "Worlds that are not as declared",
+        "Worlds that are not as declared: the first start ever",
         f"{HOST}/bench/worlds/bench_worlds --seed 2026",
+        markdown=True,
+    ),
+    Section(
+        "worlds_learnt",
+        "Worlds that are not as declared: later starts",
+        f"{HOST}/bench/worlds/bench_worlds --seed 2026 --learnt",
         markdown=True,
     ),
     Section("replay", "Measured logs through the on-chip model", f"{PYTHON} script/replay_fit.py"),

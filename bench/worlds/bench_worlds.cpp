@@ -214,7 +214,7 @@ void add_figures(figures_t &figures, const options_t &options, const named_t &ro
         is_declared ? "<= 12" : "");
 }
 
-std::string markdown(const options_t &options, const std::vector<named_t> &rows)
+std::string markdown(const std::vector<named_t> &rows)
 {
     std::string page = "| world |", rule = "|---|";
     for (const column_t &column : columns) {
@@ -228,7 +228,6 @@ std::string markdown(const options_t &options, const std::vector<named_t> &rows)
             page += fmt::format(" {} |", column.cell(row.sum));
         page += "\n";
     }
-    page += fmt::format("\n    {}\n", options.command);
     return page;
 }
 
@@ -330,7 +329,7 @@ void do_campaign(const options_t &options, const std::vector<int> &worlds)
     fmt::print("{:.0f} x real time on one core, controller included\n",
                all.simulated_s / all.spent_s);
     write(options.json, figures.json() + "\n");
-    write(options.markdown, markdown(options, rows));
+    write(options.markdown, markdown(rows));
 }
 
 std::string footer()
@@ -387,8 +386,9 @@ int main(int argc, char **argv)
     } catch (const CLI::ParseError &error) {
         return app.exit(error) == 0 ? 0 : 2;
     }
-    options.command = fmt::format("build/host/bench/worlds/bench_worlds --seed {} --arrays {}{}",
-                                  options.seed, options.arrays, options.learnt ? " --learnt" : "");
+    options.command = fmt::format(
+        "build/host/bench/worlds/bench_worlds --seed {} --arrays {} --seconds {:g}{}", options.seed,
+        options.arrays, options.seconds, options.learnt ? " --learnt" : "");
     try {
         const std::vector<int> worlds = chosen(options);
         if (options.trace.empty())
