@@ -51,6 +51,18 @@ SECTIONS: tuple[Section, ...] = (
     Section("firmware", "The firmware's size", f"{PYTHON} bench/firmware/firmware.py"),
     Section("board", "The firmware on the simulated Mega", f"{HOST}/bench/board/bench_board"),
     Section("policy", "Driving with the neighbours in mind", f"{HOST}/bench/policy/bench_policy", markdown=True),
+    Section(
+        "worlds",
+        "Worlds that are not as declared: the first start ever",
+        f"{HOST}/bench/worlds/bench_worlds --seed 2026",
+        markdown=True,
+    ),
+    Section(
+        "worlds_learnt",
+        "Worlds that are not as declared: later starts",
+        f"{HOST}/bench/worlds/bench_worlds --seed 2026 --learnt",
+        markdown=True,
+    ),
     Section("replay", "Measured logs through the on-chip model", f"{PYTHON} script/replay_fit.py"),
     Section("measured", "Measured data", f"{PYTHON} bench/diagnose/measured.py", json=False, markdown=True),
     Section("diagnose", "Undeclared effects", f"{PYTHON} bench/diagnose/run.py --seeds 4", markdown=True),

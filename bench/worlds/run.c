@@ -9,7 +9,7 @@
 #define FIRST_START_S 180.0 /* what one to eight springs may take; nine share the supply */
 #define LATER_START_S 90.0
 #define NINE_MORE_S   30.0
-#define TRACE_TICKS   TICKS_PER_S
+#define TRACE_TICKS   10 /* 0.2 s */
 
 typedef struct {
     const run_case_t *run;
@@ -47,11 +47,12 @@ static void trace_head(FILE *trace, int springs)
 {
     (void)fprintf(trace, "time_s,loss_factor");
     for (int k = 1; k <= springs; k++) {
-        (void)fprintf(trace,
-                      ",duty%d,i%d_a,v%d_v,read%d_ma,read%d_mv,end%d_c,middle%d_c,t%d_c,a%d,ms%d_c,"
-                      "ohm%d,believed%d_c,low%d_c,high%d_c,believed_a%d,low_a%d,high_a%d,target%d_ma,"
-                      "limits%d,fault%d",
-                      k, k, k, k, k, k, k, k, k, k, k, k, k, k, k, k, k, k, k, k);
+        (void)fprintf(
+            trace,
+            ",duty%d,i%d_a,v%d_v,read%d_ma,read%d_mv,end%d_c,middle%d_c,t%d_c,a%d,ms%d_c,"
+            "ohm%d,believed%d_c,low%d_c,high%d_c,believed_a%d,low_a%d,high_a%d,target%d_ma,"
+            "limits%d,fault%d",
+            k, k, k, k, k, k, k, k, k, k, k, k, k, k, k, k, k, k, k, k);
     }
     (void)fputc('\n', trace);
 }
@@ -70,12 +71,11 @@ static void trace_row(const bench_t *bench, FILE *trace)
                       world_node_c(world, k, 0), world_node_c(world, k, 1), world_mean_c(world, k),
                       world_austenite(world, k), world_martensite_start_c(world, k),
                       world_resistance_ohm(world, k));
-        (void)fprintf(trace, ",%.2f,%.2f,%.2f,%.4f,%.4f,%.4f,%u,%u,%d",
-                      belief_temperature_c(controller, k), c.low, c.high,
-                      belief_austenite(controller, k), phase.low, phase.high,
-                      controller_target_ma(controller, (uint8_t)k),
-                      controller_limits(controller, (uint8_t)k),
-                      (int)controller_fault(controller, (uint8_t)k));
+        (void)fprintf(
+            trace, ",%.2f,%.2f,%.2f,%.4f,%.4f,%.4f,%u,%u,%d", belief_temperature_c(controller, k),
+            c.low, c.high, belief_austenite(controller, k), phase.low, phase.high,
+            controller_target_ma(controller, (uint8_t)k), controller_limits(controller, (uint8_t)k),
+            (int)controller_fault(controller, (uint8_t)k));
     }
     (void)fputc('\n', trace);
 }

@@ -23,7 +23,7 @@ typedef struct {
     double wall_s; /* processor time of this thread */
 } run_result_t;
 
-/* trace: CSV of truth and belief once a second, or NULL. False if and only if the world or the
+/* trace: CSV of truth and belief every 0.2 s, or NULL. False if and only if the world or the
  * controller refuses its parameters. */
 bool run_case(const run_case_t *run, run_result_t *result, FILE *trace);
 

@@ -129,8 +129,7 @@ void score_tick(score_t *score, const world_t *world, const controller_t *contro
         spring->hottest_c = fmax(spring->hottest_c, world_hottest_c(world, k));
         if (!spring->driven) {
             spring->was_low = spring->was_low || austenite < SCORE_UNDRIVEN;
-            spring->undriven_most =
-                spring->was_low ? fmax(spring->undriven_most, austenite) : 0.0;
+            spring->undriven_most = spring->was_low ? fmax(spring->undriven_most, austenite) : 0.0;
         } else if (controller != NULL) {
             score_driven(score, spring, world, k, controller);
         }

@@ -21,22 +21,22 @@
 
 typedef struct {
     bool driven;
-    double reached_s;       /* 95 % austenite, after the last start; NaN: not yet */
-    double report_from_s;   /* since when a report stands; NaN: none */
-    double report_last_s;   /* when it was last seen */
-    double settled_s;       /* longest of all starts: at 95 %, or reported from then until it was */
-    double lost_s;          /* how long below 90 % and unreported, now */
-    double silent_s;        /* sum of what such times had beyond SCORE_LOST_S */
-    double hottest_c;       /* of any node */
-    double lowest_held;     /* least austenite after it was reached */
-    bool was_low;           /* undriven: it has been below SCORE_UNDRIVEN */
-    double undriven_most;   /* austenite, since then */
-    double hold_c, hold_s;  /* sum of mean temperature times time held, and that time */
-    bool below_start;       /* clearly below austenite start since it last crossed it */
+    double reached_s;      /* 95 % austenite, after the last start; NaN: not yet */
+    double report_from_s;  /* since when a report stands; NaN: none */
+    double report_last_s;  /* when it was last seen */
+    double settled_s;      /* longest of all starts: at 95 %, or reported from then until it was */
+    double lost_s;         /* how long below 90 % and unreported, now */
+    double silent_s;       /* sum of what such times had beyond SCORE_LOST_S */
+    double hottest_c;      /* of any node */
+    double lowest_held;    /* least austenite after it was reached */
+    bool was_low;          /* undriven: it has been below SCORE_UNDRIVEN */
+    double undriven_most;  /* austenite, since then */
+    double hold_c, hold_s; /* sum of mean temperature times time held, and that time */
+    bool below_start;      /* clearly below austenite start since it last crossed it */
     int reheats;
-    double settled_hold_s;  /* in which they were counted */
+    double settled_hold_s;    /* in which they were counted */
     double known_s, inside_s; /* bounds were given; temperature and phase were within them */
-    double inside_c_s, inside_phase_s; /* either alone */
+    double inside_c_s, inside_phase_s;    /* either alone */
     double half_width_k, half_distance_k; /* sums over hold_s */
 } score_spring_t;
 
@@ -54,7 +54,8 @@ void score_begin(score_t *score, const world_t *world, const bool driven[], doub
 void score_restart(score_t *score, const world_t *world);
 /* After every tick. While the board is off, controller is NULL: only what is hot counts. */
 void score_tick(score_t *score, const world_t *world, const controller_t *controller);
-/* Closes the run: springs that have reached nothing and reported nothing have settled_s INFINITY. */
+/* Closes the run: springs that have reached nothing and reported nothing have settled_s INFINITY.
+ */
 void score_end(score_t *score);
 
 #endif

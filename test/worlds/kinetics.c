@@ -115,7 +115,8 @@ static void move_preisach(grain_t *grain, const alloy_t *alloy, double heating_c
     double risen_slope, fallen_slope, per_k = 0.0;
     double risen = passed((heating_c - alloy->austenite_start_c) / up_k, &risen_slope);
     double fallen = passed((start_c - cooling_c) / down_k, &fallen_slope);
-    double on = move_relays(grain, risen, risen_slope / up_k, fallen, fallen_slope / down_k, &per_k);
+    double on =
+        move_relays(grain, risen, risen_slope / up_k, fallen, fallen_slope / down_k, &per_k);
     if (!has_r) {
         grain->austenite = grain->latent = on;
         grain->latent_per_k = per_k;

@@ -34,7 +34,7 @@ typedef struct {
     double latent;       /* 0..1: share of the latent heat that it holds */
     double latent_per_k; /* on the branch it last moved along; 0 where nothing transforms */
     /* cosine, linear, exponential: the transformation restarts at each turning point */
-    double hottest_c, coldest_c;          /* effective, since the other branch was last moved on */
+    double hottest_c, coldest_c; /* effective, since the other branch was last moved on */
     double martensite_from, austenite_from; /* fractions at which the branches began */
     /* Preisach: the staircase of nested turning points, as shares of switched relays */
     struct {

@@ -4,17 +4,17 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define PAIRS_MAX         (4 * WORLD_SPRINGS_MAX)
-#define LOSS_EVERY_TICKS  5     /* the convection's law varies slowly: rise^0.148 */
-#define CONVECTION_POWER  0.148 /* Morgan 1975: horizontal wires, Rayleigh number 0.01 to 100 */
+#define PAIRS_MAX          (4 * WORLD_SPRINGS_MAX)
+#define LOSS_EVERY_TICKS   5     /* the convection's law varies slowly: rise^0.148 */
+#define CONVECTION_POWER   0.148 /* Morgan 1975: horizontal wires, Rayleigh number 0.01 to 100 */
 #define RADIATION_W_PER_K4 5.670e-8
-#define ZERO_C            273.15
-#define STRESS_TIME_S     0.1 /* a finger's: 95 % within 0.3 s */
+#define ZERO_C             273.15
+#define STRESS_TIME_S      0.1 /* a finger's: 95 % within 0.3 s */
 /* Along the wire between the middles of two thirds: 18 W/mK (NiTi), 0.503 mm2, 36.7 mm. */
-#define AXIAL_W_PER_K     0.000247
-#define SHARE             (1.0 / WORLD_NODES)
-#define SOLVER_ROUNDS     6
-#define SOLVER_J          1e-8 /* 1e-7 K of a node */
+#define AXIAL_W_PER_K 0.000247
+#define SHARE         (1.0 / WORLD_NODES)
+#define SOLVER_ROUNDS 6
+#define SOLVER_J      1e-8 /* 1e-7 K of a node */
 
 typedef struct {
     double temperature_c;
@@ -123,7 +123,8 @@ static void draw_spring(draw_t *draw, const world_spring_t *batch, world_spring_
     alloy->austenite_start_c += up_k * (batch->alloy.austenite_start_c + near_one(draw, own) - 2.0);
     alloy->martensite_finish_c = alloy->martensite_start_c - down_k * near_one(draw, 1.0);
     alloy->austenite_finish_c = alloy->austenite_start_c + up_k * near_one(draw, 1.0);
-    /* A sound INA219 (data sheet: 0.2 % typical, 1 % shunt; 0.1 mV over 0.1 ohm) and sound crimps. */
+    /* A sound INA219 (data sheet: 0.2 % typical, 1 % shunt; 0.1 mV over 0.1 ohm) and sound crimps.
+     */
     spring->sensor.current_gain = random_uniform(&draw->random, 0.99, 1.01);
     spring->sensor.voltage_gain = random_uniform(&draw->random, 0.998, 1.002);
     spring->sensor.current_offset_a = random_uniform(&draw->random, -0.001, 0.001);
@@ -328,7 +329,8 @@ static void blow(world_t *world, double now_s, uint8_t fan_percent)
                          (1.0 + (p->fan_loss_factor - 1.0) * fan_percent / 100.0);
 }
 
-/* Still air carries heat off a thin wire a little better the hotter it is; moving air as it comes. */
+/* Still air carries heat off a thin wire a little better the hotter it is; moving air as it comes.
+ */
 static void weigh_convection(world_t *world)
 {
     double sink_c = world->parameters.air_w_per_k > 0.0 ? world->air_c : world->ambient_c;
@@ -336,9 +338,8 @@ static void weigh_convection(world_t *world)
         spring_t *spring = &world->spring[k];
         for (int n = 0; n < WORLD_NODES; n++) {
             double rise = fabs(spring->node[n].temperature_c - sink_c) / WORLD_LOSS_RISE_K;
-            spring->node[n].convection_w_per_k = world->loss_factor *
-                                                 spring->convection_full_w_per_k *
-                                                 pow(rise, CONVECTION_POWER);
+            spring->node[n].convection_w_per_k =
+                world->loss_factor * spring->convection_full_w_per_k * pow(rise, CONVECTION_POWER);
         }
     }
 }
@@ -349,11 +350,11 @@ static double node_ohm(const world_spring_t *parameters, const node_t *node)
     double rise_k = node->temperature_c - WORLD_RESISTANCE_C;
     double martensite = 1.0 - grain->austenite - grain->r_phase;
     double austenite_ohm_per = 1.0 + parameters->austenite_per_k * rise_k;
-    return SHARE *
-           (martensite * parameters->martensite_ohm * (1.0 + parameters->martensite_per_k * rise_k) +
-            (grain->austenite * parameters->austenite_ohm +
-             grain->r_phase * parameters->r_phase_ohm) *
-                austenite_ohm_per);
+    return SHARE * (martensite * parameters->martensite_ohm *
+                        (1.0 + parameters->martensite_per_k * rise_k) +
+                    (grain->austenite * parameters->austenite_ohm +
+                     grain->r_phase * parameters->r_phase_ohm) *
+                        austenite_ohm_per);
 }
 
 double world_resistance_ohm(const world_t *world, int spring)

@@ -42,15 +42,15 @@ typedef struct {
 } world_spring_t;
 
 typedef enum {
-    WORLD_STRESS_MPA,           /* value: stress from now on, MPa, taken up within 0.3 s */
-    WORLD_CONTACT_OHM,          /* value: contact resistance from now on */
-    WORLD_CONTACT_OHM_PER_S,    /* value: its drift from now on */
-    WORLD_SENSOR_FREEZE,        /* the last registers for ever */
-    WORLD_SENSOR_CURRENT_GAIN,  /* value: gain from now on: a lie */
-    WORLD_SENSOR_VOLTAGE_GAIN,  /* the same */
-    WORLD_SENSOR_SWAP,          /* value: spring whose sensor answers for this one, and the reverse */
-    WORLD_SUPPLY_V,             /* value: supply from now on */
-    WORLD_AMBIENT_C             /* value: true ambient from now on */
+    WORLD_STRESS_MPA,          /* value: stress from now on, MPa, taken up within 0.3 s */
+    WORLD_CONTACT_OHM,         /* value: contact resistance from now on */
+    WORLD_CONTACT_OHM_PER_S,   /* value: its drift from now on */
+    WORLD_SENSOR_FREEZE,       /* the last registers for ever */
+    WORLD_SENSOR_CURRENT_GAIN, /* value: gain from now on: a lie */
+    WORLD_SENSOR_VOLTAGE_GAIN, /* the same */
+    WORLD_SENSOR_SWAP, /* value: spring whose sensor answers for this one, and the reverse */
+    WORLD_SUPPLY_V,    /* value: supply from now on */
+    WORLD_AMBIENT_C    /* value: true ambient from now on */
 } world_event_kind_t;
 
 typedef struct {
@@ -87,7 +87,8 @@ void world_parameters_default(world_parameters_t *parameters);
 
 /* Moves everything that a specimen may have otherwise within +- tolerance of what it is, partly for
  * the whole array (one batch), partly for each spring; transformation temperatures by that share of
- * their band's width. Also draws the sensors' and contacts' ordinary imperfections, and the seed. */
+ * their band's width. Also draws the sensors' and contacts' ordinary imperfections, and the seed.
+ */
 void world_draw(world_parameters_t *parameters, uint64_t seed, double tolerance);
 
 /* NULL if and only if memory or the parameters do not allow it: rows x columns outside
@@ -106,7 +107,7 @@ double world_time_s(const world_t *world);
 double world_node_c(const world_t *world, int spring, int node);
 double world_hottest_c(const world_t *world, int spring); /* of its nodes */
 double world_mean_c(const world_t *world, int spring);
-double world_austenite(const world_t *world, int spring); /* 0..1, mean of its nodes */
+double world_austenite(const world_t *world, int spring);          /* 0..1, mean of its nodes */
 double world_martensite_start_c(const world_t *world, int spring); /* under the present load */
 double world_austenite_start_c(const world_t *world, int spring);
 double world_resistance_ohm(const world_t *world, int spring); /* with its contacts */
