@@ -298,23 +298,6 @@ static const char *reason_of(thermal_model_status_t status)
     return "refused";
 }
 
-/* The chip's parameter as the plant calls it: they differ in the unit. */
-static void plant_name(thermal_model_parameter_t parameter, char *name, size_t size)
-{
-    static const char *const units[][2] = {
-        {"_uw_per_k", "_w_per_k"}, {"_mj", "_j"}, {"_cc", "_c"}, {"_permille", ""}};
-    const char *own = thermal_model_parameter_name(parameter);
-    for (size_t k = 0; k < sizeof units / sizeof units[0]; k++) {
-        const char *unit = strstr(own, units[k][0]);
-        if (unit != NULL) {
-            (void)snprintf(name, size, "%.*s%s%s", (int)(unit - own), own, units[k][1],
-                           unit + strlen(units[k][0]));
-            return;
-        }
-    }
-    (void)snprintf(name, size, "%s", own);
-}
-
 chip_mapping_status_t chip_mapping_from_plant(const plant_t *plant,
                                               thermal_model_parameters_t *parameters, char *message,
                                               size_t message_size)
@@ -351,13 +334,11 @@ chip_mapping_status_t chip_mapping_from_plant(const plant_t *plant,
         return CHIP_MAPPING_ERROR_RANGE;
     }
     thermal_model_t model;
-    thermal_model_parameter_t bad = THERMAL_MODEL_PARAMETER_COUNT;
+    uint16_t bad = PARAMETER_COUNT;
     const thermal_model_status_t status = thermal_model_init(&model, &p, &bad);
     if (status != THERMAL_MODEL_OK) {
         message[0] = '\0';
-        char name[64];
-        plant_name(bad, name, sizeof name);
-        say(&m, "%s is %s", name, reason_of(status));
+        say(&m, "%s is %s", parameter_row(bad).name, reason_of(status));
         return CHIP_MAPPING_ERROR_MODEL;
     }
     static const char *const measurement[] = {"sensor_lag", "sensor_gain", "optical_mixing",

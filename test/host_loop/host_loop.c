@@ -432,11 +432,11 @@ static void what_does_not_fit_is_refused(void)
     controller_settings_t wrong = settings;
     wrong.model.rows = 2;
     TEST_ASSERT_NULL(loop_create(&wrong, plant, NULL, 1, &bad));
-    TEST_ASSERT_EQUAL_UINT16(offsetof(controller_settings_t, model.rows), bad);
+    TEST_ASSERT_EQUAL_UINT16(PARAMETER_rows, bad);
     wrong = settings;
     wrong.safety.bad_samples = 0;
     TEST_ASSERT_NULL(loop_create(&wrong, plant, NULL, 1, &bad));
-    TEST_ASSERT_EQUAL_UINT16(offsetof(controller_settings_t, safety.bad_samples), bad);
+    TEST_ASSERT_EQUAL_UINT16(PARAMETER_fault_bad_samples, bad);
     start();
     TEST_ASSERT_FALSE(loop_act(loop, LOOP_ACTION_OPEN_SPRING, 9));
     TEST_ASSERT_FALSE(loop_act(loop, LOOP_ACTION_OPEN_SPRING, -1));
