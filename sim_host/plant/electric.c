@@ -6,11 +6,11 @@
 
 static double resistance_at(const plant_t *p, int i, double t, double austenite)
 {
-    if (!p->on[E_RESISTANCE_PHASE])
-        return p->value[P_RESISTANCE][i] * p->resistance_scale[i];
-    const double martensite_ohm = p->value[P_RESISTANCE_MARTENSITE][i];
-    const double austenite_ohm = p->value[P_RESISTANCE_AUSTENITE][i];
-    const double warm = 1.0 + p->value[P_RESISTANCE_COEFFICIENT][0] * (t - 20.0);
+    if (!p->on[E_resistance_phase])
+        return p->value[P_resistance_ohm][i] * p->resistance_scale[i];
+    const double martensite_ohm = p->value[P_resistance_martensite_ohm][i];
+    const double austenite_ohm = p->value[P_resistance_austenite_ohm][i];
+    const double warm = 1.0 + p->value[P_resistance_coefficient_per_k][0] * (t - 20.0);
     return (martensite_ohm + (austenite_ohm - martensite_ohm) * austenite) * fmax(warm, 0.05) *
            p->resistance_scale[i];
 }
@@ -24,7 +24,7 @@ static double terminal_ohm(const plant_t *p, int i, double t, double austenite)
 
 static double command_w(const plant_t *p, int i)
 {
-    return p->quantity[i] * p->value[P_COMMAND_POWER][i] * p->resistance_scale[i];
+    return p->quantity[i] * p->value[P_command_power_w][i] * p->resistance_scale[i];
 }
 
 /* Mean voltage of the supply under all that is drawn. Stages in duty and command mode load it like
@@ -32,16 +32,16 @@ static double command_w(const plant_t *p, int i)
  * whatever the voltage is. */
 static double supply_voltage(const plant_t *p, const double *t, const double *austenite)
 {
-    const double open_v = scalar(p, P_SUPPLY_V);
-    const double source_ohm = scalar(p, P_SUPPLY_OHM);
-    if (!p->on[E_SUPPLY_SAG] || source_ohm == 0.0)
+    const double open_v = scalar(p, P_supply_v);
+    const double source_ohm = scalar(p, P_supply_resistance_ohm);
+    if (!p->on[E_supply_sag] || source_ohm == 0.0)
         return open_v;
-    const bool chopped = scalar(p, P_SUPPLY_CHOPPED) != 0.0;
+    const bool chopped = scalar(p, P_supply_chopped) != 0.0;
     double conductance = 0.0, power = 0.0, sunk_a = 0.0;
     for (int i = 0; i < p->n; i++) {
         if (p->fault[i] == PLANT_FAULT_OPEN)
             continue;
-        const double loop_ohm = p->value[P_LOOP_OHM][i];
+        const double loop_ohm = p->value[P_loop_resistance_ohm][i];
         const double spring_ohm = terminal_ohm(p, i, t[i], austenite[i]);
         switch (p->mode[i]) {
         case PLANT_DRIVE_POWER:
@@ -69,8 +69,9 @@ static double supply_voltage(const plant_t *p, const double *t, const double *au
 
 static double stage_current(const plant_t *p, int i, double supply_v, double t, double austenite)
 {
-    return electrics_buck_current_a(p->quantity[i], supply_v, scalar(p, P_FREEWHEEL_V),
-                                    terminal_ohm(p, i, t, austenite), p->value[P_LOOP_OHM][i]);
+    return electrics_buck_current_a(p->quantity[i], supply_v, scalar(p, P_freewheel_drop_v),
+                                    terminal_ohm(p, i, t, austenite),
+                                    p->value[P_loop_resistance_ohm][i]);
 }
 
 /* Heat set free in spring i, W; a held spring's is found from its losses elsewhere. */
@@ -88,11 +89,11 @@ static double heating(const plant_t *p, int i, double supply_v, double t, double
         return current * current * resistance_at(p, i, t, austenite);
     }
     case PLANT_DRIVE_COMMAND: {
-        const double open_v = scalar(p, P_SUPPLY_V), wanted_w = command_w(p, i);
-        if (p->on[E_SUPPLY_SAG] && scalar(p, P_SUPPLY_CHOPPED) != 0.0) {
+        const double open_v = scalar(p, P_supply_v), wanted_w = command_w(p, i);
+        if (p->on[E_supply_sag] && scalar(p, P_supply_chopped) != 0.0) {
             /* While it is on it draws all of its current, whatever its command: only the others'
              * mean counts. The power is at constant current. */
-            const double own_v = scalar(p, P_SUPPLY_OHM) * wanted_w / open_v;
+            const double own_v = scalar(p, P_supply_resistance_ohm) * wanted_w / open_v;
             return wanted_w * fmin((supply_v + own_v) / open_v, 1.0);
         }
         const double ratio = supply_v / open_v;
@@ -114,14 +115,14 @@ void plant_electric_find(plant_t *p, const double *t, const double *austenite)
 void plant_electric_prepare(plant_t *p)
 {
     for (int i = 0; i < p->n; i++)
-        p->resistance_scale[i] = p->on[E_SPRING_MISMATCH] ? p->value[P_RESISTANCE_SCALE][i] : 1.0;
+        p->resistance_scale[i] = p->on[E_spring_mismatch] ? p->value[P_resistance_scale][i] : 1.0;
 }
 
 void plant_electric_prepare_inputs(plant_t *p)
 {
     p->power_varies = false;
     for (int i = 0; i < p->n; i++)
-        if (p->on[E_RESISTANCE_PHASE] &&
+        if (p->on[E_resistance_phase] &&
             (p->mode[i] == PLANT_DRIVE_CURRENT || p->mode[i] == PLANT_DRIVE_DUTY))
             p->power_varies = true;
     plant_electric_find(p, p->temperature_c, p->austenite);

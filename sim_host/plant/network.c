@@ -32,30 +32,30 @@ void plant_network_lay(plant_t *p)
 
 double plant_network_ambient(const plant_t *p, double time_s)
 {
-    double ambient = p->value[P_AMBIENT][0];
-    if (p->on[E_AMBIENT_DRIFT])
-        ambient +=
-            scalar(p, P_AMBIENT_RAMP) * time_s / 3600.0 +
-            scalar(p, P_AMBIENT_AMPLITUDE) *
-                sin(2.0 * PI * time_s / scalar(p, P_AMBIENT_PERIOD) + scalar(p, P_AMBIENT_PHASE));
+    double ambient = p->value[P_ambient_c][0];
+    if (p->on[E_ambient_drift])
+        ambient += scalar(p, P_ambient_ramp_k_per_h) * time_s / 3600.0 +
+                   scalar(p, P_ambient_amplitude_k) *
+                       sin(2.0 * PI * time_s / scalar(p, P_ambient_period_s) +
+                           scalar(p, P_ambient_phase_rad));
     return ambient;
 }
 
 static double loss_at(const plant_t *p, int i, double t, double air)
 {
-    if (!p->on[E_NATURAL_CONVECTION])
+    if (!p->on[E_natural_convection])
         return p->loss_sum[i];
-    if (scalar(p, P_CONVECTION) < 0.5)
-        return p->loss_natural[i] * pow(fabs(t - air) / scalar(p, P_CONVECTION_REFERENCE),
-                                        scalar(p, P_CONVECTION_EXPONENT)) +
+    if (scalar(p, P_convection_correlation) < 0.5)
+        return p->loss_natural[i] * pow(fabs(t - air) / scalar(p, P_convection_reference_k),
+                                        scalar(p, P_convection_exponent)) +
                p->loss_forced[i];
-    const double diameter_m = 1e-3 * scalar(p, P_WIRE_DIAMETER);
+    const double diameter_m = 1e-3 * scalar(p, P_wire_diameter_mm);
     const double natural =
-        scalar(p, P_CONVECTION_SCALE) * convection_natural_w_per_m2k(diameter_m, t, air);
+        scalar(p, P_convection_scale) * convection_natural_w_per_m2k(diameter_m, t, air);
     const double forced =
-        scalar(p, P_FORCED_SCALE) *
-        convection_forced_w_per_m2k(diameter_m, p->fan * scalar(p, P_FAN_VELOCITY), t, air);
-    return convection_mixed(natural, forced) * 1e-6 * scalar(p, P_SURFACE) * p->loss_scale[i];
+        scalar(p, P_forced_scale) *
+        convection_forced_w_per_m2k(diameter_m, p->fan * scalar(p, P_fan_velocity_m_per_s), t, air);
+    return convection_mixed(natural, forced) * 1e-6 * scalar(p, P_surface_mm2) * p->loss_scale[i];
 }
 
 void plant_network_flows(plant_t *p, double time_s, const double *t, const double *austenite,
@@ -63,8 +63,8 @@ void plant_network_flows(plant_t *p, double time_s, const double *t, const doubl
 {
     const int n = p->n;
     const double ambient = plant_network_ambient(p, time_s);
-    const bool shared_air = p->on[E_SHARED_AIR], plate = p->on[E_PLATE_CONDUCTION];
-    const bool natural = p->on[E_NATURAL_CONVECTION];
+    const bool shared_air = p->on[E_shared_air], plate = p->on[E_plate_conduction];
+    const bool natural = p->on[E_natural_convection];
     const double air = shared_air ? t[n] : ambient;
     const double ambient_k2 = (ambient + KELVIN) * (ambient + KELVIN);
     double in_w = 0.0, to_air = 0.0, radiated = 0.0, to_plate = 0.0;
@@ -92,7 +92,7 @@ void plant_network_flows(plant_t *p, double time_s, const double *t, const doubl
             q -= w;
         }
         if (plate) {
-            const double w = p->value[P_PLATE_COUPLING][i] * (ti - t[n + 1]);
+            const double w = p->value[P_plate_coupling_w_per_k][i] * (ti - t[n + 1]);
             to_plate += w;
             q -= w;
         }
@@ -109,14 +109,14 @@ void plant_network_flows(plant_t *p, double time_s, const double *t, const doubl
     double out_w = radiated;
     flows->q_w[n] = flows->q_w[n + 1] = 0.0;
     if (shared_air) {
-        const double w = scalar(p, P_AIR_EXCHANGE) * (air - ambient);
+        const double w = scalar(p, P_air_exchange_w_per_k) * (air - ambient);
         flows->q_w[n] = to_air - w;
         out_w += w;
     } else {
         out_w += to_air;
     }
     if (plate) {
-        const double w = scalar(p, P_PLATE_LOSS) * (t[n + 1] - ambient);
+        const double w = scalar(p, P_plate_loss_w_per_k) * (t[n + 1] - ambient);
         flows->q_w[n + 1] = to_plate - w;
         out_w += w;
     }
@@ -127,34 +127,34 @@ void plant_network_flows(plant_t *p, double time_s, const double *t, const doubl
 void plant_network_prepare(plant_t *p)
 {
     const int n = p->n;
-    const bool mismatch = p->on[E_SPRING_MISMATCH];
+    const bool mismatch = p->on[E_spring_mismatch];
     for (int i = 0; i < n; i++) {
-        const double heavier = mismatch ? p->value[P_HEAT_CAPACITY_SCALE][i] : 1.0;
+        const double heavier = mismatch ? p->value[P_heat_capacity_scale][i] : 1.0;
         const int free_sides = 4 - (p->orthogonal_start[i + 1] - p->orthogonal_start[i]);
-        p->capacity[i] = p->value[P_HEAT_CAPACITY][i] * heavier;
-        p->loss_scale[i] = mismatch ? p->value[P_LOSS_SCALE][i] : 1.0;
-        if (p->on[E_EDGE_LOSS])
-            p->loss_scale[i] *= 1.0 + scalar(p, P_EDGE_LOSS) * free_sides;
+        p->capacity[i] = p->value[P_heat_capacity_j_per_k][i] * heavier;
+        p->loss_scale[i] = mismatch ? p->value[P_loss_scale][i] : 1.0;
+        if (p->on[E_edge_loss])
+            p->loss_scale[i] *= 1.0 + scalar(p, P_edge_loss_fraction) * free_sides;
 
         static const int row_of[4] = {0, -1, 0, 1}, column_of[4] = {-1, 0, 1, 0};
-        const int direction = (int)scalar(p, P_WAKE_DIRECTION);
+        const int direction = (int)scalar(p, P_wake_direction);
         const int row = i / p->columns + row_of[direction];
         const int column = i % p->columns + column_of[direction];
         p->upstream[i] = row >= 0 && row < p->rows && column >= 0 && column < p->columns
                              ? row * p->columns + column
                              : -1;
     }
-    p->capacity[n] = scalar(p, P_AIR_HEAT_CAPACITY);
-    p->capacity[n + 1] = scalar(p, P_PLATE_HEAT_CAPACITY);
+    p->capacity[n] = scalar(p, P_air_heat_capacity_j_per_k);
+    p->capacity[n + 1] = scalar(p, P_plate_heat_capacity_j_per_k);
     for (int i = 0; i < n + 2; i++)
         p->inverse_capacity[i] = 1.0 / p->capacity[i];
-    p->radiation_w_per_k4 = p->on[E_RADIATION] ? scalar(p, P_EMISSIVITY) * STEFAN_BOLTZMANN * 1e-6 *
-                                                     scalar(p, P_SURFACE)
+    p->radiation_w_per_k4 = p->on[E_radiation] ? scalar(p, P_emissivity) * STEFAN_BOLTZMANN * 1e-6 *
+                                                     scalar(p, P_surface_mm2)
                                                : 0.0;
     /* Nodes that are off stand at ambient, so that switching one on starts it there. */
-    if (!p->on[E_SHARED_AIR])
+    if (!p->on[E_shared_air])
         p->temperature_c[n] = plant_network_ambient(p, p->time_s);
-    if (!p->on[E_PLATE_CONDUCTION])
+    if (!p->on[E_plate_conduction])
         p->temperature_c[n + 1] = plant_network_ambient(p, p->time_s);
 }
 
@@ -163,28 +163,31 @@ void plant_network_prepare_inputs(plant_t *p)
     const int n = p->n;
     const double fan = p->fan;
     p->coupling_orthogonal =
-        scalar(p, P_ORTHOGONAL) + fan * (scalar(p, P_ORTHOGONAL_FAN) - scalar(p, P_ORTHOGONAL));
+        scalar(p, P_orthogonal_w_per_k) +
+        fan * (scalar(p, P_orthogonal_fan_w_per_k) - scalar(p, P_orthogonal_w_per_k));
     p->coupling_diagonal =
-        scalar(p, P_DIAGONAL) + fan * (scalar(p, P_DIAGONAL_FAN) - scalar(p, P_DIAGONAL));
-    p->wake = p->on[E_FAN_WAKE] ? scalar(p, P_WAKE) * fan : 0.0;
+        scalar(p, P_diagonal_w_per_k) +
+        fan * (scalar(p, P_diagonal_fan_w_per_k) - scalar(p, P_diagonal_w_per_k));
+    p->wake = p->on[E_fan_wake] ? scalar(p, P_wake_w_per_k) * fan : 0.0;
     p->any_held = false;
-    const bool shared_air = p->on[E_SHARED_AIR], plate = p->on[E_PLATE_CONDUCTION];
-    double fastest = 0.0, air_sum = scalar(p, P_AIR_EXCHANGE), plate_sum = scalar(p, P_PLATE_LOSS);
+    const bool shared_air = p->on[E_shared_air], plate = p->on[E_plate_conduction];
+    double fastest = 0.0, air_sum = scalar(p, P_air_exchange_w_per_k),
+           plate_sum = scalar(p, P_plate_loss_w_per_k);
     for (int i = 0; i < n; i++) {
-        p->loss_natural[i] = p->value[P_LOSS][i] * (1.0 - fan) * p->loss_scale[i];
-        p->loss_forced[i] = p->value[P_LOSS_FAN][i] * fan * p->loss_scale[i];
+        p->loss_natural[i] = p->value[P_loss_w_per_k][i] * (1.0 - fan) * p->loss_scale[i];
+        p->loss_forced[i] = p->value[P_loss_fan_w_per_k][i] * fan * p->loss_scale[i];
         p->loss_sum[i] = p->loss_natural[i] + p->loss_forced[i];
         if (p->mode[i] == PLANT_DRIVE_TEMPERATURE)
             p->any_held = true;
         /* Gershgorin: no eigenvalue beyond (own conductances + couplings) / capacity */
         const double own = p->loss_sum[i] + p->wake + 4.0 * 1.1e8 * p->radiation_w_per_k4 +
-                           (plate ? p->value[P_PLATE_COUPLING][i] : 0.0);
+                           (plate ? p->value[P_plate_coupling_w_per_k][i] : 0.0);
         const double coupled =
             p->coupling_orthogonal * (p->orthogonal_start[i + 1] - p->orthogonal_start[i]) +
             p->coupling_diagonal * (p->diagonal_start[i + 1] - p->diagonal_start[i]);
         fastest = fmax(fastest, (own + 2.0 * coupled) * p->inverse_capacity[i]);
         air_sum += 2.0 * p->loss_sum[i];
-        plate_sum += 2.0 * p->value[P_PLATE_COUPLING][i];
+        plate_sum += 2.0 * p->value[P_plate_coupling_w_per_k][i];
     }
     if (shared_air)
         fastest = fmax(fastest, air_sum * p->inverse_capacity[n]);
@@ -192,9 +195,9 @@ void plant_network_prepare_inputs(plant_t *p)
         fastest = fmax(fastest, plate_sum * p->inverse_capacity[n + 1]);
     /* The method is stable to 2.5 / eigenvalue; 1.5 damps well. */
     p->step_limit_s = fastest > 0.0 ? 1.5 / fastest : LONGEST_STEP_S;
-    if (p->on[E_AMBIENT_DRIFT])
-        p->step_limit_s = fmin(p->step_limit_s, scalar(p, P_AMBIENT_PERIOD) / 32.0);
-    if (p->on[E_SENSOR_LAG] && p->on[E_LATENT_HEAT])
+    if (p->on[E_ambient_drift])
+        p->step_limit_s = fmin(p->step_limit_s, scalar(p, P_ambient_period_s) / 32.0);
+    if (p->on[E_sensor_lag] && p->on[E_latent_heat])
         p->step_limit_s = fmin(p->step_limit_s, 1.0); /* lag() sees no kink within a step */
 }
 
@@ -205,10 +208,10 @@ double plant_ambient_c(const plant_t *p)
 
 double plant_air_c(const plant_t *p)
 {
-    return p->on[E_SHARED_AIR] ? p->temperature_c[p->n] : plant_ambient_c(p);
+    return p->on[E_shared_air] ? p->temperature_c[p->n] : plant_ambient_c(p);
 }
 
 double plant_plate_c(const plant_t *p)
 {
-    return p->on[E_PLATE_CONDUCTION] ? p->temperature_c[p->n + 1] : plant_ambient_c(p);
+    return p->on[E_plate_conduction] ? p->temperature_c[p->n + 1] : plant_ambient_c(p);
 }

@@ -22,12 +22,14 @@ static double smooth_rise(double t, double low, double high, double *slope)
 
 static double rising(const plant_t *p, double t, double *slope)
 {
-    return smooth_rise(t, p->value[P_AUSTENITE_START][0], p->value[P_AUSTENITE_FINISH][0], slope);
+    return smooth_rise(t, p->value[P_austenite_start_c][0], p->value[P_austenite_finish_c][0],
+                       slope);
 }
 
 static double falling(const plant_t *p, double t, double *slope)
 {
-    return smooth_rise(t, p->value[P_MARTENSITE_FINISH][0], p->value[P_MARTENSITE_START][0], slope);
+    return smooth_rise(t, p->value[P_martensite_finish_c][0], p->value[P_martensite_start_c][0],
+                       slope);
 }
 
 double plant_phase_fraction(const plant_t *p, int i, double t, double *slope)
@@ -54,9 +56,10 @@ double plant_phase_fraction(const plant_t *p, int i, double t, double *slope)
 /* Where heating and cooling transform next, seen from t. */
 static void set_thresholds(plant_t *p, int i, double t)
 {
-    p->heat_from_c[i] = p->austenite[i] < 1.0 ? fmax(t, p->value[P_AUSTENITE_START][0]) : HUGE_VAL;
+    p->heat_from_c[i] =
+        p->austenite[i] < 1.0 ? fmax(t, p->value[P_austenite_start_c][0]) : HUGE_VAL;
     p->cool_from_c[i] =
-        p->austenite[i] > 0.0 ? fmin(t, p->value[P_MARTENSITE_START][0]) : -HUGE_VAL;
+        p->austenite[i] > 0.0 ? fmin(t, p->value[P_martensite_start_c][0]) : -HUGE_VAL;
 }
 
 void plant_phase_anchor(plant_t *p, int i)
@@ -134,8 +137,8 @@ double plant_phase_temperature_after(const plant_t *p, int i, double heat_j, dou
 
 plant_status_t plant_check(const plant_t *p, const char **message)
 {
-    const double mf = scalar(p, P_MARTENSITE_FINISH), ms = scalar(p, P_MARTENSITE_START);
-    const double as = scalar(p, P_AUSTENITE_START), af = scalar(p, P_AUSTENITE_FINISH);
+    const double mf = scalar(p, P_martensite_finish_c), ms = scalar(p, P_martensite_start_c);
+    const double as = scalar(p, P_austenite_start_c), af = scalar(p, P_austenite_finish_c);
     const char *text = NULL;
     if (!(mf < ms))
         text = "martensite_finish_c must be below martensite_start_c";
@@ -152,12 +155,12 @@ plant_status_t plant_check(const plant_t *p, const char **message)
 
 void plant_phase_prepare(plant_t *p)
 {
-    const double *heavier = p->value[P_HEAT_CAPACITY_SCALE];
+    const double *heavier = p->value[P_heat_capacity_scale];
     for (int i = 0; i < p->n; i++) {
-        p->latent_j[i] = p->on[E_LATENT_HEAT] ? p->value[P_LATENT_HEAT][i] : 0.0;
-        if (p->on[E_SPRING_MISMATCH])
+        p->latent_j[i] = p->on[E_latent_heat] ? p->value[P_latent_heat_j][i] : 0.0;
+        if (p->on[E_spring_mismatch])
             p->latent_j[i] *= heavier[i];
-        p->latent_cooling_j[i] = p->latent_j[i] * scalar(p, P_LATENT_COOLING);
+        p->latent_cooling_j[i] = p->latent_j[i] * scalar(p, P_latent_cooling_ratio);
         plant_phase_anchor(p, i);
     }
 }

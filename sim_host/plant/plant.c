@@ -166,9 +166,9 @@ plant_status_t plant_set_fan(plant_t *p, double fraction)
 
 plant_status_t plant_set_ambient(plant_t *p, double ambient_c)
 {
-    if (ambient_c == p->value[P_AMBIENT][0])
+    if (ambient_c == p->value[P_ambient_c][0])
         return PLANT_OK;
-    return plant_set_index(p, P_AMBIENT, -1, ambient_c);
+    return plant_set_index(p, P_ambient_c, -1, ambient_c);
 }
 
 static void write_row(const plant_t *p, double *measured_c, double *temperature_c)
@@ -187,7 +187,7 @@ plant_status_t plant_simulate(plant_t *p, size_t rows, const double *time_s,
                               double *temperature_c)
 {
     const size_t n = (size_t)p->n;
-    const plant_parameter_t *ambient = plant_parameter(P_AMBIENT);
+    const plant_parameter_t *ambient = plant_parameter(P_ambient_c);
     for (size_t r = 0; r < rows; r++) {
         const double dt_s = r + 1 < rows ? time_s[r + 1] - time_s[r] : 1.0;
         if (!(dt_s > 0.0) || dt_s > LONGEST_STEP_S)

@@ -16,30 +16,29 @@
 /* ------------------------------------------------------------------- table */
 
 enum parameter_id {
-#define X(id, ...) P_##id,
+#define PLANT(name, ...) P_##name,
 #include "plant.def"
-#undef X
     PARAMETER_COUNT
 };
 
 #define PLANT_EFFECTS(X)                                                                           \
-    X(RADIATION, "radiation")                                                                      \
-    X(NATURAL_CONVECTION, "natural_convection")                                                    \
-    X(LATENT_HEAT, "latent_heat")                                                                  \
-    X(RESISTANCE_PHASE, "resistance_phase")                                                        \
-    X(SHARED_AIR, "shared_air")                                                                    \
-    X(PLATE_CONDUCTION, "plate_conduction")                                                        \
-    X(FAN_WAKE, "fan_wake")                                                                        \
-    X(EDGE_LOSS, "edge_loss")                                                                      \
-    X(SPRING_MISMATCH, "spring_mismatch")                                                          \
-    X(SUPPLY_SAG, "supply_sag")                                                                    \
-    X(AMBIENT_DRIFT, "ambient_drift")                                                              \
-    X(SENSOR_LAG, "sensor_lag")                                                                    \
-    X(SENSOR_GAIN, "sensor_gain")                                                                  \
-    X(OPTICAL_MIXING, "optical_mixing")
+    X(radiation)                                                                                   \
+    X(natural_convection)                                                                          \
+    X(latent_heat)                                                                                 \
+    X(resistance_phase)                                                                            \
+    X(shared_air)                                                                                  \
+    X(plate_conduction)                                                                            \
+    X(fan_wake)                                                                                    \
+    X(edge_loss)                                                                                   \
+    X(spring_mismatch)                                                                             \
+    X(supply_sag)                                                                                  \
+    X(ambient_drift)                                                                               \
+    X(sensor_lag)                                                                                  \
+    X(sensor_gain)                                                                                 \
+    X(optical_mixing)
 
 enum effect_id {
-#define X(id, name) E_##id,
+#define X(name) E_##name,
     PLANT_EFFECTS(X)
 #undef X
         EFFECT_COUNT

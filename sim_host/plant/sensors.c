@@ -16,13 +16,13 @@ static double lag(double shown, double t0, double middle, double t1, double tau,
 
 double plant_sensors_follow(const plant_t *p, int i, double middle_c, double end_c, double h_s)
 {
-    return lag(p->sensor_c[i], p->temperature_c[i], middle_c, end_c, p->value[P_SENSOR_LAG][i],
+    return lag(p->sensor_c[i], p->temperature_c[i], middle_c, end_c, p->value[P_sensor_lag_s][i],
                h_s);
 }
 
 void plant_sensors_prepare(plant_t *p)
 {
-    if (!p->on[E_SENSOR_LAG])
+    if (!p->on[E_sensor_lag])
         memcpy(p->sensor_c, p->temperature_c, (size_t)p->n * sizeof(double));
 }
 
@@ -30,19 +30,19 @@ double plant_measured_c(const plant_t *p, int spring)
 {
     double seen = p->sensor_c[spring];
     const double ambient = plant_network_ambient(p, p->time_s);
-    if (p->on[E_OPTICAL_MIXING]) {
+    if (p->on[E_optical_mixing]) {
         double orthogonal = 0.0, diagonal = 0.0;
         for (int k = p->orthogonal_start[spring]; k < p->orthogonal_start[spring + 1]; k++)
             orthogonal += p->sensor_c[p->orthogonal[k]] - seen;
         for (int k = p->diagonal_start[spring]; k < p->diagonal_start[spring + 1]; k++)
             diagonal += p->sensor_c[p->diagonal[k]] - seen;
-        const double background = ambient + scalar(p, P_OPTICAL_BACKGROUND_RISE);
+        const double background = ambient + scalar(p, P_optical_background_rise_k);
         seen +=
-            scalar(p, P_OPTICAL_ORTHOGONAL) * orthogonal + scalar(p, P_OPTICAL_DIAGONAL) * diagonal;
-        seen += scalar(p, P_OPTICAL_BACKGROUND) * (background - seen);
+            scalar(p, P_optical_orthogonal) * orthogonal + scalar(p, P_optical_diagonal) * diagonal;
+        seen += scalar(p, P_optical_background) * (background - seen);
     }
-    if (p->on[E_SENSOR_GAIN])
-        seen = ambient + p->value[P_SENSOR_GAIN][spring] * (seen - ambient) +
-               p->value[P_SENSOR_OFFSET][spring];
+    if (p->on[E_sensor_gain])
+        seen = ambient + p->value[P_sensor_gain][spring] * (seen - ambient) +
+               p->value[P_sensor_offset_k][spring];
     return seen;
 }

@@ -16,7 +16,7 @@ void plant_solver_hold(plant_t *p)
         p->input_j += heat_j;
         p->stored_j += heat_j;
         p->flows_known = false;
-        if (!p->on[E_SENSOR_LAG])
+        if (!p->on[E_sensor_lag])
             p->sensor_c[i] = p->temperature_c[i];
     }
 }
@@ -63,7 +63,7 @@ static void accept(plant_t *p, double h)
     const flows_t *first = &p->k[0], *last = &p->k[3];
     for (int i = 0; i < p->n; i++) {
         const double t0 = p->temperature_c[i], t1 = p->stage_c[i];
-        if (p->on[E_SENSOR_LAG]) { /* heat at half of the step: Hermite, from the flows at both ends
+        if (p->on[E_sensor_lag]) { /* heat at half of the step: Hermite, from the flows at both ends
                                     */
             const double heat_j =
                 0.5 * p->increment_j[i] + 0.125 * h * (first->q_w[i] - last->q_w[i]);
@@ -101,14 +101,14 @@ plant_status_t plant_solver_advance(plant_t *p, double dt_s)
     if (status != PLANT_OK)
         return status;
     const int nodes = p->n + 2;
-    const double tolerance = scalar(p, P_TOLERANCE);
+    const double tolerance = scalar(p, P_integration_tolerance_c);
     const double start_s = p->time_s, end_s = start_s + dt_s;
     double done_s = 0.0;
     double *e = p->increment_j;
     const double *k0 = p->k[0].q_w, *k1 = p->k[1].q_w, *k2 = p->k[2].q_w, *k3 = p->k[3].q_w;
     const double *austenite = p->power_varies ? p->stage_austenite : p->austenite;
 
-    if (!p->flows_known || p->on[E_AMBIENT_DRIFT])
+    if (!p->flows_known || p->on[E_ambient_drift])
         plant_network_flows(p, p->time_s, p->temperature_c, p->austenite, &p->k[0]);
     p->flows_known = true;
     while (done_s < dt_s) {
@@ -183,7 +183,7 @@ plant_status_t plant_settle(plant_t *p, double limit_s)
             fastest = fmax(fastest, fabs(p->k[0].q_w[i]) * p->inverse_capacity[i]);
         for (int i = 0; i < p->n; i++)
             fastest = fmax(fastest, fabs(p->sensor_c[i] - p->temperature_c[i]) * 1e-4);
-        if (fastest < 1e-9 && !p->on[E_AMBIENT_DRIFT])
+        if (fastest < 1e-9 && !p->on[E_ambient_drift])
             return PLANT_OK;
     }
     return PLANT_ERROR_TIME;

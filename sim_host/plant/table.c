@@ -4,17 +4,21 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const plant_parameter_t parameters[PARAMETER_COUNT] = {
-#define X(id, name, unit, effect, standard, low, high, each, text)                                 \
-    {name, unit, effect, text, standard, low, high, each},
-#include "plant.def"
+static const char *const effects[EFFECT_COUNT] = {
+#define X(name) #name,
+    PLANT_EFFECTS(X)
 #undef X
 };
 
-static const char *const effects[EFFECT_COUNT] = {
-#define X(id, name) name,
-    PLANT_EFFECTS(X)
-#undef X
+#define ONE    false
+#define EACH   true
+#define E_none EFFECT_COUNT
+
+static const plant_parameter_t parameters[PARAMETER_COUNT] = {
+#define PLANT(name, unit, count, minimum, maximum, standard, effect, sentence)                     \
+    {#name,   unit, E_##effect == E_none ? NULL : #effect, sentence, standard, minimum,            \
+     maximum, count},
+#include "plant.def"
 };
 
 size_t plant_parameter_count(void)
@@ -88,7 +92,7 @@ plant_status_t plant_set_index(plant_t *p, size_t k, int spring, double value)
         return PLANT_ERROR_INDEX;
     if (!within(value, parameter->minimum, parameter->maximum))
         return PLANT_ERROR_RANGE;
-    if ((k == P_WAKE_DIRECTION || k == P_CONVECTION || k == P_SUPPLY_CHOPPED) &&
+    if ((k == P_wake_direction || k == P_convection_correlation || k == P_supply_chopped) &&
         value != floor(value))
         return PLANT_ERROR_RANGE;
     if (spring < 0)
@@ -96,12 +100,12 @@ plant_status_t plant_set_index(plant_t *p, size_t k, int spring, double value)
             p->value[k][i] = value;
     else
         p->value[k][spring] = value;
-    if (k == P_AMBIENT) {
+    if (k == P_ambient_c) {
         p->inputs_changed = true; /* need not rebuild the network at each row of a log */
         const double ambient = plant_network_ambient(p, p->time_s);
-        if (!p->on[E_SHARED_AIR])
+        if (!p->on[E_shared_air])
             p->temperature_c[p->n] = ambient;
-        if (!p->on[E_PLATE_CONDUCTION])
+        if (!p->on[E_plate_conduction])
             p->temperature_c[p->n + 1] = ambient;
     } else {
         p->parameters_changed = true;
