@@ -312,7 +312,7 @@ void replay(const replay_options &options)
     plant_reset(plant.get());
     check_command_power(log, plant.get(), options.model_path);
     thermal_model_parameters_t chip{};
-    char message[256] = "";
+    char message[1024] = "";
     if (chip_mapping_from_plant(plant.get(), &chip, message, sizeof message) != CHIP_MAPPING_OK) {
         throw place_of(model, message).error(message);
     }

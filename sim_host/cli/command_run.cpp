@@ -44,7 +44,7 @@ std::string set_chip_model(const scenario &plan, const plant_t *plant, settings_
 {
     thermal_model_parameters_t &model = settings.controller.model;
     std::string path = plan.model_path.empty() ? "plant" : plan.model_path;
-    char message[256] = "";
+    char message[1024] = "";
     if (path == "defaults") {
         model.rows = static_cast<std::uint8_t>(plan.rows);
         model.columns = static_cast<std::uint8_t>(plan.cols);

@@ -50,7 +50,8 @@ static double value_of(const mapping_t *m, const char *name, int spring)
     double value = 0.0;
     const int index = plant_parameter_index(name);
     if (index >= 0) {
-        (void)plant_get_index(m->plant, (size_t)index, spring, &value);
+        const bool each = plant_parameter((size_t)index)->per_spring;
+        (void)plant_get_index(m->plant, (size_t)index, each ? spring : 0, &value);
     }
     return value;
 }
@@ -61,8 +62,9 @@ static double array_value(const mapping_t *m, const char *name)
 }
 
 /* A physical value as the whole number of the row that is nearest. The first one that does not fit
- * is told. */
-static void put(mapping_t *m, parameter_t parameter, int element, double value)
+ * is told, by the plant's name for it. */
+static void put_from(mapping_t *m, const char *name, parameter_t parameter, int element,
+                     double value)
 {
     const parameter_row_t row = parameter_row((uint16_t)parameter);
     const double unit = pow(10.0, -row.decimals);
@@ -73,10 +75,16 @@ static void put(mapping_t *m, parameter_t parameter, int element, double value)
     }
     if (!m->failed) {
         m->message[0] = '\0';
-        say(m, "%s is %.6g, the chip holds %.6g to %.6g", row.name, value, row.minimum * unit,
+        say(m, "%s is %.6g, the chip holds %.6g to %.6g", name, value, row.minimum * unit,
             row.maximum * unit);
         m->failed = true;
     }
+}
+
+static void put(mapping_t *m, parameter_t parameter, int element, double value)
+{
+    const parameter_row_t row = parameter_row((uint16_t)parameter);
+    put_from(m, row.name, parameter, element, value);
 }
 
 /* Mean over the springs; *spread is the largest relative distance from it. */
@@ -164,7 +172,7 @@ static void map_loss(mapping_t *m)
     const double fan_mean = mean_of(m, forced, &fan_spread);
     put(m, PARAMETER_loss_w_per_k, 0, mean);
     put(m, PARAMETER_loss_fan_w_per_k, 0, fan_mean);
-    put(m, PARAMETER_loss_rise_per_k, 0, rise);
+    put_from(m, "loss rise with temperature (1/K)", PARAMETER_loss_rise_per_k, 0, rise);
     double worst = 0.0;
     for (int i = 0; i < m->springs; i++) {
         const double own = mean > 0.0       ? natural[i] / mean
@@ -211,21 +219,15 @@ static void map_resistance(mapping_t *m)
     const bool mismatch = is_on(m, EFFECT_spring_mismatch);
     const parameter_t phases[] = {PARAMETER_resistance_martensite_ohm,
                                   PARAMETER_resistance_austenite_ohm};
-    /* The chip's resistance does not depend on temperature: taken where it matters, between the
-     * phases. */
-    const double middle_c =
-        0.5 * (array_value(m, "martensite_start_c") + array_value(m, "austenite_start_c"));
-    const double warm =
-        phase ? 1.0 + array_value(m, "resistance_coefficient_per_k") * (middle_c - 20.0) : 1.0;
     double worst = 0.0;
     for (size_t k = 0; k < 2; k++) {
         const parameter_row_t row = parameter_row((uint16_t)phases[k]);
+        const char *const name = phase ? row.name : "resistance_ohm";
         double ohm[PLANT_MAX_SPRINGS], spread = 0.0;
         for (int i = 0; i < m->springs; i++) {
-            ohm[i] = warm * (mismatch ? value_of(m, "resistance_scale", i) : 1.0) *
-                     value_of(m, phase ? row.name : "resistance_ohm", i);
+            ohm[i] = (mismatch ? value_of(m, "resistance_scale", i) : 1.0) * value_of(m, name, i);
         }
-        put(m, phases[k], 0, mean_of(m, ohm, &spread));
+        put_from(m, name, phases[k], 0, mean_of(m, ohm, &spread));
         worst = fmax(worst, spread);
     }
     if (worst > SAME && !m->failed) {
@@ -314,8 +316,8 @@ chip_mapping_status_t chip_mapping_from_plant(const plant_t *plant,
     map_resistance(&m);
     map_rows_of_the_same_name(&m);
     if (is_on(&m, EFFECT_radiation)) {
-        put(&m, PARAMETER_radiating_area_mm2, 0,
-            array_value(&m, "emissivity") * array_value(&m, "surface_mm2"));
+        put_from(&m, "emissivity x surface_mm2", PARAMETER_radiating_area_mm2, 0,
+                 array_value(&m, "emissivity") * array_value(&m, "surface_mm2"));
     }
     if (m.failed) {
         return CHIP_MAPPING_ERROR_RANGE;
