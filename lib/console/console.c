@@ -399,8 +399,7 @@ static console_error_t word_model(console_t *console, const arguments_t *argumen
     if (any_spring_on(console)) {
         return CONSOLE_ERROR_SPRINGS_ON;
     }
-    thermal_model_reset(&console->controller->model, console->status->ambient_c7);
-    thermal_model_set_ambient(&console->controller->model, console->status->ambient_c7);
+    controller_set_temperature(console->controller, console->status->ambient_c7);
     return CONSOLE_OK;
 }
 

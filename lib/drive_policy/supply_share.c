@@ -1,11 +1,5 @@
 #include "supply_share.h"
 
-#if defined(__AVR__) && !defined(__clang__)
-#define HOT __attribute__((noinline, optimize("O2"))) /* a third of its cycles */
-#else
-#define HOT
-#endif
-
 void supply_queue_add(supply_queue_t *queue, uint8_t spring)
 {
     for (uint8_t k = 0; k < queue->count; k++) {
@@ -29,8 +23,8 @@ void supply_queue_remove(supply_queue_t *queue, uint8_t spring)
     queue->count = kept;
 }
 
-HOT uint16_t supply_share_cap_ma(const uint16_t target_ma[], uint8_t springs, uint16_t budget_ma,
-                                 uint16_t cap_ma)
+uint16_t supply_share_cap_ma(const uint16_t target_ma[], uint8_t springs, uint16_t budget_ma,
+                             uint16_t cap_ma)
 {
     for (uint8_t pass = 0; pass < SUPPLY_SHARE_PASSES; pass++) {
         uint16_t left_ma = budget_ma;

@@ -394,7 +394,7 @@ static void rotating_the_pattern_rotates_the_temperatures(void)
     }
 }
 
-/* 1 x 3 and 3 x 1 are one array seen from two sides, and the frame lies the other way */
+/* 1 x 3 and 3 x 1 are one array seen from two sides */
 static void a_row_behaves_as_a_column(void)
 {
     thermal_model_state_t state[2];
@@ -731,41 +731,6 @@ static void corrections_add_and_saturate(void)
     TEST_ASSERT_TRUE(thermal_model_is_consistent(&model));
 }
 
-/* Through whole loops with powers at random: what begin_step leaves is followed in any order, in
- * part by the next step itself; in between the state is one that the model accepts. */
-static void step_in_portions_is_the_same_step(void)
-{
-    start();
-    thermal_model_t portions = model;
-    uint32_t left = 0;
-    for (uint32_t n = 0; n < 20000; n++) {
-        for (uint8_t k = 0; k < 9; k++) {
-            power_uw[k] = (n / 600u + k) % 2u != 0 ? random_bits() % 4000000u : 0;
-        }
-        thermal_model_step(&model, power_uw);
-        thermal_model_begin_step(&portions, power_uw);
-        for (uint32_t turn = random_bits() % 6u; turn > 0; turn--) {
-            thermal_model_t copy;
-            thermal_model_state_t state;
-            TEST_ASSERT_TRUE(thermal_model_is_consistent(&portions));
-            thermal_model_get_state(&portions, &state);
-            copy = portions;
-            TEST_ASSERT_TRUE(thermal_model_set_state(&copy, &state));
-            if (turn % 2u != 0) {
-                thermal_model_settle(&portions, (uint8_t)(random_bits() % 9u));
-            } else {
-                thermal_model_follow_phases(&portions, (uint8_t)(random_bits() % 4u));
-            }
-        }
-        thermal_model_t whole = portions;
-        thermal_model_follow_phases(&whole, UINT8_MAX);
-        TEST_ASSERT_EQUAL_MEMORY(&model.state, &whole.state, sizeof model.state);
-        TEST_ASSERT_EQUAL_MEMORY(model.lead, whole.lead, sizeof model.lead);
-        left += memcmp(&portions.state, &whole.state, sizeof whole.state) != 0;
-    }
-    TEST_ASSERT_GREATER_THAN(100, left); /* it was not all done at once */
-}
-
 /* Nine springs, all driven, until the centre is half austenite. */
 static void heat_half_way(void)
 {
@@ -804,21 +769,6 @@ static void heat_added_at_once_is_kept_and_the_phase_follows(void)
     TEST_ASSERT_TRUE(thermal_model_is_consistent(&model));
 }
 
-/* A correction between the portions is one after the step. */
-static void correction_in_between_comes_after_the_step(void)
-{
-    heat_half_way();
-    thermal_model_t portions = model;
-    thermal_model_step(&model, power_uw);
-    thermal_model_begin_step(&portions, power_uw);
-    TEST_ASSERT_LESS_THAN(thermal_model_temperature_c7(&model, 4),
-                          thermal_model_temperature_c7(&portions, 4));
-    thermal_model_add_temperature(&model, 4, 40);
-    thermal_model_add_temperature(&portions, 4, 40);
-    thermal_model_follow_phases(&portions, UINT8_MAX);
-    TEST_ASSERT_EQUAL_MEMORY(&model.state, &portions.state, sizeof model.state);
-}
-
 int main(void)
 {
     UNITY_BEGIN();
@@ -850,8 +800,6 @@ int main(void)
     RUN_TEST(power_to_hold_holds);
     RUN_TEST(state_survives_and_garbage_does_not_enter);
     RUN_TEST(corrections_add_and_saturate);
-    RUN_TEST(step_in_portions_is_the_same_step);
-    RUN_TEST(correction_in_between_comes_after_the_step);
     RUN_TEST(heat_added_at_once_is_kept_and_the_phase_follows);
     return UNITY_END();
 }
