@@ -464,13 +464,24 @@ uint16_t thermal_model_austenite(const thermal_model_t *model, uint8_t spring)
     return austenite_of(model, &points, &model->state.spring[spring]);
 }
 
+/* R (1 + rise (T - 20 degC)); 537 / 2^36 is 1e-6 / 128 to 0.03 %. */
+static int64_t warmed_uohm(uint32_t at_20_uohm, int16_t rise_ppm_per_k, int16_t temperature_c7)
+{
+    const int64_t change = (int64_t)at_20_uohm * rise_ppm_per_k * (temperature_c7 - 20 * 128);
+    return at_20_uohm + ((change * 537) >> 36);
+}
+
 uint32_t thermal_model_resistance_uohm_at(const thermal_model_t *model, uint16_t austenite,
                                           int16_t temperature_c7)
 {
-    (void)temperature_c7;
-    const int64_t martensite_uohm = model->parameters.resistance_martensite_uohm;
-    const int64_t austenite_uohm = model->parameters.resistance_austenite_uohm;
-    return (uint32_t)(martensite_uohm + (((austenite_uohm - martensite_uohm) * austenite) >> 15));
+    const thermal_model_parameters_t *p = &model->parameters;
+    const int64_t martensite_uohm = warmed_uohm(
+        p->resistance_martensite_uohm, p->resistance_martensite_rise_ppm_per_k, temperature_c7);
+    const int64_t austenite_uohm = warmed_uohm(
+        p->resistance_austenite_uohm, p->resistance_austenite_rise_ppm_per_k, temperature_c7);
+    const int64_t mixed_uohm =
+        martensite_uohm + (((austenite_uohm - martensite_uohm) * austenite) >> 15);
+    return mixed_uohm > 1 ? (uint32_t)mixed_uohm : 1u;
 }
 
 uint32_t thermal_model_resistance_uohm(const thermal_model_t *model, uint8_t spring)

@@ -13,6 +13,7 @@
 #define CAPACITY_UJ_PER_MS  132u          /* least: STEP_GAIN_UJ_PER_MS over this fits 31 bits */
 #define WIDTH_MIN_CC        200
 #define WIDTH_MAX_CC        10000
+#define LOWEST_CC           (-3000)
 #define HIGHEST_CC          20000
 
 static uint32_t larger(uint32_t a, uint32_t b)
@@ -124,6 +125,13 @@ static refusal_t check_phase(const thermal_model_parameters_t *p)
     if (least_width_cc > start_m - finish_m || least_width_cc > finish_a - start_a ||
         (int16_t)latent_cc > HIGHEST_CC - finish_a) {
         REFUSE(RANGE, latent_heat_j);
+    }
+    for (uint8_t i = 0; i < (uint8_t)(p->rows * p->columns); i++) {
+        const int16_t shift_cc = p->transformation_shift_cc[i];
+        if (finish_m + shift_cc < LOWEST_CC ||
+            finish_a + shift_cc + (int16_t)latent_cc > HIGHEST_CC) {
+            REFUSE(RANGE, transformation_shift_k);
+        }
     }
     return 0;
 }
@@ -260,6 +268,7 @@ static void derive_spring(thermal_model_t *model, uint8_t i)
     spring->row = (uint8_t)(i / p->columns);
     spring->column = (uint8_t)(i % p->columns);
     spring->upstream = upstream_of(p, spring->row, spring->column);
+    spring->transformation_shift_c7 = fixed_point_c7_from_cc(p->transformation_shift_cc[i]);
     spring->step_gain =
         (int32_t)((STEP_GAIN_UJ_PER_MS * p->step_ms + capacity_uj_per_k / 2u) / capacity_uj_per_k);
     spring->loss_natural_uw_per_k = (uint16_t)scaled_loss(p->loss_uw_per_k, scale);

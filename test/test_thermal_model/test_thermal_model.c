@@ -289,6 +289,42 @@ static void latent_heat_delays_by_its_energy(void)
     TEST_ASSERT_UINT32_WITHIN(3, 321, steps);
 }
 
+static void resistance_of_each_phase_rises_from_20_degrees(void)
+{
+    parameters.resistance_martensite_rise_ppm_per_k = 1500;
+    parameters.resistance_austenite_rise_ppm_per_k = -300;
+    start();
+    TEST_ASSERT_EQUAL_UINT32(175000, thermal_model_resistance_uohm_at(&model, 0, 20 * 128));
+    TEST_ASSERT_UINT32_WITHIN(20, 190750, thermal_model_resistance_uohm_at(&model, 0, 80 * 128));
+    TEST_ASSERT_UINT32_WITHIN(20, 159250, thermal_model_resistance_uohm_at(&model, 0, -40 * 128));
+    const uint16_t all = THERMAL_MODEL_AUSTENITE_FULL;
+    TEST_ASSERT_UINT32_WITHIN(20, 215058, thermal_model_resistance_uohm_at(&model, all, 80 * 128));
+    TEST_ASSERT_UINT32_WITHIN(20, 202904,
+                              thermal_model_resistance_uohm_at(&model, all / 2, 80 * 128));
+    thermal_model_set_temperature(&model, 0, 60 * 128);
+    TEST_ASSERT_UINT32_WITHIN(20, 185500, thermal_model_resistance_uohm(&model, 0));
+    parameters.resistance_martensite_uohm = 16000000;
+    parameters.resistance_martensite_rise_ppm_per_k = 5000;
+    start();
+    TEST_ASSERT_UINT32_WITHIN(8000, 31600000,
+                              thermal_model_resistance_uohm_at(&model, 0, 215 * 128));
+}
+
+/* A spring whose transformation is shifted transforms so much later, and its neighbour does not. */
+static void a_shift_moves_one_springs_transformation(void)
+{
+    parameters.transformation_shift_cc[0] = 800;
+    start();
+    thermal_model_set_temperature(&model, 0, 96 * 128);
+    thermal_model_set_temperature(&model, 1, 96 * 128);
+    thermal_model_set_temperature(&model, 2, 93 * 128);
+    TEST_ASSERT_EQUAL_UINT16(0, thermal_model_austenite(&model, 0));
+    TEST_ASSERT_GREATER_THAN_UINT16(20000, thermal_model_austenite(&model, 1));
+    thermal_model_set_temperature(&model, 0, 101 * 128);
+    TEST_ASSERT_UINT16_WITHIN(300, thermal_model_austenite(&model, 2),
+                              thermal_model_austenite(&model, 0));
+}
+
 static void resistance_follows_phase_with_either_sign(void)
 {
     start();
@@ -645,6 +681,11 @@ static void what_does_not_fit_together_is_refused_by_name(void)
     REFUSED(OVERFLOW, plate_coupling_w_per_k, plate_coupling_uw_per_k, 64000);
     REFUSED(RANGE, wake_w_per_k, wake_uw_per_k, 11301);
     REFUSED(RANGE, loss_scale, loss_scale_permille[8], 0);
+    parameters.martensite_finish_cc = 500;
+    parameters.martensite_start_cc = 7000;
+    REFUSED(RANGE, transformation_shift_k, transformation_shift_cc[8], -3501);
+    parameters.austenite_finish_cc = 13200;
+    REFUSED(RANGE, transformation_shift_k, transformation_shift_cc[3], 4000);
     parameters.heat_capacity_mj_per_k = 40;
     parameters.latent_heat_mj = 0;
     parameters.loss_uw_per_k = 60000;
@@ -787,6 +828,8 @@ int main(void)
     RUN_TEST(stepping_takes_the_same_loop_as_setting);
     RUN_TEST(latent_heat_delays_by_its_energy);
     RUN_TEST(resistance_follows_phase_with_either_sign);
+    RUN_TEST(resistance_of_each_phase_rises_from_20_degrees);
+    RUN_TEST(a_shift_moves_one_springs_transformation);
     RUN_TEST(no_heat_from_nothing);
     RUN_TEST(closed_array_keeps_its_heat);
     RUN_TEST(rotating_the_pattern_rotates_the_temperatures);
