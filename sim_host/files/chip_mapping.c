@@ -224,12 +224,13 @@ static void map_resistance(mapping_t *m, thermal_model_parameters_t *p)
      * phases. */
     const double middle_c =
         0.5 * (array_value(m, "martensite_start_c") + array_value(m, "austenite_start_c"));
-    const double warm =
-        phase ? 1.0 + array_value(m, "resistance_coefficient_per_k") * (middle_c - 20.0) : 1.0;
+    const double above_k = is_on(m, "resistance_temperature") ? middle_c - 20.0 : 0.0;
+    const double martensite_rise = array_value(m, "resistance_martensite_rise_per_k") * above_k;
+    const double austenite_rise = array_value(m, "resistance_austenite_rise_per_k") * above_k;
     for (int i = 0; i < m->springs; i++) {
-        const double scale = warm * (mismatch ? value_of(m, "resistance_scale", i) : 1.0);
-        martensite[i] = scale * value_of(m, martensite_name, i);
-        austenite[i] = scale * value_of(m, austenite_name, i);
+        const double scale = mismatch ? value_of(m, "resistance_scale", i) : 1.0;
+        martensite[i] = scale * (1.0 + martensite_rise) * value_of(m, martensite_name, i);
+        austenite[i] = scale * (1.0 + austenite_rise) * value_of(m, austenite_name, i);
     }
     double spread = 0.0, other_spread = 0.0;
     p->resistance_martensite_uohm = (uint32_t)fitted(

@@ -114,7 +114,9 @@ static void effects_of_the_chip_are_switched_on(void)
 static void resistance_is_taken_between_the_phases(void)
 {
     on("resistance_phase");
-    set("resistance_coefficient_per_k", 0.001);
+    on("resistance_temperature");
+    set("resistance_martensite_rise_per_k", 0.001);
+    set("resistance_austenite_rise_per_k", 0.001);
     TEST_ASSERT_EQUAL(CHIP_MAPPING_OK, map());
     TEST_ASSERT_EQUAL(186025, chip.resistance_martensite_uohm); /* 0.175 (1 + 0.001 x 63) */
     TEST_ASSERT_EQUAL(232797, chip.resistance_austenite_uohm);
