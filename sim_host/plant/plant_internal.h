@@ -21,30 +21,10 @@ enum parameter_id {
     PARAMETER_COUNT
 };
 
-#define PLANT_EFFECTS(X)                                                                           \
-    X(radiation)                                                                                   \
-    X(natural_convection)                                                                          \
-    X(latent_heat)                                                                                 \
-    X(resistance_phase)                                                                            \
-    X(shared_air)                                                                                  \
-    X(plate_conduction)                                                                            \
-    X(fan_wake)                                                                                    \
-    X(edge_loss)                                                                                   \
-    X(spring_mismatch)                                                                             \
-    X(supply_sag)                                                                                  \
-    X(ambient_drift)                                                                               \
-    X(sensor_lag)                                                                                  \
-    X(sensor_gain)                                                                                 \
-    X(optical_mixing)                                                                              \
-    X(resistance_temperature)                                                                      \
-    X(transformation_shift)                                                                        \
-    X(contact_resistance)
-
 enum effect_id {
-#define X(name) E_##name,
-    PLANT_EFFECTS(X)
-#undef X
-        EFFECT_COUNT
+#define EFFECT(name, ...) E_##name,
+#include "effects.def"
+    EFFECT_COUNT
 };
 
 /* ------------------------------------------------------------------- state */

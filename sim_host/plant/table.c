@@ -5,9 +5,8 @@
 #include <string.h>
 
 static const char *const effects[EFFECT_COUNT] = {
-#define X(name) #name,
-    PLANT_EFFECTS(X)
-#undef X
+#define EFFECT(name, ...) #name,
+#include "effects.def"
 };
 
 #define ONE    false
@@ -16,8 +15,14 @@ static const char *const effects[EFFECT_COUNT] = {
 
 static const plant_parameter_t parameters[PARAMETER_COUNT] = {
 #define PLANT(name, unit, count, minimum, maximum, standard, effect, sentence)                     \
-    {#name,   unit, E_##effect == E_none ? NULL : #effect, sentence, standard, minimum,            \
-     maximum, count},
+    {#name,                                                                                        \
+     sizeof(unit) > 1 ? (unit) : "1",                                                              \
+     E_##effect == E_none ? NULL : #effect,                                                        \
+     sentence,                                                                                     \
+     standard,                                                                                     \
+     minimum,                                                                                      \
+     maximum,                                                                                      \
+     count},
 #include "plant.def"
 };
 

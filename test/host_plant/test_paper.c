@@ -22,8 +22,6 @@ constant_current_from_cold_never_transforms_at_1_5_a_but_runs_past_at_a_little_m
 {
     on("latent_heat");
     on("resistance_phase");
-    set("orthogonal_w_per_k", 0.000586); /* 4 mm */
-    set("diagonal_w_per_k", 0.000293);
     drive(0, PLANT_DRIVE_CURRENT, 1.5); /* one corner alone: its neighbours cool it */
     settle();
     TEST_ASSERT_DOUBLE_WITHIN(1.0, 75.0, at(0));
