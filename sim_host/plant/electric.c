@@ -4,22 +4,39 @@
 
 #include "electrics.h"
 
-static double resistance_at(const plant_t *p, int i, double t, double austenite)
+/* A straight line through 20 degC, stopped before a steep one crosses zero. */
+static double warmed(double rise_per_k, double t)
 {
-    if (!p->on[E_resistance_phase])
-        return p->value[P_resistance_ohm][i] * p->resistance_scale[i];
-    const double martensite_ohm = p->value[P_resistance_martensite_ohm][i];
-    const double austenite_ohm = p->value[P_resistance_austenite_ohm][i];
-    const double warm = 1.0 + p->value[P_resistance_coefficient_per_k][0] * (t - 20.0);
-    return (martensite_ohm + (austenite_ohm - martensite_ohm) * austenite) * fmax(warm, 0.05) *
-           p->resistance_scale[i];
+    return fmax(1.0 + rise_per_k * (t - 20.0), 0.05);
 }
 
-/* Between the terminals, faults included; an open spring is left to its callers. */
+static double resistance_at(const plant_t *p, int i, double t, double austenite)
+{
+    const bool phase = p->on[E_resistance_phase];
+    double martensite_ohm = p->value[phase ? P_resistance_martensite_ohm : P_resistance_ohm][i];
+    double austenite_ohm = p->value[phase ? P_resistance_austenite_ohm : P_resistance_ohm][i];
+    if (p->on[E_resistance_temperature]) {
+        martensite_ohm *= warmed(scalar(p, P_resistance_martensite_rise_per_k), t);
+        austenite_ohm *= warmed(scalar(p, P_resistance_austenite_rise_per_k), t);
+    }
+    return (martensite_ohm + (austenite_ohm - martensite_ohm) * austenite) * p->resistance_scale[i];
+}
+
+/* Between the terminals, contact and faults included; an open spring is left to its callers. */
 static double terminal_ohm(const plant_t *p, int i, double t, double austenite)
 {
     return p->fault[i] == PLANT_FAULT_SHORT ? ELECTRICS_SHORT_OHM
-                                            : resistance_at(p, i, t, austenite);
+                                            : resistance_at(p, i, t, austenite) + p->contact_ohm[i];
+}
+
+/* Of the power at its terminals, what heats spring i: the rest heats its contact, which is at the
+ * mount and warms no node. */
+static double own_share(const plant_t *p, int i, double t, double austenite)
+{
+    if (p->contact_ohm[i] == 0.0)
+        return 1.0;
+    const double own_ohm = resistance_at(p, i, t, austenite);
+    return own_ohm / (own_ohm + p->contact_ohm[i]);
 }
 
 static double command_w(const plant_t *p, int i)
@@ -81,7 +98,7 @@ static double heating(const plant_t *p, int i, double supply_v, double t, double
         return 0.0;
     switch (p->mode[i]) {
     case PLANT_DRIVE_POWER:
-        return p->quantity[i];
+        return p->quantity[i] * own_share(p, i, t, austenite);
     case PLANT_DRIVE_CURRENT:
         return p->quantity[i] * p->quantity[i] * resistance_at(p, i, t, austenite);
     case PLANT_DRIVE_DUTY: {
@@ -114,17 +131,19 @@ void plant_electric_find(plant_t *p, const double *t, const double *austenite)
 
 void plant_electric_prepare(plant_t *p)
 {
-    for (int i = 0; i < p->n; i++)
+    for (int i = 0; i < p->n; i++) {
         p->resistance_scale[i] = p->on[E_spring_mismatch] ? p->value[P_resistance_scale][i] : 1.0;
+        p->contact_ohm[i] = p->on[E_contact_resistance] ? p->value[P_contact_ohm][i] : 0.0;
+    }
 }
 
 void plant_electric_prepare_inputs(plant_t *p)
 {
     p->power_varies = false;
     for (int i = 0; i < p->n; i++)
-        if (p->on[E_resistance_phase] &&
-            (p->mode[i] == PLANT_DRIVE_CURRENT || p->mode[i] == PLANT_DRIVE_DUTY))
-            p->power_varies = true;
+        if (p->mode[i] == PLANT_DRIVE_CURRENT || p->mode[i] == PLANT_DRIVE_DUTY ||
+            (p->mode[i] == PLANT_DRIVE_POWER && p->contact_ohm[i] > 0.0))
+            p->power_varies = p->on[E_resistance_phase] || p->on[E_resistance_temperature];
     plant_electric_find(p, p->temperature_c, p->austenite);
 }
 
@@ -136,6 +155,11 @@ double plant_supply_v(const plant_t *p)
 double plant_resistance_ohm(const plant_t *p, int spring)
 {
     return resistance_at(p, spring, p->temperature_c[spring], p->austenite[spring]);
+}
+
+double plant_terminal_ohm(const plant_t *p, int spring)
+{
+    return terminal_ohm(p, spring, p->temperature_c[spring], p->austenite[spring]);
 }
 
 double plant_power_w(const plant_t *p, int spring)
@@ -162,6 +186,5 @@ double plant_current_a(const plant_t *p, int spring)
 
 double plant_voltage_v(const plant_t *p, int spring)
 {
-    return plant_current_a(p, spring) *
-           terminal_ohm(p, spring, p->temperature_c[spring], p->austenite[spring]);
+    return plant_current_a(p, spring) * plant_terminal_ohm(p, spring);
 }

@@ -1,6 +1,7 @@
 #include "plant_internal.h"
 
 #include <math.h>
+#include <string.h>
 
 /* Liang and Rogers, J. Intell. Mater. Syst. Struct. 1 (1990) 207, with the turning point as memory:
  * a branch starts where the opposite transformation last ended, so that a loop that transforms
@@ -20,30 +21,28 @@ static double smooth_rise(double t, double low, double high, double *slope)
     return 0.5 - 0.5 * cos(angle);
 }
 
-static double rising(const plant_t *p, double t, double *slope)
+static double rising(const plant_t *p, int i, double t, double *slope)
 {
-    return smooth_rise(t, p->value[P_austenite_start_c][0], p->value[P_austenite_finish_c][0],
-                       slope);
+    return smooth_rise(t, p->points[i].austenite_start_c, p->points[i].austenite_finish_c, slope);
 }
 
-static double falling(const plant_t *p, double t, double *slope)
+static double falling(const plant_t *p, int i, double t, double *slope)
 {
-    return smooth_rise(t, p->value[P_martensite_finish_c][0], p->value[P_martensite_start_c][0],
-                       slope);
+    return smooth_rise(t, p->points[i].martensite_finish_c, p->points[i].martensite_start_c, slope);
 }
 
 double plant_phase_fraction(const plant_t *p, int i, double t, double *slope)
 {
     *slope = 0.0;
     if (t > p->heat_from_c[i]) {
-        const double rise = rising(p, t, slope);
+        const double rise = rising(p, i, t, slope);
         *slope *= 1.0 - p->heat_start[i];
         const double fraction = p->heat_start[i] + (1.0 - p->heat_start[i]) * rise;
         if (fraction >= p->austenite[i])
             return fraction;
         *slope = 0.0; /* rounding at the turning point */
     } else if (t < p->cool_from_c[i]) {
-        const double fall = falling(p, t, slope);
+        const double fall = falling(p, i, t, slope);
         *slope *= p->cool_start[i];
         const double fraction = p->cool_start[i] * fall;
         if (fraction <= p->austenite[i])
@@ -56,17 +55,23 @@ double plant_phase_fraction(const plant_t *p, int i, double t, double *slope)
 /* Where heating and cooling transform next, seen from t. */
 static void set_thresholds(plant_t *p, int i, double t)
 {
-    p->heat_from_c[i] =
-        p->austenite[i] < 1.0 ? fmax(t, p->value[P_austenite_start_c][0]) : HUGE_VAL;
+    p->heat_from_c[i] = p->austenite[i] < 1.0 ? fmax(t, p->points[i].austenite_start_c) : HUGE_VAL;
     p->cool_from_c[i] =
-        p->austenite[i] > 0.0 ? fmin(t, p->value[P_martensite_start_c][0]) : -HUGE_VAL;
+        p->austenite[i] > 0.0 ? fmin(t, p->points[i].martensite_start_c) : -HUGE_VAL;
+}
+
+/* The present fraction, as far as the outer loop allows it at t. */
+static double allowed(const plant_t *p, int i, double t)
+{
+    double slope;
+    return fmin(fmax(p->austenite[i], rising(p, i, t, &slope)), falling(p, i, t, &slope));
 }
 
 void plant_phase_anchor(plant_t *p, int i)
 {
     double slope;
     const double t = p->temperature_c[i];
-    const double rise = rising(p, t, &slope), fall = falling(p, t, &slope);
+    const double rise = rising(p, i, t, &slope), fall = falling(p, i, t, &slope);
     p->austenite[i] = fmin(fmax(p->austenite[i], rise), fall);
     p->heat_start[i] = rise < 1.0 ? (p->austenite[i] - rise) / (1.0 - rise) : 0.0;
     p->cool_start[i] = fall > 0.0 ? p->austenite[i] / fall : 0.0;
@@ -84,10 +89,10 @@ void plant_phase_move(plant_t *p, int i, double t)
     p->austenite[i] = after;
     set_thresholds(p, i, t);
     if (after > before) {
-        const double fall = falling(p, t, &slope);
+        const double fall = falling(p, i, t, &slope);
         p->cool_start[i] = fall > 0.0 ? after / fall : 0.0;
     } else {
-        const double rise = rising(p, t, &slope);
+        const double rise = rising(p, i, t, &slope);
         p->heat_start[i] = rise < 1.0 ? (after - rise) / (1.0 - rise) : 0.0;
     }
 }
@@ -153,14 +158,48 @@ plant_status_t plant_check(const plant_t *p, const char **message)
     return text ? PLANT_ERROR_RANGE : PLANT_OK;
 }
 
+static points_t points_of(const plant_t *p, int i)
+{
+    const double shift =
+        p->on[E_transformation_shift] ? p->value[P_transformation_shift_k][i] : 0.0;
+    return (points_t){
+        scalar(p, P_martensite_finish_c) + shift, scalar(p, P_martensite_start_c) + shift,
+        scalar(p, P_austenite_start_c) + shift, scalar(p, P_austenite_finish_c) + shift};
+}
+
+/* The points have moved: where the outer loop no longer allows the fraction at this temperature,
+ * the spring transforms until temperature and fraction agree, and takes up no heat in all. */
+static void follow_points(plant_t *p, int i)
+{
+    const double t0 = p->temperature_c[i], x0 = p->austenite[i], c = p->capacity[i];
+    if (allowed(p, i, t0) != x0) {
+        double low = t0 - p->latent_j[i] / c, high = t0 + p->latent_cooling_j[i] / c;
+        for (int k = 0; k < 60; k++) { /* to the last bit */
+            const double t = 0.5 * (low + high);
+            const double heat_j = c * (t - t0) + plant_phase_latent_j(p, i, allowed(p, i, t) - x0);
+            *(heat_j > 0.0 ? &high : &low) = t;
+        }
+        p->temperature_c[i] = 0.5 * (low + high);
+    }
+    plant_phase_anchor(p, i);
+    p->stored_j +=
+        c * (p->temperature_c[i] - t0) + plant_phase_latent_j(p, i, p->austenite[i] - x0);
+}
+
 void plant_phase_prepare(plant_t *p)
 {
-    const double *heavier = p->value[P_heat_capacity_scale];
     for (int i = 0; i < p->n; i++) {
         p->latent_j[i] = p->on[E_latent_heat] ? p->value[P_latent_heat_j][i] : 0.0;
         if (p->on[E_spring_mismatch])
-            p->latent_j[i] *= heavier[i];
+            p->latent_j[i] *= p->value[P_heat_capacity_scale][i];
         p->latent_cooling_j[i] = p->latent_j[i] * scalar(p, P_latent_cooling_ratio);
-        plant_phase_anchor(p, i);
+        const points_t points = points_of(p, i);
+        const bool moved = memcmp(&points, &p->points[i], sizeof points) != 0;
+        p->points[i] = points;
+        if (p->restarted || p->time_s == 0.0) /* a starting state */
+            plant_phase_anchor(p, i);
+        else if (moved)
+            follow_points(p, i);
     }
+    p->restarted = false;
 }

@@ -64,7 +64,7 @@ void plant_reset(plant_t *p)
         p->sensor_c[i] = ambient;
         p->austenite[i] = 0.0;
     }
-    p->parameters_changed = true; /* lays the branches anew */
+    p->parameters_changed = p->restarted = true;
     if (plant_solver_prepare(p) == PLANT_OK) {
         plant_solver_hold(p);
         p->input_j = p->output_j = p->stored_j = 0.0;

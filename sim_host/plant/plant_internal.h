@@ -35,6 +35,11 @@ typedef struct {
     double in_w, out_w;
 } flows_t;
 
+/* Transformation temperatures of one spring, degC. */
+typedef struct {
+    double martensite_finish_c, martensite_start_c, austenite_start_c, austenite_finish_c;
+} points_t;
+
 struct plant {
     int rows, columns, n;
     double value[PARAMETER_COUNT][MAX_SPRINGS];
@@ -45,6 +50,7 @@ struct plant {
     double fan;
     /* What the setters leave for plant_solver_prepare. */
     bool parameters_changed, inputs_changed;
+    bool restarted; /* the branches are to be laid anew, whatever was */
 
     double time_s;
     double temperature_c[MAX_SPRINGS + 2]; /* springs, air, plate */
@@ -59,10 +65,12 @@ struct plant {
     double step_s; /* the last good step: where the next one starts */
 
     /* derived by phase */
+    points_t points[MAX_SPRINGS];
     double latent_j[MAX_SPRINGS], latent_cooling_j[MAX_SPRINGS];
 
     /* derived by electric */
     double resistance_scale[MAX_SPRINGS];
+    double contact_ohm[MAX_SPRINGS]; /* 0 without the effect */
     double power_w[MAX_SPRINGS];
     double supply_v;
     bool power_varies; /* with the state: must be found anew at each stage */
@@ -100,7 +108,9 @@ static inline bool within(double value, double low, double high)
 
 /* ------------------------------------------------------------------- phase */
 
-/* After a change of parameters or effects, once the capacities are known. */
+/* After a change of parameters or effects, once the capacities are known. Where a spring's
+ * transformation temperatures moved during a run (a load), its phase follows them at constant
+ * enthalpy: what it transforms warms or cools it. */
 void plant_phase_prepare(plant_t *p);
 /* Fraction of spring i at t, coming monotonously from the last accepted state; *slope is its
  * derivative. */
