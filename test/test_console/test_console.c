@@ -314,6 +314,43 @@ static void saved_settings_are_there_after_a_restart(void)
     TEST_ASSERT_EQUAL_UINT16(1500, settings.controller.policy.open_current_ma);
 }
 
+static void version_says_what_became_of_the_stored_settings(void)
+{
+    static const struct {
+        settings_loaded_t loaded;
+        const char *text;
+    } cases[] = {
+        {{RECORD_LOADED, 0, 0, 0}, "settings loaded\r"},
+        {{RECORD_LOADED, 4, 1, 71},
+         "settings loaded; 4 not stored, at defaults; 1 dropped, first id 71\r"},
+        {{RECORD_LOADED_OTHER, 0, 0, 0}, "the other copy is damaged or was cut short\r"},
+        {{RECORD_EMPTY, PARAMETER_COUNT, 0, 0}, "settings none saved, defaults\r"},
+        {{RECORD_DAMAGED, PARAMETER_COUNT, 0, 0}, "settings stored ones damaged, defaults\r"},
+        {{RECORD_FOREIGN, PARAMETER_COUNT, 0, 0}, "settings stored by another version, defaults\r"},
+    };
+    for (unsigned k = 0; k < sizeof cases / sizeof cases[0]; k++) {
+        status.loaded = cases[k].loaded;
+        ask("version");
+        TEST_ASSERT_NOT_NULL_MESSAGE(strstr(said, cases[k].text), said);
+    }
+}
+
+static void selftest_gives_the_policy_back_also_when_it_is_stopped(void)
+{
+    expect_ok("policy precompensate");
+    expect_ok("selftest");
+    TEST_ASSERT_EQUAL(DRIVE_POLICY_PRECOMPENSATE, controller_policy(&controller));
+    for (const char *octet = "selftest\n"; *octet != '\0'; octet++) {
+        console_receive(&console, (uint8_t)*octet);
+    }
+    console_service(&console);
+    TEST_ASSERT_EQUAL(DRIVE_POLICY_OPEN, controller_policy(&controller));
+    TEST_ASSERT_EQUAL_UINT16(200, controller_level_permille(&controller, 0));
+    console_stop(&console);
+    TEST_ASSERT_EQUAL(DRIVE_POLICY_PRECOMPENSATE, controller_policy(&controller));
+    TEST_ASSERT_EQUAL_UINT16(0, controller_level_permille(&controller, 0));
+}
+
 static void stop_drops_the_line_that_had_begun(void)
 {
     said_length = 0;
@@ -476,6 +513,8 @@ int main(void)
     RUN_TEST(settings_that_do_not_fit_wait_until_they_do);
     RUN_TEST(a_listing_pasted_into_another_board_makes_it_the_same);
     RUN_TEST(saved_settings_are_there_after_a_restart);
+    RUN_TEST(version_says_what_became_of_the_stored_settings);
+    RUN_TEST(selftest_gives_the_policy_back_also_when_it_is_stopped);
     RUN_TEST(stop_drops_the_line_that_had_begun);
     RUN_TEST(stop_ends_a_long_answer);
     RUN_TEST(empty_lines_are_not_answered);
