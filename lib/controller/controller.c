@@ -3,6 +3,8 @@
 #include <stddef.h>
 #include <string.h>
 
+#include "invariant.h"
+
 #define MODEL_STEP_MS   100u
 #define TICKS_PER_STEP  (MODEL_STEP_MS / CONTROLLER_TICK_MS)
 #define CURRENT_MOST_MA 4095 /* the sensor ends at 3200: a step's sum of power fits 32 bits */
@@ -127,9 +129,9 @@ static uint16_t flowing_ma(int16_t current_ma)
     return current_ma > CURRENT_MOST_MA ? CURRENT_MOST_MA : (uint16_t)current_ma;
 }
 
-static uint32_t power_uw(int16_t current_ma, int16_t voltage_mv)
+static uint16_t positive_mv(int16_t voltage_mv)
 {
-    return voltage_mv > 0 ? (uint32_t)flowing_ma(current_ma) * (uint16_t)voltage_mv : 0u;
+    return voltage_mv > 0 ? (uint16_t)voltage_mv : 0u;
 }
 
 /* Takes the readings and has them judged; returns the sum of what flows. */
@@ -154,7 +156,8 @@ static uint32_t take_sensors(controller_t *controller, const controller_sensor_t
         }
         sum_ma += flowing_ma(controller->measured_ma[k]);
         controller->power_sum_uw[k] +=
-            power_uw(controller->measured_ma[k], controller->measured_mv[k]);
+            thermal_model_heating_uw(&controller->model, k, flowing_ma(controller->measured_ma[k]),
+                                     positive_mv(controller->measured_mv[k]));
     }
     safety_tick_board(&controller->safety, sum_ma);
     return sum_ma;
@@ -181,6 +184,19 @@ static void step_model(controller_t *controller, const controller_inputs_t *inpu
     memset(controller->power_sum_uw, 0, sizeof controller->power_sum_uw);
 }
 
+static bool targets_are_allowed(const controller_t *controller, const bool allowed[],
+                                const uint16_t target_ma[])
+{
+    uint32_t sum_ma = 0;
+    for (uint8_t k = 0; k < controller->springs; k++) {
+        if (target_ma[k] != 0 && !allowed[k]) {
+            return false;
+        }
+        sum_ma += target_ma[k];
+    }
+    return sum_ma <= controller->safety.parameters.supply_limit_ma;
+}
+
 static void drive(controller_t *controller, const bool valid[], uint32_t sum_ma)
 {
     bool allowed[CONTROLLER_MAX_SPRINGS];
@@ -202,6 +218,7 @@ static void drive(controller_t *controller, const bool valid[], uint32_t sum_ma)
                                   .measured_mv = controller->measured_mv,
                                   .valid = valid};
     drive_policy_tick(&controller->policy, &input, target_ma);
+    INVARIANT(targets_are_allowed(controller, allowed, target_ma));
 
     /* Targets fit the budget; while loops still settle, what flows may not: then none rises
      * further. */
@@ -342,8 +359,8 @@ uint32_t controller_power_uw(const controller_t *controller, uint8_t spring)
     if (controller->current.channel[spring].blind_ticks != 0 && controller->duty[spring] == 0) {
         return 0;
     }
-    const uint32_t measured_uw =
-        power_uw(controller->measured_ma[spring], controller->measured_mv[spring]);
+    const uint32_t measured_uw = (uint32_t)flowing_ma(controller->measured_ma[spring]) *
+                                 positive_mv(controller->measured_mv[spring]);
     return measured_uw < THERMAL_MODEL_HIGHEST_POWER_UW ? measured_uw
                                                         : THERMAL_MODEL_HIGHEST_POWER_UW;
 }

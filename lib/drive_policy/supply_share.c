@@ -1,5 +1,7 @@
 #include "supply_share.h"
 
+#include "invariant.h"
+
 void supply_queue_add(supply_queue_t *queue, uint8_t spring)
 {
     for (uint8_t k = 0; k < queue->count; k++) {
@@ -7,9 +9,8 @@ void supply_queue_add(supply_queue_t *queue, uint8_t spring)
             return;
         }
     }
-    if (queue->count < THERMAL_MODEL_MAX_SPRINGS) {
-        queue->spring[queue->count++] = spring;
-    }
+    INVARIANT(queue->count < THERMAL_MODEL_MAX_SPRINGS); /* each is in it once at most */
+    queue->spring[queue->count++] = spring;
 }
 
 void supply_queue_remove(supply_queue_t *queue, uint8_t spring)

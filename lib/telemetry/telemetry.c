@@ -7,7 +7,6 @@
 #define CUT_STEPS   8u   /* and told again when they differ by more */
 
 /* Kept out of its callers, where that is measured to be smaller. */
-#define OWN __attribute__((noinline))
 
 void telemetry_init(telemetry_t *telemetry)
 {
@@ -47,7 +46,7 @@ static void start_piece(piece_t *piece)
     text_line_start(&piece->line, piece->bytes, PIECE_BYTES);
 }
 
-static OWN void add(piece_t *piece, const char *flash_text)
+static void add(piece_t *piece, const char *flash_text)
 {
     text_add_values(&piece->line, flash_text, piece->values);
 }
@@ -187,8 +186,8 @@ static bool write_spring(telemetry_t *telemetry, const controller_t *controller,
     return !csv || !says; /* of status at most one line a tick */
 }
 
-OWN void telemetry_tick(telemetry_t *telemetry, const controller_t *controller, uint32_t time_ms,
-                        int16_t ambient_c7, const text_output_t *output)
+void telemetry_tick(telemetry_t *telemetry, const controller_t *controller, uint32_t time_ms,
+                    int16_t ambient_c7, const text_output_t *output)
 {
     if (telemetry->format == TELEMETRY_OFF) {
         return;

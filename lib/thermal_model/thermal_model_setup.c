@@ -13,6 +13,7 @@
 #define CAPACITY_UJ_PER_MS  132u          /* least: STEP_GAIN_UJ_PER_MS over this fits 31 bits */
 #define WIDTH_MIN_CC        200
 #define WIDTH_MAX_CC        10000
+#define LOWEST_CC           (-3000)
 #define HIGHEST_CC          20000
 
 static uint32_t larger(uint32_t a, uint32_t b)
@@ -124,6 +125,13 @@ static refusal_t check_phase(const thermal_model_parameters_t *p)
     if (least_width_cc > start_m - finish_m || least_width_cc > finish_a - start_a ||
         (int16_t)latent_cc > HIGHEST_CC - finish_a) {
         REFUSE(RANGE, latent_heat_j);
+    }
+    for (uint8_t i = 0; i < (uint8_t)(p->rows * p->columns); i++) {
+        const int16_t shift_cc = p->transformation_shift_cc[i];
+        if (finish_m + shift_cc < LOWEST_CC ||
+            finish_a + shift_cc > HIGHEST_CC - (int16_t)latent_cc) {
+            REFUSE(RANGE, transformation_shift_k);
+        }
     }
     return 0;
 }
@@ -264,11 +272,19 @@ static void derive_spring(thermal_model_t *model, uint8_t i)
         (int32_t)((STEP_GAIN_UJ_PER_MS * p->step_ms + capacity_uj_per_k / 2u) / capacity_uj_per_k);
     spring->loss_natural_uw_per_k = (uint16_t)scaled_loss(p->loss_uw_per_k, scale);
     spring->loss_fan_uw_per_k = (uint16_t)scaled_loss(p->loss_fan_uw_per_k, scale);
+    spring->transformation_shift_c7 = fixed_point_c7_from_cc(p->transformation_shift_cc[i]);
+    const uint32_t contact_q16 = fixed_point_multiply_divide(p->contact_uohm[i], 65536u, 1000000u);
+    spring->contact_q16 = contact_q16 > UINT16_MAX ? UINT16_MAX : (uint16_t)contact_q16;
     /* 1024 / 1e6 */
     spring->loss_rise_natural =
         (uint16_t)(((uint32_t)spring->loss_natural_uw_per_k * p->loss_rise_ppm_per_k * 16u +
                     7812u) /
                    15625u);
+}
+
+static int32_t resistance_rise(uint32_t resistance_uohm, int16_t ppm_per_k)
+{
+    return (int32_t)((int64_t)resistance_uohm * ppm_per_k * 512 / 1000000); /* 2^16 / 128 / 1e6 */
 }
 
 static void derive(thermal_model_t *model)
@@ -285,6 +301,10 @@ static void derive(thermal_model_t *model)
     points->martensite_start_c7 = fixed_point_c7_from_cc(p->martensite_start_cc);
     points->austenite_start_c7 = fixed_point_c7_from_cc(p->austenite_start_cc);
     points->austenite_finish_c7 = fixed_point_c7_from_cc(p->austenite_finish_cc);
+    model->martensite_rise =
+        resistance_rise(p->resistance_martensite_uohm, p->resistance_martensite_rise_ppm_per_k);
+    model->austenite_rise =
+        resistance_rise(p->resistance_austenite_uohm, p->resistance_austenite_rise_ppm_per_k);
     model->heating_position =
         position_factor((int16_t)(points->austenite_finish_c7 - points->austenite_start_c7));
     model->cooling_position =
