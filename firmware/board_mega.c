@@ -59,7 +59,8 @@ static void read_reset_flags(void)
     wdt_disable();
 }
 
-/* Stack high-water mark: the free RAM is painted before main. */
+/* Stack high-water mark: the free RAM is painted before main. In assembly, as nothing else is sure
+ * to work in a function without a frame that paints where frames lie. */
 #define STACK_PAINT 0xC5u
 extern uint8_t __heap_start;
 static void paint_stack(void) __attribute__((naked, used, section(".init3")));

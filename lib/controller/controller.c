@@ -3,6 +3,8 @@
 #include <stddef.h>
 #include <string.h>
 
+#include "invariant.h"
+
 #define MODEL_STEP_MS   100u
 #define TICKS_PER_STEP  (MODEL_STEP_MS / CONTROLLER_TICK_MS)
 #define CURRENT_MOST_MA 4095 /* the sensor ends at 3200: a step's sum of power fits 32 bits */
@@ -36,9 +38,8 @@ static bool init_model(thermal_model_t *model, const thermal_model_parameters_t 
 
 static void tell_resistance(controller_t *controller, uint8_t spring)
 {
-    const uint32_t resistance_mohm = (thermal_model_resistance_uohm(&controller->model, spring) +
-                                      controller->model.parameters.contact_uohm[spring]) /
-                                     1000u;
+    const uint32_t resistance_mohm =
+        thermal_model_resistance_uohm(&controller->model, spring) / 1000u;
     current_control_set_resistance(&controller->current, spring,
                                    resistance_mohm < UINT16_MAX ? (uint16_t)resistance_mohm
                                                                 : UINT16_MAX);
@@ -128,19 +129,9 @@ static uint16_t flowing_ma(int16_t current_ma)
     return current_ma > CURRENT_MOST_MA ? CURRENT_MOST_MA : (uint16_t)current_ma;
 }
 
-static uint32_t power_uw(int16_t current_ma, int16_t voltage_mv)
+static uint16_t positive_mv(int16_t voltage_mv)
 {
-    return voltage_mv > 0 ? (uint32_t)flowing_ma(current_ma) * (uint16_t)voltage_mv : 0u;
-}
-
-/* Across the spring alone, without the contact in series. 4295 / 2^32 is 1e-6. */
-static int16_t spring_mv(const controller_t *controller, uint8_t spring)
-{
-    const uint32_t contact_uohm = controller->model.parameters.contact_uohm[spring];
-    const uint32_t drop_nv = contact_uohm * flowing_ma(controller->measured_ma[spring]);
-    const int32_t own_mv =
-        controller->measured_mv[spring] - (int32_t)(((uint64_t)drop_nv * 4295u) >> 32);
-    return own_mv > INT16_MIN ? (int16_t)own_mv : INT16_MIN;
+    return voltage_mv > 0 ? (uint16_t)voltage_mv : 0u;
 }
 
 /* Takes the readings and has them judged; returns the sum of what flows. */
@@ -165,7 +156,8 @@ static uint32_t take_sensors(controller_t *controller, const controller_sensor_t
         }
         sum_ma += flowing_ma(controller->measured_ma[k]);
         controller->power_sum_uw[k] +=
-            power_uw(controller->measured_ma[k], spring_mv(controller, k));
+            thermal_model_heating_uw(&controller->model, k, flowing_ma(controller->measured_ma[k]),
+                                     positive_mv(controller->measured_mv[k]));
     }
     safety_tick_board(&controller->safety, sum_ma);
     return sum_ma;
@@ -192,12 +184,23 @@ static void step_model(controller_t *controller, const controller_inputs_t *inpu
     memset(controller->power_sum_uw, 0, sizeof controller->power_sum_uw);
 }
 
+static bool targets_are_allowed(const controller_t *controller, const bool allowed[],
+                                const uint16_t target_ma[])
+{
+    uint32_t sum_ma = 0;
+    for (uint8_t k = 0; k < controller->springs; k++) {
+        if (target_ma[k] != 0 && !allowed[k]) {
+            return false;
+        }
+        sum_ma += target_ma[k];
+    }
+    return sum_ma <= controller->safety.parameters.supply_limit_ma;
+}
+
 static void drive(controller_t *controller, const bool valid[], uint32_t sum_ma)
 {
     bool allowed[CONTROLLER_MAX_SPRINGS];
-    int16_t measured_mv[CONTROLLER_MAX_SPRINGS];
     for (uint8_t k = 0; k < controller->springs; k++) {
-        measured_mv[k] = spring_mv(controller, k);
         allowed[k] = safety_allows(&controller->safety, k);
         if (!allowed[k]) {
             current_control_reset(&controller->current, k);
@@ -212,9 +215,10 @@ static void drive(controller_t *controller, const bool valid[], uint32_t sum_ma)
                                       controller->current.parameters.maximum_current_ma,
                                   .supply_limit_ma = limits->supply_limit_ma,
                                   .measured_ma = controller->measured_ma,
-                                  .measured_mv = measured_mv,
+                                  .measured_mv = controller->measured_mv,
                                   .valid = valid};
     drive_policy_tick(&controller->policy, &input, target_ma);
+    INVARIANT(targets_are_allowed(controller, allowed, target_ma));
 
     /* Targets fit the budget; while loops still settle, what flows may not: then none rises
      * further. */
@@ -355,8 +359,8 @@ uint32_t controller_power_uw(const controller_t *controller, uint8_t spring)
     if (controller->current.channel[spring].blind_ticks != 0 && controller->duty[spring] == 0) {
         return 0;
     }
-    const uint32_t measured_uw =
-        power_uw(controller->measured_ma[spring], spring_mv(controller, spring));
+    const uint32_t measured_uw = (uint32_t)flowing_ma(controller->measured_ma[spring]) *
+                                 positive_mv(controller->measured_mv[spring]);
     return measured_uw < THERMAL_MODEL_HIGHEST_POWER_UW ? measured_uw
                                                         : THERMAL_MODEL_HIGHEST_POWER_UW;
 }

@@ -1,6 +1,7 @@
 #include "current_control.h"
 
 #include "fixed_point.h"
+#include "invariant.h"
 
 #define MEASURED_LIMIT_MA 4095  /* keeps current times gain below 2^27; the sensor ends at 3200 */
 #define ESTIMATE_LIMIT    24575 /* loop gain, duty steps per mA in Q16: the sum of both fits int16 */
@@ -104,6 +105,7 @@ static void learn(const current_control_t *control, current_control_channel_t *c
         trim_q24 = -limit_q24;
     }
     c->trim_q24 = trim_q24;
+    INVARIANT(trim_q24 <= limit_q24 && trim_q24 >= -limit_q24);
 }
 
 static uint16_t give(const current_control_t *control, current_control_channel_t *c)
@@ -119,6 +121,7 @@ static uint16_t give(const current_control_t *control, current_control_channel_t
         duty = most;
     }
     c->duty = duty;
+    INVARIANT(duty <= most && most <= CURRENT_CONTROL_DUTY_STEPS);
     return duty;
 }
 

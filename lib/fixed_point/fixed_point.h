@@ -7,6 +7,8 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "invariant.h"
+
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -27,7 +29,9 @@ static inline uint32_t fixed_point_mac_s16_u16(uint32_t accumulator, int16_t a, 
 /* a b / 2^31, rounded to the nearest; not for a and b of both -2^31. */
 static inline int32_t fixed_point_scale_q31(int32_t a, int32_t b)
 {
-    return (int32_t)(((int64_t)a * b + INT64_C(0x40000000)) >> 31);
+    const int64_t scaled = ((int64_t)a * b + INT64_C(0x40000000)) >> 31;
+    INVARIANT(scaled >= INT32_MIN && scaled <= INT32_MAX);
+    return (int32_t)scaled;
 }
 
 /* floor(a b / 2^16). */

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "fixed_point.h"
+#include "invariant.h"
 #include "text.h"
 
 #define TICKS_PER_SECOND 50
@@ -154,6 +155,9 @@ void safety_tick_spring(safety_t *safety, uint8_t spring, const safety_sample_t 
         s->temperature = limit;
         latch(safety, s, SAFETY_FAULT_OVER_TEMPERATURE);
     }
+
+    INVARIANT(s->sensor <= limit && s->temperature <= limit);
+    INVARIANT(s->fault < SAFETY_FAULT_COUNT);
 
     if (sample->expected_ma == 0) {
         s->on_s = 0;

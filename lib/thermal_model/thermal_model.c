@@ -4,6 +4,7 @@
 
 #include "fixed_point.h"
 #include "flash_memory.h"
+#include "invariant.h"
 #include "thermal_model_internal.h"
 
 /* How one step works.
@@ -17,9 +18,10 @@
  * T = h - latent. Where it transforms, the h of a temperature rises with it along the branch, and T
  * is found by halving; the latent heat is then what h leaves, so that errors do not add up. */
 
-#define SEGMENTS         32
-#define LATENT_SLACK_C23 0x400000 /* 0.5 K: 1/128 K times the steepest slope of h, and rounding */
-#define KELVIN_AT_0_C7   34963u   /* 273.15 K */
+#define SEGMENTS                32
+#define LATENT_SLACK_C23        0x400000 /* 0.5 K: 1/128 K times the steepest slope of h, and rounding */
+#define KELVIN_AT_0_C7          34963u /* 273.15 K */
+#define RESISTANCE_REFERENCE_C7 (20 * 128)
 
 /* 2^15 (1 + cos(pi k / 32)) / 2 */
 static const uint16_t cosine[SEGMENTS + 1] FLASH_MEMORY = {
@@ -27,6 +29,12 @@ static const uint16_t cosine[SEGMENTS + 1] FLASH_MEMORY = {
     24107, 22654, 21140, 19580, 17990, 16384, 14778, 13188, 11628, 10114, 8661,
     7282,  5990,  4799,  3719,  2761,  1935,  1247,  705,   315,   79,    0,
 };
+
+/* Kept over a warm reset and read from outside: no padding on the chip. */
+#ifdef __AVR__
+_Static_assert(sizeof(thermal_model_spring_state_t) == 15, "size of what a spring remembers");
+_Static_assert(sizeof(thermal_model_state_t) == 8 + 15 * THERMAL_MODEL_MAX_SPRINGS, "and of all");
+#endif
 
 static uint8_t clamp_index(const thermal_model_t *model, uint8_t spring)
 {
@@ -232,6 +240,12 @@ static void transform(const thermal_model_t *model, const thermal_model_transfor
         clamp_c23(temperature_c23, c23_of(THERMAL_MODEL_LOWEST_C7), c23_of(model->highest_c7));
 }
 
+static bool is_held_at_a_limit(const thermal_model_t *model, int32_t temperature_c23)
+{
+    return temperature_c23 == c23_of(THERMAL_MODEL_LOWEST_C7) ||
+           temperature_c23 == c23_of(model->highest_c7);
+}
+
 /* Heat into a spring, over its heat capacity: its phase follows. */
 static void add_heat(thermal_model_t *model, uint8_t i, int32_t gain_c23)
 {
@@ -242,8 +256,12 @@ static void add_heat(thermal_model_t *model, uint8_t i, int32_t gain_c23)
         state->temperature_c23 = held_c23;
         return;
     }
+    const int64_t enthalpy_c23 = (int64_t)held_c23 + state->latent_c23;
     const thermal_model_transformation_t points = thermal_model_transformation(model, i);
     transform(model, &points, state, held_c23);
+    INVARIANT((int64_t)state->temperature_c23 + state->latent_c23 == enthalpy_c23 ||
+              is_held_at_a_limit(model, state->temperature_c23));
+    (void)enthalpy_c23;
 }
 
 /* ---- flows, 1/64 uW ---- */
@@ -285,8 +303,18 @@ static int32_t from_neighbours(const thermal_model_t *model, uint8_t i, int16_t 
     return flow;
 }
 
+/* What leaves one spring enters another. */
+static bool exchange_closes(const thermal_model_t *model)
+{
+    int64_t sum = 0;
+    for (uint8_t i = 0; i < model->springs; i++) {
+        sum += from_neighbours(model, i, model->spring[i].midstep_c6);
+    }
+    return sum == 0;
+}
+
 /* What a spring gives the air around it. */
-static int32_t lost(const thermal_model_spring_t *spring, int16_t above_air_c6)
+static int32_t given_to_air(const thermal_model_spring_t *spring, int16_t above_air_c6)
 {
     uint16_t conductance = spring->loss_uw_per_k;
     if (above_air_c6 > 0) {
@@ -308,7 +336,7 @@ static flows_t flows_at(const thermal_model_t *model, uint8_t i, int16_t tempera
     const thermal_model_spring_t *own = &model->spring[i];
     const int16_t air_c6 = model->air.midstep_c6;
     flows_t flows;
-    flows.to_air = lost(own, (int16_t)(temperature_c6 - air_c6));
+    flows.to_air = given_to_air(own, (int16_t)(temperature_c6 - air_c6));
     if (own->upstream != NO_SPRING) { /* what the fan's air brings it took there */
         const int16_t above_c6 = (int16_t)(model->spring[own->upstream].midstep_c6 - air_c6);
         flows.to_air -= flow_through(model->wake_uw_per_k, above_c6);
@@ -343,6 +371,7 @@ void thermal_model_step(thermal_model_t *model, const uint32_t power_uw[])
     int32_t gain_c23[THERMAL_MODEL_MAX_SPRINGS];
     int64_t to_air = 0;
     int64_t to_plate = 0;
+    INVARIANT(exchange_closes(model));
     for (uint8_t i = 0; i < model->springs; i++) {
         const flows_t flows = flows_at(model, i, model->spring[i].midstep_c6);
         const uint32_t power = power_uw[i] < THERMAL_MODEL_HIGHEST_POWER_UW
@@ -364,9 +393,36 @@ void thermal_model_step(thermal_model_t *model, const uint32_t power_uw[])
     if (model->parameters.plate_coupling_uw_per_k != 0) {
         step_node(&model->plate, &model->state.plate_c23, model->ambient_c7, to_plate);
     }
+    INVARIANT(thermal_model_is_consistent(model));
 }
 
 /* ---- setting and reading ---- */
+
+static bool spring_is_consistent(const thermal_model_t *model, uint8_t i,
+                                 const thermal_model_spring_state_t *state)
+{
+    const int32_t most_c23 = latent_c23_of(model, THERMAL_MODEL_AUSTENITE_FULL) + LATENT_SLACK_C23;
+    if (state->branch > THERMAL_MODEL_BRANCH_HEATING ||
+        state->amplitude > THERMAL_MODEL_AUSTENITE_FULL || state->latent_c23 < -LATENT_SLACK_C23 ||
+        state->latent_c23 > most_c23) {
+        return false;
+    }
+    const int16_t temperature_c7 = c7_of(state->temperature_c23);
+    if (temperature_c7 > state->heating_c7 || temperature_c7 < state->cooling_c7) {
+        return false;
+    }
+    const thermal_model_transformation_t points = thermal_model_transformation(model, i);
+    if (state->branch == THERMAL_MODEL_BRANCH_HEATING) {
+        return (state->heating_c7 == model->highest_c7 ||
+                (state->heating_c7 >= points.austenite_start_c7 &&
+                 state->heating_c7 < points.austenite_finish_c7)) &&
+               state->cooling_c7 == points.martensite_start_c7;
+    }
+    return (state->cooling_c7 == THERMAL_MODEL_LOWEST_C7 ||
+            (state->cooling_c7 <= points.martensite_start_c7 &&
+             state->cooling_c7 > points.martensite_finish_c7)) &&
+           state->heating_c7 == points.austenite_start_c7;
+}
 
 void thermal_model_set_ambient(thermal_model_t *model, int16_t ambient_c7)
 {
@@ -431,6 +487,7 @@ void thermal_model_set_temperature(thermal_model_t *model, uint8_t spring, int16
     state->latent_c23 = latent_c23_of(model, austenite_of(model, &points, state));
     state->temperature_c23 = c23_of(temperature_c7);
     model->spring[spring].midstep_c6 = c6_of(temperature_c7);
+    INVARIANT(spring_is_consistent(model, spring, state));
 }
 
 void thermal_model_add_temperature(thermal_model_t *model, uint8_t spring, int16_t difference_c7)
@@ -450,6 +507,7 @@ void thermal_model_add_enthalpy(thermal_model_t *model, uint8_t spring, int16_t 
     spring = clamp_index(model, spring);
     add_heat(model, spring, c23_of(difference_c7));
     model->spring[spring].midstep_c6 = c6_of(thermal_model_temperature_c7(model, spring));
+    INVARIANT(spring_is_consistent(model, spring, &model->state.spring[spring]));
 }
 
 int16_t thermal_model_temperature_c7(const thermal_model_t *model, uint8_t spring)
@@ -464,30 +522,38 @@ uint16_t thermal_model_austenite(const thermal_model_t *model, uint8_t spring)
     return austenite_of(model, &points, &model->state.spring[spring]);
 }
 
-/* R (1 + rise (T - 20 degC)); 537 / 2^36 is 1e-6 / 128 to 0.03 %. */
-static int64_t warmed_uohm(uint32_t at_20_uohm, int16_t rise_ppm_per_k, int16_t temperature_c7)
+static int32_t resistance_of_phase(uint32_t at_reference_uohm, int32_t rise, int16_t above_c7)
 {
-    const int64_t change = (int64_t)at_20_uohm * rise_ppm_per_k * (temperature_c7 - 20 * 128);
-    return at_20_uohm + ((change * 537) >> 36);
+    return (int32_t)(at_reference_uohm + (uint32_t)(int32_t)(((int64_t)rise * above_c7) >> 16));
 }
 
-uint32_t thermal_model_resistance_uohm_at(const thermal_model_t *model, uint16_t austenite,
-                                          int16_t temperature_c7)
+uint32_t thermal_model_resistance_uohm_at(const thermal_model_t *model, uint8_t spring,
+                                          uint16_t austenite, int16_t temperature_c7)
 {
     const thermal_model_parameters_t *p = &model->parameters;
-    const int64_t martensite_uohm = warmed_uohm(
-        p->resistance_martensite_uohm, p->resistance_martensite_rise_ppm_per_k, temperature_c7);
-    const int64_t austenite_uohm = warmed_uohm(
-        p->resistance_austenite_uohm, p->resistance_austenite_rise_ppm_per_k, temperature_c7);
-    const int64_t mixed_uohm =
-        martensite_uohm + (((austenite_uohm - martensite_uohm) * austenite) >> 15);
-    return mixed_uohm > 1 ? (uint32_t)mixed_uohm : 1u;
+    const int16_t above_c7 = (int16_t)(clamp_c7(temperature_c7) - RESISTANCE_REFERENCE_C7);
+    const int32_t martensite_uohm =
+        resistance_of_phase(p->resistance_martensite_uohm, model->martensite_rise, above_c7);
+    const int32_t austenite_uohm =
+        resistance_of_phase(p->resistance_austenite_uohm, model->austenite_rise, above_c7);
+    const int32_t change_uohm =
+        (int32_t)(((int64_t)(austenite_uohm - martensite_uohm) * austenite) >> 15);
+    const uint32_t own_uohm = (uint32_t)(martensite_uohm + change_uohm);
+    return (own_uohm > 0 ? own_uohm : 1u) + p->contact_uohm[clamp_index(model, spring)];
 }
 
 uint32_t thermal_model_resistance_uohm(const thermal_model_t *model, uint8_t spring)
 {
-    return thermal_model_resistance_uohm_at(model, thermal_model_austenite(model, spring),
+    return thermal_model_resistance_uohm_at(model, spring, thermal_model_austenite(model, spring),
                                             thermal_model_temperature_c7(model, spring));
+}
+
+uint32_t thermal_model_heating_uw(const thermal_model_t *model, uint8_t spring, uint16_t current_ma,
+                                  uint16_t voltage_mv)
+{
+    const uint16_t contact_q16 = model->spring[clamp_index(model, spring)].contact_q16;
+    const uint16_t contact_mv = (uint16_t)(((uint32_t)current_ma * contact_q16) >> 16);
+    return voltage_mv > contact_mv ? (uint32_t)current_ma * (uint16_t)(voltage_mv - contact_mv) : 0;
 }
 
 int16_t thermal_model_air_c7(const thermal_model_t *model)
@@ -522,32 +588,6 @@ static bool is_within_limits(int32_t temperature_c23)
 {
     return temperature_c23 >= c23_of(THERMAL_MODEL_LOWEST_C7) &&
            temperature_c23 <= c23_of(THERMAL_MODEL_HIGHEST_C7);
-}
-
-static bool spring_is_consistent(const thermal_model_t *model, uint8_t i,
-                                 const thermal_model_spring_state_t *state)
-{
-    const int32_t most_c23 = latent_c23_of(model, THERMAL_MODEL_AUSTENITE_FULL) + LATENT_SLACK_C23;
-    if (state->branch > THERMAL_MODEL_BRANCH_HEATING ||
-        state->amplitude > THERMAL_MODEL_AUSTENITE_FULL || state->latent_c23 < -LATENT_SLACK_C23 ||
-        state->latent_c23 > most_c23) {
-        return false;
-    }
-    const int16_t temperature_c7 = c7_of(state->temperature_c23);
-    if (temperature_c7 > state->heating_c7 || temperature_c7 < state->cooling_c7) {
-        return false;
-    }
-    const thermal_model_transformation_t points = thermal_model_transformation(model, i);
-    if (state->branch == THERMAL_MODEL_BRANCH_HEATING) {
-        return (state->heating_c7 == model->highest_c7 ||
-                (state->heating_c7 >= points.austenite_start_c7 &&
-                 state->heating_c7 < points.austenite_finish_c7)) &&
-               state->cooling_c7 == points.martensite_start_c7;
-    }
-    return (state->cooling_c7 == THERMAL_MODEL_LOWEST_C7 ||
-            (state->cooling_c7 <= points.martensite_start_c7 &&
-             state->cooling_c7 > points.martensite_finish_c7)) &&
-           state->heating_c7 == points.austenite_start_c7;
 }
 
 static bool state_is_consistent(const thermal_model_t *model, const thermal_model_state_t *state)

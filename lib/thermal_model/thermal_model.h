@@ -88,6 +88,7 @@ typedef struct {
     uint16_t loss_rise_natural;
     int16_t midstep_c6; /* temperature expected at the middle of the next step, Q9.6 degC */
     int16_t transformation_shift_c7;
+    uint16_t contact_q16; /* 2^-16 ohm */
     uint8_t row;
     uint8_t column;
     uint8_t upstream; /* spring from which the fan blows; THERMAL_MODEL_MAX_SPRINGS: none */
@@ -107,7 +108,9 @@ typedef struct {
     thermal_model_slow_node_t air;
     thermal_model_slow_node_t plate;
     thermal_model_transformation_t transformation; /* of a spring that is not shifted */
-    uint16_t heating_position;                     /* 2^21 / width of the transformation, 1/128 K */
+    int32_t martensite_rise;                       /* of its resistance: 2^-16 uohm per 1/128 K */
+    int32_t austenite_rise;
+    uint16_t heating_position; /* 2^21 / width of the transformation, 1/128 K */
     uint16_t cooling_position;
     uint16_t latent_full_c8;      /* Q8.8 K: latent heat over heat capacity */
     uint16_t orthogonal_uw_per_k; /* at the present fan */
@@ -130,7 +133,8 @@ typedef struct {
  * 1..8000 permille; heat capacity times scale below 1 mJ/K, or so small that a step of the highest
  * power exceeds 63 K; latent heat over heat capacity above 80 K or above 20 times either width; a
  * transformation narrower than 2 K or wider than 100 K; a transformation temperature outside
- * -30..200 degC; austenite finish plus latent heat over heat capacity above 200 degC; a resistance
+ * -30..200 degC; austenite finish plus latent heat over heat capacity above 200 degC, or either
+ * beyond its end with the shift of a spring; a resistance
  * of 0 or above 16 ohm; loss rise above 20000 ppm/K; wake direction above 3; wake above the fan's
  * loss (heat from nothing); air or plate above 2 kJ/K; a plate coupled but without heat capacity.
  *
@@ -167,10 +171,15 @@ int16_t
 thermal_model_air_c7(const thermal_model_t *model); /* ambient where there is no shared air */
 int16_t thermal_model_plate_c7(const thermal_model_t *model);
 
-/* The one law of resistance: what a spring has at a phase (Q0.15, 0..32768) and a temperature. The
- * phases are mixed by their shares, each with its own resistance. At least 1 uohm. O(1). */
-uint32_t thermal_model_resistance_uohm_at(const thermal_model_t *model, uint16_t austenite,
-                                          int16_t temperature_c7);
+/* The one law of resistance: what that spring's sensor sees at a phase (Q0.15, 0..32768) and a
+ * temperature. Each phase's own resistance rises in proportion with the distance from 20 degC, they
+ * are mixed by their shares, and the spring's contact is in series. At least 1 uohm. O(1). */
+uint32_t thermal_model_resistance_uohm_at(const thermal_model_t *model, uint8_t spring,
+                                          uint16_t austenite, int16_t temperature_c7);
+/* What heats the spring of what its sensor measures: not what heats its contact, uW. current_ma: at
+ * most 4095. O(1). */
+uint32_t thermal_model_heating_uw(const thermal_model_t *model, uint8_t spring, uint16_t current_ma,
+                                  uint16_t voltage_mv);
 /* The one source of the temperatures between which that spring transforms. O(1). */
 thermal_model_transformation_t thermal_model_transformation(const thermal_model_t *model,
                                                             uint8_t spring);

@@ -129,7 +129,7 @@ static refusal_t check_phase(const thermal_model_parameters_t *p)
     for (uint8_t i = 0; i < (uint8_t)(p->rows * p->columns); i++) {
         const int16_t shift_cc = p->transformation_shift_cc[i];
         if (finish_m + shift_cc < LOWEST_CC ||
-            finish_a + shift_cc + (int16_t)latent_cc > HIGHEST_CC) {
+            finish_a + shift_cc > HIGHEST_CC - (int16_t)latent_cc) {
             REFUSE(RANGE, transformation_shift_k);
         }
     }
@@ -268,16 +268,23 @@ static void derive_spring(thermal_model_t *model, uint8_t i)
     spring->row = (uint8_t)(i / p->columns);
     spring->column = (uint8_t)(i % p->columns);
     spring->upstream = upstream_of(p, spring->row, spring->column);
-    spring->transformation_shift_c7 = fixed_point_c7_from_cc(p->transformation_shift_cc[i]);
     spring->step_gain =
         (int32_t)((STEP_GAIN_UJ_PER_MS * p->step_ms + capacity_uj_per_k / 2u) / capacity_uj_per_k);
     spring->loss_natural_uw_per_k = (uint16_t)scaled_loss(p->loss_uw_per_k, scale);
     spring->loss_fan_uw_per_k = (uint16_t)scaled_loss(p->loss_fan_uw_per_k, scale);
+    spring->transformation_shift_c7 = fixed_point_c7_from_cc(p->transformation_shift_cc[i]);
+    const uint32_t contact_q16 = fixed_point_multiply_divide(p->contact_uohm[i], 65536u, 1000000u);
+    spring->contact_q16 = contact_q16 > UINT16_MAX ? UINT16_MAX : (uint16_t)contact_q16;
     /* 1024 / 1e6 */
     spring->loss_rise_natural =
         (uint16_t)(((uint32_t)spring->loss_natural_uw_per_k * p->loss_rise_ppm_per_k * 16u +
                     7812u) /
                    15625u);
+}
+
+static int32_t resistance_rise(uint32_t resistance_uohm, int16_t ppm_per_k)
+{
+    return (int32_t)((int64_t)resistance_uohm * ppm_per_k * 512 / 1000000); /* 2^16 / 128 / 1e6 */
 }
 
 static void derive(thermal_model_t *model)
@@ -294,6 +301,10 @@ static void derive(thermal_model_t *model)
     points->martensite_start_c7 = fixed_point_c7_from_cc(p->martensite_start_cc);
     points->austenite_start_c7 = fixed_point_c7_from_cc(p->austenite_start_cc);
     points->austenite_finish_c7 = fixed_point_c7_from_cc(p->austenite_finish_cc);
+    model->martensite_rise =
+        resistance_rise(p->resistance_martensite_uohm, p->resistance_martensite_rise_ppm_per_k);
+    model->austenite_rise =
+        resistance_rise(p->resistance_austenite_uohm, p->resistance_austenite_rise_ppm_per_k);
     model->heating_position =
         position_factor((int16_t)(points->austenite_finish_c7 - points->austenite_start_c7));
     model->cooling_position =

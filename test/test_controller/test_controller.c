@@ -175,22 +175,6 @@ static void model_is_fed_with_the_measured_power_of_each_tick(void)
 }
 
 /* From martensite to austenite, whichever has more. */
-/* 175 mohm measured, 30 of them in the contact: the spring has the power of 145. */
-static void a_contact_in_series_heats_no_spring(void)
-{
-    settings.model.contact_uohm[4] = 30000;
-    start();
-    controller_set_target(&controller, 3, 1000);
-    controller_set_target(&controller, 4, 1000);
-    run(200);
-    TEST_ASSERT_INT_WITHIN(4, 262, controller_measured_mv(&controller, 4)); /* as measured */
-    TEST_ASSERT_UINT32_WITHIN(12000, 394000, controller_power_uw(&controller, 3));
-    TEST_ASSERT_UINT32_WITHIN(12000, 326000, controller_power_uw(&controller, 4));
-    TEST_ASSERT_LESS_THAN_INT16(controller_temperature_c7(&controller, 3) - 20,
-                                controller_temperature_c7(&controller, 4));
-    TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, controller_fault(&controller, 4));
-}
-
 static void each_current_loop_is_told_its_springs_resistance(void)
 {
     for (int falling = 0; falling < 2; falling++) {
@@ -508,7 +492,6 @@ int main(void)
     RUN_TEST(a_driven_spring_gets_its_current_and_only_that_one);
     RUN_TEST(sum_of_currents_never_exceeds_the_supply);
     RUN_TEST(model_is_fed_with_the_measured_power_of_each_tick);
-    RUN_TEST(a_contact_in_series_heats_no_spring);
     RUN_TEST(each_current_loop_is_told_its_springs_resistance);
     RUN_TEST(missing_readings_keep_the_last_power_while_the_output_is_on);
     RUN_TEST(failing_sensor_is_a_fault_of_its_spring_alone);

@@ -289,42 +289,6 @@ static void latent_heat_delays_by_its_energy(void)
     TEST_ASSERT_UINT32_WITHIN(3, 321, steps);
 }
 
-static void resistance_of_each_phase_rises_from_20_degrees(void)
-{
-    parameters.resistance_martensite_rise_ppm_per_k = 1500;
-    parameters.resistance_austenite_rise_ppm_per_k = -300;
-    start();
-    TEST_ASSERT_EQUAL_UINT32(175000, thermal_model_resistance_uohm_at(&model, 0, 20 * 128));
-    TEST_ASSERT_UINT32_WITHIN(20, 190750, thermal_model_resistance_uohm_at(&model, 0, 80 * 128));
-    TEST_ASSERT_UINT32_WITHIN(20, 159250, thermal_model_resistance_uohm_at(&model, 0, -40 * 128));
-    const uint16_t all = THERMAL_MODEL_AUSTENITE_FULL;
-    TEST_ASSERT_UINT32_WITHIN(20, 215058, thermal_model_resistance_uohm_at(&model, all, 80 * 128));
-    TEST_ASSERT_UINT32_WITHIN(20, 202904,
-                              thermal_model_resistance_uohm_at(&model, all / 2, 80 * 128));
-    thermal_model_set_temperature(&model, 0, 60 * 128);
-    TEST_ASSERT_UINT32_WITHIN(20, 185500, thermal_model_resistance_uohm(&model, 0));
-    parameters.resistance_martensite_uohm = 16000000;
-    parameters.resistance_martensite_rise_ppm_per_k = 5000;
-    start();
-    TEST_ASSERT_UINT32_WITHIN(8000, 31600000,
-                              thermal_model_resistance_uohm_at(&model, 0, 215 * 128));
-}
-
-/* A spring whose transformation is shifted transforms so much later, and its neighbour does not. */
-static void a_shift_moves_one_springs_transformation(void)
-{
-    parameters.transformation_shift_cc[0] = 800;
-    start();
-    thermal_model_set_temperature(&model, 0, 96 * 128);
-    thermal_model_set_temperature(&model, 1, 96 * 128);
-    thermal_model_set_temperature(&model, 2, 93 * 128);
-    TEST_ASSERT_EQUAL_UINT16(0, thermal_model_austenite(&model, 0));
-    TEST_ASSERT_GREATER_THAN_UINT16(20000, thermal_model_austenite(&model, 1));
-    thermal_model_set_temperature(&model, 0, 101 * 128);
-    TEST_ASSERT_UINT16_WITHIN(300, thermal_model_austenite(&model, 2),
-                              thermal_model_austenite(&model, 0));
-}
-
 static void resistance_follows_phase_with_either_sign(void)
 {
     start();
@@ -340,6 +304,67 @@ static void resistance_follows_phase_with_either_sign(void)
     TEST_ASSERT_UINT32_WITHIN(10000, 8000000, thermal_model_resistance_uohm(&model, 0));
     thermal_model_set_temperature(&model, 0, c7(110));
     TEST_ASSERT_EQUAL_UINT32(1, thermal_model_resistance_uohm(&model, 0));
+}
+
+/* 1500 ppm/K of 175 mohm over 60 K is 15.75 mohm, 500 ppm/K of 219 mohm over 90 K 9.855 mohm. */
+static void resistance_of_each_phase_rises_from_20_degrees(void)
+{
+    parameters.resistance_martensite_rise_ppm_per_k = 1500;
+    parameters.resistance_austenite_rise_ppm_per_k = 500;
+    start();
+    TEST_ASSERT_UINT32_WITHIN(2, 175000, thermal_model_resistance_uohm(&model, 0));
+    thermal_model_set_temperature(&model, 0, c7(80));
+    TEST_ASSERT_UINT32_WITHIN(20, 190750, thermal_model_resistance_uohm(&model, 0));
+    thermal_model_set_temperature(&model, 0, c7(110));
+    TEST_ASSERT_UINT32_WITHIN(20, 228855, thermal_model_resistance_uohm(&model, 0));
+    /* half of each, at 60 degC: (185500 + 223380) / 2 */
+    TEST_ASSERT_UINT32_WITHIN(20, 204440,
+                              thermal_model_resistance_uohm_at(&model, 0, 16384, c7(60)));
+    parameters.resistance_martensite_rise_ppm_per_k = -3000;
+    start();
+    thermal_model_set_temperature(&model, 0, c7(80));
+    TEST_ASSERT_UINT32_WITHIN(20, 143500, thermal_model_resistance_uohm(&model, 0));
+}
+
+/* 1 A through 20 mohm: 20 mV and 20 mW that the spring does not get. */
+static void contact_is_seen_in_the_resistance_and_not_in_the_heat(void)
+{
+    parameters.contact_uohm[2] = 20000;
+    start();
+    TEST_ASSERT_EQUAL_UINT32(195000, thermal_model_resistance_uohm(&model, 2));
+    TEST_ASSERT_EQUAL_UINT32(175000, thermal_model_resistance_uohm(&model, 1));
+    TEST_ASSERT_UINT32_WITHIN(1000, 175000, thermal_model_heating_uw(&model, 2, 1000, 195));
+    TEST_ASSERT_EQUAL_UINT32(195000, thermal_model_heating_uw(&model, 1, 1000, 195));
+    TEST_ASSERT_EQUAL_UINT32(0, thermal_model_heating_uw(&model, 2, 1000, 10));
+}
+
+/* The whole loop of one spring lies 12.5 K higher, its neighbours' does not. */
+static void a_shifted_spring_transforms_higher(void)
+{
+    parameters.transformation_shift_cc[1] = 1250;
+    parameters.transformation_shift_cc[2] = -4000;
+    start();
+    TEST_ASSERT_EQUAL_INT16(c7(88), thermal_model_transformation(&model, 0).austenite_start_c7);
+    TEST_ASSERT_EQUAL_INT16(c7(80.5), thermal_model_transformation(&model, 1).martensite_finish_c7);
+    TEST_ASSERT_EQUAL_INT16(c7(38), thermal_model_transformation(&model, 2).martensite_start_c7);
+    thermal_model_set_temperature(&model, 1, c7(100.4));
+    TEST_ASSERT_EQUAL_UINT16(0, thermal_model_austenite(&model, 1));
+    thermal_model_set_temperature(&model, 1, c7(105.5));
+    TEST_ASSERT_DOUBLE_WITHIN(0.002, 0.5, phase(1));
+    thermal_model_set_temperature(&model, 1, c7(110.6));
+    thermal_model_set_temperature(&model, 1, c7(85.5));
+    TEST_ASSERT_DOUBLE_WITHIN(0.002, 0.5, phase(1));
+    for (uint8_t k = 0; k < 3; k++) { /* the same by heat: 5 K above each one's austenite start */
+        start();
+        memset(power_uw, 0, sizeof power_uw);
+        power_uw[k] = 800000;
+        const int16_t half_c7 =
+            (int16_t)(thermal_model_transformation(&model, k).austenite_start_c7 + c7(5));
+        while (thermal_model_temperature_c7(&model, k) < half_c7) {
+            run(1);
+        }
+        TEST_ASSERT_DOUBLE_WITHIN(0.02, 0.5, phase(k));
+    }
 }
 
 /* ---- conservation, symmetry --------------------------------------------------------------------
@@ -669,6 +694,12 @@ static void what_does_not_fit_together_is_refused_by_name(void)
     parameters.austenite_finish_cc = 9400;
     parameters.latent_heat_mj = 25000;
     refused(THERMAL_MODEL_ERROR_RANGE, PARAMETER_latent_heat_j);
+    parameters.martensite_finish_cc = -100; /* with the shift the last spring's is below -30 */
+    REFUSED(RANGE, transformation_shift_k, transformation_shift_cc[8], -2901);
+    parameters.austenite_finish_cc = 18000; /* and 10 K of latent heat above 200 */
+    parameters.austenite_start_cc = 17000;
+    parameters.latent_heat_mj = 3000;
+    REFUSED(RANGE, transformation_shift_k, transformation_shift_cc[8], 1001);
     REFUSED(ORDER, martensite_start_c, martensite_start_cc, 6800);
     REFUSED(RANGE, martensite_start_c, martensite_start_cc, 6900);
     REFUSED(ORDER, austenite_start_c, austenite_start_cc, 7799);
@@ -681,11 +712,6 @@ static void what_does_not_fit_together_is_refused_by_name(void)
     REFUSED(OVERFLOW, plate_coupling_w_per_k, plate_coupling_uw_per_k, 64000);
     REFUSED(RANGE, wake_w_per_k, wake_uw_per_k, 11301);
     REFUSED(RANGE, loss_scale, loss_scale_permille[8], 0);
-    parameters.martensite_finish_cc = 500;
-    parameters.martensite_start_cc = 7000;
-    REFUSED(RANGE, transformation_shift_k, transformation_shift_cc[8], -3501);
-    parameters.austenite_finish_cc = 13200;
-    REFUSED(RANGE, transformation_shift_k, transformation_shift_cc[3], 4000);
     parameters.heat_capacity_mj_per_k = 40;
     parameters.latent_heat_mj = 0;
     parameters.loss_uw_per_k = 60000;
@@ -829,7 +855,11 @@ int main(void)
     RUN_TEST(latent_heat_delays_by_its_energy);
     RUN_TEST(resistance_follows_phase_with_either_sign);
     RUN_TEST(resistance_of_each_phase_rises_from_20_degrees);
-    RUN_TEST(a_shift_moves_one_springs_transformation);
+    RUN_TEST(contact_is_seen_in_the_resistance_and_not_in_the_heat);
+    RUN_TEST(a_shifted_spring_transforms_higher);
+    RUN_TEST(resistance_of_each_phase_rises_from_20_degrees);
+    RUN_TEST(contact_is_seen_in_the_resistance_and_not_in_the_heat);
+    RUN_TEST(a_shifted_spring_transforms_higher);
     RUN_TEST(no_heat_from_nothing);
     RUN_TEST(closed_array_keeps_its_heat);
     RUN_TEST(rotating_the_pattern_rotates_the_temperatures);
