@@ -2,6 +2,18 @@
 
 #include "invariant.h"
 
+static bool holds_each_once(const supply_queue_t *queue)
+{
+    for (uint8_t k = 0; k < queue->count; k++) {
+        for (uint8_t n = 0; n < k; n++) {
+            if (queue->spring[n] == queue->spring[k]) {
+                return false;
+            }
+        }
+    }
+    return queue->count <= THERMAL_MODEL_MAX_SPRINGS;
+}
+
 void supply_queue_add(supply_queue_t *queue, uint8_t spring)
 {
     for (uint8_t k = 0; k < queue->count; k++) {
@@ -9,8 +21,8 @@ void supply_queue_add(supply_queue_t *queue, uint8_t spring)
             return;
         }
     }
-    INVARIANT(queue->count < THERMAL_MODEL_MAX_SPRINGS); /* each is in it once at most */
-    queue->spring[queue->count++] = spring;
+    queue->spring[queue->count++] = spring; /* there is room: it was not in */
+    INVARIANT(holds_each_once(queue));
 }
 
 void supply_queue_remove(supply_queue_t *queue, uint8_t spring)
