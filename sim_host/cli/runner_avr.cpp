@@ -8,6 +8,7 @@
 #include "board_view.h"
 #include "controller.h"
 #include "electrics.h"
+#include "scenario_plant.h"
 #include "simulated_board.h"
 #include "text.h"
 
@@ -78,6 +79,9 @@ public:
                 throw event.place.error("the plant refuses this temperature");
             }
             warm_thermistor();
+            return;
+        case scenario_word::set:
+            set_plant(plant_.get(), event);
             return;
         case scenario_word::fail:
         case scenario_word::repair:
@@ -239,6 +243,16 @@ private:
             break;
         case scenario_failure::stale:
             board_set_fault(board_->get(), BOARD_FAULT_STALE, channel, on);
+            break;
+        case scenario_failure::freeze:
+            board_set_fault(board_->get(), BOARD_FAULT_FREEZE, channel, on);
+            break;
+        case scenario_failure::lie:
+            board_scale_sensor(board_->get(), channel, on ? event.amount : 1.0,
+                               on ? event.voltage_amount : 1.0);
+            break;
+        case scenario_failure::swap:
+            board_swap_sensors(board_->get(), channel, static_cast<unsigned>(event.springs[1]));
             break;
         case scenario_failure::sda_low:
             board_set_fault(board_->get(), BOARD_FAULT_SDA_LOW, channel, on);
