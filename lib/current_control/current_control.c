@@ -1,6 +1,7 @@
 #include "current_control.h"
 
 #include "fixed_point.h"
+#include "invariant.h"
 
 #define MEASURED_LIMIT_MA 4095  /* keeps current times gain below 2^27; the sensor ends at 3200 */
 #define ESTIMATE_LIMIT    24575 /* loop gain, duty steps per mA in Q16: the sum of both fits int16 */
@@ -8,49 +9,9 @@
 #define FIRST_MA          128u /* what a rise from off begins with */
 #define SMALL_MA          25u  /* a change that need not wait: a step of the policy's sweep */
 
-#ifdef __AVR__
-#define HOT    __attribute__((noinline, optimize("O2")))
-#define ALWAYS __attribute__((always_inline))
-/* The address stays in a pointer register instead of being worked out anew for each field. */
-#define KEEP_ADDRESS(pointer) __asm__("" : "+b"(pointer))
-#else
-#define HOT
-#define ALWAYS
-#define KEEP_ADDRESS(pointer) (void)(pointer)
-#endif
-
-void current_control_parameters_default(current_control_parameters_t *parameters)
-{
-    static const current_control_parameters_t usual FLASH_MEMORY = {.supply_mv = 5000,
-                                                                    .freewheel_mv = 0,
-                                                                    .shunt_mohm = 100,
-                                                                    .wiring_mohm = 80,
-                                                                    .integral_permille = 600,
-                                                                    .slew_ma_per_tick = 300,
-                                                                    .maximum_current_ma = 3000,
-                                                                    .maximum_duty_steps = 760,
-                                                                    .trim_limit_mohm = 150,
-                                                                    .hold_ticks = 10};
-    flash_copy(parameters, &usual, sizeof usual);
-}
-
-#define RANGE(field, type, minimum, maximum)                                                       \
-    PARAMETER_RANGE(current_control_parameters_t, field, type, minimum, maximum)
-const current_control_ranges_t current_control_ranges FLASH_MEMORY = {
-    RANGE(supply_mv, U16, 1000, 16000),
-    RANGE(freewheel_mv, U16, 0, 1000),
-    RANGE(shunt_mohm, U16, 0, 1000),
-    RANGE(wiring_mohm, U16, 0, 1000),
-    RANGE(integral_permille, U16, 1, 1000),
-    RANGE(slew_ma_per_tick, U16, 1, 3200),
-    RANGE(maximum_current_ma, U16, 1, 3200),
-    RANGE(maximum_duty_steps, U16, 1, CURRENT_CONTROL_DUTY_STEPS),
-    RANGE(trim_limit_mohm, U16, 0, 1000),
-    RANGE(hold_ticks, U8, 0, 250)};
-
 bool current_control_check(const current_control_parameters_t *p, uint16_t *bad)
 {
-    return parameter_check(p, &current_control_ranges, sizeof current_control_ranges, bad);
+    return parameter_check(PARAMETER_PART_CURRENT, p, bad);
 }
 
 bool current_control_apply(current_control_t *control, const current_control_parameters_t *p,
@@ -119,8 +80,8 @@ static inline int16_t to_q8(int32_t value_q16)
 
 /* The trim takes integral x error / reference, the reference rounded up to FIRST_MA times a power
  * of two; error: the given duty less the one that what it has brought should have taken. */
-static HOT void learn(const current_control_t *control, current_control_channel_t *c,
-                      int16_t measured_ma)
+static void learn(const current_control_t *control, current_control_channel_t *c,
+                  int16_t measured_ma)
 {
     if (measured_ma > MEASURED_LIMIT_MA) {
         measured_ma = MEASURED_LIMIT_MA;
@@ -144,9 +105,10 @@ static HOT void learn(const current_control_t *control, current_control_channel_
         trim_q24 = -limit_q24;
     }
     c->trim_q24 = trim_q24;
+    INVARIANT(trim_q24 <= limit_q24 && trim_q24 >= -limit_q24);
 }
 
-static HOT uint16_t give(const current_control_t *control, current_control_channel_t *c)
+static uint16_t give(const current_control_t *control, current_control_channel_t *c)
 {
     uint32_t wanted_q16 =
         fixed_point_mac_u16((uint32_t)control->offset_q16 + c->residue_q16, c->reference_ma,
@@ -159,12 +121,13 @@ static HOT uint16_t give(const current_control_t *control, current_control_chann
         duty = most;
     }
     c->duty = duty;
+    INVARIANT(duty <= most && most <= CURRENT_CONTROL_DUTY_STEPS);
     return duty;
 }
 
 /* What is not learnt yet at least halves from one rise to the next: so the reference may double. */
-static inline ALWAYS uint16_t raised_ma(const current_control_t *control, uint16_t reference_ma,
-                                        uint16_t target_ma)
+static uint16_t raised_ma(const current_control_t *control, uint16_t reference_ma,
+                          uint16_t target_ma)
 {
     uint16_t rise_ma = reference_ma == 0 ? FIRST_MA : reference_ma;
     uint16_t slew_ma = (uint16_t)(control->parameters.slew_ma_per_tick * 2u);
@@ -175,9 +138,9 @@ static inline ALWAYS uint16_t raised_ma(const current_control_t *control, uint16
     return left_ma < rise_ma ? target_ma : (uint16_t)(reference_ma + rise_ma);
 }
 
-HOT void current_control_tick(current_control_t *control, uint8_t channels,
-                              const uint16_t target_ma[], const int16_t measured_ma[],
-                              const bool valid[], bool may_rise, uint16_t duty[])
+void current_control_tick(current_control_t *control, uint8_t channels, const uint16_t target_ma[],
+                          const int16_t measured_ma[], const bool valid[], bool may_rise,
+                          uint16_t duty[])
 {
     bool turn = !control->even_turn;
     control->even_turn = turn;
@@ -187,7 +150,6 @@ HOT void current_control_tick(current_control_t *control, uint8_t channels,
     }
     current_control_channel_t *c = control->channel;
     for (; channels != 0; channels--, c++, duty++, measured_ma++, turn = !turn) {
-        KEEP_ADDRESS(c);
         bool knows = *valid++;
         if (knows) {
             c->blind_ticks = 0;

@@ -1,16 +1,15 @@
-/* What it is for: turns wanted levels into target currents, within the limits of springs and
- * supply.
- * What it owns: the choice of policy, each spring's stage (heat, hold, lower), the observer of its
- * resistance, the derating and the queue for the shared supply.
- * What it never does: close a current loop, switch an output, divide or use floating point in a
- * tick. */
+/* What it is for: turns wanted levels into target currents, by what is believed of each spring and
+ * within the limits of springs and supply.
+ * What it owns: the choice of policy, each spring's stage, its margin, what is said of it.
+ * What it never does: judge a reading (spring_estimator does), close a current loop, switch an
+ * output. */
 #ifndef DRIVE_POLICY_H
 #define DRIVE_POLICY_H
 
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "parameter.h"
+#include "parameters.h"
 #include "spring_estimator.h"
 #include "supply_share.h"
 #include "thermal_model.h"
@@ -21,14 +20,15 @@ extern "C" {
 
 #define DRIVE_POLICY_MAX_SPRINGS THERMAL_MODEL_MAX_SPRINGS
 #define DRIVE_POLICY_LEVEL_FULL  1000u /* permille */
-#define DRIVE_POLICY_ROUND       10u /* updates, one a tick: a spring each, then the supply's share */
+#define DRIVE_POLICY_ROUND       10u   /* turns, each of one tick and of one spring in ten */
 
 typedef enum {
     DRIVE_POLICY_OPEN = 0,         /* a set current while on, nothing while off: the paper's way */
     DRIVE_POLICY_PRECOMPENSATE = 1 /* boost, then hold by the model's inverse */
 } drive_policy_kind_t;
 
-/* Which limit holds a spring's target below what its level asks for; bits. */
+/* What is said of a spring: which limit holds its target below what its level asks for, and where
+ * it is not what it was asked to be; bits. */
 typedef enum {
     DRIVE_POLICY_LIMIT_NONE = 0,
     DRIVE_POLICY_LIMIT_SAFETY = 1,      /* locked or faulted: not driven */
@@ -38,8 +38,9 @@ typedef enum {
     DRIVE_POLICY_LIMIT_UNDRIVEN = 16,   /* an undriven neighbour would come near austenite start */
     DRIVE_POLICY_LIMIT_OVERLOAD = 32, /* the board was above its continuous current for too long */
     DRIVE_POLICY_LIMIT_TRIP = 64,     /* a limit stayed fully derated: off until cleared */
-    DRIVE_POLICY_LIMIT_BLIND = 128    /* not a limit: the resistance is not trusted here, phase
-                                         and level are the model's alone */
+    DRIVE_POLICY_LIMIT_BLIND = 128,   /* its resistance shows no phase: the model alone */
+    DRIVE_POLICY_LIMIT_COOLING = 256, /* it may still be hot from before power-on: it waits */
+    DRIVE_POLICY_LIMIT_AWAY = 512     /* not where it was asked to be, or that cannot be seen */
 } drive_policy_limit_t;
 
 /* What a spring is doing under DRIVE_POLICY_PRECOMPENSATE. */
@@ -51,141 +52,74 @@ typedef enum {
 } drive_policy_stage_t;
 
 typedef struct {
-    uint8_t policy;             /* drive_policy_kind_t */
-    uint16_t open_current_ma;   /* open: current of a spring that is fully on, 0..3200 */
-    uint16_t supply_reserve_ma; /* kept free of supply_limit_ma for ripple and settling, 0..10000 */
-    /* precompensate */
-    uint16_t boost_current_ma; /* heating, 100..3200 */
-    uint16_t probe_current_ma; /* least current of a driven spring: its resistance stays readable,
-                                  100..1000 */
-    uint16_t dither_ma;        /* the current sweeps down by this and back, so that the average of
-                                  coarse voltage readings is a fine one, 0..400 */
-    uint16_t hold_margin_cc; /* above martensite start once the loss is known, 1/100 K, 50..3000 */
-    uint16_t unsure_margin_cc; /* while it is not, hold_margin_cc..5000 */
-    uint16_t search_mk_per_s;  /* how fast the margin narrows until martensite start is seen in the
-                                  resistance, mK/s, 0 (never) .. 1000 */
-    uint8_t observer;          /* 0 off, 1 the resistance corrects phase, temperature and loss */
-    uint8_t probe_period_s;    /* undriven springs get a pulse this often, 0 never .. 250 */
-    int16_t temperature_limit_cc; /* no current above, 1/100 degC, -4000..20000 */
-    uint16_t temperature_band_cc; /* derating begins this far below, 1/100 K, 100..5000 */
-    uint16_t undriven_margin_cc;  /* undriven springs stay this far below austenite start, 1/100 K,
-                                     0..5000 */
-    uint16_t overload_current_ma; /* sum of currents that the board stands for ever, 100..60000 */
-    uint16_t overload_time_s;     /* and how long more than that, 1..3000 */
-    uint16_t trip_time_s; /* fully derated for so long: off until cleared, 1..600; 0 never */
-} drive_policy_parameters_t;
-
-typedef struct {
-    parameter_range_t policy, open_current_ma, supply_reserve_ma, boost_current_ma,
-        probe_current_ma, dither_ma, hold_margin_cc, unsure_margin_cc, search_mk_per_s, observer,
-        probe_period_s, temperature_limit_cc, temperature_band_cc, undriven_margin_cc,
-        overload_current_ma, overload_time_s, trip_time_s;
-} drive_policy_ranges_t;
-extern const drive_policy_ranges_t drive_policy_ranges FLASH_MEMORY;
-
-typedef struct {
-    uint16_t granted_ma;            /* share of the supply, before dither */
-    uint16_t target_ma;             /* given in the last tick */
-    uint8_t stage;                  /* drive_policy_stage_t */
-    uint8_t flags;                  /* internal */
-    uint8_t limits;                 /* that act */
-    uint8_t severity;               /* undriven: 255 at its limit */
-    uint16_t wanted_ma;             /* before limits */
-    uint16_t asked_ma;              /* after all but the supply's */
-    uint16_t ceiling_ma;            /* by derating */
-    uint16_t floor_ma;              /* while it heats: what it has comes before other boosts */
-    float margin_k;
-    int16_t last_c7;                /* temperature one update ago */
-    uint16_t derated_updates;
-    uint8_t derating;  /* limits behind ceiling_ma */
+    float margin_k;       /* of the hold, above martensite start */
+    float severity;       /* undriven: 0 .. 1 at its limit */
+    float rise_k_per_s;   /* of its temperature, over seconds */
+    uint16_t limits;      /* drive_policy_limit_t bits that act */
+    uint16_t derating;    /* of them, those behind ceiling_ma */
+    uint16_t wanted_ma;   /* before limits */
+    uint16_t floor_ma;    /* while it heats: what it has comes before other boosts */
+    uint16_t ceiling_ma;  /* by derating */
+    uint16_t granted_ma;  /* share of the supply, before dither */
+    uint16_t target_ma;   /* given in the last tick */
+    uint16_t derated_turns; /* fully, on end */
+    uint16_t away_turns;  /* since it was asked for, or was last there */
+    int16_t last_c7;      /* temperature a turn ago */
+    uint8_t stage;        /* drive_policy_stage_t */
+    bool arrived;         /* has been there since it was asked for */
+    bool released;        /* switched off hot: no false actuation */
+    bool tripped;
 } drive_policy_spring_t;
 
 typedef struct {
     drive_policy_parameters_t parameters;
+    spring_estimator_t estimator;
+    supply_queue_t queue; /* springs that heat */
+    uint16_t overload_quarters; /* s */
+    uint16_t sum_ma;      /* of the last targets */
     uint8_t springs;
     uint8_t columns;
-    uint8_t slot;   /* of the round in which each spring is updated once */
-    uint8_t round;  /* counts */
-    uint8_t sweep;  /* of the dither */
-    uint8_t soft;   /* turns in which no target jumps: the policy has just changed */
-    uint8_t severe; /* springs whose severity is not 0 */
-    uint8_t reason; /* limit behind the supply's share */
-    bool prepared;
-    bool stale;     /* shares are worked out anew in the next tick */
-    bool stops;     /* some spring is driven no longer */
-    bool waiting;   /* some spring has less than it asks for */
-    uint8_t probed; /* spring whose pulse it is */
-    uint16_t probe_ticks;
-    uint16_t maximum_ma; /* with which the shares were worked out */
-    uint16_t supply_ma;
-    uint16_t cap_ma;            /* of the holds, if the supply is too small for them */
-    uint16_t budget_ma;         /* with which the shares were worked out */
-    uint16_t levels;            /* hash of all wanted levels */
-    uint16_t sum_ma;            /* of the last targets */
-    uint16_t left_ma;           /* of the budget: what no spring has been granted */
-    uint16_t overload_quarters; /* s */
-    supply_queue_t queue;       /* springs that heat */
+    uint8_t tick;  /* counts to the next in which no spring is updated */
+    uint8_t slot;  /* of the round in which each spring is updated once */
+    uint8_t sweep; /* of the dither */
+    bool walks;    /* the policy has changed: no target jumps until all have arrived */
     drive_policy_spring_t spring[DRIVE_POLICY_MAX_SPRINGS];
-    /* derived, see drive_policy_prepare */
-    spring_estimator_t estimator;
-    uint16_t overload_half_quarters;
-    uint16_t overload_gain; /* 2^16 over that */
-    uint16_t derating_gain; /* 2^16 over the band */
-    int16_t limit_c7;
-    int16_t undriven_c7; /* undriven springs stay below */
 } drive_policy_t;
 
 typedef struct {
-    thermal_model_t *model; /* temperatures as of the last model step; the observer corrects them */
+    thermal_model_t *model; /* temperatures as of the last model step; the estimator corrects them */
     const uint16_t *level_permille; /* wanted per spring, 0..1000 */
     const bool *allowed;            /* by safety, per spring */
     uint16_t maximum_current_ma;    /* of one spring */
     uint16_t supply_limit_ma;       /* of the sum */
     const int16_t *measured_ma;     /* of the last tick; NULL: nothing is measured */
     const int16_t *measured_mv;
-    const bool *valid;  /* per spring: the two are readings of the last tick */
-    bool model_stepped; /* in this tick, which has little time left: no spring is updated */
+    const bool *valid; /* per spring: the two are readings of the last tick */
 } drive_policy_input_t;
 
-void drive_policy_parameters_default(drive_policy_parameters_t *parameters);
-
-/* Fails if and only if a parameter is outside the range above; then *bad is its byte
- * offset in *parameters (bad may be NULL). */
+/* Fails if and only if a parameter is outside its row's range, or unsure_margin_k is below
+ * hold_margin_k; then *bad (may be NULL) is the row of parameters.def. */
 bool drive_policy_check(const drive_policy_parameters_t *parameters, uint16_t *bad);
 
-/* Fails (false, nothing changed) if and only if springs is 0 or above DRIVE_POLICY_MAX_SPRINGS or a
- * parameter is outside the range above; then *bad names it (bad may be NULL). */
+/* Nothing is known of any spring yet. Fails (false, nothing changed) as drive_policy_check does. */
 bool drive_policy_init(drive_policy_t *policy, const drive_policy_parameters_t *parameters,
-                       uint8_t springs, uint16_t *bad);
-/* Replaces the parameters. Fails as drive_policy_init does. */
+                       thermal_model_t *model, uint16_t *bad);
+/* Replaces the parameters, and takes over those of the model; what is believed stays. Fails as
+ * drive_policy_check does. */
 bool drive_policy_apply(drive_policy_t *policy, const drive_policy_parameters_t *parameters,
-                        uint16_t *bad);
-
-/* What the ticks need of the model's parameters, worked out with divisions: call it after init,
- * after apply and whenever the model's parameters change. Without it only DRIVE_POLICY_OPEN drives.
- */
-void drive_policy_prepare(drive_policy_t *policy, const thermal_model_t *model);
+                        const thermal_model_t *model, uint16_t *bad);
 
 /* One tick (20 ms). The targets' sum never exceeds supply_limit_ma - supply_reserve_ma. A spring is
- * off in the tick in which its level is 0 or it is not allowed. What else it is given follows once
- * in DRIVE_POLICY_ROUND ticks without a model step: four times a second. */
+ * off in the tick in which its level is 0 or it is not allowed. What else is decided of it follows
+ * in its turn: four times a second. */
 void drive_policy_tick(drive_policy_t *policy, const drive_policy_input_t *input,
                        uint16_t target_ma[]);
 
-/* Measured power of a spring less the loss that the observer found beyond the model's: what the
- * model must be stepped with, uW. */
-uint32_t drive_policy_model_power_uw(const drive_policy_t *policy, const thermal_model_t *model, uint8_t spring,
-                                     uint32_t power_uw);
-
-/* Bits of drive_policy_limit_t that acted on the spring in the last tick. */
-uint8_t drive_policy_limits(const drive_policy_t *policy, uint8_t spring);
-/* By how much they cut the current that it asked for, mA. */
+/* Bits of drive_policy_limit_t of the last tick. */
+uint16_t drive_policy_limits(const drive_policy_t *policy, uint8_t spring);
+/* By how much limits cut the current that it asked for, mA. */
 uint16_t drive_policy_cut_ma(const drive_policy_t *policy, uint8_t spring);
 drive_policy_stage_t drive_policy_stage(const drive_policy_t *policy, uint8_t spring);
-/* The resistance of this spring is plausible, quiet and agrees with the model. */
-bool drive_policy_observes(const drive_policy_t *policy, uint8_t spring);
-/* Austenite as the resistance says, permille; outside 0..1000 by noise. */
-int16_t drive_policy_phase_permille(const drive_policy_t *policy, uint8_t spring);
 /* Trips are forgotten. */
 void drive_policy_clear(drive_policy_t *policy);
 

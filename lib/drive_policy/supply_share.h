@@ -24,12 +24,19 @@ void supply_queue_add(supply_queue_t *queue, uint8_t spring);
 /* Nothing if it is not in. */
 void supply_queue_remove(supply_queue_t *queue, uint8_t spring);
 
-/* A cap under which the targets fit the budget (max-min fair): cap_ma (0, or what the last call
- * gave) raised towards the largest one. What is left of the budget at least halves with each of
- * SUPPLY_SHARE_PASSES, until it is below 1 mA for each capped spring. O(passes n). */
-#define SUPPLY_SHARE_PASSES 4u
-uint16_t supply_share_cap_ma(const uint16_t target_ma[], uint8_t springs, uint16_t budget_ma,
-                             uint16_t cap_ma);
+/* What one spring asks for, mA. */
+typedef struct {
+    uint16_t asked_ma;   /* in all */
+    uint16_t secured_ma; /* of that, what comes before all boosts: the hold of a spring that holds,
+                            of one in the queue what keeps what it has reached */
+} supply_claim_t;
+
+/* granted_ma[k], 0..asked_ma: secured first, cut to a common cap if they alone are too much
+ * (max-min fair); then those in the queue, one after the other, each all that it asks for or what
+ * is left of the budget: heat grows with the square of current. Springs must be below `springs`.
+ * O(n). */
+void supply_share(const supply_queue_t *queue, const supply_claim_t claim[], uint8_t springs,
+                  uint16_t budget_ma, uint16_t granted_ma[]);
 
 #ifdef __cplusplus
 }

@@ -4,10 +4,10 @@
 #include <string.h>
 
 #include "fixed_point.h"
+#include "invariant.h"
 #include "text.h"
 
 #define TICKS_PER_SECOND 50
-#define QUICK_LIMIT_MOHM 999u
 
 /* Electrical conditions, bits of safety_spring_t.suspects; their order is that of blame. */
 #define OVER_CURRENT    1u
@@ -16,77 +16,28 @@
 #define HIGH_RESISTANCE 8u
 #define STUCK_ON        16u
 
-#define RANGE(field, type, minimum, maximum)                                                       \
-    PARAMETER_RANGE(safety_parameters_t, field, type, minimum, maximum)
-const safety_ranges_t safety_ranges FLASH_MEMORY = {RANGE(over_current_ma, U16, 100, 3200),
-                                                    RANGE(supply_limit_ma, U16, 100, 60000),
-                                                    RANGE(check_current_ma, U16, 50, 3200),
-                                                    RANGE(resistance_minimum_mohm, U16, 0, 10000),
-                                                    RANGE(resistance_maximum_mohm, U16, 0, 10000),
-                                                    RANGE(stuck_on_ma, U16, 10, 3200),
-                                                    RANGE(temperature_trip_cc, S16, 0, 25000),
-                                                    RANGE(maximum_on_s, U16, 0, 65535),
-                                                    RANGE(bad_samples, U8, 1, 250)};
-
-void safety_parameters_default(safety_parameters_t *parameters)
-{
-    static const safety_parameters_t usual FLASH_MEMORY = {.over_current_ma = 3150,
-                                                           .supply_limit_ma = 15000,
-                                                           .check_current_ma = 300,
-                                                           .resistance_minimum_mohm = 80,
-                                                           .resistance_maximum_mohm = 500,
-                                                           .stuck_on_ma = 100,
-                                                           .temperature_trip_cc = 13000,
-                                                           .maximum_on_s = 0,
-                                                           .bad_samples = 5};
-    flash_copy(parameters, &usual, sizeof usual);
-}
-
 bool safety_check(const safety_parameters_t *p, uint16_t *bad)
 {
-    if (!parameter_check(p, &safety_ranges, sizeof safety_ranges, bad)) {
+    if (!parameter_check(PARAMETER_PART_SAFETY, p, bad)) {
         return false;
     }
     if (p->resistance_maximum_mohm != 0 &&
         p->resistance_maximum_mohm <= p->resistance_minimum_mohm) {
         if (bad != NULL) {
-            *bad = offsetof(safety_parameters_t, resistance_maximum_mohm);
+            *bad = PARAMETER_resistance_maximum_ohm;
         }
         return false;
     }
     return true;
 }
 
-/* Bounds of safety_tick_good: a reading within them is within the exact ones, too. */
-static void prepare_quick(safety_t *safety)
-{
-    const safety_parameters_t *p = &safety->parameters;
-    uint16_t low_mohm = p->resistance_minimum_mohm;
-    uint16_t high_mohm = p->resistance_maximum_mohm;
-    if (high_mohm == 0 || high_mohm > QUICK_LIMIT_MOHM) {
-        high_mohm = QUICK_LIMIT_MOHM;
-    }
-    safety->quick_low = 0;
-    safety->quick_high = (uint8_t)(high_mohm * 256ul / 1000u);
-    uint16_t most_ma = p->over_current_ma;
-    if (low_mohm <= QUICK_LIMIT_MOHM - 3u) {
-        safety->quick_low = (uint8_t)((low_mohm * 256ul + 999u) / 1000u);
-    } else if (most_ma >= p->check_current_ma) {
-        /* a lower bound that does not fit: no current that says something is looked at quickly */
-        most_ma = (uint16_t)(p->check_current_ma - 1u);
-    }
-    safety->quick_ma = most_ma;
-}
-
-__attribute__((noinline)) bool safety_apply(safety_t *safety, const safety_parameters_t *parameters,
-                                            uint16_t *bad)
+bool safety_apply(safety_t *safety, const safety_parameters_t *parameters, uint16_t *bad)
 {
     if (!safety_check(parameters, bad)) {
         return false;
     }
     safety->parameters = *parameters;
     safety->temperature_trip_c7 = fixed_point_c7_from_cc(parameters->temperature_trip_cc);
-    prepare_quick(safety);
     return true;
 }
 
@@ -185,8 +136,7 @@ static void count_electrical(safety_t *safety, safety_spring_t *spring, uint8_t 
     }
 }
 
-__attribute__((noinline)) void safety_tick_spring(safety_t *safety, uint8_t spring,
-                                                  const safety_sample_t *sample)
+void safety_tick_spring(safety_t *safety, uint8_t spring, const safety_sample_t *sample)
 {
     safety_spring_t *s = &safety->spring[spring];
     uint8_t limit = safety->parameters.bad_samples;
@@ -205,6 +155,9 @@ __attribute__((noinline)) void safety_tick_spring(safety_t *safety, uint8_t spri
         s->temperature = limit;
         latch(safety, s, SAFETY_FAULT_OVER_TEMPERATURE);
     }
+
+    INVARIANT(s->sensor <= limit && s->temperature <= limit);
+    INVARIANT(s->fault < SAFETY_FAULT_COUNT);
 
     if (sample->expected_ma == 0) {
         s->on_s = 0;

@@ -1,45 +1,55 @@
 #include "spring_estimator.h"
 
 #include <math.h>
-#include <stdio.h>
 
+#include "invariant.h"
 #include "spring_estimator_internal.h"
 
-#define LEAST_READINGS    4
-#define LEAST_MEAN_MA     50u
-#define SETTLING_TICKS    8
-#define SLOW_SHARE        0.0625f /* of a turn in the average: 4 s, six periods of the dither */
-#define NOISE_FIRST       0.002f
-#define NOISE_MOST        0.05f
-#define NOISE_SHARE       0.06f
-#define NOISE_SAME        0.1f /* a current that has moved by more tells nothing of the noise */
-#define THIRD_DIFFERENCES 2.449f /* sqrt(6): of a second difference over one reading's */
+#define LEAST_READINGS 4
+#define LEAST_MEAN_MA  50u
+#define SETTLING_TICKS 8
+#define SLOW_SHARE     0.0625f /* of a turn in the average: 4 s, six periods of the dither */
+#define NOISE_FIRST    0.002f
+#define NOISE_MOST     0.05f
+#define NOISE_SHARE    0.06f
+#define NOISE_SAME     0.1f   /* a current that has moved by more tells nothing of the noise */
+#define BEND_TO_SD     0.512f /* mean size of a second difference: 1 / (sqrt(6) sqrt(2 / pi)) */
 
-/* Standard deviations of a uniform tolerance of 15 and 20 %. */
-#define CAPACITY_SD       0.09f
-#define LOSS_SD           0.12f
-#define LOSS_MOST         0.45f /* of the declared loss: no more is ever believed */
-#define LOSS_DRIFT_SD     0.0005f /* of the declared loss, a second's: 3 % in a minute's root */
-#define NEIGHBOUR_SD      0.15f /* of the rise that neighbours have given */
-#define SHIFT_SD_K        3.0f  /* of a declared transformation, and of a light touch */
-#define SHIFT_MOST_K      30.0f
-#define SHIFT_DRIFT_K2    1e-4f /* a second's */
-#define COLD_SD_K         4.0f  /* of ambient */
-#define BOUND_SDS         2.6f
-#define PROBABLE_SDS      0.7f
-#define LEAST_SD_K        0.6f /* nodes of one spring differ by so much */
-#define PHASE_SD          0.02f
-#define LOOK_SD           0.12f /* of phase by a resistance that was learnt at another current */
-#define LOOK_A            0.8f
+#define CAPACITY_SD    0.09f /* of a declared heat capacity: 15 %, uniform */
+#define LOSS_SD        0.12f /* of a declared loss: 20 % */
+#define LOSS_MOST      0.45f /* of the declared loss: no more is ever believed */
+#define LOSS_DRIFT_SD  0.0005f /* of the declared loss, in a second: 3 % in an hour */
+#define NEIGHBOUR_SD   0.15f   /* of the rise of a spring that its neighbours heat */
+#define SHIFT_SD_K     3.0f    /* of declared transformation temperatures */
+#define SHIFT_MOST_K   30.0f
+#define TRUST_SD_K     4.0f    /* of ambient, or of what a reset has kept */
+#define LEAST_SD_K     0.6f    /* parts of one spring differ by so much */
+#define UNIFORM_SD     0.29f   /* of a width */
+#define FORGETS        0.9998f /* a turn's: a disturbance is forgotten within 20 minutes */
+
+#define TRUST_STILL_SDS 0.7f /* where the transformation may never show: probably over */
+#define TRUST_ONSET_SDS 1.3f /* where its beginning was seen: certainly, but for 10 % */
+
+#define PHASE_SD       0.02f
+#define PHASE_READ_SD  0.08f /* by its own resistances */
+#define PHASE_ONSET_SD 0.12f /* by one of its own, the other declared */
+#define PHASE_BLIND_SD 0.3f
+#define LOOK_SD        0.12f /* by resistances that were learnt at another current */
+#define LOOK_SDS       3.0f
+#define LOOK_MOST      0.4f
+#define LOOK_TURNS     3
+
+#define LEARNT_OHM_LEAST 0.01f
+#define LEARNT_OHM_MOST  16.0f
 
 static float clamp(float value, float low, float high)
 {
     return value < low ? low : value > high ? high : value;
 }
 
-float spring_now_c(const thermal_model_t *model, uint8_t k)
+static float from_c7(int16_t temperature_c7)
 {
-    return (float)thermal_model_temperature_c7(model, k) * (1.0f / 128.0f);
+    return (float)temperature_c7 * (1.0f / 128.0f);
 }
 
 static int16_t as_c7(float temperature_c)
@@ -47,9 +57,23 @@ static int16_t as_c7(float temperature_c)
     return (int16_t)(clamp(temperature_c, -40.0f, 215.0f) * 128.0f);
 }
 
-static float ambient_c(const thermal_model_t *model)
+float spring_now_c(const thermal_model_t *model, uint8_t k)
 {
-    return (float)model->ambient_c7 * (1.0f / 128.0f);
+    return from_c7(thermal_model_temperature_c7(model, k));
+}
+
+float spring_ambient_c(const thermal_model_t *model)
+{
+    return from_c7(thermal_model_ambient_c7(model));
+}
+
+spring_transformation_t spring_transformation(const thermal_model_t *model, uint8_t k)
+{
+    const thermal_model_transformation_t t = thermal_model_transformation(model, k);
+    return (spring_transformation_t){.martensite_finish_c = from_c7(t.martensite_finish_c7),
+                                     .martensite_start_c = from_c7(t.martensite_start_c7),
+                                     .austenite_start_c = from_c7(t.austenite_start_c7),
+                                     .austenite_finish_c = from_c7(t.austenite_finish_c7)};
 }
 
 static float hold_w(const thermal_model_t *model, uint8_t k, float temperature_c)
@@ -58,14 +82,13 @@ static float hold_w(const thermal_model_t *model, uint8_t k, float temperature_c
 }
 
 /* The temperature, its phase as if it came from martensite, or from austenite. */
-static void set_temperature(const spring_estimator_t *e, thermal_model_t *model, uint8_t k,
-                            float temperature_c, uint8_t from)
+static void set_temperature(thermal_model_t *model, uint8_t k, float temperature_c, uint8_t from)
 {
-    if (from == SPRING_PHASE_AUSTENITE) {
-        thermal_model_set_temperature(model, k, as_c7(e->austenite_finish_c + 1.0f));
-    } else if (from == SPRING_PHASE_MARTENSITE) {
-        thermal_model_set_temperature(model, k, as_c7(e->martensite_finish_c - 1.0f));
-    }
+    const spring_transformation_t t = spring_transformation(model, k);
+    thermal_model_set_temperature(model, k,
+                                  as_c7(from == SPRING_PHASE_AUSTENITE
+                                            ? t.austenite_finish_c + 1.0f
+                                            : t.martensite_finish_c - 1.0f));
     thermal_model_set_temperature(model, k, as_c7(temperature_c));
 }
 
@@ -76,22 +99,18 @@ static float distance_k2(const spring_belief_t *b)
 
 /* ---- beginning ---- */
 
-void spring_estimator_prepare(spring_estimator_t *e, const thermal_model_t *model)
+void spring_estimator_prepare(spring_estimator_t *e, const thermal_model_t *model, bool observes)
 {
     const thermal_model_parameters_t *p = &model->parameters;
+    e->observes = observes;
     e->heat_capacity_j_per_k = (float)p->heat_capacity_mj_per_k * 1e-3f;
     e->loss_w_per_k = (float)p->loss_uw_per_k * 1e-6f;
     e->martensite_ohm = (float)p->resistance_martensite_uohm * 1e-6f;
-    e->change =
-        1.0f - (float)p->resistance_martensite_uohm / (float)p->resistance_austenite_uohm;
-    e->martensite_finish_c = (float)p->martensite_finish_cc * 0.01f;
-    e->martensite_start_c = (float)p->martensite_start_cc * 0.01f;
-    e->austenite_start_c = (float)p->austenite_start_cc * 0.01f;
-    e->austenite_finish_c = (float)p->austenite_finish_cc * 0.01f;
+    e->change = 1.0f - (float)p->resistance_martensite_uohm / (float)p->resistance_austenite_uohm;
 }
 
-static void begin(const spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model,
-                  uint8_t k, float temperature_c, float sd_k, uint8_t possible)
+/* A temperature that is known to sd_k, and where its transformation lies as declared. */
+static void begin(spring_belief_t *b, float temperature_c, float sd_k, uint8_t possible)
 {
     const spring_learnt_t learnt = b->learnt;
     *b = (spring_belief_t){.variance_k2 = sd_k * sd_k + SHIFT_SD_K * SHIFT_SD_K,
@@ -101,41 +120,54 @@ static void begin(const spring_estimator_t *e, spring_belief_t *b, thermal_model
                            .noise = NOISE_FIRST,
                            .learnt = learnt,
                            .last_c = temperature_c};
-    set_temperature(e, model, k, temperature_c, SPRING_PHASE_MARTENSITE);
 }
 
-static const spring_learnt_t *nothing_learnt(const spring_estimator_t *e, spring_learnt_t *learnt)
+void spring_estimator_init(spring_estimator_t *e, thermal_model_t *model)
 {
-    *learnt = (spring_learnt_t){.change = e->change, .loss_sd_w_per_k = LOSS_SD * e->loss_w_per_k};
+    const float coldest_c = spring_ambient_c(model);
+    const float width_k = SPRING_ESTIMATOR_HOTTEST_C - coldest_c;
+    e->springs = model->springs;
+    spring_estimator_prepare(e, model, true);
+    for (uint8_t k = 0; k < e->springs; k++) {
+        e->spring[k].learnt = (spring_learnt_t){
+            .change = e->change, .loss_sd_w_per_k = LOSS_SD * e->loss_w_per_k};
+        begin(&e->spring[k], coldest_c + 0.5f * width_k, UNIFORM_SD * width_k, SPRING_PHASE_ANY);
+        set_temperature(model, k, coldest_c + 0.5f * width_k, SPRING_PHASE_MARTENSITE);
+    }
+}
+
+void spring_estimator_trust_model(spring_estimator_t *e, const thermal_model_t *model)
+{
+    for (uint8_t k = 0; k < e->springs; k++) {
+        const uint16_t austenite = thermal_model_austenite(model, k);
+        begin(&e->spring[k], spring_now_c(model, k), TRUST_SD_K,
+              austenite == 0                              ? SPRING_PHASE_MARTENSITE
+              : austenite == THERMAL_MODEL_AUSTENITE_FULL ? SPRING_PHASE_AUSTENITE
+                                                          : SPRING_PHASE_BETWEEN);
+    }
+}
+
+void spring_estimator_restore(spring_estimator_t *e, uint8_t k, const spring_learnt_t *l)
+{
+    /* written so that a NaN is left out, too */
+    const bool possible = l->austenite_ohm > LEARNT_OHM_LEAST && l->austenite_ohm < LEARNT_OHM_MOST &&
+                          fabsf(l->change) < 1.0f && l->change != 0.0f &&
+                          fabsf(l->loss_w_per_k) <= LOSS_MOST * e->loss_w_per_k &&
+                          l->loss_sd_w_per_k >= 0.0f &&
+                          l->loss_sd_w_per_k <= LOSS_SD * e->loss_w_per_k &&
+                          fabsf(l->martensite_rise_per_k) <= COEFFICIENT_MOST_PER_HEAT_K;
+    if (possible) {
+        e->spring[k].learnt = *l;
+        e->spring[k].loss_variance = l->loss_sd_w_per_k * l->loss_sd_w_per_k;
+    }
+}
+
+spring_learnt_t spring_estimator_learnt(const spring_estimator_t *e, uint8_t k)
+{
+    spring_learnt_t learnt = e->spring[k].learnt;
+    const float sd = sqrtf(e->spring[k].loss_variance);
+    learnt.loss_sd_w_per_k = sd < LOSS_SD * e->loss_w_per_k ? sd : LOSS_SD * e->loss_w_per_k;
     return learnt;
-}
-
-void spring_estimator_init(spring_estimator_t *e, thermal_model_t *model, float hottest_c)
-{
-    spring_learnt_t nothing;
-    const float coldest_c = ambient_c(model);
-    e->springs = (uint8_t)(model->parameters.rows * model->parameters.columns);
-    spring_estimator_prepare(e, model);
-    for (uint8_t k = 0; k < e->springs; k++) {
-        e->spring[k].learnt = *nothing_learnt(e, &nothing);
-        begin(e, &e->spring[k], model, k, 0.5f * (coldest_c + hottest_c),
-              0.29f * (hottest_c - coldest_c), SPRING_PHASE_ANY);
-    }
-}
-
-void spring_estimator_cold(spring_estimator_t *e, thermal_model_t *model)
-{
-    for (uint8_t k = 0; k < e->springs; k++) {
-        begin(e, &e->spring[k], model, k, ambient_c(model), COLD_SD_K, SPRING_PHASE_MARTENSITE);
-    }
-}
-
-void spring_estimator_restore(spring_estimator_t *e, uint8_t k, const spring_learnt_t *learnt)
-{
-    if (learnt->austenite_ohm > 0.0f) {
-        e->spring[k].learnt = *learnt;
-        e->spring[k].loss_variance = learnt->loss_sd_w_per_k * learnt->loss_sd_w_per_k;
-    }
 }
 
 /* ---- one turn ---- */
@@ -154,9 +186,8 @@ static void take_noise(spring_belief_t *b, float ohm, float current_a)
 {
     const bool same = fabsf(current_a - b->current_a) < NOISE_SAME * current_a;
     if (same && b->ohm_before[1] > 0.0f) {
-        const float bend = (ohm - 2.0f * b->ohm_before[0] + b->ohm_before[1]) / ohm;
-        const float noise = clamp(fabsf(bend) / THIRD_DIFFERENCES * 1.25f, 0.0f, NOISE_MOST);
-        b->noise += (noise - b->noise) * NOISE_SHARE;
+        const float bend = fabsf(ohm - 2.0f * b->ohm_before[0] + b->ohm_before[1]) / ohm;
+        b->noise += (fminf(BEND_TO_SD * bend, NOISE_MOST) - b->noise) * NOISE_SHARE;
     }
     b->ohm_before[1] = same ? b->ohm_before[0] : 0.0f;
     b->ohm_before[0] = ohm;
@@ -181,11 +212,10 @@ static void take_readings(spring_belief_t *b)
     b->readings = 0;
 }
 
-/* What this spring gives off beyond the model, at a temperature on the declared scale. */
 static float extra_loss_w(const spring_belief_t *b, const thermal_model_t *model,
                           float temperature_c)
 {
-    return b->learnt.loss_w_per_k * (temperature_c - ambient_c(model));
+    return b->learnt.loss_w_per_k * (temperature_c - spring_ambient_c(model));
 }
 
 /* How the errors of distance and loss go on in a turn. Returns the heat taken up, K. */
@@ -194,82 +224,90 @@ static float predict(const spring_estimator_t *e, spring_belief_t *b, const ther
 {
     const float now_c = spring_now_c(model, k);
     const float balance_w = hold_w(model, k, now_c);
+    const float per_w = SPRING_ESTIMATOR_TURN_S / e->heat_capacity_j_per_k;
+    const float by_loss = -per_w * (now_c - spring_ambient_c(model));
+    const float drift = LOSS_DRIFT_SD * e->loss_w_per_k;
     b->stiffness_w_per_k =
         (hold_w(model, k, now_c + 8.0f) - balance_w) * 0.125f + b->learnt.loss_w_per_k;
-    const float per_w = SPRING_ESTIMATOR_TURN_S / e->heat_capacity_j_per_k;
     const float keeps = 1.0f - per_w * b->stiffness_w_per_k;
-    const float above_k = now_c - ambient_c(model);
-    const float by_loss = -per_w * above_k;
-    const float drift = LOSS_DRIFT_SD * e->loss_w_per_k;
     b->variance_k2 = keeps * (keeps * b->variance_k2 + 2.0f * by_loss * b->covariance) +
                      by_loss * by_loss * b->loss_variance;
     b->covariance = keeps * b->covariance + by_loss * b->loss_variance;
     b->loss_variance += SPRING_ESTIMATOR_TURN_S * drift * drift;
     b->capacity_k = keeps * b->capacity_k + CAPACITY_SD * (now_c - b->last_c);
-    {static int n; extern char *getenv(const char*); if (k==2 && getenv("DBG2") && n++%80==0) fprintf(stderr,"%d sd %.2f cap %.2f lossd %.1f%% loss %.1f%% cov %.5f stiff %.2f dist %.1f lost %.3f cross %d T %.1f\n",n/4,sqrtf(b->variance_k2),b->capacity_k,100*sqrtf(b->loss_variance)/e->loss_w_per_k,100*b->learnt.loss_w_per_k/e->loss_w_per_k,b->covariance,1e3*b->stiffness_w_per_k,b->disturbance_k,b->lost,b->crossings,now_c);}
+    if (b->variance_k2 < LEAST_SD_K * LEAST_SD_K) {
+        b->variance_k2 = LEAST_SD_K * LEAST_SD_K;
+    }
     b->last_c = now_c;
     return per_w * (power_w - balance_w - extra_loss_w(b, model, now_c));
 }
 
-static void limit_loss(const spring_estimator_t *e, spring_belief_t *b)
+static void correct_loss(const spring_estimator_t *e, spring_belief_t *b, float more_w_per_k)
 {
     const float most = LOSS_MOST * e->loss_w_per_k;
-    b->learnt.loss_w_per_k = clamp(b->learnt.loss_w_per_k, -most, most);
+    b->learnt.loss_w_per_k = clamp(b->learnt.loss_w_per_k + more_w_per_k, -most, most);
 }
 
 float spring_see(const spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model, uint8_t k,
                  float seen_c, float sd_k, uint8_t from)
 {
     const float error_k = seen_c - spring_now_c(model, k);
-    const float own_k2 = b->variance_k2 + b->capacity_k * b->capacity_k;
-    const float total = own_k2 + sd_k * sd_k;
-    const float gain = own_k2 / total;
-    const float shift = fminf(b->shift_variance_k2 / total, gain);
-    const float loss = b->covariance / total;
-    set_temperature(e, model, k, seen_c - (1.0f - gain) * error_k, from);
+    const float total_k2 = distance_k2(b) + sd_k * sd_k;
+    const float gain = distance_k2(b) / total_k2;
+    const float left = 1.0f - gain;
+    const float by_loss = b->covariance / total_k2;
+    set_temperature(model, k, seen_c - left * error_k, from);
     b->last_c = spring_now_c(model, k);
-    b->shift_k = clamp(b->shift_k - shift * error_k, -SHIFT_MOST_K, SHIFT_MOST_K);
-    b->learnt.loss_w_per_k += loss * error_k;
-    limit_loss(e, b);
-    b->loss_variance -= loss * b->covariance;
-    b->covariance *= 1.0f - gain;
-    b->capacity_k *= 1.0f - gain;
-    b->shift_variance_k2 *= 1.0f - gain;
-    b->variance_k2 = fmaxf(b->variance_k2 * (1.0f - gain), LEAST_SD_K * LEAST_SD_K);
+    b->shift_k = clamp(b->shift_k - fminf(b->shift_variance_k2 / total_k2, gain) * error_k,
+                       -SHIFT_MOST_K, SHIFT_MOST_K);
+    correct_loss(e, b, by_loss * error_k);
+    b->loss_variance -= by_loss * b->covariance;
+    b->covariance *= left;
+    b->capacity_k *= left;
+    b->shift_variance_k2 *= left;
+    b->variance_k2 = fmaxf(b->variance_k2 * left, LEAST_SD_K * LEAST_SD_K);
+    INVARIANT(b->loss_variance >= 0.0f && b->variance_k2 > 0.0f);
     return error_k;
 }
 
-void spring_keep(const spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model, uint8_t k,
-                 float limit_c, uint8_t from)
+void spring_keep_above(const spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model,
+                       uint8_t k, float limit_c)
 {
     const float error_k = limit_c - spring_now_c(model, k);
-    b->learnt.loss_w_per_k += b->covariance / b->variance_k2 * error_k;
-    limit_loss(e, b);
-    set_temperature(e, model, k, limit_c, from);
-    b->last_c = spring_now_c(model, k);
+    if (error_k > 0.0f) {
+        correct_loss(e, b, b->covariance / distance_k2(b) * error_k);
+        set_temperature(model, k, limit_c, SPRING_PHASE_AUSTENITE);
+        b->last_c = spring_now_c(model, k);
+    }
 }
 
-/* What was learnt at power-on before tells the phase at the first look. */
-static void look(const spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model, uint8_t k)
+/* After power-on what was learnt before tells the phase, and so between which temperatures it is. */
+static void look(spring_belief_t *b, thermal_model_t *model, uint8_t k)
 {
     const spring_learnt_t *l = &b->learnt;
-    const float most = LOOK_SD + 3.0f * b->noise / fabsf(l->change);
-    if (b->possible != SPRING_PHASE_ANY || l->austenite_ohm == 0.0f || b->current_a < LOOK_A ||
-        b->fresh < 3 || most > 0.4f) {
+    const float unsure = LOOK_SD + LOOK_SDS * b->noise / fabsf(l->change);
+    if (b->possible != SPRING_PHASE_ANY || l->austenite_ohm == 0.0f || b->current_a < STRONG_A ||
+        b->fresh < LOOK_TURNS || unsure > LOOK_MOST) {
         return;
     }
+    const spring_transformation_t t = spring_transformation(model, k);
     const float austenite = 1.0f - (1.0f - b->slow_ohm / l->austenite_ohm) / l->change;
-    if (austenite < most) {
-        begin(e, b, model, k, 0.5f * (ambient_c(model) + e->austenite_start_c),
-              0.29f * (e->austenite_start_c - ambient_c(model)), SPRING_PHASE_MARTENSITE);
-    } else if (austenite > 1.0f - most) {
-        begin(e, b, model, k, e->austenite_start_c, 8.0f, SPRING_PHASE_AUSTENITE);
-        set_temperature(e, model, k, e->austenite_start_c, SPRING_PHASE_AUSTENITE);
-    } else {
-        begin(e, b, model, k, 0.5f * (e->martensite_finish_c + e->austenite_finish_c), 8.0f,
-              SPRING_PHASE_BETWEEN);
+    float low_c = t.martensite_finish_c;
+    float high_c = t.austenite_finish_c;
+    uint8_t phase = SPRING_PHASE_BETWEEN;
+    if (austenite < unsure) {
+        low_c = spring_ambient_c(model);
+        high_c = t.austenite_start_c;
+        phase = SPRING_PHASE_MARTENSITE;
+    } else if (austenite > 1.0f - unsure) {
+        low_c = t.martensite_start_c;
+        phase = SPRING_PHASE_AUSTENITE;
     }
-    b->fresh = 4;
+    const uint8_t fresh = b->fresh;
+    begin(b, 0.5f * (low_c + high_c), UNIFORM_SD * (high_c - low_c), phase);
+    set_temperature(model, k, 0.5f * (low_c + high_c), phase);
+    b->last_c = spring_now_c(model, k);
+    b->fresh = fresh;
 }
 
 void spring_estimator_update(spring_estimator_t *e, thermal_model_t *model, uint8_t k)
@@ -280,60 +318,69 @@ void spring_estimator_update(spring_estimator_t *e, thermal_model_t *model, uint
     const float power_w = b->reads ? b->current_a * b->current_a * b->ohm : 0.0f;
     const float heat_k = predict(e, b, model, k, power_w);
     const float moved_k = b->last_c - before_c;
-    b->disturbance_k *= 0.9998f; /* forgotten within 20 minutes */
-    if (b->reads) {
-        look(e, b, model, k);
+    b->disturbance_k *= FORGETS;
+    if (b->reads && e->observes) {
+        look(b, model, k);
         b->heat_k += heat_k;
+        spring_heating_watch(e, b, model, k);
         if (!b->blind) {
-            spring_heating_watch(e, b, model, k);
             spring_holding_watch(e, b, model, k, moved_k);
         }
     } else {
         b->mark_ohm = b->line_ohm = 0.0f;
         b->quiet = 0;
     }
-    if (spring_now_c(model, k) + BOUND_SDS * spring_estimator_sd_k(b) < e->martensite_finish_c) {
+    const float hottest_c =
+        spring_now_c(model, k) + SPRING_ESTIMATOR_BOUND_SDS * spring_estimator_sd_k(b);
+    if (hottest_c < spring_transformation(model, k).martensite_finish_c) {
         b->possible = SPRING_PHASE_MARTENSITE;
         b->lost = 0.0f;
     }
 }
 
-/* ---- what is believed ---- */
-
-void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, uint8_t k,
-                                 bool full)
-{
-    spring_belief_t *b = &e->spring[k];
-    if (full && b->possible != SPRING_PHASE_AUSTENITE) {
-        b->blind = b->blind || b->possible == SPRING_PHASE_MARTENSITE;
-        b->possible = SPRING_PHASE_AUSTENITE;
-        set_temperature(e, model, k, spring_now_c(model, k), SPRING_PHASE_AUSTENITE);
-    }
-    b->lost = 0.0f;
-    b->crossings = 0;
-    b->quiet = 0;
-    b->full_ohm = full && b->reads && b->current_a > 0.8f ? b->ohm : 0.0f;
-    b->full_c = spring_now_c(model, k);
-}
+/* ---- stages ---- */
 
 bool spring_estimator_has_transformed(const spring_estimator_t *e, const thermal_model_t *model,
                                       uint8_t k)
 {
     const spring_belief_t *b = &e->spring[k];
-    /* Where the transformation is known to show, and has still to come, it is waited for as long as
-     * it may be; else no longer than it probably takes. */
-    const bool to_come = (b->possible & SPRING_PHASE_AUSTENITE) == 0;
-    const bool shows = b->reads && !b->blind && (b->onset || b->learnt.austenite_ohm > 0.0f);
-    const float sds = b->onset ? 1.3f : to_come && shows ? BOUND_SDS : PROBABLE_SDS;
-    return b->possible == SPRING_PHASE_AUSTENITE ||
-           (!b->steep &&
-           spring_now_c(model, k) - sds * spring_estimator_sd_k(b) > e->austenite_finish_c);
+    if (b->possible == SPRING_PHASE_AUSTENITE) {
+        return true;
+    }
+    if (b->steep && b->reads) {
+        return false;
+    }
+    /* A spring whose transformation is known to show, and has not begun to, has it still to come,
+     * however hot the model is: its alloy is another one. */
+    const bool shows = b->reads && !b->blind && b->learnt.austenite_ohm > 0.0f &&
+                       (b->possible & SPRING_PHASE_AUSTENITE) == 0;
+    const float sds = b->onset ? TRUST_ONSET_SDS
+                      : shows  ? SPRING_ESTIMATOR_BOUND_SDS
+                               : TRUST_STILL_SDS;
+    return spring_now_c(model, k) - sds * spring_estimator_sd_k(b) >
+           spring_transformation(model, k).austenite_finish_c;
 }
 
-bool spring_estimator_is_cold(const spring_belief_t *b)
+void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, uint8_t k,
+                                 bool full)
 {
-    return b->possible == SPRING_PHASE_MARTENSITE;
+    spring_belief_t *b = &e->spring[k];
+    const float now_c = spring_now_c(model, k);
+    if (full && b->possible != SPRING_PHASE_AUSTENITE) {
+        b->blind = b->blind || b->possible == SPRING_PHASE_MARTENSITE;
+        b->possible = SPRING_PHASE_AUSTENITE;
+        set_temperature(model, k, now_c, SPRING_PHASE_AUSTENITE);
+    } else if (!full && b->possible == SPRING_PHASE_AUSTENITE) {
+        b->possible = SPRING_PHASE_BETWEEN | SPRING_PHASE_AUSTENITE;
+    }
+    b->lost = 0.0f;
+    b->quiet = 0;
+    b->line_ohm = 0.0f;
+    b->full_ohm = full && b->reads && b->current_a > STRONG_A ? b->ohm : 0.0f;
+    b->full_c = now_c;
 }
+
+/* ---- what is believed ---- */
 
 bool spring_estimator_sees(const spring_belief_t *b)
 {
@@ -345,50 +392,72 @@ float spring_estimator_sd_k(const spring_belief_t *b)
     return sqrtf(distance_k2(b));
 }
 
+float spring_estimator_cooling_s(const spring_estimator_t *e, const thermal_model_t *model,
+                                 uint8_t k)
+{
+    const spring_belief_t *b = &e->spring[k];
+    const float ambient_c = spring_ambient_c(model);
+    const float room_k = spring_transformation(model, k).martensite_finish_c - ambient_c;
+    const float hot_k =
+        spring_now_c(model, k) + SPRING_ESTIMATOR_BOUND_SDS * spring_estimator_sd_k(b) - ambient_c;
+    if (b->possible != SPRING_PHASE_ANY || room_k <= 0.0f || hot_k <= room_k) {
+        return 0.0f;
+    }
+    return e->heat_capacity_j_per_k / e->loss_w_per_k * logf(hot_k / room_k);
+}
+
+static spring_bounds_t around(float value, float sd)
+{
+    const float most = SPRING_ESTIMATOR_BOUND_SDS * sd;
+    return (spring_bounds_t){value, value - most, value + most};
+}
+
 spring_bounds_t spring_estimator_temperature_c(const spring_estimator_t *e,
                                                const thermal_model_t *model, uint8_t k)
 {
     const spring_belief_t *b = &e->spring[k];
-    const float value_c = spring_now_c(model, k) + b->shift_k;
-    const float neighbours_k = NEIGHBOUR_SD * (value_c - ambient_c(model));
-    const float own = b->possible == SPRING_PHASE_MARTENSITE ? neighbours_k * neighbours_k : 0.0f;
-    const float most_k = BOUND_SDS * sqrtf(distance_k2(b) + SHIFT_SD_K * SHIFT_SD_K + own);
-    return (spring_bounds_t){value_c, value_c - most_k, value_c + most_k};
+    const float now_c = spring_now_c(model, k) + b->shift_k;
+    /* what is not driven is as warm as its neighbours make it */
+    const float neighbours_k = b->possible == SPRING_PHASE_MARTENSITE
+                                   ? NEIGHBOUR_SD * (now_c - spring_ambient_c(model))
+                                   : 0.0f;
+    return around(now_c, sqrtf(distance_k2(b) + SHIFT_SD_K * SHIFT_SD_K +
+                               neighbours_k * neighbours_k));
 }
 
 spring_bounds_t spring_estimator_distance_k(const spring_estimator_t *e,
                                             const thermal_model_t *model, uint8_t k)
 {
-    const float value_k = spring_now_c(model, k) - e->martensite_start_c;
-    const float most_k = BOUND_SDS * spring_estimator_sd_k(&e->spring[k]);
-    return (spring_bounds_t){value_k, value_k - most_k, value_k + most_k};
+    return around(spring_now_c(model, k) - spring_transformation(model, k).martensite_start_c,
+                  spring_estimator_sd_k(&e->spring[k]));
 }
 
 spring_bounds_t spring_estimator_austenite(const spring_estimator_t *e,
                                            const thermal_model_t *model, uint8_t k)
 {
     const spring_belief_t *b = &e->spring[k];
+    const spring_learnt_t *l = &b->learnt;
+    const bool sees = spring_estimator_sees(b);
     float value = (float)thermal_model_austenite(model, k) * (1.0f / 32768.0f);
-    float sd = 0.3f;
+    float sd = PHASE_BLIND_SD;
     if (b->possible == SPRING_PHASE_AUSTENITE) {
-        value = clamp(1.0f - b->lost, 0.0f, 1.0f);
-        sd = b->blind ? 0.3f : PHASE_SD;
+        value = 1.0f - b->lost;
+        sd = b->blind ? PHASE_BLIND_SD : PHASE_SD;
     } else if (b->possible == SPRING_PHASE_MARTENSITE) {
-        sd = PHASE_SD;
-        value = spring_now_c(model, k) < e->austenite_start_c ? 0.0f : value;
-        if (spring_now_c(model, k) + BOUND_SDS * spring_estimator_sd_k(b) > e->austenite_start_c) {
-            sd = 0.4f;
-        }
-    } else if (b->reads && !b->blind && b->learnt.austenite_ohm > 0.0f) {
-        value = clamp(1.0f - (1.0f - b->ohm / b->learnt.austenite_ohm) / b->learnt.change, 0.0f,
-                      1.0f);
-        sd = 0.08f;
-    } else if (b->reads && !b->blind && b->onset) {
-        value = clamp((1.0f - b->onset_ohm / b->ohm) / b->learnt.change, 0.0f, 1.0f);
-        sd = 0.12f;
+        const spring_bounds_t c = spring_estimator_temperature_c(e, model, k);
+        sd = c.high < spring_transformation(model, k).austenite_start_c ? PHASE_SD : PHASE_BLIND_SD;
+    } else if (b->possible != SPRING_PHASE_ANY && sees && l->austenite_ohm > 0.0f) {
+        value = 1.0f - (1.0f - b->ohm / l->austenite_ohm) / l->change;
+        sd = PHASE_READ_SD;
+    } else if (sees && b->onset) {
+        value = (1.0f - b->onset_ohm / b->ohm) / l->change;
+        sd = PHASE_ONSET_SD;
+    } else if (b->possible == SPRING_PHASE_ANY) {
+        return (spring_bounds_t){value, 0.0f, 1.0f};
     }
-    return (spring_bounds_t){value, clamp(value - BOUND_SDS * sd, 0.0f, 1.0f),
-                             clamp(value + BOUND_SDS * sd, 0.0f, 1.0f)};
+    value = clamp(value, 0.0f, 1.0f);
+    const spring_bounds_t bounds = around(value, sd);
+    return (spring_bounds_t){value, clamp(bounds.low, 0.0f, 1.0f), clamp(bounds.high, 0.0f, 1.0f)};
 }
 
 uint32_t spring_estimator_model_power_uw(const spring_estimator_t *e, const thermal_model_t *model,

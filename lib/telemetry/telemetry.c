@@ -6,9 +6,6 @@
 #define CUT_SHIFT   6u   /* cuts are remembered in 64 mA */
 #define CUT_STEPS   8u   /* and told again when they differ by more */
 
-/* Kept out of its callers, where that is measured to be smaller. */
-#define OWN __attribute__((noinline))
-
 void telemetry_init(telemetry_t *telemetry)
 {
     telemetry->dropped = 0;
@@ -35,7 +32,7 @@ static void count_dropped(telemetry_t *telemetry, uint8_t lines)
     telemetry->dropped = dropped < lines ? UINT16_MAX : dropped;
 }
 
-/* In one struct, the large member last: the chip reaches only 63 bytes of a frame directly. */
+/* Output under construction, and the numbers that go into it. */
 typedef struct {
     text_line_t line;
     int32_t values[4];
@@ -47,7 +44,7 @@ static void start_piece(piece_t *piece)
     text_line_start(&piece->line, piece->bytes, PIECE_BYTES);
 }
 
-static OWN void add(piece_t *piece, const char *flash_text)
+static void add(piece_t *piece, const char *flash_text)
 {
     text_add_values(&piece->line, flash_text, piece->values);
 }
@@ -114,10 +111,11 @@ static void write_csv(telemetry_t *telemetry, const controller_t *controller, ui
     flush(line, output);
 }
 
-void telemetry_add_limits(text_line_t *line, uint8_t limits, char separator)
+void telemetry_add_limits(text_line_t *line, uint16_t limits, char separator)
 {
     static const char names[] FLASH_MEMORY =
-        "none\0safety\0current\0supply\0temperature\0undriven\0overload\0trip\0blind";
+        "none\0safety\0current\0supply\0temperature\0undriven\0overload\0trip\0blind\0"
+        "cooling\0away";
     uint16_t named = (uint16_t)(limits == 0 ? 1u : (unsigned)limits << 1);
     for (const char *name = names; named != 0; named >>= 1, name = text_item(name, 1)) {
         if ((named & 1u) != 0) {
@@ -139,7 +137,7 @@ static bool write_spring(telemetry_t *telemetry, const controller_t *controller,
     const uint8_t k = telemetry->next < springs ? telemetry->next : 0;
     const uint8_t number = (uint8_t)(k + 1u);
     const bool csv = telemetry->format == TELEMETRY_CSV;
-    const uint8_t limits = controller_limits(controller, k);
+    const uint16_t limits = controller_limits(controller, k);
     const uint16_t cut_ma = controller_cut_ma(controller, k);
     const uint8_t cut = (uint8_t)(cut_ma >> CUT_SHIFT);
     telemetry_told_t *const told = &telemetry->told[k];
@@ -187,8 +185,8 @@ static bool write_spring(telemetry_t *telemetry, const controller_t *controller,
     return !csv || !says; /* of status at most one line a tick */
 }
 
-OWN void telemetry_tick(telemetry_t *telemetry, const controller_t *controller, uint32_t time_ms,
-                        int16_t ambient_c7, const text_output_t *output)
+void telemetry_tick(telemetry_t *telemetry, const controller_t *controller, uint32_t time_ms,
+                    int16_t ambient_c7, const text_output_t *output)
 {
     if (telemetry->format == TELEMETRY_OFF) {
         return;

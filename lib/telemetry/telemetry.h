@@ -34,7 +34,7 @@ typedef enum {
 
 /* What was last said of a spring's limits. */
 typedef struct {
-    uint8_t limits; /* bits of drive_policy_limit_t */
+    uint16_t limits; /* bits of drive_policy_limit_t */
     uint8_t cut;    /* 64 mA */
 } telemetry_told_t;
 
@@ -56,8 +56,8 @@ bool telemetry_set(telemetry_t *telemetry, uint8_t format, uint8_t hz);
 
 /* Once per control tick; writes when a line is due. time_ms is the tick's, ambient_c7 as the
  * controller got it.
- * CSV is design section 4's log with the simulator's extra columns: per spring i{k}_a and v{k}_v as
- * measured, m{k}_c the model's temperature, d{k} the duty; then fan, ambient_c and state: "ok",
+ * CSV is the log of docs/files.md with the simulator's extra columns: per spring i{k}_a and v{k}_v
+ * as measured, m{k}_c the model's temperature, d{k} the duty; then fan, ambient_c and state: "ok",
  * "locked" or "fault_N". Between those lines, as status, which limits act on a spring and by how
  * much: "<limits|spring:5|t:12.340|supply|temperature|cut_a:2.610>", "|none|" once they have ended.
  * Once a period each spring is looked at, and told where its limits are others than those last told
@@ -71,7 +71,7 @@ void telemetry_tick(telemetry_t *telemetry, const controller_t *controller, uint
                     int16_t ambient_c7, const text_output_t *output);
 
 /* The names of the limits (bits of drive_policy_limit_t), each after the separator. */
-void telemetry_add_limits(text_line_t *line, uint8_t limits, char separator);
+void telemetry_add_limits(text_line_t *line, uint16_t limits, char separator);
 
 /* The CSV's first line in pieces: piece 0 .. springs + 1 into line. False after the last one. */
 bool telemetry_header(uint8_t springs, uint8_t piece, text_line_t *line);

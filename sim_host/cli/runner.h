@@ -30,7 +30,7 @@ struct runner_spring {
     double target_a;
     double model_c;
     double model_austenite; /* 0..1 */
-    std::uint8_t limits;    /* bits of drive_policy_limit_t */
+    std::uint16_t limits;   /* bits of drive_policy_limit_t */
     double cut_a;           /* by which they cut what the policy would give */
     std::string fault;      /* "none", or a name of docs/codes.csv */
 };
@@ -63,7 +63,7 @@ std::unique_ptr<runner> make_native_runner(const runner_request &request);
 std::unique_ptr<runner> make_avr_runner(const runner_request &request);
 
 /* The setting at a byte offset of controller_settings_t, as the user writes it. */
-std::string setting_name(std::size_t offset);
+std::string setting_name(std::uint16_t row);
 
 } // namespace ninespring
 #endif

@@ -8,6 +8,7 @@
 #include "board_view.h"
 #include "controller.h"
 #include "electrics.h"
+#include "scenario_plant.h"
 #include "simulated_board.h"
 #include "text.h"
 
@@ -78,6 +79,9 @@ public:
                 throw event.place.error("the plant refuses this temperature");
             }
             warm_thermistor();
+            return;
+        case scenario_word::set:
+            set_plant(plant_.get(), event);
             return;
         case scenario_word::fail:
         case scenario_word::repair:
@@ -170,20 +174,19 @@ private:
 
     void send_settings(const settings_t &wanted, const settings_t &fresh)
     {
-        for (std::uint8_t k = 0; k < settings_count(); ++k) {
-            settings_entry_t entry{};
-            settings_entry(k, &entry);
-            for (std::uint8_t element = 0; element < std::min<int>(entry.count, BOARD_CHANNELS);
+        for (std::uint16_t k = 0; k < PARAMETER_COUNT; ++k) {
+            const parameter_row_t row = parameter_row(k);
+            for (std::uint8_t element = 0; element < std::min<int>(row.count, BOARD_CHANNELS);
                  ++element) {
                 const std::int32_t value = settings_get(&wanted, k, element);
                 if (value == settings_get(&fresh, k, element)) {
                     continue;
                 }
                 char text[TEXT_DECIMAL_SIZE];
-                text_format_decimal(value, entry.decimals, text);
-                set(entry.count == 1 ? std::string(settings_name(k))
-                                     : fmt::format("{}_{}", settings_name(k), element + 1),
-                    text);
+                text_format_decimal(value, row.decimals, text);
+                char name[SETTINGS_NAME_SIZE];
+                settings_name(k, element, name);
+                set(name, text);
             }
         }
     }
@@ -241,6 +244,16 @@ private:
         case scenario_failure::stale:
             board_set_fault(board_->get(), BOARD_FAULT_STALE, channel, on);
             break;
+        case scenario_failure::freeze:
+            board_set_fault(board_->get(), BOARD_FAULT_FREEZE, channel, on);
+            break;
+        case scenario_failure::lie:
+            board_scale_sensor(board_->get(), channel, on ? event.amount : 1.0,
+                               on ? event.voltage_amount : 1.0);
+            break;
+        case scenario_failure::swap:
+            board_swap_sensors(board_->get(), channel, static_cast<unsigned>(event.springs[1]));
+            break;
         case scenario_failure::sda_low:
             board_set_fault(board_->get(), BOARD_FAULT_SDA_LOW, channel, on);
             break;
@@ -263,11 +276,10 @@ private:
     {
         static thermal_model_t model;
         const board_view_spring_t &seen = view_.spring[k];
-        model.pass.count = 1;
-        model.austenite_start_c7 = view_.austenite_start_c7;
-        model.martensite_start_c7 = view_.martensite_start_c7;
-        model.austenite_finish_c7 = view_.austenite_finish_c7;
-        model.martensite_finish_c7 = view_.martensite_finish_c7;
+        model.springs = 1;
+        model.transformation = {view_.martensite_finish_c7, view_.martensite_start_c7,
+                                view_.austenite_start_c7, view_.austenite_finish_c7};
+        model.spring[0].transformation_shift_c7 = seen.transformation_shift_c7;
         model.heating_position = view_.heating_position;
         model.cooling_position = view_.cooling_position;
         model.state.spring[0].heating_c7 = seen.heating_c7;

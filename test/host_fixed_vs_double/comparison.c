@@ -63,6 +63,7 @@ static void draw(thermal_model_parameters_t *p, bool latent)
     for (int i = 0; i < p->rows * p->columns; i++) {
         p->loss_scale_permille[i] = (uint16_t)between(850, 1150);
         p->heat_capacity_scale_permille[i] = (uint16_t)between(850, 1150);
+        p->transformation_shift_cc[i] = (int16_t)((int)between(0, 1600) - 800);
     }
 }
 
@@ -92,9 +93,9 @@ comparison_t compare_fixed_with_double(uint32_t first_set, uint32_t sets, uint32
         thermal_model_parameters_t p;
         draw(&p, latent);
         thermal_model_t model;
-        thermal_model_parameter_t bad = THERMAL_MODEL_ROWS;
+        uint16_t bad = PARAMETER_COUNT;
         if (thermal_model_init(&model, &p, &bad) != THERMAL_MODEL_OK) {
-            fprintf(stderr, "set %u refused: %s\n", set, thermal_model_parameter_name(bad));
+            fprintf(stderr, "set %u refused: %s\n", set, parameter_row(bad).name);
             exit(1);
         }
         reference_network_t reference;
