@@ -18,9 +18,9 @@ RETURN_ADDRESS = 3  # bytes, on a chip with more than 128 KB of flash
 SAVED_BY_HELPER = 18  # registers that __prologue_saves__ can push
 
 # Who calls through a pointer, and what can be behind it. The functions behind text_output_t and
-# settings_storage_t are in firmware/main.cpp, a word's in console.c; nothing attaches to Wire as a slave.
+# record_storage_t are in firmware/main.cpp, a record's bytes in settings_record.c, a word's in console.c; nothing attaches to Wire as a slave.
 OUTPUT = (r"serial_room", r"serial_write")
-STORAGE = (r"eeprom_read", r"eeprom_ready", r"eeprom_write")
+STORAGE = (r"eeprom_read", r"eeprom_ready", r"eeprom_write", r"record_byte")
 WORDS = (r"^word_\w+",)
 NOTHING = (r"twi_onSlave\w+",)
 INDIRECT: tuple[tuple[str, tuple[str, ...]], ...] = (
@@ -31,7 +31,7 @@ INDIRECT: tuple[tuple[str, tuple[str, ...]], ...] = (
         OUTPUT,
     ),
     (r"^(telemetry_|flush|write_csv|write_spring)", OUTPUT),
-    (r"^(settings_|examine|read_values|read_word|next_byte|value_byte|finish)", STORAGE),
+    (r"^(settings_|record_store_|examine|slot_|next_byte|take)", STORAGE),
     (r"^__vector_39", NOTHING),
     (r"^__do_global_ctors|^__tablejump2__|^__do_global_dtors", (r"^_GLOBAL__sub_I",)),
     (

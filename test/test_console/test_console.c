@@ -56,6 +56,7 @@ static settings_store_t store;
 static telemetry_t telemetry;
 static console_status_t status;
 static console_t console;
+static int32_t weak_ma; /* all that spring 3 ever has; 0: as much as is wanted */
 
 void setUp(void)
 {
@@ -70,6 +71,7 @@ void setUp(void)
     TEST_ASSERT_TRUE(controller_init(&controller, &settings.controller, 20 * 128, NULL));
     telemetry_init(&telemetry);
     console_init(&console, &output, &controller, &settings, &store, &telemetry, &status);
+    weak_ma = 0;
     room = 60000;
     said_length = 0;
     said[0] = '\0';
@@ -82,6 +84,9 @@ static void tick(void)
 {
     for (uint8_t k = 0; k < 9; k++) {
         inputs.sensor[k].current_ma = (int16_t)controller_target_ma(&controller, k);
+        if (k == 2 && weak_ma != 0 && inputs.sensor[k].current_ma > weak_ma) {
+            inputs.sensor[k].current_ma = (int16_t)weak_ma;
+        }
         inputs.sensor[k].voltage_mv = (int16_t)((inputs.sensor[k].current_ma * 18 + 50) / 100);
     }
     controller_tick(&controller, &inputs, &outputs);
@@ -335,6 +340,17 @@ static void version_says_what_became_of_the_stored_settings(void)
     }
 }
 
+static void selftest_says_which_spring_has_too_little_current(void)
+{
+    expect_ok("selftest");
+    TEST_ASSERT_NOT_NULL(strstr(said, "spring 3: sensor ok, 0.180 ohm\r"));
+    weak_ma = SELFTEST_CURRENT_MA / 2u;
+    ask("selftest");
+    TEST_ASSERT_NOT_NULL(strstr(said, "error:17 "));
+    TEST_ASSERT_NOT_NULL(strstr(said, "spring 3: sensor ok, too little current\r"));
+    TEST_ASSERT_NOT_NULL(strstr(said, "spring 4: sensor ok, 0.180 ohm\r"));
+}
+
 static void selftest_gives_the_policy_back_also_when_it_is_stopped(void)
 {
     expect_ok("policy precompensate");
@@ -514,6 +530,7 @@ int main(void)
     RUN_TEST(a_listing_pasted_into_another_board_makes_it_the_same);
     RUN_TEST(saved_settings_are_there_after_a_restart);
     RUN_TEST(version_says_what_became_of_the_stored_settings);
+    RUN_TEST(selftest_says_which_spring_has_too_little_current);
     RUN_TEST(selftest_gives_the_policy_back_also_when_it_is_stopped);
     RUN_TEST(stop_drops_the_line_that_had_begun);
     RUN_TEST(stop_ends_a_long_answer);

@@ -367,67 +367,6 @@ static void a_shifted_spring_transforms_higher(void)
     }
 }
 
-/* 1500 ppm/K of 175 mohm over 60 K is 15.75 mohm, 500 ppm/K of 219 mohm over 90 K 9.855 mohm. */
-static void resistance_of_each_phase_rises_from_20_degrees(void)
-{
-    parameters.resistance_martensite_rise_ppm_per_k = 1500;
-    parameters.resistance_austenite_rise_ppm_per_k = 500;
-    start();
-    TEST_ASSERT_UINT32_WITHIN(2, 175000, thermal_model_resistance_uohm(&model, 0));
-    thermal_model_set_temperature(&model, 0, c7(80));
-    TEST_ASSERT_UINT32_WITHIN(20, 190750, thermal_model_resistance_uohm(&model, 0));
-    thermal_model_set_temperature(&model, 0, c7(110));
-    TEST_ASSERT_UINT32_WITHIN(20, 228855, thermal_model_resistance_uohm(&model, 0));
-    /* half of each, at 60 degC: (185500 + 223380) / 2 */
-    TEST_ASSERT_UINT32_WITHIN(20, 204440,
-                              thermal_model_resistance_uohm_at(&model, 0, 16384, c7(60)));
-    parameters.resistance_martensite_rise_ppm_per_k = -3000;
-    start();
-    thermal_model_set_temperature(&model, 0, c7(80));
-    TEST_ASSERT_UINT32_WITHIN(20, 143500, thermal_model_resistance_uohm(&model, 0));
-}
-
-/* 1 A through 20 mohm: 20 mV and 20 mW that the spring does not get. */
-static void contact_is_seen_in_the_resistance_and_not_in_the_heat(void)
-{
-    parameters.contact_uohm[2] = 20000;
-    start();
-    TEST_ASSERT_EQUAL_UINT32(195000, thermal_model_resistance_uohm(&model, 2));
-    TEST_ASSERT_EQUAL_UINT32(175000, thermal_model_resistance_uohm(&model, 1));
-    TEST_ASSERT_UINT32_WITHIN(1000, 175000, thermal_model_heating_uw(&model, 2, 1000, 195));
-    TEST_ASSERT_EQUAL_UINT32(195000, thermal_model_heating_uw(&model, 1, 1000, 195));
-    TEST_ASSERT_EQUAL_UINT32(0, thermal_model_heating_uw(&model, 2, 1000, 10));
-}
-
-/* The whole loop of one spring lies 12.5 K higher, its neighbours' does not. */
-static void a_shifted_spring_transforms_higher(void)
-{
-    parameters.transformation_shift_cc[1] = 1250;
-    parameters.transformation_shift_cc[2] = -4000;
-    start();
-    TEST_ASSERT_EQUAL_INT16(c7(88), thermal_model_transformation(&model, 0).austenite_start_c7);
-    TEST_ASSERT_EQUAL_INT16(c7(80.5), thermal_model_transformation(&model, 1).martensite_finish_c7);
-    TEST_ASSERT_EQUAL_INT16(c7(38), thermal_model_transformation(&model, 2).martensite_start_c7);
-    thermal_model_set_temperature(&model, 1, c7(100.4));
-    TEST_ASSERT_EQUAL_UINT16(0, thermal_model_austenite(&model, 1));
-    thermal_model_set_temperature(&model, 1, c7(105.5));
-    TEST_ASSERT_DOUBLE_WITHIN(0.002, 0.5, phase(1));
-    thermal_model_set_temperature(&model, 1, c7(110.6));
-    thermal_model_set_temperature(&model, 1, c7(85.5));
-    TEST_ASSERT_DOUBLE_WITHIN(0.002, 0.5, phase(1));
-    for (uint8_t k = 0; k < 3; k++) { /* the same by heat: 5 K above each one's austenite start */
-        start();
-        memset(power_uw, 0, sizeof power_uw);
-        power_uw[k] = 800000;
-        const int16_t half_c7 =
-            (int16_t)(thermal_model_transformation(&model, k).austenite_start_c7 + c7(5));
-        while (thermal_model_temperature_c7(&model, k) < half_c7) {
-            run(1);
-        }
-        TEST_ASSERT_DOUBLE_WITHIN(0.02, 0.5, phase(k));
-    }
-}
-
 /* ---- conservation, symmetry --------------------------------------------------------------------
  */
 
