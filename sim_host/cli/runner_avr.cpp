@@ -276,11 +276,10 @@ private:
     {
         static thermal_model_t model;
         const board_view_spring_t &seen = view_.spring[k];
-        model.pass.count = 1;
-        model.austenite_start_c7 = view_.austenite_start_c7;
-        model.martensite_start_c7 = view_.martensite_start_c7;
-        model.austenite_finish_c7 = view_.austenite_finish_c7;
-        model.martensite_finish_c7 = view_.martensite_finish_c7;
+        model.springs = 1;
+        model.transformation = {view_.martensite_finish_c7, view_.martensite_start_c7,
+                                view_.austenite_start_c7, view_.austenite_finish_c7};
+        model.spring[0].transformation_shift_c7 = seen.transformation_shift_c7;
         model.heating_position = view_.heating_position;
         model.cooling_position = view_.cooling_position;
         model.state.spring[0].heating_c7 = seen.heating_c7;

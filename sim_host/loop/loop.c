@@ -266,12 +266,12 @@ void loop_advance(loop_t *loop, double seconds)
 static void boot(loop_t *loop, bool keeps_memory)
 {
     thermal_model_state_t state;
-    thermal_model_get_state(&loop->controller.model, &state);
+    controller_get_model_state(&loop->controller, &state);
     (void)controller_init(&loop->controller, &loop->settings, told_ambient_c7(loop), NULL);
-    if (!keeps_memory || !thermal_model_set_state(&loop->controller.model, &state)) {
+    if (!keeps_memory || !controller_set_model_state(&loop->controller, &state)) {
         /* as the firmware: as hot as they could be, just below the trip */
         int32_t hot_cc = (int32_t)loop->settings.safety.temperature_trip_cc - 500;
-        thermal_model_reset(&loop->controller.model, (int16_t)(hot_cc * 32 / 25));
+        controller_set_temperature(&loop->controller, (int16_t)(hot_cc * 32 / 25));
     }
     controller_lock(&loop->controller);
 }
