@@ -2,56 +2,27 @@
 
 from __future__ import annotations
 
-import datetime
-import json
 import os
 import signal
 import sys
-import time
 import warnings
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
-from importlib import resources
 from pathlib import Path
 from typing import Any, NoReturn
 
 import click
-import jsonschema
 import numpy as np
-from rich.console import Console
-from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from . import __version__
+from .board_commands import add_board_commands
+from .console import FILE, JSON, Group, checked, err, out, result_of, working, write
 from .errors import InputError, WorkError
-from .logs import Run, check_folder, log_text, read_bytes, read_log, sha256_of, write_atomically
+from .logs import Run, check_folder, log_text, read_log, sha256_of
 
-WIDE = 160
-"""Columns of a table that goes to a file or a pipe."""
 FEWEST_ROWS = 50
 """Logs with fewer rows than this, all together, are no measurement to fit to."""
 SHAPES = {1: (1, 1), 2: (1, 2), 4: (2, 2), 9: (3, 3), 16: (4, 4), 25: (5, 5), 36: (6, 6), 49: (7, 7), 64: (8, 8)}
 """Springs of a log, and the array they are taken for where no array.toml says it."""
-
-out = Console(highlight=False, width=None if sys.stdout.isatty() else WIDE)
-err = Console(stderr=True, highlight=False, width=None if sys.stderr.isatty() else WIDE)
-FILE = click.Path(dir_okay=False, path_type=Path)
-
-
-@contextmanager
-def _working(text: str, total: float | None = None) -> Iterator[Callable[..., None]]:
-    """Show that work goes on, on the terminal's error stream: say(words), say(words, done) with a total."""
-    with Progress(
-        SpinnerColumn(),
-        *(() if total is None else (BarColumn(),)),
-        TextColumn("{task.description}"),
-        TimeElapsedColumn(),
-        console=err,
-        transient=True,
-        disable=not err.is_terminal,
-    ) as progress:
-        task = progress.add_task(text, total=total)
-        yield lambda now, done=None: progress.update(task, description=now, completed=done)
 
 
 def _array_and_runs(array_path: Path | None, logs: tuple[Path, ...], model: Any = None) -> tuple[Any, list[Run]]:
@@ -95,28 +66,12 @@ def _say(where: str, notes: list[str]) -> None:
         err.print(where + note, style="yellow", markup=False)
 
 
-def checked(data: Mapping[str, Any]) -> str:
-    """Return a command's result as JSON text, held to its schema (results.schema.json, diagnosis.schema.json)."""
-    name = "diagnosis" if str(data.get("schema", "")).startswith("ninespring.diagnosis/") else "results"
-    schema = json.loads((resources.files("ninespring") / f"{name}.schema.json").read_text("utf-8"))
-    jsonschema.validate(data, schema)
-    return json.dumps(data, indent=1, allow_nan=False) + "\n"
-
-
-def _result(name: str, **more: Any) -> dict[str, Any]:
-    return {"schema": f"ninespring.{name}/1", "tool": f"ninespring {__version__}"} | more
-
-
-def _write(files: Mapping[Path | None, str]) -> None:
-    """Write a command's files, all or none as far as a file system goes; a file named None is not wanted."""
-    write_atomically({path: text for path, text in files.items() if path})
-
-
 def _logs_of(runs: list[Run]) -> list[dict[str, Any]]:
     return [{"file": Path(r.name).name, "sha256": r.sha256, "rows": len(r.time_s), "notes": r.notes} for r in runs]
 
 
 @click.group(
+    cls=Group,
     context_settings={"help_option_names": ["-h", "--help"]},
     epilog="Logs, models and their units: docs/files.md. From bench to calibrated chip in one page: docs/calibrating.md. "
     "Exit code 0: done; 1: the work failed; 2: the input or the arguments are wrong, and one line says what and where.",
@@ -130,8 +85,6 @@ ARRAY = click.option(
     "--array", "array_path", type=FILE, help="array.toml; left out: a square (or 1 x 2) of the paper's spring"
 )
 MODEL = click.option("--model", "model_path", type=FILE, required=True, help="model.toml that fit or diagnose wrote")
-JSON = click.option("--json", "json_path", type=FILE, help="write the result for programs")
-PORT = click.option("--port", required=True, help="serial port, e.g. /dev/ttyACM0; 115200 baud")
 
 
 @cli.command(
@@ -167,7 +120,7 @@ def fit(logs: tuple[Path, ...], array_path: Path | None, effects: str, output: P
             raise InputError("a steady table: `ninespring diagnose` fits it, effect by effect", path, 1)
     array, runs = _array_and_runs(array_path, logs)
     _say_notes(runs)
-    with _working("fitting") as say:
+    with working("fitting") as say:
         problem, chosen, base = diagnosis.fit_effects(array, runs, wanted, say)
         say("held-out blocks")
         held = diagnosis.holdout_rmse(problem, chosen)
@@ -178,7 +131,7 @@ def fit(logs: tuple[Path, ...], array_path: Path | None, effects: str, output: P
             suspect += plausibility.shifted_clock(problem, (chosen,))
     model = diagnosis.model_of(problem, chosen, runs)
     model.provenance["rmse_before_c"] = rms(base.residual)
-    result = _result(
+    result = result_of(
         "fit",
         logs=_logs_of(runs),
         rmse_before_c=rms(base.residual),
@@ -193,7 +146,7 @@ def fit(logs: tuple[Path, ...], array_path: Path | None, effects: str, output: P
         at_bounds=chosen.at_bounds(),
         warnings=suspect,
     )
-    _write({output: model_text(model), json_path: checked(result)})
+    write({output: model_text(model), json_path: checked(result)})
     _say("", suspect)
     _print_parameters(result["parameters"])
     out.print(f"error {result['rmse_c']:.3f} K, held out {held:.3f} K, noise {problem.noise_c:.3f} K -> {output}")
@@ -256,12 +209,12 @@ def diagnose(
     if any(steady.is_steady(path) for path in logs):
         if len(logs) > 1:
             raise InputError("give one steady table, or logs")
-        with _working("fitting") as say:
+        with working("fitting") as say:
             result = steady.diagnose_table(logs[0], model, array_path, frozen, say)
         page, made = report.steady_report(result), steady.model_after(result, model, array_path)
     else:
         array, runs = _array_and_runs(array_path, logs, model)
-        with _working("fitting") as say:
+        with working("fitting") as say:
             found = diagnosis.diagnose(array, runs, model=model, frozen=frozen, progress=say)
             if surrogate:
                 say("empirical surrogate")
@@ -280,7 +233,7 @@ def diagnose(
         output.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"cannot be made a folder: {error.strerror}", output) from None
-    _write(files)
+    write(files)
     for note in result["warnings"]:
         if "isolated spike" not in note:
             out.print(f"note: {note}", style="yellow", markup=False)
@@ -356,7 +309,7 @@ def predict(log: Path, model_path: Path, output: Path, chip: bool, json_path: Pa
     run = read_log(log, array.springs, temperatures=False, why=f"{model_path.name} is of {array.rows} x {array.cols}")
     run.notes += plausibility.swapped([run]) + plausibility.undriven_but_hottest(run)
     _say_notes([run])
-    with _working("simulating"):
+    with working("simulating"):
         shown = diagnosis.predict(model, run, chip)
     columns = {f"t{k + 1}_c": shown[:, k] for k in range(run.springs)}
     square = (run.temperature_c - shown) ** 2
@@ -364,7 +317,7 @@ def predict(log: Path, model_path: Path, output: Path, chip: bool, json_path: Pa
     rmse = float(np.sqrt(square[seen].mean())) if seen.any() else None
     each = [float(np.sqrt(square[seen[:, k], k].mean())) if seen[:, k].any() else None for k in range(run.springs)]
     note = model.provenance.get("note")
-    result = _result(
+    result = result_of(
         "predict",
         logs=_logs_of([run]),
         model={"file": model_path.name, "sha256": sha256_of(model_path)},
@@ -374,7 +327,7 @@ def predict(log: Path, model_path: Path, output: Path, chip: bool, json_path: Pa
         rmse_per_spring_c=each,
         **({"note": note} if note else {}),
     )
-    _write({output: log_text(run.time_s, columns), json_path: checked(result)})
+    write({output: log_text(run.time_s, columns), json_path: checked(result)})
     out.print(f"{len(run.time_s)} rows" + ("" if rmse is None else f", error {rmse:.3f} K rms") + f" -> {output}")
     if note:
         out.print(f"note: {note}", markup=False)
@@ -403,14 +356,14 @@ def export(model_path: Path, output: Path, json_path: Path | None) -> None:
     text, message = diagnosis.chip_settings(model)
     left = {e: WHY_NOT_ON_CHIP[e] for e in model.effects if e in WHY_NOT_ON_CHIP}
     settings = dict(line[1:].split("=", 1) for line in text.splitlines())
-    result = _result(
+    result = result_of(
         "export",
         model={"file": model_path.name, "sha256": sha256_of(model_path)},
         settings={name: float(value) for name, value in settings.items()},
         left_out=left,
     )
     head = [f"# from {model_path.name}", *(f"# {e} is left out: {why}" for e, why in left.items())]
-    _write({output: "\n".join([*head, text]), json_path: checked(result)})
+    write({output: "\n".join([*head, text]), json_path: checked(result)})
     if message:
         out.print(message, markup=False)
     out.print(f"{len(settings)} settings -> {output} (`ninespring upload` sends them)")
@@ -443,6 +396,9 @@ map.toml:                                          regions.toml (pixels):
 @click.option(
     "--interval", type=click.FloatRange(min=0, min_open=True), default=1.0, show_default=True, help="s a frame"
 )
+@click.option(
+    "--unit", type=click.Choice(["degC", "degF", "K"]), default="degC", show_default=True, help="of the frames"
+)
 @click.option("--times", type=FILE, help="times of the frames, s on the log's clock, one a line")
 @click.option("--offset", type=float, default=0.0, show_default=True, help="s to add to the frames' times")
 @click.option(
@@ -465,6 +421,7 @@ def import_(
     mapping: str | None,
     regions: Path | None,
     interval: float,
+    unit: str,
     offset: float,
     times: Path | None,
     statistic: str,
@@ -474,7 +431,7 @@ def import_(
 ) -> None:
     """Make a log of another logger's file (--map) or of thermal-camera frames (--regions).
 
-    SOURCE is a table with a header; or frames in degC: a .npy of (frames, height, width), a .csv, or a folder of .csv.
+    SOURCE is a table with a header; or frames: a .npy of (frames, height, width), a .csv, or a folder of .csv.
     """
     from . import importing
 
@@ -492,9 +449,9 @@ def import_(
         count, frames = importing.frames_of(source)
         if stamps is not None and len(stamps) != count:
             raise InputError(f"{len(stamps)} times for {count} frames", times)
-        with _working("reading frames", count) as say:
+        with working("reading frames", count) as say:
             columns = importing.reduce_frames(
-                source, count, frames, places, statistic, lambda row: say(f"frame {row} of {count}", row)
+                *(source, count, frames, places, statistic), lambda row: say(f"frame {row} of {count}", row), unit
             )
         if log_path:
             text = importing.merge_into_log(log_path, stamps, interval, offset, columns)
@@ -502,158 +459,13 @@ def import_(
             when = (np.arange(count) * interval if stamps is None else stamps) + offset
             text = log_text(when, columns, {"imported_from": source.name})
     header, *rows = [line for line in text.splitlines() if not line.startswith("#")]
-    result = _result("import", source=source.name, columns=header.split(","), rows=len(rows))
-    _write({output: text, json_path: checked(result)})
+    result = result_of("import", source=source.name, columns=header.split(","), rows=len(rows))
+    write({output: text, json_path: checked(result)})
     seen = sum(name.startswith("t") for name in result["columns"][1:])
     out.print(f"{len(rows)} rows, temperatures of {seen} springs -> {output}", soft_wrap=True, markup=False)
 
 
-@cli.command(
-    epilog="""\b
-Example:
-  ninespring record --port /dev/ttyACM0 --hz 1 --duration 900 --run steps.txt -o board1.csv
-\b
-steps.txt (console words; `at S` waits until so many seconds after the first row):
-  ambient 21.5
-  at 5 pattern 101000101
-  at 300 fan 100
-  at 600 off all
-"""
-)
-@PORT
-@click.option("-o", "--output", type=FILE, required=True, help="log to write")
-@click.option("--hz", type=click.IntRange(1, 50), default=1, show_default=True, help="rows a second")
-@click.option(
-    "--duration",
-    type=click.FloatRange(min=0, min_open=True),
-    default=900.0,
-    show_default=True,
-    help="s; Ctrl-C ends it earlier",
-)
-@click.option("--run", "script", type=FILE, help="console lines to send, one a line, each at its time")
-@JSON
-def record(port: str, output: Path, hz: int, duration: float, script: Path | None, json_path: Path | None) -> None:
-    """Log a board's telemetry: currents (A), voltages (V), the model's temperatures (degC).
-
-    What has come is kept, whatever ends the recording: Ctrl-C, a cable, a reset of the board. While it runs, rows go to
-    OUTPUT.part; at the end that becomes OUTPUT.
-    """
-    from .board import Board, script_lines
-    from .board import record as record_board
-
-    check_folder(output, json_path)
-    steps = script_lines(read_bytes(script).decode("utf-8", "replace"), str(script)) if script else []
-    started = datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
-    part = output.with_name(output.name + ".part")
-    with Board(port) as board, _working(f"recording from {port}", duration) as say, part.open("w") as stream:
-        try:
-            board.greet()
-            got = record_board(
-                board,
-                hz,
-                duration,
-                steps,
-                write=lambda line: print(line, file=stream, flush=True),
-                say=lambda rows, seconds: say(f"{rows} rows", seconds),
-            )
-        except BaseException:
-            part.unlink()
-            raise
-    head = [f"# recorded: {started}", f"# port: {port}", f"# tool: ninespring {__version__}"]
-    if got.dropped:
-        head.append(f"# dropped_lines: {got.dropped}")
-    result = _result("record", rows=got.rows, dropped_lines=got.dropped, ended=got.ended)
-    _write({output: "\n".join([*head, part.read_text().rstrip("\n")]) + "\n", json_path: checked(result)})
-    part.unlink()
-    out.print(f"{got.rows} rows -> {output}" + (f", {got.dropped} lines dropped" if got.dropped else ""))
-    if got.ended:
-        raise WorkError(f"{got.ended}; what had come until then is in {output}")
-
-
-@cli.command(
-    epilog="""\b
-Example:
-  ninespring upload --port /dev/ttyACM0 settings.txt
-"""
-)
-@click.argument("settings", type=FILE)
-@PORT
-@click.option("--save/--no-save", default=True, show_default=True, help="keep them in the EEPROM")
-@JSON
-def upload(settings: Path, port: str, save: bool, json_path: Path | None) -> None:
-    """Send exported settings to a board, read them back, save them.
-
-    Nothing is saved unless the board took every line and shows every value in `$$`.
-    """
-    from .board import Board, settings_lines, settings_that_differ
-
-    check_folder(json_path)
-    lines = settings_lines(read_bytes(settings).decode("utf-8", "replace"), str(settings))
-    with Board(port) as board, _working("sending", len(lines)) as say:
-        board.greet()
-        remarks: list[str] = []
-        for k, line in enumerate(lines):
-            say(line, k)
-            try:
-                remarks = board.ask(line)
-            except WorkError as error:
-                raise WorkError(f"{error}: nothing is saved, a reset of the board gives back what it had") from None
-        if remarks:
-            raise WorkError(f"the board does not take them together: {remarks[-1]}")
-        say("reading back", len(lines))
-        if wrong := settings_that_differ(lines, board.ask("$$", 10.0)):
-            raise WorkError(f"the board shows other values than were sent, nothing is saved: {'; '.join(wrong)}")
-        if save:
-            board.ask("$save", 10.0)
-    _write({json_path: checked(_result("upload", settings=len(lines), saved=save))})
-    out.print(f"{len(lines)} settings sent and read back{', saved' if save else ''}")
-
-
-@cli.command(
-    epilog="""\b
-Example:
-  ninespring monitor --port /dev/ttyACM0
-"""
-)
-@PORT
-@click.option("--hz", type=click.IntRange(1, 50), default=2, show_default=True, help="updates a second")
-@click.option("--duration", type=click.FloatRange(min=0, min_open=True), default=1e9, help="s; Ctrl-C ends it")
-def monitor(port: str, hz: int, duration: float) -> None:
-    """Show a board's temperatures and currents as they are."""
-    from rich.live import Live
-
-    from .board import Board
-
-    with Board(port) as board:
-        board.greet()
-        names: list[str] = []
-        try:
-            with Live(console=out, refresh_per_second=8) as live:
-                for line in board.telemetry(hz, time.monotonic() + duration):
-                    cells = line.split(",")
-                    if line.startswith("time_s,"):
-                        names = cells
-                    elif len(cells) == len(names):
-                        live.update(_board_table(dict(zip(names, cells, strict=True))))
-        except KeyboardInterrupt:
-            pass
-        board.stop()
-
-
-def _board_table(row: dict[str, str]) -> Table:
-    table = Table(
-        "spring",
-        "current A",
-        "voltage V",
-        "model degC",
-        "duty",
-        title=f"{row.get('time_s', '')} s, fan {row.get('fan', '')}, {row.get('state', '')}",
-    )
-    k = 1
-    while f"i{k}_a" in row:
-        table.add_row(str(k), row[f"i{k}_a"], row.get(f"v{k}_v", ""), row.get(f"m{k}_c", ""), row.get(f"d{k}", ""))
-        k += 1
-    return table
+add_board_commands(cli)
 
 
 def _end(message: str, code: int) -> NoReturn:

@@ -10,6 +10,7 @@ import hashlib
 import io
 import os
 import re
+import sys
 import tempfile
 import warnings
 from collections.abc import Callable, Iterable, Mapping
@@ -47,6 +48,12 @@ LIMITS = {
     "ambient_c": (-40.0, 60.0, "degC", "looks like Fahrenheit or kelvin: give degC"),
 }
 """Per kind of column: lowest, highest, unit, and what to do about a value beyond them."""
+BELOW = {
+    "i": "a negative current: the leads of that sensor are swapped? Turn the sign (`ninespring import --map`, scale = -1)",
+    "v": "a negative voltage: the leads of that sensor are swapped? Turn the sign (`ninespring import --map`, scale = -1)",
+    "u": "a negative command: commands run from 0 to 1",
+}
+"""What to do about a value below the lowest, where that is another thing."""
 
 
 @dataclass
@@ -99,20 +106,34 @@ def check_folder(*paths: Path | None) -> None:
             continue
         if not path.parent.is_dir():
             raise InputError(f"the folder {path.parent} does not exist: create it first", path)
-        if not os.access(path.parent, os.W_OK):
+        if not (path.exists() and not path.is_file()) and not os.access(path.parent, os.W_OK):
             raise InputError(f"the folder {path.parent} cannot be written", path)
 
 
 def write_atomically(files: Mapping[Path, str]) -> None:
-    """Write text files whole or not at all: temporary files beside them, all of them renamed at the end."""
-    check_folder(*files)
+    """Write text files whole or not at all: temporary files beside them, all of them renamed at the end.
+
+    Where a path is a link, what it points to is replaced, not the link. A device or a pipe is written as it is, `-` is
+    standard output.
+    """
+    places = {path: path if str(path) == "-" or not path.is_symlink() else path.resolve() for path in files}
+    check_folder(*places.values())
     umask = os.umask(0)
     os.umask(umask)
     made: list[tuple[str, Path]] = []
     try:
         for path, text in files.items():
-            handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-            made.append((temporary, path))
+            place = places[path]
+            if str(place) == "-":
+                sys.stdout.write(text)
+                sys.stdout.flush()
+                continue
+            if place.exists() and not place.is_file() and not place.is_dir():
+                with open(place, "w", encoding="utf-8", newline="\n") as stream:
+                    stream.write(text)
+                continue
+            handle, temporary = tempfile.mkstemp(dir=place.parent, prefix=f".{place.name}.")
+            made.append((temporary, place))
             with os.fdopen(handle, "w", encoding="utf-8", newline="\n") as stream:
                 stream.write(text)
             os.chmod(temporary, 0o666 & ~umask)
@@ -327,6 +348,8 @@ def _check_range(table: Table, name: str, kind: str) -> None:
     bad = np.flatnonzero((values < low) | (values > high))
     if bad.size:
         line, column = table.where(int(bad[0]), name)
+        if values[bad[0]] < low and abs(values[bad[0]]) <= high:
+            advice = BELOW.get(kind, advice)
         raise InputError(f"{name} = {values[bad[0]]:g} {unit}".rstrip() + f": {advice}", table.path, line, column)
 
 
