@@ -29,10 +29,15 @@ from cases import (
     plan,
     write_logs,
 )
-from ninespring import diagnosis, fitting, native, search
+from ninespring import native
 from ninespring.effects import candidates
+from ninespring.fit import problem as fitting
+from ninespring.fit.simulate import simulate_run
 from ninespring.logs import read_log
 from ninespring.models import Array
+from ninespring.search import search
+from ninespring.search.evidence import excess
+from ninespring.verdict import diagnosis
 from world import EFFECTS, OUTSIDE
 
 MATTERS = 0.5
@@ -54,7 +59,7 @@ def marginal(found: diagnosis.Diagnosis, truth: tuple[str, ...], effect: str) ->
         best = max(options, key=lambda k: screen.forecast([k])[0])
         size = screen.forecast([best])[1].get(best, 1.0)
         fit = hunt.refit(fit, [screen.candidates[best]], [size])
-    return math.sqrt(search.excess(problem, fit))
+    return math.sqrt(excess(problem, fit))
 
 
 DECLARED = {
@@ -96,14 +101,14 @@ def run_case(job: tuple[str, tuple[str, ...], int]) -> dict[str, Any]:
     plant = native.Plant(3, 3)
     plant.set_effects(found.model.effects)
     plant.set_all(found.model.parameters)
-    shown = fitting.simulate_run(plant, third, third.ambient_c, {})
+    shown = simulate_run(plant, third, third.ambient_c, {})
     third_rmse = float(np.sqrt(np.nanmean((third.temperature_c - shown) ** 2)))
     if group == "pair":
         sizes = {e: marginal(found, truth, e) for e in truth}
     elif group == "single":
-        sizes = {truth[0]: math.sqrt(search.excess(found.problem, found.baseline))}
+        sizes = {truth[0]: math.sqrt(excess(found.problem, found.baseline))}
     else:
-        sizes = {"": math.sqrt(search.excess(found.problem, found.baseline))}
+        sizes = {"": math.sqrt(excess(found.problem, found.baseline))}
     return {
         "group": group,
         "truth": list(truth),

@@ -14,10 +14,12 @@ import jsonschema
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from ninespring import cli, diagnosis
+from ninespring import cli, console
 from ninespring.errors import WorkError
+from ninespring.fit.predict import predict
 from ninespring.logs import log_text, read_log, read_table, write_atomically
 from ninespring.models import Array, Model, model_text, read_model
+from ninespring.verdict import result as fitted
 from rich.console import Console
 
 
@@ -103,14 +105,14 @@ def test_every_result_is_held_to_its_schema(make_log, tmp_path: Path) -> None:
         assert done.returncode == 0, done.stderr
         result = json.loads((tmp_path / "r.json").read_text())
         assert result["schema"] == f"ninespring.{name}/1"
-        cli.checked(result)
+        console.checked(result)
         for key in result:
             broken = dict(result)
             del broken[key]
             with pytest.raises(jsonschema.ValidationError):
-                cli.checked(broken)
+                console.checked(broken)
         with pytest.raises(jsonschema.ValidationError):
-            cli.checked(result | {"surplus": 1})
+            console.checked(result | {"surplus": 1})
 
 
 def test_the_chip_starts_again_after_gaps_and_is_seen_by_the_same_sensors(make_log) -> None:
@@ -123,7 +125,7 @@ def test_the_chip_starts_again_after_gaps_and_is_seen_by_the_same_sensors(make_l
     true = {"sensor_lag": {"sensor_lag_s": 8.0}, "edge_loss": {"edge_loss_fraction": 0.2}}
     run = read_log(make_log(effects=true, change=gap))
     model = Model(Array(), list(true), {k: v for one in true.values() for k, v in one.items()})
-    plant, chip = diagnosis.predict(model, run), diagnosis.predict(model, run, chip=True)
+    plant, chip = predict(model, run), predict(model, run, chip=True)
     assert np.abs(plant - chip).max() < 0.1
     left = run.temperature_c - chip
     assert np.sqrt(np.nanmean(left**2)) < 0.35
@@ -196,7 +198,7 @@ def test_work_that_ends_early_leaves_nothing_and_says_one_line(
         raise raised
 
     stream = io.StringIO()
-    monkeypatch.setattr(diagnosis, "model_of", ends)
+    monkeypatch.setattr(fitted, "model_of", ends)
     monkeypatch.setattr(cli, "err", Console(file=stream, width=200))
     monkeypatch.setattr(sys, "argv", ["ninespring", "fit", str(log), "-o", str(tmp_path / "m.toml")])
     before = signal.getsignal(signal.SIGTERM)

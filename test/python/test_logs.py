@@ -10,7 +10,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from ninespring import native
 from ninespring.errors import InputError
-from ninespring.fitting import simulate_run
+from ninespring.fit.simulate import simulate_run
 from ninespring.logs import condense, log_text, read_log, read_table
 
 HEADER = "time_s,i1_a,t1_c\n"

@@ -219,7 +219,7 @@ def test_values_that_really_changed_are_kept() -> None:
 
 def test_a_header_that_came_corrupt_is_asked_for_again(tmp_path: Path) -> None:
     board = FakeBoard()
-    board.stream = STREAM
+    board.stream, board.every_s = iter(STREAM), 0.05
     real, said = board.say, []
 
     def corrupt_once(*lines: str) -> None:
@@ -236,13 +236,13 @@ def test_a_header_that_came_corrupt_is_asked_for_again(tmp_path: Path) -> None:
 def test_steps_are_sent_in_their_time_and_status_is_kept_between_the_rows(tmp_path: Path) -> None:
     status = "<limits|spring:1|t:8.000|supply|cut_a:2.610>"
     board = FakeBoard()
-    board.stream = [*STREAM[:3], "[remark]", status, *STREAM[3:8]]
+    board.stream = [*STREAM[:3], status, *STREAM[3:8]]
     (tmp_path / "steps.txt").write_text("ambient 21.5\nat 0.5 = on 1   ; the first\nat 1.5 = fan 100\n")
     done = record(board, tmp_path, "--duration", 3, "--run", tmp_path / "steps.txt")
     assert done.returncode == 0, done.stderr
     lines = (tmp_path / "log.csv").read_text().splitlines()
     at = lines.index(f"# {status}")
-    assert lines[at - 1] == "# [remark]" and lines[at + 1] == row(2.0)
+    assert lines[at - 1 : at + 2] == [row(1.5), f"# {status}", row(2.0)]
     sent = board.sent()
     order = [sent.index(word) for word in ("ambient 21.5", "$$", "telemetry csv 2", "on 1", "fan 100", "off all")]
     assert order == sorted(order)

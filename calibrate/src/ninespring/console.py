@@ -13,21 +13,25 @@ from typing import Any
 
 import click
 import jsonschema
+import numpy as np
 from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.table import Table
 
 from . import __version__
 from .errors import InputError
-from .logs import write_atomically
+from .logs import Run, read_log, write_atomically
 
 WIDE = 160
 """Columns of a table that goes to a file or a pipe."""
+FEWEST_ROWS = 50
+"""Logs with fewer rows than this, all together, are no measurement to fit to."""
+SHAPES = {1: (1, 1), 2: (1, 2), 4: (2, 2), 9: (3, 3), 16: (4, 4), 25: (5, 5), 36: (6, 6), 49: (7, 7), 64: (8, 8)}
+"""Springs of a log, and the array they are taken for where no array.toml says it."""
 
 out = Console(highlight=False, width=None if sys.stdout.isatty() else WIDE)
 err = Console(stderr=True, highlight=False, width=None if sys.stderr.isatty() else WIDE)
 FILE = click.Path(dir_okay=False, path_type=Path)
-JSON = click.option("--json", "json_path", type=FILE, help="write the result for programs")
-PORT = click.option("--port", required=True, help="serial port, e.g. /dev/ttyACM0; 115200 baud")
 OUTPUTS = ("output", "json_path")
 """Parameters of commands that name files to write; every other path is an input."""
 IN_A_FOLDER = ("diagnosis.json", "report.html", "model.toml")
@@ -73,12 +77,6 @@ def _same(one: Path, other: Path) -> bool:
     return one.resolve() == other.resolve()
 
 
-class Group(click.Group):
-    """The commands."""
-
-    command_class = Command
-
-
 @contextmanager
 def working(text: str, total: float | None = None) -> Iterator[Callable[..., None]]:
     """Show that work goes on, on the terminal's error stream: say(words), say(words, done) with a total."""
@@ -95,19 +93,101 @@ def working(text: str, total: float | None = None) -> Iterator[Callable[..., Non
         yield lambda now, done=None: progress.update(task, description=now, completed=done)
 
 
+def array_and_runs(array_path: Path | None, logs: tuple[Path, ...], model: Any = None) -> tuple[Any, list[Run]]:
+    """Read logs of one array; refuse what does not go together or is no measurement."""
+    from .models import read_array
+
+    array = model.array if model else read_array(array_path) if array_path else None
+    runs = [read_log(path, array.springs if array else None) for path in logs]
+    array = array_of(array, runs)
+    modes = {run.mode for run in runs}
+    if len(modes) > 1:
+        raise InputError(f"the logs are driven by {' and '.join(sorted(modes))}: diagnose one kind at a time")
+    if (rows := sum(len(run.time_s) for run in runs)) < FEWEST_ROWS:
+        raise InputError(f"{rows} rows are too few to fit to: log some minutes (docs/calibrating.md)", runs[0].name)
+    if not any(np.any(run.drive) for run in runs):
+        raise InputError(
+            "no spring is ever driven: log what the springs were given (i1_a ... or u1 ...)", runs[0].name, 1
+        )
+    return array, runs
+
+
+def array_of(array: Any, runs: list[Run]) -> Any:
+    """Return the array of these runs; refuse what does not go together."""
+    from .models import Array
+
+    for k, run in enumerate(runs):
+        for other in runs[:k]:
+            if run.sha256 == other.sha256:
+                raise InputError(f"is the same as {other.name}: it would count twice, give it once", run.name)
+    counts = {run.springs for run in runs}
+    if len(counts) > 1:
+        raise InputError(f"the logs have {' and '.join(map(str, sorted(counts)))} springs: give logs of one array")
+    if array is None:
+        count = counts.pop()
+        if count not in SHAPES:
+            raise InputError(
+                f"{count} springs: say how they are arranged, `--array array.toml` with [array] rows and cols",
+                runs[0].name,
+                1,
+            )
+        array = Array(*SHAPES[count])
+    return array
+
+
+def notes_of(runs: list[Run]) -> None:
+    """Print what was mended of logs, and what is doubted."""
+    for run in runs:
+        notes(f"{Path(run.name).name}: ", run.notes)
+
+
+def notes(where: str, lines: list[str]) -> None:
+    """Print lines about the data, each behind `where`."""
+    for note in lines:
+        err.print(where + note, style="yellow", markup=False)
+
+
 def checked(data: Mapping[str, Any]) -> str:
-    """Return a command's result as JSON text, held to its schema (results.schema.json, diagnosis.schema.json)."""
-    name = "diagnosis" if str(data.get("schema", "")).startswith("ninespring.diagnosis/") else "results"
-    schema = json.loads((resources.files("ninespring") / f"{name}.schema.json").read_text("utf-8"))
+    """Return a command's result as JSON text, held to its schema (results.schema.json, verdict/diagnosis.schema.json)."""
+    diagnosed = str(data.get("schema", "")).startswith("ninespring.diagnosis/")
+    name = "verdict/diagnosis.schema.json" if diagnosed else "results.schema.json"
+    schema = json.loads((resources.files("ninespring") / name).read_text("utf-8"))
     jsonschema.validate(data, schema)
     return json.dumps(data, indent=1, allow_nan=False) + "\n"
 
 
-def result_of(name: str, **more: Any) -> dict[str, Any]:
-    """Return a command's result for programs, with what wrote it."""
+def outcome(name: str, **more: Any) -> dict[str, Any]:
+    """Return a command's result for programs."""
     return {"schema": f"ninespring.{name}/1", "tool": f"ninespring {__version__}"} | more
 
 
 def write(files: Mapping[Path | None, str]) -> None:
     """Write a command's files, all or none as far as a file system goes; a file named None is not wanted."""
     write_atomically({path: text for path, text in files.items() if path})
+
+
+def beside(output: Path) -> Console:
+    """Return where to talk: standard output, unless the result itself goes there."""
+    return err if str(output) == "-" else out
+
+
+def logs_of(runs: list[Run]) -> list[dict[str, Any]]:
+    """Return which logs a result is from."""
+    return [{"file": Path(r.name).name, "sha256": r.sha256, "rows": len(r.time_s), "notes": r.notes} for r in runs]
+
+
+ARRAY = click.option(
+    "--array", "array_path", type=FILE, help="array.toml; left out: a square (or 1 x 2) of the paper's spring"
+)
+MODEL = click.option("--model", "model_path", type=FILE, required=True, help="model.toml that fit or diagnose wrote")
+JSON = click.option("--json", "json_path", type=FILE, help="write the result for programs")
+PORT = click.option("--port", required=True, help="serial port, e.g. /dev/ttyACM0; 115200 baud")
+
+
+def print_parameters(parameters: dict[str, Any]) -> None:
+    """Print a table of numbers."""
+    table = Table("number", "value", "standard error", "unit", "")
+    for name, one in parameters.items():
+        error = "-" if one["stderr"] is None else f"{one['stderr']:.2g}"
+        table.add_row(name, f"{one['value']:.5g}", error, one["unit"], one.get("note", ""))
+    out.print(table)

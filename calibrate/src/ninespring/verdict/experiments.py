@@ -8,9 +8,11 @@ from typing import Any
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from . import native
-from .fitting import Fit, Problem, simulate_run
-from .logs import Run
+from .. import native
+from ..fit.problem import Problem
+from ..fit.simulate import simulate_run
+from ..fit.spec import Fit
+from ..logs.run import Run
 
 
 @dataclass

@@ -14,9 +14,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from . import statistics
-from .effects import Candidate
-from .fitting import Fit, Problem, Spec
+from ..effects import Candidate
+from ..fit.problem import Problem
+from ..fit.spec import Fit, Spec
+from .evidence import excess, gain, log_evidence
+from .screen import Screen
 
 MIN_EVIDENCE = 3.0
 """Nats an effect must win by, after the price of its numbers and of having had many to choose from."""
@@ -30,132 +32,8 @@ MIN_SHARE_UNEXPLAINED = 0.35
 """The same where structure remains at the end: nothing is adopted just because it helps a little ..."""
 MIN_TOTAL_UNEXPLAINED = 0.75
 """... and what is adopted must together explain this part of what the declared model left."""
-EQUIVALENT = 0.3
-"""Two models whose predictions differ by less than this (rms, in units of the noise) are the same in practice."""
-UNEXPLAINED = 0.5
-"""Structure left, rms in units of the noise, above which the rest counts as unexplained: less does not matter."""
-UNEXPLAINED_LOCAL = 1.0
-"""The same for one spring of one run, where the two laws of a phase change may differ for a while."""
+
 MAX_EFFECTS = 4
-DRIFTS = ("free", "slow")
-"""Variants of ambient_drift that follow anything slow. They must beat a physical cause by TOLD_APART, not just by 0."""
-SLOW_NODES = ("shared_air", "plate_conduction")
-"""Effects that are tried in the place of such a drift whatever the forecast says."""
-
-
-def handicap(one: Fit, other: Fit) -> float:
-    """Return the nats by which `one` must be ahead of `other`: more where it has a drift in a physical cause's place.
-
-    Negative the other way round; 0 where both have a drift, bent or not.
-    """
-    drifts = [dict(fit.spec.variant).get("ambient_drift") for fit in (one, other)]
-    if None not in drifts:
-        return 0.0
-    return TOLD_APART * ((drifts[0] in DRIFTS) - (drifts[1] in DRIFTS))
-
-
-def log_evidence(problem: Problem, better: Fit, other: Fit) -> float:
-    """Return by how many nats the data prefer `better`: half the difference of BIC, autocorrelation accounted for.
-
-    Two accounts, the clearer one counts. Slow structure: residuals at their effective sample size. Fast structure:
-    the innovations of an autoregression of each residual, which are nearly independent whatever remains slow.
-    """
-    factor = fit_factor(problem, better)
-    n = better.count / factor
-    k = len(better.spec.free) - len(better.stuck) - (len(other.spec.free) - len(other.stuck))
-    slow = 0.5 * n * math.log(max(other.chi2, 1e-12) / max(better.chi2, 1e-12)) - 0.5 * k * math.log(max(n, 2.0))
-    ratio = innovation(problem, other) / innovation(problem, better)
-    fast = 0.5 * better.count * math.log(max(ratio, 1e-12)) - 0.5 * k * math.log(better.count)
-    return max(slow, fast) if better.chi2 <= other.chi2 else slow
-
-
-def innovation(problem: Problem, fit: Fit) -> float:
-    """Return the variance of a residual's innovations, in units of the noise^2 (Yule-Walker, six lags)."""
-    if not math.isfinite(fit.innovation):
-        scaled = [left / noise for left, noise in zip(fit.residual, problem.noise, strict=True)]
-        rho = statistics.autocorrelation(scaled, 6)
-        matrix = rho[np.abs(np.arange(6)[:, None] - np.arange(6))] + 1e-6 * np.eye(6)
-        share = float(rho[1:] @ np.linalg.solve(matrix, rho[1:]))
-        fit.innovation = fit.sse / fit.count * max(1e-6, 1.0 - share)
-    return fit.innovation
-
-
-def fit_factor(problem: Problem, fit: Fit) -> float:
-    """Return samples per independent sample of a fit's residual."""
-    if not math.isfinite(fit.factor):
-        fit.factor = statistics.correlation_factor(
-            [left / noise for left, noise in zip(fit.residual, problem.noise, strict=True)],
-            problem.longest_lag(),
-        )
-    return fit.factor
-
-
-def gain(better: Fit, other: Fit) -> float:
-    """Return the structure that `better` explains and `other` does not, rms in units of the noise."""
-    return math.sqrt(max(0.0, other.sse - better.sse) / better.count)
-
-
-def excess(problem: Problem, fit: Fit) -> float:
-    """Return what the residual holds beyond white noise, as a mean square in units of the noise (>= 0)."""
-    return max(0.0, float(np.nanmax(structure_by_width(problem, fit))))
-
-
-def structure_by_width(problem: Problem, fit: Fit) -> np.ndarray:
-    """Return pooled structure (mean square, noise units) at block widths of 4, 12 and 40 rows."""
-    out = []
-    residual = problem.without_starts(fit.residual)
-    for width in (4, 12, 40):
-        part = statistics.structure(residual, problem.noise, width, [run.starts for run in problem.runs])
-        weight = np.array([mask.sum(axis=0) for mask in problem.mask], dtype=float)
-        weight = np.where(np.isfinite(part), weight, 0.0)
-        out.append(float(np.nansum(np.nan_to_num(part) * weight) / max(1.0, weight.sum())))
-    return np.array(out)
-
-
-def difference(problem: Problem, a: Fit, b: Fit) -> float:
-    """Return the rms difference of what two fits predict, in units of the noise."""
-    total = 0.0
-    for one, two, noise, mask in zip(a.residual, b.residual, problem.noise, problem.mask, strict=True):
-        total += float((((one - two) / noise)[mask] ** 2).sum())
-    return math.sqrt(total / a.count)
-
-
-@dataclass
-class Screen:
-    """Linear forecast around a fit: what each candidate variant, and each pair of them, would explain."""
-
-    fit: Fit
-    candidates: list[Candidate]
-    directions: np.ndarray
-    """(count, total directions), base numbers projected out."""
-    owner: np.ndarray
-    """Candidate of each direction."""
-    gram: np.ndarray
-    moment: np.ndarray
-
-    def forecast(self, chosen: Sequence[int]) -> tuple[float, dict[int, float]]:
-        """Return the drop of chi2 with these candidates, and each one's size (1 is its typical size)."""
-        columns = np.flatnonzero(np.isin(self.owner, chosen))
-        columns = columns[np.diag(self.gram)[columns] > 1e-6]
-        while columns.size:
-            matrix = self.gram[np.ix_(columns, columns)]
-            ridge = 1e-6 * np.diag(np.diag(matrix))
-            size = np.linalg.solve(matrix + ridge, self.moment[columns])
-            wrong = np.array(
-                [not self.candidates[self.owner[c]].signed and s < 0 for c, s in zip(columns, size, strict=True)]
-            )
-            if not wrong.any():
-                limit = np.array([self.candidates[self.owner[c]].most for c in columns])
-                clipped = np.clip(size, -limit, limit)
-                drop = 2 * clipped @ self.moment[columns] - clipped @ matrix @ clipped
-                sizes: dict[int, float] = {}
-                for c, s in zip(columns, clipped, strict=True):
-                    key = int(self.owner[c])
-                    if abs(s) > abs(sizes.get(key, 0.0)):
-                        sizes[key] = float(s)
-                return max(0.0, float(drop)), sizes
-            columns = columns[~wrong]
-        return 0.0, {}
 
 
 @dataclass
@@ -267,7 +145,26 @@ class Search:
         ahead = (
             log_evidence(self.problem, one, other) if one.chi2 < other.chi2 else -log_evidence(self.problem, other, one)
         )
-        return ahead > handicap(one, other)
+        return ahead > self.handicap(one, other)
+
+    def candidate_of(self, fit: Fit, effect: str) -> Candidate | None:
+        """Return the candidate by which a fit has an effect."""
+        wanted = (effect, dict(fit.spec.variant).get(effect))
+        return next((c for c in self.candidates if (c.effect, c.variant) == wanted), None)
+
+    def handicap(self, one: Fit, other: Fit) -> float:
+        """Return the nats by which `one` must be ahead: TOLD_APART where it alone has a flexible cause, and the other
+        something else in its place.
+
+        Negative the other way round; 0 where both have that effect, bent or not.
+        """
+        flexible = {c.effect for c in self.candidates if c.flexible}
+        shared = flexible & set(one.spec.effects) & set(other.spec.effects)
+        bends = [
+            any(c.flexible for e in fit.spec.effects if e not in shared and (c := self.candidate_of(fit, e)))
+            for fit in (one, other)
+        ]
+        return TOLD_APART * (bends[0] - bends[1])
 
     def holds_out(self, better: Fit, other: Fit) -> bool:
         """Return whether `better` also predicts blocks better that neither was fitted to."""
@@ -393,6 +290,7 @@ class Search:
             screen = self.screen(other)
             forecasts = []
             variant = dict(fit.spec.variant)[effect]
+            own = self.candidate_of(fit, effect)
             for k, candidate in enumerate(screen.candidates):
                 if (candidate.effect, candidate.variant) == (effect, variant):
                     continue
@@ -405,8 +303,8 @@ class Search:
             seen: set[str] = set()
             for drop, k, sizes in forecasts:
                 name = screen.candidates[k].effect
-                # where a drift took up something slow, a linear forecast says too little of a slow node
-                slow = variant in DRIFTS and effect == "ambient_drift" and name in SLOW_NODES
+                # where something flexible took up something slow, a linear forecast says too little of a slow node
+                slow = own is not None and own.flexible and screen.candidates[k].slow_node
                 if name in seen or (not slow and (len(seen) >= most or drop < 0.5 * needed)):
                     continue
                 seen.add(name)
@@ -440,18 +338,3 @@ class Search:
     def run(self) -> tuple[Fit, dict[str, Fit], list[tuple[str, Fit]]]:
         """Search; return the chosen fit, the fits without each effect, and the contenders."""
         return self.settle(self.forward(self.base))
-
-
-def unexplained(problem: Problem, fit: Fit) -> bool:
-    """Return whether structure well above the noise is left in a fit's residual."""
-    pooled = structure_by_width(problem, fit)
-    if math.sqrt(max(0.0, float(pooled.max()))) > UNEXPLAINED:
-        return True
-    residual = problem.without_starts(fit.residual)
-    for width in (12, 40):
-        local = statistics.structure(residual, problem.noise, width, [run.starts for run in problem.runs])
-        blocks = np.array([mask.sum(axis=0) for mask in problem.mask]) / width
-        spread = np.sqrt(2.0 / np.maximum(blocks, 1.0)) / width
-        if np.any(local > np.maximum(UNEXPLAINED_LOCAL**2, 6 * spread)):
-            return True
-    return False

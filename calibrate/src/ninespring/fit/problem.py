@@ -1,7 +1,7 @@
-"""Fits of the plant to logs: free numbers, parallel simulations, bounded least squares, standard errors.
+"""Runs to be explained by an array: parallel simulations, bounded least squares, standard errors.
 
-A `Spec` says what a model is (effects on, fixed values, free numbers); a `Problem` holds the runs and
-simulates them; `Problem.fit` returns a `Fit`. All residuals are measured minus model, degC.
+A `Spec` says what a model is; a `Problem` holds the runs and simulates them; `Problem.fit` returns a `Fit`.
+All residuals are measured minus model, degC.
 """
 
 from __future__ import annotations
@@ -10,16 +10,18 @@ import concurrent.futures
 import math
 import os
 import threading
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.optimize import least_squares
 
-from . import native, statistics
-from .logs import Run
-from .models import Array
+from .. import native
+from ..logs.run import Run
+from ..models import Array
+from . import statistics
+from .simulate import array_parameters, simulate_run
+from .spec import Fit, Spec
 
 WORKERS = max(1, min(8, os.cpu_count() or 1))
 _BAD = 1e3
@@ -44,159 +46,6 @@ def fold_of_rows(run: Run) -> np.ndarray:
     """Return the fold (0..FOLDS-1) of every row: blocks of BLOCK_S, or of a fifth of a short run, in turn."""
     block = min(BLOCK_S, run.duration_s / FOLDS)
     return ((run.time_s - run.time_s[0]) // max(block, 1e-9)).astype(int) % FOLDS
-
-
-@dataclass(frozen=True)
-class Free:
-    """One free number of a fit.
-
-    `names` are the plant's parameters that take its value (times `weights` where given). `ambient` numbers set a
-    run's ambient instead: a constant, or a hat function of time around `knot` of the run's knots.
-    """
-
-    key: str
-    start: float
-    low: float
-    high: float
-    unit: str
-    names: tuple[str, ...] = ()
-    log: bool = False
-    run: int | None = None
-    knot: int | None = None
-    effect: str | None = None
-    scale: float = 1.0
-    """A change that matters, in its unit (linear numbers only)."""
-
-    def inner(self, value: float) -> float:
-        """Map to the coordinate the optimiser works in."""
-        return math.log(value) if self.log else value / self.scale
-
-    def outer(self, z: float) -> float:
-        """Map back."""
-        value = math.exp(z) if self.log else z * self.scale
-        return min(self.high, max(self.low, value))
-
-    @property
-    def slope_step(self) -> float:
-        """Step of a finite difference in the inner coordinate."""
-        return 0.01 if self.log else 0.02
-
-
-@dataclass(frozen=True)
-class Spec:
-    """What a model is: effects on, values fixed, numbers free."""
-
-    effects: tuple[str, ...] = ()
-    fixed: tuple[tuple[str, float], ...] = ()
-    free: tuple[Free, ...] = ()
-    variant: tuple[tuple[str, str], ...] = ()
-    """Per effect, which variant (spring, direction, ...)."""
-
-    also_on: tuple[tuple[str, str], ...] = ()
-    """(effect, effect of the plant that is on with it)."""
-
-    def with_effect(
-        self,
-        effect: str,
-        free: Iterable[Free],
-        fixed: Iterable[tuple[str, float]],
-        variant: str,
-        also_on: Iterable[str] = (),
-    ) -> Spec:
-        """Return the spec with one more effect on."""
-        return Spec(
-            (*self.effects, effect),
-            tuple((dict(self.fixed) | dict(fixed)).items()),
-            (*self.free, *free),
-            (*self.variant, (effect, variant)),
-            (*self.also_on, *((effect, other) for other in also_on)),
-        )
-
-    @property
-    def plant_effects(self) -> tuple[str, ...]:
-        """Effects to switch on in the plant."""
-        return tuple(dict.fromkeys((*self.effects, *(other for _, other in self.also_on))))
-
-    def without(self, effect: str) -> Spec:
-        """Return the spec without an effect (its fixed values stay: they count only while it is on)."""
-        return replace(
-            self,
-            effects=tuple(e for e in self.effects if e != effect),
-            free=tuple(f for f in self.free if f.effect != effect),
-            variant=tuple(v for v in self.variant if v[0] != effect),
-            also_on=tuple(v for v in self.also_on if v[0] != effect),
-        )
-
-
-@dataclass
-class Fit:
-    """A fitted model: values, what it leaves, how sure."""
-
-    spec: Spec
-    values: np.ndarray
-    chi2: float
-    """Sum of squared residuals in units of the noise, errors of the starting temperatures whitened out."""
-    count: int
-    residual: list[np.ndarray]
-    """Per run (rows, springs), degC, NaN where nothing was measured."""
-    jacobian: np.ndarray | None = None
-    """d(residual / noise) / d(inner coordinate), (count, free)."""
-    vector: np.ndarray | None = None
-    covariance: np.ndarray | None = None
-    """Of the inner coordinates, autocorrelation taken into account."""
-    stuck: list[str] = field(default_factory=list)
-    """Numbers that the data cannot fix: held at their start."""
-    sse: float = math.nan
-    """Plain sum of squared residuals in units of the noise."""
-    factor: float = math.nan
-    """Samples per independent sample of the residual, where it has been computed."""
-    innovation: float = math.nan
-    """Variance of the residual's innovations, where it has been computed."""
-    holdout: float = math.nan
-    """Held-out rms error, degC, where it has been computed."""
-    simulations: int = 0
-
-    def value(self, key: str) -> float:
-        """Return a fitted number by key."""
-        return float(self.values[[f.key for f in self.spec.free].index(key)])
-
-    def as_dict(self) -> dict[str, float]:
-        """Return fitted numbers by key."""
-        return {f.key: float(v) for f, v in zip(self.spec.free, self.values, strict=True)}
-
-    def stderr(self) -> dict[str, float]:
-        """Return standard errors in the numbers' own units; infinite where the data say nothing."""
-        out = {}
-        for k, f in enumerate(self.spec.free):
-            if f.key in self.stuck or self.covariance is None:
-                out[f.key] = math.inf
-                continue
-            inner = math.sqrt(max(0.0, float(self.covariance[k, k])))
-            out[f.key] = inner * (abs(self.values[k]) if f.log else f.scale)
-        return out
-
-    def correlations(self, limit: float = 0.98) -> list[tuple[str, str, float]]:
-        """Return pairs of numbers whose errors are correlated beyond `limit`."""
-        if self.covariance is None:
-            return []
-        deviation = np.sqrt(np.maximum(np.diag(self.covariance), 1e-300))
-        rho = self.covariance / np.outer(deviation, deviation)
-        keys = [f.key for f in self.spec.free]
-        return [
-            (keys[a], keys[b], float(rho[a, b]))
-            for a in range(len(keys))
-            for b in range(a)
-            if abs(rho[a, b]) > limit and keys[a] not in self.stuck and keys[b] not in self.stuck
-        ]
-
-    def at_bounds(self) -> list[str]:
-        """Return keys of numbers at a bound."""
-        out = []
-        for f, v in zip(self.spec.free, self.values, strict=True):
-            z, low, high = f.inner(v), f.inner(f.low), f.inner(f.high)
-            if z <= low + 1e-3 * (high - low) or z >= high - 1e-3 * (high - low):
-                out.append(f.key)
-        return out
 
 
 class Problem:
@@ -583,84 +432,3 @@ class Problem:
             out.append(rows[mask] + base)
             base += 20
         return np.concatenate(out)
-
-
-def simulate_run(
-    plant: native.Plant,
-    run: Run,
-    ambient: np.ndarray | None,
-    values: Mapping[str, float],
-    start_offset: np.ndarray | None = None,
-) -> np.ndarray:
-    """Simulate one log as section 4 says: from its first measured temperatures (ambient where none).
-
-    After a gap the springs start again from what was measured there; air and plate carry on.
-    Air and plate start at ambient, or, where the run begins warm and steady, in balance with its first inputs.
-    """
-    if ambient is not None:
-        plant.set_ambient(float(ambient[0]))
-    plant.set_fan(float(run.fan[0]))
-    plant.reset()
-    mode = native.MODES[run.mode]
-    first = run.temperature_c[0].copy()
-    if run.warm:
-        for k in range(run.springs):
-            plant.drive(k, mode, float(run.drive[0, k]))
-        # a drifting ambient has no balance: it begins at the run's first row
-        plant.settle_without("ambient_drift", 1e6)
-    plant.start_from_measured(first + (0.0 if start_offset is None else start_offset))
-    if len(run.starts) == 1:
-        return plant.simulate(run.time_s, mode, run.drive, run.fan, ambient)
-    out = np.empty_like(run.temperature_c)
-    bounds = [*run.starts, len(run.time_s)]
-    for piece, (begin, end) in enumerate(zip(bounds[:-1], bounds[1:], strict=True)):
-        if piece:
-            across = slice(begin - 1, begin + 1)
-            plant.simulate(
-                run.time_s[across],
-                mode,
-                run.drive[across],
-                run.fan[across],
-                None if ambient is None else ambient[across],
-            )
-            plant.start_from_measured(run.temperature_c[begin])
-        part = slice(begin, end)
-        if end - begin == 1:
-            out[part] = plant.measured_c()
-            continue
-        out[part] = plant.simulate(
-            run.time_s[part],
-            mode,
-            run.drive[part],
-            run.fan[part],
-            None if ambient is None else ambient[part],
-        )
-    return out
-
-
-def array_parameters(array: Array) -> dict[str, float]:
-    """Return the plant's parameters that follow from array.toml: the host tools' rules (docs/files.md)."""
-    material, spring = array.material, array.spring
-    out = {
-        key: value for key, value in material.items() if key == "emissivity" or key.endswith(("_start_c", "_finish_c"))
-    }
-    if not material and not spring:
-        return out
-    wire_mm = spring.get("wire_diameter_mm", 0.8)
-    length_mm = 110.0
-    if "coil_diameter_mm" in spring or "turns" in spring:
-        length_mm = math.pi * spring.get("coil_diameter_mm", 3.45) * spring.get("turns", 10.0)
-    length_mm = spring.get("wire_length_mm", length_mm)
-    section_mm2 = math.pi / 4.0 * wire_mm**2
-    mass_kg = section_mm2 * length_mm * 1e-9 * material.get("density_kg_per_m3", 6450.0)
-    ohm = 1e-5 * length_mm / section_mm2
-    austenite = ohm * material.get("resistivity_austenite_uohm_cm", 100.0)
-    return out | {
-        "wire_diameter_mm": wire_mm,
-        "surface_mm2": math.pi * wire_mm * length_mm,
-        "heat_capacity_j_per_k": mass_kg * material.get("heat_capacity_j_per_kgk", 840.0),
-        "latent_heat_j": mass_kg * material.get("latent_heat_j_per_kg", 24200.0),
-        "resistance_martensite_ohm": ohm * material.get("resistivity_martensite_uohm_cm", 80.0),
-        "resistance_austenite_ohm": austenite,
-        "resistance_ohm": austenite,
-    }

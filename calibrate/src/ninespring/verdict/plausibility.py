@@ -12,9 +12,10 @@ from dataclasses import replace
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from . import statistics
-from .fitting import Fit, Problem
-from .logs import Run
+from ..fit import statistics
+from ..fit.problem import Problem
+from ..fit.spec import Fit
+from ..logs.run import Run
 
 OWN_DRIVE_SHARE = 0.5
 """Standardised coefficient (1 about: the drive alone moves the spring) from which a drive is a spring's own."""

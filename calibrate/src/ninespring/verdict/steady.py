@@ -13,40 +13,12 @@ from rich.console import Console
 from rich.table import Table
 from scipy.optimize import minimize_scalar
 
-from . import __version__, effects, native
-from .errors import InputError
-from .logs import read_bytes, read_table, sha256_of
-from .models import Array, Model, read_array
-from .search import TOLD_APART
-
-COMMAND_PARAMETER: dict[str, tuple[str, float, float, dict[str, float]]] = {
-    "radiation": ("emissivity", 0.0, 1.0, {}),
-    "natural_convection": ("convection_exponent", 0.0, 1.0, {}),
-    "shared_air": ("air_exchange_w_per_k", 0.005, 10.0, {}),
-    "plate_conduction": ("plate_coupling_w_per_k", 0.0, 0.05, {"plate_loss_w_per_k": 0.01}),
-    "fan_wake": ("wake_w_per_k", 0.0, 0.0113, {"wake_direction": 0.0}),
-    "edge_loss": ("edge_loss_fraction", -0.2, 2.0, {}),
-    "spring_mismatch": ("loss_scale", 0.05, 5.0, {}),
-    "sensor_gain": ("sensor_gain", 0.5, 2.5, {"sensor_offset_k": 0.0}),
-    "optical_mixing": ("optical_orthogonal", 0.0, 0.2, {"optical_diagonal": 0.0}),
-    "resistance_phase": ("resistance_austenite_ohm", 0.1, 0.4, {}),
-    "latent_heat": ("latent_heat_j", 0.0, 20.0, {}),
-}
-"""Per effect: the one number that is fitted, its bounds, and what is set with it."""
-
-AGAINST = {
-    "sensor_gain": "the same gain would apply to the hot springs: they would have shown far above the 99 they did",
-    "spring_mismatch": "one spring of nine made alike would have to lose that much less than its neighbours, "
-    "at every pitch, after each rebuild",
-    "shared_air": "a fan flushes the air between the springs, yet the error is as large with the fan as without",
-    "radiation": "it only adds loss: the undriven spring would be colder, not warmer",
-    "natural_convection": "with the fan on the loss is forced and depends little on temperature, yet the error "
-    "is as large",
-    "fan_wake": "it needs the fan, yet the error is there without it",
-    "optical_mixing": "Perspex is opaque from 8 to 14 um: the camera sees the plate's surface, which itself "
-    "blurs the springs; a share per neighbour would also fall with the pitch",
-    "plate_conduction": "",
-}
+from .. import __version__, effects, native
+from ..effects import Effect
+from ..errors import InputError
+from ..logs import read_bytes, read_table, sha256_of
+from ..models import Array, Model, read_array
+from ..search.search import TOLD_APART
 
 
 @dataclass
@@ -183,22 +155,35 @@ def _rms(values: np.ndarray) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
+def set_by(effect: Effect, value: float, watched: int) -> dict[str, float]:
+    """Return all that an effect's one number sets; of a number per spring only the watched one's is meant."""
+    steady = effect.steady
+    assert steady is not None
+    return (
+        dict(steady.also)
+        | {key_of(effect, watched): value}
+        | {name: share * value for name, share in steady.follows.items()}
+    )
+
+
+def key_of(effect: Effect, watched: int) -> str:
+    """Return the parameter that an effect's one number is, of the watched spring where it is one of a spring's own."""
+    assert effect.steady is not None
+    return f"{effect.steady.number}[{watched + 1}]" if effect.steady.of_one_spring else effect.steady.number
+
+
 def fit_one(
-    array: Array, declared: Mapping[str, float], effect: str, states: list[State], watched: int
+    array: Array, declared: Mapping[str, float], effect: Effect, states: list[State], watched: int
 ) -> tuple[float, dict[str, float]]:
     """Fit an effect's one number; return it and all that is set with it."""
-    name, low, high, also = COMMAND_PARAMETER[effect]
-    key = f"{name}[{watched + 1}]" if effect == "spring_mismatch" else name
-    if effect == "optical_mixing":
-        # a diagonal neighbour counts a quarter, as the plant's defaults have it
-        make = lambda v: {name: v, "optical_diagonal": 0.25 * v}  # noqa: E731
-    else:
-        make = lambda v: dict(also) | {key: v}  # noqa: E731
-    log = low > 0 and high / low > 100
-    inner = (math.log(low), math.log(high)) if log else (low, high)
+    steady = effect.steady
+    assert steady is not None
+    log = steady.low > 0 and steady.high / steady.low > 100
+    inner = (math.log(steady.low), math.log(steady.high)) if log else (steady.low, steady.high)
 
     def cost(z: float) -> float:
-        return float((errors(array, declared, {effect: make(math.exp(z) if log else z)}, states) ** 2).sum())
+        on = set_by(effect, math.exp(z) if log else z, watched)
+        return float((errors(array, declared, {effect.name: on}, states) ** 2).sum())
 
     grid = np.linspace(*inner, 25)
     values = [cost(z) for z in grid]
@@ -206,7 +191,7 @@ def fit_one(
     found = minimize_scalar(cost, bounds=(grid[max(0, k - 1)], grid[min(24, k + 1)]), method="bounded")
     z = float(found.x) if found.fun < values[k] else float(grid[k])
     value = math.exp(z) if log else z
-    return value, make(value)
+    return value, set_by(effect, value, watched)
 
 
 def diagnose_states(
@@ -219,11 +204,12 @@ def diagnose_states(
     before = errors(array, declared, {}, states)
     watched = int(np.flatnonzero(np.isfinite(states[0].measured_c))[0])
     rows = []
-    for effect in effects.IN_WORDS:
-        if effect not in COMMAND_PARAMETER:
+    for effect in effects.library():
+        name, steady = effect.name, effect.steady
+        if steady is None:
             rows.append(
                 {
-                    "name": effect,
+                    "name": name,
                     "rmse_c": _rms(before),
                     "holdout_rmse_c": _rms(before),
                     "value": None,
@@ -231,41 +217,37 @@ def diagnose_states(
                 }
             )
             continue
-        progress(f"fitting {effect}")
+        progress(f"fitting {name}")
         value, on = fit_one(array, declared, effect, states, watched)
-        left = errors(array, declared, {effect: on}, states)
+        left = errors(array, declared, {name: on}, states)
         held = []
         for k in range(len(states)):
             rest = states[:k] + states[k + 1 :]
             _, other = fit_one(array, declared, effect, rest, watched)
-            held.append(errors(array, declared, {effect: other}, [states[k]]))
-        name, low, high, _ = COMMAND_PARAMETER[effect]
+            held.append(errors(array, declared, {name: other}, [states[k]]))
+        low, high, key = steady.low, steady.high, key_of(effect, watched)
         step = max(1e-6, 1e-3 * (high - low))
-        moved = dict(on)
-        key = next(iter(k for k in on if k.startswith(name)))
-        moved[key] = min(high, value + step)
-        if effect == "optical_mixing":
-            moved["optical_diagonal"] = 0.25 * moved[key]
-        slope = (errors(array, declared, {effect: moved}, states) - left) / max(1e-12, moved[key] - value)
+        at = min(high, value + step)
+        slope = (errors(array, declared, {name: set_by(effect, at, watched)}, states) - left) / max(1e-12, at - value)
         spread = math.sqrt(float((left**2).sum()) / max(1, len(left) - 1))
         error = spread / float(np.linalg.norm(slope)) if np.linalg.norm(slope) > 0 else None
         n = len(left)
         same = np.abs(left - before).max() < 1e-6
         rows.append(
             {
-                "name": effect,
+                "name": name,
                 "rmse_c": _rms(left),
                 "holdout_rmse_c": _rms(np.concatenate(held)),
                 "value": value,
                 "set": on,
                 "parameter": key,
                 "stderr": error,
-                "unit": native.parameter_table()[name].unit,
+                "unit": native.parameter_table()[steady.number].unit,
                 "at_bound": bool(value - low < 1e-3 * (high - low) or high - value < 1e-3 * (high - low)),
                 "evidence": 0.5 * n * math.log(max(float((before**2).sum()), 1e-9) / max(float((left**2).sum()), 1e-9))
                 - 0.5 * math.log(n),
                 "residual_c": [float(v) for v in left],
-                "note": "changes nothing here" if same else AGAINST.get(effect, ""),
+                "note": "changes nothing here" if same else steady.against,
             }
         )
     order = sorted(rows, key=lambda r: r["holdout_rmse_c"])
