@@ -17,7 +17,7 @@ from rich.table import Table
 from . import __version__
 from .console import FILE, JSON, PORT, checked, err, out, outcome, working, write
 from .errors import InputError, WorkError
-from .export.command import export
+from .export.command import export, verify
 from .fit.command import fit
 from .fit.predict_command import predict
 from .import_command import import_
@@ -35,7 +35,7 @@ def cli() -> None:
     """Calibrate the thermal model of an array of NiTi springs, and say what the model lacks."""
 
 
-for command in (fit, diagnose, predict, export, import_):
+for command in (fit, diagnose, predict, export, verify, import_):
     cli.add_command(command)
 
 

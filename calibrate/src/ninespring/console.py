@@ -112,6 +112,11 @@ def write(files: Mapping[Path | None, str]) -> None:
     write_atomically({path: text for path, text in files.items() if path})
 
 
+def beside(output: Path) -> Console:
+    """Return where to talk: standard output, unless the result itself goes there."""
+    return err if str(output) == "-" else out
+
+
 def logs_of(runs: list[Run]) -> list[dict[str, Any]]:
     """Return which logs a result is from."""
     return [{"file": Path(r.name).name, "sha256": r.sha256, "rows": len(r.time_s), "notes": r.notes} for r in runs]
@@ -125,10 +130,10 @@ JSON = click.option("--json", "json_path", type=FILE, help="write the result for
 PORT = click.option("--port", required=True, help="serial port, e.g. /dev/ttyACM0; 115200 baud")
 
 
-def print_parameters(parameters: dict[str, Any]) -> None:
+def print_parameters(console: Console, parameters: dict[str, Any]) -> None:
     """Print a table of numbers."""
     table = Table("number", "value", "standard error", "unit", "")
     for name, one in parameters.items():
         error = "-" if one["stderr"] is None else f"{one['stderr']:.2g}"
         table.add_row(name, f"{one['value']:.5g}", error, one["unit"], one.get("note", ""))
-    out.print(table)
+    console.print(table)

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 import numpy as np
 
-from .console import FILE, JSON, checked, out, outcome, working, write
+from .console import FILE, JSON, beside, checked, outcome, working, write
 from .errors import InputError
 from .logs import check_folder, log_text
 
@@ -101,4 +101,4 @@ def import_(
     result = outcome("import", source=source.name, columns=header.split(","), rows=len(rows))
     write({output: text, json_path: checked(result)})
     seen = sum(name.startswith("t") for name in result["columns"][1:])
-    out.print(f"{len(rows)} rows, temperatures of {seen} springs -> {output}", soft_wrap=True, markup=False)
+    beside(output).print(f"{len(rows)} rows, temperatures of {seen} springs -> {output}", soft_wrap=True, markup=False)

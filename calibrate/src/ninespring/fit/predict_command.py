@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 import numpy as np
 
-from ..console import FILE, JSON, MODEL, checked, logs_of, notes_of, out, outcome, working, write
+from ..console import FILE, JSON, MODEL, beside, checked, logs_of, notes_of, outcome, working, write
 from ..logs import check_folder, log_text, read_log, sha256_of
 
 
@@ -57,6 +57,8 @@ def predict(log: Path, model_path: Path, output: Path, chip: bool, json_path: Pa
         **({"note": note} if note else {}),
     )
     write({output: log_text(run.time_s, columns), json_path: checked(result)})
-    out.print(f"{len(run.time_s)} rows" + ("" if rmse is None else f", error {rmse:.3f} K rms") + f" -> {output}")
+    beside(output).print(
+        f"{len(run.time_s)} rows" + ("" if rmse is None else f", error {rmse:.3f} K rms") + f" -> {output}"
+    )
     if note:
-        out.print(f"note: {note}", markup=False)
+        beside(output).print(f"note: {note}", markup=False)

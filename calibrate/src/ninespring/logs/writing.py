@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import hashlib
 import os
+import sys
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
 from ..errors import InputError
+
+STANDARD_OUTPUT = "-"
 
 
 def sha256_of(path: str | Path) -> str:
@@ -23,27 +26,42 @@ def sha256_of(path: str | Path) -> str:
     return digest.hexdigest()
 
 
-def check_folder(*paths: Path | None) -> None:
-    """Refuse output files whose folder is not there or cannot be written, before any work is done."""
+def check_folder(*paths: Path | None, inputs: Iterable[Path | None] = ()) -> None:
+    """Refuse output files before any work is done: no folder, no right to write, or a command's own input."""
+    read = [path for path in inputs if path is not None and path.exists()]
     for path in paths:
-        if path is None:
+        if path is None or str(path) == STANDARD_OUTPUT:
             continue
         if not path.parent.is_dir():
             raise InputError(f"the folder {path.parent} does not exist: create it first", path)
-        if not os.access(path.parent, os.W_OK):
+        if path.exists() and any(os.path.samefile(path, one) for one in read):
+            raise InputError("would be written over its own input: give another name", path)
+        if not os.access(Path(os.path.realpath(path)).parent, os.W_OK) and not _is_device(path):
             raise InputError(f"the folder {path.parent} cannot be written", path)
 
 
+def _is_device(path: Path) -> bool:
+    return path.exists() and not path.is_file()
+
+
 def write_atomically(files: Mapping[Path, str]) -> None:
-    """Write text files whole or not at all: temporary files beside them, all of them renamed at the end."""
+    """Write text files whole or not at all: temporary files beside them, all of them renamed at the end.
+
+    A link stays a link: the file that it leads to is written. What is no file (a device, a pipe) is written into, and
+    `-` is standard output; both last, when nothing else can fail.
+    """
     check_folder(*files)
     umask = os.umask(0)
     os.umask(umask)
     made: list[tuple[str, Path]] = []
+    streams = {path: text for path, text in files.items() if str(path) == STANDARD_OUTPUT or _is_device(path)}
     try:
         for path, text in files.items():
-            handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-            made.append((temporary, path))
+            if path in streams:
+                continue
+            target = Path(os.path.realpath(path))
+            handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
+            made.append((temporary, target))
             with os.fdopen(handle, "w", encoding="utf-8", newline="\n") as stream:
                 stream.write(text)
             os.chmod(temporary, 0o666 & ~umask)
@@ -53,6 +71,13 @@ def write_atomically(files: Mapping[Path, str]) -> None:
     finally:
         for temporary, _ in made:
             os.unlink(temporary)
+    for path, text in streams.items():
+        if str(path) == STANDARD_OUTPUT:
+            sys.stdout.write(text)
+            sys.stdout.flush()
+        else:
+            with path.open("w", encoding="utf-8", newline="\n") as stream:
+                stream.write(text)
 
 
 def read_bytes(path: str | Path) -> bytes:

@@ -75,6 +75,8 @@ def diagnose(
             page = report.html_report(found)
         result, made = found.result, found.model
     text = checked(result)
+    check_folder(
+        *(output / name for name in ("diagnosis.json", "report.html", "model.toml") if output.is_dir()))
     files: dict[Path | None, str] = {
         output / "diagnosis.json": text,
         output / "report.html": page,
