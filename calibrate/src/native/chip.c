@@ -49,27 +49,21 @@ int chip_export(const plant_t *plant, char *text, size_t text_size, char *messag
     const size_t springs =
         (size_t)settings.controller.model.rows * settings.controller.model.columns;
     size_t used = 0;
-    for (uint8_t k = 0; k < settings_count(); k++) {
-        settings_entry_t entry;
-        settings_entry(k, &entry);
-        if (entry.offset >=
-                offsetof(settings_t, controller.model) + sizeof settings.controller.model ||
-            entry.offset < offsetof(settings_t, controller.model)) {
+    for (uint16_t k = 0; k < PARAMETER_COUNT; k++) {
+        const parameter_row_t row = parameter_row(k);
+        if (row.part != PARAMETER_PART_MODEL) {
             continue;
         }
-        for (uint8_t element = 0; element < entry.count; element++) {
-            if (entry.count > 1 && element >= springs) {
+        for (uint8_t element = 0; element < row.count; element++) {
+            if (row.count > 1 && element >= springs) {
                 break;
             }
             char value[TEXT_DECIMAL_SIZE];
+            char name[SETTINGS_NAME_SIZE];
             char line[SETTINGS_NAME_SIZE + TEXT_DECIMAL_SIZE + 8];
-            (void)text_format_decimal(settings_get(&settings, k, element), entry.decimals, value);
-            if (entry.count > 1) {
-                (void)snprintf(line, sizeof line, "$%s_%u=%s\n", settings_name(k), element + 1u,
-                               value);
-            } else {
-                (void)snprintf(line, sizeof line, "$%s=%s\n", settings_name(k), value);
-            }
+            (void)text_format_decimal(settings_get(&settings, k, element), row.decimals, value);
+            settings_name(k, element, name);
+            (void)snprintf(line, sizeof line, "$%s=%s\n", name, value);
             if (!append(text, text_size, &used, line)) {
                 return -10;
             }

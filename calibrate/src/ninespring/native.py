@@ -328,7 +328,7 @@ def chip_export(plant: Plant) -> tuple[str, str]:
     """Return the console lines of the on-chip model with this plant's numbers, and what was left out."""
     from .errors import WorkError
 
-    text, message = ctypes.create_string_buffer(16384), ctypes.create_string_buffer(512)
+    text, message = ctypes.create_string_buffer(16384), ctypes.create_string_buffer(1024)
     call = library().chip_export
     call.restype = ctypes.c_int
     call.argtypes = (ctypes.c_void_p, ctypes.c_char_p, ctypes.c_size_t, ctypes.c_char_p, ctypes.c_size_t)
@@ -355,7 +355,7 @@ def chip_simulate(
     power_w = np.ascontiguousarray(power_w, dtype=float)
     arrays = [np.ascontiguousarray(a, dtype=float) for a in (time_s, power_w, fan, ambient_c, first_c)]
     out = np.empty_like(power_w)
-    message = ctypes.create_string_buffer(256)
+    message = ctypes.create_string_buffer(1024)
     call = library().chip_simulate
     call.restype = ctypes.c_int
     call.argtypes = (
