@@ -14,7 +14,7 @@ from ninespring.errors import InputError, WorkError
 from ninespring.export import drive
 from ninespring.export.settings import settings_of
 from ninespring.fit.predict import predict_by_chip
-from ninespring.logs import check_folder, read_log, write_atomically
+from ninespring.logs import read_log, write_atomically
 from ninespring.models import Array, Model, model_text, read_model
 from ninespring.verdict import diagnosis
 
@@ -147,13 +147,9 @@ def test_the_chips_error_is_told_before_and_after_on_a_log_that_was_not_fitted(m
 
 def test_an_output_that_is_an_input_is_refused(cold: Path) -> None:
     text = cold.read_text()
-    with pytest.raises(InputError, match="its own input"):
+    with pytest.raises(InputError, match="would be written over"):
         run("export", "--model", cold, "-o", cold)
     assert cold.read_text() == text
-    link = cold.with_name("link.toml")
-    link.symlink_to(cold)
-    with pytest.raises(InputError, match="its own input"):
-        check_folder(link, inputs=(cold,))
 
 
 def test_a_link_stays_a_link_a_device_a_device_and_a_dash_is_standard_output(

@@ -86,9 +86,9 @@ int chip_simulate(const char *lines, int array_rows, int array_columns, size_t r
     }
     const thermal_model_parameters_t *parameters = &settings.controller.model;
     static _Thread_local thermal_model_t model;
-    thermal_model_parameter_t bad = THERMAL_MODEL_PARAMETER_COUNT;
+    uint16_t bad = 0;
     if (thermal_model_init(&model, parameters, &bad) != THERMAL_MODEL_OK) {
-        (void)snprintf(message, message_size, "%s", thermal_model_parameter_name(bad));
+        (void)snprintf(message, message_size, "%s", parameter_row(bad).name);
         return -2;
     }
     const size_t n = (size_t)parameters->rows * parameters->columns;

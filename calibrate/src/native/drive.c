@@ -34,9 +34,8 @@ int chip_drive(const plant_t *plant, const char *lines, const int *pattern, size
     uint16_t bad = UINT16_MAX;
     loop_t *loop = loop_create(&settings.controller, plant, NULL, 1u, &bad);
     if (loop == NULL) {
-        uint8_t index = 0, element = 0;
-        const bool known = bad != UINT16_MAX && settings_find_offset(bad, &index, &element);
-        (void)snprintf(message, message_size, "%s", known ? settings_name(index) : "settings");
+        (void)snprintf(message, message_size, "%s",
+                       bad == UINT16_MAX ? "settings" : parameter_row(bad).name);
         return -2;
     }
     const int springs = plant_spring_count(plant);

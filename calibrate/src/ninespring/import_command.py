@@ -7,13 +7,14 @@ from pathlib import Path
 import click
 import numpy as np
 
-from .console import FILE, JSON, beside, checked, outcome, working, write
+from .console import FILE, JSON, Command, beside, checked, result_of, working, write
 from .errors import InputError
 from .logs import check_folder, log_text
 
 
 @click.command(
     "import",
+    cls=Command,
     epilog="""\b
 Examples:
   ninespring import logger.csv --map map.toml -o run1.csv
@@ -39,6 +40,9 @@ map.toml:                                          regions.toml (pixels):
 @click.option(
     "--interval", type=click.FloatRange(min=0, min_open=True), default=1.0, show_default=True, help="s a frame"
 )
+@click.option(
+    "--unit", type=click.Choice(["degC", "degF", "K"]), default="degC", show_default=True, help="of the frames"
+)
 @click.option("--times", type=FILE, help="times of the frames, s on the log's clock, one a line")
 @click.option("--offset", type=float, default=0.0, show_default=True, help="s to add to the frames' times")
 @click.option(
@@ -61,6 +65,7 @@ def import_(
     mapping: str | None,
     regions: Path | None,
     interval: float,
+    unit: str,
     offset: float,
     times: Path | None,
     statistic: str,
@@ -70,7 +75,7 @@ def import_(
 ) -> None:
     """Make a log of another logger's file (--map) or of thermal-camera frames (--regions).
 
-    SOURCE is a table with a header; or frames in degC: a .npy of (frames, height, width), a .csv, or a folder of .csv.
+    SOURCE is a table with a header; or frames: a .npy of (frames, height, width), a .csv, or a folder of .csv.
     """
     from . import importing
 
@@ -90,7 +95,7 @@ def import_(
             raise InputError(f"{len(stamps)} times for {count} frames", times)
         with working("reading frames", count) as say:
             columns = importing.reduce_frames(
-                source, count, frames, places, statistic, lambda row: say(f"frame {row} of {count}", row)
+                *(source, count, frames, places, statistic), lambda row: say(f"frame {row} of {count}", row), unit
             )
         if log_path:
             text = importing.merge_into_log(log_path, stamps, interval, offset, columns)
@@ -98,7 +103,7 @@ def import_(
             when = (np.arange(count) * interval if stamps is None else stamps) + offset
             text = log_text(when, columns, {"imported_from": source.name})
     header, *rows = [line for line in text.splitlines() if not line.startswith("#")]
-    result = outcome("import", source=source.name, columns=header.split(","), rows=len(rows))
+    result = result_of("import", source=source.name, columns=header.split(","), rows=len(rows))
     write({output: text, json_path: checked(result)})
     seen = sum(name.startswith("t") for name in result["columns"][1:])
     beside(output).print(f"{len(rows)} rows, temperatures of {seen} springs -> {output}", soft_wrap=True, markup=False)

@@ -9,7 +9,7 @@ from typing import Any
 import click
 import numpy as np
 
-from ..console import FILE, JSON, MODEL, beside, checked, logs_of, notes_of, out, outcome, working, write
+from ..console import FILE, JSON, MODEL, Command, beside, checked, logs_of, notes_of, out, result_of, working, write
 from ..errors import InputError, WorkError
 from ..logs import check_folder, read_bytes, read_log, sha256_of
 
@@ -32,11 +32,12 @@ def _chip_lines(path: Path | None) -> str:
 
 
 @click.command(
+    cls=Command,
     epilog="""\b
 Examples:
   ninespring export --model diagnosis/model.toml -o settings.txt
   ninespring export --model diagnosis/model.toml --chip now.txt -o -
-"""
+""",
 )
 @MODEL
 @click.option("-o", "--output", type=FILE, required=True, help="console lines to write, `$name=value`; - prints them")
@@ -75,7 +76,7 @@ def export(model_path: Path, output: Path, chip_path: Path | None, force: bool, 
         *(f"# {e} is left out: {why}" for e, why in left.items()),
         *(f"# not written, {why}: {', '.join(_together(names))}" for why, names in kept.items()),
     ]
-    result = outcome(
+    result = result_of(
         "export",
         model={"file": model_path.name, "sha256": sha256_of(model_path)},
         settings={name: float(value) for name, value in made.written.items()},
@@ -99,11 +100,12 @@ def _together(names: list[str]) -> list[str]:
 
 
 @click.command(
+    cls=Command,
     epilog="""\b
 Examples:
   ninespring verify --model diagnosis/model.toml run3.csv
   ninespring verify --model diagnosis/model.toml --port /dev/ttyACM0 run3.csv
-"""
+""",
 )
 @click.argument("log", type=FILE)
 @MODEL
@@ -139,7 +141,7 @@ def verify(log: Path, model_path: Path, chip_path: Path | None, port: str | None
             float(np.sqrt(np.mean(left[seen[:, k], k] ** 2))) if seen[:, k].any() else None for k in range(run.springs)
         ]
         errors[name] = {"rmse_c": float(np.sqrt(np.mean(left[seen] ** 2))), "rmse_per_spring_c": each}
-    result = outcome(
+    result = result_of(
         "verify",
         logs=logs_of([run]),
         model={"file": model_path.name, "sha256": sha256_of(model_path)},

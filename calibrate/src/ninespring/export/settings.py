@@ -79,7 +79,7 @@ def _moved(plant: native.Plant, name: str) -> native.Plant:
     value = twin.get(name)
     span = known.maximum - known.minimum
     step = 0.1 * abs(value) if value else min(0.05 * span, 1.0)
-    if known.unit == "1" and float(value).is_integer() and span <= 8:
+    if float(value).is_integer() and span <= 8:
         step = 1.0
     for other in (value + step, value - step):
         if known.minimum <= other <= known.maximum:

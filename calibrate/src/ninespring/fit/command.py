@@ -10,14 +10,15 @@ from ..console import (
     ARRAY,
     FILE,
     JSON,
+    Command,
     array_and_runs,
     beside,
     checked,
     logs_of,
     notes,
     notes_of,
-    outcome,
     print_parameters,
+    result_of,
     working,
     write,
 )
@@ -26,11 +27,12 @@ from ..logs import check_folder
 
 
 @click.command(
+    cls=Command,
     epilog="""\b
 Examples:
   ninespring fit run1.csv run2.csv -o model.toml
   ninespring fit --effects latent_heat,shared_air run1.csv -o model.toml
-"""
+""",
 )
 @click.argument("logs", nargs=-1, required=True, type=FILE)
 @ARRAY
@@ -71,7 +73,7 @@ def fit(logs: tuple[Path, ...], array_path: Path | None, effects: str, output: P
             suspect += plausibility.shifted_clock(problem, (chosen,))
     model = model_of(problem, chosen, runs)
     model.provenance["rmse_before_c"] = rms(base.residual)
-    result = outcome(
+    result = result_of(
         "fit",
         logs=logs_of(runs),
         rmse_before_c=rms(base.residual),

@@ -7,16 +7,17 @@ from pathlib import Path
 import click
 import numpy as np
 
-from ..console import FILE, JSON, MODEL, beside, checked, logs_of, notes_of, outcome, working, write
+from ..console import FILE, JSON, MODEL, Command, beside, checked, logs_of, notes_of, result_of, working, write
 from ..logs import check_folder, log_text, read_log, sha256_of
 
 
 @click.command(
+    cls=Command,
     epilog="""\b
 Examples:
   ninespring predict --model diagnosis/model.toml run3.csv -o predicted.csv
   ninespring predict --chip --model diagnosis/model.toml run3.csv -o predicted.csv
-"""
+""",
 )
 @click.argument("log", type=FILE)
 @MODEL
@@ -46,7 +47,7 @@ def predict(log: Path, model_path: Path, output: Path, chip: bool, json_path: Pa
     rmse = float(np.sqrt(square[seen].mean())) if seen.any() else None
     each = [float(np.sqrt(square[seen[:, k], k].mean())) if seen[:, k].any() else None for k in range(run.springs)]
     note = model.provenance.get("note")
-    result = outcome(
+    result = result_of(
         "predict",
         logs=logs_of([run]),
         model={"file": model_path.name, "sha256": sha256_of(model_path)},

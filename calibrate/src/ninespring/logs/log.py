@@ -30,6 +30,12 @@ LIMITS = {
     "ambient_c": (-40.0, 60.0, "degC", "looks like Fahrenheit or kelvin: give degC"),
 }
 """Per kind of column: lowest, highest, unit, and what to do about a value beyond them."""
+BELOW = {
+    "i": "a negative current: the leads of that sensor are swapped? Turn the sign (`ninespring import --map`, scale = -1)",
+    "v": "a negative voltage: the leads of that sensor are swapped? Turn the sign (`ninespring import --map`, scale = -1)",
+    "u": "a negative command: commands run from 0 to 1",
+}
+"""What to do about a value below the lowest, where that is another thing."""
 
 
 def _check_range(table: Table, name: str, kind: str) -> None:
@@ -38,6 +44,8 @@ def _check_range(table: Table, name: str, kind: str) -> None:
     bad = np.flatnonzero((values < low) | (values > high))
     if bad.size:
         line, column = table.where(int(bad[0]), name)
+        if values[bad[0]] < low and abs(values[bad[0]]) <= high:
+            advice = BELOW.get(kind, advice)
         raise InputError(f"{name} = {values[bad[0]]:g} {unit}".rstrip() + f": {advice}", table.path, line, column)
 
 

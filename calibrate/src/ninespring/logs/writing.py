@@ -6,7 +6,7 @@ import hashlib
 import os
 import sys
 import tempfile
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -26,16 +26,13 @@ def sha256_of(path: str | Path) -> str:
     return digest.hexdigest()
 
 
-def check_folder(*paths: Path | None, inputs: Iterable[Path | None] = ()) -> None:
-    """Refuse output files before any work is done: no folder, no right to write, or a command's own input."""
-    read = [path for path in inputs if path is not None and path.exists()]
+def check_folder(*paths: Path | None) -> None:
+    """Refuse output files whose folder is not there or cannot be written, before any work is done."""
     for path in paths:
         if path is None or str(path) == STANDARD_OUTPUT:
             continue
         if not path.parent.is_dir():
             raise InputError(f"the folder {path.parent} does not exist: create it first", path)
-        if path.exists() and any(os.path.samefile(path, one) for one in read):
-            raise InputError("would be written over its own input: give another name", path)
         if not os.access(Path(os.path.realpath(path)).parent, os.W_OK) and not _is_device(path):
             raise InputError(f"the folder {path.parent} cannot be written", path)
 

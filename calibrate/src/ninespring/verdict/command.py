@@ -8,19 +8,20 @@ from typing import Any
 import click
 from rich.table import Table
 
-from ..console import ARRAY, FILE, array_and_runs, checked, out, working, write
+from ..console import ARRAY, FILE, Command, array_and_runs, checked, out, working, write
 from ..errors import InputError
 from ..logs import check_folder
 
 
 @click.command(
+    cls=Command,
     epilog="""\b
 Examples:
   ninespring diagnose run1.csv run2.csv -o diagnosis
   ninespring diagnose --array array.toml tclab.csv -o diagnosis
   ninespring diagnose --model model.toml --frozen run3.csv -o check
   ninespring diagnose --model model.toml --frozen steady.csv -o steady
-"""
+""",
 )
 @click.argument("logs", nargs=-1, required=True, type=FILE)
 @ARRAY
@@ -75,8 +76,6 @@ def diagnose(
             page = report.html_report(found)
         result, made = found.result, found.model
     text = checked(result)
-    check_folder(
-        *(output / name for name in ("diagnosis.json", "report.html", "model.toml") if output.is_dir()))
     files: dict[Path | None, str] = {
         output / "diagnosis.json": text,
         output / "report.html": page,

@@ -179,9 +179,7 @@ def find(problem: Problem, fit: Fit, say: Callable[[str], None] = lambda text: N
     return found
 
 
-def _pieces_of(
-    problem: Problem, fit: Fit, r: int, slopes: np.ndarray, factor: float, typical_w: float
-) -> list[Piece]:
+def _pieces_of(problem: Problem, fit: Fit, r: int, slopes: np.ndarray, factor: float, typical_w: float) -> list[Piece]:
     """Return the pieces of one run: chosen one by one, the best first, all sizes fitted again with each."""
     run, mask, noise = problem.runs[r], problem.mask[r], problem.noise[r]
     springs, rows = run.springs, len(run.time_s)
