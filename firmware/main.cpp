@@ -66,7 +66,7 @@ static void eeprom_write(void *, uint16_t address, uint8_t value)
 {
     board_eeprom_write(address, value);
 }
-static const settings_storage_t eeprom = {nullptr, eeprom_read, eeprom_ready, eeprom_write};
+static const record_storage_t eeprom = {nullptr, eeprom_read, eeprom_ready, eeprom_write};
 
 static const char *reset_text(uint8_t cause)
 {

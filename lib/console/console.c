@@ -3,11 +3,7 @@
 #include <stddef.h>
 #include <string.h>
 
-#define MAX_ARGUMENTS       2u
-#define SELFTEST_CURRENT_MA 300u
-#define SELFTEST_TICKS                                                                             \
-    30u /* 0.6 s a spring: the current has settled, the spring warmed by 0.1 K                     \
-         */
+#define MAX_ARGUMENTS 2u
 
 typedef enum {
     JOB_NONE = 0,
@@ -59,17 +55,6 @@ static __attribute__((noinline)) bool room_for(const console_t *console, uint16_
     return console->output.room(console->output.context) >= bytes;
 }
 
-static void add_setting_name(text_line_t *line, uint8_t index, uint8_t element)
-{
-    settings_entry_t entry;
-    settings_entry(index, &entry);
-    text_add_flash(line, settings_name(index));
-    if (entry.count > 1) {
-        text_add_char(line, '_');
-        text_add_decimal(line, element + 1, 0);
-    }
-}
-
 static __attribute__((noinline)) void add_spring(text_line_t *line, uint8_t spring)
 {
     const int32_t number = spring + 1;
@@ -83,34 +68,31 @@ static __attribute__((noinline)) void add_spring(text_line_t *line, uint8_t spri
  * line. */
 static void apply_settings(console_t *console)
 {
-    uint16_t offset = 0;
+    uint16_t bad = PARAMETER_COUNT;
     console->conflict =
-        !controller_apply_settings(console->controller, &console->settings->controller, &offset);
+        !controller_apply_settings(console->controller, &console->settings->controller, &bad);
     if (!console->conflict) {
         return;
     }
     out_t out;
-    if (!settings_find_offset(offset, &console->conflict_index, &console->conflict_element)) {
-        console->conflict_index = 0;
-        console->conflict_element = 0;
-    }
     out_start(&out);
     text_add_flash(&out.line, FLASH_TEXT("[not active yet: "));
-    add_setting_name(&out.line, console->conflict_index, console->conflict_element);
+    text_add(&out.line, parameter_row(bad).name);
     text_add_flash(&out.line, FLASH_TEXT(" does not fit the others]"));
     out_end(console, &out);
 }
 
-static void print_setting(const console_t *console, uint8_t index, uint8_t element)
+static void print_setting(const console_t *console, uint16_t index, uint8_t element)
 {
     out_t out;
-    settings_entry_t entry;
-    settings_entry(index, &entry);
+    char name[SETTINGS_NAME_SIZE];
+    settings_name(index, element, name);
     out_start(&out);
     text_add_char(&out.line, '$');
-    add_setting_name(&out.line, index, element);
+    text_add(&out.line, name);
     text_add_char(&out.line, '=');
-    text_add_decimal(&out.line, settings_get(console->settings, index, element), entry.decimals);
+    text_add_decimal(&out.line, settings_get(console->settings, index, element),
+                     parameter_row(index).decimals);
     out_end(console, &out);
 }
 
@@ -158,13 +140,12 @@ static void start_job(console_t *console, job_t job)
     console->job = (uint8_t)job;
     console->step = 0;
     console->element = 0;
-    console->failures = 0;
 }
 
 /* A line that starts with '$'. */
 static console_error_t settings_line(console_t *console, char *line)
 {
-    uint8_t index;
+    uint16_t index;
     uint8_t element;
     char *const equals = strchr(line, '=');
     if (equals != NULL) {
@@ -179,7 +160,7 @@ static console_error_t settings_line(console_t *console, char *line)
         if (console->conflict) {
             return CONSOLE_ERROR_SETTINGS_CONFLICT;
         }
-        settings_save_start(console->store, console->settings, 0);
+        settings_save_start(console->store, console->settings);
         start_job(console, JOB_SAVE);
         return CONSOLE_OK;
     }
@@ -399,8 +380,8 @@ static console_error_t word_selftest(console_t *console, const arguments_t *argu
     }
     const console_error_t error = may_drive(console);
     if (error == CONSOLE_OK) {
-        (void)controller_set_policy(console->controller,
-                                    DRIVE_POLICY_OPEN); /* a level is a current */
+        selftest_start(&console->selftest, console->controller,
+                       console->settings->controller.policy.open_current_ma);
         start_job(console, JOB_SELFTEST);
     }
     return error;
@@ -546,20 +527,31 @@ static bool help_line(const console_t *console, out_t *out)
     return false;
 }
 
-static const char *loaded_text(const console_status_t *status)
+static void add_loaded(text_line_t *line, const console_status_t *status)
 {
+    /* as record_found_t has them */
+    static const char texts[] FLASH_MEMORY = "loaded\0"
+                                             "loaded; the other copy is damaged or was cut short\0"
+                                             "none saved, defaults\0"
+                                             "stored ones damaged, defaults\0"
+                                             "stored by another version, defaults";
+    const settings_loaded_t *const loaded = &status->loaded;
     if (status->settings_conflict_at_boot) {
-        return FLASH_TEXT("stored ones do not fit together, defaults are active");
+        text_add_flash(line, FLASH_TEXT("stored ones do not fit together, defaults are active"));
+        return;
     }
-    /* as settings_loaded_t has them */
-    static const char texts[] FLASH_MEMORY =
-        "loaded\0"
-        "loaded from an earlier version, new ones are at their defaults\0"
-        "loaded; the other copy is damaged or was cut short\0"
-        "none saved, defaults\0"
-        "stored ones damaged, defaults\0"
-        "stored by another version, defaults";
-    return text_item(texts, (uint8_t)status->loaded);
+    text_add_flash(line, text_item(texts, (uint8_t)loaded->found));
+    if (loaded->found > RECORD_LOADED_OTHER) {
+        return;
+    }
+    const int32_t counts[] = {loaded->missing};
+    if (loaded->missing != 0) {
+        text_add_values(line, FLASH_TEXT("; #0 not stored, at defaults"), counts);
+    }
+    const int32_t dropped[] = {loaded->dropped, loaded->dropped_id};
+    if (loaded->dropped != 0) {
+        text_add_values(line, FLASH_TEXT("; #0 dropped, first id #0"), dropped);
+    }
 }
 
 static bool version_line(const console_t *console, out_t *out)
@@ -577,7 +569,7 @@ static bool version_line(const console_t *console, out_t *out)
         text_add_flash(line, FLASH_TEXT("reset "));
         text_add_flash(line, status->reset_cause);
         text_add_flash(line, FLASH_TEXT("; settings "));
-        text_add_flash(line, loaded_text(status));
+        add_loaded(line, status);
         return true;
     case 2: {
         const int32_t values[] = {status->ticks_late, status->tick_longest_us, status->load_percent,
@@ -674,25 +666,18 @@ static bool faults_line(const console_t *console, out_t *out)
 
 static void end_job(console_t *console, console_error_t error)
 {
-    if (console->job == JOB_SELFTEST) {
-        const uint8_t policy = console->settings->controller.policy.policy;
-        controller_stop(console->controller);
-        (void)controller_set_policy(console->controller, (drive_policy_kind_t)policy);
-    }
     console->job = JOB_NONE;
     answer(console, error);
 }
 
 static void list_settings(console_t *console)
 {
-    settings_entry_t entry;
-    if (console->step == settings_count()) {
+    if (console->step == PARAMETER_COUNT) {
         end_job(console, CONSOLE_OK);
         return;
     }
-    settings_entry(console->step, &entry);
     print_setting(console, console->step, console->element);
-    if (++console->element >= entry.count) {
+    if (++console->element >= parameter_row(console->step).count) {
         console->element = 0;
         console->step++;
     }
@@ -719,16 +704,6 @@ static void start_telemetry(console_t *console)
     end_job(console, CONSOLE_OK);
 }
 
-/* Level at which the open policy gives SELFTEST_CURRENT_MA. */
-static uint16_t selftest_level(const console_t *console)
-{
-    const uint16_t full_ma = console->settings->controller.policy.open_current_ma;
-    if (full_ma <= SELFTEST_CURRENT_MA) {
-        return 1000;
-    }
-    return (uint16_t)((uint32_t)SELFTEST_CURRENT_MA * 1000u / full_ma);
-}
-
 /* As controller_sensor_status_t has them. */
 static const char sensor_texts[] FLASH_MEMORY = "sensor ok\0"
                                                 "sensor absent\0"
@@ -736,56 +711,41 @@ static const char sensor_texts[] FLASH_MEMORY = "sensor ok\0"
                                                 "sensor stale\0"
                                                 "sensor was reset";
 
-/* One spring after the other is driven with a small current; then its line is printed. */
 static void selftest(console_t *console)
 {
-    controller_t *const controller = console->controller;
-    const uint8_t k = console->step;
-    if (k >= controller_springs(controller)) {
-        end_job(console, console->failures == 0 ? CONSOLE_OK : CONSOLE_ERROR_SELFTEST_FAILED);
+    selftest_result_t result;
+    switch (selftest_step(&console->selftest, console->controller, console->status->ticks,
+                          console->status->sensor_status, &result)) {
+    case SELFTEST_WAITS:
         return;
-    }
-    if (console->element == 0) { /* not yet driven */
-        controller_set_target(controller, k, selftest_level(console));
-        console->tick = console->status->ticks;
-        console->element = 1;
+    case SELFTEST_ENDED:
+        end_job(console,
+                console->selftest.failures == 0 ? CONSOLE_OK : CONSOLE_ERROR_SELFTEST_FAILED);
         return;
+    default:
+        break;
     }
-    if (console->status->ticks - console->tick < SELFTEST_TICKS) {
-        return;
-    }
-    const int16_t current_ma = controller_measured_ma(controller, k);
-    const int16_t voltage_mv = controller_measured_mv(controller, k);
-    const uint8_t status = console->status->sensor_status[k];
-    const safety_fault_t fault = controller_fault(controller, k);
-    const bool sound = status == CONTROLLER_SENSOR_OK && fault == SAFETY_FAULT_NONE &&
-                       current_ma > (int16_t)(SELFTEST_CURRENT_MA / 2u);
     out_t out;
     out_start(&out);
-    add_spring(&out.line, k);
-    text_add_flash(&out.line, text_item(sensor_texts, status));
-    if (fault != SAFETY_FAULT_NONE) {
+    add_spring(&out.line, result.spring);
+    text_add_flash(&out.line, text_item(sensor_texts, (uint8_t)result.sensor));
+    if (result.fault != SAFETY_FAULT_NONE) {
         text_add_flash(&out.line, FLASH_TEXT(", "));
-        add_fault(&out.line, fault);
-    } else if (sound) {
-        const int32_t resistance_mohm = (int32_t)voltage_mv * 1000 / current_ma;
-        text_add_values(&out.line, FLASH_TEXT(", #3 ohm"), &resistance_mohm);
-    } else if (status == CONTROLLER_SENSOR_OK) {
+        add_fault(&out.line, result.fault);
+    } else if (result.sound) {
+        text_add_values(&out.line, FLASH_TEXT(", #3 ohm"), &result.resistance_mohm);
+    } else if (result.sensor == CONTROLLER_SENSOR_OK) {
         text_add_flash(&out.line, FLASH_TEXT(", too little current"));
     }
     out_end(console, &out);
-    console->failures = (uint8_t)(console->failures + (sound ? 0u : 1u));
-    controller_set_target(controller, k, 0);
-    console->element = 0;
-    console->step++;
 }
 
 static void save(console_t *console)
 {
-    switch (settings_save_step(console->store)) {
-    case SETTINGS_SAVE_BUSY:
+    switch (record_store_step(&console->store->record)) {
+    case RECORD_SAVE_BUSY:
         break;
-    case SETTINGS_SAVE_DONE:
+    case RECORD_SAVE_DONE:
         end_job(console, CONSOLE_OK);
         break;
     default:
@@ -867,6 +827,9 @@ void console_break_line(console_t *console, console_error_t error)
 
 void console_stop(console_t *console)
 {
+    if (console->job == JOB_SELFTEST) {
+        selftest_end(&console->selftest, console->controller);
+    }
     if (console->job != JOB_NONE && console->job != JOB_SAVE) {
         end_job(console, CONSOLE_ERROR_STOPPED);
     }

@@ -11,6 +11,7 @@
 
 #include "console_codes.h"
 #include "controller.h"
+#include "selftest.h"
 #include "settings.h"
 #include "telemetry.h"
 #include "text.h"
@@ -48,14 +49,11 @@ typedef struct {
     telemetry_t *telemetry;
     const console_status_t *status;
     /* internal */
-    uint8_t job;      /* what console_service goes on with */
-    uint8_t step;     /* of the job */
-    uint8_t element;  /* of a listed setting */
-    uint8_t failures; /* of the selftest */
-    uint32_t tick;    /* since when the selftest waits */
-    bool conflict;    /* settings differ from what is active, since they do not fit together */
-    uint8_t conflict_index;
-    uint8_t conflict_element;
+    uint8_t job;     /* what console_service goes on with */
+    uint8_t step;    /* of the job */
+    uint8_t element; /* of a listed setting */
+    selftest_t selftest;
+    bool conflict;       /* settings differ from what is active, since they do not fit together */
     uint8_t next_format; /* telemetry that starts after its header */
     uint8_t next_hz;
     uint8_t broken; /* console_error_t of the line under construction */

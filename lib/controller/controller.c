@@ -17,14 +17,6 @@
 #define ALWAYS
 #endif
 
-static bool refuse(uint16_t *bad, size_t offset)
-{
-    if (bad != NULL) {
-        *bad = (uint16_t)offset;
-    }
-    return false;
-}
-
 void controller_settings_default(controller_settings_t *settings)
 {
     thermal_model_parameters_default(&settings->model);
@@ -33,43 +25,23 @@ void controller_settings_default(controller_settings_t *settings)
     drive_policy_parameters_default(&settings->policy);
 }
 
-static bool move(uint16_t *bad, size_t offset)
-{
-    if (bad != NULL) {
-        *bad = (uint16_t)(*bad + offset);
-    }
-    return false;
-}
-
 /* All parts but the model, which checks itself when it takes its parameters. */
 static bool check(const controller_settings_t *settings, uint16_t *bad)
 {
     if (settings->model.step_ms != MODEL_STEP_MS) {
-        return refuse(bad, offsetof(controller_settings_t, model) +
-                               offsetof(thermal_model_parameters_t, step_ms));
+        if (bad != NULL) {
+            *bad = PARAMETER_COUNT;
+        }
+        return false;
     }
-    if (!current_control_check(&settings->current, bad)) {
-        return move(bad, offsetof(controller_settings_t, current));
-    }
-    if (!safety_check(&settings->safety, bad)) {
-        return move(bad, offsetof(controller_settings_t, safety));
-    }
-    if (!drive_policy_check(&settings->policy, bad)) {
-        return move(bad, offsetof(controller_settings_t, policy));
-    }
-    return true;
+    return current_control_check(&settings->current, bad) && safety_check(&settings->safety, bad) &&
+           drive_policy_check(&settings->policy, bad);
 }
 
 static bool init_model(thermal_model_t *model, const thermal_model_parameters_t *parameters,
                        uint16_t *bad)
 {
-    thermal_model_parameter_t refused = THERMAL_MODEL_ROWS;
-    if (thermal_model_init(model, parameters, &refused) != THERMAL_MODEL_OK) {
-        const parameter_range_t *const ranges = (const parameter_range_t *)&thermal_model_ranges;
-        return refuse(bad, offsetof(controller_settings_t, model) +
-                               parameter_range(&ranges[refused]).offset);
-    }
-    return true;
+    return thermal_model_init(model, parameters, bad) == THERMAL_MODEL_OK;
 }
 
 /* martensite + austenite x difference, in mohm: below 16 ohm each. */

@@ -19,38 +19,9 @@
 #define KEEP_ADDRESS(pointer) (void)(pointer)
 #endif
 
-void current_control_parameters_default(current_control_parameters_t *parameters)
-{
-    static const current_control_parameters_t usual FLASH_MEMORY = {.supply_mv = 5000,
-                                                                    .freewheel_mv = 0,
-                                                                    .shunt_mohm = 100,
-                                                                    .wiring_mohm = 80,
-                                                                    .integral_permille = 600,
-                                                                    .slew_ma_per_tick = 300,
-                                                                    .maximum_current_ma = 3000,
-                                                                    .maximum_duty_steps = 760,
-                                                                    .trim_limit_mohm = 150,
-                                                                    .hold_ticks = 10};
-    flash_copy(parameters, &usual, sizeof usual);
-}
-
-#define RANGE(field, type, minimum, maximum)                                                       \
-    PARAMETER_RANGE(current_control_parameters_t, field, type, minimum, maximum)
-const current_control_ranges_t current_control_ranges FLASH_MEMORY = {
-    RANGE(supply_mv, U16, 1000, 16000),
-    RANGE(freewheel_mv, U16, 0, 1000),
-    RANGE(shunt_mohm, U16, 0, 1000),
-    RANGE(wiring_mohm, U16, 0, 1000),
-    RANGE(integral_permille, U16, 1, 1000),
-    RANGE(slew_ma_per_tick, U16, 1, 3200),
-    RANGE(maximum_current_ma, U16, 1, 3200),
-    RANGE(maximum_duty_steps, U16, 1, CURRENT_CONTROL_DUTY_STEPS),
-    RANGE(trim_limit_mohm, U16, 0, 1000),
-    RANGE(hold_ticks, U8, 0, 250)};
-
 bool current_control_check(const current_control_parameters_t *p, uint16_t *bad)
 {
-    return parameter_check(p, &current_control_ranges, sizeof current_control_ranges, bad);
+    return parameter_check(PARAMETER_PART_CURRENT, p, bad);
 }
 
 bool current_control_apply(current_control_t *control, const current_control_parameters_t *p,

@@ -7,7 +7,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "parameter.h"
+#include "parameters.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -22,26 +22,6 @@ extern "C" {
 #endif
 
 #define CURRENT_CONTROL_DUTY_STEPS 800u /* timer counts of one PWM period */
-
-typedef struct {
-    uint16_t supply_mv;          /* what feeds the buck stages, 1000..16000 */
-    uint16_t freewheel_mv;       /* drop of the freewheel diode, 0..1000; 0: synchronous or ideal */
-    uint16_t shunt_mohm;         /* 0..1000 */
-    uint16_t wiring_mohm;        /* inductor, switch and leads, 0..1000 */
-    uint16_t integral_permille;  /* of an error, learnt in two ticks, 1..1000 */
-    uint16_t slew_ma_per_tick;   /* how fast a reference may rise, 1..3200; falls are immediate */
-    uint16_t maximum_current_ma; /* of one channel, 1..3200: a higher target is clamped */
-    uint16_t maximum_duty_steps; /* 1..800 */
-    uint16_t
-        trim_limit_mohm; /* how far the learnt loop resistance may be off the estimate, 0..1000 */
-    uint8_t hold_ticks;  /* ticks that a channel may run without a reading, 0..250; then off */
-} current_control_parameters_t;
-
-typedef struct {
-    parameter_range_t supply_mv, freewheel_mv, shunt_mohm, wiring_mohm, integral_permille,
-        slew_ma_per_tick, maximum_current_ma, maximum_duty_steps, trim_limit_mohm, hold_ticks;
-} current_control_ranges_t;
-extern const current_control_ranges_t current_control_ranges FLASH_MEMORY;
 
 typedef struct {
     int32_t trim_q24;      /* learnt less estimated loop gain, duty steps per mA */
@@ -63,9 +43,6 @@ typedef struct {
     bool even_turn; /* channels 0, 2, .. had their turn in the last tick */
     current_control_channel_t channel[CURRENT_CONTROL_MAX_CHANNELS];
 } current_control_t;
-
-/* The reference board of docs/hardware.md. */
-void current_control_parameters_default(current_control_parameters_t *parameters);
 
 /* Fails if and only if a parameter is outside the range above; then *bad is its
  * byte offset in *parameters (bad may be NULL). */

@@ -101,57 +101,14 @@ static int16_t clamp16(int32_t value, int16_t low, int16_t high)
 
 /* ---- parameters ---- */
 
-void drive_policy_parameters_default(drive_policy_parameters_t *parameters)
-{
-    static const drive_policy_parameters_t usual FLASH_MEMORY = {.policy = DRIVE_POLICY_OPEN,
-                                                                 .open_current_ma = 1500,
-                                                                 .supply_reserve_ma = 200,
-                                                                 .boost_current_ma = 3000,
-                                                                 .probe_current_ma = 400,
-                                                                 .dither_ma = 300,
-                                                                 .hold_margin_cc = 250,
-                                                                 .unsure_margin_cc = 1200,
-                                                                 .search_mk_per_s = 80,
-                                                                 .observer = 1,
-                                                                 .probe_period_s = 0,
-                                                                 .temperature_limit_cc = 11000,
-                                                                 .temperature_band_cc = 1000,
-                                                                 .undriven_margin_cc = 500,
-                                                                 .overload_current_ma = 14000,
-                                                                 .overload_time_s = 300,
-                                                                 .trip_time_s = 30};
-    flash_copy(parameters, &usual, sizeof usual);
-}
-
-#define RANGE(field, type, minimum, maximum)                                                       \
-    PARAMETER_RANGE(drive_policy_parameters_t, field, type, minimum, maximum)
-const drive_policy_ranges_t drive_policy_ranges FLASH_MEMORY = {
-    RANGE(policy, U8, DRIVE_POLICY_OPEN, DRIVE_POLICY_PRECOMPENSATE),
-    RANGE(open_current_ma, U16, 0, CURRENT_MOST_MA),
-    RANGE(supply_reserve_ma, U16, 0, 10000),
-    RANGE(boost_current_ma, U16, 100, CURRENT_MOST_MA),
-    RANGE(probe_current_ma, U16, 100, 1000),
-    RANGE(dither_ma, U16, 0, 400),
-    RANGE(hold_margin_cc, U16, 50, 3000),
-    RANGE(unsure_margin_cc, U16, 50, 5000),
-    RANGE(search_mk_per_s, U16, 0, 1000),
-    RANGE(observer, U8, 0, 1),
-    RANGE(probe_period_s, U8, 0, 250),
-    RANGE(temperature_limit_cc, S16, -4000, 20000),
-    RANGE(temperature_band_cc, U16, 100, 5000),
-    RANGE(undriven_margin_cc, U16, 0, 5000),
-    RANGE(overload_current_ma, U16, 100, 60000),
-    RANGE(overload_time_s, U16, 1, 3000),
-    RANGE(trip_time_s, U16, 0, 600)};
-
 bool drive_policy_check(const drive_policy_parameters_t *p, uint16_t *bad)
 {
-    if (!parameter_check(p, &drive_policy_ranges, sizeof drive_policy_ranges, bad)) {
+    if (!parameter_check(PARAMETER_PART_POLICY, p, bad)) {
         return false;
     }
     if (p->unsure_margin_cc < p->hold_margin_cc) {
         if (bad != NULL) {
-            *bad = offsetof(drive_policy_parameters_t, unsure_margin_cc);
+            *bad = PARAMETER_unsure_margin_k;
         }
         return false;
     }

@@ -10,7 +10,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "parameter.h"
+#include "parameters.h"
 #include "resistance_observer.h"
 #include "supply_share.h"
 #include "thermal_model.h"
@@ -49,39 +49,6 @@ typedef enum {
     DRIVE_POLICY_STAGE_HOLD, /* inside the hysteresis band, just above martensite start */
     DRIVE_POLICY_STAGE_LOWER /* cooling to a lower wanted phase */
 } drive_policy_stage_t;
-
-typedef struct {
-    uint8_t policy;             /* drive_policy_kind_t */
-    uint16_t open_current_ma;   /* open: current of a spring that is fully on, 0..3200 */
-    uint16_t supply_reserve_ma; /* kept free of supply_limit_ma for ripple and settling, 0..10000 */
-    /* precompensate */
-    uint16_t boost_current_ma; /* heating, 100..3200 */
-    uint16_t probe_current_ma; /* least current of a driven spring: its resistance stays readable,
-                                  100..1000 */
-    uint16_t dither_ma;        /* the current sweeps down by this and back, so that the average of
-                                  coarse voltage readings is a fine one, 0..400 */
-    uint16_t hold_margin_cc; /* above martensite start once the loss is known, 1/100 K, 50..3000 */
-    uint16_t unsure_margin_cc; /* while it is not, hold_margin_cc..5000 */
-    uint16_t search_mk_per_s;  /* how fast the margin narrows until martensite start is seen in the
-                                  resistance, mK/s, 0 (never) .. 1000 */
-    uint8_t observer;          /* 0 off, 1 the resistance corrects phase, temperature and loss */
-    uint8_t probe_period_s;    /* undriven springs get a pulse this often, 0 never .. 250 */
-    int16_t temperature_limit_cc; /* no current above, 1/100 degC, -4000..20000 */
-    uint16_t temperature_band_cc; /* derating begins this far below, 1/100 K, 100..5000 */
-    uint16_t undriven_margin_cc;  /* undriven springs stay this far below austenite start, 1/100 K,
-                                     0..5000 */
-    uint16_t overload_current_ma; /* sum of currents that the board stands for ever, 100..60000 */
-    uint16_t overload_time_s;     /* and how long more than that, 1..3000 */
-    uint16_t trip_time_s; /* fully derated for so long: off until cleared, 1..600; 0 never */
-} drive_policy_parameters_t;
-
-typedef struct {
-    parameter_range_t policy, open_current_ma, supply_reserve_ma, boost_current_ma,
-        probe_current_ma, dither_ma, hold_margin_cc, unsure_margin_cc, search_mk_per_s, observer,
-        probe_period_s, temperature_limit_cc, temperature_band_cc, undriven_margin_cc,
-        overload_current_ma, overload_time_s, trip_time_s;
-} drive_policy_ranges_t;
-extern const drive_policy_ranges_t drive_policy_ranges FLASH_MEMORY;
 
 typedef struct {
     resistance_observer_t observer; /* first: what every tick touches */
@@ -169,10 +136,8 @@ typedef struct {
     bool model_stepped; /* in this tick, which has little time left: no spring is updated */
 } drive_policy_input_t;
 
-void drive_policy_parameters_default(drive_policy_parameters_t *parameters);
-
-/* Fails if and only if a parameter is outside the range above; then *bad is its byte
- * offset in *parameters (bad may be NULL). */
+/* Fails if and only if a parameter is outside the range above; then *bad (may be NULL)
+ * is its row of parameters.def. */
 bool drive_policy_check(const drive_policy_parameters_t *parameters, uint16_t *bad);
 
 /* Fails (false, nothing changed) if and only if springs is 0 or above DRIVE_POLICY_MAX_SPRINGS or a

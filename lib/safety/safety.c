@@ -16,41 +16,15 @@
 #define HIGH_RESISTANCE 8u
 #define STUCK_ON        16u
 
-#define RANGE(field, type, minimum, maximum)                                                       \
-    PARAMETER_RANGE(safety_parameters_t, field, type, minimum, maximum)
-const safety_ranges_t safety_ranges FLASH_MEMORY = {RANGE(over_current_ma, U16, 100, 3200),
-                                                    RANGE(supply_limit_ma, U16, 100, 60000),
-                                                    RANGE(check_current_ma, U16, 50, 3200),
-                                                    RANGE(resistance_minimum_mohm, U16, 0, 10000),
-                                                    RANGE(resistance_maximum_mohm, U16, 0, 10000),
-                                                    RANGE(stuck_on_ma, U16, 10, 3200),
-                                                    RANGE(temperature_trip_cc, S16, 0, 25000),
-                                                    RANGE(maximum_on_s, U16, 0, 65535),
-                                                    RANGE(bad_samples, U8, 1, 250)};
-
-void safety_parameters_default(safety_parameters_t *parameters)
-{
-    static const safety_parameters_t usual FLASH_MEMORY = {.over_current_ma = 3150,
-                                                           .supply_limit_ma = 15000,
-                                                           .check_current_ma = 300,
-                                                           .resistance_minimum_mohm = 80,
-                                                           .resistance_maximum_mohm = 500,
-                                                           .stuck_on_ma = 100,
-                                                           .temperature_trip_cc = 13000,
-                                                           .maximum_on_s = 0,
-                                                           .bad_samples = 5};
-    flash_copy(parameters, &usual, sizeof usual);
-}
-
 bool safety_check(const safety_parameters_t *p, uint16_t *bad)
 {
-    if (!parameter_check(p, &safety_ranges, sizeof safety_ranges, bad)) {
+    if (!parameter_check(PARAMETER_PART_SAFETY, p, bad)) {
         return false;
     }
     if (p->resistance_maximum_mohm != 0 &&
         p->resistance_maximum_mohm <= p->resistance_minimum_mohm) {
         if (bad != NULL) {
-            *bad = offsetof(safety_parameters_t, resistance_maximum_mohm);
+            *bad = PARAMETER_resistance_maximum_ohm;
         }
         return false;
     }

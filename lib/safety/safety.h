@@ -7,7 +7,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "parameter.h"
+#include "parameters.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -44,25 +44,6 @@ typedef enum {
     SAFETY_FAULT_COUNT
 } safety_fault_t;
 
-typedef struct {
-    uint16_t over_current_ma;         /* trips above, 100..3200 (the sensor's full scale) */
-    uint16_t supply_limit_ma;         /* sum of all springs, 100..60000 */
-    uint16_t check_current_ma;        /* open and resistance checks need at least this expected
-                                         current, 50..3200 */
-    uint16_t resistance_minimum_mohm; /* below: short, 0..10000; 0 off */
-    uint16_t resistance_maximum_mohm; /* above: high resistance, 0..10000; 0 off */
-    uint16_t stuck_on_ma;             /* current in an output that is off, 10..3200 */
-    int16_t temperature_trip_cc;      /* of the model, 1/100 degC, 0..25000 */
-    uint16_t maximum_on_s;            /* longest time an output may be on without a pause; 0 none */
-    uint8_t bad_samples;              /* a fault needs this many bad ticks in a row, 1..250 */
-} safety_parameters_t;
-
-typedef struct {
-    parameter_range_t over_current_ma, supply_limit_ma, check_current_ma, resistance_minimum_mohm,
-        resistance_maximum_mohm, stuck_on_ma, temperature_trip_cc, maximum_on_s, bad_samples;
-} safety_ranges_t;
-extern const safety_ranges_t safety_ranges FLASH_MEMORY;
-
 /* What is remembered of one spring: internal. Bad ticks in a row are counted up to bad_samples. */
 typedef struct {
     uint8_t fault;       /* safety_fault_t, first one since the last clear */
@@ -96,8 +77,6 @@ typedef struct {
     uint16_t expected_ma;   /* reference of the current loop in the measured tick; 0: it was off */
     int16_t temperature_c7; /* of the model, degC in Q9.7 */
 } safety_sample_t;
-
-void safety_parameters_default(safety_parameters_t *parameters);
 
 /* Fails if and only if a parameter is outside the range above; then *bad is its
  * byte offset in *parameters (bad may be NULL). */

@@ -10,18 +10,10 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "parameter.h"
+#include "parameters.h"
 
 #ifdef __cplusplus
 extern "C" {
-#endif
-
-#ifndef THERMAL_MODEL_MAX_SPRINGS
-#ifdef __AVR__
-#define THERMAL_MODEL_MAX_SPRINGS 9
-#else
-#define THERMAL_MODEL_MAX_SPRINGS 64
-#endif
 #endif
 
 /* The array lies in a frame of fixed width, its shorter side along the row: 3 of 9 (or of 15), 8 of
@@ -44,47 +36,6 @@ typedef enum {
     THERMAL_MODEL_WAKE_NORTH
 } thermal_model_wake_t;
 
-/* Physical parameters, all integers. 0 switches the effect of a parameter off where it says so.
- * Springs are row-major, spring 0 is row 1, column 1. */
-typedef struct {
-    uint8_t rows;
-    uint8_t columns;
-    uint16_t step_ms;                /* length of one step */
-    uint16_t heat_capacity_mj_per_k; /* of one spring */
-    uint16_t loss_uw_per_k;          /* one spring to the air around it, fan off */
-    uint16_t loss_fan_uw_per_k;      /* the same, fan at 100 % */
-    uint16_t orthogonal_uw_per_k;    /* between neighbours in a row or column, fan off */
-    uint16_t orthogonal_fan_uw_per_k;
-    uint16_t diagonal_uw_per_k;
-    uint16_t diagonal_fan_uw_per_k;
-    uint16_t loss_rise_ppm_per_k; /* natural_convection: loss conductance rises
-                                     with (T - air); 0 off */
-    uint16_t radiating_area_cmm2; /* radiation: emissivity times surface, 1/100
-                                     mm2; 0 off */
-    uint16_t latent_heat_mj;      /* latent_heat: of one spring's full transformation;
-                                     0 off */
-    int16_t martensite_finish_cc; /* transformation temperatures, 1/100 degC */
-    int16_t martensite_start_cc;
-    int16_t austenite_start_cc;
-    int16_t austenite_finish_cc;
-    uint32_t resistance_martensite_uohm;
-    uint32_t resistance_austenite_uohm;  /* may be above or below the martensite's */
-    uint32_t air_heat_capacity_mj_per_k; /* shared_air: the air between the springs */
-    uint32_t air_exchange_uw_per_k;      /* shared_air: that air to ambient; 0: no
-                                            shared air (it is ambient) */
-    uint16_t plate_coupling_uw_per_k;    /* plate_conduction: each spring to the
-                                            plate; 0 off */
-    uint32_t plate_heat_capacity_mj_per_k;
-    uint16_t plate_loss_uw_per_k; /* plate to ambient */
-    uint16_t wake_uw_per_k;       /* fan_wake: heat received per K of the upstream
-                                     spring above air, fan       at 100 %; 0 off */
-    uint8_t wake_direction;       /* thermal_model_wake_t */
-    uint16_t loss_scale_permille[THERMAL_MODEL_MAX_SPRINGS];          /* edge_loss,
-                                                                         spring_mismatch */
-    uint16_t heat_capacity_scale_permille[THERMAL_MODEL_MAX_SPRINGS]; /* spring_mismatch
-                                                                       */
-} thermal_model_parameters_t;
-
 /* What a parameter can be refused for. */
 typedef enum {
     THERMAL_MODEL_OK = 0,
@@ -94,52 +45,6 @@ typedef enum {
         -3, /* the step is too long for this heat capacity and these losses */
     THERMAL_MODEL_ERROR_ORDER = -4 /* transformation temperatures out of order */
 } thermal_model_status_t;
-
-/* One for each field of thermal_model_parameters_t, in order. */
-typedef enum {
-    THERMAL_MODEL_ROWS = 0,
-    THERMAL_MODEL_COLUMNS,
-    THERMAL_MODEL_STEP,
-    THERMAL_MODEL_HEAT_CAPACITY,
-    THERMAL_MODEL_LOSS,
-    THERMAL_MODEL_LOSS_FAN,
-    THERMAL_MODEL_ORTHOGONAL,
-    THERMAL_MODEL_ORTHOGONAL_FAN,
-    THERMAL_MODEL_DIAGONAL,
-    THERMAL_MODEL_DIAGONAL_FAN,
-    THERMAL_MODEL_LOSS_RISE,
-    THERMAL_MODEL_RADIATING_AREA,
-    THERMAL_MODEL_LATENT_HEAT,
-    THERMAL_MODEL_MARTENSITE_FINISH,
-    THERMAL_MODEL_MARTENSITE_START,
-    THERMAL_MODEL_AUSTENITE_START,
-    THERMAL_MODEL_AUSTENITE_FINISH,
-    THERMAL_MODEL_RESISTANCE_MARTENSITE,
-    THERMAL_MODEL_RESISTANCE_AUSTENITE,
-    THERMAL_MODEL_AIR_HEAT_CAPACITY,
-    THERMAL_MODEL_AIR_EXCHANGE,
-    THERMAL_MODEL_PLATE_COUPLING,
-    THERMAL_MODEL_PLATE_HEAT_CAPACITY,
-    THERMAL_MODEL_PLATE_LOSS,
-    THERMAL_MODEL_WAKE,
-    THERMAL_MODEL_WAKE_TOWARDS,
-    THERMAL_MODEL_LOSS_SCALE,
-    THERMAL_MODEL_HEAT_CAPACITY_SCALE,
-    THERMAL_MODEL_PARAMETER_COUNT
-} thermal_model_parameter_t;
-
-/* Their own limits, in flash and in that order. */
-typedef struct {
-    parameter_range_t rows, columns, step_ms, heat_capacity_mj_per_k, loss_uw_per_k,
-        loss_fan_uw_per_k, orthogonal_uw_per_k, orthogonal_fan_uw_per_k, diagonal_uw_per_k,
-        diagonal_fan_uw_per_k, loss_rise_ppm_per_k, radiating_area_cmm2, latent_heat_mj,
-        martensite_finish_cc, martensite_start_cc, austenite_start_cc, austenite_finish_cc,
-        resistance_martensite_uohm, resistance_austenite_uohm, air_heat_capacity_mj_per_k,
-        air_exchange_uw_per_k, plate_coupling_uw_per_k, plate_heat_capacity_mj_per_k,
-        plate_loss_uw_per_k, wake_uw_per_k, wake_direction, loss_scale_permille,
-        heat_capacity_scale_permille;
-} thermal_model_ranges_t;
-extern const thermal_model_ranges_t thermal_model_ranges FLASH_MEMORY;
 
 /* Temperatures are held within these, degC in Q9.7: -40 .. 215. What lies outside counts as the
  * limit. A spring's upper limit is 255 degC less latent heat over heat capacity where that is
@@ -262,15 +167,9 @@ typedef struct {
     thermal_model_parameters_t parameters;
 } thermal_model_t;
 
-/* The paper's spring at 4 mm pitch, 3 x 3, 0.1 s, no optional effect but phase and latent heat
- * (docs/physics.md). */
-void thermal_model_parameters_default(thermal_model_parameters_t *parameters);
-
-/* The field's name as it is written in thermal_model_parameters_t, "" for no parameter. */
-const char *thermal_model_parameter_name(thermal_model_parameter_t parameter);
-
 /* Takes the parameters; then fan off, ambient 20 degC, everything at 20 degC and martensite. On
- * refusal the model is unchanged and *bad (may be NULL) says which parameter. O(n); divides: for
+ * refusal the model is unchanged and *bad (may be NULL) is the row of parameters.def
+ * that is in the way, PARAMETER_COUNT where it is step_ms. O(n); divides: for
  * start-up, not for the tick. Fails if and only if
  *
  * RANGE: rows x columns not in 1..THERMAL_MODEL_MAX_SPRINGS; step_ms not in 1..1000; a scale not in
@@ -290,7 +189,7 @@ const char *thermal_model_parameter_name(thermal_model_parameter_t parameter);
  * UNSTABLE: step times conductance above half the heat capacity of a spring, or of the plate. */
 thermal_model_status_t thermal_model_init(thermal_model_t *model,
                                           const thermal_model_parameters_t *parameters,
-                                          thermal_model_parameter_t *bad);
+                                          uint16_t *bad);
 
 /* Springs, air and plate to one temperature, reached from cold: martensite below austenite start.
  * O(n). */

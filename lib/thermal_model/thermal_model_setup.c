@@ -16,106 +16,6 @@
 #define WIDTH_MAX_CC        10000
 #define HIGHEST_CC          20000
 
-#define RANGE(field, type, minimum, maximum)                                                       \
-    PARAMETER_RANGE(thermal_model_parameters_t, field, type, minimum, maximum)
-const thermal_model_ranges_t thermal_model_ranges FLASH_MEMORY = {
-    RANGE(rows, U8, 1, THERMAL_MODEL_MAX_SPRINGS),
-    RANGE(columns, U8, 1, THERMAL_MODEL_MAX_SPRINGS),
-    RANGE(step_ms, U16, 1, 1000),
-    RANGE(heat_capacity_mj_per_k, U16, 1, 65535),
-    RANGE(loss_uw_per_k, U16, 0, 65535),
-    RANGE(loss_fan_uw_per_k, U16, 0, 65535),
-    RANGE(orthogonal_uw_per_k, U16, 0, 65535),
-    RANGE(orthogonal_fan_uw_per_k, U16, 0, 65535),
-    RANGE(diagonal_uw_per_k, U16, 0, 65535),
-    RANGE(diagonal_fan_uw_per_k, U16, 0, 65535),
-    RANGE(loss_rise_ppm_per_k, U16, 0, 20000),
-    RANGE(radiating_area_cmm2, U16, 0, 65535),
-    RANGE(latent_heat_mj, U16, 0, 65535),
-    RANGE(martensite_finish_cc, S16, -3000, HIGHEST_CC),
-    RANGE(martensite_start_cc, S16, -3000, HIGHEST_CC),
-    RANGE(austenite_start_cc, S16, -3000, HIGHEST_CC),
-    RANGE(austenite_finish_cc, S16, -3000, HIGHEST_CC),
-    RANGE(resistance_martensite_uohm, U32, 1, 16000),
-    RANGE(resistance_austenite_uohm, U32, 1, 16000),
-    RANGE(air_heat_capacity_mj_per_k, U32, 0, 2000),
-    RANGE(air_exchange_uw_per_k, U32, 0, 16000), /* 16 bits of 256 uW/K */
-    RANGE(plate_coupling_uw_per_k, U16, 0, 65535),
-    RANGE(plate_heat_capacity_mj_per_k, U32, 0, 2000),
-    RANGE(plate_loss_uw_per_k, U16, 0, 65535),
-    RANGE(wake_uw_per_k, U16, 0, 65535),
-    RANGE(wake_direction, U8, 0, THERMAL_MODEL_WAKE_NORTH),
-    RANGE(loss_scale_permille, U16, 1, 8000),
-    RANGE(heat_capacity_scale_permille, U16, 1, 8000)};
-
-void thermal_model_parameters_default(thermal_model_parameters_t *parameters)
-{
-    static const thermal_model_parameters_t usual FLASH_MEMORY = {
-        .rows = 3,
-        .columns = 3,
-        .step_ms = 100,
-        .heat_capacity_mj_per_k = 300,
-        .loss_uw_per_k = 5800,
-        .loss_fan_uw_per_k = 11300,
-        .orthogonal_uw_per_k = 586,
-        .orthogonal_fan_uw_per_k = 658,
-        .diagonal_uw_per_k = 293,
-        .diagonal_fan_uw_per_k = 329,
-        .latent_heat_mj = 8650,
-        .martensite_finish_cc = 6800,
-        .martensite_start_cc = 7800,
-        .austenite_start_cc = 8800,
-        .austenite_finish_cc = 9800,
-        .resistance_martensite_uohm = 175000,
-        .resistance_austenite_uohm = 219000,
-        .air_heat_capacity_mj_per_k = 50,
-        .plate_heat_capacity_mj_per_k = 20000,
-        .plate_loss_uw_per_k = 20000};
-    flash_copy(parameters, &usual, sizeof usual);
-    for (uint8_t i = 0; i < THERMAL_MODEL_MAX_SPRINGS; i++) {
-        parameters->loss_scale_permille[i] = 1000;
-        parameters->heat_capacity_scale_permille[i] = 1000;
-    }
-}
-
-const char *thermal_model_parameter_name(thermal_model_parameter_t parameter)
-{
-    static const char *const names[THERMAL_MODEL_PARAMETER_COUNT] = {
-        "rows",
-        "columns",
-        "step_ms",
-        "heat_capacity_mj_per_k",
-        "loss_uw_per_k",
-        "loss_fan_uw_per_k",
-        "orthogonal_uw_per_k",
-        "orthogonal_fan_uw_per_k",
-        "diagonal_uw_per_k",
-        "diagonal_fan_uw_per_k",
-        "loss_rise_ppm_per_k",
-        "radiating_area_cmm2",
-        "latent_heat_mj",
-        "martensite_finish_cc",
-        "martensite_start_cc",
-        "austenite_start_cc",
-        "austenite_finish_cc",
-        "resistance_martensite_uohm",
-        "resistance_austenite_uohm",
-        "air_heat_capacity_mj_per_k",
-        "air_exchange_uw_per_k",
-        "plate_coupling_uw_per_k",
-        "plate_heat_capacity_mj_per_k",
-        "plate_loss_uw_per_k",
-        "wake_uw_per_k",
-        "wake_direction",
-        "loss_scale_permille",
-        "heat_capacity_scale_permille",
-    };
-    if ((unsigned)parameter >= (unsigned)THERMAL_MODEL_PARAMETER_COUNT) {
-        return "";
-    }
-    return names[parameter];
-}
-
 static __attribute__((noinline)) uint32_t larger(uint32_t a, uint32_t b)
 {
     return a > b ? a : b;
@@ -164,32 +64,28 @@ static __attribute__((noinline)) uint32_t scaled_loss(uint16_t loss_uw_per_k, ui
     return ((uint32_t)loss_uw_per_k * permille + 500u) / 1000u;
 }
 
-/* A refusal: the status and the parameter, in one value; 0 is none. */
+/* A refusal: the status and the row, in one value; 0 is none. */
 typedef uint16_t refusal_t;
-#define REFUSE(status, parameter)                                                                  \
-    return (refusal_t)((uint16_t)(THERMAL_MODEL_##parameter) << 8 | -THERMAL_MODEL_ERROR_##status)
+#define REFUSED(status, row)                                                                       \
+    (refusal_t)((uint16_t)(row) << 8 | (uint8_t)-THERMAL_MODEL_ERROR_##status)
+#define REFUSE(status, name) return REFUSED(status, PARAMETER_##name)
 
 static refusal_t check_array(const thermal_model_parameters_t *p)
 {
-    const uint8_t outside =
-        parameter_first_outside(p, &thermal_model_ranges, THERMAL_MODEL_LOSS_SCALE);
-    if (outside < THERMAL_MODEL_LOSS_SCALE) {
-        return (refusal_t)((uint16_t)outside << 8 | -THERMAL_MODEL_ERROR_RANGE);
+    uint16_t outside;
+    if (!parameter_check(PARAMETER_PART_MODEL, p, &outside)) {
+        return REFUSED(RANGE, outside);
+    }
+    if (p->step_ms < 1u || p->step_ms > 1000u) {
+        return REFUSED(RANGE, PARAMETER_COUNT);
     }
     if ((uint16_t)p->rows * p->columns > THERMAL_MODEL_MAX_SPRINGS) {
-        REFUSE(RANGE, COLUMNS);
+        REFUSE(RANGE, columns);
     }
-    const parameter_range_t scale = parameter_range(&thermal_model_ranges.loss_scale_permille);
     for (uint8_t i = 0; i < (uint8_t)(p->rows * p->columns); i++) {
-        if (!parameter_is_within(&scale, p->loss_scale_permille[i])) {
-            REFUSE(RANGE, LOSS_SCALE);
-        }
-        if (!parameter_is_within(&scale, p->heat_capacity_scale_permille[i])) {
-            REFUSE(RANGE, HEAT_CAPACITY_SCALE);
-        }
         const uint32_t capacity = spring_capacity(p, i);
         if (capacity < 1000u || capacity < (uint32_t)p->step_ms * CAPACITY_UJ_PER_MS) {
-            REFUSE(RANGE, HEAT_CAPACITY);
+            REFUSE(RANGE, heat_capacity_j_per_k);
         }
     }
     return 0;
@@ -208,28 +104,28 @@ static refusal_t check_phase(const thermal_model_parameters_t *p)
     const int16_t start_a = p->austenite_start_cc;
     const int16_t finish_a = p->austenite_finish_cc;
     if (start_m <= finish_m) {
-        REFUSE(ORDER, MARTENSITE_START);
+        REFUSE(ORDER, martensite_start_c);
     }
     if (!is_width(finish_m, start_m)) {
-        REFUSE(RANGE, MARTENSITE_START);
+        REFUSE(RANGE, martensite_start_c);
     }
     if (start_a < start_m) {
-        REFUSE(ORDER, AUSTENITE_START);
+        REFUSE(ORDER, austenite_start_c);
     }
     if (finish_a <= start_a) {
-        REFUSE(ORDER, AUSTENITE_FINISH);
+        REFUSE(ORDER, austenite_finish_c);
     }
     if (!is_width(start_a, finish_a)) {
-        REFUSE(RANGE, AUSTENITE_FINISH);
+        REFUSE(RANGE, austenite_finish_c);
     }
     const uint32_t latent_cc = p->latent_heat_mj * (uint32_t)100 / p->heat_capacity_mj_per_k;
     if (latent_cc > LATENT_MAX_K * 100u) {
-        REFUSE(RANGE, LATENT_HEAT);
+        REFUSE(RANGE, latent_heat_j);
     }
     const int16_t least_width_cc = (int16_t)(((int16_t)latent_cc + 19) / 20);
     if (least_width_cc > start_m - finish_m || least_width_cc > finish_a - start_a ||
         (int16_t)latent_cc > HIGHEST_CC - finish_a) {
-        REFUSE(RANGE, LATENT_HEAT);
+        REFUSE(RANGE, latent_heat_j);
     }
     return 0;
 }
@@ -239,18 +135,18 @@ static refusal_t check_spring(const thermal_model_parameters_t *p, uint8_t i)
     const uint32_t natural = scaled_loss(p->loss_uw_per_k, p->loss_scale_permille[i]);
     const uint32_t forced = scaled_loss(p->loss_fan_uw_per_k, p->loss_scale_permille[i]);
     if (natural >= CONDUCTANCE_MAX && natural >= forced) {
-        REFUSE(OVERFLOW, LOSS);
+        REFUSE(OVERFLOW, loss_w_per_k);
     }
     if (forced >= CONDUCTANCE_MAX) {
-        REFUSE(OVERFLOW, LOSS_FAN);
+        REFUSE(OVERFLOW, loss_fan_w_per_k);
     }
     if (p->wake_uw_per_k > (uint16_t)forced) {
-        REFUSE(RANGE, WAKE);
+        REFUSE(RANGE, wake_w_per_k);
     }
     const uint32_t rise_e6 = natural * p->loss_rise_ppm_per_k;
     const uint32_t risen = natural + rise_e6 / (1000000u / LEAD_SPAN_K) + 1u;
     if (rise_e6 > LOSS_RISE_MAX_E6 || risen > CONDUCTANCE_MAX) {
-        REFUSE(OVERFLOW, LOSS_RISE);
+        REFUSE(OVERFLOW, loss_rise_per_k);
     }
     const place_t place = place_of(p, i);
     const uint32_t orthogonal =
@@ -262,27 +158,27 @@ static refusal_t check_spring(const thermal_model_parameters_t *p, uint8_t i)
     const uint32_t total = loss + conduction + p->wake_uw_per_k + radiation_slope(p);
     if (conduction <= CONDUCTANCE_MAX && total > CONDUCTANCE_SUM_MAX && loss > conduction) {
         if (forced > natural) {
-            REFUSE(OVERFLOW, LOSS_FAN);
+            REFUSE(OVERFLOW, loss_fan_w_per_k);
         }
-        REFUSE(OVERFLOW, LOSS);
+        REFUSE(OVERFLOW, loss_w_per_k);
     }
     if (conduction > CONDUCTANCE_MAX || total > CONDUCTANCE_SUM_MAX) {
         if (p->plate_coupling_uw_per_k > orthogonal + diagonal) {
-            REFUSE(OVERFLOW, PLATE_COUPLING);
+            REFUSE(OVERFLOW, plate_coupling_w_per_k);
         }
         if (diagonal > orthogonal) {
             if (p->diagonal_fan_uw_per_k > p->diagonal_uw_per_k) {
-                REFUSE(OVERFLOW, DIAGONAL_FAN);
+                REFUSE(OVERFLOW, diagonal_fan_w_per_k);
             }
-            REFUSE(OVERFLOW, DIAGONAL);
+            REFUSE(OVERFLOW, diagonal_w_per_k);
         }
         if (p->orthogonal_fan_uw_per_k > p->orthogonal_uw_per_k) {
-            REFUSE(OVERFLOW, ORTHOGONAL_FAN);
+            REFUSE(OVERFLOW, orthogonal_fan_w_per_k);
         }
-        REFUSE(OVERFLOW, ORTHOGONAL);
+        REFUSE(OVERFLOW, orthogonal_w_per_k);
     }
     if ((total * p->step_ms + 499u) / 500u > spring_capacity(p, i)) { /* step G <= C / 2 */
-        REFUSE(UNSTABLE, STEP);
+        REFUSE(UNSTABLE, heat_capacity_j_per_k);
     }
     return 0;
 }
@@ -293,11 +189,11 @@ static refusal_t check_plate(const thermal_model_parameters_t *p)
         return 0;
     }
     if (p->plate_heat_capacity_mj_per_k == 0) {
-        REFUSE(RANGE, PLATE_HEAT_CAPACITY);
+        REFUSE(RANGE, plate_heat_capacity_j_per_k);
     }
     const uint32_t total = plate_conductance(p);
     if ((total * p->step_ms + 499999u) / 500000u > p->plate_heat_capacity_mj_per_k) {
-        REFUSE(UNSTABLE, PLATE_HEAT_CAPACITY);
+        REFUSE(UNSTABLE, plate_heat_capacity_j_per_k);
     }
     return 0;
 }
@@ -460,12 +356,12 @@ void thermal_model_apply_fan(thermal_model_t *model)
 
 thermal_model_status_t thermal_model_init(thermal_model_t *model,
                                           const thermal_model_parameters_t *parameters,
-                                          thermal_model_parameter_t *bad)
+                                          uint16_t *bad)
 {
     const refusal_t refusal = check(parameters);
     if (refusal != 0) {
         if (bad != NULL) {
-            *bad = (thermal_model_parameter_t)(refusal >> 8);
+            *bad = refusal >> 8;
         }
         return (thermal_model_status_t)(-(int)(refusal & 0xFFu));
     }

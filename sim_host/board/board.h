@@ -43,7 +43,8 @@ typedef enum {
     BOARD_FAULT_OPEN = 0, /* spring broken */
     BOARD_FAULT_SHORT,    /* spring's ends connected */
     BOARD_FAULT_NACK,     /* its INA219 does not answer */
-    BOARD_FAULT_STALE,    /* its INA219 converts no more */
+    BOARD_FAULT_STALE,    /* its INA219 converts no more, and says so: CNVR stays clear */
+    BOARD_FAULT_FREEZE,   /* its INA219 acknowledges and converts, with the same result for ever */
     BOARD_FAULT_SDA_LOW,  /* the bus's data line is held low (channel ignored) */
     BOARD_FAULT_EEPROM,   /* the EEPROM keeps nothing that is written (channel ignored) */
     BOARD_FAULT_FAN       /* the fan stands still whatever it is told (channel ignored) */
@@ -54,7 +55,8 @@ typedef void (*board_mark_t)(void *context, uint64_t cycle, unsigned which, uint
 
 typedef struct {
     const char *elf;      /* path of the program */
-    plant_t *plant;       /* nine springs at most, not owned; NULL: nothing is connected */
+    plant_t *plant;       /* nine springs at most, not owned; its parameters may be set between
+                             runs; NULL: nothing is connected */
     uint64_t seed;        /* of what RAM holds at power-on, and of the sensors' noise */
     double shunt_noise_v; /* standard deviation of one conversion of an INA219 */
     double bus_noise_v;
@@ -106,6 +108,11 @@ double board_fan(const board_t *board); /* what the pin says, 0..1 */
 double board_current_a(const board_t *board, unsigned channel);
 
 void board_set_fault(board_t *board, board_fault_t fault, unsigned channel, bool on);
+/* The INA219 shows so many times its current and its voltage (1, 1: the truth). */
+void board_scale_sensor(board_t *board, unsigned channel, double current_scale,
+                        double voltage_scale);
+/* The two INA219s change their places in the stages; done twice, they are back. */
+void board_swap_sensors(board_t *board, unsigned a, unsigned b);
 /* The INA219 loses its configuration. */
 void board_reset_sensor(board_t *board, unsigned channel);
 /* A register (0..5) of an INA219, without side effects. */

@@ -70,7 +70,10 @@ void ina219_power_on(ina219_t *sensor, const ina219_inputs_t *now)
     ina219_t before = *sensor;
     *sensor = (ina219_t){.config = CONFIG_RESET,
                          .absent = before.absent,
+                         .stale = before.stale,
                          .frozen = before.frozen,
+                         .shunt_gain_error = before.shunt_gain_error,
+                         .bus_gain_error = before.bus_gain_error,
                          .shunt_noise_v = before.shunt_noise_v,
                          .bus_noise_v = before.bus_noise_v,
                          .noise = before.noise};
@@ -102,14 +105,32 @@ static void calculate(ina219_t *sensor)
     sensor->power = (uint16_t)(power > UINT16_MAX ? UINT16_MAX : power);
 }
 
-/* A mean over a window, with the noise of as many conversions as it held. */
-static double mean_v(ina219_t *sensor, double begin, double end, double cycles, double noise_v)
+/* A mean over a window, with the gain error and the noise of as many conversions as it held. */
+static double mean_v(ina219_t *sensor, double sum_v_cycles, double cycles, double gain_error,
+                     double noise_v)
 {
     uint8_t setting = adc_setting(sensor);
     double samples = (setting & 8u) != 0 ? (double)(1u << (setting & 7u)) : 1.0;
-    double mean = (end - begin) / cycles;
+    double mean = (1.0 + gain_error) * sum_v_cycles / cycles;
     return noise_v > 0.0 ? mean + electrics_noise_normal(&sensor->noise) * noise_v / sqrt(samples)
                          : mean;
+}
+
+/* The result of the conversion that ends now, in its register. */
+static void take_result(ina219_t *sensor, const ina219_inputs_t *now, double cycles)
+{
+    long step = resolution_step(adc_setting(sensor));
+    if (sensor->phase == INA219_CONVERTS_SHUNT) {
+        long full_scale = 4000L << ((sensor->config >> 11) & 3u);
+        double mean = mean_v(sensor, now->shunt_v_cycles - sensor->window_start.shunt_v_cycles,
+                             cycles, sensor->shunt_gain_error, sensor->shunt_noise_v);
+        sensor->shunt_10uv = (int16_t)quantised(mean, 10e-6, step, -full_scale, full_scale);
+    } else {
+        long full_scale = (sensor->config & 0x2000u) != 0 ? BUS_FULL_SCALE_32V : BUS_FULL_SCALE_16V;
+        double mean = mean_v(sensor, now->bus_v_cycles - sensor->window_start.bus_v_cycles, cycles,
+                             sensor->bus_gain_error, sensor->bus_noise_v);
+        sensor->bus_4mv = (uint16_t)quantised(mean, 4e-3, step, 0, full_scale);
+    }
 }
 
 void ina219_conversion_ended(ina219_t *sensor, const ina219_inputs_t *now)
@@ -118,22 +139,11 @@ void ina219_conversion_ended(ina219_t *sensor, const ina219_inputs_t *now)
         return;
     }
     double cycles = (double)(now->cycle - sensor->window_start.cycle);
-    long step = resolution_step(adc_setting(sensor));
-    bool shunt = sensor->phase == INA219_CONVERTS_SHUNT;
     uint8_t mode = mode_of(sensor);
-    bool last_of_sequence = !shunt || (mode & MODE_BUS) == 0;
-    if (!sensor->frozen && cycles > 0) {
-        if (shunt) {
-            long full_scale = 4000L << ((sensor->config >> 11) & 3u);
-            double mean = mean_v(sensor, sensor->window_start.shunt_v_cycles, now->shunt_v_cycles,
-                                 cycles, sensor->shunt_noise_v);
-            sensor->shunt_10uv = (int16_t)quantised(mean, 10e-6, step, -full_scale, full_scale);
-        } else {
-            long full_scale =
-                (sensor->config & 0x2000u) != 0 ? BUS_FULL_SCALE_32V : BUS_FULL_SCALE_16V;
-            double mean = mean_v(sensor, sensor->window_start.bus_v_cycles, now->bus_v_cycles,
-                                 cycles, sensor->bus_noise_v);
-            sensor->bus_4mv = (uint16_t)quantised(mean, 4e-3, step, 0, full_scale);
+    bool last_of_sequence = sensor->phase == INA219_CONVERTS_BUS || (mode & MODE_BUS) == 0;
+    if (!sensor->stale && cycles > 0) {
+        if (!sensor->frozen) {
+            take_result(sensor, now, cycles);
         }
         sensor->conversions++;
         if (last_of_sequence) {

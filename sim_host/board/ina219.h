@@ -60,7 +60,9 @@ typedef struct {
     electrics_noise_t noise;
     /* faults */
     bool absent; /* answers no address */
-    bool frozen; /* converts no more: registers stay as they are and CNVR stays clear */
+    bool stale;  /* converts no more: registers stay as they are and CNVR stays clear */
+    bool frozen; /* converts, with the results that it has */
+    double shunt_gain_error, bus_gain_error; /* it shows 1 + error times what is there */
 } ina219_t;
 
 /* Registers to their reset values (config 0x399F, calibration 0) and the first conversion begun.

@@ -64,8 +64,7 @@ public:
     chip_replay(const log_data &log, const plant_t *plant, const thermal_model_parameters_t &chip)
         : log_(log), springs_(log.springs.size()), plant_(plant)
     {
-        thermal_model_parameter_t bad{};
-        if (thermal_model_init(&model_, &chip, &bad) != THERMAL_MODEL_OK) {
+        if (thermal_model_init(&model_, &chip, nullptr) != THERMAL_MODEL_OK) {
             throw work_error("the on-chip model refuses parameters that the mapping accepted");
         }
         step_s_ = chip.step_ms / 1000.0;
@@ -313,7 +312,7 @@ void replay(const replay_options &options)
     plant_reset(plant.get());
     check_command_power(log, plant.get(), options.model_path);
     thermal_model_parameters_t chip{};
-    char message[256] = "";
+    char message[1024] = "";
     if (chip_mapping_from_plant(plant.get(), &chip, message, sizeof message) != CHIP_MAPPING_OK) {
         throw place_of(model, message).error(message);
     }

@@ -44,7 +44,7 @@ std::string set_chip_model(const scenario &plan, const plant_t *plant, settings_
 {
     thermal_model_parameters_t &model = settings.controller.model;
     std::string path = plan.model_path.empty() ? "plant" : plan.model_path;
-    char message[256] = "";
+    char message[1024] = "";
     if (path == "defaults") {
         model.rows = static_cast<std::uint8_t>(plan.rows);
         model.columns = static_cast<std::uint8_t>(plan.cols);
@@ -87,8 +87,8 @@ std::string set_chip(const scenario &plan, const plant_t *plant, settings_t &set
             break;
         case SETTINGS_UNKNOWN_NAME: {
             std::vector<std::string> names;
-            for (std::uint8_t k = 0; k < settings_count(); ++k) {
-                names.emplace_back(settings_name(k));
+            for (std::uint16_t k = 0; k < PARAMETER_COUNT; ++k) {
+                names.emplace_back(parameter_row(k).name);
             }
             throw entry.key_place.error(
                 fmt::format("the chip has no setting {}{}; the console's $$ "
@@ -100,15 +100,14 @@ std::string set_chip(const scenario &plan, const plant_t *plant, settings_t &set
                 "${}: {} is not a number with a point and as many decimals as the setting has",
                 entry.key, in_quotes(entry.value)));
         case SETTINGS_OUT_OF_RANGE: {
-            std::uint8_t index = 0;
+            std::uint16_t row = 0;
             std::uint8_t element = 0;
-            settings_entry_t known{};
-            settings_find(entry.key.c_str(), &index, &element);
-            settings_entry(index, &known);
+            settings_find(entry.key.c_str(), &row, &element);
+            const parameter_row_t known = parameter_row(row);
             const double scale = std::pow(10.0, known.decimals);
             throw entry.place.error(fmt::format("${} is {}; it must be {} to {} {}", entry.key,
                                                 in_quotes(entry.value), known.minimum / scale,
-                                                known.maximum / scale, settings_unit(index)));
+                                                known.maximum / scale, known.unit));
         }
         }
     }

@@ -18,20 +18,9 @@ std::unique_ptr<runner> make_runner(const std::string &board, const runner_reque
     throw input_error(fmt::format("--board {}: this build has no such board; use native", board));
 }
 
-std::string setting_name(std::size_t offset)
+std::string setting_name(std::uint16_t row)
 {
-    static_assert(offsetof(settings_t, controller) == 0, "offsets of both structs are the same");
-    for (std::uint8_t k = 0; k < settings_count(); ++k) {
-        settings_entry_t entry{};
-        settings_entry(k, &entry);
-        const std::size_t size = parameter_width(entry.type);
-        if (offset >= entry.offset && offset < entry.offset + size * entry.count) {
-            return entry.count == 1 ? fmt::format("${}", settings_name(k))
-                                    : fmt::format("${}_{}", settings_name(k),
-                                                  (offset - entry.offset) / size + 1);
-        }
-    }
-    return "a setting";
+    return row < PARAMETER_COUNT ? fmt::format("${}", parameter_row(row).name) : "a setting";
 }
 
 } // namespace ninespring

@@ -170,20 +170,19 @@ private:
 
     void send_settings(const settings_t &wanted, const settings_t &fresh)
     {
-        for (std::uint8_t k = 0; k < settings_count(); ++k) {
-            settings_entry_t entry{};
-            settings_entry(k, &entry);
-            for (std::uint8_t element = 0; element < std::min<int>(entry.count, BOARD_CHANNELS);
+        for (std::uint16_t k = 0; k < PARAMETER_COUNT; ++k) {
+            const parameter_row_t row = parameter_row(k);
+            for (std::uint8_t element = 0; element < std::min<int>(row.count, BOARD_CHANNELS);
                  ++element) {
                 const std::int32_t value = settings_get(&wanted, k, element);
                 if (value == settings_get(&fresh, k, element)) {
                     continue;
                 }
                 char text[TEXT_DECIMAL_SIZE];
-                text_format_decimal(value, entry.decimals, text);
-                set(entry.count == 1 ? std::string(settings_name(k))
-                                     : fmt::format("{}_{}", settings_name(k), element + 1),
-                    text);
+                text_format_decimal(value, row.decimals, text);
+                char name[SETTINGS_NAME_SIZE];
+                settings_name(k, element, name);
+                set(name, text);
             }
         }
     }

@@ -7,14 +7,12 @@
 #include <string.h>
 
 #include "convection.h"
+#include "descriptions.h"
 
 /* Rise above the air over which the chip's straight line replaces the law of natural convection. */
-#define CONVECTION_SPAN_K  90
-#define STEP_MS            100
-#define SAME               1e-3 /* relative: springs nearer than this to each other count as equal */
-#define FAN_FULL           1.0
-#define CAPACITY_LONGEST   4294967295.0
-#define RESISTANCE_HIGHEST 16e6 /* uohm */
+#define CONVECTION_SPAN_K 90
+#define SAME              1e-3 /* relative: springs nearer than this to each other count as equal */
+#define FAN_FULL          1.0
 
 typedef struct {
     const plant_t *plant;
@@ -22,6 +20,7 @@ typedef struct {
     char *message;
     size_t size;
     bool failed;
+    thermal_model_parameters_t chip;
 } mapping_t;
 
 static void say(mapping_t *m, const char *form, ...)
@@ -40,9 +39,9 @@ static void say(mapping_t *m, const char *form, ...)
     va_end(list);
 }
 
-static bool is_on(const mapping_t *m, const char *effect)
+static bool is_on(const mapping_t *m, effect_t effect)
 {
-    const int index = plant_effect_index(effect);
+    const int index = effect < EFFECT_COUNT ? plant_effect_index(effect_row(effect)->name) : -1;
     return index >= 0 && plant_effect_is_on(m->plant, (size_t)index);
 }
 
@@ -51,7 +50,8 @@ static double value_of(const mapping_t *m, const char *name, int spring)
     double value = 0.0;
     const int index = plant_parameter_index(name);
     if (index >= 0) {
-        (void)plant_get_index(m->plant, (size_t)index, spring, &value);
+        const bool each = plant_parameter((size_t)index)->per_spring;
+        (void)plant_get_index(m->plant, (size_t)index, each ? spring : 0, &value);
     }
     return value;
 }
@@ -61,31 +61,30 @@ static double array_value(const mapping_t *m, const char *name)
     return value_of(m, name, 0);
 }
 
-/* A physical value as a whole number of the chip's units. The first one that does not fit is told.
- */
-static double fitted(mapping_t *m, const char *name, double value, double unit, double low,
-                     double high)
+/* A physical value as the whole number of the row that is nearest. The first one that does not fit
+ * is told, by the plant's name for it. */
+static void put_from(mapping_t *m, const char *name, parameter_t parameter, int element,
+                     double value)
 {
+    const parameter_row_t row = parameter_row((uint16_t)parameter);
+    const double unit = pow(10.0, -row.decimals);
     const double whole = round(value / unit);
-    if (whole >= low && whole <= high) {
-        return whole;
+    if (whole >= row.minimum && whole <= row.maximum) {
+        parameter_set(&m->chip, &row, (uint8_t)element, (int32_t)whole);
+        return;
     }
     if (!m->failed) {
         m->message[0] = '\0';
-        say(m, "%s is %.6g, the chip holds %.6g to %.6g", name, value, low * unit, high * unit);
+        say(m, "%s is %.6g, the chip holds %.6g to %.6g", name, value, row.minimum * unit,
+            row.maximum * unit);
         m->failed = true;
     }
-    return low;
 }
 
-static uint16_t fitted_u16(mapping_t *m, const char *name, double value, double unit)
+static void put(mapping_t *m, parameter_t parameter, int element, double value)
 {
-    return (uint16_t)fitted(m, name, value, unit, 0.0, 65535.0);
-}
-
-static int16_t temperature_cc(mapping_t *m, const char *name)
-{
-    return (int16_t)fitted(m, name, array_value(m, name), 0.01, -32768.0, 32767.0);
+    const parameter_row_t row = parameter_row((uint16_t)parameter);
+    put_from(m, row.name, parameter, element, value);
 }
 
 /* Mean over the springs; *spread is the largest relative distance from it. */
@@ -145,33 +144,35 @@ static void straighten(const mapping_t *m, double *factor, double *rise_per_k, d
     *fan_loss = fan_y / s22;
 }
 
-static void map_loss(mapping_t *m, thermal_model_parameters_t *p)
+/* Loss of each spring, with edge, mismatch and natural convection in it: a mean and a scale each.
+ */
+static void map_loss(mapping_t *m)
 {
-    const bool edge = is_on(m, "edge_loss"), mismatch = is_on(m, "spring_mismatch");
+    const bool edge = is_on(m, EFFECT_edge_loss), mismatch = is_on(m, EFFECT_spring_mismatch);
     const double per_side = array_value(m, "edge_loss_fraction");
-    double scale[PLANT_MAX_SPRINGS];
+    const int rows = m->chip.rows, columns = m->chip.columns;
     double natural[PLANT_MAX_SPRINGS] = {0.0}, forced[PLANT_MAX_SPRINGS] = {0.0};
     double factor = 1.0, rise = 0.0, fan_loss = 0.0;
-    const bool convection = is_on(m, "natural_convection");
+    const bool convection = is_on(m, EFFECT_natural_convection);
     const bool correlation = convection && array_value(m, "convection_correlation") >= 0.5;
     if (convection) {
         straighten(m, &factor, &rise, &fan_loss);
     }
     for (int i = 0; i < m->springs; i++) {
-        const int row = i / p->columns, column = i % p->columns;
+        const int row = i / columns, column = i % columns;
         const int free_sides =
-            (row == 0) + (row == p->rows - 1) + (column == 0) + (column == p->columns - 1);
-        scale[i] = mismatch ? value_of(m, "loss_scale", i) : 1.0;
-        scale[i] *= edge ? 1.0 + per_side * free_sides : 1.0;
-        natural[i] = scale[i] * (correlation ? factor : factor * value_of(m, "loss_w_per_k", i));
-        forced[i] = scale[i] * (correlation ? fan_loss : value_of(m, "loss_fan_w_per_k", i));
+            (row == 0) + (row == rows - 1) + (column == 0) + (column == columns - 1);
+        const double scale = (mismatch ? value_of(m, "loss_scale", i) : 1.0) *
+                             (edge ? 1.0 + per_side * free_sides : 1.0);
+        natural[i] = scale * (correlation ? factor : factor * value_of(m, "loss_w_per_k", i));
+        forced[i] = scale * (correlation ? fan_loss : value_of(m, "loss_fan_w_per_k", i));
     }
     double spread = 0.0, fan_spread = 0.0;
     const double mean = mean_of(m, natural, &spread);
     const double fan_mean = mean_of(m, forced, &fan_spread);
-    p->loss_uw_per_k = fitted_u16(m, "loss_w_per_k", mean, 1e-6);
-    p->loss_fan_uw_per_k = fitted_u16(m, "loss_fan_w_per_k", fan_mean, 1e-6);
-    p->loss_rise_ppm_per_k = fitted_u16(m, "loss rise with temperature (1/K)", rise, 1e-6);
+    put(m, PARAMETER_loss_w_per_k, 0, mean);
+    put(m, PARAMETER_loss_fan_w_per_k, 0, fan_mean);
+    put_from(m, "loss rise with temperature (1/K)", PARAMETER_loss_rise_per_k, 0, rise);
     double worst = 0.0;
     for (int i = 0; i < m->springs; i++) {
         const double own = mean > 0.0       ? natural[i] / mean
@@ -179,7 +180,7 @@ static void map_loss(mapping_t *m, thermal_model_parameters_t *p)
                                             : 1.0;
         const double fan_own = fan_mean > 0.0 ? forced[i] / fan_mean : own;
         worst = fmax(worst, fabs(fan_own - own));
-        p->loss_scale_permille[i] = (uint16_t)fitted(m, "loss_scale", own, 1e-3, 1.0, 65535.0);
+        put(m, PARAMETER_loss_scale, i, own);
     }
     if (worst > SAME && !m->failed) {
         say(m, "springs that differ in loss with the fan otherwise than without: the chip takes "
@@ -187,9 +188,9 @@ static void map_loss(mapping_t *m, thermal_model_parameters_t *p)
     }
 }
 
-static void map_capacity(mapping_t *m, thermal_model_parameters_t *p)
+static void map_capacity(mapping_t *m)
 {
-    const bool latent = is_on(m, "latent_heat"), mismatch = is_on(m, "spring_mismatch");
+    const bool latent = is_on(m, EFFECT_latent_heat), mismatch = is_on(m, EFFECT_spring_mismatch);
     double capacity[PLANT_MAX_SPRINGS] = {0.0}, latent_k[PLANT_MAX_SPRINGS] = {0.0};
     for (int i = 0; i < m->springs; i++) {
         const double own = value_of(m, "heat_capacity_j_per_k", i);
@@ -198,13 +199,10 @@ static void map_capacity(mapping_t *m, thermal_model_parameters_t *p)
     }
     double spread = 0.0, latent_spread = 0.0;
     const double mean = mean_of(m, capacity, &spread);
-    const double mean_latent_k = mean_of(m, latent_k, &latent_spread);
-    p->heat_capacity_mj_per_k =
-        (uint16_t)fitted(m, "heat_capacity_j_per_k", mean, 1e-3, 1.0, 65535.0);
-    p->latent_heat_mj = fitted_u16(m, "latent_heat_j", mean_latent_k * mean, 1e-3);
+    put(m, PARAMETER_heat_capacity_j_per_k, 0, mean);
+    put(m, PARAMETER_latent_heat_j, 0, mean_of(m, latent_k, &latent_spread) * mean);
     for (int i = 0; i < m->springs; i++) {
-        p->heat_capacity_scale_permille[i] =
-            (uint16_t)fitted(m, "heat_capacity_scale", capacity[i] / mean, 1e-3, 1.0, 65535.0);
+        put(m, PARAMETER_heat_capacity_scale, i, capacity[i] / mean);
     }
     if (latent_spread > SAME && !m->failed) {
         say(m, "latent_heat_j differs between springs: the chip takes the mean");
@@ -214,71 +212,71 @@ static void map_capacity(mapping_t *m, thermal_model_parameters_t *p)
     }
 }
 
-static void map_resistance(mapping_t *m, thermal_model_parameters_t *p)
+/* Without resistance_phase both phases have the plant's one resistance. */
+static void map_resistance(mapping_t *m)
 {
-    const bool phase = is_on(m, "resistance_phase"), mismatch = is_on(m, "spring_mismatch");
-    const char *martensite_name = phase ? "resistance_martensite_ohm" : "resistance_ohm";
-    const char *austenite_name = phase ? "resistance_austenite_ohm" : "resistance_ohm";
-    double martensite[PLANT_MAX_SPRINGS], austenite[PLANT_MAX_SPRINGS];
-    /* The chip's resistance does not depend on temperature: taken where it matters, between the
-     * phases. */
-    const double middle_c =
-        0.5 * (array_value(m, "martensite_start_c") + array_value(m, "austenite_start_c"));
-    const double warm =
-        phase ? 1.0 + array_value(m, "resistance_coefficient_per_k") * (middle_c - 20.0) : 1.0;
-    for (int i = 0; i < m->springs; i++) {
-        const double scale = warm * (mismatch ? value_of(m, "resistance_scale", i) : 1.0);
-        martensite[i] = scale * value_of(m, martensite_name, i);
-        austenite[i] = scale * value_of(m, austenite_name, i);
+    const bool phase = is_on(m, EFFECT_resistance_phase);
+    const bool mismatch = is_on(m, EFFECT_spring_mismatch);
+    const parameter_t phases[] = {PARAMETER_resistance_martensite_ohm,
+                                  PARAMETER_resistance_austenite_ohm};
+    double worst = 0.0;
+    for (size_t k = 0; k < 2; k++) {
+        const parameter_row_t row = parameter_row((uint16_t)phases[k]);
+        const char *const name = phase ? row.name : "resistance_ohm";
+        double ohm[PLANT_MAX_SPRINGS], spread = 0.0;
+        for (int i = 0; i < m->springs; i++) {
+            ohm[i] = (mismatch ? value_of(m, "resistance_scale", i) : 1.0) * value_of(m, name, i);
+        }
+        put_from(m, name, phases[k], 0, mean_of(m, ohm, &spread));
+        worst = fmax(worst, spread);
     }
-    double spread = 0.0, other_spread = 0.0;
-    p->resistance_martensite_uohm = (uint32_t)fitted(
-        m, martensite_name, mean_of(m, martensite, &spread), 1e-6, 1.0, RESISTANCE_HIGHEST);
-    p->resistance_austenite_uohm = (uint32_t)fitted(
-        m, austenite_name, mean_of(m, austenite, &other_spread), 1e-6, 1.0, RESISTANCE_HIGHEST);
-    if (fmax(spread, other_spread) > SAME && !m->failed) {
+    if (worst > SAME && !m->failed) {
         say(m, "resistance differs between springs: the chip takes the mean, and measures v x i");
     }
 }
 
-static void map_effects(mapping_t *m, thermal_model_parameters_t *p)
+/* Rows that more than the plant's parameter of their name goes into. */
+static bool is_composed(uint16_t row)
 {
-    p->radiating_area_cmm2 =
-        is_on(m, "radiation")
-            ? fitted_u16(m, "emissivity x surface_mm2",
-                         array_value(m, "emissivity") * array_value(m, "surface_mm2"), 0.01)
-            : 0;
-    p->air_exchange_uw_per_k = 0;
-    if (is_on(m, "shared_air")) {
-        p->air_heat_capacity_mj_per_k = (uint32_t)fitted(
-            m, "air_heat_capacity_j_per_k", array_value(m, "air_heat_capacity_j_per_k"), 1e-3, 0.0,
-            CAPACITY_LONGEST);
-        p->air_exchange_uw_per_k = (uint32_t)fitted(
-            m, "air_exchange_w_per_k", array_value(m, "air_exchange_w_per_k"), 1e-6, 1.0, 16e6);
+    switch (row) {
+    case PARAMETER_loss_w_per_k:
+    case PARAMETER_loss_fan_w_per_k:
+    case PARAMETER_loss_scale:
+    case PARAMETER_heat_capacity_j_per_k:
+    case PARAMETER_heat_capacity_scale:
+    case PARAMETER_latent_heat_j:
+    case PARAMETER_resistance_martensite_ohm:
+    case PARAMETER_resistance_austenite_ohm:
+        return true;
+    default:
+        return false;
     }
-    p->plate_coupling_uw_per_k = 0;
-    if (is_on(m, "plate_conduction")) {
-        double coupling[PLANT_MAX_SPRINGS];
+}
+
+/* All others, by their name; the default, which for an effect is off, where theirs is not on. */
+static void map_rows_of_the_same_name(mapping_t *m)
+{
+    for (uint16_t k = 0; k < PARAMETER_COUNT; k++) {
+        const parameter_row_t row = parameter_row(k);
+        const effect_t effect = parameter_description(k)->effect;
+        if (row.part != PARAMETER_PART_MODEL || is_composed(k) ||
+            plant_parameter_index(row.name) < 0 || (effect != EFFECT_none && !is_on(m, effect))) {
+            continue;
+        }
+        double value[PLANT_MAX_SPRINGS], spread = 0.0;
         for (int i = 0; i < m->springs; i++) {
-            coupling[i] = value_of(m, "plate_coupling_w_per_k", i);
+            value[i] = value_of(m, row.name, i);
+            if (row.count > 1) {
+                put(m, (parameter_t)k, i, value[i]);
+            }
         }
-        double spread = 0.0;
-        p->plate_coupling_uw_per_k =
-            fitted_u16(m, "plate_coupling_w_per_k", mean_of(m, coupling, &spread), 1e-6);
-        p->plate_heat_capacity_mj_per_k = (uint32_t)fitted(
-            m, "plate_heat_capacity_j_per_k", array_value(m, "plate_heat_capacity_j_per_k"), 1e-3,
-            1.0, CAPACITY_LONGEST);
-        p->plate_loss_uw_per_k =
-            fitted_u16(m, "plate_loss_w_per_k", array_value(m, "plate_loss_w_per_k"), 1e-6);
+        if (row.count == 1) {
+            put(m, (parameter_t)k, 0, mean_of(m, value, &spread));
+        }
         if (spread > SAME && !m->failed) {
-            say(m, "plate_coupling_w_per_k differs between springs: the chip takes the mean");
+            say(m, "%s differs between springs: the chip takes the mean", row.name);
         }
     }
-    p->wake_uw_per_k = is_on(m, "fan_wake")
-                           ? fitted_u16(m, "wake_w_per_k", array_value(m, "wake_w_per_k"), 1e-6)
-                           : 0;
-    p->wake_direction =
-        is_on(m, "fan_wake") ? (uint8_t)array_value(m, "wake_direction") : (uint8_t)0;
 }
 
 static const char *reason_of(thermal_model_status_t status)
@@ -298,78 +296,46 @@ static const char *reason_of(thermal_model_status_t status)
     return "refused";
 }
 
-/* The chip's parameter as the plant calls it: they differ in the unit. */
-static void plant_name(thermal_model_parameter_t parameter, char *name, size_t size)
-{
-    static const char *const units[][2] = {
-        {"_uw_per_k", "_w_per_k"}, {"_mj", "_j"}, {"_cc", "_c"}, {"_permille", ""}};
-    const char *own = thermal_model_parameter_name(parameter);
-    for (size_t k = 0; k < sizeof units / sizeof units[0]; k++) {
-        const char *unit = strstr(own, units[k][0]);
-        if (unit != NULL) {
-            (void)snprintf(name, size, "%.*s%s%s", (int)(unit - own), own, units[k][1],
-                           unit + strlen(units[k][0]));
-            return;
-        }
-    }
-    (void)snprintf(name, size, "%s", own);
-}
-
 chip_mapping_status_t chip_mapping_from_plant(const plant_t *plant,
                                               thermal_model_parameters_t *parameters, char *message,
                                               size_t message_size)
 {
     const int rows = plant_rows(plant), columns = plant_columns(plant);
-    mapping_t m = {plant, rows * columns, message, message_size, false};
+    mapping_t m = {
+        .plant = plant, .springs = rows * columns, .message = message, .size = message_size};
     message[0] = '\0';
     if (m.springs > THERMAL_MODEL_MAX_SPRINGS) {
         say(&m, "%d x %d springs are more than the chip's model holds", rows, columns);
         return CHIP_MAPPING_ERROR_RANGE;
     }
-    thermal_model_parameters_t p;
-    thermal_model_parameters_default(&p);
-    p.rows = (uint8_t)rows;
-    p.columns = (uint8_t)columns;
-    p.step_ms = STEP_MS;
-    map_capacity(&m, &p);
-    map_loss(&m, &p);
-    p.orthogonal_uw_per_k =
-        fitted_u16(&m, "orthogonal_w_per_k", array_value(&m, "orthogonal_w_per_k"), 1e-6);
-    p.orthogonal_fan_uw_per_k =
-        fitted_u16(&m, "orthogonal_fan_w_per_k", array_value(&m, "orthogonal_fan_w_per_k"), 1e-6);
-    p.diagonal_uw_per_k =
-        fitted_u16(&m, "diagonal_w_per_k", array_value(&m, "diagonal_w_per_k"), 1e-6);
-    p.diagonal_fan_uw_per_k =
-        fitted_u16(&m, "diagonal_fan_w_per_k", array_value(&m, "diagonal_fan_w_per_k"), 1e-6);
-    p.martensite_finish_cc = temperature_cc(&m, "martensite_finish_c");
-    p.martensite_start_cc = temperature_cc(&m, "martensite_start_c");
-    p.austenite_start_cc = temperature_cc(&m, "austenite_start_c");
-    p.austenite_finish_cc = temperature_cc(&m, "austenite_finish_c");
-    map_resistance(&m, &p);
-    map_effects(&m, &p);
+    thermal_model_parameters_default(&m.chip);
+    m.chip.rows = (uint8_t)rows;
+    m.chip.columns = (uint8_t)columns;
+    map_capacity(&m);
+    map_loss(&m);
+    map_resistance(&m);
+    map_rows_of_the_same_name(&m);
+    if (is_on(&m, EFFECT_radiation)) {
+        put_from(&m, "emissivity x surface_mm2", PARAMETER_radiating_area_mm2, 0,
+                 array_value(&m, "emissivity") * array_value(&m, "surface_mm2"));
+    }
     if (m.failed) {
         return CHIP_MAPPING_ERROR_RANGE;
     }
     thermal_model_t model;
-    thermal_model_parameter_t bad = THERMAL_MODEL_PARAMETER_COUNT;
-    const thermal_model_status_t status = thermal_model_init(&model, &p, &bad);
+    uint16_t bad = PARAMETER_COUNT;
+    const thermal_model_status_t status = thermal_model_init(&model, &m.chip, &bad);
     if (status != THERMAL_MODEL_OK) {
         message[0] = '\0';
-        char name[64];
-        plant_name(bad, name, sizeof name);
-        say(&m, "%s is %s", name, reason_of(status));
+        say(&m, "%s is %s", parameter_row(bad).name, reason_of(status));
         return CHIP_MAPPING_ERROR_MODEL;
     }
-    static const char *const measurement[] = {"sensor_lag", "sensor_gain", "optical_mixing",
-                                              "ambient_drift"};
-    for (size_t k = 0; k < sizeof measurement / sizeof measurement[0]; k++) {
-        if (is_on(&m, measurement[k])) {
-            say(&m, "%s belongs to the measurement and is not on the chip", measurement[k]);
+    for (size_t k = 0; k < EFFECT_COUNT; k++) {
+        const effect_row_t *const effect = effect_row(k);
+        if (effect->not_on_chip != NULL && is_on(&m, (effect_t)k)) {
+            say(&m, "%s is not on the chip: %s", effect->name, effect->not_on_chip);
         }
     }
-    if (is_on(&m, "supply_sag")) {
-        say(&m, "supply_sag is not on the chip: it measures v x i");
-    }
-    *parameters = p;
+    *parameters = m.chip;
     return CHIP_MAPPING_OK;
 }

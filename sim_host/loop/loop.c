@@ -103,7 +103,7 @@ loop_t *loop_create(const controller_settings_t *settings, const plant_t *plant,
     }
     if (plant_rows(plant) != settings->model.rows ||
         plant_columns(plant) != settings->model.columns) {
-        refused = (uint16_t)offsetof(controller_settings_t, model.rows);
+        refused = PARAMETER_rows;
         goto fail;
     }
     loop->springs = controller_springs(&loop->controller);

@@ -51,7 +51,7 @@ void loop_options_default(loop_options_t *options);
 /* Copies the plant as it is (parameters, effects, temperatures); springs of plant and settings must
  * match. The controller starts at the plant's ambient, all off, unlocked. options may be NULL. NULL
  * if and only if the settings are refused
- * (*bad is the byte offset of the field in *settings, bad may be NULL), rows x columns of model and
+ * (*bad is its row of parameters.def, bad may be NULL), rows x columns of model and
  * plant differ
  * (*bad is that of rows), an option is out of range or memory is out (*bad is UINT16_MAX). */
 loop_t *loop_create(const controller_settings_t *settings, const plant_t *plant,

@@ -90,7 +90,8 @@ plant_status_t plant_set_austenite(plant_t *plant, int spring, double fraction);
 
 /* How a spring is driven until the next call; quantity in the unit of the mode. */
 typedef enum {
-    PLANT_DRIVE_POWER,   /* W into the spring */
+    PLANT_DRIVE_POWER,   /* W at the spring's terminals (all of it heats the spring but for what a
+                            contact takes) */
     PLANT_DRIVE_CURRENT, /* A through the spring: power = i^2 R(T, phase) */
     PLANT_DRIVE_DUTY,    /* 0..1 of the buck stage: current follows from supply and resistances */
     PLANT_DRIVE_COMMAND, /* 0..1 of command_power_w (where neither current nor voltage was measured)
@@ -137,11 +138,12 @@ double plant_supply_v(const plant_t *plant);  /* with its sag */
 double plant_temperature_c(const plant_t *plant, int spring);
 double plant_air_c(const plant_t *plant);
 double plant_plate_c(const plant_t *plant);
-double plant_austenite(const plant_t *plant, int spring); /* 0..1 */
-double plant_resistance_ohm(const plant_t *plant, int spring);
+double plant_austenite(const plant_t *plant, int spring);      /* 0..1 */
+double plant_resistance_ohm(const plant_t *plant, int spring); /* of the spring itself */
+double plant_terminal_ohm(const plant_t *plant, int spring);   /* with contact and fault */
 double plant_current_a(const plant_t *plant, int spring);
-double plant_voltage_v(const plant_t *plant, int spring); /* across the spring */
-double plant_power_w(const plant_t *plant, int spring);
+double plant_voltage_v(const plant_t *plant, int spring); /* at the terminals */
+double plant_power_w(const plant_t *plant, int spring);   /* heat into the spring itself */
 /* What a temperature sensor shows: sensor_lag, sensor_gain, optical_mixing applied; no noise. */
 double plant_measured_c(const plant_t *plant, int spring);
 /* Heat in less heat out less heat stored since the reset, J: 0 but for rounding and the inversion

@@ -22,8 +22,6 @@ std::unique_ptr<rig> powered(const char *settings = "")
     plant_t *plant = mega->plant.get();
     TEST_ASSERT_EQUAL(PLANT_OK, plant_set_effect(plant, "latent_heat", true));
     TEST_ASSERT_EQUAL(PLANT_OK, plant_set_effect(plant, "resistance_phase", true));
-    TEST_ASSERT_EQUAL(PLANT_OK, plant_set(plant, "orthogonal_w_per_k", 586e-6));
-    TEST_ASSERT_EQUAL(PLANT_OK, plant_set(plant, "diagonal_w_per_k", 293e-6));
     mega->boot();
     mega->expect_ok("policy precompensate");
     std::string line;

@@ -198,16 +198,42 @@ static void reset_bit_restores_the_power_on_values(void)
     TEST_ASSERT_EQUAL_HEX16(0, read_register(INA219_REGISTER_CALIBRATION));
 }
 
-static void a_frozen_sensor_shows_old_values_and_is_never_ready(void)
+static void a_stale_sensor_shows_old_values_and_is_never_ready(void)
 {
     bus_v = 1.0;
     pass_us(2 * 532);
     read_register(INA219_REGISTER_POWER);
-    sensor.frozen = true;
+    sensor.stale = true;
     bus_v = 2.0;
     pass_us(50000);
     TEST_ASSERT_FALSE(ready());
     TEST_ASSERT_EQUAL_UINT16(250, read_register(INA219_REGISTER_BUS) >> 3);
+}
+
+static void a_frozen_sensor_is_ready_again_and_again_with_the_same_result(void)
+{
+    bus_v = 1.0;
+    pass_us(2 * 532);
+    sensor.frozen = true;
+    bus_v = 2.0;
+    for (int k = 0; k < 3; k++) {
+        read_register(INA219_REGISTER_POWER);
+        TEST_ASSERT_FALSE(ready());
+        pass_us(2 * 532);
+        TEST_ASSERT_TRUE(ready());
+        TEST_ASSERT_EQUAL_UINT16(250, read_register(INA219_REGISTER_BUS) >> 3);
+    }
+    sensor.frozen = false;
+    pass_us(2 * 532);
+    TEST_ASSERT_EQUAL_UINT16(500, read_register(INA219_REGISTER_BUS) >> 3);
+}
+
+static void a_gain_error_scales_what_is_shown(void)
+{
+    bus_v = 1.0;
+    sensor.bus_gain_error = -0.2;
+    pass_us(4 * 532);
+    TEST_ASSERT_EQUAL_UINT16(200, read_register(INA219_REGISTER_BUS) >> 3);
 }
 
 static void an_absent_sensor_acknowledges_nothing(void)
@@ -249,7 +275,9 @@ int main(void)
     RUN_TEST(calibrations_lowest_bit_is_void);
     RUN_TEST(an_impossible_calibration_sets_overflow);
     RUN_TEST(reset_bit_restores_the_power_on_values);
-    RUN_TEST(a_frozen_sensor_shows_old_values_and_is_never_ready);
+    RUN_TEST(a_stale_sensor_shows_old_values_and_is_never_ready);
+    RUN_TEST(a_frozen_sensor_is_ready_again_and_again_with_the_same_result);
+    RUN_TEST(a_gain_error_scales_what_is_shown);
     RUN_TEST(an_absent_sensor_acknowledges_nothing);
     RUN_TEST(the_pointer_stays_for_the_next_read);
     RUN_TEST(fewer_bits_resolve_less);

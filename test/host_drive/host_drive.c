@@ -21,8 +21,6 @@ void setUp(void)
     plant = plant_create(3, 3);
     plant_set_effect(plant, "latent_heat", true);
     plant_set_effect(plant, "resistance_phase", true);
-    plant_set(plant, "orthogonal_w_per_k", 586e-6);
-    plant_set(plant, "diagonal_w_per_k", 293e-6);
     loop = NULL;
 }
 

@@ -21,24 +21,21 @@ void tearDown(void) {}
 
 static void every_setting_of_the_policy_is_there_with_unit_and_default(void)
 {
-    const size_t first = offsetof(settings_t, controller.policy);
     settings_t defaults;
     settings_default(&defaults);
     unsigned found = 0;
-    for (uint8_t k = 0; k < settings_count(); k++) {
-        settings_entry_t entry;
-        settings_entry(k, &entry);
-        if (entry.offset < first || entry.offset >= first + sizeof defaults.controller.policy) {
+    for (uint16_t k = 0; k < PARAMETER_COUNT; k++) {
+        const parameter_row_t row = parameter_row(k);
+        if (row.part != PARAMETER_PART_POLICY) {
             continue;
         }
         double value = settings_get(&defaults, k, 0);
-        for (unsigned n = 0; n < entry.decimals; n++) {
+        for (unsigned n = 0; n < row.decimals; n++) {
             value /= 10.0;
         }
         char wanted[120];
-        (void)snprintf(wanted, sizeof wanted, "| `%s` |%s%s | %.*f |", settings_name(k),
-                       settings_unit(k)[0] != '\0' ? " " : "", settings_unit(k),
-                       (int)entry.decimals, value);
+        (void)snprintf(wanted, sizeof wanted, "| `%s` |%s%s | %.*f |", row.name,
+                       row.unit[0] != '\0' ? " " : "", row.unit, (int)row.decimals, value);
         TEST_ASSERT_NOT_NULL_MESSAGE(strstr(page, wanted), wanted);
         found++;
     }

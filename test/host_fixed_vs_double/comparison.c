@@ -92,9 +92,9 @@ comparison_t compare_fixed_with_double(uint32_t first_set, uint32_t sets, uint32
         thermal_model_parameters_t p;
         draw(&p, latent);
         thermal_model_t model;
-        thermal_model_parameter_t bad = THERMAL_MODEL_ROWS;
+        uint16_t bad = PARAMETER_COUNT;
         if (thermal_model_init(&model, &p, &bad) != THERMAL_MODEL_OK) {
-            fprintf(stderr, "set %u refused: %s\n", set, thermal_model_parameter_name(bad));
+            fprintf(stderr, "set %u refused: %s\n", set, parameter_row(bad).name);
             exit(1);
         }
         reference_network_t reference;

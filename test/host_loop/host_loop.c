@@ -20,16 +20,6 @@ void setUp(void)
     controller_settings_default(&settings);
     plant = plant_create(3, 3);
     TEST_ASSERT_NOT_NULL(plant);
-    const struct {
-        const char *name;
-        double value;
-    } pitch_4[] = {{"orthogonal_w_per_k", 586e-6},
-                   {"orthogonal_fan_w_per_k", 658e-6},
-                   {"diagonal_w_per_k", 293e-6},
-                   {"diagonal_fan_w_per_k", 329e-6}};
-    for (size_t k = 0; k < sizeof pitch_4 / sizeof pitch_4[0]; k++) {
-        TEST_ASSERT_EQUAL(PLANT_OK, plant_set(plant, pitch_4[k].name, pitch_4[k].value));
-    }
     TEST_ASSERT_EQUAL(PLANT_OK, plant_set_effect(plant, "latent_heat", true));
     TEST_ASSERT_EQUAL(PLANT_OK, plant_set_effect(plant, "resistance_phase", true));
     loop = NULL;
@@ -432,11 +422,11 @@ static void what_does_not_fit_is_refused(void)
     controller_settings_t wrong = settings;
     wrong.model.rows = 2;
     TEST_ASSERT_NULL(loop_create(&wrong, plant, NULL, 1, &bad));
-    TEST_ASSERT_EQUAL_UINT16(offsetof(controller_settings_t, model.rows), bad);
+    TEST_ASSERT_EQUAL_UINT16(PARAMETER_rows, bad);
     wrong = settings;
     wrong.safety.bad_samples = 0;
     TEST_ASSERT_NULL(loop_create(&wrong, plant, NULL, 1, &bad));
-    TEST_ASSERT_EQUAL_UINT16(offsetof(controller_settings_t, safety.bad_samples), bad);
+    TEST_ASSERT_EQUAL_UINT16(PARAMETER_fault_bad_samples, bad);
     start();
     TEST_ASSERT_FALSE(loop_act(loop, LOOP_ACTION_OPEN_SPRING, 9));
     TEST_ASSERT_FALSE(loop_act(loop, LOOP_ACTION_OPEN_SPRING, -1));

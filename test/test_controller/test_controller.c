@@ -367,16 +367,16 @@ static void commands_out_of_range_change_nothing(void)
     TEST_ASSERT_EQUAL_UINT8(100, outputs.fan_percent);
 }
 
-static void refuses(const controller_settings_t *changed, size_t offset)
+static void refuses(const controller_settings_t *changed, uint16_t row)
 {
     controller_t before = controller;
     uint16_t bad = UINT16_MAX;
     TEST_ASSERT_FALSE(controller_apply_settings(&controller, changed, &bad));
-    TEST_ASSERT_EQUAL_UINT16(offset, bad);
+    TEST_ASSERT_EQUAL_UINT16(row, bad);
     TEST_ASSERT_EQUAL_MEMORY(&before, &controller, sizeof controller);
     bad = UINT16_MAX;
     TEST_ASSERT_FALSE(controller_init(&controller, changed, AMBIENT_C7, &bad));
-    TEST_ASSERT_EQUAL_UINT16(offset, bad);
+    TEST_ASSERT_EQUAL_UINT16(row, bad);
     TEST_ASSERT_EQUAL_MEMORY(&before, &controller, sizeof controller);
 }
 
@@ -384,20 +384,18 @@ static void refused_settings_change_nothing_and_are_found(void)
 {
     all_on();
     run(100);
-#define REFUSES(field, value)                                                                      \
+#define REFUSES(field, value, name)                                                                \
     do {                                                                                           \
         controller_settings_t changed = settings;                                                  \
         changed.field = (value);                                                                   \
-        refuses(&changed, offsetof(controller_settings_t, field));                                 \
+        refuses(&changed, PARAMETER_##name);                                                       \
     } while (0)
-    REFUSES(model.rows, 0);
-    REFUSES(model.step_ms, 50);
-    REFUSES(model.heat_capacity_mj_per_k, 0);
-    REFUSES(model.austenite_finish_cc, 8700);
-    REFUSES(model.resistance_austenite_uohm, 0);
-    REFUSES(current.supply_mv, 0);
-    REFUSES(safety.bad_samples, 0);
-    REFUSES(policy.open_current_ma, 3201);
+    REFUSES(model.rows, 0, rows);
+    REFUSES(model.step_ms, 50, COUNT);
+    REFUSES(model.austenite_finish_cc, 8700, austenite_finish_c);
+    REFUSES(current.supply_mv, 0, supply_v);
+    REFUSES(safety.bad_samples, 0, fault_bad_samples);
+    REFUSES(policy.open_current_ma, 3201, open_current_a);
 #undef REFUSES
 }
 

@@ -419,7 +419,7 @@ static void parameters_outside_their_range_are_refused_whole(void)
     uint16_t bad = 0;
     wrong.boost_current_ma = 3300;
     TEST_ASSERT_FALSE(drive_policy_apply(&policy, &wrong, &bad));
-    TEST_ASSERT_EQUAL_UINT16(offsetof(drive_policy_parameters_t, boost_current_ma), bad);
+    TEST_ASSERT_EQUAL_UINT16(PARAMETER_boost_current_a, bad);
     TEST_ASSERT_EQUAL_UINT16(3000, policy.parameters.boost_current_ma);
     wrong = parameters;
     wrong.unsure_margin_cc = (uint16_t)(wrong.hold_margin_cc - 1);

@@ -371,42 +371,25 @@ static void every_fault_has_a_name_of_its_own(void)
     TEST_ASSERT_EQUAL_STRING("unknown", safety_fault_name(SAFETY_FAULT_COUNT));
 }
 
-static void refuses(size_t offset, size_t size, uint16_t value)
+static void refuses(const safety_parameters_t *changed, uint16_t row)
 {
-    safety_parameters_t changed = parameters;
-    if (size == 1) {
-        ((uint8_t *)&changed)[offset] = (uint8_t)value;
-    } else {
-        memcpy((uint8_t *)&changed + offset, &value, sizeof value);
-    }
     uint16_t bad = UINT16_MAX;
-    safety_t before = safety;
-    TEST_ASSERT_FALSE(safety_apply(&safety, &changed, &bad));
-    TEST_ASSERT_EQUAL_UINT16(offset, bad);
-    TEST_ASSERT_FALSE(safety_init(&safety, &changed, 9, NULL));
+    const safety_t before = safety;
+    TEST_ASSERT_FALSE(safety_apply(&safety, changed, &bad));
+    TEST_ASSERT_EQUAL_UINT16(row, bad);
+    TEST_ASSERT_FALSE(safety_init(&safety, changed, 9, NULL));
     TEST_ASSERT_EQUAL_MEMORY(&before, &safety, sizeof safety);
 }
 
-static void parameters_out_of_range_are_refused_and_found(void)
+/* Each limit: test_parameters. */
+static void parameters_that_do_not_fit_are_refused_and_found(void)
 {
-#define REFUSES(field, value)                                                                      \
-    refuses(offsetof(safety_parameters_t, field), sizeof parameters.field, (uint16_t)(value))
-    REFUSES(over_current_ma, 99);
-    REFUSES(over_current_ma, 3201);
-    REFUSES(supply_limit_ma, 99);
-    REFUSES(supply_limit_ma, 60001);
-    REFUSES(check_current_ma, 49);
-    REFUSES(check_current_ma, 3201);
-    REFUSES(resistance_minimum_mohm, 10001);
-    REFUSES(resistance_maximum_mohm, 10001);
-    REFUSES(resistance_maximum_mohm, 80); /* not above the minimum */
-    REFUSES(stuck_on_ma, 9);
-    REFUSES(stuck_on_ma, 3201);
-    REFUSES(temperature_trip_cc, -1);
-    REFUSES(temperature_trip_cc, 25001);
-    REFUSES(bad_samples, 0);
-    REFUSES(bad_samples, 251);
-#undef REFUSES
+    safety_parameters_t changed = parameters;
+    changed.bad_samples = 0;
+    refuses(&changed, PARAMETER_fault_bad_samples);
+    changed = parameters;
+    changed.resistance_maximum_mohm = changed.resistance_minimum_mohm;
+    refuses(&changed, PARAMETER_resistance_maximum_ohm);
     TEST_ASSERT_FALSE(safety_init(&safety, &parameters, 0, NULL));
     TEST_ASSERT_FALSE(safety_init(&safety, &parameters, SAFETY_MAX_SPRINGS + 1, NULL));
 }
@@ -429,6 +412,6 @@ int main(void)
     RUN_TEST(resistance_trips_at_its_limits_and_nowhere_else);
     RUN_TEST(any_sample_is_taken_without_overflow);
     RUN_TEST(every_fault_has_a_name_of_its_own);
-    RUN_TEST(parameters_out_of_range_are_refused_and_found);
+    RUN_TEST(parameters_that_do_not_fit_are_refused_and_found);
     return UNITY_END();
 }

@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "chip_mapping.h"
+#include "chip_settings.h"
 #include "plant.h"
 #include "settings.h"
 #include "text.h"
@@ -16,10 +17,10 @@
 
 EXPORT int chip_export(const plant_t *plant, char *text, size_t text_size, char *message,
                        size_t message_size);
-EXPORT int chip_simulate(const plant_t *plant, size_t rows, const double *time_s,
-                         const double *power_w, const double *fan, const double *ambient_c,
-                         const double *first_c, double *temperature_c, char *message,
-                         size_t message_size);
+EXPORT int chip_simulate(const char *lines, int array_rows, int array_columns, size_t rows,
+                         const double *time_s, const double *power_w, const double *fan,
+                         const double *ambient_c, const double *first_c, double *temperature_c,
+                         char *message, size_t message_size);
 
 static bool append(char *text, size_t size, size_t *used, const char *line)
 {
@@ -48,27 +49,21 @@ int chip_export(const plant_t *plant, char *text, size_t text_size, char *messag
     const size_t springs =
         (size_t)settings.controller.model.rows * settings.controller.model.columns;
     size_t used = 0;
-    for (uint8_t k = 0; k < settings_count(); k++) {
-        settings_entry_t entry;
-        settings_entry(k, &entry);
-        if (entry.offset >=
-                offsetof(settings_t, controller.model) + sizeof settings.controller.model ||
-            entry.offset < offsetof(settings_t, controller.model)) {
+    for (uint16_t k = 0; k < PARAMETER_COUNT; k++) {
+        const parameter_row_t row = parameter_row(k);
+        if (row.part != PARAMETER_PART_MODEL) {
             continue;
         }
-        for (uint8_t element = 0; element < entry.count; element++) {
-            if (entry.count > 1 && element >= springs) {
+        for (uint8_t element = 0; element < row.count; element++) {
+            if (row.count > 1 && element >= springs) {
                 break;
             }
             char value[TEXT_DECIMAL_SIZE];
+            char name[SETTINGS_NAME_SIZE];
             char line[SETTINGS_NAME_SIZE + TEXT_DECIMAL_SIZE + 8];
-            (void)text_format_decimal(settings_get(&settings, k, element), entry.decimals, value);
-            if (entry.count > 1) {
-                (void)snprintf(line, sizeof line, "$%s_%u=%s\n", settings_name(k), element + 1u,
-                               value);
-            } else {
-                (void)snprintf(line, sizeof line, "$%s=%s\n", settings_name(k), value);
-            }
+            (void)text_format_decimal(settings_get(&settings, k, element), row.decimals, value);
+            settings_name(k, element, name);
+            (void)snprintf(line, sizeof line, "$%s=%s\n", name, value);
             if (!append(text, text_size, &used, line)) {
                 return -10;
             }
@@ -77,23 +72,27 @@ int chip_export(const plant_t *plant, char *text, size_t text_size, char *messag
     return 0;
 }
 
-/* A log through the on-chip model with the plant's parameters: power_w[rows * n] holds from its row
- * to the next; first_c[n] starts it; temperature_c[rows * n] out. 0 done, else chip_mapping's
- * status. */
-int chip_simulate(const plant_t *plant, size_t rows, const double *time_s, const double *power_w,
-                  const double *fan, const double *ambient_c, const double *first_c,
-                  double *temperature_c, char *message, size_t message_size)
+/* A log through the on-chip model as console lines over the firmware's defaults set it:
+ * power_w[rows * n] holds from its row to the next; first_c[n] starts it; temperature_c[rows * n]
+ * out. 0 done; -1 a line is refused, -2 the model refuses the settings (message says which). */
+int chip_simulate(const char *lines, int array_rows, int array_columns, size_t rows,
+                  const double *time_s, const double *power_w, const double *fan,
+                  const double *ambient_c, const double *first_c, double *temperature_c,
+                  char *message, size_t message_size)
 {
-    thermal_model_parameters_t parameters;
-    const chip_mapping_status_t status =
-        chip_mapping_from_plant(plant, &parameters, message, message_size);
-    if (status != CHIP_MAPPING_OK) {
-        return (int)status;
+    settings_t settings;
+    if (!chip_settings(&settings, array_rows, array_columns, lines, message, message_size)) {
+        return -1;
     }
+    const thermal_model_parameters_t *parameters = &settings.controller.model;
     static _Thread_local thermal_model_t model;
-    (void)thermal_model_init(&model, &parameters, NULL);
-    const size_t n = (size_t)parameters.rows * parameters.columns;
-    const double step_s = 1e-3 * parameters.step_ms;
+    uint16_t bad = 0;
+    if (thermal_model_init(&model, parameters, &bad) != THERMAL_MODEL_OK) {
+        (void)snprintf(message, message_size, "%s", parameter_row(bad).name);
+        return -2;
+    }
+    const size_t n = (size_t)parameters->rows * parameters->columns;
+    const double step_s = 1e-3 * parameters->step_ms;
     thermal_model_set_ambient(&model, (int16_t)(ambient_c[0] * 128.0));
     thermal_model_reset(&model, (int16_t)(ambient_c[0] * 128.0));
     for (size_t k = 0; k < n; k++) {

@@ -10,7 +10,7 @@ import click
 from rich.table import Table
 
 from . import __version__
-from .console import FILE, JSON, PORT, Command, beside, checked, out, outcome, working, write
+from .console import FILE, JSON, PORT, Command, beside, checked, out, result_of, working, write
 from .errors import WorkError
 from .logs import check_folder, read_bytes
 
@@ -72,7 +72,7 @@ def record(port: str, output: Path, hz: int, duration: float, script: Path | Non
                 log.close()
         if not log.rows:
             raise WorkError(got.ended or "stopped before the first row came")
-        write({json_path: checked(outcome("record", rows=log.rows, dropped_lines=got.dropped, ended=got.ended))})
+        write({json_path: checked(result_of("record", rows=log.rows, dropped_lines=got.dropped, ended=got.ended))})
         lines = f", {got.dropped} corrupt lines dropped" if got.dropped else ""
         beside(output).print(f"{log.rows} rows -> {output}{lines}", markup=False)
     if got.ended:
@@ -114,7 +114,7 @@ def upload(settings: Path, port: str, save: bool, json_path: Path | None) -> Non
             raise WorkError(f"the board shows other values than were sent, nothing is saved: {'; '.join(wrong)}")
         if save:
             board.ask("$save", 10.0)
-    write({json_path: checked(outcome("upload", settings=len(lines), saved=save))})
+    write({json_path: checked(result_of("upload", settings=len(lines), saved=save))})
     out.print(f"{len(lines)} settings sent and read back{', saved' if save else ''}")
 
 

@@ -11,10 +11,11 @@ from typing import NoReturn
 import click
 
 from . import __version__
-from .board_commands import monitor, record, upload
-from .console import err
+from .board_commands import add_board_commands
+from .console import Group, err
+from .dashboard.command import dashboard
 from .errors import InputError, WorkError
-from .export.command import export
+from .export.command import export, verify
 from .fit.command import fit
 from .fit.predict_command import predict
 from .import_command import import_
@@ -23,6 +24,7 @@ from .verdict.command import diagnose
 
 
 @click.group(
+    cls=Group,
     context_settings={"help_option_names": ["-h", "--help"]},
     epilog="Logs, models and their units: docs/files.md. From bench to calibrated chip in one page: docs/calibrating.md. "
     "Exit code 0: done; 1: the work failed; 2: the input or the arguments are wrong, and one line says what and where.",
@@ -32,8 +34,9 @@ def cli() -> None:
     """Calibrate the thermal model of an array of NiTi springs, and say what the model lacks."""
 
 
-for command in (fit, diagnose, predict, export, import_, plot, record, upload, monitor):
+for command in (fit, diagnose, predict, export, verify, import_, plot, dashboard):
     cli.add_command(command)
+add_board_commands(cli)
 
 
 def _end(message: str, code: int) -> NoReturn:

@@ -32,6 +32,12 @@ SHAPES = {1: (1, 1), 2: (1, 2), 4: (2, 2), 9: (3, 3), 16: (4, 4), 25: (5, 5), 36
 out = Console(highlight=False, width=None if sys.stdout.isatty() else WIDE)
 err = Console(stderr=True, highlight=False, width=None if sys.stderr.isatty() else WIDE)
 FILE = click.Path(dir_okay=False, path_type=Path)
+JSON = click.option("--json", "json_path", type=FILE, help="write the result for programs")
+ARRAY = click.option(
+    "--array", "array_path", type=FILE, help="array.toml; left out: a square (or 1 x 2) of the paper's spring"
+)
+MODEL = click.option("--model", "model_path", type=FILE, required=True, help="model.toml that fit or diagnose wrote")
+PORT = click.option("--port", required=True, help="serial port, e.g. /dev/ttyACM0; 115200 baud")
 OUTPUTS = ("output", "json_path")
 """Parameters of commands that name files to write; every other path is an input."""
 IN_A_FOLDER = ("diagnosis.json", "report.html", "model.toml")
@@ -77,6 +83,12 @@ def _same(one: Path, other: Path) -> bool:
     return one.resolve() == other.resolve()
 
 
+class Group(click.Group):
+    """The commands."""
+
+    command_class = Command
+
+
 @contextmanager
 def working(text: str, total: float | None = None) -> Iterator[Callable[..., None]]:
     """Show that work goes on, on the terminal's error stream: say(words), say(words, done) with a total."""
@@ -91,6 +103,25 @@ def working(text: str, total: float | None = None) -> Iterator[Callable[..., Non
     ) as progress:
         task = progress.add_task(text, total=total)
         yield lambda now, done=None: progress.update(task, description=now, completed=done)
+
+
+def checked(data: Mapping[str, Any]) -> str:
+    """Return a command's result as JSON text, held to its schema (results.schema.json, verdict/diagnosis.schema.json)."""
+    diagnosed = str(data.get("schema", "")).startswith("ninespring.diagnosis/")
+    name = "verdict/diagnosis.schema.json" if diagnosed else "results.schema.json"
+    schema = json.loads((resources.files("ninespring") / name).read_text("utf-8"))
+    jsonschema.validate(data, schema)
+    return json.dumps(data, indent=1, allow_nan=False) + "\n"
+
+
+def result_of(name: str, **more: Any) -> dict[str, Any]:
+    """Return a command's result for programs, with what wrote it."""
+    return {"schema": f"ninespring.{name}/1", "tool": f"ninespring {__version__}"} | more
+
+
+def write(files: Mapping[Path | None, str]) -> None:
+    """Write a command's files, all or none as far as a file system goes; a file named None is not wanted."""
+    write_atomically({path: text for path, text in files.items() if path})
 
 
 def array_and_runs(array_path: Path | None, logs: tuple[Path, ...], model: Any = None) -> tuple[Any, list[Run]]:
@@ -147,25 +178,6 @@ def notes(where: str, lines: list[str]) -> None:
         err.print(where + note, style="yellow", markup=False)
 
 
-def checked(data: Mapping[str, Any]) -> str:
-    """Return a command's result as JSON text, held to its schema (results.schema.json, verdict/diagnosis.schema.json)."""
-    diagnosed = str(data.get("schema", "")).startswith("ninespring.diagnosis/")
-    name = "verdict/diagnosis.schema.json" if diagnosed else "results.schema.json"
-    schema = json.loads((resources.files("ninespring") / name).read_text("utf-8"))
-    jsonschema.validate(data, schema)
-    return json.dumps(data, indent=1, allow_nan=False) + "\n"
-
-
-def outcome(name: str, **more: Any) -> dict[str, Any]:
-    """Return a command's result for programs."""
-    return {"schema": f"ninespring.{name}/1", "tool": f"ninespring {__version__}"} | more
-
-
-def write(files: Mapping[Path | None, str]) -> None:
-    """Write a command's files, all or none as far as a file system goes; a file named None is not wanted."""
-    write_atomically({path: text for path, text in files.items() if path})
-
-
 def beside(output: Path) -> Console:
     """Return where to talk: standard output, unless the result itself goes there."""
     return err if str(output) == "-" else out
@@ -176,18 +188,10 @@ def logs_of(runs: list[Run]) -> list[dict[str, Any]]:
     return [{"file": Path(r.name).name, "sha256": r.sha256, "rows": len(r.time_s), "notes": r.notes} for r in runs]
 
 
-ARRAY = click.option(
-    "--array", "array_path", type=FILE, help="array.toml; left out: a square (or 1 x 2) of the paper's spring"
-)
-MODEL = click.option("--model", "model_path", type=FILE, required=True, help="model.toml that fit or diagnose wrote")
-JSON = click.option("--json", "json_path", type=FILE, help="write the result for programs")
-PORT = click.option("--port", required=True, help="serial port, e.g. /dev/ttyACM0; 115200 baud")
-
-
-def print_parameters(parameters: dict[str, Any]) -> None:
+def print_parameters(console: Console, parameters: dict[str, Any]) -> None:
     """Print a table of numbers."""
     table = Table("number", "value", "standard error", "unit", "")
     for name, one in parameters.items():
         error = "-" if one["stderr"] is None else f"{one['stderr']:.2g}"
         table.add_row(name, f"{one['value']:.5g}", error, one["unit"], one.get("note", ""))
-    out.print(table)
+    console.print(table)

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 import numpy as np
 
-from .console import FILE, JSON, Command, checked, out, outcome, working, write
+from .console import FILE, JSON, Command, beside, checked, result_of, working, write
 from .errors import InputError
 from .logs import check_folder, log_text
 
@@ -103,7 +103,7 @@ def import_(
             when = (np.arange(count) * interval if stamps is None else stamps) + offset
             text = log_text(when, columns, {"imported_from": source.name})
     header, *rows = [line for line in text.splitlines() if not line.startswith("#")]
-    result = outcome("import", source=source.name, columns=header.split(","), rows=len(rows))
+    result = result_of("import", source=source.name, columns=header.split(","), rows=len(rows))
     write({output: text, json_path: checked(result)})
     seen = sum(name.startswith("t") for name in result["columns"][1:])
-    out.print(f"{len(rows)} rows, temperatures of {seen} springs -> {output}", soft_wrap=True, markup=False)
+    beside(output).print(f"{len(rows)} rows, temperatures of {seen} springs -> {output}", soft_wrap=True, markup=False)

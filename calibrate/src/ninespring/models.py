@@ -223,7 +223,7 @@ def model_text(model: Model) -> str:
     for key in ("tool", "date", "note"):
         if key in made:
             lines.append(f"{key} = {json.dumps(made[key])}")
-    for key in ("rmse_before_c", "rmse_after_c"):
+    for key in ("rmse_before_c", "rmse_after_c", "hottest_c"):
         if made.get(key) is not None:
             lines.append(f"{key} = {_value(made[key])}")
     for log in made.get("logs", []):

@@ -271,11 +271,16 @@ def record(
 
 
 def _head(board: Board, log: LogFile, steps: Sequence[Step], keys: Mapping[str, str]) -> None:
-    for name, value in keys.items():
-        log.write(f"# {name}: {value}")
     for step in steps:
         if step.at_s is None:
             board.ask(step.line)
+    board.guard(write_head(board, log, keys))
+
+
+def write_head(board: Board, log: LogFile, keys: Mapping[str, str]) -> dict[str, str]:
+    """Write, as comments, what is known of a log and of the board: version, faults, settings. Return the settings."""
+    for name, value in keys.items():
+        log.write(f"# {name}: {value}")
     for line in board.version:
         log.write(f"# version: {line}")
     for line in board.ask("faults") or ["none"]:
@@ -283,7 +288,7 @@ def _head(board: Board, log: LogFile, steps: Sequence[Step], keys: Mapping[str, 
     settings = board.settings()
     for name, value in settings.items():
         log.write(f"# ${name}={value}")
-    board.guard(settings)
+    return settings
 
 
 def _rows(

@@ -35,13 +35,15 @@ class Candidate:
     """The value of its (one) number at which it does nothing."""
     flexible: bool = False
     """Follows anything slow: it must beat a physical cause clearly."""
+    alternatives: bool = False
+    """Its probes are places to start from, not directions to be combined: the best one counts."""
     slow_node: bool = False
     """A slow cause that a flexible one hides: tried in its place whatever the forecast says."""
 
-    def start_at(self, size: float) -> dict[str, float]:
+    def start_at(self, size: float, probe: int = 0) -> dict[str, float]:
         """Return starting values for a forecast size (1: as probed)."""
-        out = dict(self.probes[0])
-        if len(self.free) == 1:
+        out = dict(self.probes[probe])
+        if len(self.free) == 1 or self.alternatives:
             one = self.free[0]
             value = self.neutral + size * (out[one.key] - self.neutral)
             if one.log:

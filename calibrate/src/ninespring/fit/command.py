@@ -12,13 +12,13 @@ from ..console import (
     JSON,
     Command,
     array_and_runs,
+    beside,
     checked,
     logs_of,
     notes,
     notes_of,
-    out,
-    outcome,
     print_parameters,
+    result_of,
     working,
     write,
 )
@@ -73,7 +73,7 @@ def fit(logs: tuple[Path, ...], array_path: Path | None, effects: str, output: P
             suspect += plausibility.shifted_clock(problem, (chosen,))
     model = model_of(problem, chosen, runs)
     model.provenance["rmse_before_c"] = rms(base.residual)
-    result = outcome(
+    result = result_of(
         "fit",
         logs=logs_of(runs),
         rmse_before_c=rms(base.residual),
@@ -88,8 +88,10 @@ def fit(logs: tuple[Path, ...], array_path: Path | None, effects: str, output: P
     )
     write({output: model_text(model), json_path: checked(result)})
     notes("", suspect)
-    print_parameters(result["parameters"])
-    out.print(f"error {result['rmse_c']:.3f} K, held out {held:.3f} K, noise {problem.noise_c:.3f} K -> {output}")
+    print_parameters(beside(output), result["parameters"])
+    beside(output).print(
+        f"error {result['rmse_c']:.3f} K, held out {held:.3f} K, noise {problem.noise_c:.3f} K -> {output}"
+    )
     for effect in wanted:
         if effect in library.WHY_NOT_ON_CHIP:
-            out.print(f"{effect}: not for the chip: {library.WHY_NOT_ON_CHIP[effect]}")
+            beside(output).print(f"{effect}: not for the chip: {library.WHY_NOT_ON_CHIP[effect]}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
@@ -9,6 +10,10 @@ import numpy as np
 from .. import native
 from .problem import Problem
 from .spec import Free, Spec
+
+BELIEVED = math.log(3.0)
+"""What is declared is believed within a factor of three: next to nothing where the data speak, and what they only fix in
+combination stays near what was declared."""
 
 
 def base_spec(problem: Problem, frozen: bool = False, extra: Mapping[str, float] | None = None) -> Spec:
@@ -66,4 +71,4 @@ def base_spec(problem: Problem, frozen: bool = False, extra: Mapping[str, float]
 
 def _declared(problem: Problem, name: str, low: float, high: float) -> Free:
     start = min(high, max(low, problem.base_value(name)))
-    return Free(name, start, low, high, native.parameter_table()[name].unit, (name,), True)
+    return Free(name, start, low, high, native.parameter_table()[name].unit, (name,), True, prior=BELIEVED)

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 import numpy as np
 
-from ..console import FILE, JSON, MODEL, Command, checked, logs_of, notes_of, out, outcome, working, write
+from ..console import FILE, JSON, MODEL, Command, beside, checked, logs_of, notes_of, result_of, working, write
 from ..logs import check_folder, log_text, read_log, sha256_of
 
 
@@ -47,7 +47,7 @@ def predict(log: Path, model_path: Path, output: Path, chip: bool, json_path: Pa
     rmse = float(np.sqrt(square[seen].mean())) if seen.any() else None
     each = [float(np.sqrt(square[seen[:, k], k].mean())) if seen[:, k].any() else None for k in range(run.springs)]
     note = model.provenance.get("note")
-    result = outcome(
+    result = result_of(
         "predict",
         logs=logs_of([run]),
         model={"file": model_path.name, "sha256": sha256_of(model_path)},
@@ -58,6 +58,8 @@ def predict(log: Path, model_path: Path, output: Path, chip: bool, json_path: Pa
         **({"note": note} if note else {}),
     )
     write({output: log_text(run.time_s, columns), json_path: checked(result)})
-    out.print(f"{len(run.time_s)} rows" + ("" if rmse is None else f", error {rmse:.3f} K rms") + f" -> {output}")
+    beside(output).print(
+        f"{len(run.time_s)} rows" + ("" if rmse is None else f", error {rmse:.3f} K rms") + f" -> {output}"
+    )
     if note:
-        out.print(f"note: {note}", markup=False)
+        beside(output).print(f"note: {note}", markup=False)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -13,8 +13,8 @@ import numpy as np
 class Free:
     """One free number of a fit.
 
-    `names` are the plant's parameters that take its value (times `weights` where given). `ambient` numbers set a
-    run's ambient instead: a constant, or a hat function of time around `knot` of the run's knots.
+    `names` are the plant's parameters that take its value. `ambient` numbers set a run's ambient instead: a constant, or
+    a hat function of time around `knot` of the run's knots.
     """
 
     key: str
@@ -29,6 +29,10 @@ class Free:
     effect: str | None = None
     scale: float = 1.0
     """A change that matters, in its unit (linear numbers only)."""
+    shifts: tuple[tuple[str, float], ...] = ()
+    """Parameters of the plant to which it is added, times a weight, instead of being their value."""
+    prior: float | None = None
+    """Standard deviation, in the inner coordinate, of what is believed of it before: about its start."""
 
     def inner(self, value: float) -> float:
         """Map to the coordinate the optimiser works in."""
@@ -70,10 +74,19 @@ class Spec:
         return Spec(
             (*self.effects, effect),
             tuple((dict(self.fixed) | dict(fixed)).items()),
-            (*self.free, *free),
+            (*self.free, *(one for one in free if one.key not in {f.key for f in self.free})),
             (*self.variant, (effect, variant)),
             (*self.also_on, *((effect, other) for other in also_on)),
         )
+
+    def settings(self, values: Iterable[float], declared: Callable[[str], float]) -> dict[str, float]:
+        """Return what free numbers with these values make of the plant's parameters."""
+        out: dict[str, float] = {}
+        for free, value in zip(self.free, values, strict=True):
+            out |= dict.fromkeys(free.names, float(value))
+            for name, weight in free.shifts:
+                out[name] = out.get(name, declared(name)) + weight * float(value)
+        return out
 
     @property
     def plant_effects(self) -> tuple[str, ...]:

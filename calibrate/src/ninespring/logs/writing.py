@@ -14,6 +14,8 @@ import pandas as pd
 
 from ..errors import InputError
 
+STANDARD_OUTPUT = "-"
+
 
 def sha256_of(path: str | Path) -> str:
     """Return the SHA-256 of a file, hexadecimal."""
@@ -27,38 +29,36 @@ def sha256_of(path: str | Path) -> str:
 def check_folder(*paths: Path | None) -> None:
     """Refuse output files whose folder is not there or cannot be written, before any work is done."""
     for path in paths:
-        if path is None:
+        if path is None or str(path) == STANDARD_OUTPUT:
             continue
         if not path.parent.is_dir():
             raise InputError(f"the folder {path.parent} does not exist: create it first", path)
-        if not (path.exists() and not path.is_file()) and not os.access(path.parent, os.W_OK):
+        if not os.access(Path(os.path.realpath(path)).parent, os.W_OK) and not _is_device(path):
             raise InputError(f"the folder {path.parent} cannot be written", path)
+
+
+def _is_device(path: Path) -> bool:
+    return path.exists() and not path.is_file()
 
 
 def write_atomically(files: Mapping[Path, str]) -> None:
     """Write text files whole or not at all: temporary files beside them, all of them renamed at the end.
 
-    Where a path is a link, what it points to is replaced, not the link. A device or a pipe is written as it is, `-` is
-    standard output.
+    A link stays a link: the file that it leads to is written. What is no file (a device, a pipe) is written into, and
+    `-` is standard output; both last, when nothing else can fail.
     """
-    places = {path: path if str(path) == "-" or not path.is_symlink() else path.resolve() for path in files}
-    check_folder(*places.values())
+    check_folder(*files)
     umask = os.umask(0)
     os.umask(umask)
     made: list[tuple[str, Path]] = []
+    streams = {path: text for path, text in files.items() if str(path) == STANDARD_OUTPUT or _is_device(path)}
     try:
         for path, text in files.items():
-            place = places[path]
-            if str(place) == "-":
-                sys.stdout.write(text)
-                sys.stdout.flush()
+            if path in streams:
                 continue
-            if place.exists() and not place.is_file() and not place.is_dir():
-                with open(place, "w", encoding="utf-8", newline="\n") as stream:
-                    stream.write(text)
-                continue
-            handle, temporary = tempfile.mkstemp(dir=place.parent, prefix=f".{place.name}.")
-            made.append((temporary, place))
+            target = Path(os.path.realpath(path))
+            handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
+            made.append((temporary, target))
             with os.fdopen(handle, "w", encoding="utf-8", newline="\n") as stream:
                 stream.write(text)
             os.chmod(temporary, 0o666 & ~umask)
@@ -68,6 +68,13 @@ def write_atomically(files: Mapping[Path, str]) -> None:
     finally:
         for temporary, _ in made:
             os.unlink(temporary)
+    for path, text in streams.items():
+        if str(path) == STANDARD_OUTPUT:
+            sys.stdout.write(text)
+            sys.stdout.flush()
+        else:
+            with path.open("w", encoding="utf-8", newline="\n") as stream:
+                stream.write(text)
 
 
 def read_bytes(path: str | Path) -> bytes:

@@ -23,6 +23,8 @@ class Screen:
     """Candidate of each direction."""
     gram: np.ndarray
     moment: np.ndarray
+    probe: dict[int, list[int]]
+    """Of candidates whose probes are alternatives: those that promise most, the one that was taken first."""
 
     def forecast(self, chosen: Sequence[int]) -> tuple[float, dict[int, float]]:
         """Return the drop of chi2 with these candidates, and each one's size (1 is its typical size)."""

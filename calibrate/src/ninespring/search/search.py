@@ -14,10 +14,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from .. import effects
 from ..effects import Candidate
 from ..fit.problem import Problem
 from ..fit.spec import Fit, Spec
-from .evidence import excess, gain, log_evidence
+from .evidence import excess, fit_factor, gain, log_evidence
 from .screen import Screen
 
 MIN_EVIDENCE = 3.0
@@ -26,12 +27,14 @@ TOLD_APART = 10.0
 """Nats below which a contender stays a rival."""
 MIN_GAIN = 0.38
 """Structure, in units of the noise, an effect must explain. Below half the noise an effect does not matter."""
-MIN_SHARE = 0.2
+MIN_SHARE = 0.1
 """Of what the residual holds beyond the noise, the part an effect must explain to be adopted on the way."""
-MIN_SHARE_UNEXPLAINED = 0.35
-"""The same where structure remains at the end: nothing is adopted just because it helps a little ..."""
-MIN_TOTAL_UNEXPLAINED = 0.75
-"""... and what is adopted must together explain this part of what the declared model left."""
+PLACES = 3
+"""Of a candidate's alternative places, how many are fitted in earnest."""
+BEAM = 6
+"""Sets of causes that the search downwards keeps at each size ..."""
+REFITTED = 3
+"""... and of the best of all sizes, how many are fitted in earnest."""
 
 MAX_EFFECTS = 4
 
@@ -72,7 +75,8 @@ class Search:
                     candidate.variant,
                     candidate.also_on,
                 )
-                values = np.concatenate([fit.values, [probe.get(f.key, f.start) for f in candidate.free]])
+                start = fit.as_dict() | dict(probe)
+                values = [start.get(f.key, f.start) for f in spec.free]
                 jobs += [(spec, values, r) for r in runs]
                 owner.append(k)
         shown = problem.simulate_many(jobs) if jobs else []
@@ -90,16 +94,39 @@ class Search:
             directions[:, d] = vector - q @ (q.T @ vector)
         vector = fit.vector if fit.vector is not None else problem.vector(fit.residual)
         vector = vector - q @ (q.T @ vector)
-        screen = Screen(
-            fit,
-            open_,
-            directions,
-            np.array(owner, dtype=int),
-            directions.T @ directions,
-            directions.T @ vector,
-        )
+        moment, size = directions.T @ vector, np.maximum((directions**2).sum(axis=0), 1e-12)
+        owners = np.array(owner, dtype=int)
+        keep, probe = np.ones(len(owners), dtype=bool), {}
+        for k, candidate in enumerate(open_):
+            if candidate.alternatives:
+                columns = np.flatnonzero(owners == k)
+                right = candidate.signed | (moment[columns] > 0)
+                promise = np.where(right, moment[columns] ** 2 / size[columns], 0.0)
+                probe[k] = [int(j) for j in np.argsort(-promise)[:PLACES]]
+                keep[columns] = False
+                keep[columns[probe[k][0]]] = True
+        directions, moment = directions[:, keep], moment[keep]
+        screen = Screen(fit, open_, directions, owners[keep], directions.T @ directions, moment, probe)
         self.screens[key] = screen
         return screen
+
+    def absent(self, fit: Fit) -> dict[str, tuple[float, float]]:
+        """Return what the data say of the one number of effects that are not in the fit and would do nothing at zero.
+
+        (value, standard error), for effects with no more than one variant: a chip that has another value is wrong.
+        """
+        screen = self.screen(fit)
+        spread = math.sqrt(max(1.0, fit_factor(self.problem, fit) * fit.chi2 / fit.count))
+        out = {}
+        for k, one in enumerate(screen.candidates):
+            if one.variant or len(one.free) != 1 or one.free[0].log or one.neutral or one.effect not in effects.ON_CHIP:
+                continue
+            free, column = one.free[0], int(np.flatnonzero(screen.owner == k)[0])
+            if (size := float(screen.gram[column, column])) > 0:
+                unit = one.probes[0][free.key]
+                value = unit * float(screen.moment[column]) / size
+                out[free.key] = (min(free.high, max(free.low, value)), abs(unit) * spread / math.sqrt(size))
+        return out
 
     def refit(self, fit: Fit, added: Sequence[Candidate], sizes: Sequence[float]) -> Fit:
         """Fit `fit`'s model with candidates added, from their forecast sizes and other starts."""
@@ -113,18 +140,26 @@ class Search:
                 candidate.variant,
                 candidate.also_on,
             )
-            start |= candidate.start_at(size)
+            start |= candidate.start_at(size, self.places(fit, candidate)[0])
         key = self.key(spec)
         if key in self.fits:
             return self.fits[key]
-        best = self.problem.fit(spec, start, tolerance=1e-3, max_steps=14)
+        best = self.problem.fit(spec, start, tolerance=1e-3, max_steps=14, near=fit)
         for candidate in added:
-            for other in candidate.more_starts:
+            others = [candidate.start_at(1.0, place) for place in self.places(fit, candidate)[1:]]
+            for other in (*candidate.more_starts, *others):
                 if self.thorough or len(added) == 1:
-                    again = self.problem.fit(spec, start | other, tolerance=1e-3, max_steps=14)
+                    again = self.problem.fit(spec, start | other, tolerance=1e-3, max_steps=14, near=fit)
                     best = min(best, again, key=lambda one: one.chi2)
         self.fits[key] = best
         return best
+
+    def places(self, fit: Fit, candidate: Candidate) -> list[int]:
+        """Return the probes of a candidate that promise most on top of a fit, best first."""
+        screen = self.screens.get(self.key(fit.spec))
+        if screen is None or candidate not in screen.candidates:
+            return [0]
+        return screen.probe.get(screen.candidates.index(candidate), [0])
 
     def price(self, added: int = 1) -> float:
         """Return the nats that the freedom to choose among candidates costs."""
@@ -172,7 +207,7 @@ class Search:
         gained = self.problem.holdout_rmse(other) ** 2 - self.problem.holdout_rmse(better) ** 2
         return gained > (0.6 * MIN_GAIN * noise) ** 2
 
-    def extend(self, fit: Fit, singles: int = 8, pairs: int = 4) -> list[tuple[Fit, int]]:
+    def extend(self, fit: Fit, singles: int = 6, pairs: int = 3) -> list[tuple[Fit, int]]:
         """Return refits of the most promising single and paired additions to `fit`, with how many were added."""
         screen = self.screen(fit)
         count = len(screen.candidates)
@@ -187,7 +222,7 @@ class Search:
             effect = screen.candidates[k].effect
             if tried.get(effect, 0) >= (2 if alone[k][0] > 0.9 * best_drop else 1):
                 continue
-            if len(out) >= singles or alone[k][0] < max(0.3 * floor, 0.02 * best_drop):
+            if len(out) >= singles or alone[k][0] < max(0.3 * floor, 0.05 * best_drop):
                 break
             tried[effect] = tried.get(effect, 0) + 1
             self.progress(f"fitting {effect}")
@@ -277,7 +312,7 @@ class Search:
         if key == self.key(self.base.spec):
             return self.base
         if key not in self.fits:
-            self.fits[key] = self.problem.fit(spec, fit.as_dict(), tolerance=1e-3, max_steps=14)
+            self.fits[key] = self.problem.fit(spec, fit.as_dict(), tolerance=1e-3, max_steps=14, near=fit)
         return self.fits[key]
 
     def rivals(self, fit: Fit, without: dict[str, Fit], most: int = 3) -> list[tuple[str, Fit]]:
@@ -335,6 +370,52 @@ class Search:
                 fit = self.forward(fit)
         return fit, without, contenders
 
+    def together(self, fit: Fit) -> list[list[int]]:
+        """Return sets of candidates that would explain most together by linear forecast, whether or not each helps alone.
+
+        From every pair on, sets grow by one in a beam, priced for their numbers and for what they were chosen from.
+        """
+        screen = self.screen(fit)
+        numbers = [len(one.free) for one in screen.candidates]
+        beam: list[tuple[float, frozenset[int]]] = [(0.0, frozenset())]
+        best: dict[frozenset[int], float] = {}
+        for _ in range(MAX_EFFECTS):
+            grown: dict[frozenset[int], float] = {}
+            for _, chosen in beam:
+                there = {screen.candidates[k].effect for k in chosen}
+                for k, one in enumerate(screen.candidates):
+                    if one.effect in there or one.flexible or (more := chosen | {k}) in grown:
+                        continue
+                    drop, _ = screen.forecast(sorted(more))
+                    price = sum(numbers[j] for j in more) * 0.5 * math.log(fit.count) + self.price(len(more))
+                    grown[more] = 0.5 * drop / fit_factor(self.problem, fit) - price
+            beam = sorted(((score, chosen) for chosen, score in grown.items()), key=lambda one: -one[0])[:BEAM]
+            best |= {chosen: score for score, chosen in beam}
+        order = sorted((chosen for chosen in best if len(chosen) > 1), key=lambda one: -best[one])
+        return [sorted(one) for one in order[:REFITTED] if best[one] > 0]
+
+    def downward(self, current: Fit) -> Fit:
+        """Return the best fit of causes that only help together, pruned; `current` where none is better."""
+        screen = self.screen(self.base)
+        for chosen in self.together(self.base):
+            sizes = screen.forecast(chosen)[1]
+            if len(sizes) < len(chosen):
+                continue
+            self.progress(f"fitting {' + '.join(screen.candidates[k].effect for k in chosen)}")
+            fit = self.refit(self.base, [screen.candidates[k] for k in chosen], [sizes[k] for k in chosen])
+            fit, _ = self.backward(fit)
+            if fit is not current and fit.chi2 < current.chi2 and self.preferred(fit, current):
+                more = len(fit.spec.effects) - len(current.spec.effects)
+                if more <= 0 or self.worth(fit, current, more):
+                    current = fit
+        return current
+
     def run(self) -> tuple[Fit, dict[str, Fit], list[tuple[str, Fit]]]:
-        """Search; return the chosen fit, the fits without each effect, and the contenders."""
-        return self.settle(self.forward(self.base))
+        """Search upwards, and where structure remains downwards too.
+
+        Return the chosen fit, the fits without each effect, and the contenders.
+        """
+        found = self.forward(self.base)
+        if excess(self.problem, found) >= MIN_GAIN**2:
+            found = self.forward(self.downward(found))
+        return self.settle(found)

@@ -6,7 +6,7 @@ import json
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -25,6 +25,7 @@ from ..logs import condense
 from ..logs.run import Run
 from ..models import Array, Model
 from ..search import search
+from ..search.certainty import CERTAIN, NAMED, Witness, witness
 from ..search.evidence import EQUIVALENT, difference, excess, log_evidence, unexplained
 from . import experiments, plausibility
 from .residual import depends_on
@@ -61,9 +62,12 @@ def prepare(array: Array, runs: Sequence[Run], declared: Mapping[str, float] | N
 
 
 def first_fit(problem: Problem, spec: Spec) -> Fit:
-    """Fit the declared model: once, then starts projected out and spikes left out, then again."""
+    """Fit the declared model, errors of the first readings projected out; then with spikes left out and those errors as
+    this model has them, again."""
+    problem.learn_starts(spec, [free.start for free in spec.free])
     fit = problem.fit(spec, tolerance=1e-3)
     if problem.mask_spikes(fit.residual):
+        problem.learn_starts(fit.spec, fit.values)
         fit = problem.fit(spec, fit.as_dict(), tolerance=1e-3)
     problem.learn_starts(fit.spec, fit.values)
     noise = [statistics.noise_floor(left, run.starts) for left, run in zip(fit.residual, problem.runs, strict=True)]
@@ -161,18 +165,18 @@ def _diagnose(
     base = first_fit(problem, spec)
     found = search.Search(problem, [c for c in known if c.effect not in spec.effects], base, progress)
     final, without, contenders = found.run()
+    witnesses: dict[str, Witness] = {}
     progress("held-out blocks")
     final = _finish(problem, final)
+    while without:
+        # The least likely goes first: what it stood in for may have made the others look worse than they are.
+        witnesses = {effect: witness(problem, final, effect, other) for effect, other in without.items()}
+        effect = min(witnesses, key=lambda one: witnesses[one].probability())
+        if witnesses[effect].probability() >= NAMED:
+            break
+        kept, without, contenders = found.settle(found.reduced(final, effect), grow=False)
+        final = _finish(problem, kept)
     left_over = unexplained(problem, final)
-    if left_over and without:
-        # Structure remains: keep only what explains most of what was there.
-        kept, without, rest = found.settle(final, search.MIN_SHARE_UNEXPLAINED, grow=False)
-        explained = (base.sse - kept.sse) / base.count
-        if explained < search.MIN_TOTAL_UNEXPLAINED * excess(problem, base):
-            kept, without, rest = base, {}, []
-        if kept is not final:
-            final, contenders = _finish(problem, kept), rest
-        left_over = unexplained(problem, final)
     adopted = [e for e in final.spec.effects if e not in base.spec.effects]
     strength = {e: log_evidence(problem, final, without[e]) for e in adopted}
     base_out, final_out = problem.holdout_rmse(base), problem.holdout_rmse(final)
@@ -187,6 +191,9 @@ def _diagnose(
             "holdout_rmse_c": problem.holdout_rmse(growing),
             "evidence": strength[effect],
             "parameters": parameters_of(problem, final, effect),
+            "probability": witnesses[effect].probability(),
+            "certainty": "certain" if witnesses[effect].probability() >= CERTAIN else "probable",
+            "witness": asdict(witnesses[effect]),
             "on_chip": effect in effects.ON_CHIP,
             "in_words": effects.IN_WORDS[effect],
         }
@@ -287,7 +294,7 @@ def _diagnose(
         "seconds": round(time.monotonic() - begun, 2),
         "simulations": problem.simulations,
     }
-    made = model_of(problem, final, runs, result)
+    made = model_of(problem, final, runs, result, found.absent(final))
     validate(result)
     return Diagnosis(result, made, problem, base, final, contenders=[])
 

@@ -45,19 +45,28 @@ def parameters_of(problem: Problem, fit: Fit, effect: str | None = None) -> dict
     return out
 
 
-def model_of(problem: Problem, fit: Fit, runs: Sequence[Run], result: Mapping[str, Any] | None = None) -> Model:
-    """Return the model.toml of a fit: declared, fixed and fitted numbers, effects, provenance."""
+def model_of(
+    problem: Problem,
+    fit: Fit,
+    runs: Sequence[Run],
+    result: Mapping[str, Any] | None = None,
+    absent: Mapping[str, tuple[float, float]] | None = None,
+) -> Model:
+    """Return the model.toml of a fit: declared, fixed and fitted numbers, effects, provenance.
+
+    `absent` are numbers (value, error) of effects that are off: the data speak against them.
+    """
     table = native.parameter_table()
     model = Model(problem.array)
     model.effects = [e for e in fit.spec.plant_effects if e in native.effect_names()]
     model.parameters = dict(problem.declared) | {k: v for k, v in fit.spec.fixed}
     errors = fit.stderr()
-    for free, value in zip(fit.spec.free, fit.values, strict=True):
-        for name in free.names:
-            if name.partition("[")[0] in table:
-                model.parameters[name] = float(value)
-                if math.isfinite(errors[free.key]):
-                    model.stderr[name] = errors[free.key]
+    model.parameters |= fit.spec.settings(fit.values, problem.base_value)
+    for free in fit.spec.free:
+        if math.isfinite(errors[free.key]):
+            model.stderr |= dict.fromkeys(free.names, errors[free.key])
+            for name, weight in free.shifts:
+                model.stderr[name] = math.hypot(model.stderr.get(name, 0.0), weight * errors[free.key])
     constants = [fit.value(f.key) for f in fit.spec.free if f.key.startswith("ambient_c@")]
     if constants:
         model.parameters["ambient_c"] = float(np.mean(constants))
@@ -74,9 +83,12 @@ def model_of(problem: Problem, fit: Fit, runs: Sequence[Run], result: Mapping[st
         if table[k.partition("[")[0]].effect is None or table[k.partition("[")[0]].effect in on
     }
     model.stderr = {k: v for k, v in model.stderr.items() if k in model.parameters}
+    for name, (value, error) in (absent or {}).items():
+        model.parameters[name], model.stderr[name] = value, error
     model.provenance = {
         "logs": [{"file": Path(run.name).name, "sha256": run.sha256} for run in runs],
         "rmse_after_c": statistics.rms(fit.residual),
+        "hottest_c": max(float(np.nanmax(run.temperature_c)) for run in runs),
     }
     if result:
         model.provenance["rmse_before_c"] = result["baseline"]["rmse_c"]

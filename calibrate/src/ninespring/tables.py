@@ -1,0 +1,115 @@
+"""The tables of parameters and effects that firmware, simulation and tools share (lib/parameters)."""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TypeVar
+
+from .native import library
+
+PARTS = ("model", "current", "safety", "policy", "board")
+ACTS = ("array", "supply", "measurement")
+_Row = TypeVar("_Row", bound=ctypes.Structure)
+
+
+class _Parameter(ctypes.Structure):
+    _fields_ = (
+        ("name", ctypes.c_char * 40),
+        ("unit", ctypes.c_char * 5),
+        ("effect", ctypes.c_char_p),
+        ("sentence", ctypes.c_char_p),
+        ("minimum", ctypes.c_double),
+        ("maximum", ctypes.c_double),
+        ("standard", ctypes.c_double),
+        ("resolution", ctypes.c_double),
+        ("part", ctypes.c_int),
+        ("decimals", ctypes.c_int),
+        ("id", ctypes.c_int),
+        ("per_spring", ctypes.c_bool),
+    )
+
+
+class _Effect(ctypes.Structure):
+    _fields_ = (
+        ("name", ctypes.c_char_p),
+        ("sentence", ctypes.c_char_p),
+        ("not_on_chip", ctypes.c_char_p),
+        ("acts", ctypes.c_int),
+    )
+
+
+@dataclass(frozen=True)
+class Setting:
+    """One row of parameters.def as the chip holds it; numbers are in `unit`."""
+
+    name: str
+    unit: str
+    effect: str | None
+    sentence: str
+    minimum: float
+    maximum: float
+    default: float
+    resolution: float
+    part: str
+    decimals: int
+    id: int
+    per_spring: bool
+
+
+@dataclass(frozen=True)
+class TableEffect:
+    """One row of effects.def; `not_on_chip` says why, None where the chip carries the effect."""
+
+    name: str
+    sentence: str
+    not_on_chip: str | None
+    acts: str
+
+
+def _rows(function: str, kind: type[_Row]) -> Iterator[_Row]:
+    call = getattr(library(), function)
+    call.restype = ctypes.c_bool
+    call.argtypes = (ctypes.c_size_t, ctypes.POINTER(kind))
+    row = kind()
+    k = 0
+    while call(k, ctypes.byref(row)):
+        yield row
+        k += 1
+
+
+def _text(raw: bytes | None) -> str | None:
+    return None if raw is None else raw.decode()
+
+
+@functools.cache
+def settings() -> dict[str, Setting]:
+    """Return the chip's settings by name, in the order of `$$`."""
+    return {
+        row.name.decode(): Setting(
+            row.name.decode(),
+            row.unit.decode(),
+            _text(row.effect),
+            row.sentence.decode(),
+            row.minimum,
+            row.maximum,
+            row.standard,
+            row.resolution,
+            PARTS[row.part],
+            row.decimals,
+            row.id,
+            row.per_spring,
+        )
+        for row in _rows("table_parameter", _Parameter)
+    }
+
+
+@functools.cache
+def effects() -> dict[str, TableEffect]:
+    """Return the effects by name, in the plant's order."""
+    return {
+        row.name.decode(): TableEffect(row.name.decode(), row.sentence.decode(), _text(row.not_on_chip), ACTS[row.acts])
+        for row in _rows("table_effect", _Effect)
+    }

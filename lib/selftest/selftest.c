@@ -1,0 +1,57 @@
+#include "selftest.h"
+
+void selftest_start(selftest_t *selftest, controller_t *controller, uint16_t open_current_ma)
+{
+    *selftest = (selftest_t){.policy = (uint8_t)controller_policy(controller)};
+    selftest->level_permille =
+        open_current_ma <= SELFTEST_CURRENT_MA
+            ? 1000u
+            : (uint16_t)((uint32_t)SELFTEST_CURRENT_MA * 1000u / open_current_ma);
+    (void)controller_set_policy(controller, DRIVE_POLICY_OPEN); /* a level is a current */
+}
+
+static void judge(const controller_t *controller, uint8_t spring, uint8_t sensor,
+                  selftest_result_t *result)
+{
+    const int16_t current_ma = controller_measured_ma(controller, spring);
+    *result = (selftest_result_t){.spring = spring,
+                                  .sensor = (controller_sensor_status_t)sensor,
+                                  .fault = controller_fault(controller, spring)};
+    result->sound = result->sensor == CONTROLLER_SENSOR_OK && result->fault == SAFETY_FAULT_NONE &&
+                    current_ma > (int16_t)(SELFTEST_CURRENT_MA / 2u);
+    if (result->sound) {
+        result->resistance_mohm =
+            (int32_t)controller_measured_mv(controller, spring) * 1000 / current_ma;
+    }
+}
+
+selftest_step_t selftest_step(selftest_t *selftest, controller_t *controller, uint32_t tick,
+                              const uint8_t sensor_status[], selftest_result_t *result)
+{
+    const uint8_t spring = selftest->spring;
+    if (spring >= controller_springs(controller)) {
+        selftest_end(selftest, controller);
+        return SELFTEST_ENDED;
+    }
+    if (!selftest->driven) {
+        (void)controller_set_target(controller, spring, selftest->level_permille);
+        selftest->since_tick = tick;
+        selftest->driven = true;
+        return SELFTEST_WAITS;
+    }
+    if (tick - selftest->since_tick < SELFTEST_TICKS) {
+        return SELFTEST_WAITS;
+    }
+    judge(controller, spring, sensor_status[spring], result);
+    (void)controller_set_target(controller, spring, 0);
+    selftest->failures = (uint8_t)(selftest->failures + (result->sound ? 0u : 1u));
+    selftest->driven = false;
+    selftest->spring++;
+    return SELFTEST_JUDGED;
+}
+
+void selftest_end(selftest_t *selftest, controller_t *controller)
+{
+    controller_stop(controller);
+    (void)controller_set_policy(controller, (drive_policy_kind_t)selftest->policy);
+}

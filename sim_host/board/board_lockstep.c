@@ -1,0 +1,244 @@
+#include "board_internal.h"
+
+#include <simavr/sim_cycle_timers.h>
+
+#include "electrics.h"
+
+#define SENSOR_ADDRESS 0x40u
+/* The plant moves at most this often: springs need seconds to warm, so what it takes is little
+ * (bench/board). */
+#define PLANT_PERIOD_CYCLES BOARD_CYCLES_PER_MS
+
+static void integrate_until(board_t *board, uint64_t cycle)
+{
+    if (cycle <= board->synchronised_cycle) {
+        return;
+    }
+    double cycles = (double)(cycle - board->synchronised_cycle);
+    for (unsigned k = 0; k < BOARD_CHANNELS; k++) {
+        unsigned stage = board->stage_of_sensor[k];
+        board->shunt_v_cycles[k] += board->current_a[stage] * ELECTRICS_INA219_SHUNT_OHM * cycles;
+        board->bus_v_cycles[k] += board->voltage_v[stage] * cycles;
+    }
+    board->synchronised_cycle = cycle;
+}
+
+static ina219_inputs_t sensor_inputs(const board_t *board, unsigned k)
+{
+    return (ina219_inputs_t){board->synchronised_cycle, board->shunt_v_cycles[k],
+                             board->bus_v_cycles[k]};
+}
+
+static double fan_of(const board_t *board)
+{
+    return board->fan_stopped ? 0.0 : board_pwm_fan(&board->pwm);
+}
+
+void board_move_plant(board_t *board, uint64_t cycle)
+{
+    integrate_until(board, cycle);
+    board->next_plant_cycle = cycle + PLANT_PERIOD_CYCLES;
+    if (board->plant == NULL || board->plant_held) {
+        return;
+    }
+    if (cycle > board->plant_cycle) {
+        (void)plant_step(board->plant, (double)(cycle - board->plant_cycle) / BOARD_FREQUENCY_HZ);
+        board->plant_cycle = cycle;
+    }
+    for (unsigned k = 0; k < board->springs; k++) {
+        (void)plant_drive(board->plant, (int)k, PLANT_DRIVE_DUTY, board->pwm.duty[k]);
+    }
+    (void)plant_set_fan(board->plant, fan_of(board));
+    for (unsigned k = 0; k < board->springs; k++) {
+        board->current_a[k] = plant_current_a(board->plant, (int)k);
+        board->voltage_v[k] = plant_voltage_v(board->plant, (int)k);
+    }
+}
+
+static uint64_t next_event(const board_t *board)
+{
+    uint64_t next = board->next_plant_cycle;
+    for (unsigned k = 0; k < BOARD_CHANNELS; k++) {
+        if (board->sensor[k].conversion_end_cycle < next) {
+            next = board->sensor[k].conversion_end_cycle;
+        }
+    }
+    return next;
+}
+
+void board_handle_events(board_t *board, uint64_t now)
+{
+    uint64_t event = next_event(board);
+    while (event <= now) {
+        if (event == board->next_plant_cycle) {
+            board_move_plant(board, event);
+        }
+        integrate_until(board, event);
+        for (unsigned k = 0; k < BOARD_CHANNELS; k++) {
+            if (board->sensor[k].conversion_end_cycle <= event) {
+                ina219_inputs_t inputs = sensor_inputs(board, k);
+                ina219_conversion_ended(&board->sensor[k], &inputs);
+            }
+        }
+        event = next_event(board);
+    }
+}
+
+static avr_cycle_count_t on_event(avr_t *avr, avr_cycle_count_t when, void *param)
+{
+    board_t *board = param;
+    (void)avr;
+    board_handle_events(board, when);
+    return next_event(board);
+}
+
+void board_schedule(board_t *board)
+{
+    uint64_t next = next_event(board);
+    uint64_t now = board->avr->cycle;
+    avr_cycle_timer_register(board->avr, next > now ? next - now : 1, on_event, board);
+}
+
+/* A compare register takes effect at the next PWM period: one move of the plant serves all nine. */
+void board_pwm_changed(void *context)
+{
+    board_t *board = context;
+    uint64_t period = BOARD_PWM_PERIOD_CYCLES;
+    uint64_t next = (board->avr->cycle / period + 1u) * period;
+    if (next < board->next_plant_cycle) {
+        board->next_plant_cycle = next;
+        board_schedule(board);
+    }
+}
+
+/* --- the sensors on the bus --- */
+
+static ina219_t *sensor_at(board_t *board, uint8_t address)
+{
+    unsigned k = (unsigned)address - SENSOR_ADDRESS;
+    return address >= SENSOR_ADDRESS && k < BOARD_CHANNELS ? &board->sensor[k] : NULL;
+}
+
+bool board_sensor_begin(void *context, uint8_t address, bool read)
+{
+    ina219_t *sensor = sensor_at(context, address);
+    return sensor != NULL && ina219_begin(sensor, read);
+}
+
+void board_sensor_write(void *context, uint8_t address, uint8_t byte)
+{
+    board_t *board = context;
+    ina219_t *sensor = sensor_at(board, address);
+    board_handle_events(board, board->avr->cycle);
+    integrate_until(board, board->avr->cycle);
+    ina219_inputs_t inputs = sensor_inputs(board, (unsigned)(sensor - board->sensor));
+    uint64_t before = sensor->conversion_end_cycle;
+    ina219_write(sensor, byte, &inputs);
+    if (sensor->conversion_end_cycle != before) {
+        board_schedule(board);
+    }
+}
+
+uint8_t board_sensor_read(void *context, uint8_t address)
+{
+    board_t *board = context;
+    board_handle_events(board, board->avr->cycle);
+    return ina219_read(sensor_at(board, address));
+}
+
+void board_sensors_power_on(board_t *board)
+{
+    integrate_until(board, board->avr->cycle);
+    for (unsigned k = 0; k < BOARD_CHANNELS; k++) {
+        ina219_inputs_t inputs = sensor_inputs(board, k);
+        ina219_power_on(&board->sensor[k], &inputs);
+    }
+}
+
+void board_hold_plant(board_t *board, bool held)
+{
+    board_handle_events(board, board->avr->cycle);
+    board_move_plant(board, board->avr->cycle);
+    board->plant_held = held;
+    for (unsigned k = 0; k < BOARD_CHANNELS && held; k++) {
+        board->current_a[k] = 0.0;
+        board->voltage_v[k] = 0.0;
+    }
+    board->plant_cycle = board->avr->cycle;
+    board_move_plant(board, board->avr->cycle);
+    board_schedule(board);
+}
+
+double board_current_a(const board_t *board, unsigned channel)
+{
+    return board->current_a[channel];
+}
+
+void board_set_fault(board_t *board, board_fault_t fault, unsigned channel, bool on)
+{
+    plant_fault_t wanted = fault == BOARD_FAULT_OPEN ? PLANT_FAULT_OPEN : PLANT_FAULT_SHORT;
+    board_handle_events(board, board->avr->cycle);
+    switch (fault) {
+    case BOARD_FAULT_OPEN:
+    case BOARD_FAULT_SHORT:
+        if (board->plant != NULL && channel < board->springs) {
+            (void)plant_set_fault(board->plant, (int)channel, on ? wanted : PLANT_FAULT_NONE);
+        }
+        break;
+    case BOARD_FAULT_NACK:
+        board->sensor[channel].absent = on;
+        break;
+    case BOARD_FAULT_STALE:
+        board->sensor[channel].stale = on;
+        break;
+    case BOARD_FAULT_FREEZE:
+        board->sensor[channel].frozen = on;
+        break;
+    case BOARD_FAULT_SDA_LOW:
+        board_twi_hold_sda(&board->twi, on);
+        break;
+    case BOARD_FAULT_EEPROM:
+        board->eeprom.worn = on;
+        break;
+    case BOARD_FAULT_FAN:
+        board->fan_stopped = on;
+        break;
+    }
+    board_move_plant(board, board->avr->cycle);
+    board_schedule(board);
+}
+
+void board_scale_sensor(board_t *board, unsigned channel, double current_scale,
+                        double voltage_scale)
+{
+    board_handle_events(board, board->avr->cycle);
+    board->sensor[channel].shunt_gain_error = current_scale - 1.0;
+    board->sensor[channel].bus_gain_error = voltage_scale - 1.0;
+}
+
+void board_swap_sensors(board_t *board, unsigned a, unsigned b)
+{
+    board_handle_events(board, board->avr->cycle);
+    integrate_until(board, board->avr->cycle);
+    unsigned stage = board->stage_of_sensor[a];
+    board->stage_of_sensor[a] = board->stage_of_sensor[b];
+    board->stage_of_sensor[b] = stage;
+}
+
+void board_reset_sensor(board_t *board, unsigned channel)
+{
+    board_handle_events(board, board->avr->cycle);
+    integrate_until(board, board->avr->cycle);
+    ina219_inputs_t inputs = sensor_inputs(board, channel);
+    ina219_power_on(&board->sensor[channel], &inputs);
+    board_schedule(board);
+}
+
+uint16_t board_sensor_register(const board_t *board, unsigned channel, unsigned number)
+{
+    ina219_t copy = board->sensor[channel];
+    copy.pointer = (uint8_t)number;
+    copy.byte_count = 0;
+    unsigned high = ina219_read(&copy);
+    return (uint16_t)(high << 8 | ina219_read(&copy));
+}

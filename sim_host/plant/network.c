@@ -1,0 +1,217 @@
+#include "plant_internal.h"
+
+#include <math.h>
+
+#include "convection.h"
+
+#define STEFAN_BOLTZMANN 5.670374419e-8 /* W/m2K4 */
+#define KELVIN           273.15
+
+void plant_network_lay(plant_t *p)
+{
+    int orthogonal = 0, diagonal = 0;
+    for (int i = 0; i < p->n; i++) {
+        p->orthogonal_start[i] = orthogonal;
+        p->diagonal_start[i] = diagonal;
+        for (int dr = -1; dr <= 1; dr++)
+            for (int dc = -1; dc <= 1; dc++) {
+                const int row = i / p->columns + dr, column = i % p->columns + dc;
+                if ((dr == 0 && dc == 0) || row < 0 || row >= p->rows || column < 0 ||
+                    column >= p->columns)
+                    continue;
+                const unsigned char j = (unsigned char)(row * p->columns + column);
+                if (dr == 0 || dc == 0)
+                    p->orthogonal[orthogonal++] = j;
+                else
+                    p->diagonal[diagonal++] = j;
+            }
+    }
+    p->orthogonal_start[p->n] = orthogonal;
+    p->diagonal_start[p->n] = diagonal;
+}
+
+double plant_network_ambient(const plant_t *p, double time_s)
+{
+    double ambient = p->value[P_ambient_c][0];
+    if (p->on[E_ambient_drift])
+        ambient += scalar(p, P_ambient_ramp_k_per_h) * time_s / 3600.0 +
+                   scalar(p, P_ambient_amplitude_k) *
+                       sin(2.0 * PI * time_s / scalar(p, P_ambient_period_s) +
+                           scalar(p, P_ambient_phase_rad));
+    return ambient;
+}
+
+static double loss_at(const plant_t *p, int i, double t, double air)
+{
+    if (!p->on[E_natural_convection])
+        return p->loss_sum[i];
+    if (scalar(p, P_convection_correlation) < 0.5)
+        return p->loss_natural[i] * pow(fabs(t - air) / scalar(p, P_convection_reference_k),
+                                        scalar(p, P_convection_exponent)) +
+               p->loss_forced[i];
+    const double diameter_m = 1e-3 * scalar(p, P_wire_diameter_mm);
+    const double natural =
+        scalar(p, P_convection_scale) * convection_natural_w_per_m2k(diameter_m, t, air);
+    const double forced =
+        scalar(p, P_forced_scale) *
+        convection_forced_w_per_m2k(diameter_m, p->fan * scalar(p, P_fan_velocity_m_per_s), t, air);
+    return convection_mixed(natural, forced) * 1e-6 * scalar(p, P_surface_mm2) * p->loss_scale[i];
+}
+
+void plant_network_flows(plant_t *p, double time_s, const double *t, const double *austenite,
+                         flows_t *flows)
+{
+    const int n = p->n;
+    const double ambient = plant_network_ambient(p, time_s);
+    const bool shared_air = p->on[E_shared_air], plate = p->on[E_plate_conduction];
+    const bool natural = p->on[E_natural_convection];
+    const double air = shared_air ? t[n] : ambient;
+    const double ambient_k2 = (ambient + KELVIN) * (ambient + KELVIN);
+    double in_w = 0.0, to_air = 0.0, radiated = 0.0, to_plate = 0.0;
+
+    if (p->power_varies)
+        plant_electric_find(p, t, austenite);
+    for (int i = 0; i < n; i++) {
+        const double ti = t[i];
+        double orthogonal = 0.0, diagonal = 0.0;
+        for (int k = p->orthogonal_start[i]; k < p->orthogonal_start[i + 1]; k++)
+            orthogonal += t[p->orthogonal[k]] - ti;
+        for (int k = p->diagonal_start[i]; k < p->diagonal_start[i + 1]; k++)
+            diagonal += t[p->diagonal[k]] - ti;
+        double q = p->coupling_orthogonal * orthogonal + p->coupling_diagonal * diagonal;
+
+        double lost = (natural ? loss_at(p, i, ti, air) : p->loss_sum[i]) * (ti - air);
+        if (p->wake != 0.0 && p->upstream[i] >= 0)
+            lost -= p->wake * (t[p->upstream[i]] - air);
+        to_air += lost;
+        q -= lost;
+        if (p->radiation_w_per_k4 != 0.0) {
+            const double k2 = (ti + KELVIN) * (ti + KELVIN);
+            const double w = p->radiation_w_per_k4 * (k2 * k2 - ambient_k2 * ambient_k2);
+            radiated += w;
+            q -= w;
+        }
+        if (plate) {
+            const double w = p->value[P_plate_coupling_w_per_k][i] * (ti - t[n + 1]);
+            to_plate += w;
+            q -= w;
+        }
+        if (p->any_held && p->mode[i] == PLANT_DRIVE_TEMPERATURE) {
+            p->power_w[i] = -q;
+            q = -q;
+            in_w += q;
+            flows->q_w[i] = 0.0;
+        } else {
+            in_w += p->power_w[i];
+            flows->q_w[i] = q + p->power_w[i];
+        }
+    }
+    double out_w = radiated;
+    flows->q_w[n] = flows->q_w[n + 1] = 0.0;
+    if (shared_air) {
+        const double w = scalar(p, P_air_exchange_w_per_k) * (air - ambient);
+        flows->q_w[n] = to_air - w;
+        out_w += w;
+    } else {
+        out_w += to_air;
+    }
+    if (plate) {
+        const double w = scalar(p, P_plate_loss_w_per_k) * (t[n + 1] - ambient);
+        flows->q_w[n + 1] = to_plate - w;
+        out_w += w;
+    }
+    flows->in_w = in_w;
+    flows->out_w = out_w;
+}
+
+void plant_network_prepare(plant_t *p)
+{
+    const int n = p->n;
+    const bool mismatch = p->on[E_spring_mismatch];
+    for (int i = 0; i < n; i++) {
+        const double heavier = mismatch ? p->value[P_heat_capacity_scale][i] : 1.0;
+        const int free_sides = 4 - (p->orthogonal_start[i + 1] - p->orthogonal_start[i]);
+        p->capacity[i] = p->value[P_heat_capacity_j_per_k][i] * heavier;
+        p->loss_scale[i] = mismatch ? p->value[P_loss_scale][i] : 1.0;
+        if (p->on[E_edge_loss])
+            p->loss_scale[i] *= 1.0 + scalar(p, P_edge_loss_fraction) * free_sides;
+
+        static const int row_of[4] = {0, -1, 0, 1}, column_of[4] = {-1, 0, 1, 0};
+        const int direction = (int)scalar(p, P_wake_direction);
+        const int row = i / p->columns + row_of[direction];
+        const int column = i % p->columns + column_of[direction];
+        p->upstream[i] = row >= 0 && row < p->rows && column >= 0 && column < p->columns
+                             ? row * p->columns + column
+                             : -1;
+    }
+    p->capacity[n] = scalar(p, P_air_heat_capacity_j_per_k);
+    p->capacity[n + 1] = scalar(p, P_plate_heat_capacity_j_per_k);
+    for (int i = 0; i < n + 2; i++)
+        p->inverse_capacity[i] = 1.0 / p->capacity[i];
+    p->radiation_w_per_k4 = p->on[E_radiation] ? scalar(p, P_emissivity) * STEFAN_BOLTZMANN * 1e-6 *
+                                                     scalar(p, P_surface_mm2)
+                                               : 0.0;
+    /* Nodes that are off stand at ambient, so that switching one on starts it there. */
+    if (!p->on[E_shared_air])
+        p->temperature_c[n] = plant_network_ambient(p, p->time_s);
+    if (!p->on[E_plate_conduction])
+        p->temperature_c[n + 1] = plant_network_ambient(p, p->time_s);
+}
+
+void plant_network_prepare_inputs(plant_t *p)
+{
+    const int n = p->n;
+    const double fan = p->fan;
+    p->coupling_orthogonal =
+        scalar(p, P_orthogonal_w_per_k) +
+        fan * (scalar(p, P_orthogonal_fan_w_per_k) - scalar(p, P_orthogonal_w_per_k));
+    p->coupling_diagonal =
+        scalar(p, P_diagonal_w_per_k) +
+        fan * (scalar(p, P_diagonal_fan_w_per_k) - scalar(p, P_diagonal_w_per_k));
+    p->wake = p->on[E_fan_wake] ? scalar(p, P_wake_w_per_k) * fan : 0.0;
+    p->any_held = false;
+    const bool shared_air = p->on[E_shared_air], plate = p->on[E_plate_conduction];
+    double fastest = 0.0, air_sum = scalar(p, P_air_exchange_w_per_k),
+           plate_sum = scalar(p, P_plate_loss_w_per_k);
+    for (int i = 0; i < n; i++) {
+        p->loss_natural[i] = p->value[P_loss_w_per_k][i] * (1.0 - fan) * p->loss_scale[i];
+        p->loss_forced[i] = p->value[P_loss_fan_w_per_k][i] * fan * p->loss_scale[i];
+        p->loss_sum[i] = p->loss_natural[i] + p->loss_forced[i];
+        if (p->mode[i] == PLANT_DRIVE_TEMPERATURE)
+            p->any_held = true;
+        /* Gershgorin: no eigenvalue beyond (own conductances + couplings) / capacity */
+        const double own = p->loss_sum[i] + p->wake + 4.0 * 1.1e8 * p->radiation_w_per_k4 +
+                           (plate ? p->value[P_plate_coupling_w_per_k][i] : 0.0);
+        const double coupled =
+            p->coupling_orthogonal * (p->orthogonal_start[i + 1] - p->orthogonal_start[i]) +
+            p->coupling_diagonal * (p->diagonal_start[i + 1] - p->diagonal_start[i]);
+        fastest = fmax(fastest, (own + 2.0 * coupled) * p->inverse_capacity[i]);
+        air_sum += 2.0 * p->loss_sum[i];
+        plate_sum += 2.0 * p->value[P_plate_coupling_w_per_k][i];
+    }
+    if (shared_air)
+        fastest = fmax(fastest, air_sum * p->inverse_capacity[n]);
+    if (plate)
+        fastest = fmax(fastest, plate_sum * p->inverse_capacity[n + 1]);
+    /* The method is stable to 2.5 / eigenvalue; 1.5 damps well. */
+    p->step_limit_s = fastest > 0.0 ? 1.5 / fastest : LONGEST_STEP_S;
+    if (p->on[E_ambient_drift])
+        p->step_limit_s = fmin(p->step_limit_s, scalar(p, P_ambient_period_s) / 32.0);
+    if (p->on[E_sensor_lag] && p->on[E_latent_heat])
+        p->step_limit_s = fmin(p->step_limit_s, 1.0); /* lag() sees no kink within a step */
+}
+
+double plant_ambient_c(const plant_t *p)
+{
+    return plant_network_ambient(p, p->time_s);
+}
+
+double plant_air_c(const plant_t *p)
+{
+    return p->on[E_shared_air] ? p->temperature_c[p->n] : plant_ambient_c(p);
+}
+
+double plant_plate_c(const plant_t *p)
+{
+    return p->on[E_plate_conduction] ? p->temperature_c[p->n + 1] : plant_ambient_c(p);
+}

@@ -1,0 +1,170 @@
+/* What it is for: what the plant's rooms (table, phase, electric, network, sensors, solver) know of
+ * each other.
+ * What it owns: the plant's state and what is derived from its parameters; which room derives what.
+ * What it never does: serve anyone outside this folder: users include plant.h. */
+#ifndef PLANT_INTERNAL_H
+#define PLANT_INTERNAL_H
+
+#include "plant.h"
+
+#define MAX_SPRINGS    PLANT_MAX_SPRINGS
+#define PI             3.141592653589793
+#define COLDEST_C      (-60.0)
+#define HOTTEST_C      500.0
+#define LONGEST_STEP_S 1e7
+
+/* ------------------------------------------------------------------- table */
+
+enum parameter_id {
+#define PLANT(name, ...) P_##name,
+#include "plant.def"
+    PARAMETER_COUNT
+};
+
+enum effect_id {
+#define EFFECT(name, ...) E_##name,
+#include "effects.def"
+    EFFECT_COUNT
+};
+
+/* ------------------------------------------------------------------- state */
+
+/* What happens at one instant. q_w: net heat into each spring, then the air, then the plate. */
+typedef struct {
+    double q_w[MAX_SPRINGS + 2];
+    double in_w, out_w;
+} flows_t;
+
+/* Transformation temperatures of one spring, degC. */
+typedef struct {
+    double martensite_finish_c, martensite_start_c, austenite_start_c, austenite_finish_c;
+} points_t;
+
+struct plant {
+    int rows, columns, n;
+    double value[PARAMETER_COUNT][MAX_SPRINGS];
+    bool on[EFFECT_COUNT];
+    plant_drive_mode_t mode[MAX_SPRINGS];
+    double quantity[MAX_SPRINGS];
+    plant_fault_t fault[MAX_SPRINGS];
+    double fan;
+    /* What the setters leave for plant_solver_prepare. */
+    bool parameters_changed, inputs_changed;
+    bool restarted; /* the branches are to be laid anew, whatever was */
+
+    double time_s;
+    double temperature_c[MAX_SPRINGS + 2]; /* springs, air, plate */
+    double austenite[MAX_SPRINGS];
+    double sensor_c[MAX_SPRINGS];
+    /* Turning points. Heating follows heat_start + (1 - heat_start) rising(T) once that exceeds the
+     * present fraction, from heat_from_c on; cooling follows cool_start falling(T) below
+     * cool_from_c. */
+    double heat_start[MAX_SPRINGS], heat_from_c[MAX_SPRINGS];
+    double cool_start[MAX_SPRINGS], cool_from_c[MAX_SPRINGS];
+    double input_j, output_j, stored_j;
+    double step_s; /* the last good step: where the next one starts */
+
+    /* derived by phase */
+    points_t points[MAX_SPRINGS];
+    double latent_j[MAX_SPRINGS], latent_cooling_j[MAX_SPRINGS];
+
+    /* derived by electric */
+    double resistance_scale[MAX_SPRINGS];
+    double contact_ohm[MAX_SPRINGS]; /* 0 without the effect */
+    double power_w[MAX_SPRINGS];
+    double supply_v;
+    bool power_varies; /* with the state: must be found anew at each stage */
+
+    /* derived by network */
+    int orthogonal_start[MAX_SPRINGS + 1], diagonal_start[MAX_SPRINGS + 1];
+    unsigned char orthogonal[4 * MAX_SPRINGS], diagonal[4 * MAX_SPRINGS];
+    int upstream[MAX_SPRINGS]; /* -1: none */
+    double capacity[MAX_SPRINGS + 2], inverse_capacity[MAX_SPRINGS + 2];
+    double loss_scale[MAX_SPRINGS]; /* edge and mismatch */
+    double loss_natural[MAX_SPRINGS], loss_forced[MAX_SPRINGS];
+    double loss_sum[MAX_SPRINGS]; /* natural + forced */
+    double coupling_orthogonal, coupling_diagonal;
+    double wake;
+    double radiation_w_per_k4;
+    bool any_held;
+
+    /* of the solver */
+    double step_limit_s;
+    bool flows_known; /* k[0] is of the present state */
+    flows_t k[4];
+    double stage_c[MAX_SPRINGS + 2], stage_austenite[MAX_SPRINGS];
+    double increment_j[MAX_SPRINGS + 2];
+};
+
+static inline double scalar(const plant_t *p, enum parameter_id id)
+{
+    return p->value[id][0];
+}
+
+static inline bool within(double value, double low, double high)
+{
+    return value >= low && value <= high;
+}
+
+/* ------------------------------------------------------------------- phase */
+
+/* After a change of parameters or effects, once the capacities are known. Where a spring's
+ * transformation temperatures moved during a run (a load), its phase follows them at constant
+ * enthalpy: what it transforms warms or cools it. */
+void plant_phase_prepare(plant_t *p);
+/* Fraction of spring i at t, coming monotonously from the last accepted state; *slope is its
+ * derivative. */
+double plant_phase_fraction(const plant_t *p, int i, double t, double *slope);
+/* Both branches are laid through (t, present fraction). The outer loop bounds what is possible at
+ * t. */
+void plant_phase_anchor(plant_t *p, int i);
+/* Moves spring i to t on its branches. Only a transformation moves the memory, and only the
+ * opposite branch's. */
+void plant_phase_move(plant_t *p, int i, double t);
+/* Latent heat of a change of fraction, J. */
+double plant_phase_latent_j(const plant_t *p, int i, double change);
+/* Temperature of spring i after heat_j on top of the accepted state. */
+double plant_phase_temperature_after(const plant_t *p, int i, double heat_j, double guess_c);
+
+static inline bool plant_phase_moves(const plant_t *p, int i, double t)
+{
+    return t > p->heat_from_c[i] || t < p->cool_from_c[i];
+}
+
+/* ---------------------------------------------------------------- electric */
+
+/* After a change of parameters or effects; and of drives, faults or the ambient. */
+void plant_electric_prepare(plant_t *p);
+void plant_electric_prepare_inputs(plant_t *p);
+/* Supply and heating of each spring for these temperatures and fractions: into p->supply_v and
+ * p->power_w. */
+void plant_electric_find(plant_t *p, const double *t, const double *austenite);
+
+/* ----------------------------------------------------------------- network */
+
+void plant_network_lay(plant_t *p); /* who is whose neighbour: once */
+void plant_network_prepare(plant_t *p);
+/* Finds the longest stable step_limit_s too. */
+void plant_network_prepare_inputs(plant_t *p);
+double plant_network_ambient(const plant_t *p, double time_s);
+/* Calls plant_electric_find where heating depends on the state. */
+void plant_network_flows(plant_t *p, double time_s, const double *t, const double *austenite,
+                         flows_t *flows);
+
+/* ----------------------------------------------------------------- sensors */
+
+void plant_sensors_prepare(plant_t *p);
+/* What the sensor of spring i shows h_s later, when its spring went from the accepted temperature
+ * through middle_c to end_c. */
+double plant_sensors_follow(const plant_t *p, int i, double middle_c, double end_c, double h_s);
+
+/* ------------------------------------------------------------------ solver */
+
+/* Derives what the setters have left to derive. Fails if and only if plant_check does. */
+plant_status_t plant_solver_prepare(plant_t *p);
+/* Held springs go where they are held; what that takes counts as input. */
+void plant_solver_hold(plant_t *p);
+/* As plant_step, dt_s known to be valid. */
+plant_status_t plant_solver_advance(plant_t *p, double dt_s);
+
+#endif

@@ -1,0 +1,193 @@
+/* The transformation: its outer loop, its memory, its heat, and a load on it. */
+#include "plant_rig.h"
+
+#define PI 3.141592653589793
+
+static void lead(double t)
+{
+    hold(0, t);
+    OK(plant_step(plant, 0.01));
+}
+
+static void outer_loop_is_liang_and_rogers_cosine(void)
+{
+    const double up[][2] = {
+        {87, 0}, {90.5, 0.5 - 0.35355339}, {93, 0.5}, {95.5, 0.85355339}, {98, 1}, {120, 1}};
+    const double down[][2] = {{98, 1}, {79, 1}, {75.5, 0.85355339}, {73, 0.5}, {68, 0}, {20, 0}};
+    for (int k = 0; k < 6; k++) {
+        lead(up[k][0]);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-7, up[k][1], plant_austenite(plant, 0));
+    }
+    for (int k = 0; k < 6; k++) {
+        lead(down[k][0]);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-7, down[k][1], plant_austenite(plant, 0));
+    }
+}
+
+static void minor_loops_by_hand(void)
+{
+    static const double path[][2] = {
+        {93, 0.5},                      /* half way up */
+        {80, 0.5},                      /* back above M_s: nothing happens */
+        {92, 0.5},                      /* up again below the turning point: no ratchet */
+        {93, 0.5},          {73, 0.25}, /* half of the austenite back */
+        {80, 0.25},                     /* still nothing until A_s */
+        {70, 0.0477457514}, /* 0.5 (1 - cos(0.2 pi)) / 2: on along the same cooling branch */
+        {93, 0.5238728757}, /* the heating branch starts at what is left */
+        {98, 1.0},          {73, 0.5},  {93, 0.75}, {78, 0.75}, {73, 0.375}, {60, 0.0},
+    };
+    for (size_t k = 0; k < sizeof path / sizeof path[0]; k++) {
+        lead(path[k][0]);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-9, path[k][1], plant_austenite(plant, 0));
+    }
+}
+
+static void overlapping_bands_stay_within_the_outer_loop(void)
+{
+    set("austenite_start_c", 72.0); /* below M_s */
+    on("latent_heat");
+    on("resistance_phase");
+    uncouple();
+    random_state = 5;
+    double before = 0.0;
+    for (int k = 0; k < 3000; k++) {
+        const double t = 60.0 + 45.0 * uniform();
+        const double from = at(0);
+        lead(t);
+        const double fraction = plant_austenite(plant, 0);
+        const double rise = t <= 72 ? 0 : t >= 98 ? 1 : 0.5 - 0.5 * cos(PI * (t - 72) / 26);
+        const double fall = t <= 68 ? 0 : t >= 78 ? 1 : 0.5 - 0.5 * cos(PI * (t - 68) / 10);
+        TEST_ASSERT_TRUE(fraction >= rise - 1e-12 && fraction <= fall + 1e-12);
+        TEST_ASSERT_TRUE(t >= from ? fraction >= before : fraction <= before);
+        before = fraction;
+    }
+}
+
+static void turning_within_overlapping_bands_does_not_jump(void)
+{
+    set("austenite_start_c", 72.0);
+    lead(120.0);
+    lead(75.5);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-7, 0.85355339, plant_austenite(plant, 0));
+    lead(75.501);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-4, 0.85355339, plant_austenite(plant, 0));
+    lead(75.5);
+    lead(75.499);
+    TEST_ASSERT_DOUBLE_WITHIN(3e-4, 0.85355339, plant_austenite(plant, 0));
+}
+
+static void latent_heat_delays_by_its_energy_and_changes_no_steady_state(void)
+{
+    uncouple();
+    set("loss_w_per_k", 0.0);
+    on("latent_heat");
+    drive(0, PLANT_DRIVE_POWER, 0.5);
+    /* 20 -> 100 degC: 24 J and 8.65 J at 0.5 W */
+    OK(plant_step(plant, (24.0 + 8.65) / 0.5));
+    TEST_ASSERT_DOUBLE_WITHIN(2e-3, 100.0, at(0));
+    TEST_ASSERT_EQUAL_DOUBLE(1.0, plant_austenite(plant, 0));
+    set("loss_w_per_k", 0.0058);
+    settle();
+    TEST_ASSERT_DOUBLE_WITHIN(1e-4, 20.0 + 0.5 / 0.0058, at(0));
+}
+
+static void cooling_gives_back_its_own_share(void)
+{
+    uncouple();
+    set("loss_w_per_k", 0.0);
+    on("latent_heat");
+    set("latent_cooling_ratio", 0.336);
+    hold(0, 100.0);
+    OK(plant_step(plant, 1.0));
+    const double in = plant_energy_input_j(plant);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.3 * 80 + 8.65, in);
+    hold(0, 20.0);
+    OK(plant_step(plant, 1.0));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 8.65 * (1 - 0.336), plant_energy_input_j(plant));
+}
+
+static void a_load_moves_all_four_temperatures(void)
+{
+    on("transformation_shift");
+    set("transformation_shift_k[1]", 6.0);
+    static const double path[][2] = {{94, 0}, {99, 0.5}, {104, 1}, {84, 1}, {79, 0.5}, {74, 0}};
+    for (int k = 0; k < 6; k++) {
+        lead(path[k][0]);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-9, path[k][1], plant_austenite(plant, 0));
+    }
+    hold(1, 93.0); /* without a load */
+    OK(plant_step(plant, 0.01));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.5, plant_austenite(plant, 1));
+}
+
+/* A finger presses on a hot spring: it transforms at once as far as the heat that this sets free
+ * lets it. */
+static void a_load_on_a_hot_spring_warms_it_by_what_it_gives_back(void)
+{
+    uncouple();
+    set("loss_w_per_k", 0.0);
+    on("latent_heat");
+    on("transformation_shift");
+    lead(100.0);
+    lead(82.0);
+    drive(0, PLANT_DRIVE_POWER, 0.0);
+    OK(plant_step(plant, 1.0));
+    TEST_ASSERT_EQUAL_DOUBLE(1.0, plant_austenite(plant, 0));
+    set("transformation_shift_k[1]", 10.0); /* martensite starts at 88 */
+    OK(plant_step(plant, 1.0));
+    const double x = plant_austenite(plant, 0), warmer = at(0) - 82.0;
+    TEST_ASSERT_TRUE(x > 0.8 && x < 0.99 && at(0) < 88.0);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, get("latent_heat_j") * (1.0 - x),
+                              get("heat_capacity_j_per_k") * warmer);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.5 - 0.5 * cos(PI * (at(0) - 78.0) / 10.0), x);
+    /* the finger leaves: below austenite start nothing comes back */
+    set("transformation_shift_k[1]", 0.0);
+    OK(plant_step(plant, 1.0));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, x, plant_austenite(plant, 0));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 82.0 + warmer, at(0));
+}
+
+static void a_load_on_a_held_spring_leaves_its_heat_with_whatever_holds_it(void)
+{
+    uncouple();
+    set("loss_w_per_k", 0.0);
+    on("latent_heat");
+    on("transformation_shift");
+    lead(100.0);
+    lead(83.0);
+    const double before_j = plant_energy_input_j(plant);
+    set("transformation_shift_k[1]", 10.0);
+    OK(plant_step(plant, 1.0));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.5, plant_austenite(plant, 0));
+    TEST_ASSERT_EQUAL_DOUBLE(83.0, at(0));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, -0.5 * get("latent_heat_j"),
+                              plant_energy_input_j(plant) - before_j);
+}
+
+/* Another parameter that is set in mid-run is no load: the minor loop goes on as it was. */
+static void what_is_no_load_leaves_the_memory_alone(void)
+{
+    on("contact_resistance");
+    lead(93.0);
+    lead(73.0);
+    lead(80.0);
+    set("contact_ohm[1]", 0.05);
+    lead(70.0);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.0477457514, plant_austenite(plant, 0));
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(outer_loop_is_liang_and_rogers_cosine);
+    RUN_TEST(minor_loops_by_hand);
+    RUN_TEST(overlapping_bands_stay_within_the_outer_loop);
+    RUN_TEST(turning_within_overlapping_bands_does_not_jump);
+    RUN_TEST(latent_heat_delays_by_its_energy_and_changes_no_steady_state);
+    RUN_TEST(cooling_gives_back_its_own_share);
+    RUN_TEST(a_load_moves_all_four_temperatures);
+    RUN_TEST(a_load_on_a_hot_spring_warms_it_by_what_it_gives_back);
+    RUN_TEST(a_load_on_a_held_spring_leaves_its_heat_with_whatever_holds_it);
+    RUN_TEST(what_is_no_load_leaves_the_memory_alone);
+    return UNITY_END();
+}
