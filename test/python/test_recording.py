@@ -13,6 +13,7 @@ import sys
 import threading
 import time
 import tty
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -26,6 +27,7 @@ from ninespring.board import Board
 from ninespring.errors import WorkError
 from ninespring.logs import read_log, read_table
 from ninespring.recording import RowCheck, script_lines
+from ninespring.thermometers import Lines
 
 STREAM = [row(0.5 * k) for k in range(1, 40)]
 
@@ -449,3 +451,64 @@ def test_a_file_that_is_no_settings_is_refused_before_the_board_is_asked(tmp_pat
 def test_scripts_take_comments_and_units_as_scenarios_do() -> None:
     steps = script_lines("ambient 21\n\nat 5 = on 1  # first\nat 5.5 = off all ; then\n", "s", 6.0)
     assert [(one.line, one.at_s) for one in steps] == [("ambient 21", None), ("on 1", 5.0), ("off all", 5.5)]
+
+
+# thermometers
+
+
+@pytest.mark.parametrize(
+    ("lines", "springs", "readings"),
+    [
+        (["time_s,t1_c,t3_c", "1.0,20.5,21"], [1, 3], [(1.0, {1: 20.5, 3: 21.0})]),
+        (["21.0;22.0;23.0"] * 5, [1, 2, 3], [(None, {1: 21.0, 2: 22.0, 3: 23.0})]),
+        ([f"{k}.00,21.{k},22.0" for k in range(5)], [1, 2], [(4.0, {1: 21.4, 2: 22.0})]),
+        (["Time\tTemp1\tTC2\tbattery", "5\t20\t----\t3.3"], [1, 2], [(5.0, {1: 20.0})]),
+        (["# logger 3", "t1_c t2_c", "20 900", "20 21 22", "x"], [1, 2], [(None, {1: 20.0})]),
+    ],
+)
+def test_usual_loggers_lines_are_read(lines: list[str], springs: list[int], readings: list[object]) -> None:
+    reader = Lines()
+    got = [one for line in lines if (one := reader.read(line)) is not None]
+    if readings:
+        assert got == readings
+        assert sorted(one for one in reader.springs if one) == springs
+
+
+def test_thermometers_are_merged_onto_the_boards_clock_and_the_offset_is_said(tmp_path: Path) -> None:
+    board, logger = FakeBoard(), FakeBoard()
+    begun = time.monotonic()
+    board_s, logger_s = 100.0, 7.0  # both clocks at the beginning
+
+    def rows() -> Iterator[str]:
+        while True:
+            yield row(board_s + time.monotonic() - begun)
+
+    def read() -> None:
+        while not logger.gone:
+            now = time.monotonic() - begun
+            if int(now / 0.15) % 10 == 9:
+                logger.say("time_s,t1_c,t9_c")
+            logger.say(f"{logger_s + now:.3f},{20.0 + now:.3f},30.0")  # rises by 1 K/s
+            time.sleep(0.15)
+
+    board.stream, board.every_s = rows(), 0.5
+    threading.Thread(target=read, daemon=True).start()
+    done = record(board, tmp_path, "--duration", 8, "--thermometers", logger.port)
+    logger.gone = True
+    assert done.returncode == 0, done.stderr
+    frame = read_table(tmp_path / "log.csv", ("state",)).frame
+    assert "t9_c" not in frame
+    left = (frame["t1_c"] - 20.0) - (frame["time_s"] - board_s)
+    assert frame["t1_c"].notna().sum() >= len(frame) - 2
+    assert left.abs().max() < 0.35
+    offset = float(re.search(r"thermometers_offset_s: (.*)", (tmp_path / "log.csv").read_text())[1])
+    assert offset == pytest.approx(board_s - logger_s, abs=0.3)
+    assert "the thermometers' clock was" in done.stdout
+
+
+def test_a_port_without_thermometers_is_said_before_anything_is_driven(tmp_path: Path) -> None:
+    board = FakeBoard()
+    done = record(board, tmp_path, "--thermometers", other_thing(b""))
+    assert done.returncode == 1
+    assert "no temperatures come" in done.stderr
+    assert "telemetry csv 2" not in board.sent()

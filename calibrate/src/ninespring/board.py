@@ -78,9 +78,11 @@ class Board:
         """Answers that are still to come."""
         self._unguarded: str | None = None
         """The setting host_timeout_s as it was."""
+        self.thermometers: str | None = None
+        """Port of the simulated board's thermometers."""
         self._simulated: subprocess.Popen[str] | None = None
         if port == SIMULATED:
-            self._simulated, port = simulated_board()
+            self._simulated, port, self.thermometers = simulated_board()
         self.port = port
         try:
             self._port = Port(port)

@@ -38,8 +38,17 @@ steps.txt (console words; `at S =` waits until so many seconds after the first r
     "--duration", type=SECONDS, default=900.0, show_default=True, help="s by the board's clock; Ctrl-C ends it earlier"
 )
 @click.option("--run", "script", type=FILE, help="console lines to send, one a line, each at its time")
+@click.option("--thermometers", help="port of a thermocouple logger: its temperatures (degC) become t1_c, t2_c, ...")
 @JSON
-def record(port: str, output: Path, hz: int, duration: float, script: Path | None, json_path: Path | None) -> None:
+def record(
+    port: str,
+    output: Path,
+    hz: int,
+    duration: float,
+    script: Path | None,
+    thermometers: str | None,
+    json_path: Path | None,
+) -> None:
     """Log a board's telemetry: currents (A), voltages (V), the model's temperatures (degC).
 
     What has come is kept and the springs are switched off, whatever ends the recording: Ctrl-C, a closed terminal, a
@@ -49,6 +58,7 @@ def record(port: str, output: Path, hz: int, duration: float, script: Path | Non
     from .board import Board
     from .recording import LogFile, script_lines, told_to_stop
     from .recording import record as record_board
+    from .thermometers import Thermometers
 
     check_folder(output, json_path)
     text = read_bytes(script).decode("utf-8", "replace") if script else ""
@@ -63,17 +73,21 @@ def record(port: str, output: Path, hz: int, duration: float, script: Path | Non
             working(f"recording from {port}", duration) as say,
             Board(port, stopped=stopped, off_at_end=False) as board,
         ):
+            logger = Thermometers(thermometers) if thermometers else None
             log = LogFile(output)
             try:
-                got = record_board(
-                    *(board, log, hz, duration, steps), lambda rows, seconds: say(f"{rows} rows", seconds), keys
-                )
+                tell = lambda rows, seconds: say(f"{rows} rows", seconds)  # noqa: E731
+                got = record_board(board, log, hz, duration, steps, tell, keys, logger)
             finally:
                 log.close()
+                if logger:
+                    logger.close()
         if not log.rows:
             raise WorkError(got.ended or "stopped before the first row came")
         write({json_path: checked(result_of("record", rows=log.rows, dropped_lines=got.dropped, ended=got.ended))})
         lines = f", {got.dropped} corrupt lines dropped" if got.dropped else ""
+        if got.offset_s is not None:
+            lines += f"; the thermometers' clock was {got.offset_s:+.2f} s from the board's"
         beside(output).print(f"{log.rows} rows -> {output}{lines}", markup=False)
     if got.ended:
         raise WorkError(f"{got.ended}; what had come until then is in {output}")

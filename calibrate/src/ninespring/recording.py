@@ -10,6 +10,7 @@ import signal
 import stat
 import sys
 import time
+from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,7 +18,10 @@ from pathlib import Path
 from .board import Board
 from .errors import InputError, WorkError
 from .logs import COLUMN, EXTRA, LIMITS
+from .thermometers import Thermometers
 
+LONGEST_WAIT_S = 15.0
+"""So long, by the board's clock, a row waits for a thermometer's reading after it."""
 SILENT_S = 5.0
 """Telemetry that does not come for so long has ended."""
 STATE = re.compile(r"ok|locked|fault_\d+")
@@ -39,6 +43,8 @@ class Recording:
 
     dropped: int = 0
     """Lines that were corrupt."""
+    offset_s: float | None = None
+    """What was added to the thermometers' clock to have the board's, s."""
     ended: str = ""
     """Why it ended early where that was nobody's wish."""
 
@@ -239,18 +245,21 @@ def record(
     steps: Sequence[Step] = (),
     say: Callable[[int, float], None] = lambda rows, seconds: None,
     keys: Mapping[str, str] | None = None,
+    thermometers: Thermometers | None = None,
 ) -> Recording:
     """Record a board's telemetry; `duration_s` and the steps' times are by the board's clock, from the first row.
 
     Steps without a time are sent first. The log begins with what the board is and how it is set, ends with its faults,
     and has its status (which limits act on a spring) between the rows, all as comments. Whatever ends it, the springs are
-    off afterwards, and `ended` says why where it was no wish.
+    off afterwards, and `ended` says why where it was no wish. `thermometers` add columns t1_c ...: each row waits until a
+    reading after it has come.
     """
     got = Recording()
     answers = False
+    sink = RowSink(log, thermometers)
     try:
         _head(board, log, steps, keys or {})
-        _rows(board, log, hz, duration_s, steps, got, say)
+        _rows(board, log, hz, duration_s, steps, got, say, sink)
     except KeyboardInterrupt:
         pass
     except WorkError as error:
@@ -261,6 +270,12 @@ def record(
                 "; the springs could not be switched off from here: cut their supply"
             )
     with contextlib.suppress(WorkError):
+        sink.flush()
+        if thermometers:
+            got.offset_s = thermometers.offset_s
+            if got.offset_s is not None:
+                log.write(f"# thermometers_offset_s: {got.offset_s:.3f}")
+            got.ended = got.ended or thermometers.trouble
         if got.dropped:
             log.write(f"# dropped_lines: {got.dropped}")
         if got.ended:
@@ -268,6 +283,48 @@ def record(
         for line in board.ask("faults") if answers else ():
             log.write(f"# fault at the end: {line}")
     return got
+
+
+class RowSink:
+    """Rows on their way to the log: with thermometers, each waits for the readings around it."""
+
+    def __init__(self, log: LogFile, thermometers: Thermometers | None) -> None:
+        self.rows = 0
+        self._log, self._thermometers = log, thermometers
+        self._waiting: deque[tuple[str, float]] = deque()
+        self._springs: list[int] = []
+
+    def begin(self, names: Sequence[str]) -> None:
+        """Write the header; a thermometer of a spring that the array has not is left out."""
+        if self._thermometers:
+            self._springs = [k for k in self._thermometers.springs if f"i{k}_a" in names]
+            if not self._springs:
+                raise WorkError("the thermometers are of no spring of this array: their columns are t1_c, t2_c, ...")
+        self._log.write(",".join([*names, *(f"t{k}_c" for k in self._springs)]))
+
+    def row(self, text: str, time_s: float) -> None:
+        """Take one row; write those whose temperatures are known, and those that waited too long for them."""
+        self.rows += 1
+        if not self._thermometers:
+            self._log.write_row(text)
+            return
+        self._thermometers.row_came(time_s)
+        self._waiting.append((text, time_s))
+        while self._waiting:
+            values = self._thermometers.at(self._waiting[0][1])
+            if values is None and time_s - self._waiting[0][1] < LONGEST_WAIT_S and not self._thermometers.trouble:
+                return
+            self._write(values or {})
+
+    def flush(self) -> None:
+        """Write what waits, with the temperatures that have come."""
+        while self._waiting:
+            assert self._thermometers is not None
+            self._write(self._thermometers.at(self._waiting[0][1]) or {})
+
+    def _write(self, values: Mapping[int, float]) -> None:
+        text, _ = self._waiting.popleft()
+        self._log.write_row(",".join([text, *(f"{values[k]:.3f}" if k in values else "" for k in self._springs)]))
 
 
 def _head(board: Board, log: LogFile, steps: Sequence[Step], keys: Mapping[str, str]) -> None:
@@ -299,6 +356,7 @@ def _rows(
     steps: Sequence[Step],
     got: Recording,
     say: Callable[[int, float], None],
+    sink: RowSink,
 ) -> None:
     waiting = [step for step in steps if step.at_s is not None]
     for _ in range(3):
@@ -307,7 +365,7 @@ def _rows(
             break
     else:
         raise WorkError(f"{board.port}: the board's telemetry has no header that can be read")
-    log.write(",".join(names))
+    sink.begin(names)
     check = RowCheck(names, hz)
     first_s = math.nan
     while True:
@@ -324,10 +382,10 @@ def _rows(
         if check.restarted:
             raise WorkError("the board has started again")
         for row in good:
-            first_s = first_s if log.rows else row.time_s
+            first_s = first_s if sink.rows else row.time_s
             if row.time_s - first_s > duration_s:
                 return
-            log.write_row(row.text)
-            say(log.rows, row.time_s - first_s)
+            sink.row(row.text, row.time_s)
+            say(sink.rows, row.time_s - first_s)
             while waiting and (waiting[0].at_s or 0.0) <= row.time_s - first_s:
                 board.ask(waiting.pop(0).line)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import datetime
 import queue
 import re
@@ -13,10 +14,13 @@ from concurrent.futures import Future
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from .. import __version__
 from ..board import SIMULATED, Board, reading
 from ..errors import InputError, WorkError
-from ..recording import LogFile, RowCheck, telemetry_names, write_head
+from ..recording import LogFile, RowCheck, RowSink, telemetry_names, write_head
+from ..thermometers import Thermometers
 from . import words
 from .source import Source
 
@@ -33,14 +37,17 @@ TARGET = re.compile(r"target ([\d.]+) A")
 class BoardSource(Source):
     """A board at a port, real or simulated."""
 
-    def __init__(self, port: str, hz: int, folder: Path) -> None:
+    def __init__(self, port: str, hz: int, folder: Path, thermometers: str | None = None) -> None:
         super().__init__()
         self.kind = "simulated" if port == SIMULATED else "board"
         self._port, self._hz, self._folder = port, hz, folder
         self._wishes: queue.Queue[tuple[str, Future[str]]] = queue.Queue()
         self._board: Board | None = None
         self._settings: dict[str, str] = {}
+        self._thermometers_port = thermometers
+        self._thermometers: Thermometers | None = None
         self._log: LogFile | None = None
+        self._sink: RowSink | None = None
         self._check: RowCheck | None = None
         self._play: tuple[list[str], float] | None = None
         self._played, self._play_next_s = 0, 0.0
@@ -139,6 +146,10 @@ class BoardSource(Source):
                         self._converse(board)
                     finally:
                         self._board = None
+                        self._end_recording("")
+                        if self._thermometers:
+                            self._thermometers.close()
+                            self._thermometers = None
             except KeyboardInterrupt:
                 break
             except WorkError as error:
@@ -157,6 +168,8 @@ class BoardSource(Source):
     def _converse(self, board: Board) -> None:
         self._read_settings(board)
         board.guard(self._settings)
+        if logger := self._thermometers_port or board.thermometers:
+            self._thermometers = Thermometers(logger)
         names = next(filter(None, map(telemetry_names, board.ask(f"telemetry csv {self._hz}"))), None)
         if not names:
             raise WorkError(f"{board.port}: the board's telemetry has no header that can be read")
@@ -297,25 +310,24 @@ class BoardSource(Source):
             return
         assert self._check is not None
         for row in self._check.feed(line):
-            self._write(row.text, row=True)
+            self._write_row(row.text, row.time_s)
             now = reading(dict(zip(self._names, row.text.split(","), strict=True)))
             values: dict[str, Any] = {
                 "time_s": now.time_s,
-                "current_a": now.current_a.tolist(),
-                "voltage_v": now.voltage_v.tolist(),
-                "power_w": (now.current_a * now.voltage_v).round(4).tolist(),
-                "temperature_c": now.temperature_c.tolist(),
-                "duty": now.duty.tolist(),
+                "current_a": _plain(now.current_a),
+                "voltage_v": _plain(now.voltage_v),
+                "power_w": _plain(now.current_a * now.voltage_v),
+                "temperature_c": _plain(now.temperature_c),
+                "duty": _plain(now.duty),
                 "fan": now.fan,
                 "ambient_c": now.ambient_c,
                 "state": now.state,
                 "state_words": words.of_state(now.state),
                 "sum_a": float(now.current_a.sum()),
-                "supply_limit_a": float(self._settings.get("supply_limit_a", "nan") or "nan"),
+                "supply_limit_a": float(limit) if (limit := self._settings.get("supply_limit_a")) else None,
                 "corrupt": self._check.dropped,
+                "measured_c": self._measured(len(now.current_a)),
             }
-            if values["supply_limit_a"] != values["supply_limit_a"]:
-                values["supply_limit_a"] = None
             self._change(**values)
             self._remember(self._state)
         if self._check.restarted:
@@ -337,29 +349,48 @@ class BoardSource(Source):
         self._change(recording={"file": str(path), "rows": 0})
         try:
             write_head(board, log, keys)
-            log.write(",".join(self._names))
+            self._sink = RowSink(log, self._thermometers)
+            self._sink.begin(self._names)
         except WorkError as error:
             self._end_recording(str(error))
             raise
         return str(path)
 
-    def _write(self, line: str, row: bool = False) -> None:
-        if not self._log:
-            return
-        try:
-            if row:
-                self._log.write_row(line)
-                self._change(recording={"file": str(self._log.path), "rows": self._log.rows})
-            else:
+    def _measured(self, springs: int) -> list[float | None]:
+        latest = self._thermometers.latest if self._thermometers else {}
+        return [latest.get(k) for k in range(1, springs + 1)]
+
+    def _write(self, line: str) -> None:
+        if self._log:
+            try:
                 self._log.write(line)
-        except WorkError as error:
-            self._end_recording(str(error))
+            except WorkError as error:
+                self._end_recording(str(error))
+
+    def _write_row(self, text: str, time_s: float) -> None:
+        if self._log and self._sink:
+            try:
+                self._sink.row(text, time_s)
+                self._change(recording={"file": str(self._log.path), "rows": self._sink.rows})
+            except WorkError as error:
+                self._end_recording(str(error))
+        elif self._thermometers:
+            self._thermometers.row_came(time_s)
 
     def _end_recording(self, why: str) -> str:
         log, self._log = self._log, None
         if not log:
             return ""
+        with contextlib.suppress(WorkError):
+            if self._sink and not why:
+                self._sink.flush()
+        self._sink = None
         log.close()
         said = f"{log.rows} rows in {log.path}" if log.rows else f"nothing came for {log.path.name}"
         self._change(recording=None, said=f"{why}; {said}" if why else said)
         return said
+
+
+def _plain(values: np.ndarray) -> list[float | None]:
+    """Return numbers as JSON has them: it has no NaN."""
+    return [None if np.isnan(one) else round(float(one), 4) for one in values]

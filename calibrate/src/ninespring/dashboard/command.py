@@ -23,6 +23,7 @@ Examples:
 )
 @click.option("--port", help="serial port of a board, e.g. /dev/ttyACM0")
 @click.option("--simulate", is_flag=True, help="start a simulated board and show that")
+@click.option("--thermometers", help="port of a thermocouple logger: what it measures is shown beside the estimate")
 @click.option("--replay", type=FILE, help="log to play again")
 @click.option("--model", "model_path", type=FILE, help="with --replay: model.toml, shown beside what was measured")
 @ARRAY
@@ -42,6 +43,7 @@ Examples:
 def dashboard(
     port: str | None,
     simulate: bool,
+    thermometers: str | None,
     replay: Path | None,
     model_path: Path | None,
     array_path: Path | None,
@@ -77,7 +79,7 @@ def dashboard(
         array = array_of(array, [run])
         source = ReplaySource(run, array.rows, array.cols, model, speed)
     else:
-        source = BoardSource(port or SIMULATED, hz, folder)
+        source = BoardSource(port or SIMULATED, hz, folder, thermometers)
     here = listen(host.strip("[]"), int(number))
     name, at = here.getsockname()[:2]
     with told_to_stop() as stopped:

@@ -204,7 +204,7 @@ function append(now) {
 
 function plot(number) {
   const name = document.querySelector(`[data-plot="${number}"]`).value;
-  const end = past.time_s.at(-1) ?? 0, begin = end - Number($("window").value);
+  const end = past.time_s.at(-1) ?? 0, begin = Math.max(end - Number($("window").value), past.time_s[0] ?? 0);
   const from = past.time_s.findIndex((one) => one >= begin);
   const time = past.time_s.slice(from), traces = [];
   const line = (y, k, more = {}) => traces.push({
