@@ -222,7 +222,7 @@ def test_a_log_is_replayed_measured_beside_model(browser: Browser, make_log, tmp
     try:
         page = opened(browser, dashboard)
         expect(page.locator(".live").first).to_be_hidden()
-        expect(spring(page, 1, "measured")).to_contain_text("measured")
+        expect(spring(page, 1, "measured")).to_contain_text("°")
         shown, measured = (
             float(spring(page, 1, one).inner_text().split("°")[0]) for one in ("temperature", "measured")
         )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import pty
@@ -26,8 +27,10 @@ from ninespring import cli
 from ninespring.board import Board
 from ninespring.errors import WorkError
 from ninespring.logs import read_log, read_table
+from ninespring.monitoring import Screen
 from ninespring.recording import RowCheck, script_lines
 from ninespring.thermometers import Lines
+from rich.console import Console
 
 STREAM = [row(0.5 * k) for k in range(1, 40)]
 
@@ -512,3 +515,18 @@ def test_a_port_without_thermometers_is_said_before_anything_is_driven(tmp_path:
     assert done.returncode == 1
     assert "no temperatures come" in done.stderr
     assert "telemetry csv 2" not in board.sent()
+
+
+def test_monitor_shows_the_array_as_a_grid_with_totals_limits_and_trend() -> None:
+    screen = Screen({"rows": "1", "columns": "2", "supply_limit_a": "15.000"})
+    assert not screen.take("time_s,i1_a,v1_v,m1_c,d1,i2_a,v2_v,m2_c,d2,fan,ambient_c,state")
+    assert screen.take("1.000,1.500,0.300,20.00,0.100,0.000,0.000,20.00,0.000,0.50,21.00,ok")
+    assert not screen.take("2.000,1.5x0,0.300")
+    assert screen.take("<limits|spring:1|t:1.500|supply|cut_a:0.500>")
+    assert screen.take("3.000,1.500,0.300,22.00,0.100,0.000,0.000,20.00,0.000,0.50,21.00,fault_13")
+    console = Console(width=100, file=io.StringIO(), record=True)
+    console.print(screen.picture())
+    text = console.export_text()
+    assert "3.0 s   1.50 A of 15 A   fan 50 %   ambient 21.0 degC   stopped" in text
+    assert re.search(r"1  22\.0 ↗ *│ 2  20\.0 →", text)
+    assert "1.50 A  0.45 W" in text and "supply -0.50 A" in text

@@ -7,7 +7,6 @@ import time
 from pathlib import Path
 
 import click
-from rich.table import Table
 
 from . import __version__
 from .console import FILE, JSON, PORT, Command, beside, checked, out, result_of, working, write
@@ -143,43 +142,27 @@ Example:
 @click.option("--hz", type=HZ, default=2, show_default=True, help="updates a second")
 @click.option("--duration", type=SECONDS, default=1e9, help="s; Ctrl-C ends it")
 def monitor(port: str, hz: int, duration: float) -> None:
-    """Show a board's temperatures and currents as they are."""
+    """Show a board's array as it is: per spring the model's temperature (degC) and its trend, current (A), limits."""
     from rich.live import Live
 
     from .board import Board
+    from .monitoring import Screen
 
     with Board(port, off_at_end=False) as board:
-        names: list[str] = []
         until = time.monotonic() + duration
         try:
+            screen = Screen(board.settings())
             with Live(console=out, refresh_per_second=8) as live:
                 for line in board.ask(f"telemetry csv {hz}"):
-                    names = line.split(",") if line.startswith("time_s,") else names
+                    screen.take(line)
                 while (line := board.next_line(min(until, time.monotonic() + 5.0))) is not None:
-                    cells = line.split(",")
-                    if len(cells) == len(names):
-                        live.update(_board_table(dict(zip(names, cells, strict=True))))
+                    if screen.take(line):
+                        live.update(screen.picture())
             if time.monotonic() < until:
                 raise WorkError(f"{port}: no telemetry for 5 s")
         except KeyboardInterrupt:
             pass
         board.ask("telemetry off")
-
-
-def _board_table(row: dict[str, str]) -> Table:
-    table = Table(
-        "spring",
-        "current A",
-        "voltage V",
-        "model degC",
-        "duty",
-        title=f"{row.get('time_s', '')} s, fan {row.get('fan', '')}, {row.get('state', '')}",
-    )
-    k = 1
-    while f"i{k}_a" in row:
-        table.add_row(str(k), row[f"i{k}_a"], row.get(f"v{k}_v", ""), row.get(f"m{k}_c", ""), row.get(f"d{k}", ""))
-        k += 1
-    return table
 
 
 def add_board_commands(group: click.Group) -> None:

@@ -19,6 +19,7 @@ from .export.command import export, verify
 from .fit.command import fit
 from .fit.predict_command import predict
 from .import_command import import_
+from .plan_command import plan
 from .plot_command import plot
 from .verdict.command import diagnose
 
@@ -34,7 +35,7 @@ def cli() -> None:
     """Calibrate the thermal model of an array of NiTi springs, and say what the model lacks."""
 
 
-for command in (fit, diagnose, predict, export, verify, import_, plot, dashboard):
+for command in (fit, diagnose, predict, export, verify, import_, plan, plot, dashboard):
     cli.add_command(command)
 add_board_commands(cli)
 

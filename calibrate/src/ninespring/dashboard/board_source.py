@@ -28,7 +28,6 @@ SILENT_S = 5.0
 LOOK_EVERY_S = 1.0
 """So often the board is asked what telemetry does not tell: phase, targets, faults."""
 ANSWER_S = 15.0
-LIMITS = re.compile(r"<limits\|spring:(\d+)\|t:[\d.]+((?:\|[a-z]+)+)\|cut_a:([\d.]+)>")
 MODEL = re.compile(r"spring (\d+): ")
 PHASE = re.compile(r"austenite ([\d.]+) %")
 TARGET = re.compile(r"target ([\d.]+) A")
@@ -299,7 +298,7 @@ class BoardSource(Source):
 
     def _take(self, line: str) -> None:
         """Take a line of telemetry: a row, or which limits act on a spring."""
-        if match := LIMITS.fullmatch(line):
+        if match := words.ACTING.fullmatch(line):
             k = int(match[1]) - 1
             limits, cut = list(self._state["limits"]), list(self._state["cut_a"])
             if k < len(limits):

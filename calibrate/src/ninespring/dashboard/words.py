@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import re
+
+ACTING = re.compile(r"<limits\|spring:(\d+)\|t:[\d.]+((?:\|[a-z]+)+)\|cut_a:([\d.]+)>")
+"""What telemetry says of the limits that act on a spring: its number, their names, the current that they cut."""
+
 FAULTS = {
     1: "current above over_current_a",
     2: "driven and no current: a broken spring or wire",

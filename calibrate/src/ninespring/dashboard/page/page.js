@@ -163,11 +163,12 @@ function showSpring(k, now) {
   spring.setAttribute("aria-pressed", on);
   part("level").textContent = on ? `${Math.round(now.level[k])} %` : "";
   part("temperature").textContent = `${shown(celsius, 1)}°`;
-  part("measured").textContent = now.measured_c[k] === null || now.measured_c[k] === undefined ? "" : `${shown(now.measured_c[k], 1)}° measured`;
+  part("measured").textContent = now.measured_c[k] === null || now.measured_c[k] === undefined ? "" : `${shown(now.measured_c[k], 1)}°`;
   part("amps").textContent = `${shown(now.current_a[k], 2)} A`;
   part("limits").textContent = now.limits[k].join("; ");
   part("phase").style.width = `${100 * (now.phase?.[k] ?? 0)}%`;
   spring.title = `spring ${k + 1}: ${shown(now.temperature_c[k], 2)} degC, ${shown(now.current_a[k], 3)} A`
+    + (now.measured_c[k] != null ? `, measured ${shown(now.measured_c[k], 2)} degC` : "")
     + (now.phase?.[k] != null ? `, ${shown(100 * now.phase[k], 0)} % austenite` : "")
     + (now.target_a?.[k] != null ? `, target ${shown(now.target_a[k], 3)} A` : "")
     + (now.limits[k].length ? `; limited (${shown(now.cut_a?.[k], 2)} A less): ${now.limits[k].join("; ")}` : "");
