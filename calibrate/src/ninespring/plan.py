@@ -55,8 +55,7 @@ def make_plan(
         raise InputError(f"{duration_s:g} s are too short to identify an array: {LEAST_S:g} s or more")
     if supply_a < current_a:
         raise InputError(f"the supply's {supply_a:g} A do not drive one spring with {current_a:g} A")
-    stretches = _stretches(array.springs, duration_s, np.random.default_rng(seed))
-    stretches = _within_supply(stretches, supply_a / current_a * 100.0)
+    stretches = _stretches(array.springs, duration_s, supply_a / current_a * 100.0, np.random.default_rng(seed))
     drive, temperature = _simulated(array, stretches, duration_s, current_a)
     for _ in range(20 * len(stretches)):
         rows, springs = np.nonzero(temperature > hottest_c)
@@ -79,24 +78,28 @@ def make_plan(
     )
 
 
-def _stretches(springs: int, duration_s: float, rng: np.random.Generator) -> list[Stretch]:
-    out = []
-    for k in range(springs):
-        at = float(rng.uniform(5.0, LONGEST_S))
-        while at < COOL_FROM * duration_s - SHORTEST_S:
-            end = min(at + float(rng.uniform(SHORTEST_S, LONGEST_S)), COOL_FROM * duration_s)
-            out.append(Stretch(k, round(at), round(end), LEVELS[(k + len(out)) % len(LEVELS)]))
-            at = end + float(rng.uniform(SHORTEST_S, LONGEST_S))
-    return sorted(out, key=lambda one: one.begin_s)
+def _stretches(springs: int, duration_s: float, most: float, rng: np.random.Generator) -> list[Stretch]:
+    """Return who is driven when; `most` is the sum of levels that the supply gives, percent.
 
-
-def _within_supply(stretches: list[Stretch], most: float) -> list[Stretch]:
-    """Leave out what would be more than the supply gives; `most` is the sum of levels, percent."""
-    kept: list[Stretch] = []
-    for one in stretches:
-        if one.level + sum(other.level for other in kept if other.end_s > one.begin_s) <= most:
-            kept.append(one)
-    return kept
+    Whoever is due and does not fit waits, and the one that was driven least goes first.
+    """
+    out: list[Stretch] = []
+    due_s = rng.uniform(5.0, LONGEST_S, springs)
+    on_s, turns = np.zeros(springs), np.zeros(springs, dtype=int)
+    end_of_heating = round(COOL_FROM * duration_s)
+    for now in range(int(end_of_heating - SHORTEST_S)):
+        taken = sum(one.level for one in out if one.end_s > now)
+        for k in sorted(np.flatnonzero(due_s <= now), key=lambda k: on_s[k]):
+            level = LEVELS[(k + turns[k]) % len(LEVELS)]
+            if taken + level > most:
+                continue
+            end = min(now + round(rng.uniform(SHORTEST_S, LONGEST_S)), end_of_heating)
+            out.append(Stretch(int(k), now, end, level))
+            taken += level
+            on_s[k] += end - now
+            turns[k] += 1
+            due_s[k] = end + rng.uniform(SHORTEST_S, LONGEST_S)
+    return out
 
 
 def _simulated(
