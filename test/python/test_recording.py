@@ -17,6 +17,7 @@ import tty
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 import serial
 from click.testing import CliRunner
@@ -96,7 +97,8 @@ def test_a_recording_that_is_killed_leaves_its_rows_readable_and_the_next_one_ke
     board = FakeBoard()
     board.stream, board.every_s = STREAM, 0.1
     part = tmp_path / "log.csv.part"
-    with subprocess.Popen(command("record", "--port", board.port, "-o", tmp_path / "log.csv")) as process:
+    words = ("record", "--port", board.port, "--hz", 2, "-o", tmp_path / "log.csv")
+    with subprocess.Popen(command(*words)) as process:
         while process.poll() is None and not (part.exists() and "\n2.0," in part.read_text()):
             time.sleep(0.02)
         process.kill()
@@ -234,7 +236,7 @@ def test_a_header_that_came_corrupt_is_asked_for_again(tmp_path: Path) -> None:
 
     board.say = corrupt_once
     assert record(board, tmp_path, "--duration", 2).returncode == 0
-    assert board.sent().count("telemetry csv 2") == 2
+    assert board.sent().count("telemetry csv 20") == 2
     assert len(times(tmp_path / "log.csv")) >= 3
 
 
@@ -249,7 +251,7 @@ def test_steps_are_sent_in_their_time_and_status_is_kept_between_the_rows(tmp_pa
     at = lines.index(f"# {status}")
     assert lines[at - 1 : at + 2] == [row(1.5), f"# {status}", row(2.0)]
     sent = board.sent()
-    order = [sent.index(word) for word in ("ambient 21.5", "$$", "telemetry csv 2", "on 1", "fan 100", "off all")]
+    order = [sent.index(word) for word in ("ambient 21.5", "$$", "telemetry csv 20", "on 1", "fan 100", "off all")]
     assert order == sorted(order)
 
 
@@ -338,10 +340,10 @@ def test_the_host_timeout_is_set_while_recording_and_given_back(tmp_path: Path) 
     assert record(board, tmp_path, "--duration", 4).returncode == 0
     sent = board.sent()
     begins, ends = sent.index("$host_timeout_s=5"), sent.index("$host_timeout_s=0")
-    assert begins < sent.index("telemetry csv 2") < sent.index("off all") < ends
+    assert begins < sent.index("telemetry csv 20") < sent.index("off all") < ends
     assert "# $host_timeout_s=0" in (tmp_path / "log.csv").read_text()
     # something goes to the board all the while, so that it knows that this end lives
-    assert "" in board.seen[board.seen.index("telemetry csv 2") : board.seen.index("off all")]
+    assert "" in board.seen[board.seen.index("telemetry csv 20") : board.seen.index("off all")]
 
 
 # what is on the port
@@ -381,7 +383,7 @@ def test_a_second_program_on_the_port_is_named(tmp_path: Path) -> None:
     board = FakeBoard()
     board.stream, board.every_s = STREAM, 0.1
     with subprocess.Popen(command("record", "--port", board.port, "-o", tmp_path / "log.csv")) as process:
-        while "telemetry csv 1" not in board.seen:
+        while "telemetry csv 10" not in board.seen:
             time.sleep(0.02)
         done = ninespring("monitor", "--port", board.port)
         process.terminate()
@@ -514,7 +516,7 @@ def test_a_port_without_thermometers_is_said_before_anything_is_driven(tmp_path:
     done = record(board, tmp_path, "--thermometers", other_thing(b""))
     assert done.returncode == 1
     assert "no temperatures come" in done.stderr
-    assert "telemetry csv 2" not in board.sent()
+    assert "telemetry csv 20" not in board.sent()
 
 
 def test_monitor_shows_the_array_as_a_grid_with_totals_limits_and_trend() -> None:
@@ -530,3 +532,20 @@ def test_monitor_shows_the_array_as_a_grid_with_totals_limits_and_trend() -> Non
     assert "3.0 s   1.50 A of 15 A   fan 50 %   ambient 21.0 degC   stopped" in text
     assert re.search(r"1  22\.0 ↗ *│ 2  20\.0 →", text)
     assert "1.50 A  0.45 W" in text and "supply -0.50 A" in text
+
+
+def test_a_rows_inputs_are_their_means_until_the_next_row(tmp_path: Path) -> None:
+    """A spring that is switched on between two rows is on for that part of the interval, not from the next row on."""
+    board = FakeBoard()
+    board.stream = [
+        f"{0.05 * k:.2f},{0.0 if k < 35 else 2.0:.3f},{0.0 if k < 35 else 0.4:.3f},20.00,0.00,20.00,ok"
+        for k in range(1, 90)
+    ]
+    done = record(board, tmp_path, "--duration", 3)
+    assert done.returncode == 0, done.stderr
+    assert "telemetry csv 20" in board.sent()
+    frame = read_table(tmp_path / "log.csv", ("state",)).frame
+    assert frame["time_s"].tolist() == pytest.approx(np.arange(0.05, 3.1, 0.5))
+    # on from 1.75 s: in the row of 1.55 s for 0.3 of 0.5 s, as mean current and as mean power
+    assert frame["i1_a"].tolist() == pytest.approx([0, 0, 0, 1.2, 2, 2, 2], abs=1e-3)
+    assert (frame["i1_a"] * frame["v1_v"]).tolist() == pytest.approx([0, 0, 0, 0.48, 0.8, 0.8, 0.8], abs=1e-3)

@@ -10,6 +10,7 @@ import sys
 import threading
 import time
 import traceback
+from collections.abc import Iterator
 from concurrent.futures import Future
 from pathlib import Path
 from typing import Any
@@ -19,7 +20,7 @@ import numpy as np
 from .. import __version__
 from ..board import SIMULATED, Board, reading
 from ..errors import InputError, WorkError
-from ..recording import LogFile, RowCheck, RowSink, telemetry_names, write_head
+from ..recording import LogFile, Row, RowCheck, RowSink, telemetry_names, write_head
 from ..thermometers import Thermometers
 from . import words
 from .source import Source
@@ -305,11 +306,14 @@ class BoardSource(Source):
                 limits[k] = [words.LIMITS.get(one, one) for one in match[2][1:].split("|") if one != "none"]
                 cut[k] = float(match[3])
                 self._change(limits=limits, cut_a=cut)
-            self._write(f"# {line}")
+            with self._recording():
+                if self._sink:
+                    self._sink.comment(line)
             return
         assert self._check is not None
         for row in self._check.feed(line):
-            self._write_row(row.text, row.time_s)
+            with self._recording():
+                self._log_row(row)
             now = reading(dict(zip(self._names, row.text.split(","), strict=True)))
             values: dict[str, Any] = {
                 "time_s": now.time_s,
@@ -359,22 +363,20 @@ class BoardSource(Source):
         latest = self._thermometers.latest if self._thermometers else {}
         return [latest.get(k) for k in range(1, springs + 1)]
 
-    def _write(self, line: str) -> None:
-        if self._log:
-            try:
-                self._log.write(line)
-            except WorkError as error:
-                self._end_recording(str(error))
-
-    def _write_row(self, text: str, time_s: float) -> None:
-        if self._log and self._sink:
-            try:
-                self._sink.row(text, time_s)
-                self._change(recording={"file": str(self._log.path), "rows": self._sink.rows})
-            except WorkError as error:
-                self._end_recording(str(error))
+    def _log_row(self, row: Row) -> None:
+        if self._sink:
+            self._sink.row(row)
+            self._change(recording={"file": str(self._log.path) if self._log else "", "rows": self._sink.rows})
         elif self._thermometers:
-            self._thermometers.row_came(time_s)
+            self._thermometers.row_came(row.time_s)
+
+    @contextlib.contextmanager
+    def _recording(self) -> Iterator[None]:
+        """End the recording, not more, where its file cannot be written."""
+        try:
+            yield
+        except WorkError as error:
+            self._end_recording(str(error))
 
     def _end_recording(self, why: str) -> str:
         log, self._log = self._log, None
