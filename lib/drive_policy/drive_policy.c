@@ -41,7 +41,8 @@
 #define AWAY_TURNS       (15u * TURNS_PER_S) /* since it was there */
 #define THERE            0.95f
 
-#define WALK_MA     20   /* a tick, after a change of policy */
+#define WALK_MA     20                             /* a tick, after a change of policy */
+#define WALK_TURNS  (2u * DRIVE_POLICY_ROUND + 1u) /* every spring has had two */
 #define JUMP_MA     100u /* of a current: readings on the way tell nothing */
 #define HEAT_DITHER 4    /* of the hold's: so that a reading that hangs is noticed */
 
@@ -67,7 +68,9 @@ bool drive_policy_apply(drive_policy_t *policy, const drive_policy_parameters_t 
     if (!drive_policy_check(parameters, bad)) {
         return false;
     }
-    policy->walks = policy->walks || policy->parameters.policy != parameters->policy;
+    if (policy->parameters.policy != parameters->policy) {
+        policy->walks = WALK_TURNS;
+    }
     policy->parameters = *parameters;
     policy->columns = model->parameters.columns;
     spring_estimator_prepare(&policy->estimator, model, parameters->observer != 0);
@@ -83,7 +86,7 @@ bool drive_policy_init(drive_policy_t *policy, const drive_policy_parameters_t *
     *policy = (drive_policy_t){.springs = model->springs};
     spring_estimator_init(&policy->estimator, model);
     (void)drive_policy_apply(policy, parameters, model, NULL);
-    policy->walks = false;
+    policy->walks = 0;
     for (uint8_t k = 0; k < policy->springs; k++) {
         policy->spring[k].ceiling_ma = parameters->boost_current_ma;
         policy->spring[k].last_c7 = thermal_model_temperature_c7(model, k);
@@ -227,9 +230,10 @@ static void hold(drive_policy_t *policy, thermal_model_t *model, uint8_t k, uint
     const bool sees = spring_estimator_sees(b);
     const float level = 0.001f * (float)level_permille;
     const float phase = phase_of(policy, model, k);
-    const bool lost = full ? b->lost > LOST_AT_ONCE || b->possible == SPRING_PHASE_MARTENSITE ||
-                                 (b->lost > LOST_SETTLED && b->quiet >= SETTLED_TURNS)
-                           : phase < level - 2.0f * LEVEL_BAND;
+    const bool lost =
+        full && b->possible == SPRING_PHASE_AUSTENITE
+            ? b->lost > LOST_AT_ONCE || (b->lost > LOST_SETTLED && b->quiet >= SETTLED_TURNS)
+            : phase < (full ? 1.0f : level) - 2.0f * LEVEL_BAND;
     if (lost) {
         enter(policy, model, k, DRIVE_POLICY_STAGE_HEAT, level_permille);
         return;
@@ -487,6 +491,9 @@ static void take_turn(drive_policy_t *policy, const drive_policy_input_t *input)
     for (uint16_t k = policy->slot; k < policy->springs; k = (uint16_t)(k + DRIVE_POLICY_ROUND)) {
         update(policy, input, (uint8_t)k);
     }
+    if (policy->walks != 0) {
+        policy->walks--;
+    }
     policy->slot++;
     if (policy->slot == DRIVE_POLICY_ROUND) {
         policy->slot = 0;
@@ -543,7 +550,9 @@ static uint16_t dithered_ma(const drive_policy_t *policy, uint8_t k)
                                    ? policy->parameters.dither_ma / HEAT_DITHER
                                    : policy->parameters.dither_ma;
     const uint8_t place = (uint8_t)(policy->sweep + 7u * k) & 31u;
-    const uint16_t drop_ma = (uint16_t)((place < 16u ? place : 31u - place) * (dither_ma / 16u));
+    /* down on even steps, back on odd ones: finer than a step of the sensor */
+    const uint16_t steps = place < 16u ? 2u * place : 63u - 2u * place;
+    const uint16_t drop_ma = (uint16_t)(steps * dither_ma / 32u);
     return s->granted_ma > drop_ma ? (uint16_t)(s->granted_ma - drop_ma) : s->granted_ma;
 }
 
@@ -564,8 +573,7 @@ static void give(drive_policy_t *policy, uint16_t budget_ma, uint16_t target_ma[
 {
     const bool dithers = policy->parameters.policy != DRIVE_POLICY_OPEN;
     uint16_t room_ma = policy->sum_ma < budget_ma ? (uint16_t)(budget_ma - policy->sum_ma) : 0;
-    const bool may_walk = policy->walks && policy->sum_ma <= budget_ma;
-    bool walks = false;
+    const bool may_walk = policy->walks != 0 && policy->sum_ma <= budget_ma;
     policy->sweep++;
     policy->sum_ma = 0;
     for (uint8_t k = 0; k < policy->springs; k++) {
@@ -574,12 +582,13 @@ static void give(drive_policy_t *policy, uint16_t budget_ma, uint16_t target_ma[
         if (may_walk && (s->granted_ma != 0 || s->stage != DRIVE_POLICY_STAGE_OFF)) {
             const uint16_t wanted_ma = ma;
             ma = walked_ma(s->target_ma, ma, &room_ma);
-            walks = walks || ma != wanted_ma;
+            if (ma != wanted_ma) {
+                policy->walks = WALK_TURNS;
+            }
         }
         s->target_ma = target_ma[k] = ma;
         policy->sum_ma = (uint16_t)(policy->sum_ma + ma);
     }
-    policy->walks = walks;
 }
 
 static void share(drive_policy_t *policy, const drive_policy_input_t *input, uint16_t *budget_ma)

@@ -82,7 +82,7 @@ typedef struct {
     uint8_t tick;  /* counts to the next in which no spring is updated */
     uint8_t slot;  /* of the round in which each spring is updated once */
     uint8_t sweep; /* of the dither */
-    bool walks;    /* the policy has changed: no target jumps until all have arrived */
+    uint8_t walks; /* turns in which no target jumps: the policy has changed */
     drive_policy_spring_t spring[DRIVE_POLICY_MAX_SPRINGS];
 } drive_policy_t;
 

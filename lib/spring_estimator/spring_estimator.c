@@ -31,6 +31,8 @@
 #define TRUST_STILL_SDS 0.7f /* where the transformation may never show: probably over */
 #define TRUST_ONSET_SDS 1.3f /* where its beginning was seen: certainly, but for 10 % */
 
+#define EXPLAINED_LEAST 0.005f /* of a resistance: what a sensor's steps leave in one turn */
+
 #define PHASE_SD       0.02f
 #define PHASE_READ_SD  0.08f /* by its own resistances */
 #define PHASE_ONSET_SD 0.12f /* by one of its own, the other declared */
@@ -264,6 +266,7 @@ float spring_see(const spring_estimator_t *e, spring_belief_t *b, thermal_model_
     b->shift_k = clamp(b->shift_k - fminf(b->shift_variance_k2 / total_k2, gain) * error_k,
                        -SHIFT_MOST_K, SHIFT_MOST_K);
     correct_loss(e, b, by_loss * error_k);
+    b->kept_w_per_k = 0.0f;
     b->loss_variance -= by_loss * b->covariance;
     b->covariance *= left;
     b->capacity_k *= left;
@@ -278,10 +281,12 @@ void spring_keep_above(const spring_estimator_t *e, spring_belief_t *b, thermal_
 {
     const float error_k = limit_c - spring_now_c(model, k);
     if (error_k > 0.0f) {
-        correct_loss(e, b, b->covariance / distance_k2(b) * error_k);
-        /* no array loses so little: what is read is not its phase */
+        const float less_w_per_k = b->covariance / distance_k2(b) * error_k;
+        correct_loss(e, b, less_w_per_k);
+        b->kept_w_per_k += less_w_per_k;
+        /* it cannot lose so little: what is read is not its phase */
         b->blind = b->blind ||
-                   b->learnt.loss_w_per_k < -SPRING_ESTIMATOR_BOUND_SDS * LOSS_SD * e->loss_w_per_k;
+                   fabsf(b->kept_w_per_k) > SPRING_ESTIMATOR_BOUND_SDS * sqrtf(b->loss_variance);
         set_temperature(model, k, limit_c, SPRING_PHASE_AUSTENITE);
         b->last_c = spring_now_c(model, k);
     }
@@ -377,6 +382,23 @@ void spring_estimator_update(spring_estimator_t *e, thermal_model_t *model, uint
 
 /* ---- stages ---- */
 
+/* It reads less than when it had transformed last, and the difference is neither noise nor a
+ * temperature coefficient. Or it is still to come: its alloy is another one, if the model is hot.
+ */
+static bool lacks_phase(const spring_belief_t *b, const thermal_model_t *model, uint8_t k)
+{
+    const spring_learnt_t *l = &b->learnt;
+    if (!b->reads || b->blind || l->austenite_ohm == 0.0f || b->current_a < STRONG_A) {
+        return false;
+    }
+    const float above_k =
+        fabsf(spring_now_c(model, k) - spring_transformation(model, k).austenite_finish_c);
+    const float explained =
+        EXPLAINED_LEAST + LOOK_SDS * b->noise + COEFFICIENT_MOST_PER_K * above_k;
+    const float missing = (1.0f - b->ohm / l->austenite_ohm) / l->change;
+    return missing * fabsf(l->change) > explained;
+}
+
 bool spring_estimator_has_transformed(const spring_estimator_t *e, const thermal_model_t *model,
                                       uint8_t k)
 {
@@ -387,13 +409,9 @@ bool spring_estimator_has_transformed(const spring_estimator_t *e, const thermal
     if (b->steep && b->reads) {
         return false;
     }
-    /* A spring whose transformation is known to show, and has not begun to, has it still to come,
-     * however hot the model is: its alloy is another one. */
-    const bool shows = b->reads && !b->blind && b->learnt.austenite_ohm > 0.0f &&
-                       (b->possible & SPRING_PHASE_AUSTENITE) == 0;
-    const float sds = b->onset ? TRUST_ONSET_SDS
-                      : shows  ? SPRING_ESTIMATOR_BOUND_SDS
-                               : TRUST_STILL_SDS;
+    const float sds = lacks_phase(b, model, k) ? SPRING_ESTIMATOR_BOUND_SDS
+                      : b->onset               ? TRUST_ONSET_SDS
+                                               : TRUST_STILL_SDS;
     return spring_now_c(model, k) - sds * spring_estimator_sd_k(b) >
            spring_transformation(model, k).austenite_finish_c;
 }
@@ -410,10 +428,11 @@ void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, 
     } else if (!full && b->possible == SPRING_PHASE_AUSTENITE) {
         b->possible = SPRING_PHASE_BETWEEN | SPRING_PHASE_AUSTENITE;
     }
-    if (full && b->onset && b->reads && b->learnt.austenite_ohm == 0.0f) {
+    if (full && b->onset && b->reads && b->current_a > STRONG_A) {
         spring_learn_austenite(b); /* hot enough, and its resistance had come to rest */
     }
     b->heating = false;
+    b->kept_w_per_k = 0.0f;
     b->lost = 0.0f;
     b->quiet = 0;
     b->line_ohm = 0.0f;

@@ -62,6 +62,7 @@ typedef struct {
     float stiffness_w_per_k; /* what 1 K more of this spring gives off */
     float disturbance_k;     /* how far it was found from where it was believed, lately */
     float hottest_c;         /* while nothing is known: the most that it can be by now */
+    float kept_w_per_k;      /* taken off the loss since it was last seen, as nothing was seen */
     float lost;              /* phase lost since it had transformed, 0..1 */
     uint8_t possible;        /* SPRING_PHASE_ bits */
     uint8_t fresh;           /* turns with readings since current flows, saturating */

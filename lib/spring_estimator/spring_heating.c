@@ -53,7 +53,7 @@ void spring_learn_austenite(spring_belief_t *b)
 {
     const float change = 1.0f - b->onset_ohm / b->ohm;
     /* a heating from half way changes less */
-    if (b->cold_ohm > 0.0f || fabsf(change) > fabsf(b->learnt.change)) {
+    if (b->cold_ohm > 0.0f || b->learnt.austenite_ohm == 0.0f) {
         b->learnt.change = change;
     }
     b->learnt.austenite_ohm = b->ohm;
