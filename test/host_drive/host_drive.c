@@ -5,8 +5,8 @@
 #include "loop.h"
 #include "unity.h"
 
-#define SPRINGS 9
-#define CENTRE  4
+#define SPRINGS   9
+#define CENTRE    4
 #define HOTTEST_C 120.0 /* that any spring may ever be */
 
 static controller_settings_t settings;
@@ -167,7 +167,8 @@ static void all_nine_transform_in_turn_within_the_supply(void)
     check_all_nine_are_there();
 }
 
-/* The first start ever: it waits until even a spring of 120 degC would be martensite, and says so. */
+/* The first start ever: it waits until even a spring of 120 degC would be martensite, and says so.
+ */
 static void all_nine_are_there_after_power_on_with_no_hint(void)
 {
     power_on();
@@ -378,6 +379,76 @@ static void noisy_voltage_is_not_believed(void)
     TEST_ASSERT_TRUE(run(300.0) < 115.0);
     TEST_ASSERT_TRUE(phase(CENTRE) > 0.98);
     TEST_ASSERT_TRUE(is_blind(CENTRE));
+}
+
+static void half_a_level_is_half_a_phase(void)
+{
+    start_cold();
+    want(CENTRE, 500);
+    run(150.0);
+    TEST_ASSERT_DOUBLE_WITHIN(0.1, 0.5, phase(CENTRE));
+    TEST_ASSERT_FALSE(is_blind(CENTRE));
+    want(CENTRE, 250);
+    run(100.0);
+    TEST_ASSERT_DOUBLE_WITHIN(0.1, 0.25, phase(CENTRE));
+    want(CENTRE, 800);
+    run(100.0);
+    TEST_ASSERT_DOUBLE_WITHIN(0.1, 0.8, phase(CENTRE));
+}
+
+static bool is_at_open_current(void)
+{
+    for (int k = 0; k < SPRINGS; k++) {
+        if (target(k) != (k == CENTRE ? 0u : settings.policy.open_current_ma)) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/* After the change no target moves by more than 20 mA in a tick: to open until all have its
+ * current, to precompensate in the first ticks. Later jumps are the policy's own, from heating to
+ * holding and from waiting to heating. A current that was still rising to its target goes on. */
+static void change_policy(drive_policy_kind_t kind)
+{
+    TEST_ASSERT_TRUE(controller_set_policy(loop_controller(loop), kind));
+    settings.policy.policy = (uint8_t)kind;
+    bool arrived = false;
+    for (int n = 0; !arrived; n++) {
+        TEST_ASSERT_LESS_THAN_INT(1000, n);
+        unsigned before_ma[SPRINGS];
+        double before_a[SPRINGS];
+        for (int k = 0; k < SPRINGS; k++) {
+            before_ma[k] = target(k);
+            before_a[k] = loop_current_a(loop, k);
+        }
+        run(LOOP_TICK_S);
+        for (int k = 0; k < SPRINGS; k++) {
+            TEST_ASSERT_UINT_WITHIN(20, before_ma[k], target(k));
+            TEST_ASSERT_TRUE(loop_current_a(loop, k) >= before_a[k] - 0.12);
+            TEST_ASSERT_TRUE(loop_current_a(loop, k) <=
+                             fmax(before_a[k], target(k) / 1000.0) + 0.12);
+        }
+        arrived = kind == DRIVE_POLICY_OPEN ? is_at_open_current() : n == 12;
+    }
+}
+
+static void policy_is_switched_at_any_moment_without_a_jump(void)
+{
+    settings.policy.dither_ma = 100;
+    for (double moment_s = 0.02; moment_s < 200.0; moment_s = moment_s * 1.07 + 0.02) {
+        settings.policy.policy = DRIVE_POLICY_PRECOMPENSATE;
+        start_cold();
+        want_all_but(CENTRE);
+        run(moment_s);
+        change_policy(DRIVE_POLICY_OPEN);
+        run(fmod(37.0 * moment_s, 11.0));
+        change_policy(DRIVE_POLICY_PRECOMPENSATE);
+        run(fmod(61.0 * moment_s, 17.0));
+        change_policy(DRIVE_POLICY_OPEN);
+        loop_destroy(loop);
+    }
+    loop = NULL;
 }
 
 /* ---- limits ---- */
@@ -592,6 +663,8 @@ int main(void)
     RUN_TEST(resistance_that_rises_where_a_fall_is_declared_is_learnt);
     RUN_TEST(resistance_that_never_changes_falls_back_to_the_model);
     RUN_TEST(noisy_voltage_is_not_believed);
+    RUN_TEST(half_a_level_is_half_a_phase);
+    RUN_TEST(policy_is_switched_at_any_moment_without_a_jump);
     RUN_TEST(own_temperature_derates_and_is_never_exceeded);
     RUN_TEST(limit_that_takes_everything_trips_that_spring_until_cleared);
     RUN_TEST(undriven_spring_stays_below_its_limit_whatever_its_neighbours_want);

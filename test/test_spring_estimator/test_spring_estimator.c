@@ -47,6 +47,28 @@ static void at_power_on_everything_is_possible(void)
     TEST_ASSERT_TRUE(austenite.low == 0.0f && austenite.high == 1.0f);
 }
 
+/* From the hottest that it may be, with its latent heat. */
+static void it_is_cold_only_after_the_time_that_physics_needs(void)
+{
+    for (double loss = 0.85; loss < 1.2; loss += 0.15) {
+        power_comes_on();
+        truth.temperature_c = SPRING_ESTIMATOR_HOTTEST_C;
+        truth.austenite = 1.0;
+        truth.loss_w_per_k *= loss;
+        const double said_s = spring_estimator_cooling_s(&estimator, &model, 0);
+        double took_s = 0.0;
+        while (BELIEF.possible != SPRING_PHASE_MARTENSITE && took_s < 300.0) {
+            (void)tick(0.0);
+            took_s += TICK_S;
+        }
+        (void)snprintf(where, sizeof where, "loss x %.2f: said %.0f s, took %.0f s: %.1f degC",
+                       loss, said_s, took_s, truth.temperature_c);
+        TEST_ASSERT_TRUE_MESSAGE(truth.temperature_c < 68.0 && truth.austenite == 0.0, where);
+        TEST_ASSERT_TRUE_MESSAGE(took_s < 100.0 && fabs(said_s - took_s) < 0.25 * took_s, where);
+        TEST_ASSERT_EQUAL_FLOAT(0.0f, spring_estimator_cooling_s(&estimator, &model, 0));
+    }
+}
+
 /* ---- a heating ---- */
 
 static void check_transformation_is_seen(double ratio, double rise_per_k)
@@ -62,13 +84,17 @@ static void check_transformation_is_seen(double ratio, double rise_per_k)
         (void)tick(3.0);
         began_at = began_at < 0.0 && BELIEF.onset ? truth.austenite : began_at;
     }
-    (void)snprintf(where, sizeof where, "ratio %.2f, %.4f per K: onset at %.2f, end at %.3f, %.1f C",
-                   ratio, rise_per_k, began_at, truth.austenite, truth.temperature_c);
+    (void)snprintf(where, sizeof where,
+                   "ratio %.2f, %.4f per K: onset at %.2f, end at %.3f, %.1f C", ratio, rise_per_k,
+                   began_at, truth.austenite, truth.temperature_c);
     TEST_ASSERT_TRUE_MESSAGE(began_at > 0.0 && began_at < 0.5, where);
     TEST_ASSERT_TRUE_MESSAGE(truth.austenite > 0.99 && truth.temperature_c < 112.0, where);
     spring_estimator_begin_hold(&estimator, &model, 0, true);
     TEST_ASSERT_FALSE_MESSAGE(BELIEF.blind, where);
     TEST_ASSERT_EQUAL_UINT8_MESSAGE(SPRING_PHASE_AUSTENITE, BELIEF.possible, where);
+    TEST_ASSERT_FLOAT_WITHIN(0.01f * (float)resistance_ohm(), (float)resistance_ohm(),
+                             BELIEF.learnt.austenite_ohm);
+    TEST_ASSERT_FLOAT_WITHIN(0.04f, (float)(1.0 - 1.0 / ratio), BELIEF.learnt.change);
 }
 
 static void transformation_is_seen_whatever_its_sign_and_size(void)
@@ -100,7 +126,8 @@ static void coefficient_alone_is_never_an_onset(void)
             truth.rise_per_k = rise_per_k[n];
             truth.noise_v = noisy ? 0.016 : 0.0;
             spring_estimator_begin_heating(&estimator, 0);
-            for (double s = 0.0; s < 60.0 && !spring_estimator_has_transformed(&estimator, &model, 0);
+            for (double s = 0.0;
+                 s < 60.0 && !spring_estimator_has_transformed(&estimator, &model, 0);
                  s += TICK_S) {
                 (void)tick(3.0);
                 (void)snprintf(where, sizeof where, "%.4f per K, noisy %d: %.1f degC",
@@ -131,6 +158,16 @@ static void count_bounds(void)
     within_temperature +=
         holds(spring_estimator_temperature_c(&estimator, &model, 0), truth.temperature_c);
     within_phase += holds(spring_estimator_austenite(&estimator, &model, 0), truth.austenite);
+}
+
+static void check_counted(void)
+{
+    (void)snprintf(where, sizeof where, "of %u: distance %.4f, temperature %.4f, phase %.4f", seen,
+                   (double)within_distance / seen, (double)within_temperature / seen,
+                   (double)within_phase / seen);
+    TEST_ASSERT_TRUE_MESSAGE(within_distance >= 0.99 * seen, where);
+    TEST_ASSERT_TRUE_MESSAGE(within_temperature >= 0.99 * seen, where);
+    TEST_ASSERT_TRUE_MESSAGE(within_phase >= 0.99 * seen, where);
 }
 
 static void heat_and_hold(void)
@@ -166,12 +203,25 @@ static void driven_spring_is_within_its_bounds(void)
         truth.rise_per_k = 0.0002 * (double)(n % 4u);
         heat_and_hold();
     }
-    (void)snprintf(where, sizeof where, "of %u: distance %.4f, temperature %.4f, phase %.4f", seen,
-                   (double)within_distance / seen, (double)within_temperature / seen,
-                   (double)within_phase / seen);
-    TEST_ASSERT_TRUE_MESSAGE(within_distance >= 0.99 * seen, where);
-    TEST_ASSERT_TRUE_MESSAGE(within_temperature >= 0.99 * seen, where);
-    TEST_ASSERT_TRUE_MESSAGE(within_phase >= 0.99 * seen, where);
+    check_counted();
+}
+
+/* Nobody reads a spring that is off: what it may have become meanwhile widens. */
+static void spring_that_is_off_is_within_its_bounds(void)
+{
+    static const double off[] = {0.85, 1.0, 1.15};
+    seen = within_distance = within_temperature = within_phase = 0;
+    for (unsigned n = 0; n < 3; n++) {
+        begin_cold();
+        truth.loss_w_per_k *= off[n];
+        (void)heat_then_hold(60.0);
+        for (double s = 0.0; s < 200.0; s += TICK_S) {
+            if (tick(0.0)) {
+                count_bounds();
+            }
+        }
+    }
+    check_counted();
 }
 
 /* ---- a hold ---- */
@@ -199,8 +249,9 @@ static void crossing_is_seen_and_makes_the_distance_sure(void)
         const double off_w_per_k = (double)learnt.loss_w_per_k - 5.8e-3 * (loss[n] - 1.0);
         (void)snprintf(where, sizeof where, "loss x %.2f: off by %.6f, sd %.6f", loss[n],
                        off_w_per_k, (double)learnt.loss_sd_w_per_k);
-        TEST_ASSERT_TRUE_MESSAGE(
-            fabs(off_w_per_k) <= (double)(SPRING_ESTIMATOR_BOUND_SDS * learnt.loss_sd_w_per_k), where);
+        TEST_ASSERT_TRUE_MESSAGE(fabs(off_w_per_k) <=
+                                     (double)(SPRING_ESTIMATOR_BOUND_SDS * learnt.loss_sd_w_per_k),
+                                 where);
         TEST_ASSERT_TRUE_MESSAGE((double)learnt.loss_sd_w_per_k < 0.12 * 5.8e-3, where);
     }
 }
@@ -250,6 +301,40 @@ static void martensite_resistance_is_learnt_at_20_degrees(void)
 }
 
 /* ---- learnt before ---- */
+
+/* Power-on with what an earlier heating has taught, and a look at 1 A. */
+static uint8_t look(double temperature_c, double austenite)
+{
+    begin_cold();
+    truth.rise_per_k = 0.0004;
+    (void)heat_then_hold(60.0);
+    const spring_learnt_t learnt = spring_estimator_learnt(&estimator, 0);
+    power_comes_on();
+    spring_estimator_restore(&estimator, 0, &learnt);
+    truth.rise_per_k = 0.0004;
+    truth.temperature_c = temperature_c;
+    truth.austenite = austenite;
+    ticks(1.0, 3.0);
+    (void)snprintf(where, sizeof where, "%.0f degC, %.2f", temperature_c, austenite);
+    TEST_ASSERT_TRUE_MESSAGE(
+        holds(spring_estimator_temperature_c(&estimator, &model, 0), truth.temperature_c), where);
+    TEST_ASSERT_TRUE_MESSAGE(
+        holds(spring_estimator_austenite(&estimator, &model, 0), truth.austenite), where);
+    return BELIEF.possible;
+}
+
+static void look_tells_the_phase_by_what_was_learnt(void)
+{
+    TEST_ASSERT_EQUAL_UINT8(SPRING_PHASE_MARTENSITE, look(25.0, 0.0));
+    TEST_ASSERT_EQUAL_UINT8(SPRING_PHASE_MARTENSITE, look(66.0, 0.0));
+    TEST_ASSERT_EQUAL_UINT8(SPRING_PHASE_BETWEEN, look(76.0, 0.5));
+    static const double hot_c[] = {84.0, 100.0};
+    for (unsigned n = 0; n < 2; n++) { /* it may begin to transform before it is heated */
+        const uint8_t possible = look(hot_c[n], 1.0);
+        TEST_ASSERT_BITS_HIGH(SPRING_PHASE_AUSTENITE, possible);
+        TEST_ASSERT_BITS_LOW(SPRING_PHASE_MARTENSITE, possible);
+    }
+}
 
 static void look_without_anything_learnt_tells_nothing(void)
 {
@@ -348,14 +433,17 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(at_power_on_everything_is_possible);
+    RUN_TEST(it_is_cold_only_after_the_time_that_physics_needs);
     RUN_TEST(transformation_is_seen_whatever_its_sign_and_size);
     RUN_TEST(transformation_is_seen_through_noise);
     RUN_TEST(coefficient_alone_is_never_an_onset);
     RUN_TEST(driven_spring_is_within_its_bounds);
+    RUN_TEST(spring_that_is_off_is_within_its_bounds);
     RUN_TEST(crossing_is_seen_and_makes_the_distance_sure);
     RUN_TEST(hold_that_loses_nothing_shows_no_crossing);
     RUN_TEST(transformation_that_moves_is_noticed);
     RUN_TEST(martensite_resistance_is_learnt_at_20_degrees);
+    RUN_TEST(look_tells_the_phase_by_what_was_learnt);
     RUN_TEST(look_without_anything_learnt_tells_nothing);
     RUN_TEST(numbers_that_no_spring_has_are_not_restored);
     RUN_TEST(bad_readings_leave_a_belief_that_can_be_believed);
