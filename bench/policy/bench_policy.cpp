@@ -487,7 +487,8 @@ int main(int argc, char **argv)
 {
     CLI::App app{
         "Figures of the drive policy beside B105 (driven springs kept at 105 degC) and "
-        "B1.5 (a plain 1.5 A from cold).\n"
+        "B1.5 (a plain 1.5 A from cold). Every run begins with the hint `model cold`: what is "
+        "measured is the drive, not the start\n(bench/worlds measures that).\n"
         "Monte Carlo: each plant runs 32 of the 512 patterns, one of the 16 fractions of "
         "the 2^(9-4) design of\nresolution IV in turn, so that 16 plants run all 512 "
         "once, and two more: all on, and all but the centre. Part robust varies R_A and R_M "

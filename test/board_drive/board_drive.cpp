@@ -204,35 +204,6 @@ void springs_around_an_undriven_one_derate_before_it_acts()
     TEST_ASSERT_TRUE(temperature(*mega, CENTRE) > 34.0); /* derated, not given up */
 }
 
-void probing_is_one_spring_at_a_time_and_too_small_to_matter()
-{
-    auto mega = powered("$probe_period_s=1");
-    unsigned ticks_of[SPRINGS] = {};
-    for (int n = 0; n < 50 * 12; ++n) {
-        const board_view_t seen = tick(*mega);
-        unsigned pulses = 0;
-        for (unsigned k = 0; k < SPRINGS; ++k) {
-            if (seen.spring[k].target_ma != 0) {
-                TEST_ASSERT_EQUAL_UINT16(400, seen.spring[k].target_ma); /* probe_current_a */
-                ++pulses;
-                ticks_of[k] += board_current_a(mega->raw(), k) > 0.3;
-            }
-        }
-        TEST_ASSERT_LESS_OR_EQUAL_UINT(1, pulses);
-    }
-    for (unsigned k = 0; k < SPRINGS; ++k) {
-        TEST_ASSERT_GREATER_THAN_UINT(20, ticks_of[k]);
-        TEST_ASSERT_TRUE(temperature(*mega, k) < 20.5);
-        TEST_ASSERT_EQUAL_DOUBLE(0.0, phase(*mega, k));
-    }
-    mega->expect_ok("$probe_period_s=0");
-    mega->run_ms(100.0);
-    for (int n = 0; n < 50 * 3; ++n) {
-        mega->run_ms(CONTROLLER_TICK_MS);
-        TEST_ASSERT_TRUE(board_all_off(mega->raw()));
-    }
-}
-
 /* After `policy` no target moves by more than 20 mA in a tick until all have arrived. */
 void change_policy(rig &mega, const char *line, int ticks)
 {
@@ -324,7 +295,6 @@ int main()
     RUN_TEST(half_a_level_is_half_a_phase);
     RUN_TEST(own_temperature_derates_then_trips_until_cleared);
     RUN_TEST(springs_around_an_undriven_one_derate_before_it_acts);
-    RUN_TEST(probing_is_one_spring_at_a_time_and_too_small_to_matter);
     RUN_TEST(policy_is_switched_without_a_jump);
     RUN_TEST(readings_lost_in_a_hold_cost_neither_safety_nor_the_neighbours);
     return UNITY_END();

@@ -5,8 +5,9 @@
 #include "loop.h"
 #include "unity.h"
 
-#define SPRINGS 9
-#define CENTRE  4
+#define SPRINGS   9
+#define CENTRE    4
+#define HOTTEST_C 120.0 /* that any spring may ever be */
 
 static controller_settings_t settings;
 static loop_options_t options;
@@ -30,10 +31,19 @@ void tearDown(void)
     plant_destroy(plant);
 }
 
-static void start(void)
+/* The power comes on. Nothing is known of any spring. */
+static void power_on(void)
 {
     loop = loop_create(&settings, plant, &options, 5, NULL);
     TEST_ASSERT_NOT_NULL(loop);
+}
+
+/* The same with the hint `model cold`, where a test is about what the drive does and not about how
+ * it begins: a spring then heats at once. */
+static void start_cold(void)
+{
+    power_on();
+    controller_set_temperature(loop_controller(loop), 20 * 128);
 }
 
 static void want(int spring, uint16_t permille)
@@ -50,7 +60,7 @@ static void want_all_but(int spring)
 
 /* In every tick of every test: what is asked of the supply is within its limit less the reserve,
  * what flows is within its limit but for an overshoot of 1 % while loops settle (safety trips after
- * five such ticks), and a spring that is not to be driven gets nothing but a probing pulse. */
+ * five such ticks), and a spring that is not to be driven gets nothing. */
 static void check_tick(void)
 {
     const controller_t *controller = loop_controller(loop);
@@ -60,9 +70,8 @@ static void check_tick(void)
         unsigned target_ma = controller_target_ma(controller, k);
         sum_ma += target_ma;
         TEST_ASSERT_LESS_OR_EQUAL_UINT(settings.current.maximum_current_ma, target_ma);
-        if (controller_level_permille(controller, k) == 0 && target_ma != 0) {
-            TEST_ASSERT_TRUE(settings.policy.probe_period_s != 0);
-            TEST_ASSERT_EQUAL_UINT(settings.policy.probe_current_ma, target_ma);
+        if (controller_level_permille(controller, k) == 0) {
+            TEST_ASSERT_EQUAL_UINT(0, target_ma);
         }
     }
     TEST_ASSERT_LESS_OR_EQUAL_UINT(limit_ma - settings.policy.supply_reserve_ma, sum_ma);
@@ -116,7 +125,7 @@ static unsigned wanted(int spring)
 
 static void eight_are_held_in_the_band_and_the_centre_stays_cold(void)
 {
-    start();
+    power_on();
     want_all_but(CENTRE);
     TEST_ASSERT_TRUE(run(400.0) < 106.0);
     for (int k = 0; k < SPRINGS; k++) {
@@ -131,7 +140,7 @@ static void eight_are_held_in_the_band_and_the_centre_stays_cold(void)
 
 static void held_spring_does_not_feel_its_neighbours(void)
 {
-    start();
+    start_cold();
     want(CENTRE, 1000);
     run(400.0);
     double alone_c = temperature(CENTRE);
@@ -143,13 +152,36 @@ static void held_spring_does_not_feel_its_neighbours(void)
     TEST_ASSERT_TRUE(phase(CENTRE) > 0.98);
 }
 
-static void all_nine_transform_in_turn_within_the_supply(void)
+static void check_all_nine_are_there(void)
 {
-    start();
-    want_all_but(-1);
-    run(90.0);
     for (int k = 0; k < SPRINGS; k++) {
         TEST_ASSERT_TRUE(phase(k) > 0.99);
+    }
+}
+
+static void all_nine_transform_in_turn_within_the_supply(void)
+{
+    start_cold();
+    want_all_but(-1);
+    run(90.0);
+    check_all_nine_are_there();
+}
+
+/* The first start ever: it waits until even a spring of 120 degC would be martensite, and says so.
+ */
+static void all_nine_are_there_after_power_on_with_no_hint(void)
+{
+    power_on();
+    want_all_but(-1);
+    run(1.0);
+    for (int k = 0; k < SPRINGS; k++) {
+        TEST_ASSERT_EQUAL_UINT(0, target(k));
+        TEST_ASSERT_TRUE(limited_by(k, DRIVE_POLICY_LIMIT_COOLING));
+    }
+    run(209.0);
+    check_all_nine_are_there();
+    for (int k = 0; k < SPRINGS; k++) {
+        TEST_ASSERT_FALSE(limited_by(k, DRIVE_POLICY_LIMIT_COOLING));
     }
 }
 
@@ -157,7 +189,7 @@ static void boosts_come_in_the_order_in_which_they_were_asked_for(void)
 {
     settings.safety.supply_limit_ma = 5000;
     settings.policy.overload_current_ma = 5000;
-    start();
+    start_cold();
     want(7, 1000);
     run(1.0);
     want(5, 1000);
@@ -179,7 +211,7 @@ static void boosts_come_in_the_order_in_which_they_were_asked_for(void)
 /* One after the other the sixth would be there at 48 s. */
 static void last_ones_to_heat_take_turns(void)
 {
-    start();
+    start_cold();
     for (int k = 0; k < 6; k++) {
         want(k, 1000);
     }
@@ -191,7 +223,7 @@ static void last_ones_to_heat_take_turns(void)
 
 static void spring_that_loses_its_turn_keeps_what_it_has(void)
 {
-    start();
+    start_cold();
     for (int k = 0; k < 4; k++) {
         want(k, 1000);
     }
@@ -219,7 +251,7 @@ static void check_loss_is_found(double loss)
 {
     plant_set(plant, "loss_w_per_k", 5.8e-3 * loss);
     plant_set(plant, "heat_capacity_j_per_k", 0.300 * loss);
-    start();
+    power_on();
     want_all_but(CENTRE);
     TEST_ASSERT_TRUE(run(500.0) < 115.0);
     for (uint8_t k = 0; k < SPRINGS; k++) {
@@ -260,7 +292,7 @@ static void toggle_at_all_periods(double limit_c)
 {
     static const double period_s[] = {0.1,  0.3,  0.7,  1.5,   3.0,  10.0,
                                       20.0, 40.0, 80.0, 120.0, 300.0};
-    start();
+    power_on();
     for (unsigned n = 0; n < sizeof period_s / sizeof period_s[0]; n++) {
         toggle(period_s[n], 120.0, limit_c);
     }
@@ -272,7 +304,7 @@ static void toggle_at_all_periods(double limit_c)
 
 static void toggling_at_any_period_stays_within_the_limits(void)
 {
-    toggle_at_all_periods(115.0);
+    toggle_at_all_periods(HOTTEST_C);
 }
 
 static void toggling_an_array_that_is_not_the_declared_one_stays_within_the_limits(void)
@@ -287,7 +319,7 @@ static void toggling_an_array_that_is_not_the_declared_one_stays_within_the_limi
     }
     plant_set(plant, "orthogonal_w_per_k", 586e-6 * 1.15);
     options.ambient_error_c = -3.0;
-    toggle_at_all_periods(115.0);
+    toggle_at_all_periods(HOTTEST_C);
 }
 
 static void heats_and_holds_an_alloy_whose_resistance_falls(void)
@@ -296,7 +328,7 @@ static void heats_and_holds_an_alloy_whose_resistance_falls(void)
     plant_set(plant, "resistance_austenite_ohm", 0.175);
     settings.model.resistance_martensite_uohm = 219000;
     settings.model.resistance_austenite_uohm = 175000;
-    start();
+    power_on();
     want(CENTRE, 1000);
     TEST_ASSERT_TRUE(run(400.0) < 110.0);
     TEST_ASSERT_TRUE(phase(CENTRE) > 0.98);
@@ -304,24 +336,25 @@ static void heats_and_holds_an_alloy_whose_resistance_falls(void)
     TEST_ASSERT_TRUE(temperature(CENTRE) < 84.0);
 }
 
+/* Neither sign nor size of the declared change is believed: what is seen is learnt. */
 static void check_wrong_sign(void)
 {
-    start();
+    power_on();
     want(CENTRE, 1000);
-    TEST_ASSERT_TRUE(run(300.0) < 115.0);
+    TEST_ASSERT_TRUE(run(400.0) < 115.0);
     TEST_ASSERT_TRUE(phase(CENTRE) > 0.98);
-    TEST_ASSERT_TRUE(is_blind(CENTRE));
-    TEST_ASSERT_TRUE(temperature(CENTRE) > 87.0 && temperature(CENTRE) < 93.0); /* wider margin */
+    TEST_ASSERT_FALSE(is_blind(CENTRE));
+    TEST_ASSERT_TRUE(temperature(CENTRE) < 84.0);
 }
 
-static void resistance_that_falls_where_it_should_rise_falls_back_to_the_model(void)
+static void resistance_that_falls_where_a_rise_is_declared_is_learnt(void)
 {
     plant_set(plant, "resistance_martensite_ohm", 0.219);
     plant_set(plant, "resistance_austenite_ohm", 0.175);
     check_wrong_sign();
 }
 
-static void resistance_that_rises_where_it_should_fall_falls_back_to_the_model(void)
+static void resistance_that_rises_where_a_fall_is_declared_is_learnt(void)
 {
     settings.model.resistance_martensite_uohm = 219000;
     settings.model.resistance_austenite_uohm = 175000;
@@ -331,7 +364,7 @@ static void resistance_that_rises_where_it_should_fall_falls_back_to_the_model(v
 static void resistance_that_never_changes_falls_back_to_the_model(void)
 {
     plant_set_effect(plant, "resistance_phase", false);
-    start();
+    power_on();
     want(CENTRE, 1000);
     TEST_ASSERT_TRUE(run(300.0) < 125.0); /* the model is the only one to ask, and asked late */
     TEST_ASSERT_TRUE(phase(CENTRE) > 0.98);
@@ -341,7 +374,7 @@ static void resistance_that_never_changes_falls_back_to_the_model(void)
 static void noisy_voltage_is_not_believed(void)
 {
     options.bus_noise_v = 0.2;
-    start();
+    power_on();
     want(CENTRE, 1000);
     TEST_ASSERT_TRUE(run(300.0) < 115.0);
     TEST_ASSERT_TRUE(phase(CENTRE) > 0.98);
@@ -350,7 +383,7 @@ static void noisy_voltage_is_not_believed(void)
 
 static void half_a_level_is_half_a_phase(void)
 {
-    start();
+    start_cold();
     want(CENTRE, 500);
     run(150.0);
     TEST_ASSERT_DOUBLE_WITHIN(0.1, 0.5, phase(CENTRE));
@@ -405,7 +438,7 @@ static void policy_is_switched_at_any_moment_without_a_jump(void)
     settings.policy.dither_ma = 100;
     for (double moment_s = 0.02; moment_s < 200.0; moment_s = moment_s * 1.07 + 0.02) {
         settings.policy.policy = DRIVE_POLICY_PRECOMPENSATE;
-        start();
+        start_cold();
         want_all_but(CENTRE);
         run(moment_s);
         change_policy(DRIVE_POLICY_OPEN);
@@ -423,7 +456,7 @@ static void policy_is_switched_at_any_moment_without_a_jump(void)
 static void own_temperature_derates_and_is_never_exceeded(void)
 {
     settings.policy.temperature_limit_cc = 7000;
-    start();
+    start_cold();
     want_all_but(CENTRE);
     TEST_ASSERT_TRUE(run(60.0) < 70.0);
     for (int k = 0; k < SPRINGS; k++) {
@@ -440,7 +473,7 @@ static void limit_that_takes_everything_trips_that_spring_until_cleared(void)
 {
     settings.policy.trip_time_s = 3;
     settings.policy.temperature_limit_cc = 7000;
-    start();
+    start_cold();
     want(0, 1000);
     run(30.0);
     settings.policy.temperature_limit_cc = 5000;
@@ -467,7 +500,7 @@ static void undriven_spring_stays_below_its_limit_whatever_its_neighbours_want(v
 {
     settings.policy.undriven_margin_cc = 5000; /* 38 degC; unlimited the centre comes to 43 */
     settings.policy.trip_time_s = 0;
-    start();
+    start_cold();
     want_all_but(CENTRE);
     bool limited = false;
     for (int n = 0; n < 600; n++) {
@@ -478,14 +511,14 @@ static void undriven_spring_stays_below_its_limit_whatever_its_neighbours_want(v
         }
     }
     TEST_ASSERT_TRUE(limited);
-    TEST_ASSERT_TRUE(temperature(CENTRE) > 33.0);
+    TEST_ASSERT_TRUE(temperature(CENTRE) > 27.0); /* derated by its upper bound, not given up */
 }
 
 static void board_is_above_its_continuous_current_no_longer_than_it_may(void)
 {
     settings.policy.overload_current_ma = 5000;
     settings.policy.overload_time_s = 20;
-    start();
+    start_cold();
     want_all_but(-1);
     double above_s = 0.0;
     bool said = false;
@@ -501,11 +534,11 @@ static void board_is_above_its_continuous_current_no_longer_than_it_may(void)
     TEST_ASSERT_TRUE(above_s == 0.0);
 }
 
-/* ---- release and probing ---- */
+/* ---- release and return ---- */
 
 static void released_spring_is_martensite_sooner_than_from_105_degrees(void)
 {
-    start();
+    start_cold();
     want_all_but(-1);
     run(400.0);
     want(CENTRE, 0);
@@ -514,21 +547,11 @@ static void released_spring_is_martensite_sooner_than_from_105_degrees(void)
     TEST_ASSERT_TRUE(phase(0) > 0.98);
 }
 
-static void level_80_then_100_is_reached(void)
-{
-    start();
-    want(CENTRE, 800);
-    run(100.0);
-    want(CENTRE, 1000);
-    run(60.0);
-    TEST_ASSERT_TRUE(phase(CENTRE) > 0.98);
-}
-
 static void spring_switched_on_again_is_austenite_again(void)
 {
     static const double off_s[] = {0.02, 1.0, 5.0, 30.0, 200.0};
     for (unsigned n = 0; n < sizeof off_s / sizeof off_s[0]; n++) {
-        start();
+        start_cold();
         want_all_but(-1);
         run(120.0);
         want(CENTRE, 0);
@@ -539,185 +562,6 @@ static void spring_switched_on_again_is_austenite_again(void)
         loop_destroy(loop);
     }
     loop = NULL;
-}
-
-static void probing_is_one_undriven_spring_at_a_time_and_too_small_to_matter(void)
-{
-    settings.policy.probe_period_s = 2;
-    start();
-    for (int k = 0; k < 4; k++) {
-        want(k, 1000);
-    }
-    unsigned pulse_ticks[SPRINGS] = {0};
-    for (int n = 0; n < 50 * 300; n++) {
-        run(LOOP_TICK_S);
-        unsigned pulses = 0;
-        for (int k = 4; k < SPRINGS; k++) {
-            pulses += target(k) != 0;
-            pulse_ticks[k] += target(k) != 0;
-        }
-        TEST_ASSERT_LESS_OR_EQUAL_UINT(1, pulses);
-    }
-    double with_c[SPRINGS];
-    for (int k = 0; k < SPRINGS; k++) {
-        with_c[k] = temperature(k);
-    }
-    loop_destroy(loop);
-    settings.policy.probe_period_s = 0;
-    start();
-    for (int k = 0; k < 4; k++) {
-        want(k, 1000);
-    }
-    run(300.0);
-    for (int k = 4; k < SPRINGS; k++) {
-        TEST_ASSERT_TRUE(phase(k) == 0.0);
-        TEST_ASSERT_DOUBLE_WITHIN(1.0, temperature(k), with_c[k]);
-        TEST_ASSERT_GREATER_THAN_UINT(50 * 10, pulse_ticks[k]);
-        TEST_ASSERT_LESS_THAN_UINT(50 * 60, pulse_ticks[k]);
-    }
-}
-
-/* ---- readings that lie: a loop of its own, in which they can ---- */
-
-typedef enum { HONEST, STUCK_VOLTAGE, NOISY_VOLTAGE, ABSENT_NOW_AND_THEN, ABSENT } lie_t;
-
-static struct {
-    controller_t controller;
-    controller_inputs_t inputs;
-    controller_outputs_t outputs;
-    int16_t stuck_mv;
-    uint32_t random;
-    unsigned tick;
-} liar;
-
-static void start_liar(uint16_t neighbours_permille)
-{
-    liar.random = 3;
-    liar.tick = 0;
-    liar.outputs = (controller_outputs_t){.fan_percent = 0};
-    liar.inputs = (controller_inputs_t){.ambient_c7 = 20 * 128};
-    TEST_ASSERT_TRUE(controller_init(&liar.controller, &settings, liar.inputs.ambient_c7, NULL));
-    for (uint8_t k = 0; k < SPRINGS; k++) {
-        TEST_ASSERT_TRUE(
-            controller_set_target(&liar.controller, k, k == CENTRE ? 1000 : neighbours_permille));
-    }
-}
-
-static void tell_a_lie(lie_t lie)
-{
-    controller_sensor_t *sensor = &liar.inputs.sensor[CENTRE];
-    if (lie != STUCK_VOLTAGE) {
-        liar.stuck_mv = sensor->voltage_mv;
-    }
-    switch (lie) {
-    case HONEST:
-        break;
-    case STUCK_VOLTAGE:
-        sensor->voltage_mv = liar.stuck_mv;
-        break;
-    case NOISY_VOLTAGE: /* evenly within +-40 mV */
-        liar.random = liar.random * 1664525u + 1013904223u;
-        sensor->voltage_mv =
-            (int16_t)(sensor->voltage_mv + 4 * ((int)((liar.random >> 8) % 21u) - 10));
-        break;
-    case ABSENT_NOW_AND_THEN:
-        if (liar.tick % 5 == 0) {
-            sensor->status = CONTROLLER_SENSOR_ABSENT;
-        }
-        break;
-    case ABSENT:
-        sensor->status = CONTROLLER_SENSOR_ABSENT;
-        break;
-    }
-}
-
-/* Returns the highest temperature of the centre, whose sensor lies. */
-static double run_liar(double seconds, lie_t lie)
-{
-    double highest_c = -100.0;
-    for (long n = lround(seconds / LOOP_TICK_S); n > 0; n--) {
-        liar.tick++;
-        double sum_a = 0.0;
-        for (int k = 0; k < SPRINGS; k++) {
-            double ohm = plant_resistance_ohm(plant, k);
-            double current_a = 5.0 * liar.outputs.duty[k] / CONTROLLER_DUTY_MAX / (ohm + 0.18);
-            liar.inputs.sensor[k] =
-                (controller_sensor_t){.status = CONTROLLER_SENSOR_OK,
-                                      .current_ma = (int16_t)lround(1000.0 * current_a),
-                                      .voltage_mv = (int16_t)(4 * lround(250.0 * current_a * ohm))};
-            plant_drive(plant, k, PLANT_DRIVE_POWER, current_a * current_a * ohm);
-            sum_a += current_a;
-        }
-        TEST_ASSERT_TRUE(sum_a <= 15.0);
-        tell_a_lie(lie);
-        plant_step(plant, LOOP_TICK_S);
-        controller_tick(&liar.controller, &liar.inputs, &liar.outputs);
-        highest_c = fmax(highest_c, plant_temperature_c(plant, CENTRE));
-    }
-    return highest_c;
-}
-
-static bool liar_is_blind(void)
-{
-    return (controller_limits(&liar.controller, CENTRE) & DRIVE_POLICY_LIMIT_BLIND) != 0;
-}
-
-static void voltage_that_becomes_noisy_in_a_hold_is_let_go_and_taken_again(void)
-{
-    start_liar(0);
-    run_liar(120.0, HONEST);
-    TEST_ASSERT_FALSE(liar_is_blind());
-    TEST_ASSERT_TRUE(plant_temperature_c(plant, CENTRE) < 86.0); /* the margin has narrowed */
-    run_liar(10.0, NOISY_VOLTAGE);
-    TEST_ASSERT_TRUE(liar_is_blind());
-    TEST_ASSERT_TRUE(run_liar(200.0, NOISY_VOLTAGE) < 115.0);
-    TEST_ASSERT_TRUE(liar_is_blind());
-    TEST_ASSERT_TRUE(plant_austenite(plant, CENTRE) > 0.98);
-    TEST_ASSERT_DOUBLE_WITHIN(3.0, 90.0, plant_temperature_c(plant, CENTRE)); /* wider margin */
-    run_liar(100.0, HONEST);
-    TEST_ASSERT_FALSE(liar_is_blind());
-    TEST_ASSERT_TRUE(plant_austenite(plant, CENTRE) > 0.98);
-    TEST_ASSERT_TRUE(plant_temperature_c(plant, CENTRE) < 100.0);
-}
-
-static void voltage_that_sticks_in_a_hold_is_let_go(void)
-{
-    start_liar(0);
-    run_liar(40.0, HONEST);
-    TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_HOLD, drive_policy_stage(&liar.controller.policy, CENTRE));
-    TEST_ASSERT_TRUE(run_liar(300.0, STUCK_VOLTAGE) < 115.0);
-    TEST_ASSERT_TRUE(liar_is_blind());
-    TEST_ASSERT_TRUE(plant_austenite(plant, CENTRE) > 0.98);
-    run_liar(30.0, HONEST); /* the model follows again */
-    TEST_ASSERT_DOUBLE_WITHIN(4.0, plant_temperature_c(plant, CENTRE),
-                              controller_temperature_c7(&liar.controller, CENTRE) / 128.0);
-}
-
-static void readings_that_fail_now_and_then_do_no_harm(void)
-{
-    static const double from_s[] = {1.0, 20.0, 40.0, 150.0};
-    for (unsigned n = 0; n < sizeof from_s / sizeof from_s[0]; n++) {
-        plant_reset(plant);
-        start_liar(0);
-        run_liar(from_s[n], HONEST);
-        TEST_ASSERT_TRUE(run_liar(300.0, ABSENT_NOW_AND_THEN) < 115.0);
-        TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, controller_fault(&liar.controller, CENTRE));
-        TEST_ASSERT_TRUE(plant_austenite(plant, CENTRE) > 0.98);
-    }
-}
-
-static void spring_without_readings_is_off_and_the_others_are_held(void)
-{
-    start_liar(1000);
-    run_liar(150.0, HONEST);
-    run_liar(0.5, ABSENT);
-    TEST_ASSERT_EQUAL(SAFETY_FAULT_SENSOR_ABSENT, controller_fault(&liar.controller, CENTRE));
-    TEST_ASSERT_EQUAL_UINT16(0, liar.outputs.duty[CENTRE]);
-    run_liar(150.0, ABSENT);
-    for (int k = 0; k < SPRINGS; k++) {
-        TEST_ASSERT_TRUE(k == CENTRE || plant_austenite(plant, k) > 0.98);
-        TEST_ASSERT_TRUE(plant_temperature_c(plant, k) < 100.0);
-    }
 }
 
 /* Ends the loop. The message has two numbers that say which case it is, and the phase. */
@@ -735,7 +579,7 @@ static void spring_switched_on_again_after_seconds_is_austenite_again(void)
 {
     for (int alone = 0; alone < 2; alone++) {
         for (double off_s = 4.0; off_s <= 20.0; off_s += 1.0) {
-            start();
+            start_cold();
             want_all_but(-1);
             for (int k = 0; alone && k < SPRINGS; k++) {
                 want(k, k == CENTRE ? 1000 : 0);
@@ -749,94 +593,11 @@ static void spring_switched_on_again_after_seconds_is_austenite_again(void)
     loop = NULL;
 }
 
-/* From a level the phase goes on only where it left the transformation: until then nothing moves.
- */
-static void full_is_reached_from_any_level_at_any_moment(void)
-{
-    for (uint16_t level = 300; level <= 800; level = (uint16_t)(level + 250u)) {
-        for (double from_s = 80.0; from_s < 290.0; from_s += 14.0) {
-            plant_reset(plant);
-            start();
-            want(CENTRE, level);
-            run(from_s);
-            check_full_in_a_minute("level %.0f for %.0f s: phase %.3f", level, from_s);
-        }
-    }
-    loop = NULL;
-}
-
-/* It may take until the search has gone past martensite start for nothing, and then the slow way
- * back. */
-static void check_stuck_resistance(double from_s, double ohm)
-{
-    start();
-    want(CENTRE, 1000);
-    run(from_s);
-    plant_set(loop_plant(loop), "resistance_martensite_ohm[5]", ohm);
-    plant_set(loop_plant(loop), "resistance_austenite_ohm[5]", ohm + 1e-6);
-    double highest_c = run(1200.0);
-    char where[80];
-    (void)snprintf(where, sizeof where, "from %.0f s: highest %.1f phase %.3f blind %d", from_s,
-                   highest_c, phase(CENTRE), is_blind(CENTRE));
-    TEST_ASSERT_TRUE_MESSAGE(highest_c < 115.0 && phase(CENTRE) > 0.98 && is_blind(CENTRE), where);
-}
-
-static void resistance_that_sticks_at_austenite_in_a_hold_is_let_go(void)
-{
-    check_stuck_resistance(60.0, 0.219);
-}
-
-static void resistance_that_sticks_at_martensite_in_a_hold_is_let_go(void)
-{
-    check_stuck_resistance(60.0, 0.175);
-}
-
-static void resistance_that_sticks_between_in_a_hold_is_let_go(void)
-{
-    check_stuck_resistance(60.0, 0.190);
-}
-
-static void voltage_that_sticks_at_any_moment_of_a_hold_is_let_go(void)
-{
-    for (double from_s = 40.0; from_s < 300.0; from_s += 17.0) {
-        plant_reset(plant);
-        start_liar(0);
-        run_liar(from_s, HONEST);
-        double highest_c = run_liar(200.0, STUCK_VOLTAGE);
-        char where[80];
-        bool held = plant_austenite(plant, CENTRE) > 0.98 && liar_is_blind();
-        safety_fault_t fault = controller_fault(&liar.controller, CENTRE);
-        bool off = fault == SAFETY_FAULT_HIGH_RESISTANCE || fault == SAFETY_FAULT_SHORT_SPRING;
-        (void)snprintf(where, sizeof where, "from %.0f s: highest %.1f phase %.3f blind %d off %d",
-                       from_s, highest_c, plant_austenite(plant, CENTRE), liar_is_blind(), off);
-        TEST_ASSERT_TRUE_MESSAGE(highest_c < 115.0 && (held || off), where);
-    }
-}
-
-static void voltage_that_was_noisy_is_no_false_crossing(void)
-{
-    for (double from_s = 40.0; from_s < 300.0; from_s += 17.0) {
-        plant_reset(plant);
-        start_liar(0);
-        run_liar(from_s, HONEST);
-        double highest_c = run_liar(200.0, NOISY_VOLTAGE);
-        run_liar(200.0, HONEST);
-        double end_c = plant_temperature_c(plant, CENTRE);
-        run_liar(30.0, HONEST); /* longer than heating back what a crossing has cost */
-        end_c = fmin(end_c, plant_temperature_c(plant, CENTRE));
-        char where[80];
-        (void)snprintf(where, sizeof where, "from %.0f s: highest %.1f, then %.1f phase %.3f",
-                       from_s, highest_c, end_c, plant_austenite(plant, CENTRE));
-        TEST_ASSERT_TRUE_MESSAGE(
-            highest_c < 115.0 && plant_austenite(plant, CENTRE) > 0.98 && end_c < 95.0, where);
-    }
-}
-
 static void smaller_change_of_resistance_does_not_overheat(void)
 {
     for (double change = 0.85; change < 1.16; change += 0.05) { /* of the declared one */
         plant_set(plant, "resistance_austenite_ohm", 0.175 + 0.044 * change);
-        start();
+        power_on();
         want(CENTRE, 1000);
         double highest_c = run(600.0);
         char where[80];
@@ -860,9 +621,8 @@ static uint32_t random_below(uint32_t limit)
 static void everything_at_once_stays_within_the_limits(void)
 {
     random_state = 11;
-    settings.policy.probe_period_s = 5;
     options.ambient_error_c = 2.0;
-    start();
+    power_on();
     controller_t *controller = loop_controller(loop);
     for (int n = 0; n < 1500; n++) {
         switch (random_below(8)) {
@@ -890,6 +650,7 @@ int main(void)
     RUN_TEST(eight_are_held_in_the_band_and_the_centre_stays_cold);
     RUN_TEST(held_spring_does_not_feel_its_neighbours);
     RUN_TEST(all_nine_transform_in_turn_within_the_supply);
+    RUN_TEST(all_nine_are_there_after_power_on_with_no_hint);
     RUN_TEST(boosts_come_in_the_order_in_which_they_were_asked_for);
     RUN_TEST(last_ones_to_heat_take_turns);
     RUN_TEST(spring_that_loses_its_turn_keeps_what_it_has);
@@ -898,12 +659,11 @@ int main(void)
     RUN_TEST(toggling_at_any_period_stays_within_the_limits);
     RUN_TEST(toggling_an_array_that_is_not_the_declared_one_stays_within_the_limits);
     RUN_TEST(heats_and_holds_an_alloy_whose_resistance_falls);
-    RUN_TEST(resistance_that_falls_where_it_should_rise_falls_back_to_the_model);
-    RUN_TEST(resistance_that_rises_where_it_should_fall_falls_back_to_the_model);
+    RUN_TEST(resistance_that_falls_where_a_rise_is_declared_is_learnt);
+    RUN_TEST(resistance_that_rises_where_a_fall_is_declared_is_learnt);
     RUN_TEST(resistance_that_never_changes_falls_back_to_the_model);
     RUN_TEST(noisy_voltage_is_not_believed);
     RUN_TEST(half_a_level_is_half_a_phase);
-    RUN_TEST(level_80_then_100_is_reached);
     RUN_TEST(policy_is_switched_at_any_moment_without_a_jump);
     RUN_TEST(own_temperature_derates_and_is_never_exceeded);
     RUN_TEST(limit_that_takes_everything_trips_that_spring_until_cleared);
@@ -911,18 +671,7 @@ int main(void)
     RUN_TEST(board_is_above_its_continuous_current_no_longer_than_it_may);
     RUN_TEST(released_spring_is_martensite_sooner_than_from_105_degrees);
     RUN_TEST(spring_switched_on_again_is_austenite_again);
-    RUN_TEST(probing_is_one_undriven_spring_at_a_time_and_too_small_to_matter);
-    RUN_TEST(voltage_that_becomes_noisy_in_a_hold_is_let_go_and_taken_again);
-    RUN_TEST(voltage_that_sticks_in_a_hold_is_let_go);
-    RUN_TEST(readings_that_fail_now_and_then_do_no_harm);
-    RUN_TEST(spring_without_readings_is_off_and_the_others_are_held);
     RUN_TEST(spring_switched_on_again_after_seconds_is_austenite_again);
-    RUN_TEST(full_is_reached_from_any_level_at_any_moment);
-    RUN_TEST(resistance_that_sticks_at_austenite_in_a_hold_is_let_go);
-    RUN_TEST(resistance_that_sticks_at_martensite_in_a_hold_is_let_go);
-    RUN_TEST(resistance_that_sticks_between_in_a_hold_is_let_go);
-    RUN_TEST(voltage_that_sticks_at_any_moment_of_a_hold_is_let_go);
-    RUN_TEST(voltage_that_was_noisy_is_no_false_crossing);
     RUN_TEST(smaller_change_of_resistance_does_not_overheat);
     RUN_TEST(everything_at_once_stays_within_the_limits);
     return UNITY_END();

@@ -9,6 +9,7 @@
 #include "controller.h"
 
 #define SPRINGS 9
+#define UNKNOWN INT16_MIN /* a temperature: the power has just come on */
 
 static controller_settings_t settings;
 static controller_t controller;
@@ -118,8 +119,12 @@ static void start(drive_policy_kind_t policy, int16_t temperature_c7)
     if (!controller_init(&controller, &settings, 20 * 128, 0)) {
         failures = 1;
     }
-    for (uint8_t k = 0; k < SPRINGS; k++) { /* each at its own place of the transformation */
+    for (uint8_t k = 0; temperature_c7 != UNKNOWN && k < SPRINGS; k++) {
+        /* each at its own place of the transformation */
         thermal_model_set_temperature(&controller.model, k, (int16_t)(temperature_c7 + k * 64));
+    }
+    if (temperature_c7 != UNKNOWN) { /* else they wait, or look */
+        spring_estimator_trust_model(&controller.policy.estimator, &controller.model);
     }
 }
 
@@ -170,6 +175,22 @@ static void faults(drive_policy_kind_t policy)
     }
 }
 
+/* Springs of which all was learnt before, warm: they look, then all go on at once. */
+static void power_on(void)
+{
+    const spring_learnt_t learnt = {.austenite_ohm = 0.219f,
+                                    .change = 0.2f,
+                                    .martensite_ohm = 0.175f,
+                                    .martensite_rise_per_k = 0.0005f,
+                                    .loss_sd_w_per_k = 0.0003f};
+    start(DRIVE_POLICY_PRECOMPENSATE, UNKNOWN);
+    for (uint8_t k = 0; k < SPRINGS; k++) {
+        spring_estimator_restore(&controller.policy.estimator, k, &learnt);
+    }
+    all(1000);
+    run(300);
+}
+
 static void drive(drive_policy_kind_t policy)
 {
     start(policy, 82 * 128);
@@ -193,9 +214,9 @@ static void drive(drive_policy_kind_t policy)
 int main(void)
 {
     controller_settings_default(&settings);
-    settings.policy.probe_period_s = 1;
     drive(DRIVE_POLICY_OPEN);
     drive(DRIVE_POLICY_PRECOMPENSATE);
+    power_on();
     faults(DRIVE_POLICY_OPEN);
     faults(DRIVE_POLICY_PRECOMPENSATE);
     settings.policy.open_current_ma = 3000; /* more than the supply has, in every tick */

@@ -1,0 +1,154 @@
+#include "one_spring.h"
+
+#include <math.h>
+
+truth_t truth;
+sensor_t sensor;
+spring_estimator_t estimator;
+thermal_model_t model;
+
+static unsigned count;
+static double power_sum_w;
+static int16_t frozen_ma, frozen_mv;
+static uint32_t random_state;
+
+static uint32_t random_bits(void)
+{
+    random_state = random_state * 1664525u + 1013904223u;
+    return random_state >> 8;
+}
+
+void power_comes_on(void)
+{
+    thermal_model_parameters_t p;
+    thermal_model_parameters_default(&p);
+    p.rows = p.columns = 1;
+    (void)thermal_model_init(&model, &p, NULL);
+    spring_estimator_init(&estimator, &model);
+    truth = (truth_t){.capacity_j_per_k = p.heat_capacity_mj_per_k * 1e-3,
+                      .loss_w_per_k = p.loss_uw_per_k * 1e-6,
+                      .latent_j = 8.65,
+                      .martensite_ohm = p.resistance_martensite_uohm * 1e-6,
+                      .ratio = 1.25,
+                      .noise_v = 0.004,
+                      .temperature_c = 20.0};
+    sensor = SENSOR_GOOD;
+    count = 0;
+    power_sum_w = 0.0;
+    random_state = 5;
+}
+
+void begin_cold(void)
+{
+    power_comes_on();
+    thermal_model_reset(&model, 20 * 128);
+    spring_estimator_trust_model(&estimator, &model);
+}
+
+static double share(double from_c, double to_c)
+{
+    const double at = (truth.temperature_c - truth.shift_k - from_c) / (to_c - from_c);
+    return at < 0.0 ? 0.0 : at > 1.0 ? 1.0 : at;
+}
+
+static void live(double power_w)
+{
+    const double heat_j = (power_w - truth.loss_w_per_k * (truth.temperature_c - 20.0)) * TICK_S;
+    const double formed = share(88.0, 98.0);
+    const double kept = share(68.0, 78.0);
+    const bool transforms = (heat_j > 0.0 && formed >= truth.austenite && formed < 1.0 &&
+                             truth.temperature_c - truth.shift_k >= 88.0) ||
+                            (heat_j < 0.0 && kept <= truth.austenite && kept > 0.0 &&
+                             truth.temperature_c - truth.shift_k <= 78.0);
+    truth.temperature_c +=
+        heat_j / (truth.capacity_j_per_k + (transforms ? truth.latent_j / 10.0 : 0.0));
+    truth.austenite = fmin(fmax(truth.austenite, share(88.0, 98.0)), share(68.0, 78.0));
+}
+
+double resistance_ohm(void)
+{
+    return truth.martensite_ohm * (1.0 + (truth.ratio - 1.0) * truth.austenite) *
+           (1.0 + truth.rise_per_k * (truth.temperature_c - 20.0));
+}
+
+double distance_k(void)
+{
+    return truth.temperature_c - truth.shift_k - 78.0;
+}
+
+static void read_sensor(double current_a, int16_t *ma, int16_t *mv)
+{
+    const double noise_v = truth.noise_v * ((double)(random_bits() % 2001u) / 1000.0 - 1.0);
+    switch (sensor) {
+    case SENSOR_GOOD:
+        frozen_ma = (int16_t)lround(1000.0 * current_a);
+        frozen_mv = (int16_t)(4 * lround(250.0 * (current_a * resistance_ohm() + noise_v)));
+        break;
+    case SENSOR_FROZEN:
+        break;
+    case SENSOR_SILENT:
+    case SENSOR_ZERO:
+        *ma = *mv = 0;
+        return;
+    case SENSOR_WILD:
+        *ma = (int16_t)((int32_t)(random_bits() % 65536u) - 32768);
+        *mv = (int16_t)((int32_t)(random_bits() % 65536u) - 32768);
+        return;
+    }
+    *ma = frozen_ma;
+    *mv = frozen_mv;
+}
+
+bool tick(double current_a)
+{
+    int16_t ma, mv;
+    live(current_a * current_a * resistance_ohm());
+    read_sensor(current_a, &ma, &mv);
+    if (sensor != SENSOR_SILENT) {
+        spring_estimator_take(&BELIEF, ma, mv);
+    }
+    power_sum_w += ma > 0 && mv > 0 ? 1e-6 * ma * mv : 0.0;
+    count++;
+    if (count % 5u == 0) {
+        const uint32_t power_uw = spring_estimator_model_power_uw(
+            &estimator, &model, 0, (uint32_t)(power_sum_w * 1e6 / 5.0));
+        thermal_model_step(&model, &power_uw);
+        power_sum_w = 0.0;
+    }
+    /* a turn each 0.25 s: 12 ticks, then 13 */
+    if (count % 25u == 0 || count % 25u == 12u) {
+        spring_estimator_update(&estimator, &model, 0);
+        return true;
+    }
+    return false;
+}
+
+void ticks(double current_a, double seconds)
+{
+    for (long n = lround(seconds / TICK_S); n > 0; n--) {
+        (void)tick(current_a);
+    }
+}
+
+double heat(double most_s)
+{
+    double time_s = 0.0;
+    spring_estimator_disturb(&BELIEF);
+    spring_estimator_begin_heating(&estimator, 0);
+    while (time_s < most_s && !spring_estimator_has_transformed(&estimator, &model, 0)) {
+        (void)tick(3.0);
+        time_s += TICK_S;
+    }
+    return time_s;
+}
+
+double hold_current_a(double margin_k)
+{
+    const float target_c = spring_transformation(&model, 0).martensite_start_c + (float)margin_k;
+    const float now_c = (float)thermal_model_temperature_c7(&model, 0) / 128.0f;
+    const float power_w = spring_estimator_hold_w(&estimator, &model, 0, target_c) +
+                          fmaxf(target_c - now_c, -20.0f) * estimator.heat_capacity_j_per_k / 4.0f;
+    const unsigned place = count % 32u;
+    const double dither_a = 0.3 * ((double)(place < 16u ? place : 31u - place) / 16.0 - 0.5);
+    return fmax(1e-3 * spring_estimator_current_ma(&estimator, 0, power_w) + dither_a, 0.4);
+}

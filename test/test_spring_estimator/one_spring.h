@@ -1,0 +1,45 @@
+/* What it is for: one spring as it is, its sensor, and the estimator that reads it.
+ * What it owns: the truth: temperature, phase (straight lines over temperature, not the model's
+ * cosine), resistance. What it never does: decide, but for the plain heating and hold below. */
+#ifndef ONE_SPRING_H
+#define ONE_SPRING_H
+
+#include "spring_estimator.h"
+
+#define TICK_S 0.02
+
+typedef struct {
+    double capacity_j_per_k, loss_w_per_k, latent_j;
+    double martensite_ohm; /* at 20 degC */
+    double ratio;          /* austenite over martensite, at one temperature */
+    double rise_per_k;     /* of both */
+    double shift_k;        /* of all four transformation temperatures */
+    double noise_v;        /* evenly within +- so much, of one reading of the voltage */
+    double temperature_c, austenite;
+} truth_t;
+
+typedef enum { SENSOR_GOOD, SENSOR_SILENT, SENSOR_FROZEN, SENSOR_ZERO, SENSOR_WILD } sensor_t;
+
+extern truth_t truth;
+extern sensor_t sensor;
+extern spring_estimator_t estimator;
+extern thermal_model_t model;
+#define BELIEF (estimator.spring[0])
+
+/* The declared spring at 20 degC, and an estimator that knows nothing of it. */
+void power_comes_on(void);
+/* And that it is told that the spring is cold. */
+void begin_cold(void);
+
+/* One tick with a current; true in a tick in which the estimator had its turn. */
+bool tick(double current_a);
+void ticks(double current_a, double seconds);
+/* 3 A until it has transformed as far as the estimator knows; returns s, or `most_s`. */
+double heat(double most_s);
+/* Current that holds it where the estimator has `margin_k` above martensite start, with the dither
+ * of the drive. */
+double hold_current_a(double margin_k);
+double resistance_ohm(void);
+double distance_k(void); /* true, to the true martensite start */
+
+#endif

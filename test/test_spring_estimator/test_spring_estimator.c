@@ -1,0 +1,452 @@
+/* What is believed of one spring against the spring as it is. */
+#include <math.h>
+#include <stdio.h>
+
+#include "one_spring.h"
+#include "unity.h"
+
+static char where[120];
+
+void setUp(void)
+{
+    begin_cold();
+}
+
+void tearDown(void) {}
+
+static double heat_then_hold(double most_s)
+{
+    const double took_s = heat(most_s);
+    spring_estimator_disturb(&BELIEF);
+    spring_estimator_begin_hold(&estimator, &model, 0, true);
+    return took_s;
+}
+
+/* Narrows the margin until phase is seen to be lost; returns the sd of the turn before, K. */
+static float search(double from_k, double most_s)
+{
+    float sd_k = spring_estimator_sd_k(&BELIEF);
+    double margin_k = from_k;
+    for (double s = 0.0; s < most_s && BELIEF.lost == 0.0f; s += TICK_S) {
+        sd_k = spring_estimator_sd_k(&BELIEF);
+        margin_k -= BELIEF.quiet > 45 && BELIEF.losing == 0 ? 0.08 * TICK_S : 0.0;
+        (void)tick(hold_current_a(margin_k));
+    }
+    return sd_k;
+}
+
+/* ---- power-on ---- */
+
+static void at_power_on_everything_is_possible(void)
+{
+    power_comes_on();
+    TEST_ASSERT_EQUAL_UINT8(SPRING_PHASE_ANY, BELIEF.possible);
+    const spring_bounds_t c = spring_estimator_temperature_c(&estimator, &model, 0);
+    TEST_ASSERT_TRUE(c.low <= 20.0f && c.high >= SPRING_ESTIMATOR_HOTTEST_C);
+    const spring_bounds_t austenite = spring_estimator_austenite(&estimator, &model, 0);
+    TEST_ASSERT_TRUE(austenite.low == 0.0f && austenite.high == 1.0f);
+}
+
+/* From the hottest that it may be, with its latent heat. */
+static void it_is_cold_only_after_the_time_that_physics_needs(void)
+{
+    for (double loss = 0.85; loss < 1.2; loss += 0.15) {
+        power_comes_on();
+        truth.temperature_c = SPRING_ESTIMATOR_HOTTEST_C;
+        truth.austenite = 1.0;
+        truth.loss_w_per_k *= loss;
+        const double said_s = spring_estimator_cooling_s(&estimator, &model, 0);
+        double took_s = 0.0;
+        while (BELIEF.possible != SPRING_PHASE_MARTENSITE && took_s < 300.0) {
+            (void)tick(0.0);
+            took_s += TICK_S;
+        }
+        (void)snprintf(where, sizeof where, "loss x %.2f: said %.0f s, took %.0f s: %.1f degC",
+                       loss, said_s, took_s, truth.temperature_c);
+        TEST_ASSERT_TRUE_MESSAGE(truth.temperature_c < 68.0 && truth.austenite == 0.0, where);
+        TEST_ASSERT_TRUE_MESSAGE(took_s < 100.0 && fabs(said_s - took_s) < 0.25 * took_s, where);
+        TEST_ASSERT_EQUAL_FLOAT(0.0f, spring_estimator_cooling_s(&estimator, &model, 0));
+    }
+}
+
+/* ---- a heating ---- */
+
+static void check_transformation_is_seen(double ratio, double rise_per_k)
+{
+    begin_cold();
+    truth.ratio = ratio;
+    truth.rise_per_k = rise_per_k;
+    double began_at = -1.0;
+    ticks(3.0, 1.0);
+    spring_estimator_begin_heating(&estimator, 0);
+    for (double s = 0.0; s < 60.0 && !spring_estimator_has_transformed(&estimator, &model, 0);
+         s += TICK_S) {
+        (void)tick(3.0);
+        began_at = began_at < 0.0 && BELIEF.onset ? truth.austenite : began_at;
+    }
+    (void)snprintf(where, sizeof where,
+                   "ratio %.2f, %.4f per K: onset at %.2f, end at %.3f, %.1f C", ratio, rise_per_k,
+                   began_at, truth.austenite, truth.temperature_c);
+    TEST_ASSERT_TRUE_MESSAGE(began_at > 0.0 && began_at < 0.5, where);
+    TEST_ASSERT_TRUE_MESSAGE(truth.austenite > 0.99 && truth.temperature_c < 112.0, where);
+    spring_estimator_begin_hold(&estimator, &model, 0, true);
+    TEST_ASSERT_FALSE_MESSAGE(BELIEF.blind, where);
+    TEST_ASSERT_EQUAL_UINT8_MESSAGE(SPRING_PHASE_AUSTENITE, BELIEF.possible, where);
+    TEST_ASSERT_FLOAT_WITHIN(0.01f * (float)resistance_ohm(), (float)resistance_ohm(),
+                             BELIEF.learnt.austenite_ohm);
+    TEST_ASSERT_FLOAT_WITHIN(0.04f, (float)(1.0 - 1.0 / ratio), BELIEF.learnt.change);
+}
+
+static void transformation_is_seen_whatever_its_sign_and_size(void)
+{
+    check_transformation_is_seen(1.25, 0.0);
+    check_transformation_is_seen(1.40, 0.0);
+    check_transformation_is_seen(0.85, 0.0);
+    check_transformation_is_seen(1.25, 0.0010);
+    check_transformation_is_seen(0.85, 0.0005);
+}
+
+static void transformation_is_seen_through_noise(void)
+{
+    begin_cold();
+    truth.noise_v = 0.016; /* four steps of the sensor */
+    (void)heat_then_hold(60.0);
+    TEST_ASSERT_TRUE(truth.austenite > 0.99 && truth.temperature_c < 115.0);
+    TEST_ASSERT_FALSE(BELIEF.blind);
+}
+
+/* No change, or a temperature coefficient alone (of those in print), is no transformation. */
+static void coefficient_alone_is_never_an_onset(void)
+{
+    static const double rise_per_k[] = {-0.0003, 0.0, 0.0004, 0.0010, 0.0015};
+    for (unsigned n = 0; n < sizeof rise_per_k / sizeof rise_per_k[0]; n++) {
+        for (int noisy = 0; noisy < 2; noisy++) {
+            begin_cold();
+            truth.ratio = 1.0;
+            truth.rise_per_k = rise_per_k[n];
+            truth.noise_v = noisy ? 0.016 : 0.0;
+            spring_estimator_begin_heating(&estimator, 0);
+            for (double s = 0.0;
+                 s < 60.0 && !spring_estimator_has_transformed(&estimator, &model, 0);
+                 s += TICK_S) {
+                (void)tick(3.0);
+                (void)snprintf(where, sizeof where, "%.4f per K, noisy %d: %.1f degC",
+                               rise_per_k[n], noisy, truth.temperature_c);
+                TEST_ASSERT_FALSE_MESSAGE(BELIEF.onset, where);
+            }
+            TEST_ASSERT_TRUE_MESSAGE(truth.austenite > 0.95 && truth.temperature_c < 125.0, where);
+            spring_estimator_begin_hold(&estimator, &model, 0, true);
+            TEST_ASSERT_TRUE_MESSAGE(BELIEF.blind, where);
+            TEST_ASSERT_FALSE(spring_estimator_sees(&BELIEF));
+        }
+    }
+}
+
+/* ---- bounds ---- */
+
+static unsigned seen, within_distance, within_temperature, within_phase;
+
+static bool holds(spring_bounds_t bounds, double value)
+{
+    return bounds.low <= (float)value && (float)value <= bounds.high;
+}
+
+static void count_bounds(void)
+{
+    seen++;
+    within_distance += holds(spring_estimator_distance_k(&estimator, &model, 0), distance_k());
+    within_temperature +=
+        holds(spring_estimator_temperature_c(&estimator, &model, 0), truth.temperature_c);
+    within_phase += holds(spring_estimator_austenite(&estimator, &model, 0), truth.austenite);
+}
+
+static void check_counted(void)
+{
+    (void)snprintf(where, sizeof where, "of %u: distance %.4f, temperature %.4f, phase %.4f", seen,
+                   (double)within_distance / seen, (double)within_temperature / seen,
+                   (double)within_phase / seen);
+    TEST_ASSERT_TRUE_MESSAGE(within_distance >= 0.99 * seen, where);
+    TEST_ASSERT_TRUE_MESSAGE(within_temperature >= 0.99 * seen, where);
+    TEST_ASSERT_TRUE_MESSAGE(within_phase >= 0.99 * seen, where);
+}
+
+static void heat_and_hold(void)
+{
+    double margin_k = 12.0;
+    spring_estimator_begin_heating(&estimator, 0);
+    for (double s = 0.0; s < 60.0 && !spring_estimator_has_transformed(&estimator, &model, 0);
+         s += TICK_S) {
+        if (tick(3.0)) {
+            count_bounds();
+        }
+    }
+    spring_estimator_disturb(&BELIEF);
+    spring_estimator_begin_hold(&estimator, &model, 0, true);
+    for (double s = 0.0; s < 240.0; s += TICK_S) {
+        margin_k = BELIEF.lost > 0.0f ? 3.0 : margin_k - 0.08 * TICK_S;
+        if (tick(hold_current_a(margin_k > 0.0 ? margin_k : 0.0))) {
+            count_bounds();
+        }
+    }
+}
+
+/* 15 % off in capacity and loss, 5 K off in the transformation, with a coefficient. */
+static void driven_spring_is_within_its_bounds(void)
+{
+    static const double off[] = {0.85, 1.0, 1.15};
+    seen = within_distance = within_temperature = within_phase = 0;
+    for (unsigned n = 0; n < 27; n++) {
+        begin_cold();
+        truth.capacity_j_per_k *= off[n % 3u];
+        truth.loss_w_per_k *= off[n / 3u % 3u];
+        truth.shift_k = 5.0 * ((double)(n / 9u) - 1.0);
+        truth.rise_per_k = 0.0002 * (double)(n % 4u);
+        heat_and_hold();
+    }
+    check_counted();
+}
+
+/* Nobody reads a spring that is off: what it may have become meanwhile widens. */
+static void spring_that_is_off_is_within_its_bounds(void)
+{
+    static const double off[] = {0.85, 1.0, 1.15};
+    seen = within_distance = within_temperature = within_phase = 0;
+    for (unsigned n = 0; n < 3; n++) {
+        begin_cold();
+        truth.loss_w_per_k *= off[n];
+        (void)heat_then_hold(60.0);
+        for (double s = 0.0; s < 200.0; s += TICK_S) {
+            if (tick(0.0)) {
+                count_bounds();
+            }
+        }
+    }
+    check_counted();
+}
+
+/* ---- a hold ---- */
+
+static void crossing_is_seen_and_makes_the_distance_sure(void)
+{
+    static const double loss[] = {0.85, 1.0, 1.15};
+    for (unsigned n = 0; n < 3; n++) {
+        begin_cold();
+        truth.loss_w_per_k *= loss[n];
+        (void)heat_then_hold(60.0);
+        const float before_k = search(12.0, 400.0);
+        const float after_k = spring_estimator_sd_k(&BELIEF);
+        (void)snprintf(where, sizeof where,
+                       "loss x %.2f: lost %.3f of %.3f, sd %.2f -> %.2f, distance %.2f", loss[n],
+                       (double)BELIEF.lost, 1.0 - truth.austenite, (double)before_k,
+                       (double)after_k, distance_k());
+        TEST_ASSERT_TRUE_MESSAGE(BELIEF.lost > 0.0f, where);
+        TEST_ASSERT_TRUE_MESSAGE(distance_k() > -3.0 && distance_k() < 1.0, where);
+        TEST_ASSERT_TRUE_MESSAGE(after_k < before_k && after_k < 2.0f, where);
+        TEST_ASSERT_TRUE_MESSAGE(
+            holds(spring_estimator_distance_k(&estimator, &model, 0), distance_k()), where);
+        /* and what was learnt of the loss is right within what it says of itself */
+        const spring_learnt_t learnt = spring_estimator_learnt(&estimator, 0);
+        const double off_w_per_k = (double)learnt.loss_w_per_k - 5.8e-3 * (loss[n] - 1.0);
+        (void)snprintf(where, sizeof where, "loss x %.2f: off by %.6f, sd %.6f", loss[n],
+                       off_w_per_k, (double)learnt.loss_sd_w_per_k);
+        TEST_ASSERT_TRUE_MESSAGE(fabs(off_w_per_k) <=
+                                     (double)(SPRING_ESTIMATOR_BOUND_SDS * learnt.loss_sd_w_per_k),
+                                 where);
+        TEST_ASSERT_TRUE_MESSAGE((double)learnt.loss_sd_w_per_k < 0.12 * 5.8e-3, where);
+    }
+}
+
+static void hold_that_loses_nothing_shows_no_crossing(void)
+{
+    static const double rise_per_k[] = {0.0, 0.0010};
+    for (unsigned n = 0; n < 2; n++) {
+        begin_cold();
+        truth.rise_per_k = rise_per_k[n];
+        (void)heat_then_hold(60.0);
+        for (double s = 0.0; s < 600.0; s += TICK_S) {
+            (void)tick(hold_current_a(6.0));
+        }
+        (void)snprintf(where, sizeof where, "%.4f per K: lost %.3f of %.3f", rise_per_k[n],
+                       (double)BELIEF.lost, 1.0 - truth.austenite);
+        TEST_ASSERT_TRUE_MESSAGE(truth.austenite > 0.999, where);
+        TEST_ASSERT_EQUAL_FLOAT_MESSAGE(0.0f, BELIEF.lost, where);
+    }
+}
+
+/* A touch in mid-hold: all four temperatures rise by 8 K, and phase goes. */
+static void transformation_that_moves_is_noticed(void)
+{
+    (void)heat_then_hold(60.0);
+    for (double s = 0.0; s < 120.0; s += TICK_S) {
+        (void)tick(hold_current_a(5.0));
+    }
+    truth.shift_k = 8.0;
+    double after_s = 0.0;
+    while (BELIEF.lost == 0.0f && after_s < 60.0) {
+        (void)tick(hold_current_a(5.0));
+        after_s += TICK_S;
+    }
+    (void)snprintf(where, sizeof where, "after %.1f s, lost %.3f of %.3f, shift %.2f", after_s,
+                   (double)BELIEF.lost, 1.0 - truth.austenite, (double)BELIEF.shift_k);
+    TEST_ASSERT_TRUE_MESSAGE(after_s < 20.0 && BELIEF.shift_k > 0.0f, where);
+}
+
+static void martensite_resistance_is_learnt_at_20_degrees(void)
+{
+    truth.martensite_ohm = 0.190;
+    truth.rise_per_k = 0.0008;
+    (void)heat_then_hold(60.0);
+    TEST_ASSERT_FLOAT_WITHIN(0.004f, 0.190f, BELIEF.learnt.martensite_ohm);
+    TEST_ASSERT_FLOAT_WITHIN(0.0004f, 0.0008f, BELIEF.learnt.martensite_rise_per_k);
+}
+
+/* ---- learnt before ---- */
+
+/* Power-on with what an earlier heating has taught, and a look at 1 A. */
+static uint8_t look(double temperature_c, double austenite)
+{
+    begin_cold();
+    truth.rise_per_k = 0.0004;
+    (void)heat_then_hold(60.0);
+    const spring_learnt_t learnt = spring_estimator_learnt(&estimator, 0);
+    power_comes_on();
+    spring_estimator_restore(&estimator, 0, &learnt);
+    truth.rise_per_k = 0.0004;
+    truth.temperature_c = temperature_c;
+    truth.austenite = austenite;
+    ticks(1.0, 3.0);
+    (void)snprintf(where, sizeof where, "%.0f degC, %.2f", temperature_c, austenite);
+    TEST_ASSERT_TRUE_MESSAGE(
+        holds(spring_estimator_temperature_c(&estimator, &model, 0), truth.temperature_c), where);
+    TEST_ASSERT_TRUE_MESSAGE(
+        holds(spring_estimator_austenite(&estimator, &model, 0), truth.austenite), where);
+    return BELIEF.possible;
+}
+
+static void look_tells_the_phase_by_what_was_learnt(void)
+{
+    TEST_ASSERT_EQUAL_UINT8(SPRING_PHASE_MARTENSITE, look(25.0, 0.0));
+    TEST_ASSERT_EQUAL_UINT8(SPRING_PHASE_MARTENSITE, look(66.0, 0.0));
+    TEST_ASSERT_EQUAL_UINT8(SPRING_PHASE_BETWEEN, look(76.0, 0.5));
+    static const double hot_c[] = {84.0, 100.0};
+    for (unsigned n = 0; n < 2; n++) { /* it may begin to transform before it is heated */
+        const uint8_t possible = look(hot_c[n], 1.0);
+        TEST_ASSERT_BITS_HIGH(SPRING_PHASE_AUSTENITE, possible);
+        TEST_ASSERT_BITS_LOW(SPRING_PHASE_MARTENSITE, possible);
+    }
+}
+
+static void look_without_anything_learnt_tells_nothing(void)
+{
+    power_comes_on();
+    truth.temperature_c = 90.0;
+    truth.austenite = 1.0;
+    ticks(1.0, 3.0);
+    TEST_ASSERT_EQUAL_UINT8(SPRING_PHASE_ANY, BELIEF.possible);
+}
+
+static void numbers_that_no_spring_has_are_not_restored(void)
+{
+    const spring_learnt_t good = {.austenite_ohm = 0.22f, .change = 0.2f, .loss_sd_w_per_k = 1e-4f};
+    spring_learnt_t bad[8];
+    for (unsigned n = 0; n < 8; n++) {
+        bad[n] = good;
+    }
+    bad[0].austenite_ohm = NAN;
+    bad[1].austenite_ohm = 20.0f;
+    bad[2].change = NAN;
+    bad[3].change = 1.5f;
+    bad[4].loss_w_per_k = 1.0f;
+    bad[5].loss_sd_w_per_k = -1e-4f;
+    bad[6].martensite_rise_per_k = INFINITY;
+    bad[7].loss_sd_w_per_k = NAN;
+    for (unsigned n = 0; n < 8; n++) {
+        power_comes_on();
+        spring_estimator_restore(&estimator, 0, &bad[n]);
+        (void)snprintf(where, sizeof where, "%u", n);
+        TEST_ASSERT_EQUAL_FLOAT_MESSAGE(0.0f, BELIEF.learnt.austenite_ohm, where);
+    }
+    spring_estimator_restore(&estimator, 0, &good);
+    TEST_ASSERT_EQUAL_FLOAT(0.22f, BELIEF.learnt.austenite_ohm);
+}
+
+/* ---- readings that are none ---- */
+
+static void check_is_sound(void)
+{
+    const spring_bounds_t c = spring_estimator_temperature_c(&estimator, &model, 0);
+    const spring_bounds_t distance = spring_estimator_distance_k(&estimator, &model, 0);
+    const spring_bounds_t austenite = spring_estimator_austenite(&estimator, &model, 0);
+    TEST_ASSERT_TRUE_MESSAGE(isfinite(c.low) && isfinite(c.high) && c.low < c.high, where);
+    TEST_ASSERT_TRUE_MESSAGE(isfinite(distance.low) && distance.low < distance.high, where);
+    TEST_ASSERT_TRUE_MESSAGE(austenite.low >= 0.0f && austenite.low <= austenite.value &&
+                                 austenite.value <= austenite.high && austenite.high <= 1.0f,
+                             where);
+    TEST_ASSERT_TRUE_MESSAGE(BELIEF.loss_variance >= 0.0f, where);
+    TEST_ASSERT_TRUE_MESSAGE(isfinite(BELIEF.learnt.loss_w_per_k), where);
+    TEST_ASSERT_TRUE(thermal_model_is_consistent(&model));
+}
+
+static void bad_readings_leave_a_belief_that_can_be_believed(void)
+{
+    static const sensor_t bad[] = {SENSOR_SILENT, SENSOR_FROZEN, SENSOR_ZERO, SENSOR_WILD};
+    for (unsigned n = 0; n < 4; n++) {
+        for (int held = 0; held < 2; held++) {
+            begin_cold();
+            (void)snprintf(where, sizeof where, "sensor %u, held %d", n, held);
+            if (held) {
+                (void)heat_then_hold(60.0);
+                ticks(1.4, 60.0);
+            }
+            sensor = bad[n];
+            for (double s = 0.0; s < 600.0; s += TICK_S) {
+                if (tick(held ? 1.4 : 0.0)) {
+                    check_is_sound();
+                }
+            }
+            sensor = SENSOR_GOOD; /* off and cold, it transforms as before */
+            ticks(0.0, 400.0);
+            TEST_ASSERT_TRUE_MESSAGE(heat(60.0) < 60.0 && truth.austenite > 0.99, where);
+        }
+    }
+}
+
+/* What comes in at its largest, for longer than any count can count. */
+static void counts_and_sums_saturate(void)
+{
+    for (unsigned n = 0; n < 40; n++) {
+        spring_estimator_take(&BELIEF, 4095, 4095);
+    }
+    TEST_ASSERT_EQUAL_UINT8(15, BELIEF.readings);
+    TEST_ASSERT_EQUAL_UINT16(15u * 4095u, BELIEF.current_sum_ma);
+    TEST_ASSERT_EQUAL_UINT16(15u * 4095u, BELIEF.voltage_sum_mv);
+    begin_cold();
+    (void)heat_then_hold(60.0);
+    for (double s = 0.0; s < 300.0; s += TICK_S) {
+        (void)tick(hold_current_a(6.0));
+    }
+    TEST_ASSERT_EQUAL_UINT8(UINT8_MAX, BELIEF.fresh);
+    TEST_ASSERT_EQUAL_UINT8(UINT8_MAX, BELIEF.quiet);
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(at_power_on_everything_is_possible);
+    RUN_TEST(it_is_cold_only_after_the_time_that_physics_needs);
+    RUN_TEST(transformation_is_seen_whatever_its_sign_and_size);
+    RUN_TEST(transformation_is_seen_through_noise);
+    RUN_TEST(coefficient_alone_is_never_an_onset);
+    RUN_TEST(driven_spring_is_within_its_bounds);
+    RUN_TEST(spring_that_is_off_is_within_its_bounds);
+    RUN_TEST(crossing_is_seen_and_makes_the_distance_sure);
+    RUN_TEST(hold_that_loses_nothing_shows_no_crossing);
+    RUN_TEST(transformation_that_moves_is_noticed);
+    RUN_TEST(martensite_resistance_is_learnt_at_20_degrees);
+    RUN_TEST(look_tells_the_phase_by_what_was_learnt);
+    RUN_TEST(look_without_anything_learnt_tells_nothing);
+    RUN_TEST(numbers_that_no_spring_has_are_not_restored);
+    RUN_TEST(bad_readings_leave_a_belief_that_can_be_believed);
+    RUN_TEST(counts_and_sums_saturate);
+    return UNITY_END();
+}
