@@ -325,6 +325,48 @@ void controller_set_temperature(controller_t *controller, int16_t temperature_c7
     tell_resistances(controller);
 }
 
+spring_bounds_t controller_temperature_bounds_c(const controller_t *controller, uint8_t spring)
+{
+    return spring_estimator_temperature_c(&controller->policy.estimator, &controller->model,
+                                          spring);
+}
+
+spring_bounds_t controller_distance_bounds_k(const controller_t *controller, uint8_t spring)
+{
+    return spring_estimator_distance_k(&controller->policy.estimator, &controller->model, spring);
+}
+
+spring_bounds_t controller_austenite_bounds(const controller_t *controller, uint8_t spring)
+{
+    return spring_estimator_austenite(&controller->policy.estimator, &controller->model, spring);
+}
+
+float controller_shift_k(const controller_t *controller, uint8_t spring)
+{
+    return controller->policy.estimator.spring[spring].shift_k;
+}
+
+float controller_cooling_s(const controller_t *controller, uint8_t spring)
+{
+    return spring_estimator_cooling_s(&controller->policy.estimator, &controller->model, spring);
+}
+
+spring_learnt_t controller_learnt(const controller_t *controller, uint8_t spring)
+{
+    return spring_estimator_learnt(&controller->policy.estimator, spring);
+}
+
+void controller_restore_learnt(controller_t *controller, uint8_t spring,
+                               const spring_learnt_t *learnt)
+{
+    spring_estimator_restore(&controller->policy.estimator, spring, learnt);
+}
+
+void controller_forget_learnt(controller_t *controller, uint8_t spring)
+{
+    spring_estimator_forget(&controller->policy.estimator, spring);
+}
+
 uint8_t controller_springs(const controller_t *controller)
 {
     return controller->springs;
@@ -394,6 +436,11 @@ uint16_t controller_limits(const controller_t *controller, uint8_t spring)
 uint16_t controller_cut_ma(const controller_t *controller, uint8_t spring)
 {
     return drive_policy_cut_ma(&controller->policy, spring);
+}
+
+drive_policy_stage_t controller_stage(const controller_t *controller, uint8_t spring)
+{
+    return drive_policy_stage(&controller->policy, spring);
 }
 
 bool controller_is_locked(const controller_t *controller)
