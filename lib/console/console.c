@@ -1,4 +1,4 @@
-#include "console.h"
+#include "console_internal.h"
 
 #include <stddef.h>
 #include <string.h>
@@ -19,27 +19,10 @@ typedef enum {
 
 /* --- lines out ------------------------------------------------------------------------------ */
 
-typedef struct {
-    text_line_t line;
-    char bytes[CONSOLE_ROOM_BYTES];
-} out_t;
-
-static void out_start(out_t *out)
-{
-    text_line_start(&out->line, out->bytes, CONSOLE_ROOM_BYTES - 2u);
-}
-
-static void out_end(const console_t *console, out_t *out)
-{
-    out->line.size = CONSOLE_ROOM_BYTES;
-    text_add_flash(&out->line, FLASH_TEXT("\r\n"));
-    console->output.write(console->output.context, out->line.bytes, out->line.length);
-}
-
 static void answer(const console_t *console, console_error_t error)
 {
-    out_t out;
-    out_start(&out);
+    console_out_t out;
+    console_out_start(&out);
     if (error == CONSOLE_OK) {
         text_add_flash(&out.line, FLASH_TEXT("ok"));
     } else {
@@ -47,18 +30,12 @@ static void answer(const console_t *console, console_error_t error)
         text_add_values(&out.line, FLASH_TEXT("error:#0 "), &number);
         text_add_flash(&out.line, console_error_text(error));
     }
-    out_end(console, &out);
+    console_out_end(console, &out);
 }
 
 static bool room_for(const console_t *console, uint16_t bytes)
 {
     return console->output.room(console->output.context) >= bytes;
-}
-
-static void add_spring(text_line_t *line, uint8_t spring)
-{
-    const int32_t number = spring + 1;
-    text_add_values(line, FLASH_TEXT("spring #0: "), &number);
 }
 
 /* --- settings ------------------------------------------------------------------------------- */
@@ -74,26 +51,12 @@ static void apply_settings(console_t *console)
     if (!console->conflict) {
         return;
     }
-    out_t out;
-    out_start(&out);
+    console_out_t out;
+    console_out_start(&out);
     text_add_flash(&out.line, FLASH_TEXT("[not active yet: "));
     text_add(&out.line, parameter_row(bad).name);
     text_add_flash(&out.line, FLASH_TEXT(" does not fit the others]"));
-    out_end(console, &out);
-}
-
-static void print_setting(const console_t *console, uint16_t index, uint8_t element)
-{
-    out_t out;
-    char name[SETTINGS_NAME_SIZE];
-    settings_name(index, element, name);
-    out_start(&out);
-    text_add_char(&out.line, '$');
-    text_add(&out.line, name);
-    text_add_char(&out.line, '=');
-    text_add_decimal(&out.line, settings_get(console->settings, index, element),
-                     parameter_row(index).decimals);
-    out_end(console, &out);
+    console_out_end(console, &out);
 }
 
 static console_error_t error_of(settings_result_t result)
@@ -173,7 +136,7 @@ static console_error_t settings_line(console_t *console, char *line)
     if (!settings_find(line + 1, &index, &element)) {
         return CONSOLE_ERROR_UNKNOWN_SETTING;
     }
-    print_setting(console, index, element);
+    console_print_setting(console, index, element);
     return CONSOLE_OK;
 }
 
@@ -508,7 +471,7 @@ static console_error_t execute(console_t *console)
 
 /* --- answers of several lines --------------------------------------------------------------- */
 
-static bool help_line(const console_t *console, out_t *out)
+static bool help_line(const console_t *console, console_out_t *out)
 {
     static const char more[] FLASH_MEMORY = "$$  all settings   $NAME  one   $NAME=VALUE  set it\0"
                                             "$save  keep them   $defaults  the built-in ones\0"
@@ -526,141 +489,6 @@ static bool help_line(const console_t *console, out_t *out)
     return false;
 }
 
-static void add_loaded(text_line_t *line, const console_status_t *status)
-{
-    /* as record_found_t has them */
-    static const char texts[] FLASH_MEMORY = "loaded\0"
-                                             "loaded; the other copy is damaged or was cut short\0"
-                                             "none saved, defaults\0"
-                                             "stored ones damaged, defaults\0"
-                                             "stored by another version, defaults";
-    const settings_loaded_t *const loaded = &status->loaded;
-    if (status->settings_conflict_at_boot) {
-        text_add_flash(line, FLASH_TEXT("stored ones do not fit together, defaults are active"));
-        return;
-    }
-    text_add_flash(line, text_item(texts, (uint8_t)loaded->found));
-    if (loaded->found > RECORD_LOADED_OTHER) {
-        return;
-    }
-    const int32_t counts[] = {loaded->missing};
-    if (loaded->missing != 0) {
-        text_add_values(line, FLASH_TEXT("; #0 not stored, at defaults"), counts);
-    }
-    const int32_t dropped[] = {loaded->dropped, loaded->dropped_id};
-    if (loaded->dropped != 0) {
-        text_add_values(line, FLASH_TEXT("; #0 dropped, first id #0"), dropped);
-    }
-}
-
-static bool version_line(const console_t *console, out_t *out)
-{
-    const console_status_t *const status = console->status;
-    text_line_t *const line = &out->line;
-    switch (console->step) {
-    case 0:
-        text_add_flash(line, FLASH_TEXT("ninespring "));
-        text_add_flash(line, status->version);
-        text_add_flash(line, FLASH_TEXT(" mega2560, sensors "));
-        text_add_flash(line, status->sensors);
-        return true;
-    case 1:
-        text_add_flash(line, FLASH_TEXT("reset "));
-        text_add_flash(line, status->reset_cause);
-        text_add_flash(line, FLASH_TEXT("; settings "));
-        add_loaded(line, status);
-        return true;
-    case 2: {
-        const int32_t values[] = {status->ticks_late, status->tick_longest_us, status->load_percent,
-                                  console->telemetry->dropped, status->stack_unused_bytes};
-        text_add_values(line,
-                        FLASH_TEXT("ticks late #0, longest tick #0 us, load #0 %, "
-                                   "telemetry dropped #0, stack unused #0"),
-                        values);
-        return true;
-    }
-    default:
-        return false;
-    }
-}
-
-/* ", limits supply temperature: 1.200 A less"; nothing where none acts. */
-static void add_limits(text_line_t *line, const controller_t *controller, uint8_t spring)
-{
-    const uint16_t limits = controller_limits(controller, spring);
-    if (limits == 0) {
-        return;
-    }
-    text_add_flash(line, FLASH_TEXT(", limits"));
-    telemetry_add_limits(line, limits, ' ');
-    const int32_t cut_ma = controller_cut_ma(controller, spring);
-    if (cut_ma != 0) {
-        text_add_values(line, FLASH_TEXT(": #3 A less"), &cut_ma);
-    }
-}
-
-static bool model_line(const console_t *console, out_t *out)
-{
-    const controller_t *const controller = console->controller;
-    text_line_t *const line = &out->line;
-    const uint8_t k = console->step;
-    if (k == controller_springs(controller)) {
-        const int32_t ambient_cc = text_centi_from_c7(console->status->ambient_c7);
-        text_add_values(line, FLASH_TEXT("ambient: #2 C"), &ambient_cc);
-        return true;
-    }
-    if (k > controller_springs(controller)) {
-        return false;
-    }
-    const int32_t values[] = {k + 1,
-                              text_centi_from_c7(controller_temperature_c7(controller, k)),
-                              controller_austenite_permille(controller, k),
-                              controller_measured_ma(controller, k),
-                              controller_measured_mv(controller, k),
-                              (int32_t)controller_power_uw(controller, k),
-                              controller_target_ma(controller, k)};
-    text_add_values(
-        line, FLASH_TEXT("spring #0: #2 C, austenite #1 %, #3 A, #3 V, #6 W, target #3 A"), values);
-    add_limits(line, controller, k);
-    return true;
-}
-
-static void add_fault(text_line_t *line, safety_fault_t fault)
-{
-    const int32_t number = (int32_t)fault;
-    text_add_values(line, FLASH_TEXT("fault #0 "), &number);
-    text_add_flash(line, safety_fault_name(fault));
-}
-
-/* Steps: the lock, the board, each spring; lines only where there is something. */
-static bool faults_line(const console_t *console, out_t *out)
-{
-    const controller_t *const controller = console->controller;
-    text_line_t *const line = &out->line;
-    if (console->step == 0) {
-        if (controller_is_locked(controller)) {
-            text_add_flash(line, FLASH_TEXT("locked"));
-        }
-    } else if (console->step == 1) {
-        const safety_fault_t fault = controller_board_fault(controller);
-        if (fault != SAFETY_FAULT_NONE) {
-            text_add_flash(line, FLASH_TEXT("board: "));
-            add_fault(line, fault);
-        }
-    } else {
-        const uint8_t k = (uint8_t)(console->step - 2u);
-        if (k >= controller_springs(controller)) {
-            return false;
-        }
-        const safety_fault_t fault = controller_fault(controller, k);
-        if (fault != SAFETY_FAULT_NONE) {
-            add_spring(line, k);
-            add_fault(line, fault);
-        }
-    }
-    return true;
-}
-
 /* --- jobs ----------------------------------------------------------------------------------- */
 
 static void end_job(console_t *console, console_error_t error)
@@ -675,7 +503,7 @@ static void list_settings(console_t *console)
         end_job(console, CONSOLE_OK);
         return;
     }
-    print_setting(console, console->step, console->element);
+    console_print_setting(console, console->step, console->element);
     if (++console->element >= parameter_row(console->step).count) {
         console->element = 0;
         console->step++;
@@ -690,8 +518,8 @@ static void start_telemetry(console_t *console)
         if (!room_for(console, TELEMETRY_LINE_BYTES((uint16_t)springs))) {
             return;
         }
-        out_t out;
-        out_start(&out);
+        console_out_t out;
+        console_out_start(&out);
         while (telemetry_header(springs, piece++, &out.line)) {
             console->output.write(console->output.context, out.line.bytes, out.line.length);
             out.line.length = 0;
@@ -702,13 +530,6 @@ static void start_telemetry(console_t *console)
     telemetry_set(console->telemetry, console->next_format, console->next_hz);
     end_job(console, CONSOLE_OK);
 }
-
-/* As controller_sensor_status_t has them. */
-static const char sensor_texts[] FLASH_MEMORY = "sensor ok\0"
-                                                "sensor absent\0"
-                                                "sensor bus stuck\0"
-                                                "sensor stale\0"
-                                                "sensor was reset";
 
 static void selftest(console_t *console)
 {
@@ -724,19 +545,7 @@ static void selftest(console_t *console)
     default:
         break;
     }
-    out_t out;
-    out_start(&out);
-    add_spring(&out.line, result.spring);
-    text_add_flash(&out.line, text_item(sensor_texts, (uint8_t)result.sensor));
-    if (result.fault != SAFETY_FAULT_NONE) {
-        text_add_flash(&out.line, FLASH_TEXT(", "));
-        add_fault(&out.line, result.fault);
-    } else if (result.sound) {
-        text_add_values(&out.line, FLASH_TEXT(", #3 ohm"), &result.resistance_mohm);
-    } else if (result.sensor == CONTROLLER_SENSOR_OK) {
-        text_add_flash(&out.line, FLASH_TEXT(", too little current"));
-    }
-    out_end(console, &out);
+    console_selftest_line(console, &result);
 }
 
 static void save(console_t *console)
@@ -755,21 +564,21 @@ static void save(console_t *console)
 
 static void print_job_line(console_t *console)
 {
-    out_t out;
+    console_out_t out;
     bool more;
-    out_start(&out);
+    console_out_start(&out);
     switch (console->job) {
     case JOB_HELP:
         more = help_line(console, &out);
         break;
     case JOB_VERSION:
-        more = version_line(console, &out);
+        more = console_version_line(console, &out);
         break;
     case JOB_MODEL:
-        more = model_line(console, &out);
+        more = console_model_line(console, &out);
         break;
     default:
-        more = faults_line(console, &out);
+        more = console_faults_line(console, &out);
         break;
     }
     if (!more) {
@@ -777,7 +586,7 @@ static void print_job_line(console_t *console)
         return;
     }
     if (out.line.length > 0) {
-        out_end(console, &out);
+        console_out_end(console, &out);
     }
     console->step++;
 }
@@ -884,62 +693,4 @@ void console_init(console_t *console, const text_output_t *output, controller_t 
     console->store = store;
     console->telemetry = telemetry;
     console->status = status;
-}
-
-void console_greet(console_t *console)
-{
-    for (console->step = 0; console->step < 2u; console->step++) {
-        out_t out;
-        out_start(&out);
-        (void)version_line(console, &out);
-        out_end(console, &out);
-    }
-    if (controller_is_locked(console->controller)) {
-        out_t out;
-        out_start(&out);
-        text_add_flash(&out.line, FLASH_TEXT("locked: outputs stay off until unlock"));
-        out_end(console, &out);
-    }
-}
-
-void console_print_status(const console_t *console)
-{
-    const controller_t *const controller = console->controller;
-    int32_t sum_ma = 0;
-    int16_t hottest_c7 = INT16_MIN;
-    uint8_t hottest = 0;
-    uint8_t fault = (uint8_t)controller_board_fault(controller);
-    bool on = false;
-    out_t out;
-    text_line_t *const line = &out.line;
-    const uint8_t springs = controller_springs(controller);
-    for (uint8_t k = 0; k < springs; k++) {
-        sum_ma += controller_measured_ma(controller, k);
-        on = on || controller_level_permille(controller, k) != 0;
-        if (fault == 0) {
-            fault = (uint8_t)controller_fault(controller, k);
-        }
-        if (controller_temperature_c7(controller, k) > hottest_c7) {
-            hottest_c7 = controller_temperature_c7(controller, k);
-            hottest = k;
-        }
-    }
-    out_start(&out);
-    text_add_char(line, '<');
-    text_add_flash(line, controller_is_locked(controller) ? FLASH_TEXT("locked")
-                         : fault != 0                     ? FLASH_TEXT("fault")
-                         : on                             ? FLASH_TEXT("on")
-                                                          : FLASH_TEXT("off"));
-    const int32_t values[] = {(int32_t)(console->status->time_ms & 0x7FFFFFFFul),
-                              sum_ma,
-                              text_centi_from_c7(hottest_c7),
-                              hottest + 1,
-                              controller_fan_percent(controller),
-                              fault,
-                              console->status->ticks_late,
-                              console->status->load_percent};
-    text_add_values(line,
-                    FLASH_TEXT("|t:#3|sum_a:#3|hottest_c:#2@#0|fan:#0|fault:#0|late:#0|load:#0>"),
-                    values);
-    out_end(console, &out);
 }
