@@ -7,6 +7,8 @@
 
 #define MODEL_STEP_MS   100u
 #define TICKS_PER_STEP  (MODEL_STEP_MS / CONTROLLER_TICK_MS)
+#define TICKS_PER_S     (1000u / CONTROLLER_TICK_MS)
+#define SILENT_MOST     (3600ul * TICKS_PER_S) /* host_timeout_s at its most */
 #define CURRENT_MOST_MA 4095 /* the sensor ends at 3200: a step's sum of power fits 32 bits */
 
 void controller_settings_default(controller_settings_t *settings)
@@ -231,11 +233,29 @@ static void drive(controller_t *controller, const bool valid[], uint32_t sum_ma)
     }
 }
 
+/* With a timeout of n seconds the springs are off in the tick that ends the n-th. */
+static void listen(controller_t *controller)
+{
+    const uint32_t most = controller->safety.parameters.host_timeout_s * (uint32_t)TICKS_PER_S;
+    bool wanted = false;
+    for (uint8_t k = 0; k < controller->springs; k++) {
+        wanted = wanted || controller->level_permille[k] != 0;
+    }
+    if (controller->silent_ticks < SILENT_MOST) {
+        controller->silent_ticks++;
+    }
+    if (wanted && most != 0 && controller->silent_ticks >= most) {
+        controller_stop(controller);
+        safety_host_silent(&controller->safety);
+    }
+}
+
 void controller_tick(controller_t *controller, const controller_inputs_t *inputs,
                      controller_outputs_t *outputs)
 {
     bool valid[CONTROLLER_MAX_SPRINGS];
     uint32_t sum_ma = take_sensors(controller, inputs->sensor, valid);
+    listen(controller);
     step_model(controller, inputs);
     drive(controller, valid, sum_ma);
     memcpy(outputs->duty, controller->duty, sizeof outputs->duty);
@@ -283,6 +303,11 @@ void controller_emergency_stop(controller_t *controller)
 {
     controller_stop(controller);
     safety_emergency_stop(&controller->safety);
+}
+
+void controller_host_heard(controller_t *controller)
+{
+    controller->silent_ticks = 0;
 }
 
 void controller_clear_faults(controller_t *controller)

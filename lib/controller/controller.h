@@ -61,6 +61,7 @@ typedef struct {
     current_control_t current;
     safety_t safety;
     drive_policy_t policy;
+    uint32_t silent_ticks; /* since the host was heard; no more than the longest host_timeout_s */
     uint8_t springs;
     int16_t ambient_c7;      /* of the last model step */
     uint8_t model_tick;      /* ticks since the last model step */
@@ -113,6 +114,9 @@ bool controller_set_fan(controller_t *controller, uint8_t percent);
 void controller_stop(controller_t *controller);
 /* All levels to 0 and SAFETY_FAULT_EMERGENCY_STOP until cleared. */
 void controller_emergency_stop(controller_t *controller);
+/* Whoever asked for the springs is still there. host_timeout_s (0: never) after the last call, in
+ * the tick in which a spring is wanted, all levels are set to 0 with SAFETY_FAULT_HOST_SILENT. */
+void controller_host_heard(controller_t *controller);
 /* Faults are forgotten and all levels set to 0: nothing starts by clearing. */
 void controller_clear_faults(controller_t *controller);
 void controller_lock(controller_t *controller);

@@ -29,7 +29,7 @@ static void out_write(void *context, const char *bytes, uint8_t length)
     said[said_length] = '\0';
 }
 
-static uint8_t memory[2u * SETTINGS_SLOT_BYTES];
+static uint8_t memory[SETTINGS_LEARNT_BASE + 2u * SETTINGS_LEARNT_SLOT_BYTES];
 static uint8_t memory_read(void *context, uint16_t address)
 {
     (void)context;
@@ -53,6 +53,7 @@ static controller_inputs_t inputs;
 static controller_outputs_t outputs;
 static settings_t settings;
 static settings_store_t store;
+static learnt_store_t learnt;
 static telemetry_t telemetry;
 static console_status_t status;
 static console_t console;
@@ -69,8 +70,10 @@ void setUp(void)
     status.ambient_c7 = inputs.ambient_c7 = 20 * 128;
     status.loaded = settings_load(&store, &storage, &settings);
     TEST_ASSERT_TRUE(controller_init(&controller, &settings.controller, 20 * 128, NULL));
+    learnt_store_open(&learnt, &storage, SETTINGS_LEARNT_BASE, SETTINGS_LEARNT_SLOT_BYTES,
+                      &controller);
     telemetry_init(&telemetry);
-    console_init(&console, &output, &controller, &settings, &store, &telemetry, &status);
+    console_init(&console, &output, &controller, &settings, &store, &learnt, &telemetry, &status);
     weak_ma = 0;
     room = 60000;
     said_length = 0;
@@ -177,7 +180,7 @@ static void each_word_is_obeyed(void)
     expect_ok("ambient 23.5");
     TEST_ASSERT_EQUAL_INT16(2350, settings.board.ambient_cc);
     expect_ok("model");
-    TEST_ASSERT_NOT_NULL(strstr(said, "spring 9: 20.00 C"));
+    TEST_ASSERT_NOT_NULL(strstr(said, "spring 9: 70.0 degC"));
     expect_ok("model cold");
     expect_ok("faults");
     expect_ok("clear");

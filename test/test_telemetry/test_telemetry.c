@@ -276,7 +276,7 @@ static void limits_that_toggle_are_told_once_a_period_and_take_no_other_springs_
         limit(8, DRIVE_POLICY_LIMIT_NONE, 0);
         for (unsigned tick = 0; tick < 500; tick++) {
             for (uint8_t k = 0; k < 8; k++) {
-                const uint8_t now = controller.policy.spring[k].limits;
+                const uint16_t now = controller.policy.spring[k].limits;
                 limit(k, now ^ DRIVE_POLICY_LIMIT_SUPPLY, 0);
             }
             if (tick == 300) {
