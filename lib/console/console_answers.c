@@ -172,29 +172,33 @@ bool console_model_line(const console_t *console, console_out_t *out)
     return true;
 }
 
-/* "spring 1: 0.1748 ohm at 20 degC, 0.040 % per K, austenite 25.1 %, loss 3.2 % (+-1.4), shift 0.4
- * K": resistance of martensite, its rise, by how much austenite's is higher, the loss beyond the
- * declared one, by how much the transformation lies higher. */
+/* "spring 1: 0.1748 ohm at 20 degC, 0.040 % per K, austenite 0.2190 ohm, 25.1 % more, loss 3.2 %
+ * (+-1.4), shift 0.4 K": the martensite's resistance and its rise, that of austenite when it had
+ * just transformed, the loss beyond the declared one, by how much it transforms higher. */
 static void add_learnt(text_line_t *line, const console_t *console, uint8_t k)
 {
     const spring_learnt_t learnt = controller_learnt(console->controller, k);
-    const float declared_w_per_k =
-        1e-6f * (float)console->settings->controller.model.loss_uw_per_k;
+    const float declared_w_per_k = 1e-6f * (float)console->settings->controller.model.loss_uw_per_k;
     add_spring(line, k);
-    if (!(learnt.austenite_ohm > 0.0f)) {
+    if (!(learnt.austenite_ohm > 0.0f) && !(learnt.martensite_ohm > 0.0f) &&
+        learnt.loss_w_per_k == 0.0f) {
         text_add_flash(line, FLASH_TEXT("nothing yet"));
         return;
     }
     if (learnt.martensite_ohm > 0.0f) {
         const int32_t cold[] = {rounded(1e4f * learnt.martensite_ohm),
                                 rounded(1e5f * learnt.martensite_rise_per_k)};
-        text_add_values(line, FLASH_TEXT("#4 ohm at 20 degC, #3 % per K"), cold);
+        text_add_values(line, FLASH_TEXT("#4 ohm at 20 degC, #3 % per K, "), cold);
     } else {
-        const int32_t hot = rounded(1e4f * learnt.austenite_ohm);
-        text_add_values(line, FLASH_TEXT("not seen cold, austenite #4 ohm"), &hot);
+        text_add_flash(line, FLASH_TEXT("not seen cold, "));
     }
-    const int32_t change = rounded(1e3f * learnt.change / (1.0f - learnt.change));
-    text_add_values(line, FLASH_TEXT(", austenite #1 %"), &change);
+    if (learnt.austenite_ohm > 0.0f) {
+        const int32_t hot[] = {rounded(1e4f * learnt.austenite_ohm),
+                               rounded(1e3f * learnt.change / (1.0f - learnt.change))};
+        text_add_values(line, FLASH_TEXT("austenite #4 ohm, #1 % more"), hot);
+    } else {
+        text_add_flash(line, FLASH_TEXT("not seen to transform"));
+    }
     if (declared_w_per_k > 0.0f) {
         const int32_t loss[] = {rounded(1e3f * learnt.loss_w_per_k / declared_w_per_k),
                                 rounded(1e3f * learnt.loss_sd_w_per_k / declared_w_per_k)};
@@ -210,7 +214,7 @@ bool console_learnt_line(const console_t *console, console_out_t *out)
     if (console->step < springs) {
         add_learnt(&out->line, console, console->step);
     } else if (console->step == springs) {
-        text_add_flash(&out->line, FLASH_TEXT("against the declared ones; "));
+        text_add_flash(&out->line, FLASH_TEXT("loss and shift are beyond the declared ones; "));
         text_add_flash(&out->line,
                        learnt_store_keeps(console->learnt)
                            ? FLASH_TEXT("kept over power-off")
