@@ -21,7 +21,7 @@
 #endif
 
 #ifndef NINESPRING_VERSION
-#define NINESPRING_VERSION "0.1.0"
+#define NINESPRING_VERSION "unknown"
 #endif
 
 // Not static: debugger and simulator look at it by name.

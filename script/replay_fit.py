@@ -163,7 +163,7 @@ def fit(sim: Path, log: Path, folder: Path, name: str) -> tuple[list[float], lis
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    default_data = os.environ.get("NINESPRING_DATA") or ROOT.parent / "shared" / "data"
+    default_data = os.environ.get("NINESPRING_DATA") or ROOT / "data"
     parser.add_argument(
         "--data",
         type=Path,

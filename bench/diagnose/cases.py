@@ -17,6 +17,11 @@ REPORTING_SEEDS = range(300_000, 400_000)
 """Seeds of the reported figures: looked at only to report. What 100000 and 200000 up once showed led to later work."""
 
 PAIRS = [pair for pair in itertools.combinations(EFFECTS, 2) if set(pair) != {"resistance_phase", "supply_sag"}]
+BESIDE = [
+    (EFFECTS[(3 * k) % len(EFFECTS)], list(OUTSIDE)[(k // len(EFFECTS) + 5 * k) % len(OUTSIDE)])
+    for k in range(len(EFFECTS) * len(OUTSIDE))
+]
+"""Every effect of the library beside every one outside of it, mixed."""
 
 
 @dataclass
@@ -24,7 +29,7 @@ class Case:
     """One case: what acts (truth), what is written for the diagnosis, what is held out."""
 
     group: str
-    """single, pair, none or outside."""
+    """single, pair, none, outside, beside (one of the library and one outside of it) or alloy (not as declared)."""
     truth: tuple[str, ...]
     seed: int
     world: World
@@ -113,6 +118,8 @@ def make_case(group: str, truth: tuple[str, ...], seed: int) -> Case:
         columns = "i"
     elif group == "none":
         columns = ("iv", "iv", "i", "u")[seed % 4]
+    if group == "alloy":
+        world.effects["_alloy"] = {"shift": float(u(-30.0, 5.0)), "hysteresis": float(u(-4.0, 6.0))}
     if columns == "u":
         world.effects["_command"] = {"on": 1.0}
     scale = 1.0 if columns == "u" else float(u(0.92, 1.02))
@@ -172,4 +179,9 @@ def plan(seeds: range | list[int], groups: tuple[str, ...]) -> list[tuple[str, t
             jobs += [("none", (), seed * 4 + k) for k in range(4)]
         if "outside" in groups:
             jobs += [("outside", (name,), seed) for name in OUTSIDE]
+        if "beside" in groups:
+            picked = [BESIDE[(n * 10 + k) % len(BESIDE)] for k in range(10)]
+            jobs += [("beside", pair, seed) for pair in picked]
+        if "alloy" in groups:
+            jobs += [("alloy", ("latent_heat",), seed * 3 + k) for k in range(3)]
     return jobs

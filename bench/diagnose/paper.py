@@ -11,8 +11,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from ninespring import steady
 from ninespring.models import Array
+from ninespring.verdict import steady
 
 COMMAND = "python bench/diagnose/measured.py"
 ROOT = Path(__file__).resolve().parents[2]
@@ -20,7 +20,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 def data() -> Path:
     """Return the folder of measured data, or end saying so."""
-    folder = Path(os.environ.get("NINESPRING_DATA", ROOT.parent / "shared" / "data"))
+    folder = Path(os.environ.get("NINESPRING_DATA", ROOT / "data"))
     if not folder.is_dir():
         sys.exit(f"{folder} is not there: set NINESPRING_DATA to the folder of measured data")
     return folder

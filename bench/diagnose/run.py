@@ -29,10 +29,15 @@ from cases import (
     plan,
     write_logs,
 )
-from ninespring import diagnosis, fitting, native, search
+from ninespring import native
 from ninespring.effects import candidates
+from ninespring.fit import problem as fitting
+from ninespring.fit.simulate import simulate_run
 from ninespring.logs import read_log
 from ninespring.models import Array
+from ninespring.search import search
+from ninespring.search.evidence import excess
+from ninespring.verdict import diagnosis
 from world import EFFECTS, OUTSIDE
 
 MATTERS = 0.5
@@ -54,7 +59,7 @@ def marginal(found: diagnosis.Diagnosis, truth: tuple[str, ...], effect: str) ->
         best = max(options, key=lambda k: screen.forecast([k])[0])
         size = screen.forecast([best])[1].get(best, 1.0)
         fit = hunt.refit(fit, [screen.candidates[best]], [size])
-    return math.sqrt(search.excess(problem, fit))
+    return math.sqrt(excess(problem, fit))
 
 
 DECLARED = {
@@ -79,6 +84,19 @@ def covered(case: Case, adopted: list[str], fitted: dict[str, Any]) -> tuple[int
     return sum(abs(one["value"] - true) <= 1.96 * one["stderr"] for one, true in known), len(known)
 
 
+def alloy_error(case: Case, model: Any) -> list[float]:
+    """Return how far the fitted transformation is from the true one, up and down, K; large where it was not fitted."""
+    alloy = case.world.effects["_alloy"]
+    out = []
+    for start, finish, true in (
+        ("austenite_start_c", "austenite_finish_c", 93.0 + alloy["shift"] + 0.5 * alloy["hysteresis"]),
+        ("martensite_start_c", "martensite_finish_c", 73.0 + alloy["shift"] - 0.5 * alloy["hysteresis"]),
+    ):
+        middle = 0.5 * (model.parameters.get(start, 1e3) + model.parameters.get(finish, 1e3))
+        out.append(middle - true)
+    return out
+
+
 def run_case(job: tuple[str, tuple[str, ...], int]) -> dict[str, Any]:
     """Make one case, diagnose it, compare."""
     group, truth, seed = job
@@ -96,15 +114,20 @@ def run_case(job: tuple[str, tuple[str, ...], int]) -> dict[str, Any]:
     plant = native.Plant(3, 3)
     plant.set_effects(found.model.effects)
     plant.set_all(found.model.parameters)
-    shown = fitting.simulate_run(plant, third, third.ambient_c, {})
+    shown = simulate_run(plant, third, third.ambient_c, {})
     third_rmse = float(np.sqrt(np.nanmean((third.temperature_c - shown) ** 2)))
     if group == "pair":
         sizes = {e: marginal(found, truth, e) for e in truth}
-    elif group == "single":
-        sizes = {truth[0]: math.sqrt(search.excess(found.problem, found.baseline))}
+    elif group in ("single", "alloy"):
+        sizes = {truth[0]: math.sqrt(excess(found.problem, found.baseline))}
     else:
-        sizes = {"": math.sqrt(search.excess(found.problem, found.baseline))}
+        sizes = {"": math.sqrt(excess(found.problem, found.baseline))}
     return {
+        "witnesses": [
+            {"effect": e["name"], "true": e["name"] in truth, "probability": e["probability"], "witness": e["witness"]}
+            for e in result["effects"]
+        ],
+        "alloy": alloy_error(case, found.model) if group == "alloy" else None,
         "group": group,
         "truth": list(truth),
         "seed": seed,
@@ -316,11 +339,14 @@ def main() -> int:
     )
     parser.add_argument("--quick", action="store_true", help="one seed of singles and none, for CI")
     parser.add_argument("--development", action="store_true", help="seeds of the development range")
-    parser.add_argument("--groups", default="single,pair,none,outside")
+    parser.add_argument("--groups", default="single,pair,none,outside,beside,alloy")
     parser.add_argument(
         "--only",
         default="",
         help="only cases with one of these effects, comma-separated",
+    )
+    parser.add_argument(
+        "--collect", action="store_true", help="keep every effect that the search adopts, however unlikely"
     )
     parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--json", type=Path)
@@ -337,6 +363,8 @@ def main() -> int:
         jobs = [job for job in jobs if wanted & set(job[1])]
     cases = []
     fitting.WORKERS = 1
+    if options.collect:
+        diagnosis.NAMED = 0.0
     with concurrent.futures.ProcessPoolExecutor(options.processes) as pool:
         for done, case in enumerate(pool.map(run_case, jobs, chunksize=1), start=1):
             cases.append(case)

@@ -9,10 +9,11 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from ninespring import diagnosis, importing
-from ninespring.fitting import BLOCK_S
+from ninespring import importing
+from ninespring.fit.problem import BLOCK_S
 from ninespring.logs import read_log
 from ninespring.models import Array, Model
+from ninespring.verdict import diagnosis, residual
 from paper import COMMAND, data
 
 LOGS = (
@@ -110,7 +111,7 @@ def section() -> tuple[str, list[dict[str, Any]]]:
                 f" Structure of {found['residual']['structure_c']:.2f} K rms remains above the sensor's noise. "
                 + found["residual"]["note"].split(". ", 1)[-1]
             )
-            empirical = diagnosis.surrogate(diagnosed.problem, diagnosed.final)
+            empirical = residual.surrogate(diagnosed.problem, diagnosed.final)
             said += (
                 f" How much of it the drives could still explain: an empirical model of them, filtered by 3 to 300 s, takes "
                 f"{empirical['holdout_before_c']:.3f} to {empirical['holdout_after_c']:.3f} K held out; "

@@ -126,6 +126,9 @@ def simulate(world: World, runs: list[Inputs]) -> dict[str, np.ndarray]:
     air_on = effect.get("shared_air")
     plate_on = effect.get("plate_conduction")
     latent = effect.get("latent_heat", {"joule": 0.0})["joule"]
+    # an alloy that is not as declared: degC by which it transforms elsewhere, K of further hysteresis
+    elsewhere = effect.get("_alloy", {}).get("shift", 0.0)
+    opened = 0.5 * effect.get("_alloy", {}).get("hysteresis", 0.0)
     drift = effect.get("ambient_drift")
     convection = effect.get("natural_convection")
     radiation = effect.get("radiation")
@@ -140,10 +143,10 @@ def simulate(world: World, runs: list[Inputs]) -> dict[str, np.ndarray]:
 
     def duhem(t: np.ndarray, rising: np.ndarray, xi: np.ndarray) -> np.ndarray:
         """Phase per kelvin in the direction of motion (austenite fraction, 88..98 up, 78..68 down)."""
-        up = np.clip((t - 88.0) / 10.0, 0.0, 1.0)
+        up = np.clip((t - elsewhere - opened - 88.0) / 10.0, 0.0, 1.0)
         f_up = 0.5 * (1 - np.cos(np.pi * up))
         slope_up = np.where((up > 0) & (up < 1), 0.05 * np.pi * np.sin(np.pi * up), 0.0)
-        down = np.clip((t - 68.0) / 10.0, 0.0, 1.0)
+        down = np.clip((t - elsewhere + opened - 68.0) / 10.0, 0.0, 1.0)
         f_down = 0.5 * (1 - np.cos(np.pi * down))
         slope_down = np.where((down > 0) & (down < 1), 0.05 * np.pi * np.sin(np.pi * down), 0.0)
         rate_up = (1 - xi) * slope_up / np.maximum(1 - f_up, 1e-3)

@@ -149,6 +149,8 @@ outcome_t run_policy(const run_t &wanted)
     const loop_owner owner(loop_create(&settings, plant.get(), &options, wanted.seed, nullptr));
     loop_t *loop = owner.get();
     controller_t *controller = loop_controller(loop);
+    // what is measured is the drive, not the start: the console's `model cold`
+    controller_set_temperature(controller, controller->ambient_c7);
     outcome_t result = blank();
     tracer trace(wanted);
     for (int k = 0; k < springs; k++)

@@ -2,7 +2,6 @@
 
 #include <math.h>
 
-
 double belief_temperature_c(const controller_t *controller, int spring)
 {
     return controller_temperature_c7(controller, (uint8_t)spring) / 128.0;

@@ -160,7 +160,7 @@ uint16_t controller_austenite_permille(const controller_t *controller, uint8_t s
 safety_fault_t controller_fault(const controller_t *controller, uint8_t spring);
 safety_fault_t controller_board_fault(const controller_t *controller);
 uint16_t controller_limits(const controller_t *controller,
-                          uint8_t spring); /* drive_policy_limit_t bits */
+                           uint8_t spring); /* drive_policy_limit_t bits */
 /* By how much they cut the spring's target. */
 uint16_t controller_cut_ma(const controller_t *controller, uint8_t spring);
 drive_policy_stage_t controller_stage(const controller_t *controller, uint8_t spring);

@@ -17,8 +17,8 @@ float derating_severity(float highest_c, float rise_k_per_s, float limit_c)
     return 1.0f - derating_share(highest_c + HORIZON_S * rise_k_per_s, limit_c, UNDRIVEN_BAND_K);
 }
 
-uint16_t derating_overload_ma(uint16_t budget_ma, uint16_t continuous_ma, uint16_t overload_quarters,
-                              uint16_t allowed_quarters)
+uint16_t derating_overload_ma(uint16_t budget_ma, uint16_t continuous_ma,
+                              uint16_t overload_quarters, uint16_t allowed_quarters)
 {
     const uint16_t free_quarters = allowed_quarters / 2u;
     if (budget_ma <= continuous_ma || overload_quarters <= free_quarters) {

@@ -5,34 +5,37 @@
 #include "derating.h"
 #include "invariant.h"
 
-#define TURNS_PER_S    4u
-#define TURN_S         SPRING_ESTIMATOR_TURN_S
-#define TICKS_PER_REST 5u /* in which the model steps and no spring is updated: a round takes 1/4 s */
+#define TURNS_PER_S 4u
+#define TURN_S      SPRING_ESTIMATOR_TURN_S
+#define TICKS_PER_REST                                                                             \
+    5u /* in which the model steps and no spring is updated: a round takes 1/4 s */
 
-/* A spring counts as wanted fully on from here: the last percent of a transformation has no level. */
+/* A spring counts as wanted fully on from here: the last percent of a transformation has no level.
+ */
 #define LEVEL_FULL_PERMILLE 960
 #define LEVEL_BAND          0.05f /* a held level may be off by so much before it is sought again */
 #define LEVEL_POWER_W       0.4f  /* beyond the hold: heating to a level slows down */
 #define LEVEL_ROOM_K        1.0f  /* a held level stays so far below austenite start */
 
-#define LOST_AT_ONCE   0.03f  /* phase lost: it is heated back */
-#define LOST_SETTLED   0.008f /* the same once the hold is at rest: a search has cost it */
-#define SETTLED_TURNS  45     /* of a hold at rest: the estimator has a line to compare with */
-#define SEARCH_SD_K    3.0f   /* a distance known so badly is worth a search */
-#define SEARCH_END_K   (-1.0f)
-#define MARGIN_PER_SD  1.6f   /* 95 % of a normal distribution, one side */
-#define MARGIN_SD_K    1.5f   /* that hold_margin_k itself allows for */
-#define BLIND_BEGIN_K  4.0f   /* above austenite finish: it has transformed at the likely worst */
-#define BLIND_K_PER_S  (1.0f / 60.0f)
-#define SUSPECTED_W    0.038f /* stops a fall of 0.1 K/s */
-#define FOLLOW_S       4.0f   /* a distance from the held temperature is closed in */
-#define SHORT_MOST_K   20.0f
-#define KEPT_K         3.0f  /* above austenite start what was reached is worth keeping */
-#define TURN_K         6.0f  /* colder than one that heats: it is its turn */
-#define GOES_ON_K      4.0f  /* below austenite start: keeps its turn */
-#define LOOK_MA        1000u /* of a spring of which much was learnt and nothing is known */
-#define UNDRIVEN_SDS   2.0f
-#define RISE_SHARE     0.25f /* of a turn in the average */
+#define LOST_AT_ONCE  0.03f  /* phase lost: it is heated back */
+#define LOST_SETTLED  0.004f /* the same once the hold is at rest: a search has cost it */
+#define SETTLED_TURNS 45     /* of a hold at rest: the estimator has a line to compare with */
+#define SEARCH_SD_K   3.0f   /* a distance known so badly is worth a search */
+#define SEARCH_END_K  (-1.0f)
+#define MARGIN_PER_SD 1.6f /* 95 % of a normal distribution, one side */
+#define MARGIN_SD_K   1.5f /* that hold_margin_k itself allows for */
+#define BLIND_BEGIN_K 4.0f /* above austenite finish: it has transformed at the likely worst */
+#define BLIND_K_PER_S (1.0f / 60.0f)
+#define SUSPECTED_W   0.038f /* stops a fall of 0.1 K/s */
+#define FOLLOW_S      4.0f   /* a distance from the held temperature is closed in */
+#define SHORT_MOST_K  20.0f
+#define KEPT_K        3.0f  /* above austenite start what was reached is worth keeping */
+#define TURN_K        6.0f  /* colder than one that heats: it is its turn */
+#define GOES_ON_K     4.0f  /* below austenite start: keeps its turn */
+#define LOOK_MA       1000u /* of a spring of which much was learnt and nothing is known */
+#define UNDRIVEN_SDS  2.0f
+#define NEIGHBOUR_SD  0.15f /* of the rise of a spring that its neighbours heat */
+#define RISE_SHARE    0.25f /* of a turn in the average */
 
 #define AWAY_FIRST_TURNS (85u * TURNS_PER_S) /* since it was asked for */
 #define AWAY_TURNS       (15u * TURNS_PER_S) /* since it was there */
@@ -133,6 +136,7 @@ static void enter(drive_policy_t *policy, thermal_model_t *model, uint8_t k,
         s->wanted_ma = policy->parameters.probe_current_ma;
         break;
     case DRIVE_POLICY_STAGE_LOWER:
+        spring_estimator_begin_hold(&policy->estimator, model, k, false);
         s->wanted_ma = policy->parameters.probe_current_ma;
         break;
     }
@@ -175,8 +179,8 @@ static void heat(drive_policy_t *policy, thermal_model_t *model, uint8_t k, uint
     const float phase = phase_of(policy, model, k);
     /* its own limit leaves too little to go on, and it is hot enough to have transformed */
     const bool ends = s->ceiling_ma < boost_ma - (boost_ma >> 2) && c > points.austenite_finish_c;
-    if (ends || (full ? spring_estimator_has_transformed(&policy->estimator, model, k)
-                      : phase >= level)) {
+    if (ends ||
+        (full ? spring_estimator_has_transformed(&policy->estimator, model, k) : phase >= level)) {
         enter(policy, model, k, DRIVE_POLICY_STAGE_HOLD, level_permille);
         return;
     }
@@ -184,7 +188,8 @@ static void heat(drive_policy_t *policy, thermal_model_t *model, uint8_t k, uint
     const bool waits = waits_for_supply(s);
     s->floor_ma = 0;
     if (slows || waits) {
-        const uint16_t keeps_ma = hold_current_ma(policy, model, k, c, slows ? LEVEL_POWER_W : 0.0f);
+        const uint16_t keeps_ma =
+            hold_current_ma(policy, model, k, c, slows ? LEVEL_POWER_W : 0.0f);
         if (slows && keeps_ma < s->wanted_ma) {
             s->wanted_ma = keeps_ma;
         }
@@ -194,7 +199,8 @@ static void heat(drive_policy_t *policy, thermal_model_t *model, uint8_t k, uint
     }
 }
 
-/* Above martensite start, by as much as its distance is unsure; never so high that a level rises. */
+/* Above martensite start, by as much as its distance is unsure; never so high that a level rises.
+ */
 static float safe_margin_k(const drive_policy_t *policy, const thermal_model_t *model, uint8_t k,
                            bool full)
 {
@@ -207,8 +213,9 @@ static float safe_margin_k(const drive_policy_t *policy, const thermal_model_t *
     if (!full && most_k > band_k) {
         most_k = band_k;
     }
-    const float margin_k = least_k + b->disturbance_k +
-                           MARGIN_PER_SD * (spring_estimator_sd_k(b) - MARGIN_SD_K);
+    const float margin_k =
+        least_k + b->disturbance_k +
+        MARGIN_PER_SD * (spring_estimator_hold_sd_k(&policy->estimator, model, k) - MARGIN_SD_K);
     return margin_k > most_k ? most_k : margin_k < least_k ? least_k : margin_k;
 }
 
@@ -235,7 +242,8 @@ static void hold(drive_policy_t *policy, thermal_model_t *model, uint8_t k, uint
     if (full && !sees) { /* who knows whether it has transformed: above that first, then down */
         s->margin_k -= BLIND_K_PER_S * TURN_S;
         s->margin_k = s->margin_k < safe_k ? safe_k : s->margin_k;
-    } else if (s->margin_k > safe_k || !full || spring_estimator_sd_k(b) < SEARCH_SD_K) {
+    } else if (s->margin_k > safe_k || !full ||
+               spring_estimator_hold_sd_k(&policy->estimator, model, k) < SEARCH_SD_K) {
         s->margin_k = safe_k;
     } else if (b->quiet >= SETTLED_TURNS && b->losing == 0 && s->margin_k > SEARCH_END_K) {
         s->margin_k -= 0.001f * TURN_S * (float)policy->parameters.search_mk_per_s;
@@ -249,7 +257,8 @@ static void hold(drive_policy_t *policy, thermal_model_t *model, uint8_t k, uint
                        : wanted_ma;
 }
 
-static void lower(drive_policy_t *policy, thermal_model_t *model, uint8_t k, uint16_t level_permille)
+static void lower(drive_policy_t *policy, thermal_model_t *model, uint8_t k,
+                  uint16_t level_permille)
 {
     const float level = 0.001f * (float)level_permille;
     const float phase = phase_of(policy, model, k);
@@ -301,15 +310,17 @@ static void precompensate(drive_policy_t *policy, thermal_model_t *model, uint8_
 static float severity(const drive_policy_t *policy, const thermal_model_t *model, uint8_t k,
                       drive_policy_spring_t *s)
 {
-    const spring_bounds_t c = spring_estimator_temperature_c(&policy->estimator, model, k);
+    const spring_belief_t *b = &policy->estimator.spring[k];
     const float limit_c = spring_transformation(model, k).austenite_start_c -
                           kelvin(policy->parameters.undriven_margin_cc);
-    const float highest_c = c.value + (c.high - c.value) * (UNDRIVEN_SDS / SPRING_ESTIMATOR_BOUND_SDS);
+    const float rise_k = now_c(model, k) - 1.0f / 128.0f * (float)thermal_model_ambient_c7(model);
+    const float highest_c =
+        now_c(model, k) + UNDRIVEN_SDS * (spring_estimator_sd_k(b) + NEIGHBOUR_SD * rise_k);
     const float severe = derating_severity(highest_c, s->rise_k_per_s, limit_c);
     if (severe <= 0.0f) {
         s->released = false;
     }
-    return s->released || policy->estimator.spring[k].possible == SPRING_PHASE_ANY ? 0.0f : severe;
+    return s->released || b->possible == SPRING_PHASE_ANY ? 0.0f : severe;
 }
 
 static float worst_neighbour(const drive_policy_t *policy, uint8_t k)
@@ -319,7 +330,8 @@ static float worst_neighbour(const drive_policy_t *policy, uint8_t k)
     const uint8_t column = (uint8_t)(k % columns);
     float worst = 0.0f;
     for (uint8_t r = row > 0 ? (uint8_t)(row - 1) : 0; r <= row + 1; r++) {
-        for (uint8_t c = column > 0 ? (uint8_t)(column - 1) : 0; c <= column + 1 && c < columns; c++) {
+        for (uint8_t c = column > 0 ? (uint8_t)(column - 1) : 0; c <= column + 1 && c < columns;
+             c++) {
             const uint16_t other = (uint16_t)(r * columns + c);
             if (other < policy->springs && policy->spring[other].severity > worst) {
                 worst = policy->spring[other].severity;
@@ -349,8 +361,8 @@ static void derate(drive_policy_t *policy, const thermal_model_t *model, uint8_t
         s->derated_turns = 0;
     } else if (s->derated_turns < UINT16_MAX) {
         s->derated_turns++;
-        s->tripped = s->tripped || (p->trip_time_s != 0 &&
-                                    s->derated_turns >= p->trip_time_s * TURNS_PER_S);
+        s->tripped =
+            s->tripped || (p->trip_time_s != 0 && s->derated_turns >= p->trip_time_s * TURNS_PER_S);
     }
 }
 
@@ -361,8 +373,8 @@ static void count_overload(drive_policy_t *policy)
     const drive_policy_parameters_t *p = &policy->parameters;
     bool waiting = false;
     for (uint8_t k = 0; k < policy->springs; k++) {
-        waiting = waiting || (policy->spring[k].limits & (DRIVE_POLICY_LIMIT_SUPPLY |
-                                                          DRIVE_POLICY_LIMIT_OVERLOAD)) != 0;
+        waiting = waiting || (policy->spring[k].limits &
+                              (DRIVE_POLICY_LIMIT_SUPPLY | DRIVE_POLICY_LIMIT_OVERLOAD)) != 0;
     }
     if (policy->sum_ma > p->overload_current_ma) {
         if (policy->overload_quarters < p->overload_time_s * TURNS_PER_S) {
@@ -457,7 +469,8 @@ static void rotate_queue(drive_policy_t *policy, const thermal_model_t *model)
             coldest_c = c < coldest_c ? c : coldest_c;
         } else {
             room++;
-            if (c > warmest_c && c < spring_transformation(model, k).austenite_start_c - GOES_ON_K) {
+            if (c > warmest_c &&
+                c < spring_transformation(model, k).austenite_start_c - GOES_ON_K) {
                 warmest_c = c;
                 warmest = k;
             }
@@ -518,9 +531,8 @@ static void claim_of(drive_policy_t *policy, const drive_policy_input_t *input, 
         s->limits |= DRIVE_POLICY_LIMIT_CURRENT;
     }
     claim->asked_ma = asked_ma;
-    claim->secured_ma = s->stage != DRIVE_POLICY_STAGE_HEAT || s->floor_ma > asked_ma
-                            ? asked_ma
-                            : s->floor_ma;
+    claim->secured_ma =
+        s->stage != DRIVE_POLICY_STAGE_HEAT || s->floor_ma > asked_ma ? asked_ma : s->floor_ma;
 }
 
 /* A slow triangle below what is granted, each spring at another place of it. */
@@ -559,7 +571,7 @@ static void give(drive_policy_t *policy, uint16_t budget_ma, uint16_t target_ma[
     for (uint8_t k = 0; k < policy->springs; k++) {
         drive_policy_spring_t *s = &policy->spring[k];
         uint16_t ma = dithers ? dithered_ma(policy, k) : s->granted_ma;
-        if (may_walk && s->granted_ma != 0) {
+        if (may_walk && (s->granted_ma != 0 || s->stage != DRIVE_POLICY_STAGE_OFF)) {
             const uint16_t wanted_ma = ma;
             ma = walked_ma(s->target_ma, ma, &room_ma);
             walks = walks || ma != wanted_ma;
@@ -576,11 +588,11 @@ static void share(drive_policy_t *policy, const drive_policy_input_t *input, uin
     const uint16_t supply_ma = input->supply_limit_ma > p->supply_reserve_ma
                                    ? (uint16_t)(input->supply_limit_ma - p->supply_reserve_ma)
                                    : 0;
-    *budget_ma = p->policy == DRIVE_POLICY_OPEN
-                     ? supply_ma
-                     : derating_overload_ma(supply_ma, p->overload_current_ma,
-                                            policy->overload_quarters,
-                                            (uint16_t)(p->overload_time_s * TURNS_PER_S));
+    *budget_ma =
+        p->policy == DRIVE_POLICY_OPEN
+            ? supply_ma
+            : derating_overload_ma(supply_ma, p->overload_current_ma, policy->overload_quarters,
+                                   (uint16_t)(p->overload_time_s * TURNS_PER_S));
     supply_claim_t claim[DRIVE_POLICY_MAX_SPRINGS];
     uint16_t granted_ma[DRIVE_POLICY_MAX_SPRINGS];
     for (uint8_t k = 0; k < policy->springs; k++) {
@@ -594,8 +606,8 @@ static void share(drive_policy_t *policy, const drive_policy_input_t *input, uin
         }
         s->granted_ma = granted_ma[k];
         if (granted_ma[k] < claim[k].asked_ma) {
-            s->limits |= *budget_ma < supply_ma ? DRIVE_POLICY_LIMIT_OVERLOAD
-                                                : DRIVE_POLICY_LIMIT_SUPPLY;
+            s->limits |=
+                *budget_ma < supply_ma ? DRIVE_POLICY_LIMIT_OVERLOAD : DRIVE_POLICY_LIMIT_SUPPLY;
         }
     }
 }

@@ -52,31 +52,31 @@ typedef enum {
 } drive_policy_stage_t;
 
 typedef struct {
-    float margin_k;       /* of the hold, above martensite start */
-    float severity;       /* undriven: 0 .. 1 at its limit */
-    float rise_k_per_s;   /* of its temperature, over seconds */
-    uint16_t limits;      /* drive_policy_limit_t bits that act */
-    uint16_t derating;    /* of them, those behind ceiling_ma */
-    uint16_t wanted_ma;   /* before limits */
-    uint16_t floor_ma;    /* while it heats: what it has comes before other boosts */
-    uint16_t ceiling_ma;  /* by derating */
-    uint16_t granted_ma;  /* share of the supply, before dither */
-    uint16_t target_ma;   /* given in the last tick */
+    float margin_k;         /* of the hold, above martensite start */
+    float severity;         /* undriven: 0 .. 1 at its limit */
+    float rise_k_per_s;     /* of its temperature, over seconds */
+    uint16_t limits;        /* drive_policy_limit_t bits that act */
+    uint16_t derating;      /* of them, those behind ceiling_ma */
+    uint16_t wanted_ma;     /* before limits */
+    uint16_t floor_ma;      /* while it heats: what it has comes before other boosts */
+    uint16_t ceiling_ma;    /* by derating */
+    uint16_t granted_ma;    /* share of the supply, before dither */
+    uint16_t target_ma;     /* given in the last tick */
     uint16_t derated_turns; /* fully, on end */
-    uint16_t away_turns;  /* since it was asked for, or was last there */
-    int16_t last_c7;      /* temperature a turn ago */
-    uint8_t stage;        /* drive_policy_stage_t */
-    bool arrived;         /* has been there since it was asked for */
-    bool released;        /* switched off hot: no false actuation */
+    uint16_t away_turns;    /* since it was asked for, or was last there */
+    int16_t last_c7;        /* temperature a turn ago */
+    uint8_t stage;          /* drive_policy_stage_t */
+    bool arrived;           /* has been there since it was asked for */
+    bool released;          /* switched off hot: no false actuation */
     bool tripped;
 } drive_policy_spring_t;
 
 typedef struct {
     drive_policy_parameters_t parameters;
     spring_estimator_t estimator;
-    supply_queue_t queue; /* springs that heat */
+    supply_queue_t queue;       /* springs that heat */
     uint16_t overload_quarters; /* s */
-    uint16_t sum_ma;      /* of the last targets */
+    uint16_t sum_ma;            /* of the last targets */
     uint8_t springs;
     uint8_t columns;
     uint8_t tick;  /* counts to the next in which no spring is updated */
@@ -87,7 +87,8 @@ typedef struct {
 } drive_policy_t;
 
 typedef struct {
-    thermal_model_t *model; /* temperatures as of the last model step; the estimator corrects them */
+    thermal_model_t
+        *model; /* temperatures as of the last model step; the estimator corrects them */
     const uint16_t *level_permille; /* wanted per spring, 0..1000 */
     const bool *allowed;            /* by safety, per spring */
     uint16_t maximum_current_ma;    /* of one spring */

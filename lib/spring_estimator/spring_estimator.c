@@ -15,17 +15,18 @@
 #define NOISE_SAME     0.1f   /* a current that has moved by more tells nothing of the noise */
 #define BEND_TO_SD     0.512f /* mean size of a second difference: 1 / (sqrt(6) sqrt(2 / pi)) */
 
-#define CAPACITY_SD    0.09f /* of a declared heat capacity: 15 %, uniform */
-#define LOSS_SD        0.12f /* of a declared loss: 20 % */
-#define LOSS_MOST      0.45f /* of the declared loss: no more is ever believed */
-#define LOSS_DRIFT_SD  0.0005f /* of the declared loss, in a second: 3 % in an hour */
-#define NEIGHBOUR_SD   0.15f   /* of the rise of a spring that its neighbours heat */
-#define SHIFT_SD_K     3.0f    /* of declared transformation temperatures */
-#define SHIFT_MOST_K   30.0f
-#define TRUST_SD_K     4.0f    /* of ambient, or of what a reset has kept */
-#define LEAST_SD_K     0.6f    /* parts of one spring differ by so much */
-#define UNIFORM_SD     0.29f   /* of a width */
-#define FORGETS        0.9998f /* a turn's: a disturbance is forgotten within 20 minutes */
+#define CAPACITY_SD   0.09f   /* of a declared heat capacity: 15 %, uniform */
+#define LOSS_SD       0.12f   /* of a declared loss: 20 % */
+#define LOSS_MOST     0.45f   /* of the declared loss: no more is ever believed */
+#define LOSS_DRIFT_SD 0.0005f /* of the declared loss, in a second: 3 % in an hour */
+#define NEIGHBOUR_SD  0.15f   /* of the rise of a spring that its neighbours heat */
+#define SHIFT_SD_K    3.0f    /* of declared transformation temperatures */
+#define SHIFT_MOST_K  30.0f
+#define TRUST_SD_K    5.0f    /* of ambient, or of what a reset has kept */
+#define LEAST_SD_K    0.6f    /* parts of one spring differ by so much */
+#define UNIFORM_SD    0.29f   /* of a width */
+#define LEAST_LOSS    0.8f    /* of a declared loss: with it the hottest possible spring cools */
+#define FORGETS       0.9998f /* a turn's: a disturbance is forgotten within 20 minutes */
 
 #define TRUST_STILL_SDS 0.7f /* where the transformation may never show: probably over */
 #define TRUST_ONSET_SDS 1.3f /* where its beginning was seen: certainly, but for 10 % */
@@ -105,6 +106,7 @@ void spring_estimator_prepare(spring_estimator_t *e, const thermal_model_t *mode
     e->observes = observes;
     e->heat_capacity_j_per_k = (float)p->heat_capacity_mj_per_k * 1e-3f;
     e->loss_w_per_k = (float)p->loss_uw_per_k * 1e-6f;
+    e->latent_heat_j = (float)p->latent_heat_mj * 1e-3f;
     e->martensite_ohm = (float)p->resistance_martensite_uohm * 1e-6f;
     e->change = 1.0f - (float)p->resistance_martensite_uohm / (float)p->resistance_austenite_uohm;
 }
@@ -138,6 +140,7 @@ void spring_estimator_init(spring_estimator_t *e, thermal_model_t *model)
     for (uint8_t k = 0; k < e->springs; k++) {
         spring_estimator_forget(e, k);
         begin(&e->spring[k], coldest_c + 0.5f * width_k, UNIFORM_SD * width_k, SPRING_PHASE_ANY);
+        e->spring[k].hottest_c = SPRING_ESTIMATOR_HOTTEST_C;
         set_temperature(model, k, coldest_c + 0.5f * width_k, SPRING_PHASE_MARTENSITE);
     }
 }
@@ -156,12 +159,12 @@ void spring_estimator_trust_model(spring_estimator_t *e, const thermal_model_t *
 void spring_estimator_restore(spring_estimator_t *e, uint8_t k, const spring_learnt_t *l)
 {
     /* written so that a NaN is left out, too */
-    const bool possible = l->austenite_ohm > LEARNT_OHM_LEAST && l->austenite_ohm < LEARNT_OHM_MOST &&
-                          fabsf(l->change) < 1.0f && l->change != 0.0f &&
-                          fabsf(l->loss_w_per_k) <= LOSS_MOST * e->loss_w_per_k &&
-                          l->loss_sd_w_per_k >= 0.0f &&
-                          l->loss_sd_w_per_k <= LOSS_SD * e->loss_w_per_k &&
-                          fabsf(l->martensite_rise_per_k) <= COEFFICIENT_MOST_PER_HEAT_K;
+    const bool possible =
+        l->austenite_ohm > LEARNT_OHM_LEAST && l->austenite_ohm < LEARNT_OHM_MOST &&
+        fabsf(l->change) < 1.0f && l->change != 0.0f &&
+        fabsf(l->loss_w_per_k) <= LOSS_MOST * e->loss_w_per_k && l->loss_sd_w_per_k >= 0.0f &&
+        l->loss_sd_w_per_k <= LOSS_SD * e->loss_w_per_k &&
+        fabsf(l->martensite_rise_per_k) <= COEFFICIENT_MOST_PER_HEAT_K;
     if (possible) {
         e->spring[k].learnt = *l;
         e->spring[k].loss_variance = l->loss_sd_w_per_k * l->loss_sd_w_per_k;
@@ -282,12 +285,16 @@ void spring_keep_above(const spring_estimator_t *e, spring_belief_t *b, thermal_
     const float error_k = limit_c - spring_now_c(model, k);
     if (error_k > 0.0f) {
         correct_loss(e, b, b->covariance / distance_k2(b) * error_k);
+        /* no array loses so little: what is read is not its phase */
+        b->blind = b->blind ||
+                   b->learnt.loss_w_per_k < -SPRING_ESTIMATOR_BOUND_SDS * LOSS_SD * e->loss_w_per_k;
         set_temperature(model, k, limit_c, SPRING_PHASE_AUSTENITE);
         b->last_c = spring_now_c(model, k);
     }
 }
 
-/* After power-on what was learnt before tells the phase, and so between which temperatures it is. */
+/* After power-on what was learnt before tells the phase, and so between which temperatures it is.
+ */
 static void look(spring_belief_t *b, thermal_model_t *model, uint8_t k)
 {
     const spring_learnt_t *l = &b->learnt;
@@ -316,6 +323,30 @@ static void look(spring_belief_t *b, thermal_model_t *model, uint8_t k)
     b->fresh = fresh;
 }
 
+/* Heat capacity where the hottest possible spring is: on its way it gives off its latent heat. */
+static float hottest_capacity_j_per_k(const spring_estimator_t *e, const spring_belief_t *b,
+                                      const spring_transformation_t *t)
+{
+    return b->hottest_c > t->martensite_start_c
+               ? e->heat_capacity_j_per_k
+               : e->heat_capacity_j_per_k +
+                     e->latent_heat_j / (t->martensite_start_c - t->martensite_finish_c);
+}
+
+/* Of a spring of which nothing is known: the hottest that it can be, and whether that is
+ * martensite. Its neighbours may be as hot. */
+static void cool(const spring_estimator_t *e, spring_belief_t *b, const thermal_model_t *model,
+                 uint8_t k)
+{
+    const spring_transformation_t t = spring_transformation(model, k);
+    const float above_k = b->hottest_c - spring_ambient_c(model);
+    b->hottest_c -= SPRING_ESTIMATOR_TURN_S * LEAST_LOSS * e->loss_w_per_k * above_k /
+                    hottest_capacity_j_per_k(e, b, &t);
+    if (b->hottest_c < t.martensite_finish_c) {
+        b->possible = SPRING_PHASE_MARTENSITE;
+    }
+}
+
 void spring_estimator_update(spring_estimator_t *e, thermal_model_t *model, uint8_t k)
 {
     spring_belief_t *b = &e->spring[k];
@@ -336,11 +367,17 @@ void spring_estimator_update(spring_estimator_t *e, thermal_model_t *model, uint
         b->mark_ohm = b->line_ohm = 0.0f;
         b->quiet = 0;
     }
-    const float hottest_c =
-        spring_now_c(model, k) + SPRING_ESTIMATOR_BOUND_SDS * spring_estimator_sd_k(b);
-    if (hottest_c < spring_transformation(model, k).martensite_finish_c) {
+    if (b->possible == SPRING_PHASE_ANY) {
+        cool(e, b, model, k);
+        return;
+    }
+    const spring_transformation_t t = spring_transformation(model, k);
+    const spring_bounds_t distance_k = spring_estimator_distance_k(e, model, k);
+    if (distance_k.high < t.martensite_finish_c - t.martensite_start_c) {
         b->possible = SPRING_PHASE_MARTENSITE;
         b->lost = 0.0f;
+    } else if (b->possible == SPRING_PHASE_AUSTENITE && !b->reads && distance_k.low < 0.0f) {
+        b->possible = SPRING_PHASE_BETWEEN | SPRING_PHASE_AUSTENITE; /* nothing tells any more */
     }
 }
 
@@ -379,6 +416,10 @@ void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, 
     } else if (!full && b->possible == SPRING_PHASE_AUSTENITE) {
         b->possible = SPRING_PHASE_BETWEEN | SPRING_PHASE_AUSTENITE;
     }
+    if (full && b->onset && b->reads && b->learnt.austenite_ohm == 0.0f) {
+        spring_learn_austenite(b); /* hot enough, and its resistance had come to rest */
+    }
+    b->heating = false;
     b->lost = 0.0f;
     b->quiet = 0;
     b->line_ohm = 0.0f;
@@ -398,18 +439,33 @@ float spring_estimator_sd_k(const spring_belief_t *b)
     return sqrtf(distance_k2(b));
 }
 
+float spring_estimator_hold_sd_k(const spring_estimator_t *e, const thermal_model_t *model,
+                                 uint8_t k)
+{
+    const spring_belief_t *b = &e->spring[k];
+    const float above_k = spring_now_c(model, k) - spring_ambient_c(model);
+    const float settles_k2 = above_k * above_k * b->loss_variance /
+                             (b->stiffness_w_per_k * b->stiffness_w_per_k + 1e-12f);
+    return sqrtf(fmaxf(distance_k2(b), settles_k2));
+}
+
 float spring_estimator_cooling_s(const spring_estimator_t *e, const thermal_model_t *model,
                                  uint8_t k)
 {
     const spring_belief_t *b = &e->spring[k];
+    const spring_transformation_t t = spring_transformation(model, k);
     const float ambient_c = spring_ambient_c(model);
-    const float room_k = spring_transformation(model, k).martensite_finish_c - ambient_c;
-    const float hot_k =
-        spring_now_c(model, k) + SPRING_ESTIMATOR_BOUND_SDS * spring_estimator_sd_k(b) - ambient_c;
-    if (b->possible != SPRING_PHASE_ANY || room_k <= 0.0f || hot_k <= room_k) {
+    if (b->possible != SPRING_PHASE_ANY || t.martensite_finish_c <= ambient_c) {
         return 0.0f;
     }
-    return e->heat_capacity_j_per_k / e->loss_w_per_k * logf(hot_k / room_k);
+    const float loss = LEAST_LOSS * e->loss_w_per_k;
+    const float hot_c = fmaxf(b->hottest_c, t.martensite_start_c);
+    const float left_c = fminf(b->hottest_c, t.martensite_start_c);
+    spring_belief_t transforming = {.hottest_c = t.martensite_start_c};
+    return e->heat_capacity_j_per_k / loss *
+               logf((hot_c - ambient_c) / (t.martensite_start_c - ambient_c)) +
+           hottest_capacity_j_per_k(e, &transforming, &t) / loss *
+               logf((left_c - ambient_c) / (t.martensite_finish_c - ambient_c));
 }
 
 static spring_bounds_t around(float value, float sd)
@@ -423,12 +479,15 @@ spring_bounds_t spring_estimator_temperature_c(const spring_estimator_t *e,
 {
     const spring_belief_t *b = &e->spring[k];
     const float now_c = spring_now_c(model, k) + b->shift_k;
-    /* what is not driven is as warm as its neighbours make it */
-    const float neighbours_k = b->possible == SPRING_PHASE_MARTENSITE
-                                   ? NEIGHBOUR_SD * (now_c - spring_ambient_c(model))
-                                   : 0.0f;
-    return around(now_c, sqrtf(distance_k2(b) + SHIFT_SD_K * SHIFT_SD_K +
-                               neighbours_k * neighbours_k));
+    float others_k2 = SHIFT_SD_K * SHIFT_SD_K; /* where it was seen, its transformation was */
+    if (b->possible == SPRING_PHASE_ANY) {
+        return (spring_bounds_t){now_c, spring_ambient_c(model) - TRUST_SD_K, b->hottest_c};
+    }
+    if (b->possible == SPRING_PHASE_MARTENSITE) { /* as warm as room and neighbours make it */
+        const float neighbours_k = NEIGHBOUR_SD * (now_c - spring_ambient_c(model));
+        others_k2 = TRUST_SD_K * TRUST_SD_K + neighbours_k * neighbours_k;
+    }
+    return around(now_c, sqrtf(distance_k2(b) + others_k2));
 }
 
 spring_bounds_t spring_estimator_distance_k(const spring_estimator_t *e,

@@ -37,9 +37,9 @@ spring_transformation_t spring_transformation(const thermal_model_t *model, uint
 
 /* A spring's own numbers, what stays of it over power-off. */
 typedef struct {
-    float austenite_ohm;         /* when it had just transformed; 0: it was never seen to */
-    float change;                /* from martensite to austenite, of austenite_ohm; below 0: it falls */
-    float martensite_ohm;        /* at 20 degC; 0: it was never seen from cold */
+    float austenite_ohm;  /* when it had just transformed; 0: it was never seen to */
+    float change;         /* from martensite to austenite, of austenite_ohm; below 0: it falls */
+    float martensite_ohm; /* at 20 degC; 0: it was never seen from cold */
     float martensite_rise_per_k; /* of that, relative */
     float loss_w_per_k;          /* beyond the declared one */
     float loss_sd_w_per_k;
@@ -48,10 +48,11 @@ typedef struct {
 /* What is believed of one spring. To be read by anyone, written by this module alone.
  *
  * The model keeps the temperature on the declared scale: there the transformation lies where it is
- * declared, and the distance to it is what readings tell. shift_k is how much of that is believed to
- * be the transformation's own (a load, another batch) and not the temperature's. */
+ * declared, and the distance to it is what readings tell. shift_k is how much of that is believed
+ * to be the transformation's own (a load, another batch) and not the temperature's. */
 typedef struct {
-    /* the error of that temperature: variances of what the loss explains, and of the heat capacity */
+    /* the error of that temperature: variances of what the loss explains, and of the heat capacity
+     */
     float variance_k2;
     float covariance;    /* of distance and loss, W */
     float loss_variance; /* (W/K)^2 */
@@ -60,6 +61,7 @@ typedef struct {
     float shift_variance_k2;
     float stiffness_w_per_k; /* what 1 K more of this spring gives off */
     float disturbance_k;     /* how far it was found from where it was believed, lately */
+    float hottest_c;         /* while nothing is known: the most that it can be by now */
     float lost;              /* phase lost since it had transformed, 0..1 */
     uint8_t possible;        /* SPRING_PHASE_ bits */
     uint8_t fresh;           /* turns with readings since current flows, saturating */
@@ -67,6 +69,7 @@ typedef struct {
     uint8_t losing;          /* turns on end in which it seems to lose phase */
     bool reads;              /* the last turn had readings fit for use */
     bool blind;              /* a heating that must have transformed it did not show */
+    bool heating;            /* between spring_estimator_begin_heating and _begin_hold */
     bool onset;              /* this heating was seen to begin to transform it */
     bool steep;              /* and its resistance still changes as only that explains */
     spring_learnt_t learnt;
@@ -102,6 +105,7 @@ typedef struct {
     uint8_t springs;
     bool observes; /* readings are used */
     float heat_capacity_j_per_k;
+    float latent_heat_j;
     float loss_w_per_k;
     float martensite_ohm;
     float change; /* declared, as in spring_learnt_t */
@@ -115,7 +119,8 @@ typedef struct {
 /* Nothing is known of any spring: any phase, from the model's ambient to
  * SPRING_ESTIMATOR_HOTTEST_C. The model's temperatures are set to the middle. */
 void spring_estimator_init(spring_estimator_t *estimator, thermal_model_t *model);
-/* Takes what it needs of the model's parameters; whether readings are used. What is believed stays. */
+/* Takes what it needs of the model's parameters; whether readings are used. What is believed stays.
+ */
 void spring_estimator_prepare(spring_estimator_t *estimator, const thermal_model_t *model,
                               bool observes);
 /* The model's temperatures and phases are right, to some kelvin: a hint, or what a warm reset has
@@ -145,7 +150,8 @@ static inline void spring_estimator_take(spring_belief_t *belief, int16_t curren
 /* The current jumps: readings on the way are left out. */
 void spring_estimator_disturb(spring_belief_t *belief);
 
-/* Once in a turn: takes the readings, and moves the model's temperature and phase to what they say. */
+/* Once in a turn: takes the readings, and moves the model's temperature and phase to what they say.
+ */
 void spring_estimator_update(spring_estimator_t *estimator, thermal_model_t *model, uint8_t spring);
 
 /* A heating begins: what the resistance does from here on tells of the transformation. */
@@ -153,7 +159,7 @@ void spring_estimator_begin_heating(spring_estimator_t *estimator, uint8_t sprin
 /* The heating has fully transformed it: seen, or as hot as it takes whatever it reads. */
 bool spring_estimator_has_transformed(const spring_estimator_t *estimator,
                                       const thermal_model_t *model, uint8_t spring);
-/* A hold begins; full: of a spring that is taken to be fully on. */
+/* A hold begins, or a cooling to a level; full: of a spring that is taken to be fully on. */
 void spring_estimator_begin_hold(spring_estimator_t *estimator, thermal_model_t *model,
                                  uint8_t spring, bool full);
 
@@ -161,6 +167,10 @@ void spring_estimator_begin_hold(spring_estimator_t *estimator, thermal_model_t 
 bool spring_estimator_sees(const spring_belief_t *belief);
 /* Of the distance to the transformation. */
 float spring_estimator_sd_k(const spring_belief_t *belief);
+/* The same while it is held at its present temperature, at its largest: an error of the loss shows
+ * within minutes. */
+float spring_estimator_hold_sd_k(const spring_estimator_t *estimator, const thermal_model_t *model,
+                                 uint8_t spring);
 /* How long it may still be hot from before power-on, s; 0 where that is over. */
 float spring_estimator_cooling_s(const spring_estimator_t *estimator, const thermal_model_t *model,
                                  uint8_t spring);

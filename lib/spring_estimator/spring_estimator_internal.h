@@ -6,8 +6,8 @@
 
 #include "spring_estimator.h"
 
-/* Largest temperature coefficient in print; per kelvin of heat, where the heat capacity is 15 % less
- * than declared. */
+/* Largest temperature coefficient in print; per kelvin of heat, where the heat capacity is 15 %
+ * less than declared. */
 #define COEFFICIENT_MOST_PER_K      0.0015f
 #define COEFFICIENT_MOST_PER_HEAT_K (COEFFICIENT_MOST_PER_K / 0.85f)
 
@@ -26,6 +26,9 @@ float spring_see(const spring_estimator_t *estimator, spring_belief_t *belief,
  * no surer than before. */
 void spring_keep_above(const spring_estimator_t *estimator, spring_belief_t *belief,
                        thermal_model_t *model, uint8_t spring, float limit_c);
+
+/* It has transformed: what it reads now is its own austenite's, and the way there its change. */
+void spring_learn_austenite(spring_belief_t *belief);
 
 /* While it heats: what heat does to its resistance. */
 void spring_heating_watch(const spring_estimator_t *estimator, spring_belief_t *belief,

@@ -21,6 +21,7 @@ void spring_estimator_begin_heating(spring_estimator_t *e, uint8_t k)
     b->heat_k = b->mark_k = b->flat_k = b->excess = 0.0f;
     b->mark_ohm = b->onset_ohm = b->cold_ohm = b->line_ohm = 0.0f;
     b->onset = b->steep = false;
+    b->heating = true;
     if (b->possible == SPRING_PHASE_AUSTENITE) {
         b->possible = b->lost < CHANGE_PART ? SPRING_PHASE_BETWEEN | SPRING_PHASE_AUSTENITE
                                             : SPRING_PHASE_BETWEEN;
@@ -48,8 +49,7 @@ static void see_onset(const spring_estimator_t *e, spring_belief_t *b, thermal_m
     b->possible = SPRING_PHASE_BETWEEN;
 }
 
-static void see_finish(const spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model,
-                       uint8_t k)
+void spring_learn_austenite(spring_belief_t *b)
 {
     const float change = 1.0f - b->onset_ohm / b->ohm;
     /* a heating from half way changes less */
@@ -57,13 +57,18 @@ static void see_finish(const spring_estimator_t *e, spring_belief_t *b, thermal_
         b->learnt.change = change;
     }
     b->learnt.austenite_ohm = b->ohm;
+}
+
+static void see_finish(const spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model,
+                       uint8_t k)
+{
+    spring_learn_austenite(b);
     b->possible = SPRING_PHASE_AUSTENITE;
     b->blind = false;
     b->steep = false;
     b->lost = 0.0f;
-    (void)spring_see(e, b, model, k,
-                     spring_transformation(model, k).austenite_finish_c + b->flat_k, PLACE_SD_K,
-                     SPRING_PHASE_AUSTENITE);
+    (void)spring_see(e, b, model, k, spring_transformation(model, k).austenite_finish_c + b->flat_k,
+                     PLACE_SD_K, SPRING_PHASE_AUSTENITE);
 }
 
 /* Change of resistance over heat, a step at a time: more than any temperature coefficient makes is
@@ -71,7 +76,7 @@ static void see_finish(const spring_estimator_t *e, spring_belief_t *b, thermal_
 void spring_heating_watch(const spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model,
                           uint8_t k)
 {
-    if (b->current_a < STRONG_A || b->possible == SPRING_PHASE_AUSTENITE ||
+    if (!b->heating || b->current_a < STRONG_A || b->possible == SPRING_PHASE_AUSTENITE ||
         b->possible == SPRING_PHASE_ANY || b->settling != 0) {
         b->mark_ohm = 0.0f;
         return;

@@ -92,8 +92,10 @@ void spring_holding_watch(const spring_estimator_t *e, spring_belief_t *b, therm
     const float left = b->slow_ohm / kept_ohm - 1.0f;
     const float as_learnt = -left / b->learnt.change;
     const float lost = as_learnt > 0.0f ? as_learnt : -as_learnt / OTHER_WAY;
-    const float sure =
-        fmaxf(LOSS_LEAST, SURE_SDS * NOISE_IN_SLOW * b->noise) / fabsf(b->learnt.change);
+    /* as its temperature may have moved unseen, so may the resistance */
+    const float moves = fabsf(b->learnt.martensite_rise_per_k) * spring_estimator_sd_k(b);
+    const float sure = fmaxf(fmaxf(LOSS_LEAST, moves), SURE_SDS * NOISE_IN_SLOW * b->noise) /
+                       fabsf(b->learnt.change);
     if (lost < SUSPECTED * sure) {
         b->losing = 0;
         b->line_ohm += b->line_ohm * left / LINE_TURNS;

@@ -35,7 +35,7 @@ typedef enum {
 /* What was last said of a spring's limits. */
 typedef struct {
     uint16_t limits; /* bits of drive_policy_limit_t */
-    uint8_t cut;    /* 64 mA */
+    uint8_t cut;     /* 64 mA */
 } telemetry_told_t;
 
 typedef struct {

@@ -18,10 +18,10 @@ typedef struct {
     int16_t measured_ma, measured_mv;
     uint16_t target_ma, duty, level_permille;
     int16_t temperature_c7;
-    uint8_t fault;         /* safety_fault_t */
+    uint8_t fault; /* safety_fault_t */
     uint8_t stage;
-    uint16_t limits; /* drive_policy_stage_t, bits of drive_policy_limit_t */
-    uint16_t wanted_ma;    /* what the policy would give without them */
+    uint16_t limits;    /* drive_policy_stage_t, bits of drive_policy_limit_t */
+    uint16_t wanted_ma; /* what the policy would give without them */
     /* where its phase stands: see thermal_model_spring_state_t */
     int16_t heating_c7, cooling_c7, transformation_shift_c7;
     uint16_t amplitude;

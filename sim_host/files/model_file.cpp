@@ -390,15 +390,15 @@ void check_provenance(const reader &root)
         return;
     }
     const reader table = root.table(*node, "provenance");
-    table.refuse_unknown({"tool", "date", "logs", "rmse_before_c", "rmse_after_c", "note"});
+    table.refuse_unknown({"tool", "date", "logs", "rmse_before_c", "rmse_after_c", "hottest_c", "note"});
     for (const char *key : {"tool", "date", "note"}) {
         if (const toml::node *text = table.find(key)) {
             (void)table.text(*text, key);
         }
     }
-    for (const char *key : {"rmse_before_c", "rmse_after_c"}) {
+    for (const char *key : {"rmse_before_c", "rmse_after_c", "hottest_c"}) {
         if (const toml::node *number = table.find(key)) {
-            (void)table.number(*number, key, 0.0, 1e6);
+            (void)table.number(*number, key, -100.0, 1e6);
         }
     }
     if (const toml::node *logs = table.find("logs")) {

@@ -65,8 +65,5 @@ def make_log(tmp_path: Path) -> Make:
 
 @pytest.fixture
 def measured() -> Path:
-    """Return the folder of measured data; skip where it is absent."""
-    folder = Path(os.environ.get("NINESPRING_DATA", Path(__file__).resolve().parents[3] / "shared" / "data"))
-    if not folder.is_dir():
-        pytest.skip(f"no measured data at {folder}: set NINESPRING_DATA")
-    return folder
+    """Return the folder of measured data."""
+    return Path(os.environ.get("NINESPRING_DATA", Path(__file__).resolve().parents[2] / "data"))

@@ -76,9 +76,7 @@ def board() -> Iterator[str]:
 
 def settings_of(port: str) -> dict[str, float]:
     with Board(port) as connection:
-        connection.greet()
-        lines = connection.ask("$$", 30.0)
-    return {name: float(value) for name, value in (line[1:].split("=", 1) for line in lines if line.startswith("$"))}
+        return {name: float(value) for name, value in connection.settings().items()}
 
 
 @pytest.mark.skipif(not SIM.exists(), reason=f"SKIPPED: {SIM} is not there: build it, or set NINESPRING_SIM")
@@ -115,8 +113,8 @@ def test_an_effect_found_in_a_log_is_in_the_model_of_the_chip_that_it_was_upload
     assert scale != [before[f"loss_scale_{k}"] for k in (1, 2, 5)]
 
     # and the chip's model does what the model does: its telemetry, recorded, against a replay of what it measured
-    (tmp_path / "steps.txt").write_text("at 1 = pattern 111101111\nat 25 = off all\n")
-    record = ("record", "--port", board, "--hz", 2, "--duration", 12, "--run", tmp_path / "steps.txt")
+    (tmp_path / "steps.txt").write_text("at 1 = pattern 111101111\nat 45 = off all\n")
+    record = ("record", "--port", board, "--hz", 2, "--duration", 60, "--run", tmp_path / "steps.txt")
     ninespring(*record, "-o", tmp_path / "board.csv")
     got = read_table(tmp_path / "board.csv", ("state",)).frame
     assert len(got) > 15

@@ -4,25 +4,22 @@ from __future__ import annotations
 
 import io
 import json
-import os
-import pty
 import re
 import signal
 import subprocess
 import sys
-import threading
-import time
-import tty
 from pathlib import Path
 
 import jsonschema
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from ninespring import cli, diagnosis
+from ninespring import cli, console
 from ninespring.errors import WorkError
+from ninespring.fit.predict import predict
 from ninespring.logs import log_text, read_log, read_table, write_atomically
 from ninespring.models import Array, Model, model_text, read_model
+from ninespring.verdict import result as fitted
 from rich.console import Console
 
 
@@ -108,14 +105,14 @@ def test_every_result_is_held_to_its_schema(make_log, tmp_path: Path) -> None:
         assert done.returncode == 0, done.stderr
         result = json.loads((tmp_path / "r.json").read_text())
         assert result["schema"] == f"ninespring.{name}/1"
-        cli.checked(result)
+        console.checked(result)
         for key in result:
             broken = dict(result)
             del broken[key]
             with pytest.raises(jsonschema.ValidationError):
-                cli.checked(broken)
+                console.checked(broken)
         with pytest.raises(jsonschema.ValidationError):
-            cli.checked(result | {"surplus": 1})
+            console.checked(result | {"surplus": 1})
 
 
 def test_the_chip_starts_again_after_gaps_and_is_seen_by_the_same_sensors(make_log) -> None:
@@ -128,7 +125,7 @@ def test_the_chip_starts_again_after_gaps_and_is_seen_by_the_same_sensors(make_l
     true = {"sensor_lag": {"sensor_lag_s": 8.0}, "edge_loss": {"edge_loss_fraction": 0.2}}
     run = read_log(make_log(effects=true, change=gap))
     model = Model(Array(), list(true), {k: v for one in true.values() for k, v in one.items()})
-    plant, chip = diagnosis.predict(model, run), diagnosis.predict(model, run, chip=True)
+    plant, chip = predict(model, run), predict(model, run, chip=True)
     assert np.abs(plant - chip).max() < 0.1
     left = run.temperature_c - chip
     assert np.sqrt(np.nanmean(left**2)) < 0.35
@@ -201,7 +198,7 @@ def test_work_that_ends_early_leaves_nothing_and_says_one_line(
         raise raised
 
     stream = io.StringIO()
-    monkeypatch.setattr(diagnosis, "model_of", ends)
+    monkeypatch.setattr(fitted, "model_of", ends)
     monkeypatch.setattr(cli, "err", Console(file=stream, width=200))
     monkeypatch.setattr(sys, "argv", ["ninespring", "fit", str(log), "-o", str(tmp_path / "m.toml")])
     before = signal.getsignal(signal.SIGTERM)
@@ -284,156 +281,3 @@ def test_a_bad_log_leaves_nothing_half_written(make_log, tmp_path: Path) -> None
     done = ninespring("diagnose", log, "-o", tmp_path / "out")
     assert done.returncode == 2
     assert set(tmp_path.iterdir()) == before
-
-
-class FakeBoard:
-    """A board on a pty: answers lines with `ok` or what it is told, keeps settings, shows them in `$$`."""
-
-    def __init__(self, answers: dict[str, list[str]] | None = None) -> None:
-        self.master, slave = pty.openpty()
-        tty.setraw(slave)
-        self.port = os.ttyname(slave)
-        self.answers = answers or {}
-        self.seen: list[str] = []
-        self.settings: dict[str, str] = {}
-        threading.Thread(target=self.serve, daemon=True).start()
-
-    def say(self, *lines: str) -> None:
-        os.write(self.master, "".join(line + "\r\n" for line in lines).encode())
-
-    def serve(self) -> None:
-        buffer = b""
-        while True:
-            try:
-                buffer += os.read(self.master, 256)
-            except OSError:
-                return
-            while b"\n" in buffer:
-                line, buffer = buffer.split(b"\n", 1)
-                text = line.decode().strip()
-                self.seen.append(text)
-                if text in self.answers:
-                    self.say(*self.answers[text])
-                elif text == "$$":
-                    self.say(*(f"${name}={value}" for name, value in self.settings.items()), "ok")
-                else:
-                    if text.startswith("$") and "=" in text:
-                        self.settings.__setitem__(*text[1:].split("=", 1))
-                    self.say("ok")
-
-
-TELEMETRY = "time_s,i1_a,v1_v,m1_c,fan,ambient_c,state"
-
-
-def test_upload_sends_settings_reads_them_back_and_saves(tmp_path: Path) -> None:
-    board = FakeBoard()
-    (tmp_path / "s.txt").write_text("# from model.toml\n$latent_heat_j=8.000\n$loss_w_per_k=0.005800\n")
-    done = ninespring("upload", "--port", board.port, tmp_path / "s.txt", "--json", tmp_path / "u.json")
-    assert done.returncode == 0, done.stderr
-    assert board.seen[-4:] == ["$latent_heat_j=8.000", "$loss_w_per_k=0.005800", "$$", "$save"]
-    assert json.loads((tmp_path / "u.json").read_text())["settings"] == 2
-
-
-@pytest.mark.parametrize(
-    ("answers", "said"),
-    [
-        ({"$loss_w_per_k=9": ["error:4 out of range"]}, "error 4 out of range"),
-        ({"$loss_w_per_k=9": ["[not active yet: x]", "ok"]}, "not active yet"),
-        ({"$$": ["$loss_w_per_k=0.005800", "ok"]}, "loss_w_per_k is 0.005800, not 9"),
-        ({"$$": ["ok"]}, "loss_w_per_k is missing"),
-    ],
-)
-def test_what_the_board_does_not_take_is_said_and_nothing_saved(
-    tmp_path: Path, answers: dict[str, list[str]], said: str
-) -> None:
-    board = FakeBoard(answers)
-    (tmp_path / "s.txt").write_text("$loss_w_per_k=9\n")
-    done = ninespring("upload", "--port", board.port, tmp_path / "s.txt")
-    assert done.returncode == 1
-    assert said in done.stderr
-    assert "$save" not in board.seen
-
-
-@pytest.mark.parametrize("text", ["", "# nothing\n", "loss_w_per_k=1\n", "$loss=1;$save\n", "$x=nan\n", "$ä=1\n"])
-def test_a_file_that_is_no_settings_is_refused_before_the_board_is_asked(tmp_path: Path, text: str) -> None:
-    (tmp_path / "s.txt").write_text(text)
-    done = ninespring("upload", "--port", "/dev/no-such-port", tmp_path / "s.txt")
-    assert done.returncode == 2
-    assert done.stderr.startswith(f"ninespring: {tmp_path / 's.txt'}")
-
-
-def test_record_keeps_whole_rows_that_rise_and_sends_the_steps_in_their_time(tmp_path: Path) -> None:
-    rows = [TELEMETRY, "ok", "7.0,1,0.2,20,0,20,ok", "7.5,1,0.2,20,0,20,ok", "7.5,1,0.2,20,0,20,ok", "8.0,1,0."]
-    status = "<limits|spring:1|t:8.000|supply|cut_a:2.610>"
-    board = FakeBoard({"telemetry csv 2": [*rows, "[remark]", status, "<limits|spr", "8.5,1,0.2,21,0,20,ok"]})
-    (tmp_path / "steps.txt").write_text("ambient 21.5\nat 0.5 = on 1   ; the first\nat 1.5 = fan 100\nat 90 = on 2\n")
-    log = tmp_path / "log.csv"
-    done = ninespring(
-        *("record", "--port", board.port, "--hz", 2, "--duration", 1.5, "--run", tmp_path / "steps.txt", "-o", log)
-    )
-    assert done.returncode == 0, done.stderr
-    lines = log.read_text().splitlines()
-    assert "# dropped_lines: 2" in lines
-    assert lines[-2:] == [f"# {status}", "8.5,1,0.2,21,0,20,ok"]
-    assert [line.split(",")[0] for line in lines if not line.startswith("#")] == ["time_s", "7.0", "7.5", "8.5"]
-    at = [board.seen.index(word) for word in ("ambient 21.5", "telemetry csv 2", "on 1", "fan 100", "off all")]
-    assert at == sorted(at)
-    assert "on 2" not in board.seen
-    assert board.seen[-1] == "telemetry off"
-    assert sorted(one.name for one in tmp_path.iterdir()) == ["log.csv", "steps.txt"]
-
-
-@pytest.mark.parametrize(
-    ("more", "said"),
-    [([], "no telemetry for 5 s"), (["0.1,1,0.2,20,0,20,ok"], "started again"), (["error:7 x"], "7 x")],
-)
-def test_what_was_recorded_is_kept_whatever_ends_it(tmp_path: Path, more: list[str], said: str) -> None:
-    rows = [TELEMETRY, "ok", "5.0,1,0.2,20,0,20,ok", "6.0,1,0.2,20,0,20,ok", *more]
-    board = FakeBoard({"telemetry csv 1": rows})
-    log = tmp_path / "log.csv"
-    done = ninespring("record", "--port", board.port, "--duration", 60, "-o", log, "--json", tmp_path / "r.json")
-    assert done.returncode == 1
-    assert said in done.stderr
-    assert log.read_text().splitlines()[-1].startswith("6.0,")
-    assert said in json.loads((tmp_path / "r.json").read_text())["ended"]
-
-
-def test_a_recording_that_is_killed_leaves_its_rows_beside_and_no_log(tmp_path: Path) -> None:
-    board = FakeBoard({"telemetry csv 1": [TELEMETRY, "ok", "5.0,1,0.2,20,0,20,ok"]})
-    command = [sys.executable, "-m", "ninespring", "record", "--port", board.port, "-o", str(tmp_path / "log.csv")]
-    with subprocess.Popen(command, stderr=subprocess.DEVNULL) as process:
-        part = tmp_path / "log.csv.part"
-        while process.poll() is None and not (part.exists() and "5.0," in part.read_text()):
-            time.sleep(0.05)
-        process.kill()
-    assert [one.name for one in tmp_path.iterdir()] == ["log.csv.part"]
-
-
-def test_a_recording_that_is_ended_from_outside_is_written(tmp_path: Path) -> None:
-    board = FakeBoard({"telemetry csv 1": [TELEMETRY, "ok", "5.0,1,0.2,20,0,20,ok"]})
-    command = [sys.executable, "-m", "ninespring", "record", "--port", board.port, "-o", str(tmp_path / "log.csv")]
-    with subprocess.Popen(command, stderr=subprocess.DEVNULL) as process:
-        part = tmp_path / "log.csv.part"
-        while process.poll() is None and not (part.exists() and "5.0," in part.read_text()):
-            time.sleep(0.05)
-        process.terminate()
-        assert process.wait(30) == 0
-    assert [one.name for one in tmp_path.iterdir()] == ["log.csv"]
-
-
-def test_a_port_that_is_not_there_ends_with_one(tmp_path: Path) -> None:
-    done = ninespring("record", "--port", "/dev/no-such-port", "-o", tmp_path / "x.csv")
-    assert done.returncode == 1
-    assert "cannot be opened" in done.stderr
-    assert not list(tmp_path.iterdir())
-
-
-@pytest.mark.parametrize(
-    ("text", "line"),
-    [("at 5 pattern 1\n", 1), ("on 1\nat 5 = on 2\non 3\n", 3), ("at 5 = on 1\nat 4 = on 2\n", 2), ("fan ä\n", 1)],
-)
-def test_a_wrong_script_is_refused_with_its_line(tmp_path: Path, text: str, line: int) -> None:
-    (tmp_path / "steps.txt").write_text(text)
-    done = ninespring("record", "--port", "x", "--run", tmp_path / "steps.txt", "-o", tmp_path / "x.csv")
-    assert done.returncode == 2
-    assert done.stderr.startswith(f"ninespring: {tmp_path / 'steps.txt'}:{line}:1: ")

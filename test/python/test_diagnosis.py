@@ -7,10 +7,13 @@ import copy
 import jsonschema
 import numpy as np
 import pytest
-from ninespring import diagnosis, effects
-from ninespring.fitting import Problem
+from ninespring import effects, native
+from ninespring.fit.declared import base_spec
+from ninespring.fit.predict import plant_of, predict
+from ninespring.fit.problem import Problem
 from ninespring.logs import read_log
 from ninespring.models import Array, model_text, read_model
+from ninespring.verdict import diagnosis
 
 
 def names(result: dict) -> list[str]:
@@ -113,7 +116,7 @@ def test_the_model_file_is_read_back_and_predicts(make_log, tmp_path) -> None:
     found = diagnosis.diagnose(Array(), [run])
     path = tmp_path / "model.toml"
     path.write_text(model_text(found.model))
-    shown = diagnosis.predict(read_model(path), run)
+    shown = predict(read_model(path), run)
     assert np.sqrt(np.nanmean((run.temperature_c - shown) ** 2)) < 0.33
 
 
@@ -122,7 +125,7 @@ def test_the_chip_takes_the_effect_and_not_the_thermometer(make_log) -> None:
     runs = [read_log(make_log(f"{k}.csv", both, seed=k)) for k in (1, 2)]
     found = diagnosis.diagnose(Array(), runs)
     assert set(names(found.result)) == set(both)
-    text, message = diagnosis.chip_settings(found.model)
+    text, message = native.chip_export(plant_of(found.model))
     value = float(next(line for line in text.splitlines() if line.startswith("$latent_heat_j=")).split("=")[1])
     assert value == pytest.approx(8.0, rel=0.1)
     assert "lag" not in text and "sensor_lag" in message
@@ -139,14 +142,14 @@ def test_the_chip_model_is_better_with_the_effect_on_a_log_it_never_saw(
     before.parameters = {k: v for k, v in before.parameters.items() if k != "latent_heat_j"}
 
     def error(model) -> float:
-        return float(np.sqrt(np.nanmean((held.temperature_c - diagnosis.predict(model, held, chip=True)) ** 2)))
+        return float(np.sqrt(np.nanmean((held.temperature_c - predict(model, held, chip=True)) ** 2)))
 
     assert error(found.model) < 0.6 < error(before)
 
 
 def test_simulations_in_threads_give_the_same_as_alone(make_log) -> None:
     problem = Problem(Array(), [read_log(make_log())])
-    spec = effects.base_spec(problem)
+    spec = base_spec(problem)
     values = [f.start for f in spec.free]
     alone = problem.simulate(spec, values, 0)
     for one in problem.simulate_many([(spec, values, 0)] * 8):

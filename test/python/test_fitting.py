@@ -6,10 +6,14 @@ import math
 
 import numpy as np
 import pytest
-from ninespring import diagnosis, effects, native, search, statistics
-from ninespring.fitting import FOLDS, Problem, fold_of_rows
+from ninespring import effects, native
+from ninespring.fit import statistics
+from ninespring.fit.declared import base_spec
+from ninespring.fit.problem import FOLDS, Problem, fold_of_rows
 from ninespring.logs import read_log
 from ninespring.models import Array
+from ninespring.search import evidence, search
+from ninespring.verdict import diagnosis
 
 TRUE = {
     "heat_capacity_j_per_k": 0.3,
@@ -58,7 +62,7 @@ def test_errors_grow_where_the_residual_remembers(make_log) -> None:
     sizes = []
     for change in (None, wander):
         problem = Problem(Array(), [read_log(make_log(seed=4, change=change))])
-        fit = problem.fit(effects.base_spec(problem), errors=True)
+        fit = problem.fit(base_spec(problem), errors=True)
         sizes.append(fit.stderr()["loss_w_per_k"])
     # 0.3 K white and 0.3 K that remembers 50 s: far more than the factor of 1.4 of the mere size
     assert sizes[1] > 2.5 * sizes[0]
@@ -69,7 +73,7 @@ def test_held_out_blocks_are_not_fitted(make_log) -> None:
     run = read_log(make_log(seed=6, noise=0.05))
     at = fold_of_rows(run) == 2
     problem = Problem(Array(), [run])
-    fit = problem.fit(effects.base_spec(problem), errors=True)
+    fit = problem.fit(base_spec(problem), errors=True)
     clean = problem.holdout_rmse(fit)
     assert clean == pytest.approx(0.05, rel=0.1)
     # a number that is free in one block only: fitted in sample, unknown when the block is left out
@@ -99,7 +103,7 @@ def test_a_wrong_first_reading_is_kept_out_of_the_fit(make_log) -> None:
     values = []
     for run in (true, wrong):
         problem = Problem(Array(), [run])
-        values.append(diagnosis.first_fit(problem, effects.base_spec(problem)))
+        values.append(diagnosis.first_fit(problem, base_spec(problem)))
     errors = values[0].stderr()
     for key, one in values[0].as_dict().items():
         assert abs(one - values[1].value(key)) < errors[key], key
@@ -107,7 +111,7 @@ def test_a_wrong_first_reading_is_kept_out_of_the_fit(make_log) -> None:
 
 def test_values_that_the_plant_refuses_are_merely_bad(make_log) -> None:
     problem = Problem(Array(), [read_log(make_log(seconds=120))])
-    spec = effects.base_spec(problem)
+    spec = base_spec(problem)
     values = [f.start for f in spec.free]
     values[0] = -1.0
     assert np.all(problem.simulate(spec, values, 0) == 1e3)
@@ -115,7 +119,7 @@ def test_values_that_the_plant_refuses_are_merely_bad(make_log) -> None:
 
 def test_bounds_hold_and_are_reported(make_log) -> None:
     problem = Problem(Array(), [read_log(make_log(effects={"edge_loss": {"edge_loss_fraction": -0.2}}))])
-    spec = effects.base_spec(problem)
+    spec = base_spec(problem)
     side = next(c for c in effects.candidates(problem) if c.variant == "per free side")
     spec = spec.with_effect(side.effect, side.free, (), side.variant)
     fit = problem.fit(spec)
@@ -153,23 +157,23 @@ def test_springs_start_where_the_sensors_would_show_the_first_row() -> None:
 def test_evidence_prices_numbers_and_counts_correlated_samples_for_less(make_log) -> None:
     """A number that explains nothing costs; the same gain is worth less where the residual remembers."""
     problem = Problem(Array(), [read_log(make_log(seed=2))])
-    base = diagnosis.first_fit(problem, effects.base_spec(problem))
+    base = diagnosis.first_fit(problem, base_spec(problem))
     known = effects.candidates(problem)
     found = search.Search(problem, known, base)
     lag = next(c for c in known if c.effect == "sensor_lag")
     spare = found.refit(base, [lag], [0.1])
-    assert search.log_evidence(problem, spare, base) < -3.0  # half the logarithm of 5400 samples, less what it found
+    assert evidence.log_evidence(problem, spare, base) < -3.0  # half the logarithm of 5400 samples, less what it found
     better = problem.fit(base.spec, base.as_dict(), errors=True)
     better.chi2, better.sse = 0.9 * base.chi2, 0.9 * base.sse
-    white = search.log_evidence(problem, better, base)
+    white = evidence.log_evidence(problem, better, base)
     better.factor = 20.0
-    better.innovation = search.innovation(problem, base)
-    assert 0 < search.log_evidence(problem, better, base) < 0.2 * white
+    better.innovation = evidence.innovation(problem, base)
+    assert 0 < evidence.log_evidence(problem, better, base) < 0.2 * white
 
 
 def test_only_what_the_noise_of_a_first_reading_leaves_is_taken_away(make_log) -> None:
     problem = Problem(Array(), [read_log(make_log(seed=9))])
-    fit = diagnosis.first_fit(problem, effects.base_spec(problem))
+    fit = diagnosis.first_fit(problem, base_spec(problem))
     response = problem.simulate(fit.spec, fit.values, 0, np.eye(9)[3]) - problem.simulate(fit.spec, fit.values, 0)
     rest = problem.without_starts(fit.residual)[0]
     for off, left in ((0.6, 0.0), (6.0, 6.0 - 0.9)):  # K: twice the noise, twenty times the noise

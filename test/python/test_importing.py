@@ -189,7 +189,7 @@ def test_frames_that_are_not_in_degrees_are_refused(tmp_path: Path) -> None:
     regions = [importing.Region(3, 0, 0, 2, 2)]
     raw = np.full((4, 4, 4), 20.0)
     raw[2] = 29315.0
-    with pytest.raises(InputError, match=r"spring 3 shows 29315 in frame 3: frames are in degC"):
+    with pytest.raises(InputError, match=r"spring 3 shows 29315 in frame 3: that is no temperature in degC"):
         importing.reduce_frames("f.npy", 4, iter(raw), regions)
     dead = raw[:2].copy()
     dead[0, 0, 0] = np.nan
@@ -208,3 +208,16 @@ def test_wrong_times_of_frames_are_refused_with_their_line(tmp_path: Path, text:
     assert caught.value.line == line
     path.write_text("# s\n0\n0.5  # late\n\n2\n")
     assert importing.read_times(path).tolist() == [0, 0.5, 2]
+
+
+def test_kelvin_is_recognised_in_frames_and_tables_and_converted_when_told(tmp_path: Path) -> None:
+    frames = np.full((5, 4, 4), 294.0) + np.arange(5.0)[:, None, None]
+    one = [importing.Region(1, 0, 0, 4, 4)]
+    with pytest.raises(InputError, match=r"looks like kelvin, `--unit K` converts"):
+        importing.reduce_frames("f.npy", 5, iter(frames), one)
+    got = importing.reduce_frames("f.npy", 5, iter(frames), one, unit="K")["t1_c"]
+    assert got == pytest.approx(20.85 + np.arange(5.0))
+    (tmp_path / "t.csv").write_text("Time,I,T\n" + "".join(f"{k},1,{294 + k}\n" for k in range(5)))
+    (tmp_path / "map.toml").write_text('[columns]\ntime_s = "Time"\ni1_a = "I"\nt1_c = "T"\n')
+    with pytest.raises(InputError, match=r'looks like kelvin, unit = "K" for t1_c'):
+        importing.import_table(tmp_path / "t.csv", tmp_path / "map.toml")

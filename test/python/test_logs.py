@@ -10,7 +10,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from ninespring import native
 from ninespring.errors import InputError
-from ninespring.fitting import simulate_run
+from ninespring.fit.simulate import simulate_run
 from ninespring.logs import condense, log_text, read_log, read_table
 
 HEADER = "time_s,i1_a,t1_c\n"
@@ -325,3 +325,10 @@ def test_what_is_written_is_read_back(tmp_path: Path, rows: list[tuple[float, fl
     assert np.allclose(run.drive[:, 0], current, atol=1e-4)
     seen = np.isfinite(run.temperature_c[:, 0])
     assert np.allclose(run.temperature_c[seen, 0], temperature[seen], atol=1e-4)
+
+
+@pytest.mark.parametrize(("value", "said"), [(-1.5, "leads of that sensor are swapped"), (1500, "milliamperes")])
+def test_a_negative_current_is_not_taken_for_milliamperes(make_log, value: float, said: str) -> None:
+    log = make_log(change=lambda c: c["i3_a"].__setitem__(slice(50, 60), value))
+    with pytest.raises(InputError, match=said):
+        read_log(log)

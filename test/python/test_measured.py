@@ -5,9 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from ninespring import diagnosis, importing, steady
+from ninespring import importing
 from ninespring.logs import read_log
 from ninespring.models import Array, Model
+from ninespring.verdict import diagnosis, steady
 
 
 def test_six_camera_values_are_explained_by_one_number_and_rivals_have_experiments(

@@ -7,8 +7,9 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from ninespring import diagnosis, native
+from ninespring import native
 from ninespring.errors import InputError
+from ninespring.fit.predict import plant_of
 from ninespring.models import SCHEMA, Array, Model, model_text, read_array, read_model
 
 HEAD = f'schema = "{SCHEMA}"\neffects = ["latent_heat"]\n\n[array]\nrows = 1\ncols = 2\n\n'
@@ -97,7 +98,7 @@ def test_a_model_is_the_plant_that_it_describes() -> None:
     model.effects = ["supply_sag"]
     model.parameters = {"loss_w_per_k[2]": 0.02, "loss_w_per_k": 0.01, "supply_chopped": 1.0}
     model.array.spring = {"wire_diameter_mm": 1.6}
-    plant = diagnosis.plant_of(model)
+    plant = plant_of(model)
     assert (plant.get("loss_w_per_k[1]"), plant.get("loss_w_per_k[2]")) == (0.01, 0.02)
     assert plant.get("supply_chopped") == 1.0
     # four times the section: four times the heat capacity, a quarter of the resistance

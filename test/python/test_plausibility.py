@@ -6,9 +6,9 @@ import re
 
 import numpy as np
 import pytest
-from ninespring import diagnosis, plausibility
 from ninespring.logs import read_log
 from ninespring.models import Array
+from ninespring.verdict import diagnosis, plausibility
 
 TRUE = {"latent_heat": {"latent_heat_j": 8.0}, "shared_air": {"air_exchange_w_per_k": 0.2}}
 

@@ -8,9 +8,10 @@ from html.parser import HTMLParser
 
 import numpy as np
 import pytest
-from ninespring import diagnosis, report
 from ninespring.logs import read_log
 from ninespring.models import Array
+from ninespring.report import page as report
+from ninespring.verdict import diagnosis
 
 
 class Page(HTMLParser):

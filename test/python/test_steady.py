@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ninespring import diagnosis, steady
 from ninespring.errors import InputError
 from ninespring.models import Array
+from ninespring.verdict import diagnosis, steady
 
 MIXING = {"optical_mixing": {"optical_orthogonal": 0.06, "optical_diagonal": 0.015}}
 

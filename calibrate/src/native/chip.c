@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "chip_mapping.h"
+#include "chip_settings.h"
 #include "plant.h"
 #include "settings.h"
 #include "text.h"
@@ -16,10 +17,10 @@
 
 EXPORT int chip_export(const plant_t *plant, char *text, size_t text_size, char *message,
                        size_t message_size);
-EXPORT int chip_simulate(const plant_t *plant, size_t rows, const double *time_s,
-                         const double *power_w, const double *fan, const double *ambient_c,
-                         const double *first_c, double *temperature_c, char *message,
-                         size_t message_size);
+EXPORT int chip_simulate(const char *lines, int array_rows, int array_columns, size_t rows,
+                         const double *time_s, const double *power_w, const double *fan,
+                         const double *ambient_c, const double *first_c, double *temperature_c,
+                         char *message, size_t message_size);
 
 static bool append(char *text, size_t size, size_t *used, const char *line)
 {
@@ -71,23 +72,27 @@ int chip_export(const plant_t *plant, char *text, size_t text_size, char *messag
     return 0;
 }
 
-/* A log through the on-chip model with the plant's parameters: power_w[rows * n] holds from its row
- * to the next; first_c[n] starts it; temperature_c[rows * n] out. 0 done, else chip_mapping's
- * status. */
-int chip_simulate(const plant_t *plant, size_t rows, const double *time_s, const double *power_w,
-                  const double *fan, const double *ambient_c, const double *first_c,
-                  double *temperature_c, char *message, size_t message_size)
+/* A log through the on-chip model as console lines over the firmware's defaults set it:
+ * power_w[rows * n] holds from its row to the next; first_c[n] starts it; temperature_c[rows * n]
+ * out. 0 done; -1 a line is refused, -2 the model refuses the settings (message says which). */
+int chip_simulate(const char *lines, int array_rows, int array_columns, size_t rows,
+                  const double *time_s, const double *power_w, const double *fan,
+                  const double *ambient_c, const double *first_c, double *temperature_c,
+                  char *message, size_t message_size)
 {
-    thermal_model_parameters_t parameters;
-    const chip_mapping_status_t status =
-        chip_mapping_from_plant(plant, &parameters, message, message_size);
-    if (status != CHIP_MAPPING_OK) {
-        return (int)status;
+    settings_t settings;
+    if (!chip_settings(&settings, array_rows, array_columns, lines, message, message_size)) {
+        return -1;
     }
+    const thermal_model_parameters_t *parameters = &settings.controller.model;
     static _Thread_local thermal_model_t model;
-    (void)thermal_model_init(&model, &parameters, NULL);
-    const size_t n = (size_t)parameters.rows * parameters.columns;
-    const double step_s = 1e-3 * parameters.step_ms;
+    uint16_t bad = 0;
+    if (thermal_model_init(&model, parameters, &bad) != THERMAL_MODEL_OK) {
+        (void)snprintf(message, message_size, "%s", parameter_row(bad).name);
+        return -2;
+    }
+    const size_t n = (size_t)parameters->rows * parameters->columns;
+    const double step_s = 1e-3 * parameters->step_ms;
     thermal_model_set_ambient(&model, (int16_t)(ambient_c[0] * 128.0));
     thermal_model_reset(&model, (int16_t)(ambient_c[0] * 128.0));
     for (size_t k = 0; k < n; k++) {

@@ -1,241 +1,302 @@
-"""A board at a serial port (docs/console.md): one line out, lines in until `ok` or `error:N`."""
+"""A board and its console (docs/console.md): one line out, lines in until `ok` or `error:N`."""
 
 from __future__ import annotations
 
 import contextlib
-import math
 import re
+import subprocess
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass
 from types import TracebackType
 
-import serial
+import numpy as np
 
 from .errors import InputError, WorkError
+from .port import Port
+from .simulated import simulated_board
 
-BAUD = 115200
 ERROR = re.compile(r"^error:(\d+) ?(.*)$")
+TELEMETRY = re.compile(r"^(?:\d+\.\d+,.*|<.*>)$")
+"""A row, or a status line: comes at any moment, also in the middle of an answer."""
+FOUND_WITHIN_S = 5.0
+"""So soon a board is found, or it is said that there is none."""
+BOOTING_S = 2.0
+"""A Mega's boot loader listens for so long after a reset, and takes what is sent meanwhile for a program."""
+SIMULATED = "simulated"
+HOST_TIMEOUT_S = 5
+"""Springs go off when nothing came from here for so long, where the board has that setting."""
+ALIVE_EVERY_S = 1.0
+
+
+@dataclass(frozen=True)
+class Reading:
+    """One row of telemetry: arrays have one entry per spring (n,)."""
+
+    time_s: float
+    current_a: np.ndarray
+    voltage_v: np.ndarray
+    temperature_c: np.ndarray
+    """What the model on the chip believes."""
+    duty: np.ndarray
+    fan: float
+    ambient_c: float
+    state: str
+
+    def __repr__(self) -> str:
+        hottest = int(np.argmax(self.temperature_c))
+        return (
+            f"<{self.time_s:.1f} s, {self.current_a.sum():.2f} A, hottest spring {hottest + 1} at "
+            f"{self.temperature_c[hottest]:.1f} degC, {self.state}>"
+        )
 
 
 class Board:
-    """An open serial connection. Use as a context manager."""
+    """A board at a serial port. Leaving its `with` block switches all springs off.
 
-    def __init__(self, port: str, timeout_s: float = 3.0) -> None:
-        """Open the port; a Mega resets when it is opened."""
-        try:
-            self._serial = serial.Serial(port, BAUD, timeout=0.2, write_timeout=2.0)
-        except (serial.SerialException, OSError, ValueError) as error:
-            reason = str(error).split(":")[-1].strip()
-            raise WorkError(f"{port}: cannot be opened ({reason}): is the board there, is the port free?") from None
+    >>> with Board("/dev/ttyACM0") as board:  # or Board("simulated")
+    ...     board.on(5, 80)
+    ...     print(board.read().temperature_c)
+    """
+
+    def __init__(
+        self,
+        port: str = SIMULATED,
+        *,
+        stopped: Callable[[], bool] = lambda: False,
+        off_at_end: bool = True,
+    ) -> None:
+        """Open the port and find the board; `stopped` is asked while waiting, and ends it with KeyboardInterrupt."""
+        self.off_at_end = off_at_end
+        self.stopped = stopped
+        self.version: list[str] = []
+        """What the board says of itself."""
+        self._telemetry: deque[str] = deque()
+        self._alive_s = 0.0
+        self._owed = 0
+        """Answers that are still to come."""
+        self._unguarded: str | None = None
+        """The setting host_timeout_s as it was."""
+        self.thermometers: str | None = None
+        """Port of the simulated board's thermometers."""
+        self._simulated: subprocess.Popen[str] | None = None
+        if port == SIMULATED:
+            self._simulated, port, self.thermometers = simulated_board()
         self.port = port
-        self.timeout_s = timeout_s
+        try:
+            self._port = Port(port)
+            try:
+                self._greet()
+            except BaseException:
+                self._port.close()
+                raise
+        except BaseException:
+            self._end_simulation()
+            raise
+
+    def __repr__(self) -> str:
+        return f"<board at {self.port}: {self.version[0] if self.version else 'closed'}>"
 
     def __enter__(self) -> Board:
-        """Return the board."""
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Close the port."""
-        self._serial.close()
+        self.close()
 
-    def read_line(self, until: float) -> str | None:
-        """Return the next line without its end, None where none came until that monotonic time."""
-        buffer = b""
-        while time.monotonic() < until:
-            try:
-                buffer += self._serial.readline()
-            except (serial.SerialException, OSError):
-                raise WorkError(f"{self.port}: the board went away") from None
-            if buffer.endswith(b"\n"):
-                return buffer.decode("ascii", "replace").strip()
-        return None
-
-    def greet(self) -> None:
-        """Wait until the board answers an empty question; it may still be starting."""
-        for _ in range(8):
-            try:
-                self.ask("telemetry off", 1.5)
-                return
-            except WorkError as error:
-                last = error
-        raise WorkError(f"{self.port}: no board answers at {BAUD} baud ({last})")
-
-    def ask(self, line: str, timeout_s: float | None = None) -> list[str]:
-        """Send one line; return the answer's lines. WorkError where it is refused or nothing comes."""
+    def close(self) -> None:
+        """Switch everything off (unless told otherwise) and close the port."""
         try:
-            self._serial.write(line.encode("ascii") + b"\n")
-        except UnicodeEncodeError:
-            raise InputError(f"'{line}' is not plain ASCII") from None
-        except (serial.SerialException, OSError):
-            raise WorkError(f"{self.port}: the board does not take '{line}'") from None
-        until = time.monotonic() + (timeout_s or self.timeout_s)
+            if self.off_at_end:
+                self.make_safe()
+        finally:
+            self._port.close()
+            self._end_simulation()
+
+    def _end_simulation(self) -> None:
+        if self._simulated:
+            self._simulated.terminate()
+            self._simulated.communicate(timeout=10)
+            self._simulated = None
+
+    def _greet(self) -> None:
+        """Find out what is there: a board says `ninespring` to `version`."""
+        until = time.monotonic() + FOUND_WITHIN_S - 0.2
+        heard: list[str] = []
+        if self._port.resets_the_board:
+            line = self._wait(time.monotonic() + BOOTING_S)
+            heard += [line] if line else []
+        while (left := until - time.monotonic()) > 0:
+            self._port.write("\nversion\n")
+            ends = time.monotonic() + min(1.0, left)
+            while (line := self._wait(ends)) is not None:
+                heard.append(line)
+                if line.startswith("ninespring "):
+                    self.version = [line]
+                    break
+            if self.version:
+                self._end_of_greeting()
+                return
+        shown = next((re.sub(r"[^ -~]", "?", line)[:40] for line in heard if line), "")
+        if shown:
+            raise WorkError(f"{self.port}: what is there is no Ninespring board: it says '{shown}'")
+        raise WorkError(f"{self.port}: silent at 115200 baud: is it the right port, does the board run Ninespring?")
+
+    def _end_of_greeting(self) -> None:
+        """Read the rest of the answer, and those to what was asked while the board was still starting."""
+        self._port.write("telemetry off\n")
+        quiet_s, answered = 0.2, False
+        until = time.monotonic() + 1.0
+        while (line := self._wait(until)) is not None:
+            if TELEMETRY.match(line):
+                continue
+            if not answered and line not in ("", "ok"):
+                self.version.append(line)
+            answered = answered or line == "ok"
+            until = time.monotonic() + (quiet_s if answered else 1.0)
+
+    def _wait(self, until_s: float) -> str | None:
+        line = None if self.stopped() else self._port.read_line(until_s, self.stopped)
+        if line is None and self.stopped():
+            raise KeyboardInterrupt
+        return line
+
+    def ask(self, line: str, timeout_s: float = 3.0) -> list[str]:
+        """Send one line; return the answer's lines. WorkError where it is refused or nothing comes.
+
+        Telemetry that comes meanwhile is kept for `next_line`.
+        """
+        self._port.write(line + "\n")
+        self._alive_s = time.monotonic()
+        until = self._alive_s + timeout_s
+        self._owed += 1
         answer: list[str] = []
-        while (got := self.read_line(until)) is not None:
+        while (got := self._wait(until)) is not None:
+            match = ERROR.match(got)
+            if got == "ok" or match:
+                self._owed -= 1
+                if self._owed:  # the end of an answer that was not waited for
+                    answer = []
+                    continue
             if got == "ok":
                 return answer
-            if match := ERROR.match(got):
+            if match:
                 raise WorkError(f"'{line}' refused: error {match[1]} {match[2]}".rstrip())
-            answer.append(got)
-        raise WorkError(f"no answer to '{line}'")
+            if TELEMETRY.match(got):
+                self._telemetry.append(got)
+            elif got:
+                answer.append(got)
+        self._owed = 0
+        raise WorkError(f"{self.port}: no answer to '{line}' for {timeout_s:g} s")
 
-    def telemetry(self, hz: int, until: float) -> Iterator[str]:
-        """Switch CSV telemetry on and yield its lines, the header first, and status in angle brackets, until that time.
+    def next_line(self, until_s: float) -> str | None:
+        """Return the next line that nobody asked for (telemetry), None where none came until that monotonic time."""
+        if self._telemetry:
+            return self._telemetry.popleft()
+        while True:
+            now = time.monotonic()
+            if now >= self._alive_s + ALIVE_EVERY_S:
+                self._alive_s = now
+                self._port.write("\n")  # an empty line is not answered, but shows that this end lives
+            if (line := self._wait(min(until_s, self._alive_s + ALIVE_EVERY_S))) is not None:
+                return line
+            if time.monotonic() >= until_s:
+                return None
 
-        The time is monotonic.
-        """
-        for line in self.ask(f"telemetry csv {hz}"):
-            if line.startswith("time_s,"):
-                yield line
-        while time.monotonic() < until:
-            line = self.read_line(min(until, time.monotonic() + 5.0))
-            if line is None:
-                if time.monotonic() < until:
-                    raise WorkError(f"{self.port}: no telemetry for 5 s")
-                return
-            if match := ERROR.match(line):
-                raise WorkError(f"the board refuses what it was sent: error {match[1]} {match[2]}".rstrip())
-            status = line.startswith("<") and line.endswith(">")
-            if status or (line and line[0] not in "[<>" and line != "ok"):
-                yield line
+    def settings(self) -> dict[str, str]:
+        """Return the settings as `$$` shows them, without their units."""
+        pairs = (line[1:].split("=", 1) for line in self.ask("$$", 10.0) if line.startswith("$") and "=" in line)
+        return {name: value.split()[0] for name, value in pairs if value.strip()}
 
-    def send(self, line: str) -> None:
-        """Send one line whose answer comes among the telemetry."""
-        try:
-            self._serial.write(line.encode("ascii") + b"\n")
-        except (serial.SerialException, OSError):
-            raise WorkError(f"{self.port}: the board went away") from None
+    def guard(self, settings: dict[str, str]) -> None:
+        """Have the springs go off when this program falls silent, where the board can: ended by `make_safe`."""
+        if "host_timeout_s" in settings:
+            self._unguarded = settings["host_timeout_s"]
+            self.ask(f"$host_timeout_s={HOST_TIMEOUT_S}")
 
-    def off(self) -> None:
-        """Switch all springs off, if the board is still there."""
-        with contextlib.suppress(WorkError):
-            self.send("off all")
+    def unguard(self) -> None:
+        """Give the board back the timeout that it had."""
+        if self._unguarded is not None:
+            self.ask(f"$host_timeout_s={self._unguarded}", 1.0)
+            self._unguarded = None
 
-    def stop(self) -> None:
-        """Switch telemetry off, whatever is still under way."""
-        with contextlib.suppress(WorkError, serial.SerialException, OSError):
-            self._serial.reset_input_buffer()
-            self.ask("telemetry off")
+    def make_safe(self) -> bool:
+        """Switch telemetry and all springs off; True where the board confirms it. Never raises, and nothing stops it."""
+        self.stopped = lambda: False
+        for urgent in (False, False, True):
+            with contextlib.suppress(WorkError):
+                if urgent:
+                    self._port.write("!")
+                else:
+                    self.ask("off all", 1.0)
+                self.ask("telemetry off", 1.0)
+                self._telemetry.clear()
+                self.unguard()
+                return True
+        return False
 
+    def stop_now(self) -> None:
+        """Stop at once, from any thread, whatever is under way: `clear` goes on."""
+        self._port.write("!")
 
-@dataclass
-class Step:
-    """A console line to send so many seconds after the first row (None: before the recording)."""
+    def on(self, spring: int | None = None, level: float = 100) -> None:
+        """Drive a spring (1 = top left, row by row; None: all) at a level of 0..100 percent."""
+        self.ask(f"on {'all' if spring is None else spring} {level:g}")
 
-    line: str
-    at_s: float | None = None
+    def off(self, spring: int | None = None) -> None:
+        """Stop driving a spring, or all."""
+        self.ask(f"off {'all' if spring is None else spring}")
 
+    def pattern(self, springs: str) -> None:
+        """Drive exactly the springs that are 1 in a text of 0 and 1, row by row."""
+        self.ask(f"pattern {springs}")
 
-@dataclass
-class Recording:
-    """What came of a recording."""
+    def fan(self, percent: float) -> None:
+        """Set the fan, 0..100 percent."""
+        self.ask(f"fan {percent:g}")
 
-    rows: int = 0
-    dropped: int = 0
-    ended: str = ""
-    """Why it ended early where that was nobody's wish."""
-
-
-def script_lines(text: str, name: str) -> list[Step]:
-    """Return the steps of a script: console lines, or `at SECONDS = line` as in scenarios; # and ; begin comments."""
-    steps: list[Step] = []
-    for number, raw in enumerate(text.splitlines(), start=1):
-        line = re.split("[#;]", raw, maxsplit=1)[0].strip()
-        if not line:
-            continue
-        if not line.isascii():
-            raise InputError("the console takes plain ASCII", name, number, 1)
-        step = Step(line)
-        if re.match(r"at\b", line):
-            match = re.fullmatch(r"at\s+(\d+(?:\.\d*)?)\s*=\s*(\S.*)", line)
-            if not match:
-                raise InputError(f"'{line[:40]}' is not `at SECONDS = console line`", name, number, 1)
-            step = Step(match[2], float(match[1]))
-            if steps and steps[-1].at_s is not None and steps[-1].at_s > float(match[1]):
-                raise InputError("times of a script must not fall", name, number, 1)
-        elif steps and steps[-1].at_s is not None:
-            raise InputError(
-                f"'{line[:40]}' comes after timed lines: give it a time, `at SECONDS = ...`", name, number, 1
-            )
-        steps.append(step)
-    return steps
-
-
-def record(
-    board: Board,
-    hz: int,
-    duration_s: float,
-    steps: Sequence[Step] = (),
-    write: Callable[[str], None] = lambda line: None,
-    say: Callable[[int, float], None] = lambda rows, seconds: None,
-) -> Recording:
-    """Write a log's lines from a board's telemetry as they come: header and rows that are whole and rise in time.
-
-    Status between the rows, such as which limits act on a spring, becomes comments. Steps without a time are sent first;
-    timed ones in between, by the board's clock. What is driven by steps is switched off at the end. WorkError where no
-    row came.
-    """
-    got = Recording()
-    header, first, last = "", math.nan, -math.inf
-    for step in steps:
-        if step.at_s is None:
-            board.ask(step.line)
-    waiting = [step for step in steps if step.at_s is not None]
-    until = time.monotonic() + duration_s
-    try:
-        for line in board.telemetry(hz, until):
-            if line.startswith("time_s,"):
-                if not header:
-                    header = line
-                    write(line)
-                continue
-            if not header:
-                continue
-            if line.startswith("<"):
-                write(f"# {line}")
-                continue
-            try:
-                now = float(line.split(",", 1)[0])
-            except ValueError:
-                now = math.nan
-            if now < last - 1.0:
-                got.ended = "the board has started again"
-                break
-            if line.count(",") != header.count(",") or not now > last:
-                got.dropped += 1
-                continue
-            last = now
-            first = now if got.rows == 0 else first
-            got.rows += 1
-            write(line)
-            say(got.rows, now - first)
-            while waiting and waiting[0].at_s is not None and waiting[0].at_s <= now - first:
-                board.send(waiting.pop(0).line)
-    except KeyboardInterrupt:
-        pass
-    except WorkError as error:
-        if not got.rows:
-            raise
-        got.ended = str(error)
-    if steps:
-        board.off()
-    board.stop()
-    if not got.rows:
-        raise WorkError(f"{board.port}: no telemetry came")
-    return got
+    def read(self) -> Reading:
+        """Return what the board measures now."""
+        names = next((line.split(",") for line in self.ask("telemetry csv 50") if line.startswith("time_s,")), [])
+        until = time.monotonic() + 3.0
+        while (line := self.next_line(until)) is not None:
+            cells = line.split(",")
+            if line[:1].isdigit() and len(cells) == len(names):
+                self.ask("telemetry off")
+                self._telemetry.clear()
+                return reading(dict(zip(names, cells, strict=True)))
+        raise WorkError(f"{self.port}: no telemetry came")
 
 
-def settings_that_differ(sent: Sequence[str], shown: Sequence[str]) -> list[str]:
-    """Return what a board shows otherwise than it was sent, in words; both as lines `$name=value`."""
-    has = dict(line[1:].split("=", 1) for line in shown if line.startswith("$") and "=" in line)
+def reading(cells: dict[str, str]) -> Reading:
+    """Return a row of telemetry as numbers; ValueError where it is none."""
+    springs = sum(re.fullmatch(r"i\d+_a", name) is not None for name in cells)
+
+    def each(name: str) -> np.ndarray:
+        return np.array([float(cells.get(name.format(k), "nan")) for k in range(1, springs + 1)])
+
+    return Reading(
+        time_s=float(cells["time_s"]),
+        current_a=each("i{}_a"),
+        voltage_v=each("v{}_v"),
+        temperature_c=each("m{}_c"),
+        duty=each("d{}"),
+        fan=float(cells["fan"]),
+        ambient_c=float(cells["ambient_c"]),
+        state=cells["state"],
+    )
+
+
+def settings_that_differ(sent: list[str], has: dict[str, str]) -> list[str]:
+    """Return what a board shows otherwise than it was sent (`$name=value`), in words."""
     out = []
     for line in sent:
         name, value = line[1:].split("=", 1)
         if name not in has:
             out.append(f"{name} is missing")
-        elif float(has[name].split()[0]) != float(value):
+        elif float(has[name]) != float(value):
             out.append(f"{name} is {has[name]}, not {value}")
     return out
 

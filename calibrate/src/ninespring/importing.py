@@ -34,6 +34,9 @@ UNITS: dict[str, tuple[float, float]] = {
 }
 """Factor and offset from a unit to the log's own."""
 
+COLDEST_ROOM_K = LIMITS["ambient_c"][0] + 273.15
+"""Springs that are never colder than this number are in kelvin: even the coldest room is above it, in kelvin."""
+
 BUILT_IN: dict[str, dict[str, Any]] = {
     "tclab": {
         "columns": {
@@ -252,6 +255,9 @@ def import_table(path: str | Path, mapping: str | Path) -> str:
     for name, value in rules.constants.items():
         out[name] = np.full(len(frame), value)
     time_s = out.pop("time_s")
+    for name in out:
+        if re.fullmatch(r"t\d+_c", name):
+            _refuse_kelvin(out[name], f'unit = "K" for {name} in the mapping converts', path)
     return log_text(time_s, out, {"imported_from": Path(path).name, "mapping": Path(str(mapping)).name}, 5)
 
 
@@ -389,8 +395,9 @@ def reduce_frames(
     regions: list[Region],
     statistic: str = "mean",
     say: Callable[[int], None] = lambda row: None,
+    unit: str = "degC",
 ) -> dict[str, np.ndarray]:
-    """Return {t{k}_c: (frames,)} of a frame sequence, a region a spring; `statistic` mean, median, max."""
+    """Return {t{k}_c: (frames,)} of a frame sequence in `unit`, a region a spring; `statistic` mean, median, max."""
     reduce = {"mean": np.mean, "median": np.median, "max": np.max}[statistic]
     out = np.full((count, len(regions)), np.nan)
     for row, frame in enumerate(frames):
@@ -407,16 +414,25 @@ def reduce_frames(
             if good.size:
                 out[row, k] = reduce(good)
         say(row + 1)
-    low, high, unit, _ = LIMITS["t"]
+    factor, offset = UNITS[unit]
+    out = out * factor + offset
+    _refuse_kelvin(out, "`--unit K` converts", path)
+    low, high, _, _ = LIMITS["t"]
     for k, one in enumerate(regions):
         if np.any(bad := (out[:, k] < low) | (out[:, k] > high)):
             row = int(np.flatnonzero(bad)[0])
             raise InputError(
-                f"spring {one.spring} shows {out[row, k]:g} in frame {row + 1}: frames are in {unit} (raw counts, "
-                "or kelvin times 100?)",
+                f"spring {one.spring} shows {out[row, k]:g} in frame {row + 1}: that is no temperature in degC "
+                "(raw counts, or kelvin times 100?)",
                 path,
             )
     return {f"t{one.spring}_c": out[:, k] for k, one in enumerate(regions)}
+
+
+def _refuse_kelvin(temperature: np.ndarray, advice: str, path: str | Path) -> None:
+    """Refuse temperatures that are never below a cold room's in kelvin: no array is so hot from beginning to end."""
+    if np.isfinite(temperature).any() and (coldest := float(np.nanmin(temperature))) > COLDEST_ROOM_K:
+        raise InputError(f"nothing is ever colder than {coldest:.0f}: looks like kelvin, {advice}", path)
 
 
 def merge_into_log(

@@ -65,6 +65,10 @@ class Model:
     provenance: dict[str, Any] = field(default_factory=dict)
     name: str = ""
 
+    def __repr__(self) -> str:
+        effects = ", ".join(self.effects) or "no effects"
+        return f"<model of {self.array.rows} x {self.array.cols}: {effects}; {len(self.parameters)} parameters>"
+
 
 class _Reader:
     def __init__(self, path: str | Path) -> None:
@@ -219,7 +223,7 @@ def model_text(model: Model) -> str:
     for key in ("tool", "date", "note"):
         if key in made:
             lines.append(f"{key} = {json.dumps(made[key])}")
-    for key in ("rmse_before_c", "rmse_after_c"):
+    for key in ("rmse_before_c", "rmse_after_c", "hottest_c"):
         if made.get(key) is not None:
             lines.append(f"{key} = {_value(made[key])}")
     for log in made.get("logs", []):

@@ -73,9 +73,7 @@ def library() -> ctypes.CDLL:
     try:
         lib = ctypes.CDLL(str(path))
     except OSError as error:
-        raise RuntimeError(
-            f"the compiled part of ninespring is missing ({error}): run `pip install ./calibrate`"
-        ) from None
+        raise RuntimeError(f"the compiled part of ninespring is missing ({error}): run `pip install .`") from None
     pointer, integer, size, real = (
         ctypes.c_void_p,
         ctypes.c_int,
@@ -338,14 +336,18 @@ def chip_export(plant: Plant) -> tuple[str, str]:
 
 
 def chip_simulate(
-    plant: Plant,
+    lines: str,
+    shape: tuple[int, int],
     time_s: np.ndarray,
     power_w: np.ndarray,
     fan: np.ndarray,
     ambient_c: np.ndarray,
     first_c: np.ndarray,
 ) -> np.ndarray:
-    """Run a log through the on-chip fixed-point model; return its temperatures, (rows, springs), degC."""
+    """Run a log through the on-chip fixed-point model, set by console lines over the firmware's defaults.
+
+    Return its temperatures, (rows, springs), degC.
+    """
     from .errors import WorkError
 
     power_w = np.ascontiguousarray(power_w, dtype=float)
@@ -354,11 +356,60 @@ def chip_simulate(
     message = ctypes.create_string_buffer(1024)
     call = library().chip_simulate
     call.restype = ctypes.c_int
-    call.argtypes = (ctypes.c_void_p, ctypes.c_size_t, *(_double_p,) * 6, ctypes.c_char_p, ctypes.c_size_t)
+    call.argtypes = (
+        ctypes.c_char_p,
+        ctypes.c_int,
+        ctypes.c_int,
+        ctypes.c_size_t,
+        *(_double_p,) * 6,
+        ctypes.c_char_p,
+        ctypes.c_size_t,
+    )
     pointers = [_pointer(a) for a in arrays]
-    if call(plant._plant, len(time_s), *pointers, _pointer(out), message, len(message)):
-        raise WorkError(f"the model does not fit the chip: {message.value.decode()}")
+    if call(lines.encode(), *shape, len(time_s), *pointers, _pointer(out), message, len(message)):
+        raise WorkError(f"the chip refuses {message.value.decode()}")
     return out
+
+
+def chip_drive(
+    plant: Plant, lines: str, pattern: Sequence[bool], rows: int, on_rows: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Drive a copy of a plant by the chip's controller with console lines over the firmware's defaults.
+
+    The pattern is on for `on_rows` seconds of `rows`. Return true temperatures (degC) and austenite, (rows, springs).
+    """
+    from .errors import WorkError
+
+    temperature, austenite = np.empty((rows, plant.springs)), np.empty((rows, plant.springs))
+    wanted = (ctypes.c_int * plant.springs)(*map(int, pattern))
+    message = ctypes.create_string_buffer(256)
+    call = library().chip_drive
+    call.restype = ctypes.c_int
+    call.argtypes = (
+        ctypes.c_void_p,
+        ctypes.c_char_p,
+        _int_p,
+        ctypes.c_size_t,
+        ctypes.c_size_t,
+        _double_p,
+        _double_p,
+        ctypes.c_char_p,
+        ctypes.c_size_t,
+    )
+    status = call(
+        plant._plant,
+        lines.encode(),
+        wanted,
+        rows,
+        on_rows,
+        _pointer(temperature),
+        _pointer(austenite),
+        message,
+        len(message),
+    )
+    if status:
+        raise WorkError(f"the chip refuses {message.value.decode()}")
+    return temperature, austenite
 
 
 def paper_configure(plant: Plant, pitch_mm: float) -> None:

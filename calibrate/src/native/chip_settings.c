@@ -1,0 +1,35 @@
+#include "chip_settings.h"
+
+#include <stdio.h>
+#include <string.h>
+
+#define LINE_SIZE 96u
+
+static bool assign(settings_t *settings, char *line)
+{
+    char *value = strchr(line, '=');
+    if (line[0] != '$' || value == NULL) {
+        return line[0] == '#' || line[0] == '\0';
+    }
+    *value = '\0';
+    return settings_assign(settings, line + 1, value + 1) == SETTINGS_OK;
+}
+
+bool chip_settings(settings_t *settings, int rows, int columns, const char *lines, char *message,
+                   size_t size)
+{
+    settings_default(settings);
+    settings->controller.model.rows = (uint8_t)rows;
+    settings->controller.model.columns = (uint8_t)columns;
+    for (const char *at = lines; *at != '\0';) {
+        const size_t length = strcspn(at, "\n");
+        char line[LINE_SIZE];
+        (void)snprintf(line, sizeof line, "%.*s", (int)length, at);
+        if (length >= sizeof line || !assign(settings, line)) {
+            (void)snprintf(message, size, "%.*s", (int)length, at);
+            return false;
+        }
+        at += length + (at[length] == '\n' ? 1u : 0u);
+    }
+    return true;
+}

@@ -1,0 +1,171 @@
+"""The commands that talk to a board: record, upload, monitor."""
+
+from __future__ import annotations
+
+import datetime
+import time
+from pathlib import Path
+
+import click
+
+from . import __version__
+from .console import FILE, JSON, PORT, Command, beside, checked, out, result_of, working, write
+from .errors import WorkError
+from .logs import check_folder, read_bytes
+
+HZ = click.IntRange(1, 50)
+SECONDS = click.FloatRange(min=0, min_open=True)
+
+
+@click.command(
+    cls=Command,
+    epilog="""\b
+Example:
+  ninespring record --port /dev/ttyACM0 --hz 1 --duration 900 --run steps.txt -o board1.csv
+\b
+steps.txt (console words; `at S =` waits until so many seconds after the first row):
+  ambient 21.5
+  at 5 = pattern 101000101
+  at 300 = fan 100
+  at 600 = off all
+""",
+)
+@PORT
+@click.option("-o", "--output", type=FILE, required=True, help="log to write; - is standard output")
+@click.option("--hz", type=HZ, default=1, show_default=True, help="rows a second")
+@click.option(
+    "--duration", type=SECONDS, default=900.0, show_default=True, help="s by the board's clock; Ctrl-C ends it earlier"
+)
+@click.option("--run", "script", type=FILE, help="console lines to send, one a line, each at its time")
+@click.option("--thermometers", help="port of a thermocouple logger: its temperatures (degC) become t1_c, t2_c, ...")
+@JSON
+def record(
+    port: str,
+    output: Path,
+    hz: int,
+    duration: float,
+    script: Path | None,
+    thermometers: str | None,
+    json_path: Path | None,
+) -> None:
+    """Log a board's telemetry: currents (A), voltages (V), the model's temperatures (degC).
+
+    What has come is kept and the springs are switched off, whatever ends the recording: Ctrl-C, a closed terminal, a
+    cable, a full disk, a reset of the board. While it runs, rows go to OUTPUT.part; at the end that becomes OUTPUT.
+    The log begins with the board's version, faults and settings as comments.
+    """
+    from .board import Board
+    from .recording import LogFile, script_lines, told_to_stop
+    from .recording import record as record_board
+    from .thermometers import Thermometers
+
+    check_folder(output, json_path)
+    text = read_bytes(script).decode("utf-8", "replace") if script else ""
+    steps = script_lines(text, str(script), duration)
+    keys = {
+        "recorded": datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%dT%H:%M:%SZ"),
+        "port": port,
+        "tool": f"ninespring {__version__}",
+    }
+    with told_to_stop() as stopped:
+        with (
+            working(f"recording from {port}", duration) as say,
+            Board(port, stopped=stopped, off_at_end=False) as board,
+        ):
+            logger = Thermometers(thermometers) if thermometers else None
+            log = LogFile(output)
+            try:
+                tell = lambda rows, seconds: say(f"{rows} rows", seconds)  # noqa: E731
+                got = record_board(board, log, hz, duration, steps, tell, keys, logger)
+            finally:
+                log.close()
+                if logger:
+                    logger.close()
+        if not log.rows:
+            raise WorkError(got.ended or "stopped before the first row came")
+        write({json_path: checked(result_of("record", rows=log.rows, dropped_lines=got.dropped, ended=got.ended))})
+        lines = f", {got.dropped} corrupt lines dropped" if got.dropped else ""
+        if got.offset_s is not None:
+            lines += f"; the thermometers' clock was {got.offset_s:+.2f} s from the board's"
+        beside(output).print(f"{log.rows} rows -> {output}{lines}", markup=False)
+    if got.ended:
+        raise WorkError(f"{got.ended}; what had come until then is in {output}")
+
+
+@click.command(
+    cls=Command,
+    epilog="""\b
+Example:
+  ninespring upload --port /dev/ttyACM0 settings.txt
+""",
+)
+@click.argument("settings", type=FILE)
+@PORT
+@click.option("--save/--no-save", default=True, show_default=True, help="keep them in the EEPROM")
+@JSON
+def upload(settings: Path, port: str, save: bool, json_path: Path | None) -> None:
+    """Send exported settings to a board, read them back, save them.
+
+    Nothing is saved unless the board took every line and shows every value in `$$`.
+    """
+    from .board import Board, settings_lines, settings_that_differ
+
+    check_folder(json_path)
+    lines = settings_lines(read_bytes(settings).decode("utf-8", "replace"), str(settings))
+    with working("sending", len(lines)) as say, Board(port, off_at_end=False) as board:
+        remarks: list[str] = []
+        for k, line in enumerate(lines):
+            say(line, k)
+            try:
+                remarks = board.ask(line)
+            except WorkError as error:
+                raise WorkError(f"{error}: nothing is saved, a reset of the board gives back what it had") from None
+        if remarks:
+            raise WorkError(f"the board does not take them together: {remarks[-1]}")
+        say("reading back", len(lines))
+        if wrong := settings_that_differ(lines, board.settings()):
+            raise WorkError(f"the board shows other values than were sent, nothing is saved: {'; '.join(wrong)}")
+        if save:
+            board.ask("$save", 10.0)
+    write({json_path: checked(result_of("upload", settings=len(lines), saved=save))})
+    out.print(f"{len(lines)} settings sent and read back{', saved' if save else ''}")
+
+
+@click.command(
+    cls=Command,
+    epilog="""\b
+Example:
+  ninespring monitor --port /dev/ttyACM0
+""",
+)
+@PORT
+@click.option("--hz", type=HZ, default=2, show_default=True, help="updates a second")
+@click.option("--duration", type=SECONDS, default=1e9, help="s; Ctrl-C ends it")
+def monitor(port: str, hz: int, duration: float) -> None:
+    """Show a board's array as it is: per spring the model's temperature (degC) and its trend, current (A), limits."""
+    from rich.live import Live
+
+    from .board import Board
+    from .monitoring import Screen
+
+    with Board(port, off_at_end=False) as board:
+        until = time.monotonic() + duration
+        try:
+            screen = Screen(board.settings())
+            with Live(console=out, refresh_per_second=8) as live:
+                for line in board.ask(f"telemetry csv {hz}"):
+                    screen.take(line)
+                while (line := board.next_line(min(until, time.monotonic() + 5.0))) is not None:
+                    if screen.take(line):
+                        live.update(screen.picture())
+            if time.monotonic() < until:
+                raise WorkError(f"{port}: no telemetry for 5 s")
+        except KeyboardInterrupt:
+            pass
+        board.ask("telemetry off")
+
+
+def add_board_commands(group: click.Group) -> None:
+    """Add the commands to the command line."""
+    for one in (record, upload, monitor):
+        group.add_command(one)

@@ -1,0 +1,38 @@
+"""The alloy as it is: where it transforms and how wide its hysteresis is, beside what was declared."""
+
+from __future__ import annotations
+
+from ..fit.spec import Free
+from .effect import Scene
+
+VARIANT = "alloy as found"
+SHIFT, HYSTERESIS, WIDTH = "alloy_shift_k", "hysteresis_change_k", "transformation_width_change_k"
+FARTHEST_K = 45.0
+STEP_K = 5.0
+"""Places of the transformation that are tried: half its usual width apart."""
+
+
+def numbers(scene: Scene) -> tuple[Free, ...]:
+    """Return the alloy's three numbers, all 0 where it is as declared."""
+    get = scene.declared
+    gap = get("austenite_start_c") - get("martensite_start_c")
+    narrowest = min(
+        get("austenite_finish_c") - get("austenite_start_c"), get("martensite_start_c") - get("martensite_finish_c")
+    )
+    start, finish = ("austenite_start_c", "martensite_start_c"), ("austenite_finish_c", "martensite_finish_c")
+    everything = tuple((name, 1.0) for name in (*start, *finish))
+    opened = tuple((name, 0.5 if name.startswith("austenite") else -0.5) for name in (*start, *finish))
+    widened = (("austenite_finish_c", 1.0), ("martensite_finish_c", -1.0))
+    # what is believed before: batches and loads shift a declared alloy by some 15 K, its shape by a third of that
+    return (
+        Free(SHIFT, 0.0, -FARTHEST_K, FARTHEST_K, "K", (), False, scale=3.0, shifts=everything, prior=5.0),
+        Free(HYSTERESIS, 0.0, 0.1 - gap, 40.0, "K", (), False, scale=2.0, shifts=opened, prior=2.5),
+        Free(WIDTH, 0.0, 0.5 - narrowest, 25.0, "K", (), False, scale=2.0, shifts=widened, prior=2.5),
+    )
+
+
+def places(scene: Scene) -> list[float]:
+    """Return the shifts worth trying: those at which the hottest spring would transform."""
+    most = int(FARTHEST_K / STEP_K)
+    shifts = [STEP_K * k for k in range(-most + 1, most)]
+    return [s for s in shifts if scene.declared("austenite_start_c") + s < scene.hottest_c]

@@ -1,0 +1,54 @@
+"""The surroundings are not as logged: off by a constant in each run, drifting steadily, or bent between knots."""
+
+from collections.abc import Iterator
+
+from ..fit.spec import Free
+from .effect import Candidate, Effect, Scene, linear
+
+OFFSET = "ambient_offset_k"
+KINDS = (("free", "ambient_drift_k", 500.0), ("slow", "ambient_slow_drift_k", 1800.0))
+"""Variants with knots: name, key of their numbers, the shortest run (s) that could show one."""
+
+
+def _candidates(scene: Scene) -> Iterator[Candidate]:
+    ramp = "ambient_ramp_k_per_h"
+    yield Candidate(
+        "ramp",
+        (linear(ramp, -60.0, 60.0, 2.0, 4.0),),
+        ({ramp: min(20.0, 3600.0 / max(60.0, scene.duration_s))},),
+        fixed=(("ambient_amplitude_k", 0.0),),
+        signed=True,
+        most=20.0,
+    )
+    offsets = tuple(
+        Free(f"{OFFSET}@{r + 1}.1", 0.0, -8.0, 8.0, "K", (), False, run=r, knot=1, scale=1.0)
+        for r in range(len(scene.knots[OFFSET]))
+    )
+    yield Candidate(
+        "offset of each run",
+        offsets,
+        tuple({f.key: float(f is one) for f in offsets} for one in offsets),
+        fixed=(("ambient_amplitude_k", 0.0), (ramp, 0.0)),
+        signed=True,
+        most=8.0,
+    )
+    for variant, key, shortest_s in KINDS:
+        if scene.duration_s < shortest_s:
+            continue
+        free = tuple(
+            Free(f"{key}@{r + 1}.{k}", 0.0, -6.0, 6.0, "K", (), False, run=r, knot=k, scale=1.0)
+            for r, count in enumerate(scene.knots[key])
+            for k in range(1, count + 1)
+        )
+        yield Candidate(
+            variant,
+            free,
+            tuple({f.key: float(f is one) for f in free} for one in free),
+            fixed=(("ambient_amplitude_k", 0.0), (ramp, 0.0)),
+            signed=True,
+            most=10.0,
+            flexible=True,
+        )
+
+
+EFFECT = Effect("ambient_drift", _candidates)

@@ -1,0 +1,30 @@
+"""The fan's air carries heat from one spring to the next."""
+
+from collections.abc import Iterator
+
+from .effect import Candidate, Effect, Scene, Steady, linear
+
+NAME = "wake_w_per_k"
+
+
+def _candidates(scene: Scene) -> Iterator[Candidate]:
+    if not scene.fan_seen:
+        return
+    for direction, (towards, count) in enumerate(
+        (("east", scene.cols), ("south", scene.rows), ("west", scene.cols), ("north", scene.rows))
+    ):
+        if count > 1:
+            yield Candidate(
+                towards,
+                (linear(NAME, 0.0, 0.05, 1e-3, 1e-3),),
+                ({NAME: 1e-3},),
+                fixed=(("wake_direction", float(direction)),),
+                most=5.0,
+            )
+
+
+EFFECT = Effect(
+    "fan_wake",
+    _candidates,
+    Steady(NAME, 0.0, 0.0113, {"wake_direction": 0.0}, against="it needs the fan, yet the error is there without it"),
+)

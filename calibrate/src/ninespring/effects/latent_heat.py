@@ -1,0 +1,26 @@
+"""The phase change takes up heat on the way up and gives it back on the way down."""
+
+from collections.abc import Iterator
+
+from . import alloy
+from .effect import Candidate, Effect, Scene, Steady, linear
+
+NAME = "latent_heat_j"
+
+
+def _candidates(scene: Scene) -> Iterator[Candidate]:
+    if scene.transforms:
+        yield Candidate("", (linear(NAME, 0.0, 200.0, 5.0, 5.0),), ({NAME: 5.0},), most=6.0)
+    if places := alloy.places(scene):
+        size = 16.0 * scene.declared("heat_capacity_j_per_k")  # as the paper's spring has it
+        still = {alloy.HYSTERESIS: 0.0, alloy.WIDTH: 0.0}
+        yield Candidate(
+            alloy.VARIANT,
+            (linear(NAME, 0.0, 200.0, size, size), *alloy.numbers(scene)),
+            tuple({NAME: size, alloy.SHIFT: shift} | still for shift in places),
+            most=6.0,
+            alternatives=True,
+        )
+
+
+EFFECT = Effect("latent_heat", _candidates, Steady(NAME, 0.0, 20.0))

@@ -1,0 +1,35 @@
+"""Resistance, and with it the heat of a given current, depends on the phase."""
+
+from collections.abc import Iterator
+
+from . import alloy
+from .effect import Candidate, Effect, Scene, Steady, linear
+
+
+def _candidates(scene: Scene) -> Iterator[Candidate]:
+    if "current" not in scene.modes:
+        return
+    name, martensite = "resistance_austenite_ohm", scene.declared("resistance_martensite_ohm")
+    number = linear(name, 0.5 * martensite, 2.0 * martensite, 1.2 * martensite, 0.2 * martensite)
+    if scene.transforms:
+        yield Candidate(
+            "",
+            (number,),
+            ({name: 1.15 * martensite},),
+            signed=True,
+            neutral=martensite,
+            more_starts=({name: 0.85 * martensite}, {name: 1.25 * martensite}),
+        )
+    if places := alloy.places(scene):
+        still = {alloy.HYSTERESIS: 0.0, alloy.WIDTH: 0.0}
+        yield Candidate(
+            alloy.VARIANT,
+            (number, *alloy.numbers(scene)),
+            tuple({name: 1.15 * martensite, alloy.SHIFT: shift} | still for shift in places),
+            signed=True,
+            neutral=martensite,
+            alternatives=True,
+        )
+
+
+EFFECT = Effect("resistance_phase", _candidates, Steady("resistance_austenite_ohm", 0.1, 0.4))

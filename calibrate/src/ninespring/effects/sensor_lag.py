@@ -1,0 +1,19 @@
+"""The thermometers follow late."""
+
+from collections.abc import Iterator
+
+from .effect import Candidate, Effect, Scene, positive
+
+
+def _candidates(scene: Scene) -> Iterator[Candidate]:
+    name, step = "sensor_lag_s", scene.step_s
+    yield Candidate(
+        "",
+        (positive(name, 0.02 * step, 600.0, 4.0 * step),),
+        ({name: 3.0 * step},),
+        most=8.0,
+        more_starts=({name: 15.0 * step},),
+    )
+
+
+EFFECT = Effect("sensor_lag", _candidates)

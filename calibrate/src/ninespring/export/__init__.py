@@ -1,0 +1,1 @@
+"""A model into the chip: which settings the data determined, and whether they drive as well as before."""

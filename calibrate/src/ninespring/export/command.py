@@ -1,0 +1,164 @@
+"""`ninespring export` and `ninespring verify`."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+
+from ..console import FILE, JSON, MODEL, Command, beside, checked, logs_of, notes_of, out, result_of, working, write
+from ..errors import InputError, WorkError
+from ..logs import check_folder, read_bytes, read_log, sha256_of
+
+CHIP = click.option(
+    "--chip",
+    "chip_path",
+    type=FILE,
+    help="what the board has now, the lines that `$$` prints; left out: the firmware's defaults",
+)
+
+
+def _chip_lines(path: Path | None) -> str:
+    from ..board import settings_lines
+
+    if path is None:
+        return ""
+    # `$$` tells units behind the values
+    text = re.sub(r"^(\$\S+=\S+)[ \t].*$", r"\1", read_bytes(path).decode("utf-8", "replace"), flags=re.M)
+    return "\n".join(settings_lines(text, str(path)))
+
+
+@click.command(
+    cls=Command,
+    epilog="""\b
+Examples:
+  ninespring export --model diagnosis/model.toml -o settings.txt
+  ninespring export --model diagnosis/model.toml --chip now.txt -o -
+""",
+)
+@MODEL
+@click.option("-o", "--output", type=FILE, required=True, help="console lines to write, `$name=value`; - prints them")
+@CHIP
+@click.option("--force", is_flag=True, help="write even settings that drive worse than the board's own")
+@JSON
+def export(model_path: Path, output: Path, chip_path: Path | None, force: bool, json_path: Path | None) -> None:
+    """Write the console lines that put a model into the chip.
+
+    Only what the logs determined is written: the rest stays as the chip has it, and the file says which and why. Before
+    writing, an array like the model's is driven with the old and the new settings, and settings that hold, heat or
+    limit worse are refused.
+    """
+    from .. import effects
+    from ..models import read_model
+    from .drive import compare
+    from .settings import settings_of
+
+    check_folder(output, json_path)
+    model = read_model(model_path)
+    made = settings_of(model)
+    left = {e: effects.WHY_NOT_ON_CHIP[e] for e in model.effects if e in effects.WHY_NOT_ON_CHIP}
+    old = _chip_lines(chip_path)
+    with working("driving the old and the new settings") as say:
+        worse, drives = compare(model, old, f"{old}\n{made.lines}", say)
+    if worse and not force:
+        raise WorkError(
+            f"these settings would drive worse, nothing is written: {'; '.join(worse)} (--force writes them all the same)"
+        )
+    kept: dict[str, list[str]] = {}
+    for name, why in made.kept.items():
+        kept.setdefault(why, []).append(name)
+    head = [
+        f"# from {model_path.name}",
+        *(f"# worse, written by --force: {one}" for one in worse),
+        *(f"# {e} is left out: {why}" for e, why in left.items()),
+        *(f"# not written, {why}: {', '.join(_together(names))}" for why, names in kept.items()),
+    ]
+    result = result_of(
+        "export",
+        model={"file": model_path.name, "sha256": sha256_of(model_path)},
+        settings={name: float(value) for name, value in made.written.items()},
+        kept=made.kept,
+        left_out=left,
+        worse=worse,
+        drives=drives,
+    )
+    write({output: "\n".join([*head, made.lines]), json_path: checked(result)})
+    said = beside(output)
+    if made.remarks:
+        said.print(made.remarks, markup=False)
+    for line in head[1:]:
+        said.print(line[2:], markup=False)
+    said.print(f"{len(made.written)} settings -> {output} (`ninespring upload` sends them)")
+
+
+def _together(names: list[str]) -> list[str]:
+    """Return names with those of single springs as one."""
+    return list(dict.fromkeys(n.rstrip("0123456789").rstrip("_") if n[-1:].isdigit() else n for n in names))
+
+
+@click.command(
+    cls=Command,
+    epilog="""\b
+Examples:
+  ninespring verify --model diagnosis/model.toml run3.csv
+  ninespring verify --model diagnosis/model.toml --port /dev/ttyACM0 run3.csv
+""",
+)
+@click.argument("log", type=FILE)
+@MODEL
+@CHIP
+@click.option("--port", help="serial port of the board: what it has now is the 'before'")
+@JSON
+def verify(log: Path, model_path: Path, chip_path: Path | None, port: str | None, json_path: Path | None) -> None:
+    """Tell the chip's error before and after, on a log that the fit never saw.
+
+    Before: the settings that the board has (--port, --chip) or the firmware's defaults. After: with what `export` writes
+    of the model over them.
+    """
+    from ..fit.predict import predict_by_chip
+    from ..models import read_model
+    from .settings import settings_of
+
+    check_folder(json_path)
+    if port and chip_path:
+        raise InputError("give either --port or --chip: what the board has now")
+    model = read_model(model_path)
+    shape = f"{model_path.name} is of {model.array.rows} x {model.array.cols}"
+    run = read_log(log, model.array.springs, why=shape)
+    if any(one.get("sha256") == run.sha256 for one in model.provenance.get("logs", [])):
+        raise InputError("the model was fitted to this log: give one that the fit never saw", log)
+    notes_of([run])
+    old = _port_lines(port) if port else _chip_lines(chip_path)
+    made = settings_of(model)
+    errors: dict[str, Any] = {}
+    for name, lines in (("before", old), ("after", f"{old}\n{made.lines}")):
+        left = run.temperature_c - predict_by_chip(model, lines, run)
+        seen = np.isfinite(left)
+        each = [
+            float(np.sqrt(np.mean(left[seen[:, k], k] ** 2))) if seen[:, k].any() else None for k in range(run.springs)
+        ]
+        errors[name] = {"rmse_c": float(np.sqrt(np.mean(left[seen] ** 2))), "rmse_per_spring_c": each}
+    result = result_of(
+        "verify",
+        logs=logs_of([run]),
+        model={"file": model_path.name, "sha256": sha256_of(model_path)},
+        **errors,
+    )
+    write({json_path: checked(result)})
+    out.print(
+        f"the chip's model on {log.name}: error {errors['before']['rmse_c']:.2f} K rms as it is, "
+        f"{errors['after']['rmse_c']:.2f} K with the model's settings",
+        markup=False,
+    )
+    if errors["after"]["rmse_c"] > errors["before"]["rmse_c"]:
+        raise WorkError("the model's settings make the chip's error larger on this log: do not upload them")
+
+
+def _port_lines(port: str) -> str:
+    from ..board import Board
+
+    with Board(port, off_at_end=False) as board:
+        return "\n".join(f"${name}={value}" for name, value in board.settings().items())

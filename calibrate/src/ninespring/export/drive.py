@@ -1,0 +1,96 @@
+"""Whether new settings drive an array worse than the old ones: both are tried on the array as it is best known."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from .. import native
+from ..models import Model
+from .settings import best_plant, draw
+
+DRAWS = 4
+"""Further arrays, drawn from the uncertainty of the model's numbers."""
+TRANSFORMED = 0.9
+"""Austenite from which a spring counts as heated."""
+WORSE = {
+    "held": (0.03, "springs that are on hold {old:.0%} austenite as the chip is now, {new:.0%} with the new settings"),
+    "heating_s": (5.0, "heating takes {old:.0f} s as the chip is now, {new:.0f} s with the new settings"),
+    "hottest_c": (3.0, "the hottest spring reaches {old:.0f} degC as the chip is now, {new:.0f} with the new settings"),
+    "undriven": (
+        0.03,
+        "springs that are off reach {old:.0%} austenite as the chip is now, {new:.0%} with the new settings",
+    ),
+}
+"""Per measure of a drive: the difference that is worse (three hundredths of a stroke, the noise of a hold, a tenth of a
+heating and of the way to the limit), and how it is said."""
+
+
+@dataclass
+class Drive:
+    """How a pattern was driven."""
+
+    held: float
+    """Mean austenite of the driven springs over the second half of the time that they are on."""
+    heating_s: float
+    """Until the last driven spring has transformed; all the time where one never does."""
+    hottest_c: float
+    undriven: float
+    """Highest austenite of a spring that is off."""
+
+
+def patterns(springs: int) -> list[np.ndarray]:
+    """Return what is tried: all but the middle one, and the first alone."""
+    everyone = np.ones(springs, dtype=bool)
+    if springs == 1:
+        return [everyone]
+    middle = everyone.copy()
+    middle[springs // 2] = False
+    return [middle, np.arange(springs) == 0]
+
+
+def drive(plant: native.Plant, lines: str, pattern: np.ndarray) -> Drive:
+    """Drive a plant from cold with settings; the longer the slower its springs are."""
+    slowest = plant.get("heat_capacity_j_per_k") / max(1e-4, plant.get("loss_w_per_k"))
+    on = int(np.clip(5.0 * slowest, 200.0, 1800.0))
+    plant = plant.copy()
+    plant.reset()
+    temperature, austenite = native.chip_drive(plant, lines, list(pattern), on, on)
+    heated = np.minimum.reduce(austenite[:, pattern], axis=1) >= TRANSFORMED
+    off = austenite[:, ~pattern]
+    return Drive(
+        float(austenite[on // 2 :, pattern].mean()),
+        float(np.argmax(heated)) if heated.any() else float(on),
+        float(temperature.max()),
+        float(off.max()) if off.size else 0.0,
+    )
+
+
+def compare(
+    model: Model, old: str, new: str, say: Callable[[str], None] = lambda text: None
+) -> tuple[list[str], list[dict[str, float]]]:
+    """Return what gets worse with the new settings, in words, and every measure of every drive.
+
+    Tried on the array as it is best known, and on others drawn from the model's uncertainty; worse is what is worse on
+    the first, or on most of all of them.
+    """
+    rng = np.random.default_rng(0)
+    plants = [best_plant(model), *(best_plant(model, draw(model, rng)) for _ in range(DRAWS))]
+    said: list[str] = []
+    rows = []
+    for pattern in patterns(model.array.springs):
+        pairs = []
+        for k, plant in enumerate(plants):
+            say(f"driving array {k + 1} of {len(plants)}")
+            pairs.append((drive(plant, old, pattern), drive(plant, new, pattern)))
+        for measure, (limit, words) in WORSE.items():
+            sign = -1.0 if measure == "held" else 1.0
+            values = [(getattr(a, measure), getattr(b, measure)) for a, b in pairs]
+            worse = [sign * (b - a) > max(limit, 0.1 * a * (measure == "heating_s")) for a, b in values]
+            rows += [{"array": k + 1, "measure": measure, "old": a, "new": b} for k, (a, b) in enumerate(values)]
+            if worse[0] or sum(worse) > len(worse) / 2:
+                a, b = values[0] if worse[0] else values[worse.index(True)]
+                said.append(words.format(old=a, new=b))
+    return list(dict.fromkeys(said)), rows

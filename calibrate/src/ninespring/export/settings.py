@@ -1,0 +1,145 @@
+"""Which of the chip's settings a model determines, and which stay as the chip has them, and why.
+
+Nothing lists which setting follows from which number: each determined number is moved, and the settings that move with
+it are the ones it determines.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .. import effects, native
+from ..fit.simulate import array_parameters
+from ..models import Model
+
+FIRMWARE_EFFECTS = ("latent_heat", "resistance_phase")
+"""What the firmware's defaults carry: what no log determines keeps these."""
+KNOWN = 0.5
+"""That an effect is not there is known where the error of its number is less than this part of what the chip has of it."""
+
+
+@dataclass
+class Settings:
+    """Console lines of a model, and what was left to the chip."""
+
+    written: dict[str, str]
+    """Setting, value as text."""
+    kept: dict[str, str]
+    """Setting that is not written, and why."""
+    remarks: str
+    """What the chip takes otherwise than the model has it, in words."""
+
+    @property
+    def lines(self) -> str:
+        """Console lines, one a setting."""
+        return "".join(f"${name}={value}\n" for name, value in self.written.items())
+
+
+def best_plant(model: Model, numbers: dict[str, float] | None = None) -> native.Plant:
+    """Return the plant as it is best known: the firmware's declared spring with all that the model says over it."""
+    plant = native.Plant(model.array.rows, model.array.cols)
+    table = native.parameter_table()
+    values = array_parameters(model.array) | model.parameters | (numbers or {})
+    said = {table[name.partition("[")[0]].effect for name in values} & set(FIRMWARE_EFFECTS)
+    plant.set_effects({*model.effects, *FIRMWARE_EFFECTS, *said} - effects.MEASUREMENT)
+    plant.set_all({name: value for name, value in values.items() if name != "resistance_ohm"})
+    return plant
+
+
+def determined(model: Model) -> dict[str, str]:
+    """Return the model's numbers that may be written, and why each of the others may not ('' where it may).
+
+    Numbers that are known in combination only are written together: one without the other would be wrong.
+    """
+    table = native.parameter_table()
+    out: dict[str, str] = dict.fromkeys(array_parameters(model.array), "")
+    for name in model.parameters:
+        effect, error = table[name.partition("[")[0]].effect, model.stderr.get(name)
+        if effect in model.effects:
+            out[name] = ""
+        elif error is not None and effect:
+            size = abs(table[name.partition("[")[0]].default)
+            out[name] = "" if error < KNOWN * size else "the log says too little of it"
+        elif error is not None:
+            out[name] = ""
+    return out
+
+
+def _lines(plant: native.Plant) -> tuple[dict[str, str], str]:
+    text, remarks = native.chip_export(plant)
+    return dict(line[1:].split("=", 1) for line in text.splitlines()), remarks
+
+
+def _moved(plant: native.Plant, name: str) -> native.Plant:
+    """Return a copy of a plant in which one number is clearly another."""
+    known = native.parameter_table()[name.partition("[")[0]]
+    twin = plant.copy()
+    value = twin.get(name)
+    span = known.maximum - known.minimum
+    step = 0.1 * abs(value) if value else min(0.05 * span, 1.0)
+    if float(value).is_integer() and span <= 8:
+        step = 1.0
+    for other in (value + step, value - step):
+        if known.minimum <= other <= known.maximum:
+            try:
+                twin.set(name, other)
+                native.chip_export(twin)
+            except Exception:
+                twin.set(name, value)
+                continue
+            return twin
+    return twin
+
+
+def settings_of(model: Model) -> Settings:
+    """Return the settings that a model determines; refused (WorkError) where one does not fit the chip."""
+    plant = best_plant(model)
+    full, remarks = _lines(plant)
+    why = determined(model)
+    wanted = {"rows", "columns"} & set(full)
+
+    def moves(name: str) -> set[str]:
+        moved, _ = _lines(_moved(plant, name))
+        return {key for key in full if moved.get(key) != full[key]}
+
+    weak: dict[str, str] = {}
+    for name, reason in why.items():
+        if reason:
+            weak |= dict.fromkeys(moves(name), reason)
+        else:
+            wanted |= moves(name)
+    for name, known in native.parameter_table().items():
+        # what also follows from a number of the firmware's that no log determined stays the firmware's
+        if known.effect in FIRMWARE_EFFECTS and name not in why:
+            wanted -= moves(name)
+    written = {name: value for name, value in full.items() if name in wanted}
+    kept = {name: weak.get(name) or _reason(model, name, plant) for name in full if name not in wanted}
+    return Settings(written, kept, remarks)
+
+
+def _reason(model: Model, setting: str, plant: native.Plant) -> str:
+    table = native.parameter_table()
+    known = table.get(setting.rstrip("0123456789").rstrip("_")) or table.get(setting)
+    hottest = model.provenance.get("hottest_c")
+    transformation = setting == "latent_heat_j" or setting.endswith(("_start_c", "_finish_c"))
+    begins = plant.get("austenite_start_c")
+    if transformation and hottest is not None and hottest < begins:
+        return f"the log's hottest spring reached {hottest:.0f} degC: transformation kept as it is"
+    if known is not None and known.effect and known.effect not in model.effects:
+        return f"the diagnosis named no {known.effect}"
+    return "these logs do not determine it"
+
+
+def draw(model: Model, rng: np.random.Generator) -> dict[str, float]:
+    """Return the model's numbers once more, each moved by its standard error's chance."""
+    table = native.parameter_table()
+    out = {}
+    for name, error in model.stderr.items():
+        known, value = table[name.partition("[")[0]], model.parameters[name]
+        if error > 0.2 * abs(value):  # known in combination only: moved alone it would be no array that fits the logs
+            continue
+        moved = value + error * rng.standard_normal()
+        out[name] = min(known.maximum, max(known.minimum, moved))
+    return out

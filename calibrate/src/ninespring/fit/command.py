@@ -1,0 +1,97 @@
+"""`ninespring fit`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from ..console import (
+    ARRAY,
+    FILE,
+    JSON,
+    Command,
+    array_and_runs,
+    beside,
+    checked,
+    logs_of,
+    notes,
+    notes_of,
+    print_parameters,
+    result_of,
+    working,
+    write,
+)
+from ..errors import InputError
+from ..logs import check_folder
+
+
+@click.command(
+    cls=Command,
+    epilog="""\b
+Examples:
+  ninespring fit run1.csv run2.csv -o model.toml
+  ninespring fit --effects latent_heat,shared_air run1.csv -o model.toml
+""",
+)
+@click.argument("logs", nargs=-1, required=True, type=FILE)
+@ARRAY
+@click.option("--effects", default="", help="effects to switch on and fit, comma-separated")
+@click.option("-o", "--output", type=FILE, required=True, help="model.toml to write")
+@JSON
+def fit(logs: tuple[Path, ...], array_path: Path | None, effects: str, output: Path, json_path: Path | None) -> None:
+    """Fit the declared model, with the effects named, to logs.
+
+    Errors are root mean squares in K; numbers are in J/K, W/K, J, s as the table says. Held out: on blocks of two and a
+    half minutes that the numbers were not fitted to.
+    """
+    from .. import effects as library
+    from .. import native
+    from ..models import model_text
+    from ..verdict import diagnosis, plausibility, steady
+    from ..verdict.result import model_of, parameters_of
+    from .statistics import rms
+
+    check_folder(output, json_path)
+    wanted = list(dict.fromkeys(e.strip() for e in effects.split(",") if e.strip()))
+    for name in wanted:
+        if name not in native.effect_names():
+            raise InputError(f"there is no effect '{name}': {', '.join(native.effect_names())}")
+    for path in logs:
+        if steady.is_steady(path):
+            raise InputError("a steady table: `ninespring diagnose` fits it, effect by effect", path, 1)
+    array, runs = array_and_runs(array_path, logs)
+    notes_of(runs)
+    with working("fitting") as say:
+        problem, chosen, base = diagnosis.fit_effects(array, runs, wanted, say)
+        say("held-out blocks")
+        held = problem.holdout_rmse(chosen)
+        suspect = plausibility.swapped(runs)
+        suspect += [text for run in runs for text in plausibility.undriven_but_hottest(run)]
+        if rms(chosen.residual) > 1.5 * problem.noise_c:
+            say("is a clock off?")
+            suspect += plausibility.shifted_clock(problem, (chosen,))
+    model = model_of(problem, chosen, runs)
+    model.provenance["rmse_before_c"] = rms(base.residual)
+    result = result_of(
+        "fit",
+        logs=logs_of(runs),
+        rmse_before_c=rms(base.residual),
+        rmse_c=rms(chosen.residual),
+        holdout_rmse_c=held,
+        noise_c=problem.noise_c,
+        effects=list(chosen.spec.effects),
+        parameters={k: v for e in (None, *chosen.spec.effects) for k, v in parameters_of(problem, chosen, e).items()},
+        not_identifiable=sorted(chosen.stuck),
+        at_bounds=chosen.at_bounds(),
+        warnings=suspect,
+    )
+    write({output: model_text(model), json_path: checked(result)})
+    notes("", suspect)
+    print_parameters(beside(output), result["parameters"])
+    beside(output).print(
+        f"error {result['rmse_c']:.3f} K, held out {held:.3f} K, noise {problem.noise_c:.3f} K -> {output}"
+    )
+    for effect in wanted:
+        if effect in library.WHY_NOT_ON_CHIP:
+            beside(output).print(f"{effect}: not for the chip: {library.WHY_NOT_ON_CHIP[effect]}")

@@ -1,0 +1,55 @@
+"""What a model.toml predicts of a log: by the plant, or by the on-chip model seen through the same sensors."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .. import effects, native
+from ..logs.run import Run
+from ..models import Model
+from .simulate import array_parameters, simulate_run
+
+
+def plant_of(model: Model) -> native.Plant:
+    """Return the plant that a model.toml describes."""
+    plant = native.Plant(model.array.rows, model.array.cols)
+    plant.set_all(array_parameters(model.array))
+    plant.set_effects(model.effects)
+    plant.set_all(model.parameters)
+    return plant
+
+
+def predict(model: Model, run: Run, chip: bool = False) -> np.ndarray:
+    """Return what the sensors should show, (rows, springs), degC; `chip`: by the on-chip model, seen by the same sensors."""
+    if chip:
+        return predict_by_chip(model, native.chip_export(plant_of(model))[0], run)
+    return simulate_run(plant_of(model), run, run.ambient_c, {})
+
+
+def predict_by_chip(model: Model, lines: str, run: Run) -> np.ndarray:
+    """Return what a chip with these console lines predicts, (rows, springs), degC, seen by the model's sensors."""
+    plant = plant_of(model)
+    shown = simulate_run(plant, run, run.ambient_c, {})
+    # What lag, gain and mixing of the sensors add is the plant's: the chip has none of them.
+    plant = plant_of(model)
+    plant.set_effects([e for e in model.effects if e not in effects.MEASUREMENT])
+    seen_by = shown - simulate_run(plant, run, run.ambient_c, {})
+    ambient = run.ambient_c if run.ambient_c is not None else np.full(len(run.time_s), plant.get("ambient_c"))
+    power = run.drive
+    if run.mode == "current":
+        power = run.drive**2 * plant.get("resistance_ohm")
+    elif run.mode == "command":
+        power = run.drive * np.array([plant.get(f"command_power_w[{k + 1}]") for k in range(run.springs)])
+    out = np.empty_like(run.temperature_c)
+    shape = (model.array.rows, model.array.cols)
+    for begin, end in zip(run.starts, [*run.starts[1:], len(run.time_s)], strict=True):
+        part = slice(begin, end)
+        before = out[begin - 1] if begin else np.full(run.springs, ambient[0])
+        first = np.where(np.isfinite(run.temperature_c[begin]), run.temperature_c[begin], before)
+        if end - begin == 1:
+            out[part] = first
+            continue
+        out[part] = native.chip_simulate(
+            lines, shape, run.time_s[part], power[part], run.fan[part], ambient[part], first
+        )
+    return out + seen_by

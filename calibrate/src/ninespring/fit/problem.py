@@ -1,0 +1,457 @@
+"""Runs to be explained by an array: parallel simulations, bounded least squares, standard errors.
+
+A `Spec` says what a model is; a `Problem` holds the runs and simulates them; `Problem.fit` returns a `Fit`.
+All residuals are measured minus model, degC.
+"""
+
+from __future__ import annotations
+
+import concurrent.futures
+import math
+import os
+import threading
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.optimize import least_squares
+
+from .. import native
+from ..logs.run import Run
+from ..models import Array
+from . import statistics
+from .simulate import array_parameters, simulate_run
+from .spec import Fit, Spec
+
+WORKERS = max(1, min(8, os.cpu_count() or 1))
+REUSED = 0.1
+"""Movement, in the inner coordinates, up to which a slope is used again: a tenth of what matters."""
+_BAD = 1e3
+"""What a simulation that the plant refuses 'shows', degC: so far off that no fit goes there."""
+
+
+FOLDS = 5
+BLOCK_S = 150.0
+"""Length of a held-out block: longer than the residual remembers, shorter than a drift of the ambient."""
+
+
+SLOW_KNOTS = 5
+"""Knots of a slow drift of the ambient over a run, the first of them zero."""
+
+
+def _hats(run: Run, knots: np.ndarray) -> np.ndarray:
+    """Return smooth unit bumps around each knot but the first, (rows, knots - 1)."""
+    return CubicSpline(knots, np.eye(len(knots)), bc_type="natural")(run.time_s)[:, 1:]
+
+
+def fold_of_rows(run: Run) -> np.ndarray:
+    """Return the fold (0..FOLDS-1) of every row: blocks of BLOCK_S, or of a fifth of a short run, in turn."""
+    block = min(BLOCK_S, run.duration_s / FOLDS)
+    return ((run.time_s - run.time_s[0]) // max(block, 1e-9)).astype(int) % FOLDS
+
+
+class Problem:
+    """Runs to be explained by an array. Holds what does not depend on the model."""
+
+    def __init__(self, array: Array, runs: Sequence[Run], declared: Mapping[str, float] | None = None) -> None:
+        self.array = array
+        self.runs = list(runs)
+        self.declared = dict(declared or {})
+        self.knots = [
+            np.linspace(run.time_s[0], run.time_s[-1], max(2, min(20, 1 + round(run.duration_s / 300.0))))
+            for run in self.runs
+        ]
+        self.hats = {
+            "ambient_drift_k": [_hats(run, knots) for run, knots in zip(self.runs, self.knots, strict=True)],
+            "ambient_offset_k": [np.ones((len(run.time_s), 1)) for run in self.runs],
+            "ambient_slow_drift_k": [
+                _hats(run, np.linspace(run.time_s[0], run.time_s[-1], SLOW_KNOTS)) for run in self.runs
+            ],
+        }
+        self.noise = [statistics.noise_floor(run.temperature_c, run.starts) for run in self.runs]
+        self._tidy_noise()
+        self.mask = [np.isfinite(run.temperature_c) for run in self.runs]
+        self.count = int(sum(mask.sum() for mask in self.mask))
+        self.basis: list[np.ndarray | None] = [None] * len(self.runs)
+        self.start_response: list[np.ndarray | None] = [None] * len(self.runs)
+        self.pool = concurrent.futures.ThreadPoolExecutor(WORKERS)
+        self.simulations = 0
+        self._count_lock = threading.Lock()
+        base = native.Plant(array.rows, array.cols)
+        base.set_all(array_parameters(array))
+        base.set_all(self.declared)
+        self._base = base
+        self._local = threading.local()
+
+    def base_value(self, name: str) -> float:
+        """Return what the declared array has for a parameter of the plant."""
+        return self._base.get(name)
+
+    def _tidy_noise(self) -> None:
+        """A column too short or too clean to estimate takes the median of the others; 0.005 degC at least."""
+        everything = np.concatenate(self.noise)
+        usable = everything[np.isfinite(everything) & (everything > 0)]
+        usual = float(np.median(usable)) if usable.size else 0.05
+        self.noise = [np.maximum(np.where(np.isfinite(one), one, usual), max(0.005, 0.2 * usual)) for one in self.noise]
+
+    @property
+    def noise_c(self) -> float:
+        """Noise floor over everything measured, degC rms."""
+        total = sum(
+            float((mask.sum(axis=0) * noise**2).sum()) for mask, noise in zip(self.mask, self.noise, strict=True)
+        )
+        return math.sqrt(total / max(1, self.count))
+
+    def mask_spikes(self, residual: Sequence[np.ndarray]) -> int:
+        """Leave isolated outliers of a residual out of everything that follows; return how many."""
+        total = 0
+        for run, mask, noise, left in zip(self.runs, self.mask, self.noise, residual, strict=True):
+            bad = statistics.spikes(left, noise)
+            share = bad.mean() if bad.size else 0.0
+            if 0 < share < 0.02:
+                run.temperature_c[bad] = np.nan
+                mask &= ~bad
+                total += int(bad.sum())
+        self.count = int(sum(mask.sum() for mask in self.mask))
+        return total
+
+    # ---- simulation -------------------------------------------------------------------------------------
+
+    def ambient_of(self, run_index: int, values: Mapping[str, float]) -> np.ndarray | None:
+        """Return the run's ambient (rows,) with fitted constants and knots, None where nothing says any."""
+        run = self.runs[run_index]
+        constant = values.get(f"ambient_c@{run_index + 1}")
+        ambient = run.ambient_c
+        if ambient is None and constant is not None:
+            ambient = np.full(len(run.time_s), constant)
+        for name, hats in self.hats.items():
+            prefix = f"{name}@{run_index + 1}."
+            drift = [values.get(f"{prefix}{k}", 0.0) for k in range(1, hats[run_index].shape[1] + 1)]
+            if any(drift):
+                if ambient is None:
+                    ambient = np.full(len(run.time_s), self._base.get("ambient_c"))
+                ambient = ambient + hats[run_index] @ np.asarray(drift)
+        return ambient
+
+    def plant_for(self, spec: Spec, values: Sequence[float]) -> native.Plant:
+        """Return a fresh plant with the spec's effects and values."""
+        plant = self._base.copy()
+        plant.set_effects(spec.plant_effects)
+        plant.set_all(dict(spec.fixed))
+        plant.set_all(spec.settings(values, self._base.get))
+        return plant
+
+    def simulate(
+        self,
+        spec: Spec,
+        values: Sequence[float],
+        run_index: int,
+        start_offset: np.ndarray | None = None,
+    ) -> np.ndarray:
+        """Return what the sensors of one run should show, (rows, springs), degC."""
+        run = self.runs[run_index]
+        with self._count_lock:
+            self.simulations += 1
+        by_key = {f.key: float(v) for f, v in zip(spec.free, values, strict=True)}
+        try:
+            plant = self.plant_for(spec, values)
+            return simulate_run(plant, run, self.ambient_of(run_index, by_key), by_key, start_offset)
+        except native.NativeError:
+            return np.full(run.temperature_c.shape, _BAD)
+
+    def simulate_many(self, jobs: Sequence[tuple[Spec, Sequence[float], int]]) -> list[np.ndarray]:
+        """Simulate (spec, values, run) jobs in parallel threads."""
+        if len(jobs) == 1:
+            return [self.simulate(*jobs[0])]
+        return list(self.pool.map(lambda job: self.simulate(*job), jobs))
+
+    def predictions(self, spec: Spec, values: Sequence[float]) -> list[np.ndarray]:
+        """Return what all runs should show."""
+        return self.simulate_many([(spec, values, r) for r in range(len(self.runs))])
+
+    # ---- residuals --------------------------------------------------------------------------------------
+
+    def residuals(self, predicted: Sequence[np.ndarray]) -> list[np.ndarray]:
+        """Return measured minus predicted per run, NaN where not measured."""
+        return [run.temperature_c - p for run, p in zip(self.runs, predicted, strict=True)]
+
+    def vector(self, fields: Sequence[np.ndarray], weights: Sequence[np.ndarray] | None = None) -> np.ndarray:
+        """Return fields (per run, degC) as one vector in units of the noise, starts whitened out."""
+        pieces = []
+        for r, (value, mask, noise) in enumerate(zip(fields, self.mask, self.noise, strict=True)):
+            piece = (value / noise)[mask]
+            basis = self.basis[r]
+            if weights is not None:
+                piece = piece * weights[r][mask]
+            if basis is not None:
+                piece = piece - basis @ (basis.T @ piece)
+            pieces.append(piece)
+        return np.concatenate(pieces)
+
+    def plain(self, residual: Sequence[np.ndarray]) -> float:
+        """Return the sum of squared residuals in units of the noise."""
+        return sum(
+            float((((left / noise)[mask]) ** 2).sum())
+            for left, noise, mask in zip(residual, self.noise, self.mask, strict=True)
+        )
+
+    def learn_starts(self, spec: Spec, values: Sequence[float]) -> None:
+        """Find how an error of each starting temperature dies out, to keep it out of all that follows.
+
+        A simulation starts at the first measured temperatures, which carry the sensor's noise. Its effect is
+        nearly linear and the same in all models: it is computed once, and residuals are whitened by it.
+        """
+        jobs = []
+        for r, run in enumerate(self.runs):
+            jobs.append((r, np.zeros(run.springs)))
+            for k in range(run.springs):
+                jobs.append((r, np.eye(run.springs)[k]))
+        shown = list(self.pool.map(lambda job: self.simulate(spec, values, job[0], job[1]), jobs))
+        at = 0
+        for r, run in enumerate(self.runs):
+            base = shown[at]
+            columns = []
+            for k in range(run.springs):
+                response = ((shown[at + 1 + k] - base) / self.noise[r])[self.mask[r]]
+                response = response * self.noise[r][k]
+                if np.isfinite(run.temperature_c[0, k]) and np.linalg.norm(response) > 1:
+                    columns.append(response)
+            at += 1 + run.springs
+            if columns:
+                # whitening by the covariance 1 + S S', S the response to one sigma of each start
+                u, size, _ = np.linalg.svd(np.column_stack(columns), full_matrices=False)
+                self.basis[r] = u * np.sqrt(1.0 - 1.0 / np.sqrt(1.0 + size**2))
+                self.start_response[r] = np.column_stack(columns)
+
+    def without_starts(self, residual: Sequence[np.ndarray]) -> list[np.ndarray]:
+        """Return residuals less what errors of the first readings, as large as their noise makes them, leave in them.
+
+        The errors are estimated with the noise as their spread and cut at 3 of it: a start that is further off is
+        structure like any other.
+        """
+        out = []
+        for left, mask, noise, response in zip(residual, self.mask, self.noise, self.start_response, strict=True):
+            left = left.copy()
+            if response is not None:
+                scaled = (left / noise)[mask]
+                normal = response.T @ response + np.eye(response.shape[1])
+                size = np.clip(np.linalg.solve(normal, response.T @ scaled), -3.0, 3.0)
+                left[mask] -= (response @ size) * np.broadcast_to(noise, mask.shape)[mask]
+            out.append(left)
+        return out
+
+    # ---- fitting ----------------------------------------------------------------------------------------
+
+    def jacobian(
+        self,
+        spec: Spec,
+        values: np.ndarray,
+        predicted: Sequence[np.ndarray],
+        weights: Sequence[np.ndarray] | None = None,
+        columns: Sequence[int] | None = None,
+    ) -> np.ndarray:
+        """Return d(residual vector)/d(inner coordinate) by one-sided differences, simulated in parallel."""
+        columns = range(len(spec.free)) if columns is None else columns
+        jobs: list[tuple[Spec, Sequence[float], int]] = []
+        where: list[tuple[int, int, float]] = []
+        for c in columns:
+            free = spec.free[c]
+            z = free.inner(values[c])
+            step = free.slope_step
+            if z + step > free.inner(free.high):
+                step = -step
+            moved = values.copy()
+            moved[c] = free.outer(z + step)
+            step = free.inner(moved[c]) - z
+            for r in range(len(self.runs)):
+                if free.run is None or free.run == r:
+                    jobs.append((spec, moved, r))
+                    where.append((c, r, step))
+        shown = self.simulate_many(jobs) if jobs else []
+        out = np.zeros((self.count, len(list(columns))))
+        position = {c: k for k, c in enumerate(columns)}
+        fields: dict[int, list[np.ndarray]] = {}
+        for (c, r, step), field_c in zip(where, shown, strict=True):
+            fields.setdefault(c, [np.zeros_like(p) for p in predicted])[r] = -(field_c - predicted[r]) / step
+        for c, change in fields.items():
+            out[:, position[c]] = self.vector(change, weights)
+        return out
+
+    def fit(
+        self,
+        spec: Spec,
+        start: Mapping[str, float] | None = None,
+        *,
+        tolerance: float = 1e-4,
+        max_steps: int = 25,
+        weights: Sequence[np.ndarray] | None = None,
+        errors: bool = False,
+        near: Fit | None = None,
+    ) -> Fit:
+        """Fit the spec's free numbers by bounded least squares. `start` overrides starting values by key.
+
+        A column of the slope is simulated again only where the numbers have moved by REUSED since: a slope that is a few
+        hundredths off changes the way to the minimum, not the minimum. `near` is a fit whose slopes serve to begin with.
+        """
+        begun = self.simulations
+        free = list(spec.free)
+        values = np.array([(start or {}).get(f.key, f.start) for f in free], dtype=float)
+        values = np.array([min(f.high, max(f.low, v)) for f, v in zip(free, values, strict=True)], dtype=float)
+        if not free:
+            predicted = self.predictions(spec, values)
+            left = self.residuals(predicted)
+            vector = self.vector(left, weights)
+            return Fit(
+                spec,
+                values,
+                float(vector @ vector),
+                self.count,
+                left,
+                np.zeros((self.count, 0)),
+                vector,
+                np.zeros((0, 0)),
+                sse=self.plain(left),
+            )
+        low = np.array([f.inner(f.low) for f in free])
+        high = np.array([f.inner(f.high) for f in free])
+        cache: dict[bytes, tuple[list[np.ndarray], np.ndarray]] = {}
+
+        def outer(z: np.ndarray) -> np.ndarray:
+            return np.array([f.outer(one) for f, one in zip(free, z, strict=True)])
+
+        def run(z: np.ndarray) -> tuple[list[np.ndarray], np.ndarray]:
+            key = z.tobytes()
+            if key not in cache:
+                shown = self.predictions(spec, outer(z))
+                cache[key] = (shown, self.vector(self.residuals(shown), weights))
+                if len(cache) > 4:
+                    cache.pop(next(iter(cache)))
+            return cache[key]
+
+        keys = [f.key for f in free]
+        known: dict[int, tuple[np.ndarray, np.ndarray]] = {}
+        if near is not None and near.jacobian is not None and len(near.jacobian) == self.count:
+            there = {f.key: f.inner(v) for f, v in zip(near.spec.free, near.values, strict=True)}
+            at = np.array([there.get(key, np.nan) for key in keys])
+            weight = 1.0 if weights is None else np.concatenate([w[m] for w, m in zip(weights, self.mask, strict=True)])
+            for column, f in enumerate(near.spec.free):
+                if f.key in keys:
+                    known[keys.index(f.key)] = (at, near.jacobian[:, column] * weight)
+
+        def slope(z: np.ndarray) -> np.ndarray:
+            stale = [c for c in range(len(free)) if c not in known or np.nanmax(np.abs(z - known[c][0])) > REUSED]
+            if stale:
+                fresh = self.jacobian(spec, outer(z), run(z)[0], weights, stale)
+                known.update({c: (z.copy(), fresh[:, k]) for k, c in enumerate(stale)})
+            return np.column_stack([known[c][1] for c in range(len(free))])
+
+        # what is believed before, as further residuals: (z - believed) / its standard deviation
+        believed = np.array([f.inner(f.start) for f in free])
+        trust = np.array([1.0 / f.prior if f.prior else 0.0 for f in free])
+        some = trust > 0
+        z0 = np.array([f.inner(v) for f, v in zip(free, values, strict=True)])
+        margin = 1e-6 * (high - low)
+        z0 = np.clip(z0, low + margin, high - margin)
+        found = least_squares(
+            lambda z: np.concatenate([run(z)[1], (trust * (z - believed))[some]]),
+            z0,
+            jac=lambda z: np.vstack([slope(z), np.diag(trust)[some]]),
+            bounds=(low, high),
+            x_scale="jac",
+            ftol=tolerance,
+            xtol=1e-6,
+            gtol=1e-10,
+            max_nfev=max_steps,
+        )
+        z, jac = found.x, found.jac[: self.count]
+        shown, vector = run(z)
+        fit = Fit(
+            spec,
+            outer(z),
+            float(vector @ vector),
+            self.count,
+            self.residuals(shown),
+            jac,
+            vector,
+        )
+        fit.sse = self.plain(fit.residual)
+        norms = np.linalg.norm(jac, axis=0)
+        span = np.where([f.log for f in free], 0.5, 1.0)
+        fit.stuck = [f.key for f, norm, one in zip(free, norms, span, strict=True) if norm * one < 1.0]
+        if errors:
+            self.add_errors(fit)
+        fit.simulations = self.simulations - begun
+        return fit
+
+    def holdout_rmse(self, fit: Fit) -> float:
+        """Return the rms error, degC, on blocks held out of the fit, one fold after the other.
+
+        Every fifth block of about two minutes is left out, the numbers are fitted to the rest from where they
+        were, and the whole run is simulated with them: the error counts where they have not seen the data.
+        """
+        if not len(fit.values):
+            return statistics.rms(fit.residual)
+        if math.isfinite(fit.holdout):
+            return fit.holdout
+        total, count = 0.0, 0
+        rows = [fold_of_rows(run) for run in self.runs]
+        for fold in range(FOLDS):
+            out = [one == fold for one in rows]
+            weights = [
+                np.broadcast_to(~o[:, None], mask.shape).astype(float) for o, mask in zip(out, self.mask, strict=True)
+            ]
+            again = self.fit(fit.spec, fit.as_dict(), weights=weights, tolerance=1e-3, max_steps=4, near=fit)
+            for residual, o in zip(again.residual, out, strict=True):
+                total += float(np.nansum(residual[o] ** 2))
+                count += int(np.isfinite(residual[o]).sum())
+        fit.holdout = math.sqrt(total / max(1, count))
+        return fit.holdout
+
+    def add_errors(self, fit: Fit) -> None:
+        """Compute the covariance at the fit, with the residual's size and autocorrelation taken into account.
+
+        A sandwich: J'J inverse around the long-run covariance of J'r over blocks in time (all springs of a block
+        together), never less than what white noise alone would give.
+        """
+        predicted = [run.temperature_c - left for run, left in zip(self.runs, fit.residual, strict=True)]
+        shown = self.predictions(fit.spec, fit.values) if predicted else []
+        jac = self.jacobian(fit.spec, fit.values, shown)
+        fit.jacobian = jac
+        used = [k for k, f in enumerate(fit.spec.free) if f.key not in fit.stuck]
+        covariance = np.full((jac.shape[1], jac.shape[1]), 0.0)
+        fit.factor = statistics.correlation_factor(
+            [left / noise for left, noise in zip(fit.residual, self.noise, strict=True)],
+            self.longest_lag(),
+        )
+        if used:
+            spread = max(1.0, fit.chi2 / max(1, fit.count - len(used)))
+            trust = np.array([1.0 / f.prior if f.prior else 0.0 for f in fit.spec.free])[used]
+            inner = np.linalg.pinv(jac[:, used].T @ jac[:, used] + spread * np.diag(trust**2), rcond=1e-12)
+            white = inner * spread
+            blocks = self._block_of_samples()
+            score = np.zeros((blocks.max() + 1, len(used)))
+            vector = fit.vector if fit.vector is not None else self.vector(fit.residual)
+            np.add.at(score, blocks, jac[:, used] * vector[:, None])
+            few = len(score)
+            meat = score.T @ score * (few / max(1.0, few - 1.0))
+            robust = inner @ meat @ inner
+            ratio = np.sqrt(np.maximum(1.0, np.diag(robust) / np.maximum(np.diag(white), 1e-300)))
+            # Blocks say nothing better than white noise does where the residual is white: use them only
+            # where autocorrelation is there.
+            if fit.factor < 1.5:
+                ratio = np.ones_like(ratio)
+            covariance[np.ix_(used, used)] = white * np.outer(ratio, ratio)
+        fit.covariance = covariance
+
+    def longest_lag(self) -> int:
+        """Return the number of lags worth summing: a fifth of the shortest run, at most 300."""
+        return int(min(300, min(len(run.time_s) for run in self.runs) // 5))
+
+    def _block_of_samples(self) -> np.ndarray:
+        """Return the block number of every sample of the residual vector: 20 blocks in time a run."""
+        out, base = [], 0
+        for run, mask in zip(self.runs, self.mask, strict=True):
+            rows = np.broadcast_to((np.arange(len(run.time_s)) * 20 // len(run.time_s))[:, None], mask.shape)
+            out.append(rows[mask] + base)
+            base += 20
+        return np.concatenate(out)

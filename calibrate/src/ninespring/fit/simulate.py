@@ -1,0 +1,93 @@
+"""One log through the plant, as docs/files.md says, and the plant that an array or a model declares."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from .. import native
+from ..logs.run import Run
+from ..models import Array
+
+
+def simulate_run(
+    plant: native.Plant,
+    run: Run,
+    ambient: np.ndarray | None,
+    values: Mapping[str, float],
+    start_offset: np.ndarray | None = None,
+) -> np.ndarray:
+    """Simulate one log as section 4 says: from its first measured temperatures (ambient where none).
+
+    After a gap the springs start again from what was measured there; air and plate carry on.
+    Air and plate start at ambient, or, where the run begins warm and steady, in balance with its first inputs.
+    """
+    if ambient is not None:
+        plant.set_ambient(float(ambient[0]))
+    plant.set_fan(float(run.fan[0]))
+    plant.reset()
+    mode = native.MODES[run.mode]
+    first = run.temperature_c[0].copy()
+    if run.warm:
+        for k in range(run.springs):
+            plant.drive(k, mode, float(run.drive[0, k]))
+        # a drifting ambient has no balance: it begins at the run's first row
+        plant.settle_without("ambient_drift", 1e6)
+    plant.start_from_measured(first + (0.0 if start_offset is None else start_offset))
+    if len(run.starts) == 1:
+        return plant.simulate(run.time_s, mode, run.drive, run.fan, ambient)
+    out = np.empty_like(run.temperature_c)
+    bounds = [*run.starts, len(run.time_s)]
+    for piece, (begin, end) in enumerate(zip(bounds[:-1], bounds[1:], strict=True)):
+        if piece:
+            across = slice(begin - 1, begin + 1)
+            plant.simulate(
+                run.time_s[across],
+                mode,
+                run.drive[across],
+                run.fan[across],
+                None if ambient is None else ambient[across],
+            )
+            plant.start_from_measured(run.temperature_c[begin])
+        part = slice(begin, end)
+        if end - begin == 1:
+            out[part] = plant.measured_c()
+            continue
+        out[part] = plant.simulate(
+            run.time_s[part],
+            mode,
+            run.drive[part],
+            run.fan[part],
+            None if ambient is None else ambient[part],
+        )
+    return out
+
+
+def array_parameters(array: Array) -> dict[str, float]:
+    """Return the plant's parameters that follow from array.toml: the host tools' rules (docs/files.md)."""
+    material, spring = array.material, array.spring
+    out = {
+        key: value for key, value in material.items() if key == "emissivity" or key.endswith(("_start_c", "_finish_c"))
+    }
+    if not material and not spring:
+        return out
+    wire_mm = spring.get("wire_diameter_mm", 0.8)
+    length_mm = 110.0
+    if "coil_diameter_mm" in spring or "turns" in spring:
+        length_mm = math.pi * spring.get("coil_diameter_mm", 3.45) * spring.get("turns", 10.0)
+    length_mm = spring.get("wire_length_mm", length_mm)
+    section_mm2 = math.pi / 4.0 * wire_mm**2
+    mass_kg = section_mm2 * length_mm * 1e-9 * material.get("density_kg_per_m3", 6450.0)
+    ohm = 1e-5 * length_mm / section_mm2
+    austenite = ohm * material.get("resistivity_austenite_uohm_cm", 100.0)
+    return out | {
+        "wire_diameter_mm": wire_mm,
+        "surface_mm2": math.pi * wire_mm * length_mm,
+        "heat_capacity_j_per_k": mass_kg * material.get("heat_capacity_j_per_kgk", 840.0),
+        "latent_heat_j": mass_kg * material.get("latent_heat_j_per_kg", 24200.0),
+        "resistance_martensite_ohm": ohm * material.get("resistivity_martensite_uohm_cm", 80.0),
+        "resistance_austenite_ohm": austenite,
+        "resistance_ohm": austenite,
+    }

@@ -1,0 +1,52 @@
+"""One log, checked: what every fit starts from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+DriveMode = Literal["power", "current", "command"]
+
+
+@dataclass
+class Run:
+    """One log, checked. Arrays have one row per time (n) and one column per spring (k)."""
+
+    name: str
+    sha256: str
+    time_s: np.ndarray
+    mode: DriveMode
+    drive: np.ndarray
+    """(n, k): W, A or 0..1 by `mode`; row r holds until time r + 1."""
+    temperature_c: np.ndarray
+    """(n, k), NaN where not measured or not trusted."""
+    fan: np.ndarray
+    ambient_c: np.ndarray | None
+    """(n,) or None where the log has none."""
+    current_a: np.ndarray | None = None
+    voltage_v: np.ndarray | None = None
+    notes: list[str] = field(default_factory=list)
+    warm: bool = False
+    """The run begins warm and steady: hidden heat is in balance with the first inputs."""
+    starts: list[int] = field(default_factory=lambda: [0])
+    """Rows at which a simulation starts again from the measured temperatures (the first; after gaps)."""
+
+    def __repr__(self) -> str:
+        measured = int(np.isfinite(self.temperature_c).any(axis=0).sum())
+        return (
+            f"<run {Path(self.name).name}: {len(self.time_s)} rows, {self.duration_s:.0f} s, {self.springs} springs by "
+            f"{self.mode}, {measured} measured>"
+        )
+
+    @property
+    def springs(self) -> int:
+        """Number of springs."""
+        return self.temperature_c.shape[1]
+
+    @property
+    def duration_s(self) -> float:
+        """From the first row to the last, s."""
+        return float(self.time_s[-1] - self.time_s[0])

@@ -1,0 +1,96 @@
+"""A serial port, taken for this program alone: lines in, lines out, and one error for every way that it can go away."""
+
+from __future__ import annotations
+
+import errno
+import os
+import termios
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+import serial
+
+from .errors import InputError, WorkError
+
+BAUD = 115200
+LONGEST_LINE = 8192
+"""Bytes: what is longer has no line ends and is no console."""
+GONE = (serial.SerialException, OSError, termios.error)
+"""What pyserial raises when a cable is pulled; termios.error is no OSError."""
+
+
+class Port:
+    """An open serial port, locked against a second program."""
+
+    def __init__(self, name: str) -> None:
+        """Open and lock the port; a Mega resets when it is opened."""
+        self.name = name
+        self._arrived = b""
+        try:
+            self._serial = serial.Serial(name, BAUD, timeout=0.1, write_timeout=2.0, exclusive=True)
+        except (*GONE, ValueError) as error:
+            if "exclusively lock" in str(error) or getattr(error, "errno", None) == errno.EBUSY:
+                raise WorkError(f"{name}: another program has the port{_who_has(name)}: end it first") from None
+            number = getattr(error, "errno", None)
+            reason = os.strerror(number) if number else "not a serial port"
+            raise WorkError(f"{name}: cannot be opened ({reason}): is the board there, is the port free?") from None
+
+    @property
+    def resets_the_board(self) -> bool:
+        """Whether opening it pulled a modem line, which restarts a Mega; a pseudo-terminal has none."""
+        try:
+            _ = self._serial.cts
+        except GONE:
+            return False
+        return True
+
+    @contextmanager
+    def _still_there(self) -> Iterator[None]:
+        try:
+            yield
+        except GONE:
+            raise WorkError(f"{self.name}: the board went away{_who_has(self.name)}") from None
+
+    def read_line(self, until_s: float, stopped: Callable[[], bool] = lambda: False) -> str | None:
+        """Return the next line without its end; None where none came until that monotonic time, or when stopped."""
+        while b"\n" not in self._arrived:
+            if len(self._arrived) > LONGEST_LINE:
+                raise WorkError(f"{self.name}: {len(self._arrived)} bytes without a line end: this is no board")
+            if stopped() or time.monotonic() >= until_s:
+                return None
+            with self._still_there():
+                self._arrived += self._serial.read(max(1, self._serial.in_waiting))
+        line, _, self._arrived = self._arrived.partition(b"\n")
+        return line.decode("ascii", "replace").strip()
+
+    def write(self, text: str) -> None:
+        """Send text as it is."""
+        try:
+            raw = text.encode("ascii")
+        except UnicodeEncodeError:
+            raise InputError(f"'{text.strip()}' is not plain ASCII") from None
+        with self._still_there():
+            self._serial.write(raw)
+
+    def close(self) -> None:
+        """Close the port, whatever became of it."""
+        with suppress(GONE):
+            self._serial.close()
+
+
+def _who_has(name: str) -> str:
+    """Return ` (program, pid)` of another process that has the port open, as far as this system tells."""
+    try:
+        target = os.path.realpath(name)
+        for link in Path("/proc").glob("[0-9]*/fd/*"):
+            pid = int(link.parts[2])
+            try:
+                if pid != os.getpid() and os.readlink(link) == target:
+                    return f" ({(link.parents[1] / 'comm').read_text().strip()}, pid {pid})"
+            except OSError:
+                continue
+    except OSError:
+        pass
+    return ""

@@ -1,0 +1,453 @@
+"""Recording a board's telemetry as a log: what comes is checked line by line, kept whatever ends it, and nothing stays on."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import os
+import re
+import signal
+import stat
+import sys
+import time
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from .board import Board
+from .errors import InputError, WorkError
+from .logs import COLUMN, EXTRA, LIMITS
+from .thermometers import Thermometers
+
+FINER = 10
+"""So many rows of telemetry become one of the log, where the line has room for them."""
+FINEST_HZ = 20
+"""Nine springs' rows fill half the line at this rate."""
+LONGEST_WAIT_S = 15.0
+"""So long, by the board's clock, a row waits for a thermometer's reading after it."""
+SILENT_S = 5.0
+"""Telemetry that does not come for so long has ended."""
+STATE = re.compile(r"ok|locked|fault_\d+")
+NUMBER = re.compile(r"-?\d+(?:\.(\d+))?")
+COMMENT = re.compile(r"[<\[][ -~]*[>\]]")
+
+
+@dataclass
+class Step:
+    """A console line to send so many seconds after the first row (None: before the recording)."""
+
+    line: str
+    at_s: float | None = None
+
+
+@dataclass
+class Recording:
+    """What came of a recording."""
+
+    dropped: int = 0
+    """Lines that were corrupt."""
+    offset_s: float | None = None
+    """What was added to the thermometers' clock to have the board's, s."""
+    ended: str = ""
+    """Why it ended early where that was nobody's wish."""
+
+
+def script_lines(text: str, name: str, duration_s: float = math.inf) -> list[Step]:
+    """Return the steps of a script: console lines, or `at SECONDS = line` as in scenarios; # and ; begin comments."""
+    steps: list[Step] = []
+    for number, raw in enumerate(text.splitlines(), start=1):
+        line = re.split("[#;]", raw, maxsplit=1)[0].strip()
+        if not line:
+            continue
+        if not line.isascii():
+            raise InputError("the console takes plain ASCII", name, number, 1)
+        step = Step(line)
+        if re.match(r"at\b", line):
+            match = re.fullmatch(r"at\s+(\d+(?:\.\d*)?)\s*=\s*(\S.*)", line)
+            if not match:
+                raise InputError(f"'{line[:40]}' is not `at SECONDS = console line`", name, number, 1)
+            at_s = float(match[1])
+            step = Step(match[2], at_s)
+            if steps and steps[-1].at_s is not None and steps[-1].at_s > at_s:
+                raise InputError("times of a script must not fall", name, number, 1)
+            if at_s >= duration_s:
+                raise InputError(
+                    f"{at_s:g} s is not before the end of the recording, `--duration {duration_s:g}`", name, number, 1
+                )
+        elif steps and steps[-1].at_s is not None:
+            raise InputError(
+                f"'{line[:40]}' comes after timed lines: give it a time, `at SECONDS = ...`", name, number, 1
+            )
+        steps.append(step)
+    return steps
+
+
+@dataclass(frozen=True)
+class Row:
+    """One row of telemetry."""
+
+    text: str
+    time_s: float
+    form: tuple[tuple[int, ...], frozenset[str]]
+    """Digits after each point, and the columns that are out of range: the same in neighbours unless one is corrupt."""
+
+
+class RowCheck:
+    """Tells a board's rows from what a bad line made of them.
+
+    A row has a cell per column, each a finite number, and it follows the row before: the same digits after each point,
+    the same columns in range, a time that goes on. One that does not follow is held until the next one follows it (then
+    something really changed) or not (then it was corrupt).
+    """
+
+    def __init__(self, names: Sequence[str], hz: float) -> None:
+        self.names = names
+        self.dropped = 0
+        self.restarted = False
+        """Time began anew: the board was reset."""
+        self._longest_step_s = max(1.0, 3.0 / hz)
+        self._last: Row | None = None
+        self._held: Row | None = None
+
+    def feed(self, line: str) -> list[Row]:
+        """Return the rows that are now known to be good, in order."""
+        row = self._parse(line)
+        if row is None:
+            self.dropped += 1
+            return []
+        if self._last and self._follows(self._last, row):
+            self.dropped += self._held is not None
+            good = [row]
+        elif self._held and self._follows(self._held, row):
+            if self._last and self._held.time_s <= self._last.time_s:
+                self.restarted = True
+                return []
+            good = [self._held, row]
+        else:
+            self.dropped += self._held is not None
+            self._held = row
+            return []
+        self._held, self._last = None, row
+        return good
+
+    def _parse(self, line: str) -> Row | None:
+        cells = line.split(",")
+        if len(cells) != len(self.names):
+            return None
+        digits: list[int] = []
+        out: set[str] = set()
+        for name, cell in zip(self.names, cells, strict=True):
+            if name == "state":
+                if not STATE.fullmatch(cell):
+                    return None
+                continue
+            if not (match := NUMBER.fullmatch(cell)):
+                return None
+            digits.append(len(match[1] or ""))
+            low, high = LIMITS.get(name if name in LIMITS else name[0], (-math.inf, math.inf))[:2]
+            if not low <= float(cell) <= high:
+                out.add(name)
+        return Row(line, float(cells[self.names.index("time_s")]), (tuple(digits), frozenset(out)))
+
+    def _follows(self, before: Row, row: Row) -> bool:
+        return row.form == before.form and 0.0 < row.time_s - before.time_s <= self._longest_step_s
+
+
+def telemetry_names(header: str) -> list[str] | None:
+    """Return the columns of a telemetry header, None where it is none or corrupt."""
+    names = header.split(",")
+    springs = sum(re.fullmatch(r"i\d+_a", name) is not None for name in names)
+    wanted = {"time_s", *(f"i{k}_a" for k in range(1, springs + 1))}
+    whole = all(COLUMN.match(name) or EXTRA.match(name) for name in names) and len(set(names)) == len(names)
+    return names if springs and whole and wanted <= set(names) else None
+
+
+class LogFile:
+    """Takes a log line by line. Lines are in the file at once; the file has its name when it is finished.
+
+    A regular file grows as NAME.part, which is a readable log at every moment. A device or a pipe is written as it is, `-`
+    is standard output.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.part: Path | None = None
+        self.rows = 0
+        self._whole = 0
+        """Bytes of whole lines."""
+        try:
+            if str(path) == "-":
+                self._file = os.dup(sys.stdout.fileno())
+            elif path.exists() and not stat.S_ISREG(path.stat().st_mode):
+                self._file = os.open(path, os.O_WRONLY)
+            else:
+                self.path = path.resolve()
+                self._file = self._new_part()
+        except OSError as error:
+            raise InputError(f"cannot be written: {error.strerror}", path) from None
+
+    def _new_part(self) -> int:
+        """Open a new file beside the log: an old .part is what a killed recording left, and is kept."""
+        count = 1
+        while True:
+            self.part = self.path.with_name(f"{self.path.name}.part{'' if count == 1 else count}")
+            with contextlib.suppress(FileExistsError):
+                return os.open(self.part, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
+            count += 1
+
+    def write(self, line: str) -> None:
+        """Write one line. WorkError where the disk is full or the reader went away."""
+        left = (line + "\n").encode()
+        whole = self._whole + len(left)
+        try:
+            while left:
+                left = left[os.write(self._file, left) :]
+        except OSError as error:
+            raise WorkError(f"{self.part or self.path}: {error.strerror}") from None
+        self._whole = whole
+
+    def write_row(self, line: str) -> None:
+        """Write one row of numbers."""
+        self.write(line)
+        self.rows += 1
+
+    def close(self) -> None:
+        """Cut off a line that was not written whole, and give the file its name; without a row, remove it."""
+        if self.part:
+            with contextlib.suppress(OSError):
+                os.ftruncate(self._file, self._whole)
+                os.fsync(self._file)
+        os.close(self._file)
+        if self.part and self.rows:
+            os.replace(self.part, self.path)
+        elif self.part:
+            self.part.unlink()
+
+
+@contextlib.contextmanager
+def told_to_stop() -> Iterator[Callable[[], bool]]:
+    """Have SIGINT, SIGTERM and SIGHUP (a closed terminal) only be noted, and tell whether one came.
+
+    What is under way is then ended in order. A signal that is ignored (nohup) stays so.
+    """
+    told: list[int] = []
+    before = {}
+    for one in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        if signal.getsignal(one) != signal.SIG_IGN:
+            before[one] = signal.signal(one, lambda number, frame: told.append(number))
+    try:
+        yield lambda: bool(told)
+    finally:
+        for one, handler in before.items():
+            signal.signal(one, handler)
+
+
+def record(
+    board: Board,
+    log: LogFile,
+    hz: int,
+    duration_s: float,
+    steps: Sequence[Step] = (),
+    say: Callable[[int, float], None] = lambda rows, seconds: None,
+    keys: Mapping[str, str] | None = None,
+    thermometers: Thermometers | None = None,
+) -> Recording:
+    """Record a board's telemetry, `hz` rows a second; `duration_s` and the steps' times are by the board's clock, from the first row.
+
+    Steps without a time are sent first. The log begins with what the board is and how it is set, ends with its faults,
+    and has its status (which limits act on a spring) between the rows, all as comments. Whatever ends it, the springs are
+    off afterwards, and `ended` says why where it was no wish. `thermometers` add columns t1_c ...: each row waits until a
+    reading after it has come.
+    """
+    got = Recording()
+    answers = False
+    finer_hz = max(hz, min(FINER * hz, FINEST_HZ))
+    sink = RowSink(log, thermometers, 1.0 / hz if finer_hz > hz else 0.0)
+    try:
+        _head(board, log, steps, keys or {})
+        _rows(board, finer_hz, duration_s, steps, got, say, sink)
+    except KeyboardInterrupt:
+        pass
+    except WorkError as error:
+        got.ended = str(error)
+    finally:
+        if not (answers := board.make_safe()):
+            got.ended = (got.ended or f"{board.port}: the board does not answer") + (
+                "; the springs could not be switched off from here: cut their supply"
+            )
+    with contextlib.suppress(WorkError):
+        sink.flush()
+        if thermometers:
+            got.offset_s = thermometers.offset_s
+            if got.offset_s is not None:
+                log.write(f"# thermometers_offset_s: {got.offset_s:.3f}")
+            got.ended = got.ended or thermometers.trouble
+        if got.dropped:
+            log.write(f"# dropped_lines: {got.dropped}")
+        if got.ended:
+            log.write(f"# ended: {got.ended}")
+        for line in board.ask("faults") if answers else ():
+            log.write(f"# fault at the end: {line}")
+    return got
+
+
+class RowSink:
+    """Rows on their way to the log, and comments between them.
+
+    With `every_s`, rows that came faster become one: currents and voltages are their means until the next one begins, as a
+    log's inputs hold from its row on (the voltage is weighted with the current, so that their product is the mean power); the
+    rest is that of the first. With thermometers, a row waits for the readings around it.
+    """
+
+    def __init__(self, log: LogFile, thermometers: Thermometers | None, every_s: float = 0.0) -> None:
+        self.rows = 0
+        self._log, self._thermometers, self._every_s = log, thermometers, every_s
+        self._names: list[str] = []
+        self._springs: list[int] = []
+        """Those with a thermometer."""
+        self._bucket: list[Row] = []
+        self._comments: list[str] = []
+        """What came since the bucket's first row."""
+        self._waiting: deque[tuple[str, float, list[str]]] = deque()
+
+    def begin(self, names: Sequence[str]) -> None:
+        """Write the header; a thermometer of a spring that the array has not is left out."""
+        self._names = list(names)
+        if self._thermometers:
+            self._springs = [k for k in self._thermometers.springs if f"i{k}_a" in names]
+            if not self._springs:
+                raise WorkError("the thermometers are of no spring of this array: their columns are t1_c, t2_c, ...")
+        self._log.write(",".join([*names, *(f"t{k}_c" for k in self._springs)]))
+
+    def row(self, row: Row) -> None:
+        """Take one row."""
+        if self._thermometers:
+            self._thermometers.row_came(row.time_s)
+        if self._bucket and row.time_s - self._bucket[0].time_s < (1.0 - 0.5 / FINER) * self._every_s:
+            self._bucket.append(row)
+            return
+        self._end_bucket()
+        self._bucket = [row]
+        if not self._every_s:
+            self._end_bucket()
+        self._write(row.time_s)
+
+    def comment(self, text: str) -> None:
+        """Take a comment: it comes after the rows that were taken before it."""
+        if self._bucket:
+            self._comments.append(text)
+        elif self._waiting:
+            self._waiting[-1][2].append(text)
+        else:
+            self._log.write(f"# {text}")
+
+    def flush(self) -> None:
+        """Write all that was taken, with the temperatures that have come."""
+        self._end_bucket()
+        self._write(math.inf)
+
+    def _end_bucket(self) -> None:
+        if self._bucket:
+            first = self._bucket[0]
+            self.rows += 1
+            self._waiting.append(
+                (mean_row(self._names, [one.text for one in self._bucket]), first.time_s, self._comments)
+            )
+            self._bucket, self._comments = [], []
+
+    def _write(self, now_s: float) -> None:
+        """Write those whose temperatures are known, and those that have waited too long for them."""
+        while self._waiting:
+            text, time_s, comments = self._waiting[0]
+            if self._thermometers:
+                values = self._thermometers.at(time_s)
+                if values is None and now_s - time_s < LONGEST_WAIT_S and not self._thermometers.trouble:
+                    return
+                text = ",".join([text, *(f"{values[k]:.3f}" if k in (values or {}) else "" for k in self._springs)])
+            self._waiting.popleft()
+            self._log.write_row(text)
+            for one in comments:
+                self._log.write(f"# {one}")
+
+
+def mean_row(names: Sequence[str], rows: Sequence[str]) -> str:
+    """Return the first row with the currents and voltages that all of them mean."""
+    if len(rows) == 1:
+        return rows[0]
+    cells = [row.split(",") for row in rows]
+    out = list(cells[0])
+    for at, name in enumerate(names):
+        if re.fullmatch(r"i\d+_a", name):
+            current = [float(one[at]) for one in cells]
+            out[at] = f"{sum(current) / len(cells):.4f}"
+            voltage_name = f"v{name[1:-2]}_v"
+            if voltage_name in names:
+                where = names.index(voltage_name)
+                voltage = [float(one[where]) for one in cells]
+                weight = current if sum(current) > 0 else [1.0] * len(cells)
+                out[where] = f"{sum(v * w for v, w in zip(voltage, weight, strict=True)) / sum(weight):.4f}"
+    return ",".join(out)
+
+
+def _head(board: Board, log: LogFile, steps: Sequence[Step], keys: Mapping[str, str]) -> None:
+    for step in steps:
+        if step.at_s is None:
+            board.ask(step.line)
+    board.guard(write_head(board, log, keys))
+
+
+def write_head(board: Board, log: LogFile, keys: Mapping[str, str]) -> dict[str, str]:
+    """Write, as comments, what is known of a log and of the board: version, faults, settings. Return the settings."""
+    for name, value in keys.items():
+        log.write(f"# {name}: {value}")
+    for line in board.version:
+        log.write(f"# version: {line}")
+    for line in board.ask("faults") or ["none"]:
+        log.write(f"# fault: {line}")
+    settings = board.settings()
+    for name, value in settings.items():
+        log.write(f"# ${name}={value}")
+    return settings
+
+
+def _rows(
+    board: Board,
+    hz: int,
+    duration_s: float,
+    steps: Sequence[Step],
+    got: Recording,
+    say: Callable[[int, float], None],
+    sink: RowSink,
+) -> None:
+    waiting = [step for step in steps if step.at_s is not None]
+    for _ in range(3):
+        names = next(filter(None, map(telemetry_names, board.ask(f"telemetry csv {hz}"))), None)
+        if names:
+            break
+    else:
+        raise WorkError(f"{board.port}: the board's telemetry has no header that can be read")
+    sink.begin(names)
+    check = RowCheck(names, hz)
+    first_s = math.nan
+    while True:
+        line = board.next_line(time.monotonic() + SILENT_S)
+        if line is None:
+            raise WorkError(f"{board.port}: no telemetry for {SILENT_S:g} s")
+        if not line:
+            continue
+        if COMMENT.fullmatch(line):
+            sink.comment(line)
+            continue
+        good = check.feed(line)
+        got.dropped = check.dropped
+        if check.restarted:
+            raise WorkError("the board has started again")
+        for row in good:
+            first_s = row.time_s if math.isnan(first_s) else first_s
+            if row.time_s - first_s > duration_s:
+                return
+            sink.row(row)
+            say(sink.rows, row.time_s - first_s)
+            while waiting and (waiting[0].at_s or 0.0) <= row.time_s - first_s:
+                board.ask(waiting.pop(0).line)

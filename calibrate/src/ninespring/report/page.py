@@ -1,0 +1,236 @@
+"""report.html: everything a diagnosis found, in one file that needs nothing else."""
+
+from __future__ import annotations
+
+import html
+import re
+from typing import Any
+
+from .. import effects, native
+from ..search import search
+from ..verdict import steady
+from ..verdict.diagnosis import Diagnosis
+from . import figures
+
+STYLE = """
+:root{color-scheme:light}body{font:16px/1.5 system-ui,-apple-system,"Segoe UI",sans-serif;color:#1d2733;
+background:#f6f7f9;margin:0}main{max-width:1120px;margin:0 auto;padding:24px 20px 60px}
+h1{font-size:28px;margin:8px 0 4px}h2{font-size:20px;margin:36px 0 8px;border-bottom:1px solid #d9dfe5;padding-bottom:4px}
+.lead{font-size:18px;margin:6px 0 18px}.cards{display:grid;grid-template-columns:repeat(auto-fit,minmax(170px,1fr));gap:12px}
+.card{background:#fff;border:1px solid #e1e6eb;border-radius:10px;padding:12px 14px}.card b{display:block;font-size:24px}
+.card span{color:#5a6875;font-size:13px}.table{overflow-x:auto}figure{background:#fff;border:1px solid #e1e6eb;border-radius:10px;padding:10px;
+margin:12px 0}figure svg{width:100%;height:auto;display:block}figcaption{color:#5a6875;font-size:14px;padding:4px 6px}
+table{border-collapse:collapse;width:100%;background:#fff;border:1px solid #e1e6eb;border-radius:10px;font-size:14px}
+th,td{padding:6px 10px;border-bottom:1px solid #eef1f4;text-align:left;vertical-align:top}th{background:#f0f3f6}
+td.n,th.n{text-align:right;font-variant-numeric:tabular-nums}.warn{background:#fff6e5;border:1px solid #f0d9a8;
+border-radius:10px;padding:10px 14px}.bad{background:#fdeeea;border-color:#e9b9ac}small{color:#5a6875}
+"""
+
+
+def _e(text: object) -> str:
+    return html.escape(str(text))
+
+
+def _table(header: list[str], rows: list[list[object]], numeric: set[int]) -> str:
+    head = "".join(f'<th class="n">{_e(h)}</th>' if k in numeric else f"<th>{_e(h)}</th>" for k, h in enumerate(header))
+    body = "".join(
+        "<tr>"
+        + "".join(f'<td class="n">{_e(c)}</td>' if k in numeric else f"<td>{_e(c)}</td>" for k, c in enumerate(row))
+        + "</tr>"
+        for row in rows
+    )
+    return f'<div class="table"><table><tr>{head}</tr>{body}</table></div>'
+
+
+def _parameters(entries: dict[str, Any]) -> str:
+    """Return a table of numbers with standard errors, units, and what they are."""
+    table = native.parameter_table()
+    rows: list[list[object]] = []
+    for name, one in entries.items():
+        error = "not determined" if one["stderr"] is None else f"{one['stderr']:.2g}"
+        unit = "–" if one["unit"] in ("", "1") else one["unit"]
+        known = table.get(re.split(r"[\[@]", name)[0])
+        says = "; ".join(filter(None, (known.description if known else "", one.get("note", ""))))
+        rows.append([name, f"{one['value']:.5g}", error, unit, says])
+    return _table(["number", "value", "standard error", "unit", "what it is"], rows, {1, 2})
+
+
+def verdict(result: dict[str, Any]) -> str:
+    """Return the outcome in one sentence."""
+    before, after = result["baseline"], result["after"]
+    names = [e["name"] + (f" ({e['variant']})" if e.get("variant") else "") for e in result["effects"]]
+    held = f"held-out error {before['holdout_rmse_c']:.2f} → {after['holdout_rmse_c']:.2f} K at a noise of {before['noise_c']:.2f} K"
+    if names and not result["unexplained"]:
+        return f"Missing: {' and '.join(names)}; {held}."
+    if names:
+        return f"Missing: {' and '.join(names)}, and something that no effect of the library explains; {held}."
+    if result["unexplained"]:
+        return f"Something is missing that no effect of the library explains; {held}."
+    return f"Nothing is missing: the declared model explains the data to the noise; {held}."
+
+
+def html_report(found: Diagnosis) -> str:
+    """Return the report as HTML."""
+    result = found.result
+    before, after = result["baseline"], result["after"]
+    parts = ["<h1>What the array does that the model did not</h1>", f'<p class="lead">{_e(verdict(result))}</p>']
+    cards = [
+        (f"{before['rmse_c']:.2f} K", "error before"),
+        (f"{after['rmse_c']:.2f} K", "error after"),
+        (f"{before['holdout_rmse_c']:.2f} K", "held-out before"),
+        (f"{after['holdout_rmse_c']:.2f} K", "held-out after"),
+        (f"{before['noise_c']:.2f} K", "noise of the sensors"),
+        ("yes" if result["unexplained"] else "none", "unexplained rest"),
+    ]
+    parts.append(
+        '<div class="cards">'
+        + "".join(f'<div class="card"><b>{_e(a)}</b><span>{_e(b)}</span></div>' for a, b in cards)
+        + "</div>"
+    )
+    parts.append(
+        "<h2>Errors before and after</h2>"
+        + _table(
+            ["", "in sample, K rms", "held out, K rms"],
+            [
+                ["before: the declared model", f"{before['rmse_c']:.3f}", f"{before['holdout_rmse_c']:.3f}"],
+                ["after: with the effects adopted", f"{after['rmse_c']:.3f}", f"{after['holdout_rmse_c']:.3f}"],
+                ["noise of the sensors", f"{before['noise_c']:.3f}", "–"],
+            ],
+            {1, 2},
+        )
+    )
+    if result["warnings"]:
+        parts.append('<h2>About the data</h2><div class="warn">' + "<br>".join(map(_e, result["warnings"])) + "</div>")
+    if result["unexplained"]:
+        parts.append(f'<h2>Unexplained</h2><div class="warn bad">{_e(result["residual"]["note"])}</div>')
+    if result["effects"]:
+        parts.append("<h2>Effects adopted</h2>")
+        rows = [
+            [
+                e["name"] + (f" ({e['variant']})" if e.get("variant") else ""),
+                e["in_words"],
+                f"{e['rmse_c']:.3f}",
+                f"{e['holdout_rmse_c']:.3f}",
+                f"{e['evidence']:.0f}",
+                "yes" if e["on_chip"] else "no: " + e["why_not_on_chip"],
+            ]
+            for e in result["effects"]
+        ]
+        parts.append(
+            _table(
+                ["effect", "what it is", "error with it, K", "held out, K", "evidence, nats", "goes into the chip"],
+                rows,
+                {2, 3, 4},
+            )
+        )
+        numbers = {k: v for e in result["effects"] for k, v in e["parameters"].items()}
+        parts.append("<h2>Their numbers</h2>" + _parameters(numbers))
+    if result["rivals"]:
+        parts.append("<h2>What these data cannot tell apart</h2>")
+        rows = [
+            [
+                r["instead_of"],
+                r["name"] + (f" ({r['variant']})" if r.get("variant") else ""),
+                f"{r['rmse_c']:.3f}",
+                f"{r['evidence']:.1f}",
+                r["separating_experiment"],
+            ]
+            for r in result["rivals"]
+        ]
+        parts.append(
+            _table(
+                ["adopted", "could also be", "error, K", "adopted leads by, nats", "the experiment that would tell"],
+                rows,
+                {2, 3},
+            )
+        )
+    parts.append("<h2>Measured against model</h2>")
+    for r, (svg, left) in enumerate(figures.traces(found)):
+        log, run = result["logs"][r], found.problem.runs[r]
+        parts.append(
+            f"<figure>{svg}<figcaption>Run {r + 1}: {_e(log['file'])}, {log['rows']} rows, {run.duration_s / 60:.1f} min. "
+            "Grey: measured; red: the declared model; blue: with the effects adopted.</figcaption></figure>"
+            f"<figure>{left}<figcaption>Run {r + 1}: what both models leave. Within the grey band, two standard deviations "
+            "of the sensor's noise, there is nothing more to find.</figcaption></figure>"
+        )
+    parts.append(
+        f"<h2>Where the error sits</h2><figure>{figures.maps(found)}<figcaption>Each cell is a spring, row 1 on top; its number in the corner. Mean: measured less model.</figcaption></figure>"
+    )
+    parts.append(
+        f"<h2>What is left</h2><figure>{figures.autocorrelation(found)}<figcaption>{_e(result['residual']['note'])}</figcaption></figure>"
+    )
+    if svg := figures.evidence(found):
+        parts.append(
+            f"<h2>What was tried</h2><figure>{svg}<figcaption>Models fitted on the way, best first; blue is the one adopted.</figcaption></figure>"
+        )
+    parts.append("<h2>The declared model's numbers</h2>" + _parameters(after["parameters"]))
+    identify = result["identifiability"]
+    lines = [f"{n}: the data cannot fix it" for n in identify["not_identifiable"]]
+    lines += [f"{n}: at its bound" for n in identify["at_bounds"]]
+    lines += [
+        f"{c['a']} and {c['b']}: errors correlated at {c['correlation']:+.3f}; only a combination is determined"
+        for c in identify["correlated"]
+    ]
+    if lines:
+        parts.append('<h2>Not determined by these data</h2><div class="warn">' + "<br>".join(map(_e, lines)) + "</div>")
+    parts.append(
+        f"<p><small>{_e(result['tool'])}; {result['simulations']} simulations in {result['seconds']} s. An effect is adopted only if it explains more than {search.MIN_GAIN:.2f} of the noise, by {search.MIN_EVIDENCE:.0f} nats. Effects known: {', '.join(effects.IN_WORDS)}.</small></p>"
+    )
+    return _page(parts)
+
+
+def _page(parts: list[str]) -> str:
+    title = "Ninespring diagnosis"
+    return f'<!doctype html><html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width"><title>{title}</title><style>{STYLE}</style></head><body><main>{"".join(parts)}</main></body></html>\n'
+
+
+def steady_report(result: dict[str, Any]) -> str:
+    """Return the report of a steady table's diagnosis as HTML."""
+    before, after = result["baseline"], result["after"]
+    names = ", ".join(e["name"] for e in result["effects"]) or "no effect"
+    parts = [
+        f"<h1>Steady table: error {before['rmse_c']:.2f} → {after['rmse_c']:.2f} K</h1>",
+        f'<p class="lead">With one number each, {_e(names)} explains it best.</p>',
+    ]
+    if result["warnings"]:
+        parts.append('<h2>About the data</h2><div class="warn">' + "<br>".join(map(_e, result["warnings"])) + "</div>")
+    parts.append(
+        "<h2>Errors before and after</h2>"
+        + _table(
+            ["", "in sample, K rms", "left one out, K rms"],
+            [
+                ["before: the declared model, frozen", f"{before['rmse_c']:.2f}", f"{before['holdout_rmse_c']:.2f}"],
+                ["after: with the effect adopted", f"{after['rmse_c']:.2f}", f"{after['holdout_rmse_c']:.2f}"],
+            ],
+            {1, 2},
+        )
+    )
+    rows: list[list[object]] = [
+        [c["case"], f"{c['measured_c']:.1f}", f"{c['before_c']:.1f}", f"{c['after_c']:.1f}" if "after_c" in c else "–"]
+        for c in result["cases"]
+    ]
+    parts.append(
+        f"<h2>Cases</h2><figure>{figures.cases(result)}</figure>"
+        + _table(["case", "measured, °C", "model before, °C", "model after, °C"], rows, {1, 2, 3})
+    )
+    parts += [f"<h2>Its number</h2>{_parameters(e['parameters'])}" for e in result["effects"]]
+    parts.append(
+        "<h2>Every effect with one number</h2>" + _table(steady.HEADER, [*steady.candidate_rows(result)], {2, 3})
+    )
+    if result["rivals"]:
+        rows = [
+            [r["instead_of"], r["name"], f"{r['rmse_c']:.2f}", r["separating_experiment"]] for r in result["rivals"]
+        ]
+        parts.append(
+            "<h2>What these numbers cannot tell apart</h2>"
+            + _table(["best", "could also be", "error, K", "the experiment that would tell"], rows, {2})
+        )
+    parts.append(f"<p><small>{_e(result['tool'])}. {_e(result['residual']['note'])}.</small></p>")
+    return _page(parts)
+
+
+def with_unit(value: dict[str, Any]) -> str:
+    """Return a fitted number in words: value, standard error, unit."""
+    error = "" if value["stderr"] is None else f" +- {value['stderr']:.2g}"
+    unit = "" if value["unit"] in ("", "1") else f" {value['unit']}"
+    return f"{value['value']:.4g}{error}{unit}"

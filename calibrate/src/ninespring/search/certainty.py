@@ -1,0 +1,110 @@
+"""How sure an adopted effect is: what it explains, and whether it explains the same share everywhere and always.
+
+A cause that is there explains its part at every time and at every spring that it acts on. A name that only stands in for
+something else fits here better than there. Both are measured on the effect's own signal: what the fitted model shows less
+what it shows with this effect switched off and every other number as it is.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..fit import statistics
+from ..fit.problem import Problem
+from ..fit.spec import Fit
+from .evidence import excess, log_evidence
+
+STRETCHES = 4
+"""Parts of a run in which an effect's size is estimated on its own."""
+CERTAIN = 0.9
+"""Probability from which an effect is called certain, not probable."""
+NAMED = 0.5
+"""Probability from which an effect is named at all."""
+WEIGHTS = {
+    "one": -1.0,
+    "share": 1.0,
+    "in_time": -2.0,
+    "in_place": 0.0,
+    "left": -1.0,
+    "nats": 0.0,
+}
+"""Logistic weights of a witness: fitted by bench/diagnose/certainty.py to developing seeds, checked on reporting ones."""
+
+
+@dataclass(frozen=True)
+class Witness:
+    """What speaks for an effect in a fit."""
+
+    nats: float
+    share: float
+    """Of what the fit without it leaves beyond the noise, the part that it explains, 0..1."""
+    in_time: float
+    """How its size scatters from stretch to stretch, relative to its size (0: the same always)."""
+    in_place: float
+    """The same from spring to spring."""
+    left: float
+    """What the whole model leaves beyond the noise, relative to the noise."""
+
+    def features(self) -> dict[str, float]:
+        """Return what the probability is computed from: each bounded, none of them in units of a log's length."""
+        return {
+            "one": 1.0,
+            "share": self.share,
+            "in_time": math.log10(0.01 + self.in_time),
+            "in_place": math.log10(0.01 + self.in_place),
+            "left": math.log10(0.1 + self.left),
+            "nats": math.log10(max(1.0, self.nats)),
+        }
+
+    def probability(self) -> float:
+        """Return how likely the effect is there."""
+        z = sum(WEIGHTS[name] * value for name, value in self.features().items())
+        return 1.0 / (1.0 + math.exp(-z))
+
+
+def scatter(signal: list[np.ndarray], residual: list[np.ndarray], noise_factor: float) -> float:
+    """Return how an amplitude fitted in each cell scatters about 1, rms weighted by signal, beyond what noise makes."""
+    top = bottom = 0.0
+    for s, r in zip(signal, residual, strict=True):
+        power = float(s @ s)
+        if power <= 0:
+            continue
+        off = float(s @ r) / power
+        top += power * max(0.0, off**2 - noise_factor / power)
+        bottom += power
+    return math.sqrt(top / bottom) if bottom > 0 else math.inf
+
+
+def witness(problem: Problem, fit: Fit, effect: str, without: Fit) -> Witness:
+    """Return what speaks for an effect in a fit; `without` is the best fit that lacks it."""
+    beyond = max(1e-9, excess(problem, without))
+    off = fit.spec.without(effect)
+    values = [fit.value(free.key) for free in off.free]
+    bare = problem.predictions(off, values)
+    shown = [run.temperature_c - left for run, left in zip(problem.runs, fit.residual, strict=True)]
+    left = problem.without_starts(fit.residual)
+    factor = statistics.correlation_factor(
+        [one / noise for one, noise in zip(left, problem.noise, strict=True)], problem.longest_lag()
+    )
+    times: tuple[list[np.ndarray], list[np.ndarray]] = ([], [])
+    places: tuple[list[np.ndarray], list[np.ndarray]] = ([], [])
+    for full, less, rest, noise, mask in zip(shown, bare, left, problem.noise, problem.mask, strict=True):
+        signal, scaled = (full - less) / noise, rest / noise
+        stretch = np.arange(len(signal)) * STRETCHES // len(signal)
+        for k in range(STRETCHES):
+            here = mask & (stretch == k)[:, None]
+            times[0].append(signal[here])
+            times[1].append(scaled[here])
+        for k in range(signal.shape[1]):
+            places[0].append(signal[mask[:, k], k])
+            places[1].append(scaled[mask[:, k], k])
+    return Witness(
+        log_evidence(problem, fit, without),
+        min(1.0, max(0.0, (without.sse - fit.sse) / fit.count / beyond)),
+        min(10.0, scatter(*times, factor)),
+        min(10.0, scatter(*places, factor)),
+        math.sqrt(excess(problem, fit)),
+    )

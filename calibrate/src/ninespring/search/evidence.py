@@ -1,0 +1,99 @@
+"""What speaks for one fit against another: nats with autocorrelation accounted for, structure, differences."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..fit import statistics
+from ..fit.problem import Problem
+from ..fit.spec import Fit
+
+EQUIVALENT = 0.3
+"""Two models whose predictions differ by less than this (rms, in units of the noise) are the same in practice."""
+UNEXPLAINED = 0.5
+"""Structure left, rms in units of the noise, above which the rest counts as unexplained: less does not matter."""
+UNEXPLAINED_LOCAL = 1.0
+"""The same for one spring of one run, where the two laws of a phase change may differ for a while."""
+
+
+def log_evidence(problem: Problem, better: Fit, other: Fit) -> float:
+    """Return by how many nats the data prefer `better`: half the difference of BIC, autocorrelation accounted for.
+
+    Two accounts, the clearer one counts. Slow structure: residuals at their effective sample size. Fast structure:
+    the innovations of an autoregression of each residual, which are nearly independent whatever remains slow.
+    """
+    factor = fit_factor(problem, better)
+    n = better.count / factor
+    k = len(better.spec.free) - len(better.stuck) - (len(other.spec.free) - len(other.stuck))
+    slow = 0.5 * n * math.log(max(other.chi2, 1e-12) / max(better.chi2, 1e-12)) - 0.5 * k * math.log(max(n, 2.0))
+    ratio = innovation(problem, other) / innovation(problem, better)
+    fast = 0.5 * better.count * math.log(max(ratio, 1e-12)) - 0.5 * k * math.log(better.count)
+    return max(slow, fast) if better.chi2 <= other.chi2 else slow
+
+
+def innovation(problem: Problem, fit: Fit) -> float:
+    """Return the variance of a residual's innovations, in units of the noise^2 (Yule-Walker, six lags)."""
+    if not math.isfinite(fit.innovation):
+        scaled = [left / noise for left, noise in zip(fit.residual, problem.noise, strict=True)]
+        rho = statistics.autocorrelation(scaled, 6)
+        matrix = rho[np.abs(np.arange(6)[:, None] - np.arange(6))] + 1e-6 * np.eye(6)
+        share = float(rho[1:] @ np.linalg.solve(matrix, rho[1:]))
+        fit.innovation = fit.sse / fit.count * max(1e-6, 1.0 - share)
+    return fit.innovation
+
+
+def fit_factor(problem: Problem, fit: Fit) -> float:
+    """Return samples per independent sample of a fit's residual."""
+    if not math.isfinite(fit.factor):
+        fit.factor = statistics.correlation_factor(
+            [left / noise for left, noise in zip(fit.residual, problem.noise, strict=True)],
+            problem.longest_lag(),
+        )
+    return fit.factor
+
+
+def gain(better: Fit, other: Fit) -> float:
+    """Return the structure that `better` explains and `other` does not, rms in units of the noise."""
+    return math.sqrt(max(0.0, other.sse - better.sse) / better.count)
+
+
+def excess(problem: Problem, fit: Fit) -> float:
+    """Return what the residual holds beyond white noise, as a mean square in units of the noise (>= 0)."""
+    return max(0.0, float(np.nanmax(structure_by_width(problem, fit))))
+
+
+def structure_by_width(problem: Problem, fit: Fit) -> np.ndarray:
+    """Return pooled structure (mean square, noise units) at block widths of 4, 12 and 40 rows."""
+    out = []
+    residual = problem.without_starts(fit.residual)
+    for width in (4, 12, 40):
+        part = statistics.structure(residual, problem.noise, width, [run.starts for run in problem.runs])
+        weight = np.array([mask.sum(axis=0) for mask in problem.mask], dtype=float)
+        weight = np.where(np.isfinite(part), weight, 0.0)
+        out.append(float(np.nansum(np.nan_to_num(part) * weight) / max(1.0, weight.sum())))
+    return np.array(out)
+
+
+def difference(problem: Problem, a: Fit, b: Fit) -> float:
+    """Return the rms difference of what two fits predict, in units of the noise."""
+    total = 0.0
+    for one, two, noise, mask in zip(a.residual, b.residual, problem.noise, problem.mask, strict=True):
+        total += float((((one - two) / noise)[mask] ** 2).sum())
+    return math.sqrt(total / a.count)
+
+
+def unexplained(problem: Problem, fit: Fit) -> bool:
+    """Return whether structure well above the noise is left in a fit's residual."""
+    pooled = structure_by_width(problem, fit)
+    if math.sqrt(max(0.0, float(pooled.max()))) > UNEXPLAINED:
+        return True
+    residual = problem.without_starts(fit.residual)
+    for width in (12, 40):
+        local = statistics.structure(residual, problem.noise, width, [run.starts for run in problem.runs])
+        blocks = np.array([mask.sum(axis=0) for mask in problem.mask]) / width
+        spread = np.sqrt(2.0 / np.maximum(blocks, 1.0)) / width
+        if np.any(local > np.maximum(UNEXPLAINED_LOCAL**2, 6 * spread)):
+            return True
+    return False

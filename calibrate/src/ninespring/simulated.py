@@ -1,0 +1,45 @@
+"""The simulated board: finds `ninespring-sim`, starts it, and says at which port it is."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+from collections.abc import Sequence
+from pathlib import Path
+
+from .errors import WorkError
+
+
+def simulator() -> Path:
+    """Return the program: NINESPRING_SIM, this source tree's build, or the PATH."""
+    named = os.environ.get("NINESPRING_SIM")
+    tree = Path(__file__).resolve().parents[3] / "build" / "host" / "ninespring-sim"
+    for one in (named, tree, shutil.which("ninespring-sim")):
+        if one and os.access(one, os.X_OK):
+            return Path(one)
+    raise WorkError("ninespring-sim is not there: script/build builds it, or set NINESPRING_SIM to it")
+
+
+def simulated_board(more: Sequence[str] = ()) -> tuple[subprocess.Popen[str], str, str]:
+    """Start a simulated board; return its process, to be terminated, its port, and that of its thermometers.
+
+    In a session of its own: Ctrl-C in the terminal ends this program first, which switches the springs off.
+    """
+    elf = os.environ.get("NINESPRING_AVR_DIR")
+    words = [
+        str(simulator()),
+        "board",
+        "--thermometers",
+        "pty",
+        *(("--elf", str(Path(elf) / "firmware.elf")) if elf else ()),
+        *more,
+    ]
+    process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True)
+    assert process.stdout is not None and process.stderr is not None
+    port = process.stdout.readline().strip()
+    if not port.startswith("/dev/"):
+        said = process.stderr.read().strip().splitlines()
+        process.wait(10)
+        raise WorkError(f"the simulated board does not start: {said[-1] if said else 'it says nothing'}")
+    return process, port, process.stdout.readline().strip()

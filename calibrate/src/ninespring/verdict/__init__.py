@@ -1,0 +1,1 @@
+"""What a search found, said: named effects, rivals, what is left, experiments that would tell."""

@@ -1,0 +1,342 @@
+"""The diagnosis: fit what is declared, look at what is left, find what is missing, say what cannot be told apart."""
+
+from __future__ import annotations
+
+import json
+import math
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from .. import __version__, effects
+from ..errors import InputError
+from ..fit import statistics
+from ..fit.declared import base_spec
+from ..fit.problem import Problem
+from ..fit.spec import Fit, Spec
+from ..logs import condense
+from ..logs.run import Run
+from ..models import Array, Model
+from ..search import search
+from ..search.certainty import CERTAIN, NAMED, Witness, witness
+from ..search.evidence import EQUIVALENT, difference, excess, log_evidence, unexplained
+from . import experiments, plausibility
+from .residual import depends_on
+from .result import DRIFT_LEFT_OUT, model_of, parameters_of
+
+SCHEMA = "ninespring.diagnosis/1"
+
+
+@dataclass
+class Diagnosis:
+    """Everything a diagnosis found: the result for programs and what the report draws."""
+
+    result: dict[str, Any]
+    model: Model
+    problem: Problem
+    baseline: Fit
+    final: Fit
+    contenders: list[dict[str, Any]] = field(default_factory=list)
+
+    @property
+    def effects(self) -> list[str]:
+        """Names of what was found, strongest first."""
+        return [one["name"] for one in self.result["effects"]]
+
+    def __repr__(self) -> str:
+        before, after = self.result["baseline"]["rmse_c"], self.result["after"]["rmse_c"]
+        return f"<diagnosis: {', '.join(self.effects) or 'nothing found'}; {before:.2f} K before, {after:.2f} K after>"
+
+
+def prepare(array: Array, runs: Sequence[Run], declared: Mapping[str, float] | None = None) -> Problem:
+    """Return the problem of these runs, condensed where they are long."""
+    share = max(600, 6000 // max(1, len(runs)))
+    return Problem(array, [condense(run, share) for run in runs], declared)
+
+
+def first_fit(problem: Problem, spec: Spec) -> Fit:
+    """Fit the declared model, errors of the first readings projected out; then with spikes left out and those errors as
+    this model has them, again."""
+    problem.learn_starts(spec, [free.start for free in spec.free])
+    fit = problem.fit(spec, tolerance=1e-3)
+    if problem.mask_spikes(fit.residual):
+        problem.learn_starts(fit.spec, fit.values)
+        fit = problem.fit(spec, fit.as_dict(), tolerance=1e-3)
+    problem.learn_starts(fit.spec, fit.values)
+    noise = [statistics.noise_floor(left, run.starts) for left, run in zip(fit.residual, problem.runs, strict=True)]
+    problem.noise = [np.fmin(a, b) for a, b in zip(problem.noise, noise, strict=True)]
+    problem._tidy_noise()
+    return problem.fit(spec, fit.as_dict(), tolerance=1e-5, errors=True)
+
+
+def _finish(problem: Problem, fit: Fit) -> Fit:
+    if fit.covariance is None:
+        again = problem.fit(fit.spec, fit.as_dict(), tolerance=1e-6, errors=True)
+        return again if again.chi2 <= fit.chi2 * (1 + 1e-6) else fit
+    return fit
+
+
+def in_order(found: search.Search, base: Fit, final: Fit, adopted: Sequence[str]) -> list[tuple[str, Fit]]:
+    """Return adopted effects, the one that explains most first, each with the fit of all up to it."""
+    out: list[tuple[str, Fit]] = []
+    rest = list(adopted)
+    while rest:
+        options = []
+        for effect in rest:
+            spec = final.spec
+            for other in rest:
+                if other != effect:
+                    spec = spec.without(other)
+            key = found.key(spec)
+            if len(rest) == 1:
+                fit = final
+            elif key in found.fits:
+                fit = found.fits[key]
+            else:
+                fit = found.fits[key] = found.problem.fit(spec, final.as_dict(), tolerance=1e-3, max_steps=14)
+            options.append((fit.sse, effect, fit))
+        _, effect, fit = min(options, key=lambda one: one[0])
+        rest.remove(effect)
+        out.append((effect, fit))
+    return out
+
+
+def variant_of(fit: Fit, effect: str) -> str:
+    """Return which variant of an effect a fit has."""
+    return dict(fit.spec.variant).get(effect, "")
+
+
+def diagnose(
+    array: Array,
+    runs: Sequence[Run],
+    *,
+    model: Model | None = None,
+    frozen: bool = False,
+    progress: Callable[[str], None] = lambda text: None,
+) -> Diagnosis:
+    """Diagnose logs. `model` gives declared values and effects already on; `frozen` keeps them as they are."""
+    # Simulations run in threads of their own: a linear algebra that starts more only gets in their way.
+    with threadpool_limits(1):
+        return _diagnose(array, runs, model, frozen, progress)
+
+
+def with_effects_of(spec: Spec, model: Model, known: Sequence[effects.Candidate], frozen: bool) -> Spec:
+    """Return the spec with a model's effects on, each in the variant that the model's parameters speak of.
+
+    Its numbers start at the model's values; where frozen they stay there.
+    """
+    given = model.parameters
+
+    def matches(one: effects.Candidate) -> int:
+        numbers = sum(name in given for free in one.free for name in free.names)
+        return numbers + sum(1 if given.get(name) == value else -1 for name, value in one.fixed if name in given)
+
+    for effect in model.effects:
+        if effect in spec.plant_effects:
+            continue
+        options = [c for c in known if c.effect == effect]
+        if frozen or not options:
+            spec = spec.with_effect(effect, (), (), max(options, key=matches).variant if options else "")
+            continue
+        one = max(options, key=matches)
+        free = [replace(f, start=next((given[n] for n in f.names if n in given), f.start)) for f in one.free]
+        spec = spec.with_effect(effect, free, one.fixed, one.variant, one.also_on)
+    return spec
+
+
+def _diagnose(
+    array: Array, runs: Sequence[Run], model: Model | None, frozen: bool, progress: Callable[[str], None]
+) -> Diagnosis:
+    begun = time.monotonic()
+    declared = dict(model.parameters) if model else {}
+    problem = prepare(model.array if model else array, runs, declared)
+    progress("fitting what is declared")
+    spec = base_spec(problem, frozen)
+    known = effects.candidates(problem)
+    if model:
+        spec = with_effects_of(spec, model, known, frozen)
+    base = first_fit(problem, spec)
+    found = search.Search(problem, [c for c in known if c.effect not in spec.effects], base, progress)
+    final, without, contenders = found.run()
+    witnesses: dict[str, Witness] = {}
+    progress("held-out blocks")
+    final = _finish(problem, final)
+    while without:
+        # The least likely goes first: what it stood in for may have made the others look worse than they are.
+        witnesses = {effect: witness(problem, final, effect, other) for effect, other in without.items()}
+        effect = min(witnesses, key=lambda one: witnesses[one].probability())
+        if witnesses[effect].probability() >= NAMED:
+            break
+        kept, without, contenders = found.settle(found.reduced(final, effect), grow=False)
+        final = _finish(problem, kept)
+    left_over = unexplained(problem, final)
+    adopted = [e for e in final.spec.effects if e not in base.spec.effects]
+    strength = {e: log_evidence(problem, final, without[e]) for e in adopted}
+    base_out, final_out = problem.holdout_rmse(base), problem.holdout_rmse(final)
+
+    listed = []
+    steps = in_order(found, base, final, adopted)
+    adopted = [effect for effect, _ in steps]
+    for effect, growing in steps:
+        entry = {
+            "name": effect,
+            "rmse_c": statistics.rms(growing.residual),
+            "holdout_rmse_c": problem.holdout_rmse(growing),
+            "evidence": strength[effect],
+            "parameters": parameters_of(problem, final, effect),
+            "probability": witnesses[effect].probability(),
+            "certainty": "certain" if witnesses[effect].probability() >= CERTAIN else "probable",
+            "witness": asdict(witnesses[effect]),
+            "on_chip": effect in effects.ON_CHIP,
+            "in_words": effects.IN_WORDS[effect],
+        }
+        if variant := variant_of(final, effect):
+            entry["variant"] = variant
+        if effect in effects.WHY_NOT_ON_CHIP:
+            entry["why_not_on_chip"] = effects.WHY_NOT_ON_CHIP[effect]
+        listed.append(entry)
+
+    rivals, seen = [], set()
+    for instead, other in sorted(contenders, key=lambda one: one[1].chi2):
+        extra = [e for e in other.spec.effects if e not in final.spec.effects]
+        if instead not in adopted or not extra or (instead, extra[0]) in seen:
+            continue
+        apart = difference(problem, final, other)
+        ahead = log_evidence(problem, final, other)
+        if ahead >= search.TOLD_APART and apart >= EQUIVALENT:
+            continue
+        seen.add((instead, extra[0]))
+        progress(f"how to tell {extra[0]} from {instead}")
+        trial = experiments.separate(problem, final, other)
+        other = _finish(problem, other)
+        rivals.append(
+            {
+                "instead_of": instead,
+                "name": extra[0],
+                "variant": variant_of(other, extra[0]),
+                "rmse_c": statistics.rms(other.residual),
+                "holdout_rmse_c": problem.holdout_rmse(other),
+                "evidence": ahead,
+                "predictions_differ_c": apart * problem.noise_c,
+                "parameters": parameters_of(problem, other, extra[0]),
+                "separating_experiment": trial.text,
+                "experiment": trial.as_dict(),
+            }
+        )
+
+    candidates = []
+    for key, fit in found.fits.items():
+        candidates.append(
+            {
+                "effects": [f"{e} ({v})" if v else e for e, v in key],
+                "rmse_c": statistics.rms(fit.residual),
+                "evidence_over_baseline": log_evidence(problem, fit, base),
+                "adopted": fit.spec.variant == final.spec.variant,
+            }
+        )
+    candidates.sort(key=lambda one: -one["evidence_over_baseline"])
+    rho = statistics.autocorrelation([r / n for r, n in zip(final.residual, problem.noise, strict=True)], 1)
+    depends, note = depends_on(problem, final)
+    warnings = [f"{Path(run.name).name}: {text}" for run in problem.runs for text in run.notes]
+    if any(free.knot is not None for free in final.spec.free):
+        warnings.append(f"model.toml: {DRIFT_LEFT_OUT}; log ambient_c to have it predicted")
+    warnings += plausibility.swapped(problem.runs)
+    warnings += [text for run in problem.runs for text in plausibility.undriven_but_hottest(run)]
+    if left_over:
+        warnings += plausibility.shifted_clock(problem, (base,) if final is base else (base, final))
+    if left_over:
+        note = ("structure well above the noise remains that no effect of the library explains. " + note).strip()
+    else:
+        note = note or "white at the noise floor"
+    result: dict[str, Any] = {
+        "schema": SCHEMA,
+        "tool": f"ninespring {__version__}",
+        "logs": [{"file": Path(r.name).name, "sha256": r.sha256, "rows": len(r.time_s)} for r in runs],
+        "baseline": {
+            "rmse_c": statistics.rms(base.residual),
+            "holdout_rmse_c": base_out,
+            "noise_c": problem.noise_c,
+            "parameters": parameters_of(problem, base),
+            "effects": list(base.spec.effects),
+        },
+        "effects": listed,
+        "rivals": rivals,
+        "after": {
+            "rmse_c": statistics.rms(final.residual),
+            "holdout_rmse_c": final_out,
+            "parameters": parameters_of(problem, final),
+        },
+        "unexplained": bool(left_over),
+        "residual": {
+            "autocorrelation_lag1": float(np.clip(rho[1], -1.0, 1.0)),
+            "structure_c": math.sqrt(excess(problem, final)) * problem.noise_c,
+            "rmse_per_spring_c": [finite(v) for v in per_spring(final.residual)],
+            "noise_per_spring_c": [
+                finite(v) for v in np.sqrt(np.nanmean(np.square(np.asarray(problem.noise)), axis=0))
+            ],
+            "depends_on": depends,
+            "note": note,
+        },
+        "candidates": candidates[:40],
+        "identifiability": {
+            "not_identifiable": sorted(set(final.stuck)),
+            "at_bounds": final.at_bounds(),
+            "correlated": [{"a": a, "b": b, "correlation": r} for a, b, r in final.correlations()],
+        },
+        "warnings": warnings,
+        "seconds": round(time.monotonic() - begun, 2),
+        "simulations": problem.simulations,
+    }
+    made = model_of(problem, final, runs, result, found.absent(final))
+    validate(result)
+    return Diagnosis(result, made, problem, base, final, contenders=[])
+
+
+def finite(value: float) -> float | None:
+    """Return the number, None where it is none (JSON has no NaN)."""
+    return float(value) if math.isfinite(value) else None
+
+
+def per_spring(residual: Sequence[np.ndarray]) -> np.ndarray:
+    """Return the rms of each spring over all runs, (springs,)."""
+    total = sum(np.nansum(r**2, axis=0) for r in residual)
+    count = sum(np.isfinite(r).sum(axis=0) for r in residual)
+    return np.sqrt(np.where(count > 0, total / np.maximum(count, 1), np.nan))
+
+
+def schema() -> dict[str, Any]:
+    """Return the JSON schema of diagnosis.json."""
+    return json.loads((resources.files("ninespring.verdict") / "diagnosis.schema.json").read_text("utf-8"))
+
+
+def validate(result: Mapping[str, Any]) -> None:
+    """Check a result against the schema."""
+    jsonschema.validate(result, schema())
+
+
+def fit_effects(
+    array: Array, runs: Sequence[Run], wanted: Sequence[str], progress: Callable[[str], None] = lambda text: None
+) -> tuple[Problem, Fit, Fit]:
+    """Fit the declared model with the effects named; return the problem, the fit and the declared model's fit."""
+    with threadpool_limits(1):
+        problem = prepare(array, runs)
+        known = effects.candidates(problem)
+        base = first_fit(problem, base_spec(problem))
+        found = search.Search(problem, known, base, progress)
+        fit = base
+        for effect in wanted:
+            screen = found.screen(fit)
+            options = [k for k, c in enumerate(screen.candidates) if c.effect == effect]
+            if not options:
+                raise InputError(f"{effect} cannot show in these logs: nothing in them depends on it")
+            best = max(options, key=lambda k: screen.forecast([k])[0])
+            progress(f"fitting {effect}")
+            fit = found.refit(fit, [screen.candidates[best]], [screen.forecast([best])[1].get(best, 1.0)])
+        return problem, _finish(problem, fit), base

@@ -1,0 +1,262 @@
+"""Heat of unknown origin: what the best model still lacks, as watts for each spring over time, and as events.
+
+What a fit leaves is explained by the fewest pieces that explain it: heat at one spring from one time to another, the same
+share of heat at all springs, or a sensor that jumps (which heat cannot make: heat needs time). Each piece's answer is
+simulated by the fitted model itself; what the model's own numbers could have taken up is projected out; a piece stays
+where it beats its price. Its size is a least-squares estimate with an error, and the watts over time are the sum of pieces.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..fit.problem import Problem
+from ..fit.spec import Fit
+from ..search.evidence import fit_factor
+
+GRID_S = 15.0
+"""Times at which a piece may begin or end: half of what an event's place in time is told to."""
+SHORTEST_S = 45.0
+"""A piece is at least this long: shorter ones are no heat that a spring would show."""
+MOST = 12
+"""Pieces of one run; where more would help, the rest is not made of events."""
+SMALLEST = 0.05
+"""Of a spring's usual power: less heat than this is not told, whatever its evidence."""
+PROBE_W = 0.02
+"""Heat, as a part of a watt, whose answer is simulated: small enough that the model is straight."""
+
+
+@dataclass(frozen=True)
+class Piece:
+    """One piece of unknown heat, or a sensor's jump, in one run."""
+
+    run: int
+    kind: str
+    """heat (at one spring), common (all springs alike) or sensor (a reading that jumps)."""
+    spring: int
+    """0-based; -1 for common."""
+    begin_s: float
+    end_s: float
+    size: float
+    """W, or K for a sensor."""
+    error: float
+    nats: float
+
+    def as_dict(self, share: float | None) -> dict[str, Any]:
+        """Return it for JSON; `share` is its size in parts of the spring's usual power."""
+        return {
+            "run": self.run + 1,
+            "kind": self.kind,
+            "spring": self.spring + 1 if self.spring >= 0 else None,
+            "from_s": self.begin_s,
+            "to_s": self.end_s,
+            "size": self.size,
+            "stderr": self.error,
+            "unit": "K" if self.kind == "sensor" else "W",
+            "share": share,
+            "evidence": self.nats,
+            "text": self.words(share),
+        }
+
+    def words(self, share: float | None) -> str:
+        """Return it as a sentence."""
+        when = f"{self.begin_s:.0f} to {self.end_s:.0f} s of run {self.run + 1}"
+        if self.kind == "sensor":
+            return f"thermometer {self.spring + 1} reads {abs(self.size):.1f} K {'more' if self.size > 0 else 'less'}, {when}"
+        where = "each spring" if self.kind == "common" else f"spring {self.spring + 1}"
+        part = f" ({100 * abs(share):.0f} % of what it is usually given)" if share else ""
+        return f"{where}: {abs(self.size):.2g} W {'more' if self.size > 0 else 'less'} than known{part}, {when}"
+
+
+@dataclass
+class UnknownHeat:
+    """What a fit leaves, as heat: watts over time and the events that they are made of."""
+
+    times_s: list[np.ndarray]
+    """Per run, times of the rows of `watts`."""
+    watts: list[np.ndarray]
+    """Per run (times, springs)."""
+    pieces: list[Piece]
+    usual_w: np.ndarray
+    """Per spring: mean power while it is driven, W."""
+
+    def share(self, piece: Piece) -> float | None:
+        """Return a piece's size in parts of the usual power of its spring, None where there is none."""
+        usual = float(self.usual_w[piece.spring]) if piece.spring >= 0 else float(np.nanmean(self.usual_w))
+        return piece.size / usual if piece.kind != "sensor" and usual > 0 else None
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return it for diagnosis.json."""
+        return {
+            "events": [piece.as_dict(self.share(piece)) for piece in self.pieces],
+            "mean_w": [[float(v) for v in run.mean(axis=0)] for run in self.watts],
+            "usual_w": [float(v) if math.isfinite(v) else None for v in self.usual_w],
+        }
+
+
+def power_of(problem: Problem, fit: Fit, run_index: int) -> np.ndarray:
+    """Return the power that a fit gives each spring of a run, (rows, springs), W (current: at the martensite's resistance)."""
+    run = problem.runs[run_index]
+    plant = problem.plant_for(fit.spec, fit.values)
+    if run.mode == "current":
+        return run.drive**2 * plant.get("resistance_ohm")
+    if run.mode == "command":
+        return run.drive * np.array([plant.get(f"command_power_w[{k + 1}]") for k in range(run.springs)])
+    return run.drive
+
+
+def _answers(problem: Problem, fit: Fit, r: int) -> tuple[np.ndarray, float]:
+    """Return how the readings answer a step of 1 W at each spring, (springs, rows, springs), K/W, and the rows' step, s.
+
+    The array is taken as straight about where it is at rest: an answer is the same whenever the step begins.
+    """
+    run = problem.runs[r]
+    step = float(np.median(np.diff(run.time_s)))
+    rows = len(run.time_s)
+    plant = problem.plant_for(fit.spec, fit.values)
+    effects = [name for name in fit.spec.plant_effects if name not in ("ambient_drift", "latent_heat")]
+    plant.set_effects(effects)
+    plant.set_fan(float(np.median(run.fan)))
+    from .. import native
+
+    time_s = np.arange(rows) * step
+    fan = np.full(rows, float(np.median(run.fan)))
+    middle = power_of(problem, fit, r).mean(axis=0)
+    out = np.empty((run.springs, rows, run.springs))
+
+    def shown(extra: np.ndarray) -> np.ndarray:
+        twin = plant.copy()
+        twin.reset()
+        for k in range(run.springs):
+            twin.drive(k, native.POWER, float(middle[k]))
+        twin.settle(1e6)
+        return twin.simulate(time_s, native.POWER, np.tile(middle + extra, (rows, 1)), fan)
+
+    rest = shown(np.zeros(run.springs))
+    size = PROBE_W * max(0.05, float(middle.max()))
+    for k in range(run.springs):
+        out[k] = (shown(size * np.eye(run.springs)[k]) - rest) / size
+    return out, step
+
+
+def find(problem: Problem, fit: Fit, say: Callable[[str], None] = lambda text: None) -> UnknownHeat:
+    """Find the pieces of unknown heat in what a fit leaves."""
+    usual = np.zeros(problem.array.springs)
+    driven = np.zeros(problem.array.springs)
+    for r in range(len(problem.runs)):
+        power = power_of(problem, fit, r)
+        usual += power.sum(axis=0)
+        driven += (power > 0).sum(axis=0)
+    usual_w = np.where(driven > 0, usual / np.maximum(driven, 1), np.nan)
+    typical = float(np.nanmean(usual_w)) if np.isfinite(usual_w).any() else 1.0
+    factor = fit_factor(problem, fit)
+    found = UnknownHeat([], [], [], usual_w)
+    jacobian = fit.jacobian if fit.jacobian is not None else np.zeros((problem.count, 0))
+    begin = 0
+    for r, run in enumerate(problem.runs):
+        say(f"unknown heat in run {r + 1}")
+        mask = problem.mask[r]
+        count = int(mask.sum())
+        slopes = jacobian[begin : begin + count]
+        begin += count
+        pieces = _pieces_of(problem, fit, r, slopes, factor, typical)
+        watts = np.zeros((len(run.time_s), run.springs))
+        since = run.time_s - run.time_s[0]
+        for piece in pieces:
+            here = (since >= piece.begin_s) & (since < piece.end_s)
+            if piece.kind == "heat":
+                watts[here, piece.spring] += piece.size
+            elif piece.kind == "common":
+                watts[here] += piece.size
+        found.times_s.append(run.time_s)
+        found.watts.append(watts)
+        found.pieces += pieces
+    return found
+
+
+def _pieces_of(problem: Problem, fit: Fit, r: int, slopes: np.ndarray, factor: float, typical_w: float) -> list[Piece]:
+    """Return the pieces of one run: chosen one by one, the best first, all sizes fitted again with each."""
+    run, mask, noise = problem.runs[r], problem.mask[r], problem.noise[r]
+    springs, rows = run.springs, len(run.time_s)
+    answers, step = _answers(problem, fit, r)
+    grid = max(1, round(GRID_S / step))
+    edges = np.arange(0, rows, grid)
+    if len(edges) < 4:
+        return []
+    used = slopes[:, np.linalg.norm(slopes, axis=0) > 1e-6] if slopes.size else slopes
+    basis = np.linalg.qr(used)[0] if used.shape[1] else np.zeros((int(mask.sum()), 0))
+    kinds = [("heat", k) for k in range(springs)] + [("sensor", k) for k in range(springs)]
+    if springs > 1:
+        kinds.append(("common", -1))
+
+    def column(kind: str, k: int, at: int) -> np.ndarray:
+        """Return what a unit step that begins at a row adds to the readings, in units of the noise."""
+        field = np.zeros((rows, springs))
+        if kind == "sensor":
+            field[at:, k] = 1.0
+        else:
+            answer = answers[k] if kind == "heat" else answers.sum(axis=0)
+            field[at:] = answer[: rows - at]
+        return (field / noise)[mask]
+
+    steps = {one: np.column_stack([column(*one, int(at)) for at in edges]) for one in kinds}
+    steps = {one: block - basis @ (basis.T @ block) for one, block in steps.items()}
+    grams = {one: block.T @ block for one, block in steps.items()}
+    left = (problem.without_starts(fit.residual)[r] / noise)[mask]
+    left = left - basis @ (basis.T @ left)
+    chosen: list[tuple[str, int, int, int]] = []
+    columns: list[np.ndarray] = []
+    shortest = max(1, round(SHORTEST_S / GRID_S))
+    tried = len(kinds) * len(edges) ** 2 / 2
+    rest, sizes, gains = left, np.zeros(0), []
+    while len(chosen) < MOST:
+        best = (0.0, None)
+        for one in kinds:
+            moment = steps[one].T @ rest
+            gram = grams[one]
+            diagonal = np.diag(gram)
+            # a piece is a step up less a step down; the last edge stands for the end of the run
+            top = np.append(moment, 0.0)
+            square = np.append(diagonal, 0.0)
+            cross = np.pad(gram, ((0, 0), (0, 1)))
+            power = diagonal[:, None] + square[None, :] - 2.0 * cross
+            gain = (moment[:, None] - top[None, :]) ** 2 / np.maximum(power, 1e-9)
+            long = np.arange(len(edges) + 1)[None, :] - np.arange(len(edges))[:, None] >= shortest
+            gain = np.where(long & (power > 1e-6), gain, 0.0)
+            a, b = np.unravel_index(int(np.argmax(gain)), gain.shape)
+            if gain[a, b] > best[0]:
+                best = (float(gain[a, b]), (*one, int(a), int(b)))
+        if best[1] is None:
+            break
+        # what it gains, in nats, correlated samples counted for what they are, less the price of its choice
+        nats = 0.5 * best[0] / factor - math.log(tried)
+        if nats < 0.5 * math.log(max(2.0, len(left) / factor)):
+            break
+        kind, k, a, b = best[1]
+        vector = steps[kind, k][:, a] - (steps[kind, k][:, b] if b < len(edges) else 0.0)
+        chosen.append((kind, k, a, b))
+        columns.append(vector)
+        gains.append(nats)
+        matrix = np.column_stack(columns)
+        sizes = np.linalg.lstsq(matrix, left, rcond=None)[0]
+        rest = left - matrix @ sizes
+    if not chosen:
+        return []
+    matrix = np.column_stack(columns)
+    spread = max(1.0, float(rest @ rest) / max(1, len(rest)) * factor)
+    errors = np.sqrt(np.diag(np.linalg.pinv(matrix.T @ matrix)) * spread)
+    out = []
+    end = float(run.time_s[-1] - run.time_s[0])
+    for (kind, k, a, b), size, error, nats in zip(chosen, sizes, errors, gains, strict=True):
+        begin_s = float(run.time_s[edges[a]] - run.time_s[0])
+        end_s = float(run.time_s[edges[b]] - run.time_s[0]) if b < len(edges) else end
+        small = abs(size) < (SMALLEST * typical_w if kind != "sensor" else 3.0 * float(noise[k]))
+        if small or abs(size) < 3.0 * error:
+            continue
+        out.append(Piece(r, kind, k, begin_s, end_s, float(size), float(error), float(nats)))
+    return out

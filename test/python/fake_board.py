@@ -1,0 +1,89 @@
+"""A board on a pseudo-terminal: answers lines with `ok` or what it is told, keeps settings, and can be pulled."""
+
+from __future__ import annotations
+
+import os
+import pty
+import threading
+import time
+import tty
+from collections.abc import Iterable
+
+VERSION = ["ninespring 9.9.9 mega2560, sensors fake", "reset power-on; settings loaded", "ok"]
+TELEMETRY = "time_s,i1_a,v1_v,m1_c,fan,ambient_c,state"
+
+
+def row(time_s: float, current_a: float = 1.0) -> str:
+    return f"{time_s:.1f},{current_a:.3f},0.200,20.00,0.00,20.00,ok"
+
+
+class FakeBoard:
+    def __init__(self, answers: dict[str, list[str]] | None = None) -> None:
+        self.master, self.slave = pty.openpty()
+        tty.setraw(self.slave)
+        self.port = os.ttyname(self.slave)
+        self.answers = {"version": VERSION, "faults": ["ok"]} | (answers or {})
+        self.seen: list[str] = []
+        self.settings: dict[str, str] = {}
+        self.stream: Iterable[str] = ()
+        """Lines that follow the answer to `telemetry csv`, until `telemetry off` or a pull."""
+        self.every_s = 0.0
+        self._streaming = 0
+        """Which stream runs; 0 none."""
+        self.gone = False
+        threading.Thread(target=self._serve, daemon=True).start()
+
+    def say(self, *lines: str) -> None:
+        if not self.gone:
+            os.write(self.master, "".join(line + "\r\n" for line in lines).encode("latin-1"))
+
+    def pull(self) -> None:
+        """The cable is pulled: from now on every access fails."""
+        self.gone = True
+        os.close(self.master)
+        os.close(self.slave)
+
+    def sent(self) -> list[str]:
+        """What came, without the empty lines that only show that someone is there."""
+        return [line for line in self.seen if line]
+
+    def _stream(self, number: int) -> None:
+        for line in self.stream:
+            if self._streaming != number or self.gone:
+                return
+            if line == "PULL":
+                self.pull()
+                return
+            self.say(line)
+            time.sleep(self.every_s)
+
+    def _serve(self) -> None:
+        buffer = b""
+        while not self.gone:
+            try:
+                buffer += os.read(self.master, 256)
+            except OSError:
+                return
+            if b"!" in buffer:
+                self.seen.append("!")
+                buffer = buffer.replace(b"!", b"")
+            while b"\n" in buffer:
+                line, buffer = buffer.split(b"\n", 1)
+                self._obey(line.decode().strip())
+
+    def _obey(self, text: str) -> None:
+        self.seen.append(text)
+        if text.startswith("telemetry csv") and text not in self.answers:
+            self.say(TELEMETRY, "ok")
+            self._streaming = len(self.seen)
+            threading.Thread(target=self._stream, args=(self._streaming,), daemon=True).start()
+        elif text in self.answers:
+            self.say(*self.answers[text])
+        elif text == "$$":
+            self.say(*(f"${name}={value}" for name, value in self.settings.items()), "ok")
+        elif text:
+            if text == "telemetry off":
+                self._streaming = 0
+            if text.startswith("$") and "=" in text:
+                self.settings.__setitem__(*text[1:].split("=", 1))
+            self.say("ok")

@@ -1,0 +1,168 @@
+"""What reaches the chip: only what the logs determined, and nothing that drives worse than what the chip has."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from ninespring import native
+from ninespring.cli import cli
+from ninespring.errors import InputError, WorkError
+from ninespring.export import drive
+from ninespring.export.settings import settings_of
+from ninespring.fit.predict import predict_by_chip
+from ninespring.logs import read_log, write_atomically
+from ninespring.models import Array, Model, model_text, read_model
+from ninespring.verdict import diagnosis
+
+
+def run(*words: object) -> str:
+    done = CliRunner().invoke(cli, [str(w) for w in words], catch_exceptions=True)
+    if done.exception and not isinstance(done.exception, SystemExit):
+        raise done.exception
+    return done.output
+
+
+def lukewarm(columns: dict[str, np.ndarray]) -> None:
+    """Leave a log as it would be with a quarter of the heat."""
+    for k in range(1, 10):
+        columns[f"i{k}_a"] = 0.5 * columns[f"i{k}_a"]
+        columns[f"v{k}_v"] = 0.5 * columns[f"v{k}_v"]
+        columns[f"t{k}_c"] = 20.0 + 0.25 * (columns[f"t{k}_c"] - 20.0)
+
+
+@pytest.fixture
+def cold(make_log, tmp_path: Path) -> Path:
+    """Return a model of a log that never comes near the transformation."""
+    found = diagnosis.diagnose(Array(), [read_log(make_log("cold.csv", change=lukewarm))])
+    path = tmp_path / "cold.toml"
+    path.write_text(model_text(found.model))
+    return path
+
+
+def test_what_the_log_never_reached_is_not_written_and_the_file_says_so(cold: Path, tmp_path: Path) -> None:
+    run("export", "--model", cold, "-o", tmp_path / "s.txt")
+    lines = (tmp_path / "s.txt").read_text().splitlines()
+    names = {line[1:].split("=")[0] for line in lines if line.startswith("$")}
+    assert {"heat_capacity_j_per_k", "loss_w_per_k", "orthogonal_w_per_k"} <= names
+    assert not {n for n in names if "latent" in n or n.endswith(("start_c", "finish_c")) or n.startswith("resistance")}
+    hottest = read_model(cold).provenance["hottest_c"]
+    said = next(line for line in lines if "transformation kept as it is" in line)
+    assert f"reached {hottest:.0f} degC" in said and "latent_heat_j" in said and "austenite_start_c" in said
+
+
+def test_a_latent_heat_that_the_data_speak_against_is_written_as_what_it_is(make_log) -> None:
+    found = diagnosis.diagnose(Array(), [read_log(make_log(seconds=900))])  # through the transformation, without any
+    assert found.model.effects == []
+    made = settings_of(found.model)
+    assert abs(float(made.written["latent_heat_j"])) < 0.6
+
+
+def test_numbers_that_are_known_in_combination_only_are_written_together(make_log) -> None:
+    """One run of all springs alike: losses and couplings cannot be told, and what is written must still be right."""
+
+    def together(columns: dict[str, np.ndarray]) -> None:
+        plant = native.Plant(3, 3)
+        plant.set_all({"loss_w_per_k": 0.007})
+        plant.reset()
+        drive = np.repeat(np.where(np.arange(600) % 300 < 200, 0.3, 0.0)[:, None], 9, axis=1)
+        shown = plant.simulate(np.arange(600.0), native.POWER, drive)
+        for k in range(1, 10):
+            columns[f"i{k}_a"], columns[f"v{k}_v"] = drive[:, k - 1], np.ones(600)
+            columns[f"t{k}_c"] = shown[:, k - 1] + np.random.default_rng(k).normal(0, 0.3, 600)
+        columns["fan"] = np.zeros(600)
+
+    run_ = read_log(make_log(change=together))
+    found = diagnosis.diagnose(Array(), [run_])
+    made = settings_of(found.model)
+    assert "loss_fan_w_per_k" not in made.written
+    shown = predict_by_chip(found.model, made.lines, run_)
+    assert np.sqrt(np.nanmean((run_.temperature_c - shown) ** 2)) < 0.5
+    couplings = [float(made.written[n]) for n in ("orthogonal_w_per_k", "diagonal_w_per_k") if n in made.written]
+    assert all(0.2e-3 < one < 1.2e-3 for one in couplings), "near what was declared: the data do not speak"
+
+
+def test_the_settings_of_an_effect_are_found_without_a_list() -> None:
+    model = Model(Array(), ["fan_wake", "radiation"])
+    model.parameters = {"wake_w_per_k": 0.001, "wake_direction": 2.0, "emissivity": 0.6}
+    model.stderr = {"wake_w_per_k": 0.0001, "emissivity": 0.05}
+    made = settings_of(model)
+    assert set(made.written) == {"rows", "columns", "wake_w_per_k", "wake_direction", "radiating_area_mm2"}
+    assert made.written["wake_direction"] == "2"
+
+
+def wrong(tmp_path: Path) -> Path:
+    """Return a model whose chip would drive badly: it takes the transformation for 30 K lower than the array's."""
+    model = Model(Array(), ["latent_heat", "resistance_phase"])
+    model.parameters = {"heat_capacity_j_per_k": 0.3, "loss_w_per_k": 0.0058}
+    model.stderr = {"heat_capacity_j_per_k": 0.001, "loss_w_per_k": 0.0001}
+    path = tmp_path / "wrong.toml"
+    path.write_text(model_text(model))
+    return path
+
+
+def test_settings_that_drive_worse_are_refused_and_written_only_by_force(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path, out = wrong(tmp_path), tmp_path / "s.txt"
+    made = settings_of(read_model(path))
+    made.written |= {"austenite_start_c": "58.00", "austenite_finish_c": "68.00"}
+    made.written |= {
+        "martensite_start_c": "48.00",
+        "martensite_finish_c": "38.00",
+        "resistance_austenite_ohm": "0.176000",
+    }
+    monkeypatch.setattr("ninespring.export.settings.settings_of", lambda model: made)
+    with pytest.raises(WorkError) as refused:
+        run("export", "--model", path, "-o", out)
+    assert "would drive worse" in str(refused.value) and not out.exists()
+    run("export", "--model", path, "-o", out, "--force")
+    assert "$austenite_start_c=58.00" in out.read_text() and "# worse, written by --force" in out.read_text()
+
+
+def test_a_drive_is_measured_as_it_was() -> None:
+    plant = native.Plant(3, 3)
+    plant.set_effects(["latent_heat", "resistance_phase"])
+    alone = np.arange(9) == 4
+    good = drive.drive(plant, "", alone)
+    assert good.held > 0.9 and good.heating_s < 60 and good.hottest_c < 130 and good.undriven < 0.1
+    weak = drive.drive(plant, "$boost_current_a=0.500\n$maximum_current_a=0.600", alone)
+    assert weak.held < 0.1 and weak.heating_s > 150
+
+
+def test_the_chips_error_is_told_before_and_after_on_a_log_that_was_not_fitted(make_log, tmp_path: Path) -> None:
+    other = {"spring_mismatch": {"loss_scale[5]": 1.3}}
+    fitted, fresh = make_log("fitted.csv", effects=other, seed=1), make_log("fresh.csv", effects=other, seed=2)
+    run("diagnose", fitted, "-o", tmp_path / "d")
+    said = run("verify", "--model", tmp_path / "d" / "model.toml", fresh, "--json", tmp_path / "v.json")
+    assert "as it is" in said
+    result = __import__("json").loads((tmp_path / "v.json").read_text())
+    assert result["after"]["rmse_c"] < 0.5 < result["before"]["rmse_c"]
+    with pytest.raises(InputError, match="never saw"):
+        run("verify", "--model", tmp_path / "d" / "model.toml", fitted)
+
+
+def test_an_output_that_is_an_input_is_refused(cold: Path) -> None:
+    text = cold.read_text()
+    with pytest.raises(InputError, match="would be written over"):
+        run("export", "--model", cold, "-o", cold)
+    assert cold.read_text() == text
+
+
+def test_a_link_stays_a_link_a_device_a_device_and_a_dash_is_standard_output(
+    tmp_path: Path, capsys: pytest.CaptureFixture
+) -> None:
+    target, link = tmp_path / "target.txt", tmp_path / "link.txt"
+    target.write_text("old")
+    link.symlink_to(target)
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
+    write_atomically({link: "new\n", pipe: "piped\n", Path("-"): "shown\n", Path("/dev/null"): "gone"})
+    assert link.is_symlink() and target.read_text() == "new\n"
+    assert os.read(reader, 100) == b"piped\n" and pipe.is_fifo()
+    os.close(reader)
+    assert capsys.readouterr().out == "shown\n"

@@ -1,0 +1,551 @@
+"""Recording: nothing that came is lost and nothing stays on, whatever ends it; what is on a port is recognised."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import pty
+import re
+import shlex
+import signal
+import subprocess
+import sys
+import threading
+import time
+import tty
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+import serial
+from click.testing import CliRunner
+from fake_board import TELEMETRY, FakeBoard, row
+from hypothesis import given
+from hypothesis import strategies as st
+from ninespring import cli
+from ninespring.board import Board
+from ninespring.errors import WorkError
+from ninespring.logs import read_log, read_table
+from ninespring.monitoring import Screen
+from ninespring.recording import RowCheck, script_lines
+from ninespring.thermometers import Lines
+from rich.console import Console
+
+STREAM = [row(0.5 * k) for k in range(1, 40)]
+
+
+def command(*arguments: object) -> list[str]:
+    return [sys.executable, "-m", "ninespring", *map(str, arguments)]
+
+
+def ninespring(*arguments: object) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(command(*arguments), capture_output=True, text=True, timeout=120, check=False)
+
+
+def record(board: FakeBoard, folder: Path, *more: object) -> subprocess.CompletedProcess[str]:
+    return ninespring("record", "--port", board.port, "--hz", 2, "-o", folder / "log.csv", *more)
+
+
+def times(log: Path) -> list[float]:
+    return read_table(log, ("state",)).frame["time_s"].tolist()
+
+
+def assert_off(board: FakeBoard) -> None:
+    assert "off all" in board.sent()
+    assert not any(line.startswith(("on ", "pattern ")) for line in board.sent()[board.sent().index("off all") :])
+
+
+def test_the_log_says_what_board_it_was_and_how_it_was_set(tmp_path: Path) -> None:
+    board = FakeBoard({"faults": ["board: fault 13 emergency_stop", "ok"]})
+    board.settings = {"loss_w_per_k": "0.005800", "rows": "1"}
+    board.stream = STREAM
+    done = record(board, tmp_path, "--duration", 3)
+    assert done.returncode == 0, done.stderr
+    text = (tmp_path / "log.csv").read_text()
+    head = text[: text.index(TELEMETRY)].splitlines()
+    assert "# version: ninespring 9.9.9 mega2560, sensors fake" in head
+    assert "# fault: board: fault 13 emergency_stop" in head
+    assert "# $loss_w_per_k=0.005800" in head and "# $rows=1" in head
+    assert text.endswith("# fault at the end: board: fault 13 emergency_stop\n")
+    assert times(tmp_path / "log.csv") == [0.5 * k for k in range(1, 8)]
+    assert read_log(tmp_path / "log.csv", 1, temperatures=False).current_a is not None
+    assert_off(board)
+
+
+@pytest.mark.parametrize("told", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_keeps_what_came_and_switches_off(tmp_path: Path, told: signal.Signals) -> None:
+    board = FakeBoard()
+    board.stream, board.every_s = STREAM, 0.1
+    (tmp_path / "steps.txt").write_text("on 1\n")
+    words = ("record", "--port", board.port, "--hz", 2, "--run", tmp_path / "steps.txt", "-o", tmp_path / "log.csv")
+    with subprocess.Popen(command(*words), stderr=subprocess.PIPE, text=True) as process:
+        part = tmp_path / "log.csv.part"
+        while process.poll() is None and not (part.exists() and "\n2.0," in part.read_text()):
+            time.sleep(0.02)
+        process.send_signal(told)
+        time.sleep(0.05)
+        process.send_signal(told)  # an impatient second one does not cut it short
+        assert process.wait(30) == 0, process.stderr
+    assert times(tmp_path / "log.csv")[:4] == [0.5, 1.0, 1.5, 2.0]
+    assert not part.exists()
+    assert_off(board)
+
+
+def test_a_recording_that_is_killed_leaves_its_rows_readable_and_the_next_one_keeps_them(tmp_path: Path) -> None:
+    board = FakeBoard()
+    board.stream, board.every_s = STREAM, 0.1
+    part = tmp_path / "log.csv.part"
+    words = ("record", "--port", board.port, "--hz", 2, "-o", tmp_path / "log.csv")
+    with subprocess.Popen(command(*words)) as process:
+        while process.poll() is None and not (part.exists() and "\n2.0," in part.read_text()):
+            time.sleep(0.02)
+        process.kill()
+    assert times(part)[:4] == [0.5, 1.0, 1.5, 2.0]
+    kept = part.read_bytes()
+    board = FakeBoard()
+    board.stream = STREAM
+    assert record(board, tmp_path, "--duration", 2).returncode == 0
+    assert part.read_bytes() == kept
+    assert times(tmp_path / "log.csv") == [0.5, 1.0, 1.5, 2.0, 2.5]
+
+
+def test_a_pulled_cable_keeps_what_came(tmp_path: Path) -> None:
+    board = FakeBoard()
+    board.stream = [*STREAM[:6], "PULL"]
+    board.every_s = 0.02
+    done = record(board, tmp_path, "--json", tmp_path / "r.json")
+    assert done.returncode == 1
+    assert "went away" in done.stderr and "cut their supply" in done.stderr
+    assert times(tmp_path / "log.csv")[-1] >= 2.5
+    assert "went away" in json.loads((tmp_path / "r.json").read_text())["ended"]
+
+
+@pytest.fixture
+def small_disk(tmp_path: Path) -> Path:
+    folder = tmp_path / "disk"
+    folder.mkdir()
+    if subprocess.run(["mount", "-t", "tmpfs", "-o", "size=16k", "none", folder], capture_output=True).returncode:
+        pytest.skip("SKIPPED: this user cannot mount a small disk")
+    yield folder
+    subprocess.run(["umount", folder], check=True)
+
+
+def test_a_full_disk_keeps_what_fitted_and_switches_off(small_disk: Path, tmp_path: Path) -> None:
+    board = FakeBoard()
+    board.stream = [row(0.5 * k) for k in range(1, 2000)]
+    (tmp_path / "steps.txt").write_text("on 1\n")
+    done = record(board, small_disk, "--duration", 5000, "--run", tmp_path / "steps.txt")
+    assert done.returncode == 1
+    assert "No space left on device" in done.stderr
+    assert [one.name for one in small_disk.iterdir()] == ["log.csv"]
+    assert (small_disk / "log.csv").read_text().endswith("\n")
+    assert len(times(small_disk / "log.csv")) > 100
+    assert_off(board)
+
+
+def test_a_full_device_is_said_and_switches_off(tmp_path: Path) -> None:
+    board = FakeBoard()
+    board.stream = STREAM
+    (tmp_path / "steps.txt").write_text("on 1\n")
+    done = ninespring("record", "--port", board.port, "-o", "/dev/full", "--run", tmp_path / "steps.txt")
+    assert done.returncode == 1
+    assert "No space left on device" in done.stderr
+    assert Path("/dev/full").is_char_device()
+    assert "on 1" not in board.sent() or board.sent().index("off all") > board.sent().index("on 1")
+
+
+def test_a_board_that_starts_again_ends_the_recording(tmp_path: Path) -> None:
+    board = FakeBoard()
+    board.stream = [row(7.0), row(7.5), row(8.0), row(0.5), row(1.0), row(1.5)]
+    done = record(board, tmp_path)
+    assert done.returncode == 1
+    assert "started again" in done.stderr
+    assert times(tmp_path / "log.csv") == [7.0, 7.5, 8.0]
+    assert_off(board)
+
+
+def test_telemetry_that_falls_silent_ends_the_recording(tmp_path: Path) -> None:
+    board = FakeBoard()
+    board.stream = STREAM[:3]
+    done = record(board, tmp_path)
+    assert done.returncode == 1
+    assert "no telemetry for 5 s" in done.stderr
+    assert times(tmp_path / "log.csv") == [0.5, 1.0, 1.5]
+    assert_off(board)
+
+
+CORRUPT = [
+    "2.0,1.0x0,0.200,20.00,0.00,20.00,ok",  # a wrong character
+    "2.0,1.00,0.200,20.00,0.00,20.00,ok",  # a lost digit
+    "2.0,1.000,0.200,20.00,0.00,20.00",  # a lost cell
+    "2.0,1.000,0.20",  # cut off
+    "2.0,1.000,0.2,00,20.00,0.00,20.00,ok",  # a comma for a point
+    "82.0,1.000,0.200,20.00,0.00,20.00,ok",  # a time that would make all that follow old
+    "0.1,1.000,0.200,20.00,0.00,20.00,ok",  # a time that looks like a reset
+    "2.0,71.000,0.200,20.00,0.00,20.00,ok",  # a current that would have the log refused
+    "2.0,1.000,0.200,nan,0.00,20.00,ok",
+    "2.0,1.000,0.200,20.00,0.00,20.00,fault_",
+    "2.0,1.000,0.200,20.00,0.00,\x80\x00.00,ok",
+    "<limits|spr",
+]
+
+
+@pytest.mark.parametrize("bad", CORRUPT)
+def test_a_corrupt_line_is_dropped_and_counted_and_the_log_is_readable(tmp_path: Path, bad: str) -> None:
+    board = FakeBoard()
+    board.stream = [*STREAM[:3], bad, *STREAM[4:8]]
+    done = record(board, tmp_path, "--duration", 3)
+    assert done.returncode == 0, done.stderr
+    assert "# dropped_lines: 1" in (tmp_path / "log.csv").read_text()
+    assert times(tmp_path / "log.csv") == [0.5, 1.0, 1.5, 2.5, 3.0, 3.5]
+    read_log(tmp_path / "log.csv", 1, temperatures=False)
+
+
+@given(st.integers(0, 19), st.integers(0, 40), st.characters(min_codepoint=32, max_codepoint=126))
+def test_one_wrong_character_costs_at_most_two_rows(number: int, at: int, wrong: str) -> None:
+    rows = [row(0.5 * k) for k in range(1, 21)]
+    at %= len(rows[number])
+    lines = list(rows)
+    lines[number] = lines[number][:at] + wrong + lines[number][at + 1 :]
+    check = RowCheck(TELEMETRY.split(","), 2)
+    good = [one for line in lines for one in check.feed(line)]
+    assert not check.restarted
+    stamps = [one.time_s for one in good]
+    assert stamps == sorted(set(stamps))
+    # the last row, if held, waits for one that follows it
+    assert len(good) >= 20 - 2 - (number >= 18)
+
+
+def test_values_that_really_changed_are_kept() -> None:
+    check = RowCheck(TELEMETRY.split(","), 2)
+    lines = [row(0.5), row(1.0), row(1.5, -3.0), row(2.0, -3.0), row(60.0, -3.0), row(60.5, -3.0)]
+    assert [one.time_s for line in lines for one in check.feed(line)] == [0.5, 1.0, 1.5, 2.0, 60.0, 60.5]
+
+
+def test_a_header_that_came_corrupt_is_asked_for_again(tmp_path: Path) -> None:
+    board = FakeBoard()
+    board.stream, board.every_s = iter(STREAM), 0.05
+    real, said = board.say, []
+
+    def corrupt_once(*lines: str) -> None:
+        first = bool(lines) and lines[0] == TELEMETRY and not said
+        said.extend(lines[:1] if first else ())
+        real(*((TELEMETRY.replace("i1_a", "i\x011_a"), "ok") if first else lines))
+
+    board.say = corrupt_once
+    assert record(board, tmp_path, "--duration", 2).returncode == 0
+    assert board.sent().count("telemetry csv 20") == 2
+    assert len(times(tmp_path / "log.csv")) >= 3
+
+
+def test_steps_are_sent_in_their_time_and_status_is_kept_between_the_rows(tmp_path: Path) -> None:
+    status = "<limits|spring:1|t:8.000|supply|cut_a:2.610>"
+    board = FakeBoard()
+    board.stream = [*STREAM[:3], status, *STREAM[3:8]]
+    (tmp_path / "steps.txt").write_text("ambient 21.5\nat 0.5 = on 1   ; the first\nat 1.5 = fan 100\n")
+    done = record(board, tmp_path, "--duration", 3, "--run", tmp_path / "steps.txt")
+    assert done.returncode == 0, done.stderr
+    lines = (tmp_path / "log.csv").read_text().splitlines()
+    at = lines.index(f"# {status}")
+    assert lines[at - 1 : at + 2] == [row(1.5), f"# {status}", row(2.0)]
+    sent = board.sent()
+    order = [sent.index(word) for word in ("ambient 21.5", "$$", "telemetry csv 20", "on 1", "fan 100", "off all")]
+    assert order == sorted(order)
+
+
+def test_a_step_that_the_board_refuses_ends_the_recording(tmp_path: Path) -> None:
+    board = FakeBoard({"on 9": ["error:11 a fault is latched"]})
+    board.stream = STREAM
+    (tmp_path / "steps.txt").write_text("at 1 = on 9\n")
+    done = record(board, tmp_path, "--run", tmp_path / "steps.txt")
+    assert done.returncode == 1
+    assert "'on 9' refused: error 11" in done.stderr
+    assert times(tmp_path / "log.csv")[0] == 0.5
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        ("at 5 pattern 1\n", 1),
+        ("on 1\nat 5 = on 2\non 3\n", 3),
+        ("at 5 = on 1\nat 4 = on 2\n", 2),
+        ("fan ä\n", 1),
+        ("at 5 = on 1\nat 900 = off all\n", 2),
+    ],
+)
+def test_a_wrong_script_is_refused_with_its_line(tmp_path: Path, text: str, line: int) -> None:
+    (tmp_path / "steps.txt").write_text(text)
+    done = ninespring("record", "--port", "x", "--run", tmp_path / "steps.txt", "-o", tmp_path / "x.csv")
+    assert done.returncode == 2
+    assert done.stderr.startswith(f"ninespring: {tmp_path / 'steps.txt'}:{line}:1: ")
+
+
+def test_the_example_in_its_help_runs(tmp_path: Path) -> None:
+    text = CliRunner().invoke(cli.cli, ["record", "--help"]).output
+    words = shlex.split(re.search(r"^ +(ninespring record .*)$", text, re.MULTILINE)[1])
+    steps = text.partition("steps.txt (")[2].partition("\n")[2]
+    (tmp_path / "steps.txt").write_text(steps)
+    board = FakeBoard()
+    board.stream = (f"{k}.0,1.000,0.200,20.00,0.00,20.00,ok" for k in range(1, 2000))
+    words[words.index("--port") + 1] = board.port
+    done = subprocess.run(command(*words[1:]), capture_output=True, text=True, cwd=tmp_path, timeout=60, check=False)
+    assert done.returncode == 0, done.stderr
+    assert {"ambient 21.5", "pattern 101000101", "fan 100", "off all"} <= set(board.sent())
+    assert times(tmp_path / "board1.csv")[-1] == 901.0
+
+
+def test_the_log_can_go_to_standard_output(tmp_path: Path) -> None:
+    board = FakeBoard()
+    board.stream = STREAM
+    done = ninespring("record", "--port", board.port, "--hz", 2, "--duration", 2, "-o", "-")
+    assert done.returncode == 0, done.stderr
+    (tmp_path / "log.csv").write_text(done.stdout)
+    assert times(tmp_path / "log.csv") == [0.5, 1.0, 1.5, 2.0, 2.5]
+    assert "5 rows" in done.stderr
+
+
+def test_a_reader_that_goes_away_ends_the_recording(tmp_path: Path) -> None:
+    board = FakeBoard()
+    board.stream, board.every_s = [row(0.5 * k) for k in range(1, 2000)], 0.002
+    words = shlex.join(command("record", "--port", board.port, "--hz", 2, "--duration", 5000, "-o", "-"))
+    done = subprocess.run(f"{words} | head -3", shell=True, capture_output=True, text=True, timeout=60, check=False)
+    assert len(done.stdout.splitlines()) == 3
+    assert_off(board)
+
+
+def test_a_link_stays_a_link_and_no_input_is_written_over(tmp_path: Path) -> None:
+    board = FakeBoard()
+    board.stream = STREAM
+    (tmp_path / "real.csv").write_text("old\n")
+    (tmp_path / "log.csv").symlink_to("real.csv")
+    assert record(board, tmp_path, "--duration", 2).returncode == 0
+    assert (tmp_path / "log.csv").is_symlink()
+    assert times(tmp_path / "real.csv")[0] == 0.5
+    steps = tmp_path / "steps.txt"
+    steps.write_text("on 1\n")
+    (tmp_path / "same.txt").hardlink_to(steps)
+    for output, more in ((steps, ()), (tmp_path / "same.txt", ()), (tmp_path / "a", ("--json", tmp_path / "a"))):
+        done = ninespring("record", "--port", board.port, "--run", steps, "-o", output, *more)
+        assert done.returncode == 2
+        assert "would be written over" in done.stderr or "one file" in done.stderr
+    assert steps.read_text() == "on 1\n"
+
+
+def test_the_host_timeout_is_set_while_recording_and_given_back(tmp_path: Path) -> None:
+    board = FakeBoard()
+    board.settings = {"host_timeout_s": "0"}
+    board.stream, board.every_s = STREAM, 0.3
+    assert record(board, tmp_path, "--duration", 4).returncode == 0
+    sent = board.sent()
+    begins, ends = sent.index("$host_timeout_s=5"), sent.index("$host_timeout_s=0")
+    assert begins < sent.index("telemetry csv 20") < sent.index("off all") < ends
+    assert "# $host_timeout_s=0" in (tmp_path / "log.csv").read_text()
+    # something goes to the board all the while, so that it knows that this end lives
+    assert "" in board.seen[board.seen.index("telemetry csv 20") : board.seen.index("off all")]
+
+
+# what is on the port
+
+
+def other_thing(said: bytes) -> str:
+    """Return the port of something else, which says the same again and again."""
+    master, slave = pty.openpty()
+    tty.setraw(slave)
+
+    def speak() -> None:
+        while said:
+            os.write(master, said)
+            time.sleep(0.2)
+
+    threading.Thread(target=speak, daemon=True).start()
+    return os.ttyname(slave)
+
+
+@pytest.mark.parametrize(
+    ("said", "message"),
+    [
+        (b"", "silent at 115200 baud"),
+        (b"\r\nGrbl 1.1h ['$' for help]\r\nerror:1\r\nerror:1\r\n", "it says 'Grbl 1.1h"),
+        (bytes(range(128, 256)) * 100, "no board"),
+    ],
+)
+def test_a_silent_or_foreign_port_is_recognised_within_five_seconds(said: bytes, message: str) -> None:
+    port = other_thing(said)
+    begun = time.monotonic()
+    with pytest.raises(WorkError, match=re.escape(message)):
+        Board(port)
+    assert time.monotonic() - begun < 5.0
+
+
+def test_a_second_program_on_the_port_is_named(tmp_path: Path) -> None:
+    board = FakeBoard()
+    board.stream, board.every_s = STREAM, 0.1
+    with subprocess.Popen(command("record", "--port", board.port, "-o", tmp_path / "log.csv")) as process:
+        while "telemetry csv 10" not in board.seen:
+            time.sleep(0.02)
+        done = ninespring("monitor", "--port", board.port)
+        process.terminate()
+    assert done.returncode == 1
+    assert "another program has the port" in done.stderr
+
+
+def test_a_port_that_is_not_there_or_is_none_is_said(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    for port in ("/dev/no-such-port", tmp_path / "file", tmp_path):
+        done = ninespring("record", "--port", port, "-o", tmp_path / "x.csv")
+        assert done.returncode == 1
+        assert "cannot be opened" in done.stderr
+        assert len(done.stderr.strip().splitlines()) == 1
+    assert [one.name for one in tmp_path.iterdir()] == ["file"]
+
+
+def test_telemetry_left_on_by_someone_else_does_not_confuse(tmp_path: Path) -> None:
+    board = FakeBoard()
+    board.stream, board.every_s = [row(0.01 * k) for k in range(9999)], 0.01
+    with serial.Serial(board.port) as someone:
+        someone.write(b"telemetry csv 50\n")
+        time.sleep(0.3)
+    with Board(board.port) as found:
+        assert found.version[0].startswith("ninespring 9.9.9")
+        board.settings = {"rows": "1"}
+        assert found.settings() == {"rows": "1"}
+
+
+# upload
+
+
+def test_upload_sends_settings_reads_them_back_and_saves(tmp_path: Path) -> None:
+    board = FakeBoard()
+    (tmp_path / "s.txt").write_text("# from model.toml\n$latent_heat_j=8.000\n$loss_w_per_k=0.005800\n")
+    done = ninespring("upload", "--port", board.port, tmp_path / "s.txt", "--json", tmp_path / "u.json")
+    assert done.returncode == 0, done.stderr
+    assert board.sent()[-4:] == ["$latent_heat_j=8.000", "$loss_w_per_k=0.005800", "$$", "$save"]
+    assert json.loads((tmp_path / "u.json").read_text())["settings"] == 2
+
+
+@pytest.mark.parametrize(
+    ("answers", "said"),
+    [
+        ({"$loss_w_per_k=9": ["error:4 out of range"]}, "error 4 out of range"),
+        ({"$loss_w_per_k=9": ["[not active yet: x]", "ok"]}, "not active yet"),
+        ({"$$": ["$loss_w_per_k=0.005800", "ok"]}, "loss_w_per_k is 0.005800, not 9"),
+        ({"$$": ["ok"]}, "loss_w_per_k is missing"),
+    ],
+)
+def test_what_the_board_does_not_take_is_said_and_nothing_saved(
+    tmp_path: Path, answers: dict[str, list[str]], said: str
+) -> None:
+    board = FakeBoard(answers)
+    (tmp_path / "s.txt").write_text("$loss_w_per_k=9\n")
+    done = ninespring("upload", "--port", board.port, tmp_path / "s.txt")
+    assert done.returncode == 1
+    assert said in done.stderr
+    assert "$save" not in board.seen
+
+
+@pytest.mark.parametrize("text", ["", "# nothing\n", "loss_w_per_k=1\n", "$loss=1;$save\n", "$x=nan\n", "$ä=1\n"])
+def test_a_file_that_is_no_settings_is_refused_before_the_board_is_asked(tmp_path: Path, text: str) -> None:
+    (tmp_path / "s.txt").write_text(text)
+    done = ninespring("upload", "--port", "/dev/no-such-port", tmp_path / "s.txt")
+    assert done.returncode == 2
+    assert done.stderr.startswith(f"ninespring: {tmp_path / 's.txt'}")
+
+
+def test_scripts_take_comments_and_units_as_scenarios_do() -> None:
+    steps = script_lines("ambient 21\n\nat 5 = on 1  # first\nat 5.5 = off all ; then\n", "s", 6.0)
+    assert [(one.line, one.at_s) for one in steps] == [("ambient 21", None), ("on 1", 5.0), ("off all", 5.5)]
+
+
+# thermometers
+
+
+@pytest.mark.parametrize(
+    ("lines", "springs", "readings"),
+    [
+        (["time_s,t1_c,t3_c", "1.0,20.5,21"], [1, 3], [(1.0, {1: 20.5, 3: 21.0})]),
+        (["21.0;22.0;23.0"] * 5, [1, 2, 3], [(None, {1: 21.0, 2: 22.0, 3: 23.0})]),
+        ([f"{k}.00,21.{k},22.0" for k in range(5)], [1, 2], [(4.0, {1: 21.4, 2: 22.0})]),
+        (["Time\tTemp1\tTC2\tbattery", "5\t20\t----\t3.3"], [1, 2], [(5.0, {1: 20.0})]),
+        (["# logger 3", "t1_c t2_c", "20 900", "20 21 22", "x"], [1, 2], [(None, {1: 20.0})]),
+    ],
+)
+def test_usual_loggers_lines_are_read(lines: list[str], springs: list[int], readings: list[object]) -> None:
+    reader = Lines()
+    got = [one for line in lines if (one := reader.read(line)) is not None]
+    if readings:
+        assert got == readings
+        assert sorted(one for one in reader.springs if one) == springs
+
+
+def test_thermometers_are_merged_onto_the_boards_clock_and_the_offset_is_said(tmp_path: Path) -> None:
+    board, logger = FakeBoard(), FakeBoard()
+    begun = time.monotonic()
+    board_s, logger_s = 100.0, 7.0  # both clocks at the beginning
+
+    def rows() -> Iterator[str]:
+        while True:
+            yield row(board_s + time.monotonic() - begun)
+
+    def read() -> None:
+        while not logger.gone:
+            now = time.monotonic() - begun
+            if int(now / 0.15) % 10 == 9:
+                logger.say("time_s,t1_c,t9_c")
+            logger.say(f"{logger_s + now:.3f},{20.0 + now:.3f},30.0")  # rises by 1 K/s
+            time.sleep(0.15)
+
+    board.stream, board.every_s = rows(), 0.5
+    threading.Thread(target=read, daemon=True).start()
+    done = record(board, tmp_path, "--duration", 8, "--thermometers", logger.port)
+    logger.gone = True
+    assert done.returncode == 0, done.stderr
+    frame = read_table(tmp_path / "log.csv", ("state",)).frame
+    assert "t9_c" not in frame
+    left = (frame["t1_c"] - 20.0) - (frame["time_s"] - board_s)
+    assert frame["t1_c"].notna().sum() >= len(frame) - 2
+    assert left.abs().max() < 0.35
+    offset = float(re.search(r"thermometers_offset_s: (.*)", (tmp_path / "log.csv").read_text())[1])
+    assert offset == pytest.approx(board_s - logger_s, abs=0.3)
+    assert "the thermometers' clock was" in done.stdout
+
+
+def test_a_port_without_thermometers_is_said_before_anything_is_driven(tmp_path: Path) -> None:
+    board = FakeBoard()
+    done = record(board, tmp_path, "--thermometers", other_thing(b""))
+    assert done.returncode == 1
+    assert "no temperatures come" in done.stderr
+    assert "telemetry csv 20" not in board.sent()
+
+
+def test_monitor_shows_the_array_as_a_grid_with_totals_limits_and_trend() -> None:
+    screen = Screen({"rows": "1", "columns": "2", "supply_limit_a": "15.000"})
+    assert not screen.take("time_s,i1_a,v1_v,m1_c,d1,i2_a,v2_v,m2_c,d2,fan,ambient_c,state")
+    assert screen.take("1.000,1.500,0.300,20.00,0.100,0.000,0.000,20.00,0.000,0.50,21.00,ok")
+    assert not screen.take("2.000,1.5x0,0.300")
+    assert screen.take("<limits|spring:1|t:1.500|supply|cut_a:0.500>")
+    assert screen.take("3.000,1.500,0.300,22.00,0.100,0.000,0.000,20.00,0.000,0.50,21.00,fault_13")
+    console = Console(width=100, file=io.StringIO(), record=True)
+    console.print(screen.picture())
+    text = console.export_text()
+    assert "3.0 s   1.50 A of 15 A   fan 50 %   ambient 21.0 degC   stopped" in text
+    assert re.search(r"1  22\.0 ↗ *│ 2  20\.0 →", text)
+    assert "1.50 A  0.45 W" in text and "supply -0.50 A" in text
+
+
+def test_a_rows_inputs_are_their_means_until_the_next_row(tmp_path: Path) -> None:
+    """A spring that is switched on between two rows is on for that part of the interval, not from the next row on."""
+    board = FakeBoard()
+    board.stream = [
+        f"{0.05 * k:.2f},{0.0 if k < 35 else 2.0:.3f},{0.0 if k < 35 else 0.4:.3f},20.00,0.00,20.00,ok"
+        for k in range(1, 90)
+    ]
+    done = record(board, tmp_path, "--duration", 3)
+    assert done.returncode == 0, done.stderr
+    assert "telemetry csv 20" in board.sent()
+    frame = read_table(tmp_path / "log.csv", ("state",)).frame
+    assert frame["time_s"].tolist() == pytest.approx(np.arange(0.05, 3.1, 0.5))
+    # on from 1.75 s: in the row of 1.55 s for 0.3 of 0.5 s, as mean current and as mean power
+    assert frame["i1_a"].tolist() == pytest.approx([0, 0, 0, 1.2, 2, 2, 2], abs=1e-3)
+    assert (frame["i1_a"] * frame["v1_v"]).tolist() == pytest.approx([0, 0, 0, 0.48, 0.8, 0.8, 0.8], abs=1e-3)
