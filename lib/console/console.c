@@ -5,7 +5,6 @@
 
 #define MAX_ARGUMENTS 2u
 
-
 /* --- lines out ------------------------------------------------------------------------------ */
 
 static void answer(const console_t *console, console_error_t error)
@@ -170,7 +169,8 @@ static console_error_t word_fan(console_t *console, const arguments_t *arguments
 
 static console_error_t word_ambient(console_t *console, const arguments_t *arguments)
 {
-    return console_error_of(settings_assign(console->settings, "ambient_c", arguments->argument[0]));
+    return console_error_of(
+        settings_assign(console->settings, "ambient_c", arguments->argument[0]));
 }
 
 static console_error_t word_telemetry(console_t *console, const arguments_t *arguments)
@@ -299,7 +299,8 @@ typedef struct {
     console_error_t (*function)(console_t *console, const arguments_t *arguments);
 } word_t;
 
-#define WORD_ROW(word, least, most, job, function, usage) {least, most, CONSOLE_JOB_##job, function},
+#define WORD_ROW(word, least, most, job, function, usage)                                          \
+    {least, most, CONSOLE_JOB_##job, function},
 static const word_t words[] FLASH_MEMORY = {WORDS(WORD_ROW)};
 #define WORD_COUNT ((uint8_t)(sizeof words / sizeof words[0]))
 
@@ -596,8 +597,8 @@ void console_receive(console_t *console, uint8_t octet)
 /* --- start and status ----------------------------------------------------------------------- */
 
 void console_init(console_t *console, const text_output_t *output, controller_t *controller,
-                  settings_t *settings, settings_store_t *store, learnt_store_t *learnt, telemetry_t *telemetry,
-                  const console_status_t *status)
+                  settings_t *settings, settings_store_t *store, learnt_store_t *learnt,
+                  telemetry_t *telemetry, const console_status_t *status)
 {
     memset(console, 0, sizeof *console);
     console->output = *output;

@@ -65,8 +65,8 @@ typedef struct {
 
 /* The pointers must stay valid. settings must be those the controller was initialised with. */
 void console_init(console_t *console, const text_output_t *output, controller_t *controller,
-                  settings_t *settings, settings_store_t *store, learnt_store_t *learnt, telemetry_t *telemetry,
-                  const console_status_t *status);
+                  settings_t *settings, settings_store_t *store, learnt_store_t *learnt,
+                  telemetry_t *telemetry, const console_status_t *status);
 
 /* Two lines after start: who it is, why it started, what became of the settings. */
 void console_greet(console_t *console);

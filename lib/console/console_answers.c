@@ -138,8 +138,7 @@ static void add_reason(text_line_t *line, const controller_t *controller, uint8_
     const uint16_t limits = controller_limits(controller, k);
     if ((limits & DRIVE_POLICY_LIMIT_COOLING) != 0) {
         const int32_t seconds = rounded(controller_cooling_s(controller, k) + 0.5f);
-        text_add_values(line,
-                        FLASH_TEXT("  waits #0 s: it may still be hot from before power-on"),
+        text_add_values(line, FLASH_TEXT("  waits #0 s: it may still be hot from before power-on"),
                         &seconds);
     } else if ((limits & DRIVE_POLICY_LIMIT_AWAY) != 0) {
         text_add_flash(line, FLASH_TEXT("  away: not where it was asked to be, "
@@ -215,10 +214,9 @@ bool console_learnt_line(const console_t *console, console_out_t *out)
         add_learnt(&out->line, console, console->step);
     } else if (console->step == springs) {
         text_add_flash(&out->line, FLASH_TEXT("loss and shift are beyond the declared ones; "));
-        text_add_flash(&out->line,
-                       learnt_store_keeps(console->learnt)
-                           ? FLASH_TEXT("kept over power-off")
-                           : FLASH_TEXT("nothing is kept over power-off yet"));
+        text_add_flash(&out->line, learnt_store_keeps(console->learnt)
+                                       ? FLASH_TEXT("kept over power-off")
+                                       : FLASH_TEXT("nothing is kept over power-off yet"));
     }
     return console->step <= springs;
 }

@@ -140,7 +140,8 @@ spring_bounds_t controller_austenite_bounds(const controller_t *controller, uint
 float controller_shift_k(const controller_t *controller, uint8_t spring);
 /* How long it may still be hot from before power-on, s; 0 where that is over. */
 float controller_cooling_s(const controller_t *controller, uint8_t spring);
-/* The spring's own numbers, to be kept over power-off. Those that no spring has are not restored. */
+/* The spring's own numbers, to be kept over power-off. Those that no spring has are not restored.
+ */
 spring_learnt_t controller_learnt(const controller_t *controller, uint8_t spring);
 void controller_restore_learnt(controller_t *controller, uint8_t spring,
                                const spring_learnt_t *learnt);

@@ -14,7 +14,8 @@
 extern "C" {
 #endif
 
-#define LEARNT_STORE_KIND 3u /* of record; a change of LEARNT_STORE_SPRING_BYTES or of its fields takes a new one */
+#define LEARNT_STORE_KIND                                                                          \
+    3u /* of record; a change of LEARNT_STORE_SPRING_BYTES or of its fields takes a new one */
 #define LEARNT_STORE_SPRING_BYTES 15u
 
 /* After so long with every driven spring held, and no sooner than that after the save before: an

@@ -113,7 +113,8 @@ const char *safety_fault_name(safety_fault_t fault);
 void safety_clear(safety_t *safety);
 /* Latches SAFETY_FAULT_LIMIT_TRIP: the policy held this spring at nothing for too long. */
 void safety_trip_limit(safety_t *safety, uint8_t spring);
-/* Latches SAFETY_FAULT_HOST_SILENT: whoever asked for the springs has not been heard for too long. */
+/* Latches SAFETY_FAULT_HOST_SILENT: whoever asked for the springs has not been heard for too long.
+ */
 void safety_host_silent(safety_t *safety);
 /* Latches SAFETY_FAULT_EMERGENCY_STOP. */
 void safety_emergency_stop(safety_t *safety);
