@@ -9,6 +9,7 @@
 #include "crc16.h"
 #include "current_sensor.h"
 #include "fixed_point.h"
+#include "learnt_store.h"
 #include "ntc.h"
 #include "settings.h"
 #include "telemetry.h"
@@ -28,6 +29,7 @@ controller_t controller;
 
 static settings_t settings;
 static settings_store_t store;
+static learnt_store_t learnt;
 static telemetry_t telemetry;
 static console_t console;
 static console_status_t status;
@@ -103,18 +105,13 @@ static void keep_model(void)
     kept.crc = crc16_add_bytes(CRC16_START, &kept.state, sizeof kept.state);
 }
 
-// Without a state that survived, the springs are taken to be as hot as they could be: just below
-// the trip. From there the model lets them cool; `model cold` says that they are cold. The
-// precedent is a motor relay's thermal memory (IEC 60255-149).
+// Without a state that survived nothing is known of the springs, as controller_init leaves them.
 static void start_model(uint8_t cause)
 {
     const bool whole = kept.crc == crc16_add_bytes(CRC16_START, &kept.state, sizeof kept.state);
-    if ((cause & BOARD_RESET_WARM) && whole &&
-        controller_set_model_state(&controller, &kept.state)) {
-        return;
+    if ((cause & BOARD_RESET_WARM) && whole) {
+        (void)controller_set_model_state(&controller, &kept.state);
     }
-    const int16_t hot_cc = (int16_t)(settings.controller.safety.temperature_trip_cc - 500);
-    controller_set_temperature(&controller, fixed_point_c7_from_cc(hot_cc));
 }
 
 // Configures the sensors at the start and when the setting has changed: they then convert anew, and
@@ -224,7 +221,7 @@ static void take_input(void)
     }
 }
 
-static void measure_load(void)
+static void each_second(void)
 {
     static uint32_t second_ms;
     const uint32_t now_ms = board_time_ms();
@@ -235,6 +232,7 @@ static void measure_load(void)
     const uint32_t idle_us = board_idle_us_take();
     status.load_percent = idle_us >= 1000000ul ? 0u : (uint8_t)(100u - idle_us / 10000u);
     status.stack_unused_bytes = board_stack_unused();
+    learnt_store_second(&learnt, &controller);
 }
 
 static void start(void)
@@ -256,13 +254,16 @@ static void start(void)
         settings_default(&settings);
         controller_init(&controller, &settings.controller, ambient_c7(), nullptr);
     }
+    learnt_store_open(&learnt, &eeprom, SETTINGS_LEARNT_BASE, SETTINGS_LEARNT_SLOT_BYTES,
+                      &controller);
     start_model(cause);
     if (cause & (BOARD_RESET_WATCHDOG | BOARD_RESET_BROWN_OUT | BOARD_RESET_UNKNOWN)) {
         controller_lock(&controller);
     }
     telemetry_init(&telemetry);
     telemetry_set(&telemetry, settings.board.telemetry_format, settings.board.telemetry_hz);
-    console_init(&console, &serial_output, &controller, &settings, &store, &telemetry, &status);
+    console_init(&console, &serial_output, &controller, &settings, &store, &learnt, &telemetry,
+                 &status);
     console_greet(&console);
     board_watchdog_start();
     follow_averaging();
@@ -283,13 +284,19 @@ static void turn(void)
         run_tick(behind);
     }
     console_service(&console);
+    if (!console_busy(&console)) { // a save of the settings comes first
+        (void)learnt_store_step(&learnt);
+    }
     take_input();
-    status_wanted = board_serial_status_take() || status_wanted;
+    if (board_serial_status_take()) {
+        controller_host_heard(&controller);
+        status_wanted = true;
+    }
     if (status_wanted && board_serial_room() >= CONSOLE_ROOM_BYTES) {
         status_wanted = false;
         console_print_status(&console);
     }
-    measure_load();
+    each_second();
     board_idle(console_busy(&console) || status_wanted);
 }
 

@@ -18,17 +18,17 @@ static belief_bounds_t bounds(spring_bounds_t b)
 }
 belief_bounds_t belief_temperature_bounds_c(const controller_t *c, int spring)
 {
-    return bounds(spring_estimator_temperature_c(&c->policy.estimator, &c->model, (uint8_t)spring));
+    return bounds(controller_temperature_bounds_c(c, (uint8_t)spring));
 }
 
 belief_bounds_t belief_austenite_bounds(const controller_t *c, int spring)
 {
-    return bounds(spring_estimator_austenite(&c->policy.estimator, &c->model, (uint8_t)spring));
+    return bounds(controller_austenite_bounds(c, (uint8_t)spring));
 }
 
 belief_bounds_t belief_distance_bounds_k(const controller_t *c, int spring)
 {
-    return bounds(spring_estimator_distance_k(&c->policy.estimator, &c->model, (uint8_t)spring));
+    return bounds(controller_distance_bounds_k(c, (uint8_t)spring));
 }
 
 bool belief_reported(const controller_t *controller, int spring)
@@ -41,15 +41,18 @@ bool belief_reported(const controller_t *controller, int spring)
            (controller_limits(controller, (uint8_t)spring) & ~silent) != 0;
 }
 
-/* The controller of this version keeps nothing over power-off. */
+/* As lib/learnt_store does, without its rounding to bytes. */
 void belief_keep(const controller_t *controller, belief_memory_t *memory)
 {
-    (void)controller;
-    memory->valid = false;
+    for (uint8_t k = 0; k < controller_springs(controller); k++) {
+        memory->learnt[k] = controller_learnt(controller, k);
+    }
+    memory->valid = true;
 }
 
 void belief_restore(controller_t *controller, const belief_memory_t *memory)
 {
-    (void)controller;
-    (void)memory;
+    for (uint8_t k = 0; memory->valid && k < controller_springs(controller); k++) {
+        controller_restore_learnt(controller, k, &memory->learnt[k]);
+    }
 }

@@ -26,6 +26,7 @@ bool belief_reported(const controller_t *controller, int spring);
 
 /* What is kept over power-off. */
 typedef struct {
+    spring_learnt_t learnt[CONTROLLER_MAX_SPRINGS];
     bool valid;
 } belief_memory_t;
 void belief_keep(const controller_t *controller, belief_memory_t *memory);

@@ -5,18 +5,6 @@
 
 #define MAX_ARGUMENTS 2u
 
-typedef enum {
-    JOB_NONE = 0,
-    JOB_HELP,
-    JOB_VERSION,
-    JOB_MODEL,
-    JOB_FAULTS,
-    JOB_SETTINGS,
-    JOB_SAVE,
-    JOB_TELEMETRY,
-    JOB_SELFTEST
-} job_t;
-
 /* --- lines out ------------------------------------------------------------------------------ */
 
 static void answer(const console_t *console, console_error_t error)
@@ -36,108 +24,6 @@ static void answer(const console_t *console, console_error_t error)
 static bool room_for(const console_t *console, uint16_t bytes)
 {
     return console->output.room(console->output.context) >= bytes;
-}
-
-/* --- settings ------------------------------------------------------------------------------- */
-
-/* Activates the settings as they are set. Where they do not fit together the active ones stay, and
- * the console says which value is in the way: `$$` of another board can only be pasted line by
- * line. */
-static void apply_settings(console_t *console)
-{
-    uint16_t bad = PARAMETER_COUNT;
-    console->conflict =
-        !controller_apply_settings(console->controller, &console->settings->controller, &bad);
-    if (!console->conflict) {
-        return;
-    }
-    console_out_t out;
-    console_out_start(&out);
-    text_add_flash(&out.line, FLASH_TEXT("[not active yet: "));
-    text_add(&out.line, parameter_row(bad).name);
-    text_add_flash(&out.line, FLASH_TEXT(" does not fit the others]"));
-    console_out_end(console, &out);
-}
-
-static console_error_t error_of(settings_result_t result)
-{
-    switch (result) {
-    case SETTINGS_OK:
-        return CONSOLE_OK;
-    case SETTINGS_UNKNOWN_NAME:
-        return CONSOLE_ERROR_UNKNOWN_SETTING;
-    case SETTINGS_OUT_OF_RANGE:
-        return CONSOLE_ERROR_OUT_OF_RANGE;
-    default:
-        return CONSOLE_ERROR_BAD_ARGUMENT;
-    }
-}
-
-/* Telemetry and policy can be set by word or as a setting: one truth, the setting. */
-static void follow_board_settings(console_t *console)
-{
-    const board_settings_t *const board = &console->settings->board;
-    if (console->telemetry->format != board->telemetry_format ||
-        console->telemetry->hz != board->telemetry_hz) {
-        telemetry_set(console->telemetry, board->telemetry_format, board->telemetry_hz);
-    }
-}
-
-static console_error_t assign(console_t *console, const char *name, const char *value)
-{
-    const settings_t before = *console->settings;
-    const console_error_t error = error_of(settings_assign(console->settings, name, value));
-    if (error != CONSOLE_OK) {
-        return error;
-    }
-    if (memcmp(&before.controller, &console->settings->controller, sizeof before.controller) != 0 ||
-        console->conflict) {
-        apply_settings(console);
-    }
-    follow_board_settings(console);
-    return CONSOLE_OK;
-}
-
-static void start_job(console_t *console, job_t job)
-{
-    console->job = (uint8_t)job;
-    console->step = 0;
-    console->element = 0;
-}
-
-/* A line that starts with '$'. */
-static console_error_t settings_line(console_t *console, char *line)
-{
-    uint16_t index;
-    uint8_t element;
-    char *const equals = strchr(line, '=');
-    if (equals != NULL) {
-        *equals = '\0';
-        return assign(console, line + 1, equals + 1);
-    }
-    if (flash_equal(line, FLASH_TEXT("$$"))) {
-        start_job(console, JOB_SETTINGS);
-        return CONSOLE_OK;
-    }
-    if (flash_equal(line, FLASH_TEXT("$save"))) {
-        if (console->conflict) {
-            return CONSOLE_ERROR_SETTINGS_CONFLICT;
-        }
-        settings_save_start(console->store, console->settings);
-        start_job(console, JOB_SAVE);
-        return CONSOLE_OK;
-    }
-    if (flash_equal(line, FLASH_TEXT("$defaults"))) {
-        settings_default(console->settings);
-        apply_settings(console);
-        follow_board_settings(console);
-        return CONSOLE_OK;
-    }
-    if (!settings_find(line + 1, &index, &element)) {
-        return CONSOLE_ERROR_UNKNOWN_SETTING;
-    }
-    console_print_setting(console, index, element);
-    return CONSOLE_OK;
 }
 
 /* --- words ---------------------------------------------------------------------------------- */
@@ -283,7 +169,8 @@ static console_error_t word_fan(console_t *console, const arguments_t *arguments
 
 static console_error_t word_ambient(console_t *console, const arguments_t *arguments)
 {
-    return error_of(settings_assign(console->settings, "ambient_c", arguments->argument[0]));
+    return console_error_of(
+        settings_assign(console->settings, "ambient_c", arguments->argument[0]));
 }
 
 static console_error_t word_telemetry(console_t *console, const arguments_t *arguments)
@@ -307,7 +194,7 @@ static console_error_t word_telemetry(console_t *console, const arguments_t *arg
     console->next_format = format;
     console->next_hz = (uint8_t)hz;
     telemetry_set(console->telemetry, TELEMETRY_OFF, (uint8_t)hz);
-    start_job(console, JOB_TELEMETRY);
+    console_start_job(console, CONSOLE_JOB_TELEMETRY);
     return CONSOLE_OK;
 }
 
@@ -345,7 +232,7 @@ static console_error_t word_selftest(console_t *console, const arguments_t *argu
     if (error == CONSOLE_OK) {
         selftest_start(&console->selftest, console->controller,
                        console->settings->controller.policy.open_current_ma);
-        start_job(console, JOB_SELFTEST);
+        console_start_job(console, CONSOLE_JOB_SELFTEST);
     }
     return error;
 }
@@ -353,7 +240,7 @@ static console_error_t word_selftest(console_t *console, const arguments_t *argu
 static console_error_t word_model(console_t *console, const arguments_t *arguments)
 {
     if (arguments->count == 0) {
-        start_job(console, JOB_MODEL);
+        console_start_job(console, CONSOLE_JOB_MODEL);
         return CONSOLE_OK;
     }
     if (!flash_equal(arguments->argument[0], FLASH_TEXT("cold"))) {
@@ -363,6 +250,23 @@ static console_error_t word_model(console_t *console, const arguments_t *argumen
         return CONSOLE_ERROR_SPRINGS_ON;
     }
     controller_set_temperature(console->controller, console->status->ambient_c7);
+    return CONSOLE_OK;
+}
+
+static console_error_t word_learnt(console_t *console, const arguments_t *arguments)
+{
+    if (arguments->count == 0) {
+        console_start_job(console, CONSOLE_JOB_LEARNT);
+        return CONSOLE_OK;
+    }
+    if (!flash_equal(arguments->argument[0], FLASH_TEXT("clear"))) {
+        return CONSOLE_ERROR_BAD_ARGUMENT;
+    }
+    if (any_spring_on(console)) {
+        return CONSOLE_ERROR_SPRINGS_ON;
+    }
+    learnt_store_clear(console->learnt, console->controller);
+    console_start_job(console, CONSOLE_JOB_FORGET);
     return CONSOLE_OK;
 }
 
@@ -377,7 +281,8 @@ static console_error_t word_model(console_t *console, const arguments_t *argumen
     X(fan, 1, 1, NONE, word_fan, " 0..100  in percent")                                            \
     X(ambient, 1, 1, NONE, word_ambient, " C  air temperature, where no sensor measures it")       \
     X(model, 0, 1, NONE, word_model,                                                               \
-      " [cold]  temperatures as the model has them; cold: at ambient")                             \
+      " [cold]  what is believed of each spring, with bounds; cold: it is at ambient")             \
+    X(learnt, 0, 1, NONE, word_learnt, " [clear]  each spring's own numbers; clear: forget them")  \
     X(faults, 0, 0, FAULTS, NULL, "  what is latched")                                             \
     X(clear, 0, 0, NONE, word_clear, "  forget faults; all springs off")                           \
     X(unlock, 0, 0, NONE, word_unlock, "  after a watchdog or brown-out reset")                    \
@@ -390,11 +295,12 @@ static const char word_texts[] FLASH_MEMORY = WORDS(WORD_TEXT);
 typedef struct {
     uint8_t least; /* arguments */
     uint8_t most;
-    uint8_t job; /* job_t that it starts, or JOB_NONE and a function */
+    uint8_t job; /* console_job_t that it starts, or CONSOLE_JOB_NONE and a function */
     console_error_t (*function)(console_t *console, const arguments_t *arguments);
 } word_t;
 
-#define WORD_ROW(word, least, most, job, function, usage) {least, most, JOB_##job, function},
+#define WORD_ROW(word, least, most, job, function, usage)                                          \
+    {least, most, CONSOLE_JOB_##job, function},
 static const word_t words[] FLASH_MEMORY = {WORDS(WORD_ROW)};
 #define WORD_COUNT ((uint8_t)(sizeof words / sizeof words[0]))
 
@@ -431,7 +337,7 @@ static char *next_word(char **rest)
 static console_error_t execute(console_t *console)
 {
     if (console->line[0] == '$') {
-        return settings_line(console, console->line);
+        return console_settings_line(console, console->line);
     }
     word_t word;
     arguments_t arguments = {0, {NULL, NULL}};
@@ -460,8 +366,8 @@ static console_error_t execute(console_t *console)
             return CONSOLE_ERROR_SURPLUS_ARGUMENT;
         }
         arguments.count = given;
-        if (word.job != JOB_NONE) {
-            start_job(console, (job_t)word.job);
+        if (word.job != CONSOLE_JOB_NONE) {
+            console_start_job(console, (console_job_t)word.job);
             return CONSOLE_OK;
         }
         return word.function(console, &arguments);
@@ -493,7 +399,7 @@ static bool help_line(const console_t *console, console_out_t *out)
 
 static void end_job(console_t *console, console_error_t error)
 {
-    console->job = JOB_NONE;
+    console->job = CONSOLE_JOB_NONE;
     answer(console, error);
 }
 
@@ -548,9 +454,9 @@ static void selftest(console_t *console)
     console_selftest_line(console, &result);
 }
 
-static void save(console_t *console)
+static void save(console_t *console, record_store_t *record)
 {
-    switch (record_store_step(&console->store->record)) {
+    switch (record_store_step(record)) {
     case RECORD_SAVE_BUSY:
         break;
     case RECORD_SAVE_DONE:
@@ -568,14 +474,17 @@ static void print_job_line(console_t *console)
     bool more;
     console_out_start(&out);
     switch (console->job) {
-    case JOB_HELP:
+    case CONSOLE_JOB_HELP:
         more = help_line(console, &out);
         break;
-    case JOB_VERSION:
+    case CONSOLE_JOB_VERSION:
         more = console_version_line(console, &out);
         break;
-    case JOB_MODEL:
+    case CONSOLE_JOB_MODEL:
         more = console_model_line(console, &out);
+        break;
+    case CONSOLE_JOB_LEARNT:
+        more = console_learnt_line(console, &out);
         break;
     default:
         more = console_faults_line(console, &out);
@@ -593,20 +502,23 @@ static void print_job_line(console_t *console)
 
 void console_service(console_t *console)
 {
-    if (console->job == JOB_NONE || !room_for(console, CONSOLE_ROOM_BYTES)) {
+    if (console->job == CONSOLE_JOB_NONE || !room_for(console, CONSOLE_ROOM_BYTES)) {
         return;
     }
     switch (console->job) {
-    case JOB_SETTINGS:
+    case CONSOLE_JOB_SETTINGS:
         list_settings(console);
         break;
-    case JOB_SAVE:
-        save(console);
+    case CONSOLE_JOB_SAVE:
+        save(console, &console->store->record);
         break;
-    case JOB_TELEMETRY:
+    case CONSOLE_JOB_FORGET:
+        save(console, &console->learnt->record);
+        break;
+    case CONSOLE_JOB_TELEMETRY:
         start_telemetry(console);
         break;
-    case JOB_SELFTEST:
+    case CONSOLE_JOB_SELFTEST:
         selftest(console);
         break;
     default:
@@ -617,7 +529,7 @@ void console_service(console_t *console)
 
 bool console_busy(const console_t *console)
 {
-    return console->job != JOB_NONE;
+    return console->job != CONSOLE_JOB_NONE;
 }
 
 /* --- lines in ------------------------------------------------------------------------------- */
@@ -625,7 +537,7 @@ bool console_busy(const console_t *console)
 bool console_ready(const console_t *console)
 {
     /* a refused setting says two lines */
-    return console->job == JOB_NONE && room_for(console, 2u * CONSOLE_ROOM_BYTES);
+    return console->job == CONSOLE_JOB_NONE && room_for(console, 2u * CONSOLE_ROOM_BYTES);
 }
 
 void console_break_line(console_t *console, console_error_t error)
@@ -635,10 +547,11 @@ void console_break_line(console_t *console, console_error_t error)
 
 void console_stop(console_t *console)
 {
-    if (console->job == JOB_SELFTEST) {
+    if (console->job == CONSOLE_JOB_SELFTEST) {
         selftest_end(&console->selftest, console->controller);
     }
-    if (console->job != JOB_NONE && console->job != JOB_SAVE) {
+    if (console->job != CONSOLE_JOB_NONE && console->job != CONSOLE_JOB_SAVE &&
+        console->job != CONSOLE_JOB_FORGET) {
         end_job(console, CONSOLE_ERROR_STOPPED);
     }
     if (console->length > 0 || console->broken != CONSOLE_OK) {
@@ -650,6 +563,7 @@ void console_receive(console_t *console, uint8_t octet)
 {
     if (octet == '\n' || octet == '\r') {
         const uint8_t length = console->length;
+        controller_host_heard(console->controller);
         console_error_t error = (console_error_t)console->broken;
         console->line[length] = '\0';
         console->length = 0;
@@ -660,7 +574,7 @@ void console_receive(console_t *console, uint8_t octet)
         if (error == CONSOLE_OK) {
             error = execute(console);
         }
-        if (console->job == JOB_NONE) {
+        if (console->job == CONSOLE_JOB_NONE) {
             answer(console, error);
         }
         return;
@@ -683,14 +597,15 @@ void console_receive(console_t *console, uint8_t octet)
 /* --- start and status ----------------------------------------------------------------------- */
 
 void console_init(console_t *console, const text_output_t *output, controller_t *controller,
-                  settings_t *settings, settings_store_t *store, telemetry_t *telemetry,
-                  const console_status_t *status)
+                  settings_t *settings, settings_store_t *store, learnt_store_t *learnt,
+                  telemetry_t *telemetry, const console_status_t *status)
 {
     memset(console, 0, sizeof *console);
     console->output = *output;
     console->controller = controller;
     console->settings = settings;
     console->store = store;
+    console->learnt = learnt;
     console->telemetry = telemetry;
     console->status = status;
 }

@@ -11,6 +11,7 @@
 
 #include "console_codes.h"
 #include "controller.h"
+#include "learnt_store.h"
 #include "selftest.h"
 #include "settings.h"
 #include "telemetry.h"
@@ -46,6 +47,7 @@ typedef struct {
     controller_t *controller;
     settings_t *settings; /* as set; active once they fit together */
     settings_store_t *store;
+    learnt_store_t *learnt;
     telemetry_t *telemetry;
     const console_status_t *status;
     /* internal */
@@ -63,8 +65,8 @@ typedef struct {
 
 /* The pointers must stay valid. settings must be those the controller was initialised with. */
 void console_init(console_t *console, const text_output_t *output, controller_t *controller,
-                  settings_t *settings, settings_store_t *store, telemetry_t *telemetry,
-                  const console_status_t *status);
+                  settings_t *settings, settings_store_t *store, learnt_store_t *learnt,
+                  telemetry_t *telemetry, const console_status_t *status);
 
 /* Two lines after start: who it is, why it started, what became of the settings. */
 void console_greet(console_t *console);
@@ -72,7 +74,8 @@ void console_greet(console_t *console);
 /* True when the next received byte may be given to console_receive: no answer is under way and
  * there is room for the next one. */
 bool console_ready(const console_t *console);
-/* One received byte; '\n' or '\r' ends a line, an empty line is not answered. */
+/* One received byte; '\n' or '\r' ends a line, an empty line is not answered.
+ * Each end of a line tells the controller that the host is there. */
 void console_receive(console_t *console, uint8_t octet);
 
 /* Goes on with an answer under way, at most one line or one EEPROM byte. Call it in each turn of

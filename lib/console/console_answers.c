@@ -105,30 +105,120 @@ static void add_limits(text_line_t *line, const controller_t *controller, uint8_
     }
 }
 
+static int32_t rounded(float value)
+{
+    return (int32_t)(value + (value < 0.0f ? -0.5f : 0.5f));
+}
+
+/* "spring 1: 80.2 degC, 78.9 to 82.0, 2.4 K above martensite start (+-2.1), austenite 99.6 %, 97.0
+ * to 100.0, hold": what is believed, with the bounds of 99 %. */
+static void add_belief(text_line_t *line, const controller_t *controller, uint8_t k)
+{
+    /* as drive_policy_stage_t has them */
+    static const char stages[] FLASH_MEMORY = "\0, heat\0, hold\0, lower";
+    const spring_bounds_t c = controller_temperature_bounds_c(controller, k);
+    const spring_bounds_t distance_k = controller_distance_bounds_k(controller, k);
+    const spring_bounds_t austenite = controller_austenite_bounds(controller, k);
+    const bool below = distance_k.value < 0.0f;
+    const int32_t values[] = {k + 1, rounded(10.0f * c.value), rounded(10.0f * c.low),
+                              rounded(10.0f * c.high),
+                              rounded(10.0f * (below ? -distance_k.value : distance_k.value))};
+    text_add_values(line, FLASH_TEXT("spring #0: #1 degC, #1 to #1, #1 K "), values);
+    text_add_flash(line, below ? FLASH_TEXT("below") : FLASH_TEXT("above"));
+    const int32_t rest[] = {rounded(10.0f * (distance_k.high - distance_k.value)),
+                            rounded(1000.0f * austenite.value), rounded(1000.0f * austenite.low),
+                            rounded(1000.0f * austenite.high)};
+    text_add_values(line, FLASH_TEXT(" martensite start (+-#1), austenite #1 %, #1 to #1"), rest);
+    text_add_flash(line, text_item(stages, (uint8_t)controller_stage(controller, k)));
+}
+
+/* What the spring waits for, or why it is not where it was asked to be. */
+static void add_reason(text_line_t *line, const controller_t *controller, uint8_t k)
+{
+    const uint16_t limits = controller_limits(controller, k);
+    if ((limits & DRIVE_POLICY_LIMIT_COOLING) != 0) {
+        const int32_t seconds = rounded(controller_cooling_s(controller, k) + 0.5f);
+        text_add_values(line, FLASH_TEXT("  waits #0 s: it may still be hot from before power-on"),
+                        &seconds);
+    } else if ((limits & DRIVE_POLICY_LIMIT_AWAY) != 0) {
+        text_add_flash(line, FLASH_TEXT("  away: not where it was asked to be, "
+                                        "or that cannot be seen"));
+    }
+}
+
+/* Steps: three for each spring, the ambient; lines only where there is something. */
 bool console_model_line(const console_t *console, console_out_t *out)
 {
     const controller_t *const controller = console->controller;
     text_line_t *const line = &out->line;
-    const uint8_t k = console->step;
-    if (k == controller_springs(controller)) {
+    const uint8_t k = console->step / 3u;
+    if (k >= controller_springs(controller)) {
         const int32_t ambient_cc = text_centi_from_c7(console->status->ambient_c7);
-        text_add_values(line, FLASH_TEXT("ambient: #2 C"), &ambient_cc);
-        return true;
+        text_add_values(line, FLASH_TEXT("ambient: #2 degC"), &ambient_cc);
+        return console->step % 3u == 0;
     }
-    if (k > controller_springs(controller)) {
-        return false;
+    if (console->step % 3u == 0) {
+        add_belief(line, controller, k);
+    } else if (console->step % 3u == 1) {
+        const int32_t values[] = {
+            controller_measured_ma(controller, k), controller_measured_mv(controller, k),
+            (int32_t)controller_power_uw(controller, k), controller_target_ma(controller, k)};
+        text_add_values(line, FLASH_TEXT("  #3 A, #3 V, #6 W, target #3 A"), values);
+        add_limits(line, controller, k);
+    } else {
+        add_reason(line, controller, k);
     }
-    const int32_t values[] = {k + 1,
-                              text_centi_from_c7(controller_temperature_c7(controller, k)),
-                              controller_austenite_permille(controller, k),
-                              controller_measured_ma(controller, k),
-                              controller_measured_mv(controller, k),
-                              (int32_t)controller_power_uw(controller, k),
-                              controller_target_ma(controller, k)};
-    text_add_values(
-        line, FLASH_TEXT("spring #0: #2 C, austenite #1 %, #3 A, #3 V, #6 W, target #3 A"), values);
-    add_limits(line, controller, k);
     return true;
+}
+
+/* "spring 1: 0.1748 ohm at 20 degC, 0.040 % per K, austenite 0.2190 ohm, 25.1 % more, loss 3.2 %
+ * (+-1.4), shift 0.4 K": the martensite's resistance and its rise, that of austenite when it had
+ * just transformed, the loss beyond the declared one, by how much it transforms higher. */
+static void add_learnt(text_line_t *line, const console_t *console, uint8_t k)
+{
+    const spring_learnt_t learnt = controller_learnt(console->controller, k);
+    const float declared_w_per_k = 1e-6f * (float)console->settings->controller.model.loss_uw_per_k;
+    add_spring(line, k);
+    if (!(learnt.austenite_ohm > 0.0f) && !(learnt.martensite_ohm > 0.0f) &&
+        learnt.loss_w_per_k == 0.0f) {
+        text_add_flash(line, FLASH_TEXT("nothing yet"));
+        return;
+    }
+    if (learnt.martensite_ohm > 0.0f) {
+        const int32_t cold[] = {rounded(1e4f * learnt.martensite_ohm),
+                                rounded(1e5f * learnt.martensite_rise_per_k)};
+        text_add_values(line, FLASH_TEXT("#4 ohm at 20 degC, #3 % per K, "), cold);
+    } else {
+        text_add_flash(line, FLASH_TEXT("not seen cold, "));
+    }
+    if (learnt.austenite_ohm > 0.0f) {
+        const int32_t hot[] = {rounded(1e4f * learnt.austenite_ohm),
+                               rounded(1e3f * learnt.change / (1.0f - learnt.change))};
+        text_add_values(line, FLASH_TEXT("austenite #4 ohm, #1 % more"), hot);
+    } else {
+        text_add_flash(line, FLASH_TEXT("not seen to transform"));
+    }
+    if (declared_w_per_k > 0.0f) {
+        const int32_t loss[] = {rounded(1e3f * learnt.loss_w_per_k / declared_w_per_k),
+                                rounded(1e3f * learnt.loss_sd_w_per_k / declared_w_per_k)};
+        text_add_values(line, FLASH_TEXT(", loss #1 % (+-#1)"), loss);
+    }
+    const int32_t shift = rounded(10.0f * controller_shift_k(console->controller, k));
+    text_add_values(line, FLASH_TEXT(", shift #1 K"), &shift);
+}
+
+bool console_learnt_line(const console_t *console, console_out_t *out)
+{
+    const uint8_t springs = controller_springs(console->controller);
+    if (console->step < springs) {
+        add_learnt(&out->line, console, console->step);
+    } else if (console->step == springs) {
+        text_add_flash(&out->line, FLASH_TEXT("loss and shift are beyond the declared ones; "));
+        text_add_flash(&out->line, learnt_store_keeps(console->learnt)
+                                       ? FLASH_TEXT("kept over power-off")
+                                       : FLASH_TEXT("nothing is kept over power-off yet"));
+    }
+    return console->step <= springs;
 }
 
 static void add_fault(text_line_t *line, safety_fault_t fault)

@@ -1,10 +1,24 @@
-/* What it is for: what the console's two files share: lines out.
- * What it owns: the shape of a line under construction.
+/* What it is for: what the console's files share: lines out, and what goes on over several turns.
+ * What it owns: the shape of a line under construction, the jobs.
  * What it never does: serve anyone outside this folder: users include console.h. */
 #ifndef CONSOLE_INTERNAL_H
 #define CONSOLE_INTERNAL_H
 
 #include "console.h"
+
+typedef enum {
+    CONSOLE_JOB_NONE = 0,
+    CONSOLE_JOB_HELP,
+    CONSOLE_JOB_VERSION,
+    CONSOLE_JOB_MODEL,
+    CONSOLE_JOB_LEARNT,
+    CONSOLE_JOB_FAULTS,
+    CONSOLE_JOB_SETTINGS,
+    CONSOLE_JOB_SAVE,
+    CONSOLE_JOB_FORGET,
+    CONSOLE_JOB_TELEMETRY,
+    CONSOLE_JOB_SELFTEST
+} console_job_t;
 
 typedef struct {
     text_line_t line;
@@ -17,8 +31,14 @@ void console_out_end(const console_t *console, console_out_t *out);
 /* One line of an answer that has several, by console->step; false after the last one. */
 bool console_version_line(const console_t *console, console_out_t *out);
 bool console_model_line(const console_t *console, console_out_t *out);
+bool console_learnt_line(const console_t *console, console_out_t *out);
 bool console_faults_line(const console_t *console, console_out_t *out);
 
+void console_start_job(console_t *console, console_job_t job);
+
+/* A line that starts with '$'. */
+console_error_t console_settings_line(console_t *console, char *line);
+console_error_t console_error_of(settings_result_t result);
 /* As `$$` has it. */
 void console_print_setting(const console_t *console, uint16_t index, uint8_t element);
 void console_selftest_line(const console_t *console, const selftest_result_t *result);

@@ -7,6 +7,8 @@
 
 #define MODEL_STEP_MS   100u
 #define TICKS_PER_STEP  (MODEL_STEP_MS / CONTROLLER_TICK_MS)
+#define TICKS_PER_S     (1000u / CONTROLLER_TICK_MS)
+#define SILENT_MOST     (3600ul * TICKS_PER_S) /* host_timeout_s at its most */
 #define CURRENT_MOST_MA 4095 /* the sensor ends at 3200: a step's sum of power fits 32 bits */
 
 void controller_settings_default(controller_settings_t *settings)
@@ -232,11 +234,29 @@ static void drive(controller_t *controller, const bool valid[], uint32_t sum_ma)
     }
 }
 
+/* With a timeout of n seconds the springs are off in the tick that ends the n-th. */
+static void listen(controller_t *controller)
+{
+    const uint32_t most = controller->safety.parameters.host_timeout_s * (uint32_t)TICKS_PER_S;
+    bool wanted = false;
+    for (uint8_t k = 0; k < controller->springs; k++) {
+        wanted = wanted || controller->level_permille[k] != 0;
+    }
+    if (controller->silent_ticks < SILENT_MOST) {
+        controller->silent_ticks++;
+    }
+    if (wanted && most != 0 && controller->silent_ticks >= most) {
+        controller_stop(controller);
+        safety_host_silent(&controller->safety);
+    }
+}
+
 void controller_tick(controller_t *controller, const controller_inputs_t *inputs,
                      controller_outputs_t *outputs)
 {
     bool valid[CONTROLLER_MAX_SPRINGS];
     uint32_t sum_ma = take_sensors(controller, inputs->sensor, valid);
+    listen(controller);
     step_model(controller, inputs);
     drive(controller, valid, sum_ma);
     memcpy(outputs->duty, controller->duty, sizeof outputs->duty);
@@ -286,6 +306,11 @@ void controller_emergency_stop(controller_t *controller)
     safety_emergency_stop(&controller->safety);
 }
 
+void controller_host_heard(controller_t *controller)
+{
+    controller->silent_ticks = 0;
+}
+
 void controller_clear_faults(controller_t *controller)
 {
     controller_stop(controller);
@@ -324,6 +349,48 @@ void controller_set_temperature(controller_t *controller, int16_t temperature_c7
     thermal_model_reset(&controller->model, temperature_c7);
     spring_estimator_trust_model(&controller->policy.estimator, &controller->model);
     tell_resistances(controller);
+}
+
+spring_bounds_t controller_temperature_bounds_c(const controller_t *controller, uint8_t spring)
+{
+    return spring_estimator_temperature_c(&controller->policy.estimator, &controller->model,
+                                          spring);
+}
+
+spring_bounds_t controller_distance_bounds_k(const controller_t *controller, uint8_t spring)
+{
+    return spring_estimator_distance_k(&controller->policy.estimator, &controller->model, spring);
+}
+
+spring_bounds_t controller_austenite_bounds(const controller_t *controller, uint8_t spring)
+{
+    return spring_estimator_austenite(&controller->policy.estimator, &controller->model, spring);
+}
+
+float controller_shift_k(const controller_t *controller, uint8_t spring)
+{
+    return controller->policy.estimator.spring[spring].shift_k;
+}
+
+float controller_cooling_s(const controller_t *controller, uint8_t spring)
+{
+    return spring_estimator_cooling_s(&controller->policy.estimator, &controller->model, spring);
+}
+
+spring_learnt_t controller_learnt(const controller_t *controller, uint8_t spring)
+{
+    return spring_estimator_learnt(&controller->policy.estimator, spring);
+}
+
+void controller_restore_learnt(controller_t *controller, uint8_t spring,
+                               const spring_learnt_t *learnt)
+{
+    spring_estimator_restore(&controller->policy.estimator, spring, learnt);
+}
+
+void controller_forget_learnt(controller_t *controller, uint8_t spring)
+{
+    spring_estimator_forget(&controller->policy.estimator, spring);
 }
 
 uint8_t controller_springs(const controller_t *controller)
@@ -395,6 +462,11 @@ uint16_t controller_limits(const controller_t *controller, uint8_t spring)
 uint16_t controller_cut_ma(const controller_t *controller, uint8_t spring)
 {
     return drive_policy_cut_ma(&controller->policy, spring);
+}
+
+drive_policy_stage_t controller_stage(const controller_t *controller, uint8_t spring)
+{
+    return drive_policy_stage(&controller->policy, spring);
 }
 
 bool controller_is_locked(const controller_t *controller)

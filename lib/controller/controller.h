@@ -61,6 +61,7 @@ typedef struct {
     current_control_t current;
     safety_t safety;
     drive_policy_t policy;
+    uint32_t silent_ticks; /* since the host was heard; no more than the longest host_timeout_s */
     uint8_t springs;
     int16_t ambient_c7;      /* of the last model step */
     uint8_t model_tick;      /* ticks since the last model step */
@@ -113,6 +114,9 @@ bool controller_set_fan(controller_t *controller, uint8_t percent);
 void controller_stop(controller_t *controller);
 /* All levels to 0 and SAFETY_FAULT_EMERGENCY_STOP until cleared. */
 void controller_emergency_stop(controller_t *controller);
+/* Whoever asked for the springs is still there. host_timeout_s (0: never) after the last call, in
+ * the tick in which a spring is wanted, all levels are set to 0 with SAFETY_FAULT_HOST_SILENT. */
+void controller_host_heard(controller_t *controller);
 /* Faults are forgotten and all levels set to 0: nothing starts by clearing. */
 void controller_clear_faults(controller_t *controller);
 void controller_lock(controller_t *controller);
@@ -126,7 +130,24 @@ bool controller_set_model_state(controller_t *controller, const thermal_model_st
 /* Springs, air and plate are taken to be at one temperature, reached from cold. */
 void controller_set_temperature(controller_t *controller, int16_t temperature_c7);
 
-/* For telemetry; spring must be below controller_springs. */
+/* What is known of each spring, with the bounds of 99 % (spring_estimator); spring, here and below,
+ * must be below controller_springs. Temperature in degC, distance to martensite start in K,
+ * austenite 0..1. */
+spring_bounds_t controller_temperature_bounds_c(const controller_t *controller, uint8_t spring);
+spring_bounds_t controller_distance_bounds_k(const controller_t *controller, uint8_t spring);
+spring_bounds_t controller_austenite_bounds(const controller_t *controller, uint8_t spring);
+/* By how much the transformation is believed to lie above where it is declared (a load), K. */
+float controller_shift_k(const controller_t *controller, uint8_t spring);
+/* How long it may still be hot from before power-on, s; 0 where that is over. */
+float controller_cooling_s(const controller_t *controller, uint8_t spring);
+/* The spring's own numbers, to be kept over power-off. Those that no spring has are not restored.
+ */
+spring_learnt_t controller_learnt(const controller_t *controller, uint8_t spring);
+void controller_restore_learnt(controller_t *controller, uint8_t spring,
+                               const spring_learnt_t *learnt);
+void controller_forget_learnt(controller_t *controller, uint8_t spring);
+
+/* For telemetry. */
 uint8_t controller_springs(const controller_t *controller);
 uint16_t controller_level_permille(const controller_t *controller, uint8_t spring);
 uint16_t controller_target_ma(const controller_t *controller, uint8_t spring);
@@ -143,6 +164,7 @@ uint16_t controller_limits(const controller_t *controller,
                            uint8_t spring); /* drive_policy_limit_t bits */
 /* By how much they cut the spring's target. */
 uint16_t controller_cut_ma(const controller_t *controller, uint8_t spring);
+drive_policy_stage_t controller_stage(const controller_t *controller, uint8_t spring);
 bool controller_is_locked(const controller_t *controller);
 uint8_t controller_fan_percent(const controller_t *controller); /* wanted */
 drive_policy_kind_t controller_policy(const controller_t *controller);

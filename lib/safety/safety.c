@@ -218,6 +218,8 @@ const char *safety_fault_name(safety_fault_t fault)
                                              "supply_current\0"
                                              "emergency_stop\0"
                                              "limit_trip\0"
+                                             "sensor_mismatch\0"
+                                             "host_silent\0"
                                              "unknown";
     return text_item(names, (uint8_t)(fault < SAFETY_FAULT_COUNT ? fault : SAFETY_FAULT_COUNT));
 }
@@ -232,6 +234,11 @@ void safety_clear(safety_t *safety)
 void safety_trip_limit(safety_t *safety, uint8_t spring)
 {
     latch(safety, &safety->spring[spring], SAFETY_FAULT_LIMIT_TRIP);
+}
+
+void safety_host_silent(safety_t *safety)
+{
+    latch_board(safety, SAFETY_FAULT_HOST_SILENT);
 }
 
 void safety_emergency_stop(safety_t *safety)

@@ -40,7 +40,10 @@ typedef enum {
     SAFETY_FAULT_SUPPLY_CURRENT = 12, /* sum of currents above supply_limit_ma */
     SAFETY_FAULT_EMERGENCY_STOP = 13, /* '!' or safety_emergency_stop */
     /* of one spring */
-    SAFETY_FAULT_LIMIT_TRIP = 14, /* the policy gave up: safety_trip_limit */
+    SAFETY_FAULT_LIMIT_TRIP = 14,      /* the policy gave up */
+    SAFETY_FAULT_SENSOR_MISMATCH = 15, /* what is read cannot be this output's circuit */
+    /* of the board */
+    SAFETY_FAULT_HOST_SILENT = 16, /* safety_host_silent */
     SAFETY_FAULT_COUNT
 } safety_fault_t;
 
@@ -110,6 +113,9 @@ const char *safety_fault_name(safety_fault_t fault);
 void safety_clear(safety_t *safety);
 /* Latches SAFETY_FAULT_LIMIT_TRIP: the policy held this spring at nothing for too long. */
 void safety_trip_limit(safety_t *safety, uint8_t spring);
+/* Latches SAFETY_FAULT_HOST_SILENT: whoever asked for the springs has not been heard for too long.
+ */
+void safety_host_silent(safety_t *safety);
 /* Latches SAFETY_FAULT_EMERGENCY_STOP. */
 void safety_emergency_stop(safety_t *safety);
 /* After a watchdog or brown-out reset: nothing is driven until unlocked. */

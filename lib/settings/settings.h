@@ -52,13 +52,14 @@ settings_result_t settings_assign(settings_t *settings, const char *name, const 
 #define SETTINGS_RECORD_KIND 2u
 #define SETTINGS_BASE        0u
 #if THERMAL_MODEL_MAX_SPRINGS <= 16
-#define SETTINGS_SLOT_BYTES 1024u
-#else
-#define SETTINGS_SLOT_BYTES 2048u
-#endif
-/* What has been learnt of each spring may have 2 x 256 bytes behind the settings. */
-#define SETTINGS_LEARNT_BASE       (SETTINGS_BASE + 2u * SETTINGS_SLOT_BYTES)
+#define SETTINGS_SLOT_BYTES        1024u
 #define SETTINGS_LEARNT_SLOT_BYTES 256u
+#else
+#define SETTINGS_SLOT_BYTES        2048u
+#define SETTINGS_LEARNT_SLOT_BYTES 1024u
+#endif
+/* Behind the settings lies what has been learnt of each spring (learnt_store). */
+#define SETTINGS_LEARNT_BASE (SETTINGS_BASE + 2u * SETTINGS_SLOT_BYTES)
 
 /* What became of the stored record. Where found is none of RECORD_LOADED..., all are defaults. */
 typedef struct {

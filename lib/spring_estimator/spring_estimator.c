@@ -126,6 +126,13 @@ static void begin(spring_belief_t *b, float temperature_c, float sd_k, uint8_t p
                            .last_c = temperature_c};
 }
 
+void spring_estimator_forget(spring_estimator_t *e, uint8_t k)
+{
+    const float sd = LOSS_SD * e->loss_w_per_k;
+    e->spring[k].learnt = (spring_learnt_t){.change = e->change, .loss_sd_w_per_k = sd};
+    e->spring[k].loss_variance = sd * sd;
+}
+
 void spring_estimator_init(spring_estimator_t *e, thermal_model_t *model)
 {
     const float coldest_c = spring_ambient_c(model);
@@ -133,8 +140,7 @@ void spring_estimator_init(spring_estimator_t *e, thermal_model_t *model)
     e->springs = model->springs;
     spring_estimator_prepare(e, model, true);
     for (uint8_t k = 0; k < e->springs; k++) {
-        e->spring[k].learnt =
-            (spring_learnt_t){.change = e->change, .loss_sd_w_per_k = LOSS_SD * e->loss_w_per_k};
+        spring_estimator_forget(e, k);
         begin(&e->spring[k], coldest_c + 0.5f * width_k, UNIFORM_SD * width_k, SPRING_PHASE_ANY);
         e->spring[k].hottest_c = SPRING_ESTIMATOR_HOTTEST_C;
         set_temperature(model, k, coldest_c + 0.5f * width_k, SPRING_PHASE_MARTENSITE);

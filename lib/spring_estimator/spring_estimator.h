@@ -130,6 +130,8 @@ void spring_estimator_trust_model(spring_estimator_t *estimator, const thermal_m
 /* What was learnt before. Numbers that no spring has are left out. */
 void spring_estimator_restore(spring_estimator_t *estimator, uint8_t spring,
                               const spring_learnt_t *learnt);
+/* Nothing is known of its own numbers but the declared ones. */
+void spring_estimator_forget(spring_estimator_t *estimator, uint8_t spring);
 /* What has been learnt, with how surely. */
 spring_learnt_t spring_estimator_learnt(const spring_estimator_t *estimator, uint8_t spring);
 

@@ -2,7 +2,7 @@
 
 #include <string.h>
 
-#define PIECE_BYTES 144u /* the last spring's Teleplot lines, with the array's */
+#define PIECE_BYTES 208u /* the last spring's Teleplot lines, with the array's */
 #define CUT_SHIFT   6u   /* cuts are remembered in 64 mA */
 #define CUT_STEPS   8u   /* and told again when they differ by more */
 
@@ -22,6 +22,7 @@ bool telemetry_set(telemetry_t *telemetry, uint8_t format, uint8_t hz)
     telemetry->phase = 0;
     telemetry->next = 0;
     telemetry->left = 0;
+    telemetry->rounds = 0;
     memset(telemetry->told, 0, sizeof telemetry->told);
     return true;
 }
@@ -125,6 +126,16 @@ void telemetry_add_limits(text_line_t *line, uint16_t limits, char separator)
     }
 }
 
+/* After its number and the time. */
+static void add_bounds(piece_t *piece, const controller_t *controller, uint8_t k)
+{
+    const spring_bounds_t bounds_c = controller_temperature_bounds_c(controller, k);
+    piece->values[2] = (int32_t)(100.0f * bounds_c.low);
+    add(piece, FLASH_TEXT(">low#0:#0:#2\r\n"));
+    piece->values[2] = (int32_t)(100.0f * bounds_c.high);
+    add(piece, FLASH_TEXT(">high#0:#0:#2\r\n"));
+}
+
 /* What is due of the next spring: its round of Teleplot, or what is new of its limits. Gives
  * whether the one after it may have its turn in this tick, too. */
 static bool write_spring(telemetry_t *telemetry, const controller_t *controller, uint32_t time_ms,
@@ -163,6 +174,9 @@ static bool write_spring(telemetry_t *telemetry, const controller_t *controller,
         add(&piece, FLASH_TEXT(">i#0:#0:#3\r\n"));
         values[2] = text_centi_from_c7(controller_temperature_c7(controller, k));
         add(&piece, FLASH_TEXT(">m#0:#0:#2\r\n"));
+        if (telemetry->rounds == 0) {
+            add_bounds(&piece, controller, k);
+        }
         if (number == springs) {
             values[2] = controller_fan_percent(controller);
             text_add_values(line, FLASH_TEXT(">fan:#0:#2\r\n"), &values[1]);
@@ -198,6 +212,7 @@ void telemetry_tick(telemetry_t *telemetry, const controller_t *controller, uint
             write_csv(telemetry, controller, time_ms, ambient_c7, output);
         } else {
             count_dropped(telemetry, telemetry->left);
+            telemetry->rounds = (uint8_t)((telemetry->rounds + 1u) % telemetry->hz);
         }
         telemetry->left = controller_springs(controller);
     }

@@ -45,6 +45,7 @@ typedef struct {
     uint16_t dropped; /* lines, stays at 65535 */
     uint8_t next;     /* spring whose turn it is; the array's springs: the first */
     uint8_t left;     /* springs that have not had theirs in this period */
+    uint8_t rounds;   /* of Teleplot, since one with bounds */
     telemetry_told_t told[CONTROLLER_MAX_SPRINGS];
 } telemetry_t;
 
@@ -64,7 +65,8 @@ bool telemetry_set(telemetry_t *telemetry, uint8_t format, uint8_t hz);
  * or the cut has changed by half an ampere: at most one such line a tick, later where there is no
  * room.
  * Teleplot is a round a period: i{k} and m{k} of each spring, limits{k} and cut{k} while limits act
- * and once when they have ended, fan and fault with the last spring. A round takes as many ticks as
+ * and once when they have ended, once a second low{k} and high{k}, the bounds of its temperature,
+ * fan and fault with the last spring. A round takes as many ticks as
  * it needs; what is left of it when the next one is due is dropped, counted once a spring, and the
  * next one begins there. */
 void telemetry_tick(telemetry_t *telemetry, const controller_t *controller, uint32_t time_ms,

@@ -91,7 +91,9 @@ described_plant describe_plant(const plant_arguments &arguments)
 {
     const scenario plan =
         arguments.scenario_path.empty()
-            ? parse_scenario(make_text_file("(no scenario)", "[scenario]\nduration_s = 1\n"),
+            ? parse_scenario(make_text_file("(no scenario)",
+                                            "[scenario]\nduration_s = 1\n[plant]\neffects = "
+                                            "latent_heat, resistance_phase\n"),
                              arguments.sets)
             : read_scenario(arguments.scenario_path, arguments.sets);
     return {scenario_plant(plan), plan.seed, plan.noise_current_a * ELECTRICS_INA219_SHUNT_OHM,

@@ -19,7 +19,8 @@ plant_pointer scenario_plant(const scenario &plan);
 /* Of a command that has a board of its own, and takes from a scenario only what stands around it.
  */
 struct plant_arguments {
-    std::string scenario_path; /* empty: the paper's array, 3 x 3, no effects, no noise */
+    std::string
+        scenario_path; /* empty: the paper's array, 3 x 3, of springs that transform, no noise */
     std::vector<std::string> sets;
 };
 struct described_plant {

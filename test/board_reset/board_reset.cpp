@@ -85,16 +85,24 @@ void a_watchdog_reset_keeps_the_models_temperatures()
 }
 
 /* Nobody knows how long it was off: the springs may be as hot as they ever get. */
-void power_on_does_not_start_from_ambient()
+void after_power_on_a_spring_waits_until_it_cannot_be_hot()
 {
     rig mega;
     heat(mega);
     board_reset(mega.raw(), BOARD_RESET_POWER_ON);
     mega.boot(false);
-    const int hot_c7 = mega.view().spring[4].temperature_c7;
-    TEST_ASSERT_TRUE(hot_c7 > 80 * 128);
+    mega.expect_ok("policy precompensate");
+    mega.expect_ok("on 5");
     mega.run_ms(5000.0);
-    TEST_ASSERT_TRUE_MESSAGE(mega.view().spring[4].temperature_c7 < hot_c7, "it does not decay");
+    TEST_ASSERT_TRUE(board_all_off(mega.raw()));
+    TEST_ASSERT_BITS_HIGH(DRIVE_POLICY_LIMIT_COOLING, mega.view().spring[4].limits);
+    const std::string before = mega.say("model");
+    TEST_ASSERT_TRUE_MESSAGE(contains(before, "  waits "), before.c_str());
+    mega.expect_ok("off all");
+    mega.expect_ok("model cold");
+    mega.expect_ok("on 5");
+    mega.run_ms(2000.0);
+    TEST_ASSERT_TRUE_MESSAGE(board_duty(mega.raw(), 4) > 0.0, "it waits though it is cold");
 }
 
 void the_watchdog_is_never_hungry_in_normal_work()
@@ -122,7 +130,7 @@ int main()
     RUN_TEST(a_brown_out_leaves_the_board_locked);
     RUN_TEST(the_reset_button_keeps_the_models_temperatures);
     RUN_TEST(a_watchdog_reset_keeps_the_models_temperatures);
-    RUN_TEST(power_on_does_not_start_from_ambient);
+    RUN_TEST(after_power_on_a_spring_waits_until_it_cannot_be_hot);
     RUN_TEST(the_watchdog_is_never_hungry_in_normal_work);
     return UNITY_END();
 }

@@ -29,7 +29,7 @@ static void out_write(void *context, const char *bytes, uint8_t length)
     said[said_length] = '\0';
 }
 
-static uint8_t memory[2u * SETTINGS_SLOT_BYTES];
+static uint8_t memory[SETTINGS_LEARNT_BASE + 2u * SETTINGS_LEARNT_SLOT_BYTES];
 static uint8_t memory_read(void *context, uint16_t address)
 {
     (void)context;
@@ -53,6 +53,7 @@ static controller_inputs_t inputs;
 static controller_outputs_t outputs;
 static settings_t settings;
 static settings_store_t store;
+static learnt_store_t learnt;
 static telemetry_t telemetry;
 static console_status_t status;
 static console_t console;
@@ -69,8 +70,10 @@ void setUp(void)
     status.ambient_c7 = inputs.ambient_c7 = 20 * 128;
     status.loaded = settings_load(&store, &storage, &settings);
     TEST_ASSERT_TRUE(controller_init(&controller, &settings.controller, 20 * 128, NULL));
+    learnt_store_open(&learnt, &storage, SETTINGS_LEARNT_BASE, SETTINGS_LEARNT_SLOT_BYTES,
+                      &controller);
     telemetry_init(&telemetry);
-    console_init(&console, &output, &controller, &settings, &store, &telemetry, &status);
+    console_init(&console, &output, &controller, &settings, &store, &learnt, &telemetry, &status);
     weak_ma = 0;
     room = 60000;
     said_length = 0;
@@ -138,6 +141,7 @@ static void expect_error(const char *line, console_error_t error)
 {
     char want[16];
     const settings_t before = settings;
+    controller_host_heard(&controller); /* by any line */
     const controller_t before_controller = controller;
     snprintf(want, sizeof want, "error:%d ", (int)error);
     ask(line);
@@ -177,7 +181,7 @@ static void each_word_is_obeyed(void)
     expect_ok("ambient 23.5");
     TEST_ASSERT_EQUAL_INT16(2350, settings.board.ambient_cc);
     expect_ok("model");
-    TEST_ASSERT_NOT_NULL(strstr(said, "spring 9: 20.00 C"));
+    TEST_ASSERT_NOT_NULL(strstr(said, "spring 9: "));
     expect_ok("model cold");
     expect_ok("faults");
     expect_ok("clear");
@@ -415,11 +419,116 @@ static void nothing_is_said_without_room(void)
 
 static void status_is_one_line(void)
 {
+    expect_ok("model cold");
     said_length = 0;
     console_print_status(&console);
     TEST_ASSERT_EQUAL_STRING_LEN("<off|t:0.000|sum_a:0.000|hottest_c:20.00@1|fan:0|fault:0|", said,
                                  57);
     TEST_ASSERT_EQUAL_PTR(said + said_length - 1u, strchr(said, '\n'));
+}
+
+static void model_says_with_which_bounds(void)
+{
+    char wanted[160];
+    expect_ok("model cold");
+    expect_ok("model");
+    const spring_bounds_t c = controller_temperature_bounds_c(&controller, 8);
+    const spring_bounds_t k = controller_distance_bounds_k(&controller, 8);
+    TEST_ASSERT_TRUE(c.low < 15.0f && c.low > 0.0f && c.high > 25.0f && c.high < 40.0f);
+    snprintf(wanted, sizeof wanted,
+             "spring 9: 20.0 degC, %.1f to %.1f, 58.0 K below martensite start (+-%.1f), "
+             "austenite 0.0 %%, 0.0 to %.1f\r\n",
+             (double)c.low, (double)c.high, (double)(k.high - k.value),
+             100.0 * (double)controller_austenite_bounds(&controller, 8).high);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(said, wanted), wanted);
+    TEST_ASSERT_NOT_NULL(strstr(said, "\r\n  0.000 A, 0.000 V, 0.000000 W, target 0.000 A\r\n"
+                                      "ambient: 20.00 degC\r\nok\r\n"));
+}
+
+static void model_says_how_long_a_spring_waits_and_when_it_is_away(void)
+{
+    expect_ok("policy precompensate");
+    expect_ok("on 2");
+    for (unsigned t = 0; t < 50; t++) {
+        tick();
+    }
+    expect_ok("model");
+    TEST_ASSERT_NOT_NULL(strstr(said, ", heat\r\n"));
+    const char *const waits = strstr(said, "  waits ");
+    TEST_ASSERT_NOT_NULL(waits);
+    TEST_ASSERT_NOT_NULL(strstr(waits, " s: it may still be hot from before power-on\r\n"));
+    const float seconds = controller_cooling_s(&controller, 1);
+    TEST_ASSERT_FLOAT_WITHIN(2.0f, seconds, strtof(waits + 8, NULL));
+    TEST_ASSERT_NULL(strstr(waits + 8, "  waits ")); /* nobody else is driven */
+    expect_ok("off all");
+    controller.policy.spring[4].limits = DRIVE_POLICY_LIMIT_AWAY;
+    room = CONSOLE_ROOM_BYTES * 2u;
+    console.job = 0;
+    said_length = 0;
+    for (const char *c = "model\n"; *c != '\0'; c++) {
+        console_receive(&console, (uint8_t)*c);
+    }
+    while (console_busy(&console)) { /* without a tick, which would judge the spring anew */
+        console_service(&console);
+    }
+    TEST_ASSERT_NOT_NULL(strstr(said, ", limits away\r\n  away: not where it was asked to be"));
+}
+
+static void learnt_says_what_is_known_and_clear_forgets_it(void)
+{
+    const spring_learnt_t numbers = {.austenite_ohm = 0.219f,
+                                     .change = 0.2f,
+                                     .martensite_ohm = 0.1752f,
+                                     .martensite_rise_per_k = 0.0004f,
+                                     .loss_w_per_k = -0.00029f,
+                                     .loss_sd_w_per_k = 0.000058f};
+    expect_ok("learnt");
+    TEST_ASSERT_NOT_NULL(strstr(said, "spring 9: nothing yet\r\n"));
+    controller_restore_learnt(&controller, 8, &numbers);
+    controller.policy.estimator.spring[8].shift_k = 2.5f;
+    expect_ok("learnt");
+    TEST_ASSERT_NOT_NULL(strstr(said, "spring 8: nothing yet\r\n"
+                                      "spring 9: 0.1752 ohm at 20 degC, 0.040 % per K, austenite "
+                                      "0.2190 ohm, 25.0 % more, loss -5.0 % (+-1.0), shift 2.5 K"));
+    expect_error("learnt forget", CONSOLE_ERROR_BAD_ARGUMENT);
+    expect_ok("on 1");
+    expect_error("learnt clear", CONSOLE_ERROR_SPRINGS_ON);
+    expect_ok("off all");
+    expect_ok("learnt clear");
+    expect_ok("learnt");
+    TEST_ASSERT_NOT_NULL(strstr(said, "spring 9: nothing yet\r\n"));
+}
+
+static void silent(unsigned ticks)
+{
+    for (unsigned t = 0; t < ticks; t++) {
+        tick();
+    }
+}
+
+static void a_host_that_falls_silent_switches_its_springs_off(void)
+{
+    expect_ok("$host_timeout_s=2");
+    silent(1000); /* nothing is driven */
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, controller_board_fault(&controller));
+    expect_ok("on 1");
+    for (unsigned line = 0; line < 5; line++) {
+        silent(99);
+        TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, controller_board_fault(&controller));
+        type(line % 2u == 0 ? "\n" : "frobnicate\n");
+    }
+    type("fan 1"); /* has no end */
+    silent(101);
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_HOST_SILENT, controller_board_fault(&controller));
+    TEST_ASSERT_EQUAL_UINT16(0, controller_level_permille(&controller, 0));
+    TEST_ASSERT_EQUAL_UINT16(0, outputs.duty[0]);
+    type("\n");
+    expect_error("on 1", CONSOLE_ERROR_FAULT);
+    expect_ok("clear");
+    expect_ok("$host_timeout_s=0");
+    expect_ok("on 1");
+    silent(1000);
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, controller_board_fault(&controller));
 }
 
 static void random_bytes_get_one_answer_a_line(void)
@@ -537,6 +646,10 @@ int main(void)
     RUN_TEST(empty_lines_are_not_answered);
     RUN_TEST(nothing_is_said_without_room);
     RUN_TEST(status_is_one_line);
+    RUN_TEST(model_says_with_which_bounds);
+    RUN_TEST(model_says_how_long_a_spring_waits_and_when_it_is_away);
+    RUN_TEST(learnt_says_what_is_known_and_clear_forgets_it);
+    RUN_TEST(a_host_that_falls_silent_switches_its_springs_off);
     RUN_TEST(random_bytes_get_one_answer_a_line);
     RUN_TEST(codes_table_holds_what_the_code_says);
     RUN_TEST(documentation_names_every_error_fault_and_word);

@@ -1,3 +1,4 @@
+#include <stdlib.h>
 #include <string.h>
 
 #include "telemetry.h"
@@ -33,6 +34,7 @@ void setUp(void)
     controller_settings_t settings;
     controller_settings_default(&settings);
     TEST_ASSERT_TRUE(controller_init(&controller, &settings, 20 * 128, NULL));
+    controller_set_temperature(&controller, 20 * 128);
     telemetry_init(&telemetry);
     said_length = 0;
     said[0] = '\0';
@@ -185,9 +187,9 @@ static void what_of_a_round_found_no_room_is_dropped_and_every_spring_has_its_tu
 }
 
 /* As the policy would have it: these limits, and this much less than wanted. */
-static void limit(uint8_t spring, uint8_t limits, uint16_t cut_ma)
+static void limit(uint8_t spring, unsigned limits, uint16_t cut_ma)
 {
-    controller.policy.spring[spring].limits = limits;
+    controller.policy.spring[spring].limits = (uint16_t)limits;
     controller.policy.spring[spring].wanted_ma = 3000;
     controller.policy.spring[spring].target_ma = (uint16_t)(3000u - cut_ma);
 }
@@ -276,7 +278,7 @@ static void limits_that_toggle_are_told_once_a_period_and_take_no_other_springs_
         limit(8, DRIVE_POLICY_LIMIT_NONE, 0);
         for (unsigned tick = 0; tick < 500; tick++) {
             for (uint8_t k = 0; k < 8; k++) {
-                const uint8_t now = controller.policy.spring[k].limits;
+                const uint16_t now = controller.policy.spring[k].limits;
                 limit(k, now ^ DRIVE_POLICY_LIMIT_SUPPLY, 0);
             }
             if (tick == 300) {
@@ -298,11 +300,11 @@ static void limits_that_toggle_are_told_once_a_period_and_take_no_other_springs_
 static void all_limits_at_once_fit_and_are_told_whole(void)
 {
     TEST_ASSERT_TRUE(telemetry_set(&telemetry, TELEMETRY_CSV, 1));
-    limit(8, 255, 3000);
+    limit(8, 1023, 3000);
     ticks(60, 0x7FFFFFFFul - 49u * 20u);
     TEST_ASSERT_EQUAL_UINT(1, occurrences("<limits|spring:9|t:"));
     TEST_ASSERT_EQUAL_UINT(1, occurrences("|safety|current|supply|temperature|undriven|overload|"
-                                          "trip|blind|cut_a:3.000>\r\n"));
+                                          "trip|blind|cooling|away|cut_a:3.000>\r\n"));
 }
 
 static void telemetry_that_starts_tells_what_acts(void)
@@ -342,17 +344,39 @@ static void teleplots_longest_lines_are_whole(void)
     controller.measured_ma[8] = -32768;
     controller.model.state.spring[8].temperature_c23 = -40 * 8388608;
     controller.safety.spring[8].fault = SAFETY_FAULT_EMERGENCY_STOP;
-    limit(8, 255, 3000);
+    controller.policy.estimator.spring[8].variance_k2 = 3000.0f;
+    limit(8, 1023, 3000);
     TEST_ASSERT_TRUE(telemetry_set(&telemetry, TELEMETRY_TELEPLOT, 50));
+    telemetry.rounds = 49; /* of this second the last one: with bounds */
     room = 8000;
     telemetry_tick(&telemetry, &controller, 0x7FFFFFFFul, 0, &output);
     TEST_ASSERT_NOT_NULL(strstr(said, ">i9:2147483647:-32.768\r\n"));
     TEST_ASSERT_NOT_NULL(strstr(said, ">m9:2147483647:-40.00\r\n"));
-    TEST_ASSERT_NOT_NULL(strstr(said, ">limits9:2147483647:255\r\n"));
+    TEST_ASSERT_NOT_NULL(strstr(said, ">limits9:2147483647:1023\r\n"));
     TEST_ASSERT_NOT_NULL(strstr(said, ">cut9:2147483647:3.000\r\n"));
     TEST_ASSERT_NOT_NULL(strstr(said, ">fan:2147483647:0.00\r\n"));
     TEST_ASSERT_NOT_NULL(strstr(said, ">fault:2147483647:13\r\n"));
-    TEST_ASSERT_EQUAL_UINT(22, lines());
+    TEST_ASSERT_NOT_NULL(strstr(said, ">low9:2147483647:-1"));
+    TEST_ASSERT_NOT_NULL(strstr(said, ">high9:2147483647:1"));
+    TEST_ASSERT_EQUAL_UINT(40, lines());
+}
+
+static void teleplot_has_the_bounds_of_temperature_once_a_second(void)
+{
+    TEST_ASSERT_TRUE(telemetry_set(&telemetry, TELEMETRY_TELEPLOT, 5));
+    ticks(49, 1000);
+    TEST_ASSERT_EQUAL_UINT(0, occurrences(">low"));
+    ticks(9, 1000);
+    TEST_ASSERT_EQUAL_UINT(9, occurrences(">low"));
+    TEST_ASSERT_EQUAL_UINT(9, occurrences(">high"));
+    const spring_bounds_t bounds_c = controller_temperature_bounds_c(&controller, 8);
+    TEST_ASSERT_TRUE(bounds_c.low < 19.0f && bounds_c.high > 21.0f);
+    const char *const high = strstr(said, ">high9:1");
+    TEST_ASSERT_NOT_NULL(high);
+    TEST_ASSERT_FLOAT_WITHIN(0.011f, bounds_c.high, strtof(strchr(high + 8, ':') + 1, NULL));
+    forget();
+    ticks(150, 2000);
+    TEST_ASSERT_EQUAL_UINT(3u * 9u, occurrences(">low"));
 }
 
 static void off_says_nothing_and_bad_settings_are_refused(void)
@@ -383,6 +407,7 @@ int main(void)
     RUN_TEST(telemetry_that_starts_tells_what_acts);
     RUN_TEST(teleplot_has_limits_while_they_act_and_once_when_they_have_ended);
     RUN_TEST(teleplots_longest_lines_are_whole);
+    RUN_TEST(teleplot_has_the_bounds_of_temperature_once_a_second);
     RUN_TEST(off_says_nothing_and_bad_settings_are_refused);
     return UNITY_END();
 }

@@ -1,0 +1,191 @@
+#include "learnt_store.h"
+
+#include <math.h>
+#include <string.h>
+
+/* A resistance is worth a save when it differs by so much of itself; its rise per kelvin when that
+ * makes as much over a heating. */
+#define WORTH_SHARE     0.02f
+#define WORTH_HEATING_K 80.0f
+
+/* Of each field: units of one, bytes. Signed ones are in two's complement. */
+#define UOHM          1e6f
+#define CHANGE        1e4f
+#define RISE          1e6f
+#define UW_PER_K      1e6f
+#define OHM_BYTES     3u
+#define CHANGE_BYTES  2u
+#define RISE_BYTES    2u
+#define LOSS_BYTES    3u
+#define LOSS_SD_BYTES 2u
+_Static_assert(2u * OHM_BYTES + CHANGE_BYTES + RISE_BYTES + LOSS_BYTES + LOSS_SD_BYTES ==
+                   LEARNT_STORE_SPRING_BYTES,
+               "a spring's fields fill its bytes");
+
+/* --- bytes ---------------------------------------------------------------------------------- */
+
+/* Towards zero, so that what is at a limit is not beyond it when it is read again. */
+static uint8_t *put(uint8_t *at, float value, float units, uint8_t bytes)
+{
+    const uint32_t number = (uint32_t)(int32_t)(value * units);
+    for (uint8_t k = 0; k < bytes; k++) {
+        *at++ = (uint8_t)(number >> (8u * k));
+    }
+    return at;
+}
+
+static void pack(const spring_learnt_t *learnt, uint8_t *at)
+{
+    at = put(at, learnt->austenite_ohm, UOHM, OHM_BYTES);
+    at = put(at, learnt->martensite_ohm, UOHM, OHM_BYTES);
+    at = put(at, learnt->change, CHANGE, CHANGE_BYTES);
+    at = put(at, learnt->martensite_rise_per_k, RISE, RISE_BYTES);
+    at = put(at, learnt->loss_w_per_k, UW_PER_K, LOSS_BYTES);
+    (void)put(at, learnt->loss_sd_w_per_k, UW_PER_K, LOSS_SD_BYTES);
+}
+
+static uint32_t take(const record_store_t *record, uint16_t *at, uint8_t bytes)
+{
+    uint32_t number = 0;
+    for (uint8_t k = 0; k < bytes; k++) {
+        number |= (uint32_t)record_store_read(record, (*at)++) << (8u * k);
+    }
+    return number;
+}
+
+static float take_signed(const record_store_t *record, uint16_t *at, uint8_t bytes, float units)
+{
+    const uint32_t number = take(record, at, bytes);
+    const uint32_t sign = 1ul << (8u * bytes - 1u);
+    return (float)((int32_t)(number ^ sign) - (int32_t)sign) / units;
+}
+
+/* What the record has of a spring. False where it has nothing. */
+static bool unpack(const record_store_t *record, uint8_t spring, spring_learnt_t *learnt)
+{
+    uint16_t at = (uint16_t)(spring * LEARNT_STORE_SPRING_BYTES);
+    if (at + LEARNT_STORE_SPRING_BYTES > record_store_length(record)) {
+        return false;
+    }
+    learnt->austenite_ohm = (float)take(record, &at, OHM_BYTES) / UOHM;
+    learnt->martensite_ohm = (float)take(record, &at, OHM_BYTES) / UOHM;
+    learnt->change = take_signed(record, &at, CHANGE_BYTES, CHANGE);
+    learnt->martensite_rise_per_k = take_signed(record, &at, RISE_BYTES, RISE);
+    learnt->loss_w_per_k = take_signed(record, &at, LOSS_BYTES, UW_PER_K);
+    learnt->loss_sd_w_per_k = (float)take(record, &at, LOSS_SD_BYTES) / UW_PER_K;
+    return learnt->austenite_ohm > 0.0f;
+}
+
+static uint8_t byte_of(void *context, uint16_t position)
+{
+    return ((const learnt_store_t *)context)->bytes[position];
+}
+
+static void save(learnt_store_t *store, uint16_t length)
+{
+    store->since_s = 0;
+    record_store_save(&store->record, byte_of, store, length);
+}
+
+/* --- when ----------------------------------------------------------------------------------- */
+
+static bool differs(float a, float b, float by)
+{
+    return fabsf(a - b) > by;
+}
+
+static bool worth_a_save(const learnt_store_t *store, const controller_t *controller,
+                         uint8_t spring)
+{
+    const spring_learnt_t now = controller_learnt(controller, spring);
+    spring_learnt_t kept;
+    if (!(now.austenite_ohm > 0.0f)) {
+        return false;
+    }
+    return !unpack(&store->record, spring, &kept) ||
+           differs(now.austenite_ohm, kept.austenite_ohm, WORTH_SHARE * now.austenite_ohm) ||
+           differs(now.martensite_ohm, kept.martensite_ohm, WORTH_SHARE * now.martensite_ohm) ||
+           differs(now.change, kept.change, WORTH_SHARE) ||
+           differs(now.martensite_rise_per_k, kept.martensite_rise_per_k,
+                   WORTH_SHARE / WORTH_HEATING_K) ||
+           differs(now.loss_w_per_k, kept.loss_w_per_k, now.loss_sd_w_per_k) ||
+           2.0f * now.loss_sd_w_per_k < kept.loss_sd_w_per_k;
+}
+
+/* At least one is driven, and those that are, are held. */
+static bool all_held(const controller_t *controller)
+{
+    bool any = false;
+    for (uint8_t k = 0; k < controller_springs(controller); k++) {
+        if (controller_level_permille(controller, k) == 0) {
+            continue;
+        }
+        if (controller_stage(controller, k) != DRIVE_POLICY_STAGE_HOLD) {
+            return false;
+        }
+        any = true;
+    }
+    return any;
+}
+
+void learnt_store_second(learnt_store_t *store, const controller_t *controller)
+{
+    const uint8_t springs = controller_springs(controller);
+    bool worth = false;
+    if (store->since_s < LEARNT_STORE_PAUSE_S) {
+        store->since_s++;
+    }
+    if (!all_held(controller)) {
+        store->held_s = 0;
+    } else if (store->held_s < LEARNT_STORE_HELD_S) {
+        store->held_s++;
+    }
+    if (store->since_s < LEARNT_STORE_PAUSE_S || store->held_s < LEARNT_STORE_HELD_S) {
+        return;
+    }
+    for (uint8_t k = 0; k < springs && !worth; k++) {
+        worth = worth_a_save(store, controller, k);
+    }
+    if (!worth) {
+        return;
+    }
+    for (uint8_t k = 0; k < springs; k++) {
+        const spring_learnt_t learnt = controller_learnt(controller, k);
+        pack(&learnt, store->bytes + (uint16_t)(k * LEARNT_STORE_SPRING_BYTES));
+    }
+    save(store, (uint16_t)(springs * LEARNT_STORE_SPRING_BYTES));
+}
+
+record_save_t learnt_store_step(learnt_store_t *store)
+{
+    return record_store_step(&store->record);
+}
+
+void learnt_store_clear(learnt_store_t *store, controller_t *controller)
+{
+    for (uint8_t k = 0; k < controller_springs(controller); k++) {
+        controller_forget_learnt(controller, k);
+    }
+    save(store, 0);
+}
+
+bool learnt_store_keeps(const learnt_store_t *store)
+{
+    return record_store_length(&store->record) != 0;
+}
+
+record_found_t learnt_store_open(learnt_store_t *store, const record_storage_t *storage,
+                                 uint16_t base, uint16_t slot_bytes, controller_t *controller)
+{
+    spring_learnt_t learnt;
+    memset(store, 0, sizeof *store);
+    store->since_s = LEARNT_STORE_PAUSE_S;
+    const record_found_t found =
+        record_store_open(&store->record, storage, base, slot_bytes, LEARNT_STORE_KIND);
+    for (uint8_t k = 0; k < controller_springs(controller); k++) {
+        if (unpack(&store->record, k, &learnt)) {
+            controller_restore_learnt(controller, k, &learnt);
+        }
+    }
+    return found;
+}

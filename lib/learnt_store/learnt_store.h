@@ -1,0 +1,52 @@
+/* What it is for: keeps what was learnt of each spring over power-off, with few writes.
+ * What it owns: how these numbers lie in a record, and when they are worth a save.
+ * What it never does: judge a number (spring_estimator does), or wait for a byte to be written. */
+#ifndef LEARNT_STORE_H
+#define LEARNT_STORE_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "controller.h"
+#include "record_store.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define LEARNT_STORE_KIND                                                                          \
+    3u /* of record; a change of LEARNT_STORE_SPRING_BYTES or of its fields takes a new one */
+#define LEARNT_STORE_SPRING_BYTES 15u
+
+/* After so long with every driven spring held, and no sooner than that after the save before: an
+ * EEPROM's 100,000 writes of the two slots are then 3.8 years of saves without a pause. */
+#define LEARNT_STORE_HELD_S  60u
+#define LEARNT_STORE_PAUSE_S 600u
+
+typedef struct {
+    record_store_t record;
+    uint16_t since_s; /* the last save began; stays at LEARNT_STORE_PAUSE_S */
+    uint8_t held_s;   /* all driven springs, on end; stays at LEARNT_STORE_HELD_S */
+    uint8_t bytes[CONTROLLER_MAX_SPRINGS * LEARNT_STORE_SPRING_BYTES]; /* of a save under way */
+} learnt_store_t;
+
+/* Finds the record and gives the controller, which has been initialised, what it holds of each of
+ * its springs. slot_bytes must hold RECORD_OVERHEAD_BYTES and the bytes of all springs. */
+record_found_t learnt_store_open(learnt_store_t *store, const record_storage_t *storage,
+                                 uint16_t base, uint16_t slot_bytes, controller_t *controller);
+
+/* Once a second. Starts a save if and only if both times above have passed and of a spring
+ * something is known that the record has not: its first numbers, a resistance that differs by 2 %,
+ * a loss that differs by its standard deviation or is known twice as well. */
+void learnt_store_second(learnt_store_t *store, const controller_t *controller);
+/* Goes on with a save under way: at most one byte. May be left out for a while. */
+record_save_t learnt_store_step(learnt_store_t *store);
+/* The controller's springs are forgotten, and a save of nothing starts. */
+void learnt_store_clear(learnt_store_t *store, controller_t *controller);
+/* Whether the record holds anything. */
+bool learnt_store_keeps(const learnt_store_t *store);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

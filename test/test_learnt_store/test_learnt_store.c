@@ -1,0 +1,241 @@
+/* What was learnt comes back after power-off, to the unit it is kept in; it is saved when it is
+ * worth a save, and only then; power may fail at any byte. */
+#include <string.h>
+
+#include "learnt_store.h"
+#include "settings.h"
+#include "unity.h"
+
+#define MEMORY_BYTES (SETTINGS_LEARNT_BASE + 2u * SETTINGS_LEARNT_SLOT_BYTES)
+
+static uint8_t memory[MEMORY_BYTES];
+static unsigned writes_left; /* before the power goes */
+static unsigned writes;
+
+static uint8_t memory_read(void *context, uint16_t address)
+{
+    (void)context;
+    return memory[address];
+}
+
+static bool memory_ready(void *context)
+{
+    (void)context;
+    return true;
+}
+
+static void memory_write(void *context, uint16_t address, uint8_t value)
+{
+    (void)context;
+    TEST_ASSERT_GREATER_OR_EQUAL_UINT(SETTINGS_LEARNT_BASE, address);
+    TEST_ASSERT_LESS_THAN_UINT(MEMORY_BYTES, address);
+    writes++;
+    if (writes_left > 0) {
+        writes_left--;
+        memory[address] = value;
+    }
+}
+
+static const record_storage_t storage = {NULL, memory_read, memory_ready, memory_write};
+static controller_t controller;
+static learnt_store_t store;
+static const spring_learnt_t numbers = {.austenite_ohm = 0.2191f,
+                                        .change = -0.2034f,
+                                        .martensite_ohm = 0.174512f,
+                                        .martensite_rise_per_k = 0.000431f,
+                                        .loss_w_per_k = -0.000417f,
+                                        .loss_sd_w_per_k = 0.000121f};
+
+static void power_on(void)
+{
+    controller_settings_t settings;
+    controller_settings_default(&settings);
+    TEST_ASSERT_TRUE(controller_init(&controller, &settings, 20 * 128, NULL));
+    writes_left = UINT32_MAX;
+    (void)learnt_store_open(&store, &storage, SETTINGS_LEARNT_BASE, SETTINGS_LEARNT_SLOT_BYTES,
+                            &controller);
+}
+
+/* Seconds of the loop; the EEPROM takes a byte in each turn. */
+static void seconds(unsigned count)
+{
+    for (unsigned s = 0; s < count; s++) {
+        learnt_store_second(&store, &controller);
+        for (unsigned turn = 0; turn < 2000; turn++) {
+            (void)learnt_store_step(&store);
+        }
+    }
+}
+
+static void hold(uint8_t spring, drive_policy_stage_t stage)
+{
+    TEST_ASSERT_TRUE(controller_set_target(&controller, spring, 1000));
+    controller.policy.spring[spring].stage = (uint8_t)stage;
+}
+
+static void learn(uint8_t spring, const spring_learnt_t *learnt)
+{
+    controller_restore_learnt(&controller, spring, learnt);
+    TEST_ASSERT_EQUAL_FLOAT(learnt->austenite_ohm,
+                            controller_learnt(&controller, spring).austenite_ohm);
+}
+
+void setUp(void)
+{
+    memset(memory, 0xFF, sizeof memory);
+    power_on();
+    writes = 0;
+}
+
+void tearDown(void) {}
+
+static void expect_numbers(uint8_t spring)
+{
+    const spring_learnt_t back = controller_learnt(&controller, spring);
+    TEST_ASSERT_FLOAT_WITHIN(1.1e-6f, numbers.austenite_ohm, back.austenite_ohm);
+    TEST_ASSERT_FLOAT_WITHIN(1.1e-6f, numbers.martensite_ohm, back.martensite_ohm);
+    TEST_ASSERT_FLOAT_WITHIN(1.1e-4f, numbers.change, back.change);
+    TEST_ASSERT_FLOAT_WITHIN(1.1e-6f, numbers.martensite_rise_per_k, back.martensite_rise_per_k);
+    TEST_ASSERT_FLOAT_WITHIN(1.1e-6f, numbers.loss_w_per_k, back.loss_w_per_k);
+    TEST_ASSERT_FLOAT_WITHIN(1.1e-6f, numbers.loss_sd_w_per_k, back.loss_sd_w_per_k);
+}
+
+static void what_was_learnt_is_there_after_power_on(void)
+{
+    hold(0, DRIVE_POLICY_STAGE_HOLD);
+    learn(0, &numbers);
+    learn(8, &numbers);
+    seconds(LEARNT_STORE_HELD_S);
+    power_on();
+    expect_numbers(0);
+    expect_numbers(8);
+    TEST_ASSERT_EQUAL_FLOAT(0.0f, controller_learnt(&controller, 1).austenite_ohm);
+    TEST_ASSERT_TRUE(learnt_store_keeps(&store));
+}
+
+static void it_is_saved_a_minute_after_all_that_are_driven_are_held_and_no_sooner(void)
+{
+    hold(0, DRIVE_POLICY_STAGE_HOLD);
+    hold(1, DRIVE_POLICY_STAGE_HEAT);
+    learn(0, &numbers);
+    seconds(1000);
+    TEST_ASSERT_EQUAL_UINT(0, writes);
+    hold(1, DRIVE_POLICY_STAGE_HOLD);
+    seconds(LEARNT_STORE_HELD_S - 1u);
+    TEST_ASSERT_EQUAL_UINT(0, writes);
+    seconds(1);
+    TEST_ASSERT_TRUE(learnt_store_keeps(&store));
+}
+
+static void nothing_driven_or_nothing_learnt_writes_nothing(void)
+{
+    learn(0, &numbers);
+    seconds(2000);
+    TEST_ASSERT_EQUAL_UINT(0, writes);
+    controller_forget_learnt(&controller, 0);
+    hold(0, DRIVE_POLICY_STAGE_HOLD);
+    seconds(2000);
+    TEST_ASSERT_EQUAL_UINT(0, writes);
+}
+
+static unsigned saved_after(const spring_learnt_t *change)
+{
+    learn(0, change);
+    writes = 0;
+    seconds(LEARNT_STORE_PAUSE_S);
+    return writes;
+}
+
+static void only_what_differs_enough_is_worth_a_save_and_that_once_in_ten_minutes(void)
+{
+    spring_learnt_t next = numbers;
+    hold(0, DRIVE_POLICY_STAGE_HOLD);
+    learn(0, &numbers);
+    seconds(LEARNT_STORE_HELD_S);
+    TEST_ASSERT_EQUAL_UINT(0, saved_after(&numbers));
+    next.austenite_ohm = 1.019f * numbers.austenite_ohm;
+    next.loss_sd_w_per_k = 0.51f * numbers.loss_sd_w_per_k;
+    next.loss_w_per_k = numbers.loss_w_per_k + 0.9f * next.loss_sd_w_per_k;
+    TEST_ASSERT_EQUAL_UINT(0, saved_after(&next));
+    next.loss_w_per_k = numbers.loss_w_per_k + 1.1f * next.loss_sd_w_per_k;
+    TEST_ASSERT_TRUE(saved_after(&next) > 0);
+    next.austenite_ohm *= 1.03f;
+    TEST_ASSERT_TRUE(saved_after(&next) > 0);
+    next.martensite_ohm *= 0.97f;
+    TEST_ASSERT_TRUE(saved_after(&next) > 0);
+    next.loss_sd_w_per_k *= 0.4f;
+    TEST_ASSERT_TRUE(saved_after(&next) > 0);
+
+    /* no sooner than so long after the save before */
+    next.austenite_ohm *= 1.03f;
+    learn(0, &next);
+    for (writes = 0; writes == 0;) {
+        seconds(1);
+    }
+    next.austenite_ohm *= 1.03f;
+    learn(0, &next);
+    writes = 0;
+    seconds(LEARNT_STORE_PAUSE_S - 1u);
+    TEST_ASSERT_EQUAL_UINT(0, writes);
+    seconds(1);
+    TEST_ASSERT_TRUE(writes > 0);
+}
+
+static void wherever_the_power_is_cut_the_old_or_the_new_is_whole(void)
+{
+    spring_learnt_t next = numbers;
+    next.austenite_ohm = 0.25f;
+    for (unsigned cut = 0; cut < 160; cut++) {
+        setUp();
+        hold(0, DRIVE_POLICY_STAGE_HOLD);
+        learn(0, &numbers);
+        seconds(LEARNT_STORE_HELD_S);
+        power_on();
+        hold(0, DRIVE_POLICY_STAGE_HOLD);
+        learn(0, &next);
+        writes_left = cut;
+        seconds(LEARNT_STORE_HELD_S);
+        power_on();
+        const float back = controller_learnt(&controller, 0).austenite_ohm;
+        TEST_ASSERT_TRUE(back > 0.2190f && (back < 0.2192f || back > 0.2499f));
+    }
+}
+
+static void clear_forgets_in_memory_and_over_power_off(void)
+{
+    hold(0, DRIVE_POLICY_STAGE_HOLD);
+    learn(0, &numbers);
+    seconds(LEARNT_STORE_HELD_S);
+    learnt_store_clear(&store, &controller);
+    TEST_ASSERT_EQUAL_FLOAT(0.0f, controller_learnt(&controller, 0).austenite_ohm);
+    seconds(1);
+    TEST_ASSERT_FALSE(learnt_store_keeps(&store));
+    power_on();
+    TEST_ASSERT_EQUAL_FLOAT(0.0f, controller_learnt(&controller, 0).austenite_ohm);
+}
+
+static void what_lies_at_its_limit_is_taken_back(void)
+{
+    spring_learnt_t most = numbers;
+    controller_forget_learnt(&controller, 0);
+    most.loss_sd_w_per_k = controller_learnt(&controller, 0).loss_sd_w_per_k;
+    hold(0, DRIVE_POLICY_STAGE_HOLD);
+    learn(0, &most);
+    seconds(LEARNT_STORE_HELD_S);
+    power_on();
+    TEST_ASSERT_FLOAT_WITHIN(1.1e-6f, most.austenite_ohm,
+                             controller_learnt(&controller, 0).austenite_ohm);
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(what_was_learnt_is_there_after_power_on);
+    RUN_TEST(it_is_saved_a_minute_after_all_that_are_driven_are_held_and_no_sooner);
+    RUN_TEST(nothing_driven_or_nothing_learnt_writes_nothing);
+    RUN_TEST(only_what_differs_enough_is_worth_a_save_and_that_once_in_ten_minutes);
+    RUN_TEST(wherever_the_power_is_cut_the_old_or_the_new_is_whole);
+    RUN_TEST(clear_forgets_in_memory_and_over_power_off);
+    RUN_TEST(what_lies_at_its_limit_is_taken_back);
+    return UNITY_END();
+}
