@@ -269,7 +269,7 @@ def confusion(cases: list[dict[str, Any]]) -> list[list[str]]:
     """Return rows: truth, cases, what was adopted how often, rivals, errors."""
     groups: dict[tuple[str, str], list[dict[str, Any]]] = defaultdict(list)
     for case in cases:
-        if case["group"] != "pair":
+        if case["group"] not in ("pair", "beside"):
             groups[case["group"], "+".join(case["truth"]) or "none"].append(case)
     order = {name: k for k, name in enumerate((*EFFECTS, "none", *OUTSIDE))}
     rows = []
@@ -378,6 +378,8 @@ def main() -> int:
                     file=sys.stderr,
                     flush=True,
                 )
+            if options.cases:
+                options.cases.write_text(json.dumps(cases, indent=1) + "\n")
     found = figures(cases)
     text = table(
         found,
@@ -396,8 +398,6 @@ def main() -> int:
             Path(options.markdown).write_text(text + "\n")
     if options.json:
         options.json.write_text(json.dumps(found, indent=1) + "\n")
-    if options.cases:
-        options.cases.write_text(json.dumps(cases, indent=1) + "\n")
     return 0
 
 

@@ -14,7 +14,7 @@ import jsonschema
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from ninespring import cli
+from ninespring import cli, console
 from ninespring.errors import WorkError
 from ninespring.fit.predict import predict
 from ninespring.logs import log_text, read_log, read_table, write_atomically
@@ -105,14 +105,14 @@ def test_every_result_is_held_to_its_schema(make_log, tmp_path: Path) -> None:
         assert done.returncode == 0, done.stderr
         result = json.loads((tmp_path / "r.json").read_text())
         assert result["schema"] == f"ninespring.{name}/1"
-        cli.checked(result)
+        console.checked(result)
         for key in result:
             broken = dict(result)
             del broken[key]
             with pytest.raises(jsonschema.ValidationError):
-                cli.checked(broken)
+                console.checked(broken)
         with pytest.raises(jsonschema.ValidationError):
-            cli.checked(result | {"surplus": 1})
+            console.checked(result | {"surplus": 1})
 
 
 def test_the_chip_starts_again_after_gaps_and_is_seen_by_the_same_sensors(make_log) -> None:

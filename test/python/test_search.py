@@ -76,14 +76,22 @@ def test_only_what_the_log_could_show_is_a_candidate(make_log, tmp_path: Path) -
 
     def cold(columns: dict[str, np.ndarray]) -> None:
         for k in range(1, 10):
-            columns[f"t{k}_c"] = np.minimum(columns[f"t{k}_c"], 45.0)
+            columns[f"t{k}_c"] = np.minimum(columns[f"t{k}_c"], 40.0)
 
-    everything = {*effects.IN_WORDS} - {"supply_sag", "resistance_phase"}  # power is logged
+    everything = {*effects.IN_WORDS} - {
+        "supply_sag",
+        "resistance_phase",
+        "resistance_temperature",
+        "contact_resistance",
+    }  # power is logged
     assert names_of(Problem(Array(), [read_log(make_log("a.csv"))])) == everything
     assert names_of(Problem(Array(), [read_log(make_log("b.csv", change=without_fan))])) == everything - {"fan_wake"}
     # 30 K below the declared transformation an alloy may transform all the same, at half the way to it none does
     assert names_of(Problem(Array(), [read_log(make_log("c.csv", change=lukewarm))])) == everything
-    assert names_of(Problem(Array(), [read_log(make_log("e.csv", change=cold))])) == everything - {"latent_heat"}
+    assert names_of(Problem(Array(), [read_log(make_log("e.csv", change=cold))])) == everything - {
+        "latent_heat",
+        "transformation_shift",
+    }
     assert "resistance_phase" in names_of(Problem(Array(), [read_log(make_log("d.csv", columns="i"))]))
     pair = names_of(Problem(Array(1, 2), [read_log(commanded(tmp_path / "u.csv", {}), 2)]))
     assert "supply_sag" in pair and "edge_loss" not in pair

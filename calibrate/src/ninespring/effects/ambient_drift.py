@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from ..fit.spec import Free
-from .effect import Candidate, Effect, Scene, linear
+from .effect import Candidate, Effect, Numbers, Scene, linear, sized
 
 OFFSET = "ambient_offset_k"
 KINDS = (("free", "ambient_drift_k", 500.0), ("slow", "ambient_slow_drift_k", 1800.0))
@@ -31,6 +31,7 @@ def _candidates(scene: Scene) -> Iterator[Candidate]:
         fixed=(("ambient_amplitude_k", 0.0), (ramp, 0.0)),
         signed=True,
         most=8.0,
+        flexible=True,
     )
     for variant, key, shortest_s in KINDS:
         if scene.duration_s < shortest_s:
@@ -51,4 +52,15 @@ def _candidates(scene: Scene) -> Iterator[Candidate]:
         )
 
 
-EFFECT = Effect("ambient_drift", _candidates)
+def _says(numbers: Numbers, variant: str) -> str:
+    if "ambient_ramp_k_per_h" in numbers:
+        return f"The surroundings drift by {sized(*numbers['ambient_ramp_k_per_h'], 'K/h')}."
+    values = [value for value, _ in numbers.values()]
+    if variant.startswith("offset"):
+        return (
+            f"The surroundings are {', '.join(f'{value:+.1f}' for value in values)} K off what is logged, run by run."
+        )
+    return f"The surroundings drift during the runs, by {max(values) - min(values):.1f} K."
+
+
+EFFECT = Effect("ambient_drift", _candidates, says=_says)

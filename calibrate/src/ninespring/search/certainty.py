@@ -30,6 +30,7 @@ WEIGHTS = {
     "in_place": 0.0,
     "left": -1.0,
     "nats": 0.0,
+    "flexible": 0.0,
 }
 """Logistic weights of a witness: fitted by bench/diagnose/certainty.py to developing seeds, checked on reporting ones."""
 
@@ -47,6 +48,8 @@ class Witness:
     """The same from spring to spring."""
     left: float
     """What the whole model leaves beyond the noise, relative to the noise."""
+    flexible: bool
+    """It follows anything slow: as likely a stand-in as a cause."""
 
     def features(self) -> dict[str, float]:
         """Return what the probability is computed from: each bounded, none of them in units of a log's length."""
@@ -57,6 +60,7 @@ class Witness:
             "in_place": math.log10(0.01 + self.in_place),
             "left": math.log10(0.1 + self.left),
             "nats": math.log10(max(1.0, self.nats)),
+            "flexible": float(self.flexible),
         }
 
     def probability(self) -> float:
@@ -78,7 +82,7 @@ def scatter(signal: list[np.ndarray], residual: list[np.ndarray], noise_factor: 
     return math.sqrt(top / bottom) if bottom > 0 else math.inf
 
 
-def witness(problem: Problem, fit: Fit, effect: str, without: Fit) -> Witness:
+def witness(problem: Problem, fit: Fit, effect: str, without: Fit, flexible: bool) -> Witness:
     """Return what speaks for an effect in a fit; `without` is the best fit that lacks it."""
     beyond = max(1e-9, excess(problem, without))
     off = fit.spec.without(effect)
@@ -107,4 +111,5 @@ def witness(problem: Problem, fit: Fit, effect: str, without: Fit) -> Witness:
         min(10.0, scatter(*times, factor)),
         min(10.0, scatter(*places, factor)),
         math.sqrt(excess(problem, fit)),
+        flexible,
     )
