@@ -159,10 +159,11 @@ def _diagnose(
     witnesses: dict[str, Witness] = {}
     progress("held-out blocks")
     final = _finish(problem, final)
+    guessed = all(run.ambient_c is None for run in problem.runs)
     while without:
         # The least likely goes first: what it stood in for may have made the others look worse than they are.
         witnesses = {
-            effect: witness(problem, final, effect, other, found.is_flexible(final, effect))
+            effect: witness(problem, final, effect, other, found.is_flexible(final, effect) and not guessed)
             for effect, other in without.items()
         }
         effect = min(witnesses, key=lambda one: witnesses[one].probability())
