@@ -10,6 +10,9 @@ from pathlib import Path
 
 from .errors import WorkError
 
+NITI = "plant.effects=latent_heat,resistance_phase"
+"""What every NiTi spring does."""
+
 
 def simulator() -> Path:
     """Return the program: NINESPRING_SIM, this source tree's build, or the PATH."""
@@ -32,6 +35,8 @@ def simulated_board(more: Sequence[str] = ()) -> tuple[subprocess.Popen[str], st
         "board",
         "--thermometers",
         "pty",
+        "--set",
+        NITI,
         *(("--elf", str(Path(elf) / "firmware.elf")) if elf else ()),
         *more,
     ]

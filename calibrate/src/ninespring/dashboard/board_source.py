@@ -349,7 +349,7 @@ class BoardSource(Source):
             raise WorkError(f"'record' refused: {error}") from None
         keys = {"recorded": f"{now:%Y-%m-%dT%H:%M:%SZ}", "port": board.port, "tool": f"ninespring {__version__}"}
         self._log = log
-        self._change(recording={"file": str(path), "rows": 0})
+        self._change(recording={"file": path.name, "rows": 0})
         try:
             write_head(board, log, keys)
             self._sink = RowSink(log, self._thermometers)
@@ -366,7 +366,7 @@ class BoardSource(Source):
     def _log_row(self, row: Row) -> None:
         if self._sink:
             self._sink.row(row)
-            self._change(recording={"file": str(self._log.path) if self._log else "", "rows": self._sink.rows})
+            self._change(recording={"file": self._log.path.name if self._log else "", "rows": self._sink.rows})
         elif self._thermometers:
             self._thermometers.row_came(row.time_s)
 
