@@ -85,7 +85,7 @@ static float hold_w(const thermal_model_t *model, uint8_t k, float temperature_c
 }
 
 /* The temperature, its phase as if it came from martensite, or from austenite. */
-static void set_temperature(thermal_model_t *model, uint8_t k, float temperature_c, uint8_t from)
+void spring_set_temperature(thermal_model_t *model, uint8_t k, float temperature_c, uint8_t from)
 {
     const spring_transformation_t t = spring_transformation(model, k);
     thermal_model_set_temperature(model, k,
@@ -143,7 +143,7 @@ void spring_estimator_init(spring_estimator_t *e, thermal_model_t *model)
         spring_estimator_forget(e, k);
         begin(&e->spring[k], coldest_c + 0.5f * width_k, UNIFORM_SD * width_k, SPRING_PHASE_ANY);
         e->spring[k].hottest_c = SPRING_ESTIMATOR_HOTTEST_C;
-        set_temperature(model, k, coldest_c + 0.5f * width_k, SPRING_PHASE_MARTENSITE);
+        spring_set_temperature(model, k, coldest_c + 0.5f * width_k, SPRING_PHASE_MARTENSITE);
     }
 }
 
@@ -267,7 +267,7 @@ float spring_see(const spring_estimator_t *e, spring_belief_t *b, thermal_model_
     const float gain = distance_k2(b) / total_k2;
     const float left = 1.0f - gain;
     const float by_loss = b->covariance / total_k2;
-    set_temperature(model, k, seen_c - left * error_k, from);
+    spring_set_temperature(model, k, seen_c - left * error_k, from);
     b->last_c = spring_now_c(model, k);
     b->shift_k = clamp(b->shift_k - fminf(b->shift_variance_k2 / total_k2, gain) * error_k,
                        -SHIFT_MOST_K, SHIFT_MOST_K);
@@ -293,7 +293,7 @@ void spring_keep_above(const spring_estimator_t *e, spring_belief_t *b, thermal_
         /* it cannot lose so little: what is read is not its phase */
         b->blind = b->blind ||
                    fabsf(b->kept_w_per_k) > SPRING_ESTIMATOR_BOUND_SDS * sqrtf(b->loss_variance);
-        set_temperature(model, k, limit_c, SPRING_PHASE_AUSTENITE);
+        spring_set_temperature(model, k, limit_c, SPRING_PHASE_AUSTENITE);
         b->last_c = spring_now_c(model, k);
     }
 }
@@ -323,7 +323,7 @@ static void look(spring_belief_t *b, thermal_model_t *model, uint8_t k)
     }
     const uint8_t fresh = b->fresh;
     begin(b, 0.5f * (low_c + high_c), UNIFORM_SD * (high_c - low_c), phase);
-    set_temperature(model, k, 0.5f * (low_c + high_c), phase);
+    spring_set_temperature(model, k, 0.5f * (low_c + high_c), phase);
     b->last_c = spring_now_c(model, k);
     b->fresh = fresh;
 }
@@ -430,7 +430,7 @@ void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, 
     if (full && b->possible != SPRING_PHASE_AUSTENITE) {
         b->blind = b->blind || b->possible == SPRING_PHASE_MARTENSITE;
         b->possible = SPRING_PHASE_AUSTENITE;
-        set_temperature(model, k, now_c, SPRING_PHASE_AUSTENITE);
+        spring_set_temperature(model, k, now_c, SPRING_PHASE_AUSTENITE);
     } else if (!full && b->possible == SPRING_PHASE_AUSTENITE) {
         b->possible = SPRING_PHASE_BETWEEN | SPRING_PHASE_AUSTENITE;
     }

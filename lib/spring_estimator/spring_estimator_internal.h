@@ -17,6 +17,10 @@
 float spring_now_c(const thermal_model_t *model, uint8_t spring);
 float spring_ambient_c(const thermal_model_t *model);
 
+/* The model's temperature, its phase as if it came there from martensite, or from austenite
+ * (SPRING_PHASE_MARTENSITE or _AUSTENITE). */
+void spring_set_temperature(thermal_model_t *model, uint8_t spring, float temperature_c,
+                            uint8_t from);
 /* The spring was seen at a place of its transformation, give or take sd_k: the one update of
  * distance, shift and loss. The model's temperature is set, its phase reached from `from`
  * (SPRING_PHASE_MARTENSITE or _AUSTENITE). Returns the error found, K. */

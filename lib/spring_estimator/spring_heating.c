@@ -13,6 +13,8 @@
 #define FLAT_K         6.0f  /* of heat without a change: it is over */
 #define ONSET_K        2.0f  /* beyond austenite start it is noticed */
 #define PLACE_SD_K     3.0f
+#define SHIFT_BOUND_K  8.0f  /* 2.6 standard deviations of a declared transformation */
+#define CAPACITY_BOUND 1.25f /* the same of a heat capacity */
 #define COLD_SPAN_K    20.0f /* least, over which a coefficient is learnt */
 
 void spring_estimator_begin_heating(spring_estimator_t *e, uint8_t k)
@@ -71,11 +73,26 @@ static void see_finish(const spring_estimator_t *e, spring_belief_t *b, thermal_
                      PLACE_SD_K, SPRING_PHASE_AUSTENITE);
 }
 
+/* A spring that is known to show its transformation and has not begun to is not as hot as that: the
+ * model is held there, until even the coldest and heaviest spring would have come so far. */
+static void hold_back(const spring_belief_t *b, thermal_model_t *model, uint8_t k)
+{
+    const float onset_c = spring_transformation(model, k).austenite_start_c + ONSET_K;
+    const float most_k = (onset_c + SHIFT_BOUND_K - spring_ambient_c(model)) * CAPACITY_BOUND;
+    if (b->possible == SPRING_PHASE_MARTENSITE && b->learnt.austenite_ohm > 0.0f && !b->blind &&
+        b->heat_k < most_k && spring_now_c(model, k) > onset_c) {
+        spring_set_temperature(model, k, onset_c, SPRING_PHASE_MARTENSITE);
+    }
+}
+
 /* Change of resistance over heat, a step at a time: more than any temperature coefficient makes is
  * a transformation, whatever its sign. */
 void spring_heating_watch(const spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model,
                           uint8_t k)
 {
+    if (b->heating) {
+        hold_back(b, model, k);
+    }
     if (!b->heating || b->current_a < STRONG_A || b->possible == SPRING_PHASE_AUSTENITE ||
         b->possible == SPRING_PHASE_ANY || b->settling != 0) {
         b->mark_ohm = 0.0f;

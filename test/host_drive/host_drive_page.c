@@ -51,8 +51,7 @@ static void every_limit_is_there_with_its_bit(void)
         {DRIVE_POLICY_LIMIT_SAFETY, "safety"},     {DRIVE_POLICY_LIMIT_CURRENT, "current"},
         {DRIVE_POLICY_LIMIT_SUPPLY, "supply"},     {DRIVE_POLICY_LIMIT_TEMPERATURE, "temperature"},
         {DRIVE_POLICY_LIMIT_UNDRIVEN, "undriven"}, {DRIVE_POLICY_LIMIT_OVERLOAD, "overload"},
-        {DRIVE_POLICY_LIMIT_TRIP, "trip"},         {DRIVE_POLICY_LIMIT_BLIND, "blind"},
-        {DRIVE_POLICY_LIMIT_COOLING, "cooling"},   {DRIVE_POLICY_LIMIT_AWAY, "away"}};
+        {DRIVE_POLICY_LIMIT_TRIP, "trip"},         {DRIVE_POLICY_LIMIT_BLIND, "blind"}};
     for (unsigned k = 0; k < sizeof limits / sizeof limits[0]; k++) {
         char wanted[40];
         (void)snprintf(wanted, sizeof wanted, "| %u | `%s` |", (unsigned)limits[k].bit,

@@ -1,5 +1,5 @@
-/* The drive policy by what it does: to springs as they are, and where a limit is meant, by what it
- * is told of them. */
+/* The drive policy by what it does: to springs as they are, and where a limit is meant, by what it is
+ * told of them. */
 #include <stddef.h>
 #include <stdio.h>
 #include <string.h>
@@ -9,7 +9,7 @@
 
 #define RESERVED_MA   14800u /* supply 15 A less the default reserve */
 #define FULL_BOOST_MA 3000u
-#define TURN_TICKS    13u /* in which each spring is decided on once, rounded up */
+#define TURN_TICKS    13u    /* in which each spring is decided on once, rounded up */
 
 static char where[120];
 
@@ -76,6 +76,20 @@ static void held_spring_stays_on_near_martensite_start(void)
     }
 }
 
+static void spring_that_has_lost_its_phase_is_heated_back(void)
+{
+    begin_cold(1, 2);
+    level[0] = 1000;
+    (void)run(200.0);
+    truth[0].shift_k = 8.0; /* a touch */
+    (void)run(30.0);
+    TEST_ASSERT_TRUE(truth[0].austenite < 0.95); /* it did lose */
+    (void)run(60.0);
+    (void)snprintf(where, sizeof where, "%.1f degC, %.3f", truth[0].temperature_c,
+                   truth[0].austenite);
+    TEST_ASSERT_TRUE_MESSAGE(truth[0].austenite > 0.95, where);
+}
+
 static void resistance_without_a_change_is_driven_by_the_model_and_said(void)
 {
     begin_cold(1, 2);
@@ -129,7 +143,7 @@ static void two_springs_hold_by_the_hand_computed_inverse(void)
     /* 60 K x (5.8 + 0.586) mW/K = 0.38316 W through 0.175 ohm: 1.4797 A */
     TEST_ASSERT_UINT16_WITHIN(4, 1480, target_ma[0]);
     thermal_model_set_temperature(&model, 1, 30 * 128); /* 50 K x 0.586 mW/K: 0.3773 W, 1.4683 A */
-    decisions(40u * TURN_TICKS);                        /* that jump is no rise any more */
+    decisions(40u * TURN_TICKS); /* that jump is no rise any more */
     TEST_ASSERT_UINT16_WITHIN(4, 1468, target_ma[0]);
 }
 
@@ -291,6 +305,26 @@ static void budget_holds_in_every_tick_whatever_is_asked(void)
     TEST_ASSERT_TRUE(thermal_model_is_consistent(&model));
 }
 
+static void policy_switch_never_jumps(void)
+{
+    parameters.dither_ma = 0;
+    begin_cold(3, 3);
+    level[0] = level[4] = level[5] = 1000;
+    for (unsigned at = 1; at < 300; at += 37) {
+        decisions(at);
+        uint16_t last[SPRINGS];
+        parameters.policy ^= 1u;
+        TEST_ASSERT_TRUE(drive_policy_apply(&policy, &parameters, &model, NULL));
+        for (unsigned n = 0; n < 60; n++) {
+            memcpy(last, target_ma, sizeof last);
+            (void)decide();
+            for (uint8_t k = 0; k < SPRINGS; k++) {
+                TEST_ASSERT_UINT16_WITHIN(20, last[k], target_ma[k]);
+            }
+        }
+    }
+}
+
 static void parameters_outside_their_range_are_refused_whole(void)
 {
     begin_cold(3, 3);
@@ -315,6 +349,7 @@ int main(void)
     UNITY_BEGIN();
     RUN_TEST(after_power_on_it_waits_says_so_and_then_holds_all_nine);
     RUN_TEST(held_spring_stays_on_near_martensite_start);
+    RUN_TEST(spring_that_has_lost_its_phase_is_heated_back);
     RUN_TEST(resistance_without_a_change_is_driven_by_the_model_and_said);
     RUN_TEST(level_is_held);
     RUN_TEST(spring_that_cannot_get_there_is_said_to_be_away);
@@ -327,6 +362,7 @@ int main(void)
     RUN_TEST(spring_just_released_is_no_false_actuation);
     RUN_TEST(overload_takes_the_excess_away_in_time);
     RUN_TEST(budget_holds_in_every_tick_whatever_is_asked);
+    RUN_TEST(policy_switch_never_jumps);
     RUN_TEST(parameters_outside_their_range_are_refused_whole);
     run_limit_tests();
     return UNITY_END();

@@ -53,7 +53,8 @@ static double share(double from_c, double to_c)
 
 static void live(double power_w)
 {
-    const double heat_j = (power_w - truth.loss_w_per_k * (truth.temperature_c - 20.0)) * TICK_S;
+    const double heat_j =
+        (power_w - truth.loss_w_per_k * (truth.temperature_c - 20.0)) * TICK_S;
     const double formed = share(88.0, 98.0);
     const double kept = share(68.0, 78.0);
     const bool transforms = (heat_j > 0.0 && formed >= truth.austenite && formed < 1.0 &&
@@ -147,7 +148,8 @@ double hold_current_a(double margin_k)
     const float target_c = spring_transformation(&model, 0).martensite_start_c + (float)margin_k;
     const float now_c = (float)thermal_model_temperature_c7(&model, 0) / 128.0f;
     const float power_w = spring_estimator_hold_w(&estimator, &model, 0, target_c) +
-                          fmaxf(target_c - now_c, -20.0f) * estimator.heat_capacity_j_per_k / 4.0f;
+                          fmaxf(target_c - now_c, -20.0f) *
+                              estimator.heat_capacity_j_per_k / 4.0f;
     const unsigned place = count % 32u;
     const double dither_a = 0.3 * ((double)(place < 16u ? place : 31u - place) / 16.0 - 0.5);
     return fmax(1e-3 * spring_estimator_current_ma(&estimator, 0, power_w) + dither_a, 0.4);

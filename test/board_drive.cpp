@@ -1,0 +1,323 @@
+/* The drive policy as it is flashed: what the springs of a plant do when the console asks for it.
+ */
+#include <algorithm>
+#include <cmath>
+
+#include "board_test.h"
+
+using namespace board_test;
+
+namespace
+{
+
+constexpr unsigned SPRINGS = BOARD_CHANNELS;
+constexpr unsigned CENTRE = 4;
+constexpr double SUPPLY_A = 15.0;
+constexpr unsigned BUDGET_MA = 14800; /* less the default reserve */
+
+/* A board around the paper's springs, with their phase, under precompensate; with the hint `model
+ * cold` (boot), for tests that are not about the beginning. */
+std::unique_ptr<rig> powered(const char *settings = "")
+{
+    auto mega = std::make_unique<rig>();
+    plant_t *plant = mega->plant.get();
+    TEST_ASSERT_EQUAL(PLANT_OK, plant_set_effect(plant, "latent_heat", true));
+    TEST_ASSERT_EQUAL(PLANT_OK, plant_set_effect(plant, "resistance_phase", true));
+    mega->boot();
+    mega->expect_ok("policy precompensate");
+    std::string line;
+    for (const char *c = settings; *c != '\0'; ++c) {
+        if (*c == ' ') {
+            mega->expect_ok(line);
+            line.clear();
+        } else {
+            line += *c;
+        }
+    }
+    if (!line.empty()) {
+        mega->expect_ok(line);
+    }
+    return mega;
+}
+
+double temperature(const rig &mega, unsigned k)
+{
+    return plant_temperature_c(mega.plant.get(), static_cast<int>(k));
+}
+
+double phase(const rig &mega, unsigned k)
+{
+    return plant_austenite(mega.plant.get(), static_cast<int>(k));
+}
+
+/* One control tick; what is asked of the supply and what flows stay below its limits. */
+board_view_t tick(rig &mega)
+{
+    mega.run_ms(CONTROLLER_TICK_MS);
+    const board_view_t seen = mega.view();
+    unsigned target_ma = 0;
+    int measured_ma = 0;
+    double flowing_a = 0.0;
+    for (unsigned k = 0; k < SPRINGS; ++k) {
+        target_ma += seen.spring[k].target_ma;
+        measured_ma += seen.spring[k].measured_ma;
+        flowing_a += board_current_a(mega.raw(), k);
+    }
+    TEST_ASSERT_LESS_OR_EQUAL_UINT(BUDGET_MA, target_ma);
+    TEST_ASSERT_LESS_OR_EQUAL_INT(static_cast<int>(1000.0 * SUPPLY_A), measured_ma);
+    TEST_ASSERT_TRUE(flowing_a <= SUPPLY_A);
+    return seen;
+}
+
+/* Advances, and gives the highest temperature of any spring. */
+double run(rig &mega, double seconds)
+{
+    double highest_c = -100.0;
+    for (long n = std::lround(seconds * 1000.0 / CONTROLLER_TICK_MS); n > 0; --n) {
+        tick(mega);
+        for (unsigned k = 0; k < SPRINGS; ++k) {
+            highest_c = std::max(highest_c, temperature(mega, k));
+        }
+    }
+    return highest_c;
+}
+
+void heats_then_holds_above_martensite_start_then_lets_go()
+{
+    auto mega = powered("$unsure_margin_k=3");
+    mega->expect_ok("on 5");
+    TEST_ASSERT_TRUE(run(*mega, 30.0) < 110.0);
+    TEST_ASSERT_TRUE(phase(*mega, CENTRE) >= 0.99);
+    run(*mega, 25.0); /* it coasts down to the band */
+    for (int n = 0; n < 5; ++n) {
+        run(*mega, 2.0);
+        TEST_ASSERT_EQUAL_UINT8(DRIVE_POLICY_STAGE_HOLD, mega->view().spring[CENTRE].stage);
+        TEST_ASSERT_TRUE(phase(*mega, CENTRE) >= 0.98);
+        TEST_ASSERT_TRUE(temperature(*mega, CENTRE) > 77.0);
+        TEST_ASSERT_TRUE(temperature(*mega, CENTRE) < 84.0);
+        TEST_ASSERT_DOUBLE_WITHIN(3.0, temperature(*mega, CENTRE),
+                                  mega->view().spring[CENTRE].temperature_c7 / 128.0);
+    }
+    mega->expect_ok("off 5");
+    mega->run_ms(2.0 * CONTROLLER_TICK_MS);
+    TEST_ASSERT_TRUE(board_all_off(mega->raw()));
+    run(*mega, 45.0);
+    TEST_ASSERT_TRUE(phase(*mega, CENTRE) <= 0.01);
+}
+
+/* What the README says to type, and nothing else: a first start, nothing learnt, no hint. */
+void pattern_of_the_readme_is_there_after_power_on()
+{
+    auto mega = std::make_unique<rig>();
+    plant_t *plant = mega->plant.get();
+    TEST_ASSERT_EQUAL(PLANT_OK, plant_set_effect(plant, "latent_heat", true));
+    TEST_ASSERT_EQUAL(PLANT_OK, plant_set_effect(plant, "resistance_phase", true));
+    mega->boot(false);
+    mega->expect_ok("pattern 111101111");
+    mega->expect_ok("policy precompensate");
+    run(*mega, 2.0);
+    TEST_ASSERT_EQUAL_UINT16(0, mega->view().spring[0].target_ma);
+    const std::string said = mega->say("model");
+    TEST_ASSERT_TRUE_MESSAGE(contains(said, "cooling"), said.c_str());
+    TEST_ASSERT_TRUE(run(*mega, 178.0) < 115.0);
+    for (unsigned k = 0; k < SPRINGS; ++k) {
+        TEST_ASSERT_TRUE(k == CENTRE ? phase(*mega, k) < 0.05 : phase(*mega, k) >= 0.95);
+    }
+}
+
+void boosts_of_nine_are_in_turn_within_the_supply()
+{
+    auto mega = powered();
+    mega->expect_ok("on all");
+    run(*mega, 4.0); /* currents have risen */
+    const board_view_t seen = mega->view();
+    unsigned full = 0, waiting = 0;
+    for (const board_view_spring_t &spring : seen.spring) {
+        full += spring.target_ma > 2900;
+        waiting += spring.target_ma == 0;
+        if (spring.target_ma < 2900) {
+            TEST_ASSERT_BITS_HIGH(DRIVE_POLICY_LIMIT_SUPPLY, spring.limits);
+            TEST_ASSERT_UINT_WITHIN(30, 3000, spring.wanted_ma);
+        }
+    }
+    TEST_ASSERT_EQUAL_UINT(4, full); /* of 14.8 A; what is left goes to one more */
+    TEST_ASSERT_EQUAL_UINT(4, waiting);
+    TEST_ASSERT_TRUE(run(*mega, 76.0) < 110.0);
+    for (unsigned k = 0; k < SPRINGS; ++k) {
+        TEST_ASSERT_TRUE(phase(*mega, k) >= 0.98);
+        TEST_ASSERT_EQUAL_UINT8(SAFETY_FAULT_NONE, mega->view().spring[k].fault);
+    }
+    TEST_ASSERT_EQUAL_UINT8(SAFETY_FAULT_NONE, mega->view().board_fault);
+}
+
+void half_a_level_is_half_a_phase()
+{
+    auto mega = powered();
+    mega->expect_ok("on 1 50");
+    run(*mega, 45.0);
+    for (int n = 0; n < 3; ++n) {
+        run(*mega, 5.0);
+        TEST_ASSERT_DOUBLE_WITHIN(0.12, 0.5, phase(*mega, 0));
+        TEST_ASSERT_BITS_LOW(DRIVE_POLICY_LIMIT_BLIND, mega->view().spring[0].limits);
+    }
+}
+
+void own_temperature_derates_then_trips_until_cleared()
+{
+    auto mega = powered("$temperature_limit_c=60 $trip_time_s=2");
+    mega->expect_ok("on 1");
+    run(*mega, 2.0);
+    TEST_ASSERT_BITS_LOW(DRIVE_POLICY_LIMIT_TEMPERATURE, mega->view().spring[0].limits);
+    TEST_ASSERT_TRUE(run(*mega, 15.0) < 60.0);
+    TEST_ASSERT_TRUE(temperature(*mega, 0) > 52.0); /* derated, not off */
+    const board_view_spring_t derated = mega->view().spring[0];
+    TEST_ASSERT_BITS_HIGH(DRIVE_POLICY_LIMIT_TEMPERATURE, derated.limits);
+    TEST_ASSERT_TRUE(derated.target_ma > 500 && derated.target_ma < 2000);
+    TEST_ASSERT_UINT_WITHIN(30, 3000, derated.wanted_ma);
+    const std::string said = mega->say("model");
+    TEST_ASSERT_TRUE_MESSAGE(contains(said, "A, limits temperature: 1."), said.c_str());
+    TEST_ASSERT_TRUE_MESSAGE(contains(said, " A less"), said.c_str());
+    mega->expect_ok("telemetry csv 5");
+    mega->board.take_output();
+    run(*mega, 2.0);
+    const std::string status = mega->board.take_output();
+    TEST_ASSERT_TRUE_MESSAGE(contains(status, "\r\n<limits|spring:1|t:"), status.c_str());
+    TEST_ASSERT_TRUE_MESSAGE(contains(status, "|temperature|cut_a:1."), status.c_str());
+    TEST_ASSERT_EQUAL_UINT(status.find("<limits"), status.rfind("<limits")); /* told once */
+
+    mega->expect_ok("$temperature_limit_c=40");
+    run(*mega, 1.0);
+    TEST_ASSERT_EQUAL_UINT16(0, mega->view().spring[0].target_ma);
+    TEST_ASSERT_EQUAL_UINT8(SAFETY_FAULT_NONE, mega->view().spring[0].fault);
+    run(*mega, 2.0);
+    TEST_ASSERT_EQUAL_UINT8(SAFETY_FAULT_LIMIT_TRIP, mega->view().spring[0].fault);
+    const std::string tripped = mega->board.take_output();
+    TEST_ASSERT_TRUE_MESSAGE(contains(tripped, "|temperature|cut_a:3.000>\r\n"), tripped.c_str());
+    TEST_ASSERT_TRUE_MESSAGE(contains(tripped, ",fault_14\r\n"), tripped.c_str());
+    mega->expect_ok("telemetry off");
+    TEST_ASSERT_TRUE(contains(mega->say("faults"), "limit_trip"));
+
+    mega->expect_ok("$temperature_limit_c=110"); /* the cause is gone, the latch stays */
+    run(*mega, 1.0);
+    TEST_ASSERT_EQUAL_UINT16(0, mega->view().spring[0].target_ma);
+    TEST_ASSERT_EQUAL_STRING("error:11", mega->answer("on 1").substr(0, 8).c_str());
+    mega->expect_ok("clear");
+    mega->expect_ok("on 1");
+    run(*mega, 2.0);
+    TEST_ASSERT_TRUE(mega->view().spring[0].target_ma > 2900);
+}
+
+void springs_around_an_undriven_one_derate_before_it_acts()
+{
+    auto mega = powered("$undriven_margin_k=50"); /* 38 degC */
+    mega->expect_ok("pattern 111101111");
+    bool limited = false;
+    for (int n = 0; n < 50 * 50; ++n) {
+        const board_view_t seen = tick(*mega);
+        for (unsigned k = 0; k < SPRINGS; ++k) {
+            limited |= k != CENTRE && seen.spring[k].target_ma < seen.spring[k].wanted_ma &&
+                       (seen.spring[k].limits & DRIVE_POLICY_LIMIT_UNDRIVEN) != 0;
+        }
+        TEST_ASSERT_EQUAL_UINT16(0, seen.spring[CENTRE].target_ma);
+        TEST_ASSERT_TRUE(temperature(*mega, CENTRE) < 39.0);
+    }
+    TEST_ASSERT_TRUE(limited);
+    TEST_ASSERT_TRUE(temperature(*mega, CENTRE) > 27.0); /* derated by its upper bound, not given up */
+}
+
+/* After `policy` no target moves by more than 20 mA in a tick until all have arrived. */
+void change_policy(rig &mega, const char *line, int ticks)
+{
+    board_view_t before = mega.view();
+    mega.board.take_output();
+    mega.board.send(line);
+    for (int n = 0; n < ticks; ++n) {
+        const board_view_t now = tick(mega);
+        for (unsigned k = 0; k < SPRINGS; ++k) {
+            TEST_ASSERT_INT_WITHIN(20, before.spring[k].target_ma, now.spring[k].target_ma);
+        }
+        before = now;
+    }
+    TEST_ASSERT_TRUE(contains(mega.board.take_output(), "ok"));
+}
+
+void policy_is_switched_without_a_jump()
+{
+    auto mega = powered("$dither_a=0.1");
+    mega->expect_ok("pattern 110100001");
+    run(*mega, 10.0); /* four heat */
+    change_policy(*mega, "policy open\n", 100);
+    for (unsigned k : {0u, 1u, 3u, 8u}) {
+        TEST_ASSERT_EQUAL_UINT16(1500, mega->view().spring[k].target_ma);
+    }
+    run(*mega, 1.0);
+    change_policy(*mega, "policy precompensate\n", 70);
+    run(*mega, 20.0); /* they hold */
+    change_policy(*mega, "policy open\n", 100);
+    change_policy(*mega, "policy precompensate\n", 30);
+    for (unsigned k = 0; k < SPRINGS; ++k) {
+        TEST_ASSERT_EQUAL_UINT8(SAFETY_FAULT_NONE, mega->view().spring[k].fault);
+    }
+}
+
+void readings_lost_in_a_hold_cost_neither_safety_nor_the_neighbours()
+{
+    auto mega = powered();
+    mega->expect_ok("pattern 100010001");
+    run(*mega, 35.0);
+    for (unsigned k : {0u, 4u, 8u}) {
+        TEST_ASSERT_EQUAL_UINT8(DRIVE_POLICY_STAGE_HOLD, mega->view().spring[k].stage);
+    }
+    /* single readings: below what a fault needs, the hold goes on */
+    for (int n = 0; n < 30; ++n) {
+        const board_fault_t fault = n % 2 == 0 ? BOARD_FAULT_NACK : BOARD_FAULT_STALE;
+        board_set_fault(mega->raw(), fault, CENTRE, true);
+        tick(*mega);
+        board_set_fault(mega->raw(), fault, CENTRE, false);
+        run(*mega, 0.08);
+    }
+    TEST_ASSERT_EQUAL_UINT8(SAFETY_FAULT_NONE, mega->view().spring[CENTRE].fault);
+    TEST_ASSERT_TRUE(phase(*mega, CENTRE) >= 0.98);
+    TEST_ASSERT_TRUE(temperature(*mega, CENTRE) < 100.0);
+    /* for good: that spring is off with the fault that says why, the others are held */
+    board_set_fault(mega->raw(), BOARD_FAULT_NACK, CENTRE, true);
+    board_set_fault(mega->raw(), BOARD_FAULT_STALE, 8, true);
+    run(*mega, 1.0);
+    TEST_ASSERT_EQUAL_UINT8(SAFETY_FAULT_SENSOR_ABSENT, mega->view().spring[CENTRE].fault);
+    TEST_ASSERT_EQUAL_UINT8(SAFETY_FAULT_SENSOR_STALE, mega->view().spring[8].fault);
+    TEST_ASSERT_TRUE(board_duty(mega->raw(), CENTRE) == 0.0 && board_duty(mega->raw(), 8) == 0.0);
+    TEST_ASSERT_BITS_HIGH(DRIVE_POLICY_LIMIT_SAFETY, mega->view().spring[CENTRE].limits);
+    run(*mega, 2.0);
+    TEST_ASSERT_EQUAL_UINT8(DRIVE_POLICY_STAGE_HOLD, mega->view().spring[0].stage);
+    TEST_ASSERT_TRUE(phase(*mega, 0) >= 0.98);
+    /* repaired before they have cooled: the hold is taken up again */
+    board_set_fault(mega->raw(), BOARD_FAULT_NACK, CENTRE, false);
+    board_set_fault(mega->raw(), BOARD_FAULT_STALE, 8, false);
+    run(*mega, 0.1);
+    mega->expect_ok("clear");
+    mega->expect_ok("pattern 100010001");
+    TEST_ASSERT_TRUE(run(*mega, 20.0) < 115.0);
+    for (unsigned k : {0u, 4u, 8u}) {
+        TEST_ASSERT_TRUE(phase(*mega, k) >= 0.98);
+    }
+}
+
+} // namespace
+
+void setUp() {}
+void tearDown() {}
+
+int main()
+{
+    need_elf(elf());
+    UNITY_BEGIN();
+    RUN_TEST(heats_then_holds_above_martensite_start_then_lets_go);
+    RUN_TEST(pattern_of_the_readme_is_there_after_power_on);
+    RUN_TEST(boosts_of_nine_are_in_turn_within_the_supply);
+    RUN_TEST(half_a_level_is_half_a_phase);
+    RUN_TEST(own_temperature_derates_then_trips_until_cleared);
+    RUN_TEST(springs_around_an_undriven_one_derate_before_it_acts);
+    RUN_TEST(policy_is_switched_without_a_jump);
+    RUN_TEST(readings_lost_in_a_hold_cost_neither_safety_nor_the_neighbours);
+    return UNITY_END();
+}
