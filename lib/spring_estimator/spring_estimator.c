@@ -322,10 +322,12 @@ static void look(spring_belief_t *b, thermal_model_t *model, uint8_t k)
         phase = SPRING_PHASE_AUSTENITE;
     }
     const uint8_t fresh = b->fresh;
+    const bool heating = b->heating;
     begin(b, 0.5f * (low_c + high_c), UNIFORM_SD * (high_c - low_c), phase);
     spring_set_temperature(model, k, 0.5f * (low_c + high_c), phase);
     b->last_c = spring_now_c(model, k);
     b->fresh = fresh;
+    b->heating = heating;
 }
 
 /* Heat capacity where the hottest possible spring is: on its way it gives off its latent heat. */
