@@ -7,9 +7,11 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "circuit_check.h"
 #include "current_control.h"
 #include "drive_policy.h"
 #include "safety.h"
+#include "temperature_ceiling.h"
 #include "thermal_model.h"
 
 #ifdef __cplusplus
@@ -66,11 +68,16 @@ typedef struct {
     uint8_t model_tick;      /* ticks since the last model step */
     uint8_t fan_percent;     /* wanted */
     uint8_t resistance_turn; /* whose resistance the current loop is told in the next tick */
+    uint8_t floor_turn; /* of the round in which each spring's circuit and ceiling are judged */
     uint16_t level_permille[CONTROLLER_MAX_SPRINGS];
     uint16_t duty[CONTROLLER_MAX_SPRINGS];
     int16_t measured_ma[CONTROLLER_MAX_SPRINGS]; /* last valid reading */
     int16_t measured_mv[CONTROLLER_MAX_SPRINGS];
     uint32_t power_sum_uw[CONTROLLER_MAX_SPRINGS]; /* over the ticks of the running model step */
+    temperature_ceiling_t ceiling;
+    circuit_check_t circuit[CONTROLLER_MAX_SPRINGS];
+    uint32_t heat_sum_uw[CONTROLLER_MAX_SPRINGS]; /* over the ticks of the ceiling's running step */
+    uint16_t duty_sum[CONTROLLER_MAX_SPRINGS];    /* the same */
 } controller_t;
 
 /* The paper's spring and 3 x 3 array on the reference board. */
@@ -140,7 +147,7 @@ uint16_t controller_austenite_permille(const controller_t *controller, uint8_t s
 safety_fault_t controller_fault(const controller_t *controller, uint8_t spring);
 safety_fault_t controller_board_fault(const controller_t *controller);
 uint16_t controller_limits(const controller_t *controller,
-                          uint8_t spring); /* drive_policy_limit_t bits */
+                           uint8_t spring); /* drive_policy_limit_t bits */
 /* By how much they cut the spring's target. */
 uint16_t controller_cut_ma(const controller_t *controller, uint8_t spring);
 bool controller_is_locked(const controller_t *controller);

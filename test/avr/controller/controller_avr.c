@@ -193,7 +193,6 @@ static void drive(drive_policy_kind_t policy)
 int main(void)
 {
     controller_settings_default(&settings);
-    settings.policy.probe_period_s = 1;
     drive(DRIVE_POLICY_OPEN);
     drive(DRIVE_POLICY_PRECOMPENSATE);
     faults(DRIVE_POLICY_OPEN);
