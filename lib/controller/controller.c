@@ -171,11 +171,15 @@ static uint32_t take_sensors(controller_t *controller, const controller_sensor_t
 }
 
 /* What no belief can talk away: is it a circuit, and how hot could it be by now? */
-static void judge(controller_t *controller, uint8_t k)
+static void judge_circuit(controller_t *controller, uint8_t k)
 {
     if (circuit_check_judge(&controller->circuit[k], &controller->current.parameters)) {
         safety_trip(&controller->safety, k, SAFETY_FAULT_SENSOR_MISMATCH);
     }
+}
+
+static void raise_ceiling(controller_t *controller, uint8_t k)
+{
     const float share = 1.0f / (float)CIRCUIT_CHECK_TICKS;
     const float measured_w = 1e-6f * share * (float)controller->heat_sum_uw[k];
     const float driven_w =
@@ -192,13 +196,18 @@ static void judge(controller_t *controller, uint8_t k)
     }
 }
 
-/* In the ticks between two steps of the model. */
+/* In the ticks between two steps of the model, half a round apart for each spring. */
 static void take_floor_turn(controller_t *controller)
 {
-    for (uint16_t k = controller->floor_turn; k < controller->springs; k += FLOOR_TURNS) {
-        judge(controller, (uint8_t)k);
+    const uint8_t turn = controller->floor_turn;
+    for (uint16_t k = turn; k < controller->springs; k += FLOOR_TURNS) {
+        judge_circuit(controller, (uint8_t)k);
     }
-    controller->floor_turn = (uint8_t)((controller->floor_turn + 1u) % FLOOR_TURNS);
+    for (uint16_t k = (turn + FLOOR_TURNS / 2u) % FLOOR_TURNS; k < controller->springs;
+         k += FLOOR_TURNS) {
+        raise_ceiling(controller, (uint8_t)k);
+    }
+    controller->floor_turn = (uint8_t)((turn + 1u) % FLOOR_TURNS);
 }
 
 static void step_model(controller_t *controller, const controller_inputs_t *inputs)
