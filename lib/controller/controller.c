@@ -203,7 +203,7 @@ static void take_floor_turn(controller_t *controller)
     for (uint16_t k = turn; k < controller->springs; k += FLOOR_TURNS) {
         judge_circuit(controller, (uint8_t)k);
     }
-    for (uint16_t k = (turn + FLOOR_TURNS / 2u) % FLOOR_TURNS; k < controller->springs;
+    for (uint16_t k = (uint16_t)((turn + FLOOR_TURNS / 2u) % FLOOR_TURNS); k < controller->springs;
          k += FLOOR_TURNS) {
         raise_ceiling(controller, (uint8_t)k);
     }

@@ -67,15 +67,18 @@ void temperature_ceiling_step(temperature_ceiling_t *ceiling, const thermal_mode
     const float now_c = ceiling->temperature_c[k];
     const float flow_w = hold_w(model, k, now_c);
     const float stiffness_w_per_k = 0.125f * (hold_w(model, k, now_c + 8.0f) - flow_w);
-    float colder_w = 0.0f; /* what the model's neighbours take beyond those of the ceiling */
+    /* What the model's neighbours take beyond those of the ceiling, uW / 128: a spring's couplings
+     * and the span of temperatures keep it within 32 bits. */
+    int32_t colder = 0;
     for (uint8_t j = 0; j < model->springs; j++) {
         const uint16_t coupling_uw_per_k = thermal_model_coupling_uw_per_k(model, k, j);
         if (coupling_uw_per_k != 0) {
-            colder_w +=
-                1e-6f * (float)coupling_uw_per_k *
-                (ceiling->temperature_c[j] - from_c7(thermal_model_temperature_c7(model, j)));
+            colder +=
+                (int32_t)coupling_uw_per_k * ((int16_t)(ceiling->temperature_c[j] * 128.0f) -
+                                              (int32_t)thermal_model_temperature_c7(model, j));
         }
     }
+    const float colder_w = (float)colder * (1e-6f / 128.0f);
     /* stable whatever the heat capacity: the flow's own change is taken at the end of the step */
     const float gain_k = (power_w - flow_w + colder_w) * TEMPERATURE_CEILING_TURN_S /
                          (capacity_j_per_k + stiffness_w_per_k * TEMPERATURE_CEILING_TURN_S);
