@@ -9,6 +9,7 @@
 #define TICKS_PER_STEP  (MODEL_STEP_MS / CONTROLLER_TICK_MS)
 #define TICKS_PER_S     (1000u / CONTROLLER_TICK_MS)
 #define SILENT_MOST     (3600ul * TICKS_PER_S) /* host_timeout_s at its most */
+#define FLOOR_TURNS     (CIRCUIT_CHECK_TICKS - CIRCUIT_CHECK_TICKS / TICKS_PER_STEP)
 #define CURRENT_MOST_MA 4095 /* the sensor ends at 3200: a step's sum of power fits 32 bits */
 
 void controller_settings_default(controller_settings_t *settings)
@@ -68,6 +69,7 @@ static void start(controller_t *controller, const controller_settings_t *setting
     (void)safety_init(&controller->safety, &settings->safety, controller->springs, NULL);
     (void)drive_policy_init(&controller->policy, &settings->policy, model, NULL);
     tell_resistances(controller);
+    temperature_ceiling_set(&controller->ceiling, model);
 }
 
 bool controller_init(controller_t *controller, const controller_settings_t *settings,
@@ -147,7 +149,12 @@ static uint32_t take_sensors(controller_t *controller, const controller_sensor_t
             .expected_ma = current_control_reference_ma(&controller->current, k),
             .temperature_c7 = thermal_model_temperature_c7(&controller->model, k)};
         safety_tick_spring(&controller->safety, k, &sample);
-        valid[k] = sensor[k].status == CONTROLLER_SENSOR_OK;
+        valid[k] = sensor[k].status == CONTROLLER_SENSOR_OK &&
+                   !safety_is_frozen(&controller->safety, k, sensor[k].current_ma);
+        circuit_check_take(&controller->circuit[k], controller->current.fixed_mohm,
+                           controller->duty[k], valid[k], sensor[k].current_ma,
+                           sensor[k].voltage_mv);
+        controller->duty_sum[k] = (uint16_t)(controller->duty_sum[k] + controller->duty[k]);
         if (valid[k]) {
             controller->measured_ma[k] = sensor[k].current_ma;
             controller->measured_mv[k] = sensor[k].voltage_mv;
@@ -155,12 +162,54 @@ static uint32_t take_sensors(controller_t *controller, const controller_sensor_t
             continue;
         }
         sum_ma += flowing_ma(controller->measured_ma[k]);
-        controller->power_sum_uw[k] +=
+        const uint32_t heating_uw =
             thermal_model_heating_uw(&controller->model, k, flowing_ma(controller->measured_ma[k]),
                                      positive_mv(controller->measured_mv[k]));
+        controller->power_sum_uw[k] += heating_uw;
+        controller->heat_sum_uw[k] += heating_uw;
     }
     safety_tick_board(&controller->safety, sum_ma);
     return sum_ma;
+}
+
+/* What no belief can talk away: is it a circuit, and how hot could it be by now? */
+static void judge_circuit(controller_t *controller, uint8_t k)
+{
+    if (circuit_check_judge(&controller->circuit[k], &controller->current.parameters)) {
+        safety_trip(&controller->safety, k, SAFETY_FAULT_SENSOR_MISMATCH);
+    }
+}
+
+static void raise_ceiling(controller_t *controller, uint8_t k)
+{
+    const float share = 1.0f / (float)CIRCUIT_CHECK_TICKS;
+    const float measured_w = 1e-6f * share * (float)controller->heat_sum_uw[k];
+    const float driven_w =
+        temperature_ceiling_power_w(&controller->model, &controller->current.parameters,
+                                    share * (float)controller->duty_sum[k]);
+    temperature_ceiling_step(&controller->ceiling, &controller->model, k,
+                             measured_w > driven_w ? measured_w : driven_w);
+    controller->heat_sum_uw[k] = 0;
+    controller->duty_sum[k] = 0;
+    const float trip_c = 0.01f * (float)controller->safety.parameters.temperature_trip_cc;
+    if (controller->ceiling.temperature_c[k] >
+        temperature_ceiling_trip_c(&controller->model, trip_c)) {
+        safety_trip(&controller->safety, k, SAFETY_FAULT_OVER_TEMPERATURE);
+    }
+}
+
+/* In the ticks between two steps of the model, half a round apart for each spring. */
+static void take_floor_turn(controller_t *controller)
+{
+    const uint8_t turn = controller->floor_turn;
+    for (uint16_t k = turn; k < controller->springs; k += FLOOR_TURNS) {
+        judge_circuit(controller, (uint8_t)k);
+    }
+    for (uint16_t k = (uint16_t)((turn + FLOOR_TURNS / 2u) % FLOOR_TURNS); k < controller->springs;
+         k += FLOOR_TURNS) {
+        raise_ceiling(controller, (uint8_t)k);
+    }
+    controller->floor_turn = (uint8_t)((turn + 1u) % FLOOR_TURNS);
 }
 
 static void step_model(controller_t *controller, const controller_inputs_t *inputs)
@@ -170,6 +219,7 @@ static void step_model(controller_t *controller, const controller_inputs_t *inpu
     controller->resistance_turn =
         (uint8_t)((controller->resistance_turn + 1u) % controller->springs);
     if (++controller->model_tick < TICKS_PER_STEP) {
+        take_floor_turn(controller);
         return;
     }
     controller->model_tick = 0;
@@ -229,7 +279,7 @@ static void drive(controller_t *controller, const bool valid[], uint32_t sum_ma)
                          controller->measured_ma, valid, may_rise, controller->duty);
     for (uint8_t k = 0; k < controller->springs; k++) {
         if ((drive_policy_limits(&controller->policy, k) & DRIVE_POLICY_LIMIT_TRIP) != 0) {
-            safety_trip_limit(&controller->safety, k);
+            safety_trip(&controller->safety, k, SAFETY_FAULT_LIMIT_TRIP);
         }
     }
 }
@@ -315,6 +365,7 @@ void controller_clear_faults(controller_t *controller)
 {
     controller_stop(controller);
     safety_clear(&controller->safety);
+    memset(controller->circuit, 0, sizeof controller->circuit);
     drive_policy_clear(&controller->policy);
 }
 
@@ -340,6 +391,7 @@ bool controller_set_model_state(controller_t *controller, const thermal_model_st
         return false;
     }
     spring_estimator_trust_model(&controller->policy.estimator, &controller->model);
+    temperature_ceiling_set(&controller->ceiling, &controller->model);
     tell_resistances(controller);
     return true;
 }
@@ -348,6 +400,7 @@ void controller_set_temperature(controller_t *controller, int16_t temperature_c7
 {
     thermal_model_reset(&controller->model, temperature_c7);
     spring_estimator_trust_model(&controller->policy.estimator, &controller->model);
+    temperature_ceiling_set(&controller->ceiling, &controller->model);
     tell_resistances(controller);
 }
 

@@ -7,9 +7,11 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "circuit_check.h"
 #include "current_control.h"
 #include "drive_policy.h"
 #include "safety.h"
+#include "temperature_ceiling.h"
 #include "thermal_model.h"
 
 #ifdef __cplusplus
@@ -67,11 +69,16 @@ typedef struct {
     uint8_t model_tick;      /* ticks since the last model step */
     uint8_t fan_percent;     /* wanted */
     uint8_t resistance_turn; /* whose resistance the current loop is told in the next tick */
+    uint8_t floor_turn; /* of the round in which each spring's circuit and ceiling are judged */
     uint16_t level_permille[CONTROLLER_MAX_SPRINGS];
     uint16_t duty[CONTROLLER_MAX_SPRINGS];
     int16_t measured_ma[CONTROLLER_MAX_SPRINGS]; /* last valid reading */
     int16_t measured_mv[CONTROLLER_MAX_SPRINGS];
     uint32_t power_sum_uw[CONTROLLER_MAX_SPRINGS]; /* over the ticks of the running model step */
+    temperature_ceiling_t ceiling;
+    circuit_check_t circuit[CONTROLLER_MAX_SPRINGS];
+    uint32_t heat_sum_uw[CONTROLLER_MAX_SPRINGS]; /* over the ticks of the ceiling's running step */
+    uint16_t duty_sum[CONTROLLER_MAX_SPRINGS];    /* the same */
 } controller_t;
 
 /* The paper's spring and 3 x 3 array on the reference board. */

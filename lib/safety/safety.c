@@ -136,6 +136,15 @@ static void count_electrical(safety_t *safety, safety_spring_t *spring, uint8_t 
     }
 }
 
+#define NOT_FROZEN INT16_MIN /* the sensor ends far above */
+
+bool safety_is_frozen(const safety_t *safety, uint8_t spring, int16_t current_ma)
+{
+    const safety_spring_t *s = &safety->spring[spring];
+    return s->fault == SAFETY_FAULT_SENSOR_MISMATCH && current_ma == s->frozen_ma &&
+           current_ma != NOT_FROZEN;
+}
+
 void safety_tick_spring(safety_t *safety, uint8_t spring, const safety_sample_t *sample)
 {
     safety_spring_t *s = &safety->spring[spring];
@@ -143,7 +152,10 @@ void safety_tick_spring(safety_t *safety, uint8_t spring, const safety_sample_t 
     uint8_t status = sample->sensor_status;
     if (status == 0) {
         s->sensor = 0;
-        count_electrical(safety, s, find_electrical(&safety->parameters, sample));
+        if (!safety_is_frozen(safety, spring, sample->current_ma)) {
+            s->frozen_ma = s->fault == SAFETY_FAULT_NONE ? sample->current_ma : NOT_FROZEN;
+            count_electrical(safety, s, find_electrical(&safety->parameters, sample));
+        }
     } else if (++s->sensor >= limit) { /* nothing is known: the electrical count stays */
         s->sensor = limit;
         latch(safety, s,
@@ -231,9 +243,14 @@ void safety_clear(safety_t *safety)
     memset(safety->spring, 0, sizeof safety->spring);
 }
 
-void safety_trip_limit(safety_t *safety, uint8_t spring)
+void safety_trip(safety_t *safety, uint8_t spring, safety_fault_t fault)
 {
-    latch(safety, &safety->spring[spring], SAFETY_FAULT_LIMIT_TRIP);
+    latch(safety, &safety->spring[spring], fault);
+}
+
+void safety_host_silent(safety_t *safety)
+{
+    latch_board(safety, SAFETY_FAULT_HOST_SILENT);
 }
 
 void safety_host_silent(safety_t *safety)

@@ -33,7 +33,7 @@ typedef enum {
     SAFETY_FAULT_SENSOR_BUS = 6,      /* I2C bus stuck or timed out */
     SAFETY_FAULT_SENSOR_STALE = 7,    /* no new conversions */
     SAFETY_FAULT_SENSOR_RESET = 8, /* the sensor lost its configuration and did not take it again */
-    SAFETY_FAULT_OVER_TEMPERATURE = 9, /* the model says so */
+    SAFETY_FAULT_OVER_TEMPERATURE = 9, /* of the model, or of the ceiling on it */
     SAFETY_FAULT_ON_TIME = 10,         /* on for longer than maximum_on_s */
     /* of the board: every spring is off until cleared */
     SAFETY_FAULT_STUCK_ON = 11,       /* current flows in a spring that is off: cut the supply */
@@ -55,6 +55,7 @@ typedef struct {
     uint8_t sensor;      /* ticks */
     uint8_t temperature; /* ticks */
     uint16_t on_s;
+    int16_t frozen_ma; /* after SAFETY_FAULT_SENSOR_MISMATCH, while the sensor shows nothing else */
 } safety_spring_t;
 
 typedef struct {
@@ -99,6 +100,10 @@ bool safety_apply(safety_t *safety, const safety_parameters_t *parameters, uint1
 void safety_tick_spring(safety_t *safety, uint8_t spring, const safety_sample_t *sample);
 void safety_tick_board(safety_t *safety, uint32_t sum_ma);
 
+/* The sensor of a spring with SAFETY_FAULT_SENSOR_MISMATCH has shown one current ever since, on and
+ * off alike: it is no reading, and no current in a spring that is off. */
+bool safety_is_frozen(const safety_t *safety, uint8_t spring, int16_t current_ma);
+
 /* True if and only if the output may be on: not locked, no board fault, no fault of this spring. */
 bool safety_allows(const safety_t *safety, uint8_t spring);
 
@@ -111,8 +116,9 @@ const char *safety_fault_name(safety_fault_t fault);
 /* Forgets all faults and counters. A condition that persists trips again after bad_samples ticks.
  * Not the lock. */
 void safety_clear(safety_t *safety);
-/* Latches SAFETY_FAULT_LIMIT_TRIP: the policy held this spring at nothing for too long. */
-void safety_trip_limit(safety_t *safety, uint8_t spring);
+/* Latches a fault of one spring that others have found, at once: SAFETY_FAULT_OVER_TEMPERATURE,
+ * _LIMIT_TRIP or _SENSOR_MISMATCH. */
+void safety_trip(safety_t *safety, uint8_t spring, safety_fault_t fault);
 /* Latches SAFETY_FAULT_HOST_SILENT: whoever asked for the springs has not been heard for too long.
  */
 void safety_host_silent(safety_t *safety);

@@ -571,6 +571,19 @@ int16_t thermal_model_ambient_c7(const thermal_model_t *model)
     return model->ambient_c7;
 }
 
+uint16_t thermal_model_coupling_uw_per_k(const thermal_model_t *model, uint8_t spring,
+                                         uint8_t other)
+{
+    const thermal_model_spring_t *a = &model->spring[spring];
+    const thermal_model_spring_t *b = &model->spring[other];
+    const int8_t down = (int8_t)(a->row - b->row);
+    const int8_t along = (int8_t)(a->column - b->column);
+    if (spring == other || down < -1 || down > 1 || along < -1 || along > 1) {
+        return 0;
+    }
+    return down == 0 || along == 0 ? model->orthogonal_uw_per_k : model->diagonal_uw_per_k;
+}
+
 int32_t thermal_model_power_to_hold_uw(const thermal_model_t *model, uint8_t spring,
                                        int16_t temperature_c7)
 {

@@ -184,6 +184,10 @@ uint32_t thermal_model_heating_uw(const thermal_model_t *model, uint8_t spring, 
 thermal_model_transformation_t thermal_model_transformation(const thermal_model_t *model,
                                                             uint8_t spring);
 int16_t thermal_model_ambient_c7(const thermal_model_t *model);
+/* Between two springs at the present fan; 0 where they are no neighbours. Both below the number of
+ * springs. O(1). */
+uint16_t thermal_model_coupling_uw_per_k(const thermal_model_t *model, uint8_t spring,
+                                         uint8_t other);
 
 /* Takes one spring to a temperature as if slowly: on the way its phase transforms as it would.
  * O(1). */

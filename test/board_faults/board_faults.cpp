@@ -109,6 +109,50 @@ void frozen_lying_and_swapped_sensors_show_what_they_should_not()
     TEST_ASSERT_EQUAL_DOUBLE(0.0, shown_a(*mega, 7));
 }
 
+/* The policy sweeps the current; the sensor answers, converts, and shows the same for ever. */
+void a_frozen_sensor_is_found_within_two_seconds_and_its_neighbours_go_on()
+{
+    auto mega = std::make_unique<rig>();
+    mega->boot();
+    mega->expect_ok("model cold");
+    mega->expect_ok("policy precompensate");
+    mega->expect_ok("on 1");
+    mega->expect_ok("on 5");
+    mega->run_ms(4000.0);
+    TEST_ASSERT_EQUAL_UINT8(SAFETY_FAULT_NONE, mega->view().spring[4].fault);
+    board_set_fault(mega->raw(), BOARD_FAULT_FREEZE, 4, true);
+    mega->run_ms(2000.0);
+    const board_view_t seen = mega->view();
+    TEST_ASSERT_EQUAL_INT(SAFETY_FAULT_SENSOR_MISMATCH, seen.spring[4].fault);
+    TEST_ASSERT_EQUAL_DOUBLE(0.0, board_duty(mega->raw(), 4));
+    TEST_ASSERT_EQUAL_INT(SAFETY_FAULT_NONE, seen.spring[0].fault);
+    TEST_ASSERT_TRUE(board_duty(mega->raw(), 0) > 0.0);
+}
+
+/* The near miss: both numbers off by as much as a bad sensor's may be. */
+void a_sensor_that_is_a_little_off_is_no_fault()
+{
+    auto mega = std::make_unique<rig>();
+    mega->boot();
+    mega->expect_ok("model cold");
+    mega->expect_ok("policy precompensate");
+    board_scale_sensor(mega->raw(), 4, 0.95, 1.05);
+    mega->expect_ok("on 1");
+    mega->expect_ok("on 5");
+    mega->run_ms(8000.0);
+    const board_view_t seen = mega->view();
+    TEST_ASSERT_EQUAL_INT(SAFETY_FAULT_NONE, seen.spring[4].fault);
+    TEST_ASSERT_TRUE(board_duty(mega->raw(), 4) > 0.0);
+}
+
+void a_sensor_that_shows_half_is_a_mismatch()
+{
+    auto mega = driven();
+    board_scale_sensor(mega->raw(), 4, 0.5, 0.5);
+    mega->run_ms(3000.0);
+    only(*mega, 4, SAFETY_FAULT_SENSOR_MISMATCH);
+}
+
 void a_stuck_bus_switches_everything_off_without_missing_the_watchdog()
 {
     auto mega = driven();
@@ -209,6 +253,9 @@ int main()
     RUN_TEST(a_sensor_that_does_not_answer_is_absent);
     RUN_TEST(a_sensor_that_converts_no_more_is_stale);
     RUN_TEST(frozen_lying_and_swapped_sensors_show_what_they_should_not);
+    RUN_TEST(a_frozen_sensor_is_found_within_two_seconds_and_its_neighbours_go_on);
+    RUN_TEST(a_sensor_that_is_a_little_off_is_no_fault);
+    RUN_TEST(a_sensor_that_shows_half_is_a_mismatch);
     RUN_TEST(a_stuck_bus_switches_everything_off_without_missing_the_watchdog);
     RUN_TEST(the_bus_comes_back_when_it_is_released);
     RUN_TEST(a_sensor_that_lost_its_configuration_gets_it_again);

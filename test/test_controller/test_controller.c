@@ -93,7 +93,6 @@ static void nothing_is_driven_without_a_command(void)
         run(1);
         TEST_ASSERT_TRUE(all_off());
     }
-    TEST_ASSERT_EQUAL_INT16(AMBIENT_C7, controller_temperature_c7(&controller, 4));
 }
 
 static void a_driven_spring_gets_its_current_and_only_that_one(void)
@@ -147,6 +146,7 @@ static void model_is_fed_with_the_measured_power_of_each_tick(void)
     thermal_model_t model;
     TEST_ASSERT_EQUAL(THERMAL_MODEL_OK, thermal_model_init(&model, &settings.model, NULL));
     thermal_model_reset(&model, AMBIENT_C7);
+    controller_set_temperature(&controller, AMBIENT_C7); /* else it could be warm */
     uint32_t power_uw[THERMAL_MODEL_MAX_SPRINGS] = {0};
     for (int n = 0; n < 2000;
          n++) { /* currents that no loop asked for: below what counts as stuck on */
@@ -286,6 +286,65 @@ static void hot_model_trips(void)
     run(settings.safety.bad_samples);
     TEST_ASSERT_EQUAL(SAFETY_FAULT_OVER_TEMPERATURE, controller_fault(&controller, 4));
     TEST_ASSERT_EQUAL_UINT16(0, outputs.duty[4]);
+}
+
+/* What is believed is cold for ever, what is measured goes on: the ceiling ends it. */
+static void ceiling_trips_whatever_is_believed(void)
+{
+    settings.policy.open_current_ma = 3000;
+    start();
+    controller_set_target(&controller, 4, 1000);
+    uint32_t ticks = 0;
+    while (controller_fault(&controller, 4) == SAFETY_FAULT_NONE && ticks < 50u * 300u) {
+        thermal_model_set_temperature(&controller.model, 4, 30 * 128);
+        run(1);
+        ticks++;
+    }
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_OVER_TEMPERATURE, controller_fault(&controller, 4));
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, controller_fault(&controller, 3));
+    TEST_ASSERT_EQUAL_UINT16(0, outputs.duty[4]);
+}
+
+/* The near miss: from the same cold belief, a current that keeps it below the trip for ever. */
+static void ceiling_lets_a_current_pass_that_cannot_overheat(void)
+{
+    settings.policy.open_current_ma = 1500;
+    start();
+    controller_set_target(&controller, 4, 1000);
+    for (uint32_t n = 0; n < 50u * 600u; n++) {
+        thermal_model_set_temperature(&controller.model, 4, 30 * 128);
+        run(1);
+    }
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, controller_fault(&controller, 4));
+}
+
+/* It answers, converts, and shows the same for ever. */
+static void frozen_sensor_is_found_within_two_seconds_and_stops_its_spring_alone(void)
+{
+    settings.policy.policy = DRIVE_POLICY_PRECOMPENSATE;
+    start();
+    controller_set_temperature(&controller, AMBIENT_C7); /* heats at once */
+    controller_set_target(&controller, 4, 1000);
+    controller_set_target(&controller, 0, 1000);
+    run(300);
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, controller_fault(&controller, 4));
+    const controller_sensor_t shown = inputs.sensor[4];
+    TEST_ASSERT_GREATER_THAN_INT16(500, shown.current_ma);
+    uint32_t ticks = 0;
+    while (controller_fault(&controller, 4) == SAFETY_FAULT_NONE && ticks < 200) {
+        inputs.sensor[4] = shown;
+        run(1);
+        ticks++;
+    }
+    TEST_ASSERT_LESS_OR_EQUAL_UINT32(100, ticks);
+    for (int n = 0; n < 200; n++) {
+        inputs.sensor[4] = shown;
+        run(1);
+    }
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_SENSOR_MISMATCH, controller_fault(&controller, 4));
+    TEST_ASSERT_EQUAL_UINT16(0, outputs.duty[4]);
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, controller_board_fault(&controller));
+    TEST_ASSERT_NOT_EQUAL(0, outputs.duty[0]);
 }
 
 /* Above the policy's limit, below safety's: after trip_time_s it is off, and says why. */
@@ -431,7 +490,6 @@ static void another_size_starts_anew_but_stays_locked(void)
     TEST_ASSERT_EQUAL_UINT8(2, controller_springs(&controller));
     TEST_ASSERT_TRUE(controller_is_locked(&controller));
     TEST_ASSERT_EQUAL(SAFETY_FAULT_EMERGENCY_STOP, controller_board_fault(&controller));
-    TEST_ASSERT_EQUAL_INT16(AMBIENT_C7, controller_temperature_c7(&controller, 0));
     run(1);
     TEST_ASSERT_TRUE(all_off());
     TEST_ASSERT_FALSE(controller_set_target(&controller, 2, 1000));
@@ -498,6 +556,9 @@ int main(void)
     RUN_TEST(open_and_shorted_springs_are_told_apart);
     RUN_TEST(current_in_an_output_that_is_off_stops_the_board);
     RUN_TEST(hot_model_trips);
+    RUN_TEST(ceiling_trips_whatever_is_believed);
+    RUN_TEST(ceiling_lets_a_current_pass_that_cannot_overheat);
+    RUN_TEST(frozen_sensor_is_found_within_two_seconds_and_stops_its_spring_alone);
     RUN_TEST(limit_that_stays_is_a_fault_until_cleared);
     RUN_TEST(stop_acts_in_the_next_tick);
     RUN_TEST(locked_board_drives_nothing_until_unlocked);

@@ -205,12 +205,53 @@ static void sum_above_the_supply_trips_everything(void)
 
 static void limit_trip_is_of_its_spring_alone_until_cleared(void)
 {
-    safety_trip_limit(&safety, 4);
+    safety_trip(&safety, 4, SAFETY_FAULT_LIMIT_TRIP);
     ticks(4, &running, 100);
     TEST_ASSERT_EQUAL(SAFETY_FAULT_LIMIT_TRIP, safety_fault(&safety, 4));
     TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, safety_board_fault(&safety));
     TEST_ASSERT_FALSE(safety_allows(&safety, 4));
     TEST_ASSERT_TRUE(safety_allows(&safety, 3));
+    safety_clear(&safety);
+    TEST_ASSERT_TRUE(safety_allows(&safety, 4));
+}
+
+/* Frozen at what flowed: neither a current in a spring that is off nor a fault of the board, until it
+ * shows another. */
+static void frozen_sensor_is_no_current_in_a_spring_that_is_off(void)
+{
+    ticks(4, &running, 10);
+    safety_trip(&safety, 4, SAFETY_FAULT_SENSOR_MISMATCH);
+    safety_sample_t sample = running;
+    sample.expected_ma = 0;
+    ticks(4, &sample, 100);
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_SENSOR_MISMATCH, safety_fault(&safety, 4));
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, safety_board_fault(&safety));
+    TEST_ASSERT_TRUE(safety_is_frozen(&safety, 4, sample.current_ma));
+    sample.current_ma++; /* it lives: that current flows */
+    ticks(4, &sample, 1);
+    TEST_ASSERT_FALSE(safety_is_frozen(&safety, 4, sample.current_ma));
+    ticks(4, &sample, parameters.bad_samples - 1u);
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_STUCK_ON, safety_board_fault(&safety));
+}
+
+static void other_faults_do_not_silence_a_sensor(void)
+{
+    ticks(4, &running, 10);
+    safety_trip(&safety, 4, SAFETY_FAULT_LIMIT_TRIP);
+    safety_sample_t sample = running;
+    sample.expected_ma = 0;
+    ticks(4, &sample, parameters.bad_samples);
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_STUCK_ON, safety_board_fault(&safety));
+}
+
+static void silent_host_stops_the_board_until_cleared(void)
+{
+    safety_host_silent(&safety);
+    ticks(4, &running, 100);
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_HOST_SILENT, safety_board_fault(&safety));
+    for (uint8_t k = 0; k < 9; k++) {
+        TEST_ASSERT_FALSE(safety_allows(&safety, k));
+    }
     safety_clear(&safety);
     TEST_ASSERT_TRUE(safety_allows(&safety, 4));
 }
@@ -365,6 +406,9 @@ int main(void)
     RUN_TEST(the_first_fault_is_kept);
     RUN_TEST(sum_above_the_supply_trips_everything);
     RUN_TEST(limit_trip_is_of_its_spring_alone_until_cleared);
+    RUN_TEST(frozen_sensor_is_no_current_in_a_spring_that_is_off);
+    RUN_TEST(other_faults_do_not_silence_a_sensor);
+    RUN_TEST(silent_host_stops_the_board_until_cleared);
     RUN_TEST(emergency_stop_holds_until_cleared);
     RUN_TEST(lock_holds_until_unlocked_and_is_no_fault);
     RUN_TEST(on_time_is_limited_only_where_it_is_set);

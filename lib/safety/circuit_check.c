@@ -1,0 +1,78 @@
+#include "circuit_check.h"
+
+#include <math.h>
+
+#define LEAST_READINGS 12u /* where a current rises, every other tick gives one */
+#define DUTY_STEPS     800.0f
+
+/* Of the duty, steps^2. A quarter of the default dither gives 1; below that, four times a sensor's
+ * noise (6 mV) would be more than an eighth of what the window should show. */
+#define LEAST_VARIANCE 0.5f
+/* Share of the voltage that should follow: 1, less (4.2 V for 5, wiring 0.04 ohm more, gain 3 %)
+ * 0.73 to 1.28. */
+#define LEAST_SLOPE 0.25f
+#define MOST_SLOPE  2.5f
+/* Off by more than the same tolerances, and the offsets of both readings. */
+#define BALANCE_SHARE 0.3f
+#define BALANCE_V     0.015f
+
+static uint16_t amount(int16_t value)
+{
+    if (value <= 0) {
+        return 0;
+    }
+    return (uint16_t)value > CIRCUIT_CHECK_MOST ? CIRCUIT_CHECK_MOST : (uint16_t)value;
+}
+
+void circuit_check_take(circuit_check_t *c, uint16_t fixed_mohm, uint16_t duty, bool valid,
+                        int16_t current_ma, int16_t voltage_mv)
+{
+    const uint16_t moved = (uint16_t)(duty - c->last_duty + CIRCUIT_CHECK_JUMP);
+    c->last_duty = duty;
+    if (!valid || moved > 2u * CIRCUIT_CHECK_JUMP) {
+        return;
+    }
+    const uint16_t dropped_mv = (uint16_t)(((uint32_t)amount(current_ma) * fixed_mohm) >>
+                                           10); /* 2 % low: tolerances are 30 */
+    const uint16_t behind_mv = (uint16_t)(amount(voltage_mv) + dropped_mv);
+    c->readings++;
+    c->duty = (uint16_t)(c->duty + duty);
+    c->voltage_mv += behind_mv;
+    c->duty_square += (uint32_t)duty * duty;
+    c->duty_voltage += (uint32_t)duty * behind_mv;
+}
+
+static void count(uint8_t *windows, bool bad)
+{
+    if (!bad) {
+        *windows = 0;
+    } else if (*windows < UINT8_MAX) {
+        (*windows)++;
+    }
+}
+
+bool circuit_check_judge(circuit_check_t *c, const current_control_parameters_t *p)
+{
+    bool astray = false;
+    bool unbalanced = false;
+    if (c->readings >= LEAST_READINGS) {
+        const float share = 1.0f / (float)c->readings;
+        const float drop_v = 1e-3f * (float)p->freewheel_mv;
+        const float swing_v = 1e-3f * (float)p->supply_mv + drop_v;
+        const float duty = share * (float)c->duty;
+        const float found_v = 1e-3f * share * (float)c->voltage_mv;
+        const float variance = share * (float)c->duty_square - duty * duty;
+        const float follows_v = 1e-3f * share * (float)c->duty_voltage - duty * found_v;
+        const float should_v = variance * swing_v / DUTY_STEPS;
+        const float driven_v = duty * swing_v / DUTY_STEPS - drop_v;
+        const float expected_v = driven_v > 0.0f ? driven_v : 0.0f;
+        astray = variance >= LEAST_VARIANCE &&
+                 (follows_v < LEAST_SLOPE * should_v || follows_v > MOST_SLOPE * should_v);
+        unbalanced = fabsf(found_v - expected_v) > BALANCE_SHARE * expected_v + BALANCE_V;
+    }
+    count(&c->astray, astray);
+    count(&c->unbalanced, unbalanced);
+    *c = (circuit_check_t){
+        .last_duty = c->last_duty, .astray = c->astray, .unbalanced = c->unbalanced};
+    return c->astray >= CIRCUIT_CHECK_WINDOWS || c->unbalanced >= CIRCUIT_CHECK_BALANCE_WINDOWS;
+}

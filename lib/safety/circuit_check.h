@@ -1,0 +1,50 @@
+/* What it is for: tells whether duty, supply, current and voltage of one spring can be one circuit.
+ * What it owns: sums over a window of readings, and how many windows on end could not be.
+ * What it never does: latch a fault, correct a reading. It uses floating point, once in a window.
+ */
+#ifndef CIRCUIT_CHECK_H
+#define CIRCUIT_CHECK_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "parameters.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define CIRCUIT_CHECK_TICKS           30u   /* of a window: three of them fit in 2 s */
+#define CIRCUIT_CHECK_MOST            4095u /* mA and mV: the sums fit 32 bits */
+#define CIRCUIT_CHECK_JUMP            2u /* steps: after more, a reading may be of the duty before */
+#define CIRCUIT_CHECK_WINDOWS         2u /* on end in which the voltage did not follow the duty */
+#define CIRCUIT_CHECK_BALANCE_WINDOWS 3u /* on end whose voltages did not add up */
+
+/* Of one spring. The voltage is that behind the switch: the spring's, and what its current drops
+ * over shunt and wiring. It is duty times supply, whatever the spring's resistance does. */
+typedef struct {
+    uint32_t duty_square;
+    uint32_t duty_voltage;
+    uint32_t voltage_mv;
+    uint16_t duty;
+    uint16_t last_duty;
+    uint8_t readings;
+    uint8_t astray;     /* windows on end in which the voltage did not follow the duty */
+    uint8_t unbalanced; /* windows on end in which it was not what the duty should bring */
+} circuit_check_t;
+
+/* One tick: the duty (steps of 800) that was applied in it and, if valid, what was read at its end.
+ * Above CIRCUIT_CHECK_MOST counts as that, below 0 as 0. fixed_mohm: shunt and wiring. */
+void circuit_check_take(circuit_check_t *check, uint16_t fixed_mohm, uint16_t duty, bool valid,
+                        int16_t current_ma, int16_t voltage_mv);
+
+/* Ends the window, begins the next one: at most CIRCUIT_CHECK_TICKS ticks after the last. True if
+ * and only if what was read has not been a circuit for CIRCUIT_CHECK_WINDOWS windows on end, or
+ * CIRCUIT_CHECK_BALANCE_WINDOWS. A window that can tell nothing (few readings; for the first, a
+ * duty that hardly moves) ends such a row. */
+bool circuit_check_judge(circuit_check_t *check, const current_control_parameters_t *circuit);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

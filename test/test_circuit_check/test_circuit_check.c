@@ -1,0 +1,206 @@
+/* What a circuit can show passes, at the corners of every tolerance; what none can show is found
+ * within 2 s. */
+#include <math.h>
+#include <stdint.h>
+#include <string.h>
+
+#include "circuit_check.h"
+#include "unity.h"
+
+#define SHUNT_OHM 0.1
+
+typedef struct {
+    double supply_v, wiring_ohm, spring_ohm, ohm_per_s;
+    double current_gain, current_offset_ma, voltage_offset_mv, noise_ma, noise_mv;
+} circuit_t;
+
+static const circuit_t declared = {5.0, 0.08, 0.2, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0};
+static current_control_parameters_t parameters;
+static circuit_check_t check;
+static uint32_t random_state;
+
+void setUp(void)
+{
+    current_control_parameters_default(&parameters);
+    memset(&check, 0, sizeof check);
+    random_state = 1;
+}
+
+void tearDown(void) {}
+
+/* Mean 0, deviation 1, up to 3.4. */
+static double noise(void)
+{
+    double sum = 0.0;
+    for (int n = 0; n < 12; n++) {
+        random_state = random_state * 1664525u + 1013904223u;
+        sum += (double)(random_state >> 8) / 16777216.0 - 0.5;
+    }
+    return sum;
+}
+
+/* A triangle of so many steps in 32 ticks, as the policy sweeps. */
+static uint16_t swept(uint16_t duty, uint16_t steps, uint32_t tick)
+{
+    const uint32_t place = tick & 31u;
+    return (uint16_t)(duty + (place < 16u ? place : 31u - place) * steps / 15u);
+}
+
+static double current_ma(const circuit_t *c, uint16_t duty, uint32_t tick)
+{
+    const double ohm = c->spring_ohm + c->ohm_per_s * 0.02 * tick;
+    return 1e3 * c->supply_v * duty / 800.0 / (ohm + SHUNT_OHM + c->wiring_ohm);
+}
+
+/* Ticks until it is found, or `ticks`. shown: which duty the sensor's reading is of. */
+typedef uint16_t shown_t(uint16_t duty, uint16_t steps, uint32_t tick);
+static uint16_t same(uint16_t duty, uint16_t steps, uint32_t tick)
+{
+    return swept(duty, steps, tick);
+}
+static uint16_t frozen(uint16_t duty, uint16_t steps, uint32_t tick)
+{
+    (void)steps;
+    (void)tick;
+    return duty;
+}
+static uint16_t tick_late(uint16_t duty, uint16_t steps, uint32_t tick)
+{
+    return swept(duty, steps, tick - 1u);
+}
+static uint16_t higher(uint16_t duty, uint16_t steps, uint32_t tick)
+{
+    return (uint16_t)(1.6 * swept(duty, steps, tick));
+}
+
+static uint32_t found_after(const circuit_t *c, uint16_t duty, uint16_t steps, shown_t *shown,
+                            uint32_t ticks)
+{
+    for (uint32_t tick = 0; tick < ticks; tick++) {
+        const uint16_t of = shown(duty, steps, tick);
+        const double ma = current_ma(c, of, tick);
+        const double mv = ma * (c->spring_ohm + c->ohm_per_s * 0.02 * tick);
+        const int16_t read_ma =
+            (int16_t)lround(ma * c->current_gain + c->current_offset_ma + c->noise_ma * noise());
+        const int16_t read_mv =
+            (int16_t)(4 * lround((mv + c->voltage_offset_mv + c->noise_mv * noise()) / 4.0));
+        circuit_check_take(&check, parameters.shunt_mohm + parameters.wiring_mohm,
+                           swept(duty, steps, tick), tick % 97u != 13u, read_ma, read_mv);
+        if (tick % CIRCUIT_CHECK_TICKS == 17u && circuit_check_judge(&check, &parameters)) {
+            return tick + 1u;
+        }
+    }
+    return ticks;
+}
+
+#define HOUR (50u * 3600u)
+
+static void every_corner_of_the_tolerances_is_a_circuit(void)
+{
+    for (unsigned corner = 0; corner < 64u; corner++) {
+        circuit_t c = declared;
+        c.supply_v = (corner & 1u) ? 4.2 : 5.5;
+        c.wiring_ohm = (corner & 1u) ? 0.12 : 0.04;
+        c.current_gain = (corner & 2u) ? 0.97 : 1.03;
+        c.current_offset_ma = (corner & 4u) ? -5.0 : 5.0;
+        c.voltage_offset_mv = (corner & 8u) ? -8.0 : 8.0;
+        c.noise_ma = (corner & 16u) ? 4.0 : 0.0;
+        c.noise_mv = (corner & 16u) ? 5.6 : 0.0;
+        const bool heats = (corner & 32u) != 0;
+        TEST_ASSERT_EQUAL_UINT32(
+            HOUR / 20u, found_after(&c, heats ? 190 : 60, heats ? 3 : 16, same, HOUR / 20u));
+    }
+}
+
+/* 40 % in 3 s: a current that is kept meanwhile takes ever more duty. */
+static void resistance_that_changes_is_no_mismatch(void)
+{
+    for (uint32_t tick = 0; tick < 150; tick++) {
+        const double spring_ohm = 0.175 * (1.0 + 0.4 * tick / 150.0);
+        const double ma = 3000.0;
+        const uint16_t duty = (uint16_t)lround(ma * (spring_ohm + 0.18) * 0.8 / 5.0);
+        circuit_check_take(&check, 180, duty, true, (int16_t)ma,
+                           (int16_t)(4 * lround(ma * spring_ohm / 4.0)));
+        if (tick % CIRCUIT_CHECK_TICKS == 29u) {
+            TEST_ASSERT_FALSE(circuit_check_judge(&check, &parameters));
+        }
+    }
+}
+
+static void frozen_reading_is_found_within_two_seconds(void)
+{
+    TEST_ASSERT_LESS_OR_EQUAL_UINT32(100, found_after(&declared, 60, 16, frozen, 1000)); /* holds */
+    setUp();
+    TEST_ASSERT_LESS_OR_EQUAL_UINT32(100, found_after(&declared, 190, 3, frozen, 1000)); /* heats */
+}
+
+/* Nothing moves: it may well be so. */
+static void reading_that_stands_still_with_its_duty_is_none(void)
+{
+    TEST_ASSERT_EQUAL_UINT32(HOUR / 20u, found_after(&declared, 120, 0, frozen, HOUR / 20u));
+}
+
+static void reading_of_one_tick_earlier_is_none(void)
+{
+    TEST_ASSERT_EQUAL_UINT32(HOUR / 20u, found_after(&declared, 60, 16, tick_late, HOUR / 20u));
+    TEST_ASSERT_EQUAL_UINT32(HOUR / 20u, found_after(&declared, 190, 3, tick_late, HOUR / 20u));
+}
+
+/* A pulse in every window, each read a tick late. */
+static void pulses_read_late_are_none(void)
+{
+    for (uint32_t tick = 0; tick < 3000; tick++) {
+        const uint16_t duty = tick % CIRCUIT_CHECK_TICKS < 5u ? 100 : 0;
+        const uint16_t was = (tick + CIRCUIT_CHECK_TICKS - 1u) % CIRCUIT_CHECK_TICKS < 5u ? 100 : 0;
+        const double ma = current_ma(&declared, was, 0);
+        circuit_check_take(&check, 180, duty, true, (int16_t)ma, (int16_t)(ma * 0.2));
+        if (tick % CIRCUIT_CHECK_TICKS == 0u) { /* the first tick of a pulse is the window's last */
+            TEST_ASSERT_FALSE(circuit_check_judge(&check, &parameters));
+        }
+    }
+}
+
+static void reading_of_another_output_is_found_within_two_seconds(void)
+{
+    TEST_ASSERT_LESS_OR_EQUAL_UINT32(100, found_after(&declared, 60, 16, higher, 1000));
+    setUp();
+    TEST_ASSERT_LESS_OR_EQUAL_UINT32(100, found_after(&declared, 120, 0, higher, 1000));
+}
+
+static void one_bad_window_is_none(void)
+{
+    for (int n = 0; n < 100; n++) {
+        (void)found_after(&declared, 60, 16, frozen, 18); /* judged once, at its end */
+        TEST_ASSERT_EQUAL_UINT32(48, found_after(&declared, 60, 16, same, 48));
+    }
+}
+
+static void any_reading_is_taken_without_overflow(void)
+{
+    const int16_t word[] = {INT16_MIN, -1, 0, 4095, INT16_MAX};
+    parameters.shunt_mohm = parameters.wiring_mohm = 1000;
+    for (unsigned n = 0; n < 25u; n++) {
+        setUp();
+        for (unsigned tick = 0; tick < CIRCUIT_CHECK_TICKS; tick++) {
+            circuit_check_take(&check, 2000, (uint16_t)(800u - tick % 2u), true, word[n / 5u],
+                               word[n % 5u]);
+        }
+        TEST_ASSERT_EQUAL_UINT8(29, check.readings); /* the first one jumps */
+        (void)circuit_check_judge(&check, &parameters);
+    }
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(every_corner_of_the_tolerances_is_a_circuit);
+    RUN_TEST(resistance_that_changes_is_no_mismatch);
+    RUN_TEST(frozen_reading_is_found_within_two_seconds);
+    RUN_TEST(reading_that_stands_still_with_its_duty_is_none);
+    RUN_TEST(reading_of_one_tick_earlier_is_none);
+    RUN_TEST(pulses_read_late_are_none);
+    RUN_TEST(reading_of_another_output_is_found_within_two_seconds);
+    RUN_TEST(one_bad_window_is_none);
+    RUN_TEST(any_reading_is_taken_without_overflow);
+    return UNITY_END();
+}
