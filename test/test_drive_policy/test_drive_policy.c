@@ -291,6 +291,26 @@ static void budget_holds_in_every_tick_whatever_is_asked(void)
     TEST_ASSERT_TRUE(thermal_model_is_consistent(&model));
 }
 
+static void policy_switch_never_jumps(void)
+{
+    parameters.dither_ma = 0;
+    begin_cold(3, 3);
+    level[0] = level[4] = level[5] = 1000;
+    for (unsigned at = 1; at < 300; at += 37) {
+        decisions(at);
+        uint16_t last[SPRINGS];
+        parameters.policy ^= 1u;
+        TEST_ASSERT_TRUE(drive_policy_apply(&policy, &parameters, &model, NULL));
+        for (unsigned n = 0; n < 60; n++) {
+            memcpy(last, target_ma, sizeof last);
+            (void)decide();
+            for (uint8_t k = 0; k < SPRINGS; k++) {
+                TEST_ASSERT_UINT16_WITHIN(20, last[k], target_ma[k]);
+            }
+        }
+    }
+}
+
 static void parameters_outside_their_range_are_refused_whole(void)
 {
     begin_cold(3, 3);
@@ -327,6 +347,7 @@ int main(void)
     RUN_TEST(spring_just_released_is_no_false_actuation);
     RUN_TEST(overload_takes_the_excess_away_in_time);
     RUN_TEST(budget_holds_in_every_tick_whatever_is_asked);
+    RUN_TEST(policy_switch_never_jumps);
     RUN_TEST(parameters_outside_their_range_are_refused_whole);
     run_limit_tests();
     return UNITY_END();
