@@ -86,7 +86,7 @@ void heats_then_holds_above_martensite_start_then_lets_go()
 {
     auto mega = powered("$unsure_margin_k=3");
     mega->expect_ok("on 5");
-    TEST_ASSERT_TRUE(run(*mega, 30.0) < 110.0);
+    TEST_ASSERT_TRUE(run(*mega, 35.0) < 110.0);
     TEST_ASSERT_TRUE(phase(*mega, CENTRE) >= 0.99);
     run(*mega, 25.0); /* it coasts down to the band */
     for (int n = 0; n < 5; ++n) {
