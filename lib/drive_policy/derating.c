@@ -27,6 +27,6 @@ uint16_t derating_overload_ma(uint16_t budget_ma, uint16_t continuous_ma,
     const uint16_t excess_ma = (uint16_t)(budget_ma - continuous_ma);
     const uint16_t over = (uint16_t)(overload_quarters - free_quarters);
     const uint16_t away_ma =
-        over >= free_quarters ? excess_ma : (uint16_t)((uint32_t)excess_ma * over / free_quarters);
+        (uint16_t)(over >= free_quarters ? excess_ma : (uint32_t)excess_ma * over / free_quarters);
     return (uint16_t)(budget_ma - away_ma);
 }

@@ -15,7 +15,8 @@ constexpr unsigned CENTRE = 4;
 constexpr double SUPPLY_A = 15.0;
 constexpr unsigned BUDGET_MA = 14800; /* less the default reserve */
 
-/* A board around the paper's springs, with their phase, under precompensate. */
+/* A board around the paper's springs, with their phase, under precompensate; with the hint `model
+ * cold` (boot), for tests that are not about the beginning. */
 std::unique_ptr<rig> powered(const char *settings = "")
 {
     auto mega = std::make_unique<rig>();
@@ -85,7 +86,7 @@ void heats_then_holds_above_martensite_start_then_lets_go()
 {
     auto mega = powered("$unsure_margin_k=3");
     mega->expect_ok("on 5");
-    TEST_ASSERT_TRUE(run(*mega, 30.0) < 110.0);
+    TEST_ASSERT_TRUE(run(*mega, 35.0) < 110.0);
     TEST_ASSERT_TRUE(phase(*mega, CENTRE) >= 0.99);
     run(*mega, 25.0); /* it coasts down to the band */
     for (int n = 0; n < 5; ++n) {
@@ -102,6 +103,26 @@ void heats_then_holds_above_martensite_start_then_lets_go()
     TEST_ASSERT_TRUE(board_all_off(mega->raw()));
     run(*mega, 45.0);
     TEST_ASSERT_TRUE(phase(*mega, CENTRE) <= 0.01);
+}
+
+/* What the README says to type, and nothing else: a first start, nothing learnt, no hint. */
+void pattern_of_the_readme_is_there_after_power_on()
+{
+    auto mega = std::make_unique<rig>();
+    plant_t *plant = mega->plant.get();
+    TEST_ASSERT_EQUAL(PLANT_OK, plant_set_effect(plant, "latent_heat", true));
+    TEST_ASSERT_EQUAL(PLANT_OK, plant_set_effect(plant, "resistance_phase", true));
+    mega->boot(false);
+    mega->expect_ok("pattern 111101111");
+    mega->expect_ok("policy precompensate");
+    run(*mega, 2.0);
+    TEST_ASSERT_EQUAL_UINT16(0, mega->view().spring[0].target_ma);
+    const std::string said = mega->say("model");
+    TEST_ASSERT_TRUE_MESSAGE(contains(said, "cooling"), said.c_str());
+    TEST_ASSERT_TRUE(run(*mega, 178.0) < 115.0);
+    for (unsigned k = 0; k < SPRINGS; ++k) {
+        TEST_ASSERT_TRUE(k == CENTRE ? phase(*mega, k) < 0.05 : phase(*mega, k) >= 0.95);
+    }
 }
 
 void boosts_of_nine_are_in_turn_within_the_supply()
@@ -201,7 +222,8 @@ void springs_around_an_undriven_one_derate_before_it_acts()
         TEST_ASSERT_TRUE(temperature(*mega, CENTRE) < 39.0);
     }
     TEST_ASSERT_TRUE(limited);
-    TEST_ASSERT_TRUE(temperature(*mega, CENTRE) > 34.0); /* derated, not given up */
+    TEST_ASSERT_TRUE(temperature(*mega, CENTRE) >
+                     27.0); /* derated by its upper bound, not given up */
 }
 
 /* After `policy` no target moves by more than 20 mA in a tick until all have arrived. */
@@ -291,6 +313,7 @@ int main()
     need_elf(elf());
     UNITY_BEGIN();
     RUN_TEST(heats_then_holds_above_martensite_start_then_lets_go);
+    RUN_TEST(pattern_of_the_readme_is_there_after_power_on);
     RUN_TEST(boosts_of_nine_are_in_turn_within_the_supply);
     RUN_TEST(half_a_level_is_half_a_phase);
     RUN_TEST(own_temperature_derates_then_trips_until_cleared);
