@@ -222,7 +222,8 @@ void springs_around_an_undriven_one_derate_before_it_acts()
         TEST_ASSERT_TRUE(temperature(*mega, CENTRE) < 39.0);
     }
     TEST_ASSERT_TRUE(limited);
-    TEST_ASSERT_TRUE(temperature(*mega, CENTRE) > 27.0); /* derated by its upper bound, not given up */
+    TEST_ASSERT_TRUE(temperature(*mega, CENTRE) >
+                     27.0); /* derated by its upper bound, not given up */
 }
 
 /* After `policy` no target moves by more than 20 mA in a tick until all have arrived. */

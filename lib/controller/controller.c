@@ -224,9 +224,8 @@ static void step_model(controller_t *controller, const controller_inputs_t *inpu
     }
     controller->model_tick = 0;
     for (uint8_t k = 0; k < controller->springs; k++) {
-        controller->power_sum_uw[k] =
-            spring_estimator_model_power_uw(&controller->policy.estimator, &controller->model, k,
-                                            controller->power_sum_uw[k] / TICKS_PER_STEP);
+        controller->power_sum_uw[k] = spring_estimator_model_power_uw(
+            &controller->policy.estimator, k, controller->power_sum_uw[k] / TICKS_PER_STEP);
     }
     controller->ambient_c7 = inputs->ambient_c7;
     thermal_model_set_ambient(&controller->model, inputs->ambient_c7);

@@ -32,7 +32,7 @@
 #define KEPT_K        3.0f  /* above austenite start what was reached is worth keeping */
 #define TURN_K        6.0f  /* colder than one that heats: it is its turn */
 #define GOES_ON_K     4.0f  /* below austenite start: keeps its turn */
-#define LOOK_MA       1000u /* of a spring of which much was learnt and nothing is known */
+#define LOOK_MA       2000u /* of a spring of which much was learnt and nothing is known */
 #define UNDRIVEN_SDS  2.0f
 #define NEIGHBOUR_SD  0.15f /* of the rise of a spring that its neighbours heat */
 #define RISE_SHARE    0.25f /* of a turn in the average */
@@ -129,7 +129,7 @@ static void enter(drive_policy_t *policy, thermal_model_t *model, uint8_t k,
         break;
     case DRIVE_POLICY_STAGE_HEAT:
         supply_queue_add(&policy->queue, k);
-        spring_estimator_begin_heating(&policy->estimator, k);
+        spring_estimator_begin_heating(&policy->estimator, model, k);
         s->wanted_ma = policy->parameters.boost_current_ma;
         break;
     case DRIVE_POLICY_STAGE_HOLD:

@@ -53,6 +53,9 @@ static uint32_t sum_below(const supply_claim_t claim[], uint8_t springs, uint16_
 /* The highest cap, to 1 mA, under which what is secured fits the budget. */
 static uint16_t cap_of(const supply_claim_t claim[], uint8_t springs, uint16_t budget_ma)
 {
+    if (sum_below(claim, springs, UINT16_MAX) <= budget_ma) {
+        return UINT16_MAX;
+    }
     uint16_t cap_ma = 0;
     for (uint16_t step_ma = 1u << CAP_PASSES; step_ma != 0; step_ma >>= 1) {
         if (sum_below(claim, springs, (uint16_t)(cap_ma + step_ma)) <= budget_ma) {

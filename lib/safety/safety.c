@@ -253,11 +253,6 @@ void safety_host_silent(safety_t *safety)
     latch_board(safety, SAFETY_FAULT_HOST_SILENT);
 }
 
-void safety_host_silent(safety_t *safety)
-{
-    latch_board(safety, SAFETY_FAULT_HOST_SILENT);
-}
-
 void safety_emergency_stop(safety_t *safety)
 {
     latch_board(safety, SAFETY_FAULT_EMERGENCY_STOP);

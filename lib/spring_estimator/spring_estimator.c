@@ -15,18 +15,19 @@
 #define NOISE_SAME     0.1f   /* a current that has moved by more tells nothing of the noise */
 #define BEND_TO_SD     0.512f /* mean size of a second difference: 1 / (sqrt(6) sqrt(2 / pi)) */
 
-#define CAPACITY_SD   0.09f   /* of a declared heat capacity: 15 %, uniform */
-#define LOSS_SD       0.12f   /* of a declared loss: 20 % */
-#define LOSS_MOST     0.45f   /* of the declared loss: no more is ever believed */
-#define LOSS_DRIFT_SD 0.0005f /* of the declared loss, in a second: 3 % in an hour */
-#define NEIGHBOUR_SD  0.15f   /* of the rise of a spring that its neighbours heat */
-#define SHIFT_SD_K    3.0f    /* of declared transformation temperatures */
-#define SHIFT_MOST_K  30.0f
-#define TRUST_SD_K    5.0f    /* of ambient, or of what a reset has kept */
-#define LEAST_SD_K    0.6f    /* parts of one spring differ by so much */
-#define UNIFORM_SD    0.29f   /* of a width */
-#define LEAST_LOSS    0.8f    /* of a declared loss: with it the hottest possible spring cools */
-#define FORGETS       0.9998f /* a turn's: a disturbance is forgotten within 20 minutes */
+#define CAPACITY_SD     0.09f   /* of a declared heat capacity: 15 %, uniform */
+#define LOSS_SD         0.12f   /* of a declared loss: 20 % */
+#define LOSS_MOST       0.45f   /* of the declared loss: no more is ever believed */
+#define LOSS_DRIFT_SD   0.0005f /* of the declared loss, in a second: 3 % in an hour */
+#define STIFFNESS_TURNS 4
+#define NEIGHBOUR_SD    0.15f /* of the rise of a spring that its neighbours heat */
+#define SHIFT_SD_K      3.0f  /* of declared transformation temperatures */
+#define SHIFT_MOST_K    30.0f
+#define TRUST_SD_K      5.0f    /* of ambient, or of what a reset has kept */
+#define LEAST_SD_K      0.6f    /* parts of one spring differ by so much */
+#define UNIFORM_SD      0.29f   /* of a width */
+#define LEAST_LOSS      0.8f    /* of a declared loss: with it the hottest possible spring cools */
+#define FORGETS         0.9998f /* a turn's: a disturbance is forgotten within 20 minutes */
 
 #define TRUST_STILL_SDS 0.7f /* where the transformation may never show: probably over */
 #define TRUST_ONSET_SDS 1.3f /* where its beginning was seen: certainly, but for 10 % */
@@ -238,8 +239,12 @@ static float predict(const spring_estimator_t *e, spring_belief_t *b, const ther
     const float per_w = SPRING_ESTIMATOR_TURN_S / e->heat_capacity_j_per_k;
     const float by_loss = -per_w * (now_c - spring_ambient_c(model));
     const float drift = LOSS_DRIFT_SD * e->loss_w_per_k;
-    b->stiffness_w_per_k =
-        (hold_w(model, k, now_c + 8.0f) - balance_w) * 0.125f + b->learnt.loss_w_per_k;
+    if (b->stiffness_turns-- == 0) { /* it moves with the fan and the air: slowly */
+        b->stiffness_turns = STIFFNESS_TURNS;
+        b->stiffness_w_per_k =
+            (hold_w(model, k, now_c + 8.0f) - balance_w) * 0.125f + b->learnt.loss_w_per_k;
+    }
+    b->extra_loss_uw = (int32_t)(1e6f * extra_loss_w(b, model, now_c));
     const float keeps = 1.0f - per_w * b->stiffness_w_per_k;
     b->variance_k2 = keeps * (keeps * b->variance_k2 + 2.0f * by_loss * b->covariance) +
                      by_loss * by_loss * b->loss_variance;
@@ -250,7 +255,7 @@ static float predict(const spring_estimator_t *e, spring_belief_t *b, const ther
         b->variance_k2 = LEAST_SD_K * LEAST_SD_K;
     }
     b->last_c = now_c;
-    return per_w * (power_w - balance_w - extra_loss_w(b, model, now_c));
+    return per_w * (power_w - balance_w - 1e-6f * (float)b->extra_loss_uw);
 }
 
 static void correct_loss(const spring_estimator_t *e, spring_belief_t *b, float more_w_per_k)
@@ -300,8 +305,9 @@ void spring_keep_above(const spring_estimator_t *e, spring_belief_t *b, thermal_
 
 /* After power-on what was learnt before tells the phase, and so between which temperatures it is.
  */
-static void look(spring_belief_t *b, thermal_model_t *model, uint8_t k)
+static void look(spring_estimator_t *e, thermal_model_t *model, uint8_t k)
 {
+    spring_belief_t *b = &e->spring[k];
     const spring_learnt_t *l = &b->learnt;
     const float unsure = LOOK_SD + LOOK_SDS * b->noise / fabsf(l->change);
     if (b->possible != SPRING_PHASE_ANY || l->austenite_ohm == 0.0f || b->current_a < STRONG_A ||
@@ -324,10 +330,13 @@ static void look(spring_belief_t *b, thermal_model_t *model, uint8_t k)
     const uint8_t fresh = b->fresh;
     const bool heating = b->heating;
     begin(b, 0.5f * (low_c + high_c), UNIFORM_SD * (high_c - low_c), phase);
-    spring_set_temperature(model, k, 0.5f * (low_c + high_c), phase);
+    spring_set_temperature(model, k, 0.5f * (low_c + high_c),
+                           austenite > 0.5f ? SPRING_PHASE_AUSTENITE : SPRING_PHASE_MARTENSITE);
     b->last_c = spring_now_c(model, k);
     b->fresh = fresh;
-    b->heating = heating;
+    if (heating) {
+        spring_estimator_begin_heating(e, model, k);
+    }
 }
 
 /* Heat capacity where the hottest possible spring is: on its way it gives off its latent heat. */
@@ -364,7 +373,7 @@ void spring_estimator_update(spring_estimator_t *e, thermal_model_t *model, uint
     const float moved_k = b->last_c - before_c;
     b->disturbance_k *= FORGETS;
     if (b->reads && e->observes) {
-        look(b, model, k);
+        look(e, model, k);
         b->heat_k += heat_k;
         spring_heating_watch(e, b, model, k);
         if (!b->blind) {
@@ -393,7 +402,7 @@ void spring_estimator_update(spring_estimator_t *e, thermal_model_t *model, uint
 /* It reads less than when it had transformed last, and the difference is neither noise nor a
  * temperature coefficient. Or it is still to come: its alloy is another one, if the model is hot.
  */
-static bool lacks_phase(const spring_belief_t *b, const thermal_model_t *model, uint8_t k)
+bool spring_lacks_phase(const spring_belief_t *b, const thermal_model_t *model, uint8_t k)
 {
     const spring_learnt_t *l = &b->learnt;
     if (!b->reads || b->blind || l->austenite_ohm == 0.0f || b->current_a < STRONG_A) {
@@ -417,9 +426,9 @@ bool spring_estimator_has_transformed(const spring_estimator_t *e, const thermal
     if (b->steep && b->reads) {
         return false;
     }
-    const float sds = lacks_phase(b, model, k) ? SPRING_ESTIMATOR_BOUND_SDS
-                      : b->onset               ? TRUST_ONSET_SDS
-                                               : TRUST_STILL_SDS;
+    const float sds = spring_lacks_phase(b, model, k) ? SPRING_ESTIMATOR_BOUND_SDS
+                      : b->onset                      ? TRUST_ONSET_SDS
+                                                      : TRUST_STILL_SDS;
     return spring_now_c(model, k) - sds * spring_estimator_sd_k(b) >
            spring_transformation(model, k).austenite_finish_c;
 }
@@ -535,7 +544,7 @@ spring_bounds_t spring_estimator_austenite(const spring_estimator_t *e,
     } else if (b->possible != SPRING_PHASE_ANY && sees && l->austenite_ohm > 0.0f) {
         value = 1.0f - (1.0f - b->ohm / l->austenite_ohm) / l->change;
         sd = PHASE_READ_SD;
-    } else if (sees && b->onset) {
+    } else if (sees && b->onset && b->cold_ohm > 0.0f) {
         value = (1.0f - b->onset_ohm / b->ohm) / l->change;
         sd = PHASE_ONSET_SD;
     } else if (b->possible == SPRING_PHASE_ANY) {
@@ -546,12 +555,10 @@ spring_bounds_t spring_estimator_austenite(const spring_estimator_t *e,
     return (spring_bounds_t){value, clamp(bounds.low, 0.0f, 1.0f), clamp(bounds.high, 0.0f, 1.0f)};
 }
 
-uint32_t spring_estimator_model_power_uw(const spring_estimator_t *e, const thermal_model_t *model,
-                                         uint8_t k, uint32_t power_uw)
+uint32_t spring_estimator_model_power_uw(const spring_estimator_t *e, uint8_t k, uint32_t power_uw)
 {
-    const float own_uw =
-        (float)power_uw - 1e6f * extra_loss_w(&e->spring[k], model, spring_now_c(model, k));
-    return own_uw <= 0.0f ? 0 : (uint32_t)own_uw;
+    const int32_t own_uw = (int32_t)power_uw - e->spring[k].extra_loss_uw;
+    return own_uw <= 0 ? 0 : (uint32_t)own_uw;
 }
 
 float spring_estimator_hold_w(const spring_estimator_t *e, const thermal_model_t *model, uint8_t k,

@@ -60,11 +60,13 @@ typedef struct {
     float shift_k;
     float shift_variance_k2;
     float stiffness_w_per_k; /* what 1 K more of this spring gives off */
+    int32_t extra_loss_uw;   /* what it loses beyond the model, now */
     float disturbance_k;     /* how far it was found from where it was believed, lately */
     float hottest_c;         /* while nothing is known: the most that it can be by now */
     float kept_w_per_k;      /* taken off the loss since it was last seen, as nothing was seen */
     float lost;              /* phase lost since it had transformed, 0..1 */
     uint8_t possible;        /* SPRING_PHASE_ bits */
+    uint8_t stiffness_turns; /* to the next look at it */
     uint8_t fresh;           /* turns with readings since current flows, saturating */
     uint8_t quiet;           /* turns in which its temperature hardly moved, saturating */
     uint8_t losing;          /* turns on end in which it seems to lose phase */
@@ -87,9 +89,11 @@ typedef struct {
     float noise;         /* standard deviation of one turn's, relative */
     float last_c;        /* the model's temperature a turn ago */
     /* the running heating */
-    float heat_k;   /* taken up, over heat capacity */
-    float mark_k;   /* where the resistance was last compared, and what it was */
-    float mark_ohm; /* 0: nowhere yet */
+    float begun_c;       /* where it began, at the coldest */
+    float begun_missing; /* what was still to transform then, at the most, 0..1 */
+    float heat_k;        /* taken up, over heat capacity */
+    float mark_k;        /* where the resistance was last compared, and what it was */
+    float mark_ohm;      /* 0: nowhere yet */
     float onset_ohm;
     float cold_ohm; /* at its beginning, martensite; 0: it was not */
     float cold_c;
@@ -156,7 +160,8 @@ void spring_estimator_disturb(spring_belief_t *belief);
 void spring_estimator_update(spring_estimator_t *estimator, thermal_model_t *model, uint8_t spring);
 
 /* A heating begins: what the resistance does from here on tells of the transformation. */
-void spring_estimator_begin_heating(spring_estimator_t *estimator, uint8_t spring);
+void spring_estimator_begin_heating(spring_estimator_t *estimator, const thermal_model_t *model,
+                                    uint8_t spring);
 /* The heating has fully transformed it: seen, or as hot as it takes whatever it reads. */
 bool spring_estimator_has_transformed(const spring_estimator_t *estimator,
                                       const thermal_model_t *model, uint8_t spring);
@@ -185,9 +190,9 @@ spring_bounds_t spring_estimator_distance_k(const spring_estimator_t *estimator,
 spring_bounds_t spring_estimator_austenite(const spring_estimator_t *estimator,
                                            const thermal_model_t *model, uint8_t spring);
 
-/* What the model must be stepped with: measured power less what this spring loses beyond it. */
-uint32_t spring_estimator_model_power_uw(const spring_estimator_t *estimator,
-                                         const thermal_model_t *model, uint8_t spring,
+/* What the model must be stepped with: measured power, below 2 kW, less what this spring loses
+ * beyond it. */
+uint32_t spring_estimator_model_power_uw(const spring_estimator_t *estimator, uint8_t spring,
                                          uint32_t power_uw);
 /* Power that holds it there, on the declared scale, W. */
 float spring_estimator_hold_w(const spring_estimator_t *estimator, const thermal_model_t *model,

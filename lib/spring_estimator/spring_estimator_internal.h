@@ -31,6 +31,10 @@ float spring_see(const spring_estimator_t *estimator, spring_belief_t *belief,
 void spring_keep_above(const spring_estimator_t *estimator, spring_belief_t *belief,
                        thermal_model_t *model, uint8_t spring, float limit_c);
 
+/* It reads less than when it had transformed last, and the difference is neither noise nor a
+ * temperature coefficient. */
+bool spring_lacks_phase(const spring_belief_t *belief, const thermal_model_t *model,
+                        uint8_t spring);
 /* It has transformed: what it reads now is its own austenite's, and the way there its change. */
 void spring_learn_austenite(spring_belief_t *belief);
 

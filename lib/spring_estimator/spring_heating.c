@@ -17,17 +17,21 @@
 #define CAPACITY_BOUND 1.25f /* the same of a heat capacity */
 #define COLD_SPAN_K    20.0f /* least, over which a coefficient is learnt */
 
-void spring_estimator_begin_heating(spring_estimator_t *e, uint8_t k)
+void spring_estimator_begin_heating(spring_estimator_t *e, const thermal_model_t *model, uint8_t k)
 {
     spring_belief_t *b = &e->spring[k];
-    b->heat_k = b->mark_k = b->flat_k = b->excess = 0.0f;
-    b->mark_ohm = b->onset_ohm = b->cold_ohm = b->line_ohm = 0.0f;
-    b->onset = b->steep = false;
-    b->heating = true;
     if (b->possible == SPRING_PHASE_AUSTENITE) {
         b->possible = b->lost < CHANGE_PART ? SPRING_PHASE_BETWEEN | SPRING_PHASE_AUSTENITE
                                             : SPRING_PHASE_BETWEEN;
     }
+    b->heat_k = b->mark_k = b->flat_k = b->excess = 0.0f;
+    b->mark_ohm = b->onset_ohm = b->cold_ohm = b->line_ohm = 0.0f;
+    b->onset = b->steep = false;
+    b->heating = true;
+    b->begun_c =
+        fmaxf(spring_now_c(model, k) - SPRING_ESTIMATOR_BOUND_SDS * spring_estimator_sd_k(b),
+              spring_ambient_c(model));
+    b->begun_missing = 1.0f - spring_estimator_austenite(e, model, k).low;
 }
 
 static void see_onset(const spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model,
@@ -73,15 +77,24 @@ static void see_finish(const spring_estimator_t *e, spring_belief_t *b, thermal_
                      PLACE_SD_K, SPRING_PHASE_AUSTENITE);
 }
 
-/* A spring that is known to show its transformation and has not begun to is not as hot as that: the
- * model is held there, until even the coldest and heaviest spring would have come so far. */
-static void hold_back(const spring_belief_t *b, thermal_model_t *model, uint8_t k)
+/* A spring that is known to show its transformation is not hotter than that lets it be, whatever
+ * the model says, until even the coldest and heaviest spring must have come so far. */
+static void hold_back(const spring_estimator_t *e, const spring_belief_t *b, thermal_model_t *model,
+                      uint8_t k)
 {
-    const float onset_c = spring_transformation(model, k).austenite_start_c + ONSET_K;
-    const float most_k = (onset_c + SHIFT_BOUND_K - spring_ambient_c(model)) * CAPACITY_BOUND;
-    if (b->possible == SPRING_PHASE_MARTENSITE && b->learnt.austenite_ohm > 0.0f && !b->blind &&
-        b->heat_k < most_k && spring_now_c(model, k) > onset_c) {
-        spring_set_temperature(model, k, onset_c, SPRING_PHASE_MARTENSITE);
+    const spring_transformation_t t = spring_transformation(model, k);
+    const bool martensite = b->possible == SPRING_PHASE_MARTENSITE;
+    const float limit_c = martensite ? t.austenite_start_c + ONSET_K : t.austenite_finish_c;
+    const float now_c = spring_now_c(model, k);
+    if (b->learnt.austenite_ohm == 0.0f || b->blind || now_c <= limit_c ||
+        (!martensite && !spring_lacks_phase(b, model, k))) {
+        return;
+    }
+    const float latent_k =
+        martensite ? 0.0f : b->begun_missing * e->latent_heat_j / e->heat_capacity_j_per_k;
+    const float most_k = (limit_c + SHIFT_BOUND_K - b->begun_c + latent_k) * CAPACITY_BOUND;
+    if (b->heat_k < most_k) {
+        spring_set_temperature(model, k, limit_c, SPRING_PHASE_MARTENSITE);
     }
 }
 
@@ -91,7 +104,7 @@ void spring_heating_watch(const spring_estimator_t *e, spring_belief_t *b, therm
                           uint8_t k)
 {
     if (b->heating) {
-        hold_back(b, model, k);
+        hold_back(e, b, model, k);
     }
     if (!b->heating || b->current_a < STRONG_A || b->possible == SPRING_PHASE_AUSTENITE ||
         b->possible == SPRING_PHASE_ANY || b->settling != 0) {
@@ -116,11 +129,13 @@ void spring_heating_watch(const spring_estimator_t *e, spring_belief_t *b, therm
     const float excess = change > explained    ? change - explained
                          : change < -explained ? change + explained
                                                : 0.0f;
-    if (!b->onset && excess * b->excess <= 0.0f) {
+    /* a spring whose change is known changes that way */
+    const bool against = b->learnt.austenite_ohm > 0.0f && excess * b->learnt.change < 0.0f;
+    if (!b->onset && (against || excess * b->excess <= 0.0f)) {
         b->excess = 0.0f; /* none, or the other way: counted anew */
         b->onset_ohm = b->mark_ohm;
     }
-    b->excess += excess;
+    b->excess += against ? 0.0f : excess;
     b->steep = b->onset && fabsf(excess) > STEEP_SDS * b->noise;
     b->flat_k = b->steep || !b->onset ? 0.0f : b->flat_k + step_k;
     if (!b->onset && fabsf(b->excess) > EXCESS_SEEN + EXCESS_SDS * b->noise) {

@@ -138,7 +138,8 @@ static void cap_fits_and_wastes_less_than_a_milliampere_each(void)
         for (uint8_t k = 0; k < SPRINGS; k++) {
             highest_ma = granted_ma[k] > highest_ma ? granted_ma[k] : highest_ma;
         }
-        for (uint8_t k = 0; k < SPRINGS; k++) { /* nobody has less than another but by his own wish */
+        for (uint8_t k = 0; k < SPRINGS;
+             k++) { /* nobody has less than another but by his own wish */
             TEST_ASSERT_TRUE(granted_ma[k] == highest_ma || granted_ma[k] == claim[k].asked_ma);
         }
     }

@@ -153,8 +153,8 @@ uint32_t tick(void)
     if (++count % 5u == 0) {
         uint32_t power_uw[SPRINGS] = {0};
         for (uint8_t k = 0; k < policy.springs; k++) {
-            power_uw[k] = spring_estimator_model_power_uw(&policy.estimator, &model, k,
-                                                          power_sum_uw[k] / 5u);
+            power_uw[k] =
+                spring_estimator_model_power_uw(&policy.estimator, k, power_sum_uw[k] / 5u);
             power_sum_uw[k] = 0;
         }
         thermal_model_step(&model, power_uw);

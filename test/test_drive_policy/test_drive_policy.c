@@ -1,5 +1,5 @@
-/* The drive policy by what it does: to springs as they are, and where a limit is meant, by what it is
- * told of them. */
+/* The drive policy by what it does: to springs as they are, and where a limit is meant, by what it
+ * is told of them. */
 #include <stddef.h>
 #include <stdio.h>
 #include <string.h>
@@ -9,7 +9,7 @@
 
 #define RESERVED_MA   14800u /* supply 15 A less the default reserve */
 #define FULL_BOOST_MA 3000u
-#define TURN_TICKS    13u    /* in which each spring is decided on once, rounded up */
+#define TURN_TICKS    13u /* in which each spring is decided on once, rounded up */
 
 static char where[120];
 
@@ -143,7 +143,7 @@ static void two_springs_hold_by_the_hand_computed_inverse(void)
     /* 60 K x (5.8 + 0.586) mW/K = 0.38316 W through 0.175 ohm: 1.4797 A */
     TEST_ASSERT_UINT16_WITHIN(4, 1480, target_ma[0]);
     thermal_model_set_temperature(&model, 1, 30 * 128); /* 50 K x 0.586 mW/K: 0.3773 W, 1.4683 A */
-    decisions(40u * TURN_TICKS); /* that jump is no rise any more */
+    decisions(40u * TURN_TICKS);                        /* that jump is no rise any more */
     TEST_ASSERT_UINT16_WITHIN(4, 1468, target_ma[0]);
 }
 

@@ -215,8 +215,8 @@ static void limit_trip_is_of_its_spring_alone_until_cleared(void)
     TEST_ASSERT_TRUE(safety_allows(&safety, 4));
 }
 
-/* Frozen at what flowed: neither a current in a spring that is off nor a fault of the board, until it
- * shows another. */
+/* Frozen at what flowed: neither a current in a spring that is off nor a fault of the board, until
+ * it shows another. */
 static void frozen_sensor_is_no_current_in_a_spring_that_is_off(void)
 {
     ticks(4, &running, 10);

@@ -53,8 +53,7 @@ static double share(double from_c, double to_c)
 
 static void live(double power_w)
 {
-    const double heat_j =
-        (power_w - truth.loss_w_per_k * (truth.temperature_c - 20.0)) * TICK_S;
+    const double heat_j = (power_w - truth.loss_w_per_k * (truth.temperature_c - 20.0)) * TICK_S;
     const double formed = share(88.0, 98.0);
     const double kept = share(68.0, 78.0);
     const bool transforms = (heat_j > 0.0 && formed >= truth.austenite && formed < 1.0 &&
@@ -111,8 +110,8 @@ bool tick(double current_a)
     power_sum_w += ma > 0 && mv > 0 ? 1e-6 * ma * mv : 0.0;
     count++;
     if (count % 5u == 0) {
-        const uint32_t power_uw = spring_estimator_model_power_uw(
-            &estimator, &model, 0, (uint32_t)(power_sum_w * 1e6 / 5.0));
+        const uint32_t power_uw =
+            spring_estimator_model_power_uw(&estimator, 0, (uint32_t)(power_sum_w * 1e6 / 5.0));
         thermal_model_step(&model, &power_uw);
         power_sum_w = 0.0;
     }
@@ -135,7 +134,7 @@ double heat(double most_s)
 {
     double time_s = 0.0;
     spring_estimator_disturb(&BELIEF);
-    spring_estimator_begin_heating(&estimator, 0);
+    spring_estimator_begin_heating(&estimator, &model, 0);
     while (time_s < most_s && !spring_estimator_has_transformed(&estimator, &model, 0)) {
         (void)tick(3.0);
         time_s += TICK_S;
@@ -148,8 +147,7 @@ double hold_current_a(double margin_k)
     const float target_c = spring_transformation(&model, 0).martensite_start_c + (float)margin_k;
     const float now_c = (float)thermal_model_temperature_c7(&model, 0) / 128.0f;
     const float power_w = spring_estimator_hold_w(&estimator, &model, 0, target_c) +
-                          fmaxf(target_c - now_c, -20.0f) *
-                              estimator.heat_capacity_j_per_k / 4.0f;
+                          fmaxf(target_c - now_c, -20.0f) * estimator.heat_capacity_j_per_k / 4.0f;
     const unsigned place = count % 32u;
     const double dither_a = 0.3 * ((double)(place < 16u ? place : 31u - place) / 16.0 - 0.5);
     return fmax(1e-3 * spring_estimator_current_ma(&estimator, 0, power_w) + dither_a, 0.4);

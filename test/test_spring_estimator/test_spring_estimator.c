@@ -78,14 +78,15 @@ static void check_transformation_is_seen(double ratio, double rise_per_k)
     truth.rise_per_k = rise_per_k;
     double began_at = -1.0;
     ticks(3.0, 1.0);
-    spring_estimator_begin_heating(&estimator, 0);
+    spring_estimator_begin_heating(&estimator, &model, 0);
     for (double s = 0.0; s < 60.0 && !spring_estimator_has_transformed(&estimator, &model, 0);
          s += TICK_S) {
         (void)tick(3.0);
         began_at = began_at < 0.0 && BELIEF.onset ? truth.austenite : began_at;
     }
-    (void)snprintf(where, sizeof where, "ratio %.2f, %.4f per K: onset at %.2f, end at %.3f, %.1f C",
-                   ratio, rise_per_k, began_at, truth.austenite, truth.temperature_c);
+    (void)snprintf(where, sizeof where,
+                   "ratio %.2f, %.4f per K: onset at %.2f, end at %.3f, %.1f C", ratio, rise_per_k,
+                   began_at, truth.austenite, truth.temperature_c);
     TEST_ASSERT_TRUE_MESSAGE(began_at > 0.0 && began_at < 0.5, where);
     TEST_ASSERT_TRUE_MESSAGE(truth.austenite > 0.99 && truth.temperature_c < 112.0, where);
     spring_estimator_begin_hold(&estimator, &model, 0, true);
@@ -124,8 +125,9 @@ static void coefficient_alone_is_never_an_onset(void)
             truth.ratio = 1.0;
             truth.rise_per_k = rise_per_k[n];
             truth.noise_v = noisy ? 0.016 : 0.0;
-            spring_estimator_begin_heating(&estimator, 0);
-            for (double s = 0.0; s < 60.0 && !spring_estimator_has_transformed(&estimator, &model, 0);
+            spring_estimator_begin_heating(&estimator, &model, 0);
+            for (double s = 0.0;
+                 s < 60.0 && !spring_estimator_has_transformed(&estimator, &model, 0);
                  s += TICK_S) {
                 (void)tick(3.0);
                 (void)snprintf(where, sizeof where, "%.4f per K, noisy %d: %.1f degC",
@@ -171,7 +173,7 @@ static void check_counted(void)
 static void heat_and_hold(void)
 {
     double margin_k = 12.0;
-    spring_estimator_begin_heating(&estimator, 0);
+    spring_estimator_begin_heating(&estimator, &model, 0);
     for (double s = 0.0; s < 60.0 && !spring_estimator_has_transformed(&estimator, &model, 0);
          s += TICK_S) {
         if (tick(3.0)) {
@@ -247,8 +249,9 @@ static void crossing_is_seen_and_makes_the_distance_sure(void)
         const double off_w_per_k = (double)learnt.loss_w_per_k - 5.8e-3 * (loss[n] - 1.0);
         (void)snprintf(where, sizeof where, "loss x %.2f: off by %.6f, sd %.6f", loss[n],
                        off_w_per_k, (double)learnt.loss_sd_w_per_k);
-        TEST_ASSERT_TRUE_MESSAGE(
-            fabs(off_w_per_k) <= (double)(SPRING_ESTIMATOR_BOUND_SDS * learnt.loss_sd_w_per_k), where);
+        TEST_ASSERT_TRUE_MESSAGE(fabs(off_w_per_k) <=
+                                     (double)(SPRING_ESTIMATOR_BOUND_SDS * learnt.loss_sd_w_per_k),
+                                 where);
         TEST_ASSERT_TRUE_MESSAGE((double)learnt.loss_sd_w_per_k < 0.12 * 5.8e-3, where);
     }
 }
