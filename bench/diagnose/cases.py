@@ -36,6 +36,8 @@ class Case:
     runs: list[Inputs] = field(default_factory=list)
     columns: str = "iv"
     """iv: current and voltage, i: current, u: command."""
+    sensors: bool = False
+    """Currents and voltages have the noise of a board's sensors, 0.5 mA and 0.5 mV."""
 
     @property
     def name(self) -> str:
@@ -142,11 +144,16 @@ def write_logs(case: Case, folder: Path) -> tuple[list[Path], Path, np.ndarray]:
                 names.append(f"u{k + 1}")
                 columns.append(out["command"][r][:, k])
             else:
+                current, voltage = out["current"][r][:, k], out["voltage"][r][:, k]
+                if case.sensors:
+                    on = current > 0
+                    current = current + on * rng.normal(0.0, 5e-4, len(current))
+                    voltage = voltage + on * rng.normal(0.0, 5e-4, len(current))
                 names.append(f"i{k + 1}_a")
-                columns.append(out["current"][r][:, k])
+                columns.append(current)
                 if case.columns == "iv":
                     names.append(f"v{k + 1}_v")
-                    columns.append(out["voltage"][r][:, k])
+                    columns.append(voltage)
         for k in range(SPRINGS):
             names.append(f"t{k + 1}_c")
             columns.append(shown[:, k])

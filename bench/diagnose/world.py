@@ -129,6 +129,7 @@ def simulate(world: World, runs: list[Inputs]) -> dict[str, np.ndarray]:
     # an alloy that is not as declared: degC by which it transforms elsewhere, K of further hysteresis
     elsewhere = effect.get("_alloy", {}).get("shift", 0.0)
     opened = 0.5 * effect.get("_alloy", {}).get("hysteresis", 0.0)
+    warmed = effect.get("resistance_temperature", {}).get("rise", 0.0)
     drift = effect.get("ambient_drift")
     convection = effect.get("natural_convection")
     radiation = effect.get("radiation")
@@ -159,7 +160,10 @@ def simulate(world: World, runs: list[Inputs]) -> dict[str, np.ndarray]:
         if drift:
             surroundings = surroundings + drift["kelvin"] * np.sin(0.5 * np.pi * now / drift["period_s"])
         shown = current[:, row].copy()
-        resistance = r_martensite + (r_austenite - r_martensite) * phase
+        resistance = (r_martensite + (r_austenite - r_martensite) * phase) * (1.0 + warmed * (temperature - 20.0))
+        if (e := effect.get("contact_resistance")) and now >= e["from"]:
+            # the sensor measures the contact with the spring; its heat is the contact's own
+            resistance = resistance + e["ohm"] * (np.arange(SPRINGS) == int(e["spring"]))
         if sag:
             drawn = command[:, row].sum(axis=1, keepdims=True)
         out["temperature"][:, row] = temperature
@@ -195,7 +199,7 @@ def simulate(world: World, runs: list[Inputs]) -> dict[str, np.ndarray]:
                 kelvin, cold = t + 273.15, surroundings[:, None] + 273.15
                 lost = lost + radiation["emissivity"] * STEFAN_BOLTZMANN * 277e-6 * (kelvin**4 - cold**4)
             heat = r_martensite + (r_austenite - r_martensite) * xi
-            heat = shown**2 * heat
+            heat = shown**2 * heat * (1.0 + warmed * (t - 20.0))
             if sag is not None or mode_command:
                 heat = world.command_power * command[:, row]
                 if sag:
@@ -205,6 +209,10 @@ def simulate(world: World, runs: list[Inputs]) -> dict[str, np.ndarray]:
             if e := effect.get("delayed_heat"):
                 rate_d = (heat - d) / e["delay_s"]
                 heat = heat * (1 - e["fraction"]) + e["fraction"] * d
+            if (e := effect.get("_heat")) and e["from"] <= now < e["to"]:
+                # a step of heat that nothing logs, in the first run
+                extra = e["watt"] * (np.arange(SPRINGS) == int(e["spring"])) * (np.arange(count) == 0)[:, None]
+                heat = heat + extra
             if e := effect.get("loose_contact"):
                 bad = (now % e["period_s"]) < e["bad_s"]
                 if bad and now > e["period_s"]:

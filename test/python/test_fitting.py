@@ -19,7 +19,7 @@ TRUE = {
     "heat_capacity_j_per_k": 0.3,
     "loss_w_per_k": 0.0058,
     "loss_fan_w_per_k": 0.0113,
-    "orthogonal_w_per_k": 0.000408,
+    "orthogonal_w_per_k": 0.000586,
 }
 
 

@@ -89,6 +89,7 @@ def test_the_report_shows_what_was_found_and_needs_nothing_else(found: diagnosis
     assert not re.search(r"url\((?!#)", text)
     assert page.headings == [
         "What the array does that the model did not",
+        "What to do next",
         "Errors before and after",
         "About the data",
         "Effects adopted",
@@ -99,12 +100,13 @@ def test_the_report_shows_what_was_found_and_needs_nothing_else(found: diagnosis
         "What was tried",
         "The declared model's numbers",
     ]
-    # two runs, temperatures and residuals; maps; autocorrelation; candidates
-    assert page.figures == 7
+    # the map and the bars of the first screen; two runs, temperatures and residuals; maps; autocorrelation; candidates
+    assert page.figures == 9
     before, after = result["baseline"], result["after"]
     for row, one in (("before: the declared model", before), ("after: with the effects adopted", after)):
         assert page.row(row)[1:] == [f"{one['rmse_c']:.3f}", f"{one['holdout_rmse_c']:.3f}"]
     assert page.row("noise of the sensors")[1] == f"{before['noise_c']:.3f}"
+    assert "The thermometers lag 5." in text and "The transformation takes up" in text and "certain, " in text
     for effect in result["effects"]:
         row = page.row(effect["name"])
         assert row[2:5] == [f"{effect['rmse_c']:.3f}", f"{effect['holdout_rmse_c']:.3f}", f"{effect['evidence']:.0f}"]
@@ -141,7 +143,7 @@ def test_the_report_shows_rivals_what_is_unexplained_and_what_is_not_determined(
         "depends on the moon",
         "latent_heat_j: the data cannot",
         "sensor_lag_s: at its",
-        "correlated at +0.990",
+        "determined in combination only: loss_w_per_k, sensor_lag_s",
     ):
         assert words in text
 

@@ -124,12 +124,19 @@ def write(files: Mapping[Path | None, str]) -> None:
     write_atomically({path: text for path, text in files.items() if path})
 
 
-def array_and_runs(array_path: Path | None, logs: tuple[Path, ...], model: Any = None) -> tuple[Any, list[Run]]:
-    """Read logs of one array; refuse what does not go together or is no measurement."""
+def array_and_runs(
+    array_path: Path | None, logs: tuple[Path, ...], model: Any = None, or_resistance: bool = False
+) -> tuple[Any, list[Run]]:
+    """Read logs of one array; refuse what does not go together or is no measurement.
+
+    `or_resistance`: logs of currents and voltages need no temperature.
+    """
     from .models import read_array
 
     array = model.array if model else read_array(array_path) if array_path else None
-    runs = [read_log(path, array.springs if array else None) for path in logs]
+    runs = [read_log(path, array.springs if array else None, or_resistance=or_resistance) for path in logs]
+    if len({bool(np.isfinite(run.temperature_c).any()) for run in runs}) > 1:
+        raise InputError("some of these logs have temperatures and others none: give one kind at a time", logs[0])
     array = array_of(array, runs)
     modes = {run.mode for run in runs}
     if len(modes) > 1:

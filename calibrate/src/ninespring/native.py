@@ -286,6 +286,45 @@ class Plant:
                 break
             guess[seen] = np.clip(guess[seen] + off, -60.0, 500.0)
 
+    def readings(
+        self, time_s: np.ndarray, power_w: np.ndarray, fan: np.ndarray, ambient_c: np.ndarray | None
+    ) -> np.ndarray:
+        """Run a whole log; return what a board would read of each spring as v / i, (rows, springs), ohm."""
+        arrays = [np.ascontiguousarray(one, dtype=float) for one in (time_s, power_w, fan)]
+        ambient = None if ambient_c is None else np.ascontiguousarray(ambient_c, dtype=float)
+        ohm, temperature = np.empty_like(arrays[1]), np.empty_like(arrays[1])
+        call = self._lib.plant_readings
+        call.restype = ctypes.c_int
+        call.argtypes = (ctypes.c_void_p, ctypes.c_size_t, *(_double_p,) * 6)
+        pointers = [_pointer(one) for one in (*arrays, ambient, ohm, temperature)]
+        self._check(call(self._plant, len(arrays[0]), *pointers), "readings")
+        return ohm
+
+    def trace(
+        self,
+        time_s: np.ndarray,
+        mode: int,
+        drive: np.ndarray,
+        fan: np.ndarray | None = None,
+        ambient_c: np.ndarray | None = None,
+    ) -> np.ndarray:
+        """Run a whole log row by row; return true temperatures (degC) and austenite, (rows, springs, 2)."""
+        rows, n = drive.shape
+        out = np.empty((rows, n, 2))
+        for row in range(rows):
+            for k in range(n):
+                out[row, k] = self._lib.plant_temperature_c(self._plant, k), self._lib.plant_austenite(self._plant, k)
+            if row + 1 == rows:
+                break
+            for k in range(n):
+                self.drive(k, mode, float(drive[row, k]))
+            if fan is not None:
+                self.set_fan(float(fan[row]))
+            if ambient_c is not None:
+                self.set_ambient(float(ambient_c[row]))
+            self._check(self._lib.plant_step(self._plant, float(time_s[row + 1] - time_s[row])), "step")
+        return out
+
     def simulate(
         self,
         time_s: np.ndarray,

@@ -9,6 +9,8 @@ from __future__ import annotations
 import functools
 import importlib
 import pkgutil
+from collections.abc import Mapping
+from typing import Any
 
 from .. import native
 from ..fit.problem import Problem
@@ -29,6 +31,11 @@ def library() -> tuple[Effect, ...]:
     modules = (importlib.import_module(f"{__name__}.{one.name}") for one in pkgutil.iter_modules(__path__))
     known = [module.EFFECT for module in modules if hasattr(module, "EFFECT")]
     return tuple(sorted(known, key=lambda one: native.effect_names().index(one.name)))
+
+
+def sentence(name: str, parameters: Mapping[str, Any], variant: str = "") -> str:
+    """Return what was found of an effect, in words and sizes."""
+    return next(one for one in library() if one.name == name).sentence(parameters, variant)
 
 
 def candidates(problem: Problem) -> list[Candidate]:

@@ -1,11 +1,10 @@
-"""The surroundings are not as logged: off by a constant in each run, drifting steadily, or bent between knots."""
+"""The surroundings change during the run: steadily, or bent between knots of each run's own."""
 
 from collections.abc import Iterator
 
 from ..fit.spec import Free
-from .effect import Candidate, Effect, Scene, linear
+from .effect import Candidate, Effect, Numbers, Scene, linear, sized
 
-OFFSET = "ambient_offset_k"
 KINDS = (("free", "ambient_drift_k", 500.0), ("slow", "ambient_slow_drift_k", 1800.0))
 """Variants with knots: name, key of their numbers, the shortest run (s) that could show one."""
 
@@ -19,18 +18,6 @@ def _candidates(scene: Scene) -> Iterator[Candidate]:
         fixed=(("ambient_amplitude_k", 0.0),),
         signed=True,
         most=20.0,
-    )
-    offsets = tuple(
-        Free(f"{OFFSET}@{r + 1}.1", 0.0, -8.0, 8.0, "K", (), False, run=r, knot=1, scale=1.0)
-        for r in range(len(scene.knots[OFFSET]))
-    )
-    yield Candidate(
-        "offset of each run",
-        offsets,
-        tuple({f.key: float(f is one) for f in offsets} for one in offsets),
-        fixed=(("ambient_amplitude_k", 0.0), (ramp, 0.0)),
-        signed=True,
-        most=8.0,
     )
     for variant, key, shortest_s in KINDS:
         if scene.duration_s < shortest_s:
@@ -51,4 +38,15 @@ def _candidates(scene: Scene) -> Iterator[Candidate]:
         )
 
 
-EFFECT = Effect("ambient_drift", _candidates)
+def _says(numbers: Numbers, variant: str) -> str:
+    if "ambient_ramp_k_per_h" in numbers:
+        return f"The surroundings drift by {sized(*numbers['ambient_ramp_k_per_h'], 'K/h')}."
+    values = [value for value, _ in numbers.values()]
+    if variant.startswith("offset"):
+        return (
+            f"The surroundings are {', '.join(f'{value:+.1f}' for value in values)} K off what is logged, run by run."
+        )
+    return f"The surroundings drift during the runs, by {max(values) - min(values):.1f} K."
+
+
+EFFECT = Effect("ambient_drift", _candidates, says=_says)

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from ..fit.spec import Free
-from .effect import Candidate, Effect, Scene, Steady, linear
+from .effect import Candidate, Effect, Numbers, Scene, Steady, linear, percent
 
 
 def _candidates(scene: Scene) -> Iterator[Candidate]:
@@ -28,4 +28,11 @@ def _candidates(scene: Scene) -> Iterator[Candidate]:
         )
 
 
-EFFECT = Effect("edge_loss", _candidates, Steady("edge_loss_fraction", -0.2, 2.0))
+def _says(numbers: Numbers, variant: str) -> str:
+    if "edge_loss_fraction" in numbers:
+        value, error = numbers["edge_loss_fraction"]
+        return f"Outer springs lose {percent(1.0 + value, error)} for each free side."
+    return f"Outer springs lose {percent(*numbers['outer_loss_scale'])}."
+
+
+EFFECT = Effect("edge_loss", _candidates, Steady("edge_loss_fraction", -0.2, 2.0), says=_says)

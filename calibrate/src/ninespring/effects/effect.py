@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -117,6 +119,10 @@ def scene_of(problem: Problem) -> Scene:
     )
 
 
+Numbers = Mapping[str, tuple[float, float | None]]
+"""Values with standard errors, by name."""
+
+
 @dataclass(frozen=True)
 class Effect:
     """One effect: its name in the table of effects, and the ways it can be there."""
@@ -124,6 +130,18 @@ class Effect:
     name: str
     candidates: Callable[[Scene], Iterator[Candidate]]
     steady: Steady | None = None
+    says: Callable[[Numbers, str], str] | None = None
+    """What was found in one sentence: of the numbers' values with errors, and the variant."""
+
+    def sentence(self, parameters: Mapping[str, Mapping[str, Any]], variant: str) -> str:
+        """Return what was found, in words and sizes; parameters as diagnosis.json has them."""
+        numbers = {name: (float(one["value"]), one["stderr"]) for name, one in parameters.items()}
+        if self.says:
+            return self.says(numbers, variant)
+        sizes = [sized(value, error, str(parameters[name]["unit"])) for name, (value, error) in numbers.items()]
+        return (
+            f"{self.name.replace('_', ' ').capitalize()}{f' ({variant})' if variant else ''}: {', '.join(sizes[:3])}."
+        )
 
     def candidates_for(self, scene: Scene) -> list[Candidate]:
         """Return the ways it could be there, its name filled in."""
@@ -131,6 +149,22 @@ class Effect:
             replace(one, effect=self.name, free=tuple(replace(f, effect=self.name) for f in one.free))
             for one in self.candidates(scene)
         ]
+
+
+def sized(value: float, error: float | None, unit: str = "", factor: float = 1.0) -> str:
+    """Return a number with its error, as many digits as the error leaves."""
+    value, error = value * factor, None if error is None else error * factor
+    unit = "" if unit in ("", "1") else f" {unit}"
+    if error is None or not error or error > abs(value):
+        return f"{value:.2g}{unit}" + (" (hardly determined alone)" if error else "")
+    digits = max(0, min(6, 1 - math.floor(math.log10(error)) - (error / 10 ** math.floor(math.log10(error)) > 3)))
+    return f"{value:.{digits}f}{unit} (+-{error:.{digits}f})"
+
+
+def percent(value: float, error: float | None, more: str = "more", less: str = "less") -> str:
+    """Return a ratio as so many percent more or less."""
+    size, bracket, rest = sized(abs(value - 1.0), error, factor=100.0).partition(" (")
+    return f"{size} % {more if value > 1 else less}{bracket}{rest}"
 
 
 def positive(name: str, low: float, high: float, start: float) -> Free:

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from . import alloy
-from .effect import Candidate, Effect, Scene, Steady, linear
+from .effect import Candidate, Effect, Numbers, Scene, Steady, linear, sized
 
 NAME = "latent_heat_j"
 
@@ -23,4 +23,11 @@ def _candidates(scene: Scene) -> Iterator[Candidate]:
         )
 
 
-EFFECT = Effect("latent_heat", _candidates, Steady(NAME, 0.0, 20.0))
+def _says(numbers: Numbers, variant: str) -> str:
+    said = f"The transformation takes up {sized(*numbers[NAME], 'J')}"
+    if alloy.SHIFT in numbers:
+        said += f", and lies {sized(*numbers[alloy.SHIFT], 'K')} from where it is declared"
+    return said + "."
+
+
+EFFECT = Effect("latent_heat", _candidates, Steady(NAME, 0.0, 20.0), says=_says)

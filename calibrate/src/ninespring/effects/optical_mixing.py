@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from .effect import Candidate, Effect, Scene, Steady, linear
+from .effect import Candidate, Effect, Numbers, Scene, Steady, linear, sized
 
 
 def _candidates(scene: Scene) -> Iterator[Candidate]:
@@ -23,6 +23,10 @@ def _candidates(scene: Scene) -> Iterator[Candidate]:
     )
 
 
+def _says(numbers: Numbers, variant: str) -> str:
+    return f"The camera sees {sized(*numbers['optical_orthogonal'], '%', 100.0)} of each neighbour in a spring's place."
+
+
 EFFECT = Effect(
     "optical_mixing",
     _candidates,
@@ -34,4 +38,5 @@ EFFECT = Effect(
         against="Perspex is opaque from 8 to 14 um: the camera sees the plate's surface, which itself blurs the springs; "
         "a share per neighbour would also fall with the pitch",
     ),
+    says=_says,
 )

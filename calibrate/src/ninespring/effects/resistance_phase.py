@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from . import alloy
-from .effect import Candidate, Effect, Scene, Steady, linear
+from .effect import Candidate, Effect, Numbers, Scene, Steady, linear, sized
 
 
 def _candidates(scene: Scene) -> Iterator[Candidate]:
@@ -32,4 +32,11 @@ def _candidates(scene: Scene) -> Iterator[Candidate]:
         )
 
 
-EFFECT = Effect("resistance_phase", _candidates, Steady("resistance_austenite_ohm", 0.1, 0.4))
+def _says(numbers: Numbers, variant: str) -> str:
+    said = f"Austenite has {sized(*numbers['resistance_austenite_ohm'], 'ohm')}"
+    if alloy.SHIFT in numbers:
+        said += f", and the transformation lies {sized(*numbers[alloy.SHIFT], 'K')} from where it is declared"
+    return said + "."
+
+
+EFFECT = Effect("resistance_phase", _candidates, Steady("resistance_austenite_ohm", 0.1, 0.4), says=_says)

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from .effect import Candidate, Effect, Scene, Steady, linear
+from .effect import Candidate, Effect, Numbers, Scene, Steady, linear, percent, sized
 
 
 def _candidates(scene: Scene) -> Iterator[Candidate]:
@@ -26,6 +26,15 @@ def _candidates(scene: Scene) -> Iterator[Candidate]:
         )
 
 
+def _says(numbers: Numbers, variant: str) -> str:
+    which = (
+        "All thermometers read" if variant == "all sensors" else f"Thermometer {variant.removeprefix('sensor ')} reads"
+    )
+    gain = next(value for name, value in numbers.items() if name.startswith("sensor_gain"))
+    offset = next(value for name, value in numbers.items() if name.startswith("sensor_offset_k"))
+    return f"{which} {percent(*gain)} of the rise, off by {sized(*offset, 'K')}."
+
+
 EFFECT = Effect(
     "sensor_gain",
     _candidates,
@@ -36,4 +45,5 @@ EFFECT = Effect(
         {"sensor_offset_k": 0.0},
         against="the same gain would apply to the hot springs: they would have shown far above the 99 they did",
     ),
+    says=_says,
 )

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from .effect import Candidate, Effect, Scene, positive
+from .effect import Candidate, Effect, Numbers, Scene, positive, sized
 
 
 def _candidates(scene: Scene) -> Iterator[Candidate]:
@@ -16,4 +16,8 @@ def _candidates(scene: Scene) -> Iterator[Candidate]:
     )
 
 
-EFFECT = Effect("sensor_lag", _candidates)
+def _says(numbers: Numbers, variant: str) -> str:
+    return f"The thermometers lag {sized(*numbers['sensor_lag_s'], 's')}."
+
+
+EFFECT = Effect("sensor_lag", _candidates, says=_says)

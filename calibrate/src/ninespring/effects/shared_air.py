@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from .effect import Candidate, Effect, Scene, Steady, positive
+from .effect import Candidate, Effect, Numbers, Scene, Steady, positive, sized
 
 
 def _candidates(scene: Scene) -> Iterator[Candidate]:
@@ -21,6 +21,10 @@ def _candidates(scene: Scene) -> Iterator[Candidate]:
     )
 
 
+def _says(numbers: Numbers, variant: str) -> str:
+    return f"The air between the springs warms: {sized(*numbers['air_exchange_w_per_k'], 'mW/K', 1e3)} to the room."
+
+
 EFFECT = Effect(
     "shared_air",
     _candidates,
@@ -30,4 +34,5 @@ EFFECT = Effect(
         10.0,
         against="a fan flushes the air between the springs, yet the error is as large with the fan as without",
     ),
+    says=_says,
 )

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from .effect import Candidate, Effect, Scene, Steady, linear
+from .effect import Candidate, Effect, Numbers, Scene, Steady, linear, percent
 
 
 def _candidates(scene: Scene) -> Iterator[Candidate]:
@@ -19,6 +19,15 @@ def _candidates(scene: Scene) -> Iterator[Candidate]:
         )
 
 
+def _says(numbers: Numbers, variant: str) -> str:
+    k = variant.removeprefix("spring ")
+    loss, mass = numbers[f"loss_scale[{k}]"], numbers[f"heat_capacity_scale[{k}]"]
+    said = f"Spring {k} loses {percent(*loss)}"
+    if abs(mass[0] - 1.0) > 2.0 * (mass[1] or 0.0):
+        said += f", and holds {percent(*mass)} heat"
+    return said + "."
+
+
 EFFECT = Effect(
     "spring_mismatch",
     _candidates,
@@ -30,4 +39,5 @@ EFFECT = Effect(
         against="one spring of nine made alike would have to lose that much less than its neighbours, at every pitch, "
         "after each rebuild",
     ),
+    says=_says,
 )

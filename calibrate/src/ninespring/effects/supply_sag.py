@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from .effect import Candidate, Effect, Scene, linear
+from .effect import Candidate, Effect, Numbers, Scene, linear, sized
 
 
 def _candidates(scene: Scene) -> Iterator[Candidate]:
@@ -22,4 +22,8 @@ def _candidates(scene: Scene) -> Iterator[Candidate]:
         )
 
 
-EFFECT = Effect("supply_sag", _candidates)
+def _says(numbers: Numbers, variant: str) -> str:
+    return f"The supply sags under load: {sized(*numbers['supply_resistance_ohm'], 'ohm')} in front of {variant}."
+
+
+EFFECT = Effect("supply_sag", _candidates, says=_says)

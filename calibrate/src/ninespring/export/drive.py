@@ -68,6 +68,17 @@ def drive(plant: native.Plant, lines: str, pattern: np.ndarray) -> Drive:
     )
 
 
+def worse_than(old: Drive, new: Drive) -> list[str]:
+    """Return the measures in which one drive is worse than another."""
+    out = []
+    for measure, (limit, _) in WORSE.items():
+        a, b = getattr(old, measure), getattr(new, measure)
+        more = a - b if measure == "held" else b - a
+        if more > max(limit, 0.1 * a * (measure == "heating_s")):
+            out.append(measure)
+    return out
+
+
 def compare(
     model: Model, old: str, new: str, say: Callable[[str], None] = lambda text: None
 ) -> tuple[list[str], list[dict[str, float]]]:
@@ -85,10 +96,10 @@ def compare(
         for k, plant in enumerate(plants):
             say(f"driving array {k + 1} of {len(plants)}")
             pairs.append((drive(plant, old, pattern), drive(plant, new, pattern)))
-        for measure, (limit, words) in WORSE.items():
-            sign = -1.0 if measure == "held" else 1.0
+        judged = [worse_than(a, b) for a, b in pairs]
+        for measure, (_, words) in WORSE.items():
             values = [(getattr(a, measure), getattr(b, measure)) for a, b in pairs]
-            worse = [sign * (b - a) > max(limit, 0.1 * a * (measure == "heating_s")) for a, b in values]
+            worse = [measure in one for one in judged]
             rows += [{"array": k + 1, "measure": measure, "old": a, "new": b} for k, (a, b) in enumerate(values)]
             if worse[0] or sum(worse) > len(worse) / 2:
                 a, b = values[0] if worse[0] else values[worse.index(True)]

@@ -78,7 +78,8 @@ def _moved(plant: native.Plant, name: str) -> native.Plant:
     twin = plant.copy()
     value = twin.get(name)
     span = known.maximum - known.minimum
-    step = 0.1 * abs(value) if value else min(0.05 * span, 1.0)
+    # clearly more than the last digit that the chip holds of it
+    step = max(0.1 * abs(value), 0.05 * abs(known.default)) or min(0.05 * span, 1.0)
     if float(value).is_integer() and span <= 8:
         step = 1.0
     for other in (value + step, value - step):

@@ -23,7 +23,8 @@ from ..console import (
     write,
 )
 from ..errors import InputError
-from ..logs import check_folder
+from ..logs import Run, check_folder
+from ..models import Array
 
 
 @click.command(
@@ -42,7 +43,8 @@ Examples:
 def fit(logs: tuple[Path, ...], array_path: Path | None, effects: str, output: Path, json_path: Path | None) -> None:
     """Fit the declared model, with the effects named, to logs.
 
-    Errors are root mean squares in K; numbers are in J/K, W/K, J, s as the table says. Held out: on blocks of two and a
+    Logs of a board alone, currents and voltages without any temperature, are fitted to v / i: each spring's transformation
+    is a fixed point of its temperature, and effects of the array that it shows are looked for and named. Errors are root mean squares in K (of v / i: in mohm); numbers are in J/K, W/K, J, s as the table says. Held out: on blocks of two and a
     half minutes that the numbers were not fitted to.
     """
     from .. import effects as library
@@ -50,6 +52,7 @@ def fit(logs: tuple[Path, ...], array_path: Path | None, effects: str, output: P
     from ..models import model_text
     from ..verdict import diagnosis, plausibility, steady
     from ..verdict.result import model_of, parameters_of
+    from . import from_resistance
     from .statistics import rms
 
     check_folder(output, json_path)
@@ -60,8 +63,13 @@ def fit(logs: tuple[Path, ...], array_path: Path | None, effects: str, output: P
     for path in logs:
         if steady.is_steady(path):
             raise InputError("a steady table: `ninespring diagnose` fits it, effect by effect", path, 1)
-    array, runs = array_and_runs(array_path, logs)
+    array, runs = array_and_runs(array_path, logs, or_resistance=True)
     notes_of(runs)
+    if from_resistance.has_none(runs):
+        if wanted:
+            raise InputError("without a thermometer the effects are looked for: leave --effects out", logs[0])
+        _fit_from_resistance(array, runs, output, json_path)
+        return
     with working("fitting") as say:
         problem, chosen, base = diagnosis.fit_effects(array, runs, wanted, say)
         say("held-out blocks")
@@ -95,3 +103,42 @@ def fit(logs: tuple[Path, ...], array_path: Path | None, effects: str, output: P
     for effect in wanted:
         if effect in library.WHY_NOT_ON_CHIP:
             beside(output).print(f"{effect}: not for the chip: {library.WHY_NOT_ON_CHIP[effect]}")
+
+
+def _fit_from_resistance(array: Array, runs: list[Run], output: Path, json_path: Path | None) -> None:
+    from .. import effects
+    from ..models import model_text
+    from ..verdict.result import parameters_of
+    from . import from_resistance
+    from .statistics import rms
+
+    with working("fitting v / i") as say:
+        problem, found, first = from_resistance.fit(array, runs)
+        found, witnesses = from_resistance.with_effects(problem, found, say)
+    model = from_resistance.model_of_fit(problem, found)
+    errors = {"rmse_before_ohm": first.residual, "rmse_ohm": found.residual}
+    result = result_of(
+        "fit",
+        logs=logs_of(runs),
+        rmse_before_c=None,
+        rmse_c=None,
+        holdout_rmse_c=None,
+        noise_c=None,
+        **{name: 1e-3 * rms(left) for name, left in errors.items()},
+        noise_ohm=1e-3 * problem.noise_c,
+        effects=list(found.spec.effects),
+        parameters={k: v for e in (None, *found.spec.effects) for k, v in parameters_of(problem, found, e).items()},
+        not_identifiable=sorted(found.stuck),
+        at_bounds=found.at_bounds(),
+        warnings=[from_resistance.SCALE],
+    )
+    write({output: model_text(model), json_path: checked(result)})
+    print_parameters(beside(output), result["parameters"])
+    beside(output).print(
+        f"no thermometer: fitted to v / i, error {1e3 * result['rmse_before_ohm']:.2f} mohm as declared, "
+        f"{1e3 * result['rmse_ohm']:.2f} fitted, noise {1e3 * result['noise_ohm']:.2f} -> {output}"
+    )
+    for name, one in witnesses.items():
+        said = effects.sentence(name, parameters_of(problem, found, name), dict(found.spec.variant)[name])
+        beside(output).print(f"{said} ({100 * one.probability():.0f} %)", markup=False)
+    notes("", [from_resistance.SCALE])

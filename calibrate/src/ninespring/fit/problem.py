@@ -63,7 +63,6 @@ class Problem:
         ]
         self.hats = {
             "ambient_drift_k": [_hats(run, knots) for run, knots in zip(self.runs, self.knots, strict=True)],
-            "ambient_offset_k": [np.ones((len(run.time_s), 1)) for run in self.runs],
             "ambient_slow_drift_k": [
                 _hats(run, np.linspace(run.time_s[0], run.time_s[-1], SLOW_KNOTS)) for run in self.runs
             ],

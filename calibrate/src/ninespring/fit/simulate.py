@@ -18,8 +18,11 @@ def simulate_run(
     ambient: np.ndarray | None,
     values: Mapping[str, float],
     start_offset: np.ndarray | None = None,
+    trace: bool = False,
 ) -> np.ndarray:
-    """Simulate one log as section 4 says: from its first measured temperatures (ambient where none).
+    """Simulate one log as docs/files.md says: from its first measured temperatures (ambient where none).
+
+    Return what the sensors show, (rows, springs), degC; `trace`: true temperatures and austenite, (rows, springs, 2).
 
     After a gap the springs start again from what was measured there; air and plate carry on.
     Air and plate start at ambient, or, where the run begins warm and steady, in balance with its first inputs.
@@ -36,14 +39,15 @@ def simulate_run(
         # a drifting ambient has no balance: it begins at the run's first row
         plant.settle_without("ambient_drift", 1e6)
     plant.start_from_measured(first + (0.0 if start_offset is None else start_offset))
+    simulate = plant.trace if trace else plant.simulate
     if len(run.starts) == 1:
-        return plant.simulate(run.time_s, mode, run.drive, run.fan, ambient)
-    out = np.empty_like(run.temperature_c)
+        return simulate(run.time_s, mode, run.drive, run.fan, ambient)
+    out = np.empty((*run.temperature_c.shape, 2) if trace else run.temperature_c.shape)
     bounds = [*run.starts, len(run.time_s)]
     for piece, (begin, end) in enumerate(zip(bounds[:-1], bounds[1:], strict=True)):
         if piece:
             across = slice(begin - 1, begin + 1)
-            plant.simulate(
+            simulate(
                 run.time_s[across],
                 mode,
                 run.drive[across],
@@ -52,10 +56,10 @@ def simulate_run(
             )
             plant.start_from_measured(run.temperature_c[begin])
         part = slice(begin, end)
-        if end - begin == 1:
+        if end - begin == 1 and not trace:
             out[part] = plant.measured_c()
             continue
-        out[part] = plant.simulate(
+        out[part] = simulate(
             run.time_s[part],
             mode,
             run.drive[part],

@@ -50,8 +50,8 @@ def condense(run: Run, max_rows: int = 4000) -> Run:
         temperature_c=run.temperature_c[pick],
         fan=run.fan[pick],
         ambient_c=None if run.ambient_c is None else run.ambient_c[pick],
-        current_a=None,
-        voltage_v=None,
+        current_a=None if run.current_a is None else run.current_a[pick],
+        voltage_v=None if run.voltage_v is None else run.voltage_v[pick],
         starts=starts,
         notes=[
             *run.notes,
@@ -99,6 +99,15 @@ def _averaged(run: Run, max_rows: int) -> Run:
         smooth = measured.rolling(factor - (factor + 1) % 2, center=True, min_periods=1).mean().to_numpy()
         pieces["temperature"].append(smooth[rows - begin])
     row = np.concatenate(pieces["row"])
+    current = voltage = None
+    if run.current_a is not None and run.voltage_v is not None:
+        # the voltage weighted by the current, as the board averages it: their product stays the mean power
+        begins = [np.arange(a, b, factor) for a, b in zip(run.starts, [*run.starts[1:], n], strict=True)]
+        at = np.concatenate(begins)
+        span = np.add.reduceat(weight, at)
+        current = np.add.reduceat(weight[:, None] * run.current_a, at, axis=0) / span[:, None]
+        power = np.add.reduceat(weight[:, None] * run.current_a * run.voltage_v, at, axis=0) / span[:, None]
+        voltage = np.where(current > 0, power / np.where(current > 0, current, 1.0), 0.0)
     return replace(
         run,
         time_s=run.time_s[row],
@@ -106,8 +115,8 @@ def _averaged(run: Run, max_rows: int) -> Run:
         temperature_c=np.ascontiguousarray(np.concatenate(pieces["temperature"])),
         fan=np.concatenate(pieces["fan"]),
         ambient_c=None if run.ambient_c is None else run.ambient_c[row],
-        current_a=None,
-        voltage_v=None,
+        current_a=current,
+        voltage_v=voltage,
         starts=starts,
         notes=[*run.notes, f"{n} rows averaged {factor} by {factor} for the fit"],
     )

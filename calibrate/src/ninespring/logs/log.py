@@ -83,7 +83,8 @@ def _driving_columns(
     if "time_s" not in names:
         raise InputError("no column time_s", path, line, 1)
     if temperatures and not groups["t"]:
-        raise InputError("no temperature column (t1_c ...)", path, line, 1)
+        more = ": with currents and voltages alone, `ninespring fit` tells what they do" if groups["v"] else ""
+        raise InputError(f"no temperature column (t1_c ...){more}", path, line, 1)
     count = springs or max(set().union(*groups.values()), default=0)
     everyone = set(range(1, count + 1))
     letter = "i" if groups["i"] else "u"
@@ -107,12 +108,18 @@ def _driving_columns(
     return letter, count, bool(groups["v"])
 
 
-def read_log(path: str | Path, springs: int | None = None, temperatures: bool = True, why: str = "") -> Run:
-    """Read and check one log; `springs` is the array's number (`why` says whose), None to take what the header says."""
+def read_log(
+    path: str | Path, springs: int | None = None, temperatures: bool = True, why: str = "", or_resistance: bool = False
+) -> Run:
+    """Read and check one log; `springs` is the array's number (`why` says whose), None to take what the header says.
+
+    `temperatures`: refuse a log without any, unless `or_resistance` and it has currents and voltages.
+    """
     found: list[tuple[str, int, bool]] = []
 
     def check(names: list[str], line: int, columns: list[int]) -> None:
-        found.append(_driving_columns(path, names, line, columns, springs, temperatures, why))
+        needed = temperatures and not (or_resistance and any(COLUMN.match(n) and n[0] == "v" for n in names))
+        found.append(_driving_columns(path, names, line, columns, springs, needed, why))
 
     table = read_table(path, header_check=check)
     letter, count, has_voltages = found[0]
@@ -183,7 +190,7 @@ def read_log(path: str | Path, springs: int | None = None, temperatures: bool = 
     if mode == "command":
         run.drive = np.clip(run.drive, 0.0, 1.0)
     without = [str(k) for k in range(1, count + 1) if f"t{k}_c" not in frame]
-    if without and temperatures:
+    if without and temperatures and len(without) < count:
         notes.append(f"no temperature of spring {', '.join(without)}: simulated, but not compared")
     mending.refuse_wrong_units(run, table)
     mending.mask_bad_sensors(run)
@@ -191,7 +198,11 @@ def read_log(path: str | Path, springs: int | None = None, temperatures: bool = 
     mending.find_gaps(run)
     run.warm = mending.begins_warm(run)
     mending.doubt_units(run)
-    if temperatures and not np.isfinite(run.temperature_c).any():
+    if (
+        temperatures
+        and not (or_resistance and voltage is not None and len(without) == count)
+        and not np.isfinite(run.temperature_c).any()
+    ):
         why = f" ({notes[-1]})" if notes else ""
         raise InputError(f"no usable temperature in the whole log{why}", path)
     return run

@@ -72,6 +72,8 @@ def traces(found: Diagnosis) -> list[tuple[str, str]]:
                     line = shown[pick].copy()
                     line[breaks[1:] - 1] = np.nan
                     axis.plot(since, line, color=colour, lw=0.9, label=label)
+                if residual:
+                    _shade_inputs(axis, run, k, pick)
                 axis.set_title(f"spring {k + 1}", fontsize=9, loc="left", color=INK)
                 axis.grid(alpha=0.25)
                 axis.tick_params(labelsize=8)
@@ -83,6 +85,59 @@ def traces(found: Diagnosis) -> list[tuple[str, str]]:
             pair.append(_svg(figure))
         figures.append((pair[0], pair[1]))
     return figures
+
+
+def _shade_inputs(axis: Any, run: Run, k: int, pick: slice) -> None:
+    """Shade a spring's drive and the fan into the lowest sixth of a picture."""
+    since = (run.time_s - run.time_s[0])[pick]
+    top = max(1e-12, float(run.drive.max()))
+    across = axis.get_xaxis_transform()
+    axis.fill_between(
+        since, 0.0, run.drive[pick, k] / top / 6.0, transform=across, color="#c9a14a", alpha=0.45, lw=0, step="post"
+    )
+    axis.fill_between(since, 0.0, run.fan[pick] / 40.0, transform=across, color="#5b8fd0", alpha=0.7, lw=0, step="post")
+
+
+def array_map(found: Diagnosis) -> str:
+    """Draw what is left at each spring in multiples of its sensor's noise, with a colour bar."""
+    problem = found.problem
+    shape = (problem.array.rows, problem.array.cols)
+    scaled = [left / noise for left, noise in zip(found.final.residual, problem.noise, strict=True)]
+    joined = np.concatenate(scaled)
+    seen = np.isfinite(joined)
+    rms = np.sqrt(np.nansum(joined**2, axis=0) / np.where(seen.any(axis=0), seen.sum(axis=0), np.nan))
+    figure, axis = plt.subplots(figsize=(4.2, min(4.2, 0.8 + 3.4 * shape[0] / shape[1])))
+    high = max(3.0, float(np.nanmax(rms)))
+    shown = axis.imshow(rms.reshape(shape), cmap="YlOrRd", vmin=1.0, vmax=high)
+    for k, value in enumerate(rms):
+        text = f"{k + 1}" if not math.isfinite(value) else f"{k + 1}\n{value:.1f}"
+        dark = math.isfinite(value) and value > 1.0 + 0.7 * (high - 1.0)
+        axis.text(
+            k % shape[1], k // shape[1], text, ha="center", va="center", fontsize=9, color="white" if dark else INK
+        )
+    axis.set_xticks([])
+    axis.set_yticks([])
+    figure.colorbar(shown, ax=axis, shrink=0.8, label="rms error / noise")
+    return _svg(figure)
+
+
+def error_bars(result: dict[str, Any]) -> str:
+    """Draw the held-out errors before and after, and the noise."""
+    before, after = result["baseline"], result["after"]
+    rows = (
+        ("before", before["holdout_rmse_c"], BEFORE),
+        ("after", after["holdout_rmse_c"], AFTER),
+        ("noise", before["noise_c"], MEASURED),
+    )
+    figure, axis = plt.subplots(figsize=(4.2, 1.5))
+    for at, (name, value, colour) in enumerate(rows):
+        axis.barh(-at, value, color=colour, height=0.7)
+        axis.text(value, -at, f" {value:.2f} K", va="center", fontsize=9)
+        axis.text(0, -at, f"{name} ", va="center", ha="right", fontsize=9)
+    axis.set_xlim(0, max(value for _, value, _ in rows) * 1.25)
+    axis.set_axis_off()
+    axis.set_title("error on held-out blocks", fontsize=9, loc="left")
+    return _svg(figure)
 
 
 def _rows_of(run: Run, pick: slice) -> np.ndarray:

@@ -13,17 +13,24 @@ from ..verdict.diagnosis import Diagnosis
 from . import figures
 
 STYLE = """
-:root{color-scheme:light}body{font:16px/1.5 system-ui,-apple-system,"Segoe UI",sans-serif;color:#1d2733;
-background:#f6f7f9;margin:0}main{max-width:1120px;margin:0 auto;padding:24px 20px 60px}
-h1{font-size:28px;margin:8px 0 4px}h2{font-size:20px;margin:36px 0 8px;border-bottom:1px solid #d9dfe5;padding-bottom:4px}
-.lead{font-size:18px;margin:6px 0 18px}.cards{display:grid;grid-template-columns:repeat(auto-fit,minmax(170px,1fr));gap:12px}
-.card{background:#fff;border:1px solid #e1e6eb;border-radius:10px;padding:12px 14px}.card b{display:block;font-size:24px}
-.card span{color:#5a6875;font-size:13px}.table{overflow-x:auto}figure{background:#fff;border:1px solid #e1e6eb;border-radius:10px;padding:10px;
-margin:12px 0}figure svg{width:100%;height:auto;display:block}figcaption{color:#5a6875;font-size:14px;padding:4px 6px}
-table{border-collapse:collapse;width:100%;background:#fff;border:1px solid #e1e6eb;border-radius:10px;font-size:14px}
-th,td{padding:6px 10px;border-bottom:1px solid #eef1f4;text-align:left;vertical-align:top}th{background:#f0f3f6}
-td.n,th.n{text-align:right;font-variant-numeric:tabular-nums}.warn{background:#fff6e5;border:1px solid #f0d9a8;
-border-radius:10px;padding:10px 14px}.bad{background:#fdeeea;border-color:#e9b9ac}small{color:#5a6875}
+:root{color-scheme:light dark;--ink:#1d2733;--soft:#5a6875;--page:#f6f7f9;--card:#fff;--line:#e1e6eb;--head:#f0f3f6;
+--warn:#fff6e5;--bad:#fdeeea}
+@media (prefers-color-scheme:dark){:root{--ink:#e6ebf0;--soft:#a7b4c0;--page:#14191f;--card:#1d242c;--line:#333e49;--head:#252e38;
+--warn:#3a3017;--bad:#43241d}}
+body{font:16px/1.5 system-ui,-apple-system,"Segoe UI",sans-serif;color:var(--ink);background:var(--page);margin:0}
+main{max-width:1120px;margin:0 auto;padding:24px 20px 60px}
+h1{font-size:26px;margin:8px 0 4px}h2{font-size:20px;margin:36px 0 8px;border-bottom:1px solid var(--line);padding-bottom:4px}
+.lead{font-size:17px;margin:6px 0 18px}.first{display:grid;grid-template-columns:minmax(0,3fr) minmax(0,2fr);gap:18px;align-items:start}
+.said{list-style:none;margin:0;padding:0}.said li{background:var(--card);border:1px solid var(--line);border-radius:10px;
+padding:10px 14px;margin:0 0 8px;font-size:18px}.said b{font-weight:600;font-size:13px;color:var(--soft);display:block}
+pre{background:var(--head);border-radius:10px;padding:10px 14px;overflow-x:auto;font-size:14px}
+.table{overflow-x:auto}figure{background:#fff;color:#1d2733;border:1px solid var(--line);border-radius:10px;padding:10px;margin:0 0 12px}
+figure svg{width:100%;height:auto;display:block}figcaption{color:#5a6875;font-size:14px;padding:4px 6px}
+table{border-collapse:collapse;width:100%;background:var(--card);border:1px solid var(--line);border-radius:10px;font-size:14px}
+th,td{padding:6px 10px;border-bottom:1px solid var(--line);text-align:left;vertical-align:top}th{background:var(--head)}
+td.n,th.n{text-align:right;font-variant-numeric:tabular-nums}.warn{background:var(--warn);border:1px solid var(--line);
+border-radius:10px;padding:10px 14px}.bad{background:var(--bad)}small{color:var(--soft)}
+@media (max-width:700px){.first{grid-template-columns:minmax(0,1fr)}main{padding:14px 12px 40px}h1{font-size:22px}.said li{font-size:16px}}
 """
 
 
@@ -69,23 +76,53 @@ def verdict(result: dict[str, Any]) -> str:
     return f"Nothing is missing: the declared model explains the data to the noise; {held}."
 
 
+def findings(result: dict[str, Any]) -> list[tuple[str, str]]:
+    """Return what was found in words and sizes, each with how sure it is: effects, unknown heat, what is left."""
+    out = []
+    for one in result["effects"]:
+        sure = f"{one['certainty']}, {100 * one['probability']:.0f} %" if "probability" in one else ""
+        out.append((f"{one['name']}: {sure}" if sure else one["name"], one.get("text", one["in_words"])))
+    for event in result.get("unknown_heat", {}).get("events", []):
+        kind = "a thermometer that jumped" if event["kind"] == "sensor" else "heat of unknown origin"
+        sure = f" (+-{event['stderr']:.2g} {event['unit']})"
+        out.append((kind + sure, event["text"][0].upper() + event["text"][1:] + "."))
+    if result["unexplained"]:
+        left = result["residual"].get("structure_c")
+        size = f"{left:.2f} K rms of structure is left" if left is not None else "Structure is left"
+        out.append(("unexplained", f"{size} beyond the noise of {result['baseline']['noise_c']:.2f} K."))
+    if not out:
+        out.append(("nothing is missing", "The declared model explains the logs to the noise of the sensors."))
+    return out
+
+
+def next_steps(result: dict[str, Any]) -> list[str]:
+    """Return what to do next, as commands."""
+    out = [f"# {one['separating_experiment']}" for one in result["rivals"][:2]]
+    if out:
+        out += [
+            "ninespring record --port PORT --run steps.txt -o board3.csv     # that experiment, with a thermometer",
+            f"ninespring diagnose {' '.join(log['file'] for log in result.get('logs', []))} run3.csv -o diagnosis",
+        ]
+    return [
+        *out,
+        "ninespring verify --model diagnosis/model.toml another.csv      # a log that this fit never saw",
+        "ninespring export --model diagnosis/model.toml -o settings.txt",
+        "ninespring upload --port PORT settings.txt",
+    ]
+
+
 def html_report(found: Diagnosis) -> str:
     """Return the report as HTML."""
     result = found.result
     before, after = result["baseline"], result["after"]
     parts = ["<h1>What the array does that the model did not</h1>", f'<p class="lead">{_e(verdict(result))}</p>']
-    cards = [
-        (f"{before['rmse_c']:.2f} K", "error before"),
-        (f"{after['rmse_c']:.2f} K", "error after"),
-        (f"{before['holdout_rmse_c']:.2f} K", "held-out before"),
-        (f"{after['holdout_rmse_c']:.2f} K", "held-out after"),
-        (f"{before['noise_c']:.2f} K", "noise of the sensors"),
-        ("yes" if result["unexplained"] else "none", "unexplained rest"),
-    ]
+    said = [(one, text) for one, text in findings(result)]
+    lines = "".join(f"<li><b>{_e(one)}</b>{_e(text)}</li>" for one, text in said)
     parts.append(
-        '<div class="cards">'
-        + "".join(f'<div class="card"><b>{_e(a)}</b><span>{_e(b)}</span></div>' for a, b in cards)
-        + "</div>"
+        f'<div class="first"><div><ul class="said">{lines}</ul></div><div>'
+        f"<figure>{figures.array_map(found)}<figcaption>What the best model leaves at each spring, in multiples of its "
+        f"sensor's noise.</figcaption></figure><figure>{figures.error_bars(result)}</figure></div></div>"
+        f"<h2>What to do next</h2><pre>{_e(chr(10).join(next_steps(result)))}</pre>"
     )
     parts.append(
         "<h2>Errors before and after</h2>"
@@ -148,10 +185,11 @@ def html_report(found: Diagnosis) -> str:
     for r, (svg, left) in enumerate(figures.traces(found)):
         log, run = result["logs"][r], found.problem.runs[r]
         parts.append(
+            f"<figure>{left}<figcaption>Run {r + 1}: what both models leave. Within the grey band, two standard deviations "
+            "of the sensor's noise, there is nothing more to find. Shaded below: the spring's own drive, and blue the fan."
+            "</figcaption></figure>"
             f"<figure>{svg}<figcaption>Run {r + 1}: {_e(log['file'])}, {log['rows']} rows, {run.duration_s / 60:.1f} min. "
             "Grey: measured; red: the declared model; blue: with the effects adopted.</figcaption></figure>"
-            f"<figure>{left}<figcaption>Run {r + 1}: what both models leave. Within the grey band, two standard deviations "
-            "of the sensor's noise, there is nothing more to find.</figcaption></figure>"
         )
     parts.append(
         f"<h2>Where the error sits</h2><figure>{figures.maps(found)}<figcaption>Each cell is a spring, row 1 on top; its number in the corner. Mean: measured less model.</figcaption></figure>"
@@ -167,10 +205,9 @@ def html_report(found: Diagnosis) -> str:
     identify = result["identifiability"]
     lines = [f"{n}: the data cannot fix it" for n in identify["not_identifiable"]]
     lines += [f"{n}: at its bound" for n in identify["at_bounds"]]
-    lines += [
-        f"{c['a']} and {c['b']}: errors correlated at {c['correlation']:+.3f}; only a combination is determined"
-        for c in identify["correlated"]
-    ]
+    tied = sorted({name for c in identify["correlated"] for name in (c["a"], c["b"])})
+    if tied:
+        lines.append(f"determined in combination only: {', '.join(tied)}")
     if lines:
         parts.append('<h2>Not determined by these data</h2><div class="warn">' + "<br>".join(map(_e, lines)) + "</div>")
     parts.append(

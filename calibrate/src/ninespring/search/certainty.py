@@ -23,13 +23,14 @@ CERTAIN = 0.9
 """Probability from which an effect is called certain, not probable."""
 NAMED = 0.5
 """Probability from which an effect is named at all."""
+ENOUGH_NATS = 30.0
+"""Evidence beyond which more says nothing more: what stands in for something else has hundreds of nats, too."""
 WEIGHTS = {
-    "one": -1.0,
-    "share": 1.0,
-    "in_time": -2.0,
-    "in_place": 0.0,
-    "left": -1.0,
-    "nats": 0.0,
+    "one": -7.80,
+    "share": 1.84,
+    "in_time": -1.97,
+    "nats": 3.45,
+    "flexible": -3.43,
 }
 """Logistic weights of a witness: fitted by bench/diagnose/certainty.py to developing seeds, checked on reporting ones."""
 
@@ -47,16 +48,17 @@ class Witness:
     """The same from spring to spring."""
     left: float
     """What the whole model leaves beyond the noise, relative to the noise."""
+    flexible: bool
+    """It follows anything slow: as likely a stand-in as a cause, where what it says changed was logged."""
 
     def features(self) -> dict[str, float]:
-        """Return what the probability is computed from: each bounded, none of them in units of a log's length."""
+        """Return what the probability is computed from, each bounded."""
         return {
             "one": 1.0,
-            "share": self.share,
+            "share": math.log10((self.share + 0.01) / (1.01 - self.share)),
             "in_time": math.log10(0.01 + self.in_time),
-            "in_place": math.log10(0.01 + self.in_place),
-            "left": math.log10(0.1 + self.left),
-            "nats": math.log10(max(1.0, self.nats)),
+            "nats": math.log10(max(1.0, min(self.nats, ENOUGH_NATS))),
+            "flexible": float(self.flexible),
         }
 
     def probability(self) -> float:
@@ -78,7 +80,7 @@ def scatter(signal: list[np.ndarray], residual: list[np.ndarray], noise_factor: 
     return math.sqrt(top / bottom) if bottom > 0 else math.inf
 
 
-def witness(problem: Problem, fit: Fit, effect: str, without: Fit) -> Witness:
+def witness(problem: Problem, fit: Fit, effect: str, without: Fit, flexible: bool) -> Witness:
     """Return what speaks for an effect in a fit; `without` is the best fit that lacks it."""
     beyond = max(1e-9, excess(problem, without))
     off = fit.spec.without(effect)
@@ -107,4 +109,5 @@ def witness(problem: Problem, fit: Fit, effect: str, without: Fit) -> Witness:
         min(10.0, scatter(*times, factor)),
         min(10.0, scatter(*places, factor)),
         math.sqrt(excess(problem, fit)),
+        flexible,
     )

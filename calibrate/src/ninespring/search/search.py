@@ -187,6 +187,11 @@ class Search:
         wanted = (effect, dict(fit.spec.variant).get(effect))
         return next((c for c in self.candidates if (c.effect, c.variant) == wanted), None)
 
+    def is_flexible(self, fit: Fit, effect: str) -> bool:
+        """Return whether a fit has an effect in a variant that follows anything slow."""
+        one = self.candidate_of(fit, effect)
+        return one is not None and one.flexible
+
     def handicap(self, one: Fit, other: Fit) -> float:
         """Return the nats by which `one` must be ahead: TOLD_APART where it alone has a flexible cause, and the other
         something else in its place.
@@ -196,7 +201,7 @@ class Search:
         flexible = {c.effect for c in self.candidates if c.flexible}
         shared = flexible & set(one.spec.effects) & set(other.spec.effects)
         bends = [
-            any(c.flexible for e in fit.spec.effects if e not in shared and (c := self.candidate_of(fit, e)))
+            any(self.is_flexible(fit, effect) for effect in fit.spec.effects if effect not in shared)
             for fit in (one, other)
         ]
         return TOLD_APART * (bends[0] - bends[1])
@@ -207,7 +212,7 @@ class Search:
         gained = self.problem.holdout_rmse(other) ** 2 - self.problem.holdout_rmse(better) ** 2
         return gained > (0.6 * MIN_GAIN * noise) ** 2
 
-    def extend(self, fit: Fit, singles: int = 6, pairs: int = 3) -> list[tuple[Fit, int]]:
+    def extend(self, fit: Fit, singles: int = 6, pairs: int = 2) -> list[tuple[Fit, int]]:
         """Return refits of the most promising single and paired additions to `fit`, with how many were added."""
         screen = self.screen(fit)
         count = len(screen.candidates)

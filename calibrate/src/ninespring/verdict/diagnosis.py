@@ -6,7 +6,7 @@ import json
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, replace
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -27,7 +27,7 @@ from ..models import Array, Model
 from ..search import search
 from ..search.certainty import CERTAIN, NAMED, Witness, witness
 from ..search.evidence import EQUIVALENT, difference, excess, log_evidence, unexplained
-from . import experiments, plausibility
+from . import experiments, plausibility, resistance, unknown_heat
 from .residual import depends_on
 from .result import DRIFT_LEFT_OUT, model_of, parameters_of
 
@@ -43,7 +43,7 @@ class Diagnosis:
     problem: Problem
     baseline: Fit
     final: Fit
-    contenders: list[dict[str, Any]] = field(default_factory=list)
+    heat: unknown_heat.UnknownHeat
 
     @property
     def effects(self) -> list[str]:
@@ -168,9 +168,13 @@ def _diagnose(
     witnesses: dict[str, Witness] = {}
     progress("held-out blocks")
     final = _finish(problem, final)
+    guessed = all(run.ambient_c is None for run in problem.runs)
     while without:
         # The least likely goes first: what it stood in for may have made the others look worse than they are.
-        witnesses = {effect: witness(problem, final, effect, other) for effect, other in without.items()}
+        witnesses = {
+            effect: witness(problem, final, effect, other, found.is_flexible(final, effect) and not guessed)
+            for effect, other in without.items()
+        }
         effect = min(witnesses, key=lambda one: witnesses[one].probability())
         if witnesses[effect].probability() >= NAMED:
             break
@@ -196,12 +200,17 @@ def _diagnose(
             "witness": asdict(witnesses[effect]),
             "on_chip": effect in effects.ON_CHIP,
             "in_words": effects.IN_WORDS[effect],
+            "text": effects.sentence(effect, parameters_of(problem, final, effect), variant_of(final, effect)),
         }
         if variant := variant_of(final, effect):
             entry["variant"] = variant
         if effect in effects.WHY_NOT_ON_CHIP:
             entry["why_not_on_chip"] = effects.WHY_NOT_ON_CHIP[effect]
         listed.append(entry)
+
+    progress("what v / i says")
+    second = resistance.witness(problem, final, contacts=not left_over)
+    listed += [resistance.entry(one, final, problem) for one in (second or {}).get("effects", [])]
 
     rivals, seen = [], set()
     for instead, other in sorted(contenders, key=lambda one: one[1].chi2):
@@ -255,6 +264,7 @@ def _diagnose(
         note = ("structure well above the noise remains that no effect of the library explains. " + note).strip()
     else:
         note = note or "white at the noise floor"
+    heat = unknown_heat.find(problem, final, progress)
     result: dict[str, Any] = {
         "schema": SCHEMA,
         "tool": f"ninespring {__version__}",
@@ -274,6 +284,8 @@ def _diagnose(
             "parameters": parameters_of(problem, final),
         },
         "unexplained": bool(left_over),
+        "unknown_heat": heat.as_dict(),
+        **({"resistance": {key: one for key, one in second.items() if key != "effects"}} if second else {}),
         "residual": {
             "autocorrelation_lag1": float(np.clip(rho[1], -1.0, 1.0)),
             "structure_c": math.sqrt(excess(problem, final)) * problem.noise_c,
@@ -295,8 +307,9 @@ def _diagnose(
         "simulations": problem.simulations,
     }
     made = model_of(problem, final, runs, result, found.absent(final))
+    resistance.into_model(made, second)
     validate(result)
-    return Diagnosis(result, made, problem, base, final, contenders=[])
+    return Diagnosis(result, made, problem, base, final, heat)
 
 
 def finite(value: float) -> float | None:

@@ -10,13 +10,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from ..fit.problem import Problem
+from ..fit.simulate import simulate_run
 from ..fit.spec import Fit
+from ..logs.run import Run
 from ..search.evidence import fit_factor
 
 GRID_S = 15.0
@@ -27,8 +29,10 @@ MOST = 12
 """Pieces of one run; where more would help, the rest is not made of events."""
 SMALLEST = 0.05
 """Of a spring's usual power: less heat than this is not told, whatever its evidence."""
-PROBE_W = 0.02
-"""Heat, as a part of a watt, whose answer is simulated: small enough that the model is straight."""
+PROBE = 0.05
+"""Heat whose answer is simulated, as a part of the usual power: small enough that the model is straight."""
+EDGES = 80
+"""Edges of one run, at most: a longer run has a coarser grid."""
 
 
 @dataclass(frozen=True)
@@ -110,38 +114,47 @@ def power_of(problem: Problem, fit: Fit, run_index: int) -> np.ndarray:
     return run.drive
 
 
-def _answers(problem: Problem, fit: Fit, r: int) -> tuple[np.ndarray, float]:
-    """Return how the readings answer a step of 1 W at each spring, (springs, rows, springs), K/W, and the rows' step, s.
-
-    The array is taken as straight about where it is at rest: an answer is the same whenever the step begins.
-    """
-    run = problem.runs[r]
-    step = float(np.median(np.diff(run.time_s)))
-    rows = len(run.time_s)
+def _with_heat(problem: Problem, fit: Fit, run: Run, power_w: np.ndarray, extra_w: np.ndarray) -> Run:
+    """Return a run whose springs are given `extra_w` (rows, springs) beside what was logged."""
+    wanted = np.maximum(power_w + extra_w, 0.0)
+    if run.mode == "power":
+        return replace(run, drive=wanted)
+    factor = np.where(power_w > 0, wanted / np.where(power_w > 0, power_w, 1.0), 0.0)
     plant = problem.plant_for(fit.spec, fit.values)
-    effects = [name for name in fit.spec.plant_effects if name not in ("ambient_drift", "latent_heat")]
-    plant.set_effects(effects)
-    plant.set_fan(float(np.median(run.fan)))
-    from .. import native
+    if run.mode == "current":
+        idle = np.sqrt(wanted / plant.get("resistance_ohm"))
+        return replace(run, drive=np.where(power_w > 0, run.drive * np.sqrt(factor), idle))
+    full = np.array([max(1e-9, plant.get(f"command_power_w[{k + 1}]")) for k in range(run.springs)])
+    return replace(run, drive=np.minimum(np.where(power_w > 0, run.drive * factor, wanted / full), 1.0))
 
-    time_s = np.arange(rows) * step
-    fan = np.full(rows, float(np.median(run.fan)))
-    middle = power_of(problem, fit, r).mean(axis=0)
-    out = np.empty((run.springs, rows, run.springs))
+
+def _answers(
+    problem: Problem, fit: Fit, r: int, edges: np.ndarray, typical_w: float
+) -> dict[tuple[str, int], np.ndarray]:
+    """Return how the readings answer 1 W that begins at each edge and stays, (edges, rows, springs), K/W: per spring, and
+    at all of them. Simulated with everything else as it was, fan and all.
+    """
+    run, power = problem.runs[r], power_of(problem, fit, r)
+    ambient = problem.ambient_of(r, fit.as_dict())
+    size = PROBE * typical_w
 
     def shown(extra: np.ndarray) -> np.ndarray:
-        twin = plant.copy()
-        twin.reset()
-        for k in range(run.springs):
-            twin.drive(k, native.POWER, float(middle[k]))
-        twin.settle(1e6)
-        return twin.simulate(time_s, native.POWER, np.tile(middle + extra, (rows, 1)), fan)
+        plant = problem.plant_for(fit.spec, fit.values)
+        return simulate_run(plant, _with_heat(problem, fit, run, power, extra), ambient, {})
 
-    rest = shown(np.zeros(run.springs))
-    size = PROBE_W * max(0.05, float(middle.max()))
-    for k in range(run.springs):
-        out[k] = (shown(size * np.eye(run.springs)[k]) - rest) / size
-    return out, step
+    rest = shown(np.zeros_like(power))
+    jobs, keys = [], []
+    for kind, k in [("heat", k) for k in range(run.springs)] + ([("common", -1)] if run.springs > 1 else []):
+        for edge in edges:
+            extra = np.zeros_like(power)
+            extra[edge:, slice(None) if k < 0 else k] = size
+            jobs.append(extra)
+            keys.append((kind, k))
+    answers = list(problem.pool.map(shown, jobs))
+    out: dict[tuple[str, int], list[np.ndarray]] = {}
+    for key, answer in zip(keys, answers, strict=True):
+        out.setdefault(key, []).append((answer - rest) / size)
+    return {key: np.stack(one) for key, one in out.items()}
 
 
 def find(problem: Problem, fit: Fit, say: Callable[[str], None] = lambda text: None) -> UnknownHeat:
@@ -183,35 +196,35 @@ def _pieces_of(problem: Problem, fit: Fit, r: int, slopes: np.ndarray, factor: f
     """Return the pieces of one run: chosen one by one, the best first, all sizes fitted again with each."""
     run, mask, noise = problem.runs[r], problem.mask[r], problem.noise[r]
     springs, rows = run.springs, len(run.time_s)
-    answers, step = _answers(problem, fit, r)
-    grid = max(1, round(GRID_S / step))
+    step = float(np.median(np.diff(run.time_s)))
+    grid = max(1, round(GRID_S / step), -(-rows // EDGES))
     edges = np.arange(0, rows, grid)
     if len(edges) < 4:
         return []
+    answers = _answers(problem, fit, r, edges, typical_w)
     used = slopes[:, np.linalg.norm(slopes, axis=0) > 1e-6] if slopes.size else slopes
     basis = np.linalg.qr(used)[0] if used.shape[1] else np.zeros((int(mask.sum()), 0))
     kinds = [("heat", k) for k in range(springs)] + [("sensor", k) for k in range(springs)]
     if springs > 1:
         kinds.append(("common", -1))
 
-    def column(kind: str, k: int, at: int) -> np.ndarray:
-        """Return what a unit step that begins at a row adds to the readings, in units of the noise."""
-        field = np.zeros((rows, springs))
-        if kind == "sensor":
-            field[at:, k] = 1.0
-        else:
-            answer = answers[k] if kind == "heat" else answers.sum(axis=0)
-            field[at:] = answer[: rows - at]
-        return (field / noise)[mask]
+    def columns_of(kind: str, k: int) -> np.ndarray:
+        """Return what a unit step that begins at each edge adds to the readings, in units of the noise, (count, edges)."""
+        if kind != "sensor":
+            return np.column_stack([(answer / noise)[mask] for answer in answers[kind, k]])
+        fields = np.zeros((len(edges), rows, springs))
+        for number, edge in enumerate(edges):
+            fields[number, edge:, k] = 1.0
+        return np.column_stack([(field / noise)[mask] for field in fields])
 
-    steps = {one: np.column_stack([column(*one, int(at)) for at in edges]) for one in kinds}
+    steps = {one: columns_of(*one) for one in kinds}
     steps = {one: block - basis @ (basis.T @ block) for one, block in steps.items()}
     grams = {one: block.T @ block for one, block in steps.items()}
     left = (problem.without_starts(fit.residual)[r] / noise)[mask]
     left = left - basis @ (basis.T @ left)
     chosen: list[tuple[str, int, int, int]] = []
     columns: list[np.ndarray] = []
-    shortest = max(1, round(SHORTEST_S / GRID_S))
+    shortest = max(1, round(SHORTEST_S / (grid * step)))
     tried = len(kinds) * len(edges) ** 2 / 2
     rest, sizes, gains = left, np.zeros(0), []
     while len(chosen) < MOST:

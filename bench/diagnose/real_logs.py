@@ -1,0 +1,316 @@
+"""What real logs bring: heat of unknown origin, resistance as a second witness, and whether export helps or harms.
+
+    .venv/bin/python bench/diagnose/real_logs.py [--cases N] [--first SEED] [--json FILE]
+
+The data are of `world.py`, which shares nothing with the product, but for the last part: there arrays of the product's own
+plant, with other numbers, are driven by the chip's controller with the settings before and after. The real actuator
+(niti_pulse) is read from NINESPRING_PRIVATE, and left out where that is not set: its licence does not let it be carried.
+"""
+
+from __future__ import annotations
+
+import argparse
+import concurrent.futures
+import json
+import os
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from cases import REPORTING_SEEDS, SPRINGS, Case, make_case, write_logs
+from ninespring import native
+from ninespring.export import drive
+from ninespring.export.settings import settings_of
+from ninespring.fit import from_resistance
+from ninespring.fit import problem as fitting
+from ninespring.logs import log_text, read_log
+from ninespring.models import Array, Model
+from ninespring.verdict import diagnosis
+from world import World, random_inputs, simulate
+
+COMMAND = "python bench/diagnose/real_logs.py"
+
+
+def diagnosed(case: Case) -> tuple[diagnosis.Diagnosis, float]:
+    """Write a case's logs, diagnose the first two; return what was found, and the hours of log."""
+    with tempfile.TemporaryDirectory() as folder:
+        train, _, _ = write_logs(case, Path(folder))
+        runs = [read_log(path, SPRINGS) for path in train]
+        return diagnosis.diagnose(Array(), runs), sum(run.duration_s for run in runs) / 3600.0
+
+
+def unknown_heat(seed: int) -> dict[str, Any]:
+    """Inject a step of heat that nothing logs; return whether it was found, and what else was."""
+    rng = np.random.default_rng([seed, 11])
+    case = make_case("none", (), seed)
+    case.columns = "iv"
+    case.world.effects.pop("_command", None)
+    spring, begin, length = int(rng.integers(9)), float(rng.integers(150, 600)), float(rng.integers(120, 280))
+    power = case.runs[0].current[:, spring] ** 2 * case.world.resistance
+    watt = float(rng.uniform(0.15, 0.4) * power[power > 0].mean())
+    case.world.effects["_heat"] = {"spring": spring, "from": begin, "to": begin + length, "watt": watt}
+    found, hours = diagnosed(case)
+    events = found.result["unknown_heat"]["events"]
+    hits = [
+        e
+        for e in events
+        if e["kind"] == "heat"
+        and e["spring"] == spring + 1
+        and e["run"] == 1
+        and abs(e["from_s"] - begin) <= 30.0
+        and abs(e["to_s"] - begin - length) <= 30.0
+        and abs(e["size"] - watt) <= 0.25 * watt
+    ]
+    names = [e["name"] for e in found.result["effects"]]
+    return {"found": bool(hits), "others": len(events) - len(hits), "hours": hours, "names": names, "events": events}
+
+
+def quiet(seed: int) -> dict[str, Any]:
+    """Return the events told where nothing acts."""
+    case = make_case("none", (), seed)
+    found, hours = diagnosed(case)
+    return {"others": len(found.result["unknown_heat"]["events"]), "hours": hours}
+
+
+def second_witness(seed: int) -> dict[str, Any]:
+    """Let resistance rise with temperature, or a contact step, or neither; return what v / i named."""
+    rng = np.random.default_rng([seed, 13])
+    what = ("resistance_temperature", "contact_resistance", "")[seed % 3]
+    case = make_case("none", (), seed)
+    case.columns, case.sensors = "iv", True
+    case.world.effects = {"latent_heat": {"joule": 8.0}, "resistance_phase": {"ratio": 1.25}}
+    if what == "resistance_temperature":
+        case.world.effects[what] = {"rise": float(rng.uniform(0.0004, 0.0012))}
+    if what == "contact_resistance":
+        ohm, begin = float(rng.uniform(0.005, 0.02)), float(rng.integers(150, 700))
+        case.world.effects[what] = {"spring": float(rng.integers(9)), "from": begin, "ohm": ohm}
+    found, _ = diagnosed(case)
+    names = {e["name"] for e in found.result["effects"] if e.get("seen_by")}
+    return {"what": what, "names": sorted(names)}
+
+
+def exported(seed: int) -> dict[str, Any]:
+    """Diagnose and export the log of a random array; drive that array with the settings before and after."""
+    rng = np.random.default_rng([seed, 17])
+    plant = native.Plant(3, 3)
+    plant.set_effects(["latent_heat", "resistance_phase"])
+    numbers = ("heat_capacity_j_per_k", "loss_w_per_k", "loss_fan_w_per_k", "orthogonal_w_per_k", "diagonal_w_per_k")
+    for name in (*numbers, "latent_heat_j"):
+        plant.set(name, plant.get(name) * rng.uniform(0.8, 1.2))
+    cold = bool(seed % 2)
+    rows = 900
+    time_s = np.arange(float(rows))
+    current = np.zeros((rows, 9))
+    for k in range(9):
+        at = int(rng.integers(5, 60))
+        while at < rows:
+            hold = int(rng.integers(30, 150))
+            current[at : at + hold, k] = 0.0 if rng.random() < 0.4 else rng.uniform(0.8, 1.4 if cold else 2.1)
+            at += hold
+    fan = ((time_s // 250) % 2 == 1).astype(float)
+    twin = plant.copy()
+    twin.reset()
+    shown = twin.simulate(time_s, native.CURRENT, current, fan, np.full(rows, 20.0))
+    twin = plant.copy()
+    twin.reset()
+    traced = twin.trace(time_s, native.CURRENT, current, fan, np.full(rows, 20.0))
+    ohm = (
+        plant.get("resistance_martensite_ohm") * (1 - traced[:, :, 1])
+        + plant.get("resistance_austenite_ohm") * traced[:, :, 1]
+    )
+    on = current > 0
+    columns = {f"i{k + 1}_a": current[:, k] + 5e-4 * on[:, k] * rng.standard_normal(rows) for k in range(9)}
+    columns |= {f"v{k + 1}_v": (current * ohm)[:, k] + 5e-4 * on[:, k] * rng.standard_normal(rows) for k in range(9)}
+    columns |= {f"t{k + 1}_c": shown[:, k] + rng.normal(0.0, 0.3, rows) for k in range(9)}
+    columns |= {"fan": fan, "ambient_c": np.full(rows, 20.0)}
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "log.csv"
+        path.write_text(log_text(time_s, columns))
+        found = diagnosis.diagnose(Array(), [read_log(path, 9)])
+    made = settings_of(found.model)
+    refused = bool(drive.compare(found.model, "", made.lines)[0])
+    worse, gains = [], []
+    for pattern in drive.patterns(9):
+        old, new = (drive.drive(plant, lines, pattern) for lines in ("", made.lines))
+        worse += drive.worse_than(old, new)
+        gains.append(new.held - old.held)
+    return {
+        "cold": cold,
+        "refused": refused,
+        "worse": [] if refused else worse,
+        "held": float(np.mean(gains)),
+        "names": [e["name"] for e in found.result["effects"]],
+        "hottest": float(shown.max()),
+    }
+
+
+def board_alone(seed: int) -> dict[str, Any]:
+    """Fit half an hour of a board's v and i, no thermometer, array +-15 %; return the chip's error in a later drive."""
+    rng = np.random.default_rng([seed, 19])
+    case = make_case("none", (), seed)
+    case.columns, case.sensors = "iv", True
+    world = case.world
+    for name in ("heat_capacity", "loss", "loss_fan", "orthogonal", "orthogonal_fan", "diagonal", "diagonal_fan"):
+        setattr(world, name, getattr(World(), name) * rng.uniform(0.85, 1.15))
+    world.effects = {"latent_heat": {"joule": 8.65 * rng.uniform(0.85, 1.15)}, "resistance_phase": {"ratio": 1.25}}
+    case.runs = [random_inputs(rng, 1800, True), random_inputs(rng, 1800, True)]
+    for run in case.runs:
+        run.current[run.current == 0] = 0.25  # the board's probe: without a current there is no v / i
+    truth = simulate(world, case.runs)["shown"][1]
+    with tempfile.TemporaryDirectory() as folder:
+        paths, _ = write_logs(replace(case, runs=[*case.runs, case.runs[1]]), Path(folder))[:2]
+        board, later = (read_log(path, SPRINGS) for path in paths)
+    board = replace(board, temperature_c=np.full_like(board.temperature_c, np.nan))
+    problem, found, _ = from_resistance.fit(Array(), [board])
+    lines = settings_of(from_resistance.model_of_fit(problem, found)).lines
+    errors = []
+    for settings in ("", lines):
+        ambient = later.ambient_c
+        assert ambient is not None
+        first = np.full(SPRINGS, ambient[0])
+        shown = native.chip_simulate(settings, (3, 3), later.time_s, later.drive, later.fan, ambient, first)
+        errors.append(float(np.sqrt(np.mean((shown - truth) ** 2))))
+    return {"before": errors[0], "after": errors[1]}
+
+
+def niti(folder: Path) -> list[dict[str, Any]]:
+    """Diagnose the runs of the real actuator, each alone, its alloy declared roughly."""
+    out = []
+    for file in sorted(folder.glob("*.csv")):
+        raw = pd.read_csv(file)
+        raw.columns = ["row", "t", "ambient", "force", "pwm", "rate"]
+        raw = raw.rolling(15, center=True, min_periods=1).median().iloc[::20]
+        columns = {"u1": raw.pwm / 255.0, "t1_c": raw.t, "ambient_c": raw.ambient}
+        with tempfile.TemporaryDirectory() as temporary:
+            path = Path(temporary) / "log.csv"
+            path.write_text(log_text(raw.row.to_numpy() * 0.01, {k: v.to_numpy(float) for k, v in columns.items()}))
+            run = read_log(path, 1)
+        model = Model(Array(1, 1))
+        model.parameters = {"command_power_w": 10.0, "austenite_start_c": 48.0, "austenite_finish_c": 58.0}
+        model.parameters |= {"martensite_start_c": 42.0, "martensite_finish_c": 32.0}
+        result = diagnosis.diagnose(Array(1, 1), [run], model=model).result
+        names = [e["name"] for e in result["effects"]]
+        out.append(
+            {
+                "file": file.name,
+                "before": result["baseline"]["rmse_c"],
+                "after": result["after"]["rmse_c"],
+                "names": names,
+            }
+        )
+    return out
+
+
+def _all(job: tuple[Callable[[int], dict[str, Any]], int]) -> dict[str, Any]:
+    begun = time.monotonic()
+    out = job[0](job[1])
+    return out | {"part": job[0].__name__, "seed": job[1], "seconds": time.monotonic() - begun}
+
+
+def row(figure: str, value: float, unit: str, target: str) -> dict[str, Any]:
+    """Return one figure of the results."""
+    return {"figure": figure, "value": round(value, 3), "unit": unit, "target": target, "command": COMMAND}
+
+
+def percent(name: str, hits: list[bool], target: str) -> dict[str, Any]:
+    """Return how many of these are so."""
+    return row(f"{name} ({sum(hits)} of {len(hits)})", 100.0 * sum(hits) / max(1, len(hits)), "%", target)
+
+
+def figures(done: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Return the figures of all parts."""
+    part = {name: [one for one in done if one["part"] == name] for name in {one["part"] for one in done}}
+    out = []
+    if heat := part.get("unknown_heat"):
+        out.append(
+            percent(
+                "unknown heat: a step of 15 to 40 % found at its spring, within 30 s and 25 %",
+                [h["found"] for h in heat],
+                ">= 90",
+            )
+        )
+        every = [*heat, *part.get("quiet", [])]
+        out.append(
+            row(
+                "other events, an hour of log",
+                sum(h["others"] for h in every) / sum(h["hours"] for h in every),
+                "1/h",
+                "<= 1",
+            )
+        )
+    if seen := part.get("second_witness"):
+        for what in ("resistance_temperature", "contact_resistance"):
+            out.append(
+                percent(f"{what} named from v / i", [what in s["names"] for s in seen if s["what"] == what], ">= 90")
+            )
+        false = [bool(set(s["names"]) - {s["what"], "resistance_phase"}) for s in seen]
+        out.append(percent("v / i named what is not there", false, "<= 10"))
+    if boards := part.get("board_alone"):
+        before, after = (float(np.median([b[key] for b in boards])) for key in ("before", "after"))
+        out.append(row("board alone, no thermometer: the chip's error later, before", before, "K", ""))
+        out.append(row("the same, after (median)", after, "K", f"<= {before / 3:.2f}"))
+        out.append(percent("the same: at most a third of before", [b["after"] <= b["before"] / 3 for b in boards], ""))
+    if done_exports := part.get("exported"):
+        out.append(percent("export: drive worse than before", [bool(e["worse"]) for e in done_exports], "0"))
+        out.append(percent("export: refused", [e["refused"] for e in done_exports], ""))
+        out.append(
+            row(
+                "export: change of what is held, mean",
+                100.0 * float(np.mean([e["held"] for e in done_exports])),
+                "% austenite",
+                "",
+            )
+        )
+    return out
+
+
+def main() -> int:
+    """Run the benchmark."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--cases", type=int, default=12, help="of each part")
+    parser.add_argument("--first", type=int, default=REPORTING_SEEDS.start)
+    parser.add_argument("--parts", default="unknown_heat,quiet,second_witness,board_alone,exported")
+    parser.add_argument("--processes", type=int, default=2)
+    parser.add_argument("--json", type=Path)
+    parser.add_argument("--all", type=Path, help="write every case, for study")
+    options = parser.parse_args()
+    parts = {f.__name__: f for f in (unknown_heat, quiet, second_witness, board_alone, exported)}
+    jobs = [
+        (parts[name], seed)
+        for name in options.parts.split(",")
+        for seed in range(options.first, options.first + options.cases)
+    ]
+    fitting.WORKERS = 1
+    done = []
+    with concurrent.futures.ProcessPoolExecutor(options.processes) as pool:
+        for one in pool.map(_all, jobs, chunksize=1):
+            done.append(one)
+            print(json.dumps({k: v for k, v in one.items() if k != "events"}), file=sys.stderr, flush=True)
+            if options.all:
+                options.all.write_text(json.dumps(done, indent=1) + "\n")
+    out = figures(done)
+    private = os.environ.get("NINESPRING_PRIVATE")
+    for one in niti(Path(private) / "niti_pulse") if private else []:
+        out.append(
+            row(
+                f"real actuator, {one['file']}, {' + '.join(one['names']) or 'nothing'} named: error, {one['before']:.2f} before",
+                one["after"],
+                "K",
+                "<= 0.5",
+            )
+        )
+    for one in out:
+        print(f"{one['figure']:90} {one['value']:8} {one['unit']:4} {one['target']}")
+    if options.json:
+        options.json.write_text(json.dumps(out, indent=1) + "\n")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

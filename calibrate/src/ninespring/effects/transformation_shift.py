@@ -1,0 +1,30 @@
+"""One spring transforms elsewhere than the others: its load, or another batch of wire."""
+
+from collections.abc import Iterator
+
+from .effect import Candidate, Effect, Numbers, Scene, linear, sized
+
+
+def _candidates(scene: Scene) -> Iterator[Candidate]:
+    # it shows by what goes with a transformation: beside latent heat, or the resistance of the phases
+    if scene.springs < 2 or scene.hottest_c < scene.declared("austenite_start_c") - 45.0:
+        return
+    for k in range(1, scene.springs + 1):
+        name = f"transformation_shift_k[{k}]"
+        yield Candidate(
+            f"spring {k}",
+            (linear(name, -40.0, 40.0, 0.0, 3.0),),
+            ({name: 3.0},),
+            signed=True,
+            most=5.0,
+            more_starts=({name: 10.0}, {name: -10.0}),
+        )
+
+
+def _says(numbers: Numbers, variant: str) -> str:
+    (value, error), *_ = numbers.values()
+    word = "higher" if value > 0 else "lower"
+    return f"{variant.capitalize()} transforms {sized(abs(value), error, 'K')} {word} than the others."
+
+
+EFFECT = Effect("transformation_shift", _candidates, says=_says)
