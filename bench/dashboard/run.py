@@ -5,11 +5,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import subprocess
 import sys
 import time
+from functools import partial
 from pathlib import Path
 
 from websockets.sync.client import connect
@@ -30,21 +32,24 @@ def main() -> int:
     with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
         url = process.stdout.readline().split()[0].rstrip("/")
-        open_one = lambda: connect(url.replace("http", "ws") + "/ws", additional_headers={"origin": url})  # noqa: E731
-        with open_one() as page:
-            while json.loads(page.recv()).get("time_s") is None:
+        own = {"origin": url}
+        with contextlib.ExitStack() as stack:
+            open_one = partial(connect, url.replace("http", "ws") + "/ws", additional_headers=own)
+            first = stack.enter_context(open_one())
+            while json.loads(first.recv()).get("time_s") is None:
                 pass
         for count in (0, 1, 4):
-            pages = [open_one() for _ in range(count)]
-            begun, before, states, bytes_ = time.monotonic(), cpu_s(process.pid), 0, 0
-            while time.monotonic() - begun < seconds:
-                if not pages:
-                    time.sleep(0.1)
-                for page in pages:
-                    text = page.recv()
-                    states += '"kind":"state"' in text.replace(" ", "")
-                    bytes_ += len(text)
-            passed = time.monotonic() - begun
+            with contextlib.ExitStack() as stack:
+                pages = [stack.enter_context(open_one()) for _ in range(count)]
+                begun, before, states, bytes_ = time.monotonic(), cpu_s(process.pid), 0, 0
+                while time.monotonic() - begun < seconds:
+                    if not pages:
+                        time.sleep(0.1)
+                    for page in pages:
+                        text = page.recv()
+                        states += json.loads(text)["kind"] == "state"
+                        bytes_ += len(text)
+                passed = time.monotonic() - begun
             load = 100.0 * (cpu_s(process.pid) - before) / passed
             each = (
                 f"{states / count / passed:.1f} states/s, {bytes_ / count / passed / 1e3:.1f} kB/s each"
@@ -52,8 +57,6 @@ def main() -> int:
                 else ""
             )
             print(f"{count} pages: {load:.1f} % of one core; {each}")
-            for page in pages:
-                page.close()
         process.terminate()
     return 0
 
