@@ -58,6 +58,8 @@ def test_a_board_is_off_after_its_block_also_after_an_error() -> None:
     with pytest.raises(ns.WorkError, match="locked after a reset"), ns.Board(fake.port) as board:
         board.on(1, 50)
         assert board.read().current_a.tolist() == [0.5]
+        with pytest.raises(ns.InputError, match="one line"):
+            board.ask("on 1\non 2")
         board.on(9)
     sent = fake.sent()
     assert sent.index("on 1 50") < sent.index("on 9 100") < sent.index("off all")

@@ -260,6 +260,8 @@ MALFORMED = [
     '{"do": "say", "line": "on 1\\non 1"}',
     '{"do": "say", "line": "telemetry off"}',
     '{"do": "set", "name": "x=1\\non 1", "value": "1"}',
+    '{"do": "set", "name": "rows\\n", "value": "1"}',
+    '{"do": "say", "line": "on 1\\n"}',
     '{"do": "__class__"}',
     "[" * 5000,
 ]

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
+import pandas as pd
 import pytest
 from ninespring import importing
-from ninespring.logs import read_log
+from ninespring.logs import log_text, read_log
 from ninespring.models import Array, Model
 from ninespring.verdict import diagnosis, steady
 
@@ -53,6 +55,26 @@ def test_a_glitch_and_an_unlogged_drift_are_handled_without_being_told(measured:
         "command_power_w": 1.0,
     }
     found = diagnosis.diagnose(Array(1, 2), [run], model=model)
-    assert {"ambient_drift", "sensor_lag"} <= {e["name"] for e in found.result["effects"]}
-    assert found.model.effects == ["sensor_lag"]
+    assert "ambient_drift" in {e["name"] for e in found.result["effects"]}
+    assert found.result["unexplained"] and found.result["after"]["rmse_c"] < 0.33
+    assert "ambient_drift" not in found.model.effects
     assert found.model.provenance["note"] == diagnosis.DRIFT_LEFT_OUT
+
+
+def test_the_latent_heat_of_a_real_actuator_is_named_with_its_alloy_declared_roughly(tmp_path: Path) -> None:
+    """The data's licence is unknown: they are not carried here, and read only where NINESPRING_PRIVATE says where."""
+    private = os.environ.get("NINESPRING_PRIVATE")
+    if not private:
+        pytest.skip("NINESPRING_PRIVATE is not set: the real actuator's log (niti_pulse) is not public")
+    raw = pd.read_csv(Path(private) / "niti_pulse" / "AB0.csv")
+    raw.columns = ["row", "t", "ambient", "force", "pwm", "rate"]
+    raw = raw.rolling(15, center=True, min_periods=1).median().iloc[::20]
+    path = tmp_path / "log.csv"
+    columns = {"u1": raw.pwm / 255.0, "t1_c": raw.t, "ambient_c": raw.ambient}
+    path.write_text(log_text(raw.row.to_numpy() * 0.01, {name: one.to_numpy(float) for name, one in columns.items()}))
+    model = Model(Array(1, 1))
+    model.parameters = {"command_power_w": 10.0, "austenite_start_c": 48.0, "austenite_finish_c": 58.0}
+    model.parameters |= {"martensite_start_c": 42.0, "martensite_finish_c": 32.0}
+    result = diagnosis.diagnose(Array(1, 1), [read_log(path, 1)], model=model).result
+    assert "latent_heat" in {e["name"] for e in result["effects"]}
+    assert result["after"]["rmse_c"] < 0.55 * result["baseline"]["rmse_c"]

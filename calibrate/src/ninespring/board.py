@@ -168,6 +168,8 @@ class Board:
 
         Telemetry that comes meanwhile is kept for `next_line`.
         """
+        if not re.fullmatch("[ -~]+", line):
+            raise InputError(f"{line[:40]!r} is not one line of plain ASCII")
         self._port.write(line + "\n")
         self._alive_s = time.monotonic()
         until = self._alive_s + timeout_s

@@ -42,7 +42,7 @@ def _wish(do: str, /, **properties: Any) -> dict[str, Any]:
 
 
 _LEVEL = {"type": "integer", "minimum": 0, "maximum": 100}
-_PATTERN = {"type": "string", "pattern": "^[01]{1,64}$"}
+_PATTERN = {"type": "string", "pattern": r"^[01]{1,64}\Z"}
 WISHES = jsonschema.Draft202012Validator(
     {
         "oneOf": [
@@ -60,10 +60,10 @@ WISHES = jsonschema.Draft202012Validator(
             _wish("ambient", celsius={"type": "number", "minimum": -40, "maximum": 85}),
             _wish(
                 "set",
-                name={"type": "string", "pattern": "^[a-z0-9_]{1,40}$"},
-                value={"type": "string", "pattern": r"^-?\d{1,9}(\.\d{1,9})?$"},
+                name={"type": "string", "pattern": r"^[a-z0-9_]{1,40}\Z"},
+                value={"type": "string", "pattern": r"^-?[0-9]{1,9}(\.[0-9]{1,9})?\Z"},
             ),
-            _wish("say", line={"type": "string", "pattern": '^["-~][ -~]{0,62}$'}),
+            _wish("say", line={"type": "string", "pattern": r'^["-~][ -~]{0,62}\Z'}),
             _wish("seek", time_s={"type": "number"}),
             _wish("speed", speed={"type": "number", "minimum": 0.1, "maximum": 1000}),
         ]

@@ -83,7 +83,8 @@ def _driving_columns(
     if "time_s" not in names:
         raise InputError("no column time_s", path, line, 1)
     if temperatures and not groups["t"]:
-        raise InputError("no temperature column (t1_c ...)", path, line, 1)
+        more = ": with currents and voltages alone, `ninespring fit` tells what they do" if groups["v"] else ""
+        raise InputError(f"no temperature column (t1_c ...){more}", path, line, 1)
     count = springs or max(set().union(*groups.values()), default=0)
     everyone = set(range(1, count + 1))
     letter = "i" if groups["i"] else "u"

@@ -185,18 +185,22 @@ def witness(problem: Problem, fit: Fit, contacts: bool = True) -> dict[str, Any]
         return {"value": float(weights @ model.values), "stderr": error, "unit": "ohm"}
 
     mean = {key: 1.0 / len(own) for key in own}
+    alike = _solve(read, own | ({"phase": read.phase} if two_phases else {})).values[: len(own)]
+    # a longer wire has more of everything: what is shared counts in proportion to a spring's own resistance
+    share = (alike / alike.mean())[np.searchsorted(sorted({int(one) for one in read.spring}), read.spring)]
     if two_phases:
-        trial = _solve(read, columns | {"phase": read.phase})
+        trial = _solve(read, columns | {"phase": read.phase * share})
         nats = _nats(read, model, trial)
         if nats > LEAST_NATS:
-            columns, model = columns | {"phase": read.phase}, trial
+            columns, model = columns | {"phase": read.phase * share}, trial
     resistances = {"resistance_martensite_ohm": mean}
     if "phase" in columns:
         resistances["resistance_austenite_ohm"] = mean | {"phase": 1.0}
     phase_nats = _nats(read, first, model)
-    rising = {"rise martensite": read.over_k * (1.0 - read.phase), "rise austenite": read.over_k * read.phase}
+    over_k = read.over_k * share
+    rising = {"rise martensite": over_k * (1.0 - read.phase), "rise austenite": over_k * read.phase}
     if not two_phases:
-        rising = {"rise martensite": read.over_k}
+        rising = {"rise martensite": over_k}
     trial = _solve(read, columns | rising)
     rise_nats = _nats(read, model, trial)
     if rise_nats > LEAST_NATS:
@@ -247,34 +251,42 @@ def _contacts(
 
     What a contact always had is in its spring's own resistance: v / i alone cannot tell wire from clamp.
     """
+
+    def later(k: int, r: int, at: float) -> np.ndarray:
+        """Return where a spring's contact is as it is since a time of a run."""
+        since = (read.run > r) | ((read.run == r) & (read.time_s >= at))
+        return ((read.spring == k) & since).astype(float)
+
+    options: dict[tuple[int, int, float], np.ndarray] = {}
+    grid: dict[int, float] = {}
     springs = sorted({int(k) for k in read.spring})
-    options: dict[tuple[int, tuple[int, float]], np.ndarray] = {}
     for k in springs:
-        own = read.spring == k
-        for r in sorted({int(one) for one in read.run[own]}):
-            times = read.time_s[own & (read.run == r)]
+        for r in sorted({int(one) for one in read.run[read.spring == k]}):
+            times = read.time_s[(read.spring == k) & (read.run == r)]
+            grid[r] = max(grid.get(r, 0.0), float(times[-1] - times[0]) / (STEP_GRID + 1))
             for at in np.linspace(times[0], times[-1], STEP_GRID + 2)[1:-1]:
-                later = own & ((read.run > r) | ((read.run == r) & (read.time_s >= at)))
-                options[k, (r, float(at))] = later.astype(float)
-    out = []
-    for _ in springs:
-        basis = np.column_stack(list(columns.values())) / read.noise[:, None]
-        q = np.linalg.qr(basis)[0]
-        gains = {}
-        for key, column in options.items():
-            vector = column / read.noise
-            vector = vector - q @ (q.T @ vector)
-            power = float(vector @ vector)
-            gains[key] = (float(vector @ model.rest) ** 2 / power) if power > 1e-9 else 0.0
-        key = max(gains, key=lambda one: gains[one])
-        name = f"contact {key}"
-        trial = _solve(read, columns | {name: options[key]})
+                options[k, r, float(at)] = later(k, r, float(at))
+
+    def gain(column: np.ndarray, q: np.ndarray) -> float:
+        vector = column / read.noise
+        vector = vector - q @ (q.T @ vector)
+        power = float(vector @ vector)
+        return float(vector @ model.rest) ** 2 / power if power > 1e-9 else 0.0
+
+    tried, out = max(1, len(options)), []
+    while options and len(out) < len(springs):
+        q = np.linalg.qr(np.column_stack(list(columns.values())) / read.noise[:, None])[0]
+        k, r, near = max(options, key=lambda one: gain(options[one], q))
+        finer = np.linspace(near - grid[r], near + grid[r], 2 * STEP_GRID + 1)
+        at = float(max(finer, key=lambda one: gain(later(k, r, float(one)), q)))
+        name = f"contact {k} {r} {at}"
+        trial = _solve(read, columns | {name: later(k, r, at)})
         nats = _nats(read, model, trial)
         size, error = float(trial.values[-1]), math.sqrt(float(trial.covariance[-1, -1]))
-        if nats < math.log(len(options)) + LEAST_NATS or abs(size) < max(SMALLEST_OHM, 3.0 * error):
+        if nats < math.log(tried) + LEAST_NATS or abs(size) < max(SMALLEST_OHM, 3.0 * error):
             break
-        columns = columns | {name: options[key]}
-        model = trial
-        out.append((key[0], key[1], nats, size, error, len(options)))
-        options.pop(key)
+        columns, model = columns | {name: later(k, r, at)}, trial
+        out.append((k, (r, at), nats, size, error, tried))
+        # a change that takes a while is one change
+        options = {key: one for key, one in options.items() if key[:2] != (k, r) or abs(key[2] - at) > 2.5 * grid[r]}
     return model, out

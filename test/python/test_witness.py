@@ -1,0 +1,133 @@
+"""Heat of unknown origin is told by place, time, sign and size; v / i tells phases, rises and contacts; both are silent
+where nothing is there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from ninespring import native
+from ninespring.fit.declared import base_spec
+from ninespring.fit.problem import Problem
+from ninespring.fit.spec import Fit
+from ninespring.logs import log_text, read_log
+from ninespring.models import Array
+from ninespring.search import certainty
+from ninespring.verdict import diagnosis, resistance, unknown_heat
+
+ROWS = 700
+Change = Callable[[np.ndarray], None]
+
+
+def array_log(
+    path: Path,
+    heat: Change = lambda watts: None,
+    readings: Change = lambda shown: None,
+    ohms: Change = lambda ohm: None,
+    effects: dict[str, float] | None = None,
+) -> tuple[Problem, Fit]:
+    """Write a 3 x 3 log with changes to the heat, the thermometers and the resistances that nothing logs; fit it."""
+    rng = np.random.default_rng(2)
+    time_s, watts = np.arange(float(ROWS)), np.full((ROWS, 9), 0.05)
+    for k in range(9):
+        at = int(rng.integers(5, 40))
+        while at < ROWS:
+            hold = int(rng.integers(30, 120))
+            watts[at : at + hold, k] = 0.05 if rng.random() < 0.4 else rng.uniform(0.2, 0.65)
+            at += hold
+    fan = ((time_s // 200) % 2 == 1).astype(float)
+    given = watts.copy()
+    heat(given)
+    plant = native.Plant(3, 3)
+    plant.set_effects(["resistance_phase", "resistance_temperature"] if effects else ["resistance_phase"])
+    plant.set_all(effects or {})
+    plant.reset()
+    traced = plant.copy().trace(time_s, native.POWER, given, fan, np.full(ROWS, 20.0))
+    ohm = plant.readings(time_s, given, fan, np.full(ROWS, 20.0)) * (1.0 + 0.04 * np.linspace(-1, 1, 9))
+    ohms(ohm)
+    shown = traced[:, :, 0] + rng.normal(0.0, 0.3, (ROWS, 9))
+    readings(shown)
+    current = np.sqrt(watts / ohm)
+    voltage = watts / current + rng.normal(0.0, 3e-4, (ROWS, 9))
+    columns = {f"i{k + 1}_a": current[:, k] for k in range(9)} | {f"v{k + 1}_v": voltage[:, k] for k in range(9)}
+    columns |= {f"t{k + 1}_c": shown[:, k] for k in range(9)} | {"fan": fan, "ambient_c": np.full(ROWS, 20.0)}
+    path.write_text(log_text(time_s, columns, decimals=5))
+    problem = Problem(Array(), [read_log(path, 9)])
+    return problem, diagnosis.first_fit(problem, base_spec(problem))
+
+
+def test_a_step_of_heat_is_told_by_its_place_time_sign_and_size(tmp_path: Path) -> None:
+    def less(watts: np.ndarray) -> None:
+        watts[305:485, 2] -= 0.045
+
+    problem, fit = array_log(tmp_path / "log.csv", heat=less)
+    found = unknown_heat.find(problem, fit)
+    heat = [piece for piece in found.pieces if piece.kind == "heat"]
+    assert heat and all(piece.spring == 2 and piece.size < 0 for piece in heat)
+    joules = sum(piece.size * (piece.end_s - piece.begin_s) for piece in heat)
+    assert joules == pytest.approx(-0.045 * 180.0, rel=0.25)
+    assert min(piece.begin_s for piece in heat) == pytest.approx(305, abs=30)
+    assert max(piece.end_s for piece in heat) == pytest.approx(485, abs=30)
+    assert "spring 3: " in heat[0].words(None) and "less than known" in heat[0].words(None)
+
+
+def test_a_thermometer_that_jumps_is_no_heat(tmp_path: Path) -> None:
+    def jump(shown: np.ndarray) -> None:
+        shown[400:, 6] += 2.5
+
+    problem, fit = array_log(tmp_path / "log.csv", readings=jump)
+    pieces = unknown_heat.find(problem, fit).pieces
+    assert [(p.kind, p.spring) for p in pieces] == [("sensor", 6)]
+    assert pieces[0].size == pytest.approx(2.5, abs=0.3) and pieces[0].begin_s == pytest.approx(400, abs=15)
+
+
+def test_nothing_is_told_where_nothing_is(tmp_path: Path) -> None:
+    problem, fit = array_log(tmp_path / "log.csv")
+    assert unknown_heat.find(problem, fit).pieces == []
+    second = resistance.witness(problem, fit)
+    assert second is not None
+    assert {one["name"] for one in second["effects"]} <= {"resistance_phase"}
+
+
+def test_a_contact_that_gets_worse_is_told_with_its_spring_time_and_size(tmp_path: Path) -> None:
+    def worse(ohm: np.ndarray) -> None:
+        ohm[350:, 4] += 0.008
+
+    problem, fit = array_log(tmp_path / "log.csv", ohms=worse)
+    second = resistance.witness(problem, fit)
+    assert second is not None
+    contacts = [one for one in second["effects"] if one["name"] == "contact_resistance"]
+    assert len(contacts) == 1 and contacts[0]["variant"].startswith("spring 5, from 3")
+    assert contacts[0]["parameters"]["contact_ohm[5]"]["value"] == pytest.approx(0.008, rel=0.15)
+    assert not resistance.witness(problem, fit, contacts=False)["effects"][1:]  # type: ignore[index]
+
+
+def test_a_resistance_that_rises_with_temperature_is_told(tmp_path: Path) -> None:
+    rises = {"resistance_martensite_rise_per_k": 0.0008, "resistance_austenite_rise_per_k": 0.0005}
+    problem, fit = array_log(tmp_path / "log.csv", effects=rises)
+    second = resistance.witness(problem, fit)
+    assert second is not None
+    named = {one["name"]: one["parameters"] for one in second["effects"]}
+    rise = named["resistance_temperature"]["resistance_martensite_rise_per_k"]
+    assert rise["value"] == pytest.approx(0.0008, rel=0.15)
+
+
+def test_a_cause_of_one_size_always_is_likelier_than_one_that_fits_here_and_not_there() -> None:
+    def of(**change: float) -> float:
+        usual = {"nats": 100.0, "share": 0.97, "in_time": 0.01, "in_place": 0.02, "left": 1.0, "flexible": False}
+        return certainty.Witness(**(usual | change)).probability()
+
+    assert of() > 0.9 > 0.5 > of(in_time=0.5, share=0.4)
+    assert of(in_time=0.3) < of() and of(share=0.3) < of() and of(nats=4.0) < of() and of(flexible=True) < of()
+    assert of(nats=30.0) == of(nats=3000.0)
+
+
+def test_an_amplitude_that_is_the_same_everywhere_does_not_scatter() -> None:
+    rng = np.random.default_rng(1)
+    signal = [rng.normal(0, 5, 200) for _ in range(6)]
+    noise = [rng.normal(0, 1, 200) for _ in range(6)]
+    assert certainty.scatter(signal, noise, 1.0) < 0.03
+    half = [n + (0.5 if k < 3 else -0.5) * s for k, (s, n) in enumerate(zip(signal, noise, strict=True))]
+    assert certainty.scatter(signal, half, 1.0) == pytest.approx(0.5, abs=0.05)
