@@ -2,6 +2,7 @@
 
 from .condense import condense as condense
 from .log import COLUMN as COLUMN
+from .log import EXTRA as EXTRA
 from .log import LIMITS as LIMITS
 from .log import MAX_SPRINGS as MAX_SPRINGS
 from .log import read_log as read_log
