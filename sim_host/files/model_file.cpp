@@ -390,7 +390,8 @@ void check_provenance(const reader &root)
         return;
     }
     const reader table = root.table(*node, "provenance");
-    table.refuse_unknown({"tool", "date", "logs", "rmse_before_c", "rmse_after_c", "hottest_c", "note"});
+    table.refuse_unknown(
+        {"tool", "date", "logs", "rmse_before_c", "rmse_after_c", "hottest_c", "note"});
     for (const char *key : {"tool", "date", "note"}) {
         if (const toml::node *text = table.find(key)) {
             (void)table.text(*text, key);
