@@ -66,6 +66,7 @@ SECTIONS: tuple[Section, ...] = (
     Section("replay", "Measured logs through the on-chip model", f"{PYTHON} script/replay_fit.py"),
     Section("measured", "Measured data", f"{PYTHON} bench/diagnose/measured.py", json=False, markdown=True),
     Section("diagnose", "Undeclared effects", f"{PYTHON} bench/diagnose/run.py --seeds 4", markdown=True),
+    Section("real_logs", "What real logs bring", f"{PYTHON} bench/diagnose/real_logs.py"),
 )
 
 

@@ -53,7 +53,8 @@ def test_a_board_alone_tells_capacity_loss_coupling_and_latent_heat(tmp_path: Pa
     fit(board_log(tmp_path / "board.csv"), "-o", tmp_path / "m.toml", "--json", tmp_path / "r.json")
     model = read_model(tmp_path / "m.toml")
     for name, value in TRUE.items():
-        assert model.parameters[name] == pytest.approx(value, rel=0.05), name
+        assert model.parameters[name] == pytest.approx(value, rel=0.1 if name.startswith("orth") else 0.05), name
+    assert set(model.effects) == {"latent_heat", "resistance_phase", "spring_mismatch"}, "no effect that is not there"
     assert "only a thermometer can say" in model.provenance["note"]
     assert model.provenance["hottest_c"] > 88.0 and "rmse_after_c" not in model.provenance
     result = json.loads((tmp_path / "r.json").read_text())

@@ -318,3 +318,14 @@ def test_a_model_with_effects_needs_no_other_on_the_log_it_came_from(make_log, t
         assert again.result["baseline"]["rmse_c"] == pytest.approx(first.result["after"]["rmse_c"], rel=0.01)
         frozen = diagnosis.diagnose(array, [run], model=first.model, frozen=True)
         assert frozen.baseline.spec.free == () and frozen.result["effects"] == []
+
+
+def test_every_effect_of_the_table_has_its_file_and_a_sentence() -> None:
+    assert [one.name for one in effects.library()] == list(native.effect_names())
+    said = effects.sentence("sensor_lag", {"sensor_lag_s": {"value": 5.04, "stderr": 0.21, "unit": "s"}})
+    assert said == "The thermometers lag 5.0 s (+-0.2)."
+    mismatch = {
+        f"{name}[4]": {"value": value, "stderr": 0.03, "unit": "1"}
+        for name, value in (("loss_scale", 1.16), ("heat_capacity_scale", 1.01))
+    }
+    assert effects.sentence("spring_mismatch", mismatch, "spring 4") == "Spring 4 loses 16 % more (+-3)."

@@ -157,7 +157,8 @@ def sized(value: float, error: float | None, unit: str = "", factor: float = 1.0
     unit = "" if unit in ("", "1") else f" {unit}"
     if error is None or not error or error > abs(value):
         return f"{value:.2g}{unit}" + (" (hardly determined alone)" if error else "")
-    digits = max(0, min(6, 1 - math.floor(math.log10(error)) - (error / 10 ** math.floor(math.log10(error)) > 3)))
+    order = math.floor(math.log10(error))
+    digits = max(0, min(6, -order + (error / 10.0**order < 2.0)))
     return f"{value:.{digits}f}{unit} (+-{error:.{digits}f})"
 
 

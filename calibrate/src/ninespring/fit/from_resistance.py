@@ -136,12 +136,10 @@ def with_effects(
     ]
     search = Search(problem, known, found, progress)
     chosen, without, _ = search.run()
-    while True:
-        witnesses = {name: witness(problem, chosen, name, other, False) for name, other in without.items()}
-        weakest = min(witnesses, key=lambda one: witnesses[one].probability(), default=None)
-        if weakest is None or witnesses[weakest].probability() >= NAMED:
-            break
-        chosen, without, _ = search.settle(search.reduced(chosen, weakest), grow=False)
+    witnesses = {name: witness(problem, chosen, name, other, False) for name, other in without.items()}
+    for name in [one for one, said in witnesses.items() if said.probability() < NAMED]:
+        chosen = search.reduced(chosen, name)
+        del witnesses[name]
     if witnesses:
         chosen = problem.fit(chosen.spec, chosen.as_dict(), tolerance=1e-6, max_steps=20, errors=True)
     return chosen, witnesses

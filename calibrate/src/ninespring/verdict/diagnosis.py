@@ -25,7 +25,7 @@ from ..logs import condense
 from ..logs.run import Run
 from ..models import Array, Model
 from ..search import search
-from ..search.certainty import CERTAIN, NAMED, Witness, witness
+from ..search.certainty import CERTAIN, NAMED, witness
 from ..search.evidence import EQUIVALENT, difference, excess, log_evidence, unexplained
 from . import experiments, plausibility, resistance, unknown_heat
 from .residual import depends_on
@@ -165,21 +165,22 @@ def _diagnose(
     base = first_fit(problem, spec)
     found = search.Search(problem, [c for c in known if c.effect not in spec.effects], base, progress)
     final, without, contenders = found.run()
-    witnesses: dict[str, Witness] = {}
     progress("held-out blocks")
     final = _finish(problem, final)
+    # where the ambient was not logged, that it drifted is no stand-in
     guessed = all(run.ambient_c is None for run in problem.runs)
-    while without:
-        # The least likely goes first: what it stood in for may have made the others look worse than they are.
-        witnesses = {
-            effect: witness(problem, final, effect, other, found.is_flexible(final, effect) and not guessed)
-            for effect, other in without.items()
-        }
-        effect = min(witnesses, key=lambda one: witnesses[one].probability())
-        if witnesses[effect].probability() >= NAMED:
-            break
-        kept, without, contenders = found.settle(found.reduced(final, effect), grow=False)
-        final = _finish(problem, kept)
+    witnesses = {
+        effect: witness(problem, final, effect, other, found.is_flexible(final, effect) and not guessed)
+        for effect, other in without.items()
+    }
+    doubtful = [effect for effect, one in witnesses.items() if one.probability() < NAMED]
+    if doubtful:
+        # judged together, beside one another: what one of them stood in for does not count against the rest
+        for effect in doubtful:
+            final = found.reduced(final, effect)
+        final = _finish(problem, final)
+        without = {effect: found.reduced(final, effect) for effect in without if effect not in doubtful}
+        contenders = found.rivals(final, without)
     left_over = unexplained(problem, final)
     adopted = [e for e in final.spec.effects if e not in base.spec.effects]
     strength = {e: log_evidence(problem, final, without[e]) for e in adopted}
@@ -209,7 +210,7 @@ def _diagnose(
         listed.append(entry)
 
     progress("what v / i says")
-    second = resistance.witness(problem, final, contacts=not left_over)
+    second = resistance.witness(problem, final, contacts=math.sqrt(excess(problem, final)) < resistance.KNOWN_K)
     listed += [resistance.entry(one, final, problem) for one in (second or {}).get("effects", [])]
 
     rivals, seen = [], set()

@@ -25,8 +25,10 @@ DRIVEN_A = 0.2
 """Currents from which v / i is a measurement of resistance, not of the sensor's offset."""
 REFERENCE_C = 20.0
 """Temperature of the declared resistances."""
-TRUST = 0.05
-"""Of one phase's wire, the share that must have been seen in the other phase before two resistances are told apart."""
+SEEN = 30
+"""Readings in each phase from which two resistances are told apart."""
+KNOWN_K = 2.0
+"""Structure left in the temperatures, in multiples of the noise, up to which changes of a contact are looked for."""
 BELIEVED_RISE = 0.001
 """Per K: what NiTi's resistance rises by, about, in either phase."""
 SETTLED = 0.02
@@ -162,8 +164,8 @@ def witness(problem: Problem, fit: Fit, contacts: bool = True) -> dict[str, Any]
     read = readings(problem, fit)
     if read is None:
         return None
-    both = float(read.phase.mean())
-    two_phases = TRUST < both < 1.0 - TRUST
+    austenite = int((read.phase > 0.5).sum())
+    two_phases = SEEN <= austenite <= len(read.ohm) - SEEN
     # every spring has a resistance of its own: wires differ; what is shared is how it changes
     own = {f"own {k}": (read.spring == k).astype(float) for k in sorted({int(one) for one in read.spring})}
     columns = own
