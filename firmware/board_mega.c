@@ -59,7 +59,8 @@ static void read_reset_flags(void)
     wdt_disable();
 }
 
-/* Stack high-water mark: the free RAM is painted before main. */
+/* Stack high-water mark: the free RAM is painted before main. In assembly, as nothing else is sure
+ * to work in a function without a frame that paints where frames lie. */
 #define STACK_PAINT 0xC5u
 extern uint8_t __heap_start;
 static void paint_stack(void) __attribute__((naked, used, section(".init3")));
@@ -184,8 +185,7 @@ static void outputs_init(void)
  * on. A fast PWM output is high for OCR + 1 counts, so 0 cannot be had from the timer: there the
  * COM bit is cleared and the pin is low. The registers A, B, C follow one another, as do their
  * bits. */
-static __attribute__((noinline)) uint8_t set_timer(volatile uint16_t *compare,
-                                                   const uint16_t duty[3])
+static uint8_t set_timer(volatile uint16_t *compare, const uint16_t duty[3])
 {
     uint8_t mode = PWM_A_OFF;
     for (uint8_t com = PWM_COM_A; com >= PWM_COM_C; com >>= 2, compare++, duty++) {
@@ -247,7 +247,7 @@ ISR(TIMER2_COMPA_vect)
     }
 }
 
-__attribute__((noinline)) uint32_t board_time_ms(void)
+uint32_t board_time_ms(void)
 {
     uint32_t copy;
     cli();

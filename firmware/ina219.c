@@ -23,7 +23,7 @@ controller_sensor_status_t ina219_read(uint8_t address, uint8_t reg, uint16_t *v
     return status == CONTROLLER_SENSOR_OK ? ina219_read_again(address, value) : status;
 }
 
-__attribute__((noinline)) uint16_t ina219_configuration(uint8_t averaging)
+uint16_t ina219_configuration(uint8_t averaging)
 {
     return averaging == 8u ? 0x1DDFu  /* BADC = SADC = 1011: 8 samples, 4.26 ms each */
                            : 0x1E67u; /* 1100: 16 samples, 8.51 ms each */

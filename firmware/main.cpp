@@ -20,7 +20,7 @@
 #endif
 
 #ifndef NINESPRING_VERSION
-#define NINESPRING_VERSION "0.1.0"
+#define NINESPRING_VERSION "unknown"
 #endif
 
 // Not static: debugger and simulator look at it by name.
@@ -99,7 +99,7 @@ static int16_t ambient_c7(void)
 
 static void keep_model(void)
 {
-    thermal_model_get_state(&controller.model, &kept.state);
+    controller_get_model_state(&controller, &kept.state);
     kept.crc = crc16_add_bytes(CRC16_START, &kept.state, sizeof kept.state);
 }
 
@@ -110,11 +110,11 @@ static void start_model(uint8_t cause)
 {
     const bool whole = kept.crc == crc16_add_bytes(CRC16_START, &kept.state, sizeof kept.state);
     if ((cause & BOARD_RESET_WARM) && whole &&
-        thermal_model_set_state(&controller.model, &kept.state)) {
+        controller_set_model_state(&controller, &kept.state)) {
         return;
     }
     const int16_t hot_cc = (int16_t)(settings.controller.safety.temperature_trip_cc - 500);
-    thermal_model_reset(&controller.model, fixed_point_c7_from_cc(hot_cc));
+    controller_set_temperature(&controller, fixed_point_c7_from_cc(hot_cc));
 }
 
 // Configures the sensors at the start and when the setting has changed: they then convert anew, and
@@ -128,7 +128,7 @@ static void follow_averaging()
     }
 }
 
-static __attribute__((noinline)) void run_tick(uint8_t behind)
+static void run_tick(uint8_t behind)
 {
     const uint32_t begin_us = board_time_us();
     if (behind > 0 && status.ticks_late < UINT16_MAX) {

@@ -24,7 +24,7 @@ typedef struct {
     char bytes[CONSOLE_ROOM_BYTES];
 } out_t;
 
-static __attribute__((noinline)) void out_start(out_t *out)
+static void out_start(out_t *out)
 {
     text_line_start(&out->line, out->bytes, CONSOLE_ROOM_BYTES - 2u);
 }
@@ -50,12 +50,12 @@ static void answer(const console_t *console, console_error_t error)
     out_end(console, &out);
 }
 
-static __attribute__((noinline)) bool room_for(const console_t *console, uint16_t bytes)
+static bool room_for(const console_t *console, uint16_t bytes)
 {
     return console->output.room(console->output.context) >= bytes;
 }
 
-static __attribute__((noinline)) void add_spring(text_line_t *line, uint8_t spring)
+static void add_spring(text_line_t *line, uint8_t spring)
 {
     const int32_t number = spring + 1;
     text_add_values(line, FLASH_TEXT("spring #0: "), &number);
@@ -399,8 +399,7 @@ static console_error_t word_model(console_t *console, const arguments_t *argumen
     if (any_spring_on(console)) {
         return CONSOLE_ERROR_SPRINGS_ON;
     }
-    thermal_model_reset(&console->controller->model, console->status->ambient_c7);
-    thermal_model_set_ambient(&console->controller->model, console->status->ambient_c7);
+    controller_set_temperature(console->controller, console->status->ambient_c7);
     return CONSOLE_OK;
 }
 
@@ -600,7 +599,7 @@ static void add_limits(text_line_t *line, const controller_t *controller, uint8_
     }
 }
 
-static __attribute__((noinline)) bool model_line(const console_t *console, out_t *out)
+static bool model_line(const console_t *console, out_t *out)
 {
     const controller_t *const controller = console->controller;
     text_line_t *const line = &out->line;

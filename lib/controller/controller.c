@@ -3,19 +3,11 @@
 #include <stddef.h>
 #include <string.h>
 
-#include "fixed_point.h"
+#include "invariant.h"
 
 #define MODEL_STEP_MS   100u
 #define TICKS_PER_STEP  (MODEL_STEP_MS / CONTROLLER_TICK_MS)
 #define CURRENT_MOST_MA 4095 /* the sensor ends at 3200: a step's sum of power fits 32 bits */
-
-#ifdef __AVR__
-#define HOT    __attribute__((noinline, optimize("O2")))
-#define ALWAYS __attribute__((always_inline))
-#else
-#define HOT
-#define ALWAYS
-#endif
 
 void controller_settings_default(controller_settings_t *settings)
 {
@@ -44,22 +36,17 @@ static bool init_model(thermal_model_t *model, const thermal_model_parameters_t 
     return thermal_model_init(model, parameters, bad) == THERMAL_MODEL_OK;
 }
 
-/* martensite + austenite x difference, in mohm: below 16 ohm each. */
 static void tell_resistance(controller_t *controller, uint8_t spring)
 {
-    uint16_t austenite = thermal_model_austenite(&controller->model, spring); /* Q0.15 */
-    int32_t change_q15 = (int32_t)fixed_point_mac_s16_u16(0, controller->change_mohm, austenite);
-    current_control_set_resistance(
-        &controller->current, spring,
-        (uint16_t)(controller->martensite_mohm + (uint16_t)((uint32_t)change_q15 * 2u >> 16)));
+    const uint32_t resistance_mohm =
+        thermal_model_resistance_uohm(&controller->model, spring) / 1000u;
+    current_control_set_resistance(&controller->current, spring,
+                                   resistance_mohm < UINT16_MAX ? (uint16_t)resistance_mohm
+                                                                : UINT16_MAX);
 }
 
-static void tell_all_resistances(controller_t *controller)
+static void tell_resistances(controller_t *controller)
 {
-    const thermal_model_parameters_t *p = &controller->model.parameters;
-    controller->martensite_mohm = (uint16_t)(p->resistance_martensite_uohm / 1000u);
-    controller->change_mohm =
-        (int16_t)((int32_t)(p->resistance_austenite_uohm / 1000u) - controller->martensite_mohm);
     for (uint8_t k = 0; k < controller->springs; k++) {
         tell_resistance(controller, k);
     }
@@ -79,7 +66,7 @@ static void start(controller_t *controller, const controller_settings_t *setting
     (void)safety_init(&controller->safety, &settings->safety, controller->springs, NULL);
     (void)drive_policy_init(&controller->policy, &settings->policy, controller->springs, NULL);
     drive_policy_prepare(&controller->policy, model);
-    tell_all_resistances(controller);
+    tell_resistances(controller);
 }
 
 bool controller_init(controller_t *controller, const controller_settings_t *settings,
@@ -109,7 +96,6 @@ bool controller_apply_settings(controller_t *controller, const controller_settin
     const thermal_model_parameters_t *old = &controller->model.parameters;
     bool same_size = settings->model.rows == old->rows && settings->model.columns == old->columns;
     thermal_model_state_t state;
-    thermal_model_follow_phases(&controller->model, UINT8_MAX);
     thermal_model_get_state(&controller->model, &state);
     if (!check(settings, bad) || !init_model(&controller->model, &settings->model, bad)) {
         return false;
@@ -121,7 +107,7 @@ bool controller_apply_settings(controller_t *controller, const controller_settin
         (void)safety_apply(&controller->safety, &settings->safety, NULL);
         (void)drive_policy_apply(&controller->policy, &settings->policy, NULL);
         drive_policy_prepare(&controller->policy, &controller->model);
-        tell_all_resistances(controller);
+        tell_resistances(controller);
         return true;
     }
     uint8_t board_fault = controller->safety.board_fault;
@@ -134,15 +120,8 @@ bool controller_apply_settings(controller_t *controller, const controller_settin
     return true;
 }
 
-/* A fifth, to 2e-5 and 1 uW: 13107 = 2^16 / 5. */
-static inline ALWAYS uint32_t fifth(uint32_t sum)
-{
-    uint32_t low = fixed_point_mac_u16(0, (uint16_t)sum, 13107u);
-    return fixed_point_mac_u16(low >> 16, (uint16_t)(sum >> 16), 13107u);
-}
-
 /* What flows, 0..CURRENT_MOST_MA. */
-static inline ALWAYS uint16_t flowing_ma(int16_t current_ma)
+static uint16_t flowing_ma(int16_t current_ma)
 {
     if (current_ma <= 0) {
         return 0;
@@ -150,95 +129,79 @@ static inline ALWAYS uint16_t flowing_ma(int16_t current_ma)
     return current_ma > CURRENT_MOST_MA ? CURRENT_MOST_MA : (uint16_t)current_ma;
 }
 
-/* value / 2^16. The AVR's compiler would load all four bytes. */
-static inline ALWAYS int16_t upper_half(const int32_t *value)
+static uint16_t positive_mv(int16_t voltage_mv)
 {
-#ifdef __AVR__
-    int16_t half;
-    memcpy(&half, (const uint8_t *)value + sizeof half, sizeof half);
-    return half;
-#else
-    return (int16_t)(*value >> 16);
-#endif
+    return voltage_mv > 0 ? (uint16_t)voltage_mv : 0u;
 }
 
 /* Takes the readings and has them judged; returns the sum of what flows. */
-static HOT uint32_t take_sensors(controller_t *controller, const controller_sensor_t *sensor,
-                                 bool valid[])
+static uint32_t take_sensors(controller_t *controller, const controller_sensor_t sensor[],
+                             bool valid[])
 {
     uint32_t sum_ma = 0;
-    for (uint8_t k = 0; k < controller->springs; k++, sensor++) {
-        uint8_t status = (uint8_t)sensor->status;
-        int16_t current_ma = sensor->current_ma;
-        int16_t voltage_mv = sensor->voltage_mv;
-        uint16_t expected_ma = controller->current.channel[k].reference_ma;
-        int16_t temperature_c7 = upper_half(&controller->model.state.spring[k].temperature_c23);
-        if (!safety_tick_good(&controller->safety, &controller->safety.spring[k], status,
-                              current_ma, voltage_mv, expected_ma, temperature_c7)) {
-            safety_sample_t sample = {.sensor_status = status,
-                                      .current_ma = current_ma,
-                                      .voltage_mv = voltage_mv,
-                                      .expected_ma = expected_ma,
-                                      .temperature_c7 = temperature_c7};
-            safety_tick_spring(&controller->safety, k, &sample);
-        }
-        valid[k] = status == CONTROLLER_SENSOR_OK;
+    for (uint8_t k = 0; k < controller->springs; k++) {
+        const safety_sample_t sample = {
+            .sensor_status = (uint8_t)sensor[k].status,
+            .current_ma = sensor[k].current_ma,
+            .voltage_mv = sensor[k].voltage_mv,
+            .expected_ma = current_control_reference_ma(&controller->current, k),
+            .temperature_c7 = thermal_model_temperature_c7(&controller->model, k)};
+        safety_tick_spring(&controller->safety, k, &sample);
+        valid[k] = sensor[k].status == CONTROLLER_SENSOR_OK;
         if (valid[k]) {
-            controller->measured_ma[k] = current_ma;
-            controller->measured_mv[k] = voltage_mv;
-        } else if (controller->duty[k] != 0) {
-            current_ma = controller->measured_ma[k];
-            voltage_mv = controller->measured_mv[k];
-        } else {
+            controller->measured_ma[k] = sensor[k].current_ma;
+            controller->measured_mv[k] = sensor[k].voltage_mv;
+        } else if (controller->duty[k] == 0) {
             continue;
         }
-        uint16_t amount_ma = flowing_ma(current_ma);
-        sum_ma += amount_ma;
-        if (voltage_mv > 0) {
-            controller->power_sum_uw[k] =
-                fixed_point_mac_u16(controller->power_sum_uw[k], amount_ma, (uint16_t)voltage_mv);
-        }
+        sum_ma += flowing_ma(controller->measured_ma[k]);
+        controller->power_sum_uw[k] +=
+            thermal_model_heating_uw(&controller->model, k, flowing_ma(controller->measured_ma[k]),
+                                     positive_mv(controller->measured_mv[k]));
     }
     safety_tick_board(&controller->safety, sum_ma);
     return sum_ma;
 }
 
-/* True if a step of the model began. */
-static bool step_model(controller_t *controller, const controller_inputs_t *inputs)
+static void step_model(controller_t *controller, const controller_inputs_t *inputs)
 {
-    /* One spring in each tick: the phase moves slowly, looking it up costs. */
-    uint8_t turn = controller->resistance_turn;
-    tell_resistance(controller, turn);
-    turn++;
-    controller->resistance_turn = turn < controller->springs ? turn : 0;
+    /* one spring in each tick: the phase moves slowly */
+    tell_resistance(controller, controller->resistance_turn);
+    controller->resistance_turn =
+        (uint8_t)((controller->resistance_turn + 1u) % controller->springs);
     if (++controller->model_tick < TICKS_PER_STEP) {
-        /* a quarter of them, and the policy settles its own: the last of the four finds as many
-         * left */
-        bool last = controller->model_tick == TICKS_PER_STEP - 1u;
-        thermal_model_follow_phases(&controller->model,
-                                    last ? UINT8_MAX : (uint8_t)(controller->springs / 4u));
-        return false;
+        return;
     }
     controller->model_tick = 0;
     for (uint8_t k = 0; k < controller->springs; k++) {
-        controller->power_sum_uw[k] =
-            drive_policy_model_power_uw(&controller->policy, k, fifth(controller->power_sum_uw[k]));
+        controller->power_sum_uw[k] = drive_policy_model_power_uw(
+            &controller->policy, k, controller->power_sum_uw[k] / TICKS_PER_STEP);
     }
     controller->ambient_c7 = inputs->ambient_c7;
     thermal_model_set_ambient(&controller->model, inputs->ambient_c7);
     thermal_model_set_fan(&controller->model, inputs->fan_percent);
-    thermal_model_begin_step(&controller->model, controller->power_sum_uw);
+    thermal_model_step(&controller->model, controller->power_sum_uw);
     memset(controller->power_sum_uw, 0, sizeof controller->power_sum_uw);
-    return true;
 }
 
-static void drive(controller_t *controller, const bool valid[], uint32_t sum_ma, bool model_stepped)
+static bool targets_are_allowed(const controller_t *controller, const bool allowed[],
+                                const uint16_t target_ma[])
 {
-    const safety_t *safety = &controller->safety;
-    const bool any_allowed = !safety->locked && safety->board_fault == SAFETY_FAULT_NONE;
+    uint32_t sum_ma = 0;
+    for (uint8_t k = 0; k < controller->springs; k++) {
+        if (target_ma[k] != 0 && !allowed[k]) {
+            return false;
+        }
+        sum_ma += target_ma[k];
+    }
+    return sum_ma <= controller->safety.parameters.supply_limit_ma;
+}
+
+static void drive(controller_t *controller, const bool valid[], uint32_t sum_ma)
+{
     bool allowed[CONTROLLER_MAX_SPRINGS];
     for (uint8_t k = 0; k < controller->springs; k++) {
-        allowed[k] = any_allowed && safety->spring[k].fault == SAFETY_FAULT_NONE;
+        allowed[k] = safety_allows(&controller->safety, k);
         if (!allowed[k]) {
             current_control_reset(&controller->current, k);
         }
@@ -253,9 +216,9 @@ static void drive(controller_t *controller, const bool valid[], uint32_t sum_ma,
                                   .supply_limit_ma = limits->supply_limit_ma,
                                   .measured_ma = controller->measured_ma,
                                   .measured_mv = controller->measured_mv,
-                                  .valid = valid,
-                                  .model_stepped = model_stepped};
+                                  .valid = valid};
     drive_policy_tick(&controller->policy, &input, target_ma);
+    INVARIANT(targets_are_allowed(controller, allowed, target_ma));
 
     /* Targets fit the budget; while loops still settle, what flows may not: then none rises
      * further. */
@@ -263,21 +226,20 @@ static void drive(controller_t *controller, const bool valid[], uint32_t sum_ma,
         sum_ma + controller->policy.parameters.supply_reserve_ma <= limits->supply_limit_ma;
     current_control_tick(&controller->current, controller->springs, target_ma,
                          controller->measured_ma, valid, may_rise, controller->duty);
-    /* the policy gives it nothing, so that its latch can wait for its turn */
-    uint8_t turn = controller->resistance_turn;
-    if ((controller->policy.spring[turn].limits & DRIVE_POLICY_LIMIT_TRIP) != 0) {
-        safety_trip_limit(&controller->safety, turn);
+    for (uint8_t k = 0; k < controller->springs; k++) {
+        if ((drive_policy_limits(&controller->policy, k) & DRIVE_POLICY_LIMIT_TRIP) != 0) {
+            safety_trip_limit(&controller->safety, k);
+        }
     }
 }
 
-__attribute__((noinline)) void controller_tick(controller_t *controller,
-                                               const controller_inputs_t *inputs,
-                                               controller_outputs_t *outputs)
+void controller_tick(controller_t *controller, const controller_inputs_t *inputs,
+                     controller_outputs_t *outputs)
 {
     bool valid[CONTROLLER_MAX_SPRINGS];
     uint32_t sum_ma = take_sensors(controller, inputs->sensor, valid);
-    bool model_stepped = step_model(controller, inputs);
-    drive(controller, valid, sum_ma, model_stepped);
+    step_model(controller, inputs);
+    drive(controller, valid, sum_ma);
     memcpy(outputs->duty, controller->duty, sizeof outputs->duty);
     outputs->fan_percent = controller->fan_percent;
 }
@@ -347,6 +309,26 @@ void controller_unlock(controller_t *controller)
     safety_unlock(&controller->safety);
 }
 
+void controller_get_model_state(const controller_t *controller, thermal_model_state_t *state)
+{
+    thermal_model_get_state(&controller->model, state);
+}
+
+bool controller_set_model_state(controller_t *controller, const thermal_model_state_t *state)
+{
+    if (!thermal_model_set_state(&controller->model, state)) {
+        return false;
+    }
+    tell_resistances(controller);
+    return true;
+}
+
+void controller_set_temperature(controller_t *controller, int16_t temperature_c7)
+{
+    thermal_model_reset(&controller->model, temperature_c7);
+    tell_resistances(controller);
+}
+
 uint8_t controller_springs(const controller_t *controller)
 {
     return controller->springs;
@@ -377,10 +359,10 @@ uint32_t controller_power_uw(const controller_t *controller, uint8_t spring)
     if (controller->current.channel[spring].blind_ticks != 0 && controller->duty[spring] == 0) {
         return 0;
     }
-    int16_t voltage_mv = controller->measured_mv[spring];
-    uint32_t power_uw = fixed_point_mac_u16(0, flowing_ma(controller->measured_ma[spring]),
-                                            voltage_mv > 0 ? (uint16_t)voltage_mv : 0u);
-    return power_uw < THERMAL_MODEL_HIGHEST_POWER_UW ? power_uw : THERMAL_MODEL_HIGHEST_POWER_UW;
+    const uint32_t measured_uw = (uint32_t)flowing_ma(controller->measured_ma[spring]) *
+                                 positive_mv(controller->measured_mv[spring]);
+    return measured_uw < THERMAL_MODEL_HIGHEST_POWER_UW ? measured_uw
+                                                        : THERMAL_MODEL_HIGHEST_POWER_UW;
 }
 
 uint16_t controller_duty(const controller_t *controller, uint8_t spring)
@@ -398,8 +380,7 @@ uint16_t controller_austenite_permille(const controller_t *controller, uint8_t s
     return (uint16_t)((thermal_model_austenite(&controller->model, spring) * 1000ul) >> 15);
 }
 
-__attribute__((noinline)) safety_fault_t controller_fault(const controller_t *controller,
-                                                          uint8_t spring)
+safety_fault_t controller_fault(const controller_t *controller, uint8_t spring)
 {
     return safety_fault(&controller->safety, spring);
 }

@@ -66,8 +66,6 @@ typedef struct {
     uint8_t model_tick;      /* ticks since the last model step */
     uint8_t fan_percent;     /* wanted */
     uint8_t resistance_turn; /* whose resistance the current loop is told in the next tick */
-    uint16_t martensite_mohm;
-    int16_t change_mohm; /* from martensite to austenite */
     uint16_t level_permille[CONTROLLER_MAX_SPRINGS];
     uint16_t duty[CONTROLLER_MAX_SPRINGS];
     int16_t measured_ma[CONTROLLER_MAX_SPRINGS]; /* last valid reading */
@@ -91,8 +89,8 @@ bool controller_init(controller_t *controller, const controller_settings_t *sett
 bool controller_apply_settings(controller_t *controller, const controller_settings_t *settings,
                                uint16_t *bad);
 
-/* One tick of 20 ms: sensors, safety, model (every 5th tick, with the mean power of the ticks;
- * phases that move follow in the next four, see thermal_model_begin_step), policy, current loops.
+/* One tick of 20 ms: sensors, safety, model (every 5th tick, with the mean power of the ticks),
+ * policy, current loops.
  * inputs are of the tick that just ended, outputs are for the one that starts. outputs of springs
  * that do not exist are 0. Power is v x i of a valid reading. Without one it is the last valid
  * power if the output was on in the tick, else 0: the duty is not raised while a channel is blind,
@@ -120,6 +118,13 @@ void controller_clear_faults(controller_t *controller);
 void controller_lock(controller_t *controller);
 /* Levels are set to 0: nothing starts by unlocking. */
 void controller_unlock(controller_t *controller);
+
+/* What the model remembers, to be kept over a warm reset. */
+void controller_get_model_state(const controller_t *controller, thermal_model_state_t *state);
+/* False, and nothing changed, if and only if the state is not one this model could be in. */
+bool controller_set_model_state(controller_t *controller, const thermal_model_state_t *state);
+/* Springs, air and plate are taken to be at one temperature, reached from cold. */
+void controller_set_temperature(controller_t *controller, int16_t temperature_c7);
 
 /* For telemetry; spring must be below controller_springs. */
 uint8_t controller_springs(const controller_t *controller);

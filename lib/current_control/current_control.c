@@ -1,23 +1,13 @@
 #include "current_control.h"
 
 #include "fixed_point.h"
+#include "invariant.h"
 
 #define MEASURED_LIMIT_MA 4095  /* keeps current times gain below 2^27; the sensor ends at 3200 */
 #define ESTIMATE_LIMIT    24575 /* loop gain, duty steps per mA in Q16: the sum of both fits int16 */
 #define TRIM_LIMIT        8191u
 #define FIRST_MA          128u /* what a rise from off begins with */
 #define SMALL_MA          25u  /* a change that need not wait: a step of the policy's sweep */
-
-#ifdef __AVR__
-#define HOT    __attribute__((noinline, optimize("O2")))
-#define ALWAYS __attribute__((always_inline))
-/* The address stays in a pointer register instead of being worked out anew for each field. */
-#define KEEP_ADDRESS(pointer) __asm__("" : "+b"(pointer))
-#else
-#define HOT
-#define ALWAYS
-#define KEEP_ADDRESS(pointer) (void)(pointer)
-#endif
 
 bool current_control_check(const current_control_parameters_t *p, uint16_t *bad)
 {
@@ -90,8 +80,8 @@ static inline int16_t to_q8(int32_t value_q16)
 
 /* The trim takes integral x error / reference, the reference rounded up to FIRST_MA times a power
  * of two; error: the given duty less the one that what it has brought should have taken. */
-static HOT void learn(const current_control_t *control, current_control_channel_t *c,
-                      int16_t measured_ma)
+static void learn(const current_control_t *control, current_control_channel_t *c,
+                  int16_t measured_ma)
 {
     if (measured_ma > MEASURED_LIMIT_MA) {
         measured_ma = MEASURED_LIMIT_MA;
@@ -115,9 +105,10 @@ static HOT void learn(const current_control_t *control, current_control_channel_
         trim_q24 = -limit_q24;
     }
     c->trim_q24 = trim_q24;
+    INVARIANT(trim_q24 <= limit_q24 && trim_q24 >= -limit_q24);
 }
 
-static HOT uint16_t give(const current_control_t *control, current_control_channel_t *c)
+static uint16_t give(const current_control_t *control, current_control_channel_t *c)
 {
     uint32_t wanted_q16 =
         fixed_point_mac_u16((uint32_t)control->offset_q16 + c->residue_q16, c->reference_ma,
@@ -130,12 +121,13 @@ static HOT uint16_t give(const current_control_t *control, current_control_chann
         duty = most;
     }
     c->duty = duty;
+    INVARIANT(duty <= most && most <= CURRENT_CONTROL_DUTY_STEPS);
     return duty;
 }
 
 /* What is not learnt yet at least halves from one rise to the next: so the reference may double. */
-static inline ALWAYS uint16_t raised_ma(const current_control_t *control, uint16_t reference_ma,
-                                        uint16_t target_ma)
+static uint16_t raised_ma(const current_control_t *control, uint16_t reference_ma,
+                          uint16_t target_ma)
 {
     uint16_t rise_ma = reference_ma == 0 ? FIRST_MA : reference_ma;
     uint16_t slew_ma = (uint16_t)(control->parameters.slew_ma_per_tick * 2u);
@@ -146,9 +138,9 @@ static inline ALWAYS uint16_t raised_ma(const current_control_t *control, uint16
     return left_ma < rise_ma ? target_ma : (uint16_t)(reference_ma + rise_ma);
 }
 
-HOT void current_control_tick(current_control_t *control, uint8_t channels,
-                              const uint16_t target_ma[], const int16_t measured_ma[],
-                              const bool valid[], bool may_rise, uint16_t duty[])
+void current_control_tick(current_control_t *control, uint8_t channels, const uint16_t target_ma[],
+                          const int16_t measured_ma[], const bool valid[], bool may_rise,
+                          uint16_t duty[])
 {
     bool turn = !control->even_turn;
     control->even_turn = turn;
@@ -158,7 +150,6 @@ HOT void current_control_tick(current_control_t *control, uint8_t channels,
     }
     current_control_channel_t *c = control->channel;
     for (; channels != 0; channels--, c++, duty++, measured_ma++, turn = !turn) {
-        KEEP_ADDRESS(c);
         bool knows = *valid++;
         if (knows) {
             c->blind_ticks = 0;

@@ -4,14 +4,6 @@
 
 #include "fixed_point.h"
 
-#if defined(__AVR__) && !defined(__clang__)
-#define HOT __attribute__((noinline, optimize("O2"))) /* a third of its cycles */
-#else
-#define HOT
-#endif
-
-#define OWN __attribute__((noinline)) /* one function of all would spill its registers */
-
 /* Each spring is updated once in a round, 0.25 s. Counts of updates and windows below are of those
  * quarters. */
 #define UPDATES_PER_S 4u
@@ -77,7 +69,8 @@
 #define HORIZON_UPDATES    24   /* 6 s: undriven springs are predicted so far */
 #define PARTIAL_POWER_64UW 6250 /* 0.4 W beyond the hold: heating to a level slows down */
 
-#define SOFT_MA         20                             /* per tick, after a change of policy */
+#define TICKS_PER_REST  5u /* no spring is updated in that tick: a round takes 1/4 s */
+#define SOFT_MA         20 /* per tick, after a change of policy */
 #define SOFT_TURNS      (2u * DRIVE_POLICY_ROUND + 1u) /* every spring has had two */
 #define LEAST_BOOST_MA  200u                           /* less is not worth waiting for */
 #define JUMP_MA         100u
@@ -160,18 +153,19 @@ void drive_policy_prepare(drive_policy_t *policy, const thermal_model_t *model)
     resistance_alloy_prepare(&policy->alloy, m->resistance_martensite_uohm,
                              m->resistance_austenite_uohm);
     policy->columns = m->columns;
+    const thermal_model_transformation_t points = thermal_model_transformation(model, 0);
 
     /* a distance of 1 K is closed with a time constant of 4 s: C / 4 s */
     uint32_t feedback = (uint32_t)m->heat_capacity_mj_per_k * 1000u / (4u * KELVIN_C7);
     policy->feedback_uw_per_c7 = feedback > 16383u ? 16383u : (uint16_t)feedback;
     /* half of the error in each update: width / 2 / 1000 */
-    uint16_t width_c7 = (uint16_t)(model->austenite_finish_c7 - model->austenite_start_c7);
+    uint16_t width_c7 = (uint16_t)(points.austenite_finish_c7 - points.austenite_start_c7);
     policy->correction_q8 = (uint16_t)((uint32_t)width_c7 * 131u >> 10);
     /* 35 % of the declared loss */
     policy->bias_limit_uw_per_k = (int16_t)((uint32_t)m->loss_uw_per_k * 23u >> 6);
     /* heat of a fall of 0.04 K/s over the 60 K that correct_hold works with */
     policy->falling_uw_per_k = (int16_t)((uint32_t)policy->feedback_uw_per_c7 * 87u >> 8);
-    width_c7 = (uint16_t)(model->martensite_start_c7 - model->martensite_finish_c7);
+    width_c7 = (uint16_t)(points.martensite_start_c7 - points.martensite_finish_c7);
     policy->event_c7 = (int16_t)((uint32_t)width_c7 * 14u >> 8); /* 5.5 % */
 
     policy->hold_margin_c7 = fixed_point_c7_from_cc((int16_t)p->hold_margin_cc);
@@ -200,7 +194,7 @@ static int32_t bias_at(const thermal_model_t *model, int16_t bias_uw_per_k, int1
     if (bias_uw_per_k == 0) {
         return 0;
     }
-    int16_t above_c7 = (int16_t)(temperature_c7 - model->ambient_c7);
+    int16_t above_c7 = (int16_t)(temperature_c7 - thermal_model_ambient_c7(model));
     if (above_c7 <= 0) {
         return 0;
     }
@@ -226,11 +220,13 @@ uint32_t drive_policy_model_power_uw(const drive_policy_t *policy, uint8_t sprin
 
 /* The model's spring to a temperature, its phase as if it came from martensite or from austenite.
  */
-static OWN void rewind_to(thermal_model_t *model, uint8_t k, int16_t temperature_c7, bool from_cold)
+static void rewind_to(thermal_model_t *model, uint8_t k, int16_t temperature_c7, bool from_cold)
 {
-    thermal_model_set_temperature(model, k,
-                                  from_cold ? (int16_t)(model->martensite_finish_c7 - KELVIN_C7)
-                                            : (int16_t)(model->austenite_finish_c7 + KELVIN_C7));
+    thermal_model_set_temperature(
+        model, k,
+        from_cold
+            ? (int16_t)(thermal_model_transformation(model, k).martensite_finish_c7 - KELVIN_C7)
+            : (int16_t)(thermal_model_transformation(model, k).austenite_finish_c7 + KELVIN_C7));
     thermal_model_set_temperature(model, k, temperature_c7);
 }
 
@@ -245,7 +241,7 @@ static bool trusted(const drive_policy_t *policy, const drive_policy_spring_t *s
 
 /* Austenite as the resistance says, 0..1000 permille. Fully on is what it read when it had
  * transformed, whatever the declared resistances say. */
-static OWN int16_t read_phase(const drive_policy_spring_t *s)
+static int16_t read_phase(const drive_policy_spring_t *s)
 {
     int16_t phase = s->observer.phase_permille;
     if (phase <= 0) {
@@ -258,14 +254,14 @@ static OWN int16_t read_phase(const drive_policy_spring_t *s)
 }
 
 /* The same, or as the model says where the resistance is not trusted. */
-static OWN int16_t best_phase(const drive_policy_t *policy, const drive_policy_spring_t *s,
-                              const thermal_model_t *model, uint8_t k)
+static int16_t best_phase(const drive_policy_t *policy, const drive_policy_spring_t *s,
+                          const thermal_model_t *model, uint8_t k)
 {
     return trusted(policy, s) ? read_phase(s) : model_permille(model, k);
 }
 
 /* How far the model is to move for an error of its phase: half of what is beyond the deadband. */
-static OWN int16_t correction_c7(const drive_policy_t *policy, int16_t error, int16_t deadband)
+static int16_t correction_c7(const drive_policy_t *policy, int16_t error, int16_t deadband)
 {
     if (error > deadband) {
         error = (int16_t)(error - deadband);
@@ -278,18 +274,21 @@ static OWN int16_t correction_c7(const drive_policy_t *policy, int16_t error, in
 }
 
 /* While it heats: where the resistance says the spring is, against where the model has it. */
-static OWN void correct_heating(const drive_policy_t *policy, drive_policy_spring_t *s,
-                                thermal_model_t *model, uint8_t k, int16_t phase, int16_t permille)
+static void correct_heating(const drive_policy_t *policy, drive_policy_spring_t *s,
+                            thermal_model_t *model, uint8_t k, int16_t phase, int16_t permille)
 {
     int16_t now_c7 = thermal_model_temperature_c7(model, k);
     int16_t error = (int16_t)(phase - permille);
     int16_t move_c7 = 0;
-    if (now_c7 < model->austenite_start_c7) {
+    if (now_c7 < thermal_model_transformation(model, k).austenite_start_c7) {
         if (error > PHASE_DEADBAND && phase > PHASE_SEEN) {
-            move_c7 = (int16_t)(model->austenite_start_c7 + KELVIN_C7 - now_c7);
+            move_c7 = (int16_t)(thermal_model_transformation(model, k).austenite_start_c7 +
+                                KELVIN_C7 - now_c7);
         } /* too little phase below austenite start is memory, and heating brings it */
-    } else if (phase < 1000 - PHASE_MISSING && now_c7 > model->austenite_finish_c7) {
-        move_c7 = (int16_t)(model->austenite_finish_c7 - KELVIN_C7 / 2 - now_c7);
+    } else if (phase < 1000 - PHASE_MISSING &&
+               now_c7 > thermal_model_transformation(model, k).austenite_finish_c7) {
+        move_c7 = (int16_t)(thermal_model_transformation(model, k).austenite_finish_c7 -
+                            KELVIN_C7 / 2 - now_c7);
     } else {
         move_c7 = correction_c7(policy, error, PHASE_DEADBAND);
     }
@@ -326,22 +325,25 @@ static int16_t place_of_phase(int16_t permille)
 }
 
 /* Where heating goes on to transform a spring that is so much austenite. */
-static OWN int16_t goes_on_c7(const drive_policy_t *policy, const thermal_model_t *model,
-                              int16_t permille)
+static int16_t goes_on_c7(const drive_policy_t *policy, const thermal_model_t *model, uint8_t k,
+                          int16_t permille)
 {
     uint16_t place = (uint16_t)place_of_phase(clamp16(permille, 0, 1000));
     uint32_t place_q15 = fixed_point_mac_u16(0, place, policy->correction_q8) << 1;
-    return (int16_t)(model->austenite_start_c7 + (int16_t)(place_q15 >> 8));
+    return (int16_t)(thermal_model_transformation(model, k).austenite_start_c7 +
+                     (int16_t)(place_q15 >> 8));
 }
 
 /* Between martensite start and austenite start the phase rests: what the resistance says of it is
  * the phase's memory, not the temperature. */
-static OWN void impose_phase(const drive_policy_t *policy, thermal_model_t *model, uint8_t k,
-                             int16_t permille)
+static void impose_phase(const drive_policy_t *policy, thermal_model_t *model, uint8_t k,
+                         int16_t permille)
 {
     int16_t now_c7 = thermal_model_temperature_c7(model, k);
-    thermal_model_set_temperature(model, k, (int16_t)(model->martensite_finish_c7 - KELVIN_C7));
-    thermal_model_set_temperature(model, k, goes_on_c7(policy, model, permille));
+    thermal_model_set_temperature(
+        model, k,
+        (int16_t)(thermal_model_transformation(model, k).martensite_finish_c7 - KELVIN_C7));
+    thermal_model_set_temperature(model, k, goes_on_c7(policy, model, k, permille));
     thermal_model_set_temperature(model, k, now_c7);
 }
 
@@ -408,9 +410,9 @@ static void enter(drive_policy_t *policy, uint8_t k, drive_policy_stage_t stage)
 
 /* What heats a spring at a temperature, against its neighbours as they are now, plus a correction
  * towards it. */
-static HOT uint16_t hold_current_ma(const drive_policy_t *policy, const drive_policy_spring_t *s,
-                                    const thermal_model_t *model, uint8_t k, int16_t target_c7,
-                                    int16_t extra_64uw)
+static uint16_t hold_current_ma(const drive_policy_t *policy, const drive_policy_spring_t *s,
+                                const thermal_model_t *model, uint8_t k, int16_t target_c7,
+                                int16_t extra_64uw)
 {
     int16_t short_c7 = (int16_t)(target_c7 - thermal_model_temperature_c7(model, k));
     short_c7 = short_c7 > SHORT_MOST_C7    ? SHORT_MOST_C7
@@ -434,24 +436,25 @@ static bool waits_for_supply(const drive_policy_spring_t *s)
     return s->granted_ma < s->asked_ma - (s->asked_ma >> 2);
 }
 
-static OWN bool is_transformed(const drive_policy_t *policy, drive_policy_spring_t *s,
-                               thermal_model_t *model, uint8_t k, bool sees, int16_t phase)
+static bool is_transformed(const drive_policy_t *policy, drive_policy_spring_t *s,
+                           thermal_model_t *model, uint8_t k, bool sees, int16_t phase)
 {
     int16_t now_c7 = thermal_model_temperature_c7(model, k);
     if (!sees) {
         bool derated = s->ceiling_ma < policy->parameters.boost_current_ma >> 1;
-        return now_c7 >= model->austenite_finish_c7 + BLIND_OVERSHOOT_C7 ||
-               (derated && now_c7 >= model->austenite_finish_c7);
+        return now_c7 >= thermal_model_transformation(model, k).austenite_finish_c7 +
+                             BLIND_OVERSHOOT_C7 ||
+               (derated && now_c7 >= thermal_model_transformation(model, k).austenite_finish_c7);
     }
     if (s->plateau >= PLATEAU_TRUSTED && phase > 600 &&
         s->target_ma >= policy->parameters.boost_current_ma >> 1) {
-        if (now_c7 < model->austenite_finish_c7) {
-            rewind_to(model, k, model->austenite_finish_c7, true);
+        if (now_c7 < thermal_model_transformation(model, k).austenite_finish_c7) {
+            rewind_to(model, k, thermal_model_transformation(model, k).austenite_finish_c7, true);
         }
         return true;
     }
     return s->plateau >= 2 && phase >= RATIO_FULL_PERMILLE &&
-           now_c7 >= model->austenite_finish_c7 - KELVIN_C7;
+           now_c7 >= thermal_model_transformation(model, k).austenite_finish_c7 - KELVIN_C7;
 }
 
 /* Counts windows in which the phase stood still: the last percent of a transformation is slow. What
@@ -473,12 +476,13 @@ static void watch_plateau(const drive_policy_t *policy, drive_policy_spring_t *s
 
 /* Where the resistance says that the heating is, and the model with it. True once the wanted phase
  * is reached. */
-static OWN bool has_heated(drive_policy_t *policy, drive_policy_spring_t *s, thermal_model_t *model,
-                           uint8_t k, int16_t level, bool fresh)
+static bool has_heated(drive_policy_t *policy, drive_policy_spring_t *s, thermal_model_t *model,
+                       uint8_t k, int16_t level, bool fresh)
 {
     int16_t now_c7 = thermal_model_temperature_c7(model, k);
     int16_t permille = model_permille(model, k);
-    bool certain = permille == 0 && now_c7 < model->austenite_start_c7 - CERTAIN_C7;
+    bool certain = permille == 0 &&
+                   now_c7 < thermal_model_transformation(model, k).austenite_start_c7 - CERTAIN_C7;
     if (certain && fresh && s->fresh >= LEARNING_WINDOWS) {
         resistance_observer_learn_martensite(&s->observer, &policy->alloy);
     }
@@ -486,18 +490,19 @@ static OWN bool has_heated(drive_policy_t *policy, drive_policy_spring_t *s, the
     bool strong = s->target_ma >= 2u * policy->parameters.probe_current_ma; /* no coarse reading */
     int16_t phase = sees ? read_phase(s) : permille;
     /* until heating goes on, what it is, is memory */
-    bool rests = now_c7 < goes_on_c7(policy, model, permille) - KELVIN_C7;
+    bool rests = now_c7 < goes_on_c7(policy, model, k, permille) - KELVIN_C7;
     if (waits_for_supply(s) || rests) {
         s->plateau = 0; /* it stands still because it waits, or has not begun to go on */
     } else if (fresh) {
         watch_plateau(policy, s);
     }
     if (fresh && s->reference == 0) {
-        if (now_c7 < model->martensite_finish_c7) {
+        if (now_c7 < thermal_model_transformation(model, k).martensite_finish_c7) {
             s->reference = 1;
-        } else if (sees && strong && now_c7 > model->martensite_start_c7) {
+        } else if (sees && strong &&
+                   now_c7 > thermal_model_transformation(model, k).martensite_start_c7) {
             s->reference = 1; /* the first look at it, if it was not cold before */
-            if (now_c7 < model->austenite_start_c7 &&
+            if (now_c7 < thermal_model_transformation(model, k).austenite_start_c7 &&
                 (phase > permille + PHASE_SEEN || phase < permille - PHASE_SEEN)) {
                 impose_phase(policy, model, k, phase);
                 return false;
@@ -519,12 +524,13 @@ static OWN bool has_heated(drive_policy_t *policy, drive_policy_spring_t *s, the
     return true;
 }
 
-static OWN void heat(drive_policy_t *policy, drive_policy_spring_t *s, thermal_model_t *model,
-                     uint8_t k, int16_t level, bool fresh)
+static void heat(drive_policy_t *policy, drive_policy_spring_t *s, thermal_model_t *model,
+                 uint8_t k, int16_t level, bool fresh)
 {
     int16_t now_c7 = thermal_model_temperature_c7(model, k);
     bool waits = waits_for_supply(s);
-    bool slows = level < LEVEL_FULL_PERMILLE && now_c7 > model->austenite_start_c7 - KELVIN_C7;
+    bool slows = level < LEVEL_FULL_PERMILLE &&
+                 now_c7 > thermal_model_transformation(model, k).austenite_start_c7 - KELVIN_C7;
     if ((waits || slows) && (policy->round & 1u) != 0) { /* every second time: a tick is short */
         uint16_t keeps_ma =
             hold_current_ma(policy, s, model, k, now_c7, slows ? PARTIAL_POWER_64UW : 0);
@@ -532,7 +538,7 @@ static OWN void heat(drive_policy_t *policy, drive_policy_spring_t *s, thermal_m
             s->wanted_ma = keeps_ma;
         }
         /* what it has is kept while it waits */
-        bool has = now_c7 > model->austenite_start_c7 + KEPT_C7 ||
+        bool has = now_c7 > thermal_model_transformation(model, k).austenite_start_c7 + KEPT_C7 ||
                    best_phase(policy, s, model, k) > level >> 1;
         s->floor_ma = waits && has ? keeps_ma : 0;
     } else if (has_heated(policy, s, model, k, level, fresh)) {
@@ -551,8 +557,9 @@ static void let_go(const drive_policy_t *policy, drive_policy_spring_t *s,
     s->bias_uw_per_k = 0;
     s->margin_c7 = policy->unsure_margin_c7;
     if (full) {
+        const thermal_model_transformation_t points = thermal_model_transformation(model, 0);
         s->margin_c7 =
-            (int16_t)(model->austenite_finish_c7 + BLIND_OVERSHOOT_C7 - model->martensite_start_c7);
+            (int16_t)(points.austenite_finish_c7 + BLIND_OVERSHOOT_C7 - points.martensite_start_c7);
     }
 }
 
@@ -564,7 +571,7 @@ static bool is_pausing(const drive_policy_spring_t *s)
 
 /* The average has settled. What was lost is lost for good, and by now the average shows all of it:
  * a loss that it does not show was its own wandering. */
-static OWN void take_reference(drive_policy_t *policy, drive_policy_spring_t *s)
+static void take_reference(drive_policy_t *policy, drive_policy_spring_t *s)
 {
     if ((s->flags & FLAG_DOUBT) != 0) {
         int16_t lost = (int16_t)-resistance_observer_drift_permille(&s->observer, &policy->alloy,
@@ -585,11 +592,12 @@ static OWN void take_reference(drive_policy_t *policy, drive_policy_spring_t *s)
 }
 
 /* Looks for the first loss of phase: martensite start, seen as on a thermometer. */
-static OWN void watch_hold(drive_policy_t *policy, drive_policy_spring_t *s, thermal_model_t *model,
-                           uint8_t k, bool full)
+static void watch_hold(drive_policy_t *policy, drive_policy_spring_t *s, thermal_model_t *model,
+                       uint8_t k, bool full)
 {
     int16_t now_c7 = thermal_model_temperature_c7(model, k);
-    int16_t target_c7 = (int16_t)(model->martensite_start_c7 + s->margin_c7);
+    int16_t target_c7 =
+        (int16_t)(thermal_model_transformation(model, k).martensite_start_c7 + s->margin_c7);
     if (s->reference < REFERENCE_WINDOWS) {
         if (now_c7 < target_c7 + SETTLED_C7 && now_c7 > target_c7 - SETTLED_C7) {
             s->reference++;
@@ -610,7 +618,7 @@ static OWN void watch_hold(drive_policy_t *policy, drive_policy_spring_t *s, the
         let_go(policy, s, model, full);
         return;
     }
-    int16_t start_c7 = model->martensite_start_c7;
+    int16_t start_c7 = thermal_model_transformation(model, k).martensite_start_c7;
     if (loss + s->lost_permille >= LOSS_REHEAT && full) {
         enter(policy, k, DRIVE_POLICY_STAGE_HEAT);
         return;
@@ -659,8 +667,8 @@ static OWN void watch_hold(drive_policy_t *policy, drive_policy_spring_t *s, the
 }
 
 /* The margin narrows: to the wanted one where the loss is known, else until the start is seen. */
-static OWN void narrow_margin(const drive_policy_t *policy, drive_policy_spring_t *s,
-                              const thermal_model_t *model, bool full)
+static void narrow_margin(const drive_policy_t *policy, drive_policy_spring_t *s,
+                          const thermal_model_t *model, bool full)
 {
     int16_t floor_c7 =
         (s->flags & FLAG_LEARNT) != 0 ? policy->hold_margin_c7 : (int16_t) - (PIN_C7 + PULL_C7);
@@ -678,8 +686,8 @@ static OWN void narrow_margin(const drive_policy_t *policy, drive_policy_spring_
     }
 }
 
-static OWN void hold(drive_policy_t *policy, drive_policy_spring_t *s, thermal_model_t *model,
-                     uint8_t k, int16_t level, bool fresh)
+static void hold(drive_policy_t *policy, drive_policy_spring_t *s, thermal_model_t *model,
+                 uint8_t k, int16_t level, bool fresh)
 {
     bool full = level >= LEVEL_FULL_PERMILLE;
     int16_t phase = full ? s->observer.phase_permille : read_phase(s);
@@ -733,8 +741,8 @@ static OWN void hold(drive_policy_t *policy, drive_policy_spring_t *s, thermal_m
         enter(policy, k, DRIVE_POLICY_STAGE_LOWER);
         return;
     }
-    int16_t target_c7 =
-        (int16_t)(model->martensite_start_c7 + (coasts ? coasting_c7 : s->margin_c7));
+    int16_t target_c7 = (int16_t)(thermal_model_transformation(model, k).martensite_start_c7 +
+                                  (coasts ? coasting_c7 : s->margin_c7));
     uint16_t wanted_ma =
         hold_current_ma(policy, s, model, k, target_c7, is_pausing(s) ? SUSPICION_64UW : 0);
     wanted_ma = (uint16_t)(wanted_ma + (policy->parameters.dither_ma >> 1));
@@ -744,8 +752,8 @@ static OWN void hold(drive_policy_t *policy, drive_policy_spring_t *s, thermal_m
     s->wanted_ma = wanted_ma;
 }
 
-static OWN void lower(drive_policy_t *policy, drive_policy_spring_t *s, thermal_model_t *model,
-                      uint8_t k, int16_t level, bool fresh)
+static void lower(drive_policy_t *policy, drive_policy_spring_t *s, thermal_model_t *model,
+                  uint8_t k, int16_t level, bool fresh)
 {
     int16_t phase = best_phase(policy, s, model, k);
     if (fresh && trusted(policy, s)) {
@@ -759,8 +767,8 @@ static OWN void lower(drive_policy_t *policy, drive_policy_spring_t *s, thermal_
 }
 
 /* Undriven: how near austenite start it is going to come, 255 at the limit. */
-static OWN uint8_t off(const drive_policy_t *policy, drive_policy_spring_t *s,
-                       thermal_model_t *model, uint8_t k, bool fresh)
+static uint8_t off(const drive_policy_t *policy, drive_policy_spring_t *s, thermal_model_t *model,
+                   uint8_t k, bool fresh)
 {
     int16_t now_c7 = thermal_model_temperature_c7(model, k);
     int16_t from_c7 = (int16_t)(policy->undriven_c7 - UNDRIVEN_BAND_C7);
@@ -787,7 +795,7 @@ static OWN uint8_t off(const drive_policy_t *policy, drive_policy_spring_t *s,
 /* ---- derating ---- */
 
 /* Worst of the undriven neighbours; a driven spring has no severity. */
-static OWN uint8_t worst_neighbour(const drive_policy_t *policy, uint8_t k)
+static uint8_t worst_neighbour(const drive_policy_t *policy, uint8_t k)
 {
     uint8_t columns = policy->columns;
     uint8_t row_start = 0;
@@ -816,8 +824,8 @@ static uint16_t share_q8(uint16_t value, uint16_t share)
     return (uint16_t)(fixed_point_mac_u16(0, value, share) >> 8);
 }
 
-static OWN void derate(const drive_policy_t *policy, drive_policy_spring_t *s,
-                       const thermal_model_t *model, uint8_t k, bool driven)
+static void derate(const drive_policy_t *policy, drive_policy_spring_t *s,
+                   const thermal_model_t *model, uint8_t k, bool driven)
 {
     uint16_t full_ma = policy->parameters.boost_current_ma;
     uint16_t share = 256;
@@ -888,7 +896,7 @@ static uint16_t budget_ma(drive_policy_t *policy)
     return (uint16_t)(budget - away_ma);
 }
 
-static OWN void grant(drive_policy_t *policy, drive_policy_spring_t *s, uint16_t granted_ma)
+static void grant(drive_policy_t *policy, drive_policy_spring_t *s, uint16_t granted_ma)
 {
     if ((uint16_t)(granted_ma + JUMP_MA - s->granted_ma) > 2u * JUMP_MA) {
         resistance_observer_disturb(&s->observer);
@@ -903,7 +911,7 @@ static OWN void grant(drive_policy_t *policy, drive_policy_spring_t *s, uint16_t
 
 /* Holds first, the largest cut to a common cap if they alone are too much; then those that heat,
  * one after the other: heat grows with the square of current. */
-static HOT void share(drive_policy_t *policy)
+static void share(drive_policy_t *policy)
 {
     uint16_t budget = budget_ma(policy);
     uint16_t fixed_ma[DRIVE_POLICY_MAX_SPRINGS];
@@ -957,7 +965,7 @@ static HOT void share(drive_policy_t *policy)
 
 /* The last ones to heat take turns while they are cold: else the very last heats alone, with most
  * of the supply unused. Far more that wait are better served one after the other. */
-static OWN void rotate_queue(drive_policy_t *policy, const thermal_model_t *model)
+static void rotate_queue(drive_policy_t *policy, const thermal_model_t *model)
 {
     int16_t coldest_c7 = INT16_MAX; /* of those that wait */
     int16_t warmest_c7 = INT16_MIN; /* of those that heat, but have not begun to transform */
@@ -972,7 +980,8 @@ static OWN void rotate_queue(drive_policy_t *policy, const thermal_model_t *mode
             coldest_c7 = now_c7 < coldest_c7 ? now_c7 : coldest_c7;
         } else {
             room++;
-            if (now_c7 > warmest_c7 && now_c7 < model->austenite_start_c7 - GOES_ON_C7) {
+            if (now_c7 > warmest_c7 &&
+                now_c7 < thermal_model_transformation(model, k).austenite_start_c7 - GOES_ON_C7) {
                 warmest_c7 = now_c7;
                 warmest = k;
             }
@@ -985,8 +994,7 @@ static OWN void rotate_queue(drive_policy_t *policy, const thermal_model_t *mode
 }
 
 /* What one spring asks for now: less at once, more as far as nobody else is to have it. */
-static OWN void ask(drive_policy_t *policy, const drive_policy_input_t *input,
-                    drive_policy_spring_t *s)
+static void ask(drive_policy_t *policy, const drive_policy_input_t *input, drive_policy_spring_t *s)
 {
     uint16_t asked_ma = s->wanted_ma;
     uint8_t limits = DRIVE_POLICY_LIMIT_NONE;
@@ -1055,7 +1063,8 @@ static bool is_there(const thermal_model_t *model, uint8_t k, int16_t level)
     int16_t permille = model_permille(model, k);
     if (level >= LEVEL_FULL_PERMILLE) {
         return permille >= MODEL_FULL_PERMILLE &&
-               thermal_model_temperature_c7(model, k) > model->martensite_start_c7 + KELVIN_C7;
+               thermal_model_temperature_c7(model, k) >
+                   thermal_model_transformation(model, k).martensite_start_c7 + KELVIN_C7;
     }
     return permille >= level - LEVEL_BAND_PERMILLE;
 }
@@ -1082,14 +1091,13 @@ static void precompensate(drive_policy_t *policy, const drive_policy_input_t *in
     }
 }
 
-static OWN void update(drive_policy_t *policy, const drive_policy_input_t *input,
-                       drive_policy_spring_t *s, uint8_t k)
+static void update(drive_policy_t *policy, const drive_policy_input_t *input,
+                   drive_policy_spring_t *s, uint8_t k)
 {
     bool open = policy->parameters.policy == DRIVE_POLICY_OPEN;
     bool driven = input->level_permille[k] != 0 && input->allowed[k];
     if (policy->prepared) {
         thermal_model_t *model = input->model;
-        thermal_model_settle(model, k);
         bool fresh =
             resistance_observer_update(&s->observer, &policy->alloy, s->fresh >= FRESH_WINDOWS);
         if (fresh || s->target_ma == 0) {
@@ -1126,20 +1134,19 @@ static OWN void update(drive_policy_t *policy, const drive_policy_input_t *input
     }
 }
 
-/* A hash of the levels tells that one has changed. */
-static OWN void watch_levels(drive_policy_t *policy, const uint16_t *level)
+static void watch_levels(drive_policy_t *policy, const uint16_t *level_permille)
 {
-    uint16_t hash = 0;
-    for (uint8_t n = policy->springs; n != 0; n--) {
-        hash = (uint16_t)((uint16_t)(hash << 1) + *level++);
+    for (uint8_t k = 0; k < policy->springs; k++) {
+        if (policy->spring[k].level_permille != level_permille[k]) {
+            policy->spring[k].level_permille = level_permille[k];
+            policy->stale = true;
+        }
     }
-    policy->stale = policy->stale || hash != policy->levels;
-    policy->levels = hash;
 }
 
 /* Limits, parameters or, under DRIVE_POLICY_OPEN, levels have changed: what all springs are given
  * is worked out anew. */
-static OWN void restart(drive_policy_t *policy, const drive_policy_input_t *input)
+static void restart(drive_policy_t *policy, const drive_policy_input_t *input)
 {
     const drive_policy_parameters_t *p = &policy->parameters;
     drive_policy_spring_t *s = policy->spring;
@@ -1154,7 +1161,7 @@ static OWN void restart(drive_policy_t *policy, const drive_policy_input_t *inpu
 }
 
 /* The work of this tick: one place of the round. */
-static OWN void take_turn(drive_policy_t *policy, const drive_policy_input_t *input)
+static void take_turn(drive_policy_t *policy, const drive_policy_input_t *input)
 {
     uint8_t slot = policy->slot;
     if (policy->soft != 0) {
@@ -1185,8 +1192,8 @@ static OWN void take_turn(drive_policy_t *policy, const drive_policy_input_t *in
 /* What is granted, less the dither: a slow triangle below, each spring at another place of it. Not
  * driven is off at once, whatever the update's turn. Returns the targets' sum. No calls in the
  * loop: they would cost its registers. */
-static HOT uint16_t give(drive_policy_t *policy, const uint16_t *level, const bool *allowed,
-                         uint16_t *target_ma)
+static uint16_t give(drive_policy_t *policy, const uint16_t *level, const bool *allowed,
+                     uint16_t *target_ma)
 {
     uint8_t place = policy->sweep;
     policy->sweep = (uint8_t)(place + 1u);
@@ -1235,7 +1242,7 @@ static HOT uint16_t give(drive_policy_t *policy, const uint16_t *level, const bo
 }
 
 /* Springs that are driven no longer. */
-static OWN void stop_some(drive_policy_t *policy, const uint16_t *level, const bool *allowed)
+static void stop_some(drive_policy_t *policy, const uint16_t *level, const bool *allowed)
 {
     drive_policy_spring_t *s = policy->spring;
     for (uint8_t n = policy->springs; n != 0; n--, s++) {
@@ -1248,7 +1255,7 @@ static OWN void stop_some(drive_policy_t *policy, const uint16_t *level, const b
 
 /* After a change of policy a target walks from where it was, up as far as there is room: what the
  * last targets left of the budget. Returns the targets' sum. */
-static HOT uint16_t soften(drive_policy_t *policy, uint16_t *target_ma)
+static uint16_t soften(drive_policy_t *policy, uint16_t *target_ma)
 {
     uint16_t room_ma = 0;
     if (policy->sum_ma < policy->budget_ma) {
@@ -1291,8 +1298,8 @@ static HOT uint16_t soften(drive_policy_t *policy, uint16_t *target_ma)
 }
 
 /* Takes the readings of the last tick. */
-static HOT void listen(drive_policy_t *policy, const bool *valid, const int16_t *current_ma,
-                       const int16_t *voltage_mv)
+static void listen(drive_policy_t *policy, const bool *valid, const int16_t *current_ma,
+                   const int16_t *voltage_mv)
 {
     drive_policy_spring_t *s = policy->spring;
     for (uint8_t n = policy->springs; n != 0; n--, s++, current_ma++, voltage_mv++) {
@@ -1303,8 +1310,7 @@ static HOT void listen(drive_policy_t *policy, const bool *valid, const int16_t 
 }
 
 /* Undriven springs one after the other, in what the budget leaves. */
-static OWN void probe(drive_policy_t *policy, const drive_policy_input_t *input,
-                      uint16_t target_ma[])
+static void probe(drive_policy_t *policy, const drive_policy_input_t *input, uint16_t target_ma[])
 {
     const drive_policy_parameters_t *p = &policy->parameters;
     if (p->probe_period_s == 0 || p->policy == DRIVE_POLICY_OPEN || policy->soft != 0) {
@@ -1330,6 +1336,10 @@ static OWN void probe(drive_policy_t *policy, const drive_policy_input_t *input,
 void drive_policy_tick(drive_policy_t *policy, const drive_policy_input_t *input,
                        uint16_t target_ma[])
 {
+    bool rests = ++policy->tick == TICKS_PER_REST;
+    if (rests) {
+        policy->tick = 0;
+    }
     bool limits_changed = policy->supply_ma != input->supply_limit_ma ||
                           policy->maximum_ma != input->maximum_current_ma;
     if (limits_changed) {
@@ -1337,17 +1347,17 @@ void drive_policy_tick(drive_policy_t *policy, const drive_policy_input_t *input
         policy->maximum_ma = input->maximum_current_ma;
         policy->soft = 0; /* a lower limit holds at once */
     }
-    if (!input->model_stepped && policy->parameters.policy == DRIVE_POLICY_OPEN) {
+    if (!rests && policy->parameters.policy == DRIVE_POLICY_OPEN) {
         watch_levels(policy, input->level_permille);
     }
-    if (limits_changed || (policy->stale && !input->model_stepped)) {
+    if (limits_changed || (policy->stale && !rests)) {
         restart(policy, input); /* takes the time of all else */
     } else {
-        bool in_time = !input->model_stepped || policy->soft == 0;
+        bool in_time = !rests || policy->soft == 0;
         if (in_time && policy->prepared && input->valid != NULL) {
             listen(policy, input->valid, input->measured_ma, input->measured_mv);
         }
-        if (!input->model_stepped) {
+        if (!rests) {
             take_turn(policy, input);
         }
     }

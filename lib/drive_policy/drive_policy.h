@@ -59,6 +59,7 @@ typedef struct {
     uint8_t limits;                 /* that act */
     uint8_t severity;               /* undriven: 255 at its limit */
     uint8_t fresh;                  /* windows since current flows without a gap, saturating */
+    uint16_t level_permille;        /* wanted when the shares were last worked out, open */
     uint16_t wanted_ma;             /* before limits */
     uint16_t asked_ma;              /* after all but the supply's */
     uint16_t ceiling_ma;            /* by derating */
@@ -85,6 +86,7 @@ typedef struct {
     drive_policy_parameters_t parameters;
     uint8_t springs;
     uint8_t columns;
+    uint8_t tick;   /* counts to the next in which no spring is updated */
     uint8_t slot;   /* of the round in which each spring is updated once */
     uint8_t round;  /* counts */
     uint8_t sweep;  /* of the dither */
@@ -101,7 +103,6 @@ typedef struct {
     uint16_t supply_ma;
     uint16_t cap_ma;            /* of the holds, if the supply is too small for them */
     uint16_t budget_ma;         /* with which the shares were worked out */
-    uint16_t levels;            /* hash of all wanted levels */
     uint16_t sum_ma;            /* of the last targets */
     uint16_t left_ma;           /* of the budget: what no spring has been granted */
     uint16_t overload_quarters; /* s */
@@ -132,8 +133,7 @@ typedef struct {
     uint16_t supply_limit_ma;       /* of the sum */
     const int16_t *measured_ma;     /* of the last tick; NULL: nothing is measured */
     const int16_t *measured_mv;
-    const bool *valid;  /* per spring: the two are readings of the last tick */
-    bool model_stepped; /* in this tick, which has little time left: no spring is updated */
+    const bool *valid; /* per spring: the two are readings of the last tick */
 } drive_policy_input_t;
 
 /* Fails if and only if a parameter is outside the range above; then *bad (may be NULL)
@@ -155,7 +155,8 @@ void drive_policy_prepare(drive_policy_t *policy, const thermal_model_t *model);
 
 /* One tick (20 ms). The targets' sum never exceeds supply_limit_ma - supply_reserve_ma. A spring is
  * off in the tick in which its level is 0 or it is not allowed. What else it is given follows once
- * in DRIVE_POLICY_ROUND ticks without a model step: four times a second. */
+ * four times a second: each in one of DRIVE_POLICY_ROUND ticks, and every fifth tick updates none.
+ */
 void drive_policy_tick(drive_policy_t *policy, const drive_policy_input_t *input,
                        uint16_t target_ma[]);
 

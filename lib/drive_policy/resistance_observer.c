@@ -2,12 +2,6 @@
 
 #include "fixed_point.h"
 
-#if defined(__AVR__) && !defined(__clang__)
-#define HOT __attribute__((noinline, optimize("O2"))) /* a third of its cycles */
-#else
-#define HOT
-#endif
-
 #define LEAST_MA          150u
 #define SCALE_LOWEST      2048
 #define SCALE_HIGHEST     60000
@@ -76,7 +70,7 @@ void resistance_observer_reset(resistance_observer_t *observer)
 }
 
 /* a b / 2^14, at most UINT16_MAX. */
-static inline __attribute__((always_inline)) uint16_t product_q14(uint16_t a, uint16_t b)
+static inline uint16_t product_q14(uint16_t a, uint16_t b)
 {
     uint32_t product = fixed_point_mac_u16(0, a, b);
     return (uint8_t)(product >> 24) >= 64u ? UINT16_MAX : (uint16_t)((product << 2) >> 16);
@@ -130,18 +124,17 @@ static inline void refresh_inverse(resistance_observer_t *observer)
 
 /* A ratio of fraction bits, after an error (Q13) over a norm: gain is 2^25 over it, Q0 for a ratio
  * in Q14. */
-static inline __attribute__((always_inline)) uint32_t corrected(uint32_t ratio, int32_t error_q13,
-                                                                uint32_t gain, uint32_t one)
+static inline uint32_t corrected(uint32_t ratio, int32_t error_q13, uint32_t gain, uint32_t one)
 {
-    int32_t sum = (int32_t)ratio + fixed_point_scale_s24(error_q13 >> 8, gain);
+    int32_t sum = (int32_t)ratio + (int32_t)(((int64_t)(error_q13 >> 8) * gain) >> 16);
     if (sum < (int32_t)(one >> 3)) {
         return one >> 3;
     }
     return sum > (int32_t)(3u * one) ? 3u * one : (uint32_t)sum;
 }
 
-HOT bool resistance_observer_update(resistance_observer_t *observer,
-                                    const resistance_alloy_t *alloy, bool judges)
+bool resistance_observer_update(resistance_observer_t *observer, const resistance_alloy_t *alloy,
+                                bool judges)
 {
     uint8_t readings = observer->readings;
     uint16_t sum_ma = observer->current_sum_ma;
@@ -218,7 +211,7 @@ bool resistance_observer_is_plausible(const resistance_observer_t *observer,
 
 /* Square root of 24 bits, rounded down: two bits of the square, from the top, make one of the
  * root; the first four of it in 8 bits. */
-static HOT uint16_t root(uint32_t square)
+static uint16_t root(uint32_t square)
 {
     uint8_t bits = (uint8_t)(square >> 16);
     uint8_t small = 0;
@@ -248,8 +241,8 @@ static HOT uint16_t root(uint32_t square)
     return twice >> 1;
 }
 
-HOT uint16_t resistance_current_for_power_ma(const resistance_alloy_t *alloy, uint16_t inverse_q14,
-                                             uint16_t power_64uw)
+uint16_t resistance_current_for_power_ma(const resistance_alloy_t *alloy, uint16_t inverse_q14,
+                                         uint16_t power_64uw)
 {
     /* i^2 (mA^2) = 64 1000 P / (R_M ratio) */
     uint16_t conductance = product_q14(alloy->gain_mantissa, inverse_q14);

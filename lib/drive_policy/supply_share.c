@@ -1,10 +1,18 @@
 #include "supply_share.h"
 
-#if defined(__AVR__) && !defined(__clang__)
-#define HOT __attribute__((noinline, optimize("O2"))) /* a third of its cycles */
-#else
-#define HOT
-#endif
+#include "invariant.h"
+
+static bool holds_each_once(const supply_queue_t *queue)
+{
+    for (uint8_t k = 0; k < queue->count; k++) {
+        for (uint8_t n = 0; n < k; n++) {
+            if (queue->spring[n] == queue->spring[k]) {
+                return false;
+            }
+        }
+    }
+    return queue->count <= THERMAL_MODEL_MAX_SPRINGS;
+}
 
 void supply_queue_add(supply_queue_t *queue, uint8_t spring)
 {
@@ -13,9 +21,8 @@ void supply_queue_add(supply_queue_t *queue, uint8_t spring)
             return;
         }
     }
-    if (queue->count < THERMAL_MODEL_MAX_SPRINGS) {
-        queue->spring[queue->count++] = spring;
-    }
+    queue->spring[queue->count++] = spring; /* there is room: it was not in */
+    INVARIANT(holds_each_once(queue));
 }
 
 void supply_queue_remove(supply_queue_t *queue, uint8_t spring)
@@ -29,8 +36,8 @@ void supply_queue_remove(supply_queue_t *queue, uint8_t spring)
     queue->count = kept;
 }
 
-HOT uint16_t supply_share_cap_ma(const uint16_t target_ma[], uint8_t springs, uint16_t budget_ma,
-                                 uint16_t cap_ma)
+uint16_t supply_share_cap_ma(const uint16_t target_ma[], uint8_t springs, uint16_t budget_ma,
+                             uint16_t cap_ma)
 {
     for (uint8_t pass = 0; pass < SUPPLY_SHARE_PASSES; pass++) {
         uint16_t left_ma = budget_ma;

@@ -10,6 +10,7 @@
 #define FLASH_TEXT(text)           PSTR(text)
 #define flash_copy(to, from, size) memcpy_P((to), (from), (size))
 #define flash_byte(address)        pgm_read_byte(address)
+#define flash_word(address)        pgm_read_word(address)
 #define flash_equal(text, flash)   (strcmp_P((text), (flash)) == 0)
 #else
 #include <string.h>
@@ -17,6 +18,7 @@
 #define FLASH_TEXT(text)           (text)
 #define flash_copy(to, from, size) memcpy((to), (from), (size))
 #define flash_byte(address)        (*(const unsigned char *)(address))
+#define flash_word(address)        (*(address))
 #define flash_equal(text, flash)   (strcmp((text), (flash)) == 0)
 #endif
 

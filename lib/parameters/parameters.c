@@ -55,10 +55,7 @@ int32_t parameter_decode(const void *bytes, uint8_t type)
 {
     int32_t value = 0;
     memcpy(&value, bytes, parameter_width(type));
-    if (type == PARAMETER_S16) {
-        return (int16_t)value;
-    }
-    return value < 0 ? INT32_MAX : value;
+    return type == PARAMETER_S16 ? (int16_t)value : value;
 }
 
 int32_t parameter_get(const void *values, const parameter_row_t *row, uint8_t element)

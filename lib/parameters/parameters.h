@@ -105,7 +105,8 @@ typedef struct {
 parameter_row_t parameter_row(uint16_t row);
 
 uint8_t parameter_width(uint8_t type); /* bytes */
-/* A value that lies as its bytes, low byte first. One above INT32_MAX reads as that. */
+/* A value that lies as its bytes, low byte first. One above INT32_MAX reads as negative, which no
+ * row of that type allows. */
 int32_t parameter_decode(const void *bytes, uint8_t type);
 /* Of one element; values: the part's struct. */
 int32_t parameter_get(const void *values, const parameter_row_t *row, uint8_t element);

@@ -4,10 +4,10 @@
 #include <string.h>
 
 #include "fixed_point.h"
+#include "invariant.h"
 #include "text.h"
 
 #define TICKS_PER_SECOND 50
-#define QUICK_LIMIT_MOHM 999u
 
 /* Electrical conditions, bits of safety_spring_t.suspects; their order is that of blame. */
 #define OVER_CURRENT    1u
@@ -31,36 +31,13 @@ bool safety_check(const safety_parameters_t *p, uint16_t *bad)
     return true;
 }
 
-/* Bounds of safety_tick_good: a reading within them is within the exact ones, too. */
-static void prepare_quick(safety_t *safety)
-{
-    const safety_parameters_t *p = &safety->parameters;
-    uint16_t low_mohm = p->resistance_minimum_mohm;
-    uint16_t high_mohm = p->resistance_maximum_mohm;
-    if (high_mohm == 0 || high_mohm > QUICK_LIMIT_MOHM) {
-        high_mohm = QUICK_LIMIT_MOHM;
-    }
-    safety->quick_low = 0;
-    safety->quick_high = (uint8_t)(high_mohm * 256ul / 1000u);
-    uint16_t most_ma = p->over_current_ma;
-    if (low_mohm <= QUICK_LIMIT_MOHM - 3u) {
-        safety->quick_low = (uint8_t)((low_mohm * 256ul + 999u) / 1000u);
-    } else if (most_ma >= p->check_current_ma) {
-        /* a lower bound that does not fit: no current that says something is looked at quickly */
-        most_ma = (uint16_t)(p->check_current_ma - 1u);
-    }
-    safety->quick_ma = most_ma;
-}
-
-__attribute__((noinline)) bool safety_apply(safety_t *safety, const safety_parameters_t *parameters,
-                                            uint16_t *bad)
+bool safety_apply(safety_t *safety, const safety_parameters_t *parameters, uint16_t *bad)
 {
     if (!safety_check(parameters, bad)) {
         return false;
     }
     safety->parameters = *parameters;
     safety->temperature_trip_c7 = fixed_point_c7_from_cc(parameters->temperature_trip_cc);
-    prepare_quick(safety);
     return true;
 }
 
@@ -159,8 +136,7 @@ static void count_electrical(safety_t *safety, safety_spring_t *spring, uint8_t 
     }
 }
 
-__attribute__((noinline)) void safety_tick_spring(safety_t *safety, uint8_t spring,
-                                                  const safety_sample_t *sample)
+void safety_tick_spring(safety_t *safety, uint8_t spring, const safety_sample_t *sample)
 {
     safety_spring_t *s = &safety->spring[spring];
     uint8_t limit = safety->parameters.bad_samples;
@@ -179,6 +155,9 @@ __attribute__((noinline)) void safety_tick_spring(safety_t *safety, uint8_t spri
         s->temperature = limit;
         latch(safety, s, SAFETY_FAULT_OVER_TEMPERATURE);
     }
+
+    INVARIANT(s->sensor <= limit && s->temperature <= limit);
+    INVARIANT(s->fault < SAFETY_FAULT_COUNT);
 
     if (sample->expected_ma == 0) {
         s->on_s = 0;

@@ -57,9 +57,6 @@ typedef struct {
 typedef struct {
     safety_parameters_t parameters;
     int16_t temperature_trip_c7;
-    uint16_t quick_ma; /* derived: above, a sample is looked at closely */
-    uint8_t quick_low; /* resistance limits, 1/256 ohm */
-    uint8_t quick_high;
     uint8_t springs;
     uint8_t board_fault; /* safety_fault_t, first one since the last clear */
     uint8_t supply_count;
@@ -119,60 +116,6 @@ void safety_emergency_stop(safety_t *safety);
 void safety_lock(safety_t *safety);
 void safety_unlock(safety_t *safety);
 bool safety_is_locked(const safety_t *safety);
-
-/* ---- the short way ---- */
-
-/* safety_tick_spring for a sample that is good after others that were: a few compares in 16 bits
- * that only such a sample passes. False: nothing is done, safety_tick_spring has to. In the header,
- * because it stands in the tick's loop over the springs. */
-static inline
-#ifdef __AVR__
-    __attribute__((always_inline))
-#endif
-    bool
-    safety_tick_good(const safety_t *safety, safety_spring_t *spring, uint8_t sensor_status,
-                     int16_t current_ma, int16_t voltage_mv, uint16_t expected_ma,
-                     int16_t temperature_c7)
-{
-    const safety_parameters_t *p = &safety->parameters;
-    if ((uint8_t)(sensor_status | spring->electrical | spring->sensor | spring->temperature) != 0 ||
-        temperature_c7 > safety->temperature_trip_c7) {
-        return false;
-    }
-    uint16_t amount_ma = current_ma > 0 ? (uint16_t)current_ma : 0u;
-    if (amount_ma > safety->quick_ma) {
-        return false;
-    }
-    if (amount_ma >= p->check_current_ma) {
-        if ((uint16_t)voltage_mv > 4095u) {
-            return false;
-        }
-        /* quick_ma is below 4096: in 16 mA, 8 bits; times 1/256 ohm is 1/16 mV */
-        uint8_t amount_16ma = (uint8_t)(amount_ma >> 4);
-        uint16_t voltage_16th = (uint16_t)((uint16_t)voltage_mv << 4);
-        if (voltage_16th < (uint16_t)((amount_16ma + 1u) * safety->quick_low) ||
-            voltage_16th > (uint16_t)(amount_16ma * safety->quick_high)) {
-            return false;
-        }
-    }
-    if (expected_ma == 0) {
-        if (amount_ma > p->stuck_on_ma) {
-            return false;
-        }
-        spring->on_s = 0;
-        return true;
-    }
-    if (expected_ma >= p->check_current_ma && current_ma < (int16_t)(expected_ma >> 2)) {
-        return false;
-    }
-    if (safety->second_ticks == 0) {
-        if (spring->on_s >= (p->maximum_on_s != 0 ? p->maximum_on_s : UINT16_MAX)) {
-            return false;
-        }
-        spring->on_s++;
-    }
-    return true;
-}
 
 #ifdef __cplusplus
 }

@@ -6,9 +6,6 @@
 #define CUT_SHIFT   6u   /* cuts are remembered in 64 mA */
 #define CUT_STEPS   8u   /* and told again when they differ by more */
 
-/* Kept out of its callers, where that is measured to be smaller. */
-#define OWN __attribute__((noinline))
-
 void telemetry_init(telemetry_t *telemetry)
 {
     telemetry->dropped = 0;
@@ -35,7 +32,7 @@ static void count_dropped(telemetry_t *telemetry, uint8_t lines)
     telemetry->dropped = dropped < lines ? UINT16_MAX : dropped;
 }
 
-/* In one struct, the large member last: the chip reaches only 63 bytes of a frame directly. */
+/* Output under construction, and the numbers that go into it. */
 typedef struct {
     text_line_t line;
     int32_t values[4];
@@ -47,7 +44,7 @@ static void start_piece(piece_t *piece)
     text_line_start(&piece->line, piece->bytes, PIECE_BYTES);
 }
 
-static OWN void add(piece_t *piece, const char *flash_text)
+static void add(piece_t *piece, const char *flash_text)
 {
     text_add_values(&piece->line, flash_text, piece->values);
 }
@@ -187,8 +184,8 @@ static bool write_spring(telemetry_t *telemetry, const controller_t *controller,
     return !csv || !says; /* of status at most one line a tick */
 }
 
-OWN void telemetry_tick(telemetry_t *telemetry, const controller_t *controller, uint32_t time_ms,
-                        int16_t ambient_c7, const text_output_t *output)
+void telemetry_tick(telemetry_t *telemetry, const controller_t *controller, uint32_t time_ms,
+                    int16_t ambient_c7, const text_output_t *output)
 {
     if (telemetry->format == TELEMETRY_OFF) {
         return;

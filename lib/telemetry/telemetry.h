@@ -56,8 +56,8 @@ bool telemetry_set(telemetry_t *telemetry, uint8_t format, uint8_t hz);
 
 /* Once per control tick; writes when a line is due. time_ms is the tick's, ambient_c7 as the
  * controller got it.
- * CSV is design section 4's log with the simulator's extra columns: per spring i{k}_a and v{k}_v as
- * measured, m{k}_c the model's temperature, d{k} the duty; then fan, ambient_c and state: "ok",
+ * CSV is the log of docs/files.md with the simulator's extra columns: per spring i{k}_a and v{k}_v
+ * as measured, m{k}_c the model's temperature, d{k} the duty; then fan, ambient_c and state: "ok",
  * "locked" or "fault_N". Between those lines, as status, which limits act on a spring and by how
  * much: "<limits|spring:5|t:12.340|supply|temperature|cut_a:2.610>", "|none|" once they have ended.
  * Once a period each spring is looked at, and told where its limits are others than those last told

@@ -163,7 +163,7 @@ const char *text_item(const char *texts, uint8_t index)
 }
 
 /* Kept out of its callers: measured to be smaller. */
-__attribute__((noinline)) int16_t text_centi_from_c7(int16_t temperature_c7)
+int16_t text_centi_from_c7(int16_t temperature_c7)
 {
     return (int16_t)(((int32_t)temperature_c7 * 25 + 16) >> 5); /* x 100 / 128 */
 }

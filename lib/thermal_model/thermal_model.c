@@ -3,475 +3,437 @@
 #include <string.h>
 
 #include "fixed_point.h"
+#include "flash_memory.h"
+#include "invariant.h"
 #include "thermal_model_internal.h"
-#ifdef __AVR__
-#include "thermal_model_pass_avr.h"
-#else
-#define thermal_model_pass thermal_model_pass_in_c
-#endif
 
 /* How one step works.
  *
- * Heat flows are taken at the middle of the step: from `lead`, the temperature
- * extrapolated by half a step (Adams-Bashforth of second order, with the power
- * left out of the extrapolation as it may jump). A conductance in uW/K times a
- * lead in 1/64 K is a flow in 1/64 uW. Flows add modulo 2^32; init has made
- * sure that a spring's total fits. flow / 2^8 times step / capacity is the
- * spring's gain of enthalpy, in 2^-23 K. Enthalpy over heat capacity is the
- * state, h = T + (L / C) austenite, so that latent heat is neither lost nor
- * made. Where the phase rests, T = h - latent is one subtraction. Where it
- * transforms, T follows from h by one Newton step on the branch's cosine: the
- * residual is taken anew each step, so that errors do not add up. */
+ * Heat flows are taken at the middle of the step: from `midstep`, the temperature extrapolated by
+ * half a step (Adams-Bashforth of second order, with the power left out of the extrapolation as it
+ * may jump). What leaves one spring enters its neighbour by the same product, so no heat is lost or
+ * made between them; init has made sure that a spring's flows fit. Flow times step / capacity is
+ * the spring's gain of enthalpy, in 2^-23 K. Enthalpy over heat capacity is the state,
+ * h = T + (L / C) austenite, so that latent heat is neither lost nor made. Where the phase rests,
+ * T = h - latent. Where it transforms, the h of a temperature rises with it along the branch, and T
+ * is found by halving; the latent heat is then what h leaves, so that errors do not add up. */
 
-#ifdef __AVR__
-#include <avr/pgmspace.h>
-#define IN_FLASH           PROGMEM
-#define READ_WORD(address) pgm_read_word(address)
-#define READ_BYTE(address) pgm_read_byte(address)
-#else
-#define IN_FLASH
-#define READ_WORD(address) (*(address))
-#define READ_BYTE(address) (*(address))
-#endif
-
-/* A phase that moves, and what it calls: fast, since nine may move at a time. */
-#define ALWAYS __attribute__((always_inline))
-#ifdef __AVR__
-#define HOT __attribute__((noinline, noclone))
-/* The address stays in a pointer register instead of being worked out anew for each field. */
-#define KEEP_ADDRESS(pointer) __asm__("" : "+b"(pointer))
-#else
-#define HOT
-#define KEEP_ADDRESS(pointer) (void)(pointer)
-#endif
-
-#define SEGMENTS         32
-#define GAIN_ONE         255u
-#define LATENT_SLACK_C23 0x1000000 /* 2 K: what Newton may leave for the next step */
+#define SEGMENTS                32
+#define LATENT_SLACK_C23        0x400000 /* 0.5 K: 1/128 K times the steepest slope of h, and rounding */
+#define KELVIN_AT_0_C7          34963u /* 273.15 K */
+#define RESISTANCE_REFERENCE_C7 (20 * 128)
 
 /* 2^15 (1 + cos(pi k / 32)) / 2 */
-static const uint16_t cosine[SEGMENTS + 1] IN_FLASH = {
+static const uint16_t cosine[SEGMENTS + 1] FLASH_MEMORY = {
     32768, 32689, 32453, 32063, 31521, 30833, 30007, 29049, 27969, 26778, 25486,
     24107, 22654, 21140, 19580, 17990, 16384, 14778, 13188, 11628, 10114, 8661,
     7282,  5990,  4799,  3719,  2761,  1935,  1247,  705,   315,   79,    0,
 };
 
-/* 256 / (1 + (k + 1/2) / 8): dT/dh where the branch's slope d(latent)/dT is k/8 */
-static const uint8_t gains[128] IN_FLASH = {
-    241, 216, 195, 178, 164, 152, 141, 132, 124, 117, 111, 105, 100, 95, 91, 87, 84, 80, 77,
-    74,  72,  69,  67,  65,  63,  61,  59,  58,  56,  55,  53,  52,  51, 49, 48, 47, 46, 45,
-    44,  43,  42,  41,  41,  40,  39,  38,  38,  37,  36,  36,  35,  34, 34, 33, 33, 32, 32,
-    31,  31,  30,  30,  29,  29,  29,  28,  28,  27,  27,  27,  26,  26, 26, 25, 25, 25, 25,
-    24,  24,  24,  23,  23,  23,  23,  22,  22,  22,  22,  21,  21,  21, 21, 21, 20, 20, 20,
-    20,  20,  19,  19,  19,  19,  19,  19,  18,  18,  18,  18,  18,  18, 17, 17, 17, 17, 17,
-    17,  17,  16,  16,  16,  16,  16,  16,  16,  16,  15,  15,  15,  15,
-};
+/* Kept over a warm reset and read from outside: no padding on the chip. */
+#ifdef __AVR__
+_Static_assert(sizeof(thermal_model_spring_state_t) == 15, "size of what a spring remembers");
+_Static_assert(sizeof(thermal_model_state_t) == 8 + 15 * THERMAL_MODEL_MAX_SPRINGS, "and of all");
+#endif
 
 static uint8_t clamp_index(const thermal_model_t *model, uint8_t spring)
 {
-    return spring < model->pass.count ? spring : 0;
+    return spring < model->springs ? spring : 0;
+}
+
+static int16_t c7_of(int32_t value_c23)
+{
+    return (int16_t)(value_c23 >> 16);
+}
+
+static int32_t c23_of(int16_t value_c7)
+{
+    return (int32_t)value_c7 * 65536;
+}
+
+static int16_t clamp_c7(int32_t temperature_c7)
+{
+    if (temperature_c7 < THERMAL_MODEL_LOWEST_C7) {
+        return THERMAL_MODEL_LOWEST_C7;
+    }
+    return temperature_c7 > THERMAL_MODEL_HIGHEST_C7 ? THERMAL_MODEL_HIGHEST_C7
+                                                     : (int16_t)temperature_c7;
+}
+
+/* In the unit of flows, from one in Q9.7. */
+static int16_t c6_of(int16_t temperature_c7)
+{
+    return (int16_t)(temperature_c7 >> 1);
+}
+
+/* Where a temperature is half a step later if it goes on as in the last. */
+static int16_t midstep_c6(int16_t before_c7, int16_t now_c7)
+{
+    return c6_of(clamp_c7(now_c7 + (((int32_t)now_c7 - before_c7) >> 1)));
 }
 
 /* ---- phase ---- */
 
-/* S at a distance (c7) into a transformation: Q0.15, and by how much it falls in this segment. */
-static inline ALWAYS uint16_t shape_inline(uint16_t distance_c7, uint16_t position_factor,
-                                           uint16_t *fall)
+thermal_model_transformation_t thermal_model_transformation(const thermal_model_t *model,
+                                                            uint8_t spring)
 {
-    uint16_t position = (uint16_t)(fixed_point_mac_u16(0, distance_c7, position_factor) >> 8);
-    uint8_t segment = (uint8_t)(position >> 8);
-    if (segment >= SEGMENTS) {
-        *fall = 0;
+    const int16_t shift_c7 = model->spring[clamp_index(model, spring)].transformation_shift_c7;
+    thermal_model_transformation_t points = model->transformation;
+    points.martensite_finish_c7 = (int16_t)(points.martensite_finish_c7 + shift_c7);
+    points.martensite_start_c7 = (int16_t)(points.martensite_start_c7 + shift_c7);
+    points.austenite_start_c7 = (int16_t)(points.austenite_start_c7 + shift_c7);
+    points.austenite_finish_c7 = (int16_t)(points.austenite_finish_c7 + shift_c7);
+    return points;
+}
+
+/* a b for two shares in Q0.15. */
+static uint16_t product_q15(uint16_t a, uint16_t b)
+{
+    return (uint16_t)(((uint32_t)a * b << 1) >> 16);
+}
+
+/* S at a distance into a transformation: Q0.15, from 1 down to 0. */
+static uint16_t shape(int16_t distance_c7, uint16_t position_factor)
+{
+    if (distance_c7 <= 0) {
+        return THERMAL_MODEL_AUSTENITE_FULL;
+    }
+    const uint32_t position = ((uint32_t)(uint16_t)distance_c7 * position_factor) >> 8;
+    if (position >= SEGMENTS * 256u) {
         return 0;
     }
-    uint16_t left = READ_WORD(&cosine[segment]);
-    *fall = (uint16_t)(left - READ_WORD(&cosine[segment + 1]));
-    return (uint16_t)(left - (uint16_t)(fixed_point_mac_u16(0, *fall, (uint8_t)position) >> 8));
+    const uint16_t *segment = &cosine[position >> 8];
+    const uint16_t left = flash_word(segment);
+    const uint16_t fall = (uint16_t)(left - flash_word(segment + 1));
+    return (uint16_t)(left - (uint16_t)(((uint32_t)fall * (uint8_t)position) >> 8));
 }
 
-static uint16_t branch_shape(uint16_t distance_c7, uint16_t position_factor)
+/* The phase at a temperature of a branch. */
+static uint16_t austenite_on_branch(const thermal_model_t *model,
+                                    const thermal_model_transformation_t *points, uint8_t branch,
+                                    uint16_t amplitude, int16_t temperature_c7)
 {
-    uint16_t fall;
-    return shape_inline(distance_c7, position_factor, &fall);
+    if (branch == THERMAL_MODEL_BRANCH_HEATING) {
+        const int16_t distance_c7 = (int16_t)(temperature_c7 - points->austenite_start_c7);
+        return (uint16_t)(THERMAL_MODEL_AUSTENITE_FULL -
+                          product_q15(amplitude, shape(distance_c7, model->heating_position)));
+    }
+    const int16_t distance_c7 = (int16_t)(points->martensite_start_c7 - temperature_c7);
+    return product_q15(amplitude, shape(distance_c7, model->cooling_position));
 }
 
+/* How far it came on its branch is where the phase stands. */
 static uint16_t austenite_of(const thermal_model_t *model,
+                             const thermal_model_transformation_t *points,
                              const thermal_model_spring_state_t *state)
 {
-    if (state->branch == THERMAL_MODEL_BRANCH_HEATING) {
-        if (state->heating_c7 >= model->austenite_finish_c7) {
-            return THERMAL_MODEL_AUSTENITE_FULL;
-        }
-        uint16_t distance = (uint16_t)(state->heating_c7 - model->austenite_start_c7);
-        uint16_t shape = branch_shape(distance, model->heating_position);
-        return (uint16_t)(THERMAL_MODEL_AUSTENITE_FULL -
-                          (fixed_point_mac_u16(0, shape, state->amplitude) >> 15));
-    }
-    if (state->cooling_c7 <= model->martensite_finish_c7) {
-        return 0;
-    }
-    uint16_t distance = (uint16_t)(model->martensite_start_c7 - state->cooling_c7);
-    uint16_t shape = branch_shape(distance, model->cooling_position);
-    return (uint16_t)(fixed_point_mac_u16(0, shape, state->amplitude) >> 15);
+    return austenite_on_branch(model, points, state->branch, state->amplitude,
+                               state->branch == THERMAL_MODEL_BRANCH_HEATING ? state->heating_c7
+                                                                             : state->cooling_c7);
 }
 
-/* What follows from amplitude and branch. */
-static void refresh_branch(const thermal_model_t *model, thermal_model_spring_t *spring,
-                           const thermal_model_spring_state_t *state)
+static int32_t latent_c23_of(const thermal_model_t *model, uint16_t austenite)
 {
-    uint16_t full = (uint16_t)(model->latent_full_c23 >> 15);
-    spring->branch_latent = (uint16_t)(fixed_point_mac_u16(0, full, state->amplitude) >> 15);
-    spring->branch_slope =
-        fixed_point_high_u16(spring->branch_latent, state->branch == THERMAL_MODEL_BRANCH_HEATING
-                                                        ? model->heating_slope
-                                                        : model->cooling_slope);
-}
-
-static inline ALWAYS int16_t high_word(int32_t value)
-{
-    return (int16_t)((uint32_t)value >> 16);
+    return (int32_t)((uint32_t)model->latent_full_c8 * austenite); /* Q8.8 times Q0.15 */
 }
 
 /* Nothing is left to transform: all austenite, or all martensite. */
-static __attribute__((noinline)) void complete(const thermal_model_t *model,
-                                               thermal_model_spring_state_t *state, bool austenite)
+static void complete(const thermal_model_t *model, const thermal_model_transformation_t *points,
+                     thermal_model_spring_state_t *state, bool austenite)
 {
     state->amplitude = THERMAL_MODEL_AUSTENITE_FULL;
-    state->gain = GAIN_ONE;
     if (austenite) {
         state->branch = THERMAL_MODEL_BRANCH_HEATING;
         state->heating_c7 = model->highest_c7;
-        state->cooling_c7 = model->martensite_start_c7;
-        state->latent_c23 = model->latent_full_c23;
+        state->cooling_c7 = points->martensite_start_c7;
     } else {
         state->branch = THERMAL_MODEL_BRANCH_COOLING;
-        state->heating_c7 = model->austenite_start_c7;
+        state->heating_c7 = points->austenite_start_c7;
         state->cooling_c7 = THERMAL_MODEL_LOWEST_C7;
-        state->latent_c23 = 0;
     }
 }
 
 /* Onto the branch of heating or cooling, unless it is on that; what it has left to transform. */
-static uint16_t turn_to(const thermal_model_t *model, thermal_model_spring_state_t *state,
-                        bool heats)
+static uint16_t turn_to(const thermal_model_t *model, const thermal_model_transformation_t *points,
+                        thermal_model_spring_state_t *state, bool heats)
 {
     const uint8_t branch = heats ? THERMAL_MODEL_BRANCH_HEATING : THERMAL_MODEL_BRANCH_COOLING;
     if (state->branch != branch) {
-        const uint16_t austenite = austenite_of(model, state);
+        const uint16_t austenite = austenite_of(model, points, state);
         state->amplitude = heats ? (uint16_t)(THERMAL_MODEL_AUSTENITE_FULL - austenite) : austenite;
         state->branch = branch;
-        state->gain = GAIN_ONE;
         if (heats) {
-            state->cooling_c7 = model->martensite_start_c7;
+            state->cooling_c7 = points->martensite_start_c7;
         } else {
-            state->heating_c7 = model->austenite_start_c7;
+            state->heating_c7 = points->austenite_start_c7;
         }
     }
     return state->amplitude;
 }
 
-/* How far (c7) into a transformation the spring is now; `turn` is how far it was, `beyond` the
- * enthalpy added since. Solves distance - A S(distance) = enthalpy_past_start for the branch's
- * latent heat A; never goes back. */
-static inline ALWAYS int16_t newton(uint16_t turn, uint16_t beyond, uint16_t width,
-                                    uint16_t position_factor, const thermal_model_spring_t *spring,
-                                    uint8_t *gain, int16_t enthalpy_past_start)
+static int32_t clamp_c23(int32_t value_c23, int32_t lowest_c23, int32_t highest_c23)
 {
-    uint16_t target = (uint16_t)(turn + (uint16_t)(fixed_point_mac_u16(0, beyond, *gain) >> 8));
-    if (target >= width) {
-        target = (uint16_t)(width - 1u);
-    }
-    for (uint8_t pass = 0; pass < 4; pass++) { /* nearly always one: see the end */
-        uint16_t fall;
-        uint16_t shape = shape_inline(target, position_factor, &fall);
-        uint32_t used = fixed_point_mac_u16(0, spring->branch_latent, shape); /* c23 */
-        uint8_t index = (uint8_t)(fixed_point_mac_u16(0, spring->branch_slope, fall) >> 16);
-        if (index > 127u) {
-            index = 127u;
-        }
-        *gain = READ_BYTE(&gains[index]);
-        int16_t residual =
-            (int16_t)(enthalpy_past_start - (int16_t)target + high_word((int32_t)(used + 0x8000u)));
-        int16_t correction = fixed_point_scale_s16_u8(residual, *gain);
-        int16_t next = (int16_t)((int16_t)target + correction);
-        if (next < (int16_t)turn) {
-            next = (int16_t)turn;
-        }
-        if (next >= (int16_t)width) {
-            next = (int16_t)(width - 1u);
-        }
-        target = (uint16_t)next;
-        if (residual < 32 && residual > -32) {
-            break;
-        }
-    }
-    return (int16_t)target;
+    return value_c23 < lowest_c23 ? lowest_c23 : value_c23 > highest_c23 ? highest_c23 : value_c23;
 }
 
-/* A spring with this enthalpy passes a threshold if its phase is held, and comes to held_c7: lets
- * the phase follow. What is left in state is the phase's memory and the latent heat; the
- * temperature is the rest of the enthalpy. */
-static inline ALWAYS void transform(const thermal_model_t *model, thermal_model_spring_t *spring,
-                                    thermal_model_spring_state_t *state, int16_t held_c7,
-                                    int32_t enthalpy_c23)
+/* How far a spring comes on its branch towards held_c7, which it would reach without latent heat:
+ * up to where temperature and latent heat add up to its enthalpy. Never back. */
+static int16_t reached_c7(const thermal_model_t *model,
+                          const thermal_model_transformation_t *points,
+                          const thermal_model_spring_state_t *state, int16_t held_c7,
+                          int32_t enthalpy_c23)
 {
-    uint16_t width, turn, beyond, position;
-    int16_t past;
-    bool heats = held_c7 > state->heating_c7;
-    if (heats != (state->branch == THERMAL_MODEL_BRANCH_HEATING)) {
-        (void)turn_to(model, state, heats);
-        refresh_branch(model, spring, state);
+    const bool heats = state->branch == THERMAL_MODEL_BRANCH_HEATING;
+    int16_t from_c7 = heats ? state->heating_c7 : state->cooling_c7;
+    int16_t to_c7 = (int16_t)(heats ? held_c7 + 1 : held_c7 - 1); /* too far */
+    if (heats && to_c7 > points->austenite_finish_c7) {
+        to_c7 = points->austenite_finish_c7;
+    } else if (!heats && to_c7 < points->martensite_finish_c7) {
+        to_c7 = points->martensite_finish_c7;
     }
-    if (heats) {
-        int16_t austenitic_c7 = high_word(enthalpy_c23 - model->latent_full_c23);
-        if (austenitic_c7 >= model->austenite_finish_c7 || state->amplitude == 0) {
-            complete(model, state, true);
-            return;
+    while (to_c7 - from_c7 > 1 || from_c7 - to_c7 > 1) {
+        const int16_t middle_c7 = (int16_t)(from_c7 + (to_c7 - from_c7) / 2);
+        const int16_t there_c7 =
+            c7_of(c23_of(middle_c7) +
+                  latent_c23_of(model, austenite_on_branch(model, points, state->branch,
+                                                           state->amplitude, middle_c7)));
+        if (heats ? there_c7 <= c7_of(enthalpy_c23) : there_c7 >= c7_of(enthalpy_c23)) {
+            from_c7 = middle_c7;
+        } else {
+            to_c7 = middle_c7;
         }
-        if (model->latent_full_c23 == 0) {
-            state->heating_c7 = held_c7;
-            return;
-        }
-        width = (uint16_t)(model->austenite_finish_c7 - model->austenite_start_c7);
-        turn = (uint16_t)(state->heating_c7 - model->austenite_start_c7);
-        beyond = (uint16_t)(held_c7 - state->heating_c7);
-        past = (int16_t)(austenitic_c7 - model->austenite_start_c7);
-        position = model->heating_position;
-    } else {
-        int16_t martensitic_c7 = high_word(enthalpy_c23);
-        if (martensitic_c7 <= model->martensite_finish_c7 || state->amplitude == 0) {
-            complete(model, state, false);
-            return;
-        }
-        if (model->latent_full_c23 == 0) {
-            state->cooling_c7 = held_c7;
-            return;
-        }
-        width = (uint16_t)(model->martensite_start_c7 - model->martensite_finish_c7);
-        turn = (uint16_t)(model->martensite_start_c7 - state->cooling_c7);
-        beyond = (uint16_t)(state->cooling_c7 - held_c7);
-        past = (int16_t)(model->martensite_start_c7 - martensitic_c7);
-        position = model->cooling_position;
     }
-    int16_t distance = newton(turn, beyond, width, position, spring, &state->gain, past);
-    int16_t temperature_c7;
-    if (heats) {
-        temperature_c7 = (int16_t)(model->austenite_start_c7 + distance);
-        state->heating_c7 = temperature_c7;
-    } else {
-        temperature_c7 = (int16_t)(model->martensite_start_c7 - distance);
-        state->cooling_c7 = temperature_c7;
-    }
-    state->latent_c23 = enthalpy_c23 - (int32_t)((uint32_t)(uint16_t)temperature_c7 << 16);
+    return from_c7;
 }
 
-/* ---- flows ---- */
-
-/* Radiated at a lead, 1/64 uW: factor (T / 512 K)^4. */
-static uint32_t radiation_of(uint16_t lead, uint16_t factor)
-{
-    uint16_t kelvin = (uint16_t)(2u * lead + LEAD_ORIGIN_KELVIN);
-    uint16_t square = fixed_point_high_u16(kelvin, kelvin);
-    return fixed_point_mac_u16(0, fixed_point_high_u16(square, square), factor);
-}
-
-/* What the fan's air brings from upstream, having taken it there; 0 at the edge where it comes in.
+/* A spring passes a threshold if its phase is held, and comes to held_c23: lets the phase follow.
  */
-static uint32_t brought(const thermal_model_t *model, const thermal_model_spring_t *spring)
+static void transform(const thermal_model_t *model, const thermal_model_transformation_t *points,
+                      thermal_model_spring_state_t *state, int32_t held_c23)
 {
-    if (spring->upstream == 0) {
-        return 0;
-    }
-    const uint16_t *own = &model->lead[spring->frame + BLOCK_CENTRE];
-    uint16_t upstream = own[model->wake_offset];
-    return fixed_point_mac_s16_u16(0, (int16_t)(upstream - model->pass.air_lead), model->wake);
-}
-
-/* Flows that are the same for every spring: from the plate, and radiation from the surroundings. */
-static inline __attribute__((always_inline)) uint32_t common_flow(const thermal_model_t *model)
-{
-    return fixed_point_mac_u16(model->ambient_radiation, model->plate_lead,
-                               model->parameters.plate_coupling_uw_per_k);
-}
-
-static __attribute__((noinline)) int32_t clamp_c23(int32_t value)
-{
-    int16_t c7 = high_word(value);
-    if (c7 < THERMAL_MODEL_LOWEST_C7) {
-        return (int32_t)THERMAL_MODEL_LOWEST_C7 * 65536;
-    }
-    if (c7 >= THERMAL_MODEL_HIGHEST_C7) {
-        return (int32_t)THERMAL_MODEL_HIGHEST_C7 * 65536;
-    }
-    return value;
-}
-
-/* One step of air or plate: flow (4 uW) in, less what it loses to ambient. 1/64 K times a coarse
- * loss is a unit of flow. */
-static inline __attribute__((always_inline)) void relax(const thermal_model_slow_node_t *node,
-                                                        int32_t *state_c23, uint16_t *lead,
-                                                        uint16_t ambient_lead, int32_t flow)
-{
-    int32_t lost = (int32_t)fixed_point_mac_s16_u16(0, (int16_t)(*lead - ambient_lead), node->loss);
-    if (node->units == 0) { /* one look where nothing is unusual */
-        flow -= lost >> 8;
+    const int32_t enthalpy_c23 = fixed_point_add_saturated(held_c23, state->latent_c23);
+    const bool heats = c7_of(held_c23) > state->heating_c7;
+    const uint16_t all = heats ? THERMAL_MODEL_AUSTENITE_FULL : 0;
+    const int32_t done_c23 = enthalpy_c23 - latent_c23_of(model, all);
+    int32_t temperature_c23;
+    if (turn_to(model, points, state, heats) == 0) {
+        complete(model, points, state, heats);
+        temperature_c23 = held_c23;
+    } else if (heats ? c7_of(done_c23) >= points->austenite_finish_c7
+                     : c7_of(done_c23) <= points->martensite_finish_c7) {
+        complete(model, points, state, heats);
+        state->latent_c23 = latent_c23_of(model, all);
+        temperature_c23 = done_c23;
     } else {
-        flow -= (node->units & SLOW_NODE_COARSE) != 0 ? lost : lost >> 8;
-        if ((node->units & SLOW_NODE_MANY) != 0) {
-            flow >>= 4;
+        const int16_t now_c7 = reached_c7(model, points, state, c7_of(held_c23), enthalpy_c23);
+        if (heats) {
+            state->heating_c7 = now_c7;
+        } else {
+            state->cooling_c7 = now_c7;
         }
+        const uint16_t austenite = austenite_of(model, points, state);
+        temperature_c23 = clamp_c23(enthalpy_c23 - latent_c23_of(model, austenite), c23_of(now_c7),
+                                    c23_of(now_c7) + 0xffff);
+        state->latent_c23 = enthalpy_c23 - temperature_c23;
     }
-    int32_t gain = fixed_point_scale_s24(fixed_point_clamp_s24(flow), node->gain);
-    if (node->wide) {
-        gain = fixed_point_clamp_s24(gain) * 256;
-    }
-    int16_t before = high_word(*state_c23);
-    int32_t after = clamp_c23(fixed_point_add_saturated(*state_c23, gain));
-    *state_c23 = after;
-    int16_t now = high_word(after);
-    *lead = lead_ahead(now, node->leads ? before : now);
+    state->temperature_c23 =
+        clamp_c23(temperature_c23, c23_of(THERMAL_MODEL_LOWEST_C7), c23_of(model->highest_c7));
 }
 
-static void set_lead(thermal_model_t *model, uint8_t spring, uint16_t lead)
+static bool is_held_at_a_limit(const thermal_model_t *model, int32_t temperature_c23)
 {
-    uint16_t *place = &model->lead[model->spring[spring].frame + BLOCK_CENTRE];
-    model->pass.lead_sum += (uint32_t)lead - *place;
-    *place = lead;
+    return temperature_c23 == c23_of(THERMAL_MODEL_LOWEST_C7) ||
+           temperature_c23 == c23_of(model->highest_c7);
 }
 
-/* Flows that only some springs have, into their gain_c23. Returns what the wake takes from the air.
- */
-static int32_t extra_flows(thermal_model_t *model)
+/* Heat into a spring, over its heat capacity: its phase follows. */
+static void add_heat(thermal_model_t *model, uint8_t i, int32_t gain_c23)
 {
-    int32_t taken = 0;
-    for (uint8_t i = 0; i < model->pass.count; i++) {
-        thermal_model_spring_t *spring = &model->spring[i];
-        const uint16_t *block = &model->lead[spring->frame];
-        uint32_t flow = 0;
-        if (model->wake != 0) {
-            flow = brought(model, spring);
-            taken += (int32_t)flow >> 8;
-        }
-        if (model->radiation_factor != 0) {
-            flow -= radiation_of(block[BLOCK_CENTRE], model->radiation_factor);
-        }
-        spring->gain_c23 = (int32_t)flow;
-    }
-    return taken;
-}
-
-/* A spring that the pass left as it was, since the step takes it past a threshold. */
-static HOT void follow_phase(thermal_model_t *model, uint8_t i)
-{
-    thermal_model_spring_t *spring = &model->spring[i];
     thermal_model_spring_state_t *state = &model->state.spring[i];
-    KEEP_ADDRESS(spring);
-    KEEP_ADDRESS(state);
-    int16_t before = high_word(state->temperature_c23);
-    int32_t held_c23 = fixed_point_add_saturated(state->temperature_c23, spring->gain_c23);
-    int32_t enthalpy_c23 = fixed_point_add_saturated(held_c23, state->latent_c23);
-    spring->pending = 0;
-    transform(model, spring, state, high_word(held_c23), enthalpy_c23);
-    int32_t temperature_c23 = enthalpy_c23 - state->latent_c23;
-    int16_t temperature_c7 = high_word(temperature_c23);
-    if (temperature_c7 > model->highest_c7 || temperature_c7 < THERMAL_MODEL_LOWEST_C7) {
-        temperature_c7 = temperature_c7 < 0 ? THERMAL_MODEL_LOWEST_C7 : model->highest_c7;
-        temperature_c23 = (int32_t)temperature_c7 * 65536;
-    }
-    state->temperature_c23 = temperature_c23;
-    set_lead(model, i, lead_ahead(temperature_c7, before));
-}
-
-void thermal_model_settle(thermal_model_t *model, uint8_t spring)
-{
-    spring = clamp_index(model, spring);
-    if (model->spring[spring].pending != 0) {
-        follow_phase(model, spring);
-    }
-}
-
-void thermal_model_follow_phases(thermal_model_t *model, uint8_t most)
-{
-    if (model->pass.pending == 0) {
+    const int32_t held_c23 = fixed_point_add_saturated(state->temperature_c23, gain_c23);
+    const int16_t held_c7 = c7_of(held_c23);
+    if (held_c7 <= state->heating_c7 && held_c7 >= state->cooling_c7) {
+        state->temperature_c23 = held_c23;
         return;
     }
-    for (uint8_t i = 0; i < model->pass.count; i++) {
-        if (model->spring[i].pending == 0) {
-            continue;
-        }
-        if (most-- == 0) {
-            return;
-        }
-        follow_phase(model, i);
-    }
-    model->pass.pending = 0;
+    const int64_t enthalpy_c23 = (int64_t)held_c23 + state->latent_c23;
+    const thermal_model_transformation_t points = thermal_model_transformation(model, i);
+    transform(model, &points, state, held_c23);
+    INVARIANT((int64_t)state->temperature_c23 + state->latent_c23 == enthalpy_c23 ||
+              is_held_at_a_limit(model, state->temperature_c23));
+    (void)enthalpy_c23;
 }
 
-__attribute__((noinline)) void thermal_model_begin_step(thermal_model_t *model,
-                                                        const uint32_t power_uw[])
+/* ---- flows, 1/64 uW ---- */
+
+static int32_t flow_through(uint16_t conductance_uw_per_k, int16_t difference_c6)
 {
-    thermal_model_follow_phases(model, UINT8_MAX);
-    int32_t above_plate = (int32_t)(model->pass.lead_sum -
-                                    fixed_point_mac_u16(0, model->plate_lead, model->pass.count));
-    model->pass.common = common_flow(model) + 128u; /* half of what the shift drops */
-    model->pass.air_flow = 0;
-    model->pass.power_uw = power_uw;
-    if ((model->pass.flags & PASS_EXTRA) != 0) {
-        model->pass.air_flow = -extra_flows(model);
+    return (int32_t)difference_c6 * conductance_uw_per_k;
+}
+
+/* Radiated at a temperature: factor (T / 512 K)^4. */
+static int32_t radiated(const thermal_model_t *model, int16_t temperature_c6)
+{
+    if (model->radiation_factor == 0) {
+        return 0;
     }
-    thermal_model_pass(model);
-    /* air, then plate, in a loop: the AVR's code for it is long */
-    for (uint8_t plate = 0; plate < 2; plate++) {
-        const uint16_t coupling = model->parameters.plate_coupling_uw_per_k;
-        if ((plate ? coupling : model->air.loss) == 0) {
-            continue;
+    const uint16_t kelvin_c7 = (uint16_t)(KELVIN_AT_0_C7 + 2u * (uint16_t)temperature_c6);
+    const uint16_t square = fixed_point_high_u16(kelvin_c7, kelvin_c7);
+    return (int32_t)((uint32_t)fixed_point_high_u16(square, square) * model->radiation_factor);
+}
+
+static int32_t from_neighbours(const thermal_model_t *model, uint8_t i, int16_t temperature_c6)
+{
+    const thermal_model_spring_t *own = &model->spring[i];
+    const uint8_t columns = model->parameters.columns;
+    const uint8_t top = own->row > 0 ? (uint8_t)(own->row - 1u) : 0;
+    const uint8_t left = own->column > 0 ? (uint8_t)(own->column - 1u) : 0;
+    int32_t flow = 0;
+    for (uint8_t row = top; row <= own->row + 1u && row < model->parameters.rows; row++) {
+        for (uint8_t column = left; column <= own->column + 1u && column < columns; column++) {
+            const uint8_t j = (uint8_t)(row * columns + column);
+            if (j == i) {
+                continue;
+            }
+            const bool beside = row == own->row || column == own->column;
+            flow += flow_through(beside ? model->orthogonal_uw_per_k : model->diagonal_uw_per_k,
+                                 (int16_t)(model->spring[j].midstep_c6 - temperature_c6));
         }
-        relax(plate ? &model->plate : &model->air,
-              plate ? &model->state.plate_c23 : &model->state.air_c23,
-              plate ? &model->plate_lead : &model->pass.air_lead, model->ambient_lead,
-              plate ? fixed_point_scale_s24(above_plate, (uint32_t)coupling << 8)
-                    : model->pass.air_flow);
     }
+    return flow;
+}
+
+/* What leaves one spring enters another. */
+static bool exchange_closes(const thermal_model_t *model)
+{
+    int64_t sum = 0;
+    for (uint8_t i = 0; i < model->springs; i++) {
+        sum += from_neighbours(model, i, model->spring[i].midstep_c6);
+    }
+    return sum == 0;
+}
+
+/* What a spring gives the air around it. */
+static int32_t given_to_air(const thermal_model_spring_t *spring, int16_t above_air_c6)
+{
+    uint16_t conductance = spring->loss_uw_per_k;
+    if (above_air_c6 > 0) {
+        conductance = (uint16_t)(conductance +
+                                 (((uint32_t)spring->loss_rise * (uint16_t)above_air_c6) >> 16));
+    }
+    return flow_through(conductance, above_air_c6);
+}
+
+typedef struct {
+    int32_t into_spring;
+    int32_t to_air;
+    int32_t to_plate;
+} flows_t;
+
+/* All but its own heating, were the spring at that temperature and all else as it is now. */
+static flows_t flows_at(const thermal_model_t *model, uint8_t i, int16_t temperature_c6)
+{
+    const thermal_model_spring_t *own = &model->spring[i];
+    const int16_t air_c6 = model->air.midstep_c6;
+    flows_t flows;
+    flows.to_air = given_to_air(own, (int16_t)(temperature_c6 - air_c6));
+    if (own->upstream != NO_SPRING) { /* what the fan's air brings it took there */
+        const int16_t above_c6 = (int16_t)(model->spring[own->upstream].midstep_c6 - air_c6);
+        flows.to_air -= flow_through(model->wake_uw_per_k, above_c6);
+    }
+    flows.to_plate = flow_through(model->parameters.plate_coupling_uw_per_k,
+                                  (int16_t)(temperature_c6 - model->plate.midstep_c6));
+    flows.into_spring =
+        from_neighbours(model, i, temperature_c6) - flows.to_air - flows.to_plate -
+        (radiated(model, temperature_c6) - radiated(model, c6_of(model->ambient_c7)));
+    return flows;
+}
+
+/* One step of air or plate with this flow from the springs. */
+static void step_node(thermal_model_slow_node_t *node, int32_t *state_c23, int16_t ambient_c7,
+                      int64_t flow)
+{
+    flow -= (int64_t)(int16_t)(node->midstep_c6 - c6_of(ambient_c7)) * node->loss_uw_per_k;
+    const int64_t gain_c23 = (flow * node->gain + (INT64_C(1) << 27)) >> 28;
+    const int16_t before_c7 = c7_of(*state_c23);
+    const int64_t after_c23 = *state_c23 + gain_c23;
+    const int32_t lowest_c23 = c23_of(THERMAL_MODEL_LOWEST_C7);
+    const int32_t highest_c23 = c23_of(THERMAL_MODEL_HIGHEST_C7);
+    *state_c23 = after_c23 < lowest_c23    ? lowest_c23
+                 : after_c23 > highest_c23 ? highest_c23
+                                           : (int32_t)after_c23;
+    const int16_t now_c7 = c7_of(*state_c23);
+    node->midstep_c6 = node->quick ? c6_of(now_c7) : midstep_c6(before_c7, now_c7);
 }
 
 void thermal_model_step(thermal_model_t *model, const uint32_t power_uw[])
 {
-    thermal_model_begin_step(model, power_uw);
-    thermal_model_follow_phases(model, UINT8_MAX);
+    int32_t gain_c23[THERMAL_MODEL_MAX_SPRINGS];
+    int64_t to_air = 0;
+    int64_t to_plate = 0;
+    INVARIANT(exchange_closes(model));
+    for (uint8_t i = 0; i < model->springs; i++) {
+        const flows_t flows = flows_at(model, i, model->spring[i].midstep_c6);
+        const uint32_t power = power_uw[i] < THERMAL_MODEL_HIGHEST_POWER_UW
+                                   ? power_uw[i]
+                                   : THERMAL_MODEL_HIGHEST_POWER_UW;
+        gain_c23[i] = fixed_point_scale_q31((int32_t)(power << 6) + flows.into_spring,
+                                            model->spring[i].step_gain);
+        to_air += flows.to_air;
+        to_plate += flows.to_plate;
+    }
+    for (uint8_t i = 0; i < model->springs; i++) {
+        const int16_t before_c7 = thermal_model_temperature_c7(model, i);
+        add_heat(model, i, gain_c23[i]);
+        model->spring[i].midstep_c6 = midstep_c6(before_c7, thermal_model_temperature_c7(model, i));
+    }
+    if (model->parameters.air_exchange_uw_per_k != 0) {
+        step_node(&model->air, &model->state.air_c23, model->ambient_c7, to_air);
+    }
+    if (model->parameters.plate_coupling_uw_per_k != 0) {
+        step_node(&model->plate, &model->state.plate_c23, model->ambient_c7, to_plate);
+    }
+    INVARIANT(thermal_model_is_consistent(model));
 }
 
 /* ---- setting and reading ---- */
 
-void thermal_model_refresh_ambient(thermal_model_t *model)
+static bool spring_is_consistent(const thermal_model_t *model, uint8_t i,
+                                 const thermal_model_spring_state_t *state)
 {
-    model->ambient_lead = lead_from_c7(model->ambient_c7);
-    model->ambient_radiation = model->radiation_factor != 0
-                                   ? radiation_of(model->ambient_lead, model->radiation_factor)
-                                   : 0;
-    if (model->parameters.air_exchange_uw_per_k == 0) {
-        model->pass.air_lead = model->ambient_lead;
-        model->state.air_c23 = (int32_t)model->ambient_c7 * 65536;
+    const int32_t most_c23 = latent_c23_of(model, THERMAL_MODEL_AUSTENITE_FULL) + LATENT_SLACK_C23;
+    if (state->branch > THERMAL_MODEL_BRANCH_HEATING ||
+        state->amplitude > THERMAL_MODEL_AUSTENITE_FULL || state->latent_c23 < -LATENT_SLACK_C23 ||
+        state->latent_c23 > most_c23) {
+        return false;
     }
-    if (model->parameters.plate_coupling_uw_per_k == 0) {
-        model->plate_lead = model->ambient_lead;
-        model->state.plate_c23 = (int32_t)model->ambient_c7 * 65536;
+    const int16_t temperature_c7 = c7_of(state->temperature_c23);
+    if (temperature_c7 > state->heating_c7 || temperature_c7 < state->cooling_c7) {
+        return false;
     }
-}
-
-static __attribute__((noinline)) int16_t clamp_c7(int16_t temperature_c7)
-{
-    if (temperature_c7 < THERMAL_MODEL_LOWEST_C7) {
-        return THERMAL_MODEL_LOWEST_C7;
+    const thermal_model_transformation_t points = thermal_model_transformation(model, i);
+    if (state->branch == THERMAL_MODEL_BRANCH_HEATING) {
+        return (state->heating_c7 == model->highest_c7 ||
+                (state->heating_c7 >= points.austenite_start_c7 &&
+                 state->heating_c7 < points.austenite_finish_c7)) &&
+               state->cooling_c7 == points.martensite_start_c7;
     }
-    return temperature_c7 > THERMAL_MODEL_HIGHEST_C7 ? THERMAL_MODEL_HIGHEST_C7 : temperature_c7;
+    return (state->cooling_c7 == THERMAL_MODEL_LOWEST_C7 ||
+            (state->cooling_c7 <= points.martensite_start_c7 &&
+             state->cooling_c7 > points.martensite_finish_c7)) &&
+           state->heating_c7 == points.austenite_start_c7;
 }
 
 void thermal_model_set_ambient(thermal_model_t *model, int16_t ambient_c7)
 {
-    ambient_c7 = clamp_c7(ambient_c7);
-    if (ambient_c7 != model->ambient_c7) {
-        model->ambient_c7 = ambient_c7;
-        thermal_model_refresh_ambient(model);
+    model->ambient_c7 = clamp_c7(ambient_c7);
+    if (model->parameters.air_exchange_uw_per_k == 0) {
+        model->air.midstep_c6 = c6_of(model->ambient_c7);
+        model->state.air_c23 = c23_of(model->ambient_c7);
+    }
+    if (model->parameters.plate_coupling_uw_per_k == 0) {
+        model->plate.midstep_c6 = c6_of(model->ambient_c7);
+        model->state.plate_c23 = c23_of(model->ambient_c7);
     }
 }
 
@@ -489,14 +451,14 @@ void thermal_model_set_fan(thermal_model_t *model, uint8_t percent)
 void thermal_model_reset(thermal_model_t *model, int16_t temperature_c7)
 {
     temperature_c7 = clamp_c7(temperature_c7);
-    model->state.air_c23 = (int32_t)temperature_c7 * 65536;
-    model->state.plate_c23 = model->state.air_c23;
-    model->pass.air_lead = lead_from_c7(temperature_c7);
-    model->plate_lead = model->pass.air_lead;
-    thermal_model_refresh_ambient(model);
-    for (uint8_t i = 0; i < model->pass.count; i++) {
-        model->spring[i].pending = 0;
-        complete(model, &model->state.spring[i], false);
+    model->state.air_c23 = c23_of(temperature_c7);
+    model->state.plate_c23 = c23_of(temperature_c7);
+    model->air.midstep_c6 = c6_of(temperature_c7);
+    model->plate.midstep_c6 = c6_of(temperature_c7);
+    thermal_model_set_ambient(model, model->ambient_c7); /* where there is no air or plate */
+    for (uint8_t i = 0; i < model->springs; i++) {
+        const thermal_model_transformation_t points = thermal_model_transformation(model, i);
+        complete(model, &points, &model->state.spring[i], false);
         thermal_model_set_temperature(model, i, temperature_c7);
     }
 }
@@ -504,114 +466,117 @@ void thermal_model_reset(thermal_model_t *model, int16_t temperature_c7)
 void thermal_model_set_temperature(thermal_model_t *model, uint8_t spring, int16_t temperature_c7)
 {
     spring = clamp_index(model, spring);
-    thermal_model_settle(model, spring);
     temperature_c7 = clamp_c7(temperature_c7);
     if (temperature_c7 > model->highest_c7) {
         temperature_c7 = model->highest_c7;
     }
     thermal_model_spring_state_t *state = &model->state.spring[spring];
+    const thermal_model_transformation_t points = thermal_model_transformation(model, spring);
     const bool heats = temperature_c7 > state->heating_c7;
     if (heats || temperature_c7 < state->cooling_c7) {
-        const bool beyond = heats ? temperature_c7 >= model->austenite_finish_c7
-                                  : temperature_c7 <= model->martensite_finish_c7;
-        if (beyond || turn_to(model, state, heats) == 0) {
-            complete(model, state, heats);
+        const bool is_done = heats ? temperature_c7 >= points.austenite_finish_c7
+                                   : temperature_c7 <= points.martensite_finish_c7;
+        if (turn_to(model, &points, state, heats) == 0 || is_done) {
+            complete(model, &points, state, heats);
         } else if (heats) {
             state->heating_c7 = temperature_c7;
         } else {
             state->cooling_c7 = temperature_c7;
         }
     }
-    refresh_branch(model, &model->spring[spring], state);
-    /* latent = L/C austenite, in two products: Q8.8 times Q0.15 is Q8.23 */
-    state->latent_c23 = (int32_t)fixed_point_mac_u16(0, (uint16_t)(model->latent_full_c23 >> 15),
-                                                     austenite_of(model, state));
-    state->temperature_c23 = (int32_t)temperature_c7 * 65536;
-    set_lead(model, spring, lead_from_c7(temperature_c7));
+    state->latent_c23 = latent_c23_of(model, austenite_of(model, &points, state));
+    state->temperature_c23 = c23_of(temperature_c7);
+    model->spring[spring].midstep_c6 = c6_of(temperature_c7);
+    INVARIANT(spring_is_consistent(model, spring, state));
 }
 
 void thermal_model_add_temperature(thermal_model_t *model, uint8_t spring, int16_t difference_c7)
 {
-    spring = clamp_index(model, spring);
-    thermal_model_settle(model, spring);
-    int32_t sum = (int32_t)high_word(model->state.spring[spring].temperature_c23) + difference_c7;
-    if (sum < THERMAL_MODEL_LOWEST_C7) {
-        sum = THERMAL_MODEL_LOWEST_C7;
-    }
-    if (sum > THERMAL_MODEL_HIGHEST_C7) {
-        sum = THERMAL_MODEL_HIGHEST_C7;
-    }
-    thermal_model_set_temperature(model, spring, (int16_t)sum);
+    const int32_t sum_c7 = (int32_t)thermal_model_temperature_c7(model, spring) + difference_c7;
+    thermal_model_set_temperature(model, spring, clamp_c7(sum_c7));
 }
 
 int16_t thermal_model_enthalpy_c7(const thermal_model_t *model, uint8_t spring)
 {
     const thermal_model_spring_state_t *state = &model->state.spring[clamp_index(model, spring)];
-    return high_word(fixed_point_add_saturated(state->temperature_c23, state->latent_c23));
+    return c7_of(fixed_point_add_saturated(state->temperature_c23, state->latent_c23));
 }
 
 void thermal_model_add_enthalpy(thermal_model_t *model, uint8_t spring, int16_t difference_c7)
 {
     spring = clamp_index(model, spring);
-    thermal_model_settle(model, spring);
-    thermal_model_spring_state_t *state = &model->state.spring[spring];
-    int32_t difference_c23 = (int32_t)difference_c7 * 65536;
-    int32_t held_c23 = fixed_point_add_saturated(state->temperature_c23, difference_c23);
-    if (high_word(held_c23) > state->heating_c7 || high_word(held_c23) < state->cooling_c7) {
-        model->spring[spring].gain_c23 = difference_c23;
-        follow_phase(model, spring);
-    } else {
-        state->temperature_c23 = clamp_c23(held_c23);
-    }
-    set_lead(model, spring, lead_from_c7(high_word(state->temperature_c23)));
+    add_heat(model, spring, c23_of(difference_c7));
+    model->spring[spring].midstep_c6 = c6_of(thermal_model_temperature_c7(model, spring));
+    INVARIANT(spring_is_consistent(model, spring, &model->state.spring[spring]));
 }
 
 int16_t thermal_model_temperature_c7(const thermal_model_t *model, uint8_t spring)
 {
-    return high_word(model->state.spring[clamp_index(model, spring)].temperature_c23);
+    return c7_of(model->state.spring[clamp_index(model, spring)].temperature_c23);
 }
 
 uint16_t thermal_model_austenite(const thermal_model_t *model, uint8_t spring)
 {
-    return austenite_of(model, &model->state.spring[clamp_index(model, spring)]);
+    spring = clamp_index(model, spring);
+    const thermal_model_transformation_t points = thermal_model_transformation(model, spring);
+    return austenite_of(model, &points, &model->state.spring[spring]);
+}
+
+static int32_t resistance_of_phase(uint32_t at_reference_uohm, int32_t rise, int16_t above_c7)
+{
+    return (int32_t)(at_reference_uohm + (uint32_t)(int32_t)(((int64_t)rise * above_c7) >> 16));
+}
+
+uint32_t thermal_model_resistance_uohm_at(const thermal_model_t *model, uint8_t spring,
+                                          uint16_t austenite, int16_t temperature_c7)
+{
+    const thermal_model_parameters_t *p = &model->parameters;
+    const int16_t above_c7 = (int16_t)(clamp_c7(temperature_c7) - RESISTANCE_REFERENCE_C7);
+    const int32_t martensite_uohm =
+        resistance_of_phase(p->resistance_martensite_uohm, model->martensite_rise, above_c7);
+    const int32_t austenite_uohm =
+        resistance_of_phase(p->resistance_austenite_uohm, model->austenite_rise, above_c7);
+    const int32_t change_uohm =
+        (int32_t)(((int64_t)(austenite_uohm - martensite_uohm) * austenite) >> 15);
+    const uint32_t own_uohm = (uint32_t)(martensite_uohm + change_uohm);
+    return (own_uohm > 0 ? own_uohm : 1u) + p->contact_uohm[clamp_index(model, spring)];
 }
 
 uint32_t thermal_model_resistance_uohm(const thermal_model_t *model, uint8_t spring)
 {
-    uint16_t austenite = thermal_model_austenite(model, spring);
-    int32_t difference = (int32_t)(model->parameters.resistance_austenite_uohm -
-                                   model->parameters.resistance_martensite_uohm);
-    int32_t change = (difference >> 15) * (int32_t)austenite +
-                     (int32_t)(((uint32_t)difference & 0x7fffu) * austenite >> 15);
-    return model->parameters.resistance_martensite_uohm + (uint32_t)change;
+    return thermal_model_resistance_uohm_at(model, spring, thermal_model_austenite(model, spring),
+                                            thermal_model_temperature_c7(model, spring));
+}
+
+uint32_t thermal_model_heating_uw(const thermal_model_t *model, uint8_t spring, uint16_t current_ma,
+                                  uint16_t voltage_mv)
+{
+    const uint16_t contact_q16 = model->spring[clamp_index(model, spring)].contact_q16;
+    const uint16_t contact_mv = (uint16_t)(((uint32_t)current_ma * contact_q16) >> 16);
+    return voltage_mv > contact_mv ? (uint32_t)current_ma * (uint16_t)(voltage_mv - contact_mv) : 0;
 }
 
 int16_t thermal_model_air_c7(const thermal_model_t *model)
 {
-    return high_word(model->state.air_c23);
+    return c7_of(model->state.air_c23);
 }
 
 int16_t thermal_model_plate_c7(const thermal_model_t *model)
 {
-    return high_word(model->state.plate_c23);
+    return c7_of(model->state.plate_c23);
+}
+
+int16_t thermal_model_ambient_c7(const thermal_model_t *model)
+{
+    return model->ambient_c7;
 }
 
 int32_t thermal_model_power_to_hold_uw(const thermal_model_t *model, uint8_t spring,
                                        int16_t temperature_c7)
 {
-    spring = clamp_index(model, spring);
-    uint16_t lead = lead_from_c7(temperature_c7);
-    const thermal_model_spring_t *own = &model->spring[spring];
-    const uint16_t *block = &model->lead[own->frame];
-    uint32_t flow = thermal_model_conducted(common_flow(model), block, own, lead);
-    flow -= thermal_model_lost((int16_t)(lead - model->pass.air_lead), own);
-    if (model->wake != 0) {
-        flow += brought(model, own);
-    }
-    if (model->radiation_factor != 0) {
-        flow -= radiation_of(lead, model->radiation_factor);
-    }
-    return -((int32_t)flow >> POWER_SHIFT);
+    const flows_t flows =
+        flows_at(model, clamp_index(model, spring), c6_of(clamp_c7(temperature_c7)));
+    return -(flows.into_spring >> 6);
 }
 
 void thermal_model_get_state(const thermal_model_t *model, thermal_model_state_t *state)
@@ -619,38 +584,19 @@ void thermal_model_get_state(const thermal_model_t *model, thermal_model_state_t
     *state = model->state;
 }
 
-static bool spring_is_consistent(const thermal_model_t *model,
-                                 const thermal_model_spring_state_t *state)
+static bool is_within_limits(int32_t temperature_c23)
 {
-    if (state->branch > THERMAL_MODEL_BRANCH_HEATING ||
-        state->amplitude > THERMAL_MODEL_AUSTENITE_FULL || state->latent_c23 < -LATENT_SLACK_C23 ||
-        state->latent_c23 > model->latent_full_c23 + LATENT_SLACK_C23) {
-        return false;
-    }
-    int16_t temperature_c7 = high_word(state->temperature_c23);
-    if (temperature_c7 > state->heating_c7 || temperature_c7 < state->cooling_c7) {
-        return false;
-    }
-    if (state->branch == THERMAL_MODEL_BRANCH_HEATING) {
-        return (state->heating_c7 == model->highest_c7 ||
-                (state->heating_c7 >= model->austenite_start_c7 &&
-                 state->heating_c7 < model->austenite_finish_c7)) &&
-               state->cooling_c7 == model->martensite_start_c7;
-    }
-    return (state->cooling_c7 == THERMAL_MODEL_LOWEST_C7 ||
-            (state->cooling_c7 <= model->martensite_start_c7 &&
-             state->cooling_c7 > model->martensite_finish_c7)) &&
-           state->heating_c7 == model->austenite_start_c7;
+    return temperature_c23 >= c23_of(THERMAL_MODEL_LOWEST_C7) &&
+           temperature_c23 <= c23_of(THERMAL_MODEL_HIGHEST_C7);
 }
 
 static bool state_is_consistent(const thermal_model_t *model, const thermal_model_state_t *state)
 {
-    if (clamp_c23(state->air_c23) != state->air_c23 ||
-        clamp_c23(state->plate_c23) != state->plate_c23) {
+    if (!is_within_limits(state->air_c23) || !is_within_limits(state->plate_c23)) {
         return false;
     }
-    for (uint8_t i = 0; i < model->pass.count; i++) {
-        if (!spring_is_consistent(model, &state->spring[i])) {
+    for (uint8_t i = 0; i < model->springs; i++) {
+        if (!spring_is_consistent(model, i, &state->spring[i])) {
             return false;
         }
     }
@@ -663,35 +609,26 @@ bool thermal_model_set_state(thermal_model_t *model, const thermal_model_state_t
         return false;
     }
     model->state = *state;
-    model->pass.air_lead = lead_from_c7(high_word(state->air_c23));
-    model->plate_lead = lead_from_c7(high_word(state->plate_c23));
-    thermal_model_refresh_ambient(model);
-    for (uint8_t i = 0; i < model->pass.count; i++) {
-        model->spring[i].pending = 0;
-        refresh_branch(model, &model->spring[i], &model->state.spring[i]);
-        set_lead(model, i, lead_from_c7(high_word(state->spring[i].temperature_c23)));
+    model->air.midstep_c6 = c6_of(c7_of(state->air_c23));
+    model->plate.midstep_c6 = c6_of(c7_of(state->plate_c23));
+    thermal_model_set_ambient(model, model->ambient_c7); /* where there is no air or plate */
+    for (uint8_t i = 0; i < model->springs; i++) {
+        model->spring[i].midstep_c6 = c6_of(c7_of(state->spring[i].temperature_c23));
     }
     return true;
 }
 
 bool thermal_model_is_consistent(const thermal_model_t *model)
 {
-    if (model->pass.count == 0 || model->pass.count > THERMAL_MODEL_MAX_SPRINGS ||
-        model->pass.count != model->parameters.rows * model->parameters.columns) {
+    if (model->springs == 0 || model->springs > THERMAL_MODEL_MAX_SPRINGS ||
+        model->springs != model->parameters.rows * model->parameters.columns) {
         return false;
     }
-    uint32_t sum = 0;
-    for (uint16_t k = 0; k < sizeof model->lead / sizeof model->lead[0]; k++) {
-        if (model->lead[k] > LEAD_HIGHEST) {
+    for (uint8_t i = 0; i < model->springs; i++) {
+        if (model->spring[i].midstep_c6 < c6_of(THERMAL_MODEL_LOWEST_C7) ||
+            model->spring[i].midstep_c6 > c6_of(THERMAL_MODEL_HIGHEST_C7)) {
             return false;
         }
-        sum += model->lead[k];
-    }
-    for (uint8_t i = 0; i < model->pass.count; i++) {
-        sum -= model->lead[model->spring[i].frame + BLOCK_CENTRE];
-    }
-    if (sum != 0) { /* the frame is zeros */
-        return false;
     }
     return state_is_consistent(model, &model->state);
 }

@@ -16,18 +16,6 @@
 extern "C" {
 #endif
 
-/* The array lies in a frame of fixed width, its shorter side along the row: 3 of 9 (or of 15), 8 of
- * 64 (or of 80). */
-#if THERMAL_MODEL_MAX_SPRINGS <= 15
-#define THERMAL_MODEL_FRAME_STRIDE 5
-typedef uint8_t thermal_model_place_t; /* index in the frame */
-#elif THERMAL_MODEL_MAX_SPRINGS <= 80
-#define THERMAL_MODEL_FRAME_STRIDE 10
-typedef uint16_t thermal_model_place_t;
-#else
-#error "THERMAL_MODEL_MAX_SPRINGS above 80"
-#endif
-
 /* Where the fan's air goes: towards the next column, the next row, ... (row 1 is at the top). */
 typedef enum {
     THERMAL_MODEL_WAKE_EAST = 0,
@@ -72,7 +60,6 @@ typedef struct {
     int16_t cooling_c7;      /* below this, martensite forms; the lower limit when none
                                 is left to form */
     uint16_t amplitude;      /* Q0.15, of the branch */
-    uint8_t gain;            /* 1/256: dT/dh where the branch was left */
     uint8_t branch;          /* thermal_model_branch_t */
 } thermal_model_spring_state_t;
 
@@ -83,88 +70,58 @@ typedef struct {
     thermal_model_spring_state_t spring[THERMAL_MODEL_MAX_SPRINGS];
 } thermal_model_state_t;
 
-/* Derived from the parameters: internal, read it through the functions. */
+/* Between which temperatures one spring transforms, degC in Q9.7. */
 typedef struct {
-    uint32_t step_gain;          /* 2^41 1e-6 step / heat capacity */
-    int32_t gain_c23;            /* enthalpy gained in this step */
-    int16_t block_offset;        /* the same, in bytes from this struct */
-    thermal_model_place_t frame; /* where the block of 3 x 3 around it begins */
-    uint16_t orthogonal;         /* uW/K at the present fan; the same for all, kept here
-                                    for the step's speed */
-    uint16_t diagonal;
-    uint16_t conduction; /* all of this spring's couplings and the plate's */
-    uint16_t loss;
-    uint16_t loss_rise;    /* uW/K per 1024 K */
-    uint16_t loss_natural; /* uW/K, scaled for this spring: fan off, fan full */
-    uint16_t loss_fan;
-    uint16_t loss_rise_natural;
-    uint16_t branch_latent;  /* Q8.8 K: amplitude times latent heat over heat
-                                capacity */
-    uint16_t branch_slope;   /* of the branch, for the slope table */
-    uint8_t orthogonals : 3; /* neighbours */
-    uint8_t diagonals : 3;
-    uint8_t upstream : 1; /* 1: there is a spring from which the fan blows */
-    uint8_t pending;      /* this step takes it past a threshold: its phase is still to
-                             follow */
-} thermal_model_spring_t;
-
-/* What a pass over the springs takes and gives back. Internal. */
-typedef struct {
-    uint32_t common;   /* flow into every spring, 1/64 uW, rounding included */
-    int32_t air_flow;  /* from the springs, 4 uW: added to */
-    uint32_t lead_sum; /* of all springs */
-#ifdef THERMAL_MODEL_CHIP_LAYOUT
-    uint16_t power_uw; /* for who reads the chip's memory from outside: its pointers have 16 bits */
-#else
-    const uint32_t *power_uw;
-#endif
-    uint16_t air_lead; /* 1/64 K above just under the lowest */
-    uint8_t count;
-    uint8_t flags;   /* 1: every gain_c23 holds a flow of its own to begin with; 2:
-                        some loss_rise is not 0 */
-    uint8_t pending; /* out: some spring is */
-} thermal_model_pass_t;
-
-/* Air or plate: how flow becomes temperature. Internal. */
-typedef struct {
-    uint32_t gain; /* 2^-16, or 2^-8 where `wide`, of 2^-23 K a unit of flow */
-    uint16_t loss; /* to ambient: uW/K; 256 uW/K where SLOW_NODE_COARSE */
-    uint8_t units; /* SLOW_NODE_... bits; a unit of flow is 4 uW, 64 uW where SLOW_NODE_MANY */
-    bool wide;
-    bool leads; /* its own time is long against a step: taken half a step ahead,
-                 * as the springs are
-                 */
-} thermal_model_slow_node_t;
-
-/* The single values come first: the AVR reaches 64 bytes from a pointer in one instruction. */
-typedef struct {
-    thermal_model_pass_t pass;
-    thermal_model_slow_node_t air;
-    thermal_model_slow_node_t plate;
-    int32_t latent_full_c23;    /* latent heat over heat capacity */
-    uint32_t ambient_radiation; /* 1/64 uW */
-    uint16_t ambient_lead;      /* 1/64 K above just under the lowest */
-    uint16_t plate_lead;
-    uint16_t radiation_factor;
-    uint16_t wake;
     int16_t martensite_finish_c7;
     int16_t martensite_start_c7;
     int16_t austenite_start_c7;
     int16_t austenite_finish_c7;
-    uint16_t heating_position; /* 2^21 / width of the transformation */
+} thermal_model_transformation_t;
+
+/* Derived from the parameters: internal, read it through the functions. */
+typedef struct {
+    int32_t step_gain;      /* 2^48 1e-6 step / heat capacity: 2^-31 of 2^-23 K for 1/64 uW */
+    uint16_t loss_uw_per_k; /* at the present fan; natural and fan: with the fan off and full */
+    uint16_t loss_natural_uw_per_k;
+    uint16_t loss_fan_uw_per_k;
+    uint16_t loss_rise; /* uW/K per 1024 K */
+    uint16_t loss_rise_natural;
+    int16_t midstep_c6; /* temperature expected at the middle of the next step, Q9.6 degC */
+    int16_t transformation_shift_c7;
+    uint16_t contact_q16; /* 2^-16 ohm */
+    uint8_t row;
+    uint8_t column;
+    uint8_t upstream; /* spring from which the fan blows; THERMAL_MODEL_MAX_SPRINGS: none */
+} thermal_model_spring_t;
+
+/* Air or plate: how flow becomes temperature. Internal. */
+typedef struct {
+    int64_t gain;           /* 2^45 1e-6 step / heat capacity: 2^-28 of 2^-23 K for 1/64 uW */
+    uint32_t loss_uw_per_k; /* to ambient */
+    int16_t midstep_c6;
+    bool quick; /* a step is long against its own time: taken implicitly, not extrapolated */
+} thermal_model_slow_node_t;
+
+typedef struct {
+    thermal_model_parameters_t parameters;
+    thermal_model_state_t state;
+    thermal_model_slow_node_t air;
+    thermal_model_slow_node_t plate;
+    thermal_model_transformation_t transformation; /* of a spring that is not shifted */
+    int32_t martensite_rise;                       /* of its resistance: 2^-16 uohm per 1/128 K */
+    int32_t austenite_rise;
+    uint16_t heating_position; /* 2^21 / width of the transformation, 1/128 K */
     uint16_t cooling_position;
-    uint16_t heating_slope;
-    uint16_t cooling_slope;
+    uint16_t latent_full_c8;      /* Q8.8 K: latent heat over heat capacity */
+    uint16_t orthogonal_uw_per_k; /* at the present fan */
+    uint16_t diagonal_uw_per_k;
+    uint16_t wake_uw_per_k;
+    uint16_t radiation_factor; /* 1/64 uW at 512 K */
     int16_t ambient_c7;
     int16_t highest_c7; /* of a spring: temperature plus latent heat must fit */
-    int8_t wake_offset; /* to the upstream spring in the frame */
     uint8_t fan_percent;
-    thermal_model_state_t state;
+    uint8_t springs;
     thermal_model_spring_t spring[THERMAL_MODEL_MAX_SPRINGS];
-    /* temperatures half a step ahead, 1/64 K above just under the lowest; 0 where there is no
-     * spring */
-    uint16_t lead[THERMAL_MODEL_FRAME_STRIDE * (THERMAL_MODEL_MAX_SPRINGS + 2)];
-    thermal_model_parameters_t parameters;
 } thermal_model_t;
 
 /* Takes the parameters; then fan off, ambient 20 degC, everything at 20 degC and martensite. On
@@ -176,7 +133,8 @@ typedef struct {
  * 1..8000 permille; heat capacity times scale below 1 mJ/K, or so small that a step of the highest
  * power exceeds 63 K; latent heat over heat capacity above 80 K or above 20 times either width; a
  * transformation narrower than 2 K or wider than 100 K; a transformation temperature outside
- * -30..200 degC; austenite finish plus latent heat over heat capacity above 200 degC; a resistance
+ * -30..200 degC; austenite finish plus latent heat over heat capacity above 200 degC, or either
+ * beyond its end with the shift of a spring; a resistance
  * of 0 or above 16 ohm; loss rise above 20000 ppm/K; wake direction above 3; wake above the fan's
  * loss (heat from nothing); air or plate above 2 kJ/K; a plate coupled but without heat capacity.
  *
@@ -200,28 +158,32 @@ void thermal_model_set_ambient(thermal_model_t *model, int16_t ambient_c7);
  * no division. */
 void thermal_model_set_fan(thermal_model_t *model, uint8_t percent);
 
-/* One step of step_ms with power_uw[i] into spring i. O(n), 32-bit products, no division. */
+/* One step of step_ms with power_uw[i] into spring i. O(n), no division. */
 void thermal_model_step(thermal_model_t *model, const uint32_t power_uw[]);
-
-/* The same in portions, for who has little time at a stretch: begin_step, then follow_phases as
- * often as it takes. begin_step moves the network, O(n); a spring whose phase moves with it stays
- * as it was before the step, in every respect, until its turn in follow_phases, which takes `most`
- * of them at a time, or in settle, which takes one. The model can be read, and its state be kept,
- * at any moment. But who sets a temperature from what he reads calls settle first, or the step's
- * heat is lost. What is left when the next step begins is done first: after each whole step the
- * model is the same as after thermal_model_step. power_uw is not read later. */
-void thermal_model_begin_step(thermal_model_t *model, const uint32_t power_uw[]);
-void thermal_model_follow_phases(thermal_model_t *model, uint8_t most);
-void thermal_model_settle(thermal_model_t *model, uint8_t spring);
 
 /* Getters, O(1). An index out of range reads as spring 0. */
 int16_t thermal_model_temperature_c7(const thermal_model_t *model, uint8_t spring);
 uint16_t thermal_model_austenite(const thermal_model_t *model,
                                  uint8_t spring); /* Q0.15, 0..32768 */
+/* Of the law below at the spring's own phase and temperature. */
 uint32_t thermal_model_resistance_uohm(const thermal_model_t *model, uint8_t spring);
 int16_t
 thermal_model_air_c7(const thermal_model_t *model); /* ambient where there is no shared air */
 int16_t thermal_model_plate_c7(const thermal_model_t *model);
+
+/* The one law of resistance: what that spring's sensor sees at a phase (Q0.15, 0..32768) and a
+ * temperature. Each phase's own resistance rises in proportion with the distance from 20 degC, they
+ * are mixed by their shares, and the spring's contact is in series. At least 1 uohm. O(1). */
+uint32_t thermal_model_resistance_uohm_at(const thermal_model_t *model, uint8_t spring,
+                                          uint16_t austenite, int16_t temperature_c7);
+/* What heats the spring of what its sensor measures: not what heats its contact, uW. current_ma: at
+ * most 4095. O(1). */
+uint32_t thermal_model_heating_uw(const thermal_model_t *model, uint8_t spring, uint16_t current_ma,
+                                  uint16_t voltage_mv);
+/* The one source of the temperatures between which that spring transforms. O(1). */
+thermal_model_transformation_t thermal_model_transformation(const thermal_model_t *model,
+                                                            uint8_t spring);
+int16_t thermal_model_ambient_c7(const thermal_model_t *model);
 
 /* Takes one spring to a temperature as if slowly: on the way its phase transforms as it would.
  * O(1). */

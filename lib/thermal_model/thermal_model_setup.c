@@ -8,15 +8,15 @@
 #define CONDUCTANCE_MAX     65535u
 #define CONDUCTANCE_SUM_MAX 98000u    /* (2^31 / 64 uW - highest power) / 256 K */
 #define LOSS_RISE_MAX_E6    63999511u /* 1e-6 uW/K per K: loss_rise is 16 bits of uW/K per 1024 K */
-#define FEW_SPRINGS         16
-#define GAIN_MAX            0xffffffu
-#define STEP_GAIN_UJ_PER_MS 2199023256u /* 2^41 / 1e3: thermal_model_spring_t.step_gain */
-#define CAPACITY_UJ_PER_MS  132u        /* least: STEP_GAIN_UJ_PER_MS over this is below GAIN_MAX */
+#define STEP_GAIN_UJ_PER_MS 281474976711u /* 2^48 / 1e3: thermal_model_spring_t.step_gain */
+#define NODE_GAIN_UJ_PER_MS 35184372089u  /* 2^45 / 1e3: thermal_model_slow_node_t.gain */
+#define CAPACITY_UJ_PER_MS  132u          /* least: STEP_GAIN_UJ_PER_MS over this fits 31 bits */
 #define WIDTH_MIN_CC        200
 #define WIDTH_MAX_CC        10000
+#define LOWEST_CC           (-3000)
 #define HIGHEST_CC          20000
 
-static __attribute__((noinline)) uint32_t larger(uint32_t a, uint32_t b)
+static uint32_t larger(uint32_t a, uint32_t b)
 {
     return a > b ? a : b;
 }
@@ -52,14 +52,13 @@ static uint32_t plate_conductance(const thermal_model_parameters_t *p)
            p->plate_loss_uw_per_k;
 }
 
-static __attribute__((noinline)) uint32_t spring_capacity(const thermal_model_parameters_t *p,
-                                                          uint8_t i)
+static uint32_t spring_capacity(const thermal_model_parameters_t *p, uint8_t i)
 {
     return (uint32_t)p->heat_capacity_mj_per_k * p->heat_capacity_scale_permille[i];
 }
 
 /* Of one spring. */
-static __attribute__((noinline)) uint32_t scaled_loss(uint16_t loss_uw_per_k, uint16_t permille)
+static uint32_t scaled_loss(uint16_t loss_uw_per_k, uint16_t permille)
 {
     return ((uint32_t)loss_uw_per_k * permille + 500u) / 1000u;
 }
@@ -127,6 +126,13 @@ static refusal_t check_phase(const thermal_model_parameters_t *p)
         (int16_t)latent_cc > HIGHEST_CC - finish_a) {
         REFUSE(RANGE, latent_heat_j);
     }
+    for (uint8_t i = 0; i < (uint8_t)(p->rows * p->columns); i++) {
+        const int16_t shift_cc = p->transformation_shift_cc[i];
+        if (finish_m + shift_cc < LOWEST_CC ||
+            finish_a + shift_cc > HIGHEST_CC - (int16_t)latent_cc) {
+            REFUSE(RANGE, transformation_shift_k);
+        }
+    }
     return 0;
 }
 
@@ -144,7 +150,7 @@ static refusal_t check_spring(const thermal_model_parameters_t *p, uint8_t i)
         REFUSE(RANGE, wake_w_per_k);
     }
     const uint32_t rise_e6 = natural * p->loss_rise_ppm_per_k;
-    const uint32_t risen = natural + rise_e6 / (1000000u / LEAD_SPAN_K) + 1u;
+    const uint32_t risen = natural + rise_e6 / (1000000u / SPAN_K) + 1u;
     if (rise_e6 > LOSS_RISE_MAX_E6 || risen > CONDUCTANCE_MAX) {
         REFUSE(OVERFLOW, loss_rise_per_k);
     }
@@ -210,122 +216,117 @@ static refusal_t check(const thermal_model_parameters_t *p)
     return refusal != 0 ? refusal : check_plate(p);
 }
 
-/* The node leads (see thermal_model.c) where a step is short against its own time; else its own
- * flow is taken implicitly, so that any step is stable. */
-static void slow_node(thermal_model_slow_node_t *node, uint32_t capacity_mj_per_k,
-                      uint32_t conductance_uw_per_k, uint32_t loss_uw_per_k, uint16_t step_ms,
-                      uint8_t count)
+/* Where a step is long against the node's own time, its own flow is taken implicitly, so that any
+ * step is stable. */
+static void derive_node(thermal_model_slow_node_t *node, uint32_t capacity_mj_per_k,
+                        uint32_t conductance_uw_per_k, uint32_t loss_uw_per_k, uint16_t step_ms)
 {
-    const bool coarse = loss_uw_per_k > UINT16_MAX;
-    const bool many = count > FEW_SPRINGS;
-    node->units = (uint8_t)((coarse ? SLOW_NODE_COARSE : 0) | (many ? SLOW_NODE_MANY : 0));
-    node->loss = (uint16_t)(coarse ? (loss_uw_per_k + 128u) / 256u : loss_uw_per_k);
-    uint32_t exchanged =
-        fixed_point_multiply_divide(conductance_uw_per_k, step_ms, 1000u); /* uJ/K */
-    uint32_t capacity = capacity_mj_per_k * 1000u;                         /* uJ/K */
-    node->leads = exchanged <= capacity / 4u;
-    if (!node->leads) {
-        capacity += exchanged;
+    const uint32_t exchanged_uj_per_k =
+        fixed_point_multiply_divide(conductance_uw_per_k, step_ms, 1000u);
+    uint32_t capacity_uj_per_k = capacity_mj_per_k * 1000u;
+    node->loss_uw_per_k = loss_uw_per_k;
+    node->quick = exchanged_uj_per_k > capacity_uj_per_k / 4u;
+    if (node->quick) {
+        capacity_uj_per_k += exchanged_uj_per_k;
     }
-    if (capacity == 0) {
-        capacity = 1; /* a node without flows: nothing moves it */
+    if (capacity_uj_per_k == 0) {
+        capacity_uj_per_k = 1; /* a node without flows: nothing moves it */
     }
-    /* 24 bits of 4 uW hold 33 W: for a few springs; of 64 uW for many */
-    uint32_t steps = (uint32_t)step_ms << (many ? 4 : 0);
-    /* 4e-6 2^23 2^16 step[ms] 1e-3 / (capacity[uJ/K] 1e-6) */
-    node->gain = fixed_point_multiply_divide(STEP_GAIN_UJ_PER_MS, steps, capacity);
-    node->wide = node->gain > GAIN_MAX;
-    if (node->wide) {
-        node->gain = fixed_point_multiply_divide(8589935u, steps, capacity);
-        if (node->gain > GAIN_MAX) {
-            node->gain = GAIN_MAX;
-        }
-    }
+    node->gain =
+        (int64_t)((NODE_GAIN_UJ_PER_MS * step_ms + capacity_uj_per_k / 2u) / capacity_uj_per_k);
 }
 
-static uint16_t position_factor(uint32_t width_c7)
+static uint16_t position_factor(int16_t width_c7)
 {
-    return (uint16_t)((0x200000u + width_c7 / 2u) / width_c7);
+    return (uint16_t)((0x200000u + (uint16_t)width_c7 / 2u) / (uint16_t)width_c7);
 }
 
-static __attribute__((noinline)) uint16_t slope_factor(uint32_t width_c7)
+/* The spring from which the fan blows at that place; NO_SPRING at the edge where its air comes in.
+ */
+static uint8_t upstream_of(const thermal_model_parameters_t *p, uint8_t row, uint8_t column)
 {
-    uint32_t factor = (0x1000000u + width_c7 / 2u) / width_c7; /* 2^17 / width in K */
-    return (uint16_t)(factor > 65535u ? 65535u : factor);
+    const uint8_t i = (uint8_t)(row * p->columns + column);
+    switch ((thermal_model_wake_t)p->wake_direction) {
+    case THERMAL_MODEL_WAKE_EAST:
+        return column > 0 ? (uint8_t)(i - 1u) : NO_SPRING;
+    case THERMAL_MODEL_WAKE_SOUTH:
+        return row > 0 ? (uint8_t)(i - p->columns) : NO_SPRING;
+    case THERMAL_MODEL_WAKE_WEST:
+        return column + 1u < p->columns ? (uint8_t)(i + 1u) : NO_SPRING;
+    case THERMAL_MODEL_WAKE_NORTH:
+        return row + 1u < p->rows ? (uint8_t)(i + p->columns) : NO_SPRING;
+    }
+    return NO_SPRING;
 }
 
-static void derive_springs(thermal_model_t *model)
+static void derive_spring(thermal_model_t *model, uint8_t i)
 {
     const thermal_model_parameters_t *p = &model->parameters;
-    const bool tall = p->rows >= p->columns;
-    const uint8_t along_row = tall ? 1 : THERMAL_MODEL_FRAME_STRIDE;
-    const uint8_t along_column = tall ? THERMAL_MODEL_FRAME_STRIDE : 1;
-    const bool by_row = (p->wake_direction & 1u) != 0; /* south, north */
-    const bool rises = p->wake_direction < THERMAL_MODEL_WAKE_WEST;
-    const int8_t upstream = (int8_t)(by_row ? along_column : along_row);
-    model->wake_offset = rises ? (int8_t)-upstream : upstream;
-    for (uint8_t i = 0; i < model->pass.count; i++) {
-        thermal_model_spring_t *spring = &model->spring[i];
-        const uint16_t scale = p->loss_scale_permille[i];
-        const place_t place = place_of(p, i);
-        spring->step_gain =
-            fixed_point_multiply_divide(STEP_GAIN_UJ_PER_MS, p->step_ms, spring_capacity(p, i));
-        spring->loss_natural = (uint16_t)scaled_loss(p->loss_uw_per_k, scale);
-        spring->loss_fan = (uint16_t)scaled_loss(p->loss_fan_uw_per_k, scale);
-        /* 1024 / 1e6 */
-        spring->loss_rise_natural =
-            (uint16_t)(((uint32_t)spring->loss_natural * p->loss_rise_ppm_per_k * 16u + 7812u) /
-                       15625u);
-        spring->orthogonals = place.orthogonals & 7u;
-        spring->diagonals = place.diagonals & 7u;
-        const uint8_t at = by_row ? place.row : place.column;
-        const uint8_t last = (uint8_t)((by_row ? p->rows : p->columns) - 1u);
-        spring->upstream = at != (rises ? 0 : last);
-        spring->frame =
-            (thermal_model_place_t)(place.row * along_column + place.column * along_row);
-        spring->block_offset =
-            (int16_t)((const char *)&model->lead[spring->frame] - (const char *)spring);
-    }
+    thermal_model_spring_t *spring = &model->spring[i];
+    const uint16_t scale = p->loss_scale_permille[i];
+    const uint32_t capacity_uj_per_k = spring_capacity(p, i);
+    spring->row = (uint8_t)(i / p->columns);
+    spring->column = (uint8_t)(i % p->columns);
+    spring->upstream = upstream_of(p, spring->row, spring->column);
+    spring->step_gain =
+        (int32_t)((STEP_GAIN_UJ_PER_MS * p->step_ms + capacity_uj_per_k / 2u) / capacity_uj_per_k);
+    spring->loss_natural_uw_per_k = (uint16_t)scaled_loss(p->loss_uw_per_k, scale);
+    spring->loss_fan_uw_per_k = (uint16_t)scaled_loss(p->loss_fan_uw_per_k, scale);
+    spring->transformation_shift_c7 = fixed_point_c7_from_cc(p->transformation_shift_cc[i]);
+    const uint32_t contact_q16 = fixed_point_multiply_divide(p->contact_uohm[i], 65536u, 1000000u);
+    spring->contact_q16 = contact_q16 > UINT16_MAX ? UINT16_MAX : (uint16_t)contact_q16;
+    /* 1024 / 1e6 */
+    spring->loss_rise_natural =
+        (uint16_t)(((uint32_t)spring->loss_natural_uw_per_k * p->loss_rise_ppm_per_k * 16u +
+                    7812u) /
+                   15625u);
+}
+
+static int32_t resistance_rise(uint32_t resistance_uohm, int16_t ppm_per_k)
+{
+    return (int32_t)((int64_t)resistance_uohm * ppm_per_k * 512 / 1000000); /* 2^16 / 128 / 1e6 */
 }
 
 static void derive(thermal_model_t *model)
 {
     const thermal_model_parameters_t *p = &model->parameters;
-    model->pass.count = (uint8_t)(p->rows * p->columns);
-    derive_springs(model);
-    model->latent_full_c23 = (int32_t)fixed_point_multiply_divide((uint32_t)p->latent_heat_mj << 10,
-                                                                  8192u, p->heat_capacity_mj_per_k);
-    int16_t highest_c7 = (int16_t)(255 * 128 - (int16_t)(model->latent_full_c23 >> 16));
+    model->springs = (uint8_t)(p->rows * p->columns);
+    model->latent_full_c8 =
+        (uint16_t)fixed_point_multiply_divide(p->latent_heat_mj, 256u, p->heat_capacity_mj_per_k);
+    const int16_t highest_c7 = (int16_t)(SPAN_K * 128 - model->latent_full_c8 / 2u);
     model->highest_c7 =
         highest_c7 < THERMAL_MODEL_HIGHEST_C7 ? highest_c7 : (int16_t)THERMAL_MODEL_HIGHEST_C7;
-    model->martensite_finish_c7 = fixed_point_c7_from_cc(p->martensite_finish_cc);
-    model->martensite_start_c7 = fixed_point_c7_from_cc(p->martensite_start_cc);
-    model->austenite_start_c7 = fixed_point_c7_from_cc(p->austenite_start_cc);
-    model->austenite_finish_c7 = fixed_point_c7_from_cc(p->austenite_finish_cc);
-    uint32_t heating = (uint32_t)(model->austenite_finish_c7 - model->austenite_start_c7);
-    uint32_t cooling = (uint32_t)(model->martensite_start_c7 - model->martensite_finish_c7);
-    model->heating_position = position_factor(heating);
-    model->cooling_position = position_factor(cooling);
-    model->heating_slope = slope_factor(heating);
-    model->cooling_slope = slope_factor(cooling);
-    model->pass.flags = p->loss_rise_ppm_per_k != 0 ? PASS_RISES : 0;
+    thermal_model_transformation_t *points = &model->transformation;
+    points->martensite_finish_c7 = fixed_point_c7_from_cc(p->martensite_finish_cc);
+    points->martensite_start_c7 = fixed_point_c7_from_cc(p->martensite_start_cc);
+    points->austenite_start_c7 = fixed_point_c7_from_cc(p->austenite_start_cc);
+    points->austenite_finish_c7 = fixed_point_c7_from_cc(p->austenite_finish_cc);
+    model->martensite_rise =
+        resistance_rise(p->resistance_martensite_uohm, p->resistance_martensite_rise_ppm_per_k);
+    model->austenite_rise =
+        resistance_rise(p->resistance_austenite_uohm, p->resistance_austenite_rise_ppm_per_k);
+    model->heating_position =
+        position_factor((int16_t)(points->austenite_finish_c7 - points->austenite_start_c7));
+    model->cooling_position =
+        position_factor((int16_t)(points->martensite_start_c7 - points->martensite_finish_c7));
     /* 1e-8 m2 sigma 512^4 K^4 64e6 / 2^16 = 0.0380535 a unit of area, to 1e-6 */
     model->radiation_factor =
         (uint16_t)((p->radiating_area_cmm2 * (uint32_t)39902 + 0x80000u) >> 20);
 
-    uint32_t loss_sum = 0;
-    for (uint8_t i = 0; i < model->pass.count; i++) {
+    uint32_t loss_sum_uw_per_k = p->air_exchange_uw_per_k;
+    for (uint8_t i = 0; i < model->springs; i++) {
         const thermal_model_spring_t *spring = &model->spring[i];
-        loss_sum += larger(spring->loss_natural, spring->loss_fan);
+        derive_spring(model, i);
+        loss_sum_uw_per_k += larger(spring->loss_natural_uw_per_k, spring->loss_fan_uw_per_k);
     }
-    slow_node(&model->air, p->air_heat_capacity_mj_per_k, loss_sum + p->air_exchange_uw_per_k,
-              p->air_exchange_uw_per_k, p->step_ms, model->pass.count);
-    slow_node(&model->plate, p->plate_heat_capacity_mj_per_k, plate_conductance(p),
-              p->plate_loss_uw_per_k, p->step_ms, model->pass.count);
+    derive_node(&model->air, p->air_heat_capacity_mj_per_k, loss_sum_uw_per_k,
+                p->air_exchange_uw_per_k, p->step_ms);
+    derive_node(&model->plate, p->plate_heat_capacity_mj_per_k, plate_conductance(p),
+                p->plate_loss_uw_per_k, p->step_ms);
 }
 
 /* natural + (forced - natural) fan, fan in Q2.14 */
-static __attribute__((noinline)) uint16_t between(uint16_t natural, uint16_t forced, uint16_t fan)
+static uint16_t between(uint16_t natural, uint16_t forced, uint16_t fan)
 {
     int32_t difference = ((int32_t)forced - (int32_t)natural) * (int32_t)fan;
     return (uint16_t)(natural + ((difference + 8192) >> 14));
@@ -334,23 +335,17 @@ static __attribute__((noinline)) uint16_t between(uint16_t natural, uint16_t for
 void thermal_model_apply_fan(thermal_model_t *model)
 {
     const thermal_model_parameters_t *p = &model->parameters;
-    uint16_t fan = (uint16_t)(((uint32_t)model->fan_percent * 41943u + 128u) >> 8); /* Q2.14 */
-    uint16_t orthogonal = between(p->orthogonal_uw_per_k, p->orthogonal_fan_uw_per_k, fan);
-    uint16_t diagonal = between(p->diagonal_uw_per_k, p->diagonal_fan_uw_per_k, fan);
-    model->wake = between(0, p->wake_uw_per_k, fan);
-    model->pass.flags = (uint8_t)(model->pass.flags & ~PASS_EXTRA);
-    if (model->wake != 0 || model->radiation_factor != 0) {
-        model->pass.flags |= PASS_EXTRA;
-    }
-    for (uint8_t i = 0; i < model->pass.count; i++) {
+    const uint16_t fan =
+        (uint16_t)(((uint32_t)model->fan_percent * 41943u + 128u) >> 8); /* Q2.14 */
+    model->orthogonal_uw_per_k = between(p->orthogonal_uw_per_k, p->orthogonal_fan_uw_per_k, fan);
+    model->diagonal_uw_per_k = between(p->diagonal_uw_per_k, p->diagonal_fan_uw_per_k, fan);
+    model->wake_uw_per_k = between(0, p->wake_uw_per_k, fan);
+    for (uint8_t i = 0; i < model->springs; i++) {
         thermal_model_spring_t *spring = &model->spring[i];
-        spring->loss = between(spring->loss_natural, spring->loss_fan, fan);
+        spring->loss_uw_per_k =
+            between(spring->loss_natural_uw_per_k, spring->loss_fan_uw_per_k, fan);
         /* natural convection rises with temperature, the fan's does not */
         spring->loss_rise = between(spring->loss_rise_natural, 0, fan);
-        spring->orthogonal = orthogonal;
-        spring->diagonal = diagonal;
-        spring->conduction = (uint16_t)(spring->orthogonals * orthogonal +
-                                        spring->diagonals * diagonal + p->plate_coupling_uw_per_k);
     }
 }
 
@@ -365,8 +360,9 @@ thermal_model_status_t thermal_model_init(thermal_model_t *model,
         }
         return (thermal_model_status_t)(-(int)(refusal & 0xFFu));
     }
-    memmove(&model->parameters, parameters, sizeof *parameters); /* may be the model's own */
-    memset(model, 0, offsetof(thermal_model_t, parameters));
+    const thermal_model_parameters_t taken = *parameters; /* may be the model's own */
+    memset(model, 0, sizeof *model);
+    model->parameters = taken;
     derive(model);
     thermal_model_apply_fan(model);
     model->ambient_c7 = 20 * 128;

@@ -1,5 +1,4 @@
 /* The chip packs its structures and has nine springs: this file alone sees them so. */
-#define THERMAL_MODEL_CHIP_LAYOUT
 #define THERMAL_MODEL_MAX_SPRINGS    9
 #define SAFETY_MAX_SPRINGS           9
 #define CURRENT_CONTROL_MAX_CHANNELS 9
@@ -33,6 +32,7 @@ static void view_spring(const controller_t *chip, unsigned k, board_view_spring_
     view->cooling_c7 = state->cooling_c7;
     view->amplitude = state->amplitude;
     view->branch = state->branch;
+    view->transformation_shift_c7 = chip->model.spring[k].transformation_shift_c7;
 }
 
 bool board_view(const board_t *board, const char *symbol, board_view_t *view)
@@ -49,10 +49,10 @@ bool board_view(const board_t *board, const char *symbol, board_view_t *view)
     view->locked = chip.safety.locked;
     view->fan_percent = chip.fan_percent;
     view->ambient_c7 = chip.model.ambient_c7;
-    view->austenite_start_c7 = chip.model.austenite_start_c7;
-    view->martensite_start_c7 = chip.model.martensite_start_c7;
-    view->austenite_finish_c7 = chip.model.austenite_finish_c7;
-    view->martensite_finish_c7 = chip.model.martensite_finish_c7;
+    view->austenite_start_c7 = chip.model.transformation.austenite_start_c7;
+    view->martensite_start_c7 = chip.model.transformation.martensite_start_c7;
+    view->austenite_finish_c7 = chip.model.transformation.austenite_finish_c7;
+    view->martensite_finish_c7 = chip.model.transformation.martensite_finish_c7;
     view->heating_position = chip.model.heating_position;
     view->cooling_position = chip.model.cooling_position;
     for (unsigned k = 0; k < BOARD_CHANNELS; k++) {

@@ -22,7 +22,7 @@ typedef struct {
     uint8_t stage, limits; /* drive_policy_stage_t, bits of drive_policy_limit_t */
     uint16_t wanted_ma;    /* what the policy would give without them */
     /* where its phase stands: see thermal_model_spring_state_t */
-    int16_t heating_c7, cooling_c7;
+    int16_t heating_c7, cooling_c7, transformation_shift_c7;
     uint16_t amplitude;
     uint8_t branch;
 } board_view_spring_t;

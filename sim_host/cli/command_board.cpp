@@ -12,6 +12,7 @@
 #include "board_pty.h"
 #include "scenario_plant.h"
 #include "simulated_board.h"
+#include "thermometers.h"
 
 namespace ninespring
 {
@@ -28,6 +29,7 @@ void on_signal(int)
 
 struct board_arguments {
     plant_arguments array;
+    thermometer_arguments thermometers;
     std::string elf;
     std::string speed = "1";
     std::string eeprom;
@@ -109,9 +111,13 @@ void run_board(const board_arguments &arguments)
                           array.bus_noise_v);
     eeprom_file eeprom(arguments.eeprom, board.get());
     terminal port;
+    thermometers logger(arguments.thermometers, array.plant.get(), array.seed);
     std::signal(SIGINT, on_signal);
     std::signal(SIGTERM, on_signal);
     fmt::print("{}\n", port.get()->name);
+    if (!logger.name().empty()) {
+        fmt::print("{}\n", logger.name());
+    }
     fmt::print(stderr, "board on {} at 115200 baud, {}; Ctrl-C ends it\n", port.get()->name,
                speed == 0.0 ? std::string("as fast as it goes")
                             : fmt::format("{} x real time", speed));
@@ -128,6 +134,7 @@ void run_board(const board_arguments &arguments)
         const std::string text = board.take_output();
         board_pty_write(port.get(), reinterpret_cast<const std::uint8_t *>(text.data()),
                         text.size());
+        logger.follow(board_time_s(board.get()));
         eeprom.save_when_idle();
         clock.wait(board_time_s(board.get()));
     }
@@ -153,6 +160,7 @@ void add_command_board(CLI::App &app)
     command->add_option("--eeprom", arguments->eeprom,
                         "File that keeps the EEPROM; made if it is not there");
     add_plant_options(*command, arguments->array);
+    add_thermometer_options(*command, arguments->thermometers);
     add_seconds_option(*command, "--duration", arguments->duration_s,
                        "Simulated seconds after which it ends; 0: never");
     command->callback([arguments] { run_board(*arguments); });

@@ -8,6 +8,7 @@
 #include "board_view.h"
 #include "controller.h"
 #include "electrics.h"
+#include "scenario_plant.h"
 #include "simulated_board.h"
 #include "text.h"
 
@@ -78,6 +79,9 @@ public:
                 throw event.place.error("the plant refuses this temperature");
             }
             warm_thermistor();
+            return;
+        case scenario_word::set:
+            set_plant(plant_.get(), event);
             return;
         case scenario_word::fail:
         case scenario_word::repair:
@@ -240,6 +244,16 @@ private:
         case scenario_failure::stale:
             board_set_fault(board_->get(), BOARD_FAULT_STALE, channel, on);
             break;
+        case scenario_failure::freeze:
+            board_set_fault(board_->get(), BOARD_FAULT_FREEZE, channel, on);
+            break;
+        case scenario_failure::lie:
+            board_scale_sensor(board_->get(), channel, on ? event.amount : 1.0,
+                               on ? event.voltage_amount : 1.0);
+            break;
+        case scenario_failure::swap:
+            board_swap_sensors(board_->get(), channel, static_cast<unsigned>(event.springs[1]));
+            break;
         case scenario_failure::sda_low:
             board_set_fault(board_->get(), BOARD_FAULT_SDA_LOW, channel, on);
             break;
@@ -262,11 +276,10 @@ private:
     {
         static thermal_model_t model;
         const board_view_spring_t &seen = view_.spring[k];
-        model.pass.count = 1;
-        model.austenite_start_c7 = view_.austenite_start_c7;
-        model.martensite_start_c7 = view_.martensite_start_c7;
-        model.austenite_finish_c7 = view_.austenite_finish_c7;
-        model.martensite_finish_c7 = view_.martensite_finish_c7;
+        model.springs = 1;
+        model.transformation = {view_.martensite_finish_c7, view_.martensite_start_c7,
+                                view_.austenite_start_c7, view_.austenite_finish_c7};
+        model.spring[0].transformation_shift_c7 = seen.transformation_shift_c7;
         model.heating_position = view_.heating_position;
         model.cooling_position = view_.cooling_position;
         model.state.spring[0].heating_c7 = seen.heating_c7;

@@ -5,6 +5,7 @@
 
 #include "electrics.h"
 #include "loop.h"
+#include "scenario_plant.h"
 
 namespace ninespring
 {
@@ -73,8 +74,11 @@ public:
             }
             return;
         case scenario_word::ambient:
-            throw event.place.error("the native board measures its ambient; write room DEGC to "
-                                    "change the room, or run with --board avr");
+            loop_tell_ambient(loop_.get(), event.amount);
+            return;
+        case scenario_word::set:
+            set_plant(loop_plant(loop_.get()), event);
+            return;
         case scenario_word::clear:
             controller_clear_faults(controller);
             return;
@@ -145,6 +149,16 @@ private:
         case scenario_failure::stale:
             action = good ? LOOP_ACTION_SENSOR_GOOD : LOOP_ACTION_SENSOR_STALE;
             break;
+        case scenario_failure::freeze:
+            action = good ? LOOP_ACTION_SENSOR_GOOD : LOOP_ACTION_SENSOR_FREEZE;
+            break;
+        case scenario_failure::lie:
+            loop_scale_sensor(loop_.get(), event.springs[0], good ? 1.0 : event.amount,
+                              good ? 1.0 : event.voltage_amount);
+            return;
+        case scenario_failure::swap:
+            loop_swap_sensors(loop_.get(), event.springs[0], event.springs[1]);
+            return;
         case scenario_failure::sda_low:
             action = good ? LOOP_ACTION_BUS_GOOD : LOOP_ACTION_SENSOR_BUS;
             break;

@@ -60,6 +60,22 @@ plant_pointer scenario_plant(const scenario &plan)
     return plant;
 }
 
+void set_plant(plant_t *plant, const scenario_event &event)
+{
+    set_plant_parameter(plant, event.parameter, event.amount, event.place);
+    const std::string name = event.parameter.substr(0, event.parameter.find('['));
+    const char *effect = find_plant_parameter(name)->effect;
+    if (effect != nullptr &&
+        !plant_effect_is_on(plant, static_cast<std::size_t>(plant_effect_index(effect)))) {
+        throw event.place.error(fmt::format(
+            "{} belongs to {}, which is off; name it in [plant] effects", name, in_quotes(effect)));
+    }
+    const char *message = nullptr;
+    if (plant_check(plant, &message) != PLANT_OK) {
+        throw event.place.error(message == nullptr ? "the plant refuses this" : message);
+    }
+}
+
 void add_plant_options(CLI::App &command, plant_arguments &arguments)
 {
     command.add_option("--scenario", arguments.scenario_path,

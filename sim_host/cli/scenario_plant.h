@@ -35,5 +35,9 @@ described_plant describe_plant(const plant_arguments &arguments);
 /* Where the scenario sets a plant parameter that `message` names: the last one, or the file. */
 source_place place_of(const scenario &plan, std::string_view message);
 
+/* The event `set`: a parameter of a plant, in mid-run. Fails (input_error at the event's place) if
+ * the plant refuses it, or its effect is off, so that it would do nothing. */
+void set_plant(plant_t *plant, const scenario_event &event);
+
 } // namespace ninespring
 #endif

@@ -105,15 +105,17 @@ void electrics_ina219_advance(electrics_ina219_t *sensor, double dt_s, double cu
             sensor->phase_s = window_s;
         } else { /* a pair is complete */
             const double root = sqrt((double)sensor->samples);
-            double current = sensor->shunt_sum_as / window_s;
-            double voltage = sensor->bus_sum_vs / window_s;
+            double current = (1.0 + sensor->current_gain_error) * sensor->shunt_sum_as / window_s;
+            double voltage = (1.0 + sensor->bus_gain_error) * sensor->bus_sum_vs / window_s;
             if (sensor->shunt_noise_v > 0.0)
                 current += electrics_noise_normal(&sensor->noise) * sensor->shunt_noise_v /
                            (root * ELECTRICS_INA219_SHUNT_OHM);
             if (sensor->bus_noise_v > 0.0)
                 voltage += electrics_noise_normal(&sensor->noise) * sensor->bus_noise_v / root;
-            sensor->shunt_register = electrics_ina219_shunt_register(current);
-            sensor->bus_register = electrics_ina219_bus_register(voltage);
+            if (!sensor->frozen) {
+                sensor->shunt_register = electrics_ina219_shunt_register(current);
+                sensor->bus_register = electrics_ina219_bus_register(voltage);
+            }
             sensor->ready = true;
             sensor->phase_s = sensor->shunt_sum_as = sensor->bus_sum_vs = 0.0;
         }

@@ -69,7 +69,10 @@ typedef struct {
     electrics_noise_t noise;
     int16_t shunt_register; /* last finished pair */
     uint16_t bus_register;
-    bool ready;     /* a new pair since the last take */
+    bool ready; /* a new pair since the last take */
+    /* What may be wrong with it, to be set between calls. */
+    bool frozen;                               /* a finished pair is like the last one */
+    double current_gain_error, bus_gain_error; /* it shows 1 + error times what is there */
     double phase_s; /* time into the present pair: shunt first, then bus */
     double shunt_sum_as, bus_sum_vs;
 } electrics_ina219_t;

@@ -142,19 +142,23 @@ std::vector<std::string> words_of(std::string_view text)
 struct failure_word {
     const char *name;
     scenario_failure what;
-    bool of_spring;
+    const char *after; /* what follows the word, as the user is told */
+    std::size_t springs;
     bool lasts;
 };
 
-constexpr std::array<failure_word, 8> FAILURES = {
-    {{"open", scenario_failure::open, true, true},
-     {"short", scenario_failure::short_circuit, true, true},
-     {"nack", scenario_failure::nack, true, true},
-     {"sda_low", scenario_failure::sda_low, false, true},
-     {"stale", scenario_failure::stale, true, true},
-     {"ina_reset", scenario_failure::ina_reset, true, false},
-     {"brown_out", scenario_failure::brown_out, false, false},
-     {"fan_stop", scenario_failure::fan_stop, false, true}}};
+constexpr std::array<failure_word, 11> FAILURES = {
+    {{"open", scenario_failure::open, " K", 1, true},
+     {"short", scenario_failure::short_circuit, " K", 1, true},
+     {"nack", scenario_failure::nack, " K", 1, true},
+     {"stale", scenario_failure::stale, " K", 1, true},
+     {"freeze", scenario_failure::freeze, " K", 1, true},
+     {"lie", scenario_failure::lie, " K CURRENT_SCALE VOLTAGE_SCALE", 1, true},
+     {"swap", scenario_failure::swap, " K L", 2, true},
+     {"ina_reset", scenario_failure::ina_reset, " K", 1, false},
+     {"sda_low", scenario_failure::sda_low, "", 0, true},
+     {"brown_out", scenario_failure::brown_out, "", 0, false},
+     {"fan_stop", scenario_failure::fan_stop, "", 0, true}}};
 
 /* One event's words, checked against the array. */
 class event_reader
@@ -210,6 +214,11 @@ public:
             event.word = scenario_word::room;
             count(2, 2, "room DEGC");
             event.amount = amount(words_[1], -40.0, 85.0);
+        } else if (first == "set") {
+            event.word = scenario_word::set;
+            count(3, 3, "set PARAMETER VALUE");
+            event.parameter = words_[1];
+            event.amount = amount(words_[2], -1e9, 1e9);
         } else if (first == "clear" || first == "unlock" || first == "!") {
             event.word = first == "clear"    ? scenario_word::clear
                          : first == "unlock" ? scenario_word::unlock
@@ -225,10 +234,10 @@ public:
         } else {
             throw wrong(fmt::format(
                 "there is no word {}{}; events have on, off, pattern, policy, fan, ambient, clear, "
-                "unlock, !, room, fail, repair",
+                "unlock, !, room, set, fail, repair",
                 in_quotes(first),
                 did_you_mean(first, {"on", "off", "pattern", "policy", "fan", "ambient", "clear",
-                                     "unlock", "room", "fail", "repair", "telemetry"})));
+                                     "unlock", "room", "set", "fail", "repair", "telemetry"})));
         }
         return event;
     }
@@ -307,19 +316,27 @@ private:
             }
         }
         if (found == nullptr) {
-            throw wrong(fmt::format("{} what? open, short, nack, stale or ina_reset with a spring, "
-                                    "sda_low, brown_out or fan_stop without",
+            throw wrong(fmt::format("{} what? open, short, nack, stale, freeze, lie or ina_reset "
+                                    "with a spring, swap with two, sda_low, brown_out or fan_stop "
+                                    "without",
                                     words_[0]));
         }
         if (event.word == scenario_word::repair && !found->lasts) {
             throw wrong(fmt::format("{} is over at once; there is nothing to repair", found->name));
         }
         event.what = found->what;
-        if (found->of_spring) {
-            count(3, 3, fmt::format("{} {} K", words_[0], found->name).c_str());
-            event.springs = springs(words_[2], false);
-        } else {
-            count(2, 2, fmt::format("{} {}", words_[0], found->name).c_str());
+        const bool scales =
+            event.word == scenario_word::fail && found->what == scenario_failure::lie;
+        const std::size_t words = 2 + found->springs + (scales ? 2 : 0);
+        const char *const after =
+            found->what == scenario_failure::lie && !scales ? " K" : found->after;
+        count(words, words, fmt::format("{} {}{}", words_[0], found->name, after).c_str());
+        for (std::size_t k = 0; k < found->springs; ++k) {
+            event.springs.push_back(springs(words_[2 + k], false)[0]);
+        }
+        if (scales) {
+            event.amount = amount(words_[3], 0.0, 100.0);
+            event.voltage_amount = amount(words_[4], 0.0, 100.0);
         }
     }
 

@@ -34,6 +34,7 @@ enum class scenario_word {
     stop,    /* the console's `!` */
     console, /* text: another console line, for a board only */
     room,    /* amount: degC, the plant's own ambient */
+    set,     /* parameter of the plant (a load, a contact), amount */
     fail,    /* what, springs */
     repair   /* what, springs */
 };
@@ -45,6 +46,9 @@ enum class scenario_failure {
     nack,
     sda_low,
     stale,
+    freeze,
+    lie,  /* amount: shown of the current, voltage_amount: of the voltage */
+    swap, /* two springs' sensors */
     ina_reset,
     brown_out,
     fan_stop
@@ -55,6 +59,8 @@ struct scenario_event {
     scenario_word word = scenario_word::off;
     std::vector<int> springs; /* 0-based, rising */
     double amount = 0.0;
+    double voltage_amount = 0.0;
+    std::string parameter;
     std::vector<bool> pattern;
     scenario_failure what = scenario_failure::none;
     std::string

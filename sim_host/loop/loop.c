@@ -12,10 +12,11 @@ typedef struct {
     electrics_fault_t fault;
     controller_sensor_status_t status; /* lasting failure of the sensor */
     bool lost_configuration;           /* told once, then written again */
+    int stage;                         /* whose current the sensor measures */
     double loop_ohm;                   /* of the stage beyond the spring */
-    double resistance_ohm;             /* of the spring, since the plant's last step */
+    double terminal_ohm; /* of the spring and its contact, since the plant's last step */
     double current_a;
-    double energy_j; /* into the spring since the plant's last step */
+    double energy_j; /* at the spring's terminals since the plant's last step */
 } channel_t;
 
 struct loop {
@@ -31,7 +32,8 @@ struct loop {
     bool bus_stuck;
     bool fan_stopped;
     uint8_t fan_percent;
-    double ambient_c; /* since the plant's last step */
+    double ambient_c;      /* since the plant's last step */
+    double told_ambient_c; /* NaN: the truth, but for its error */
     double supply_v;
     double source_ohm;
     double freewheel_drop_v;
@@ -71,13 +73,14 @@ static int16_t to_c7(double temperature_c)
 
 static int16_t told_ambient_c7(const loop_t *loop)
 {
-    return to_c7(loop->ambient_c + loop->options.ambient_error_c);
+    return to_c7(isnan(loop->told_ambient_c) ? loop->ambient_c + loop->options.ambient_error_c
+                                             : loop->told_ambient_c);
 }
 
 static void read_plant(loop_t *loop)
 {
     for (int k = 0; k < loop->springs; k++) {
-        loop->channel[k].resistance_ohm = plant_resistance_ohm(loop->plant, k);
+        loop->channel[k].terminal_ohm = plant_terminal_ohm(loop->plant, k);
     }
     loop->ambient_c = plant_ambient_c(loop->plant);
 }
@@ -97,6 +100,7 @@ loop_t *loop_create(const controller_settings_t *settings, const plant_t *plant,
     }
     loop->settings = *settings;
     loop->options = chosen;
+    loop->told_ambient_c = (double)NAN;
     if (!controller_init(&loop->controller, settings,
                          to_c7(plant_ambient_c(plant) + chosen.ambient_error_c), &refused)) {
         goto fail;
@@ -125,6 +129,7 @@ loop_t *loop_create(const controller_settings_t *settings, const plant_t *plant,
         loop->source_ohm = parameter(plant, "supply_resistance_ohm", -1);
     }
     for (int k = 0; k < loop->springs; k++) {
+        loop->channel[k].stage = k;
         loop->channel[k].loop_ohm = parameter(plant, "loop_resistance_ohm", k);
         (void)plant_drive(loop->plant, k, PLANT_DRIVE_POWER, 0.0);
     }
@@ -183,7 +188,7 @@ static void flow(loop_t *loop)
         duty[k] = c->fault == ELECTRICS_FAULT_OPEN
                       ? 0.0
                       : (double)loop->outputs.duty[k] / CONTROLLER_DUTY_MAX;
-        spring_ohm[k] = c->fault == ELECTRICS_FAULT_SHORT ? ELECTRICS_SHORT_OHM : c->resistance_ohm;
+        spring_ohm[k] = c->fault == ELECTRICS_FAULT_SHORT ? ELECTRICS_SHORT_OHM : c->terminal_ohm;
         load_s += duty[k] * duty[k] / (spring_ohm[k] + c->loop_ohm);
     }
     double bus_v = loop->source_ohm > 0.0
@@ -197,12 +202,16 @@ static void flow(loop_t *loop)
             c->current_a = electrics_buck_current_a(duty[k], bus_v, loop->freewheel_drop_v,
                                                     spring_ohm[k], c->loop_ohm);
         }
-        const double voltage_v = c->current_a * spring_ohm[k];
         if (c->fault == ELECTRICS_FAULT_NONE) {
-            c->energy_j += c->current_a * voltage_v * LOOP_TICK_S;
+            c->energy_j += c->current_a * c->current_a * spring_ohm[k] * LOOP_TICK_S;
         }
-        electrics_ina219_advance(&c->sensor, LOOP_TICK_S, c->current_a, voltage_v);
         sum_a += c->current_a;
+    }
+    for (int k = 0; k < loop->springs; k++) {
+        const int stage = loop->channel[k].stage;
+        const double current_a = loop->channel[stage].current_a;
+        electrics_ina219_advance(&loop->channel[k].sensor, LOOP_TICK_S, current_a,
+                                 current_a * spring_ohm[stage]);
     }
     if (sum_a > loop->highest_sum_a) {
         loop->highest_sum_a = sum_a;
@@ -257,20 +266,57 @@ void loop_advance(loop_t *loop, double seconds)
 static void boot(loop_t *loop, bool keeps_memory)
 {
     thermal_model_state_t state;
-    thermal_model_get_state(&loop->controller.model, &state);
+    controller_get_model_state(&loop->controller, &state);
     (void)controller_init(&loop->controller, &loop->settings, told_ambient_c7(loop), NULL);
-    if (!keeps_memory || !thermal_model_set_state(&loop->controller.model, &state)) {
+    if (!keeps_memory || !controller_set_model_state(&loop->controller, &state)) {
         /* as the firmware: as hot as they could be, just below the trip */
         int32_t hot_cc = (int32_t)loop->settings.safety.temperature_trip_cc - 500;
-        thermal_model_reset(&loop->controller.model, (int16_t)(hot_cc * 32 / 25));
+        controller_set_temperature(&loop->controller, (int16_t)(hot_cc * 32 / 25));
     }
     controller_lock(&loop->controller);
+}
+
+static bool is_spring(const loop_t *loop, int spring)
+{
+    return spring >= 0 && spring < loop->springs;
+}
+
+bool loop_scale_sensor(loop_t *loop, int spring, double current_scale, double voltage_scale)
+{
+    if (!is_spring(loop, spring) || !(current_scale >= 0.0 && current_scale <= 100.0) ||
+        !(voltage_scale >= 0.0 && voltage_scale <= 100.0)) {
+        return false;
+    }
+    loop->channel[spring].sensor.current_gain_error = current_scale - 1.0;
+    loop->channel[spring].sensor.bus_gain_error = voltage_scale - 1.0;
+    return true;
+}
+
+bool loop_swap_sensors(loop_t *loop, int a, int b)
+{
+    if (!is_spring(loop, a) || !is_spring(loop, b)) {
+        return false;
+    }
+    const int stage = loop->channel[a].stage;
+    loop->channel[a].stage = loop->channel[b].stage;
+    loop->channel[b].stage = stage;
+    return true;
+}
+
+/* The sensor back to its own stage; the one that is there takes the other. */
+static void unswap(loop_t *loop, int spring)
+{
+    int there = 0;
+    while (loop->channel[there].stage != spring) {
+        there++;
+    }
+    (void)loop_swap_sensors(loop, spring, there);
 }
 
 bool loop_act(loop_t *loop, loop_action_t action, int spring)
 {
     if ((unsigned)action >= LOOP_ACTION_COUNT ||
-        (is_of_one_spring(action) && (spring < 0 || spring >= loop->springs))) {
+        (is_of_one_spring(action) && !is_spring(loop, spring))) {
         return false;
     }
     channel_t *c = is_of_one_spring(action) ? &loop->channel[spring] : NULL;
@@ -293,11 +339,17 @@ bool loop_act(loop_t *loop, loop_action_t action, int spring)
     case LOOP_ACTION_SENSOR_STALE:
         c->status = CONTROLLER_SENSOR_STALE;
         break;
+    case LOOP_ACTION_SENSOR_FREEZE:
+        c->sensor.frozen = true;
+        break;
     case LOOP_ACTION_SENSOR_RESET:
         c->lost_configuration = true;
         break;
     case LOOP_ACTION_SENSOR_GOOD:
         c->status = CONTROLLER_SENSOR_OK;
+        c->sensor.frozen = false;
+        (void)loop_scale_sensor(loop, spring, 1.0, 1.0);
+        unswap(loop, spring);
         break;
     case LOOP_ACTION_BUS_GOOD:
         loop->bus_stuck = false;
@@ -317,6 +369,15 @@ bool loop_act(loop_t *loop, loop_action_t action, int spring)
     case LOOP_ACTION_COUNT:
         break;
     }
+    return true;
+}
+
+bool loop_tell_ambient(loop_t *loop, double ambient_c)
+{
+    if (!isnan(ambient_c) && !(ambient_c >= -100.0 && ambient_c <= 200.0)) {
+        return false;
+    }
+    loop->told_ambient_c = ambient_c;
     return true;
 }
 
@@ -347,7 +408,7 @@ double loop_time_s(const loop_t *loop)
 static const channel_t *channel(const loop_t *loop, int spring)
 {
     static const channel_t none;
-    return spring >= 0 && spring < loop->springs ? &loop->channel[spring] : &none;
+    return is_spring(loop, spring) ? &loop->channel[spring] : &none;
 }
 
 double loop_current_a(const loop_t *loop, int spring)

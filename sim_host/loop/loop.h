@@ -22,16 +22,17 @@ typedef struct loop loop_t;
  * or LOOP_ACTION_SENSOR_GOOD. */
 typedef enum {
     LOOP_ACTION_OPEN_SPRING = 0, /* one spring: the wire breaks */
-    LOOP_ACTION_SHORT_SPRING, /* one spring: ELECTRICS_SHORT_OHM between its ends; it is not heated
-                               */
-    LOOP_ACTION_SPRING_GOOD,  /* one spring: connected again */
-    LOOP_ACTION_SENSOR_NACK,  /* one sensor: no acknowledge */
-    LOOP_ACTION_SENSOR_BUS,   /* all sensors: SDA stuck low */
-    LOOP_ACTION_SENSOR_STALE, /* one sensor: no new conversions */
-    LOOP_ACTION_SENSOR_RESET, /* one sensor: lost its configuration once; it is written again */
-    LOOP_ACTION_SENSOR_GOOD,  /* one sensor: answers and converts again */
-    LOOP_ACTION_BUS_GOOD,     /* ends LOOP_ACTION_SENSOR_BUS */
-    LOOP_ACTION_FAN_STOP,     /* the fan stands whatever it is told */
+    LOOP_ACTION_SHORT_SPRING,  /* one spring: ELECTRICS_SHORT_OHM between its ends; it is not heated
+                                */
+    LOOP_ACTION_SPRING_GOOD,   /* one spring: connected again */
+    LOOP_ACTION_SENSOR_NACK,   /* one sensor: no acknowledge */
+    LOOP_ACTION_SENSOR_BUS,    /* all sensors: SDA stuck low */
+    LOOP_ACTION_SENSOR_STALE,  /* one sensor: no new conversions, and it says so */
+    LOOP_ACTION_SENSOR_FREEZE, /* one sensor: converts, with the same result for ever */
+    LOOP_ACTION_SENSOR_RESET,  /* one sensor: lost its configuration once; it is written again */
+    LOOP_ACTION_SENSOR_GOOD,   /* one sensor: answers, converts and shows what is, at its place */
+    LOOP_ACTION_BUS_GOOD,      /* ends LOOP_ACTION_SENSOR_BUS */
+    LOOP_ACTION_FAN_STOP,      /* the fan stands whatever it is told */
     LOOP_ACTION_FAN_GOOD,
     LOOP_ACTION_WATCHDOG,  /* reset: boots locked, the model's state survives */
     LOOP_ACTION_BROWN_OUT, /* supply lost and back: boots locked, the model assumes hot springs */
@@ -67,6 +68,15 @@ void loop_advance(loop_t *loop, double seconds);
 /* Fails if and only if there is no such action, or it needs a spring and there is no such one
  * (0-based). */
 bool loop_act(loop_t *loop, loop_action_t action, int spring);
+/* A sensor lies: it shows so many times the current and the voltage. Fails if and only if there is
+ * no such spring or a scale is not 0..100. */
+bool loop_scale_sensor(loop_t *loop, int spring, double current_scale, double voltage_scale);
+/* Two sensors change their places in the stages; done twice, they are back. Fails if and only if
+ * there is no such spring. */
+bool loop_swap_sensors(loop_t *loop, int a, int b);
+/* From now on the chip is told this ambient, whatever the plant's is; NaN: the plant's again. Fails
+ * if and only if it is not -100..200 degC. */
+bool loop_tell_ambient(loop_t *loop, double ambient_c);
 /* Of the plant, and (with ambient_error_c) what the chip is told. Fails if the plant refuses it. */
 bool loop_set_ambient(loop_t *loop, double ambient_c);
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+import statistics
 import subprocess
 import sys
 from pathlib import Path
@@ -117,11 +118,47 @@ def ends_cleanly(program: str, elf: Path) -> None:
         assert board.process.wait(timeout=20) == 0
 
 
+def thermometers_beside_the_board(program: str, elf: Path, folder: Path) -> None:
+    log = folder / "thermometers.csv"
+    rates = ("--thermometer-rate", "5", "--thermometer-noise", "0.5", "--thermometer-springs", "2,9")
+    with Board(program, elf, "--speed", "max", "--duration", "40", "--thermometers", str(log), *rates) as board:
+        assert board.process.wait(timeout=100) == 0
+    header, *lines = log.read_text().splitlines()
+    assert header == "time_s,t2_c,t9_c", header
+    rows = [[float(cell) for cell in line.split(",")] for line in lines]
+    assert len(rows) == 201, len(rows)  # 0 to 40 s
+    assert all(abs(row[0] - 0.2 * k) < 0.0015 for k, row in enumerate(rows))
+    for column in (1, 2):
+        values = [row[column] for row in rows]
+        assert abs(statistics.mean(values) - 20.0) < 0.15  # 0.5 / sqrt(200) is 0.035
+        assert 0.4 < statistics.stdev(values) < 0.6
+    log.unlink()
+    with Board(program, elf, "--speed", "max", "--thermometers", "pty", "--thermometer-noise", "0") as board:
+        assert board.process.stdout is not None
+        name = board.process.stdout.readline().strip()
+        with serial.Serial(name, 115200, timeout=20) as logger, first_contact(board) as port:
+            assert ask(port, "on 1") == ["ok"]
+            seen: dict[bytes, float] = {}
+            while seen.get(b"t1_c", 0.0) < 25.0:
+                line = logger.readline()
+                assert line.endswith(b"\r\n"), line
+                cells = line.strip().split(b",")
+                if cells[0] == b"time_s":
+                    header = cells
+                elif isinstance(header, list) and len(cells) == len(header):
+                    seen = dict(zip(header, map(float, cells), strict=True))
+            assert seen[b"t1_c"] > seen[b"t9_c"] + 2.0, seen
+
+
 def refuses_what_is_wrong(program: str, elf: Path) -> None:
     for arguments in (
         ["--elf", "/no/such.elf"],
         ["--elf", str(elf), "--speed", "fast"],
         ["--elf", __file__],
+        ["--elf", str(elf), "--thermometers", "pty", "--thermometer-springs", "3,1"],
+        ["--elf", str(elf), "--thermometers", "pty", "--thermometer-springs", "10"],
+        ["--elf", str(elf), "--thermometer-rate", "2"],
+        ["--elf", str(elf), "--thermometers", "pty", "--thermometer-rate", "0"],
     ):
         result = subprocess.run(
             [program, "board", *arguments],
@@ -144,6 +181,7 @@ def main() -> int:
     survives_clients_that_leave(program, elf)
     keeps_its_eeprom(program, elf, Path.cwd())
     ends_cleanly(program, elf)
+    thermometers_beside_the_board(program, elf, Path.cwd())
     refuses_what_is_wrong(program, elf)
     print("PASS")
     return 0

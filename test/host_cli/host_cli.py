@@ -308,6 +308,24 @@ class Run(Case):
         faults = [spring["fault"] for spring in json.loads(self.json.read_text())["springs"]]
         self.assertEqual(faults, ["none", "none", "open_spring"] + ["none"] * 6)
 
+    def test_what_looks_right_and_is_not(self) -> None:
+        events = "at 3 = fail freeze 1\nat 3 = fail lie 2 0.8 1.1\nat 3 = fail swap 4 9\nat 4 = ambient 35\n"
+        rows = rows_of_text(self.run_it("a.csv", scenario=SCENARIO + events))
+        self.assertEqual(len({row["i1_a"] for row in rows[7:28]}), 1)  # noise moves the others
+        self.assertGreater(len({row["i3_a"] for row in rows[7:28]}), 3)
+        self.assertEqual(rows[12]["ambient_c"], "35.000")
+
+    def test_a_load_and_a_contact_in_mid_run(self) -> None:
+        plant = SCENARIO.replace("resistance_phase", "contact_resistance, transformation_shift")
+        rows = rows_of_text(self.run_it("a.csv", scenario=plant + "at 8 = set contact_ohm[3] 0.05\n"))
+        ohm = [float(row["v3_v"]) / float(row["i3_a"]) for row in (rows[15], rows[20])]
+        self.assertAlmostEqual(ohm[1] - ohm[0], 0.05, delta=0.008)  # 4 mV steps at 1 A
+        refused = self.scenario_refused
+        refused("s.ini:15:", "belongs to 'contact_resistance', which is off", SCENARIO + "at 1 = set contact_ohm 1\n")
+        refused("s.ini:15:", "no parameter", SCENARIO + "at 1 = set contact 1\n")
+        refused("s.ini:15:", "austenite_start_c must be", SCENARIO + "at 1 = set austenite_start_c 150\n")
+        refused("s.ini:15:", "write `fail lie K CURRENT_SCALE VOLTAGE_SCALE`", SCENARIO + "at 1 = fail lie 2\n")
+
     def test_what_the_chip_leaves_out_is_told(self) -> None:
         path = self.file("s.ini", SCENARIO)
         for set_to, told in (("0.5", "latent_cooling_ratio is not on the chip"), ("1", "")):
@@ -588,7 +606,7 @@ class Replay(Case):
         shown = [row["y1_c"] for row in rows]
         self.assertEqual(shown[0], plain[0])  # the sensor starts where the spring does
         self.assertLess(float(shown[3]), float(plain[3]) - 1)
-        self.assertIn("sensor_lag belongs to the measurement", table)
+        self.assertIn("sensor_lag is not on the chip", table)
 
     def test_current_and_voltage_are_power(self) -> None:
         model = MODEL.replace("cols = 2", "cols = 1")

@@ -63,6 +63,7 @@ static void draw(thermal_model_parameters_t *p, bool latent)
     for (int i = 0; i < p->rows * p->columns; i++) {
         p->loss_scale_permille[i] = (uint16_t)between(850, 1150);
         p->heat_capacity_scale_permille[i] = (uint16_t)between(850, 1150);
+        p->transformation_shift_cc[i] = (int16_t)((int)between(0, 1600) - 800);
     }
 }
 

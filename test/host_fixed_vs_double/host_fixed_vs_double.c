@@ -1,5 +1,5 @@
-/* The figure of design section 7: 1 h of random drive, 200 random parameter sets, 0.05 degC rms and
- * 0.15 at most. */
+/* What is promised of fixed point: 1 h of random drive, 200 random parameter sets, 0.05 degC rms
+ * and 0.15 at most. */
 #include "comparison.h"
 #include "unity.h"
 

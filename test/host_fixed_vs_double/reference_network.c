@@ -49,17 +49,17 @@ static double on_branch(const reference_network_t *r, int heating, double amplit
 double reference_austenite(const reference_network_t *r, int i)
 {
     const reference_spring_t *s = &r->spring[i];
-    return on_branch(r, s->heating, s->amplitude, s->turn_c);
+    return on_branch(r, s->heating, s->amplitude, s->turn_c - s->shift_c);
 }
 
 /* Temperature at an enthalpy; the memory follows. */
 static double settle(const reference_network_t *r, reference_spring_t *s, double enthalpy)
 {
     double latent = latent_k(r);
-    double austenite = on_branch(r, s->heating, s->amplitude, s->turn_c);
+    double austenite = on_branch(r, s->heating, s->amplitude, s->turn_c - s->shift_c);
     double t = enthalpy - latent * austenite; /* with the phase held */
-    double above = s->heating ? s->turn_c : austenite_start(r);
-    double below = s->heating ? martensite_start(r) : s->turn_c;
+    double above = s->heating ? s->turn_c : austenite_start(r) + s->shift_c;
+    double below = s->heating ? martensite_start(r) + s->shift_c : s->turn_c;
     int heating;
     if (t > above && austenite < 1.0) {
         heating = 1;
@@ -80,7 +80,8 @@ static double settle(const reference_network_t *r, reference_spring_t *s, double
         if (!(guess > low && guess < high)) {
             guess = 0.5 * (low + high);
         }
-        double excess = guess + latent * on_branch(r, heating, s->amplitude, guess) - enthalpy;
+        double excess =
+            guess + latent * on_branch(r, heating, s->amplitude, guess - s->shift_c) - enthalpy;
         if (fabs(excess) < 1e-9) {
             break;
         }
@@ -89,8 +90,8 @@ static double settle(const reference_network_t *r, reference_spring_t *s, double
         } else {
             low = guess;
         }
-        double slope = (on_branch(r, heating, s->amplitude, guess + 1e-4) -
-                        on_branch(r, heating, s->amplitude, guess - 1e-4)) /
+        double slope = (on_branch(r, heating, s->amplitude, guess - s->shift_c + 1e-4) -
+                        on_branch(r, heating, s->amplitude, guess - s->shift_c - 1e-4)) /
                        2e-4;
         guess -= excess / (1.0 + latent * slope);
     }
@@ -110,7 +111,8 @@ void reference_reset(reference_network_t *r, const thermal_model_parameters_t *p
     for (int i = 0; i < r->n; i++) {
         r->spring[i].enthalpy_k = temperature_c;
         r->spring[i].temperature_c = temperature_c;
-        r->spring[i].turn_c = martensite_finish(r) - 1.0;
+        r->spring[i].shift_c = parameters->transformation_shift_cc[i] / 100.0;
+        r->spring[i].turn_c = martensite_finish(r) + r->spring[i].shift_c - 1.0;
         r->spring[i].amplitude = 1.0;
     }
 }

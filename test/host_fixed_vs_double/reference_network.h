@@ -13,7 +13,8 @@
 typedef struct {
     double enthalpy_k; /* temperature plus latent heat over heat capacity */
     double temperature_c;
-    double turn_c; /* furthest point of the branch it is on */
+    double turn_c;  /* furthest point of the branch it is on */
+    double shift_c; /* of all four transformation temperatures */
     double amplitude;
     int heating; /* branch: 1 austenite = 1 - amplitude S, 0 austenite = amplitude S */
 } reference_spring_t;

@@ -299,6 +299,72 @@ static void a_repair_ends_its_own_failure_only(void)
     TEST_ASSERT_EQUAL(CONTROLLER_SENSOR_ABSENT, loop_inputs(loop)->sensor[0].status);
 }
 
+/* What looks right and is not: the loop only provokes it; what the controller makes of it is not
+ * judged here. */
+static void frozen_lying_and_swapped_sensors_show_what_they_should_not(void)
+{
+    start();
+    command(0x1FF);
+    loop_advance(loop, 5.0);
+    const controller_sensor_t *sensor = loop_inputs(loop)->sensor;
+    TEST_ASSERT_TRUE(loop_act(loop, LOOP_ACTION_SENSOR_FREEZE, 3));
+    TEST_ASSERT_TRUE(loop_scale_sensor(loop, 4, 0.9, 1.2));
+    const int16_t frozen_ma = sensor[3].current_ma, frozen_mv = sensor[3].voltage_mv;
+    for (int n = 0; n < 50; n++) { /* noise moves every reading but a frozen one */
+        loop_tick(loop);
+        TEST_ASSERT_EQUAL(CONTROLLER_SENSOR_OK, sensor[3].status);
+        TEST_ASSERT_EQUAL_INT16(frozen_ma, sensor[3].current_ma);
+        TEST_ASSERT_EQUAL_INT16(frozen_mv, sensor[3].voltage_mv);
+    }
+    TEST_ASSERT_INT16_WITHIN(20, 900.0 * loop_current_a(loop, 4), sensor[4].current_ma);
+    TEST_ASSERT_INT16_WITHIN(
+        8, 1200.0 * loop_current_a(loop, 4) * plant_terminal_ohm(loop_plant(loop), 4),
+        sensor[4].voltage_mv);
+
+    command(0x1BF); /* spring 7 off, its sensor at spring 8's */
+    TEST_ASSERT_TRUE(loop_swap_sensors(loop, 6, 7));
+    loop_advance(loop, 0.06);
+    TEST_ASSERT_INT16_WITHIN(2, 0, sensor[7].current_ma);
+    TEST_ASSERT_TRUE(sensor[6].current_ma > 500);
+    for (int k = 0; k < 9; k++) {
+        TEST_ASSERT_TRUE(loop_act(loop, LOOP_ACTION_SENSOR_GOOD, k));
+    }
+    loop_advance(loop, 2.0); /* the currents settle */
+    for (int k = 0; k < 9; k++) {
+        TEST_ASSERT_INT16_WITHIN(20, 1000.0 * loop_current_a(loop, k), sensor[k].current_ma);
+    }
+    TEST_ASSERT_FALSE(loop_swap_sensors(loop, 0, 9));
+    TEST_ASSERT_FALSE(loop_scale_sensor(loop, -1, 1.0, 1.0));
+    TEST_ASSERT_FALSE(loop_scale_sensor(loop, 0, (double)NAN, 1.0));
+}
+
+static void a_contact_in_mid_run_takes_voltage_and_heats_nothing(void)
+{
+    start();
+    TEST_ASSERT_EQUAL(PLANT_OK, plant_set_effect(loop_plant(loop), "contact_resistance", true));
+    command(0x1FF);
+    loop_advance(loop, 400.0);
+    const int before_mv = loop_inputs(loop)->sensor[2].voltage_mv;
+    const double before_c = true_c(2);
+    TEST_ASSERT_EQUAL(PLANT_OK, plant_set(loop_plant(loop), "contact_ohm[3]", 0.03));
+    loop_advance(loop, 60.0);
+    TEST_ASSERT_INT_WITHIN(8, before_mv + 45, loop_inputs(loop)->sensor[2].voltage_mv); /* 1.5 A */
+    TEST_ASSERT_DOUBLE_WITHIN(0.5, before_c, true_c(2));
+}
+
+static void the_chip_believes_the_ambient_that_it_is_told(void)
+{
+    start();
+    TEST_ASSERT_TRUE(loop_tell_ambient(loop, 10.0));
+    TEST_ASSERT_TRUE(loop_set_ambient(loop, 30.0));
+    loop_tick(loop);
+    TEST_ASSERT_EQUAL_INT16(10 * 128, loop_inputs(loop)->ambient_c7);
+    TEST_ASSERT_FALSE(loop_tell_ambient(loop, 1000.0));
+    TEST_ASSERT_TRUE(loop_tell_ambient(loop, (double)NAN));
+    loop_tick(loop);
+    TEST_ASSERT_EQUAL_INT16(30 * 128, loop_inputs(loop)->ambient_c7);
+}
+
 static void sensor_that_reset_once_is_no_fault(void)
 {
     start();
@@ -447,6 +513,9 @@ int main(void)
     RUN_TEST(short_never_exceeds_the_sensor_for_long);
     RUN_TEST(stuck_bus_switches_everything_off);
     RUN_TEST(a_repair_ends_its_own_failure_only);
+    RUN_TEST(frozen_lying_and_swapped_sensors_show_what_they_should_not);
+    RUN_TEST(a_contact_in_mid_run_takes_voltage_and_heats_nothing);
+    RUN_TEST(the_chip_believes_the_ambient_that_it_is_told);
     RUN_TEST(sensor_that_reset_once_is_no_fault);
     RUN_TEST(stopped_fan_makes_the_springs_hotter_than_the_chip_believes);
     RUN_TEST(after_a_reset_nothing_runs_until_unlocked);

@@ -1,7 +1,7 @@
 """Hold the plant to an independent integration: its equations written again, solved by SciPy's RK45 and Radau.
 
 Random networks (size, parameters, effects, drives, fan, ambient), each log simulated by the plant in one call
-and here with tolerances of 1e-7. Exit code 77 where NumPy or SciPy is absent.
+and here with tolerances of 1e-8. Exit code 77 where NumPy or SciPy is absent.
 """
 
 from __future__ import annotations
@@ -398,7 +398,7 @@ def compare(lib: ctypes.CDLL, seed: int) -> tuple[float, float, str]:
         edges = np.linspace(time[r], time[r + 1], pieces + 1)
         for a, b in pairwise(edges):
             args = (drive[r], fan[r])
-            y = solve_ivp(model.slope, (a, b), y, method, args=args, rtol=1e-7, atol=1e-7).y[:, -1]
+            y = solve_ivp(model.slope, (a, b), y, method, args=args, rtol=1e-8, atol=1e-8).y[:, -1]
             model.remember(y[:n])
     label = f"{rows} x {columns}, {method}, top {real.max():.0f} degC, {' '.join(sorted(on))}"
     return worst[0], worst[1], label

@@ -229,7 +229,8 @@ static void every_bad_parameter_is_refused_and_changes_nothing(void)
                                       springs[k]);
     TEST_ASSERT_EQUAL_INT(PLANT_ERROR_RANGE, plant_set(plant, "wake_direction", 0.5));
     TEST_ASSERT_EQUAL_INT(PLANT_ERROR_NAME, plant_set_effect(plant, "gravity", true));
-    TEST_ASSERT_EQUAL_INT(PLANT_ERROR_NAME, plant_set_effect_index(plant, plant_effect_count(), true));
+    TEST_ASSERT_EQUAL_INT(PLANT_ERROR_NAME,
+                          plant_set_effect_index(plant, plant_effect_count(), true));
     TEST_ASSERT_EQUAL_INT(PLANT_ERROR_NAME,
                           plant_set_index(plant, plant_parameter_count(), -1, 1.0));
     TEST_ASSERT_EQUAL_INT(PLANT_ERROR_INDEX, plant_set_index(plant, 0, 9, 1.0));

@@ -28,7 +28,8 @@ class FakeBoard:
         self.stream: Iterable[str] = ()
         """Lines that follow the answer to `telemetry csv`, until `telemetry off` or a pull."""
         self.every_s = 0.0
-        self._streaming = threading.Event()
+        self._streaming = 0
+        """Which stream runs; 0 none."""
         self.gone = False
         threading.Thread(target=self._serve, daemon=True).start()
 
@@ -46,9 +47,9 @@ class FakeBoard:
         """What came, without the empty lines that only show that someone is there."""
         return [line for line in self.seen if line]
 
-    def _stream(self) -> None:
+    def _stream(self, number: int) -> None:
         for line in self.stream:
-            if not self._streaming.is_set() or self.gone:
+            if self._streaming != number or self.gone:
                 return
             if line == "PULL":
                 self.pull()
@@ -74,15 +75,15 @@ class FakeBoard:
         self.seen.append(text)
         if text.startswith("telemetry csv") and text not in self.answers:
             self.say(TELEMETRY, "ok")
-            self._streaming.set()
-            threading.Thread(target=self._stream, daemon=True).start()
+            self._streaming = len(self.seen)
+            threading.Thread(target=self._stream, args=(self._streaming,), daemon=True).start()
         elif text in self.answers:
             self.say(*self.answers[text])
         elif text == "$$":
             self.say(*(f"${name}={value}" for name, value in self.settings.items()), "ok")
         elif text:
             if text == "telemetry off":
-                self._streaming.clear()
+                self._streaming = 0
             if text.startswith("$") and "=" in text:
                 self.settings.__setitem__(*text[1:].split("=", 1))
             self.say("ok")

@@ -240,12 +240,15 @@ def test_files_are_written_together_or_not_at_all(tmp_path: Path) -> None:
     assert sorted(one.name for one in tmp_path.iterdir()) == ["a", "b"]
 
 
-@pytest.mark.parametrize("command", ["fit", "diagnose", "predict", "export", "import", "record", "upload", "monitor"])
+@pytest.mark.parametrize(
+    "command",
+    ["fit", "diagnose", "predict", "export", "import", "record", "upload", "monitor", "plan", "plot", "dashboard"],
+)
 def test_help_says_what_it_does_with_an_example(command: str) -> None:
     runner = CliRunner()
     text = runner.invoke(cli.cli, [command, "--help"]).output
     assert f"ninespring {command} " in text.partition("Example")[2]
-    assert "  -o, --output" in text or command in ("upload", "monitor")
+    assert "  -o, --output" in text or command in ("upload", "monitor", "dashboard")
     for line in re.findall(r"^  (?:-\w, )?--.*(?:\n {10,}.*)*", text, re.MULTILINE):
         assert re.search(r"  +\S.*\w", line.lstrip().partition("  ")[1] + line.lstrip().partition("  ")[2]), line
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import pty
@@ -13,8 +14,10 @@ import sys
 import threading
 import time
 import tty
+from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 import serial
 from click.testing import CliRunner
@@ -25,7 +28,10 @@ from ninespring import cli
 from ninespring.board import Board
 from ninespring.errors import WorkError
 from ninespring.logs import read_log, read_table
+from ninespring.monitoring import Screen
 from ninespring.recording import RowCheck, script_lines
+from ninespring.thermometers import Lines
+from rich.console import Console
 
 STREAM = [row(0.5 * k) for k in range(1, 40)]
 
@@ -91,7 +97,8 @@ def test_a_recording_that_is_killed_leaves_its_rows_readable_and_the_next_one_ke
     board = FakeBoard()
     board.stream, board.every_s = STREAM, 0.1
     part = tmp_path / "log.csv.part"
-    with subprocess.Popen(command("record", "--port", board.port, "-o", tmp_path / "log.csv")) as process:
+    words = ("record", "--port", board.port, "--hz", 2, "-o", tmp_path / "log.csv")
+    with subprocess.Popen(command(*words)) as process:
         while process.poll() is None and not (part.exists() and "\n2.0," in part.read_text()):
             time.sleep(0.02)
         process.kill()
@@ -219,7 +226,7 @@ def test_values_that_really_changed_are_kept() -> None:
 
 def test_a_header_that_came_corrupt_is_asked_for_again(tmp_path: Path) -> None:
     board = FakeBoard()
-    board.stream = STREAM
+    board.stream, board.every_s = iter(STREAM), 0.05
     real, said = board.say, []
 
     def corrupt_once(*lines: str) -> None:
@@ -229,22 +236,22 @@ def test_a_header_that_came_corrupt_is_asked_for_again(tmp_path: Path) -> None:
 
     board.say = corrupt_once
     assert record(board, tmp_path, "--duration", 2).returncode == 0
-    assert board.sent().count("telemetry csv 2") == 2
+    assert board.sent().count("telemetry csv 20") == 2
     assert len(times(tmp_path / "log.csv")) >= 3
 
 
 def test_steps_are_sent_in_their_time_and_status_is_kept_between_the_rows(tmp_path: Path) -> None:
     status = "<limits|spring:1|t:8.000|supply|cut_a:2.610>"
     board = FakeBoard()
-    board.stream = [*STREAM[:3], "[remark]", status, *STREAM[3:8]]
+    board.stream = [*STREAM[:3], status, *STREAM[3:8]]
     (tmp_path / "steps.txt").write_text("ambient 21.5\nat 0.5 = on 1   ; the first\nat 1.5 = fan 100\n")
     done = record(board, tmp_path, "--duration", 3, "--run", tmp_path / "steps.txt")
     assert done.returncode == 0, done.stderr
     lines = (tmp_path / "log.csv").read_text().splitlines()
     at = lines.index(f"# {status}")
-    assert lines[at - 1] == "# [remark]" and lines[at + 1] == row(2.0)
+    assert lines[at - 1 : at + 2] == [row(1.5), f"# {status}", row(2.0)]
     sent = board.sent()
-    order = [sent.index(word) for word in ("ambient 21.5", "$$", "telemetry csv 2", "on 1", "fan 100", "off all")]
+    order = [sent.index(word) for word in ("ambient 21.5", "$$", "telemetry csv 20", "on 1", "fan 100", "off all")]
     assert order == sorted(order)
 
 
@@ -333,10 +340,10 @@ def test_the_host_timeout_is_set_while_recording_and_given_back(tmp_path: Path) 
     assert record(board, tmp_path, "--duration", 4).returncode == 0
     sent = board.sent()
     begins, ends = sent.index("$host_timeout_s=5"), sent.index("$host_timeout_s=0")
-    assert begins < sent.index("telemetry csv 2") < sent.index("off all") < ends
+    assert begins < sent.index("telemetry csv 20") < sent.index("off all") < ends
     assert "# $host_timeout_s=0" in (tmp_path / "log.csv").read_text()
     # something goes to the board all the while, so that it knows that this end lives
-    assert "" in board.seen[board.seen.index("telemetry csv 2") : board.seen.index("off all")]
+    assert "" in board.seen[board.seen.index("telemetry csv 20") : board.seen.index("off all")]
 
 
 # what is on the port
@@ -376,7 +383,7 @@ def test_a_second_program_on_the_port_is_named(tmp_path: Path) -> None:
     board = FakeBoard()
     board.stream, board.every_s = STREAM, 0.1
     with subprocess.Popen(command("record", "--port", board.port, "-o", tmp_path / "log.csv")) as process:
-        while "telemetry csv 1" not in board.seen:
+        while "telemetry csv 10" not in board.seen:
             time.sleep(0.02)
         done = ninespring("monitor", "--port", board.port)
         process.terminate()
@@ -449,3 +456,96 @@ def test_a_file_that_is_no_settings_is_refused_before_the_board_is_asked(tmp_pat
 def test_scripts_take_comments_and_units_as_scenarios_do() -> None:
     steps = script_lines("ambient 21\n\nat 5 = on 1  # first\nat 5.5 = off all ; then\n", "s", 6.0)
     assert [(one.line, one.at_s) for one in steps] == [("ambient 21", None), ("on 1", 5.0), ("off all", 5.5)]
+
+
+# thermometers
+
+
+@pytest.mark.parametrize(
+    ("lines", "springs", "readings"),
+    [
+        (["time_s,t1_c,t3_c", "1.0,20.5,21"], [1, 3], [(1.0, {1: 20.5, 3: 21.0})]),
+        (["21.0;22.0;23.0"] * 5, [1, 2, 3], [(None, {1: 21.0, 2: 22.0, 3: 23.0})]),
+        ([f"{k}.00,21.{k},22.0" for k in range(5)], [1, 2], [(4.0, {1: 21.4, 2: 22.0})]),
+        (["Time\tTemp1\tTC2\tbattery", "5\t20\t----\t3.3"], [1, 2], [(5.0, {1: 20.0})]),
+        (["# logger 3", "t1_c t2_c", "20 900", "20 21 22", "x"], [1, 2], [(None, {1: 20.0})]),
+    ],
+)
+def test_usual_loggers_lines_are_read(lines: list[str], springs: list[int], readings: list[object]) -> None:
+    reader = Lines()
+    got = [one for line in lines if (one := reader.read(line)) is not None]
+    if readings:
+        assert got == readings
+        assert sorted(one for one in reader.springs if one) == springs
+
+
+def test_thermometers_are_merged_onto_the_boards_clock_and_the_offset_is_said(tmp_path: Path) -> None:
+    board, logger = FakeBoard(), FakeBoard()
+    begun = time.monotonic()
+    board_s, logger_s = 100.0, 7.0  # both clocks at the beginning
+
+    def rows() -> Iterator[str]:
+        while True:
+            yield row(board_s + time.monotonic() - begun)
+
+    def read() -> None:
+        while not logger.gone:
+            now = time.monotonic() - begun
+            if int(now / 0.15) % 10 == 9:
+                logger.say("time_s,t1_c,t9_c")
+            logger.say(f"{logger_s + now:.3f},{20.0 + now:.3f},30.0")  # rises by 1 K/s
+            time.sleep(0.15)
+
+    board.stream, board.every_s = rows(), 0.5
+    threading.Thread(target=read, daemon=True).start()
+    done = record(board, tmp_path, "--duration", 8, "--thermometers", logger.port)
+    logger.gone = True
+    assert done.returncode == 0, done.stderr
+    frame = read_table(tmp_path / "log.csv", ("state",)).frame
+    assert "t9_c" not in frame
+    left = (frame["t1_c"] - 20.0) - (frame["time_s"] - board_s)
+    assert frame["t1_c"].notna().sum() >= len(frame) - 2
+    assert left.abs().max() < 0.35
+    offset = float(re.search(r"thermometers_offset_s: (.*)", (tmp_path / "log.csv").read_text())[1])
+    assert offset == pytest.approx(board_s - logger_s, abs=0.3)
+    assert "the thermometers' clock was" in done.stdout
+
+
+def test_a_port_without_thermometers_is_said_before_anything_is_driven(tmp_path: Path) -> None:
+    board = FakeBoard()
+    done = record(board, tmp_path, "--thermometers", other_thing(b""))
+    assert done.returncode == 1
+    assert "no temperatures come" in done.stderr
+    assert "telemetry csv 20" not in board.sent()
+
+
+def test_monitor_shows_the_array_as_a_grid_with_totals_limits_and_trend() -> None:
+    screen = Screen({"rows": "1", "columns": "2", "supply_limit_a": "15.000"})
+    assert not screen.take("time_s,i1_a,v1_v,m1_c,d1,i2_a,v2_v,m2_c,d2,fan,ambient_c,state")
+    assert screen.take("1.000,1.500,0.300,20.00,0.100,0.000,0.000,20.00,0.000,0.50,21.00,ok")
+    assert not screen.take("2.000,1.5x0,0.300")
+    assert screen.take("<limits|spring:1|t:1.500|supply|cut_a:0.500>")
+    assert screen.take("3.000,1.500,0.300,22.00,0.100,0.000,0.000,20.00,0.000,0.50,21.00,fault_13")
+    console = Console(width=100, file=io.StringIO(), record=True)
+    console.print(screen.picture())
+    text = console.export_text()
+    assert "3.0 s   1.50 A of 15 A   fan 50 %   ambient 21.0 degC   stopped" in text
+    assert re.search(r"1  22\.0 ↗ *│ 2  20\.0 →", text)
+    assert "1.50 A  0.45 W" in text and "supply -0.50 A" in text
+
+
+def test_a_rows_inputs_are_their_means_until_the_next_row(tmp_path: Path) -> None:
+    """A spring that is switched on between two rows is on for that part of the interval, not from the next row on."""
+    board = FakeBoard()
+    board.stream = [
+        f"{0.05 * k:.2f},{0.0 if k < 35 else 2.0:.3f},{0.0 if k < 35 else 0.4:.3f},20.00,0.00,20.00,ok"
+        for k in range(1, 90)
+    ]
+    done = record(board, tmp_path, "--duration", 3)
+    assert done.returncode == 0, done.stderr
+    assert "telemetry csv 20" in board.sent()
+    frame = read_table(tmp_path / "log.csv", ("state",)).frame
+    assert frame["time_s"].tolist() == pytest.approx(np.arange(0.05, 3.1, 0.5))
+    # on from 1.75 s: in the row of 1.55 s for 0.3 of 0.5 s, as mean current and as mean power
+    assert frame["i1_a"].tolist() == pytest.approx([0, 0, 0, 1.2, 2, 2, 2], abs=1e-3)
+    assert (frame["i1_a"] * frame["v1_v"]).tolist() == pytest.approx([0, 0, 0, 0.48, 0.8, 0.8, 0.8], abs=1e-3)

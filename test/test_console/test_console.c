@@ -56,6 +56,7 @@ static settings_store_t store;
 static telemetry_t telemetry;
 static console_status_t status;
 static console_t console;
+static int32_t weak_ma; /* all that spring 3 ever has; 0: as much as is wanted */
 
 void setUp(void)
 {
@@ -70,6 +71,7 @@ void setUp(void)
     TEST_ASSERT_TRUE(controller_init(&controller, &settings.controller, 20 * 128, NULL));
     telemetry_init(&telemetry);
     console_init(&console, &output, &controller, &settings, &store, &telemetry, &status);
+    weak_ma = 0;
     room = 60000;
     said_length = 0;
     said[0] = '\0';
@@ -82,6 +84,9 @@ static void tick(void)
 {
     for (uint8_t k = 0; k < 9; k++) {
         inputs.sensor[k].current_ma = (int16_t)controller_target_ma(&controller, k);
+        if (k == 2 && weak_ma != 0 && inputs.sensor[k].current_ma > weak_ma) {
+            inputs.sensor[k].current_ma = (int16_t)weak_ma;
+        }
         inputs.sensor[k].voltage_mv = (int16_t)((inputs.sensor[k].current_ma * 18 + 50) / 100);
     }
     controller_tick(&controller, &inputs, &outputs);
@@ -314,6 +319,54 @@ static void saved_settings_are_there_after_a_restart(void)
     TEST_ASSERT_EQUAL_UINT16(1500, settings.controller.policy.open_current_ma);
 }
 
+static void version_says_what_became_of_the_stored_settings(void)
+{
+    static const struct {
+        settings_loaded_t loaded;
+        const char *text;
+    } cases[] = {
+        {{RECORD_LOADED, 0, 0, 0}, "settings loaded\r"},
+        {{RECORD_LOADED, 4, 1, 71},
+         "settings loaded; 4 not stored, at defaults; 1 dropped, first id 71\r"},
+        {{RECORD_LOADED_OTHER, 0, 0, 0}, "the other copy is damaged or was cut short\r"},
+        {{RECORD_EMPTY, PARAMETER_COUNT, 0, 0}, "settings none saved, defaults\r"},
+        {{RECORD_DAMAGED, PARAMETER_COUNT, 0, 0}, "settings stored ones damaged, defaults\r"},
+        {{RECORD_FOREIGN, PARAMETER_COUNT, 0, 0}, "settings stored by another version, defaults\r"},
+    };
+    for (unsigned k = 0; k < sizeof cases / sizeof cases[0]; k++) {
+        status.loaded = cases[k].loaded;
+        ask("version");
+        TEST_ASSERT_NOT_NULL_MESSAGE(strstr(said, cases[k].text), said);
+    }
+}
+
+static void selftest_says_which_spring_has_too_little_current(void)
+{
+    expect_ok("selftest");
+    TEST_ASSERT_NOT_NULL(strstr(said, "spring 3: sensor ok, 0.180 ohm\r"));
+    weak_ma = SELFTEST_CURRENT_MA / 2u;
+    ask("selftest");
+    TEST_ASSERT_NOT_NULL(strstr(said, "error:17 "));
+    TEST_ASSERT_NOT_NULL(strstr(said, "spring 3: sensor ok, too little current\r"));
+    TEST_ASSERT_NOT_NULL(strstr(said, "spring 4: sensor ok, 0.180 ohm\r"));
+}
+
+static void selftest_gives_the_policy_back_also_when_it_is_stopped(void)
+{
+    expect_ok("policy precompensate");
+    expect_ok("selftest");
+    TEST_ASSERT_EQUAL(DRIVE_POLICY_PRECOMPENSATE, controller_policy(&controller));
+    for (const char *octet = "selftest\n"; *octet != '\0'; octet++) {
+        console_receive(&console, (uint8_t)*octet);
+    }
+    console_service(&console);
+    TEST_ASSERT_EQUAL(DRIVE_POLICY_OPEN, controller_policy(&controller));
+    TEST_ASSERT_EQUAL_UINT16(200, controller_level_permille(&controller, 0));
+    console_stop(&console);
+    TEST_ASSERT_EQUAL(DRIVE_POLICY_PRECOMPENSATE, controller_policy(&controller));
+    TEST_ASSERT_EQUAL_UINT16(0, controller_level_permille(&controller, 0));
+}
+
 static void stop_drops_the_line_that_had_begun(void)
 {
     said_length = 0;
@@ -476,6 +529,9 @@ int main(void)
     RUN_TEST(settings_that_do_not_fit_wait_until_they_do);
     RUN_TEST(a_listing_pasted_into_another_board_makes_it_the_same);
     RUN_TEST(saved_settings_are_there_after_a_restart);
+    RUN_TEST(version_says_what_became_of_the_stored_settings);
+    RUN_TEST(selftest_says_which_spring_has_too_little_current);
+    RUN_TEST(selftest_gives_the_policy_back_also_when_it_is_stopped);
     RUN_TEST(stop_drops_the_line_that_had_begun);
     RUN_TEST(stop_ends_a_long_answer);
     RUN_TEST(empty_lines_are_not_answered);

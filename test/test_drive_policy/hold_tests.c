@@ -55,8 +55,10 @@ static void hold_phase(int permille, unsigned windows)
 {
     for (unsigned n = windows * WINDOW; n != 0; n--) {
         if (spring->stage == DRIVE_POLICY_STAGE_HOLD) {
-            thermal_model_set_temperature(&model, 0,
-                                          (int16_t)(model.martensite_start_c7 + spring->margin_c7));
+            thermal_model_set_temperature(
+                &model, 0,
+                (int16_t)(thermal_model_transformation(&model, 0).martensite_start_c7 +
+                          spring->margin_c7));
         }
         read_ohm(ohm_of(permille));
     }
@@ -92,8 +94,10 @@ static void begin_hold_in_row(uint8_t springs, int permille)
 {
     make_row(springs);
     thermal_model_set_temperature(&model, 0, 110 * KELVIN);
-    thermal_model_set_temperature(&model, 0,
-                                  (int16_t)(model.martensite_start_c7 + policy.unsure_margin_c7));
+    thermal_model_set_temperature(
+        &model, 0,
+        (int16_t)(thermal_model_transformation(&model, 0).martensite_start_c7 +
+                  policy.unsure_margin_c7));
     level[0] = 1000;
     knows(permille);
     read_phase(permille, 1);
@@ -128,8 +132,8 @@ static void begin_search(void)
 
 static bool is_just_below_start(void)
 {
-    int16_t below_c7 =
-        (int16_t)(model.martensite_start_c7 - thermal_model_temperature_c7(&model, 0));
+    int16_t below_c7 = (int16_t)(thermal_model_transformation(&model, 0).martensite_start_c7 -
+                                 thermal_model_temperature_c7(&model, 0));
     return below_c7 > 0 && below_c7 < 3 * KELVIN;
 }
 
@@ -183,8 +187,8 @@ static void sighting_makes_the_model_austenite_whatever_it_had(void)
 {
     begin_search();
     int16_t there_c7 = thermal_model_temperature_c7(&model, 0);
-    for (int16_t t_c7 = model.martensite_start_c7; thermal_model_austenite(&model, 0) > 30500;
-         t_c7--) {
+    for (int16_t t_c7 = thermal_model_transformation(&model, 0).martensite_start_c7;
+         thermal_model_austenite(&model, 0) > 30500; t_c7--) {
         thermal_model_set_temperature(&model, 0, t_c7);
     }
     thermal_model_set_temperature(&model, 0, there_c7); /* with 93 % */
@@ -242,7 +246,8 @@ static void first_doubt_pauses_the_search_at_a_little_more_power(void)
     hold_phase(1000, 10);
     TEST_ASSERT_LESS_THAN_INT16(margin_c7, spring->margin_c7);
     margin_c7 = spring->margin_c7;
-    int16_t there_c7 = (int16_t)(model.martensite_start_c7 + margin_c7);
+    int16_t there_c7 =
+        (int16_t)(thermal_model_transformation(&model, 0).martensite_start_c7 + margin_c7);
     thermal_model_set_temperature(&model, 0, there_c7);
     read_phase(1000, 1);
     margin_c7 = spring->margin_c7;
@@ -328,7 +333,8 @@ static void large_confirmed_loss_is_heated_back(void)
 static void coasting_from_a_boost_with_a_known_loss_sights_nothing(void)
 {
     learn();
-    switch_off_and_on((int16_t)(model.martensite_start_c7 + 6 * KELVIN));
+    switch_off_and_on(
+        (int16_t)(thermal_model_transformation(&model, 0).martensite_start_c7 + 6 * KELVIN));
     TEST_ASSERT_GREATER_THAN_INT16(policy.hold_margin_c7 + 2 * KELVIN, spring->margin_c7);
     knows(1000);
     parameters.search_mk_per_s = 0; /* it stays where it coasts */
@@ -395,7 +401,8 @@ static void doubt_when_readings_fail_takes_back_what_was_learnt(void)
     }
     TEST_ASSERT_FALSE(drive_policy_observes(&policy, 0));
     TEST_ASSERT_EQUAL_INT16(0, spring->bias_uw_per_k);
-    switch_off_and_on((int16_t)(model.martensite_start_c7 + 12 * KELVIN));
+    switch_off_and_on(
+        (int16_t)(thermal_model_transformation(&model, 0).martensite_start_c7 + 12 * KELVIN));
     TEST_ASSERT_EQUAL_INT16(policy.unsure_margin_c7, spring->margin_c7);
 }
 
@@ -408,7 +415,8 @@ static void failing_readings_leave_a_confirmed_loss(void)
     }
     TEST_ASSERT_FALSE(drive_policy_observes(&policy, 0));
     TEST_ASSERT_EQUAL_INT16(bias, spring->bias_uw_per_k);
-    switch_off_and_on((int16_t)(model.martensite_start_c7 + 12 * KELVIN));
+    switch_off_and_on(
+        (int16_t)(thermal_model_transformation(&model, 0).martensite_start_c7 + 12 * KELVIN));
     TEST_ASSERT_LESS_THAN_INT16(policy.unsure_margin_c7, spring->margin_c7);
 }
 
@@ -418,8 +426,9 @@ static int16_t bias_after_sighting(int16_t margin_c7, int16_t bias_uw_per_k)
     begin_search();
     spring->margin_c7 = margin_c7;
     spring->bias_uw_per_k = bias_uw_per_k;
-    thermal_model_set_temperature(&model, 0,
-                                  (int16_t)(model.martensite_start_c7 - policy.event_c7));
+    thermal_model_set_temperature(
+        &model, 0,
+        (int16_t)(thermal_model_transformation(&model, 0).martensite_start_c7 - policy.event_c7));
     sight();
     return spring->bias_uw_per_k;
 }
@@ -473,8 +482,9 @@ static void impossible_loss_lets_go_of_the_reading_and_does_not_heat(void)
     TEST_ASSERT_BITS_HIGH(DRIVE_POLICY_LIMIT_BLIND, drive_policy_limits(&policy, 0));
     TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_HOLD, spring->stage);
     /* above austenite finish first, where it is austenite whatever it was */
-    TEST_ASSERT_GREATER_THAN_INT16(model.austenite_finish_c7,
-                                   model.martensite_start_c7 + spring->margin_c7);
+    TEST_ASSERT_GREATER_THAN_INT16(thermal_model_transformation(&model, 0).austenite_finish_c7,
+                                   thermal_model_transformation(&model, 0).martensite_start_c7 +
+                                       spring->margin_c7);
 }
 
 static void loss_beyond_what_a_search_costs_is_heated_back_at_once(void)
@@ -517,7 +527,7 @@ static void begin_heating(int model_permille, int permille)
     level[0] = 1000;
     read_phase(0, 8);
     knows(permille);
-    for (int16_t t_c7 = model.austenite_start_c7;
+    for (int16_t t_c7 = thermal_model_transformation(&model, 0).austenite_start_c7;
          thermal_model_austenite(&model, 0) * 1000 / 32768 < model_permille; t_c7++) {
         thermal_model_set_temperature(&model, 0, t_c7);
     }
@@ -529,11 +539,13 @@ static void resistance_that_stands_still_ends_a_heating_though_the_model_lags(vo
     begin_heating(800, 850);
     read_phase(850, 4);
     TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_HEAT, spring->stage);
-    TEST_ASSERT_LESS_THAN_INT16(model.austenite_finish_c7 - KELVIN,
+    TEST_ASSERT_LESS_THAN_INT16(thermal_model_transformation(&model, 0).austenite_finish_c7 -
+                                    KELVIN,
                                 thermal_model_temperature_c7(&model, 0));
     read_phase(850, 8);
     TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_HOLD, spring->stage);
-    TEST_ASSERT_INT16_WITHIN(4, model.austenite_finish_c7, thermal_model_temperature_c7(&model, 0));
+    TEST_ASSERT_INT16_WITHIN(4, thermal_model_transformation(&model, 0).austenite_finish_c7,
+                             thermal_model_temperature_c7(&model, 0));
 }
 
 static void resistance_that_still_rises_does_not_end_a_heating(void)
@@ -583,7 +595,8 @@ static void what_it_read_when_it_had_transformed_is_fully_on_when_heated_again(v
 static void too_little_phase_until_heating_goes_on_changes_nothing(void)
 {
     begin_heating(950, 850);
-    int16_t temperature_c7 = (int16_t)(model.austenite_start_c7 + 2 * KELVIN);
+    int16_t temperature_c7 =
+        (int16_t)(thermal_model_transformation(&model, 0).austenite_start_c7 + 2 * KELVIN);
     thermal_model_set_temperature(&model, 0, temperature_c7);
     uint16_t austenite = thermal_model_austenite(&model, 0);
     read_phase(850, 8);
@@ -603,10 +616,14 @@ static drive_policy_stage_t stage_of_rest_at(int16_t temperature_c7)
 
 static void phase_that_rests_until_heating_goes_on_has_not_finished(void)
 {
-    TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_HEAT,
-                      stage_of_rest_at((int16_t)(model.austenite_start_c7 - 3 * KELVIN)));
-    TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_HEAT,
-                      stage_of_rest_at((int16_t)(model.austenite_start_c7 + 4 * KELVIN)));
+    TEST_ASSERT_EQUAL(
+        DRIVE_POLICY_STAGE_HEAT,
+        stage_of_rest_at(
+            (int16_t)(thermal_model_transformation(&model, 0).austenite_start_c7 - 3 * KELVIN)));
+    TEST_ASSERT_EQUAL(
+        DRIVE_POLICY_STAGE_HEAT,
+        stage_of_rest_at(
+            (int16_t)(thermal_model_transformation(&model, 0).austenite_start_c7 + 4 * KELVIN)));
 }
 
 static void model_takes_half_of_what_the_phase_is_off_beyond_the_deadband(void)
@@ -625,16 +642,20 @@ static void model_takes_half_of_what_the_phase_is_off_beyond_the_deadband(void)
 static void phase_below_austenite_start_shows_that_the_spring_is_hotter(void)
 {
     begin_heating(0, 150);
-    thermal_model_set_temperature(&model, 0, (int16_t)(model.austenite_start_c7 - 5 * KELVIN));
+    thermal_model_set_temperature(
+        &model, 0,
+        (int16_t)(thermal_model_transformation(&model, 0).austenite_start_c7 - 5 * KELVIN));
     read_phase(150, 1);
-    TEST_ASSERT_INT16_WITHIN(KELVIN, model.austenite_start_c7 + KELVIN,
+    TEST_ASSERT_INT16_WITHIN(KELVIN,
+                             thermal_model_transformation(&model, 0).austenite_start_c7 + KELVIN,
                              thermal_model_temperature_c7(&model, 0));
 }
 
 static void too_little_phase_below_austenite_start_changes_nothing(void)
 {
     begin_heating(850, 600);
-    int16_t temperature_c7 = (int16_t)(model.austenite_start_c7 - 3 * KELVIN);
+    int16_t temperature_c7 =
+        (int16_t)(thermal_model_transformation(&model, 0).austenite_start_c7 - 3 * KELVIN);
     thermal_model_set_temperature(&model, 0, temperature_c7);
     uint16_t austenite = thermal_model_austenite(&model, 0);
     read_phase(600, 40);
@@ -646,7 +667,8 @@ static void too_little_phase_below_austenite_start_changes_nothing(void)
 static void certain_martensite_teaches_the_scale_and_corrects_nothing(void)
 {
     begin_heating(0, 300);
-    int16_t temperature_c7 = (int16_t)(model.austenite_start_c7 - 30 * KELVIN);
+    int16_t temperature_c7 =
+        (int16_t)(thermal_model_transformation(&model, 0).austenite_start_c7 - 30 * KELVIN);
     thermal_model_set_temperature(&model, 0, temperature_c7);
     read_phase(300, 2);
     TEST_ASSERT_TRUE(drive_policy_observes(&policy, 0));
@@ -706,7 +728,9 @@ static void what_a_spring_reads_when_transformed_is_its_own_fully_on(void)
 
 static uint16_t current_at(int16_t margin_c7)
 {
-    thermal_model_set_temperature(&model, 0, (int16_t)(model.martensite_start_c7 + margin_c7));
+    thermal_model_set_temperature(
+        &model, 0,
+        (int16_t)(thermal_model_transformation(&model, 0).martensite_start_c7 + margin_c7));
     read_phase(1000, 2);
     return spring->wanted_ma;
 }
@@ -771,7 +795,9 @@ static void spring_that_waits_to_be_heated_again_keeps_its_holds_current(void)
     level[1] = 1000;
     read_phase(1000, 4);
     thermal_model_set_temperature(&model, 0, 110 * KELVIN);
-    thermal_model_set_temperature(&model, 0, (int16_t)(model.martensite_start_c7 + 5 * KELVIN));
+    thermal_model_set_temperature(
+        &model, 0,
+        (int16_t)(thermal_model_transformation(&model, 0).martensite_start_c7 + 5 * KELVIN));
     knows(1000);
     level[0] = 1000;
     hold_phase(1000, 8);

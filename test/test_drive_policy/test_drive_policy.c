@@ -19,7 +19,6 @@ int16_t measured_ma[SPRINGS];
 int16_t measured_mv[SPRINGS];
 uint16_t target_ma[SPRINGS];
 uint16_t supply_limit_ma;
-static uint8_t model_tick; /* every fifth tick the model steps: no spring is updated */
 
 void make(uint8_t rows, uint8_t columns)
 {
@@ -30,7 +29,6 @@ void make(uint8_t rows, uint8_t columns)
     TEST_ASSERT_EQUAL(THERMAL_MODEL_OK, thermal_model_init(&model, &p, NULL));
     TEST_ASSERT_TRUE(drive_policy_init(&policy, &parameters, (uint8_t)(rows * columns), NULL));
     drive_policy_prepare(&policy, &model);
-    model_tick = 0;
     for (uint8_t k = 0; k < SPRINGS; k++) {
         level[k] = 0;
         allowed[k] = true;
@@ -51,7 +49,6 @@ void tearDown(void) {}
 
 uint32_t tick(void)
 {
-    model_tick = (uint8_t)(model_tick + 1u < 5u ? model_tick + 1u : 0u);
     drive_policy_input_t input = {.model = &model,
                                   .level_permille = level,
                                   .allowed = allowed,
@@ -59,8 +56,7 @@ uint32_t tick(void)
                                   .supply_limit_ma = supply_limit_ma,
                                   .measured_ma = measured_ma,
                                   .measured_mv = measured_mv,
-                                  .valid = valid,
-                                  .model_stepped = model_tick == 0};
+                                  .valid = valid};
     drive_policy_tick(&policy, &input, target_ma);
     uint32_t sum = 0;
     for (uint8_t k = 0; k < policy.springs; k++) {
@@ -212,23 +208,6 @@ static void holds_come_before_boosts(void)
     TEST_ASSERT_EQUAL_UINT16(0, drive_policy_limits(&policy, 8) & DRIVE_POLICY_LIMIT_SUPPLY);
     TEST_ASSERT_GREATER_THAN_UINT16(1000, target_ma[8]);
     TEST_ASSERT_LESS_OR_EQUAL_UINT32(3800, (uint32_t)target_ma[0] + target_ma[8]);
-}
-
-static void no_spring_is_updated_beside_a_model_step(void)
-{
-    make(3, 3);
-    for (unsigned n = 0; n < 40; n++) {
-        model_tick = 4; /* the next tick is one with a step */
-        level[4] = 1000;
-        (void)tick();
-        TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_OFF, drive_policy_stage(&policy, 4));
-    }
-    ticks(13);
-    TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_HEAT, drive_policy_stage(&policy, 4));
-    level[4] = 0; /* off does not wait */
-    model_tick = 4;
-    (void)tick();
-    TEST_ASSERT_EQUAL_UINT16(0, target_ma[4]);
 }
 
 static void cap_fits_and_comes_within_a_milliampere_each(void)
@@ -590,7 +569,6 @@ int main(void)
     RUN_TEST(boosts_are_staggered_not_diluted);
     RUN_TEST(who_waits_longest_is_next);
     RUN_TEST(holds_come_before_boosts);
-    RUN_TEST(no_spring_is_updated_beside_a_model_step);
     RUN_TEST(cap_fits_and_comes_within_a_milliampere_each);
     RUN_TEST(held_springs_coast_on_while_others_wait);
     RUN_TEST(own_temperature_derates_linearly_then_trips);

@@ -173,46 +173,6 @@ static void condition_that_follows_another_trips_in_its_own_time(void)
     TEST_ASSERT_EQUAL(SAFETY_FAULT_SHORT_SPRING, safety_fault(&safety, 4));
 }
 
-/* The short way is only taken where the long one finds nothing, and then leaves the same. */
-static void short_way_agrees_with_the_long_one(void)
-{
-    static const uint16_t limits_mohm[][2] = {{80, 500}, {0, 0}, {997, 9000}, {3, 998}, {150, 260}};
-    uint32_t taken = 0;
-    for (unsigned n = 0; n < 5; n++) {
-        parameters.resistance_minimum_mohm = limits_mohm[n][0];
-        parameters.resistance_maximum_mohm = limits_mohm[n][1];
-        parameters.maximum_on_s = n % 2u != 0 ? 3 : 0;
-        TEST_ASSERT_TRUE(safety_init(&safety, &parameters, 9, NULL));
-        for (uint32_t i = 0; i < 400000u; i++) {
-            uint32_t mixed = i * 2654435761u;
-            int16_t current_ma = (int16_t)((mixed >> 20) - 400u);
-            safety_sample_t sample = {
-                .current_ma = current_ma,
-                .voltage_mv = (int16_t)((uint16_t)current_ma * (mixed >> 8 & 1023u) / 1000u),
-                .expected_ma = (mixed & 1u) != 0 ? (uint16_t)(mixed >> 21) : 0u,
-                .temperature_c7 = (int16_t)(mixed >> 4 & 0x41ffu)};
-            safety_t before = safety;
-            bool good =
-                safety_tick_good(&safety, &safety.spring[4], 0, sample.current_ma,
-                                 sample.voltage_mv, sample.expected_ma, sample.temperature_c7);
-            safety_t after = safety;
-            safety = before;
-            safety_tick_spring(&safety, 4, &sample);
-            if (good) {
-                TEST_ASSERT_EQUAL_MEMORY(&safety, &after, sizeof safety);
-                taken++;
-            } else {
-                TEST_ASSERT_EQUAL_MEMORY(&before, &after, sizeof safety);
-            }
-            safety_tick_board(&safety, 0);
-            if (i % 3u == 0) {
-                safety_clear(&safety);
-            }
-        }
-    }
-    TEST_ASSERT_GREATER_THAN(200000, taken);
-}
-
 static void the_first_fault_is_kept(void)
 {
     safety_sample_t sample = running;
@@ -402,7 +362,6 @@ int main(void)
     RUN_TEST(too_little_current_says_nothing_about_the_resistance);
     RUN_TEST(missing_readings_neither_count_nor_forgive);
     RUN_TEST(condition_that_follows_another_trips_in_its_own_time);
-    RUN_TEST(short_way_agrees_with_the_long_one);
     RUN_TEST(the_first_fault_is_kept);
     RUN_TEST(sum_above_the_supply_trips_everything);
     RUN_TEST(limit_trip_is_of_its_spring_alone_until_cleared);

@@ -306,6 +306,67 @@ static void resistance_follows_phase_with_either_sign(void)
     TEST_ASSERT_EQUAL_UINT32(1, thermal_model_resistance_uohm(&model, 0));
 }
 
+/* 1500 ppm/K of 175 mohm over 60 K is 15.75 mohm, 500 ppm/K of 219 mohm over 90 K 9.855 mohm. */
+static void resistance_of_each_phase_rises_from_20_degrees(void)
+{
+    parameters.resistance_martensite_rise_ppm_per_k = 1500;
+    parameters.resistance_austenite_rise_ppm_per_k = 500;
+    start();
+    TEST_ASSERT_UINT32_WITHIN(2, 175000, thermal_model_resistance_uohm(&model, 0));
+    thermal_model_set_temperature(&model, 0, c7(80));
+    TEST_ASSERT_UINT32_WITHIN(20, 190750, thermal_model_resistance_uohm(&model, 0));
+    thermal_model_set_temperature(&model, 0, c7(110));
+    TEST_ASSERT_UINT32_WITHIN(20, 228855, thermal_model_resistance_uohm(&model, 0));
+    /* half of each, at 60 degC: (185500 + 223380) / 2 */
+    TEST_ASSERT_UINT32_WITHIN(20, 204440,
+                              thermal_model_resistance_uohm_at(&model, 0, 16384, c7(60)));
+    parameters.resistance_martensite_rise_ppm_per_k = -3000;
+    start();
+    thermal_model_set_temperature(&model, 0, c7(80));
+    TEST_ASSERT_UINT32_WITHIN(20, 143500, thermal_model_resistance_uohm(&model, 0));
+}
+
+/* 1 A through 20 mohm: 20 mV and 20 mW that the spring does not get. */
+static void contact_is_seen_in_the_resistance_and_not_in_the_heat(void)
+{
+    parameters.contact_uohm[2] = 20000;
+    start();
+    TEST_ASSERT_EQUAL_UINT32(195000, thermal_model_resistance_uohm(&model, 2));
+    TEST_ASSERT_EQUAL_UINT32(175000, thermal_model_resistance_uohm(&model, 1));
+    TEST_ASSERT_UINT32_WITHIN(1000, 175000, thermal_model_heating_uw(&model, 2, 1000, 195));
+    TEST_ASSERT_EQUAL_UINT32(195000, thermal_model_heating_uw(&model, 1, 1000, 195));
+    TEST_ASSERT_EQUAL_UINT32(0, thermal_model_heating_uw(&model, 2, 1000, 10));
+}
+
+/* The whole loop of one spring lies 12.5 K higher, its neighbours' does not. */
+static void a_shifted_spring_transforms_higher(void)
+{
+    parameters.transformation_shift_cc[1] = 1250;
+    parameters.transformation_shift_cc[2] = -4000;
+    start();
+    TEST_ASSERT_EQUAL_INT16(c7(88), thermal_model_transformation(&model, 0).austenite_start_c7);
+    TEST_ASSERT_EQUAL_INT16(c7(80.5), thermal_model_transformation(&model, 1).martensite_finish_c7);
+    TEST_ASSERT_EQUAL_INT16(c7(38), thermal_model_transformation(&model, 2).martensite_start_c7);
+    thermal_model_set_temperature(&model, 1, c7(100.4));
+    TEST_ASSERT_EQUAL_UINT16(0, thermal_model_austenite(&model, 1));
+    thermal_model_set_temperature(&model, 1, c7(105.5));
+    TEST_ASSERT_DOUBLE_WITHIN(0.002, 0.5, phase(1));
+    thermal_model_set_temperature(&model, 1, c7(110.6));
+    thermal_model_set_temperature(&model, 1, c7(85.5));
+    TEST_ASSERT_DOUBLE_WITHIN(0.002, 0.5, phase(1));
+    for (uint8_t k = 0; k < 3; k++) { /* the same by heat: 5 K above each one's austenite start */
+        start();
+        memset(power_uw, 0, sizeof power_uw);
+        power_uw[k] = 800000;
+        const int16_t half_c7 =
+            (int16_t)(thermal_model_transformation(&model, k).austenite_start_c7 + c7(5));
+        while (thermal_model_temperature_c7(&model, k) < half_c7) {
+            run(1);
+        }
+        TEST_ASSERT_DOUBLE_WITHIN(0.02, 0.5, phase(k));
+    }
+}
+
 /* ---- conservation, symmetry --------------------------------------------------------------------
  */
 
@@ -394,7 +455,7 @@ static void rotating_the_pattern_rotates_the_temperatures(void)
     }
 }
 
-/* 1 x 3 and 3 x 1 are one array seen from two sides, and the frame lies the other way */
+/* 1 x 3 and 3 x 1 are one array seen from two sides */
 static void a_row_behaves_as_a_column(void)
 {
     thermal_model_state_t state[2];
@@ -633,6 +694,12 @@ static void what_does_not_fit_together_is_refused_by_name(void)
     parameters.austenite_finish_cc = 9400;
     parameters.latent_heat_mj = 25000;
     refused(THERMAL_MODEL_ERROR_RANGE, PARAMETER_latent_heat_j);
+    parameters.martensite_finish_cc = -100; /* with the shift the last spring's is below -30 */
+    REFUSED(RANGE, transformation_shift_k, transformation_shift_cc[8], -2901);
+    parameters.austenite_finish_cc = 18000; /* and 10 K of latent heat above 200 */
+    parameters.austenite_start_cc = 17000;
+    parameters.latent_heat_mj = 3000;
+    REFUSED(RANGE, transformation_shift_k, transformation_shift_cc[8], 1001);
     REFUSED(ORDER, martensite_start_c, martensite_start_cc, 6800);
     REFUSED(RANGE, martensite_start_c, martensite_start_cc, 6900);
     REFUSED(ORDER, austenite_start_c, austenite_start_cc, 7799);
@@ -731,41 +798,6 @@ static void corrections_add_and_saturate(void)
     TEST_ASSERT_TRUE(thermal_model_is_consistent(&model));
 }
 
-/* Through whole loops with powers at random: what begin_step leaves is followed in any order, in
- * part by the next step itself; in between the state is one that the model accepts. */
-static void step_in_portions_is_the_same_step(void)
-{
-    start();
-    thermal_model_t portions = model;
-    uint32_t left = 0;
-    for (uint32_t n = 0; n < 20000; n++) {
-        for (uint8_t k = 0; k < 9; k++) {
-            power_uw[k] = (n / 600u + k) % 2u != 0 ? random_bits() % 4000000u : 0;
-        }
-        thermal_model_step(&model, power_uw);
-        thermal_model_begin_step(&portions, power_uw);
-        for (uint32_t turn = random_bits() % 6u; turn > 0; turn--) {
-            thermal_model_t copy;
-            thermal_model_state_t state;
-            TEST_ASSERT_TRUE(thermal_model_is_consistent(&portions));
-            thermal_model_get_state(&portions, &state);
-            copy = portions;
-            TEST_ASSERT_TRUE(thermal_model_set_state(&copy, &state));
-            if (turn % 2u != 0) {
-                thermal_model_settle(&portions, (uint8_t)(random_bits() % 9u));
-            } else {
-                thermal_model_follow_phases(&portions, (uint8_t)(random_bits() % 4u));
-            }
-        }
-        thermal_model_t whole = portions;
-        thermal_model_follow_phases(&whole, UINT8_MAX);
-        TEST_ASSERT_EQUAL_MEMORY(&model.state, &whole.state, sizeof model.state);
-        TEST_ASSERT_EQUAL_MEMORY(model.lead, whole.lead, sizeof model.lead);
-        left += memcmp(&portions.state, &whole.state, sizeof whole.state) != 0;
-    }
-    TEST_ASSERT_GREATER_THAN(100, left); /* it was not all done at once */
-}
-
 /* Nine springs, all driven, until the centre is half austenite. */
 static void heat_half_way(void)
 {
@@ -804,21 +836,6 @@ static void heat_added_at_once_is_kept_and_the_phase_follows(void)
     TEST_ASSERT_TRUE(thermal_model_is_consistent(&model));
 }
 
-/* A correction between the portions is one after the step. */
-static void correction_in_between_comes_after_the_step(void)
-{
-    heat_half_way();
-    thermal_model_t portions = model;
-    thermal_model_step(&model, power_uw);
-    thermal_model_begin_step(&portions, power_uw);
-    TEST_ASSERT_LESS_THAN(thermal_model_temperature_c7(&model, 4),
-                          thermal_model_temperature_c7(&portions, 4));
-    thermal_model_add_temperature(&model, 4, 40);
-    thermal_model_add_temperature(&portions, 4, 40);
-    thermal_model_follow_phases(&portions, UINT8_MAX);
-    TEST_ASSERT_EQUAL_MEMORY(&model.state, &portions.state, sizeof model.state);
-}
-
 int main(void)
 {
     UNITY_BEGIN();
@@ -837,6 +854,12 @@ int main(void)
     RUN_TEST(stepping_takes_the_same_loop_as_setting);
     RUN_TEST(latent_heat_delays_by_its_energy);
     RUN_TEST(resistance_follows_phase_with_either_sign);
+    RUN_TEST(resistance_of_each_phase_rises_from_20_degrees);
+    RUN_TEST(contact_is_seen_in_the_resistance_and_not_in_the_heat);
+    RUN_TEST(a_shifted_spring_transforms_higher);
+    RUN_TEST(resistance_of_each_phase_rises_from_20_degrees);
+    RUN_TEST(contact_is_seen_in_the_resistance_and_not_in_the_heat);
+    RUN_TEST(a_shifted_spring_transforms_higher);
     RUN_TEST(no_heat_from_nothing);
     RUN_TEST(closed_array_keeps_its_heat);
     RUN_TEST(rotating_the_pattern_rotates_the_temperatures);
@@ -850,8 +873,6 @@ int main(void)
     RUN_TEST(power_to_hold_holds);
     RUN_TEST(state_survives_and_garbage_does_not_enter);
     RUN_TEST(corrections_add_and_saturate);
-    RUN_TEST(step_in_portions_is_the_same_step);
-    RUN_TEST(correction_in_between_comes_after_the_step);
     RUN_TEST(heat_added_at_once_is_kept_and_the_phase_follows);
     return UNITY_END();
 }

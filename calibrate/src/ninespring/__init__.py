@@ -1,3 +1,35 @@
-"""Calibrate the thermal model of an array of NiTi springs, and say what the model lacks."""
+"""Calibrate the thermal model of an array of NiTi springs, and say what the model lacks.
 
-__version__ = "0.1.0"
+>>> import ninespring as ns
+>>> run = ns.read_log("run1.csv")
+>>> found = ns.diagnose(run)
+>>> ns.plot(run, found.model).savefig("run1.png")
+"""
+
+from importlib.metadata import version
+
+__version__ = version("ninespring")
+
+from .api import diagnose, fit, plot, predict, save
+from .board import Board, Reading
+from .errors import InputError, WorkError
+from .logs import Run, read_log
+from .models import Array, Model, read_array, read_model
+
+__all__ = [
+    "Array",
+    "Board",
+    "InputError",
+    "Model",
+    "Reading",
+    "Run",
+    "WorkError",
+    "diagnose",
+    "fit",
+    "plot",
+    "predict",
+    "read_array",
+    "read_log",
+    "read_model",
+    "save",
+]

@@ -78,9 +78,11 @@ class Board:
         """Answers that are still to come."""
         self._unguarded: str | None = None
         """The setting host_timeout_s as it was."""
+        self.thermometers: str | None = None
+        """Port of the simulated board's thermometers."""
         self._simulated: subprocess.Popen[str] | None = None
         if port == SIMULATED:
-            self._simulated, port = simulated_board()
+            self._simulated, port, self.thermometers = simulated_board()
         self.port = port
         try:
             self._port = Port(port)
@@ -166,6 +168,8 @@ class Board:
 
         Telemetry that comes meanwhile is kept for `next_line`.
         """
+        if not re.fullmatch("[ -~]+", line):
+            raise InputError(f"{line[:40]!r} is not one line of plain ASCII")
         self._port.write(line + "\n")
         self._alive_s = time.monotonic()
         until = self._alive_s + timeout_s
@@ -204,15 +208,21 @@ class Board:
                 return None
 
     def settings(self) -> dict[str, str]:
-        """Return the settings as `$$` shows them."""
+        """Return the settings as `$$` shows them, without their units."""
         pairs = (line[1:].split("=", 1) for line in self.ask("$$", 10.0) if line.startswith("$") and "=" in line)
-        return dict(pairs)
+        return {name: value.split()[0] for name, value in pairs if value.strip()}
 
     def guard(self, settings: dict[str, str]) -> None:
         """Have the springs go off when this program falls silent, where the board can: ended by `make_safe`."""
         if "host_timeout_s" in settings:
             self._unguarded = settings["host_timeout_s"]
             self.ask(f"$host_timeout_s={HOST_TIMEOUT_S}")
+
+    def unguard(self) -> None:
+        """Give the board back the timeout that it had."""
+        if self._unguarded is not None:
+            self.ask(f"$host_timeout_s={self._unguarded}", 1.0)
+            self._unguarded = None
 
     def make_safe(self) -> bool:
         """Switch telemetry and all springs off; True where the board confirms it. Never raises, and nothing stops it."""
@@ -225,11 +235,13 @@ class Board:
                     self.ask("off all", 1.0)
                 self.ask("telemetry off", 1.0)
                 self._telemetry.clear()
-                if self._unguarded is not None:
-                    self.ask(f"$host_timeout_s={self._unguarded}", 1.0)
-                    self._unguarded = None
+                self.unguard()
                 return True
         return False
+
+    def stop_now(self) -> None:
+        """Stop at once, from any thread, whatever is under way: `clear` goes on."""
+        self._port.write("!")
 
     def on(self, spring: int | None = None, level: float = 100) -> None:
         """Drive a spring (1 = top left, row by row; None: all) at a level of 0..100 percent."""
@@ -286,7 +298,7 @@ def settings_that_differ(sent: list[str], has: dict[str, str]) -> list[str]:
         name, value = line[1:].split("=", 1)
         if name not in has:
             out.append(f"{name} is missing")
-        elif float(has[name].split()[0]) != float(value):
+        elif float(has[name]) != float(value):
             out.append(f"{name} is {has[name]}, not {value}")
     return out
 

@@ -7,10 +7,9 @@ import time
 from pathlib import Path
 
 import click
-from rich.table import Table
 
 from . import __version__
-from .console import FILE, JSON, PORT, Command, checked, err, out, result_of, working, write
+from .console import FILE, JSON, PORT, Command, beside, checked, out, result_of, working, write
 from .errors import WorkError
 from .logs import check_folder, read_bytes
 
@@ -38,8 +37,17 @@ steps.txt (console words; `at S =` waits until so many seconds after the first r
     "--duration", type=SECONDS, default=900.0, show_default=True, help="s by the board's clock; Ctrl-C ends it earlier"
 )
 @click.option("--run", "script", type=FILE, help="console lines to send, one a line, each at its time")
+@click.option("--thermometers", help="port of a thermocouple logger: its temperatures (degC) become t1_c, t2_c, ...")
 @JSON
-def record(port: str, output: Path, hz: int, duration: float, script: Path | None, json_path: Path | None) -> None:
+def record(
+    port: str,
+    output: Path,
+    hz: int,
+    duration: float,
+    script: Path | None,
+    thermometers: str | None,
+    json_path: Path | None,
+) -> None:
     """Log a board's telemetry: currents (A), voltages (V), the model's temperatures (degC).
 
     What has come is kept and the springs are switched off, whatever ends the recording: Ctrl-C, a closed terminal, a
@@ -49,6 +57,7 @@ def record(port: str, output: Path, hz: int, duration: float, script: Path | Non
     from .board import Board
     from .recording import LogFile, script_lines, told_to_stop
     from .recording import record as record_board
+    from .thermometers import Thermometers
 
     check_folder(output, json_path)
     text = read_bytes(script).decode("utf-8", "replace") if script else ""
@@ -63,18 +72,22 @@ def record(port: str, output: Path, hz: int, duration: float, script: Path | Non
             working(f"recording from {port}", duration) as say,
             Board(port, stopped=stopped, off_at_end=False) as board,
         ):
+            logger = Thermometers(thermometers) if thermometers else None
             log = LogFile(output)
             try:
-                got = record_board(
-                    *(board, log, hz, duration, steps), lambda rows, seconds: say(f"{rows} rows", seconds), keys
-                )
+                tell = lambda rows, seconds: say(f"{rows} rows", seconds)  # noqa: E731
+                got = record_board(board, log, hz, duration, steps, tell, keys, logger)
             finally:
                 log.close()
+                if logger:
+                    logger.close()
         if not log.rows:
             raise WorkError(got.ended or "stopped before the first row came")
         write({json_path: checked(result_of("record", rows=log.rows, dropped_lines=got.dropped, ended=got.ended))})
         lines = f", {got.dropped} corrupt lines dropped" if got.dropped else ""
-        (err if str(output) == "-" else out).print(f"{log.rows} rows -> {output}{lines}", markup=False)
+        if got.offset_s is not None:
+            lines += f"; the thermometers' clock was {got.offset_s:+.2f} s from the board's"
+        beside(output).print(f"{log.rows} rows -> {output}{lines}", markup=False)
     if got.ended:
         raise WorkError(f"{got.ended}; what had come until then is in {output}")
 
@@ -129,43 +142,27 @@ Example:
 @click.option("--hz", type=HZ, default=2, show_default=True, help="updates a second")
 @click.option("--duration", type=SECONDS, default=1e9, help="s; Ctrl-C ends it")
 def monitor(port: str, hz: int, duration: float) -> None:
-    """Show a board's temperatures and currents as they are."""
+    """Show a board's array as it is: per spring the model's temperature (degC) and its trend, current (A), limits."""
     from rich.live import Live
 
     from .board import Board
+    from .monitoring import Screen
 
     with Board(port, off_at_end=False) as board:
-        names: list[str] = []
         until = time.monotonic() + duration
         try:
+            screen = Screen(board.settings())
             with Live(console=out, refresh_per_second=8) as live:
                 for line in board.ask(f"telemetry csv {hz}"):
-                    names = line.split(",") if line.startswith("time_s,") else names
+                    screen.take(line)
                 while (line := board.next_line(min(until, time.monotonic() + 5.0))) is not None:
-                    cells = line.split(",")
-                    if len(cells) == len(names):
-                        live.update(_board_table(dict(zip(names, cells, strict=True))))
+                    if screen.take(line):
+                        live.update(screen.picture())
             if time.monotonic() < until:
                 raise WorkError(f"{port}: no telemetry for 5 s")
         except KeyboardInterrupt:
             pass
         board.ask("telemetry off")
-
-
-def _board_table(row: dict[str, str]) -> Table:
-    table = Table(
-        "spring",
-        "current A",
-        "voltage V",
-        "model degC",
-        "duty",
-        title=f"{row.get('time_s', '')} s, fan {row.get('fan', '')}, {row.get('state', '')}",
-    )
-    k = 1
-    while f"i{k}_a" in row:
-        table.add_row(str(k), row[f"i{k}_a"], row.get(f"v{k}_v", ""), row.get(f"m{k}_c", ""), row.get(f"d{k}", ""))
-        k += 1
-    return table
 
 
 def add_board_commands(group: click.Group) -> None:

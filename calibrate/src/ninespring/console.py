@@ -131,12 +131,29 @@ def array_and_runs(
 
     `or_resistance`: logs of currents and voltages need no temperature.
     """
-    from .models import Array, read_array
+    from .models import read_array
 
     array = model.array if model else read_array(array_path) if array_path else None
     runs = [read_log(path, array.springs if array else None, or_resistance=or_resistance) for path in logs]
     if len({bool(np.isfinite(run.temperature_c).any()) for run in runs}) > 1:
         raise InputError("some of these logs have temperatures and others none: give one kind at a time", logs[0])
+    array = array_of(array, runs)
+    modes = {run.mode for run in runs}
+    if len(modes) > 1:
+        raise InputError(f"the logs are driven by {' and '.join(sorted(modes))}: diagnose one kind at a time")
+    if (rows := sum(len(run.time_s) for run in runs)) < FEWEST_ROWS:
+        raise InputError(f"{rows} rows are too few to fit to: log some minutes (docs/calibrating.md)", runs[0].name)
+    if not any(np.any(run.drive) for run in runs):
+        raise InputError(
+            "no spring is ever driven: log what the springs were given (i1_a ... or u1 ...)", runs[0].name, 1
+        )
+    return array, runs
+
+
+def array_of(array: Any, runs: list[Run]) -> Any:
+    """Return the array of these runs; refuse what does not go together."""
+    from .models import Array
+
     for k, run in enumerate(runs):
         for other in runs[:k]:
             if run.sha256 == other.sha256:
@@ -149,18 +166,11 @@ def array_and_runs(
         if count not in SHAPES:
             raise InputError(
                 f"{count} springs: say how they are arranged, `--array array.toml` with [array] rows and cols",
-                logs[0],
+                runs[0].name,
                 1,
             )
         array = Array(*SHAPES[count])
-    modes = {run.mode for run in runs}
-    if len(modes) > 1:
-        raise InputError(f"the logs are driven by {' and '.join(sorted(modes))}: diagnose one kind at a time")
-    if (rows := sum(len(run.time_s) for run in runs)) < FEWEST_ROWS:
-        raise InputError(f"{rows} rows are too few to fit to: log some minutes (docs/calibrating.md)", logs[0])
-    if not any(np.any(run.drive) for run in runs):
-        raise InputError("no spring is ever driven: log what the springs were given (i1_a ... or u1 ...)", logs[0], 1)
-    return array, runs
+    return array
 
 
 def notes_of(runs: list[Run]) -> None:

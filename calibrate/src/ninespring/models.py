@@ -65,6 +65,10 @@ class Model:
     provenance: dict[str, Any] = field(default_factory=dict)
     name: str = ""
 
+    def __repr__(self) -> str:
+        effects = ", ".join(self.effects) or "no effects"
+        return f"<model of {self.array.rows} x {self.array.cols}: {effects}; {len(self.parameters)} parameters>"
+
 
 class _Reader:
     def __init__(self, path: str | Path) -> None:

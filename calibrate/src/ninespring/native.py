@@ -73,9 +73,7 @@ def library() -> ctypes.CDLL:
     try:
         lib = ctypes.CDLL(str(path))
     except OSError as error:
-        raise RuntimeError(
-            f"the compiled part of ninespring is missing ({error}): run `pip install ./calibrate`"
-        ) from None
+        raise RuntimeError(f"the compiled part of ninespring is missing ({error}): run `pip install .`") from None
     pointer, integer, size, real = (
         ctypes.c_void_p,
         ctypes.c_int,

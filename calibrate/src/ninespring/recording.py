@@ -10,6 +10,7 @@ import signal
 import stat
 import sys
 import time
+from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,7 +18,14 @@ from pathlib import Path
 from .board import Board
 from .errors import InputError, WorkError
 from .logs import COLUMN, EXTRA, LIMITS
+from .thermometers import Thermometers
 
+FINER = 10
+"""So many rows of telemetry become one of the log, where the line has room for them."""
+FINEST_HZ = 20
+"""Nine springs' rows fill half the line at this rate."""
+LONGEST_WAIT_S = 15.0
+"""So long, by the board's clock, a row waits for a thermometer's reading after it."""
 SILENT_S = 5.0
 """Telemetry that does not come for so long has ended."""
 STATE = re.compile(r"ok|locked|fault_\d+")
@@ -39,6 +47,8 @@ class Recording:
 
     dropped: int = 0
     """Lines that were corrupt."""
+    offset_s: float | None = None
+    """What was added to the thermometers' clock to have the board's, s."""
     ended: str = ""
     """Why it ended early where that was nobody's wish."""
 
@@ -74,7 +84,9 @@ def script_lines(text: str, name: str, duration_s: float = math.inf) -> list[Ste
 
 
 @dataclass(frozen=True)
-class _Row:
+class Row:
+    """One row of telemetry."""
+
     text: str
     time_s: float
     form: tuple[tuple[int, ...], frozenset[str]]
@@ -95,10 +107,10 @@ class RowCheck:
         self.restarted = False
         """Time began anew: the board was reset."""
         self._longest_step_s = max(1.0, 3.0 / hz)
-        self._last: _Row | None = None
-        self._held: _Row | None = None
+        self._last: Row | None = None
+        self._held: Row | None = None
 
-    def feed(self, line: str) -> list[_Row]:
+    def feed(self, line: str) -> list[Row]:
         """Return the rows that are now known to be good, in order."""
         row = self._parse(line)
         if row is None:
@@ -119,7 +131,7 @@ class RowCheck:
         self._held, self._last = None, row
         return good
 
-    def _parse(self, line: str) -> _Row | None:
+    def _parse(self, line: str) -> Row | None:
         cells = line.split(",")
         if len(cells) != len(self.names):
             return None
@@ -136,9 +148,9 @@ class RowCheck:
             low, high = LIMITS.get(name if name in LIMITS else name[0], (-math.inf, math.inf))[:2]
             if not low <= float(cell) <= high:
                 out.add(name)
-        return _Row(line, float(cells[self.names.index("time_s")]), (tuple(digits), frozenset(out)))
+        return Row(line, float(cells[self.names.index("time_s")]), (tuple(digits), frozenset(out)))
 
-    def _follows(self, before: _Row, row: _Row) -> bool:
+    def _follows(self, before: Row, row: Row) -> bool:
         return row.form == before.form and 0.0 < row.time_s - before.time_s <= self._longest_step_s
 
 
@@ -239,18 +251,22 @@ def record(
     steps: Sequence[Step] = (),
     say: Callable[[int, float], None] = lambda rows, seconds: None,
     keys: Mapping[str, str] | None = None,
+    thermometers: Thermometers | None = None,
 ) -> Recording:
-    """Record a board's telemetry; `duration_s` and the steps' times are by the board's clock, from the first row.
+    """Record a board's telemetry, `hz` rows a second; `duration_s` and the steps' times are by the board's clock, from the first row.
 
     Steps without a time are sent first. The log begins with what the board is and how it is set, ends with its faults,
     and has its status (which limits act on a spring) between the rows, all as comments. Whatever ends it, the springs are
-    off afterwards, and `ended` says why where it was no wish.
+    off afterwards, and `ended` says why where it was no wish. `thermometers` add columns t1_c ...: each row waits until a
+    reading after it has come.
     """
     got = Recording()
     answers = False
+    finer_hz = max(hz, min(FINER * hz, FINEST_HZ))
+    sink = RowSink(log, thermometers, 1.0 / hz if finer_hz > hz else 0.0)
     try:
         _head(board, log, steps, keys or {})
-        _rows(board, log, hz, duration_s, steps, got, say)
+        _rows(board, finer_hz, duration_s, steps, got, say, sink)
     except KeyboardInterrupt:
         pass
     except WorkError as error:
@@ -261,6 +277,12 @@ def record(
                 "; the springs could not be switched off from here: cut their supply"
             )
     with contextlib.suppress(WorkError):
+        sink.flush()
+        if thermometers:
+            got.offset_s = thermometers.offset_s
+            if got.offset_s is not None:
+                log.write(f"# thermometers_offset_s: {got.offset_s:.3f}")
+            got.ended = got.ended or thermometers.trouble
         if got.dropped:
             log.write(f"# dropped_lines: {got.dropped}")
         if got.ended:
@@ -270,12 +292,115 @@ def record(
     return got
 
 
+class RowSink:
+    """Rows on their way to the log, and comments between them.
+
+    With `every_s`, rows that came faster become one: currents and voltages are their means until the next one begins, as a
+    log's inputs hold from its row on (the voltage is weighted with the current, so that their product is the mean power); the
+    rest is that of the first. With thermometers, a row waits for the readings around it.
+    """
+
+    def __init__(self, log: LogFile, thermometers: Thermometers | None, every_s: float = 0.0) -> None:
+        self.rows = 0
+        self._log, self._thermometers, self._every_s = log, thermometers, every_s
+        self._names: list[str] = []
+        self._springs: list[int] = []
+        """Those with a thermometer."""
+        self._bucket: list[Row] = []
+        self._comments: list[str] = []
+        """What came since the bucket's first row."""
+        self._waiting: deque[tuple[str, float, list[str]]] = deque()
+
+    def begin(self, names: Sequence[str]) -> None:
+        """Write the header; a thermometer of a spring that the array has not is left out."""
+        self._names = list(names)
+        if self._thermometers:
+            self._springs = [k for k in self._thermometers.springs if f"i{k}_a" in names]
+            if not self._springs:
+                raise WorkError("the thermometers are of no spring of this array: their columns are t1_c, t2_c, ...")
+        self._log.write(",".join([*names, *(f"t{k}_c" for k in self._springs)]))
+
+    def row(self, row: Row) -> None:
+        """Take one row."""
+        if self._thermometers:
+            self._thermometers.row_came(row.time_s)
+        if self._bucket and row.time_s - self._bucket[0].time_s < (1.0 - 0.5 / FINER) * self._every_s:
+            self._bucket.append(row)
+            return
+        self._end_bucket()
+        self._bucket = [row]
+        if not self._every_s:
+            self._end_bucket()
+        self._write(row.time_s)
+
+    def comment(self, text: str) -> None:
+        """Take a comment: it comes after the rows that were taken before it."""
+        if self._bucket:
+            self._comments.append(text)
+        elif self._waiting:
+            self._waiting[-1][2].append(text)
+        else:
+            self._log.write(f"# {text}")
+
+    def flush(self) -> None:
+        """Write all that was taken, with the temperatures that have come."""
+        self._end_bucket()
+        self._write(math.inf)
+
+    def _end_bucket(self) -> None:
+        if self._bucket:
+            first = self._bucket[0]
+            self.rows += 1
+            self._waiting.append(
+                (mean_row(self._names, [one.text for one in self._bucket]), first.time_s, self._comments)
+            )
+            self._bucket, self._comments = [], []
+
+    def _write(self, now_s: float) -> None:
+        """Write those whose temperatures are known, and those that have waited too long for them."""
+        while self._waiting:
+            text, time_s, comments = self._waiting[0]
+            if self._thermometers:
+                values = self._thermometers.at(time_s)
+                if values is None and now_s - time_s < LONGEST_WAIT_S and not self._thermometers.trouble:
+                    return
+                text = ",".join([text, *(f"{values[k]:.3f}" if k in (values or {}) else "" for k in self._springs)])
+            self._waiting.popleft()
+            self._log.write_row(text)
+            for one in comments:
+                self._log.write(f"# {one}")
+
+
+def mean_row(names: Sequence[str], rows: Sequence[str]) -> str:
+    """Return the first row with the currents and voltages that all of them mean."""
+    if len(rows) == 1:
+        return rows[0]
+    cells = [row.split(",") for row in rows]
+    out = list(cells[0])
+    for at, name in enumerate(names):
+        if re.fullmatch(r"i\d+_a", name):
+            current = [float(one[at]) for one in cells]
+            out[at] = f"{sum(current) / len(cells):.4f}"
+            voltage_name = f"v{name[1:-2]}_v"
+            if voltage_name in names:
+                where = names.index(voltage_name)
+                voltage = [float(one[where]) for one in cells]
+                weight = current if sum(current) > 0 else [1.0] * len(cells)
+                out[where] = f"{sum(v * w for v, w in zip(voltage, weight, strict=True)) / sum(weight):.4f}"
+    return ",".join(out)
+
+
 def _head(board: Board, log: LogFile, steps: Sequence[Step], keys: Mapping[str, str]) -> None:
-    for name, value in keys.items():
-        log.write(f"# {name}: {value}")
     for step in steps:
         if step.at_s is None:
             board.ask(step.line)
+    board.guard(write_head(board, log, keys))
+
+
+def write_head(board: Board, log: LogFile, keys: Mapping[str, str]) -> dict[str, str]:
+    """Write, as comments, what is known of a log and of the board: version, faults, settings. Return the settings."""
+    for name, value in keys.items():
+        log.write(f"# {name}: {value}")
     for line in board.version:
         log.write(f"# version: {line}")
     for line in board.ask("faults") or ["none"]:
@@ -283,17 +408,17 @@ def _head(board: Board, log: LogFile, steps: Sequence[Step], keys: Mapping[str, 
     settings = board.settings()
     for name, value in settings.items():
         log.write(f"# ${name}={value}")
-    board.guard(settings)
+    return settings
 
 
 def _rows(
     board: Board,
-    log: LogFile,
     hz: int,
     duration_s: float,
     steps: Sequence[Step],
     got: Recording,
     say: Callable[[int, float], None],
+    sink: RowSink,
 ) -> None:
     waiting = [step for step in steps if step.at_s is not None]
     for _ in range(3):
@@ -302,7 +427,7 @@ def _rows(
             break
     else:
         raise WorkError(f"{board.port}: the board's telemetry has no header that can be read")
-    log.write(",".join(names))
+    sink.begin(names)
     check = RowCheck(names, hz)
     first_s = math.nan
     while True:
@@ -312,17 +437,17 @@ def _rows(
         if not line:
             continue
         if COMMENT.fullmatch(line):
-            log.write(f"# {line}")
+            sink.comment(line)
             continue
         good = check.feed(line)
         got.dropped = check.dropped
         if check.restarted:
             raise WorkError("the board has started again")
         for row in good:
-            first_s = first_s if log.rows else row.time_s
+            first_s = row.time_s if math.isnan(first_s) else first_s
             if row.time_s - first_s > duration_s:
                 return
-            log.write_row(row.text)
-            say(log.rows, row.time_s - first_s)
+            sink.row(row)
+            say(sink.rows, row.time_s - first_s)
             while waiting and (waiting[0].at_s or 0.0) <= row.time_s - first_s:
                 board.ask(waiting.pop(0).line)

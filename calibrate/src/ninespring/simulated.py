@@ -10,6 +10,9 @@ from pathlib import Path
 
 from .errors import WorkError
 
+NITI = "plant.effects=latent_heat,resistance_phase"
+"""What every NiTi spring does."""
+
 
 def simulator() -> Path:
     """Return the program: NINESPRING_SIM, this source tree's build, or the PATH."""
@@ -21,13 +24,22 @@ def simulator() -> Path:
     raise WorkError("ninespring-sim is not there: script/build builds it, or set NINESPRING_SIM to it")
 
 
-def simulated_board(more: Sequence[str] = ()) -> tuple[subprocess.Popen[str], str]:
-    """Start a simulated board; return its process, to be terminated, and its port.
+def simulated_board(more: Sequence[str] = ()) -> tuple[subprocess.Popen[str], str, str]:
+    """Start a simulated board; return its process, to be terminated, its port, and that of its thermometers.
 
     In a session of its own: Ctrl-C in the terminal ends this program first, which switches the springs off.
     """
     elf = os.environ.get("NINESPRING_AVR_DIR")
-    words = [str(simulator()), "board", *(("--elf", str(Path(elf) / "firmware.elf")) if elf else ()), *more]
+    words = [
+        str(simulator()),
+        "board",
+        "--thermometers",
+        "pty",
+        "--set",
+        NITI,
+        *(("--elf", str(Path(elf) / "firmware.elf")) if elf else ()),
+        *more,
+    ]
     process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True)
     assert process.stdout is not None and process.stderr is not None
     port = process.stdout.readline().strip()
@@ -35,4 +47,4 @@ def simulated_board(more: Sequence[str] = ()) -> tuple[subprocess.Popen[str], st
         said = process.stderr.read().strip().splitlines()
         process.wait(10)
         raise WorkError(f"the simulated board does not start: {said[-1] if said else 'it says nothing'}")
-    return process, port
+    return process, port, process.stdout.readline().strip()

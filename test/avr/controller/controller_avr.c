@@ -43,17 +43,10 @@ static void count_parts(bool steps)
                                   .supply_limit_ma = 15000,
                                   .measured_ma = aside.measured_ma,
                                   .measured_mv = aside.measured_mv,
-                                  .valid = valid,
-                                  .model_stepped = steps};
-    if (steps) {
-        COUNT("policy_beside_model_step");
-        drive_policy_tick(&aside.policy, &input, target_ma);
-        COUNTED();
-    } else {
-        COUNT("policy");
-        drive_policy_tick(&aside.policy, &input, target_ma);
-        COUNTED();
-    }
+                                  .valid = valid};
+    COUNT("policy");
+    drive_policy_tick(&aside.policy, &input, target_ma);
+    COUNTED();
     safety_sample_t sample = {.sensor_status = (uint8_t)inputs.sensor[0].status,
                               .current_ma = inputs.sensor[0].current_ma,
                               .voltage_mv = inputs.sensor[0].voltage_mv,

@@ -160,6 +160,5 @@ def verify(log: Path, model_path: Path, chip_path: Path | None, port: str | None
 def _port_lines(port: str) -> str:
     from ..board import Board
 
-    with Board(port) as board:
-        board.greet()
-        return "\n".join(line.split()[0] for line in board.ask("$$", 10.0) if line.startswith("$"))
+    with Board(port, off_at_end=False) as board:
+        return "\n".join(f"${name}={value}" for name, value in board.settings().items())

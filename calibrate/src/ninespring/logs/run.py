@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
@@ -32,6 +33,13 @@ class Run:
     """The run begins warm and steady: hidden heat is in balance with the first inputs."""
     starts: list[int] = field(default_factory=lambda: [0])
     """Rows at which a simulation starts again from the measured temperatures (the first; after gaps)."""
+
+    def __repr__(self) -> str:
+        measured = int(np.isfinite(self.temperature_c).any(axis=0).sum())
+        return (
+            f"<run {Path(self.name).name}: {len(self.time_s)} rows, {self.duration_s:.0f} s, {self.springs} springs by "
+            f"{self.mode}, {measured} measured>"
+        )
 
     @property
     def springs(self) -> int:

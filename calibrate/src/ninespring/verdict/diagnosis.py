@@ -45,6 +45,15 @@ class Diagnosis:
     final: Fit
     heat: unknown_heat.UnknownHeat
 
+    @property
+    def effects(self) -> list[str]:
+        """Names of what was found, strongest first."""
+        return [one["name"] for one in self.result["effects"]]
+
+    def __repr__(self) -> str:
+        before, after = self.result["baseline"]["rmse_c"], self.result["after"]["rmse_c"]
+        return f"<diagnosis: {', '.join(self.effects) or 'nothing found'}; {before:.2f} K before, {after:.2f} K after>"
+
 
 def prepare(array: Array, runs: Sequence[Run], declared: Mapping[str, float] | None = None) -> Problem:
     """Return the problem of these runs, condensed where they are long."""

@@ -13,10 +13,10 @@ void setup()
     thermal_model_parameters_default(&parameters);
     parameters.rows = 1;
     parameters.columns = 3;
-    thermal_model_parameter_t bad;
+    uint16_t bad = PARAMETER_COUNT;
     if (thermal_model_init(&model, &parameters, &bad) != THERMAL_MODEL_OK) {
         Serial.print(F("cannot use "));
-        Serial.println(thermal_model_parameter_name(bad));
+        Serial.println(bad < PARAMETER_COUNT ? parameter_row(bad).name : "step_ms");
         for (;;) {
         }
     }

@@ -1,0 +1,343 @@
+// The page: shows each state that comes, sends wishes. What the array does is decided elsewhere.
+const $ = (id) => document.getElementById(id);
+const QUANTITIES = {
+  temperature_c: "temperature, degC", current_a: "current, A", voltage_v: "voltage, V", power_w: "power, W",
+  duty: "duty", phase: "austenite, 0..1", sum_a: "sum of currents, A",
+};
+const COLOURS = ["#4477aa", "#ee6677", "#228833", "#b8a01c", "#66ccee", "#aa3377", "#999999", "#ee7733", "#44bb99"];
+const WARM = [[27, 17, 68], [86, 20, 125], [165, 44, 96], [225, 86, 53], [251, 155, 6], [252, 255, 164]];
+const LOW_C = 20, HIGH_C = 120, MOST_POINTS = 6000;
+
+let socket = null, state = {}, shape = "", wishes = 0, drawn = [], list = [], held = new Set();
+const waiting = new Map();
+const past = { time_s: [], each: {}, sum_a: [] };
+
+function wish(what) {
+  if (!socket || socket.readyState !== WebSocket.OPEN) {
+    tell("not connected: nothing was sent", true);
+    return Promise.reject(new Error("not connected"));
+  }
+  const id = ++wishes;
+  socket.send(JSON.stringify({ ...what, id }));
+  return new Promise((done, refused) => waiting.set(id, { done, refused }));
+}
+
+function ask(what) {
+  return wish(what).catch((error) => { tell(error.message, true); throw error; });
+}
+const quietly = (what) => ask(what).catch(() => {});
+
+function tell(text, bad = false) {
+  if (!text) return;
+  const item = document.createElement("li");
+  item.textContent = `${new Date().toLocaleTimeString()}  ${text}`;
+  item.className = bad ? "bad" : "";
+  $("log").prepend(item);
+  while ($("log").childElementCount > 200) $("log").lastChild.remove();
+}
+
+function connect() {
+  socket = new WebSocket(`ws://${location.host}/ws`);
+  socket.onmessage = (event) => take(JSON.parse(event.data));
+  socket.onclose = () => {
+    for (const one of waiting.values()) one.refused(new Error("the connection was lost"));
+    waiting.clear();
+    badge($("connection"), "page not connected", "bad");
+    trouble("This page has lost its server: what it shows is old. It tries again.");
+    setTimeout(connect, 1000);
+  };
+}
+
+function take(message) {
+  if (message.kind === "state") show(message);
+  else if (message.kind === "history") remember(message);
+  else if (message.kind === "settings") showSettings(message.settings);
+  else {
+    const one = waiting.get(message.id);
+    waiting.delete(message.id);
+    if (message.kind === "done") { tell(message.said); one?.done(message.said); }
+    else if (one) one.refused(new Error(message.why));
+    else tell(message.why, true);
+  }
+}
+
+function badge(where, text, kind) {
+  where.textContent = text;
+  where.className = `badge ${kind}`;
+}
+
+function trouble(text) {
+  $("trouble").textContent = text;
+  $("trouble").hidden = !text;
+}
+
+const shown = (value, digits, none = "–") => (value === null || value === undefined ? none : value.toFixed(digits));
+
+function colour(celsius) {
+  const at = Math.min(Math.max((celsius - LOW_C) / (HIGH_C - LOW_C), 0), 1) * (WARM.length - 1);
+  const k = Math.min(Math.floor(at), WARM.length - 2);
+  return WARM[k].map((one, c) => Math.round(one + (at - k) * (WARM[k + 1][c] - one)));
+}
+
+function show(now) {
+  const before = state;
+  state = now;
+  const live = now.source !== "replay";
+  $("name").textContent = now.name ?? "";
+  document.title = `${now.name ?? ""} - Ninespring`;
+  for (const one of document.querySelectorAll(".live")) one.hidden = !live;
+  document.querySelector(".replay").hidden = live;
+  badge($("connection"), now.connected ? { board: "connected", simulated: "simulated", replay: "replay" }[now.source] : "no board",
+    now.connected ? "good" : "bad");
+  trouble(now.connected ? "" : `${now.trouble || "looking for the board"}${live ? " - it is looked for again and again" : ""}`);
+  if (now.said && now.said !== before.said) tell(now.said);
+  if (!now.springs) return;
+  if (shape !== `${now.rows}x${now.cols}`) build(now.rows, now.cols);
+  if (now.time_s === undefined) return;
+
+  $("time").textContent = shown(now.time_s, 1);
+  $("sum").textContent = shown(now.sum_a, 2);
+  $("supply").textContent = now.supply_limit_a ? `of ${shown(now.supply_limit_a, 1)} A` : "";
+  const known = now.temperature_c.map((one) => one ?? -999);
+  const hottest = known.indexOf(Math.max(...known));
+  $("hottest").textContent = `${shown(now.temperature_c[hottest], 1)} degC (${hottest + 1})`;
+  badge($("state"), now.state_words ?? now.state, now.state === "ok" ? "good" : "bad");
+  $("unlock").hidden = now.state !== "locked";
+  for (let k = 0; k < now.springs; k++) showSpring(k, now);
+  $("truth-legend").hidden = !now.measured_c.some((one) => one !== null);
+  $("faults").replaceChildren(...now.faults.map((one) => {
+    const item = document.createElement("li");
+    item.textContent = one;
+    return item;
+  }));
+  if (live) {
+    if (!held.has("policy")) $("policy").value = now.policy;
+    if (!held.has("fan")) $("fan").value = Math.round(now.fan * 100);
+    $("fan-shown").textContent = `${held.has("fan") ? $("fan").value : Math.round(now.fan * 100)} %`;
+    $("record").textContent = now.recording ? "End recording" : "Record";
+    $("recording").textContent = now.recording ? `recording ${now.recording.file}: ${now.recording.rows} rows` : "";
+    $("play").textContent = now.playing ? "Playing" : "Play";
+  } else {
+    $("pause").textContent = now.playing ? "Pause" : "Play";
+    if (!held.has("speed")) $("speed").value = now.speed;
+    Object.assign($("seek"), { min: now.begins_s, max: now.ends_s });
+    if (!held.has("seek")) $("seek").value = now.time_s;
+  }
+  if (now.time_s !== before.time_s) append(now);
+}
+
+function build(rows, cols) {
+  shape = `${rows}x${cols}`;
+  const count = rows * cols;
+  drawn = Array(count).fill(false);
+  const array = $("array"), draw = $("draw");
+  array.style.gridTemplateColumns = `repeat(${cols}, minmax(0, 1fr))`;
+  draw.style.gridTemplateColumns = `repeat(${cols}, auto)`;
+  array.replaceChildren();
+  draw.replaceChildren();
+  for (let k = 0; k < count; k++) {
+    const spring = document.createElement("button");
+    for (const name of ["number", "level", "temperature", "measured", "amps", "limits", "phase"]) {
+      const part = document.createElement("span");
+      part.className = name;
+      spring.append(part);
+    }
+    spring.querySelector(".number").textContent = k + 1;
+    spring.onclick = () => quietly({ do: "level", spring: k + 1, level: state.level[k] > 0 ? 0 : Number($("level").value) });
+    array.append(spring);
+    const cell = document.createElement("button");
+    cell.setAttribute("aria-pressed", "false");
+    cell.setAttribute("aria-label", `spring ${k + 1}`);
+    cell.onclick = () => { drawn[k] = !drawn[k]; cell.setAttribute("aria-pressed", drawn[k]); };
+    draw.append(cell);
+  }
+}
+
+function showSpring(k, now) {
+  const spring = $("array").children[k], celsius = now.temperature_c[k], on = now.level[k] > 0;
+  const part = (name) => spring.querySelector(`.${name}`);
+  const [red, green, blue] = celsius === null ? [120, 120, 120] : colour(celsius);
+  spring.style.background = `rgb(${red} ${green} ${blue})`;
+  spring.style.color = red * 0.3 + green * 0.59 + blue * 0.11 > 140 ? "#111" : "#fff";
+  spring.classList.toggle("on", on);
+  spring.setAttribute("aria-pressed", on);
+  part("level").textContent = on ? `${Math.round(now.level[k])} %` : "";
+  part("temperature").textContent = `${shown(celsius, 1)}°`;
+  part("measured").textContent = now.measured_c[k] === null || now.measured_c[k] === undefined ? "" : `${shown(now.measured_c[k], 1)}°`;
+  part("amps").textContent = `${shown(now.current_a[k], 2)} A`;
+  part("limits").textContent = now.limits[k].join("; ");
+  part("phase").style.width = `${100 * (now.phase?.[k] ?? 0)}%`;
+  spring.title = `spring ${k + 1}: ${shown(now.temperature_c[k], 2)} degC, ${shown(now.current_a[k], 3)} A`
+    + (now.measured_c[k] != null ? `, measured ${shown(now.measured_c[k], 2)} degC` : "")
+    + (now.phase?.[k] != null ? `, ${shown(100 * now.phase[k], 0)} % austenite` : "")
+    + (now.target_a?.[k] != null ? `, target ${shown(now.target_a[k], 3)} A` : "")
+    + (now.limits[k].length ? `; limited (${shown(now.cut_a?.[k], 2)} A less): ${now.limits[k].join("; ")}` : "");
+}
+
+// plots
+
+function remember(history) {
+  past.time_s = history.time_s;
+  past.each = {};
+  for (const name of [...Object.keys(QUANTITIES), "measured_c"]) past.each[name] = history[name] ?? [];
+  past.sum_a = past.time_s.map((_, row) => past.each.current_a.reduce((sum, one) => sum + (one[row] ?? 0), 0));
+}
+
+function append(now) {
+  const last = past.time_s.at(-1);
+  if (last !== undefined && now.time_s < last) {
+    past.time_s = [];
+    past.each = {};
+    past.sum_a = [];
+  }
+  past.time_s.push(now.time_s);
+  past.sum_a.push(now.sum_a);
+  for (const name of [...Object.keys(QUANTITIES), "measured_c"]) {
+    if (name === "sum_a") continue;
+    const each = (past.each[name] ??= []);
+    for (let k = 0; k < now.springs; k++) (each[k] ??= []).push(now[name]?.[k] ?? null);
+  }
+  if (past.time_s.length > MOST_POINTS) {
+    const cut = MOST_POINTS / 4;
+    for (const one of [past.time_s, past.sum_a, ...Object.values(past.each).flat()]) one.splice(0, cut);
+  }
+}
+
+function plot(number) {
+  const name = document.querySelector(`[data-plot="${number}"]`).value;
+  const end = past.time_s.at(-1) ?? 0, begin = Math.max(end - Number($("window").value), past.time_s[0] ?? 0);
+  const from = past.time_s.findIndex((one) => one >= begin);
+  const time = past.time_s.slice(from), traces = [];
+  const line = (y, k, more = {}) => traces.push({
+    x: time, y: y.slice(from), mode: "lines", name: k === null ? "sum" : `${k + 1}`, legendgroup: `${k}`,
+    line: { width: 1.6, color: k === null ? COLOURS[0] : COLOURS[k % COLOURS.length], ...more.line }, showlegend: !more.line,
+  });
+  if (name === "sum_a") line(past.sum_a, null);
+  else (past.each[name] ?? []).forEach((one, k) => line(one, k));
+  if (name === "temperature_c") {
+    (past.each.measured_c ?? []).forEach((one, k) => one.some((value) => value !== null) && line(one, k, { line: { dash: "dot" } }));
+  }
+  const style = getComputedStyle(document.documentElement);
+  const ink = style.getPropertyValue("--ink"), grid = style.getPropertyValue("--line");
+  window.Plotly?.react($(`plot${number}`), traces, {
+    margin: { l: 52, r: 8, t: 8, b: 34 }, paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", font: { color: ink, size: 12 },
+    xaxis: { title: { text: "s" }, range: [begin, end], gridcolor: grid, zerolinecolor: grid },
+    yaxis: { title: { text: QUANTITIES[name] }, gridcolor: grid, zerolinecolor: grid },
+    legend: { orientation: "h", y: 1.12 }, uirevision: name,
+  }, { displaylogo: false, responsive: true, displayModeBar: false });
+}
+
+// settings
+
+function showSettings(settings) {
+  const body = $("settings");
+  const edited = new Set([...body.querySelectorAll("input.changed")].map((one) => one.name));
+  for (const one of settings) {
+    let row = body.querySelector(`tr[data-name="${one.name}"]`);
+    if (!row) row = newSetting(one);
+    const input = row.querySelector("input");
+    input.dataset.value = one.value;
+    if (!edited.has(one.name)) input.value = one.value;
+    input.classList.toggle("changed", input.value !== one.value);
+  }
+}
+
+function newSetting(one) {
+  const row = $("settings").insertRow();
+  row.dataset.name = one.name;
+  const [name, value, unit, range, what] = [0, 1, 2, 3, 4].map(() => row.insertCell());
+  name.textContent = one.name;
+  unit.textContent = one.unit ?? "";
+  range.textContent = one.low === undefined ? "" : `${one.low} .. ${one.high}`;
+  what.textContent = one.what ?? "";
+  const input = document.createElement("input");
+  input.name = one.name;
+  input.inputMode = "decimal";
+  input.setAttribute("aria-label", one.name);
+  const words = document.createElement("span");
+  words.className = "words";
+  value.append(input, words);
+  input.oninput = () => input.classList.toggle("changed", input.value !== input.dataset.value);
+  const set = () => {
+    if (input.value === input.dataset.value) return;
+    ask({ do: "set", name: one.name, value: input.value.trim() })
+      .then((said) => { words.textContent = said; input.classList.remove("changed"); })
+      .catch((error) => { words.textContent = error.message; });
+  };
+  input.onkeydown = (event) => {
+    if (event.key === "Enter") set();
+  };
+  input.onchange = set;
+  return row;
+}
+
+// wishes
+
+const pattern = (make) => Array.from({ length: state.springs }, (_, k) => (make(Math.floor(k / state.cols), k % state.cols) ? "1" : "0")).join("");
+const MAKE = {
+  checker: () => pattern((r, c) => (r + c) % 2 === 0),
+  ring: () => pattern((r, c) => r === 0 || c === 0 || r === state.rows - 1 || c === state.cols - 1),
+};
+const drawing = () => drawn.map((one) => (one ? "1" : "0")).join("");
+
+function stop() {
+  list.playing = false;
+  wish({ do: "stop" }).then(() => tell("STOP: all springs off. Clear faults to go on.")).catch((error) => tell(error.message, true));
+}
+
+function showList() {
+  $("list").replaceChildren(...list.map((one, at) => {
+    const item = document.createElement("li"), remove = document.createElement("button");
+    item.textContent = one;
+    remove.textContent = "remove";
+    remove.onclick = () => { list.splice(at, 1); showList(); };
+    item.append(remove);
+    return item;
+  }));
+  $("play").disabled = !list.length;
+}
+
+$("stop").onclick = stop;
+document.addEventListener("keydown", (event) => {
+  if (event.key === "Escape") { event.preventDefault(); stop(); }
+}, true);
+for (const one of document.querySelectorAll("[data-all]")) {
+  one.onclick = () => quietly({ do: "all", level: one.dataset.all === "on" ? Number($("level").value) : 0 });
+}
+for (const one of document.querySelectorAll("[data-make]")) one.onclick = () => quietly({ do: "pattern", springs: MAKE[one.dataset.make]() });
+$("apply").onclick = () => quietly({ do: "pattern", springs: drawing() });
+$("add").onclick = () => { list.push(drawing()); showList(); };
+$("play").onclick = () => quietly({ do: "play", patterns: list, seconds: Number($("seconds").value) });
+$("level").oninput = () => { $("level-shown").textContent = `${$("level").value} %`; };
+$("policy").onchange = () => quietly({ do: "policy", policy: $("policy").value });
+$("fan").onchange = () => quietly({ do: "fan", percent: Number($("fan").value) });
+$("record").onclick = () => quietly({ do: state.recording ? "end_recording" : "record" });
+$("clear").onclick = () => quietly({ do: "clear" });
+$("unlock").onclick = () => quietly({ do: "unlock" });
+$("save").onclick = () => quietly({ do: "say", line: "$save" });
+$("pause").onclick = () => quietly({ do: "pause" });
+$("speed").onchange = () => quietly({ do: "speed", speed: Number($("speed").value) });
+$("seek").onchange = () => quietly({ do: "seek", time_s: Number($("seek").value) });
+for (const name of ["fan", "policy", "speed", "seek"]) {
+  const one = $(name);
+  one.addEventListener("pointerdown", () => held.add(name));
+  one.addEventListener("keydown", () => held.add(name));
+  for (const end of ["change", "blur"]) one.addEventListener(end, () => setTimeout(() => held.delete(name), 500));
+}
+$("console").onsubmit = (event) => {
+  event.preventDefault();
+  const line = $("line").value.trim();
+  if (!line) return;
+  tell(`> ${line}`);
+  quietly({ do: "say", line });
+  $("line").value = "";
+};
+$("find").oninput = () => {
+  for (const row of $("settings").rows) row.hidden = !row.textContent.toLowerCase().includes($("find").value.toLowerCase());
+};
+for (const [at, select] of document.querySelectorAll("[data-plot]").entries()) {
+  for (const [value, text] of Object.entries(QUANTITIES)) select.add(new Option(text, value));
+  select.value = at === 0 ? "temperature_c" : "current_a";
+}
+setInterval(() => { if (!document.hidden) { plot(0); plot(1); } }, 500);
+connect();

@@ -1,0 +1,77 @@
+"""What a page shows and does, whatever is behind it: a state that is replaced whole, its history, and wishes."""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from typing import Any
+
+HISTORY_S = 600.0
+POINTS = 1200
+"""Most points of history that a new page gets."""
+SERIES = ("temperature_c", "measured_c", "current_a", "voltage_v", "power_w", "duty", "phase")
+"""What is kept of each spring over time."""
+
+
+class Source:
+    """One array as all pages see it."""
+
+    kind = ""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._state: dict[str, Any] = {"connected": False, "trouble": "looking for the board"}
+        self._revision = 0
+        self._history: deque[dict[str, Any]] = deque()
+        self.closing = threading.Event()
+
+    @property
+    def revision(self) -> int:
+        """Counts the states: another number, another state."""
+        return self._revision
+
+    def state(self) -> dict[str, Any]:
+        """Return the state as it is now."""
+        with self._lock:
+            return self._state | {"kind": "state", "source": self.kind, "revision": self._revision}
+
+    def history(self) -> dict[str, Any]:
+        """Return the last minutes: {time_s: (n,), name: (k, n) ...}."""
+        with self._lock:
+            rows = list(self._history)
+        rows = rows[:: 1 + len(rows) // POINTS]
+        out: dict[str, Any] = {"kind": "history", "time_s": [row["time_s"] for row in rows]}
+        for name in SERIES:
+            out[name] = [list(one) for one in zip(*(row[name] for row in rows), strict=True)] if rows else []
+        return out
+
+    def _change(self, **values: Any) -> None:
+        with self._lock:
+            self._state = self._state | values
+            self._revision += 1
+
+    def _remember(self, row: dict[str, Any]) -> None:
+        with self._lock:
+            if self._history and row["time_s"] < self._history[-1]["time_s"]:
+                self._history.clear()
+            self._history.append({name: row[name] for name in ("time_s", *SERIES)})
+            while row["time_s"] - self._history[0]["time_s"] > HISTORY_S:
+                self._history.popleft()
+
+    def settings(self) -> list[dict[str, Any]]:
+        """Return the settings with value, unit and range; none where there is no board."""
+        return []
+
+    def start(self) -> None:
+        """Begin."""
+
+    def stop_now(self) -> None:
+        """Switch everything off, at once, from any thread."""
+
+    def do(self, wish: dict[str, Any]) -> str:
+        """Carry out a wish; return the board's words. WorkError or InputError where it is refused."""
+        raise NotImplementedError
+
+    def close(self) -> None:
+        """Switch everything off and end."""
+        self.closing.set()

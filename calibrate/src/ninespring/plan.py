@@ -1,0 +1,131 @@
+"""A steps.txt that identifies an array: every spring on and off at its own times and levels, within the limits.
+
+What a fit needs: each spring heats while its neighbours do and while they do not, at more than one level, some beyond the
+transformation; the fan blows for a part; at the end everything cools. What the array stands: the supply's current, the
+springs' temperature, as the declared array's simulation has it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from . import native
+from .errors import InputError
+from .fit.simulate import array_parameters
+from .models import Array
+
+LEVELS = (100, 100, 75, 50)
+"""Percent of the current; full level half of the time, for only that transforms."""
+SHORTEST_S, LONGEST_S = 30.0, 150.0
+"""A spring stays on or off for so long: from less to more than a time constant (50 s)."""
+FAN_FROM, FAN_TO, COOL_FROM = 0.45, 0.7, 0.88
+"""Parts of the duration."""
+BACK_OFF_S = 5.0
+LEAST_S = 300.0
+
+
+@dataclass
+class Stretch:
+    """A spring is driven from one time to another (s), at a level in percent."""
+
+    spring: int
+    begin_s: float
+    end_s: float
+    level: int
+
+
+@dataclass
+class Plan:
+    """What to send, and what is expected of it."""
+
+    steps: list[str]
+    hottest_c: float
+    most_a: float
+    share_on: np.ndarray
+    """(springs,) part of the time that each spring is driven."""
+
+
+def make_plan(
+    array: Array, duration_s: float, current_a: float, supply_a: float, hottest_c: float, seed: int = 1
+) -> Plan:
+    """Return a plan; `current_a` is a spring's at full level, `supply_a` the most of all, `hottest_c` of any spring."""
+    if duration_s < LEAST_S:
+        raise InputError(f"{duration_s:g} s are too short to identify an array: {LEAST_S:g} s or more")
+    if supply_a < current_a:
+        raise InputError(f"the supply's {supply_a:g} A do not drive one spring with {current_a:g} A")
+    stretches = _stretches(array.springs, duration_s, supply_a / current_a * 100.0, np.random.default_rng(seed))
+    drive, temperature = _simulated(array, stretches, duration_s, current_a)
+    for _ in range(20 * len(stretches)):
+        rows, springs = np.nonzero(temperature > hottest_c)
+        if not rows.size:
+            break
+        # the one that is too hot first, or a neighbour that heats it, ends a little before
+        row, k = int(rows[0]), int(springs[0])
+        on = [one for one in stretches if one.begin_s <= row < one.end_s + LONGEST_S]
+        guilty = max(on, key=lambda one: (one.spring == k, one.end_s >= row, one.level))
+        guilty.end_s = min(guilty.end_s, float(row)) - BACK_OFF_S
+        stretches = [one for one in stretches if one.end_s - one.begin_s >= BACK_OFF_S]
+        drive, temperature = _simulated(array, stretches, duration_s, current_a)
+    else:
+        raise InputError(f"no plan keeps the springs below {hottest_c:g} degC with {current_a:g} A: lower the current")
+    return Plan(
+        steps=_lines(stretches, duration_s, current_a),
+        hottest_c=float(temperature.max()),
+        most_a=float(drive.sum(axis=1).max()),
+        share_on=(drive > 0).mean(axis=0),
+    )
+
+
+def _stretches(springs: int, duration_s: float, most: float, rng: np.random.Generator) -> list[Stretch]:
+    """Return who is driven when; `most` is the sum of levels that the supply gives, percent.
+
+    Whoever is due and does not fit waits, and the one that was driven least goes first.
+    """
+    out: list[Stretch] = []
+    due_s = rng.uniform(5.0, LONGEST_S, springs)
+    on_s, turns = np.zeros(springs), np.zeros(springs, dtype=int)
+    end_of_heating = round(COOL_FROM * duration_s)
+    for now in range(int(end_of_heating - SHORTEST_S)):
+        taken = sum(one.level for one in out if one.end_s > now)
+        for k in sorted(np.flatnonzero(due_s <= now), key=lambda k: on_s[k]):
+            level = LEVELS[(k + turns[k]) % len(LEVELS)]
+            if taken + level > most:
+                continue
+            end = min(now + round(rng.uniform(SHORTEST_S, LONGEST_S)), end_of_heating)
+            out.append(Stretch(int(k), now, end, level))
+            taken += level
+            on_s[k] += end - now
+            turns[k] += 1
+            due_s[k] = end + rng.uniform(SHORTEST_S, LONGEST_S)
+    return out
+
+
+def _simulated(
+    array: Array, stretches: list[Stretch], duration_s: float, current_a: float
+) -> tuple[np.ndarray, np.ndarray]:
+    time_s = np.arange(0.0, duration_s)
+    drive = np.zeros((len(time_s), array.springs))
+    for one in stretches:
+        drive[(time_s >= one.begin_s) & (time_s < one.end_s), one.spring] = one.level / 100.0 * current_a
+    fan = ((time_s >= FAN_FROM * duration_s) & (time_s < FAN_TO * duration_s)).astype(float)
+    plant = native.Plant(array.rows, array.cols)
+    plant.set_all(array_parameters(array))
+    plant.set_effects(["latent_heat", "resistance_phase"])
+    plant.reset()
+    ambient = np.full(len(time_s), plant.get("ambient_c"))
+    return drive, plant.simulate(time_s, native.CURRENT, drive, fan, ambient)
+
+
+def _lines(stretches: list[Stretch], duration_s: float, current_a: float) -> list[str]:
+    events: list[tuple[float, int, str]] = [
+        (round(FAN_FROM * duration_s), 0, "fan 100"),
+        (round(FAN_TO * duration_s), 0, "fan 0"),
+        (round(COOL_FROM * duration_s), 2, "off all"),
+    ]
+    for one in stretches:
+        events.append((one.end_s, 0, f"off {one.spring + 1}"))
+        events.append((one.begin_s, 1, f"on {one.spring + 1} {one.level}"))
+    head = ["policy open", f"$open_current_a={current_a:.3f}", "fan 0"]
+    return head + [f"at {at:g} = {line}" for at, _, line in sorted(events)]

@@ -1,0 +1,63 @@
+"""`ninespring plan`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from .console import ARRAY, FILE, Command, beside, write
+from .logs import check_folder
+from .models import Array, read_array
+
+
+@click.command(
+    cls=Command,
+    epilog="""\b
+Examples:
+  ninespring plan -o steps.txt
+  ninespring plan --array array.toml --supply 10 --duration 1200 -o steps.txt
+  ninespring record --port /dev/ttyACM0 --run steps.txt --duration 900 -o board1.csv
+""",
+)
+@ARRAY
+@click.option("--duration", type=click.FloatRange(1, 36000), default=900.0, show_default=True, help="s")
+@click.option(
+    "--current", type=click.FloatRange(0.1, 3.2), default=2.0, show_default=True, help="A, one spring at full level"
+)
+@click.option(
+    "--supply", type=click.FloatRange(0.1, 60), default=14.0, show_default=True, help="A, all springs together"
+)
+@click.option(
+    "--hottest",
+    type=click.FloatRange(40, 200),
+    default=105.0,
+    show_default=True,
+    help="degC, of any spring, as declared",
+)
+@click.option("--seed", type=click.IntRange(0), default=1, show_default=True, help="another one: another plan")
+@click.option("-o", "--output", type=FILE, required=True, help="steps.txt to write; - prints it")
+def plan(
+    array_path: Path | None, duration: float, current: float, supply: float, hottest: float, seed: int, output: Path
+) -> None:
+    """Write the steps of a recording that identifies an array, within what its supply and its springs stand.
+
+    The springs' temperatures are those of the declared array; the board's own limits hold all the same.
+    """
+    from .plan import make_plan
+
+    check_folder(output)
+    array = read_array(array_path) if array_path else Array()
+    made = make_plan(array, duration, current, supply, hottest, seed)
+    head = [
+        f"# {array.rows} x {array.cols} springs, {duration:g} s; at most {made.most_a:.2f} A of {supply:g}, "
+        f"{made.hottest_c:.0f} degC of {hottest:g} if the array is as declared",
+        f"# ninespring record --run {output.name} --duration {duration:g} --port PORT --thermometers PORT -o run1.csv",
+    ]
+    write({output: "\n".join([*head, *made.steps]) + "\n"})
+    beside(output).print(
+        f"{len(made.steps)} steps -> {output}: at most {made.most_a:.2f} A, {made.hottest_c:.0f} degC; each spring is on "
+        f"for {100 * made.share_on.min():.0f} to {100 * made.share_on.max():.0f} % of the time",
+        soft_wrap=True,
+        markup=False,
+    )

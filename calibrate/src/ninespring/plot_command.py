@@ -1,0 +1,52 @@
+"""`ninespring plot`."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+
+import click
+
+from .console import ARRAY, FILE, Command, array_of, notes_of, out, working
+from .errors import InputError
+from .logs import check_folder, read_log
+from .models import read_array, read_model
+
+PICTURES = (".png", ".svg", ".pdf", ".gif")
+
+
+@click.command(
+    cls=Command,
+    epilog="""\b
+Examples:
+  ninespring plot run1.csv -o run1.png
+  ninespring plot run1.csv --model diagnosis/model.toml -o run1.svg
+  ninespring plot run1.csv -o run1.gif
+""",
+)
+@click.argument("log", type=FILE)
+@click.option("--model", "model_path", type=FILE, help="model.toml: what it makes of the log, dashed")
+@ARRAY
+@click.option("-o", "--output", type=FILE, required=True, help="picture: .png, .svg, .pdf; .gif: the array in motion")
+def plot(log: Path, model_path: Path | None, array_path: Path | None, output: Path) -> None:
+    """Draw a log: each spring's temperature (degC) and what it was given."""
+    kind = output.suffix.lower()
+    if kind not in PICTURES:
+        raise InputError(f"'{kind}' is none of {', '.join(PICTURES)}", output)
+    check_folder(output)
+    from . import plotting
+    from .fit.predict import predict
+
+    model = read_model(model_path) if model_path else None
+    array = model.array if model else read_array(array_path) if array_path else None
+    run = read_log(log, array.springs if array else None, temperatures=False)
+    notes_of([run])
+    with working("drawing"), tempfile.TemporaryDirectory(dir=output.parent, prefix=".plot-") as folder:
+        made = Path(folder) / f"picture{kind}"
+        if kind == ".gif":
+            array = array_of(array, [run])
+            plotting.animate(run, array.rows, array.cols, made)
+        else:
+            plotting.figure(run, predict(model, run) if model else None).savefig(made, dpi=150)
+        made.replace(output.resolve())
+    out.print(f"{len(run.time_s)} rows -> {output}", soft_wrap=True, markup=False)

@@ -1,0 +1,23 @@
+/* What it is for: says what is always true, so that whatever breaks it stops there and then.
+ * What it owns: nothing. It is on in every build for a host, and costs the chip nothing.
+ * What it never does: judge what comes from outside; that is refused, with a status. */
+#ifndef INVARIANT_H
+#define INVARIANT_H
+
+#ifdef __AVR__
+#define INVARIANT(condition) ((void)sizeof(condition)) /* checked by the compiler, never run */
+#else
+#include <stdio.h>
+#include <stdlib.h>
+
+static inline void invariant_broken(const char *condition, const char *file, int line)
+{
+    fprintf(stderr, "%s:%d: broken: %s\n", file, line, condition);
+    abort();
+}
+
+#define INVARIANT(condition)                                                                       \
+    ((condition) ? (void)0 : invariant_broken(#condition, __FILE__, __LINE__))
+#endif
+
+#endif

@@ -1,0 +1,81 @@
+"""`import ninespring as ns`: the page docs/python.md does what it says."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import ninespring as ns
+import numpy as np
+import pytest
+from fake_board import FakeBoard, row
+
+ROOT = Path(__file__).resolve().parents[2]
+SIM = Path(os.environ.get("NINESPRING_SIM", ROOT / "build" / "host" / "ninespring-sim"))
+LATENT = {"latent_heat": {"latent_heat_j": 8.0}}
+
+
+def test_the_page_about_python_runs(make_log, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    make_log("run1.csv", effects=LATENT)
+    blocks = re.findall(r"^```python\n(.*?)^```", (ROOT / "docs" / "python.md").read_text(), re.MULTILINE | re.DOTALL)
+    assert len(blocks) == 3
+    if not SIM.exists():
+        blocks = [one for one in blocks if "simulated" not in one]
+    monkeypatch.chdir(tmp_path)
+    space: dict[str, object] = {}
+    for block in blocks:
+        exec(block, space)
+    assert space["found"].effects == ["latent_heat"]
+    assert repr(space["found"]).startswith("<diagnosis: latent_heat; ")
+    predicted, run = space["predicted"], space["run"]
+    assert predicted.shape == space["on_chip"].shape == run.temperature_c.shape
+    assert np.sqrt(np.nanmean((predicted - run.temperature_c) ** 2)) < 0.35
+    assert (tmp_path / "run1.png").stat().st_size > 20_000
+    assert ns.read_model("model.toml").effects == ["latent_heat"]
+    assert len(repr(run)) < 100 and len(repr(space["found"].model)) < 100
+    if SIM.exists():
+        now = space["now"]
+        assert now.current_a[4] > 0.8 and now.current_a[[0, 8]].tolist() == [0.0, 0.0]
+        assert now.fan == 0.5 and len(repr(now)) < 100
+
+
+def test_fit_takes_what_read_log_gave_or_a_path(make_log) -> None:
+    log = make_log(effects=LATENT, seconds=300)
+    by_path, by_run = ns.fit(log, effects=["latent_heat"]), ns.fit(ns.read_log(log), effects=["latent_heat"])
+    assert by_path.parameters == by_run.parameters
+    with pytest.raises(ns.InputError, match="there is no effect 'ghosts'"):
+        ns.fit(log, effects=["ghosts"])
+    with pytest.raises(ns.InputError, match="no log"):
+        ns.diagnose()
+
+
+def test_a_board_is_off_after_its_block_also_after_an_error() -> None:
+    fake = FakeBoard({"on 9 100": ["error:10 locked after a reset; type unlock"]})
+    fake.stream = [row(1.0, 0.5)] * 3
+    with pytest.raises(ns.WorkError, match="locked after a reset"), ns.Board(fake.port) as board:
+        board.on(1, 50)
+        assert board.read().current_a.tolist() == [0.5]
+        with pytest.raises(ns.InputError, match="one line"):
+            board.ask("on 1\non 2")
+        board.on(9)
+    sent = fake.sent()
+    assert sent.index("on 1 50") < sent.index("on 9 100") < sent.index("off all")
+
+
+@pytest.mark.parametrize(("name", "begins"), [("p.png", b"\x89PNG"), ("p.svg", b"<?xml"), ("p.gif", b"GIF89a")])
+def test_plot_draws_a_log(make_log, tmp_path: Path, name: str, begins: bytes) -> None:
+    log = make_log(seconds=60)
+    command = [sys.executable, "-m", "ninespring", "plot", str(log), "-o", str(tmp_path / name)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / name).read_bytes().startswith(begins)
+    assert sorted(one.name for one in tmp_path.iterdir()) == sorted([name, log.name])
+
+
+def test_plot_refuses_a_picture_that_it_cannot_make(make_log, tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "ninespring", "plot", str(make_log(seconds=60)), "-o", str(tmp_path / "p.bmp")]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 2 and ".png, .svg, .pdf, .gif" in done.stderr

@@ -1,0 +1,69 @@
+"""The repository as others meet it: one version, a site without broken links, a package that installs anywhere."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import site
+import subprocess
+import sys
+import venv
+from pathlib import Path
+
+import ninespring
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+VERSION = re.search(r"project\(ninespring VERSION ([0-9.]+)", (ROOT / "CMakeLists.txt").read_text())[1]
+
+
+def run(*words: object, **more: object) -> subprocess.CompletedProcess[str]:
+    done = subprocess.run(list(map(str, words)), capture_output=True, text=True, timeout=280, check=False, **more)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done
+
+
+def test_the_version_stands_in_one_place() -> None:
+    assert ninespring.__version__ == VERSION
+    assert f"\nversion: {VERSION}\n" in (ROOT / "CITATION.cff").read_text()
+    assert f"## {VERSION}\n" in (ROOT / "CHANGELOG.md").read_text()
+    for library in ROOT.glob("lib/*/library.json"):
+        assert json.loads(library.read_text())["version"] == VERSION, library
+
+
+def test_the_site_builds_without_a_warning(tmp_path: Path) -> None:
+    run(sys.executable, "-m", "mkdocs", "build", "--strict", "-f", ROOT / "mkdocs.yml", "-d", tmp_path / "site")
+    index = (tmp_path / "site" / "index.html").read_text()
+    # nothing is loaded from elsewhere
+    assert not re.findall(r'<(?:script|link)[^>]+(?:src|href)="https?://(?!127)[^"]+\.(?:js|css)', index)
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the wheel that is built from the source distribution alone, where no other source is."""
+    folder = tmp_path_factory.mktemp("dist")
+    run(sys.executable, "-m", "build", "--sdist", "--no-isolation", "-o", folder, ROOT)
+    (sdist,) = folder.glob("*.tar.gz")
+    assert sdist.stat().st_size < 2e6
+    run(
+        sys.executable, "-m", "pip", "wheel", "-q", "--no-deps", "--no-build-isolation", "-w", folder, sdist, cwd=folder
+    )
+    (made,) = folder.glob("*.whl")
+    return made
+
+
+def test_the_wheel_works_without_the_tree_beside_it(wheel: Path, tmp_path: Path) -> None:
+    assert wheel.name.startswith(f"ninespring-{VERSION}-py3-none-")
+    venv.create(tmp_path / "venv", with_pip=False)
+    python = tmp_path / "venv" / "bin" / "python"
+    home = next((tmp_path / "venv" / "lib").glob("python*")) / "site-packages"
+    run(sys.executable, "-m", "pip", "install", "-q", "--no-deps", "--target", home, wheel)
+    # what it depends on, from here; not what is installed here in editable form
+    (home / "dependencies.pth").write_text("\n".join(site.getsitepackages()) + "\n")
+    code = "import ninespring, ninespring.native as n; n.library(); print(ninespring.__file__, ninespring.__version__)"
+    clean = {name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "NINESPRING"))}
+    said = run(python, "-c", code, cwd=tmp_path, env=clean).stdout.split()
+    assert said == [str(home / "ninespring" / "__init__.py"), VERSION]
+    assert (home / "ninespring" / "py.typed").exists()
+    assert "dashboard" in run(python, "-m", "ninespring", "--help", cwd=tmp_path, env=clean).stdout
