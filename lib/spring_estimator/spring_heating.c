@@ -92,7 +92,9 @@ static void hold_back(const spring_estimator_t *e, const spring_belief_t *b, the
     }
     const float latent_k =
         martensite ? 0.0f : b->begun_missing * e->latent_heat_j / e->heat_capacity_j_per_k;
-    const float most_k = (limit_c + SHIFT_BOUND_K - b->begun_c + latent_k) * CAPACITY_BOUND;
+    /* where some austenite is left for certain, its transformation is where it was */
+    const float shift_k = (b->possible & SPRING_PHASE_AUSTENITE) != 0 ? 0.0f : SHIFT_BOUND_K;
+    const float most_k = (limit_c + shift_k - b->begun_c + latent_k) * CAPACITY_BOUND;
     if (b->heat_k < most_k) {
         spring_set_temperature(model, k, limit_c, SPRING_PHASE_MARTENSITE);
     }
