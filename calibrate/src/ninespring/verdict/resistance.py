@@ -40,8 +40,8 @@ STEP_GRID = 24
 """Times of a run at which a contact may have changed."""
 LEAST_NATS = 3.0
 """Evidence, after the price of numbers and of choosing, from which v / i names an effect: one in twenty."""
-SMALLEST_RISE = 2e-4
-"""Per K: a fifth of NiTi's usual rise; below it the scale of a current sensor that drifts with its own heat explains as much."""
+SMALLEST_RISE = 3e-4
+"""Per K: a third of NiTi's usual rise; below it the steps of a board's voltage readings (4 mV of some 0.2 V) explain as much."""
 SMALLEST_PHASE = 0.02
 """Difference between the phases, as a part of the resistance, that is told."""
 SMALLEST_OHM = 0.002
