@@ -36,6 +36,9 @@ public:
                     ? "the loop cannot be made from this plant and these settings"
                     : fmt::format("the chip refuses {}; set it in [chip]", setting_name(bad)));
         }
+        controller_set_temperature(
+            loop_controller(loop_.get()),
+            static_cast<std::int16_t>(std::lround(plant_ambient_c(request.plant) * 128.0)));
     }
 
     void act(const scenario_event &event) override

@@ -1,6 +1,7 @@
 /* What it is for: a plant driven by the chip's controller with given settings, in one call.
  * What it owns: the walk from console lines to a controller, and the rows that come back.
  * What it never does: judge what it sees. */
+#include <math.h>
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdio.h>
@@ -17,7 +18,7 @@ EXPORT int chip_drive(const plant_t *plant, const char *lines, const int *patter
                       size_t on_rows, double *temperature_c, double *austenite, char *message,
                       size_t message_size);
 
-/* The plant from where it is, driven by the firmware's defaults with these console lines:
+/* The plant from where it is (cold), driven by the firmware's defaults with these console lines:
  * pattern[n] on for on_rows seconds, then off; rows[r] of temperature_c and austenite (n each) are
  * what it truly has after r seconds. 0 done; -1 a line is refused, -2 the controller refuses the
  * settings (message says which). */
@@ -38,6 +39,9 @@ int chip_drive(const plant_t *plant, const char *lines, const int *pattern, size
                        bad == UINT16_MAX ? "settings" : parameter_row(bad).name);
         return -2;
     }
+    /* It is told that they are cold, as by `model cold`: old and new settings begin knowing the same. */
+    controller_set_temperature(loop_controller(loop),
+                               (int16_t)lround(plant_ambient_c(loop_plant(loop)) * 128.0));
     const int springs = plant_spring_count(plant);
     bool on[CONTROLLER_MAX_SPRINGS] = {false};
     for (int k = 0; k < springs; k++) {
