@@ -62,6 +62,8 @@ public:
         boot();
         look();
         configure(*request.settings);
+        board_->command("model cold", ANSWER_LIMIT_MS); /* the springs are at ambient, which a board
+                                                           that was off cannot know */
         look();
         /* The experiment begins with the springs as the plant has them, whatever the board did
          * until now. */
