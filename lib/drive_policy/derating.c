@@ -5,11 +5,11 @@
 
 float derating_share(float temperature_c, float limit_c, float band_k)
 {
-    const float share = (limit_c - temperature_c) / band_k;
-    if (share >= 1.0f) {
+    const float below_k = limit_c - temperature_c;
+    if (below_k >= band_k) { /* as a rule: no division */
         return 1.0f;
     }
-    return share > 0.0f ? share : 0.0f;
+    return below_k > 0.0f ? below_k / band_k : 0.0f;
 }
 
 float derating_severity(float highest_c, float rise_k_per_s, float limit_c)

@@ -29,9 +29,9 @@
 #define SUSPECTED_W   0.038f /* stops a fall of 0.1 K/s */
 #define FOLLOW_S      4.0f   /* a distance from the held temperature is closed in */
 #define SHORT_MOST_K  20.0f
-#define KEPT_K        3.0f  /* above austenite start what was reached is worth keeping */
-#define TURN_K        6.0f  /* colder than one that heats: it is its turn */
-#define GOES_ON_K     4.0f  /* below austenite start: keeps its turn */
+#define KEPT_C7       (3 * 128) /* above austenite start what was reached is worth keeping */
+#define TURN_C7       (6 * 128) /* colder than one that heats: it is its turn */
+#define GOES_ON_C7    (4 * 128) /* below austenite start: keeps its turn */
 #define LOOK_MA       2000u /* of a spring of which much was learnt and nothing is known */
 #define UNDRIVEN_SDS  2.0f
 #define NEIGHBOUR_SD  0.15f /* of the rise of a spring that its neighbours heat */
@@ -103,7 +103,7 @@ static float kelvin(uint16_t value_ck)
 
 static float now_c(const thermal_model_t *model, uint8_t k)
 {
-    return (float)thermal_model_temperature_c7(model, k) * (1.0f / 128.0f);
+    return spring_c(thermal_model_temperature_c7(model, k));
 }
 
 static bool is_full(uint16_t level_permille)
@@ -113,7 +113,7 @@ static bool is_full(uint16_t level_permille)
 
 static float phase_of(const drive_policy_t *policy, const thermal_model_t *model, uint8_t k)
 {
-    return spring_estimator_austenite(&policy->estimator, model, k).value;
+    return spring_estimator_phase(&policy->estimator, model, k);
 }
 
 static void enter(drive_policy_t *policy, thermal_model_t *model, uint8_t k,
@@ -123,6 +123,7 @@ static void enter(drive_policy_t *policy, thermal_model_t *model, uint8_t k,
     supply_queue_remove(&policy->queue, k);
     s->floor_ma = s->stage == DRIVE_POLICY_STAGE_HOLD ? s->wanted_ma : 0; /* until its turn */
     s->stage = (uint8_t)stage;
+    const thermal_model_transformation_t points = thermal_model_transformation(model, k);
     switch (stage) {
     case DRIVE_POLICY_STAGE_OFF:
         s->wanted_ma = 0;
@@ -134,8 +135,9 @@ static void enter(drive_policy_t *policy, thermal_model_t *model, uint8_t k,
         break;
     case DRIVE_POLICY_STAGE_HOLD:
         spring_estimator_begin_hold(&policy->estimator, model, k, is_full(level_permille));
-        s->margin_k = spring_transformation(model, k).austenite_finish_c + BLIND_BEGIN_K -
-                      spring_transformation(model, k).martensite_start_c;
+        s->margin_k =
+            spring_c((int16_t)(points.austenite_finish_c7 - points.martensite_start_c7)) +
+            BLIND_BEGIN_K;
         s->wanted_ma = policy->parameters.probe_current_ma;
         break;
     case DRIVE_POLICY_STAGE_LOWER:
@@ -169,9 +171,9 @@ static void heat(drive_policy_t *policy, thermal_model_t *model, uint8_t k, uint
 {
     drive_policy_spring_t *s = &policy->spring[k];
     const spring_belief_t *b = &policy->estimator.spring[k];
-    const spring_transformation_t points = spring_transformation(model, k);
+    const thermal_model_transformation_t points = thermal_model_transformation(model, k);
     const uint16_t boost_ma = policy->parameters.boost_current_ma;
-    const float c = now_c(model, k);
+    const int16_t c7 = thermal_model_temperature_c7(model, k);
     if (b->possible == SPRING_PHASE_ANY) { /* nothing is known: a look, or until it is cold */
         s->wanted_ma = b->learnt.austenite_ohm > 0.0f && policy->estimator.observes ? LOOK_MA : 0;
         return;
@@ -181,22 +183,22 @@ static void heat(drive_policy_t *policy, thermal_model_t *model, uint8_t k, uint
     const float level = 0.001f * (float)level_permille;
     const float phase = phase_of(policy, model, k);
     /* its own limit leaves too little to go on, and it is hot enough to have transformed */
-    const bool ends = s->ceiling_ma < boost_ma - (boost_ma >> 2) && c > points.austenite_finish_c;
+    const bool ends = s->ceiling_ma < boost_ma - (boost_ma >> 2) && c7 > points.austenite_finish_c7;
     if (ends ||
         (full ? spring_estimator_has_transformed(&policy->estimator, model, k) : phase >= level)) {
         enter(policy, model, k, DRIVE_POLICY_STAGE_HOLD, level_permille);
         return;
     }
-    const bool slows = !full && c > points.austenite_start_c - 1.0f;
+    const bool slows = !full && c7 > points.austenite_start_c7 - 128;
     const bool waits = waits_for_supply(s);
     s->floor_ma = 0;
     if (slows || waits) {
         const uint16_t keeps_ma =
-            hold_current_ma(policy, model, k, c, slows ? LEVEL_POWER_W : 0.0f);
+            hold_current_ma(policy, model, k, spring_c(c7), slows ? LEVEL_POWER_W : 0.0f);
         if (slows && keeps_ma < s->wanted_ma) {
             s->wanted_ma = keeps_ma;
         }
-        if (waits && (c > points.austenite_start_c + KEPT_K || phase > 0.5f * level)) {
+        if (waits && (c7 > points.austenite_start_c7 + KEPT_C7 || phase > 0.5f * level)) {
             s->floor_ma = keeps_ma;
         }
     }
@@ -205,20 +207,19 @@ static void heat(drive_policy_t *policy, thermal_model_t *model, uint8_t k, uint
 /* Above martensite start, by as much as its distance is unsure; never so high that a level rises.
  */
 static float safe_margin_k(const drive_policy_t *policy, const thermal_model_t *model, uint8_t k,
-                           bool full)
+                           bool full, float sd_k)
 {
     const drive_policy_parameters_t *p = &policy->parameters;
-    const spring_belief_t *b = &policy->estimator.spring[k];
-    const spring_transformation_t points = spring_transformation(model, k);
+    const thermal_model_transformation_t points = thermal_model_transformation(model, k);
     const float least_k = kelvin(p->hold_margin_cc);
     float most_k = kelvin(p->unsure_margin_cc);
-    const float band_k = points.austenite_start_c - points.martensite_start_c - LEVEL_ROOM_K;
+    const float band_k =
+        spring_c((int16_t)(points.austenite_start_c7 - points.martensite_start_c7)) - LEVEL_ROOM_K;
     if (!full && most_k > band_k) {
         most_k = band_k;
     }
     const float margin_k =
-        least_k + b->disturbance_k +
-        MARGIN_PER_SD * (spring_estimator_hold_sd_k(&policy->estimator, model, k) - MARGIN_SD_K);
+        least_k + policy->estimator.spring[k].disturbance_k + MARGIN_PER_SD * (sd_k - MARGIN_SD_K);
     return margin_k > most_k ? most_k : margin_k < least_k ? least_k : margin_k;
 }
 
@@ -242,17 +243,18 @@ static void hold(drive_policy_t *policy, thermal_model_t *model, uint8_t k, uint
         enter(policy, model, k, DRIVE_POLICY_STAGE_LOWER, level_permille);
         return;
     }
-    const float safe_k = safe_margin_k(policy, model, k, full);
+    const float sd_k = spring_estimator_hold_sd_k(&policy->estimator, model, k);
+    const float safe_k = safe_margin_k(policy, model, k, full, sd_k);
     if (full && !sees) { /* who knows whether it has transformed: above that first, then down */
         s->margin_k -= BLIND_K_PER_S * TURN_S;
         s->margin_k = s->margin_k < safe_k ? safe_k : s->margin_k;
-    } else if (s->margin_k > safe_k || !full ||
-               spring_estimator_hold_sd_k(&policy->estimator, model, k) < SEARCH_SD_K) {
+    } else if (s->margin_k > safe_k || !full || sd_k < SEARCH_SD_K) {
         s->margin_k = safe_k;
     } else if (b->quiet >= SETTLED_TURNS && b->losing == 0 && s->margin_k > SEARCH_END_K) {
         s->margin_k -= 0.001f * TURN_S * (float)policy->parameters.search_mk_per_s;
     }
-    const float target_c = spring_transformation(model, k).martensite_start_c + s->margin_k;
+    const int16_t start_c7 = thermal_model_transformation(model, k).martensite_start_c7;
+    const float target_c = spring_c(start_c7) + s->margin_k;
     const uint16_t holds_ma =
         hold_current_ma(policy, model, k, target_c, b->losing != 0 ? SUSPECTED_W : 0.0f);
     const uint16_t wanted_ma = (uint16_t)(holds_ma + policy->parameters.dither_ma / 2u);
@@ -315,11 +317,11 @@ static float severity(const drive_policy_t *policy, const thermal_model_t *model
                       drive_policy_spring_t *s)
 {
     const spring_belief_t *b = &policy->estimator.spring[k];
-    const float limit_c = spring_transformation(model, k).austenite_start_c -
-                          kelvin(policy->parameters.undriven_margin_cc);
-    const float rise_k = now_c(model, k) - 1.0f / 128.0f * (float)thermal_model_ambient_c7(model);
-    const float highest_c =
-        now_c(model, k) + UNDRIVEN_SDS * (spring_estimator_sd_k(b) + NEIGHBOUR_SD * rise_k);
+    const int16_t start_c7 = thermal_model_transformation(model, k).austenite_start_c7;
+    const float limit_c = spring_c(start_c7) - kelvin(policy->parameters.undriven_margin_cc);
+    const float c = now_c(model, k);
+    const float rise_k = c - spring_c(thermal_model_ambient_c7(model));
+    const float highest_c = c + UNDRIVEN_SDS * (spring_estimator_sd_k(b) + NEIGHBOUR_SD * rise_k);
     const float severe = derating_severity(highest_c, s->rise_k_per_s, limit_c);
     if (severe <= 0.0f) {
         s->released = false;
@@ -461,26 +463,26 @@ static void update(drive_policy_t *policy, const drive_policy_input_t *input, ui
  * of the supply unused. Far more that wait are better served one after the other. */
 static void rotate_queue(drive_policy_t *policy, const thermal_model_t *model)
 {
-    float coldest_c = 1000.0f;  /* of those that wait */
-    float warmest_c = -1000.0f; /* of those that heat, but have not begun to transform */
+    int16_t coldest_c7 = INT16_MAX; /* of those that wait */
+    int16_t warmest_c7 = INT16_MIN; /* of those that heat, but have not begun to transform */
     uint8_t warmest = 0;
     int room = 0; /* that heat, less twice those that wait */
     for (uint8_t n = 0; n < policy->queue.count; n++) {
         const uint8_t k = policy->queue.spring[n];
-        const float c = now_c(model, k);
+        const int16_t c7 = thermal_model_temperature_c7(model, k);
         if (policy->spring[k].granted_ma < policy->spring[k].wanted_ma / 2u) {
             room -= 2;
-            coldest_c = c < coldest_c ? c : coldest_c;
+            coldest_c7 = c7 < coldest_c7 ? c7 : coldest_c7;
         } else {
             room++;
-            if (c > warmest_c &&
-                c < spring_transformation(model, k).austenite_start_c - GOES_ON_K) {
-                warmest_c = c;
+            if (c7 > warmest_c7 &&
+                c7 < thermal_model_transformation(model, k).austenite_start_c7 - GOES_ON_C7) {
+                warmest_c7 = c7;
                 warmest = k;
             }
         }
     }
-    if (room >= 0 && warmest_c - TURN_K > coldest_c) {
+    if (room >= 0 && (int32_t)warmest_c7 - TURN_C7 > coldest_c7) {
         supply_queue_remove(&policy->queue, warmest);
         supply_queue_add(&policy->queue, warmest);
     }
@@ -504,6 +506,13 @@ static void take_turn(drive_policy_t *policy, const drive_policy_input_t *input)
 
 /* ---- one tick ---- */
 
+/* Rounded, without a division of 32 bits: nine of those would be a tenth of a tick's cycles. */
+static uint16_t share_of_ma(uint16_t full_ma, uint16_t level_permille)
+{
+    const uint16_t share_q16 = (uint16_t)(((uint32_t)level_permille * 33554u) >> 9); /* 65.535 */
+    return (uint16_t)(((uint32_t)full_ma * share_q16 + 0x8000u) >> 16);
+}
+
 /* What each spring asks for, after its own limits. */
 static void claim_of(drive_policy_t *policy, const drive_policy_input_t *input, uint8_t k,
                      supply_claim_t *claim)
@@ -523,8 +532,7 @@ static void claim_of(drive_policy_t *policy, const drive_policy_input_t *input, 
     if (open) {
         switch_off(policy, k);
         s->released = false;
-        s->wanted_ma = (uint16_t)((uint32_t)p->open_current_ma * input->level_permille[k] /
-                                  DRIVE_POLICY_LEVEL_FULL);
+        s->wanted_ma = share_of_ma(p->open_current_ma, input->level_permille[k]);
     } else {
         s->limits = said_of(policy, k);
     }

@@ -19,6 +19,7 @@
 #define LOSS_SD         0.12f   /* of a declared loss: 20 % */
 #define LOSS_MOST       0.45f   /* of the declared loss: no more is ever believed */
 #define LOSS_DRIFT_SD   0.0005f /* of the declared loss, in a second: 3 % in an hour */
+#define LOSS_DRIFT      (SPRING_ESTIMATOR_TURN_S * LOSS_DRIFT_SD * LOSS_DRIFT_SD)
 #define STIFFNESS_TURNS 4
 #define NEIGHBOUR_SD    0.15f /* of the rise of a spring that its neighbours heat */
 #define SHIFT_SD_K      3.0f  /* of declared transformation temperatures */
@@ -51,7 +52,7 @@ static float clamp(float value, float low, float high)
     return value < low ? low : value > high ? high : value;
 }
 
-static float from_c7(int16_t temperature_c7)
+float spring_c(int16_t temperature_c7)
 {
     return (float)temperature_c7 * (1.0f / 128.0f);
 }
@@ -63,21 +64,12 @@ static int16_t as_c7(float temperature_c)
 
 float spring_now_c(const thermal_model_t *model, uint8_t k)
 {
-    return from_c7(thermal_model_temperature_c7(model, k));
+    return spring_c(thermal_model_temperature_c7(model, k));
 }
 
 float spring_ambient_c(const thermal_model_t *model)
 {
-    return from_c7(thermal_model_ambient_c7(model));
-}
-
-spring_transformation_t spring_transformation(const thermal_model_t *model, uint8_t k)
-{
-    const thermal_model_transformation_t t = thermal_model_transformation(model, k);
-    return (spring_transformation_t){.martensite_finish_c = from_c7(t.martensite_finish_c7),
-                                     .martensite_start_c = from_c7(t.martensite_start_c7),
-                                     .austenite_start_c = from_c7(t.austenite_start_c7),
-                                     .austenite_finish_c = from_c7(t.austenite_finish_c7)};
+    return spring_c(thermal_model_ambient_c7(model));
 }
 
 static float hold_w(const thermal_model_t *model, uint8_t k, float temperature_c)
@@ -88,11 +80,11 @@ static float hold_w(const thermal_model_t *model, uint8_t k, float temperature_c
 /* The temperature, its phase as if it came from martensite, or from austenite. */
 void spring_set_temperature(thermal_model_t *model, uint8_t k, float temperature_c, uint8_t from)
 {
-    const spring_transformation_t t = spring_transformation(model, k);
+    const thermal_model_transformation_t t = thermal_model_transformation(model, k);
     thermal_model_set_temperature(model, k,
-                                  as_c7(from == SPRING_PHASE_AUSTENITE
-                                            ? t.austenite_finish_c + 1.0f
-                                            : t.martensite_finish_c - 1.0f));
+                                  (int16_t)(from == SPRING_PHASE_AUSTENITE
+                                                ? t.austenite_finish_c7 + 128
+                                                : t.martensite_finish_c7 - 128));
     thermal_model_set_temperature(model, k, as_c7(temperature_c));
 }
 
@@ -108,6 +100,7 @@ void spring_estimator_prepare(spring_estimator_t *e, const thermal_model_t *mode
     const thermal_model_parameters_t *p = &model->parameters;
     e->observes = observes;
     e->heat_capacity_j_per_k = (float)p->heat_capacity_mj_per_k * 1e-3f;
+    e->turn_k_per_w = SPRING_ESTIMATOR_TURN_S / e->heat_capacity_j_per_k;
     e->loss_w_per_k = (float)p->loss_uw_per_k * 1e-6f;
     e->latent_heat_j = (float)p->latent_heat_mj * 1e-3f;
     e->martensite_ohm = (float)p->resistance_martensite_uohm * 1e-6f;
@@ -236,26 +229,28 @@ static float predict(const spring_estimator_t *e, spring_belief_t *b, const ther
 {
     const float now_c = spring_now_c(model, k);
     const float balance_w = hold_w(model, k, now_c);
-    const float per_w = SPRING_ESTIMATOR_TURN_S / e->heat_capacity_j_per_k;
-    const float by_loss = -per_w * (now_c - spring_ambient_c(model));
-    const float drift = LOSS_DRIFT_SD * e->loss_w_per_k;
+    const float per_w = e->turn_k_per_w;
+    const float above_k = now_c - spring_ambient_c(model);
+    const float by_loss = -per_w * above_k;
     if (b->stiffness_turns-- == 0) { /* it moves with the fan and the air: slowly */
         b->stiffness_turns = STIFFNESS_TURNS;
         b->stiffness_w_per_k =
             (hold_w(model, k, now_c + 8.0f) - balance_w) * 0.125f + b->learnt.loss_w_per_k;
     }
-    b->extra_loss_uw = (int32_t)(1e6f * extra_loss_w(b, model, now_c));
+    const float extra_w = b->learnt.loss_w_per_k * above_k;
+    b->extra_loss_uw = (int32_t)(1e6f * extra_w);
     const float keeps = 1.0f - per_w * b->stiffness_w_per_k;
-    b->variance_k2 = keeps * (keeps * b->variance_k2 + 2.0f * by_loss * b->covariance) +
-                     by_loss * by_loss * b->loss_variance;
-    b->covariance = keeps * b->covariance + by_loss * b->loss_variance;
-    b->loss_variance += SPRING_ESTIMATOR_TURN_S * drift * drift;
+    const float kept = keeps * b->covariance;
+    const float joins = by_loss * b->loss_variance;
+    b->variance_k2 = keeps * keeps * b->variance_k2 + by_loss * (kept + kept + joins);
+    b->covariance = kept + joins;
+    b->loss_variance += LOSS_DRIFT * e->loss_w_per_k * e->loss_w_per_k;
     b->capacity_k = keeps * b->capacity_k + CAPACITY_SD * (now_c - b->last_c);
     if (b->variance_k2 < LEAST_SD_K * LEAST_SD_K) {
         b->variance_k2 = LEAST_SD_K * LEAST_SD_K;
     }
     b->last_c = now_c;
-    return per_w * (power_w - balance_w - 1e-6f * (float)b->extra_loss_uw);
+    return per_w * (power_w - balance_w - extra_w);
 }
 
 static void correct_loss(const spring_estimator_t *e, spring_belief_t *b, float more_w_per_k)
@@ -309,28 +304,32 @@ static void look(spring_estimator_t *e, thermal_model_t *model, uint8_t k)
 {
     spring_belief_t *b = &e->spring[k];
     const spring_learnt_t *l = &b->learnt;
-    const float unsure = LOOK_SD + LOOK_SDS * b->noise / fabsf(l->change);
     if (b->possible != SPRING_PHASE_ANY || l->austenite_ohm == 0.0f || b->current_a < STRONG_A ||
-        b->fresh < LOOK_TURNS || unsure > LOOK_MOST) {
+        b->fresh < LOOK_TURNS) {
         return;
     }
-    const spring_transformation_t t = spring_transformation(model, k);
+    const float unsure = LOOK_SD + LOOK_SDS * b->noise / fabsf(l->change);
+    if (unsure > LOOK_MOST) {
+        return;
+    }
+    const thermal_model_transformation_t t = thermal_model_transformation(model, k);
     const float austenite = 1.0f - (1.0f - b->slow_ohm / l->austenite_ohm) / l->change;
-    float low_c = t.martensite_finish_c;
-    float high_c = t.austenite_finish_c;
+    int16_t low_c7 = t.martensite_finish_c7;
+    int16_t high_c7 = t.austenite_finish_c7;
     uint8_t phase = SPRING_PHASE_BETWEEN;
     if (austenite < unsure) {
-        low_c = spring_ambient_c(model);
-        high_c = t.austenite_start_c;
+        low_c7 = thermal_model_ambient_c7(model);
+        high_c7 = t.austenite_start_c7;
         phase = SPRING_PHASE_MARTENSITE;
     } else if (austenite > 1.0f - unsure) {
-        low_c = t.martensite_start_c;
+        low_c7 = t.martensite_start_c7;
         phase = SPRING_PHASE_AUSTENITE;
     }
+    const float middle_c = 0.5f * (spring_c(low_c7) + spring_c(high_c7));
     const uint8_t fresh = b->fresh;
     const bool heating = b->heating;
-    begin(b, 0.5f * (low_c + high_c), UNIFORM_SD * (high_c - low_c), phase);
-    spring_set_temperature(model, k, 0.5f * (low_c + high_c),
+    begin(b, middle_c, UNIFORM_SD * spring_c((int16_t)(high_c7 - low_c7)), phase);
+    spring_set_temperature(model, k, middle_c,
                            austenite > 0.5f ? SPRING_PHASE_AUSTENITE : SPRING_PHASE_MARTENSITE);
     b->last_c = spring_now_c(model, k);
     b->fresh = fresh;
@@ -341,12 +340,13 @@ static void look(spring_estimator_t *e, thermal_model_t *model, uint8_t k)
 
 /* Heat capacity where the hottest possible spring is: on its way it gives off its latent heat. */
 static float hottest_capacity_j_per_k(const spring_estimator_t *e, const spring_belief_t *b,
-                                      const spring_transformation_t *t)
+                                      const thermal_model_transformation_t *t)
 {
-    return b->hottest_c > t->martensite_start_c
+    return b->hottest_c > spring_c(t->martensite_start_c7)
                ? e->heat_capacity_j_per_k
                : e->heat_capacity_j_per_k +
-                     e->latent_heat_j / (t->martensite_start_c - t->martensite_finish_c);
+                     e->latent_heat_j /
+                         spring_c((int16_t)(t->martensite_start_c7 - t->martensite_finish_c7));
 }
 
 /* Of a spring of which nothing is known: the hottest that it can be, and whether that is
@@ -354,11 +354,11 @@ static float hottest_capacity_j_per_k(const spring_estimator_t *e, const spring_
 static void cool(const spring_estimator_t *e, spring_belief_t *b, const thermal_model_t *model,
                  uint8_t k)
 {
-    const spring_transformation_t t = spring_transformation(model, k);
+    const thermal_model_transformation_t t = thermal_model_transformation(model, k);
     const float above_k = b->hottest_c - spring_ambient_c(model);
     b->hottest_c -= SPRING_ESTIMATOR_TURN_S * LEAST_LOSS * e->loss_w_per_k * above_k /
                     hottest_capacity_j_per_k(e, b, &t);
-    if (b->hottest_c < t.martensite_finish_c) {
+    if (b->hottest_c < spring_c(t.martensite_finish_c7)) {
         b->possible = SPRING_PHASE_MARTENSITE;
     }
 }
@@ -387,12 +387,18 @@ void spring_estimator_update(spring_estimator_t *e, thermal_model_t *model, uint
         cool(e, b, model, k);
         return;
     }
-    const spring_transformation_t t = spring_transformation(model, k);
-    const spring_bounds_t distance_k = spring_estimator_distance_k(e, model, k);
-    if (distance_k.high < t.martensite_finish_c - t.martensite_start_c) {
-        b->possible = SPRING_PHASE_MARTENSITE;
-        b->lost = 0.0f;
-    } else if (b->possible == SPRING_PHASE_AUSTENITE && !b->reads && distance_k.low < 0.0f) {
+    const int16_t now_c7 = thermal_model_temperature_c7(model, k);
+    const thermal_model_transformation_t t = thermal_model_transformation(model, k);
+    if (now_c7 < t.martensite_finish_c7) {
+        const float below_k = spring_c((int16_t)(t.martensite_finish_c7 - now_c7));
+        if (below_k > SPRING_ESTIMATOR_BOUND_SDS * spring_estimator_sd_k(b)) {
+            b->possible = SPRING_PHASE_MARTENSITE;
+            b->lost = 0.0f;
+            return;
+        }
+    }
+    if (b->possible == SPRING_PHASE_AUSTENITE && !b->reads &&
+        spring_estimator_distance_k(e, model, k).low < 0.0f) {
         b->possible = SPRING_PHASE_BETWEEN | SPRING_PHASE_AUSTENITE; /* nothing tells any more */
     }
 }
@@ -408,12 +414,12 @@ bool spring_lacks_phase(const spring_belief_t *b, const thermal_model_t *model, 
     if (!b->reads || b->blind || l->austenite_ohm == 0.0f || b->current_a < STRONG_A) {
         return false;
     }
-    const float above_k =
-        fabsf(spring_now_c(model, k) - spring_transformation(model, k).austenite_finish_c);
+    const int16_t finish_c7 = thermal_model_transformation(model, k).austenite_finish_c7;
+    const float above_k = fabsf(spring_now_c(model, k) - spring_c(finish_c7));
     const float explained =
         EXPLAINED_LEAST + LOOK_SDS * b->noise + COEFFICIENT_MOST_PER_K * above_k;
-    const float missing = (1.0f - b->ohm / l->austenite_ohm) / l->change;
-    return missing * fabsf(l->change) > explained;
+    const float less = 1.0f - b->ohm / l->austenite_ohm;
+    return (l->change < 0.0f ? -less : less) > explained;
 }
 
 bool spring_estimator_has_transformed(const spring_estimator_t *e, const thermal_model_t *model,
@@ -430,7 +436,7 @@ bool spring_estimator_has_transformed(const spring_estimator_t *e, const thermal
                       : b->onset                      ? TRUST_ONSET_SDS
                                                       : TRUST_STILL_SDS;
     return spring_now_c(model, k) - sds * spring_estimator_sd_k(b) >
-           spring_transformation(model, k).austenite_finish_c;
+           spring_c(thermal_model_transformation(model, k).austenite_finish_c7);
 }
 
 void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, uint8_t k,
@@ -483,19 +489,21 @@ float spring_estimator_cooling_s(const spring_estimator_t *e, const thermal_mode
                                  uint8_t k)
 {
     const spring_belief_t *b = &e->spring[k];
-    const spring_transformation_t t = spring_transformation(model, k);
+    const thermal_model_transformation_t t = thermal_model_transformation(model, k);
+    const float start_c = spring_c(t.martensite_start_c7);
+    const float finish_c = spring_c(t.martensite_finish_c7);
     const float ambient_c = spring_ambient_c(model);
-    if (b->possible != SPRING_PHASE_ANY || t.martensite_finish_c <= ambient_c) {
+    if (b->possible != SPRING_PHASE_ANY || finish_c <= ambient_c) {
         return 0.0f;
     }
     const float loss = LEAST_LOSS * e->loss_w_per_k;
-    const float hot_c = fmaxf(b->hottest_c, t.martensite_start_c);
-    const float left_c = fminf(b->hottest_c, t.martensite_start_c);
-    spring_belief_t transforming = {.hottest_c = t.martensite_start_c};
+    const float hot_c = fmaxf(b->hottest_c, start_c);
+    const float left_c = fminf(b->hottest_c, start_c);
+    spring_belief_t transforming = {.hottest_c = start_c};
     return e->heat_capacity_j_per_k / loss *
-               logf((hot_c - ambient_c) / (t.martensite_start_c - ambient_c)) +
+               logf((hot_c - ambient_c) / (start_c - ambient_c)) +
            hottest_capacity_j_per_k(e, &transforming, &t) / loss *
-               logf((left_c - ambient_c) / (t.martensite_finish_c - ambient_c));
+               logf((left_c - ambient_c) / (finish_c - ambient_c));
 }
 
 static spring_bounds_t around(float value, float sd)
@@ -523,35 +531,74 @@ spring_bounds_t spring_estimator_temperature_c(const spring_estimator_t *e,
 spring_bounds_t spring_estimator_distance_k(const spring_estimator_t *e,
                                             const thermal_model_t *model, uint8_t k)
 {
-    return around(spring_now_c(model, k) - spring_transformation(model, k).martensite_start_c,
+    const int16_t start_c7 = thermal_model_transformation(model, k).martensite_start_c7;
+    return around(spring_c((int16_t)(thermal_model_temperature_c7(model, k) - start_c7)),
                   spring_estimator_sd_k(&e->spring[k]));
+}
+
+/* What the phase is told by: the best that there is. */
+typedef enum { BY_MODEL, BY_LOSS, BY_RESISTANCE, BY_ONSET } phase_source_t;
+
+static phase_source_t phase_source(const spring_belief_t *b)
+{
+    if (b->possible == SPRING_PHASE_AUSTENITE) {
+        return BY_LOSS;
+    }
+    if (b->possible == SPRING_PHASE_MARTENSITE || !spring_estimator_sees(b)) {
+        return BY_MODEL;
+    }
+    if (b->possible != SPRING_PHASE_ANY && b->learnt.austenite_ohm > 0.0f) {
+        return BY_RESISTANCE;
+    }
+    return b->onset && b->cold_ohm > 0.0f ? BY_ONSET : BY_MODEL;
+}
+
+float spring_estimator_phase(const spring_estimator_t *e, const thermal_model_t *model, uint8_t k)
+{
+    const spring_belief_t *b = &e->spring[k];
+    const spring_learnt_t *l = &b->learnt;
+    switch (phase_source(b)) {
+    case BY_LOSS:
+        return clamp(1.0f - b->lost, 0.0f, 1.0f);
+    case BY_RESISTANCE:
+        return clamp(1.0f - (1.0f - b->ohm / l->austenite_ohm) / l->change, 0.0f, 1.0f);
+    case BY_ONSET:
+        return clamp((1.0f - b->onset_ohm / b->ohm) / l->change, 0.0f, 1.0f);
+    case BY_MODEL:
+        break;
+    }
+    return (float)thermal_model_austenite(model, k) * (1.0f / 32768.0f);
+}
+
+static float phase_sd(const spring_estimator_t *e, const thermal_model_t *model, uint8_t k)
+{
+    const spring_belief_t *b = &e->spring[k];
+    switch (phase_source(b)) {
+    case BY_LOSS:
+        return b->blind ? PHASE_BLIND_SD : PHASE_SD;
+    case BY_RESISTANCE:
+        return PHASE_READ_SD;
+    case BY_ONSET:
+        return PHASE_ONSET_SD;
+    case BY_MODEL:
+        break;
+    }
+    const int16_t start_c7 = thermal_model_transformation(model, k).austenite_start_c7;
+    return b->possible == SPRING_PHASE_MARTENSITE &&
+                   spring_estimator_temperature_c(e, model, k).high < spring_c(start_c7)
+               ? PHASE_SD
+               : PHASE_BLIND_SD;
 }
 
 spring_bounds_t spring_estimator_austenite(const spring_estimator_t *e,
                                            const thermal_model_t *model, uint8_t k)
 {
+    const float value = spring_estimator_phase(e, model, k);
     const spring_belief_t *b = &e->spring[k];
-    const spring_learnt_t *l = &b->learnt;
-    const bool sees = spring_estimator_sees(b);
-    float value = (float)thermal_model_austenite(model, k) * (1.0f / 32768.0f);
-    float sd = PHASE_BLIND_SD;
-    if (b->possible == SPRING_PHASE_AUSTENITE) {
-        value = 1.0f - b->lost;
-        sd = b->blind ? PHASE_BLIND_SD : PHASE_SD;
-    } else if (b->possible == SPRING_PHASE_MARTENSITE) {
-        const spring_bounds_t c = spring_estimator_temperature_c(e, model, k);
-        sd = c.high < spring_transformation(model, k).austenite_start_c ? PHASE_SD : PHASE_BLIND_SD;
-    } else if (b->possible != SPRING_PHASE_ANY && sees && l->austenite_ohm > 0.0f) {
-        value = 1.0f - (1.0f - b->ohm / l->austenite_ohm) / l->change;
-        sd = PHASE_READ_SD;
-    } else if (sees && b->onset && b->cold_ohm > 0.0f) {
-        value = (1.0f - b->onset_ohm / b->ohm) / l->change;
-        sd = PHASE_ONSET_SD;
-    } else if (b->possible == SPRING_PHASE_ANY) {
+    if (b->possible == SPRING_PHASE_ANY && phase_source(b) == BY_MODEL) {
         return (spring_bounds_t){value, 0.0f, 1.0f};
     }
-    value = clamp(value, 0.0f, 1.0f);
-    const spring_bounds_t bounds = around(value, sd);
+    const spring_bounds_t bounds = around(value, phase_sd(e, model, k));
     return (spring_bounds_t){value, clamp(bounds.low, 0.0f, 1.0f), clamp(bounds.high, 0.0f, 1.0f)};
 }
 

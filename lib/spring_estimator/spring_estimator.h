@@ -29,11 +29,8 @@ enum {
     SPRING_PHASE_ANY = 7
 };
 
-/* Between which temperatures a spring transforms, degC, as the model has it. */
-typedef struct {
-    float martensite_finish_c, martensite_start_c, austenite_start_c, austenite_finish_c;
-} spring_transformation_t;
-spring_transformation_t spring_transformation(const thermal_model_t *model, uint8_t spring);
+/* degC of a temperature of the model. */
+float spring_c(int16_t temperature_c7);
 
 /* A spring's own numbers, what stays of it over power-off. */
 typedef struct {
@@ -110,6 +107,7 @@ typedef struct {
     uint8_t springs;
     bool observes; /* readings are used */
     float heat_capacity_j_per_k;
+    float turn_k_per_w; /* what 1 W adds in a turn */
     float latent_heat_j;
     float loss_w_per_k;
     float martensite_ohm;
@@ -187,6 +185,8 @@ spring_bounds_t spring_estimator_temperature_c(const spring_estimator_t *estimat
                                                const thermal_model_t *model, uint8_t spring);
 spring_bounds_t spring_estimator_distance_k(const spring_estimator_t *estimator,
                                             const thermal_model_t *model, uint8_t spring);
+float spring_estimator_phase(const spring_estimator_t *estimator, const thermal_model_t *model,
+                             uint8_t spring); /* of that the value alone */
 spring_bounds_t spring_estimator_austenite(const spring_estimator_t *estimator,
                                            const thermal_model_t *model, uint8_t spring);
 

@@ -12,6 +12,7 @@
 #define CHANGE_PART    0.15f /* of a transformation: less to come may not show */
 #define FLAT_K         6.0f  /* of heat without a change: it is over */
 #define ONSET_K        2.0f  /* beyond austenite start it is noticed */
+#define ONSET_C7       256   /* the same */
 #define PLACE_SD_K     3.0f
 #define SHIFT_BOUND_K  8.0f  /* 2.6 standard deviations of a declared transformation */
 #define CAPACITY_BOUND 1.25f /* the same of a heat capacity */
@@ -48,8 +49,8 @@ static void see_onset(const spring_estimator_t *e, spring_belief_t *b, thermal_m
             l->martensite_ohm =
                 b->cold_ohm / (1.0f + l->martensite_rise_per_k * (b->cold_c - 20.0f));
         }
-        (void)spring_see(e, b, model, k,
-                         spring_transformation(model, k).austenite_start_c + ONSET_K, PLACE_SD_K,
+        const int16_t start_c7 = thermal_model_transformation(model, k).austenite_start_c7;
+        (void)spring_see(e, b, model, k, spring_c(start_c7) + ONSET_K, PLACE_SD_K,
                          SPRING_PHASE_MARTENSITE);
     }
     b->possible = SPRING_PHASE_BETWEEN;
@@ -73,8 +74,9 @@ static void see_finish(const spring_estimator_t *e, spring_belief_t *b, thermal_
     b->blind = false;
     b->steep = false;
     b->lost = 0.0f;
-    (void)spring_see(e, b, model, k, spring_transformation(model, k).austenite_finish_c + b->flat_k,
-                     PLACE_SD_K, SPRING_PHASE_AUSTENITE);
+    const int16_t finish_c7 = thermal_model_transformation(model, k).austenite_finish_c7;
+    (void)spring_see(e, b, model, k, spring_c(finish_c7) + b->flat_k, PLACE_SD_K,
+                     SPRING_PHASE_AUSTENITE);
 }
 
 /* A spring that is known to show its transformation is not hotter than that lets it be, whatever
@@ -82,17 +84,21 @@ static void see_finish(const spring_estimator_t *e, spring_belief_t *b, thermal_
 static void hold_back(const spring_estimator_t *e, const spring_belief_t *b, thermal_model_t *model,
                       uint8_t k)
 {
-    const spring_transformation_t t = spring_transformation(model, k);
+    const thermal_model_transformation_t t = thermal_model_transformation(model, k);
     const bool martensite = b->possible == SPRING_PHASE_MARTENSITE;
-    const float limit_c = martensite ? t.austenite_start_c + ONSET_K : t.austenite_finish_c;
-    const float now_c = spring_now_c(model, k);
-    if (b->learnt.austenite_ohm == 0.0f || b->blind || now_c <= limit_c ||
+    const int16_t limit_c7 = martensite ? (int16_t)(t.austenite_start_c7 + ONSET_C7)
+                                        : t.austenite_finish_c7;
+    if (b->learnt.austenite_ohm == 0.0f || b->blind ||
+        thermal_model_temperature_c7(model, k) <= limit_c7 ||
         (!martensite && !spring_lacks_phase(b, model, k))) {
         return;
     }
     const float latent_k =
         martensite ? 0.0f : b->begun_missing * e->latent_heat_j / e->heat_capacity_j_per_k;
-    const float most_k = (limit_c + SHIFT_BOUND_K - b->begun_c + latent_k) * CAPACITY_BOUND;
+    const float limit_c = spring_c(limit_c7);
+    /* where some austenite is left for certain, its transformation is where it was */
+    const float shift_k = (b->possible & SPRING_PHASE_AUSTENITE) != 0 ? 0.0f : SHIFT_BOUND_K;
+    const float most_k = (limit_c + shift_k - b->begun_c + latent_k) * CAPACITY_BOUND;
     if (b->heat_k < most_k) {
         spring_set_temperature(model, k, limit_c, SPRING_PHASE_MARTENSITE);
     }

@@ -22,10 +22,11 @@
 static void see_crossing(const spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model,
                          uint8_t k, float lost)
 {
-    const spring_transformation_t t = spring_transformation(model, k);
+    const thermal_model_transformation_t t = thermal_model_transformation(model, k);
     /* the beginning of the cosine, (1 - cos pi x) / 2 */
     const float depth_k =
-        (t.martensite_start_c - t.martensite_finish_c) * 0.64f * sqrtf(fminf(lost, 1.0f));
+        spring_c((int16_t)(t.martensite_start_c7 - t.martensite_finish_c7)) * 0.64f *
+        sqrtf(fminf(lost, 1.0f));
     const bool searched = spring_estimator_sd_k(b) > 3.0f * CROSSING_SD_K;
     if (lost > LARGE_LOSS) {
         /* nearer to it by as much as more is lost up there */
@@ -37,7 +38,7 @@ static void see_crossing(const spring_estimator_t *e, spring_belief_t *b, therma
         b->covariance -= moved_k2 * by_loss;
         b->loss_variance += moved_k2 * by_loss * by_loss;
     }
-    const float error_k = spring_see(e, b, model, k, t.martensite_start_c - depth_k, CROSSING_SD_K,
+    const float error_k = spring_see(e, b, model, k, spring_c(t.martensite_start_c7) - depth_k, CROSSING_SD_K,
                                      SPRING_PHASE_AUSTENITE);
     if (!searched && -error_k > b->disturbance_k) {
         b->disturbance_k = -error_k;
@@ -90,21 +91,20 @@ void spring_holding_watch(const spring_estimator_t *e, spring_belief_t *b, therm
     const float kept_ohm =
         b->line_ohm * (1.0f + b->learnt.martensite_rise_per_k * (now_c - b->line_c));
     const float left = b->slow_ohm / kept_ohm - 1.0f;
-    const float as_learnt = -left / b->learnt.change;
-    const float lost = as_learnt > 0.0f ? as_learnt : -as_learnt / OTHER_WAY;
+    const float as_learnt = b->learnt.change < 0.0f ? left : -left;
+    const float changed = as_learnt > 0.0f ? as_learnt : -as_learnt * (1.0f / OTHER_WAY);
     /* as its temperature may have moved unseen, so may the resistance */
     const float moves = fabsf(b->learnt.martensite_rise_per_k) * spring_estimator_sd_k(b);
-    const float sure = fmaxf(fmaxf(LOSS_LEAST, moves), SURE_SDS * NOISE_IN_SLOW * b->noise) /
-                       fabsf(b->learnt.change);
-    if (lost < SUSPECTED * sure) {
+    const float sure = fmaxf(fmaxf(LOSS_LEAST, moves), SURE_SDS * NOISE_IN_SLOW * b->noise);
+    if (changed < SUSPECTED * sure) {
+        const int16_t start_c7 = thermal_model_transformation(model, k).martensite_start_c7;
         b->losing = 0;
-        b->line_ohm += b->line_ohm * left / LINE_TURNS;
-        spring_keep_above(e, b, model, k,
-                          spring_transformation(model, k).martensite_start_c - STILL_K);
+        b->line_ohm += b->line_ohm * left * (1.0f / LINE_TURNS);
+        spring_keep_above(e, b, model, k, spring_c(start_c7) - STILL_K);
         return;
     }
     b->losing = b->losing < UINT8_MAX ? (uint8_t)(b->losing + 1) : UINT8_MAX;
-    if ((lost > sure && b->losing >= CONFIRM_TURNS) || b->losing >= LASTING_TURNS) {
-        see_crossing(e, b, model, k, lost);
+    if ((changed > sure && b->losing >= CONFIRM_TURNS) || b->losing >= LASTING_TURNS) {
+        see_crossing(e, b, model, k, changed / fabsf(b->learnt.change));
     }
 }

@@ -36,10 +36,15 @@ static float clamp(float value, float low, float high)
     return value < low ? low : value > high ? high : value;
 }
 
-/* Along the line from none at low_c to all at high_c, with the heat that there is. */
-static float phase_on(float low_c, float high_c, float heat_c, float latent_k)
+/* Along the line from none at low to all at high, with the heat that there is. */
+static float phase_on(int16_t low_c7, int16_t high_c7, float heat_c, float latent_k)
 {
-    return clamp((heat_c - low_c) / (high_c - low_c + latent_k), 0.0f, 1.0f);
+    const float beyond_k = heat_c - from_c7(low_c7);
+    if (beyond_k <= 0.0f) { /* as a rule: no division */
+        return 0.0f;
+    }
+    const float width_k = from_c7((int16_t)(high_c7 - low_c7)) + latent_k;
+    return beyond_k < width_k ? beyond_k / width_k : 1.0f;
 }
 
 static void add_heat(temperature_ceiling_t *ceiling, const thermal_model_t *model, uint8_t k,
@@ -48,11 +53,12 @@ static void add_heat(temperature_ceiling_t *ceiling, const thermal_model_t *mode
     const thermal_model_transformation_t t = thermal_model_transformation(model, k);
     const float before = ceiling->austenite[k];
     const float heat_c = ceiling->temperature_c[k] + gain_k + latent_k * before;
-    const float heated =
-        phase_on(from_c7(t.austenite_start_c7), from_c7(t.austenite_finish_c7), heat_c, latent_k);
-    const float cooled =
-        phase_on(from_c7(t.martensite_finish_c7), from_c7(t.martensite_start_c7), heat_c, latent_k);
-    const float after = heated > before ? heated : cooled < before ? cooled : before;
+    float after = phase_on(t.austenite_start_c7, t.austenite_finish_c7, heat_c, latent_k);
+    if (after <= before) {
+        const float cooled =
+            phase_on(t.martensite_finish_c7, t.martensite_start_c7, heat_c, latent_k);
+        after = cooled < before ? cooled : before;
+    }
     ceiling->austenite[k] = after;
     ceiling->temperature_c[k] = clamp(heat_c - latent_k * after, LOWEST_C, HIGHEST_C);
 }
@@ -61,8 +67,9 @@ void temperature_ceiling_step(temperature_ceiling_t *ceiling, const thermal_mode
                               uint8_t k, float power_w)
 {
     const thermal_model_parameters_t *p = &model->parameters;
-    const float scale = 1e-6f * (float)p->heat_capacity_scale_permille[k];
-    const float capacity_j_per_k = scale * (float)p->heat_capacity_mj_per_k;
+    const uint32_t capacity_uj_per_k =
+        (uint32_t)p->heat_capacity_scale_permille[k] * p->heat_capacity_mj_per_k;
+    const float capacity_j_per_k = 1e-6f * (float)capacity_uj_per_k;
     const float latent_k = (float)p->latent_heat_mj / (float)p->heat_capacity_mj_per_k;
     const float now_c = ceiling->temperature_c[k];
     const float flow_w = hold_w(model, k, now_c);
@@ -88,17 +95,20 @@ void temperature_ceiling_step(temperature_ceiling_t *ceiling, const thermal_mode
 float temperature_ceiling_trip_c(const thermal_model_t *model, float trip_c)
 {
     const float ambient_c = from_c7(thermal_model_ambient_c7(model));
-    const float at_c = ambient_c + (trip_c - ambient_c) / RISE_SHARE;
+    const float at_c = ambient_c + (trip_c - ambient_c) * (1.0f / RISE_SHARE);
     return at_c < HIGHEST_C - 1.0f ? at_c : HIGHEST_C - 1.0f;
 }
 
 float temperature_ceiling_power_w(const thermal_model_t *model,
                                   const current_control_parameters_t *circuit, float duty)
 {
-    const float ohm = 1e-6f * (float)model->parameters.resistance_austenite_uohm;
-    const float fixed_ohm = 1e-3f * (float)(circuit->shunt_mohm + circuit->wiring_mohm);
-    const float swing_v = 1e-3f * (float)(circuit->supply_mv + circuit->freewheel_mv);
-    const float behind_v = swing_v * duty * (1.0f / 800.0f) - 1e-3f * (float)circuit->freewheel_mv;
-    const float current_a = behind_v > 0.0f ? behind_v / (ohm + fixed_ohm) : 0.0f;
-    return POWER_SHARE * current_a * current_a * ohm;
+    const float swing_mv = (float)((int32_t)circuit->supply_mv + circuit->freewheel_mv);
+    const float behind_mv = swing_mv * duty * (1.0f / 800.0f) - (float)circuit->freewheel_mv;
+    if (behind_mv <= 0.0f) {
+        return 0.0f;
+    }
+    const float mohm = 1e-3f * (float)model->parameters.resistance_austenite_uohm;
+    const float fixed_mohm = (float)((int32_t)circuit->shunt_mohm + circuit->wiring_mohm);
+    const float current_a = behind_mv / (mohm + fixed_mohm);
+    return POWER_SHARE * 1e-3f * current_a * current_a * mohm;
 }

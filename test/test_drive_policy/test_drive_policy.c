@@ -1,5 +1,6 @@
 /* The drive policy by what it does: to springs as they are, and where a limit is meant, by what it
  * is told of them. */
+#include <math.h>
 #include <stddef.h>
 #include <stdio.h>
 #include <string.h>
@@ -82,9 +83,12 @@ static void spring_that_has_lost_its_phase_is_heated_back(void)
     level[0] = 1000;
     (void)run(200.0);
     truth[0].shift_k = 8.0; /* a touch */
-    (void)run(30.0);
-    TEST_ASSERT_TRUE(truth[0].austenite < 0.95); /* it did lose */
-    (void)run(60.0);
+    double least = 1.0;
+    for (unsigned second = 0; second < 30; second++) {
+        (void)run(1.0);
+        least = fmin(least, truth[0].austenite);
+    }
+    TEST_ASSERT_TRUE(least < 0.95); /* it did lose */
     (void)snprintf(where, sizeof where, "%.1f degC, %.3f", truth[0].temperature_c,
                    truth[0].austenite);
     TEST_ASSERT_TRUE_MESSAGE(truth[0].austenite > 0.95, where);

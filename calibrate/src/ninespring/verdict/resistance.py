@@ -26,7 +26,7 @@ DRIVEN_A = 0.2
 REFERENCE_C = 20.0
 """Temperature of the declared resistances."""
 SEEN = 30
-"""Readings in each phase from which two resistances are told apart."""
+"""Readings in each phase from which two resistances are told apart, and before and after a contact changed."""
 KNOWN_K = 2.0
 """Structure left in the temperatures, in multiples of the noise, up to which changes of a contact are looked for."""
 BELIEVED_RISE = 0.001
@@ -40,8 +40,8 @@ STEP_GRID = 24
 """Times of a run at which a contact may have changed."""
 LEAST_NATS = 3.0
 """Evidence, after the price of numbers and of choosing, from which v / i names an effect: one in twenty."""
-SMALLEST_RISE = 2e-4
-"""Per K: a fifth of NiTi's usual rise; below it the scale of a current sensor that drifts with its own heat explains as much."""
+SMALLEST_RISE = 3e-4
+"""Per K: a third of NiTi's usual rise; below it the steps of a board's voltage readings (4 mV of some 0.2 V) explain as much."""
 SMALLEST_PHASE = 0.02
 """Difference between the phases, as a part of the resistance, that is told."""
 SMALLEST_OHM = 0.002
@@ -269,7 +269,12 @@ def _contacts(
             for at in np.linspace(times[0], times[-1], STEP_GRID + 2)[1:-1]:
                 options[k, r, float(at)] = later(k, r, float(at))
 
-    def gain(column: np.ndarray, q: np.ndarray) -> float:
+    own = np.bincount(read.spring.astype(int))
+
+    def gain(k: int, column: np.ndarray, q: np.ndarray) -> float:
+        # a few readings, as those of the moment in which a spring is switched on, are no contact that stays
+        if min(column.sum(), own[k] - column.sum()) < SEEN:
+            return 0.0
         vector = column / read.noise
         vector = vector - q @ (q.T @ vector)
         power = float(vector @ vector)
@@ -278,9 +283,9 @@ def _contacts(
     tried, out = max(1, len(options)), []
     while options and len(out) < len(springs):
         q = np.linalg.qr(np.column_stack(list(columns.values())) / read.noise[:, None])[0]
-        k, r, near = max(options, key=lambda one: gain(options[one], q))
+        k, r, near = max(options, key=lambda one: gain(one[0], options[one], q))
         finer = np.linspace(near - grid[r], near + grid[r], 2 * STEP_GRID + 1)
-        at = float(max(finer, key=lambda one: gain(later(k, r, float(one)), q)))
+        at = float(max(finer, key=lambda one: gain(k, later(k, r, float(one)), q)))
         name = f"contact {k} {r} {at}"
         trial = _solve(read, columns | {name: later(k, r, at)})
         nats = _nats(read, model, trial)
