@@ -195,11 +195,14 @@ std::string version_under(const std::string &format)
     mega->board.send("telemetry " + format + " 50\n");
     mega->run_ms(2000.0);
     const std::string told = mega->board.take_output();
-    for (const char *spring : {"6", "7", "8", "9"}) { /* they wait for their turn */
-        const std::string name = (format == "csv" ? "<limits|spring:" : ">m") + std::string(spring);
-        TEST_ASSERT_TRUE_MESSAGE(contains(told, name), name.c_str());
+    /* 14.8 A let four of nine heat with 3 A: four and what is left wait for their turn, whoever. */
+    unsigned waiting = 0;
+    for (int k = 1; k <= 9; ++k) {
+        const std::string name = (format == "csv" ? "<limits|spring:" : ">cut") + std::to_string(k);
+        waiting += contains(told, name) ? 1u : 0u;
     }
-    TEST_ASSERT_TRUE(contains(told, format == "csv" ? "|supply|cut_a:3.000>" : ">cut9:"));
+    TEST_ASSERT_GREATER_OR_EQUAL_UINT_MESSAGE(5, waiting, told.c_str());
+    TEST_ASSERT_TRUE(format != "csv" || contains(told, "|supply|cut_a:3.000>"));
     mega->board.send("telemetry off\n");
     mega->run_ms(1000.0);
     mega->board.take_output();
