@@ -268,10 +268,8 @@ static void boot(loop_t *loop, bool keeps_memory)
     thermal_model_state_t state;
     controller_get_model_state(&loop->controller, &state);
     (void)controller_init(&loop->controller, &loop->settings, told_ambient_c7(loop), NULL);
-    if (!keeps_memory || !controller_set_model_state(&loop->controller, &state)) {
-        /* as the firmware: as hot as they could be, just below the trip */
-        int32_t hot_cc = (int32_t)loop->settings.safety.temperature_trip_cc - 500;
-        controller_set_temperature(&loop->controller, (int16_t)(hot_cc * 32 / 25));
+    if (keeps_memory) {
+        (void)controller_set_model_state(&loop->controller, &state);
     }
     controller_lock(&loop->controller);
 }

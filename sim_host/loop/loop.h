@@ -35,7 +35,7 @@ typedef enum {
     LOOP_ACTION_FAN_STOP,      /* the fan stands whatever it is told */
     LOOP_ACTION_FAN_GOOD,
     LOOP_ACTION_WATCHDOG,  /* reset: boots locked, the model's state survives */
-    LOOP_ACTION_BROWN_OUT, /* supply lost and back: boots locked, the model assumes hot springs */
+    LOOP_ACTION_BROWN_OUT, /* supply lost and back: boots locked, nothing is known of the springs */
     LOOP_ACTION_COUNT
 } loop_action_t;
 
@@ -50,7 +50,7 @@ typedef struct {
 void loop_options_default(loop_options_t *options);
 
 /* Copies the plant as it is (parameters, effects, temperatures); springs of plant and settings must
- * match. The controller starts at the plant's ambient, all off, unlocked. options may be NULL. NULL
+ * match. The controller knows nothing of the springs, all off, unlocked. options may be NULL. NULL
  * if and only if the settings are refused
  * (*bad is its row of parameters.def, bad may be NULL), rows x columns of model and
  * plant differ

@@ -189,6 +189,7 @@ void telemetry_teleplot_lines_have_its_form()
 std::string version_under(const std::string &format)
 {
     auto mega = booted();
+    mega->expect_ok("model cold"); /* else all wait, and for no turn */
     mega->expect_ok("policy precompensate");
     mega->expect_ok("on all");
     mega->board.send("telemetry " + format + " 50\n");

@@ -64,6 +64,11 @@ static double chip_c(int spring)
     return controller_temperature_c7(loop_controller(loop), (uint8_t)spring) / 128.0;
 }
 
+static double hottest_c(int spring)
+{
+    return (double)controller_temperature_bounds_c(loop_controller(loop), (uint8_t)spring).high;
+}
+
 static double true_c(int spring)
 {
     return plant_temperature_c(loop_plant(loop), spring);
@@ -420,8 +425,8 @@ static void after_a_reset_nothing_runs_until_unlocked(void)
         for (int n = 0; n < 500; n++) {
             loop_tick(loop);
             TEST_ASSERT_TRUE(loop_sum_current_a(loop) == 0.0);
-            for (int k = 0; k < 9; k++) { /* never believed colder than they are */
-                TEST_ASSERT_TRUE(chip_c(k) > true_c(k) - 0.5);
+            for (int k = 0; k < 9; k++) { /* never taken to be certainly colder than they are */
+                TEST_ASSERT_TRUE(hottest_c(k) > true_c(k) - 0.5);
             }
         }
         TEST_ASSERT_TRUE(controller_is_locked(loop_controller(loop)));

@@ -39,7 +39,8 @@ int chip_drive(const plant_t *plant, const char *lines, const int *pattern, size
                        bad == UINT16_MAX ? "settings" : parameter_row(bad).name);
         return -2;
     }
-    /* It is told that they are cold, as by `model cold`: old and new settings begin knowing the same. */
+    /* It is told that they are cold, as by `model cold`: old and new settings begin knowing the
+     * same. */
     controller_set_temperature(loop_controller(loop),
                                (int16_t)lround(plant_ambient_c(loop_plant(loop)) * 128.0));
     const int springs = plant_spring_count(plant);
