@@ -89,9 +89,9 @@ void temperature_ceiling_step(temperature_ceiling_t *ceiling, const thermal_mode
     }
     const float colder_w = (float)colder * (1e-6f / 128.0f);
     /* stable whatever the heat capacity: the flow's own change is taken at the end of the step */
-    const float gain_k = (power_w - flow_w + colder_w) * TEMPERATURE_CEILING_TURN_S /
-                         (capacity_j_per_k +
-                          1e-6f * (float)stiffness_uw_per_k * TEMPERATURE_CEILING_TURN_S);
+    const float gain_k =
+        (power_w - flow_w + colder_w) * TEMPERATURE_CEILING_TURN_S /
+        (capacity_j_per_k + 1e-6f * (float)stiffness_uw_per_k * TEMPERATURE_CEILING_TURN_S);
     add_heat(ceiling, model, k, gain_k, latent_k);
 }
 
