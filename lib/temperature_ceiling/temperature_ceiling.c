@@ -73,13 +73,15 @@ void temperature_ceiling_step(temperature_ceiling_t *ceiling, const thermal_mode
     const float latent_k = (float)p->latent_heat_mj / (float)p->heat_capacity_mj_per_k;
     const float now_c = ceiling->temperature_c[k];
     const float flow_w = hold_w(model, k, now_c);
-    const float stiffness_w_per_k = 0.125f * (hold_w(model, k, now_c + 8.0f) - flow_w);
     /* What the model's neighbours take beyond those of the ceiling, uW / 128: a spring's couplings
      * and the span of temperatures keep it within 32 bits. */
     int32_t colder = 0;
+    uint32_t stiffness_uw_per_k =
+        (uint32_t)model->spring[k].loss_uw_per_k + p->plate_coupling_uw_per_k;
     for (uint8_t j = 0; j < model->springs; j++) {
         const uint16_t coupling_uw_per_k = thermal_model_coupling_uw_per_k(model, k, j);
         if (coupling_uw_per_k != 0) {
+            stiffness_uw_per_k += coupling_uw_per_k;
             colder +=
                 (int32_t)coupling_uw_per_k * ((int16_t)(ceiling->temperature_c[j] * 128.0f) -
                                               (int32_t)thermal_model_temperature_c7(model, j));
@@ -87,8 +89,9 @@ void temperature_ceiling_step(temperature_ceiling_t *ceiling, const thermal_mode
     }
     const float colder_w = (float)colder * (1e-6f / 128.0f);
     /* stable whatever the heat capacity: the flow's own change is taken at the end of the step */
-    const float gain_k = (power_w - flow_w + colder_w) * TEMPERATURE_CEILING_TURN_S /
-                         (capacity_j_per_k + stiffness_w_per_k * TEMPERATURE_CEILING_TURN_S);
+    const float gain_k =
+        (power_w - flow_w + colder_w) * TEMPERATURE_CEILING_TURN_S /
+        (capacity_j_per_k + 1e-6f * (float)stiffness_uw_per_k * TEMPERATURE_CEILING_TURN_S);
     add_heat(ceiling, model, k, gain_k, latent_k);
 }
 

@@ -20,7 +20,6 @@
 
 #define SEGMENTS                32
 #define LATENT_SLACK_C23        0x400000 /* 0.5 K: 1/128 K times the steepest slope of h, and rounding */
-#define KELVIN_AT_0_C7          34963u /* 273.15 K */
 #define RESISTANCE_REFERENCE_C7 (20 * 128)
 
 /* 2^15 (1 + cos(pi k / 32)) / 2 */
@@ -264,90 +263,7 @@ static void add_heat(thermal_model_t *model, uint8_t i, int32_t gain_c23)
     (void)enthalpy_c23;
 }
 
-/* ---- flows, 1/64 uW ---- */
-
-static int32_t flow_through(uint16_t conductance_uw_per_k, int16_t difference_c6)
-{
-    return (int32_t)difference_c6 * conductance_uw_per_k;
-}
-
-/* Radiated at a temperature: factor (T / 512 K)^4. */
-static int32_t radiated(const thermal_model_t *model, int16_t temperature_c6)
-{
-    if (model->radiation_factor == 0) {
-        return 0;
-    }
-    const uint16_t kelvin_c7 = (uint16_t)(KELVIN_AT_0_C7 + 2u * (uint16_t)temperature_c6);
-    const uint16_t square = fixed_point_high_u16(kelvin_c7, kelvin_c7);
-    return (int32_t)((uint32_t)fixed_point_high_u16(square, square) * model->radiation_factor);
-}
-
-static int32_t from_neighbours(const thermal_model_t *model, uint8_t i, int16_t temperature_c6)
-{
-    const thermal_model_spring_t *own = &model->spring[i];
-    const uint8_t columns = model->parameters.columns;
-    const uint8_t top = own->row > 0 ? (uint8_t)(own->row - 1u) : 0;
-    const uint8_t left = own->column > 0 ? (uint8_t)(own->column - 1u) : 0;
-    int32_t flow = 0;
-    for (uint8_t row = top; row <= own->row + 1u && row < model->parameters.rows; row++) {
-        for (uint8_t column = left; column <= own->column + 1u && column < columns; column++) {
-            const uint8_t j = (uint8_t)(row * columns + column);
-            if (j == i) {
-                continue;
-            }
-            const bool beside = row == own->row || column == own->column;
-            flow += flow_through(beside ? model->orthogonal_uw_per_k : model->diagonal_uw_per_k,
-                                 (int16_t)(model->spring[j].midstep_c6 - temperature_c6));
-        }
-    }
-    return flow;
-}
-
-/* What leaves one spring enters another. */
-static bool exchange_closes(const thermal_model_t *model)
-{
-    int64_t sum = 0;
-    for (uint8_t i = 0; i < model->springs; i++) {
-        sum += from_neighbours(model, i, model->spring[i].midstep_c6);
-    }
-    return sum == 0;
-}
-
-/* What a spring gives the air around it. */
-static int32_t given_to_air(const thermal_model_spring_t *spring, int16_t above_air_c6)
-{
-    uint16_t conductance = spring->loss_uw_per_k;
-    if (above_air_c6 > 0) {
-        conductance = (uint16_t)(conductance +
-                                 (((uint32_t)spring->loss_rise * (uint16_t)above_air_c6) >> 16));
-    }
-    return flow_through(conductance, above_air_c6);
-}
-
-typedef struct {
-    int32_t into_spring;
-    int32_t to_air;
-    int32_t to_plate;
-} flows_t;
-
-/* All but its own heating, were the spring at that temperature and all else as it is now. */
-static flows_t flows_at(const thermal_model_t *model, uint8_t i, int16_t temperature_c6)
-{
-    const thermal_model_spring_t *own = &model->spring[i];
-    const int16_t air_c6 = model->air.midstep_c6;
-    flows_t flows;
-    flows.to_air = given_to_air(own, (int16_t)(temperature_c6 - air_c6));
-    if (own->upstream != NO_SPRING) { /* what the fan's air brings it took there */
-        const int16_t above_c6 = (int16_t)(model->spring[own->upstream].midstep_c6 - air_c6);
-        flows.to_air -= flow_through(model->wake_uw_per_k, above_c6);
-    }
-    flows.to_plate = flow_through(model->parameters.plate_coupling_uw_per_k,
-                                  (int16_t)(temperature_c6 - model->plate.midstep_c6));
-    flows.into_spring =
-        from_neighbours(model, i, temperature_c6) - flows.to_air - flows.to_plate -
-        (radiated(model, temperature_c6) - radiated(model, c6_of(model->ambient_c7)));
-    return flows;
-}
+/* ---- step ---- */
 
 /* One step of air or plate with this flow from the springs. */
 static void step_node(thermal_model_slow_node_t *node, int32_t *state_c23, int16_t ambient_c7,
@@ -371,9 +287,10 @@ void thermal_model_step(thermal_model_t *model, const uint32_t power_uw[])
     int32_t gain_c23[THERMAL_MODEL_MAX_SPRINGS];
     int64_t to_air = 0;
     int64_t to_plate = 0;
-    INVARIANT(exchange_closes(model));
+    INVARIANT(thermal_model_exchange_closes(model));
     for (uint8_t i = 0; i < model->springs; i++) {
-        const flows_t flows = flows_at(model, i, model->spring[i].midstep_c6);
+        const thermal_model_flows_t flows =
+            thermal_model_flows_at(model, i, model->spring[i].midstep_c6);
         const uint32_t power = power_uw[i] < THERMAL_MODEL_HIGHEST_POWER_UW
                                    ? power_uw[i]
                                    : THERMAL_MODEL_HIGHEST_POWER_UW;
@@ -522,9 +439,15 @@ uint16_t thermal_model_austenite(const thermal_model_t *model, uint8_t spring)
     return austenite_of(model, &points, &model->state.spring[spring]);
 }
 
-static int32_t resistance_of_phase(uint32_t at_reference_uohm, int32_t rise, int16_t above_c7)
+/* A phase's own resistance: its rise times the distance from 20 degC fits 28 bits, as a share in
+ * 2^-24 25 bits. */
+static int32_t resistance_of_phase(uint32_t at_reference_uohm, int16_t rise_ppm_per_k,
+                                   int16_t above_c7)
 {
-    return (int32_t)(at_reference_uohm + (uint32_t)(int32_t)(((int64_t)rise * above_c7) >> 16));
+    const int32_t rise = (int32_t)rise_ppm_per_k * above_c7;           /* 1e-6 / 128 */
+    const int32_t share_q24 = (int32_t)(((int64_t)rise * 8590) >> 16); /* 2^40 / 128e6 */
+    const int32_t change_uohm = (int32_t)(((int64_t)(int32_t)at_reference_uohm * share_q24) >> 24);
+    return (int32_t)at_reference_uohm + change_uohm;
 }
 
 uint32_t thermal_model_resistance_uohm_at(const thermal_model_t *model, uint8_t spring,
@@ -532,10 +455,10 @@ uint32_t thermal_model_resistance_uohm_at(const thermal_model_t *model, uint8_t 
 {
     const thermal_model_parameters_t *p = &model->parameters;
     const int16_t above_c7 = (int16_t)(clamp_c7(temperature_c7) - RESISTANCE_REFERENCE_C7);
-    const int32_t martensite_uohm =
-        resistance_of_phase(p->resistance_martensite_uohm, model->martensite_rise, above_c7);
-    const int32_t austenite_uohm =
-        resistance_of_phase(p->resistance_austenite_uohm, model->austenite_rise, above_c7);
+    const int32_t martensite_uohm = resistance_of_phase(
+        p->resistance_martensite_uohm, p->resistance_martensite_rise_ppm_per_k, above_c7);
+    const int32_t austenite_uohm = resistance_of_phase(
+        p->resistance_austenite_uohm, p->resistance_austenite_rise_ppm_per_k, above_c7);
     const int32_t change_uohm =
         (int32_t)(((int64_t)(austenite_uohm - martensite_uohm) * austenite) >> 15);
     const uint32_t own_uohm = (uint32_t)(martensite_uohm + change_uohm);
@@ -587,8 +510,8 @@ uint16_t thermal_model_coupling_uw_per_k(const thermal_model_t *model, uint8_t s
 int32_t thermal_model_power_to_hold_uw(const thermal_model_t *model, uint8_t spring,
                                        int16_t temperature_c7)
 {
-    const flows_t flows =
-        flows_at(model, clamp_index(model, spring), c6_of(clamp_c7(temperature_c7)));
+    const thermal_model_flows_t flows =
+        thermal_model_flows_at(model, clamp_index(model, spring), c6_of(clamp_c7(temperature_c7)));
     return -(flows.into_spring >> 6);
 }
 

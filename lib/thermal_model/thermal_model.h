@@ -108,9 +108,7 @@ typedef struct {
     thermal_model_slow_node_t air;
     thermal_model_slow_node_t plate;
     thermal_model_transformation_t transformation; /* of a spring that is not shifted */
-    int32_t martensite_rise;                       /* of its resistance: 2^-16 uohm per 1/128 K */
-    int32_t austenite_rise;
-    uint16_t heating_position; /* 2^21 / width of the transformation, 1/128 K */
+    uint16_t heating_position;                     /* 2^21 / width of the transformation, 1/128 K */
     uint16_t cooling_position;
     uint16_t latent_full_c8;      /* Q8.8 K: latent heat over heat capacity */
     uint16_t orthogonal_uw_per_k; /* at the present fan */

@@ -195,6 +195,16 @@ static void the_effects_page_says_what_the_table_says(void)
     expect_table(NINESPRING_SOURCE_DIR "/docs/adding-an-effect.md", titles, wanted);
 }
 
+static void each_effect_has_its_law_in_the_physics_page(void)
+{
+    read_page(NINESPRING_SOURCE_DIR "/docs/physics.md");
+    for (size_t k = 0; k < EFFECT_COUNT; k++) {
+        char row[80];
+        (void)snprintf(row, sizeof row, "\n| `%s` | ", effect_row(k)->name);
+        TEST_ASSERT_NOT_NULL_MESSAGE(strstr(page, row), row);
+    }
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -204,5 +214,6 @@ int main(void)
     RUN_TEST(a_number_after_a_name_is_always_a_spring);
     RUN_TEST(the_settings_page_says_what_the_table_says);
     RUN_TEST(the_effects_page_says_what_the_table_says);
+    RUN_TEST(each_effect_has_its_law_in_the_physics_page);
     return UNITY_END();
 }
