@@ -69,11 +69,17 @@ def drive(plant: native.Plant, lines: str, pattern: np.ndarray) -> Drive:
 
 
 def worse_than(old: Drive, new: Drive) -> list[str]:
-    """Return the measures in which one drive is worse than another."""
+    """Return the measures in which one drive is worse than another.
+
+    A spring that is heated further takes longer and gets hotter: that is no fault of settings that hold more of it.
+    """
     out = []
+    holds_more = new.held - old.held > WORSE["held"][0]
     for measure, (limit, _) in WORSE.items():
         a, b = getattr(old, measure), getattr(new, measure)
         more = a - b if measure == "held" else b - a
+        if measure in ("heating_s", "hottest_c") and holds_more:
+            continue
         if more > max(limit, 0.1 * a * (measure == "heating_s")):
             out.append(measure)
     return out
