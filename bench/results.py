@@ -50,7 +50,9 @@ SECTIONS: tuple[Section, ...] = (
     Section("loop", "Controller and array, natively", f"{HOST}/bench/loop/bench_loop"),
     Section("firmware", "The firmware's size", f"{PYTHON} bench/firmware/firmware.py"),
     Section("board", "The firmware on the simulated Mega", f"{HOST}/bench/board/bench_board"),
-    Section("policy", "Driving with the neighbours in mind", f"{HOST}/bench/policy/bench_policy --quick", markdown=True),
+    Section(
+        "policy", "Driving with the neighbours in mind", f"{HOST}/bench/policy/bench_policy --quick", markdown=True
+    ),
     Section(
         "worlds",
         "Worlds that are not as declared: the first start ever",
