@@ -183,11 +183,10 @@ static void judge_circuit(controller_t *controller, uint8_t k)
 
 static void raise_ceiling(controller_t *controller, uint8_t k)
 {
-    const float measured_w =
-        1e-6f / (float)CIRCUIT_CHECK_TICKS * (float)controller->heat_sum_uw[k];
-    const float driven_w =
-        temperature_ceiling_power_w(&controller->model, &controller->current.parameters,
-                                    1.0f / (float)CIRCUIT_CHECK_TICKS * (float)controller->duty_sum[k]);
+    const float measured_w = 1e-6f / (float)CIRCUIT_CHECK_TICKS * (float)controller->heat_sum_uw[k];
+    const float driven_w = temperature_ceiling_power_w(
+        &controller->model, &controller->current.parameters,
+        1.0f / (float)CIRCUIT_CHECK_TICKS * (float)controller->duty_sum[k]);
     temperature_ceiling_step(&controller->ceiling, &controller->model, k,
                              measured_w > driven_w ? measured_w : driven_w);
     controller->heat_sum_uw[k] = 0;
@@ -217,21 +216,21 @@ static void take_floor_turn(controller_t *controller)
 static uint32_t mean_of_step(uint32_t sum)
 {
     const uint16_t share_q16 = 65536u / TICKS_PER_STEP;
-    return fixed_point_mac_u16(fixed_point_high_u16((uint16_t)sum, share_q16), (uint16_t)(sum >> 16),
-                               share_q16);
+    return fixed_point_mac_u16(fixed_point_high_u16((uint16_t)sum, share_q16),
+                               (uint16_t)(sum >> 16), share_q16);
 }
 
 static void step_model(controller_t *controller, const controller_inputs_t *inputs)
 {
+    /* one spring in each tick: the phase moves slowly */
+    tell_resistance(controller, controller->resistance_turn);
+    controller->resistance_turn =
+        (uint8_t)((controller->resistance_turn + 1u) % controller->springs);
     if (++controller->model_tick < TICKS_PER_STEP) {
         take_floor_turn(controller);
         return;
     }
     controller->model_tick = 0;
-    /* one spring in each step: the phase moves slowly, and the loop closes what is left */
-    tell_resistance(controller, controller->resistance_turn);
-    controller->resistance_turn =
-        (uint8_t)((controller->resistance_turn + 1u) % controller->springs);
     for (uint8_t k = 0; k < controller->springs; k++) {
         controller->power_sum_uw[k] = spring_estimator_model_power_uw(
             &controller->policy.estimator, k, mean_of_step(controller->power_sum_uw[k]));

@@ -32,7 +32,7 @@
 #define KEPT_C7       (3 * 128) /* above austenite start what was reached is worth keeping */
 #define TURN_C7       (6 * 128) /* colder than one that heats: it is its turn */
 #define GOES_ON_C7    (4 * 128) /* below austenite start: keeps its turn */
-#define LOOK_MA       2000u /* of a spring of which much was learnt and nothing is known */
+#define LOOK_MA       2000u     /* of a spring of which much was learnt and nothing is known */
 #define UNDRIVEN_SDS  2.0f
 #define NEIGHBOUR_SD  0.15f /* of the rise of a spring that its neighbours heat */
 #define RISE_SHARE    0.25f /* of a turn in the average */
@@ -135,9 +135,8 @@ static void enter(drive_policy_t *policy, thermal_model_t *model, uint8_t k,
         break;
     case DRIVE_POLICY_STAGE_HOLD:
         spring_estimator_begin_hold(&policy->estimator, model, k, is_full(level_permille));
-        s->margin_k =
-            spring_c((int16_t)(points.austenite_finish_c7 - points.martensite_start_c7)) +
-            BLIND_BEGIN_K;
+        s->margin_k = spring_c((int16_t)(points.austenite_finish_c7 - points.martensite_start_c7)) +
+                      BLIND_BEGIN_K;
         s->wanted_ma = policy->parameters.probe_current_ma;
         break;
     case DRIVE_POLICY_STAGE_LOWER:
@@ -183,9 +182,8 @@ static void heat(drive_policy_t *policy, thermal_model_t *model, uint8_t k, uint
     const float level = 0.001f * (float)level_permille;
     /* its own limit leaves too little to go on, and it is hot enough to have transformed */
     const bool ends = s->ceiling_ma < boost_ma - (boost_ma >> 2) && c7 > points.austenite_finish_c7;
-    if (ends ||
-        (full ? spring_estimator_has_transformed(&policy->estimator, model, k)
-              : phase_of(policy, model, k) >= level)) {
+    if (ends || (full ? spring_estimator_has_transformed(&policy->estimator, model, k)
+                      : phase_of(policy, model, k) >= level)) {
         enter(policy, model, k, DRIVE_POLICY_STAGE_HOLD, level_permille);
         return;
     }

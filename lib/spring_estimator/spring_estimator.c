@@ -503,8 +503,7 @@ float spring_estimator_cooling_s(const spring_estimator_t *e, const thermal_mode
     const float hot_c = fmaxf(b->hottest_c, start_c);
     const float left_c = fminf(b->hottest_c, start_c);
     spring_belief_t transforming = {.hottest_c = start_c};
-    return e->heat_capacity_j_per_k / loss *
-               logf((hot_c - ambient_c) / (start_c - ambient_c)) +
+    return e->heat_capacity_j_per_k / loss * logf((hot_c - ambient_c) / (start_c - ambient_c)) +
            hottest_capacity_j_per_k(e, &transforming, &t) / loss *
                logf((left_c - ambient_c) / (finish_c - ambient_c));
 }

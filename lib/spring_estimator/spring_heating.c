@@ -86,8 +86,8 @@ static void hold_back(const spring_estimator_t *e, const spring_belief_t *b, the
 {
     const thermal_model_transformation_t t = thermal_model_transformation(model, k);
     const bool martensite = b->possible == SPRING_PHASE_MARTENSITE;
-    const int16_t limit_c7 = martensite ? (int16_t)(t.austenite_start_c7 + ONSET_C7)
-                                        : t.austenite_finish_c7;
+    const int16_t limit_c7 =
+        martensite ? (int16_t)(t.austenite_start_c7 + ONSET_C7) : t.austenite_finish_c7;
     if (b->learnt.austenite_ohm == 0.0f || b->blind ||
         thermal_model_temperature_c7(model, k) <= limit_c7 ||
         (!martensite && !spring_lacks_phase(b, model, k))) {

@@ -24,9 +24,8 @@ static void see_crossing(const spring_estimator_t *e, spring_belief_t *b, therma
 {
     const thermal_model_transformation_t t = thermal_model_transformation(model, k);
     /* the beginning of the cosine, (1 - cos pi x) / 2 */
-    const float depth_k =
-        spring_c((int16_t)(t.martensite_start_c7 - t.martensite_finish_c7)) * 0.64f *
-        sqrtf(fminf(lost, 1.0f));
+    const float depth_k = spring_c((int16_t)(t.martensite_start_c7 - t.martensite_finish_c7)) *
+                          0.64f * sqrtf(fminf(lost, 1.0f));
     const bool searched = spring_estimator_sd_k(b) > 3.0f * CROSSING_SD_K;
     if (lost > LARGE_LOSS) {
         /* nearer to it by as much as more is lost up there */
@@ -38,8 +37,8 @@ static void see_crossing(const spring_estimator_t *e, spring_belief_t *b, therma
         b->covariance -= moved_k2 * by_loss;
         b->loss_variance += moved_k2 * by_loss * by_loss;
     }
-    const float error_k = spring_see(e, b, model, k, spring_c(t.martensite_start_c7) - depth_k, CROSSING_SD_K,
-                                     SPRING_PHASE_AUSTENITE);
+    const float error_k = spring_see(e, b, model, k, spring_c(t.martensite_start_c7) - depth_k,
+                                     CROSSING_SD_K, SPRING_PHASE_AUSTENITE);
     if (!searched && -error_k > b->disturbance_k) {
         b->disturbance_k = -error_k;
     }
