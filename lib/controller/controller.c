@@ -222,15 +222,15 @@ static uint32_t mean_of_step(uint32_t sum)
 
 static void step_model(controller_t *controller, const controller_inputs_t *inputs)
 {
+    /* one spring in each tick: the phase moves slowly */
+    tell_resistance(controller, controller->resistance_turn);
+    controller->resistance_turn =
+        (uint8_t)((controller->resistance_turn + 1u) % controller->springs);
     if (++controller->model_tick < TICKS_PER_STEP) {
         take_floor_turn(controller);
         return;
     }
     controller->model_tick = 0;
-    /* one spring in each step: the phase moves slowly, and the loop closes what is left */
-    tell_resistance(controller, controller->resistance_turn);
-    controller->resistance_turn =
-        (uint8_t)((controller->resistance_turn + 1u) % controller->springs);
     for (uint8_t k = 0; k < controller->springs; k++) {
         controller->power_sum_uw[k] = spring_estimator_model_power_uw(
             &controller->policy.estimator, k, mean_of_step(controller->power_sum_uw[k]));

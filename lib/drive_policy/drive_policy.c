@@ -180,11 +180,10 @@ static void heat(drive_policy_t *policy, thermal_model_t *model, uint8_t k, uint
     s->wanted_ma = boost_ma;
     const bool full = is_full(level_permille);
     const float level = 0.001f * (float)level_permille;
-    const float phase = phase_of(policy, model, k);
     /* its own limit leaves too little to go on, and it is hot enough to have transformed */
     const bool ends = s->ceiling_ma < boost_ma - (boost_ma >> 2) && c7 > points.austenite_finish_c7;
-    if (ends ||
-        (full ? spring_estimator_has_transformed(&policy->estimator, model, k) : phase >= level)) {
+    if (ends || (full ? spring_estimator_has_transformed(&policy->estimator, model, k)
+                      : phase_of(policy, model, k) >= level)) {
         enter(policy, model, k, DRIVE_POLICY_STAGE_HOLD, level_permille);
         return;
     }
@@ -197,7 +196,8 @@ static void heat(drive_policy_t *policy, thermal_model_t *model, uint8_t k, uint
         if (slows && keeps_ma < s->wanted_ma) {
             s->wanted_ma = keeps_ma;
         }
-        if (waits && (c7 > points.austenite_start_c7 + KEPT_C7 || phase > 0.5f * level)) {
+        if (waits && (c7 > points.austenite_start_c7 + KEPT_C7 ||
+                      phase_of(policy, model, k) > 0.5f * level)) {
             s->floor_ma = keeps_ma;
         }
     }
@@ -398,10 +398,10 @@ static void watch_away(drive_policy_t *policy, const thermal_model_t *model, uin
 {
     drive_policy_spring_t *s = &policy->spring[k];
     const float level = is_full(level_permille) ? 1.0f : 0.001f * (float)level_permille;
-    const float off = phase_of(policy, model, k) - level;
-    const bool there = s->stage == DRIVE_POLICY_STAGE_HOLD &&
-                       spring_estimator_sees(&policy->estimator.spring[k]) &&
-                       off > THERE - 1.0f - (level < 1.0f ? LEVEL_BAND : 0.0f);
+    const bool there =
+        s->stage == DRIVE_POLICY_STAGE_HOLD &&
+        spring_estimator_sees(&policy->estimator.spring[k]) &&
+        phase_of(policy, model, k) - level > THERE - 1.0f - (level < 1.0f ? LEVEL_BAND : 0.0f);
     if (there) {
         s->arrived = true;
         s->away_turns = 0;
@@ -451,7 +451,9 @@ static void update(drive_policy_t *policy, const drive_policy_input_t *input, ui
     s->rise_k_per_s += (rise_k_per_s - s->rise_k_per_s) * RISE_SHARE;
     s->last_c7 = c7;
     s->severity = driven ? 0.0f : severity(policy, input->model, k, s);
-    if (driven && policy->parameters.policy != DRIVE_POLICY_OPEN) {
+    /* what was just seen is acted on in the next turn: a tick has no time for both */
+    if (driven && policy->parameters.policy != DRIVE_POLICY_OPEN &&
+        !policy->estimator.spring[k].seen) {
         precompensate(policy, input->model, k, level_permille);
         watch_away(policy, input->model, k, level_permille);
     }

@@ -269,6 +269,7 @@ float spring_see(const spring_estimator_t *e, spring_belief_t *b, thermal_model_
     const float by_loss = b->covariance / total_k2;
     spring_set_temperature(model, k, seen_c - left * error_k, from);
     b->last_c = spring_now_c(model, k);
+    b->seen = true;
     b->shift_k = clamp(b->shift_k - fminf(b->shift_variance_k2 / total_k2, gain) * error_k,
                        -SHIFT_MOST_K, SHIFT_MOST_K);
     correct_loss(e, b, by_loss * error_k);
@@ -333,6 +334,7 @@ static void look(spring_estimator_t *e, thermal_model_t *model, uint8_t k)
                            austenite > 0.5f ? SPRING_PHASE_AUSTENITE : SPRING_PHASE_MARTENSITE);
     b->last_c = spring_now_c(model, k);
     b->fresh = fresh;
+    b->seen = true;
     if (heating) {
         spring_estimator_begin_heating(e, model, k);
     }
@@ -367,6 +369,7 @@ void spring_estimator_update(spring_estimator_t *e, thermal_model_t *model, uint
 {
     spring_belief_t *b = &e->spring[k];
     const float before_c = b->last_c;
+    b->seen = false;
     take_readings(b);
     const float power_w = b->reads ? b->current_a * b->current_a * b->ohm : 0.0f;
     const float heat_k = predict(e, b, model, k, power_w);

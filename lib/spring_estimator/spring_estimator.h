@@ -68,6 +68,7 @@ typedef struct {
     uint8_t quiet;           /* turns in which its temperature hardly moved, saturating */
     uint8_t losing;          /* turns on end in which it seems to lose phase */
     bool reads;              /* the last turn had readings fit for use */
+    bool seen;               /* the last turn has moved it to where it was seen */
     bool blind;              /* a heating that must have transformed it did not show */
     bool heating;            /* between spring_estimator_begin_heating and _begin_hold */
     bool onset;              /* this heating was seen to begin to transform it */
