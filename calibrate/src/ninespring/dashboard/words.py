@@ -16,7 +16,7 @@ FAULTS = {
     6: "I2C bus stuck or timed out",
     7: "the current sensor finishes no conversions",
     8: "the current sensor lost its configuration and did not take it again",
-    9: "the model's temperature is above temperature_trip_c",
+    9: "the model or the power it was given makes it hotter than temperature_trip_c",
     10: "on for longer than maximum_on_s",
     11: "current in a spring that is off: cut the supply",
     12: "sum of currents above supply_limit_a",
