@@ -259,10 +259,19 @@ function newSetting(one) {
   value.append(input, words);
   input.oninput = () => input.classList.toggle("changed", input.value !== input.dataset.value);
   const set = () => {
-    if (input.value === input.dataset.value) return;
-    ask({ do: "set", name: one.name, value: input.value.trim() })
-      .then((said) => { words.textContent = said; input.classList.remove("changed"); })
-      .catch((error) => { words.textContent = error.message; });
+    const wanted = input.value.trim();
+    // Enter commits twice, as a key and as a change; and what is typed while the board answers is not lost.
+    if (wanted === input.dataset.value || wanted === input.dataset.asked) return;
+    input.dataset.asked = wanted;
+    ask({ do: "set", name: one.name, value: wanted })
+      .then((said) => {
+        words.textContent = said;
+        if (input.value.trim() === wanted) input.classList.remove("changed");
+      })
+      .catch((error) => { words.textContent = error.message; })
+      .finally(() => {
+        if (input.dataset.asked === wanted) delete input.dataset.asked;
+      });
   };
   input.onkeydown = (event) => {
     if (event.key === "Enter") set();
