@@ -34,22 +34,28 @@ def predict_by_chip(model: Model, lines: str, run: Run) -> np.ndarray:
     plant = plant_of(model)
     plant.set_effects([e for e in model.effects if e not in effects.MEASUREMENT])
     seen_by = shown - simulate_run(plant, run, run.ambient_c, {})
+    return chip_trace(model, lines, run)[0] + seen_by
+
+
+def chip_trace(model: Model, lines: str, run: Run) -> tuple[np.ndarray, np.ndarray]:
+    """Return temperatures (degC) and austenite, (rows, springs), that a chip with these lines believes along a log."""
+    plant = plant_of(model)
     ambient = run.ambient_c if run.ambient_c is not None else np.full(len(run.time_s), plant.get("ambient_c"))
-    power = run.drive
-    if run.mode == "current":
-        power = run.drive**2 * plant.get("resistance_ohm")
-    elif run.mode == "command":
-        power = run.drive * np.array([plant.get(f"command_power_w[{k + 1}]") for k in range(run.springs)])
-    out = np.empty_like(run.temperature_c)
-    shape = (model.array.rows, model.array.cols)
+    power = np.array([plant.get(f"command_power_w[{k + 1}]") for k in range(run.springs)])
+    temperature, austenite = np.empty_like(run.temperature_c), np.empty_like(run.temperature_c)
     for begin, end in zip(run.starts, [*run.starts[1:], len(run.time_s)], strict=True):
         part = slice(begin, end)
-        before = out[begin - 1] if begin else np.full(run.springs, ambient[0])
+        before = temperature[begin - 1] if begin else np.full(run.springs, ambient[0])
         first = np.where(np.isfinite(run.temperature_c[begin]), run.temperature_c[begin], before)
-        if end - begin == 1:
-            out[part] = first
-            continue
-        out[part] = native.chip_simulate(
-            lines, shape, run.time_s[part], power[part], run.fan[part], ambient[part], first
+        temperature[part], austenite[part] = native.chip_simulate(
+            lines,
+            (model.array.rows, model.array.cols),
+            run.time_s[part],
+            native.MODES[run.mode],
+            run.drive[part],
+            power,
+            run.fan[part],
+            ambient[part],
+            first,
         )
-    return out + seen_by
+    return temperature, austenite
