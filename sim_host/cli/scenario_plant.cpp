@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 
 #include "electrics.h"
-#include "model_file.h"
+#include "plant_names.h"
 #include "paper.h"
 
 namespace ninespring

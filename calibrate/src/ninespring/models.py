@@ -73,7 +73,8 @@ class Model:
 
 
 def _array(file: TomlFile) -> Array:
-    file.need(("array",))
+    if file.get(("array",)) is None:
+        raise file.refuse("there is no [array] table; add rows and cols", ())
     file.table(("array",), ("rows", "cols", "pitch_mm"))
     array = Array(*(file.whole(("array", key), 1, native.MAX_SPRINGS) for key in ("rows", "cols")))
     if array.springs > native.MAX_SPRINGS:
