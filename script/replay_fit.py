@@ -54,7 +54,7 @@ FREE = (
 
 
 def convert(source: Path, target: Path) -> None:
-    """Writes a section-4 log from a TCLab file: time (s), heaters (%), temperatures (degC), set points if any."""
+    """Writes a log (docs/files.md) from a TCLab file: time (s), heaters (%), temperatures (degC), set points if any."""
     with source.open(newline="") as stream:
         rows = list(csv.reader(stream))
     header = [name.strip().lower() for name in rows[0]]

@@ -32,7 +32,7 @@ typedef struct {
     const char *name;
     const char *unit;
     const char
-        *effect; /* the effect it belongs to (design, section 5), NULL for the declared model */
+        *effect; /* the effect it belongs to, NULL for the declared model */
     const char *description;
     double default_value;
     double minimum;
