@@ -24,7 +24,8 @@ void add_command_replay(CLI::App &app)
         arguments.push_back(nullptr);
         execv(NINESPRING_TOOL, arguments.data());
         execvp("ninespring", arguments.data());
-        throw work_error("replay is the work of `ninespring`, which is not there: run script/setup");
+        throw work_error(
+            "replay is the work of `ninespring`, which is not there: run script/setup");
     });
 }
 

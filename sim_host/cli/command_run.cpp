@@ -28,7 +28,8 @@ struct run_options {
     std::string json_path;
 };
 
-/* The file of settings that [chip] model names, from the scenario's folder; empty if it names none. */
+/* The file of settings that [chip] model names, from the scenario's folder; empty if it names none.
+ */
 std::string settings_path(const scenario &plan)
 {
     if (plan.model.empty() || plan.model == "plant" || plan.model == "defaults") {

@@ -25,7 +25,7 @@ current_a = 0.001
 at 1 = pattern 111101111
 at 15 = off all
 """
-SETTINGS = "# not written: loss\n$heat_capacity_j_per_k=0.900\n\n$rows=3\n"
+SETTINGS = "# not written: loss\n$heat_capacity_j_per_k=3.000\n\n$rows=3\n"
 
 
 def rows_of(path: Path) -> list[dict[str, str]]:

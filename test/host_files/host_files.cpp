@@ -51,8 +51,10 @@ void files_that_are_not_text_are_refused(void)
 {
     expect(error_of([] { make_text_file("a", "x\n" + std::string(1000000, '1')); }),
            "a:2:65537: ", "1000000 characters");
-    expect(error_of([] { make_text_file("a", std::string("\xFF\xFEt\0", 4)); }), "a:1:1: ", "UTF-16");
-    expect(error_of([] { make_text_file("a", std::string("t\n0,\0", 5)); }), "a:2:3: ", "zero byte");
+    expect(error_of([] { make_text_file("a", std::string("\xFF\xFEt\0", 4)); }),
+           "a:1:1: ", "UTF-16");
+    expect(error_of([] { make_text_file("a", std::string("t\n0,\0", 5)); }),
+           "a:2:3: ", "zero byte");
     expect(error_of([] { make_text_file("a", ""); }), "a:1:1: ", "empty");
     expect(error_of([] { read_text_file("no_such_file"); }), "no_such_file: ", "cannot be read");
     expect(error_of([] { read_text_file("."); }), ".: ", "is a folder");

@@ -1,6 +1,6 @@
-/* What it is for: one on-chip model with its parameters and what drives it, for the tests of both files.
- * What it owns: defaults before each test, and degrees for the model's integers.
- * What it never does: look behind thermal_model.h. */
+/* What it is for: one on-chip model with its parameters and what drives it, for the tests of both
+ * files. What it owns: defaults before each test, and degrees for the model's integers. What it
+ * never does: look behind thermal_model.h. */
 #ifndef DRIVEN_MODEL_H
 #define DRIVEN_MODEL_H
 

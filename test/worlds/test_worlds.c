@@ -118,7 +118,8 @@ static void transforming_takes_the_latent_heat(void)
     TEST_ASSERT_DOUBLE_WITHIN(0.02, 0.300 * (world_mean_c(world, 0) - 20.0) + 8.65, supplied_j);
 }
 
-/* docs/physics.md: near 5.8 mW/K holds 105 degC at 0.493 W; by convection's law less per kelvin lower. */
+/* docs/physics.md: near 5.8 mW/K holds 105 degC at 0.493 W; by convection's law less per kelvin
+ * lower. */
 static void loss_is_as_declared_at_105_and_less_per_kelvin_below(void)
 {
     single_spring();

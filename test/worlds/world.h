@@ -82,7 +82,8 @@ typedef struct {
 
 typedef struct world world_t;
 
-/* The paper's spring and array on the reference board, as docs/physics.md declares them; pitch 4 mm. */
+/* The paper's spring and array on the reference board, as docs/physics.md declares them; pitch 4
+ * mm. */
 void world_parameters_default(world_parameters_t *parameters);
 
 /* Moves everything that a specimen may have otherwise within +- tolerance of what it is, partly for

@@ -74,7 +74,8 @@ int chip_export(const plant_t *plant, char *text, size_t text_size, char *messag
     return 0;
 }
 
-/* A log on its way through the model: what the rows say, and where the model stands between them. */
+/* A log on its way through the model: what the rows say, and where the model stands between them.
+ */
 typedef struct {
     thermal_model_t model;
     size_t springs;

@@ -78,9 +78,7 @@ def _array(file: TomlFile) -> Array:
     file.table(("array",), ("rows", "cols", "pitch_mm"))
     array = Array(*(file.whole(("array", key), 1, native.MAX_SPRINGS) for key in ("rows", "cols")))
     if array.springs > native.MAX_SPRINGS:
-        raise file.refuse(
-            f"{array.rows} x {array.cols} are more than {native.MAX_SPRINGS} springs", ("array", "cols")
-        )
+        raise file.refuse(f"{array.rows} x {array.cols} are more than {native.MAX_SPRINGS} springs", ("array", "cols"))
     if file.get(("array", "pitch_mm")) is not None:
         array.pitch_mm = file.number(("array", "pitch_mm"), 0.1, 1000.0)
     for name, keys in (("spring", SPRING_KEYS), ("material", MATERIAL_KEYS)):

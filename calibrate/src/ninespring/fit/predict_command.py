@@ -92,7 +92,12 @@ def replay(log: Path, model_path: Path, output: Path, json_path: Path | None) ->
 
     check_folder(output, json_path)
     model = read_model(model_path)
-    run = read_log(log, model.array.springs, temperatures=False, why=f"{model_path.name} is of {model.array.rows} x {model.array.cols}")
+    run = read_log(
+        log,
+        model.array.springs,
+        temperatures=False,
+        why=f"{model_path.name} is of {model.array.rows} x {model.array.cols}",
+    )
     notes_of([run])
     lines, left_out = prediction.chip_lines(model)
     believed, austenite = prediction.chip_trace(model, lines, run)

@@ -38,7 +38,11 @@ BELOW = {
 """What to do about a value below the lowest, where that is another thing."""
 
 NAMES_OF = (
-    (r"t(?:emp|emperature)?_?([1-9][0-9]?)_(?:deg)?f", "t{}_c", "temperatures are in degC: convert with (F - 32) / 1.8"),
+    (
+        r"t(?:emp|emperature)?_?([1-9][0-9]?)_(?:deg)?f",
+        "t{}_c",
+        "temperatures are in degC: convert with (F - 32) / 1.8",
+    ),
     (r"t(?:emp|emperature)?_?([1-9][0-9]?)_k", "t{}_c", "temperatures are in degC: subtract 273.15"),
     (r"t(?:emp|emperature)?_?([1-9][0-9]?)(?:_(?:deg)?c)?", "t{}_c", "if it is in degC"),
     (r"(?:i|current)_?([1-9][0-9]?)_ma", "i{}_a", "currents are in ampere: divide by 1000"),

@@ -48,7 +48,9 @@ def refuse_wrong_units(run: Run, table: Table) -> None:
     if run.duration_s > LONGEST_S:
         line, column = table.where(len(table.lines) - 1, "time_s")
         days = run.duration_s / 86400.0
-        said = f"the log spans {days:.3g} days: if its time is in ms, divide by 1000 (`ninespring import --map` converts)"
+        said = (
+            f"the log spans {days:.3g} days: if its time is in ms, divide by 1000 (`ninespring import --map` converts)"
+        )
         raise InputError(said, run.name, line, column)
     if not np.isfinite(run.temperature_c[:5]).any():
         return
