@@ -115,6 +115,7 @@ def test_a_damaged_model_is_read_or_refused_with_one_line(tmp_path: Path, wounds
         assert str(error).startswith(f"{path}:") and "\n" not in str(error)
 
 
+@settings(deadline=None)
 @given(data=st.data())
 def test_what_is_written_is_read_back(data: st.DataObject, tmp_path_factory: pytest.TempPathFactory) -> None:
     model = Model(Array(data.draw(st.integers(1, 8)), data.draw(st.integers(1, 8))))
