@@ -27,6 +27,8 @@
 #define TRUST_SD_K      5.0f    /* of ambient, or of what a reset has kept */
 #define LEAST_SD_K      0.6f    /* parts of one spring differ by so much */
 #define UNIFORM_SD      0.29f   /* of a width */
+#define OFFSET_SD_V     0.005f  /* 8 mV, and 5 mA in 0.2 ohm: evenly */
+#define OFFSET_AGAIN_V  0.001f  /* by the next hold it may have moved by so much */
 #define LEAST_LOSS      0.8f    /* of a declared loss: with it the hottest possible spring cools */
 #define FORGETS         0.9998f /* a turn's: a disturbance is forgotten within 20 minutes */
 
@@ -116,6 +118,7 @@ static void begin(spring_belief_t *b, float temperature_c, float sd_k, uint8_t p
                            .loss_variance = learnt.loss_sd_w_per_k * learnt.loss_sd_w_per_k,
                            .possible = possible,
                            .noise = NOISE_FIRST,
+                           .offset_sd_v = OFFSET_SD_V,
                            .learnt = learnt,
                            .last_c = temperature_c};
 }
@@ -203,7 +206,8 @@ static void take_readings(spring_belief_t *b)
     b->reads = b->readings >= LEAST_READINGS && b->current_sum_ma >= LEAST_MEAN_MA * b->readings &&
                b->voltage_sum_mv > 0;
     if (b->reads) {
-        const float ohm = (float)b->voltage_sum_mv / (float)b->current_sum_ma;
+        const float offset_mv = 1e3f * b->offset_v * (float)b->readings;
+        const float ohm = ((float)b->voltage_sum_mv - offset_mv) / (float)b->current_sum_ma;
         const float current_a = (float)b->current_sum_ma * 1e-3f / (float)b->readings;
         take_noise(b, ohm, current_a);
         b->slow_ohm = b->fresh == 0 ? ohm : b->slow_ohm + (ohm - b->slow_ohm) * SLOW_SHARE;
@@ -461,9 +465,13 @@ void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, 
     b->kept_w_per_k = 0.0f;
     b->lost = 0.0f;
     b->quiet = 0;
+    b->losing = 0;
     b->line_ohm = 0.0f;
-    b->full_ohm = full && b->reads && b->current_a > STRONG_A ? b->ohm : 0.0f;
-    b->full_c = now_c;
+    if (full && b->reads && b->current_a > STRONG_A) {
+        b->slow_ohm = b->ohm;
+        spring_begin_line(b, now_c);
+        b->offset_sd_v = fmaxf(b->offset_sd_v, OFFSET_AGAIN_V);
+    }
 }
 
 /* ---- what is believed ---- */

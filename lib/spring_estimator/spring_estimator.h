@@ -84,8 +84,10 @@ typedef struct {
     float ohm;
     float ohm_before[2]; /* one and two turns earlier; 0: at another current */
     float slow_ohm;      /* over 4 s */
-    float noise;         /* standard deviation of one turn's, relative */
-    float last_c;        /* the model's temperature a turn ago */
+    float offset_v;      /* of the sensor: of what is read of the voltage */
+    float offset_sd_v;
+    float noise;  /* standard deviation of one turn's, relative */
+    float last_c; /* the model's temperature a turn ago */
     /* the running heating */
     float begun_c;       /* where it began, at the coldest */
     float begun_missing; /* what was still to transform then, at the most, 0..1 */
@@ -98,10 +100,9 @@ typedef struct {
     float excess; /* change that no temperature coefficient explains; signed */
     float flat_k; /* heat since, without such a change */
     /* the running hold */
-    float full_ohm; /* at its beginning, at full_c; 0: not fully on, or not read */
-    float full_c;
     float line_ohm; /* what it reads while it keeps its phase, at line_c; 0: none yet */
     float line_c;
+    float line_per_a; /* 1 / current of the line */
 } spring_belief_t;
 
 typedef struct {

@@ -89,9 +89,8 @@ static void hold_back(const spring_estimator_t *e, const spring_belief_t *b, the
     const bool martensite = b->possible == SPRING_PHASE_MARTENSITE;
     const int16_t limit_c7 =
         martensite ? (int16_t)(t.austenite_start_c7 + ONSET_C7) : t.austenite_finish_c7;
-    const bool shows =
-        b->steep || (b->learnt.austenite_ohm > 0.0f && !b->blind &&
-                     (martensite || spring_lacks_phase(b, model, k)));
+    const bool shows = b->steep || (b->learnt.austenite_ohm > 0.0f && !b->blind &&
+                                    (martensite || spring_lacks_phase(b, model, k)));
     if (!shows || thermal_model_temperature_c7(model, k) <= limit_c7) {
         return;
     }
