@@ -72,6 +72,7 @@ typedef struct {
     bool blind;              /* a heating that must have transformed it did not show */
     bool heating;            /* between spring_estimator_begin_heating and _begin_hold */
     bool onset;              /* this heating was seen to begin to transform it */
+    bool rough;              /* the line is of one turn, not of the average */
     bool steep;              /* and its resistance still changes as only that explains */
     spring_learnt_t learnt;
 

@@ -2,10 +2,11 @@
 
 #include "spring_estimator_internal.h"
 
-#define QUIET_K     0.08f           /* a turn's: 0.3 K/s */
-#define QUIET_TURNS 40              /* 10 s: the average has settled */
-#define LINE_SHARE  (1.0f / 240.0f) /* of a turn, 60 s: what the line follows is no loss of phase  \
-                                     */
+#define QUIET_K     0.08f /* a turn's: 0.3 K/s */
+#define QUIET_TURNS 40    /* 10 s: the average has settled */
+#define LINE_SHARE                                                                                 \
+    (1.0f / 240.0f)            /* of a turn, 60 s: what the line follows is no loss of phase       \
+                                */
 #define LOSS_LEAST     0.0012f /* of the resistance: what a sensor's steps leave in the average */
 #define NOISE_IN_SLOW  0.18f   /* of one turn's: sqrt(share / (2 - share)) */
 #define SURE_SDS       5.0f
@@ -18,7 +19,7 @@
 #define CROSSING_SD_K  1.0f
 #define APART_PER_A    1.0f    /* between two currents, as of 3 and 0.75 A */
 #define OFFSET_LEAST_V 0.0005f /* what a turn's steps of 4 mV leave, and its noise */
-#define OFFSET_SDS 3.0f
+#define OFFSET_SDS     3.0f
 #define OFFSET_MOST_V  0.012f
 #define STILL_K        0.5f  /* below where it would be seen */
 #define COSINE_BEGINS  0.64f /* 2 / pi: x where a cosine has sqrt(lost) = (pi / 2) x */
@@ -38,6 +39,7 @@ void spring_begin_line(spring_belief_t *b, float now_c)
     b->line_ohm = b->slow_ohm;
     b->line_c = now_c;
     b->line_per_a = 1.0f / b->current_a;
+    b->rough = false;
     b->losing = 0;
 }
 
@@ -74,7 +76,9 @@ static void learn_offset(spring_belief_t *b, float now_c)
     const float off_v = (b->ohm - b->line_ohm) / apart_per_a;
     const float moved = COEFFICIENT_MOST_PER_K * (now_c - b->line_c) * b->line_ohm / apart_per_a;
     const float prior_v2 = b->offset_sd_v * b->offset_sd_v;
-    const float gain = prior_v2 / (prior_v2 + OFFSET_LEAST_V * OFFSET_LEAST_V + moved * moved);
+    const float noise_v = b->noise * b->ohm / apart_per_a;
+    const float gain =
+        prior_v2 / (prior_v2 + OFFSET_LEAST_V * OFFSET_LEAST_V + noise_v * noise_v + moved * moved);
     const float more_v = gain * off_v;
     if (fabsf(b->offset_v + more_v) > OFFSET_MOST_V) {
         return; /* no offset is so large */
@@ -107,7 +111,6 @@ void spring_holding_watch(const spring_estimator_t *e, spring_belief_t *b, therm
         b->quiet = 0;
         return;
     }
-    const bool rested = b->quiet >= QUIET_TURNS;
     b->quiet = fabsf(moved_k) > QUIET_K ? 0
                : b->quiet < UINT8_MAX   ? (uint8_t)(b->quiet + 1)
                                         : UINT8_MAX;
@@ -141,7 +144,7 @@ void spring_holding_watch(const spring_estimator_t *e, spring_belief_t *b, therm
     if (changed < SUSPECTED * sure) {
         b->losing = 0;
         if (b->quiet >= QUIET_TURNS) {
-            if (!rested) { /* it has come to rest */
+            if (b->rough) { /* it has come to rest */
                 spring_begin_line(b, now_c);
             }
             b->line_ohm += b->line_ohm * left * LINE_SHARE;
