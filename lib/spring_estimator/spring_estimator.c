@@ -15,6 +15,10 @@
 #define NOISE_SAME     0.1f   /* a current that has moved by more tells nothing of the noise */
 #define BEND_TO_SD     0.512f /* mean size of a second difference: 1 / (sqrt(6) sqrt(2 / pi)) */
 
+#define JUMP_LEAST   0.03f /* of a resistance in a turn: 2 W change 6 % of the phase in it */
+#define JUMP_OF_LOAD 0.08f /* 16 K at once, latent heat kept: 40 % of the phase */
+#define JUMP_SDS     5.0f
+
 #define CAPACITY_SD     0.09f   /* of a declared heat capacity: 15 %, uniform */
 #define LOSS_SD         0.12f   /* of a declared loss: 20 % */
 #define LOSS_MOST       0.45f   /* of the declared loss: no more is ever believed */
@@ -27,6 +31,8 @@
 #define TRUST_SD_K      5.0f    /* of ambient, or of what a reset has kept */
 #define LEAST_SD_K      0.6f    /* parts of one spring differ by so much */
 #define UNIFORM_SD      0.29f   /* of a width */
+#define OFFSET_SD_V     0.005f  /* 8 mV, and 5 mA in 0.2 ohm: evenly */
+#define OFFSET_AGAIN_V  0.001f  /* by the next hold it may have moved by so much */
 #define LEAST_LOSS      0.8f    /* of a declared loss: with it the hottest possible spring cools */
 #define FORGETS         0.9998f /* a turn's: a disturbance is forgotten within 20 minutes */
 
@@ -116,6 +122,7 @@ static void begin(spring_belief_t *b, float temperature_c, float sd_k, uint8_t p
                            .loss_variance = learnt.loss_sd_w_per_k * learnt.loss_sd_w_per_k,
                            .possible = possible,
                            .noise = NOISE_FIRST,
+                           .offset_sd_v = OFFSET_SD_V,
                            .learnt = learnt,
                            .last_c = temperature_c};
 }
@@ -186,10 +193,32 @@ void spring_estimator_disturb(spring_belief_t *b)
     b->ohm_before[1] = 0.0f;
 }
 
+/* No phase changes so fast: it is a contact or the sensor, and all that it is compared with jumps
+ * along. */
+static void jump(spring_belief_t *b, float by)
+{
+    b->slow_ohm *= by;
+    b->line_ohm *= by;
+    b->mark_ohm *= by;
+    b->onset_ohm *= by;
+    b->cold_ohm *= by;
+    b->ohm_before[0] *= by;
+    b->learnt.austenite_ohm *= by;
+    b->learnt.martensite_ohm *= by;
+}
+
 /* Second differences of turns at the same current: neither a level nor a slope shows in them. */
 static void take_noise(spring_belief_t *b, float ohm, float current_a)
 {
     const bool same = fabsf(current_a - b->current_a) < NOISE_SAME * current_a;
+    const bool near = fminf(current_a, b->current_a) > fmaxf(STRONG_A, 0.5f * current_a);
+    const float step = near && b->ohm_before[0] > 0.0f ? ohm / b->ohm_before[0] : 1.0f;
+    const bool by_load =
+        b->possible != SPRING_PHASE_AUSTENITE || (step - 1.0f) * b->learnt.change < 0.0f;
+    if (fabsf(step - 1.0f) > (by_load ? JUMP_OF_LOAD : JUMP_LEAST) + JUMP_SDS * b->noise) {
+        jump(b, step);
+        b->ohm_before[1] = 0.0f;
+    }
     if (same && b->ohm_before[1] > 0.0f) {
         const float bend = fabsf(ohm - 2.0f * b->ohm_before[0] + b->ohm_before[1]) / ohm;
         b->noise += (fminf(BEND_TO_SD * bend, NOISE_MOST) - b->noise) * NOISE_SHARE;
@@ -203,7 +232,8 @@ static void take_readings(spring_belief_t *b)
     b->reads = b->readings >= LEAST_READINGS && b->current_sum_ma >= LEAST_MEAN_MA * b->readings &&
                b->voltage_sum_mv > 0;
     if (b->reads) {
-        const float ohm = (float)b->voltage_sum_mv / (float)b->current_sum_ma;
+        const float offset_mv = 1e3f * b->offset_v * (float)b->readings;
+        const float ohm = ((float)b->voltage_sum_mv - offset_mv) / (float)b->current_sum_ma;
         const float current_a = (float)b->current_sum_ma * 1e-3f / (float)b->readings;
         take_noise(b, ohm, current_a);
         b->slow_ohm = b->fresh == 0 ? ohm : b->slow_ohm + (ohm - b->slow_ohm) * SLOW_SHARE;
@@ -291,9 +321,13 @@ void spring_keep_above(const spring_estimator_t *e, spring_belief_t *b, thermal_
         const float less_w_per_k = b->covariance / distance_k2(b) * error_k;
         correct_loss(e, b, less_w_per_k);
         b->kept_w_per_k += less_w_per_k;
-        /* it cannot lose so little: what is read is not its phase */
-        b->blind = b->blind ||
-                   fabsf(b->kept_w_per_k) > SPRING_ESTIMATOR_BOUND_SDS * sqrtf(b->loss_variance);
+        if (fabsf(b->kept_w_per_k) > SPRING_ESTIMATOR_BOUND_SDS * sqrtf(b->loss_variance)) {
+            /* it cannot lose so little: what is read is not its phase, and taught nothing */
+            correct_loss(e, b, -b->kept_w_per_k);
+            b->kept_w_per_k = 0.0f;
+            b->blind = true;
+            b->lost = 1.0f;
+        }
         spring_set_temperature(model, k, limit_c, SPRING_PHASE_AUSTENITE);
         b->last_c = spring_now_c(model, k);
     }
@@ -461,9 +495,14 @@ void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, 
     b->kept_w_per_k = 0.0f;
     b->lost = 0.0f;
     b->quiet = 0;
+    b->losing = 0;
     b->line_ohm = 0.0f;
-    b->full_ohm = full && b->reads && b->current_a > STRONG_A ? b->ohm : 0.0f;
-    b->full_c = now_c;
+    if (full && b->reads && b->current_a > STRONG_A) {
+        b->slow_ohm = b->ohm;
+        spring_begin_line(b, now_c);
+        b->rough = true;
+        b->offset_sd_v = fmaxf(b->offset_sd_v, OFFSET_AGAIN_V);
+    }
 }
 
 /* ---- what is believed ---- */

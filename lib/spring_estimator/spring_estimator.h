@@ -72,6 +72,7 @@ typedef struct {
     bool blind;              /* a heating that must have transformed it did not show */
     bool heating;            /* between spring_estimator_begin_heating and _begin_hold */
     bool onset;              /* this heating was seen to begin to transform it */
+    bool rough;              /* the line is of one turn, not of the average */
     bool steep;              /* and its resistance still changes as only that explains */
     spring_learnt_t learnt;
 
@@ -84,8 +85,10 @@ typedef struct {
     float ohm;
     float ohm_before[2]; /* one and two turns earlier; 0: at another current */
     float slow_ohm;      /* over 4 s */
-    float noise;         /* standard deviation of one turn's, relative */
-    float last_c;        /* the model's temperature a turn ago */
+    float offset_v;      /* of the sensor: of what is read of the voltage */
+    float offset_sd_v;
+    float noise;  /* standard deviation of one turn's, relative */
+    float last_c; /* the model's temperature a turn ago */
     /* the running heating */
     float begun_c;       /* where it began, at the coldest */
     float begun_missing; /* what was still to transform then, at the most, 0..1 */
@@ -98,10 +101,9 @@ typedef struct {
     float excess; /* change that no temperature coefficient explains; signed */
     float flat_k; /* heat since, without such a change */
     /* the running hold */
-    float full_ohm; /* at its beginning, at full_c; 0: not fully on, or not read */
-    float full_c;
     float line_ohm; /* what it reads while it keeps its phase, at line_c; 0: none yet */
     float line_c;
+    float line_per_a; /* 1 / current of the line */
 } spring_belief_t;
 
 typedef struct {
