@@ -254,11 +254,29 @@ static void undriven_spring_derates_its_neighbours_only(void)
 
 static void spring_just_released_is_no_false_actuation(void)
 {
+    for (unsigned wait = 0; wait < TURN_TICKS; wait++) { /* one of them is the tick of its turn */
+        begin_cold(3, 3);
+        believe(1, 95, true);
+        level[0] = level[1] = 1000;
+        decisions(2u * TURN_TICKS + wait);
+        level[1] = 0;
+        for (unsigned n = 0; n < 3u * TURN_TICKS; n++) {
+            (void)decide();
+            TEST_ASSERT_BITS_LOW(DRIVE_POLICY_LIMIT_UNDRIVEN, drive_policy_limits(&policy, 0));
+        }
+    }
+}
+
+static void spring_released_from_the_other_policy_is_none_either(void)
+{
+    parameters.policy = DRIVE_POLICY_OPEN;
     begin_cold(3, 3);
     believe(1, 95, true);
     level[0] = level[1] = 1000;
     decisions(2u * TURN_TICKS);
     level[1] = 0;
+    parameters.policy = DRIVE_POLICY_PRECOMPENSATE;
+    TEST_ASSERT_TRUE(drive_policy_apply(&policy, &parameters, &model, NULL));
     decisions(3u * TURN_TICKS);
     TEST_ASSERT_BITS_LOW(DRIVE_POLICY_LIMIT_UNDRIVEN, drive_policy_limits(&policy, 0));
 }
@@ -364,6 +382,7 @@ int main(void)
     RUN_TEST(own_temperature_derates_linearly_then_trips);
     RUN_TEST(undriven_spring_derates_its_neighbours_only);
     RUN_TEST(spring_just_released_is_no_false_actuation);
+    RUN_TEST(spring_released_from_the_other_policy_is_none_either);
     RUN_TEST(overload_takes_the_excess_away_in_time);
     RUN_TEST(budget_holds_in_every_tick_whatever_is_asked);
     RUN_TEST(policy_switch_never_jumps);
