@@ -180,6 +180,7 @@ spring_learnt_t spring_estimator_learnt(const spring_estimator_t *e, uint8_t k)
 void spring_estimator_disturb(spring_belief_t *b)
 {
     b->settling = SETTLING_TICKS;
+    b->jumped = true;
     b->current_sum_ma = b->voltage_sum_mv = 0;
     b->readings = 0;
     b->quiet = 0;
@@ -210,9 +211,10 @@ static void take_readings(spring_belief_t *b)
         b->current_a = current_a;
         b->ohm = ohm;
         b->fresh = b->fresh < UINT8_MAX ? (uint8_t)(b->fresh + 1) : UINT8_MAX;
-    } else if (b->current_sum_ma < LEAST_MEAN_MA) {
-        b->fresh = 0;
+    } else if (b->current_sum_ma < LEAST_MEAN_MA && !b->jumped) {
+        b->fresh = 0; /* no current, or no sensor */
     }
+    b->jumped = false;
     b->current_sum_ma = b->voltage_sum_mv = 0;
     b->readings = 0;
 }
@@ -400,7 +402,7 @@ void spring_estimator_update(spring_estimator_t *e, thermal_model_t *model, uint
             return;
         }
     }
-    if (b->possible == SPRING_PHASE_AUSTENITE && !b->reads &&
+    if (b->possible == SPRING_PHASE_AUSTENITE && b->fresh == 0 &&
         spring_estimator_distance_k(e, model, k).low < 0.0f) {
         b->possible = SPRING_PHASE_BETWEEN | SPRING_PHASE_AUSTENITE; /* nothing tells any more */
     }

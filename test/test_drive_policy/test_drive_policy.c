@@ -77,6 +77,18 @@ static void held_spring_stays_on_near_martensite_start(void)
     }
 }
 
+static void jump_of_the_current_forgets_no_phase(void)
+{
+    begin_cold(1, 2);
+    level[0] = 1000;
+    (void)run(300.0);
+    for (unsigned n = 0; n < TURN_TICKS; n++) { /* one of them leaves a turn without readings */
+        spring_estimator_disturb(&policy.estimator.spring[0]);
+        (void)run(1.0 + TICK_S);
+        TEST_ASSERT_EQUAL_UINT8(SPRING_PHASE_AUSTENITE, policy.estimator.spring[0].possible);
+    }
+}
+
 static void spring_that_has_lost_its_phase_is_heated_back(void)
 {
     begin_cold(1, 2);
@@ -371,6 +383,7 @@ int main(void)
     UNITY_BEGIN();
     RUN_TEST(after_power_on_it_waits_says_so_and_then_holds_all_nine);
     RUN_TEST(held_spring_stays_on_near_martensite_start);
+    RUN_TEST(jump_of_the_current_forgets_no_phase);
     RUN_TEST(spring_that_has_lost_its_phase_is_heated_back);
     RUN_TEST(resistance_without_a_change_is_driven_by_the_model_and_said);
     RUN_TEST(level_is_held);
