@@ -377,9 +377,9 @@ void spring_estimator_update(spring_estimator_t *e, thermal_model_t *model, uint
     const float heat_k = predict(e, b, model, k, power_w);
     const float moved_k = b->last_c - before_c;
     b->disturbance_k *= FORGETS;
+    b->heat_k += b->reads || b->fresh == 0 ? heat_k : 0.0f; /* while a current settles: who knows */
     if (b->reads && e->observes) {
         look(e, model, k);
-        b->heat_k += heat_k;
         spring_heating_watch(e, b, model, k);
         if (!b->blind) {
             spring_holding_watch(e, b, model, k, moved_k);

@@ -90,7 +90,8 @@ typedef struct {
     /* the running heating */
     float begun_c;       /* where it began, at the coldest */
     float begun_missing; /* what was still to transform then, at the most, 0..1 */
-    float heat_k;        /* taken up, over heat capacity */
+    float heat_k;        /* taken up, over heat capacity; less while it waits for its turn */
+    float peak_k;        /* the most of it */
     float mark_k;        /* where the resistance was last compared, and what it was */
     float mark_ohm;      /* 0: nowhere yet */
     float onset_ohm;

@@ -89,6 +89,21 @@ static void jump_of_the_current_forgets_no_phase(void)
     }
 }
 
+static void spring_that_had_to_wait_half_transformed_goes_on_to_the_end(void)
+{
+    begin_cold(1, 2);
+    level[0] = 1000;
+    while (truth[0].austenite < 0.3) {
+        (void)tick();
+    }
+    supply_limit_ma = 0;
+    (void)run(12.0);
+    supply_limit_ma = 15000;
+    (void)run(30.0);
+    (void)snprintf(where, sizeof where, "%.3f", truth[0].austenite);
+    TEST_ASSERT_TRUE_MESSAGE(truth[0].austenite > 0.99, where);
+}
+
 static void spring_that_has_lost_its_phase_is_heated_back(void)
 {
     begin_cold(1, 2);
@@ -384,6 +399,7 @@ int main(void)
     RUN_TEST(after_power_on_it_waits_says_so_and_then_holds_all_nine);
     RUN_TEST(held_spring_stays_on_near_martensite_start);
     RUN_TEST(jump_of_the_current_forgets_no_phase);
+    RUN_TEST(spring_that_had_to_wait_half_transformed_goes_on_to_the_end);
     RUN_TEST(spring_that_has_lost_its_phase_is_heated_back);
     RUN_TEST(resistance_without_a_change_is_driven_by_the_model_and_said);
     RUN_TEST(level_is_held);
