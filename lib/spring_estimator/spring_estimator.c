@@ -187,6 +187,7 @@ spring_learnt_t spring_estimator_learnt(const spring_estimator_t *e, uint8_t k)
 void spring_estimator_disturb(spring_belief_t *b)
 {
     b->settling = SETTLING_TICKS;
+    b->jumped = true;
     b->current_sum_ma = b->voltage_sum_mv = 0;
     b->readings = 0;
     b->quiet = 0;
@@ -240,9 +241,10 @@ static void take_readings(spring_belief_t *b)
         b->current_a = current_a;
         b->ohm = ohm;
         b->fresh = b->fresh < UINT8_MAX ? (uint8_t)(b->fresh + 1) : UINT8_MAX;
-    } else if (b->current_sum_ma < LEAST_MEAN_MA) {
-        b->fresh = 0;
+    } else if (b->current_sum_ma < LEAST_MEAN_MA && !b->jumped) {
+        b->fresh = 0; /* no current, or no sensor */
     }
+    b->jumped = false;
     b->current_sum_ma = b->voltage_sum_mv = 0;
     b->readings = 0;
 }
@@ -409,9 +411,9 @@ void spring_estimator_update(spring_estimator_t *e, thermal_model_t *model, uint
     const float heat_k = predict(e, b, model, k, power_w);
     const float moved_k = b->last_c - before_c;
     b->disturbance_k *= FORGETS;
+    b->heat_k += b->reads || b->fresh == 0 ? heat_k : 0.0f; /* while a current settles: who knows */
     if (b->reads && e->observes) {
         look(e, model, k);
-        b->heat_k += heat_k;
         spring_heating_watch(e, b, model, k);
         if (!b->blind) {
             spring_holding_watch(e, b, model, k, moved_k);
@@ -434,7 +436,7 @@ void spring_estimator_update(spring_estimator_t *e, thermal_model_t *model, uint
             return;
         }
     }
-    if (b->possible == SPRING_PHASE_AUSTENITE && !b->reads &&
+    if (b->possible == SPRING_PHASE_AUSTENITE && b->fresh == 0 &&
         spring_estimator_distance_k(e, model, k).low < 0.0f) {
         b->possible = SPRING_PHASE_BETWEEN | SPRING_PHASE_AUSTENITE; /* nothing tells any more */
     }

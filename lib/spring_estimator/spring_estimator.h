@@ -79,6 +79,7 @@ typedef struct {
     /* the running turn's readings */
     uint8_t readings;
     uint8_t settling; /* to be left out, after a jump of the current */
+    bool jumped;      /* there was one in this turn */
     uint16_t current_sum_ma;
     uint16_t voltage_sum_mv;
     float current_a; /* of the last turn that had readings */
@@ -92,7 +93,8 @@ typedef struct {
     /* the running heating */
     float begun_c;       /* where it began, at the coldest */
     float begun_missing; /* what was still to transform then, at the most, 0..1 */
-    float heat_k;        /* taken up, over heat capacity */
+    float heat_k;        /* taken up, over heat capacity; less while it waits for its turn */
+    float peak_k;        /* the most of it */
     float mark_k;        /* where the resistance was last compared, and what it was */
     float mark_ohm;      /* 0: nowhere yet */
     float onset_ohm;
