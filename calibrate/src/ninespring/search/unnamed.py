@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from scipy.signal import lfilter
 
 from ..effects.effect import sized
@@ -33,6 +34,8 @@ EDGES = 60
 """Of them in one run, at most."""
 SHORTEST = 2
 """Of those times, how many anything lasts."""
+SMOOTHED = 5
+"""Readings of a thermometer that are taken together."""
 DELAYS_S = (10.0, 30.0, 90.0)
 """By which heat may come late."""
 MOST = 12
@@ -41,7 +44,15 @@ ROUNDS = 4
 """Of finding what has no name and searching the library beside it."""
 SHOWN = ("pickup", "mixing", "sensor", "reading")
 """Kinds that are the thermometers' own: the springs are as they would be without."""
-UNITS = {"bridge": "W/K", "plume": "W/K", "heat": "W", "sensor": "K"}
+UNITS = {
+    "pickup": "K",
+    "bridge": "W/K",
+    "plume": "W/K",
+    "heat": "W",
+    "sensor": "K",
+    "reading": "K",
+    "surroundings": "K",
+}
 """Of a cause's size; the others are parts of what they take from."""
 SHARE = 0.1
 """Of what is left beyond the noise, the part that an unnamed cause must explain."""
@@ -71,21 +82,27 @@ class Cause:
 class Hidden:
     """An unnamed cause that is there: what a unit of it adds to the readings, (count,)."""
 
-    kind: str
+    cause: Cause
     text: str
+    rows: tuple[int, int | None]
     column: np.ndarray
     size: float = math.nan
     error: float = math.nan
 
+    def around(self, problem: Problem, fit: Fit) -> Hidden:
+        """Return it with what it adds as another fit has it."""
+        column = column_of(problem, fit, self.cause, typical_power(problem, fit), *self.rows)
+        return replace(self, column=column)
+
     def as_dict(self) -> dict[str, Any]:
         """Return it for diagnosis.json."""
-        unit = UNITS.get(self.kind, "1")
+        unit = UNITS.get(self.cause.kind, "1")
         return {
-            "kind": self.kind,
+            "kind": self.cause.kind,
             "size": self.size,
             "stderr": self.error,
             "unit": unit,
-            "text": f"{self.text}: {sized(self.size, self.error, unit)}",
+            "text": f"{self.text}: {sized(self.size, self.error, unit) if unit != '1' else sized(self.size, self.error, '%', 100.0)}",
         }
 
 
@@ -107,7 +124,9 @@ def _thinned(problem: Problem, columns: np.ndarray) -> np.ndarray:
     return np.concatenate(out)
 
 
-def column_of(problem: Problem, fit: Fit, cause: Cause, typical_w: float, begin: int = 0, end: int | None = None) -> np.ndarray:
+def column_of(
+    problem: Problem, fit: Fit, cause: Cause, typical_w: float, begin: int = 0, end: int | None = None
+) -> np.ndarray:
     """Return what a unit of a cause, from one row to another, adds to the readings of all runs, (count,)."""
     fields = []
     for r, (run, profile) in enumerate(zip(problem.runs, cause.profiles, strict=True)):
@@ -139,8 +158,14 @@ def library(problem: Problem, fit: Fit) -> list[Cause]:
         ambient = problem.ambient_of(r, by_key)
         shown = simulate_run(plant, run, ambient, by_key)
         around = np.full(len(run.time_s), plant.get("ambient_c")) if ambient is None else ambient
+        # where something unknown acts, the readings know better than the fit how warm the springs are
+        read = pd.DataFrame(run.temperature_c).rolling(SMOOTHED, center=True, min_periods=1).mean().to_numpy()
+        shown = np.where(np.isfinite(read), read, shown)
         over = shown - around[:, None]
-        acting = _everywhere(problem, run, power, shown, over)
+        still, blown = plant.get("loss_w_per_k"), plant.get("loss_fan_w_per_k")
+        loss_w_per_k = still + run.fan * (blown - still)
+        lost = over * loss_w_per_k[:, None]
+        acting = _everywhere(problem, run, power, shown, over, lost)
         heating = [key for key in acting if key[0] not in SHOWN]
         moved = dict(zip(heating, answers(problem, fit, r, [acting[key] for key in heating], typical), strict=True))
         for key, profile in acting.items():
@@ -148,10 +173,8 @@ def library(problem: Problem, fit: Fit) -> list[Cause]:
             profiles.setdefault(key, [None] * len(problem.runs))[r] = profile
             scaled = np.where(problem.mask[r], moved.get(key, profile) / problem.noise[r], 0.0)
             columns.setdefault(key, nothing)[r] = thin(scaled[:, :, None])
-        windows += _windows(problem, fit, r, samples, power, over, typical)
-    everywhere = [
-        Cause(*key, tuple(profiles[key]), np.concatenate(parts)) for key, parts in columns.items()
-    ]
+        windows += _windows(problem, fit, r, samples, power, lost, loss_w_per_k, typical)
+    everywhere = [Cause(*key, tuple(profiles[key]), np.concatenate(parts)) for key, parts in columns.items()]
     return everywhere + windows
 
 
@@ -162,7 +185,7 @@ def _only(k: int, values: np.ndarray, springs: int) -> np.ndarray:
 
 
 def _everywhere(
-    problem: Problem, run: Run, power: np.ndarray, shown: np.ndarray, over: np.ndarray
+    problem: Problem, run: Run, power: np.ndarray, shown: np.ndarray, over: np.ndarray, lost: np.ndarray
 ) -> dict[tuple[str, str], np.ndarray]:
     """Return, per kind and words, what acts all the time: heat (rows, springs), W, or what thermometers show, K."""
     springs, (rows, cols) = run.springs, (problem.array.rows, problem.array.cols)
@@ -194,13 +217,13 @@ def _everywhere(
                 out["plume", f"each spring is warmed by the one {words}, without the fan"] = warmed * still
     for delay_s in DELAYS_S:
         out["delay", f"a part of the heat comes {delay_s:g} s late"] = _delayed(power, run.time_s, delay_s) - power
-    out["trend", "all losses change over the run"] = -over * ramp[:, None]
+    out["trend", "all losses change over the run"] = -lost * ramp[:, None]
     out["trend", "all drives change over the run"] = power * ramp[:, None]
-    amperes = np.sqrt(np.maximum(power, 0.0))
+    amperes = np.sqrt(np.maximum(power, 0.0) / max(1e-12, float(power.mean())))
     out["pickup", "each thermometer shows its spring's current"] = amperes
-    out["pickup", "each thermometer shows its spring's power"] = power
+    out["pickup", "each thermometer shows its spring's power"] = power / max(1e-12, float(power.mean()))
     for k in range(springs):
-        out["trend", f"the loss of spring {k + 1} changes over the run"] = _only(k, -over[:, k] * ramp, springs)
+        out["trend", f"the loss of spring {k + 1} changes over the run"] = _only(k, -lost[:, k] * ramp, springs)
         out["trend", f"the drive of spring {k + 1} changes over the run"] = _only(k, power[:, k] * ramp, springs)
         out["reading", f"thermometer {k + 1} drifts"] = _only(k, ramp, springs)
         if springs > 1:
@@ -209,7 +232,14 @@ def _everywhere(
 
 
 def _windows(
-    problem: Problem, fit: Fit, r: int, samples: Sequence[int], power: np.ndarray, over: np.ndarray, typical_w: float
+    problem: Problem,
+    fit: Fit,
+    r: int,
+    samples: Sequence[int],
+    power: np.ndarray,
+    lost: np.ndarray,
+    loss_w_per_k: np.ndarray,
+    typical_w: float,
 ) -> list[Cause]:
     """Return what may begin and end in one run: heat, drives, losses and thermometers, each in steps at the edges."""
     run, mask, noise = problem.runs[r], problem.mask[r], problem.noise[r]
@@ -240,10 +270,11 @@ def _windows(
         return np.cumsum((mean[:, None, None] * between)[::-1], axis=0)[::-1]
 
     out = []
-    everything_lost, everything_driven = np.zeros_like(answer["heat", 0]), np.zeros_like(answer["heat", 0])
+    everything_lost, everything_driven, warmer = (np.zeros_like(answer["heat", 0]) for _ in range(3))
     one = np.ones(rows)
     for k in range(springs):
-        everything_lost += shaped(k, -over[:, k])
+        everything_lost += shaped(k, -lost[:, k])
+        warmer += shaped(k, loss_w_per_k)
         driven = shaped(k, power[:, k])
         everything_driven += driven
         jumps = np.zeros((len(edges), rows, springs))
@@ -252,8 +283,13 @@ def _windows(
         out.append(cause("contact", f"the drive of spring {k + 1} changes", _only(k, power[:, k], springs), driven))
         out.append(cause("heat", f"spring {k + 1} is given heat", _only(k, one, springs), answer["heat", k]))
         out.append(cause("sensor", f"thermometer {k + 1} jumps", _only(k, one, springs), jumps))
-    out.append(cause("gust", "all losses change", -over, everything_lost))
+    out.append(cause("gust", "all losses change", -lost, everything_lost))
+    out.append(cause("surroundings", "the surroundings are warmer", np.outer(loss_w_per_k, np.ones(springs)), warmer))
     if springs > 1:
+        every = np.zeros((len(edges), rows, springs))
+        for number, edge in enumerate(edges):
+            every[number, edge:] = 1.0
+        out.append(cause("sensor", "all thermometers jump", np.ones((rows, springs)), every))
         out.append(cause("supply", "all drives change", power, everything_driven))
     return out
 
@@ -301,7 +337,7 @@ def find(problem: Problem, fit: Fit, kinds: Sequence[Cause], already: Sequence[H
             run = problem.runs[next(r for r, one in enumerate(best.profiles) if one is not None)]
             when = [float(run.time_s[min(row, len(run.time_s) - 1)] - run.time_s[0]) for row in span]
             text = text.format(f"{when[0]:.0f} to {when[1]:.0f} s")
-        found.append(Hidden(best.kind, text, column_of(problem, fit, best, typical, *span)))
+        found.append(Hidden(best, text, span, column_of(problem, fit, best, typical, *span)))
         unit = vector - basis @ (basis.T @ vector)
         unit = unit / np.linalg.norm(unit)
         left = left - unit * (unit @ left)
@@ -347,15 +383,19 @@ def search_beside(
     first.progress("causes without a name")
     kinds = library(problem, final)
     hidden: list[Hidden] = []
-    out = None
+    out = taken_out = None
     for _ in range(ROUNDS):
+        hidden = [one.around(problem, final) for one in hidden]
+        problem.leave_out(np.column_stack([one.column for one in hidden]) if hidden else None)
+        final = problem.evaluate(final)
         if final.jacobian is None:
             shown = problem.predictions(final.spec, final.values)
             final = replace(final, jacobian=problem.jacobian(final.spec, final.values, shown))
         grown = find(problem, final, kinds, hidden)
         if len(grown) == len(hidden):
             break
-        problem.leave_out(np.column_stack([one.column for one in grown]))
+        taken_out = np.column_stack([one.column for one in grown])
+        problem.leave_out(taken_out)
         base = problem.fit(first.base.spec, first.base.as_dict(), errors=True)
         search = Search(problem, first.candidates, base, first.progress)
         result = search.run()
@@ -366,8 +406,8 @@ def search_beside(
         out = (search, result, hidden)
         if len(hidden) == len(grown) and not unexplained(problem, final):
             break
-        problem.leave_out(np.column_stack([one.column for one in hidden]) if hidden else None)
-        final = problem.evaluate(replace(final, jacobian=None))
+        final = replace(final, jacobian=None)
+    problem.leave_out(taken_out)
     return out
 
 

@@ -246,10 +246,12 @@ def _diagnose(
     adopted = [effect for effect, _ in steps]
     apart_from_final = rivals_of(found, final, adopted, contenders, progress)
     tried = candidates_of(found, final, base)
-    # from here on everything is in the error again, with or without a name
-    problem.leave_out(None)
-    base, final = declared_alone, problem.evaluate(final)
-    steps = [(effect, problem.evaluate(fit)) for effect, fit in steps]
+    if hidden:
+        # from here on everything is in the error again: a model is for an array in which what has no name still acts
+        problem.leave_out(None)
+        base = declared_alone
+        steps = [(e, problem.fit(fit.spec, fit.as_dict(), tolerance=1e-3, max_steps=14)) for e, fit in steps]
+        final = problem.fit(final.spec, final.as_dict(), tolerance=1e-4, errors=True)
     base_out, final_out = problem.holdout_rmse(base), problem.holdout_rmse(final)
 
     listed = []
