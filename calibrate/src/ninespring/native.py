@@ -17,7 +17,7 @@ from .errors import WorkError
 
 MAX_SPRINGS = 64
 POWER, CURRENT, DUTY, COMMAND, TEMPERATURE = range(5)
-MODES = {"power": POWER, "current": CURRENT, "command": COMMAND}
+MODES = {"power": POWER, "current": CURRENT, "command": COMMAND, "temperature": TEMPERATURE}
 
 _ERRORS = {
     -1: "no parameter or effect of that name",

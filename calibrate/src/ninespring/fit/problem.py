@@ -11,6 +11,7 @@ import math
 import os
 import threading
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -26,6 +27,8 @@ from .spec import Fit, Spec
 WORKERS = max(1, min(8, os.cpu_count() or 1))
 REUSED = 0.1
 """Movement, in the inner coordinates, up to which a slope is used again: a tenth of what matters."""
+FORETOLD = 0.3
+"""Part of what a step changed that slopes may have foretold wrongly and still be mended, not simulated again."""
 _BAD = 1e3
 """What a simulation that the plant refuses 'shows', degC: so far off that no fit goes there."""
 
@@ -73,6 +76,7 @@ class Problem:
         self.count = int(sum(mask.sum() for mask in self.mask))
         self.basis: list[np.ndarray | None] = [None] * len(self.runs)
         self.start_response: list[np.ndarray | None] = [None] * len(self.runs)
+        self.unnamed: np.ndarray | None = None
         self.pool = concurrent.futures.ThreadPoolExecutor(WORKERS)
         self.simulations = 0
         self._count_lock = threading.Lock()
@@ -171,20 +175,55 @@ class Problem:
     # ---- residuals --------------------------------------------------------------------------------------
 
     def residuals(self, predicted: Sequence[np.ndarray]) -> list[np.ndarray]:
-        """Return measured minus predicted per run, NaN where not measured."""
-        return [run.temperature_c - p for run, p in zip(self.runs, predicted, strict=True)]
+        """Return measured minus predicted per run less what unnamed causes take up, NaN where not measured."""
+        out = [run.temperature_c - p for run, p in zip(self.runs, predicted, strict=True)]
+        if self.unnamed is None:
+            return out
+        pieces = self.scaled(out)
+        taken = self.unnamed @ (self.unnamed.T @ np.concatenate(pieces))
+        begin = 0
+        for left, mask, noise, piece in zip(out, self.mask, self.noise, pieces, strict=True):
+            left[mask] -= taken[begin : begin + len(piece)] * np.broadcast_to(noise, mask.shape)[mask]
+            begin += len(piece)
+        return out
+
+    def scaled(self, fields: Sequence[np.ndarray]) -> list[np.ndarray]:
+        """Return what is measured of fields (per run, degC), in units of the noise, one vector a run."""
+        return [(value / noise)[mask] for value, mask, noise in zip(fields, self.mask, self.noise, strict=True)]
+
+    def leave_out(self, columns: np.ndarray | None) -> None:
+        """Take what these columns (count, causes) can explain out of all that follows; None: take nothing out."""
+        self.unnamed = None if columns is None or not columns.size else np.linalg.qr(columns)[0]
+
+    def evaluate(self, fit: Fit) -> Fit:
+        """Return a fit's numbers with what they leave here, nothing fitted again."""
+        left = self.residuals(self.predictions(fit.spec, fit.values))
+        vector = self.vector(left)
+        return replace(
+            fit,
+            chi2=float(vector @ vector),
+            residual=left,
+            vector=vector,
+            sse=self.plain(left),
+            factor=math.nan,
+            innovation=math.nan,
+            holdout=math.nan,
+        )
 
     def vector(self, fields: Sequence[np.ndarray], weights: Sequence[np.ndarray] | None = None) -> np.ndarray:
         """Return fields (per run, degC) as one vector in units of the noise, starts whitened out."""
-        pieces = []
-        for r, (value, mask, noise) in enumerate(zip(fields, self.mask, self.noise, strict=True)):
-            piece = (value / noise)[mask]
+        pieces = self.scaled(fields)
+        if self.unnamed is not None:
+            whole = np.concatenate(pieces)
+            whole -= self.unnamed @ (self.unnamed.T @ whole)
+            pieces = np.split(whole, np.cumsum([len(one) for one in pieces])[:-1])
+        for r, (piece, mask) in enumerate(zip(pieces, self.mask, strict=True)):
             basis = self.basis[r]
             if weights is not None:
                 piece = piece * weights[r][mask]
             if basis is not None:
                 piece = piece - basis @ (basis.T @ piece)
-            pieces.append(piece)
+            pieces[r] = piece
         return np.concatenate(pieces)
 
     def plain(self, residual: Sequence[np.ndarray]) -> float:
@@ -337,11 +376,26 @@ class Problem:
                 if f.key in keys:
                     known[keys.index(f.key)] = (at, near.jacobian[:, column] * weight)
 
+        secant: list[tuple[np.ndarray, np.ndarray]] = []
+
         def slope(z: np.ndarray) -> np.ndarray:
-            stale = [c for c in range(len(free)) if c not in known or np.nanmax(np.abs(z - known[c][0])) > REUSED]
-            if stale:
-                fresh = self.jacobian(spec, outer(z), run(z)[0], weights, stale)
-                known.update({c: (z.copy(), fresh[:, k]) for k, c in enumerate(stale)})
+            vector = run(z)[1]
+            foretold = False
+            if secant and len(known) == len(free):
+                # what the slopes foretold of the last step says whether they still hold; the rest of it mends them
+                # (Broyden 1965)
+                moved, changed = z - secant[-1][0], vector - secant[-1][1]
+                missed = changed - sum(known[c][1] * one for c, one in enumerate(moved))
+                length = float(moved @ moved)
+                foretold = length > 0 and float(missed @ missed) < FORETOLD**2 * float(changed @ changed)
+                if foretold:
+                    known.update({c: (z, known[c][1] + missed * (moved[c] / length)) for c in known})
+            if not foretold:
+                stale = [c for c in range(len(free)) if c not in known or np.nanmax(np.abs(z - known[c][0])) > REUSED]
+                if stale:
+                    fresh = self.jacobian(spec, outer(z), run(z)[0], weights, stale)
+                    known.update({c: (z.copy(), fresh[:, k]) for k, c in enumerate(stale)})
+            secant[:] = [(z.copy(), vector)]
             return np.column_stack([known[c][1] for c in range(len(free))])
 
         # what is believed before, as further residuals: (z - believed) / its standard deviation

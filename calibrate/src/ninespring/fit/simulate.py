@@ -12,6 +12,24 @@ from ..logs.run import Run
 from ..models import Array
 
 
+def started(
+    plant: native.Plant, run: Run, ambient: np.ndarray | None, begin: int, start_offset: np.ndarray | None = None
+) -> native.Plant:
+    """Return the plant as it is where a log, or what follows a gap in it, begins."""
+    if ambient is not None:
+        plant.set_ambient(float(ambient[begin]))
+    plant.set_fan(float(run.fan[begin]))
+    plant.reset()
+    first = run.temperature_c[begin].copy()
+    if run.warm:
+        for k in range(run.springs):
+            plant.drive(k, native.MODES[run.mode], float(run.drive[begin, k]))
+        # a drifting ambient has no balance: it begins at the run's first row
+        plant.settle_without("ambient_drift", 1e6)
+    plant.start_from_measured(first + (0.0 if start_offset is None else start_offset))
+    return plant
+
+
 def simulate_run(
     plant: native.Plant,
     run: Run,
@@ -27,18 +45,8 @@ def simulate_run(
     After a gap the springs start again from what was measured there; air and plate carry on.
     Air and plate start at ambient, or, where the run begins warm and steady, in balance with its first inputs.
     """
-    if ambient is not None:
-        plant.set_ambient(float(ambient[0]))
-    plant.set_fan(float(run.fan[0]))
-    plant.reset()
+    started(plant, run, ambient, 0, start_offset)
     mode = native.MODES[run.mode]
-    first = run.temperature_c[0].copy()
-    if run.warm:
-        for k in range(run.springs):
-            plant.drive(k, mode, float(run.drive[0, k]))
-        # a drifting ambient has no balance: it begins at the run's first row
-        plant.settle_without("ambient_drift", 1e6)
-    plant.start_from_measured(first + (0.0 if start_offset is None else start_offset))
     simulate = plant.trace if trace else plant.simulate
     if len(run.starts) == 1:
         return simulate(run.time_s, mode, run.drive, run.fan, ambient)

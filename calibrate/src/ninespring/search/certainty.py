@@ -86,7 +86,7 @@ def witness(problem: Problem, fit: Fit, effect: str, without: Fit, flexible: boo
     off = fit.spec.without(effect)
     values = [fit.value(free.key) for free in off.free]
     bare = problem.predictions(off, values)
-    shown = [run.temperature_c - left for run, left in zip(problem.runs, fit.residual, strict=True)]
+    shown = problem.predictions(fit.spec, fit.values)
     left = problem.without_starts(fit.residual)
     factor = statistics.correlation_factor(
         [one / noise for one, noise in zip(left, problem.noise, strict=True)], problem.longest_lag()

@@ -24,7 +24,7 @@ from ..fit.spec import Fit, Spec
 from ..logs import condense
 from ..logs.run import Run
 from ..models import Array, Model
-from ..search import search
+from ..search import search, unnamed
 from ..search.certainty import CERTAIN, NAMED, witness
 from ..search.evidence import EQUIVALENT, difference, excess, log_evidence, unexplained
 from . import experiments, plausibility, resistance, unknown_heat
@@ -151,69 +151,17 @@ def with_effects_of(spec: Spec, model: Model, known: Sequence[effects.Candidate]
     return spec
 
 
-def _diagnose(
-    array: Array, runs: Sequence[Run], model: Model | None, frozen: bool, progress: Callable[[str], None]
-) -> Diagnosis:
-    begun = time.monotonic()
-    declared = dict(model.parameters) if model else {}
-    problem = prepare(model.array if model else array, runs, declared)
-    progress("fitting what is declared")
-    spec = base_spec(problem, frozen)
-    known = effects.candidates(problem)
-    if model:
-        spec = with_effects_of(spec, model, known, frozen)
-    base = first_fit(problem, spec)
-    found = search.Search(problem, [c for c in known if c.effect not in spec.effects], base, progress)
-    final, without, contenders = found.run()
-    progress("held-out blocks")
-    final = _finish(problem, final)
-    # where the ambient was not logged, that it drifted is no stand-in
-    guessed = all(run.ambient_c is None for run in problem.runs)
-    witnesses = {
-        effect: witness(problem, final, effect, other, found.is_flexible(final, effect) and not guessed)
-        for effect, other in without.items()
-    }
-    doubtful = [effect for effect, one in witnesses.items() if one.probability() < NAMED]
-    if doubtful:
-        # judged together, beside one another: what one of them stood in for does not count against the rest
-        for effect in doubtful:
-            final = found.reduced(final, effect)
-        final = _finish(problem, final)
-        without = {effect: found.reduced(final, effect) for effect in without if effect not in doubtful}
-        contenders = found.rivals(final, without)
-    left_over = unexplained(problem, final)
-    adopted = [e for e in final.spec.effects if e not in base.spec.effects]
-    strength = {e: log_evidence(problem, final, without[e]) for e in adopted}
-    base_out, final_out = problem.holdout_rmse(base), problem.holdout_rmse(final)
-
-    listed = []
-    steps = in_order(found, base, final, adopted)
-    adopted = [effect for effect, _ in steps]
-    for effect, growing in steps:
-        entry = {
-            "name": effect,
-            "rmse_c": statistics.rms(growing.residual),
-            "holdout_rmse_c": problem.holdout_rmse(growing),
-            "evidence": strength[effect],
-            "parameters": parameters_of(problem, final, effect),
-            "probability": witnesses[effect].probability(),
-            "certainty": "certain" if witnesses[effect].probability() >= CERTAIN else "probable",
-            "witness": asdict(witnesses[effect]),
-            "on_chip": effect in effects.ON_CHIP,
-            "in_words": effects.IN_WORDS[effect],
-            "text": effects.sentence(effect, parameters_of(problem, final, effect), variant_of(final, effect)),
-        }
-        if variant := variant_of(final, effect):
-            entry["variant"] = variant
-        if effect in effects.WHY_NOT_ON_CHIP:
-            entry["why_not_on_chip"] = effects.WHY_NOT_ON_CHIP[effect]
-        listed.append(entry)
-
-    progress("what v / i says")
-    second = resistance.witness(problem, final, contacts=math.sqrt(excess(problem, final)) < resistance.KNOWN_K)
-    listed += [resistance.entry(one, final, problem) for one in (second or {}).get("effects", [])]
-
-    rivals, seen = [], set()
+def rivals_of(
+    found: search.Search,
+    final: Fit,
+    adopted: Sequence[str],
+    contenders: Sequence[tuple[str, Fit]],
+    progress: Callable[[str], None],
+) -> list[dict[str, Any]]:
+    """Return what the data cannot tell from an effect that was named, each with the experiment that would."""
+    problem = found.problem
+    rivals: list[dict[str, Any]] = []
+    seen = set()
     for instead, other in sorted(contenders, key=lambda one: one[1].chi2):
         extra = [e for e in other.spec.effects if e not in final.spec.effects]
         if instead not in adopted or not extra or (instead, extra[0]) in seen:
@@ -240,18 +188,97 @@ def _diagnose(
                 "experiment": trial.as_dict(),
             }
         )
+    return rivals
 
-    candidates = []
-    for key, fit in found.fits.items():
-        candidates.append(
-            {
-                "effects": [f"{e} ({v})" if v else e for e, v in key],
-                "rmse_c": statistics.rms(fit.residual),
-                "evidence_over_baseline": log_evidence(problem, fit, base),
-                "adopted": fit.spec.variant == final.spec.variant,
-            }
-        )
-    candidates.sort(key=lambda one: -one["evidence_over_baseline"])
+
+def candidates_of(found: search.Search, final: Fit, base: Fit) -> list[dict[str, Any]]:
+    """Return every model that the search fitted, the likeliest first."""
+    candidates = [
+        {
+            "effects": [f"{e} ({v})" if v else e for e, v in key],
+            "rmse_c": statistics.rms(fit.residual),
+            "evidence_over_baseline": float(log_evidence(found.problem, fit, base)),
+            "adopted": fit.spec.variant == final.spec.variant,
+        }
+        for key, fit in found.fits.items()
+    ]
+    return sorted(candidates, key=lambda one: -one["evidence_over_baseline"])
+
+
+def _diagnose(
+    array: Array, runs: Sequence[Run], model: Model | None, frozen: bool, progress: Callable[[str], None]
+) -> Diagnosis:
+    begun = time.monotonic()
+    declared = dict(model.parameters) if model else {}
+    problem = prepare(model.array if model else array, runs, declared)
+    progress("fitting what is declared")
+    spec = base_spec(problem, frozen)
+    known = effects.candidates(problem)
+    if model:
+        spec = with_effects_of(spec, model, known, frozen)
+    base = first_fit(problem, spec)
+    found = search.Search(problem, [c for c in known if c.effect not in spec.effects], base, progress)
+    final, without, contenders = found.run()
+    hidden: list[unnamed.Hidden] = []
+    if unexplained(problem, final) and (beside := unnamed.search_beside(problem, found, final)):
+        found, (final, without, contenders), hidden = beside
+    declared_alone, base = base, found.base
+    progress("held-out blocks")
+    final = _finish(problem, final)
+    # where the ambient was not logged, that it drifted is no stand-in
+    guessed = all(run.ambient_c is None for run in problem.runs)
+    witnesses = {
+        effect: witness(problem, final, effect, other, found.is_flexible(final, effect) and not guessed)
+        for effect, other in without.items()
+    }
+    doubtful = [effect for effect, one in witnesses.items() if one.probability() < NAMED]
+    if doubtful:
+        # judged together, beside one another: what one of them stood in for does not count against the rest
+        for effect in doubtful:
+            final = found.reduced(final, effect)
+        final = _finish(problem, final)
+        without = {effect: found.reduced(final, effect) for effect in without if effect not in doubtful}
+        contenders = found.rivals(final, without)
+    left_over = unexplained(problem, final) or bool(hidden)
+    adopted = [e for e in final.spec.effects if e not in base.spec.effects]
+    strength = {e: log_evidence(problem, final, without[e]) for e in adopted}
+    steps = in_order(found, base, final, adopted)
+    adopted = [effect for effect, _ in steps]
+    apart_from_final = rivals_of(found, final, adopted, contenders, progress)
+    tried = candidates_of(found, final, base)
+    if hidden:
+        # from here on everything is in the error again: a model is for an array in which what has no name still acts
+        problem.leave_out(None)
+        base = declared_alone
+        steps = [(e, problem.fit(fit.spec, fit.as_dict(), tolerance=1e-3, max_steps=14)) for e, fit in steps]
+        final = problem.fit(final.spec, final.as_dict(), tolerance=1e-4, errors=True)
+    base_out, final_out = problem.holdout_rmse(base), problem.holdout_rmse(final)
+
+    listed = []
+    for effect, growing in steps:
+        entry = {
+            "name": effect,
+            "rmse_c": statistics.rms(growing.residual),
+            "holdout_rmse_c": problem.holdout_rmse(growing),
+            "evidence": strength[effect],
+            "parameters": parameters_of(problem, final, effect),
+            "probability": witnesses[effect].probability(),
+            "certainty": "certain" if witnesses[effect].probability() >= CERTAIN else "probable",
+            "witness": asdict(witnesses[effect]),
+            "on_chip": effect in effects.ON_CHIP,
+            "in_words": effects.IN_WORDS[effect],
+            "text": effects.sentence(effect, parameters_of(problem, final, effect), variant_of(final, effect)),
+        }
+        if variant := variant_of(final, effect):
+            entry["variant"] = variant
+        if effect in effects.WHY_NOT_ON_CHIP:
+            entry["why_not_on_chip"] = effects.WHY_NOT_ON_CHIP[effect]
+        listed.append(entry)
+
+    progress("what v / i says")
+    second = resistance.witness(problem, final)
+    listed += [resistance.entry(one, final, problem) for one in (second or {}).get("effects", [])]
+
     rho = statistics.autocorrelation([r / n for r, n in zip(final.residual, problem.noise, strict=True)], 1)
     depends, note = depends_on(problem, final)
     warnings = [f"{Path(run.name).name}: {text}" for run in problem.runs for text in run.notes]
@@ -278,7 +305,7 @@ def _diagnose(
             "effects": list(base.spec.effects),
         },
         "effects": listed,
-        "rivals": rivals,
+        "rivals": apart_from_final,
         "after": {
             "rmse_c": statistics.rms(final.residual),
             "holdout_rmse_c": final_out,
@@ -286,6 +313,7 @@ def _diagnose(
         },
         "unexplained": bool(left_over),
         "unknown_heat": heat.as_dict(),
+        "unnamed": [one.as_dict() for one in hidden],
         **({"resistance": {key: one for key, one in second.items() if key != "effects"}} if second else {}),
         "residual": {
             "autocorrelation_lag1": float(np.clip(rho[1], -1.0, 1.0)),
@@ -297,7 +325,7 @@ def _diagnose(
             "depends_on": depends,
             "note": note,
         },
-        "candidates": candidates[:40],
+        "candidates": tried[:40],
         "identifiability": {
             "not_identifiable": sorted(set(final.stuck)),
             "at_bounds": final.at_bounds(),

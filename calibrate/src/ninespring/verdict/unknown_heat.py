@@ -10,15 +10,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from ..fit.heat import THIN, power_of, step_answers, thin
 from ..fit.problem import Problem
-from ..fit.simulate import simulate_run
 from ..fit.spec import Fit
-from ..logs.run import Run
 from ..search.evidence import fit_factor
 
 GRID_S = 15.0
@@ -29,8 +28,6 @@ MOST = 12
 """Pieces of one run; where more would help, the rest is not made of events."""
 SMALLEST = 0.05
 """Of a spring's usual power: less heat than this is not told, whatever its evidence."""
-PROBE = 0.05
-"""Heat whose answer is simulated, as a part of the usual power: small enough that the model is straight."""
 EDGES = 80
 """Edges of one run, at most: a longer run has a coarser grid."""
 
@@ -103,60 +100,6 @@ class UnknownHeat:
         }
 
 
-def power_of(problem: Problem, fit: Fit, run_index: int) -> np.ndarray:
-    """Return the power that a fit gives each spring of a run, (rows, springs), W (current: at the martensite's resistance)."""
-    run = problem.runs[run_index]
-    plant = problem.plant_for(fit.spec, fit.values)
-    if run.mode == "current":
-        return run.drive**2 * plant.get("resistance_ohm")
-    if run.mode == "command":
-        return run.drive * np.array([plant.get(f"command_power_w[{k + 1}]") for k in range(run.springs)])
-    return run.drive
-
-
-def _with_heat(problem: Problem, fit: Fit, run: Run, power_w: np.ndarray, extra_w: np.ndarray) -> Run:
-    """Return a run whose springs are given `extra_w` (rows, springs) beside what was logged."""
-    wanted = np.maximum(power_w + extra_w, 0.0)
-    if run.mode == "power":
-        return replace(run, drive=wanted)
-    factor = np.where(power_w > 0, wanted / np.where(power_w > 0, power_w, 1.0), 0.0)
-    plant = problem.plant_for(fit.spec, fit.values)
-    if run.mode == "current":
-        idle = np.sqrt(wanted / plant.get("resistance_ohm"))
-        return replace(run, drive=np.where(power_w > 0, run.drive * np.sqrt(factor), idle))
-    full = np.array([max(1e-9, plant.get(f"command_power_w[{k + 1}]")) for k in range(run.springs)])
-    return replace(run, drive=np.minimum(np.where(power_w > 0, run.drive * factor, wanted / full), 1.0))
-
-
-def _answers(
-    problem: Problem, fit: Fit, r: int, edges: np.ndarray, typical_w: float
-) -> dict[tuple[str, int], np.ndarray]:
-    """Return how the readings answer 1 W that begins at each edge and stays, (edges, rows, springs), K/W: per spring, and
-    at all of them. Simulated with everything else as it was, fan and all.
-    """
-    run, power = problem.runs[r], power_of(problem, fit, r)
-    ambient = problem.ambient_of(r, fit.as_dict())
-    size = PROBE * typical_w
-
-    def shown(extra: np.ndarray) -> np.ndarray:
-        plant = problem.plant_for(fit.spec, fit.values)
-        return simulate_run(plant, _with_heat(problem, fit, run, power, extra), ambient, {})
-
-    rest = shown(np.zeros_like(power))
-    jobs, keys = [], []
-    for kind, k in [("heat", k) for k in range(run.springs)] + ([("common", -1)] if run.springs > 1 else []):
-        for edge in edges:
-            extra = np.zeros_like(power)
-            extra[edge:, slice(None) if k < 0 else k] = size
-            jobs.append(extra)
-            keys.append((kind, k))
-    answers = list(problem.pool.map(shown, jobs))
-    out: dict[tuple[str, int], list[np.ndarray]] = {}
-    for key, answer in zip(keys, answers, strict=True):
-        out.setdefault(key, []).append((answer - rest) / size)
-    return {key: np.stack(one) for key, one in out.items()}
-
-
 def find(problem: Problem, fit: Fit, say: Callable[[str], None] = lambda text: None) -> UnknownHeat:
     """Find the pieces of unknown heat in what a fit leaves."""
     usual = np.zeros(problem.array.springs)
@@ -201,27 +144,35 @@ def _pieces_of(problem: Problem, fit: Fit, r: int, slopes: np.ndarray, factor: f
     edges = np.arange(0, rows, grid)
     if len(edges) < 4:
         return []
-    answers = _answers(problem, fit, r, edges, typical_w)
-    used = slopes[:, np.linalg.norm(slopes, axis=0) > 1e-6] if slopes.size else slopes
-    basis = np.linalg.qr(used)[0] if used.shape[1] else np.zeros((int(mask.sum()), 0))
+    answers = step_answers(problem, fit, r, edges, typical_w)
     kinds = [("heat", k) for k in range(springs)] + [("sensor", k) for k in range(springs)]
     if springs > 1:
         kinds.append(("common", -1))
 
+    def thinned(fields: np.ndarray) -> np.ndarray:
+        """Return fields (edges, rows, springs) as columns (samples, edges), in units of the noise."""
+        return thin(np.moveaxis(np.where(mask, fields / noise, 0.0), 0, 2))
+
     def columns_of(kind: str, k: int) -> np.ndarray:
-        """Return what a unit step that begins at each edge adds to the readings, in units of the noise, (count, edges)."""
+        """Return what a unit step that begins at each edge adds to the readings, (samples, edges)."""
         if kind != "sensor":
-            return np.column_stack([(answer / noise)[mask] for answer in answers[kind, k]])
+            return thinned(answers[kind, k])
         fields = np.zeros((len(edges), rows, springs))
         for number, edge in enumerate(edges):
             fields[number, edge:, k] = 1.0
-        return np.column_stack([(field / noise)[mask] for field in fields])
+        return thinned(fields)
 
-    steps = {one: columns_of(*one) for one in kinds}
-    steps = {one: block - basis @ (basis.T @ block) for one, block in steps.items()}
-    grams = {one: block.T @ block for one, block in steps.items()}
-    left = (problem.without_starts(fit.residual)[r] / noise)[mask]
+    used = slopes[:, np.linalg.norm(slopes, axis=0) > 1e-6] if slopes.size else slopes
+    spread_out = np.zeros((*mask.shape, used.shape[1]))
+    spread_out[mask] = used
+    basis = np.linalg.qr(thin(spread_out))[0] if used.shape[1] else np.zeros((-(-rows // THIN) * springs, 0))
+    left = thinned(problem.without_starts(fit.residual)[r][None])[:, 0].astype(float)
     left = left - basis @ (basis.T @ left)
+    steps = {one: columns_of(*one) for one in kinds}
+    grams = {}
+    for one, block in steps.items():
+        inside = basis.T @ block
+        grams[one] = (block.T @ block - inside.T @ inside).astype(float)
     chosen: list[tuple[str, int, int, int]] = []
     columns: list[np.ndarray] = []
     shortest = max(1, round(SHORTEST_S / (grid * step)))
@@ -252,6 +203,7 @@ def _pieces_of(problem: Problem, fit: Fit, r: int, slopes: np.ndarray, factor: f
             break
         kind, k, a, b = best[1]
         vector = steps[kind, k][:, a] - (steps[kind, k][:, b] if b < len(edges) else 0.0)
+        vector = vector - basis @ (basis.T @ vector)
         chosen.append((kind, k, a, b))
         columns.append(vector)
         gains.append(nats)

@@ -1,0 +1,425 @@
+"""Causes that have no name in the library, in kinds that need none: heat that goes where it should not, losses and drives
+that change in time, thermometers that see what is not theirs.
+
+What one of them makes of the readings is simulated by the fitted model and is nearly linear in its size. Beside an unknown
+cause of such a kind a known one shows as clearly as alone; without it every name is a stand-in. They are taken out of the
+readings while the library is searched, priced for all that they were chosen from, and are no part of the model.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from scipy.signal import lfilter
+
+from ..effects.effect import sized
+from ..fit.heat import THIN, answers, power_of, step_answers, thin
+from ..fit.problem import Problem
+from ..fit.simulate import simulate_run
+from ..fit.spec import Fit
+from ..logs.run import Run
+from .evidence import fit_factor, unexplained
+from .search import Search
+
+GRID_S = 15.0
+"""Times at which something may begin or end."""
+STEPS = 600
+"""Of them at all springs together, at most: an array of many springs has a coarser grid."""
+EDGES = 60
+"""Of them in one run, at most."""
+SHORTEST = 2
+"""Of those times, how many anything lasts."""
+SMOOTHED = 5
+"""Readings of a thermometer that are taken together."""
+DELAYS_S = (10.0, 30.0, 90.0)
+"""By which heat may come late."""
+MOST = 12
+"""Unnamed causes, at most: where more would help, it is no cause of these kinds."""
+ROUNDS = 4
+"""Of finding what has no name and searching the library beside it."""
+SHOWN = ("pickup", "mixing", "sensor", "reading")
+"""Kinds that are the thermometers' own: the springs are as they would be without."""
+UNITS = {
+    "pickup": "K",
+    "bridge": "W/K",
+    "plume": "W/K",
+    "heat": "W",
+    "sensor": "K",
+    "reading": "K",
+    "surroundings": "K",
+}
+"""Of a cause's size; the others are parts of what they take from."""
+SHARE = 0.1
+"""Of what is left beyond the noise, the part that an unnamed cause must explain."""
+LEAST_NATS = 3.0
+"""Evidence after all prices: one in twenty."""
+
+
+@dataclass(frozen=True)
+class Cause:
+    """One kind of unnamed cause at one place, and what a unit of it adds to the readings, thinned (samples, numbers)."""
+
+    kind: str
+    text: str
+    profiles: tuple[np.ndarray | None, ...]
+    """Per run (rows, springs): the heat of a unit, W, or what the thermometers show more, K; None: not in this run."""
+    columns: np.ndarray
+    edges: tuple[int, ...] = ()
+    """Where given, the columns begin at one of these rows each and stay, the last is the end: a window is one less another."""
+
+    @property
+    def shown(self) -> bool:
+        """Whether it is the thermometers that show it."""
+        return self.kind in SHOWN
+
+
+@dataclass(frozen=True)
+class Hidden:
+    """An unnamed cause that is there: what a unit of it adds to the readings, (count,)."""
+
+    cause: Cause
+    text: str
+    rows: tuple[int, int | None]
+    column: np.ndarray
+    size: float = math.nan
+    error: float = math.nan
+
+    def around(self, problem: Problem, fit: Fit) -> Hidden:
+        """Return it with what it adds as another fit has it."""
+        column = column_of(problem, fit, self.cause, typical_power(problem, fit), *self.rows)
+        return replace(self, column=column)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return it for diagnosis.json."""
+        unit = UNITS.get(self.cause.kind, "1")
+        return {
+            "kind": self.cause.kind,
+            "size": self.size,
+            "stderr": self.error,
+            "unit": unit,
+            "text": f"{self.text}: {sized(self.size, self.error, unit) if unit != '1' else sized(self.size, self.error, '%', 100.0)}",
+        }
+
+
+def _delayed(power: np.ndarray, time_s: np.ndarray, delay_s: float) -> np.ndarray:
+    step = float(np.median(np.diff(time_s)))
+    keep = math.exp(-step / delay_s)
+    return lfilter([1.0 - keep], [1.0, -keep], power, axis=0)
+
+
+def _thinned(problem: Problem, columns: np.ndarray) -> np.ndarray:
+    """Return columns (count, n) with every THIN rows as one sample, unit noise kept: causes are slower than rows."""
+    out, begin = [], 0
+    for mask in problem.mask:
+        whole = np.zeros((*mask.shape, columns.shape[1]))
+        end = begin + int(mask.sum())
+        whole[mask] = columns[begin:end]
+        out.append(thin(whole))
+        begin = end
+    return np.concatenate(out)
+
+
+def column_of(
+    problem: Problem, fit: Fit, cause: Cause, typical_w: float, begin: int = 0, end: int | None = None
+) -> np.ndarray:
+    """Return what a unit of a cause, from one row to another, adds to the readings of all runs, (count,)."""
+    fields = []
+    for r, (run, profile) in enumerate(zip(problem.runs, cause.profiles, strict=True)):
+        if profile is None:
+            fields.append(np.zeros_like(run.temperature_c))
+            continue
+        within = np.zeros_like(profile)
+        within[begin:end] = profile[begin:end]
+        fields.append(within if cause.shown else answers(problem, fit, r, [within], typical_w)[0])
+    return np.concatenate(problem.scaled(fields))
+
+
+def typical_power(problem: Problem, fit: Fit) -> float:
+    """Return the mean power of a spring while it is driven, W."""
+    powers = np.concatenate([power_of(problem, fit, r) for r in range(len(problem.runs))])
+    return float(powers[powers > 0].mean()) if (powers > 0).any() else 1.0
+
+
+def library(problem: Problem, fit: Fit) -> list[Cause]:
+    """Return every unnamed cause, simulated around a fit."""
+    typical = typical_power(problem, fit)
+    profiles: dict[tuple[str, str], list[np.ndarray | None]] = {}
+    columns: dict[tuple[str, str], list[np.ndarray]] = {}
+    windows: list[Cause] = []
+    samples = [len(range(0, len(mask), THIN)) * mask.shape[1] for mask in problem.mask]
+    for r, run in enumerate(problem.runs):
+        power, by_key = power_of(problem, fit, r), fit.as_dict()
+        plant = problem.plant_for(fit.spec, fit.values)
+        ambient = problem.ambient_of(r, by_key)
+        shown = simulate_run(plant, run, ambient, by_key)
+        around = np.full(len(run.time_s), plant.get("ambient_c")) if ambient is None else ambient
+        # where something unknown acts, the readings know better than the fit how warm the springs are
+        read = pd.DataFrame(run.temperature_c).rolling(SMOOTHED, center=True, min_periods=1).mean().to_numpy()
+        shown = np.where(np.isfinite(read), read, shown)
+        over = shown - around[:, None]
+        still, blown = plant.get("loss_w_per_k"), plant.get("loss_fan_w_per_k")
+        loss_w_per_k = still + run.fan * (blown - still)
+        lost = over * loss_w_per_k[:, None]
+        acting = _everywhere(problem, run, power, shown, over, lost)
+        heating = [key for key in acting if key[0] not in SHOWN]
+        moved = dict(zip(heating, answers(problem, fit, r, [acting[key] for key in heating], typical), strict=True))
+        for key, profile in acting.items():
+            nothing = [np.zeros((one, 1), dtype=np.float32) for one in samples]
+            profiles.setdefault(key, [None] * len(problem.runs))[r] = profile
+            scaled = np.where(problem.mask[r], moved.get(key, profile) / problem.noise[r], 0.0)
+            columns.setdefault(key, nothing)[r] = thin(scaled[:, :, None])
+        windows += _windows(problem, fit, r, samples, power, lost, loss_w_per_k, typical)
+    everywhere = [Cause(*key, tuple(profiles[key]), np.concatenate(parts)) for key, parts in columns.items()]
+    return everywhere + windows
+
+
+def _only(k: int, values: np.ndarray, springs: int) -> np.ndarray:
+    out = np.zeros((len(values), springs))
+    out[:, k] = values
+    return out
+
+
+def _everywhere(
+    problem: Problem, run: Run, power: np.ndarray, shown: np.ndarray, over: np.ndarray, lost: np.ndarray
+) -> dict[tuple[str, str], np.ndarray]:
+    """Return, per kind and words, what acts all the time: heat (rows, springs), W, or what thermometers show, K."""
+    springs, (rows, cols) = run.springs, (problem.array.rows, problem.array.cols)
+    place = [divmod(k, cols) for k in range(springs)]
+    ramp = (run.time_s - run.time_s[0]) / max(1.0, run.duration_s)
+    out: dict[tuple[str, str], np.ndarray] = {}
+    for j in range(springs):
+        for k in range(springs):
+            apart = max(abs(a - b) for a, b in zip(place[j], place[k], strict=True))
+            if j == k or (springs > 16 and apart > 2):
+                continue
+            out["crosstalk", f"the drive of spring {j + 1} also heats spring {k + 1}"] = _only(k, power[:, j], springs)
+            seen = _only(k, shown[:, j] - shown[:, k], springs)
+            out["mixing", f"thermometer {k + 1} also sees spring {j + 1}"] = seen
+            if j < k and apart > 1:
+                flow = over[:, j] - over[:, k]
+                text = f"springs {j + 1} and {k + 1} are joined, though no neighbours"
+                out["bridge", text] = _only(k, flow, springs) - _only(j, flow, springs)
+    for words, step in (("above", (1, 0)), ("below", (-1, 0)), ("to the left", (0, 1)), ("to the right", (0, -1))):
+        warmed = np.zeros_like(power)
+        for k, (row, col) in enumerate(place):
+            beside = (row - step[0], col - step[1])
+            if 0 <= beside[0] < rows and 0 <= beside[1] < cols:
+                warmed[:, k] = np.maximum(over[:, beside[0] * cols + beside[1]], 0.0)
+        if warmed.any():
+            out["plume", f"each spring is warmed by the one {words}"] = warmed
+            if run.fan.any():
+                still = (1.0 - run.fan)[:, None]
+                out["plume", f"each spring is warmed by the one {words}, without the fan"] = warmed * still
+    for delay_s in DELAYS_S:
+        out["delay", f"a part of the heat comes {delay_s:g} s late"] = _delayed(power, run.time_s, delay_s) - power
+    out["trend", "all losses change over the run"] = -lost * ramp[:, None]
+    out["trend", "all drives change over the run"] = power * ramp[:, None]
+    amperes = np.sqrt(np.maximum(power, 0.0) / max(1e-12, float(power.mean())))
+    out["pickup", "each thermometer shows its spring's current"] = amperes
+    out["pickup", "each thermometer shows its spring's power"] = power / max(1e-12, float(power.mean()))
+    for k in range(springs):
+        out["trend", f"the loss of spring {k + 1} changes over the run"] = _only(k, -lost[:, k] * ramp, springs)
+        out["trend", f"the drive of spring {k + 1} changes over the run"] = _only(k, power[:, k] * ramp, springs)
+        out["reading", f"thermometer {k + 1} drifts"] = _only(k, ramp, springs)
+        if springs > 1:
+            out["pickup", f"thermometer {k + 1} shows its spring's current"] = _only(k, amperes[:, k], springs)
+    return out
+
+
+def _windows(
+    problem: Problem,
+    fit: Fit,
+    r: int,
+    samples: Sequence[int],
+    power: np.ndarray,
+    lost: np.ndarray,
+    loss_w_per_k: np.ndarray,
+    typical_w: float,
+) -> list[Cause]:
+    """Return what may begin and end in one run: heat, drives, losses and thermometers, each in steps at the edges."""
+    run, mask, noise = problem.runs[r], problem.mask[r], problem.noise[r]
+    step = float(np.median(np.diff(run.time_s)))
+    rows, springs = run.temperature_c.shape
+    grid = max(1, round(GRID_S / step), -(-rows // min(EDGES, max(8, STEPS // springs))))
+    edges = np.arange(0, rows, grid)
+    if len(edges) < 4:
+        return []
+    answer = step_answers(problem, fit, r, edges, typical_w)
+    ends = (*(int(edge) for edge in edges), rows)
+    begin = sum(samples[:r])
+
+    def cause(kind: str, text: str, profile: np.ndarray, block: np.ndarray) -> Cause:
+        """Return the cause of a block of fields (edges, rows, springs)."""
+        columns = np.zeros((sum(samples), len(block)), dtype=np.float32)
+        scaled = np.where(mask, block / noise, 0.0)
+        columns[begin : begin + samples[r]] = thin(np.moveaxis(scaled, 0, 2))
+        profiles = [None] * len(problem.runs)
+        profiles[r] = profile
+        return Cause(kind, f"{text}, {{}} of run {r + 1}", tuple(profiles), columns, ends)
+
+    def shaped(k: int, heat: np.ndarray) -> np.ndarray:
+        """Return the answers to a heat of spring k that begins at each edge, from those to constant heat between edges."""
+        mean = np.add.reduceat(heat, edges) / np.diff(ends)
+        steps = answer["heat", k]
+        between = steps - np.concatenate([steps[1:], np.zeros_like(steps[:1])])
+        return np.cumsum((mean[:, None, None] * between)[::-1], axis=0)[::-1]
+
+    out = []
+    everything_lost, everything_driven, warmer = (np.zeros_like(answer["heat", 0]) for _ in range(3))
+    one = np.ones(rows)
+    for k in range(springs):
+        everything_lost += shaped(k, -lost[:, k])
+        warmer += shaped(k, loss_w_per_k)
+        driven = shaped(k, power[:, k])
+        everything_driven += driven
+        jumps = np.zeros((len(edges), rows, springs))
+        for number, edge in enumerate(edges):
+            jumps[number, edge:, k] = 1.0
+        out.append(cause("contact", f"the drive of spring {k + 1} changes", _only(k, power[:, k], springs), driven))
+        out.append(cause("heat", f"spring {k + 1} is given heat", _only(k, one, springs), answer["heat", k]))
+        out.append(cause("sensor", f"thermometer {k + 1} jumps", _only(k, one, springs), jumps))
+    out.append(cause("gust", "all losses change", -lost, everything_lost))
+    out.append(cause("surroundings", "the surroundings are warmer", np.outer(loss_w_per_k, np.ones(springs)), warmer))
+    if springs > 1:
+        every = np.zeros((len(edges), rows, springs))
+        for number, edge in enumerate(edges):
+            every[number, edge:] = 1.0
+        out.append(cause("sensor", "all thermometers jump", np.ones((rows, springs)), every))
+        out.append(cause("supply", "all drives change", power, everything_driven))
+    return out
+
+
+def find(problem: Problem, fit: Fit, kinds: Sequence[Cause], already: Sequence[Hidden]) -> list[Hidden]:
+    """Return the unnamed causes that a fit's residual calls for, beside those that are taken out already.
+
+    The best first, while it beats its price and explains a fair share of what is left.
+    """
+    jac = fit.jacobian if fit.jacobian is not None else np.zeros((problem.count, 0))
+    used = jac[:, np.linalg.norm(jac, axis=0) > 1e-6]
+    taken = [used, *([] if problem.unnamed is None else [problem.unnamed])]
+    basis = np.linalg.qr(_thinned(problem, np.column_stack(taken)))[0]
+    left = _thinned(problem, np.concatenate(problem.scaled(problem.without_starts(fit.residual)))[:, None])[:, 0]
+    left = left - basis @ (basis.T @ left)
+    typical = typical_power(problem, fit)
+    found = list(already)
+    samples = problem.count / fit_factor(problem, fit)
+    single = [one for one in kinds if not one.edges]
+    windows = [one for one in kinds if one.edges]
+    matrix = np.column_stack([one.columns[:, 0] for one in single])
+    whole = (matrix**2).sum(axis=0)
+    power = whole - ((basis.T @ matrix) ** 2).sum(axis=0)
+    grams = []
+    for one in windows:
+        inside = basis.T @ one.columns
+        grams.append(one.columns.T @ one.columns - inside.T @ inside)
+    tried = len(single) + sum(one.columns.shape[1] ** 2 / 2 for one in windows)
+    while len(found) < MOST:
+        gain = np.where(power > 1e-3 * whole, (matrix.T @ left) ** 2 / np.maximum(power, 1e-12), 0.0)
+        k = int(np.argmax(gain))
+        drop, vector, best, span = float(gain[k]), matrix[:, k], single[k], (0, None)
+        for one, gram in zip(windows, grams, strict=True):
+            value, a, b = _best_window(one.columns.T @ left, gram)
+            if value > drop:
+                vector = one.columns[:, a] - (0.0 if b == len(gram) else one.columns[:, b])
+                drop, best, span = value, one, (one.edges[a], one.edges[b])
+        rest = float(left @ left)
+        price = math.log(tried) + 0.5 * math.log(max(2.0, samples))
+        nats = 0.5 * samples * math.log(rest / max(1e-9, rest - drop)) - price
+        if nats < LEAST_NATS or drop < SHARE * max(0.0, rest - len(left)):
+            break
+        text = best.text
+        if best.edges:
+            run = problem.runs[next(r for r, one in enumerate(best.profiles) if one is not None)]
+            when = [float(run.time_s[min(row, len(run.time_s) - 1)] - run.time_s[0]) for row in span]
+            text = text.format(f"{when[0]:.0f} to {when[1]:.0f} s")
+        found.append(Hidden(best, text, span, column_of(problem, fit, best, typical, *span)))
+        unit = vector - basis @ (basis.T @ vector)
+        unit = unit / np.linalg.norm(unit)
+        left = left - unit * (unit @ left)
+        basis = np.column_stack([basis, unit])
+        power = power - (unit @ matrix) ** 2
+        for one, gram in zip(windows, grams, strict=True):
+            inside = unit @ one.columns
+            gram -= np.outer(inside, inside)
+    return found
+
+
+def weighed(problem: Problem, fit: Fit, hidden: Sequence[Hidden]) -> list[tuple[Hidden, float]]:
+    """Return unnamed causes with their sizes beside a fit's numbers, and the nats by which each is needed there."""
+    problem.leave_out(None)
+    bare = problem.evaluate(fit)
+    slopes = problem.jacobian(fit.spec, fit.values, problem.predictions(fit.spec, fit.values))
+    slopes = slopes[:, np.linalg.norm(slopes, axis=0) > 1e-6]
+    columns = np.column_stack([one.column for one in hidden])
+    matrix = np.column_stack([columns, slopes])
+    scale = np.linalg.norm(matrix, axis=0)
+    left = np.concatenate(problem.scaled(problem.without_starts(bare.residual)))
+    inverse = np.linalg.pinv((matrix / scale).T @ (matrix / scale), rcond=1e-10)
+    size = inverse @ ((matrix / scale).T @ left)
+    rest = left - (matrix / scale) @ size
+    problem.leave_out(columns)
+    factor = fit_factor(problem, problem.evaluate(fit))
+    spread = factor * max(1.0, float(rest @ rest) / problem.count)
+    out = []
+    for k, one in enumerate(hidden):
+        nats = 0.5 * float(size[k] ** 2 / inverse[k, k]) / spread
+        error = math.sqrt(float(inverse[k, k]) * spread) / scale[k]
+        out.append((replace(one, size=float(size[k] / scale[k]), error=error), nats))
+    return out
+
+
+def search_beside(
+    problem: Problem, first: Search, final: Fit
+) -> tuple[Search, tuple[Fit, dict[str, Fit], list[tuple[str, Fit]]], list[Hidden]] | None:
+    """Search the library again beside what has no name; None where nothing of these kinds is there.
+
+    The problem leaves the unnamed causes out when this returns.
+    """
+    first.progress("causes without a name")
+    kinds = library(problem, final)
+    hidden: list[Hidden] = []
+    out = taken_out = None
+    for _ in range(ROUNDS):
+        hidden = [one.around(problem, final) for one in hidden]
+        problem.leave_out(np.column_stack([one.column for one in hidden]) if hidden else None)
+        final = problem.evaluate(final)
+        if final.jacobian is None:
+            shown = problem.predictions(final.spec, final.values)
+            final = replace(final, jacobian=problem.jacobian(final.spec, final.values, shown))
+        grown = find(problem, final, kinds, hidden)
+        if len(grown) == len(hidden):
+            break
+        taken_out = np.column_stack([one.column for one in grown])
+        problem.leave_out(taken_out)
+        base = problem.fit(first.base.spec, first.base.as_dict(), errors=True)
+        search = Search(problem, first.candidates, base, first.progress)
+        result = search.run()
+        final = result[0]
+        # what stood in for an effect that is named by now goes again
+        judged = weighed(problem, final, grown)
+        hidden = [one for one, nats in judged if nats > LEAST_NATS]
+        out = (search, result, hidden)
+        if len(hidden) == len(grown) and not unexplained(problem, final):
+            break
+        final = replace(final, jacobian=None)
+    problem.leave_out(taken_out)
+    return out
+
+
+def _best_window(moment: np.ndarray, gram: np.ndarray) -> tuple[float, int, int]:
+    """Return what the best step up and down would explain, and its edges; the last edge is the end of the run."""
+    count = len(moment)
+    diagonal = np.diag(gram)
+    top, square = np.append(moment, 0.0), np.append(diagonal, 0.0)
+    cross = np.pad(gram, ((0, 0), (0, 1)))
+    power = diagonal[:, None] + square[None, :] - 2.0 * cross
+    gain = (moment[:, None] - top[None, :]) ** 2 / np.maximum(power, 1e-9)
+    long = np.arange(count + 1)[None, :] - np.arange(count)[:, None] >= SHORTEST
+    gain = np.where(long & (power > 1e-6), gain, 0.0)
+    a, b = np.unravel_index(int(np.argmax(gain)), gain.shape)
+    return float(gain[a, b]), int(a), int(b)
