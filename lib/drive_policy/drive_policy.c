@@ -532,7 +532,7 @@ static void claim_of(drive_policy_t *policy, const drive_policy_input_t *input, 
     }
     if (open) {
         switch_off(policy, k);
-        s->released = false;
+        s->released = true; /* when it is off, it was: what heats it then is what it had */
         s->wanted_ma = share_of_ma(p->open_current_ma, input->level_permille[k]);
     } else {
         s->limits = said_of(policy, k);
