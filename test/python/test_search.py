@@ -14,6 +14,8 @@ from ninespring.fit.problem import Problem
 from ninespring.fit.spec import Fit
 from ninespring.logs import log_text, read_log
 from ninespring.models import Array, Model
+from ninespring.plan import plan_experiment
+from ninespring.recording import script_lines
 from ninespring.search import evidence, search
 from ninespring.verdict import diagnosis, experiments
 from ninespring.verdict.residual import surrogate
