@@ -1,4 +1,4 @@
-"""Writes docs/results.md: runs every benchmark and puts its figures beside their targets.
+"""Writes docs/results.md, which is read in two minutes, and docs/results-tables.md: every figure beside its target.
 
     script/results                 all of them
     script/results thermal_model   only that section is measured again; the others keep their last figures
@@ -27,6 +27,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 KEPT = ROOT / "docs" / "results"
 PAGE = ROOT / "docs" / "results.md"
+TABLES = ROOT / "docs" / "results-tables.md"
 TARGET = re.compile(r"(?P<sign><=|>=|<|>)\s*(?P<limit>[-+0-9.e]+)|(?P<none>0)")
 
 
@@ -131,27 +132,152 @@ def table(section: Section) -> list[str]:
     return [*lines, "", f"    {section.command}", ""]
 
 
-def summary() -> list[str]:
-    """How many targets are met, and each that is missed."""
-    verdicts = [(section, row, meets(row)) for section in SECTIONS for row in figures_of(section)]
-    met = sum(verdict is True for _, _, verdict in verdicts)
-    missed = [(section, row) for section, row, verdict in verdicts if verdict is False]
-    lines = [f"Of {met + len(missed)} figures with a target, {met} meet it." + (" Missed:" if missed else ""), ""]
-    if missed:
-        lines += ["| missed | measured | target | section |", "|---|---|---|---|"]
-        lines += [f"| {row['figure']} | {measured(row)} | {row['target']} | {at.title} |" for at, row in missed]
-        lines.append("")
+HEADLINES: tuple[tuple[str, tuple[tuple[str, str, str], ...]], ...] = (
+    (
+        "Is driving by the model worth it? Beside each: springs kept at 105 degC, as the paper did (B105), and at 1.5 A (B1.5)",
+        (
+            (
+                "rise of the undriven centre while its eight neighbours are held",
+                "policy",
+                "rise of the undriven centre",
+            ),
+            (
+                "energy over ten minutes, of B105's, mean of 512 patterns",
+                "policy",
+                "energy over 10 min, of B105's, mean, 512",
+            ),
+            ("all nine from cold to austenite within 15 A", "policy", "all nine, within 15 A"),
+            ("a spring that is switched off is martensite again after", "policy", "release: centre of eight held"),
+            ("driven springs that never transform, of 2304", "policy", "driven springs that never reach 99 %, 512"),
+        ),
+    ),
+    (
+        "Does it believe what is true? The array as declared, from power-on, nothing told",
+        (
+            ("all nine transformed after", "worlds", "declared: latest start, nine"),
+            (
+                "temperature and phase within their bounds (99 % are promised)",
+                "worlds",
+                "declared: temperature and phase",
+            ),
+            ("half width of the temperature's bounds", "worlds", "declared: half width of the temperature"),
+            ("hottest that any spring came", "worlds", "declared: hottest true"),
+        ),
+    ),
+    (
+        "Does the diagnosis find what it is not told?",
+        (
+            ("one undeclared effect: named, or as a rival", "diagnose", "single effect adopted or named"),
+            ("two undeclared effects: both named", "diagnose", "both effects of a pair"),
+            ("nothing missing: nothing named", "diagnose", "nothing adopted where nothing"),
+            (
+                "an effect outside of the library: said to be unexplained",
+                "diagnose",
+                "flagged unexplained, effect outside",
+            ),
+            ("of those called certain, right", "diagnose", "of those called 0.8 to 1"),
+            ("no thermometer at all: the chip's error before", "real_logs", "board alone, no thermometer"),
+            ("... and after", "real_logs", "the same, after"),
+        ),
+    ),
+    (
+        "What does it cost?",
+        (
+            ("worst control tick, of 320,000 cycles", "firmware", "controller_tick, worst case, without"),
+            ("flash, of 253,952 bytes", "firmware", "flash (integer"),
+            ("RAM left in the worst case, of 8,192 bytes", "firmware", "RAM left in the worst case (integer"),
+            (
+                "chip's fixed-point model against double precision, rms",
+                "thermal_model",
+                "fixed point against double, 200 sets x 1 h, with",
+            ),
+            ("simulated array and controller", "loop", "controller + plant, native, 9"),
+        ),
+    ),
+)
+"""What the first page shows: words, section, and how the figure's name begins."""
+WORLDS = ("worlds", "worlds_learnt")
+
+
+def section_named(name: str) -> Section:
+    return next(section for section in SECTIONS if section.name == name)
+
+
+def headline(words: str, name: str, begins: str) -> list[str]:
+    """Return a row: words, what was measured (baselines beside it), target and verdict."""
+    rows = [row for row in figures_of(section_named(name)) if str(row["figure"]).startswith(begins)]
+    if not rows:
+        return [words, "not measured", "", ""]
+    first, *others = rows
+    beside = [
+        f"{str(row['figure']).rpartition(' - ')[2]} {measured(row)}" for row in others if " - B" in str(row["figure"])
+    ]
+    verdict = {True: "met", False: "**missed**", None: ""}[meets(first)]
+    target = first.get("target")
+    return [words, "; ".join([measured(first), *beside]), "" if target in (None, "") else str(target), verdict]
+
+
+def worlds_in_words() -> list[str]:
+    """Return in how many worlds every target is met, and which ones miss what."""
+    lines = []
+    for name in WORLDS:
+        section = section_named(name)
+        worlds: set[str] = set()
+        missed: dict[str, list[str]] = {}
+        for row in figures_of(section):
+            world, colon, what = str(row["figure"]).partition(": ")
+            if colon and meets(row) is not None:
+                worlds.add(world)
+                missed.setdefault(f"{what}, {row['target']}", []).extend([world] if meets(row) is False else [])
+        if worlds:
+            met = len(worlds - {world for missing in missed.values() for world in missing})
+            lines += [f"{section.title}: every target is met in {met} of {len(worlds)}.", ""]
+            lines += ["| target | missed in |", "|---|---|"]
+            lines += [f"| {what} | {', '.join(missing)} |" for what, missing in missed.items() if missing]
+            lines.append("")
     return lines
 
 
-def page() -> str:
+def anchor(title: str) -> str:
+    """Return a heading's anchor as the site and the forge make it."""
+    return re.sub(r"[^a-z0-9 _-]", "", title.lower()).replace(" ", "-")
+
+
+def first_page() -> str:
+    """What a reader wants to know, in two minutes."""
     lines = [
         "# Results",
         "",
-        "Written by `script/results`: every figure below was measured by the command under its table.",
+        "Written by `script/results`, like the [tables](results-tables.md) that it is taken from.",
+        "",
+    ]
+    for question, rows in HEADLINES:
+        lines += [f"## {question}", "", "| | measured | target | |", "|---|---|---|---|"]
+        lines += [f"| {' | '.join(headline(*row))} |" for row in rows]
+        lines.append("")
+    lines += ["## Does it hold where the array is not as declared?", "", "[Worlds](worlds.md) says what each is.", ""]
+    lines += worlds_in_words()
+    lines += ["## All targets", "", "| section | met | missed |", "|---|---|---|"]
+    for section in SECTIONS:
+        verdicts = [meets(row) for row in figures_of(section)]
+        counts = f"{verdicts.count(True)} | {verdicts.count(False)}" if figures_of(section) else " | "
+        lines.append(f"| [{section.title}](results-tables.md#{anchor(section.title)}) | {counts} |")
+    return "\n".join([*lines, "", written()])
+
+
+def written() -> str:
+    today = datetime.date.today().isoformat()
+    return f"Page written {today} on {platform.system()} {platform.machine()}.\n"
+
+
+def tables() -> str:
+    """Every figure."""
+    lines = [
+        "# Results: the tables",
+        "",
+        "Written by `script/results`: every figure below was measured by the command under its table; [Results](results.md) is the short of it.",
         "Times are of one machine and are given as ratios where they can be; cycles and bytes are exact.",
         "",
-        *summary(),
     ]
     for section in SECTIONS:
         lines += [f"## {section.title}", ""]
@@ -165,20 +291,27 @@ def page() -> str:
             found = True
         if not found:
             lines += [f"Not measured yet: `{section.command}`.", ""]
-    today = datetime.date.today().isoformat()
-    lines += ["---", f"Page written {today} on {platform.system()} {platform.machine()}.", ""]
-    return "\n".join(lines)
+    return "\n".join([*lines, "---", written()])
+
+
+def write_pages() -> None:
+    PAGE.write_text(first_page(), encoding="utf-8")
+    TABLES.write_text(tables(), encoding="utf-8")
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     names = [section.name for section in SECTIONS]
+    parser.add_argument("--pages", action="store_true", help="only write the pages anew from what is kept")
     parser.add_argument("sections", nargs="*", metavar="SECTION", help=f"one of: {', '.join(names)}; default all")
     arguments = parser.parse_args()
     unknown = sorted(set(arguments.sections) - set(names))
     if unknown:
         parser.error(f"no such section: {', '.join(unknown)}; there are {', '.join(names)}")
     KEPT.mkdir(parents=True, exist_ok=True)
+    if arguments.pages:
+        write_pages()
+        return 0
     failed = []
     for section in SECTIONS:
         if arguments.sections and section.name not in arguments.sections:
@@ -188,8 +321,8 @@ def main() -> int:
         except (subprocess.CalledProcessError, OSError) as error:
             print(f"results: {section.name} failed: {error}", file=sys.stderr)
             failed.append(section.name)
-        PAGE.write_text(page(), encoding="utf-8")  # after each: what is measured is not lost
-    print(f"results: wrote {PAGE.relative_to(ROOT)}", file=sys.stderr)
+        write_pages()  # after each: what is measured is not lost
+    print(f"results: wrote {PAGE.relative_to(ROOT)} and {TABLES.relative_to(ROOT)}", file=sys.stderr)
     return 1 if failed else 0
 
 

@@ -4,6 +4,7 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <stdlib.h>
+#include <sys/ioctl.h>
 #include <termios.h>
 #include <unistd.h>
 
@@ -59,4 +60,10 @@ size_t board_pty_write(board_pty_t *pty, const uint8_t *bytes, size_t count)
 {
     ssize_t written = write(pty->master, bytes, count);
     return written > 0 ? (size_t)written : 0;
+}
+
+size_t board_pty_unread(const board_pty_t *pty)
+{
+    int count = 0;
+    return ioctl(pty->terminal, FIONREAD, &count) == 0 && count > 0 ? (size_t)count : 0;
 }

@@ -25,6 +25,8 @@ void board_pty_close(board_pty_t *pty);
 size_t board_pty_read(board_pty_t *pty, uint8_t *bytes, size_t size);
 /* Bytes written; the rest is lost. */
 size_t board_pty_write(board_pty_t *pty, const uint8_t *bytes, size_t count);
+/* Bytes that no client has read yet. */
+size_t board_pty_unread(const board_pty_t *pty);
 
 #ifdef __cplusplus
 }

@@ -85,6 +85,42 @@ private:
     double lost_s_ = 0.0;
 };
 
+/* Has time stand still until a client has read what was written: as fast as it goes is faster than
+ * anybody reads, and would make an instant's delay of the reader a long one. A port that is left
+ * alone is not awaited. */
+class reader
+{
+public:
+    explicit reader(const board_pty_t *pty, std::size_t unread_most)
+        : pty_(pty), unread_most_(unread_most)
+    {
+    }
+    void await()
+    {
+        if (pty_ == nullptr) {
+            return;
+        }
+        const auto until = std::chrono::steady_clock::now() + LEFT_ALONE;
+        bool behind = board_pty_unread(pty_) > unread_most_;
+        while (behind && reads_ && interrupted == 0) {
+            std::this_thread::sleep_for(LOOK_AGAIN);
+            behind = board_pty_unread(pty_) > unread_most_;
+            reads_ = std::chrono::steady_clock::now() < until;
+        }
+        reads_ = reads_ || !behind;
+    }
+
+private:
+    static constexpr std::chrono::milliseconds LEFT_ALONE{1000};
+    static constexpr std::chrono::microseconds LOOK_AGAIN{200};
+    const board_pty_t *pty_;
+    std::size_t unread_most_;
+    bool reads_ = true;
+};
+
+/* A row of nine springs: to wait after each byte would cost more than the simulation. */
+constexpr std::size_t BOARD_UNREAD_MOST = 256;
+
 class terminal
 {
 public:
@@ -124,6 +160,8 @@ void run_board(const board_arguments &arguments)
     std::fflush(stdout);
 
     pace clock(speed);
+    reader of_board(port.get(), BOARD_UNREAD_MOST);
+    reader of_logger(logger.port(), 0);
     std::uint8_t bytes[256];
     while (interrupted == 0 &&
            (arguments.duration_s == 0.0 || board_time_s(board.get()) < arguments.duration_s)) {
@@ -135,6 +173,10 @@ void run_board(const board_arguments &arguments)
         board_pty_write(port.get(), reinterpret_cast<const std::uint8_t *>(text.data()),
                         text.size());
         logger.follow(board_time_s(board.get()));
+        if (speed == 0.0) {
+            of_board.await();
+            of_logger.await();
+        }
         eeprom.save_when_idle();
         clock.wait(board_time_s(board.get()));
     }

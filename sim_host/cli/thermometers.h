@@ -43,6 +43,8 @@ public:
     [[nodiscard]] const std::string &name() const { return name_; }
     /* Writes the line that is due. Fails (work_error) if the file takes it no more. */
     void follow(double time_s);
+    /* nullptr: there is none. */
+    [[nodiscard]] const board_pty_t *port() const { return pty_.master < 0 ? nullptr : &pty_; }
 
 private:
     void say(const std::string &line);

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import itertools
 import signal
 import statistics
 import subprocess
 import sys
+import time
 from pathlib import Path
 from typing import Self
 
@@ -91,6 +93,21 @@ def survives_clients_that_leave(program: str, elf: Path) -> None:
             port.write(b"version\n")
             assert b"ok\r\n" in port.read_until(b"ok\r\n")
         assert board.process.poll() is None
+
+
+def waits_for_a_slow_reader(program: str, elf: Path) -> None:
+    """As fast as it goes is faster than anybody reads: nothing of it may be lost."""
+    with Board(program, elf, "--speed", "max") as board, first_contact(board) as port:
+        ask(port, "telemetry csv 20")
+        times: list[float] = []
+        while len(times) < 300:
+            if len(times) % 50 == 49:
+                time.sleep(0.5)  # 10 s of the board's time, and more than the terminal keeps
+            cells = port.readline().split(b",")
+            if len(cells) > 30:
+                times.append(float(cells[0]))
+        steps = [later - earlier for earlier, later in itertools.pairwise(times)]
+        assert max(steps) < 0.09, max(steps)  # a lost row would make it 0.1
 
 
 def keeps_its_eeprom(program: str, elf: Path, folder: Path) -> None:
@@ -179,6 +196,7 @@ def main() -> int:
         return SKIPPED
     talks_like_a_board(program, elf)
     survives_clients_that_leave(program, elf)
+    waits_for_a_slow_reader(program, elf)
     keeps_its_eeprom(program, elf, Path.cwd())
     ends_cleanly(program, elf)
     thermometers_beside_the_board(program, elf, Path.cwd())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import ninespring as ns
@@ -75,3 +76,47 @@ def test_what_cannot_be_planned_is_refused(tmp_path: Path) -> None:
     assert done.exit_code == 0, done.output
     text = (tmp_path / "steps.txt").read_text()
     assert "at most" in text and script_lines(text, "steps.txt", 900.0)[0].line == "policy open"
+
+
+ASKED = {
+    "separating_experiment": "staircase: all springs on; watch spring 5",
+    "experiment": {
+        "duration_s": 600.0,
+        "current_a": 1.8,
+        "steps": [
+            {"at_s": 0.0, "percent": [0, 50, 0, 0, 0, 0, 0, 0, 0], "fan": 0},
+            {"at_s": 240.0, "percent": [100] * 9, "fan": 100},
+            {"at_s": 300.0, "percent": [0] * 9, "fan": 0},
+        ],
+    },
+}
+
+
+def test_the_experiment_that_a_diagnosis_asks_for_is_planned_within_the_limits(tmp_path: Path) -> None:
+    told, steps = tmp_path / "diagnosis.json", tmp_path / "steps.txt"
+    told.write_text(json.dumps({"rivals": [{"experiment": {"name": "of a table"}}, ASKED]}))
+    done = CliRunner().invoke(cli.cli, ["plan", "--for", str(told), "-o", str(steps)])
+    assert done.exit_code == 0, done.output
+    text = steps.read_text()
+    assert text.startswith("# staircase: all springs on; watch spring 5\n") and "--duration 610" in text
+    lines = script_lines(text, "steps.txt", 610.0)
+    assert [one.line for one in lines[:2]] == ["policy open", "$open_current_a=1.556"]  # 14 A for nine
+    timed = [(one.at_s, one.line) for one in lines if one.at_s is not None]
+    assert timed[:3] == [(5.0, "on 2 50"), (245.0, "fan 100"), (245.0, "on 1 100")]
+    assert timed[-1] == (305.0, "off 9") and len(timed) == 1 + 10 + 10
+    cooler = plan.plan_experiment(Array(), ASKED["experiment"], 14.0, 45.0)
+    assert 40.0 < cooler.hottest_c <= 45.0 and cooler.most_a < 13.9
+    with pytest.raises(InputError, match="for 9 springs, the array has 2"):
+        plan.plan_experiment(Array(1, 2), ASKED["experiment"], 14.0, 105.0)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"), [("[]", "no diagnosis.json"), ("{", "no diagnosis.json"), ('{"rivals": []}', "asks for no")]
+)
+def test_what_asks_for_no_experiment_is_said(tmp_path: Path, text: str, said: str) -> None:
+    (tmp_path / "diagnosis.json").write_text(text)
+    done = CliRunner().invoke(
+        cli.cli, ["plan", "--for", str(tmp_path / "diagnosis.json"), "-o", str(tmp_path / "x.txt")]
+    )
+    assert isinstance(done.exception, InputError) and said in str(done.exception)
+    assert not (tmp_path / "x.txt").exists()

@@ -346,6 +346,15 @@ def test_the_host_timeout_is_set_while_recording_and_given_back(tmp_path: Path) 
     assert "" in board.seen[board.seen.index("telemetry csv 20") : board.seen.index("off all")]
 
 
+def test_a_board_whose_clock_runs_faster_hears_that_this_end_lives(tmp_path: Path) -> None:
+    """A simulated board at --speed max: its host_timeout_s is by its own clock."""
+    board = FakeBoard()
+    board.stream, board.every_s = [row(0.5 * k) for k in range(1, 200)], 0.02
+    assert record(board, tmp_path, "--duration", 60).returncode == 0
+    alive = board.seen[board.seen.index("telemetry csv 20") : board.seen.index("off all")].count("")
+    assert alive >= 55, alive  # 60 s of its time, little more than 2 s here
+
+
 # what is on the port
 
 

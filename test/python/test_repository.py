@@ -39,6 +39,15 @@ def test_the_site_builds_without_a_warning(tmp_path: Path) -> None:
     assert not re.findall(r'<(?:script|link)[^>]+(?:src|href)="https?://(?!127)[^"]+\.(?:js|css)', index)
 
 
+def test_the_results_first_page_has_a_figure_for_each_of_its_lines() -> None:
+    sys.path.insert(0, str(ROOT / "bench"))
+    import results
+
+    assert "not measured" not in results.first_page()
+    page = (ROOT / "docs" / "results.md").read_text()
+    assert page.split("Page written")[0] == results.first_page().split("Page written")[0]  # by nobody's hand
+
+
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the wheel that is built from the source distribution alone, where no other source is."""

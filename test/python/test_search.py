@@ -14,6 +14,8 @@ from ninespring.fit.problem import Problem
 from ninespring.fit.spec import Fit
 from ninespring.logs import log_text, read_log
 from ninespring.models import Array, Model
+from ninespring.plan import plan_experiment
+from ninespring.recording import script_lines
 from ninespring.search import evidence, search
 from ninespring.verdict import diagnosis, experiments
 from ninespring.verdict.residual import surrogate
@@ -220,6 +222,8 @@ def test_the_experiment_that_separates_is_one_in_which_both_models_differ(make_l
     told = experiments.separate(problem, base, with_heat)
     assert told.difference_c > 3.0 and 1 <= told.spring <= 9 and 0 < told.at_s <= told.duration_s
     assert told.name in told.text and f"spring {told.spring}" in told.text
+    planned = plan_experiment(Array(), told.as_dict(), 14.0, 105.0)
+    assert script_lines("\n".join(planned.steps), "steps.txt", told.duration_s + 10.0)[-1].at_s
 
 
 def test_a_drift_of_these_runs_is_said_and_left_out_of_the_model(make_log, tmp_path: Path) -> None:

@@ -308,6 +308,23 @@ static void spring_released_from_the_other_policy_is_none_either(void)
     TEST_ASSERT_BITS_LOW(DRIVE_POLICY_LIMIT_UNDRIVEN, drive_policy_limits(&policy, 0));
 }
 
+static void what_was_driven_open_and_is_off_again_trips_no_neighbour(void)
+{
+    parameters.policy = DRIVE_POLICY_OPEN;
+    parameters.trip_time_s = 2;
+    begin_cold(3, 3);
+    level[0] = level[1] = 1000;
+    decisions(2u * TURN_TICKS);
+    believe(1, 95, true);
+    level[1] = 0;
+    for (unsigned n = 0; n < 10; n++) {
+        believe(1, 95, true); /* cools more slowly than the limit's patience */
+        decisions(3u * TURN_TICKS);
+    }
+    TEST_ASSERT_BITS_LOW(DRIVE_POLICY_LIMIT_TRIP, drive_policy_limits(&policy, 0));
+    TEST_ASSERT_GREATER_THAN_UINT16(1400, target_ma[0]);
+}
+
 static void overload_takes_the_excess_away_in_time(void)
 {
     parameters.overload_current_ma = 6000;
@@ -412,6 +429,7 @@ int main(void)
     RUN_TEST(undriven_spring_derates_its_neighbours_only);
     RUN_TEST(spring_just_released_is_no_false_actuation);
     RUN_TEST(spring_released_from_the_other_policy_is_none_either);
+    RUN_TEST(what_was_driven_open_and_is_off_again_trips_no_neighbour);
     RUN_TEST(overload_takes_the_excess_away_in_time);
     RUN_TEST(budget_holds_in_every_tick_whatever_is_asked);
     RUN_TEST(policy_switch_never_jumps);

@@ -28,6 +28,8 @@ SIMULATED = "simulated"
 HOST_TIMEOUT_S = 5
 """Springs go off when nothing came from here for so long, where the board has that setting."""
 ALIVE_EVERY_S = 1.0
+"""By the clock here and by the board's: that of a simulated one may run faster."""
+ROW_TIME = re.compile(r"^(\d+\.\d+),")
 
 
 @dataclass(frozen=True)
@@ -74,6 +76,7 @@ class Board:
         """What the board says of itself."""
         self._telemetry: deque[str] = deque()
         self._alive_s = 0.0
+        self._alive_board_s = 0.0
         self._owed = 0
         """Answers that are still to come."""
         self._unguarded: str | None = None
@@ -196,16 +199,26 @@ class Board:
     def next_line(self, until_s: float) -> str | None:
         """Return the next line that nobody asked for (telemetry), None where none came until that monotonic time."""
         if self._telemetry:
-            return self._telemetry.popleft()
+            return self._came(self._telemetry.popleft())
         while True:
-            now = time.monotonic()
-            if now >= self._alive_s + ALIVE_EVERY_S:
-                self._alive_s = now
-                self._port.write("\n")  # an empty line is not answered, but shows that this end lives
+            if time.monotonic() >= self._alive_s + ALIVE_EVERY_S:
+                self._show_life()
             if (line := self._wait(min(until_s, self._alive_s + ALIVE_EVERY_S))) is not None:
-                return line
+                return self._came(line)
             if time.monotonic() >= until_s:
                 return None
+
+    def _show_life(self) -> None:
+        self._alive_s = time.monotonic()
+        self._port.write("\n")  # an empty line is not answered, but shows that this end lives
+
+    def _came(self, line: str) -> str:
+        if match := ROW_TIME.match(line):
+            board_s = float(match[1])
+            if not 0.0 <= board_s - self._alive_board_s < ALIVE_EVERY_S:
+                self._alive_board_s = board_s
+                self._show_life()
+        return line
 
     def settings(self) -> dict[str, str]:
         """Return the settings as `$$` shows them, without their units."""

@@ -7,7 +7,9 @@ springs' temperature, as the declared array's simulation has it.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -24,6 +26,10 @@ FAN_FROM, FAN_TO, COOL_FROM = 0.45, 0.7, 0.88
 """Parts of the duration."""
 BACK_OFF_S = 5.0
 LEAST_S = 300.0
+FIRST_S = 5.0
+"""An experiment begins so long after the recording: what was there before is seen."""
+BACK_OFF, LEAST_A = 0.97, 0.05
+"""Of the current, where an experiment would pass a limit."""
 
 
 @dataclass
@@ -78,6 +84,43 @@ def make_plan(
     )
 
 
+def plan_experiment(
+    array: Array, experiment: Mapping[str, Any], supply_a: float, hottest_c: float, current_a: float | None = None
+) -> Plan:
+    """Return the plan of an experiment that a diagnosis asks for, with less current where a limit would be passed.
+
+    `experiment` is what diagnosis.json has of a rival; `current_a` is a spring's at full level where that has none.
+    """
+    steps = experiment["steps"]
+    percent = np.array([one["percent"] for one in steps], dtype=float)
+    if percent.shape[1] != array.springs:
+        raise InputError(f"the experiment is for {percent.shape[1]} springs, the array has {array.springs}")
+    full_a = experiment["current_a"] or current_a
+    if not full_a:
+        raise InputError("the diagnosed logs have no current: give that of a spring at full level, --current")
+    time_s = np.arange(0.0, experiment["duration_s"])
+    at = np.searchsorted([one["at_s"] for one in steps], time_s, "right") - 1
+    fan = np.array([one["fan"] for one in steps])[at] / 100.0
+    full_a = min(full_a, supply_a / max(percent.sum(axis=1).max() / 100.0, 1e-9))
+    temperature = _temperatures(array, percent[at] / 100.0 * full_a, fan)
+    while temperature.max() > hottest_c:
+        if full_a < LEAST_A:
+            raise InputError(f"this experiment gets hotter than {hottest_c:g} degC with any current")
+        full_a *= BACK_OFF
+        temperature = _temperatures(array, percent[at] / 100.0 * full_a, fan)
+    lines = ["policy open", f"$open_current_a={full_a:.3f}", "off all", "fan 0"]
+    before, blows = np.zeros(array.springs), 0
+    for one in steps:
+        stamp = f"at {one['at_s'] + FIRST_S:g} = "
+        lines += [f"{stamp}fan {one['fan']}"] * (one["fan"] != blows)
+        for k in np.flatnonzero(np.array(one["percent"]) != before):
+            level = one["percent"][k]
+            lines.append(f"{stamp}on {k + 1} {level}" if level else f"{stamp}off {k + 1}")
+        before, blows = np.array(one["percent"]), one["fan"]
+    drive = percent[at] / 100.0 * full_a
+    return Plan(lines, float(temperature.max()), float(drive.sum(axis=1).max()), (drive > 0).mean(axis=0))
+
+
 def _stretches(springs: int, duration_s: float, most: float, rng: np.random.Generator) -> list[Stretch]:
     """Return who is driven when; `most` is the sum of levels that the supply gives, percent.
 
@@ -110,12 +153,18 @@ def _simulated(
     for one in stretches:
         drive[(time_s >= one.begin_s) & (time_s < one.end_s), one.spring] = one.level / 100.0 * current_a
     fan = ((time_s >= FAN_FROM * duration_s) & (time_s < FAN_TO * duration_s)).astype(float)
+    return drive, _temperatures(array, drive, fan)
+
+
+def _temperatures(array: Array, drive: np.ndarray, fan: np.ndarray) -> np.ndarray:
+    """Return (s, springs) degC of an array as declared, given currents (s, springs) and fan (s,) each second."""
+    time_s = np.arange(0.0, len(drive))
     plant = native.Plant(array.rows, array.cols)
     plant.set_all(array_parameters(array))
     plant.set_effects(["latent_heat", "resistance_phase"])
     plant.reset()
     ambient = np.full(len(time_s), plant.get("ambient_c"))
-    return drive, plant.simulate(time_s, native.CURRENT, drive, fan, ambient)
+    return plant.simulate(time_s, native.CURRENT, drive, fan, ambient)
 
 
 def _lines(stretches: list[Stretch], duration_s: float, current_a: float) -> list[str]:

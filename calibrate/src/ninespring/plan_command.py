@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
+from typing import Any
 
 import click
 
 from .console import ARRAY, FILE, Command, beside, write
-from .logs import check_folder
+from .errors import InputError
+from .logs import check_folder, read_bytes
 from .models import Array, read_array
 
 
@@ -18,9 +21,11 @@ Examples:
   ninespring plan -o steps.txt
   ninespring plan --array array.toml --supply 10 --duration 1200 -o steps.txt
   ninespring record --port /dev/ttyACM0 --run steps.txt --duration 900 -o board1.csv
+  ninespring plan --for diagnosis/diagnosis.json -o steps.txt
 """,
 )
 @ARRAY
+@click.option("--for", "diagnosis", type=FILE, help="diagnosis.json: the experiment that it asks for first")
 @click.option("--duration", type=click.FloatRange(1, 36000), default=900.0, show_default=True, help="s")
 @click.option(
     "--current", type=click.FloatRange(0.1, 3.2), default=2.0, show_default=True, help="A, one spring at full level"
@@ -38,18 +43,32 @@ Examples:
 @click.option("--seed", type=click.IntRange(0), default=1, show_default=True, help="another one: another plan")
 @click.option("-o", "--output", type=FILE, required=True, help="steps.txt to write; - prints it")
 def plan(
-    array_path: Path | None, duration: float, current: float, supply: float, hottest: float, seed: int, output: Path
+    array_path: Path | None,
+    diagnosis: Path | None,
+    duration: float,
+    current: float,
+    supply: float,
+    hottest: float,
+    seed: int,
+    output: Path,
 ) -> None:
     """Write the steps of a recording that identifies an array, within what its supply and its springs stand.
 
     The springs' temperatures are those of the declared array; the board's own limits hold all the same.
     """
-    from .plan import make_plan
+    from .plan import FIRST_S, make_plan, plan_experiment
 
     check_folder(output)
     array = read_array(array_path) if array_path else Array()
-    made = make_plan(array, duration, current, supply, hottest, seed)
-    head = [
+    head = []
+    if diagnosis:
+        asked = asked_for(diagnosis)
+        head = [f"# {asked['separating_experiment']}"]
+        duration = asked["experiment"]["duration_s"] + 2.0 * FIRST_S
+        made = plan_experiment(array, asked["experiment"], supply, hottest, current)
+    else:
+        made = make_plan(array, duration, current, supply, hottest, seed)
+    head += [
         f"# {array.rows} x {array.cols} springs, {duration:g} s; at most {made.most_a:.2f} A of {supply:g}, "
         f"{made.hottest_c:.0f} degC of {hottest:g} if the array is as declared",
         f"# ninespring record --run {output.name} --duration {duration:g} --port PORT --thermometers PORT -o run1.csv",
@@ -61,3 +80,15 @@ def plan(
         soft_wrap=True,
         markup=False,
     )
+
+
+def asked_for(path: Path) -> dict[str, Any]:
+    """Return the first rival in a diagnosis.json that has an experiment."""
+    try:
+        rivals = json.loads(read_bytes(path))["rivals"]
+        found = next((one for one in rivals if one.get("experiment", {}).get("steps")), None)
+    except (ValueError, KeyError, TypeError, AttributeError):
+        raise InputError("no diagnosis.json that `ninespring diagnose` wrote", path) from None
+    if not found:
+        raise InputError("asks for no experiment: these logs tell all effects apart", path)
+    return found

@@ -18,19 +18,16 @@ from typing import Any
 import numpy as np
 
 from .. import __version__
+from ..belief import beliefs
 from ..board import SIMULATED, Board, reading
 from ..errors import InputError, WorkError
 from ..recording import SILENT_S, LogFile, Row, RowCheck, RowSink, telemetry_names, write_head
 from ..thermometers import Thermometers
 from . import words
-from .source import Source
+from .source import Source, at_once
 
 LOOK_EVERY_S = 1.0
 """So often the board is asked what telemetry does not tell: phase, targets, faults."""
-ANSWER_S = 15.0
-MODEL = re.compile(r"spring (\d+): ")
-PHASE = re.compile(r"austenite ([\d.]+) %")
-TARGET = re.compile(r"target ([\d.]+) A")
 
 
 class BoardSource(Source):
@@ -67,11 +64,7 @@ class BoardSource(Source):
     def stop_now(self) -> None:
         """Send the stop that the board obeys from its receive interrupt; whatever was wished before is dropped."""
         self._play = None
-        while True:
-            try:
-                self._wishes.get_nowait()[1].set_exception(WorkError("dropped by the stop"))
-            except queue.Empty:
-                break
+        self._drop_wishes("dropped by the stop")
         board = self._board
         if board is None:
             raise WorkError("the board is not there")
@@ -92,8 +85,8 @@ class BoardSource(Source):
             out.append(one)
         return out
 
-    def do(self, wish: dict[str, Any]) -> str:
-        """Carry out a wish as a console line; return what the board answered."""
+    def do(self, wish: dict[str, Any]) -> Future[str]:
+        """Have the board's thread carry out a wish as a console line; what the board answers comes later."""
         what = wish["do"]
         if what not in ("play", "record", "end_recording", "set", "ambient", "policy"):
             self._play = None
@@ -105,7 +98,7 @@ class BoardSource(Source):
                 raise InputError(f"a pattern of {springs} springs has {springs} digits")
         if what == "play":
             self._play, self._played, self._play_next_s = (wish["patterns"], wish["seconds"]), 0, 0.0
-            return "playing"
+            return at_once("playing")
         if what == "say":
             if wish["line"].split()[0].lower() == "telemetry":
                 raise InputError("the page needs the telemetry as it is")
@@ -127,20 +120,36 @@ class BoardSource(Source):
         }[what]()
         return self._ask(line)
 
-    def _ask(self, line: str) -> str:
+    def _ask(self, line: str) -> Future[str]:
         if self._board is None:
             raise WorkError("the board is not there")
         answer: Future[str] = Future()
         self._wishes.put((line, answer))
-        return answer.result(ANSWER_S)
+        return answer
+
+    def _next_wish(self) -> tuple[str, Future[str]] | None:
+        """Return the next wish that somebody still waits for, None where there is none."""
+        with contextlib.suppress(queue.Empty):
+            while True:
+                line, answer = self._wishes.get_nowait()
+                if answer.set_running_or_notify_cancel():
+                    return line, answer
+        return None
+
+    def _drop_wishes(self, why: str) -> None:
+        while wish := self._next_wish():
+            wish[1].set_exception(WorkError(why))
 
     # from the board's side
 
     def _run(self) -> None:
+        lost = ""
+        """How the board was lost: it is shown until there is one again, before what the attempts to find it say."""
         while not self.closing.is_set():
-            trouble = ""
+            trouble, found = "", False
             try:
                 with Board(self._port, stopped=self.closing.is_set) as board:
+                    found = True
                     try:
                         self._converse(board)
                     finally:
@@ -156,13 +165,14 @@ class BoardSource(Source):
             except Exception as error:
                 traceback.print_exc(file=sys.stderr)
                 trouble = f"a defect of the tool: {type(error).__name__}: {error}"
-            self._end_recording(trouble)
             self._play = None
-            while not self._wishes.empty():
-                self._wishes.get()[1].set_exception(WorkError("the board went away"))
+            self._drop_wishes("the board went away")
+            if found:
+                lost = trouble
+            elif lost:
+                trouble = f"{lost}. Since then: {trouble}"
             self._change(connected=False, trouble=trouble)
             self.closing.wait(1.0)
-        self._end_recording("")
 
     def _converse(self, board: Board) -> None:
         self._read_settings(board)
@@ -185,7 +195,9 @@ class BoardSource(Source):
             cols=columns,
             springs=springs,
             level=[0] * springs,
+            bounds_c=[None] * springs,
             phase=[None] * springs,
+            doing=[""] * springs,
             target_a=[None] * springs,
             limits=[[] for _ in range(springs)],
             cut_a=[0.0] * springs,
@@ -195,17 +207,16 @@ class BoardSource(Source):
         )
         self._board = board
         heard_s = look_s = time.monotonic()
+        looked_at = self._state.get("state")
+        """The board's state when it was last asked for its faults."""
         while not self.closing.is_set():
             now = time.monotonic()
             self._play_on(board, now)
-            try:
-                line, answer = self._wishes.get_nowait()
-            except queue.Empty:
-                if now >= look_s:
-                    look_s = now + LOOK_EVERY_S
-                    self._look(board)
-            else:
-                self._obey(board, line, answer)
+            if wish := self._next_wish():
+                self._obey(board, *wish)
+            elif now >= look_s or self._state.get("state") != looked_at:
+                look_s, looked_at = now + LOOK_EVERY_S, self._state.get("state")
+                self._look(board)
             got = board.next_line(time.monotonic() + 0.05)
             if got:
                 heard_s = time.monotonic()
@@ -222,7 +233,8 @@ class BoardSource(Source):
             if line == "record":
                 said = self._begin_recording(board)
             elif line == "end_recording":
-                said = self._end_recording("")
+                self._end_recording("")
+                said = ""  # every page is told
             else:
                 if line == "$save":
                     board.unguard()  # what is saved is what was set, not what this page needs
@@ -276,13 +288,8 @@ class BoardSource(Source):
             self._change(playing=self._play is not None)
 
     def _look(self, board: Board) -> None:
-        phase, target = list(self._state["phase"]), list(self._state["target_a"])
-        for line in board.ask("model", 3.0):
-            if match := MODEL.match(line):
-                k = int(match[1]) - 1
-                if k < len(phase):
-                    phase[k] = float(one[1]) / 100.0 if (one := PHASE.search(line)) else None
-                    target[k] = float(one[1]) if (one := TARGET.search(line)) else None
+        believed = beliefs(board.ask("model"))
+        each = [believed.get(k) for k in range(1, self._state["springs"] + 1)]
         faults = board.ask("faults")
         level = list(self._state["level"])
         for one in faults:
@@ -294,7 +301,14 @@ class BoardSource(Source):
             re.sub(r"fault (\d+) \w+", lambda match: f"{words.FAULTS.get(int(match[1]), match[0])}", one)
             for one in faults
         ]
-        self._change(phase=phase, target_a=target, faults=shown, level=level)
+        self._change(
+            bounds_c=[one and [one.low_c, one.high_c] for one in each],
+            phase=[one and one.austenite for one in each],
+            doing=[one.why or one.doing if one else "" for one in each],
+            target_a=[one and one.target_a for one in each],
+            faults=shown,
+            level=level,
+        )
 
     def _take(self, line: str) -> None:
         """Take a line of telemetry: a row, or which limits act on a spring."""
@@ -377,10 +391,10 @@ class BoardSource(Source):
         except WorkError as error:
             self._end_recording(str(error))
 
-    def _end_recording(self, why: str) -> str:
+    def _end_recording(self, why: str) -> None:
         log, self._log = self._log, None
         if not log:
-            return ""
+            return
         with contextlib.suppress(WorkError):
             if self._sink and not why:
                 self._sink.flush()
@@ -388,7 +402,6 @@ class BoardSource(Source):
         log.close()
         said = f"{log.rows} rows in {log.path}" if log.rows else f"nothing came for {log.path.name}"
         self._change(recording=None, said=f"{why}; {said}" if why else said)
-        return said
 
 
 def _plain(values: np.ndarray) -> list[float | None]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
+from concurrent.futures import Future
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,7 @@ import numpy as np
 from ..errors import InputError
 from ..logs import Run
 from ..models import Model
-from .source import Source
+from .source import Source, at_once
 
 TICK_S = 0.1
 
@@ -77,7 +78,7 @@ class ReplaySource(Source):
         self._playing = False
         self._show(self._row)
 
-    def do(self, wish: dict[str, Any]) -> str:
+    def do(self, wish: dict[str, Any]) -> Future[str]:
         """Play, pause, seek, or change the speed."""
         with self._moved:
             if wish["do"] == "seek":
@@ -95,7 +96,7 @@ class ReplaySource(Source):
             else:
                 raise InputError("a log is replayed: there is nothing to drive")
         self._show(self._row)
-        return ""
+        return at_once("")
 
     def _values(self, row: int) -> dict[str, Any]:
         each = {

@@ -29,6 +29,8 @@ PLOTLY = Path(plotly.__file__).with_name("package_data") / "plotly.min.js"
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
 EVERY_S = 0.1
 """Most often that a page is told a new state."""
+ANSWER_S = 15.0
+"""So long a page waits for the board's words."""
 LONGEST_WISH = 65536
 
 
@@ -185,7 +187,8 @@ async def _carry_out(source: Source, text: str, answers: asyncio.Queue[dict[str,
             answers.put_nowait({"kind": "settings", "settings": source.settings()})
             said = ""
         else:
-            said = await asyncio.to_thread(source.do, wish)
+            # taken before anything is awaited: a page's wishes keep their order
+            said = await asyncio.wait_for(asyncio.wrap_future(source.do(wish)), ANSWER_S)
     except (ValueError, jsonschema.ValidationError, RecursionError):
         answers.put_nowait({"kind": "refused", "id": number, "why": "not a wish that this page can have"})
     except (WorkError, InputError, TimeoutError) as error:

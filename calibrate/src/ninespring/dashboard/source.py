@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections import deque
+from concurrent.futures import Future
 from typing import Any
 
 HISTORY_S = 600.0
@@ -68,10 +69,20 @@ class Source:
     def stop_now(self) -> None:
         """Switch everything off, at once, from any thread."""
 
-    def do(self, wish: dict[str, Any]) -> str:
-        """Carry out a wish; return the board's words. WorkError or InputError where it is refused."""
+    def do(self, wish: dict[str, Any]) -> Future[str]:
+        """Take a wish, without waiting: wishes are carried out in the order in which they are taken.
+
+        The board's words come later; WorkError or InputError, at once or as what comes, where it is refused.
+        """
         raise NotImplementedError
 
     def close(self) -> None:
         """Switch everything off and end."""
         self.closing.set()
+
+
+def at_once(said: str) -> Future[str]:
+    """Return an answer that is there already."""
+    answer: Future[str] = Future()
+    answer.set_result(said)
+    return answer

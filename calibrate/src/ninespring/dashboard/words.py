@@ -33,7 +33,9 @@ LIMITS = {
     "undriven": "a neighbour that is off would transform",
     "overload": "the supply has been overloaded for long",
     "trip": "off until cleared: held at no current for too long",
-    "blind": "its temperature is not known well enough",
+    "blind": "its resistance shows no phase",
+    "cooling": "it may still be hot from before power-on: it waits",
+    "away": "not where it was asked to be, or that cannot be seen",
 }
 STATES = {"ok": "ready", "locked": "locked after a reset: unlock it"}
 

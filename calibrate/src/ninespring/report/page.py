@@ -99,8 +99,10 @@ def next_steps(result: dict[str, Any]) -> list[str]:
     """Return what to do next, as commands."""
     out = [f"# {one['separating_experiment']}" for one in result["rivals"][:2]]
     if out:
+        run = next((one["experiment"]["duration_s"] for one in result["rivals"] if "experiment" in one), 900.0) + 10.0
         out += [
-            "ninespring record --port PORT --run steps.txt -o board3.csv     # that experiment, with a thermometer",
+            "ninespring plan --for diagnosis/diagnosis.json -o steps.txt     # the first of them",
+            f"ninespring record --port PORT --thermometers PORT --run steps.txt --duration {run:g} -o run3.csv",
             f"ninespring diagnose {' '.join(log['file'] for log in result.get('logs', []))} run3.csv -o diagnosis",
         ]
     return [

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -28,6 +28,10 @@ class Experiment:
     duration_s: float
     noise_c: float
     text: str
+    current_a: float | None = None
+    """Of a spring at 100 %; None where the logs have no current."""
+    steps: list[dict[str, Any]] = field(default_factory=list)
+    """What is set when: at_s, percent of the current (one per spring), fan in percent."""
 
     def as_dict(self) -> dict[str, Any]:
         """Return it for JSON."""
@@ -38,6 +42,8 @@ class Experiment:
             "difference_c": self.difference_c,
             "at_s": self.at_s,
             "duration_s": self.duration_s,
+            "current_a": self.current_a,
+            "steps": self.steps,
         }
 
 
@@ -104,10 +110,19 @@ def _inputs(rows: int, cols: int, fan_seen: bool) -> list[tuple[str, str, np.nda
     return out
 
 
+def _steps(time_s: np.ndarray, share: np.ndarray, fan: np.ndarray) -> list[dict[str, Any]]:
+    """Return the changes of an experiment: share of the current (rows, n), fan (rows,), 0..1."""
+    table = np.rint(100.0 * np.column_stack([share, fan])).astype(int)
+    changes = np.flatnonzero(np.r_[True, (np.diff(table, axis=0) != 0).any(axis=1)])
+    return [{"at_s": float(time_s[k]), "percent": table[k, :-1].tolist(), "fan": int(table[k, -1])} for k in changes]
+
+
 def separate(problem: Problem, a: Fit, b: Fit) -> Experiment:
     """Return the standard experiment in which two fitted models differ most (best per its length and noise)."""
     run = problem.runs[0]
     fan_seen = any((r.fan > 0.1).any() for r in problem.runs)
+    flowed = [r.current_a[r.current_a > 0] for r in problem.runs if r.current_a is not None]
+    current_a = max((float(np.percentile(one, 95)) for one in flowed if one.size), default=None)
     best: tuple[float, Experiment] | None = None
     noise = problem.noise_c
     top = max(float(np.percentile(r.drive[r.drive > 0], 95)) if (r.drive > 0).any() else 0.5 for r in problem.runs)
@@ -154,6 +169,8 @@ def separate(problem: Problem, a: Fit, b: Fit) -> Experiment:
                     float(time_s[-1]),
                     noise,
                     "",
+                    current_a,
+                    _steps(time_s, levels if run.mode == "command" else np.sqrt(levels), fan),
                 ),
             )
     assert best is not None

@@ -42,14 +42,30 @@ function connect() {
   socket.onclose = () => {
     for (const one of waiting.values()) one.refused(new Error("the connection was lost"));
     waiting.clear();
+    newest = null;
     badge($("connection"), "page not connected", "bad");
     trouble("This page has lost its server: what it shows is old. It tries again.");
     setTimeout(connect, 1000);
   };
 }
 
+// States that come faster than this machine can show them are kept for the plots; the newest is shown.
+let newest = null;
+
+function takeState(now) {
+  if (now.time_s !== undefined && now.time_s !== past.time_s.at(-1)) append(now);
+  if (!newest) {
+    requestAnimationFrame(() => {
+      const now = newest;
+      newest = null;
+      if (now) show(now);
+    });
+  }
+  newest = now;
+}
+
 function take(message) {
-  if (message.kind === "state") show(message);
+  if (message.kind === "state") takeState(message);
   else if (message.kind === "history") remember(message);
   else if (message.kind === "settings") showSettings(message.settings);
   else {
@@ -104,12 +120,14 @@ function show(now) {
   badge($("state"), now.state_words ?? now.state, now.state === "ok" ? "good" : "bad");
   $("unlock").hidden = now.state !== "locked";
   for (let k = 0; k < now.springs; k++) showSpring(k, now);
-  $("truth-legend").hidden = !now.measured_c.some((one) => one !== null);
-  $("faults").replaceChildren(...now.faults.map((one) => {
-    const item = document.createElement("li");
-    item.textContent = one;
-    return item;
-  }));
+  $("bounds-legend").hidden = !now.bounds_c?.some((one) => one);
+  if (String(now.faults) !== String(before.faults)) {
+    $("faults").replaceChildren(...now.faults.map((one) => {
+      const item = document.createElement("li");
+      item.textContent = one;
+      return item;
+    }));
+  }
   if (live) {
     if (!held.has("policy")) $("policy").value = now.policy;
     if (!held.has("fan")) $("fan").value = Math.round(now.fan * 100);
@@ -123,7 +141,6 @@ function show(now) {
     Object.assign($("seek"), { min: now.begins_s, max: now.ends_s });
     if (!held.has("seek")) $("seek").value = now.time_s;
   }
-  if (now.time_s !== before.time_s) append(now);
 }
 
 function build(rows, cols) {
@@ -137,7 +154,7 @@ function build(rows, cols) {
   draw.replaceChildren();
   for (let k = 0; k < count; k++) {
     const spring = document.createElement("button");
-    for (const name of ["number", "level", "temperature", "measured", "amps", "limits", "phase"]) {
+    for (const name of ["number", "level", "temperature", "bounds", "measured", "amps", "limits", "phase"]) {
       const part = document.createElement("span");
       part.className = name;
       spring.append(part);
@@ -163,14 +180,18 @@ function showSpring(k, now) {
   spring.setAttribute("aria-pressed", on);
   part("level").textContent = on ? `${Math.round(now.level[k])} %` : "";
   part("temperature").textContent = `${shown(celsius, 1)}°`;
-  part("measured").textContent = now.measured_c[k] === null || now.measured_c[k] === undefined ? "" : `${shown(now.measured_c[k], 1)}°`;
+  const [low, high] = now.bounds_c?.[k] ?? [];
+  part("bounds").textContent = low === undefined ? "" : `${shown(low, 0)}…${shown(high, 0)}°`;
+  part("measured").textContent = now.measured_c[k] == null ? "" : `measured ${shown(now.measured_c[k], 1)}°`;
   part("amps").textContent = `${shown(now.current_a[k], 2)} A`;
   part("limits").textContent = now.limits[k].join("; ");
   part("phase").style.width = `${100 * (now.phase?.[k] ?? 0)}%`;
   spring.title = `spring ${k + 1}: ${shown(now.temperature_c[k], 2)} degC, ${shown(now.current_a[k], 3)} A`
+    + (low === undefined ? "" : `; surely ${shown(low, 1)} to ${shown(high, 1)} degC (99 %)`)
     + (now.measured_c[k] != null ? `, measured ${shown(now.measured_c[k], 2)} degC` : "")
     + (now.phase?.[k] != null ? `, ${shown(100 * now.phase[k], 0)} % austenite` : "")
     + (now.target_a?.[k] != null ? `, target ${shown(now.target_a[k], 3)} A` : "")
+    + (now.doing?.[k] ? `; ${now.doing[k]}` : "")
     + (now.limits[k].length ? `; limited (${shown(now.cut_a?.[k], 2)} A less): ${now.limits[k].join("; ")}` : "");
 }
 
@@ -237,8 +258,8 @@ function showSettings(settings) {
     if (!row) row = newSetting(one);
     const input = row.querySelector("input");
     input.dataset.value = one.value;
-    if (!edited.has(one.name)) input.value = one.value;
-    input.classList.toggle("changed", input.value !== one.value);
+    if (!edited.has(one.name) && input.dataset.asked === undefined) input.value = one.value;
+    if (input.dataset.asked === undefined) input.classList.toggle("changed", input.value.trim() !== one.value);
   }
 }
 
@@ -257,11 +278,12 @@ function newSetting(one) {
   const words = document.createElement("span");
   words.className = "words";
   value.append(input, words);
-  input.oninput = () => input.classList.toggle("changed", input.value !== input.dataset.value);
+  // What was asked for last stands for the board's value until the board has answered: what is typed meanwhile is not lost.
+  const known = () => input.dataset.asked ?? input.dataset.value;
+  input.oninput = () => input.classList.toggle("changed", input.value.trim() !== known());
   const set = () => {
     const wanted = input.value.trim();
-    // Enter commits twice, as a key and as a change; and what is typed while the board answers is not lost.
-    if (wanted === input.dataset.value || wanted === input.dataset.asked) return;
+    if (wanted === known()) return; // Enter commits twice, as a key and as a change
     input.dataset.asked = wanted;
     ask({ do: "set", name: one.name, value: wanted })
       .then((said) => {
@@ -290,7 +312,6 @@ const MAKE = {
 const drawing = () => drawn.map((one) => (one ? "1" : "0")).join("");
 
 function stop() {
-  list.playing = false;
   wish({ do: "stop" }).then(() => tell("STOP: all springs off. Clear faults to go on.")).catch((error) => tell(error.message, true));
 }
 
@@ -329,8 +350,7 @@ $("speed").onchange = () => quietly({ do: "speed", speed: Number($("speed").valu
 $("seek").onchange = () => quietly({ do: "seek", time_s: Number($("seek").value) });
 for (const name of ["fan", "policy", "speed", "seek"]) {
   const one = $(name);
-  one.addEventListener("pointerdown", () => held.add(name));
-  one.addEventListener("keydown", () => held.add(name));
+  for (const begin of ["pointerdown", "keydown", "input"]) one.addEventListener(begin, () => held.add(name));
   for (const end of ["change", "blur"]) one.addEventListener(end, () => setTimeout(() => held.delete(name), 500));
 }
 $("console").onsubmit = (event) => {
@@ -348,5 +368,11 @@ for (const [at, select] of document.querySelectorAll("[data-plot]").entries()) {
   for (const [value, text] of Object.entries(QUANTITIES)) select.add(new Option(text, value));
   select.value = at === 0 ? "temperature_c" : "current_a";
 }
-setInterval(() => { if (!document.hidden) { plot(0); plot(1); } }, 500);
+// Plots take a fifth of this machine's time at most: stop and the newest state go first.
+function plots() {
+  const begun = performance.now();
+  if (!document.hidden) { plot(0); plot(1); }
+  setTimeout(plots, Math.max(500, 4 * (performance.now() - begun)));
+}
+plots();
 connect();
