@@ -188,18 +188,16 @@ static void heat(drive_policy_t *policy, thermal_model_t *model, uint8_t k, uint
         return;
     }
     const bool slows = !full && c7 > points.austenite_start_c7 - 128;
-    const bool waits = waits_for_supply(s);
+    const bool keeps = waits_for_supply(s) && (c7 > points.austenite_start_c7 + KEPT_C7 ||
+                                               phase_of(policy, model, k) > 0.5f * level);
     s->floor_ma = 0;
-    if (slows || waits) {
+    if (slows || keeps) {
         const uint16_t keeps_ma =
             hold_current_ma(policy, model, k, spring_c(c7), slows ? LEVEL_POWER_W : 0.0f);
         if (slows && keeps_ma < s->wanted_ma) {
             s->wanted_ma = keeps_ma;
         }
-        if (waits && (c7 > points.austenite_start_c7 + KEPT_C7 ||
-                      phase_of(policy, model, k) > 0.5f * level)) {
-            s->floor_ma = keeps_ma;
-        }
+        s->floor_ma = keeps ? keeps_ma : 0;
     }
 }
 
@@ -502,6 +500,9 @@ static void take_turn(drive_policy_t *policy, const drive_policy_input_t *input)
         policy->slot = 0;
         count_overload(policy);
         rotate_queue(policy, input->model);
+        policy->stiffness_turn = (uint8_t)((policy->stiffness_turn + 1u) % policy->springs);
+        spring_estimator_look_at_stiffness(&policy->estimator, input->model,
+                                           policy->stiffness_turn);
     }
 }
 

@@ -15,20 +15,19 @@
 #define NOISE_SAME     0.1f   /* a current that has moved by more tells nothing of the noise */
 #define BEND_TO_SD     0.512f /* mean size of a second difference: 1 / (sqrt(6) sqrt(2 / pi)) */
 
-#define CAPACITY_SD     0.09f   /* of a declared heat capacity: 15 %, uniform */
-#define LOSS_SD         0.12f   /* of a declared loss: 20 % */
-#define LOSS_MOST       0.45f   /* of the declared loss: no more is ever believed */
-#define LOSS_DRIFT_SD   0.0005f /* of the declared loss, in a second: 3 % in an hour */
-#define LOSS_DRIFT      (SPRING_ESTIMATOR_TURN_S * LOSS_DRIFT_SD * LOSS_DRIFT_SD)
-#define STIFFNESS_TURNS 4
-#define NEIGHBOUR_SD    0.15f /* of the rise of a spring that its neighbours heat */
-#define SHIFT_SD_K      3.0f  /* of declared transformation temperatures */
-#define SHIFT_MOST_K    30.0f
-#define TRUST_SD_K      5.0f    /* of ambient, or of what a reset has kept */
-#define LEAST_SD_K      0.6f    /* parts of one spring differ by so much */
-#define UNIFORM_SD      0.29f   /* of a width */
-#define LEAST_LOSS      0.8f    /* of a declared loss: with it the hottest possible spring cools */
-#define FORGETS         0.9998f /* a turn's: a disturbance is forgotten within 20 minutes */
+#define CAPACITY_SD   0.09f   /* of a declared heat capacity: 15 %, uniform */
+#define LOSS_SD       0.12f   /* of a declared loss: 20 % */
+#define LOSS_MOST     0.45f   /* of the declared loss: no more is ever believed */
+#define LOSS_DRIFT_SD 0.0005f /* of the declared loss, in a second: 3 % in an hour */
+#define LOSS_DRIFT    (SPRING_ESTIMATOR_TURN_S * LOSS_DRIFT_SD * LOSS_DRIFT_SD)
+#define NEIGHBOUR_SD  0.15f /* of the rise of a spring that its neighbours heat */
+#define SHIFT_SD_K    3.0f  /* of declared transformation temperatures */
+#define SHIFT_MOST_K  30.0f
+#define TRUST_SD_K    5.0f    /* of ambient, or of what a reset has kept */
+#define LEAST_SD_K    0.6f    /* parts of one spring differ by so much */
+#define UNIFORM_SD    0.29f   /* of a width */
+#define LEAST_LOSS    0.8f    /* of a declared loss: with it the hottest possible spring cools */
+#define FORGETS       0.9998f /* a turn's: a disturbance is forgotten within 20 minutes */
 
 #define TRUST_STILL_SDS 0.7f /* where the transformation may never show: probably over */
 #define TRUST_ONSET_SDS 1.3f /* where its beginning was seen: certainly, but for 10 % */
@@ -105,13 +104,18 @@ void spring_estimator_prepare(spring_estimator_t *e, const thermal_model_t *mode
     e->latent_heat_j = (float)p->latent_heat_mj * 1e-3f;
     e->martensite_ohm = (float)p->resistance_martensite_uohm * 1e-6f;
     e->change = 1.0f - (float)p->resistance_martensite_uohm / (float)p->resistance_austenite_uohm;
+    for (uint8_t k = 0; k < model->springs; k++) {
+        spring_estimator_look_at_stiffness(e, model, k);
+    }
 }
 
 /* A temperature that is known to sd_k, and where its transformation lies as declared. */
 static void begin(spring_belief_t *b, float temperature_c, float sd_k, uint8_t possible)
 {
     const spring_learnt_t learnt = b->learnt;
-    *b = (spring_belief_t){.variance_k2 = sd_k * sd_k + SHIFT_SD_K * SHIFT_SD_K,
+    const float stiffness_w_per_k = b->declared_stiffness_w_per_k;
+    *b = (spring_belief_t){.declared_stiffness_w_per_k = stiffness_w_per_k,
+                           .variance_k2 = sd_k * sd_k + SHIFT_SD_K * SHIFT_SD_K,
                            .shift_variance_k2 = SHIFT_SD_K * SHIFT_SD_K,
                            .loss_variance = learnt.loss_sd_w_per_k * learnt.loss_sd_w_per_k,
                            .possible = possible,
@@ -225,6 +229,20 @@ static float extra_loss_w(const spring_belief_t *b, const thermal_model_t *model
     return b->learnt.loss_w_per_k * (temperature_c - spring_ambient_c(model));
 }
 
+/* It moves with the fan and the air: slowly. */
+void spring_estimator_look_at_stiffness(spring_estimator_t *e, const thermal_model_t *model,
+                                        uint8_t k)
+{
+    const float now_c = spring_now_c(model, k);
+    e->spring[k].declared_stiffness_w_per_k =
+        (hold_w(model, k, now_c + 8.0f) - hold_w(model, k, now_c)) * 0.125f;
+}
+
+float spring_stiffness_w_per_k(const spring_belief_t *b)
+{
+    return b->declared_stiffness_w_per_k + b->learnt.loss_w_per_k;
+}
+
 /* How the errors of distance and loss go on in a turn. Returns the heat taken up, K. */
 static float predict(const spring_estimator_t *e, spring_belief_t *b, const thermal_model_t *model,
                      uint8_t k, float power_w)
@@ -234,14 +252,9 @@ static float predict(const spring_estimator_t *e, spring_belief_t *b, const ther
     const float per_w = e->turn_k_per_w;
     const float above_k = now_c - spring_ambient_c(model);
     const float by_loss = -per_w * above_k;
-    if (b->stiffness_turns-- == 0) { /* it moves with the fan and the air: slowly */
-        b->stiffness_turns = STIFFNESS_TURNS;
-        b->stiffness_w_per_k =
-            (hold_w(model, k, now_c + 8.0f) - balance_w) * 0.125f + b->learnt.loss_w_per_k;
-    }
     const float extra_w = b->learnt.loss_w_per_k * above_k;
     b->extra_loss_uw = (int32_t)(1e6f * extra_w);
-    const float keeps = 1.0f - per_w * b->stiffness_w_per_k;
+    const float keeps = 1.0f - per_w * spring_stiffness_w_per_k(b);
     const float kept = keeps * b->covariance;
     const float joins = by_loss * b->loss_variance;
     b->variance_k2 = keeps * keeps * b->variance_k2 + by_loss * (kept + kept + joins);
@@ -265,14 +278,14 @@ float spring_see(const spring_estimator_t *e, spring_belief_t *b, thermal_model_
                  float seen_c, float sd_k, uint8_t from)
 {
     const float error_k = seen_c - spring_now_c(model, k);
-    const float total_k2 = distance_k2(b) + sd_k * sd_k;
-    const float gain = distance_k2(b) / total_k2;
+    const float per_total = 1.0f / (distance_k2(b) + sd_k * sd_k);
+    const float gain = distance_k2(b) * per_total;
     const float left = 1.0f - gain;
-    const float by_loss = b->covariance / total_k2;
+    const float by_loss = b->covariance * per_total;
     spring_set_temperature(model, k, seen_c - left * error_k, from);
     b->last_c = spring_now_c(model, k);
     b->seen = true;
-    b->shift_k = clamp(b->shift_k - fminf(b->shift_variance_k2 / total_k2, gain) * error_k,
+    b->shift_k = clamp(b->shift_k - fminf(b->shift_variance_k2 * per_total, gain) * error_k,
                        -SHIFT_MOST_K, SHIFT_MOST_K);
     correct_loss(e, b, by_loss * error_k);
     b->kept_w_per_k = 0.0f;
@@ -486,7 +499,7 @@ float spring_estimator_hold_sd_k(const spring_estimator_t *e, const thermal_mode
     const spring_belief_t *b = &e->spring[k];
     const float above_k = spring_now_c(model, k) - spring_ambient_c(model);
     const float settles_k2 = above_k * above_k * b->loss_variance /
-                             (b->stiffness_w_per_k * b->stiffness_w_per_k + 1e-12f);
+                             (spring_stiffness_w_per_k(b) * spring_stiffness_w_per_k(b) + 1e-12f);
     return sqrtf(fmaxf(distance_k2(b), settles_k2));
 }
 
