@@ -36,13 +36,14 @@
 
 #define PHASE_SD       0.02f
 #define PHASE_READ_SD  0.08f /* by its own resistances */
-#define PHASE_ONSET_SD 0.12f /* by one of its own, the other declared */
+#define PHASE_ONE_SD 0.12f /* by one of its own, the other declared */
 #define PHASE_BLIND_SD 0.3f
 #define LOOK_SD        0.12f /* by resistances that were learnt at another current */
 #define LOOK_SDS       3.0f
 #define LOOK_MOST      0.4f
 #define LOOK_TURNS     3
 
+#define LEARNT_AT_C      20.0f
 #define LEARNT_OHM_LEAST 0.01f
 #define LEARNT_OHM_MOST  16.0f
 
@@ -184,7 +185,7 @@ spring_learnt_t spring_estimator_learnt(const spring_estimator_t *e, uint8_t k)
 void spring_estimator_disturb(spring_belief_t *b)
 {
     b->settling = SETTLING_TICKS;
-    b->jumped = true;
+    b->cut_short = true;
     b->current_sum_ma = b->voltage_sum_mv = 0;
     b->readings = 0;
     b->quiet = 0;
@@ -215,10 +216,10 @@ static void take_readings(spring_belief_t *b)
         b->current_a = current_a;
         b->ohm = ohm;
         b->fresh = b->fresh < UINT8_MAX ? (uint8_t)(b->fresh + 1) : UINT8_MAX;
-    } else if (b->current_sum_ma < LEAST_MEAN_MA && !b->jumped) {
+    } else if (b->current_sum_ma < LEAST_MEAN_MA && !b->cut_short) {
         b->fresh = 0; /* no current, or no sensor */
     }
-    b->jumped = false;
+    b->cut_short = false;
     b->current_sum_ma = b->voltage_sum_mv = 0;
     b->readings = 0;
 }
@@ -554,7 +555,7 @@ spring_bounds_t spring_estimator_distance_k(const spring_estimator_t *e,
 }
 
 /* What the phase is told by: the best that there is. */
-typedef enum { BY_MODEL, BY_LOSS, BY_RESISTANCE, BY_ONSET } phase_source_t;
+typedef enum { BY_MODEL, BY_LOSS, BY_RESISTANCE, BY_MARTENSITE } phase_source_t;
 
 static phase_source_t phase_source(const spring_belief_t *b)
 {
@@ -567,7 +568,17 @@ static phase_source_t phase_source(const spring_belief_t *b)
     if (b->possible != SPRING_PHASE_ANY && b->learnt.austenite_ohm > 0.0f) {
         return BY_RESISTANCE;
     }
-    return b->onset && b->cold_ohm > 0.0f ? BY_ONSET : BY_MODEL;
+    return b->possible != SPRING_PHASE_ANY && b->learnt.martensite_ohm > 0.0f ? BY_MARTENSITE
+                                                                             : BY_MODEL;
+}
+
+/* Its own martensite's, at its temperature. */
+static float martensite_ohm_now(const spring_belief_t *b, const thermal_model_t *model,
+                                   uint8_t k)
+{
+    const spring_learnt_t *l = &b->learnt;
+    return l->martensite_ohm *
+           (1.0f + l->martensite_rise_per_k * (spring_now_c(model, k) - LEARNT_AT_C));
 }
 
 float spring_estimator_phase(const spring_estimator_t *e, const thermal_model_t *model, uint8_t k)
@@ -579,8 +590,8 @@ float spring_estimator_phase(const spring_estimator_t *e, const thermal_model_t 
         return clamp(1.0f - b->lost, 0.0f, 1.0f);
     case BY_RESISTANCE:
         return clamp(1.0f - (1.0f - b->ohm / l->austenite_ohm) / l->change, 0.0f, 1.0f);
-    case BY_ONSET:
-        return clamp((1.0f - b->onset_ohm / b->ohm) / l->change, 0.0f, 1.0f);
+    case BY_MARTENSITE:
+        return clamp((1.0f - martensite_ohm_now(b, model, k) / b->ohm) / l->change, 0.0f, 1.0f);
     case BY_MODEL:
         break;
     }
@@ -595,8 +606,8 @@ static float phase_sd(const spring_estimator_t *e, const thermal_model_t *model,
         return b->blind ? PHASE_BLIND_SD : PHASE_SD;
     case BY_RESISTANCE:
         return PHASE_READ_SD;
-    case BY_ONSET:
-        return PHASE_ONSET_SD;
+    case BY_MARTENSITE:
+        return PHASE_ONE_SD;
     case BY_MODEL:
         break;
     }

@@ -77,7 +77,7 @@ typedef struct {
     /* the running turn's readings */
     uint8_t readings;
     uint8_t settling; /* to be left out, after a jump of the current */
-    bool jumped;      /* there was one in this turn */
+    bool cut_short;   /* there was one in this turn */
     uint16_t current_sum_ma;
     uint16_t voltage_sum_mv;
     float current_a; /* of the last turn that had readings */
