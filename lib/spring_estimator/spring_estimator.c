@@ -36,7 +36,7 @@
 
 #define PHASE_SD       0.02f
 #define PHASE_READ_SD  0.08f /* by its own resistances */
-#define PHASE_ONE_SD 0.12f /* by one of its own, the other declared */
+#define PHASE_ONE_SD   0.12f /* by one of its own, the other declared */
 #define PHASE_BLIND_SD 0.3f
 #define LOOK_SD        0.12f /* by resistances that were learnt at another current */
 #define LOOK_SDS       3.0f
@@ -215,6 +215,7 @@ static void take_readings(spring_belief_t *b)
         b->slow_ohm = b->fresh == 0 ? ohm : b->slow_ohm + (ohm - b->slow_ohm) * SLOW_SHARE;
         b->current_a = current_a;
         b->ohm = ohm;
+        b->phase_ohm = current_a > STRONG_A || b->fresh == 0 ? ohm : b->phase_ohm;
         b->fresh = b->fresh < UINT8_MAX ? (uint8_t)(b->fresh + 1) : UINT8_MAX;
     } else if (b->current_sum_ma < LEAST_MEAN_MA && !b->cut_short) {
         b->fresh = 0; /* no current, or no sensor */
@@ -569,12 +570,11 @@ static phase_source_t phase_source(const spring_belief_t *b)
         return BY_RESISTANCE;
     }
     return b->possible != SPRING_PHASE_ANY && b->learnt.martensite_ohm > 0.0f ? BY_MARTENSITE
-                                                                             : BY_MODEL;
+                                                                              : BY_MODEL;
 }
 
 /* Its own martensite's, at its temperature. */
-static float martensite_ohm_now(const spring_belief_t *b, const thermal_model_t *model,
-                                   uint8_t k)
+static float martensite_ohm_now(const spring_belief_t *b, const thermal_model_t *model, uint8_t k)
 {
     const spring_learnt_t *l = &b->learnt;
     return l->martensite_ohm *
@@ -589,9 +589,10 @@ float spring_estimator_phase(const spring_estimator_t *e, const thermal_model_t 
     case BY_LOSS:
         return clamp(1.0f - b->lost, 0.0f, 1.0f);
     case BY_RESISTANCE:
-        return clamp(1.0f - (1.0f - b->ohm / l->austenite_ohm) / l->change, 0.0f, 1.0f);
+        return clamp(1.0f - (1.0f - b->phase_ohm / l->austenite_ohm) / l->change, 0.0f, 1.0f);
     case BY_MARTENSITE:
-        return clamp((1.0f - martensite_ohm_now(b, model, k) / b->ohm) / l->change, 0.0f, 1.0f);
+        return clamp((1.0f - martensite_ohm_now(b, model, k) / b->phase_ohm) / l->change, 0.0f,
+                     1.0f);
     case BY_MODEL:
         break;
     }

@@ -84,6 +84,7 @@ typedef struct {
     float ohm;
     float ohm_before[2]; /* one and two turns earlier; 0: at another current */
     float slow_ohm;      /* over 4 s */
+    float phase_ohm;     /* the last at a strong current: what tells the phase */
     float noise;         /* standard deviation of one turn's, relative */
     float last_c;        /* the model's temperature a turn ago */
     /* the running heating */
