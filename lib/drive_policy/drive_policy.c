@@ -1,5 +1,6 @@
 #include "drive_policy.h"
 
+#include <math.h>
 #include <stddef.h>
 
 #include "derating.h"
@@ -33,6 +34,7 @@
 #define TURN_C7       (6 * 128) /* colder than one that heats: it is its turn */
 #define GOES_ON_C7    (4 * 128) /* below austenite start: keeps its turn */
 #define LOOK_MA       2000u     /* of a spring of which much was learnt and nothing is known */
+#define LOWER_MA      800u      /* the least at which a resistance tells the phase */
 #define UNDRIVEN_SDS  2.0f
 #define NEIGHBOUR_SD  0.15f /* of the rise of a spring that its neighbours heat */
 #define RISE_SHARE    0.25f /* of a turn in the average */
@@ -141,7 +143,7 @@ static void enter(drive_policy_t *policy, thermal_model_t *model, uint8_t k,
         break;
     case DRIVE_POLICY_STAGE_LOWER:
         spring_estimator_begin_hold(&policy->estimator, model, k, false);
-        s->wanted_ma = policy->parameters.probe_current_ma;
+        s->wanted_ma = (uint16_t)(LOWER_MA + policy->parameters.dither_ma);
         break;
     }
 }
@@ -188,35 +190,31 @@ static void heat(drive_policy_t *policy, thermal_model_t *model, uint8_t k, uint
         return;
     }
     const bool slows = !full && c7 > points.austenite_start_c7 - 128;
-    const bool waits = waits_for_supply(s);
+    const bool keeps = waits_for_supply(s) && (c7 > points.austenite_start_c7 + KEPT_C7 ||
+                                               phase_of(policy, model, k) > 0.5f * level);
     s->floor_ma = 0;
-    if (slows || waits) {
+    if (slows || keeps) {
         const uint16_t keeps_ma =
             hold_current_ma(policy, model, k, spring_c(c7), slows ? LEVEL_POWER_W : 0.0f);
         if (slows && keeps_ma < s->wanted_ma) {
             s->wanted_ma = keeps_ma;
         }
-        if (waits && (c7 > points.austenite_start_c7 + KEPT_C7 ||
-                      phase_of(policy, model, k) > 0.5f * level)) {
-            s->floor_ma = keeps_ma;
-        }
+        s->floor_ma = keeps ? keeps_ma : 0;
     }
 }
 
-/* Above martensite start, by as much as its distance is unsure; never so high that a level rises.
- */
+/* Above martensite start: fully on by as much as its distance is unsure; a level as far from both
+ * ends of the band as it can be. */
 static float safe_margin_k(const drive_policy_t *policy, const thermal_model_t *model, uint8_t k,
                            bool full, float sd_k)
 {
     const drive_policy_parameters_t *p = &policy->parameters;
-    const thermal_model_transformation_t points = thermal_model_transformation(model, k);
-    const float least_k = kelvin(p->hold_margin_cc);
-    float most_k = kelvin(p->unsure_margin_cc);
-    const float band_k =
-        spring_c((int16_t)(points.austenite_start_c7 - points.martensite_start_c7)) - LEVEL_ROOM_K;
-    if (!full && most_k > band_k) {
-        most_k = band_k;
+    if (!full) {
+        const thermal_model_transformation_t points = thermal_model_transformation(model, k);
+        return 0.5f * spring_c((int16_t)(points.austenite_start_c7 - points.martensite_start_c7));
     }
+    const float least_k = kelvin(p->hold_margin_cc);
+    const float most_k = kelvin(p->unsure_margin_cc);
     const float margin_k =
         least_k + policy->estimator.spring[k].disturbance_k + MARGIN_PER_SD * (sd_k - MARGIN_SD_K);
     return margin_k > most_k ? most_k : margin_k < least_k ? least_k : margin_k;
@@ -398,10 +396,10 @@ static void watch_away(drive_policy_t *policy, const thermal_model_t *model, uin
 {
     drive_policy_spring_t *s = &policy->spring[k];
     const float level = is_full(level_permille) ? 1.0f : 0.001f * (float)level_permille;
-    const bool there =
-        s->stage == DRIVE_POLICY_STAGE_HOLD &&
-        spring_estimator_sees(&policy->estimator.spring[k]) &&
-        phase_of(policy, model, k) - level > THERE - 1.0f - (level < 1.0f ? LEVEL_BAND : 0.0f);
+    const float band = 1.0f - THERE + (level < 1.0f ? LEVEL_BAND : 0.0f);
+    const bool there = s->stage == DRIVE_POLICY_STAGE_HOLD &&
+                       spring_estimator_sees(&policy->estimator.spring[k]) &&
+                       fabsf(phase_of(policy, model, k) - level) < band;
     if (there) {
         s->arrived = true;
         s->away_turns = 0;
@@ -502,6 +500,9 @@ static void take_turn(drive_policy_t *policy, const drive_policy_input_t *input)
         policy->slot = 0;
         count_overload(policy);
         rotate_queue(policy, input->model);
+        policy->stiffness_turn = (uint8_t)((policy->stiffness_turn + 1u) % policy->springs);
+        spring_estimator_look_at_stiffness(&policy->estimator, input->model,
+                                           policy->stiffness_turn);
     }
 }
 

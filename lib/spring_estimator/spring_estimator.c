@@ -24,7 +24,6 @@
 #define LOSS_MOST       0.45f   /* of the declared loss: no more is ever believed */
 #define LOSS_DRIFT_SD   0.0005f /* of the declared loss, in a second: 3 % in an hour */
 #define LOSS_DRIFT      (SPRING_ESTIMATOR_TURN_S * LOSS_DRIFT_SD * LOSS_DRIFT_SD)
-#define STIFFNESS_TURNS 4
 #define NEIGHBOUR_SD    0.15f /* of the rise of a spring that its neighbours heat */
 #define SHIFT_SD_K      3.0f  /* of declared transformation temperatures */
 #define SHIFT_MOST_K    30.0f
@@ -43,13 +42,14 @@
 
 #define PHASE_SD       0.02f
 #define PHASE_READ_SD  0.08f /* by its own resistances */
-#define PHASE_ONSET_SD 0.12f /* by one of its own, the other declared */
+#define PHASE_ONE_SD   0.12f /* by one of its own, the other declared */
 #define PHASE_BLIND_SD 0.3f
 #define LOOK_SD        0.12f /* by resistances that were learnt at another current */
 #define LOOK_SDS       3.0f
 #define LOOK_MOST      0.4f
 #define LOOK_TURNS     3
 
+#define LEARNT_AT_C      20.0f
 #define LEARNT_OHM_LEAST 0.01f
 #define LEARNT_OHM_MOST  16.0f
 
@@ -111,13 +111,18 @@ void spring_estimator_prepare(spring_estimator_t *e, const thermal_model_t *mode
     e->latent_heat_j = (float)p->latent_heat_mj * 1e-3f;
     e->martensite_ohm = (float)p->resistance_martensite_uohm * 1e-6f;
     e->change = 1.0f - (float)p->resistance_martensite_uohm / (float)p->resistance_austenite_uohm;
+    for (uint8_t k = 0; k < model->springs; k++) {
+        spring_estimator_look_at_stiffness(e, model, k);
+    }
 }
 
 /* A temperature that is known to sd_k, and where its transformation lies as declared. */
 static void begin(spring_belief_t *b, float temperature_c, float sd_k, uint8_t possible)
 {
     const spring_learnt_t learnt = b->learnt;
-    *b = (spring_belief_t){.variance_k2 = sd_k * sd_k + SHIFT_SD_K * SHIFT_SD_K,
+    const float stiffness_w_per_k = b->declared_stiffness_w_per_k;
+    *b = (spring_belief_t){.declared_stiffness_w_per_k = stiffness_w_per_k,
+                           .variance_k2 = sd_k * sd_k + SHIFT_SD_K * SHIFT_SD_K,
                            .shift_variance_k2 = SHIFT_SD_K * SHIFT_SD_K,
                            .loss_variance = learnt.loss_sd_w_per_k * learnt.loss_sd_w_per_k,
                            .possible = possible,
@@ -187,7 +192,7 @@ spring_learnt_t spring_estimator_learnt(const spring_estimator_t *e, uint8_t k)
 void spring_estimator_disturb(spring_belief_t *b)
 {
     b->settling = SETTLING_TICKS;
-    b->jumped = true;
+    b->cut_short = true;
     b->current_sum_ma = b->voltage_sum_mv = 0;
     b->readings = 0;
     b->quiet = 0;
@@ -240,11 +245,12 @@ static void take_readings(spring_belief_t *b)
         b->slow_ohm = b->fresh == 0 ? ohm : b->slow_ohm + (ohm - b->slow_ohm) * SLOW_SHARE;
         b->current_a = current_a;
         b->ohm = ohm;
+        b->phase_ohm = current_a > STRONG_A || b->fresh == 0 ? ohm : b->phase_ohm;
         b->fresh = b->fresh < UINT8_MAX ? (uint8_t)(b->fresh + 1) : UINT8_MAX;
-    } else if (b->current_sum_ma < LEAST_MEAN_MA && !b->jumped) {
+    } else if (b->current_sum_ma < LEAST_MEAN_MA && !b->cut_short) {
         b->fresh = 0; /* no current, or no sensor */
     }
-    b->jumped = false;
+    b->cut_short = false;
     b->current_sum_ma = b->voltage_sum_mv = 0;
     b->readings = 0;
 }
@@ -253,6 +259,20 @@ static float extra_loss_w(const spring_belief_t *b, const thermal_model_t *model
                           float temperature_c)
 {
     return b->learnt.loss_w_per_k * (temperature_c - spring_ambient_c(model));
+}
+
+/* It moves with the fan and the air: slowly. */
+void spring_estimator_look_at_stiffness(spring_estimator_t *e, const thermal_model_t *model,
+                                        uint8_t k)
+{
+    const float now_c = spring_now_c(model, k);
+    e->spring[k].declared_stiffness_w_per_k =
+        (hold_w(model, k, now_c + 8.0f) - hold_w(model, k, now_c)) * 0.125f;
+}
+
+float spring_stiffness_w_per_k(const spring_belief_t *b)
+{
+    return b->declared_stiffness_w_per_k + b->learnt.loss_w_per_k;
 }
 
 /* How the errors of distance and loss go on in a turn. Returns the heat taken up, K. */
@@ -264,14 +284,9 @@ static float predict(const spring_estimator_t *e, spring_belief_t *b, const ther
     const float per_w = e->turn_k_per_w;
     const float above_k = now_c - spring_ambient_c(model);
     const float by_loss = -per_w * above_k;
-    if (b->stiffness_turns-- == 0) { /* it moves with the fan and the air: slowly */
-        b->stiffness_turns = STIFFNESS_TURNS;
-        b->stiffness_w_per_k =
-            (hold_w(model, k, now_c + 8.0f) - balance_w) * 0.125f + b->learnt.loss_w_per_k;
-    }
     const float extra_w = b->learnt.loss_w_per_k * above_k;
     b->extra_loss_uw = (int32_t)(1e6f * extra_w);
-    const float keeps = 1.0f - per_w * b->stiffness_w_per_k;
+    const float keeps = 1.0f - per_w * spring_stiffness_w_per_k(b);
     const float kept = keeps * b->covariance;
     const float joins = by_loss * b->loss_variance;
     b->variance_k2 = keeps * keeps * b->variance_k2 + by_loss * (kept + kept + joins);
@@ -295,14 +310,14 @@ float spring_see(const spring_estimator_t *e, spring_belief_t *b, thermal_model_
                  float seen_c, float sd_k, uint8_t from)
 {
     const float error_k = seen_c - spring_now_c(model, k);
-    const float total_k2 = distance_k2(b) + sd_k * sd_k;
-    const float gain = distance_k2(b) / total_k2;
+    const float per_total = 1.0f / (distance_k2(b) + sd_k * sd_k);
+    const float gain = distance_k2(b) * per_total;
     const float left = 1.0f - gain;
-    const float by_loss = b->covariance / total_k2;
+    const float by_loss = b->covariance * per_total;
     spring_set_temperature(model, k, seen_c - left * error_k, from);
     b->last_c = spring_now_c(model, k);
     b->seen = true;
-    b->shift_k = clamp(b->shift_k - fminf(b->shift_variance_k2 / total_k2, gain) * error_k,
+    b->shift_k = clamp(b->shift_k - fminf(b->shift_variance_k2 * per_total, gain) * error_k,
                        -SHIFT_MOST_K, SHIFT_MOST_K);
     correct_loss(e, b, by_loss * error_k);
     b->kept_w_per_k = 0.0f;
@@ -525,7 +540,7 @@ float spring_estimator_hold_sd_k(const spring_estimator_t *e, const thermal_mode
     const spring_belief_t *b = &e->spring[k];
     const float above_k = spring_now_c(model, k) - spring_ambient_c(model);
     const float settles_k2 = above_k * above_k * b->loss_variance /
-                             (b->stiffness_w_per_k * b->stiffness_w_per_k + 1e-12f);
+                             (spring_stiffness_w_per_k(b) * spring_stiffness_w_per_k(b) + 1e-12f);
     return sqrtf(fmaxf(distance_k2(b), settles_k2));
 }
 
@@ -580,7 +595,7 @@ spring_bounds_t spring_estimator_distance_k(const spring_estimator_t *e,
 }
 
 /* What the phase is told by: the best that there is. */
-typedef enum { BY_MODEL, BY_LOSS, BY_RESISTANCE, BY_ONSET } phase_source_t;
+typedef enum { BY_MODEL, BY_LOSS, BY_RESISTANCE, BY_MARTENSITE } phase_source_t;
 
 static phase_source_t phase_source(const spring_belief_t *b)
 {
@@ -593,7 +608,16 @@ static phase_source_t phase_source(const spring_belief_t *b)
     if (b->possible != SPRING_PHASE_ANY && b->learnt.austenite_ohm > 0.0f) {
         return BY_RESISTANCE;
     }
-    return b->onset && b->cold_ohm > 0.0f ? BY_ONSET : BY_MODEL;
+    return b->possible != SPRING_PHASE_ANY && b->learnt.martensite_ohm > 0.0f ? BY_MARTENSITE
+                                                                              : BY_MODEL;
+}
+
+/* Its own martensite's, at its temperature. */
+static float martensite_ohm_now(const spring_belief_t *b, const thermal_model_t *model, uint8_t k)
+{
+    const spring_learnt_t *l = &b->learnt;
+    return l->martensite_ohm *
+           (1.0f + l->martensite_rise_per_k * (spring_now_c(model, k) - LEARNT_AT_C));
 }
 
 float spring_estimator_phase(const spring_estimator_t *e, const thermal_model_t *model, uint8_t k)
@@ -604,9 +628,10 @@ float spring_estimator_phase(const spring_estimator_t *e, const thermal_model_t 
     case BY_LOSS:
         return clamp(1.0f - b->lost, 0.0f, 1.0f);
     case BY_RESISTANCE:
-        return clamp(1.0f - (1.0f - b->ohm / l->austenite_ohm) / l->change, 0.0f, 1.0f);
-    case BY_ONSET:
-        return clamp((1.0f - b->onset_ohm / b->ohm) / l->change, 0.0f, 1.0f);
+        return clamp(1.0f - (1.0f - b->phase_ohm / l->austenite_ohm) / l->change, 0.0f, 1.0f);
+    case BY_MARTENSITE:
+        return clamp((1.0f - martensite_ohm_now(b, model, k) / b->phase_ohm) / l->change, 0.0f,
+                     1.0f);
     case BY_MODEL:
         break;
     }
@@ -621,8 +646,8 @@ static float phase_sd(const spring_estimator_t *e, const thermal_model_t *model,
         return b->blind ? PHASE_BLIND_SD : PHASE_SD;
     case BY_RESISTANCE:
         return PHASE_READ_SD;
-    case BY_ONSET:
-        return PHASE_ONSET_SD;
+    case BY_MARTENSITE:
+        return PHASE_ONE_SD;
     case BY_MODEL:
         break;
     }

@@ -56,14 +56,13 @@ typedef struct {
     float capacity_k;    /* a standard deviation, signed: it shrinks again on the way back */
     float shift_k;
     float shift_variance_k2;
-    float stiffness_w_per_k; /* what 1 K more of this spring gives off */
+    float declared_stiffness_w_per_k; /* what 1 K more of this spring gives off */
     int32_t extra_loss_uw;   /* what it loses beyond the model, now */
     float disturbance_k;     /* how far it was found from where it was believed, lately */
     float hottest_c;         /* while nothing is known: the most that it can be by now */
     float kept_w_per_k;      /* taken off the loss since it was last seen, as nothing was seen */
     float lost;              /* phase lost since it had transformed, 0..1 */
     uint8_t possible;        /* SPRING_PHASE_ bits */
-    uint8_t stiffness_turns; /* to the next look at it */
     uint8_t fresh;           /* turns with readings since current flows, saturating */
     uint8_t quiet;           /* turns in which its temperature hardly moved, saturating */
     uint8_t losing;          /* turns on end in which it seems to lose phase */
@@ -79,7 +78,7 @@ typedef struct {
     /* the running turn's readings */
     uint8_t readings;
     uint8_t settling; /* to be left out, after a jump of the current */
-    bool jumped;      /* there was one in this turn */
+    bool cut_short;   /* there was one in this turn */
     uint16_t current_sum_ma;
     uint16_t voltage_sum_mv;
     float current_a; /* of the last turn that had readings */
@@ -90,6 +89,7 @@ typedef struct {
     float offset_sd_v;
     float noise;  /* standard deviation of one turn's, relative */
     float last_c; /* the model's temperature a turn ago */
+    float phase_ohm;     /* the last at a strong current: what tells the phase */
     /* the running heating */
     float begun_c;       /* where it began, at the coldest */
     float begun_missing; /* what was still to transform then, at the most, 0..1 */
@@ -161,6 +161,11 @@ void spring_estimator_disturb(spring_belief_t *belief);
 /* Once in a turn: takes the readings, and moves the model's temperature and phase to what they say.
  */
 void spring_estimator_update(spring_estimator_t *estimator, thermal_model_t *model, uint8_t spring);
+
+/* What the spring gives off per kelvin, as the model has it by now: to be called once in some
+ * seconds, in a tick that has room. */
+void spring_estimator_look_at_stiffness(spring_estimator_t *estimator, const thermal_model_t *model,
+                                        uint8_t spring);
 
 /* A heating begins: what the resistance does from here on tells of the transformation. */
 void spring_estimator_begin_heating(spring_estimator_t *estimator, const thermal_model_t *model,

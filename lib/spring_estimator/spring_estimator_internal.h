@@ -23,6 +23,8 @@ float spring_ambient_c(const thermal_model_t *model);
  * (SPRING_PHASE_MARTENSITE or _AUSTENITE). */
 void spring_set_temperature(thermal_model_t *model, uint8_t spring, float temperature_c,
                             uint8_t from);
+/* What 1 K more gives off, with what was found to be lost beyond the declared loss. */
+float spring_stiffness_w_per_k(const spring_belief_t *belief);
 /* The spring was seen at a place of its transformation, give or take sd_k: the one update of
  * distance, shift and loss. The model's temperature is set, its phase reached from `from`
  * (SPRING_PHASE_MARTENSITE or _AUSTENITE). Returns the error found, K. */

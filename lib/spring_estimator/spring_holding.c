@@ -50,7 +50,7 @@ static void see_crossing(const spring_estimator_t *e, spring_belief_t *b, therma
     if (lost > LARGE_LOSS) {
         /* nearer to it by as much as more is lost up there */
         const float above_k = fmaxf(spring_now_c(model, k) - spring_ambient_c(model), 1.0f);
-        const float by_loss = b->stiffness_w_per_k / above_k;
+        const float by_loss = spring_stiffness_w_per_k(b) / above_k;
         const float moved_k2 = LARGE_SD_K * LARGE_SD_K;
         b->shift_variance_k2 += moved_k2;
         b->variance_k2 += moved_k2;

@@ -3,32 +3,39 @@
 /* The rise that trips the model is this share of the one that trips the ceiling: as hot as declared
  * numbers make an array whose heat capacity, losses, couplings and transformation are off by as
  * much as bench/worlds draws them, the ceiling stays a tenth below. */
-#define RISE_SHARE 0.9f
+#define RISE_SHARE_NUMERATOR   9
+#define RISE_SHARE_DENOMINATOR 10
 /* Of the power that duty and supply give: with 4.2 V for 5 and 0.04 ohm more in the wiring it is no
  * less. */
 #define POWER_SHARE 0.64f
 
-#define HIGHEST_C 215.0f
-#define LOWEST_C  (-40.0f)
+#define HIGHEST_C7 (215 * 128)
+#define HIGHEST_C  215.0f
+#define LOWEST_C   (-40.0f)
 
 static float from_c7(int16_t c7)
 {
     return (float)c7 * (1.0f / 128.0f);
 }
 
-static float hold_w(const thermal_model_t *model, uint8_t k, float temperature_c)
+/* Q9.23, as the model keeps its own: the upper half is the temperature in Q9.7. */
+static int16_t c7_of(int32_t temperature_c23)
 {
-    return 1e-6f *
-           (float)thermal_model_power_to_hold_uw(model, k, (int16_t)(temperature_c * 128.0f));
+    return (int16_t)(temperature_c23 >> 16);
 }
 
 void temperature_ceiling_set(temperature_ceiling_t *ceiling, const thermal_model_t *model)
 {
     for (uint8_t k = 0; k < model->springs; k++) {
-        ceiling->temperature_c[k] = from_c7(thermal_model_temperature_c7(model, k));
+        ceiling->temperature_c23[k] = (int32_t)thermal_model_temperature_c7(model, k) * 65536;
         ceiling->austenite[k] =
             (float)thermal_model_austenite(model, k) / (float)THERMAL_MODEL_AUSTENITE_FULL;
     }
+}
+
+float temperature_ceiling_c(const temperature_ceiling_t *ceiling, uint8_t k)
+{
+    return (float)ceiling->temperature_c23[k] * (1.0f / 8388608.0f);
 }
 
 static float clamp(float value, float low, float high)
@@ -52,15 +59,16 @@ static void add_heat(temperature_ceiling_t *ceiling, const thermal_model_t *mode
 {
     const thermal_model_transformation_t t = thermal_model_transformation(model, k);
     const float before = ceiling->austenite[k];
-    const float heat_c = ceiling->temperature_c[k] + gain_k + latent_k * before;
+    const float heat_c = temperature_ceiling_c(ceiling, k) + gain_k + latent_k * before;
     float after = phase_on(t.austenite_start_c7, t.austenite_finish_c7, heat_c, latent_k);
-    if (after <= before) {
+    if (after <= before && before > 0.0f) {
         const float cooled =
             phase_on(t.martensite_finish_c7, t.martensite_start_c7, heat_c, latent_k);
         after = cooled < before ? cooled : before;
     }
     ceiling->austenite[k] = after;
-    ceiling->temperature_c[k] = clamp(heat_c - latent_k * after, LOWEST_C, HIGHEST_C);
+    ceiling->temperature_c23[k] =
+        (int32_t)(clamp(heat_c - latent_k * after, LOWEST_C, HIGHEST_C) * 8388608.0f);
 }
 
 void temperature_ceiling_step(temperature_ceiling_t *ceiling, const thermal_model_t *model,
@@ -69,10 +77,9 @@ void temperature_ceiling_step(temperature_ceiling_t *ceiling, const thermal_mode
     const thermal_model_parameters_t *p = &model->parameters;
     const uint32_t capacity_uj_per_k =
         (uint32_t)p->heat_capacity_scale_permille[k] * p->heat_capacity_mj_per_k;
-    const float capacity_j_per_k = 1e-6f * (float)capacity_uj_per_k;
-    const float latent_k = (float)p->latent_heat_mj / (float)p->heat_capacity_mj_per_k;
-    const float now_c = ceiling->temperature_c[k];
-    const float flow_w = hold_w(model, k, now_c);
+    const float latent_k = (float)model->latent_full_c8 * (1.0f / 256.0f);
+    const int32_t hold_uw =
+        thermal_model_power_to_hold_uw(model, k, c7_of(ceiling->temperature_c23[k]));
     /* What the model's neighbours take beyond those of the ceiling, uW / 128: a spring's couplings
      * and the span of temperatures keep it within 32 bits. */
     int32_t colder = 0;
@@ -83,23 +90,26 @@ void temperature_ceiling_step(temperature_ceiling_t *ceiling, const thermal_mode
         if (coupling_uw_per_k != 0) {
             stiffness_uw_per_k += coupling_uw_per_k;
             colder +=
-                (int32_t)coupling_uw_per_k * ((int16_t)(ceiling->temperature_c[j] * 128.0f) -
+                (int32_t)coupling_uw_per_k * (c7_of(ceiling->temperature_c23[j]) -
                                               (int32_t)thermal_model_temperature_c7(model, j));
         }
     }
-    const float colder_w = (float)colder * (1e-6f / 128.0f);
+    const float into_w = power_w + 1e-6f * (float)(colder / 128 - hold_uw);
     /* stable whatever the heat capacity: the flow's own change is taken at the end of the step */
     const float gain_k =
-        (power_w - flow_w + colder_w) * TEMPERATURE_CEILING_TURN_S /
-        (capacity_j_per_k + 1e-6f * (float)stiffness_uw_per_k * TEMPERATURE_CEILING_TURN_S);
+        into_w * (1e6f * TEMPERATURE_CEILING_TURN_S) /
+        ((float)capacity_uj_per_k + TEMPERATURE_CEILING_TURN_S * (float)stiffness_uw_per_k);
     add_heat(ceiling, model, k, gain_k, latent_k);
 }
 
-float temperature_ceiling_trip_c(const thermal_model_t *model, float trip_c)
+bool temperature_ceiling_trips(const temperature_ceiling_t *ceiling, const thermal_model_t *model,
+                               uint8_t k, int16_t trip_cc)
 {
-    const float ambient_c = from_c7(thermal_model_ambient_c7(model));
-    const float at_c = ambient_c + (trip_c - ambient_c) * (1.0f / RISE_SHARE);
-    return at_c < HIGHEST_C - 1.0f ? at_c : HIGHEST_C - 1.0f;
+    const int16_t c7 = c7_of(ceiling->temperature_c23[k]);
+    const int32_t ambient = 100 * (int32_t)thermal_model_ambient_c7(model); /* degC / 12800 */
+    return c7 >= HIGHEST_C7 - 128 ||
+           (100 * (int32_t)c7 - ambient) * RISE_SHARE_NUMERATOR >
+               (128 * (int32_t)trip_cc - ambient) * RISE_SHARE_DENOMINATOR;
 }
 
 float temperature_ceiling_power_w(const thermal_model_t *model,

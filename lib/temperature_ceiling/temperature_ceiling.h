@@ -5,6 +5,7 @@
 #ifndef TEMPERATURE_CEILING_H
 #define TEMPERATURE_CEILING_H
 
+#include <stdbool.h>
 #include <stdint.h>
 
 #include "thermal_model.h"
@@ -16,8 +17,8 @@ extern "C" {
 #define TEMPERATURE_CEILING_TURN_S 0.6f /* between two steps of a spring */
 
 typedef struct {
-    float temperature_c[THERMAL_MODEL_MAX_SPRINGS];
-    float austenite[THERMAL_MODEL_MAX_SPRINGS]; /* 0..1 */
+    int32_t temperature_c23[THERMAL_MODEL_MAX_SPRINGS]; /* Q9.23 degC */
+    float austenite[THERMAL_MODEL_MAX_SPRINGS];         /* 0..1 */
 } temperature_ceiling_t;
 
 /* From here on it begins where the model is. */
@@ -28,9 +29,12 @@ void temperature_ceiling_set(temperature_ceiling_t *ceiling, const thermal_model
 void temperature_ceiling_step(temperature_ceiling_t *ceiling, const thermal_model_t *model,
                               uint8_t spring, float power_w);
 
-/* The temperature at which it trips: a tenth more above ambient than trip_c, which an array within
- * its tolerances does not reach. */
-float temperature_ceiling_trip_c(const thermal_model_t *model, float trip_c);
+float temperature_ceiling_c(const temperature_ceiling_t *ceiling, uint8_t spring);
+
+/* It is a tenth more above ambient than trip_cc (0.01 degC), which an array within its tolerances
+ * does not reach; or as hot as it can be. */
+bool temperature_ceiling_trips(const temperature_ceiling_t *ceiling, const thermal_model_t *model,
+                               uint8_t spring, int16_t trip_cc);
 
 /* Power that the duty (steps of 800) must at least bring, whatever is read: the supply may be a
  * fifth lower than declared. */

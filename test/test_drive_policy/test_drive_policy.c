@@ -142,6 +142,24 @@ static void level_is_held(void)
     }
 }
 
+/* Whichever way it came there, and never fully on: by its own martensite's resistance. */
+static void levels_one_after_the_other_are_held(void)
+{
+    static const uint16_t levels[] = {500, 250, 800, 400, 600};
+    for (int n = 0; n < 3; n++) {
+        set_defaults();
+        loss_w_per_k *= 0.85 + 0.15 * n;
+        begin_cold(1, 2);
+        for (unsigned j = 0; j < 5; j++) {
+            level[0] = levels[j];
+            (void)run(120.0);
+            (void)snprintf(where, sizeof where, "loss %d, %u permille: %.3f", n, levels[j],
+                           truth[0].austenite);
+            TEST_ASSERT_TRUE_MESSAGE(fabs(truth[0].austenite - 0.001 * levels[j]) < 0.1, where);
+        }
+    }
+}
+
 static void spring_that_cannot_get_there_is_said_to_be_away(void)
 {
     maximum_current_ma = 1000; /* 50 degC at most */
@@ -420,6 +438,7 @@ int main(void)
     RUN_TEST(spring_that_has_lost_its_phase_is_heated_back);
     RUN_TEST(resistance_without_a_change_is_driven_by_the_model_and_said);
     RUN_TEST(level_is_held);
+    RUN_TEST(levels_one_after_the_other_are_held);
     RUN_TEST(spring_that_cannot_get_there_is_said_to_be_away);
     RUN_TEST(two_springs_hold_by_the_hand_computed_inverse);
     RUN_TEST(boosts_are_staggered_not_diluted);

@@ -50,7 +50,7 @@ static void it_follows_the_declared_network(void)
         const bool heats = phase < 20;
         run(heats ? 0.6f : 0.1f, heats ? 600000u : 100000u, 6.0f);
         for (uint8_t k = 0; k < 9; k++) {
-            TEST_ASSERT_FLOAT_WITHIN(3.0f, model_c(k), ceiling.temperature_c[k]);
+            TEST_ASSERT_FLOAT_WITHIN(3.0f, model_c(k), temperature_ceiling_c(&ceiling, k));
         }
     }
 }
@@ -68,26 +68,27 @@ static void no_correction_of_the_model_lowers_it(void)
         }
     }
     for (uint8_t k = 0; k < 9; k++) {
-        TEST_ASSERT_TRUE(ceiling.temperature_c[k] > untouched.temperature_c[k]);
+        TEST_ASSERT_TRUE(temperature_ceiling_c(&ceiling, k) > temperature_ceiling_c(&untouched, k));
     }
 }
 
 /* As hot as the model may be at rest, it does not trip; with a fifth more power it does. */
 static void it_trips_a_tenth_above_the_model(void)
 {
-    const float trip_c = temperature_ceiling_trip_c(&model, 130.0f);
-    TEST_ASSERT_FLOAT_WITHIN(0.01f, 20.0f + 110.0f / 0.9f, trip_c);
     run(0.0058f * 110.0f, 638000u, 1200.0f); /* all alike: nothing flows between them */
-    TEST_ASSERT_FLOAT_WITHIN(0.5f, 130.0f, ceiling.temperature_c[4]);
-    TEST_ASSERT_TRUE(ceiling.temperature_c[4] < trip_c);
+    TEST_ASSERT_FLOAT_WITHIN(0.5f, 130.0f, temperature_ceiling_c(&ceiling, 4));
+    TEST_ASSERT_FALSE(temperature_ceiling_trips(&ceiling, &model, 4, 13000));
+    TEST_ASSERT_FALSE(temperature_ceiling_trips(&ceiling, &model, 4, 12000)); /* 131.1 degC */
+    TEST_ASSERT_TRUE(temperature_ceiling_trips(&ceiling, &model, 4, 11800));  /* 128.9 degC */
     run(1.2f * 0.0058f * 110.0f, 638000u, 1200.0f);
-    TEST_ASSERT_TRUE(ceiling.temperature_c[4] > trip_c);
+    TEST_ASSERT_TRUE(temperature_ceiling_trips(&ceiling, &model, 4, 13000));
 }
 
 static void a_trip_beyond_the_model_still_trips(void)
 {
+    TEST_ASSERT_FALSE(temperature_ceiling_trips(&ceiling, &model, 0, 25000));
     run(8.0f, 0, 600.0f);
-    TEST_ASSERT_TRUE(ceiling.temperature_c[0] > temperature_ceiling_trip_c(&model, 250.0f));
+    TEST_ASSERT_TRUE(temperature_ceiling_trips(&ceiling, &model, 0, 25000));
 }
 
 /* 0.64 of I^2 R with 5 V, 0.18 ohm and the austenite's 0.219. */
@@ -115,7 +116,7 @@ static void it_is_stable_whatever_the_heat_capacity(void)
     TEST_ASSERT_EQUAL(THERMAL_MODEL_OK, thermal_model_init(&model, &parameters, NULL));
     temperature_ceiling_set(&ceiling, &model);
     run(0.3f, 300000u, 60.0f);
-    TEST_ASSERT_FLOAT_WITHIN(0.5f, 20.0f + 0.3f / 0.0058f, ceiling.temperature_c[4]);
+    TEST_ASSERT_FLOAT_WITHIN(0.5f, 20.0f + 0.3f / 0.0058f, temperature_ceiling_c(&ceiling, 4));
 }
 
 int main(void)
