@@ -431,7 +431,6 @@ static void switch_off(drive_policy_t *policy, uint8_t k)
 {
     drive_policy_spring_t *s = &policy->spring[k];
     if (s->stage != DRIVE_POLICY_STAGE_OFF) {
-        s->released = true;
         supply_queue_remove(&policy->queue, k);
         s->stage = DRIVE_POLICY_STAGE_OFF;
     }
@@ -450,6 +449,7 @@ static void update(drive_policy_t *policy, const drive_policy_input_t *input, ui
     const float rise_k_per_s = (float)(c7 - s->last_c7) / (128.0f * TURN_S);
     s->rise_k_per_s += (rise_k_per_s - s->rise_k_per_s) * RISE_SHARE;
     s->last_c7 = c7;
+    s->released = s->released || driven; /* also where its turn comes before it is off */
     s->severity = driven ? 0.0f : severity(policy, input->model, k, s);
     /* what was just seen is acted on in the next turn: a tick has no time for both */
     if (driven && policy->parameters.policy != DRIVE_POLICY_OPEN &&
@@ -532,7 +532,6 @@ static void claim_of(drive_policy_t *policy, const drive_policy_input_t *input, 
     }
     if (open) {
         switch_off(policy, k);
-        s->released = false;
         s->wanted_ma = share_of_ma(p->open_current_ma, input->level_permille[k]);
     } else {
         s->limits = said_of(policy, k);

@@ -187,6 +187,7 @@ spring_learnt_t spring_estimator_learnt(const spring_estimator_t *e, uint8_t k)
 void spring_estimator_disturb(spring_belief_t *b)
 {
     b->settling = SETTLING_TICKS;
+    b->jumped = true;
     b->current_sum_ma = b->voltage_sum_mv = 0;
     b->readings = 0;
     b->quiet = 0;
@@ -217,11 +218,11 @@ static bool leave_out(spring_belief_t *b, float ohm, float current_a)
     const bool by_load = !holds || step * b->learnt.change < 0.0f;
     const float most = (by_load ? JUMP_OF_LOAD : JUMP_LEAST) + JUMP_SDS * b->noise;
     const bool jumps = fabsf(step) > most * was_ohm;
-    if (jumps && b->jumped) {
+    if (jumps && b->odd) {
         jump(b, ohm / was_ohm);
     }
-    b->jumped = jumps && !b->jumped;
-    return b->jumped;
+    b->odd = jumps && !b->odd;
+    return b->odd;
 }
 
 /* Second differences of turns at the same current: neither a level nor a slope shows in them. */
@@ -256,9 +257,10 @@ static void take_readings(spring_belief_t *b)
         if (!leave_out(b, ohm, current_a)) {
             take_reading(b, ohm, current_a);
         }
-    } else if (b->current_sum_ma < LEAST_MEAN_MA) {
-        b->fresh = 0;
+    } else if (b->current_sum_ma < LEAST_MEAN_MA && !b->jumped) {
+        b->fresh = 0; /* no current, or no sensor */
     }
+    b->jumped = false;
     b->current_sum_ma = b->voltage_sum_mv = 0;
     b->readings = 0;
 }
@@ -425,9 +427,9 @@ void spring_estimator_update(spring_estimator_t *e, thermal_model_t *model, uint
     const float heat_k = predict(e, b, model, k, power_w);
     const float moved_k = b->last_c - before_c;
     b->disturbance_k *= FORGETS;
+    b->heat_k += b->reads || b->fresh == 0 ? heat_k : 0.0f; /* while a current settles: who knows */
     if (b->reads && e->observes) {
         look(e, model, k);
-        b->heat_k += heat_k;
         spring_heating_watch(e, b, model, k);
         if (!b->blind) {
             spring_holding_watch(e, b, model, k, moved_k);
@@ -450,7 +452,7 @@ void spring_estimator_update(spring_estimator_t *e, thermal_model_t *model, uint
             return;
         }
     }
-    if (b->possible == SPRING_PHASE_AUSTENITE && !b->reads &&
+    if (b->possible == SPRING_PHASE_AUSTENITE && b->fresh == 0 &&
         spring_estimator_distance_k(e, model, k).low < 0.0f) {
         b->possible = SPRING_PHASE_BETWEEN | SPRING_PHASE_AUSTENITE; /* nothing tells any more */
     }

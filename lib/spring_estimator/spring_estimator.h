@@ -67,7 +67,7 @@ typedef struct {
     uint8_t fresh;           /* turns with readings since current flows, saturating */
     uint8_t quiet;           /* turns in which its temperature hardly moved, saturating */
     uint8_t losing;          /* turns on end in which it seems to lose phase */
-    bool jumped;             /* the turn before read what no phase changes to so fast */
+    bool odd;                /* the turn before read what no phase changes to so fast */
     bool reads;              /* the last turn had readings fit for use */
     bool seen;               /* the last turn has moved it to where it was seen */
     bool blind;              /* a heating that must have transformed it did not show */
@@ -80,6 +80,7 @@ typedef struct {
     /* the running turn's readings */
     uint8_t readings;
     uint8_t settling; /* to be left out, after a jump of the current */
+    bool jumped;      /* there was one in this turn */
     uint16_t current_sum_ma;
     uint16_t voltage_sum_mv;
     float current_a; /* of the last turn that had readings */
@@ -93,7 +94,8 @@ typedef struct {
     /* the running heating */
     float begun_c;       /* where it began, at the coldest */
     float begun_missing; /* what was still to transform then, at the most, 0..1 */
-    float heat_k;        /* taken up, over heat capacity */
+    float heat_k;        /* taken up, over heat capacity; less while it waits for its turn */
+    float peak_k;        /* the most of it */
     float mark_k;        /* where the resistance was last compared, and what it was */
     float mark_ohm;      /* 0: nowhere yet */
     float onset_ohm;

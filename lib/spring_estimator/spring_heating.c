@@ -25,7 +25,7 @@ void spring_estimator_begin_heating(spring_estimator_t *e, const thermal_model_t
         b->possible = b->lost < CHANGE_PART ? SPRING_PHASE_BETWEEN | SPRING_PHASE_AUSTENITE
                                             : SPRING_PHASE_BETWEEN;
     }
-    b->heat_k = b->mark_k = b->flat_k = b->excess = 0.0f;
+    b->heat_k = b->peak_k = b->mark_k = b->flat_k = b->excess = 0.0f;
     b->mark_ohm = b->onset_ohm = b->cold_ohm = b->line_ohm = 0.0f;
     b->onset = b->steep = false;
     b->heating = true;
@@ -123,7 +123,11 @@ void spring_heating_watch(const spring_estimator_t *e, spring_belief_t *b, therm
         b->cold_ohm = b->ohm;
         b->cold_c = spring_now_c(model, k);
     }
-    if (b->mark_ohm == 0.0f || b->heat_k < b->mark_k) {
+    if (b->heat_k < b->peak_k) {
+        return; /* it had to wait: on the way back up nothing transforms, and that tells nothing */
+    }
+    b->peak_k = b->heat_k;
+    if (b->mark_ohm == 0.0f) {
         b->mark_ohm = b->ohm;
         b->mark_k = b->heat_k;
         return;

@@ -77,6 +77,33 @@ static void held_spring_stays_on_near_martensite_start(void)
     }
 }
 
+static void jump_of_the_current_forgets_no_phase(void)
+{
+    begin_cold(1, 2);
+    level[0] = 1000;
+    (void)run(300.0);
+    for (unsigned n = 0; n < TURN_TICKS; n++) { /* one of them leaves a turn without readings */
+        spring_estimator_disturb(&policy.estimator.spring[0]);
+        (void)run(1.0 + TICK_S);
+        TEST_ASSERT_EQUAL_UINT8(SPRING_PHASE_AUSTENITE, policy.estimator.spring[0].possible);
+    }
+}
+
+static void spring_that_had_to_wait_half_transformed_goes_on_to_the_end(void)
+{
+    begin_cold(1, 2);
+    level[0] = 1000;
+    while (truth[0].austenite < 0.3) {
+        (void)tick();
+    }
+    supply_limit_ma = 0;
+    (void)run(12.0);
+    supply_limit_ma = 15000;
+    (void)run(30.0);
+    (void)snprintf(where, sizeof where, "%.3f", truth[0].austenite);
+    TEST_ASSERT_TRUE_MESSAGE(truth[0].austenite > 0.99, where);
+}
+
 static void spring_that_has_lost_its_phase_is_heated_back(void)
 {
     begin_cold(1, 2);
@@ -254,11 +281,29 @@ static void undriven_spring_derates_its_neighbours_only(void)
 
 static void spring_just_released_is_no_false_actuation(void)
 {
+    for (unsigned wait = 0; wait < TURN_TICKS; wait++) { /* one of them is the tick of its turn */
+        begin_cold(3, 3);
+        believe(1, 95, true);
+        level[0] = level[1] = 1000;
+        decisions(2u * TURN_TICKS + wait);
+        level[1] = 0;
+        for (unsigned n = 0; n < 3u * TURN_TICKS; n++) {
+            (void)decide();
+            TEST_ASSERT_BITS_LOW(DRIVE_POLICY_LIMIT_UNDRIVEN, drive_policy_limits(&policy, 0));
+        }
+    }
+}
+
+static void spring_released_from_the_other_policy_is_none_either(void)
+{
+    parameters.policy = DRIVE_POLICY_OPEN;
     begin_cold(3, 3);
     believe(1, 95, true);
     level[0] = level[1] = 1000;
     decisions(2u * TURN_TICKS);
     level[1] = 0;
+    parameters.policy = DRIVE_POLICY_PRECOMPENSATE;
+    TEST_ASSERT_TRUE(drive_policy_apply(&policy, &parameters, &model, NULL));
     decisions(3u * TURN_TICKS);
     TEST_ASSERT_BITS_LOW(DRIVE_POLICY_LIMIT_UNDRIVEN, drive_policy_limits(&policy, 0));
 }
@@ -353,6 +398,8 @@ int main(void)
     UNITY_BEGIN();
     RUN_TEST(after_power_on_it_waits_says_so_and_then_holds_all_nine);
     RUN_TEST(held_spring_stays_on_near_martensite_start);
+    RUN_TEST(jump_of_the_current_forgets_no_phase);
+    RUN_TEST(spring_that_had_to_wait_half_transformed_goes_on_to_the_end);
     RUN_TEST(spring_that_has_lost_its_phase_is_heated_back);
     RUN_TEST(resistance_without_a_change_is_driven_by_the_model_and_said);
     RUN_TEST(level_is_held);
@@ -364,6 +411,7 @@ int main(void)
     RUN_TEST(own_temperature_derates_linearly_then_trips);
     RUN_TEST(undriven_spring_derates_its_neighbours_only);
     RUN_TEST(spring_just_released_is_no_false_actuation);
+    RUN_TEST(spring_released_from_the_other_policy_is_none_either);
     RUN_TEST(overload_takes_the_excess_away_in_time);
     RUN_TEST(budget_holds_in_every_tick_whatever_is_asked);
     RUN_TEST(policy_switch_never_jumps);
