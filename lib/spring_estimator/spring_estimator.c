@@ -199,38 +199,57 @@ void spring_estimator_disturb(spring_belief_t *b)
     b->ohm_before[1] = 0.0f;
 }
 
-/* No phase changes so fast: it is a contact or the sensor, and all that it is compared with jumps
- * along. */
+/* All that readings are compared with jumps along. */
 static void jump(spring_belief_t *b, float by)
 {
-    b->slow_ohm *= by;
     b->line_ohm *= by;
     b->mark_ohm *= by;
     b->onset_ohm *= by;
     b->cold_ohm *= by;
-    b->ohm_before[0] *= by;
     b->learnt.austenite_ohm *= by;
     b->learnt.martensite_ohm *= by;
+    b->slow_ohm = b->line_ohm > 0.0f ? b->line_ohm : b->slow_ohm * by;
+    b->ohm_before[0] = b->ohm_before[1] = 0.0f;
+}
+
+/* No phase changes so fast: it is a contact or the sensor. A turn in which it may have jumped half
+ * way is left out. */
+static bool leave_out(spring_belief_t *b, float ohm, float current_a)
+{
+    const bool holds = b->line_ohm > 0.0f;
+    const float was_ohm = holds ? b->slow_ohm : b->ohm_before[0];
+    const bool near = fminf(current_a, b->current_a) > fmaxf(STRONG_A, 0.5f * current_a);
+    const float step = near && b->fresh != 0 && was_ohm > 0.0f ? ohm - was_ohm : 0.0f;
+    const bool by_load = !holds || step * b->learnt.change < 0.0f;
+    const float most = (by_load ? JUMP_OF_LOAD : JUMP_LEAST) + JUMP_SDS * b->noise;
+    const bool jumps = fabsf(step) > most * was_ohm;
+    if (jumps && b->odd) {
+        jump(b, ohm / was_ohm);
+    }
+    b->odd = jumps && !b->odd;
+    return b->odd;
 }
 
 /* Second differences of turns at the same current: neither a level nor a slope shows in them. */
 static void take_noise(spring_belief_t *b, float ohm, float current_a)
 {
     const bool same = fabsf(current_a - b->current_a) < NOISE_SAME * current_a;
-    const bool near = fminf(current_a, b->current_a) > fmaxf(STRONG_A, 0.5f * current_a);
-    const float step = near && b->ohm_before[0] > 0.0f ? ohm / b->ohm_before[0] : 1.0f;
-    const bool by_load =
-        b->possible != SPRING_PHASE_AUSTENITE || (step - 1.0f) * b->learnt.change < 0.0f;
-    if (fabsf(step - 1.0f) > (by_load ? JUMP_OF_LOAD : JUMP_LEAST) + JUMP_SDS * b->noise) {
-        jump(b, step);
-        b->ohm_before[1] = 0.0f;
-    }
     if (same && b->ohm_before[1] > 0.0f) {
         const float bend = fabsf(ohm - 2.0f * b->ohm_before[0] + b->ohm_before[1]) / ohm;
         b->noise += (fminf(BEND_TO_SD * bend, NOISE_MOST) - b->noise) * NOISE_SHARE;
     }
     b->ohm_before[1] = same ? b->ohm_before[0] : 0.0f;
     b->ohm_before[0] = ohm;
+}
+
+static void take_reading(spring_belief_t *b, float ohm, float current_a)
+{
+    take_noise(b, ohm, current_a);
+    b->slow_ohm = b->fresh == 0 ? ohm : b->slow_ohm + (ohm - b->slow_ohm) * SLOW_SHARE;
+    b->current_a = current_a;
+    b->ohm = ohm;
+    b->phase_ohm = current_a > STRONG_A || b->fresh == 0 ? ohm : b->phase_ohm;
+    b->fresh = b->fresh < UINT8_MAX ? (uint8_t)(b->fresh + 1) : UINT8_MAX;
 }
 
 static void take_readings(spring_belief_t *b)
@@ -241,12 +260,9 @@ static void take_readings(spring_belief_t *b)
         const float offset_mv = 1e3f * b->offset_v * (float)b->readings;
         const float ohm = ((float)b->voltage_sum_mv - offset_mv) / (float)b->current_sum_ma;
         const float current_a = (float)b->current_sum_ma * 1e-3f / (float)b->readings;
-        take_noise(b, ohm, current_a);
-        b->slow_ohm = b->fresh == 0 ? ohm : b->slow_ohm + (ohm - b->slow_ohm) * SLOW_SHARE;
-        b->current_a = current_a;
-        b->ohm = ohm;
-        b->phase_ohm = current_a > STRONG_A || b->fresh == 0 ? ohm : b->phase_ohm;
-        b->fresh = b->fresh < UINT8_MAX ? (uint8_t)(b->fresh + 1) : UINT8_MAX;
+        if (!leave_out(b, ohm, current_a)) {
+            take_reading(b, ohm, current_a);
+        }
     } else if (b->current_sum_ma < LEAST_MEAN_MA && !b->cut_short) {
         b->fresh = 0; /* no current, or no sensor */
     }

@@ -93,8 +93,9 @@ static void hold_back(const spring_estimator_t *e, const spring_belief_t *b, the
     if (!shows || thermal_model_temperature_c7(model, k) <= limit_c7) {
         return;
     }
+    /* what does not show takes no latent heat */
     const float latent_k =
-        martensite ? 0.0f : b->begun_missing * e->latent_heat_j / e->heat_capacity_j_per_k;
+        b->onset ? b->begun_missing * e->latent_heat_j / e->heat_capacity_j_per_k : 0.0f;
     const float limit_c = spring_c(limit_c7);
     /* where some austenite is left for certain, its transformation is where it was */
     const float shift_k = (b->possible & SPRING_PHASE_AUSTENITE) != 0 ? 0.0f : SHIFT_BOUND_K;

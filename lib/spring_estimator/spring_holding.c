@@ -136,11 +136,17 @@ void spring_holding_watch(const spring_estimator_t *e, spring_belief_t *b, therm
     }
     const float left = b->slow_ohm / kept_ohm - 1.0f;
     const float as_learnt = b->learnt.change < 0.0f ? left : -left;
-    const float changed = as_learnt > 0.0f ? as_learnt : -as_learnt * (1.0f / OTHER_WAY);
+    const float sd_k = spring_estimator_sd_k(b);
+    /* the other way is an intermediate phase, which comes where it may be cold enough; else it is
+     * the last of the austenite that comes */
+    const bool cold = now_c - SPRING_ESTIMATOR_BOUND_SDS * sd_k < lost_at_c(model, k, 0.0f);
+    const float changed = as_learnt > 0.0f ? as_learnt
+                          : cold           ? -as_learnt * (1.0f / OTHER_WAY)
+                                           : 0.0f;
     /* as its temperature may have moved unseen, so may the resistance */
-    const float moves = fabsf(b->learnt.martensite_rise_per_k) * spring_estimator_sd_k(b);
-    const float sure =
-        fmaxf(fmaxf(LOSS_LEAST, moves), SURE_SDS * NOISE_IN_SLOW * b->noise) + may_move(b, now_c);
+    const float moves = fabsf(b->learnt.martensite_rise_per_k) * sd_k;
+    const float noise = b->rough ? b->noise : NOISE_IN_SLOW * b->noise;
+    const float sure = fmaxf(fmaxf(LOSS_LEAST, moves), SURE_SDS * noise) + may_move(b, now_c);
     if (changed < SUSPECTED * sure) {
         b->losing = 0;
         if (b->quiet >= QUIET_TURNS) {
