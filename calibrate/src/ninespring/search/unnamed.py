@@ -294,6 +294,19 @@ def _windows(
     return out
 
 
+def _starts(problem: Problem) -> list[np.ndarray]:
+    """Return what errors of the first readings do, as columns (count, springs)."""
+    out, begin = [], 0
+    for mask, response in zip(problem.mask, problem.start_response, strict=True):
+        end = begin + int(mask.sum())
+        if response is not None:
+            column = np.zeros((problem.count, response.shape[1]))
+            column[begin:end] = response
+            out.append(column)
+        begin = end
+    return out
+
+
 def find(problem: Problem, fit: Fit, kinds: Sequence[Cause], already: Sequence[Hidden]) -> list[Hidden]:
     """Return the unnamed causes that a fit's residual calls for, beside those that are taken out already.
 
@@ -301,7 +314,7 @@ def find(problem: Problem, fit: Fit, kinds: Sequence[Cause], already: Sequence[H
     """
     jac = fit.jacobian if fit.jacobian is not None else np.zeros((problem.count, 0))
     used = jac[:, np.linalg.norm(jac, axis=0) > 1e-6]
-    taken = [used, *([] if problem.unnamed is None else [problem.unnamed])]
+    taken = [used, *_starts(problem), *([] if problem.unnamed is None else [problem.unnamed])]
     basis = np.linalg.qr(_thinned(problem, np.column_stack(taken)))[0]
     left = _thinned(problem, np.concatenate(problem.scaled(problem.without_starts(fit.residual)))[:, None])[:, 0]
     left = left - basis @ (basis.T @ left)
@@ -368,7 +381,7 @@ def weighed(problem: Problem, fit: Fit, hidden: Sequence[Hidden]) -> list[tuple[
     out = []
     for k, one in enumerate(hidden):
         nats = 0.5 * float(size[k] ** 2 / inverse[k, k]) / spread
-        error = math.sqrt(float(inverse[k, k]) * spread) / scale[k]
+        error = math.sqrt(float(inverse[k, k] * spread)) / float(scale[k])
         out.append((replace(one, size=float(size[k] / scale[k]), error=error), nats))
     return out
 
@@ -394,6 +407,10 @@ def search_beside(
         grown = find(problem, final, kinds, hidden)
         if len(grown) == len(hidden):
             break
+        problem.leave_out(np.column_stack([one.column for one in grown]))
+        # what they add depends on the numbers, which they spoilt until now
+        nearer = problem.fit(final.spec, final.as_dict(), tolerance=1e-3, max_steps=14)
+        grown = [one.around(problem, nearer) for one in grown]
         taken_out = np.column_stack([one.column for one in grown])
         problem.leave_out(taken_out)
         base = problem.fit(first.base.spec, first.base.as_dict(), errors=True)
@@ -401,7 +418,8 @@ def search_beside(
         result = search.run()
         final = result[0]
         # what stood in for an effect that is named by now goes again
-        judged = weighed(problem, final, grown)
+        judged = weighed(problem, final, [one.around(problem, final) for one in grown])
+        problem.leave_out(taken_out)
         hidden = [one for one, nats in judged if nats > LEAST_NATS]
         out = (search, result, hidden)
         if len(hidden) == len(grown) and not unexplained(problem, final):
