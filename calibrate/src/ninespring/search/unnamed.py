@@ -344,6 +344,20 @@ def _starts(problem: Problem) -> list[np.ndarray]:
     return out
 
 
+def _gram(columns: np.ndarray, basis: np.ndarray) -> np.ndarray:
+    """Return the products of columns with one another, a basis projected out."""
+    inside = basis.T @ columns
+    return (columns.T @ columns - inside.T @ inside).astype(float)
+
+
+def _least_squares(gram: np.ndarray, moment: np.ndarray) -> tuple[np.ndarray, int]:
+    """Return the least squares of these products, and how many numbers the data fix."""
+    scale = np.sqrt(np.maximum(np.diag(gram), 1e-12))
+    value, vector = np.linalg.eigh(gram / np.outer(scale, scale))
+    used = value > 1e-4
+    return vector[:, used] @ ((vector[:, used].T @ (moment / scale)) / value[used]) / scale, int(used.sum())
+
+
 def find(problem: Problem, fit: Fit, kinds: Sequence[Cause], already: Sequence[Hidden]) -> list[Hidden]:
     """Return the unnamed causes that a fit's residual calls for, beside those that are taken out already.
 
@@ -364,10 +378,7 @@ def find(problem: Problem, fit: Fit, kinds: Sequence[Cause], already: Sequence[H
     matrix = np.column_stack([one.columns[:, 0] for one in single])
     whole = (matrix**2).sum(axis=0)
     power = whole - ((basis.T @ matrix) ** 2).sum(axis=0)
-    grams = []
-    for one in windows:
-        inside = basis.T @ one.columns
-        grams.append(one.columns.T @ one.columns - inside.T @ inside)
+    grams, often_grams = ([_gram(one.columns, basis) for one in some] for some in (windows, often))
     tried = len(single) + sum(one.columns.shape[1] ** 2 / 2 for one in windows)
     while len(found) < MOST:
         gain = np.where(power > 1e-3 * whole, (matrix.T @ left) ** 2 / np.maximum(power, 1e-12), 0.0)
@@ -386,12 +397,12 @@ def find(problem: Problem, fit: Fit, kinds: Sequence[Cause], already: Sequence[H
 
         nats, vectors = nats_of(drop, 1), vector[:, None]
         # the half that one window leaves may be many more like it
-        for one in often if drop < 0.5 * (rest - len(left)) else ():
-            block = one.columns - basis @ (basis.T @ one.columns)
-            inside = np.linalg.qr(block[:, np.linalg.norm(block, axis=0) > 1e-3])[0]
-            explained = float(np.sum((inside.T @ left) ** 2))
-            if (more := nats_of(explained, inside.shape[1])) > nats:
-                nats, drop, vectors, best, span = more, explained, inside, one, (0, None)
+        for one, gram in zip(often, often_grams, strict=True) if drop < 0.5 * (rest - len(left)) else ():
+            moment = one.columns.T @ left
+            size, numbers = _least_squares(gram, moment)
+            explained = float(size @ moment)
+            if (more := nats_of(explained, numbers)) > nats:
+                nats, drop, vectors, best, span = more, explained, one.columns, one, (0, None)
         if nats < LEAST_NATS or drop < SHARE * max(0.0, rest - len(left)):
             break
         text = best.text
@@ -400,11 +411,12 @@ def find(problem: Problem, fit: Fit, kinds: Sequence[Cause], already: Sequence[H
             when = [float(run.time_s[min(row, len(run.time_s) - 1)] - run.time_s[0]) for row in span]
             text = text.format(f"{when[0]:.0f} to {when[1]:.0f} s")
         found.append(Hidden(best, text, span, column_of(problem, fit, best, typical, *span)))
-        units = np.linalg.qr(vectors - basis @ (basis.T @ vectors))[0]
+        vectors = vectors - basis @ (basis.T @ vectors)
+        units = np.linalg.qr(vectors[:, np.linalg.norm(vectors, axis=0) > 1e-3])[0]
         left = left - units @ (units.T @ left)
         basis = np.column_stack([basis, units])
         power = power - ((units.T @ matrix) ** 2).sum(axis=0)
-        for one, gram in zip(windows, grams, strict=True):
+        for one, gram in zip([*windows, *often], [*grams, *often_grams], strict=True):
             inside = units.T @ one.columns
             gram -= inside.T @ inside
     return found
