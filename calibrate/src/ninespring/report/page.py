@@ -8,7 +8,7 @@ from typing import Any
 
 from .. import effects, native
 from ..search import search
-from ..verdict import steady
+from ..verdict import board_alone, steady
 from ..verdict.diagnosis import Diagnosis
 from . import figures
 
@@ -264,6 +264,22 @@ def steady_report(result: dict[str, Any]) -> str:
             "<h2>What these numbers cannot tell apart</h2>"
             + _table(["best", "could also be", "error, K", "the experiment that would tell"], rows, {2})
         )
+    parts.append(f"<p><small>{_e(result['tool'])}. {_e(result['residual']['note'])}.</small></p>")
+    return _page(parts)
+
+
+def board_report(result: dict[str, Any]) -> str:
+    """Return the report of a diagnosis without thermometers as HTML."""
+    said = "".join(
+        f"<li><b>{_e(one['certainty'])}, {100 * one['probability']:.0f} %</b>{_e(one['text'])}</li>"
+        for one in result["effects"]
+    )
+    parts = ["<h1>A board without thermometers</h1>", f'<p class="lead">{_e(board_alone.verdict(result))}</p>']
+    if said:
+        parts.append(f'<ul class="said">{said}</ul>')
+    parts.append('<h2>About the data</h2><div class="warn">' + "<br>".join(map(_e, result["warnings"])) + "</div>")
+    parts.append("<h2>The array's numbers</h2>" + _parameters(result["after"]["parameters"]))
+    parts += [f"<h2>{_e(one['name'])}</h2>{_parameters(one['parameters'])}" for one in result["effects"]]
     parts.append(f"<p><small>{_e(result['tool'])}. {_e(result['residual']['note'])}.</small></p>")
     return _page(parts)
 
