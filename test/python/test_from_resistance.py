@@ -17,7 +17,9 @@ from ninespring.models import read_model
 TRUE = {"heat_capacity_j_per_k": 0.34, "loss_w_per_k": 0.0052, "orthogonal_w_per_k": 0.0007, "latent_heat_j": 7.5}
 
 
-def board_log(path: Path, strongest_a: float = 2.1, **more: np.ndarray | None) -> Path:
+def board_log(
+    path: Path, strongest_a: float = 2.1, effects: dict[str, dict[str, float]] | None = None, **more: np.ndarray | None
+) -> Path:
     """Write what a board logs of an array that is not as declared, springs in turn and together; no temperature."""
     rng = np.random.default_rng(4)
     rows = 900
@@ -26,8 +28,10 @@ def board_log(path: Path, strongest_a: float = 2.1, **more: np.ndarray | None) -
         for at in range(10 + 11 * k, rows, 150):
             current[at : at + 70, k] = strongest_a * rng.uniform(0.75, 1.0)
     plant = native.Plant(3, 3)
-    plant.set_effects(["latent_heat", "resistance_phase"])
+    plant.set_effects(["latent_heat", "resistance_phase", *(effects or {})])
     plant.set_all(TRUE)
+    for numbers in (effects or {}).values():
+        plant.set_all(numbers)
     plant.reset()
     ohm = np.empty((rows, 9))
     for row in range(rows):
@@ -79,3 +83,16 @@ def test_a_log_that_cannot_tell_is_refused_with_what_it_lacks(tmp_path: Path, ch
 def test_logs_with_and_without_temperatures_are_not_mixed(tmp_path: Path, make_log) -> None:
     with pytest.raises(InputError, match="give one kind at a time"):
         fit(board_log(tmp_path / "board.csv"), make_log(), "-o", tmp_path / "m.toml")
+
+
+def test_a_board_alone_is_diagnosed_with_its_effect_and_no_degrees(tmp_path: Path) -> None:
+    log = board_log(tmp_path / "board.csv", effects={"edge_loss": {"edge_loss_fraction": 0.25}})
+    done = CliRunner().invoke(cli, ["diagnose", str(log), "-o", str(tmp_path / "out")], catch_exceptions=False)
+    assert done.exit_code == 0, done.output
+    result = json.loads((tmp_path / "out" / "diagnosis.json").read_text())
+    assert [one["name"] for one in result["effects"]] == ["edge_loss"]
+    fraction = result["effects"][0]["parameters"]["edge_loss_fraction"]
+    assert abs(fraction["value"] - 0.25) < 4.0 * fraction["stderr"]
+    assert result["after"]["rmse_c"] is None and result["after"]["rmse_ohm"] < 0.5 * result["baseline"]["rmse_ohm"]
+    assert "edge_loss" in read_model(tmp_path / "out" / "model.toml").effects
+    assert "only a thermometer can say" in (tmp_path / "out" / "report.html").read_text()

@@ -8,7 +8,7 @@ from typing import Any
 
 from .. import effects, native
 from ..search import search
-from ..verdict import steady
+from ..verdict import board_alone, steady
 from ..verdict.diagnosis import Diagnosis
 from . import figures
 
@@ -82,6 +82,8 @@ def findings(result: dict[str, Any]) -> list[tuple[str, str]]:
     for one in result["effects"]:
         sure = f"{one['certainty']}, {100 * one['probability']:.0f} %" if "probability" in one else ""
         out.append((f"{one['name']}: {sure}" if sure else one["name"], one.get("text", one["in_words"])))
+    for one in result.get("unnamed", []):
+        out.append(("a cause without a name", one["text"][0].upper() + one["text"][1:] + "."))
     for event in result.get("unknown_heat", {}).get("events", []):
         kind = "a thermometer that jumped" if event["kind"] == "sensor" else "heat of unknown origin"
         sure = f" (+-{event['stderr']:.2g} {event['unit']})"
@@ -264,6 +266,22 @@ def steady_report(result: dict[str, Any]) -> str:
             "<h2>What these numbers cannot tell apart</h2>"
             + _table(["best", "could also be", "error, K", "the experiment that would tell"], rows, {2})
         )
+    parts.append(f"<p><small>{_e(result['tool'])}. {_e(result['residual']['note'])}.</small></p>")
+    return _page(parts)
+
+
+def board_report(result: dict[str, Any]) -> str:
+    """Return the report of a diagnosis without thermometers as HTML."""
+    said = "".join(
+        f"<li><b>{_e(one['certainty'])}, {100 * one['probability']:.0f} %</b>{_e(one['text'])}</li>"
+        for one in result["effects"]
+    )
+    parts = ["<h1>A board without thermometers</h1>", f'<p class="lead">{_e(board_alone.verdict(result))}</p>']
+    if said:
+        parts.append(f'<ul class="said">{said}</ul>')
+    parts.append('<h2>About the data</h2><div class="warn">' + "<br>".join(map(_e, result["warnings"])) + "</div>")
+    parts.append("<h2>The array's numbers</h2>" + _parameters(result["after"]["parameters"]))
+    parts += [f"<h2>{_e(one['name'])}</h2>{_parameters(one['parameters'])}" for one in result["effects"]]
     parts.append(f"<p><small>{_e(result['tool'])}. {_e(result['residual']['note'])}.</small></p>")
     return _page(parts)
 

@@ -26,6 +26,8 @@ from ..logs.run import Run
 from .evidence import fit_factor, unexplained
 from .search import Search
 
+COARSER = 2
+"""Of those times, as many as one where something comes and goes all the time."""
 GRID_S = 15.0
 """Times at which something may begin or end."""
 STEPS = 600
@@ -71,6 +73,9 @@ class Cause:
     columns: np.ndarray
     edges: tuple[int, ...] = ()
     """Where given, the columns begin at one of these rows each and stay, the last is the end: a window is one less another."""
+
+    spans: tuple[tuple[int, int, int], ...] = ()
+    """Where given, each column acts in one run between two rows only, all of them together: it comes and goes."""
 
     @property
     def shown(self) -> bool:
@@ -127,7 +132,11 @@ def _thinned(problem: Problem, columns: np.ndarray) -> np.ndarray:
 def column_of(
     problem: Problem, fit: Fit, cause: Cause, typical_w: float, begin: int = 0, end: int | None = None
 ) -> np.ndarray:
-    """Return what a unit of a cause, from one row to another, adds to the readings of all runs, (count,)."""
+    """Return what a unit of a cause, from one row to another, adds to the readings of all runs, (count, numbers)."""
+    if cause.spans:
+        alone = [replace(cause, spans=(), profiles=_of_run(cause.profiles, r)) for r in range(len(problem.runs))]
+        parts = [column_of(problem, fit, alone[r], typical_w, first, last) for r, first, last in cause.spans]
+        return np.column_stack(parts)
     fields = []
     for r, (run, profile) in enumerate(zip(problem.runs, cause.profiles, strict=True)):
         if profile is None:
@@ -136,7 +145,11 @@ def column_of(
         within = np.zeros_like(profile)
         within[begin:end] = profile[begin:end]
         fields.append(within if cause.shown else answers(problem, fit, r, [within], typical_w)[0])
-    return np.concatenate(problem.scaled(fields))
+    return np.concatenate(problem.scaled(fields))[:, None]
+
+
+def _of_run(profiles: Sequence[np.ndarray | None], r: int) -> tuple[np.ndarray | None, ...]:
+    return tuple(one if k == r else None for k, one in enumerate(profiles))
 
 
 def typical_power(problem: Problem, fit: Fit) -> float:
@@ -175,7 +188,31 @@ def library(problem: Problem, fit: Fit) -> list[Cause]:
             columns.setdefault(key, nothing)[r] = thin(scaled[:, :, None])
         windows += _windows(problem, fit, r, samples, power, lost, loss_w_per_k, typical)
     everywhere = [Cause(*key, tuple(profiles[key]), np.concatenate(parts)) for key, parts in columns.items()]
-    return everywhere + windows
+    return everywhere + windows + _often(windows)
+
+
+def _often(windows: Sequence[Cause]) -> list[Cause]:
+    """Return what comes and goes all the time: the windows of one kind and place in all runs, COARSER edges as one."""
+    together: dict[tuple[str, str], list[Cause]] = {}
+    for one in windows:
+        if not one.shown:
+            together.setdefault((one.kind, one.text.partition(", {}")[0]), []).append(one)
+    out = []
+    for (kind, text), parts in together.items():
+        spans, columns = [], []
+        for one in parts:
+            run = next(r for r, profile in enumerate(one.profiles) if profile is not None)
+            for first in range(0, len(one.edges) - 1, COARSER):
+                last = min(first + COARSER, len(one.edges) - 1)
+                spans.append((run, one.edges[first], one.edges[last]))
+                until = one.columns[:, last] if last < one.columns.shape[1] else 0.0
+                columns.append(one.columns[:, first] - until)
+        merged = [
+            next((p.profiles[r] for p in parts if p.profiles[r] is not None), None)
+            for r in range(len(parts[0].profiles))
+        ]
+        out.append(Cause(kind, f"{text} again and again", tuple(merged), np.column_stack(columns), spans=tuple(spans)))
+    return out
 
 
 def _only(k: int, values: np.ndarray, springs: int) -> np.ndarray:
@@ -294,6 +331,33 @@ def _windows(
     return out
 
 
+def _starts(problem: Problem) -> list[np.ndarray]:
+    """Return what errors of the first readings do, as columns (count, springs)."""
+    out, begin = [], 0
+    for mask, response in zip(problem.mask, problem.start_response, strict=True):
+        end = begin + int(mask.sum())
+        if response is not None:
+            column = np.zeros((problem.count, response.shape[1]))
+            column[begin:end] = response
+            out.append(column)
+        begin = end
+    return out
+
+
+def _gram(columns: np.ndarray, basis: np.ndarray) -> np.ndarray:
+    """Return the products of columns with one another, a basis projected out."""
+    inside = basis.T @ columns
+    return (columns.T @ columns - inside.T @ inside).astype(float)
+
+
+def _least_squares(gram: np.ndarray, moment: np.ndarray) -> tuple[np.ndarray, int]:
+    """Return the least squares of these products, and how many numbers the data fix."""
+    scale = np.sqrt(np.maximum(np.diag(gram), 1e-12))
+    value, vector = np.linalg.eigh(gram / np.outer(scale, scale))
+    used = value > 1e-4
+    return vector[:, used] @ ((vector[:, used].T @ (moment / scale)) / value[used]) / scale, int(used.sum())
+
+
 def find(problem: Problem, fit: Fit, kinds: Sequence[Cause], already: Sequence[Hidden]) -> list[Hidden]:
     """Return the unnamed causes that a fit's residual calls for, beside those that are taken out already.
 
@@ -301,22 +365,20 @@ def find(problem: Problem, fit: Fit, kinds: Sequence[Cause], already: Sequence[H
     """
     jac = fit.jacobian if fit.jacobian is not None else np.zeros((problem.count, 0))
     used = jac[:, np.linalg.norm(jac, axis=0) > 1e-6]
-    taken = [used, *([] if problem.unnamed is None else [problem.unnamed])]
+    taken = [used, *_starts(problem), *([] if problem.unnamed is None else [problem.unnamed])]
     basis = np.linalg.qr(_thinned(problem, np.column_stack(taken)))[0]
     left = _thinned(problem, np.concatenate(problem.scaled(problem.without_starts(fit.residual)))[:, None])[:, 0]
     left = left - basis @ (basis.T @ left)
     typical = typical_power(problem, fit)
     found = list(already)
     samples = problem.count / fit_factor(problem, fit)
-    single = [one for one in kinds if not one.edges]
+    single = [one for one in kinds if not one.edges and not one.spans]
+    often = [one for one in kinds if one.spans]
     windows = [one for one in kinds if one.edges]
     matrix = np.column_stack([one.columns[:, 0] for one in single])
     whole = (matrix**2).sum(axis=0)
     power = whole - ((basis.T @ matrix) ** 2).sum(axis=0)
-    grams = []
-    for one in windows:
-        inside = basis.T @ one.columns
-        grams.append(one.columns.T @ one.columns - inside.T @ inside)
+    grams, often_grams = ([_gram(one.columns, basis) for one in some] for some in (windows, often))
     tried = len(single) + sum(one.columns.shape[1] ** 2 / 2 for one in windows)
     while len(found) < MOST:
         gain = np.where(power > 1e-3 * whole, (matrix.T @ left) ** 2 / np.maximum(power, 1e-12), 0.0)
@@ -328,8 +390,19 @@ def find(problem: Problem, fit: Fit, kinds: Sequence[Cause], already: Sequence[H
                 vector = one.columns[:, a] - (0.0 if b == len(gram) else one.columns[:, b])
                 drop, best, span = value, one, (one.edges[a], one.edges[b])
         rest = float(left @ left)
-        price = math.log(tried) + 0.5 * math.log(max(2.0, samples))
-        nats = 0.5 * samples * math.log(rest / max(1e-9, rest - drop)) - price
+
+        def nats_of(explained: float, numbers: int) -> float:
+            price = math.log(tried) + 0.5 * numbers * math.log(max(2.0, samples))
+            return 0.5 * samples * math.log(rest / max(1e-9, rest - explained)) - price  # noqa: B023 - of this turn
+
+        nats, vectors = nats_of(drop, 1), vector[:, None]
+        # the half that one window leaves may be many more like it
+        for one, gram in zip(often, often_grams, strict=True) if drop < 0.5 * (rest - len(left)) else ():
+            moment = one.columns.T @ left
+            size, numbers = _least_squares(gram, moment)
+            explained = float(size @ moment)
+            if (more := nats_of(explained, numbers)) > nats:
+                nats, drop, vectors, best, span = more, explained, one.columns, one, (0, None)
         if nats < LEAST_NATS or drop < SHARE * max(0.0, rest - len(left)):
             break
         text = best.text
@@ -338,14 +411,14 @@ def find(problem: Problem, fit: Fit, kinds: Sequence[Cause], already: Sequence[H
             when = [float(run.time_s[min(row, len(run.time_s) - 1)] - run.time_s[0]) for row in span]
             text = text.format(f"{when[0]:.0f} to {when[1]:.0f} s")
         found.append(Hidden(best, text, span, column_of(problem, fit, best, typical, *span)))
-        unit = vector - basis @ (basis.T @ vector)
-        unit = unit / np.linalg.norm(unit)
-        left = left - unit * (unit @ left)
-        basis = np.column_stack([basis, unit])
-        power = power - (unit @ matrix) ** 2
-        for one, gram in zip(windows, grams, strict=True):
-            inside = unit @ one.columns
-            gram -= np.outer(inside, inside)
+        vectors = vectors - basis @ (basis.T @ vectors)
+        units = np.linalg.qr(vectors[:, np.linalg.norm(vectors, axis=0) > 1e-3])[0]
+        left = left - units @ (units.T @ left)
+        basis = np.column_stack([basis, units])
+        power = power - ((units.T @ matrix) ** 2).sum(axis=0)
+        for one, gram in zip([*windows, *often], [*grams, *often_grams], strict=True):
+            inside = units.T @ one.columns
+            gram -= inside.T @ inside
     return found
 
 
@@ -366,10 +439,20 @@ def weighed(problem: Problem, fit: Fit, hidden: Sequence[Hidden]) -> list[tuple[
     factor = fit_factor(problem, problem.evaluate(fit))
     spread = factor * max(1.0, float(rest @ rest) / problem.count)
     out = []
-    for k, one in enumerate(hidden):
-        nats = 0.5 * float(size[k] ** 2 / inverse[k, k]) / spread
-        error = math.sqrt(float(inverse[k, k]) * spread) / scale[k]
-        out.append((replace(one, size=float(size[k] / scale[k]), error=error), nats))
+    begin = 0
+    for one in hidden:
+        own = slice(begin, begin + one.column.shape[1])
+        begin = own.stop
+        numbers = begin - own.start
+        drop = float(size[own] @ np.linalg.solve(inverse[own, own] + 1e-12 * np.eye(numbers), size[own]))
+        nats = 0.5 * drop / spread - 0.5 * (numbers - 1) * math.log(max(2.0, problem.count / factor))
+        errors = np.sqrt(np.maximum(np.diag(inverse[own, own]), 0.0) * spread) / scale[own]
+        value = (
+            float(size[own][0] / scale[own][0])
+            if numbers == 1
+            else float(np.sqrt(np.mean((size[own] / scale[own]) ** 2)))
+        )
+        out.append((replace(one, size=value, error=float(np.sqrt(np.mean(errors**2)))), nats))
     return out
 
 
@@ -394,6 +477,10 @@ def search_beside(
         grown = find(problem, final, kinds, hidden)
         if len(grown) == len(hidden):
             break
+        problem.leave_out(np.column_stack([one.column for one in grown]))
+        # what they add depends on the numbers, which they spoilt until now
+        nearer = problem.fit(final.spec, final.as_dict(), tolerance=1e-3, max_steps=14)
+        grown = [one.around(problem, nearer) for one in grown]
         taken_out = np.column_stack([one.column for one in grown])
         problem.leave_out(taken_out)
         base = problem.fit(first.base.spec, first.base.as_dict(), errors=True)
@@ -401,7 +488,8 @@ def search_beside(
         result = search.run()
         final = result[0]
         # what stood in for an effect that is named by now goes again
-        judged = weighed(problem, final, grown)
+        judged = weighed(problem, final, [one.around(problem, final) for one in grown])
+        problem.leave_out(taken_out)
         hidden = [one for one, nats in judged if nats > LEAST_NATS]
         out = (search, result, hidden)
         if len(hidden) == len(grown) and not unexplained(problem, final):

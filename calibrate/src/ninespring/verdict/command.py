@@ -47,26 +47,37 @@ def diagnose(
 ) -> None:
     """Find the effect that the model lacks: writes diagnosis.json, report.html, model.toml.
 
-    LOGS are logs of one array, or one steady table (docs/files.md). Errors are root mean squares in K; evidence is in
+    LOGS are logs of one array, or one steady table (docs/files.md). Logs of a board alone, currents and voltages without any
+    temperature, are diagnosed from v / i: degrees stay open. Errors are root mean squares in K; evidence is in
     nats, the logarithm of how many times likelier the data are with the effect.
     """
+    from ..fit import from_resistance
     from ..models import model_text, read_model
     from ..report import page as report
-    from . import diagnosis, steady
+    from . import board_alone, diagnosis, steady
     from .residual import surrogate as empirical
 
     check_folder(json_path)
     if frozen and not model_path:
         raise InputError("--frozen needs --model")
     model = read_model(model_path) if model_path else None
-    if any(steady.is_steady(path) for path in logs):
+    steady_table = any(steady.is_steady(path) for path in logs)
+    if steady_table:
         if len(logs) > 1:
             raise InputError("give one steady table, or logs")
         with working("fitting") as say:
             result = steady.diagnose_table(logs[0], model, array_path, frozen, say)
         page, made = report.steady_report(result), steady.model_after(result, model, array_path)
     else:
-        array, runs = array_and_runs(array_path, logs, model)
+        array, runs = array_and_runs(array_path, logs, model, or_resistance=True)
+        alone = from_resistance.has_none(runs)
+        if alone and (model_path or surrogate):
+            raise InputError("without a thermometer give logs and an array only: no --model, no --surrogate", logs[0])
+    if not steady_table and alone:
+        with working("fitting v / i") as say:
+            result, made = board_alone.diagnose(array, runs, say)
+        page = report.board_report(result)
+    elif not steady_table:
         with working("fitting") as say:
             found = diagnosis.diagnose(array, runs, model=model, frozen=frozen, progress=say)
             if surrogate:
@@ -92,6 +103,9 @@ def diagnose(
             out.print(f"note: {note}", style="yellow", markup=False)
     if "cases" in result:
         steady.print_result(out, result)
+    elif result["after"]["rmse_c"] is None:
+        for line in (board_alone.verdict(result), *(one["text"] for one in result["effects"])):
+            out.print(line, markup=False)
     else:
         _print_diagnosis(result, report.verdict(result))
     out.print(f"-> {output / 'report.html'}", soft_wrap=True)

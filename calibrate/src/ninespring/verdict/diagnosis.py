@@ -32,6 +32,8 @@ from .residual import depends_on
 from .result import DRIFT_LEFT_OUT, model_of, parameters_of
 
 SCHEMA = "ninespring.diagnosis/1"
+PINNED = 1e-5
+"""Spread, in a number's inner coordinate, that leaves it where it is."""
 
 
 @dataclass
@@ -81,6 +83,24 @@ def _finish(problem: Problem, fit: Fit) -> Fit:
         again = problem.fit(fit.spec, fit.as_dict(), tolerance=1e-6, errors=True)
         return again if again.chi2 <= fit.chi2 * (1 + 1e-6) else fit
     return fit
+
+
+def with_everything(problem: Problem, clean: Fit) -> Fit:
+    """Return a fit that was made beside what has no name, with that in the error: the effects' numbers stay, with their
+    errors, and the declared numbers take up what they can.
+    """
+    own = np.array([free.effect is None for free in clean.spec.free])
+    pinned = [
+        free if mine else replace(free, start=float(value), prior=PINNED)
+        for free, value, mine in zip(clean.spec.free, clean.values, own, strict=True)
+    ]
+    spec = replace(clean.spec, free=tuple(pinned))
+    fit = problem.fit(spec, clean.as_dict(), tolerance=1e-4, errors=True)
+    covariance = fit.covariance
+    if clean.covariance is not None and covariance is not None:
+        together = np.outer(own, own)
+        covariance = np.where(together, covariance, np.where(np.outer(~own, ~own), clean.covariance, 0.0))
+    return replace(fit, spec=clean.spec, covariance=covariance)
 
 
 def in_order(found: search.Search, base: Fit, final: Fit, adopted: Sequence[str]) -> list[tuple[str, Fit]]:
@@ -250,8 +270,8 @@ def _diagnose(
         # from here on everything is in the error again: a model is for an array in which what has no name still acts
         problem.leave_out(None)
         base = declared_alone
-        steps = [(e, problem.fit(fit.spec, fit.as_dict(), tolerance=1e-3, max_steps=14)) for e, fit in steps]
-        final = problem.fit(final.spec, final.as_dict(), tolerance=1e-4, errors=True)
+        steps = [(effect, with_everything(problem, fit)) for effect, fit in steps]
+        final = with_everything(problem, final)
     base_out, final_out = problem.holdout_rmse(base), problem.holdout_rmse(final)
 
     listed = []

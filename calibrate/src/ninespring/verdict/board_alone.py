@@ -1,0 +1,108 @@
+"""The diagnosis of logs without any temperature: what v / i says of the array, and what it cannot say."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from threadpoolctl import threadpool_limits
+
+from .. import __version__, effects
+from ..fit import from_resistance, statistics
+from ..logs.run import Run
+from ..models import Array, Model
+from ..search.certainty import CERTAIN
+from ..search.evidence import unexplained
+from .diagnosis import SCHEMA, validate
+from .residual import depends_on
+from .result import parameters_of
+
+LEFT = "structure well above the noise of v / i remains that no effect of the library explains"
+
+
+def diagnose(
+    array: Array, runs: Sequence[Run], progress: Callable[[str], None] = lambda text: None
+) -> tuple[dict[str, Any], Model]:
+    """Return the diagnosis, every error in degrees left open, and the model that comes of it."""
+    begun = time.monotonic()
+    with threadpool_limits(1):
+        problem, alone, first = from_resistance.fit(array, runs)
+        progress("effects that v / i shows")
+        found, witnesses = from_resistance.with_effects(problem, alone, progress)
+        left_over = unexplained(problem, found)
+        depends, note = depends_on(problem, found)
+    listed = []
+    for name, one in witnesses.items():
+        variant, parameters = dict(found.spec.variant).get(name, ""), parameters_of(problem, found, name)
+        probability = one.probability()
+        listed.append(
+            {
+                "name": name,
+                "rmse_c": None,
+                "holdout_rmse_c": None,
+                "evidence": float(one.nats),
+                "parameters": parameters,
+                "probability": probability,
+                "certainty": "certain" if probability >= CERTAIN else "probable",
+                "on_chip": name in effects.ON_CHIP,
+                "in_words": effects.IN_WORDS[name],
+                "text": effects.sentence(name, parameters, variant),
+                "seen_by": "v / i",
+                **({"variant": variant} if variant else {}),
+            }
+        )
+    listed.sort(key=lambda one: -one["evidence"])
+    no_degrees = {"rmse_c": None, "holdout_rmse_c": None}
+    result: dict[str, Any] = {
+        "schema": SCHEMA,
+        "tool": f"ninespring {__version__}",
+        "logs": [{"file": Path(r.name).name, "sha256": r.sha256, "rows": len(r.time_s)} for r in runs],
+        "baseline": {
+            **no_degrees,
+            "noise_c": None,
+            "rmse_ohm": 1e-3 * statistics.rms(first.residual),
+            "noise_ohm": 1e-3 * problem.noise_c,
+            "effects": list(alone.spec.effects),
+        },
+        "effects": listed,
+        "rivals": [],
+        "after": {
+            **no_degrees,
+            "rmse_ohm": 1e-3 * statistics.rms(found.residual),
+            "parameters": {
+                key: one for e in (None, *alone.spec.effects) for key, one in parameters_of(problem, found, e).items()
+            },
+        },
+        "unexplained": bool(left_over),
+        "residual": {
+            "autocorrelation_lag1": float(statistics.autocorrelation(found.residual, 1)[1]),
+            "depends_on": depends,
+            "note": f"{LEFT}. {note}".strip() if left_over else note or "white at the noise of v / i",
+        },
+        "identifiability": {
+            "not_identifiable": sorted(set(found.stuck)),
+            "at_bounds": found.at_bounds(),
+            "correlated": [{"a": a, "b": b, "correlation": r} for a, b, r in found.correlations()],
+        },
+        "warnings": [from_resistance.SCALE, *(f"{Path(run.name).name}: {text}" for run in runs for text in run.notes)],
+        "seconds": round(time.monotonic() - begun, 2),
+        "simulations": problem.simulations,
+    }
+    validate(result)
+    return result, from_resistance.model_of_fit(problem, found)
+
+
+def verdict(result: dict[str, Any]) -> str:
+    """Return the outcome in one sentence."""
+    before, after = result["baseline"], result["after"]
+    names = " and ".join(one["name"] for one in result["effects"])
+    error = (
+        f"v / i is met to {1e3 * after['rmse_ohm']:.2f} mohm ({1e3 * before['rmse_ohm']:.2f} as declared, "
+        f"noise {1e3 * before['noise_ohm']:.2f})"
+    )
+    more = " Something else is missing that no effect of the library explains." if result["unexplained"] else ""
+    return (
+        f"No thermometer: {error}. {f'Missing: {names}.' if names else 'No effect is missing that v / i shows.'}{more}"
+    )
