@@ -249,6 +249,17 @@ def mean(values: Iterable[float]) -> float:
     return sum(known) / len(known)
 
 
+def heatings(celsius: Iterable[float]) -> int:
+    """Return how often a spring was heated through its transformation: from a hold's temperatures to above austenite start."""
+    count, below = 0, True
+    for one in celsius:
+        if below and one > AUSTENITE_START_C + 2.0:
+            count, below = count + 1, False
+        elif one < (MARTENSITE_START_C + AUSTENITE_START_C) / 2.0:
+            below = True
+    return count
+
+
 def held(trace: Columns) -> dict[str, float]:
     """Return what the thermometers say of the driven springs while they are held, and what that costs."""
     first = next(k for k, t in enumerate(trace["time_s"]) if t - trace["time_s"][0] >= DRIVE_S - HELD_S)
@@ -257,7 +268,8 @@ def held(trace: Columns) -> dict[str, float]:
         mean(i * v for i, v in zip(trace[f"i{k}_a"][first:], trace[f"v{k}_v"][first:], strict=True)) for k in DRIVEN
     ]
     hottest = max(t for k in DRIVEN for t in trace[f"t{k}_c"] if not math.isnan(t))
-    return {"coldest": min(mean_c), "warmest": max(mean_c), "hottest": hottest, "watts": sum(power)}
+    again = sum(heatings(trace[f"t{k}_c"]) - 1 for k in DRIVEN)
+    return {"again": again, "coldest": min(mean_c), "warmest": max(mean_c), "hottest": hottest, "watts": sum(power)}
 
 
 def undeclared() -> str:
@@ -288,7 +300,7 @@ def undeclared() -> str:
             )
             axis.plot(seconds, trace[f"m{k}_c"], color=colour, linestyle="dotted")
         axis.set(title=f"{name}: off by {chip_error(trace):.2f} K rms", xlabel="time, s", ylim=(15, 115))
-    axes[0].set_ylabel("temperature, °C; dotted: what the chip believes")
+    axes[0].set_ylabel("°C; dotted: the chip's belief")
     axes[0].legend(loc="lower right")
     found = ", ".join(model["effects"])
     numbers = [
@@ -313,6 +325,7 @@ def undeclared() -> str:
             ("held springs: the coolest, mean", "coldest", 1, "°C"),
             ("held springs: the warmest, mean", "warmest", 1, "°C"),
             ("hottest that a driven spring came", "hottest", 1, "°C"),
+            ("springs that had lost their phase and were heated again", "again", 0, "times"),
             ("power of the eight while they are held", "watts", 2, "W"),
         )
     ]
@@ -322,7 +335,8 @@ twice. Neither the chip nor the calibration is told. The firmware runs in a simu
 <code>record</code> logs {PLAN_S // 60} minutes of <code>ninespring plan</code>, <code>diagnose</code> is given the log, <code>export</code> and
 <code>upload</code> put what it found on the chip. The effects in the model: <b>{html.escape(found)}</b>.</p>
 {table(["", "found", "+-"], numbers)}
-<p>Before and after, the same drive that no fit has seen: <code>policy precompensate</code>, eight springs on, the centre off.</p>
+<p>Before and after, the same drive that no fit has seen: <code>policy precompensate</code>, eight springs on, the centre off. A spring
+that is held below {MARTENSITE_START_C:.0f} °C, where martensite starts, loses its phase.</p>
 {table(["", *traces], rows)}
 {picture(figure, "temperatures of three springs, measured and believed by the chip, before and after")}
 <p>The whole <a href="diagnosis/report.html">report</a>; <a href="settings.txt">what was uploaded</a>.</p>"""
