@@ -111,7 +111,7 @@ public:
     }
 
 private:
-    static constexpr std::chrono::milliseconds LEFT_ALONE{1000};
+    static constexpr std::chrono::milliseconds LEFT_ALONE{10000};
     static constexpr std::chrono::microseconds LOOK_AGAIN{200};
     const board_pty_t *pty_;
     std::size_t unread_most_;

@@ -430,13 +430,15 @@ def test_upload_sends_settings_reads_them_back_and_saves(tmp_path: Path) -> None
     (tmp_path / "s.txt").write_text("# from model.toml\n$latent_heat_j=8.000\n$loss_w_per_k=0.005800\n")
     done = ninespring("upload", "--port", board.port, tmp_path / "s.txt", "--json", tmp_path / "u.json")
     assert done.returncode == 0, done.stderr
-    assert board.sent()[-4:] == ["$latent_heat_j=8.000", "$loss_w_per_k=0.005800", "$$", "$save"]
+    lines = ["learnt clear", "$latent_heat_j=8.000", "$loss_w_per_k=0.005800", "$$", "$save"]
+    assert board.sent()[-5:] == lines
     assert json.loads((tmp_path / "u.json").read_text())["settings"] == 2
 
 
 @pytest.mark.parametrize(
     ("answers", "said"),
     [
+        ({"learnt clear": ["error:12 a spring is on"]}, "a spring is on"),
         ({"$loss_w_per_k=9": ["error:4 out of range"]}, "error 4 out of range"),
         ({"$loss_w_per_k=9": ["[not active yet: x]", "ok"]}, "not active yet"),
         ({"$$": ["$loss_w_per_k=0.005800", "ok"]}, "loss_w_per_k is 0.005800, not 9"),

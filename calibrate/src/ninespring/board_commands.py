@@ -106,14 +106,15 @@ Example:
 def upload(settings: Path, port: str, save: bool, json_path: Path | None) -> None:
     """Send exported settings to a board, read them back, save them.
 
-    Nothing is saved unless the board took every line and shows every value in `$$`.
+    Nothing is saved unless the board took every line and shows every value in `$$`. What the board has learnt of its
+    springs it has learnt beside its old numbers, and forgets. All springs must be off.
     """
     from .board import Board, settings_lines, settings_that_differ
 
     check_folder(json_path)
     lines = settings_lines(read_bytes(settings).decode("utf-8", "replace"), str(settings))
     with working("sending", len(lines)) as say, Board(port, off_at_end=False) as board:
-        remarks: list[str] = []
+        remarks = board.ask("learnt clear", 10.0)
         for k, line in enumerate(lines):
             say(line, k)
             try:
