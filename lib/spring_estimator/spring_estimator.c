@@ -421,11 +421,12 @@ static float hottest_capacity_j_per_k(const spring_estimator_t *e, const spring_
 /* Of a spring of which nothing is known: the hottest that it can be, and whether that is
  * martensite. Its neighbours may be as hot. */
 static void cool(const spring_estimator_t *e, spring_belief_t *b, const thermal_model_t *model,
-                 uint8_t k)
+                 uint8_t k, float power_w)
 {
     const thermal_model_transformation_t t = thermal_model_transformation(model, k);
     const float above_k = b->hottest_c - spring_ambient_c(model);
-    b->hottest_c -= SPRING_ESTIMATOR_TURN_S * LEAST_LOSS * e->loss_w_per_k * above_k /
+    b->hottest_c += SPRING_ESTIMATOR_TURN_S *
+                    (power_w - LEAST_LOSS * e->loss_w_per_k * above_k) /
                     hottest_capacity_j_per_k(e, b, &t);
     if (b->hottest_c < spring_c(t.martensite_finish_c7)) {
         b->possible = SPRING_PHASE_MARTENSITE;
@@ -454,7 +455,7 @@ void spring_estimator_update(spring_estimator_t *e, thermal_model_t *model, uint
         b->quiet = 0;
     }
     if (b->possible == SPRING_PHASE_ANY) {
-        cool(e, b, model, k);
+        cool(e, b, model, k, power_w);
         return;
     }
     const int16_t now_c7 = thermal_model_temperature_c7(model, k);

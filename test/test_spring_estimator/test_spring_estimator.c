@@ -69,6 +69,18 @@ static void it_is_cold_only_after_the_time_that_physics_needs(void)
     }
 }
 
+/* As `policy open` may heat it at once. */
+static void what_is_heated_before_it_is_known_is_not_cold_by_the_time_alone(void)
+{
+    power_comes_on();
+    for (double s = 0.0; s < 200.0; s += TICK_S) {
+        (void)tick(1.9);
+    }
+    TEST_ASSERT_TRUE(truth.temperature_c > 78.0);
+    TEST_ASSERT_EQUAL_UINT8(SPRING_PHASE_ANY, BELIEF.possible);
+    TEST_ASSERT_TRUE((double)BELIEF.hottest_c > truth.temperature_c);
+}
+
 /* ---- a heating ---- */
 
 static void check_transformation_is_seen(double ratio, double rise_per_k)
@@ -434,6 +446,7 @@ int main(void)
     UNITY_BEGIN();
     RUN_TEST(at_power_on_everything_is_possible);
     RUN_TEST(it_is_cold_only_after_the_time_that_physics_needs);
+    RUN_TEST(what_is_heated_before_it_is_known_is_not_cold_by_the_time_alone);
     RUN_TEST(transformation_is_seen_whatever_its_sign_and_size);
     RUN_TEST(transformation_is_seen_through_noise);
     RUN_TEST(coefficient_alone_is_never_an_onset);
