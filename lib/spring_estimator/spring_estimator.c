@@ -218,11 +218,15 @@ static bool leave_out(spring_belief_t *b, float ohm, float current_a)
 {
     const bool holds = b->line_ohm > 0.0f;
     const float was_ohm = holds ? b->slow_ohm : b->ohm_before[0];
+    const float step = ohm - was_ohm;
+    if (fabsf(step) <= JUMP_LEAST * was_ohm || b->fresh == 0 || was_ohm <= 0.0f) {
+        b->odd = false;
+        return false;
+    }
     const bool near = fminf(current_a, b->current_a) > fmaxf(STRONG_A, 0.5f * current_a);
-    const float step = near && b->fresh != 0 && was_ohm > 0.0f ? ohm - was_ohm : 0.0f;
     const bool by_load = !holds || step * b->learnt.change < 0.0f;
     const float most = (by_load ? JUMP_OF_LOAD : JUMP_LEAST) + JUMP_SDS * b->noise;
-    const bool jumps = fabsf(step) > most * was_ohm;
+    const bool jumps = near && fabsf(step) > most * was_ohm;
     if (jumps && b->odd) {
         jump(b, ohm / was_ohm);
     }
@@ -404,6 +408,8 @@ static void look(spring_estimator_t *e, thermal_model_t *model, uint8_t k)
     b->seen = true;
     if (heating) {
         spring_estimator_begin_heating(e, model, k);
+        b->begun_c =
+            spring_ambient_c(model); /* a look may take another current's offset for phase */
     }
 }
 
@@ -425,8 +431,7 @@ static void cool(const spring_estimator_t *e, spring_belief_t *b, const thermal_
 {
     const thermal_model_transformation_t t = thermal_model_transformation(model, k);
     const float above_k = b->hottest_c - spring_ambient_c(model);
-    b->hottest_c += SPRING_ESTIMATOR_TURN_S *
-                    (power_w - LEAST_LOSS * e->loss_w_per_k * above_k) /
+    b->hottest_c += SPRING_ESTIMATOR_TURN_S * (power_w - LEAST_LOSS * e->loss_w_per_k * above_k) /
                     hottest_capacity_j_per_k(e, b, &t);
     if (b->hottest_c < spring_c(t.martensite_finish_c7)) {
         b->possible = SPRING_PHASE_MARTENSITE;
@@ -515,6 +520,9 @@ void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, 
 {
     spring_belief_t *b = &e->spring[k];
     const float now_c = spring_now_c(model, k);
+    const bool lacks =
+        full && b->possible != SPRING_PHASE_AUSTENITE && spring_lacks_phase(b, model, k);
+    const float phase = spring_estimator_phase(e, model, k);
     if (full && b->possible != SPRING_PHASE_AUSTENITE) {
         b->blind = b->blind || b->possible == SPRING_PHASE_MARTENSITE;
         b->possible = SPRING_PHASE_AUSTENITE;
@@ -522,12 +530,16 @@ void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, 
     } else if (!full && b->possible == SPRING_PHASE_AUSTENITE) {
         b->possible = SPRING_PHASE_BETWEEN | SPRING_PHASE_AUSTENITE;
     }
-    if (full && b->onset && b->reads && b->current_a > STRONG_A) {
+    /* its heating was ended, by a limit or as hot as it takes: once more, then what it reads tells
+     * nothing */
+    b->blind = b->blind || (lacks && b->doubted);
+    b->doubted = lacks && !b->blind;
+    if (full && !lacks && b->onset && b->reads && b->current_a > STRONG_A) {
         spring_learn_austenite(b); /* hot enough, and its resistance had come to rest */
     }
     b->heating = false;
     b->kept_w_per_k = 0.0f;
-    b->lost = 0.0f;
+    b->lost = b->doubted ? 1.0f - phase : 0.0f;
     b->quiet = 0;
     b->losing = 0;
     b->line_ohm = 0.0f;

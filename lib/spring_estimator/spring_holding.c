@@ -70,25 +70,24 @@ static void see_crossing(const spring_estimator_t *e, spring_belief_t *b, therma
 static void learn_offset(spring_belief_t *b, float now_c)
 {
     const float apart_per_a = 1.0f / b->current_a - b->line_per_a;
-    if (b->offset_sd_v <= OFFSET_LEAST_V || apart_per_a < APART_PER_A) {
+    if (apart_per_a < APART_PER_A) {
         return;
     }
-    const float off_v = (b->ohm - b->line_ohm) / apart_per_a;
-    const float moved = COEFFICIENT_MOST_PER_K * (now_c - b->line_c) * b->line_ohm / apart_per_a;
+    const float apart_a = 1.0f / apart_per_a;
+    const float moved_v = COEFFICIENT_MOST_PER_K * (now_c - b->line_c) * b->line_ohm * apart_a;
+    const float noise_v = b->noise * b->ohm * apart_a;
     const float prior_v2 = b->offset_sd_v * b->offset_sd_v;
-    const float noise_v = b->noise * b->ohm / apart_per_a;
-    const float gain =
-        prior_v2 / (prior_v2 + OFFSET_LEAST_V * OFFSET_LEAST_V + noise_v * noise_v + moved * moved);
-    const float more_v = gain * off_v;
+    const float read_v2 = OFFSET_LEAST_V * OFFSET_LEAST_V + noise_v * noise_v + moved_v * moved_v;
+    const float gain = prior_v2 / (prior_v2 + read_v2);
+    const float more_v = gain * (b->ohm - b->line_ohm) * apart_a;
     if (fabsf(b->offset_v + more_v) > OFFSET_MOST_V) {
         return; /* no offset is so large */
     }
     b->offset_v += more_v;
-    b->offset_sd_v = sqrtf(prior_v2 * (1.0f - gain));
+    b->offset_sd_v = sqrtf(gain * read_v2);
     b->line_ohm -= more_v * b->line_per_a;
-    b->learnt.austenite_ohm = b->line_ohm;
-    b->ohm -= more_v / b->current_a;
-    b->slow_ohm = b->ohm;
+    b->learnt.austenite_ohm = b->doubted ? b->learnt.austenite_ohm : b->line_ohm;
+    b->seen = true; /* it is acted on in the next turn */
 }
 
 /* By how much the resistance may have left its line with the phase kept: its temperature moves it,
@@ -101,6 +100,21 @@ static float may_move(const spring_belief_t *b, float now_c)
                                    : COEFFICIENT_MOST_PER_K;
     return unsure_per_k * fabsf(now_c - b->line_c) +
            OFFSET_SDS * b->offset_sd_v * fabsf(1.0f / b->current_a - b->line_per_a) / b->line_ohm;
+}
+
+/* Of what the resistance has left its line by, the part that lost phase may explain. */
+static float as_lost(const spring_belief_t *b, const thermal_model_t *model, uint8_t k, float left,
+                     float sd_k)
+{
+    const float less = b->learnt.change < 0.0f ? left : -left;
+    if (less > 0.0f) {
+        return less;
+    }
+    /* the other way is an intermediate phase, which comes where it may be cold enough; else it is
+     * the last of the austenite that comes */
+    const bool cold = spring_now_c(model, k) - SPRING_ESTIMATOR_BOUND_SDS * sd_k <
+                      spring_c(thermal_model_transformation(model, k).martensite_start_c7);
+    return cold ? -less * (1.0f / OTHER_WAY) : 0.0f;
 }
 
 /* A phase that is kept changes the resistance no faster than temperature does. */
@@ -124,7 +138,7 @@ void spring_holding_watch(const spring_estimator_t *e, spring_belief_t *b, therm
             return;
         }
         spring_begin_line(b, now_c);
-    } else if (b->quiet == 0) {
+    } else if (b->quiet == 0 && b->offset_sd_v > OFFSET_LEAST_V) {
         learn_offset(b, now_c);
     }
     const float kept_ohm =
@@ -135,18 +149,15 @@ void spring_holding_watch(const spring_estimator_t *e, spring_belief_t *b, therm
         return;
     }
     const float left = b->slow_ohm / kept_ohm - 1.0f;
-    const float as_learnt = b->learnt.change < 0.0f ? left : -left;
     const float sd_k = spring_estimator_sd_k(b);
-    /* the other way is an intermediate phase, which comes where it may be cold enough; else it is
-     * the last of the austenite that comes */
-    const bool cold = now_c - SPRING_ESTIMATOR_BOUND_SDS * sd_k < lost_at_c(model, k, 0.0f);
-    const float changed = as_learnt > 0.0f ? as_learnt
-                          : cold           ? -as_learnt * (1.0f / OTHER_WAY)
-                                           : 0.0f;
+    const float changed = as_lost(b, model, k, left, sd_k);
     /* as its temperature may have moved unseen, so may the resistance */
     const float moves = fabsf(b->learnt.martensite_rise_per_k) * sd_k;
     const float noise = b->rough ? b->noise : NOISE_IN_SLOW * b->noise;
-    const float sure = fmaxf(fmaxf(LOSS_LEAST, moves), SURE_SDS * noise) + may_move(b, now_c);
+    float sure = fmaxf(fmaxf(LOSS_LEAST, moves), SURE_SDS * noise);
+    if (changed >= SUSPECTED * sure) { /* as a rule not: two divisions are saved */
+        sure += may_move(b, now_c);
+    }
     if (changed < SUSPECTED * sure) {
         b->losing = 0;
         if (b->quiet >= QUIET_TURNS) {
