@@ -279,9 +279,11 @@ def main() -> int:
     parser.add_argument("--cases", type=int, default=12, help="of each part")
     parser.add_argument("--first", type=int, default=REPORTING_SEEDS.start)
     parser.add_argument("--parts", default="unknown_heat,quiet,second_witness,board_alone,exported")
-    parser.add_argument("--processes", type=int, default=2)
+    parser.add_argument("--processes", type=int, default=os.cpu_count() or 2)
     parser.add_argument("--json", type=Path)
-    parser.add_argument("--all", type=Path, help="write every case, for study")
+    parser.add_argument(
+        "--all", type=Path, help="write every case here as it is done; what it has already is not done again"
+    )
     options = parser.parse_args()
     parts = {f.__name__: f for f in (unknown_heat, quiet, second_witness, board_alone, exported)}
     jobs = [
@@ -290,9 +292,12 @@ def main() -> int:
         for seed in range(options.first, options.first + options.cases)
     ]
     fitting.WORKERS = 1
-    done = []
+    done = json.loads(options.all.read_text()) if options.all and options.all.exists() else []
+    there = {(one["part"], one["seed"]) for one in done}
+    jobs = [one for one in jobs if (one[0].__name__, one[1]) not in there]
     with concurrent.futures.ProcessPoolExecutor(options.processes) as pool:
-        for one in pool.map(_all, jobs, chunksize=1):
+        for future in concurrent.futures.as_completed([pool.submit(_all, job) for job in jobs]):
+            one = future.result()
             done.append(one)
             print(json.dumps({k: v for k, v in one.items() if k != "events"}), file=sys.stderr, flush=True)
             if options.all:

@@ -141,6 +141,14 @@ def test_the_chips_error_is_told_before_and_after_on_a_log_that_was_not_fitted(m
     assert "as it is" in said
     result = __import__("json").loads((tmp_path / "v.json").read_text())
     assert result["after"]["rmse_c"] < 0.5 < result["before"]["rmse_c"]
+    report = tmp_path / "d" / "report.html"
+    for _ in range(2):
+        run("verify", "--model", tmp_path / "d" / "model.toml", fresh, "--report", report)
+    page = report.read_text()
+    assert page.count("The chip on fresh.csv, which the fit never saw") == 1, "what was said before is replaced"
+    assert f"{result['after']['rmse_c']:.2f}" in page and page.rstrip().endswith("</html>")
+    with pytest.raises(InputError, match="is no report"):
+        run("verify", "--model", tmp_path / "d" / "model.toml", fresh, "--report", fresh)
     with pytest.raises(InputError, match="never saw"):
         run("verify", "--model", tmp_path / "d" / "model.toml", fitted)
 

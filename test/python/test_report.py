@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import dataclasses
 import re
 from html.parser import HTMLParser
 
@@ -134,9 +135,18 @@ def test_the_report_shows_rivals_what_is_unexplained_and_what_is_not_determined(
         "at_bounds": ["sensor_lag_s"],
         "correlated": [{"a": "loss_w_per_k", "b": "sensor_lag_s", "correlation": 0.99}],
     }
+    assert "Heat of unknown origin" not in Page(report.html_report(changed)).headings, "there is none"
+    watts = [np.zeros_like(run.temperature_c) for run in found.problem.runs]
+    watts[1][100:200, 3] = -0.2
+    changed.heat = dataclasses.replace(found.heat, watts=watts)
     text = report.html_report(changed)
     page = Page(text)
-    assert {"Unexplained", "What these data cannot tell apart", "Not determined by these data"} <= set(page.headings)
+    assert {
+        "Heat of unknown origin",
+        "Unexplained",
+        "What these data cannot tell apart",
+        "Not determined by these data",
+    } <= set(page.headings)
     wanted = ["latent_heat", "shared_air", "0.400", "3.0", "all springs on for 60 min; watch spring 1"]
     assert wanted in page.rows
     for words in (

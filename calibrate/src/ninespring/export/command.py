@@ -103,7 +103,7 @@ def _together(names: list[str]) -> list[str]:
     cls=Command,
     epilog="""\b
 Examples:
-  ninespring verify --model diagnosis/model.toml run3.csv
+  ninespring verify --model diagnosis/model.toml run3.csv --report diagnosis/report.html
   ninespring verify --model diagnosis/model.toml --port /dev/ttyACM0 run3.csv
 """,
 )
@@ -111,8 +111,16 @@ Examples:
 @MODEL
 @CHIP
 @click.option("--port", help="serial port of the board: what it has now is the 'before'")
+@click.option("--report", "report_path", type=FILE, help="report.html of the diagnosis: put before and after into it")
 @JSON
-def verify(log: Path, model_path: Path, chip_path: Path | None, port: str | None, json_path: Path | None) -> None:
+def verify(
+    log: Path,
+    model_path: Path,
+    chip_path: Path | None,
+    port: str | None,
+    report_path: Path | None,
+    json_path: Path | None,
+) -> None:
     """Tell the chip's error before and after, on a log that the fit never saw.
 
     Before: the settings that the board has (--port, --chip) or the firmware's defaults. After: with what `export` writes
@@ -120,9 +128,13 @@ def verify(log: Path, model_path: Path, chip_path: Path | None, port: str | None
     """
     from ..fit.predict import predict_by_chip
     from ..models import read_model
+    from ..report.verified import with_verification
     from .settings import settings_of
 
-    check_folder(json_path)
+    check_folder(report_path, json_path)
+    report = read_bytes(report_path).decode("utf-8", "replace") if report_path else ""
+    if report and "</main>" not in report:
+        raise InputError("is no report of `ninespring diagnose`", report_path)
     if port and chip_path:
         raise InputError("give either --port or --chip: what the board has now")
     model = read_model(model_path)
@@ -147,7 +159,7 @@ def verify(log: Path, model_path: Path, chip_path: Path | None, port: str | None
         model={"file": model_path.name, "sha256": sha256_of(model_path)},
         **errors,
     )
-    write({json_path: checked(result)})
+    write({json_path: checked(result), report_path: with_verification(report, result)})
     out.print(
         f"the chip's model on {log.name}: error {errors['before']['rmse_c']:.2f} K rms as it is, "
         f"{errors['after']['rmse_c']:.2f} K with the model's settings",

@@ -15,6 +15,9 @@ DRAWS = 4
 """Further arrays, drawn from the uncertainty of the model's numbers."""
 TRANSFORMED = 0.9
 """Austenite from which a spring counts as heated."""
+ENOUGH_K = 12.0
+"""Above its austenite finish, what a spring may reach without being called hotter: the margin that the chip keeps above its
+own target while it is unsure (`unsure_margin_k`)."""
 WORSE = {
     "held": (0.03, "springs that are on hold {old:.0%} austenite as the chip is now, {new:.0%} with the new settings"),
     "heating_s": (5.0, "heating takes {old:.0f} s as the chip is now, {new:.0f} s with the new settings"),
@@ -37,6 +40,8 @@ class Drive:
     heating_s: float
     """Until the last driven spring has transformed; all the time where one never does."""
     hottest_c: float
+    enough_c: float
+    """What a spring that is heated through may reach."""
     undriven: float
     """Highest austenite of a spring that is off."""
 
@@ -64,6 +69,7 @@ def drive(plant: native.Plant, lines: str, pattern: np.ndarray) -> Drive:
         float(austenite[on // 2 :, pattern].mean()),
         float(np.argmax(heated)) if heated.any() else float(on),
         float(temperature.max()),
+        plant.get("austenite_finish_c") + ENOUGH_K,
         float(off.max()) if off.size else 0.0,
     )
 
@@ -71,12 +77,15 @@ def drive(plant: native.Plant, lines: str, pattern: np.ndarray) -> Drive:
 def worse_than(old: Drive, new: Drive) -> list[str]:
     """Return the measures in which one drive is worse than another.
 
-    A spring that is heated further takes longer and gets hotter: that is no fault of settings that hold more of it.
+    A spring that is heated further takes longer and gets hotter: that is no fault of settings that hold more of it. Nor is it
+    one to heat a spring through that was not quite.
     """
     out = []
     holds_more = new.held - old.held > WORSE["held"][0]
     for measure, (limit, _) in WORSE.items():
         a, b = getattr(old, measure), getattr(new, measure)
+        if measure == "hottest_c":
+            a = max(a, old.enough_c)
         more = a - b if measure == "held" else b - a
         if measure in ("heating_s", "hottest_c") and holds_more:
             continue

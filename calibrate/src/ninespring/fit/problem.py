@@ -15,7 +15,7 @@ from dataclasses import replace
 
 import numpy as np
 from scipy.interpolate import CubicSpline
-from scipy.optimize import least_squares
+from scipy.optimize import OptimizeResult, least_squares
 
 from .. import native
 from ..logs.run import Run
@@ -376,6 +376,7 @@ class Problem:
                 if f.key in keys:
                     known[keys.index(f.key)] = (at, near.jacobian[:, column] * weight)
 
+        mended: list[bool] = []
         secant: list[tuple[np.ndarray, np.ndarray]] = []
 
         def slope(z: np.ndarray) -> np.ndarray:
@@ -389,6 +390,7 @@ class Problem:
                 length = float(moved @ moved)
                 foretold = length > 0 and float(missed @ missed) < FORETOLD**2 * float(changed @ changed)
                 if foretold:
+                    mended.append(True)
                     known.update({c: (z, known[c][1] + missed * (moved[c] / length)) for c in known})
             if not foretold:
                 stale = [c for c in range(len(free)) if c not in known or np.nanmax(np.abs(z - known[c][0])) > REUSED]
@@ -405,17 +407,26 @@ class Problem:
         z0 = np.array([f.inner(v) for f, v in zip(free, values, strict=True)])
         margin = 1e-6 * (high - low)
         z0 = np.clip(z0, low + margin, high - margin)
-        found = least_squares(
-            lambda z: np.concatenate([run(z)[1], (trust * (z - believed))[some]]),
-            z0,
-            jac=lambda z: np.vstack([slope(z), np.diag(trust)[some]]),
-            bounds=(low, high),
-            x_scale="jac",
-            ftol=tolerance,
-            xtol=1e-6,
-            gtol=1e-10,
-            max_nfev=max_steps,
-        )
+
+        def descend(begin: np.ndarray) -> OptimizeResult:
+            return least_squares(
+                lambda z: np.concatenate([run(z)[1], (trust * (z - believed))[some]]),
+                begin,
+                jac=lambda z: np.vstack([slope(z), np.diag(trust)[some]]),
+                bounds=(low, high),
+                x_scale="jac",
+                ftol=tolerance,
+                xtol=1e-6,
+                gtol=1e-10,
+                max_nfev=max_steps,
+            )
+
+        found = descend(z0)
+        if mended:
+            # slopes that were mended may end before the minimum: fresh ones say whether they did
+            known.clear()
+            secant.clear()
+            found = descend(found.x)
         z, jac = found.x, found.jac[: self.count]
         shown, vector = run(z)
         fit = Fit(

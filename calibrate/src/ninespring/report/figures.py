@@ -121,6 +121,32 @@ def array_map(found: Diagnosis) -> str:
     return _svg(figure)
 
 
+def unknown_heat(found: Diagnosis) -> str:
+    """Draw the watts that no log has, springs over time, a panel a run, with a colour bar; empty where there are none."""
+    heat = found.heat
+    most = max((float(np.abs(watts).max()) for watts in heat.watts if watts.size), default=0.0)
+    if most <= 0:
+        return ""
+    springs, runs = found.problem.array.springs, len(heat.watts)
+    figure, axes = plt.subplots(
+        runs, 1, figsize=(9.0, 0.9 + runs * max(0.9, 0.2 * springs)), squeeze=False, layout="constrained"
+    )
+    for r, (axis, times, watts) in enumerate(zip(axes[:, 0], heat.times_s, heat.watts, strict=True)):
+        pick = _thin(len(times))
+        edges = np.append(times[pick], times[-1]) - times[0]
+        # red: more than was logged; blue: less
+        shown = axis.pcolormesh(
+            edges, np.arange(springs + 1) + 0.5, watts[pick].T, cmap="RdBu_r", vmin=-most, vmax=most
+        )
+        axis.set_yticks(np.arange(1, springs + 1))
+        axis.invert_yaxis()
+        axis.set_ylabel(f"run {r + 1}, spring", fontsize=8)
+        axis.tick_params(labelsize=7)
+    axes[-1, 0].set_xlabel("s", fontsize=8)
+    figure.colorbar(shown, ax=axes[:, 0], label="W more (red) or less (blue) than known")
+    return _svg(figure)
+
+
 def error_bars(result: dict[str, Any]) -> str:
     """Draw the held-out errors before and after, and the noise."""
     before, after = result["baseline"], result["after"]

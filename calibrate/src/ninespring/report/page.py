@@ -198,6 +198,11 @@ def html_report(found: Diagnosis) -> str:
     parts.append(
         f"<h2>Where the error sits</h2><figure>{figures.maps(found)}<figcaption>Each cell is a spring, row 1 on top; its number in the corner. Mean: measured less model.</figcaption></figure>"
     )
+    if svg := figures.unknown_heat(found):
+        parts.append(
+            f"<h2>Heat of unknown origin</h2><figure>{svg}<figcaption>Where, when and how much: heat that the model lacks, W, "
+            "at each spring over time.</figcaption></figure>"
+        )
     parts.append(
         f"<h2>What is left</h2><figure>{figures.autocorrelation(found)}<figcaption>{_e(result['residual']['note'])}</figcaption></figure>"
     )
