@@ -6,7 +6,6 @@ import base64
 import contextlib
 import csv
 import html
-import io
 import json
 import math
 import subprocess
@@ -79,12 +78,12 @@ def read(path: Path) -> Columns:
     return {name: [float(row[name] or "nan") for row in rows] for name in rows[0] if name not in ("source", "state")}
 
 
-def picture(figure: Figure, text: str) -> str:
-    """Return a figure as an image that stands in the page itself; text says what is to be seen."""
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format="svg")
+def picture(figure: Figure, name: str, text: str) -> str:
+    """Return a figure as an image that stands in the page itself, and write it beside it; text says what is to be seen."""
+    path = OUT / f"{name}.svg"
+    figure.savefig(path)
     plt.close(figure)
-    data = base64.b64encode(buffer.getvalue()).decode()
+    data = base64.b64encode(path.read_bytes()).decode()
     return f'<img alt="{html.escape(text)}" src="data:image/svg+xml;base64,{data}">'
 
 
@@ -117,7 +116,7 @@ def paper() -> str:
 <b>{comsol["rmse_c"]:.2f} °C</b> rms. The thermal camera saw another array: the model misses its six by
 <b>{camera["rmse_c"]:.1f} °C</b> rms, at most {camera["largest_error_c"]:.1f}. Nothing was tuned to the camera.
 <code>docs/physics.md</code> says what may explain it, <code>docs/results.md</code> how well each explanation fits.</p>
-{picture(figure, "bars: the centre's temperature in the paper and in the model")}"""
+{picture(figure, "paper", "bars: the centre's temperature in the paper and in the model")}"""
 
 
 def drive() -> str:
@@ -171,7 +170,7 @@ def drive() -> str:
 holds it in the hysteresis band (green), where it stays austenite at the least heat. The chip was told that the springs are cold
 (<code>model cold</code>); what it does without that word stands below.</p>
 {table(["", *DRIVES.values()], rows)}
-{picture(figure, "temperature of a driven corner and of the centre over ten minutes, three ways to drive")}"""
+{picture(figure, "drive", "temperature of a driven corner and of the centre over ten minutes, three ways to drive")}"""
 
 
 def moments(trace: Columns) -> tuple[float, float]:
@@ -210,7 +209,7 @@ def start() -> str:
 <p>Two console lines, at 2 and at 5 s: <code>policy precompensate</code>, <code>pattern 111101111</code>. A board that was just switched on
 cannot know that the springs are cold: it looks at them with at most 1 A, and waits until none can still be hot. The hint <code>model cold</code> makes it begin at once.</p>
 {table(["", "heats from", "all eight transformed"], rows)}
-{picture(figure, "temperatures of nine springs from power-on, with and without the hint")}{missing}"""
+{picture(figure, "start", "temperatures of nine springs from power-on, with and without the hint")}{missing}"""
 
 
 @contextlib.contextmanager
@@ -338,7 +337,7 @@ twice. Neither the chip nor the calibration is told. The firmware runs in a simu
 <p>Before and after, the same drive that no fit has seen: <code>policy precompensate</code>, eight springs on, the centre off. A spring
 that is held below {MARTENSITE_START_C:.0f} °C, where martensite starts, loses its phase.</p>
 {table(["", *traces], rows)}
-{picture(figure, "temperatures of three springs, measured and believed by the chip, before and after")}
+{picture(figure, "undeclared", "temperatures of three springs, measured and believed by the chip, before and after")}
 <p>The whole <a href="diagnosis/report.html">report</a>; <a href="settings.txt">what was uploaded</a>.</p>"""
 
 

@@ -91,8 +91,8 @@ private:
 class reader
 {
 public:
-    explicit reader(const board_pty_t *pty, std::size_t unread_most)
-        : pty_(pty), unread_most_(unread_most)
+    reader(const board_pty_t *pty, std::size_t unread_most, std::chrono::seconds left_alone)
+        : pty_(pty), unread_most_(unread_most), left_alone_(left_alone)
     {
     }
     void await()
@@ -100,7 +100,7 @@ public:
         if (pty_ == nullptr) {
             return;
         }
-        const auto until = std::chrono::steady_clock::now() + LEFT_ALONE;
+        const auto until = std::chrono::steady_clock::now() + left_alone_;
         bool behind = board_pty_unread(pty_) > unread_most_;
         while (behind && reads_ && interrupted == 0) {
             std::this_thread::sleep_for(LOOK_AGAIN);
@@ -111,11 +111,11 @@ public:
     }
 
 private:
-    static constexpr std::chrono::milliseconds LEFT_ALONE{10000};
     static constexpr std::chrono::microseconds LOOK_AGAIN{200};
     const board_pty_t *pty_;
     std::size_t unread_most_;
-    bool reads_ = true;
+    std::chrono::seconds left_alone_;
+    bool reads_ = false;
 };
 
 /* A row of nine springs: to wait after each byte would cost more than the simulation. */
@@ -160,8 +160,8 @@ void run_board(const board_arguments &arguments)
     std::fflush(stdout);
 
     pace clock(speed);
-    reader of_board(port.get(), BOARD_UNREAD_MOST);
-    reader of_logger(logger.port(), 0);
+    reader of_board(port.get(), BOARD_UNREAD_MOST, std::chrono::seconds(10));
+    reader of_logger(logger.port(), 0, std::chrono::seconds(1));
     std::uint8_t bytes[256];
     while (interrupted == 0 &&
            (arguments.duration_s == 0.0 || board_time_s(board.get()) < arguments.duration_s)) {

@@ -10,6 +10,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -17,6 +18,7 @@ import numpy as np
 import pytest
 from ninespring.board import Board
 from ninespring.logs import read_log, read_table
+from websockets.sync.client import connect
 
 ROOT = Path(__file__).resolve().parents[2]
 SIM = Path(os.environ.get("NINESPRING_SIM", ROOT / "build" / "host" / "ninespring-sim"))
@@ -64,9 +66,10 @@ def measured(folder: Path, name: str, **values: object) -> Path:
 
 
 @pytest.fixture
-def board() -> Iterator[str]:
-    """Return the port of a simulated board with its plant, ended at the end."""
-    with subprocess.Popen([SIM, "board", "--elf", ELF, "--speed", "max"], stdout=subprocess.PIPE, text=True) as process:
+def board(request: pytest.FixtureRequest) -> Iterator[str]:
+    """Return the port of a simulated board with its plant, ended at the end; its speed may be asked for."""
+    words = [SIM, "board", "--elf", ELF, "--speed", getattr(request, "param", "max")]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
         port = process.stdout.readline().strip()
         assert port.startswith("/dev/"), "no pty"
@@ -140,3 +143,48 @@ def test_an_effect_found_in_a_log_is_in_the_model_of_the_chip_that_it_was_upload
     apart = np.abs(got[columns].to_numpy(float) - again[columns].to_numpy(float)).max()
     assert apart < 0.1 * rise
     assert apart < np.abs(got[columns].to_numpy(float) - other[columns].to_numpy(float)).max()
+
+
+def faults_of(port: str) -> list[str]:
+    with Board(port, off_at_end=False) as connection:
+        return connection.ask("faults")
+
+
+@pytest.mark.skipif(not (SIM.exists() and ELF.exists()), reason=f"SKIPPED: {SIM} or {ELF} is not there")
+@pytest.mark.parametrize("board", ["4"], indirect=True)
+@pytest.mark.parametrize("program", ["record", "dashboard"])
+def test_a_program_that_is_killed_leaves_no_spring_on(board: str, tmp_path: Path, program: str) -> None:
+    (tmp_path / "steps.txt").write_text("at 1 = on all 50\n")
+    words = {
+        "record": ["record", "--run", tmp_path / "steps.txt", "-o", tmp_path / "log.csv"],
+        "dashboard": ["dashboard", "--listen", "127.0.0.1:0", "--folder", tmp_path],
+    }[program]
+    command = [sys.executable, "-m", "ninespring", *map(str, words), "--port", board]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        if program == "dashboard":
+            url = process.stdout.readline().split()[0].rstrip("/")
+            with connect(f"{url.replace('http', 'ws')}/ws", additional_headers={"origin": url}) as page:
+                while not (state := json.loads(page.recv(30))).get("connected"):
+                    pass
+                page.send('{"do": "all", "level": 50}')
+                while (state := json.loads(page.recv(30))).get("sum_a", 0.0) < 5.0:
+                    assert state.get("connected", True)
+        else:
+            until = time.monotonic() + 60.0
+            while not flows(tmp_path / "log.csv.part"):
+                assert time.monotonic() < until, "nothing was driven"
+                time.sleep(0.05)
+        process.kill()
+    for _ in range(6):
+        time.sleep(4.0)  # nobody says anything: to ask would keep it alive
+        if faults := faults_of(board):
+            break
+    assert any("host_silent" in line for line in faults)
+
+
+def flows(part: Path) -> bool:
+    """Return whether a log that is being written has a row with a current."""
+    rows = (
+        [line.split(",") for line in part.read_text().splitlines() if not line.startswith("#")] if part.exists() else []
+    )
+    return any(float(one) > 0.5 for row in rows[1:] for name, one in zip(rows[0], row, strict=False) if name == "i1_a")

@@ -25,6 +25,8 @@ FOUND_WITHIN_S = 5.0
 BOOTING_S = 2.0
 """A Mega's boot loader listens for so long after a reset, and takes what is sent meanwhile for a program."""
 SIMULATED = "simulated"
+PATIENCE = 6.0
+"""So many times longer an answer of the simulated board is awaited: it has what the machine leaves it."""
 HOST_TIMEOUT_S = 5
 """Springs go off when nothing came from here for so long, where the board has that setting."""
 ALIVE_EVERY_S = 1.0
@@ -84,6 +86,8 @@ class Board:
         self.thermometers: str | None = None
         """Port of the simulated board's thermometers."""
         self._simulated: subprocess.Popen[str] | None = None
+        self.patience = PATIENCE if port == SIMULATED else 1.0
+        """Times as long as usual everything may take."""
         if port == SIMULATED:
             self._simulated, port, self.thermometers = simulated_board()
         self.port = port
@@ -126,14 +130,14 @@ class Board:
 
     def _greet(self) -> None:
         """Find out what is there: a board says `ninespring` to `version`."""
-        until = time.monotonic() + FOUND_WITHIN_S - 0.2
+        until = time.monotonic() + self.patience * FOUND_WITHIN_S - 0.2
         heard: list[str] = []
         if self._port.resets_the_board:
             line = self._wait(time.monotonic() + BOOTING_S)
             heard += [line] if line else []
         while (left := until - time.monotonic()) > 0:
             self._port.write("\nversion\n")
-            ends = time.monotonic() + min(1.0, left)
+            ends = time.monotonic() + min(self.patience, left)
             while (line := self._wait(ends)) is not None:
                 heard.append(line)
                 if line.startswith("ninespring "):
@@ -150,15 +154,15 @@ class Board:
     def _end_of_greeting(self) -> None:
         """Read the rest of the answer, and those to what was asked while the board was still starting."""
         self._port.write("telemetry off\n")
-        quiet_s, answered = 0.2, False
-        until = time.monotonic() + 1.0
+        quiet_s, answered = 0.2 * self.patience, False
+        until = time.monotonic() + self.patience
         while (line := self._wait(until)) is not None:
             if TELEMETRY.match(line):
                 continue
             if not answered and line not in ("", "ok"):
                 self.version.append(line)
             answered = answered or line == "ok"
-            until = time.monotonic() + (quiet_s if answered else 1.0)
+            until = time.monotonic() + (quiet_s if answered else self.patience)
 
     def _wait(self, until_s: float) -> str | None:
         line = None if self.stopped() else self._port.read_line(until_s, self.stopped)
@@ -167,7 +171,7 @@ class Board:
         return line
 
     def ask(self, line: str, timeout_s: float = 3.0) -> list[str]:
-        """Send one line; return the answer's lines. WorkError where it is refused or nothing comes.
+        """Send one line; return the answer's lines. WorkError where it is refused, or nothing of it comes for so long.
 
         Telemetry that comes meanwhile is kept for `next_line`.
         """
@@ -175,6 +179,7 @@ class Board:
             raise InputError(f"{line[:40]!r} is not one line of plain ASCII")
         self._port.write(line + "\n")
         self._alive_s = time.monotonic()
+        timeout_s *= self.patience
         until = self._alive_s + timeout_s
         self._owed += 1
         answer: list[str] = []
@@ -193,6 +198,7 @@ class Board:
                 self._telemetry.append(got)
             elif got:
                 answer.append(got)
+                until = time.monotonic() + timeout_s
         self._owed = 0
         raise WorkError(f"{self.port}: no answer to '{line}' for {timeout_s:g} s")
 
@@ -275,7 +281,7 @@ class Board:
     def read(self) -> Reading:
         """Return what the board measures now."""
         names = next((line.split(",") for line in self.ask("telemetry csv 50") if line.startswith("time_s,")), [])
-        until = time.monotonic() + 3.0
+        until = time.monotonic() + 3.0 * self.patience
         while (line := self.next_line(until)) is not None:
             cells = line.split(",")
             if line[:1].isdigit() and len(cells) == len(names):

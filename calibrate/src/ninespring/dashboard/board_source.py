@@ -221,8 +221,8 @@ class BoardSource(Source):
             if got:
                 heard_s = time.monotonic()
                 self._take(got)
-            elif time.monotonic() - heard_s > SILENT_S:
-                raise WorkError(f"{board.port}: no telemetry for {SILENT_S:g} s")
+            elif (silent_s := time.monotonic() - heard_s) > SILENT_S * board.patience:
+                raise WorkError(f"{board.port}: no telemetry for {silent_s:.0f} s")
 
     def _read_settings(self, board: Board) -> None:
         self._settings = board.settings()

@@ -175,14 +175,14 @@ function showSpring(k, now) {
   const part = (name) => spring.querySelector(`.${name}`);
   const [red, green, blue] = celsius === null ? [120, 120, 120] : colour(celsius);
   spring.style.background = `rgb(${red} ${green} ${blue})`;
-  spring.style.color = red * 0.3 + green * 0.59 + blue * 0.11 > 140 ? "#111" : "#fff";
+  spring.style.color = red * 0.3 + green * 0.59 + blue * 0.11 > 110 ? "#111" : "#fff";
   spring.classList.toggle("on", on);
   spring.setAttribute("aria-pressed", on);
   part("level").textContent = on ? `${Math.round(now.level[k])} %` : "";
   part("temperature").textContent = `${shown(celsius, 1)}°`;
   const [low, high] = now.bounds_c?.[k] ?? [];
   part("bounds").textContent = low === undefined ? "" : `${shown(low, 0)}…${shown(high, 0)}°`;
-  part("measured").textContent = now.measured_c[k] == null ? "" : `measured ${shown(now.measured_c[k], 1)}°`;
+  part("measured").textContent = now.measured_c[k] == null ? "" : `${shown(now.measured_c[k], 1)}°`;
   part("amps").textContent = `${shown(now.current_a[k], 2)} A`;
   part("limits").textContent = now.limits[k].join("; ");
   part("phase").style.width = `${100 * (now.phase?.[k] ?? 0)}%`;
@@ -244,7 +244,7 @@ function plot(number) {
     margin: { l: 52, r: 8, t: 8, b: 34 }, paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", font: { color: ink, size: 12 },
     xaxis: { title: { text: "s" }, range: [begin, end], gridcolor: grid, zerolinecolor: grid },
     yaxis: { title: { text: QUANTITIES[name] }, gridcolor: grid, zerolinecolor: grid },
-    legend: { orientation: "h", y: 1.12 }, uirevision: name,
+    legend: { orientation: "h", y: 1.02, yanchor: "bottom" }, uirevision: name,
   }, { displaylogo: false, responsive: true, displayModeBar: false });
 }
 
