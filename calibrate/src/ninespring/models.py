@@ -14,6 +14,7 @@ from typing import Any
 
 from . import __version__, native
 from .errors import InputError
+from .explore import cooling
 from .importing import line_of, read_toml
 
 SCHEMA = "ninespring.model/1"
@@ -47,6 +48,8 @@ class Array:
     spring: dict[str, float] = field(default_factory=dict)
     material: dict[str, float] = field(default_factory=dict)
     sensor: dict[str, Any] = field(default_factory=dict)
+    cooling: dict[str, Any] = field(default_factory=dict)
+    """What `ninespring couplings` reckons with; nothing else looks at it, and no model keeps it."""
 
     @property
     def springs(self) -> int:
@@ -121,13 +124,32 @@ class _Reader:
         if "noise_c" in sensor:
             self.number(sensor, "noise_c", 0.0, 50.0, "[sensor]")
         array.sensor = dict(sensor)
+        array.cooling = self.cooling()
         return array
+
+    def cooling(self) -> dict[str, Any]:
+        """Return the checked `[cooling]` table (explore/cooling.py)."""
+        part = self.data.get("cooling", {})
+        if not isinstance(part, dict):
+            raise self.refuse("[cooling] must be a table", "cooling")
+        self.known(part, cooling.KEYS, "[cooling]")
+        out: dict[str, Any] = {}
+        for key, value in part.items():
+            if key in cooling.NUMBERS:
+                out[key] = self.number(part, key, *cooling.NUMBERS[key], "[cooling]")
+                continue
+            if value not in cooling.WORDS[key]:
+                close = difflib.get_close_matches(str(value), cooling.WORDS[key], 1)
+                hint = f" (did you mean {close[0]}?)" if close else ""
+                raise self.refuse(f"[cooling] {key} has no '{value}'{hint}; it has {', '.join(cooling.WORDS[key])}", key)
+            out[key] = value
+        return out
 
 
 def read_array(path: str | Path) -> Array:
     """Read array.toml; refused with file and line where it breaks docs/files.md."""
     reader = _Reader(path)
-    reader.known(reader.data, ("array", "spring", "material", "sensor"), "the file")
+    reader.known(reader.data, ("array", "spring", "material", "sensor", "cooling"), "the file")
     return reader.array()
 
 
