@@ -10,7 +10,6 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from scipy import special
 
 from ..models import Array
 from . import correlations as by
@@ -62,26 +61,26 @@ def cylinder_and_plane(mesh: Mesh) -> tuple[float, float]:
 
 
 def plate_as_fin(mesh: Mesh) -> tuple[float, float]:
-    """Return K/W of two plates, each a fin around an end of a spring that gives all its heat to them.
+    """Return W/K that two plates take up along one edge, each a straight fin: sqrt(h k t) W tanh(m L), m^2 = h / k t.
 
-    The air takes nothing. A fin heated evenly over a disc, x = r sqrt(h / k t): (1 - 2 I1(x) K1(x)) / (pi r^2 h) on the disc's mean; a rod heated
-    evenly, held at both ends: L / (12 k A) on its mean, which is taken off.
+    One face gives heat to the room; the other has air that takes nothing, and a spring that leads nowhere.
     """
-    geometry = _geometry(1, 5.0, plate="steel", plate_thickness_mm=0.3, margin_mm=90.0)
-    spring = geometry.spring
-    rise = _answers(geometry, mesh, Film(0.0, 1e-9, 1e3), np.array([1.0]))
+    from scipy.sparse.linalg import splu
+
+    geometry = _geometry(1, 5.0, plate="steel", plate_thickness_mm=0.5, margin_mm=40.0)
+    field = build(geometry, False, replace(mesh, along=1), Film(0.0, 1e-9, 1e3))
+    side = 2 * (geometry.cooling.margin_mm + geometry.spring.radius_mm) * MM
     hot = geometry.ambient_c + PLATE_RISE_K
-    side = 2 * (geometry.cooling.margin_mm + spring.radius_mm) * MM
     h = by.natural_plate(side, hot, geometry.ambient_c) + by.radiation(PLATE_EMISSIVITY, hot, geometry.ambient_c)
-    thick = MATERIALS["steel"].conductivity * geometry.cooling.plate_thickness_mm * MM
-    radius = spring.radius_mm * MM
-    # the plate ends at a distance where the fin has cooled; a disc of the same area as the square stands for it
-    edge = side / math.sqrt(math.pi)
-    x, y = radius * math.sqrt(h / thick), edge * math.sqrt(h / thick)
-    reflected = special.k1(y) / special.i1(y)
-    fin = (1 - 2 * special.i1(x) * (special.k1(x) - reflected * special.i1(x))) / (math.pi * radius**2 * h)
-    rod = spring.length_mm * MM / (12 * spring.along_w_per_mk * math.pi * radius**2)
-    return float(rise[0]) - rod, fin / 2
+    steel, thick = MATERIALS["steel"].conductivity, geometry.cooling.plate_thickness_mm * MM
+    west = field.place[:, 0] < field.place[:, 0].min() + 1e-9
+    held = west & (field.place[:, 2] < thick * (1 + 1e-9))
+    free = ~held
+    t = held.astype(float)
+    matrix = field.conductance.tocsr()
+    t[free] = splu(matrix[free][:, free].tocsc()).solve(-(matrix[free][:, held] @ t[held]))
+    m = math.sqrt(h / (steel * thick))
+    return float(t @ (matrix @ t)), 2 * math.sqrt(h * steel * thick) * side * math.tanh(m * side)
 
 
 def spring_alone(mesh: Mesh, fan: bool = True) -> tuple[float, float]:

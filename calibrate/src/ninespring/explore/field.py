@@ -122,6 +122,8 @@ class Field:
     """(unknowns,): W/K to the room through the plates' outer faces."""
     freed: np.ndarray
     """(unknowns,): W/K from the air to the room, where no cell's stream takes it up."""
+    place: np.ndarray
+    """(unknowns, 3): where each unknown is, m: east, north, up from the lower face."""
     unknowns: int = field(init=False)
 
     def __post_init__(self) -> None:
@@ -317,4 +319,10 @@ def build(geometry: Geometry, fan: bool, mesh: Mesh, film: Film | None = None) -
         lanes_of(geometry.rows, geometry.cols, cooling.fan_direction),
         times * outer,
         times * freed,
+        np.hstack(
+            [
+                np.repeat(Basis(plan, ElementTriP2()).doflocs.T, levels, axis=0),
+                np.tile(heights, len(ones))[:, None],
+            ]
+        ),
     )

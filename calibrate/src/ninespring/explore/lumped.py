@@ -149,7 +149,11 @@ def lumped_of(geometry: Geometry, still: Modes, blown: Modes | None) -> Lumped:
         name: float(one if name == "edge_loss_fraction" else one * values[name])
         for name, one in zip(names, spread, strict=True)
     }
-    return Lumped({name: values[name] for name in values}, reduction, float(np.sqrt(np.mean(fit.fun**2))))
+    for name, value in values.items():
+        if 0.0 < value < 10 * OFF_ZERO:  # at the end of its range: the field has none of it
+            values[name] = 0.0
+            reduction.pop(name, None)
+    return Lumped(values, reduction, float(np.sqrt(np.mean(fit.fun**2))))
 
 
 def _start(geometry: Geometry, still: Modes, blown: Modes | None) -> dict[str, float]:
