@@ -118,7 +118,7 @@ def metrics_of(spec: Spec, point: Mapping[str, Any], seed: int) -> dict[str, flo
         if moved.any(axis=0).all():
             out["start_s"] = float(moved.argmax(axis=0).max() + 1)
         back = (x[on:, pattern] <= BACK).all(axis=1)
-        if back.any():
+        if back.any() and out["started"]:
             out["cool_s"] = float(back.argmax() + 1)
         out["pictures_per_min"] = 60.0 / (out["start_s"] + out["cool_s"])
     if not pattern.all():
