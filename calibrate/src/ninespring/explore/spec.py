@@ -88,6 +88,8 @@ class Spec:
 
     method: str = "grid"
     points: int = 0
+    asked: int = 0
+    """Points that the file asks for: of saltelli, the base of its sample, which has more."""
     seed: int = 1
     duration_s: int = 300
     on_s: int = 180
@@ -107,14 +109,14 @@ class Spec:
         from scipy.stats import qmc
 
         if self.method == "latin":
-            return qmc.LatinHypercube(len(self.axes), rng=self.seed).random(self.points)
+            return qmc.LatinHypercube(len(self.axes), rng=self.seed).random(self.asked)
         if self.method == "sobol":
-            return qmc.Sobol(len(self.axes), rng=self.seed).random(self.points)
+            return qmc.Sobol(len(self.axes), rng=self.seed).random(self.asked)
         if self.method == "saltelli":
             from SALib.sample import sobol
 
             problem = {"num_vars": len(self.axes), "names": [a.key for a in self.axes], "bounds": [[0, 1]] * len(self.axes)}
-            return sobol.sample(problem, self.points, calc_second_order=False, seed=self.seed)
+            return sobol.sample(problem, self.asked, calc_second_order=False, seed=self.seed)
         return None
 
     def table(self, values: Sequence[Any]) -> dict[str, Any]:
@@ -246,7 +248,7 @@ class _Reader:
         if spec.method == "grid" and "points" in head:
             raise self.refuse("a grid has as many points as its steps make: leave out points", "points")
         if spec.method != "grid":
-            spec.points = int(self.number(head.get("points", 0), 1, MOST_POINTS, "points", True))
+            spec.points = spec.asked = int(self.number(head.get("points", 0), 1, MOST_POINTS, "points", True))
         if spec.method == "saltelli" and spec.points & (spec.points - 1):
             raise self.refuse(f"points is {spec.points}: saltelli wants a power of two", "points")
         fixed, vary = self.table("fixed"), self.table("vary")

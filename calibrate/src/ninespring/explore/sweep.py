@@ -8,10 +8,12 @@ from __future__ import annotations
 import itertools
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from ..errors import WorkError
 from .point import run_point
 from .results import Results
 from .spec import Spec
@@ -48,9 +50,11 @@ def run_points(
     client: Any, spec: Spec, wanted: Iterator[tuple[int, dict[str, Any]]], keep: Callable[[list[dict[str, Any]]], None]
 ) -> None:
     """Run points as they come from an iterator; hand over the rows of each lot once, in the order in which they end."""
-    from distributed import as_completed
+    from concurrent.futures import CancelledError
 
-    slim = _slim(spec)
+    from distributed import KilledWorker, as_completed
+
+    slim = replace(spec, text="")
     cores = max(1, sum(client.nthreads().values()))
     per_point_s = LOT_S
     flying: Any = as_completed([])
@@ -66,19 +70,16 @@ def run_points(
     while under_way < cores and send():
         under_way += 1
     for future in flying:
-        rows, took_s = future.result()
+        try:
+            rows, took_s = future.result()
+        except (KilledWorker, CancelledError) as error:
+            raise WorkError(f"the cluster gave up ({type(error).__name__}): the same command carries on") from None
         future.release()
         under_way -= 1
         per_point_s = took_s
         keep(rows)
         while under_way < AHEAD * cores and send():
             under_way += 1
-
-
-def _slim(spec: Spec) -> Spec:
-    from dataclasses import replace
-
-    return replace(spec, text="")
 
 
 def sweep(client: Any, spec: Spec, results: Results, done: np.ndarray, say: Say) -> None:
