@@ -1,6 +1,6 @@
 """The field solution against closed forms, on finer and finer meshes.
 
-    .venv/bin/python bench/explore/closed_forms.py [--json FILE]
+.venv/bin/python bench/explore/closed_forms.py [--json FILE]
 """
 
 from __future__ import annotations

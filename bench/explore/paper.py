@@ -54,7 +54,9 @@ def main() -> None:
     parser.add_argument("--json", type=Path)
     options = parser.parse_args()
     figures = []
-    print(f"{'reading':>12} {'pitch':>5} {'fan':>3} {'COMSOL':>7} {'fit':>6} {'geometry':>9} {'camera':>7} {'corner W':>9}")
+    print(
+        f"{'reading':>12} {'pitch':>5} {'fan':>3} {'COMSOL':>7} {'fit':>6} {'geometry':>9} {'camera':>7} {'corner W':>9}"
+    )
     for reading, coil in READINGS.items():
         off: dict[str, list[float]] = {"COMSOL": [], "camera": []}
         for pitch in (4, 5, 6):

@@ -1,6 +1,6 @@
 """The sweep's own cost: throughput against bare loops, workers killed every 20 s, memory at 10^5 points.
 
-    .venv/bin/python bench/explore/sweep.py [throughput killed memory] [--json FILE]
+.venv/bin/python bench/explore/sweep.py [throughput killed memory] [--json FILE]
 """
 
 from __future__ import annotations
@@ -96,8 +96,17 @@ def throughput(folder: Path, cores: int) -> list[dict[str, Any]]:
         assert len(table) == spec.points
         name = f"throughput against bare loops, {1e3 * alone_cpu / spec.points:.0f} ms a point"
         print(f"{name}: clock {100 * alone / took:.0f} %, processors {100 * alone_cpu / worked:.0f} %", flush=True)
-        out.append({"figure": f"{name}, processors", "value": round(100 * alone_cpu / worked), "unit": "%", "target": ">= 85"})
-        out.append({"figure": f"  by the clock, {cores} cores", "value": round(100 * alone / took), "unit": "%", "target": None})
+        out.append(
+            {"figure": f"{name}, processors", "value": round(100 * alone_cpu / worked), "unit": "%", "target": ">= 85"}
+        )
+        out.append(
+            {
+                "figure": f"  by the clock, {cores} cores",
+                "value": round(100 * alone / took),
+                "unit": "%",
+                "target": None,
+            }
+        )
     return out
 
 
@@ -129,7 +138,12 @@ def killed(folder: Path, cores: int) -> list[dict[str, Any]]:
     return [
         {"figure": f"{COUNT} points, a worker killed every 20 s: lost or twice", "value": 0 if once else 1}
         | {"unit": "points", "target": "0"},
-        {"figure": "  rows that differ from the undisturbed run's", "value": 0 if same else 1, "unit": "", "target": "0"},
+        {
+            "figure": "  rows that differ from the undisturbed run's",
+            "value": 0 if same else 1,
+            "unit": "",
+            "target": "0",
+        },
     ]
 
 
@@ -141,7 +155,14 @@ def memory(folder: Path, cores: int) -> list[dict[str, Any]]:
         swept(spec, folder / f"memory-{points}", cores)
         peaks.append(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
         print(f"{points} points: peak {peaks[-1]:.0f} MB", flush=True)
-    out.append({"figure": "10^5 points: peak memory of scheduler and client", "value": round(peaks[1]), "unit": "MB", "target": None})
+    out.append(
+        {
+            "figure": "10^5 points: peak memory of scheduler and client",
+            "value": round(peaks[1]),
+            "unit": "MB",
+            "target": None,
+        }
+    )
     out.append({"figure": "  more than for 10^3", "value": round(peaks[1] - peaks[0]), "unit": "MB", "target": None})
     return out
 

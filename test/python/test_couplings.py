@@ -11,14 +11,14 @@ import pytest
 from click.testing import CliRunner
 from ninespring import cli
 from ninespring.errors import InputError
+from ninespring.explore import closed_forms, couplings, geometry
+from ninespring.explore.cooling import Cooling
+from ninespring.explore.field import Mesh, screening_length
 from ninespring.models import Array, read_array, read_model
 
 pytest.importorskip("skfem", reason="SKIPPED: scikit-fem is missing: pip install 'ninespring[explore]'")
 pytest.importorskip("gmsh", reason="SKIPPED: gmsh is missing: pip install 'ninespring[explore]'", exc_type=Exception)
 
-from ninespring.explore import closed_forms, couplings, geometry
-from ninespring.explore.cooling import Cooling
-from ninespring.explore.field import Mesh, screening_length
 
 COARSE = Mesh(9, 2, 1)
 
@@ -123,7 +123,9 @@ def test_the_command_writes_a_model_that_the_others_read(tmp_path: Path) -> None
 
 def test_a_larger_array_repeats_what_a_part_of_it_does() -> None:
     part = geometry.geometry_of(Array(3, 3, 5.0))
-    lumped = couplings.Lumped({"plate_coupling_w_per_k": 1e-3, "plate_loss_w_per_k": 0.01, "edge_loss_fraction": 0.1}, {}, 0.0)
+    lumped = couplings.Lumped(
+        {"plate_coupling_w_per_k": 1e-3, "plate_loss_w_per_k": 0.01, "edge_loss_fraction": 0.1}, {}, 0.0
+    )
     lumped.values |= {"plate_heat_capacity_j_per_k": 2.0, "loss_w_per_k": 1e-3, "loss_fan_w_per_k": 2e-3}
     whole = replace(part, rows=8, cols=8)
     model = couplings.model_of(Array(8, 8, 5.0), whole, part, lumped, {})
@@ -142,7 +144,10 @@ def test_a_larger_array_repeats_what_a_part_of_it_does() -> None:
         ("[array]\nrows=3\ncols=3\npitch_mm=5\n[cooling]\nfan_m_per_s=-1\n", "it must be 0 to 10"),
         ("[array]\nrows=3\ncols=3\npitch_mm=5\n[cooling]\nfan_m_per_s=0.01\n", "write 0 for still air"),
         ("[array]\nrows=3\ncols=3\npitch_mm=5\n[cooling]\nspring_length_mm=5\n", "do not fit into 5 mm"),
-        ("[array]\nrows=3\ncols=3\npitch_mm=5\n[cooling]\nbaffle='steel'\nbaffle_thickness_mm=1\n", "does not fit between"),
+        (
+            "[array]\nrows=3\ncols=3\npitch_mm=5\n[cooling]\nbaffle='steel'\nbaffle_thickness_mm=1\n",
+            "does not fit between",
+        ),
         ("[array]\nrows=3\ncols=3\npitch_mm=6\n[cooling]\nbaffle='steel'\nplate='none'\n", "plate must not be none"),
         ("[array]\nrows=3\ncols=3\npitch_mm=6\n[spring]\ncoil_diameter_mm=0.7\n", "cannot be wound"),
         ("cooling = 3\n[array]\nrows=3\ncols=3\npitch_mm=6\n", "must be a table"),

@@ -17,14 +17,14 @@ import pytest
 from click.testing import CliRunner
 from ninespring import cli, native
 from ninespring.errors import InputError
+from ninespring.explore import point, sweep
+from ninespring.explore.results import Results
+from ninespring.explore.spec import METRICS, Spec, read_spec
 
 distributed = pytest.importorskip("distributed", reason="SKIPPED: dask is missing: pip install 'ninespring[explore]'")
 pytest.importorskip("pyarrow", reason="SKIPPED: pyarrow is missing: pip install 'ninespring[explore]'")
 pytest.importorskip("SALib", reason="SKIPPED: SALib is missing: pip install 'ninespring[explore]'")
 
-from ninespring.explore import point, sweep
-from ninespring.explore.results import Results
-from ninespring.explore.spec import METRICS, Spec, read_spec
 
 SHORT = "duration_s = 60\non_s = 40\n"
 
@@ -129,7 +129,9 @@ def test_indices_say_what_matters(tmp_path: Path) -> None:
         '[sweep]\nmethod = "saltelli"\npoints = 256\n[vary]\npitch_mm = {from = 5, to = 8}\nfan = {from = 0, to = 1}\n',
     )
     points = list(spec.all_points())
-    made = {name: [np.nan] * len(points) for name in METRICS} | {"hottest_c": [3 * p["fan"] + p["pitch_mm"] / 3 for p in points]}
+    made = {name: [np.nan] * len(points) for name in METRICS} | {
+        "hottest_c": [3 * p["fan"] + p["pitch_mm"] / 3 for p in points]
+    }
     found = sweep.indices_of(spec, pd.DataFrame(made))
     assert list(found) == ["hottest_c"]
     # variances 9/12 and 1/12
@@ -155,13 +157,20 @@ def test_the_optimiser_finds_the_best_and_carries_on(tmp_path: Path, client: Any
 
 
 def test_a_point_that_the_chip_refuses_is_kept_with_its_reason(tmp_path: Path) -> None:
-    spec = spec_of(tmp_path, f"[sweep]\n{SHORT}[fixed]\nlatent_heat_j_per_kg = 100000\nturns = 10\n[vary]\nfan = [0, 1]\n".replace("turns = 10\n", "density_kg_per_m3 = 20000\n"))
+    spec = spec_of(
+        tmp_path,
+        f"[sweep]\n{SHORT}[fixed]\nlatent_heat_j_per_kg = 100000\nturns = 10\n[vary]\nfan = [0, 1]\n".replace(
+            "turns = 10\n", "density_kg_per_m3 = 20000\n"
+        ),
+    )
     row = point.run_point(spec, 0, next(spec.all_points()))
     assert "latent_heat_j" in row["error"] and np.isnan(row["hottest_c"])
 
 
 def test_geometry_goes_into_the_points(tmp_path: Path) -> None:
-    pytest.importorskip("gmsh", reason="SKIPPED: gmsh is missing: pip install 'ninespring[explore]'", exc_type=Exception)
+    pytest.importorskip(
+        "gmsh", reason="SKIPPED: gmsh is missing: pip install 'ninespring[explore]'", exc_type=Exception
+    )
     text = (
         f'[sweep]\ncouplings = "field"\n{SHORT}[fixed]\nrows = 1\ncols = 2\npattern = "middle"\nfan_m_per_s = 0\n'
         'plate = "none"\n[vary]\npitch_mm = [5, 7]\n'
@@ -179,7 +188,10 @@ HEAD = "[sweep]\n"
     [
         (HEAD + "[vary]\npich_mm = [5]\n", "did you mean pitch_mm?"),
         (HEAD + "[vary]\npitch_mm = {from = 6, to = 5, steps = 3}\n", "from 6 to 5: the wrong way round"),
-        (HEAD + "[vary]\npitch_mm = {from = 4, to = 5, steps = 2}\n", "point 1 (pitch_mm 4) cannot exist: coils overlap"),
+        (
+            HEAD + "[vary]\npitch_mm = {from = 4, to = 5, steps = 2}\n",
+            "point 1 (pitch_mm 4) cannot exist: coils overlap",
+        ),
         (HEAD + "[vary]\nfan = [0, 1]\nsize = [3, 9]\n", "size is 9"),
         (HEAD + "[vary]\nrows = [9]\ncols = [8]\n", "9 x 8 are more than 64 springs"),
         (HEAD + "[vary]\nfan = [0, 2]\n", "it must be 0 to 1"),
@@ -213,13 +225,23 @@ def test_the_command_runs_and_says_where_the_dashboard_is(tmp_path: Path) -> Non
     looked = subprocess.run([*words, "--check"], cwd=tmp_path, capture_output=True, text=True, check=True, timeout=60)
     assert "6 points, pitch_mm, fan" in looked.stdout and not (tmp_path / "out").exists()
     done = subprocess.run(
-        [*words, "--workers", "1", "--json", "r.json"], cwd=tmp_path, capture_output=True, text=True, check=False, timeout=600
+        [*words, "--workers", "1", "--json", "r.json"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=600,
     )
     assert done.returncode == 0, done.stderr
     assert "Dask's dashboard: http://127.0.0.1:" in done.stdout and "6 points in out/points" in done.stdout
     assert json.loads((tmp_path / "r.json").read_text())["points"] == 6
     nowhere = subprocess.run(
-        [*words[:-1], "other", "--scheduler", "tcp://127.0.0.1:9"], cwd=tmp_path, capture_output=True, text=True, check=False, timeout=600
+        [*words[:-1], "other", "--scheduler", "tcp://127.0.0.1:9"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=600,
     )
     assert nowhere.returncode == 1 and "no Dask scheduler" in nowhere.stderr
 

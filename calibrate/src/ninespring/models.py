@@ -141,7 +141,9 @@ class _Reader:
             if value not in cooling.WORDS[key]:
                 close = difflib.get_close_matches(str(value), cooling.WORDS[key], 1)
                 hint = f" (did you mean {close[0]}?)" if close else ""
-                raise self.refuse(f"[cooling] {key} has no '{value}'{hint}; it has {', '.join(cooling.WORDS[key])}", key)
+                raise self.refuse(
+                    f"[cooling] {key} has no '{value}'{hint}; it has {', '.join(cooling.WORDS[key])}", key
+                )
             out[key] = value
         return out
 

@@ -29,7 +29,9 @@ def _answers(geometry: Geometry, mesh: Mesh, film: Film, right: np.ndarray) -> n
     """Return the springs' mean steady rise, for powers in them; no radiation."""
     mesh = replace(mesh, along=1)  # along the axis nothing changes, or a parabola: one quadratic element has it
     field = build(geometry, False, mesh, film)
-    return field.spring.T @ Solver(field.conductance, field.capacity, 0.0).solve(0.0, field.spring @ right[:, None])[:, 0]
+    return (
+        field.spring.T @ Solver(field.conductance, field.capacity, 0.0).solve(0.0, field.spring @ right[:, None])[:, 0]
+    )
 
 
 def two_cylinders(mesh: Mesh) -> tuple[float, float]:

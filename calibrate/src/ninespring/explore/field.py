@@ -15,7 +15,7 @@ import numpy as np
 from scipy import optimize, sparse, special
 
 from . import correlations as by
-from .cooling import DIRECTIONS, MATERIALS
+from .cooling import MATERIALS
 from .geometry import Geometry
 from .mesh import Box, plan_mesh
 

@@ -59,7 +59,13 @@ def _size(gmsh: Any, centres: Sequence[Point], near: float, far: float, from_m: 
     distance = gmsh.model.mesh.field.add("Distance")
     gmsh.model.mesh.field.setNumbers(distance, "PointsList", points)
     size = gmsh.model.mesh.field.add("Threshold")
-    for name, value in {"InField": distance, "SizeMin": near, "SizeMax": far, "DistMin": from_m, "DistMax": to_m}.items():
+    for name, value in {
+        "InField": distance,
+        "SizeMin": near,
+        "SizeMax": far,
+        "DistMin": from_m,
+        "DistMax": to_m,
+    }.items():
         gmsh.model.mesh.field.setNumber(size, name, value)
     gmsh.model.mesh.field.setAsBackgroundMesh(size)
 
@@ -73,7 +79,11 @@ def plan_mesh(box: Box, centres: Sequence[Point], radius: float, walls: Sequence
         reach = same_area(radius, corners)
         for x, y in centres:
             points = [
-                occ.addPoint(x + reach * math.cos(2 * math.pi * k / corners), y + reach * math.sin(2 * math.pi * k / corners), 0.0)
+                occ.addPoint(
+                    x + reach * math.cos(2 * math.pi * k / corners),
+                    y + reach * math.sin(2 * math.pi * k / corners),
+                    0.0,
+                )
                 for k in range(corners)
             ]
             edges = [occ.addLine(points[k], points[(k + 1) % corners]) for k in range(corners)]
@@ -100,7 +110,9 @@ def ring_mesh(wire: float, coil: float, half: float, far: float, elements: int) 
         if reach >= half:
             reach = wire  # turns that touch: the corners must not stand out
         points = [
-            occ.addPoint(coil + reach * math.cos(2 * math.pi * k / corners), reach * math.sin(2 * math.pi * k / corners), 0.0)
+            occ.addPoint(
+                coil + reach * math.cos(2 * math.pi * k / corners), reach * math.sin(2 * math.pi * k / corners), 0.0
+            )
             for k in range(corners)
         ]
         edges = [occ.addLine(points[k], points[(k + 1) % corners]) for k in range(corners)]

@@ -125,5 +125,3 @@ def metrics_of(spec: Spec, point: Mapping[str, Any], seed: int) -> dict[str, flo
         out["undriven_c"] = float(t[:, ~pattern].max())
         out["undriven_austenite"] = float(x[:, ~pattern].max())
     return out
-
-

@@ -68,7 +68,12 @@ class Results:
         """Return all rows as a table (pandas), by point."""
         import pyarrow.dataset as dataset
 
-        return dataset.dataset(self.points, format="parquet").to_table().to_pandas().sort_values("point", ignore_index=True)
+        return (
+            dataset.dataset(self.points, format="parquet")
+            .to_table()
+            .to_pandas()
+            .sort_values("point", ignore_index=True)
+        )
 
 
 def _whole(path: Path, data: bytes) -> None:

@@ -115,7 +115,11 @@ class Spec:
         if self.method == "saltelli":
             from SALib.sample import sobol
 
-            problem = {"num_vars": len(self.axes), "names": [a.key for a in self.axes], "bounds": [[0, 1]] * len(self.axes)}
+            problem = {
+                "num_vars": len(self.axes),
+                "names": [a.key for a in self.axes],
+                "bounds": [[0, 1]] * len(self.axes),
+            }
             return sobol.sample(problem, self.asked, calc_second_order=False, seed=self.seed)
         return None
 
@@ -266,7 +270,7 @@ class _Reader:
         if spec.couplings == "law":
             for key in (*SPRING_KEYS, *cooling.KEYS):
                 if key in fixed or key in vary:
-                    raise self.refuse(f"{key}: the paper's law knows only pitch and fan; couplings = \"field\"", key)
+                    raise self.refuse(f'{key}: the paper\'s law knows only pitch and fan; couplings = "field"', key)
         self.optimise(spec)
         spec.text = read_bytes(self.path).decode()
         spec.sha256 = hashlib.sha256(json.dumps(self.data, sort_keys=True).encode()).hexdigest()
@@ -292,7 +296,9 @@ class _Reader:
 
 def named(point: Mapping[str, Any]) -> str:
     """Return a point's numbers as words."""
-    return ", ".join(f"{key} {value:.4g}" if isinstance(value, float) else f"{key} {value}" for key, value in point.items())
+    return ", ".join(
+        f"{key} {value:.4g}" if isinstance(value, float) else f"{key} {value}" for key, value in point.items()
+    )
 
 
 def read_spec(path: Path) -> Spec:

@@ -40,7 +40,15 @@ def local_cluster(workers: int) -> Any:
     import dask
     from distributed import LocalCluster
 
-    dask.config.set({"distributed.scheduler.allowed-failures": LOSSES, "distributed.admin.log-format": "%(message)s"})
+    dask.config.set(
+        {
+            "distributed.scheduler.allowed-failures": LOSSES,
+            # what Dask does all the time beside the work
+            "distributed.worker.profile.enabled": False,
+            "distributed.admin.tick.interval": "1s",
+            "distributed.admin.system-monitor.interval": "2s",
+        }
+    )
     return LocalCluster(
         n_workers=workers, threads_per_worker=1, dashboard_address="127.0.0.1:0", silence_logs="ERROR", memory_limit=0
     )
@@ -160,7 +168,11 @@ def indices_of(spec: Spec, table: Any, seed: int = 0) -> dict[str, dict[str, dic
 
     from .spec import METRICS
 
-    problem = {"num_vars": len(spec.axes), "names": [axis.key for axis in spec.axes], "bounds": [[0, 1]] * len(spec.axes)}
+    problem = {
+        "num_vars": len(spec.axes),
+        "names": [axis.key for axis in spec.axes],
+        "bounds": [[0, 1]] * len(spec.axes),
+    }
     out: dict[str, dict[str, dict[str, float]]] = {}
     for metric in METRICS:
         values = table[metric].to_numpy()

@@ -116,7 +116,9 @@ def _evaluate(spec: Any, table: Any, output: Path) -> dict[str, Any]:
         if best is None:
             raise WorkError(f"no point keeps the limits and has {spec.metric}: all {len(table)} are in {output}/points")
         words = ", ".join(f"{axis.key} {best[axis.key]}" for axis in spec.axes)
-        out.print(f"best {spec.metric}: {best[spec.metric]:.4g} {UNITS[spec.metric]} at {words}", soft_wrap=True, markup=False)
+        out.print(
+            f"best {spec.metric}: {best[spec.metric]:.4g} {UNITS[spec.metric]} at {words}", soft_wrap=True, markup=False
+        )
         return {"best": {axis.key: _plain(best[axis.key]) for axis in spec.axes} | {spec.metric: best[spec.metric]}}
     if spec.method != "saltelli":
         return {}
