@@ -14,6 +14,7 @@ from typing import Any
 
 import matplotlib as mpl
 import pandas as pd
+from matplotlib import pyplot as plt
 
 mpl.use("svg")
 mpl.rcParams |= {
@@ -22,8 +23,6 @@ mpl.rcParams |= {
     "font.size": 9,
     "figure.constrained_layout.use": True,
 }
-from matplotlib import pyplot as plt
-
 ROOT = Path(__file__).resolve().parents[2]
 STILL, FAN = "#c2410c", "#1d4ed8"
 AUSTENITE_START_C = 88
