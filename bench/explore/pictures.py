@@ -67,7 +67,7 @@ def paper(work: Path) -> Any:
             axis.plot(at, values, "o-", color=colour, label=f"geometry alone, {reading} mm")
         axis.set(title="fan" if fan else "still air", xlabel="pitch, mm")
     axes[0].set_ylabel("undriven centre, degC\n(eight at 105)")
-    axes[0].legend(fontsize=7)
+    axes[1].legend(fontsize=7)
     return figure
 
 
