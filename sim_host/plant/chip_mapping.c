@@ -150,6 +150,7 @@ static void map_loss(mapping_t *m)
 {
     const bool edge = is_on(m, EFFECT_edge_loss), mismatch = is_on(m, EFFECT_spring_mismatch);
     const double per_side = array_value(m, "edge_loss_fraction");
+    const double fan_per_side = per_side * array_value(m, "edge_loss_fan_share");
     const int rows = m->chip.rows, columns = m->chip.columns;
     double natural[PLANT_MAX_SPRINGS] = {0.0}, forced[PLANT_MAX_SPRINGS] = {0.0};
     double factor = 1.0, rise = 0.0, fan_loss = 0.0;
@@ -162,10 +163,11 @@ static void map_loss(mapping_t *m)
         const int row = i / columns, column = i % columns;
         const int free_sides =
             (row == 0) + (row == rows - 1) + (column == 0) + (column == columns - 1);
-        const double scale = (mismatch ? value_of(m, "loss_scale", i) : 1.0) *
-                             (edge ? 1.0 + per_side * free_sides : 1.0);
+        const double own = mismatch ? value_of(m, "loss_scale", i) : 1.0;
+        const double scale = own * (edge ? 1.0 + per_side * free_sides : 1.0);
+        const double fan_scale = own * (edge ? 1.0 + fan_per_side * free_sides : 1.0);
         natural[i] = scale * (correlation ? factor : factor * value_of(m, "loss_w_per_k", i));
-        forced[i] = scale * (correlation ? fan_loss : value_of(m, "loss_fan_w_per_k", i));
+        forced[i] = fan_scale * (correlation ? fan_loss : value_of(m, "loss_fan_w_per_k", i));
     }
     double spread = 0.0, fan_spread = 0.0;
     const double mean = mean_of(m, natural, &spread);

@@ -133,8 +133,12 @@ void plant_network_prepare(plant_t *p)
         const int free_sides = 4 - (p->orthogonal_start[i + 1] - p->orthogonal_start[i]);
         p->capacity[i] = p->value[P_heat_capacity_j_per_k][i] * heavier;
         p->loss_scale[i] = mismatch ? p->value[P_loss_scale][i] : 1.0;
-        if (p->on[E_edge_loss])
-            p->loss_scale[i] *= 1.0 + scalar(p, P_edge_loss_fraction) * free_sides;
+        p->loss_scale_fan[i] = p->loss_scale[i];
+        if (p->on[E_edge_loss]) {
+            const double more = scalar(p, P_edge_loss_fraction) * free_sides;
+            p->loss_scale[i] *= 1.0 + more;
+            p->loss_scale_fan[i] *= 1.0 + scalar(p, P_edge_loss_fan_share) * more;
+        }
 
         static const int row_of[4] = {0, -1, 0, 1}, column_of[4] = {-1, 0, 1, 0};
         const int direction = (int)scalar(p, P_wake_direction);
@@ -175,7 +179,7 @@ void plant_network_prepare_inputs(plant_t *p)
            plate_sum = scalar(p, P_plate_loss_w_per_k);
     for (int i = 0; i < n; i++) {
         p->loss_natural[i] = p->value[P_loss_w_per_k][i] * (1.0 - fan) * p->loss_scale[i];
-        p->loss_forced[i] = p->value[P_loss_fan_w_per_k][i] * fan * p->loss_scale[i];
+        p->loss_forced[i] = p->value[P_loss_fan_w_per_k][i] * fan * p->loss_scale_fan[i];
         p->loss_sum[i] = p->loss_natural[i] + p->loss_forced[i];
         if (p->mode[i] == PLANT_DRIVE_TEMPERATURE)
             p->any_held = true;

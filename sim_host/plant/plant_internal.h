@@ -80,7 +80,7 @@ struct plant {
     unsigned char orthogonal[4 * MAX_SPRINGS], diagonal[4 * MAX_SPRINGS];
     int upstream[MAX_SPRINGS]; /* -1: none */
     double capacity[MAX_SPRINGS + 2], inverse_capacity[MAX_SPRINGS + 2];
-    double loss_scale[MAX_SPRINGS]; /* edge and mismatch */
+    double loss_scale[MAX_SPRINGS], loss_scale_fan[MAX_SPRINGS]; /* edge and mismatch */
     double loss_natural[MAX_SPRINGS], loss_forced[MAX_SPRINGS];
     double loss_sum[MAX_SPRINGS]; /* natural + forced */
     double coupling_orthogonal, coupling_diagonal;

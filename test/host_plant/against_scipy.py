@@ -48,6 +48,7 @@ SCALARS = {
     "plate_loss_w_per_k": (0.01, 0.1),
     "wake_w_per_k": (0, 2e-3),
     "edge_loss_fraction": (0, 0.3),
+    "edge_loss_fan_share": (0, 2),
     "supply_resistance_ohm": (0, 0.5),
     "ambient_ramp_k_per_h": (-20, 20),
     "ambient_amplitude_k": (0, 3),
@@ -101,8 +102,11 @@ class Model:
         self.heavier = values["heat_capacity_scale"] if mismatch else one
         self.ohm_scale = values["resistance_scale"] if mismatch else one
         self.loss_scale = values["loss_scale"] if mismatch else one
+        self.fan_loss_scale = self.loss_scale
         if "edge_loss" in on:
-            self.loss_scale = self.loss_scale * (1 + values["edge_loss_fraction"] * (4 - self.orthogonal.sum(1)))
+            more = values["edge_loss_fraction"] * (4 - self.orthogonal.sum(1))
+            self.fan_loss_scale = self.loss_scale * (1 + values["edge_loss_fan_share"] * more)
+            self.loss_scale = self.loss_scale * (1 + more)
         self.capacity = values["heat_capacity_j_per_k"] * self.heavier
         self.shift = self.contact = np.zeros(self.n)
         self.step(values)
@@ -236,7 +240,7 @@ class Model:
         """Conductance to the air (n,), W/K."""
         v = self.v
         natural = v["loss_w_per_k"] * (1 - fan) * self.loss_scale
-        forced = v["loss_fan_w_per_k"] * fan * self.loss_scale
+        forced = v["loss_fan_w_per_k"] * fan * self.fan_loss_scale
         if "natural_convection" not in self.on:
             return natural + forced
         rise = abs(t - air)

@@ -15,6 +15,8 @@ from .board_commands import add_board_commands
 from .console import Group, err
 from .dashboard.command import dashboard
 from .errors import InputError, WorkError
+from .explore.couplings_command import couplings
+from .explore.sweep_command import sweep
 from .export.command import export, verify
 from .fit.command import fit
 from .fit.predict_command import predict, replay
@@ -35,7 +37,7 @@ def cli() -> None:
     """Calibrate the thermal model of an array of NiTi springs, and say what the model lacks."""
 
 
-for command in (fit, diagnose, predict, replay, export, verify, import_, plan, plot, dashboard):
+for command in (fit, diagnose, predict, replay, export, verify, import_, plan, plot, couplings, sweep, dashboard):
     cli.add_command(command)
 add_board_commands(cli)
 

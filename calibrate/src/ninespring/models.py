@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from . import __version__, native
+from .explore import cooling
 from .toml_file import At, TomlFile, did_you_mean
 
 SCHEMA = "ninespring.model/1"
@@ -47,6 +48,8 @@ class Array:
     spring: dict[str, float] = field(default_factory=dict)
     material: dict[str, float] = field(default_factory=dict)
     sensor: dict[str, Any] = field(default_factory=dict)
+    cooling: dict[str, Any] = field(default_factory=dict)
+    """What `ninespring couplings` reckons with; nothing else looks at it, and no model keeps it."""
 
     @property
     def springs(self) -> int:
@@ -92,11 +95,25 @@ def _array(file: TomlFile) -> Array:
     return array
 
 
+def _cooling(file: TomlFile) -> dict[str, Any]:
+    given = dict(file.table(("cooling",), cooling.KEYS))
+    for key, value in given.items():
+        at = ("cooling", key)
+        if key in cooling.NUMBERS:
+            given[key] = file.number(at, *cooling.NUMBERS[key])
+        elif value not in (words := cooling.WORDS[key]):
+            has = f"{did_you_mean(str(value), words)}; it has {', '.join(words)}"
+            raise file.refuse(f"[cooling] {key} has no '{value}'{has}", at)
+    return given
+
+
 def read_array(path: str | Path) -> Array:
     """Read array.toml; refused with file, line and column where it breaks docs/files.md."""
     file = TomlFile(path)
-    file.table((), TABLES)
-    return _array(file)
+    file.table((), (*TABLES, "cooling"))
+    array = _array(file)
+    array.cooling = _cooling(file)
+    return array
 
 
 def read_model(path: str | Path) -> Model:

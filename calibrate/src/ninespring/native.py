@@ -439,6 +439,39 @@ def chip_drive(
     return temperature, austenite
 
 
+def chip_run(
+    plant: Plant, lines: str, pattern: Sequence[bool], fan: float, seed: int, rows: int, on_rows: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Drive a copy of a plant from cold by the chip's controller: the pattern on for `on_rows` seconds, then off.
+
+    Return true temperatures (degC) and austenite, (rows, springs), and of each second heat (W) and current (A) of all.
+    """
+    from .errors import WorkError
+
+    temperature, austenite = np.empty((rows, plant.springs)), np.empty((rows, plant.springs))
+    power, current = np.empty(rows), np.empty(rows)
+    wanted = (ctypes.c_int * plant.springs)(*map(int, pattern))
+    message = ctypes.create_string_buffer(256)
+    call = library().chip_run
+    call.restype = ctypes.c_int
+    call.argtypes = (
+        ctypes.c_void_p,
+        ctypes.c_char_p,
+        _int_p,
+        ctypes.c_double,
+        ctypes.c_uint64,
+        ctypes.c_size_t,
+        ctypes.c_size_t,
+        *(_double_p,) * 4,
+        ctypes.c_char_p,
+        ctypes.c_size_t,
+    )
+    outputs = [_pointer(one) for one in (temperature, austenite, power, current)]
+    if call(plant._plant, lines.encode(), wanted, fan, seed, rows, on_rows, *outputs, message, len(message)):
+        raise WorkError(f"the chip refuses {message.value.decode()}")
+    return temperature, austenite, power, current
+
+
 def paper_configure(plant: Plant, pitch_mm: float) -> None:
     """Give a plant the paper's loss and couplings at a pitch (sim_host/plant/paper.h)."""
     call = library().paper_configure

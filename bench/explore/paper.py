@@ -1,0 +1,95 @@
+"""The paper's six COMSOL temperatures from geometry alone, beside today's fit and the camera. Nothing here is fitted.
+
+    .venv/bin/python bench/explore/paper.py [--mesh fine] [--json FILE]
+
+Eight springs at COMSOL's 105 degC (the camera's were at 99), the centre undriven, steady: the full field, not the network.
+A 4 mm pitch overlaps coils of 3.45 mm mean diameter (4.25 mm outside), so there are two readings: 3.45 mm is the OUTER
+diameter (mean 2.65: exists at 4, 5, 6 mm), or the mean one (exists at 5 and 6 mm only).
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+
+import numpy as np
+from ninespring import native
+from ninespring.errors import InputError
+from ninespring.explore.couplings import fields_of
+from ninespring.explore.field import MESHES
+from ninespring.explore.geometry import geometry_of
+from ninespring.explore.modes import Modes
+from ninespring.models import Array
+
+HOT_C, AMBIENT_C, CENTRE = 105.0, 20.0, 4
+COMSOL = {(4, 0): 52, (4, 1): 42, (5, 0): 45, (5, 1): 35, (6, 0): 40, (6, 1): 31}
+CAMERA = {(4, 0): 63, (4, 1): 55, (5, 0): 57, (5, 1): 50, (6, 0): 55, (6, 1): 49}
+READINGS = {"outer 3.45": 2.65, "mean 3.45": 3.45}
+
+
+def centre_c(modes: Modes) -> tuple[float, float]:
+    """Return the centre's temperature (degC) where the other eight are held, and what holds a corner (W)."""
+    response = modes.response()
+    hot = [k for k in range(9) if k != CENTRE]
+    power = np.linalg.solve(response[np.ix_(hot, hot)], np.full(8, HOT_C - AMBIENT_C))
+    return AMBIENT_C + float(response[CENTRE, hot] @ power), float(power[0])
+
+
+def fitted_c(pitch_mm: float, fan: int) -> float:
+    """Return what the paper's spacing law, fitted to these six, makes of it."""
+    plant = native.Plant(3, 3)
+    native.paper_configure(plant, pitch_mm)
+    plant.set_fan(fan)
+    for k in range(9):
+        plant.drive(k, *((native.POWER, 0.0) if k == CENTRE else (native.TEMPERATURE, HOT_C)))
+    plant.settle()
+    return float(plant.temperature_c()[CENTRE])
+
+
+def main() -> None:
+    """Reckon, print."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--mesh", choices=MESHES, default="normal")
+    parser.add_argument("--json", type=Path)
+    options = parser.parse_args()
+    figures = []
+    print(
+        f"{'reading':>12} {'pitch':>5} {'fan':>3} {'COMSOL':>7} {'fit':>6} {'geometry':>9} {'camera':>7} {'corner W':>9}"
+    )
+    for reading, coil in READINGS.items():
+        off: dict[str, list[float]] = {"COMSOL": [], "camera": []}
+        for pitch in (4, 5, 6):
+            try:
+                geometry = geometry_of(Array(3, 3, float(pitch), {"coil_diameter_mm": coil}))
+            except InputError as error:
+                print(f"{reading:>12} {pitch:5}  {error}")
+                continue
+            for fan, modes in enumerate(fields_of(geometry, MESHES[options.mesh])):
+                assert modes is not None
+                found, corner_w = centre_c(modes)
+                case = pitch, fan
+                off["COMSOL"].append(found - COMSOL[case])
+                off["camera"].append(found - CAMERA[case])
+                print(
+                    f"{reading:>12} {pitch:5} {fan:3} {COMSOL[case]:7} {fitted_c(pitch, fan):6.1f} {found:9.1f} "
+                    f"{CAMERA[case]:7} {corner_w:9.3f}",
+                    flush=True,
+                )
+                figures.append(
+                    {"figure": f"centre, {reading} mm, pitch {pitch} mm, {'fan' if fan else 'still'}"}
+                    | {"value": round(found, 1), "unit": "degC", "target": None}
+                )
+        for against, errors in off.items():
+            rms = float(np.sqrt(np.mean(np.square(errors))))
+            print(f"{reading:>12} rms from {against}: {rms:.1f} K over {len(errors)} cases")
+            figures.append(
+                {"figure": f"rms from {against}, {reading} mm", "value": round(rms, 1), "unit": "K", "target": None}
+            )
+    if options.json:
+        command = f"bench/explore/paper.py --mesh {options.mesh}"
+        options.json.write_text(json.dumps([one | {"command": command} for one in figures], indent=1) + "\n")
+
+
+if __name__ == "__main__":
+    main()

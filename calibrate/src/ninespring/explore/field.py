@@ -1,0 +1,328 @@
+"""The field: heat conduction in springs, air, walls and plates, three-dimensional, by finite elements.
+
+Elements are prisms: quadratic triangles in the plan times quadratic intervals along the axis, for every material's border is
+either upright or level. The air conducts, and gives its heat to the stream at `sink` W/m3K: so much that ONE spring alone
+in an endless array-less room loses what the correlation says (`screening_length`). What the fan's stream has taken up
+it carries from cell to cell (`stream`), one cell a spring.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy import optimize, sparse, special
+
+from . import correlations as by
+from .cooling import MATERIALS
+from .geometry import Geometry
+from .mesh import Box, plan_mesh
+
+MM = 1e-3
+RADIAL_W_PER_MK = 18.0
+"""Of a spring across its axis: NiTi. Nine times less changes nothing: the air around conducts six hundred times less."""
+PLATE_RISE_K = 15.0
+"""Of a plate's outer face above the room, where its coefficient is taken."""
+PLATE_EMISSIVITY = 0.9
+GRADING = 1.8
+"""Elements along the axis grow from the ends: so much of the field is there."""
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """How fine: corners of a circle, elements along half of the springs and through a plate."""
+
+    corners: int = 12
+    along: int = 3
+    plate: int = 1
+
+    def coarser(self) -> Mesh:
+        """Return the mesh of elements COARSER times as large."""
+        return Mesh(*(max(1, round(one / COARSER)) for one in (self.corners, self.along, self.plate)))
+
+
+COARSER = 1.5
+MESHES = {"coarse": Mesh(9, 2, 1), "normal": Mesh(12, 3, 1), "fine": Mesh(18, 5, 2)}
+
+
+def screening_length(nusselt: float, radius: float) -> float:
+    """Return lambda of k T'' = k T / lambda^2 around a cylinder, at which it loses Nu = 2 x K1(x) / K0(x), x = r / lambda."""
+    x = optimize.brentq(lambda x: 2 * x * special.k1e(x) / special.k0e(x) - nusselt, 1e-6, 1e3)
+    return radius / x
+
+
+@dataclass
+class Film:
+    """What correlations say of one spring alone, at a speed of the air."""
+
+    convection_w_per_m2k: float
+    air_w_per_mk: float
+    lambda_m: float
+
+    @property
+    def sink_w_per_m3k(self) -> float:
+        """What the air gives to the stream."""
+        return self.air_w_per_mk / self.lambda_m**2
+
+
+def film_of(geometry: Geometry, fan: bool) -> Film:
+    """Return the film around one spring, the air still or blown."""
+    spring, cooling = geometry.spring, geometry.cooling
+    radius = spring.radius_mm * MM
+    surface, air = cooling.surface_c, geometry.ambient_c
+    h = by.natural_upright_cylinder(2 * radius, spring.length_mm * MM, surface, air)
+    if fan:
+        h = by.mixed(h, by.cross_flow_cylinder(2 * radius, cooling.fan_m_per_s, surface, air))
+    k = by.air_conductivity(0.5 * (surface + air))
+    return Film(h, k, screening_length(h * 2 * radius / k, radius))
+
+
+@dataclass
+class Region:
+    """A material in the plan, in one layer."""
+
+    across: float
+    along: float
+    heat: float
+    sink: float = 0.0
+
+
+@dataclass
+class Layer:
+    """A slice of the height, m, and what is in it."""
+
+    thickness: float
+    elements: int
+    air: Region
+    wall: Region
+    spring: Region
+    holds_springs: bool
+    graded: int = 0
+    """1: the elements are small at the lower end, -1 at the upper."""
+
+
+@dataclass
+class Field:
+    """The assembled problem: conductances (W/K), heat capacities (J/K), springs, streams."""
+
+    conductance: sparse.csc_matrix
+    capacity: sparse.csc_matrix
+    spring: np.ndarray
+    """(unknowns, springs): mean temperature of a spring is spring.T @ T; 1 W into it is spring @ 1."""
+    taken: np.ndarray
+    """(unknowns, springs): heat that a cell's air gives its stream is taken.T @ (T - stream)."""
+    radiated: np.ndarray
+    """(springs, springs), W/K: what springs radiate to each other and to the room, linear in their mean temperatures."""
+    flow_w_per_k: float
+    """Heat that the stream carries per K, one lane; inf where the air stands."""
+    lanes: list[list[int]]
+    """Springs in the order in which the stream meets them."""
+    outer: np.ndarray
+    """(unknowns,): W/K to the room through the plates' outer faces."""
+    freed: np.ndarray
+    """(unknowns,): W/K from the air to the room, where no cell's stream takes it up."""
+    place: np.ndarray
+    """(unknowns, 3): where each unknown is, m: east, north, up from the lower face."""
+    unknowns: int = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.unknowns = self.conductance.shape[0]
+
+
+def _layers(geometry: Geometry, film: Film, mesh: Mesh) -> tuple[list[Layer], bool]:
+    """Return slices from the lower face up, and whether they are one half of the height, the other being its mirror."""
+    spring, cooling = geometry.spring, geometry.cooling
+    heat = by.air_heat_per_m3k(0.5 * (cooling.surface_c + geometry.ambient_c))
+    air = Region(film.air_w_per_mk, film.air_w_per_mk, heat, film.sink_w_per_m3k)
+    coil = Region(RADIAL_W_PER_MK, spring.along_w_per_mk, spring.heat_per_m3k)
+    solid = air
+    if cooling.baffle != "none":
+        made = MATERIALS[cooling.baffle]
+        solid = Region(made.conductivity, made.conductivity, made.heat_per_m3k)
+    half = spring.length_mm * MM / 2.0
+    height = (cooling.baffle_height_mm or spring.length_mm) * MM
+    plates: list[Layer] = []
+    if cooling.plate != "none":
+        made = MATERIALS[cooling.plate]
+        one = Region(made.conductivity, made.conductivity, made.heat_per_m3k)
+        plates = [Layer(cooling.plate_thickness_mm * MM, mesh.plate, one, one, one, False)]
+    if cooling.baffle == "none" or height >= 2 * half * (1 - 1e-9):
+        return [*plates, Layer(half, mesh.along, air, solid, coil, True, 1)], True
+    low = max(1, round(2 * mesh.along * height / (2 * half)))
+    gap = [
+        Layer(height, low, air, solid, coil, True, 1),
+        Layer(2 * half - height, max(2, 2 * mesh.along - low), air, air, coil, True, -1),
+    ]
+    return [*plates, *gap, *plates], False
+
+
+def _heights(layers: list[Layer]) -> np.ndarray:
+    at, out = 0.0, [0.0]
+    for one in layers:
+        share = np.linspace(0.0, 1.0, one.elements + 1)[1:]
+        if one.graded > 0:
+            share = share**GRADING
+        elif one.graded < 0:
+            share = 1.0 - (1.0 - share) ** GRADING
+        out += list(at + one.thickness * share)
+        at += one.thickness
+    return np.array(out)
+
+
+def _line(layers: list[Layer]) -> tuple[np.ndarray, list[tuple[sparse.csr_matrix, sparse.csr_matrix]]]:
+    """Return the unknowns' heights, and stiffness and mass along the axis of each layer."""
+    from skfem import Basis, ElementLineP2, MeshLine
+    from skfem.models.poisson import laplace, mass
+
+    line = MeshLine(_heights(layers))
+    middles = line.p[0][line.t].mean(axis=0)
+    edges = np.cumsum([0.0, *(one.thickness for one in layers)])
+    out = []
+    for low, high in zip(edges[:-1], edges[1:], strict=True):
+        basis = Basis(line, ElementLineP2(), elements=np.flatnonzero((middles > low) & (middles < high)))
+        out.append((laplace.assemble(basis), mass.assemble(basis)))
+    return Basis(line, ElementLineP2()).doflocs[0], out
+
+
+def centres_of(geometry: Geometry) -> np.ndarray:
+    """Return the springs' axes, (springs, 2), m: x to the east, y to the north, row 1 in the north."""
+    pitch = geometry.pitch_mm * MM
+    return np.array([(c * pitch, -r * pitch) for r in range(geometry.rows) for c in range(geometry.cols)])
+
+
+def walls_of(geometry: Geometry) -> list[Box]:
+    """Return the walls half-way between the springs: along the fan's air where there is a fan, else both ways."""
+    cooling = geometry.cooling
+    if cooling.baffle == "none":
+        return []
+    pitch, half = geometry.pitch_mm * MM, cooling.baffle_thickness_mm * MM / 2.0
+    upright = [(c + 0.5) * pitch for c in range(geometry.cols - 1)]
+    level = [-(r + 0.5) * pitch for r in range(geometry.rows - 1)]
+    south, north = -(geometry.rows - 0.5) * pitch, 0.5 * pitch
+    west, east = -0.5 * pitch, (geometry.cols - 0.5) * pitch
+    blown = cooling.fan_m_per_s > 0
+    out: list[Box] = []
+    if not blown or cooling.fan_direction in ("south", "north"):
+        out += [(x - half, south, x + half, north) for x in upright]
+    if not blown or cooling.fan_direction in ("east", "west"):
+        out += [(west, y - half, east, y + half) for y in level]
+    return out
+
+
+def lanes_of(rows: int, cols: int, direction: str) -> list[list[int]]:
+    """Return the springs of each row or column, upstream first."""
+    number = np.arange(rows * cols).reshape(rows, cols)
+    lanes = (number if direction in ("east", "west") else number.T).tolist()
+    return [lane[::-1] if direction in ("west", "north") else lane for lane in lanes]
+
+
+def radiation_of(geometry: Geometry) -> np.ndarray:
+    """Return what the springs' smooth cylinders radiate, W/K: to the nearest in a row or column, the rest to the room.
+
+    Grey and weakly coupled (emissivity times view, no second reflections); a wall between counts as the room.
+    """
+    spring = geometry.spring
+    area = 2 * math.pi * spring.radius_mm * spring.length_mm * MM**2
+    whole = area * by.radiation(spring.emissivity, geometry.cooling.surface_c, geometry.ambient_c)
+    view = spring.emissivity * by.view_of_neighbour(2 * spring.radius_mm, geometry.pitch_mm)
+    n = geometry.rows * geometry.cols
+    out = whole * np.eye(n)
+    if geometry.cooling.baffle == "none":
+        for i in range(n):
+            for j in range(n):
+                if abs(i // geometry.cols - j // geometry.cols) + abs(i % geometry.cols - j % geometry.cols) == 1:
+                    out[i, j] = -whole * view
+    return out
+
+
+def build(geometry: Geometry, fan: bool, mesh: Mesh, film: Film | None = None) -> Field:
+    """Assemble an array's field, the air still or blown; `film`: another than the correlations'."""
+    from skfem import Basis, ElementTriP2
+    from skfem.models.poisson import laplace, mass
+
+    cooling, pitch, radius = geometry.cooling, geometry.pitch_mm * MM, geometry.spring.radius_mm * MM
+    film = film or film_of(geometry, fan)
+    centres, margin = centres_of(geometry), cooling.margin_mm * MM + radius
+    box = (*(centres.min(axis=0) - margin), *(centres.max(axis=0) + margin))
+    box = (box[0], box[1], box[2], box[3])
+    walls = walls_of(geometry)
+    plan = plan_mesh(box, [tuple(one) for one in centres], radius, walls, mesh.corners)
+    at = plan.p[:, plan.t].mean(axis=1)  # (2, triangles)
+    far = np.hypot(at[0, :, None] - centres[:, 0], at[1, :, None] - centres[:, 1])
+    owner, inside = far.argmin(axis=1), far.min(axis=1) < radius
+    wall = np.zeros(at.shape[1], dtype=bool)
+    for x0, y0, x1, y1 in walls:
+        wall |= (at[0] > x0) & (at[0] < x1) & (at[1] > y0) & (at[1] < y1)
+    wall &= ~inside
+    cell = (np.abs(at.T - centres[owner]) < pitch / 2.0).all(axis=1) & ~inside & ~wall
+
+    def parts(elements: np.ndarray) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:
+        basis = Basis(plan, ElementTriP2(), elements=np.flatnonzero(elements))
+        return laplace.assemble(basis), mass.assemble(basis)
+
+    n = len(centres)
+    regions = {"spring": parts(inside), "air": parts(~inside & ~wall)}
+    if wall.any():
+        regions["wall"] = parts(wall)
+    ones = np.ones(regions["air"][1].shape[0])
+    in_spring = np.array([parts(inside & (owner == j))[1] @ ones for j in range(n)]).T
+    in_cell = np.array([parts(cell & (owner == j))[1] @ ones for j in range(n)]).T
+
+    layers, mirrored = _layers(geometry, film, mesh)
+    times = 2.0 if mirrored else 1.0
+    heights, lines = _line(layers)
+    levels = len(heights)
+    stiff = capacity = None
+    spring, taken = np.zeros((len(ones) * levels, n)), np.zeros((len(ones) * levels, n))
+    freed = np.zeros(len(spring))
+    free = regions["air"][1] @ ones - (in_cell.sum(axis=1) if fan else 0.0)
+    for layer, (k1, m1) in zip(layers, lines, strict=True):
+        parts_of = {"spring": layer.spring, "air": layer.air, "wall": layer.wall}
+        across = sum(parts_of[name].across * regions[name][0] for name in regions)
+        sink = sum(parts_of[name].sink * regions[name][1] for name in regions)
+        along = sum(parts_of[name].along * regions[name][1] for name in regions)
+        heat = sum(parts_of[name].heat * regions[name][1] for name in regions)
+        here = sparse.kron(across + sink, m1) + sparse.kron(along, k1)
+        stiff = here if stiff is None else stiff + here
+        here = sparse.kron(heat, m1)
+        capacity = here if capacity is None else capacity + here
+        weight = np.asarray(m1.sum(axis=1)).ravel()
+        freed += layer.air.sink * np.kron(free, weight)
+        if layer.holds_springs:
+            spring += np.kron(in_spring, weight[:, None])
+            taken += layer.air.sink * np.kron(in_cell, weight[:, None])
+    # both outer faces of the plates give heat to the room
+    plan_mass = sum(one[1] for one in regions.values())
+    outer = np.zeros(len(spring))
+    if cooling.plate != "none":
+        side = math.sqrt((box[2] - box[0]) * (box[3] - box[1]))
+        hot = geometry.ambient_c + PLATE_RISE_K
+        h = by.natural_plate(side, hot, geometry.ambient_c) + by.radiation(PLATE_EMISSIVITY, hot, geometry.ambient_c)
+        order = np.argsort(heights)
+        for end in (order[0],) if mirrored else (order[0], order[-1]):
+            face = sparse.csr_matrix(([1.0], ([end], [end])), shape=(levels, levels))
+            stiff = stiff + h * sparse.kron(plan_mass, face)
+            outer += h * np.kron(np.asarray(plan_mass.sum(axis=1)).ravel(), face.diagonal())
+    stiff, capacity = times * sparse.csc_matrix(stiff), times * sparse.csc_matrix(capacity)
+    flow = math.inf
+    if fan:
+        heat = by.air_heat_per_m3k(geometry.ambient_c)
+        flow = heat * cooling.fan_m_per_s * pitch * geometry.spring.length_mm * MM
+    return Field(
+        stiff,
+        capacity,
+        spring / spring.sum(axis=0),
+        times * taken,
+        radiation_of(geometry),
+        flow,
+        lanes_of(geometry.rows, geometry.cols, cooling.fan_direction),
+        times * outer,
+        times * freed,
+        np.hstack(
+            [
+                np.repeat(Basis(plan, ElementTriP2()).doflocs.T, levels, axis=0),
+                np.tile(heights, len(ones))[:, None],
+            ]
+        ),
+    )

@@ -1,0 +1,160 @@
+"""The springs of an array as the field solution has them: upright cylinders between two plates.
+
+A coil is a stack of rings. Seen from outside, rings of wire a (radius) at a spacing s conduct into the air like a smooth
+cylinder: its radius is found by a field solution of one ring (`ring_radius_mm`), not assumed. Along its axis the cylinder
+conducts what the helix conducts; it has the helix' heat capacity.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import InputError
+from ..models import Array
+from .cooling import Cooling, cooling_of
+
+SLOWEST_M_PER_S = 0.05
+NITI_CONDUCTIVITY = 18.0
+"""W/mK, austenite (as test/worlds)."""
+PAPER_SPACING = 2.35
+"""Turns follow each other by so many wire diameters where nothing says otherwise: 110 mm of the paper's wire in 10 turns
+of 3.45 mm are 18.8 mm long."""
+
+
+@dataclass(frozen=True)
+class Spring:
+    """One spring, mm; its heat capacity in J/K."""
+
+    wire_mm: float
+    coil_mm: float
+    turns: float
+    wire_length_mm: float
+    length_mm: float
+    heat_capacity_j_per_k: float
+    emissivity: float
+
+    @property
+    def outer_mm(self) -> float:
+        """Outer diameter."""
+        return self.coil_mm + self.wire_mm
+
+    @property
+    def spacing_mm(self) -> float:
+        """From turn to turn."""
+        return self.length_mm / self.turns
+
+    @functools.cached_property
+    def radius_mm(self) -> float:
+        """Of the smooth cylinder that conducts into the air like the coil."""
+        return ring_radius_mm(self.wire_mm, self.coil_mm, self.spacing_mm)
+
+    @property
+    def along_w_per_mk(self) -> float:
+        """Conductivity of the cylinder along its axis: the wire's, over its section and its way."""
+        wire = NITI_CONDUCTIVITY * self.wire_mm**2 / 4.0 * self.length_mm / self.wire_length_mm
+        return wire / self.radius_mm**2
+
+    @property
+    def heat_per_m3k(self) -> float:
+        """Of the cylinder, J/m3K."""
+        return self.heat_capacity_j_per_k / (math.pi * self.radius_mm**2 * self.length_mm * 1e-9)
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """An array of equal springs, as the field solution needs it."""
+
+    rows: int
+    cols: int
+    pitch_mm: float
+    spring: Spring
+    cooling: Cooling
+    ambient_c: float = 20.0
+
+
+def spring_of(array: Array, cooling: Cooling) -> Spring:
+    """Return the spring that array.toml describes (docs/files.md); what cannot be wound is refused."""
+    from ..fit.simulate import array_parameters
+
+    given = array.spring
+    wire, coil, turns = (
+        given.get("wire_diameter_mm", 0.8),
+        given.get("coil_diameter_mm", 3.45),
+        given.get("turns", 10.0),
+    )
+    if coil <= wire:
+        raise InputError(f"a wire of {wire:g} mm cannot be wound to a mean coil of {coil:g} mm")
+    around = math.pi * coil * turns
+    length = cooling.spring_length_mm or PAPER_SPACING * wire * turns
+    wire_length = given.get("wire_length_mm", math.hypot(around, length))
+    if length < wire * turns:
+        raise InputError(f"{turns:g} turns of {wire:g} mm do not fit into {length:g} mm: spring_length_mm")
+    if wire_length < around:
+        raise InputError(f"{wire_length:g} mm of wire are less than {turns:g} turns of {coil:g} mm ({around:.4g} mm)")
+    shown = Array(1, 1, None, dict(given) | {"wire_diameter_mm": wire}, array.material)
+    capacity = array_parameters(shown)["heat_capacity_j_per_k"]
+    return Spring(wire, coil, turns, wire_length, length, capacity, array.material.get("emissivity", 0.4))
+
+
+def geometry_of(array: Array, rows: int | None = None, cols: int | None = None) -> Geometry:
+    """Return an array's geometry, of as many springs as asked; what cannot exist is refused by its numbers."""
+    cooling = cooling_of(array.cooling)
+    spring = spring_of(array, cooling)
+    if array.pitch_mm is None:
+        raise InputError("[array] is without pitch_mm: the couplings follow from it")
+    if array.pitch_mm <= spring.outer_mm:
+        raise InputError(
+            f"coils overlap: {spring.coil_mm:g} mm mean coil + {spring.wire_mm:g} mm wire are {spring.outer_mm:g} mm, "
+            f"the pitch is {array.pitch_mm:g} mm (if {spring.coil_mm:g} mm is the OUTER diameter, "
+            f"write coil_diameter_mm = {spring.coil_mm - spring.wire_mm:g})"
+        )
+    if cooling.baffle != "none" and cooling.baffle_thickness_mm >= array.pitch_mm - spring.outer_mm:
+        raise InputError(
+            f"a wall of {cooling.baffle_thickness_mm:g} mm does not fit between coils that are "
+            f"{array.pitch_mm - spring.outer_mm:.3g} mm apart"
+        )
+    if cooling.baffle_height_mm and cooling.baffle_height_mm > spring.length_mm:
+        raise InputError(
+            f"baffle_height_mm is {cooling.baffle_height_mm:g}, the plates are {spring.length_mm:.4g} mm apart"
+        )
+    if 0.0 < cooling.fan_m_per_s < SLOWEST_M_PER_S:
+        raise InputError(
+            f"fan_m_per_s is {cooling.fan_m_per_s:g}: below {SLOWEST_M_PER_S:g} the springs move the air themselves; "
+            "write 0 for still air"
+        )
+    if cooling.baffle != "none" and cooling.plate == "none":
+        raise InputError("baffles stand on plates: plate must not be none")
+    return Geometry(rows or array.rows, cols or array.cols, array.pitch_mm, spring, cooling)
+
+
+@functools.cache
+def ring_radius_mm(wire_mm: float, coil_mm: float, spacing_mm: float, elements: int = 12) -> float:
+    """Return the radius of the smooth cylinder that conducts into the air like a stack of rings, by a field solution.
+
+    Half a ring in half its spacing, axisymmetric; the outer edge, four coil radii away, is held.
+    """
+    from skfem import Basis, BilinearForm, ElementTriP2, condense, solve
+    from skfem.helpers import dot, grad
+
+    from .mesh import ring_mesh
+
+    a, far = coil_mm / 2.0, 2.0 * coil_mm
+    mesh, on_wire = ring_mesh(wire_mm / 2.0, a, spacing_mm / 2.0, far, elements)
+    basis = Basis(mesh, ElementTriP2())
+
+    @BilinearForm
+    def conduct(u: object, v: object, w: object) -> object:
+        return w.x[0] * dot(grad(u), grad(v))
+
+    matrix = conduct.assemble(basis)
+    held = basis.get_dofs(on_wire).all()
+    outer = basis.get_dofs(lambda x: np.abs(x[0] - far) < 1e-9 * far).all()
+    values = np.zeros(basis.N)
+    values[held] = 1.0
+    t = solve(*condense(matrix, x=values, D=np.union1d(held, outer)))
+    flux = 2 * math.pi * float(t @ (matrix @ t))  # per K and unit conductivity, of half a spacing
+    return far * math.exp(-2 * math.pi * (spacing_mm / 2.0) / flux)

@@ -1,0 +1,82 @@
+"""What a sweep leaves: a folder of Parquet files, one for each lot of points, written whole or not at all.
+
+`points/from-to.parquet` hold the rows; each carries the spec's text, its SHA-256 and this version in its metadata, each row
+its point's number and seed. A point that is in a file is done: that is all that a resumed sweep needs to know.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .. import __version__
+from ..errors import InputError
+from .spec import Spec
+
+META = b"ninespring"
+
+
+class Results:
+    """A sweep's folder."""
+
+    def __init__(self, folder: Path, spec: Spec) -> None:
+        self.folder, self.spec = folder, spec
+        self.points = folder / "points"
+        self.meta = json.dumps({"version": __version__, "sha256": spec.sha256, "seed": spec.seed, "spec": spec.text})
+
+    def open(self) -> np.ndarray:
+        """Make or take up the folder; return which points are done, (points,) bool. Another spec's folder is refused."""
+        import pyarrow.parquet as parquet
+
+        if self.folder.exists() and not self.folder.is_dir():
+            raise InputError("is a file; give a folder", self.folder)
+        self.points.mkdir(parents=True, exist_ok=True)
+        kept = self.folder / "spec.json"
+        if kept.exists():
+            before = json.loads(kept.read_text())
+            if (before["sha256"], before["version"]) != (self.spec.sha256, __version__):
+                raise InputError(
+                    "holds the results of another spec, or of another version: give another folder", self.folder
+                )
+        elif any(self.folder.glob("points/*.parquet")):
+            raise InputError("holds Parquet files that no sweep of this spec wrote: give another folder", self.folder)
+        done = np.zeros(self.spec.points, dtype=bool)
+        for part in self.points.glob("*.parquet"):
+            done[parquet.read_table(part, columns=["point"])["point"].to_numpy()] = True
+        for left in self.points.glob("*.part"):
+            left.unlink()  # of a sweep that was killed while it wrote
+        _whole(kept, self.meta.encode())
+        return done
+
+    def add(self, rows: Sequence[dict[str, Any]]) -> None:
+        """Keep a lot of points."""
+        import pyarrow as pa
+        import pyarrow.parquet as parquet
+
+        table = pa.Table.from_pylist(list(rows)).replace_schema_metadata({META: self.meta.encode()})
+        name = f"{rows[0]['point']:08d}-{rows[-1]['point']:08d}"
+        made = self.points / f"{name}.part"
+        parquet.write_table(table, made)
+        os.replace(made, self.points / f"{name}.parquet")
+
+    def read(self) -> Any:
+        """Return all rows as a table (pandas), by point."""
+        import pyarrow.dataset as dataset
+
+        return (
+            dataset.dataset(self.points, format="parquet")
+            .to_table()
+            .to_pandas()
+            .sort_values("point", ignore_index=True)
+        )
+
+
+def _whole(path: Path, data: bytes) -> None:
+    made = path.with_suffix(".part")
+    made.write_bytes(data)
+    os.replace(made, path)

@@ -1,0 +1,321 @@
+"""SPEC.toml of a sweep: what is varied, how it is sampled, what each point is; refused whole where it cannot be done.
+
+A point is a flat table of values, one for each key of KEYS. Point i of a spec is always the same.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import itertools
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .. import native
+from ..errors import InputError
+from ..logs import read_bytes
+from ..models import MATERIAL_KEYS, SPRING_KEYS, Array
+from ..toml_file import TomlFile, did_you_mean
+from . import cooling
+
+METHODS = ("grid", "latin", "sobol", "saltelli", "optimise")
+PATTERNS = ("all", "all_but_middle", "middle", "checkerboard", "random")
+POLICIES = ("open", "precompensate")
+COUPLINGS = ("law", "field")
+OWN: dict[str, tuple[Any, float, float]] = {
+    "rows": (3, 1, 64),
+    "cols": (3, 1, 64),
+    "size": (0, 0, 8),
+    "pitch_mm": (5.0, 1.0, 100.0),
+    "fan": (0.0, 0.0, 1.0),
+    "ambient_c": (20.0, -40.0, 80.0),
+    "supply_limit_a": (15.0, 0.1, 60.0),
+    "boost_current_a": (3.0, 0.1, 3.2),
+    "open_current_a": (1.5, 0.0, 3.2),
+    "tolerance": (0.0, 0.0, 0.5),
+    "transformation_spread_k": (0.0, 0.0, 20.0),
+}
+"""Key: what it is where nothing is said, and its limits. `size` n is rows = cols = n."""
+LIMITS: dict[str, tuple[float, float]] = (
+    {key: (low, high) for key, (_, low, high) in OWN.items()} | SPRING_KEYS | MATERIAL_KEYS | cooling.NUMBERS
+)
+WORDS = {"policy": POLICIES, "pattern": PATTERNS, **cooling.WORDS}
+WHOLE = ("rows", "cols", "size")
+KEYS = (*LIMITS, *WORDS)
+SWEEP_KEYS = ("method", "points", "seed", "duration_s", "on_s", "couplings", "mesh")
+MOST_POINTS = 10_000_000
+METRICS = (
+    "start_s",
+    "started",
+    "cool_s",
+    "pictures_per_min",
+    "hottest_c",
+    "undriven_c",
+    "undriven_austenite",
+    "hold_w",
+    "energy_j",
+    "supply_a",
+)
+UNITS = dict(zip(METRICS, ("s", "1", "s", "1/min", "degC", "degC", "1", "W", "J", "A"), strict=True))
+
+
+@dataclass
+class Axis:
+    """What one key goes through."""
+
+    key: str
+    values: list[Any] = field(default_factory=list)
+    """Those of a list, or of a grid's range."""
+    low: float = 0.0
+    high: float = 0.0
+
+    def at(self, share: float) -> Any:
+        """Return the value at 0..1 of the way."""
+        if self.values:
+            return self.values[min(int(share * len(self.values)), len(self.values) - 1)]
+        value = self.low + share * (self.high - self.low)
+        return round(value) if self.key in WHOLE else value
+
+
+@dataclass
+class Spec:
+    """A checked spec."""
+
+    method: str = "grid"
+    points: int = 0
+    asked: int = 0
+    """Points that the file asks for: of saltelli, the base of its sample, which has more."""
+    seed: int = 1
+    duration_s: int = 300
+    on_s: int = 180
+    couplings: str = "law"
+    mesh: str = "coarse"
+    fixed: dict[str, Any] = field(default_factory=dict)
+    axes: list[Axis] = field(default_factory=list)
+    metric: str = ""
+    goal: str = "min"
+    limits: dict[str, tuple[float | None, float | None]] = field(default_factory=dict)
+    sha256: str = ""
+    text: str = ""
+    name: str = "SPEC.toml"
+
+    def shares(self) -> np.ndarray | None:
+        """Return the sample in the unit cube, (points, axes); None for a grid or where an optimiser asks."""
+        from scipy.stats import qmc
+
+        if self.method == "latin":
+            return qmc.LatinHypercube(len(self.axes), rng=self.seed).random(self.asked)
+        if self.method == "sobol":
+            return qmc.Sobol(len(self.axes), rng=self.seed).random(self.asked)
+        if self.method == "saltelli":
+            from SALib.sample import sobol
+
+            problem = {
+                "num_vars": len(self.axes),
+                "names": [a.key for a in self.axes],
+                "bounds": [[0, 1]] * len(self.axes),
+            }
+            return sobol.sample(problem, self.asked, calc_second_order=False, seed=self.seed)
+        return None
+
+    def table(self, values: Sequence[Any]) -> dict[str, Any]:
+        """Return a point: what is fixed, and a value for each axis."""
+        return self.fixed | {axis.key: value for axis, value in zip(self.axes, values, strict=True)}
+
+    def all_points(self) -> Iterator[dict[str, Any]]:
+        """Return every point, in order (none of an optimiser's)."""
+        if self.method == "grid":
+            for values in itertools.product(*(axis.values for axis in self.axes)):
+                yield self.table(values)
+        shares = self.shares()
+        for row in () if shares is None else shares:
+            yield self.table([axis.at(float(share)) for axis, share in zip(self.axes, row, strict=True)])
+
+
+def array_of_point(point: Mapping[str, Any]) -> Array:
+    """Return the array that a point describes."""
+    rows, cols = point.get("rows", 3), point.get("cols", 3)
+    if point.get("size"):
+        rows = cols = point["size"]
+    return Array(
+        int(rows),
+        int(cols),
+        float(point.get("pitch_mm", 5.0)),
+        {key: point[key] for key in SPRING_KEYS if key in point},
+        {key: point[key] for key in MATERIAL_KEYS if key in point},
+        {},
+        {key: point[key] for key in cooling.KEYS if key in point},
+    )
+
+
+def check_point(point: Mapping[str, Any]) -> None:
+    """Refuse (InputError) what cannot exist."""
+    from .geometry import geometry_of
+
+    array = array_of_point(point)
+    if array.springs > native.MAX_SPRINGS:
+        raise InputError(f"{array.rows} x {array.cols} are more than {native.MAX_SPRINGS} springs")
+    geometry_of(array)
+    plant = native.Plant(1, 1)
+    plant.set_all({key: point[key] for key in MATERIAL_KEYS if key in point and key.endswith("_c")})
+    if wrong := plant.check():
+        raise InputError(wrong)
+
+
+class _Reader:
+    def __init__(self, path: Path) -> None:
+        self.path, self.file = path, TomlFile(path)
+        self.data = self.file.data
+
+    def refuse(self, message: str, near: str) -> InputError:
+        return self.file.refuse(message, (), word=near)
+
+    def known(self, key: str, names: Sequence[str], where: str) -> None:
+        if key not in names:
+            hint = did_you_mean(key, names) or f"; it has {', '.join(names)}"
+            raise self.refuse(f"{where} has no key '{key}'{hint}", key)
+
+    def word(self, value: Any, names: Sequence[str], key: str) -> str:
+        if value not in names:
+            hint = did_you_mean(str(value), names)
+            raise self.refuse(f"{key} has no '{value}'{hint}; it has {', '.join(names)}", key)
+        return value
+
+    def number(self, value: Any, low: float, high: float, key: str, whole: bool = False) -> float:
+        if isinstance(value, bool) or not isinstance(value, int if whole else int | float):
+            raise self.refuse(f"{key} must be a {'whole ' if whole else ''}number", key)
+        if not low <= value <= high:
+            raise self.refuse(f"{key} is {value:g}; it must be {low:g} to {high:g}", key)
+        return value
+
+    def value(self, key: str, value: Any) -> Any:
+        if key in WORDS:
+            return self.word(value, WORDS[key], key)
+        return self.number(value, *LIMITS[key], key, key in WHOLE)
+
+    def table(self, name: str) -> dict[str, Any]:
+        part = self.data.get(name, {})
+        if not isinstance(part, dict):
+            raise self.refuse(f"[{name}] must be a table", name)
+        return part
+
+    def axis(self, key: str, given: Any, method: str) -> Axis:
+        if isinstance(given, list):
+            if not given:
+                raise self.refuse(f"{key} has no values", key)
+            values = [self.value(key, one) for one in given]
+            if len(set(values)) < len(values):
+                raise self.refuse(f"{key} has a value twice", key)
+            return Axis(key, values)
+        if not isinstance(given, dict):
+            raise self.refuse(f"[vary] {key} is a list, or {{from = .., to = ..}}; one value belongs into [fixed]", key)
+        for one in given:
+            self.known(one, ("from", "to", "steps"), f"[vary] {key}")
+        if "from" not in given or "to" not in given:
+            raise self.refuse(f"[vary] {key} needs from and to", key)
+        if key in WORDS:
+            raise self.refuse(f"{key} is a word: give a list of {', '.join(WORDS[key])}", key)
+        low, high = self.value(key, given["from"]), self.value(key, given["to"])
+        if not low < high:
+            raise self.refuse(f"{key} goes from {low:g} to {high:g}: the wrong way round", key)
+        if method != "grid":
+            if "steps" in given:
+                raise self.refuse(f"{key}: steps are of a grid; {method} takes the whole range", key)
+            return Axis(key, [], low, high)
+        if "steps" not in given:
+            raise self.refuse(f"{key}: a grid needs steps", key)
+        steps = int(self.number(given["steps"], 2, 100000, "steps", True))
+        values = np.linspace(low, high, steps).tolist()
+        if key in WHOLE:
+            values = sorted({round(one) for one in values})
+        return Axis(key, [round(one, 12) for one in values])
+
+    def spec(self) -> Spec:
+        for name in self.data:
+            self.known(name, ("sweep", "fixed", "vary", "optimise"), "the file")
+        head = self.table("sweep")
+        for key in head:
+            self.known(key, SWEEP_KEYS, "[sweep]")
+        spec = Spec(name=str(self.path))
+        spec.method = self.word(head.get("method", "grid"), METHODS, "method")
+        spec.couplings = self.word(head.get("couplings", "law"), COUPLINGS, "couplings")
+        spec.mesh = self.word(head.get("mesh", "coarse"), ("coarse", "normal", "fine"), "mesh")
+        spec.seed = int(self.number(head.get("seed", 1), 0, 2**31, "seed", True))
+        spec.duration_s = int(self.number(head.get("duration_s", 300), 10, 36000, "duration_s", True))
+        spec.on_s = int(self.number(head.get("on_s", min(180, spec.duration_s)), 5, spec.duration_s, "on_s", True))
+        if spec.method == "grid" and "points" in head:
+            raise self.refuse("a grid has as many points as its steps make: leave out points", "points")
+        if spec.method != "grid":
+            spec.points = spec.asked = int(self.number(head.get("points", 0), 1, MOST_POINTS, "points", True))
+        if spec.method == "saltelli" and spec.points & (spec.points - 1):
+            raise self.refuse(f"points is {spec.points}: saltelli wants a power of two", "points")
+        fixed, vary = self.table("fixed"), self.table("vary")
+        for table, where in ((fixed, "[fixed]"), (vary, "[vary]")):
+            for key in table:
+                self.known(key, KEYS, where)
+        if both := sorted(set(fixed) & set(vary)):
+            raise self.refuse(f"{both[0]} is fixed and varied", both[0])
+        spec.fixed = {key: self.value(key, value) for key, value in fixed.items()}
+        spec.axes = [self.axis(key, value, spec.method) for key, value in vary.items()]
+        if not spec.axes:
+            raise self.refuse("nothing is varied: [vary] is empty or missing", "vary")
+        if {"size", "rows"} <= {*fixed, *vary} or {"size", "cols"} <= {*fixed, *vary}:
+            raise self.refuse("size stands for rows and cols: give one or the other", "size")
+        if spec.couplings == "law":
+            for key in (*SPRING_KEYS, *cooling.KEYS):
+                if key in fixed or key in vary:
+                    raise self.refuse(f'{key}: the paper\'s law knows only pitch and fan; couplings = "field"', key)
+        self.optimise(spec)
+        spec.text = read_bytes(self.path).decode()
+        spec.sha256 = hashlib.sha256(json.dumps(self.data, sort_keys=True).encode()).hexdigest()
+        return spec
+
+    def optimise(self, spec: Spec) -> None:
+        part = self.table("optimise")
+        if bool(part) != (spec.method == "optimise"):
+            raise self.refuse("method optimise and the table [optimise] go together", "optimise")
+        for key in part:
+            self.known(key, ("metric", "goal", *METRICS), "[optimise]")
+        if not part:
+            return
+        spec.metric = self.word(part.get("metric", ""), METRICS, "metric")
+        spec.goal = self.word(part.get("goal", "min"), ("min", "max"), "goal")
+        for key in METRICS:
+            if key in part:
+                bound = part[key]
+                if not isinstance(bound, dict) or not bound or set(bound) - {"least", "most"}:
+                    raise self.refuse(f"[optimise] {key} = {{least = .., most = ..}}", key)
+                spec.limits[key] = (bound.get("least"), bound.get("most"))
+
+
+def named(point: Mapping[str, Any]) -> str:
+    """Return a point's numbers as words."""
+    return ", ".join(
+        f"{key} {value:.4g}" if isinstance(value, float) else f"{key} {value}" for key, value in point.items()
+    )
+
+
+def read_spec(path: Path) -> Spec:
+    """Read SPEC.toml; every point is looked at before any is run."""
+    spec = _Reader(path).spec()
+    seen: set[str] = set()
+    count = 0
+    for count, point in enumerate(spec.all_points(), 1):
+        # what cannot exist depends on these alone
+        key = json.dumps({k: v for k, v in point.items() if k not in ("fan", "policy", "pattern", "ambient_c")})
+        if count > MOST_POINTS:
+            raise InputError(f"more than {MOST_POINTS} points", path)
+        if key in seen:
+            continue
+        if len(seen) < 100_000:
+            seen.add(key)
+        try:
+            check_point(point)
+        except InputError as error:
+            raise InputError(f"point {count} ({named(point)}) cannot exist: {error.message}", path) from None
+    spec.points = count or spec.points
+    return spec
