@@ -375,8 +375,7 @@ static void cool(const spring_estimator_t *e, spring_belief_t *b, const thermal_
 {
     const thermal_model_transformation_t t = thermal_model_transformation(model, k);
     const float above_k = b->hottest_c - spring_ambient_c(model);
-    b->hottest_c += SPRING_ESTIMATOR_TURN_S *
-                    (power_w - LEAST_LOSS * e->loss_w_per_k * above_k) /
+    b->hottest_c += SPRING_ESTIMATOR_TURN_S * (power_w - LEAST_LOSS * e->loss_w_per_k * above_k) /
                     hottest_capacity_j_per_k(e, b, &t);
     if (b->hottest_c < spring_c(t.martensite_finish_c7)) {
         b->possible = SPRING_PHASE_MARTENSITE;
@@ -393,7 +392,10 @@ void spring_estimator_update(spring_estimator_t *e, thermal_model_t *model, uint
     const float heat_k = predict(e, b, model, k, power_w);
     const float moved_k = b->last_c - before_c;
     b->disturbance_k *= FORGETS;
-    b->heat_k += b->reads || b->fresh == 0 ? heat_k : 0.0f; /* while a current settles: who knows */
+    if (b->reads || b->fresh == 0) { /* while a current settles, who knows */
+        /* a spring that waits cools by no less than the least loss: more would hide a finish */
+        b->heat_k += heat_k < 0.0f ? LEAST_LOSS * heat_k : heat_k;
+    }
     if (b->reads && e->observes) {
         look(e, model, k);
         spring_heating_watch(e, b, model, k);
