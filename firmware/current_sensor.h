@@ -13,8 +13,8 @@
 extern "C" {
 #endif
 
-#define CURRENT_SENSOR_FIRST_ADDRESS    0x40u /* spring 1; spring 9 is 0x48 */
-#define CURRENT_SENSOR_SHUNT_OHM_TENTHS 1     /* the formulas below hold for a shunt of 0.1 ohm */
+/* The formulas below hold for a shunt of 0.1 ohm. */
+#define CURRENT_SENSOR_FIRST_ADDRESS 0x40u /* spring 1; spring 9 is 0x48 */
 
 /* Which driver this firmware was built with: "adafruit", "integer" or "hil", as a text in flash. */
 const char *current_sensor_name(void);

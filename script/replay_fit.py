@@ -6,7 +6,7 @@ at full command, and the room's temperature. It is the starting point that `nine
 error that it prints is not good yet.
 
 The logs hold the heaters' command, not their power, so that only ratios can be found: the heat capacity stays at the
-textbook's 2 J/K (4 g, 500 J/kgK), and the rest is fitted by least squares over repeated `ninespring-sim replay`.
+textbook's 2 J/K (4 g, 500 J/kgK), and the rest is fitted by least squares over repeated replays.
 """
 
 from __future__ import annotations
@@ -14,15 +14,18 @@ from __future__ import annotations
 import argparse
 import csv
 import datetime
-import hashlib
 import json
-import math
 import os
-import subprocess
 import sys
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import numpy as np
+    from ninespring.logs import Run
+    from ninespring.models import Model
 
 ROOT = Path(__file__).resolve().parent.parent
 SKIPPED = 77  # what ctest counts as skipped
@@ -53,8 +56,8 @@ FREE = (
 )
 
 
-def convert(source: Path, target: Path) -> None:
-    """Writes a section-4 log from a TCLab file: time (s), heaters (%), temperatures (degC), set points if any."""
+def convert(source: Path, target: Path, sha256: str) -> None:
+    """Writes a log (docs/files.md) from a TCLab file: time (s), heaters (%), temperatures (degC), set points if any."""
     with source.open(newline="") as stream:
         rows = list(csv.reader(stream))
     header = [name.strip().lower() for name in rows[0]]
@@ -63,80 +66,50 @@ def convert(source: Path, target: Path) -> None:
         if len(header) <= position or not header[position].startswith(begin):
             raise SystemExit(f"{source}:1: column {position + 1} is not '{begin}'; is this a TCLab file?")
     with target.open("w") as stream:
-        stream.write(f"# source: {source.name}\n# sha256: {sha256(source)}\n")
+        stream.write(f"# source: {source.name}\n# sha256: {sha256}\n")
         stream.write("time_s,u1,u2,t1_c,t2_c\n")
         for row in rows[1:]:
             time_s, u1, u2, t1, t2 = (float(value) for value in row[:5])
             stream.write(f"{time_s:.3f},{u1 / 100:.5f},{u2 / 100:.5f},{t1:.3f},{t2:.3f}\n")
 
 
-def sha256(path: Path) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()
+def model_of(values: list[float], errors: list[float] | None = None) -> Model:
+    """The plain network with these numbers."""
+    from ninespring.models import Array, Model
 
-
-def write_model(
-    path: Path,
-    values: list[float],
-    errors: list[float] | None = None,
-    provenance: str = "",
-) -> None:
-    lines = [
-        'schema = "ninespring.model/1"',
-        "effects = []",
-        "",
-        "[array]",
-        "rows = 1",
-        "cols = 2",
-        "",
-    ]
-    lines += ["[sensor]", 'kind = "thermistor"', ""]
-    both = zip(FREE, values, errors or [math.nan] * len(values), strict=True)
-    rows = [(free.name, value, free.unit, error, free.spring) for free, value, error in both]
-    rows.append(("heat_capacity_j_per_k", HEAT_CAPACITY_J_PER_K, "J/K", math.nan, 0))
+    names = [free.name + (f"[{free.spring}]" if free.spring else "") for free in FREE]
+    model = Model(Array(1, 2, sensor={"kind": "thermistor"}), parameters=dict(zip(names, values, strict=True)))
+    model.stderr = dict(zip(names, errors or [], strict=False))
     # No fan in these logs, and no diagonal in a 1 x 2 array; a transistor does not transform.
-    rows.append(("loss_fan_w_per_k", values[0], "W/K", math.nan, 0))
-    rows.append(("orthogonal_fan_w_per_k", values[1], "W/K", math.nan, 0))
-    for name, value, unit, error, spring in rows:
-        lines += [
-            "[[parameter]]",
-            f'name = "{name}"',
-            f"value = {value:.9g}",
-            f'unit = "{unit}"',
-        ]
-        if math.isfinite(error):
-            lines.append(f"stderr = {error:.3g}")
-        if spring:
-            lines.append(f"spring = {spring}")
-        lines.append("")
-    path.write_text("\n".join(lines) + "\n" + provenance)
+    model.parameters |= {
+        "heat_capacity_j_per_k": HEAT_CAPACITY_J_PER_K,
+        "loss_fan_w_per_k": values[0],
+        "orthogonal_fan_w_per_k": values[1],
+    }
+    return model
 
 
-def replay(sim: Path, log: Path, model: Path, output: Path) -> tuple[list[float], dict]:
-    """Residuals (model less measured, degC, both springs) and the command's own summary."""
-    summary = output.with_suffix(".json")
-    command = [sim, "replay", log, "--model", model, "-o", output, "--json", summary]
-    done = subprocess.run([str(part) for part in command], capture_output=True, text=True, check=False)
-    if done.returncode != 0:
-        raise SystemExit(done.stderr.strip() or f"ninespring-sim replay failed ({done.returncode})")
-    residuals = []
-    with output.open(newline="") as stream:
-        for row in csv.DictReader(line for line in stream if not line.startswith("#")):
-            for k in (1, 2):
-                if row[f"t{k}_c"]:
-                    residuals.append(float(row[f"m{k}_c"]) - float(row[f"t{k}_c"]))
-    return residuals, json.loads(summary.read_text())
+def replay(log: Run, model: Model) -> np.ndarray:
+    """The on-chip model less what was measured, (rows, springs), degC."""
+    from ninespring.fit.predict import chip_lines, chip_trace
+
+    return chip_trace(model, chip_lines(model)[0], log)[0] - log.temperature_c
 
 
-def fit(sim: Path, log: Path, folder: Path, name: str) -> tuple[list[float], list[float], float, float]:
+def rms(left: np.ndarray) -> float:
+    import numpy as np
+
+    return float(np.sqrt(np.nanmean(left**2)))
+
+
+def fit(log: Run) -> tuple[list[float], list[float], float, float]:
     """Fitted values, their standard errors, and the rms error with the textbook's values and with these (degC)."""
     import numpy as np
     from scipy.optimize import least_squares
 
-    model, output = folder / f"{name}.trial.toml", folder / f"{name}.trial.csv"
-
     def residuals(values: np.ndarray) -> np.ndarray:
-        write_model(model, [float(value) for value in values])
-        return np.asarray(replay(sim, log, model, output)[0])
+        left = replay(log, model_of([float(value) for value in values]))
+        return left[np.isfinite(left)]
 
     start = np.array([free.start for free in FREE])
     result = least_squares(
@@ -149,16 +122,8 @@ def fit(sim: Path, log: Path, folder: Path, name: str) -> tuple[list[float], lis
     )
     count = len(result.fun)
     covariance = np.linalg.pinv(result.jac.T @ result.jac) * float(result.fun @ result.fun) / (count - len(FREE))
-    before = float(np.sqrt(np.mean(residuals(start) ** 2)))
-    after = float(np.sqrt(np.mean(result.fun**2)))
-    for trial in (model, output, output.with_suffix(".json")):
-        trial.unlink(missing_ok=True)
-    return (
-        [float(value) for value in result.x],
-        [float(value) for value in np.sqrt(np.diag(covariance))],
-        before,
-        after,
-    )
+    errors = [float(value) for value in np.sqrt(np.diag(covariance))]
+    return [float(value) for value in result.x], errors, rms(residuals(start)), rms(result.fun)
 
 
 def main() -> int:
@@ -170,8 +135,7 @@ def main() -> int:
         default=Path(default_data),
         help="folder that holds tclab_apm/",
     )
-    parser.add_argument("--sim", type=Path, default=ROOT / "build" / "host" / "ninespring-sim")
-    parser.add_argument("-o", "--output", type=Path, help="keep logs, models and replays in this folder")
+    parser.add_argument("-o", "--output", type=Path, help="keep logs and models in this folder")
     parser.add_argument("--json", type=Path, help="write the errors to this JSON file")
     arguments = parser.parse_args()
 
@@ -180,25 +144,16 @@ def main() -> int:
     if missing:
         print(f"SKIPPED: no measured data: {source / missing[0]} is not there; give its folder with --data")
         return SKIPPED
-    if not arguments.sim.is_file():
-        print(
-            f"replay_fit: {arguments.sim} is not there; build first, or give --sim",
-            file=sys.stderr,
-        )
-        return 2
     try:
-        import scipy  # noqa: F401
+        import ninespring  # noqa: F401
     except ImportError:
-        print(
-            "replay_fit: SciPy is not there; run script/setup and use .venv/bin/python",
-            file=sys.stderr,
-        )
+        print("replay_fit: the Python package is not there; run script/setup and use .venv/bin/python", file=sys.stderr)
         return 2
 
     with tempfile.TemporaryDirectory() as temporary:
         folder = arguments.output or Path(temporary)
         folder.mkdir(parents=True, exist_ok=True)
-        return work(arguments.sim, source, folder, arguments.json)
+        return work(source, folder, arguments.json)
 
 
 def figure(text: str, rms_c: float) -> dict:
@@ -207,23 +162,28 @@ def figure(text: str, rms_c: float) -> dict:
     return {"figure": text, "value": rms_c, "unit": "degC rms", "target": "", "command": command}
 
 
-def work(sim: Path, source: Path, folder: Path, json_path: Path | None) -> int:
+def work(source: Path, folder: Path, json_path: Path | None) -> int:
+    from ninespring.logs import read_log, sha256_of
+    from ninespring.models import model_text
+
     logs, models, figures = {}, {}, []
     for file in LOGS:
         name = Path(file).stem
-        logs[name] = folder / f"{name}.csv"
-        models[name] = folder / f"{name}.toml"
-        convert(source / file, logs[name])
+        convert(source / file, folder / f"{name}.csv", sha256_of(source / file))
+        logs[name] = read_log(folder / f"{name}.csv", 2)
         if sys.stderr.isatty():
             print(f"fitting {name} ...", file=sys.stderr)
-        values, errors, before, after = fit(sim, logs[name], folder, name)
-        provenance = (
-            f'[provenance]\ntool = "replay_fit"\ndate = "{datetime.date.today().isoformat()}"\n'
-            f'logs = [{{file = "{file}", sha256 = "{sha256(source / file)}"}}]\n'
-            f"rmse_before_c = {before:.4f}\nrmse_after_c = {after:.4f}\n"
-            'note = "plain network; standard errors take the residuals for independent, which they are not"\n'
-        )
-        write_model(models[name], values, errors, provenance)
+        values, errors, before, after = fit(logs[name])
+        models[name] = model_of(values, errors)
+        models[name].provenance = {
+            "tool": "replay_fit",
+            "date": datetime.date.today().isoformat(),
+            "logs": [{"file": file, "sha256": sha256_of(source / file)}],
+            "rmse_before_c": before,
+            "rmse_after_c": after,
+            "note": "plain network; standard errors take the residuals for independent, which they are not",
+        }
+        (folder / f"{name}.toml").write_text(model_text(models[name]))
         print(f"{name}: {before:.2f} degC rms with the textbook's values, {after:.2f} with the fitted ones")
         figures.append(figure(f"on-chip model with the textbook's values, replayed on {name}", before))
         for free, value, error in zip(FREE, values, errors, strict=True):
@@ -233,12 +193,10 @@ def work(sim: Path, source: Path, folder: Path, json_path: Path | None) -> int:
     print(f"\n{'on-chip model of':<24} {'replayed on':<24} {'rms degC':>9}  (heater 1, heater 2)")
     for fitted, model in models.items():
         for replayed, log in logs.items():
-            output = folder / f"{fitted}_on_{replayed}.csv"
-            _, summary = replay(sim, log, model, output)
-            each = [spring["rmse_c"] for spring in summary["springs"]]
+            left = replay(log, model)
             note = "" if fitted == replayed else "  other room, other day"
-            print(f"{fitted:<24} {replayed:<24} {summary['rmse_c']:9.2f}  ({each[0]:.2f}, {each[1]:.2f}){note}")
-            figures.append(figure(f"on-chip model fitted to {fitted}, replayed on {replayed}", summary["rmse_c"]))
+            print(f"{fitted:<24} {replayed:<24} {rms(left):9.2f}  ({rms(left[:, 0]):.2f}, {rms(left[:, 1]):.2f}){note}")
+            figures.append(figure(f"on-chip model fitted to {fitted}, replayed on {replayed}", rms(left)))
     print("\nNot good yet: a sensor resolves 0.3 degC. What is missing is for `ninespring diagnose` to find.")
     if json_path is not None:
         json_path.write_text(json.dumps(figures, indent=2) + "\n")

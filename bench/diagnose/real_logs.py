@@ -174,7 +174,10 @@ def board_alone(seed: int) -> dict[str, Any]:
         ambient = later.ambient_c
         assert ambient is not None
         first = np.full(SPRINGS, ambient[0])
-        shown = native.chip_simulate(settings, (3, 3), later.time_s, later.drive, later.fan, ambient, first)
+        power = np.zeros(SPRINGS)  # of a command: these logs have none
+        shown, _ = native.chip_simulate(
+            settings, (3, 3), later.time_s, native.POWER, later.drive, power, later.fan, ambient, first
+        )
         errors.append(float(np.sqrt(np.mean((shown - truth) ** 2))))
     return {"before": errors[0], "after": errors[1]}
 

@@ -15,19 +15,25 @@
 #define NOISE_SAME     0.1f   /* a current that has moved by more tells nothing of the noise */
 #define BEND_TO_SD     0.512f /* mean size of a second difference: 1 / (sqrt(6) sqrt(2 / pi)) */
 
-#define CAPACITY_SD   0.09f   /* of a declared heat capacity: 15 %, uniform */
-#define LOSS_SD       0.12f   /* of a declared loss: 20 % */
-#define LOSS_MOST     0.45f   /* of the declared loss: no more is ever believed */
-#define LOSS_DRIFT_SD 0.0005f /* of the declared loss, in a second: 3 % in an hour */
-#define LOSS_DRIFT    (SPRING_ESTIMATOR_TURN_S * LOSS_DRIFT_SD * LOSS_DRIFT_SD)
-#define NEIGHBOUR_SD  0.15f /* of the rise of a spring that its neighbours heat */
-#define SHIFT_SD_K    3.0f  /* of declared transformation temperatures */
-#define SHIFT_MOST_K  30.0f
-#define TRUST_SD_K    5.0f    /* of ambient, or of what a reset has kept */
-#define LEAST_SD_K    0.6f    /* parts of one spring differ by so much */
-#define UNIFORM_SD    0.29f   /* of a width */
-#define LEAST_LOSS    0.8f    /* of a declared loss: with it the hottest possible spring cools */
-#define FORGETS       0.9998f /* a turn's: a disturbance is forgotten within 20 minutes */
+#define JUMP_LEAST   0.03f /* of a resistance in a turn: 2 W change 6 % of the phase in it */
+#define JUMP_OF_LOAD 0.08f /* 16 K at once, latent heat kept: 40 % of the phase */
+#define JUMP_SDS     5.0f
+
+#define CAPACITY_SD     0.09f   /* of a declared heat capacity: 15 %, uniform */
+#define LOSS_SD         0.12f   /* of a declared loss: 20 % */
+#define LOSS_MOST       0.45f   /* of the declared loss: no more is ever believed */
+#define LOSS_DRIFT_SD   0.0005f /* of the declared loss, in a second: 3 % in an hour */
+#define LOSS_DRIFT      (SPRING_ESTIMATOR_TURN_S * LOSS_DRIFT_SD * LOSS_DRIFT_SD)
+#define NEIGHBOUR_SD    0.15f /* of the rise of a spring that its neighbours heat */
+#define SHIFT_SD_K      3.0f  /* of declared transformation temperatures */
+#define SHIFT_MOST_K    30.0f
+#define TRUST_SD_K      5.0f    /* of ambient, or of what a reset has kept */
+#define LEAST_SD_K      0.6f    /* parts of one spring differ by so much */
+#define UNIFORM_SD      0.29f   /* of a width */
+#define OFFSET_SD_V     0.005f  /* 8 mV, and 5 mA in 0.2 ohm: evenly */
+#define OFFSET_AGAIN_V  0.001f  /* by the next hold it may have moved by so much */
+#define LEAST_LOSS      0.8f    /* of a declared loss: with it the hottest possible spring cools */
+#define FORGETS         0.9998f /* a turn's: a disturbance is forgotten within 20 minutes */
 
 #define TRUST_STILL_SDS 0.7f /* where the transformation may never show: probably over */
 #define TRUST_ONSET_SDS 1.3f /* where its beginning was seen: certainly, but for 10 % */
@@ -121,6 +127,7 @@ static void begin(spring_belief_t *b, float temperature_c, float sd_k, uint8_t p
                            .loss_variance = learnt.loss_sd_w_per_k * learnt.loss_sd_w_per_k,
                            .possible = possible,
                            .noise = NOISE_FIRST,
+                           .offset_sd_v = OFFSET_SD_V,
                            .learnt = learnt,
                            .last_c = temperature_c};
 }
@@ -192,6 +199,41 @@ void spring_estimator_disturb(spring_belief_t *b)
     b->ohm_before[1] = 0.0f;
 }
 
+/* All that readings are compared with jumps along. */
+static void jump(spring_belief_t *b, float by)
+{
+    b->line_ohm *= by;
+    b->mark_ohm *= by;
+    b->onset_ohm *= by;
+    b->cold_ohm *= by;
+    b->learnt.austenite_ohm *= by;
+    b->learnt.martensite_ohm *= by;
+    b->slow_ohm = b->line_ohm > 0.0f ? b->line_ohm : b->slow_ohm * by;
+    b->ohm_before[0] = b->ohm_before[1] = 0.0f;
+}
+
+/* No phase changes so fast: it is a contact or the sensor. A turn in which it may have jumped half
+ * way is left out. */
+static bool leave_out(spring_belief_t *b, float ohm, float current_a)
+{
+    const bool holds = b->line_ohm > 0.0f;
+    const float was_ohm = holds ? b->slow_ohm : b->ohm_before[0];
+    const float step = ohm - was_ohm;
+    if (fabsf(step) <= JUMP_LEAST * was_ohm || b->fresh == 0 || was_ohm <= 0.0f) {
+        b->odd = false;
+        return false;
+    }
+    const bool near = fminf(current_a, b->current_a) > fmaxf(STRONG_A, 0.5f * current_a);
+    const bool by_load = !holds || step * b->learnt.change < 0.0f;
+    const float most = (by_load ? JUMP_OF_LOAD : JUMP_LEAST) + JUMP_SDS * b->noise;
+    const bool jumps = near && fabsf(step) > most * was_ohm;
+    if (jumps && b->odd) {
+        jump(b, ohm / was_ohm);
+    }
+    b->odd = jumps && !b->odd;
+    return b->odd;
+}
+
 /* Second differences of turns at the same current: neither a level nor a slope shows in them. */
 static void take_noise(spring_belief_t *b, float ohm, float current_a)
 {
@@ -204,19 +246,27 @@ static void take_noise(spring_belief_t *b, float ohm, float current_a)
     b->ohm_before[0] = ohm;
 }
 
+static void take_reading(spring_belief_t *b, float ohm, float current_a)
+{
+    take_noise(b, ohm, current_a);
+    b->slow_ohm = b->fresh == 0 ? ohm : b->slow_ohm + (ohm - b->slow_ohm) * SLOW_SHARE;
+    b->current_a = current_a;
+    b->ohm = ohm;
+    b->phase_ohm = current_a > STRONG_A || b->fresh == 0 ? ohm : b->phase_ohm;
+    b->fresh = b->fresh < UINT8_MAX ? (uint8_t)(b->fresh + 1) : UINT8_MAX;
+}
+
 static void take_readings(spring_belief_t *b)
 {
     b->reads = b->readings >= LEAST_READINGS && b->current_sum_ma >= LEAST_MEAN_MA * b->readings &&
                b->voltage_sum_mv > 0;
     if (b->reads) {
-        const float ohm = (float)b->voltage_sum_mv / (float)b->current_sum_ma;
+        const float offset_mv = 1e3f * b->offset_v * (float)b->readings;
+        const float ohm = ((float)b->voltage_sum_mv - offset_mv) / (float)b->current_sum_ma;
         const float current_a = (float)b->current_sum_ma * 1e-3f / (float)b->readings;
-        take_noise(b, ohm, current_a);
-        b->slow_ohm = b->fresh == 0 ? ohm : b->slow_ohm + (ohm - b->slow_ohm) * SLOW_SHARE;
-        b->current_a = current_a;
-        b->ohm = ohm;
-        b->phase_ohm = current_a > STRONG_A || b->fresh == 0 ? ohm : b->phase_ohm;
-        b->fresh = b->fresh < UINT8_MAX ? (uint8_t)(b->fresh + 1) : UINT8_MAX;
+        if (!leave_out(b, ohm, current_a)) {
+            take_reading(b, ohm, current_a);
+        }
     } else if (b->current_sum_ma < LEAST_MEAN_MA && !b->cut_short) {
         b->fresh = 0; /* no current, or no sensor */
     }
@@ -308,9 +358,13 @@ void spring_keep_above(const spring_estimator_t *e, spring_belief_t *b, thermal_
         const float less_w_per_k = b->covariance / distance_k2(b) * error_k;
         correct_loss(e, b, less_w_per_k);
         b->kept_w_per_k += less_w_per_k;
-        /* it cannot lose so little: what is read is not its phase */
-        b->blind = b->blind ||
-                   fabsf(b->kept_w_per_k) > SPRING_ESTIMATOR_BOUND_SDS * sqrtf(b->loss_variance);
+        if (fabsf(b->kept_w_per_k) > SPRING_ESTIMATOR_BOUND_SDS * sqrtf(b->loss_variance)) {
+            /* it cannot lose so little: what is read is not its phase, and taught nothing */
+            correct_loss(e, b, -b->kept_w_per_k);
+            b->kept_w_per_k = 0.0f;
+            b->blind = true;
+            b->lost = 1.0f;
+        }
         spring_set_temperature(model, k, limit_c, SPRING_PHASE_AUSTENITE);
         b->last_c = spring_now_c(model, k);
     }
@@ -354,6 +408,8 @@ static void look(spring_estimator_t *e, thermal_model_t *model, uint8_t k)
     b->seen = true;
     if (heating) {
         spring_estimator_begin_heating(e, model, k);
+        b->begun_c =
+            spring_ambient_c(model); /* a look may take another current's offset for phase */
     }
 }
 
@@ -467,6 +523,9 @@ void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, 
 {
     spring_belief_t *b = &e->spring[k];
     const float now_c = spring_now_c(model, k);
+    const bool lacks =
+        full && b->possible != SPRING_PHASE_AUSTENITE && spring_lacks_phase(b, model, k);
+    const float phase = spring_estimator_phase(e, model, k);
     if (full && b->possible != SPRING_PHASE_AUSTENITE) {
         b->blind = b->blind || b->possible == SPRING_PHASE_MARTENSITE;
         b->possible = SPRING_PHASE_AUSTENITE;
@@ -474,16 +533,25 @@ void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, 
     } else if (!full && b->possible == SPRING_PHASE_AUSTENITE) {
         b->possible = SPRING_PHASE_BETWEEN | SPRING_PHASE_AUSTENITE;
     }
-    if (full && b->onset && b->reads && b->current_a > STRONG_A) {
+    /* its heating was ended, by a limit or as hot as it takes: once more, then what it reads tells
+     * nothing */
+    b->blind = b->blind || (lacks && b->doubted);
+    b->doubted = lacks && !b->blind;
+    if (full && !lacks && b->onset && b->reads && b->current_a > STRONG_A) {
         spring_learn_austenite(b); /* hot enough, and its resistance had come to rest */
     }
     b->heating = false;
     b->kept_w_per_k = 0.0f;
-    b->lost = 0.0f;
+    b->lost = b->doubted ? 1.0f - phase : 0.0f;
     b->quiet = 0;
+    b->losing = 0;
     b->line_ohm = 0.0f;
-    b->full_ohm = full && b->reads && b->current_a > STRONG_A ? b->ohm : 0.0f;
-    b->full_c = now_c;
+    if (full && b->reads && b->current_a > STRONG_A) {
+        b->slow_ohm = b->ohm;
+        spring_begin_line(b, now_c);
+        b->rough = true;
+        b->offset_sd_v = fmaxf(b->offset_sd_v, OFFSET_AGAIN_V);
+    }
 }
 
 /* ---- what is believed ---- */

@@ -11,6 +11,8 @@
 #define COEFFICIENT_MOST_PER_K      0.0015f
 #define COEFFICIENT_MOST_PER_HEAT_K (COEFFICIENT_MOST_PER_K / 0.85f)
 
+#define COEFFICIENT_SD_PER_K 0.00025f /* of one that was learnt: noise and offset over 20 K */
+
 /* A reading at less is coarse: 4 mV are 3 % of its voltage. */
 #define STRONG_A 0.8f
 
@@ -40,6 +42,8 @@ bool spring_lacks_phase(const spring_belief_t *belief, const thermal_model_t *mo
 /* It has transformed: what it reads now is its own austenite's, and the way there its change. */
 void spring_learn_austenite(spring_belief_t *belief);
 
+/* What it reads on average now is what it reads with the phase that it has. */
+void spring_begin_line(spring_belief_t *belief, float now_c);
 /* While it heats: what heat does to its resistance. */
 void spring_heating_watch(const spring_estimator_t *estimator, spring_belief_t *belief,
                           thermal_model_t *model, uint8_t spring);

@@ -2,7 +2,7 @@
 
 #include "spring_estimator_internal.h"
 
-#define STEP_LEAST_K   3.0f /* of heat between two comparisons */
+#define STEP_LEAST_K   2.0f /* of heat between two comparisons */
 #define STEP_MOST_K    15.0f
 #define STEP_PER_NOISE 1600.0f /* so that a slope's noise is half of the largest coefficient */
 #define EXCESS_SEEN    0.01f   /* a change that no coefficient explains, and that is no noise */
@@ -10,7 +10,7 @@
 #define STEEP_SDS      2.0f
 #define CHANGE_LEAST   0.03f /* of a whole transformation, else it is none */
 #define CHANGE_PART    0.15f /* of a transformation: less to come may not show */
-#define FLAT_K         6.0f  /* of heat without a change: it is over */
+#define FLAT_K         4.0f  /* of heat without a change: it is over */
 #define ONSET_K        2.0f  /* beyond austenite start it is noticed */
 #define ONSET_C7       256   /* the same */
 #define PLACE_SD_K     3.0f
@@ -78,8 +78,9 @@ static void see_finish(const spring_estimator_t *e, spring_belief_t *b, thermal_
                      SPRING_PHASE_AUSTENITE);
 }
 
-/* A spring that is known to show its transformation is not hotter than that lets it be, whatever
- * the model says, until even the coldest and heaviest spring must have come so far. */
+/* A spring that still transforms, or is known to show it and has not yet, is not hotter than that
+ * lets it be, whatever the model says, until even the coldest and heaviest spring must have come so
+ * far. */
 static void hold_back(const spring_estimator_t *e, const spring_belief_t *b, thermal_model_t *model,
                       uint8_t k)
 {
@@ -87,13 +88,14 @@ static void hold_back(const spring_estimator_t *e, const spring_belief_t *b, the
     const bool martensite = b->possible == SPRING_PHASE_MARTENSITE;
     const int16_t limit_c7 =
         martensite ? (int16_t)(t.austenite_start_c7 + ONSET_C7) : t.austenite_finish_c7;
-    if (b->learnt.austenite_ohm == 0.0f || b->blind ||
-        thermal_model_temperature_c7(model, k) <= limit_c7 ||
-        (!martensite && !spring_lacks_phase(b, model, k))) {
+    const bool shows = b->steep || (b->learnt.austenite_ohm > 0.0f && !b->blind &&
+                                    (martensite || spring_lacks_phase(b, model, k)));
+    if (!shows || thermal_model_temperature_c7(model, k) <= limit_c7) {
         return;
     }
+    /* what does not show takes no latent heat */
     const float latent_k =
-        martensite ? 0.0f : b->begun_missing * e->latent_heat_j / e->heat_capacity_j_per_k;
+        b->onset ? b->begun_missing * e->latent_heat_j / e->heat_capacity_j_per_k : 0.0f;
     const float limit_c = spring_c(limit_c7);
     /* where some austenite is left for certain, its transformation is where it was */
     const float shift_k = (b->possible & SPRING_PHASE_AUSTENITE) != 0 ? 0.0f : SHIFT_BOUND_K;

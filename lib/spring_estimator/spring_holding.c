@@ -2,30 +2,50 @@
 
 #include "spring_estimator_internal.h"
 
-#define QUIET_K       0.08f   /* a turn's: 0.3 K/s */
-#define QUIET_TURNS   40      /* 10 s: the average has settled */
-#define LINE_TURNS    240.0f  /* 60 s: what the line follows is no loss of phase */
-#define LOSS_LEAST    0.0012f /* of the resistance: what a sensor's steps leave in the average */
-#define NOISE_IN_SLOW 0.18f   /* of one turn's: sqrt(share / (2 - share)) */
-#define SURE_SDS      5.0f
-#define SUSPECTED     0.6f /* of what is sure */
-#define OTHER_WAY     3.0f /* times as much: an intermediate phase, where drifts go either way */
-#define CONFIRM_TURNS 2
-#define LASTING_TURNS 60    /* 15 s of suspicion are as sure */
-#define LARGE_LOSS    0.04f /* no hold drifts so far: the transformation may have moved */
-#define LARGE_SD_K    5.0f
-#define CROSSING_SD_K 1.0f
-#define STILL_K       0.5f  /* below martensite start it would be seen */
-#define OFFSET_MOST   0.03f /* of a resistance, read at another current: 8 mV of 0.27 V */
-#define OFFSET_PHASE  0.1f
+#define QUIET_K     0.08f /* a turn's: 0.3 K/s */
+#define QUIET_TURNS 40    /* 10 s: the average has settled */
+#define LINE_SHARE                                                                                 \
+    (1.0f / 240.0f)            /* of a turn, 60 s: what the line follows is no loss of phase       \
+                                */
+#define LOSS_LEAST     0.0012f /* of the resistance: what a sensor's steps leave in the average */
+#define NOISE_IN_SLOW  0.18f   /* of one turn's: sqrt(share / (2 - share)) */
+#define SURE_SDS       5.0f
+#define SUSPECTED      0.6f /* of what is sure */
+#define OTHER_WAY      3.0f /* times as much: an intermediate phase, where drifts go either way */
+#define CONFIRM_TURNS  2
+#define LASTING_TURNS  60    /* 15 s of suspicion are as sure */
+#define LARGE_LOSS     0.04f /* no hold drifts so far: the transformation may have moved */
+#define LARGE_SD_K     5.0f
+#define CROSSING_SD_K  1.0f
+#define APART_PER_A    1.0f    /* between two currents, as of 3 and 0.75 A */
+#define OFFSET_LEAST_V 0.0005f /* what a turn's steps of 4 mV leave, and its noise */
+#define OFFSET_SDS     3.0f
+#define OFFSET_MOST_V  0.012f
+#define STILL_K        0.5f  /* below where it would be seen */
+#define COSINE_BEGINS  0.64f /* 2 / pi: x where a cosine has sqrt(lost) = (pi / 2) x */
+
+/* Where it is on its way down, having lost so much: the beginning of the cosine, (1 - cos pi x)
+ * / 2. */
+static float lost_at_c(const thermal_model_t *model, uint8_t k, float lost)
+{
+    const thermal_model_transformation_t t = thermal_model_transformation(model, k);
+    const float width_k = spring_c((int16_t)(t.martensite_start_c7 - t.martensite_finish_c7));
+    const float depth = lost > 0.0f ? COSINE_BEGINS * sqrtf(fminf(lost, 1.0f)) : 0.0f;
+    return spring_c(t.martensite_start_c7) - width_k * depth;
+}
+
+void spring_begin_line(spring_belief_t *b, float now_c)
+{
+    b->line_ohm = b->slow_ohm;
+    b->line_c = now_c;
+    b->line_per_a = 1.0f / b->current_a;
+    b->rough = false;
+    b->losing = 0;
+}
 
 static void see_crossing(const spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model,
                          uint8_t k, float lost)
 {
-    const thermal_model_transformation_t t = thermal_model_transformation(model, k);
-    /* the beginning of the cosine, (1 - cos pi x) / 2 */
-    const float depth_k = spring_c((int16_t)(t.martensite_start_c7 - t.martensite_finish_c7)) *
-                          0.64f * sqrtf(fminf(lost, 1.0f));
     const bool searched = spring_estimator_sd_k(b) > 3.0f * CROSSING_SD_K;
     if (lost > LARGE_LOSS) {
         /* nearer to it by as much as more is lost up there */
@@ -37,24 +57,64 @@ static void see_crossing(const spring_estimator_t *e, spring_belief_t *b, therma
         b->covariance -= moved_k2 * by_loss;
         b->loss_variance += moved_k2 * by_loss * by_loss;
     }
-    const float error_k = spring_see(e, b, model, k, spring_c(t.martensite_start_c7) - depth_k,
-                                     CROSSING_SD_K, SPRING_PHASE_AUSTENITE);
+    b->lost = fminf(b->lost + lost, 1.0f);
+    const float error_k = spring_see(e, b, model, k, lost_at_c(model, k, b->lost), CROSSING_SD_K,
+                                     SPRING_PHASE_AUSTENITE);
     if (!searched && -error_k > b->disturbance_k) {
         b->disturbance_k = -error_k;
     }
-    b->lost = fminf(b->lost + lost, 1.0f);
-    b->quiet = 0;
-    b->losing = 0;
 }
 
-/* What went on the way here, beyond what temperature and an offset of the sensor explain. */
-static float gone_on_the_way(const spring_belief_t *b, float now_c)
+/* The current has dropped, the spring is what it was a moment ago: what reads otherwise is the
+ * sensor's offset. */
+static void learn_offset(spring_belief_t *b, float now_c)
 {
-    if (b->full_ohm == 0.0f) {
-        return 0.0f;
+    const float apart_per_a = 1.0f / b->current_a - b->line_per_a;
+    if (apart_per_a < APART_PER_A) {
+        return;
     }
-    return fabsf(1.0f - b->slow_ohm / b->full_ohm) - OFFSET_MOST -
-           COEFFICIENT_MOST_PER_K * fabsf(b->full_c - now_c);
+    const float apart_a = 1.0f / apart_per_a;
+    const float moved_v = COEFFICIENT_MOST_PER_K * (now_c - b->line_c) * b->line_ohm * apart_a;
+    const float noise_v = b->noise * b->ohm * apart_a;
+    const float prior_v2 = b->offset_sd_v * b->offset_sd_v;
+    const float read_v2 = OFFSET_LEAST_V * OFFSET_LEAST_V + noise_v * noise_v + moved_v * moved_v;
+    const float gain = prior_v2 / (prior_v2 + read_v2);
+    const float more_v = gain * (b->ohm - b->line_ohm) * apart_a;
+    if (fabsf(b->offset_v + more_v) > OFFSET_MOST_V) {
+        return; /* no offset is so large */
+    }
+    b->offset_v += more_v;
+    b->offset_sd_v = sqrtf(gain * read_v2);
+    b->line_ohm -= more_v * b->line_per_a;
+    b->learnt.austenite_ohm = b->doubted ? b->learnt.austenite_ohm : b->line_ohm;
+    b->seen = true; /* it is acted on in the next turn */
+}
+
+/* By how much the resistance may have left its line with the phase kept: its temperature moves it,
+ * and another current shows another share of the sensor's offset. */
+static float may_move(const spring_belief_t *b, float now_c)
+{
+    const spring_learnt_t *l = &b->learnt;
+    const float unsure_per_k = l->martensite_ohm > 0.0f
+                                   ? COEFFICIENT_SD_PER_K + 0.5f * fabsf(l->martensite_rise_per_k)
+                                   : COEFFICIENT_MOST_PER_K;
+    return unsure_per_k * fabsf(now_c - b->line_c) +
+           OFFSET_SDS * b->offset_sd_v * fabsf(1.0f / b->current_a - b->line_per_a) / b->line_ohm;
+}
+
+/* Of what the resistance has left its line by, the part that lost phase may explain. */
+static float as_lost(const spring_belief_t *b, const thermal_model_t *model, uint8_t k, float left,
+                     float sd_k)
+{
+    const float less = b->learnt.change < 0.0f ? left : -left;
+    if (less > 0.0f) {
+        return less;
+    }
+    /* the other way is an intermediate phase, which comes where it may be cold enough; else it is
+     * the last of the austenite that comes */
+    const bool cold = spring_now_c(model, k) - SPRING_ESTIMATOR_BOUND_SDS * sd_k <
+                      spring_c(thermal_model_transformation(model, k).martensite_start_c7);
+    return cold ? -less * (1.0f / OTHER_WAY) : 0.0f;
 }
 
 /* A phase that is kept changes the resistance no faster than temperature does. */
@@ -68,42 +128,51 @@ void spring_holding_watch(const spring_estimator_t *e, spring_belief_t *b, therm
     b->quiet = fabsf(moved_k) > QUIET_K ? 0
                : b->quiet < UINT8_MAX   ? (uint8_t)(b->quiet + 1)
                                         : UINT8_MAX;
-    if (b->quiet == 0) {
-        b->slow_ohm = b->ohm;
-        b->line_ohm = 0.0f;
-    }
-    if (b->quiet < QUIET_TURNS) {
-        b->losing = 0;
-        return;
-    }
     const float now_c = spring_now_c(model, k);
     if (b->line_ohm == 0.0f) {
-        const float gone = gone_on_the_way(b, now_c);
-        b->line_ohm = b->slow_ohm;
-        b->line_c = now_c;
-        b->full_ohm = 0.0f; /* asked once */
-        if (gone > 0.0f) {
-            see_crossing(e, b, model, k, gone / fabsf(b->learnt.change) + OFFSET_PHASE);
+        if (b->quiet == 0) {
+            b->slow_ohm = b->ohm;
+        }
+        if (b->quiet < QUIET_TURNS) {
+            b->losing = 0;
             return;
         }
+        spring_begin_line(b, now_c);
+    } else if (b->quiet == 0 && b->offset_sd_v > OFFSET_LEAST_V) {
+        learn_offset(b, now_c);
     }
     const float kept_ohm =
         b->line_ohm * (1.0f + b->learnt.martensite_rise_per_k * (now_c - b->line_c));
-    const float left = b->slow_ohm / kept_ohm - 1.0f;
-    const float as_learnt = b->learnt.change < 0.0f ? left : -left;
-    const float changed = as_learnt > 0.0f ? as_learnt : -as_learnt * (1.0f / OTHER_WAY);
-    /* as its temperature may have moved unseen, so may the resistance */
-    const float moves = fabsf(b->learnt.martensite_rise_per_k) * spring_estimator_sd_k(b);
-    const float sure = fmaxf(fmaxf(LOSS_LEAST, moves), SURE_SDS * NOISE_IN_SLOW * b->noise);
-    if (changed < SUSPECTED * sure) {
-        const int16_t start_c7 = thermal_model_transformation(model, k).martensite_start_c7;
+    if (b->quiet == 0 && b->current_a < STRONG_A) { /* on its way to the hold: too weak to tell */
+        b->slow_ohm = kept_ohm;
         b->losing = 0;
-        b->line_ohm += b->line_ohm * left * (1.0f / LINE_TURNS);
-        spring_keep_above(e, b, model, k, spring_c(start_c7) - STILL_K);
+        return;
+    }
+    const float left = b->slow_ohm / kept_ohm - 1.0f;
+    const float sd_k = spring_estimator_sd_k(b);
+    const float changed = as_lost(b, model, k, left, sd_k);
+    /* as its temperature may have moved unseen, so may the resistance */
+    const float moves = fabsf(b->learnt.martensite_rise_per_k) * sd_k;
+    const float noise = b->rough ? b->noise : NOISE_IN_SLOW * b->noise;
+    float sure = fmaxf(fmaxf(LOSS_LEAST, moves), SURE_SDS * noise);
+    if (changed >= SUSPECTED * sure) { /* as a rule not: two divisions are saved */
+        sure += may_move(b, now_c);
+    }
+    if (changed < SUSPECTED * sure) {
+        b->losing = 0;
+        if (b->quiet >= QUIET_TURNS) {
+            if (b->rough) { /* it has come to rest */
+                spring_begin_line(b, now_c);
+            }
+            b->line_ohm += b->line_ohm * left * LINE_SHARE;
+            b->line_c += (now_c - b->line_c) * LINE_SHARE;
+            spring_keep_above(e, b, model, k, lost_at_c(model, k, b->lost) - STILL_K);
+        }
         return;
     }
     b->losing = b->losing < UINT8_MAX ? (uint8_t)(b->losing + 1) : UINT8_MAX;
     if ((changed > sure && b->losing >= CONFIRM_TURNS) || b->losing >= LASTING_TURNS) {
         see_crossing(e, b, model, k, changed / fabsf(b->learnt.change));
+        spring_begin_line(b, spring_now_c(model, k));
     }
 }

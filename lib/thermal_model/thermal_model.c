@@ -407,26 +407,6 @@ void thermal_model_set_temperature(thermal_model_t *model, uint8_t spring, int16
     INVARIANT(spring_is_consistent(model, spring, state));
 }
 
-void thermal_model_add_temperature(thermal_model_t *model, uint8_t spring, int16_t difference_c7)
-{
-    const int32_t sum_c7 = (int32_t)thermal_model_temperature_c7(model, spring) + difference_c7;
-    thermal_model_set_temperature(model, spring, clamp_c7(sum_c7));
-}
-
-int16_t thermal_model_enthalpy_c7(const thermal_model_t *model, uint8_t spring)
-{
-    const thermal_model_spring_state_t *state = &model->state.spring[clamp_index(model, spring)];
-    return c7_of(fixed_point_add_saturated(state->temperature_c23, state->latent_c23));
-}
-
-void thermal_model_add_enthalpy(thermal_model_t *model, uint8_t spring, int16_t difference_c7)
-{
-    spring = clamp_index(model, spring);
-    add_heat(model, spring, c23_of(difference_c7));
-    model->spring[spring].midstep_c6 = c6_of(thermal_model_temperature_c7(model, spring));
-    INVARIANT(spring_is_consistent(model, spring, &model->state.spring[spring]));
-}
-
 int16_t thermal_model_temperature_c7(const thermal_model_t *model, uint8_t spring)
 {
     return c7_of(model->state.spring[clamp_index(model, spring)].temperature_c23);

@@ -190,14 +190,6 @@ uint16_t thermal_model_coupling_uw_per_k(const thermal_model_t *model, uint8_t s
 /* Takes one spring to a temperature as if slowly: on the way its phase transforms as it would.
  * O(1). */
 void thermal_model_set_temperature(thermal_model_t *model, uint8_t spring, int16_t temperature_c7);
-/* The same by a difference: an observer's correction. Saturates. */
-void thermal_model_add_temperature(thermal_model_t *model, uint8_t spring, int16_t difference_c7);
-
-/* Temperature plus latent heat taken up over heat capacity, degC in Q9.7: what heat alone changes.
- */
-int16_t thermal_model_enthalpy_c7(const thermal_model_t *model, uint8_t spring);
-/* The same heat into or out of a spring at once, K in Q9.7: its phase follows as in a step. */
-void thermal_model_add_enthalpy(thermal_model_t *model, uint8_t spring, int16_t difference_c7);
 
 /* The steady power that holds that spring at that temperature while its neighbours, air and plate
  * are as they are now; negative where it would have to be cooled. O(1), no division. */

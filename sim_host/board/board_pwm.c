@@ -27,7 +27,7 @@ typedef struct {
 #define DDRB 0x24u
 
 static const uint16_t timer_base[3] = {0x90, 0xA0, 0x120};
-/* Design, section 2: channels 1..9 are OC3A, OC3B, OC3C, OC4A ... OC5C. */
+/* Channels 1..9 are OC3A, OC3B, OC3C, OC4A ... OC5C. */
 static const pin_t pins[BOARD_PWM_OUTPUTS] = {
     {0, 0, DDRE, 3}, {0, 1, DDRE, 4}, {0, 2, DDRE, 5}, {1, 0, DDRH, 3}, {1, 1, DDRH, 4},
     {1, 2, DDRH, 5}, {2, 0, DDRL, 3}, {2, 1, DDRL, 4}, {2, 2, DDRL, 5},

@@ -73,22 +73,6 @@ bool check_outputs(const std::vector<std::string> &outputs, const std::vector<st
     return table;
 }
 
-bool mentions(std::string_view message, std::string_view name)
-{
-    const auto of_a_name = [](char c) {
-        return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '_';
-    };
-    for (std::size_t at = message.find(name); at != std::string_view::npos;
-         at = message.find(name, at + 1)) {
-        const std::size_t end = at + name.size();
-        if ((at == 0 || !of_a_name(message[at - 1])) &&
-            (end == message.size() || !of_a_name(message[end]))) {
-            return true;
-        }
-    }
-    return false;
-}
-
 std::string json_text(const nlohmann::ordered_json &value)
 {
     return value.dump(2, ' ', true, nlohmann::ordered_json::error_handler_t::replace) + "\n";

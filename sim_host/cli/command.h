@@ -43,9 +43,6 @@ void add_seconds_option(CLI::App &command, const std::string &name, double &seco
  * `-`. */
 bool check_outputs(const std::vector<std::string> &outputs, const std::vector<std::string> &inputs);
 
-/* True if `message` holds `name` as a whole word: by it a refusal finds its place in a file. */
-bool mentions(std::string_view message, std::string_view name);
-
 /* The JSON as it is written everywhere: two blanks of indent, NaN as null, a line end. */
 std::string json_text(const nlohmann::ordered_json &value);
 

@@ -4,7 +4,7 @@
 #include <fmt/format.h>
 #include <map>
 
-#include "log_file.h"
+#include "log_writer.h"
 #include "paper.h"
 
 namespace ninespring

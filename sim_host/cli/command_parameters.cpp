@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "model_file.h"
+#include "plant_names.h"
 
 namespace ninespring
 {

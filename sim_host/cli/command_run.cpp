@@ -7,8 +7,7 @@
 
 #include "chip_mapping.h"
 #include "electrics.h"
-#include "log_file.h"
-#include "model_file.h"
+#include "log_writer.h"
 #include "runner.h"
 #include "scenario_plant.h"
 
@@ -29,87 +28,104 @@ struct run_options {
     std::string json_path;
 };
 
-/* The model.toml that [chip] names, from the scenario's folder; empty if it names none. */
-std::string model_path(const scenario &plan)
+/* The file of settings that [chip] model names, from the scenario's folder; empty if it names none.
+ */
+std::string settings_path(const scenario &plan)
 {
-    if (plan.model_path.empty() || plan.model_path == "plant" || plan.model_path == "defaults") {
+    if (plan.model.empty() || plan.model == "plant" || plan.model == "defaults") {
         return {};
     }
-    return (std::filesystem::path(plan.name).parent_path() / plan.model_path).string();
+    return (std::filesystem::path(plan.name).parent_path() / plan.model).string();
 }
 
-/* What the chip is told of the array: the plant's own numbers, its defaults, or a fitted model's.
- * Gives what of it the chip leaves out, in words; mostly nothing. */
-std::string set_chip_model(const scenario &plan, const plant_t *plant, settings_t &settings)
+/* The lines `$name=value` of that file, each with its place. */
+std::vector<scenario_entry> read_settings(const std::string &path)
 {
-    thermal_model_parameters_t &model = settings.controller.model;
-    std::string path = plan.model_path.empty() ? "plant" : plan.model_path;
-    char message[1024] = "";
-    if (path == "defaults") {
-        model.rows = static_cast<std::uint8_t>(plan.rows);
-        model.columns = static_cast<std::uint8_t>(plan.cols);
-        return {};
-    }
-    if (path == "plant") {
-        if (chip_mapping_from_plant(plant, &model, message, sizeof message) != CHIP_MAPPING_OK) {
-            throw place_of(plan, message)
-                .error(fmt::format("the chip cannot hold the plant's parameters: {}; write "
-                                   "[chip] model = defaults, or a model.toml",
-                                   message));
+    const text_file file = read_text_file(path);
+    std::vector<scenario_entry> entries;
+    std::size_t line = 0;
+    for (std::size_t position = 0; position < file.text.size();) {
+        const std::string_view text = next_line(file.text, position);
+        ++line;
+        if (text.empty() || text.front() == '#') {
+            continue;
         }
-        return message;
+        const std::size_t equals = text.find('=');
+        if (text.front() != '$' || equals == std::string_view::npos) {
+            throw input_error(path, line, 1,
+                              fmt::format("{} is not $name=value; of a model.toml, `ninespring "
+                                          "export --model model.toml -o FILE` writes these lines",
+                                          in_quotes(text)));
+        }
+        entries.push_back({std::string(text.substr(1, equals - 1)),
+                           std::string(text.substr(equals + 1)),
+                           {path, line, equals + 2},
+                           {path, line, 2}});
     }
-    const model_description fitted = read_model(model_path(plan));
-    if (fitted.array.rows != plan.rows || fitted.array.cols != plan.cols) {
-        throw plan.model_place.error(
-            fmt::format("{} is of {} x {} springs, the scenario of {} x {}", path,
-                        fitted.array.rows, fitted.array.cols, plan.rows, plan.cols));
-    }
-    plant_pointer described(plant_create(plan.rows, plan.cols));
-    if (described == nullptr) {
-        throw work_error("memory is out");
-    }
-    apply_model(described.get(), fitted);
-    if (chip_mapping_from_plant(described.get(), &model, message, sizeof message) !=
-        CHIP_MAPPING_OK) {
-        throw plan.model_place.error(fmt::format("the chip cannot hold {}: {}", path, message));
-    }
-    return message;
+    return entries;
 }
 
+void assign(settings_t &settings, const scenario_entry &entry)
+{
+    switch (settings_assign(&settings, entry.key.c_str(), entry.value.c_str())) {
+    case SETTINGS_OK:
+        break;
+    case SETTINGS_UNKNOWN_NAME: {
+        std::vector<std::string> names;
+        for (std::uint16_t k = 0; k < PARAMETER_COUNT; ++k) {
+            names.emplace_back(parameter_row(k).name);
+        }
+        throw entry.key_place.error(
+            fmt::format("the chip has no setting {}{}; the console's $$ lists them",
+                        in_quotes(entry.key), did_you_mean(entry.key, names)));
+    }
+    case SETTINGS_NOT_A_NUMBER:
+        throw entry.place.error(fmt::format(
+            "${}: {} is not a number with a point and as many decimals as the setting has",
+            entry.key, in_quotes(entry.value)));
+    case SETTINGS_OUT_OF_RANGE: {
+        std::uint16_t row = 0;
+        std::uint8_t element = 0;
+        settings_find(entry.key.c_str(), &row, &element);
+        const parameter_row_t known = parameter_row(row);
+        const double scale = std::pow(10.0, known.decimals);
+        throw entry.place.error(fmt::format("${} is {}; it must be {} to {} {}", entry.key,
+                                            in_quotes(entry.value), known.minimum / scale,
+                                            known.maximum / scale, known.unit));
+    }
+    }
+}
+
+/* What the chip is told: the plant's own numbers, its defaults, or a file of settings; and what
+ * [chip] says besides. Gives what of the plant the chip leaves out, in words; mostly nothing. */
 std::string set_chip(const scenario &plan, const plant_t *plant, settings_t &settings)
 {
     settings_default(&settings);
-    std::string left_out = set_chip_model(plan, plant, settings);
+    thermal_model_parameters_t &model = settings.controller.model;
+    char left_out[1024] = "";
+    if (plan.model.empty() || plan.model == "plant") {
+        if (chip_mapping_from_plant(plant, &model, left_out, sizeof left_out) != CHIP_MAPPING_OK) {
+            throw place_of(plan, left_out)
+                .error(fmt::format("the chip cannot hold the plant's parameters: {}; write "
+                                   "[chip] model = defaults, or a file of settings",
+                                   left_out));
+        }
+    } else {
+        model.rows = static_cast<std::uint8_t>(plan.rows);
+        model.columns = static_cast<std::uint8_t>(plan.cols);
+    }
+    const std::string path = settings_path(plan);
+    for (const scenario_entry &entry :
+         path.empty() ? std::vector<scenario_entry>() : read_settings(path)) {
+        assign(settings, entry);
+    }
+    if (model.rows != plan.rows || model.columns != plan.cols) {
+        throw plan.model_place.error(
+            fmt::format("{} is of {} x {} springs, the scenario of {} x {}", plan.model, model.rows,
+                        model.columns, plan.rows, plan.cols));
+    }
     for (const scenario_entry &entry : plan.settings) {
-        switch (settings_assign(&settings, entry.key.c_str(), entry.value.c_str())) {
-        case SETTINGS_OK:
-            break;
-        case SETTINGS_UNKNOWN_NAME: {
-            std::vector<std::string> names;
-            for (std::uint16_t k = 0; k < PARAMETER_COUNT; ++k) {
-                names.emplace_back(parameter_row(k).name);
-            }
-            throw entry.key_place.error(
-                fmt::format("the chip has no setting {}{}; the console's $$ "
-                            "lists them",
-                            in_quotes(entry.key), did_you_mean(entry.key, names)));
-        }
-        case SETTINGS_NOT_A_NUMBER:
-            throw entry.place.error(fmt::format(
-                "${}: {} is not a number with a point and as many decimals as the setting has",
-                entry.key, in_quotes(entry.value)));
-        case SETTINGS_OUT_OF_RANGE: {
-            std::uint16_t row = 0;
-            std::uint8_t element = 0;
-            settings_find(entry.key.c_str(), &row, &element);
-            const parameter_row_t known = parameter_row(row);
-            const double scale = std::pow(10.0, known.decimals);
-            throw entry.place.error(fmt::format("${} is {}; it must be {} to {} {}", entry.key,
-                                                in_quotes(entry.value), known.minimum / scale,
-                                                known.maximum / scale, known.unit));
-        }
-        }
+        assign(settings, entry);
     }
     if (plan.policy == "precompensate") {
         settings.controller.policy.policy = DRIVE_POLICY_PRECOMPENSATE;
@@ -340,7 +356,7 @@ void run(const run_options &options)
     }
     scenario plan = read_scenario(options.scenario_path, options.sets);
     const bool table = check_outputs({options.output, options.json_path},
-                                     {options.scenario_path, options.elf, model_path(plan)});
+                                     {options.scenario_path, options.elf, settings_path(plan)});
     if (!options.seed.empty()) {
         plan.seed = parse_seed(options.seed, {"--seed", 0, 0});
     }

@@ -3,11 +3,33 @@
 #include <fmt/format.h>
 
 #include "electrics.h"
-#include "model_file.h"
 #include "paper.h"
+#include "plant_names.h"
 
 namespace ninespring
 {
+
+namespace
+{
+
+/* True if `message` holds `name` as a whole word: by it a refusal finds its place in a file. */
+bool mentions(std::string_view message, std::string_view name)
+{
+    const auto of_a_name = [](char c) {
+        return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '_';
+    };
+    for (std::size_t at = message.find(name); at != std::string_view::npos;
+         at = message.find(name, at + 1)) {
+        const std::size_t end = at + name.size();
+        if ((at == 0 || !of_a_name(message[at - 1])) &&
+            (end == message.size() || !of_a_name(message[end]))) {
+            return true;
+        }
+    }
+    return false;
+}
+
+} // namespace
 
 source_place place_of(const scenario &plan, std::string_view message)
 {

@@ -420,7 +420,7 @@ void read_entry(scenario &result, const raw_entry &entry)
         }
     } else if (entry.section == "chip") {
         if (entry.key == "model") {
-            result.model_path = entry.value;
+            result.model = entry.value;
             result.model_place = entry.value_place;
         } else {
             const std::string name = entry.key[0] == '$' ? entry.key.substr(1) : entry.key;

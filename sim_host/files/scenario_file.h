@@ -78,8 +78,8 @@ struct scenario {
     int cols = 3;
     std::optional<double> pitch_mm;
     source_place pitch_place;
-    std::string model_path; /* [chip] model: "plant", "defaults" or a model.toml, from the
-                               scenario's folder */
+    std::string model; /* [chip] model: "plant", "defaults" or a file of `$name=value` lines, from
+                          the scenario's folder */
     source_place model_place;
     std::vector<scenario_entry> effects;  /* key: the effect */
     std::vector<scenario_entry> plant;    /* parameters */

@@ -86,21 +86,6 @@ plant_status_t plant_set_temperature(plant_t *p, int spring, double temperature_
     return PLANT_OK;
 }
 
-plant_status_t plant_set_austenite(plant_t *p, int spring, double fraction)
-{
-    if (spring < 0 || spring >= p->n)
-        return PLANT_ERROR_INDEX;
-    if (!within(fraction, 0.0, 1.0))
-        return PLANT_ERROR_RANGE;
-    const plant_status_t status = plant_solver_prepare(p);
-    if (status != PLANT_OK)
-        return status;
-    p->austenite[spring] = fraction;
-    plant_phase_anchor(p, spring);
-    p->inputs_changed = true;
-    return PLANT_OK;
-}
-
 static bool drive_is_valid(plant_drive_mode_t mode, double quantity)
 {
     switch (mode) {

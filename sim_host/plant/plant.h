@@ -31,8 +31,7 @@ typedef enum {
 typedef struct {
     const char *name;
     const char *unit;
-    const char
-        *effect; /* the effect it belongs to (design, section 5), NULL for the declared model */
+    const char *effect; /* the effect it belongs to, NULL for the declared model */
     const char *description;
     double default_value;
     double minimum;
@@ -84,9 +83,6 @@ void plant_reset(plant_t *plant);
 /* Puts a spring (and its sensor) to -60..500 degC; its phase follows as if it had been led there
  * slowly. Not in the energy sums: it is a starting state. */
 plant_status_t plant_set_temperature(plant_t *plant, int spring, double temperature_c);
-/* Austenite fraction 0..1 of a starting state, limited to what the temperature allows (outer loop).
- */
-plant_status_t plant_set_austenite(plant_t *plant, int spring, double fraction);
 
 /* How a spring is driven until the next call; quantity in the unit of the mode. */
 typedef enum {

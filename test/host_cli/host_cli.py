@@ -2,7 +2,6 @@
 
 import csv
 import json
-import math
 import os
 import subprocess
 import sys
@@ -26,21 +25,7 @@ current_a = 0.001
 at 1 = pattern 111101111
 at 15 = off all
 """
-MODEL = """schema = "ninespring.model/1"
-effects = []
-[array]
-rows = 1
-cols = 2
-[[parameter]]
-name = "heat_capacity_j_per_k"
-value = 2.0
-unit = "J/K"
-[[parameter]]
-name = "command_power_w"
-value = 1.0
-unit = "W"
-"""
-LOG = "time_s,u1,u2,t1_c,t2_c\n0,0,0,20,20\n1,1,0,20,20\n2,1,0,20.4,20\n10,0,0.5,24,20.1\n11.25,0,0.5,,20.3\n"
+SETTINGS = "# not written: loss\n$heat_capacity_j_per_k=3.000\n\n$rows=3\n"
 
 
 def rows_of(path: Path) -> list[dict[str, str]]:
@@ -130,11 +115,6 @@ class Case(unittest.TestCase):
         path = self.file("s.ini", content)
         self.refused(begin, part, "run", path.name, "-o", self.output, "--json", self.json, *more)
 
-    def replay_refused(self, begin: str, part: str, log: "str | bytes" = LOG, model: str = MODEL) -> None:
-        log_path, model_path = self.file("log.csv", log), self.file("m.toml", model)
-        arguments = ("replay", log_path.name, "--model", model_path.name)
-        self.refused(begin, part, *arguments, "-o", self.output, "--json", self.json)
-
 
 class Arguments(Case):
     def test_help_everywhere(self) -> None:
@@ -172,9 +152,9 @@ class Arguments(Case):
         self.refused("a.csv: ", "two outputs", "run", scenario, "-o", "a.csv", "--json", "a.csv")
         self.refused("a.csv: ", "two outputs", "run", scenario, "-o", "a.csv", "--json", self.folder / "a.csv")
         self.refused("-: ", "two outputs", "paper", "-o", "-", "--json", "-")
-        self.file("m.toml", MODEL)
-        fitted = self.file("f.ini", SCENARIO.replace("[chip]", "[chip]\nmodel = m.toml"))
-        self.refused("m.toml: ", "is an input", "run", fitted, "-o", "m.toml")
+        self.file("s.txt", SETTINGS)
+        fitted = self.file("f.ini", SCENARIO.replace("[chip]", "[chip]\nmodel = s.txt"))
+        self.refused("s.txt: ", "is an input", "run", fitted, "-o", "s.txt")
         self.refused(f"{self.folder}: ", "is a folder", "paper", "-o", self.folder)
 
     def test_parameters_are_listed(self) -> None:
@@ -240,7 +220,7 @@ class Run(Case):
         self.assertEqual(first, self.run_it("c.csv", "--seed", 5))
         self.assertNotEqual(first, self.run_it("d.csv", "--seed", 6))
 
-    def test_log_holds_what_section_4_names(self) -> None:
+    def test_the_log_has_every_column_that_the_documents_name(self) -> None:
         self.run_it("a.csv", "--json", self.json)
         rows = rows_of(self.folder / "a.csv")
         self.assertEqual(len(rows), 41)
@@ -278,7 +258,8 @@ class Run(Case):
             "m.toml",
             f'schema = "ninespring.model/1"\n{effects}[array]\nrows = 3\ncols = 3\n',
         )
-        self.works("replay", "a.csv", "--model", model, "-o", self.output, "--json", self.json)
+        done = self.sim("replay", "a.csv", "--model", model, "-o", self.output, "--json", self.json)
+        self.assertEqual(done.returncode, 0, done.stderr)
         self.assertLess(json.loads(self.json.read_text())["rmse_c"], 0.3)
 
     def test_set_acts_as_the_file_would(self) -> None:
@@ -438,17 +419,19 @@ class Run(Case):
         self.assertEqual(precompensate, targets(SCENARIO + "at 0 = policy precompensate\n"))
         self.assertEqual(targets(SCENARIO), targets(named + "at 0 = policy open\n"))
 
-    def test_a_model_of_another_array_is_refused(self) -> None:
-        self.file("m.toml", MODEL)
-        scenario = SCENARIO.replace("[chip]", "[chip]\nmodel = m.toml")
-        self.scenario_refused("s.ini:8:9: ", "1 x 2 springs, the scenario of 3 x 3", scenario)
-
-    def test_a_model_file_is_what_the_chip_believes(self) -> None:
-        cold = MODEL.replace("cols = 2", "cols = 3").replace("rows = 1", "rows = 3").replace("2.0", "3.0")
-        self.file("fitted.toml", cold)
-        scenario = SCENARIO.replace("[chip]", "[chip]\nmodel = fitted.toml")
-        rows = rows_of_text(self.run_it("a.csv", scenario=scenario))
+    def test_a_file_of_settings_is_what_the_chip_believes(self) -> None:
+        told = SCENARIO.replace("[chip]", "[chip]\nmodel = fitted.txt")
+        self.file("fitted.txt", SETTINGS)
+        rows = rows_of_text(self.run_it("a.csv", scenario=told))
         self.assertLess(float(rows[-1]["m1_c"]), float(rows[-1]["p1_c"]) - 10)
+        for line, place, said in (
+            ("$rows=1\n", "s.ini:8:9: ", "is of 1 x 3 springs, the scenario of 3 x 3"),
+            ("[array]\nrows = 1\n", "fitted.txt:1:1: ", "`ninespring export --model model.toml -o FILE`"),
+            ("# a\n$loss_w_per_kk=1\n", "fitted.txt:2:2: ", "did you mean loss_w_per_k?"),
+            ("$loss_w_per_k=9\n", "fitted.txt:1:15: ", "must be"),
+        ):
+            self.file("fitted.txt", line)
+            self.scenario_refused(place, said, told)
 
     def test_output_is_replaced_whole(self) -> None:
         self.output.write_text("old")
@@ -506,7 +489,7 @@ class BadScenario(Case):
             chip.format("open_current_ma = 1"),
         )
         self.scenario_refused("s.ini:2:", "must be", chip.format("open_current_a = 1500"))
-        self.scenario_refused("none.toml: ", "cannot be read", chip.format("model = none.toml"))
+        self.scenario_refused("none.txt: ", "cannot be read", chip.format("model = none.txt"))
 
     def test_what_the_chip_cannot_hold(self) -> None:
         plant = "[plant]\nplate_loss_w_per_k = 1\n{}\n[scenario]\nduration_s = 1\n"
@@ -534,165 +517,6 @@ class BadScenario(Case):
             SCENARIO,
             "--set",
             "ambient_c=1,5",
-        )
-
-
-class Replay(Case):
-    def replay(self, log: str = LOG, model: str = MODEL) -> tuple[str, list[dict[str, str]], dict]:
-        """What is printed, the rows that are written, the result for programs."""
-        self.file("log.csv", log)
-        self.file("m.toml", model)
-        table = self.works("replay", "log.csv", "--model", "m.toml", "-o", self.output, "--json", self.json)
-        return table, rows_of(self.output), json.loads(self.json.read_text())
-
-    def near(self, row: dict[str, str], column: str, expected: float, delta: float) -> None:
-        self.assertAlmostEqual(float(row[column]), expected, delta=delta)
-
-    def test_model_follows_the_command(self) -> None:
-        table, rows, result = self.replay("\ufeff" + LOG.replace("\n", "\r\n"))
-        self.assertIn("degC rms", table)
-        self.assertEqual([row["time_s"] for row in rows], ["0.000", "1.000", "2.000", "10.000", "11.250"])
-        self.assertEqual(rows[4]["t1_c"], "")
-        # 1 W into 2 J/K from 1 s to 10 s, little lost: half a kelvin a second.
-        self.near(rows[2], "m1_c", 20.5, 0.02)
-        self.near(rows[3], "m1_c", 24.45, 0.15)
-        self.near(rows[4], "m2_c", float(rows[3]["m2_c"]) + 0.3125, 0.03)
-        self.assertEqual([one["samples"] for one in result["springs"]], [4, 5])
-
-    def test_rows_between_two_steps(self) -> None:
-        model = MODEL.replace("2.0", "0.2")  # 5 K/s at 1 W: half a step of the chip is 0.25 K
-        _, rows, _ = self.replay("time_s,u1,u2,t1_c\n0,1,0.5,20\n1.05,1,0,\n1.1,0,0,\n", model)
-        rise = [(1 - math.exp(-seconds * 0.0058 / 0.2)) / 0.0058 for seconds in (0, 1.05, 1.1)]
-        for row, expected in zip(rows, rise, strict=True):
-            self.near(row, "m1_c", 20 + expected, 0.03)
-        self.near(rows[2], "m2_c", 20 + 0.5 * rise[1], 0.03)  # off in the middle of the step
-
-    def test_the_log_s_fan_and_air_count(self) -> None:
-        rows_in = "0,0,0,60,0,40\n100,0,0,,1,40\n200,0,0,,1,20\n300,0,0,,1,20\n"
-        model = MODEL + '[[parameter]]\nname = "orthogonal_w_per_k"\nvalue = 0\nunit = "W/K"\n'
-        model += '[[parameter]]\nname = "orthogonal_fan_w_per_k"\nvalue = 0\nunit = "W/K"\n'
-        _, rows, _ = self.replay("time_s,u1,u2,t1_c,fan,ambient_c\n" + rows_in, model)
-        warm = 40 + 20 * math.exp(-100 * 0.0058 / 2)
-        fanned = 40 + (warm - 40) * math.exp(-100 * 0.0113 / 2)
-        cooled = 20 + (fanned - 20) * math.exp(-100 * 0.0113 / 2)
-        for row, expected in zip(rows, (60, warm, fanned, cooled), strict=True):
-            self.near(row, "m1_c", expected, 0.05)
-        for row, expected in zip(rows, (40, 40, 40, 20 + 20 * math.exp(-0.565)), strict=True):
-            self.near(row, "m2_c", expected, 0.05)  # never measured: starts at the log's ambient
-
-    def test_errors_are_those_of_the_file(self) -> None:
-        effects = 'effects = ["sensor_gain"]'
-        _, rows, result = self.replay(model=MODEL.replace("effects = []", effects))
-        everything = []
-        for k, spring in enumerate(result["springs"], 1):
-            for of, key in (("m", "rmse_c"), ("y", "shown_rmse_c")):
-                errors = [float(row[f"{of}{k}_c"]) - float(row[f"t{k}_c"]) for row in rows if row[f"t{k}_c"]]
-                rms = (sum(e * e for e in errors) / len(errors)) ** 0.5
-                self.assertAlmostEqual(spring[key], rms, delta=0.001)
-                if of == "m":
-                    everything += errors
-                    self.assertAlmostEqual(spring["mean_error_c"], sum(errors) / len(errors), delta=0.001)
-                    self.assertAlmostEqual(spring["largest_error_c"], max(map(abs, errors)), delta=0.001)
-        rms = (sum(e * e for e in everything) / len(everything)) ** 0.5
-        self.assertAlmostEqual(result["rmse_c"], rms, delta=0.001)
-        self.assertNotAlmostEqual(result["springs"][0]["shown_rmse_c"], result["springs"][0]["rmse_c"], delta=0.01)
-
-    def test_measurement_effects_stay_off_the_chip(self) -> None:
-        warm = LOG.replace("0,0,0,20,20", "0,0,0,30,20")
-        plain = [row["m1_c"] for row in self.replay(warm)[1]]
-        effects = 'effects = ["sensor_lag"]'
-        table, rows, _ = self.replay(warm, MODEL.replace("effects = []", effects))
-        self.assertEqual([row["m1_c"] for row in rows], plain)
-        shown = [row["y1_c"] for row in rows]
-        self.assertEqual(shown[0], plain[0])  # the sensor starts where the spring does
-        self.assertLess(float(shown[3]), float(plain[3]) - 1)
-        self.assertIn("sensor_lag is not on the chip", table)
-
-    def test_current_and_voltage_are_power(self) -> None:
-        model = MODEL.replace("cols = 2", "cols = 1")
-        _, rows, _ = self.replay("time_s,i1_a,v1_v,t1_c\n0,2,0.5,20\n4,0,0,22\n", model)
-        self.near(rows[1], "m1_c", 21.98, 0.03)
-        _, rows, _ = self.replay("time_s,i1_a,t1_c\n0,2,20\n4,0,22\n", model)
-        self.near(rows[1], "m1_c", 20 + 4 * 0.219 * 4 / 2, 0.05)
-
-    def test_a_log_without_temperatures_is_simulated(self) -> None:
-        table, rows, result = self.replay("time_s,u1,u2\n0,1,0\n10,0,0\n")
-        self.assertIn("no temperature to compare with", table)
-        self.near(rows[1], "m1_c", 25, 0.2)
-        self.assertEqual((result["rmse_c"], result["springs"][0]["largest_error_c"]), (None, None))
-
-    def test_bad_logs(self) -> None:
-        refused = self.replay_refused
-        refused(
-            "log.csv:1:14: ",
-            "(F - 32) / 1.8 and name it t1_c",
-            LOG.replace("t1_c", "t1_f"),
-        )
-        refused(
-            "log.csv:1:8: ",
-            "divide by 1000 and name it i1_a",
-            LOG.replace("u1", "i1_ma"),
-        )
-        refused("log.csv:1:19: ", "appears twice", LOG.replace("t2_c", "t1_c"))
-        refused("log.csv:1:1: ", "no column time_s", LOG.replace("time_s", "note_t"))
-        refused("log.csv:1:1: ", "neither i2_a nor u2", LOG.replace("u2", "note_u"))
-        refused("log.csv:3:3: ", "nan", LOG.replace("1,1,0,20,20", "1,nan,0,20,20"))
-        refused("log.csv:4:1: ", "does not rise", LOG.replace("2,1,0", "1,1,0"))
-        refused("log.csv:3:1: ", "does not rise", LOG.replace("1,1,0,20,20", "-1,1,0,20,20"))
-        refused("log.csv:3:3: ", "in percent", LOG.replace("1,1,0,20,20", "1,70,0,20,20"))
-        refused("log.csv:6:11: ", "cut short", LOG[:-8])
-        refused("log.csv:1:7: ", "decimal point", LOG.replace(",", ";"))
-        refused(
-            "log.csv:3:12: ",
-            "decimal commas",
-            LOG.replace("1,1,0,20,20", "1,1,0,20,5,20,5"),
-        )
-        refused("log.csv:7:65537: ", "1000000 characters", LOG + "1" * 1000000)
-        refused("log.csv:1:1: ", "no row", LOG.split("\n")[0])
-        refused("log.csv:1:1: ", "empty", "")
-        refused("log.csv:1:1: ", "UTF-16", LOG.encode("utf-16"))
-        refused(
-            "log.csv:1:11: ",
-            "the array has 1 springs",
-            LOG,
-            MODEL.replace("cols = 2", "cols = 1"),
-        )
-        refused("log.csv: ", "in ms", LOG.replace("11.25", "11250000"))
-
-    def test_bad_models(self) -> None:
-        refused = self.replay_refused
-        refused(
-            "m.toml:1:10: ",
-            "ninespring.model/1",
-            model=MODEL.replace("model/1", "model/2"),
-        )
-        refused("m.toml:9:8: ", "convert", model=MODEL.replace("J/K", "mJ/K"))
-        refused("m.toml:8:9: ", "must be", model=MODEL.replace("2.0", "-2.0"))
-        refused("m.toml:8:9: ", "must be", model=MODEL.replace("2.0", "nan"))
-        refused(
-            "m.toml:7:8: ",
-            "did you mean heat_capacity_j_per_k?",
-            model=MODEL.replace("_per_k", "_per_c"),
-        )
-        refused("m.toml:14:1: ", "no key 'colour'", model=MODEL + "colour = 1\n")
-        refused("m.toml:13:", "not TOML", model=MODEL[:-2])
-        refused(
-            "m.toml: ",
-            "no command_power_w",
-            model=MODEL.replace("value = 1.0", "value = 0.0"),
-        )
-        refused("m.toml:8:9: ", "the chip holds", model=MODEL.replace("2.0", "200.0"))
-
-    def test_missing_files(self) -> None:
-        self.refused(
-            "m.toml: ",
-            "cannot be read",
-            "replay",
-            "l.csv",
-            "--model",
-            "m.toml",
-            "-o",
-            self.output,
         )
 
 

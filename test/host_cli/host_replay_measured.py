@@ -13,13 +13,13 @@ MOST_RMSE_C = {"energy_balance_600": 1.5, "second_order_mimo_201": 1.5}
 
 
 def main() -> int:
-    sim, root = Path(sys.argv[1]), Path(sys.argv[2])
+    root = Path(sys.argv[1])
     data = Path(os.environ.get("NINESPRING_DATA") or root / "data")
     python = root / ".venv" / "bin" / "python"
     if not python.exists():
         python = Path(sys.executable)
-    if subprocess.run([python, "-c", "import scipy"], capture_output=True, check=False).returncode != 0:
-        print("SKIPPED: SciPy is not there (script/setup puts it into .venv)")
+    if subprocess.run([python, "-c", "import ninespring"], capture_output=True, check=False).returncode != 0:
+        print("SKIPPED: the Python package is not there (script/setup puts it into .venv)")
         return 77
     with tempfile.TemporaryDirectory() as folder:
         result = Path(folder) / "fit.json"
@@ -29,8 +29,6 @@ def main() -> int:
             script,
             "--data",
             data,
-            "--sim",
-            sim,
             "-o",
             folder,
             "--json",

@@ -12,8 +12,7 @@ extern "C" {
 #include <unity.h>
 }
 
-#include "log_file.h"
-#include "model_file.h"
+#include "log_writer.h"
 #include "scenario_file.h"
 #include "text_file.h"
 
@@ -43,135 +42,41 @@ void expect(const std::string &text, const std::string &begin, const std::string
     TEST_ASSERT_TRUE_MESSAGE(text.find(part) != std::string::npos, text.c_str());
 }
 
-void refuses_log(const std::string &text, const std::string &begin, const std::string &part)
-{
-    expect(error_of([&] { parse_log(make_text_file("a.csv", text)); }), begin, part);
-}
-
 void refuses_scenario(const std::string &text, const std::string &begin, const std::string &part)
 {
     expect(error_of([&] { parse_scenario(make_text_file("s.ini", text, 197)); }), begin, part);
 }
 
-void refuses_model(const std::string &text, const std::string &begin, const std::string &part)
-{
-    expect(error_of([&] { parse_model(make_text_file("m.toml", text)); }), begin, part);
-}
-
-const std::string HEADER = "time_s,i1_a,t1_c\n";
-
-void log_of_two_springs_is_read(void)
-{
-    const log_data log = parse_log(make_text_file(
-        "a.csv", "\xEF\xBB\xBF# board: 7\r\n# no colon here\r\ntime_s, i1_a,v1_v,u2,t1_c,t2_c,fan,"
-                 "ambient_c,m1_c,d1,limits1,cut1_a,state,note_who\r\n"
-                 "0,1.5,0.26,0.5,20,,0,21,20,0.5,0,0.000,ok,me\r\n\r\n"
-                 "# <limits|spring:1|t:0.480|supply|cut_a:0.500>\r\n"
-                 "0.5,\"1.25\",0.25,1,20.5,30,1,21.5,x,0.5,4,0.500,ok,you"));
-    TEST_ASSERT_EQUAL(2, log.springs.size());
-    TEST_ASSERT_EQUAL(2, log.time_s.size());
-    TEST_ASSERT_EQUAL_DOUBLE(1.25, log.springs[0].current_a[1]);
-    TEST_ASSERT_EQUAL_DOUBLE(0.25, log.springs[0].voltage_v[1]);
-    TEST_ASSERT_EQUAL(0, log.springs[0].command.size());
-    TEST_ASSERT_EQUAL_DOUBLE(1.0, log.springs[1].command[1]);
-    TEST_ASSERT_TRUE((std::isnan)(log.springs[1].temperature_c[0]));
-    TEST_ASSERT_EQUAL_DOUBLE(30.0, log.springs[1].temperature_c[1]);
-    TEST_ASSERT_EQUAL_DOUBLE(1.0, log.fan[1]);
-    TEST_ASSERT_EQUAL_DOUBLE(21.5, log.ambient_c[1]);
-}
-
-void log_without_optional_columns_is_read(void)
-{
-    const log_data log = parse_log(make_text_file("a.csv", "u1,time_s\n1,0\n0.25,1e0\n"));
-    TEST_ASSERT_EQUAL(1, log.springs.size());
-    TEST_ASSERT_EQUAL(2, log.fan.size());
-    TEST_ASSERT_EQUAL_DOUBLE(0.0, log.fan[1]);
-    TEST_ASSERT_TRUE(log.ambient_c.empty());
-    TEST_ASSERT_TRUE(log.springs[0].temperature_c.empty());
-}
-
-void log_columns_with_a_wrong_unit_are_refused_with_advice(void)
-{
-    refuses_log("time_s,i1_a,t1_f\n", "a.csv:1:13: ", "(F - 32) / 1.8 and name it t1_c");
-    refuses_log("time_s,i12_ma,t1_c\n", "a.csv:1:8: ", "divide by 1000 and name it i12_a");
-    refuses_log("time_s,i1_a,v1_mV\n", "a.csv:1:13: ", "divide by 1000 and name it v1_v");
-    refuses_log("time_ms,i1_a\n", "a.csv:1:1: ", "divide by 1000 and name it time_s");
-    refuses_log("Time,i1_a\n", "a.csv:1:1: ", "name it time_s");
-    refuses_log("time_s,Q1_pct\n", "a.csv:1:8: ", "divide by 100 and name it u1");
-    refuses_log("time_s,i1_a,t1\n", "a.csv:1:13: ", "if it is degC, name it t1_c");
-    refuses_log("time_s,i1_a,ambient_f\n", "a.csv:1:13: ", "(F - 32) / 1.8");
-    refuses_log("time_s,i1_a,weather\n", "a.csv:1:13: ", "note_");
-}
-
-void log_values_out_of_range_are_refused_with_advice(void)
-{
-    refuses_log(HEADER + "0,1500,20\n", "a.csv:2:3: ", "if it is in mA, divide by 1000");
-    refuses_log("time_s,u1\n0,70\n", "a.csv:2:3: ", "if it is in percent, divide by 100");
-    refuses_log("time_s,u1,fan\n0,0,50\n", "a.csv:2:5: ", "if it is in percent, divide by 100");
-    refuses_log(HEADER + "0,1,900\n", "a.csv:2:5: ", "leave the field empty");
-}
-
-void log_values_that_are_no_numbers_are_refused(void)
-{
-    refuses_log(HEADER + "0,1,20\n1,nan,20\n", "a.csv:3:3: ", "column i1_a: 'nan'");
-    refuses_log(HEADER + "0,1,NaN\n", "a.csv:2:5: ", "leave the field empty");
-    refuses_log(HEADER + "0,inf,20\n", "a.csv:2:3: ", "not a finite number");
-    refuses_log(HEADER + "0,,20\n", "a.csv:2:3: ", "a number is missing");
-    refuses_log(HEADER + "0,1.5A,20\n", "a.csv:2:3: ", "'1.5A' is not a number");
-    refuses_log(HEADER + "0,1e999,20\n", "a.csv:2:3: ", "too large");
-    refuses_log(HEADER + "0,0x10,20\n", "a.csv:2:3: ", "not a number");
-}
-
-void decimal_commas_are_refused(void)
-{
-    refuses_log("time_s;i1_a;t1_c\n0;1,5;20,1\n", "a.csv:1:7: ", "separate them by ','");
-    refuses_log(HEADER + "0,1,5,20,1\n", "a.csv:2:7: ", "decimal commas");
-    refuses_log(HEADER + "0,\"1,5\",20\n", "a.csv:2:3: ", "decimal comma");
-    refuses_log("time_s\ti1_a\n", "a.csv:1:7: ", "tabs");
-}
-
-void log_times_must_rise(void)
-{
-    refuses_log(HEADER + "0,1,20\n1,1,20\n1,1,20\n", "a.csv:4:1: ", "remove the duplicate row");
-    refuses_log(HEADER + "5,1,20\n4,1,20\n", "a.csv:3:1: ", "does not rise: 4 after 5");
-    refuses_log(HEADER + "nan,1,20\n", "a.csv:2:1: ", "time_s");
-}
-
-void log_with_missing_columns_is_refused(void)
-{
-    refuses_log("i1_a,t1_c\n0,20\n", "a.csv:1:1: ", "there is no column time_s");
-    refuses_log("time_s,fan\n0,0\n", "a.csv:1:1: ", "there is no spring");
-    refuses_log("time_s,i1_a,t3_c,i3_a\n", "a.csv:1:1: ", "spring 2 has neither i2_a nor u2");
-    refuses_log("time_s,u1,v1_v\n", "a.csv:1:11: ", "v1_v is without i1_a");
-    refuses_log("time_s,i1_a,i1_a\n", "a.csv:1:13: ", "appears twice");
-    refuses_log("time_s,i1_a,,t1_c\n", "a.csv:1:13: ", "no name");
-    refuses_log("time_s,i65_a\n", "a.csv:1:8: ", "at most 64");
-    expect(
-        error_of([] { parse_log(make_text_file("a.csv", "time_s,i1_a,i2_a,i3_a\n0,0,0,0\n"), 2); }),
-        "a.csv:1:18: ", "the array has 2 springs");
-}
-
-void truncated_logs_are_refused(void)
-{
-    refuses_log(HEADER + "0,1,20\n1,1", "a.csv:3:4: ", "cut short");
-    refuses_log(HEADER + "0,1\n1,1,20\n", "a.csv:2:4: ", "complete the row");
-    refuses_log(HEADER, "a.csv:1:1: ", "no row");
-    refuses_log("# a: b\n", "a.csv:1:1: ", "no line with column names");
-    refuses_log("", "a.csv:1:1: ", "empty");
-    refuses_log(HEADER + "0,\"1,20\n", "a.csv:2:3: ", "quote is not closed");
-}
-
 void files_that_are_not_text_are_refused(void)
 {
-    refuses_log(HEADER + "0," + std::string(1000000, '1') + ",20\n",
-                "a.csv:2:65537: ", "1000005 characters");
-    refuses_log(std::string("\xFF\xFEt\0", 4), "a.csv:1:1: ", "UTF-16");
-    refuses_log(std::string("time_s,i1_a\n0,\0", 15), "a.csv:2:3: ", "zero byte");
-    expect(error_of([] { read_log("no_such_file.csv"); }), "no_such_file.csv: ", "cannot be read");
-    expect(error_of([] { read_log("."); }), ".: ", "is a folder");
+    expect(error_of([] { make_text_file("a", "x\n" + std::string(1000000, '1')); }),
+           "a:2:65537: ", "1000000 characters");
+    expect(error_of([] { make_text_file("a", std::string("\xFF\xFEt\0", 4)); }),
+           "a:1:1: ", "UTF-16");
+    expect(error_of([] { make_text_file("a", std::string("t\n0,\0", 5)); }),
+           "a:2:3: ", "zero byte");
+    expect(error_of([] { make_text_file("a", ""); }), "a:1:1: ", "empty");
+    expect(error_of([] { read_text_file("no_such_file"); }), "no_such_file: ", "cannot be read");
+    expect(error_of([] { read_text_file("."); }), ".: ", "is a folder");
 }
 
-void written_log_is_read_back(void)
+void number_is_refused_with_advice(void)
+{
+    const auto problem = [](const char *text) {
+        double value = 0.0;
+        return parse_number(text, value);
+    };
+    expect(problem(""), "", "is missing");
+    expect(problem("1.5A"), "'1.5A'", "not a number");
+    expect(problem("1e999"), "'1e999'", "too large");
+    expect(problem("0x10"), "'0x10'", "not a number");
+    expect(problem("1,5"), "'1,5'", "decimal comma");
+    expect(problem("70%"), "'70%'", "fraction of 1");
+    expect(problem("inf"), "'inf'", "not a finite number");
+    TEST_ASSERT_EQUAL_STRING("", problem("+1.5e0").c_str());
+}
+
+void log_is_written_with_fixed_decimals(void)
 {
     log_writer writer;
     writer.comment("scenario", "x\ny");
@@ -182,9 +87,6 @@ void written_log_is_read_back(void)
     writer.row({0.02, 1.0, std::nan("")});
     TEST_ASSERT_EQUAL_STRING("# scenario: x y\ntime_s,u1,t1_c\n0.00,0.500,0.000\n0.02,1.000,\n",
                              writer.text().c_str());
-    const log_data log = parse_log(make_text_file("w.csv", writer.text()));
-    TEST_ASSERT_EQUAL_DOUBLE(0.5, log.springs[0].command[0]);
-    TEST_ASSERT_TRUE((std::isnan)(log.springs[0].temperature_c[1]));
 }
 
 void file_is_written_whole_or_not_at_all(void)
@@ -209,72 +111,6 @@ void file_is_written_whole_or_not_at_all(void)
     TEST_ASSERT_TRUE(failed);
     TEST_ASSERT_EQUAL(1, std::distance(fs::directory_iterator(folder), fs::directory_iterator()));
     fs::remove_all(folder);
-}
-
-const std::string MODEL = "schema = \"ninespring.model/1\"\n"
-                          "[array]\nrows = 1\ncols = 2\npitch_mm = 30\n";
-
-void model_is_read(void)
-{
-    const plant_parameter_t *per_spring = nullptr;
-    const plant_parameter_t *of_array = nullptr;
-    for (std::size_t k = 0; k < plant_parameter_count(); ++k) {
-        const plant_parameter_t *one = plant_parameter(k);
-        if (one->effect == nullptr) {
-            (one->per_spring ? per_spring : of_array) = one;
-        }
-    }
-    TEST_ASSERT_NOT_NULL(of_array);
-    const auto block = [](const plant_parameter_t *one, const std::string &more) {
-        return std::string("[[parameter]]\nname = \"") + one->name +
-               "\"\nvalue = " + std::to_string(one->default_value) + "\nunit = \"" + one->unit +
-               "\"\n" + more;
-    };
-    std::string text = "schema = \"ninespring.model/1\"\neffects = [\"latent_heat\"]\n"
-                       "[array]\nrows = 1\ncols = 2\n" +
-                       block(of_array, "stderr = 0.25\n");
-    if (per_spring != nullptr) {
-        text += block(per_spring, "spring = 2\n");
-        refuses_model(MODEL + block(per_spring, "spring = 3\n"), "m.toml:10:10: ", "1 to 2");
-    }
-    const model_description model = parse_model(make_text_file("m.toml", text));
-    TEST_ASSERT_EQUAL(2, model.array.cols);
-    TEST_ASSERT_EQUAL_STRING("latent_heat", model.effects[0].first.c_str());
-    TEST_ASSERT_EQUAL_DOUBLE(0.25, *model.parameters[0].stderr_value);
-    refuses_model(MODEL + block(of_array, "") + block(of_array, ""),
-                  "m.toml:12:9: ", "appears twice");
-    refuses_model(MODEL + block(of_array, "effect = \"radiation\"\n"),
-                  "m.toml:10:10: ", "belongs to no effect");
-    refuses_model(MODEL + "[[parameter]]\nname = \"" + of_array->name +
-                      "\"\nvalue = 1\nunit = \"furlong\"\n",
-                  "m.toml:", of_array->unit);
-    refuses_model(MODEL + "[[parameter]]\nname = \"" + of_array->name +
-                      "\"\nvalue = nan\nunit = \"" + of_array->unit + "\"\n",
-                  "m.toml:8:9: ", of_array->name);
-}
-
-void model_with_errors_is_refused(void)
-{
-    refuses_model("schema = \"other/9\"\n[array]\nrows=1\ncols=2\n",
-                  "m.toml:1:10: ", "ninespring.model/1");
-    refuses_model("[array]\nrows=1\ncols=2\n", "m.toml:1:1: ", "without schema");
-    refuses_model("schema = \"ninespring.model/1\"\n", "m.toml:1:1: ", "without array");
-    refuses_model(MODEL + "colour = 3\n", "m.toml:6:1: ", "no key 'colour'");
-    refuses_model(MODEL + "rows = 2\n", "m.toml:6:8: ", "not TOML");
-    refuses_model(MODEL + "[material]\nmass = 2\n", "m.toml:7:1: ", "no key 'mass'");
-    refuses_model(MODEL + "[sensor]\nnoise_c = \"0.3\"\n", "m.toml:7:11: ", "without quotes");
-    refuses_model(MODEL + "[spring]\nturns = inf\n", "m.toml:7:9: ", "turns");
-    refuses_model("schema = \"ninespring.model/1\"\neffects = [\"latent_heet\"]\n[array]\nrows=1\n"
-                  "cols=2\n",
-                  "m.toml:2:12: ", "did you mean latent_heat?");
-    refuses_model(MODEL + "[[parameter]]\nname = \"nothing\"\nvalue = 1\nunit = \"W\"\n",
-                  "m.toml:7:8: ", "there is no parameter 'nothing'");
-    refuses_model(MODEL + "[[parameter]]\nvalue = 1\n", "m.toml:6:", "without name");
-    refuses_model(MODEL + "[[param", "m.toml:6:", "not TOML");
-    refuses_model("schema = \"ninespring.model/1\"\n[array]\nrows=9\ncols=9\n",
-                  "m.toml:4:6: ", "more than 64");
-    refuses_model("schema = \"ninespring.model/1\"\n[array]\nrows=1.5\ncols=9\n",
-                  "m.toml:3:6: ", "whole number");
 }
 
 const std::string SCENARIO = "[scenario]\nduration_s = 60\n";
@@ -367,43 +203,15 @@ void scenario_arguments_with_errors_are_refused(void)
     refuses("scenario.colour=1", "no key 'colour'");
 }
 
-void array_of_a_model_is_read_and_checked(void)
-{
-    const std::string schema = "schema = \"ninespring.model/1\"\n";
-    const array_description array =
-        parse_model(make_text_file("m.toml", schema + "[array]\nrows = 2\ncols = 3\npitch_mm = 4\n"
-                                                      "[spring]\nwire_diameter_mm = 0.8\n"
-                                                      "[sensor]\nkind = \"camera\"\n"))
-            .array;
-    TEST_ASSERT_EQUAL(2, array.rows);
-    TEST_ASSERT_EQUAL_DOUBLE(4.0, *array.pitch_mm);
-    TEST_ASSERT_EQUAL(1, array.spring.size());
-    TEST_ASSERT_EQUAL_STRING("camera", array.sensor_kind.c_str());
-    refuses_model(schema + "[array]\nrows = 2\n", "m.toml:2:1: ", "without cols");
-    refuses_model(schema + "[array]\nrows = 2\ncols = 2\n[colour]\n",
-                  "m.toml:5:2: ", "no key 'colour'");
-}
-
 } // namespace
 
 int main(void)
 {
     UNITY_BEGIN();
-    RUN_TEST(log_of_two_springs_is_read);
-    RUN_TEST(log_without_optional_columns_is_read);
-    RUN_TEST(log_columns_with_a_wrong_unit_are_refused_with_advice);
-    RUN_TEST(log_values_out_of_range_are_refused_with_advice);
-    RUN_TEST(log_values_that_are_no_numbers_are_refused);
-    RUN_TEST(decimal_commas_are_refused);
-    RUN_TEST(log_times_must_rise);
-    RUN_TEST(log_with_missing_columns_is_refused);
-    RUN_TEST(truncated_logs_are_refused);
+    RUN_TEST(number_is_refused_with_advice);
+    RUN_TEST(log_is_written_with_fixed_decimals);
     RUN_TEST(files_that_are_not_text_are_refused);
-    RUN_TEST(written_log_is_read_back);
     RUN_TEST(file_is_written_whole_or_not_at_all);
-    RUN_TEST(model_is_read);
-    RUN_TEST(model_with_errors_is_refused);
-    RUN_TEST(array_of_a_model_is_read_and_checked);
     RUN_TEST(scenario_is_read);
     RUN_TEST(scenario_with_errors_is_refused);
     RUN_TEST(scenario_events_with_errors_are_refused);

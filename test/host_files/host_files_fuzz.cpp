@@ -9,8 +9,6 @@ extern "C" {
 #include <unity.h>
 }
 
-#include "log_file.h"
-#include "model_file.h"
 #include "scenario_file.h"
 
 using namespace ninespring;
@@ -90,13 +88,6 @@ void attack(const std::string &valid, const std::function<void(const text_file &
     }
 }
 
-void log_reader_survives(void)
-{
-    attack("# a: b\ntime_s,i1_a,v1_v,u2,t1_c,t2_c,fan,ambient_c,m1_c,note_x\n"
-           "0,1.5,0.26,0.5,20,,0,21,20,a\n0.5,\"1.25\",0.25,1,20.5,30,1,21.5,x,b\n",
-           [](const text_file &file) { parse_log(file); });
-}
-
 void scenario_reader_survives(void)
 {
     attack("[scenario]\nduration_s = 60\nseed=7\n[array]\nrows = 1\ncols = 3 ; inline\n"
@@ -106,26 +97,11 @@ void scenario_reader_survives(void)
            [](const text_file &file) { parse_scenario(file); });
 }
 
-void model_reader_survives(void)
-{
-    const plant_parameter_t *one = plant_parameter(0);
-    attack(std::string("schema = \"ninespring.model/1\"\neffects = [\"latent_heat\"]\n[array]\n"
-                       "rows = 1\ncols = 2\npitch_mm = 30\n[spring]\nturns = 10\n[sensor]\n"
-                       "kind = \"camera\"\n[[parameter]]\nname = \"") +
-               one->name + "\"\nvalue = " + std::to_string(one->default_value) + "\nunit = \"" +
-               one->unit +
-               "\"\nstderr = 0.1\n[provenance]\ntool = \"x\"\nlogs = [{file = \"a\", sha256 = "
-               "\"0\"}]\nrmse_before_c = 1.5\n",
-           [](const text_file &file) { parse_model(file); });
-}
-
 } // namespace
 
 int main(void)
 {
     UNITY_BEGIN();
-    RUN_TEST(log_reader_survives);
     RUN_TEST(scenario_reader_survives);
-    RUN_TEST(model_reader_survives);
     return UNITY_END();
 }

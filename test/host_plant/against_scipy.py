@@ -22,25 +22,6 @@ NETWORKS = 24
 LIMIT_C = 0.01
 POWER, CURRENT, DUTY, COMMAND, HELD = range(5)
 MODES = [POWER, CURRENT, DUTY, COMMAND]
-EFFECTS = [
-    "radiation",
-    "natural_convection",
-    "latent_heat",
-    "resistance_phase",
-    "shared_air",
-    "plate_conduction",
-    "fan_wake",
-    "edge_loss",
-    "spring_mismatch",
-    "supply_sag",
-    "ambient_drift",
-    "sensor_lag",
-    "sensor_gain",
-    "optical_mixing",
-    "resistance_temperature",
-    "transformation_shift",
-    "contact_resistance",
-]
 # name: (low, high) of the random values; per-spring ones get one value a spring
 SCALARS = {
     "orthogonal_w_per_k": (0, 1e-3),
@@ -325,6 +306,8 @@ def load(path: str) -> ctypes.CDLL:
     pointer, real, text, array = ctypes.c_void_p, ctypes.c_double, ctypes.c_char_p, ctypes.c_void_p
     lib.plant_create.restype = pointer
     lib.plant_destroy.argtypes = [pointer]
+    lib.plant_effect_count.restype, lib.plant_effect_name.restype = ctypes.c_size_t, text
+    lib.plant_effect_name.argtypes = [ctypes.c_size_t]
     lib.plant_set.argtypes = [pointer, text, real]
     lib.plant_set_effect.argtypes = [pointer, text, ctypes.c_bool]
     lib.plant_reset.argtypes = [pointer]
@@ -339,7 +322,8 @@ def compare(lib: ctypes.CDLL, seed: int) -> tuple[float, float, str]:
     rng = np.random.default_rng(seed)
     rows, columns = int(rng.integers(1, 4)), int(rng.integers(1, 4))
     n = rows * columns
-    on = {e for k, e in enumerate(EFFECTS) if k == seed % len(EFFECTS) or rng.random() < 0.4}
+    effects = [lib.plant_effect_name(k).decode() for k in range(lib.plant_effect_count())]
+    on = {e for k, e in enumerate(effects) if k == seed % len(effects) or rng.random() < 0.4}
     values: dict = {k: rng.uniform(*r) for k, r in SCALARS.items()}
     values |= {k: rng.uniform(*r, n) for k, r in EACH.items()}
     values["wake_direction"] = float(rng.integers(0, 4))

@@ -304,8 +304,6 @@ static void bad_drives_and_steps_are_refused(void)
     TEST_ASSERT_EQUAL_INT(PLANT_ERROR_RANGE, plant_set_ambient(plant, 200.0));
     TEST_ASSERT_EQUAL_INT(PLANT_ERROR_RANGE, plant_set_temperature(plant, 0, 1000.0));
     TEST_ASSERT_EQUAL_INT(PLANT_ERROR_INDEX, plant_set_temperature(plant, 9, 20.0));
-    TEST_ASSERT_EQUAL_INT(PLANT_ERROR_RANGE, plant_set_austenite(plant, 0, 1.5));
-    TEST_ASSERT_EQUAL_INT(PLANT_ERROR_INDEX, plant_set_austenite(plant, 9, 0.5));
     TEST_ASSERT_NULL(plant_create(0, 3));
     TEST_ASSERT_NULL(plant_create(3, -1));
     TEST_ASSERT_NULL(plant_create(5, 13));

@@ -60,6 +60,36 @@ def test_bad_logs_are_refused_where_they_are_bad(tmp_path: Path, text: str, line
     assert word in error.message
 
 
+@pytest.mark.parametrize(
+    ("header", "column", "advice"),
+    [
+        ("time_s,i1_a,t1_f", 13, "convert with (F - 32) / 1.8, and name it t1_c"),
+        ("time_s,i12_ma,t1_c", 8, "divide by 1000, and name it i12_a"),
+        ("time_s,i1_a,v1_mV", 13, "divide by 1000, and name it v1_v"),
+        ("time_ms,i1_a", 1, "divide by 1000, and name it time_s"),
+        ("Time,i1_a", 1, "and name it time_s"),
+        ("time_s,Q1_pct", 8, "divide by 100, and name it u1"),
+        ("time_s,i1_a,t1", 13, "if it is in degC, and name it t1_c"),
+        ("time_s,i1_a,ambient_f", 13, "(F - 32) / 1.8, and name it ambient_c"),
+        ("time_s,i1_a,weather", 13, "note_"),
+        ("time_s,i65_a,t1_c", 8, "64 springs"),
+        ("time_s,i1_a,,t1_c", 13, "no name"),
+    ],
+)
+def test_a_column_with_another_s_name_is_refused_with_what_to_do(
+    tmp_path: Path, header: str, column: int, advice: str
+) -> None:
+    error = refused(tmp_path, header + "\n0,0,0,0\n")
+    assert (error.line, error.column) == (1, column)
+    assert advice in error.message
+
+
+def test_a_log_of_months_is_in_milliseconds(tmp_path: Path) -> None:
+    error = refused(tmp_path, HEADER + "0,1,20\n1,1,20.5\n6000000,1,21\n")
+    assert (error.line, error.column) == (4, 1)
+    assert "if its time is in ms" in error.message
+
+
 def test_a_missing_spring_is_refused_by_its_number(tmp_path: Path) -> None:
     error = refused(tmp_path, "time_s,i1_a,i3_a,t1_c,t2_c,t3_c\n0,1,1,20,20,20\n")
     assert "spring 2" in error.message

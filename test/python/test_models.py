@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from hypothesis import given
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from ninespring import native
 from ninespring.errors import InputError
@@ -15,57 +16,106 @@ from ninespring.models import SCHEMA, Array, Model, model_text, read_array, read
 HEAD = f'schema = "{SCHEMA}"\neffects = ["latent_heat"]\n\n[array]\nrows = 1\ncols = 2\n\n'
 
 
+ARRAY = "[array]\nrows = 3\ncols = 3\n"
+UNIT = 'unit = "W/K"'
+
+
 def entry(text: str) -> str:
     return f"{HEAD}[[parameter]]\n{text}\n"
 
 
+def refused(path: Path, read: Callable[[Path], object]) -> tuple[str, str]:
+    """Return `line:column` of a refusal and what it says."""
+    with pytest.raises(InputError) as caught:
+        read(path)
+    error = caught.value
+    assert str(error).startswith(f"{path}:") and "\n" not in str(error)
+    return f"{error.line}:{error.column}", error.message
+
+
 @pytest.mark.parametrize(
-    ("text", "line", "words"),
+    ("text", "place", "words"),
     [
-        ("[sensor]\nnoise_c = 0.3\n", 1, "there is no [array] table"),
-        ("[array]\nrows = 3\n", 1, "without cols"),
-        ("[array]\nrows = 3\ncols = 2.5\n", 3, "cols must be a whole number"),
-        ("[array]\nrows = 9\ncols = 9\n", 2, "more than 64 springs"),
-        ("[array]\nrows = 3\ncols = 3\npitch = 4\n", 4, "did you mean pitch_mm?"),
-        ('[array]\nrows = 3\ncols = 3\npitch_mm = "4"\n', 4, "must be a number, without quotes"),
-        ("[array]\nrows = 3\ncols = 3\n[spring]\nturns = -1\n", 5, "turns is -1"),
-        ("[array]\nrows = 3\ncols =\n", 3, "this is not TOML"),
+        ("[sensor]\nnoise_c = 0.3\n", "1:1", "there is no [array] table"),
+        ("[array]\nrows = 3\n", "1:1", "without cols"),
+        ("[array]\nrows = 3\ncols = 2.5\n", "3:8", "cols must be a whole number"),
+        ("[array]\nrows = 9\ncols = 9\n", "3:8", "more than 64 springs"),
+        ("array = 3\n", "1:9", "[array] must be a table"),
+        (ARRAY + "pitch = 4\n", "4:1", "did you mean pitch_mm?"),
+        (ARRAY + 'pitch_mm = "4"\n', "4:12", "must be a number, without quotes"),
+        (ARRAY + "[spring]\nturns = -1\n", "5:9", "turns is -1"),
+        (ARRAY + "[spring]\nturns = inf\n", "5:9", "turns"),
+        (ARRAY + "[material]\n# turns = 1\n  mass = 2\n", "6:3", "no key 'mass'"),
+        (ARRAY + '[sensor]\nnoise_c = "0.3"\n', "5:11", "without quotes"),
+        (ARRAY + "[sensor]\nkind = 3\n", "5:8", "text in quotes"),
+        ("[array]\nrows = 3\ncols =\n", "3:7", "this is not TOML"),
+        (ARRAY + "rows = 2\n", "4:9", "this is not TOML"),
+        (ARRAY + "[[param", "4:8", "this is not TOML"),
     ],
 )
-def test_a_wrong_array_is_refused_where_it_is_wrong(tmp_path: Path, text: str, line: int, words: str) -> None:
+def test_a_wrong_array_is_refused_where_it_is_wrong(tmp_path: Path, text: str, place: str, words: str) -> None:
     path = tmp_path / "array.toml"
     path.write_text(text)
-    with pytest.raises(InputError) as refused:
-        read_array(path)
-    assert f":{line}:" in str(refused.value) and words in str(refused.value)
+    at, said = refused(path, read_array)
+    assert at == place and words in said
 
 
 @pytest.mark.parametrize(
-    ("text", "line", "words"),
+    ("text", "place", "words"),
     [
-        (HEAD.replace("model/1", "model/9"), 1, "this version reads"),
-        (HEAD.replace("latent_heat", "latent_heet"), 2, "did you mean latent_heat?"),
-        (entry('name = "loss_w"\nvalue = 1.0'), 9, "did you mean loss_w_per_k?"),
-        (entry('name = "loss_w_per_k"'), 9, "without value"),
-        (entry('name = "loss_w_per_k"\nvalue = 0.01\nunit = "mW/K"'), 9, "is in 'W/K', not in 'mW/K'"),
-        (entry('name = "loss_w_per_k"\nvalue = 99.0'), 10, "it must be 0 to 10"),
-        (entry('name = "loss_w_per_k"\nvalue = 0.01\nspring = 3'), 9, "there is no spring 3"),
-        (entry('name = "orthogonal_w_per_k"\nvalue = 0.01\nspring = 1'), 9, "of the whole array"),
+        (HEAD.replace("model/1", "model/9"), "1:10", "this version reads"),
+        (HEAD.partition("\n")[2], "1:1", "without schema"),
+        (f'schema = "{SCHEMA}"\n', "1:1", "there is no [array] table"),
+        (HEAD + "pitch_mm = 4\n\n[colour]\n", "10:1", "no key 'colour'"),
+        (HEAD.replace("latent_heat", "latent_heet"), "2:13", "did you mean latent_heat?"),
+        (HEAD.replace('"latent_heat"', '"radiation",\n "radiation"'), "2:13", "appears twice"),
+        (HEAD.replace('["latent_heat"]', '"latent_heat"'), "2:11", "must be a list"),
+        (entry("value = 1.0"), "8:1", "without name"),
+        (entry(f'name = "loss_w"\nvalue = 1.0\n{UNIT}'), "9:8", "did you mean loss_w_per_k?"),
+        (entry('name = "loss_w_per_k"'), "8:1", "without value"),
+        (entry('name = "loss_w_per_k"\nvalue = 0.01'), "8:1", "without unit"),
+        (entry('name = "loss_w_per_k"\nvalue = 0.01\nunit = "mW/K"'), "11:8", "is in 'W/K', not in 'mW/K'"),
+        (entry('name = "loss_w_per_k"\nvalue = 99.0'), "10:9", "it must be 0 to 10"),
+        (entry('name = "loss_w_per_k"\nvalue = nan'), "10:9", "it must be 0 to 10"),
+        (entry(f'name = "loss_w_per_k"\nvalue = 0.01\n{UNIT}\nspring = 3'), "12:10", "1 to 2"),
+        (entry(f'name = "loss_w_per_k"\nvalue = 0.01\n{UNIT}\nstderr = -1'), "12:10", "stderr is -1"),
+        (entry(f'name = "loss_w_per_k"\nvalue = 0.01\n{UNIT}\neffect = "radiation"'), "12:10", "no effect"),
+        (entry(f'name = "orthogonal_w_per_k"\nvalue = 0.01\n{UNIT}\nspring = 1'), "12:10", "of the whole array"),
         (
-            entry('name = "loss_w_per_k"\nvalue = 0.01') * 1 + '[[parameter]]\nname = "loss_w_per_k"\nvalue = 0.02\n',
-            9,
+            entry(f'name = "loss_w_per_k"\nvalue = 0.01\n{UNIT}')
+            + f'[[parameter]]\nname = "loss_w_per_k"\nvalue = 0.02\n{UNIT}\n',
+            "14:9",
             "twice",
         ),
+        (HEAD + "[provenance]\nauthor = 3\n", "9:1", "no key 'author'"),
+        (HEAD + "[provenance]\nnote = 3\n", "9:8", "text in quotes"),
+        (HEAD + "[provenance]\nlogs = [3]\n", "9:8", "must be a table"),
     ],
 )
-def test_a_wrong_model_is_refused_where_it_is_wrong(tmp_path: Path, text: str, line: int, words: str) -> None:
+def test_a_wrong_model_is_refused_where_it_is_wrong(tmp_path: Path, text: str, place: str, words: str) -> None:
     path = tmp_path / "model.toml"
     path.write_text(text)
-    with pytest.raises(InputError) as refused:
-        read_model(path)
-    assert f":{line}:" in str(refused.value) and words in str(refused.value)
+    at, said = refused(path, read_model)
+    assert at == place and words in said
 
 
+@settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.lists(st.tuples(st.integers(0, 400), st.integers(0, 30), st.binary(max_size=9)), min_size=1, max_size=4))
+def test_a_damaged_model_is_read_or_refused_with_one_line(tmp_path: Path, wounds: list[tuple[int, int, bytes]]) -> None:
+    whole = Model(Array(1, 2, 4.0, {"turns": 10.0}, {}, {"kind": "camera"}), ["latent_heat"], {"loss_w_per_k": 0.01})
+    whole.provenance = {"note": "a", "logs": [{"file": "a", "sha256": "0"}]}
+    data = model_text(whole).encode()
+    for at, cut, put in wounds:
+        data = data[:at] + put + data[at + cut :]
+    path = tmp_path / "model.toml"
+    path.write_bytes(data)
+    try:
+        assert read_model(path).array.springs >= 1
+    except InputError as error:
+        assert str(error).startswith(f"{path}:") and "\n" not in str(error)
+
+
+@settings(deadline=None)
 @given(data=st.data())
 def test_what_is_written_is_read_back(data: st.DataObject, tmp_path_factory: pytest.TempPathFactory) -> None:
     model = Model(Array(data.draw(st.integers(1, 8)), data.draw(st.integers(1, 8))))

@@ -5,6 +5,8 @@
 #include "console.h"
 #include "unity.h"
 
+#include "../fakes/eeprom.h"
+
 #ifndef NINESPRING_SOURCE_DIR
 #define NINESPRING_SOURCE_DIR "."
 #endif
@@ -29,25 +31,7 @@ static void out_write(void *context, const char *bytes, uint8_t length)
     said[said_length] = '\0';
 }
 
-static uint8_t memory[SETTINGS_LEARNT_BASE + 2u * SETTINGS_LEARNT_SLOT_BYTES];
-static uint8_t memory_read(void *context, uint16_t address)
-{
-    (void)context;
-    return memory[address];
-}
-static bool memory_ready(void *context)
-{
-    (void)context;
-    return true;
-}
-static void memory_write(void *context, uint16_t address, uint8_t value)
-{
-    (void)context;
-    memory[address] = value;
-}
-
 static const text_output_t output = {NULL, out_room, out_write};
-static const record_storage_t storage = {NULL, memory_read, memory_ready, memory_write};
 static controller_t controller;
 static controller_inputs_t inputs;
 static controller_outputs_t outputs;

@@ -6,37 +6,8 @@
 #include "settings.h"
 #include "unity.h"
 
-#define MEMORY_BYTES (SETTINGS_LEARNT_BASE + 2u * SETTINGS_LEARNT_SLOT_BYTES)
+#include "../fakes/eeprom.h"
 
-static uint8_t memory[MEMORY_BYTES];
-static unsigned writes_left; /* before the power goes */
-static unsigned writes;
-
-static uint8_t memory_read(void *context, uint16_t address)
-{
-    (void)context;
-    return memory[address];
-}
-
-static bool memory_ready(void *context)
-{
-    (void)context;
-    return true;
-}
-
-static void memory_write(void *context, uint16_t address, uint8_t value)
-{
-    (void)context;
-    TEST_ASSERT_GREATER_OR_EQUAL_UINT(SETTINGS_LEARNT_BASE, address);
-    TEST_ASSERT_LESS_THAN_UINT(MEMORY_BYTES, address);
-    writes++;
-    if (writes_left > 0) {
-        writes_left--;
-        memory[address] = value;
-    }
-}
-
-static const record_storage_t storage = {NULL, memory_read, memory_ready, memory_write};
 static controller_t controller;
 static learnt_store_t store;
 static const spring_learnt_t numbers = {.austenite_ohm = 0.2191f,
@@ -83,6 +54,7 @@ static void learn(uint8_t spring, const spring_learnt_t *learnt)
 void setUp(void)
 {
     memset(memory, 0xFF, sizeof memory);
+    memory_begin = SETTINGS_LEARNT_BASE;
     power_on();
     writes = 0;
 }

@@ -8,40 +8,11 @@
 #include "text.h"
 #include "unity.h"
 
+#include "../fakes/eeprom.h"
+
 #define MEMORY_BYTES (2u * SETTINGS_SLOT_BYTES)
 #define HEAD         6u /* bytes of a slot before the entries */
 
-static uint8_t memory[MEMORY_BYTES];
-static unsigned writes_left; /* before the power goes */
-static unsigned writes;
-static unsigned worn; /* this cell keeps nothing */
-
-static uint8_t memory_read(void *context, uint16_t address)
-{
-    (void)context;
-    TEST_ASSERT_LESS_THAN_UINT(MEMORY_BYTES, address);
-    return memory[address];
-}
-
-static bool memory_ready(void *context)
-{
-    (void)context;
-    return true;
-}
-
-static void memory_write(void *context, uint16_t address, uint8_t value)
-{
-    (void)context;
-    TEST_ASSERT_LESS_THAN_UINT(MEMORY_BYTES, address);
-    writes++;
-    if (writes_left == 0 || address == worn) {
-        return;
-    }
-    writes_left--;
-    memory[address] = value;
-}
-
-static const record_storage_t storage = {NULL, memory_read, memory_ready, memory_write};
 static settings_store_t store;
 static settings_t settings;
 static settings_t loaded;
@@ -51,6 +22,7 @@ void setUp(void)
     memset(memory, 0xFF, sizeof memory);
     writes_left = UINT32_MAX;
     worn = MEMORY_BYTES;
+    memory_end = MEMORY_BYTES;
     settings_load(&store, &storage, &settings);
 }
 

@@ -82,7 +82,9 @@ static void read_sensor(double current_a, int16_t *ma, int16_t *mv)
     switch (sensor) {
     case SENSOR_GOOD:
         frozen_ma = (int16_t)lround(1000.0 * current_a);
-        frozen_mv = (int16_t)(4 * lround(250.0 * (current_a * resistance_ohm() + noise_v)));
+        frozen_mv =
+            (int16_t)(4 * lround(250.0 * (current_a * (resistance_ohm() + truth.contact_ohm) +
+                                          truth.offset_v + noise_v)));
         break;
     case SENSOR_FROZEN:
         break;

@@ -14,6 +14,8 @@ typedef struct {
     double ratio;          /* austenite over martensite, at one temperature */
     double rise_per_k;     /* of both */
     double shift_k;        /* of all four transformation temperatures */
+    double contact_ohm;    /* in series, read with it */
+    double offset_v;       /* of what is read of the voltage */
     double noise_v;        /* evenly within +- so much, of one reading of the voltage */
     double temperature_c, austenite;
 } truth_t;

@@ -303,6 +303,93 @@ static void transformation_that_moves_is_noticed(void)
     TEST_ASSERT_TRUE_MESSAGE(after_s < 20.0 && BELIEF.shift_k > 0.0f, where);
 }
 
+/* In a gust the model runs ahead: what still transforms is not past its transformation. */
+static void heating_in_a_gust_goes_on_until_it_is_over(void)
+{
+    static const double loss[] = {1.0, 1.5, 2.0};
+    for (unsigned n = 0; n < 3; n++) {
+        begin_cold();
+        truth.loss_w_per_k *= loss[n];
+        (void)heat_then_hold(90.0);
+        (void)snprintf(where, sizeof where, "loss x %.1f: %.3f at %.1f degC", loss[n],
+                       truth.austenite, truth.temperature_c);
+        TEST_ASSERT_TRUE_MESSAGE(truth.austenite > 0.97 && truth.temperature_c < 115.0, where);
+    }
+}
+
+static void offset_is_learnt_where_the_current_drops(void)
+{
+    for (double offset_v = -0.008; offset_v < 0.009; offset_v += 0.004) {
+        begin_cold();
+        truth.offset_v = offset_v;
+        truth.rise_per_k = 0.0004;
+        (void)heat_then_hold(60.0);
+        ticks(0.4, 2.0);
+        (void)snprintf(where, sizeof where, "%.4f V: %.4f V give or take %.4f", offset_v,
+                       (double)BELIEF.offset_v, (double)BELIEF.offset_sd_v);
+        TEST_ASSERT_TRUE_MESSAGE(fabs((double)BELIEF.offset_v - offset_v) < 0.0015, where);
+        TEST_ASSERT_FLOAT_WITHIN(0.002f, (float)resistance_ohm(), BELIEF.learnt.austenite_ohm);
+    }
+}
+
+/* From the first second of a hold, before it has come to rest, and all of it. */
+static void phase_lost_on_the_way_to_the_hold_is_counted(void)
+{
+    truth.offset_v = 0.005;
+    (void)heat_then_hold(60.0);
+    ticks(0.4, 2.0);
+    for (double s = 0.0; s < 60.0 && truth.austenite > 0.8; s += TICK_S) {
+        (void)tick(0.9);
+    }
+    ticks(1.2, 6.0); /* the average follows */
+    (void)snprintf(where, sizeof where, "lost %.3f of %.3f", (double)BELIEF.lost,
+                   1.0 - truth.austenite);
+    TEST_ASSERT_TRUE_MESSAGE(truth.austenite < 0.85, where);
+    TEST_ASSERT_FLOAT_WITHIN_MESSAGE(0.05f, (float)(1.0 - truth.austenite), BELIEF.lost, where);
+}
+
+/* A contact that steps is no phase, whatever the sign; nor one that ages. */
+static void contact_is_not_taken_for_phase(void)
+{
+    static const double step_ohm[] = {0.015, 0.025, -0.025};
+    for (unsigned n = 0; n < 4; n++) {
+        begin_cold();
+        truth.contact_ohm = n == 2 ? 0.025 : 0.0;
+        (void)heat_then_hold(60.0);
+        for (long t = 0; t < 15000; t++) {
+            truth.contact_ohm += n < 3 && t == 5000 ? step_ohm[n] : 0.0;
+            truth.contact_ohm += n == 3 ? 0.020 / 900.0 * TICK_S : 0.0;
+            (void)tick(hold_current_a(8.0));
+        }
+        (void)snprintf(where, sizeof where, "%u: lost %.3f of %.3f at %.1f degC", n,
+                       (double)BELIEF.lost, 1.0 - truth.austenite, truth.temperature_c);
+        TEST_ASSERT_TRUE_MESSAGE(truth.austenite > 0.97, where);
+        TEST_ASSERT_TRUE_MESSAGE(BELIEF.lost < 0.03f && !BELIEF.blind, where); /* not heated back */
+    }
+}
+
+/* A heating that a limit ends before the phase is there has not transformed it; the second time
+ * its readings tell nothing any more. */
+static void heating_that_a_limit_ends_is_doubted(void)
+{
+    (void)heat_then_hold(60.0);
+    ticks(0.0, 300.0);
+    for (int time = 0; time < 2; time++) {
+        spring_estimator_disturb(&BELIEF);
+        spring_estimator_begin_heating(&estimator, &model, 0);
+        ticks(3.0, time == 0 ? 18.0 : 0.5);
+        spring_estimator_begin_hold(&estimator, &model, 0, true);
+        (void)snprintf(where, sizeof where, "%d: lost %.3f of %.3f", time, (double)BELIEF.lost,
+                       1.0 - truth.austenite);
+        TEST_ASSERT_TRUE_MESSAGE(truth.austenite > 0.1 && truth.austenite < 0.7, where);
+        TEST_ASSERT_TRUE_MESSAGE(BELIEF.blind == (time == 1), where);
+        if (time == 0) {
+            TEST_ASSERT_FLOAT_WITHIN_MESSAGE(0.1f, (float)(1.0 - truth.austenite), BELIEF.lost,
+                                             where);
+        }
+    }
+}
+
 static void martensite_resistance_is_learnt_at_20_degrees(void)
 {
     truth.martensite_ohm = 0.190;
@@ -455,6 +542,11 @@ int main(void)
     RUN_TEST(crossing_is_seen_and_makes_the_distance_sure);
     RUN_TEST(hold_that_loses_nothing_shows_no_crossing);
     RUN_TEST(transformation_that_moves_is_noticed);
+    RUN_TEST(heating_in_a_gust_goes_on_until_it_is_over);
+    RUN_TEST(offset_is_learnt_where_the_current_drops);
+    RUN_TEST(phase_lost_on_the_way_to_the_hold_is_counted);
+    RUN_TEST(contact_is_not_taken_for_phase);
+    RUN_TEST(heating_that_a_limit_ends_is_doubted);
     RUN_TEST(martensite_resistance_is_learnt_at_20_degrees);
     RUN_TEST(look_tells_the_phase_by_what_was_learnt);
     RUN_TEST(look_without_anything_learnt_tells_nothing);

@@ -9,7 +9,7 @@
 
 #include "random.h"
 
-/* Registers, as design.md section 2 sets them: 10 uV over 0.1 ohm, and 4 mV. */
+/* Registers, as docs/hardware.md has them: 10 uV over 0.1 ohm, and 4 mV. */
 #define INA219_CURRENT_STEP_A 0.0001
 #define INA219_VOLTAGE_STEP_V 0.004
 #define INA219_CURRENT_MAX_A  3.2 /* gain /8 */

@@ -118,7 +118,8 @@ static void transforming_takes_the_latent_heat(void)
     TEST_ASSERT_DOUBLE_WITHIN(0.02, 0.300 * (world_mean_c(world, 0) - 20.0) + 8.65, supplied_j);
 }
 
-/* design.md: near 5.8 mW/K holds 105 degC at 0.493 W; by convection's law less per kelvin lower. */
+/* docs/physics.md: near 5.8 mW/K holds 105 degC at 0.493 W; by convection's law less per kelvin
+ * lower. */
 static void loss_is_as_declared_at_105_and_less_per_kelvin_below(void)
 {
     single_spring();
@@ -180,7 +181,7 @@ static void hold_current_a(int first, int last, double a, double seconds)
     }
 }
 
-/* design.md section 1: 1.5 A settles a cold spring alone in the array at 63 to 75 degC. All nine
+/* docs/physics.md: 1.5 A settles a cold spring alone in the array at 63 to 75 degC. All nine
  * have a current that does not transform them, and with slightly more they run past 104. */
 static void constant_current_is_unstable_through_the_transformation(void)
 {

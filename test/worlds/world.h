@@ -18,7 +18,7 @@
 #define WORLD_EVENTS_MAX  32
 #define WORLD_TICK_S      0.02
 
-/* Stress moves the transformation: Flexinol, measured (design.md section 1). */
+/* Stress moves the transformation: Flexinol, measured (docs/worlds.md). */
 #define WORLD_HEATING_MPA_PER_K 8.1
 #define WORLD_COOLING_MPA_PER_K 7.5
 
@@ -82,7 +82,8 @@ typedef struct {
 
 typedef struct world world_t;
 
-/* The paper's spring and array on the reference board, as design.md declares them; pitch 4 mm. */
+/* The paper's spring and array on the reference board, as docs/physics.md declares them; pitch 4
+ * mm. */
 void world_parameters_default(world_parameters_t *parameters);
 
 /* Moves everything that a specimen may have otherwise within +- tolerance of what it is, partly for

@@ -17,7 +17,7 @@ from .dashboard.command import dashboard
 from .errors import InputError, WorkError
 from .export.command import export, verify
 from .fit.command import fit
-from .fit.predict_command import predict
+from .fit.predict_command import predict, replay
 from .import_command import import_
 from .plan_command import plan
 from .plot_command import plot
@@ -35,7 +35,7 @@ def cli() -> None:
     """Calibrate the thermal model of an array of NiTi springs, and say what the model lacks."""
 
 
-for command in (fit, diagnose, predict, export, verify, import_, plan, plot, dashboard):
+for command in (fit, diagnose, predict, replay, export, verify, import_, plan, plot, dashboard):
     cli.add_command(command)
 add_board_commands(cli)
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 import math
 import re
-import tomllib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +15,7 @@ import pandas as pd
 
 from .errors import InputError
 from .logs import COLUMN, LIMITS, MAX_SPRINGS, log_text, read_bytes, read_table
+from .toml_file import TomlFile
 
 UNITS: dict[str, tuple[float, float]] = {
     "": (1.0, 0.0),
@@ -60,27 +60,6 @@ BUILT_IN: dict[str, dict[str, Any]] = {
 """Mappings that come with the tool: `--map tclab`."""
 
 
-def read_toml(path: str | Path) -> dict[str, Any]:
-    """Read a TOML file; syntax errors are refused with line and column."""
-    try:
-        return tomllib.loads(read_bytes(path).decode("utf-8"))
-    except UnicodeDecodeError:
-        raise InputError("not UTF-8 text", path, 1) from None
-    except tomllib.TOMLDecodeError as error:
-        match = re.search(r"^(.*) \(at line (\d+), column (\d+)\)$", str(error))
-        if match:
-            raise InputError(f"this is not TOML: {match[1]}", path, int(match[2]), int(match[3])) from None
-        raise InputError(f"this is not TOML: {error}", path) from None
-
-
-def line_of(path: str | Path, text: str) -> int | None:
-    """Return the first 1-based line of a file that holds `text`."""
-    for number, line in enumerate(read_bytes(path).decode("utf-8", "replace").splitlines(), 1):
-        if text in line:
-            return number
-    return None
-
-
 @dataclass
 class _Rule:
     """Where one of the log's columns comes from: names to look for, value = factor * number + offset, or ISO times."""
@@ -105,10 +84,11 @@ class _Mapping:
 def _read_mapping(mapping: str | Path) -> _Mapping:
     """Read a mapping file, or take a built-in mapping; refused with file and line where it is wrong."""
     built_in = str(mapping) in BUILT_IN
-    rules = BUILT_IN[str(mapping)] if built_in else read_toml(mapping)
+    file = None if built_in else TomlFile(mapping)
+    rules = file.data if file else BUILT_IN[str(mapping)]
 
     def refuse(message: str, near: str) -> InputError:
-        return InputError(message, mapping, None if built_in else line_of(mapping, near), 1)
+        return InputError(message, mapping, file and file.line_of(near), 1)
 
     def number(value: Any, what: str, near: str) -> float:
         if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
@@ -126,14 +106,14 @@ def _read_mapping(mapping: str | Path) -> _Mapping:
     for name in rules:
         if name not in ("columns", "file", "constants"):
             raise refuse(f"unknown table [{name}]: a mapping has [columns], [file], [constants]", name)
-    file = known(rules.get("file", {}), ("separator", "decimal", "skip_lines"), "[file]")
+    given = known(rules.get("file", {}), ("separator", "decimal", "skip_lines"), "[file]")
     for key, default in (("separator", ","), ("decimal", ".")):
-        if not isinstance(file.get(key, default), str) or len(file.get(key, default)) != 1:
+        if not isinstance(given.get(key, default), str) or len(given.get(key, default)) != 1:
             raise refuse(f'{key} must be one character in quotes, as in {key} = "{default}"', key)
-    out = _Mapping({}, {}, file.get("separator", ","), file.get("decimal", "."))
+    out = _Mapping({}, {}, given.get("separator", ","), given.get("decimal", "."))
     if out.separator == out.decimal:
         raise refuse("separator and decimal cannot be the same", "separator")
-    skip = number(file.get("skip_lines", 0), "skip_lines", "skip_lines")
+    skip = number(given.get("skip_lines", 0), "skip_lines", "skip_lines")
     if skip < 0 or skip != int(skip):
         raise refuse("skip_lines must be a whole number of lines", "skip_lines")
     out.skip_lines = int(skip)
@@ -277,7 +257,8 @@ def read_regions(path: str | Path) -> list[Region]:
 
     `[grid]`: rows, cols, left, top (centre of spring 1, pixels), step_x, step_y (pixels), width, height.
     """
-    data = read_toml(path)
+    file = TomlFile(path)
+    data = file.data
     regions: list[Region] = []
 
     def number(table: dict[str, Any], key: str, where: str, low: float) -> float:
@@ -285,19 +266,19 @@ def read_regions(path: str | Path) -> list[Region]:
         if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= 1e5:
             what = "" if key not in table else f", not {value!r}"
             raise InputError(
-                f"{where} needs a number '{key}' from {low:g} to 100000{what}", path, line_of(path, where), 1
+                f"{where} needs a number '{key}' from {low:g} to 100000{what}", path, file.line_of(where), 1
             )
         return float(value)
 
     grid, boxes = data.get("grid"), data.get("region", [])
     if grid is not None and not isinstance(grid, dict):
-        raise InputError("grid must be a table: [grid]", path, line_of(path, "grid"), 1)
+        raise InputError("grid must be a table: [grid]", path, file.line_of("grid"), 1)
     if not isinstance(boxes, list) or not all(isinstance(one, dict) for one in boxes):
-        raise InputError("region must be a list of tables: [[region]]", path, line_of(path, "region"), 1)
+        raise InputError("region must be a list of tables: [[region]]", path, file.line_of("region"), 1)
     if grid:
         rows, cols = (int(number(grid, key, "[grid]", 1)) for key in ("rows", "cols"))
         if rows * cols > MAX_SPRINGS:
-            raise InputError(f"{rows} x {cols} are more than {MAX_SPRINGS} springs", path, line_of(path, "rows"), 1)
+            raise InputError(f"{rows} x {cols} are more than {MAX_SPRINGS} springs", path, file.line_of("rows"), 1)
         half_w, half_h = (number(grid, key, "[grid]", 1) / 2 for key in ("width", "height"))
         left, top = (number(grid, key, "[grid]", 0) for key in ("left", "top"))
         step_x = number(grid, "step_x", "[grid]", 1) if cols > 1 else 0.0

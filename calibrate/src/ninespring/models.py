@@ -6,17 +6,17 @@ Names, units and limits of parameters are the plant's own table (`native.paramet
 from __future__ import annotations
 
 import datetime
-import difflib
 import json
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from . import __version__, native
-from .errors import InputError
-from .importing import line_of, read_toml
+from .toml_file import At, TomlFile, did_you_mean
 
 SCHEMA = "ninespring.model/1"
+TABLES = ("array", "spring", "material", "sensor")
+ERRORS = ("rmse_before_c", "rmse_after_c", "hottest_c")
 SPRING_KEYS = {
     "wire_diameter_mm": (0.01, 10.0),
     "coil_diameter_mm": (0.1, 100.0),
@@ -64,125 +64,99 @@ class Model:
     stderr: dict[str, float] = field(default_factory=dict)
     provenance: dict[str, Any] = field(default_factory=dict)
     name: str = ""
+    places: dict[str, tuple[int, int]] = field(default_factory=dict)
+    """Line and column of each parameter's value, where the model was read from a file."""
 
     def __repr__(self) -> str:
         effects = ", ".join(self.effects) or "no effects"
         return f"<model of {self.array.rows} x {self.array.cols}: {effects}; {len(self.parameters)} parameters>"
 
 
-class _Reader:
-    def __init__(self, path: str | Path) -> None:
-        self.path = path
-        self.data = read_toml(path)
-
-    def refuse(self, message: str, near: str) -> InputError:
-        return InputError(message, self.path, line_of(self.path, near) or 1, 1)
-
-    def known(self, table: dict[str, Any], names: Any, where: str) -> None:
-        for key in table:
-            if key not in names:
-                close = difflib.get_close_matches(key, list(names), 1)
-                hint = f" (did you mean {close[0]}?)" if close else ""
-                raise self.refuse(f"{where} has no key '{key}'{hint}; it has {', '.join(names)}", key)
-
-    def number(self, table: dict[str, Any], key: str, low: float, high: float, where: str) -> float:
-        value = table[key]
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            raise self.refuse(f"{where} {key} must be a number, without quotes", key)
-        if not low <= value <= high:
-            raise self.refuse(f"{where} {key} is {value:g}; it must be {low:g} to {high:g}", key)
-        return float(value)
-
-    def array(self) -> Array:
-        table = self.data.get("array")
-        if not isinstance(table, dict):
-            raise InputError("there is no [array] table; add rows and cols", self.path, 1, 1)
-        self.known(table, ("rows", "cols", "pitch_mm"), "[array]")
-        for key in ("rows", "cols"):
-            if key not in table:
-                raise self.refuse(f"[array] is without {key}; add it", "[array]")
-            if isinstance(table[key], bool) or not isinstance(table[key], int):
-                raise self.refuse(f"[array] {key} must be a whole number", key)
-            if not 1 <= table[key] <= native.MAX_SPRINGS:
-                raise self.refuse(f"[array] {key} must be 1 to {native.MAX_SPRINGS}", key)
-        array = Array(table["rows"], table["cols"])
-        if array.springs > native.MAX_SPRINGS:
-            raise self.refuse(f"{array.rows} x {array.cols} are more than {native.MAX_SPRINGS} springs", "rows")
-        if "pitch_mm" in table:
-            array.pitch_mm = self.number(table, "pitch_mm", 0.1, 1000.0, "[array]")
-        for name, keys in (("spring", SPRING_KEYS), ("material", MATERIAL_KEYS)):
-            part = self.data.get(name, {})
-            if not isinstance(part, dict):
-                raise self.refuse(f"[{name}] must be a table", name)
-            self.known(part, keys, f"[{name}]")
-            getattr(array, name).update({key: self.number(part, key, *keys[key], f"[{name}]") for key in part})
-        sensor = self.data.get("sensor", {})
-        self.known(sensor, ("kind", "noise_c"), "[sensor]")
-        if "noise_c" in sensor:
-            self.number(sensor, "noise_c", 0.0, 50.0, "[sensor]")
-        array.sensor = dict(sensor)
-        return array
+def _array(file: TomlFile) -> Array:
+    if file.get(("array",)) is None:
+        raise file.refuse("there is no [array] table; add rows and cols", ())
+    file.table(("array",), ("rows", "cols", "pitch_mm"))
+    array = Array(*(file.whole(("array", key), 1, native.MAX_SPRINGS) for key in ("rows", "cols")))
+    if array.springs > native.MAX_SPRINGS:
+        raise file.refuse(f"{array.rows} x {array.cols} are more than {native.MAX_SPRINGS} springs", ("array", "cols"))
+    if file.get(("array", "pitch_mm")) is not None:
+        array.pitch_mm = file.number(("array", "pitch_mm"), 0.1, 1000.0)
+    for name, keys in (("spring", SPRING_KEYS), ("material", MATERIAL_KEYS)):
+        given = file.table((name,), keys)
+        getattr(array, name).update({key: file.number((name, key), *keys[key]) for key in given})
+    array.sensor = dict(file.table(("sensor",), ("kind", "noise_c")))
+    if "kind" in array.sensor:
+        file.text_at(("sensor", "kind"))
+    if "noise_c" in array.sensor:
+        file.number(("sensor", "noise_c"), 0.0, 50.0)
+    return array
 
 
 def read_array(path: str | Path) -> Array:
-    """Read array.toml; refused with file and line where it breaks docs/files.md."""
-    reader = _Reader(path)
-    reader.known(reader.data, ("array", "spring", "material", "sensor"), "the file")
-    return reader.array()
+    """Read array.toml; refused with file, line and column where it breaks docs/files.md."""
+    file = TomlFile(path)
+    file.table((), TABLES)
+    return _array(file)
 
 
 def read_model(path: str | Path) -> Model:
-    """Read model.toml; refused with file and line where it breaks docs/files.md."""
-    reader = _Reader(path)
-    reader.known(
-        reader.data,
-        ("schema", "array", "spring", "material", "sensor", "effects", "parameter", "provenance"),
-        "the file",
-    )
-    if reader.data.get("schema") != SCHEMA:
-        raise reader.refuse(
-            f"schema is '{reader.data.get('schema', '')}'; this version reads \"{SCHEMA}\"",
-            "schema",
-        )
-    model = Model(reader.array(), name=str(path))
-    names = native.effect_names()
-    for effect in reader.data.get("effects", []):
-        if effect not in names:
-            close = difflib.get_close_matches(str(effect), names, 1)
-            hint = f" (did you mean {close[0]}?)" if close else ""
-            raise reader.refuse(f"there is no effect '{effect}'{hint}", str(effect))
-        model.effects.append(effect)
-    table = native.parameter_table()
-    for entry in reader.data.get("parameter", []):
-        reader.known(entry, ("name", "value", "unit", "stderr", "spring", "effect"), "[[parameter]]")
-        name = entry.get("name", "")
-        if name not in table:
-            close = difflib.get_close_matches(name, list(table), 1)
-            hint = f" (did you mean {close[0]}?)" if close else ""
-            raise reader.refuse(f"there is no parameter '{name}'{hint}", f'"{name}"')
-        known = table[name]
-        if "value" not in entry:
-            raise reader.refuse(f"parameter {name} is without value; add it", f'"{name}"')
-        value = reader.number(entry, "value", known.minimum, known.maximum, name)
-        if entry.get("unit", known.unit) != known.unit:
-            raise reader.refuse(
-                f"{name} is in '{known.unit}', not in '{entry['unit']}'; convert the value",
-                f'"{name}"',
-            )
-        full = name
-        if "spring" in entry:
-            if not known.per_spring:
-                raise reader.refuse(f"{name} is of the whole array; remove spring", f'"{name}"')
-            if not 1 <= entry["spring"] <= model.array.springs:
-                raise reader.refuse(f"{name}: there is no spring {entry['spring']}", f'"{name}"')
-            full = f"{name}[{entry['spring']}]"
-        if full in model.parameters:
-            raise reader.refuse(f"parameter {full} appears twice; remove one", f'"{name}"')
-        model.parameters[full] = value
-        if "stderr" in entry:
-            model.stderr[full] = reader.number(entry, "stderr", 0.0, 1e12, name)
-    model.provenance = dict(reader.data.get("provenance", {}))
+    """Read model.toml; refused with file, line and column where it breaks docs/files.md."""
+    file = TomlFile(path)
+    file.table((), ("schema", *TABLES, "effects", "parameter", "provenance"))
+    if (schema := file.text_at(("schema",))) != SCHEMA:
+        raise file.refuse(f"schema is '{schema}'; this version reads \"{SCHEMA}\"", ("schema",))
+    model = Model(_array(file), name=str(path))
+    for at in file.tables(("effects",)):
+        name = file.get(at)
+        if name not in native.effect_names():
+            said = f"there is no effect '{name}'{did_you_mean(str(name), native.effect_names())}"
+            raise file.refuse(said, ("effects",), word=str(name))
+        if name in model.effects:
+            raise file.refuse(f"effect {name} appears twice; remove one", ("effects",), word=str(name))
+        model.effects.append(name)
+    for at in file.tables(("parameter",)):
+        _read_parameter(file, at, model)
+    _check_provenance(file)
+    model.provenance = dict(file.data.get("provenance", {}))
     return model
+
+
+def _read_parameter(file: TomlFile, at: At, model: Model) -> None:
+    entry = file.table(at, ("name", "value", "unit", "stderr", "spring", "effect"))
+    name, table = file.text_at((*at, "name")), native.parameter_table()
+    if name not in table:
+        raise file.refuse(f"there is no parameter '{name}'{did_you_mean(name, table)}", (*at, "name"))
+    known = table[name]
+    value = file.number((*at, "value"), known.minimum, known.maximum, name)
+    if (unit := file.text_at((*at, "unit"))) != known.unit:
+        raise file.refuse(f"{name} is in '{known.unit}', not in '{unit}'; convert the value", (*at, "unit"))
+    if "effect" in entry and entry["effect"] != known.effect:
+        raise file.refuse(f"{name} belongs to {known.effect or 'no effect'}; remove or correct effect", (*at, "effect"))
+    full = name
+    if "spring" in entry:
+        spring = file.whole((*at, "spring"), 1, model.array.springs)
+        if not known.per_spring:
+            raise file.refuse(f"{name} is of the whole array; remove spring", (*at, "spring"))
+        full = f"{name}[{spring}]"
+    if full in model.parameters:
+        raise file.refuse(f"parameter {full} appears twice; remove one", (*at, "value"))
+    model.parameters[full] = value
+    model.places[full] = file.place((*at, "value"))
+    if "stderr" in entry:
+        model.stderr[full] = file.number((*at, "stderr"), 0.0, 1e12, f"{name} stderr")
+
+
+def _check_provenance(file: TomlFile) -> None:
+    given = file.table(("provenance",), ("tool", "date", "logs", *ERRORS, "note"))
+    for key in given:
+        if key in ERRORS:
+            file.number(("provenance", key), -100.0, 1e6)
+        elif key != "logs":
+            file.text_at(("provenance", key))
+    for at in file.tables(("provenance", "logs")):
+        file.table(at, ("file", "sha256"))
+        file.text_at((*at, "file"))
+        file.text_at((*at, "sha256"))
 
 
 def _value(number: float) -> str:
@@ -223,7 +197,7 @@ def model_text(model: Model) -> str:
     for key in ("tool", "date", "note"):
         if key in made:
             lines.append(f"{key} = {json.dumps(made[key])}")
-    for key in ("rmse_before_c", "rmse_after_c", "hottest_c"):
+    for key in ERRORS:
         if made.get(key) is not None:
             lines.append(f"{key} = {_value(made[key])}")
     for log in made.get("logs", []):

@@ -13,6 +13,8 @@ from importlib import resources
 
 import numpy as np
 
+from .errors import WorkError
+
 MAX_SPRINGS = 64
 POWER, CURRENT, DUTY, COMMAND, TEMPERATURE = range(5)
 MODES = {"power": POWER, "current": CURRENT, "command": COMMAND}
@@ -361,53 +363,58 @@ class Plant:
         return out
 
 
+def _chip(refusal: str, function: str, *arguments: object) -> str:
+    """Call a function of the chip, all of which end with room for a message; return that, or raise it behind `refusal`."""
+    message = ctypes.create_string_buffer(1024)
+    call = getattr(library(), function)
+    call.restype = ctypes.c_int
+    if call(*arguments, message, ctypes.c_size_t(len(message))):
+        raise WorkError(f"{refusal} {message.value.decode()}")
+    return message.value.decode()
+
+
 def chip_export(plant: Plant) -> tuple[str, str]:
     """Return the console lines of the on-chip model with this plant's numbers, and what was left out."""
-    from .errors import WorkError
-
-    text, message = ctypes.create_string_buffer(16384), ctypes.create_string_buffer(1024)
-    call = library().chip_export
-    call.restype = ctypes.c_int
-    call.argtypes = (ctypes.c_void_p, ctypes.c_char_p, ctypes.c_size_t, ctypes.c_char_p, ctypes.c_size_t)
-    if call(plant._plant, text, len(text), message, len(message)):
-        raise WorkError(f"the model does not fit the chip: {message.value.decode()}")
-    return text.value.decode(), message.value.decode()
+    text = ctypes.create_string_buffer(16384)
+    left_out = _chip(
+        "the model does not fit the chip:",
+        "chip_export",
+        ctypes.c_void_p(plant._plant),
+        text,
+        ctypes.c_size_t(len(text)),
+    )
+    return text.value.decode(), left_out
 
 
 def chip_simulate(
     lines: str,
     shape: tuple[int, int],
     time_s: np.ndarray,
-    power_w: np.ndarray,
+    mode: int,
+    drive: np.ndarray,
+    command_power_w: np.ndarray,
     fan: np.ndarray,
     ambient_c: np.ndarray,
     first_c: np.ndarray,
-) -> np.ndarray:
+) -> tuple[np.ndarray, np.ndarray]:
     """Run a log through the on-chip fixed-point model, set by console lines over the firmware's defaults.
 
-    Return its temperatures, (rows, springs), degC.
+    `command_power_w`: (springs,), W at full command. Return its temperatures (degC) and austenite, (rows, springs).
     """
-    from .errors import WorkError
-
-    power_w = np.ascontiguousarray(power_w, dtype=float)
-    arrays = [np.ascontiguousarray(a, dtype=float) for a in (time_s, power_w, fan, ambient_c, first_c)]
-    out = np.empty_like(power_w)
-    message = ctypes.create_string_buffer(1024)
-    call = library().chip_simulate
-    call.restype = ctypes.c_int
-    call.argtypes = (
-        ctypes.c_char_p,
-        ctypes.c_int,
-        ctypes.c_int,
-        ctypes.c_size_t,
-        *(_double_p,) * 6,
-        ctypes.c_char_p,
-        ctypes.c_size_t,
+    given = (time_s, drive, command_power_w, fan, ambient_c, first_c)
+    times, drive, *others = (np.ascontiguousarray(one, dtype=float) for one in given)
+    temperature, austenite = np.empty_like(drive), np.empty_like(drive)
+    _chip(
+        "the chip refuses",
+        "chip_simulate",
+        lines.encode(),
+        *shape,
+        ctypes.c_size_t(len(times)),
+        _pointer(times),
+        mode,
+        *(_pointer(one) for one in (drive, *others, temperature, austenite)),
     )
-    pointers = [_pointer(a) for a in arrays]
-    if call(lines.encode(), *shape, len(time_s), *pointers, _pointer(out), message, len(message)):
-        raise WorkError(f"the chip refuses {message.value.decode()}")
-    return out
+    return temperature, austenite
 
 
 def chip_drive(
@@ -417,37 +424,18 @@ def chip_drive(
 
     The pattern is on for `on_rows` seconds of `rows`. Return true temperatures (degC) and austenite, (rows, springs).
     """
-    from .errors import WorkError
-
     temperature, austenite = np.empty((rows, plant.springs)), np.empty((rows, plant.springs))
-    wanted = (ctypes.c_int * plant.springs)(*map(int, pattern))
-    message = ctypes.create_string_buffer(256)
-    call = library().chip_drive
-    call.restype = ctypes.c_int
-    call.argtypes = (
-        ctypes.c_void_p,
-        ctypes.c_char_p,
-        _int_p,
-        ctypes.c_size_t,
-        ctypes.c_size_t,
-        _double_p,
-        _double_p,
-        ctypes.c_char_p,
-        ctypes.c_size_t,
-    )
-    status = call(
-        plant._plant,
+    _chip(
+        "the chip refuses",
+        "chip_drive",
+        ctypes.c_void_p(plant._plant),
         lines.encode(),
-        wanted,
-        rows,
-        on_rows,
+        (ctypes.c_int * plant.springs)(*map(int, pattern)),
+        ctypes.c_size_t(rows),
+        ctypes.c_size_t(on_rows),
         _pointer(temperature),
         _pointer(austenite),
-        message,
-        len(message),
     )
-    if status:
-        raise WorkError(f"the chip refuses {message.value.decode()}")
     return temperature, austenite
 
 

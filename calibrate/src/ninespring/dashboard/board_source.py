@@ -20,12 +20,11 @@ import numpy as np
 from .. import __version__
 from ..board import SIMULATED, Board, reading
 from ..errors import InputError, WorkError
-from ..recording import LogFile, Row, RowCheck, RowSink, telemetry_names, write_head
+from ..recording import SILENT_S, LogFile, Row, RowCheck, RowSink, telemetry_names, write_head
 from ..thermometers import Thermometers
 from . import words
 from .source import Source
 
-SILENT_S = 5.0
 LOOK_EVERY_S = 1.0
 """So often the board is asked what telemetry does not tell: phase, targets, faults."""
 ANSWER_S = 15.0

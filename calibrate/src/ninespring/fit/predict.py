@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 
 from .. import effects, native
+from ..errors import InputError, WorkError
 from ..logs.run import Run
 from ..models import Model
 from .simulate import array_parameters, simulate_run
@@ -19,10 +22,22 @@ def plant_of(model: Model) -> native.Plant:
     return plant
 
 
+def chip_lines(model: Model) -> tuple[str, str]:
+    """Return the console lines of the on-chip model with a model's numbers, and what was left out; refused at its place."""
+    plant = plant_of(model)
+    try:
+        if why := plant.check():
+            raise WorkError(why)
+        return native.chip_export(plant)
+    except WorkError as error:
+        names = [name for name in model.places if re.search(rf"\b{name.partition('[')[0]}\b", str(error))]
+        raise InputError(str(error), model.name, *(model.places[names[-1]] if names else ())) from None
+
+
 def predict(model: Model, run: Run, chip: bool = False) -> np.ndarray:
     """Return what the sensors should show, (rows, springs), degC; `chip`: by the on-chip model, seen by the same sensors."""
     if chip:
-        return predict_by_chip(model, native.chip_export(plant_of(model))[0], run)
+        return predict_by_chip(model, chip_lines(model)[0], run)
     return simulate_run(plant_of(model), run, run.ambient_c, {})
 
 
@@ -34,22 +49,31 @@ def predict_by_chip(model: Model, lines: str, run: Run) -> np.ndarray:
     plant = plant_of(model)
     plant.set_effects([e for e in model.effects if e not in effects.MEASUREMENT])
     seen_by = shown - simulate_run(plant, run, run.ambient_c, {})
+    return chip_trace(model, lines, run)[0] + seen_by
+
+
+def chip_trace(model: Model, lines: str, run: Run) -> tuple[np.ndarray, np.ndarray]:
+    """Return temperatures (degC) and austenite, (rows, springs), that a chip with these lines believes along a log."""
+    plant = plant_of(model)
     ambient = run.ambient_c if run.ambient_c is not None else np.full(len(run.time_s), plant.get("ambient_c"))
-    power = run.drive
-    if run.mode == "current":
-        power = run.drive**2 * plant.get("resistance_ohm")
-    elif run.mode == "command":
-        power = run.drive * np.array([plant.get(f"command_power_w[{k + 1}]") for k in range(run.springs)])
-    out = np.empty_like(run.temperature_c)
-    shape = (model.array.rows, model.array.cols)
+    power = np.array([plant.get(f"command_power_w[{k + 1}]") for k in range(run.springs)])
+    if run.mode == "command" and (without := np.flatnonzero(power <= 0)).size:
+        said = f"the log has only commands, and the model no command_power_w of spring {without[0] + 1}; add it"
+        raise InputError(said, model.name)
+    temperature, austenite = np.empty_like(run.temperature_c), np.empty_like(run.temperature_c)
     for begin, end in zip(run.starts, [*run.starts[1:], len(run.time_s)], strict=True):
         part = slice(begin, end)
-        before = out[begin - 1] if begin else np.full(run.springs, ambient[0])
+        before = temperature[begin - 1] if begin else np.full(run.springs, ambient[0])
         first = np.where(np.isfinite(run.temperature_c[begin]), run.temperature_c[begin], before)
-        if end - begin == 1:
-            out[part] = first
-            continue
-        out[part] = native.chip_simulate(
-            lines, shape, run.time_s[part], power[part], run.fan[part], ambient[part], first
+        temperature[part], austenite[part] = native.chip_simulate(
+            lines,
+            (model.array.rows, model.array.cols),
+            run.time_s[part],
+            native.MODES[run.mode],
+            run.drive[part],
+            power,
+            run.fan[part],
+            ambient[part],
+            first,
         )
-    return out + seen_by
+    return temperature, austenite

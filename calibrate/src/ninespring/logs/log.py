@@ -37,6 +37,36 @@ BELOW = {
 }
 """What to do about a value below the lowest, where that is another thing."""
 
+NAMES_OF = (
+    (
+        r"t(?:emp|emperature)?_?([1-9][0-9]?)_(?:deg)?f",
+        "t{}_c",
+        "temperatures are in degC: convert with (F - 32) / 1.8",
+    ),
+    (r"t(?:emp|emperature)?_?([1-9][0-9]?)_k", "t{}_c", "temperatures are in degC: subtract 273.15"),
+    (r"t(?:emp|emperature)?_?([1-9][0-9]?)(?:_(?:deg)?c)?", "t{}_c", "if it is in degC"),
+    (r"(?:i|current)_?([1-9][0-9]?)_ma", "i{}_a", "currents are in ampere: divide by 1000"),
+    (r"(?:i|current)_?([1-9][0-9]?)(?:_a)?", "i{}_a", "if it is in ampere"),
+    (r"(?:v|voltage)_?([1-9][0-9]?)_mv", "v{}_v", "voltages are in volt: divide by 1000"),
+    (r"(?:v|voltage)_?([1-9][0-9]?)(?:_v)?", "v{}_v", "if it is in volt"),
+    (r"[uq]([1-9][0-9]?)(?:_pct|_percent)", "u{}", "a command is 0 to 1: divide by 100"),
+    (r"[uq]([1-9][0-9]?)", "u{}", "a command is 0 to 1: divide by 100 if it is in percent"),
+    (r"(?:time|t)_ms|ms", "time_s", "times are in seconds: divide by 1000"),
+    (r"(?:time|t)_min", "time_s", "times are in seconds: multiply by 60"),
+    (r"time|t|t_s|time_sec|seconds|time \(sec\)|timestamp", "time_s", "if it is in seconds"),
+    (r"(?:ambient|t_air|air)_f", "ambient_c", "temperatures are in degC: convert with (F - 32) / 1.8"),
+    (r"(?:ambient|t_air|air)(?:_c)?", "ambient_c", "if it is in degC"),
+    (r"fan_(?:pct|percent)", "fan", "the fan runs from 0 to 1: divide by 100"),
+)
+"""Names that others give to a log's columns: what they are called here, and what to do with their numbers."""
+
+
+def _advice(name: str) -> str:
+    for other, ours, todo in NAMES_OF:
+        if found := re.fullmatch(other, name, re.IGNORECASE):
+            return f"{todo}, and name it {ours.format(*found.groups())}"
+    return "a log has time_s, i1_a, v1_v, u1, t1_c ..., fan, ambient_c; note_... is skipped"
+
 
 def _check_range(table: Table, name: str, kind: str) -> None:
     low, high, unit, advice = LIMITS[kind]
@@ -68,8 +98,7 @@ def _driving_columns(
             kind, number = "u", int(match[4])
         if not match:
             raise InputError(
-                f"unknown column '{name}': a log has time_s, i1_a, v1_v, u1, t1_c ..., fan, ambient_c "
-                "(`ninespring import --map` renames)",
+                f"unknown column '{name}': {_advice(name)} (`ninespring import --map` converts and renames)",
                 path,
                 line,
                 at,
@@ -189,6 +218,8 @@ def read_log(
     )
     if mode == "command":
         run.drive = np.clip(run.drive, 0.0, 1.0)
+        if has_voltages:
+            notes.append("voltages without currents say nothing of the power: not used")
     without = [str(k) for k in range(1, count + 1) if f"t{k}_c" not in frame]
     if without and temperatures and len(without) < count:
         notes.append(f"no temperature of spring {', '.join(without)}: simulated, but not compared")

@@ -14,6 +14,8 @@ from ..fit.statistics import noise_floor
 from .run import Run
 from .table import Table
 
+LONGEST_S = 60.0 * 86400.0
+"""No bench logs two months in one go: a longer log is in milliseconds."""
 RUN_IN_S = 120.0
 """After a gap: how long the noise of the temperatures that the simulation starts from is still felt."""
 
@@ -42,7 +44,14 @@ def rising_rows(table: Table, notes: list[str]) -> np.ndarray:
 
 
 def refuse_wrong_units(run: Run, table: Table) -> None:
-    """Springs that start above 45 degC though nothing is driven, and never get colder: Fahrenheit or kelvin."""
+    """Months in one log: milliseconds. Springs above 45 degC though nothing is driven: Fahrenheit or kelvin."""
+    if run.duration_s > LONGEST_S:
+        line, column = table.where(len(table.lines) - 1, "time_s")
+        days = run.duration_s / 86400.0
+        said = (
+            f"the log spans {days:.3g} days: if its time is in ms, divide by 1000 (`ninespring import --map` converts)"
+        )
+        raise InputError(said, run.name, line, column)
     if not np.isfinite(run.temperature_c[:5]).any():
         return
     with warnings.catch_warnings():

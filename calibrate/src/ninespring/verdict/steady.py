@@ -1,4 +1,4 @@
-"""Steady tables (design, section 4): which effect, with one number each, explains what a table shows."""
+"""Steady tables (docs/files.md): which effect, with one number each, explains what a table shows."""
 
 from __future__ import annotations
 

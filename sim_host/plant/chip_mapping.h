@@ -22,7 +22,7 @@ typedef enum {
         -2 /* the numbers fit one by one, thermal_model_init refuses them together */
 } chip_mapping_status_t;
 
-/* The plant's declared model and those effects that the chip carries (design, section 5) as chip
+/* The plant's declared model and those effects that the chip carries as chip
  * parameters, rounded to the nearest integer. message (message_size > 0) gets one line: on failure
  * which parameter, its value and the chip's limit; on success the effects that are on and were left
  * out, and why, or an empty text. Left out on purpose: sensor_lag, sensor_gain, optical_mixing,

@@ -1,0 +1,421 @@
+/* Whatever the parameters, the pattern and the state: nothing wraps, nothing comes from nothing. */
+#include <string.h>
+
+#include "driven_model.h"
+
+/* ---- conservation, symmetry --------------------------------------------------------------------
+ */
+
+static void no_heat_from_nothing(void)
+{
+    parameters.loss_rise_ppm_per_k = 3000;
+    parameters.radiating_area_cmm2 = 11080;
+    parameters.air_exchange_uw_per_k = 60000;
+    parameters.plate_coupling_uw_per_k = 500;
+    parameters.wake_uw_per_k = 1000;
+    start();
+    thermal_model_set_fan(&model, 60);
+    thermal_model_state_t before, after;
+    thermal_model_get_state(&model, &before);
+    run(36000); /* an hour at ambient: not one bit */
+    thermal_model_get_state(&model, &after);
+    TEST_ASSERT_EQUAL_MEMORY(&before, &after, sizeof before);
+}
+
+/* springs that lose nothing: what goes into them stays, through transformations and back */
+static void closed_array_keeps_its_heat(void)
+{
+    parameters.loss_uw_per_k = parameters.loss_fan_uw_per_k = 0;
+    start();
+    power_uw[4] = 2000000;
+    power_uw[0] = 1000000;
+    run(300); /* 90 J into nine springs */
+    memset(power_uw, 0, sizeof power_uw);
+    int64_t enthalpy[2];
+    for (int k = 0; k < 2; k++) {
+        thermal_model_state_t state;
+        thermal_model_get_state(&model, &state);
+        enthalpy[k] = 0;
+        for (int i = 0; i < 9; i++) {
+            enthalpy[k] += (int64_t)state.spring[i].temperature_c23 + state.spring[i].latent_c23;
+        }
+        run(36000);
+    }
+    double given_k = 90.0 / 0.3, before_k = (double)enthalpy[0] / 8388608.0 - 180.0;
+    TEST_ASSERT_DOUBLE_WITHIN(0.01, given_k, before_k);
+    TEST_ASSERT_DOUBLE_WITHIN(0.05, before_k, (double)enthalpy[1] / 8388608.0 - 180.0);
+}
+
+static void rotating_the_pattern_rotates_the_temperatures(void)
+{
+    parameters.air_exchange_uw_per_k = 60000;
+    parameters.plate_coupling_uw_per_k = 500;
+    parameters.radiating_area_cmm2 = 11080;
+    parameters.loss_rise_ppm_per_k = 2000;
+    thermal_model_state_t state[4];
+    for (int turn = 0; turn < 4; turn++) {
+        parameters.wake_uw_per_k = 1000;
+        parameters.wake_direction = (uint8_t)turn; /* clockwise, as the pattern */
+        start();
+        thermal_model_set_fan(&model, 40);
+        random_state = 5;
+        for (int k = 0; k < 3000; k++) {
+            if (k % 100 == 0) {
+                for (int i = 0; i < 9; i++) {
+                    int row = i / 3, column = i % 3;
+                    for (int t = 0; t < turn; t++) {
+                        int old = row;
+                        row = column;
+                        column = 2 - old;
+                    }
+                    power_uw[row * 3 + column] = random_bits() % 1000000u;
+                }
+            }
+            run(1);
+        }
+        thermal_model_get_state(&model, &state[turn]);
+    }
+    for (int turn = 1; turn < 4; turn++) {
+        for (int i = 0; i < 9; i++) {
+            int row = i / 3, column = i % 3;
+            for (int t = 0; t < turn; t++) {
+                int old = row;
+                row = column;
+                column = 2 - old;
+            }
+            TEST_ASSERT_EQUAL_MEMORY(&state[0].spring[i], &state[turn].spring[row * 3 + column],
+                                     sizeof state[0].spring[0]);
+        }
+        TEST_ASSERT_EQUAL_INT32(state[0].air_c23, state[turn].air_c23);
+        TEST_ASSERT_EQUAL_INT32(state[0].plate_c23, state[turn].plate_c23);
+    }
+}
+
+/* 1 x 3 and 3 x 1 are one array seen from two sides */
+static void a_row_behaves_as_a_column(void)
+{
+    thermal_model_state_t state[2];
+    for (int k = 0; k < 2; k++) {
+        parameters.rows = k ? 1 : 3;
+        parameters.columns = k ? 3 : 1;
+        parameters.wake_uw_per_k = 1000;
+        parameters.wake_direction = k ? THERMAL_MODEL_WAKE_EAST : THERMAL_MODEL_WAKE_SOUTH;
+        start();
+        thermal_model_set_fan(&model, 100);
+        power_uw[0] = 400000;
+        power_uw[1] = 100000;
+        run(2000);
+        thermal_model_get_state(&model, &state[k]);
+    }
+    TEST_ASSERT_EQUAL_MEMORY(&state[0].spring, &state[1].spring, 3 * sizeof state[0].spring[0]);
+}
+
+static void equal_springs_stay_equal_whatever_the_size(void)
+{
+    for (uint8_t rows = 1; rows <= 8; rows++) {
+        for (uint8_t columns = 1; columns <= 8; columns++) {
+            if (rows * columns > THERMAL_MODEL_MAX_SPRINGS) {
+                continue;
+            }
+            parameters.rows = rows;
+            parameters.columns = columns;
+            start();
+            for (int i = 0; i < rows * columns; i++) {
+                power_uw[i] = 300000;
+            }
+            run(50);
+            for (uint8_t i = 1; i < rows * columns; i++) {
+                TEST_ASSERT_EQUAL_INT16(thermal_model_temperature_c7(&model, 0),
+                                        thermal_model_temperature_c7(&model, i));
+            }
+            TEST_ASSERT_TRUE(thermal_model_is_consistent(&model));
+        }
+    }
+}
+
+/* ---- an effect at zero is no effect ------------------------------------------------------------
+ */
+
+static void an_absent_effect_leaves_no_trace(void)
+{
+    thermal_model_state_t state[5];
+    for (int k = 0; k < 5; k++) {
+        setUp();
+        switch (k) {
+        case 1: /* no shared air: its capacity does not matter */
+            parameters.air_heat_capacity_mj_per_k = 1234;
+            break;
+        case 2: /* no plate: neither does its */
+            parameters.plate_heat_capacity_mj_per_k = 17;
+            parameters.plate_loss_uw_per_k = 65535;
+            break;
+        case 3: /* no wake: nor its direction */
+            parameters.wake_direction = THERMAL_MODEL_WAKE_NORTH;
+            break;
+        case 4: /* fan off: nor what the fan would do */
+            parameters.wake_uw_per_k = 2000;
+            parameters.loss_fan_uw_per_k = 9000;
+            parameters.orthogonal_fan_uw_per_k = 1;
+            parameters.diagonal_fan_uw_per_k = 999;
+            break;
+        default:
+            break;
+        }
+        start();
+        for (int n = 0; n < 3000; n++) {
+            if (n % 200 == 0) {
+                for (int i = 0; i < 9; i++) {
+                    power_uw[i] = random_bits() % 900000u;
+                }
+            }
+            run(1);
+        }
+        thermal_model_get_state(&model, &state[k]);
+        TEST_ASSERT_EQUAL_MEMORY(&state[0], &state[k], sizeof state[0]);
+    }
+}
+
+/* ---- corners -----------------------------------------------------------------------------------
+ */
+
+static void corner(unsigned bits)
+{
+    thermal_model_parameters_default(&parameters);
+    parameters.step_ms = bits & 1u ? 1000 : 1;
+    parameters.heat_capacity_mj_per_k = bits & 2u ? 65535 : 200;
+    parameters.loss_uw_per_k = bits & 4u ? 30000 : 0;
+    parameters.loss_fan_uw_per_k = bits & 8u ? 60000 : 0;
+    parameters.orthogonal_uw_per_k = bits & 16u ? 7000 : 0;
+    parameters.diagonal_uw_per_k = bits & 32u ? 3000 : 0;
+    parameters.loss_rise_ppm_per_k = bits & 64u ? 2000 : 0;
+    parameters.radiating_area_cmm2 = bits & 128u ? 20000 : 0;
+    parameters.latent_heat_mj = bits & 256u ? 65535 : 0;
+    parameters.air_exchange_uw_per_k = bits & 512u ? 16000000 : 0;
+    parameters.air_heat_capacity_mj_per_k = bits & 1024u ? 2000000 : 0;
+    parameters.plate_coupling_uw_per_k = bits & 2048u ? 10000 : 0;
+    parameters.plate_heat_capacity_mj_per_k = bits & 4096u ? 2000000 : 300;
+    parameters.plate_loss_uw_per_k = bits & 8192u ? 65535 : 0;
+    parameters.wake_uw_per_k = bits & 16384u ? 20000 : 0;
+    if (bits & 32768u) {
+        parameters.martensite_finish_cc = -3000;
+        parameters.martensite_start_cc = -2800;
+        parameters.austenite_start_cc = 9000;
+        parameters.austenite_finish_cc = 19000;
+    }
+}
+
+/* Hot neighbours must not cool a spring, cold ones not heat it, whatever the parameters: a wrapped
+ * flow would. */
+static void no_accepted_corner_wraps(void)
+{
+    unsigned accepted = 0;
+    for (unsigned bits = 0; bits < 65536u; bits++) {
+        corner(bits);
+        if (thermal_model_init(&model, &parameters, 0) != THERMAL_MODEL_OK) {
+            continue;
+        }
+        accepted++;
+        thermal_model_set_fan(&model, (uint8_t)(bits % 3u * 50u));
+        /* the hottest everything around the coldest spring, full power in it */
+        thermal_model_set_ambient(&model, INT16_MAX);
+        thermal_model_reset(&model, INT16_MAX);
+        thermal_model_set_temperature(&model, 4, INT16_MIN);
+        for (int i = 0; i < 9; i++) {
+            power_uw[i] = UINT32_MAX;
+        }
+        int16_t before = thermal_model_temperature_c7(&model, 4);
+        run(1);
+        TEST_ASSERT_TRUE(thermal_model_temperature_c7(&model, 4) >= before);
+        TEST_ASSERT_EQUAL_INT16(THERMAL_MODEL_HIGHEST_C7, thermal_model_temperature_c7(&model, 0));
+        run(2);
+        TEST_ASSERT_TRUE(thermal_model_is_consistent(&model));
+        /* the coldest everything around the hottest spring, without power */
+        thermal_model_set_ambient(&model, INT16_MIN);
+        thermal_model_reset(&model, INT16_MIN);
+        thermal_model_set_temperature(&model, 4, INT16_MAX);
+        memset(power_uw, 0, sizeof power_uw);
+        before = thermal_model_temperature_c7(&model, 4);
+        run(1);
+        TEST_ASSERT_TRUE(thermal_model_temperature_c7(&model, 4) <= before);
+        TEST_ASSERT_TRUE(thermal_model_temperature_c7(&model, 0) >= THERMAL_MODEL_LOWEST_C7);
+        run(2);
+        TEST_ASSERT_TRUE(thermal_model_is_consistent(&model));
+    }
+    TEST_ASSERT_TRUE(accepted > 5000u);
+}
+
+static void random_corners_for_long_stay_consistent(void)
+{
+    for (unsigned round = 0; round < 2000; round++) {
+        corner(random_bits());
+        if (thermal_model_init(&model, &parameters, 0) != THERMAL_MODEL_OK) {
+            continue;
+        }
+        for (int k = 0; k < 300; k++) {
+            if (k % 10 == 0) {
+                for (int i = 0; i < 9; i++) {
+                    power_uw[i] = random_bits() >> (random_bits() % 32u);
+                }
+                uint8_t spring = (uint8_t)random_bits();
+                thermal_model_set_temperature(&model, spring, (int16_t)random_bits());
+                thermal_model_set_fan(&model, (uint8_t)random_bits());
+                thermal_model_set_ambient(&model, (int16_t)random_bits());
+                (void)thermal_model_power_to_hold_uw(&model, spring, (int16_t)random_bits());
+            }
+            run(1);
+            TEST_ASSERT_TRUE(thermal_model_is_consistent(&model));
+        }
+    }
+}
+
+static void too_much_power_counts_as_the_highest(void)
+{
+    static const uint32_t much[] = {THERMAL_MODEL_HIGHEST_POWER_UW + 1u, 0x01000000u, 0x04000001u,
+                                    UINT32_MAX};
+    start();
+    power_uw[0] = THERMAL_MODEL_HIGHEST_POWER_UW;
+    run(1);
+    int16_t highest = thermal_model_temperature_c7(&model, 0);
+    TEST_ASSERT_DOUBLE_WITHIN(0.01, 20.0 + 8.388607 / 3.0, highest / 128.0);
+    for (int k = 0; k < 4; k++) {
+        start();
+        power_uw[0] = much[k];
+        run(1);
+        TEST_ASSERT_EQUAL_INT16(highest, thermal_model_temperature_c7(&model, 0));
+    }
+}
+
+/* ---- refusals ----------------------------------------------------------------------------------
+ */
+
+static void refused(thermal_model_status_t status, uint16_t row)
+{
+    thermal_model_t before = model;
+    uint16_t bad = UINT16_MAX;
+    const char *const name = row < PARAMETER_COUNT ? parameter_row(row).name : "step_ms";
+    TEST_ASSERT_EQUAL_MESSAGE(status, thermal_model_init(&model, &parameters, &bad), name);
+    TEST_ASSERT_EQUAL_UINT16_MESSAGE(row, bad, name);
+    TEST_ASSERT_EQUAL_MEMORY(&before, &model, sizeof model);
+    setUp();
+}
+
+#define REFUSED(status, name, field, value)                                                        \
+    parameters.field = (value);                                                                    \
+    refused(THERMAL_MODEL_ERROR_##status, PARAMETER_##name)
+
+/* A value outside its own limits: test_parameters has each of them. */
+static void what_does_not_fit_together_is_refused_by_name(void)
+{
+    start();
+    REFUSED(RANGE, rows, rows, 0);
+    REFUSED(RANGE, columns, columns, 30);
+    parameters.step_ms = 0;
+    refused(THERMAL_MODEL_ERROR_RANGE, PARAMETER_COUNT);
+    parameters.step_ms = 1001;
+    refused(THERMAL_MODEL_ERROR_RANGE, PARAMETER_COUNT);
+    REFUSED(RANGE, heat_capacity_j_per_k, heat_capacity_mj_per_k, 13);
+    REFUSED(OVERFLOW, loss_w_per_k, loss_uw_per_k, 65535);
+    REFUSED(OVERFLOW, loss_fan_w_per_k, loss_fan_uw_per_k, 65535);
+    REFUSED(OVERFLOW, orthogonal_w_per_k, orthogonal_uw_per_k, 20000);
+    REFUSED(OVERFLOW, orthogonal_fan_w_per_k, orthogonal_fan_uw_per_k, 20000);
+    REFUSED(OVERFLOW, diagonal_w_per_k, diagonal_uw_per_k, 20000);
+    REFUSED(OVERFLOW, diagonal_fan_w_per_k, diagonal_fan_uw_per_k, 20000);
+    parameters.loss_uw_per_k = 20000;
+    REFUSED(OVERFLOW, loss_rise_per_k, loss_rise_ppm_per_k, 20000);
+    parameters.loss_uw_per_k = parameters.loss_fan_uw_per_k = 60000;
+    parameters.orthogonal_uw_per_k = parameters.orthogonal_fan_uw_per_k = 9500;
+    refused(THERMAL_MODEL_ERROR_OVERFLOW, PARAMETER_loss_w_per_k);
+    REFUSED(RANGE, latent_heat_j, latent_heat_mj, 30100);
+    parameters.austenite_start_cc = 9000;
+    parameters.austenite_finish_cc = 9400;
+    parameters.latent_heat_mj = 25000;
+    refused(THERMAL_MODEL_ERROR_RANGE, PARAMETER_latent_heat_j);
+    parameters.martensite_finish_cc = -100; /* with the shift the last spring's is below -30 */
+    REFUSED(RANGE, transformation_shift_k, transformation_shift_cc[8], -2901);
+    parameters.austenite_finish_cc = 18000; /* and 10 K of latent heat above 200 */
+    parameters.austenite_start_cc = 17000;
+    parameters.latent_heat_mj = 3000;
+    REFUSED(RANGE, transformation_shift_k, transformation_shift_cc[8], 1001);
+    REFUSED(ORDER, martensite_start_c, martensite_start_cc, 6800);
+    REFUSED(RANGE, martensite_start_c, martensite_start_cc, 6900);
+    REFUSED(ORDER, austenite_start_c, austenite_start_cc, 7799);
+    REFUSED(ORDER, austenite_finish_c, austenite_finish_cc, 8800);
+    REFUSED(RANGE, austenite_finish_c, austenite_finish_cc, 8900);
+    parameters.plate_coupling_uw_per_k = 1000;
+    REFUSED(RANGE, plate_heat_capacity_j_per_k, plate_heat_capacity_mj_per_k, 0);
+    parameters.plate_coupling_uw_per_k = 1000;
+    REFUSED(UNSTABLE, plate_heat_capacity_j_per_k, plate_heat_capacity_mj_per_k, 5);
+    REFUSED(OVERFLOW, plate_coupling_w_per_k, plate_coupling_uw_per_k, 64000);
+    REFUSED(RANGE, wake_w_per_k, wake_uw_per_k, 11301);
+    REFUSED(RANGE, loss_scale, loss_scale_permille[8], 0);
+    parameters.heat_capacity_mj_per_k = 40;
+    parameters.latent_heat_mj = 0;
+    parameters.loss_uw_per_k = 60000;
+    parameters.orthogonal_uw_per_k = 8000;
+    parameters.step_ms = 300;
+    refused(THERMAL_MODEL_ERROR_UNSTABLE, PARAMETER_heat_capacity_j_per_k);
+}
+
+static void state_survives_and_garbage_does_not_enter(void)
+{
+    start();
+    power_uw[0] = 600000;
+    power_uw[4] = 900000;
+    run(400);
+    thermal_model_state_t state, again;
+    thermal_model_get_state(&model, &state);
+    double kept[2] = {degrees(0), degrees(4)};
+    run(300);
+    TEST_ASSERT_TRUE(thermal_model_set_state(&model, &state));
+    thermal_model_get_state(&model, &again);
+    TEST_ASSERT_EQUAL_MEMORY(&state, &again, sizeof state);
+    TEST_ASSERT_DOUBLE_WITHIN(0.001, kept[0], degrees(0));
+    TEST_ASSERT_DOUBLE_WITHIN(0.001, kept[1], degrees(4));
+    run(1);
+    TEST_ASSERT_TRUE(thermal_model_is_consistent(&model));
+    thermal_model_t before = model;
+    unsigned taken = 0;
+    for (int k = 0; k < 20000; k++) {
+        thermal_model_state_t garbage = state;
+        uint8_t *bytes = (uint8_t *)&garbage;
+        for (int n = 0; n < 40; n++) {
+            bytes[random_bits() % (9u * sizeof garbage.spring[0])] = (uint8_t)random_bits();
+        }
+        if (thermal_model_set_state(&model, &garbage)) {
+            taken++;
+            run(3);
+            TEST_ASSERT_TRUE(thermal_model_is_consistent(&model));
+            model = before;
+        } else {
+            TEST_ASSERT_EQUAL_MEMORY(&before, &model, sizeof model);
+        }
+    }
+    TEST_ASSERT_TRUE(taken < 2000u);
+}
+
+static void temperatures_saturate(void)
+{
+    start();
+    thermal_model_set_temperature(&model, 2, INT16_MAX);
+    TEST_ASSERT_EQUAL_INT16(THERMAL_MODEL_HIGHEST_C7, thermal_model_temperature_c7(&model, 2));
+    thermal_model_set_temperature(&model, 2, INT16_MIN);
+    TEST_ASSERT_EQUAL_INT16(THERMAL_MODEL_LOWEST_C7, thermal_model_temperature_c7(&model, 2));
+    TEST_ASSERT_TRUE(thermal_model_is_consistent(&model));
+}
+
+void run_consistency_tests(void)
+{
+    Unity.TestFile = __FILE__;
+    RUN_TEST(no_heat_from_nothing);
+    RUN_TEST(closed_array_keeps_its_heat);
+    RUN_TEST(rotating_the_pattern_rotates_the_temperatures);
+    RUN_TEST(a_row_behaves_as_a_column);
+    RUN_TEST(equal_springs_stay_equal_whatever_the_size);
+    RUN_TEST(an_absent_effect_leaves_no_trace);
+    RUN_TEST(no_accepted_corner_wraps);
+    RUN_TEST(random_corners_for_long_stay_consistent);
+    RUN_TEST(too_much_power_counts_as_the_highest);
+    RUN_TEST(what_does_not_fit_together_is_refused_by_name);
+    RUN_TEST(state_survives_and_garbage_does_not_enter);
+    RUN_TEST(temperatures_saturate);
+}
