@@ -46,8 +46,9 @@ static void see_onset(const spring_estimator_t *e, spring_belief_t *b, thermal_m
             const float rise_per_k = (b->onset_ohm / b->cold_ohm - 1.0f) / (now_c - b->cold_c);
             l->martensite_rise_per_k =
                 fminf(fmaxf(rise_per_k, -COEFFICIENT_MOST_PER_K), COEFFICIENT_MOST_PER_K);
+            l->martensite_ohm =
+                b->cold_ohm / (1.0f + l->martensite_rise_per_k * (b->cold_c - 20.0f));
         }
-        l->martensite_ohm = b->onset_ohm / (1.0f + l->martensite_rise_per_k * (now_c - 20.0f));
         const int16_t start_c7 = thermal_model_transformation(model, k).austenite_start_c7;
         (void)spring_see(e, b, model, k, spring_c(start_c7) + ONSET_K, PLACE_SD_K,
                          SPRING_PHASE_MARTENSITE);
