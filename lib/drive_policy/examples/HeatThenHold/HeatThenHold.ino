@@ -41,7 +41,8 @@ void loop()
         return;
     }
     next_ms += 20;
-    const uint16_t level_permille[3] = {0, (uint16_t)(tick < 6000 ? DRIVE_POLICY_LEVEL_FULL : 0), 0};
+    const uint16_t level_permille[3] = {0, (uint16_t)(tick < 6000 ? DRIVE_POLICY_LEVEL_FULL : 0),
+                                        0};
     const bool allowed[3] = {true, true, true};
     drive_policy_input_t input = {};
     input.model = &model;

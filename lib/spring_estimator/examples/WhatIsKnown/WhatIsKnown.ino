@@ -1,6 +1,6 @@
-// The power came on, and nobody knows how hot the spring is. It is read with 0.5 A for a minute (the
-// readings are made up: a martensite spring at rest), and the bounds of its temperature close in.
-// For the serial plotter. Nothing has to be connected.
+// The power came on, and nobody knows how hot the spring is. It is read with 0.5 A for a minute
+// (the readings are made up: a martensite spring at rest), and the bounds of its temperature close
+// in. For the serial plotter. Nothing has to be connected.
 #include <spring_estimator.h>
 
 static thermal_model_t model;
