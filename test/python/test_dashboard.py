@@ -331,6 +331,24 @@ def test_a_pages_wishes_are_carried_out_in_their_order(tmp_path: Path) -> None:
     assert [line for line in board.sent() if line.startswith("on ")] == [f"on 1 {level}" for level in range(1, 101)]
 
 
+def test_a_stop_that_drops_what_is_being_answered_loses_no_board(tmp_path: Path) -> None:
+    board = FakeBoard({"model": ["error:12 dropped by the stop"]})
+    board.stream, board.every_s = (row(0.1 * k) for k in range(10, 9999)), 0.1
+    dashboard = Dashboard(tmp_path, "--port", board.port)
+    try:
+        with connect(
+            f"ws://{dashboard.address}/ws", additional_headers={"origin": dashboard.url.rstrip("/")}
+        ) as socket:
+            while not json.loads(socket.recv(10)).get("connected"):
+                pass
+            until = time.monotonic() + 3.0
+            while time.monotonic() < until:
+                assert json.loads(socket.recv(10)).get("connected", True)
+    finally:
+        assert dashboard.end() == 0
+    assert board.sent().count("version") == 1 and "model" in board.sent()
+
+
 def test_limits_in_words_are_those_of_the_table() -> None:
     table = re.findall(r"^\| \d+ \| `([a-z]+)` \|", (ROOT / "docs" / "driving.md").read_text(), re.MULTILINE)
     assert set(table) == words.LIMITS.keys()

@@ -13,7 +13,7 @@ from types import TracebackType
 
 import numpy as np
 
-from .errors import InputError, WorkError
+from .errors import InputError, RefusedError, WorkError
 from .port import Port
 from .simulated import simulated_board
 
@@ -193,7 +193,7 @@ class Board:
             if got == "ok":
                 return answer
             if match:
-                raise WorkError(f"'{line}' refused: error {match[1]} {match[2]}".rstrip())
+                raise RefusedError(f"'{line}' refused: error {match[1]} {match[2]}".rstrip())
             if TELEMETRY.match(got):
                 self._telemetry.append(got)
             elif got:

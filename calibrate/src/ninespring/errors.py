@@ -28,3 +28,7 @@ class InputError(Exception):
 
 class WorkError(Exception):
     """The input was right but the work failed (a port went away, a fit cannot be done). Exit code 1."""
+
+
+class RefusedError(WorkError):
+    """The board answered that it does not do what it was asked to: it is there, and goes on."""

@@ -20,7 +20,7 @@ import numpy as np
 from .. import __version__
 from ..belief import beliefs
 from ..board import SIMULATED, Board, reading
-from ..errors import InputError, WorkError
+from ..errors import InputError, RefusedError, WorkError
 from ..recording import SILENT_S, LogFile, Row, RowCheck, RowSink, telemetry_names, write_head
 from ..thermometers import Thermometers
 from . import words
@@ -216,7 +216,8 @@ class BoardSource(Source):
                 self._obey(board, *wish)
             elif now >= look_s or self._state.get("state") != looked_at:
                 look_s, looked_at = now + LOOK_EVERY_S, self._state.get("state")
-                self._look(board)
+                with contextlib.suppress(RefusedError):  # a stop drops what is being answered: the next look tells
+                    self._look(board)
             got = board.next_line(time.monotonic() + 0.05)
             if got:
                 heard_s = time.monotonic()
@@ -245,7 +246,7 @@ class BoardSource(Source):
             answer.set_result(said)
         except (WorkError, InputError) as error:
             answer.set_exception(error)
-            if "refused" not in str(error) and not isinstance(error, InputError):
+            if not isinstance(error, (RefusedError, InputError)):
                 raise  # no answer: look for the board anew
         except BaseException as error:
             answer.set_exception(WorkError(str(error)))
@@ -282,7 +283,7 @@ class BoardSource(Source):
             except WorkError as error:
                 self._play = None
                 self._change(said=str(error))
-                if "refused" not in str(error):
+                if not isinstance(error, RefusedError):
                     raise
         if (self._state.get("playing") or False) != (self._play is not None):
             self._change(playing=self._play is not None)
@@ -353,13 +354,13 @@ class BoardSource(Source):
 
     def _begin_recording(self, board: Board) -> str:
         if self._log:
-            raise WorkError(f"'record' refused: {self._log.path.name} is being recorded")
+            raise RefusedError(f"'record' refused: {self._log.path.name} is being recorded")
         now = datetime.datetime.now(datetime.UTC)
         path = self._folder / f"ninespring-{now:%Y%m%d-%H%M%S}.csv"
         try:
             log = LogFile(path)
         except InputError as error:
-            raise WorkError(f"'record' refused: {error}") from None
+            raise RefusedError(f"'record' refused: {error}") from None
         keys = {"recorded": f"{now:%Y-%m-%dT%H:%M:%SZ}", "port": board.port, "tool": f"ninespring {__version__}"}
         self._log = log
         self._change(recording={"file": path.name, "rows": 0})
