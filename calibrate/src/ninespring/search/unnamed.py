@@ -430,7 +430,7 @@ def weighed(problem: Problem, fit: Fit, hidden: Sequence[Hidden]) -> list[tuple[
     slopes = slopes[:, np.linalg.norm(slopes, axis=0) > 1e-6]
     columns = np.column_stack([one.column for one in hidden])
     matrix = np.column_stack([columns, slopes])
-    scale = np.linalg.norm(matrix, axis=0)
+    scale = np.maximum(np.linalg.norm(matrix, axis=0), 1e-9)
     left = np.concatenate(problem.scaled(problem.without_starts(bare.residual)))
     inverse = np.linalg.pinv((matrix / scale).T @ (matrix / scale), rcond=1e-10)
     size = inverse @ ((matrix / scale).T @ left)

@@ -85,17 +85,21 @@ def _finish(problem: Problem, fit: Fit) -> Fit:
     return fit
 
 
-def with_everything(problem: Problem, clean: Fit) -> Fit:
+def with_everything(problem: Problem, clean: Fit, base: Fit) -> Fit:
     """Return a fit that was made beside what has no name, with that in the error: the effects' numbers stay, with their
-    errors, and the declared numbers take up what they can.
+    errors, and the declared numbers, and those of a run alone, take up what they can.
+
+    All are fitted again where that would leave more than the declared model alone does.
     """
-    own = np.array([free.effect is None for free in clean.spec.free])
+    own = np.array([free.effect is None or free.run is not None for free in clean.spec.free])
     pinned = [
         free if mine else replace(free, start=float(value), prior=PINNED)
         for free, value, mine in zip(clean.spec.free, clean.values, own, strict=True)
     ]
     spec = replace(clean.spec, free=tuple(pinned))
     fit = problem.fit(spec, clean.as_dict(), tolerance=1e-4, errors=True)
+    if fit.sse > base.sse:
+        return problem.fit(clean.spec, clean.as_dict(), tolerance=1e-4, errors=True)
     covariance = fit.covariance
     if clean.covariance is not None and covariance is not None:
         together = np.outer(own, own)
@@ -270,8 +274,8 @@ def _diagnose(
         # from here on everything is in the error again: a model is for an array in which what has no name still acts
         problem.leave_out(None)
         base = declared_alone
-        steps = [(effect, with_everything(problem, fit)) for effect, fit in steps]
-        final = with_everything(problem, final)
+        steps = [(effect, with_everything(problem, fit, base)) for effect, fit in steps]
+        final = with_everything(problem, final, base)
     base_out, final_out = problem.holdout_rmse(base), problem.holdout_rmse(final)
 
     listed = []
