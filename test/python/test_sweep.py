@@ -85,6 +85,11 @@ def test_what_is_there_is_not_done_again(tmp_path: Path, client: Any) -> None:
     (tmp_path / "out" / "points" / "00000000-00000000.part").write_text("half a file")
     assert swept(client, spec, tmp_path / "out").equals(whole)
     assert all(part.stat().st_mtime_ns == at for part, at in kept.items())
+    held = Results(tmp_path / "out", spec)
+    assert held.open().all()
+    with pytest.raises(InputError, match="another sweep is writing"):
+        Results(tmp_path / "out", spec).open()
+    held.lock.close()
     with pytest.raises(InputError, match="another spec"):
         Results(tmp_path / "out", spec_of(tmp_path, GRID.replace("0.1", "0.2"))).open()
 
