@@ -94,6 +94,15 @@ def test_what_is_there_is_not_done_again(tmp_path: Path, client: Any) -> None:
         Results(tmp_path / "out", spec_of(tmp_path, GRID.replace("0.1", "0.2"))).open()
 
 
+def test_numbers_are_of_one_kind_in_every_file(tmp_path: Path) -> None:
+    spec = spec_of(tmp_path, f"[sweep]\n{SHORT}[vary]\npitch_mm = [5, 6.5]\nsize = [1, 2]\n")
+    results = Results(tmp_path / "out", spec)
+    results.open()
+    for index, one in enumerate(spec.all_points()):
+        results.add([point.run_point(spec, index, one)])
+    assert results.read()["pitch_mm"].tolist() == [5.0, 5.0, 6.5, 6.5]
+
+
 def test_lost_workers_lose_nothing(tmp_path: Path, client: Any) -> None:
     text = GRID.replace(SHORT, "duration_s = 600\non_s = 400\n").replace("steps = 3", "steps = 12")
     spec = spec_of(tmp_path, text)
