@@ -66,6 +66,8 @@ def swept(spec: Spec, folder: Path, cores: int, disturb: Any = None) -> tuple[fl
     done = results.open()
     with engine.local_cluster(cores) as cluster, Client(cluster) as client:
         client.wait_for_workers(cores)
+        import pyarrow.parquet  # noqa: F401 - loaded before the clock runs
+
         client.run(lambda: __import__("ninespring.explore.point"))
         stop = threading.Event()
         if disturb:

@@ -242,7 +242,21 @@ def test_files_are_written_together_or_not_at_all(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     "command",
-    ["fit", "diagnose", "predict", "export", "import", "record", "upload", "monitor", "plan", "plot", "dashboard"],
+    [
+        "fit",
+        "diagnose",
+        "predict",
+        "export",
+        "import",
+        "record",
+        "upload",
+        "monitor",
+        "plan",
+        "plot",
+        "dashboard",
+        "couplings",
+        "sweep",
+    ],
 )
 def test_help_says_what_it_does_with_an_example(command: str) -> None:
     runner = CliRunner()

@@ -85,8 +85,22 @@ def test_what_is_there_is_not_done_again(tmp_path: Path, client: Any) -> None:
     (tmp_path / "out" / "points" / "00000000-00000000.part").write_text("half a file")
     assert swept(client, spec, tmp_path / "out").equals(whole)
     assert all(part.stat().st_mtime_ns == at for part, at in kept.items())
+    held = Results(tmp_path / "out", spec)
+    assert held.open().all()
+    with pytest.raises(InputError, match="another sweep is writing"):
+        Results(tmp_path / "out", spec).open()
+    held.lock.close()
     with pytest.raises(InputError, match="another spec"):
         Results(tmp_path / "out", spec_of(tmp_path, GRID.replace("0.1", "0.2"))).open()
+
+
+def test_numbers_are_of_one_kind_in_every_file(tmp_path: Path) -> None:
+    spec = spec_of(tmp_path, f"[sweep]\n{SHORT}[vary]\npitch_mm = [5, 6.5]\nsize = [1, 2]\n")
+    results = Results(tmp_path / "out", spec)
+    results.open()
+    for index, one in enumerate(spec.all_points()):
+        results.add([point.run_point(spec, index, one)])
+    assert results.read()["pitch_mm"].tolist() == [5.0, 5.0, 6.5, 6.5]
 
 
 def test_lost_workers_lose_nothing(tmp_path: Path, client: Any) -> None:

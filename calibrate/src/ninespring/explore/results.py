@@ -6,6 +6,7 @@ its point's number and seed. A point that is in a file is done: that is all that
 
 from __future__ import annotations
 
+import fcntl
 import json
 import os
 from collections.abc import Sequence
@@ -36,6 +37,11 @@ class Results:
         if self.folder.exists() and not self.folder.is_dir():
             raise InputError("is a file; give a folder", self.folder)
         self.points.mkdir(parents=True, exist_ok=True)
+        self.lock = (self.folder / "lock").open("w")
+        try:
+            fcntl.flock(self.lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            raise InputError("another sweep is writing into this folder", self.folder) from None
         kept = self.folder / "spec.json"
         if kept.exists():
             before = json.loads(kept.read_text())

@@ -195,7 +195,8 @@ class _Reader:
     def value(self, key: str, value: Any) -> Any:
         if key in WORDS:
             return self.word(value, WORDS[key], key)
-        return self.number(value, *LIMITS[key], key, key in WHOLE)
+        number = self.number(value, *LIMITS[key], key, key in WHOLE)
+        return number if key in WHOLE else float(number)  # 5 and 6.5 are of one kind, in every file
 
     def table(self, name: str) -> dict[str, Any]:
         part = self.data.get(name, {})

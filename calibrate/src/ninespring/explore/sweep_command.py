@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import time
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -80,31 +81,29 @@ def _run(spec: Any, results: Any, done: Any, scheduler: str | None, workers: int
     from .sweep import local_cluster
     from .sweep import sweep as run
 
-    cluster = None if scheduler else local_cluster(workers)
-    try:
-        client = Client(scheduler or cluster, timeout=CONNECT_S)
-    except (OSError, ValueError) as error:
-        raise WorkError(f"no Dask scheduler at {scheduler}: {error}") from None
-    with (
-        client,
-        Progress(
-            TextColumn("points"),
-            BarColumn(),
-            MofNCompleteColumn(),
-            TimeElapsedColumn(),
-            TextColumn("left"),
-            TimeRemainingColumn(),
-            console=err,
-            disable=not err.is_terminal,
-        ) as progress,
-    ):
+    with ExitStack() as stack:
+        where = scheduler or stack.enter_context(local_cluster(workers))
+        try:
+            client = stack.enter_context(Client(where, timeout=CONNECT_S))
+        except (OSError, ValueError) as error:
+            raise WorkError(f"no Dask scheduler at {scheduler}: {error}") from None
         if not client.nthreads():
-            client.wait_for_workers(1, timeout=CONNECT_S)
+            raise WorkError(f"the Dask scheduler at {scheduler} has no workers: dask worker {scheduler}")
+        progress = stack.enter_context(
+            Progress(
+                TextColumn("points"),
+                BarColumn(),
+                MofNCompleteColumn(),
+                TimeElapsedColumn(),
+                TextColumn("left"),
+                TimeRemainingColumn(),
+                console=err,
+                disable=not err.is_terminal,
+            )
+        )
         out.print(f"Dask's dashboard: {client.dashboard_link}", soft_wrap=True, markup=False)
         task = progress.add_task("points", total=spec.points, completed=int(done.sum()))
         run(client, spec, results, done, lambda count: progress.update(task, completed=count))
-    if cluster is not None:
-        cluster.close()
 
 
 def _evaluate(spec: Any, table: Any, output: Path) -> dict[str, Any]:
