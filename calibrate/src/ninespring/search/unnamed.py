@@ -373,7 +373,8 @@ def find(problem: Problem, fit: Fit, kinds: Sequence[Cause], already: Sequence[H
     found = list(already)
     samples = problem.count / fit_factor(problem, fit)
     single = [one for one in kinds if not one.edges and not one.spans]
-    often = [one for one in kinds if one.spans]
+    known = {one.text for one in already}
+    often = [one for one in kinds if one.spans and one.text not in known]
     windows = [one for one in kinds if one.edges]
     matrix = np.column_stack([one.columns[:, 0] for one in single])
     whole = (matrix**2).sum(axis=0)

@@ -32,6 +32,8 @@ from .residual import depends_on
 from .result import DRIFT_LEFT_OUT, model_of, parameters_of
 
 SCHEMA = "ninespring.diagnosis/1"
+MOST_OF_IT = 0.5
+"""Part of what is beyond the noise without an effect that it explains, where more is explained than left."""
 PINNED = 1e-5
 """Spread, in a number's inner coordinate, that leaves it where it is."""
 
@@ -255,7 +257,9 @@ def _diagnose(
         effect: witness(problem, final, effect, other, found.is_flexible(final, effect) and not guessed)
         for effect, other in without.items()
     }
-    doubtful = [effect for effect, one in witnesses.items() if one.probability() < NAMED]
+    # beside causes without a name that leave structure themselves, a name must explain more than it leaves
+    least = MOST_OF_IT if hidden and unexplained(problem, final) else 0.0
+    doubtful = [effect for effect, one in witnesses.items() if one.probability() < NAMED or one.share < least]
     if doubtful:
         # judged together, beside one another: what one of them stood in for does not count against the rest
         for effect in doubtful:
