@@ -5,24 +5,25 @@
 #define QUIET_K     0.08f /* a turn's: 0.3 K/s */
 #define QUIET_TURNS 40    /* 10 s: the average has settled */
 #define LINE_SHARE                                                                                 \
-    (1.0f / 240.0f)            /* of a turn, 60 s: what the line follows is no loss of phase       \
-                                */
-#define LOSS_LEAST     0.0012f /* of the resistance: what a sensor's steps leave in the average */
-#define NOISE_IN_SLOW  0.18f   /* of one turn's: sqrt(share / (2 - share)) */
-#define SURE_SDS       5.0f
-#define SUSPECTED      0.6f /* of what is sure */
-#define OTHER_WAY      3.0f /* times as much: an intermediate phase, where drifts go either way */
-#define CONFIRM_TURNS  2
-#define LASTING_TURNS  60    /* 15 s of suspicion are as sure */
-#define LARGE_LOSS     0.04f /* no hold drifts so far: the transformation may have moved */
-#define LARGE_SD_K     5.0f
-#define CROSSING_SD_K  1.0f
-#define APART_PER_A    1.0f    /* between two currents, as of 3 and 0.75 A */
-#define OFFSET_LEAST_V 0.0005f /* what a turn's steps of 4 mV leave, and its noise */
-#define OFFSET_SDS     3.0f
-#define OFFSET_MOST_V  0.012f
-#define STILL_K        0.5f  /* below where it would be seen */
-#define COSINE_BEGINS  0.64f /* 2 / pi: x where a cosine has sqrt(lost) = (pi / 2) x */
+    (1.0f / 240.0f)             /* of a turn, 60 s: what the line follows is no loss of phase      \
+                                 */
+#define LOSS_LEAST      0.0012f /* of the resistance: what a sensor's steps leave in the average */
+#define NOISE_IN_SLOW   0.18f   /* of one turn's: sqrt(share / (2 - share)) */
+#define SURE_SDS        5.0f
+#define SUSPECTED       0.85f /* of what is sure: 3 sqrt(2) of 5, as the line is an average, too */
+#define SUSPECTED_ROUGH 0.6f  /* 3 of 5: of a line of one turn */
+#define OTHER_WAY       3.0f  /* times as much: an intermediate phase, where drifts go either way */
+#define CONFIRM_TURNS   2
+#define LASTING_TURNS   60    /* 15 s of suspicion are as sure */
+#define LARGE_LOSS      0.04f /* no hold drifts so far: the transformation may have moved */
+#define LARGE_SD_K      5.0f
+#define CROSSING_SD_K   1.0f
+#define APART_PER_A     1.0f    /* between two currents, as of 3 and 0.75 A */
+#define OFFSET_LEAST_V  0.0005f /* what a turn's steps of 4 mV leave, and its noise */
+#define OFFSET_SDS      3.0f
+#define OFFSET_MOST_V   0.012f
+#define STILL_K         0.5f  /* below where it would be seen */
+#define COSINE_BEGINS   0.64f /* 2 / pi: x where a cosine has sqrt(lost) = (pi / 2) x */
 
 /* Where it is on its way down, having lost so much: the beginning of the cosine, (1 - cos pi x)
  * / 2. */
@@ -155,10 +156,11 @@ void spring_holding_watch(const spring_estimator_t *e, spring_belief_t *b, therm
     const float moves = fabsf(b->learnt.martensite_rise_per_k) * sd_k;
     const float noise = b->rough ? b->noise : NOISE_IN_SLOW * b->noise;
     float sure = fmaxf(fmaxf(LOSS_LEAST, moves), SURE_SDS * noise);
-    if (changed >= SUSPECTED * sure) { /* as a rule not: two divisions are saved */
+    const float suspected = b->rough ? SUSPECTED_ROUGH : SUSPECTED;
+    if (changed >= suspected * sure) { /* as a rule not: two divisions are saved */
         sure += may_move(b, now_c);
     }
-    if (changed < SUSPECTED * sure) {
+    if (changed < suspected * sure) {
         b->losing = 0;
         if (b->quiet >= QUIET_TURNS) {
             if (b->rough) { /* it has come to rest */
@@ -174,5 +176,6 @@ void spring_holding_watch(const spring_estimator_t *e, spring_belief_t *b, therm
     if ((changed > sure && b->losing >= CONFIRM_TURNS) || b->losing >= LASTING_TURNS) {
         see_crossing(e, b, model, k, changed / fabsf(b->learnt.change));
         spring_begin_line(b, spring_now_c(model, k));
+        b->rough = true; /* the average still falls after the phase: anew when it is at rest */
     }
 }
