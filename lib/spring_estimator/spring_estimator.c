@@ -359,9 +359,8 @@ void spring_keep_above(const spring_estimator_t *e, spring_belief_t *b, thermal_
         correct_loss(e, b, less_w_per_k);
         b->kept_w_per_k += less_w_per_k;
         if (fabsf(b->kept_w_per_k) > SPRING_ESTIMATOR_BOUND_SDS * sqrtf(b->loss_variance)) {
-            /* it cannot lose so little: what is read is not its phase, and taught nothing */
-            correct_loss(e, b, -b->kept_w_per_k);
-            b->kept_w_per_k = 0.0f;
+            /* it hardly can lose so little: what is read may not be its phase. If it is, the loss is
+             * right, and the declared one would overheat it: it stays. */
             b->blind = true;
             b->lost = 1.0f;
         }
