@@ -358,7 +358,8 @@ void spring_keep_above(const spring_estimator_t *e, spring_belief_t *b, thermal_
         const float less_w_per_k = b->covariance / distance_k2(b) * error_k;
         correct_loss(e, b, less_w_per_k);
         b->kept_w_per_k += less_w_per_k;
-        if (fabsf(b->kept_w_per_k) > SPRING_ESTIMATOR_BOUND_SDS * sqrtf(b->loss_variance)) {
+        const float sds = SPRING_ESTIMATOR_BOUND_SDS;
+        if (b->kept_w_per_k * b->kept_w_per_k > sds * sds * b->loss_variance) {
             /* it hardly can lose so little: what is read may not be its phase. If it is, the loss is
              * right, and the declared one would overheat it: it stays. */
             b->blind = true;

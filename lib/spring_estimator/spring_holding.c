@@ -67,12 +67,12 @@ static void see_crossing(const spring_estimator_t *e, spring_belief_t *b, therma
 }
 
 /* The current has dropped, the spring is what it was a moment ago: what reads otherwise is the
- * sensor's offset. */
-static void learn_offset(spring_belief_t *b, float now_c)
+ * sensor's offset. Returns whether this turn told one. */
+static bool learn_offset(spring_belief_t *b, float now_c)
 {
     const float apart_per_a = 1.0f / b->current_a - b->line_per_a;
     if (apart_per_a < APART_PER_A) {
-        return;
+        return false;
     }
     const float apart_a = 1.0f / apart_per_a;
     const float moved_v = COEFFICIENT_MOST_PER_K * (now_c - b->line_c) * b->line_ohm * apart_a;
@@ -82,13 +82,14 @@ static void learn_offset(spring_belief_t *b, float now_c)
     const float gain = prior_v2 / (prior_v2 + read_v2);
     const float more_v = gain * (b->ohm - b->line_ohm) * apart_a;
     if (fabsf(b->offset_v + more_v) > OFFSET_MOST_V) {
-        return; /* no offset is so large */
+        return false; /* no offset is so large */
     }
     b->offset_v += more_v;
     b->offset_sd_v = sqrtf(gain * read_v2);
     b->line_ohm -= more_v * b->line_per_a;
     b->learnt.austenite_ohm = b->doubted ? b->learnt.austenite_ohm : b->line_ohm;
     b->seen = true; /* it is acted on in the next turn */
+    return true;
 }
 
 /* By how much the resistance may have left its line with the phase kept: its temperature moves it,
@@ -139,8 +140,8 @@ void spring_holding_watch(const spring_estimator_t *e, spring_belief_t *b, therm
             return;
         }
         spring_begin_line(b, now_c);
-    } else if (b->quiet == 0 && b->offset_sd_v > OFFSET_LEAST_V) {
-        learn_offset(b, now_c);
+    } else if (b->quiet == 0 && b->offset_sd_v > OFFSET_LEAST_V && learn_offset(b, now_c)) {
+        return;
     }
     const float kept_ohm =
         b->line_ohm * (1.0f + b->learnt.martensite_rise_per_k * (now_c - b->line_c));
