@@ -57,13 +57,13 @@ SECTIONS: tuple[Section, ...] = (
     Section(
         "worlds",
         "Worlds that are not as declared: the first start ever",
-        f"{HOST}/bench/worlds/bench_worlds --seed 2026",
+        f"{HOST}/bench/worlds/bench_worlds --seed 2027",
         markdown=True,
     ),
     Section(
         "worlds_learnt",
         "Worlds that are not as declared: later starts",
-        f"{HOST}/bench/worlds/bench_worlds --seed 2026 --learnt",
+        f"{HOST}/bench/worlds/bench_worlds --seed 2027 --learnt",
         markdown=True,
     ),
     Section("replay", "Measured logs through the on-chip model", f"{PYTHON} script/replay_fit.py"),

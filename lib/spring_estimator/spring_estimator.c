@@ -19,21 +19,21 @@
 #define JUMP_OF_LOAD 0.08f /* 16 K at once, latent heat kept: 40 % of the phase */
 #define JUMP_SDS     5.0f
 
-#define CAPACITY_SD     0.09f   /* of a declared heat capacity: 15 %, uniform */
-#define LOSS_SD         0.12f   /* of a declared loss: 20 % */
-#define LOSS_MOST       0.45f   /* of the declared loss: no more is ever believed */
-#define LOSS_DRIFT_SD   0.0005f /* of the declared loss, in a second: 3 % in an hour */
-#define LOSS_DRIFT      (SPRING_ESTIMATOR_TURN_S * LOSS_DRIFT_SD * LOSS_DRIFT_SD)
-#define NEIGHBOUR_SD    0.15f /* of the rise of a spring that its neighbours heat */
-#define SHIFT_SD_K      3.0f  /* of declared transformation temperatures */
-#define SHIFT_MOST_K    30.0f
-#define TRUST_SD_K      5.0f    /* of ambient, or of what a reset has kept */
-#define LEAST_SD_K      0.6f    /* parts of one spring differ by so much */
-#define UNIFORM_SD      0.29f   /* of a width */
-#define OFFSET_SD_V     0.005f  /* 8 mV, and 5 mA in 0.2 ohm: evenly */
-#define OFFSET_AGAIN_V  0.001f  /* by the next hold it may have moved by so much */
-#define LEAST_LOSS      0.8f    /* of a declared loss: with it the hottest possible spring cools */
-#define FORGETS         0.9998f /* a turn's: a disturbance is forgotten within 20 minutes */
+#define CAPACITY_SD    0.09f   /* of a declared heat capacity: 15 %, uniform */
+#define LOSS_SD        0.12f   /* of a declared loss: 20 % */
+#define LOSS_MOST      0.45f   /* of the declared loss: no more is ever believed */
+#define LOSS_DRIFT_SD  0.0005f /* of the declared loss, in a second: 3 % in an hour */
+#define LOSS_DRIFT     (SPRING_ESTIMATOR_TURN_S * LOSS_DRIFT_SD * LOSS_DRIFT_SD)
+#define NEIGHBOUR_SD   0.15f /* of the rise of a spring that its neighbours heat */
+#define SHIFT_SD_K     3.0f  /* of declared transformation temperatures */
+#define SHIFT_MOST_K   30.0f
+#define TRUST_SD_K     5.0f    /* of ambient, or of what a reset has kept */
+#define LEAST_SD_K     0.6f    /* parts of one spring differ by so much */
+#define UNIFORM_SD     0.29f   /* of a width */
+#define OFFSET_SD_V    0.005f  /* 8 mV, and 5 mA in 0.2 ohm: evenly */
+#define OFFSET_AGAIN_V 0.001f  /* by the next hold it may have moved by so much */
+#define LEAST_LOSS     0.8f    /* of a declared loss: with it the hottest possible spring cools */
+#define FORGETS        0.9998f /* a turn's: a disturbance is forgotten within 20 minutes */
 
 #define TRUST_STILL_SDS 0.7f /* where the transformation may never show: probably over */
 #define TRUST_ONSET_SDS 1.3f /* where its beginning was seen: certainly, but for 10 % */
@@ -360,8 +360,8 @@ void spring_keep_above(const spring_estimator_t *e, spring_belief_t *b, thermal_
         b->kept_w_per_k += less_w_per_k;
         const float sds = SPRING_ESTIMATOR_BOUND_SDS;
         if (b->kept_w_per_k * b->kept_w_per_k > sds * sds * b->loss_variance) {
-            /* it hardly can lose so little: what is read may not be its phase. If it is, the loss is
-             * right, and the declared one would overheat it: it stays. */
+            /* it hardly can lose so little: what is read may not be its phase. If it is, the loss
+             * is right, and the declared one would overheat it: it stays. */
             b->blind = true;
             b->lost = 1.0f;
         }

@@ -57,24 +57,24 @@ typedef struct {
     float shift_k;
     float shift_variance_k2;
     float declared_stiffness_w_per_k; /* what 1 K more of this spring gives off */
-    int32_t extra_loss_uw;   /* what it loses beyond the model, now */
-    float disturbance_k;     /* how far it was found from where it was believed, lately */
-    float hottest_c;         /* while nothing is known: the most that it can be by now */
-    float kept_w_per_k;      /* taken off the loss since it was last seen, as nothing was seen */
-    float lost;              /* phase lost since it had transformed, 0..1 */
-    uint8_t possible;        /* SPRING_PHASE_ bits */
-    uint8_t fresh;           /* turns with readings since current flows, saturating */
-    uint8_t quiet;           /* turns in which its temperature hardly moved, saturating */
-    uint8_t losing;          /* turns on end in which it seems to lose phase */
-    bool doubted;            /* its last heating ended before its resistance said so */
-    bool odd;                /* the turn before read what no phase changes to so fast */
-    bool reads;              /* the last turn had readings fit for use */
-    bool seen;               /* the last turn has moved it to where it was seen */
-    bool blind;              /* a heating that must have transformed it did not show */
-    bool heating;            /* between spring_estimator_begin_heating and _begin_hold */
-    bool onset;              /* this heating was seen to begin to transform it */
-    bool rough;              /* the line is of one turn, not of the average */
-    bool steep;              /* and its resistance still changes as only that explains */
+    int32_t extra_loss_uw;            /* what it loses beyond the model, now */
+    float disturbance_k;              /* how far it was found from where it was believed, lately */
+    float hottest_c;                  /* while nothing is known: the most that it can be by now */
+    float kept_w_per_k; /* taken off the loss since it was last seen, as nothing was seen */
+    float lost;         /* phase lost since it had transformed, 0..1 */
+    uint8_t possible;   /* SPRING_PHASE_ bits */
+    uint8_t fresh;      /* turns with readings since current flows, saturating */
+    uint8_t quiet;      /* turns in which its temperature hardly moved, saturating */
+    uint8_t losing;     /* turns on end in which it seems to lose phase */
+    bool doubted;       /* its last heating ended before its resistance said so */
+    bool odd;           /* the turn before read what no phase changes to so fast */
+    bool reads;         /* the last turn had readings fit for use */
+    bool seen;          /* the last turn has moved it to where it was seen */
+    bool blind;         /* a heating that must have transformed it did not show */
+    bool heating;       /* between spring_estimator_begin_heating and _begin_hold */
+    bool onset;         /* this heating was seen to begin to transform it */
+    bool rough;         /* the line is of one turn, not of the average */
+    bool steep;         /* and its resistance still changes as only that explains */
     spring_learnt_t learnt;
 
     /* the running turn's readings */
