@@ -46,6 +46,8 @@ GUARDED = {
     ("_ZN18Adafruit_I2CDevice8detectedEv", "_ZN18Adafruit_I2CDevice8detectedEv"),  # begin() put into it
     ("__fp_splitA", "__fp_splitA"),
 }
+# The same of a routine that is entered by either label: it jumps back behind the call, never to it.
+ENTERED_BY_BOTH = {("__mulsf3", "__mulsf3x")}
 
 
 @dataclass
@@ -170,6 +172,8 @@ def _deepest(nodes: dict[str, Node], start: str) -> tuple[int, list[str]]:
         for callee in node.calls:
             if (name, callee) in GUARDED:
                 best = max(best, (nodes[callee].own + RETURN_ADDRESS, [callee]))
+                continue
+            if callee in path and (name, callee) in ENTERED_BY_BOTH:
                 continue
             if callee in path:
                 raise ValueError(f"recursion: {' > '.join(path)} > {callee}: its stack has no bound")
