@@ -40,22 +40,23 @@
 
 #define EXPLAINED_LEAST 0.005f /* of a resistance: what a sensor's steps leave in one turn */
 
-#define PHASE_SD       0.02f
-#define PHASE_READ_SD  0.08f /* by its own resistances */
-#define PHASE_ONE_SD   0.12f /* by one of its own, the other declared */
-#define PHASE_BLIND_SD 0.3f
-#define LOOK_SD        0.12f /* by resistances that were learnt at another current */
-#define LOOK_SDS       3.0f
-#define LOOK_MOST      0.4f
-#define LOOK_TURNS     3
+#define LOOK_SD    0.12f /* by resistances that were learnt at another current */
+#define LOOK_SDS   3.0f
+#define LOOK_MOST  0.4f
+#define LOOK_TURNS 3
 
-#define LEARNT_AT_C      20.0f
 #define LEARNT_OHM_LEAST 0.01f
 #define LEARNT_OHM_MOST  16.0f
 
-static float clamp(float value, float low, float high)
+float spring_clamp(float value, float low, float high)
 {
     return value < low ? low : value > high ? high : value;
+}
+
+spring_bounds_t spring_around(float value, float sd)
+{
+    const float most = SPRING_ESTIMATOR_BOUND_SDS * sd;
+    return (spring_bounds_t){value, value - most, value + most};
 }
 
 float spring_c(int16_t temperature_c7)
@@ -65,7 +66,7 @@ float spring_c(int16_t temperature_c7)
 
 static int16_t as_c7(float temperature_c)
 {
-    return (int16_t)(clamp(temperature_c, -40.0f, 215.0f) * 128.0f);
+    return (int16_t)(spring_clamp(temperature_c, -40.0f, 215.0f) * 128.0f);
 }
 
 float spring_now_c(const thermal_model_t *model, uint8_t k)
@@ -323,7 +324,7 @@ static float predict(const spring_estimator_t *e, spring_belief_t *b, const ther
 static void correct_loss(const spring_estimator_t *e, spring_belief_t *b, float more_w_per_k)
 {
     const float most = LOSS_MOST * e->loss_w_per_k;
-    b->learnt.loss_w_per_k = clamp(b->learnt.loss_w_per_k + more_w_per_k, -most, most);
+    b->learnt.loss_w_per_k = spring_clamp(b->learnt.loss_w_per_k + more_w_per_k, -most, most);
 }
 
 float spring_see(const spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model, uint8_t k,
@@ -337,8 +338,8 @@ float spring_see(const spring_estimator_t *e, spring_belief_t *b, thermal_model_
     spring_set_temperature(model, k, seen_c - left * error_k, from);
     b->last_c = spring_now_c(model, k);
     b->seen = true;
-    b->shift_k = clamp(b->shift_k - fminf(b->shift_variance_k2 * per_total, gain) * error_k,
-                       -SHIFT_MOST_K, SHIFT_MOST_K);
+    b->shift_k = spring_clamp(b->shift_k - fminf(b->shift_variance_k2 * per_total, gain) * error_k,
+                              -SHIFT_MOST_K, SHIFT_MOST_K);
     correct_loss(e, b, by_loss * error_k);
     b->kept_w_per_k = 0.0f;
     b->loss_variance -= by_loss * b->covariance;
@@ -596,12 +597,6 @@ float spring_estimator_cooling_s(const spring_estimator_t *e, const thermal_mode
                logf((left_c - ambient_c) / (finish_c - ambient_c));
 }
 
-static spring_bounds_t around(float value, float sd)
-{
-    const float most = SPRING_ESTIMATOR_BOUND_SDS * sd;
-    return (spring_bounds_t){value, value - most, value + most};
-}
-
 spring_bounds_t spring_estimator_temperature_c(const spring_estimator_t *e,
                                                const thermal_model_t *model, uint8_t k)
 {
@@ -615,91 +610,15 @@ spring_bounds_t spring_estimator_temperature_c(const spring_estimator_t *e,
         const float neighbours_k = NEIGHBOUR_SD * (now_c - spring_ambient_c(model));
         others_k2 = TRUST_SD_K * TRUST_SD_K + neighbours_k * neighbours_k;
     }
-    return around(now_c, sqrtf(distance_k2(b) + others_k2));
+    return spring_around(now_c, sqrtf(distance_k2(b) + others_k2));
 }
 
 spring_bounds_t spring_estimator_distance_k(const spring_estimator_t *e,
                                             const thermal_model_t *model, uint8_t k)
 {
     const int16_t start_c7 = thermal_model_transformation(model, k).martensite_start_c7;
-    return around(spring_c((int16_t)(thermal_model_temperature_c7(model, k) - start_c7)),
-                  spring_estimator_sd_k(&e->spring[k]));
-}
-
-/* What the phase is told by: the best that there is. */
-typedef enum { BY_MODEL, BY_LOSS, BY_RESISTANCE, BY_MARTENSITE } phase_source_t;
-
-static phase_source_t phase_source(const spring_belief_t *b)
-{
-    if (b->possible == SPRING_PHASE_AUSTENITE) {
-        return BY_LOSS;
-    }
-    if (b->possible == SPRING_PHASE_MARTENSITE || !spring_estimator_sees(b)) {
-        return BY_MODEL;
-    }
-    if (b->possible != SPRING_PHASE_ANY && b->learnt.austenite_ohm > 0.0f) {
-        return BY_RESISTANCE;
-    }
-    return b->possible != SPRING_PHASE_ANY && b->learnt.martensite_ohm > 0.0f ? BY_MARTENSITE
-                                                                              : BY_MODEL;
-}
-
-/* Its own martensite's, at its temperature. */
-static float martensite_ohm_now(const spring_belief_t *b, const thermal_model_t *model, uint8_t k)
-{
-    const spring_learnt_t *l = &b->learnt;
-    return l->martensite_ohm *
-           (1.0f + l->martensite_rise_per_k * (spring_now_c(model, k) - LEARNT_AT_C));
-}
-
-float spring_estimator_phase(const spring_estimator_t *e, const thermal_model_t *model, uint8_t k)
-{
-    const spring_belief_t *b = &e->spring[k];
-    const spring_learnt_t *l = &b->learnt;
-    switch (phase_source(b)) {
-    case BY_LOSS:
-        return clamp(1.0f - b->lost, 0.0f, 1.0f);
-    case BY_RESISTANCE:
-        return clamp(1.0f - (1.0f - b->phase_ohm / l->austenite_ohm) / l->change, 0.0f, 1.0f);
-    case BY_MARTENSITE:
-        return clamp((1.0f - martensite_ohm_now(b, model, k) / b->phase_ohm) / l->change, 0.0f,
-                     1.0f);
-    case BY_MODEL:
-        break;
-    }
-    return (float)thermal_model_austenite(model, k) * (1.0f / 32768.0f);
-}
-
-static float phase_sd(const spring_estimator_t *e, const thermal_model_t *model, uint8_t k)
-{
-    const spring_belief_t *b = &e->spring[k];
-    switch (phase_source(b)) {
-    case BY_LOSS:
-        return b->blind ? PHASE_BLIND_SD : PHASE_SD;
-    case BY_RESISTANCE:
-        return PHASE_READ_SD;
-    case BY_MARTENSITE:
-        return PHASE_ONE_SD;
-    case BY_MODEL:
-        break;
-    }
-    const int16_t start_c7 = thermal_model_transformation(model, k).austenite_start_c7;
-    return b->possible == SPRING_PHASE_MARTENSITE &&
-                   spring_estimator_temperature_c(e, model, k).high < spring_c(start_c7)
-               ? PHASE_SD
-               : PHASE_BLIND_SD;
-}
-
-spring_bounds_t spring_estimator_austenite(const spring_estimator_t *e,
-                                           const thermal_model_t *model, uint8_t k)
-{
-    const float value = spring_estimator_phase(e, model, k);
-    const spring_belief_t *b = &e->spring[k];
-    if (b->possible == SPRING_PHASE_ANY && phase_source(b) == BY_MODEL) {
-        return (spring_bounds_t){value, 0.0f, 1.0f};
-    }
-    const spring_bounds_t bounds = around(value, phase_sd(e, model, k));
-    return (spring_bounds_t){value, clamp(bounds.low, 0.0f, 1.0f), clamp(bounds.high, 0.0f, 1.0f)};
+    return spring_around(spring_c((int16_t)(thermal_model_temperature_c7(model, k) - start_c7)),
+                         spring_estimator_sd_k(&e->spring[k]));
 }
 
 uint32_t spring_estimator_model_power_uw(const spring_estimator_t *e, uint8_t k, uint32_t power_uw)

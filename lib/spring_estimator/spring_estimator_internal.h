@@ -16,6 +16,11 @@
 /* A reading at less is coarse: 4 mV are 3 % of its voltage. */
 #define STRONG_A 0.8f
 
+#define LEARNT_AT_C 20.0f /* a learnt martensite's resistance is that at this temperature */
+
+float spring_clamp(float value, float low, float high);
+/* The value with its bounds, SPRING_ESTIMATOR_BOUND_SDS either way. */
+spring_bounds_t spring_around(float value, float sd);
 float spring_now_c(const thermal_model_t *model, uint8_t spring);
 float spring_ambient_c(const thermal_model_t *model);
 

@@ -47,7 +47,7 @@ static void see_onset(const spring_estimator_t *e, spring_belief_t *b, thermal_m
             l->martensite_rise_per_k =
                 fminf(fmaxf(rise_per_k, -COEFFICIENT_MOST_PER_K), COEFFICIENT_MOST_PER_K);
             l->martensite_ohm =
-                b->cold_ohm / (1.0f + l->martensite_rise_per_k * (b->cold_c - 20.0f));
+                b->cold_ohm / (1.0f + l->martensite_rise_per_k * (b->cold_c - LEARNT_AT_C));
         }
         const int16_t start_c7 = thermal_model_transformation(model, k).austenite_start_c7;
         (void)spring_see(e, b, model, k, spring_c(start_c7) + ONSET_K, PLACE_SD_K,
