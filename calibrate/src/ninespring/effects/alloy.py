@@ -6,28 +6,30 @@ from ..fit.spec import Free
 from .effect import Scene
 
 VARIANT = "alloy as found"
-SHIFT, HYSTERESIS, WIDTH = "alloy_shift_k", "hysteresis_change_k", "transformation_width_change_k"
+SHIFT, HYSTERESIS = "alloy_shift_k", "hysteresis_change_k"
+HEATING, COOLING = "heating_width_change_k", "cooling_width_change_k"
+STILL = {HYSTERESIS: 0.0, HEATING: 0.0, COOLING: 0.0}
+"""All but where it transforms, as declared."""
 FARTHEST_K = 45.0
 STEP_K = 5.0
 """Places of the transformation that are tried: half its usual width apart."""
 
 
 def numbers(scene: Scene) -> tuple[Free, ...]:
-    """Return the alloy's three numbers, all 0 where it is as declared."""
+    """Return the alloy's numbers, all 0 where it is as declared."""
     get = scene.declared
     gap = get("austenite_start_c") - get("martensite_start_c")
-    narrowest = min(
-        get("austenite_finish_c") - get("austenite_start_c"), get("martensite_start_c") - get("martensite_finish_c")
-    )
+    heating = get("austenite_finish_c") - get("austenite_start_c")
+    cooling = get("martensite_start_c") - get("martensite_finish_c")
     start, finish = ("austenite_start_c", "martensite_start_c"), ("austenite_finish_c", "martensite_finish_c")
     everything = tuple((name, 1.0) for name in (*start, *finish))
     opened = tuple((name, 0.5 if name.startswith("austenite") else -0.5) for name in (*start, *finish))
-    widened = (("austenite_finish_c", 1.0), ("martensite_finish_c", -1.0))
     # what is believed before: batches and loads shift a declared alloy by some 15 K, its shape by a third of that
     return (
         Free(SHIFT, 0.0, -FARTHEST_K, FARTHEST_K, "K", (), False, scale=3.0, shifts=everything, prior=5.0),
         Free(HYSTERESIS, 0.0, 0.1 - gap, 40.0, "K", (), False, scale=2.0, shifts=opened, prior=2.5),
-        Free(WIDTH, 0.0, 0.5 - narrowest, 25.0, "K", (), False, scale=2.0, shifts=widened, prior=2.5),
+        Free(HEATING, 0.0, 0.5 - heating, 40.0, "K", (), False, scale=2.0, shifts=(("austenite_finish_c", 1.0),), prior=2.5),
+        Free(COOLING, 0.0, 0.5 - cooling, 40.0, "K", (), False, scale=2.0, shifts=(("martensite_finish_c", -1.0),), prior=2.5),
     )
 
 

@@ -13,11 +13,10 @@ def _candidates(scene: Scene) -> Iterator[Candidate]:
         yield Candidate("", (linear(NAME, 0.0, 200.0, 5.0, 5.0),), ({NAME: 5.0},), most=6.0)
     if places := alloy.places(scene):
         size = 16.0 * scene.declared("heat_capacity_j_per_k")  # as the paper's spring has it
-        still = {alloy.HYSTERESIS: 0.0, alloy.WIDTH: 0.0}
         yield Candidate(
             alloy.VARIANT,
             (linear(NAME, 0.0, 200.0, size, size), *alloy.numbers(scene)),
-            tuple({NAME: size, alloy.SHIFT: shift} | still for shift in places),
+            tuple({NAME: size, alloy.SHIFT: shift} | alloy.STILL for shift in places),
             most=6.0,
             alternatives=True,
         )

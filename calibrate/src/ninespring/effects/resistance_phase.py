@@ -21,11 +21,10 @@ def _candidates(scene: Scene) -> Iterator[Candidate]:
             more_starts=({name: 0.85 * martensite}, {name: 1.25 * martensite}),
         )
     if places := alloy.places(scene):
-        still = {alloy.HYSTERESIS: 0.0, alloy.WIDTH: 0.0}
         yield Candidate(
             alloy.VARIANT,
             (number, *alloy.numbers(scene)),
-            tuple({name: 1.15 * martensite, alloy.SHIFT: shift} | still for shift in places),
+            tuple({name: 1.15 * martensite, alloy.SHIFT: shift} | alloy.STILL for shift in places),
             signed=True,
             neutral=martensite,
             alternatives=True,

@@ -126,8 +126,8 @@ class Fit:
     """Plain sum of squared residuals in units of the noise."""
     factor: float = math.nan
     """Samples per independent sample of the residual, where it has been computed."""
-    innovation: float = math.nan
-    """Variance of the residual's innovations, where it has been computed."""
+    colour: np.ndarray | None = None
+    """Autoregression of the residual, where it has been computed."""
     holdout: float = math.nan
     """Held-out rms error, degC, where it has been computed."""
     simulations: int = 0

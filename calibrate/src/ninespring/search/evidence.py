@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from scipy.signal import lfilter
 
 from ..fit import statistics
 from ..fit.problem import Problem
@@ -18,30 +19,50 @@ UNEXPLAINED_LOCAL = 1.0
 """The same for one spring of one run, where the two laws of a phase change may differ for a while."""
 
 
+LAGS = 6
+"""Of the autoregression that stands for a residual's colour."""
+
+
 def log_evidence(problem: Problem, better: Fit, other: Fit) -> float:
     """Return by how many nats the data prefer `better`: half the difference of BIC, autocorrelation accounted for.
 
-    Two accounts, the clearer one counts. Slow structure: residuals at their effective sample size. Fast structure:
-    the innovations of an autoregression of each residual, which are nearly independent whatever remains slow.
+    Two accounts, the clearer one counts. Slow structure: residuals at their effective sample size. Everything faster:
+    generalised least squares. What `better` leaves tells the noise's colour, as an autoregression; both residuals are
+    whitened by it. A thermometer that wanders then says little of what is slow, and no less of what is quick.
     """
     factor = fit_factor(problem, better)
     n = better.count / factor
     k = len(better.spec.free) - len(better.stuck) - (len(other.spec.free) - len(other.stuck))
     slow = 0.5 * n * math.log(max(other.chi2, 1e-12) / max(better.chi2, 1e-12)) - 0.5 * k * math.log(max(n, 2.0))
-    ratio = innovation(problem, other) / innovation(problem, better)
-    fast = 0.5 * better.count * math.log(max(ratio, 1e-12)) - 0.5 * k * math.log(better.count)
-    return max(slow, fast) if better.chi2 <= other.chi2 else slow
+    if better.chi2 > other.chi2:
+        return slow
+    colour = coefficients(problem, better)
+    left, would_be_left = innovations(problem, better, colour), innovations(problem, other, colour)
+    spread = max(1e-12, left / better.count)
+    whitened = 0.5 * (would_be_left - left) / spread - 0.5 * k * math.log(better.count)
+    return max(slow, whitened)
 
 
-def innovation(problem: Problem, fit: Fit) -> float:
-    """Return the variance of a residual's innovations, in units of the noise^2 (Yule-Walker, six lags)."""
-    if not math.isfinite(fit.innovation):
-        scaled = [left / noise for left, noise in zip(fit.residual, problem.noise, strict=True)]
-        rho = statistics.autocorrelation(scaled, 6)
-        matrix = rho[np.abs(np.arange(6)[:, None] - np.arange(6))] + 1e-6 * np.eye(6)
-        share = float(rho[1:] @ np.linalg.solve(matrix, rho[1:]))
-        fit.innovation = fit.sse / fit.count * max(1e-6, 1.0 - share)
-    return fit.innovation
+def _in_noise(problem: Problem, fit: Fit) -> list[np.ndarray]:
+    return [np.nan_to_num(left / noise) for left, noise in zip(fit.residual, problem.noise, strict=True)]
+
+
+def coefficients(problem: Problem, fit: Fit) -> np.ndarray:
+    """Return the autoregression of a fit's residual, (LAGS,): least squares over all runs and springs."""
+    if fit.colour is None:
+        normal, moment = np.eye(LAGS), np.zeros(LAGS)
+        for one in _in_noise(problem, fit):
+            before = np.stack([one[LAGS - k : len(one) - k].ravel() for k in range(1, LAGS + 1)])
+            normal += before @ before.T
+            moment += before @ one[LAGS:].ravel()
+        fit.colour = np.linalg.solve(normal, moment)
+    return fit.colour
+
+
+def innovations(problem: Problem, fit: Fit, colour: np.ndarray) -> float:
+    """Return the sum of squares of a fit's residual, in units of the noise, whitened by an autoregression."""
+    filtered = [lfilter(np.concatenate(([1.0], -colour)), [1.0], one, axis=0) for one in _in_noise(problem, fit)]
+    return sum(float((one[LAGS:] ** 2).sum()) for one in filtered)
 
 
 def fit_factor(problem: Problem, fit: Fit) -> float:
