@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 
 import numpy as np
@@ -167,8 +168,30 @@ def test_evidence_prices_numbers_and_counts_correlated_samples_for_less(make_log
     better.chi2, better.sse = 0.9 * base.chi2, 0.9 * base.sse
     white = evidence.log_evidence(problem, better, base)
     better.factor = 20.0
-    better.innovation = evidence.innovation(problem, base)
     assert 0 < evidence.log_evidence(problem, better, base) < 0.2 * white
+
+
+def test_a_thermometer_that_wanders_says_less_of_what_is_slow_than_of_what_is_quick(make_log) -> None:
+    """Of two causes that leave as much behind, the quick one is clear where the slow one is the thermometer's own way."""
+    problem = Problem(Array(), [read_log(make_log(seed=2))])
+    base = diagnosis.first_fit(problem, base_spec(problem))
+    rows = len(problem.runs[0].time_s)
+    rng = np.random.default_rng(3)
+    wander = 0.3 * np.cumsum(rng.standard_normal((rows, 9)), axis=0)
+    time_s = np.arange(rows)[:, None]
+
+    def evidence_for(signal: np.ndarray) -> float:
+        fits = [copy.copy(base), copy.copy(base)]
+        for fit, left in zip(fits, (wander, wander + signal), strict=True):
+            fit.residual, fit.factor, fit.colour = [left], math.nan, None
+            fit.chi2 = fit.sse = problem.plain(fit.residual)
+        fits[1].chi2 = fits[1].sse = 1.05 * fits[0].chi2
+        return evidence.log_evidence(problem, fits[0], fits[1])
+
+    slow, quick = np.sin(2 * np.pi * time_s / 1200.0), np.sin(2 * np.pi * time_s / 12.0)
+    assert evidence_for(np.broadcast_to(quick, wander.shape)) > 5.0 * abs(
+        evidence_for(np.broadcast_to(slow, wander.shape))
+    )
 
 
 def test_only_what_the_noise_of_a_first_reading_leaves_is_taken_away(make_log) -> None:

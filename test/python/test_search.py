@@ -192,7 +192,8 @@ def test_a_forecast_keeps_to_what_is_physical(plain: search.Search) -> None:
 
 def test_an_effect_that_explains_less_than_half_the_noise_is_not_worth_it(plain: search.Search) -> None:
     better = copy.copy(plain.base)
-    better.innovation = 0.5 * evidence.innovation(plain.problem, plain.base)  # statistical evidence without end
+    better.residual = [0.5 * left for left in plain.base.residual]  # statistical evidence without end
+    better.colour = None
     for share, worth in ((0.3, False), (0.5, True)):
         better.sse = plain.base.sse - share**2 * plain.base.count
         better.chi2 = plain.base.chi2 - share**2 * plain.base.count

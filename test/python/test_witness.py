@@ -15,7 +15,7 @@ from ninespring.fit.spec import Fit
 from ninespring.logs import log_text, read_log
 from ninespring.models import Array
 from ninespring.search import certainty
-from ninespring.verdict import diagnosis, resistance, unknown_heat
+from ninespring.verdict import contacts, diagnosis, resistance, unknown_heat
 
 ROWS = 700
 Change = Callable[[np.ndarray], None]
@@ -101,6 +101,28 @@ def test_a_contact_that_gets_worse_is_told_with_its_spring_time_and_size(tmp_pat
     contacts = [one for one in second["effects"] if one["name"] == "contact_resistance"]
     assert len(contacts) == 1 and contacts[0]["variant"].startswith("spring 5, from 3")
     assert contacts[0]["parameters"]["contact_ohm[5]"]["value"] == pytest.approx(0.008, rel=0.15)
+
+
+def test_a_contact_that_comes_and_goes_is_told_each_time_and_its_heat_taken_out(tmp_path: Path) -> None:
+    def loose(ohm: np.ndarray) -> None:
+        ohm[220:450, 4] += 0.008
+
+    problem, fit = array_log(tmp_path / "log.csv", ohms=loose)
+    second = resistance.witness(problem, fit)
+    assert second is not None
+    steps = second["contacts"]
+    assert [one.spring for one in steps] == [4, 4]
+    assert [one.ohm for one in steps] == pytest.approx([0.008, -0.008], rel=0.1)
+    run = problem.runs[0]
+    current = run.current_a
+    assert current is not None
+    before = run.drive.copy()
+    contacts.take_heat_out(problem, steps)
+    taken = before - problem.runs[0].drive
+    assert np.delete(taken, 4, axis=1).max() == 0.0
+    within = slice(int(steps[0].from_s), int(steps[1].from_s))
+    assert taken[within, 4] == pytest.approx(current[within, 4] ** 2 * steps[0].ohm, rel=1e-9)
+    assert np.abs(taken[int(steps[1].from_s) :, 4]).max() < 0.1 * taken[within, 4].max()
 
 
 def test_a_resistance_that_rises_with_temperature_is_told(tmp_path: Path) -> None:

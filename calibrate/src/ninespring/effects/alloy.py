@@ -28,8 +28,30 @@ def numbers(scene: Scene) -> tuple[Free, ...]:
     return (
         Free(SHIFT, 0.0, -FARTHEST_K, FARTHEST_K, "K", (), False, scale=3.0, shifts=everything, prior=5.0),
         Free(HYSTERESIS, 0.0, 0.1 - gap, 40.0, "K", (), False, scale=2.0, shifts=opened, prior=2.5),
-        Free(HEATING, 0.0, 0.5 - heating, 40.0, "K", (), False, scale=2.0, shifts=(("austenite_finish_c", 1.0),), prior=2.5),
-        Free(COOLING, 0.0, 0.5 - cooling, 40.0, "K", (), False, scale=2.0, shifts=(("martensite_finish_c", -1.0),), prior=2.5),
+        Free(
+            HEATING,
+            0.0,
+            0.5 - heating,
+            40.0,
+            "K",
+            (),
+            False,
+            scale=2.0,
+            shifts=(("austenite_finish_c", 1.0),),
+            prior=2.5,
+        ),
+        Free(
+            COOLING,
+            0.0,
+            0.5 - cooling,
+            40.0,
+            "K",
+            (),
+            False,
+            scale=2.0,
+            shifts=(("martensite_finish_c", -1.0),),
+            prior=2.5,
+        ),
     )
 
 

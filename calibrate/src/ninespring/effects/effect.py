@@ -83,8 +83,6 @@ class Scene:
     duration_s: float
     knots: Mapping[str, tuple[int, ...]]
     """Per kind of drift, how many knots each run has."""
-    ambient_logged: tuple[bool, ...]
-    """Of each run, whether its ambient was logged."""
     declared: Callable[[str], float]
     """What the declared array has for a parameter of the plant."""
 
@@ -117,7 +115,6 @@ def scene_of(problem: Problem) -> Scene:
         float(np.median(np.diff(runs[0].time_s))),
         max(run.duration_s for run in runs),
         {key: tuple(one.shape[1] for one in hats) for key, hats in problem.hats.items()},
-        tuple(run.ambient_c is not None for run in runs),
         problem.base_value,
     )
 

@@ -127,8 +127,6 @@ class Problem:
         ambient = run.ambient_c
         if ambient is None and constant is not None:
             ambient = np.full(len(run.time_s), constant)
-        if offset := values.get(f"ambient_offset_k@{run_index + 1}"):
-            ambient = (np.full(len(run.time_s), self._base.get("ambient_c")) if ambient is None else ambient) + offset
         for name, hats in self.hats.items():
             prefix = f"{name}@{run_index + 1}."
             drift = [values.get(f"{prefix}{k}", 0.0) for k in range(1, hats[run_index].shape[1] + 1)]

@@ -27,7 +27,7 @@ from ..models import Array, Model
 from ..search import search, unnamed
 from ..search.certainty import CERTAIN, NAMED, witness
 from ..search.evidence import EQUIVALENT, difference, excess, log_evidence, unexplained
-from . import experiments, plausibility, resistance, unknown_heat
+from . import contacts, experiments, plausibility, resistance, unknown_heat
 from .residual import depends_on
 from .result import DRIFT_LEFT_OUT, model_of, parameters_of
 
@@ -245,6 +245,13 @@ def _diagnose(
     base = first_fit(problem, spec)
     found = search.Search(problem, [c for c in known if c.effect not in spec.effects], base, progress)
     final, without, contenders = found.run()
+    progress("what v / i says")
+    if steps := (resistance.witness(problem, final) or {}).get("contacts"):
+        # v i is measured with the contact: its heat is not the spring's, and everything is looked for again without it
+        contacts.take_heat_out(problem, steps)
+        base = first_fit(problem, spec)
+        found = search.Search(problem, found.candidates, base, progress)
+        final, without, contenders = found.run()
     hidden: list[unnamed.Hidden] = []
     if unexplained(problem, final) and (beside := unnamed.search_beside(problem, found, final)):
         found, (final, without, contenders), hidden = beside
@@ -342,7 +349,11 @@ def _diagnose(
         "unexplained": bool(left_over),
         "unknown_heat": heat.as_dict(),
         "unnamed": [one.as_dict() for one in hidden],
-        **({"resistance": {key: one for key, one in second.items() if key != "effects"}} if second else {}),
+        **(
+            {"resistance": {key: one for key, one in second.items() if key not in ("effects", "contacts")}}
+            if second
+            else {}
+        ),
         "residual": {
             "autocorrelation_lag1": float(np.clip(rho[1], -1.0, 1.0)),
             "structure_c": math.sqrt(excess(problem, final)) * problem.noise_c,

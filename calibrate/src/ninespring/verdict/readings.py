@@ -1,0 +1,129 @@
+"""v / i of every spring in rows: the readings that tell a resistance, and linear fits of them.
+
+A reading counts where the spring is driven and settled in one phase; how hot it was the thermometers say, not the fit.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pandas as pd
+from scipy.ndimage import maximum_filter1d, minimum_filter1d
+
+from ..fit import statistics
+from ..fit.problem import Problem
+from ..fit.simulate import simulate_run
+from ..fit.spec import Fit
+
+DRIVEN_A = 0.2
+"""Currents from which v / i is a measurement of resistance, not of the sensor's offset."""
+REFERENCE_C = 20.0
+"""Temperature of the declared resistances."""
+BELIEVED_RISE = 0.001
+"""Per K: what NiTi's resistance rises by, about, in either phase."""
+SETTLED = 0.02
+NEAR_S = 15.0
+"""A reading counts where austenite moves by less than SETTLED within NEAR_S before and after."""
+SMOOTHED = 5
+"""Readings of a thermometer that are taken together for a spring's temperature."""
+SEEN = 30
+"""Readings in each phase from which two resistances are told apart, and before and after a contact changed."""
+
+
+@dataclass
+class Readings:
+    """v / i of all runs in rows: what was read, of which spring, at which phase and temperature."""
+
+    ohm: np.ndarray
+    spring: np.ndarray
+    run: np.ndarray
+    time_s: np.ndarray
+    phase: np.ndarray
+    over_k: np.ndarray
+    noise: np.ndarray
+    """Of each row, ohm."""
+
+
+def readings(problem: Problem, fit: Fit) -> Readings | None:
+    """Return the readings of runs whose currents and voltages are known; None where there are none."""
+    parts = []
+    for r, run in enumerate(problem.runs):
+        if run.current_a is None or run.voltage_v is None:
+            continue
+        traced = _as_measured(problem, fit, r)
+        driven = run.current_a > DRIVEN_A
+        width = 1 + 2 * max(1, round(NEAR_S / float(np.median(np.diff(run.time_s)))))
+        ohm = np.where(driven, run.voltage_v / np.where(driven, run.current_a, 1.0), np.nan)
+        noise = statistics.noise_floor(ohm, run.starts)
+        for k in range(run.springs):
+            # on the way between the phases the model's part of austenite is no better than its temperature
+            moving = maximum_filter1d(traced[:, k, 1], width) - minimum_filter1d(traced[:, k, 1], width) > SETTLED
+            between = (traced[:, k, 1] > SETTLED) & (traced[:, k, 1] < 1.0 - SETTLED)
+            here = np.flatnonzero(driven[:, k] & ~moving & ~between)
+            if len(here) >= 20 and np.isfinite(noise[k]):
+                n = len(here)
+                columns = (ohm[here, k], np.full(n, k), np.full(n, r), run.time_s[here])
+                # what a volt's and an ampere's last digit leave is noise as well
+                sigma = np.full(n, max(noise[k], 1e-4 * float(np.median(ohm[here, k]))))
+                parts.append((*columns, traced[here, k, 1], traced[here, k, 0] - REFERENCE_C, sigma))
+    if not parts:
+        return None
+    return Readings(*(np.concatenate([part[j] for part in parts]) for j in range(7)))
+
+
+def _as_measured(problem: Problem, fit: Fit, r: int) -> np.ndarray:
+    """Return temperatures and austenite of a run, (rows, springs, 2), springs as hot as the thermometers say.
+
+    What heat the model has wrong, as that of a contact which is measured with its spring, is in neither.
+    """
+    run = problem.runs[r]
+    ambient = problem.ambient_of(r, fit.as_dict())
+    traced = simulate_run(problem.plant_for(fit.spec, fit.values), run, ambient, {}, trace=True)
+    left = pd.DataFrame(fit.residual[r]).rolling(SMOOTHED, center=True, min_periods=1).mean().fillna(0.0).to_numpy()
+    hot = np.clip(traced[:, :, 0] + left, -60.0, 500.0)
+    given = replace(run, mode="temperature", drive=hot, warm=False, starts=[0])
+    return simulate_run(problem.plant_for(fit.spec, fit.values), given, ambient, {}, trace=True)
+
+
+@dataclass
+class Linear:
+    """A weighted linear fit."""
+
+    names: list[str]
+    values: np.ndarray
+    covariance: np.ndarray
+    chi2: float
+    rest: np.ndarray
+
+    @property
+    def spread(self) -> float:
+        """Mean square of what is left, in units of the noise, 1 at least."""
+        return max(1.0, self.chi2 / max(1, len(self.rest) - len(self.values)))
+
+
+def solve(read: Readings, columns: dict[str, np.ndarray]) -> Linear:
+    """Fit; rises with temperature are believed to be within BELIEVED_RISE beforehand."""
+    matrix = np.column_stack(list(columns.values())) / read.noise[:, None]
+    wanted = read.ohm / read.noise
+    usual = BELIEVED_RISE * float(np.median(read.ohm))
+    trust = np.array([1.0 / usual**2 if key.startswith("rise") else 0.0 for key in columns])
+    scale = np.maximum(np.linalg.norm(matrix, axis=0), 1e-12)
+    normal = (matrix / scale).T @ (matrix / scale) + np.diag(trust / scale**2)
+    inverse = np.linalg.pinv(normal, rcond=1e-10)
+    values = inverse @ ((matrix / scale).T @ wanted) / scale
+    rest = wanted - matrix @ values
+    chi2 = float(rest @ rest)
+    found = Linear(list(columns), values, inverse, chi2, rest)
+    found.covariance = inverse * found.spread / np.outer(scale, scale)
+    return found
+
+
+def nats_of(read: Readings, less: Linear, more: Linear) -> float:
+    """Return by how much the larger model is likelier: half the difference of BIC, correlated rows counted for less."""
+    rest = more.rest
+    rho = float(rest[1:] @ rest[:-1] / max(1e-12, rest @ rest))
+    n = len(rest) * max(0.02, (1.0 - max(0.0, rho)) / (1.0 + max(0.0, rho)))
+    gained = 0.5 * n * math.log(max(less.chi2, 1e-9) / max(more.chi2, 1e-9))
+    return gained - 0.5 * (len(more.values) - len(less.values)) * math.log(max(2.0, n))
