@@ -415,12 +415,12 @@ class Search:
                     current = fit
         return current
 
-    def run(self) -> tuple[Fit, dict[str, Fit], list[tuple[str, Fit]]]:
-        """Search upwards, and where structure remains downwards too.
+    def run(self, downwards: bool = True) -> tuple[Fit, dict[str, Fit], list[tuple[str, Fit]]]:
+        """Search upwards, and where structure remains downwards too, if wanted.
 
         Return the chosen fit, the fits without each effect, and the contenders.
         """
         found = self.forward(self.base)
-        if excess(self.problem, found) >= MIN_GAIN**2:
+        if downwards and excess(self.problem, found) >= MIN_GAIN**2:
             found = self.forward(self.downward(found))
         return self.settle(found)
