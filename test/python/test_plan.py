@@ -24,7 +24,7 @@ def driven(steps: list[Step], springs: int, duration_s: float, current_a: float)
         if word[0] == "fan":
             fan[at:] = float(word[1]) / 100
         elif word[0] == "on":
-            current[at:, int(word[1]) - 1] = float(word[2]) / 100 * current_a
+            current[at:, slice(None) if word[1] == "all" else int(word[1]) - 1] = float(word[2]) / 100 * current_a
         elif word[0] == "off":
             current[at:, slice(None) if word[1] == "all" else int(word[1]) - 1] = 0.0
     return current, fan
@@ -46,6 +46,21 @@ def test_a_plan_keeps_the_limits_and_drives_every_spring(rows: int, cols: int, s
     plant.reset()
     shown = plant.simulate(np.arange(900.0), native.CURRENT, current, fan, np.full(900, 20.0))
     assert 98.0 < shown.max() <= 105.0
+
+
+def test_without_a_thermometer_every_spring_crosses_often_and_none_is_ever_without_a_current() -> None:
+    made = plan.make_plan(Array(), 1800.0, 2.6, 14.0, 105.0, board_alone=True)
+    current, fan = driven(script_lines("\n".join(made.steps), "steps.txt", 1800.0), 9, 1800, 2.6)
+    assert current[1:].min() > 0.2 and current.sum(axis=1).max() <= 14.0
+    plant = native.Plant(3, 3)
+    plant.set_effects(["latent_heat", "resistance_phase"])
+    plant.reset()
+    traced = plant.trace(np.arange(1800.0), native.CURRENT, current, fan, np.full(1800, 20.0))
+    for blown in (False, True):
+        phase = traced[(fan > 0.5) == blown, :, 1]
+        crossings = (np.abs(np.diff((phase > 0.5).astype(int), axis=0))).sum(axis=0)
+        assert crossings.min() >= 4, f"up and down twice, fan {blown}"
+    assert traced[:, :, 0].max() <= 105.0
 
 
 def test_what_was_planned_identifies_the_array(tmp_path: Path) -> None:

@@ -1,12 +1,14 @@
 """A steps.txt that identifies an array: every spring on and off at its own times and levels, within the limits.
 
 What a fit needs: each spring heats while its neighbours do and while they do not, at more than one level, some beyond the
-transformation; the fan blows for a part; at the end everything cools. What the array stands: the supply's current, the
+transformation; the fan blows for a part; at the end everything cools. Without a thermometer v / i tells all, and tells nothing
+without a current: then a spring that rests keeps a little, and every turn crosses the transformation. What the array stands: the supply's current, the
 springs' temperature, as the declared array's simulation has it.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -22,8 +24,12 @@ LEVELS = (100, 100, 75, 50)
 """Percent of the current; full level half of the time, for only that transforms."""
 SHORTEST_S, LONGEST_S = 30.0, 150.0
 """A spring stays on or off for so long: from less to more than a time constant (50 s)."""
-FAN_FROM, FAN_TO, COOL_FROM = 0.45, 0.7, 0.88
+FAN = ((0.45, 0.7),)
+FAN_OFTEN = ((0.15, 0.35), (0.55, 0.75))
+COOL_FROM = 0.88
 """Parts of the duration."""
+RESTING_A = 0.25
+"""A spring's current at rest where v / i is all there is: a quarter more than what v / i is read from."""
 BACK_OFF_S = 5.0
 LEAST_S = 300.0
 FIRST_S = 5.0
@@ -54,15 +60,33 @@ class Plan:
 
 
 def make_plan(
-    array: Array, duration_s: float, current_a: float, supply_a: float, hottest_c: float, seed: int = 1
+    array: Array,
+    duration_s: float,
+    current_a: float,
+    supply_a: float,
+    hottest_c: float,
+    seed: int = 1,
+    board_alone: bool = False,
 ) -> Plan:
-    """Return a plan; `current_a` is a spring's at full level, `supply_a` the most of all, `hottest_c` of any spring."""
+    """Return a plan; `current_a` is a spring's at full level, `supply_a` the most of all, `hottest_c` of any spring.
+
+    `board_alone`: for a recording without any thermometer.
+    """
+    resting = math.ceil(100.0 * RESTING_A / current_a) if board_alone else 0
+    levels, fan = ((100,), FAN_OFTEN) if board_alone else (LEVELS, FAN)
     if duration_s < LEAST_S:
         raise InputError(f"{duration_s:g} s are too short to identify an array: {LEAST_S:g} s or more")
     if supply_a < current_a:
         raise InputError(f"the supply's {supply_a:g} A do not drive one spring with {current_a:g} A")
-    stretches = _stretches(array.springs, duration_s, supply_a / current_a * 100.0, np.random.default_rng(seed))
-    drive, temperature = _simulated(array, stretches, duration_s, current_a)
+    most = supply_a / current_a * 100.0 - resting * array.springs
+    if most < 100.0:
+        raise InputError(f"the supply's {supply_a:g} A do not drive one spring while the others keep {RESTING_A:g} A")
+    stretches = _stretches(array.springs, duration_s, most, levels, np.random.default_rng(seed))
+
+    def simulated() -> tuple[np.ndarray, np.ndarray]:
+        return _simulated(array, stretches, duration_s, current_a, resting, fan)
+
+    drive, temperature = simulated()
     for _ in range(20 * len(stretches)):
         rows, springs = np.nonzero(temperature > hottest_c)
         if not rows.size:
@@ -73,14 +97,14 @@ def make_plan(
         guilty = max(on, key=lambda one: (one.spring == k, one.end_s >= row, one.level))
         guilty.end_s = min(guilty.end_s, float(row)) - BACK_OFF_S
         stretches = [one for one in stretches if one.end_s - one.begin_s >= BACK_OFF_S]
-        drive, temperature = _simulated(array, stretches, duration_s, current_a)
+        drive, temperature = simulated()
     else:
         raise InputError(f"no plan keeps the springs below {hottest_c:g} degC with {current_a:g} A: lower the current")
     return Plan(
-        steps=_lines(stretches, duration_s, current_a),
+        steps=_lines(array.springs, stretches, duration_s, current_a, resting, fan),
         hottest_c=float(temperature.max()),
         most_a=float(drive.sum(axis=1).max()),
-        share_on=(drive > 0).mean(axis=0),
+        share_on=(drive > 1.01 * resting / 100.0 * current_a).mean(axis=0),
     )
 
 
@@ -121,7 +145,9 @@ def plan_experiment(
     return Plan(lines, float(temperature.max()), float(drive.sum(axis=1).max()), (drive > 0).mean(axis=0))
 
 
-def _stretches(springs: int, duration_s: float, most: float, rng: np.random.Generator) -> list[Stretch]:
+def _stretches(
+    springs: int, duration_s: float, most: float, levels: tuple[int, ...], rng: np.random.Generator
+) -> list[Stretch]:
     """Return who is driven when; `most` is the sum of levels that the supply gives, percent.
 
     Whoever is due and does not fit waits, and the one that was driven least goes first.
@@ -133,7 +159,7 @@ def _stretches(springs: int, duration_s: float, most: float, rng: np.random.Gene
     for now in range(int(end_of_heating - SHORTEST_S)):
         taken = sum(one.level for one in out if one.end_s > now)
         for k in sorted(np.flatnonzero(due_s <= now), key=lambda k: on_s[k]):
-            level = LEVELS[(k + turns[k]) % len(LEVELS)]
+            level = levels[(k + turns[k]) % len(levels)]
             if taken + level > most:
                 continue
             end = min(now + round(rng.uniform(SHORTEST_S, LONGEST_S)), end_of_heating)
@@ -146,13 +172,20 @@ def _stretches(springs: int, duration_s: float, most: float, rng: np.random.Gene
 
 
 def _simulated(
-    array: Array, stretches: list[Stretch], duration_s: float, current_a: float
+    array: Array,
+    stretches: list[Stretch],
+    duration_s: float,
+    current_a: float,
+    resting: int,
+    blows: tuple[tuple[float, float], ...],
 ) -> tuple[np.ndarray, np.ndarray]:
     time_s = np.arange(0.0, duration_s)
-    drive = np.zeros((len(time_s), array.springs))
+    drive = np.full((len(time_s), array.springs), resting / 100.0 * current_a)
     for one in stretches:
         drive[(time_s >= one.begin_s) & (time_s < one.end_s), one.spring] = one.level / 100.0 * current_a
-    fan = ((time_s >= FAN_FROM * duration_s) & (time_s < FAN_TO * duration_s)).astype(float)
+    fan = np.zeros(len(time_s))
+    for begin, end in blows:
+        fan[(time_s >= begin * duration_s) & (time_s < end * duration_s)] = 1.0
     return drive, _temperatures(array, drive, fan)
 
 
@@ -167,14 +200,24 @@ def _temperatures(array: Array, drive: np.ndarray, fan: np.ndarray) -> np.ndarra
     return plant.simulate(time_s, native.CURRENT, drive, fan, ambient)
 
 
-def _lines(stretches: list[Stretch], duration_s: float, current_a: float) -> list[str]:
-    events: list[tuple[float, int, str]] = [
-        (round(FAN_FROM * duration_s), 0, "fan 100"),
-        (round(FAN_TO * duration_s), 0, "fan 0"),
-        (round(COOL_FROM * duration_s), 2, "off all"),
-    ]
+def _lines(
+    springs: int,
+    stretches: list[Stretch],
+    duration_s: float,
+    current_a: float,
+    resting: int,
+    blows: tuple[tuple[float, float], ...],
+) -> list[str]:
+    events: list[tuple[float, int, str]] = []
+    for begin, end in blows:
+        events += [(round(begin * duration_s), 0, "fan 100"), (round(end * duration_s), 0, "fan 0")]
     for one in stretches:
-        events.append((one.end_s, 0, f"off {one.spring + 1}"))
+        rest = f"on {one.spring + 1} {resting}" if resting else f"off {one.spring + 1}"
+        events.append((one.end_s, 0, rest))
         events.append((one.begin_s, 1, f"on {one.spring + 1} {one.level}"))
     head = ["policy open", f"$open_current_a={current_a:.3f}", "fan 0"]
+    if resting:
+        head.append(f"at 0 = on all {resting}")
+    else:
+        events.append((round(COOL_FROM * duration_s), 2, "off all"))
     return head + [f"at {at:g} = {line}" for at, _, line in sorted(events)]

@@ -21,14 +21,23 @@ Examples:
   ninespring plan -o steps.txt
   ninespring plan --array array.toml --supply 10 --duration 1200 -o steps.txt
   ninespring record --port /dev/ttyACM0 --run steps.txt --duration 900 -o board1.csv
+  ninespring plan --no-thermometer -o steps.txt
   ninespring plan --for diagnosis/diagnosis.json -o steps.txt
 """,
 )
 @ARRAY
 @click.option("--for", "diagnosis", type=FILE, help="diagnosis.json: the experiment that it asks for first")
-@click.option("--duration", type=click.FloatRange(1, 36000), default=900.0, show_default=True, help="s")
 @click.option(
-    "--current", type=click.FloatRange(0.1, 3.2), default=2.0, show_default=True, help="A, one spring at full level"
+    "--no-thermometer",
+    "board_alone",
+    is_flag=True,
+    help="for the board's own v and i alone: every turn crosses the transformation, and a little current always flows",
+)
+@click.option("--duration", type=click.FloatRange(1, 36000), help="s  [default: 900; without a thermometer 1800]")
+@click.option(
+    "--current",
+    type=click.FloatRange(0.1, 3.2),
+    help="A, one spring at full level  [default: 2.0; without a thermometer 2.6, to transform in the fan's air too]",
 )
 @click.option(
     "--supply", type=click.FloatRange(0.1, 60), default=14.0, show_default=True, help="A, all springs together"
@@ -45,8 +54,9 @@ Examples:
 def plan(
     array_path: Path | None,
     diagnosis: Path | None,
-    duration: float,
-    current: float,
+    board_alone: bool,
+    duration: float | None,
+    current: float | None,
     supply: float,
     hottest: float,
     seed: int,
@@ -61,17 +71,20 @@ def plan(
     check_folder(output)
     array = read_array(array_path) if array_path else Array()
     head = []
+    duration = duration or (1800.0 if board_alone else 900.0)
+    current = current or (2.6 if board_alone else 2.0)
     if diagnosis:
         asked = asked_for(diagnosis)
         head = [f"# {asked['separating_experiment']}"]
         duration = asked["experiment"]["duration_s"] + 2.0 * FIRST_S
         made = plan_experiment(array, asked["experiment"], supply, hottest, current)
     else:
-        made = make_plan(array, duration, current, supply, hottest, seed)
+        made = make_plan(array, duration, current, supply, hottest, seed, board_alone)
+    thermometers = "" if board_alone else " --thermometers PORT"
     head += [
         f"# {array.rows} x {array.cols} springs, {duration:g} s; at most {made.most_a:.2f} A of {supply:g}, "
         f"{made.hottest_c:.0f} degC of {hottest:g} if the array is as declared",
-        f"# ninespring record --run {output.name} --duration {duration:g} --port PORT --thermometers PORT -o run1.csv",
+        f"# ninespring record --run {output.name} --duration {duration:g} --port PORT{thermometers} -o run1.csv",
     ]
     write({output: "\n".join([*head, *made.steps]) + "\n"})
     beside(output).print(
