@@ -23,16 +23,17 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from cases import REPORTING_SEEDS, SPRINGS, Case, make_case, write_logs
-from ninespring import native
+from cases import REPORTING_SEEDS, SPRINGS, Case, effect_numbers, make_case, write_logs
+from ninespring import native, plan
 from ninespring.export import drive
 from ninespring.export.settings import settings_of
-from ninespring.fit import from_resistance
 from ninespring.fit import problem as fitting
 from ninespring.logs import log_text, read_log
 from ninespring.models import Array, Model
+from ninespring.recording import script_lines
+from ninespring.verdict import board_alone as verdict_of_board
 from ninespring.verdict import diagnosis
-from world import World, random_inputs, simulate
+from world import Inputs, World, random_inputs, simulate
 
 COMMAND = "python bench/diagnose/real_logs.py"
 
@@ -150,8 +151,29 @@ def exported(seed: int) -> dict[str, Any]:
     }
 
 
+SHOWN_BY_BOARD = ("edge_loss", "spring_mismatch", "shared_air", "plate_conduction", "fan_wake", "radiation")
+"""Undeclared effects of the array that may act where nothing but v and i is logged."""
+FULL_A = 2.6
+
+
+def planned(array: Array, seed: int) -> Inputs:
+    """Return what `ninespring plan --no-thermometer` drives an array with, its steps read as the board reads them."""
+    duration_s = 1800
+    current, fan = np.zeros((duration_s, SPRINGS)), np.zeros(duration_s)
+    made = plan.make_plan(array, duration_s, FULL_A, 14.0, 105.0, seed, board_alone=True)
+    for step in script_lines("\n".join(made.steps), "steps.txt", duration_s):
+        at, (word, *rest) = int(step.at_s or 0), step.line.split()
+        if word == "fan":
+            fan[at:] = float(rest[0]) / 100.0
+        elif word == "on":
+            current[at:, slice(None) if rest[0] == "all" else int(rest[0]) - 1] = float(rest[1]) / 100.0 * FULL_A
+    room = np.random.default_rng([seed, 23]).uniform(18.0, 24.0)
+    return Inputs(np.arange(float(duration_s)), current, current / FULL_A, fan, np.full(duration_s, room))
+
+
 def board_alone(seed: int) -> dict[str, Any]:
-    """Fit half an hour of a board's v and i, no thermometer, array +-15 %; return the chip's error in a later drive."""
+    """Diagnose half an hour of a board's v and i, no thermometer, as planned; array +-15 %, every second one with an effect
+    that nothing declares. Return the chip's error in a later drive with settings before and after, and what was named."""
     rng = np.random.default_rng([seed, 19])
     case = make_case("none", (), seed)
     case.columns, case.sensors = "iv", True
@@ -159,18 +181,18 @@ def board_alone(seed: int) -> dict[str, Any]:
     for name in ("heat_capacity", "loss", "loss_fan", "orthogonal", "orthogonal_fan", "diagonal", "diagonal_fan"):
         setattr(world, name, getattr(World(), name) * rng.uniform(0.85, 1.15))
     world.effects = {"latent_heat": {"joule": 8.65 * rng.uniform(0.85, 1.15)}, "resistance_phase": {"ratio": 1.25}}
-    case.runs = [random_inputs(rng, 1800, True), random_inputs(rng, 1800, True)]
-    for run in case.runs:
-        run.current[run.current == 0] = 0.25  # the board's probe: without a current there is no v / i
+    what = SHOWN_BY_BOARD[seed // 2 % len(SHOWN_BY_BOARD)] if seed % 2 else ""
+    if what:
+        world.effects[what] = effect_numbers(what, rng)
+    case.runs = [planned(Array(), seed), random_inputs(rng, 1800, True)]
     truth = simulate(world, case.runs)["shown"][1]
     with tempfile.TemporaryDirectory() as folder:
         paths, _ = write_logs(replace(case, runs=[*case.runs, case.runs[1]]), Path(folder))[:2]
         board, later = (read_log(path, SPRINGS) for path in paths)
     board = replace(board, temperature_c=np.full_like(board.temperature_c, np.nan))
-    problem, found, _ = from_resistance.fit(Array(), [board])
-    lines = settings_of(from_resistance.model_of_fit(problem, found)).lines
+    result, model = verdict_of_board.diagnose(Array(), [board])
     errors = []
-    for settings in ("", lines):
+    for settings in ("", settings_of(model).lines):
         ambient = later.ambient_c
         assert ambient is not None
         first = np.full(SPRINGS, ambient[0])
@@ -179,7 +201,8 @@ def board_alone(seed: int) -> dict[str, Any]:
             settings, (3, 3), later.time_s, native.POWER, later.drive, power, later.fan, ambient, first
         )
         errors.append(float(np.sqrt(np.mean((shown - truth) ** 2))))
-    return {"before": errors[0], "after": errors[1]}
+    names = [e["name"] for e in result["effects"]]
+    return {"what": what, "names": names, "before": errors[0], "after": errors[1], "unexplained": result["unexplained"]}
 
 
 def niti(folder: Path) -> list[dict[str, Any]]:

@@ -265,6 +265,7 @@ def _everywhere(
         out["trend", f"the loss of spring {k + 1} changes over the run"] = _only(k, -lost[:, k] * ramp, springs)
         out["trend", f"the drive of spring {k + 1} changes over the run"] = _only(k, power[:, k] * ramp, springs)
         out["reading", f"thermometer {k + 1} drifts"] = _only(k, ramp, springs)
+        out["heat", f"spring {k + 1} is given heat all the time"] = _only(k, np.ones_like(ramp), springs)
         if springs > 1:
             out["pickup", f"thermometer {k + 1} shows its spring's current"] = _only(k, amperes[:, k], springs)
     return out
@@ -360,7 +361,9 @@ def _least_squares(gram: np.ndarray, moment: np.ndarray) -> tuple[np.ndarray, in
     return vector[:, used] @ ((vector[:, used].T @ (moment / scale)) / value[used]) / scale, int(used.sum())
 
 
-def find(problem: Problem, fit: Fit, kinds: Sequence[Cause], already: Sequence[Hidden]) -> list[Hidden]:
+def find(
+    problem: Problem, fit: Fit, kinds: Sequence[Cause], already: Sequence[Hidden], most: int = MOST
+) -> list[Hidden]:
     """Return the unnamed causes that a fit's residual calls for, beside those that are taken out already.
 
     The best first, while it beats its price and explains a fair share of what is left.
@@ -383,7 +386,7 @@ def find(problem: Problem, fit: Fit, kinds: Sequence[Cause], already: Sequence[H
     power = whole - ((basis.T @ matrix) ** 2).sum(axis=0)
     grams, often_grams = ([_gram(one.columns, basis) for one in some] for some in (windows, often))
     tried = len(single) + sum(one.columns.shape[1] ** 2 / 2 for one in windows)
-    while len(found) < MOST:
+    while len(found) < most:
         gain = np.where(power > 1e-3 * whole, (matrix.T @ left) ** 2 / np.maximum(power, 1e-12), 0.0)
         k = int(np.argmax(gain))
         drop, vector, best, span = float(gain[k]), matrix[:, k], single[k], (0, None)
@@ -459,6 +462,19 @@ def weighed(problem: Problem, fit: Fit, hidden: Sequence[Hidden]) -> list[tuple[
     return out
 
 
+def _alone(problem: Problem, base: Fit, final: Fit) -> Fit | None:
+    """Return the declared model's fit beside the unnamed cause that it calls for, where that one explains more than all the
+    library found: then the library's names may stand in for it. None where it does not.
+    """
+    grown = find(problem, base, library(problem, base), (), most=1)
+    if not grown or len(final.spec.effects) == len(base.spec.effects):
+        return None
+    problem.leave_out(grown[0].column)
+    fit = problem.fit(base.spec, base.as_dict(), tolerance=1e-3, max_steps=14)
+    problem.leave_out(None)
+    return replace(fit, jacobian=None) if fit.sse < final.sse else None
+
+
 def search_beside(
     problem: Problem, first: Search, final: Fit
 ) -> tuple[Search, tuple[Fit, dict[str, Fit], list[tuple[str, Fit]]], list[Hidden]] | None:
@@ -467,6 +483,8 @@ def search_beside(
     The problem leaves the unnamed causes out when this returns.
     """
     first.progress("causes without a name")
+    if (nearer := _alone(problem, first.base, final)) is not None:
+        final = nearer
     kinds = library(problem, final)
     hidden: list[Hidden] = []
     out = taken_out = None
