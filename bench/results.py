@@ -68,13 +68,22 @@ SECTIONS: tuple[Section, ...] = (
     ),
     Section("replay", "Measured logs through the on-chip model", f"{PYTHON} script/replay_fit.py"),
     Section("measured", "Measured data", f"{PYTHON} bench/diagnose/measured.py", json=False, markdown=True),
-    Section("diagnose", "Undeclared effects", f"{PYTHON} bench/diagnose/run.py --seeds 4", markdown=True),
+    Section(
+        "diagnose",
+        "Undeclared effects",
+        f"{PYTHON} bench/diagnose/run.py --seeds 2 --cases build/results/diagnose.json",
+        markdown=True,
+    ),
     Section("closed_forms", "The field against closed forms", f"{PYTHON} bench/explore/closed_forms.py"),
     Section(
         "explore_paper", "The paper's temperatures from geometry", f"{PYTHON} bench/explore/paper.py --mesh coarse"
     ),
     Section("sweep", "Sweeps", f"{PYTHON} bench/explore/sweep.py"),
-    Section("real_logs", "What real logs bring", f"{PYTHON} bench/diagnose/real_logs.py"),
+    Section(
+        "real_logs",
+        "What real logs bring",
+        f"{PYTHON} bench/diagnose/real_logs.py --resume build/results/real_logs.json",
+    ),
 )
 
 

@@ -24,7 +24,7 @@ def rows(paths: list[Path]) -> tuple[np.ndarray, np.ndarray]:
     """Return features (effects, features) and whether each effect was there."""
     features, true = [], []
     for path in paths:
-        for case in json.loads(path.read_text()):
+        for case in json.loads(path.read_text())["cases"].values():
             for one in case["witnesses"]:
                 features.append(list(Witness(**one["witness"]).features().values()))
                 true.append(one["true"])

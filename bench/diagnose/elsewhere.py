@@ -133,7 +133,9 @@ def _run(case: Apart, rng: np.random.Generator, current: np.ndarray, fan: np.nda
             air += STEP_S * (out.sum() - n["air_exchange"] * (air - around)) / n["air_capacity"]
             flow = heat - out + network @ temperature - network.sum(axis=1) * temperature
             if "radiation" in acts:
-                flow = flow - n["emissivity"] * 5.67e-8 * 277e-6 * ((temperature + 273.15) ** 4 - (around + 273.15) ** 4)
+                flow = flow - n["emissivity"] * 5.67e-8 * 277e-6 * (
+                    (temperature + 273.15) ** 4 - (around + 273.15) ** 4
+                )
             if "fan_wake" in acts:
                 upwind = np.where(COLUMN > 0, np.roll(temperature, 1) - around, 0.0)
                 flow = flow + moving * n["wake"] * upwind

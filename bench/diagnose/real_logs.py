@@ -12,6 +12,7 @@ from __future__ import annotations
 import argparse
 import concurrent.futures
 import json
+import math
 import os
 import sys
 import tempfile
@@ -21,16 +22,20 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import elsewhere
 import numpy as np
 import pandas as pd
 from cases import REPORTING_SEEDS, SPRINGS, Case, effect_numbers, make_case, write_logs
+from kept import Kept
 from ninespring import native, plan
 from ninespring.export import drive
 from ninespring.export.settings import settings_of
+from ninespring.fit import from_resistance
 from ninespring.fit import problem as fitting
 from ninespring.logs import log_text, read_log
 from ninespring.models import Array, Model
 from ninespring.recording import script_lines
+from ninespring.search.evidence import excess
 from ninespring.verdict import board_alone as verdict_of_board
 from ninespring.verdict import diagnosis
 from world import Inputs, World, random_inputs, simulate
@@ -154,6 +159,8 @@ def exported(seed: int) -> dict[str, Any]:
 SHOWN_BY_BOARD = ("edge_loss", "spring_mismatch", "shared_air", "plate_conduction", "fan_wake", "radiation")
 """Undeclared effects of the array that may act where nothing but v and i is logged."""
 FULL_A = 2.6
+MATTERS = 0.5
+"""Structure, rms in units of the noise of v / i, from which an effect counts as one that v / i can show."""
 
 
 def planned(array: Array, seed: int) -> Inputs:
@@ -191,6 +198,10 @@ def board_alone(seed: int) -> dict[str, Any]:
         board, later = (read_log(path, SPRINGS) for path in paths)
     board = replace(board, temperature_c=np.full_like(board.temperature_c, np.nan))
     result, model = verdict_of_board.diagnose(Array(), [board])
+    structure = 0.0
+    if what:
+        problem, alone, _ = from_resistance.fit(Array(), [board])
+        structure = math.sqrt(excess(problem, alone))
     errors = []
     for settings in ("", settings_of(model).lines):
         ambient = later.ambient_c
@@ -202,7 +213,25 @@ def board_alone(seed: int) -> dict[str, Any]:
         )
         errors.append(float(np.sqrt(np.mean((shown - truth) ** 2))))
     names = [e["name"] for e in result["effects"]]
-    return {"what": what, "names": names, "before": errors[0], "after": errors[1], "unexplained": result["unexplained"]}
+    return {"what": what, "names": names, "before": errors[0], "after": errors[1], "structure": structure}
+
+
+def apart(seed: int) -> dict[str, Any]:
+    """Diagnose a case of the other world, a known effect beside a cause without a name; every eighth without the known."""
+    known = (*elsewhere.KNOWN, "")[seed % 8]
+    unknown = list(elsewhere.UNKNOWN)[(3 * seed + seed // 8) % len(elsewhere.UNKNOWN)]
+    case = elsewhere.make(seed, known, unknown)
+    runs = []
+    with tempfile.TemporaryDirectory() as folder:
+        for r, log in enumerate(case.logs):
+            path = Path(folder) / f"run{r + 1}.csv"
+            path.write_text(log_text(np.arange(float(len(log["fan"]))), log))
+            runs.append(read_log(path, SPRINGS))
+    begun = time.process_time()
+    result = diagnosis.diagnose(Array(), runs).result
+    names = [e["name"] for e in result["effects"]]
+    said = {"names": names, "rivals": [r["name"] for r in result["rivals"]], "unexplained": result["unexplained"]}
+    return {"known": known, "unknown": unknown, "cpu_s": time.process_time() - begun} | said
 
 
 def niti(folder: Path) -> list[dict[str, Any]]:
@@ -282,6 +311,25 @@ def figures(done: list[dict[str, Any]]) -> list[dict[str, Any]]:
         out.append(row("board alone, no thermometer: the chip's error later, before", before, "K", ""))
         out.append(row("the same, after (median)", after, "K", f"<= {before / 3:.2f}"))
         out.append(percent("the same: at most a third of before", [b["after"] <= b["before"] / 3 for b in boards], ""))
+        shown = [b for b in boards if b["structure"] >= MATTERS]
+        out.append(
+            percent(
+                "the same: an undeclared effect named, where it leaves half the noise in v / i",
+                [b["what"] in b["names"] for b in shown],
+                ">= 80",
+            )
+        )
+        out.append(percent("the same: a false name", [bool(set(b["names"]) - {b["what"]}) for b in boards], ""))
+    if others := part.get("apart"):
+        beside = [o for o in others if o["known"]]
+        out.append(
+            percent("another world: the known effect named", [o["known"] in o["names"] for o in beside], ">= 90")
+        )
+        out.append(percent("another world: flagged unexplained", [o["unexplained"] for o in others], ">= 95"))
+        false = [bool(set(o["names"]) - {o["known"]}) for o in others]
+        out.append(percent("another world: a false name", false, "<= 10"))
+        seconds = [o["cpu_s"] for o in others]
+        out.append(row("another world: a diagnosis, longest", max(seconds), "s of one core", "<= 30"))
     if done_exports := part.get("exported"):
         out.append(percent("export: drive worse than before", [bool(e["worse"]) for e in done_exports], "0"))
         out.append(percent("export: refused", [e["refused"] for e in done_exports], ""))
@@ -301,30 +349,29 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--cases", type=int, default=12, help="of each part")
     parser.add_argument("--first", type=int, default=REPORTING_SEEDS.start)
-    parser.add_argument("--parts", default="unknown_heat,quiet,second_witness,board_alone,exported")
+    parser.add_argument("--parts", default="unknown_heat,quiet,second_witness,board_alone,exported,apart")
     parser.add_argument("--processes", type=int, default=os.cpu_count() or 2)
     parser.add_argument("--json", type=Path)
     parser.add_argument(
-        "--all", type=Path, help="write every case here as it is done; what it has already is not done again"
+        "--resume", type=Path, help="keep each case here; what it has of this very code is not done again"
     )
     options = parser.parse_args()
-    parts = {f.__name__: f for f in (unknown_heat, quiet, second_witness, board_alone, exported)}
+    parts = {f.__name__: f for f in (unknown_heat, quiet, second_witness, board_alone, exported, apart)}
     jobs = [
         (parts[name], seed)
         for name in options.parts.split(",")
         for seed in range(options.first, options.first + options.cases)
     ]
     fitting.WORKERS = 1
-    done = json.loads(options.all.read_text()) if options.all and options.all.exists() else []
-    there = {(one["part"], one["seed"]) for one in done}
-    jobs = [one for one in jobs if (one[0].__name__, one[1]) not in there]
+    kept = Kept(options.resume)
+    wanted = {f"{part.__name__} {seed}": (part, seed) for part, seed in jobs}
     with concurrent.futures.ProcessPoolExecutor(options.processes) as pool:
-        for future in concurrent.futures.as_completed([pool.submit(_all, job) for job in jobs]):
+        todo = {pool.submit(_all, job): key for key, job in wanted.items() if key not in kept.cases}
+        for future in concurrent.futures.as_completed(todo):
             one = future.result()
-            done.append(one)
+            kept.add(todo[future], one)
             print(json.dumps({k: v for k, v in one.items() if k != "events"}), file=sys.stderr, flush=True)
-            if options.all:
-                options.all.write_text(json.dumps(done, indent=1) + "\n")
+    done = [kept.cases[key] for key in wanted]
     out = figures(done)
     private = os.environ.get("NINESPRING_PRIVATE")
     for one in niti(Path(private) / "niti_pulse") if private else []:
@@ -336,6 +383,7 @@ def main() -> int:
                 "<= 0.5",
             )
         )
+    out = [one for one in out if "(0 of 0)" not in one["figure"]]
     for one in out:
         print(f"{one['figure']:90} {one['value']:8} {one['unit']:4} {one['target']}")
     if options.json:
