@@ -52,3 +52,19 @@ def test_nothing_without_a_name_where_the_library_explains_all(make_log) -> None
     runs = [read_log(make_log(f"{seed}.csv", effects=EDGES, seed=seed)) for seed in (3, 4)]
     found = diagnosis.diagnose(Array(), runs).result
     assert found["unnamed"] == [] and not found["unexplained"]
+
+
+def test_a_trickle_of_heat_is_no_thermometer_with_an_offset(make_log) -> None:
+    """What the library would take for a false thermometer is told as what it is, where that explains more."""
+
+    def trickle(columns: dict[str, np.ndarray]) -> None:
+        extra = np.zeros((len(columns["fan"]), 9))
+        extra[:, 3] = 0.06
+        astray(columns, extra)
+
+    runs = [read_log(make_log(f"{seed}.csv", effects=EDGES, seed=seed, change=trickle)) for seed in (3, 4)]
+    found = diagnosis.diagnose(Array(), runs).result
+    assert [one["name"] for one in found["effects"]] == ["edge_loss"] and found["unexplained"]
+    (cause,) = found["unnamed"]
+    assert "spring 4 is given heat all the time" in cause["text"]
+    assert cause["size"] == pytest.approx(0.06, abs=0.005)
