@@ -251,6 +251,7 @@ static void take_reading(spring_belief_t *b, float ohm, float current_a)
 {
     take_noise(b, ohm, current_a);
     b->slow_ohm = b->fresh == 0 ? ohm : b->slow_ohm + (ohm - b->slow_ohm) * SLOW_SHARE;
+    b->slow_a = b->fresh == 0 ? current_a : b->slow_a + (current_a - b->slow_a) * SLOW_SHARE;
     b->current_a = current_a;
     b->ohm = ohm;
     b->phase_ohm = current_a > STRONG_A || b->fresh == 0 ? ohm : b->phase_ohm;
@@ -519,6 +520,15 @@ bool spring_estimator_has_transformed(const spring_estimator_t *e, const thermal
            spring_c(thermal_model_transformation(model, k).austenite_finish_c7);
 }
 
+/* What is known of an austenite's coefficient by its martensite's. */
+static float coefficient_sd_per_k(const spring_learnt_t *l)
+{
+    return (l->martensite_ohm > 0.0f
+                ? COEFFICIENT_BOUND_PER_K + 0.5f * fabsf(l->martensite_rise_per_k)
+                : COEFFICIENT_MOST_PER_K) /
+           SPRING_ESTIMATOR_BOUND_SDS;
+}
+
 void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, uint8_t k,
                                  bool full)
 {
@@ -541,6 +551,11 @@ void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, 
     if (full && !lacks && b->onset && b->reads && b->current_a > STRONG_A) {
         spring_learn_austenite(b); /* hot enough, and its resistance had come to rest */
     }
+    const float rise_sd_per_k = coefficient_sd_per_k(&b->learnt);
+    if (b->rise_sd_per_k == 0.0f || rise_sd_per_k < b->rise_sd_per_k) {
+        b->rise_sd_per_k = rise_sd_per_k; /* until the hold has taught its austenite's own */
+        b->rise_per_k = b->learnt.martensite_rise_per_k;
+    }
     b->heating = false;
     b->kept_w_per_k = 0.0f;
     b->lost = b->doubted ? 1.0f - phase : 0.0f;
@@ -549,6 +564,7 @@ void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, 
     b->line_ohm = 0.0f;
     if (full && b->reads && b->current_a > STRONG_A) {
         b->slow_ohm = b->ohm;
+        b->slow_a = b->current_a;
         spring_begin_line(b, now_c);
         b->rough = true;
         b->offset_sd_v = fmaxf(b->offset_sd_v, OFFSET_AGAIN_V);

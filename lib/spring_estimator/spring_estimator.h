@@ -87,6 +87,7 @@ typedef struct {
     float ohm;
     float ohm_before[2]; /* one and two turns earlier; 0: at another current */
     float slow_ohm;      /* over 4 s */
+    float slow_a;        /* the current over the same */
     float phase_ohm;     /* the last at a strong current: what tells the phase */
     float offset_v;      /* of the sensor: of what is read of the voltage */
     float offset_sd_v;
@@ -107,7 +108,9 @@ typedef struct {
     /* the running hold */
     float line_ohm; /* what it reads while it keeps its phase, at line_c; 0: none yet */
     float line_c;
-    float line_per_a; /* 1 / current of the line */
+    float line_a;     /* current of the line */
+    float rise_per_k; /* what a kelvin adds to it, relative: the austenite's own, once learnt */
+    float rise_sd_per_k;
 } spring_belief_t;
 
 typedef struct {

@@ -11,7 +11,7 @@
 #define COEFFICIENT_MOST_PER_K      0.0015f
 #define COEFFICIENT_MOST_PER_HEAT_K (COEFFICIENT_MOST_PER_K / 0.85f)
 
-#define COEFFICIENT_SD_PER_K 0.00025f /* of one that was learnt: noise and offset over 20 K */
+#define COEFFICIENT_BOUND_PER_K 0.00025f /* of one that was learnt: noise and offset over 20 K */
 
 /* A reading at less is coarse: 4 mV are 3 % of its voltage. */
 #define STRONG_A 0.8f

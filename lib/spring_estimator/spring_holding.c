@@ -22,6 +22,9 @@
 #define OFFSET_LEAST_V  0.0005f /* what a turn's steps of 4 mV leave, and its noise */
 #define OFFSET_SDS      3.0f
 #define OFFSET_MOST_V   0.012f
+#define AWAY_LEAST_K     1.0f    /* less tells nothing of a coefficient */
+/* Of an average: what a sensor's steps leave, LOSS_LEAST / 3, and it tells anew in 2 x 16 turns. */
+#define LINE_VARIANCE    (32.0f * LOSS_LEAST * LOSS_LEAST / 9.0f)
 #define STILL_K         0.5f  /* below where it would be seen */
 #define COSINE_BEGINS   0.64f /* 2 / pi: x where a cosine has sqrt(lost) = (pi / 2) x */
 
@@ -39,7 +42,7 @@ void spring_begin_line(spring_belief_t *b, float now_c)
 {
     b->line_ohm = b->slow_ohm;
     b->line_c = now_c;
-    b->line_per_a = 1.0f / b->current_a;
+    b->line_a = b->slow_a;
     b->rough = false;
     b->losing = 0;
 }
@@ -70,7 +73,7 @@ static void see_crossing(const spring_estimator_t *e, spring_belief_t *b, therma
  * sensor's offset. Returns whether this turn told one. */
 static bool learn_offset(spring_belief_t *b, float now_c)
 {
-    const float apart_per_a = 1.0f / b->current_a - b->line_per_a;
+    const float apart_per_a = 1.0f / b->current_a - 1.0f / b->line_a;
     if (apart_per_a < APART_PER_A) {
         return false;
     }
@@ -86,22 +89,36 @@ static bool learn_offset(spring_belief_t *b, float now_c)
     }
     b->offset_v += more_v;
     b->offset_sd_v = sqrtf(gain * read_v2);
-    b->line_ohm -= more_v * b->line_per_a;
+    b->line_ohm -= more_v / b->line_a;
     b->learnt.austenite_ohm = b->doubted ? b->learnt.austenite_ohm : b->line_ohm;
     b->seen = true; /* it is acted on in the next turn */
     return true;
 }
 
-/* By how much the resistance may have left its line with the phase kept: its temperature moves it,
- * and another current shows another share of the sensor's offset. */
-static float may_move(const spring_belief_t *b, float now_c)
+/* By how much the resistance may have left its line with the phase kept, sure of it at rest: its
+ * temperature moves it, and another current shows another share of the sensor's offset. */
+static float with_moves(const spring_belief_t *b, float sure, float now_c)
 {
-    const spring_learnt_t *l = &b->learnt;
-    const float unsure_per_k = l->martensite_ohm > 0.0f
-                                   ? COEFFICIENT_SD_PER_K + 0.5f * fabsf(l->martensite_rise_per_k)
-                                   : COEFFICIENT_MOST_PER_K;
-    return unsure_per_k * fabsf(now_c - b->line_c) +
-           OFFSET_SDS * b->offset_sd_v * fabsf(1.0f / b->current_a - b->line_per_a) / b->line_ohm;
+    const float moves = SPRING_ESTIMATOR_BOUND_SDS * b->rise_sd_per_k * (now_c - b->line_c);
+    const float offset =
+        OFFSET_SDS * b->offset_sd_v * (1.0f / b->slow_a - 1.0f / b->line_a) / b->line_ohm;
+    return sqrtf(sure * sure + moves * moves + offset * offset);
+}
+
+/* It keeps its phase: the line follows what it reads, and what a moving temperature does to it is
+ * its coefficient. */
+static void follow(spring_belief_t *b, float now_c, float left)
+{
+    const float away_k = now_c - b->line_c;
+    if (fabsf(away_k) > AWAY_LEAST_K && fabsf(left) < LOSS_LEAST) {
+        const float variance = b->rise_sd_per_k * b->rise_sd_per_k;
+        const float gain = variance * away_k / (variance * away_k * away_k + LINE_VARIANCE);
+        b->rise_per_k = spring_clamp(b->rise_per_k + gain * left, -COEFFICIENT_MOST_PER_K,
+                                     COEFFICIENT_MOST_PER_K);
+        b->rise_sd_per_k = sqrtf(variance * (1.0f - gain * away_k));
+    }
+    b->line_ohm += b->line_ohm * left * LINE_SHARE;
+    b->line_c += away_k * LINE_SHARE;
 }
 
 /* Of what the resistance has left its line by, the part that lost phase may explain. */
@@ -134,6 +151,7 @@ void spring_holding_watch(const spring_estimator_t *e, spring_belief_t *b, therm
     if (b->line_ohm == 0.0f) {
         if (b->quiet == 0) {
             b->slow_ohm = b->ohm;
+            b->slow_a = b->current_a;
         }
         if (b->quiet < QUIET_TURNS) {
             b->losing = 0;
@@ -144,9 +162,10 @@ void spring_holding_watch(const spring_estimator_t *e, spring_belief_t *b, therm
         return;
     }
     const float kept_ohm =
-        b->line_ohm * (1.0f + b->learnt.martensite_rise_per_k * (now_c - b->line_c));
+        b->line_ohm * (1.0f + b->rise_per_k * (now_c - b->line_c));
     if (b->quiet == 0 && b->current_a < STRONG_A) { /* on its way to the hold: too weak to tell */
         b->slow_ohm = kept_ohm;
+        b->slow_a = b->line_a;
         b->losing = 0;
         return;
     }
@@ -154,12 +173,12 @@ void spring_holding_watch(const spring_estimator_t *e, spring_belief_t *b, therm
     const float sd_k = spring_estimator_sd_k(b);
     const float changed = as_lost(b, model, k, left, sd_k);
     /* as its temperature may have moved unseen, so may the resistance */
-    const float moves = fabsf(b->learnt.martensite_rise_per_k) * sd_k;
+    const float moves = fabsf(b->rise_per_k) * sd_k;
     const float noise = b->rough ? b->noise : NOISE_IN_SLOW * b->noise;
     float sure = fmaxf(fmaxf(LOSS_LEAST, moves), SURE_SDS * noise);
     const float suspected = b->rough ? SUSPECTED_ROUGH : SUSPECTED;
     if (changed >= suspected * sure) { /* as a rule not: two divisions are saved */
-        sure += may_move(b, now_c);
+        sure = with_moves(b, sure, now_c);
     }
     if (changed < suspected * sure) {
         b->losing = 0;
@@ -167,8 +186,7 @@ void spring_holding_watch(const spring_estimator_t *e, spring_belief_t *b, therm
             if (b->rough) { /* it has come to rest */
                 spring_begin_line(b, now_c);
             }
-            b->line_ohm += b->line_ohm * left * LINE_SHARE;
-            b->line_c += (now_c - b->line_c) * LINE_SHARE;
+            follow(b, now_c, left);
             spring_keep_above(e, b, model, k, lost_at_c(model, k, b->lost) - STILL_K);
         }
         return;

@@ -341,7 +341,7 @@ static void phase_lost_on_the_way_to_the_hold_is_counted(void)
     for (double s = 0.0; s < 60.0 && truth.austenite > 0.8; s += TICK_S) {
         (void)tick(0.9);
     }
-    ticks(1.2, 6.0); /* the average follows */
+    ticks(1.2, 16.0); /* the average follows */
     (void)snprintf(where, sizeof where, "lost %.3f of %.3f", (double)BELIEF.lost,
                    1.0 - truth.austenite);
     TEST_ASSERT_TRUE_MESSAGE(truth.austenite < 0.85, where);
