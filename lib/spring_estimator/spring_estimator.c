@@ -200,8 +200,7 @@ void spring_estimator_disturb(spring_belief_t *b)
     b->ohm_before[1] = 0.0f;
 }
 
-/* All that readings are compared with jumps along. */
-static void jump(spring_belief_t *b, float by)
+void spring_jump(spring_belief_t *b, float by)
 {
     b->line_ohm *= by;
     b->mark_ohm *= by;
@@ -229,7 +228,7 @@ static bool leave_out(spring_belief_t *b, float ohm, float current_a)
     const float most = (by_load ? JUMP_OF_LOAD : JUMP_LEAST) + JUMP_SDS * b->noise;
     const bool jumps = near && fabsf(step) > most * was_ohm;
     if (jumps && b->odd) {
-        jump(b, ohm / was_ohm);
+        spring_jump(b, ohm / was_ohm);
     }
     b->odd = jumps && !b->odd;
     return b->odd;
@@ -492,7 +491,7 @@ void spring_estimator_update(spring_estimator_t *e, thermal_model_t *model, uint
 bool spring_lacks_phase(const spring_belief_t *b, const thermal_model_t *model, uint8_t k)
 {
     const spring_learnt_t *l = &b->learnt;
-    if (!b->reads || b->blind || l->austenite_ohm == 0.0f || b->current_a < STRONG_A) {
+    if (b->fresh == 0 || b->blind || l->austenite_ohm == 0.0f || b->current_a < STRONG_A) {
         return false;
     }
     const int16_t finish_c7 = thermal_model_transformation(model, k).austenite_finish_c7;

@@ -40,6 +40,8 @@ float spring_see(const spring_estimator_t *estimator, spring_belief_t *belief,
 void spring_keep_above(const spring_estimator_t *estimator, spring_belief_t *belief,
                        thermal_model_t *model, uint8_t spring, float limit_c);
 
+/* All that readings are compared with jumps along: a contact, or the sensor. */
+void spring_jump(spring_belief_t *belief, float by);
 /* It reads less than when it had transformed last, and the difference is neither noise nor a
  * temperature coefficient. */
 bool spring_lacks_phase(const spring_belief_t *belief, const thermal_model_t *model,

@@ -16,6 +16,7 @@
 #define PLACE_SD_K     3.0f
 #define SHIFT_BOUND_K  8.0f  /* 2.6 standard deviations of a declared transformation */
 #define CAPACITY_BOUND 1.25f /* the same of a heat capacity */
+#define SAME_CURRENT   0.1f  /* within it a sensor's offset shows alike */
 #define COLD_SPAN_K    20.0f /* least, over which a coefficient is learnt */
 
 void spring_estimator_begin_heating(spring_estimator_t *e, const thermal_model_t *model, uint8_t k)
@@ -106,6 +107,23 @@ static void hold_back(const spring_estimator_t *e, const spring_belief_t *b, the
     }
 }
 
+/* As hot as it may be it has come to its austenite start. */
+static bool may_transform(const spring_belief_t *b, const thermal_model_t *model, uint8_t k)
+{
+    return b->possible != SPRING_PHASE_MARTENSITE ||
+           spring_now_c(model, k) + SPRING_ESTIMATOR_BOUND_SDS * spring_estimator_sd_k(b) >
+               spring_c(thermal_model_transformation(model, k).austenite_start_c7);
+}
+
+/* By as much as a transformation does: one whose change is known, by half of it at least. */
+static bool has_changed(const spring_belief_t *b)
+{
+    const float least = b->learnt.austenite_ohm > 0.0f
+                            ? 0.5f * fabsf(b->learnt.change) * b->begun_missing
+                            : CHANGE_LEAST;
+    return fabsf(b->ohm / b->onset_ohm - 1.0f) > fmaxf(least, CHANGE_LEAST);
+}
+
 /* Change of resistance over heat, a step at a time: more than any temperature coefficient makes is
  * a transformation, whatever its sign. */
 void spring_heating_watch(const spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model,
@@ -119,6 +137,10 @@ void spring_heating_watch(const spring_estimator_t *e, spring_belief_t *b, therm
         b->mark_ohm = 0.0f;
         return;
     }
+    if (b->mark_ohm > 0.0f && fabsf(b->current_a - b->mark_a) > SAME_CURRENT * b->current_a) {
+        b->mark_ohm = b->excess = 0.0f; /* the sensor's offset shows otherwise */
+        b->cold_ohm = b->heat_k < COLD_SPAN_K ? 0.0f : b->cold_ohm;
+    }
     if (b->cold_ohm == 0.0f && b->possible == SPRING_PHASE_MARTENSITE) {
         b->cold_ohm = b->ohm;
         b->cold_c = spring_now_c(model, k);
@@ -129,6 +151,7 @@ void spring_heating_watch(const spring_estimator_t *e, spring_belief_t *b, therm
     b->peak_k = b->heat_k;
     if (b->mark_ohm == 0.0f) {
         b->mark_ohm = b->ohm;
+        b->mark_a = b->current_a;
         b->mark_k = b->heat_k;
         return;
     }
@@ -151,9 +174,14 @@ void spring_heating_watch(const spring_estimator_t *e, spring_belief_t *b, therm
     b->steep = b->onset && fabsf(excess) > STEEP_SDS * b->noise;
     b->flat_k = b->steep || !b->onset ? 0.0f : b->flat_k + step_k;
     if (!b->onset && fabsf(b->excess) > EXCESS_SEEN + EXCESS_SDS * b->noise) {
-        see_onset(e, b, model, k);
-        b->steep = true;
-    } else if (b->flat_k >= FLAT_K && fabsf(b->ohm / b->onset_ohm - 1.0f) > CHANGE_LEAST) {
+        if (may_transform(b, model, k)) {
+            see_onset(e, b, model, k);
+            b->steep = true;
+        } else {
+            spring_jump(b, b->ohm / b->onset_ohm); /* too cold: a contact */
+            b->excess = 0.0f;
+        }
+    } else if (b->flat_k >= FLAT_K && has_changed(b)) {
         see_finish(e, b, model, k);
     }
     b->mark_ohm = b->ohm;
