@@ -502,6 +502,13 @@ bool spring_lacks_phase(const spring_belief_t *b, const thermal_model_t *model, 
     return (l->change < 0.0f ? -less : less) > explained;
 }
 
+static bool surely_finished(const spring_belief_t *b, const thermal_model_t *model, uint8_t k,
+                            float sds)
+{
+    return spring_now_c(model, k) - sds * spring_estimator_sd_k(b) >
+           spring_c(thermal_model_transformation(model, k).austenite_finish_c7);
+}
+
 bool spring_estimator_has_transformed(const spring_estimator_t *e, const thermal_model_t *model,
                                       uint8_t k)
 {
@@ -515,17 +522,7 @@ bool spring_estimator_has_transformed(const spring_estimator_t *e, const thermal
     const float sds = spring_lacks_phase(b, model, k) ? SPRING_ESTIMATOR_BOUND_SDS
                       : b->onset                      ? TRUST_ONSET_SDS
                                                       : TRUST_STILL_SDS;
-    return spring_now_c(model, k) - sds * spring_estimator_sd_k(b) >
-           spring_c(thermal_model_transformation(model, k).austenite_finish_c7);
-}
-
-/* What is known of an austenite's coefficient by its martensite's. */
-static float coefficient_sd_per_k(const spring_learnt_t *l)
-{
-    return (l->martensite_ohm > 0.0f
-                ? COEFFICIENT_BOUND_PER_K + 0.5f * fabsf(l->martensite_rise_per_k)
-                : COEFFICIENT_MOST_PER_K) /
-           SPRING_ESTIMATOR_BOUND_SDS;
+    return surely_finished(b, model, k, sds);
 }
 
 void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, uint8_t k,
@@ -543,17 +540,12 @@ void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, 
     } else if (!full && b->possible == SPRING_PHASE_AUSTENITE) {
         b->possible = SPRING_PHASE_BETWEEN | SPRING_PHASE_AUSTENITE;
     }
-    /* its heating was ended, by a limit or as hot as it takes: once more, then what it reads tells
-     * nothing */
-    b->blind = b->blind || (lacks && b->doubted);
+    /* as hot as it takes whatever it reads, or ended twice by a limit: what it reads tells nothing */
+    const bool certain = surely_finished(b, model, k, SPRING_ESTIMATOR_BOUND_SDS);
+    b->blind = b->blind || (lacks && (b->doubted || certain));
     b->doubted = lacks && !b->blind;
     if (full && !lacks && b->onset && b->reads && b->current_a > STRONG_A) {
         spring_learn_austenite(b); /* hot enough, and its resistance had come to rest */
-    }
-    const float rise_sd_per_k = coefficient_sd_per_k(&b->learnt);
-    if (b->rise_sd_per_k == 0.0f || rise_sd_per_k < b->rise_sd_per_k) {
-        b->rise_sd_per_k = rise_sd_per_k; /* until the hold has taught its austenite's own */
-        b->rise_per_k = b->learnt.martensite_rise_per_k;
     }
     b->heating = false;
     b->kept_w_per_k = 0.0f;

@@ -43,6 +43,13 @@ void spring_begin_line(spring_belief_t *b, float now_c)
     b->line_ohm = b->slow_ohm;
     b->line_c = now_c;
     b->line_a = b->slow_a;
+    /* as martensite's until this line tells: a contact that ages makes another slope of each */
+    const spring_learnt_t *l = &b->learnt;
+    const float most_per_k = l->martensite_ohm > 0.0f ? COEFFICIENT_BOUND_PER_K +
+                                                            0.5f * fabsf(l->martensite_rise_per_k)
+                                                      : COEFFICIENT_MOST_PER_K;
+    b->rise_per_k = l->martensite_rise_per_k;
+    b->rise_sd_per_k = most_per_k / SPRING_ESTIMATOR_BOUND_SDS;
     b->rough = false;
     b->losing = 0;
 }
@@ -105,8 +112,8 @@ static float with_moves(const spring_belief_t *b, float sure, float now_c)
     return sqrtf(sure * sure + moves * moves + offset * offset);
 }
 
-/* It keeps its phase: the line follows what it reads, and what a moving temperature does to it is
- * its coefficient. */
+/* It keeps its phase: the line follows what it reads, and how that goes with a moving temperature
+ * is its slope. */
 static void follow(spring_belief_t *b, float now_c, float left)
 {
     const float away_k = now_c - b->line_c;
