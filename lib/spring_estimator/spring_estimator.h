@@ -102,8 +102,10 @@ typedef struct {
     float mark_ohm;      /* 0: nowhere yet */
     float mark_a;        /* at this current */
     float onset_ohm;
+    float onset_k;  /* heat taken up until then */
     float cold_ohm; /* at its beginning, martensite; 0: it was not */
     float cold_c;
+    float cold_a;
     float excess; /* change that no temperature coefficient explains; signed */
     float flat_k; /* heat since, without such a change */
     /* the running hold */

@@ -17,6 +17,7 @@
 #define SHIFT_BOUND_K  8.0f  /* 2.6 standard deviations of a declared transformation */
 #define CAPACITY_BOUND 1.25f /* the same of a heat capacity */
 #define SAME_CURRENT   0.1f  /* within it a sensor's offset shows alike */
+#define LEAST_HEAT     0.74f /* latent heat 15 % less than declared, heat capacity 15 % more */
 #define COLD_SPAN_K    20.0f /* least, over which a coefficient is learnt */
 
 void spring_estimator_begin_heating(spring_estimator_t *e, const thermal_model_t *model, uint8_t k)
@@ -41,6 +42,7 @@ static void see_onset(const spring_estimator_t *e, spring_belief_t *b, thermal_m
 {
     const float now_c = spring_now_c(model, k);
     b->onset = true;
+    b->onset_k = b->heat_k;
     if (b->possible == SPRING_PHASE_MARTENSITE) {
         spring_learnt_t *l = &b->learnt;
         if (b->cold_ohm > 0.0f && now_c > b->cold_c + COLD_SPAN_K) {
@@ -124,6 +126,14 @@ static bool has_changed(const spring_belief_t *b)
     return fabsf(b->ohm / b->onset_ohm - 1.0f) > fmaxf(least, CHANGE_LEAST);
 }
 
+/* Else it may only pause: a load may have moved the rest of its transformation away. */
+static bool has_taken_enough(const spring_estimator_t *e, const spring_belief_t *b,
+                             const thermal_model_t *model, uint8_t k)
+{
+    const float latent_k = b->begun_missing * e->latent_heat_j / e->heat_capacity_j_per_k;
+    return b->heat_k - b->onset_k > LEAST_HEAT * latent_k && !spring_lacks_phase(b, model, k);
+}
+
 /* Change of resistance over heat, a step at a time: more than any temperature coefficient makes is
  * a transformation, whatever its sign. */
 void spring_heating_watch(const spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model,
@@ -139,10 +149,11 @@ void spring_heating_watch(const spring_estimator_t *e, spring_belief_t *b, therm
     }
     if (b->mark_ohm > 0.0f && fabsf(b->current_a - b->mark_a) > SAME_CURRENT * b->current_a) {
         b->mark_ohm = b->excess = 0.0f; /* the sensor's offset shows otherwise */
-        b->cold_ohm = b->heat_k < COLD_SPAN_K ? 0.0f : b->cold_ohm;
     }
-    if (b->cold_ohm == 0.0f && b->possible == SPRING_PHASE_MARTENSITE) {
+    if (b->possible == SPRING_PHASE_MARTENSITE &&
+        (b->cold_ohm == 0.0f || b->current_a > (1.0f + SAME_CURRENT) * b->cold_a)) {
         b->cold_ohm = b->ohm;
+        b->cold_a = b->current_a;
         b->cold_c = spring_now_c(model, k);
     }
     if (b->heat_k < b->peak_k) {
@@ -181,7 +192,8 @@ void spring_heating_watch(const spring_estimator_t *e, spring_belief_t *b, therm
             spring_jump(b, b->ohm / b->onset_ohm); /* too cold: a contact */
             b->excess = 0.0f;
         }
-    } else if (b->flat_k >= FLAT_K && has_changed(b)) {
+    } else if (b->flat_k >= FLAT_K && has_changed(b) &&
+               (b->flat_k >= FLAT_K + SHIFT_BOUND_K || has_taken_enough(e, b, model, k))) {
         see_finish(e, b, model, k);
     }
     b->mark_ohm = b->ohm;
