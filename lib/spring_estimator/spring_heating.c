@@ -82,9 +82,26 @@ static void see_finish(const spring_estimator_t *e, spring_belief_t *b, thermal_
                      SPRING_PHASE_AUSTENITE);
 }
 
+/* Heat by which even the coldest and heaviest spring has come so far. */
+static float most_heat_k(const spring_estimator_t *e, const spring_belief_t *b, int16_t limit_c7)
+{
+    /* what does not show takes no latent heat */
+    const float latent_k =
+        b->onset ? b->begun_missing * e->latent_heat_j / e->heat_capacity_j_per_k : 0.0f;
+    /* where some austenite is left for certain, its transformation is where it was */
+    const float shift_k = (b->possible & SPRING_PHASE_AUSTENITE) != 0 ? 0.0f : SHIFT_BOUND_K;
+    return (spring_c(limit_c7) + shift_k - b->begun_c + latent_k) * CAPACITY_BOUND;
+}
+
+bool spring_heated_enough(const spring_estimator_t *e, const spring_belief_t *b,
+                          const thermal_model_t *model, uint8_t k)
+{
+    return b->heat_k >=
+           most_heat_k(e, b, thermal_model_transformation(model, k).austenite_finish_c7);
+}
+
 /* A spring that still transforms, or is known to show it and has not yet, is not hotter than that
- * lets it be, whatever the model says, until even the coldest and heaviest spring must have come so
- * far. */
+ * lets it be, whatever the model says, until it must have come so far. */
 static void hold_back(const spring_estimator_t *e, const spring_belief_t *b, thermal_model_t *model,
                       uint8_t k)
 {
@@ -94,18 +111,9 @@ static void hold_back(const spring_estimator_t *e, const spring_belief_t *b, the
         martensite ? (int16_t)(t.austenite_start_c7 + ONSET_C7) : t.austenite_finish_c7;
     const bool shows = b->steep || (b->learnt.austenite_ohm > 0.0f && !b->blind &&
                                     (martensite || spring_lacks_phase(b, model, k)));
-    if (!shows || thermal_model_temperature_c7(model, k) <= limit_c7) {
-        return;
-    }
-    /* what does not show takes no latent heat */
-    const float latent_k =
-        b->onset ? b->begun_missing * e->latent_heat_j / e->heat_capacity_j_per_k : 0.0f;
-    const float limit_c = spring_c(limit_c7);
-    /* where some austenite is left for certain, its transformation is where it was */
-    const float shift_k = (b->possible & SPRING_PHASE_AUSTENITE) != 0 ? 0.0f : SHIFT_BOUND_K;
-    const float most_k = (limit_c + shift_k - b->begun_c + latent_k) * CAPACITY_BOUND;
-    if (b->heat_k < most_k) {
-        spring_set_temperature(model, k, limit_c, SPRING_PHASE_MARTENSITE);
+    if (shows && thermal_model_temperature_c7(model, k) > limit_c7 &&
+        b->heat_k < most_heat_k(e, b, limit_c7)) {
+        spring_set_temperature(model, k, spring_c(limit_c7), SPRING_PHASE_MARTENSITE);
     }
 }
 
