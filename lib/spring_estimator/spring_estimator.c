@@ -223,10 +223,13 @@ static bool leave_out(spring_belief_t *b, float ohm, float current_a)
         b->odd = false;
         return false;
     }
-    const bool near = fminf(current_a, b->current_a) > fmaxf(STRONG_A, 0.5f * current_a);
+    /* a line compares with any current, but for the sensor's offset; a heating only with its own */
+    const bool compares =
+        current_a > STRONG_A && (holds || b->current_a > fmaxf(STRONG_A, 0.5f * current_a));
     const bool by_load = !holds || step * b->learnt.change < 0.0f;
-    const float most = (by_load ? JUMP_OF_LOAD : JUMP_LEAST) + JUMP_SDS * b->noise;
-    const bool jumps = near && fabsf(step) > most * was_ohm;
+    const float most = (by_load ? JUMP_OF_LOAD : JUMP_LEAST) + JUMP_SDS * b->noise +
+                       (holds ? spring_offset_may_show(b, current_a) : 0.0f);
+    const bool jumps = compares && fabsf(step) > most * was_ohm;
     if (jumps && b->odd) {
         spring_jump(b, ohm / was_ohm);
     }

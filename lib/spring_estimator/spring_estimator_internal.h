@@ -54,6 +54,8 @@ void spring_begin_line(spring_belief_t *belief, float now_c);
 /* Even the coldest and heaviest spring has transformed by the heat of this heating. */
 bool spring_heated_enough(const spring_estimator_t *estimator, const spring_belief_t *belief,
                           const thermal_model_t *model, uint8_t spring);
+/* What the sensor's offset may add to it at another current than its line's, relative. */
+float spring_offset_may_show(const spring_belief_t *belief, float current_a);
 /* While it heats: what heat does to its resistance. */
 void spring_heating_watch(const spring_estimator_t *estimator, spring_belief_t *belief,
                           thermal_model_t *model, uint8_t spring);

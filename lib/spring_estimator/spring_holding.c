@@ -102,13 +102,17 @@ static bool learn_offset(spring_belief_t *b, float now_c)
     return true;
 }
 
+float spring_offset_may_show(const spring_belief_t *b, float current_a)
+{
+    return OFFSET_SDS * b->offset_sd_v * fabsf(1.0f / current_a - 1.0f / b->line_a) / b->line_ohm;
+}
+
 /* By how much the resistance may have left its line with the phase kept, sure of it at rest: its
  * temperature moves it, and another current shows another share of the sensor's offset. */
 static float with_moves(const spring_belief_t *b, float sure, float now_c)
 {
     const float moves = SPRING_ESTIMATOR_BOUND_SDS * b->rise_sd_per_k * (now_c - b->line_c);
-    const float offset =
-        OFFSET_SDS * b->offset_sd_v * (1.0f / b->slow_a - 1.0f / b->line_a) / b->line_ohm;
+    const float offset = spring_offset_may_show(b, b->slow_a);
     return sqrtf(sure * sure + moves * moves + offset * offset);
 }
 
