@@ -608,6 +608,13 @@ float spring_estimator_cooling_s(const spring_estimator_t *e, const thermal_mode
                logf((left_c - ambient_c) / (finish_c - ambient_c));
 }
 
+/* What moved it lately, a gust for one, may do so again, either way. */
+static spring_bounds_t disturbed(const spring_belief_t *b, spring_bounds_t bounds)
+{
+    return (spring_bounds_t){bounds.value, bounds.low - b->disturbance_k,
+                             bounds.high + b->disturbance_k};
+}
+
 spring_bounds_t spring_estimator_temperature_c(const spring_estimator_t *e,
                                                const thermal_model_t *model, uint8_t k)
 {
@@ -615,21 +622,23 @@ spring_bounds_t spring_estimator_temperature_c(const spring_estimator_t *e,
     const float now_c = spring_now_c(model, k) + b->shift_k;
     float others_k2 = SHIFT_SD_K * SHIFT_SD_K; /* where it was seen, its transformation was */
     if (b->possible == SPRING_PHASE_ANY) {
-        return (spring_bounds_t){now_c, spring_ambient_c(model) - TRUST_SD_K, b->hottest_c};
+        const float coldest_c = spring_ambient_c(model) - SPRING_ESTIMATOR_BOUND_SDS * TRUST_SD_K;
+        return (spring_bounds_t){now_c, coldest_c, b->hottest_c};
     }
     if (b->possible == SPRING_PHASE_MARTENSITE) { /* as warm as room and neighbours make it */
         const float neighbours_k = NEIGHBOUR_SD * (now_c - spring_ambient_c(model));
         others_k2 = TRUST_SD_K * TRUST_SD_K + neighbours_k * neighbours_k;
     }
-    return spring_around(now_c, sqrtf(distance_k2(b) + others_k2));
+    return disturbed(b, spring_around(now_c, sqrtf(distance_k2(b) + others_k2)));
 }
 
 spring_bounds_t spring_estimator_distance_k(const spring_estimator_t *e,
                                             const thermal_model_t *model, uint8_t k)
 {
     const int16_t start_c7 = thermal_model_transformation(model, k).martensite_start_c7;
-    return spring_around(spring_c((int16_t)(thermal_model_temperature_c7(model, k) - start_c7)),
-                         spring_estimator_sd_k(&e->spring[k]));
+    const float away_k = spring_c((int16_t)(thermal_model_temperature_c7(model, k) - start_c7));
+    const spring_belief_t *b = &e->spring[k];
+    return disturbed(b, spring_around(away_k, spring_estimator_sd_k(b)));
 }
 
 uint32_t spring_estimator_model_power_uw(const spring_estimator_t *e, uint8_t k, uint32_t power_uw)
