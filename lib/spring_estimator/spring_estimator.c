@@ -148,7 +148,8 @@ void spring_estimator_init(spring_estimator_t *e, thermal_model_t *model)
     spring_estimator_prepare(e, model, true);
     for (uint8_t k = 0; k < e->springs; k++) {
         spring_estimator_forget(e, k);
-        begin(&e->spring[k], coldest_c + 0.5f * width_k, UNIFORM_SD * width_k, SPRING_PHASE_ANY);
+        begin(&e->spring[k], coldest_c + 0.5f * width_k,
+              UNIFORM_SD * width_k + TRUST_SD_K /* of ambient */, SPRING_PHASE_ANY);
         e->spring[k].hottest_c = SPRING_ESTIMATOR_HOTTEST_C;
         spring_set_temperature(model, k, coldest_c + 0.5f * width_k, SPRING_PHASE_MARTENSITE);
     }
