@@ -544,7 +544,8 @@ void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, 
     } else if (!full && b->possible == SPRING_PHASE_AUSTENITE) {
         b->possible = SPRING_PHASE_BETWEEN | SPRING_PHASE_AUSTENITE;
     }
-    /* as hot as it takes whatever it reads, or ended twice by a limit: what it reads tells nothing */
+    /* as hot as it takes whatever it reads, or ended twice by a limit: what it reads tells nothing
+     */
     const bool certain = spring_heated_enough(e, b, model, k) ||
                          surely_finished(b, model, k, SPRING_ESTIMATOR_BOUND_SDS);
     b->blind = b->blind || (lacks && (b->doubted || certain));

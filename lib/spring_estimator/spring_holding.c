@@ -22,11 +22,11 @@
 #define OFFSET_LEAST_V  0.0005f /* what a turn's steps of 4 mV leave, and its noise */
 #define OFFSET_SDS      3.0f
 #define OFFSET_MOST_V   0.012f
-#define AWAY_LEAST_K     1.0f    /* less tells nothing of a coefficient */
+#define AWAY_LEAST_K    1.0f /* less tells nothing of a coefficient */
 /* Of an average: what a sensor's steps leave, LOSS_LEAST / 3, and it tells anew in 2 x 16 turns. */
-#define LINE_VARIANCE    (32.0f * LOSS_LEAST * LOSS_LEAST / 9.0f)
-#define STILL_K         0.5f  /* below where it would be seen */
-#define COSINE_BEGINS   0.64f /* 2 / pi: x where a cosine has sqrt(lost) = (pi / 2) x */
+#define LINE_VARIANCE (32.0f * LOSS_LEAST * LOSS_LEAST / 9.0f)
+#define STILL_K       0.5f  /* below where it would be seen */
+#define COSINE_BEGINS 0.64f /* 2 / pi: x where a cosine has sqrt(lost) = (pi / 2) x */
 
 /* Where it is on its way down, having lost so much: the beginning of the cosine, (1 - cos pi x)
  * / 2. */
@@ -45,9 +45,9 @@ void spring_begin_line(spring_belief_t *b, float now_c)
     b->line_a = b->slow_a;
     /* as martensite's until this line tells: a contact that ages makes another slope of each */
     const spring_learnt_t *l = &b->learnt;
-    const float most_per_k = l->martensite_ohm > 0.0f ? COEFFICIENT_BOUND_PER_K +
-                                                            0.5f * fabsf(l->martensite_rise_per_k)
-                                                      : COEFFICIENT_MOST_PER_K;
+    const float most_per_k = l->martensite_ohm > 0.0f
+                                 ? COEFFICIENT_BOUND_PER_K + 0.5f * fabsf(l->martensite_rise_per_k)
+                                 : COEFFICIENT_MOST_PER_K;
     b->rise_per_k = l->martensite_rise_per_k;
     b->rise_sd_per_k = most_per_k / SPRING_ESTIMATOR_BOUND_SDS;
     b->rough = false;
@@ -107,13 +107,13 @@ float spring_offset_may_show(const spring_belief_t *b, float current_a)
     return OFFSET_SDS * b->offset_sd_v * fabsf(1.0f / current_a - 1.0f / b->line_a) / b->line_ohm;
 }
 
-/* By how much the resistance may have left its line with the phase kept, sure of it at rest: its
- * temperature moves it, and another current shows another share of the sensor's offset. */
-static float with_moves(const spring_belief_t *b, float sure, float now_c)
+/* By how much, squared, the resistance may have left its line with the phase kept: its temperature
+ * moves it, and another current shows another share of the sensor's offset. */
+static float may_move_squared(const spring_belief_t *b, float now_c)
 {
     const float moves = SPRING_ESTIMATOR_BOUND_SDS * b->rise_sd_per_k * (now_c - b->line_c);
     const float offset = spring_offset_may_show(b, b->slow_a);
-    return sqrtf(sure * sure + moves * moves + offset * offset);
+    return moves * moves + offset * offset;
 }
 
 /* It keeps its phase: the line follows what it reads, and how that goes with a moving temperature
@@ -172,8 +172,7 @@ void spring_holding_watch(const spring_estimator_t *e, spring_belief_t *b, therm
     } else if (b->quiet == 0 && b->offset_sd_v > OFFSET_LEAST_V && learn_offset(b, now_c)) {
         return;
     }
-    const float kept_ohm =
-        b->line_ohm * (1.0f + b->rise_per_k * (now_c - b->line_c));
+    const float kept_ohm = b->line_ohm * (1.0f + b->rise_per_k * (now_c - b->line_c));
     if (b->quiet == 0 && b->current_a < STRONG_A) { /* on its way to the hold: too weak to tell */
         b->slow_ohm = kept_ohm;
         b->slow_a = b->line_a;
@@ -187,11 +186,13 @@ void spring_holding_watch(const spring_estimator_t *e, spring_belief_t *b, therm
     const float moves = fabsf(b->rise_per_k) * sd_k;
     const float noise = b->rough ? b->noise : NOISE_IN_SLOW * b->noise;
     float sure = fmaxf(fmaxf(LOSS_LEAST, moves), SURE_SDS * noise);
-    const float suspected = b->rough ? SUSPECTED_ROUGH : SUSPECTED;
-    if (changed >= suspected * sure) { /* as a rule not: two divisions are saved */
-        sure = with_moves(b, sure, now_c);
+    float suspected = (b->rough ? SUSPECTED_ROUGH : SUSPECTED) * sure;
+    if (changed >= suspected) { /* as a rule not: two divisions are saved */
+        const float moves2 = may_move_squared(b, now_c);
+        sure = sqrtf(sure * sure + moves2);
+        suspected = sqrtf(suspected * suspected + moves2);
     }
-    if (changed < suspected * sure) {
+    if (changed < suspected) {
         b->losing = 0;
         if (b->quiet >= QUIET_TURNS) {
             if (b->rough) { /* it has come to rest */
