@@ -379,6 +379,16 @@ def test_faults_and_states_in_words_are_those_of_the_table() -> None:
     assert words.of_state("fault_2") == faults[2]
 
 
+def test_what_hinders_is_said_in_the_terminal_too(tmp_path: Path) -> None:
+    words = [sys.executable, "-m", "ninespring", "dashboard", "--listen", "127.0.0.1:0", "--port", str(tmp_path / "no")]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stderr is not None
+        said = process.stderr.readline()
+        process.send_signal(signal.SIGINT)
+    assert "no: cannot be opened (No such file or directory)" in said
+    assert process.returncode == 0
+
+
 @pytest.mark.parametrize(
     "arguments", [(), ("--simulate", "--port", "x"), ("--simulate", "--listen", "here"), ("--replay", "no-such.csv")]
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import io
 import json
 import os
@@ -29,6 +30,7 @@ from ninespring.board import Board
 from ninespring.errors import WorkError
 from ninespring.logs import read_log, read_table
 from ninespring.monitoring import Screen
+from ninespring.port import Port
 from ninespring.recording import RowCheck, script_lines
 from ninespring.thermometers import Lines
 from rich.console import Console
@@ -408,6 +410,16 @@ def test_a_port_that_is_not_there_or_is_none_is_said(tmp_path: Path) -> None:
         assert "cannot be opened" in done.stderr
         assert len(done.stderr.strip().splitlines()) == 1
     assert [one.name for one in tmp_path.iterdir()] == ["file"]
+
+
+def test_a_port_that_is_not_this_users_says_how_to_be_allowed(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused(*arguments: object, **more: object) -> None:
+        raise serial.SerialException(errno.EACCES, "could not open port")
+
+    monkeypatch.setattr(serial, "Serial", refused)
+    monkeypatch.setattr(Path, "group", lambda path: "dialout")
+    with pytest.raises(WorkError, match="usermod --append --groups dialout"):
+        Port("/dev/ttyACM0")
 
 
 def test_telemetry_left_on_by_someone_else_does_not_confuse(tmp_path: Path) -> None:
