@@ -412,6 +412,12 @@ def test_a_port_that_is_not_there_or_is_none_is_said(tmp_path: Path) -> None:
     assert [one.name for one in tmp_path.iterdir()] == ["file"]
 
 
+def test_thermometers_at_the_boards_own_port_are_refused(tmp_path: Path) -> None:
+    done = ninespring("record", "--port", "/dev/x", "--thermometers", "/dev/../dev/x", "-o", tmp_path / "x.csv")
+    assert done.returncode == 2
+    assert "that is the board's port" in done.stderr
+
+
 def test_a_port_that_is_not_this_users_says_how_to_be_allowed(monkeypatch: pytest.MonkeyPatch) -> None:
     def refused(*arguments: object, **more: object) -> None:
         raise serial.SerialException(errno.EACCES, "could not open port")
