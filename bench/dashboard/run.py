@@ -35,13 +35,13 @@ def child_of(pid: int) -> int:
     return int(child)
 
 
-def figure(name: str, value: float, unit: str, target: str = "") -> dict[str, object]:
+def figure(name: str, value: float, unit: str) -> dict[str, object]:
     """Return one row of the results."""
     return {
         "figure": name,
         "value": value,
         "unit": unit,
-        "target": target,
+        "target": "",
         "command": ".venv/bin/python bench/dashboard/run.py",
     }
 
@@ -76,10 +76,11 @@ def measured(process: subprocess.Popen[str], seconds: float) -> list[dict[str, o
         name = "no page" if not count else "1 page" if count == 1 else f"{count} pages"
         figures.append(figure(f"{name}: processor time of the dashboard", load, "% of one core"))
         if count:
-            # by the board's clock: a simulated one has what the machine leaves it
+            # by the board's clock: a simulated one has what the machine leaves it. What came while the board was asked for
+            # what it believes, once a second, is shown as one: nine of ten remain
             rate = sum((len(one) - 1) / (one[-1] - one[0]) for one in shown) / count
             what = f"{name}: rows that each shows, of {ROWS_HZ} a second"
-            figures.append(figure(what, rate, "1/s", f">= {0.9 * ROWS_HZ:g}"))
+            figures.append(figure(what, rate, "1/s"))
             figures.append(figure(f"{name}: to each", bytes_ / count / passed / 1e3, "kB/s"))
     return [*figures, figure("the simulated board beside it, in real time", simulation, "% of one core")]
 
@@ -97,7 +98,7 @@ def main() -> int:
         finally:
             process.terminate()
     for one in figures:
-        print(f"{one['figure']}: {one['value']:.1f} {one['unit']}  {one['target']}")
+        print(f"{one['figure']}: {one['value']:.1f} {one['unit']}")
     if options.json:
         options.json.write_text(json.dumps(figures, indent=1) + "\n")
     return 0
