@@ -52,7 +52,7 @@ def measured(process: subprocess.Popen[str], seconds: float) -> list[dict[str, o
     url = process.stdout.readline().split()[0].rstrip("/")
     open_one = partial(connect, url.replace("http", "ws") + "/ws", additional_headers={"origin": url})
     with open_one() as first:
-        while json.loads(first.recv()).get("time_s") is None:
+        while (state := json.loads(first.recv()))["kind"] != "state" or "time_s" not in state:
             pass
     board = child_of(process.pid)
     figures: list[dict[str, object]] = []
