@@ -124,16 +124,6 @@ def test_a_pulled_cable_keeps_what_came(tmp_path: Path) -> None:
     assert "went away" in json.loads((tmp_path / "r.json").read_text())["ended"]
 
 
-@pytest.fixture
-def small_disk(tmp_path: Path) -> Path:
-    folder = tmp_path / "disk"
-    folder.mkdir()
-    if subprocess.run(["mount", "-t", "tmpfs", "-o", "size=16k", "none", folder], capture_output=True).returncode:
-        pytest.skip("SKIPPED: this user cannot mount a small disk")
-    yield folder
-    subprocess.run(["umount", folder], check=True)
-
-
 def test_a_full_disk_keeps_what_fitted_and_switches_off(small_disk: Path, tmp_path: Path) -> None:
     board = FakeBoard()
     board.stream = [row(0.5 * k) for k in range(1, 2000)]
