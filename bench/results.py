@@ -75,6 +75,7 @@ SECTIONS: tuple[Section, ...] = (
     ),
     Section("sweep", "Sweeps", f"{PYTHON} bench/explore/sweep.py"),
     Section("real_logs", "What real logs bring", f"{PYTHON} bench/diagnose/real_logs.py"),
+    Section("dashboard", "The live page", f"{PYTHON} bench/dashboard/run.py"),
 )
 
 

@@ -23,7 +23,9 @@ def need(*modules: str) -> None:
         try:
             importlib.import_module(name)
         except ImportError as error:
-            raise WorkError(f"{name} is missing ({error}): pip install 'ninespring[explore]'") from None
+            raise WorkError(
+                f"{name} is missing ({error}): script/setup installs it in the tree, elsewhere pip install 'ninespring[explore]'"
+            ) from None
         except OSError as error:
             raise WorkError(f"{name} does not load ({error}): docs/exploring.md names the system's libraries") from None
 
