@@ -38,7 +38,7 @@ struct loop {
     double source_ohm;
     double freewheel_drop_v;
     double highest_sum_a;
-    channel_t channel[PLANT_MAX_SPRINGS];
+    channel_t channel[CONTROLLER_MAX_SPRINGS];
 };
 
 static bool is_of_one_spring(loop_action_t action)
@@ -180,8 +180,8 @@ static void read_sensor(loop_t *loop, int k)
 /* Currents of the tick that starts, from the duties. */
 static void flow(loop_t *loop)
 {
-    double duty[PLANT_MAX_SPRINGS];
-    double spring_ohm[PLANT_MAX_SPRINGS];
+    double duty[CONTROLLER_MAX_SPRINGS];
+    double spring_ohm[CONTROLLER_MAX_SPRINGS];
     double load_s = 0.0;
     for (int k = 0; k < loop->springs; k++) {
         const channel_t *c = &loop->channel[k];

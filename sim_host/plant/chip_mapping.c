@@ -281,6 +281,31 @@ static void map_rows_of_the_same_name(mapping_t *m)
     }
 }
 
+/* The chip's network ends at the first neighbours: what reaches the second ones goes to those, so
+ * that all springs together exchange as much. */
+static void map_second_neighbours(mapping_t *m)
+{
+    static const struct {
+        const char *second, *orthogonal;
+        parameter_t row;
+    } ways[] = {{"second_w_per_k", "orthogonal_w_per_k", PARAMETER_orthogonal_w_per_k},
+                {"second_fan_w_per_k", "orthogonal_fan_w_per_k", PARAMETER_orthogonal_fan_w_per_k}};
+    const int rows = m->chip.rows, columns = m->chip.columns;
+    const int beside = rows * (columns - 1) + columns * (rows - 1);
+    const int apart =
+        (columns > 2 ? rows * (columns - 2) : 0) + (rows > 2 ? columns * (rows - 2) : 0);
+    bool moved = false;
+    for (size_t k = 0; apart > 0 && k < sizeof ways / sizeof ways[0]; k++) {
+        const double second = array_value(m, ways[k].second);
+        moved = moved || second > 0.0;
+        put_from(m, "orthogonal_w_per_k with second_w_per_k", ways[k].row, 0,
+                 array_value(m, ways[k].orthogonal) + second * apart / beside);
+    }
+    if (moved && !m->failed) {
+        say(m, "second_w_per_k is not on the chip: counted into orthogonal_w_per_k");
+    }
+}
+
 static const char *reason_of(thermal_model_status_t status)
 {
     switch (status) {
@@ -317,6 +342,7 @@ chip_mapping_status_t chip_mapping_from_plant(const plant_t *plant,
     map_loss(&m);
     map_resistance(&m);
     map_rows_of_the_same_name(&m);
+    map_second_neighbours(&m);
     if (is_on(&m, EFFECT_radiation)) {
         put_from(&m, "emissivity x surface_mm2", PARAMETER_radiating_area_mm2, 0,
                  array_value(&m, "emissivity") * array_value(&m, "surface_mm2"));

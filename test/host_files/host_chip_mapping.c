@@ -146,6 +146,16 @@ static void what_the_chip_averages_is_said(void)
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(message, "the chip takes the ratio without"), message);
 }
 
+/* 3 x 3: six pairs two apart, twelve beside each other. */
+static void second_neighbours_are_counted_to_the_first(void)
+{
+    set("orthogonal_w_per_k", 0.0005);
+    set("second_w_per_k", 0.0001);
+    TEST_ASSERT_EQUAL(CHIP_MAPPING_OK, map());
+    TEST_ASSERT_EQUAL(550, chip.orthogonal_uw_per_k);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(message, "second_w_per_k is not on the chip"), message);
+}
+
 /* What each spring loses on the chip is what it loses in the plant, to the permille. */
 static void edge_and_mismatch_become_scales(void)
 {
@@ -255,6 +265,7 @@ int main(void)
     RUN_TEST(effects_that_are_off_cost_nothing);
     RUN_TEST(what_the_plant_has_in_two_numbers_becomes_one);
     RUN_TEST(what_the_chip_averages_is_said);
+    RUN_TEST(second_neighbours_are_counted_to_the_first);
     RUN_TEST(edge_and_mismatch_become_scales);
     RUN_TEST(natural_convection_becomes_a_rising_loss);
     RUN_TEST(what_is_not_on_the_chip_is_left_out_and_said);
