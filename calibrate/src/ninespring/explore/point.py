@@ -14,7 +14,7 @@ from .. import native
 from ..errors import InputError, WorkError
 from ..fit.simulate import array_parameters
 from ..models import Array
-from .spec import METRICS, Spec, array_of_point
+from .spec import METRICS, Spec, array_of_point, board_of_point
 
 STARTED = 0.95
 """Austenite from which a driven spring has moved."""
@@ -84,6 +84,17 @@ def pattern_of(point: Mapping[str, Any], rows: int, cols: int, rng: np.random.Ge
     return ~middle if wanted == "all_but_middle" else np.ones(rows * cols, dtype=bool)
 
 
+def settings_of(point: Mapping[str, Any]) -> str:
+    """Return the console lines of every board besides its model."""
+    lines = [f"$policy={int(point.get('policy', 'precompensate') == 'precompensate')}"]
+    lines += [
+        f"${name}={point[name]:.3f}"
+        for name in ("supply_limit_a", "boost_current_a", "open_current_a")
+        if name in point
+    ]
+    return "\n".join([*lines, ""])
+
+
 def run_point(spec: Spec, index: int, point: Mapping[str, Any]) -> dict[str, Any]:
     """Run one point; return its row: point, seed, what was varied, metrics (NaN where there is none), error."""
     seed = int(np.random.SeedSequence([spec.seed, index]).generate_state(1)[0])
@@ -98,17 +109,17 @@ def metrics_of(spec: Spec, point: Mapping[str, Any], seed: int) -> dict[str, flo
     """Run a point by its seed; return its metrics (UNITS in spec.py)."""
     rng = np.random.default_rng(seed)
     declared = plant_of_point(spec, point)
-    lines, _ = native.chip_export(declared)
-    for name in ("supply_limit_a", "boost_current_a", "open_current_a"):
-        if name in point:
-            lines += f"${name}={point[name]:.3f}\n"
-    lines += f"$policy={int(point.get('policy', 'precompensate') == 'precompensate')}\n"
+    board = board_of_point(point, array_of_point(point))
+    lines = [
+        native.chip_export(declared, part)[0] + settings_of(point)
+        for part in native.boards_of(declared.rows, declared.cols, *board)
+    ]
     real = real_of(declared, point, rng)
     real.reset()
     pattern = pattern_of(point, real.rows, real.cols, rng)
     fan = float(point.get("fan", 0.0))
     on = spec.on_s
-    t, x, power, current = native.chip_run(real, lines, list(pattern), fan, seed, spec.duration_s, on)
+    t, x, power, current = native.chip_run(real, board, lines, list(pattern), fan, seed, spec.duration_s, on)
     out = dict.fromkeys(METRICS, math.nan)
     out |= {"hottest_c": float(t.max()), "energy_j": float(power.sum()), "supply_a": float(current.max())}
     out["hold_w"] = float(power[3 * on // 4 : on].mean())

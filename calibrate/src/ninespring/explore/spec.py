@@ -27,9 +27,11 @@ PATTERNS = ("all", "all_but_middle", "middle", "checkerboard", "random")
 POLICIES = ("open", "precompensate")
 COUPLINGS = ("law", "field")
 OWN: dict[str, tuple[Any, float, float]] = {
-    "rows": (3, 1, 64),
-    "cols": (3, 1, 64),
-    "size": (0, 0, 8),
+    "rows": (3, 1, native.MAX_SPRINGS),
+    "cols": (3, 1, native.MAX_SPRINGS),
+    "size": (0, 0, 32),
+    "board_rows": (8, 1, native.BOARD_SPRINGS),
+    "board_cols": (8, 1, native.BOARD_SPRINGS),
     "pitch_mm": (5.0, 1.0, 100.0),
     "fan": (0.0, 0.0, 1.0),
     "ambient_c": (20.0, -40.0, 80.0),
@@ -44,7 +46,7 @@ LIMITS: dict[str, tuple[float, float]] = (
     {key: (low, high) for key, (_, low, high) in OWN.items()} | SPRING_KEYS | MATERIAL_KEYS | cooling.NUMBERS
 )
 WORDS = {"policy": POLICIES, "pattern": PATTERNS, **cooling.WORDS}
-WHOLE = ("rows", "cols", "size")
+WHOLE = ("rows", "cols", "size", "board_rows", "board_cols")
 KEYS = (*LIMITS, *WORDS)
 SWEEP_KEYS = ("method", "points", "seed", "duration_s", "on_s", "couplings", "mesh")
 MOST_POINTS = 10_000_000
@@ -152,6 +154,13 @@ def array_of_point(point: Mapping[str, Any]) -> Array:
     )
 
 
+def board_of_point(point: Mapping[str, Any], array: Array) -> tuple[int, int]:
+    """Return rows and columns of springs of a board: all, where nothing is said and they are few enough."""
+    if "board_rows" not in point and "board_cols" not in point and array.springs <= native.BOARD_SPRINGS:
+        return array.rows, array.cols
+    return int(point.get("board_rows", 8)), int(point.get("board_cols", 8))
+
+
 def check_point(point: Mapping[str, Any]) -> None:
     """Refuse (InputError) what cannot exist."""
     from .geometry import geometry_of
@@ -159,6 +168,9 @@ def check_point(point: Mapping[str, Any]) -> None:
     array = array_of_point(point)
     if array.springs > native.MAX_SPRINGS:
         raise InputError(f"{array.rows} x {array.cols} are more than {native.MAX_SPRINGS} springs")
+    board_rows, board_cols = board_of_point(point, array)
+    if board_rows * board_cols > native.BOARD_SPRINGS:
+        raise InputError(f"{board_rows} x {board_cols} are more than {native.BOARD_SPRINGS} springs on a board")
     geometry_of(array)
     plant = native.Plant(1, 1)
     plant.set_all({key: point[key] for key in MATERIAL_KEYS if key in point and key.endswith("_c")})
