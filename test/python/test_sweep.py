@@ -206,8 +206,21 @@ def test_boards_of_a_large_array_do_as_one_board_does() -> None:
     assert one["started"] == many["started"] == 1.0
     assert abs(one["undriven_c"] - many["undriven_c"]) < 3.0
     assert many["hottest_c"] < 115.0
+    spec.boards = {1: {"supply_limit_a": 1.0}}  # the first six springs of all: 3 x 2
+    first = point.metrics_of(spec, array | {"board_rows": 3, "board_cols": 2}, 1)
+    assert 0.8 <= first["started"] < 1.0
+    spec.boards = {}
     little = point.metrics_of(spec, array | {"board_rows": 3, "board_cols": 2, "supply_limit_a": 1.0}, 1)
     assert little["started"] < 1.0 and little["supply_a"] <= 6 * 1.05
+
+
+def test_every_pattern_is_a_point_of_its_own(tmp_path: Path) -> None:
+    path = tmp_path / "s.toml"
+    path.write_text(HEAD + "[fixed]\nsize = 2\n[vary]\npattern = 'every'\n")
+    spec = read_spec(path)
+    given = [one["pattern"] for one in spec.all_points()]
+    assert len(set(given)) == 16 and given[6] == "0110"
+    assert point.pattern_of({"pattern": "0110"}, 2, 2, np.random.default_rng(1)).tolist() == [False, True, True, False]
 
 
 @pytest.mark.parametrize(
@@ -223,6 +236,12 @@ def test_boards_of_a_large_array_do_as_one_board_does() -> None:
         (HEAD + "[vary]\nrows = [64]\ncols = [17]\n", "64 x 17 are more than 1024 springs"),
         (HEAD + "[fixed]\nboard_rows = 9\n[vary]\nsize = [16]\n", "9 x 8 are more than 64 springs on a board"),
         (HEAD + "[vary]\nfan = [0, 2]\n", "it must be 0 to 1"),
+        (HEAD + "[vary]\nfan = [0, 1]\n[board.2]\nsupply_limit_a = 5\n", "[board.2], but the array has 1 boards"),
+        (HEAD + "[vary]\nfan = [0, 1]\n[board.1]\nsuply_limit_a = 5\n", "did you mean supply_limit_a?"),
+        (HEAD + "[vary]\nfan = [0, 1]\n[board.first]\nsupply_limit_a = 5\n", "must be [board.1]"),
+        (HEAD + "[vary]\npattern = ['0101']\n", "a pattern of 4 springs for an array of 9"),
+        (HEAD + "[fixed]\nsize = 4\n[vary]\npattern = 'every'\n", "16 springs have too many patterns"),
+        (HEAD + "[vary]\nsize = [2, 3]\npattern = 'every'\n", "an array of one size"),
         (HEAD + "[vary]\npitch_mm = 5\n", "belongs into [fixed]"),
         (HEAD + "[vary]\npitch_mm = {from = 5, to = 6}\n", "a grid needs steps"),
         (HEAD + "[vary]\npitch_mm = [5, 5]\n", "a value twice"),

@@ -75,6 +75,8 @@ def pattern_of(point: Mapping[str, Any], rows: int, cols: int, rng: np.random.Ge
     row, col = np.divmod(np.arange(rows * cols), cols)
     middle = (row == rows // 2) & (col == cols // 2)
     wanted = point.get("pattern", "all_but_middle")
+    if wanted[0] in "01":
+        return np.array([one == "1" for one in wanted])
     if wanted == "random":
         return rng.random(rows * cols) < 0.5
     if wanted == "checkerboard":
@@ -85,7 +87,7 @@ def pattern_of(point: Mapping[str, Any], rows: int, cols: int, rng: np.random.Ge
 
 
 def settings_of(point: Mapping[str, Any]) -> str:
-    """Return the console lines of every board besides its model."""
+    """Return a board's console lines besides its model."""
     lines = [f"$policy={int(point.get('policy', 'precompensate') == 'precompensate')}"]
     lines += [
         f"${name}={point[name]:.3f}"
@@ -105,14 +107,14 @@ def run_point(spec: Spec, index: int, point: Mapping[str, Any]) -> dict[str, Any
         return out | dict.fromkeys(METRICS, math.nan) | {"error": str(error)}
 
 
-def metrics_of(spec: Spec, point: Mapping[str, Any], seed: int) -> dict[str, float]:
+def metrics_of(spec: Spec, point: dict[str, Any], seed: int) -> dict[str, float]:
     """Run a point by its seed; return its metrics (UNITS in spec.py)."""
     rng = np.random.default_rng(seed)
     declared = plant_of_point(spec, point)
     board = board_of_point(point, array_of_point(point))
     lines = [
-        native.chip_export(declared, part)[0] + settings_of(point)
-        for part in native.boards_of(declared.rows, declared.cols, *board)
+        native.chip_export(declared, part)[0] + settings_of(point | spec.boards.get(number, {}))
+        for number, part in enumerate(native.boards_of(declared.rows, declared.cols, *board), 1)
     ]
     real = real_of(declared, point, rng)
     real.reset()

@@ -24,6 +24,9 @@ from . import cooling
 
 METHODS = ("grid", "latin", "sobol", "saltelli", "optimise")
 PATTERNS = ("all", "all_but_middle", "middle", "checkerboard", "random")
+EVERY = "every"
+"""[vary] pattern: all patterns of an array of at most EVERY_SPRINGS."""
+EVERY_SPRINGS = 12
 POLICIES = ("open", "precompensate")
 COUPLINGS = ("law", "field")
 OWN: dict[str, tuple[Any, float, float]] = {
@@ -48,6 +51,7 @@ LIMITS: dict[str, tuple[float, float]] = (
 WORDS = {"policy": POLICIES, "pattern": PATTERNS, **cooling.WORDS}
 WHOLE = ("rows", "cols", "size", "board_rows", "board_cols")
 KEYS = (*LIMITS, *WORDS)
+BOARD_KEYS = ("policy", "supply_limit_a", "boost_current_a", "open_current_a")
 SWEEP_KEYS = ("method", "points", "seed", "duration_s", "on_s", "couplings", "mesh")
 MOST_POINTS = 10_000_000
 METRICS = (
@@ -98,6 +102,8 @@ class Spec:
     mesh: str = "coarse"
     fixed: dict[str, Any] = field(default_factory=dict)
     axes: list[Axis] = field(default_factory=list)
+    boards: dict[int, dict[str, Any]] = field(default_factory=dict)
+    """What boards (from 1) have that differs from the point."""
     metric: str = ""
     goal: str = "min"
     limits: dict[str, tuple[float | None, float | None]] = field(default_factory=dict)
@@ -166,6 +172,9 @@ def check_point(point: Mapping[str, Any]) -> None:
     from .geometry import geometry_of
 
     array = array_of_point(point)
+    pattern = str(point.get("pattern", ""))
+    if pattern[:1] in ("0", "1") and len(pattern) != array.springs:
+        raise InputError(f"a pattern of {len(pattern)} springs for an array of {array.springs}")
     if array.springs > native.MAX_SPRINGS:
         raise InputError(f"{array.rows} x {array.cols} are more than {native.MAX_SPRINGS} springs")
     board_rows, board_cols = board_of_point(point, array)
@@ -205,6 +214,8 @@ class _Reader:
         return value
 
     def value(self, key: str, value: Any) -> Any:
+        if key == "pattern" and isinstance(value, str) and value and not set(value) - {"0", "1"}:
+            return value
         if key in WORDS:
             return self.word(value, WORDS[key], key)
         number = self.number(value, *LIMITS[key], key, key in WHOLE)
@@ -215,6 +226,14 @@ class _Reader:
         if not isinstance(part, dict):
             raise self.refuse(f"[{name}] must be a table", name)
         return part
+
+    def every_pattern(self, fixed: Mapping[str, Any], vary: Mapping[str, Any]) -> Axis:
+        if {"rows", "cols", "size"} & set(vary):
+            raise self.refuse(f'pattern = "{EVERY}" wants an array of one size', EVERY)
+        springs = array_of_point(fixed).springs
+        if springs > EVERY_SPRINGS:
+            raise self.refuse(f"{springs} springs have too many patterns: at most {EVERY_SPRINGS} springs", EVERY)
+        return Axis("pattern", [f"{k:0{springs}b}" for k in range(2**springs)])
 
     def axis(self, key: str, given: Any, method: str) -> Axis:
         if isinstance(given, list):
@@ -249,7 +268,7 @@ class _Reader:
 
     def spec(self) -> Spec:
         for name in self.data:
-            self.known(name, ("sweep", "fixed", "vary", "optimise"), "the file")
+            self.known(name, ("sweep", "fixed", "vary", "board", "optimise"), "the file")
         head = self.table("sweep")
         for key in head:
             self.known(key, SWEEP_KEYS, "[sweep]")
@@ -273,7 +292,12 @@ class _Reader:
         if both := sorted(set(fixed) & set(vary)):
             raise self.refuse(f"{both[0]} is fixed and varied", both[0])
         spec.fixed = {key: self.value(key, value) for key, value in fixed.items()}
-        spec.axes = [self.axis(key, value, spec.method) for key, value in vary.items()]
+        spec.axes = [
+            self.every_pattern(spec.fixed, vary)
+            if (key, value) == ("pattern", EVERY)
+            else self.axis(key, value, spec.method)
+            for key, value in vary.items()
+        ]
         if not spec.axes:
             raise self.refuse("nothing is varied: [vary] is empty or missing", "vary")
         if {"size", "rows"} <= {*fixed, *vary} or {"size", "cols"} <= {*fixed, *vary}:
@@ -282,10 +306,21 @@ class _Reader:
             for key in (*SPRING_KEYS, *cooling.KEYS):
                 if key in fixed or key in vary:
                     raise self.refuse(f'{key}: the paper\'s law knows only pitch and fan; couplings = "field"', key)
+        spec.boards = self.boards()
         self.optimise(spec)
         spec.text = read_bytes(self.path).decode()
         spec.sha256 = hashlib.sha256(json.dumps(self.data, sort_keys=True).encode()).hexdigest()
         return spec
+
+    def boards(self) -> dict[int, dict[str, Any]]:
+        out = {}
+        for number, own in self.table("board").items():
+            if not number.isdecimal() or number.startswith("0") or not isinstance(own, dict):
+                raise self.refuse(f"[board.{number}] must be [board.1], [board.2], ...", number)
+            for key in own:
+                self.known(key, BOARD_KEYS, f"[board.{number}]")
+            out[int(number)] = {key: self.value(key, value) for key, value in own.items()}
+        return out
 
     def optimise(self, spec: Spec) -> None:
         part = self.table("optimise")
@@ -319,7 +354,7 @@ def read_spec(path: Path) -> Spec:
     count = 0
     for count, point in enumerate(spec.all_points(), 1):
         # what cannot exist depends on these alone
-        key = json.dumps({k: v for k, v in point.items() if k not in ("fan", "policy", "pattern", "ambient_c")})
+        key = json.dumps({k: v for k, v in point.items() if k not in ("fan", "policy", "ambient_c")})
         if count > MOST_POINTS:
             raise InputError(f"more than {MOST_POINTS} points", path)
         if key in seen:
@@ -328,6 +363,10 @@ def read_spec(path: Path) -> Spec:
             seen.add(key)
         try:
             check_point(point)
+            array = array_of_point(point)
+            boards = len(native.boards_of(array.rows, array.cols, *board_of_point(point, array)))
+            if spec.boards and max(spec.boards) > boards:
+                raise InputError(f"[board.{max(spec.boards)}], but the array has {boards} boards")
         except InputError as error:
             raise InputError(f"point {count} ({named(point)}) cannot exist: {error.message}", path) from None
     spec.points = count or spec.points
