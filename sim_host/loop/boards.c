@@ -33,7 +33,8 @@ boards_part_t boards_part(int array_rows, int array_columns, int rows, int colum
 }
 
 boards_t *boards_create(const controller_settings_t settings[], const plant_t *plant, int rows,
-                        int columns, uint64_t seed, int *board, uint16_t *bad)
+                        int columns, const loop_options_t *options, uint64_t seed, int *board,
+                        uint16_t *bad)
 {
     const int array_rows = plant_rows(plant), array_columns = plant_columns(plant);
     const int count = boards_count(array_rows, array_columns, rows, columns);
@@ -50,8 +51,9 @@ boards_t *boards_create(const controller_settings_t settings[], const plant_t *p
     }
     for (int k = 0; k < count; k++) {
         const boards_part_t part = boards_part(array_rows, array_columns, rows, columns, k);
-        boards->loop[k] = loop_create_part(&settings[k], boards->plant, part.row, part.column, NULL,
-                                           seed + (uint64_t)k * UINT64_C(0x9E3779B97F4A7C15), bad);
+        boards->loop[k] =
+            loop_create_part(&settings[k], boards->plant, part.row, part.column, options,
+                             seed + (uint64_t)k * UINT64_C(0x9E3779B97F4A7C15), bad);
         if (boards->loop[k] == NULL) {
             boards_destroy(boards);
             if (board != NULL) {

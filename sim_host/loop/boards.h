@@ -26,7 +26,8 @@ boards_part_t boards_part(int array_rows, int array_columns, int rows, int colum
  * NULL if and only if board *board (may be NULL) is refused (*bad as of loop_create_part), or
  * memory is out (*board is -1). */
 boards_t *boards_create(const controller_settings_t settings[], const plant_t *plant, int rows,
-                        int columns, uint64_t seed, int *board, uint16_t *bad);
+                        int columns, const loop_options_t *options, uint64_t seed, int *board,
+                        uint16_t *bad);
 void boards_destroy(boards_t *boards);
 
 /* One tick of every board, in step. */

@@ -43,7 +43,7 @@ static void cut(int rows, int columns)
         settings[k].model.rows = (uint8_t)part.rows;
         settings[k].model.columns = (uint8_t)part.columns;
     }
-    boards = boards_create(settings, plant, rows, columns, 1, NULL, NULL);
+    boards = boards_create(settings, plant, rows, columns, NULL, 1, NULL, NULL);
     TEST_ASSERT_NOT_NULL(boards);
 }
 
@@ -124,7 +124,7 @@ static void the_board_that_does_not_fit_is_named(void)
     settings[0].model.rows = settings[1].model.rows = 2;
     settings[0].model.columns = 2;
     settings[1].model.columns = 3;
-    TEST_ASSERT_NULL(boards_create(settings, plant, 2, 2, 1, &board, &bad));
+    TEST_ASSERT_NULL(boards_create(settings, plant, 2, 2, NULL, 1, &board, &bad));
     TEST_ASSERT_EQUAL(1, board);
     TEST_ASSERT_EQUAL(PARAMETER_rows, bad);
 }

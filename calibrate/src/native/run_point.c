@@ -88,7 +88,7 @@ int chip_run(const plant_t *plant, int board_rows, int board_columns, const char
     uint16_t bad = UINT16_MAX;
     int board = 0;
     boards_t *boards =
-        boards_create(settings, plant, board_rows, board_columns, seed, &board, &bad);
+        boards_create(settings, plant, board_rows, board_columns, NULL, seed, &board, &bad);
     free(settings);
     if (boards == NULL) {
         (void)snprintf(message, message_size, "board %d: %s", board + 1,
