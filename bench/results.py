@@ -74,6 +74,7 @@ SECTIONS: tuple[Section, ...] = (
     Section(
         "explore_paper", "The paper's temperatures from geometry", f"{PYTHON} bench/explore/paper.py --mesh coarse"
     ),
+    Section("worst", "The worst patterns of 8 x 8", f"{PYTHON} bench/explore/worst.py"),
     Section("field_logs", "Logs of the field, diagnosed", f"{PYTHON} bench/diagnose/field.py", markdown=True),
     Section("sweep", "Sweeps", f"{PYTHON} bench/explore/sweep.py"),
     Section("real_logs", "What real logs bring", f"{PYTHON} bench/diagnose/real_logs.py"),

@@ -116,8 +116,8 @@ def patterns(work: Path) -> Any:
                 f"{100 * row.undriven_austenite:.0f} % austenite, with {row.pattern}"
             )
     axis.axhline(AUSTENITE_START_C, color="#9ca3af", lw=0.8)
-    axis.set(xlabel="pitch, mm", ylabel="undriven at most, degC\n(worst of 512 patterns)")
-    axis.legend(fontsize=7)
+    axis.set(xlabel="pitch, mm", ylabel="undriven at most, degC\n(worst of 512 patterns)", ylim=(20, 105))
+    axis.legend(fontsize=7, handlelength=4, ncols=4, loc="upper center")
     return figure
 
 

@@ -152,46 +152,16 @@ static void straighten(const mapping_t *m, double *factor, double *rise_per_k, d
     *fan_loss = fan_y / s22;
 }
 
-static bool is_within(int row, int column, int rows, int columns)
+/* Of spring i: sides without a neighbour in the whole array. */
+static int free_sides_of(const mapping_t *m, int i)
 {
-    return row >= 0 && row < rows && column >= 0 && column < columns;
+    const int row = m->row + i / m->columns, column = m->column + i % m->columns;
+    return (row == 0) + (row == plant_rows(m->plant) - 1) + (column == 0) +
+           (column == plant_columns(m->plant) - 1);
 }
 
-static bool is_in_plant(const mapping_t *m, int row, int column)
-{
-    return is_within(m->row + row, m->column + column, plant_rows(m->plant),
-                     plant_columns(m->plant));
-}
-
-/* Of spring i: sides without a neighbour in the whole array, and neighbours that the chip does not
- * know: beside it, across, two apart. */
-typedef struct {
-    int free_sides, orthogonal, diagonal, second;
-} outside_t;
-
-static outside_t outside_of(const mapping_t *m, int i)
-{
-    outside_t outside = {0};
-    for (int k = 0; k < 9; k++) {
-        const int row = i / m->columns + k / 3 - 1, column = i % m->columns + k % 3 - 1;
-        const bool beside = k % 2 == 1;
-        if (!is_in_plant(m, row, column)) {
-            outside.free_sides += beside;
-        } else if (!is_within(row, column, m->rows, m->columns)) {
-            *(beside ? &outside.orthogonal : &outside.diagonal) += 1;
-        }
-    }
-    for (int k = 0; k < 4; k++) {
-        static const int away[4][2] = {{-2, 0}, {0, -2}, {0, 2}, {2, 0}};
-        const int row = i / m->columns + away[k][0], column = i % m->columns + away[k][1];
-        outside.second +=
-            is_in_plant(m, row, column) && !is_within(row, column, m->rows, m->columns);
-    }
-    return outside;
-}
-
-/* Loss of each spring, with edge, mismatch, natural convection and what leads to springs of other
- * boards in it: a mean and a scale each. */
+/* Loss of each spring, with edge, mismatch and natural convection in it: a mean and a scale each.
+ */
 static void map_loss(mapping_t *m)
 {
     const bool edge = is_on(m, EFFECT_edge_loss), mismatch = is_on(m, EFFECT_spring_mismatch);
@@ -205,19 +175,12 @@ static void map_loss(mapping_t *m)
         straighten(m, &factor, &rise, &fan_loss);
     }
     for (int i = 0; i < m->springs; i++) {
-        const outside_t outside = outside_of(m, i);
-        const int free_sides = outside.free_sides;
+        const int free_sides = free_sides_of(m, i);
         const double own = mismatch ? value_of(m, "loss_scale", i) : 1.0;
         const double scale = own * (edge ? 1.0 + per_side * free_sides : 1.0);
         const double fan_scale = own * (edge ? 1.0 + fan_per_side * free_sides : 1.0);
         natural[i] = scale * (correlation ? factor : factor * value_of(m, "loss_w_per_k", i));
         forced[i] = fan_scale * (correlation ? fan_loss : value_of(m, "loss_fan_w_per_k", i));
-        natural[i] += outside.orthogonal * array_value(m, "orthogonal_w_per_k") +
-                      outside.diagonal * array_value(m, "diagonal_w_per_k") +
-                      outside.second * array_value(m, "second_w_per_k");
-        forced[i] += outside.orthogonal * array_value(m, "orthogonal_fan_w_per_k") +
-                     outside.diagonal * array_value(m, "diagonal_fan_w_per_k") +
-                     outside.second * array_value(m, "second_fan_w_per_k");
     }
     double spread = 0.0, fan_spread = 0.0;
     const double mean = mean_of(m, natural, &spread);

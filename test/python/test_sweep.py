@@ -206,6 +206,14 @@ def test_boards_of_a_large_array_do_as_one_board_does() -> None:
     assert one["started"] == many["started"] == 1.0
     assert abs(one["undriven_c"] - many["undriven_c"]) < 3.0
     assert many["hottest_c"] < 115.0
+    # where couplings are strong (what geometry says of 4.3 mm), a board that took its neighbours to be cold would run away
+    strong = point.plant_of_point(spec, array)
+    strong.set("orthogonal_w_per_k", 1.8e-3)
+    strong.set("loss_w_per_k", 2.2e-3)
+    parts = native.boards_of(6, 6, 2, 2)
+    lines = [native.chip_export(strong, part)[0] + point.settings_of(array) for part in parts]
+    hot, *_ = native.chip_run(strong, (2, 2), lines, [True] * 36, 0.0, 1, 200, 200)
+    assert hot.max() < 115.0
     spec.boards = {1: {"supply_limit_a": 1.0}}  # the first six springs of all: 3 x 2
     first = point.metrics_of(spec, array | {"board_rows": 3, "board_cols": 2}, 1)
     assert 0.8 <= first["started"] < 1.0
