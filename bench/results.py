@@ -48,6 +48,7 @@ PYTHON = ".venv/bin/python"
 SECTIONS: tuple[Section, ...] = (
     Section("thermal_model", "The model on the chip", f"{HOST}/bench/thermal_model/bench_thermal_model"),
     Section("plant", "The simulated array", f"{HOST}/bench/plant/bench_plant"),
+    Section("scale", "Arrays up to 32 x 32", f"{HOST}/bench/plant/bench_scale"),
     Section("loop", "Controller and array, natively", f"{HOST}/bench/loop/bench_loop"),
     Section("firmware", "The firmware's size", f"{PYTHON} bench/firmware/firmware.py"),
     Section("board", "The firmware on the simulated Mega", f"{HOST}/bench/board/bench_board"),
@@ -57,13 +58,13 @@ SECTIONS: tuple[Section, ...] = (
     Section(
         "worlds",
         "Worlds that are not as declared: the first start ever",
-        f"{HOST}/bench/worlds/bench_worlds --seed 2027",
+        f"{HOST}/bench/worlds/bench_worlds --seed 2028",
         markdown=True,
     ),
     Section(
         "worlds_learnt",
         "Worlds that are not as declared: later starts",
-        f"{HOST}/bench/worlds/bench_worlds --seed 2027 --learnt",
+        f"{HOST}/bench/worlds/bench_worlds --seed 2028 --learnt",
         markdown=True,
     ),
     Section("replay", "Measured logs through the on-chip model", f"{PYTHON} script/replay_fit.py"),
@@ -78,12 +79,15 @@ SECTIONS: tuple[Section, ...] = (
     Section(
         "explore_paper", "The paper's temperatures from geometry", f"{PYTHON} bench/explore/paper.py --mesh coarse"
     ),
+    Section("worst", "The worst patterns of 8 x 8", f"{PYTHON} bench/explore/worst.py"),
+    Section("field_logs", "Logs of the field, diagnosed", f"{PYTHON} bench/diagnose/field.py", markdown=True),
     Section("sweep", "Sweeps", f"{PYTHON} bench/explore/sweep.py"),
     Section(
         "real_logs",
         "What real logs bring",
         f"{PYTHON} bench/diagnose/real_logs.py --resume build/results/real_logs.json",
     ),
+    Section("dashboard", "The live page", f"{PYTHON} bench/dashboard/run.py"),
 )
 
 

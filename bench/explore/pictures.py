@@ -1,6 +1,6 @@
 """The pictures of docs/exploring.md: runs its sweeps (carries on where they are), then draws.
 
-.venv/bin/python bench/explore/pictures.py [paper pitch cooling which] [--work build/explore] [--figures docs/figures]
+.venv/bin/python bench/explore/pictures.py [paper pitch cooling patterns which] [--work build/explore] [--figures docs/figures]
 """
 
 from __future__ import annotations
@@ -80,17 +80,44 @@ def pitch(work: Path) -> Any:
         ("pictures_per_min", axes[1], "pictures a minute"),
     ):
         for (size, fan), part in table.groupby(["size", "fan"]):
-            style = {2: ":", 3: "--", 4: "-"}[size]
+            style, marker = {3: (":", "o"), 4: ("--", "s"), 8: ("-.", "^"), 16: ("-", "D")}[size]
             axis.plot(
                 part.pitch_mm,
                 part[metric],
                 style,
-                marker=".",
+                marker=marker,
+                ms=4,
+                mfc="none",
                 color=FAN if fan else STILL,
                 label=f"{size} x {size}{', fan' if fan else ''}",
             )
         axis.set(xlabel="pitch, mm", ylabel=label)
-    axes[0].legend(fontsize=7)
+    axes[0].legend(fontsize=7, handlelength=4)
+    return figure
+
+
+def patterns(work: Path) -> Any:
+    """Draw the hottest that any undriven spring comes in any of all patterns, against the pitch."""
+    table = swept("patterns", work)
+    figure, axis = plt.subplots(figsize=(7.2, 3.0))
+    for (policy, fan), part in table.groupby(["policy", "fan"]):
+        worst = part.loc[part.groupby("pitch_mm")["undriven_c"].idxmax()]
+        axis.plot(
+            worst.pitch_mm,
+            worst.undriven_c,
+            "-" if policy == "precompensate" else "--",
+            marker="o",
+            color=FAN if fan else STILL,
+            label=f"{policy}{', fan' if fan else ''}",
+        )
+        for row in worst.itertuples():
+            print(
+                f"pitch {row.pitch_mm:g} mm, {policy}, fan {fan:g}: undriven at most {row.undriven_c:.1f} degC, "
+                f"{100 * row.undriven_austenite:.0f} % austenite, with {row.pattern}"
+            )
+    axis.axhline(AUSTENITE_START_C, color="#9ca3af", lw=0.8)
+    axis.set(xlabel="pitch, mm", ylabel="undriven at most, degC\n(worst of 512 patterns)", ylim=(20, 105))
+    axis.legend(fontsize=7, handlelength=4, ncols=4, loc="upper center")
     return figure
 
 
@@ -123,19 +150,19 @@ def which(work: Path) -> Any:
     swept("which", work)
     found = json.loads((work / "which" / "indices.json").read_text())
     keys = list(next(iter(found.values())))
-    figure, axis = plt.subplots(figsize=(7.2, 2.6))
+    figure, axis = plt.subplots(figsize=(7.2, 3.6))
     values = [[min(1.0, max(0.0, found[metric][key]["ST"])) for key in keys] for metric in found]
     axis.imshow(values, cmap="Oranges", vmin=0, vmax=1, aspect="auto")
-    axis.set_xticks(range(len(keys)), keys)
+    axis.set_xticks(range(len(keys)), keys, rotation=20, ha="right", fontsize=7)
     axis.set_yticks(range(len(found)), list(found))
     for y, metric in enumerate(found):
         for x, key in enumerate(keys):
             one = found[metric][key]
-            axis.text(x, y, f"{one['ST']:.2f} ± {one['ST_conf']:.2f}", ha="center", va="center", fontsize=7)
+            axis.text(x, y, f"{one['ST']:.2f}\n± {one['ST_conf']:.2f}", ha="center", va="center", fontsize=6)
     return figure
 
 
-PICTURES = {"paper": paper, "pitch": pitch, "cooling": cooling, "which": which}
+PICTURES = {"paper": paper, "pitch": pitch, "cooling": cooling, "patterns": patterns, "which": which}
 
 
 def main() -> None:

@@ -182,10 +182,9 @@ def main() -> None:
     figures = []
     with tempfile.TemporaryDirectory() as folder:
         for name in options.part or PARTS:
-            figures += PARTS[name](Path(folder), cores)
-    if options.json:
-        figures = [one | {"command": "bench/explore/sweep.py"} for one in figures]
-        options.json.write_text(json.dumps(figures, indent=1) + "\n")
+            figures += [one | {"command": "bench/explore/sweep.py"} for one in PARTS[name](Path(folder), cores)]
+            if options.json:  # after each: what is measured is not lost
+                options.json.write_text(json.dumps(figures, indent=1) + "\n")
 
 
 if __name__ == "__main__":

@@ -9,7 +9,7 @@ static void restart_spring(score_spring_t *spring)
 {
     spring->reached_s = spring->report_from_s = spring->report_last_s = NAN;
     spring->lost_s = 0.0;
-    spring->below_start = false;
+    spring->heats = false;
 }
 
 void score_begin(score_t *score, const world_t *world, const bool driven[], double allowed_s)
@@ -72,7 +72,7 @@ static void score_driven(score_t *score, score_spring_t *spring, const world_t *
                          const controller_t *controller)
 {
     double now_s = world_time_s(world), since_s = now_s - score->start_s;
-    double austenite = world_austenite(world, k), middle_c = world_node_c(world, k, 1);
+    double austenite = world_austenite(world, k);
     score_report(spring, belief_reported(controller, k), now_s);
     if (isnan(spring->reached_s) && austenite >= SCORE_REACHED) {
         spring->reached_s = now_s;
@@ -90,15 +90,11 @@ static void score_driven(score_t *score, score_spring_t *spring, const world_t *
     if (since_s >= SCORE_HOLD_S && austenite >= SCORE_LOST) {
         score_hold(spring, world, k, controller);
     }
-    double start_c = world_austenite_start_c(world, k);
     bool settled = since_s >= SCORE_SETTLED_S && !isnan(spring->reached_s);
     spring->settled_hold_s += settled ? SAMPLE_S : 0.0;
-    if (middle_c < start_c - SCORE_REHEAT_K) {
-        spring->below_start = true;
-    } else if (middle_c > start_c && spring->below_start) {
-        spring->below_start = false;
-        spring->reheats += settled;
-    }
+    bool heats = world_current_a(world, k) > SCORE_REHEAT_A;
+    spring->reheats += settled && heats && !spring->heats;
+    spring->heats = heats;
 }
 
 static void score_bounds(score_spring_t *spring, const world_t *world, int k,

@@ -16,7 +16,7 @@
 #define SCORE_UNDRIVEN     0.05  /* austenite that an undriven spring may have */
 #define SCORE_HOLD_S       300.0 /* from then on after a start a spring counts as held */
 #define SCORE_SETTLED_S    600.0 /* from then on reheats count */
-#define SCORE_REHEAT_K     2.0   /* a reheat: austenite start is crossed after so much below it */
+#define SCORE_REHEAT_A     2.2   /* a reheat begins: no hold needs so much */
 #define SCORE_REPORT_GAP_S 1.0   /* a report still stands over shorter gaps */
 
 typedef struct {
@@ -32,7 +32,7 @@ typedef struct {
     bool was_low;          /* undriven: it has been below SCORE_UNDRIVEN */
     double undriven_most;  /* austenite, since then */
     double hold_c, hold_s; /* sum of mean temperature times time held, and that time */
-    bool below_start;      /* clearly below austenite start since it last crossed it */
+    bool heats;            /* with the current of a heating */
     int reheats;
     double settled_hold_s;    /* in which they were counted */
     double known_s, inside_s; /* bounds were given; temperature and phase were within them */

@@ -26,9 +26,9 @@
 #define MARGIN_PER_SD 1.6f /* 95 % of a normal distribution, one side */
 #define MARGIN_SD_K   1.5f /* that hold_margin_k itself allows for */
 #define BLIND_BEGIN_K 4.0f /* above austenite finish: it has transformed at the likely worst */
-#define BLIND_K_PER_S (1.0f / 60.0f)
-#define SUSPECTED_W   0.038f /* stops a fall of 0.1 K/s */
-#define FOLLOW_S      4.0f   /* a distance from the held temperature is closed in */
+#define BLIND_K_PER_S (1.0f / 40.0f) /* slower than its time constant, C / G = 52 s, follows */
+#define SUSPECTED_W   0.038f         /* stops a fall of 0.1 K/s */
+#define FOLLOW_S      4.0f           /* a distance from the held temperature is closed in */
 #define SHORT_MOST_K  20.0f
 #define KEPT_C7       (3 * 128) /* above austenite start what was reached is worth keeping */
 #define TURN_C7       (6 * 128) /* colder than one that heats: it is its turn */

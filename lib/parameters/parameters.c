@@ -46,7 +46,7 @@ uint8_t parameter_width(uint8_t type)
     return type == PARAMETER_U8 ? 1 : type == PARAMETER_U32 ? 4 : 2;
 }
 
-static size_t place(const parameter_row_t *row, uint8_t element)
+static size_t place(const parameter_row_t *row, spring_index_t element)
 {
     return row->offset + (size_t)element * parameter_width(row->type);
 }
@@ -58,12 +58,12 @@ int32_t parameter_decode(const void *bytes, uint8_t type)
     return type == PARAMETER_S16 ? (int16_t)value : value;
 }
 
-int32_t parameter_get(const void *values, const parameter_row_t *row, uint8_t element)
+int32_t parameter_get(const void *values, const parameter_row_t *row, spring_index_t element)
 {
     return parameter_decode((const uint8_t *)values + place(row, element), row->type);
 }
 
-void parameter_set(void *values, const parameter_row_t *row, uint8_t element, int32_t value)
+void parameter_set(void *values, const parameter_row_t *row, spring_index_t element, int32_t value)
 {
     memcpy((uint8_t *)values + place(row, element), &value, parameter_width(row->type));
 }
@@ -75,7 +75,7 @@ bool parameter_check(parameter_part_t part, const void *values, uint16_t *bad)
             continue;
         }
         const parameter_row_t row = parameter_row(k);
-        for (uint8_t element = 0; element < row.count; element++) {
+        for (spring_index_t element = 0; element < row.count; element++) {
             const int32_t value = parameter_get(values, &row, element);
             if (value < row.minimum || value > row.maximum) {
                 if (bad != NULL) {
@@ -95,7 +95,7 @@ static void set_defaults(parameter_part_t part, void *values)
             continue;
         }
         const parameter_row_t row = parameter_row(k);
-        for (uint8_t element = 0; element < row.count; element++) {
+        for (spring_index_t element = 0; element < row.count; element++) {
             parameter_set(values, &row, element, row.standard);
         }
     }

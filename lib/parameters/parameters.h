@@ -22,6 +22,13 @@ extern "C" {
 #endif
 #endif
 
+/* Counts springs: a byte on a board. */
+#if THERMAL_MODEL_MAX_SPRINGS <= UINT8_MAX
+typedef uint8_t spring_index_t;
+#else
+typedef uint16_t spring_index_t;
+#endif
+
 /* --- the values, a struct for each part ----------------------------------------------------- */
 
 #define PARAMETER_C_U8    uint8_t
@@ -89,11 +96,11 @@ typedef enum { PARAMETER_U8 = 0, PARAMETER_U16, PARAMETER_S16, PARAMETER_U32 } p
 
 typedef struct {
     char name[PARAMETER_NAME_SIZE];
-    char unit[5];  /* "" for a plain number */
-    uint8_t id;    /* in stored records */
-    uint8_t part;  /* parameter_part_t */
-    uint8_t type;  /* parameter_type_t */
-    uint8_t count; /* 1, or THERMAL_MODEL_MAX_SPRINGS: an element for each spring */
+    char unit[5];         /* "" for a plain number */
+    uint8_t id;           /* in stored records */
+    uint8_t part;         /* parameter_part_t */
+    uint8_t type;         /* parameter_type_t */
+    spring_index_t count; /* 1, or THERMAL_MODEL_MAX_SPRINGS: an element for each spring */
     uint8_t decimals;
     uint16_t offset; /* of the first element in the part's struct */
     int32_t minimum; /* of one value alone, in units of 10^-decimals */
@@ -109,8 +116,8 @@ uint8_t parameter_width(uint8_t type); /* bytes */
  * row of that type allows. */
 int32_t parameter_decode(const void *bytes, uint8_t type);
 /* Of one element; values: the part's struct. */
-int32_t parameter_get(const void *values, const parameter_row_t *row, uint8_t element);
-void parameter_set(void *values, const parameter_row_t *row, uint8_t element, int32_t value);
+int32_t parameter_get(const void *values, const parameter_row_t *row, spring_index_t element);
+void parameter_set(void *values, const parameter_row_t *row, spring_index_t element, int32_t value);
 
 /* True if and only if all values of a part keep the limits of their rows; else *bad (may be NULL)
  * is the first row that is not kept. O(rows). */

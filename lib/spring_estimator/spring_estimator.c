@@ -148,7 +148,8 @@ void spring_estimator_init(spring_estimator_t *e, thermal_model_t *model)
     spring_estimator_prepare(e, model, true);
     for (uint8_t k = 0; k < e->springs; k++) {
         spring_estimator_forget(e, k);
-        begin(&e->spring[k], coldest_c + 0.5f * width_k, UNIFORM_SD * width_k, SPRING_PHASE_ANY);
+        begin(&e->spring[k], coldest_c + 0.5f * width_k,
+              UNIFORM_SD * width_k + TRUST_SD_K /* of ambient */, SPRING_PHASE_ANY);
         e->spring[k].hottest_c = SPRING_ESTIMATOR_HOTTEST_C;
         spring_set_temperature(model, k, coldest_c + 0.5f * width_k, SPRING_PHASE_MARTENSITE);
     }
@@ -200,8 +201,7 @@ void spring_estimator_disturb(spring_belief_t *b)
     b->ohm_before[1] = 0.0f;
 }
 
-/* All that readings are compared with jumps along. */
-static void jump(spring_belief_t *b, float by)
+void spring_jump(spring_belief_t *b, float by)
 {
     b->line_ohm *= by;
     b->mark_ohm *= by;
@@ -224,12 +224,15 @@ static bool leave_out(spring_belief_t *b, float ohm, float current_a)
         b->odd = false;
         return false;
     }
-    const bool near = fminf(current_a, b->current_a) > fmaxf(STRONG_A, 0.5f * current_a);
+    /* a line compares with any current, but for the sensor's offset; a heating only with its own */
+    const bool compares =
+        current_a > STRONG_A && (holds || b->current_a > fmaxf(STRONG_A, 0.5f * current_a));
     const bool by_load = !holds || step * b->learnt.change < 0.0f;
-    const float most = (by_load ? JUMP_OF_LOAD : JUMP_LEAST) + JUMP_SDS * b->noise;
-    const bool jumps = near && fabsf(step) > most * was_ohm;
+    const float most = (by_load ? JUMP_OF_LOAD : JUMP_LEAST) + JUMP_SDS * b->noise +
+                       (holds ? spring_offset_may_show(b, current_a) : 0.0f);
+    const bool jumps = compares && fabsf(step) > most * was_ohm;
     if (jumps && b->odd) {
-        jump(b, ohm / was_ohm);
+        spring_jump(b, ohm / was_ohm);
     }
     b->odd = jumps && !b->odd;
     return b->odd;
@@ -251,6 +254,7 @@ static void take_reading(spring_belief_t *b, float ohm, float current_a)
 {
     take_noise(b, ohm, current_a);
     b->slow_ohm = b->fresh == 0 ? ohm : b->slow_ohm + (ohm - b->slow_ohm) * SLOW_SHARE;
+    b->slow_a = b->fresh == 0 ? current_a : b->slow_a + (current_a - b->slow_a) * SLOW_SHARE;
     b->current_a = current_a;
     b->ohm = ohm;
     b->phase_ohm = current_a > STRONG_A || b->fresh == 0 ? ohm : b->phase_ohm;
@@ -491,7 +495,7 @@ void spring_estimator_update(spring_estimator_t *e, thermal_model_t *model, uint
 bool spring_lacks_phase(const spring_belief_t *b, const thermal_model_t *model, uint8_t k)
 {
     const spring_learnt_t *l = &b->learnt;
-    if (!b->reads || b->blind || l->austenite_ohm == 0.0f || b->current_a < STRONG_A) {
+    if (b->fresh == 0 || b->blind || l->austenite_ohm == 0.0f || b->current_a < STRONG_A) {
         return false;
     }
     const int16_t finish_c7 = thermal_model_transformation(model, k).austenite_finish_c7;
@@ -500,6 +504,13 @@ bool spring_lacks_phase(const spring_belief_t *b, const thermal_model_t *model, 
         EXPLAINED_LEAST + LOOK_SDS * b->noise + COEFFICIENT_MOST_PER_K * above_k;
     const float less = 1.0f - b->ohm / l->austenite_ohm;
     return (l->change < 0.0f ? -less : less) > explained;
+}
+
+static bool surely_finished(const spring_belief_t *b, const thermal_model_t *model, uint8_t k,
+                            float sds)
+{
+    return spring_now_c(model, k) - sds * spring_estimator_sd_k(b) >
+           spring_c(thermal_model_transformation(model, k).austenite_finish_c7);
 }
 
 bool spring_estimator_has_transformed(const spring_estimator_t *e, const thermal_model_t *model,
@@ -515,8 +526,7 @@ bool spring_estimator_has_transformed(const spring_estimator_t *e, const thermal
     const float sds = spring_lacks_phase(b, model, k) ? SPRING_ESTIMATOR_BOUND_SDS
                       : b->onset                      ? TRUST_ONSET_SDS
                                                       : TRUST_STILL_SDS;
-    return spring_now_c(model, k) - sds * spring_estimator_sd_k(b) >
-           spring_c(thermal_model_transformation(model, k).austenite_finish_c7);
+    return surely_finished(b, model, k, sds);
 }
 
 void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, uint8_t k,
@@ -534,9 +544,11 @@ void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, 
     } else if (!full && b->possible == SPRING_PHASE_AUSTENITE) {
         b->possible = SPRING_PHASE_BETWEEN | SPRING_PHASE_AUSTENITE;
     }
-    /* its heating was ended, by a limit or as hot as it takes: once more, then what it reads tells
-     * nothing */
-    b->blind = b->blind || (lacks && b->doubted);
+    /* as hot as it takes whatever it reads, or ended twice by a limit: what it reads tells nothing
+     */
+    const bool certain = spring_heated_enough(e, b, model, k) ||
+                         surely_finished(b, model, k, SPRING_ESTIMATOR_BOUND_SDS);
+    b->blind = b->blind || (lacks && (b->doubted || certain));
     b->doubted = lacks && !b->blind;
     if (full && !lacks && b->onset && b->reads && b->current_a > STRONG_A) {
         spring_learn_austenite(b); /* hot enough, and its resistance had come to rest */
@@ -549,6 +561,7 @@ void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, 
     b->line_ohm = 0.0f;
     if (full && b->reads && b->current_a > STRONG_A) {
         b->slow_ohm = b->ohm;
+        b->slow_a = b->current_a;
         spring_begin_line(b, now_c);
         b->rough = true;
         b->offset_sd_v = fmaxf(b->offset_sd_v, OFFSET_AGAIN_V);
@@ -597,6 +610,13 @@ float spring_estimator_cooling_s(const spring_estimator_t *e, const thermal_mode
                logf((left_c - ambient_c) / (finish_c - ambient_c));
 }
 
+/* What moved it lately, a gust for one, may do so again, either way. */
+static spring_bounds_t disturbed(const spring_belief_t *b, spring_bounds_t bounds)
+{
+    return (spring_bounds_t){bounds.value, bounds.low - b->disturbance_k,
+                             bounds.high + b->disturbance_k};
+}
+
 spring_bounds_t spring_estimator_temperature_c(const spring_estimator_t *e,
                                                const thermal_model_t *model, uint8_t k)
 {
@@ -604,21 +624,23 @@ spring_bounds_t spring_estimator_temperature_c(const spring_estimator_t *e,
     const float now_c = spring_now_c(model, k) + b->shift_k;
     float others_k2 = SHIFT_SD_K * SHIFT_SD_K; /* where it was seen, its transformation was */
     if (b->possible == SPRING_PHASE_ANY) {
-        return (spring_bounds_t){now_c, spring_ambient_c(model) - TRUST_SD_K, b->hottest_c};
+        const float coldest_c = spring_ambient_c(model) - SPRING_ESTIMATOR_BOUND_SDS * TRUST_SD_K;
+        return (spring_bounds_t){now_c, coldest_c, b->hottest_c};
     }
     if (b->possible == SPRING_PHASE_MARTENSITE) { /* as warm as room and neighbours make it */
         const float neighbours_k = NEIGHBOUR_SD * (now_c - spring_ambient_c(model));
         others_k2 = TRUST_SD_K * TRUST_SD_K + neighbours_k * neighbours_k;
     }
-    return spring_around(now_c, sqrtf(distance_k2(b) + others_k2));
+    return disturbed(b, spring_around(now_c, sqrtf(distance_k2(b) + others_k2)));
 }
 
 spring_bounds_t spring_estimator_distance_k(const spring_estimator_t *e,
                                             const thermal_model_t *model, uint8_t k)
 {
     const int16_t start_c7 = thermal_model_transformation(model, k).martensite_start_c7;
-    return spring_around(spring_c((int16_t)(thermal_model_temperature_c7(model, k) - start_c7)),
-                         spring_estimator_sd_k(&e->spring[k]));
+    const float away_k = spring_c((int16_t)(thermal_model_temperature_c7(model, k) - start_c7));
+    const spring_belief_t *b = &e->spring[k];
+    return disturbed(b, spring_around(away_k, spring_estimator_sd_k(b)));
 }
 
 uint32_t spring_estimator_model_power_uw(const spring_estimator_t *e, uint8_t k, uint32_t power_uw)

@@ -87,6 +87,7 @@ typedef struct {
     float ohm;
     float ohm_before[2]; /* one and two turns earlier; 0: at another current */
     float slow_ohm;      /* over 4 s */
+    float slow_a;        /* the current over the same */
     float phase_ohm;     /* the last at a strong current: what tells the phase */
     float offset_v;      /* of the sensor: of what is read of the voltage */
     float offset_sd_v;
@@ -99,15 +100,20 @@ typedef struct {
     float peak_k;        /* the most of it */
     float mark_k;        /* where the resistance was last compared, and what it was */
     float mark_ohm;      /* 0: nowhere yet */
+    float mark_a;        /* at this current */
     float onset_ohm;
+    float onset_k;  /* heat taken up until then */
     float cold_ohm; /* at its beginning, martensite; 0: it was not */
     float cold_c;
+    float cold_a;
     float excess; /* change that no temperature coefficient explains; signed */
     float flat_k; /* heat since, without such a change */
     /* the running hold */
     float line_ohm; /* what it reads while it keeps its phase, at line_c; 0: none yet */
     float line_c;
-    float line_per_a; /* 1 / current of the line */
+    float line_a;     /* current of the line */
+    float rise_per_k; /* what a kelvin adds to it, relative */
+    float rise_sd_per_k;
 } spring_belief_t;
 
 typedef struct {

@@ -11,7 +11,7 @@
 #define COEFFICIENT_MOST_PER_K      0.0015f
 #define COEFFICIENT_MOST_PER_HEAT_K (COEFFICIENT_MOST_PER_K / 0.85f)
 
-#define COEFFICIENT_SD_PER_K 0.00025f /* of one that was learnt: noise and offset over 20 K */
+#define COEFFICIENT_BOUND_PER_K 0.00025f /* of one that was learnt: noise and offset over 20 K */
 
 /* A reading at less is coarse: 4 mV are 3 % of its voltage. */
 #define STRONG_A 0.8f
@@ -40,6 +40,8 @@ float spring_see(const spring_estimator_t *estimator, spring_belief_t *belief,
 void spring_keep_above(const spring_estimator_t *estimator, spring_belief_t *belief,
                        thermal_model_t *model, uint8_t spring, float limit_c);
 
+/* All that readings are compared with jumps along: a contact, or the sensor. */
+void spring_jump(spring_belief_t *belief, float by);
 /* It reads less than when it had transformed last, and the difference is neither noise nor a
  * temperature coefficient. */
 bool spring_lacks_phase(const spring_belief_t *belief, const thermal_model_t *model,
@@ -49,6 +51,11 @@ void spring_learn_austenite(spring_belief_t *belief);
 
 /* What it reads on average now is what it reads with the phase that it has. */
 void spring_begin_line(spring_belief_t *belief, float now_c);
+/* Even the coldest and heaviest spring has transformed by the heat of this heating. */
+bool spring_heated_enough(const spring_estimator_t *estimator, const spring_belief_t *belief,
+                          const thermal_model_t *model, uint8_t spring);
+/* What the sensor's offset may add to it at another current than its line's, relative. */
+float spring_offset_may_show(const spring_belief_t *belief, float current_a);
 /* While it heats: what heat does to its resistance. */
 void spring_heating_watch(const spring_estimator_t *estimator, spring_belief_t *belief,
                           thermal_model_t *model, uint8_t spring);

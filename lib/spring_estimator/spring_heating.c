@@ -16,6 +16,8 @@
 #define PLACE_SD_K     3.0f
 #define SHIFT_BOUND_K  8.0f  /* 2.6 standard deviations of a declared transformation */
 #define CAPACITY_BOUND 1.25f /* the same of a heat capacity */
+#define SAME_CURRENT   0.1f  /* within it a sensor's offset shows alike */
+#define LEAST_HEAT     0.74f /* latent heat 15 % less than declared, heat capacity 15 % more */
 #define COLD_SPAN_K    20.0f /* least, over which a coefficient is learnt */
 
 void spring_estimator_begin_heating(spring_estimator_t *e, const thermal_model_t *model, uint8_t k)
@@ -40,6 +42,7 @@ static void see_onset(const spring_estimator_t *e, spring_belief_t *b, thermal_m
 {
     const float now_c = spring_now_c(model, k);
     b->onset = true;
+    b->onset_k = b->heat_k;
     if (b->possible == SPRING_PHASE_MARTENSITE) {
         spring_learnt_t *l = &b->learnt;
         if (b->cold_ohm > 0.0f && now_c > b->cold_c + COLD_SPAN_K) {
@@ -79,9 +82,26 @@ static void see_finish(const spring_estimator_t *e, spring_belief_t *b, thermal_
                      SPRING_PHASE_AUSTENITE);
 }
 
+/* Heat by which even the coldest and heaviest spring has come so far. */
+static float most_heat_k(const spring_estimator_t *e, const spring_belief_t *b, int16_t limit_c7)
+{
+    /* what does not show takes no latent heat */
+    const float latent_k =
+        b->onset ? b->begun_missing * e->latent_heat_j / e->heat_capacity_j_per_k : 0.0f;
+    /* where some austenite is left for certain, its transformation is where it was */
+    const float shift_k = (b->possible & SPRING_PHASE_AUSTENITE) != 0 ? 0.0f : SHIFT_BOUND_K;
+    return (spring_c(limit_c7) + shift_k - b->begun_c + latent_k) * CAPACITY_BOUND;
+}
+
+bool spring_heated_enough(const spring_estimator_t *e, const spring_belief_t *b,
+                          const thermal_model_t *model, uint8_t k)
+{
+    return b->heat_k >=
+           most_heat_k(e, b, thermal_model_transformation(model, k).austenite_finish_c7);
+}
+
 /* A spring that still transforms, or is known to show it and has not yet, is not hotter than that
- * lets it be, whatever the model says, until even the coldest and heaviest spring must have come so
- * far. */
+ * lets it be, whatever the model says, until it must have come so far. */
 static void hold_back(const spring_estimator_t *e, const spring_belief_t *b, thermal_model_t *model,
                       uint8_t k)
 {
@@ -91,19 +111,35 @@ static void hold_back(const spring_estimator_t *e, const spring_belief_t *b, the
         martensite ? (int16_t)(t.austenite_start_c7 + ONSET_C7) : t.austenite_finish_c7;
     const bool shows = b->steep || (b->learnt.austenite_ohm > 0.0f && !b->blind &&
                                     (martensite || spring_lacks_phase(b, model, k)));
-    if (!shows || thermal_model_temperature_c7(model, k) <= limit_c7) {
-        return;
+    if (shows && thermal_model_temperature_c7(model, k) > limit_c7 &&
+        b->heat_k < most_heat_k(e, b, limit_c7)) {
+        spring_set_temperature(model, k, spring_c(limit_c7), SPRING_PHASE_MARTENSITE);
     }
-    /* what does not show takes no latent heat */
-    const float latent_k =
-        b->onset ? b->begun_missing * e->latent_heat_j / e->heat_capacity_j_per_k : 0.0f;
-    const float limit_c = spring_c(limit_c7);
-    /* where some austenite is left for certain, its transformation is where it was */
-    const float shift_k = (b->possible & SPRING_PHASE_AUSTENITE) != 0 ? 0.0f : SHIFT_BOUND_K;
-    const float most_k = (limit_c + shift_k - b->begun_c + latent_k) * CAPACITY_BOUND;
-    if (b->heat_k < most_k) {
-        spring_set_temperature(model, k, limit_c, SPRING_PHASE_MARTENSITE);
-    }
+}
+
+/* As hot as it may be it has come to its austenite start. */
+static bool may_transform(const spring_belief_t *b, const thermal_model_t *model, uint8_t k)
+{
+    return b->possible != SPRING_PHASE_MARTENSITE ||
+           spring_now_c(model, k) + SPRING_ESTIMATOR_BOUND_SDS * spring_estimator_sd_k(b) >
+               spring_c(thermal_model_transformation(model, k).austenite_start_c7);
+}
+
+/* By as much as a transformation does: one whose change is known, by half of it at least. */
+static bool has_changed(const spring_belief_t *b)
+{
+    const float least = b->learnt.austenite_ohm > 0.0f
+                            ? 0.5f * fabsf(b->learnt.change) * b->begun_missing
+                            : CHANGE_LEAST;
+    return fabsf(b->ohm / b->onset_ohm - 1.0f) > fmaxf(least, CHANGE_LEAST);
+}
+
+/* Else it may only pause: a load may have moved the rest of its transformation away. */
+static bool has_taken_enough(const spring_estimator_t *e, const spring_belief_t *b,
+                             const thermal_model_t *model, uint8_t k)
+{
+    const float latent_k = b->begun_missing * e->latent_heat_j / e->heat_capacity_j_per_k;
+    return b->heat_k - b->onset_k > LEAST_HEAT * latent_k && !spring_lacks_phase(b, model, k);
 }
 
 /* Change of resistance over heat, a step at a time: more than any temperature coefficient makes is
@@ -119,8 +155,13 @@ void spring_heating_watch(const spring_estimator_t *e, spring_belief_t *b, therm
         b->mark_ohm = 0.0f;
         return;
     }
-    if (b->cold_ohm == 0.0f && b->possible == SPRING_PHASE_MARTENSITE) {
+    if (b->mark_ohm > 0.0f && fabsf(b->current_a - b->mark_a) > SAME_CURRENT * b->current_a) {
+        b->mark_ohm = b->excess = 0.0f; /* the sensor's offset shows otherwise */
+    }
+    if (b->possible == SPRING_PHASE_MARTENSITE &&
+        (b->cold_ohm == 0.0f || b->current_a > (1.0f + SAME_CURRENT) * b->cold_a)) {
         b->cold_ohm = b->ohm;
+        b->cold_a = b->current_a;
         b->cold_c = spring_now_c(model, k);
     }
     if (b->heat_k < b->peak_k) {
@@ -129,6 +170,7 @@ void spring_heating_watch(const spring_estimator_t *e, spring_belief_t *b, therm
     b->peak_k = b->heat_k;
     if (b->mark_ohm == 0.0f) {
         b->mark_ohm = b->ohm;
+        b->mark_a = b->current_a;
         b->mark_k = b->heat_k;
         return;
     }
@@ -151,9 +193,15 @@ void spring_heating_watch(const spring_estimator_t *e, spring_belief_t *b, therm
     b->steep = b->onset && fabsf(excess) > STEEP_SDS * b->noise;
     b->flat_k = b->steep || !b->onset ? 0.0f : b->flat_k + step_k;
     if (!b->onset && fabsf(b->excess) > EXCESS_SEEN + EXCESS_SDS * b->noise) {
-        see_onset(e, b, model, k);
-        b->steep = true;
-    } else if (b->flat_k >= FLAT_K && fabsf(b->ohm / b->onset_ohm - 1.0f) > CHANGE_LEAST) {
+        if (may_transform(b, model, k)) {
+            see_onset(e, b, model, k);
+            b->steep = true;
+        } else {
+            spring_jump(b, b->ohm / b->onset_ohm); /* too cold: a contact */
+            b->excess = 0.0f;
+        }
+    } else if (b->flat_k >= FLAT_K && has_changed(b) &&
+               (b->flat_k >= FLAT_K + SHIFT_BOUND_K || has_taken_enough(e, b, model, k))) {
         see_finish(e, b, model, k);
     }
     b->mark_ohm = b->ohm;

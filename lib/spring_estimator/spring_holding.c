@@ -22,8 +22,11 @@
 #define OFFSET_LEAST_V  0.0005f /* what a turn's steps of 4 mV leave, and its noise */
 #define OFFSET_SDS      3.0f
 #define OFFSET_MOST_V   0.012f
-#define STILL_K         0.5f  /* below where it would be seen */
-#define COSINE_BEGINS   0.64f /* 2 / pi: x where a cosine has sqrt(lost) = (pi / 2) x */
+#define AWAY_LEAST_K    1.0f /* less tells nothing of a coefficient */
+/* Of an average: what a sensor's steps leave, LOSS_LEAST / 3, and it tells anew in 2 x 16 turns. */
+#define LINE_VARIANCE (32.0f * LOSS_LEAST * LOSS_LEAST / 9.0f)
+#define STILL_K       0.5f  /* below where it would be seen */
+#define COSINE_BEGINS 0.64f /* 2 / pi: x where a cosine has sqrt(lost) = (pi / 2) x */
 
 /* Where it is on its way down, having lost so much: the beginning of the cosine, (1 - cos pi x)
  * / 2. */
@@ -39,7 +42,14 @@ void spring_begin_line(spring_belief_t *b, float now_c)
 {
     b->line_ohm = b->slow_ohm;
     b->line_c = now_c;
-    b->line_per_a = 1.0f / b->current_a;
+    b->line_a = b->slow_a;
+    /* as martensite's until this line tells: a contact that ages makes another slope of each */
+    const spring_learnt_t *l = &b->learnt;
+    const float most_per_k = l->martensite_ohm > 0.0f
+                                 ? COEFFICIENT_BOUND_PER_K + 0.5f * fabsf(l->martensite_rise_per_k)
+                                 : COEFFICIENT_MOST_PER_K;
+    b->rise_per_k = l->martensite_rise_per_k;
+    b->rise_sd_per_k = most_per_k / SPRING_ESTIMATOR_BOUND_SDS;
     b->rough = false;
     b->losing = 0;
 }
@@ -70,7 +80,7 @@ static void see_crossing(const spring_estimator_t *e, spring_belief_t *b, therma
  * sensor's offset. Returns whether this turn told one. */
 static bool learn_offset(spring_belief_t *b, float now_c)
 {
-    const float apart_per_a = 1.0f / b->current_a - b->line_per_a;
+    const float apart_per_a = 1.0f / b->current_a - 1.0f / b->line_a;
     if (apart_per_a < APART_PER_A) {
         return false;
     }
@@ -86,22 +96,40 @@ static bool learn_offset(spring_belief_t *b, float now_c)
     }
     b->offset_v += more_v;
     b->offset_sd_v = sqrtf(gain * read_v2);
-    b->line_ohm -= more_v * b->line_per_a;
+    b->line_ohm -= more_v / b->line_a;
     b->learnt.austenite_ohm = b->doubted ? b->learnt.austenite_ohm : b->line_ohm;
     b->seen = true; /* it is acted on in the next turn */
     return true;
 }
 
-/* By how much the resistance may have left its line with the phase kept: its temperature moves it,
- * and another current shows another share of the sensor's offset. */
-static float may_move(const spring_belief_t *b, float now_c)
+float spring_offset_may_show(const spring_belief_t *b, float current_a)
 {
-    const spring_learnt_t *l = &b->learnt;
-    const float unsure_per_k = l->martensite_ohm > 0.0f
-                                   ? COEFFICIENT_SD_PER_K + 0.5f * fabsf(l->martensite_rise_per_k)
-                                   : COEFFICIENT_MOST_PER_K;
-    return unsure_per_k * fabsf(now_c - b->line_c) +
-           OFFSET_SDS * b->offset_sd_v * fabsf(1.0f / b->current_a - b->line_per_a) / b->line_ohm;
+    return OFFSET_SDS * b->offset_sd_v * fabsf(1.0f / current_a - 1.0f / b->line_a) / b->line_ohm;
+}
+
+/* By how much, squared, the resistance may have left its line with the phase kept: its temperature
+ * moves it, and another current shows another share of the sensor's offset. */
+static float may_move_squared(const spring_belief_t *b, float now_c)
+{
+    const float moves = SPRING_ESTIMATOR_BOUND_SDS * b->rise_sd_per_k * (now_c - b->line_c);
+    const float offset = spring_offset_may_show(b, b->slow_a);
+    return moves * moves + offset * offset;
+}
+
+/* It keeps its phase: the line follows what it reads, and how that goes with a moving temperature
+ * is its slope. */
+static void follow(spring_belief_t *b, float now_c, float left)
+{
+    const float away_k = now_c - b->line_c;
+    if (fabsf(away_k) > AWAY_LEAST_K && fabsf(left) < LOSS_LEAST) {
+        const float variance = b->rise_sd_per_k * b->rise_sd_per_k;
+        const float gain = variance * away_k / (variance * away_k * away_k + LINE_VARIANCE);
+        b->rise_per_k = spring_clamp(b->rise_per_k + gain * left, -COEFFICIENT_MOST_PER_K,
+                                     COEFFICIENT_MOST_PER_K);
+        b->rise_sd_per_k = sqrtf(variance * (1.0f - gain * away_k));
+    }
+    b->line_ohm += b->line_ohm * left * LINE_SHARE;
+    b->line_c += away_k * LINE_SHARE;
 }
 
 /* Of what the resistance has left its line by, the part that lost phase may explain. */
@@ -134,6 +162,7 @@ void spring_holding_watch(const spring_estimator_t *e, spring_belief_t *b, therm
     if (b->line_ohm == 0.0f) {
         if (b->quiet == 0) {
             b->slow_ohm = b->ohm;
+            b->slow_a = b->current_a;
         }
         if (b->quiet < QUIET_TURNS) {
             b->losing = 0;
@@ -143,10 +172,10 @@ void spring_holding_watch(const spring_estimator_t *e, spring_belief_t *b, therm
     } else if (b->quiet == 0 && b->offset_sd_v > OFFSET_LEAST_V && learn_offset(b, now_c)) {
         return;
     }
-    const float kept_ohm =
-        b->line_ohm * (1.0f + b->learnt.martensite_rise_per_k * (now_c - b->line_c));
+    const float kept_ohm = b->line_ohm * (1.0f + b->rise_per_k * (now_c - b->line_c));
     if (b->quiet == 0 && b->current_a < STRONG_A) { /* on its way to the hold: too weak to tell */
         b->slow_ohm = kept_ohm;
+        b->slow_a = b->line_a;
         b->losing = 0;
         return;
     }
@@ -154,21 +183,22 @@ void spring_holding_watch(const spring_estimator_t *e, spring_belief_t *b, therm
     const float sd_k = spring_estimator_sd_k(b);
     const float changed = as_lost(b, model, k, left, sd_k);
     /* as its temperature may have moved unseen, so may the resistance */
-    const float moves = fabsf(b->learnt.martensite_rise_per_k) * sd_k;
+    const float moves = fabsf(b->rise_per_k) * sd_k;
     const float noise = b->rough ? b->noise : NOISE_IN_SLOW * b->noise;
     float sure = fmaxf(fmaxf(LOSS_LEAST, moves), SURE_SDS * noise);
-    const float suspected = b->rough ? SUSPECTED_ROUGH : SUSPECTED;
-    if (changed >= suspected * sure) { /* as a rule not: two divisions are saved */
-        sure += may_move(b, now_c);
+    float suspected = (b->rough ? SUSPECTED_ROUGH : SUSPECTED) * sure;
+    if (changed >= suspected) { /* as a rule not: two divisions are saved */
+        const float moves2 = may_move_squared(b, now_c);
+        sure = sqrtf(sure * sure + moves2);
+        suspected = sqrtf(suspected * suspected + moves2);
     }
-    if (changed < suspected * sure) {
+    if (changed < suspected) {
         b->losing = 0;
         if (b->quiet >= QUIET_TURNS) {
             if (b->rough) { /* it has come to rest */
                 spring_begin_line(b, now_c);
             }
-            b->line_ohm += b->line_ohm * left * LINE_SHARE;
-            b->line_c += (now_c - b->line_c) * LINE_SHARE;
+            follow(b, now_c, left);
             spring_keep_above(e, b, model, k, lost_at_c(model, k, b->lost) - STILL_K);
         }
         return;

@@ -35,7 +35,7 @@ _Static_assert(sizeof(thermal_model_spring_state_t) == 15, "size of what a sprin
 _Static_assert(sizeof(thermal_model_state_t) == 8 + 15 * THERMAL_MODEL_MAX_SPRINGS, "and of all");
 #endif
 
-static uint8_t clamp_index(const thermal_model_t *model, uint8_t spring)
+static spring_index_t clamp_index(const thermal_model_t *model, spring_index_t spring)
 {
     return spring < model->springs ? spring : 0;
 }
@@ -74,7 +74,7 @@ static int16_t midstep_c6(int16_t before_c7, int16_t now_c7)
 /* ---- phase ---- */
 
 thermal_model_transformation_t thermal_model_transformation(const thermal_model_t *model,
-                                                            uint8_t spring)
+                                                            spring_index_t spring)
 {
     const int16_t shift_c7 = model->spring[clamp_index(model, spring)].transformation_shift_c7;
     thermal_model_transformation_t points = model->transformation;
@@ -246,7 +246,7 @@ static bool is_held_at_a_limit(const thermal_model_t *model, int32_t temperature
 }
 
 /* Heat into a spring, over its heat capacity: its phase follows. */
-static void add_heat(thermal_model_t *model, uint8_t i, int32_t gain_c23)
+static void add_heat(thermal_model_t *model, spring_index_t i, int32_t gain_c23)
 {
     thermal_model_spring_state_t *state = &model->state.spring[i];
     const int32_t held_c23 = fixed_point_add_saturated(state->temperature_c23, gain_c23);
@@ -288,7 +288,7 @@ void thermal_model_step(thermal_model_t *model, const uint32_t power_uw[])
     int64_t to_air = 0;
     int64_t to_plate = 0;
     INVARIANT(thermal_model_exchange_closes(model));
-    for (uint8_t i = 0; i < model->springs; i++) {
+    for (spring_index_t i = 0; i < model->springs; i++) {
         const thermal_model_flows_t flows =
             thermal_model_flows_at(model, i, model->spring[i].midstep_c6);
         const uint32_t power = power_uw[i] < THERMAL_MODEL_HIGHEST_POWER_UW
@@ -299,7 +299,7 @@ void thermal_model_step(thermal_model_t *model, const uint32_t power_uw[])
         to_air += flows.to_air;
         to_plate += flows.to_plate;
     }
-    for (uint8_t i = 0; i < model->springs; i++) {
+    for (spring_index_t i = 0; i < model->springs; i++) {
         const int16_t before_c7 = thermal_model_temperature_c7(model, i);
         add_heat(model, i, gain_c23[i]);
         model->spring[i].midstep_c6 = midstep_c6(before_c7, thermal_model_temperature_c7(model, i));
@@ -315,7 +315,7 @@ void thermal_model_step(thermal_model_t *model, const uint32_t power_uw[])
 
 /* ---- setting and reading ---- */
 
-static bool spring_is_consistent(const thermal_model_t *model, uint8_t i,
+static bool spring_is_consistent(const thermal_model_t *model, spring_index_t i,
                                  const thermal_model_spring_state_t *state)
 {
     const int32_t most_c23 = latent_c23_of(model, THERMAL_MODEL_AUSTENITE_FULL) + LATENT_SLACK_C23;
@@ -373,14 +373,15 @@ void thermal_model_reset(thermal_model_t *model, int16_t temperature_c7)
     model->air.midstep_c6 = c6_of(temperature_c7);
     model->plate.midstep_c6 = c6_of(temperature_c7);
     thermal_model_set_ambient(model, model->ambient_c7); /* where there is no air or plate */
-    for (uint8_t i = 0; i < model->springs; i++) {
+    for (spring_index_t i = 0; i < model->springs; i++) {
         const thermal_model_transformation_t points = thermal_model_transformation(model, i);
         complete(model, &points, &model->state.spring[i], false);
         thermal_model_set_temperature(model, i, temperature_c7);
     }
 }
 
-void thermal_model_set_temperature(thermal_model_t *model, uint8_t spring, int16_t temperature_c7)
+void thermal_model_set_temperature(thermal_model_t *model, spring_index_t spring,
+                                   int16_t temperature_c7)
 {
     spring = clamp_index(model, spring);
     temperature_c7 = clamp_c7(temperature_c7);
@@ -407,12 +408,12 @@ void thermal_model_set_temperature(thermal_model_t *model, uint8_t spring, int16
     INVARIANT(spring_is_consistent(model, spring, state));
 }
 
-int16_t thermal_model_temperature_c7(const thermal_model_t *model, uint8_t spring)
+int16_t thermal_model_temperature_c7(const thermal_model_t *model, spring_index_t spring)
 {
     return c7_of(model->state.spring[clamp_index(model, spring)].temperature_c23);
 }
 
-uint16_t thermal_model_austenite(const thermal_model_t *model, uint8_t spring)
+uint16_t thermal_model_austenite(const thermal_model_t *model, spring_index_t spring)
 {
     spring = clamp_index(model, spring);
     const thermal_model_transformation_t points = thermal_model_transformation(model, spring);
@@ -430,7 +431,7 @@ static int32_t resistance_of_phase(uint32_t at_reference_uohm, int16_t rise_ppm_
     return (int32_t)at_reference_uohm + change_uohm;
 }
 
-uint32_t thermal_model_resistance_uohm_at(const thermal_model_t *model, uint8_t spring,
+uint32_t thermal_model_resistance_uohm_at(const thermal_model_t *model, spring_index_t spring,
                                           uint16_t austenite, int16_t temperature_c7)
 {
     const thermal_model_parameters_t *p = &model->parameters;
@@ -445,14 +446,14 @@ uint32_t thermal_model_resistance_uohm_at(const thermal_model_t *model, uint8_t 
     return (own_uohm > 0 ? own_uohm : 1u) + p->contact_uohm[clamp_index(model, spring)];
 }
 
-uint32_t thermal_model_resistance_uohm(const thermal_model_t *model, uint8_t spring)
+uint32_t thermal_model_resistance_uohm(const thermal_model_t *model, spring_index_t spring)
 {
     return thermal_model_resistance_uohm_at(model, spring, thermal_model_austenite(model, spring),
                                             thermal_model_temperature_c7(model, spring));
 }
 
-uint32_t thermal_model_heating_uw(const thermal_model_t *model, uint8_t spring, uint16_t current_ma,
-                                  uint16_t voltage_mv)
+uint32_t thermal_model_heating_uw(const thermal_model_t *model, spring_index_t spring,
+                                  uint16_t current_ma, uint16_t voltage_mv)
 {
     const uint16_t contact_q16 = model->spring[clamp_index(model, spring)].contact_q16;
     const uint16_t contact_mv = (uint16_t)(((uint32_t)current_ma * contact_q16) >> 16);
@@ -474,8 +475,8 @@ int16_t thermal_model_ambient_c7(const thermal_model_t *model)
     return model->ambient_c7;
 }
 
-uint16_t thermal_model_coupling_uw_per_k(const thermal_model_t *model, uint8_t spring,
-                                         uint8_t other)
+uint16_t thermal_model_coupling_uw_per_k(const thermal_model_t *model, spring_index_t spring,
+                                         spring_index_t other)
 {
     const thermal_model_spring_t *a = &model->spring[spring];
     const thermal_model_spring_t *b = &model->spring[other];
@@ -487,7 +488,7 @@ uint16_t thermal_model_coupling_uw_per_k(const thermal_model_t *model, uint8_t s
     return down == 0 || along == 0 ? model->orthogonal_uw_per_k : model->diagonal_uw_per_k;
 }
 
-int32_t thermal_model_power_to_hold_uw(const thermal_model_t *model, uint8_t spring,
+int32_t thermal_model_power_to_hold_uw(const thermal_model_t *model, spring_index_t spring,
                                        int16_t temperature_c7)
 {
     const thermal_model_flows_t flows =
@@ -511,7 +512,7 @@ static bool state_is_consistent(const thermal_model_t *model, const thermal_mode
     if (!is_within_limits(state->air_c23) || !is_within_limits(state->plate_c23)) {
         return false;
     }
-    for (uint8_t i = 0; i < model->springs; i++) {
+    for (spring_index_t i = 0; i < model->springs; i++) {
         if (!spring_is_consistent(model, i, &state->spring[i])) {
             return false;
         }
@@ -528,7 +529,7 @@ bool thermal_model_set_state(thermal_model_t *model, const thermal_model_state_t
     model->air.midstep_c6 = c6_of(c7_of(state->air_c23));
     model->plate.midstep_c6 = c6_of(c7_of(state->plate_c23));
     thermal_model_set_ambient(model, model->ambient_c7); /* where there is no air or plate */
-    for (uint8_t i = 0; i < model->springs; i++) {
+    for (spring_index_t i = 0; i < model->springs; i++) {
         model->spring[i].midstep_c6 = c6_of(c7_of(state->spring[i].temperature_c23));
     }
     return true;
@@ -540,7 +541,7 @@ bool thermal_model_is_consistent(const thermal_model_t *model)
         model->springs != model->parameters.rows * model->parameters.columns) {
         return false;
     }
-    for (uint8_t i = 0; i < model->springs; i++) {
+    for (spring_index_t i = 0; i < model->springs; i++) {
         if (model->spring[i].midstep_c6 < c6_of(THERMAL_MODEL_LOWEST_C7) ||
             model->spring[i].midstep_c6 > c6_of(THERMAL_MODEL_HIGHEST_C7)) {
             return false;

@@ -91,7 +91,7 @@ typedef struct {
     uint16_t contact_q16; /* 2^-16 ohm */
     uint8_t row;
     uint8_t column;
-    uint8_t upstream; /* spring from which the fan blows; THERMAL_MODEL_MAX_SPRINGS: none */
+    spring_index_t upstream; /* spring from which the fan blows; THERMAL_MODEL_MAX_SPRINGS: none */
 } thermal_model_spring_t;
 
 /* Air or plate: how flow becomes temperature. Internal. */
@@ -118,7 +118,7 @@ typedef struct {
     int16_t ambient_c7;
     int16_t highest_c7; /* of a spring: temperature plus latent heat must fit */
     uint8_t fan_percent;
-    uint8_t springs;
+    spring_index_t springs;
     thermal_model_spring_t spring[THERMAL_MODEL_MAX_SPRINGS];
 } thermal_model_t;
 
@@ -138,7 +138,8 @@ typedef struct {
  *
  * ORDER: not martensite finish < martensite start <= austenite start < austenite finish.
  *
- * OVERFLOW: one spring's couplings and plate above 65.5 mW/K, its loss (at 255 K if it rises) above
+ * OVERFLOW: one spring's couplings and plate above 65.5 mW/K, all springs' to the plate above
+ * 4.29 W/K, its loss (at 255 K if it rises) above
  * 65.5 mW/K, all of it with wake and radiation above 98 mW/K, or its loss rising by more than
  * 64 uW/K per K.
  *
@@ -160,11 +161,11 @@ void thermal_model_set_fan(thermal_model_t *model, uint8_t percent);
 void thermal_model_step(thermal_model_t *model, const uint32_t power_uw[]);
 
 /* Getters, O(1). An index out of range reads as spring 0. */
-int16_t thermal_model_temperature_c7(const thermal_model_t *model, uint8_t spring);
+int16_t thermal_model_temperature_c7(const thermal_model_t *model, spring_index_t spring);
 uint16_t thermal_model_austenite(const thermal_model_t *model,
-                                 uint8_t spring); /* Q0.15, 0..32768 */
+                                 spring_index_t spring); /* Q0.15, 0..32768 */
 /* Of the law below at the spring's own phase and temperature. */
-uint32_t thermal_model_resistance_uohm(const thermal_model_t *model, uint8_t spring);
+uint32_t thermal_model_resistance_uohm(const thermal_model_t *model, spring_index_t spring);
 int16_t
 thermal_model_air_c7(const thermal_model_t *model); /* ambient where there is no shared air */
 int16_t thermal_model_plate_c7(const thermal_model_t *model);
@@ -172,28 +173,29 @@ int16_t thermal_model_plate_c7(const thermal_model_t *model);
 /* The one law of resistance: what that spring's sensor sees at a phase (Q0.15, 0..32768) and a
  * temperature. Each phase's own resistance rises in proportion with the distance from 20 degC, they
  * are mixed by their shares, and the spring's contact is in series. At least 1 uohm. O(1). */
-uint32_t thermal_model_resistance_uohm_at(const thermal_model_t *model, uint8_t spring,
+uint32_t thermal_model_resistance_uohm_at(const thermal_model_t *model, spring_index_t spring,
                                           uint16_t austenite, int16_t temperature_c7);
 /* What heats the spring of what its sensor measures: not what heats its contact, uW. current_ma: at
  * most 4095. O(1). */
-uint32_t thermal_model_heating_uw(const thermal_model_t *model, uint8_t spring, uint16_t current_ma,
-                                  uint16_t voltage_mv);
+uint32_t thermal_model_heating_uw(const thermal_model_t *model, spring_index_t spring,
+                                  uint16_t current_ma, uint16_t voltage_mv);
 /* The one source of the temperatures between which that spring transforms. O(1). */
 thermal_model_transformation_t thermal_model_transformation(const thermal_model_t *model,
-                                                            uint8_t spring);
+                                                            spring_index_t spring);
 int16_t thermal_model_ambient_c7(const thermal_model_t *model);
 /* Between two springs at the present fan; 0 where they are no neighbours. Both below the number of
  * springs. O(1). */
-uint16_t thermal_model_coupling_uw_per_k(const thermal_model_t *model, uint8_t spring,
-                                         uint8_t other);
+uint16_t thermal_model_coupling_uw_per_k(const thermal_model_t *model, spring_index_t spring,
+                                         spring_index_t other);
 
 /* Takes one spring to a temperature as if slowly: on the way its phase transforms as it would.
  * O(1). */
-void thermal_model_set_temperature(thermal_model_t *model, uint8_t spring, int16_t temperature_c7);
+void thermal_model_set_temperature(thermal_model_t *model, spring_index_t spring,
+                                   int16_t temperature_c7);
 
 /* The steady power that holds that spring at that temperature while its neighbours, air and plate
  * are as they are now; negative where it would have to be cooled. O(1), no division. */
-int32_t thermal_model_power_to_hold_uw(const thermal_model_t *model, uint8_t spring,
+int32_t thermal_model_power_to_hold_uw(const thermal_model_t *model, spring_index_t spring,
                                        int16_t temperature_c7);
 
 /* O(n). */

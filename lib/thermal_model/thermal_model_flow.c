@@ -23,7 +23,7 @@ typedef struct {
     uint8_t diagonals;
 } place_t;
 
-static place_t place_of(const thermal_model_parameters_t *p, uint8_t spring)
+static place_t place_of(const thermal_model_parameters_t *p, spring_index_t spring)
 {
     place_t place = {.row = (uint8_t)(spring / p->columns),
                      .column = (uint8_t)(spring % p->columns)};
@@ -46,7 +46,8 @@ static uint32_t scaled_loss(uint16_t loss_uw_per_k, uint16_t permille)
     return ((uint32_t)loss_uw_per_k * permille + 500u) / 1000u;
 }
 
-thermal_model_refusal_t thermal_model_check_flows(const thermal_model_parameters_t *p, uint8_t i)
+thermal_model_refusal_t thermal_model_check_flows(const thermal_model_parameters_t *p,
+                                                  spring_index_t i)
 {
     const uint32_t natural = scaled_loss(p->loss_uw_per_k, p->loss_scale_permille[i]);
     const uint32_t forced = scaled_loss(p->loss_fan_uw_per_k, p->loss_scale_permille[i]);
@@ -104,23 +105,23 @@ thermal_model_refusal_t thermal_model_check_flows(const thermal_model_parameters
 
 /* The spring from which the fan blows at that place; NO_SPRING at the edge where its air comes in.
  */
-static uint8_t upstream_of(const thermal_model_parameters_t *p, uint8_t row, uint8_t column)
+static spring_index_t upstream_of(const thermal_model_parameters_t *p, uint8_t row, uint8_t column)
 {
-    const uint8_t i = (uint8_t)(row * p->columns + column);
+    const spring_index_t i = (spring_index_t)(row * p->columns + column);
     switch ((thermal_model_wake_t)p->wake_direction) {
     case THERMAL_MODEL_WAKE_EAST:
-        return column > 0 ? (uint8_t)(i - 1u) : NO_SPRING;
+        return column > 0 ? (spring_index_t)(i - 1u) : NO_SPRING;
     case THERMAL_MODEL_WAKE_SOUTH:
-        return row > 0 ? (uint8_t)(i - p->columns) : NO_SPRING;
+        return row > 0 ? (spring_index_t)(i - p->columns) : NO_SPRING;
     case THERMAL_MODEL_WAKE_WEST:
-        return column + 1u < p->columns ? (uint8_t)(i + 1u) : NO_SPRING;
+        return column + 1u < p->columns ? (spring_index_t)(i + 1u) : NO_SPRING;
     case THERMAL_MODEL_WAKE_NORTH:
-        return row + 1u < p->rows ? (uint8_t)(i + p->columns) : NO_SPRING;
+        return row + 1u < p->rows ? (spring_index_t)(i + p->columns) : NO_SPRING;
     }
     return NO_SPRING;
 }
 
-static uint32_t derive_spring(thermal_model_t *model, uint8_t i)
+static uint32_t derive_spring(thermal_model_t *model, spring_index_t i)
 {
     const thermal_model_parameters_t *p = &model->parameters;
     thermal_model_spring_t *spring = &model->spring[i];
@@ -144,7 +145,7 @@ uint32_t thermal_model_derive_flows(thermal_model_t *model)
     model->radiation_factor =
         (uint16_t)((model->parameters.radiating_area_cmm2 * (uint32_t)39902 + 0x80000u) >> 20);
     uint32_t to_air_uw_per_k = 0;
-    for (uint8_t i = 0; i < model->springs; i++) {
+    for (spring_index_t i = 0; i < model->springs; i++) {
         to_air_uw_per_k += derive_spring(model, i);
     }
     return to_air_uw_per_k;
@@ -165,7 +166,7 @@ void thermal_model_apply_fan(thermal_model_t *model)
     model->orthogonal_uw_per_k = between(p->orthogonal_uw_per_k, p->orthogonal_fan_uw_per_k, fan);
     model->diagonal_uw_per_k = between(p->diagonal_uw_per_k, p->diagonal_fan_uw_per_k, fan);
     model->wake_uw_per_k = between(0, p->wake_uw_per_k, fan);
-    for (uint8_t i = 0; i < model->springs; i++) {
+    for (spring_index_t i = 0; i < model->springs; i++) {
         thermal_model_spring_t *spring = &model->spring[i];
         spring->loss_uw_per_k =
             between(spring->loss_natural_uw_per_k, spring->loss_fan_uw_per_k, fan);
@@ -192,7 +193,8 @@ static int32_t radiated(const thermal_model_t *model, int16_t temperature_c6)
     return (int32_t)((uint32_t)fixed_point_high_u16(square, square) * model->radiation_factor);
 }
 
-static int32_t from_neighbours(const thermal_model_t *model, uint8_t i, int16_t temperature_c6)
+static int32_t from_neighbours(const thermal_model_t *model, spring_index_t i,
+                               int16_t temperature_c6)
 {
     const thermal_model_spring_t *own = &model->spring[i];
     const uint8_t columns = model->parameters.columns;
@@ -201,7 +203,7 @@ static int32_t from_neighbours(const thermal_model_t *model, uint8_t i, int16_t 
     int32_t flow = 0;
     for (uint8_t row = top; row <= own->row + 1u && row < model->parameters.rows; row++) {
         for (uint8_t column = left; column <= own->column + 1u && column < columns; column++) {
-            const uint8_t j = (uint8_t)(row * columns + column);
+            const spring_index_t j = (spring_index_t)(row * columns + column);
             if (j == i) {
                 continue;
             }
@@ -216,7 +218,7 @@ static int32_t from_neighbours(const thermal_model_t *model, uint8_t i, int16_t 
 bool thermal_model_exchange_closes(const thermal_model_t *model)
 {
     int64_t sum = 0;
-    for (uint8_t i = 0; i < model->springs; i++) {
+    for (spring_index_t i = 0; i < model->springs; i++) {
         sum += from_neighbours(model, i, model->spring[i].midstep_c6);
     }
     return sum == 0;
@@ -233,7 +235,7 @@ static int32_t given_to_air(const thermal_model_spring_t *spring, int16_t above_
     return flow_through(conductance, above_air_c6);
 }
 
-thermal_model_flows_t thermal_model_flows_at(const thermal_model_t *model, uint8_t i,
+thermal_model_flows_t thermal_model_flows_at(const thermal_model_t *model, spring_index_t i,
                                              int16_t temperature_c6)
 {
     const thermal_model_spring_t *own = &model->spring[i];

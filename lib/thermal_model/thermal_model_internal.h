@@ -20,10 +20,11 @@ typedef uint16_t thermal_model_refusal_t;
 #define REFUSE(status, name) return REFUSED(status, PARAMETER_##name)
 
 /* A spring's own, uJ/K. */
-uint32_t thermal_model_spring_capacity(const thermal_model_parameters_t *p, uint8_t i);
+uint32_t thermal_model_spring_capacity(const thermal_model_parameters_t *p, spring_index_t i);
 
 /* All flows of that spring together fit their integers and the step. */
-thermal_model_refusal_t thermal_model_check_flows(const thermal_model_parameters_t *p, uint8_t i);
+thermal_model_refusal_t thermal_model_check_flows(const thermal_model_parameters_t *p,
+                                                  spring_index_t i);
 
 /* What the flows take from the parameters once. Returns all springs' conductance to the air, with
  * the fan or without, whichever is higher. */
@@ -38,7 +39,7 @@ typedef struct {
     int32_t to_air;
     int32_t to_plate;
 } thermal_model_flows_t;
-thermal_model_flows_t thermal_model_flows_at(const thermal_model_t *model, uint8_t i,
+thermal_model_flows_t thermal_model_flows_at(const thermal_model_t *model, spring_index_t i,
                                              int16_t temperature_c6);
 
 /* What leaves one spring enters another. */

@@ -13,14 +13,14 @@
 #define LOWEST_CC           (-3000)
 #define HIGHEST_CC          20000
 
-/* Of the plate, to all springs and to ambient: below 2^32 / 1000 uW/K. */
+/* Of the plate, to all springs and to ambient: of 64 springs below 2^32 / 1000 uW/K. */
 static uint32_t plate_conductance(const thermal_model_parameters_t *p)
 {
-    return (uint32_t)p->plate_coupling_uw_per_k * (uint8_t)(p->rows * p->columns) +
+    return (uint32_t)p->plate_coupling_uw_per_k * (spring_index_t)(p->rows * p->columns) +
            p->plate_loss_uw_per_k;
 }
 
-uint32_t thermal_model_spring_capacity(const thermal_model_parameters_t *p, uint8_t i)
+uint32_t thermal_model_spring_capacity(const thermal_model_parameters_t *p, spring_index_t i)
 {
     return (uint32_t)p->heat_capacity_mj_per_k * p->heat_capacity_scale_permille[i];
 }
@@ -37,7 +37,7 @@ static thermal_model_refusal_t check_array(const thermal_model_parameters_t *p)
     if ((uint16_t)p->rows * p->columns > THERMAL_MODEL_MAX_SPRINGS) {
         REFUSE(RANGE, columns);
     }
-    for (uint8_t i = 0; i < (uint8_t)(p->rows * p->columns); i++) {
+    for (spring_index_t i = 0; i < (spring_index_t)(p->rows * p->columns); i++) {
         const uint32_t capacity = thermal_model_spring_capacity(p, i);
         if (capacity < 1000u || capacity < (uint32_t)p->step_ms * CAPACITY_UJ_PER_MS) {
             REFUSE(RANGE, heat_capacity_j_per_k);
@@ -82,7 +82,7 @@ static thermal_model_refusal_t check_phase(const thermal_model_parameters_t *p)
         (int16_t)latent_cc > HIGHEST_CC - finish_a) {
         REFUSE(RANGE, latent_heat_j);
     }
-    for (uint8_t i = 0; i < (uint8_t)(p->rows * p->columns); i++) {
+    for (spring_index_t i = 0; i < (spring_index_t)(p->rows * p->columns); i++) {
         const int16_t shift_cc = p->transformation_shift_cc[i];
         if (finish_m + shift_cc < LOWEST_CC ||
             finish_a + shift_cc > HIGHEST_CC - (int16_t)latent_cc) {
@@ -101,6 +101,9 @@ static thermal_model_refusal_t check_plate(const thermal_model_parameters_t *p)
         REFUSE(RANGE, plate_heat_capacity_j_per_k);
     }
     const uint32_t total = plate_conductance(p);
+    if (THERMAL_MODEL_MAX_SPRINGS > 64 && total > UINT32_MAX / 1000u) {
+        REFUSE(OVERFLOW, plate_coupling_w_per_k);
+    }
     if ((total * p->step_ms + 499999u) / 500000u > p->plate_heat_capacity_mj_per_k) {
         REFUSE(UNSTABLE, plate_heat_capacity_j_per_k);
     }
@@ -113,7 +116,7 @@ static thermal_model_refusal_t check(const thermal_model_parameters_t *p)
     if (refusal == 0) {
         refusal = check_phase(p);
     }
-    for (uint8_t i = 0; refusal == 0 && i < (uint8_t)(p->rows * p->columns); i++) {
+    for (spring_index_t i = 0; refusal == 0 && i < (spring_index_t)(p->rows * p->columns); i++) {
         refusal = thermal_model_check_flows(p, i);
     }
     return refusal != 0 ? refusal : check_plate(p);
@@ -144,7 +147,7 @@ static uint16_t position_factor(int16_t width_c7)
     return (uint16_t)((0x200000u + (uint16_t)width_c7 / 2u) / (uint16_t)width_c7);
 }
 
-static void derive_spring(thermal_model_t *model, uint8_t i)
+static void derive_spring(thermal_model_t *model, spring_index_t i)
 {
     const thermal_model_parameters_t *p = &model->parameters;
     thermal_model_spring_t *spring = &model->spring[i];
@@ -159,7 +162,7 @@ static void derive_spring(thermal_model_t *model, uint8_t i)
 static void derive(thermal_model_t *model)
 {
     const thermal_model_parameters_t *p = &model->parameters;
-    model->springs = (uint8_t)(p->rows * p->columns);
+    model->springs = (spring_index_t)(p->rows * p->columns);
     model->latent_full_c8 =
         (uint16_t)fixed_point_multiply_divide(p->latent_heat_mj, 256u, p->heat_capacity_mj_per_k);
     const int16_t highest_c7 = (int16_t)(SPAN_K * 128 - model->latent_full_c8 / 2u);
@@ -175,7 +178,7 @@ static void derive(thermal_model_t *model)
     model->cooling_position =
         position_factor((int16_t)(points->martensite_start_c7 - points->martensite_finish_c7));
 
-    for (uint8_t i = 0; i < model->springs; i++) {
+    for (spring_index_t i = 0; i < model->springs; i++) {
         derive_spring(model, i);
     }
     derive_node(&model->air, p->air_heat_capacity_mj_per_k,

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <fmt/format.h>
 
+#include "boards.h"
 #include "chip_mapping.h"
 #include "electrics.h"
 #include "log_writer.h"
@@ -96,36 +97,46 @@ void assign(settings_t &settings, const scenario_entry &entry)
     }
 }
 
-/* What the chip is told: the plant's own numbers, its defaults, or a file of settings; and what
- * [chip] says besides. Gives what of the plant the chip leaves out, in words; mostly nothing. */
-std::string set_chip(const scenario &plan, const plant_t *plant, settings_t &settings)
+/* What a board's chip is told: the plant's own numbers, its defaults, or a file of settings; and
+ * what [chip] and its own section say besides. Gives what of the plant the chip leaves out, in
+ * words; mostly nothing. */
+std::string set_chip(const scenario &plan, const plant_t *plant, int number, settings_t &settings)
 {
+    const boards_part_t part =
+        boards_part(plan.rows, plan.cols, plan.board_rows, plan.board_cols, number - 1);
     settings_default(&settings);
     thermal_model_parameters_t &model = settings.controller.model;
     char left_out[1024] = "";
     if (plan.model.empty() || plan.model == "plant") {
-        if (chip_mapping_from_plant(plant, &model, left_out, sizeof left_out) != CHIP_MAPPING_OK) {
+        if (chip_mapping_from_part(plant, part.row, part.column, part.rows, part.columns, &model,
+                                   left_out, sizeof left_out) != CHIP_MAPPING_OK) {
             throw place_of(plan, left_out)
                 .error(fmt::format("the chip cannot hold the plant's parameters: {}; write "
                                    "[chip] model = defaults, or a file of settings",
                                    left_out));
         }
     } else {
-        model.rows = static_cast<std::uint8_t>(plan.rows);
-        model.columns = static_cast<std::uint8_t>(plan.cols);
+        model.rows = static_cast<std::uint8_t>(part.rows);
+        model.columns = static_cast<std::uint8_t>(part.columns);
     }
     const std::string path = settings_path(plan);
     for (const scenario_entry &entry :
          path.empty() ? std::vector<scenario_entry>() : read_settings(path)) {
         assign(settings, entry);
     }
-    if (model.rows != plan.rows || model.columns != plan.cols) {
+    if (model.rows != part.rows || model.columns != part.columns) {
         throw plan.model_place.error(
             fmt::format("{} is of {} x {} springs, the scenario of {} x {}", plan.model, model.rows,
-                        model.columns, plan.rows, plan.cols));
+                        model.columns, part.rows, part.columns));
     }
     for (const scenario_entry &entry : plan.settings) {
         assign(settings, entry);
+    }
+    for (const scenario_board &board : plan.boards) {
+        for (const scenario_entry &entry :
+             board.number == number ? board.settings : std::vector<scenario_entry>()) {
+            assign(settings, entry);
+        }
     }
     if (plan.policy == "precompensate") {
         settings.controller.policy.policy = DRIVE_POLICY_PRECOMPENSATE;
@@ -364,8 +375,12 @@ void run(const run_options &options)
         plan.policy = options.policy;
     }
     const plant_pointer plant = scenario_plant(plan);
-    settings_t settings{};
-    const std::string left_out = set_chip(plan, plant.get(), settings);
+    std::vector<settings_t> settings(static_cast<std::size_t>(
+        boards_count(plan.rows, plan.cols, plan.board_rows, plan.board_cols)));
+    std::string left_out;
+    for (std::size_t k = 0; k < settings.size(); ++k) {
+        left_out = set_chip(plan, plant.get(), static_cast<int>(k) + 1, settings[k]);
+    }
     const std::unique_ptr<runner> board =
         make_runner(options.board, {&plan, plant.get(), &settings, options.elf});
 

@@ -11,6 +11,9 @@ std::unique_ptr<runner> make_runner(const std::string &board, const runner_reque
         return make_native_runner(request);
     }
 #ifdef NINESPRING_BOARD
+    if (board == "avr" && request.settings->size() > 1) {
+        throw input_error("--board avr is one board; leave out [array] board_rows and board_cols");
+    }
     if (board == "avr") {
         return make_avr_runner(request);
     }

@@ -1,11 +1,12 @@
-/* What it is for: one board around one plant, advanced tick by tick: the thing that `run` runs.
- * What it owns: the interface, and the choice between the native loop and a simulated board.
- * What it never does: read files, print, or know a log. */
+/* What it is for: a board, or several, around one plant, advanced tick by tick: the thing that
+ * `run` runs. What it owns: the interface, and the choice between the native loop and a simulated
+ * board. What it never does: read files, print, or know a log. */
 #ifndef RUNNER_H
 #define RUNNER_H
 
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "plant.h"
 #include "scenario_file.h"
@@ -17,10 +18,10 @@ namespace ninespring
 constexpr double RUNNER_TICK_S = 0.02;
 
 struct runner_request {
-    const scenario *plan; /* array, seed, noise; not its events */
-    const plant_t *plant; /* as it starts; copied */
-    const settings_t *settings;
-    std::string elf; /* of a simulated board */
+    const scenario *plan;                    /* array, seed, noise; not its events */
+    const plant_t *plant;                    /* as it starts; copied */
+    const std::vector<settings_t> *settings; /* of each board */
+    std::string elf;                         /* of a simulated board */
 };
 
 /* What the board knows of one spring. */

@@ -61,7 +61,7 @@ public:
         warm_thermistor();
         boot();
         look();
-        configure(*request.settings);
+        configure(request.settings->front());
         board_->command("model cold", ANSWER_LIMIT_MS); /* the springs are at ambient, which a board
                                                            that was off cannot know */
         look();

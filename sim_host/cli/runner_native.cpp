@@ -3,8 +3,8 @@
 #include <cmath>
 #include <fmt/format.h>
 
+#include "boards.h"
 #include "electrics.h"
-#include "loop.h"
 #include "scenario_plant.h"
 
 namespace ninespring
@@ -13,8 +13,14 @@ namespace ninespring
 namespace
 {
 
-struct loop_deleter {
-    void operator()(loop_t *loop) const { loop_destroy(loop); }
+struct boards_deleter {
+    void operator()(boards_t *boards) const { boards_destroy(boards); }
+};
+
+/* A spring of the array, where it is connected. */
+struct place {
+    loop_t *loop;
+    std::uint8_t spring;
 };
 
 class native_runner : public runner
@@ -26,41 +32,120 @@ public:
         loop_options_default(&options);
         options.shunt_noise_v = request.plan->noise_current_a * ELECTRICS_INA219_SHUNT_OHM;
         options.bus_noise_v = request.plan->noise_voltage_v;
+        std::vector<controller_settings_t> settings;
+        for (const settings_t &one : *request.settings) {
+            settings.push_back(one.controller);
+        }
+        const scenario &plan = *request.plan;
         std::uint16_t bad = UINT16_MAX;
-        loop_.reset(loop_create(&request.settings->controller, request.plant, &options,
-                                request.plan->seed, &bad));
-        if (loop_ == nullptr) {
+        int refused = 0;
+        boards_.reset(boards_create(settings.data(), request.plant, plan.board_rows,
+                                    plan.board_cols, &options, plan.seed, &refused, &bad));
+        if (boards_ == nullptr) {
             throw input_error(
-                request.plan->name, 0, 0,
+                plan.name, 0, 0,
                 bad == UINT16_MAX
                     ? "the loop cannot be made from this plant and these settings"
                     : fmt::format("the chip refuses {}; set it in [chip]", setting_name(bad)));
         }
-        controller_set_temperature(
-            loop_controller(loop_.get()),
-            static_cast<std::int16_t>(std::lround(plant_ambient_c(request.plant) * 128.0)));
+        place_.resize(static_cast<std::size_t>(plan.rows * plan.cols));
+        for (int k = 0; k < boards_of(boards_.get()); ++k) {
+            loop_t *loop = boards_loop(boards_.get(), k);
+            const boards_part_t part =
+                boards_part(plan.rows, plan.cols, plan.board_rows, plan.board_cols, k);
+            for (int i = 0; i < part.rows * part.columns; ++i) {
+                const int spring =
+                    (part.row + i / part.columns) * plan.cols + part.column + i % part.columns;
+                place_[static_cast<std::size_t>(spring)] = {loop, static_cast<std::uint8_t>(i)};
+            }
+            loops_.push_back(loop);
+            controller_set_temperature(
+                loop_controller(loop),
+                static_cast<std::int16_t>(std::lround(plant_ambient_c(request.plant) * 128.0)));
+        }
     }
 
     void act(const scenario_event &event) override
     {
-        controller_t *controller = loop_controller(loop_.get());
         switch (event.word) {
         case scenario_word::on:
         case scenario_word::off:
             for (const int k : event.springs) {
-                const double level = event.word == scenario_word::on ? event.amount * 10.0 : 0.0;
-                controller_set_target(controller, static_cast<std::uint8_t>(k),
-                                      static_cast<std::uint16_t>(std::lround(level)));
+                set_level(k, event.word == scenario_word::on ? event.amount * 10.0 : 0.0);
             }
             return;
-        case scenario_word::pattern: {
-            bool on[CONTROLLER_MAX_SPRINGS] = {};
+        case scenario_word::pattern:
             for (std::size_t k = 0; k < event.pattern.size(); ++k) {
-                on[k] = event.pattern[k];
+                set_level(static_cast<int>(k), event.pattern[k] ? 1000.0 : 0.0);
             }
-            controller_set_pattern(controller, on);
+            return;
+        case scenario_word::set:
+            set_plant(boards_plant(boards_.get()), event);
+            return;
+        case scenario_word::fail:
+        case scenario_word::repair:
+            fail(event);
+            return;
+        default: /* what is said to a board is said to all */
+            for (loop_t *loop : loops_) {
+                tell(loop, event);
+            }
             return;
         }
+    }
+
+    void tick() override { boards_tick(boards_.get()); }
+
+    [[nodiscard]] runner_spring spring(int k) const override
+    {
+        const place &at = place_[static_cast<std::size_t>(k)];
+        const controller_t *controller = loop_controller(at.loop);
+        return {controller_measured_ma(controller, at.spring) / 1000.0,
+                controller_measured_mv(controller, at.spring) / 1000.0,
+                controller_target_ma(controller, at.spring) / 1000.0,
+                controller_temperature_c7(controller, at.spring) / 128.0,
+                controller_austenite_permille(controller, at.spring) / 1000.0,
+                controller_limits(controller, at.spring),
+                controller_cut_ma(controller, at.spring) / 1000.0,
+                safety_fault_name(controller_fault(controller, at.spring))};
+    }
+
+    [[nodiscard]] double fan() const override
+    {
+        return controller_fan_percent(loop_controller(loops_[0])) / 100.0;
+    }
+
+    [[nodiscard]] double ambient_c() const override
+    {
+        return loop_inputs(loops_[0])->ambient_c7 / 128.0;
+    }
+
+    /* Of the first board that has one. */
+    [[nodiscard]] std::string board_fault() const override
+    {
+        for (loop_t *loop : loops_) {
+            const safety_fault_t fault = controller_board_fault(loop_controller(loop));
+            if (fault != SAFETY_FAULT_NONE) {
+                return safety_fault_name(fault);
+            }
+        }
+        return safety_fault_name(SAFETY_FAULT_NONE);
+    }
+
+    [[nodiscard]] const plant_t *plant() const override { return boards_plant(boards_.get()); }
+
+private:
+    void set_level(int spring, double permille)
+    {
+        const place &at = place_[static_cast<std::size_t>(spring)];
+        controller_set_target(loop_controller(at.loop), at.spring,
+                              static_cast<std::uint16_t>(std::lround(permille)));
+    }
+
+    static void tell(loop_t *loop, const scenario_event &event)
+    {
+        controller_t *controller = loop_controller(loop);
+        switch (event.word) {
         case scenario_word::policy:
             if (!controller_set_policy(controller, event.text == "policy open"
                                                        ? DRIVE_POLICY_OPEN
@@ -72,15 +157,12 @@ public:
             controller_set_fan(controller, static_cast<std::uint8_t>(std::lround(event.amount)));
             return;
         case scenario_word::room:
-            if (!loop_set_ambient(loop_.get(), event.amount)) {
+            if (!loop_set_ambient(loop, event.amount)) {
                 throw event.place.error("the plant refuses this temperature");
             }
             return;
         case scenario_word::ambient:
-            loop_tell_ambient(loop_.get(), event.amount);
-            return;
-        case scenario_word::set:
-            set_plant(loop_plant(loop_.get()), event);
+            loop_tell_ambient(loop, event.amount);
             return;
         case scenario_word::clear:
             controller_clear_faults(controller);
@@ -94,50 +176,16 @@ public:
         case scenario_word::console:
             throw event.place.error(
                 fmt::format("{} needs a console; run with --board avr", in_quotes(event.text)));
-        case scenario_word::fail:
-        case scenario_word::repair:
-            fail(event);
+        default:
             return;
         }
     }
 
-    void tick() override { loop_tick(loop_.get()); }
-
-    [[nodiscard]] runner_spring spring(int k) const override
-    {
-        const controller_t *controller = loop_controller(loop_.get());
-        const auto index = static_cast<std::uint8_t>(k);
-        return {controller_measured_ma(controller, index) / 1000.0,
-                controller_measured_mv(controller, index) / 1000.0,
-                controller_target_ma(controller, index) / 1000.0,
-                controller_temperature_c7(controller, index) / 128.0,
-                controller_austenite_permille(controller, index) / 1000.0,
-                controller_limits(controller, index),
-                controller_cut_ma(controller, index) / 1000.0,
-                safety_fault_name(controller_fault(controller, index))};
-    }
-
-    [[nodiscard]] double fan() const override
-    {
-        return controller_fan_percent(loop_controller(loop_.get())) / 100.0;
-    }
-
-    [[nodiscard]] double ambient_c() const override
-    {
-        return loop_inputs(loop_.get())->ambient_c7 / 128.0;
-    }
-
-    [[nodiscard]] std::string board_fault() const override
-    {
-        return safety_fault_name(controller_board_fault(loop_controller(loop_.get())));
-    }
-
-    [[nodiscard]] const plant_t *plant() const override { return loop_plant(loop_.get()); }
-
-private:
     void fail(const scenario_event &event)
     {
         const bool good = event.word == scenario_word::repair;
+        const place at = event.springs.empty() ? place{nullptr, 0}
+                                               : place_[static_cast<std::size_t>(event.springs[0])];
         loop_action_t action = LOOP_ACTION_SENSOR_GOOD;
         switch (event.what) {
         case scenario_failure::open:
@@ -156,12 +204,17 @@ private:
             action = good ? LOOP_ACTION_SENSOR_GOOD : LOOP_ACTION_SENSOR_FREEZE;
             break;
         case scenario_failure::lie:
-            loop_scale_sensor(loop_.get(), event.springs[0], good ? 1.0 : event.amount,
+            loop_scale_sensor(at.loop, at.spring, good ? 1.0 : event.amount,
                               good ? 1.0 : event.voltage_amount);
             return;
-        case scenario_failure::swap:
-            loop_swap_sensors(loop_.get(), event.springs[0], event.springs[1]);
+        case scenario_failure::swap: {
+            const place &other = place_[static_cast<std::size_t>(event.springs[1])];
+            if (other.loop != at.loop) {
+                throw event.place.error("these springs are on two boards");
+            }
+            loop_swap_sensors(at.loop, at.spring, other.spring);
             return;
+        }
         case scenario_failure::sda_low:
             action = good ? LOOP_ACTION_BUS_GOOD : LOOP_ACTION_SENSOR_BUS;
             break;
@@ -177,12 +230,16 @@ private:
         case scenario_failure::none:
             break;
         }
-        if (!loop_act(loop_.get(), action, event.springs.empty() ? 0 : event.springs[0])) {
-            throw event.place.error("the native board cannot do that");
+        for (loop_t *loop : loops_) {
+            if ((at.loop == nullptr || at.loop == loop) && !loop_act(loop, action, at.spring)) {
+                throw event.place.error("the native board cannot do that");
+            }
         }
     }
 
-    std::unique_ptr<loop_t, loop_deleter> loop_;
+    std::unique_ptr<boards_t, boards_deleter> boards_;
+    std::vector<loop_t *> loops_;
+    std::vector<place> place_; /* of each spring */
 };
 
 } // namespace

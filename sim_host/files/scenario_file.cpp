@@ -397,6 +397,35 @@ void put(std::vector<scenario_entry> &list, scenario_entry entry)
 
 const std::vector<std::string> SECTIONS = {"scenario", "array", "plant", "chip", "noise", "events"};
 
+/* N of the section [board.N]; 0: it is no such section. */
+int board_number(const std::string &section)
+{
+    const std::string digits = section.rfind("board.", 0) == 0 ? section.substr(6) : "";
+    if (digits.empty() || digits.size() > 4 || digits[0] == '0' ||
+        digits.find_first_not_of("0123456789") != std::string::npos) {
+        return 0;
+    }
+    return std::stoi(digits);
+}
+
+void put_setting(std::vector<scenario_entry> &settings, const raw_entry &entry)
+{
+    const std::string name = entry.key[0] == '$' ? entry.key.substr(1) : entry.key;
+    put(settings, {name, entry.value, entry.value_place, entry.key_place});
+}
+
+void read_board(scenario &result, int number, const raw_entry &entry)
+{
+    for (scenario_board &board : result.boards) {
+        if (board.number == number) {
+            put_setting(board.settings, entry);
+            return;
+        }
+    }
+    result.boards.push_back({number, {}, entry.key_place});
+    put_setting(result.boards.back().settings, entry);
+}
+
 void read_entry(scenario &result, const raw_entry &entry)
 {
     if (entry.section == "scenario") {
@@ -409,8 +438,12 @@ void read_entry(scenario &result, const raw_entry &entry)
         } else if (entry.key == "pitch_mm") {
             result.pitch_mm = number(entry, 0.1, 1000.0);
             result.pitch_place = entry.value_place;
+        } else if (entry.key == "board_rows") {
+            result.board_rows = whole(entry, 1, 64);
+        } else if (entry.key == "board_cols") {
+            result.board_cols = whole(entry, 1, 64);
         } else {
-            refuse_key(entry, {"rows", "cols", "pitch_mm"});
+            refuse_key(entry, {"rows", "cols", "pitch_mm", "board_rows", "board_cols"});
         }
     } else if (entry.section == "plant") {
         if (entry.key == "effects") {
@@ -423,9 +456,10 @@ void read_entry(scenario &result, const raw_entry &entry)
             result.model = entry.value;
             result.model_place = entry.value_place;
         } else {
-            const std::string name = entry.key[0] == '$' ? entry.key.substr(1) : entry.key;
-            put(result.settings, {name, entry.value, entry.value_place, entry.key_place});
+            put_setting(result.settings, entry);
         }
+    } else if (board_number(entry.section) != 0) {
+        read_board(result, board_number(entry.section), entry);
     } else if (entry.section == "noise") {
         if (entry.key == "temperature_c") {
             result.noise_temperature_c = number(entry, 0.0, 50.0);
@@ -439,6 +473,38 @@ void read_entry(scenario &result, const raw_entry &entry)
     } else if (entry.section.empty()) {
         throw entry.key_place.error(fmt::format(
             "{} stands before any [section]; begin with [scenario]", in_quotes(entry.key)));
+    }
+}
+
+/* Springs of a board, and numbers of boards. */
+void check_boards(scenario &result)
+{
+    if ((result.board_rows == 0) != (result.board_cols == 0)) {
+        throw input_error(result.name, 1, 1, "[array] board_rows and board_cols go together");
+    }
+    if (result.board_rows == 0) {
+        result.board_rows = result.rows;
+        result.board_cols = result.cols;
+    }
+    const int rows = std::min(result.rows, result.board_rows);
+    const int cols = std::min(result.cols, result.board_cols);
+    if (rows * cols > 64) {
+        throw input_error(result.name, 1, 1,
+                          fmt::format("[array] {} x {} are more than 64 springs on a board; make "
+                                      "board_rows and board_cols smaller",
+                                      rows, cols));
+    }
+    if (result.rows * result.cols > 1024) {
+        throw input_error(
+            result.name, 1, 1,
+            fmt::format("[array] {} x {} are more than 1024 springs", result.rows, result.cols));
+    }
+    const int boards = ((result.rows + rows - 1) / rows) * ((result.cols + cols - 1) / cols);
+    for (const scenario_board &board : result.boards) {
+        if (board.number > boards) {
+            throw board.place.error(
+                fmt::format("[board.{}], but the array has {}", board.number, boards));
+        }
     }
 }
 
@@ -463,9 +529,10 @@ double event_time(const raw_entry &entry)
 void check_sections(const line_source &source)
 {
     for (const auto &[name, place] : source.sections) {
-        if (std::find(SECTIONS.begin(), SECTIONS.end(), name) == SECTIONS.end()) {
+        if (std::find(SECTIONS.begin(), SECTIONS.end(), name) == SECTIONS.end() &&
+            board_number(name) == 0) {
             throw place.error(fmt::format("there is no section {}{}; there are [scenario], "
-                                          "[array], [plant], [chip], [noise], [events]",
+                                          "[array], [plant], [chip], [board.N], [noise], [events]",
                                           in_quotes(name), did_you_mean(name, SECTIONS)));
         }
     }
@@ -568,11 +635,7 @@ scenario parse_scenario(const text_file &file, const std::vector<std::string> &a
                                       "most {:.3g}; make log_interval_s longer",
                                       values, MOST_LOGGED));
     }
-    if (result.rows * result.cols > 64) {
-        throw input_error(
-            file.name, 1, 1,
-            fmt::format("[array] {} x {} are more than 64 springs", result.rows, result.cols));
-    }
+    check_boards(result);
     for (const raw_entry &entry : source.entries) {
         if (entry.section == "events") {
             const double time_s = event_time(entry);

@@ -68,6 +68,13 @@ struct scenario_event {
     source_place place;
 };
 
+/* A board's own settings. */
+struct scenario_board {
+    int number; /* from 1 */
+    std::vector<scenario_entry> settings;
+    source_place place;
+};
+
 struct scenario {
     std::string name;
     double duration_s = 0.0;
@@ -76,6 +83,9 @@ struct scenario {
     std::string policy; /* empty: as the settings say */
     int rows = 3;
     int cols = 3;
+    int board_rows = 0; /* springs of one board; 0: all of them, one board */
+    int board_cols = 0;
+    std::vector<scenario_board> boards; /* those that differ from [chip] */
     std::optional<double> pitch_mm;
     source_place pitch_place;
     std::string model; /* [chip] model: "plant", "defaults" or a file of `$name=value` lines, from

@@ -25,6 +25,8 @@ struct loop {
     controller_inputs_t inputs;
     controller_outputs_t outputs;
     plant_t *plant;
+    bool shares_plant; /* with other boards: it is theirs to destroy and to advance */
+    int place[CONTROLLER_MAX_SPRINGS]; /* of each spring in the plant */
     loop_options_t options;
     int springs;
     uint64_t ticks;
@@ -38,7 +40,7 @@ struct loop {
     double source_ohm;
     double freewheel_drop_v;
     double highest_sum_a;
-    channel_t channel[PLANT_MAX_SPRINGS];
+    channel_t channel[CONTROLLER_MAX_SPRINGS];
 };
 
 static bool is_of_one_spring(loop_action_t action)
@@ -77,16 +79,17 @@ static int16_t told_ambient_c7(const loop_t *loop)
                                              : loop->told_ambient_c);
 }
 
-static void read_plant(loop_t *loop)
+void loop_read_plant(loop_t *loop)
 {
     for (int k = 0; k < loop->springs; k++) {
-        loop->channel[k].terminal_ohm = plant_terminal_ohm(loop->plant, k);
+        loop->channel[k].terminal_ohm = plant_terminal_ohm(loop->plant, loop->place[k]);
     }
     loop->ambient_c = plant_ambient_c(loop->plant);
 }
 
-loop_t *loop_create(const controller_settings_t *settings, const plant_t *plant,
-                    const loop_options_t *options, uint64_t seed, uint16_t *bad)
+loop_t *loop_create_part(const controller_settings_t *settings, plant_t *plant, int first_row,
+                         int first_column, const loop_options_t *options, uint64_t seed,
+                         uint16_t *bad)
 {
     loop_options_t chosen;
     loop_options_default(&chosen);
@@ -105,11 +108,13 @@ loop_t *loop_create(const controller_settings_t *settings, const plant_t *plant,
                          to_c7(plant_ambient_c(plant) + chosen.ambient_error_c), &refused)) {
         goto fail;
     }
-    if (plant_rows(plant) != settings->model.rows ||
-        plant_columns(plant) != settings->model.columns) {
+    if (first_row < 0 || first_row + settings->model.rows > plant_rows(plant) || first_column < 0 ||
+        first_column + settings->model.columns > plant_columns(plant)) {
         refused = PARAMETER_rows;
         goto fail;
     }
+    loop->plant = plant;
+    loop->shares_plant = true;
     loop->springs = controller_springs(&loop->controller);
     for (int k = 0; k < loop->springs; k++) {
         if (!electrics_ina219_init(&loop->channel[k].sensor, chosen.sensor_samples,
@@ -118,10 +123,6 @@ loop_t *loop_create(const controller_settings_t *settings, const plant_t *plant,
             goto fail;
         }
     }
-    loop->plant = plant_copy(plant);
-    if (loop->plant == NULL) {
-        goto fail;
-    }
     loop->supply_v = parameter(plant, "supply_v", -1);
     loop->freewheel_drop_v = parameter(plant, "freewheel_drop_v", -1);
     int sag = plant_effect_index("supply_sag");
@@ -129,12 +130,14 @@ loop_t *loop_create(const controller_settings_t *settings, const plant_t *plant,
         loop->source_ohm = parameter(plant, "supply_resistance_ohm", -1);
     }
     for (int k = 0; k < loop->springs; k++) {
+        loop->place[k] = (first_row + k / settings->model.columns) * plant_columns(plant) +
+                         first_column + k % settings->model.columns;
         loop->channel[k].stage = k;
-        loop->channel[k].loop_ohm = parameter(plant, "loop_resistance_ohm", k);
-        (void)plant_drive(loop->plant, k, PLANT_DRIVE_POWER, 0.0);
+        loop->channel[k].loop_ohm = parameter(plant, "loop_resistance_ohm", loop->place[k]);
+        (void)plant_drive(plant, loop->place[k], PLANT_DRIVE_POWER, 0.0);
     }
     (void)plant_set_fan(loop->plant, 0.0);
-    read_plant(loop);
+    loop_read_plant(loop);
     loop->inputs.ambient_c7 = told_ambient_c7(loop); /* what is known before the first tick */
     return loop;
 fail:
@@ -145,10 +148,33 @@ fail:
     return NULL;
 }
 
+loop_t *loop_create(const controller_settings_t *settings, const plant_t *plant,
+                    const loop_options_t *options, uint64_t seed, uint16_t *bad)
+{
+    plant_t *copy = plant_copy(plant);
+    uint16_t refused = copy == NULL ? UINT16_MAX : PARAMETER_rows;
+    loop_t *loop = NULL;
+    if (copy != NULL && plant_rows(plant) == settings->model.rows &&
+        plant_columns(plant) == settings->model.columns) {
+        loop = loop_create_part(settings, copy, 0, 0, options, seed, &refused);
+    }
+    if (loop == NULL) {
+        plant_destroy(copy);
+        if (bad != NULL) {
+            *bad = refused;
+        }
+        return NULL;
+    }
+    loop->shares_plant = false;
+    return loop;
+}
+
 void loop_destroy(loop_t *loop)
 {
     if (loop != NULL) {
-        plant_destroy(loop->plant);
+        if (!loop->shares_plant) {
+            plant_destroy(loop->plant);
+        }
         free(loop);
     }
 }
@@ -180,8 +206,8 @@ static void read_sensor(loop_t *loop, int k)
 /* Currents of the tick that starts, from the duties. */
 static void flow(loop_t *loop)
 {
-    double duty[PLANT_MAX_SPRINGS];
-    double spring_ohm[PLANT_MAX_SPRINGS];
+    double duty[CONTROLLER_MAX_SPRINGS];
+    double spring_ohm[CONTROLLER_MAX_SPRINGS];
     double load_s = 0.0;
     for (int k = 0; k < loop->springs; k++) {
         const channel_t *c = &loop->channel[k];
@@ -218,23 +244,23 @@ static void flow(loop_t *loop)
     }
 }
 
-static void heat(loop_t *loop)
+/* What flowed since the plant's last step heats it during its next, of dt_s. 0: not yet. */
+static double heat(loop_t *loop)
 {
     if (++loop->plant_tick < loop->options.plant_ticks) {
-        return;
+        return 0.0;
     }
     double dt_s = loop->plant_tick * LOOP_TICK_S;
     loop->plant_tick = 0;
     for (int k = 0; k < loop->springs; k++) {
         channel_t *c = &loop->channel[k];
-        (void)plant_drive(loop->plant, k, PLANT_DRIVE_POWER, c->energy_j / dt_s);
+        (void)plant_drive(loop->plant, loop->place[k], PLANT_DRIVE_POWER, c->energy_j / dt_s);
         c->energy_j = 0.0;
     }
-    (void)plant_step(loop->plant, dt_s);
-    read_plant(loop);
+    return dt_s;
 }
 
-void loop_tick(loop_t *loop)
+double loop_tick_part(loop_t *loop)
 {
     for (int k = 0; k < loop->springs; k++) {
         if (loop->ticks != 0) { /* at power-up the sensors have not converted yet: nothing flows */
@@ -250,8 +276,17 @@ void loop_tick(loop_t *loop)
         (void)plant_set_fan(loop->plant, fan_percent / 100.0);
     }
     flow(loop);
-    heat(loop);
     loop->ticks++;
+    return heat(loop);
+}
+
+void loop_tick(loop_t *loop)
+{
+    const double dt_s = loop_tick_part(loop);
+    if (dt_s > 0.0) {
+        (void)plant_step(loop->plant, dt_s);
+        loop_read_plant(loop);
+    }
 }
 
 void loop_advance(loop_t *loop, double seconds)

@@ -16,6 +16,8 @@
 
 typedef struct {
     const plant_t *plant;
+    int row, column; /* in the plant, of the first spring */
+    int rows, columns;
     int springs;
     char *message;
     size_t size;
@@ -45,13 +47,19 @@ static bool is_on(const mapping_t *m, effect_t effect)
     return index >= 0 && plant_effect_is_on(m->plant, (size_t)index);
 }
 
-static double value_of(const mapping_t *m, const char *name, int spring)
+/* Spring i of the chip in the plant. */
+static int place_of(const mapping_t *m, int i)
+{
+    return (m->row + i / m->columns) * plant_columns(m->plant) + m->column + i % m->columns;
+}
+
+static double value_of(const mapping_t *m, const char *name, int i)
 {
     double value = 0.0;
     const int index = plant_parameter_index(name);
     if (index >= 0) {
         const bool each = plant_parameter((size_t)index)->per_spring;
-        (void)plant_get_index(m->plant, (size_t)index, each ? spring : 0, &value);
+        (void)plant_get_index(m->plant, (size_t)index, each ? place_of(m, i) : 0, &value);
     }
     return value;
 }
@@ -144,6 +152,14 @@ static void straighten(const mapping_t *m, double *factor, double *rise_per_k, d
     *fan_loss = fan_y / s22;
 }
 
+/* Of spring i: sides without a neighbour in the whole array. */
+static int free_sides_of(const mapping_t *m, int i)
+{
+    const int row = m->row + i / m->columns, column = m->column + i % m->columns;
+    return (row == 0) + (row == plant_rows(m->plant) - 1) + (column == 0) +
+           (column == plant_columns(m->plant) - 1);
+}
+
 /* Loss of each spring, with edge, mismatch and natural convection in it: a mean and a scale each.
  */
 static void map_loss(mapping_t *m)
@@ -151,7 +167,6 @@ static void map_loss(mapping_t *m)
     const bool edge = is_on(m, EFFECT_edge_loss), mismatch = is_on(m, EFFECT_spring_mismatch);
     const double per_side = array_value(m, "edge_loss_fraction");
     const double fan_per_side = per_side * array_value(m, "edge_loss_fan_share");
-    const int rows = m->chip.rows, columns = m->chip.columns;
     double natural[PLANT_MAX_SPRINGS] = {0.0}, forced[PLANT_MAX_SPRINGS] = {0.0};
     double factor = 1.0, rise = 0.0, fan_loss = 0.0;
     const bool convection = is_on(m, EFFECT_natural_convection);
@@ -160,9 +175,7 @@ static void map_loss(mapping_t *m)
         straighten(m, &factor, &rise, &fan_loss);
     }
     for (int i = 0; i < m->springs; i++) {
-        const int row = i / columns, column = i % columns;
-        const int free_sides =
-            (row == 0) + (row == rows - 1) + (column == 0) + (column == columns - 1);
+        const int free_sides = free_sides_of(m, i);
         const double own = mismatch ? value_of(m, "loss_scale", i) : 1.0;
         const double scale = own * (edge ? 1.0 + per_side * free_sides : 1.0);
         const double fan_scale = own * (edge ? 1.0 + fan_per_side * free_sides : 1.0);
@@ -249,6 +262,10 @@ static bool is_composed(uint16_t row)
     case PARAMETER_latent_heat_j:
     case PARAMETER_resistance_martensite_ohm:
     case PARAMETER_resistance_austenite_ohm:
+    case PARAMETER_air_heat_capacity_j_per_k:
+    case PARAMETER_air_exchange_w_per_k:
+    case PARAMETER_plate_heat_capacity_j_per_k:
+    case PARAMETER_plate_loss_w_per_k:
         return true;
     default:
         return false;
@@ -281,6 +298,46 @@ static void map_rows_of_the_same_name(mapping_t *m)
     }
 }
 
+/* The chip's network ends at the first neighbours: what reaches the second ones goes to those, so
+ * that all springs together exchange as much. */
+static void map_second_neighbours(mapping_t *m)
+{
+    static const struct {
+        const char *second, *orthogonal;
+        parameter_t row;
+    } ways[] = {{"second_w_per_k", "orthogonal_w_per_k", PARAMETER_orthogonal_w_per_k},
+                {"second_fan_w_per_k", "orthogonal_fan_w_per_k", PARAMETER_orthogonal_fan_w_per_k}};
+    const int rows = m->chip.rows, columns = m->chip.columns;
+    const int beside = rows * (columns - 1) + columns * (rows - 1);
+    const int apart =
+        (columns > 2 ? rows * (columns - 2) : 0) + (rows > 2 ? columns * (rows - 2) : 0);
+    bool moved = false;
+    for (size_t k = 0; apart > 0 && k < sizeof ways / sizeof ways[0]; k++) {
+        const double second = array_value(m, ways[k].second);
+        moved = moved || second > 0.0;
+        put_from(m, "orthogonal_w_per_k with second_w_per_k", ways[k].row, 0,
+                 array_value(m, ways[k].orthogonal) + second * apart / beside);
+    }
+    if (moved && !m->failed) {
+        say(m, "second_w_per_k is not on the chip: counted into orthogonal_w_per_k");
+    }
+}
+
+/* Of the air and the plate that all of the array's springs share, this board's springs' part. */
+static void map_shares(mapping_t *m)
+{
+    static const parameter_t rows[] = {
+        PARAMETER_air_heat_capacity_j_per_k, PARAMETER_air_exchange_w_per_k,
+        PARAMETER_plate_heat_capacity_j_per_k, PARAMETER_plate_loss_w_per_k};
+    const double share = (double)m->springs / plant_spring_count(m->plant);
+    for (size_t k = 0; k < sizeof rows / sizeof rows[0]; k++) {
+        const effect_t effect = parameter_description((uint16_t)rows[k])->effect;
+        if (is_on(m, effect)) {
+            put(m, rows[k], 0, share * array_value(m, parameter_row((uint16_t)rows[k]).name));
+        }
+    }
+}
+
 static const char *reason_of(thermal_model_status_t status)
 {
     switch (status) {
@@ -302,9 +359,22 @@ chip_mapping_status_t chip_mapping_from_plant(const plant_t *plant,
                                               thermal_model_parameters_t *parameters, char *message,
                                               size_t message_size)
 {
-    const int rows = plant_rows(plant), columns = plant_columns(plant);
-    mapping_t m = {
-        .plant = plant, .springs = rows * columns, .message = message, .size = message_size};
+    return chip_mapping_from_part(plant, 0, 0, plant_rows(plant), plant_columns(plant), parameters,
+                                  message, message_size);
+}
+
+chip_mapping_status_t chip_mapping_from_part(const plant_t *plant, int row, int column, int rows,
+                                             int columns, thermal_model_parameters_t *parameters,
+                                             char *message, size_t message_size)
+{
+    mapping_t m = {.plant = plant,
+                   .row = row,
+                   .column = column,
+                   .rows = rows,
+                   .columns = columns,
+                   .springs = rows * columns,
+                   .message = message,
+                   .size = message_size};
     message[0] = '\0';
     if (m.springs > THERMAL_MODEL_MAX_SPRINGS) {
         say(&m, "%d x %d springs are more than the chip's model holds", rows, columns);
@@ -317,6 +387,8 @@ chip_mapping_status_t chip_mapping_from_plant(const plant_t *plant,
     map_loss(&m);
     map_resistance(&m);
     map_rows_of_the_same_name(&m);
+    map_second_neighbours(&m);
+    map_shares(&m);
     if (is_on(&m, EFFECT_radiation)) {
         put_from(&m, "emissivity x surface_mm2", PARAMETER_radiating_area_mm2, 0,
                  array_value(&m, "emissivity") * array_value(&m, "surface_mm2"));

@@ -9,25 +9,27 @@
 
 void plant_network_lay(plant_t *p)
 {
-    int orthogonal = 0, diagonal = 0;
-    for (int i = 0; i < p->n; i++) {
-        p->orthogonal_start[i] = orthogonal;
-        p->diagonal_start[i] = diagonal;
-        for (int dr = -1; dr <= 1; dr++)
-            for (int dc = -1; dc <= 1; dc++) {
-                const int row = i / p->columns + dr, column = i % p->columns + dc;
-                if ((dr == 0 && dc == 0) || row < 0 || row >= p->rows || column < 0 ||
-                    column >= p->columns)
-                    continue;
-                const unsigned char j = (unsigned char)(row * p->columns + column);
-                if (dr == 0 || dc == 0)
-                    p->orthogonal[orthogonal++] = j;
-                else
-                    p->diagonal[diagonal++] = j;
+    static const struct {
+        int row, column;
+    } away[NEIGHBOUR_KINDS][NEIGHBOURS_MOST] = {
+        [NEIGHBOUR_ORTHOGONAL] = {{-1, 0}, {0, -1}, {0, 1}, {1, 0}},
+        [NEIGHBOUR_DIAGONAL] = {{-1, -1}, {-1, 1}, {1, -1}, {1, 1}},
+        [NEIGHBOUR_SECOND] = {{-2, 0}, {0, -2}, {0, 2}, {2, 0}},
+    };
+    for (int kind = 0; kind < NEIGHBOUR_KINDS; kind++) {
+        neighbours_t *neighbours = &p->neighbours[kind];
+        int count = 0;
+        for (int i = 0; i < p->n; i++) {
+            neighbours->start[i] = count;
+            for (int k = 0; k < NEIGHBOURS_MOST; k++) {
+                const int row = i / p->columns + away[kind][k].row;
+                const int column = i % p->columns + away[kind][k].column;
+                if (row >= 0 && row < p->rows && column >= 0 && column < p->columns)
+                    neighbours->of[count++] = row * p->columns + column;
             }
+        }
+        neighbours->start[p->n] = count;
     }
-    p->orthogonal_start[p->n] = orthogonal;
-    p->diagonal_start[p->n] = diagonal;
 }
 
 double plant_network_ambient(const plant_t *p, double time_s)
@@ -73,12 +75,10 @@ void plant_network_flows(plant_t *p, double time_s, const double *t, const doubl
         plant_electric_find(p, t, austenite);
     for (int i = 0; i < n; i++) {
         const double ti = t[i];
-        double orthogonal = 0.0, diagonal = 0.0;
-        for (int k = p->orthogonal_start[i]; k < p->orthogonal_start[i + 1]; k++)
-            orthogonal += t[p->orthogonal[k]] - ti;
-        for (int k = p->diagonal_start[i]; k < p->diagonal_start[i + 1]; k++)
-            diagonal += t[p->diagonal[k]] - ti;
-        double q = p->coupling_orthogonal * orthogonal + p->coupling_diagonal * diagonal;
+        double q = 0.0;
+        for (int kind = 0; kind < NEIGHBOUR_KINDS; kind++)
+            if (p->coupling[kind] != 0.0)
+                q += p->coupling[kind] * neighbour_difference(&p->neighbours[kind], t, i);
 
         double lost = (natural ? loss_at(p, i, ti, air) : p->loss_sum[i]) * (ti - air);
         if (p->wake != 0.0 && p->upstream[i] >= 0)
@@ -130,7 +130,7 @@ void plant_network_prepare(plant_t *p)
     const bool mismatch = p->on[E_spring_mismatch];
     for (int i = 0; i < n; i++) {
         const double heavier = mismatch ? p->value[P_heat_capacity_scale][i] : 1.0;
-        const int free_sides = 4 - (p->orthogonal_start[i + 1] - p->orthogonal_start[i]);
+        const int free_sides = 4 - neighbour_count(p, NEIGHBOUR_ORTHOGONAL, i);
         p->capacity[i] = p->value[P_heat_capacity_j_per_k][i] * heavier;
         p->loss_scale[i] = mismatch ? p->value[P_loss_scale][i] : 1.0;
         p->loss_scale_fan[i] = p->loss_scale[i];
@@ -166,12 +166,13 @@ void plant_network_prepare_inputs(plant_t *p)
 {
     const int n = p->n;
     const double fan = p->fan;
-    p->coupling_orthogonal =
-        scalar(p, P_orthogonal_w_per_k) +
-        fan * (scalar(p, P_orthogonal_fan_w_per_k) - scalar(p, P_orthogonal_w_per_k));
-    p->coupling_diagonal =
-        scalar(p, P_diagonal_w_per_k) +
-        fan * (scalar(p, P_diagonal_fan_w_per_k) - scalar(p, P_diagonal_w_per_k));
+    static const enum parameter_id natural[NEIGHBOUR_KINDS] = {
+        P_orthogonal_w_per_k, P_diagonal_w_per_k, P_second_w_per_k};
+    static const enum parameter_id forced[NEIGHBOUR_KINDS] = {
+        P_orthogonal_fan_w_per_k, P_diagonal_fan_w_per_k, P_second_fan_w_per_k};
+    for (int kind = 0; kind < NEIGHBOUR_KINDS; kind++)
+        p->coupling[kind] =
+            scalar(p, natural[kind]) + fan * (scalar(p, forced[kind]) - scalar(p, natural[kind]));
     p->wake = p->on[E_fan_wake] ? scalar(p, P_wake_w_per_k) * fan : 0.0;
     p->any_held = false;
     const bool shared_air = p->on[E_shared_air], plate = p->on[E_plate_conduction];
@@ -186,9 +187,9 @@ void plant_network_prepare_inputs(plant_t *p)
         /* Gershgorin: no eigenvalue beyond (own conductances + couplings) / capacity */
         const double own = p->loss_sum[i] + p->wake + 4.0 * 1.1e8 * p->radiation_w_per_k4 +
                            (plate ? p->value[P_plate_coupling_w_per_k][i] : 0.0);
-        const double coupled =
-            p->coupling_orthogonal * (p->orthogonal_start[i + 1] - p->orthogonal_start[i]) +
-            p->coupling_diagonal * (p->diagonal_start[i + 1] - p->diagonal_start[i]);
+        double coupled = 0.0;
+        for (int kind = 0; kind < NEIGHBOUR_KINDS; kind++)
+            coupled += p->coupling[kind] * neighbour_count(p, (enum neighbour_kind)kind, i);
         fastest = fmax(fastest, (own + 2.0 * coupled) * p->inverse_capacity[i]);
         air_sum += 2.0 * p->loss_sum[i];
         plate_sum += 2.0 * p->value[P_plate_coupling_w_per_k][i];

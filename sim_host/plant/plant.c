@@ -2,23 +2,67 @@
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "plant_internal.h"
 
+/* So many bytes behind what is taken; NULL while only counting. */
+static void *take(unsigned char *memory, size_t *taken, size_t bytes)
+{
+    void *at = memory ? memory + *taken : NULL;
+    *taken += (bytes + sizeof(double) - 1) / sizeof(double) * sizeof(double);
+    return at;
+}
+
+/* Points every array of the plant to its place in that memory, whose beginning is the plant itself.
+ * Returns how many bytes that is. */
+static size_t lay_out(plant_t *p, unsigned char *memory)
+{
+    const size_t n = (size_t)p->n, nodes = n + 2;
+    double **const of_springs[] = {&p->quantity,         &p->austenite,      &p->sensor_c,
+                                   &p->heat_start,       &p->heat_from_c,    &p->cool_start,
+                                   &p->cool_from_c,      &p->latent_j,       &p->power_w,
+                                   &p->latent_cooling_j, &p->contact_ohm,    &p->resistance_scale,
+                                   &p->loss_scale,       &p->loss_scale_fan, &p->loss_natural,
+                                   &p->loss_forced,      &p->loss_sum,       &p->stage_austenite};
+    double **const of_nodes[] = {&p->temperature_c, &p->capacity, &p->inverse_capacity, &p->stage_c,
+                                 &p->increment_j};
+    size_t taken = 0;
+    (void)take(memory, &taken, sizeof *p);
+    for (size_t k = 0; k < PARAMETER_COUNT; k++)
+        p->value[k] =
+            take(memory, &taken, (plant_parameter(k)->per_spring ? n : 1) * sizeof(double));
+    for (size_t k = 0; k < sizeof of_springs / sizeof of_springs[0]; k++)
+        *of_springs[k] = take(memory, &taken, n * sizeof(double));
+    for (size_t k = 0; k < sizeof of_nodes / sizeof of_nodes[0]; k++)
+        *of_nodes[k] = take(memory, &taken, nodes * sizeof(double));
+    for (size_t k = 0; k < sizeof p->k / sizeof p->k[0]; k++)
+        p->k[k].q_w = take(memory, &taken, nodes * sizeof(double));
+    for (int kind = 0; kind < NEIGHBOUR_KINDS; kind++) {
+        p->neighbours[kind].start = take(memory, &taken, (n + 1) * sizeof(int));
+        p->neighbours[kind].of = take(memory, &taken, NEIGHBOURS_MOST * n * sizeof(int));
+    }
+    p->upstream = take(memory, &taken, n * sizeof(int));
+    p->mode = take(memory, &taken, n * sizeof *p->mode);
+    p->fault = take(memory, &taken, n * sizeof *p->fault);
+    p->points = take(memory, &taken, n * sizeof *p->points);
+    return taken;
+}
+
 plant_t *plant_create(int rows, int columns)
 {
-    if (rows < 1 || columns < 1 || rows > MAX_SPRINGS || columns > MAX_SPRINGS ||
-        rows * columns > MAX_SPRINGS)
+    if (rows < 1 || columns < 1 || rows > PLANT_MAX_SPRINGS || columns > PLANT_MAX_SPRINGS ||
+        rows * columns > PLANT_MAX_SPRINGS)
         return NULL;
-    plant_t *p = calloc(1, sizeof *p);
+    plant_t shape = {.rows = rows, .columns = columns, .n = rows * columns};
+    shape.bytes = lay_out(&shape, NULL);
+    plant_t *p = calloc(1, shape.bytes);
     if (!p)
         return NULL;
-    p->rows = rows;
-    p->columns = columns;
-    p->n = rows * columns;
+    *p = shape;
+    lay_out(p, (unsigned char *)p);
     for (int k = 0; k < PARAMETER_COUNT; k++)
-        for (int i = 0; i < MAX_SPRINGS; i++)
-            p->value[k][i] = plant_parameter((size_t)k)->default_value;
+        (void)plant_set_index(p, (size_t)k, -1, plant_parameter((size_t)k)->default_value);
     plant_network_lay(p);
     plant_reset(p);
     return p;
@@ -31,9 +75,11 @@ void plant_destroy(plant_t *p)
 
 plant_t *plant_copy(const plant_t *p)
 {
-    plant_t *copy = malloc(sizeof *copy);
-    if (copy)
-        *copy = *p;
+    plant_t *copy = malloc(p->bytes);
+    if (!copy)
+        return NULL;
+    memcpy(copy, p, p->bytes);
+    lay_out(copy, (unsigned char *)copy);
     return copy;
 }
 

@@ -14,14 +14,14 @@
 extern "C" {
 #endif
 
-#define PLANT_MAX_SPRINGS 64
+#define PLANT_MAX_SPRINGS 1024
 
 typedef enum {
     PLANT_OK = 0,
     PLANT_ERROR_NAME = -1,  /* no parameter or effect of that name */
     PLANT_ERROR_RANGE = -2, /* value outside the parameter's limits, or not a number */
     PLANT_ERROR_INDEX = -3, /* no such spring */
-    PLANT_ERROR_SIZE = -4,  /* rows x columns not in 1..64 */
+    PLANT_ERROR_SIZE = -4,  /* rows x columns not in 1..1024 */
     PLANT_ERROR_MEMORY = -5,
     PLANT_ERROR_TIME = -6 /* time step not positive or not finite */
 } plant_status_t;
@@ -49,7 +49,8 @@ const char *plant_effect_name(size_t k);  /* NULL if and only if k >= count */
 int plant_effect_index(const char *name); /* -1: none */
 const char *plant_status_text(plant_status_t status);
 
-/* Fails (NULL) if and only if rows or columns are 0, rows x columns > 64, or memory is out. */
+/* Fails (NULL) if and only if rows or columns are 0, rows x columns > PLANT_MAX_SPRINGS, or memory
+ * is out. Memory and time of a step are in proportion to the springs. */
 plant_t *plant_create(int rows, int columns);
 void plant_destroy(plant_t *plant);
 plant_t *plant_copy(const plant_t *plant); /* NULL if and only if memory is out */

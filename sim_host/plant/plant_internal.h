@@ -7,7 +7,6 @@
 
 #include "plant.h"
 
-#define MAX_SPRINGS    PLANT_MAX_SPRINGS
 #define PI             3.141592653589793
 #define COLDEST_C      (-60.0)
 #define HOTTEST_C      500.0
@@ -31,7 +30,7 @@ enum effect_id {
 
 /* What happens at one instant. q_w: net heat into each spring, then the air, then the plate. */
 typedef struct {
-    double q_w[MAX_SPRINGS + 2];
+    double *q_w;
     double in_w, out_w;
 } flows_t;
 
@@ -40,50 +39,67 @@ typedef struct {
     double martensite_finish_c, martensite_start_c, austenite_start_c, austenite_finish_c;
 } points_t;
 
+/* Springs that exchange heat directly. */
+enum neighbour_kind {
+    NEIGHBOUR_ORTHOGONAL, /* beside each other in a row or column */
+    NEIGHBOUR_DIAGONAL,
+    NEIGHBOUR_SECOND, /* two apart in a row or column */
+    NEIGHBOUR_KINDS
+};
+#define NEIGHBOURS_MOST 4 /* of one kind */
+
+/* Those of one kind, sparse: spring i's are of[start[i]] .. of[start[i + 1] - 1]. */
+typedef struct {
+    int *start; /* n + 1 */
+    int *of;
+} neighbours_t;
+
+/* One value for each spring, row by row, but for those that say how many they are. The values lie
+ * behind the struct in its one piece of memory, as plant.c lays them out. */
 struct plant {
     int rows, columns, n;
-    double value[PARAMETER_COUNT][MAX_SPRINGS];
+    size_t bytes;                   /* of the whole piece */
+    double *value[PARAMETER_COUNT]; /* one where the parameter is not per_spring */
     bool on[EFFECT_COUNT];
-    plant_drive_mode_t mode[MAX_SPRINGS];
-    double quantity[MAX_SPRINGS];
-    plant_fault_t fault[MAX_SPRINGS];
+    plant_drive_mode_t *mode;
+    double *quantity;
+    plant_fault_t *fault;
     double fan;
     /* What the setters leave for plant_solver_prepare. */
     bool parameters_changed, inputs_changed;
     bool restarted; /* the branches are to be laid anew, whatever was */
 
     double time_s;
-    double temperature_c[MAX_SPRINGS + 2]; /* springs, air, plate */
-    double austenite[MAX_SPRINGS];
-    double sensor_c[MAX_SPRINGS];
+    double *temperature_c; /* n + 2: springs, air, plate */
+    double *austenite;
+    double *sensor_c;
     /* Turning points. Heating follows heat_start + (1 - heat_start) rising(T) once that exceeds the
      * present fraction, from heat_from_c on; cooling follows cool_start falling(T) below
      * cool_from_c. */
-    double heat_start[MAX_SPRINGS], heat_from_c[MAX_SPRINGS];
-    double cool_start[MAX_SPRINGS], cool_from_c[MAX_SPRINGS];
+    double *heat_start, *heat_from_c;
+    double *cool_start, *cool_from_c;
     double input_j, output_j, stored_j;
     double step_s; /* the last good step: where the next one starts */
 
     /* derived by phase */
-    points_t points[MAX_SPRINGS];
-    double latent_j[MAX_SPRINGS], latent_cooling_j[MAX_SPRINGS];
+    points_t *points;
+    double *latent_j, *latent_cooling_j;
 
     /* derived by electric */
-    double resistance_scale[MAX_SPRINGS];
-    double contact_ohm[MAX_SPRINGS]; /* 0 without the effect */
-    double power_w[MAX_SPRINGS];
+    double *resistance_scale;
+    double *contact_ohm; /* 0 without the effect */
+    double *power_w;
     double supply_v;
     bool power_varies; /* with the state: must be found anew at each stage */
 
     /* derived by network */
-    int orthogonal_start[MAX_SPRINGS + 1], diagonal_start[MAX_SPRINGS + 1];
-    unsigned char orthogonal[4 * MAX_SPRINGS], diagonal[4 * MAX_SPRINGS];
-    int upstream[MAX_SPRINGS]; /* -1: none */
-    double capacity[MAX_SPRINGS + 2], inverse_capacity[MAX_SPRINGS + 2];
-    double loss_scale[MAX_SPRINGS], loss_scale_fan[MAX_SPRINGS]; /* edge and mismatch */
-    double loss_natural[MAX_SPRINGS], loss_forced[MAX_SPRINGS];
-    double loss_sum[MAX_SPRINGS]; /* natural + forced */
-    double coupling_orthogonal, coupling_diagonal;
+    neighbours_t neighbours[NEIGHBOUR_KINDS];
+    int *upstream;                       /* -1: none */
+    double *capacity, *inverse_capacity; /* n + 2 */
+    double *loss_scale, *loss_scale_fan; /* edge and mismatch */
+    double *loss_natural, *loss_forced;
+    double *loss_sum; /* natural + forced */
+    double coupling[NEIGHBOUR_KINDS];
     double wake;
     double radiation_w_per_k4;
     bool any_held;
@@ -92,13 +108,27 @@ struct plant {
     double step_limit_s;
     bool flows_known; /* k[0] is of the present state */
     flows_t k[4];
-    double stage_c[MAX_SPRINGS + 2], stage_austenite[MAX_SPRINGS];
-    double increment_j[MAX_SPRINGS + 2];
+    double *stage_c, *increment_j; /* n + 2 */
+    double *stage_austenite;
 };
 
 static inline double scalar(const plant_t *p, enum parameter_id id)
 {
     return p->value[id][0];
+}
+
+static inline int neighbour_count(const plant_t *p, enum neighbour_kind kind, int i)
+{
+    return p->neighbours[kind].start[i + 1] - p->neighbours[kind].start[i];
+}
+
+/* Sum over those neighbours of t less spring i's. */
+static inline double neighbour_difference(const neighbours_t *neighbours, const double *t, int i)
+{
+    double sum = 0.0;
+    for (int k = neighbours->start[i]; k < neighbours->start[i + 1]; k++)
+        sum += t[neighbours->of[k]] - t[i];
+    return sum;
 }
 
 static inline bool within(double value, double low, double high)

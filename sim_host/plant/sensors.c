@@ -31,11 +31,10 @@ double plant_measured_c(const plant_t *p, int spring)
     double seen = p->sensor_c[spring];
     const double ambient = plant_network_ambient(p, p->time_s);
     if (p->on[E_optical_mixing]) {
-        double orthogonal = 0.0, diagonal = 0.0;
-        for (int k = p->orthogonal_start[spring]; k < p->orthogonal_start[spring + 1]; k++)
-            orthogonal += p->sensor_c[p->orthogonal[k]] - seen;
-        for (int k = p->diagonal_start[spring]; k < p->diagonal_start[spring + 1]; k++)
-            diagonal += p->sensor_c[p->diagonal[k]] - seen;
+        const double orthogonal =
+            neighbour_difference(&p->neighbours[NEIGHBOUR_ORTHOGONAL], p->sensor_c, spring);
+        const double diagonal =
+            neighbour_difference(&p->neighbours[NEIGHBOUR_DIAGONAL], p->sensor_c, spring);
         const double background = ambient + scalar(p, P_optical_background_rise_k);
         seen +=
             scalar(p, P_optical_orthogonal) * orthogonal + scalar(p, P_optical_diagonal) * diagonal;

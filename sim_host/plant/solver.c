@@ -92,6 +92,14 @@ static void accept(plant_t *p, double h)
         h * (2.0 / 9.0 * p->k[0].out_w + 1.0 / 3.0 * p->k[1].out_w + 4.0 / 9.0 * p->k[2].out_w);
 }
 
+/* The last stage is the next step's first. */
+static void keep_last_flows(plant_t *p)
+{
+    memcpy(p->k[0].q_w, p->k[3].q_w, (size_t)(p->n + 2) * sizeof(double));
+    p->k[0].in_w = p->k[3].in_w;
+    p->k[0].out_w = p->k[3].out_w;
+}
+
 /* Bogacki and Shampine, Appl. Math. Lett. 2 (1989) 321: third order with an embedded second, the
  * last stage serving as the next step's first. Works on the heat each node takes up: energy closes
  * by construction, and latent heat needs no special case. */
@@ -149,7 +157,7 @@ plant_status_t plant_solver_advance(plant_t *p, double dt_s)
             continue; /* k[0] still holds */
         }
         accept(p, h);
-        p->k[0] = p->k[3];
+        keep_last_flows(p);
         /* a step cut short by the end says nothing against the longer one */
         if (!to_end || factor * h > p->step_s || error > 0.5 * tolerance)
             p->step_s = fmin(factor * h, 1e6);

@@ -79,7 +79,7 @@ const char *plant_status_text(plant_status_t status)
     case PLANT_ERROR_INDEX:
         return "no such spring";
     case PLANT_ERROR_SIZE:
-        return "rows x columns not in 1..64";
+        return "rows x columns not in 1..1024";
     case PLANT_ERROR_MEMORY:
         return "out of memory";
     case PLANT_ERROR_TIME:
@@ -101,7 +101,7 @@ plant_status_t plant_set_index(plant_t *p, size_t k, int spring, double value)
         value != floor(value))
         return PLANT_ERROR_RANGE;
     if (spring < 0)
-        for (int i = 0; i < MAX_SPRINGS; i++)
+        for (int i = 0; i < (parameter->per_spring ? p->n : 1); i++)
             p->value[k][i] = value;
     else
         p->value[k][spring] = value;

@@ -5,6 +5,7 @@
 #ifndef BOARD_TEST_H
 #define BOARD_TEST_H
 
+#include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <memory>
@@ -90,10 +91,30 @@ public:
         TEST_ASSERT_EQUAL_STRING_MESSAGE("ok", end.c_str(), line.c_str());
     }
 
-    void run_ms(double ms) { board.run_ms(ms); }
+    void run_ms(double ms)
+    {
+        const double left_ms = ms - ahead_ms_;
+        ahead_ms_ = left_ms < 0.0 ? -left_ms : 0.0;
+        if (left_ms > 0.0) {
+            board.run_ms(left_ms);
+        }
+    }
 
+    /* Between two of the chip's ticks: in one, half of its numbers are new. */
     board_view_t view()
     {
+        constexpr double look_ms = 0.1;
+        const auto asleep = static_cast<std::uint64_t>(0.9 * look_ms * CYCLES_PER_MS);
+        std::uint64_t before = board_idle_cycles(raw());
+        for (int look = 0; look < 200; ++look) {
+            board.run_ms(look_ms);
+            ahead_ms_ += look_ms;
+            const std::uint64_t now = board_idle_cycles(raw());
+            if (now - before > asleep) {
+                break;
+            }
+            before = now;
+        }
         board_view_t seen{};
         TEST_ASSERT_TRUE_MESSAGE(board_view(raw(), "controller", &seen),
                                  "the ELF's `controller` has not the layout of this build");
@@ -102,6 +123,9 @@ public:
 
     std::unique_ptr<plant_t, plant_deleter> plant;
     ninespring::simulated_board board;
+
+private:
+    double ahead_ms_ = 0.0; /* that looks have taken: the next run is shorter by it */
 };
 
 inline bool contains(const std::string &text, const std::string &part)

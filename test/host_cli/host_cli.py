@@ -307,6 +307,16 @@ class Run(Case):
         refused("s.ini:15:", "austenite_start_c must be", SCENARIO + "at 1 = set austenite_start_c 150\n")
         refused("s.ini:15:", "write `fail lie K CURRENT_SCALE VOLTAGE_SCALE`", SCENARIO + "at 1 = fail lie 2\n")
 
+    def test_an_array_on_several_boards(self) -> None:
+        """Two boards of 2 x 2 side by side, the second with a current of its own."""
+        wide = "[scenario]\nduration_s = 20\n[array]\nrows = 2\ncols = 4\nboard_rows = 2\nboard_cols = 2\n"
+        wide += "[plant]\neffects = latent_heat, resistance_phase\n[chip]\nopen_current_a = 1.5\n"
+        wide += "[board.2]\nopen_current_a = 1\n[events]\nat 1 = pattern 11111101\n"
+        last = rows_of_text(self.run_it("a.csv", scenario=wide))[-2]
+        for spring, current_a in ((1, 1.5), (2, 1.5), (3, 1.0), (4, 1.0), (5, 1.5), (6, 1.5), (7, 0.0), (8, 1.0)):
+            self.assertAlmostEqual(float(last[f"i{spring}_a"]), current_a, delta=0.05)
+        self.scenario_refused("s.ini:16:", "on two boards", wide + "at 2 = fail swap 1 3\n")
+
     def test_what_the_chip_leaves_out_is_told(self) -> None:
         path = self.file("s.ini", SCENARIO)
         for set_to, told in (("0.5", "latent_cooling_ratio is not on the chip"), ("1", "")):

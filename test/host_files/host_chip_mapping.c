@@ -146,6 +146,38 @@ static void what_the_chip_averages_is_said(void)
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(message, "the chip takes the ratio without"), message);
 }
 
+/* The middle column of 3 x 3 as a board of its own: the edges' losses of the whole array, nothing
+ * to springs that it does not have, a third of the plate. */
+static void a_part_knows_its_own_springs_alone(void)
+{
+    on("edge_loss");
+    on("plate_conduction");
+    set("edge_loss_fraction", 0.1);
+    set("plate_heat_capacity_j_per_k", 12.0);
+    set("plate_loss_w_per_k", 0.03);
+    TEST_ASSERT_EQUAL(CHIP_MAPPING_OK,
+                      chip_mapping_from_part(plant, 0, 1, 3, 1, &chip, message, sizeof message));
+    const double expected[3] = {1.1, 1.0, 1.1};
+    for (int k = 0; k < 3; k++) {
+        TEST_ASSERT_DOUBLE_WITHIN(5.8, 5800.0 * expected[k],
+                                  chip.loss_uw_per_k * chip.loss_scale_permille[k] / 1000.0);
+    }
+    TEST_ASSERT_EQUAL(3, chip.rows);
+    TEST_ASSERT_EQUAL(1, chip.columns);
+    TEST_ASSERT_EQUAL(4000, chip.plate_heat_capacity_mj_per_k);
+    TEST_ASSERT_EQUAL(10000, chip.plate_loss_uw_per_k);
+}
+
+/* 3 x 3: six pairs two apart, twelve beside each other. */
+static void second_neighbours_are_counted_to_the_first(void)
+{
+    set("orthogonal_w_per_k", 0.0005);
+    set("second_w_per_k", 0.0001);
+    TEST_ASSERT_EQUAL(CHIP_MAPPING_OK, map());
+    TEST_ASSERT_EQUAL(550, chip.orthogonal_uw_per_k);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(message, "second_w_per_k is not on the chip"), message);
+}
+
 /* What each spring loses on the chip is what it loses in the plant, to the permille. */
 static void edge_and_mismatch_become_scales(void)
 {
@@ -255,6 +287,8 @@ int main(void)
     RUN_TEST(effects_that_are_off_cost_nothing);
     RUN_TEST(what_the_plant_has_in_two_numbers_becomes_one);
     RUN_TEST(what_the_chip_averages_is_said);
+    RUN_TEST(a_part_knows_its_own_springs_alone);
+    RUN_TEST(second_neighbours_are_counted_to_the_first);
     RUN_TEST(edge_and_mismatch_become_scales);
     RUN_TEST(natural_convection_becomes_a_rising_loss);
     RUN_TEST(what_is_not_on_the_chip_is_left_out_and_said);

@@ -163,6 +163,10 @@ void scenario_with_errors_is_refused(void)
     refuses_scenario(SCENARIO + "; " + std::string(200, 'x') + "\n",
                      "s.ini:3:198: ", "at most 197");
     refuses_scenario(SCENARIO + "[array]\nrows=9\ncols=9\n", "s.ini:1:1: ", "more than 64");
+    refuses_scenario(SCENARIO + "[array]\nboard_rows=3\n", "s.ini:1:1: ", "go together");
+    refuses_scenario(SCENARIO + "[board.2]\nsupply_limit_a=5\n",
+                     "s.ini:4:1: ", "[board.2], but the array has 1");
+    refuses_scenario(SCENARIO + "[board.0]\nsupply_limit_a=5\n", "s.ini:3:", "no section");
 }
 
 void scenario_events_with_errors_are_refused(void)

@@ -28,6 +28,8 @@ SCALARS = {
     "orthogonal_fan_w_per_k": (0, 1e-3),
     "diagonal_w_per_k": (0, 5e-4),
     "diagonal_fan_w_per_k": (0, 5e-4),
+    "second_w_per_k": (0, 2e-4),
+    "second_fan_w_per_k": (0, 2e-4),
     "ambient_c": (10, 30),
     "supply_v": (4, 6),
     "freewheel_drop_v": (0, 0.4),
@@ -93,6 +95,7 @@ class Model:
         dr, dc = abs(row[:, None] - row), abs(column[:, None] - column)
         self.orthogonal = (dr + dc == 1).astype(float)
         self.diagonal = ((dr == 1) & (dc == 1)).astype(float)
+        self.second = ((dr + dc == 2) & (dr != dc)).astype(float)
         step = [(0, 1), (1, 0), (0, -1), (-1, 0)][int(values["wake_direction"])]
         self.downstream = (  # [i, j]: i receives from j
             (row[:, None] - row == step[0]) & (column[:, None] - column == step[1])
@@ -267,7 +270,8 @@ class Model:
         x, up, down = self.phase(t)
         g_o = v["orthogonal_w_per_k"] * (1 - fan) + v["orthogonal_fan_w_per_k"] * fan
         g_d = v["diagonal_w_per_k"] * (1 - fan) + v["diagonal_fan_w_per_k"] * fan
-        g = g_o * self.orthogonal + g_d * self.diagonal
+        g_s = v["second_w_per_k"] * (1 - fan) + v["second_fan_w_per_k"] * fan
+        g = g_o * self.orthogonal + g_d * self.diagonal + g_s * self.second
         given = self.loss(t, air, fan) * (t - air)
         if "fan_wake" in on:
             given = given - v["wake_w_per_k"] * fan * (self.downstream @ t - self.downstream.sum(1) * air)

@@ -306,7 +306,7 @@ static void bad_drives_and_steps_are_refused(void)
     TEST_ASSERT_EQUAL_INT(PLANT_ERROR_INDEX, plant_set_temperature(plant, 9, 20.0));
     TEST_ASSERT_NULL(plant_create(0, 3));
     TEST_ASSERT_NULL(plant_create(3, -1));
-    TEST_ASSERT_NULL(plant_create(5, 13));
+    TEST_ASSERT_NULL(plant_create(25, 41));
     TEST_ASSERT_NULL(plant_create(65536, 65536));
 }
 
@@ -384,9 +384,9 @@ static void reset_starts_anew(void)
     TEST_ASSERT_EQUAL_MEMORY(shown[0], shown[1], sizeof shown[0]);
 }
 
-static void any_size_from_1_x_1_to_8_x_8(void)
+static void any_size_from_1_x_1_to_32_x_32(void)
 {
-    static const int sizes[][2] = {{1, 1}, {1, 2}, {2, 1}, {1, 64}, {8, 8}};
+    static const int sizes[][2] = {{1, 1}, {1, 2}, {2, 1}, {1, 1024}, {32, 32}};
     for (int k = 0; k < 5; k++) {
         plant_t *p = plant_create(sizes[k][0], sizes[k][1]);
         TEST_ASSERT_NOT_NULL(p);
@@ -402,6 +402,35 @@ static void any_size_from_1_x_1_to_8_x_8(void)
         TEST_ASSERT_TRUE(fabs(plant_energy_balance_j(p)) < 1e-9 * plant_energy_input_j(p));
         plant_destroy(p);
     }
+}
+
+/* In a row of four, a heated end warms its second neighbour alone. */
+static void second_neighbours_are_two_apart(void)
+{
+    plant_t *p = plant_create(1, 4);
+    OK(plant_set(p, "orthogonal_w_per_k", 0.0));
+    OK(plant_set(p, "second_w_per_k", 1e-3));
+    OK(plant_drive(p, 0, PLANT_DRIVE_TEMPERATURE, 100.0));
+    OK(plant_settle(p, 1e5));
+    double loss = 0.0;
+    OK(plant_get(p, "loss_w_per_k", &loss));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 20.0, plant_temperature_c(p, 1));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-3, 20.0 + 80.0 * 1e-3 / (1e-3 + loss), plant_temperature_c(p, 2));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 20.0, plant_temperature_c(p, 3));
+    plant_destroy(p);
+}
+
+/* A copy goes its own way, whatever its size. */
+static void a_copy_shares_nothing(void)
+{
+    plant_t *p = plant_create(5, 7), *copy = plant_copy(p);
+    OK(plant_drive(copy, 34, PLANT_DRIVE_POWER, 0.5));
+    OK(plant_step(copy, 50.0));
+    TEST_ASSERT_EQUAL_DOUBLE(20.0, plant_temperature_c(p, 34));
+    plant_destroy(p);
+    OK(plant_step(copy, 50.0));
+    TEST_ASSERT_TRUE(plant_temperature_c(copy, 34) > 50.0);
+    plant_destroy(copy);
 }
 
 int main(void)
@@ -423,6 +452,8 @@ int main(void)
     RUN_TEST(a_log_in_one_call_equals_the_same_by_steps);
     RUN_TEST(a_bad_log_is_refused_whole);
     RUN_TEST(reset_starts_anew);
-    RUN_TEST(any_size_from_1_x_1_to_8_x_8);
+    RUN_TEST(any_size_from_1_x_1_to_32_x_32);
+    RUN_TEST(second_neighbours_are_two_apart);
+    RUN_TEST(a_copy_shares_nothing);
     return UNITY_END();
 }

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+import subprocess
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -67,3 +68,14 @@ def make_log(tmp_path: Path) -> Make:
 def measured() -> Path:
     """Return the folder of measured data."""
     return Path(os.environ.get("NINESPRING_DATA", Path(__file__).resolve().parents[2] / "data"))
+
+
+@pytest.fixture
+def small_disk(tmp_path: Path) -> Iterator[Path]:
+    """Return a folder on a disk of its own with room for 16 kB."""
+    folder = tmp_path / "disk"
+    folder.mkdir()
+    if subprocess.run(["mount", "-t", "tmpfs", "-o", "size=16k", "none", folder], capture_output=True).returncode:
+        pytest.skip("SKIPPED: this user cannot mount a small disk")
+    yield folder
+    subprocess.run(["umount", folder], check=True)

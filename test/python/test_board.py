@@ -145,6 +145,33 @@ def test_an_effect_found_in_a_log_is_in_the_model_of_the_chip_that_it_was_upload
     assert apart < np.abs(got[columns].to_numpy(float) - other[columns].to_numpy(float)).max()
 
 
+def known_in(connection: Board) -> list[str]:
+    """Return the lines of `learnt` that tell something of a spring."""
+    lines = [line for line in connection.ask("learnt") if line.startswith("spring ")]
+    assert len(lines) == 9
+    return [line for line in lines if not line.endswith("nothing yet")]
+
+
+@pytest.mark.skipif(not (SIM.exists() and ELF.exists()), reason=f"SKIPPED: {SIM} or {ELF} is not there")
+def test_an_upload_makes_the_board_forget_what_it_has_learnt(board: str, tmp_path: Path) -> None:
+    def learnt() -> list[str]:
+        with Board(board, off_at_end=False) as connection:
+            return known_in(connection)
+
+    assert learnt() == []
+    with Board(board) as connection:
+        for line in ("policy precompensate", "model cold", "on 5"):
+            connection.ask(line)
+        until = time.monotonic() + 120.0
+        while not known_in(connection):
+            assert time.monotonic() < until, "spring 5 transforms, and shows nothing"
+    (known,) = learnt()
+    assert known.startswith("spring 5: 0.")
+    (tmp_path / "s.txt").write_text("$loss_w_per_k=0.006000\n")
+    ninespring("upload", "--port", board, tmp_path / "s.txt")
+    assert learnt() == []
+
+
 def faults_of(port: str) -> list[str]:
     with Board(port, off_at_end=False) as connection:
         return connection.ask("faults")

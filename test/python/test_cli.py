@@ -210,6 +210,14 @@ def test_work_that_ends_early_leaves_nothing_and_says_one_line(
     assert list(tmp_path.iterdir()) == [log]
 
 
+def test_ctrl_c_while_the_package_is_loaded_is_one_line() -> None:
+    slow = "import builtins, os, signal\nload = builtins.__import__\n"
+    slow += "def late(name, *more):\n    if name == 'numpy': os.kill(os.getpid(), signal.SIGINT)\n    return load(name, *more)\n"
+    slow += "builtins.__import__ = late\nfrom ninespring_start import main; main()"
+    done = subprocess.run([sys.executable, "-c", slow], capture_output=True, text=True, timeout=60, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (1, "", "ninespring: stopped\n")
+
+
 def test_fit_and_predict_say_what_is_wrong_with_a_log_too(make_log, tmp_path: Path) -> None:
     def swap(columns: dict[str, np.ndarray]) -> None:
         columns["t2_c"], columns["t8_c"] = columns["t8_c"], columns["t2_c"]

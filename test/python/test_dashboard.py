@@ -331,6 +331,29 @@ def test_a_pages_wishes_are_carried_out_in_their_order(tmp_path: Path) -> None:
     assert [line for line in board.sent() if line.startswith("on ")] == [f"on 1 {level}" for level in range(1, 101)]
 
 
+def test_a_full_disk_ends_the_recording_and_nothing_else(small_disk: Path) -> None:
+    board = FakeBoard()
+    board.stream, board.every_s = (row(0.1 * k) for k in range(10, 99999)), 0.01
+    dashboard = Dashboard(small_disk, "--port", board.port)
+    try:
+        with connect(
+            f"ws://{dashboard.address}/ws", additional_headers={"origin": dashboard.url.rstrip("/")}
+        ) as socket:
+            while not json.loads(socket.recv(10)).get("connected"):
+                pass
+            socket.send('{"do": "record"}')
+            while "No space left on device" not in (state := json.loads(socket.recv(30))).get("said", ""):
+                pass
+            assert state["connected"] and state["recording"] is None
+            while json.loads(socket.recv(10)).get("time_s", 0.0) <= state["time_s"]:
+                pass  # the array is shown as before
+    finally:
+        assert dashboard.end() == 0
+    (log,) = small_disk.iterdir()
+    assert log.suffix == ".csv" and log.read_text().endswith("\n")
+    assert len(read_table(log, ("state",)).frame) > 50
+
+
 def test_a_stop_that_drops_what_is_being_answered_loses_no_board(tmp_path: Path) -> None:
     board = FakeBoard({"model": ["error:12 dropped by the stop"]})
     board.stream, board.every_s = (row(0.1 * k) for k in range(10, 9999)), 0.1
@@ -377,6 +400,16 @@ def test_faults_and_states_in_words_are_those_of_the_table() -> None:
     assert faults.keys() == words.FAULTS.keys()
     assert all(words.FAULTS[number] == text for number, text in faults.items() if number != 13)
     assert words.of_state("fault_2") == faults[2]
+
+
+def test_what_hinders_is_said_in_the_terminal_too(tmp_path: Path) -> None:
+    words = [sys.executable, "-m", "ninespring", "dashboard", "--listen", "127.0.0.1:0", "--port", str(tmp_path / "no")]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stderr is not None
+        said = process.stderr.readline()
+        process.send_signal(signal.SIGINT)
+    assert "no: cannot be opened (No such file or directory)" in said
+    assert process.returncode == 0
 
 
 @pytest.mark.parametrize(

@@ -39,7 +39,7 @@ def refused(path: Path, read: Callable[[Path], object]) -> tuple[str, str]:
         ("[sensor]\nnoise_c = 0.3\n", "1:1", "there is no [array] table"),
         ("[array]\nrows = 3\n", "1:1", "without cols"),
         ("[array]\nrows = 3\ncols = 2.5\n", "3:8", "cols must be a whole number"),
-        ("[array]\nrows = 9\ncols = 9\n", "3:8", "more than 64 springs"),
+        ("[array]\nrows = 33\ncols = 32\n", "3:8", "more than 1024 springs"),
         ("array = 3\n", "1:9", "[array] must be a table"),
         (ARRAY + "pitch = 4\n", "4:1", "did you mean pitch_mm?"),
         (ARRAY + 'pitch_mm = "4"\n', "4:12", "must be a number, without quotes"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import io
 import json
 import os
@@ -29,6 +30,7 @@ from ninespring.board import Board
 from ninespring.errors import WorkError
 from ninespring.logs import read_log, read_table
 from ninespring.monitoring import Screen
+from ninespring.port import Port
 from ninespring.recording import RowCheck, script_lines
 from ninespring.thermometers import Lines
 from rich.console import Console
@@ -120,16 +122,6 @@ def test_a_pulled_cable_keeps_what_came(tmp_path: Path) -> None:
     assert "went away" in done.stderr and "cut their supply" in done.stderr
     assert times(tmp_path / "log.csv")[-1] >= 2.5
     assert "went away" in json.loads((tmp_path / "r.json").read_text())["ended"]
-
-
-@pytest.fixture
-def small_disk(tmp_path: Path) -> Path:
-    folder = tmp_path / "disk"
-    folder.mkdir()
-    if subprocess.run(["mount", "-t", "tmpfs", "-o", "size=16k", "none", folder], capture_output=True).returncode:
-        pytest.skip("SKIPPED: this user cannot mount a small disk")
-    yield folder
-    subprocess.run(["umount", folder], check=True)
 
 
 def test_a_full_disk_keeps_what_fitted_and_switches_off(small_disk: Path, tmp_path: Path) -> None:
@@ -408,6 +400,22 @@ def test_a_port_that_is_not_there_or_is_none_is_said(tmp_path: Path) -> None:
         assert "cannot be opened" in done.stderr
         assert len(done.stderr.strip().splitlines()) == 1
     assert [one.name for one in tmp_path.iterdir()] == ["file"]
+
+
+def test_thermometers_at_the_boards_own_port_are_refused(tmp_path: Path) -> None:
+    done = ninespring("record", "--port", "/dev/x", "--thermometers", "/dev/../dev/x", "-o", tmp_path / "x.csv")
+    assert done.returncode == 2
+    assert "that is the board's port" in done.stderr
+
+
+def test_a_port_that_is_not_this_users_says_how_to_be_allowed(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused(*arguments: object, **more: object) -> None:
+        raise serial.SerialException(errno.EACCES, "could not open port")
+
+    monkeypatch.setattr(serial, "Serial", refused)
+    monkeypatch.setattr(Path, "group", lambda path: "dialout")
+    with pytest.raises(WorkError, match="usermod --append --groups dialout"):
+        Port("/dev/ttyACM0")
 
 
 def test_telemetry_left_on_by_someone_else_does_not_confuse(tmp_path: Path) -> None:

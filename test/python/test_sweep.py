@@ -197,6 +197,40 @@ def test_geometry_goes_into_the_points(tmp_path: Path) -> None:
 HEAD = "[sweep]\n"
 
 
+def test_boards_of_a_large_array_do_as_one_board_does() -> None:
+    """They know nothing of each other: what each spring needs it sees in the spring."""
+    spec = Spec(duration_s=240, on_s=160)
+    array = {"size": 6, "fan": 1.0, "pitch_mm": 5.0, "pattern": "checkerboard", "supply_limit_a": 60.0}
+    one = point.metrics_of(spec, array | {"board_rows": 6, "board_cols": 6}, 1)
+    many = point.metrics_of(spec, array | {"board_rows": 3, "board_cols": 2}, 1)
+    assert one["started"] == many["started"] == 1.0
+    assert abs(one["undriven_c"] - many["undriven_c"]) < 3.0
+    assert many["hottest_c"] < 115.0
+    # where couplings are strong (what geometry says of 4.3 mm), a board that took its neighbours to be cold would run away
+    strong = point.plant_of_point(spec, array)
+    strong.set("orthogonal_w_per_k", 1.8e-3)
+    strong.set("loss_w_per_k", 2.2e-3)
+    parts = native.boards_of(6, 6, 2, 2)
+    lines = [native.chip_export(strong, part)[0] + point.settings_of(array) for part in parts]
+    hot, *_ = native.chip_run(strong, (2, 2), lines, [True] * 36, 0.0, 1, 200, 200)
+    assert hot.max() < 115.0
+    spec.boards = {1: {"supply_limit_a": 1.0}}  # the first six springs of all: 3 x 2
+    first = point.metrics_of(spec, array | {"board_rows": 3, "board_cols": 2}, 1)
+    assert 0.8 <= first["started"] < 1.0
+    spec.boards = {}
+    little = point.metrics_of(spec, array | {"board_rows": 3, "board_cols": 2, "supply_limit_a": 1.0}, 1)
+    assert little["started"] < 1.0 and little["supply_a"] <= 6 * 1.05
+
+
+def test_every_pattern_is_a_point_of_its_own(tmp_path: Path) -> None:
+    path = tmp_path / "s.toml"
+    path.write_text(HEAD + "[fixed]\nsize = 2\n[vary]\npattern = 'every'\n")
+    spec = read_spec(path)
+    given = [one["pattern"] for one in spec.all_points()]
+    assert len(set(given)) == 16 and given[6] == "0110"
+    assert point.pattern_of({"pattern": "0110"}, 2, 2, np.random.default_rng(1)).tolist() == [False, True, True, False]
+
+
 @pytest.mark.parametrize(
     ("text", "says"),
     [
@@ -206,9 +240,16 @@ HEAD = "[sweep]\n"
             HEAD + "[vary]\npitch_mm = {from = 4, to = 5, steps = 2}\n",
             "point 1 (pitch_mm 4) cannot exist: coils overlap",
         ),
-        (HEAD + "[vary]\nfan = [0, 1]\nsize = [3, 9]\n", "size is 9"),
-        (HEAD + "[vary]\nrows = [9]\ncols = [8]\n", "9 x 8 are more than 64 springs"),
+        (HEAD + "[vary]\nfan = [0, 1]\nsize = [3, 33]\n", "size is 33"),
+        (HEAD + "[vary]\nrows = [64]\ncols = [17]\n", "64 x 17 are more than 1024 springs"),
+        (HEAD + "[fixed]\nboard_rows = 9\n[vary]\nsize = [16]\n", "9 x 8 are more than 64 springs on a board"),
         (HEAD + "[vary]\nfan = [0, 2]\n", "it must be 0 to 1"),
+        (HEAD + "[vary]\nfan = [0, 1]\n[board.2]\nsupply_limit_a = 5\n", "[board.2], but the array has 1 boards"),
+        (HEAD + "[vary]\nfan = [0, 1]\n[board.1]\nsuply_limit_a = 5\n", "did you mean supply_limit_a?"),
+        (HEAD + "[vary]\nfan = [0, 1]\n[board.first]\nsupply_limit_a = 5\n", "must be [board.1]"),
+        (HEAD + "[vary]\npattern = ['0101']\n", "a pattern of 4 springs for an array of 9"),
+        (HEAD + "[fixed]\nsize = 4\n[vary]\npattern = 'every'\n", "16 springs have too many patterns"),
+        (HEAD + "[vary]\nsize = [2, 3]\npattern = 'every'\n", "an array of one size"),
         (HEAD + "[vary]\npitch_mm = 5\n", "belongs into [fixed]"),
         (HEAD + "[vary]\npitch_mm = {from = 5, to = 6}\n", "a grid needs steps"),
         (HEAD + "[vary]\npitch_mm = [5, 5]\n", "a value twice"),
@@ -265,9 +306,9 @@ def test_one_point_is_what_the_controller_does(tmp_path: Path) -> None:
     plant = point.plant_of_point(spec, next(spec.all_points()))
     plant.reset()
     lines = native.chip_export(plant)[0] + "$policy=1\n"
-    t, x, power, current = native.chip_run(plant, lines, [True] * 8 + [False], 0.0, 5, 120, 90)
+    t, x, power, current = native.chip_run(plant, (3, 3), [lines], [True] * 8 + [False], 0.0, 5, 120, 90)
     assert t.shape == x.shape == (120, 9) and (x[89, :8] > 0.95).all() and x[89, 8] == 0.0
     # what goes in is stored, or lost: from cold, nothing is hotter than its energy
     assert power[:90].sum() > 0 and power[91:].max() == 0.0 and current.max() <= 15.0
-    again = native.chip_run(plant, lines, [True] * 8 + [False], 0.0, 5, 120, 90)
+    again = native.chip_run(plant, (3, 3), [lines], [True] * 8 + [False], 0.0, 5, 120, 90)
     assert all(np.array_equal(a, b) for a, b in zip((t, x, power, current), again, strict=True))

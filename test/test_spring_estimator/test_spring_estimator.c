@@ -14,6 +14,14 @@ void setUp(void)
 
 void tearDown(void) {}
 
+/* Off until it is cold; the estimator keeps what it has learnt. */
+static void begin_cold_as_learnt(void)
+{
+    const spring_learnt_t learnt = spring_estimator_learnt(&estimator, 0);
+    begin_cold();
+    spring_estimator_restore(&estimator, 0, &learnt);
+}
+
 static double heat_then_hold(double most_s)
 {
     const double took_s = heat(most_s);
@@ -341,7 +349,7 @@ static void phase_lost_on_the_way_to_the_hold_is_counted(void)
     for (double s = 0.0; s < 60.0 && truth.austenite > 0.8; s += TICK_S) {
         (void)tick(0.9);
     }
-    ticks(1.2, 6.0); /* the average follows */
+    ticks(1.2, 16.0); /* the average follows */
     (void)snprintf(where, sizeof where, "lost %.3f of %.3f", (double)BELIEF.lost,
                    1.0 - truth.austenite);
     TEST_ASSERT_TRUE_MESSAGE(truth.austenite < 0.85, where);
@@ -388,6 +396,65 @@ static void heating_that_a_limit_ends_is_doubted(void)
                                              where);
         }
     }
+}
+
+/* As the limit cuts its current, the turn has no reading: the last one counts. */
+static void heating_that_is_cut_between_two_readings_is_doubted(void)
+{
+    (void)heat_then_hold(60.0);
+    begin_cold_as_learnt();
+    spring_estimator_begin_heating(&estimator, &model, 0);
+    while (truth.austenite < 0.3) {
+        (void)tick(3.0);
+    }
+    spring_estimator_disturb(&BELIEF);
+    while (!tick(0.0)) {
+    }
+    TEST_ASSERT_FALSE(BELIEF.reads);
+    spring_estimator_begin_hold(&estimator, &model, 0, true);
+    TEST_ASSERT_TRUE(BELIEF.doubted);
+    TEST_ASSERT_TRUE(spring_estimator_austenite(&estimator, &model, 0).low < 0.5f);
+}
+
+/* Far below its transformation, nor half of a transformation in a moment: a contact. */
+static void contact_that_steps_in_a_heating_does_not_end_it(void)
+{
+    for (int known = 0; known < 2; known++) {
+        for (double at_c = 35.0; at_c < 70.0; at_c += 10.0) {
+            begin_cold();
+            if (known) {
+                (void)heat_then_hold(60.0);
+                begin_cold_as_learnt();
+            }
+            spring_estimator_begin_heating(&estimator, &model, 0);
+            bool stepped = false;
+            for (double s = 0.0;
+                 s < 60.0 && !spring_estimator_has_transformed(&estimator, &model, 0);
+                 s += TICK_S) {
+                if (!stepped && truth.temperature_c > at_c) {
+                    truth.contact_ohm = 0.07 * truth.martensite_ohm;
+                    stepped = true;
+                }
+                (void)tick(3.0);
+            }
+            (void)snprintf(where, sizeof where, "known %d, step at %.0f degC: %.3f at %.1f degC",
+                           known, at_c, truth.austenite, truth.temperature_c);
+            TEST_ASSERT_TRUE_MESSAGE(truth.austenite > 0.95 && truth.temperature_c < 120.0, where);
+        }
+    }
+}
+
+/* A sensor's offset shows otherwise at the current of a look than at that of the heating. */
+static void offset_between_two_currents_is_no_onset(void)
+{
+    truth.offset_v = -0.008;
+    spring_estimator_begin_heating(&estimator, &model, 0);
+    ticks(0.9, 2.0);
+    for (double s = 0.0; s < 8.0; s += TICK_S) {
+        (void)tick(3.0);
+        TEST_ASSERT_FALSE(BELIEF.onset);
+    }
+    TEST_ASSERT_TRUE(truth.temperature_c > 50.0 && truth.temperature_c < 80.0);
 }
 
 static void martensite_resistance_is_learnt_at_20_degrees(void)
@@ -547,6 +614,9 @@ int main(void)
     RUN_TEST(phase_lost_on_the_way_to_the_hold_is_counted);
     RUN_TEST(contact_is_not_taken_for_phase);
     RUN_TEST(heating_that_a_limit_ends_is_doubted);
+    RUN_TEST(heating_that_is_cut_between_two_readings_is_doubted);
+    RUN_TEST(contact_that_steps_in_a_heating_does_not_end_it);
+    RUN_TEST(offset_between_two_currents_is_no_onset);
     RUN_TEST(martensite_resistance_is_learnt_at_20_degrees);
     RUN_TEST(look_tells_the_phase_by_what_was_learnt);
     RUN_TEST(look_without_anything_learnt_tells_nothing);

@@ -16,8 +16,8 @@
 
 #define EXPORT __attribute__((visibility("default")))
 
-EXPORT int chip_export(const plant_t *plant, char *text, size_t text_size, char *message,
-                       size_t message_size);
+EXPORT int chip_export(const plant_t *plant, int row, int column, int rows, int columns, char *text,
+                       size_t text_size, char *message, size_t message_size);
 EXPORT int chip_simulate(const char *lines, int array_rows, int array_columns, size_t rows,
                          const double *time_s, int mode, const double *drive,
                          const double *command_power_w, const double *fan, const double *ambient_c,
@@ -35,16 +35,16 @@ static bool append(char *text, size_t size, size_t *used, const char *line)
     return true;
 }
 
-/* Console lines `$name=value` of every setting of the thermal model that this plant maps to; 0
- * done, else chip_mapping's status, or -10 where the text is too small. message as
- * chip_mapping_from_plant. */
-int chip_export(const plant_t *plant, char *text, size_t text_size, char *message,
-                size_t message_size)
+/* Console lines `$name=value` of every setting of the thermal model that these springs of the plant
+ * map to (chip_mapping_from_part); 0 done, else chip_mapping's status, or -10 where the text is too
+ * small. message as chip_mapping_from_plant. */
+int chip_export(const plant_t *plant, int row, int column, int rows, int columns, char *text,
+                size_t text_size, char *message, size_t message_size)
 {
     settings_t settings;
     settings_default(&settings);
-    const chip_mapping_status_t status =
-        chip_mapping_from_plant(plant, &settings.controller.model, message, message_size);
+    const chip_mapping_status_t status = chip_mapping_from_part(
+        plant, row, column, rows, columns, &settings.controller.model, message, message_size);
     if (status != CHIP_MAPPING_OK) {
         return (int)status;
     }

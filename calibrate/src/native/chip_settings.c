@@ -19,6 +19,11 @@ bool chip_settings(settings_t *settings, int rows, int columns, const char *line
                    size_t size)
 {
     settings_default(settings);
+    if (rows * columns > CONTROLLER_MAX_SPRINGS) {
+        (void)snprintf(message, size, "%d x %d springs: a board has %d", rows, columns,
+                       CONTROLLER_MAX_SPRINGS);
+        return false;
+    }
     settings->controller.model.rows = (uint8_t)rows;
     settings->controller.model.columns = (uint8_t)columns;
     for (const char *at = lines; *at != '\0';) {

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+import os
 import time
 from pathlib import Path
 
@@ -10,7 +11,7 @@ import click
 
 from . import __version__
 from .console import FILE, JSON, PORT, Command, beside, checked, out, result_of, working, write
-from .errors import WorkError
+from .errors import InputError, WorkError
 from .logs import check_folder, read_bytes
 
 HZ = click.IntRange(1, 50)
@@ -60,6 +61,8 @@ def record(
     from .thermometers import Thermometers
 
     check_folder(output, json_path)
+    if thermometers and os.path.realpath(thermometers) == os.path.realpath(port):
+        raise InputError(f"--thermometers {thermometers}: that is the board's port, a logger has its own")
     text = read_bytes(script).decode("utf-8", "replace") if script else ""
     steps = script_lines(text, str(script), duration)
     keys = {

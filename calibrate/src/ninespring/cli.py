@@ -58,6 +58,12 @@ def main() -> None:
         sys.exit(code if isinstance(code, int) else 0)
     except InputError as error:
         _end(str(error), 2)
+    except click.exceptions.NoArgsIsHelpError as error:
+        error.show()
+        sys.exit(2)
+    except click.UsageError as error:
+        where = error.ctx.command_path if error.ctx else "ninespring"
+        _end(f"{error.format_message()} ({where} --help says more)", 2)
     except click.ClickException as error:
         _end(error.format_message(), 2)
     except (click.Abort, KeyboardInterrupt):

@@ -15,7 +15,9 @@ import numpy as np
 
 from .errors import WorkError
 
-MAX_SPRINGS = 64
+MAX_SPRINGS = 1024
+BOARD_SPRINGS = 64
+"""Of one board, natively; the Mega's has nine."""
 POWER, CURRENT, DUTY, COMMAND, TEMPERATURE = range(5)
 MODES = {"power": POWER, "current": CURRENT, "command": COMMAND, "temperature": TEMPERATURE}
 
@@ -23,7 +25,7 @@ _ERRORS = {
     -1: "no parameter or effect of that name",
     -2: "value outside its limits",
     -3: "no such spring",
-    -4: "rows x columns not in 1..64",
+    -4: "rows x columns not in 1..1024",
     -5: "out of memory",
     -6: "time step not positive, or no steady state",
 }
@@ -373,13 +375,30 @@ def _chip(refusal: str, function: str, *arguments: object) -> str:
     return message.value.decode()
 
 
-def chip_export(plant: Plant) -> tuple[str, str]:
-    """Return the console lines of the on-chip model with this plant's numbers, and what was left out."""
+Part = tuple[int, int, int, int]
+"""Springs of a board: its first row and column (0-based) in the array, its rows and columns."""
+
+
+def boards_of(rows: int, cols: int, board_rows: int, board_cols: int) -> list[Part]:
+    """Return the boards into which an array is cut, as sim_host/loop/boards.h numbers them."""
+    return [
+        (row, col, min(board_rows, rows - row), min(board_cols, cols - col))
+        for row in range(0, rows, board_rows)
+        for col in range(0, cols, board_cols)
+    ]
+
+
+def chip_export(plant: Plant, part: Part | None = None) -> tuple[str, str]:
+    """Return the console lines of the on-chip model with this plant's numbers, and what was left out.
+
+    `part`: of a board that has only these springs.
+    """
     text = ctypes.create_string_buffer(16384)
     left_out = _chip(
         "the model does not fit the chip:",
         "chip_export",
         ctypes.c_void_p(plant._plant),
+        *(part or (0, 0, plant.rows, plant.cols)),
         text,
         ctypes.c_size_t(len(text)),
     )
@@ -440,35 +459,37 @@ def chip_drive(
 
 
 def chip_run(
-    plant: Plant, lines: str, pattern: Sequence[bool], fan: float, seed: int, rows: int, on_rows: int
+    plant: Plant,
+    board: tuple[int, int],
+    lines: Sequence[str],
+    pattern: Sequence[bool],
+    fan: float,
+    seed: int,
+    rows: int,
+    on_rows: int,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Drive a copy of a plant from cold by the chip's controller: the pattern on for `on_rows` seconds, then off.
+    """Drive a copy of a plant from cold by its boards: the pattern on for `on_rows` seconds, then off.
 
+    `board`: rows and columns of springs of one board; `lines`: console lines of each (`boards_of`).
     Return true temperatures (degC) and austenite, (rows, springs), and of each second heat (W) and current (A) of all.
     """
-    from .errors import WorkError
-
+    if len(lines) != len(boards_of(plant.rows, plant.cols, *board)):
+        raise ValueError("lines of every board")
     temperature, austenite = np.empty((rows, plant.springs)), np.empty((rows, plant.springs))
     power, current = np.empty(rows), np.empty(rows)
-    wanted = (ctypes.c_int * plant.springs)(*map(int, pattern))
-    message = ctypes.create_string_buffer(256)
-    call = library().chip_run
-    call.restype = ctypes.c_int
-    call.argtypes = (
-        ctypes.c_void_p,
-        ctypes.c_char_p,
-        _int_p,
-        ctypes.c_double,
-        ctypes.c_uint64,
-        ctypes.c_size_t,
-        ctypes.c_size_t,
-        *(_double_p,) * 4,
-        ctypes.c_char_p,
-        ctypes.c_size_t,
+    _chip(
+        "the chip refuses",
+        "chip_run",
+        ctypes.c_void_p(plant._plant),
+        *board,
+        (ctypes.c_char_p * len(lines))(*(one.encode() for one in lines)),
+        (ctypes.c_int * plant.springs)(*map(int, pattern)),
+        ctypes.c_double(fan),
+        ctypes.c_uint64(seed),
+        ctypes.c_size_t(rows),
+        ctypes.c_size_t(on_rows),
+        *(_pointer(one) for one in (temperature, austenite, power, current)),
     )
-    outputs = [_pointer(one) for one in (temperature, austenite, power, current)]
-    if call(plant._plant, lines.encode(), wanted, fan, seed, rows, on_rows, *outputs, message, len(message)):
-        raise WorkError(f"the chip refuses {message.value.decode()}")
     return temperature, austenite, power, current
 
 

@@ -34,6 +34,8 @@ class Port:
             if "exclusively lock" in str(error) or getattr(error, "errno", None) == errno.EBUSY:
                 raise WorkError(f"{name}: another program has the port{_who_has(name)}: end it first") from None
             number = getattr(error, "errno", None)
+            if number in (errno.EACCES, errno.EPERM):
+                raise WorkError(f"{name}: this user may not open it: {_how_to_be_allowed(name)}") from None
             reason = os.strerror(number) if number else "not a serial port"
             raise WorkError(f"{name}: cannot be opened ({reason}): is the board there, is the port free?") from None
 
@@ -78,6 +80,17 @@ class Port:
         """Close the port, whatever became of it."""
         with suppress(GONE):
             self._serial.close()
+
+
+def _how_to_be_allowed(name: str) -> str:
+    """Return what gives a user the port: on Debian its group is dialout."""
+    try:
+        group = Path(name).group()
+    except (OSError, KeyError):
+        group = "dialout"
+    if group == "root":
+        return "only root may"
+    return f"`sudo usermod --append --groups {group} $USER`, then log in again"
 
 
 def _who_has(name: str) -> str:

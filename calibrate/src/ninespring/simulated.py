@@ -46,5 +46,7 @@ def simulated_board(more: Sequence[str] = ()) -> tuple[subprocess.Popen[str], st
     if not port.startswith("/dev/"):
         said = process.stderr.read().strip().splitlines()
         process.wait(10)
-        raise WorkError(f"the simulated board does not start: {said[-1] if said else 'it says nothing'}")
+        raise WorkError(
+            f"the simulated board does not start: {said[-1] if said else 'it says nothing'} (script/build builds it and its firmware)"
+        )
     return process, port, process.stdout.readline().strip()

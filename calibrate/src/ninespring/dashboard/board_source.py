@@ -20,6 +20,7 @@ import numpy as np
 from .. import __version__
 from ..belief import beliefs
 from ..board import SIMULATED, Board, reading
+from ..console import err
 from ..errors import InputError, RefusedError, WorkError
 from ..recording import SILENT_S, LogFile, Row, RowCheck, RowSink, telemetry_names, write_head
 from ..thermometers import Thermometers
@@ -171,6 +172,8 @@ class BoardSource(Source):
                 lost = trouble
             elif lost:
                 trouble = f"{lost}. Since then: {trouble}"
+            if trouble and trouble != self._state.get("trouble"):
+                err.print(f"ninespring: {trouble}", soft_wrap=True, markup=False)
             self._change(connected=False, trouble=trouble)
             self.closing.wait(1.0)
 

@@ -58,6 +58,7 @@ def dashboard(
     """
     from ..models import read_array, read_model
     from ..recording import told_to_stop
+    from ..simulated import simulator
     from .board_source import SIMULATED, BoardSource
     from .replay_source import ReplaySource
     from .server import listen, serve
@@ -69,7 +70,7 @@ def dashboard(
         raise InputError("--model and --array go with --replay")
     host, colon, number = address.rpartition(":")
     if not colon or not number.isdigit() or int(number) > 65535:
-        raise InputError(f"--listen {address}: not HOST:PORT")
+        raise InputError(f"--listen {address}: not HOST:PORT, as in {USUAL}")
     source: Source
     if replay:
         model = read_model(model_path) if model_path else None
@@ -79,6 +80,8 @@ def dashboard(
         array = array_of(array, [run])
         source = ReplaySource(run, array.rows, array.cols, model, speed)
     else:
+        if simulate:
+            simulator()  # what is not built does not come back, as a port does
         source = BoardSource(port or SIMULATED, hz, folder, thermometers)
     here = listen(host.strip("[]"), int(number))
     name, at = here.getsockname()[:2]

@@ -27,8 +27,8 @@ from .source import Source
 PAGE = Path(__file__).with_name("page")
 PLOTLY = Path(plotly.__file__).with_name("package_data") / "plotly.min.js"
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
-EVERY_S = 0.1
-"""Most often that a page is told a new state."""
+EVERY_S = 0.05
+"""Most often that a page is told a new state: half a row's time at 10 Hz, so that no row falls between two looks."""
 ANSWER_S = 15.0
 """So long a page waits for the board's words."""
 LONGEST_WISH = 65536

@@ -88,7 +88,7 @@ def model_of(array: Array, whole: Geometry, part: Geometry, lumped: Lumped, mesh
         effects.append("fan_wake")
         values["wake_direction"] = float(DIRECTIONS.index(whole.cooling.fan_direction))
     if "loss_fan_w_per_k" not in values:
-        for name in ("loss", "orthogonal", "diagonal"):
+        for name in ("loss", "orthogonal", "diagonal", "second"):
             values[f"{name}_fan_w_per_k"] = values[f"{name}_w_per_k"]
     table = native.parameter_table()
     kept = {name: value for name, value in values.items() if table[name].effect in (None, *effects)}

@@ -23,7 +23,9 @@ def need(*modules: str) -> None:
         try:
             importlib.import_module(name)
         except ImportError as error:
-            raise WorkError(f"{name} is missing ({error}): pip install 'ninespring[explore]'") from None
+            raise WorkError(
+                f"{name} is missing ({error}): script/setup installs it in the tree, elsewhere pip install 'ninespring[explore]'"
+            ) from None
         except OSError as error:
             raise WorkError(f"{name} does not load ({error}): docs/exploring.md names the system's libraries") from None
 
@@ -76,7 +78,7 @@ def couplings(array_path: Path, mesh: str, output: Path, json_path: Path | None)
     lines = [
         f"a coil of {spring.coil_mm:g} mm, {spring.spacing_mm:.3g} mm from turn to turn, conducts into the air like a "
         f"cylinder of {2 * spring.radius_mm:.3g} mm",
-        f"between springs two apart (the model has none): {1e3 * found.pairs.second:.3f} mW/K"
+        f"between springs two apart, from the field: {1e3 * found.pairs.second:.3f} mW/K"
         + (f", blown {1e3 * found.pairs_blown.second:.3f}" if found.pairs_blown else ""),
         f"network against field, random drive, 15 min: {100 * found.drive_error:.1f} % of the rise, rms",
         f"field: {part.rows} x {part.cols} springs, {found.still.unknowns} unknowns; heat in less heat out "

@@ -1,7 +1,7 @@
 """The lumped network (docs/physics.md) of a field: its numbers, each with an error from the reduction and from the mesh.
 
 The numbers are those whose network answers most like the field, for power in any spring and at rates from standing still
-to 20 s. What a network with couplings to the first neighbours cannot answer is the reduction's error.
+to 20 s. What a network with couplings to first and second neighbours cannot answer is the reduction's error.
 """
 
 from __future__ import annotations
@@ -16,9 +16,16 @@ from .geometry import Geometry
 from .modes import Modes
 
 RATES_PER_S = (0.0, 0.001, 0.004, 0.015, 0.05)
-STILL = ("loss_w_per_k", "edge_loss_fraction", "orthogonal_w_per_k", "diagonal_w_per_k", "heat_capacity_j_per_k")
+STILL = (
+    "loss_w_per_k",
+    "edge_loss_fraction",
+    "orthogonal_w_per_k",
+    "diagonal_w_per_k",
+    "second_w_per_k",
+    "heat_capacity_j_per_k",
+)
 PLATE = ("plate_coupling_w_per_k", "plate_heat_capacity_j_per_k", "plate_loss_w_per_k")
-FAN = ("loss_fan_w_per_k", "orthogonal_fan_w_per_k", "diagonal_fan_w_per_k", "wake_w_per_k")
+FAN = ("loss_fan_w_per_k", "orthogonal_fan_w_per_k", "diagonal_fan_w_per_k", "second_fan_w_per_k", "wake_w_per_k")
 OFF_ZERO = 1e-9
 """Numbers that cannot be negative begin above zero: their logarithm is fitted."""
 
@@ -32,7 +39,7 @@ class Pairs:
     orthogonal: float
     diagonal: float
     second: float
-    """Between springs two apart in a row or column; the network has none."""
+    """Between springs two apart in a row or column."""
 
 
 def pairs_of(modes: Modes, rows: int, cols: int) -> Pairs:
@@ -61,6 +68,8 @@ class Network:
         down, along = row[:, None] - row, col[:, None] - col
         self.orthogonal = _laplacian(np.abs(down) + np.abs(along) == 1)
         self.diagonal = _laplacian((np.abs(down) == 1) & (np.abs(along) == 1))
+        apart = np.abs(down) + np.abs(along)
+        self.second = _laplacian((apart == 2) & ((down == 0) | (along == 0)))
         sides = (row == 0).astype(float) + (row == rows - 1) + (col == 0) + (col == cols - 1)
         self.free_sides = sides
         step = ((0, 1), (1, 0), (0, -1), (-1, 0))[DIRECTIONS.index(direction)]
@@ -74,6 +83,7 @@ class Network:
         more = values["edge_loss_fraction"] * (values["edge_loss_fan_share"] if fan else 1.0)
         loss = values["loss" + name] * (1 + more * self.free_sides)
         matrix[:n, :n] = values["orthogonal" + name] * self.orthogonal + values["diagonal" + name] * self.diagonal
+        matrix[:n, :n] += values["second" + name] * self.second
         matrix[:n, :n] += np.diag(loss + rate_per_s * values["heat_capacity_j_per_k"])
         if fan:
             matrix[:n, :n] -= values["wake_w_per_k"] * self.upstream
@@ -112,9 +122,11 @@ def lumped_of(geometry: Geometry, still: Modes, blown: Modes | None) -> Lumped:
         names += FAN
     alone = network.n == 1
     if alone:
-        names = [one for one in names if not one.startswith(("edge", "orthogonal", "diagonal", "wake"))]
+        names = [one for one in names if not one.startswith(("edge", "orthogonal", "diagonal", "second", "wake"))]
     elif min(geometry.rows, geometry.cols) == 1:
         names = [one for one in names if not one.startswith("diagonal")]
+    if max(geometry.rows, geometry.cols) < 3:
+        names = [one for one in names if not one.startswith("second")]
     fixed = dict.fromkeys((*STILL, *(FAN if blown is not None else ())), 0.0)
     if blown is not None:
         # a free side gives off as many watts more with the fan as without
@@ -166,6 +178,7 @@ def _start(geometry: Geometry, still: Modes, blown: Modes | None) -> dict[str, f
         "edge_loss_fraction": 0.3,
         "orthogonal_w_per_k": max(pairs.orthogonal, 1e-6),
         "diagonal_w_per_k": max(pairs.diagonal, 1e-6),
+        "second_w_per_k": max(pairs.second, 1e-6),
         "heat_capacity_j_per_k": geometry.spring.heat_capacity_j_per_k,
         "plate_coupling_w_per_k": 0.2 * float(pairs.loss.mean()),
         "plate_heat_capacity_j_per_k": max(0.1, 2 * area * geometry.cooling.plate_thickness_mm * 1e-3 * 1.75e6 / 3),
@@ -177,6 +190,7 @@ def _start(geometry: Geometry, still: Modes, blown: Modes | None) -> dict[str, f
             "loss_fan_w_per_k": 0.8 * float(windy.loss.min()),
             "orthogonal_fan_w_per_k": max(windy.orthogonal, 1e-6),
             "diagonal_fan_w_per_k": max(windy.diagonal, 1e-6),
+            "second_fan_w_per_k": max(windy.second, 1e-6),
             "wake_w_per_k": 0.3 * max(windy.orthogonal, 1e-6),
         }
     return out

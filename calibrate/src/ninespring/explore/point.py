@@ -14,7 +14,7 @@ from .. import native
 from ..errors import InputError, WorkError
 from ..fit.simulate import array_parameters
 from ..models import Array
-from .spec import METRICS, Spec, array_of_point
+from .spec import METRICS, Spec, array_of_point, board_of_point
 
 STARTED = 0.95
 """Austenite from which a driven spring has moved."""
@@ -75,6 +75,8 @@ def pattern_of(point: Mapping[str, Any], rows: int, cols: int, rng: np.random.Ge
     row, col = np.divmod(np.arange(rows * cols), cols)
     middle = (row == rows // 2) & (col == cols // 2)
     wanted = point.get("pattern", "all_but_middle")
+    if wanted[0] in "01":
+        return np.array([one == "1" for one in wanted])
     if wanted == "random":
         return rng.random(rows * cols) < 0.5
     if wanted == "checkerboard":
@@ -82,6 +84,17 @@ def pattern_of(point: Mapping[str, Any], rows: int, cols: int, rng: np.random.Ge
     if wanted == "middle" or (wanted == "all_but_middle" and rows * cols == 1):
         return middle
     return ~middle if wanted == "all_but_middle" else np.ones(rows * cols, dtype=bool)
+
+
+def settings_of(point: Mapping[str, Any]) -> str:
+    """Return a board's console lines besides its model."""
+    lines = [f"$policy={int(point.get('policy', 'precompensate') == 'precompensate')}"]
+    lines += [
+        f"${name}={point[name]:.3f}"
+        for name in ("supply_limit_a", "boost_current_a", "open_current_a")
+        if name in point
+    ]
+    return "\n".join([*lines, ""])
 
 
 def run_point(spec: Spec, index: int, point: Mapping[str, Any]) -> dict[str, Any]:
@@ -94,21 +107,21 @@ def run_point(spec: Spec, index: int, point: Mapping[str, Any]) -> dict[str, Any
         return out | dict.fromkeys(METRICS, math.nan) | {"error": str(error)}
 
 
-def metrics_of(spec: Spec, point: Mapping[str, Any], seed: int) -> dict[str, float]:
+def metrics_of(spec: Spec, point: dict[str, Any], seed: int) -> dict[str, float]:
     """Run a point by its seed; return its metrics (UNITS in spec.py)."""
     rng = np.random.default_rng(seed)
     declared = plant_of_point(spec, point)
-    lines, _ = native.chip_export(declared)
-    for name in ("supply_limit_a", "boost_current_a", "open_current_a"):
-        if name in point:
-            lines += f"${name}={point[name]:.3f}\n"
-    lines += f"$policy={int(point.get('policy', 'precompensate') == 'precompensate')}\n"
+    board = board_of_point(point, array_of_point(point))
+    lines = [
+        native.chip_export(declared, part)[0] + settings_of(point | spec.boards.get(number, {}))
+        for number, part in enumerate(native.boards_of(declared.rows, declared.cols, *board), 1)
+    ]
     real = real_of(declared, point, rng)
     real.reset()
     pattern = pattern_of(point, real.rows, real.cols, rng)
     fan = float(point.get("fan", 0.0))
     on = spec.on_s
-    t, x, power, current = native.chip_run(real, lines, list(pattern), fan, seed, spec.duration_s, on)
+    t, x, power, current = native.chip_run(real, board, lines, list(pattern), fan, seed, spec.duration_s, on)
     out = dict.fromkeys(METRICS, math.nan)
     out |= {"hottest_c": float(t.max()), "energy_j": float(power.sum()), "supply_a": float(current.max())}
     out["hold_w"] = float(power[3 * on // 4 : on].mean())

@@ -24,12 +24,17 @@ from . import cooling
 
 METHODS = ("grid", "latin", "sobol", "saltelli", "optimise")
 PATTERNS = ("all", "all_but_middle", "middle", "checkerboard", "random")
+EVERY = "every"
+"""[vary] pattern: all patterns of an array of at most EVERY_SPRINGS."""
+EVERY_SPRINGS = 12
 POLICIES = ("open", "precompensate")
 COUPLINGS = ("law", "field")
 OWN: dict[str, tuple[Any, float, float]] = {
-    "rows": (3, 1, 64),
-    "cols": (3, 1, 64),
-    "size": (0, 0, 8),
+    "rows": (3, 1, native.MAX_SPRINGS),
+    "cols": (3, 1, native.MAX_SPRINGS),
+    "size": (0, 0, 32),
+    "board_rows": (8, 1, native.BOARD_SPRINGS),
+    "board_cols": (8, 1, native.BOARD_SPRINGS),
     "pitch_mm": (5.0, 1.0, 100.0),
     "fan": (0.0, 0.0, 1.0),
     "ambient_c": (20.0, -40.0, 80.0),
@@ -44,8 +49,9 @@ LIMITS: dict[str, tuple[float, float]] = (
     {key: (low, high) for key, (_, low, high) in OWN.items()} | SPRING_KEYS | MATERIAL_KEYS | cooling.NUMBERS
 )
 WORDS = {"policy": POLICIES, "pattern": PATTERNS, **cooling.WORDS}
-WHOLE = ("rows", "cols", "size")
+WHOLE = ("rows", "cols", "size", "board_rows", "board_cols")
 KEYS = (*LIMITS, *WORDS)
+BOARD_KEYS = ("policy", "supply_limit_a", "boost_current_a", "open_current_a")
 SWEEP_KEYS = ("method", "points", "seed", "duration_s", "on_s", "couplings", "mesh")
 MOST_POINTS = 10_000_000
 METRICS = (
@@ -96,6 +102,8 @@ class Spec:
     mesh: str = "coarse"
     fixed: dict[str, Any] = field(default_factory=dict)
     axes: list[Axis] = field(default_factory=list)
+    boards: dict[int, dict[str, Any]] = field(default_factory=dict)
+    """What boards (from 1) have that differs from the point."""
     metric: str = ""
     goal: str = "min"
     limits: dict[str, tuple[float | None, float | None]] = field(default_factory=dict)
@@ -152,13 +160,26 @@ def array_of_point(point: Mapping[str, Any]) -> Array:
     )
 
 
+def board_of_point(point: Mapping[str, Any], array: Array) -> tuple[int, int]:
+    """Return rows and columns of springs of a board: all, where nothing is said and they are few enough."""
+    if "board_rows" not in point and "board_cols" not in point and array.springs <= native.BOARD_SPRINGS:
+        return array.rows, array.cols
+    return int(point.get("board_rows", 8)), int(point.get("board_cols", 8))
+
+
 def check_point(point: Mapping[str, Any]) -> None:
     """Refuse (InputError) what cannot exist."""
     from .geometry import geometry_of
 
     array = array_of_point(point)
+    pattern = str(point.get("pattern", ""))
+    if pattern[:1] in ("0", "1") and len(pattern) != array.springs:
+        raise InputError(f"a pattern of {len(pattern)} springs for an array of {array.springs}")
     if array.springs > native.MAX_SPRINGS:
         raise InputError(f"{array.rows} x {array.cols} are more than {native.MAX_SPRINGS} springs")
+    board_rows, board_cols = board_of_point(point, array)
+    if board_rows * board_cols > native.BOARD_SPRINGS:
+        raise InputError(f"{board_rows} x {board_cols} are more than {native.BOARD_SPRINGS} springs on a board")
     geometry_of(array)
     plant = native.Plant(1, 1)
     plant.set_all({key: point[key] for key in MATERIAL_KEYS if key in point and key.endswith("_c")})
@@ -193,6 +214,8 @@ class _Reader:
         return value
 
     def value(self, key: str, value: Any) -> Any:
+        if key == "pattern" and isinstance(value, str) and value and not set(value) - {"0", "1"}:
+            return value
         if key in WORDS:
             return self.word(value, WORDS[key], key)
         number = self.number(value, *LIMITS[key], key, key in WHOLE)
@@ -203,6 +226,14 @@ class _Reader:
         if not isinstance(part, dict):
             raise self.refuse(f"[{name}] must be a table", name)
         return part
+
+    def every_pattern(self, fixed: Mapping[str, Any], vary: Mapping[str, Any]) -> Axis:
+        if {"rows", "cols", "size"} & set(vary):
+            raise self.refuse(f'pattern = "{EVERY}" wants an array of one size', EVERY)
+        springs = array_of_point(fixed).springs
+        if springs > EVERY_SPRINGS:
+            raise self.refuse(f"{springs} springs have too many patterns: at most {EVERY_SPRINGS} springs", EVERY)
+        return Axis("pattern", [f"{k:0{springs}b}" for k in range(2**springs)])
 
     def axis(self, key: str, given: Any, method: str) -> Axis:
         if isinstance(given, list):
@@ -237,7 +268,7 @@ class _Reader:
 
     def spec(self) -> Spec:
         for name in self.data:
-            self.known(name, ("sweep", "fixed", "vary", "optimise"), "the file")
+            self.known(name, ("sweep", "fixed", "vary", "board", "optimise"), "the file")
         head = self.table("sweep")
         for key in head:
             self.known(key, SWEEP_KEYS, "[sweep]")
@@ -261,7 +292,12 @@ class _Reader:
         if both := sorted(set(fixed) & set(vary)):
             raise self.refuse(f"{both[0]} is fixed and varied", both[0])
         spec.fixed = {key: self.value(key, value) for key, value in fixed.items()}
-        spec.axes = [self.axis(key, value, spec.method) for key, value in vary.items()]
+        spec.axes = [
+            self.every_pattern(spec.fixed, vary)
+            if (key, value) == ("pattern", EVERY)
+            else self.axis(key, value, spec.method)
+            for key, value in vary.items()
+        ]
         if not spec.axes:
             raise self.refuse("nothing is varied: [vary] is empty or missing", "vary")
         if {"size", "rows"} <= {*fixed, *vary} or {"size", "cols"} <= {*fixed, *vary}:
@@ -270,10 +306,21 @@ class _Reader:
             for key in (*SPRING_KEYS, *cooling.KEYS):
                 if key in fixed or key in vary:
                     raise self.refuse(f'{key}: the paper\'s law knows only pitch and fan; couplings = "field"', key)
+        spec.boards = self.boards()
         self.optimise(spec)
         spec.text = read_bytes(self.path).decode()
         spec.sha256 = hashlib.sha256(json.dumps(self.data, sort_keys=True).encode()).hexdigest()
         return spec
+
+    def boards(self) -> dict[int, dict[str, Any]]:
+        out = {}
+        for number, own in self.table("board").items():
+            if not number.isdecimal() or number.startswith("0") or not isinstance(own, dict):
+                raise self.refuse(f"[board.{number}] must be [board.1], [board.2], ...", number)
+            for key in own:
+                self.known(key, BOARD_KEYS, f"[board.{number}]")
+            out[int(number)] = {key: self.value(key, value) for key, value in own.items()}
+        return out
 
     def optimise(self, spec: Spec) -> None:
         part = self.table("optimise")
@@ -307,7 +354,7 @@ def read_spec(path: Path) -> Spec:
     count = 0
     for count, point in enumerate(spec.all_points(), 1):
         # what cannot exist depends on these alone
-        key = json.dumps({k: v for k, v in point.items() if k not in ("fan", "policy", "pattern", "ambient_c")})
+        key = json.dumps({k: v for k, v in point.items() if k not in ("fan", "policy", "ambient_c")})
         if count > MOST_POINTS:
             raise InputError(f"more than {MOST_POINTS} points", path)
         if key in seen:
@@ -316,6 +363,10 @@ def read_spec(path: Path) -> Spec:
             seen.add(key)
         try:
             check_point(point)
+            array = array_of_point(point)
+            boards = len(native.boards_of(array.rows, array.cols, *board_of_point(point, array)))
+            if spec.boards and max(spec.boards) > boards:
+                raise InputError(f"[board.{max(spec.boards)}], but the array has {boards} boards")
         except InputError as error:
             raise InputError(f"point {count} ({named(point)}) cannot exist: {error.message}", path) from None
     spec.points = count or spec.points
