@@ -51,6 +51,8 @@ void spring_learn_austenite(spring_belief_t *belief);
 
 /* What it reads on average now is what it reads with the phase that it has. */
 void spring_begin_line(spring_belief_t *belief, float now_c);
+/* The same by the last turn alone, or while the average still moves: anew when it is at rest. */
+void spring_begin_rough_line(spring_belief_t *belief, float now_c);
 /* Even the coldest and heaviest spring has transformed by the heat of this heating. */
 bool spring_heated_enough(const spring_estimator_t *estimator, const spring_belief_t *belief,
                           const thermal_model_t *model, uint8_t spring);

@@ -10,8 +10,7 @@
 #define LOSS_LEAST      0.0012f /* of the resistance: what a sensor's steps leave in the average */
 #define NOISE_IN_SLOW   0.18f   /* of one turn's: sqrt(share / (2 - share)) */
 #define SURE_SDS        5.0f
-#define SUSPECTED       0.85f /* of what is sure: 3 sqrt(2) of 5, as the line is an average, too */
-#define SUSPECTED_ROUGH 0.6f  /* 3 of 5: of a line of one turn */
+#define SUSPECTED       0.6f /* of what is sure: 3 of 5 */
 #define OTHER_WAY       3.0f  /* times as much: an intermediate phase, where drifts go either way */
 #define CONFIRM_TURNS   2
 #define LASTING_TURNS   60    /* 15 s of suspicion are as sure */
@@ -50,8 +49,16 @@ void spring_begin_line(spring_belief_t *b, float now_c)
                                  : COEFFICIENT_MOST_PER_K;
     b->rise_per_k = l->martensite_rise_per_k;
     b->rise_sd_per_k = most_per_k / SPRING_ESTIMATOR_BOUND_SDS;
+    b->line_sd = NOISE_IN_SLOW * b->noise;
     b->rough = false;
     b->losing = 0;
+}
+
+void spring_begin_rough_line(spring_belief_t *b, float now_c)
+{
+    spring_begin_line(b, now_c);
+    b->line_sd = b->noise;
+    b->rough = true;
 }
 
 static void see_crossing(const spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model,
@@ -130,6 +137,7 @@ static void follow(spring_belief_t *b, float now_c, float left)
     }
     b->line_ohm += b->line_ohm * left * LINE_SHARE;
     b->line_c += away_k * LINE_SHARE;
+    b->line_sd -= b->line_sd * LINE_SHARE;
 }
 
 /* Of what the resistance has left its line by, the part that lost phase may explain. */
@@ -184,15 +192,18 @@ void spring_holding_watch(const spring_estimator_t *e, spring_belief_t *b, therm
     const float changed = as_lost(b, model, k, left, sd_k);
     /* as its temperature may have moved unseen, so may the resistance */
     const float moves = fabsf(b->rise_per_k) * sd_k;
-    const float noise = b->rough ? b->noise : NOISE_IN_SLOW * b->noise;
-    float sure = fmaxf(fmaxf(LOSS_LEAST, moves), SURE_SDS * noise);
-    float suspected = (b->rough ? SUSPECTED_ROUGH : SUSPECTED) * sure;
-    if (changed >= suspected) { /* as a rule not: two divisions are saved */
+    const float slow_sd = NOISE_IN_SLOW * b->noise;
+    const float noise2 = slow_sd * slow_sd + b->line_sd * b->line_sd;
+    const float least = fmaxf(LOSS_LEAST, moves);
+    const float changed2 = changed * changed;
+    float sure2 = fmaxf(least * least, SURE_SDS * SURE_SDS * noise2);
+    float suspected2 = SUSPECTED * SUSPECTED * sure2;
+    if (changed2 >= suspected2) { /* as a rule not: two divisions are saved */
         const float moves2 = may_move_squared(b, now_c);
-        sure = sqrtf(sure * sure + moves2);
-        suspected = sqrtf(suspected * suspected + moves2);
+        sure2 += moves2;
+        suspected2 += moves2;
     }
-    if (changed < suspected) {
+    if (changed2 < suspected2) {
         b->losing = 0;
         if (b->quiet >= QUIET_TURNS) {
             if (b->rough) { /* it has come to rest */
@@ -204,9 +215,8 @@ void spring_holding_watch(const spring_estimator_t *e, spring_belief_t *b, therm
         return;
     }
     b->losing = b->losing < UINT8_MAX ? (uint8_t)(b->losing + 1) : UINT8_MAX;
-    if ((changed > sure && b->losing >= CONFIRM_TURNS) || b->losing >= LASTING_TURNS) {
+    if ((changed2 > sure2 && b->losing >= CONFIRM_TURNS) || b->losing >= LASTING_TURNS) {
         see_crossing(e, b, model, k, changed / fabsf(b->learnt.change));
-        spring_begin_line(b, spring_now_c(model, k));
-        b->rough = true; /* the average still falls after the phase: anew when it is at rest */
+        spring_begin_rough_line(b, spring_now_c(model, k)); /* the average still falls */
     }
 }
