@@ -103,8 +103,9 @@ static bool learn_offset(spring_belief_t *b, float now_c)
     }
     b->offset_v += more_v;
     b->offset_sd_v = sqrtf(gain * read_v2);
-    b->line_ohm -= more_v / b->line_a;
-    b->learnt.austenite_ohm = b->doubted ? b->learnt.austenite_ohm : b->line_ohm;
+    const float more_ohm = more_v / b->line_a;
+    b->line_ohm -= more_ohm;
+    b->learnt.austenite_ohm -= b->learnt.austenite_ohm > 0.0f ? more_ohm : 0.0f;
     b->seen = true; /* it is acted on in the next turn */
     return true;
 }
