@@ -138,8 +138,11 @@ static bool has_changed(const spring_belief_t *b)
 static bool has_taken_enough(const spring_estimator_t *e, const spring_belief_t *b,
                              const thermal_model_t *model, uint8_t k)
 {
+    if (b->learnt.austenite_ohm > 0.0f) {
+        return !spring_lacks_phase(b, model, k);
+    }
     const float latent_k = b->begun_missing * e->latent_heat_j / e->heat_capacity_j_per_k;
-    return b->heat_k - b->onset_k > LEAST_HEAT * latent_k && !spring_lacks_phase(b, model, k);
+    return b->heat_k - b->onset_k > LEAST_HEAT * latent_k;
 }
 
 /* Change of resistance over heat, a step at a time: more than any temperature coefficient makes is
