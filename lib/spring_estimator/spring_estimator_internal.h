@@ -16,6 +16,8 @@
 /* A reading at less is coarse: 4 mV are 3 % of its voltage. */
 #define STRONG_A 0.8f
 
+#define SHIFT_BOUND_K 8.0f /* 2.6 standard deviations of a declared transformation, or a load */
+
 #define LEARNT_AT_C 20.0f /* a learnt martensite's resistance is that at this temperature */
 
 float spring_clamp(float value, float low, float high);

@@ -5,23 +5,23 @@
 #define QUIET_K     0.08f /* a turn's: 0.3 K/s */
 #define QUIET_TURNS 40    /* 10 s: the average has settled */
 #define LINE_SHARE                                                                                 \
-    (1.0f / 240.0f)             /* of a turn, 60 s: what the line follows is no loss of phase      \
-                                 */
-#define LOSS_LEAST      0.0012f /* of the resistance: what a sensor's steps leave in the average */
-#define NOISE_IN_SLOW   0.18f   /* of one turn's: sqrt(share / (2 - share)) */
-#define SURE_SDS        5.0f
-#define SUSPECTED       0.6f /* of what is sure: 3 of 5 */
-#define OTHER_WAY       3.0f  /* times as much: an intermediate phase, where drifts go either way */
-#define CONFIRM_TURNS   2
-#define LASTING_TURNS   60    /* 15 s of suspicion are as sure */
-#define LARGE_LOSS      0.04f /* no hold drifts so far: the transformation may have moved */
-#define LARGE_SD_K      5.0f
-#define CROSSING_SD_K   1.0f
-#define APART_PER_A     1.0f    /* between two currents, as of 3 and 0.75 A */
-#define OFFSET_LEAST_V  0.0005f /* what a turn's steps of 4 mV leave, and its noise */
-#define OFFSET_SDS      3.0f
-#define OFFSET_MOST_V   0.012f
-#define AWAY_LEAST_K    1.0f /* less tells nothing of a coefficient */
+    (1.0f / 240.0f)            /* of a turn, 60 s: what the line follows is no loss of phase       \
+                                */
+#define LOSS_LEAST     0.0012f /* of the resistance: what a sensor's steps leave in the average */
+#define NOISE_IN_SLOW  0.18f   /* of one turn's: sqrt(share / (2 - share)) */
+#define SURE_SDS       5.0f
+#define SUSPECTED      0.6f /* of what is sure: 3 of 5 */
+#define OTHER_WAY      3.0f /* times as much: an intermediate phase, where drifts go either way */
+#define CONFIRM_TURNS  2
+#define LASTING_TURNS  60    /* 15 s of suspicion are as sure */
+#define LARGE_LOSS     0.04f /* no hold drifts so far: the transformation may have moved */
+#define LARGE_SD_K     5.0f
+#define CROSSING_SD_K  1.0f
+#define APART_PER_A    1.0f    /* between two currents, as of 3 and 0.75 A */
+#define OFFSET_LEAST_V 0.0005f /* what a turn's steps of 4 mV leave, and its noise */
+#define OFFSET_SDS     3.0f
+#define OFFSET_MOST_V  0.012f
+#define AWAY_LEAST_K   1.0f /* less tells nothing of a coefficient */
 /* Of an average: what a sensor's steps leave, LOSS_LEAST / 3, and it tells anew in 2 x 16 turns. */
 #define LINE_VARIANCE (32.0f * LOSS_LEAST * LOSS_LEAST / 9.0f)
 #define STILL_K       0.5f  /* below where it would be seen */
@@ -156,6 +156,17 @@ static float as_lost(const spring_belief_t *b, const thermal_model_t *model, uin
     return cold ? -less * (1.0f / OTHER_WAY) : 0.0f;
 }
 
+/* On its way down to the hold: to martensite start even if a gust takes as much heat again, and a
+ * load has moved that. Else what changes is a contact or the sensor. */
+static bool may_have_cooled(const spring_belief_t *b, const thermal_model_t *model, uint8_t k,
+                            float sd_k)
+{
+    const float now_c = spring_now_c(model, k);
+    const float cooled_k = fmaxf(b->line_c - now_c, 0.0f);
+    const float most_k = cooled_k + SPRING_ESTIMATOR_BOUND_SDS * sd_k + SHIFT_BOUND_K;
+    return now_c - most_k < spring_c(thermal_model_transformation(model, k).martensite_start_c7);
+}
+
 /* A phase that is kept changes the resistance no faster than temperature does. */
 void spring_holding_watch(const spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model,
                           uint8_t k, float moved_k)
@@ -217,6 +228,10 @@ void spring_holding_watch(const spring_estimator_t *e, spring_belief_t *b, therm
     }
     b->losing = b->losing < UINT8_MAX ? (uint8_t)(b->losing + 1) : UINT8_MAX;
     if ((changed2 > sure2 && b->losing >= CONFIRM_TURNS) || b->losing >= LASTING_TURNS) {
+        if (b->rough && !may_have_cooled(b, model, k, sd_k)) {
+            spring_begin_rough_line(b, now_c);
+            return;
+        }
         see_crossing(e, b, model, k, changed / fabsf(b->learnt.change));
         spring_begin_rough_line(b, spring_now_c(model, k)); /* the average still falls */
     }
