@@ -562,8 +562,7 @@ void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, 
     if (full && b->reads && b->current_a > STRONG_A) {
         b->slow_ohm = b->ohm;
         b->slow_a = b->current_a;
-        spring_begin_line(b, now_c);
-        b->rough = true;
+        spring_begin_rough_line(b, now_c);
         b->offset_sd_v = fmaxf(b->offset_sd_v, OFFSET_AGAIN_V);
     }
 }

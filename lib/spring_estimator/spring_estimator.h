@@ -112,6 +112,7 @@ typedef struct {
     float line_ohm; /* what it reads while it keeps its phase, at line_c; 0: none yet */
     float line_c;
     float line_a;     /* current of the line */
+    float line_sd;    /* of the line itself, relative */
     float rise_per_k; /* what a kelvin adds to it, relative */
     float rise_sd_per_k;
 } spring_belief_t;

@@ -16,6 +16,8 @@
 /* A reading at less is coarse: 4 mV are 3 % of its voltage. */
 #define STRONG_A 0.8f
 
+#define SHIFT_BOUND_K 8.0f /* 2.6 standard deviations of a declared transformation, or a load */
+
 #define LEARNT_AT_C 20.0f /* a learnt martensite's resistance is that at this temperature */
 
 float spring_clamp(float value, float low, float high);
@@ -51,6 +53,8 @@ void spring_learn_austenite(spring_belief_t *belief);
 
 /* What it reads on average now is what it reads with the phase that it has. */
 void spring_begin_line(spring_belief_t *belief, float now_c);
+/* The same by the last turn alone, or while the average still moves: anew when it is at rest. */
+void spring_begin_rough_line(spring_belief_t *belief, float now_c);
 /* Even the coldest and heaviest spring has transformed by the heat of this heating. */
 bool spring_heated_enough(const spring_estimator_t *estimator, const spring_belief_t *belief,
                           const thermal_model_t *model, uint8_t spring);

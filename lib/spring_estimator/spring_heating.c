@@ -14,7 +14,6 @@
 #define ONSET_K        2.0f  /* beyond austenite start it is noticed */
 #define ONSET_C7       256   /* the same */
 #define PLACE_SD_K     3.0f
-#define SHIFT_BOUND_K  8.0f  /* 2.6 standard deviations of a declared transformation */
 #define CAPACITY_BOUND 1.25f /* the same of a heat capacity */
 #define SAME_CURRENT   0.1f  /* within it a sensor's offset shows alike */
 #define LEAST_HEAT     0.74f /* latent heat 15 % less than declared, heat capacity 15 % more */
@@ -47,10 +46,10 @@ static void see_onset(const spring_estimator_t *e, spring_belief_t *b, thermal_m
         spring_learnt_t *l = &b->learnt;
         if (b->cold_ohm > 0.0f && now_c > b->cold_c + COLD_SPAN_K) {
             const float rise_per_k = (b->onset_ohm / b->cold_ohm - 1.0f) / (now_c - b->cold_c);
-            l->martensite_rise_per_k =
-                fminf(fmaxf(rise_per_k, -COEFFICIENT_MOST_PER_K), COEFFICIENT_MOST_PER_K);
-            l->martensite_ohm =
-                b->cold_ohm / (1.0f + l->martensite_rise_per_k * (b->cold_c - LEARNT_AT_C));
+            if (fabsf(rise_per_k) < COEFFICIENT_MOST_PER_HEAT_K) { /* else a contact has moved */
+                l->martensite_rise_per_k = rise_per_k;
+                l->martensite_ohm = b->cold_ohm / (1.0f + rise_per_k * (b->cold_c - LEARNT_AT_C));
+            }
         }
         const int16_t start_c7 = thermal_model_transformation(model, k).austenite_start_c7;
         (void)spring_see(e, b, model, k, spring_c(start_c7) + ONSET_K, PLACE_SD_K,
@@ -138,8 +137,11 @@ static bool has_changed(const spring_belief_t *b)
 static bool has_taken_enough(const spring_estimator_t *e, const spring_belief_t *b,
                              const thermal_model_t *model, uint8_t k)
 {
+    if (b->learnt.austenite_ohm > 0.0f) {
+        return !spring_lacks_phase(b, model, k);
+    }
     const float latent_k = b->begun_missing * e->latent_heat_j / e->heat_capacity_j_per_k;
-    return b->heat_k - b->onset_k > LEAST_HEAT * latent_k && !spring_lacks_phase(b, model, k);
+    return b->heat_k - b->onset_k > LEAST_HEAT * latent_k;
 }
 
 /* Change of resistance over heat, a step at a time: more than any temperature coefficient makes is

@@ -5,24 +5,23 @@
 #define QUIET_K     0.08f /* a turn's: 0.3 K/s */
 #define QUIET_TURNS 40    /* 10 s: the average has settled */
 #define LINE_SHARE                                                                                 \
-    (1.0f / 240.0f)             /* of a turn, 60 s: what the line follows is no loss of phase      \
-                                 */
-#define LOSS_LEAST      0.0012f /* of the resistance: what a sensor's steps leave in the average */
-#define NOISE_IN_SLOW   0.18f   /* of one turn's: sqrt(share / (2 - share)) */
-#define SURE_SDS        5.0f
-#define SUSPECTED       0.85f /* of what is sure: 3 sqrt(2) of 5, as the line is an average, too */
-#define SUSPECTED_ROUGH 0.6f  /* 3 of 5: of a line of one turn */
-#define OTHER_WAY       3.0f  /* times as much: an intermediate phase, where drifts go either way */
-#define CONFIRM_TURNS   2
-#define LASTING_TURNS   60    /* 15 s of suspicion are as sure */
-#define LARGE_LOSS      0.04f /* no hold drifts so far: the transformation may have moved */
-#define LARGE_SD_K      5.0f
-#define CROSSING_SD_K   1.0f
-#define APART_PER_A     1.0f    /* between two currents, as of 3 and 0.75 A */
-#define OFFSET_LEAST_V  0.0005f /* what a turn's steps of 4 mV leave, and its noise */
-#define OFFSET_SDS      3.0f
-#define OFFSET_MOST_V   0.012f
-#define AWAY_LEAST_K    1.0f /* less tells nothing of a coefficient */
+    (1.0f / 240.0f)            /* of a turn, 60 s: what the line follows is no loss of phase       \
+                                */
+#define LOSS_LEAST     0.0012f /* of the resistance: what a sensor's steps leave in the average */
+#define NOISE_IN_SLOW  0.18f   /* of one turn's: sqrt(share / (2 - share)) */
+#define SURE_SDS       5.0f
+#define SUSPECTED      0.6f /* of what is sure: 3 of 5 */
+#define OTHER_WAY      3.0f /* times as much: an intermediate phase, where drifts go either way */
+#define CONFIRM_TURNS  2
+#define LASTING_TURNS  60    /* 15 s of suspicion are as sure */
+#define LARGE_LOSS     0.04f /* no hold drifts so far: the transformation may have moved */
+#define LARGE_SD_K     5.0f
+#define CROSSING_SD_K  1.0f
+#define APART_PER_A    1.0f    /* between two currents, as of 3 and 0.75 A */
+#define OFFSET_LEAST_V 0.0005f /* what a turn's steps of 4 mV leave, and its noise */
+#define OFFSET_SDS     3.0f
+#define OFFSET_MOST_V  0.012f
+#define AWAY_LEAST_K   1.0f /* less tells nothing of a coefficient */
 /* Of an average: what a sensor's steps leave, LOSS_LEAST / 3, and it tells anew in 2 x 16 turns. */
 #define LINE_VARIANCE (32.0f * LOSS_LEAST * LOSS_LEAST / 9.0f)
 #define STILL_K       0.5f  /* below where it would be seen */
@@ -50,8 +49,16 @@ void spring_begin_line(spring_belief_t *b, float now_c)
                                  : COEFFICIENT_MOST_PER_K;
     b->rise_per_k = l->martensite_rise_per_k;
     b->rise_sd_per_k = most_per_k / SPRING_ESTIMATOR_BOUND_SDS;
+    b->line_sd = NOISE_IN_SLOW * b->noise;
     b->rough = false;
     b->losing = 0;
+}
+
+void spring_begin_rough_line(spring_belief_t *b, float now_c)
+{
+    spring_begin_line(b, now_c);
+    b->line_sd = b->noise;
+    b->rough = true;
 }
 
 static void see_crossing(const spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model,
@@ -96,8 +103,9 @@ static bool learn_offset(spring_belief_t *b, float now_c)
     }
     b->offset_v += more_v;
     b->offset_sd_v = sqrtf(gain * read_v2);
-    b->line_ohm -= more_v / b->line_a;
-    b->learnt.austenite_ohm = b->doubted ? b->learnt.austenite_ohm : b->line_ohm;
+    const float more_ohm = more_v / b->line_a;
+    b->line_ohm -= more_ohm;
+    b->learnt.austenite_ohm -= b->learnt.austenite_ohm > 0.0f ? more_ohm : 0.0f;
     b->seen = true; /* it is acted on in the next turn */
     return true;
 }
@@ -130,6 +138,7 @@ static void follow(spring_belief_t *b, float now_c, float left)
     }
     b->line_ohm += b->line_ohm * left * LINE_SHARE;
     b->line_c += away_k * LINE_SHARE;
+    b->line_sd -= b->line_sd * LINE_SHARE;
 }
 
 /* Of what the resistance has left its line by, the part that lost phase may explain. */
@@ -145,6 +154,17 @@ static float as_lost(const spring_belief_t *b, const thermal_model_t *model, uin
     const bool cold = spring_now_c(model, k) - SPRING_ESTIMATOR_BOUND_SDS * sd_k <
                       spring_c(thermal_model_transformation(model, k).martensite_start_c7);
     return cold ? -less * (1.0f / OTHER_WAY) : 0.0f;
+}
+
+/* On its way down to the hold: to martensite start even if a gust takes as much heat again, and a
+ * load has moved that. Else what changes is a contact or the sensor. */
+static bool may_have_cooled(const spring_belief_t *b, const thermal_model_t *model, uint8_t k,
+                            float sd_k)
+{
+    const float now_c = spring_now_c(model, k);
+    const float cooled_k = fmaxf(b->line_c - now_c, 0.0f);
+    const float most_k = cooled_k + SPRING_ESTIMATOR_BOUND_SDS * sd_k + SHIFT_BOUND_K;
+    return now_c - most_k < spring_c(thermal_model_transformation(model, k).martensite_start_c7);
 }
 
 /* A phase that is kept changes the resistance no faster than temperature does. */
@@ -184,15 +204,18 @@ void spring_holding_watch(const spring_estimator_t *e, spring_belief_t *b, therm
     const float changed = as_lost(b, model, k, left, sd_k);
     /* as its temperature may have moved unseen, so may the resistance */
     const float moves = fabsf(b->rise_per_k) * sd_k;
-    const float noise = b->rough ? b->noise : NOISE_IN_SLOW * b->noise;
-    float sure = fmaxf(fmaxf(LOSS_LEAST, moves), SURE_SDS * noise);
-    float suspected = (b->rough ? SUSPECTED_ROUGH : SUSPECTED) * sure;
-    if (changed >= suspected) { /* as a rule not: two divisions are saved */
+    const float slow_sd = NOISE_IN_SLOW * b->noise;
+    const float noise2 = slow_sd * slow_sd + b->line_sd * b->line_sd;
+    const float least = fmaxf(LOSS_LEAST, moves);
+    const float changed2 = changed * changed;
+    float sure2 = fmaxf(least * least, SURE_SDS * SURE_SDS * noise2);
+    float suspected2 = SUSPECTED * SUSPECTED * sure2;
+    if (changed2 >= suspected2) { /* as a rule not: two divisions are saved */
         const float moves2 = may_move_squared(b, now_c);
-        sure = sqrtf(sure * sure + moves2);
-        suspected = sqrtf(suspected * suspected + moves2);
+        sure2 += moves2;
+        suspected2 += moves2;
     }
-    if (changed < suspected) {
+    if (changed2 < suspected2) {
         b->losing = 0;
         if (b->quiet >= QUIET_TURNS) {
             if (b->rough) { /* it has come to rest */
@@ -204,9 +227,12 @@ void spring_holding_watch(const spring_estimator_t *e, spring_belief_t *b, therm
         return;
     }
     b->losing = b->losing < UINT8_MAX ? (uint8_t)(b->losing + 1) : UINT8_MAX;
-    if ((changed > sure && b->losing >= CONFIRM_TURNS) || b->losing >= LASTING_TURNS) {
+    if ((changed2 > sure2 && b->losing >= CONFIRM_TURNS) || b->losing >= LASTING_TURNS) {
+        if (b->rough && !may_have_cooled(b, model, k, sd_k)) {
+            spring_begin_rough_line(b, now_c);
+            return;
+        }
         see_crossing(e, b, model, k, changed / fabsf(b->learnt.change));
-        spring_begin_line(b, spring_now_c(model, k));
-        b->rough = true; /* the average still falls after the phase: anew when it is at rest */
+        spring_begin_rough_line(b, spring_now_c(model, k)); /* the average still falls */
     }
 }
