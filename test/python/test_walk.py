@@ -32,7 +32,7 @@ def commands() -> list[list[str]]:
 def test_the_page_is_walked_to_its_end(tmp_path: Path) -> None:
     said: dict[str, str] = {}
     board, *walk = (words for words in commands() if words[1] in WALKED)
-    assert board[1] == "board" and [words[1] for words in walk].count("record") == 2
+    assert board[1] == "board" and [words[1] for words in walk].count("record") == 3
     with subprocess.Popen(
         [*PROGRAMS[board[0]], *board[1:], "--elf", str(ELF)], stdout=subprocess.PIPE, text=True
     ) as simulated:
