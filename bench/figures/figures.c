@@ -16,6 +16,19 @@ static struct {
 } rows[MOST];
 static int count;
 
+const char *figures_json(int argc, char **argv, const char *program)
+{
+    if (argc == 3 && strcmp(argv[1], "--json") == 0) {
+        return argv[2];
+    }
+    if (argc != 1) {
+        const int help = argc == 2 && strcmp(argv[1], "--help") == 0;
+        fprintf(help ? stdout : stderr, "usage: %s [--json FILE]\n", program);
+        exit(help ? 0 : 2);
+    }
+    return NULL;
+}
+
 void figures_add(const char *figure, double value, const char *unit, const char *target)
 {
     if (count == MOST) {

@@ -6,6 +6,10 @@
 
 #include <stdbool.h>
 
+/* The file of `[--json FILE]`, or NULL. Ends the program for --help, and with 2 for anything else.
+ */
+const char *figures_json(int argc, char **argv, const char *program);
+
 /* Prints a figure and keeps it. Texts are copied, the name's first 119 characters. target: empty
  * for none. Ends the program if there are more than 64. */
 void figures_add(const char *figure, double value, const char *unit, const char *target);

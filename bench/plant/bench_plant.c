@@ -6,7 +6,6 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 
 #include "figures.h"
 #include "plant.h"
@@ -82,14 +81,7 @@ static void add(const char *what, const char *network, double value, const char 
 
 int main(int argc, char **argv)
 {
-    const char *json = NULL;
-    if (argc == 3 && strcmp(argv[1], "--json") == 0) {
-        json = argv[2];
-    } else if (argc != 1) {
-        const int help = argc == 2 && strcmp(argv[1], "--help") == 0;
-        fputs("usage: bench_plant [--json FILE]\n", help ? stdout : stderr);
-        return help ? 0 : 2;
-    }
+    const char *json = figures_json(argc, argv, "bench_plant");
     static const char *const chip_effects[] = {"radiation",  "latent_heat",      "resistance_phase",
                                                "shared_air", "plate_conduction", "fan_wake",
                                                "edge_loss"};

@@ -6,7 +6,6 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 
 #include "figures.h"
 #include "plant.h"
@@ -133,14 +132,7 @@ static void add(const char *what, int side, double value, const char *unit)
 
 int main(int argc, char **argv)
 {
-    const char *json = NULL;
-    if (argc == 3 && strcmp(argv[1], "--json") == 0) {
-        json = argv[2];
-    } else if (argc != 1) {
-        const int help = argc == 2 && strcmp(argv[1], "--help") == 0;
-        fputs("usage: bench_scale [--json FILE]\n", help ? stdout : stderr);
-        return help ? 0 : 2;
-    }
+    const char *json = figures_json(argc, argv, "bench_scale");
     static const int sides[] = {3, 8, 16, 32};
     enum { SIZES = sizeof sides / sizeof sides[0] };
     double plant_cost[SIZES], chip_cost[SIZES], bytes[SIZES];

@@ -4,9 +4,8 @@
 
 #define QUIET_K     0.08f /* a turn's: 0.3 K/s */
 #define QUIET_TURNS 40    /* 10 s: the average has settled */
-#define LINE_SHARE                                                                                 \
-    (1.0f / 240.0f)            /* of a turn, 60 s: what the line follows is no loss of phase       \
-                                */
+/* Of a turn, 60 s: what the line follows is no loss of phase. */
+#define LINE_SHARE     (1.0f / 240.0f)
 #define LOSS_LEAST     0.0012f /* of the resistance: what a sensor's steps leave in the average */
 #define NOISE_IN_SLOW  0.18f   /* of one turn's: sqrt(share / (2 - share)) */
 #define SURE_SDS       5.0f

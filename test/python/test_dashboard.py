@@ -11,6 +11,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -20,7 +21,7 @@ from ninespring.dashboard import words
 from ninespring.logs import read_log, read_table
 from playwright.sync_api import Browser, Page, expect, sync_playwright
 from websockets.exceptions import InvalidStatus
-from websockets.sync.client import connect
+from websockets.sync.client import ClientConnection, connect
 
 expect.set_options(timeout=30_000)  # ms; the board is simulated beside other tests, on as few as two cores
 ROOT = Path(__file__).resolve().parents[2]
@@ -309,46 +310,43 @@ def test_foreign_pages_are_refused_and_malformed_messages_change_nothing(tmp_pat
     assert "off all" in board.sent()
 
 
-def test_a_pages_wishes_are_carried_out_in_their_order(tmp_path: Path) -> None:
-    board = FakeBoard()
-    board.stream, board.every_s = (row(0.1 * k) for k in range(10, 9999)), 0.1
-    dashboard = Dashboard(tmp_path, "--port", board.port)
+@contextmanager
+def page_of(board: FakeBoard, folder: Path, every_s: float = 0.1) -> Iterator[ClientConnection]:
+    """Yield a page's socket once its dashboard has found the board, which streams rows; the dashboard ends well."""
+    board.stream, board.every_s = (row(0.1 * k) for k in range(10, 99999)), every_s
+    dashboard = Dashboard(folder, "--port", board.port)
     try:
         with connect(
             f"ws://{dashboard.address}/ws", additional_headers={"origin": dashboard.url.rstrip("/")}
         ) as socket:
             while not json.loads(socket.recv(10)).get("connected"):
                 pass
-            for level in range(1, 101):
-                socket.send(json.dumps({"do": "level", "spring": 1, "level": level, "id": level}))
-            answered = []
-            while len(answered) < 100:
-                if (got := json.loads(socket.recv(10)))["kind"] in ("done", "refused"):
-                    answered.append((got["kind"], got["id"]))
+            yield socket
     finally:
         assert dashboard.end() == 0
+
+
+def test_a_pages_wishes_are_carried_out_in_their_order(tmp_path: Path) -> None:
+    board = FakeBoard()
+    with page_of(board, tmp_path) as socket:
+        for level in range(1, 101):
+            socket.send(json.dumps({"do": "level", "spring": 1, "level": level, "id": level}))
+        answered = []
+        while len(answered) < 100:
+            if (got := json.loads(socket.recv(10)))["kind"] in ("done", "refused"):
+                answered.append((got["kind"], got["id"]))
     assert answered == [("done", level) for level in range(1, 101)]
     assert [line for line in board.sent() if line.startswith("on ")] == [f"on 1 {level}" for level in range(1, 101)]
 
 
 def test_a_full_disk_ends_the_recording_and_nothing_else(small_disk: Path) -> None:
-    board = FakeBoard()
-    board.stream, board.every_s = (row(0.1 * k) for k in range(10, 99999)), 0.01
-    dashboard = Dashboard(small_disk, "--port", board.port)
-    try:
-        with connect(
-            f"ws://{dashboard.address}/ws", additional_headers={"origin": dashboard.url.rstrip("/")}
-        ) as socket:
-            while not json.loads(socket.recv(10)).get("connected"):
-                pass
-            socket.send('{"do": "record"}')
-            while "No space left on device" not in (state := json.loads(socket.recv(30))).get("said", ""):
-                pass
-            assert state["connected"] and state["recording"] is None
-            while json.loads(socket.recv(10)).get("time_s", 0.0) <= state["time_s"]:
-                pass  # the array is shown as before
-    finally:
-        assert dashboard.end() == 0
+    with page_of(FakeBoard(), small_disk, 0.01) as socket:
+        socket.send('{"do": "record"}')
+        while "No space left on device" not in (state := json.loads(socket.recv(30))).get("said", ""):
+            pass
+        assert state["connected"] and state["recording"] is None
+        while json.loads(socket.recv(10)).get("time_s", 0.0) <= state["time_s"]:
+            pass  # the array is shown as before
     (log,) = small_disk.iterdir()
     assert log.suffix == ".csv" and log.read_text().endswith("\n")
     assert len(read_table(log, ("state",)).frame) > 50
@@ -356,19 +354,10 @@ def test_a_full_disk_ends_the_recording_and_nothing_else(small_disk: Path) -> No
 
 def test_a_stop_that_drops_what_is_being_answered_loses_no_board(tmp_path: Path) -> None:
     board = FakeBoard({"model": ["error:12 dropped by the stop"]})
-    board.stream, board.every_s = (row(0.1 * k) for k in range(10, 9999)), 0.1
-    dashboard = Dashboard(tmp_path, "--port", board.port)
-    try:
-        with connect(
-            f"ws://{dashboard.address}/ws", additional_headers={"origin": dashboard.url.rstrip("/")}
-        ) as socket:
-            while not json.loads(socket.recv(10)).get("connected"):
-                pass
-            until = time.monotonic() + 3.0
-            while time.monotonic() < until:
-                assert json.loads(socket.recv(10)).get("connected", True)
-    finally:
-        assert dashboard.end() == 0
+    with page_of(board, tmp_path) as socket:
+        until = time.monotonic() + 3.0
+        while time.monotonic() < until:
+            assert json.loads(socket.recv(10)).get("connected", True)
     assert board.sent().count("version") == 1 and "model" in board.sent()
 
 
