@@ -3,10 +3,11 @@
 void selftest_start(selftest_t *selftest, controller_t *controller, uint16_t open_current_ma)
 {
     *selftest = (selftest_t){.policy = (uint8_t)controller_policy(controller)};
-    selftest->level_permille =
-        open_current_ma <= SELFTEST_CURRENT_MA
-            ? 1000u
-            : (uint16_t)((uint32_t)SELFTEST_CURRENT_MA * 1000u / open_current_ma);
+    selftest->level_permille = 1000u;
+    if (open_current_ma > SELFTEST_CURRENT_MA) {
+        selftest->level_permille =
+            (uint16_t)((uint32_t)SELFTEST_CURRENT_MA * 1000u / open_current_ma);
+    }
     (void)controller_set_policy(controller, DRIVE_POLICY_OPEN); /* a level is a current */
 }
 

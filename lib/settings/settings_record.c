@@ -114,7 +114,7 @@ static uint8_t record_byte(void *context, uint16_t position)
     within = (uint16_t)(within - ENTRY_HEAD_BYTES);
     const uint8_t width = parameter_width(row.type);
     const int32_t value = settings_get(store->settings, store->row, (uint8_t)(within / width));
-    return (uint8_t)((uint32_t)value >> (8u * (within % width)));
+    return (uint8_t)((uint32_t)value >> (8u * (uint8_t)(within % width)));
 }
 
 void settings_save_start(settings_store_t *store, const settings_t *settings)
