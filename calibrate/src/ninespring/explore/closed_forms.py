@@ -30,7 +30,7 @@ def _answers(geometry: Geometry, mesh: Mesh, film: Film, right: np.ndarray) -> n
     mesh = replace(mesh, along=1)  # along the axis nothing changes, or a parabola: one quadratic element has it
     field = build(geometry, False, mesh, film)
     return (
-        field.spring.T @ Solver(field.conductance, field.capacity, 0.0).solve(0.0, field.spring @ right[:, None])[:, 0]
+        field.spring.T @ Solver(field).solve(0.0, field.spring @ right[:, None])[:, 0]
     )
 
 
