@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from . import __version__, native
+from .errors import InputError
 from .explore import cooling, stiffness
 from .toml_file import At, TomlFile, did_you_mean
 
@@ -36,6 +37,8 @@ MATERIAL_KEYS = {
     "austenite_finish_c": (-50.0, 200.0),
     "emissivity": (0.0, 1.0),
 }
+COUPLED = ("orthogonal_", "diagonal_", "second_", "wake_w")
+"""What the stiffness layer has times `stiffness_coupling_scale`."""
 BOARD_KEYS = {"supply_limit_a": (0.1, 60.0), "boost_current_a": (0.1, 3.2), "open_current_a": (0.0, 3.2)}
 """Of `[board.K]`: settings of the chip, within its limits."""
 
@@ -69,6 +72,14 @@ class Array:
         """Number of springs, in all layers."""
         return self.layers * self.rows * self.cols
 
+    def one_layer(self, who: str) -> None:
+        """Refuse a stiffness layer where only one is known."""
+        if self.layers > 1:
+            raise InputError(
+                f"a stiffness layer: {who} one layer, as a board does; give that board's log, "
+                "and an array or model without [stiffness]"
+            )
+
     @property
     def parts(self) -> list[native.Part]:
         """Springs of each board."""
@@ -91,6 +102,51 @@ class Model:
     def __repr__(self) -> str:
         effects = ", ".join(self.effects) or "no effects"
         return f"<model of {self.array.rows} x {self.array.cols}: {effects}; {len(self.parameters)} parameters>"
+
+
+def model_of_layer(model: Model, layer: str) -> Model:
+    """Return a model of two layers as one of one layer knows it: its springs, its couplings, nothing of the other."""
+    array, which = model.array, stiffness.LAYERS.index(layer)
+    if array.stiffness is None:
+        raise InputError(f"--layer {layer}: the model has one layer", model.name)
+    own = array.stiffness if which else {}
+    out = Model(
+        Array(
+            array.rows,
+            array.cols,
+            array.pitch_mm,
+            array.spring | {key: own[key] for key in SPRING_KEYS if key in own},
+            array.material | {key: own[key] for key in stiffness.MATERIAL if key in own},
+            array.sensor,
+        ),
+        list(model.effects),
+        provenance=model.provenance,
+        name=model.name,
+    )
+    n, scale = out.array.springs, model.parameters.get("stiffness_coupling_scale", 1.0)
+    for each in (False, True):  # what is said of one spring is over what is said of all
+        for full, value in model.parameters.items():
+            name, _, spring = full.partition("[")
+            if name.startswith(("series_", "stiffness_")) or bool(spring) != each:
+                continue
+            scaled = scale if which and name.startswith(COUPLED) else 1.0
+            at = int(spring[:-1]) - 1 - which * n if spring else -1
+            if spring and not 0 <= at < n:
+                continue
+            to = f"{name}[{at + 1}]" if spring else name
+            out.parameters[to] = scaled * value
+            if full in model.stderr:
+                out.stderr[to] = scaled * model.stderr[full]
+    for name in {full.partition("[")[0] for full in out.parameters if "[" in full}:
+        values = [out.parameters.get(f"{name}[{k + 1}]") for k in range(n)]
+        if values[0] is not None and len(set(values)) == 1:  # all the same: said once
+            errors = [out.stderr.pop(f"{name}[{k + 1}]", None) for k in range(n)]
+            for k in range(n):
+                del out.parameters[f"{name}[{k + 1}]"]
+            out.parameters[name] = values[0]
+            if errors[0] is not None:
+                out.stderr[name] = errors[0]
+    return out
 
 
 def _array(file: TomlFile) -> Array:

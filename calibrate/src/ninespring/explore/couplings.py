@@ -94,9 +94,7 @@ def model_of(array: Array, whole: Geometry, part: Geometry, lumped: Lumped, mesh
             if f"{name}_w_per_k" in values:
                 values[f"{name}_fan_w_per_k"] = values[f"{name}_w_per_k"]
     table = native.parameter_table()
-    error_of = {
-        name: float(np.hypot(error, mesh_error.get(name, 0.0))) for name, error in lumped.reduction.items()
-    }
+    error_of = {name: float(np.hypot(error, mesh_error.get(name, 0.0))) for name, error in lumped.reduction.items()}
     kept, errors = {}, {}
     for found, value in values.items():
         for name in names_of(found, whole):

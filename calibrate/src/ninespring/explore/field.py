@@ -278,7 +278,9 @@ def build(geometry: Geometry, fan: bool, mesh: Mesh, film: Film | None = None) -
     box = (*(centres.min(axis=0) - margin), *(centres.max(axis=0) + margin))
     box = (box[0], box[1], box[2], box[3])
     walls = walls_of(geometry)
-    plan = plan_mesh(box, [tuple(one) for one in centres], radius, walls, mesh.corners, inner if inner < radius else None)
+    plan = plan_mesh(
+        box, [tuple(one) for one in centres], radius, walls, mesh.corners, inner if inner < radius else None
+    )
     at = plan.p[:, plan.t].mean(axis=1)  # (2, triangles)
     owner = np.hypot(at[0, :, None] - centres[:, 0], at[1, :, None] - centres[:, 1]).argmin(axis=1)
     inside, core = (within(*(at - centres[owner].T), one, mesh.corners) for one in (radius, inner))

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import optimize
 
+from ..models import COUPLED
 from .cooling import DIRECTIONS
 from .geometry import Geometry
 from .modes import Modes
@@ -35,8 +36,6 @@ BELOW = (
 BELOW_PLATE = ("stiffness_plate_coupling_w_per_k",)
 BELOW_FAN = ("stiffness_loss_fan_w_per_k", "series_fan_w_per_k")
 """Of the stiffness layer. What begins with `stiffness_` and is not the scale, the plant has for each of its springs."""
-COUPLED = ("orthogonal_", "diagonal_", "second_", "wake_w")
-"""What the stiffness layer has times its scale."""
 OFF_ZERO = 1e-9
 """Numbers that cannot be negative begin above zero: their logarithm is fitted."""
 

@@ -57,7 +57,9 @@ class Solver:
 
     def __init__(self, field: Field) -> None:
         self.order = _order(field)
-        self.conductance, self.capacity = (one[self.order][:, self.order] for one in (field.conductance, field.capacity))
+        self.conductance, self.capacity = (
+            one[self.order][:, self.order] for one in (field.conductance, field.capacity)
+        )
 
     def solve(self, rate_per_s: float, right: np.ndarray) -> np.ndarray:
         """Return x, (unknowns, columns)."""

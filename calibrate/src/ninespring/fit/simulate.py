@@ -8,8 +8,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from .. import native
-from ..logs.run import Run
 from ..explore import stiffness
+from ..logs.run import Run
 from ..models import SPRING_KEYS, Array
 
 EACH = (
