@@ -1,6 +1,6 @@
 """The pictures of docs/exploring.md: runs its sweeps (carries on where they are), then draws.
 
-.venv/bin/python bench/explore/pictures.py [paper pitch cooling patterns which] [--work build/explore] [--figures docs/figures]
+.venv/bin/python bench/explore/pictures.py [stiffness paper pitch cooling patterns which] [--work build/explore] [--figures docs/figures]
 """
 
 from __future__ import annotations
@@ -162,7 +162,32 @@ def which(work: Path) -> Any:
     return figure
 
 
-PICTURES = {"paper": paper, "pitch": pitch, "cooling": cooling, "patterns": patterns, "which": which}
+def stiffness(work: Path) -> Any:
+    """Draw both layers after four minutes, by the commands of the page."""
+    from ninespring import plotting
+    from ninespring.logs import read_log
+
+    folder = work / "stiffness"
+    folder.mkdir(exist_ok=True)
+    model, scenario, log = (folder / name for name in ("model.toml", "run.ini", "run.csv"))
+    tool = [sys.executable, "-m", "ninespring"]
+    array = ROOT / "docs" / "exploring" / "stiffness.toml"
+    if not model.exists():
+        subprocess.run([*tool, "couplings", array, "--mesh", "coarse", "-o", model], check=True)
+    pattern = ("--pattern", "111101111/000010000")
+    subprocess.run([*tool, "scenario", "--model", model, *pattern, "-o", scenario], check=True)
+    subprocess.run([ROOT / "build" / "host" / "ninespring-sim", "run", scenario, "-o", log], check=True)
+    return plotting.map_at(read_log(log), 3, 3, 240.0)
+
+
+PICTURES = {
+    "stiffness": stiffness,
+    "paper": paper,
+    "pitch": pitch,
+    "cooling": cooling,
+    "patterns": patterns,
+    "which": which,
+}
 
 
 def main() -> None:

@@ -124,8 +124,12 @@ def model_of_layer(model: Model, layer: str) -> Model:
         name=model.name,
     )
     n, scale = out.array.springs, model.parameters.get("stiffness_coupling_scale", 1.0)
+    values = dict(model.parameters)
+    if which and scale != 1.0:  # what the model does not say, and the plant has
+        table = native.parameter_table()
+        values = {name: one.default for name, one in table.items() if name.startswith(COUPLED)} | values
     for each in (False, True):  # what is said of one spring is over what is said of all
-        for full, value in model.parameters.items():
+        for full, value in values.items():
             name, _, spring = full.partition("[")
             if name.startswith(("series_", "stiffness_")) or bool(spring) != each:
                 continue

@@ -85,8 +85,6 @@ def couplings(array_path: Path, mesh: str, output: Path, json_path: Path | None)
         f"field: {part.rows} x {part.cols} springs, {found.still.unknowns} unknowns; heat in less heat out "
         f"{100 * max(found.still.balance, found.blown.balance if found.blown else 0.0):.1g} %",
     ]
-    for line in lines:
-        talk.print(line, soft_wrap=True, markup=False)
     if part.below:
         lines.insert(
             1,
@@ -94,6 +92,8 @@ def couplings(array_path: Path, mesh: str, output: Path, json_path: Path | None)
             f"{2 * part.below.spring.radius_mm:.3g} mm; between the two of a taxel, from the field: "
             f"{1e3 * found.pairs.series:.3f} mW/K",
         )
+    for line in lines:
+        talk.print(line, soft_wrap=True, markup=False)
     result = result_of(
         "couplings",
         mesh=mesh,
