@@ -174,7 +174,7 @@ def stiffness(work: Path) -> Any:
     array = ROOT / "docs" / "exploring" / "stiffness.toml"
     if not model.exists():
         subprocess.run([*tool, "couplings", array, "--mesh", "coarse", "-o", model], check=True)
-    pattern = ("--pattern", "111101111/000010000")
+    pattern = ("--pattern", "111101111/000010000", "--fan", "100")
     subprocess.run([*tool, "scenario", "--model", model, *pattern, "-o", scenario], check=True)
     subprocess.run([ROOT / "build" / "host" / "ninespring-sim", "run", scenario, "-o", log], check=True)
     return plotting.map_at(read_log(log), 3, 3, 240.0)

@@ -1,13 +1,13 @@
-/* Two layers: each is the array that it would be alone, but for what passes between the springs of a
- * taxel. */
+/* Two layers: each is the array that it would be alone, but for what passes between the springs of
+ * a taxel. */
 #include <math.h>
 #include <unity.h>
 
 #include "plant.h"
 
-#define ROWS    3
-#define COLUMNS 4
-#define SPRINGS (ROWS * COLUMNS)
+#define ROWS     3
+#define COLUMNS  4
+#define SPRINGS  (ROWS * COLUMNS)
 #define OK(call) TEST_ASSERT_EQUAL_INT(PLANT_OK, (call))
 
 static plant_t *both;
@@ -117,8 +117,7 @@ static void energy_closes(void)
         OK(plant_step(both, 1.0));
     }
     TEST_ASSERT_TRUE(plant_energy_input_j(both) > 500.0);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-6 * plant_energy_input_j(both), 0.0,
-                              plant_energy_balance_j(both));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6 * plant_energy_input_j(both), 0.0, plant_energy_balance_j(both));
 }
 
 static void sizes(void)

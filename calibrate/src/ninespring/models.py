@@ -76,7 +76,7 @@ class Array:
         """Refuse a stiffness layer where only one is known."""
         if self.layers > 1:
             raise InputError(
-                f"a stiffness layer: {who} one layer, as a board does; give that board's log, "
+                f"a stiffness layer, but {who} one layer, as a board has: give that board's log, "
                 "and an array or model without [stiffness]"
             )
 
