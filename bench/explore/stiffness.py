@@ -2,8 +2,8 @@
 
 .venv/bin/python bench/explore/stiffness.py [--json FILE]
 
-The array is docs/exploring/stiffness.toml; runs are like a sweep's points: 200 s on, policy precompensate. Patterns are
-elongation/stiffness.
+The array is docs/exploring/stiffness.toml; runs are like a sweep's points, but half an hour on: nothing gets warmer. Policy
+precompensate. Patterns are elongation/stiffness.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ def main() -> None:
     say(f"{name}: network against field, random drive of 15 min", round(100 * found.drive_error, 2), "%", "<= 3")
     for key in ("series_w_per_k", "series_fan_w_per_k", "orthogonal_w_per_k", "orthogonal_fan_w_per_k"):
         say(f"{name}: {key}", round(1e3 * found.model.parameters[key], 3), "mW/K")
-    spec = Spec(duration_s=210, on_s=200, couplings="field")
+    spec = Spec(duration_s=1810, on_s=1800, couplings="field")
     for pattern, what in PATTERNS.items():
         for fan in (0.0, 1.0):
             point = {"pitch_mm": array.pitch_mm, "layers": 2, "pattern": pattern, "fan": fan}
