@@ -79,6 +79,7 @@ SECTIONS: tuple[Section, ...] = (
     Section(
         "explore_paper", "The paper's temperatures from geometry", f"{PYTHON} bench/explore/paper.py --mesh coarse"
     ),
+    Section("stiffness", "The stiffness layer", f"{PYTHON} bench/explore/stiffness.py"),
     Section("worst", "The worst patterns of 8 x 8", f"{PYTHON} bench/explore/worst.py"),
     Section("field_logs", "Logs of the field, diagnosed", f"{PYTHON} bench/diagnose/field.py", markdown=True),
     Section("sweep", "Sweeps", f"{PYTHON} bench/explore/sweep.py"),

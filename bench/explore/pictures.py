@@ -1,6 +1,6 @@
 """The pictures of docs/exploring.md: runs its sweeps (carries on where they are), then draws.
 
-.venv/bin/python bench/explore/pictures.py [paper pitch cooling patterns which] [--work build/explore] [--figures docs/figures]
+.venv/bin/python bench/explore/pictures.py [stiffness paper pitch cooling patterns which] [--work build/explore] [--figures docs/figures]
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ def paper(work: Path) -> Any:
     from paper import CAMERA, COMSOL, fitted_c
 
     found = {row["figure"]: row["value"] for row in json.loads(kept.read_text())}
-    figure, axes = plt.subplots(1, 2, figsize=(7.2, 3.0), sharey=True)
+    figure, axes = plt.subplots(1, 2, figsize=(7.2, 3.5), sharey=True)
     pitches = [4, 5, 6]
     for fan, axis in enumerate(axes):
         name = "fan" if fan else "still"
@@ -61,13 +61,13 @@ def paper(work: Path) -> Any:
         axis.plot(pitches, [CAMERA[p, fan] for p in pitches], "k^", mfc="none", label="paper, camera")
         more = [4, 4.5, 5, 5.5, 6, 7, 8]
         axis.plot(more, [fitted_c(p, fan) for p in more], "-", color="#6b7280", label="spacing law, fitted to COMSOL")
-        for reading, colour in (("outer 3.45", FAN if fan else STILL), ("mean 3.45", "#9ca3af")):
+        for reading, colour in (("outer 3.45", STILL), ("mean 3.45", "#9ca3af")):
             at = [p for p in pitches if f"centre, {reading} mm, pitch {p} mm, {name}" in found]
             values = [found[f"centre, {reading} mm, pitch {p} mm, {name}"] for p in at]
             axis.plot(at, values, "o-", color=colour, label=f"geometry alone, {reading} mm")
         axis.set(title="fan" if fan else "still air", xlabel="pitch, mm")
     axes[0].set_ylabel("undriven centre, degC\n(eight at 105)")
-    axes[1].legend(fontsize=7)
+    figure.legend(*axes[1].get_legend_handles_labels(), loc="outside lower center", ncols=3, fontsize=7)
     return figure
 
 
@@ -162,7 +162,32 @@ def which(work: Path) -> Any:
     return figure
 
 
-PICTURES = {"paper": paper, "pitch": pitch, "cooling": cooling, "patterns": patterns, "which": which}
+def stiffness(work: Path) -> Any:
+    """Draw both layers after four minutes, by the commands of the page."""
+    from ninespring import plotting
+    from ninespring.logs import read_log
+
+    folder = work / "stiffness"
+    folder.mkdir(exist_ok=True)
+    model, scenario, log = (folder / name for name in ("model.toml", "run.ini", "run.csv"))
+    tool = [sys.executable, "-m", "ninespring"]
+    array = ROOT / "docs" / "exploring" / "stiffness.toml"
+    if not model.exists():
+        subprocess.run([*tool, "couplings", array, "--mesh", "coarse", "-o", model], check=True)
+    pattern = ("--pattern", "111101111/000010000", "--fan", "100")
+    subprocess.run([*tool, "scenario", "--model", model, *pattern, "-o", scenario], check=True)
+    subprocess.run([ROOT / "build" / "host" / "ninespring-sim", "run", scenario, "-o", log], check=True)
+    return plotting.map_at(read_log(log), 3, 3, 240.0)
+
+
+PICTURES = {
+    "stiffness": stiffness,
+    "paper": paper,
+    "pitch": pitch,
+    "cooling": cooling,
+    "patterns": patterns,
+    "which": which,
+}
 
 
 def main() -> None:

@@ -182,12 +182,15 @@ class recorder
 {
 public:
     recorder(const scenario &plan, const std::string &board, const run_options &options)
-        : plan_(plan), springs_(plan.rows * plan.cols), summary_(static_cast<std::size_t>(springs_))
+        : plan_(plan), springs_(plan.springs()), summary_(static_cast<std::size_t>(springs_))
     {
         electrics_noise_seed(&noise_, plan.seed ^ 0x6e696e65737072ULL);
         log_.comment("tool", "ninespring-sim " NINESPRING_VERSION);
         log_.comment("scenario", std::filesystem::path(plan.name).filename().string());
         log_.comment("array", fmt::format("{} x {}", plan.rows, plan.cols));
+        if (plan.layers == 2) {
+            log_.comment("layers", "2");
+        }
         if (plan.pitch_mm) {
             log_.comment("pitch_mm", fmt::format("{}", *plan.pitch_mm));
         }
@@ -376,7 +379,7 @@ void run(const run_options &options)
     }
     const plant_pointer plant = scenario_plant(plan);
     std::vector<settings_t> settings(static_cast<std::size_t>(
-        boards_count(plan.rows, plan.cols, plan.board_rows, plan.board_cols)));
+        plan.layers * boards_count(plan.rows, plan.cols, plan.board_rows, plan.board_cols)));
     std::string left_out;
     for (std::size_t k = 0; k < settings.size(); ++k) {
         left_out = set_chip(plan, plant.get(), static_cast<int>(k) + 1, settings[k]);

@@ -12,7 +12,8 @@ std::unique_ptr<runner> make_runner(const std::string &board, const runner_reque
     }
 #ifdef NINESPRING_BOARD
     if (board == "avr" && request.settings->size() > 1) {
-        throw input_error("--board avr is one board; leave out [array] board_rows and board_cols");
+        throw input_error("--board avr is one board, of one layer; leave out [array] board_rows, "
+                          "board_cols and layers");
     }
     if (board == "avr") {
         return make_avr_runner(request);

@@ -48,7 +48,7 @@ public:
                     ? "the loop cannot be made from this plant and these settings"
                     : fmt::format("the chip refuses {}; set it in [chip]", setting_name(bad)));
         }
-        place_.resize(static_cast<std::size_t>(plan.rows * plan.cols));
+        place_.resize(static_cast<std::size_t>(plan.springs()));
         for (int k = 0; k < boards_of(boards_.get()); ++k) {
             loop_t *loop = boards_loop(boards_.get(), k);
             const boards_part_t part =

@@ -44,7 +44,7 @@ source_place place_of(const scenario &plan, std::string_view message)
 
 plant_pointer scenario_plant(const scenario &plan)
 {
-    plant_pointer plant(plant_create(plan.rows, plan.cols));
+    plant_pointer plant(plant_create_layers(plan.rows, plan.cols, plan.layers));
     if (plant == nullptr) {
         throw input_error(plan.name, 0, 0, "there is no plant of these rows and cols");
     }
@@ -118,6 +118,9 @@ described_plant describe_plant(const plant_arguments &arguments)
                                             "latent_heat, resistance_phase\n"),
                              arguments.sets)
             : read_scenario(arguments.scenario_path, arguments.sets);
+    if (plan.layers > 1) {
+        throw input_error(plan.name, 0, 0, "[array] layers = 2, but a board is of one layer");
+    }
     return {scenario_plant(plan), plan.seed, plan.noise_current_a * ELECTRICS_INA219_SHUNT_OHM,
             plan.noise_voltage_v};
 }

@@ -164,7 +164,10 @@ constexpr std::array<failure_word, 11> FAILURES = {
 class event_reader
 {
 public:
-    event_reader(const raw_entry &entry, int springs) : entry_(entry), springs_(springs) {}
+    event_reader(const raw_entry &entry, const scenario &plan)
+        : entry_(entry), springs_(plan.springs()), layers_(plan.layers)
+    {
+    }
 
     scenario_event read(double time_s)
     {
@@ -190,7 +193,7 @@ public:
             event.springs = springs(words_[1], true);
         } else if (first == "pattern") {
             event.word = scenario_word::pattern;
-            count(2, 2, "pattern 111101111");
+            count(2, 2, layers_ == 1 ? "pattern 111101111" : "pattern 111101111/000010000");
             event.pattern = pattern(words_[1]);
         } else if (first == "policy") {
             event.word = scenario_word::policy;
@@ -291,16 +294,40 @@ private:
 
     [[nodiscard]] std::vector<bool> pattern(const std::string &word) const
     {
+        const std::size_t slash = word.find('/');
+        if (layers_ == 1) {
+            if (slash != std::string::npos) {
+                throw wrong(fmt::format("pattern {} is of two layers, the array has one; write "
+                                        "[array] layers = 2",
+                                        in_quotes(word)));
+            }
+            return digits(word, "", springs_);
+        }
+        if (slash == std::string::npos) {
+            throw wrong(fmt::format("pattern {} is of one layer, the array has two; write "
+                                    "elongation/stiffness, with {} digits each",
+                                    in_quotes(word), springs_ / 2));
+        }
+        std::vector<bool> bits = digits(word.substr(0, slash), "elongation ", springs_ / 2);
+        const std::vector<bool> below = digits(word.substr(slash + 1), "stiffness ", springs_ / 2);
+        bits.insert(bits.end(), below.begin(), below.end());
+        return bits;
+    }
+
+    [[nodiscard]] std::vector<bool> digits(const std::string &word, const char *layer,
+                                           int springs) const
+    {
         std::vector<bool> bits;
         for (const char c : word) {
             if (c != '0' && c != '1') {
-                throw wrong(
-                    fmt::format("pattern {} holds something else than 0 and 1", in_quotes(word)));
+                throw wrong(fmt::format("{}pattern {} holds something else than 0 and 1", layer,
+                                        in_quotes(word)));
             }
             bits.push_back(c == '1');
         }
-        if (bits.size() != static_cast<std::size_t>(springs_)) {
-            throw wrong(fmt::format("pattern has {} digits for {} springs", bits.size(), springs_));
+        if (bits.size() != static_cast<std::size_t>(springs)) {
+            throw wrong(
+                fmt::format("{}pattern has {} digits for {} springs", layer, bits.size(), springs));
         }
         return bits;
     }
@@ -342,6 +369,7 @@ private:
 
     const raw_entry &entry_;
     int springs_;
+    int layers_;
     std::vector<std::string> words_;
 };
 
@@ -435,6 +463,8 @@ void read_entry(scenario &result, const raw_entry &entry)
             result.rows = whole(entry, 1, 64);
         } else if (entry.key == "cols") {
             result.cols = whole(entry, 1, 64);
+        } else if (entry.key == "layers") {
+            result.layers = whole(entry, 1, 2);
         } else if (entry.key == "pitch_mm") {
             result.pitch_mm = number(entry, 0.1, 1000.0);
             result.pitch_place = entry.value_place;
@@ -443,7 +473,7 @@ void read_entry(scenario &result, const raw_entry &entry)
         } else if (entry.key == "board_cols") {
             result.board_cols = whole(entry, 1, 64);
         } else {
-            refuse_key(entry, {"rows", "cols", "pitch_mm", "board_rows", "board_cols"});
+            refuse_key(entry, {"rows", "cols", "layers", "pitch_mm", "board_rows", "board_cols"});
         }
     } else if (entry.section == "plant") {
         if (entry.key == "effects") {
@@ -494,12 +524,13 @@ void check_boards(scenario &result)
                                       "board_rows and board_cols smaller",
                                       rows, cols));
     }
-    if (result.rows * result.cols > 1024) {
-        throw input_error(
-            result.name, 1, 1,
-            fmt::format("[array] {} x {} are more than 1024 springs", result.rows, result.cols));
+    if (result.springs() > 1024) {
+        throw input_error(result.name, 1, 1,
+                          fmt::format("[array] {} x {}{} are more than 1024 springs", result.rows,
+                                      result.cols, result.layers == 2 ? " in two layers" : ""));
     }
-    const int boards = ((result.rows + rows - 1) / rows) * ((result.cols + cols - 1) / cols);
+    const int boards =
+        result.layers * ((result.rows + rows - 1) / rows) * ((result.cols + cols - 1) / cols);
     for (const scenario_board &board : result.boards) {
         if (board.number > boards) {
             throw board.place.error(
@@ -628,7 +659,7 @@ scenario parse_scenario(const text_file &file, const std::vector<std::string> &a
         throw input_error(file.name, 1, 1,
                           "[scenario] is without duration_s; add how long to run, in seconds");
     }
-    const double values = result.duration_s / result.log_interval_s * result.rows * result.cols;
+    const double values = result.duration_s / result.log_interval_s * result.springs();
     if (values > MOST_LOGGED) {
         throw input_error(file.name, 1, 1,
                           fmt::format("[scenario] the log would hold {:.3g} rows of springs, at "
@@ -644,7 +675,7 @@ scenario parse_scenario(const text_file &file, const std::vector<std::string> &a
                     fmt::format("at {} is after the end ({} s); make duration_s longer", time_s,
                                 result.duration_s));
             }
-            result.events.push_back(event_reader(entry, result.rows * result.cols).read(time_s));
+            result.events.push_back(event_reader(entry, result).read(time_s));
         }
     }
     if (result.events.size() > MAX_EVENTS) {

@@ -83,7 +83,8 @@ struct scenario {
     std::string policy; /* empty: as the settings say */
     int rows = 3;
     int cols = 3;
-    int board_rows = 0; /* springs of one board; 0: all of them, one board */
+    int layers = 1;     /* 2: springs rows x cols + 1 .. are the stiffness layer's */
+    int board_rows = 0; /* springs of one board; 0: all of a layer, one board */
     int board_cols = 0;
     std::vector<scenario_board> boards; /* those that differ from [chip] */
     std::optional<double> pitch_mm;
@@ -98,6 +99,8 @@ struct scenario {
     double noise_current_a = 0.0;
     double noise_voltage_v = 0.0;
     std::vector<scenario_event> events; /* in time; equal times as written */
+
+    [[nodiscard]] int springs() const { return layers * rows * cols; }
 };
 
 /* `arguments`: --set texts, `section.key=value` or, for a plant parameter, `name=value`; they act

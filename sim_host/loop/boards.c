@@ -26,8 +26,10 @@ static int least(int a, int b)
 boards_part_t boards_part(int array_rows, int array_columns, int rows, int columns, int k)
 {
     const int across = parts(array_columns, columns);
-    boards_part_t part = {.row = k / across * rows, .column = k % across * columns};
-    part.rows = least(rows, array_rows - part.row);
+    const int of_layer = boards_count(array_rows, array_columns, rows, columns);
+    const int row = k % of_layer / across * rows;
+    boards_part_t part = {.row = k / of_layer * array_rows + row, .column = k % across * columns};
+    part.rows = least(rows, array_rows - row);
     part.columns = least(columns, array_columns - part.column);
     return part;
 }
@@ -37,7 +39,7 @@ boards_t *boards_create(const controller_settings_t settings[], const plant_t *p
                         uint16_t *bad)
 {
     const int array_rows = plant_rows(plant), array_columns = plant_columns(plant);
-    const int count = boards_count(array_rows, array_columns, rows, columns);
+    const int count = plant_layers(plant) * boards_count(array_rows, array_columns, rows, columns);
     boards_t *boards = calloc(1, sizeof *boards + (size_t)count * sizeof(loop_t *));
     if (boards != NULL) {
         boards->plant = plant_copy(plant);

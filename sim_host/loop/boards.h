@@ -17,9 +17,10 @@ typedef struct {
 
 typedef struct boards boards_t;
 
-/* Into how many boards of rows x columns springs (at the edges fewer) an array is cut. */
+/* Into how many boards of rows x columns springs (at the edges fewer) a layer is cut. */
 int boards_count(int array_rows, int array_columns, int rows, int columns);
-/* Which springs board k has: boards lie row by row, like springs. k must be below the count. */
+/* Which springs board k has: boards lie row by row, like springs; the stiffness layer's begin where
+ * the elongation layer's end, in a row counted on. */
 boards_part_t boards_part(int array_rows, int array_columns, int rows, int columns, int k);
 
 /* Copies the plant as loop_create does; settings[k] are board k's own, with its supply and limits.
@@ -33,7 +34,7 @@ void boards_destroy(boards_t *boards);
 /* One tick of every board, in step. */
 void boards_tick(boards_t *boards);
 
-int boards_of(const boards_t *boards); /* how many */
+int boards_of(const boards_t *boards); /* how many, in all layers */
 loop_t *boards_loop(boards_t *boards, int k);
 plant_t *boards_plant(boards_t *boards);
 

@@ -108,7 +108,9 @@ loop_t *loop_create_part(const controller_settings_t *settings, plant_t *plant, 
                          to_c7(plant_ambient_c(plant) + chosen.ambient_error_c), &refused)) {
         goto fail;
     }
-    if (first_row < 0 || first_row + settings->model.rows > plant_rows(plant) || first_column < 0 ||
+    const int rows = plant_rows(plant);
+    if (first_row < 0 || first_row >= plant_layers(plant) * rows ||
+        first_row % rows + settings->model.rows > rows || first_column < 0 ||
         first_column + settings->model.columns > plant_columns(plant)) {
         refused = PARAMETER_rows;
         goto fail;
@@ -154,7 +156,7 @@ loop_t *loop_create(const controller_settings_t *settings, const plant_t *plant,
     plant_t *copy = plant_copy(plant);
     uint16_t refused = copy == NULL ? UINT16_MAX : PARAMETER_rows;
     loop_t *loop = NULL;
-    if (copy != NULL && plant_rows(plant) == settings->model.rows &&
+    if (copy != NULL && plant_layers(plant) * plant_rows(plant) == settings->model.rows &&
         plant_columns(plant) == settings->model.columns) {
         loop = loop_create_part(settings, copy, 0, 0, options, seed, &refused);
     }

@@ -60,10 +60,10 @@ loop_t *loop_create(const controller_settings_t *settings, const plant_t *plant,
 void loop_destroy(loop_t *loop);
 
 /* A board at a part of a larger array: its springs are settings->model.rows x columns of the plant
- * from there on (0-based). The plant is the caller's, and he advances it: loop_tick_part is a tick
- * without that, and returns how far the plant is to be advanced now, s (0: not yet); then every
- * board reads the plant. boards.h does so. Fails as loop_create, and if the part is not within the
- * plant (*bad is the row of rows). */
+ * from there on (0-based, rows counted on through the layers; of one layer). The plant is the
+ * caller's, and he advances it: loop_tick_part is a tick without that, and returns how far the
+ * plant is to be advanced now, s (0: not yet); then every board reads the plant. boards.h does so.
+ * Fails as loop_create, and if the part is not within the plant (*bad is the row of rows). */
 loop_t *loop_create_part(const controller_settings_t *settings, plant_t *plant, int first_row,
                          int first_column, const loop_options_t *options, uint64_t seed,
                          uint16_t *bad);

@@ -155,7 +155,8 @@ static void straighten(const mapping_t *m, double *factor, double *rise_per_k, d
 /* Of spring i: sides without a neighbour in the whole array. */
 static int free_sides_of(const mapping_t *m, int i)
 {
-    const int row = m->row + i / m->columns, column = m->column + i % m->columns;
+    const int row = (m->row + i / m->columns) % plant_rows(m->plant);
+    const int column = m->column + i % m->columns;
     return (row == 0) + (row == plant_rows(m->plant) - 1) + (column == 0) +
            (column == plant_columns(m->plant) - 1);
 }
@@ -298,6 +299,28 @@ static void map_rows_of_the_same_name(mapping_t *m)
     }
 }
 
+/* The board of a layer has that layer's couplings, and takes the other's springs to be as warm as
+ * its own: nothing flows there. */
+static void map_layer(mapping_t *m)
+{
+    static const parameter_t rows[] = {PARAMETER_orthogonal_w_per_k,
+                                       PARAMETER_orthogonal_fan_w_per_k, PARAMETER_diagonal_w_per_k,
+                                       PARAMETER_diagonal_fan_w_per_k, PARAMETER_wake_w_per_k};
+    if (plant_layers(m->plant) == 1) {
+        return;
+    }
+    if (array_value(m, "series_w_per_k") > 0.0 && !m->failed) {
+        say(m, "series_w_per_k is not on the chip: a board knows its own layer");
+    }
+    for (size_t k = 0; k < sizeof rows / sizeof rows[0] && m->row >= plant_rows(m->plant); k++) {
+        const parameter_row_t row = parameter_row((uint16_t)rows[k]);
+        const double unit = pow(10.0, -row.decimals);
+        put_from(m, "stiffness_coupling_scale times a coupling", rows[k], 0,
+                 array_value(m, "stiffness_coupling_scale") * unit *
+                     parameter_get(&m->chip, &row, 0));
+    }
+}
+
 /* The chip's network ends at the first neighbours: what reaches the second ones goes to those, so
  * that all springs together exchange as much. */
 static void map_second_neighbours(mapping_t *m)
@@ -323,15 +346,18 @@ static void map_second_neighbours(mapping_t *m)
     }
 }
 
-/* Of the air and the plate that all of the array's springs share, this board's springs' part. */
+/* Of the air that all of the array's springs share, and of the plate that those of a layer do, this
+ * board's springs' part. */
 static void map_shares(mapping_t *m)
 {
     static const parameter_t rows[] = {
         PARAMETER_air_heat_capacity_j_per_k, PARAMETER_air_exchange_w_per_k,
         PARAMETER_plate_heat_capacity_j_per_k, PARAMETER_plate_loss_w_per_k};
-    const double share = (double)m->springs / plant_spring_count(m->plant);
     for (size_t k = 0; k < sizeof rows / sizeof rows[0]; k++) {
         const effect_t effect = parameter_description((uint16_t)rows[k])->effect;
+        const int sharers = plant_rows(m->plant) * plant_columns(m->plant) *
+                            (effect == EFFECT_shared_air ? plant_layers(m->plant) : 1);
+        const double share = (double)m->springs / sharers;
         if (is_on(m, effect)) {
             put(m, rows[k], 0, share * array_value(m, parameter_row((uint16_t)rows[k]).name));
         }
@@ -359,8 +385,8 @@ chip_mapping_status_t chip_mapping_from_plant(const plant_t *plant,
                                               thermal_model_parameters_t *parameters, char *message,
                                               size_t message_size)
 {
-    return chip_mapping_from_part(plant, 0, 0, plant_rows(plant), plant_columns(plant), parameters,
-                                  message, message_size);
+    return chip_mapping_from_part(plant, 0, 0, plant_layers(plant) * plant_rows(plant),
+                                  plant_columns(plant), parameters, message, message_size);
 }
 
 chip_mapping_status_t chip_mapping_from_part(const plant_t *plant, int row, int column, int rows,
@@ -376,6 +402,10 @@ chip_mapping_status_t chip_mapping_from_part(const plant_t *plant, int row, int 
                    .message = message,
                    .size = message_size};
     message[0] = '\0';
+    if (row % plant_rows(plant) + rows > plant_rows(plant)) {
+        say(&m, "a board has springs of one layer");
+        return CHIP_MAPPING_ERROR_RANGE;
+    }
     if (m.springs > THERMAL_MODEL_MAX_SPRINGS) {
         say(&m, "%d x %d springs are more than the chip's model holds", rows, columns);
         return CHIP_MAPPING_ERROR_RANGE;
@@ -388,6 +418,7 @@ chip_mapping_status_t chip_mapping_from_part(const plant_t *plant, int row, int 
     map_resistance(&m);
     map_rows_of_the_same_name(&m);
     map_second_neighbours(&m);
+    map_layer(&m);
     map_shares(&m);
     if (is_on(&m, EFFECT_radiation)) {
         put_from(&m, "emissivity x surface_mm2", PARAMETER_radiating_area_mm2, 0,

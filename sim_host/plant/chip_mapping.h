@@ -33,10 +33,10 @@ chip_mapping_status_t chip_mapping_from_plant(const plant_t *plant,
                                               size_t message_size);
 
 /* The same for a board that has rows x columns of the plant's springs, from (row, column) on,
- * 0-based. It knows nothing of the others, and takes them to be as warm as its own springs beside
- * them: nothing flows there. A spring that is colder than believed shows it in its resistance, one
- * that is hotter than its transformation does not. Of the array's common air and plate it has its
- * springs' share. */
+ * 0-based, rows counted on through the layers. Of the other layer it knows nothing either. It knows
+ * nothing of the others, and takes them to be as warm as its own springs beside them: nothing flows
+ * there. A spring that is colder than believed shows it in its resistance, one that is hotter than
+ * its transformation does not. Of the array's common air and plate it has its springs' share. */
 chip_mapping_status_t chip_mapping_from_part(const plant_t *plant, int row, int column, int rows,
                                              int columns, thermal_model_parameters_t *parameters,
                                              char *message, size_t message_size);

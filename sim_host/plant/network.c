@@ -7,6 +7,15 @@
 #define STEFAN_BOLTZMANN 5.670374419e-8 /* W/m2K4 */
 #define KELVIN           273.15
 
+/* The spring so many rows and columns on, in the same layer; -1: none. */
+static int beside(const plant_t *p, int i, int down, int along)
+{
+    const int row = row_of(p, i) + down, column = i % p->columns + along;
+    return row >= 0 && row < p->rows && column >= 0 && column < p->columns
+               ? i + down * p->columns + along
+               : -1;
+}
+
 void plant_network_lay(plant_t *p)
 {
     static const struct {
@@ -21,12 +30,13 @@ void plant_network_lay(plant_t *p)
         int count = 0;
         for (int i = 0; i < p->n; i++) {
             neighbours->start[i] = count;
-            for (int k = 0; k < NEIGHBOURS_MOST; k++) {
-                const int row = i / p->columns + away[kind][k].row;
-                const int column = i % p->columns + away[kind][k].column;
-                if (row >= 0 && row < p->rows && column >= 0 && column < p->columns)
-                    neighbours->of[count++] = row * p->columns + column;
+            for (int k = 0; k < NEIGHBOURS_MOST && kind != NEIGHBOUR_SERIES; k++) {
+                const int other = beside(p, i, away[kind][k].row, away[kind][k].column);
+                if (other >= 0)
+                    neighbours->of[count++] = other;
             }
+            if (kind == NEIGHBOUR_SERIES && p->layers == 2)
+                neighbours->of[count++] = (i + p->n / 2) % p->n;
         }
         neighbours->start[p->n] = count;
     }
@@ -69,20 +79,21 @@ void plant_network_flows(plant_t *p, double time_s, const double *t, const doubl
     const bool natural = p->on[E_natural_convection];
     const double air = shared_air ? t[n] : ambient;
     const double ambient_k2 = (ambient + KELVIN) * (ambient + KELVIN);
-    double in_w = 0.0, to_air = 0.0, radiated = 0.0, to_plate = 0.0;
+    double in_w = 0.0, to_air = 0.0, radiated = 0.0, to_plate[PLANT_MAX_LAYERS] = {0.0};
 
     if (p->power_varies)
         plant_electric_find(p, t, austenite);
     for (int i = 0; i < n; i++) {
+        const int layer = layer_of(p, i);
         const double ti = t[i];
         double q = 0.0;
         for (int kind = 0; kind < NEIGHBOUR_KINDS; kind++)
-            if (p->coupling[kind] != 0.0)
-                q += p->coupling[kind] * neighbour_difference(&p->neighbours[kind], t, i);
+            if (p->coupling[kind][layer] != 0.0)
+                q += p->coupling[kind][layer] * neighbour_difference(&p->neighbours[kind], t, i);
 
         double lost = (natural ? loss_at(p, i, ti, air) : p->loss_sum[i]) * (ti - air);
         if (p->wake != 0.0 && p->upstream[i] >= 0)
-            lost -= p->wake * (t[p->upstream[i]] - air);
+            lost -= p->wake * p->wake_scale[layer] * (t[p->upstream[i]] - air);
         to_air += lost;
         q -= lost;
         if (p->radiation_w_per_k4 != 0.0) {
@@ -92,8 +103,8 @@ void plant_network_flows(plant_t *p, double time_s, const double *t, const doubl
             q -= w;
         }
         if (plate) {
-            const double w = p->value[P_plate_coupling_w_per_k][i] * (ti - t[n + 1]);
-            to_plate += w;
+            const double w = p->value[P_plate_coupling_w_per_k][i] * (ti - t[plate_node(p, layer)]);
+            to_plate[layer] += w;
             q -= w;
         }
         if (p->any_held && p->mode[i] == PLANT_DRIVE_TEMPERATURE) {
@@ -107,7 +118,8 @@ void plant_network_flows(plant_t *p, double time_s, const double *t, const doubl
         }
     }
     double out_w = radiated;
-    flows->q_w[n] = flows->q_w[n + 1] = 0.0;
+    for (int node = n; node < p->nodes; node++)
+        flows->q_w[node] = 0.0;
     if (shared_air) {
         const double w = scalar(p, P_air_exchange_w_per_k) * (air - ambient);
         flows->q_w[n] = to_air - w;
@@ -115,9 +127,10 @@ void plant_network_flows(plant_t *p, double time_s, const double *t, const doubl
     } else {
         out_w += to_air;
     }
-    if (plate) {
-        const double w = scalar(p, P_plate_loss_w_per_k) * (t[n + 1] - ambient);
-        flows->q_w[n + 1] = to_plate - w;
+    for (int layer = 0; layer < p->layers && plate; layer++) {
+        const int node = plate_node(p, layer);
+        const double w = scalar(p, P_plate_loss_w_per_k) * (t[node] - ambient);
+        flows->q_w[node] = to_plate[layer] - w;
         out_w += w;
     }
     flows->in_w = in_w;
@@ -140,17 +153,14 @@ void plant_network_prepare(plant_t *p)
             p->loss_scale_fan[i] *= 1.0 + scalar(p, P_edge_loss_fan_share) * more;
         }
 
-        static const int row_of[4] = {0, -1, 0, 1}, column_of[4] = {-1, 0, 1, 0};
+        static const int down[4] = {0, -1, 0, 1}, along[4] = {-1, 0, 1, 0};
         const int direction = (int)scalar(p, P_wake_direction);
-        const int row = i / p->columns + row_of[direction];
-        const int column = i % p->columns + column_of[direction];
-        p->upstream[i] = row >= 0 && row < p->rows && column >= 0 && column < p->columns
-                             ? row * p->columns + column
-                             : -1;
+        p->upstream[i] = beside(p, i, down[direction], along[direction]);
     }
     p->capacity[n] = scalar(p, P_air_heat_capacity_j_per_k);
-    p->capacity[n + 1] = scalar(p, P_plate_heat_capacity_j_per_k);
-    for (int i = 0; i < n + 2; i++)
+    for (int layer = 0; layer < p->layers; layer++)
+        p->capacity[plate_node(p, layer)] = scalar(p, P_plate_heat_capacity_j_per_k);
+    for (int i = 0; i < p->nodes; i++)
         p->inverse_capacity[i] = 1.0 / p->capacity[i];
     p->radiation_w_per_k4 = p->on[E_radiation] ? scalar(p, P_emissivity) * STEFAN_BOLTZMANN * 1e-6 *
                                                      scalar(p, P_surface_mm2)
@@ -158,8 +168,8 @@ void plant_network_prepare(plant_t *p)
     /* Nodes that are off stand at ambient, so that switching one on starts it there. */
     if (!p->on[E_shared_air])
         p->temperature_c[n] = plant_network_ambient(p, p->time_s);
-    if (!p->on[E_plate_conduction])
-        p->temperature_c[n + 1] = plant_network_ambient(p, p->time_s);
+    for (int layer = 0; layer < p->layers && !p->on[E_plate_conduction]; layer++)
+        p->temperature_c[plate_node(p, layer)] = plant_network_ambient(p, p->time_s);
 }
 
 void plant_network_prepare_inputs(plant_t *p)
@@ -167,17 +177,24 @@ void plant_network_prepare_inputs(plant_t *p)
     const int n = p->n;
     const double fan = p->fan;
     static const enum parameter_id natural[NEIGHBOUR_KINDS] = {
-        P_orthogonal_w_per_k, P_diagonal_w_per_k, P_second_w_per_k};
+        P_orthogonal_w_per_k, P_diagonal_w_per_k, P_second_w_per_k, P_series_w_per_k};
     static const enum parameter_id forced[NEIGHBOUR_KINDS] = {
-        P_orthogonal_fan_w_per_k, P_diagonal_fan_w_per_k, P_second_fan_w_per_k};
-    for (int kind = 0; kind < NEIGHBOUR_KINDS; kind++)
-        p->coupling[kind] =
-            scalar(p, natural[kind]) + fan * (scalar(p, forced[kind]) - scalar(p, natural[kind]));
+        P_orthogonal_fan_w_per_k, P_diagonal_fan_w_per_k, P_second_fan_w_per_k,
+        P_series_fan_w_per_k};
+    const double stiffness = scalar(p, P_stiffness_coupling_scale);
+    for (int kind = 0; kind < NEIGHBOUR_KINDS; kind++) {
+        const double still = scalar(p, natural[kind]);
+        const double coupling = still + fan * (scalar(p, forced[kind]) - still);
+        p->coupling[kind][0] = coupling;
+        p->coupling[kind][1] = kind == NEIGHBOUR_SERIES ? coupling : stiffness * coupling;
+    }
+    p->wake_scale[0] = 1.0;
+    p->wake_scale[1] = stiffness;
     p->wake = p->on[E_fan_wake] ? scalar(p, P_wake_w_per_k) * fan : 0.0;
     p->any_held = false;
     const bool shared_air = p->on[E_shared_air], plate = p->on[E_plate_conduction];
-    double fastest = 0.0, air_sum = scalar(p, P_air_exchange_w_per_k),
-           plate_sum = scalar(p, P_plate_loss_w_per_k);
+    double fastest = 0.0, air_sum = scalar(p, P_air_exchange_w_per_k);
+    double plate_sum = scalar(p, P_plate_loss_w_per_k); /* of all: no less than one's own */
     for (int i = 0; i < n; i++) {
         p->loss_natural[i] = p->value[P_loss_w_per_k][i] * (1.0 - fan) * p->loss_scale[i];
         p->loss_forced[i] = p->value[P_loss_fan_w_per_k][i] * fan * p->loss_scale_fan[i];
@@ -185,11 +202,13 @@ void plant_network_prepare_inputs(plant_t *p)
         if (p->mode[i] == PLANT_DRIVE_TEMPERATURE)
             p->any_held = true;
         /* Gershgorin: no eigenvalue beyond (own conductances + couplings) / capacity */
-        const double own = p->loss_sum[i] + p->wake + 4.0 * 1.1e8 * p->radiation_w_per_k4 +
+        const int layer = layer_of(p, i);
+        const double own = p->loss_sum[i] + p->wake * p->wake_scale[layer] +
+                           4.0 * 1.1e8 * p->radiation_w_per_k4 +
                            (plate ? p->value[P_plate_coupling_w_per_k][i] : 0.0);
         double coupled = 0.0;
         for (int kind = 0; kind < NEIGHBOUR_KINDS; kind++)
-            coupled += p->coupling[kind] * neighbour_count(p, (enum neighbour_kind)kind, i);
+            coupled += p->coupling[kind][layer] * neighbour_count(p, (enum neighbour_kind)kind, i);
         fastest = fmax(fastest, (own + 2.0 * coupled) * p->inverse_capacity[i]);
         air_sum += 2.0 * p->loss_sum[i];
         plate_sum += 2.0 * p->value[P_plate_coupling_w_per_k][i];
@@ -218,5 +237,5 @@ double plant_air_c(const plant_t *p)
 
 double plant_plate_c(const plant_t *p)
 {
-    return p->on[E_plate_conduction] ? p->temperature_c[p->n + 1] : plant_ambient_c(p);
+    return p->on[E_plate_conduction] ? p->temperature_c[plate_node(p, 0)] : plant_ambient_c(p);
 }

@@ -18,7 +18,7 @@ static void *take(unsigned char *memory, size_t *taken, size_t bytes)
  * Returns how many bytes that is. */
 static size_t lay_out(plant_t *p, unsigned char *memory)
 {
-    const size_t n = (size_t)p->n, nodes = n + 2;
+    const size_t n = (size_t)p->n, nodes = (size_t)p->nodes;
     double **const of_springs[] = {&p->quantity,         &p->austenite,      &p->sensor_c,
                                    &p->heat_start,       &p->heat_from_c,    &p->cool_start,
                                    &p->cool_from_c,      &p->latent_j,       &p->power_w,
@@ -51,10 +51,17 @@ static size_t lay_out(plant_t *p, unsigned char *memory)
 
 plant_t *plant_create(int rows, int columns)
 {
+    return plant_create_layers(rows, columns, 1);
+}
+
+plant_t *plant_create_layers(int rows, int columns, int layers)
+{
     if (rows < 1 || columns < 1 || rows > PLANT_MAX_SPRINGS || columns > PLANT_MAX_SPRINGS ||
-        rows * columns > PLANT_MAX_SPRINGS)
+        layers < 1 || layers > PLANT_MAX_LAYERS || rows * columns > PLANT_MAX_SPRINGS / layers)
         return NULL;
-    plant_t shape = {.rows = rows, .columns = columns, .n = rows * columns};
+    const int n = layers * rows * columns;
+    plant_t shape = {
+        .rows = rows, .columns = columns, .layers = layers, .n = n, .nodes = n + 1 + layers};
     shape.bytes = lay_out(&shape, NULL);
     plant_t *p = calloc(1, shape.bytes);
     if (!p)
@@ -98,13 +105,18 @@ int plant_columns(const plant_t *p)
     return p->columns;
 }
 
+int plant_layers(const plant_t *p)
+{
+    return p->layers;
+}
+
 void plant_reset(plant_t *p)
 {
     p->time_s = 0.0;
     p->input_j = p->output_j = p->stored_j = 0.0;
     p->step_s = 1.0;
     const double ambient = plant_network_ambient(p, 0.0);
-    for (int i = 0; i < p->n + 2; i++)
+    for (int i = 0; i < p->nodes; i++)
         p->temperature_c[i] = ambient;
     for (int i = 0; i < p->n; i++) {
         p->sensor_c[i] = ambient;

@@ -14,7 +14,8 @@
 extern "C" {
 #endif
 
-#define PLANT_MAX_SPRINGS 1024
+#define PLANT_MAX_SPRINGS 1024 /* of all layers */
+#define PLANT_MAX_LAYERS  2
 
 typedef enum {
     PLANT_OK = 0,
@@ -52,11 +53,17 @@ const char *plant_status_text(plant_status_t status);
 /* Fails (NULL) if and only if rows or columns are 0, rows x columns > PLANT_MAX_SPRINGS, or memory
  * is out. Memory and time of a step are in proportion to the springs. */
 plant_t *plant_create(int rows, int columns);
+/* layers 2: below each spring a second one, joined end to end with it (series_w_per_k), the
+ * stiffness layer: spring k's is k + rows x columns. Couplings, free sides and wake are within a
+ * layer; each layer has the plate at its outer end, all have the one air. layers 1 is plant_create.
+ * Fails if that does, with layers x rows for rows, or layers are not 1 or 2. */
+plant_t *plant_create_layers(int rows, int columns, int layers);
 void plant_destroy(plant_t *plant);
 plant_t *plant_copy(const plant_t *plant); /* NULL if and only if memory is out */
 int plant_spring_count(const plant_t *plant);
-int plant_rows(const plant_t *plant);
+int plant_rows(const plant_t *plant); /* of a layer */
 int plant_columns(const plant_t *plant);
+int plant_layers(const plant_t *plant);
 
 /* A parameter that belongs to an effect counts only while that effect is on. Unchanged on failure.
  */
@@ -134,7 +141,7 @@ double plant_ambient_c(const plant_t *plant); /* with its drift */
 double plant_supply_v(const plant_t *plant);  /* with its sag */
 double plant_temperature_c(const plant_t *plant, int spring);
 double plant_air_c(const plant_t *plant);
-double plant_plate_c(const plant_t *plant);
+double plant_plate_c(const plant_t *plant);                    /* of the first layer */
 double plant_austenite(const plant_t *plant, int spring);      /* 0..1 */
 double plant_resistance_ohm(const plant_t *plant, int spring); /* of the spring itself */
 double plant_terminal_ohm(const plant_t *plant, int spring);   /* with contact and fault */

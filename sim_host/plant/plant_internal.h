@@ -28,7 +28,7 @@ enum effect_id {
 
 /* ------------------------------------------------------------------- state */
 
-/* What happens at one instant. q_w: net heat into each spring, then the air, then the plate. */
+/* What happens at one instant. q_w: net heat into each node. */
 typedef struct {
     double *q_w;
     double in_w, out_w;
@@ -44,6 +44,7 @@ enum neighbour_kind {
     NEIGHBOUR_ORTHOGONAL, /* beside each other in a row or column */
     NEIGHBOUR_DIAGONAL,
     NEIGHBOUR_SECOND, /* two apart in a row or column */
+    NEIGHBOUR_SERIES, /* of the other layer, end to end */
     NEIGHBOUR_KINDS
 };
 #define NEIGHBOURS_MOST 4 /* of one kind */
@@ -57,7 +58,8 @@ typedef struct {
 /* One value for each spring, row by row, but for those that say how many they are. The values lie
  * behind the struct in its one piece of memory, as plant.c lays them out. */
 struct plant {
-    int rows, columns, n;
+    int rows, columns, layers, n;   /* rows of a layer; n of all layers */
+    int nodes;                      /* springs, air, a plate for each layer */
     size_t bytes;                   /* of the whole piece */
     double *value[PARAMETER_COUNT]; /* one where the parameter is not per_spring */
     bool on[EFFECT_COUNT];
@@ -70,7 +72,7 @@ struct plant {
     bool restarted; /* the branches are to be laid anew, whatever was */
 
     double time_s;
-    double *temperature_c; /* n + 2: springs, air, plate */
+    double *temperature_c; /* nodes */
     double *austenite;
     double *sensor_c;
     /* Turning points. Heating follows heat_start + (1 - heat_start) rising(T) once that exceeds the
@@ -95,11 +97,12 @@ struct plant {
     /* derived by network */
     neighbours_t neighbours[NEIGHBOUR_KINDS];
     int *upstream;                       /* -1: none */
-    double *capacity, *inverse_capacity; /* n + 2 */
+    double *capacity, *inverse_capacity; /* nodes */
     double *loss_scale, *loss_scale_fan; /* edge and mismatch */
     double *loss_natural, *loss_forced;
     double *loss_sum; /* natural + forced */
-    double coupling[NEIGHBOUR_KINDS];
+    double coupling[NEIGHBOUR_KINDS][PLANT_MAX_LAYERS];
+    double wake_scale[PLANT_MAX_LAYERS];
     double wake;
     double radiation_w_per_k4;
     bool any_held;
@@ -108,13 +111,30 @@ struct plant {
     double step_limit_s;
     bool flows_known; /* k[0] is of the present state */
     flows_t k[4];
-    double *stage_c, *increment_j; /* n + 2 */
+    double *stage_c, *increment_j; /* nodes */
     double *stage_austenite;
 };
 
 static inline double scalar(const plant_t *p, enum parameter_id id)
 {
     return p->value[id][0];
+}
+
+static inline int layer_of(const plant_t *p, int i)
+{
+    return i < p->rows * p->columns ? 0 : 1;
+}
+
+/* Of the plate at the outer end of a layer's springs. */
+static inline int plate_node(const plant_t *p, int layer)
+{
+    return p->n + 1 + layer;
+}
+
+/* Row of the array, in whichever layer. */
+static inline int row_of(const plant_t *p, int i)
+{
+    return i / p->columns % p->rows;
 }
 
 static inline int neighbour_count(const plant_t *p, enum neighbour_kind kind, int i)

@@ -54,7 +54,7 @@ static void find_stage(plant_t *p)
         if (p->power_varies)
             p->stage_austenite[i] = plant_phase_fraction(p, i, t, &slope);
     }
-    for (int i = p->n; i < p->n + 2; i++)
+    for (int i = p->n; i < p->nodes; i++)
         p->stage_c[i] = p->temperature_c[i] + p->increment_j[i] * p->inverse_capacity[i];
 }
 
@@ -82,7 +82,7 @@ static void accept(plant_t *p, double h)
         }
         p->stored_j += p->capacity[i] * (t1 - t0) + plant_phase_latent_j(p, i, change);
     }
-    for (int i = p->n; i < p->n + 2; i++) {
+    for (int i = p->n; i < p->nodes; i++) {
         p->stored_j += p->capacity[i] * (p->stage_c[i] - p->temperature_c[i]);
         p->temperature_c[i] = p->stage_c[i];
     }
@@ -95,7 +95,7 @@ static void accept(plant_t *p, double h)
 /* The last stage is the next step's first. */
 static void keep_last_flows(plant_t *p)
 {
-    memcpy(p->k[0].q_w, p->k[3].q_w, (size_t)(p->n + 2) * sizeof(double));
+    memcpy(p->k[0].q_w, p->k[3].q_w, (size_t)p->nodes * sizeof(double));
     p->k[0].in_w = p->k[3].in_w;
     p->k[0].out_w = p->k[3].out_w;
 }
@@ -108,7 +108,7 @@ plant_status_t plant_solver_advance(plant_t *p, double dt_s)
     const plant_status_t status = plant_solver_prepare(p);
     if (status != PLANT_OK)
         return status;
-    const int nodes = p->n + 2;
+    const int nodes = p->nodes;
     const double tolerance = scalar(p, P_integration_tolerance_c);
     const double start_s = p->time_s, end_s = start_s + dt_s;
     double done_s = 0.0;
@@ -187,7 +187,7 @@ plant_status_t plant_settle(plant_t *p, double limit_s)
         if (status != PLANT_OK)
             return status;
         double fastest = 0.0;
-        for (int i = 0; i < p->n + 2; i++)
+        for (int i = 0; i < p->nodes; i++)
             fastest = fmax(fastest, fabs(p->k[0].q_w[i]) * p->inverse_capacity[i]);
         for (int i = 0; i < p->n; i++)
             fastest = fmax(fastest, fabs(p->sensor_c[i] - p->temperature_c[i]) * 1e-4);

@@ -79,7 +79,7 @@ const char *plant_status_text(plant_status_t status)
     case PLANT_ERROR_INDEX:
         return "no such spring";
     case PLANT_ERROR_SIZE:
-        return "rows x columns not in 1..1024";
+        return "rows x columns x layers not in 1..1024";
     case PLANT_ERROR_MEMORY:
         return "out of memory";
     case PLANT_ERROR_TIME:
@@ -110,8 +110,8 @@ plant_status_t plant_set_index(plant_t *p, size_t k, int spring, double value)
         const double ambient = plant_network_ambient(p, p->time_s);
         if (!p->on[E_shared_air])
             p->temperature_c[p->n] = ambient;
-        if (!p->on[E_plate_conduction])
-            p->temperature_c[p->n + 1] = ambient;
+        for (int layer = 0; layer < p->layers && !p->on[E_plate_conduction]; layer++)
+            p->temperature_c[plate_node(p, layer)] = ambient;
     } else {
         p->parameters_changed = true;
     }

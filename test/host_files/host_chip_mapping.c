@@ -168,6 +168,38 @@ static void a_part_knows_its_own_springs_alone(void)
     TEST_ASSERT_EQUAL(10000, chip.plate_loss_uw_per_k);
 }
 
+/* Each layer's board has its own losses and couplings, the plate at its end, half of the air. */
+static void a_layer_has_its_own_numbers(void)
+{
+    plant_destroy(plant);
+    plant = plant_create_layers(2, 2, 2);
+    on("plate_conduction");
+    on("shared_air");
+    set("orthogonal_w_per_k", 0.0005);
+    set("diagonal_fan_w_per_k", 0.0003);
+    set("stiffness_coupling_scale", 0.5);
+    set("plate_loss_w_per_k", 0.03);
+    set("air_heat_capacity_j_per_k", 12.0);
+    for (int k = 5; k <= 8; k++) {
+        char name[32];
+        (void)snprintf(name, sizeof name, "loss_w_per_k[%d]", k);
+        set(name, 0.004);
+    }
+    for (int layer = 0; layer < 2; layer++) {
+        TEST_ASSERT_EQUAL(CHIP_MAPPING_OK, chip_mapping_from_part(plant, 2 * layer, 0, 2, 2, &chip,
+                                                                  message, sizeof message));
+        TEST_ASSERT_EQUAL(layer ? 250 : 500, chip.orthogonal_uw_per_k);
+        TEST_ASSERT_EQUAL(layer ? 150 : 300, chip.diagonal_fan_uw_per_k);
+        TEST_ASSERT_EQUAL(layer ? 4000 : 5800, chip.loss_uw_per_k);
+        TEST_ASSERT_EQUAL(30000, chip.plate_loss_uw_per_k);
+        TEST_ASSERT_EQUAL(6000, chip.air_heat_capacity_mj_per_k);
+        TEST_ASSERT_NOT_NULL_MESSAGE(strstr(message, "series_w_per_k is not on the chip"), message);
+    }
+    TEST_ASSERT_EQUAL(CHIP_MAPPING_ERROR_RANGE,
+                      chip_mapping_from_part(plant, 1, 0, 2, 2, &chip, message, sizeof message));
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(message, "one layer"), message);
+}
+
 /* 3 x 3: six pairs two apart, twelve beside each other. */
 static void second_neighbours_are_counted_to_the_first(void)
 {
@@ -288,6 +320,7 @@ int main(void)
     RUN_TEST(what_the_plant_has_in_two_numbers_becomes_one);
     RUN_TEST(what_the_chip_averages_is_said);
     RUN_TEST(a_part_knows_its_own_springs_alone);
+    RUN_TEST(a_layer_has_its_own_numbers);
     RUN_TEST(second_neighbours_are_counted_to_the_first);
     RUN_TEST(edge_and_mismatch_become_scales);
     RUN_TEST(natural_convection_becomes_a_rising_loss);

@@ -144,6 +144,22 @@ void scenario_is_read(void)
     TEST_ASSERT_EQUAL(2, s.events[3].springs[0]);
 }
 
+/* Spring 9 + k is the stiffness spring below k; each layer has boards of its own. */
+void scenario_of_two_layers_is_read(void)
+{
+    const scenario s = parse_scenario(
+        make_text_file("s.ini", SCENARIO + "[array]\nlayers = 2\n[board.2]\nsupply_limit_a = 5\n"
+                                           "[events]\nat 1 = pattern 111101111/000010000\n"
+                                           "at 2 = on 18\n"));
+    TEST_ASSERT_EQUAL(18, s.springs());
+    TEST_ASSERT_EQUAL(18, s.events[0].pattern.size());
+    for (std::size_t k = 0; k < 18; ++k) {
+        TEST_ASSERT_EQUAL(k < 9 ? k != 4 : k == 13, s.events[0].pattern[k]);
+    }
+    TEST_ASSERT_EQUAL(17, s.events[1].springs[0]);
+    TEST_ASSERT_EQUAL(2, s.boards[0].number);
+}
+
 void scenario_with_errors_is_refused(void)
 {
     refuses_scenario(SCENARIO + "colour = 3\n", "s.ini:3:1: ", "no key 'colour'");
@@ -166,6 +182,11 @@ void scenario_with_errors_is_refused(void)
     refuses_scenario(SCENARIO + "[array]\nboard_rows=3\n", "s.ini:1:1: ", "go together");
     refuses_scenario(SCENARIO + "[board.2]\nsupply_limit_a=5\n",
                      "s.ini:4:1: ", "[board.2], but the array has 1");
+    refuses_scenario(SCENARIO + "[array]\nlayers=2\n[board.3]\nsupply_limit_a=5\n",
+                     "s.ini:6:1: ", "[board.3], but the array has 2");
+    refuses_scenario(SCENARIO + "[array]\nlayers=3\n", "s.ini:4:8: ", "must be 1 to 2");
+    refuses_scenario(SCENARIO + "[array]\nrows=32\ncols=32\nlayers=2\nboard_rows=8\nboard_cols=8\n",
+                     "s.ini:1:1: ", "in two layers are more than 1024");
     refuses_scenario(SCENARIO + "[board.0]\nsupply_limit_a=5\n", "s.ini:3:", "no section");
 }
 
@@ -182,6 +203,18 @@ void scenario_events_with_errors_are_refused(void)
     refuses("at 5 = off 1 2", "s.ini:4:8: ", "off K|all");
     refuses("at 5 = pattern 1111", "s.ini:4:8: ", "4 digits for 9 springs");
     refuses("at 5 = pattern 11111111x", "s.ini:4:8: ", "0 and 1");
+    refuses("at 5 = pattern 111101111/000010000", "s.ini:4:8: ", "write [array] layers = 2");
+    const auto refuses_of_two = [](const char *pattern, const char *part) {
+        refuses_scenario(SCENARIO + "[array]\nlayers = 2\n[events]\nat 5 = pattern " + pattern +
+                             "\n",
+                         "s.ini:6:8: ", part);
+    };
+    refuses_of_two("111101111", "of one layer, the array has two");
+    refuses_of_two("111101111000010000", "of one layer, the array has two");
+    refuses_of_two("11110111/000010000", "elongation pattern has 8 digits for 9 springs");
+    refuses_of_two("111101111/", "stiffness pattern has 0 digits for 9 springs");
+    refuses_of_two("111101111/00001000/", "stiffness pattern '00001000/'");
+    refuses_of_two("111101111/00001000x", "stiffness pattern '00001000x' holds something else");
     refuses("at 5 = policy best", "s.ini:4:8: ", "open or precompensate");
     refuses("at 5 = fan 101", "s.ini:4:8: ", "0 to 100");
     refuses("at 5 = fail melt 1", "s.ini:4:8: ", "fail what?");
@@ -217,6 +250,7 @@ int main(void)
     RUN_TEST(files_that_are_not_text_are_refused);
     RUN_TEST(file_is_written_whole_or_not_at_all);
     RUN_TEST(scenario_is_read);
+    RUN_TEST(scenario_of_two_layers_is_read);
     RUN_TEST(scenario_with_errors_is_refused);
     RUN_TEST(scenario_events_with_errors_are_refused);
     RUN_TEST(scenario_arguments_with_errors_are_refused);

@@ -37,7 +37,9 @@ void tearDown(void)
 
 static void cut(int rows, int columns)
 {
-    for (int k = 0; k < boards_count(plant_rows(plant), plant_columns(plant), rows, columns); k++) {
+    const int count =
+        plant_layers(plant) * boards_count(plant_rows(plant), plant_columns(plant), rows, columns);
+    for (int k = 0; k < count; k++) {
         const boards_part_t part =
             boards_part(plant_rows(plant), plant_columns(plant), rows, columns, k);
         settings[k].model.rows = (uint8_t)part.rows;
@@ -77,18 +79,19 @@ static void one_board_is_the_loop(void)
     loop_destroy(loop);
 }
 
-/* 5 x 4 on boards of 3 x 3: what is left at the edges is smaller, and each spring has one board. */
+/* 5 x 4 on boards of 3 x 3: what is left at the edges is smaller, and each spring has one board; of
+ * a second layer, too, whose springs are no board's of the first. */
 static void every_spring_has_one_board(void)
 {
     TEST_ASSERT_EQUAL(4, boards_count(5, 4, 3, 3));
-    int seen[20] = {0};
-    for (int k = 0; k < 4; k++) {
+    int seen[40] = {0};
+    for (int k = 0; k < 8; k++) {
         const boards_part_t part = boards_part(5, 4, 3, 3, k);
         for (int i = 0; i < part.rows * part.columns; i++) {
             seen[(part.row + i / part.columns) * 4 + part.column + i % part.columns]++;
         }
     }
-    for (int i = 0; i < 20; i++) {
+    for (int i = 0; i < 40; i++) {
         TEST_ASSERT_EQUAL(1, seen[i]);
     }
 }
@@ -116,6 +119,42 @@ static void boards_meet_in_the_heat_alone(void)
     TEST_ASSERT_TRUE(highest_a > 8.0 && highest_a < 10.0);
 }
 
+/* A board for each layer: the elongation layer's heats its springs within its own limit, and the
+ * stiffness layer's, which draws nothing, finds its springs warmer. */
+static void a_layer_has_its_own_board(void)
+{
+    plant = plant_create_layers(2, 2, 2);
+    TEST_ASSERT_EQUAL(PLANT_OK, plant_set_effect(plant, "latent_heat", true));
+    TEST_ASSERT_EQUAL(PLANT_OK, plant_set_effect(plant, "resistance_phase", true));
+    settings[0].safety.supply_limit_ma = 10000;
+    cut(2, 2);
+    TEST_ASSERT_EQUAL(2, boards_of(boards));
+    drive_all(0);
+    for (int tick = 0; tick < 50 * 200; tick++) {
+        boards_tick(boards);
+    }
+    for (int i = 0; i < 4; i++) {
+        TEST_ASSERT_TRUE(plant_austenite(boards_plant(boards), i) > 0.9);
+        TEST_ASSERT_EQUAL_DOUBLE(0.0, plant_austenite(boards_plant(boards), 4 + i));
+        TEST_ASSERT_TRUE(plant_temperature_c(boards_plant(boards), 4 + i) > 22.0);
+    }
+    TEST_ASSERT_EQUAL_DOUBLE(0.0, loop_highest_sum_current_a(boards_loop(boards, 1)));
+    TEST_ASSERT_TRUE(loop_highest_sum_current_a(boards_loop(boards, 0)) < 10.0);
+}
+
+/* Neither a board nor a loop of one board spans the layers. */
+static void no_board_spans_the_layers(void)
+{
+    uint16_t bad = 0;
+    plant = plant_create_layers(2, 2, 2);
+    settings[0].model.rows = settings[0].model.columns = 2;
+    TEST_ASSERT_NULL(loop_create(&settings[0], plant, NULL, 1, &bad));
+    TEST_ASSERT_EQUAL(PARAMETER_rows, bad);
+    TEST_ASSERT_NULL(loop_create_part(&settings[0], plant, 1, 0, NULL, 1, &bad));
+    settings[0].model.rows = 4;
+    TEST_ASSERT_NULL(loop_create(&settings[0], plant, NULL, 1, &bad));
+}
+
 static void the_board_that_does_not_fit_is_named(void)
 {
     make(2, 4);
@@ -135,6 +174,8 @@ int main(void)
     RUN_TEST(one_board_is_the_loop);
     RUN_TEST(every_spring_has_one_board);
     RUN_TEST(boards_meet_in_the_heat_alone);
+    RUN_TEST(a_layer_has_its_own_board);
+    RUN_TEST(no_board_spans_the_layers);
     RUN_TEST(the_board_that_does_not_fit_is_named);
     return UNITY_END();
 }

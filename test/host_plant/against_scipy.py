@@ -30,6 +30,9 @@ SCALARS = {
     "diagonal_fan_w_per_k": (0, 5e-4),
     "second_w_per_k": (0, 2e-4),
     "second_fan_w_per_k": (0, 2e-4),
+    "series_w_per_k": (0, 1e-3),
+    "series_fan_w_per_k": (0, 1e-3),
+    "stiffness_coupling_scale": (0.3, 1.5),
     "ambient_c": (10, 30),
     "supply_v": (4, 6),
     "freewheel_drop_v": (0, 0.4),
@@ -86,19 +89,24 @@ M_F, M_S, A_S, A_F = 68.0, 78.0, 88.0, 98.0
 
 
 class Model:
-    """The equations of docs/physics.md in NumPy. State: springs, air, plate, sensors (degC)."""
+    """The equations of docs/physics.md in NumPy. State: springs, air, a plate for each layer, sensors (degC)."""
 
-    def __init__(self, rows: int, columns: int, values: dict, on: set, modes: np.ndarray) -> None:
+    def __init__(self, shape: tuple[int, int, int], values: dict, on: set, modes: np.ndarray) -> None:
         """Take random values, the effects that are on, and how each spring is driven."""
-        self.n, self.v, self.on, self.modes = rows * columns, values, on, modes
-        row, column = np.divmod(np.arange(self.n), columns)
-        dr, dc = abs(row[:, None] - row), abs(column[:, None] - column)
+        self.layers, rows, columns = shape
+        self.n, self.v, self.on, self.modes = self.layers * rows * columns, values, on, modes
+        layer, row, column = np.unravel_index(np.arange(self.n), shape)
+        dl, dr, dc = (abs(one[:, None] - one) for one in (layer, row, column))
+        dr = dr + 99 * dl  # those of the other layer are nobody's neighbours
+        self.series = ((dl == 1) & (dr == 99) & (dc == 0)).astype(float)
+        self.of_layer = np.eye(self.layers)[layer]
+        self.scale = np.where(layer == 1, values["stiffness_coupling_scale"], 1.0)
         self.orthogonal = (dr + dc == 1).astype(float)
         self.diagonal = ((dr == 1) & (dc == 1)).astype(float)
         self.second = ((dr + dc == 2) & (dr != dc)).astype(float)
         step = [(0, 1), (1, 0), (0, -1), (-1, 0)][int(values["wake_direction"])]
         self.downstream = (  # [i, j]: i receives from j
-            (row[:, None] - row == step[0]) & (column[:, None] - column == step[1])
+            (row[:, None] - row == step[0]) & (column[:, None] - column == step[1]) & (dl == 0)
         ).astype(float)
         mismatch = "spring_mismatch" in on
         one = np.ones(self.n)
@@ -264,26 +272,30 @@ class Model:
     def slope(self, time: float, y: np.ndarray, u: np.ndarray, fan: float) -> np.ndarray:
         """Time derivative of the state."""
         n, v, on = self.n, self.v, self.on
-        t, plate, sensor = y[:n], y[n + 1], y[n + 2 :]
+        sensors = n + 1 + self.layers
+        t, plate, sensor = y[:n], y[n + 1 : sensors], y[sensors:]
         ambient = self.ambient(time)
         air = y[n] if "shared_air" in on else ambient
         x, up, down = self.phase(t)
         g_o = v["orthogonal_w_per_k"] * (1 - fan) + v["orthogonal_fan_w_per_k"] * fan
         g_d = v["diagonal_w_per_k"] * (1 - fan) + v["diagonal_fan_w_per_k"] * fan
         g_s = v["second_w_per_k"] * (1 - fan) + v["second_fan_w_per_k"] * fan
-        g = g_o * self.orthogonal + g_d * self.diagonal + g_s * self.second
+        g = self.scale[:, None] * (g_o * self.orthogonal + g_d * self.diagonal + g_s * self.second)
+        g += (v["series_w_per_k"] * (1 - fan) + v["series_fan_w_per_k"] * fan) * self.series
         given = self.loss(t, air, fan) * (t - air)
         if "fan_wake" in on:
-            given = given - v["wake_w_per_k"] * fan * (self.downstream @ t - self.downstream.sum(1) * air)
+            reached = self.downstream @ t - self.downstream.sum(1) * air
+            given = given - v["wake_w_per_k"] * fan * self.scale * reached
         q = self.power(t, x, u) + g @ t - g.sum(1) * t - given
         if "radiation" in on:
             area = v["emissivity"] * 5.670374419e-8 * v["surface_mm2"] * 1e-6
             q = q - area * ((t + 273.15) ** 4 - (ambient + 273.15) ** 4)
         out = np.zeros_like(y)
         if "plate_conduction" in on:
-            flow = v["plate_coupling_w_per_k"] * (t - plate)
+            flow = v["plate_coupling_w_per_k"] * (t - self.of_layer @ plate)
             q = q - flow
-            out[n + 1] = (flow.sum() - v["plate_loss_w_per_k"] * (plate - ambient)) / v["plate_heat_capacity_j_per_k"]
+            taken = flow @ self.of_layer - v["plate_loss_w_per_k"] * (plate - ambient)
+            out[n + 1 : sensors] = taken / v["plate_heat_capacity_j_per_k"]
         if "shared_air" in on:
             out[n] = (given.sum() - v["air_exchange_w_per_k"] * (air - ambient)) / v["air_heat_capacity_j_per_k"]
         capacity = self.capacity
@@ -291,13 +303,13 @@ class Model:
             latent = v["latent_heat_j"] * self.heavier
             capacity = capacity + np.where(q > 0, latent * up, latent * v["latent_cooling_ratio"] * down)
         out[:n] = q / capacity
-        out[n + 2 :] = (t - sensor) / v["sensor_lag_s"]
+        out[sensors:] = (t - sensor) / v["sensor_lag_s"]
         return out
 
     def seen(self, time: float, y: np.ndarray) -> np.ndarray:
         """What the sensors show (n,), degC."""
         v, ambient = self.v, self.ambient(time)
-        t = y[self.n + 2 :] if "sensor_lag" in self.on else y[: self.n]
+        t = y[self.n + 1 + self.layers :] if "sensor_lag" in self.on else y[: self.n]
         if "optical_mixing" in self.on:
             share = v["optical_orthogonal"] * self.orthogonal + v["optical_diagonal"] * self.diagonal
             t = (1 - share.sum(1)) * t + share @ t
@@ -312,7 +324,7 @@ def load(path: str) -> ctypes.CDLL:
     """Load the plant with the signatures used here."""
     lib = ctypes.CDLL(path)
     pointer, real, text, array = ctypes.c_void_p, ctypes.c_double, ctypes.c_char_p, ctypes.c_void_p
-    lib.plant_create.restype = pointer
+    lib.plant_create_layers.restype = pointer
     lib.plant_destroy.argtypes = [pointer]
     lib.plant_effect_count.restype, lib.plant_effect_name.restype = ctypes.c_size_t, text
     lib.plant_effect_name.argtypes = [ctypes.c_size_t]
@@ -329,7 +341,8 @@ def compare(lib: ctypes.CDLL, seed: int) -> tuple[float, float, str]:
     """Simulate one random network twice; largest differences of temperature and of measurement, degC."""
     rng = np.random.default_rng(seed)
     rows, columns = int(rng.integers(1, 4)), int(rng.integers(1, 4))
-    n = rows * columns
+    layers = 1 + seed % 2
+    n = layers * rows * columns
     effects = [lib.plant_effect_name(k).decode() for k in range(lib.plant_effect_count())]
     on = {e for k, e in enumerate(effects) if k == seed % len(effects) or rng.random() < 0.4}
     values: dict = {k: rng.uniform(*r) for k, r in SCALARS.items()}
@@ -345,7 +358,7 @@ def compare(lib: ctypes.CDLL, seed: int) -> tuple[float, float, str]:
     ambient = np.full(points, np.nan)
     values["supply_chopped"] = float(rng.integers(0, 2))
 
-    plant = lib.plant_create(rows, columns)
+    plant = lib.plant_create_layers(rows, columns, layers)
     for name, value in values.items():
         for k, one in enumerate(np.atleast_1d(value)):
             key = f"{name}[{k + 1}]" if np.ndim(value) else name
@@ -368,8 +381,8 @@ def compare(lib: ctypes.CDLL, seed: int) -> tuple[float, float, str]:
     assert abs(lib.plant_energy_balance_j(plant)) <= 1e-9 * lib.plant_energy_input_j(plant)
     lib.plant_destroy(plant)
 
-    model = Model(rows, columns, values, on, modes)
-    y = np.full(2 * n + 2, model.ambient(0.0))
+    model = Model((layers, rows, columns), values, on, modes)
+    y = np.full(2 * n + 1 + layers, model.ambient(0.0))
     model.turn_t[:] = y[0]
     phase_matters = bool(on & {"latent_heat", "resistance_phase", "resistance_temperature"})
     method = "RK45" if phase_matters else "Radau"  # RK45 takes the kinks of a transformation best
@@ -392,7 +405,7 @@ def compare(lib: ctypes.CDLL, seed: int) -> tuple[float, float, str]:
             args = (drive[r], fan[r])
             y = solve_ivp(model.slope, (a, b), y, method, args=args, rtol=1e-8, atol=1e-8).y[:, -1]
             model.remember(y[:n])
-    label = f"{rows} x {columns}, {method}, top {real.max():.0f} degC, {' '.join(sorted(on))}"
+    label = f"{layers} x {rows} x {columns}, {method}, top {real.max():.0f} degC, {' '.join(sorted(on))}"
     return worst[0], worst[1], label
 
 

@@ -20,6 +20,7 @@ from ninespring.errors import InputError
 from ninespring.explore import point, sweep
 from ninespring.explore.results import Results
 from ninespring.explore.spec import METRICS, Spec, read_spec
+from ninespring.models import Array
 
 distributed = pytest.importorskip("distributed", reason="SKIPPED: dask is missing: pip install 'ninespring[explore]'")
 pytest.importorskip("pyarrow", reason="SKIPPED: pyarrow is missing: pip install 'ninespring[explore]'")
@@ -228,7 +229,12 @@ def test_every_pattern_is_a_point_of_its_own(tmp_path: Path) -> None:
     spec = read_spec(path)
     given = [one["pattern"] for one in spec.all_points()]
     assert len(set(given)) == 16 and given[6] == "0110"
-    assert point.pattern_of({"pattern": "0110"}, 2, 2, np.random.default_rng(1)).tolist() == [False, True, True, False]
+    assert point.pattern_of({"pattern": "0110"}, Array(2, 2), np.random.default_rng(1)).tolist() == [
+        False,
+        True,
+        True,
+        False,
+    ]
 
 
 @pytest.mark.parametrize(
@@ -247,7 +253,7 @@ def test_every_pattern_is_a_point_of_its_own(tmp_path: Path) -> None:
         (HEAD + "[vary]\nfan = [0, 1]\n[board.2]\nsupply_limit_a = 5\n", "[board.2], but the array has 1 boards"),
         (HEAD + "[vary]\nfan = [0, 1]\n[board.1]\nsuply_limit_a = 5\n", "did you mean supply_limit_a?"),
         (HEAD + "[vary]\nfan = [0, 1]\n[board.first]\nsupply_limit_a = 5\n", "must be [board.1]"),
-        (HEAD + "[vary]\npattern = ['0101']\n", "a pattern of 4 springs for an array of 9"),
+        (HEAD + "[vary]\npattern = ['0101']\n", "pattern has 4 digits for 9 springs"),
         (HEAD + "[fixed]\nsize = 4\n[vary]\npattern = 'every'\n", "16 springs have too many patterns"),
         (HEAD + "[vary]\nsize = [2, 3]\npattern = 'every'\n", "an array of one size"),
         (HEAD + "[vary]\npitch_mm = 5\n", "belongs into [fixed]"),

@@ -26,7 +26,7 @@ static controller_settings_t *settings_of(const plant_t *plant, int board_rows, 
                                           const char *const lines[], char *message, size_t size)
 {
     const int rows = plant_rows(plant), columns = plant_columns(plant);
-    const int count = boards_count(rows, columns, board_rows, board_columns);
+    const int count = plant_layers(plant) * boards_count(rows, columns, board_rows, board_columns);
     controller_settings_t *all = calloc((size_t)count, sizeof *all);
     for (int k = 0; k < count && all != NULL; k++) {
         const boards_part_t part = boards_part(rows, columns, board_rows, board_columns, k);

@@ -23,6 +23,7 @@ from .fit.predict_command import predict, replay
 from .import_command import import_
 from .plan_command import plan
 from .plot_command import plot
+from .scenario_command import scenario
 from .verdict.command import diagnose
 
 
@@ -37,7 +38,21 @@ def cli() -> None:
     """Calibrate the thermal model of an array of NiTi springs, and say what the model lacks."""
 
 
-for command in (fit, diagnose, predict, replay, export, verify, import_, plan, plot, couplings, sweep, dashboard):
+for command in (
+    fit,
+    diagnose,
+    predict,
+    replay,
+    export,
+    verify,
+    import_,
+    plan,
+    plot,
+    couplings,
+    sweep,
+    scenario,
+    dashboard,
+):
     cli.add_command(command)
 add_board_commands(cli)
 

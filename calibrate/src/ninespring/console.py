@@ -163,13 +163,16 @@ def array_of(array: Any, runs: list[Run]) -> Any:
         raise InputError(f"the logs have {' and '.join(map(str, sorted(counts)))} springs: give logs of one array")
     if array is None:
         count = counts.pop()
+        below: dict[str, Any] | None = None
+        if runs[0].layers == 2 and count % 2 == 0:
+            count, below = count // 2, {}
         if count not in SHAPES:
             raise InputError(
                 f"{count} springs: say how they are arranged, `--array array.toml` with [array] rows and cols",
                 runs[0].name,
                 1,
             )
-        array = Array(*SHAPES[count])
+        array = Array(*SHAPES[count], stiffness=below)
     return array
 
 

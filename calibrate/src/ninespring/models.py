@@ -12,11 +12,12 @@ from pathlib import Path
 from typing import Any
 
 from . import __version__, native
-from .explore import cooling
+from .errors import InputError
+from .explore import cooling, stiffness
 from .toml_file import At, TomlFile, did_you_mean
 
 SCHEMA = "ninespring.model/1"
-TABLES = ("array", "spring", "material", "sensor")
+TABLES = ("array", "spring", "material", "sensor", "stiffness", "board")
 ERRORS = ("rmse_before_c", "rmse_after_c", "hottest_c")
 SPRING_KEYS = {
     "wire_diameter_mm": (0.01, 10.0),
@@ -36,6 +37,10 @@ MATERIAL_KEYS = {
     "austenite_finish_c": (-50.0, 200.0),
     "emissivity": (0.0, 1.0),
 }
+COUPLED = ("orthogonal_", "diagonal_", "second_", "wake_w")
+"""What the stiffness layer has times `stiffness_coupling_scale`."""
+BOARD_KEYS = {"supply_limit_a": (0.1, 60.0), "boost_current_a": (0.1, 3.2), "open_current_a": (0.0, 3.2)}
+"""Of `[board.K]`: settings of the chip, within its limits."""
 
 
 @dataclass
@@ -50,11 +55,35 @@ class Array:
     sensor: dict[str, Any] = field(default_factory=dict)
     cooling: dict[str, Any] = field(default_factory=dict)
     """What `ninespring couplings` reckons with; nothing else looks at it, and no model keeps it."""
+    stiffness: dict[str, Any] | None = None
+    """What the springs of the stiffness layer have of their own; None: there is no such layer."""
+    board: tuple[int, int] | None = None
+    """Rows and columns of springs of a board; None: all of a layer."""
+    boards: dict[int, dict[str, float]] = field(default_factory=dict)
+    """What board k (from 1) has of its own."""
+
+    @property
+    def layers(self) -> int:
+        """1, or 2 with a stiffness layer: spring k's is spring k + rows x cols."""
+        return 1 if self.stiffness is None else 2
 
     @property
     def springs(self) -> int:
-        """Number of springs."""
-        return self.rows * self.cols
+        """Number of springs, in all layers."""
+        return self.layers * self.rows * self.cols
+
+    def one_layer(self, who: str) -> None:
+        """Refuse a stiffness layer where only one is known."""
+        if self.layers > 1:
+            raise InputError(
+                f"a stiffness layer, but {who} one layer, as a board has: give that board's log, "
+                "and an array or model without [stiffness]"
+            )
+
+    @property
+    def parts(self) -> list[native.Part]:
+        """Springs of each board."""
+        return native.boards_of(self.rows, self.cols, *(self.board or (self.rows, self.cols)), self.layers)
 
 
 @dataclass
@@ -75,13 +104,66 @@ class Model:
         return f"<model of {self.array.rows} x {self.array.cols}: {effects}; {len(self.parameters)} parameters>"
 
 
+def model_of_layer(model: Model, layer: str) -> Model:
+    """Return a model of two layers as one of one layer knows it: its springs, its couplings, nothing of the other."""
+    array, which = model.array, stiffness.LAYERS.index(layer)
+    if array.stiffness is None:
+        raise InputError(f"--layer {layer}: the model has one layer", model.name)
+    own = array.stiffness if which else {}
+    out = Model(
+        Array(
+            array.rows,
+            array.cols,
+            array.pitch_mm,
+            array.spring | {key: own[key] for key in SPRING_KEYS if key in own},
+            array.material | {key: own[key] for key in stiffness.MATERIAL if key in own},
+            array.sensor,
+        ),
+        list(model.effects),
+        provenance=model.provenance,
+        name=model.name,
+    )
+    n, scale = out.array.springs, model.parameters.get("stiffness_coupling_scale", 1.0)
+    values = dict(model.parameters)
+    if which and scale != 1.0:  # what the model does not say, and the plant has
+        table = native.parameter_table()
+        values = {name: one.default for name, one in table.items() if name.startswith(COUPLED)} | values
+    for each in (False, True):  # what is said of one spring is over what is said of all
+        for full, value in values.items():
+            name, _, spring = full.partition("[")
+            if name.startswith(("series_", "stiffness_")) or bool(spring) != each:
+                continue
+            scaled = scale if which and name.startswith(COUPLED) else 1.0
+            at = int(spring[:-1]) - 1 - which * n if spring else -1
+            if spring and not 0 <= at < n:
+                continue
+            to = f"{name}[{at + 1}]" if spring else name
+            out.parameters[to] = scaled * value
+            if full in model.stderr:
+                out.stderr[to] = scaled * model.stderr[full]
+    for name in {full.partition("[")[0] for full in out.parameters if "[" in full}:
+        values = [out.parameters.get(f"{name}[{k + 1}]") for k in range(n)]
+        if values[0] is not None and len(set(values)) == 1:  # all the same: said once
+            errors = [out.stderr.pop(f"{name}[{k + 1}]", None) for k in range(n)]
+            for k in range(n):
+                del out.parameters[f"{name}[{k + 1}]"]
+            out.parameters[name] = values[0]
+            if errors[0] is not None:
+                out.stderr[name] = errors[0]
+    return out
+
+
 def _array(file: TomlFile) -> Array:
     if file.get(("array",)) is None:
         raise file.refuse("there is no [array] table; add rows and cols", ())
-    file.table(("array",), ("rows", "cols", "pitch_mm"))
+    file.table(("array",), ("rows", "cols", "pitch_mm", "board_rows", "board_cols"))
     array = Array(*(file.whole(("array", key), 1, native.MAX_SPRINGS) for key in ("rows", "cols")))
+    array.stiffness = _stiffness(file)
     if array.springs > native.MAX_SPRINGS:
-        raise file.refuse(f"{array.rows} x {array.cols} are more than {native.MAX_SPRINGS} springs", ("array", "cols"))
+        two = " in two layers" if array.layers == 2 else ""
+        said = f"{array.rows} x {array.cols}{two} are more than {native.MAX_SPRINGS} springs"
+        raise file.refuse(said, ("array", "cols"))
+    _boards(file, array)
     if file.get(("array", "pitch_mm")) is not None:
         array.pitch_mm = file.number(("array", "pitch_mm"), 0.1, 1000.0)
     for name, keys in (("spring", SPRING_KEYS), ("material", MATERIAL_KEYS)):
@@ -93,6 +175,40 @@ def _array(file: TomlFile) -> Array:
     if "noise_c" in array.sensor:
         file.number(("sensor", "noise_c"), 0.0, 50.0)
     return array
+
+
+def _stiffness(file: TomlFile) -> dict[str, Any] | None:
+    if file.get(("stiffness",)) is None:
+        return None
+    numbers = SPRING_KEYS | {key: MATERIAL_KEYS[key] for key in stiffness.MATERIAL} | stiffness.NUMBERS
+    given = dict(file.table(("stiffness",), (*numbers, *stiffness.WORDS)))
+    for key, value in given.items():
+        at = ("stiffness", key)
+        if key in numbers:
+            given[key] = file.number(at, *numbers[key])
+        elif value not in (words := stiffness.WORDS[key]):
+            has = f"{did_you_mean(str(value), words)}; it has {', '.join(words)}"
+            raise file.refuse(f"[stiffness] {key} has no '{value}'{has}", at)
+    return given
+
+
+def _boards(file: TomlFile, array: Array) -> None:
+    sizes = [key for key in ("board_rows", "board_cols") if file.get(("array", key)) is not None]
+    if len(sizes) == 1:
+        raise file.refuse("[array] board_rows and board_cols go together", ("array", sizes[0]))
+    if sizes:
+        rows, cols = (file.whole(("array", key), 1, native.BOARD_SPRINGS) for key in sizes)
+        if min(rows, array.rows) * min(cols, array.cols) > native.BOARD_SPRINGS:
+            said = f"{rows} x {cols} are more than {native.BOARD_SPRINGS} springs on a board"
+            raise file.refuse(said, ("array", "board_cols"))
+        array.board = rows, cols
+    count = len(array.parts)
+    for number in file.table(("board",), file.get(("board",)) or ()):
+        if not number.isdecimal() or not 1 <= int(number) <= count or number.startswith("0"):
+            raise file.refuse(f"[board.{number}], but the array has board 1 to {count}", ("board", number))
+        own = file.table(("board", number), BOARD_KEYS)
+        limits = {key: file.number(("board", number, key), *BOARD_KEYS[key], f"[board.{number}] {key}") for key in own}
+        array.boards[int(number)] = limits
 
 
 def _cooling(file: TomlFile) -> dict[str, Any]:
@@ -189,9 +305,12 @@ def model_text(model: Model) -> str:
     lines += ["", "[array]", f"rows = {array.rows}", f"cols = {array.cols}"]
     if array.pitch_mm is not None:
         lines.append(f"pitch_mm = {_value(array.pitch_mm)}")
-    for name in ("spring", "material", "sensor"):
-        part = getattr(array, name)
-        if part:
+    if array.board is not None:
+        lines += [f"board_rows = {array.board[0]}", f"board_cols = {array.board[1]}"]
+    tables = {name: getattr(array, name) for name in ("spring", "material", "sensor")}
+    tables |= {f"board.{number}": own for number, own in array.boards.items()}
+    for name, part in (tables | {"stiffness": array.stiffness}).items():
+        if part or (name == "stiffness" and part is not None):
             lines += ["", f"[{name}]"]
             lines += [f"{key} = {json.dumps(v) if isinstance(v, str) else _value(v)}" for key, v in part.items()]
     table = native.parameter_table()

@@ -25,7 +25,7 @@ _ERRORS = {
     -1: "no parameter or effect of that name",
     -2: "value outside its limits",
     -3: "no such spring",
-    -4: "rows x columns not in 1..1024",
+    -4: "rows x columns x layers not in 1..1024",
     -5: "out of memory",
     -6: "time step not positive, or no steady state",
 }
@@ -90,7 +90,7 @@ def library() -> ctypes.CDLL:
         "plant_parameter": (ctypes.POINTER(_Parameter), (size,)),
         "plant_effect_count": (size, ()),
         "plant_effect_name": (text, (size,)),
-        "plant_create": (pointer, (integer, integer)),
+        "plant_create_layers": (pointer, (integer, integer, integer)),
         "plant_destroy": (None, (pointer,)),
         "plant_copy": (pointer, (pointer,)),
         "plant_set": (integer, (pointer, text, real)),
@@ -170,17 +170,17 @@ def _pointer(array: np.ndarray | None) -> object:
 class Plant:
     """One simulated array. Not for two threads at once; make a `copy` for each."""
 
-    def __init__(self, rows: int, cols: int) -> None:
+    def __init__(self, rows: int, cols: int, layers: int = 1) -> None:
         self._lib = library()
-        self.rows, self.cols = rows, cols
-        self._plant = self._lib.plant_create(rows, cols)
+        self.rows, self.cols, self.layers = rows, cols, layers
+        self._plant = self._lib.plant_create_layers(rows, cols, layers)
         if not self._plant:
-            raise NativeError(-4, f"{rows} x {cols} springs")
+            raise NativeError(-4, f"{rows} x {cols}{' x 2' if layers == 2 else ''} springs")
 
     @property
     def springs(self) -> int:
-        """Number of springs."""
-        return self.rows * self.cols
+        """Number of springs, in all layers."""
+        return self.layers * self.rows * self.cols
 
     def __del__(self) -> None:
         if getattr(self, "_plant", None):
@@ -190,7 +190,7 @@ class Plant:
     def copy(self) -> Plant:
         """Return an independent plant in the same state."""
         twin = object.__new__(Plant)
-        twin._lib, twin.rows, twin.cols = self._lib, self.rows, self.cols
+        twin._lib, twin.rows, twin.cols, twin.layers = self._lib, self.rows, self.cols, self.layers
         twin._plant = self._lib.plant_copy(self._plant)
         if not twin._plant:
             raise NativeError(-5, "copy of a plant")
@@ -376,13 +376,14 @@ def _chip(refusal: str, function: str, *arguments: object) -> str:
 
 
 Part = tuple[int, int, int, int]
-"""Springs of a board: its first row and column (0-based) in the array, its rows and columns."""
+"""Springs of a board: its first row (counted on through the layers) and column, 0-based, its rows and columns."""
 
 
-def boards_of(rows: int, cols: int, board_rows: int, board_cols: int) -> list[Part]:
+def boards_of(rows: int, cols: int, board_rows: int, board_cols: int, layers: int = 1) -> list[Part]:
     """Return the boards into which an array is cut, as sim_host/loop/boards.h numbers them."""
     return [
-        (row, col, min(board_rows, rows - row), min(board_cols, cols - col))
+        (layer * rows + row, col, min(board_rows, rows - row), min(board_cols, cols - col))
+        for layer in range(layers)
         for row in range(0, rows, board_rows)
         for col in range(0, cols, board_cols)
     ]
@@ -398,7 +399,7 @@ def chip_export(plant: Plant, part: Part | None = None) -> tuple[str, str]:
         "the model does not fit the chip:",
         "chip_export",
         ctypes.c_void_p(plant._plant),
-        *(part or (0, 0, plant.rows, plant.cols)),
+        *(part or (0, 0, plant.layers * plant.rows, plant.cols)),
         text,
         ctypes.c_size_t(len(text)),
     )
@@ -473,7 +474,7 @@ def chip_run(
     `board`: rows and columns of springs of one board; `lines`: console lines of each (`boards_of`).
     Return true temperatures (degC) and austenite, (rows, springs), and of each second heat (W) and current (A) of all.
     """
-    if len(lines) != len(boards_of(plant.rows, plant.cols, *board)):
+    if len(lines) != len(boards_of(plant.rows, plant.cols, *board, plant.layers)):
         raise ValueError("lines of every board")
     temperature, austenite = np.empty((rows, plant.springs)), np.empty((rows, plant.springs))
     power, current = np.empty(rows), np.empty(rows)

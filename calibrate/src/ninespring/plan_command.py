@@ -70,6 +70,7 @@ def plan(
 
     check_folder(output)
     array = read_array(array_path) if array_path else Array()
+    array.one_layer("a plan is for")
     head = []
     duration = duration or (1800.0 if board_alone else 900.0)
     current = current or (2.6 if board_alone else 2.0)

@@ -22,15 +22,19 @@ Examples:
   ninespring plot run1.csv -o run1.png
   ninespring plot run1.csv --model diagnosis/model.toml -o run1.svg
   ninespring plot run1.csv -o run1.gif
+  ninespring plot run1.csv --at 240 -o array.png
 """,
 )
 @click.argument("log", type=FILE)
 @click.option("--model", "model_path", type=FILE, help="model.toml: what it makes of the log, dashed")
 @ARRAY
+@click.option("--at", "at_s", type=click.FloatRange(0.0), help="s: the array at that time instead, spring by spring")
 @click.option("-o", "--output", type=FILE, required=True, help="picture: .png, .svg, .pdf; .gif: the array in motion")
-def plot(log: Path, model_path: Path | None, array_path: Path | None, output: Path) -> None:
+def plot(log: Path, model_path: Path | None, array_path: Path | None, at_s: float | None, output: Path) -> None:
     """Draw a log: each spring's temperature (degC) and what it was given."""
     kind = output.suffix.lower()
+    if kind == ".gif" and at_s is not None:
+        raise InputError("--at is one picture: .png, .svg or .pdf", output)
     if kind not in PICTURES:
         raise InputError(f"'{kind}' is none of {', '.join(PICTURES)}", output)
     check_folder(output)
@@ -43,9 +47,14 @@ def plot(log: Path, model_path: Path | None, array_path: Path | None, output: Pa
     notes_of([run])
     with working("drawing"), tempfile.TemporaryDirectory(dir=output.parent, prefix=".plot-") as folder:
         made = Path(folder) / f"picture{kind}"
-        if kind == ".gif":
+        if kind == ".gif" or at_s is not None:
             array = array_of(array, [run])
+        if array is not None:
+            run.layers = array.layers
+        if kind == ".gif":
             plotting.animate(run, array.rows, array.cols, made)
+        elif at_s is not None:
+            plotting.map_at(run, array.rows, array.cols, at_s).savefig(made, dpi=150)
         else:
             plotting.figure(run, predict(model, run) if model else None).savefig(made, dpi=150)
         made.replace(output.resolve())

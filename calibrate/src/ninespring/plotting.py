@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib import animation
+from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from .explore.stiffness import LAYERS
 from .logs import Run, read_table
 
 UNIT = {"power": "power, W", "current": "current, A", "command": "command"}
@@ -35,14 +38,35 @@ def shown(run: Run) -> tuple[np.ndarray, str]:
     return (run.temperature_c, "measured") if chip is None else (chip, "the chip's model")
 
 
+def layers_of(run: Run) -> list[tuple[str, range]]:
+    """Return the run's layers: their names ('' where there is one), and their springs."""
+    n = run.springs // run.layers
+    names = LAYERS if run.layers == 2 else ("",)
+    return [(name, range(k * n, (k + 1) * n)) for k, name in enumerate(names)]
+
+
 def figure(run: Run, predicted: np.ndarray | None = None) -> Figure:
-    """Return a figure: temperatures (n, k) and `predicted` ones dashed, below them what each spring was given."""
-    out = Figure(figsize=(10, 6), layout="constrained")
+    """Return a figure: temperatures (n, k) and `predicted` ones dashed, below them what each spring was given.
+
+    Two layers are drawn side by side.
+    """
+    out = Figure(figsize=(10 if run.layers == 1 else 15, 6), layout="constrained")
     FigureCanvasAgg(out)
-    top, bottom = out.subplots(2, 1, sharex=True, height_ratios=[2, 1])
-    colors = mpl.colormaps["viridis"](np.linspace(0.0, 0.9, run.springs))
+    layers = layers_of(run)
+    axes = out.subplots(2, len(layers), sharex=True, sharey="row", height_ratios=[2, 1], squeeze=False)
+    for (name, springs), (top, bottom) in zip(layers, axes.T, strict=True):
+        _draw(run, springs, predicted, top, bottom)
+        if name:
+            top.set_title(name)
+    fan = " (shaded: fan)" if (run.fan > 0).any() else ""
+    out.suptitle(Path(run.name).name + fan, x=0.01, ha="left")
+    return out
+
+
+def _draw(run: Run, springs: range, predicted: np.ndarray | None, top: Axes, bottom: Axes) -> None:
+    colors = mpl.colormaps["viridis"](np.linspace(0.0, 0.9, len(springs)))
     temperature, what = shown(run)
-    for k, color in enumerate(colors):
+    for k, color in zip(springs, colors, strict=True):
         top.plot(run.time_s, temperature[:, k], color=color, linewidth=1.0, label=f"{k + 1}")
         if predicted is not None:
             top.plot(run.time_s, predicted[:, k], color=color, linewidth=1.0, linestyle="--")
@@ -58,33 +82,48 @@ def figure(run: Run, predicted: np.ndarray | None = None) -> Figure:
             axes.fill_between(
                 run.time_s, 0, 1, where=run.fan > 0, step="post", alpha=0.08, transform=axes.get_xaxis_transform()
             )
-    top.legend(title="spring", loc="upper left", bbox_to_anchor=(1.0, 1.0), ncols=1 + (run.springs - 1) // 12)
-    top.set_title(Path(run.name).name + (" (shaded: fan)" if (run.fan > 0).any() else ""), loc="left")
+    top.legend(title="spring", loc="upper left", bbox_to_anchor=(1.0, 1.0), ncols=1 + (len(springs) - 1) // 12)
+
+
+def _map(run: Run, rows: int, cols: int) -> tuple[Figure, Callable[[int], None]]:
+    """Return a figure of the array, layers side by side, and what draws a row of the run into it."""
+    temperature, what = shown(run)
+    layers = layers_of(run)
+    out = Figure(figsize=(1.2 * cols * len(layers) + 1.5, 1.2 * rows + 0.8), layout="constrained")
+    FigureCanvasAgg(out)
+    axes = out.subplots(1, len(layers), squeeze=False)[0]
+    low, high = float(np.nanmin(temperature)), float(np.nanmax(temperature))
+    pictures, words = [], []
+    for at, (name, springs) in zip(axes, layers, strict=True):
+        colours = {"cmap": "inferno", "vmin": min(low, 20.0), "vmax": max(high, 60.0)}
+        pictures.append(at.imshow(temperature[0, springs].reshape(rows, cols), **colours))
+        at.set_xticks(range(cols), [])
+        at.set_yticks(range(rows), [])
+        at.set_xlabel(name)
+        for k in range(len(springs)):
+            words.append(at.text(k % cols, k // cols, "", ha="center", va="center", color="white", fontsize=9))
+    out.colorbar(pictures[0], ax=list(axes), label=f"{what}, degC")
+
+    def draw(row: int) -> None:
+        axes[0].set_title(f"{run.time_s[row]:.0f} s", loc="left")
+        for picture, (_, springs) in zip(pictures, layers, strict=True):
+            picture.set_data(temperature[row, springs].reshape(rows, cols))
+        for k, one in enumerate(words):
+            one.set_text(f"{k + 1}: {temperature[row, k]:.0f}")
+            one.set_fontweight("bold" if run.drive[row, k] > 0 else "normal")
+
+    return out, draw
+
+
+def map_at(run: Run, rows: int, cols: int, time_s: float) -> Figure:
+    """Return the array at a time, s: the row of the run that is nearest; driven springs in bold."""
+    out, draw = _map(run, rows, cols)
+    draw(int(np.abs(run.time_s - time_s).argmin()))
     return out
 
 
 def animate(run: Run, rows: int, cols: int, path: Path) -> None:
     """Write an animation (GIF) of the array's temperatures."""
-    temperature, what = shown(run)
     pick = np.unique(np.linspace(0, len(run.time_s) - 1, min(FRAMES, len(run.time_s))).astype(int))
-    out = Figure(figsize=(1.2 * cols + 1.5, 1.2 * rows + 0.8), layout="constrained")
-    FigureCanvasAgg(out)
-    axes = out.subplots()
-    low, high = float(np.nanmin(temperature)), float(np.nanmax(temperature))
-    picture = axes.imshow(temperature[0].reshape(rows, cols), cmap="inferno", vmin=min(low, 20.0), vmax=max(high, 60.0))
-    out.colorbar(picture, label=f"{what}, degC")
-    axes.set_xticks(range(cols), [])
-    axes.set_yticks(range(rows), [])
-    words = [
-        axes.text(k % cols, k // cols, "", ha="center", va="center", color="white", fontsize=9)
-        for k in range(run.springs)
-    ]
-
-    def draw(row: int) -> None:
-        picture.set_data(temperature[row].reshape(rows, cols))
-        axes.set_title(f"{run.time_s[row]:.0f} s", loc="left")
-        for k, one in enumerate(words):
-            one.set_text(f"{k + 1}: {temperature[row, k]:.0f}")
-            one.set_fontweight("bold" if run.drive[row, k] > 0 else "normal")
-
+    out, draw = _map(run, rows, cols)
     animation.FuncAnimation(out, draw, frames=list(pick), blit=False).save(path, writer=animation.PillowWriter(fps=10))

@@ -78,6 +78,7 @@ def dashboard(
         run = read_log(replay, array.springs if array else None, temperatures=False)
         notes_of([run])
         array = array_of(array, [run])
+        array.one_layer("the dashboard shows")
         source = ReplaySource(run, array.rows, array.cols, model, speed)
     else:
         if simulate:

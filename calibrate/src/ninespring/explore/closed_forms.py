@@ -13,9 +13,10 @@ import numpy as np
 
 from ..models import Array
 from . import correlations as by
+from . import stiffness
 from .cooling import MATERIALS, Cooling
 from .field import MM, PLATE_EMISSIVITY, PLATE_RISE_K, Film, Mesh, build, film_of
-from .geometry import Geometry, spring_of
+from .geometry import Below, Geometry, spring_of
 from .mesh import plan_mesh
 from .modes import Solver
 
@@ -29,9 +30,7 @@ def _answers(geometry: Geometry, mesh: Mesh, film: Film, right: np.ndarray) -> n
     """Return the springs' mean steady rise, for powers in them; no radiation."""
     mesh = replace(mesh, along=1)  # along the axis nothing changes, or a parabola: one quadratic element has it
     field = build(geometry, False, mesh, film)
-    return (
-        field.spring.T @ Solver(field.conductance, field.capacity, 0.0).solve(0.0, field.spring @ right[:, None])[:, 0]
-    )
+    return field.spring.T @ Solver(field).solve(0.0, field.spring @ right[:, None])[:, 0]
 
 
 def two_cylinders(mesh: Mesh) -> tuple[float, float]:
@@ -94,9 +93,30 @@ def spring_alone(mesh: Mesh, fan: bool = True) -> tuple[float, float]:
     return 1.0 / float(rise[0]), film.convection_w_per_m2k * area
 
 
+def two_rods(mesh: Mesh, joint_diameter_mm: float = 2.0) -> tuple[float, float]:
+    """Return W/K between the means of two equal springs joined end to end: stiffness.series_w_per_k.
+
+    The air gives up all heat within a fifth of a millimetre, so that none goes along in it; what a spring loses is found
+    by heating both, and both sides' walls are insulated. The joint is so short that what it loses itself does not count.
+    """
+    around = Cooling(plate="none", margin_mm=2.0)
+    spring = spring_of(Array(), around)
+    steel, gap_mm = MATERIALS["steel"], 0.002
+    below = Below(spring, gap_mm, steel, joint_diameter_mm)
+    geometry = Geometry(1, 1, 5.0, spring, around, below=below)
+    mesh = replace(mesh, along=mesh.corners // 4)  # a spring is nine times as long as what the joint cools of it
+    field = build(geometry, False, mesh, Film(0.0, 0.005, 2e-4))
+    answers = field.spring.T @ Solver(field).solve(0.0, field.spring)
+    both, apart = (1.0 / (answers[0, 0] + sign * answers[0, 1]) for sign in (1, -1))
+    along = spring.along_w_per_mk * math.pi * spring.radius_mm**2 / spring.length_mm * MM
+    joint = steel.conductivity * math.pi / 4.0 * joint_diameter_mm**2 / gap_mm * MM
+    return (apart - both) / 2.0, stiffness.series_w_per_k(both, along, joint)
+
+
 PROBLEMS: dict[str, Callable[[Mesh], tuple[float, float]]] = {
     "two parallel cylinders": two_cylinders,
     "a cylinder and a plane": cylinder_and_plane,
     "a plate as a fin": plate_as_fin,
     "a spring alone, blown": spring_alone,
+    "two rods end to end": two_rods,
 }

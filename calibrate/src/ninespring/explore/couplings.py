@@ -82,22 +82,27 @@ def model_of(array: Array, whole: Geometry, part: Geometry, lumped: Lumped, mesh
         for name in ("plate_heat_capacity_j_per_k", "plate_loss_w_per_k"):
             values[name] *= larger
     effects = [name for name, key in (("plate_conduction", "plate_coupling_w_per_k"),) if key in values]
+    if array.stiffness and array.stiffness.get("transformation_shift_k"):
+        effects.append("transformation_shift")
     if values["edge_loss_fraction"]:
         effects.append("edge_loss")
     if values.get("wake_w_per_k"):
         effects.append("fan_wake")
         values["wake_direction"] = float(DIRECTIONS.index(whole.cooling.fan_direction))
     if "loss_fan_w_per_k" not in values:
-        for name in ("loss", "orthogonal", "diagonal", "second"):
-            values[f"{name}_fan_w_per_k"] = values[f"{name}_w_per_k"]
+        for name in ("loss", "orthogonal", "diagonal", "second", "series", "stiffness_loss"):
+            if f"{name}_w_per_k" in values:
+                values[f"{name}_fan_w_per_k"] = values[f"{name}_w_per_k"]
     table = native.parameter_table()
-    kept = {name: value for name, value in values.items() if table[name].effect in (None, *effects)}
-    errors = {
-        name: float(np.hypot(lumped.reduction.get(name, 0.0), mesh_error.get(name, 0.0)))
-        for name in kept
-        if name in lumped.reduction
-    }
-    shape = Array(whole.rows, whole.cols, array.pitch_mm, array.spring, array.material, array.sensor)
+    error_of = {name: float(np.hypot(error, mesh_error.get(name, 0.0))) for name, error in lumped.reduction.items()}
+    kept, errors = {}, {}
+    for found, value in values.items():
+        for name in names_of(found, whole):
+            if table[name.partition("[")[0]].effect in (None, *effects):
+                kept[name] = value
+                if found in error_of:
+                    errors[name] = error_of[found]
+    shape = replace(array, rows=whole.rows, cols=whole.cols, cooling={})
     note = (
         f"from geometry by a field solution (ninespring couplings): springs alone in still air at "
         f"{whole.cooling.surface_c:g} degC; no measurement went in"
@@ -105,9 +110,17 @@ def model_of(array: Array, whole: Geometry, part: Geometry, lumped: Lumped, mesh
     return Model(shape, effects, kept, errors, {"note": note})
 
 
+def names_of(found: str, whole: Geometry) -> list[str]:
+    """Return the plant's names for a number of the network: what the stiffness layer has of its own, by its springs."""
+    if not found.startswith("stiffness_") or found in native.parameter_table():
+        return [found]
+    n = whole.rows * whole.cols
+    return [f"{found.removeprefix('stiffness_')}[{n + k + 1}]" for k in range(n)]
+
+
 def plate_area(geometry: Geometry) -> float:
     """Return mm2."""
-    side = 2 * (geometry.cooling.margin_mm + geometry.spring.radius_mm)
+    side = 2 * (geometry.cooling.margin_mm + geometry.radii_mm[-1])
     return ((geometry.cols - 1) * geometry.pitch_mm + side) * ((geometry.rows - 1) * geometry.pitch_mm + side)
 
 
@@ -127,7 +140,7 @@ def random_drive(springs: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
 
 def plant_of(model: Model) -> native.Plant:
     """Return the plant of a model, linear: no latent heat."""
-    plant = native.Plant(model.array.rows, model.array.cols)
+    plant = native.Plant(model.array.rows, model.array.cols, model.array.layers)
     plant.set_effects(model.effects)
     plant.set_all(model.parameters)
     plant.reset()
@@ -136,7 +149,7 @@ def plant_of(model: Model) -> native.Plant:
 
 def drive_error(geometry: Geometry, model: Model, still: Modes, blown: Modes | None, seed: int = 1) -> float:
     """Return rms of network less field over rms of the field's rise, worst of still and blown."""
-    time_s, power = random_drive(geometry.rows * geometry.cols, seed)
+    time_s, power = random_drive(geometry.count, seed)
     worst = 0.0
     for fan, modes in ((0.0, still), (1.0, blown)):
         if modes is None:

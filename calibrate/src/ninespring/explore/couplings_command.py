@@ -60,17 +60,18 @@ def couplings(array_path: Path, mesh: str, output: Path, json_path: Path | None)
 
     with working("meshing") as say:
         found = find(array, mesh, say)
-    table = found.model.parameters
-    units = {name: one["unit"] for name, one in _parameters(found).items()}
     shown = Table("number", "value", "reduction", "mesh", "unit")
-    for name, value in table.items():
-        if name in found.lumped.reduction:
+    seen: set[str] = set()
+    for full, one in _parameters(found).items():
+        name = _found(full)
+        if name in found.lumped.reduction and name not in seen:
+            seen.add(name)
             shown.add_row(
                 name,
-                f"{value:.4g}",
-                f"{found.lumped.reduction[name]:.1g}",
-                f"{found.mesh_error.get(name, 0.0):.1g}",
-                units[name],
+                f"{one['value']:.4g}",
+                f"{one['reduction_error']:.1g}",
+                f"{one['mesh_error'] or 0.0:.1g}",
+                one["unit"],
             )
     talk = beside(output)
     talk.print(shown)
@@ -84,6 +85,13 @@ def couplings(array_path: Path, mesh: str, output: Path, json_path: Path | None)
         f"field: {part.rows} x {part.cols} springs, {found.still.unknowns} unknowns; heat in less heat out "
         f"{100 * max(found.still.balance, found.blown.balance if found.blown else 0.0):.1g} %",
     ]
+    if part.below:
+        lines.insert(
+            1,
+            f"[stiffness] springs: {part.below.spring.spacing_mm:.3g} mm from turn to turn, like a cylinder of "
+            f"{2 * part.below.spring.radius_mm:.3g} mm; between the two of a taxel, from the field: "
+            f"{1e3 * found.pairs.series:.3f} mW/K",
+        )
     for line in lines:
         talk.print(line, soft_wrap=True, markup=False)
     result = result_of(
@@ -102,15 +110,21 @@ def couplings(array_path: Path, mesh: str, output: Path, json_path: Path | None)
         talk.print(f"-> {output}", soft_wrap=True, markup=False)
 
 
+def _found(full: str) -> str:
+    """Return what the network calls a parameter of the model: those of single springs are the stiffness layer's."""
+    name, _, of_one = full.partition("[")
+    return f"stiffness_{name}" if of_one else name
+
+
 def _parameters(found: object) -> dict[str, dict[str, object]]:
     from ..native import parameter_table
 
     return {
         name: {
             "value": value,
-            "unit": parameter_table()[name].unit,
-            "reduction_error": found.lumped.reduction.get(name),
-            "mesh_error": found.mesh_error.get(name),
+            "unit": parameter_table()[name.partition("[")[0]].unit,
+            "reduction_error": found.lumped.reduction.get(_found(name)),
+            "mesh_error": found.mesh_error.get(_found(name)),
         }
         for name, value in found.model.parameters.items()
     }

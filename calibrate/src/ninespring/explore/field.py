@@ -17,7 +17,7 @@ from scipy import optimize, sparse, special
 from . import correlations as by
 from .cooling import MATERIALS
 from .geometry import Geometry
-from .mesh import Box, plan_mesh
+from .mesh import Box, plan_mesh, within
 
 MM = 1e-3
 RADIAL_W_PER_MK = 18.0
@@ -66,12 +66,12 @@ class Film:
         return self.air_w_per_mk / self.lambda_m**2
 
 
-def film_of(geometry: Geometry, fan: bool) -> Film:
-    """Return the film around one spring, the air still or blown."""
-    spring, cooling = geometry.spring, geometry.cooling
-    radius = spring.radius_mm * MM
+def film_of(geometry: Geometry, fan: bool, layer: int = 0) -> Film:
+    """Return the film around one spring, the air still or blown. What rises along a taxel rises from plate to plate."""
+    cooling = geometry.cooling
+    radius = geometry.springs[layer].radius_mm * MM
     surface, air = cooling.surface_c, geometry.ambient_c
-    h = by.natural_upright_cylinder(2 * radius, spring.length_mm * MM, surface, air)
+    h = by.natural_upright_cylinder(2 * radius, geometry.height_mm * MM, surface, air)
     if fan:
         h = by.mixed(h, by.cross_flow_cylinder(2 * radius, cooling.fan_m_per_s, surface, air))
     k = by.air_conductivity(0.5 * (surface + air))
@@ -96,8 +96,12 @@ class Layer:
     elements: int
     air: Region
     wall: Region
-    spring: Region
-    holds_springs: bool
+    core: Region
+    """Within the smallest spring's circle."""
+    ring: Region
+    """From there to the largest's, where layers differ."""
+    holds: int | None = None
+    """Whose springs, 0 elongation, 1 stiffness."""
     graded: int = 0
     """1: the elements are small at the lower end, -1 at the upper."""
 
@@ -114,8 +118,8 @@ class Field:
     """(unknowns, springs): heat that a cell's air gives its stream is taken.T @ (T - stream)."""
     radiated: np.ndarray
     """(springs, springs), W/K: what springs radiate to each other and to the room, linear in their mean temperatures."""
-    flow_w_per_k: float
-    """Heat that the stream carries per K, one lane; inf where the air stands."""
+    flow_w_per_k: list[float]
+    """Heat that the stream carries per K, of each lane; empty where the air stands."""
     lanes: list[list[int]]
     """Springs in the order in which the stream meets them."""
     outer: np.ndarray
@@ -124,19 +128,22 @@ class Field:
     """(unknowns,): W/K from the air to the room, where no cell's stream takes it up."""
     place: np.ndarray
     """(unknowns, 3): where each unknown is, m: east, north, up from the lower face."""
+    levels: int
+    """Heights at each place of the plan: unknown k is at height k % levels."""
     unknowns: int = field(init=False)
 
     def __post_init__(self) -> None:
         self.unknowns = self.conductance.shape[0]
 
 
-def _layers(geometry: Geometry, film: Film, mesh: Mesh) -> tuple[list[Layer], bool]:
+def _layers(geometry: Geometry, films: list[Film], mesh: Mesh) -> tuple[list[Layer], bool]:
     """Return slices from the lower face up, and whether they are one half of the height, the other being its mirror."""
     spring, cooling = geometry.spring, geometry.cooling
     heat = by.air_heat_per_m3k(0.5 * (cooling.surface_c + geometry.ambient_c))
-    air = Region(film.air_w_per_mk, film.air_w_per_mk, heat, film.sink_w_per_m3k)
-    coil = Region(RADIAL_W_PER_MK, spring.along_w_per_mk, spring.heat_per_m3k)
-    solid = air
+    airs = [Region(one.air_w_per_mk, one.air_w_per_mk, heat, one.sink_w_per_m3k) for one in films]
+    coils = [Region(RADIAL_W_PER_MK, one.along_w_per_mk, one.heat_per_m3k) for one in geometry.springs]
+    air, coil = airs[0], coils[0]
+    solid = None
     if cooling.baffle != "none":
         made = MATERIALS[cooling.baffle]
         solid = Region(made.conductivity, made.conductivity, made.heat_per_m3k)
@@ -146,13 +153,37 @@ def _layers(geometry: Geometry, film: Film, mesh: Mesh) -> tuple[list[Layer], bo
     if cooling.plate != "none":
         made = MATERIALS[cooling.plate]
         one = Region(made.conductivity, made.conductivity, made.heat_per_m3k)
-        plates = [Layer(cooling.plate_thickness_mm * MM, mesh.plate, one, one, one, False)]
-    if cooling.baffle == "none" or height >= 2 * half * (1 - 1e-9):
-        return [*plates, Layer(half, mesh.along, air, solid, coil, True, 1)], True
+        plates = [Layer(cooling.plate_thickness_mm * MM, mesh.plate, one, one, one, one)]
+    if geometry.below is not None:
+        below, smallest = geometry.below, geometry.radii_mm[0]
+        share = (below.joint_diameter_mm / (2 * smallest)) ** 2
+        made = below.joint
+        crimp = Region(made.conductivity, share * made.conductivity, share * made.heat_per_m3k)
+        stack = []
+        for layer in (1, 0):  # from below
+            one = geometry.springs[layer]
+            ring = coils[layer] if one.radius_mm == geometry.radii_mm[-1] else airs[layer]
+            for graded in (1, -1):
+                stack.append(
+                    Layer(
+                        one.length_mm * MM / 2.0,
+                        mesh.along,
+                        airs[layer],
+                        solid or airs[layer],
+                        coils[layer],
+                        ring,
+                        layer,
+                        graded,
+                    )
+                )
+        stack.insert(2, Layer(below.gap_mm * MM, 1, air, solid or air, crimp, air))
+        return [*plates, *stack, *plates], False
+    if solid is None or height >= 2 * half * (1 - 1e-9):
+        return [*plates, Layer(half, mesh.along, air, solid or air, coil, coil, 0, 1)], True
     low = max(1, round(2 * mesh.along * height / (2 * half)))
     gap = [
-        Layer(height, low, air, solid, coil, True, 1),
-        Layer(2 * half - height, max(2, 2 * mesh.along - low), air, air, coil, True, -1),
+        Layer(height, low, air, solid, coil, coil, 0, 1),
+        Layer(2 * half - height, max(2, 2 * mesh.along - low), air, air, coil, coil, 0, -1),
     ]
     return [*plates, *gap, *plates], False
 
@@ -222,17 +253,16 @@ def radiation_of(geometry: Geometry) -> np.ndarray:
 
     Grey and weakly coupled (emissivity times view, no second reflections); a wall between counts as the room.
     """
-    spring = geometry.spring
-    area = 2 * math.pi * spring.radius_mm * spring.length_mm * MM**2
-    whole = area * by.radiation(spring.emissivity, geometry.cooling.surface_c, geometry.ambient_c)
-    view = spring.emissivity * by.view_of_neighbour(2 * spring.radius_mm, geometry.pitch_mm)
     n = geometry.rows * geometry.cols
-    out = whole * np.eye(n)
-    if geometry.cooling.baffle == "none":
-        for i in range(n):
-            for j in range(n):
-                if abs(i // geometry.cols - j // geometry.cols) + abs(i % geometry.cols - j % geometry.cols) == 1:
-                    out[i, j] = -whole * view
+    out = np.zeros((geometry.count, geometry.count))
+    row, col = np.divmod(np.arange(n), geometry.cols)
+    beside = np.abs(row[:, None] - row) + np.abs(col[:, None] - col) == 1
+    for layer, spring in enumerate(geometry.springs):
+        area = 2 * math.pi * spring.radius_mm * spring.length_mm * MM**2
+        whole = area * by.radiation(spring.emissivity, geometry.cooling.surface_c, geometry.ambient_c)
+        view = spring.emissivity * by.view_of_neighbour(2 * spring.radius_mm, geometry.pitch_mm)
+        seen = view if geometry.cooling.baffle == "none" else 0.0
+        out[layer * n : (layer + 1) * n, layer * n : (layer + 1) * n] = whole * (np.eye(n) - seen * beside)
     return out
 
 
@@ -241,16 +271,19 @@ def build(geometry: Geometry, fan: bool, mesh: Mesh, film: Film | None = None) -
     from skfem import Basis, ElementTriP2
     from skfem.models.poisson import laplace, mass
 
-    cooling, pitch, radius = geometry.cooling, geometry.pitch_mm * MM, geometry.spring.radius_mm * MM
-    film = film or film_of(geometry, fan)
+    cooling, pitch = geometry.cooling, geometry.pitch_mm * MM
+    radius, inner = geometry.radii_mm[-1] * MM, geometry.radii_mm[0] * MM
+    films = [film or film_of(geometry, fan, layer) for layer in range(len(geometry.springs))]
     centres, margin = centres_of(geometry), cooling.margin_mm * MM + radius
     box = (*(centres.min(axis=0) - margin), *(centres.max(axis=0) + margin))
     box = (box[0], box[1], box[2], box[3])
     walls = walls_of(geometry)
-    plan = plan_mesh(box, [tuple(one) for one in centres], radius, walls, mesh.corners)
+    plan = plan_mesh(
+        box, [tuple(one) for one in centres], radius, walls, mesh.corners, inner if inner < radius else None
+    )
     at = plan.p[:, plan.t].mean(axis=1)  # (2, triangles)
-    far = np.hypot(at[0, :, None] - centres[:, 0], at[1, :, None] - centres[:, 1])
-    owner, inside = far.argmin(axis=1), far.min(axis=1) < radius
+    owner = np.hypot(at[0, :, None] - centres[:, 0], at[1, :, None] - centres[:, 1]).argmin(axis=1)
+    inside, core = (within(*(at - centres[owner].T), one, mesh.corners) for one in (radius, inner))
     wall = np.zeros(at.shape[1], dtype=bool)
     for x0, y0, x1, y1 in walls:
         wall |= (at[0] > x0) & (at[0] < x1) & (at[1] > y0) & (at[1] < y1)
@@ -262,23 +295,25 @@ def build(geometry: Geometry, fan: bool, mesh: Mesh, film: Film | None = None) -
         return laplace.assemble(basis), mass.assemble(basis)
 
     n = len(centres)
-    regions = {"spring": parts(inside), "air": parts(~inside & ~wall)}
-    if wall.any():
-        regions["wall"] = parts(wall)
+    places = {"core": core, "ring": inside & ~core, "air": ~inside & ~wall, "wall": wall}
+    regions = {name: parts(where) for name, where in places.items() if where.any()}
     ones = np.ones(regions["air"][1].shape[0])
-    in_spring = np.array([parts(inside & (owner == j))[1] @ ones for j in range(n)]).T
-    in_cell = np.array([parts(cell & (owner == j))[1] @ ones for j in range(n)]).T
 
-    layers, mirrored = _layers(geometry, film, mesh)
+    def of_each(where: np.ndarray) -> np.ndarray:
+        return np.array([parts(where & (owner == j))[1] @ ones for j in range(n)]).T
+
+    in_core, in_cell = of_each(core), of_each(cell)
+    in_ring = of_each(inside & ~core) if "ring" in regions else np.zeros_like(in_core)
+
+    layers, mirrored = _layers(geometry, films, mesh)
     times = 2.0 if mirrored else 1.0
     heights, lines = _line(layers)
     levels = len(heights)
     stiff = capacity = None
-    spring, taken = np.zeros((len(ones) * levels, n)), np.zeros((len(ones) * levels, n))
+    spring, taken = (np.zeros((len(ones) * levels, geometry.count)) for _ in range(2))
     freed = np.zeros(len(spring))
-    free = regions["air"][1] @ ones - (in_cell.sum(axis=1) if fan else 0.0)
     for layer, (k1, m1) in zip(layers, lines, strict=True):
-        parts_of = {"spring": layer.spring, "air": layer.air, "wall": layer.wall}
+        parts_of = {"core": layer.core, "ring": layer.ring, "air": layer.air, "wall": layer.wall}
         across = sum(parts_of[name].across * regions[name][0] for name in regions)
         sink = sum(parts_of[name].sink * regions[name][1] for name in regions)
         along = sum(parts_of[name].along * regions[name][1] for name in regions)
@@ -288,10 +323,15 @@ def build(geometry: Geometry, fan: bool, mesh: Mesh, film: Film | None = None) -
         here = sparse.kron(heat, m1)
         capacity = here if capacity is None else capacity + here
         weight = np.asarray(m1.sum(axis=1)).ravel()
+        # air between a small spring's circle and a large one's is its cell's, too
+        airs, coil = (in_cell + in_ring, in_core) if layer.ring.sink else (in_cell, in_core + in_ring)
+        free = regions["air"][1] @ ones + (in_ring.sum(axis=1) if layer.ring.sink else 0.0)
+        if layer.holds is not None:
+            its = slice(layer.holds * n, (layer.holds + 1) * n)
+            spring[:, its] += np.kron(coil, weight[:, None])
+            taken[:, its] += layer.air.sink * np.kron(airs, weight[:, None])
+            free = free - (airs.sum(axis=1) if fan else 0.0)
         freed += layer.air.sink * np.kron(free, weight)
-        if layer.holds_springs:
-            spring += np.kron(in_spring, weight[:, None])
-            taken += layer.air.sink * np.kron(in_cell, weight[:, None])
     # both outer faces of the plates give heat to the room
     plan_mass = sum(one[1] for one in regions.values())
     outer = np.zeros(len(spring))
@@ -305,18 +345,20 @@ def build(geometry: Geometry, fan: bool, mesh: Mesh, film: Film | None = None) -
             stiff = stiff + h * sparse.kron(plan_mass, face)
             outer += h * np.kron(np.asarray(plan_mass.sum(axis=1)).ravel(), face.diagonal())
     stiff, capacity = times * sparse.csc_matrix(stiff), times * sparse.csc_matrix(capacity)
-    flow = math.inf
-    if fan:
+    lanes, flows = [], []
+    for layer, one in enumerate(geometry.springs):
         heat = by.air_heat_per_m3k(geometry.ambient_c)
-        flow = heat * cooling.fan_m_per_s * pitch * geometry.spring.length_mm * MM
+        for lane in lanes_of(geometry.rows, geometry.cols, cooling.fan_direction):
+            lanes.append([layer * n + j for j in lane])
+            flows.append(heat * cooling.fan_m_per_s * pitch * one.length_mm * MM)
     return Field(
         stiff,
         capacity,
         spring / spring.sum(axis=0),
         times * taken,
         radiation_of(geometry),
-        flow,
-        lanes_of(geometry.rows, geometry.cols, cooling.fan_direction),
+        flows if fan else [],
+        lanes,
         times * outer,
         times * freed,
         np.hstack(
@@ -325,4 +367,5 @@ def build(geometry: Geometry, fan: bool, mesh: Mesh, film: Film | None = None) -
                 np.tile(heights, len(ones))[:, None],
             ]
         ),
+        levels,
     )

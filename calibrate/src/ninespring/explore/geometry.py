@@ -14,8 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import InputError
-from ..models import Array
-from .cooling import Cooling, cooling_of
+from ..models import SPRING_KEYS, Array
+from . import stiffness
+from .cooling import MATERIALS, Cooling, Material, cooling_of
 
 SLOWEST_M_PER_S = 0.05
 NITI_CONDUCTIVITY = 18.0
@@ -65,8 +66,18 @@ class Spring:
 
 
 @dataclass(frozen=True)
+class Below:
+    """The stiffness layer: its springs, and the joint by which each hangs at the one above."""
+
+    spring: Spring
+    gap_mm: float
+    joint: Material
+    joint_diameter_mm: float
+
+
+@dataclass(frozen=True)
 class Geometry:
-    """An array of equal springs, as the field solution needs it."""
+    """An array of springs that are equal within a layer, as the field solution needs it."""
 
     rows: int
     cols: int
@@ -74,6 +85,27 @@ class Geometry:
     spring: Spring
     cooling: Cooling
     ambient_c: float = 20.0
+    below: Below | None = None
+
+    @property
+    def springs(self) -> tuple[Spring, ...]:
+        """One of each layer."""
+        return (self.spring,) if self.below is None else (self.spring, self.below.spring)
+
+    @property
+    def count(self) -> int:
+        """Springs of all layers."""
+        return len(self.springs) * self.rows * self.cols
+
+    @property
+    def height_mm(self) -> float:
+        """From plate to plate."""
+        return sum(one.length_mm for one in self.springs) + (self.below.gap_mm if self.below else 0.0)
+
+    @property
+    def radii_mm(self) -> tuple[float, ...]:
+        """Of the smooth cylinders, the smaller first: one where both layers have the same."""
+        return tuple(sorted({one.radius_mm for one in self.springs}))
 
 
 def spring_of(array: Array, cooling: Cooling) -> Spring:
@@ -103,24 +135,17 @@ def spring_of(array: Array, cooling: Cooling) -> Spring:
 def geometry_of(array: Array, rows: int | None = None, cols: int | None = None) -> Geometry:
     """Return an array's geometry, of as many springs as asked; what cannot exist is refused by its numbers."""
     cooling = cooling_of(array.cooling)
-    spring = spring_of(array, cooling)
+    springs = {"": spring_of(array, cooling)}
+    below = None
+    if array.stiffness is not None:
+        below = below_of(array)
+        springs["[stiffness] "] = below.spring
+        if cooling.baffle_height_mm:
+            raise InputError("baffle_height_mm: with a stiffness layer walls go from plate to plate; leave it out")
     if array.pitch_mm is None:
         raise InputError("[array] is without pitch_mm: the couplings follow from it")
-    if array.pitch_mm <= spring.outer_mm:
-        raise InputError(
-            f"coils overlap: {spring.coil_mm:g} mm mean coil + {spring.wire_mm:g} mm wire are {spring.outer_mm:g} mm, "
-            f"the pitch is {array.pitch_mm:g} mm (if {spring.coil_mm:g} mm is the OUTER diameter, "
-            f"write coil_diameter_mm = {spring.coil_mm - spring.wire_mm:g})"
-        )
-    if cooling.baffle != "none" and cooling.baffle_thickness_mm >= array.pitch_mm - spring.outer_mm:
-        raise InputError(
-            f"a wall of {cooling.baffle_thickness_mm:g} mm does not fit between coils that are "
-            f"{array.pitch_mm - spring.outer_mm:.3g} mm apart"
-        )
-    if cooling.baffle_height_mm and cooling.baffle_height_mm > spring.length_mm:
-        raise InputError(
-            f"baffle_height_mm is {cooling.baffle_height_mm:g}, the plates are {spring.length_mm:.4g} mm apart"
-        )
+    for where, spring in springs.items():
+        check_room(array.pitch_mm, where, spring, cooling)
     if 0.0 < cooling.fan_m_per_s < SLOWEST_M_PER_S:
         raise InputError(
             f"fan_m_per_s is {cooling.fan_m_per_s:g}: below {SLOWEST_M_PER_S:g} the springs move the air themselves; "
@@ -128,7 +153,49 @@ def geometry_of(array: Array, rows: int | None = None, cols: int | None = None) 
         )
     if cooling.baffle != "none" and cooling.plate == "none":
         raise InputError("baffles stand on plates: plate must not be none")
-    return Geometry(rows or array.rows, cols or array.cols, array.pitch_mm, spring, cooling)
+    return Geometry(rows or array.rows, cols or array.cols, array.pitch_mm, springs[""], cooling, below=below)
+
+
+def below_of(array: Array) -> Below:
+    """Return the stiffness layer; where `[stiffness]` says nothing, its springs are those above."""
+    given = stiffness.with_defaults(array.stiffness or {})
+    own = Array(
+        array.rows,
+        array.cols,
+        array.pitch_mm,
+        array.spring | {key: given[key] for key in SPRING_KEYS if key in given},
+        array.material | {key: given[key] for key in stiffness.MATERIAL if key in given},
+    )
+    wound = {"wire_diameter_mm", "coil_diameter_mm", "turns"} & set(given)
+    if wound and "wire_length_mm" not in given:
+        own.spring.pop("wire_length_mm", None)  # it is the length of the spring above
+    cooling = Cooling()
+    if "spring_length_mm" in given or not wound:
+        cooling = Cooling(spring_length_mm=given.get("spring_length_mm", array.cooling.get("spring_length_mm")))
+    try:
+        spring = spring_of(own, cooling)
+    except InputError as error:
+        raise InputError(f"[stiffness] {error.message}") from None
+    return Below(spring, given["gap_mm"], MATERIALS[given["joint"]], given["joint_diameter_mm"])
+
+
+def check_room(pitch_mm: float, where: str, spring: Spring, cooling: Cooling) -> None:
+    """Refuse what overlaps."""
+    if pitch_mm <= spring.outer_mm:
+        raise InputError(
+            f"{where}coils overlap: {spring.coil_mm:g} mm mean coil + {spring.wire_mm:g} mm wire are {spring.outer_mm:g} mm, "
+            f"the pitch is {pitch_mm:g} mm (if {spring.coil_mm:g} mm is the OUTER diameter, "
+            f"write coil_diameter_mm = {spring.coil_mm - spring.wire_mm:g})"
+        )
+    if cooling.baffle != "none" and cooling.baffle_thickness_mm >= pitch_mm - spring.outer_mm:
+        raise InputError(
+            f"{where}a wall of {cooling.baffle_thickness_mm:g} mm does not fit between coils that are "
+            f"{pitch_mm - spring.outer_mm:.3g} mm apart"
+        )
+    if cooling.baffle_height_mm and cooling.baffle_height_mm > spring.length_mm:
+        raise InputError(
+            f"baffle_height_mm is {cooling.baffle_height_mm:g}, the plates are {spring.length_mm:.4g} mm apart"
+        )
 
 
 @functools.cache

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import optimize
 
+from ..models import COUPLED
 from .cooling import DIRECTIONS
 from .geometry import Geometry
 from .modes import Modes
@@ -26,6 +27,15 @@ STILL = (
 )
 PLATE = ("plate_coupling_w_per_k", "plate_heat_capacity_j_per_k", "plate_loss_w_per_k")
 FAN = ("loss_fan_w_per_k", "orthogonal_fan_w_per_k", "diagonal_fan_w_per_k", "second_fan_w_per_k", "wake_w_per_k")
+BELOW = (
+    "stiffness_loss_w_per_k",
+    "stiffness_heat_capacity_j_per_k",
+    "stiffness_coupling_scale",
+    "series_w_per_k",
+)
+BELOW_PLATE = ("stiffness_plate_coupling_w_per_k",)
+BELOW_FAN = ("stiffness_loss_fan_w_per_k", "series_fan_w_per_k")
+"""Of the stiffness layer. What begins with `stiffness_` and is not the scale, the plant has for each of its springs."""
 OFF_ZERO = 1e-9
 """Numbers that cannot be negative begin above zero: their logarithm is fitted."""
 
@@ -40,30 +50,37 @@ class Pairs:
     diagonal: float
     second: float
     """Between springs two apart in a row or column."""
+    series: float
+    """Between the two springs of a taxel; 0 where there is one layer."""
 
 
 def pairs_of(modes: Modes, rows: int, cols: int) -> Pairs:
-    """Return means over all pairs of a kind (both ways: a stream makes them unequal)."""
+    """Return means over all pairs of a kind (both ways: a stream makes them unequal), those of the elongation layer."""
     between = -np.linalg.inv(modes.response())
-    row, col = np.divmod(np.arange(rows * cols), cols)
+    n = rows * cols
+    loss, series = -between.sum(axis=1), between[:n, n:]
+    row, col = np.divmod(np.arange(n), cols)
     down, along = np.abs(row[:, None] - row), np.abs(col[:, None] - col)
+    between = between[:n, :n]
 
     def mean(wanted: np.ndarray) -> float:
         return float(between[wanted].mean()) if wanted.any() else 0.0
 
     return Pairs(
-        -between.sum(axis=1),
+        loss,
         mean(down + along == 1),
         mean((down == 1) & (along == 1)),
         mean((down + along == 2) & ((down == 0) | (along == 0))),
+        float(np.diag(series).mean()) if series.size else 0.0,
     )
 
 
 class Network:
     """The plant's network as matrices, for one shape."""
 
-    def __init__(self, rows: int, cols: int, direction: str) -> None:
+    def __init__(self, rows: int, cols: int, direction: str, layers: int = 1) -> None:
         self.n = n = rows * cols
+        self.layers = layers
         row, col = np.divmod(np.arange(n), cols)
         down, along = row[:, None] - row, col[:, None] - col
         self.orthogonal = _laplacian(np.abs(down) + np.abs(along) == 1)
@@ -77,6 +94,24 @@ class Network:
 
     def response(self, values: dict[str, float], fan: bool, rate_per_s: float) -> np.ndarray:
         """Return K per W, (springs, springs)."""
+        one = self._layer(values, fan, rate_per_s)
+        if self.layers == 1:
+            return np.linalg.inv(one)[: self.n, : self.n]
+        own = {key.removeprefix("stiffness_"): value for key, value in values.items() if key.startswith("stiffness_")}
+        scale = own.pop("coupling_scale")
+        own |= {key: scale * value for key, value in values.items() if key.startswith(COUPLED)}
+        size, series = len(one), values["series_fan_w_per_k" if fan else "series_w_per_k"]
+        both = np.zeros((2 * size, 2 * size))
+        both[:size, :size], both[size:, size:] = one, self._layer(values | own, fan, rate_per_s)
+        above = np.arange(self.n)
+        below = above + size
+        both[above, above] += series
+        both[below, below] += series
+        both[above, below] = both[below, above] = -series
+        springs = np.concatenate([above, below])
+        return np.linalg.inv(both)[np.ix_(springs, springs)]
+
+    def _layer(self, values: dict[str, float], fan: bool, rate_per_s: float) -> np.ndarray:
         name = "_fan_w_per_k" if fan else "_w_per_k"
         n, plate = self.n, "plate_coupling_w_per_k" in values
         matrix = np.zeros((n + plate,) * 2)
@@ -94,7 +129,7 @@ class Network:
             matrix[n, n] = (
                 n * to_plate + values["plate_loss_w_per_k"] + rate_per_s * values["plate_heat_capacity_j_per_k"]
             )
-        return np.linalg.inv(matrix)[:n, :n]
+        return matrix
 
 
 def _laplacian(near: np.ndarray) -> np.ndarray:
@@ -114,20 +149,26 @@ class Lumped:
 
 def lumped_of(geometry: Geometry, still: Modes, blown: Modes | None) -> Lumped:
     """Fit the network to the field."""
-    network = Network(geometry.rows, geometry.cols, geometry.cooling.fan_direction)
+    layers = len(geometry.springs)
+    network = Network(geometry.rows, geometry.cols, geometry.cooling.fan_direction, layers)
     names = list(STILL)
     if geometry.cooling.plate != "none":
         names += PLATE
     if blown is not None:
         names += FAN
+    if layers == 2:
+        names += [*BELOW, *(BELOW_PLATE if geometry.cooling.plate != "none" else ())]
+        names += BELOW_FAN if blown is not None else ()
     alone = network.n == 1
     if alone:
-        names = [one for one in names if not one.startswith(("edge", "orthogonal", "diagonal", "second", "wake"))]
+        names = [one for one in names if not one.startswith(("edge", "stiffness_coupling", *COUPLED))]
     elif min(geometry.rows, geometry.cols) == 1:
         names = [one for one in names if not one.startswith("diagonal")]
     if max(geometry.rows, geometry.cols) < 3:
         names = [one for one in names if not one.startswith("second")]
     fixed = dict.fromkeys((*STILL, *(FAN if blown is not None else ())), 0.0)
+    if layers == 2:
+        fixed["stiffness_coupling_scale"] = 1.0
     if blown is not None:
         # a free side gives off as many watts more with the fan as without
         still_w, blown_w = (pairs_of(one, geometry.rows, geometry.cols).loss.min() for one in (still, blown))
@@ -184,6 +225,12 @@ def _start(geometry: Geometry, still: Modes, blown: Modes | None) -> dict[str, f
         "plate_heat_capacity_j_per_k": max(0.1, 2 * area * geometry.cooling.plate_thickness_mm * 1e-3 * 1.75e6 / 3),
         "plate_loss_w_per_k": 2 * area * 10.0,
     }
+    if geometry.below is not None:
+        out["stiffness_coupling_scale"] = geometry.below.spring.length_mm / geometry.spring.length_mm
+        out["series_w_per_k"] = max(pairs.series, 1e-6)
+        own = {"heat_capacity_j_per_k": geometry.below.spring.heat_capacity_j_per_k}
+        shown = ("loss_w_per_k", "plate_coupling_w_per_k")
+        out |= {f"stiffness_{key}": value for key, value in ({key: out[key] for key in shown} | own).items()}
     if blown is not None:
         windy = pairs_of(blown, geometry.rows, geometry.cols)
         out |= {
@@ -192,5 +239,7 @@ def _start(geometry: Geometry, still: Modes, blown: Modes | None) -> dict[str, f
             "diagonal_fan_w_per_k": max(windy.diagonal, 1e-6),
             "second_fan_w_per_k": max(windy.second, 1e-6),
             "wake_w_per_k": 0.3 * max(windy.orthogonal, 1e-6),
+            "stiffness_loss_fan_w_per_k": 0.8 * float(windy.loss.min()),
+            "series_fan_w_per_k": max(windy.series, 1e-6),
         }
     return out

@@ -5,6 +5,7 @@ Circles are polygons of the same area: a conductor's outside depends on that, an
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -53,6 +54,13 @@ def same_area(radius: float, corners: int) -> float:
     return radius * math.sqrt(2 * math.pi / corners / math.sin(2 * math.pi / corners))
 
 
+def within(east: np.ndarray, north: np.ndarray, radius: float, corners: int) -> np.ndarray:
+    """Tell which places, from its centre, are in the polygon that stands for a circle in `plan_mesh`."""
+    half = math.pi / corners
+    edge = same_area(radius, corners) * math.cos(half) / np.cos(np.arctan2(north, east) % (2 * half) - half)
+    return np.hypot(east, north) < edge
+
+
 def _size(gmsh: Any, centres: Sequence[Point], near: float, far: float, from_m: float, to_m: float) -> None:
     points = [gmsh.model.occ.addPoint(x, y, 0.0) for x, y in centres]
     gmsh.model.occ.synchronize()
@@ -70,14 +78,16 @@ def _size(gmsh: Any, centres: Sequence[Point], near: float, far: float, from_m: 
     gmsh.model.mesh.field.setAsBackgroundMesh(size)
 
 
-def plan_mesh(box: Box, centres: Sequence[Point], radius: float, walls: Sequence[Box], corners: int) -> Any:
-    """Return triangles that follow circles of so many corners, and walls, in a box."""
+def plan_mesh(
+    box: Box, centres: Sequence[Point], radius: float, walls: Sequence[Box], corners: int, inner: float | None = None
+) -> Any:
+    """Return triangles that follow circles of so many corners, and walls, in a box; `inner`: of a smaller circle in each."""
     with _gmsh() as gmsh:
         occ = gmsh.model.occ
         body = [(2, occ.addRectangle(box[0], box[1], 0.0, box[2] - box[0], box[3] - box[1]))]
         parts = []
-        reach = same_area(radius, corners)
-        for x, y in centres:
+        reaches = [same_area(one, corners) for one in (radius, inner) if one is not None]
+        for (x, y), reach in itertools.product(centres, reaches):
             points = [
                 occ.addPoint(
                     x + reach * math.cos(2 * math.pi * k / corners),
@@ -91,7 +101,7 @@ def plan_mesh(box: Box, centres: Sequence[Point], radius: float, walls: Sequence
         parts += [(2, occ.addRectangle(x0, y0, 0.0, x1 - x0, y1 - y0)) for x0, y0, x1, y1 in walls]
         if parts:
             occ.fragment(body, parts)
-        near = 2 * math.pi * radius / corners * 1.2
+        near = 2 * math.pi * (inner or radius) / corners * 1.2
         far = (box[2] - box[0] + box[3] - box[1]) / 20.0
         _size(gmsh, centres, near, max(far, near), 1.2 * radius, 1.2 * radius + 12 * (max(far, near) - near))
         return _triangles(gmsh)

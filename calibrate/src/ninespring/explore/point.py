@@ -14,7 +14,7 @@ from .. import native
 from ..errors import InputError, WorkError
 from ..fit.simulate import array_parameters
 from ..models import Array
-from .spec import METRICS, Spec, array_of_point, board_of_point
+from .spec import METRICS, Spec, array_of_point, board_of_point, patterns_of
 
 STARTED = 0.95
 """Austenite from which a driven spring has moved."""
@@ -37,7 +37,7 @@ def _field(described: str, mesh: str) -> tuple[tuple[str, ...], dict[str, float]
 def plant_of_point(spec: Spec, point: Mapping[str, Any]) -> native.Plant:
     """Return the plant as it is declared."""
     array = array_of_point(point)
-    plant = native.Plant(array.rows, array.cols)
+    plant = native.Plant(array.rows, array.cols, array.layers)
     plant.set("ambient_c", float(point.get("ambient_c", 20.0)))
     effects: tuple[str, ...] = ()
     if spec.couplings == "law":
@@ -46,6 +46,7 @@ def plant_of_point(spec: Spec, point: Mapping[str, Any]) -> native.Plant:
     else:
         described = {"rows": array.rows, "cols": array.cols, "pitch_mm": array.pitch_mm}
         described |= {"spring": array.spring, "material": array.material, "cooling": array.cooling}
+        described |= {"stiffness": array.stiffness}
         plant.set_all(array_parameters(array))
         effects, parameters = _field(json.dumps(described, sort_keys=True), spec.mesh)
         plant.set_all(parameters)
@@ -66,15 +67,19 @@ def real_of(plant: native.Plant, point: Mapping[str, Any], rng: np.random.Genera
     for k in range(plant.springs):
         for row, name in enumerate(("loss_scale", "heat_capacity_scale", "resistance_scale")):
             real.set(f"{name}[{k + 1}]", float(np.clip(1.0 + tolerance * drawn[row, k], 0.3, 3.0)))
-        real.set(f"transformation_shift_k[{k + 1}]", float(np.clip(spread_k * drawn[3, k], -40.0, 40.0)))
+        shift_k = plant.get(f"transformation_shift_k[{k + 1}]") + spread_k * drawn[3, k]
+        real.set(f"transformation_shift_k[{k + 1}]", float(np.clip(shift_k, -40.0, 40.0)))
     return real
 
 
-def pattern_of(point: Mapping[str, Any], rows: int, cols: int, rng: np.random.Generator) -> np.ndarray:
+def pattern_of(point: Mapping[str, Any], array: Array, rng: np.random.Generator) -> np.ndarray:
     """Return which springs are driven, (springs,)."""
+    return np.concatenate([_layer_pattern(one, array.rows, array.cols, rng) for one in patterns_of(point, array)])
+
+
+def _layer_pattern(wanted: str, rows: int, cols: int, rng: np.random.Generator) -> np.ndarray:
     row, col = np.divmod(np.arange(rows * cols), cols)
     middle = (row == rows // 2) & (col == cols // 2)
-    wanted = point.get("pattern", "all_but_middle")
     if wanted[0] in "01":
         return np.array([one == "1" for one in wanted])
     if wanted == "random":
@@ -83,7 +88,7 @@ def pattern_of(point: Mapping[str, Any], rows: int, cols: int, rng: np.random.Ge
         return (row + col) % 2 == 0
     if wanted == "middle" or (wanted == "all_but_middle" and rows * cols == 1):
         return middle
-    return ~middle if wanted == "all_but_middle" else np.ones(rows * cols, dtype=bool)
+    return ~middle if wanted == "all_but_middle" else np.full(rows * cols, wanted == "all")
 
 
 def settings_of(point: Mapping[str, Any]) -> str:
@@ -111,14 +116,15 @@ def metrics_of(spec: Spec, point: dict[str, Any], seed: int) -> dict[str, float]
     """Run a point by its seed; return its metrics (UNITS in spec.py)."""
     rng = np.random.default_rng(seed)
     declared = plant_of_point(spec, point)
-    board = board_of_point(point, array_of_point(point))
+    array = array_of_point(point)
+    board = board_of_point(point, array)
     lines = [
         native.chip_export(declared, part)[0] + settings_of(point | spec.boards.get(number, {}))
-        for number, part in enumerate(native.boards_of(declared.rows, declared.cols, *board), 1)
+        for number, part in enumerate(native.boards_of(array.rows, array.cols, *board, array.layers), 1)
     ]
     real = real_of(declared, point, rng)
     real.reset()
-    pattern = pattern_of(point, real.rows, real.cols, rng)
+    pattern = pattern_of(point, array, rng)
     fan = float(point.get("fan", 0.0))
     on = spec.on_s
     t, x, power, current = native.chip_run(real, board, lines, list(pattern), fan, seed, spec.duration_s, on)

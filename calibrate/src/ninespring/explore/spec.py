@@ -19,11 +19,12 @@ from .. import native
 from ..errors import InputError
 from ..logs import read_bytes
 from ..models import MATERIAL_KEYS, SPRING_KEYS, Array
+from ..pattern import pattern_of
 from ..toml_file import TomlFile, did_you_mean
-from . import cooling
+from . import cooling, stiffness
 
 METHODS = ("grid", "latin", "sobol", "saltelli", "optimise")
-PATTERNS = ("all", "all_but_middle", "middle", "checkerboard", "random")
+PATTERNS = ("all", "all_but_middle", "middle", "checkerboard", "random", "none")
 EVERY = "every"
 """[vary] pattern: all patterns of an array of at most EVERY_SPRINGS."""
 EVERY_SPRINGS = 12
@@ -33,6 +34,7 @@ OWN: dict[str, tuple[Any, float, float]] = {
     "rows": (3, 1, native.MAX_SPRINGS),
     "cols": (3, 1, native.MAX_SPRINGS),
     "size": (0, 0, 32),
+    "layers": (1, 1, 2),
     "board_rows": (8, 1, native.BOARD_SPRINGS),
     "board_cols": (8, 1, native.BOARD_SPRINGS),
     "pitch_mm": (5.0, 1.0, 100.0),
@@ -45,11 +47,18 @@ OWN: dict[str, tuple[Any, float, float]] = {
     "transformation_spread_k": (0.0, 0.0, 20.0),
 }
 """Key: what it is where nothing is said, and its limits. `size` n is rows = cols = n."""
+BELOW = SPRING_KEYS | {key: MATERIAL_KEYS[key] for key in stiffness.MATERIAL} | stiffness.NUMBERS
+STIFFNESS = {f"stiffness_{key}": key for key in (*BELOW, *stiffness.WORDS)}
+"""Key: that of `[stiffness]` in array.toml."""
 LIMITS: dict[str, tuple[float, float]] = (
-    {key: (low, high) for key, (_, low, high) in OWN.items()} | SPRING_KEYS | MATERIAL_KEYS | cooling.NUMBERS
+    {key: (low, high) for key, (_, low, high) in OWN.items()}
+    | SPRING_KEYS
+    | MATERIAL_KEYS
+    | cooling.NUMBERS
+    | {f"stiffness_{key}": limits for key, limits in BELOW.items()}
 )
-WORDS = {"policy": POLICIES, "pattern": PATTERNS, **cooling.WORDS}
-WHOLE = ("rows", "cols", "size", "board_rows", "board_cols")
+WORDS = {"policy": POLICIES, "pattern": PATTERNS, **cooling.WORDS, "stiffness_joint": stiffness.WORDS["joint"]}
+WHOLE = ("rows", "cols", "size", "layers", "board_rows", "board_cols")
 KEYS = (*LIMITS, *WORDS)
 BOARD_KEYS = ("policy", "supply_limit_a", "boost_current_a", "open_current_a")
 SWEEP_KEYS = ("method", "points", "seed", "duration_s", "on_s", "couplings", "mesh")
@@ -157,14 +166,28 @@ def array_of_point(point: Mapping[str, Any]) -> Array:
         {key: point[key] for key in MATERIAL_KEYS if key in point},
         {},
         {key: point[key] for key in cooling.KEYS if key in point},
+        {key: point[full] for full, key in STIFFNESS.items() if full in point} if point.get("layers") == 2 else None,
     )
 
 
 def board_of_point(point: Mapping[str, Any], array: Array) -> tuple[int, int]:
     """Return rows and columns of springs of a board: all, where nothing is said and they are few enough."""
-    if "board_rows" not in point and "board_cols" not in point and array.springs <= native.BOARD_SPRINGS:
+    if "board_rows" not in point and "board_cols" not in point and array.rows * array.cols <= native.BOARD_SPRINGS:
         return array.rows, array.cols
     return int(point.get("board_rows", 8)), int(point.get("board_cols", 8))
+
+
+def patterns_of(point: Mapping[str, Any], array: Array) -> list[str]:
+    """Return a word, or 0 and 1 for each spring, of each layer (of two: elongation/stiffness); checked."""
+    given = str(point.get("pattern", "all_but_middle" if array.layers == 1 else "all_but_middle/none"))
+    parts = given.split("/")
+    if len(parts) == array.layers and set(parts) <= set(PATTERNS):
+        return parts
+    if len(parts) != array.layers:
+        pattern_of(given, array)  # refuses it
+    digits = ["0" * (array.rows * array.cols) if part in PATTERNS else part for part in parts]
+    pattern_of("/".join(digits), array)
+    return parts
 
 
 def check_point(point: Mapping[str, Any]) -> None:
@@ -172,9 +195,9 @@ def check_point(point: Mapping[str, Any]) -> None:
     from .geometry import geometry_of
 
     array = array_of_point(point)
-    pattern = str(point.get("pattern", ""))
-    if pattern[:1] in ("0", "1") and len(pattern) != array.springs:
-        raise InputError(f"a pattern of {len(pattern)} springs for an array of {array.springs}")
+    patterns_of(point, array)
+    if array.layers == 1 and (below := sorted(set(STIFFNESS) & set(point))):
+        raise InputError(f"{below[0]}, but layers is not 2")
     if array.springs > native.MAX_SPRINGS:
         raise InputError(f"{array.rows} x {array.cols} are more than {native.MAX_SPRINGS} springs")
     board_rows, board_cols = board_of_point(point, array)
@@ -214,7 +237,10 @@ class _Reader:
         return value
 
     def value(self, key: str, value: Any) -> Any:
-        if key == "pattern" and isinstance(value, str) and value and not set(value) - {"0", "1"}:
+        if key == "pattern" and isinstance(value, str) and value.count("/") <= 1:
+            for part in value.split("/"):
+                if not part or set(part) - {"0", "1"}:
+                    self.word(part, PATTERNS, key)
             return value
         if key in WORDS:
             return self.word(value, WORDS[key], key)
@@ -228,12 +254,14 @@ class _Reader:
         return part
 
     def every_pattern(self, fixed: Mapping[str, Any], vary: Mapping[str, Any]) -> Axis:
-        if {"rows", "cols", "size"} & set(vary):
+        if {"rows", "cols", "size", "layers"} & set(vary):
             raise self.refuse(f'pattern = "{EVERY}" wants an array of one size', EVERY)
-        springs = array_of_point(fixed).springs
+        array = array_of_point(fixed)
+        springs, cut = array.springs, array.rows * array.cols
         if springs > EVERY_SPRINGS:
             raise self.refuse(f"{springs} springs have too many patterns: at most {EVERY_SPRINGS} springs", EVERY)
-        return Axis("pattern", [f"{k:0{springs}b}" for k in range(2**springs)])
+        every = [f"{k:0{springs}b}" for k in range(2**springs)]
+        return Axis("pattern", every if array.layers == 1 else [f"{one[:cut]}/{one[cut:]}" for one in every])
 
     def axis(self, key: str, given: Any, method: str) -> Axis:
         if isinstance(given, list):
@@ -303,7 +331,7 @@ class _Reader:
         if {"size", "rows"} <= {*fixed, *vary} or {"size", "cols"} <= {*fixed, *vary}:
             raise self.refuse("size stands for rows and cols: give one or the other", "size")
         if spec.couplings == "law":
-            for key in (*SPRING_KEYS, *cooling.KEYS):
+            for key in (*SPRING_KEYS, *cooling.KEYS, *STIFFNESS):
                 if key in fixed or key in vary:
                     raise self.refuse(f'{key}: the paper\'s law knows only pitch and fan; couplings = "field"', key)
         spec.boards = self.boards()
@@ -364,7 +392,7 @@ def read_spec(path: Path) -> Spec:
         try:
             check_point(point)
             array = array_of_point(point)
-            boards = len(native.boards_of(array.rows, array.cols, *board_of_point(point, array)))
+            boards = len(native.boards_of(array.rows, array.cols, *board_of_point(point, array), array.layers))
             if spec.boards and max(spec.boards) > boards:
                 raise InputError(f"[board.{max(spec.boards)}], but the array has {boards} boards")
         except InputError as error:

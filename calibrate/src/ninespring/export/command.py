@@ -11,7 +11,9 @@ import numpy as np
 
 from ..console import FILE, JSON, MODEL, Command, beside, checked, logs_of, notes_of, out, result_of, working, write
 from ..errors import InputError, WorkError
+from ..explore.stiffness import LAYERS
 from ..logs import check_folder, read_bytes, read_log, sha256_of
+from ..models import Model
 
 CHIP = click.option(
     "--chip",
@@ -19,6 +21,20 @@ CHIP = click.option(
     type=FILE,
     help="what the board has now, the lines that `$$` prints; left out: the firmware's defaults",
 )
+LAYER = click.option(
+    "--layer", type=click.Choice(LAYERS), help="of a model with a stiffness layer: whose board it is, a board for each"
+)
+
+
+def _model(path: Path, layer: str | None) -> Model:
+    from ..models import model_of_layer, read_model
+
+    model = read_model(path)
+    if layer:
+        return model_of_layer(model, layer)
+    if model.array.layers > 1:
+        raise InputError("a stiffness layer, and a board is of one: say --layer elongation or --layer stiffness", path)
+    return model
 
 
 def _chip_lines(path: Path | None) -> str:
@@ -42,9 +58,12 @@ Examples:
 @MODEL
 @click.option("-o", "--output", type=FILE, required=True, help="console lines to write, `$name=value`; - prints them")
 @CHIP
+@LAYER
 @click.option("--force", is_flag=True, help="write even settings that drive worse than the board's own")
 @JSON
-def export(model_path: Path, output: Path, chip_path: Path | None, force: bool, json_path: Path | None) -> None:
+def export(
+    model_path: Path, output: Path, chip_path: Path | None, layer: str | None, force: bool, json_path: Path | None
+) -> None:
     """Write the console lines that put a model into the chip.
 
     Only what the logs determined is written: the rest stays as the chip has it, and the file says which and why. Before
@@ -52,12 +71,11 @@ def export(model_path: Path, output: Path, chip_path: Path | None, force: bool, 
     limit worse are refused.
     """
     from .. import effects
-    from ..models import read_model
     from .drive import compare
     from .settings import settings_of
 
     check_folder(output, json_path)
-    model = read_model(model_path)
+    model = _model(model_path, layer)
     made = settings_of(model)
     left = {e: effects.WHY_NOT_ON_CHIP[e] for e in model.effects if e in effects.WHY_NOT_ON_CHIP}
     old = _chip_lines(chip_path)
@@ -110,6 +128,7 @@ Examples:
 @click.argument("log", type=FILE)
 @MODEL
 @CHIP
+@LAYER
 @click.option("--port", help="serial port of the board: what it has now is the 'before'")
 @click.option("--report", "report_path", type=FILE, help="report.html of the diagnosis: put before and after into it")
 @JSON
@@ -117,6 +136,7 @@ def verify(
     log: Path,
     model_path: Path,
     chip_path: Path | None,
+    layer: str | None,
     port: str | None,
     report_path: Path | None,
     json_path: Path | None,
@@ -127,7 +147,6 @@ def verify(
     of the model over them.
     """
     from ..fit.predict import predict_by_chip
-    from ..models import read_model
     from ..report.verified import with_verification
     from .settings import settings_of
 
@@ -137,7 +156,7 @@ def verify(
         raise InputError("is no report of `ninespring diagnose`", report_path)
     if port and chip_path:
         raise InputError("give either --port or --chip: what the board has now")
-    model = read_model(model_path)
+    model = _model(model_path, layer)
     shape = f"{model_path.name} is of {model.array.rows} x {model.array.cols}"
     run = read_log(log, model.array.springs, why=shape)
     if any(one.get("sha256") == run.sha256 for one in model.provenance.get("logs", [])):

@@ -15,7 +15,7 @@ from .simulate import array_parameters, simulate_run
 
 def plant_of(model: Model) -> native.Plant:
     """Return the plant that a model.toml describes."""
-    plant = native.Plant(model.array.rows, model.array.cols)
+    plant = native.Plant(model.array.rows, model.array.cols, model.array.layers)
     plant.set_all(array_parameters(model.array))
     plant.set_effects(model.effects)
     plant.set_all(model.parameters)

@@ -57,6 +57,7 @@ class Problem:
     """Runs to be explained by an array. Holds what does not depend on the model."""
 
     def __init__(self, array: Array, runs: Sequence[Run], declared: Mapping[str, float] | None = None) -> None:
+        array.one_layer("fit and diagnose know")
         self.array = array
         self.runs = list(runs)
         self.declared = dict(declared or {})

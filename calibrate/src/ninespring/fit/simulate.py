@@ -8,8 +8,18 @@ from collections.abc import Mapping
 import numpy as np
 
 from .. import native
+from ..explore import stiffness
 from ..logs.run import Run
-from ..models import Array
+from ..models import SPRING_KEYS, Array
+
+EACH = (
+    "heat_capacity_j_per_k",
+    "latent_heat_j",
+    "resistance_martensite_ohm",
+    "resistance_austenite_ohm",
+    "resistance_ohm",
+)
+"""What each spring has of its own by wire, coil and material."""
 
 
 def started(
@@ -79,6 +89,20 @@ def simulate_run(
 
 def array_parameters(array: Array) -> dict[str, float]:
     """Return the plant's parameters that follow from array.toml: the host tools' rules (docs/files.md)."""
+    out = _layer_parameters(array)
+    own = array.stiffness or {}
+    spring = array.spring | {key: own[key] for key in SPRING_KEYS if key in own}
+    material = array.material | {key: own[key] for key in stiffness.MATERIAL if key in own}
+    if (spring, material) != (array.spring, array.material):
+        below = _layer_parameters(Array(array.rows, array.cols, None, spring, material))
+        own = own | {name: below[name] for name in EACH if below[name] != out.get(name)}
+    for name in ("transformation_shift_k", *EACH):
+        if name in own:
+            out |= {f"{name}[{array.springs // 2 + k + 1}]": own[name] for k in range(array.springs // 2)}
+    return out
+
+
+def _layer_parameters(array: Array) -> dict[str, float]:
     material, spring = array.material, array.spring
     out = {
         key: value for key, value in material.items() if key == "emissivity" or key.endswith(("_start_c", "_finish_c"))

@@ -137,6 +137,14 @@ def _driving_columns(
     return letter, count, bool(groups["v"])
 
 
+def _layers(table: Table, springs: int, path: str | Path) -> int:
+    if table.keys.get("layers", "1") not in ("1", "2"):
+        raise InputError(f"layers: {table.keys['layers']}; there are 1 or 2", path, 1)
+    if table.keys.get("layers") == "2" and springs % 2:
+        raise InputError(f"layers: 2, but {springs} springs: a stiffness spring below each is an even number", path, 1)
+    return int(table.keys.get("layers", "1"))
+
+
 def read_log(
     path: str | Path, springs: int | None = None, temperatures: bool = True, why: str = "", or_resistance: bool = False
 ) -> Run:
@@ -214,6 +222,7 @@ def read_log(
         ambient_c=ambient,
         current_a=current,
         voltage_v=voltage,
+        layers=_layers(table, count, path),
         notes=notes,
     )
     if mode == "command":

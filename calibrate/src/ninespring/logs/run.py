@@ -28,6 +28,8 @@ class Run:
     """(n,) or None where the log has none."""
     current_a: np.ndarray | None = None
     voltage_v: np.ndarray | None = None
+    layers: int = 1
+    """2: the first half of the springs is the elongation layer, the other the stiffness layer below it."""
     notes: list[str] = field(default_factory=list)
     warm: bool = False
     """The run begins warm and steady: hidden heat is in balance with the first inputs."""

@@ -371,6 +371,7 @@ def diagnose_table(
 ) -> dict[str, Any]:
     """Diagnose a steady table by the declared (frozen) model; without one, by the paper's."""
     array = model.array if model else read_array(array_path) if array_path else Array()
+    array.one_layer("diagnose knows")
     states = read_steady(path, array.springs)
     declared = dict(model.parameters) if model else {}
     result = diagnose_states(array, declared, states, progress)
