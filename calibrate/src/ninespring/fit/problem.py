@@ -212,19 +212,32 @@ class Problem:
 
     def vector(self, fields: Sequence[np.ndarray], weights: Sequence[np.ndarray] | None = None) -> np.ndarray:
         """Return fields (per run, degC) as one vector in units of the noise, starts whitened out."""
-        pieces = self.scaled(fields)
+        return self.vectors([fields], weights)[0]
+
+    def vectors(
+        self, several: Sequence[Sequence[np.ndarray | None]], weights: Sequence[np.ndarray] | None = None
+    ) -> np.ndarray:
+        """Return several fields (per run, degC; None: zero) as vectors, (fields, count): together, which is far quicker."""
+        out = np.zeros((len(several), self.count))
+        begin = 0
+        for r, (mask, noise) in enumerate(zip(self.mask, self.noise, strict=True)):
+            end = begin + int(mask.sum())
+            for row, fields in zip(out, several, strict=True):
+                if (field := fields[r]) is not None:
+                    row[begin:end] = (field / noise)[mask]
+            begin = end
         if self.unnamed is not None:
-            whole = np.concatenate(pieces)
-            whole -= self.unnamed @ (self.unnamed.T @ whole)
-            pieces = np.split(whole, np.cumsum([len(one) for one in pieces])[:-1])
-        for r, (piece, mask) in enumerate(zip(pieces, self.mask, strict=True)):
-            basis = self.basis[r]
+            out -= (out @ self.unnamed) @ self.unnamed.T
+        begin = 0
+        for r, (mask, basis) in enumerate(zip(self.mask, self.basis, strict=True)):
+            end = begin + int(mask.sum())
+            part = out[:, begin:end]
             if weights is not None:
-                piece = piece * weights[r][mask]
+                part *= weights[r][mask]
             if basis is not None:
-                piece = piece - basis @ (basis.T @ piece)
-            pieces[r] = piece
-        return np.concatenate(pieces)
+                part -= (part @ basis) @ basis.T
+            begin = end
+        return out
 
     def plain(self, residual: Sequence[np.ndarray]) -> float:
         """Return the sum of squared residuals in units of the noise."""
@@ -306,14 +319,11 @@ class Problem:
                     jobs.append((spec, moved, r))
                     where.append((c, r, step))
         shown = self.simulate_many(jobs) if jobs else []
-        out = np.zeros((self.count, len(list(columns))))
         position = {c: k for k, c in enumerate(columns)}
-        fields: dict[int, list[np.ndarray]] = {}
+        changes: list[list[np.ndarray | None]] = [[None] * len(self.runs) for _ in position]
         for (c, r, step), field_c in zip(where, shown, strict=True):
-            fields.setdefault(c, [np.zeros_like(p) for p in predicted])[r] = -(field_c - predicted[r]) / step
-        for c, change in fields.items():
-            out[:, position[c]] = self.vector(change, weights)
-        return out
+            changes[position[c]][r] = (predicted[r] - field_c) / step
+        return self.vectors(changes, weights).T
 
     def fit(
         self,
