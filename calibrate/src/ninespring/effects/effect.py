@@ -85,6 +85,9 @@ class Scene:
     """Per kind of drift, how many knots each run has."""
     declared: Callable[[str], float]
     """What the declared array has for a parameter of the plant."""
+    runs: int = 1
+    ambient_logged: bool = False
+    """In every run."""
 
     @property
     def springs(self) -> int:
@@ -116,6 +119,8 @@ def scene_of(problem: Problem) -> Scene:
         max(run.duration_s for run in runs),
         {key: tuple(one.shape[1] for one in hats) for key, hats in problem.hats.items()},
         problem.base_value,
+        len(runs),
+        all(run.ambient_c is not None for run in runs),
     )
 
 

@@ -82,6 +82,8 @@ def findings(result: dict[str, Any]) -> list[tuple[str, str]]:
     for one in result["effects"]:
         sure = f"{one['certainty']}, {100 * one['probability']:.0f} %" if "probability" in one else ""
         out.append((f"{one['name']}: {sure}" if sure else one["name"], one.get("text", one["in_words"])))
+    for one in result.get("runs_differ", []):
+        out.append((f"runs differ: {one['certainty']}, {100 * one['probability']:.0f} %", one["text"]))
     for one in result.get("unnamed", []):
         out.append(("a cause without a name", one["text"][0].upper() + one["text"][1:] + "."))
     for event in result.get("unknown_heat", {}).get("events", []):

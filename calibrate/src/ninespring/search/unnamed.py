@@ -169,7 +169,7 @@ def library(problem: Problem, fit: Fit) -> list[Cause]:
     samples = [len(range(0, len(mask), THIN)) * mask.shape[1] for mask in problem.mask]
     for r, run in enumerate(problem.runs):
         power, by_key = power_of(problem, fit, r), fit.as_dict()
-        plant = problem.plant_for(fit.spec, fit.values)
+        plant = problem.plant_for(fit.spec, fit.values, r)
         ambient = problem.ambient_of(r, by_key)
         shown = simulate_run(plant, run, ambient, by_key)
         around = np.full(len(run.time_s), plant.get("ambient_c")) if ambient is None else ambient
