@@ -88,6 +88,8 @@ class Scene:
     runs: int = 1
     ambient_logged: bool = False
     """In every run."""
+    load_moves: bool = False
+    """A load was logged, and was not always the same."""
 
     @property
     def springs(self) -> int:
@@ -121,6 +123,7 @@ def scene_of(problem: Problem) -> Scene:
         problem.base_value,
         len(runs),
         all(run.ambient_c is not None for run in runs),
+        any(run.load_n is not None and np.ptp(run.load_n) > 0.0 for run in runs),
     )
 
 

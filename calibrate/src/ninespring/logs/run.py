@@ -28,6 +28,8 @@ class Run:
     """(n,) or None where the log has none."""
     current_a: np.ndarray | None = None
     voltage_v: np.ndarray | None = None
+    load_n: np.ndarray | None = None
+    """(n, k), N, or None where the log has none; row r holds until time r + 1."""
     notes: list[str] = field(default_factory=list)
     warm: bool = False
     """The run begins warm and steady: hidden heat is in balance with the first inputs."""

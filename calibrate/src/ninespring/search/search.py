@@ -17,7 +17,7 @@ import numpy as np
 from .. import effects
 from ..effects import Candidate
 from ..fit.problem import Problem
-from ..fit.spec import Fit, Spec
+from ..fit.spec import RUNS_OWN, Fit, Spec
 from .evidence import excess, fit_factor, gain, log_evidence
 from .screen import Screen
 
@@ -182,7 +182,15 @@ class Search:
         )
 
     def preferred(self, one: Fit, other: Fit) -> bool:
-        """Return whether `one` takes the place of `other`, which has as many effects."""
+        """Return whether `one` takes the place of `other`, which has as many effects.
+
+        What is a run's own does so only where it explains more that matters than what is the same in all runs.
+        """
+        own = [len(set(fit.spec.effects) & set(RUNS_OWN)) for fit in (one, other)]
+        if own[0] > own[1] and gain(one, other) < MIN_GAIN:
+            return False
+        if own[0] < own[1] and gain(other, one) < MIN_GAIN:
+            return True
         ahead = (
             log_evidence(self.problem, one, other) if one.chi2 < other.chi2 else -log_evidence(self.problem, other, one)
         )
