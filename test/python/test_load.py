@@ -48,7 +48,9 @@ def loaded(path: Path, k_per_n: float, seed: int) -> Path:
             before = 0.3 * true + 8.0 * phase
             for _ in range(30):
                 middle = 0.5 * (low + high)
-                there = np.clip(phase, austenite(middle, 88.0 + off, 98.0 + off), austenite(middle, 68.0 + off, 78.0 + off))
+                there = np.clip(
+                    phase, austenite(middle, 88.0 + off, 98.0 + off), austenite(middle, 68.0 + off, 78.0 + off)
+                )
                 more = 0.3 * middle + 8.0 * there > before + heat
                 low, high = np.where(more, low, middle), np.where(more, middle, high)
             true, phase = middle, there

@@ -63,6 +63,7 @@ def test_a_drive_that_is_stronger_in_one_run_is_found_and_sized(tmp_path: Path, 
     gain = [one["parameters"][f"drive_gain@{r}"]["value"] for r in (1, 2, 3)]
     assert gain[1] / gain[0] == pytest.approx(1.12, abs=0.01)
     assert gain[2] / gain[0] == pytest.approx(0.95, abs=0.01)
+    assert all(one["parameters"][f"drive_gain@{r}"]["stderr"] < 0.01 for r in (1, 2, 3)), "told relative to their mean"
     assert one["spread"]["value"] == pytest.approx(np.std(np.log([1.0, 1.12, 0.95])), rel=0.3)
     assert not result["unexplained"]
     assert result["after"]["rmse_c"] < 1.1 * NOISE_C < result["baseline"]["rmse_c"]

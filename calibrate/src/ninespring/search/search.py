@@ -422,6 +422,8 @@ class Search:
                 continue
             self.progress(f"fitting {' + '.join(screen.candidates[k].effect for k in chosen)}")
             fit = self.refit(self.base, [screen.candidates[k] for k in chosen], [sizes[k] for k in chosen])
+            if fit.chi2 >= current.chi2:
+                continue  # and so is every part of it
             fit, _ = self.backward(fit)
             if fit is not current and fit.chi2 < current.chi2 and self.preferred(fit, current):
                 more = len(fit.spec.effects) - len(current.spec.effects)

@@ -44,8 +44,9 @@ MOST = 12
 """Unnamed causes, at most: where more would help, it is no cause of these kinds."""
 ROUNDS = 4
 """Of finding what has no name and searching the library beside it, at most ..."""
-ENOUGH = 15_000
-"""... and none is begun after so many simulations: half a minute of one core for two 15 min logs of nine springs."""
+ENOUGH = 12_000
+"""... and none is begun after so many simulations: the last one ends within half a minute of one core for two 15 min logs of
+nine springs."""
 SHOWN = ("pickup", "mixing", "sensor", "reading")
 """Kinds that are the thermometers' own: the springs are as they would be without."""
 UNITS = {

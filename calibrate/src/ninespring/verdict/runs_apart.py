@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import asdict, replace
 from typing import Any
+
+import numpy as np
 
 from .. import effects
 from ..fit.problem import Problem
@@ -16,15 +17,27 @@ ROUNDS = 3
 """Of fitting the runs' numbers and their spread in turn (expectation maximisation): more moves neither."""
 
 
+def _own(fit: Fit, effect: str) -> tuple[list[int], np.ndarray]:
+    """Return where an effect's numbers stand in a fit, and the covariance of their inner coordinates.
+
+    Of gains it is that of each one's distance from their mean: what they have in common is the command's power, the heat
+    capacity or the losses.
+    """
+    at = [k for k, free in enumerate(fit.spec.free) if free.effect == effect]
+    if fit.covariance is None:
+        return at, np.zeros((len(at), len(at)))
+    covariance = fit.covariance[np.ix_(at, at)]
+    if effect == RUN_DRIVE:
+        apart = np.eye(len(at)) - 1.0 / len(at)
+        covariance = apart @ covariance @ apart.T
+    return at, covariance
+
+
 def spread_of(fit: Fit, effect: str) -> float:
     """Return how far runs lie apart about the array's own number, rms, in the inner coordinate: sizes and errors both count."""
-    errors = fit.stderr()
-    own = [(f, value) for f, value in zip(fit.spec.free, fit.values, strict=True) if f.effect == effect]
-    squares = []
-    for free, value in own:
-        error = errors[free.key] / (abs(value) if free.log else free.scale)
-        squares.append((free.inner(value) - free.inner(free.start)) ** 2 + (error**2 if math.isfinite(error) else 0.0))
-    return math.sqrt(sum(squares) / max(1, len(squares)))
+    at, covariance = _own(fit, effect)
+    z = np.array([fit.spec.free[k].inner(fit.values[k]) - fit.spec.free[k].inner(fit.spec.free[k].start) for k in at])
+    return float(np.sqrt(np.mean(z**2 + np.diag(covariance))))
 
 
 def with_spread(problem: Problem, fit: Fit) -> Fit:
@@ -40,6 +53,10 @@ def with_spread(problem: Problem, fit: Fit) -> Fit:
 def entry(problem: Problem, fit: Fit, effect: str, nats: float, sure: Witness) -> dict[str, Any]:
     """Return what diagnosis.json says of it: each run's number, and how far they lie apart."""
     parameters = parameters_of(problem, fit, effect)
+    at, covariance = _own(fit, effect)
+    if effect == RUN_DRIVE and fit.covariance is not None:
+        for k, variance in zip(at, np.diag(covariance), strict=True):
+            parameters[fit.spec.free[k].key]["stderr"] = float(fit.values[k] * np.sqrt(max(0.0, variance)))
     return {
         "name": effect,
         "evidence": nats,
