@@ -160,8 +160,9 @@ plant_status_t plant_check(const plant_t *p, const char **message)
 
 static points_t points_of(const plant_t *p, int i)
 {
+    const double loaded = scalar(p, P_transformation_shift_k_per_n) * p->value[P_load_n][i];
     const double shift =
-        p->on[E_transformation_shift] ? p->value[P_transformation_shift_k][i] : 0.0;
+        p->on[E_transformation_shift] ? p->value[P_transformation_shift_k][i] + loaded : 0.0;
     return (points_t){
         scalar(p, P_martensite_finish_c) + shift, scalar(p, P_martensite_start_c) + shift,
         scalar(p, P_austenite_start_c) + shift, scalar(p, P_austenite_finish_c) + shift};

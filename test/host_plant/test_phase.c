@@ -120,6 +120,22 @@ static void a_load_moves_all_four_temperatures(void)
     TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.5, plant_austenite(plant, 1));
 }
 
+static void a_logged_load_moves_them_by_so_much_a_newton(void)
+{
+    on("transformation_shift");
+    set("transformation_shift_k[1]", 2.0);
+    set("transformation_shift_k_per_n", 4.0);
+    set("load_n[1]", 1.0); /* 6 K in all */
+    lead(99.0);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.5, plant_austenite(plant, 0));
+    set("load_n[1]", 0.0); /* the load is taken off: on at once to where 2 K would be */
+    OK(plant_step(plant, 0.01));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.5 - 0.5 * cos(PI * 0.9), plant_austenite(plant, 0));
+    hold(1, 93.0);
+    OK(plant_step(plant, 0.01));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.5, plant_austenite(plant, 1));
+}
+
 /* A finger presses on a hot spring: it transforms at once as far as the heat that this sets free
  * lets it. */
 static void a_load_on_a_hot_spring_warms_it_by_what_it_gives_back(void)
@@ -186,6 +202,7 @@ int main(void)
     RUN_TEST(latent_heat_delays_by_its_energy_and_changes_no_steady_state);
     RUN_TEST(cooling_gives_back_its_own_share);
     RUN_TEST(a_load_moves_all_four_temperatures);
+    RUN_TEST(a_logged_load_moves_them_by_so_much_a_newton);
     RUN_TEST(a_load_on_a_hot_spring_warms_it_by_what_it_gives_back);
     RUN_TEST(a_load_on_a_held_spring_leaves_its_heat_with_whatever_holds_it);
     RUN_TEST(what_is_no_load_leaves_the_memory_alone);

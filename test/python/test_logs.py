@@ -127,6 +127,31 @@ def test_a_gap_starts_the_simulation_again(make_log) -> None:
     assert np.isfinite(run.temperature_c[320:]).all()
 
 
+@pytest.mark.parametrize("step_c", [0.0, 0.5])
+def test_a_sensor_that_freezes_half_way_is_left_out_from_there(tmp_path: Path, step_c: float) -> None:
+    rng = np.random.default_rng(3)
+    time_s = np.arange(400.0)
+    current = np.where((time_s // 50) % 2 == 0, 0.0, 1.4)
+    true = np.empty(400)
+    now = 20.0
+    for row in range(400):
+        true[row] = now
+        now += (0.2 * current[row] ** 2 - 5.8e-3 * (now - 20.0)) / 0.3
+    shown = true + rng.normal(0.0, 0.1, 400)
+    if step_c:
+        shown = step_c * np.round(shown / step_c)
+    whole = tmp_path / "whole.csv"
+    whole.write_text(log_text(time_s, {"i1_a": current, "t1_c": shown}))
+    assert np.isfinite(read_log(whole, 1).temperature_c).all(), "steps of a thermometer are not frozen"
+    shown[230:] = shown[230]
+    path = tmp_path / "log.csv"
+    path.write_text(log_text(time_s, {"i1_a": current, "t1_c": shown}))
+    run = read_log(path, 1)
+    assert np.isfinite(run.temperature_c[:231]).all()
+    assert np.isnan(run.temperature_c[233:]).all()
+    assert any("frozen" in note and "t1_c" in note for note in run.notes)
+
+
 def test_a_saturated_sensor_is_left_out_and_said(make_log) -> None:
     def clip(columns: dict[str, np.ndarray]) -> None:
         columns["t3_c"] = np.minimum(columns["t3_c"], 45.0)

@@ -16,6 +16,7 @@ from ninespring.logs import log_text, read_log
 from ninespring.models import Array
 from ninespring.search import certainty
 from ninespring.verdict import contacts, diagnosis, resistance, unknown_heat
+from ninespring.verdict.readings import Readings
 
 ROWS = 700
 Change = Callable[[np.ndarray], None]
@@ -152,3 +153,24 @@ def test_an_amplitude_that_is_the_same_everywhere_does_not_scatter() -> None:
     assert certainty.scatter(signal, noise, 1.0) < 0.03
     half = [n + (0.5 if k < 3 else -0.5) * s for k, (s, n) in enumerate(zip(signal, noise, strict=True))]
     assert certainty.scatter(signal, half, 1.0) == pytest.approx(0.5, abs=0.05)
+
+
+def test_what_is_far_below_a_finding_is_not_taken_apart(monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(0)
+    rows = 2000
+    time_s = np.arange(float(rows))
+    wander = 2e-4 * np.sin(time_s / 60.0)  # ohm: far above the noise, a tenth of the smallest contact
+    ohm = 0.2 + wander + rng.normal(0.0, 1e-5, rows)
+    zeros = np.zeros(rows)
+    read = Readings(ohm, zeros.astype(int), zeros.astype(int), time_s, zeros, zeros + 10.0, np.full(rows, 1e-5))
+    asked = []
+    solve = contacts.solve
+    monkeypatch.setattr(contacts, "solve", lambda *given: asked.append(1) or solve(*given))
+    columns = {"own 0": np.ones(rows)}
+    steps, _ = contacts.find(read, columns, solve(read, columns))
+    assert steps == []
+    assert len(asked) == 1
+    read.ohm = ohm + 0.006 * (time_s > 900.0)
+    steps, _ = contacts.find(read, columns, solve(read, columns))
+    assert [round(one.ohm, 3) for one in steps] == [0.006]
+    assert abs(steps[0].from_s - 901.0) < 40.0

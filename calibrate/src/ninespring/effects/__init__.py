@@ -14,6 +14,7 @@ from typing import Any
 
 from .. import native
 from ..fit.problem import Problem
+from . import runs_differ
 from .effect import Candidate as Candidate
 from .effect import Effect as Effect
 from .effect import Scene as Scene
@@ -35,10 +36,15 @@ def library() -> tuple[Effect, ...]:
 
 def sentence(name: str, parameters: Mapping[str, Any], variant: str = "") -> str:
     """Return what was found of an effect, in words and sizes."""
-    return next(one for one in library() if one.name == name).sentence(parameters, variant)
+    return next(one for one in (*library(), *runs_differ.EFFECTS) if one.name == name).sentence(parameters, variant)
 
 
 def candidates(problem: Problem) -> list[Candidate]:
     """Return every effect, in every variant, that these runs could show."""
     scene = scene_of(problem)
     return [candidate for effect in library() for candidate in effect.candidates_for(scene)]
+
+
+def of_runs(problem: Problem) -> list[Candidate]:
+    """Return what may be a run's own, and not the array's, in these runs."""
+    return runs_differ.candidates(scene_of(problem))

@@ -85,6 +85,11 @@ class Scene:
     """Per kind of drift, how many knots each run has."""
     declared: Callable[[str], float]
     """What the declared array has for a parameter of the plant."""
+    runs: int = 1
+    ambient_logged: bool = False
+    """In every run."""
+    load_moves: bool = False
+    """A load was logged, and was not always the same."""
 
     @property
     def springs(self) -> int:
@@ -116,6 +121,9 @@ def scene_of(problem: Problem) -> Scene:
         max(run.duration_s for run in runs),
         {key: tuple(one.shape[1] for one in hats) for key, hats in problem.hats.items()},
         problem.base_value,
+        len(runs),
+        all(run.ambient_c is not None for run in runs),
+        any(run.load_n is not None and np.ptp(run.load_n) > 0.0 for run in runs),
     )
 
 

@@ -1,13 +1,27 @@
-"""One spring transforms elsewhere than the others: its load, or another batch of wire."""
+"""A spring transforms elsewhere: by the load that was logged, or always, as one of another batch of wire does."""
 
 from collections.abc import Iterator
 
 from .effect import Candidate, Effect, Numbers, Scene, linear, sized
 
+PER_NEWTON = "transformation_shift_k_per_n"
+LOADED = "by the logged load"
+
 
 def _candidates(scene: Scene) -> Iterator[Candidate]:
     # it shows by what goes with a transformation: beside latent heat, or the resistance of the phases
-    if scene.springs < 2 or scene.hottest_c < scene.declared("austenite_start_c") - 45.0:
+    if scene.hottest_c < scene.declared("austenite_start_c") - 45.0:
+        return
+    if scene.load_moves:
+        yield Candidate(
+            LOADED,
+            (linear(PER_NEWTON, -20.0, 20.0, 0.0, 1.0),),
+            ({PER_NEWTON: 2.0},),
+            signed=True,
+            most=8.0,
+            more_starts=({PER_NEWTON: 6.0}, {PER_NEWTON: -6.0}),
+        )
+    if scene.springs < 2:
         return
     for k in range(1, scene.springs + 1):
         name = f"transformation_shift_k[{k}]"
@@ -23,6 +37,8 @@ def _candidates(scene: Scene) -> Iterator[Candidate]:
 
 def _says(numbers: Numbers, variant: str) -> str:
     (value, error), *_ = numbers.values()
+    if variant == LOADED:
+        return f"Each newton of load moves the transformation by {sized(value, error, 'K')}."
     word = "higher" if value > 0 else "lower"
     return f"{variant.capitalize()} transforms {sized(abs(value), error, 'K')} {word} than the others."
 

@@ -105,6 +105,7 @@ def compare(
     rng = np.random.default_rng(0)
     plants = [best_plant(model), *(best_plant(model, draw(model, rng)) for _ in range(DRAWS))]
     said: list[str] = []
+    gained: list[str] = []
     rows = []
     for pattern in patterns(model.array.springs):
         pairs = []
@@ -119,4 +120,9 @@ def compare(
             if worse[0] or sum(worse) > len(worse) / 2:
                 a, b = values[0] if worse[0] else values[worse.index(True)]
                 said.append(words.format(old=a, new=b))
-    return list(dict.fromkeys(said)), rows
+        best = pairs[0]
+        if said and "undriven" in worse_than(best[1], best[0]):
+            # a pattern that this array cannot hold without heating the springs that are off
+            words = WORSE["undriven"][1].format(old=best[0].undriven, new=best[1].undriven)
+            gained.append(f"for it {words}: that pattern cannot have both here")
+    return list(dict.fromkeys([*said, *gained])), rows

@@ -29,8 +29,8 @@ def thin(fields: np.ndarray) -> np.ndarray:
 
 def power_of(problem: Problem, fit: Fit, run_index: int) -> np.ndarray:
     """Return the power that a fit gives each spring of a run, (rows, springs), W (current: at the martensite's resistance)."""
-    run = problem.runs[run_index]
-    plant = problem.plant_for(fit.spec, fit.values)
+    run = problem.run_of(run_index, fit.as_dict())
+    plant = problem.plant_for(fit.spec, fit.values, run_index)
     if run.mode == "current":
         return run.drive**2 * plant.get("resistance_ohm")
     if run.mode == "command":
@@ -38,13 +38,13 @@ def power_of(problem: Problem, fit: Fit, run_index: int) -> np.ndarray:
     return run.drive
 
 
-def _with_heat(problem: Problem, fit: Fit, run: Run, power_w: np.ndarray, extra_w: np.ndarray) -> Run:
+def _with_heat(problem: Problem, fit: Fit, r: int, run: Run, power_w: np.ndarray, extra_w: np.ndarray) -> Run:
     """Return a run whose springs are given `extra_w` (rows, springs) beside what was logged."""
     wanted = np.maximum(power_w + extra_w, 0.0)
     if run.mode == "power":
         return replace(run, drive=wanted)
     factor = np.where(power_w > 0, wanted / np.where(power_w > 0, power_w, 1.0), 0.0)
-    plant = problem.plant_for(fit.spec, fit.values)
+    plant = problem.plant_for(fit.spec, fit.values, r)
     if run.mode == "current":
         idle = np.sqrt(wanted / plant.get("resistance_ohm"))
         return replace(run, drive=np.where(power_w > 0, run.drive * np.sqrt(factor), idle))
@@ -60,10 +60,10 @@ def step_answers(
     """Return how the readings answer 1 W that begins at each edge and stays, (edges, rows, springs), K/W: per spring, and
     at all of them. Simulated with everything else as it was, fan and all, each from its edge on.
     """
-    run, power = problem.runs[r], power_of(problem, fit, r)
+    run, power = problem.run_of(r, fit.as_dict()), power_of(problem, fit, r)
     size = PROBE * typical_w
-    given = [_with_heat(problem, fit, run, power, _one(power, k, size)) for k in range(run.springs)]
-    usual = _with_heat(problem, fit, run, power, np.zeros_like(power))
+    given = [_with_heat(problem, fit, r, run, power, _one(power, k, size)) for k in range(run.springs)]
+    usual = _with_heat(problem, fit, r, run, power, np.zeros_like(power))
     ambient = problem.ambient_of(r, fit.as_dict())
     mode = native.MODES[usual.mode]
     out = {("heat", k): np.zeros((len(edges), *power.shape)) for k in range(run.springs)}
@@ -74,7 +74,7 @@ def step_answers(
         return plant.simulate(one.time_s[rows], mode, one.drive[rows], one.fan[rows], air)
 
     def of_piece(begin: int, end: int) -> None:
-        plant = started(problem.plant_for(fit.spec, fit.values), usual, ambient, begin)
+        plant = started(problem.plant_for(fit.spec, fit.values, r), usual, ambient, begin)
         rest = part(plant.copy(), usual, begin, end)
         at = begin
         for number, edge in enumerate(edges):
@@ -125,11 +125,11 @@ def answers(problem: Problem, fit: Fit, r: int, heat_w: Sequence[np.ndarray], ty
 
 
 def _shown(problem: Problem, fit: Fit, r: int, extra_w: Sequence[np.ndarray]) -> list[np.ndarray]:
-    run, power = problem.runs[r], power_of(problem, fit, r)
+    run, power = problem.run_of(r, fit.as_dict()), power_of(problem, fit, r)
     ambient = problem.ambient_of(r, fit.as_dict())
 
     def one(extra: np.ndarray) -> np.ndarray:
-        plant = problem.plant_for(fit.spec, fit.values)
-        return simulate_run(plant, _with_heat(problem, fit, run, power, extra), ambient, {})
+        plant = problem.plant_for(fit.spec, fit.values, r)
+        return simulate_run(plant, _with_heat(problem, fit, r, run, power, extra), ambient, {})
 
     return list(problem.pool.map(one, extra_w))

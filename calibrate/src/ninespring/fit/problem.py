@@ -22,7 +22,7 @@ from ..logs.run import Run
 from ..models import Array
 from . import statistics
 from .simulate import array_parameters, simulate_run
-from .spec import Fit, Spec
+from .spec import AMBIENT_OFFSET, DRIVE_GAIN, RUN_DRIVE, SENSOR_OFFSET, Fit, Spec
 
 WORKERS = max(1, min(8, os.cpu_count() or 1))
 REUSED = 0.1
@@ -128,6 +128,8 @@ class Problem:
         ambient = run.ambient_c
         if ambient is None and constant is not None:
             ambient = np.full(len(run.time_s), constant)
+        if ambient is not None:
+            ambient = ambient + values.get(f"{AMBIENT_OFFSET}@{run_index + 1}", 0.0)
         for name, hats in self.hats.items():
             prefix = f"{name}@{run_index + 1}."
             drift = [values.get(f"{prefix}{k}", 0.0) for k in range(1, hats[run_index].shape[1] + 1)]
@@ -137,13 +139,29 @@ class Problem:
                 ambient = ambient + hats[run_index] @ np.asarray(drift)
         return ambient
 
-    def plant_for(self, spec: Spec, values: Sequence[float]) -> native.Plant:
-        """Return a fresh plant with the spec's effects and values."""
+    def plant_for(self, spec: Spec, values: Sequence[float], run_index: int | None = None) -> native.Plant:
+        """Return a fresh plant with the spec's effects and values, commands as strong as in a run where one is given."""
         plant = self._base.copy()
         plant.set_effects(spec.plant_effects)
         plant.set_all(dict(spec.fixed))
         plant.set_all(spec.settings(values, self._base.get))
+        if run_index is not None and self.runs[run_index].mode == "command" and RUN_DRIVE in spec.effects:
+            gain = dict(zip((f.key for f in spec.free), values, strict=True))[f"{DRIVE_GAIN}@{run_index + 1}"]
+            for k in range(self.runs[run_index].springs):
+                plant.set(f"command_power_w[{k + 1}]", gain * plant.get(f"command_power_w[{k + 1}]"))
         return plant
+
+    def run_of(self, run_index: int, values: Mapping[str, float]) -> Run:
+        """Return a run with what is its own put right: driven as strongly as it was, read as if nothing were off.
+
+        A command's strength is the plant's (`plant_for`).
+        """
+        run = self.runs[run_index]
+        gain = values.get(f"{DRIVE_GAIN}@{run_index + 1}", 1.0)
+        off_k = values.get(f"{SENSOR_OFFSET}@{run_index + 1}", 0.0)
+        if gain != 1.0 and run.mode != "command":
+            run = replace(run, drive=run.drive * (gain if run.mode == "power" else math.sqrt(gain)))
+        return replace(run, temperature_c=run.temperature_c - off_k) if off_k else run
 
     def simulate(
         self,
@@ -153,13 +171,14 @@ class Problem:
         start_offset: np.ndarray | None = None,
     ) -> np.ndarray:
         """Return what the sensors of one run should show, (rows, springs), degC."""
-        run = self.runs[run_index]
         with self._count_lock:
             self.simulations += 1
         by_key = {f.key: float(v) for f, v in zip(spec.free, values, strict=True)}
+        run = self.run_of(run_index, by_key)
         try:
-            plant = self.plant_for(spec, values)
-            return simulate_run(plant, run, self.ambient_of(run_index, by_key), by_key, start_offset)
+            plant = self.plant_for(spec, values, run_index)
+            shown = simulate_run(plant, run, self.ambient_of(run_index, by_key), by_key, start_offset)
+            return shown + by_key.get(f"{SENSOR_OFFSET}@{run_index + 1}", 0.0)
         except native.NativeError:
             return np.full(run.temperature_c.shape, _BAD)
 
@@ -213,19 +232,32 @@ class Problem:
 
     def vector(self, fields: Sequence[np.ndarray], weights: Sequence[np.ndarray] | None = None) -> np.ndarray:
         """Return fields (per run, degC) as one vector in units of the noise, starts whitened out."""
-        pieces = self.scaled(fields)
+        return self.vectors([fields], weights)[0]
+
+    def vectors(
+        self, several: Sequence[Sequence[np.ndarray | None]], weights: Sequence[np.ndarray] | None = None
+    ) -> np.ndarray:
+        """Return several fields (per run, degC; None: zero) as vectors, (fields, count): together, which is far quicker."""
+        out = np.zeros((len(several), self.count))
+        begin = 0
+        for r, (mask, noise) in enumerate(zip(self.mask, self.noise, strict=True)):
+            end = begin + int(mask.sum())
+            for row, fields in zip(out, several, strict=True):
+                if (field := fields[r]) is not None:
+                    row[begin:end] = (field / noise)[mask]
+            begin = end
         if self.unnamed is not None:
-            whole = np.concatenate(pieces)
-            whole -= self.unnamed @ (self.unnamed.T @ whole)
-            pieces = np.split(whole, np.cumsum([len(one) for one in pieces])[:-1])
-        for r, (piece, mask) in enumerate(zip(pieces, self.mask, strict=True)):
-            basis = self.basis[r]
+            out -= (out @ self.unnamed) @ self.unnamed.T
+        begin = 0
+        for r, (mask, basis) in enumerate(zip(self.mask, self.basis, strict=True)):
+            end = begin + int(mask.sum())
+            part = out[:, begin:end]
             if weights is not None:
-                piece = piece * weights[r][mask]
+                part *= weights[r][mask]
             if basis is not None:
-                piece = piece - basis @ (basis.T @ piece)
-            pieces[r] = piece
-        return np.concatenate(pieces)
+                part -= (part @ basis) @ basis.T
+            begin = end
+        return out
 
     def plain(self, residual: Sequence[np.ndarray]) -> float:
         """Return the sum of squared residuals in units of the noise."""
@@ -307,14 +339,11 @@ class Problem:
                     jobs.append((spec, moved, r))
                     where.append((c, r, step))
         shown = self.simulate_many(jobs) if jobs else []
-        out = np.zeros((self.count, len(list(columns))))
         position = {c: k for k, c in enumerate(columns)}
-        fields: dict[int, list[np.ndarray]] = {}
+        changes: list[list[np.ndarray | None]] = [[None] * len(self.runs) for _ in position]
         for (c, r, step), field_c in zip(where, shown, strict=True):
-            fields.setdefault(c, [np.zeros_like(p) for p in predicted])[r] = -(field_c - predicted[r]) / step
-        for c, change in fields.items():
-            out[:, position[c]] = self.vector(change, weights)
-        return out
+            changes[position[c]][r] = (predicted[r] - field_c) / step
+        return self.vectors(changes, weights).T
 
     def fit(
         self,

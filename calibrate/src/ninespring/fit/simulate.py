@@ -21,6 +21,10 @@ EACH = (
 )
 """What each spring has of its own by wire, coil and material."""
 
+SHIFT_PER_N = "transformation_shift_k_per_n"
+LOAD_STEP_N = 0.1
+"""A change of load that counts: half a kelvin of the transformation (docs/physics.md: 4 K/N)."""
+
 
 def started(
     plant: native.Plant, run: Run, ambient: np.ndarray | None, begin: int, start_offset: np.ndarray | None = None
@@ -55,36 +59,64 @@ def simulate_run(
     After a gap the springs start again from what was measured there; air and plate carry on.
     Air and plate start at ambient, or, where the run begins warm and steady, in balance with its first inputs.
     """
+    along = _Along(plant, run, ambient, trace)
+    along.lay_load(0)
     started(plant, run, ambient, 0, start_offset)
-    mode = native.MODES[run.mode]
-    simulate = plant.trace if trace else plant.simulate
     if len(run.starts) == 1:
-        return simulate(run.time_s, mode, run.drive, run.fan, ambient)
+        return along.rows(0, len(run.time_s))
     out = np.empty((*run.temperature_c.shape, 2) if trace else run.temperature_c.shape)
     bounds = [*run.starts, len(run.time_s)]
     for piece, (begin, end) in enumerate(zip(bounds[:-1], bounds[1:], strict=True)):
         if piece:
-            across = slice(begin - 1, begin + 1)
-            simulate(
-                run.time_s[across],
-                mode,
-                run.drive[across],
-                run.fan[across],
-                None if ambient is None else ambient[across],
-            )
+            along.rows(begin - 1, begin + 1)
+            along.lay_load(begin)
             plant.start_from_measured(run.temperature_c[begin])
-        part = slice(begin, end)
         if end - begin == 1 and not trace:
-            out[part] = plant.measured_c()
-            continue
-        out[part] = simulate(
-            run.time_s[part],
-            mode,
-            run.drive[part],
-            run.fan[part],
-            None if ambient is None else ambient[part],
-        )
+            out[begin:end] = plant.measured_c()
+        else:
+            out[begin:end] = along.rows(begin, end)
     return out
+
+
+class _Along:
+    """A plant on its way along a log, loads laid on the springs as they were."""
+
+    def __init__(self, plant: native.Plant, run: Run, ambient: np.ndarray | None, trace: bool) -> None:
+        self.plant, self.run, self.ambient = plant, run, ambient
+        self.simulate = plant.trace if trace else plant.simulate
+        self.load_n = run.load_n if plant.get(SHIFT_PER_N) != 0.0 else None
+        self.changes = np.zeros(0, dtype=int) if self.load_n is None else load_changes(self.load_n)
+
+    def lay_load(self, row: int) -> None:
+        """Load the springs as a row says."""
+        for k, newton in enumerate(() if self.load_n is None else self.load_n[row]):
+            self.plant.set(f"load_n[{k + 1}]", float(newton))
+
+    def rows(self, begin: int, end: int) -> np.ndarray:
+        """Go from one row to the last before another; return what is shown at each of them."""
+        inside = self.changes[(self.changes > begin) & (self.changes < end - 1)]
+        if not inside.size:
+            return self._straight(begin, end)
+        pieces = []
+        for first, last in zip([begin, *inside], [*inside, end], strict=True):
+            self.lay_load(first)
+            pieces.append(self._straight(first, min(last + 1, end))[: last - first])
+        return np.concatenate(pieces)
+
+    def _straight(self, begin: int, end: int) -> np.ndarray:
+        run, part = self.run, slice(begin, end)
+        air = None if self.ambient is None else self.ambient[part]
+        return self.simulate(run.time_s[part], native.MODES[run.mode], run.drive[part], run.fan[part], air)
+
+
+def load_changes(load_n: np.ndarray) -> np.ndarray:
+    """Return the rows at which a load (rows, springs) has moved by LOAD_STEP_N since it was last laid on."""
+    out, laid = [], load_n[0]
+    for row, load in enumerate(load_n):
+        if np.abs(load - laid).max() >= LOAD_STEP_N:
+            out.append(row)
+            laid = load
+    return np.array(out, dtype=int)
 
 
 def array_parameters(array: Array) -> dict[str, float]:

@@ -8,6 +8,11 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+RUN_DRIVE, RUN_AMBIENT, RUN_SENSOR = RUNS_OWN = ("run_drive_gain", "run_ambient_offset", "run_sensor_offset")
+"""What may be a run's own (effects/runs_differ.py): of the measurement, unknown to the plant."""
+DRIVE_GAIN, AMBIENT_OFFSET, SENSOR_OFFSET = "drive_gain", "ambient_offset_k", "run_sensor_offset_k"
+"""Their numbers, by run: `drive_gain@1`."""
+
 
 @dataclass(frozen=True)
 class Free:
@@ -91,7 +96,8 @@ class Spec:
     @property
     def plant_effects(self) -> tuple[str, ...]:
         """Effects to switch on in the plant."""
-        return tuple(dict.fromkeys((*self.effects, *(other for _, other in self.also_on))))
+        on = dict.fromkeys((*self.effects, *(other for _, other in self.also_on)))
+        return tuple(effect for effect in on if effect not in RUNS_OWN)
 
     def without(self, effect: str) -> Spec:
         """Return the spec without an effect (its fixed values stay: they count only while it is on)."""

@@ -17,15 +17,16 @@ from .table import Table, read_table
 from .writing import sha256_of
 
 MAX_SPRINGS = 64
-COLUMN = re.compile(r"^(?:time_s|fan|ambient_c|([ivtu])([1-9][0-9]?)_([avc])|u([1-9][0-9]?))$")
+COLUMN = re.compile(r"^(?:time_s|fan|ambient_c|([ivtf])([1-9][0-9]?)_([avcn])|u([1-9][0-9]?))$")
 EXTRA = re.compile(r"^(?:[mpy][1-9][0-9]?_c|(?:[xd]|px|limits)[1-9][0-9]?|(?:s|cut)[1-9][0-9]?_a|state|note_.*)$")
 """Columns that the simulator and the board write beside the measured ones: skipped."""
-UNIT_OF = {"i": "a", "v": "v", "t": "c"}
+UNIT_OF = {"i": "a", "v": "v", "t": "c", "f": "n"}
 LIMITS = {
     "i": (-0.5, 20.0, "A", "looks like milliamperes: divide by 1000 (`ninespring import --map`)"),
     "v": (-0.5, 60.0, "V", "looks like millivolts: divide by 1000 (`ninespring import --map`)"),
     "u": (-1e-9, 1.0 + 1e-9, "", "commands run from 0 to 1: a command in % is divided by 100"),
     "t": (-60.0, 400.0, "degC", "not a spring's temperature: leave the cell empty if not measured"),
+    "f": (-0.5, 100.0, "N", "looks like millinewtons or grams: a load is in N (`ninespring import --map`)"),
     "fan": (-1e-9, 1.0 + 1e-9, "", "the fan runs from 0 to 1: a fan in % is divided by 100"),
     "ambient_c": (-40.0, 60.0, "degC", "looks like Fahrenheit or kelvin: give degC"),
 }
@@ -33,6 +34,7 @@ LIMITS = {
 BELOW = {
     "i": "a negative current: the leads of that sensor are swapped? Turn the sign (`ninespring import --map`, scale = -1)",
     "v": "a negative voltage: the leads of that sensor are swapped? Turn the sign (`ninespring import --map`, scale = -1)",
+    "f": "a negative load: turn the sign (`ninespring import --map`, scale = -1), 0 is no load",
     "u": "a negative command: commands run from 0 to 1",
 }
 """What to do about a value below the lowest, where that is another thing."""
@@ -65,7 +67,7 @@ def _advice(name: str) -> str:
     for other, ours, todo in NAMES_OF:
         if found := re.fullmatch(other, name, re.IGNORECASE):
             return f"{todo}, and name it {ours.format(*found.groups())}"
-    return "a log has time_s, i1_a, v1_v, u1, t1_c ..., fan, ambient_c; note_... is skipped"
+    return "a log has time_s, i1_a, v1_v, u1, t1_c, f1_n ..., fan, ambient_c; note_... is skipped"
 
 
 def _check_range(table: Table, name: str, kind: str) -> None:
@@ -83,7 +85,7 @@ def _driving_columns(
     path: str | Path, names: list[str], line: int, columns: list[int], springs: int | None, temperatures: bool, why: str
 ) -> tuple[str, int, bool]:
     """Return by what a log is driven ('i' or 'u'), its number of springs, whether it has voltages; refuse a wrong header."""
-    groups: dict[str, set[int]] = {"i": set(), "v": set(), "t": set(), "u": set()}
+    groups: dict[str, set[int]] = {"i": set(), "v": set(), "t": set(), "u": set(), "f": set()}
     because = f" ({why})" if why else ""
     for name, at in zip(names, columns, strict=True):
         if EXTRA.match(name):
@@ -168,7 +170,7 @@ def read_log(
         if name != "time_s":
             kind = name if name in LIMITS else name[0]
             _check_range(table, name, kind)
-        if name == "time_s" or name[0] in "iu" or name == "fan" or name[0] == "v":
+        if name == "time_s" or name[0] in "iuvf":
             holes = np.flatnonzero(frame[name].isna().to_numpy())
             if holes.size:
                 line, column = table.where(int(holes[0]), name)
@@ -211,6 +213,12 @@ def read_log(
     if "ambient_c" in frame and frame["ambient_c"].notna().any():
         ambient = frame["ambient_c"].ffill().bfill().to_numpy(float)
     fan = frame["fan"].to_numpy(float) if "fan" in frame else np.zeros(len(frame))
+    loads = [f"f{k}_n" for k in range(1, count + 1)]
+    load = None
+    if any(name in frame for name in loads):
+        # a spring without a column carries none; a balance's offset is no pull
+        load = np.column_stack([frame[name] if name in frame else np.zeros(len(frame)) for name in loads])
+        load = np.maximum(load, 0.0)
     run = Run(
         name=str(path),
         sha256=sha256_of(path),
@@ -223,6 +231,7 @@ def read_log(
         current_a=current,
         voltage_v=voltage,
         layers=_layers(table, count, path),
+        load_n=load,
         notes=notes,
     )
     if mode == "command":

@@ -1,6 +1,6 @@
 """What is mended of a log without guessing, and what is doubted of it: both are said in `Run.notes`.
 
-Repeated rows, gaps, glitches, a saturated or dead sensor are mended; wrong units are refused or doubted.
+Repeated rows, gaps, glitches, a saturated, dead or frozen sensor are mended; wrong units are refused or doubted.
 """
 
 from __future__ import annotations
@@ -152,6 +152,28 @@ def mask_bad_sensors(run: Run) -> None:
                     f"t{k + 1}_c stays at its {edge} value {extreme:g} degC for {longest} rows: "
                     "saturated, those rows left out"
                 )
+        _mask_frozen(run, k)
+
+
+def _mask_frozen(run: Run, k: int) -> None:
+    """A sensor that goes on showing one value after its spring's drive has changed, far longer than it ever shows another."""
+    seen = np.flatnonzero(np.isfinite(run.temperature_c[:, k]))
+    measured = run.temperature_c[seen, k]
+    bounds = np.concatenate(([0], np.flatnonzero(np.diff(measured) != 0) + 1, [len(measured)]))
+    lengths = np.diff(bounds)
+    if len(lengths) < 2:
+        return
+    longest = int(np.argmax(lengths))
+    begin, end = int(bounds[longest]), int(bounds[longest + 1])
+    moved = np.flatnonzero(np.diff(run.drive[seen[begin:end], k]) != 0)
+    since = end - begin - int(moved[0]) if moved.size else 0
+    elsewhere = int(np.delete(lengths, longest).max())
+    if since >= 30 and since > 4 * elsewhere:
+        run.temperature_c[seen[begin + 1 : end], k] = np.nan
+        run.notes.append(
+            f"t{k + 1}_c shows {measured[begin]:g} degC from {run.time_s[seen[begin]]:g} to {run.time_s[seen[end - 1]]:g} s "
+            "whatever its spring is given: frozen, those rows left out"
+        )
 
 
 def _longest_run(flags: np.ndarray) -> int:

@@ -30,6 +30,8 @@ class Run:
     voltage_v: np.ndarray | None = None
     layers: int = 1
     """2: the first half of the springs is the elongation layer, the other the stiffness layer below it."""
+    load_n: np.ndarray | None = None
+    """(n, k), N, or None where the log has none; row r holds until time r + 1."""
     notes: list[str] = field(default_factory=list)
     warm: bool = False
     """The run begins warm and steady: hidden heat is in balance with the first inputs."""

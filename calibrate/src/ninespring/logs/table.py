@@ -195,8 +195,11 @@ def _refuse_first_bad_cell(
                     good = False
                 if not good:
                     shown = value if len(value) <= 20 else value[:17] + "..."
+                    advice = "leave the cell empty if not measured"
+                    if name == "time_s":
+                        advice = "times are seconds (`ninespring import --map`, unit = iso, reads clocks with a date)"
                     raise InputError(
-                        f"{name} is '{shown}', not a number: leave the cell empty if not measured",
+                        f"{name} is '{shown}', not a number: {advice}",
                         path,
                         numbers[row],
                         at,

@@ -66,6 +66,7 @@ def verdict(result: dict[str, Any]) -> str:
     """Return the outcome in one sentence."""
     before, after = result["baseline"], result["after"]
     names = [e["name"] + (f" ({e['variant']})" if e.get("variant") else "") for e in result["effects"]]
+    apart = result.get("runs_differ")
     held = f"held-out error {before['holdout_rmse_c']:.2f} → {after['holdout_rmse_c']:.2f} K at a noise of {before['noise_c']:.2f} K"
     if names and not result["unexplained"]:
         return f"Missing: {' and '.join(names)}; {held}."
@@ -73,6 +74,8 @@ def verdict(result: dict[str, Any]) -> str:
         return f"Missing: {' and '.join(names)}, and something that no effect of the library explains; {held}."
     if result["unexplained"]:
         return f"Something is missing that no effect of the library explains; {held}."
+    if apart:
+        return f"Nothing is missing in the array's model, but the runs differ; {held}."
     return f"Nothing is missing: the declared model explains the data to the noise; {held}."
 
 
@@ -82,6 +85,8 @@ def findings(result: dict[str, Any]) -> list[tuple[str, str]]:
     for one in result["effects"]:
         sure = f"{one['certainty']}, {100 * one['probability']:.0f} %" if "probability" in one else ""
         out.append((f"{one['name']}: {sure}" if sure else one["name"], one.get("text", one["in_words"])))
+    for one in result.get("runs_differ", []):
+        out.append((f"runs differ: {one['certainty']}, {100 * one['probability']:.0f} %", one["text"]))
     for one in result.get("unnamed", []):
         out.append(("a cause without a name", one["text"][0].upper() + one["text"][1:] + "."))
     for event in result.get("unknown_heat", {}).get("events", []):

@@ -17,7 +17,7 @@ import numpy as np
 from .. import effects
 from ..effects import Candidate
 from ..fit.problem import Problem
-from ..fit.spec import Fit, Spec
+from ..fit.spec import RUNS_OWN, Fit, Spec
 from .evidence import excess, fit_factor, gain, log_evidence
 from .screen import Screen
 
@@ -35,6 +35,10 @@ BEAM = 6
 """Sets of causes that the search downwards keeps at each size ..."""
 REFITTED = 3
 """... and of the best of all sizes, how many are fitted in earnest."""
+STEPS = 14
+"""Of one fit, at most ..."""
+SPRINT = 5
+"""... and of each of several starts, before the best of them goes on."""
 
 MAX_EFFECTS = 4
 
@@ -87,11 +91,9 @@ class Search:
             jac = problem.jacobian(fit.spec, fit.values, predicted)
         used = jac[:, np.linalg.norm(jac, axis=0) > 1e-6]
         q = np.linalg.qr(used)[0] if used.shape[1] else np.zeros((problem.count, 0))
-        directions = np.empty((problem.count, len(owner)))
-        for d in range(len(owner)):
-            change = [shown[d * many + r] - predicted[r] for r in runs]
-            vector = problem.vector(change)
-            directions[:, d] = vector - q @ (q.T @ vector)
+        changes = [[shown[d * many + r] - predicted[r] for r in runs] for d in range(len(owner))]
+        vectors = problem.vectors(changes)
+        directions = (vectors - (vectors @ q) @ q.T).T
         vector = fit.vector if fit.vector is not None else problem.vector(fit.residual)
         vector = vector - q @ (q.T @ vector)
         moment, size = directions.T @ vector, np.maximum((directions**2).sum(axis=0), 1e-12)
@@ -144,13 +146,17 @@ class Search:
         key = self.key(spec)
         if key in self.fits:
             return self.fits[key]
-        best = self.problem.fit(spec, start, tolerance=1e-3, max_steps=14, near=fit)
+        starts = [start]
         for candidate in added:
             others = [candidate.start_at(1.0, place) for place in self.places(fit, candidate)[1:]]
-            for other in (*candidate.more_starts, *others):
-                if self.thorough or len(added) == 1:
-                    again = self.problem.fit(spec, start | other, tolerance=1e-3, max_steps=14, near=fit)
-                    best = min(best, again, key=lambda one: one.chi2)
+            if self.thorough or len(added) == 1:
+                starts += [start | other for other in (*candidate.more_starts, *others)]
+        # several starts race: all begin, the one that is ahead goes on
+        steps = SPRINT if len(starts) > 1 else STEPS
+        begun = [self.problem.fit(spec, one, tolerance=1e-3, max_steps=steps, near=fit) for one in starts]
+        best = min(begun, key=lambda one: one.chi2)
+        if len(starts) > 1:
+            best = self.problem.fit(spec, best.as_dict(), tolerance=1e-3, max_steps=STEPS, near=best)
         self.fits[key] = best
         return best
 
@@ -176,7 +182,15 @@ class Search:
         )
 
     def preferred(self, one: Fit, other: Fit) -> bool:
-        """Return whether `one` takes the place of `other`, which has as many effects."""
+        """Return whether `one` takes the place of `other`, which has as many effects.
+
+        What is a run's own does so only where it explains more that matters than what is the same in all runs.
+        """
+        own = [len(set(fit.spec.effects) & set(RUNS_OWN)) for fit in (one, other)]
+        if own[0] > own[1] and gain(one, other) < MIN_GAIN:
+            return False
+        if own[0] < own[1] and gain(other, one) < MIN_GAIN:
+            return True
         ahead = (
             log_evidence(self.problem, one, other) if one.chi2 < other.chi2 else -log_evidence(self.problem, other, one)
         )
@@ -317,7 +331,7 @@ class Search:
         if key == self.key(self.base.spec):
             return self.base
         if key not in self.fits:
-            self.fits[key] = self.problem.fit(spec, fit.as_dict(), tolerance=1e-3, max_steps=14, near=fit)
+            self.fits[key] = self.problem.fit(spec, fit.as_dict(), tolerance=1e-3, max_steps=STEPS, near=fit)
         return self.fits[key]
 
     def rivals(self, fit: Fit, without: dict[str, Fit], most: int = 3) -> list[tuple[str, Fit]]:
@@ -408,6 +422,8 @@ class Search:
                 continue
             self.progress(f"fitting {' + '.join(screen.candidates[k].effect for k in chosen)}")
             fit = self.refit(self.base, [screen.candidates[k] for k in chosen], [sizes[k] for k in chosen])
+            if fit.chi2 >= current.chi2:
+                continue  # and so is every part of it
             fit, _ = self.backward(fit)
             if fit is not current and fit.chi2 < current.chi2 and self.preferred(fit, current):
                 more = len(fit.spec.effects) - len(current.spec.effects)

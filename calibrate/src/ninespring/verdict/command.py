@@ -129,7 +129,8 @@ def _print_diagnosis(result: dict[str, Any], verdict: str) -> None:
                 "yes" if one["on_chip"] else "no",
             )
         out.print(table)
-    lines = [
+    lines = [f"{one['text']} Its own in each run: not in model.toml." for one in result["runs_differ"]]
+    lines += [
         f"{one['instead_of']} or {one['name']}: these data cannot tell. {one['separating_experiment']}"
         for one in result["rivals"]
     ]

@@ -74,7 +74,10 @@ def find(read: Readings, columns: dict[str, np.ndarray], model: Linear) -> tuple
             inside = np.cumsum((basis[rows] * weight[:, None])[::-1], axis=0)[::-1]
             moment = np.cumsum((rest[rows] * weight)[::-1])[::-1]
             power = np.cumsum((weight**2)[::-1])[::-1] - (inside**2).sum(axis=1)
-            gain = np.where(power > 1e-6 * weight.max() ** 2, moment**2 / np.maximum(power, 1e-9), 0.0)
+            size = moment / np.maximum(power, 1e-9)
+            # what is not half of a finding is none beside others either
+            told = (power > 1e-6 * weight.max() ** 2) & (np.abs(size) > 0.5 * SMALLEST_OHM)
+            gain = np.where(told, moment * size, 0.0)
             # a few readings, as those of the moment in which a spring is switched on, are no contact that stays
             edges = [0, *(int(np.flatnonzero(rows == one.since)[0]) for one in beside if one.spring == k), len(rows)]
             for edge in edges:

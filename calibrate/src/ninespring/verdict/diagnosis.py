@@ -20,14 +20,14 @@ from ..errors import InputError
 from ..fit import statistics
 from ..fit.declared import base_spec
 from ..fit.problem import Problem
-from ..fit.spec import Fit, Spec
+from ..fit.spec import RUNS_OWN, Fit, Spec
 from ..logs import condense
 from ..logs.run import Run
 from ..models import Array, Model
 from ..search import search, unnamed
 from ..search.certainty import CERTAIN, NAMED, witness
 from ..search.evidence import EQUIVALENT, difference, excess, log_evidence, unexplained
-from . import contacts, experiments, plausibility, resistance, unknown_heat
+from . import contacts, experiments, plausibility, resistance, runs_apart, unknown_heat
 from .residual import depends_on
 from .result import DRIFT_LEFT_OUT, model_of, parameters_of
 
@@ -243,7 +243,8 @@ def _diagnose(
     if model:
         spec = with_effects_of(spec, model, known, frozen)
     base = first_fit(problem, spec)
-    found = search.Search(problem, [c for c in known if c.effect not in spec.effects], base, progress)
+    own = effects.of_runs(problem)
+    found = search.Search(problem, [c for c in (*known, *own) if c.effect not in spec.effects], base, progress)
     final, without, contenders = found.run()
     progress("what v / i says")
     if steps := (resistance.witness(problem, final) or {}).get("contacts"):
@@ -260,8 +261,9 @@ def _diagnose(
     final = _finish(problem, final)
     # where the ambient was not logged, that it drifted is no stand-in
     guessed = all(run.ambient_c is None for run in problem.runs)
+    free_to_bend = (*RUNS_OWN, *(["ambient_drift"] if guessed else []))
     witnesses = {
-        effect: witness(problem, final, effect, other, found.is_flexible(final, effect) and not guessed)
+        effect: witness(problem, final, effect, other, found.is_flexible(final, effect) and effect not in free_to_bend)
         for effect, other in without.items()
     }
     # beside causes without a name that leave structure themselves, a name must explain more than it leaves
@@ -274,6 +276,7 @@ def _diagnose(
         final = _finish(problem, final)
         without = {effect: found.reduced(final, effect) for effect in without if effect not in doubtful}
         contenders = found.rivals(final, without)
+    final = runs_apart.with_spread(problem, final)
     left_over = unexplained(problem, final) or bool(hidden)
     adopted = [e for e in final.spec.effects if e not in base.spec.effects]
     strength = {e: log_evidence(problem, final, without[e]) for e in adopted}
@@ -289,8 +292,11 @@ def _diagnose(
         final = with_everything(problem, final, base)
     base_out, final_out = problem.holdout_rmse(base), problem.holdout_rmse(final)
 
-    listed = []
+    listed, runs_differ = [], []
     for effect, growing in steps:
+        if effect in RUNS_OWN:
+            runs_differ.append(runs_apart.entry(problem, final, effect, strength[effect], witnesses[effect]))
+            continue
         entry = {
             "name": effect,
             "rmse_c": statistics.rms(growing.residual),
@@ -348,6 +354,7 @@ def _diagnose(
         },
         "unexplained": bool(left_over),
         "unknown_heat": heat.as_dict(),
+        "runs_differ": runs_differ,
         "unnamed": [one.as_dict() for one in hidden],
         **(
             {"resistance": {key: one for key, one in second.items() if key not in ("effects", "contacts")}}

@@ -78,9 +78,9 @@ def _as_measured(problem: Problem, fit: Fit, r: int) -> np.ndarray:
 
     What heat the model has wrong, as that of a contact which is measured with its spring, is in neither.
     """
-    run = problem.runs[r]
+    run = problem.run_of(r, fit.as_dict())
     ambient = problem.ambient_of(r, fit.as_dict())
-    traced = simulate_run(problem.plant_for(fit.spec, fit.values), run, ambient, {}, trace=True)
+    traced = simulate_run(problem.plant_for(fit.spec, fit.values, r), run, ambient, {}, trace=True)
     left = pd.DataFrame(fit.residual[r]).rolling(SMOOTHED, center=True, min_periods=1).mean().fillna(0.0).to_numpy()
     hot = np.clip(traced[:, :, 0] + left, -60.0, 500.0)
     given = replace(run, mode="temperature", drive=hot, warm=False, starts=[0])
