@@ -53,7 +53,7 @@ struct sum_t {
     int runs = 0, hot_runs = 0;
     double hottest_c = -std::numeric_limits<double>::infinity();
     int driven = 0, late = 0, never_few = 0, never_nine = 0, silent = 0, undriven = 0,
-        undriven_over = 0;
+        undriven_over = 0, faults = 0;
     double latest_few_s = 0.0, latest_nine_s = 0.0; // of those that got there or were reported
     double silent_s = 0.0, undriven_most = 0.0;
     double hold_c = 0.0, hold_s = 0.0, reheats = 0.0, settled_h = 0.0;
@@ -71,6 +71,7 @@ struct sum_t {
         for (int k = 0; k < run.result.score.springs; k++) {
             const score_spring_t &spring = run.result.score.spring[k];
             run_hottest_c = std::max(run_hottest_c, spring.hottest_c);
+            faults += spring.fault;
             known_s += spring.known_s;
             inside_s += spring.inside_s;
             inside_c_s += spring.inside_c_s;
@@ -125,6 +126,7 @@ const column_t columns[] = {
     {"nine s", 6, [](const sum_t &s) { return text(s.latest_nine_s, 0); }},
     {"silent", 6, [](const sum_t &s) { return fmt::format("{}", s.silent); }},
     {"silent s", 9, [](const sum_t &s) { return text(s.silent_s, 0); }},
+    {"faults", 6, [](const sum_t &s) { return fmt::format("{}", s.faults); }},
     {"undriven > 5 %", 14,
      [](const sum_t &s) { return fmt::format("{} / {}", s.undriven_over, s.undriven); }},
     {"hold degC", 9, [](const sum_t &s) { return text(s.hold_c / s.hold_s, 1); }},

@@ -183,7 +183,9 @@ static void heat(drive_policy_t *policy, thermal_model_t *model, uint8_t k, uint
     const bool full = is_full(level_permille);
     const float level = 0.001f * (float)level_permille;
     /* its own limit leaves too little to go on, and it is hot enough to have transformed */
-    const bool ends = s->ceiling_ma < boost_ma - (boost_ma >> 2) && c7 > points.austenite_finish_c7;
+    const bool ends =
+        s->ceiling_ma < boost_ma - (boost_ma >> 2) &&
+        spring_estimator_hottest_c(b, model, k) > spring_c(points.austenite_finish_c7);
     if (ends || (full ? spring_estimator_has_transformed(&policy->estimator, model, k)
                       : phase_of(policy, model, k) >= level)) {
         enter(policy, model, k, DRIVE_POLICY_STAGE_HOLD, level_permille);
@@ -348,8 +350,12 @@ static void derate(drive_policy_t *policy, const thermal_model_t *model, uint8_t
 {
     drive_policy_spring_t *s = &policy->spring[k];
     const drive_policy_parameters_t *p = &policy->parameters;
-    float share = derating_share(now_c(model, k), 0.01f * (float)p->temperature_limit_cc,
-                                 kelvin(p->temperature_band_cc));
+    const float limit_c = 0.01f * (float)p->temperature_limit_cc;
+    const float band_k = kelvin(p->temperature_band_cc);
+    const float likely = derating_share(now_c(model, k), limit_c, band_k);
+    const float hottest_c = spring_estimator_hottest_c(&policy->estimator.spring[k], model, k);
+    const float at_worst = derating_share(hottest_c, limit_c + band_k, band_k);
+    float share = likely < at_worst ? likely : at_worst;
     s->derating = share < 1.0f ? DRIVE_POLICY_LIMIT_TEMPERATURE : DRIVE_POLICY_LIMIT_NONE;
     const float allowed = 1.0f - worst_neighbour(policy, k);
     if (allowed < 1.0f && allowed <= share) {

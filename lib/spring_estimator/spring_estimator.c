@@ -207,6 +207,7 @@ void spring_jump(spring_belief_t *b, float by)
     b->mark_ohm *= by;
     b->onset_ohm *= by;
     b->cold_ohm *= by;
+    b->full_ohm *= by;
     b->learnt.austenite_ohm *= by;
     b->learnt.martensite_ohm *= by;
     b->slow_ohm = b->line_ohm > 0.0f ? b->line_ohm : b->slow_ohm * by;
@@ -321,6 +322,9 @@ static float predict(const spring_estimator_t *e, spring_belief_t *b, const ther
     if (b->variance_k2 < LEAST_SD_K * LEAST_SD_K) {
         b->variance_k2 = LEAST_SD_K * LEAST_SD_K;
     }
+    if (b->gone_k > 0.0f) {
+        b->gone_k = keeps * b->gone_k + per_w * above_k * b->gone_w_per_k;
+    }
     b->last_c = now_c;
     return per_w * (power_w - balance_w - extra_w);
 }
@@ -353,6 +357,18 @@ float spring_see(const spring_estimator_t *e, spring_belief_t *b, thermal_model_
     b->variance_k2 = fmaxf(b->variance_k2 * left, LEAST_SD_K * LEAST_SD_K);
     INVARIANT(b->loss_variance >= 0.0f && b->variance_k2 > 0.0f);
     return error_k;
+}
+
+void spring_move(const spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model, uint8_t k,
+                 float more_k, float more_w_per_k)
+{
+    spring_set_temperature(model, k, spring_now_c(model, k) + more_k, SPRING_PHASE_AUSTENITE);
+    b->last_c = spring_now_c(model, k);
+    b->seen = true;
+    correct_loss(e, b, more_w_per_k);
+    b->variance_k2 += more_k * more_k;
+    b->loss_variance += more_w_per_k * more_w_per_k;
+    b->covariance += more_k * more_w_per_k;
 }
 
 void spring_keep_above(const spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model,
@@ -607,6 +623,11 @@ float spring_estimator_cooling_s(const spring_estimator_t *e, const thermal_mode
     return e->heat_capacity_j_per_k / loss * logf((hot_c - ambient_c) / (start_c - ambient_c)) +
            hottest_capacity_j_per_k(e, &transforming, &t) / loss *
                logf((left_c - ambient_c) / (finish_c - ambient_c));
+}
+
+float spring_estimator_hottest_c(const spring_belief_t *b, const thermal_model_t *model, uint8_t k)
+{
+    return spring_now_c(model, k) + b->gone_k;
 }
 
 /* What moved it lately, a gust for one, may do so again, either way. */

@@ -113,6 +113,11 @@ typedef struct {
     float line_c;
     float line_a;     /* current of the line */
     float line_sd;    /* of the line itself, relative */
+    /* the last loss, until its heating has brought it back */
+    float full_ohm;            /* what it read before, at martensite start; 0: no such loss */
+    float gone;                /* and by how much less it read then, relative, signed */
+    float gone_k;              /* what its distance */
+    float gone_w_per_k;        /* and loss were moved by */
     float rise_per_k; /* what a kelvin adds to it, relative */
     float rise_sd_per_k;
 } spring_belief_t;
@@ -193,6 +198,9 @@ float spring_estimator_sd_k(const spring_belief_t *belief);
 /* The same while it is held at its present temperature, at its largest: an error of the loss shows
  * within minutes. */
 float spring_estimator_hold_sd_k(const spring_estimator_t *estimator, const thermal_model_t *model,
+                                 uint8_t spring);
+/* As hot as it is if what it seems to have lost was no phase, degC. */
+float spring_estimator_hottest_c(const spring_belief_t *belief, const thermal_model_t *model,
                                  uint8_t spring);
 /* How long it may still be hot from before power-on, s; 0 where that is over. */
 float spring_estimator_cooling_s(const spring_estimator_t *estimator, const thermal_model_t *model,

@@ -41,12 +41,14 @@ static void see_onset(const spring_estimator_t *e, spring_belief_t *b, thermal_m
 {
     const float now_c = spring_now_c(model, k);
     b->onset = true;
+    spring_is_back(b);
     b->onset_k = b->heat_k;
     if (b->possible == SPRING_PHASE_MARTENSITE) {
         spring_learnt_t *l = &b->learnt;
         if (b->cold_ohm > 0.0f && now_c > b->cold_c + COLD_SPAN_K) {
             const float rise_per_k = (b->onset_ohm / b->cold_ohm - 1.0f) / (now_c - b->cold_c);
-            if (fabsf(rise_per_k) < COEFFICIENT_MOST_PER_HEAT_K) { /* else a contact has moved */
+            if (rise_per_k > COEFFICIENT_LEAST_PER_K &&
+                rise_per_k < COEFFICIENT_MOST_PER_HEAT_K) { /* else a contact has moved */
                 l->martensite_rise_per_k = rise_per_k;
                 l->martensite_ohm = b->cold_ohm / (1.0f + rise_per_k * (b->cold_c - LEARNT_AT_C));
             }
@@ -124,6 +126,14 @@ static bool may_transform(const spring_belief_t *b, const thermal_model_t *model
                spring_c(thermal_model_transformation(model, k).austenite_start_c7);
 }
 
+/* No more comes back than was missing. */
+static bool may_come_back(const spring_belief_t *b)
+{
+    return b->learnt.austenite_ohm == 0.0f ||
+           fabsf(b->excess) <
+               b->begun_missing * fabsf(b->learnt.change) + EXCESS_SEEN + EXCESS_SDS * b->noise;
+}
+
 /* By as much as a transformation does: one whose change is known, by half of it at least. */
 static bool has_changed(const spring_belief_t *b)
 {
@@ -195,11 +205,11 @@ void spring_heating_watch(const spring_estimator_t *e, spring_belief_t *b, therm
     b->steep = b->onset && fabsf(excess) > STEEP_SDS * b->noise;
     b->flat_k = b->steep || !b->onset ? 0.0f : b->flat_k + step_k;
     if (!b->onset && fabsf(b->excess) > EXCESS_SEEN + EXCESS_SDS * b->noise) {
-        if (may_transform(b, model, k)) {
+        if (may_transform(b, model, k) && may_come_back(b)) {
             see_onset(e, b, model, k);
             b->steep = true;
         } else {
-            spring_jump(b, b->ohm / b->onset_ohm); /* too cold: a contact */
+            spring_jump(b, b->ohm / b->onset_ohm); /* too cold, or too much: a contact */
             b->excess = 0.0f;
         }
     } else if (b->flat_k >= FLAT_K && has_changed(b) &&

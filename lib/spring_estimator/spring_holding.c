@@ -23,6 +23,8 @@
 #define AWAY_LEAST_K   1.0f /* less tells nothing of a coefficient */
 /* Of an average: what a sensor's steps leave, LOSS_LEAST / 3, and it tells anew in 2 x 16 turns. */
 #define LINE_VARIANCE (32.0f * LOSS_LEAST * LOSS_LEAST / 9.0f)
+#define BACK_SHARE 0.5f /* of a loss: as near to being back as to being gone */
+#define BACK_LEAST 0.01f /* twice what a line differs by from one heating to the next */
 #define STILL_K       0.5f  /* below where it would be seen */
 #define COSINE_BEGINS 0.64f /* 2 / pi: x where a cosine has sqrt(lost) = (pi / 2) x */
 
@@ -44,7 +46,7 @@ void spring_begin_line(spring_belief_t *b, float now_c)
     /* as martensite's until this line tells: a contact that ages makes another slope of each */
     const spring_learnt_t *l = &b->learnt;
     const float most_per_k = l->martensite_ohm > 0.0f
-                                 ? COEFFICIENT_BOUND_PER_K + 0.5f * fabsf(l->martensite_rise_per_k)
+                                 ? COEFFICIENT_BOUND_PER_K + fabsf(l->martensite_rise_per_k)
                                  : COEFFICIENT_MOST_PER_K;
     b->rise_per_k = l->martensite_rise_per_k;
     b->rise_sd_per_k = most_per_k / SPRING_ESTIMATOR_BOUND_SDS;
@@ -60,9 +62,29 @@ void spring_begin_rough_line(spring_belief_t *b, float now_c)
     b->rough = true;
 }
 
-static void see_crossing(const spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model,
-                         uint8_t k, float lost)
+static float start_c(const thermal_model_t *model, uint8_t k)
 {
+    return spring_c(thermal_model_transformation(model, k).martensite_start_c7);
+}
+
+/* Until it is back, or was found not to have been phase, all of it is one loss. */
+static void remember(spring_belief_t *b, float full_ohm, float left, float moved_k,
+                     float moved_w_per_k)
+{
+    if (b->full_ohm == 0.0f) {
+        b->full_ohm = full_ohm;
+    }
+    b->gone += left;
+    b->gone_k += moved_k;
+    b->gone_w_per_k += moved_w_per_k;
+}
+
+static void see_crossing(const spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model,
+                         uint8_t k, float lost, float left)
+{
+    const float was_w_per_k = b->learnt.loss_w_per_k;
+    const float full_ohm =
+        b->line_ohm * (1.0f + b->rise_per_k * (start_c(model, k) - b->line_c));
     const bool searched = spring_estimator_sd_k(b) > 3.0f * CROSSING_SD_K;
     if (lost > LARGE_LOSS) {
         /* nearer to it by as much as more is lost up there */
@@ -80,6 +102,37 @@ static void see_crossing(const spring_estimator_t *e, spring_belief_t *b, therma
     if (!searched && -error_k > b->disturbance_k) {
         b->disturbance_k = -error_k;
     }
+    remember(b, full_ohm, left, -error_k, b->learnt.loss_w_per_k - was_w_per_k);
+}
+
+/* What was no phase is taken back: it is where it was believed before, as unsure as it was found
+ * wrong. */
+static void take_back(const spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model,
+                      uint8_t k)
+{
+    spring_move(e, b, model, k, b->gone_k, -b->gone_w_per_k);
+    b->gone_k = b->gone_w_per_k = 0.0f;
+}
+
+void spring_is_back(spring_belief_t *b)
+{
+    b->full_ohm = b->gone = b->gone_k = b->gone_w_per_k = 0.0f;
+}
+
+/* Phase that was lost comes back with heat. What has not was a contact, or the sensor. */
+static void look_back(const spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model,
+                      uint8_t k, float now_c)
+{
+    const float full_ohm = b->full_ohm * (1.0f + b->rise_per_k * (now_c - start_c(model, k)));
+    const float missing = b->slow_ohm / full_ohm - 1.0f;
+    if (fabsf(b->gone) > BACK_LEAST) {
+        if (missing * b->gone > BACK_SHARE * b->gone * b->gone) {
+            take_back(e, b, model, k);
+        } else {
+            spring_is_back(b);
+        }
+    }
+    b->full_ohm = b->gone = 0.0f; /* too little to tell: it stays in doubt */
 }
 
 /* The current has dropped, the spring is what it was a moment ago: what reads otherwise is the
@@ -188,6 +241,9 @@ void spring_holding_watch(const spring_estimator_t *e, spring_belief_t *b, therm
             return;
         }
         spring_begin_line(b, now_c);
+        if (b->full_ohm > 0.0f) {
+            look_back(e, b, model, k, now_c);
+        }
     } else if (b->quiet == 0 && b->offset_sd_v > OFFSET_LEAST_V && learn_offset(b, now_c)) {
         return;
     }
@@ -219,6 +275,10 @@ void spring_holding_watch(const spring_estimator_t *e, spring_belief_t *b, therm
         if (b->quiet >= QUIET_TURNS) {
             if (b->rough) { /* it has come to rest */
                 spring_begin_line(b, now_c);
+                if (b->full_ohm > 0.0f && b->lost == 0.0f) {
+                    look_back(e, b, model, k, now_c);
+                    return;
+                }
             }
             follow(b, now_c, left);
             spring_keep_above(e, b, model, k, lost_at_c(model, k, b->lost) - STILL_K);
@@ -231,7 +291,7 @@ void spring_holding_watch(const spring_estimator_t *e, spring_belief_t *b, therm
             spring_begin_rough_line(b, now_c);
             return;
         }
-        see_crossing(e, b, model, k, changed / fabsf(b->learnt.change));
+        see_crossing(e, b, model, k, changed / fabsf(b->learnt.change), left);
         spring_begin_rough_line(b, spring_now_c(model, k)); /* the average still falls */
     }
 }
