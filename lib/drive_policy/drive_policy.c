@@ -30,6 +30,7 @@
 #define SUSPECTED_W   0.038f         /* stops a fall of 0.1 K/s */
 #define FOLLOW_S      4.0f           /* a distance from the held temperature is closed in */
 #define SHORT_MOST_K  20.0f
+#define STILL_K_PER_S 0.3f
 #define KEPT_C7       (3 * 128) /* above austenite start what was reached is worth keeping */
 #define TURN_C7       (6 * 128) /* colder than one that heats: it is its turn */
 #define GOES_ON_C7    (4 * 128) /* below austenite start: keeps its turn */
@@ -182,10 +183,12 @@ static void heat(drive_policy_t *policy, thermal_model_t *model, uint8_t k, uint
     s->wanted_ma = boost_ma;
     const bool full = is_full(level_permille);
     const float level = 0.001f * (float)level_permille;
-    /* its own limit leaves too little to go on, and it is hot enough to have transformed */
-    const bool ends =
-        s->ceiling_ma < boost_ma - (boost_ma >> 2) &&
-        spring_estimator_hottest_c(b, model, k) > spring_c(points.austenite_finish_c7);
+    /* its own limit leaves too little to go on, and it is hot enough to have transformed; or it may
+     * be, and rises no more */
+    const float finish_c = spring_c(points.austenite_finish_c7);
+    const bool ends = (s->ceiling_ma < boost_ma - (boost_ma >> 2) && spring_c(c7) > finish_c) ||
+                      (s->ceiling_ma < boost_ma && s->rise_k_per_s < STILL_K_PER_S &&
+                       spring_estimator_hottest_c(b, model, k) > finish_c);
     if (ends || (full ? spring_estimator_has_transformed(&policy->estimator, model, k)
                       : phase_of(policy, model, k) >= level)) {
         enter(policy, model, k, DRIVE_POLICY_STAGE_HOLD, level_permille);
@@ -352,10 +355,8 @@ static void derate(drive_policy_t *policy, const thermal_model_t *model, uint8_t
     const drive_policy_parameters_t *p = &policy->parameters;
     const float limit_c = 0.01f * (float)p->temperature_limit_cc;
     const float band_k = kelvin(p->temperature_band_cc);
-    const float likely = derating_share(now_c(model, k), limit_c, band_k);
     const float hottest_c = spring_estimator_hottest_c(&policy->estimator.spring[k], model, k);
-    const float at_worst = derating_share(hottest_c, limit_c + band_k, band_k);
-    float share = likely < at_worst ? likely : at_worst;
+    float share = derating_share(hottest_c, limit_c, band_k);
     s->derating = share < 1.0f ? DRIVE_POLICY_LIMIT_TEMPERATURE : DRIVE_POLICY_LIMIT_NONE;
     const float allowed = 1.0f - worst_neighbour(policy, k);
     if (allowed < 1.0f && allowed <= share) {
@@ -403,8 +404,9 @@ static void watch_away(drive_policy_t *policy, const thermal_model_t *model, uin
     drive_policy_spring_t *s = &policy->spring[k];
     const float level = is_full(level_permille) ? 1.0f : 0.001f * (float)level_permille;
     const float band = 1.0f - THERE + (level < 1.0f ? LEVEL_BAND : 0.0f);
-    const bool there = s->stage == DRIVE_POLICY_STAGE_HOLD &&
-                       spring_estimator_sees(&policy->estimator.spring[k]) &&
+    const spring_belief_t *b = &policy->estimator.spring[k];
+    const bool there = s->stage == DRIVE_POLICY_STAGE_HOLD && spring_estimator_sees(b) &&
+                       !b->unproven &&
                        fabsf(phase_of(policy, model, k) - level) < band;
     if (there) {
         s->arrived = true;

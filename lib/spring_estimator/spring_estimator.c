@@ -553,6 +553,8 @@ void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, 
     const bool lacks =
         full && b->possible != SPRING_PHASE_AUSTENITE && spring_lacks_phase(b, model, k);
     const float phase = spring_estimator_phase(e, model, k);
+    b->unproven = full && b->gone_k > 0.0f && b->possible != SPRING_PHASE_AUSTENITE &&
+                  !surely_finished(b, model, k, 0.0f);
     if (full && b->possible != SPRING_PHASE_AUSTENITE) {
         b->blind = b->blind || b->possible == SPRING_PHASE_MARTENSITE;
         b->possible = SPRING_PHASE_AUSTENITE;
@@ -564,6 +566,9 @@ void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, 
      */
     const bool certain = spring_heated_enough(e, b, model, k) ||
                          surely_finished(b, model, k, SPRING_ESTIMATOR_BOUND_SDS);
+    if (lacks && certain && !b->onset) {
+        spring_take_back(e, b, model, k);
+    }
     b->blind = b->blind || (lacks && (b->doubted || certain));
     b->doubted = lacks && !b->blind;
     if (full && !lacks && b->onset && b->reads && b->current_a > STRONG_A) {

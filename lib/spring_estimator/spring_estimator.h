@@ -67,6 +67,7 @@ typedef struct {
     uint8_t quiet;      /* turns in which its temperature hardly moved, saturating */
     uint8_t losing;     /* turns on end in which it seems to lose phase */
     bool doubted;       /* its last heating ended before its resistance said so */
+    bool unproven; /* by what it may be hotter it was spared: it may not have transformed again */
     bool odd;           /* the turn before read what no phase changes to so fast */
     bool reads;         /* the last turn had readings fit for use */
     bool seen;          /* the last turn has moved it to where it was seen */

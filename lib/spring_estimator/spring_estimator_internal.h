@@ -64,6 +64,9 @@ void spring_begin_rough_line(spring_belief_t *belief, float now_c);
 /* Even the coldest and heaviest spring has transformed by the heat of this heating. */
 bool spring_heated_enough(const spring_estimator_t *estimator, const spring_belief_t *belief,
                           const thermal_model_t *model, uint8_t spring);
+/* What it had lost was none: it is as hot as if it had not. */
+void spring_take_back(const spring_estimator_t *estimator, spring_belief_t *belief,
+                      thermal_model_t *model, uint8_t spring);
 /* What it had lost was phase: it comes back. */
 void spring_is_back(spring_belief_t *belief);
 /* What the sensor's offset may add to it at another current than its line's, relative. */

@@ -107,16 +107,18 @@ static void see_crossing(const spring_estimator_t *e, spring_belief_t *b, therma
 
 /* What was no phase is taken back: it is where it was believed before, as unsure as it was found
  * wrong. */
-static void take_back(const spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model,
+void spring_take_back(const spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model,
                       uint8_t k)
 {
     spring_move(e, b, model, k, b->gone_k, -b->gone_w_per_k);
     b->gone_k = b->gone_w_per_k = 0.0f;
+    b->unproven = false;
 }
 
 void spring_is_back(spring_belief_t *b)
 {
     b->full_ohm = b->gone = b->gone_k = b->gone_w_per_k = 0.0f;
+    b->unproven = false;
 }
 
 /* Phase that was lost comes back with heat. What has not was a contact, or the sensor. */
@@ -127,7 +129,7 @@ static void look_back(const spring_estimator_t *e, spring_belief_t *b, thermal_m
     const float missing = b->slow_ohm / full_ohm - 1.0f;
     if (fabsf(b->gone) > BACK_LEAST) {
         if (missing * b->gone > BACK_SHARE * b->gone * b->gone) {
-            take_back(e, b, model, k);
+            spring_take_back(e, b, model, k);
         } else {
             spring_is_back(b);
         }
