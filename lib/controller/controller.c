@@ -67,11 +67,12 @@ static void start(controller_t *controller, const controller_settings_t *setting
     controller->springs = (uint8_t)(settings->model.rows * settings->model.columns);
     thermal_model_set_ambient(model, ambient_c7);
     thermal_model_reset(model, ambient_c7);
+    /* by what it is given from here on: where it may be from before is the estimator's to wait for */
+    temperature_ceiling_set(&controller->ceiling, model);
     (void)current_control_init(&controller->current, &settings->current, NULL);
     (void)safety_init(&controller->safety, &settings->safety, controller->springs, NULL);
     (void)drive_policy_init(&controller->policy, &settings->policy, model, NULL);
     tell_resistances(controller);
-    temperature_ceiling_set(&controller->ceiling, model);
 }
 
 bool controller_init(controller_t *controller, const controller_settings_t *settings,
