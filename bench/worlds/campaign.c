@@ -257,7 +257,8 @@ static void ramp_ambient(run_case_t *run, random_t *random, double value)
 {
     (void)random;
     for (int i = 0; i <= 60; i++) {
-        add_event(run, WORLD_AMBIENT_C, run->seconds * i / 60.0, 0, 15.0 + (value - 15.0) * i / 60.0);
+        add_event(run, WORLD_AMBIENT_C, run->seconds * i / 60.0, 0,
+                  15.0 + (value - 15.0) * i / 60.0);
     }
     run->world.ambient_c = 15.0;
     for (int k = 0; k < count(run); k++) {
@@ -292,7 +293,8 @@ static void display(run_case_t *run, random_t *random, double value)
         run_command_t *c = add_command(run, s);
         for (int k = 0; k < count(run); k++) {
             bool on = random_uniform(random, 0.0, 1.0) < 0.5;
-            c->level_permille[k] = on ? (value > 0.0 && random_uniform(random, 0.0, 1.0) < 0.5 ? 500 : 1000) : 0;
+            c->level_permille[k] =
+                on ? (value > 0.0 && random_uniform(random, 0.0, 1.0) < 0.5 ? 500 : 1000) : 0;
         }
         s += random_uniform(random, 20.0, 120.0);
     }
@@ -339,8 +341,11 @@ static void thaw(run_case_t *run, random_t *random, double value)
 static void gain_steps(run_case_t *run, random_t *random, double value)
 {
     for (int k = 0; k < count(run); k++) {
-        add_event(run, random_uniform(random, 0.0, 1.0) < 0.5 ? WORLD_SENSOR_CURRENT_GAIN : WORLD_SENSOR_VOLTAGE_GAIN,
-                  fault_s(run, random), k, random_uniform(random, 0.0, 1.0) < 0.5 ? 1.0 - value : 1.0 + value);
+        add_event(run,
+                  random_uniform(random, 0.0, 1.0) < 0.5 ? WORLD_SENSOR_CURRENT_GAIN
+                                                         : WORLD_SENSOR_VOLTAGE_GAIN,
+                  fault_s(run, random), k,
+                  random_uniform(random, 0.0, 1.0) < 0.5 ? 1.0 - value : 1.0 + value);
     }
 }
 
@@ -364,7 +369,8 @@ static void crimp(run_case_t *run, random_t *random, double value)
         int k = any_driven(run, random);
         double s = fault_s(run, random);
         for (int i = 0; i < 36; i++) {
-            add_event(run, WORLD_CONTACT_OHM, s, k, i % 2 == 0 ? random_uniform(random, 0.005, value) : 0.002);
+            add_event(run, WORLD_CONTACT_OHM, s, k,
+                      i % 2 == 0 ? random_uniform(random, 0.005, value) : 0.002);
             double span = random_uniform(random, 0.0, 1.0);
             s += 0.02 + 60.0 * span * span * span;
         }
@@ -393,9 +399,11 @@ static void reconnect(run_case_t *run, random_t *random, double value)
 
 static void brownout(run_case_t *run, random_t *random, double value)
 {
-    for (double s = random_uniform(random, 20.0, 100.0); s < run->seconds; s += random_uniform(random, 30.0, 120.0)) {
+    for (double s = random_uniform(random, 20.0, 100.0); s < run->seconds;
+         s += random_uniform(random, 30.0, 120.0)) {
         add_event(run, WORLD_SUPPLY_V, s, 0, random_uniform(random, value, 4.6));
-        add_event(run, WORLD_SUPPLY_V, s + random_uniform(random, 0.05, 2.0), 0, run->world.supply_v);
+        add_event(run, WORLD_SUPPLY_V, s + random_uniform(random, 0.05, 2.0), 0,
+                  run->world.supply_v);
     }
 }
 
@@ -417,8 +425,10 @@ static void width(run_case_t *run, random_t *random, double value)
     (void)random;
     for (int k = 0; k < count(run); k++) {
         alloy_t *a = &run->world.spring[k].alloy;
-        a->austenite_finish_c = a->austenite_start_c + value * (a->austenite_finish_c - a->austenite_start_c);
-        a->martensite_finish_c = a->martensite_start_c - value * (a->martensite_start_c - a->martensite_finish_c);
+        a->austenite_finish_c =
+            a->austenite_start_c + value * (a->austenite_finish_c - a->austenite_start_c);
+        a->martensite_finish_c =
+            a->martensite_start_c - value * (a->martensite_start_c - a->martensite_finish_c);
     }
 }
 
@@ -442,10 +452,12 @@ static void breathing(run_case_t *run, random_t *random, double value)
 {
     for (int n = 0; n < 3; n++) {
         int k = any_driven(run, random);
-        double period_s = random_uniform(random, 20.0, 120.0), phase = random_uniform(random, 0.0, 6.0);
+        double period_s = random_uniform(random, 20.0, 120.0),
+               phase = random_uniform(random, 0.0, 6.0);
         for (int i = 0; i < 80; i++) {
             double s = 100.0 + 10.0 * i;
-            add_event(run, WORLD_STRESS_MPA, s, k, value * 7.8 * 0.5 * (1.0 + sin(phase + 6.28 * s / period_s)));
+            add_event(run, WORLD_STRESS_MPA, s, k,
+                      value * 7.8 * 0.5 * (1.0 + sin(phase + 6.28 * s / period_s)));
         }
     }
 }
@@ -455,7 +467,8 @@ static void two_step(run_case_t *run, random_t *random, double value)
     for (int k = 0; k < count(run); k++) {
         double s = random_uniform(random, 85.0, 300.0);
         add_event(run, WORLD_STRESS_MPA, s, k, value * 7.8);
-        add_event(run, WORLD_STRESS_MPA, s + random_uniform(random, 1.0, 30.0), k, 2.0 * value * 7.8);
+        add_event(run, WORLD_STRESS_MPA, s + random_uniform(random, 1.0, 30.0), k,
+                  2.0 * value * 7.8);
         add_event(run, WORLD_STRESS_MPA, s + random_uniform(random, 60.0, 300.0), k, 0.0);
     }
 }

@@ -97,8 +97,7 @@ static void score_driven(score_t *score, score_spring_t *spring, const world_t *
     double now_s = world_time_s(world), since_s = now_s - spring->start_s;
     double austenite = world_austenite(world, k);
     score_report(spring, belief_reported(controller, k), now_s);
-    if (isnan(spring->reached_s) &&
-        within(austenite, spring, SCORE_REACHED, SCORE_LEVEL_REACHED)) {
+    if (isnan(spring->reached_s) && within(austenite, spring, SCORE_REACHED, SCORE_LEVEL_REACHED)) {
         spring->reached_s = now_s;
         settle(spring);
     }

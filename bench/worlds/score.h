@@ -9,17 +9,17 @@
 #include "belief_adapter.h"
 #include "world.h"
 
-#define SCORE_EVERY_TICKS  5
-#define SCORE_REACHED      0.95 /* austenite */
-#define SCORE_LOST         0.90
-#define SCORE_LOST_S       20.0  /* may be lost for so long */
-#define SCORE_LEVEL_REACHED 0.1 /* of a level below 1, either way */
-#define SCORE_LEVEL_LOST 0.2
-#define SCORE_UNDRIVEN     0.05  /* austenite that an undriven spring may have */
-#define SCORE_HOLD_S       300.0 /* from then on after a start a spring counts as held */
-#define SCORE_SETTLED_S    600.0 /* from then on reheats count */
-#define SCORE_REHEAT_A     2.2   /* a reheat begins: no hold needs so much */
-#define SCORE_REPORT_GAP_S 1.0   /* a report still stands over shorter gaps */
+#define SCORE_EVERY_TICKS   5
+#define SCORE_REACHED       0.95 /* austenite */
+#define SCORE_LOST          0.90
+#define SCORE_LOST_S        20.0 /* may be lost for so long */
+#define SCORE_LEVEL_REACHED 0.1  /* of a level below 1, either way */
+#define SCORE_LEVEL_LOST    0.2
+#define SCORE_UNDRIVEN      0.05  /* austenite that an undriven spring may have */
+#define SCORE_HOLD_S        300.0 /* from then on after a start a spring counts as held */
+#define SCORE_SETTLED_S     600.0 /* from then on reheats count */
+#define SCORE_REHEAT_A      2.2   /* a reheat begins: no hold needs so much */
+#define SCORE_REPORT_GAP_S  1.0   /* a report still stands over shorter gaps */
 
 typedef struct {
     bool driven;

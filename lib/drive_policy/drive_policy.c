@@ -406,8 +406,7 @@ static void watch_away(drive_policy_t *policy, const thermal_model_t *model, uin
     const float band = 1.0f - THERE + (level < 1.0f ? LEVEL_BAND : 0.0f);
     const spring_belief_t *b = &policy->estimator.spring[k];
     const bool there = s->stage == DRIVE_POLICY_STAGE_HOLD && spring_estimator_sees(b) &&
-                       !b->unproven &&
-                       fabsf(phase_of(policy, model, k) - level) < band;
+                       !b->unproven && fabsf(phase_of(policy, model, k) - level) < band;
     if (there) {
         s->arrived = true;
         s->away_turns = 0;

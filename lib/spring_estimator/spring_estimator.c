@@ -203,14 +203,18 @@ void spring_estimator_disturb(spring_belief_t *b)
 
 void spring_jump(spring_belief_t *b, float by)
 {
-    b->line_ohm *= by;
-    b->mark_ohm *= by;
-    b->onset_ohm *= by;
-    b->cold_ohm *= by;
+    b->slow_ohm *= by;
+    if (b->heating) {
+        b->run.heat.mark_ohm *= by;
+        b->run.heat.onset_ohm *= by;
+        b->run.heat.cold_ohm *= by;
+    } else if (b->run.line.ohm > 0.0f) {
+        b->run.line.ohm *= by;
+        b->slow_ohm = b->run.line.ohm;
+    }
     b->full_ohm *= by;
     b->learnt.austenite_ohm *= by;
     b->learnt.martensite_ohm *= by;
-    b->slow_ohm = b->line_ohm > 0.0f ? b->line_ohm : b->slow_ohm * by;
     b->ohm_before[0] = b->ohm_before[1] = 0.0f;
 }
 
@@ -218,7 +222,7 @@ void spring_jump(spring_belief_t *b, float by)
  * way is left out. */
 static bool leave_out(spring_belief_t *b, float ohm, float current_a)
 {
-    const bool holds = b->line_ohm > 0.0f;
+    const bool holds = !b->heating && b->run.line.ohm > 0.0f;
     const float was_ohm = holds ? b->slow_ohm : b->ohm_before[0];
     const float step = ohm - was_ohm;
     if (fabsf(step) <= JUMP_LEAST * was_ohm || b->fresh == 0 || was_ohm <= 0.0f) {
@@ -429,7 +433,7 @@ static void look(spring_estimator_t *e, thermal_model_t *model, uint8_t k)
     b->seen = true;
     if (heating) {
         spring_estimator_begin_heating(e, model, k);
-        b->begun_c =
+        b->run.heat.begun_c =
             spring_ambient_c(model); /* a look may take another current's offset for phase */
     }
 }
@@ -469,9 +473,9 @@ void spring_estimator_update(spring_estimator_t *e, thermal_model_t *model, uint
     const float heat_k = predict(e, b, model, k, power_w);
     const float moved_k = b->last_c - before_c;
     b->disturbance_k *= FORGETS;
-    if (b->reads || b->fresh == 0) { /* while a current settles, who knows */
+    if (b->heating && (b->reads || b->fresh == 0)) { /* while a current settles, who knows */
         /* a spring that waits cools by no less than the least loss: more would hide a finish */
-        b->heat_k += heat_k < 0.0f ? LEAST_LOSS * heat_k : heat_k;
+        b->run.heat.heat_k += heat_k < 0.0f ? LEAST_LOSS * heat_k : heat_k;
     }
     if (b->reads && e->observes) {
         look(e, model, k);
@@ -480,7 +484,11 @@ void spring_estimator_update(spring_estimator_t *e, thermal_model_t *model, uint
             spring_holding_watch(e, b, model, k, moved_k);
         }
     } else {
-        b->mark_ohm = b->line_ohm = 0.0f;
+        if (b->heating) {
+            b->run.heat.mark_ohm = 0.0f;
+        } else {
+            b->run.line.ohm = 0.0f;
+        }
         b->quiet = 0;
     }
     if (b->possible == SPRING_PHASE_ANY) {
@@ -564,14 +572,14 @@ void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, 
     }
     /* as hot as it takes whatever it reads, or ended twice by a limit: what it reads tells nothing
      */
-    const bool certain = spring_heated_enough(e, b, model, k) ||
+    const bool certain = (b->heating && spring_heated_enough(e, b, model, k)) ||
                          surely_finished(b, model, k, SPRING_ESTIMATOR_BOUND_SDS);
     if (lacks && certain && !b->onset) {
         spring_take_back(e, b, model, k);
     }
     b->blind = b->blind || (lacks && (b->doubted || certain));
     b->doubted = lacks && !b->blind;
-    if (full && !lacks && b->onset && b->reads && b->current_a > STRONG_A) {
+    if (full && !lacks && b->heating && b->onset && b->reads && b->current_a > STRONG_A) {
         spring_learn_austenite(b); /* hot enough, and its resistance had come to rest */
     }
     b->heating = false;
@@ -579,7 +587,7 @@ void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, 
     b->lost = b->doubted ? 1.0f - phase : 0.0f;
     b->quiet = 0;
     b->losing = 0;
-    b->line_ohm = 0.0f;
+    b->run.line = (spring_line_t){0};
     if (full && b->reads && b->current_a > STRONG_A) {
         b->slow_ohm = b->ohm;
         b->slow_a = b->current_a;
