@@ -664,7 +664,9 @@ spring_bounds_t spring_estimator_temperature_c(const spring_estimator_t *e,
         const float neighbours_k = NEIGHBOUR_SD * (now_c - spring_ambient_c(model));
         others_k2 = TRUST_SD_K * TRUST_SD_K + neighbours_k * neighbours_k;
     }
-    return disturbed(b, spring_around(now_c, sqrtf(distance_k2(b) + others_k2)));
+    spring_bounds_t bounds = disturbed(b, spring_around(now_c, sqrtf(distance_k2(b) + others_k2)));
+    bounds.high += fmaxf(b->gone_k, 0.0f);
+    return bounds;
 }
 
 spring_bounds_t spring_estimator_distance_k(const spring_estimator_t *e,
