@@ -355,8 +355,11 @@ static void derate(drive_policy_t *policy, const thermal_model_t *model, uint8_t
     const drive_policy_parameters_t *p = &policy->parameters;
     const float limit_c = 0.01f * (float)p->temperature_limit_cc;
     const float band_k = kelvin(p->temperature_band_cc);
-    const float hottest_c = spring_estimator_hottest_c(&policy->estimator.spring[k], model, k);
-    float share = derating_share(hottest_c, limit_c, band_k);
+    /* a touch of 8 K and a search are such doubts: half of the band is left to them */
+    const float likely_c = now_c(model, k);
+    const float hottest_c =
+        spring_estimator_hottest_c(&policy->estimator.spring[k], model, k) - 0.5f * band_k;
+    float share = derating_share(hottest_c > likely_c ? hottest_c : likely_c, limit_c, band_k);
     s->derating = share < 1.0f ? DRIVE_POLICY_LIMIT_TEMPERATURE : DRIVE_POLICY_LIMIT_NONE;
     const float allowed = 1.0f - worst_neighbour(policy, k);
     if (allowed < 1.0f && allowed <= share) {

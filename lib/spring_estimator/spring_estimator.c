@@ -562,7 +562,8 @@ void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, 
         full && b->possible != SPRING_PHASE_AUSTENITE && spring_lacks_phase(b, model, k);
     const float phase = spring_estimator_phase(e, model, k);
     b->unproven = full && b->gone_k > 0.0f && b->possible != SPRING_PHASE_AUSTENITE &&
-                  !surely_finished(b, model, k, 0.0f);
+                  thermal_model_temperature_c7(model, k) <
+                      thermal_model_transformation(model, k).austenite_finish_c7;
     if (full && b->possible != SPRING_PHASE_AUSTENITE) {
         b->blind = b->blind || b->possible == SPRING_PHASE_MARTENSITE;
         b->possible = SPRING_PHASE_AUSTENITE;

@@ -67,24 +67,10 @@ static float start_c(const thermal_model_t *model, uint8_t k)
     return spring_c(thermal_model_transformation(model, k).martensite_start_c7);
 }
 
-/* Until it is back, or was found not to have been phase, all of it is one loss. */
-static void remember(spring_belief_t *b, float full_ohm, float left, float moved_k,
-                     float moved_w_per_k)
-{
-    if (b->full_ohm == 0.0f) {
-        b->full_ohm = full_ohm;
-    }
-    b->gone += left;
-    b->gone_k += moved_k;
-    b->gone_w_per_k += moved_w_per_k;
-}
-
 static void see_crossing(const spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model,
-                         uint8_t k, float lost, float left)
+                         uint8_t k, float lost)
 {
     const float was_w_per_k = b->learnt.loss_w_per_k;
-    const float full_ohm =
-        b->run.line.ohm * (1.0f + b->run.line.rise_per_k * (start_c(model, k) - b->run.line.c));
     const bool searched = spring_estimator_sd_k(b) > 3.0f * CROSSING_SD_K;
     if (lost > LARGE_LOSS) {
         /* nearer to it by as much as more is lost up there */
@@ -102,7 +88,8 @@ static void see_crossing(const spring_estimator_t *e, spring_belief_t *b, therma
     if (!searched && -error_k > b->disturbance_k) {
         b->disturbance_k = -error_k;
     }
-    remember(b, full_ohm, left, -error_k, b->learnt.loss_w_per_k - was_w_per_k);
+    b->gone_k -= error_k;
+    b->gone_w_per_k += b->learnt.loss_w_per_k - was_w_per_k;
 }
 
 /* What was no phase is taken back: it is where it was believed before, as unsure as it was found
@@ -298,7 +285,10 @@ void spring_holding_watch(const spring_estimator_t *e, spring_belief_t *b, therm
             spring_begin_rough_line(b, now_c);
             return;
         }
-        see_crossing(e, b, model, k, changed / fabsf(b->learnt.change), left);
+        /* until it is back, or was found not to have been phase, all of it is one loss */
+        b->full_ohm = b->full_ohm > 0.0f ? b->full_ohm : kept_ohm;
+        b->gone += left;
+        see_crossing(e, b, model, k, changed / fabsf(b->learnt.change));
         spring_begin_rough_line(b, spring_now_c(model, k)); /* the average still falls */
     }
 }
