@@ -333,7 +333,7 @@ static float predict(const spring_estimator_t *e, spring_belief_t *b, const ther
     return per_w * (power_w - balance_w - extra_w);
 }
 
-static void correct_loss(const spring_estimator_t *e, spring_belief_t *b, float more_w_per_k)
+void spring_correct_loss(const spring_estimator_t *e, spring_belief_t *b, float more_w_per_k)
 {
     const float most = LOSS_MOST * e->loss_w_per_k;
     b->learnt.loss_w_per_k = spring_clamp(b->learnt.loss_w_per_k + more_w_per_k, -most, most);
@@ -352,7 +352,7 @@ float spring_see(const spring_estimator_t *e, spring_belief_t *b, thermal_model_
     b->seen = true;
     b->shift_k = spring_clamp(b->shift_k - fminf(b->shift_variance_k2 * per_total, gain) * error_k,
                               -SHIFT_MOST_K, SHIFT_MOST_K);
-    correct_loss(e, b, by_loss * error_k);
+    spring_correct_loss(e, b, by_loss * error_k);
     b->kept_w_per_k = 0.0f;
     b->loss_variance -= by_loss * b->covariance;
     b->covariance *= left;
@@ -363,25 +363,13 @@ float spring_see(const spring_estimator_t *e, spring_belief_t *b, thermal_model_
     return error_k;
 }
 
-void spring_move(const spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model, uint8_t k,
-                 float more_k, float more_w_per_k)
-{
-    spring_set_temperature(model, k, spring_now_c(model, k) + more_k, SPRING_PHASE_AUSTENITE);
-    b->last_c = spring_now_c(model, k);
-    b->seen = true;
-    correct_loss(e, b, more_w_per_k);
-    b->variance_k2 += more_k * more_k;
-    b->loss_variance += more_w_per_k * more_w_per_k;
-    b->covariance += more_k * more_w_per_k;
-}
-
 void spring_keep_above(const spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model,
                        uint8_t k, float limit_c)
 {
     const float error_k = limit_c - spring_now_c(model, k);
     if (error_k > 0.0f) {
         const float less_w_per_k = b->covariance / distance_k2(b) * error_k;
-        correct_loss(e, b, less_w_per_k);
+        spring_correct_loss(e, b, less_w_per_k);
         b->kept_w_per_k += less_w_per_k;
         const float sds = SPRING_ESTIMATOR_BOUND_SDS;
         if (b->kept_w_per_k * b->kept_w_per_k > sds * sds * b->loss_variance) {
@@ -560,7 +548,7 @@ void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, 
     const float now_c = spring_now_c(model, k);
     const bool lacks =
         full && b->possible != SPRING_PHASE_AUSTENITE && spring_lacks_phase(b, model, k);
-    const float phase = spring_estimator_phase(e, model, k);
+    const float phase = lacks ? spring_estimator_phase(e, model, k) : 1.0f;
     b->unproven = full && b->gone_k > 0.0f && b->possible != SPRING_PHASE_AUSTENITE &&
                   thermal_model_temperature_c7(model, k) <
                       thermal_model_transformation(model, k).austenite_finish_c7;
@@ -573,12 +561,12 @@ void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, 
     }
     /* as hot as it takes whatever it reads, or ended twice by a limit: what it reads tells nothing
      */
-    const bool certain = (b->heating && spring_heated_enough(e, b, model, k)) ||
-                         surely_finished(b, model, k, SPRING_ESTIMATOR_BOUND_SDS);
-    if (lacks && certain && !b->onset) {
+    const bool certain = lacks && ((b->heating && spring_heated_enough(e, b, model, k)) ||
+                                   surely_finished(b, model, k, SPRING_ESTIMATOR_BOUND_SDS));
+    if (certain && !b->onset) {
         spring_take_back(e, b, model, k);
     }
-    b->blind = b->blind || (lacks && (b->doubted || certain));
+    b->blind = b->blind || certain || (lacks && b->doubted);
     b->doubted = lacks && !b->blind;
     if (full && !lacks && b->heating && b->onset && b->reads && b->current_a > STRONG_A) {
         spring_learn_austenite(b); /* hot enough, and its resistance had come to rest */
@@ -637,11 +625,6 @@ float spring_estimator_cooling_s(const spring_estimator_t *e, const thermal_mode
     return e->heat_capacity_j_per_k / loss * logf((hot_c - ambient_c) / (start_c - ambient_c)) +
            hottest_capacity_j_per_k(e, &transforming, &t) / loss *
                logf((left_c - ambient_c) / (finish_c - ambient_c));
-}
-
-float spring_estimator_hottest_c(const spring_belief_t *b, const thermal_model_t *model, uint8_t k)
-{
-    return spring_now_c(model, k) + b->gone_k;
 }
 
 /* What moved it lately, a gust for one, may do so again, either way. */

@@ -40,9 +40,9 @@ float spring_stiffness_w_per_k(const spring_belief_t *belief);
  * (SPRING_PHASE_MARTENSITE or _AUSTENITE). Returns the error found, K. */
 float spring_see(const spring_estimator_t *estimator, spring_belief_t *belief,
                  thermal_model_t *model, uint8_t spring, float seen_c, float sd_k, uint8_t from);
-/* It was misjudged by more_k, and its loss: moved, and as much less sure. */
-void spring_move(const spring_estimator_t *estimator, spring_belief_t *belief,
-                 thermal_model_t *model, uint8_t spring, float more_k, float more_w_per_k);
+/* Of its loss beyond the declared one, within what is ever believed. */
+void spring_correct_loss(const spring_estimator_t *estimator, spring_belief_t *belief,
+                         float more_w_per_k);
 /* It is not colder than limit_c, or that would be seen: as much as it would teach of the loss, but
  * no surer than before. */
 void spring_keep_above(const spring_estimator_t *estimator, spring_belief_t *belief,

@@ -92,12 +92,19 @@ static void see_crossing(const spring_estimator_t *e, spring_belief_t *b, therma
     b->gone_w_per_k += b->learnt.loss_w_per_k - was_w_per_k;
 }
 
-/* What was no phase is taken back: it is where it was believed before, as unsure as it was found
- * wrong. */
+/* It is where it was believed before, as unsure as it was found wrong. */
 void spring_take_back(const spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model,
                       uint8_t k)
 {
-    spring_move(e, b, model, k, b->gone_k, -b->gone_w_per_k);
+    const float more_k = b->gone_k;
+    const float less_w_per_k = b->gone_w_per_k;
+    spring_set_temperature(model, k, spring_now_c(model, k) + more_k, SPRING_PHASE_AUSTENITE);
+    b->last_c = spring_now_c(model, k);
+    b->seen = true;
+    spring_correct_loss(e, b, -less_w_per_k);
+    b->variance_k2 += more_k * more_k;
+    b->loss_variance += less_w_per_k * less_w_per_k;
+    b->covariance -= more_k * less_w_per_k;
     b->gone_k = b->gone_w_per_k = 0.0f;
     b->unproven = false;
 }
@@ -291,4 +298,9 @@ void spring_holding_watch(const spring_estimator_t *e, spring_belief_t *b, therm
         see_crossing(e, b, model, k, changed / fabsf(b->learnt.change));
         spring_begin_rough_line(b, spring_now_c(model, k)); /* the average still falls */
     }
+}
+
+float spring_estimator_hottest_c(const spring_belief_t *b, const thermal_model_t *model, uint8_t k)
+{
+    return spring_now_c(model, k) + b->gone_k;
 }
