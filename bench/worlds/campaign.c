@@ -251,21 +251,6 @@ static void cold_ends(run_case_t *run, random_t *random, double value)
     }
 }
 
-/* ---- what no list has: strangers' arrays, rooms, faults and habits ---- */
-
-static void ramp_ambient(run_case_t *run, random_t *random, double value)
-{
-    (void)random;
-    for (int i = 0; i <= 60; i++) {
-        add_event(run, WORLD_AMBIENT_C, run->seconds * i / 60.0, 0,
-                  15.0 + (value - 15.0) * i / 60.0);
-    }
-    run->world.ambient_c = 15.0;
-    for (int k = 0; k < count(run); k++) {
-        run->world.spring[k].start_c = 15.0;
-    }
-}
-
 static run_command_t *add_command(run_case_t *run, double time_s)
 {
     run_command_t *command = &run->command[run->commands++];
@@ -275,16 +260,6 @@ static run_command_t *add_command(run_case_t *run, double time_s)
     }
     return command;
 }
-
-static void fan(run_case_t *run, random_t *random, double value)
-{
-    for (double s = random_uniform(random, 100.0, 200.0); s < 850.0;
-         s += random_uniform(random, 60.0, 240.0)) {
-        add_command(run, s)->fan_percent = run->commands % 2 == 1 ? (uint8_t)value : 0;
-    }
-}
-
-static void draw_pattern(run_case_t *run, random_t *random);
 
 static void display(run_case_t *run, random_t *random, double value)
 {
@@ -300,19 +275,6 @@ static void display(run_case_t *run, random_t *random, double value)
     }
 }
 
-static void early_change(run_case_t *run, random_t *random, double value)
-{
-    (void)value;
-    double s = random_uniform(random, 84.0, 110.0);
-    for (int i = 0; i < 5; i++) {
-        run_command_t *c = add_command(run, s);
-        for (int k = 0; k < count(run); k++) {
-            c->level_permille[k] = random_uniform(random, 0.0, 1.0) < 0.5 ? 1000 : 0;
-        }
-        s += random_uniform(random, 3.0, 12.0);
-    }
-}
-
 static void pauses(run_case_t *run, random_t *random, double value)
 {
     (void)value;
@@ -323,18 +285,6 @@ static void pauses(run_case_t *run, random_t *random, double value)
         s += random_uniform(random, 3.0, 120.0);
         (void)add_command(run, s);
         s += random_uniform(random, 100.0, 200.0);
-    }
-}
-
-static void thaw(run_case_t *run, random_t *random, double value)
-{
-    double s = fault_s(run, random);
-    int k = any_driven(run, random);
-    for (int i = 0; i < 20; i++) {
-        add_event(run, WORLD_SENSOR_FREEZE, s, k, 0.0);
-        s += random_uniform(random, 0.1, value);
-        add_event(run, WORLD_SENSOR_FREEZE, s, k, 1.0);
-        s += random_uniform(random, 1.0, 40.0);
     }
 }
 
@@ -375,138 +325,6 @@ static void crimp(run_case_t *run, random_t *random, double value)
             s += 0.02 + 60.0 * span * span * span;
         }
     }
-}
-
-static void batch(run_case_t *run, random_t *random, double value)
-{
-    world_spring_t *w = &run->world.spring[any_driven(run, random)];
-    w->martensite_ohm *= value;
-    w->austenite_ohm *= value;
-    w->r_phase_ohm *= value;
-    w->alloy.austenite_start_c += 10.0;
-    w->alloy.austenite_finish_c += 10.0;
-    w->alloy.martensite_start_c += 10.0;
-    w->alloy.martensite_finish_c += 10.0;
-}
-
-static void reconnect(run_case_t *run, random_t *random, double value)
-{
-    int k = any_driven(run, random);
-    double s = fault_s(run, random);
-    add_event(run, WORLD_CONTACT_OHM, s, k, 1e6);
-    add_event(run, WORLD_CONTACT_OHM, s + random_uniform(random, 0.02, value), k, 0.002);
-}
-
-static void brownout(run_case_t *run, random_t *random, double value)
-{
-    for (double s = random_uniform(random, 20.0, 100.0); s < run->seconds;
-         s += random_uniform(random, 30.0, 120.0)) {
-        add_event(run, WORLD_SUPPLY_V, s, 0, random_uniform(random, value, 4.6));
-        add_event(run, WORLD_SUPPLY_V, s + random_uniform(random, 0.05, 2.0), 0,
-                  run->world.supply_v);
-    }
-}
-
-static void hysteresis(run_case_t *run, random_t *random, double value)
-{
-    (void)random;
-    for (int k = 0; k < count(run); k++) {
-        alloy_t *a = &run->world.spring[k].alloy; /* 10 K between start and start, as declared */
-        double more = 0.5 * (value - 20.0);
-        a->austenite_start_c += more;
-        a->austenite_finish_c += more;
-        a->martensite_start_c -= more;
-        a->martensite_finish_c -= more;
-    }
-}
-
-static void width(run_case_t *run, random_t *random, double value)
-{
-    (void)random;
-    for (int k = 0; k < count(run); k++) {
-        alloy_t *a = &run->world.spring[k].alloy;
-        a->austenite_finish_c =
-            a->austenite_start_c + value * (a->austenite_finish_c - a->austenite_start_c);
-        a->martensite_finish_c =
-            a->martensite_start_c - value * (a->martensite_start_c - a->martensite_finish_c);
-    }
-}
-
-static void latent(run_case_t *run, random_t *random, double value)
-{
-    bool more = random_uniform(random, 0.0, 1.0) < 0.5;
-    for (int k = 0; k < count(run); k++) {
-        run->world.spring[k].latent_heat_j *= more ? value : 1.0 / value;
-    }
-}
-
-static void capacity(run_case_t *run, random_t *random, double value)
-{
-    bool more = random_uniform(random, 0.0, 1.0) < 0.5;
-    for (int k = 0; k < count(run); k++) {
-        run->world.spring[k].heat_capacity_j_per_k *= more ? 1.0 + value : 1.0 - value;
-    }
-}
-
-static void breathing(run_case_t *run, random_t *random, double value)
-{
-    for (int n = 0; n < 3; n++) {
-        int k = any_driven(run, random);
-        double period_s = random_uniform(random, 20.0, 120.0),
-               phase = random_uniform(random, 0.0, 6.0);
-        for (int i = 0; i < 80; i++) {
-            double s = 100.0 + 10.0 * i;
-            add_event(run, WORLD_STRESS_MPA, s, k,
-                      value * 7.8 * 0.5 * (1.0 + sin(phase + 6.28 * s / period_s)));
-        }
-    }
-}
-
-static void two_step(run_case_t *run, random_t *random, double value)
-{
-    for (int k = 0; k < count(run); k++) {
-        double s = random_uniform(random, 85.0, 300.0);
-        add_event(run, WORLD_STRESS_MPA, s, k, value * 7.8);
-        add_event(run, WORLD_STRESS_MPA, s + random_uniform(random, 1.0, 30.0), k,
-                  2.0 * value * 7.8);
-        add_event(run, WORLD_STRESS_MPA, s + random_uniform(random, 60.0, 300.0), k, 0.0);
-    }
-}
-
-static void swapped_display(run_case_t *run, random_t *random, double value)
-{
-    (void)value;
-    world_parameters_default(&run->learnt_in);
-    world_draw(&run->learnt_in, random_bits(random), CAMPAIGN_TOLERANCE);
-}
-
-static void cold_room(run_case_t *run, random_t *random, double value)
-{
-    ambient(run, random, value);
-    run->world.ambient_c = random_uniform(random, 0.0, 1.0) < 0.5 ? 20.0 - value : 20.0 + value;
-    for (int k = 0; k < count(run); k++) {
-        run->world.spring[k].start_c = run->world.ambient_c;
-    }
-}
-
-static void one_driven(run_case_t *run, random_t *random, double value)
-{
-    (void)value;
-    memset(run->on, 0, sizeof run->on);
-    run->on[any_spring(run, random)] = true;
-}
-
-static void mild_two(run_case_t *run, random_t *random, double value)
-{
-    (void)value;
-    temperature_coefficient(run, random, 0.0);
-    sensor_errors(run, random, 0.02);
-}
-
-static void ratio_load(run_case_t *run, random_t *random, double value)
-{
-    ratio(run, random, random_uniform(random, 1.08, 1.2));
-    load_holding(run, random, value);
 }
 
 static void everything(run_case_t *run, random_t *random, double value)
@@ -555,33 +373,12 @@ static const struct {
     {"contacts", contacts, 0.02, true, "contacts step or drift by up to 20 mohm"},
     {"room", room, 0.0, true, "shared air and a plate under the crimps"},
     {"cold_ends", cold_ends, 4.0, true, "crimps carry off 2 to 4 times as much"},
-    {"h_ramp", ramp_ambient, 35.0, true, ""},
-    {"h_fan", fan, 100.0, true, ""},
-    {"h_display", display, 0.0, true, ""},
-    {"h_levels", display, 1.0, true, ""},
-    {"h_early", early_change, 1.0, true, ""},
-    {"h_pauses", pauses, 1.0, true, ""},
-    {"h_thaw", thaw, 3.0, true, ""},
-    {"h_gain", gain_steps, 0.05, true, ""},
-    {"h_drift", drifting, 0.003, true, ""},
-    {"h_crimp", crimp, 0.03, true, ""},
-    {"h_batch", batch, 1.2, true, ""},
-    {"h_reconn", reconnect, 5.0, true, ""},
-    {"h_brown", brownout, 3.0, true, ""},
-    {"h_wide", hysteresis, 40.0, true, ""},
-    {"h_narrow", hysteresis, 12.0, true, ""},
-    {"h_band2", width, 2.0, true, ""},
-    {"h_band.5", width, 0.4, true, ""},
-    {"h_latent", latent, 2.0, true, ""},
-    {"h_cap", capacity, 0.3, true, ""},
-    {"h_breath", breathing, 6.0, true, ""},
-    {"h_twostep", two_step, 6.0, true, ""},
-    {"h_eeprom", swapped_display, 6.0, true, ""},
-    {"h_room15", cold_room, 15.0, true, ""},
-    {"h_one", one_driven, 15.0, true, ""},
-    {"h_two", mild_two, 15.0, true, ""},
-    {"h_ratload", ratio_load, 15.0, true, ""},
-    {"h_all", everything, 0.2, true, ""},
+    {"patterns", display, 0.0, true, "another pattern every 20 to 120 s"},
+    {"pauses", pauses, 0.0, true, "switched off for 3 to 120 s, again and again"},
+    {"gain_steps", gain_steps, 0.05, true, "each sensor's current or voltage steps by 5 %"},
+    {"loose_crimp", crimp, 0.03, true, "contacts of up to 30 mohm that come and go"},
+    {"wandering", drifting, 0.003, true, "voltages read wander by about 0.5 %"},
+    {"together", everything, 0.2, true, "coefficient, sensor, loss, alloy, room and loads"},
 };
 
 int campaign_worlds(void)

@@ -128,14 +128,6 @@ static bool may_transform(const spring_belief_t *b, const thermal_model_t *model
                spring_c(thermal_model_transformation(model, k).austenite_start_c7);
 }
 
-/* No more comes back than was missing. */
-static bool may_come_back(const spring_belief_t *b)
-{
-    return b->learnt.austenite_ohm == 0.0f ||
-           fabsf(b->run.heat.excess) < b->run.heat.begun_missing * fabsf(b->learnt.change) +
-                                           EXCESS_SEEN + EXCESS_SDS * b->noise;
-}
-
 /* By as much as a transformation does: one whose change is known, by half of it at least. */
 static bool has_changed(const spring_belief_t *b)
 {
@@ -210,11 +202,11 @@ void spring_heating_watch(const spring_estimator_t *e, spring_belief_t *b, therm
     b->steep = b->onset && fabsf(excess) > STEEP_SDS * b->noise;
     b->run.heat.flat_k = b->steep || !b->onset ? 0.0f : b->run.heat.flat_k + step_k;
     if (!b->onset && fabsf(b->run.heat.excess) > EXCESS_SEEN + EXCESS_SDS * b->noise) {
-        if (may_transform(b, model, k) && may_come_back(b)) {
+        if (may_transform(b, model, k)) {
             see_onset(e, b, model, k);
             b->steep = true;
         } else {
-            spring_jump(b, b->ohm / b->run.heat.onset_ohm); /* too cold, or too much: a contact */
+            spring_jump(b, b->ohm / b->run.heat.onset_ohm); /* too cold: a contact */
             b->run.heat.excess = 0.0f;
         }
     } else if (b->run.heat.flat_k >= FLAT_K && has_changed(b) &&

@@ -413,24 +413,6 @@ static void loss_that_does_not_come_back_was_none(void)
     TEST_ASSERT_FLOAT_WITHIN_MESSAGE(6.0f, (float)truth.temperature_c, believed_c(), where);
 }
 
-/* A reheat can bring back what was missing, no more: 8 % of a resistance are a contact's. */
-static void no_more_comes_back_than_was_missing(void)
-{
-    begin_cold();
-    truth.noise_v = 0.0005;
-    (void)heat_then_hold(90.0);
-    for (double s = 0.0; s < 60.0; s += TICK_S) {
-        (void)tick(hold_current_a(6.0));
-    }
-    spring_estimator_disturb(&BELIEF);
-    spring_estimator_begin_heating(&estimator, &model, 0);
-    ticks(3.0, 2.0);
-    truth.contact_ohm = 0.017;
-    ticks(3.0, 1.5);
-    (void)snprintf(where, sizeof where, "%.1f degC", truth.temperature_c);
-    TEST_ASSERT_FALSE_MESSAGE(BELIEF.onset, where);
-}
-
 /* Of a contact that gets better while it warms: no metal's resistance falls so fast. */
 static void slope_that_no_metal_has_is_not_learnt(void)
 {
@@ -683,7 +665,6 @@ int main(void)
     RUN_TEST(phase_lost_on_the_way_to_the_hold_is_counted);
     RUN_TEST(contact_is_not_taken_for_phase);
     RUN_TEST(loss_that_does_not_come_back_was_none);
-    RUN_TEST(no_more_comes_back_than_was_missing);
     RUN_TEST(slope_that_no_metal_has_is_not_learnt);
     RUN_TEST(heating_that_a_limit_ends_is_doubted);
     RUN_TEST(heating_that_is_cut_between_two_readings_is_doubted);
