@@ -203,6 +203,7 @@ void add_figures(figures_t &figures, const options_t &options, const named_t &ro
     add("latest start, nine", s.never_nine > 0 ? options.seconds : s.latest_nine_s, "s",
         options.learnt ? "<= 120" : "<= 210");
     add("driven springs below 90 % for more than 20 s, unreported", s.silent, "springs", "0");
+    add("springs that ended with a fault", s.faults, "springs", "");
     add("undriven springs above 5 %", s.undriven_over, "springs", "0");
     add("mean true hold temperature", s.hold_c / s.hold_s, unit_c, structural ? "<= 95" : "<= 86");
     add("reheats per held spring and hour", s.reheats / s.settled_h, "1/h", "<= 2");
@@ -344,7 +345,7 @@ std::string footer()
                   "springs 210 s;\nwith --learnt 90 and 120 s), 'never' ones in the whole run; "
                   "'silent' ones "
                   "were below 90 % for more than 20 s,\nunreported, for 'silent s' beyond that; "
-                  "'-': nothing "
+                  "'faults': springs that ended with one;\n'-': nothing "
                   "is said, or nothing was held.\n"
                   "Seeds: 1 to 99 are for development. Results are reported for seed 2029, once.\n";
 }
