@@ -53,7 +53,7 @@ struct sum_t {
     int runs = 0, hot_runs = 0;
     double hottest_c = -std::numeric_limits<double>::infinity();
     int driven = 0, late = 0, never_few = 0, never_nine = 0, silent = 0, undriven = 0,
-        undriven_over = 0;
+        undriven_over = 0, faults = 0;
     double latest_few_s = 0.0, latest_nine_s = 0.0; // of those that got there or were reported
     double silent_s = 0.0, undriven_most = 0.0;
     double hold_c = 0.0, hold_s = 0.0, reheats = 0.0, settled_h = 0.0;
@@ -71,6 +71,7 @@ struct sum_t {
         for (int k = 0; k < run.result.score.springs; k++) {
             const score_spring_t &spring = run.result.score.spring[k];
             run_hottest_c = std::max(run_hottest_c, spring.hottest_c);
+            faults += spring.fault;
             known_s += spring.known_s;
             inside_s += spring.inside_s;
             inside_c_s += spring.inside_c_s;
@@ -125,6 +126,7 @@ const column_t columns[] = {
     {"nine s", 6, [](const sum_t &s) { return text(s.latest_nine_s, 0); }},
     {"silent", 6, [](const sum_t &s) { return fmt::format("{}", s.silent); }},
     {"silent s", 9, [](const sum_t &s) { return text(s.silent_s, 0); }},
+    {"faults", 6, [](const sum_t &s) { return fmt::format("{}", s.faults); }},
     {"undriven > 5 %", 14,
      [](const sum_t &s) { return fmt::format("{} / {}", s.undriven_over, s.undriven); }},
     {"hold degC", 9, [](const sum_t &s) { return text(s.hold_c / s.hold_s, 1); }},
@@ -201,6 +203,7 @@ void add_figures(figures_t &figures, const options_t &options, const named_t &ro
     add("latest start, nine", s.never_nine > 0 ? options.seconds : s.latest_nine_s, "s",
         options.learnt ? "<= 120" : "<= 210");
     add("driven springs below 90 % for more than 20 s, unreported", s.silent, "springs", "0");
+    add("springs that ended with a fault", s.faults, "springs", "");
     add("undriven springs above 5 %", s.undriven_over, "springs", "0");
     add("mean true hold temperature", s.hold_c / s.hold_s, unit_c, structural ? "<= 95" : "<= 86");
     add("reheats per held spring and hour", s.reheats / s.settled_h, "1/h", "<= 2");
@@ -342,7 +345,7 @@ std::string footer()
                   "springs 210 s;\nwith --learnt 90 and 120 s), 'never' ones in the whole run; "
                   "'silent' ones "
                   "were below 90 % for more than 20 s,\nunreported, for 'silent s' beyond that; "
-                  "'-': nothing "
+                  "'faults': springs that ended with one;\n'-': nothing "
                   "is said, or nothing was held.\n"
                   "Seeds: 1 to 99 are for development. Results are reported for seed 2029, once.\n";
 }

@@ -83,7 +83,7 @@ static void trace_row(const bench_t *bench, FILE *trace)
 /* A run of its own, in which nothing happens, then everything has cooled. */
 static bool learn(bench_t *bench)
 {
-    world_parameters_t quiet = bench->run->world;
+    world_parameters_t quiet = bench->run->learnt_in;
     quiet.events = 0;
     for (int k = 0; k < quiet.rows * quiet.columns; k++) {
         quiet.spring[k].start_c = quiet.ambient_c;
@@ -104,8 +104,23 @@ static bool learn(bench_t *bench)
     return true;
 }
 
+/* Types what is due. */
+static void type(bench_t *bench, score_t *score, int *typed)
+{
+    const run_case_t *run = bench->run;
+    while (*typed < run->commands && run->command[*typed].time_s <= world_time_s(bench->world)) {
+        const run_command_t *command = &run->command[(*typed)++];
+        for (int k = 0; k < world_springs(bench->world); k++) {
+            (void)controller_set_target(&bench->controller, (uint8_t)k, command->level_permille[k]);
+            score_ask(score, bench->world, k, command->level_permille[k] / 1000.0);
+        }
+        (void)controller_set_fan(&bench->controller, command->fan_percent);
+    }
+}
+
 static bool drive(bench_t *bench, score_t *score, FILE *trace)
 {
+    int typed = 0;
     const run_case_t *run = bench->run;
     long ticks = lround(run->seconds * TICKS_PER_S);
     long off = run->reset_s > 0.0 ? lround(run->reset_s * TICKS_PER_S) : ticks;
@@ -123,6 +138,7 @@ static bool drive(bench_t *bench, score_t *score, FILE *trace)
         }
         bool powered = tick < off || tick >= on_again;
         if (powered) {
+            type(bench, score, &typed);
             controller_tick(&bench->controller, &bench->inputs, &bench->outputs);
         }
         score_tick(score, bench->world, powered ? &bench->controller : NULL);

@@ -17,9 +17,10 @@ void score_begin(score_t *score, const world_t *world, const bool driven[], doub
     memset(score, 0, sizeof *score);
     score->springs = world_springs(world);
     score->allowed_s = allowed_s;
-    score->start_s = world_time_s(world);
     for (int k = 0; k < score->springs; k++) {
         score->spring[k].driven = driven[k];
+        score->spring[k].level = driven[k] ? 1.0 : 0.0;
+        score->spring[k].start_s = world_time_s(world);
         score->spring[k].lowest_held = 1.0;
         score->spring[k].hottest_c = -INFINITY;
         restart_spring(&score->spring[k]);
@@ -27,22 +28,44 @@ void score_begin(score_t *score, const world_t *world, const bool driven[], doub
 }
 
 /* A spring that is there was there when it got there, or said why not from then on. */
-static void settle(score_t *score, score_spring_t *spring)
+static void settle(score_spring_t *spring)
 {
     /* NaN, 'not yet', gives way to any number. */
     double at_s = fmin(fmin(spring->reached_s, spring->report_from_s), (double)INFINITY);
-    spring->settled_s = fmax(spring->settled_s, at_s - score->start_s);
+    spring->settled_s = fmax(spring->settled_s, at_s - spring->start_s);
 }
 
 void score_restart(score_t *score, const world_t *world)
 {
     for (int k = 0; k < score->springs; k++) {
         if (score->spring[k].driven && isnan(score->spring[k].reached_s)) {
-            settle(score, &score->spring[k]);
+            settle(&score->spring[k]);
         }
         restart_spring(&score->spring[k]);
+        score->spring[k].start_s = world_time_s(world);
     }
-    score->start_s = world_time_s(world);
+}
+
+void score_ask(score_t *score, const world_t *world, int k, double level)
+{
+    score_spring_t *spring = &score->spring[k];
+    if (level == spring->level) {
+        return;
+    }
+    bool due = world_time_s(world) - spring->start_s > score->allowed_s;
+    if (spring->driven && due && isnan(spring->reached_s)) {
+        settle(spring);
+    }
+    restart_spring(spring);
+    spring->level = level;
+    spring->driven = level > 0.0;
+    spring->start_s = world_time_s(world);
+    spring->was_low = false;
+}
+
+static bool within(double austenite, const score_spring_t *spring, double least, double band)
+{
+    return spring->level >= 0.96 ? austenite >= least : fabs(austenite - spring->level) <= band;
 }
 
 static void score_report(score_spring_t *spring, bool reported, double now_s)
@@ -71,15 +94,16 @@ static void score_hold(score_spring_t *spring, const world_t *world, int k,
 static void score_driven(score_t *score, score_spring_t *spring, const world_t *world, int k,
                          const controller_t *controller)
 {
-    double now_s = world_time_s(world), since_s = now_s - score->start_s;
+    double now_s = world_time_s(world), since_s = now_s - spring->start_s;
     double austenite = world_austenite(world, k);
     score_report(spring, belief_reported(controller, k), now_s);
-    if (isnan(spring->reached_s) && austenite >= SCORE_REACHED) {
+    if (isnan(spring->reached_s) && within(austenite, spring, SCORE_REACHED, SCORE_LEVEL_REACHED)) {
         spring->reached_s = now_s;
-        settle(score, spring);
+        settle(spring);
     }
     bool due = !isnan(spring->reached_s) || since_s > score->allowed_s;
-    bool lost = due && austenite < SCORE_LOST && isnan(spring->report_from_s);
+    bool lost = due && !within(austenite, spring, SCORE_LOST, SCORE_LEVEL_LOST) &&
+                isnan(spring->report_from_s);
     spring->lost_s = lost ? spring->lost_s + SAMPLE_S : 0.0;
     if (spring->lost_s > SCORE_LOST_S) {
         spring->silent_s += SAMPLE_S;
@@ -125,21 +149,27 @@ void score_tick(score_t *score, const world_t *world, const controller_t *contro
         spring->hottest_c = fmax(spring->hottest_c, world_hottest_c(world, k));
         if (!spring->driven) {
             spring->was_low = spring->was_low || austenite < SCORE_UNDRIVEN;
-            spring->undriven_most = spring->was_low ? fmax(spring->undriven_most, austenite) : 0.0;
+            spring->undriven_most =
+                spring->was_low ? fmax(spring->undriven_most, austenite) : spring->undriven_most;
         } else if (controller != NULL) {
             score_driven(score, spring, world, k, controller);
         }
         if (controller != NULL) {
             score_bounds(spring, world, k, controller);
+            spring->fault = controller_fault(controller, (uint8_t)k) != SAFETY_FAULT_NONE ||
+                            controller_board_fault(controller) != SAFETY_FAULT_NONE;
         }
     }
 }
 
 void score_end(score_t *score)
 {
+    double now_s = score->ticks * WORLD_TICK_S;
     for (int k = 0; k < score->springs; k++) {
-        if (score->spring[k].driven && isnan(score->spring[k].reached_s)) {
-            settle(score, &score->spring[k]);
+        score_spring_t *spring = &score->spring[k];
+        bool due = now_s - spring->start_s > score->allowed_s;
+        if (spring->driven && due && isnan(spring->reached_s)) {
+            settle(spring);
         }
     }
 }

@@ -67,11 +67,14 @@ static void start(controller_t *controller, const controller_settings_t *setting
     controller->springs = (uint8_t)(settings->model.rows * settings->model.columns);
     thermal_model_set_ambient(model, ambient_c7);
     thermal_model_reset(model, ambient_c7);
+    /* by what it is given from here on: where it may be from before is the estimator's to wait for
+     */
+    temperature_ceiling_set(&controller->ceiling, model);
+    temperature_ceiling_prepare(&controller->ceiling, model, &settings->current);
     (void)current_control_init(&controller->current, &settings->current, NULL);
     (void)safety_init(&controller->safety, &settings->safety, controller->springs, NULL);
     (void)drive_policy_init(&controller->policy, &settings->policy, model, NULL);
     tell_resistances(controller);
-    temperature_ceiling_set(&controller->ceiling, model);
 }
 
 bool controller_init(controller_t *controller, const controller_settings_t *settings,
@@ -109,6 +112,7 @@ bool controller_apply_settings(controller_t *controller, const controller_settin
         thermal_model_set_ambient(&controller->model, controller->ambient_c7);
         restore(&controller->model, &state, controller->springs);
         (void)current_control_apply(&controller->current, &settings->current, NULL);
+        temperature_ceiling_prepare(&controller->ceiling, &controller->model, &settings->current);
         (void)safety_apply(&controller->safety, &settings->safety, NULL);
         (void)drive_policy_apply(&controller->policy, &settings->policy, &controller->model, NULL);
         tell_resistances(controller);
@@ -186,8 +190,7 @@ static void raise_ceiling(controller_t *controller, uint8_t k)
 {
     const float measured_w = 1e-6f / (float)CIRCUIT_CHECK_TICKS * (float)controller->heat_sum_uw[k];
     const float driven_w = temperature_ceiling_power_w(
-        &controller->model, &controller->current.parameters,
-        1.0f / (float)CIRCUIT_CHECK_TICKS * (float)controller->duty_sum[k]);
+        &controller->ceiling, 1.0f / (float)CIRCUIT_CHECK_TICKS * (float)controller->duty_sum[k]);
     temperature_ceiling_step(&controller->ceiling, &controller->model, k,
                              measured_w > driven_w ? measured_w : driven_w);
     controller->heat_sum_uw[k] = 0;

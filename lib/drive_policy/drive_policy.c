@@ -30,6 +30,7 @@
 #define SUSPECTED_W   0.038f         /* stops a fall of 0.1 K/s */
 #define FOLLOW_S      4.0f           /* a distance from the held temperature is closed in */
 #define SHORT_MOST_K  20.0f
+#define STILL_K_PER_S 0.3f
 #define KEPT_C7       (3 * 128) /* above austenite start what was reached is worth keeping */
 #define TURN_C7       (6 * 128) /* colder than one that heats: it is its turn */
 #define GOES_ON_C7    (4 * 128) /* below austenite start: keeps its turn */
@@ -168,6 +169,23 @@ static bool waits_for_supply(const drive_policy_spring_t *s)
     return s->granted_ma < s->wanted_ma - (s->wanted_ma >> 2);
 }
 
+/* Its own limit leaves too little to go on, and it is hot enough to have transformed; or it may be,
+ * and rises no more. */
+static bool is_limited(const drive_policy_t *policy, const thermal_model_t *model, uint8_t k)
+{
+    const drive_policy_spring_t *s = &policy->spring[k];
+    const uint16_t boost_ma = policy->parameters.boost_current_ma;
+    if (s->ceiling_ma >= boost_ma) {
+        return false;
+    }
+    const float finish_c = spring_c(thermal_model_transformation(model, k).austenite_finish_c7);
+    if (now_c(model, k) > finish_c) {
+        return s->ceiling_ma < boost_ma - (boost_ma >> 2);
+    }
+    return s->rise_k_per_s < STILL_K_PER_S &&
+           spring_estimator_hottest_c(&policy->estimator.spring[k], model, k) > finish_c;
+}
+
 static void heat(drive_policy_t *policy, thermal_model_t *model, uint8_t k, uint16_t level_permille)
 {
     drive_policy_spring_t *s = &policy->spring[k];
@@ -182,10 +200,9 @@ static void heat(drive_policy_t *policy, thermal_model_t *model, uint8_t k, uint
     s->wanted_ma = boost_ma;
     const bool full = is_full(level_permille);
     const float level = 0.001f * (float)level_permille;
-    /* its own limit leaves too little to go on, and it is hot enough to have transformed */
-    const bool ends = s->ceiling_ma < boost_ma - (boost_ma >> 2) && c7 > points.austenite_finish_c7;
-    if (ends || (full ? spring_estimator_has_transformed(&policy->estimator, model, k)
-                      : phase_of(policy, model, k) >= level)) {
+    if (is_limited(policy, model, k) ||
+        (full ? spring_estimator_has_transformed(&policy->estimator, model, k)
+              : phase_of(policy, model, k) >= level)) {
         enter(policy, model, k, DRIVE_POLICY_STAGE_HOLD, level_permille);
         return;
     }
@@ -348,8 +365,12 @@ static void derate(drive_policy_t *policy, const thermal_model_t *model, uint8_t
 {
     drive_policy_spring_t *s = &policy->spring[k];
     const drive_policy_parameters_t *p = &policy->parameters;
-    float share = derating_share(now_c(model, k), 0.01f * (float)p->temperature_limit_cc,
-                                 kelvin(p->temperature_band_cc));
+    const float limit_c = 0.01f * (float)p->temperature_limit_cc;
+    const float band_k = kelvin(p->temperature_band_cc);
+    /* a touch of 8 K and a search are such doubts: half of the band is left to them */
+    const float doubt_k = policy->estimator.spring[k].gone_k - 0.5f * band_k;
+    const float c = now_c(model, k);
+    float share = derating_share(doubt_k > 0.0f ? c + doubt_k : c, limit_c, band_k);
     s->derating = share < 1.0f ? DRIVE_POLICY_LIMIT_TEMPERATURE : DRIVE_POLICY_LIMIT_NONE;
     const float allowed = 1.0f - worst_neighbour(policy, k);
     if (allowed < 1.0f && allowed <= share) {
@@ -397,9 +418,9 @@ static void watch_away(drive_policy_t *policy, const thermal_model_t *model, uin
     drive_policy_spring_t *s = &policy->spring[k];
     const float level = is_full(level_permille) ? 1.0f : 0.001f * (float)level_permille;
     const float band = 1.0f - THERE + (level < 1.0f ? LEVEL_BAND : 0.0f);
-    const bool there = s->stage == DRIVE_POLICY_STAGE_HOLD &&
-                       spring_estimator_sees(&policy->estimator.spring[k]) &&
-                       fabsf(phase_of(policy, model, k) - level) < band;
+    const spring_belief_t *b = &policy->estimator.spring[k];
+    const bool there = s->stage == DRIVE_POLICY_STAGE_HOLD && spring_estimator_sees(b) &&
+                       !b->unproven && fabsf(phase_of(policy, model, k) - level) < band;
     if (there) {
         s->arrived = true;
         s->away_turns = 0;

@@ -203,13 +203,18 @@ void spring_estimator_disturb(spring_belief_t *b)
 
 void spring_jump(spring_belief_t *b, float by)
 {
-    b->line_ohm *= by;
-    b->mark_ohm *= by;
-    b->onset_ohm *= by;
-    b->cold_ohm *= by;
+    b->slow_ohm *= by;
+    if (b->heating) {
+        b->run.heat.mark_ohm *= by;
+        b->run.heat.onset_ohm *= by;
+        b->run.heat.cold_ohm *= by;
+    } else if (b->run.line.ohm > 0.0f) {
+        b->run.line.ohm *= by;
+        b->slow_ohm = b->run.line.ohm;
+    }
+    b->full_ohm *= by;
     b->learnt.austenite_ohm *= by;
     b->learnt.martensite_ohm *= by;
-    b->slow_ohm = b->line_ohm > 0.0f ? b->line_ohm : b->slow_ohm * by;
     b->ohm_before[0] = b->ohm_before[1] = 0.0f;
 }
 
@@ -217,7 +222,7 @@ void spring_jump(spring_belief_t *b, float by)
  * way is left out. */
 static bool leave_out(spring_belief_t *b, float ohm, float current_a)
 {
-    const bool holds = b->line_ohm > 0.0f;
+    const bool holds = !b->heating && b->run.line.ohm > 0.0f;
     const float was_ohm = holds ? b->slow_ohm : b->ohm_before[0];
     const float step = ohm - was_ohm;
     if (fabsf(step) <= JUMP_LEAST * was_ohm || b->fresh == 0 || was_ohm <= 0.0f) {
@@ -321,11 +326,14 @@ static float predict(const spring_estimator_t *e, spring_belief_t *b, const ther
     if (b->variance_k2 < LEAST_SD_K * LEAST_SD_K) {
         b->variance_k2 = LEAST_SD_K * LEAST_SD_K;
     }
+    if (b->gone_k > 0.0f) {
+        b->gone_k = keeps * b->gone_k + per_w * above_k * b->gone_w_per_k;
+    }
     b->last_c = now_c;
     return per_w * (power_w - balance_w - extra_w);
 }
 
-static void correct_loss(const spring_estimator_t *e, spring_belief_t *b, float more_w_per_k)
+void spring_correct_loss(const spring_estimator_t *e, spring_belief_t *b, float more_w_per_k)
 {
     const float most = LOSS_MOST * e->loss_w_per_k;
     b->learnt.loss_w_per_k = spring_clamp(b->learnt.loss_w_per_k + more_w_per_k, -most, most);
@@ -344,7 +352,7 @@ float spring_see(const spring_estimator_t *e, spring_belief_t *b, thermal_model_
     b->seen = true;
     b->shift_k = spring_clamp(b->shift_k - fminf(b->shift_variance_k2 * per_total, gain) * error_k,
                               -SHIFT_MOST_K, SHIFT_MOST_K);
-    correct_loss(e, b, by_loss * error_k);
+    spring_correct_loss(e, b, by_loss * error_k);
     b->kept_w_per_k = 0.0f;
     b->loss_variance -= by_loss * b->covariance;
     b->covariance *= left;
@@ -361,7 +369,7 @@ void spring_keep_above(const spring_estimator_t *e, spring_belief_t *b, thermal_
     const float error_k = limit_c - spring_now_c(model, k);
     if (error_k > 0.0f) {
         const float less_w_per_k = b->covariance / distance_k2(b) * error_k;
-        correct_loss(e, b, less_w_per_k);
+        spring_correct_loss(e, b, less_w_per_k);
         b->kept_w_per_k += less_w_per_k;
         const float sds = SPRING_ESTIMATOR_BOUND_SDS;
         if (b->kept_w_per_k * b->kept_w_per_k > sds * sds * b->loss_variance) {
@@ -413,7 +421,7 @@ static void look(spring_estimator_t *e, thermal_model_t *model, uint8_t k)
     b->seen = true;
     if (heating) {
         spring_estimator_begin_heating(e, model, k);
-        b->begun_c =
+        b->run.heat.begun_c =
             spring_ambient_c(model); /* a look may take another current's offset for phase */
     }
 }
@@ -453,9 +461,9 @@ void spring_estimator_update(spring_estimator_t *e, thermal_model_t *model, uint
     const float heat_k = predict(e, b, model, k, power_w);
     const float moved_k = b->last_c - before_c;
     b->disturbance_k *= FORGETS;
-    if (b->reads || b->fresh == 0) { /* while a current settles, who knows */
+    if (b->heating && (b->reads || b->fresh == 0)) { /* while a current settles, who knows */
         /* a spring that waits cools by no less than the least loss: more would hide a finish */
-        b->heat_k += heat_k < 0.0f ? LEAST_LOSS * heat_k : heat_k;
+        b->run.heat.heat_k += heat_k < 0.0f ? LEAST_LOSS * heat_k : heat_k;
     }
     if (b->reads && e->observes) {
         look(e, model, k);
@@ -464,7 +472,11 @@ void spring_estimator_update(spring_estimator_t *e, thermal_model_t *model, uint
             spring_holding_watch(e, b, model, k, moved_k);
         }
     } else {
-        b->mark_ohm = b->line_ohm = 0.0f;
+        if (b->heating) {
+            b->run.heat.mark_ohm = 0.0f;
+        } else {
+            b->run.line.ohm = 0.0f;
+        }
         b->quiet = 0;
     }
     if (b->possible == SPRING_PHASE_ANY) {
@@ -536,7 +548,10 @@ void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, 
     const float now_c = spring_now_c(model, k);
     const bool lacks =
         full && b->possible != SPRING_PHASE_AUSTENITE && spring_lacks_phase(b, model, k);
-    const float phase = spring_estimator_phase(e, model, k);
+    const float phase = lacks ? spring_estimator_phase(e, model, k) : 1.0f;
+    b->unproven = full && b->gone_k > 0.0f && b->possible != SPRING_PHASE_AUSTENITE &&
+                  thermal_model_temperature_c7(model, k) <
+                      thermal_model_transformation(model, k).austenite_finish_c7;
     if (full && b->possible != SPRING_PHASE_AUSTENITE) {
         b->blind = b->blind || b->possible == SPRING_PHASE_MARTENSITE;
         b->possible = SPRING_PHASE_AUSTENITE;
@@ -546,11 +561,14 @@ void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, 
     }
     /* as hot as it takes whatever it reads, or ended twice by a limit: what it reads tells nothing
      */
-    const bool certain = spring_heated_enough(e, b, model, k) ||
-                         surely_finished(b, model, k, SPRING_ESTIMATOR_BOUND_SDS);
-    b->blind = b->blind || (lacks && (b->doubted || certain));
+    const bool certain = lacks && ((b->heating && spring_heated_enough(e, b, model, k)) ||
+                                   surely_finished(b, model, k, SPRING_ESTIMATOR_BOUND_SDS));
+    if (certain && !b->onset) {
+        spring_take_back(e, b, model, k);
+    }
+    b->blind = b->blind || certain || (lacks && b->doubted);
     b->doubted = lacks && !b->blind;
-    if (full && !lacks && b->onset && b->reads && b->current_a > STRONG_A) {
+    if (full && !lacks && b->heating && b->onset && b->reads && b->current_a > STRONG_A) {
         spring_learn_austenite(b); /* hot enough, and its resistance had come to rest */
     }
     b->heating = false;
@@ -558,7 +576,7 @@ void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, 
     b->lost = b->doubted ? 1.0f - phase : 0.0f;
     b->quiet = 0;
     b->losing = 0;
-    b->line_ohm = 0.0f;
+    b->run.line = (spring_line_t){0};
     if (full && b->reads && b->current_a > STRONG_A) {
         b->slow_ohm = b->ohm;
         b->slow_a = b->current_a;
@@ -630,7 +648,9 @@ spring_bounds_t spring_estimator_temperature_c(const spring_estimator_t *e,
         const float neighbours_k = NEIGHBOUR_SD * (now_c - spring_ambient_c(model));
         others_k2 = TRUST_SD_K * TRUST_SD_K + neighbours_k * neighbours_k;
     }
-    return disturbed(b, spring_around(now_c, sqrtf(distance_k2(b) + others_k2)));
+    spring_bounds_t bounds = disturbed(b, spring_around(now_c, sqrtf(distance_k2(b) + others_k2)));
+    bounds.high += fmaxf(b->gone_k, 0.0f);
+    return bounds;
 }
 
 spring_bounds_t spring_estimator_distance_k(const spring_estimator_t *e,

@@ -42,6 +42,34 @@ typedef struct {
     float loss_sd_w_per_k;
 } spring_learnt_t;
 
+/* Of the running heating. */
+typedef struct {
+    float begun_c;       /* where it began, at the coldest */
+    float begun_missing; /* what was still to transform then, at the most, 0..1 */
+    float heat_k;        /* taken up, over heat capacity; less while it waits for its turn */
+    float peak_k;        /* the most of it */
+    float mark_k;        /* where the resistance was last compared, and what it was */
+    float mark_ohm;      /* 0: nowhere yet */
+    float mark_a;        /* at this current */
+    float onset_ohm;
+    float onset_k;  /* heat taken up until then */
+    float cold_ohm; /* at its beginning, martensite; 0: it was not */
+    float cold_c;
+    float cold_a;
+    float excess; /* change that no temperature coefficient explains; signed */
+    float flat_k; /* heat since, without such a change */
+} spring_heat_t;
+
+/* Of the running hold. */
+typedef struct {
+    float ohm; /* what it reads while it keeps its phase, at c; 0: none yet */
+    float c;
+    float a;          /* current of the line */
+    float sd;         /* of the line itself, relative */
+    float rise_per_k; /* what a kelvin adds to it, relative */
+    float rise_sd_per_k;
+} spring_line_t;
+
 /* What is believed of one spring. To be read by anyone, written by this module alone.
  *
  * The model keeps the temperature on the declared scale: there the transformation lies where it is
@@ -67,14 +95,15 @@ typedef struct {
     uint8_t quiet;      /* turns in which its temperature hardly moved, saturating */
     uint8_t losing;     /* turns on end in which it seems to lose phase */
     bool doubted;       /* its last heating ended before its resistance said so */
-    bool odd;           /* the turn before read what no phase changes to so fast */
-    bool reads;         /* the last turn had readings fit for use */
-    bool seen;          /* the last turn has moved it to where it was seen */
-    bool blind;         /* a heating that must have transformed it did not show */
-    bool heating;       /* between spring_estimator_begin_heating and _begin_hold */
-    bool onset;         /* this heating was seen to begin to transform it */
-    bool rough;         /* the line is of one turn, not of the average */
-    bool steep;         /* and its resistance still changes as only that explains */
+    bool unproven; /* by what it may be hotter it was spared: it may not have transformed again */
+    bool odd;      /* the turn before read what no phase changes to so fast */
+    bool reads;    /* the last turn had readings fit for use */
+    bool seen;     /* the last turn has moved it to where it was seen */
+    bool blind;    /* a heating that must have transformed it did not show */
+    bool heating;  /* between spring_estimator_begin_heating and _begin_hold */
+    bool onset;    /* this heating was seen to begin to transform it */
+    bool rough;    /* the line is of one turn, not of the average */
+    bool steep;    /* and its resistance still changes as only that explains */
     spring_learnt_t learnt;
 
     /* the running turn's readings */
@@ -93,28 +122,16 @@ typedef struct {
     float offset_sd_v;
     float noise;  /* standard deviation of one turn's, relative */
     float last_c; /* the model's temperature a turn ago */
-    /* the running heating */
-    float begun_c;       /* where it began, at the coldest */
-    float begun_missing; /* what was still to transform then, at the most, 0..1 */
-    float heat_k;        /* taken up, over heat capacity; less while it waits for its turn */
-    float peak_k;        /* the most of it */
-    float mark_k;        /* where the resistance was last compared, and what it was */
-    float mark_ohm;      /* 0: nowhere yet */
-    float mark_a;        /* at this current */
-    float onset_ohm;
-    float onset_k;  /* heat taken up until then */
-    float cold_ohm; /* at its beginning, martensite; 0: it was not */
-    float cold_c;
-    float cold_a;
-    float excess; /* change that no temperature coefficient explains; signed */
-    float flat_k; /* heat since, without such a change */
-    /* the running hold */
-    float line_ohm; /* what it reads while it keeps its phase, at line_c; 0: none yet */
-    float line_c;
-    float line_a;     /* current of the line */
-    float line_sd;    /* of the line itself, relative */
-    float rise_per_k; /* what a kelvin adds to it, relative */
-    float rise_sd_per_k;
+    /* the last loss, until its heating has brought it back */
+    float full_ohm;     /* what it read before, at martensite start; 0: no such loss */
+    float gone;         /* and by how much less it read then, relative, signed */
+    float gone_k;       /* what its distance */
+    float gone_w_per_k; /* and loss were moved by */
+    /* it heats, or it does not */
+    union {
+        spring_heat_t heat; /* while heating */
+        spring_line_t line;
+    } run;
 } spring_belief_t;
 
 typedef struct {
@@ -193,6 +210,9 @@ float spring_estimator_sd_k(const spring_belief_t *belief);
 /* The same while it is held at its present temperature, at its largest: an error of the loss shows
  * within minutes. */
 float spring_estimator_hold_sd_k(const spring_estimator_t *estimator, const thermal_model_t *model,
+                                 uint8_t spring);
+/* As hot as it is if what it seems to have lost was no phase, degC. */
+float spring_estimator_hottest_c(const spring_belief_t *belief, const thermal_model_t *model,
                                  uint8_t spring);
 /* How long it may still be hot from before power-on, s; 0 where that is over. */
 float spring_estimator_cooling_s(const spring_estimator_t *estimator, const thermal_model_t *model,

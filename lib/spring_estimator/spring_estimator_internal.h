@@ -11,6 +11,9 @@
 #define COEFFICIENT_MOST_PER_K      0.0015f
 #define COEFFICIENT_MOST_PER_HEAT_K (COEFFICIENT_MOST_PER_K / 0.85f)
 
+/* And the least, -0.0003, with what noise and offset add over 20 K. */
+#define COEFFICIENT_LEAST_PER_K (-0.00055f)
+
 #define COEFFICIENT_BOUND_PER_K 0.00025f /* of one that was learnt: noise and offset over 20 K */
 
 /* A reading at less is coarse: 4 mV are 3 % of its voltage. */
@@ -37,6 +40,9 @@ float spring_stiffness_w_per_k(const spring_belief_t *belief);
  * (SPRING_PHASE_MARTENSITE or _AUSTENITE). Returns the error found, K. */
 float spring_see(const spring_estimator_t *estimator, spring_belief_t *belief,
                  thermal_model_t *model, uint8_t spring, float seen_c, float sd_k, uint8_t from);
+/* Of its loss beyond the declared one, within what is ever believed. */
+void spring_correct_loss(const spring_estimator_t *estimator, spring_belief_t *belief,
+                         float more_w_per_k);
 /* It is not colder than limit_c, or that would be seen: as much as it would teach of the loss, but
  * no surer than before. */
 void spring_keep_above(const spring_estimator_t *estimator, spring_belief_t *belief,
@@ -58,6 +64,11 @@ void spring_begin_rough_line(spring_belief_t *belief, float now_c);
 /* Even the coldest and heaviest spring has transformed by the heat of this heating. */
 bool spring_heated_enough(const spring_estimator_t *estimator, const spring_belief_t *belief,
                           const thermal_model_t *model, uint8_t spring);
+/* What it had lost was none: it is as hot as if it had not. */
+void spring_take_back(const spring_estimator_t *estimator, spring_belief_t *belief,
+                      thermal_model_t *model, uint8_t spring);
+/* What it had lost was phase: it comes back. */
+void spring_is_back(spring_belief_t *belief);
 /* What the sensor's offset may add to it at another current than its line's, relative. */
 float spring_offset_may_show(const spring_belief_t *belief, float current_a);
 /* While it heats: what heat does to its resistance. */

@@ -26,14 +26,14 @@ void spring_estimator_begin_heating(spring_estimator_t *e, const thermal_model_t
         b->possible = b->lost < CHANGE_PART ? SPRING_PHASE_BETWEEN | SPRING_PHASE_AUSTENITE
                                             : SPRING_PHASE_BETWEEN;
     }
-    b->heat_k = b->peak_k = b->mark_k = b->flat_k = b->excess = 0.0f;
-    b->mark_ohm = b->onset_ohm = b->cold_ohm = b->line_ohm = 0.0f;
+    const float coldest_c =
+        spring_now_c(model, k) - SPRING_ESTIMATOR_BOUND_SDS * spring_estimator_sd_k(b);
+    b->run.heat = (spring_heat_t){
+        .begun_c = fmaxf(coldest_c, spring_ambient_c(model)),
+        .begun_missing = 1.0f - spring_estimator_austenite(e, model, k).low,
+    };
     b->onset = b->steep = false;
     b->heating = true;
-    b->begun_c =
-        fmaxf(spring_now_c(model, k) - SPRING_ESTIMATOR_BOUND_SDS * spring_estimator_sd_k(b),
-              spring_ambient_c(model));
-    b->begun_missing = 1.0f - spring_estimator_austenite(e, model, k).low;
 }
 
 static void see_onset(const spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model,
@@ -41,14 +41,18 @@ static void see_onset(const spring_estimator_t *e, spring_belief_t *b, thermal_m
 {
     const float now_c = spring_now_c(model, k);
     b->onset = true;
-    b->onset_k = b->heat_k;
+    spring_is_back(b);
+    b->run.heat.onset_k = b->run.heat.heat_k;
     if (b->possible == SPRING_PHASE_MARTENSITE) {
         spring_learnt_t *l = &b->learnt;
-        if (b->cold_ohm > 0.0f && now_c > b->cold_c + COLD_SPAN_K) {
-            const float rise_per_k = (b->onset_ohm / b->cold_ohm - 1.0f) / (now_c - b->cold_c);
-            if (fabsf(rise_per_k) < COEFFICIENT_MOST_PER_HEAT_K) { /* else a contact has moved */
+        if (b->run.heat.cold_ohm > 0.0f && now_c > b->run.heat.cold_c + COLD_SPAN_K) {
+            const float rise_per_k = (b->run.heat.onset_ohm / b->run.heat.cold_ohm - 1.0f) /
+                                     (now_c - b->run.heat.cold_c);
+            if (rise_per_k > COEFFICIENT_LEAST_PER_K &&
+                rise_per_k < COEFFICIENT_MOST_PER_HEAT_K) { /* else a contact has moved */
                 l->martensite_rise_per_k = rise_per_k;
-                l->martensite_ohm = b->cold_ohm / (1.0f + rise_per_k * (b->cold_c - LEARNT_AT_C));
+                l->martensite_ohm =
+                    b->run.heat.cold_ohm / (1.0f + rise_per_k * (b->run.heat.cold_c - LEARNT_AT_C));
             }
         }
         const int16_t start_c7 = thermal_model_transformation(model, k).austenite_start_c7;
@@ -60,9 +64,9 @@ static void see_onset(const spring_estimator_t *e, spring_belief_t *b, thermal_m
 
 void spring_learn_austenite(spring_belief_t *b)
 {
-    const float change = 1.0f - b->onset_ohm / b->ohm;
+    const float change = 1.0f - b->run.heat.onset_ohm / b->ohm;
     /* a heating from half way changes less */
-    if (b->cold_ohm > 0.0f || b->learnt.austenite_ohm == 0.0f) {
+    if (b->run.heat.cold_ohm > 0.0f || b->learnt.austenite_ohm == 0.0f) {
         b->learnt.change = change;
     }
     b->learnt.austenite_ohm = b->ohm;
@@ -77,7 +81,7 @@ static void see_finish(const spring_estimator_t *e, spring_belief_t *b, thermal_
     b->steep = false;
     b->lost = 0.0f;
     const int16_t finish_c7 = thermal_model_transformation(model, k).austenite_finish_c7;
-    (void)spring_see(e, b, model, k, spring_c(finish_c7) + b->flat_k, PLACE_SD_K,
+    (void)spring_see(e, b, model, k, spring_c(finish_c7) + b->run.heat.flat_k, PLACE_SD_K,
                      SPRING_PHASE_AUSTENITE);
 }
 
@@ -86,16 +90,16 @@ static float most_heat_k(const spring_estimator_t *e, const spring_belief_t *b, 
 {
     /* what does not show takes no latent heat */
     const float latent_k =
-        b->onset ? b->begun_missing * e->latent_heat_j / e->heat_capacity_j_per_k : 0.0f;
+        b->onset ? b->run.heat.begun_missing * e->latent_heat_j / e->heat_capacity_j_per_k : 0.0f;
     /* where some austenite is left for certain, its transformation is where it was */
     const float shift_k = (b->possible & SPRING_PHASE_AUSTENITE) != 0 ? 0.0f : SHIFT_BOUND_K;
-    return (spring_c(limit_c7) + shift_k - b->begun_c + latent_k) * CAPACITY_BOUND;
+    return (spring_c(limit_c7) + shift_k - b->run.heat.begun_c + latent_k) * CAPACITY_BOUND;
 }
 
 bool spring_heated_enough(const spring_estimator_t *e, const spring_belief_t *b,
                           const thermal_model_t *model, uint8_t k)
 {
-    return b->heat_k >=
+    return b->run.heat.heat_k >=
            most_heat_k(e, b, thermal_model_transformation(model, k).austenite_finish_c7);
 }
 
@@ -111,7 +115,7 @@ static void hold_back(const spring_estimator_t *e, const spring_belief_t *b, the
     const bool shows = b->steep || (b->learnt.austenite_ohm > 0.0f && !b->blind &&
                                     (martensite || spring_lacks_phase(b, model, k)));
     if (shows && thermal_model_temperature_c7(model, k) > limit_c7 &&
-        b->heat_k < most_heat_k(e, b, limit_c7)) {
+        b->run.heat.heat_k < most_heat_k(e, b, limit_c7)) {
         spring_set_temperature(model, k, spring_c(limit_c7), SPRING_PHASE_MARTENSITE);
     }
 }
@@ -128,9 +132,9 @@ static bool may_transform(const spring_belief_t *b, const thermal_model_t *model
 static bool has_changed(const spring_belief_t *b)
 {
     const float least = b->learnt.austenite_ohm > 0.0f
-                            ? 0.5f * fabsf(b->learnt.change) * b->begun_missing
+                            ? 0.5f * fabsf(b->learnt.change) * b->run.heat.begun_missing
                             : CHANGE_LEAST;
-    return fabsf(b->ohm / b->onset_ohm - 1.0f) > fmaxf(least, CHANGE_LEAST);
+    return fabsf(b->ohm / b->run.heat.onset_ohm - 1.0f) > fmaxf(least, CHANGE_LEAST);
 }
 
 /* Else it may only pause: a load may have moved the rest of its transformation away. */
@@ -140,8 +144,8 @@ static bool has_taken_enough(const spring_estimator_t *e, const spring_belief_t 
     if (b->learnt.austenite_ohm > 0.0f) {
         return !spring_lacks_phase(b, model, k);
     }
-    const float latent_k = b->begun_missing * e->latent_heat_j / e->heat_capacity_j_per_k;
-    return b->heat_k - b->onset_k > LEAST_HEAT * latent_k;
+    const float latent_k = b->run.heat.begun_missing * e->latent_heat_j / e->heat_capacity_j_per_k;
+    return b->run.heat.heat_k - b->run.heat.onset_k > LEAST_HEAT * latent_k;
 }
 
 /* Change of resistance over heat, a step at a time: more than any temperature coefficient makes is
@@ -149,63 +153,66 @@ static bool has_taken_enough(const spring_estimator_t *e, const spring_belief_t 
 void spring_heating_watch(const spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model,
                           uint8_t k)
 {
-    if (b->heating) {
-        hold_back(e, b, model, k);
-    }
-    if (!b->heating || b->current_a < STRONG_A || b->possible == SPRING_PHASE_AUSTENITE ||
-        b->possible == SPRING_PHASE_ANY || b->settling != 0) {
-        b->mark_ohm = 0.0f;
+    if (!b->heating) {
         return;
     }
-    if (b->mark_ohm > 0.0f && fabsf(b->current_a - b->mark_a) > SAME_CURRENT * b->current_a) {
-        b->mark_ohm = b->excess = 0.0f; /* the sensor's offset shows otherwise */
+    hold_back(e, b, model, k);
+    if (b->current_a < STRONG_A || b->possible == SPRING_PHASE_AUSTENITE ||
+        b->possible == SPRING_PHASE_ANY || b->settling != 0) {
+        b->run.heat.mark_ohm = 0.0f;
+        return;
+    }
+    if (b->run.heat.mark_ohm > 0.0f &&
+        fabsf(b->current_a - b->run.heat.mark_a) > SAME_CURRENT * b->current_a) {
+        b->run.heat.mark_ohm = b->run.heat.excess = 0.0f; /* the sensor's offset shows otherwise */
     }
     if (b->possible == SPRING_PHASE_MARTENSITE &&
-        (b->cold_ohm == 0.0f || b->current_a > (1.0f + SAME_CURRENT) * b->cold_a)) {
-        b->cold_ohm = b->ohm;
-        b->cold_a = b->current_a;
-        b->cold_c = spring_now_c(model, k);
+        (b->run.heat.cold_ohm == 0.0f ||
+         b->current_a > (1.0f + SAME_CURRENT) * b->run.heat.cold_a)) {
+        b->run.heat.cold_ohm = b->ohm;
+        b->run.heat.cold_a = b->current_a;
+        b->run.heat.cold_c = spring_now_c(model, k);
     }
-    if (b->heat_k < b->peak_k) {
+    if (b->run.heat.heat_k < b->run.heat.peak_k) {
         return; /* it had to wait: on the way back up nothing transforms, and that tells nothing */
     }
-    b->peak_k = b->heat_k;
-    if (b->mark_ohm == 0.0f) {
-        b->mark_ohm = b->ohm;
-        b->mark_a = b->current_a;
-        b->mark_k = b->heat_k;
+    b->run.heat.peak_k = b->run.heat.heat_k;
+    if (b->run.heat.mark_ohm == 0.0f) {
+        b->run.heat.mark_ohm = b->ohm;
+        b->run.heat.mark_a = b->current_a;
+        b->run.heat.mark_k = b->run.heat.heat_k;
         return;
     }
-    const float step_k = b->heat_k - b->mark_k;
+    const float step_k = b->run.heat.heat_k - b->run.heat.mark_k;
     if (step_k < fminf(fmaxf(STEP_LEAST_K, STEP_PER_NOISE * b->noise), STEP_MOST_K)) {
         return;
     }
-    const float change = b->ohm / b->mark_ohm - 1.0f;
+    const float change = b->ohm / b->run.heat.mark_ohm - 1.0f;
     const float explained = COEFFICIENT_MOST_PER_HEAT_K * step_k;
     const float excess = change > explained    ? change - explained
                          : change < -explained ? change + explained
                                                : 0.0f;
     /* a spring whose change is known changes that way */
     const bool against = b->learnt.austenite_ohm > 0.0f && excess * b->learnt.change < 0.0f;
-    if (!b->onset && (against || excess * b->excess <= 0.0f)) {
-        b->excess = 0.0f; /* none, or the other way: counted anew */
-        b->onset_ohm = b->mark_ohm;
+    if (!b->onset && (against || excess * b->run.heat.excess <= 0.0f)) {
+        b->run.heat.excess = 0.0f; /* none, or the other way: counted anew */
+        b->run.heat.onset_ohm = b->run.heat.mark_ohm;
     }
-    b->excess += against ? 0.0f : excess;
+    b->run.heat.excess += against ? 0.0f : excess;
     b->steep = b->onset && fabsf(excess) > STEEP_SDS * b->noise;
-    b->flat_k = b->steep || !b->onset ? 0.0f : b->flat_k + step_k;
-    if (!b->onset && fabsf(b->excess) > EXCESS_SEEN + EXCESS_SDS * b->noise) {
+    b->run.heat.flat_k = b->steep || !b->onset ? 0.0f : b->run.heat.flat_k + step_k;
+    if (!b->onset && fabsf(b->run.heat.excess) > EXCESS_SEEN + EXCESS_SDS * b->noise) {
         if (may_transform(b, model, k)) {
             see_onset(e, b, model, k);
             b->steep = true;
         } else {
-            spring_jump(b, b->ohm / b->onset_ohm); /* too cold: a contact */
-            b->excess = 0.0f;
+            spring_jump(b, b->ohm / b->run.heat.onset_ohm); /* too cold: a contact */
+            b->run.heat.excess = 0.0f;
         }
-    } else if (b->flat_k >= FLAT_K && has_changed(b) &&
-               (b->flat_k >= FLAT_K + SHIFT_BOUND_K || has_taken_enough(e, b, model, k))) {
+    } else if (b->run.heat.flat_k >= FLAT_K && has_changed(b) &&
+               (b->run.heat.flat_k >= FLAT_K + SHIFT_BOUND_K || has_taken_enough(e, b, model, k))) {
         see_finish(e, b, model, k);
     }
-    b->mark_ohm = b->ohm;
-    b->mark_k = b->heat_k;
+    b->run.heat.mark_ohm = b->ohm;
+    b->run.heat.mark_k = b->run.heat.heat_k;
 }

@@ -23,6 +23,8 @@
 #define AWAY_LEAST_K   1.0f /* less tells nothing of a coefficient */
 /* Of an average: what a sensor's steps leave, LOSS_LEAST / 3, and it tells anew in 2 x 16 turns. */
 #define LINE_VARIANCE (32.0f * LOSS_LEAST * LOSS_LEAST / 9.0f)
+#define BACK_SHARE    0.5f  /* of a loss: as near to being back as to being gone */
+#define BACK_LEAST    0.01f /* twice what a line differs by from one heating to the next */
 #define STILL_K       0.5f  /* below where it would be seen */
 #define COSINE_BEGINS 0.64f /* 2 / pi: x where a cosine has sqrt(lost) = (pi / 2) x */
 
@@ -38,17 +40,17 @@ static float lost_at_c(const thermal_model_t *model, uint8_t k, float lost)
 
 void spring_begin_line(spring_belief_t *b, float now_c)
 {
-    b->line_ohm = b->slow_ohm;
-    b->line_c = now_c;
-    b->line_a = b->slow_a;
+    b->run.line.ohm = b->slow_ohm;
+    b->run.line.c = now_c;
+    b->run.line.a = b->slow_a;
     /* as martensite's until this line tells: a contact that ages makes another slope of each */
     const spring_learnt_t *l = &b->learnt;
     const float most_per_k = l->martensite_ohm > 0.0f
-                                 ? COEFFICIENT_BOUND_PER_K + 0.5f * fabsf(l->martensite_rise_per_k)
+                                 ? COEFFICIENT_BOUND_PER_K + fabsf(l->martensite_rise_per_k)
                                  : COEFFICIENT_MOST_PER_K;
-    b->rise_per_k = l->martensite_rise_per_k;
-    b->rise_sd_per_k = most_per_k / SPRING_ESTIMATOR_BOUND_SDS;
-    b->line_sd = NOISE_IN_SLOW * b->noise;
+    b->run.line.rise_per_k = l->martensite_rise_per_k;
+    b->run.line.rise_sd_per_k = most_per_k / SPRING_ESTIMATOR_BOUND_SDS;
+    b->run.line.sd = NOISE_IN_SLOW * b->noise;
     b->rough = false;
     b->losing = 0;
 }
@@ -56,13 +58,19 @@ void spring_begin_line(spring_belief_t *b, float now_c)
 void spring_begin_rough_line(spring_belief_t *b, float now_c)
 {
     spring_begin_line(b, now_c);
-    b->line_sd = b->noise;
+    b->run.line.sd = b->noise;
     b->rough = true;
+}
+
+static float start_c(const thermal_model_t *model, uint8_t k)
+{
+    return spring_c(thermal_model_transformation(model, k).martensite_start_c7);
 }
 
 static void see_crossing(const spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model,
                          uint8_t k, float lost)
 {
+    const float was_w_per_k = b->learnt.loss_w_per_k;
     const bool searched = spring_estimator_sd_k(b) > 3.0f * CROSSING_SD_K;
     if (lost > LARGE_LOSS) {
         /* nearer to it by as much as more is lost up there */
@@ -80,30 +88,73 @@ static void see_crossing(const spring_estimator_t *e, spring_belief_t *b, therma
     if (!searched && -error_k > b->disturbance_k) {
         b->disturbance_k = -error_k;
     }
+    b->gone_k -= error_k;
+    b->gone_w_per_k += b->learnt.loss_w_per_k - was_w_per_k;
+}
+
+/* It is where it was believed before, as unsure as it was found wrong. */
+void spring_take_back(const spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model,
+                      uint8_t k)
+{
+    const float more_k = b->gone_k;
+    const float less_w_per_k = b->gone_w_per_k;
+    spring_set_temperature(model, k, spring_now_c(model, k) + more_k, SPRING_PHASE_AUSTENITE);
+    b->last_c = spring_now_c(model, k);
+    b->seen = true;
+    spring_correct_loss(e, b, -less_w_per_k);
+    b->variance_k2 += more_k * more_k;
+    b->loss_variance += less_w_per_k * less_w_per_k;
+    b->covariance -= more_k * less_w_per_k;
+    b->gone_k = b->gone_w_per_k = 0.0f;
+    b->unproven = false;
+}
+
+void spring_is_back(spring_belief_t *b)
+{
+    b->full_ohm = b->gone = b->gone_k = b->gone_w_per_k = 0.0f;
+    b->unproven = false;
+}
+
+/* Phase that was lost comes back with heat. What has not was a contact, or the sensor. */
+static void look_back(const spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model,
+                      uint8_t k, float now_c)
+{
+    const float full_ohm =
+        b->full_ohm * (1.0f + b->run.line.rise_per_k * (now_c - start_c(model, k)));
+    const float missing = b->slow_ohm / full_ohm - 1.0f;
+    if (fabsf(b->gone) > BACK_LEAST) {
+        if (missing * b->gone > BACK_SHARE * b->gone * b->gone) {
+            spring_take_back(e, b, model, k);
+        } else {
+            spring_is_back(b);
+        }
+    }
+    b->full_ohm = b->gone = 0.0f; /* too little to tell: it stays in doubt */
 }
 
 /* The current has dropped, the spring is what it was a moment ago: what reads otherwise is the
  * sensor's offset. Returns whether this turn told one. */
 static bool learn_offset(spring_belief_t *b, float now_c)
 {
-    const float apart_per_a = 1.0f / b->current_a - 1.0f / b->line_a;
+    const float apart_per_a = 1.0f / b->current_a - 1.0f / b->run.line.a;
     if (apart_per_a < APART_PER_A) {
         return false;
     }
     const float apart_a = 1.0f / apart_per_a;
-    const float moved_v = COEFFICIENT_MOST_PER_K * (now_c - b->line_c) * b->line_ohm * apart_a;
+    const float moved_v =
+        COEFFICIENT_MOST_PER_K * (now_c - b->run.line.c) * b->run.line.ohm * apart_a;
     const float noise_v = b->noise * b->ohm * apart_a;
     const float prior_v2 = b->offset_sd_v * b->offset_sd_v;
     const float read_v2 = OFFSET_LEAST_V * OFFSET_LEAST_V + noise_v * noise_v + moved_v * moved_v;
     const float gain = prior_v2 / (prior_v2 + read_v2);
-    const float more_v = gain * (b->ohm - b->line_ohm) * apart_a;
+    const float more_v = gain * (b->ohm - b->run.line.ohm) * apart_a;
     if (fabsf(b->offset_v + more_v) > OFFSET_MOST_V) {
         return false; /* no offset is so large */
     }
     b->offset_v += more_v;
     b->offset_sd_v = sqrtf(gain * read_v2);
-    const float more_ohm = more_v / b->line_a;
-    b->line_ohm -= more_ohm;
+    const float more_ohm = more_v / b->run.line.a;
+    b->run.line.ohm -= more_ohm;
     b->learnt.austenite_ohm -= b->learnt.austenite_ohm > 0.0f ? more_ohm : 0.0f;
     b->seen = true; /* it is acted on in the next turn */
     return true;
@@ -111,14 +162,16 @@ static bool learn_offset(spring_belief_t *b, float now_c)
 
 float spring_offset_may_show(const spring_belief_t *b, float current_a)
 {
-    return OFFSET_SDS * b->offset_sd_v * fabsf(1.0f / current_a - 1.0f / b->line_a) / b->line_ohm;
+    return OFFSET_SDS * b->offset_sd_v * fabsf(1.0f / current_a - 1.0f / b->run.line.a) /
+           b->run.line.ohm;
 }
 
 /* By how much, squared, the resistance may have left its line with the phase kept: its temperature
  * moves it, and another current shows another share of the sensor's offset. */
 static float may_move_squared(const spring_belief_t *b, float now_c)
 {
-    const float moves = SPRING_ESTIMATOR_BOUND_SDS * b->rise_sd_per_k * (now_c - b->line_c);
+    const float moves =
+        SPRING_ESTIMATOR_BOUND_SDS * b->run.line.rise_sd_per_k * (now_c - b->run.line.c);
     const float offset = spring_offset_may_show(b, b->slow_a);
     return moves * moves + offset * offset;
 }
@@ -127,17 +180,17 @@ static float may_move_squared(const spring_belief_t *b, float now_c)
  * is its slope. */
 static void follow(spring_belief_t *b, float now_c, float left)
 {
-    const float away_k = now_c - b->line_c;
+    const float away_k = now_c - b->run.line.c;
     if (fabsf(away_k) > AWAY_LEAST_K && fabsf(left) < LOSS_LEAST) {
-        const float variance = b->rise_sd_per_k * b->rise_sd_per_k;
+        const float variance = b->run.line.rise_sd_per_k * b->run.line.rise_sd_per_k;
         const float gain = variance * away_k / (variance * away_k * away_k + LINE_VARIANCE);
-        b->rise_per_k = spring_clamp(b->rise_per_k + gain * left, -COEFFICIENT_MOST_PER_K,
-                                     COEFFICIENT_MOST_PER_K);
-        b->rise_sd_per_k = sqrtf(variance * (1.0f - gain * away_k));
+        b->run.line.rise_per_k = spring_clamp(b->run.line.rise_per_k + gain * left,
+                                              -COEFFICIENT_MOST_PER_K, COEFFICIENT_MOST_PER_K);
+        b->run.line.rise_sd_per_k = sqrtf(variance * (1.0f - gain * away_k));
     }
-    b->line_ohm += b->line_ohm * left * LINE_SHARE;
-    b->line_c += away_k * LINE_SHARE;
-    b->line_sd -= b->line_sd * LINE_SHARE;
+    b->run.line.ohm += b->run.line.ohm * left * LINE_SHARE;
+    b->run.line.c += away_k * LINE_SHARE;
+    b->run.line.sd -= b->run.line.sd * LINE_SHARE;
 }
 
 /* Of what the resistance has left its line by, the part that lost phase may explain. */
@@ -161,7 +214,7 @@ static bool may_have_cooled(const spring_belief_t *b, const thermal_model_t *mod
                             float sd_k)
 {
     const float now_c = spring_now_c(model, k);
-    const float cooled_k = fmaxf(b->line_c - now_c, 0.0f);
+    const float cooled_k = fmaxf(b->run.line.c - now_c, 0.0f);
     const float most_k = cooled_k + SPRING_ESTIMATOR_BOUND_SDS * sd_k + SHIFT_BOUND_K;
     return now_c - most_k < spring_c(thermal_model_transformation(model, k).martensite_start_c7);
 }
@@ -170,7 +223,7 @@ static bool may_have_cooled(const spring_belief_t *b, const thermal_model_t *mod
 void spring_holding_watch(const spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model,
                           uint8_t k, float moved_k)
 {
-    if (b->possible != SPRING_PHASE_AUSTENITE) {
+    if (b->heating || b->possible != SPRING_PHASE_AUSTENITE) {
         b->quiet = 0;
         return;
     }
@@ -178,7 +231,7 @@ void spring_holding_watch(const spring_estimator_t *e, spring_belief_t *b, therm
                : b->quiet < UINT8_MAX   ? (uint8_t)(b->quiet + 1)
                                         : UINT8_MAX;
     const float now_c = spring_now_c(model, k);
-    if (b->line_ohm == 0.0f) {
+    if (b->run.line.ohm == 0.0f) {
         if (b->quiet == 0) {
             b->slow_ohm = b->ohm;
             b->slow_a = b->current_a;
@@ -188,13 +241,17 @@ void spring_holding_watch(const spring_estimator_t *e, spring_belief_t *b, therm
             return;
         }
         spring_begin_line(b, now_c);
+        if (b->full_ohm > 0.0f) {
+            look_back(e, b, model, k, now_c);
+        }
     } else if (b->quiet == 0 && b->offset_sd_v > OFFSET_LEAST_V && learn_offset(b, now_c)) {
         return;
     }
-    const float kept_ohm = b->line_ohm * (1.0f + b->rise_per_k * (now_c - b->line_c));
+    const float kept_ohm =
+        b->run.line.ohm * (1.0f + b->run.line.rise_per_k * (now_c - b->run.line.c));
     if (b->quiet == 0 && b->current_a < STRONG_A) { /* on its way to the hold: too weak to tell */
         b->slow_ohm = kept_ohm;
-        b->slow_a = b->line_a;
+        b->slow_a = b->run.line.a;
         b->losing = 0;
         return;
     }
@@ -202,9 +259,9 @@ void spring_holding_watch(const spring_estimator_t *e, spring_belief_t *b, therm
     const float sd_k = spring_estimator_sd_k(b);
     const float changed = as_lost(b, model, k, left, sd_k);
     /* as its temperature may have moved unseen, so may the resistance */
-    const float moves = fabsf(b->rise_per_k) * sd_k;
+    const float moves = fabsf(b->run.line.rise_per_k) * sd_k;
     const float slow_sd = NOISE_IN_SLOW * b->noise;
-    const float noise2 = slow_sd * slow_sd + b->line_sd * b->line_sd;
+    const float noise2 = slow_sd * slow_sd + b->run.line.sd * b->run.line.sd;
     const float least = fmaxf(LOSS_LEAST, moves);
     const float changed2 = changed * changed;
     float sure2 = fmaxf(least * least, SURE_SDS * SURE_SDS * noise2);
@@ -219,6 +276,10 @@ void spring_holding_watch(const spring_estimator_t *e, spring_belief_t *b, therm
         if (b->quiet >= QUIET_TURNS) {
             if (b->rough) { /* it has come to rest */
                 spring_begin_line(b, now_c);
+                if (b->full_ohm > 0.0f && b->lost == 0.0f) {
+                    look_back(e, b, model, k, now_c);
+                    return;
+                }
             }
             follow(b, now_c, left);
             spring_keep_above(e, b, model, k, lost_at_c(model, k, b->lost) - STILL_K);
@@ -231,7 +292,15 @@ void spring_holding_watch(const spring_estimator_t *e, spring_belief_t *b, therm
             spring_begin_rough_line(b, now_c);
             return;
         }
+        /* until it is back, or was found not to have been phase, all of it is one loss */
+        b->full_ohm = b->full_ohm > 0.0f ? b->full_ohm : kept_ohm;
+        b->gone += left;
         see_crossing(e, b, model, k, changed / fabsf(b->learnt.change));
         spring_begin_rough_line(b, spring_now_c(model, k)); /* the average still falls */
     }
+}
+
+float spring_estimator_hottest_c(const spring_belief_t *b, const thermal_model_t *model, uint8_t k)
+{
+    return spring_now_c(model, k) + b->gone_k;
 }

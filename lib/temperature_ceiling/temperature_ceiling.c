@@ -112,16 +112,19 @@ bool temperature_ceiling_trips(const temperature_ceiling_t *ceiling, const therm
                (128 * (int32_t)trip_cc - ambient) * RISE_SHARE_DENOMINATOR;
 }
 
-float temperature_ceiling_power_w(const thermal_model_t *model,
-                                  const current_control_parameters_t *circuit, float duty)
+void temperature_ceiling_prepare(temperature_ceiling_t *ceiling, const thermal_model_t *model,
+                                 const current_control_parameters_t *circuit)
 {
-    const float swing_mv = (float)((int32_t)circuit->supply_mv + circuit->freewheel_mv);
-    const float behind_mv = swing_mv * duty * (1.0f / 800.0f) - (float)circuit->freewheel_mv;
-    if (behind_mv <= 0.0f) {
-        return 0.0f;
-    }
-    const float mohm = 1e-3f * (float)model->parameters.resistance_austenite_uohm;
-    const float fixed_mohm = (float)((int32_t)circuit->shunt_mohm + circuit->wiring_mohm);
-    const float current_a = behind_mv / (mohm + fixed_mohm);
-    return POWER_SHARE * 1e-3f * current_a * current_a * mohm;
+    const float ohm = 1e-6f * (float)model->parameters.resistance_austenite_uohm;
+    const float fixed_ohm = 1e-3f * (float)((int32_t)circuit->shunt_mohm + circuit->wiring_mohm);
+    ceiling->drop_v = 1e-3f * (float)circuit->freewheel_mv;
+    ceiling->v_per_step =
+        1e-3f / 800.0f * (float)((int32_t)circuit->supply_mv + circuit->freewheel_mv);
+    ceiling->w_per_v2 = POWER_SHARE * ohm / ((ohm + fixed_ohm) * (ohm + fixed_ohm));
+}
+
+float temperature_ceiling_power_w(const temperature_ceiling_t *ceiling, float duty)
+{
+    const float behind_v = ceiling->v_per_step * duty - ceiling->drop_v;
+    return behind_v > 0.0f ? ceiling->w_per_v2 * behind_v * behind_v : 0.0f;
 }

@@ -19,6 +19,9 @@ extern "C" {
 typedef struct {
     int32_t temperature_c23[THERMAL_MODEL_MAX_SPRINGS]; /* Q9.23 degC */
     float austenite[THERMAL_MODEL_MAX_SPRINGS];         /* 0..1 */
+    float v_per_step;                                   /* of duty */
+    float drop_v;                                       /* of the freewheeling diode */
+    float w_per_v2; /* least power of a spring, by the voltage behind its switch */
 } temperature_ceiling_t;
 
 /* From here on it begins where the model is. */
@@ -36,10 +39,13 @@ float temperature_ceiling_c(const temperature_ceiling_t *ceiling, uint8_t spring
 bool temperature_ceiling_trips(const temperature_ceiling_t *ceiling, const thermal_model_t *model,
                                uint8_t spring, int16_t trip_cc);
 
+/* Takes what it needs of the settings; where it is stays. */
+void temperature_ceiling_prepare(temperature_ceiling_t *ceiling, const thermal_model_t *model,
+                                 const current_control_parameters_t *circuit);
+
 /* Power that the duty (steps of 800) must at least bring, whatever is read: the supply may be a
  * fifth lower than declared. */
-float temperature_ceiling_power_w(const thermal_model_t *model,
-                                  const current_control_parameters_t *circuit, float duty);
+float temperature_ceiling_power_w(const temperature_ceiling_t *ceiling, float duty);
 
 #ifdef __cplusplus
 }

@@ -305,6 +305,16 @@ static void ceiling_trips_whatever_is_believed(void)
     TEST_ASSERT_EQUAL_UINT16(0, outputs.duty[4]);
 }
 
+/* What was before power-on is for the estimator to wait for: else cold springs that need not wait
+ * would trip in their first heating. */
+static void ceiling_begins_where_it_was_given_nothing_yet(void)
+{
+    start();
+    for (uint8_t k = 0; k < settings.model.rows * settings.model.columns; k++) {
+        TEST_ASSERT_EQUAL_FLOAT(20.0f, temperature_ceiling_c(&controller.ceiling, k));
+    }
+}
+
 /* The near miss: from the same cold belief, a current that keeps it below the trip for ever. */
 static void ceiling_lets_a_current_pass_that_cannot_overheat(void)
 {
@@ -557,6 +567,7 @@ int main(void)
     RUN_TEST(current_in_an_output_that_is_off_stops_the_board);
     RUN_TEST(hot_model_trips);
     RUN_TEST(ceiling_trips_whatever_is_believed);
+    RUN_TEST(ceiling_begins_where_it_was_given_nothing_yet);
     RUN_TEST(ceiling_lets_a_current_pass_that_cannot_overheat);
     RUN_TEST(frozen_sensor_is_found_within_two_seconds_and_stops_its_spring_alone);
     RUN_TEST(limit_that_stays_is_a_fault_until_cleared);

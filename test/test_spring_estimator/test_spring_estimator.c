@@ -376,6 +376,57 @@ static void contact_is_not_taken_for_phase(void)
     }
 }
 
+static float believed_c(void)
+{
+    return (float)thermal_model_temperature_c7(&model, 0) / 128.0f;
+}
+
+/* In the hold a contact gets better by 5 %, as if phase was lost. Until heat has shown that nothing
+ * comes back, it may be as hot as it was believed before; then it is. */
+static void loss_that_does_not_come_back_was_none(void)
+{
+    begin_cold();
+    truth.contact_ohm = 0.012;
+    (void)heat_then_hold(60.0);
+    for (double s = 0.0; s < 60.0; s += TICK_S) {
+        (void)tick(hold_current_a(12.0));
+    }
+    truth.contact_ohm = 0.0;
+    for (double s = 0.0; s < 60.0 && BELIEF.lost < 0.03f; s += TICK_S) {
+        (void)tick(hold_current_a(12.0));
+    }
+    (void)snprintf(where, sizeof where, "lost %.3f: %.1f to %.1f degC, true %.1f",
+                   (double)BELIEF.lost, (double)believed_c(),
+                   (double)spring_estimator_hottest_c(&BELIEF, &model, 0), truth.temperature_c);
+    TEST_ASSERT_TRUE_MESSAGE(BELIEF.lost >= 0.03f, where); /* it is taken in */
+    TEST_ASSERT_TRUE_MESSAGE((double)believed_c() < truth.temperature_c - 3.0, where);
+    /* the contact's heat was read as the spring's: 5 % of its rise */
+    TEST_ASSERT_FLOAT_WITHIN_MESSAGE(4.0f, (float)truth.temperature_c,
+                                     spring_estimator_hottest_c(&BELIEF, &model, 0), where);
+    (void)heat_then_hold(60.0);
+    for (double s = 0.0; s < 90.0; s += TICK_S) {
+        (void)tick(hold_current_a(12.0));
+    }
+    (void)snprintf(where, sizeof where, "at rest: %.1f degC, true %.1f", (double)believed_c(),
+                   truth.temperature_c);
+    TEST_ASSERT_EQUAL_FLOAT_MESSAGE(0.0f, BELIEF.gone_k, where);
+    TEST_ASSERT_FLOAT_WITHIN_MESSAGE(6.0f, (float)truth.temperature_c, believed_c(), where);
+}
+
+/* Of a contact that gets better while it warms: no metal's resistance falls so fast. */
+static void slope_that_no_metal_has_is_not_learnt(void)
+{
+    begin_cold();
+    truth.contact_ohm = 0.015;
+    spring_estimator_begin_heating(&estimator, &model, 0);
+    while (!BELIEF.onset && truth.temperature_c < 110.0) {
+        truth.contact_ohm = fmax(truth.contact_ohm - 0.001 * TICK_S, 0.0);
+        (void)tick(3.0);
+    }
+    TEST_ASSERT_TRUE(BELIEF.onset);
+    TEST_ASSERT_EQUAL_FLOAT(0.0f, BELIEF.learnt.martensite_rise_per_k);
+}
+
 /* A heating that a limit ends before the phase is there has not transformed it; the second time
  * its readings tell nothing any more. */
 static void heating_that_a_limit_ends_is_doubted(void)
@@ -613,6 +664,8 @@ int main(void)
     RUN_TEST(offset_is_learnt_where_the_current_drops);
     RUN_TEST(phase_lost_on_the_way_to_the_hold_is_counted);
     RUN_TEST(contact_is_not_taken_for_phase);
+    RUN_TEST(loss_that_does_not_come_back_was_none);
+    RUN_TEST(slope_that_no_metal_has_is_not_learnt);
     RUN_TEST(heating_that_a_limit_ends_is_doubted);
     RUN_TEST(heating_that_is_cut_between_two_readings_is_doubted);
     RUN_TEST(contact_that_steps_in_a_heating_does_not_end_it);

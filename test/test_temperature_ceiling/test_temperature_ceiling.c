@@ -96,16 +96,16 @@ static void duty_and_supply_bound_the_power_from_below(void)
 {
     current_control_parameters_t circuit;
     current_control_parameters_default(&circuit);
-    TEST_ASSERT_FLOAT_WITHIN(1e-3f, 0.64f * 0.219f * 1.5664f * 1.5664f,
-                             temperature_ceiling_power_w(&model, &circuit, 100.0f));
-    TEST_ASSERT_EQUAL_FLOAT(0.0f, temperature_ceiling_power_w(&model, &circuit, 0.0f));
-    circuit.freewheel_mv = 500;
-    TEST_ASSERT_EQUAL_FLOAT(0.0f, temperature_ceiling_power_w(&model, &circuit, 10.0f));
+    temperature_ceiling_prepare(&ceiling, &model, &circuit);
+    const float power_w = temperature_ceiling_power_w(&ceiling, 100.0f);
+    TEST_ASSERT_FLOAT_WITHIN(1e-3f, 0.64f * 0.219f * 1.5664f * 1.5664f, power_w);
+    TEST_ASSERT_EQUAL_FLOAT(0.0f, temperature_ceiling_power_w(&ceiling, 0.0f));
     /* no honest reading is below: 4.2 V, 0.22 ohm */
-    circuit.freewheel_mv = 0;
     const float least_a = 4.2f / 8.0f / (0.219f + 0.22f);
-    TEST_ASSERT_TRUE(least_a * least_a * 0.219f >
-                     0.85f * temperature_ceiling_power_w(&model, &circuit, 100.0f));
+    TEST_ASSERT_TRUE(least_a * least_a * 0.219f > 0.85f * power_w);
+    circuit.freewheel_mv = 500;
+    temperature_ceiling_prepare(&ceiling, &model, &circuit);
+    TEST_ASSERT_EQUAL_FLOAT(0.0f, temperature_ceiling_power_w(&ceiling, 10.0f));
 }
 
 /* The smallest heat capacity that the model takes: a step of 0.6 s is far longer than its time. */

@@ -15,7 +15,7 @@
 
 #define WORLD_SPRINGS_MAX 16
 #define WORLD_NODES       3 /* thirds of the wire: crimped end, middle, crimped end */
-#define WORLD_EVENTS_MAX  32
+#define WORLD_EVENTS_MAX  256
 #define WORLD_TICK_S      0.02
 
 /* Stress moves the transformation: Flexinol, measured (docs/worlds.md). */
@@ -45,7 +45,7 @@ typedef enum {
     WORLD_STRESS_MPA,          /* value: stress from now on, MPa, taken up within 0.3 s */
     WORLD_CONTACT_OHM,         /* value: contact resistance from now on */
     WORLD_CONTACT_OHM_PER_S,   /* value: its drift from now on */
-    WORLD_SENSOR_FREEZE,       /* the last registers for ever */
+    WORLD_SENSOR_FREEZE,       /* value 0: the last registers from now on; else it reads again */
     WORLD_SENSOR_CURRENT_GAIN, /* value: gain from now on: a lie */
     WORLD_SENSOR_VOLTAGE_GAIN, /* the same */
     WORLD_SENSOR_SWAP, /* value: spring whose sensor answers for this one, and the reverse */
