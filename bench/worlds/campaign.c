@@ -56,7 +56,7 @@ static void temperature_coefficient(run_case_t *run, random_t *random, double va
 {
     (void)value;
     double martensite_per_k = random_uniform(random, -0.0003, 0.0012);
-    double austenite_per_k = martensite_per_k * random_uniform(random, 0.5, 1.0);
+    double austenite_per_k = random_uniform(random, -0.0003, 0.0012); /* its own */
     for (int k = 0; k < count(run); k++) {
         run->world.spring[k].martensite_per_k = martensite_per_k;
         run->world.spring[k].austenite_per_k = austenite_per_k;
@@ -346,7 +346,8 @@ static const struct {
 } worlds[] = {
     {"declared", as_declared, 0.0, false, "everything within 15 % of its declaration, cold"},
     {"half_warm", half_warm, 0.0, false, "power-on at 35 to 86 degC, half still austenite"},
-    {"coefficient", temperature_coefficient, 0.0, true, "resistance -0.0003 to +0.0012 per K"},
+    {"coefficient", temperature_coefficient, 0.0, true,
+     "resistance -0.0003 to +0.0012 per K, each phase its own"},
     {"alloy", other_alloy, 0.0, true, "transformation off by up to 8 K, each spring its own"},
     {"load_heating", load_heating, 0.0, true, "loads worth up to 8 K either way while heating"},
     {"load_holding", load_holding, 0.0, true, "the same while holding"},

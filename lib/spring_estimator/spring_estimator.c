@@ -8,7 +8,6 @@
 #define LEAST_READINGS 4
 #define LEAST_MEAN_MA  50u
 #define SETTLING_TICKS 8
-#define SLOW_SHARE     0.0625f /* of a turn in the average: 4 s, six periods of the dither */
 #define NOISE_FIRST    0.002f
 #define NOISE_MOST     0.05f
 #define NOISE_SHARE    0.06f
@@ -247,6 +246,9 @@ static bool leave_out(spring_belief_t *b, float ohm, float current_a)
 static void take_noise(spring_belief_t *b, float ohm, float current_a)
 {
     const bool same = fabsf(current_a - b->current_a) < NOISE_SAME * current_a;
+    if (!same && b->fresh != 0) { /* it is one of the voltage */
+        b->noise = fminf(b->noise * b->current_a / current_a, NOISE_MOST);
+    }
     if (same && b->ohm_before[1] > 0.0f) {
         const float bend = fabsf(ohm - 2.0f * b->ohm_before[0] + b->ohm_before[1]) / ohm;
         b->noise += (fminf(BEND_TO_SD * bend, NOISE_MOST) - b->noise) * NOISE_SHARE;
@@ -258,8 +260,14 @@ static void take_noise(spring_belief_t *b, float ohm, float current_a)
 static void take_reading(spring_belief_t *b, float ohm, float current_a)
 {
     take_noise(b, ohm, current_a);
-    b->slow_ohm = b->fresh == 0 ? ohm : b->slow_ohm + (ohm - b->slow_ohm) * SLOW_SHARE;
-    b->slow_a = b->fresh == 0 ? current_a : b->slow_a + (current_a - b->slow_a) * SLOW_SHARE;
+    b->averaged = b->fresh == 0 ? 0 : b->averaged;
+    float share = SLOW_SHARE; /* as a rule: a division is saved */
+    if (b->averaged < SLOW_TURNS) {
+        b->averaged++;
+        share = 1.0f / (float)b->averaged;
+    }
+    b->slow_ohm += (ohm - b->slow_ohm) * share;
+    b->slow_a += (current_a - b->slow_a) * share;
     b->current_a = current_a;
     b->ohm = ohm;
     b->phase_ohm = current_a > STRONG_A || b->fresh == 0 ? ohm : b->phase_ohm;
@@ -578,8 +586,7 @@ void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, 
     b->losing = 0;
     b->run.line = (spring_line_t){0};
     if (full && b->reads && b->current_a > STRONG_A) {
-        b->slow_ohm = b->ohm;
-        b->slow_a = b->current_a;
+        spring_average_anew(b);
         spring_begin_rough_line(b, now_c);
         b->offset_sd_v = fmaxf(b->offset_sd_v, OFFSET_AGAIN_V);
     }

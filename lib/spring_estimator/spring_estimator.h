@@ -94,6 +94,7 @@ typedef struct {
     uint8_t fresh;      /* turns with readings since current flows, saturating */
     uint8_t quiet;      /* turns in which its temperature hardly moved, saturating */
     uint8_t losing;     /* turns on end in which it seems to lose phase */
+    uint8_t averaged;   /* turns in slow_ohm, saturating */
     bool doubted;       /* its last heating ended before its resistance said so */
     bool unproven; /* by what it may be hotter it was spared: it may not have transformed again */
     bool odd;      /* the turn before read what no phase changes to so fast */
@@ -102,7 +103,7 @@ typedef struct {
     bool blind;    /* a heating that must have transformed it did not show */
     bool heating;  /* between spring_estimator_begin_heating and _begin_hold */
     bool onset;    /* this heating was seen to begin to transform it */
-    bool rough;    /* the line is of one turn, not of the average */
+    bool rough;    /* the line is of few turns, not of a spring at rest */
     bool steep;    /* and its resistance still changes as only that explains */
     spring_learnt_t learnt;
 

@@ -21,6 +21,9 @@
 
 #define SHIFT_BOUND_K 8.0f /* 2.6 standard deviations of a declared transformation, or a load */
 
+#define SLOW_TURNS 16 /* of the average: 4 s, six periods of the dither */
+#define SLOW_SHARE (1.0f / SLOW_TURNS)
+
 #define LEARNT_AT_C 20.0f /* a learnt martensite's resistance is that at this temperature */
 
 float spring_clamp(float value, float low, float high);
@@ -57,6 +60,8 @@ bool spring_lacks_phase(const spring_belief_t *belief, const thermal_model_t *mo
 /* It has transformed: what it reads now is its own austenite's, and the way there its change. */
 void spring_learn_austenite(spring_belief_t *belief);
 
+/* The average begins anew, with the last turn. */
+void spring_average_anew(spring_belief_t *belief);
 /* What it reads on average now is what it reads with the phase that it has. */
 void spring_begin_line(spring_belief_t *belief, float now_c);
 /* The same by the last turn alone, or while the average still moves: anew when it is at rest. */

@@ -7,7 +7,9 @@
 /* Of a turn, 60 s: what the line follows is no loss of phase. */
 #define LINE_SHARE     (1.0f / 240.0f)
 #define LOSS_LEAST     0.0012f /* of the resistance: what a sensor's steps leave in the average */
-#define NOISE_IN_SLOW  0.18f   /* of one turn's: sqrt(share / (2 - share)) */
+#define NOISE_IN_SLOW  0.18f   /* of one turn's, with all turns in it: sqrt(share / (2 - share)) */
+#define ANCHOR_TURNS   8       /* of an average: three times as sure as one */
+#define ANCHOR_K       3.0f    /* 0.45 % of the resistance by the largest coefficient */
 #define SURE_SDS       5.0f
 #define SUSPECTED      0.6f /* of what is sure: 3 of 5 */
 #define OTHER_WAY      3.0f /* times as much: an intermediate phase, where drifts go either way */
@@ -21,8 +23,8 @@
 #define OFFSET_SDS     3.0f
 #define OFFSET_MOST_V  0.012f
 #define AWAY_LEAST_K   1.0f /* less tells nothing of a coefficient */
-/* Of an average: what a sensor's steps leave, LOSS_LEAST / 3, and it tells anew in 2 x 16 turns. */
-#define LINE_VARIANCE (32.0f * LOSS_LEAST * LOSS_LEAST / 9.0f)
+/* Of an average: so little phase may be lost unseen, and it tells anew in 2 x 16 turns. */
+#define LINE_VARIANCE (32.0f * LOSS_LEAST * LOSS_LEAST)
 #define BACK_SHARE    0.5f  /* of a loss: as near to being back as to being gone */
 #define BACK_LEAST    0.01f /* twice what a line differs by from one heating to the next */
 #define STILL_K       0.5f  /* below where it would be seen */
@@ -38,19 +40,29 @@ static float lost_at_c(const thermal_model_t *model, uint8_t k, float lost)
     return spring_c(t.martensite_start_c7) - width_k * depth;
 }
 
+void spring_average_anew(spring_belief_t *b)
+{
+    b->slow_ohm = b->ohm;
+    b->slow_a = b->current_a;
+    b->averaged = 1;
+}
+
+static float slow_sd(const spring_belief_t *b)
+{
+    return b->averaged < SLOW_TURNS ? b->noise / sqrtf((float)b->averaged)
+                                    : b->noise * NOISE_IN_SLOW;
+}
+
 void spring_begin_line(spring_belief_t *b, float now_c)
 {
     b->run.line.ohm = b->slow_ohm;
     b->run.line.c = now_c;
     b->run.line.a = b->slow_a;
-    /* as martensite's until this line tells: a contact that ages makes another slope of each */
-    const spring_learnt_t *l = &b->learnt;
-    const float most_per_k = l->martensite_ohm > 0.0f
-                                 ? COEFFICIENT_BOUND_PER_K + fabsf(l->martensite_rise_per_k)
-                                 : COEFFICIENT_MOST_PER_K;
-    b->run.line.rise_per_k = l->martensite_rise_per_k;
-    b->run.line.rise_sd_per_k = most_per_k / SPRING_ESTIMATOR_BOUND_SDS;
-    b->run.line.sd = NOISE_IN_SLOW * b->noise;
+    /* the line's own is still to be told: no phase's coefficient tells the other's, and a contact
+     * that ages makes another slope of each */
+    b->run.line.rise_per_k = b->learnt.martensite_rise_per_k;
+    b->run.line.rise_sd_per_k = COEFFICIENT_MOST_PER_K / SPRING_ESTIMATOR_BOUND_SDS;
+    b->run.line.sd = slow_sd(b);
     b->rough = false;
     b->losing = 0;
 }
@@ -68,7 +80,7 @@ static float start_c(const thermal_model_t *model, uint8_t k)
 }
 
 static void see_crossing(const spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model,
-                         uint8_t k, float lost)
+                         uint8_t k, float lost, float lost_sd)
 {
     const float was_w_per_k = b->learnt.loss_w_per_k;
     const bool searched = spring_estimator_sd_k(b) > 3.0f * CROSSING_SD_K;
@@ -83,8 +95,10 @@ static void see_crossing(const spring_estimator_t *e, spring_belief_t *b, therma
         b->loss_variance += moved_k2 * by_loss * by_loss;
     }
     b->lost = fminf(b->lost + lost, 1.0f);
-    const float error_k = spring_see(e, b, model, k, lost_at_c(model, k, b->lost), CROSSING_SD_K,
-                                     SPRING_PHASE_AUSTENITE);
+    const float seen_c = lost_at_c(model, k, b->lost);
+    const float unsure_k = seen_c - lost_at_c(model, k, b->lost + lost_sd);
+    const float sd_k = sqrtf(CROSSING_SD_K * CROSSING_SD_K + unsure_k * unsure_k);
+    const float error_k = spring_see(e, b, model, k, seen_c, sd_k, SPRING_PHASE_AUSTENITE);
     if (!searched && -error_k > b->disturbance_k) {
         b->disturbance_k = -error_k;
     }
@@ -233,8 +247,7 @@ void spring_holding_watch(const spring_estimator_t *e, spring_belief_t *b, therm
     const float now_c = spring_now_c(model, k);
     if (b->run.line.ohm == 0.0f) {
         if (b->quiet == 0) {
-            b->slow_ohm = b->ohm;
-            b->slow_a = b->current_a;
+            spring_average_anew(b);
         }
         if (b->quiet < QUIET_TURNS) {
             b->losing = 0;
@@ -252,6 +265,7 @@ void spring_holding_watch(const spring_estimator_t *e, spring_belief_t *b, therm
     if (b->quiet == 0 && b->current_a < STRONG_A) { /* on its way to the hold: too weak to tell */
         b->slow_ohm = kept_ohm;
         b->slow_a = b->run.line.a;
+        b->averaged = 0;
         b->losing = 0;
         return;
     }
@@ -260,8 +274,8 @@ void spring_holding_watch(const spring_estimator_t *e, spring_belief_t *b, therm
     const float changed = as_lost(b, model, k, left, sd_k);
     /* as its temperature may have moved unseen, so may the resistance */
     const float moves = fabsf(b->run.line.rise_per_k) * sd_k;
-    const float slow_sd = NOISE_IN_SLOW * b->noise;
-    const float noise2 = slow_sd * slow_sd + b->run.line.sd * b->run.line.sd;
+    const float noise = slow_sd(b);
+    const float noise2 = noise * noise + b->run.line.sd * b->run.line.sd;
     const float least = fmaxf(LOSS_LEAST, moves);
     const float changed2 = changed * changed;
     float sure2 = fmaxf(least * least, SURE_SDS * SURE_SDS * noise2);
@@ -273,6 +287,11 @@ void spring_holding_watch(const spring_estimator_t *e, spring_belief_t *b, therm
     }
     if (changed2 < suspected2) {
         b->losing = 0;
+        const bool away = fabsf(now_c - b->run.line.c) > ANCHOR_K;
+        if (b->rough && (b->averaged == ANCHOR_TURNS || (b->averaged > ANCHOR_TURNS && away))) {
+            spring_begin_line(b, now_c); /* a coefficient explains only the way since */
+            b->rough = true;
+        }
         if (b->quiet >= QUIET_TURNS) {
             if (b->rough) { /* it has come to rest */
                 spring_begin_line(b, now_c);
@@ -295,7 +314,9 @@ void spring_holding_watch(const spring_estimator_t *e, spring_belief_t *b, therm
         /* until it is back, or was found not to have been phase, all of it is one loss */
         b->full_ohm = b->full_ohm > 0.0f ? b->full_ohm : kept_ohm;
         b->gone += left;
-        see_crossing(e, b, model, k, changed / fabsf(b->learnt.change));
+        const float per_change = 1.0f / fabsf(b->learnt.change);
+        const float sd = sqrtf(may_move_squared(b, now_c)) / SPRING_ESTIMATOR_BOUND_SDS;
+        see_crossing(e, b, model, k, changed * per_change, sd * per_change);
         spring_begin_rough_line(b, spring_now_c(model, k)); /* the average still falls */
     }
 }

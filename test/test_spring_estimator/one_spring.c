@@ -67,8 +67,11 @@ static void live(double power_w)
 
 double resistance_ohm(void)
 {
-    return truth.martensite_ohm * (1.0 + (truth.ratio - 1.0) * truth.austenite) *
-           (1.0 + truth.rise_per_k * (truth.temperature_c - 20.0));
+    const double above_k = truth.temperature_c - 20.0;
+    const double austenite_ohm = truth.martensite_ohm * truth.ratio *
+                                 (1.0 + (truth.rise_per_k + truth.apart_per_k) * above_k);
+    return (1.0 - truth.austenite) * truth.martensite_ohm * (1.0 + truth.rise_per_k * above_k) +
+           truth.austenite * austenite_ohm;
 }
 
 double distance_k(void)

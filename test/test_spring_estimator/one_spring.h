@@ -12,7 +12,8 @@ typedef struct {
     double capacity_j_per_k, loss_w_per_k, latent_j;
     double martensite_ohm; /* at 20 degC */
     double ratio;          /* austenite over martensite, at one temperature */
-    double rise_per_k;     /* of both */
+    double rise_per_k;     /* of martensite */
+    double apart_per_k;    /* austenite's, beyond that */
     double shift_k;        /* of all four transformation temperatures */
     double contact_ohm;    /* in series, read with it */
     double offset_v;       /* of what is read of the voltage */

@@ -269,25 +269,27 @@ static void crossing_is_seen_and_makes_the_distance_sure(void)
         const double off_w_per_k = (double)learnt.loss_w_per_k - 5.8e-3 * (loss[n] - 1.0);
         (void)snprintf(where, sizeof where, "loss x %.2f: off by %.6f, sd %.6f", loss[n],
                        off_w_per_k, (double)learnt.loss_sd_w_per_k);
-        TEST_ASSERT_TRUE_MESSAGE(fabs(off_w_per_k) <=
-                                     (double)(SPRING_ESTIMATOR_BOUND_SDS * learnt.loss_sd_w_per_k),
-                                 where);
+        TEST_ASSERT_TRUE_MESSAGE(fabs(off_w_per_k) <= 3.0 * (double)learnt.loss_sd_w_per_k, where);
         TEST_ASSERT_TRUE_MESSAGE((double)learnt.loss_sd_w_per_k < 0.12 * 5.8e-3, where);
     }
 }
 
 static void hold_that_loses_nothing_shows_no_crossing(void)
 {
-    static const double rise_per_k[] = {0.0, 0.0010};
-    for (unsigned n = 0; n < 2; n++) {
+    /* what one phase's resistance does with temperature tells nothing of the other's */
+    static const double of_martensite[] = {0.0, 0.0010, 0.0, 0.0012};
+    static const double of_austenite[] = {0.0, 0.0010, 0.0010, 0.0};
+    for (unsigned n = 0; n < 4; n++) {
         begin_cold();
-        truth.rise_per_k = rise_per_k[n];
+        truth.rise_per_k = of_martensite[n];
+        truth.apart_per_k = of_austenite[n] - of_martensite[n];
         (void)heat_then_hold(60.0);
         for (double s = 0.0; s < 600.0; s += TICK_S) {
-            (void)tick(hold_current_a(6.0));
+            (void)tick(hold_current_a(9.0));
         }
-        (void)snprintf(where, sizeof where, "%.4f per K: lost %.3f of %.3f", rise_per_k[n],
-                       (double)BELIEF.lost, 1.0 - truth.austenite);
+        (void)snprintf(where, sizeof where, "%.4f and %.4f per K: lost %.3f of %.3f",
+                       of_martensite[n], of_austenite[n], (double)BELIEF.lost,
+                       1.0 - truth.austenite);
         TEST_ASSERT_TRUE_MESSAGE(truth.austenite > 0.999, where);
         TEST_ASSERT_EQUAL_FLOAT_MESSAGE(0.0f, BELIEF.lost, where);
     }
@@ -463,7 +465,7 @@ static void heating_that_is_cut_between_two_readings_is_doubted(void)
     }
     TEST_ASSERT_FALSE(BELIEF.reads);
     spring_estimator_begin_hold(&estimator, &model, 0, true);
-    TEST_ASSERT_TRUE(BELIEF.doubted);
+    TEST_ASSERT_TRUE(BELIEF.lost > 0.5f && !BELIEF.blind);
     TEST_ASSERT_TRUE(spring_estimator_austenite(&estimator, &model, 0).low < 0.5f);
 }
 
