@@ -12,6 +12,9 @@
  * 0.73 to 1.28. */
 #define LEAST_SLOPE 0.25f
 #define MOST_SLOPE  2.5f
+/* Least deviation of the duty, of itself, that tells a slope: a supply that moves by 5 % beside it,
+ * as others switch, adds half of it at the most. */
+#define SLOPE_SHARE 0.05f
 /* Off by more than the same tolerances, and the offsets of both readings. */
 #define BALANCE_SHARE 0.3f
 #define BALANCE_V     0.015f
@@ -35,6 +38,12 @@ void circuit_check_take(circuit_check_t *c, uint16_t fixed_mohm, uint16_t duty, 
     const uint16_t dropped_mv = (uint16_t)(((uint32_t)amount(current_ma) * fixed_mohm) >>
                                            10); /* 2 % low: tolerances are 30 */
     const uint16_t behind_mv = (uint16_t)(amount(voltage_mv) + dropped_mv);
+    if (c->readings == 0 || behind_mv < c->lowest_mv) {
+        c->lowest_mv = behind_mv;
+    }
+    if (behind_mv > c->highest_mv) {
+        c->highest_mv = behind_mv;
+    }
     c->readings++;
     c->duty = (uint16_t)(c->duty + duty);
     c->voltage_mv += behind_mv;
@@ -66,8 +75,14 @@ bool circuit_check_judge(circuit_check_t *c, const current_control_parameters_t 
         const float should_v = variance * swing_v / DUTY_STEPS;
         const float driven_v = duty * swing_v / DUTY_STEPS - drop_v;
         const float expected_v = driven_v > 0.0f ? driven_v : 0.0f;
-        astray = variance >= LEAST_VARIANCE &&
-                 (follows_v < LEAST_SLOPE * should_v || follows_v > MOST_SLOPE * should_v);
+        const float slope_variance = SLOPE_SHARE * SLOPE_SHARE * duty * duty;
+        const bool tells = variance >= fmaxf(LEAST_VARIANCE, slope_variance);
+        const bool other = follows_v < LEAST_SLOPE * should_v || follows_v > MOST_SLOPE * should_v;
+        /* what is swept moves by two deviations at least: half of that is none */
+        const float moved_v = 1e-3f * (float)(c->highest_mv - c->lowest_mv);
+        const bool stands =
+            variance >= LEAST_VARIANCE && moved_v * moved_v * DUTY_STEPS < should_v * swing_v;
+        astray = stands || (tells && other);
         unbalanced = fabsf(found_v - expected_v) > BALANCE_SHARE * expected_v + BALANCE_V;
     }
     count(&c->astray, astray);

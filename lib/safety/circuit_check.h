@@ -26,6 +26,7 @@ typedef struct {
     uint32_t duty_square;
     uint32_t duty_voltage;
     uint32_t voltage_mv;
+    uint16_t lowest_mv, highest_mv;
     uint16_t duty;
     uint16_t last_duty;
     uint8_t readings;

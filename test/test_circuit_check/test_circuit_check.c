@@ -134,6 +134,24 @@ static void frozen_reading_is_found_within_two_seconds(void)
     TEST_ASSERT_LESS_OR_EQUAL_UINT32(100, found_after(&declared, 190, 3, frozen, 1000)); /* heats */
 }
 
+/* As others switch, a supply with a long cable moves by 5 %. */
+static void supply_that_moves_is_none(void)
+{
+    for (unsigned heats = 0; heats < 2; heats++) {
+        setUp();
+        for (uint32_t tick = 0; tick < HOUR; tick++) {
+            const uint16_t duty = swept(heats ? 190 : 60, heats ? 3 : 16, tick);
+            const double supply_v = (tick / 7u) % 5u < 2u ? 4.75 : 5.0;
+            const double ma = 1e3 * supply_v * duty / 800.0 / 0.38;
+            circuit_check_take(&check, 180, duty, true, (int16_t)lround(ma),
+                               (int16_t)(4 * lround(ma * 0.2 / 4.0)));
+            if (tick % CIRCUIT_CHECK_TICKS == 29u) {
+                TEST_ASSERT_FALSE(circuit_check_judge(&check, &parameters));
+            }
+        }
+    }
+}
+
 /* Nothing moves: it may well be so. */
 static void reading_that_stands_still_with_its_duty_is_none(void)
 {
@@ -196,6 +214,7 @@ int main(void)
     RUN_TEST(every_corner_of_the_tolerances_is_a_circuit);
     RUN_TEST(resistance_that_changes_is_no_mismatch);
     RUN_TEST(frozen_reading_is_found_within_two_seconds);
+    RUN_TEST(supply_that_moves_is_none);
     RUN_TEST(reading_that_stands_still_with_its_duty_is_none);
     RUN_TEST(reading_of_one_tick_earlier_is_none);
     RUN_TEST(pulses_read_late_are_none);
