@@ -109,18 +109,13 @@ def test_settings_that_drive_worse_are_refused_and_written_only_by_force(
 ) -> None:
     path, out = wrong(tmp_path), tmp_path / "s.txt"
     made = settings_of(read_model(path))
-    made.written |= {"austenite_start_c": "58.00", "austenite_finish_c": "68.00"}
-    made.written |= {
-        "martensite_start_c": "48.00",
-        "martensite_finish_c": "38.00",
-        "resistance_austenite_ohm": "0.176000",
-    }
+    made.written |= {"loss_w_per_k": "0.002000"}  # too little power to hold anything
     monkeypatch.setattr("ninespring.export.settings.settings_of", lambda model: made)
     with pytest.raises(WorkError) as refused:
         run("export", "--model", path, "-o", out)
     assert "would drive worse" in str(refused.value) and not out.exists()
     run("export", "--model", path, "-o", out, "--force")
-    assert "$austenite_start_c=58.00" in out.read_text() and "# worse, written by --force" in out.read_text()
+    assert "$loss_w_per_k=0.002000" in out.read_text() and "# worse, written by --force" in out.read_text()
 
 
 def test_a_drive_is_measured_as_it_was() -> None:
