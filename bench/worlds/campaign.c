@@ -254,22 +254,19 @@ static void cold_ends(run_case_t *run, random_t *random, double value)
 static run_command_t *add_command(run_case_t *run, double time_s)
 {
     run_command_t *command = &run->command[run->commands++];
-    *command = (run_command_t){.time_s = time_s};
-    for (int k = 0; k < count(run); k++) {
-        command->level_permille[k] = run->on[k] ? 1000 : 0;
-    }
+    command->time_s = time_s;
+    memcpy(command->on, run->on, sizeof command->on);
     return command;
 }
 
-static void display(run_case_t *run, random_t *random, double value)
+static void patterns(run_case_t *run, random_t *random, double value)
 {
+    (void)value;
     double s = 120.0;
     while (s < run->seconds && run->commands < RUN_COMMANDS_MAX) {
         run_command_t *c = add_command(run, s);
         for (int k = 0; k < count(run); k++) {
-            bool on = random_uniform(random, 0.0, 1.0) < 0.5;
-            c->level_permille[k] =
-                on ? (value > 0.0 && random_uniform(random, 0.0, 1.0) < 0.5 ? 500 : 1000) : 0;
+            c->on[k] = random_uniform(random, 0.0, 1.0) < 0.5;
         }
         s += random_uniform(random, 20.0, 120.0);
     }
@@ -281,7 +278,7 @@ static void pauses(run_case_t *run, random_t *random, double value)
     double s = random_uniform(random, 100.0, 200.0);
     while (s < run->seconds - 120.0) {
         run_command_t *c = add_command(run, s);
-        memset(c->level_permille, 0, sizeof c->level_permille);
+        memset(c->on, 0, sizeof c->on);
         s += random_uniform(random, 3.0, 120.0);
         (void)add_command(run, s);
         s += random_uniform(random, 100.0, 200.0);
@@ -299,16 +296,15 @@ static void gain_steps(run_case_t *run, random_t *random, double value)
     }
 }
 
-static void drifting(run_case_t *run, random_t *random, double value)
+static void wandering(run_case_t *run, random_t *random, double value)
 {
     for (int k = 0; k < count(run); k++) {
-        double g = 1.0, f = 1.0, s = 0.0, ff = 0.0;
+        double s = 0.0, wanders = 0.0;
         for (int i = 0; i < 28; i++) {
             s += run->seconds / 28.0;
-            ff = ff * 0.7 + random_uniform(random, -value, value);
-            g = 1.0 + ff;
-            f = 1.0 + random_uniform(random, -0.3 * value, 0.3 * value);
-            add_event(run, WORLD_SENSOR_VOLTAGE_GAIN, s, k, g + f - 1.0);
+            wanders = wanders * 0.7 + random_uniform(random, -value, value);
+            double jumps = random_uniform(random, -0.3 * value, 0.3 * value);
+            add_event(run, WORLD_SENSOR_VOLTAGE_GAIN, s, k, 1.0 + wanders + jumps);
         }
     }
 }
@@ -374,11 +370,11 @@ static const struct {
     {"contacts", contacts, 0.02, true, "contacts step or drift by up to 20 mohm"},
     {"room", room, 0.0, true, "shared air and a plate under the crimps"},
     {"cold_ends", cold_ends, 4.0, true, "crimps carry off 2 to 4 times as much"},
-    {"patterns", display, 0.0, true, "another pattern every 20 to 120 s"},
+    {"patterns", patterns, 0.0, true, "another pattern every 20 to 120 s"},
     {"pauses", pauses, 0.0, true, "switched off for 3 to 120 s, again and again"},
     {"gain_steps", gain_steps, 0.05, true, "each sensor's current or voltage steps by 5 %"},
     {"loose_crimp", crimp, 0.03, true, "contacts of up to 30 mohm that come and go"},
-    {"wandering", drifting, 0.003, true, "voltages read wander by about 0.5 %"},
+    {"wandering", wandering, 0.003, true, "voltages read wander by about 0.5 %"},
     {"together", everything, 0.2, true, "coefficient, sensor, loss, alloy, room and loads"},
 };
 
@@ -421,9 +417,5 @@ void campaign_draw(int world, uint64_t seed, int array, double seconds, run_case
     random_t random = random_seeded(specimen, 2);
     draw_pattern(run, &random);
     world_draw(&run->world, specimen, CAMPAIGN_TOLERANCE);
-    run->learnt_in.rows = 0;
     worlds[world].alter(run, &random, worlds[world].value);
-    if (run->learnt_in.rows == 0) {
-        run->learnt_in = run->world;
-    }
 }

@@ -83,7 +83,7 @@ static void trace_row(const bench_t *bench, FILE *trace)
 /* A run of its own, in which nothing happens, then everything has cooled. */
 static bool learn(bench_t *bench)
 {
-    world_parameters_t quiet = bench->run->learnt_in;
+    world_parameters_t quiet = bench->run->world;
     quiet.events = 0;
     for (int k = 0; k < quiet.rows * quiet.columns; k++) {
         quiet.spring[k].start_c = quiet.ambient_c;
@@ -111,10 +111,9 @@ static void type(bench_t *bench, score_t *score, int *typed)
     while (*typed < run->commands && run->command[*typed].time_s <= world_time_s(bench->world)) {
         const run_command_t *command = &run->command[(*typed)++];
         for (int k = 0; k < world_springs(bench->world); k++) {
-            (void)controller_set_target(&bench->controller, (uint8_t)k, command->level_permille[k]);
-            score_ask(score, bench->world, k, command->level_permille[k] / 1000.0);
+            score_ask(score, bench->world, k, command->on[k]);
         }
-        (void)controller_set_fan(&bench->controller, command->fan_percent);
+        controller_set_pattern(&bench->controller, command->on);
     }
 }
 

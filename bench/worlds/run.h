@@ -12,22 +12,20 @@
 
 #define RUN_COMMANDS_MAX 64
 
-/* Typed in the run: levels and fan from then on. */
+/* Typed in the run: which springs are on from then on. */
 typedef struct {
     double time_s;
-    uint16_t level_permille[WORLD_SPRINGS_MAX];
-    uint8_t fan_percent;
+    bool on[WORLD_SPRINGS_MAX];
 } run_command_t;
 
 typedef struct {
     world_parameters_t world;
-    world_parameters_t learnt_in; /* what was driven before, if learnt */
-    bool on[WORLD_SPRINGS_MAX];   /* asked for at the beginning */
+    bool on[WORLD_SPRINGS_MAX]; /* asked for at the beginning */
     int commands;
     run_command_t command[RUN_COMMANDS_MAX]; /* in order of time */
     double seconds;
     double reset_s, reset_gap_s; /* power goes off then, for so long; 0: never */
-    bool learnt; /* an array was driven before, and the board has kept what it learnt */
+    bool learnt; /* the same array was driven before, and the board has kept what it learnt */
 } run_case_t;
 
 typedef struct {

@@ -19,7 +19,6 @@ void score_begin(score_t *score, const world_t *world, const bool driven[], doub
     score->allowed_s = allowed_s;
     for (int k = 0; k < score->springs; k++) {
         score->spring[k].driven = driven[k];
-        score->spring[k].level = driven[k] ? 1.0 : 0.0;
         score->spring[k].start_s = world_time_s(world);
         score->spring[k].lowest_held = 1.0;
         score->spring[k].hottest_c = -INFINITY;
@@ -46,10 +45,10 @@ void score_restart(score_t *score, const world_t *world)
     }
 }
 
-void score_ask(score_t *score, const world_t *world, int k, double level)
+void score_ask(score_t *score, const world_t *world, int k, bool driven)
 {
     score_spring_t *spring = &score->spring[k];
-    if (level == spring->level) {
+    if (driven == spring->driven) {
         return;
     }
     bool due = world_time_s(world) - spring->start_s > score->allowed_s;
@@ -57,15 +56,9 @@ void score_ask(score_t *score, const world_t *world, int k, double level)
         settle(spring);
     }
     restart_spring(spring);
-    spring->level = level;
-    spring->driven = level > 0.0;
+    spring->driven = driven;
     spring->start_s = world_time_s(world);
     spring->was_low = false;
-}
-
-static bool within(double austenite, const score_spring_t *spring, double least, double band)
-{
-    return spring->level >= 0.96 ? austenite >= least : fabs(austenite - spring->level) <= band;
 }
 
 static void score_report(score_spring_t *spring, bool reported, double now_s)
@@ -97,13 +90,12 @@ static void score_driven(score_t *score, score_spring_t *spring, const world_t *
     double now_s = world_time_s(world), since_s = now_s - spring->start_s;
     double austenite = world_austenite(world, k);
     score_report(spring, belief_reported(controller, k), now_s);
-    if (isnan(spring->reached_s) && within(austenite, spring, SCORE_REACHED, SCORE_LEVEL_REACHED)) {
+    if (isnan(spring->reached_s) && austenite >= SCORE_REACHED) {
         spring->reached_s = now_s;
         settle(spring);
     }
     bool due = !isnan(spring->reached_s) || since_s > score->allowed_s;
-    bool lost = due && !within(austenite, spring, SCORE_LOST, SCORE_LEVEL_LOST) &&
-                isnan(spring->report_from_s);
+    bool lost = due && austenite < SCORE_LOST && isnan(spring->report_from_s);
     spring->lost_s = lost ? spring->lost_s + SAMPLE_S : 0.0;
     if (spring->lost_s > SCORE_LOST_S) {
         spring->silent_s += SAMPLE_S;

@@ -9,21 +9,18 @@
 #include "belief_adapter.h"
 #include "world.h"
 
-#define SCORE_EVERY_TICKS   5
-#define SCORE_REACHED       0.95 /* austenite */
-#define SCORE_LOST          0.90
-#define SCORE_LOST_S        20.0 /* may be lost for so long */
-#define SCORE_LEVEL_REACHED 0.1  /* of a level below 1, either way */
-#define SCORE_LEVEL_LOST    0.2
-#define SCORE_UNDRIVEN      0.05  /* austenite that an undriven spring may have */
-#define SCORE_HOLD_S        300.0 /* from then on after a start a spring counts as held */
-#define SCORE_SETTLED_S     600.0 /* from then on reheats count */
-#define SCORE_REHEAT_A      2.2   /* a reheat begins: no hold needs so much */
-#define SCORE_REPORT_GAP_S  1.0   /* a report still stands over shorter gaps */
+#define SCORE_EVERY_TICKS  5
+#define SCORE_REACHED      0.95 /* austenite */
+#define SCORE_LOST         0.90
+#define SCORE_LOST_S       20.0  /* may be lost for so long */
+#define SCORE_UNDRIVEN     0.05  /* austenite that an undriven spring may have */
+#define SCORE_HOLD_S       300.0 /* from then on after a start a spring counts as held */
+#define SCORE_SETTLED_S    600.0 /* from then on reheats count */
+#define SCORE_REHEAT_A     2.2   /* a reheat begins: no hold needs so much */
+#define SCORE_REPORT_GAP_S 1.0   /* a report still stands over shorter gaps */
 
 typedef struct {
     bool driven;
-    double level;          /* asked for, 0..1 */
     double start_s;        /* since when */
     double reached_s;      /* 95 % austenite, after the last start; NaN: not yet */
     double report_from_s;  /* since when a report stands; NaN: none */
@@ -56,8 +53,8 @@ typedef struct {
 void score_begin(score_t *score, const world_t *world, const bool driven[], double allowed_s);
 /* The controller starts anew: what it must reach, it must reach again. */
 void score_restart(score_t *score, const world_t *world);
-/* Another level is asked of a spring, or the same. */
-void score_ask(score_t *score, const world_t *world, int spring, double level);
+/* A spring is to be driven from now on, or not, or as it was. */
+void score_ask(score_t *score, const world_t *world, int spring, bool driven);
 /* After every tick. While the board is off, controller is NULL: only what is hot counts. */
 void score_tick(score_t *score, const world_t *world, const controller_t *controller);
 /* Closes the run: springs that have reached nothing and reported nothing have settled_s INFINITY.
