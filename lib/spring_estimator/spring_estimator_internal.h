@@ -11,10 +11,8 @@
 #define COEFFICIENT_MOST_PER_K      0.0015f
 #define COEFFICIENT_MOST_PER_HEAT_K (COEFFICIENT_MOST_PER_K / 0.85f)
 
-/* And the least, -0.0003, with what noise and offset add over 20 K. */
-#define COEFFICIENT_LEAST_PER_K (-0.00055f)
-
-#define COEFFICIENT_BOUND_PER_K 0.00025f /* of one that was learnt: noise and offset over 20 K */
+/* And the least, with what noise and offset add over 20 K. */
+#define COEFFICIENT_LEAST_PER_K (-0.0003f - 0.00025f)
 
 /* A reading at less is coarse: 4 mV are 3 % of its voltage. */
 #define STRONG_A 0.8f

@@ -217,8 +217,8 @@ static float as_lost(const spring_belief_t *b, const thermal_model_t *model, uin
     }
     /* the other way is an intermediate phase, which comes where it may be cold enough; else it is
      * the last of the austenite that comes */
-    const bool cold = spring_now_c(model, k) - SPRING_ESTIMATOR_BOUND_SDS * sd_k <
-                      spring_c(thermal_model_transformation(model, k).martensite_start_c7);
+    const bool cold =
+        spring_now_c(model, k) - SPRING_ESTIMATOR_BOUND_SDS * sd_k < start_c(model, k);
     return cold ? -less * (1.0f / OTHER_WAY) : 0.0f;
 }
 
@@ -230,7 +230,7 @@ static bool may_have_cooled(const spring_belief_t *b, const thermal_model_t *mod
     const float now_c = spring_now_c(model, k);
     const float cooled_k = fmaxf(b->run.line.c - now_c, 0.0f);
     const float most_k = cooled_k + SPRING_ESTIMATOR_BOUND_SDS * sd_k + SHIFT_BOUND_K;
-    return now_c - most_k < spring_c(thermal_model_transformation(model, k).martensite_start_c7);
+    return now_c - most_k < start_c(model, k);
 }
 
 /* A phase that is kept changes the resistance no faster than temperature does. */
