@@ -257,15 +257,19 @@ static void take_noise(spring_belief_t *b, float ohm, float current_a)
     b->ohm_before[0] = ohm;
 }
 
+float spring_slow_share(const spring_belief_t *b)
+{
+    return b->averaged >= SLOW_TURNS ? SLOW_SHARE /* as a rule: a division is saved */
+           : b->averaged > 1         ? 1.0f / (float)b->averaged
+                                     : 1.0f;
+}
+
 static void take_reading(spring_belief_t *b, float ohm, float current_a)
 {
     take_noise(b, ohm, current_a);
     b->averaged = b->fresh == 0 ? 0 : b->averaged;
-    float share = SLOW_SHARE; /* as a rule: a division is saved */
-    if (b->averaged < SLOW_TURNS) {
-        b->averaged++;
-        share = 1.0f / (float)b->averaged;
-    }
+    b->averaged = b->averaged < SLOW_TURNS ? (uint8_t)(b->averaged + 1) : SLOW_TURNS;
+    const float share = spring_slow_share(b);
     b->slow_ohm += (ohm - b->slow_ohm) * share;
     b->slow_a += (current_a - b->slow_a) * share;
     b->current_a = current_a;
@@ -584,10 +588,9 @@ void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, 
     b->lost = b->doubted ? 1.0f - phase : 0.0f;
     b->quiet = 0;
     b->losing = 0;
-    b->run.line = (spring_line_t){0};
-    if (full && b->reads && b->current_a > STRONG_A) {
-        spring_average_anew(b);
-        spring_begin_rough_line(b, now_c);
+    const bool strong = full && b->reads && b->current_a > STRONG_A;
+    spring_begin_hold_line(b, strong);
+    if (strong) {
         b->offset_sd_v = fmaxf(b->offset_sd_v, OFFSET_AGAIN_V);
     }
 }

@@ -62,10 +62,11 @@ typedef struct {
 
 /* Of the running hold. */
 typedef struct {
-    float ohm; /* what it reads while it keeps its phase, at c; 0: none yet */
-    float c;
-    float a;          /* current of the line */
-    float sd;         /* of the line itself, relative */
+    float ohm;    /* what it reads while it keeps its phase; 0: none yet */
+    float a;      /* at this current */
+    float sd;     /* of the line itself, relative */
+    float way_k;  /* how far its temperature has moved since */
+    float slow_k; /* the same, averaged as the readings are */
     float rise_per_k; /* what a kelvin adds to it, relative */
     float rise_sd_per_k;
 } spring_line_t;
