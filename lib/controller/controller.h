@@ -71,7 +71,6 @@ typedef struct {
     uint8_t resistance_turn; /* whose resistance the current loop is told in the next tick */
     uint8_t floor_turn; /* of the round in which each spring's circuit and ceiling are judged */
     uint16_t level_permille[CONTROLLER_MAX_SPRINGS];
-    uint16_t duty[CONTROLLER_MAX_SPRINGS];
     int16_t measured_ma[CONTROLLER_MAX_SPRINGS]; /* last valid reading */
     int16_t measured_mv[CONTROLLER_MAX_SPRINGS];
     uint32_t power_sum_uw[CONTROLLER_MAX_SPRINGS]; /* over the ticks of the running model step */

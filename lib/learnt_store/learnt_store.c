@@ -76,9 +76,17 @@ static bool unpack(const record_store_t *record, uint8_t spring, spring_learnt_t
     return learnt->austenite_ohm > 0.0f;
 }
 
+/* A spring goes on learning while others are written: its numbers are taken all at once. */
 static uint8_t byte_of(void *context, uint16_t position)
 {
-    return ((const learnt_store_t *)context)->bytes[position];
+    learnt_store_t *const store = context;
+    const uint8_t within = (uint8_t)(position % LEARNT_STORE_SPRING_BYTES);
+    if (within == 0) {
+        const uint8_t spring = (uint8_t)(position / LEARNT_STORE_SPRING_BYTES);
+        const spring_learnt_t learnt = controller_learnt(store->controller, spring);
+        pack(&learnt, store->bytes);
+    }
+    return store->bytes[within];
 }
 
 static void save(learnt_store_t *store, uint16_t length)
@@ -149,10 +157,6 @@ void learnt_store_second(learnt_store_t *store, const controller_t *controller)
     if (!worth) {
         return;
     }
-    for (uint8_t k = 0; k < springs; k++) {
-        const spring_learnt_t learnt = controller_learnt(controller, k);
-        pack(&learnt, store->bytes + (uint16_t)(k * LEARNT_STORE_SPRING_BYTES));
-    }
     save(store, (uint16_t)(springs * LEARNT_STORE_SPRING_BYTES));
 }
 
@@ -180,6 +184,7 @@ record_found_t learnt_store_open(learnt_store_t *store, const record_storage_t *
     spring_learnt_t learnt;
     memset(store, 0, sizeof *store);
     store->since_s = LEARNT_STORE_PAUSE_S;
+    store->controller = controller;
     const record_found_t found =
         record_store_open(&store->record, storage, base, slot_bytes, LEARNT_STORE_KIND);
     for (uint8_t k = 0; k < controller_springs(controller); k++) {

@@ -25,13 +25,15 @@ extern "C" {
 
 typedef struct {
     record_store_t record;
-    uint16_t since_s; /* the last save began; stays at LEARNT_STORE_PAUSE_S */
-    uint8_t held_s;   /* all driven springs, on end; stays at LEARNT_STORE_HELD_S */
-    uint8_t bytes[CONTROLLER_MAX_SPRINGS * LEARNT_STORE_SPRING_BYTES]; /* of a save under way */
+    uint16_t since_s;               /* the last save began; stays at LEARNT_STORE_PAUSE_S */
+    uint8_t held_s;                 /* all driven springs, on end; stays at LEARNT_STORE_HELD_S */
+    const controller_t *controller; /* whose springs are kept */
+    uint8_t bytes[LEARNT_STORE_SPRING_BYTES]; /* of a save under way: the spring that is written */
 } learnt_store_t;
 
 /* Finds the record and gives the controller, which has been initialised, what it holds of each of
- * its springs. slot_bytes must hold RECORD_OVERHEAD_BYTES and the bytes of all springs. */
+ * its springs; it must stay valid. slot_bytes must hold RECORD_OVERHEAD_BYTES and the bytes of all
+ * springs. */
 record_found_t learnt_store_open(learnt_store_t *store, const record_storage_t *storage,
                                  uint16_t base, uint16_t slot_bytes, controller_t *controller);
 
