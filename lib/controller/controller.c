@@ -102,6 +102,7 @@ bool controller_apply_settings(controller_t *controller, const controller_settin
                                uint16_t *bad)
 {
     const thermal_model_parameters_t *old = &controller->model.parameters;
+    const uint16_t mark = controller_model_mark(controller);
     bool same_size = settings->model.rows == old->rows && settings->model.columns == old->columns;
     thermal_model_state_t state;
     thermal_model_get_state(&controller->model, &state);
@@ -115,6 +116,10 @@ bool controller_apply_settings(controller_t *controller, const controller_settin
         temperature_ceiling_prepare(&controller->ceiling, &controller->model, &settings->current);
         (void)safety_apply(&controller->safety, &settings->safety, NULL);
         (void)drive_policy_apply(&controller->policy, &settings->policy, &controller->model, NULL);
+        const bool other_model = mark != controller_model_mark(controller);
+        for (uint8_t k = 0; other_model && k < controller->springs; k++) {
+            controller_forget_loss(controller, k);
+        }
         tell_resistances(controller);
         return true;
     }
@@ -462,6 +467,16 @@ void controller_restore_learnt(controller_t *controller, uint8_t spring,
 void controller_forget_learnt(controller_t *controller, uint8_t spring)
 {
     spring_estimator_forget(&controller->policy.estimator, spring);
+}
+
+void controller_forget_loss(controller_t *controller, uint8_t spring)
+{
+    spring_estimator_forget_loss(&controller->policy.estimator, spring);
+}
+
+uint16_t controller_model_mark(const controller_t *controller)
+{
+    return parameter_mark(PARAMETER_PART_MODEL, &controller->model.parameters);
 }
 
 uint8_t controller_springs(const controller_t *controller)

@@ -168,6 +168,9 @@ void spring_estimator_restore(spring_estimator_t *estimator, uint8_t spring,
                               const spring_learnt_t *learnt);
 /* Nothing is known of its own numbers but the declared ones. */
 void spring_estimator_forget(spring_estimator_t *estimator, uint8_t spring);
+/* Its loss beyond the declared one is no more known than of any spring: another model is declared.
+ */
+void spring_estimator_forget_loss(spring_estimator_t *estimator, uint8_t spring);
 /* What has been learnt, with how surely. */
 spring_learnt_t spring_estimator_learnt(const spring_estimator_t *estimator, uint8_t spring);
 
