@@ -102,6 +102,7 @@ bool controller_apply_settings(controller_t *controller, const controller_settin
                                uint16_t *bad)
 {
     const thermal_model_parameters_t *old = &controller->model.parameters;
+    const uint16_t mark = controller_model_mark(controller);
     bool same_size = settings->model.rows == old->rows && settings->model.columns == old->columns;
     thermal_model_state_t state;
     thermal_model_get_state(&controller->model, &state);
@@ -115,6 +116,10 @@ bool controller_apply_settings(controller_t *controller, const controller_settin
         temperature_ceiling_prepare(&controller->ceiling, &controller->model, &settings->current);
         (void)safety_apply(&controller->safety, &settings->safety, NULL);
         (void)drive_policy_apply(&controller->policy, &settings->policy, &controller->model, NULL);
+        const bool other_model = mark != controller_model_mark(controller);
+        for (uint8_t k = 0; other_model && k < controller->springs; k++) {
+            controller_forget_loss(controller, k);
+        }
         tell_resistances(controller);
         return true;
     }
@@ -154,17 +159,17 @@ static uint32_t take_sensors(controller_t *controller, const controller_sensor_t
             .voltage_mv = sensor[k].voltage_mv,
             .expected_ma = current_control_reference_ma(&controller->current, k),
             .temperature_c7 = thermal_model_temperature_c7(&controller->model, k)};
+        const uint16_t duty = controller_duty(controller, k);
         safety_tick_spring(&controller->safety, k, &sample);
         valid[k] = sensor[k].status == CONTROLLER_SENSOR_OK &&
                    !safety_is_frozen(&controller->safety, k, sensor[k].current_ma);
-        circuit_check_take(&controller->circuit[k], controller->current.fixed_mohm,
-                           controller->duty[k], valid[k], sensor[k].current_ma,
-                           sensor[k].voltage_mv);
-        controller->duty_sum[k] = (uint16_t)(controller->duty_sum[k] + controller->duty[k]);
+        circuit_check_take(&controller->circuit[k], controller->current.fixed_mohm, duty, valid[k],
+                           sensor[k].current_ma, sensor[k].voltage_mv);
+        controller->duty_sum[k] = (uint16_t)(controller->duty_sum[k] + duty);
         if (valid[k]) {
             controller->measured_ma[k] = sensor[k].current_ma;
             controller->measured_mv[k] = sensor[k].voltage_mv;
-        } else if (controller->duty[k] == 0) {
+        } else if (duty == 0) {
             continue;
         }
         sum_ma += flowing_ma(controller->measured_ma[k]);
@@ -266,7 +271,7 @@ static bool targets_are_allowed(const controller_t *controller, const bool allow
     return sum_ma <= controller->safety.parameters.supply_limit_ma;
 }
 
-static void drive(controller_t *controller, const bool valid[], uint32_t sum_ma)
+static void drive(controller_t *controller, const bool valid[], uint32_t sum_ma, uint16_t duty[])
 {
     bool allowed[CONTROLLER_MAX_SPRINGS];
     for (uint8_t k = 0; k < controller->springs; k++) {
@@ -294,7 +299,7 @@ static void drive(controller_t *controller, const bool valid[], uint32_t sum_ma)
     bool may_rise =
         sum_ma + controller->policy.parameters.supply_reserve_ma <= limits->supply_limit_ma;
     current_control_tick(&controller->current, controller->springs, target_ma,
-                         controller->measured_ma, valid, may_rise, controller->duty);
+                         controller->measured_ma, valid, may_rise, duty);
     for (uint8_t k = 0; k < controller->springs; k++) {
         if ((drive_policy_limits(&controller->policy, k) & DRIVE_POLICY_LIMIT_TRIP) != 0) {
             safety_trip(&controller->safety, k, SAFETY_FAULT_LIMIT_TRIP);
@@ -326,8 +331,8 @@ void controller_tick(controller_t *controller, const controller_inputs_t *inputs
     uint32_t sum_ma = take_sensors(controller, inputs->sensor, valid);
     listen(controller);
     step_model(controller, inputs);
-    drive(controller, valid, sum_ma);
-    memcpy(outputs->duty, controller->duty, sizeof outputs->duty);
+    memset(outputs->duty, 0, sizeof outputs->duty);
+    drive(controller, valid, sum_ma, outputs->duty);
     outputs->fan_percent = controller->fan_percent;
 }
 
@@ -464,6 +469,16 @@ void controller_forget_learnt(controller_t *controller, uint8_t spring)
     spring_estimator_forget(&controller->policy.estimator, spring);
 }
 
+void controller_forget_loss(controller_t *controller, uint8_t spring)
+{
+    spring_estimator_forget_loss(&controller->policy.estimator, spring);
+}
+
+uint16_t controller_model_mark(const controller_t *controller)
+{
+    return parameter_mark(PARAMETER_PART_MODEL, &controller->model.parameters);
+}
+
 uint8_t controller_springs(const controller_t *controller)
 {
     return controller->springs;
@@ -491,7 +506,8 @@ int16_t controller_measured_mv(const controller_t *controller, uint8_t spring)
 
 uint32_t controller_power_uw(const controller_t *controller, uint8_t spring)
 {
-    if (controller->current.channel[spring].blind_ticks != 0 && controller->duty[spring] == 0) {
+    if (controller->current.channel[spring].blind_ticks != 0 &&
+        controller_duty(controller, spring) == 0) {
         return 0;
     }
     const uint32_t measured_uw = (uint32_t)flowing_ma(controller->measured_ma[spring]) *
@@ -502,7 +518,7 @@ uint32_t controller_power_uw(const controller_t *controller, uint8_t spring)
 
 uint16_t controller_duty(const controller_t *controller, uint8_t spring)
 {
-    return controller->duty[spring];
+    return current_control_duty(&controller->current, spring);
 }
 
 int16_t controller_temperature_c7(const controller_t *controller, uint8_t spring)

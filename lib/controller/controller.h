@@ -71,7 +71,6 @@ typedef struct {
     uint8_t resistance_turn; /* whose resistance the current loop is told in the next tick */
     uint8_t floor_turn; /* of the round in which each spring's circuit and ceiling are judged */
     uint16_t level_permille[CONTROLLER_MAX_SPRINGS];
-    uint16_t duty[CONTROLLER_MAX_SPRINGS];
     int16_t measured_ma[CONTROLLER_MAX_SPRINGS]; /* last valid reading */
     int16_t measured_mv[CONTROLLER_MAX_SPRINGS];
     uint32_t power_sum_uw[CONTROLLER_MAX_SPRINGS]; /* over the ticks of the running model step */
@@ -91,9 +90,10 @@ bool controller_init(controller_t *controller, const controller_settings_t *sett
                      int16_t ambient_c7, uint16_t *bad);
 
 /* Replaces the settings while running. If rows and columns stay, so do temperatures, phases,
- * current loops, faults, levels and fan; else as controller_init at the last ambient, but faults of
- * the board, lock and fan stay. Fails as controller_init does, and then nothing is changed.
- * Divides. */
+ * current loops, faults, levels and fan, and what was learnt of the springs; but not of their
+ * losses where the model's parameters differ, beside which these were learnt. Else as
+ * controller_init at the last ambient, but faults of the board, lock and fan stay. Fails as
+ * controller_init does, and then nothing is changed. Divides. */
 bool controller_apply_settings(controller_t *controller, const controller_settings_t *settings,
                                uint16_t *bad);
 
@@ -153,6 +153,10 @@ spring_learnt_t controller_learnt(const controller_t *controller, uint8_t spring
 void controller_restore_learnt(controller_t *controller, uint8_t spring,
                                const spring_learnt_t *learnt);
 void controller_forget_learnt(controller_t *controller, uint8_t spring);
+/* Of its own numbers the loss alone, which is one beyond the declared losses. */
+void controller_forget_loss(controller_t *controller, uint8_t spring);
+/* Of the model that is declared: what was learnt of a loss beside another one does not hold. */
+uint16_t controller_model_mark(const controller_t *controller);
 
 /* For telemetry. */
 uint8_t controller_springs(const controller_t *controller);

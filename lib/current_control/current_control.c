@@ -193,6 +193,11 @@ void current_control_tick(current_control_t *control, uint8_t channels, const ui
     }
 }
 
+uint16_t current_control_duty(const current_control_t *control, uint8_t channel)
+{
+    return control->channel[channel].duty;
+}
+
 uint16_t current_control_reference_ma(const current_control_t *control, uint8_t channel)
 {
     return control->channel[channel].reference_ma;

@@ -89,6 +89,9 @@ void current_control_tick(current_control_t *control, uint8_t channels, const ui
                           const int16_t measured_ma[], const bool valid[], bool may_rise,
                           uint16_t duty[]);
 
+/* Duty given in the last tick; 0 after a reset. */
+uint16_t current_control_duty(const current_control_t *control, uint8_t channel);
+
 /* Slew-limited reference of the last tick, mA. */
 uint16_t current_control_reference_ma(const current_control_t *control, uint8_t channel);
 

@@ -66,9 +66,9 @@ typedef struct {
     uint16_t away_turns;    /* since it was asked for, or was last there */
     int16_t last_c7;        /* temperature a turn ago */
     uint8_t stage;          /* drive_policy_stage_t */
-    bool arrived;           /* has been there since it was asked for */
-    bool released;          /* switched off hot: no false actuation */
-    bool tripped;
+    bool arrived : 1;       /* has been there since it was asked for */
+    bool released : 1;      /* switched off hot: no false actuation */
+    bool tripped : 1;
 } drive_policy_spring_t;
 
 typedef struct {

@@ -63,7 +63,7 @@ static float take_signed(const record_store_t *record, uint16_t *at, uint8_t byt
 /* What the record has of a spring. False where it has nothing. */
 static bool unpack(const record_store_t *record, uint8_t spring, spring_learnt_t *learnt)
 {
-    uint16_t at = (uint16_t)(spring * LEARNT_STORE_SPRING_BYTES);
+    uint16_t at = (uint16_t)(LEARNT_STORE_MARK_BYTES + spring * LEARNT_STORE_SPRING_BYTES);
     if (at + LEARNT_STORE_SPRING_BYTES > record_store_length(record)) {
         return false;
     }
@@ -76,9 +76,29 @@ static bool unpack(const record_store_t *record, uint8_t spring, spring_learnt_t
     return learnt->austenite_ohm > 0.0f;
 }
 
+/* A spring goes on learning while others are written: its numbers are taken all at once. */
+/* Its losses were learnt beside the model that the controller has. */
+static bool fits_model(const learnt_store_t *store, const controller_t *controller)
+{
+    uint16_t at = 0;
+    return record_store_length(&store->record) >= LEARNT_STORE_MARK_BYTES &&
+           take(&store->record, &at, LEARNT_STORE_MARK_BYTES) == controller_model_mark(controller);
+}
+
 static uint8_t byte_of(void *context, uint16_t position)
 {
-    return ((const learnt_store_t *)context)->bytes[position];
+    learnt_store_t *const store = context;
+    if (position < LEARNT_STORE_MARK_BYTES) {
+        return (uint8_t)(controller_model_mark(store->controller) >> (8u * position));
+    }
+    position = (uint16_t)(position - LEARNT_STORE_MARK_BYTES);
+    const uint8_t within = (uint8_t)(position % LEARNT_STORE_SPRING_BYTES);
+    if (within == 0) {
+        const uint8_t spring = (uint8_t)(position / LEARNT_STORE_SPRING_BYTES);
+        const spring_learnt_t learnt = controller_learnt(store->controller, spring);
+        pack(&learnt, store->bytes);
+    }
+    return store->bytes[within];
 }
 
 static void save(learnt_store_t *store, uint16_t length)
@@ -131,7 +151,6 @@ static bool all_held(const controller_t *controller)
 void learnt_store_second(learnt_store_t *store, const controller_t *controller)
 {
     const uint8_t springs = controller_springs(controller);
-    bool worth = false;
     if (store->since_s < LEARNT_STORE_PAUSE_S) {
         store->since_s++;
     }
@@ -143,17 +162,14 @@ void learnt_store_second(learnt_store_t *store, const controller_t *controller)
     if (store->since_s < LEARNT_STORE_PAUSE_S || store->held_s < LEARNT_STORE_HELD_S) {
         return;
     }
+    bool worth = learnt_store_keeps(store) && !fits_model(store, controller);
     for (uint8_t k = 0; k < springs && !worth; k++) {
         worth = worth_a_save(store, controller, k);
     }
     if (!worth) {
         return;
     }
-    for (uint8_t k = 0; k < springs; k++) {
-        const spring_learnt_t learnt = controller_learnt(controller, k);
-        pack(&learnt, store->bytes + (uint16_t)(k * LEARNT_STORE_SPRING_BYTES));
-    }
-    save(store, (uint16_t)(springs * LEARNT_STORE_SPRING_BYTES));
+    save(store, (uint16_t)(LEARNT_STORE_MARK_BYTES + springs * LEARNT_STORE_SPRING_BYTES));
 }
 
 record_save_t learnt_store_step(learnt_store_t *store)
@@ -180,11 +196,16 @@ record_found_t learnt_store_open(learnt_store_t *store, const record_storage_t *
     spring_learnt_t learnt;
     memset(store, 0, sizeof *store);
     store->since_s = LEARNT_STORE_PAUSE_S;
+    store->controller = controller;
     const record_found_t found =
         record_store_open(&store->record, storage, base, slot_bytes, LEARNT_STORE_KIND);
+    const bool fits = fits_model(store, controller);
     for (uint8_t k = 0; k < controller_springs(controller); k++) {
         if (unpack(&store->record, k, &learnt)) {
             controller_restore_learnt(controller, k, &learnt);
+            if (!fits) {
+                controller_forget_loss(controller, k);
+            }
         }
     }
     return found;

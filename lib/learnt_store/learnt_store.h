@@ -15,7 +15,8 @@ extern "C" {
 #endif
 
 #define LEARNT_STORE_KIND                                                                          \
-    3u /* of record; a change of LEARNT_STORE_SPRING_BYTES or of its fields takes a new one */
+    4u /* of record; a change of its bytes or of their meaning takes a new one */
+#define LEARNT_STORE_MARK_BYTES   2u /* controller_model_mark, beside which losses were learnt */
 #define LEARNT_STORE_SPRING_BYTES 15u
 
 /* After so long with every driven spring held, and no sooner than that after the save before: an
@@ -25,19 +26,23 @@ extern "C" {
 
 typedef struct {
     record_store_t record;
-    uint16_t since_s; /* the last save began; stays at LEARNT_STORE_PAUSE_S */
-    uint8_t held_s;   /* all driven springs, on end; stays at LEARNT_STORE_HELD_S */
-    uint8_t bytes[CONTROLLER_MAX_SPRINGS * LEARNT_STORE_SPRING_BYTES]; /* of a save under way */
+    uint16_t since_s;               /* the last save began; stays at LEARNT_STORE_PAUSE_S */
+    uint8_t held_s;                 /* all driven springs, on end; stays at LEARNT_STORE_HELD_S */
+    const controller_t *controller; /* whose springs are kept */
+    uint8_t bytes[LEARNT_STORE_SPRING_BYTES]; /* of a save under way: the mark, or the spring, that
+                                                 is written */
 } learnt_store_t;
 
 /* Finds the record and gives the controller, which has been initialised, what it holds of each of
- * its springs. slot_bytes must hold RECORD_OVERHEAD_BYTES and the bytes of all springs. */
+ * its springs, but no losses that were learnt beside another model than it has; it must stay valid.
+ * slot_bytes must hold RECORD_OVERHEAD_BYTES, the mark's and the bytes of all springs. */
 record_found_t learnt_store_open(learnt_store_t *store, const record_storage_t *storage,
                                  uint16_t base, uint16_t slot_bytes, controller_t *controller);
 
 /* Once a second. Starts a save if and only if both times above have passed and of a spring
- * something is known that the record has not: its first numbers, a resistance that differs by 2 %,
- * a loss that differs by its standard deviation or is known twice as well. */
+ * something is known that the record has not: its first numbers, losses beside the present model, a
+ * resistance that differs by 2 %, a loss that differs by its standard deviation or is known twice
+ * as well. */
 void learnt_store_second(learnt_store_t *store, const controller_t *controller);
 /* Goes on with a save under way: at most one byte. May be left out for a while. */
 record_save_t learnt_store_step(learnt_store_t *store);

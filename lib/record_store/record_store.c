@@ -95,21 +95,16 @@ uint8_t record_store_read(const record_store_t *store, uint16_t position)
 
 /* Phases of a save. The completion byte is the first to go and, once everything else has been read
  * back, the last to come: at no byte in between can the slot be taken for a record. */
-enum { PHASE_CLEAR, PHASE_WRITE, PHASE_CHECK, PHASE_COMPLETE };
-
-static void begin_pass(record_store_t *store, uint8_t phase)
-{
-    store->phase = phase;
-    store->position = 1;
-    store->crc = CRC16_START;
-}
+enum { PHASE_CLEAR, PHASE_WRITE, PHASE_COMPLETE };
 
 void record_store_save(record_store_t *store, record_byte_t byte, void *context, uint16_t length)
 {
     store->byte = byte;
     store->context = context;
     store->saved_length = length;
-    begin_pass(store, PHASE_CLEAR);
+    store->phase = PHASE_CLEAR;
+    store->position = 1;
+    store->crc = CRC16_START;
     store->state = RECORD_SAVE_BUSY;
 }
 
@@ -152,25 +147,20 @@ record_save_t record_store_step(record_store_t *store)
     }
     const uint8_t slot = (uint8_t)(1u - store->slot);
     const uint16_t position = store->position;
-    uint8_t out;
     switch (store->phase) {
     case PHASE_CLEAR:
+        store->written = CLEARED;
         storage->write(storage->context, address_of(store, slot, 0), CLEARED);
         store->phase = PHASE_WRITE;
         break;
     case PHASE_WRITE:
-        if (next_byte(store, &out)) {
-            storage->write(storage->context, address_of(store, slot, position), out);
+        if (slot_byte(store, slot, (uint16_t)(position - 1u)) != store->written) {
+            store->state = RECORD_SAVE_FAILED;
+        } else if (next_byte(store, &store->written)) {
+            storage->write(storage->context, address_of(store, slot, position), store->written);
         } else {
-            begin_pass(store, PHASE_CHECK);
-        }
-        break;
-    case PHASE_CHECK:
-        if (!next_byte(store, &out)) {
             storage->write(storage->context, address_of(store, slot, 0), COMPLETE);
             store->phase = PHASE_COMPLETE;
-        } else if (slot_byte(store, slot, position) != out) {
-            store->state = RECORD_SAVE_FAILED;
         }
         break;
     default:

@@ -28,7 +28,7 @@ typedef struct {
     void (*write)(void *context, uint16_t address, uint8_t value);
 } record_storage_t;
 
-/* The record's byte at a position; called with 0, 1, 2, ... and then so once more. */
+/* The record's byte at a position; called with 0, 1, 2, ... as each is about to be written. */
 typedef uint8_t (*record_byte_t)(void *context, uint16_t position);
 
 typedef enum {
@@ -58,10 +58,11 @@ typedef struct {
     record_byte_t byte;
     void *context;
     uint16_t saved_length;
-    uint16_t position; /* in the slot: what is written or checked next */
+    uint16_t position; /* in the slot: what is written next */
     uint16_t crc;
     uint8_t phase;
-    uint8_t state; /* record_save_t */
+    uint8_t written; /* the byte before */
+    uint8_t state;   /* record_save_t */
 } record_store_t;
 
 /* Finds the newest whole record of that kind in the two slots. O(slot_bytes). */
@@ -73,10 +74,11 @@ uint16_t record_store_length(const record_store_t *store);
 uint8_t record_store_read(const record_store_t *store, uint16_t position);
 
 /* Starts a save of `length` bytes, at most slot_bytes - RECORD_OVERHEAD_BYTES, after
- * record_store_open. What byte returns must not change until it is done. */
+ * record_store_open. */
 void record_store_save(record_store_t *store, record_byte_t byte, void *context, uint16_t length);
-/* Writes, or reads back, at most one byte, and only when the storage is ready: O(1). FAILED if and
- * only if a byte does not read back as written; the other slot then still holds the record before.
+/* Reads back the byte written last and writes the next one, only when the storage is ready: O(1).
+ * FAILED if and only if a byte does not read back as written; the other slot then still holds the
+ * record before.
  */
 record_save_t record_store_step(record_store_t *store);
 

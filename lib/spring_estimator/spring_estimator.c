@@ -113,6 +113,9 @@ void spring_estimator_prepare(spring_estimator_t *e, const thermal_model_t *mode
     e->change = 1.0f - (float)p->resistance_martensite_uohm / (float)p->resistance_austenite_uohm;
     for (uint8_t k = 0; k < model->springs; k++) {
         spring_estimator_look_at_stiffness(e, model, k);
+        if (e->spring[k].learnt.austenite_ohm == 0.0f) { /* the declared one stands in */
+            e->spring[k].learnt.change = e->change;
+        }
     }
 }
 
@@ -132,11 +135,21 @@ static void begin(spring_belief_t *b, float temperature_c, float sd_k, uint8_t p
                            .last_c = temperature_c};
 }
 
+void spring_estimator_forget_loss(spring_estimator_t *e, uint8_t k)
+{
+    spring_belief_t *b = &e->spring[k];
+    const float sd = LOSS_SD * e->loss_w_per_k;
+    b->learnt.loss_w_per_k = 0.0f;
+    b->learnt.loss_sd_w_per_k = sd;
+    b->loss_variance = sd * sd;
+    b->covariance = 0.0f;
+    b->gone_w_per_k = b->kept_w_per_k = 0.0f;
+}
+
 void spring_estimator_forget(spring_estimator_t *e, uint8_t k)
 {
-    const float sd = LOSS_SD * e->loss_w_per_k;
-    e->spring[k].learnt = (spring_learnt_t){.change = e->change, .loss_sd_w_per_k = sd};
-    e->spring[k].loss_variance = sd * sd;
+    e->spring[k].learnt = (spring_learnt_t){.change = e->change};
+    spring_estimator_forget_loss(e, k);
 }
 
 void spring_estimator_init(spring_estimator_t *e, thermal_model_t *model)

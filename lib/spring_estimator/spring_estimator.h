@@ -96,22 +96,24 @@ typedef struct {
     uint8_t quiet;      /* turns in which its temperature hardly moved, saturating */
     uint8_t losing;     /* turns on end in which it seems to lose phase */
     uint8_t averaged;   /* turns in slow_ohm, saturating */
-    bool doubted;       /* its last heating ended before its resistance said so */
-    bool unproven; /* by what it may be hotter it was spared: it may not have transformed again */
-    bool odd;      /* the turn before read what no phase changes to so fast */
-    bool reads;    /* the last turn had readings fit for use */
-    bool seen;     /* the last turn has moved it to where it was seen */
-    bool blind;    /* a heating that must have transformed it did not show */
-    bool heating;  /* between spring_estimator_begin_heating and _begin_hold */
-    bool onset;    /* this heating was seen to begin to transform it */
-    bool rough;    /* the line is of few turns, not of a spring at rest */
-    bool steep;    /* and its resistance still changes as only that explains */
+    /* bits: of nine springs they are a good part of the RAM that is spare */
+    bool doubted : 1;   /* its last heating ended before its resistance said so */
+    bool unproven : 1;  /* by what it may be hotter it was spared: it may not have transformed again
+                         */
+    bool odd : 1;       /* the turn before read what no phase changes to so fast */
+    bool reads : 1;     /* the last turn had readings fit for use */
+    bool seen : 1;      /* the last turn has moved it to where it was seen */
+    bool blind : 1;     /* a heating that must have transformed it did not show */
+    bool heating : 1;   /* between spring_estimator_begin_heating and _begin_hold */
+    bool onset : 1;     /* this heating was seen to begin to transform it */
+    bool rough : 1;     /* the line is of few turns, not of a spring at rest */
+    bool steep : 1;     /* and its resistance still changes as only that explains */
+    bool cut_short : 1; /* there was a jump of the current in the running turn */
     spring_learnt_t learnt;
 
     /* the running turn's readings */
     uint8_t readings;
     uint8_t settling; /* to be left out, after a jump of the current */
-    bool cut_short;   /* there was one in this turn */
     uint16_t current_sum_ma;
     uint16_t voltage_sum_mv;
     float current_a; /* of the last turn that had readings */
@@ -167,6 +169,9 @@ void spring_estimator_restore(spring_estimator_t *estimator, uint8_t spring,
                               const spring_learnt_t *learnt);
 /* Nothing is known of its own numbers but the declared ones. */
 void spring_estimator_forget(spring_estimator_t *estimator, uint8_t spring);
+/* Its loss beyond the declared one is no more known than of any spring: another model is declared.
+ */
+void spring_estimator_forget_loss(spring_estimator_t *estimator, uint8_t spring);
 /* What has been learnt, with how surely. */
 spring_learnt_t spring_estimator_learnt(const spring_estimator_t *estimator, uint8_t spring);
 

@@ -21,7 +21,7 @@ static void view_spring(const controller_t *chip, unsigned k, board_view_spring_
     view->measured_ma = chip->measured_ma[k];
     view->measured_mv = chip->measured_mv[k];
     view->target_ma = chip->policy.spring[k].target_ma;
-    view->duty = chip->duty[k];
+    view->duty = chip->current.channel[k].duty;
     view->level_permille = chip->level_permille[k];
     view->temperature_c7 = (int16_t)(state->temperature_c23 >> 16);
     view->fault = chip->safety.spring[k].fault;

@@ -488,6 +488,42 @@ static void accepted_settings_keep_temperatures_currents_and_faults(void)
     TEST_ASSERT_INT_WITHIN(30, 1400, controller_measured_ma(&controller, 4));
 }
 
+/* What was learnt beside a model is what that one lacks: another one declares it, or lacks
+ * something else. */
+static void another_model_forgets_the_losses_and_only_these(void)
+{
+    const spring_learnt_t own = {.austenite_ohm = 0.22f,
+                                 .change = 0.2f,
+                                 .martensite_ohm = 0.176f,
+                                 .loss_w_per_k = 0.0008f,
+                                 .loss_sd_w_per_k = 0.0001f};
+    controller_restore_learnt(&controller, 3, &own);
+    settings.policy.hold_margin_cc++;
+    settings.safety.temperature_trip_cc--;
+    TEST_ASSERT_TRUE(controller_apply_settings(&controller, &settings, NULL));
+    TEST_ASSERT_EQUAL_FLOAT(0.0008f, controller_learnt(&controller, 3).loss_w_per_k);
+    settings.model.loss_uw_per_k += 800;
+    TEST_ASSERT_TRUE(controller_apply_settings(&controller, &settings, NULL));
+    const spring_learnt_t left = controller_learnt(&controller, 3);
+    TEST_ASSERT_EQUAL_FLOAT(0.0f, left.loss_w_per_k);
+    TEST_ASSERT_EQUAL_FLOAT(controller_learnt(&controller, 4).loss_sd_w_per_k,
+                            left.loss_sd_w_per_k);
+    TEST_ASSERT_EQUAL_FLOAT(0.22f, left.austenite_ohm);
+    TEST_ASSERT_EQUAL_FLOAT(0.176f, left.martensite_ohm);
+    TEST_ASSERT_EQUAL_FLOAT(0.2f, left.change);
+}
+
+/* The declared change stands in for what was not learnt: as it is declared now. */
+static void another_declared_resistance_is_taken_where_none_was_learnt(void)
+{
+    const spring_learnt_t own = {.austenite_ohm = 0.22f, .change = 0.2f, .loss_sd_w_per_k = 1e-4f};
+    controller_restore_learnt(&controller, 3, &own);
+    settings.model.resistance_austenite_uohm = settings.model.resistance_martensite_uohm * 2u;
+    TEST_ASSERT_TRUE(controller_apply_settings(&controller, &settings, NULL));
+    TEST_ASSERT_EQUAL_FLOAT(0.5f, controller_learnt(&controller, 4).change);
+    TEST_ASSERT_EQUAL_FLOAT(0.2f, controller_learnt(&controller, 3).change);
+}
+
 static void another_size_starts_anew_but_stays_locked(void)
 {
     all_on();
@@ -576,6 +612,8 @@ int main(void)
     RUN_TEST(commands_out_of_range_change_nothing);
     RUN_TEST(refused_settings_change_nothing_and_are_found);
     RUN_TEST(accepted_settings_keep_temperatures_currents_and_faults);
+    RUN_TEST(another_model_forgets_the_losses_and_only_these);
+    RUN_TEST(another_declared_resistance_is_taken_where_none_was_learnt);
     RUN_TEST(another_size_starts_anew_but_stays_locked);
     RUN_TEST(any_input_is_taken_and_the_same_input_gives_the_same_output);
     return UNITY_END();

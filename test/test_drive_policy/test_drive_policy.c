@@ -281,6 +281,43 @@ static void own_temperature_derates_linearly_then_trips(void)
     TEST_ASSERT_GREATER_THAN_UINT16(2900, target_ma[0]);
 }
 
+/* What it has lost may have been no phase: then it is as much hotter. Half of the band is left to
+ * such doubts. */
+static void spring_that_may_be_hotter_is_derated_by_that(void)
+{
+    parameters.dither_ma = 0;
+    parameters.temperature_limit_cc = 9200;
+    begin_cold(3, 3);
+    level[0] = 1000;
+    believe(0, 80, false);
+    for (unsigned n = 0; n < 2; n++) {
+        policy.estimator.spring[0].gone_k = n == 0 ? 6.9f : 12.0f; /* counted as 2 and 7 K */
+        decisions(2u * TURN_TICKS);
+        TEST_ASSERT_UINT16_WITHIN(60, n == 0 ? FULL_BOOST_MA : FULL_BOOST_MA / 2, target_ma[0]);
+        TEST_ASSERT_EQUAL(n == 1,
+                          (drive_policy_limits(&policy, 0) & DRIVE_POLICY_LIMIT_TEMPERATURE) != 0);
+    }
+}
+
+/* A heating that the limit has slowed down to nothing ends where the spring may have transformed.
+ */
+static void limited_heating_ends_where_it_may_be_hot_enough(void)
+{
+    parameters.temperature_limit_cc = 9200;
+    for (unsigned n = 0; n < 2; n++) {
+        begin_cold(3, 3);
+        level[0] = 1000;
+        decisions(TURN_TICKS);
+        believe(0, 85, false);
+        for (unsigned turn = 0; turn < 40; turn++) { /* until its rise has worn off */
+            policy.estimator.spring[0].gone_k = n == 0 ? 11.0f : 15.0f;
+            decisions(TURN_TICKS);
+        }
+        TEST_ASSERT_EQUAL(n == 0 ? DRIVE_POLICY_STAGE_HEAT : DRIVE_POLICY_STAGE_HOLD,
+                          drive_policy_stage(&policy, 0));
+    }
+}
+
 /* By the upper bound: the wider it is, the colder the spring from which on. */
 static void undriven_spring_derates_its_neighbours_only(void)
 {
@@ -445,6 +482,8 @@ int main(void)
     RUN_TEST(who_waits_longest_is_next);
     RUN_TEST(holds_come_before_boosts);
     RUN_TEST(own_temperature_derates_linearly_then_trips);
+    RUN_TEST(spring_that_may_be_hotter_is_derated_by_that);
+    RUN_TEST(limited_heating_ends_where_it_may_be_hot_enough);
     RUN_TEST(undriven_spring_derates_its_neighbours_only);
     RUN_TEST(spring_just_released_is_no_false_actuation);
     RUN_TEST(spring_released_from_the_other_policy_is_none_either);

@@ -186,6 +186,42 @@ static void clear_forgets_in_memory_and_over_power_off(void)
     TEST_ASSERT_EQUAL_FLOAT(0.0f, controller_learnt(&controller, 0).austenite_ohm);
 }
 
+static void power_on_with(const controller_settings_t *settings)
+{
+    TEST_ASSERT_TRUE(controller_init(&controller, settings, 20 * 128, NULL));
+    (void)learnt_store_open(&store, &storage, SETTINGS_LEARNT_BASE, SETTINGS_LEARNT_SLOT_BYTES,
+                            &controller);
+}
+
+/* A calibration declares what was learnt beside the old numbers: it is not to count twice. */
+static void a_loss_that_was_learnt_beside_another_model_is_left_out(void)
+{
+    controller_settings_t settings;
+    controller_settings_default(&settings);
+    hold(0, DRIVE_POLICY_STAGE_HOLD);
+    learn(0, &numbers);
+    seconds(LEARNT_STORE_HELD_S);
+    settings.policy.hold_margin_cc++; /* not of the model */
+    power_on_with(&settings);
+    expect_numbers(0);
+    settings.model.loss_scale_permille[8]++;
+    power_on_with(&settings);
+    const spring_learnt_t back = controller_learnt(&controller, 0);
+    TEST_ASSERT_FLOAT_WITHIN(1.1e-6f, numbers.austenite_ohm, back.austenite_ohm);
+    TEST_ASSERT_EQUAL_FLOAT(0.0f, back.loss_w_per_k);
+    TEST_ASSERT_EQUAL_FLOAT(controller_learnt(&controller, 1).loss_sd_w_per_k,
+                            back.loss_sd_w_per_k);
+
+    /* the record follows, though it has no other number */
+    hold(0, DRIVE_POLICY_STAGE_HOLD);
+    writes = 0;
+    seconds(LEARNT_STORE_HELD_S);
+    TEST_ASSERT_TRUE(writes > 0);
+    writes = 0;
+    seconds(LEARNT_STORE_PAUSE_S);
+    TEST_ASSERT_EQUAL_UINT(0, writes);
+}
+
 static void what_lies_at_its_limit_is_taken_back(void)
 {
     spring_learnt_t most = numbers;
@@ -208,6 +244,7 @@ int main(void)
     RUN_TEST(only_what_differs_enough_is_worth_a_save_and_that_once_in_ten_minutes);
     RUN_TEST(wherever_the_power_is_cut_the_old_or_the_new_is_whole);
     RUN_TEST(clear_forgets_in_memory_and_over_power_off);
+    RUN_TEST(a_loss_that_was_learnt_beside_another_model_is_left_out);
     RUN_TEST(what_lies_at_its_limit_is_taken_back);
     return UNITY_END();
 }

@@ -89,7 +89,7 @@ static void the_longest_line_fits_what_is_asked_for(void)
     for (uint8_t k = 0; k < 9; k++) {
         controller.measured_ma[k] = -32768;
         controller.measured_mv[k] = -32768;
-        controller.duty[k] = 800;
+        controller.current.channel[k].duty = 800;
         controller.model.state.spring[k].temperature_c23 = -40 * 8388608;
         controller.safety.spring[k].fault = SAFETY_FAULT_EMERGENCY_STOP;
     }
