@@ -432,7 +432,7 @@ static uint16_t said_of(const drive_policy_t *policy, uint8_t k)
     const drive_policy_spring_t *s = &policy->spring[k];
     const spring_belief_t *b = &policy->estimator.spring[k];
     uint16_t said = DRIVE_POLICY_LIMIT_NONE;
-    if (b->blind || !policy->estimator.observes) {
+    if (spring_estimator_blind(b) || !policy->estimator.observes) {
         said |= DRIVE_POLICY_LIMIT_BLIND;
     }
     if (s->stage == DRIVE_POLICY_STAGE_HEAT && s->wanted_ma == 0) {

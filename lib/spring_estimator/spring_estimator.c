@@ -17,6 +17,8 @@
 #define JUMP_LEAST   0.03f /* of a resistance in a turn: 2 W change 6 % of the phase in it */
 #define JUMP_OF_LOAD 0.08f /* 16 K at once, latent heat kept: 40 % of the phase */
 #define JUMP_SDS     5.0f
+#define JUMP_TURNS   1024u /* a jump is forgotten in four minutes, one after the other */
+#define LOOSE_TURNS  (2u * JUMP_TURNS) /* one has moved, two went and came back: a third will come */
 
 #define CAPACITY_SD    0.09f   /* of a declared heat capacity: 15 %, uniform */
 #define LOSS_SD        0.12f   /* of a declared loss: 20 % */
@@ -252,6 +254,9 @@ static bool leave_out(spring_belief_t *b, float ohm, float current_a)
         spring_jump(b, ohm / was_ohm);
     }
     b->odd = jumps && !b->odd;
+    if (b->odd && b->unsteady <= LOOSE_TURNS) {
+        b->unsteady = (uint16_t)(b->unsteady + JUMP_TURNS);
+    }
     return b->odd;
 }
 
@@ -351,11 +356,13 @@ static float predict(const spring_estimator_t *e, spring_belief_t *b, const ther
     if (b->variance_k2 < LEAST_SD_K * LEAST_SD_K) {
         b->variance_k2 = LEAST_SD_K * LEAST_SD_K;
     }
-    if (b->gone_k > 0.0f) {
-        b->gone_k = keeps * b->gone_k + per_w * above_k * b->gone_w_per_k;
+    const float heat_k = per_w * (power_w - balance_w - extra_w);
+    if (b->gone_k > 0.0f) { /* what it takes up to transform again warms it, if it need not */
+        const float latent_k = b->heating ? fmaxf(heat_k - (now_c - b->last_c), 0.0f) : 0.0f;
+        b->gone_k = keeps * b->gone_k + per_w * above_k * b->gone_w_per_k + latent_k;
     }
     b->last_c = now_c;
-    return per_w * (power_w - balance_w - extra_w);
+    return heat_k;
 }
 
 void spring_correct_loss(const spring_estimator_t *e, spring_belief_t *b, float more_w_per_k)
@@ -490,7 +497,8 @@ void spring_estimator_update(spring_estimator_t *e, thermal_model_t *model, uint
         /* a spring that waits cools by no less than the least loss: more would hide a finish */
         b->run.heat.heat_k += heat_k < 0.0f ? LEAST_LOSS * heat_k : heat_k;
     }
-    if (b->reads && e->observes) {
+    b->unsteady = b->unsteady > 0 ? (uint16_t)(b->unsteady - 1) : 0;
+    if (b->reads && e->observes && b->unsteady <= LOOSE_TURNS) {
         look(e, model, k);
         spring_heating_watch(e, b, model, k);
         if (!b->blind) {
@@ -499,6 +507,7 @@ void spring_estimator_update(spring_estimator_t *e, thermal_model_t *model, uint
     } else {
         if (b->heating) {
             b->run.heat.mark_ohm = 0.0f;
+            b->steep = false;
         } else {
             b->run.line.ohm = 0.0f;
         }
@@ -532,7 +541,7 @@ void spring_estimator_update(spring_estimator_t *e, thermal_model_t *model, uint
 bool spring_lacks_phase(const spring_belief_t *b, const thermal_model_t *model, uint8_t k)
 {
     const spring_learnt_t *l = &b->learnt;
-    if (b->fresh == 0 || b->blind || l->austenite_ohm == 0.0f || b->current_a < STRONG_A) {
+    if (b->fresh == 0 || spring_estimator_blind(b) || l->austenite_ohm == 0.0f || b->current_a < STRONG_A) {
         return false;
     }
     const int16_t finish_c7 = thermal_model_transformation(model, k).austenite_finish_c7;
@@ -593,7 +602,7 @@ void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, 
     }
     b->blind = b->blind || certain || (lacks && b->doubted);
     b->doubted = lacks && !b->blind;
-    if (full && !lacks && b->heating && b->onset && b->reads && b->current_a > STRONG_A) {
+    if (full && !lacks && b->heating && b->onset && spring_estimator_sees(b) && b->current_a > STRONG_A) {
         spring_learn_austenite(b); /* hot enough, and its resistance had come to rest */
     }
     b->heating = false;
@@ -612,7 +621,12 @@ void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, 
 
 bool spring_estimator_sees(const spring_belief_t *b)
 {
-    return b->reads && !b->blind;
+    return b->reads && !spring_estimator_blind(b);
+}
+
+bool spring_estimator_blind(const spring_belief_t *b)
+{
+    return b->blind || b->unsteady > LOOSE_TURNS;
 }
 
 float spring_estimator_sd_k(const spring_belief_t *b)
