@@ -5,20 +5,7 @@
 #include "invariant.h"
 #include "spring_estimator_internal.h"
 
-#define LEAST_READINGS 4
-#define LEAST_MEAN_MA  50u
-#define SETTLING_TICKS 8
-#define NOISE_FIRST    0.002f
-#define NOISE_MOST     0.05f
-#define NOISE_SHARE    0.06f
-#define NOISE_SAME     0.1f   /* a current that has moved by more tells nothing of the noise */
-#define BEND_TO_SD     0.512f /* mean size of a second difference: 1 / (sqrt(6) sqrt(2 / pi)) */
-
-#define JUMP_LEAST   0.03f /* of a resistance in a turn: 2 W change 6 % of the phase in it */
-#define JUMP_OF_LOAD 0.08f /* 16 K at once, latent heat kept: 40 % of the phase */
-#define JUMP_SDS     5.0f
-#define JUMP_TURNS   1024u /* a jump is forgotten in four minutes, one after the other */
-#define LOOSE_TURNS  (2u * JUMP_TURNS) /* one has moved, two went and came back: a third will come */
+#define NOISE_FIRST 0.002f
 
 #define CAPACITY_SD    0.09f   /* of a declared heat capacity: 15 %, uniform */
 #define LOSS_SD        0.12f   /* of a declared loss: 20 % */
@@ -205,116 +192,6 @@ spring_learnt_t spring_estimator_learnt(const spring_estimator_t *e, uint8_t k)
 
 /* ---- one turn ---- */
 
-void spring_estimator_disturb(spring_belief_t *b)
-{
-    b->settling = SETTLING_TICKS;
-    b->cut_short = true;
-    b->current_sum_ma = b->voltage_sum_mv = 0;
-    b->readings = 0;
-    b->quiet = 0;
-    b->ohm_before[1] = 0.0f;
-}
-
-void spring_jump(spring_belief_t *b, float by)
-{
-    b->slow_ohm *= by;
-    if (b->heating) {
-        b->run.heat.mark_ohm *= by;
-        b->run.heat.onset_ohm *= by;
-        b->run.heat.cold_ohm *= by;
-    } else if (b->run.line.ohm > 0.0f) {
-        b->run.line.ohm *= by;
-        b->slow_ohm = b->run.line.ohm;
-    }
-    b->full_ohm *= by;
-    b->learnt.austenite_ohm *= by;
-    b->learnt.martensite_ohm *= by;
-    b->ohm_before[0] = b->ohm_before[1] = 0.0f;
-}
-
-/* No phase changes so fast: it is a contact or the sensor. A turn in which it may have jumped half
- * way is left out. */
-static bool leave_out(spring_belief_t *b, float ohm, float current_a)
-{
-    const bool holds = !b->heating && b->run.line.ohm > 0.0f;
-    const float was_ohm = holds ? b->slow_ohm : b->ohm_before[0];
-    const float step = ohm - was_ohm;
-    if (fabsf(step) <= JUMP_LEAST * was_ohm || b->fresh == 0 || was_ohm <= 0.0f) {
-        b->odd = false;
-        return false;
-    }
-    /* a line compares with any current, but for the sensor's offset; a heating only with its own */
-    const bool compares =
-        current_a > STRONG_A && (holds || b->current_a > fmaxf(STRONG_A, 0.5f * current_a));
-    const bool by_load = !holds || step * b->learnt.change < 0.0f;
-    const float most = (by_load ? JUMP_OF_LOAD : JUMP_LEAST) + JUMP_SDS * b->noise +
-                       (holds ? spring_offset_may_show(b, current_a) : 0.0f);
-    const bool jumps = compares && fabsf(step) > most * was_ohm;
-    if (jumps && b->odd) {
-        spring_jump(b, ohm / was_ohm);
-    }
-    b->odd = jumps && !b->odd;
-    if (b->odd && b->unsteady <= LOOSE_TURNS) {
-        b->unsteady = (uint16_t)(b->unsteady + JUMP_TURNS);
-    }
-    return b->odd;
-}
-
-/* Second differences of turns at the same current: neither a level nor a slope shows in them. */
-static void take_noise(spring_belief_t *b, float ohm, float current_a)
-{
-    const bool same = fabsf(current_a - b->current_a) < NOISE_SAME * current_a;
-    if (!same && b->fresh != 0) { /* it is one of the voltage */
-        b->noise = fminf(b->noise * b->current_a / current_a, NOISE_MOST);
-    }
-    if (same && b->ohm_before[1] > 0.0f) {
-        const float bend = fabsf(ohm - 2.0f * b->ohm_before[0] + b->ohm_before[1]) / ohm;
-        b->noise += (fminf(BEND_TO_SD * bend, NOISE_MOST) - b->noise) * NOISE_SHARE;
-    }
-    b->ohm_before[1] = same ? b->ohm_before[0] : 0.0f;
-    b->ohm_before[0] = ohm;
-}
-
-float spring_slow_share(const spring_belief_t *b)
-{
-    return b->averaged >= SLOW_TURNS ? SLOW_SHARE /* as a rule: a division is saved */
-           : b->averaged > 1         ? 1.0f / (float)b->averaged
-                                     : 1.0f;
-}
-
-static void take_reading(spring_belief_t *b, float ohm, float current_a)
-{
-    take_noise(b, ohm, current_a);
-    b->averaged = b->fresh == 0 ? 0 : b->averaged;
-    b->averaged = b->averaged < SLOW_TURNS ? (uint8_t)(b->averaged + 1) : SLOW_TURNS;
-    const float share = spring_slow_share(b);
-    b->slow_ohm += (ohm - b->slow_ohm) * share;
-    b->slow_a += (current_a - b->slow_a) * share;
-    b->current_a = current_a;
-    b->ohm = ohm;
-    b->phase_ohm = current_a > STRONG_A || b->fresh == 0 ? ohm : b->phase_ohm;
-    b->fresh = b->fresh < UINT8_MAX ? (uint8_t)(b->fresh + 1) : UINT8_MAX;
-}
-
-static void take_readings(spring_belief_t *b)
-{
-    b->reads = b->readings >= LEAST_READINGS && b->current_sum_ma >= LEAST_MEAN_MA * b->readings &&
-               b->voltage_sum_mv > 0;
-    if (b->reads) {
-        const float offset_mv = 1e3f * b->offset_v * (float)b->readings;
-        const float ohm = ((float)b->voltage_sum_mv - offset_mv) / (float)b->current_sum_ma;
-        const float current_a = (float)b->current_sum_ma * 1e-3f / (float)b->readings;
-        if (!leave_out(b, ohm, current_a)) {
-            take_reading(b, ohm, current_a);
-        }
-    } else if (b->current_sum_ma < LEAST_MEAN_MA && !b->cut_short) {
-        b->fresh = 0; /* no current, or no sensor */
-    }
-    b->cut_short = false;
-    b->current_sum_ma = b->voltage_sum_mv = 0;
-    b->readings = 0;
-}
-
 static float extra_loss_w(const spring_belief_t *b, const thermal_model_t *model,
                           float temperature_c)
 {
@@ -488,7 +365,7 @@ void spring_estimator_update(spring_estimator_t *e, thermal_model_t *model, uint
     spring_belief_t *b = &e->spring[k];
     const float before_c = b->last_c;
     b->seen = false;
-    take_readings(b);
+    spring_take_readings(b);
     const float power_w = b->reads ? b->current_a * b->current_a * b->ohm : 0.0f;
     const float heat_k = predict(e, b, model, k, power_w);
     const float moved_k = b->last_c - before_c;
@@ -497,8 +374,7 @@ void spring_estimator_update(spring_estimator_t *e, thermal_model_t *model, uint
         /* a spring that waits cools by no less than the least loss: more would hide a finish */
         b->run.heat.heat_k += heat_k < 0.0f ? LEAST_LOSS * heat_k : heat_k;
     }
-    b->unsteady = b->unsteady > 0 ? (uint16_t)(b->unsteady - 1) : 0;
-    if (b->reads && e->observes && b->unsteady <= LOOSE_TURNS) {
+    if (b->reads && e->observes && !spring_is_loose(b)) {
         look(e, model, k);
         spring_heating_watch(e, b, model, k);
         if (!b->blind) {
@@ -541,7 +417,8 @@ void spring_estimator_update(spring_estimator_t *e, thermal_model_t *model, uint
 bool spring_lacks_phase(const spring_belief_t *b, const thermal_model_t *model, uint8_t k)
 {
     const spring_learnt_t *l = &b->learnt;
-    if (b->fresh == 0 || spring_estimator_blind(b) || l->austenite_ohm == 0.0f || b->current_a < STRONG_A) {
+    if (b->fresh == 0 || spring_estimator_blind(b) || l->austenite_ohm == 0.0f ||
+        b->current_a < STRONG_A) {
         return false;
     }
     const int16_t finish_c7 = thermal_model_transformation(model, k).austenite_finish_c7;
@@ -602,7 +479,8 @@ void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, 
     }
     b->blind = b->blind || certain || (lacks && b->doubted);
     b->doubted = lacks && !b->blind;
-    if (full && !lacks && b->heating && b->onset && spring_estimator_sees(b) && b->current_a > STRONG_A) {
+    if (full && !lacks && b->heating && b->onset && spring_estimator_sees(b) &&
+        b->current_a > STRONG_A) {
         spring_learn_austenite(b); /* hot enough, and its resistance had come to rest */
     }
     b->heating = false;
@@ -626,7 +504,7 @@ bool spring_estimator_sees(const spring_belief_t *b)
 
 bool spring_estimator_blind(const spring_belief_t *b)
 {
-    return b->blind || b->unsteady > LOOSE_TURNS;
+    return b->blind || spring_is_loose(b);
 }
 
 float spring_estimator_sd_k(const spring_belief_t *b)

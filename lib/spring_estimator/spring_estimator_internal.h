@@ -49,6 +49,10 @@ void spring_correct_loss(const spring_estimator_t *estimator, spring_belief_t *b
 void spring_keep_above(const spring_estimator_t *estimator, spring_belief_t *belief,
                        thermal_model_t *model, uint8_t spring, float limit_c);
 
+/* Takes the turn's readings. */
+void spring_take_readings(spring_belief_t *belief);
+/* It has jumped again and again: what it reads tells nothing. */
+bool spring_is_loose(const spring_belief_t *belief);
 /* All that readings are compared with jumps along: a contact, or the sensor. */
 void spring_jump(spring_belief_t *belief, float by);
 /* It reads less than when it had transformed last, and the difference is neither noise nor a

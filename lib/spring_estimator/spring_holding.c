@@ -70,9 +70,9 @@ static void begin_line(spring_belief_t *b, bool rough)
 void spring_begin_hold_line(spring_belief_t *b, bool now)
 {
     /* its slope is still to be told: no phase's coefficient tells the other's */
-    b->run.line = (spring_line_t){.rise_per_k = b->learnt.martensite_rise_per_k,
-                                  .rise_sd_per_k =
-                                      COEFFICIENT_MOST_PER_K / SPRING_ESTIMATOR_BOUND_SDS};
+    b->run.line =
+        (spring_line_t){.rise_per_k = b->learnt.martensite_rise_per_k,
+                        .rise_sd_per_k = COEFFICIENT_MOST_PER_K / SPRING_ESTIMATOR_BOUND_SDS};
     if (now) {
         average_anew(b);
         begin_line(b, true);
@@ -160,8 +160,7 @@ static bool learn_offset(spring_belief_t *b)
         return false;
     }
     const float apart_a = 1.0f / apart_per_a;
-    const float moved_v =
-        COEFFICIENT_MOST_PER_K * b->run.line.way_k * b->run.line.ohm * apart_a;
+    const float moved_v = COEFFICIENT_MOST_PER_K * b->run.line.way_k * b->run.line.ohm * apart_a;
     const float noise_v = b->noise * b->ohm * apart_a;
     const float prior_v2 = b->offset_sd_v * b->offset_sd_v;
     const float read_v2 = OFFSET_LEAST_V * OFFSET_LEAST_V + noise_v * noise_v + moved_v * moved_v;
@@ -191,8 +190,7 @@ float spring_offset_may_show(const spring_belief_t *b, float current_a)
  * moves it, and another current shows another share of the sensor's offset. */
 static float may_move_squared(const spring_belief_t *b)
 {
-    const float moves =
-        SPRING_ESTIMATOR_BOUND_SDS * b->run.line.rise_sd_per_k * b->run.line.slow_k;
+    const float moves = SPRING_ESTIMATOR_BOUND_SDS * b->run.line.rise_sd_per_k * b->run.line.slow_k;
     const float offset = spring_offset_may_show(b, b->slow_a);
     return moves * moves + offset * offset;
 }
@@ -306,8 +304,7 @@ void spring_holding_watch(const spring_estimator_t *e, spring_belief_t *b, therm
         const bool away = fabsf(line->slow_k) > ANCHOR_K;
         if (b->rough && (b->averaged == ANCHOR_TURNS || (b->averaged > ANCHOR_TURNS && away))) {
             if (away && spring_estimator_distance_k(e, model, k).low > 0.0f) {
-                const float offset =
-                    spring_offset_may_show(b, b->slow_a) * (1.0f / OFFSET_SDS);
+                const float offset = spring_offset_may_show(b, b->slow_a) * (1.0f / OFFSET_SDS);
                 tell_slope(b, left, noise2 + offset * offset);
             }
             begin_line(b, true); /* a coefficient explains only the way since */
