@@ -3,6 +3,7 @@
 #include <stddef.h>
 #include <string.h>
 
+#include "crc16.h"
 #include "fixed_point.h"
 #include "invariant.h"
 
@@ -476,7 +477,15 @@ void controller_forget_loss(controller_t *controller, uint8_t spring)
 
 uint16_t controller_model_mark(const controller_t *controller)
 {
-    return parameter_mark(PARAMETER_PART_MODEL, &controller->model.parameters);
+    uint16_t crc = CRC16_START;
+    for (uint16_t k = 0; k < PARAMETER_COUNT; k++) {
+        const parameter_row_t row = parameter_row(k);
+        for (spring_index_t n = 0; row.part == PARAMETER_PART_MODEL && n < row.count; n++) {
+            const int32_t value = parameter_get(&controller->model.parameters, &row, n);
+            crc = crc16_add_bytes(crc, &value, sizeof value);
+        }
+    }
+    return crc;
 }
 
 uint8_t controller_springs(const controller_t *controller)
