@@ -30,15 +30,19 @@
 #define SUSPECTED_W   0.038f         /* stops a fall of 0.1 K/s */
 #define FOLLOW_S      4.0f           /* a distance from the held temperature is closed in */
 #define SHORT_MOST_K  20.0f
-#define STILL_K_PER_S 0.3f
-#define KEPT_C7       (3 * 128) /* above austenite start what was reached is worth keeping */
-#define TURN_C7       (6 * 128) /* colder than one that heats: it is its turn */
-#define GOES_ON_C7    (4 * 128) /* below austenite start: keeps its turn */
-#define LOOK_MA       2000u     /* of a spring of which much was learnt and nothing is known */
-#define LOWER_MA      800u      /* the least at which a resistance tells the phase */
-#define UNDRIVEN_SDS  2.0f
-#define NEIGHBOUR_SD  0.15f /* of the rise of a spring that its neighbours heat */
-#define RISE_SHARE    0.25f /* of a turn in the average */
+#define COOLS_SHARE                                                                                \
+    0.5f /* of its power is taken off on the way down: a current that still reads                  \
+          */
+#define STILL_K_PER_S       0.3f
+#define RISE_BEGINS_K_PER_S 4.0f      /* with the boost, until it is measured */
+#define KEPT_C7             (3 * 128) /* above austenite start what was reached is worth keeping */
+#define TURN_C7             (6 * 128) /* colder than one that heats: it is its turn */
+#define GOES_ON_C7          (4 * 128) /* below austenite start: keeps its turn */
+#define LOOK_MA             2000u /* of a spring of which much was learnt and nothing is known */
+#define LOWER_MA            800u  /* the least at which a resistance tells the phase */
+#define UNDRIVEN_SDS        2.0f
+#define NEIGHBOUR_SD        0.15f /* of the rise of a spring that its neighbours heat */
+#define RISE_SHARE          0.25f /* of a turn in the average */
 
 #define AWAY_FIRST_TURNS (85u * TURNS_PER_S) /* since it was asked for */
 #define AWAY_TURNS       (15u * TURNS_PER_S) /* since it was there */
@@ -134,13 +138,14 @@ static void enter(drive_policy_t *policy, thermal_model_t *model, uint8_t k,
     case DRIVE_POLICY_STAGE_HEAT:
         supply_queue_add(&policy->queue, k);
         spring_estimator_begin_heating(&policy->estimator, model, k);
+        s->rise_k_per_s = RISE_BEGINS_K_PER_S;
         s->wanted_ma = policy->parameters.boost_current_ma;
         break;
     case DRIVE_POLICY_STAGE_HOLD:
         spring_estimator_begin_hold(&policy->estimator, model, k, is_full(level_permille));
         s->margin_k = spring_c((int16_t)(points.austenite_finish_c7 - points.martensite_start_c7)) +
                       BLIND_BEGIN_K;
-        s->wanted_ma = policy->parameters.probe_current_ma;
+        s->wanted_ma = (uint16_t)(LOWER_MA + policy->parameters.dither_ma); /* for a turn */
         break;
     case DRIVE_POLICY_STAGE_LOWER:
         spring_estimator_begin_hold(&policy->estimator, model, k, false);
@@ -155,13 +160,10 @@ static uint16_t hold_current_ma(const drive_policy_t *policy, const thermal_mode
                                 uint8_t k, float target_c, float more_w)
 {
     const spring_estimator_t *e = &policy->estimator;
-    float short_k = target_c - now_c(model, k);
-    short_k = short_k > SHORT_MOST_K    ? SHORT_MOST_K
-              : short_k < -SHORT_MOST_K ? -SHORT_MOST_K
-                                        : short_k;
-    return spring_estimator_current_ma(e, k,
-                                       spring_estimator_hold_w(e, model, k, target_c) + more_w +
-                                           short_k * e->heat_capacity_j_per_k / FOLLOW_S);
+    const float short_k = fminf(target_c - now_c(model, k), SHORT_MOST_K);
+    const float hold_w = spring_estimator_hold_w(e, model, k, target_c) + more_w;
+    const float closes_w = short_k * e->heat_capacity_j_per_k / FOLLOW_S;
+    return spring_estimator_current_ma(e, k, hold_w + fmaxf(closes_w, -COOLS_SHARE * hold_w));
 }
 
 static bool waits_for_supply(const drive_policy_spring_t *s)
@@ -175,15 +177,13 @@ static bool is_limited(const drive_policy_t *policy, const thermal_model_t *mode
 {
     const drive_policy_spring_t *s = &policy->spring[k];
     const uint16_t boost_ma = policy->parameters.boost_current_ma;
-    if (s->ceiling_ma >= boost_ma) {
+    if (s->ceiling_ma >= boost_ma - (boost_ma >> 2)) {
         return false;
     }
     const float finish_c = spring_c(thermal_model_transformation(model, k).austenite_finish_c7);
-    if (now_c(model, k) > finish_c) {
-        return s->ceiling_ma < boost_ma - (boost_ma >> 2);
-    }
-    return s->rise_k_per_s < STILL_K_PER_S &&
-           spring_estimator_hottest_c(&policy->estimator.spring[k], model, k) > finish_c;
+    return now_c(model, k) > finish_c ||
+           (s->rise_k_per_s < STILL_K_PER_S &&
+            spring_estimator_hottest_c(&policy->estimator.spring[k], model, k) > finish_c);
 }
 
 static void heat(drive_policy_t *policy, thermal_model_t *model, uint8_t k, uint16_t level_permille)
@@ -434,7 +434,7 @@ static uint16_t said_of(const drive_policy_t *policy, uint8_t k)
     const drive_policy_spring_t *s = &policy->spring[k];
     const spring_belief_t *b = &policy->estimator.spring[k];
     uint16_t said = DRIVE_POLICY_LIMIT_NONE;
-    if (b->blind || !policy->estimator.observes) {
+    if (spring_estimator_blind(b) || !policy->estimator.observes) {
         said |= DRIVE_POLICY_LIMIT_BLIND;
     }
     if (s->stage == DRIVE_POLICY_STAGE_HEAT && s->wanted_ma == 0) {

@@ -17,6 +17,10 @@
 #define JUMP_LEAST   0.03f /* of a resistance in a turn: 2 W change 6 % of the phase in it */
 #define JUMP_OF_LOAD 0.08f /* 16 K at once, latent heat kept: 40 % of the phase */
 #define JUMP_SDS     5.0f
+#define JUMP_TURNS   1024u /* a jump is forgotten in four minutes, one after the other */
+#define LOOSE_TURNS                                                                                \
+    (2u * JUMP_TURNS) /* one has moved, two went and came back: a third will come                  \
+                       */
 
 #define CAPACITY_SD    0.09f   /* of a declared heat capacity: 15 %, uniform */
 #define LOSS_DRIFT_SD  0.0005f /* of the declared loss, in a second: 3 % in an hour */
@@ -214,6 +218,9 @@ static bool leave_out(spring_belief_t *b, float ohm, float current_a)
         spring_jump(b, ohm / was_ohm);
     }
     b->odd = jumps && !b->odd;
+    if (b->odd && b->unsteady <= LOOSE_TURNS) {
+        b->unsteady = (uint16_t)(b->unsteady + JUMP_TURNS);
+    }
     return b->odd;
 }
 
@@ -232,15 +239,19 @@ static void take_noise(spring_belief_t *b, float ohm, float current_a)
     b->ohm_before[0] = ohm;
 }
 
+float spring_slow_share(const spring_belief_t *b)
+{
+    return b->averaged >= SLOW_TURNS ? SLOW_SHARE /* as a rule: a division is saved */
+           : b->averaged > 1         ? 1.0f / (float)b->averaged
+                                     : 1.0f;
+}
+
 static void take_reading(spring_belief_t *b, float ohm, float current_a)
 {
     take_noise(b, ohm, current_a);
     b->averaged = b->fresh == 0 ? 0 : b->averaged;
-    float share = SLOW_SHARE; /* as a rule: a division is saved */
-    if (b->averaged < SLOW_TURNS) {
-        b->averaged++;
-        share = 1.0f / (float)b->averaged;
-    }
+    b->averaged = b->averaged < SLOW_TURNS ? (uint8_t)(b->averaged + 1) : SLOW_TURNS;
+    const float share = spring_slow_share(b);
     b->slow_ohm += (ohm - b->slow_ohm) * share;
     b->slow_a += (current_a - b->slow_a) * share;
     b->current_a = current_a;
@@ -288,9 +299,9 @@ float spring_stiffness_w_per_k(const spring_belief_t *b)
     return b->declared_stiffness_w_per_k + b->learnt.loss_w_per_k;
 }
 
-/* How the errors of distance and loss go on in a turn; while it heats, the heat taken up. */
-static void predict(const spring_estimator_t *e, spring_belief_t *b, const thermal_model_t *model,
-                    uint8_t k, float power_w)
+/* How the errors of distance and loss go on in a turn. Returns the heat taken up, K. */
+static float predict(const spring_estimator_t *e, spring_belief_t *b, const thermal_model_t *model,
+                     uint8_t k, float power_w)
 {
     const int16_t now_c7 = thermal_model_temperature_c7(model, k);
     const float now_c = spring_c(now_c7);
@@ -310,15 +321,13 @@ static void predict(const spring_estimator_t *e, spring_belief_t *b, const therm
     if (b->variance_k2 < LEAST_SD_K * LEAST_SD_K) {
         b->variance_k2 = LEAST_SD_K * LEAST_SD_K;
     }
-    if (b->gone_k > 0.0f) {
-        b->gone_k = keeps * b->gone_k + per_w * above_k * b->gone_w_per_k;
+    const float heat_k = per_w * (power_w - balance_w - extra_w);
+    if (b->gone_k > 0.0f) { /* what it takes up to transform again warms it, if it need not */
+        const float latent_k = b->heating ? fmaxf(heat_k - (now_c - b->last_c), 0.0f) : 0.0f;
+        b->gone_k = keeps * b->gone_k + per_w * above_k * b->gone_w_per_k + latent_k;
     }
     b->last_c = now_c;
-    if (b->heating && (b->reads || b->fresh == 0)) { /* while a current settles, who knows */
-        const float heat_k = per_w * (power_w - balance_w - extra_w);
-        /* a spring that waits cools by no less than the least loss: more would hide a finish */
-        b->run.heat.heat_k += heat_k < 0.0f ? LEAST_LOSS * heat_k : heat_k;
-    }
+    return heat_k;
 }
 
 void spring_correct_loss(const spring_estimator_t *e, spring_belief_t *b, float more_w_per_k)
@@ -446,10 +455,15 @@ void spring_estimator_update(spring_estimator_t *e, thermal_model_t *model, uint
     b->seen = false;
     take_readings(b);
     const float power_w = b->reads ? b->current_a * b->current_a * b->ohm : 0.0f;
-    predict(e, b, model, k, power_w);
+    const float heat_k = predict(e, b, model, k, power_w);
     const float moved_k = b->last_c - before_c;
     b->disturbance_k *= FORGETS;
-    if (b->reads && e->observes) {
+    if (b->heating && (b->reads || b->fresh == 0)) { /* while a current settles, who knows */
+        /* a spring that waits cools by no less than the least loss: more would hide a finish */
+        b->run.heat.heat_k += heat_k < 0.0f ? LEAST_LOSS * heat_k : heat_k;
+    }
+    b->unsteady = b->unsteady > 0 ? (uint16_t)(b->unsteady - 1) : 0;
+    if (b->reads && e->observes && b->unsteady <= LOOSE_TURNS) {
         look(e, model, k);
         spring_heating_watch(e, b, model, k);
         if (!b->blind) {
@@ -458,6 +472,7 @@ void spring_estimator_update(spring_estimator_t *e, thermal_model_t *model, uint
     } else {
         if (b->heating) {
             b->run.heat.mark_ohm = 0.0f;
+            b->steep = false;
         } else {
             b->run.line.ohm = 0.0f;
         }
@@ -491,7 +506,8 @@ void spring_estimator_update(spring_estimator_t *e, thermal_model_t *model, uint
 bool spring_lacks_phase(const spring_belief_t *b, const thermal_model_t *model, uint8_t k)
 {
     const spring_learnt_t *l = &b->learnt;
-    if (b->fresh == 0 || b->blind || l->austenite_ohm == 0.0f || b->current_a < STRONG_A) {
+    if (b->fresh == 0 || spring_estimator_blind(b) || l->austenite_ohm == 0.0f ||
+        b->current_a < STRONG_A) {
         return false;
     }
     const int16_t finish_c7 = thermal_model_transformation(model, k).austenite_finish_c7;
@@ -552,7 +568,8 @@ void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, 
     }
     b->blind = b->blind || certain || (lacks && b->doubted);
     b->doubted = lacks && !b->blind;
-    if (full && !lacks && b->heating && b->onset && b->reads && b->current_a > STRONG_A) {
+    if (full && !lacks && b->heating && b->onset && spring_estimator_sees(b) &&
+        b->current_a > STRONG_A) {
         spring_learn_austenite(b); /* hot enough, and its resistance had come to rest */
     }
     b->heating = false;
@@ -560,10 +577,9 @@ void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, 
     b->lost = b->doubted ? 1.0f - phase : 0.0f;
     b->quiet = 0;
     b->losing = 0;
-    b->run.line = (spring_line_t){0};
-    if (full && b->reads && b->current_a > STRONG_A) {
-        spring_average_anew(b);
-        spring_begin_rough_line(b, now_c);
+    const bool strong = full && b->reads && b->current_a > STRONG_A;
+    spring_begin_hold_line(b, strong);
+    if (strong) {
         b->offset_sd_v = fmaxf(b->offset_sd_v, OFFSET_AGAIN_V);
     }
 }
@@ -572,7 +588,12 @@ void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, 
 
 bool spring_estimator_sees(const spring_belief_t *b)
 {
-    return b->reads && !b->blind;
+    return b->reads && !spring_estimator_blind(b);
+}
+
+bool spring_estimator_blind(const spring_belief_t *b)
+{
+    return b->blind || b->unsteady > LOOSE_TURNS;
 }
 
 float spring_estimator_sd_k(const spring_belief_t *b)

@@ -62,10 +62,11 @@ typedef struct {
 
 /* Of the running hold. */
 typedef struct {
-    float ohm; /* what it reads while it keeps its phase, at c; 0: none yet */
-    float c;
-    float a;          /* current of the line */
+    float ohm;        /* what it reads while it keeps its phase; 0: none yet */
+    float a;          /* at this current */
     float sd;         /* of the line itself, relative */
+    float way_k;      /* how far its temperature has moved since */
+    float slow_k;     /* the same, averaged as the readings are */
     float rise_per_k; /* what a kelvin adds to it, relative */
     float rise_sd_per_k;
 } spring_line_t;
@@ -95,6 +96,7 @@ typedef struct {
     uint8_t quiet;      /* turns in which its temperature hardly moved, saturating */
     uint8_t losing;     /* turns on end in which it seems to lose phase */
     uint8_t averaged;   /* turns in slow_ohm, saturating */
+    uint16_t unsteady;  /* turns, of all that a contact or the sensor has jumped lately */
     /* bits: of nine springs they are a good part of the RAM that is spare */
     bool doubted : 1;   /* its last heating ended before its resistance said so */
     bool unproven : 1;  /* by what it may be hotter it was spared: it may not have transformed again
@@ -212,6 +214,8 @@ void spring_estimator_begin_hold(spring_estimator_t *estimator, thermal_model_t 
 
 /* Its resistance tells the phase. */
 bool spring_estimator_sees(const spring_belief_t *belief);
+/* What it reads tells nothing of its phase: it shows none, or its contact is loose. */
+bool spring_estimator_blind(const spring_belief_t *belief);
 /* Of the distance to the transformation. */
 float spring_estimator_sd_k(const spring_belief_t *belief);
 /* The same while it is held at its present temperature, at its largest: an error of the loss shows

@@ -63,12 +63,10 @@ bool spring_lacks_phase(const spring_belief_t *belief, const thermal_model_t *mo
 /* It has transformed: what it reads now is its own austenite's, and the way there its change. */
 void spring_learn_austenite(spring_belief_t *belief);
 
-/* The average begins anew, with the last turn. */
-void spring_average_anew(spring_belief_t *belief);
-/* What it reads on average now is what it reads with the phase that it has. */
-void spring_begin_line(spring_belief_t *belief, float now_c);
-/* The same by the last turn alone, or while the average still moves: anew when it is at rest. */
-void spring_begin_rough_line(spring_belief_t *belief, float now_c);
+/* The share of the last turn in the average. */
+float spring_slow_share(const spring_belief_t *belief);
+/* A hold begins. Now: what the last turn read is what it reads with the phase that it has. */
+void spring_begin_hold_line(spring_belief_t *belief, bool now);
 /* Even the coldest and heaviest spring has transformed by the heat of this heating. */
 bool spring_heated_enough(const spring_estimator_t *estimator, const spring_belief_t *belief,
                           const thermal_model_t *model, uint8_t spring);

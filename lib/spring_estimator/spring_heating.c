@@ -41,7 +41,9 @@ static void see_onset(const spring_estimator_t *e, spring_belief_t *b, thermal_m
 {
     const float now_c = spring_now_c(model, k);
     b->onset = true;
-    spring_is_back(b);
+    if (b->unsteady == 0) { /* else it may be the contact again */
+        spring_is_back(b);
+    }
     b->run.heat.onset_k = b->run.heat.heat_k;
     if (b->possible == SPRING_PHASE_MARTENSITE) {
         spring_learnt_t *l = &b->learnt;

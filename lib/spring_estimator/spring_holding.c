@@ -18,7 +18,7 @@
 #define LARGE_LOSS     0.04f /* no hold drifts so far: the transformation may have moved */
 #define LARGE_SD_K     5.0f
 #define CROSSING_SD_K  1.0f
-#define APART_PER_A    1.0f    /* between two currents, as of 3 and 0.75 A */
+#define APART_PER_A    0.5f    /* between two currents, as of 3 and 1.2 A */
 #define OFFSET_LEAST_V 0.0005f /* what a turn's steps of 4 mV leave, and its noise */
 #define OFFSET_SDS     3.0f
 #define OFFSET_MOST_V  0.012f
@@ -40,11 +40,12 @@ static float lost_at_c(const thermal_model_t *model, uint8_t k, float lost)
     return spring_c(t.martensite_start_c7) - width_k * depth;
 }
 
-void spring_average_anew(spring_belief_t *b)
+static void average_anew(spring_belief_t *b)
 {
     b->slow_ohm = b->ohm;
     b->slow_a = b->current_a;
     b->averaged = 1;
+    b->run.line.slow_k = b->run.line.way_k;
 }
 
 static float slow_variance(const spring_belief_t *b)
@@ -54,25 +55,29 @@ static float slow_variance(const spring_belief_t *b)
                                     : noise2 * (NOISE_IN_SLOW * NOISE_IN_SLOW);
 }
 
-void spring_begin_line(spring_belief_t *b, float now_c)
+/* What it reads on average now is what it reads with the phase that it has. Rough: it still moves,
+ * another one follows when it is at rest. */
+static void begin_line(spring_belief_t *b, bool rough)
 {
     b->run.line.ohm = b->slow_ohm;
-    b->run.line.c = now_c;
     b->run.line.a = b->slow_a;
-    /* the line's own is still to be told: no phase's coefficient tells the other's, and a contact
-     * that ages makes another slope of each */
-    b->run.line.rise_per_k = b->learnt.martensite_rise_per_k;
-    b->run.line.rise_sd_per_k = COEFFICIENT_MOST_PER_K / SPRING_ESTIMATOR_BOUND_SDS;
     b->run.line.sd = sqrtf(slow_variance(b));
-    b->rough = false;
+    b->run.line.way_k -= b->run.line.slow_k;
+    b->run.line.slow_k = 0.0f;
+    b->rough = rough;
     b->losing = 0;
 }
 
-void spring_begin_rough_line(spring_belief_t *b, float now_c)
+void spring_begin_hold_line(spring_belief_t *b, bool now)
 {
-    spring_begin_line(b, now_c);
-    b->run.line.sd = b->noise;
-    b->rough = true;
+    /* its slope is still to be told: no phase's coefficient tells the other's */
+    b->run.line =
+        (spring_line_t){.rise_per_k = b->learnt.martensite_rise_per_k,
+                        .rise_sd_per_k = COEFFICIENT_MOST_PER_K / SPRING_ESTIMATOR_BOUND_SDS};
+    if (now) {
+        average_anew(b);
+        begin_line(b, true);
+    }
 }
 
 static float start_c(const thermal_model_t *model, uint8_t k)
@@ -132,10 +137,10 @@ void spring_is_back(spring_belief_t *b)
 
 /* Phase that was lost comes back with heat. What has not was a contact, or the sensor. */
 static void look_back(const spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model,
-                      uint8_t k, float now_c)
+                      uint8_t k)
 {
-    const float full_ohm =
-        b->full_ohm * (1.0f + b->run.line.rise_per_k * (now_c - start_c(model, k)));
+    const float above_k = spring_now_c(model, k) - start_c(model, k);
+    const float full_ohm = b->full_ohm * (1.0f + b->run.line.rise_per_k * above_k);
     const float missing = b->slow_ohm / full_ohm - 1.0f;
     if (fabsf(b->gone) > BACK_LEAST) {
         if (missing * b->gone > BACK_SHARE * b->gone * b->gone) {
@@ -149,7 +154,7 @@ static void look_back(const spring_estimator_t *e, spring_belief_t *b, thermal_m
 
 /* The current has dropped, the spring is what it was a moment ago: what reads otherwise is the
  * sensor's offset. Returns whether this turn told one. */
-static bool learn_offset(spring_belief_t *b, float now_c)
+static bool learn_offset(spring_belief_t *b)
 {
     const float less_a = b->run.line.a - b->current_a;
     const float product_a2 = b->current_a * b->run.line.a;
@@ -157,8 +162,7 @@ static bool learn_offset(spring_belief_t *b, float now_c)
         return false;
     }
     const float apart_a = product_a2 / less_a;
-    const float moved_v =
-        COEFFICIENT_MOST_PER_K * (now_c - b->run.line.c) * b->run.line.ohm * apart_a;
+    const float moved_v = COEFFICIENT_MOST_PER_K * b->run.line.way_k * b->run.line.ohm * apart_a;
     const float noise_v = b->noise * b->ohm * apart_a;
     const float prior_v2 = b->offset_sd_v * b->offset_sd_v;
     const float read_v2 = OFFSET_LEAST_V * OFFSET_LEAST_V + noise_v * noise_v + moved_v * moved_v;
@@ -172,7 +176,9 @@ static bool learn_offset(spring_belief_t *b, float now_c)
     const float more_ohm = more_v / b->run.line.a;
     b->run.line.ohm -= more_ohm;
     b->learnt.austenite_ohm -= b->learnt.austenite_ohm > 0.0f ? more_ohm : 0.0f;
-    b->seen = true; /* it is acted on in the next turn */
+    b->ohm -= more_v / b->current_a;
+    average_anew(b); /* what was read before is off by it */
+    b->seen = true;  /* it is acted on in the next turn */
     return true;
 }
 
@@ -184,28 +190,33 @@ float spring_offset_may_show(const spring_belief_t *b, float current_a)
 
 /* By how much, squared, the resistance may have left its line with the phase kept: its temperature
  * moves it, and another current shows another share of the sensor's offset. */
-static float may_move_squared(const spring_belief_t *b, float now_c)
+static float may_move_squared(const spring_belief_t *b)
 {
-    const float moves =
-        SPRING_ESTIMATOR_BOUND_SDS * b->run.line.rise_sd_per_k * (now_c - b->run.line.c);
+    const float moves = SPRING_ESTIMATOR_BOUND_SDS * b->run.line.rise_sd_per_k * b->run.line.slow_k;
     const float offset = spring_offset_may_show(b, b->slow_a);
     return moves * moves + offset * offset;
 }
 
-/* It keeps its phase: the line follows what it reads, and how that goes with a moving temperature
- * is its slope. */
-static void follow(spring_belief_t *b, float now_c, float left)
+/* It keeps its phase: how what it reads goes with a moving temperature is its slope. */
+static void tell_slope(spring_belief_t *b, float left, float variance)
 {
-    const float away_k = now_c - b->run.line.c;
-    if (fabsf(away_k) > AWAY_LEAST_K && fabsf(left) < LOSS_LEAST) {
-        const float variance = b->run.line.rise_sd_per_k * b->run.line.rise_sd_per_k;
-        const float gain = variance * away_k / (variance * away_k * away_k + LINE_VARIANCE);
-        b->run.line.rise_per_k = spring_clamp(b->run.line.rise_per_k + gain * left,
-                                              -COEFFICIENT_MOST_PER_K, COEFFICIENT_MOST_PER_K);
-        b->run.line.rise_sd_per_k = sqrtf(variance * (1.0f - gain * away_k));
+    const float slow_k = b->run.line.slow_k;
+    const float prior = b->run.line.rise_sd_per_k * b->run.line.rise_sd_per_k;
+    const float gain = prior * slow_k / (prior * slow_k * slow_k + variance);
+    b->run.line.rise_per_k = spring_clamp(b->run.line.rise_per_k + gain * left,
+                                          -COEFFICIENT_MOST_PER_K, COEFFICIENT_MOST_PER_K);
+    b->run.line.rise_sd_per_k = sqrtf(prior * (1.0f - gain * slow_k));
+}
+
+/* And at rest the line follows what it reads. */
+static void follow(spring_belief_t *b, float left)
+{
+    if (fabsf(b->run.line.slow_k) > AWAY_LEAST_K && fabsf(left) < LOSS_LEAST) {
+        tell_slope(b, left, LINE_VARIANCE);
     }
     b->run.line.ohm += b->run.line.ohm * left * LINE_SHARE;
-    b->run.line.c += away_k * LINE_SHARE;
+    b->run.line.way_k -= b->run.line.slow_k * LINE_SHARE;
+    b->run.line.slow_k -= b->run.line.slow_k * LINE_SHARE;
     b->run.line.sd -= b->run.line.sd * LINE_SHARE;
 }
 
@@ -230,7 +241,7 @@ static bool may_have_cooled(const spring_belief_t *b, const thermal_model_t *mod
                             float sd_k)
 {
     const float now_c = spring_now_c(model, k);
-    const float cooled_k = fmaxf(b->run.line.c - now_c, 0.0f);
+    const float cooled_k = fmaxf(-b->run.line.way_k, 0.0f);
     const float most_k = cooled_k + SPRING_ESTIMATOR_BOUND_SDS * sd_k + SHIFT_BOUND_K;
     return now_c - most_k < start_c(model, k);
 }
@@ -246,62 +257,68 @@ void spring_holding_watch(const spring_estimator_t *e, spring_belief_t *b, therm
     b->quiet = fabsf(moved_k) > QUIET_K ? 0
                : b->quiet < UINT8_MAX   ? (uint8_t)(b->quiet + 1)
                                         : UINT8_MAX;
-    const float now_c = spring_now_c(model, k);
-    if (b->run.line.ohm == 0.0f) {
+    spring_line_t *line = &b->run.line;
+    line->way_k += moved_k;
+    line->slow_k += (line->way_k - line->slow_k) * spring_slow_share(b);
+    if (line->ohm == 0.0f) {
         if (b->quiet == 0) {
-            spring_average_anew(b);
+            average_anew(b);
         }
         if (b->quiet < QUIET_TURNS) {
             b->losing = 0;
             return;
         }
-        spring_begin_line(b, now_c);
+        begin_line(b, false);
         if (b->full_ohm > 0.0f) {
-            look_back(e, b, model, k, now_c);
+            look_back(e, b, model, k);
         }
-    } else if (b->quiet == 0 && b->offset_sd_v > OFFSET_LEAST_V && learn_offset(b, now_c)) {
+    } else if (b->quiet == 0 && b->offset_sd_v > OFFSET_LEAST_V && learn_offset(b)) {
         return;
     }
-    const float kept_ohm =
-        b->run.line.ohm * (1.0f + b->run.line.rise_per_k * (now_c - b->run.line.c));
-    if (b->quiet == 0 && b->current_a < STRONG_A) { /* on its way to the hold: too weak to tell */
-        b->slow_ohm = kept_ohm;
-        b->slow_a = b->run.line.a;
+    if (b->quiet < (b->rough ? QUIET_TURNS : 1) && b->current_a < STRONG_A) {
+        /* on its way to the hold: too weak to tell */
+        b->slow_ohm = line->ohm * (1.0f + line->rise_per_k * line->way_k);
+        b->slow_a = line->a;
+        line->slow_k = line->way_k;
         b->averaged = 0;
         b->losing = 0;
         return;
     }
+    const float kept_ohm = line->ohm * (1.0f + line->rise_per_k * line->slow_k);
     const float left = b->slow_ohm / kept_ohm - 1.0f;
     const float distance_k2 = spring_distance_k2(b);
     const float changed = as_lost(b, model, k, left, distance_k2);
     /* as its temperature may have moved unseen, so may the resistance */
-    const float rise = b->run.line.rise_per_k;
+    const float rise = line->rise_per_k;
     const float least2 = fmaxf(LOSS_LEAST * LOSS_LEAST, rise * rise * distance_k2);
-    const float noise2 = slow_variance(b) + b->run.line.sd * b->run.line.sd;
+    const float noise2 = slow_variance(b) + line->sd * line->sd;
     const float changed2 = changed * changed;
     float sure2 = fmaxf(least2, SURE_SDS * SURE_SDS * noise2);
     float suspected2 = SUSPECTED * SUSPECTED * sure2;
     if (changed2 >= suspected2) { /* as a rule not: two divisions are saved */
-        const float moves2 = may_move_squared(b, now_c);
+        const float moves2 = may_move_squared(b);
         sure2 += moves2;
         suspected2 += moves2;
     }
     if (changed2 < suspected2) {
         b->losing = 0;
-        const bool away = fabsf(now_c - b->run.line.c) > ANCHOR_K;
+        const bool away = fabsf(line->slow_k) > ANCHOR_K;
         if (b->rough && (b->averaged == ANCHOR_TURNS || (b->averaged > ANCHOR_TURNS && away))) {
-            spring_begin_line(b, now_c); /* a coefficient explains only the way since */
-            b->rough = true;
+            if (away && spring_estimator_distance_k(e, model, k).low > 0.0f) {
+                const float offset = spring_offset_may_show(b, b->slow_a) * (1.0f / OFFSET_SDS);
+                tell_slope(b, left, noise2 + offset * offset);
+            }
+            begin_line(b, true); /* a coefficient explains only the way since */
         }
         if (b->quiet >= QUIET_TURNS) {
             if (b->rough) { /* it has come to rest */
-                spring_begin_line(b, now_c);
+                begin_line(b, false);
                 if (b->full_ohm > 0.0f && b->lost == 0.0f) {
-                    look_back(e, b, model, k, now_c);
+                    look_back(e, b, model, k);
                     return;
                 }
             }
-            follow(b, now_c, left);
+            follow(b, left);
             spring_keep_above(e, b, model, k, lost_at_c(model, k, b->lost) - STILL_K);
         }
         return;
@@ -309,16 +326,16 @@ void spring_holding_watch(const spring_estimator_t *e, spring_belief_t *b, therm
     b->losing = b->losing < UINT8_MAX ? (uint8_t)(b->losing + 1) : UINT8_MAX;
     if ((changed2 > sure2 && b->losing >= CONFIRM_TURNS) || b->losing >= LASTING_TURNS) {
         if (b->rough && !may_have_cooled(b, model, k, sqrtf(distance_k2))) {
-            spring_begin_rough_line(b, now_c);
+            begin_line(b, true);
             return;
         }
         /* until it is back, or was found not to have been phase, all of it is one loss */
         b->full_ohm = b->full_ohm > 0.0f ? b->full_ohm : kept_ohm;
         b->gone += left;
         const float per_change = 1.0f / fabsf(b->learnt.change);
-        const float sd = sqrtf(may_move_squared(b, now_c)) / SPRING_ESTIMATOR_BOUND_SDS;
+        const float sd = sqrtf(may_move_squared(b)) / SPRING_ESTIMATOR_BOUND_SDS;
         see_crossing(e, b, model, k, changed * per_change, sd * per_change);
-        spring_begin_rough_line(b, spring_now_c(model, k)); /* the average still falls */
+        begin_line(b, true); /* the average still falls */
     }
 }
 
