@@ -3,6 +3,7 @@
 #include <stddef.h>
 #include <string.h>
 
+#include "crc16.h"
 #include "fixed_point.h"
 #include "invariant.h"
 
@@ -160,9 +161,7 @@ static uint32_t take_sensors(controller_t *controller, const controller_sensor_t
             .expected_ma = current_control_reference_ma(&controller->current, k),
             .temperature_c7 = thermal_model_temperature_c7(&controller->model, k)};
         const uint16_t duty = controller_duty(controller, k);
-        safety_tick_spring(&controller->safety, k, &sample);
-        valid[k] = sensor[k].status == CONTROLLER_SENSOR_OK &&
-                   !safety_is_frozen(&controller->safety, k, sensor[k].current_ma);
+        valid[k] = safety_tick_spring(&controller->safety, k, &sample);
         circuit_check_take(&controller->circuit[k], controller->current.fixed_mohm, duty, valid[k],
                            sensor[k].current_ma, sensor[k].voltage_mv);
         controller->duty_sum[k] = (uint16_t)(controller->duty_sum[k] + duty);
@@ -219,8 +218,9 @@ static void take_resistance_turn(controller_t *controller)
 static void take_floor_turn(controller_t *controller)
 {
     const uint8_t turn = controller->floor_turn;
-    controller->floor_turn = (uint8_t)((turn + 1u) % FLOOR_TURNS);
-    const uint8_t raised = (uint8_t)((turn + FLOOR_TURNS / 2u) % FLOOR_TURNS);
+    const uint8_t ahead = (uint8_t)(turn + FLOOR_TURNS / 2u);
+    const uint8_t raised = (uint8_t)(ahead < FLOOR_TURNS ? ahead : ahead - FLOOR_TURNS);
+    controller->floor_turn = (uint8_t)(turn + 1u < FLOOR_TURNS ? turn + 1u : 0u);
     for (uint16_t k = turn; k < controller->springs; k += FLOOR_TURNS) {
         judge_circuit(controller, (uint8_t)k);
     }
@@ -311,16 +311,17 @@ static void drive(controller_t *controller, const bool valid[], uint32_t sum_ma,
 static void listen(controller_t *controller)
 {
     const uint32_t most = controller->safety.parameters.host_timeout_s * (uint32_t)TICKS_PER_S;
-    bool wanted = false;
-    for (uint8_t k = 0; k < controller->springs; k++) {
-        wanted = wanted || controller->level_permille[k] != 0;
-    }
     if (controller->silent_ticks < SILENT_MOST) {
         controller->silent_ticks++;
     }
-    if (wanted && most != 0 && controller->silent_ticks >= most) {
-        controller_stop(controller);
-        safety_host_silent(&controller->safety);
+    if (most == 0 || controller->silent_ticks < most) {
+        return;
+    }
+    for (uint8_t k = 0; k < controller->springs; k++) {
+        if (controller->level_permille[k] != 0) {
+            controller_stop(controller);
+            safety_host_silent(&controller->safety);
+        }
     }
 }
 
@@ -476,7 +477,15 @@ void controller_forget_loss(controller_t *controller, uint8_t spring)
 
 uint16_t controller_model_mark(const controller_t *controller)
 {
-    return parameter_mark(PARAMETER_PART_MODEL, &controller->model.parameters);
+    uint16_t crc = CRC16_START;
+    for (uint16_t k = 0; k < PARAMETER_COUNT; k++) {
+        const parameter_row_t row = parameter_row(k);
+        for (spring_index_t n = 0; row.part == PARAMETER_PART_MODEL && n < row.count; n++) {
+            const int32_t value = parameter_get(&controller->model.parameters, &row, n);
+            crc = crc16_add_bytes(crc, &value, sizeof value);
+        }
+    }
+    return crc;
 }
 
 uint8_t controller_springs(const controller_t *controller)

@@ -155,7 +155,8 @@ void controller_restore_learnt(controller_t *controller, uint8_t spring,
 void controller_forget_learnt(controller_t *controller, uint8_t spring);
 /* Of its own numbers the loss alone, which is one beyond the declared losses. */
 void controller_forget_loss(controller_t *controller, uint8_t spring);
-/* Of the model that is declared: what was learnt of a loss beside another one does not hold. */
+/* A CRC-16 of all numbers of the model that is declared, O(parameters): what was learnt of a loss
+ * beside another one does not hold. */
 uint16_t controller_model_mark(const controller_t *controller);
 
 /* For telemetry. */

@@ -5,6 +5,7 @@
 
 #define MEASURED_LIMIT_MA 4095  /* keeps current times gain below 2^27; the sensor ends at 3200 */
 #define ESTIMATE_LIMIT    24575 /* loop gain, duty steps per mA in Q16: the sum of both fits int16 */
+#define SENSOR_END_MA     3200  /* what it reads of any current above */
 #define TRIM_LIMIT        8191u
 #define FIRST_MA          128u /* what a rise from off begins with */
 #define SMALL_MA          25u  /* a change that need not wait: a step of the policy's sweep */
@@ -79,7 +80,9 @@ static inline int16_t to_q8(int32_t value_q16)
 }
 
 /* The trim takes integral x error / reference, the reference rounded up to FIRST_MA times a power
- * of two; error: the given duty less the one that what it has brought should have taken. */
+ * of two; error: the given duty less the one that what it has brought should have taken. Of a
+ * reading at the sensor's end it takes all, the reference rounded down, and what was learnt upwards
+ * is taken back: a supply that had sagged has come back. */
 static void learn(const current_control_t *control, current_control_channel_t *c,
                   int16_t measured_ma)
 {
@@ -91,13 +94,15 @@ static void learn(const current_control_t *control, current_control_channel_t *c
     uint32_t given_q16 = ((uint32_t)c->duty << 16) - (uint32_t)control->offset_q16;
     int16_t error_q8 = to_q8((int32_t)fixed_point_mac_s16_u16(
         given_q16, (int16_t)-measured_ma, loop_gain_q16(c->estimate_q16, c->trim_q24)));
-    uint16_t integral_q16 = control->integral_q16;
-    for (uint8_t firsts = (uint8_t)((uint16_t)((uint16_t)(c->reference_ma - 1u) << 1) >> 8);
-         firsts != 0; firsts >>= 1) {
+    const bool ends = measured_ma >= SENSOR_END_MA;
+    uint16_t integral_q16 = ends ? UINT16_MAX : control->integral_q16;
+    uint8_t firsts = (uint8_t)((uint16_t)((uint16_t)(c->reference_ma - 1u) << 1) >> 8);
+    for (firsts = ends ? firsts >> 1 : firsts; firsts != 0; firsts >>= 1) {
         integral_q16 >>= 1;
     }
     int32_t step_q23 = (int32_t)fixed_point_mac_s16_u16(0, error_q8, integral_q16) >> 8;
-    int32_t trim_q24 = c->trim_q24 + 2 * step_q23; /* 1 / FIRST_MA is 2 / 256 */
+    int32_t kept_q24 = ends && c->trim_q24 > 0 ? 0 : c->trim_q24;
+    int32_t trim_q24 = kept_q24 + 2 * step_q23; /* 1 / FIRST_MA is 2 / 256 */
     int32_t limit_q24 = control->trim_limit_q24;
     if (trim_q24 > limit_q24) {
         trim_q24 = limit_q24;

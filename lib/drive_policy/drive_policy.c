@@ -30,17 +30,19 @@
 #define SUSPECTED_W   0.038f         /* stops a fall of 0.1 K/s */
 #define FOLLOW_S      4.0f           /* a distance from the held temperature is closed in */
 #define SHORT_MOST_K  20.0f
-#define COOLS_SHARE   0.5f /* of its power is taken off on the way down: a current that still reads */
-#define STILL_K_PER_S 0.3f
-#define RISE_BEGINS_K_PER_S 4.0f /* with the boost, until it is measured */
-#define KEPT_C7       (3 * 128) /* above austenite start what was reached is worth keeping */
-#define TURN_C7       (6 * 128) /* colder than one that heats: it is its turn */
-#define GOES_ON_C7    (4 * 128) /* below austenite start: keeps its turn */
-#define LOOK_MA       2000u     /* of a spring of which much was learnt and nothing is known */
-#define LOWER_MA      800u      /* the least at which a resistance tells the phase */
-#define UNDRIVEN_SDS  2.0f
-#define NEIGHBOUR_SD  0.15f /* of the rise of a spring that its neighbours heat */
-#define RISE_SHARE    0.25f /* of a turn in the average */
+#define COOLS_SHARE                                                                                \
+    0.5f /* of its power is taken off on the way down: a current that still reads                  \
+          */
+#define STILL_K_PER_S       0.3f
+#define RISE_BEGINS_K_PER_S 4.0f      /* with the boost, until it is measured */
+#define KEPT_C7             (3 * 128) /* above austenite start what was reached is worth keeping */
+#define TURN_C7             (6 * 128) /* colder than one that heats: it is its turn */
+#define GOES_ON_C7          (4 * 128) /* below austenite start: keeps its turn */
+#define LOOK_MA             2000u /* of a spring of which much was learnt and nothing is known */
+#define LOWER_MA            800u  /* the least at which a resistance tells the phase */
+#define UNDRIVEN_SDS        2.0f
+#define NEIGHBOUR_SD        0.15f /* of the rise of a spring that its neighbours heat */
+#define RISE_SHARE          0.25f /* of a turn in the average */
 
 #define AWAY_FIRST_TURNS (85u * TURNS_PER_S) /* since it was asked for */
 #define AWAY_TURNS       (15u * TURNS_PER_S) /* since it was there */
@@ -241,17 +243,16 @@ static void hold(drive_policy_t *policy, thermal_model_t *model, uint8_t k, uint
     const spring_belief_t *b = &policy->estimator.spring[k];
     const bool full = is_full(level_permille);
     const bool sees = spring_estimator_sees(b);
-    const float level = 0.001f * (float)level_permille;
-    const float phase = phase_of(policy, model, k);
+    const float level = full ? 1.0f : 0.001f * (float)level_permille;
     const bool lost =
         full && b->possible == SPRING_PHASE_AUSTENITE
             ? b->lost > LOST_AT_ONCE || (b->lost > LOST_SETTLED && b->quiet >= SETTLED_TURNS)
-            : phase < (full ? 1.0f : level) - 2.0f * LEVEL_BAND;
+            : phase_of(policy, model, k) < level - 2.0f * LEVEL_BAND;
     if (lost) {
         enter(policy, model, k, DRIVE_POLICY_STAGE_HEAT, level_permille);
         return;
     }
-    if (!full && phase > level + LEVEL_BAND) {
+    if (!full && phase_of(policy, model, k) > level + LEVEL_BAND) {
         enter(policy, model, k, DRIVE_POLICY_STAGE_LOWER, level_permille);
         return;
     }
@@ -375,7 +376,8 @@ static void derate(drive_policy_t *policy, const thermal_model_t *model, uint8_t
         share = allowed;
         s->derating |= DRIVE_POLICY_LIMIT_UNDRIVEN;
     }
-    s->ceiling_ma = (uint16_t)(share * (float)p->boost_current_ma);
+    s->ceiling_ma =
+        share < 1.0f ? (uint16_t)(share * (float)p->boost_current_ma) : p->boost_current_ma;
     if (!driven) {
         s->tripped = false;
         s->derated_turns = 0;
@@ -415,7 +417,7 @@ static void watch_away(drive_policy_t *policy, const thermal_model_t *model, uin
 {
     drive_policy_spring_t *s = &policy->spring[k];
     const float level = is_full(level_permille) ? 1.0f : 0.001f * (float)level_permille;
-    const float band = 1.0f - THERE + (level < 1.0f ? LEVEL_BAND : 0.0f);
+    const float band = 1.0f - THERE + (is_full(level_permille) ? 0.0f : LEVEL_BAND);
     const spring_belief_t *b = &policy->estimator.spring[k];
     const bool there = s->stage == DRIVE_POLICY_STAGE_HOLD && spring_estimator_sees(b) &&
                        !b->unproven && fabsf(phase_of(policy, model, k) - level) < band;
@@ -658,7 +660,7 @@ void drive_policy_tick(drive_policy_t *policy, const drive_policy_input_t *input
                                   input->measured_mv[k]);
         }
     }
-    policy->tick = (uint8_t)((policy->tick + 1u) % TICKS_PER_REST);
+    policy->tick = (uint8_t)(policy->tick + 1u < TICKS_PER_REST ? policy->tick + 1u : 0u);
     if (policy->tick != 0) {
         take_turn(policy, input);
     }

@@ -2,8 +2,6 @@
 
 #include <string.h>
 
-#include "crc16.h"
-
 #if __BYTE_ORDER__ != __ORDER_LITTLE_ENDIAN__
 #error "fields are read and written as their lower bytes"
 #endif
@@ -88,22 +86,6 @@ bool parameter_check(parameter_part_t part, const void *values, uint16_t *bad)
         }
     }
     return true;
-}
-
-uint16_t parameter_mark(parameter_part_t part, const void *values)
-{
-    uint16_t crc = CRC16_START;
-    for (uint16_t k = 0; k < PARAMETER_COUNT; k++) {
-        if (flash_byte(&table[k].part) != part) {
-            continue;
-        }
-        const parameter_row_t row = parameter_row(k);
-        for (spring_index_t element = 0; element < row.count; element++) {
-            const int32_t value = parameter_get(values, &row, element);
-            crc = crc16_add_bytes(crc, &value, sizeof value);
-        }
-    }
-    return crc;
 }
 
 static void set_defaults(parameter_part_t part, void *values)

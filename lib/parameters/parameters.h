@@ -123,9 +123,6 @@ void parameter_set(void *values, const parameter_row_t *row, spring_index_t elem
  * is the first row that is not kept. O(rows). */
 bool parameter_check(parameter_part_t part, const void *values, uint16_t *bad);
 
-/* A CRC-16 of all values of a part: others have another one, but for 1 in 65,536. O(rows). */
-uint16_t parameter_mark(parameter_part_t part, const void *values);
-
 #ifdef __cplusplus
 }
 #endif

@@ -17,7 +17,7 @@
 #define SLOPE_SHARE 0.05f
 /* Off by more than the same tolerances, and the offsets of both readings. */
 #define BALANCE_SHARE 0.3f
-#define BALANCE_V     0.015f
+#define BALANCE_MV    15.0f
 
 static uint16_t amount(int16_t value)
 {
@@ -66,24 +66,24 @@ bool circuit_check_judge(circuit_check_t *c, const current_control_parameters_t 
     bool unbalanced = false;
     if (c->readings >= LEAST_READINGS) {
         const float share = 1.0f / (float)c->readings;
-        const float drop_v = 1e-3f * (float)p->freewheel_mv;
-        const float swing_v = 1e-3f * (float)p->supply_mv + drop_v;
+        const float drop_mv = (float)p->freewheel_mv;
+        const float step_mv = ((float)p->supply_mv + drop_mv) * (1.0f / DUTY_STEPS); /* of duty */
         const float duty = share * (float)c->duty;
-        const float found_v = 1e-3f * share * (float)c->voltage_mv;
+        const float found_mv = share * (float)c->voltage_mv;
         const float variance = share * (float)c->duty_square - duty * duty;
-        const float follows_v = 1e-3f * share * (float)c->duty_voltage - duty * found_v;
-        const float should_v = variance * swing_v / DUTY_STEPS;
-        const float driven_v = duty * swing_v / DUTY_STEPS - drop_v;
-        const float expected_v = driven_v > 0.0f ? driven_v : 0.0f;
+        const float follows_mv = share * (float)c->duty_voltage - duty * found_mv;
+        const float should_mv = variance * step_mv;
+        const float driven_mv = duty * step_mv - drop_mv;
+        const float expected_mv = driven_mv > 0.0f ? driven_mv : 0.0f;
         const float slope_variance = SLOPE_SHARE * SLOPE_SHARE * duty * duty;
         const bool tells = variance >= fmaxf(LEAST_VARIANCE, slope_variance);
-        const bool other = follows_v < LEAST_SLOPE * should_v || follows_v > MOST_SLOPE * should_v;
+        const bool other =
+            follows_mv < LEAST_SLOPE * should_mv || follows_mv > MOST_SLOPE * should_mv;
         /* what is swept moves by two deviations at least: half of that is none */
-        const float moved_v = 1e-3f * (float)(c->highest_mv - c->lowest_mv);
-        const bool stands =
-            variance >= LEAST_VARIANCE && moved_v * moved_v * DUTY_STEPS < should_v * swing_v;
+        const float moved_mv = (float)(c->highest_mv - c->lowest_mv);
+        const bool stands = variance >= LEAST_VARIANCE && moved_mv * moved_mv < should_mv * step_mv;
         astray = stands || (tells && other);
-        unbalanced = fabsf(found_v - expected_v) > BALANCE_SHARE * expected_v + BALANCE_V;
+        unbalanced = fabsf(found_mv - expected_mv) > BALANCE_SHARE * expected_mv + BALANCE_MV;
     }
     count(&c->astray, astray);
     count(&c->unbalanced, unbalanced);

@@ -145,14 +145,15 @@ bool safety_is_frozen(const safety_t *safety, uint8_t spring, int16_t current_ma
            current_ma != NOT_FROZEN;
 }
 
-void safety_tick_spring(safety_t *safety, uint8_t spring, const safety_sample_t *sample)
+bool safety_tick_spring(safety_t *safety, uint8_t spring, const safety_sample_t *sample)
 {
     safety_spring_t *s = &safety->spring[spring];
     uint8_t limit = safety->parameters.bad_samples;
     uint8_t status = sample->sensor_status;
+    const bool reads = status == 0 && !safety_is_frozen(safety, spring, sample->current_ma);
     if (status == 0) {
         s->sensor = 0;
-        if (!safety_is_frozen(safety, spring, sample->current_ma)) {
+        if (reads) {
             s->frozen_ma = s->fault == SAFETY_FAULT_NONE ? sample->current_ma : NOT_FROZEN;
             count_electrical(safety, s, find_electrical(&safety->parameters, sample));
         }
@@ -180,6 +181,7 @@ void safety_tick_spring(safety_t *safety, uint8_t spring, const safety_sample_t 
             latch(safety, s, SAFETY_FAULT_ON_TIME);
         }
     }
+    return reads;
 }
 
 void safety_tick_board(safety_t *safety, uint32_t sum_ma)

@@ -95,9 +95,9 @@ bool safety_apply(safety_t *safety, const safety_parameters_t *parameters, uint1
 /* One tick (20 ms): every spring once, then the board once with the sum of the valid currents.
  * Conditions of the sensor, of the temperature and of current and voltage are counted apart. Where
  * one of the last passes into another without a good tick, the second is counted from where the
- * first ends.
+ * first ends. True if and only if the sample is a reading: valid, and not safety_is_frozen.
  */
-void safety_tick_spring(safety_t *safety, uint8_t spring, const safety_sample_t *sample);
+bool safety_tick_spring(safety_t *safety, uint8_t spring, const safety_sample_t *sample);
 void safety_tick_board(safety_t *safety, uint32_t sum_ma);
 
 /* The sensor of a spring with SAFETY_FAULT_SENSOR_MISMATCH has shown one current ever since, on and

@@ -8,8 +8,6 @@
 #define NOISE_FIRST 0.002f
 
 #define CAPACITY_SD    0.09f   /* of a declared heat capacity: 15 %, uniform */
-#define LOSS_SD        0.12f   /* of a declared loss: 20 % */
-#define LOSS_MOST      0.45f   /* of the declared loss: no more is ever believed */
 #define LOSS_DRIFT_SD  0.0005f /* of the declared loss, in a second: 3 % in an hour */
 #define LOSS_DRIFT     (SPRING_ESTIMATOR_TURN_S * LOSS_DRIFT_SD * LOSS_DRIFT_SD)
 #define NEIGHBOUR_SD   0.15f /* of the rise of a spring that its neighbours heat */
@@ -32,9 +30,6 @@
 #define LOOK_SDS   3.0f
 #define LOOK_MOST  0.4f
 #define LOOK_TURNS 3
-
-#define LEARNT_OHM_LEAST 0.01f
-#define LEARNT_OHM_MOST  16.0f
 
 float spring_clamp(float value, float low, float high)
 {
@@ -67,6 +62,12 @@ float spring_ambient_c(const thermal_model_t *model)
     return spring_c(thermal_model_ambient_c7(model));
 }
 
+static float above_ambient_k(const thermal_model_t *model, uint8_t k)
+{
+    return spring_c(
+        (int16_t)(thermal_model_temperature_c7(model, k) - thermal_model_ambient_c7(model)));
+}
+
 static float hold_w(const thermal_model_t *model, uint8_t k, float temperature_c)
 {
     return 1e-6f * (float)thermal_model_power_to_hold_uw(model, k, as_c7(temperature_c));
@@ -83,7 +84,7 @@ void spring_set_temperature(thermal_model_t *model, uint8_t k, float temperature
     thermal_model_set_temperature(model, k, as_c7(temperature_c));
 }
 
-static float distance_k2(const spring_belief_t *b)
+float spring_distance_k2(const spring_belief_t *b)
 {
     return b->variance_k2 + b->capacity_k * b->capacity_k;
 }
@@ -97,6 +98,7 @@ void spring_estimator_prepare(spring_estimator_t *e, const thermal_model_t *mode
     e->heat_capacity_j_per_k = (float)p->heat_capacity_mj_per_k * 1e-3f;
     e->turn_k_per_w = SPRING_ESTIMATOR_TURN_S / e->heat_capacity_j_per_k;
     e->loss_w_per_k = (float)p->loss_uw_per_k * 1e-6f;
+    e->loss_drift = LOSS_DRIFT * e->loss_w_per_k * e->loss_w_per_k;
     e->latent_heat_j = (float)p->latent_heat_mj * 1e-3f;
     e->martensite_ohm = (float)p->resistance_martensite_uohm * 1e-6f;
     e->change = 1.0f - (float)p->resistance_martensite_uohm / (float)p->resistance_austenite_uohm;
@@ -122,23 +124,6 @@ static void begin(spring_belief_t *b, float temperature_c, float sd_k, uint8_t p
                            .offset_sd_v = OFFSET_SD_V,
                            .learnt = learnt,
                            .last_c = temperature_c};
-}
-
-void spring_estimator_forget_loss(spring_estimator_t *e, uint8_t k)
-{
-    spring_belief_t *b = &e->spring[k];
-    const float sd = LOSS_SD * e->loss_w_per_k;
-    b->learnt.loss_w_per_k = 0.0f;
-    b->learnt.loss_sd_w_per_k = sd;
-    b->loss_variance = sd * sd;
-    b->covariance = 0.0f;
-    b->gone_w_per_k = b->kept_w_per_k = 0.0f;
-}
-
-void spring_estimator_forget(spring_estimator_t *e, uint8_t k)
-{
-    e->spring[k].learnt = (spring_learnt_t){.change = e->change};
-    spring_estimator_forget_loss(e, k);
 }
 
 void spring_estimator_init(spring_estimator_t *e, thermal_model_t *model)
@@ -167,29 +152,6 @@ void spring_estimator_trust_model(spring_estimator_t *e, const thermal_model_t *
     }
 }
 
-void spring_estimator_restore(spring_estimator_t *e, uint8_t k, const spring_learnt_t *l)
-{
-    /* written so that a NaN is left out, too */
-    const bool possible =
-        l->austenite_ohm > LEARNT_OHM_LEAST && l->austenite_ohm < LEARNT_OHM_MOST &&
-        fabsf(l->change) < 1.0f && l->change != 0.0f &&
-        fabsf(l->loss_w_per_k) <= LOSS_MOST * e->loss_w_per_k && l->loss_sd_w_per_k >= 0.0f &&
-        l->loss_sd_w_per_k <= LOSS_SD * e->loss_w_per_k &&
-        fabsf(l->martensite_rise_per_k) <= COEFFICIENT_MOST_PER_HEAT_K;
-    if (possible) {
-        e->spring[k].learnt = *l;
-        e->spring[k].loss_variance = l->loss_sd_w_per_k * l->loss_sd_w_per_k;
-    }
-}
-
-spring_learnt_t spring_estimator_learnt(const spring_estimator_t *e, uint8_t k)
-{
-    spring_learnt_t learnt = e->spring[k].learnt;
-    const float sd = sqrtf(e->spring[k].loss_variance);
-    learnt.loss_sd_w_per_k = sd < LOSS_SD * e->loss_w_per_k ? sd : LOSS_SD * e->loss_w_per_k;
-    return learnt;
-}
-
 /* ---- one turn ---- */
 
 static float extra_loss_w(const spring_belief_t *b, const thermal_model_t *model,
@@ -216,10 +178,11 @@ float spring_stiffness_w_per_k(const spring_belief_t *b)
 static float predict(const spring_estimator_t *e, spring_belief_t *b, const thermal_model_t *model,
                      uint8_t k, float power_w)
 {
-    const float now_c = spring_now_c(model, k);
-    const float balance_w = hold_w(model, k, now_c);
+    const int16_t now_c7 = thermal_model_temperature_c7(model, k);
+    const float now_c = spring_c(now_c7);
+    const float balance_w = 1e-6f * (float)thermal_model_power_to_hold_uw(model, k, now_c7);
     const float per_w = e->turn_k_per_w;
-    const float above_k = now_c - spring_ambient_c(model);
+    const float above_k = above_ambient_k(model, k);
     const float by_loss = -per_w * above_k;
     const float extra_w = b->learnt.loss_w_per_k * above_k;
     b->extra_loss_uw = (int32_t)(1e6f * extra_w);
@@ -228,7 +191,7 @@ static float predict(const spring_estimator_t *e, spring_belief_t *b, const ther
     const float joins = by_loss * b->loss_variance;
     b->variance_k2 = keeps * keeps * b->variance_k2 + by_loss * (kept + kept + joins);
     b->covariance = kept + joins;
-    b->loss_variance += LOSS_DRIFT * e->loss_w_per_k * e->loss_w_per_k;
+    b->loss_variance += e->loss_drift;
     b->capacity_k = keeps * b->capacity_k + CAPACITY_SD * (now_c - b->last_c);
     if (b->variance_k2 < LEAST_SD_K * LEAST_SD_K) {
         b->variance_k2 = LEAST_SD_K * LEAST_SD_K;
@@ -252,8 +215,8 @@ float spring_see(const spring_estimator_t *e, spring_belief_t *b, thermal_model_
                  float seen_c, float sd_k, uint8_t from)
 {
     const float error_k = seen_c - spring_now_c(model, k);
-    const float per_total = 1.0f / (distance_k2(b) + sd_k * sd_k);
-    const float gain = distance_k2(b) * per_total;
+    const float per_total = 1.0f / (spring_distance_k2(b) + sd_k * sd_k);
+    const float gain = spring_distance_k2(b) * per_total;
     const float left = 1.0f - gain;
     const float by_loss = b->covariance * per_total;
     spring_set_temperature(model, k, seen_c - left * error_k, from);
@@ -277,7 +240,7 @@ void spring_keep_above(const spring_estimator_t *e, spring_belief_t *b, thermal_
 {
     const float error_k = limit_c - spring_now_c(model, k);
     if (error_k > 0.0f) {
-        const float less_w_per_k = b->covariance / distance_k2(b) * error_k;
+        const float less_w_per_k = b->covariance / spring_distance_k2(b) * error_k;
         spring_correct_loss(e, b, less_w_per_k);
         b->kept_w_per_k += less_w_per_k;
         const float sds = SPRING_ESTIMATOR_BOUND_SDS;
@@ -509,17 +472,18 @@ bool spring_estimator_blind(const spring_belief_t *b)
 
 float spring_estimator_sd_k(const spring_belief_t *b)
 {
-    return sqrtf(distance_k2(b));
+    return sqrtf(spring_distance_k2(b));
 }
 
 float spring_estimator_hold_sd_k(const spring_estimator_t *e, const thermal_model_t *model,
                                  uint8_t k)
 {
     const spring_belief_t *b = &e->spring[k];
-    const float above_k = spring_now_c(model, k) - spring_ambient_c(model);
-    const float settles_k2 = above_k * above_k * b->loss_variance /
-                             (spring_stiffness_w_per_k(b) * spring_stiffness_w_per_k(b) + 1e-12f);
-    return sqrtf(fmaxf(distance_k2(b), settles_k2));
+    const float above_k = above_ambient_k(model, k);
+    const float stiffness = spring_stiffness_w_per_k(b);
+    const float settles_k2 =
+        above_k * above_k * b->loss_variance / (stiffness * stiffness + 1e-12f);
+    return sqrtf(fmaxf(spring_distance_k2(b), settles_k2));
 }
 
 float spring_estimator_cooling_s(const spring_estimator_t *e, const thermal_model_t *model,
@@ -563,7 +527,8 @@ spring_bounds_t spring_estimator_temperature_c(const spring_estimator_t *e,
         const float neighbours_k = NEIGHBOUR_SD * (now_c - spring_ambient_c(model));
         others_k2 = TRUST_SD_K * TRUST_SD_K + neighbours_k * neighbours_k;
     }
-    spring_bounds_t bounds = disturbed(b, spring_around(now_c, sqrtf(distance_k2(b) + others_k2)));
+    spring_bounds_t bounds =
+        disturbed(b, spring_around(now_c, sqrtf(spring_distance_k2(b) + others_k2)));
     bounds.high += fmaxf(b->gone_k, 0.0f);
     return bounds;
 }

@@ -146,6 +146,7 @@ typedef struct {
     float turn_k_per_w; /* what 1 W adds in a turn */
     float latent_heat_j;
     float loss_w_per_k;
+    float loss_drift; /* of its variance in a turn, (W/K)^2 */
     float martensite_ohm;
     float change; /* declared, as in spring_learnt_t */
     spring_belief_t spring[SPRING_ESTIMATOR_MAX_SPRINGS];

@@ -24,6 +24,9 @@
 
 #define LEARNT_AT_C 20.0f /* a learnt martensite's resistance is that at this temperature */
 
+#define LOSS_SD   0.12f /* of a declared loss: 20 % */
+#define LOSS_MOST 0.45f /* of the declared loss: no more is ever believed */
+
 float spring_clamp(float value, float low, float high);
 /* The value with its bounds, SPRING_ESTIMATOR_BOUND_SDS either way. */
 spring_bounds_t spring_around(float value, float sd);
@@ -34,6 +37,8 @@ float spring_ambient_c(const thermal_model_t *model);
  * (SPRING_PHASE_MARTENSITE or _AUSTENITE). */
 void spring_set_temperature(thermal_model_t *model, uint8_t spring, float temperature_c,
                             uint8_t from);
+/* Variance of the distance. */
+float spring_distance_k2(const spring_belief_t *belief);
 /* What 1 K more gives off, with what was found to be lost beyond the declared loss. */
 float spring_stiffness_w_per_k(const spring_belief_t *belief);
 /* The spring was seen at a place of its transformation, give or take sd_k: the one update of

@@ -48,10 +48,11 @@ static void average_anew(spring_belief_t *b)
     b->run.line.slow_k = b->run.line.way_k;
 }
 
-static float slow_sd(const spring_belief_t *b)
+static float slow_variance(const spring_belief_t *b)
 {
-    return b->averaged < SLOW_TURNS ? b->noise / sqrtf((float)b->averaged)
-                                    : b->noise * NOISE_IN_SLOW;
+    const float noise2 = b->noise * b->noise;
+    return b->averaged < SLOW_TURNS ? noise2 / (float)b->averaged
+                                    : noise2 * (NOISE_IN_SLOW * NOISE_IN_SLOW);
 }
 
 /* What it reads on average now is what it reads with the phase that it has. Rough: it still moves,
@@ -60,7 +61,7 @@ static void begin_line(spring_belief_t *b, bool rough)
 {
     b->run.line.ohm = b->slow_ohm;
     b->run.line.a = b->slow_a;
-    b->run.line.sd = slow_sd(b);
+    b->run.line.sd = sqrtf(slow_variance(b));
     b->run.line.way_k -= b->run.line.slow_k;
     b->run.line.slow_k = 0.0f;
     b->rough = rough;
@@ -155,11 +156,12 @@ static void look_back(const spring_estimator_t *e, spring_belief_t *b, thermal_m
  * sensor's offset. Returns whether this turn told one. */
 static bool learn_offset(spring_belief_t *b)
 {
-    const float apart_per_a = 1.0f / b->current_a - 1.0f / b->run.line.a;
-    if (apart_per_a < APART_PER_A) {
+    const float less_a = b->run.line.a - b->current_a;
+    const float product_a2 = b->current_a * b->run.line.a;
+    if (less_a < APART_PER_A * product_a2) { /* as a rule: no division */
         return false;
     }
-    const float apart_a = 1.0f / apart_per_a;
+    const float apart_a = product_a2 / less_a;
     const float moved_v = COEFFICIENT_MOST_PER_K * b->run.line.way_k * b->run.line.ohm * apart_a;
     const float noise_v = b->noise * b->ohm * apart_a;
     const float prior_v2 = b->offset_sd_v * b->offset_sd_v;
@@ -220,7 +222,7 @@ static void follow(spring_belief_t *b, float left)
 
 /* Of what the resistance has left its line by, the part that lost phase may explain. */
 static float as_lost(const spring_belief_t *b, const thermal_model_t *model, uint8_t k, float left,
-                     float sd_k)
+                     float distance_k2)
 {
     const float less = b->learnt.change < 0.0f ? left : -left;
     if (less > 0.0f) {
@@ -228,9 +230,9 @@ static float as_lost(const spring_belief_t *b, const thermal_model_t *model, uin
     }
     /* the other way is an intermediate phase, which comes where it may be cold enough; else it is
      * the last of the austenite that comes */
-    const bool cold =
-        spring_now_c(model, k) - SPRING_ESTIMATOR_BOUND_SDS * sd_k < start_c(model, k);
-    return cold ? -less * (1.0f / OTHER_WAY) : 0.0f;
+    const float above_k = spring_now_c(model, k) - start_c(model, k);
+    const float most_k2 = SPRING_ESTIMATOR_BOUND_SDS * SPRING_ESTIMATOR_BOUND_SDS * distance_k2;
+    return above_k < 0.0f || above_k * above_k < most_k2 ? -less * (1.0f / OTHER_WAY) : 0.0f;
 }
 
 /* On its way down to the hold: to martensite start even if a gust takes as much heat again, and a
@@ -284,15 +286,14 @@ void spring_holding_watch(const spring_estimator_t *e, spring_belief_t *b, therm
     }
     const float kept_ohm = line->ohm * (1.0f + line->rise_per_k * line->slow_k);
     const float left = b->slow_ohm / kept_ohm - 1.0f;
-    const float sd_k = spring_estimator_sd_k(b);
-    const float changed = as_lost(b, model, k, left, sd_k);
+    const float distance_k2 = spring_distance_k2(b);
+    const float changed = as_lost(b, model, k, left, distance_k2);
     /* as its temperature may have moved unseen, so may the resistance */
-    const float moves = fabsf(line->rise_per_k) * sd_k;
-    const float noise = slow_sd(b);
-    const float noise2 = noise * noise + line->sd * line->sd;
-    const float least = fmaxf(LOSS_LEAST, moves);
+    const float rise = line->rise_per_k;
+    const float least2 = fmaxf(LOSS_LEAST * LOSS_LEAST, rise * rise * distance_k2);
+    const float noise2 = slow_variance(b) + line->sd * line->sd;
     const float changed2 = changed * changed;
-    float sure2 = fmaxf(least * least, SURE_SDS * SURE_SDS * noise2);
+    float sure2 = fmaxf(least2, SURE_SDS * SURE_SDS * noise2);
     float suspected2 = SUSPECTED * SUSPECTED * sure2;
     if (changed2 >= suspected2) { /* as a rule not: two divisions are saved */
         const float moves2 = may_move_squared(b);
@@ -324,7 +325,7 @@ void spring_holding_watch(const spring_estimator_t *e, spring_belief_t *b, therm
     }
     b->losing = b->losing < UINT8_MAX ? (uint8_t)(b->losing + 1) : UINT8_MAX;
     if ((changed2 > sure2 && b->losing >= CONFIRM_TURNS) || b->losing >= LASTING_TURNS) {
-        if (b->rough && !may_have_cooled(b, model, k, sd_k)) {
+        if (b->rough && !may_have_cooled(b, model, k, sqrtf(distance_k2))) {
             begin_line(b, true);
             return;
         }

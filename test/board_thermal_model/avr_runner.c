@@ -1,7 +1,7 @@
 /* Runs an ELF of test/avr on simavr's ATmega2560 and counts the cycles between its marks.
  *
- *   avr_runner ELF [NAME MAX_CYCLES]...   exit 0: it said PASS and no named count is above its
- * maximum
+ *   avr_runner ELF [NAME MAX_CYCLES]...   exit 0: it said PASS, no named count is above its
+ * maximum, and its stack has not come near its variables
  *
  * Prints each name with its smallest and largest count. The simulation counts cycles exactly. */
 #include <errno.h>
@@ -19,6 +19,9 @@
 #define GPIOR0_ADDRESS 0x3e
 #define NAMES_MAX      32
 #define CYCLES_MAX     2000000000u
+#define RAM_BEGIN      0x200u
+#define PAINT          0xC5
+#define PAINTED_BYTES  64u /* above the variables: that the stack must leave as they are */
 
 typedef struct {
     char name[40];
@@ -91,6 +94,16 @@ static void on_byte(struct avr_irq_t *irq, uint32_t value, void *parameter)
     }
 }
 
+static bool is_painted(const uint8_t *at)
+{
+    for (unsigned k = 0; k < PAINTED_BYTES; k++) {
+        if (at[k] != PAINT) {
+            return false;
+        }
+    }
+    return true;
+}
+
 int main(int argc, char **argv)
 {
     if (argc < 2 || argc % 2 != 0) {
@@ -111,6 +124,8 @@ int main(int argc, char **argv)
     avr_init(avr);
     firmware.frequency = 16000000;
     avr_load_firmware(avr, &firmware);
+    uint8_t *const above_variables = avr->data + RAM_BEGIN + firmware.datasize + firmware.bsssize;
+    memset(above_variables, PAINT, PAINTED_BYTES);
     runner_t runner = {.current = -1};
     avr_register_io_write(avr, GPIOR0_ADDRESS, on_mark, &runner);
     avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_UART_GETIRQ('0'), UART_IRQ_OUTPUT),
@@ -127,6 +142,10 @@ int main(int argc, char **argv)
     bool good = runner.passed && state == cpu_Done;
     if (!good) {
         printf("the program did not end with PASS\n");
+    }
+    if (!is_painted(above_variables)) {
+        printf("the stack has met the variables\n");
+        good = false;
     }
     for (int k = 0; k < runner.count; k++) {
         printf("%s %" PRIu64 " %" PRIu64 "\n", runner.figures[k].name, runner.figures[k].least,

@@ -513,6 +513,22 @@ static void another_model_forgets_the_losses_and_only_these(void)
     TEST_ASSERT_EQUAL_FLOAT(0.2f, left.change);
 }
 
+static void each_number_of_the_model_changes_its_mark(void)
+{
+    thermal_model_parameters_t *const values = &controller.model.parameters;
+    const uint16_t mark = controller_model_mark(&controller);
+    for (uint16_t k = 0; k < PARAMETER_COUNT; k++) {
+        const parameter_row_t row = parameter_row(k);
+        for (spring_index_t n = 0; row.part == PARAMETER_PART_MODEL && n < row.count; n++) {
+            const int32_t value = parameter_get(values, &row, n);
+            parameter_set(values, &row, n, value ^ 1);
+            TEST_ASSERT_TRUE(mark != controller_model_mark(&controller));
+            parameter_set(values, &row, n, value);
+        }
+    }
+    TEST_ASSERT_EQUAL_UINT16(mark, controller_model_mark(&controller));
+}
+
 /* The declared change stands in for what was not learnt: as it is declared now. */
 static void another_declared_resistance_is_taken_where_none_was_learnt(void)
 {
@@ -613,6 +629,7 @@ int main(void)
     RUN_TEST(refused_settings_change_nothing_and_are_found);
     RUN_TEST(accepted_settings_keep_temperatures_currents_and_faults);
     RUN_TEST(another_model_forgets_the_losses_and_only_these);
+    RUN_TEST(each_number_of_the_model_changes_its_mark);
     RUN_TEST(another_declared_resistance_is_taken_where_none_was_learnt);
     RUN_TEST(another_size_starts_anew_but_stays_locked);
     RUN_TEST(any_input_is_taken_and_the_same_input_gives_the_same_output);

@@ -205,30 +205,11 @@ static void each_effect_has_its_law_in_the_physics_page(void)
     }
 }
 
-static void each_value_of_a_part_changes_its_mark(void)
-{
-    thermal_model_parameters_t model;
-    thermal_model_parameters_default(&model);
-    const uint16_t mark = parameter_mark(PARAMETER_PART_MODEL, &model);
-    for (uint16_t k = 0; k < PARAMETER_COUNT; k++) {
-        const parameter_row_t row = parameter_row(k);
-        for (spring_index_t element = 0; row.part == PARAMETER_PART_MODEL && element < row.count;
-             element++) {
-            const int32_t value = parameter_get(&model, &row, element);
-            parameter_set(&model, &row, element, value ^ 1);
-            TEST_ASSERT_TRUE(mark != parameter_mark(PARAMETER_PART_MODEL, &model));
-            parameter_set(&model, &row, element, value);
-        }
-    }
-    TEST_ASSERT_EQUAL_UINT16(mark, parameter_mark(PARAMETER_PART_MODEL, &model));
-}
-
 int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(each_value_is_kept_at_its_limits_and_refused_beyond);
     RUN_TEST(a_value_beyond_what_is_read_is_refused);
-    RUN_TEST(each_value_of_a_part_changes_its_mark);
     RUN_TEST(names_and_ids_are_used_once);
     RUN_TEST(a_number_after_a_name_is_always_a_spring);
     RUN_TEST(the_settings_page_says_what_the_table_says);

@@ -13,7 +13,14 @@
 
 static controller_settings_t settings;
 static controller_t controller;
-static controller_t aside; /* as it was before the tick: its parts are counted on this one */
+/* As they were before the tick: they are counted on these. No more of the controller: the stack
+ * would not fit below a second one. */
+static struct {
+    thermal_model_t model;
+    current_control_t current;
+    safety_t safety;
+    drive_policy_t policy;
+} aside;
 static controller_inputs_t inputs;
 static controller_outputs_t outputs;
 static bool broken[SPRINGS];
@@ -28,7 +35,7 @@ static void count_parts(bool steps)
     static bool yes[SPRINGS];
     static bool valid[SPRINGS];
     for (uint8_t k = 0; k < SPRINGS; k++) {
-        power_uw[k] = controller_power_uw(&aside, k);
+        power_uw[k] = controller_power_uw(&controller, k);
         yes[k] = safety_allows(&aside.safety, k);
         valid[k] = inputs.sensor[k].status == CONTROLLER_SENSOR_OK;
     }
@@ -38,12 +45,12 @@ static void count_parts(bool steps)
         COUNTED();
     }
     drive_policy_input_t input = {.model = &aside.model,
-                                  .level_permille = aside.level_permille,
+                                  .level_permille = controller.level_permille,
                                   .allowed = yes,
                                   .maximum_current_ma = 3000,
                                   .supply_limit_ma = 15000,
-                                  .measured_ma = aside.measured_ma,
-                                  .measured_mv = aside.measured_mv,
+                                  .measured_ma = controller.measured_ma,
+                                  .measured_mv = controller.measured_mv,
                                   .valid = valid};
     COUNT("policy");
     drive_policy_tick(&aside.policy, &input, target_ma);
@@ -64,7 +71,8 @@ static void count_parts(bool steps)
     }
     uint16_t duty[SPRINGS];
     COUNT("current_loops");
-    current_control_tick(&aside.current, SPRINGS, target_ma, aside.measured_ma, valid, true, duty);
+    current_control_tick(&aside.current, SPRINGS, target_ma, controller.measured_ma, valid, true,
+                         duty);
     COUNTED();
 }
 
@@ -87,7 +95,10 @@ static void respond(void)
 static void run(uint16_t ticks)
 {
     while (ticks-- > 0) {
-        memcpy(&aside, &controller, sizeof aside);
+        aside.model = controller.model;
+        aside.current = controller.current;
+        aside.safety = controller.safety;
+        aside.policy = controller.policy;
         uint8_t before = controller.model_tick;
         /* a name is said before the tick: which one it is follows from how it counts */
         bool steps = (uint8_t)(before + 1u) * CONTROLLER_TICK_MS >= 100u;

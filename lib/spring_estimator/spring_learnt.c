@@ -1,0 +1,46 @@
+#include <math.h>
+
+#include "spring_estimator_internal.h"
+
+#define LEARNT_OHM_LEAST 0.01f
+#define LEARNT_OHM_MOST  16.0f
+
+void spring_estimator_forget_loss(spring_estimator_t *e, uint8_t k)
+{
+    spring_belief_t *b = &e->spring[k];
+    const float sd = LOSS_SD * e->loss_w_per_k;
+    b->learnt.loss_w_per_k = 0.0f;
+    b->learnt.loss_sd_w_per_k = sd;
+    b->loss_variance = sd * sd;
+    b->covariance = 0.0f;
+    b->gone_w_per_k = b->kept_w_per_k = 0.0f;
+}
+
+void spring_estimator_forget(spring_estimator_t *e, uint8_t k)
+{
+    e->spring[k].learnt = (spring_learnt_t){.change = e->change};
+    spring_estimator_forget_loss(e, k);
+}
+
+void spring_estimator_restore(spring_estimator_t *e, uint8_t k, const spring_learnt_t *l)
+{
+    /* written so that a NaN is left out, too */
+    const bool possible =
+        l->austenite_ohm > LEARNT_OHM_LEAST && l->austenite_ohm < LEARNT_OHM_MOST &&
+        fabsf(l->change) < 1.0f && l->change != 0.0f &&
+        fabsf(l->loss_w_per_k) <= LOSS_MOST * e->loss_w_per_k && l->loss_sd_w_per_k >= 0.0f &&
+        l->loss_sd_w_per_k <= LOSS_SD * e->loss_w_per_k &&
+        fabsf(l->martensite_rise_per_k) <= COEFFICIENT_MOST_PER_HEAT_K;
+    if (possible) {
+        e->spring[k].learnt = *l;
+        e->spring[k].loss_variance = l->loss_sd_w_per_k * l->loss_sd_w_per_k;
+    }
+}
+
+spring_learnt_t spring_estimator_learnt(const spring_estimator_t *e, uint8_t k)
+{
+    spring_learnt_t learnt = e->spring[k].learnt;
+    const float sd = sqrtf(e->spring[k].loss_variance);
+    learnt.loss_sd_w_per_k = sd < LOSS_SD * e->loss_w_per_k ? sd : LOSS_SD * e->loss_w_per_k;
+    return learnt;
+}
