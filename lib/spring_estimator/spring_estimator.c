@@ -154,12 +154,6 @@ void spring_estimator_trust_model(spring_estimator_t *e, const thermal_model_t *
 
 /* ---- one turn ---- */
 
-static float extra_loss_w(const spring_belief_t *b, const thermal_model_t *model,
-                          float temperature_c)
-{
-    return b->learnt.loss_w_per_k * (temperature_c - spring_ambient_c(model));
-}
-
 /* It moves with the fan and the air: slowly. */
 void spring_estimator_look_at_stiffness(spring_estimator_t *e, const thermal_model_t *model,
                                         uint8_t k)
@@ -186,6 +180,7 @@ static float predict(const spring_estimator_t *e, spring_belief_t *b, const ther
     const float by_loss = -per_w * above_k;
     const float extra_w = b->learnt.loss_w_per_k * above_k;
     b->extra_loss_uw = (int32_t)(1e6f * extra_w);
+    b->gives_w = balance_w + extra_w;
     const float keeps = 1.0f - per_w * spring_stiffness_w_per_k(b);
     const float kept = keeps * b->covariance;
     const float joins = by_loss * b->loss_variance;
@@ -196,7 +191,7 @@ static float predict(const spring_estimator_t *e, spring_belief_t *b, const ther
     if (b->variance_k2 < LEAST_SD_K * LEAST_SD_K) {
         b->variance_k2 = LEAST_SD_K * LEAST_SD_K;
     }
-    const float heat_k = per_w * (power_w - balance_w - extra_w);
+    const float heat_k = per_w * (power_w - b->gives_w);
     if (b->gone_k >
         0.0f) { /* where a contact has moved, what it takes up to transform may warm it */
         const bool by_contact = b->heating && b->unsteady != 0;
@@ -553,7 +548,8 @@ uint32_t spring_estimator_model_power_uw(const spring_estimator_t *e, uint8_t k,
 float spring_estimator_hold_w(const spring_estimator_t *e, const thermal_model_t *model, uint8_t k,
                               float temperature_c)
 {
-    return hold_w(model, k, temperature_c) + extra_loss_w(&e->spring[k], model, temperature_c);
+    const spring_belief_t *b = &e->spring[k];
+    return b->gives_w + spring_stiffness_w_per_k(b) * (temperature_c - spring_now_c(model, k));
 }
 
 uint16_t spring_estimator_current_ma(const spring_estimator_t *e, uint8_t k, float power_w)

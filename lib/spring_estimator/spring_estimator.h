@@ -87,6 +87,7 @@ typedef struct {
     float shift_variance_k2;
     float declared_stiffness_w_per_k; /* what 1 K more of this spring gives off */
     int32_t extra_loss_uw;            /* what it loses beyond the model, now */
+    float gives_w;                    /* what it gives off in all, in the last turn */
     float disturbance_k;              /* how far it was found from where it was believed, lately */
     float hottest_c;                  /* while nothing is known: the most that it can be by now */
     float kept_w_per_k; /* taken off the loss since it was last seen, as nothing was seen */
@@ -244,7 +245,7 @@ spring_bounds_t spring_estimator_austenite(const spring_estimator_t *estimator,
  * beyond it. */
 uint32_t spring_estimator_model_power_uw(const spring_estimator_t *estimator, uint8_t spring,
                                          uint32_t power_uw);
-/* Power that holds it there, on the declared scale, W. */
+/* Power that holds it there, on the declared scale, W: from what it gave off in its last turn. */
 float spring_estimator_hold_w(const spring_estimator_t *estimator, const thermal_model_t *model,
                               uint8_t spring, float temperature_c);
 /* Current for a power in the resistance that it has now, 0..3200 mA. */

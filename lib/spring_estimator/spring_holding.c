@@ -235,6 +235,15 @@ static float as_lost(const spring_belief_t *b, const thermal_model_t *model, uin
     return above_k < 0.0f || above_k * above_k < most_k2 ? -less * (1.0f / OTHER_WAY) : 0.0f;
 }
 
+/* For certain above martensite start, where nothing is lost. */
+static bool is_above(const spring_belief_t *b, const thermal_model_t *model, uint8_t k,
+                     float distance_k2)
+{
+    const float above_k = spring_now_c(model, k) - start_c(model, k) - b->disturbance_k;
+    const float sds = SPRING_ESTIMATOR_BOUND_SDS;
+    return above_k > 0.0f && above_k * above_k > sds * sds * distance_k2;
+}
+
 /* On its way down to the hold: to martensite start even if a gust takes as much heat again, and a
  * load has moved that. Else what changes is a contact or the sensor. */
 static bool may_have_cooled(const spring_belief_t *b, const thermal_model_t *model, uint8_t k,
@@ -304,7 +313,7 @@ void spring_holding_watch(const spring_estimator_t *e, spring_belief_t *b, therm
         b->losing = 0;
         const bool away = fabsf(line->slow_k) > ANCHOR_K;
         if (b->rough && (b->averaged == ANCHOR_TURNS || (b->averaged > ANCHOR_TURNS && away))) {
-            if (away && spring_estimator_distance_k(e, model, k).low > 0.0f) {
+            if (away && is_above(b, model, k, distance_k2)) {
                 const float offset = spring_offset_may_show(b, b->slow_a) * (1.0f / OFFSET_SDS);
                 tell_slope(b, left, noise2 + offset * offset);
             }
