@@ -325,7 +325,7 @@ void spring_estimator_update(spring_estimator_t *e, thermal_model_t *model, uint
     spring_belief_t *b = &e->spring[k];
     const float before_c = b->last_c;
     b->seen = false;
-    spring_take_readings(b);
+    const float share = spring_take_readings(b);
     const float power_w = b->reads ? b->current_a * b->current_a * b->ohm : 0.0f;
     const float heat_k = predict(e, b, model, k, power_w);
     const float moved_k = b->last_c - before_c;
@@ -338,7 +338,7 @@ void spring_estimator_update(spring_estimator_t *e, thermal_model_t *model, uint
         look(e, model, k);
         spring_heating_watch(e, b, model, k);
         if (!b->blind) {
-            spring_holding_watch(e, b, model, k, moved_k);
+            spring_holding_watch(e, b, model, k, moved_k, share);
         }
     } else {
         if (b->heating) {

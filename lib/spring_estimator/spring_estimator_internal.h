@@ -54,8 +54,8 @@ void spring_correct_loss(const spring_estimator_t *estimator, spring_belief_t *b
 void spring_keep_above(const spring_estimator_t *estimator, spring_belief_t *belief,
                        thermal_model_t *model, uint8_t spring, float limit_c);
 
-/* Takes the turn's readings. */
-void spring_take_readings(spring_belief_t *belief);
+/* Takes the turn's readings. Returns the share of them in the average. */
+float spring_take_readings(spring_belief_t *belief);
 /* It has jumped again and again: what it reads tells nothing. */
 bool spring_is_loose(const spring_belief_t *belief);
 /* All that readings are compared with jumps along: a contact, or the sensor. */
@@ -67,8 +67,6 @@ bool spring_lacks_phase(const spring_belief_t *belief, const thermal_model_t *mo
 /* It has transformed: what it reads now is its own austenite's, and the way there its change. */
 void spring_learn_austenite(spring_belief_t *belief);
 
-/* The share of the last turn in the average. */
-float spring_slow_share(const spring_belief_t *belief);
 /* A hold begins. Now: what the last turn read is what it reads with the phase that it has. */
 void spring_begin_hold_line(spring_belief_t *belief, bool now);
 /* Even the coldest and heaviest spring has transformed by the heat of this heating. */
@@ -84,8 +82,9 @@ float spring_offset_may_show(const spring_belief_t *belief, float current_a);
 /* While it heats: what heat does to its resistance. */
 void spring_heating_watch(const spring_estimator_t *estimator, spring_belief_t *belief,
                           thermal_model_t *model, uint8_t spring);
-/* While its temperature rests, moved_k in the last turn: whether it loses phase. */
+/* While its temperature rests, moved_k in the last turn: whether it loses phase. The turn's share
+ * in the average is that of its readings. */
 void spring_holding_watch(const spring_estimator_t *estimator, spring_belief_t *belief,
-                          thermal_model_t *model, uint8_t spring, float moved_k);
+                          thermal_model_t *model, uint8_t spring, float moved_k, float share);
 
 #endif

@@ -48,20 +48,18 @@ static void average_anew(spring_belief_t *b)
     b->run.line.slow_k = b->run.line.way_k;
 }
 
-static float slow_variance(const spring_belief_t *b)
+static float slow_variance(const spring_belief_t *b, float share)
 {
-    const float noise2 = b->noise * b->noise;
-    return b->averaged < SLOW_TURNS ? noise2 / (float)b->averaged
-                                    : noise2 * (NOISE_IN_SLOW * NOISE_IN_SLOW);
+    return b->noise * b->noise * (b->averaged < SLOW_TURNS ? share : NOISE_IN_SLOW * NOISE_IN_SLOW);
 }
 
 /* What it reads on average now is what it reads with the phase that it has. Rough: it still moves,
  * another one follows when it is at rest. */
-static void begin_line(spring_belief_t *b, bool rough)
+static void begin_line(spring_belief_t *b, bool rough, float share)
 {
     b->run.line.ohm = b->slow_ohm;
     b->run.line.a = b->slow_a;
-    b->run.line.sd = sqrtf(slow_variance(b));
+    b->run.line.sd = sqrtf(slow_variance(b, share));
     b->run.line.way_k -= b->run.line.slow_k;
     b->run.line.slow_k = 0.0f;
     b->rough = rough;
@@ -76,7 +74,7 @@ void spring_begin_hold_line(spring_belief_t *b, bool now)
                         .rise_sd_per_k = COEFFICIENT_MOST_PER_K / SPRING_ESTIMATOR_BOUND_SDS};
     if (now) {
         average_anew(b);
-        begin_line(b, true);
+        begin_line(b, true, 1.0f);
     }
 }
 
@@ -257,7 +255,7 @@ static bool may_have_cooled(const spring_belief_t *b, const thermal_model_t *mod
 
 /* A phase that is kept changes the resistance no faster than temperature does. */
 void spring_holding_watch(const spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model,
-                          uint8_t k, float moved_k)
+                          uint8_t k, float moved_k, float share)
 {
     if (b->heating || b->possible != SPRING_PHASE_AUSTENITE) {
         b->quiet = 0;
@@ -268,7 +266,7 @@ void spring_holding_watch(const spring_estimator_t *e, spring_belief_t *b, therm
                                         : UINT8_MAX;
     spring_line_t *line = &b->run.line;
     line->way_k += moved_k;
-    line->slow_k += (line->way_k - line->slow_k) * spring_slow_share(b);
+    line->slow_k += (line->way_k - line->slow_k) * share;
     if (line->ohm == 0.0f) {
         if (b->quiet == 0) {
             average_anew(b);
@@ -277,7 +275,7 @@ void spring_holding_watch(const spring_estimator_t *e, spring_belief_t *b, therm
             b->losing = 0;
             return;
         }
-        begin_line(b, false);
+        begin_line(b, false, share);
         if (b->full_ohm > 0.0f) {
             look_back(e, b, model, k);
         }
@@ -300,7 +298,7 @@ void spring_holding_watch(const spring_estimator_t *e, spring_belief_t *b, therm
     /* as its temperature may have moved unseen, so may the resistance */
     const float rise = line->rise_per_k;
     const float least2 = fmaxf(LOSS_LEAST * LOSS_LEAST, rise * rise * distance_k2);
-    const float noise2 = slow_variance(b) + line->sd * line->sd;
+    const float noise2 = slow_variance(b, share) + line->sd * line->sd;
     const float changed2 = changed * changed;
     float sure2 = fmaxf(least2, SURE_SDS * SURE_SDS * noise2);
     float suspected2 = SUSPECTED * SUSPECTED * sure2;
@@ -317,11 +315,11 @@ void spring_holding_watch(const spring_estimator_t *e, spring_belief_t *b, therm
                 const float offset = spring_offset_may_show(b, b->slow_a) * (1.0f / OFFSET_SDS);
                 tell_slope(b, left, noise2 + offset * offset);
             }
-            begin_line(b, true); /* a coefficient explains only the way since */
+            begin_line(b, true, share); /* a coefficient explains only the way since */
         }
         if (b->quiet >= QUIET_TURNS) {
             if (b->rough) { /* it has come to rest */
-                begin_line(b, false);
+                begin_line(b, false, share);
                 if (b->full_ohm > 0.0f && b->lost == 0.0f) {
                     look_back(e, b, model, k);
                     return;
@@ -335,7 +333,7 @@ void spring_holding_watch(const spring_estimator_t *e, spring_belief_t *b, therm
     b->losing = b->losing < UINT8_MAX ? (uint8_t)(b->losing + 1) : UINT8_MAX;
     if ((changed2 > sure2 && b->losing >= CONFIRM_TURNS) || b->losing >= LASTING_TURNS) {
         if (b->rough && !may_have_cooled(b, model, k, sqrtf(distance_k2))) {
-            begin_line(b, true);
+            begin_line(b, true, share);
             return;
         }
         /* until it is back, or was found not to have been phase, all of it is one loss */
@@ -344,7 +342,7 @@ void spring_holding_watch(const spring_estimator_t *e, spring_belief_t *b, therm
         const float per_change = 1.0f / fabsf(b->learnt.change);
         const float sd = sqrtf(may_move_squared(b)) / SPRING_ESTIMATOR_BOUND_SDS;
         see_crossing(e, b, model, k, changed * per_change, sd * per_change);
-        begin_line(b, true); /* the average still falls */
+        begin_line(b, true, share); /* the average still falls */
     }
 }
 

@@ -91,29 +91,24 @@ static void take_noise(spring_belief_t *b, float ohm, float current_a)
     b->ohm_before[0] = ohm;
 }
 
-float spring_slow_share(const spring_belief_t *b)
-{
-    return b->averaged >= SLOW_TURNS ? SLOW_SHARE /* as a rule: a division is saved */
-           : b->averaged > 1         ? 1.0f / (float)b->averaged
-                                     : 1.0f;
-}
-
-static void take_reading(spring_belief_t *b, float ohm, float current_a)
+static float take_reading(spring_belief_t *b, float ohm, float current_a)
 {
     take_noise(b, ohm, current_a);
     b->averaged = b->fresh == 0 ? 0 : b->averaged;
     b->averaged = b->averaged < SLOW_TURNS ? (uint8_t)(b->averaged + 1) : SLOW_TURNS;
-    const float share = spring_slow_share(b);
+    const float share = b->averaged < SLOW_TURNS ? 1.0f / (float)b->averaged : SLOW_SHARE;
     b->slow_ohm += (ohm - b->slow_ohm) * share;
     b->slow_a += (current_a - b->slow_a) * share;
     b->current_a = current_a;
     b->ohm = ohm;
     b->phase_ohm = current_a > STRONG_A || b->fresh == 0 ? ohm : b->phase_ohm;
     b->fresh = b->fresh < UINT8_MAX ? (uint8_t)(b->fresh + 1) : UINT8_MAX;
+    return share;
 }
 
-void spring_take_readings(spring_belief_t *b)
+float spring_take_readings(spring_belief_t *b)
 {
+    float share = SLOW_SHARE;
     b->unsteady = b->unsteady > 0 ? (uint16_t)(b->unsteady - 1) : 0;
     b->reads = b->readings >= LEAST_READINGS && b->current_sum_ma >= LEAST_MEAN_MA * b->readings &&
                b->voltage_sum_mv > 0;
@@ -122,7 +117,7 @@ void spring_take_readings(spring_belief_t *b)
         const float ohm = ((float)b->voltage_sum_mv - offset_mv) / (float)b->current_sum_ma;
         const float current_a = (float)b->current_sum_ma * 1e-3f / (float)b->readings;
         if (!leave_out(b, ohm, current_a)) {
-            take_reading(b, ohm, current_a);
+            share = take_reading(b, ohm, current_a);
         }
     } else if (b->current_sum_ma < LEAST_MEAN_MA && !b->cut_short) {
         b->fresh = 0; /* no current, or no sensor */
@@ -130,4 +125,5 @@ void spring_take_readings(spring_belief_t *b)
     b->cut_short = false;
     b->current_sum_ma = b->voltage_sum_mv = 0;
     b->readings = 0;
+    return share;
 }
