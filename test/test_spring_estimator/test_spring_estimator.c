@@ -358,6 +358,36 @@ static void phase_lost_on_the_way_to_the_hold_is_counted(void)
     TEST_ASSERT_FLOAT_WITHIN_MESSAGE(0.05f, (float)(1.0 - truth.austenite), BELIEF.lost, where);
 }
 
+/* The austenite's own coefficient, whatever the martensite's, before any phase may be lost; but not
+ * by a current that hardly reads. */
+static void slope_is_told_on_the_way_down(void)
+{
+    static const double rise_per_k[] = {-0.0003, 0.0, 0.0006, 0.0012};
+    for (unsigned n = 0; n < 4; n++) {
+        for (unsigned weak = 0; weak < 2; weak++) {
+            unsigned t = 0; /* the dither */
+            begin_cold();
+            truth.apart_per_k = rise_per_k[n];
+            truth.offset_v = 0.008; /* told first */
+            (void)heat_then_hold(60.0);
+            ticks(1.6, 1.0); /* too near to the boost to tell the offset */
+            for (double s = 0.0; s < 60.0 && distance_k() > 4.0; s += TICK_S) {
+                (void)tick((weak != 0 ? 0.5 : 1.0) + 0.05 * (double)(t++ % 8u) / 8.0);
+            }
+            const spring_line_t *line = &BELIEF.run.line;
+            (void)snprintf(where, sizeof where, "%.4f /K: %.5f give or take %.5f", rise_per_k[n],
+                           (double)line->rise_per_k, (double)line->rise_sd_per_k);
+            TEST_ASSERT_EQUAL_MESSAGE(weak == 0, line->rise_sd_per_k < 0.0003f, where);
+            if (weak == 0) {
+                TEST_ASSERT_TRUE_MESSAGE(
+                    fabs((double)line->rise_per_k - truth.rise_per_k - truth.apart_per_k) <
+                        (double)SPRING_ESTIMATOR_BOUND_SDS * (double)line->rise_sd_per_k,
+                    where);
+            }
+        }
+    }
+}
+
 /* A contact that steps is no phase, whatever the sign; nor one that ages. */
 static void contact_is_not_taken_for_phase(void)
 {
@@ -375,6 +405,48 @@ static void contact_is_not_taken_for_phase(void)
                        (double)BELIEF.lost, 1.0 - truth.austenite, truth.temperature_c);
         TEST_ASSERT_TRUE_MESSAGE(truth.austenite > 0.97, where);
         TEST_ASSERT_TRUE_MESSAGE(BELIEF.lost < 0.03f && !BELIEF.blind, where); /* not heated back */
+    }
+}
+
+/* One that steps has moved; one that goes and comes tells nothing, until it has been quiet. */
+static void contact_that_comes_and_goes_is_blind_for_a_while(void)
+{
+    begin_cold();
+    (void)heat_then_hold(60.0);
+    for (double s = 0.0; s < 60.0; s += TICK_S) {
+        (void)tick(hold_current_a(12.0));
+    }
+    for (unsigned n = 0; n < 3; n++) {
+        TEST_ASSERT_FALSE(spring_estimator_blind(&BELIEF));
+        truth.contact_ohm = n % 2u == 0 ? 0.03 : 0.0;
+        for (double s = 0.0; s < 20.0; s += TICK_S) {
+            (void)tick(hold_current_a(12.0));
+        }
+    }
+    TEST_ASSERT_TRUE(spring_estimator_blind(&BELIEF));
+    TEST_ASSERT_FALSE(spring_estimator_sees(&BELIEF));
+    for (double s = 0.0; s < 256.0; s += TICK_S) {
+        (void)tick(hold_current_a(12.0));
+    }
+    TEST_ASSERT_FALSE(spring_estimator_blind(&BELIEF));
+}
+
+/* It seemed to lose phase where a contact had jumped: what the heating seems to take up to
+ * transform may have warmed it. Where none had, it was phase that a load took. */
+static void doubt_grows_with_a_heating_after_a_jump(void)
+{
+    for (unsigned jumped = 0; jumped < 2; jumped++) {
+        begin_cold();
+        (void)heat_then_hold(60.0);
+        BELIEF.possible = SPRING_PHASE_BETWEEN; /* as after a loss of half of it */
+        BELIEF.gone_k = 5.0f;
+        BELIEF.unsteady = jumped != 0 ? 1000u : 0u;
+        thermal_model_set_temperature(&model, 0, 20 * 128);
+        thermal_model_set_temperature(&model, 0, 92 * 128);
+        spring_estimator_begin_heating(&estimator, &model, 0);
+        ticks(3.0, 2.0);
+        (void)snprintf(where, sizeof where, "%.1f K", (double)BELIEF.gone_k);
+        TEST_ASSERT_TRUE_MESSAGE(jumped != 0 ? BELIEF.gone_k > 10.0f : BELIEF.gone_k < 5.0f, where);
     }
 }
 
@@ -734,7 +806,10 @@ int main(void)
     RUN_TEST(heating_in_a_gust_goes_on_until_it_is_over);
     RUN_TEST(offset_is_learnt_where_the_current_drops);
     RUN_TEST(phase_lost_on_the_way_to_the_hold_is_counted);
+    RUN_TEST(slope_is_told_on_the_way_down);
     RUN_TEST(contact_is_not_taken_for_phase);
+    RUN_TEST(contact_that_comes_and_goes_is_blind_for_a_while);
+    RUN_TEST(doubt_grows_with_a_heating_after_a_jump);
     RUN_TEST(loss_that_does_not_come_back_was_none);
     RUN_TEST(loss_that_is_still_missing_at_rest_is_taken_back);
     RUN_TEST(loss_that_is_back_at_rest_is_not_taken_back);
