@@ -80,6 +80,18 @@ class Array:
                 "and an array or model without [stiffness]"
             )
 
+    def of_layer(self, layer: str) -> Array:
+        """Return one layer alone: its springs, where `[stiffness]` says nothing those above; no boards, nothing of the other."""
+        own = (self.stiffness or {}) if stiffness.LAYERS.index(layer) else {}
+        return Array(
+            self.rows,
+            self.cols,
+            self.pitch_mm,
+            self.spring | {key: own[key] for key in SPRING_KEYS if key in own},
+            self.material | {key: own[key] for key in stiffness.MATERIAL if key in own},
+            self.sensor,
+        )
+
     @property
     def parts(self) -> list[native.Part]:
         """Springs of each board."""
@@ -109,20 +121,7 @@ def model_of_layer(model: Model, layer: str) -> Model:
     array, which = model.array, stiffness.LAYERS.index(layer)
     if array.stiffness is None:
         raise InputError(f"--layer {layer}: the model has one layer", model.name)
-    own = array.stiffness if which else {}
-    out = Model(
-        Array(
-            array.rows,
-            array.cols,
-            array.pitch_mm,
-            array.spring | {key: own[key] for key in SPRING_KEYS if key in own},
-            array.material | {key: own[key] for key in stiffness.MATERIAL if key in own},
-            array.sensor,
-        ),
-        list(model.effects),
-        provenance=model.provenance,
-        name=model.name,
-    )
+    out = Model(array.of_layer(layer), list(model.effects), provenance=model.provenance, name=model.name)
     n, scale = out.array.springs, model.parameters.get("stiffness_coupling_scale", 1.0)
     values = dict(model.parameters)
     if which and scale != 1.0:  # what the model does not say, and the plant has
