@@ -37,6 +37,8 @@ MATERIAL_KEYS = {
     "austenite_finish_c": (-50.0, 200.0),
     "emissivity": (0.0, 1.0),
 }
+STIFFNESS_KEYS = SPRING_KEYS | {key: MATERIAL_KEYS[key] for key in stiffness.MATERIAL} | stiffness.NUMBERS
+"""Of `[stiffness]`: its numbers."""
 COUPLED = ("orthogonal_", "diagonal_", "second_", "wake_w")
 """What the stiffness layer has times `stiffness_coupling_scale`."""
 BOARD_KEYS = {"supply_limit_a": (0.1, 60.0), "boost_current_a": (0.1, 3.2), "open_current_a": (0.0, 3.2)}
@@ -179,12 +181,11 @@ def _array(file: TomlFile) -> Array:
 def _stiffness(file: TomlFile) -> dict[str, Any] | None:
     if file.get(("stiffness",)) is None:
         return None
-    numbers = SPRING_KEYS | {key: MATERIAL_KEYS[key] for key in stiffness.MATERIAL} | stiffness.NUMBERS
-    given = dict(file.table(("stiffness",), (*numbers, *stiffness.WORDS)))
+    given = dict(file.table(("stiffness",), (*STIFFNESS_KEYS, *stiffness.WORDS)))
     for key, value in given.items():
         at = ("stiffness", key)
-        if key in numbers:
-            given[key] = file.number(at, *numbers[key])
+        if key in STIFFNESS_KEYS:
+            given[key] = file.number(at, *STIFFNESS_KEYS[key])
         elif value not in (words := stiffness.WORDS[key]):
             has = f"{did_you_mean(str(value), words)}; it has {', '.join(words)}"
             raise file.refuse(f"[stiffness] {key} has no '{value}'{has}", at)
