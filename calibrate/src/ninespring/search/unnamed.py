@@ -187,6 +187,7 @@ def library(problem: Problem, fit: Fit) -> list[Cause]:
         ambient = problem.ambient_of(r, by_key)
         shown = simulate_run(plant, run, ambient, by_key)
         around = np.full(len(run.time_s), plant.get("ambient_c")) if ambient is None else ambient
+        rise = shown - around[:, None]
         # where something unknown acts, the readings know better than the fit how warm the springs are
         read = pd.DataFrame(run.temperature_c).rolling(SMOOTHED, center=True, min_periods=1).mean().to_numpy()
         shown = np.where(np.isfinite(read), read, shown)
@@ -202,7 +203,7 @@ def library(problem: Problem, fit: Fit) -> list[Cause]:
             profiles.setdefault(key, [None] * len(problem.runs))[r] = profile
             scaled = np.where(problem.mask[r], moved.get(key, profile) / problem.noise[r], 0.0)
             columns.setdefault(key, nothing)[r] = thin(scaled[:, :, None])
-        windows += _windows(problem, fit, r, samples, power, over, loss_w_per_k, typical)
+        windows += _windows(problem, fit, r, samples, power, lost, rise, loss_w_per_k, typical)
     everywhere = [Cause(*key, tuple(profiles[key]), np.concatenate(parts)) for key, parts in columns.items()]
     return everywhere + windows + _often(windows)
 
@@ -291,7 +292,8 @@ def _windows(
     r: int,
     samples: Sequence[int],
     power: np.ndarray,
-    over: np.ndarray,
+    lost: np.ndarray,
+    rise: np.ndarray,
     loss_w_per_k: np.ndarray,
     typical_w: float,
 ) -> list[Cause]:
@@ -324,7 +326,6 @@ def _windows(
         return np.cumsum((mean[:, None, None] * between)[::-1], axis=0)[::-1]
 
     out = []
-    lost = over * loss_w_per_k[:, None]
     everything_lost, everything_driven, warmer = (np.zeros_like(answer["heat", 0]) for _ in range(3))
     one = np.ones(rows)
     for k in range(springs):
@@ -335,12 +336,12 @@ def _windows(
         jumps = np.zeros((len(edges), rows, springs))
         for number, edge in enumerate(edges):
             jumps[number, edge:, k] = 1.0
-        rise = jumps * over
         out.append(cause("contact", f"the drive of spring {k + 1} changes", _only(k, power[:, k], springs), driven))
         out.append(cause("heat", f"spring {k + 1} is given heat", _only(k, one, springs), answer["heat", k]))
         out.append(cause("sensor", f"thermometer {k + 1} jumps", _only(k, one, springs), jumps))
         text = f"thermometer {k + 1} shows more of its spring's rise"
-        out.append(cause("share", text, _only(k, over[:, k], springs), rise))
+        # of the fit's own rise: a part of the readings would explain all that they show
+        out.append(cause("share", text, _only(k, rise[:, k], springs), jumps * rise))
     out.append(cause("gust", "all losses change", -lost, everything_lost))
     out.append(cause("surroundings", "the surroundings are warmer", np.outer(loss_w_per_k, np.ones(springs)), warmer))
     if springs > 1:
@@ -520,38 +521,47 @@ def search_beside(problem: Problem, first: Search, final: Fit) -> Beside | None:
 
 
 def _or_lasting(problem: Problem, found: Search, result: Found, hidden: list[Hidden]) -> Beside:
-    """Return what was found less the names that an unnamed cause, here for a while, would nearly explain if it were here all
-    the time: whether such a cause came or went, nothing but those names says.
+    """Return what was found less the names of one spring that an unnamed cause there, found for a while, would nearly explain
+    if it were there all the time: whether it came or went, nothing but those names says.
     """
-    final, begun = result[0], {id(one.cause): one for one in hidden if one.cause.edges}
+    final, without = result[0], result[1]
+    at = {effect: _spring_of(final, effect) for effect in without}
+    begun = {id(one.cause): one for one in hidden if one.cause.edges and _place(one.cause) in at.values()}
     whole = [_all_the_time(problem, one).around(problem, final) for one in begun.values()]
-    if not whole or len(final.spec.effects) == len(found.base.spec.effects):
+    if not whole:
         return found, result, hidden
     taken_out = problem.unnamed
     problem.leave_out(np.column_stack([taken_out, *(one.column for one in whole)]))
     base = problem.fit(found.base.spec, found.base.as_dict(), errors=True)
     search = Search(problem, found.candidates, base, found.progress)
-    beside = problem.fit(final.spec, final.as_dict(), tolerance=1e-3, max_steps=STEPS_OF_FIT)
-    kept = beside
-    while True:
-        without = {
-            effect: search.reduced(kept, effect) for effect in kept.spec.effects if effect not in base.spec.effects
-        }
-        left = {
-            effect: (other.sse - kept.sse) / max(1e-9, result[1][effect].sse - final.sse)
-            for effect, other in without.items()
-        }
-        if not left or min(left.values()) >= MIN_SHARE:
-            break
-        kept = without[min(left, key=lambda effect: left[effect])]
-    fewer, without = search.backward(kept)
-    if fewer is beside:
+    kept = beside = problem.fit(final.spec, final.as_dict(), tolerance=1e-3, max_steps=STEPS_OF_FIT)
+    for effect in (effect for effect in without if at[effect] is not None):
+        other = search.reduced(kept, effect)
+        if other.sse - kept.sse < MIN_SHARE * (without[effect].sse - final.sse):
+            kept = other
+    if kept is beside:
         problem.unnamed = taken_out
         return found, result, hidden
-    contenders, left_out = search.rivals(fewer, without), problem.unnamed
-    judged = weighed(problem, fewer, [*hidden, *whole])
+    left_out = problem.unnamed
+    needed = {effect: search.reduced(kept, effect) for effect in without if effect in kept.spec.effects}
+    contenders = search.rivals(kept, needed)
+    judged = weighed(problem, kept, [*hidden, *whole])
     problem.unnamed = left_out
-    return search, (fewer, without, contenders), [one for one, nats in judged if nats > LEAST_NATS]
+    return search, (kept, needed, contenders), [one for one, nats in judged if nats > LEAST_NATS]
+
+
+def _spring_of(fit: Fit, effect: str) -> int | None:
+    """Return the spring, from 0, of which alone an effect is; None where it is of several."""
+    names = {name for free in fit.spec.free if free.effect == effect for name in free.names}
+    springs = {name.partition("[")[2] for name in names}
+    one = springs.pop() if len(springs) == 1 else ""
+    return int(one[:-1]) - 1 if one else None
+
+
+def _place(cause: Cause) -> int:
+    """Return the spring, from 0, at which alone a cause acts; -1 where at several."""
+    there = {int(k) for profile in cause.profiles if profile is not None for k in np.flatnonzero(profile.any(axis=0))}
+    return there.pop() if len(there) == 1 else -1
 
 
 def _all_the_time(problem: Problem, one: Hidden) -> Hidden:
