@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -84,6 +85,28 @@ def test_held_out_blocks_are_not_fitted(make_log) -> None:
     freer = problem.fit(spec, fit.as_dict())
     left_in = statistics.rms(freer.residual)
     assert problem.holdout_rmse(freer) > 1.2 * left_in
+
+
+def test_held_out_errors_are_those_of_fits_to_the_rest(make_log) -> None:
+    """By slopes alone, and as if each fifth of the log had not been there."""
+    run = read_log(make_log(seed=6, effects={"edge_loss": {"edge_loss_fraction": 0.2}}))
+    problem = Problem(Array(), [run])
+    spec = base_spec(problem)
+    problem.learn_starts(spec, [free.start for free in spec.free])
+    fit = problem.fit(spec)
+    at, squares = fold_of_rows(run), 0.0
+    for fold in range(FOLDS):
+        rest = replace(run, temperature_c=np.where((at == fold)[:, None], np.nan, run.temperature_c))
+        without = Problem(Array(), [rest])
+        without.noise = problem.noise
+        without.learn_starts(spec, [free.start for free in spec.free])
+        again = without.fit(spec, fit.as_dict())
+        # from the first readings of the whole log, which the first block has
+        left = problem.residuals(problem.predictions(spec, again.values))[0]
+        squares += float(np.nansum(left[at == fold] ** 2))
+    refitted = math.sqrt(squares / problem.count)
+    assert problem.holdout_rmse(fit) == pytest.approx(refitted, rel=0.01)
+    assert refitted > 1.01 * statistics.rms(fit.residual)
 
 
 def test_every_row_is_in_one_fold_and_folds_are_alike(make_log) -> None:

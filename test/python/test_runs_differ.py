@@ -11,6 +11,7 @@ from ninespring.logs import log_text, read_log
 from ninespring.models import Array, Model
 from ninespring.report.page import findings
 from ninespring.verdict import diagnosis
+from two_heaters import levels
 
 CAPACITY, LOSS, LINK, FULL_W, ROOM_C, NOISE_C = 2.0, 0.012, 0.004, 0.7, 21.0, 0.05
 
@@ -21,10 +22,7 @@ def two_heaters(folder: Path, runs: list[dict[str, float]], *, volts: bool = Fal
     for number, own in enumerate(runs):
         rng = np.random.default_rng(number)
         time_s = np.arange(600.0)
-        level = np.zeros((600, 2))
-        for k in range(2):
-            for at in range(10 + 35 * k, 600, 70):
-                level[at : at + 70, k] = rng.choice([0.0, 0.3, 0.6, 1.0])
+        level = levels(rng)
         room = ROOM_C + own.get("room", 0.0)
         true, shown = np.full(2, room), np.empty((600, 2))
         for row in range(600):

@@ -19,16 +19,14 @@ from ninespring.recording import script_lines
 from ninespring.search import evidence, search
 from ninespring.verdict import diagnosis, experiments
 from ninespring.verdict.residual import surrogate
+from two_heaters import levels
 
 
 def commanded(path: Path, on: dict[str, dict[str, float]], seed: int = 0) -> Path:
     """Write a 1 x 2 log of 600 s at 1 Hz where only the command is known, as two heaters on an Arduino give it."""
     rng = np.random.default_rng(seed)
     time_s = np.arange(600.0)
-    drive = np.zeros((600, 2))
-    for k in range(2):
-        for at in range(10 + 35 * k, 600, 70):
-            drive[at : at + 70, k] = rng.choice([0.0, 0.3, 0.6, 1.0])
+    drive = levels(rng)
     plant = native.Plant(1, 2)
     plant.set_all({"heat_capacity_j_per_k": 2.0, "loss_w_per_k": 0.012, "orthogonal_w_per_k": 0.004})
     plant.set_all({"command_power_w[1]": 0.8, "command_power_w[2]": 0.4})

@@ -7,17 +7,21 @@ import pytest
 from ninespring import native
 from ninespring.logs import read_log
 from ninespring.models import Array
+from ninespring.search import unnamed
 from ninespring.verdict import diagnosis
 
 EDGES = {"edge_loss": {"edge_loss_fraction": 0.2}}
+LATENT = {"latent_heat": {"latent_heat_j": 7.0}}
+WAKE = {"fan_wake": {"wake_w_per_k": 1.5e-3}}
 
 
-def astray(columns: dict[str, np.ndarray], extra: np.ndarray) -> None:
+def astray(columns: dict[str, np.ndarray], extra: np.ndarray, effects: dict[str, dict[str, float]] = EDGES) -> None:
     """Add to the temperatures what heat beside that of the currents makes of the same array."""
     rows = len(columns["fan"])
     plant = native.Plant(3, 3)
-    plant.set_effects(EDGES)
-    plant.set_all(EDGES["edge_loss"])
+    plant.set_effects(effects)
+    for values in effects.values():
+        plant.set_all(values)
     time_s, fan, around = np.arange(float(rows)), columns["fan"], np.full(rows, 20.0)
     power = np.column_stack([columns[f"i{k + 1}_a"] ** 2 * 0.2 for k in range(9)])
     shown = []
@@ -68,3 +72,41 @@ def test_a_trickle_of_heat_is_no_thermometer_with_an_offset(make_log) -> None:
     (cause,) = found["unnamed"]
     assert "spring 4 is given heat all the time" in cause["text"]
     assert cause["size"] == pytest.approx(0.06, abs=0.005)
+
+
+def test_names_that_stand_in_for_a_trickle_of_heat_go_and_the_true_one_stays(make_log) -> None:
+    """A thermometer's gain and a spring's own loss would explain it together, beside the latent heat that is there."""
+
+    def trickle(columns: dict[str, np.ndarray]) -> None:
+        extra = np.zeros((len(columns["fan"]), 9))
+        extra[:, 6] = 0.06
+        astray(columns, extra, LATENT)
+
+    runs = [read_log(make_log(f"{seed}.csv", effects=LATENT, seed=seed, change=trickle)) for seed in (3, 4)]
+    found = diagnosis.diagnose(Array(), runs).result
+    assert [one["name"] for one in found["effects"]] == ["latent_heat"] and found["unexplained"]
+    assert any("spring 7 is given heat all the time" in one["text"] for one in found["unnamed"])
+
+
+def test_a_thermometer_that_comes_loose_is_none_that_always_shows_less(make_log) -> None:
+    """Were it false all the time, it would have to be right again where the logs begin: the simpler words are the unnamed."""
+
+    def loosens(columns: dict[str, np.ndarray]) -> None:
+        columns["t2_c"][150:] = 20.0 + 0.7 * (columns["t2_c"][150:] - 20.0)
+
+    runs = [read_log(make_log(f"{seed}.csv", effects=WAKE, seed=seed, change=loosens)) for seed in (3, 4)]
+    found = diagnosis.diagnose(Array(), runs).result
+    assert [one["name"] for one in found["effects"]] == ["fan_wake"] and found["unexplained"]
+    assert any("thermometer 2 shows more of its spring's rise" in one["text"] for one in found["unnamed"])
+
+
+def test_what_only_leads_on_what_is_there_is_not_found_the_other_way_round(make_log) -> None:
+    """A thermometer that shows more than its spring's own rise over a neighbour's sees no spring by less than nothing."""
+
+    def apart(columns: dict[str, np.ndarray]) -> None:
+        columns["t2_c"] = columns["t2_c"] + 0.08 * (columns["t2_c"] - columns["t3_c"])
+
+    runs = [read_log(make_log(f"{seed}.csv", seed=seed, change=apart)) for seed in (3, 4)]
+    found = diagnosis.diagnose(Array(), runs).result
+    assert found["unexplained"] or found["effects"]
+    assert all(one["size"] > 0 for one in found["unnamed"] if one["kind"] in unnamed.GIVES_ONLY)

@@ -37,6 +37,8 @@ MATERIAL_KEYS = {
     "austenite_finish_c": (-50.0, 200.0),
     "emissivity": (0.0, 1.0),
 }
+STIFFNESS_KEYS = SPRING_KEYS | {key: MATERIAL_KEYS[key] for key in stiffness.MATERIAL} | stiffness.NUMBERS
+"""Of `[stiffness]`: its numbers."""
 COUPLED = ("orthogonal_", "diagonal_", "second_", "wake_w")
 """What the stiffness layer has times `stiffness_coupling_scale`."""
 BOARD_KEYS = {"supply_limit_a": (0.1, 60.0), "boost_current_a": (0.1, 3.2), "open_current_a": (0.0, 3.2)}
@@ -80,6 +82,18 @@ class Array:
                 "and an array or model without [stiffness]"
             )
 
+    def of_layer(self, layer: str) -> Array:
+        """Return one layer alone: its springs, where `[stiffness]` says nothing those above; no boards, nothing of the other."""
+        own = (self.stiffness or {}) if stiffness.LAYERS.index(layer) else {}
+        return Array(
+            self.rows,
+            self.cols,
+            self.pitch_mm,
+            self.spring | {key: own[key] for key in SPRING_KEYS if key in own},
+            self.material | {key: own[key] for key in stiffness.MATERIAL if key in own},
+            self.sensor,
+        )
+
     @property
     def parts(self) -> list[native.Part]:
         """Springs of each board."""
@@ -109,20 +123,7 @@ def model_of_layer(model: Model, layer: str) -> Model:
     array, which = model.array, stiffness.LAYERS.index(layer)
     if array.stiffness is None:
         raise InputError(f"--layer {layer}: the model has one layer", model.name)
-    own = array.stiffness if which else {}
-    out = Model(
-        Array(
-            array.rows,
-            array.cols,
-            array.pitch_mm,
-            array.spring | {key: own[key] for key in SPRING_KEYS if key in own},
-            array.material | {key: own[key] for key in stiffness.MATERIAL if key in own},
-            array.sensor,
-        ),
-        list(model.effects),
-        provenance=model.provenance,
-        name=model.name,
-    )
+    out = Model(array.of_layer(layer), list(model.effects), provenance=model.provenance, name=model.name)
     n, scale = out.array.springs, model.parameters.get("stiffness_coupling_scale", 1.0)
     values = dict(model.parameters)
     if which and scale != 1.0:  # what the model does not say, and the plant has
@@ -180,12 +181,11 @@ def _array(file: TomlFile) -> Array:
 def _stiffness(file: TomlFile) -> dict[str, Any] | None:
     if file.get(("stiffness",)) is None:
         return None
-    numbers = SPRING_KEYS | {key: MATERIAL_KEYS[key] for key in stiffness.MATERIAL} | stiffness.NUMBERS
-    given = dict(file.table(("stiffness",), (*numbers, *stiffness.WORDS)))
+    given = dict(file.table(("stiffness",), (*STIFFNESS_KEYS, *stiffness.WORDS)))
     for key, value in given.items():
         at = ("stiffness", key)
-        if key in numbers:
-            given[key] = file.number(at, *numbers[key])
+        if key in STIFFNESS_KEYS:
+            given[key] = file.number(at, *STIFFNESS_KEYS[key])
         elif value not in (words := stiffness.WORDS[key]):
             has = f"{did_you_mean(str(value), words)}; it has {', '.join(words)}"
             raise file.refuse(f"[stiffness] {key} has no '{value}'{has}", at)

@@ -2,9 +2,9 @@
 
 from collections.abc import Iterator
 
+from ..fit.simulate import SHIFT_PER_N
 from .effect import Candidate, Effect, Numbers, Scene, linear, sized
 
-PER_NEWTON = "transformation_shift_k_per_n"
 LOADED = "by the logged load"
 
 
@@ -15,11 +15,11 @@ def _candidates(scene: Scene) -> Iterator[Candidate]:
     if scene.load_moves:
         yield Candidate(
             LOADED,
-            (linear(PER_NEWTON, -20.0, 20.0, 0.0, 1.0),),
-            ({PER_NEWTON: 2.0},),
+            (linear(SHIFT_PER_N, -20.0, 20.0, 0.0, 1.0),),
+            ({SHIFT_PER_N: 2.0},),
             signed=True,
             most=8.0,
-            more_starts=({PER_NEWTON: 6.0}, {PER_NEWTON: -6.0}),
+            more_starts=({SHIFT_PER_N: 6.0}, {SHIFT_PER_N: -6.0}),
         )
     if scene.springs < 2:
         return

@@ -101,16 +101,15 @@ def two_rods(mesh: Mesh, joint_diameter_mm: float = 2.0) -> tuple[float, float]:
     """
     around = Cooling(plate="none", margin_mm=2.0)
     spring = spring_of(Array(), around)
-    steel, gap_mm = MATERIALS["steel"], 0.002
-    below = Below(spring, gap_mm, steel, joint_diameter_mm)
+    joint = {"joint": "steel", "gap_mm": 0.002, "joint_diameter_mm": joint_diameter_mm}
+    below = Below(spring, joint["gap_mm"], MATERIALS[joint["joint"]], joint_diameter_mm)
     geometry = Geometry(1, 1, 5.0, spring, around, below=below)
     mesh = replace(mesh, along=mesh.corners // 4)  # a spring is nine times as long as what the joint cools of it
     field = build(geometry, False, mesh, Film(0.0, 0.005, 2e-4))
     answers = field.spring.T @ Solver(field).solve(0.0, field.spring)
     both, apart = (1.0 / (answers[0, 0] + sign * answers[0, 1]) for sign in (1, -1))
     along = spring.along_w_per_mk * math.pi * spring.radius_mm**2 / spring.length_mm * MM
-    joint = steel.conductivity * math.pi / 4.0 * joint_diameter_mm**2 / gap_mm * MM
-    return (apart - both) / 2.0, stiffness.series_w_per_k(both, along, joint)
+    return (apart - both) / 2.0, stiffness.series_w_per_k(both, along, stiffness.joint_w_per_k(joint))
 
 
 PROBLEMS: dict[str, Callable[[Mesh], tuple[float, float]]] = {

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import InputError
-from ..models import SPRING_KEYS, Array
+from ..models import Array
 from . import stiffness
 from .cooling import MATERIALS, Cooling, Material, cooling_of
 
@@ -159,13 +159,7 @@ def geometry_of(array: Array, rows: int | None = None, cols: int | None = None) 
 def below_of(array: Array) -> Below:
     """Return the stiffness layer; where `[stiffness]` says nothing, its springs are those above."""
     given = stiffness.with_defaults(array.stiffness or {})
-    own = Array(
-        array.rows,
-        array.cols,
-        array.pitch_mm,
-        array.spring | {key: given[key] for key in SPRING_KEYS if key in given},
-        array.material | {key: given[key] for key in stiffness.MATERIAL if key in given},
-    )
+    own = array.of_layer("stiffness")
     wound = {"wire_diameter_mm", "coil_diameter_mm", "turns"} & set(given)
     if wound and "wire_length_mm" not in given:
         own.spring.pop("wire_length_mm", None)  # it is the length of the spring above

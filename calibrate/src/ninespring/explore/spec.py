@@ -18,7 +18,7 @@ import numpy as np
 from .. import native
 from ..errors import InputError
 from ..logs import read_bytes
-from ..models import MATERIAL_KEYS, SPRING_KEYS, Array
+from ..models import MATERIAL_KEYS, SPRING_KEYS, STIFFNESS_KEYS, Array
 from ..pattern import pattern_of
 from ..toml_file import TomlFile, did_you_mean
 from . import cooling, stiffness
@@ -47,15 +47,14 @@ OWN: dict[str, tuple[Any, float, float]] = {
     "transformation_spread_k": (0.0, 0.0, 20.0),
 }
 """Key: what it is where nothing is said, and its limits. `size` n is rows = cols = n."""
-BELOW = SPRING_KEYS | {key: MATERIAL_KEYS[key] for key in stiffness.MATERIAL} | stiffness.NUMBERS
-STIFFNESS = {f"stiffness_{key}": key for key in (*BELOW, *stiffness.WORDS)}
+STIFFNESS = {f"stiffness_{key}": key for key in (*STIFFNESS_KEYS, *stiffness.WORDS)}
 """Key: that of `[stiffness]` in array.toml."""
 LIMITS: dict[str, tuple[float, float]] = (
     {key: (low, high) for key, (_, low, high) in OWN.items()}
     | SPRING_KEYS
     | MATERIAL_KEYS
     | cooling.NUMBERS
-    | {f"stiffness_{key}": limits for key, limits in BELOW.items()}
+    | {f"stiffness_{key}": limits for key, limits in STIFFNESS_KEYS.items()}
 )
 WORDS = {"policy": POLICIES, "pattern": PATTERNS, **cooling.WORDS, "stiffness_joint": stiffness.WORDS["joint"]}
 WHOLE = ("rows", "cols", "size", "layers", "board_rows", "board_cols")

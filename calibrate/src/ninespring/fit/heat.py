@@ -86,7 +86,7 @@ def step_answers(
                 part(plant, usual, at, since + 1)
                 at = since
             twins = [plant.copy() for _ in given]
-            shown = problem.pool.map(lambda k: part(twins[k], given[k], since, end), range(run.springs))  # noqa: B023
+            shown = problem.each(lambda k: part(twins[k], given[k], since, end), range(run.springs))  # noqa: B023
             for k, one in enumerate(shown):
                 out["heat", k][number, since:end] = (one - rest[since - begin :]) / size
 
@@ -132,4 +132,4 @@ def _shown(problem: Problem, fit: Fit, r: int, extra_w: Sequence[np.ndarray]) ->
         plant = problem.plant_for(fit.spec, fit.values, r)
         return simulate_run(plant, _with_heat(problem, fit, r, run, power, extra), ambient, {})
 
-    return list(problem.pool.map(one, extra_w))
+    return problem.each(one, extra_w)

@@ -10,12 +10,13 @@ import concurrent.futures
 import math
 import os
 import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from scipy.interpolate import CubicSpline
-from scipy.optimize import OptimizeResult, least_squares
+from scipy.optimize import OptimizeResult, least_squares, lsq_linear
 
 from .. import native
 from ..logs.run import Run
@@ -27,8 +28,9 @@ from .spec import AMBIENT_OFFSET, DRIVE_GAIN, RUN_DRIVE, SENSOR_OFFSET, Fit, Spe
 WORKERS = max(1, min(8, os.cpu_count() or 1))
 REUSED = 0.1
 """Movement, in the inner coordinates, up to which a slope is used again: a tenth of what matters."""
-FORETOLD = 0.3
-"""Part of what a step changed that slopes may have foretold wrongly and still be mended, not simulated again."""
+FORETOLD = 0.5
+"""Part of what a step changed that slopes may have foretold wrongly and still be mended, not simulated again: they are right
+for the greater part."""
 _BAD = 1e3
 """What a simulation that the plant refuses 'shows', degC: so far off that no fit goes there."""
 
@@ -78,7 +80,7 @@ class Problem:
         self.basis: list[np.ndarray | None] = [None] * len(self.runs)
         self.start_response: list[np.ndarray | None] = [None] * len(self.runs)
         self.unnamed: np.ndarray | None = None
-        self.pool = concurrent.futures.ThreadPoolExecutor(WORKERS)
+        self._pool = concurrent.futures.ThreadPoolExecutor(WORKERS) if WORKERS > 1 else None
         self.simulations = 0
         self._count_lock = threading.Lock()
         base = native.Plant(array.rows, array.cols)
@@ -184,9 +186,13 @@ class Problem:
 
     def simulate_many(self, jobs: Sequence[tuple[Spec, Sequence[float], int]]) -> list[np.ndarray]:
         """Simulate (spec, values, run) jobs in parallel threads."""
-        if len(jobs) == 1:
-            return [self.simulate(*jobs[0])]
-        return list(self.pool.map(lambda job: self.simulate(*job), jobs))
+        return self.each(lambda job: self.simulate(*job), jobs)
+
+    def each(self, make: Callable[[Any], Any], jobs: Sequence[Any]) -> list[Any]:
+        """Return what each job makes, in parallel threads where there are several of both."""
+        if self._pool is None or len(jobs) == 1:
+            return [make(job) for job in jobs]
+        return list(self._pool.map(make, jobs))
 
     def predictions(self, spec: Spec, values: Sequence[float]) -> list[np.ndarray]:
         """Return what all runs should show."""
@@ -230,13 +236,11 @@ class Problem:
             holdout=math.nan,
         )
 
-    def vector(self, fields: Sequence[np.ndarray], weights: Sequence[np.ndarray] | None = None) -> np.ndarray:
+    def vector(self, fields: Sequence[np.ndarray]) -> np.ndarray:
         """Return fields (per run, degC) as one vector in units of the noise, starts whitened out."""
-        return self.vectors([fields], weights)[0]
+        return self.vectors([fields])[0]
 
-    def vectors(
-        self, several: Sequence[Sequence[np.ndarray | None]], weights: Sequence[np.ndarray] | None = None
-    ) -> np.ndarray:
+    def vectors(self, several: Sequence[Sequence[np.ndarray | None]]) -> np.ndarray:
         """Return several fields (per run, degC; None: zero) as vectors, (fields, count): together, which is far quicker."""
         out = np.zeros((len(several), self.count))
         begin = 0
@@ -248,14 +252,16 @@ class Problem:
             begin = end
         if self.unnamed is not None:
             out -= (out @ self.unnamed) @ self.unnamed.T
-        begin = 0
-        for r, (mask, basis) in enumerate(zip(self.mask, self.basis, strict=True)):
+        return self._whitened(out.T).T
+
+    def _whitened(self, columns: np.ndarray, back: bool = False) -> np.ndarray:
+        """Return columns (count, n) with errors of the first readings whitened out, or `back` from there."""
+        out, begin = columns.copy(), 0
+        for mask, basis in zip(self.mask, self.basis, strict=True):
             end = begin + int(mask.sum())
-            part = out[:, begin:end]
-            if weights is not None:
-                part *= weights[r][mask]
             if basis is not None:
-                part -= (part @ basis) @ basis.T
+                left = 1.0 - (basis**2).sum(axis=0)
+                out[begin:end] += (basis / left if back else -basis) @ (basis.T @ out[begin:end])
             begin = end
         return out
 
@@ -277,7 +283,7 @@ class Problem:
             jobs.append((r, np.zeros(run.springs)))
             for k in range(run.springs):
                 jobs.append((r, np.eye(run.springs)[k]))
-        shown = list(self.pool.map(lambda job: self.simulate(spec, values, job[0], job[1]), jobs))
+        shown = self.each(lambda job: self.simulate(spec, values, job[0], job[1]), jobs)
         at = 0
         for r, run in enumerate(self.runs):
             base = shown[at]
@@ -318,7 +324,6 @@ class Problem:
         spec: Spec,
         values: np.ndarray,
         predicted: Sequence[np.ndarray],
-        weights: Sequence[np.ndarray] | None = None,
         columns: Sequence[int] | None = None,
     ) -> np.ndarray:
         """Return d(residual vector)/d(inner coordinate) by one-sided differences, simulated in parallel."""
@@ -343,7 +348,7 @@ class Problem:
         changes: list[list[np.ndarray | None]] = [[None] * len(self.runs) for _ in position]
         for (c, r, step), field_c in zip(where, shown, strict=True):
             changes[position[c]][r] = (predicted[r] - field_c) / step
-        return self.vectors(changes, weights).T
+        return self.vectors(changes).T
 
     def fit(
         self,
@@ -352,14 +357,15 @@ class Problem:
         *,
         tolerance: float = 1e-4,
         max_steps: int = 25,
-        weights: Sequence[np.ndarray] | None = None,
         errors: bool = False,
         near: Fit | None = None,
+        settle: bool = True,
     ) -> Fit:
         """Fit the spec's free numbers by bounded least squares. `start` overrides starting values by key.
 
         A column of the slope is simulated again only where the numbers have moved by REUSED since: a slope that is a few
         hundredths off changes the way to the minimum, not the minimum. `near` is a fit whose slopes serve to begin with.
+        Without `settle` it may end before the minimum: for what is only begun. It then has no slopes for another to begin with.
         """
         begun = self.simulations
         free = list(spec.free)
@@ -368,7 +374,7 @@ class Problem:
         if not free:
             predicted = self.predictions(spec, values)
             left = self.residuals(predicted)
-            vector = self.vector(left, weights)
+            vector = self.vector(left)
             return Fit(
                 spec,
                 values,
@@ -391,7 +397,7 @@ class Problem:
             key = z.tobytes()
             if key not in cache:
                 shown = self.predictions(spec, outer(z))
-                cache[key] = (shown, self.vector(self.residuals(shown), weights))
+                cache[key] = (shown, self.vector(self.residuals(shown)))
                 if len(cache) > 4:
                     cache.pop(next(iter(cache)))
             return cache[key]
@@ -401,10 +407,9 @@ class Problem:
         if near is not None and near.jacobian is not None and len(near.jacobian) == self.count:
             there = {f.key: f.inner(v) for f, v in zip(near.spec.free, near.values, strict=True)}
             at = np.array([there.get(key, np.nan) for key in keys])
-            weight = 1.0 if weights is None else np.concatenate([w[m] for w, m in zip(weights, self.mask, strict=True)])
             for column, f in enumerate(near.spec.free):
                 if f.key in keys:
-                    known[keys.index(f.key)] = (at, near.jacobian[:, column] * weight)
+                    known[keys.index(f.key)] = (at, near.jacobian[:, column])
 
         mended: list[bool] = []
         secant: list[tuple[np.ndarray, np.ndarray]] = []
@@ -425,7 +430,7 @@ class Problem:
             if not foretold:
                 stale = [c for c in range(len(free)) if c not in known or np.nanmax(np.abs(z - known[c][0])) > REUSED]
                 if stale:
-                    fresh = self.jacobian(spec, outer(z), run(z)[0], weights, stale)
+                    fresh = self.jacobian(spec, outer(z), run(z)[0], stale)
                     known.update({c: (z.copy(), fresh[:, k]) for k, c in enumerate(stale)})
             secant[:] = [(z.copy(), vector)]
             return np.column_stack([known[c][1] for c in range(len(free))])
@@ -452,7 +457,7 @@ class Problem:
             )
 
         found = descend(z0)
-        if mended:
+        if mended and settle:
             # slopes that were mended may end before the minimum: fresh ones say whether they did
             known.clear()
             secant.clear()
@@ -465,7 +470,7 @@ class Problem:
             float(vector @ vector),
             self.count,
             self.residuals(shown),
-            jac,
+            jac if settle or not mended else None,
             vector,
         )
         fit.sse = self.plain(fit.residual)
@@ -480,25 +485,41 @@ class Problem:
     def holdout_rmse(self, fit: Fit) -> float:
         """Return the rms error, degC, on blocks held out of the fit, one fold after the other.
 
-        Every fifth block of about two minutes is left out, the numbers are fitted to the rest from where they
-        were, and the whole run is simulated with them: the error counts where they have not seen the data.
+        Every fifth block of about two minutes is left out, the numbers are fitted to the rest, and the error counts where
+        they have not seen the data. They move little: by the fit's slopes, within their bounds, nothing simulated.
         """
         if not len(fit.values):
             return statistics.rms(fit.residual)
         if math.isfinite(fit.holdout):
             return fit.holdout
-        total, count = 0.0, 0
-        rows = [fold_of_rows(run) for run in self.runs]
-        for fold in range(FOLDS):
-            out = [one == fold for one in rows]
-            weights = [
-                np.broadcast_to(~o[:, None], mask.shape).astype(float) for o, mask in zip(out, self.mask, strict=True)
+        free = fit.spec.free
+        z = np.array([f.inner(v) for f, v in zip(free, fit.values, strict=True)])
+        low, high = np.array([f.inner(f.low) for f in free]), np.array([f.inner(f.high) for f in free])
+        trust = np.array([1.0 / f.prior if f.prior else 0.0 for f in free])
+        believed = trust * (z - np.array([f.inner(f.start) for f in free]))
+        jac = fit.jacobian
+        if jac is None:
+            jac = self.jacobian(fit.spec, fit.values, self.predictions(fit.spec, fit.values))
+        slopes = self._whitened(jac, back=True)
+        left = np.concatenate(self.scaled(fit.residual))
+        fold = np.concatenate(
+            [
+                np.broadcast_to(fold_of_rows(run)[:, None], mask.shape)[mask]
+                for run, mask in zip(self.runs, self.mask, strict=True)
             ]
-            again = self.fit(fit.spec, fit.as_dict(), weights=weights, tolerance=1e-3, max_steps=4, near=fit)
-            for residual, o in zip(again.residual, out, strict=True):
-                total += float(np.nansum(residual[o] ** 2))
-                count += int(np.isfinite(residual[o]).sum())
-        fit.holdout = math.sqrt(total / max(1, count))
+        )
+        noise = np.concatenate([np.broadcast_to(n, m.shape)[m] for n, m in zip(self.noise, self.mask, strict=True)])
+        both = np.column_stack([slopes, left])
+        total = 0.0
+        for number in range(FOLDS):
+            out = fold == number
+            rows = self._whitened(np.where(out[:, None], 0.0, both))
+            rows = np.vstack([rows, np.column_stack([np.diag(trust), believed])])
+            inside = np.linalg.qr(rows, mode="r")
+            bounds = (np.minimum(low - z, -1e-9), np.maximum(high - z, 1e-9))
+            moved = lsq_linear(inside[:, :-1], -inside[:, -1], bounds, method="bvls").x
+            total += float(((noise * (left + slopes @ moved))[out] ** 2).sum())
+        fit.holdout = math.sqrt(total / max(1, self.count))
         return fit.holdout
 
     def add_errors(self, fit: Fit) -> None:

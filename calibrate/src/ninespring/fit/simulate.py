@@ -8,9 +8,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from .. import native
-from ..explore import stiffness
 from ..logs.run import Run
-from ..models import SPRING_KEYS, Array
+from ..models import Array
 
 EACH = (
     "heat_capacity_j_per_k",
@@ -122,11 +121,9 @@ def load_changes(load_n: np.ndarray) -> np.ndarray:
 def array_parameters(array: Array) -> dict[str, float]:
     """Return the plant's parameters that follow from array.toml: the host tools' rules (docs/files.md)."""
     out = _layer_parameters(array)
-    own = array.stiffness or {}
-    spring = array.spring | {key: own[key] for key in SPRING_KEYS if key in own}
-    material = array.material | {key: own[key] for key in stiffness.MATERIAL if key in own}
-    if (spring, material) != (array.spring, array.material):
-        below = _layer_parameters(Array(array.rows, array.cols, None, spring, material))
+    own, lower = array.stiffness or {}, array.of_layer("stiffness")
+    if (lower.spring, lower.material) != (array.spring, array.material):
+        below = _layer_parameters(lower)
         own = own | {name: below[name] for name in EACH if below[name] != out.get(name)}
     for name in ("transformation_shift_k", *EACH):
         if name in own:

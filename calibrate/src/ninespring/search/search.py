@@ -152,10 +152,13 @@ class Search:
             if self.thorough or len(added) == 1:
                 starts += [start | other for other in (*candidate.more_starts, *others)]
         # several starts race: all begin, the one that is ahead goes on
-        steps = SPRINT if len(starts) > 1 else STEPS
-        begun = [self.problem.fit(spec, one, tolerance=1e-3, max_steps=steps, near=fit) for one in starts]
+        race = len(starts) > 1
+        steps = SPRINT if race else STEPS
+        begun = [
+            self.problem.fit(spec, one, tolerance=1e-3, max_steps=steps, near=fit, settle=not race) for one in starts
+        ]
         best = min(begun, key=lambda one: one.chi2)
-        if len(starts) > 1:
+        if race:
             best = self.problem.fit(spec, best.as_dict(), tolerance=1e-3, max_steps=STEPS, near=best)
         self.fits[key] = best
         return best

@@ -24,7 +24,7 @@ from ..fit.simulate import simulate_run
 from ..fit.spec import Fit
 from ..logs.run import Run
 from .evidence import fit_factor, unexplained
-from .search import Search
+from .search import MIN_SHARE, Search
 
 COARSER = 2
 """Of those times, as many as one where something comes and goes all the time."""
@@ -44,11 +44,13 @@ MOST = 12
 """Unnamed causes, at most: where more would help, it is no cause of these kinds."""
 ROUNDS = 4
 """Of finding what has no name and searching the library beside it, at most ..."""
-ENOUGH = 12_000
-"""... and none is begun after so many simulations: the last one ends within half a minute of one core for two 15 min logs of
-nine springs."""
-SHOWN = ("pickup", "mixing", "sensor", "reading")
+ENOUGH = 15_000
+"""... and none is begun that, if it takes as many simulations as the longest before it, ends after so many: half a minute of
+one core for two 15 min logs of nine springs."""
+SHOWN = ("pickup", "mixing", "sensor", "reading", "share")
 """Kinds that are the thermometers' own: the springs are as they would be without."""
+GIVES_ONLY = ("mixing", "crosstalk", "bridge", "plume", "delay")
+"""Kinds whose size cannot be negative: they lead on what is there, and a part of it at most."""
 UNITS = {
     "pickup": "K",
     "bridge": "W/K",
@@ -63,6 +65,13 @@ SHARE = 0.1
 """Of what is left beyond the noise, the part that an unnamed cause must explain."""
 LEAST_NATS = 3.0
 """Evidence after all prices: one in twenty."""
+
+
+STEPS_OF_FIT = 14
+"""Of one fit beside them, at most."""
+
+Found = tuple[Fit, dict[str, Fit], list[tuple[str, Fit]]]
+"""As `Search.run` returns it."""
 
 
 @dataclass(frozen=True)
@@ -112,6 +121,10 @@ class Hidden:
             "unit": unit,
             "text": f"{self.text}: {sized(self.size, self.error, unit) if unit != '1' else sized(self.size, self.error, '%', 100.0)}",
         }
+
+
+Beside = tuple[Search, Found, list[Hidden]]
+"""A search beside unnamed causes, what it found, and those causes."""
 
 
 def _delayed(power: np.ndarray, time_s: np.ndarray, delay_s: float) -> np.ndarray:
@@ -174,6 +187,7 @@ def library(problem: Problem, fit: Fit) -> list[Cause]:
         ambient = problem.ambient_of(r, by_key)
         shown = simulate_run(plant, run, ambient, by_key)
         around = np.full(len(run.time_s), plant.get("ambient_c")) if ambient is None else ambient
+        rise = shown - around[:, None]
         # where something unknown acts, the readings know better than the fit how warm the springs are
         read = pd.DataFrame(run.temperature_c).rolling(SMOOTHED, center=True, min_periods=1).mean().to_numpy()
         shown = np.where(np.isfinite(read), read, shown)
@@ -189,7 +203,7 @@ def library(problem: Problem, fit: Fit) -> list[Cause]:
             profiles.setdefault(key, [None] * len(problem.runs))[r] = profile
             scaled = np.where(problem.mask[r], moved.get(key, profile) / problem.noise[r], 0.0)
             columns.setdefault(key, nothing)[r] = thin(scaled[:, :, None])
-        windows += _windows(problem, fit, r, samples, power, lost, loss_w_per_k, typical)
+        windows += _windows(problem, fit, r, samples, power, lost, rise, loss_w_per_k, typical)
     everywhere = [Cause(*key, tuple(profiles[key]), np.concatenate(parts)) for key, parts in columns.items()]
     return everywhere + windows + _often(windows)
 
@@ -279,6 +293,7 @@ def _windows(
     samples: Sequence[int],
     power: np.ndarray,
     lost: np.ndarray,
+    rise: np.ndarray,
     loss_w_per_k: np.ndarray,
     typical_w: float,
 ) -> list[Cause]:
@@ -324,6 +339,9 @@ def _windows(
         out.append(cause("contact", f"the drive of spring {k + 1} changes", _only(k, power[:, k], springs), driven))
         out.append(cause("heat", f"spring {k + 1} is given heat", _only(k, one, springs), answer["heat", k]))
         out.append(cause("sensor", f"thermometer {k + 1} jumps", _only(k, one, springs), jumps))
+        text = f"thermometer {k + 1} shows more of its spring's rise"
+        # of the fit's own rise: a part of the readings would explain all that they show
+        out.append(cause("share", text, _only(k, rise[:, k], springs), jumps * rise))
     out.append(cause("gust", "all losses change", -lost, everything_lost))
     out.append(cause("surroundings", "the surroundings are warmer", np.outer(loss_w_per_k, np.ones(springs)), warmer))
     if springs > 1:
@@ -383,12 +401,15 @@ def find(
     often = [one for one in kinds if one.spans and one.text not in known]
     windows = [one for one in kinds if one.edges]
     matrix = np.column_stack([one.columns[:, 0] for one in single])
+    either = np.array([one.kind not in GIVES_ONLY for one in single])
     whole = (matrix**2).sum(axis=0)
     power = whole - ((basis.T @ matrix) ** 2).sum(axis=0)
     grams, often_grams = ([_gram(one.columns, basis) for one in some] for some in (windows, often))
     tried = len(single) + sum(one.columns.shape[1] ** 2 / 2 for one in windows)
     while len(found) < most:
-        gain = np.where(power > 1e-3 * whole, (matrix.T @ left) ** 2 / np.maximum(power, 1e-12), 0.0)
+        moment = matrix.T @ left
+        possible = (power > 1e-3 * whole) & (either | (moment > 0))
+        gain = np.where(possible, moment**2 / np.maximum(power, 1e-12), 0.0)
         k = int(np.argmax(gain))
         drop, vector, best, span = float(gain[k]), matrix[:, k], single[k], (0, None)
         for one, gram in zip(windows, grams, strict=True):
@@ -465,34 +486,103 @@ def weighed(problem: Problem, fit: Fit, hidden: Sequence[Hidden]) -> list[tuple[
     return out
 
 
-def _alone(problem: Problem, base: Fit, final: Fit) -> Fit | None:
-    """Return the declared model's fit beside the unnamed cause that it calls for, where that one explains more than all the
-    library found: then the library's names may stand in for it. None where it does not.
+def _with_fewer(problem: Problem, first: Search, final: Fit, kinds: Sequence[Cause]) -> Fit | None:
+    """Return the best fit of some of the names, or none, beside the one unnamed cause that it calls for: where that explains
+    more than all the names, the others may stand in for it. None where it does not.
     """
-    grown = find(problem, base, library(problem, base), (), most=1)
-    if not grown or len(final.spec.effects) == len(base.spec.effects):
-        return None
-    problem.leave_out(grown[0].column)
-    fit = problem.fit(base.spec, base.as_dict(), tolerance=1e-3, max_steps=14)
-    problem.leave_out(None)
-    return replace(fit, jacobian=None) if fit.sse < final.sse else None
+    names = [effect for effect in final.spec.effects if effect not in first.base.spec.effects]
+    kept = {()} | {(one,) for one in names} | {tuple(other for other in names if other != one) for one in names}
+    best: Fit | None = None
+    for some in sorted(kept - {tuple(names)}):
+        fit = final
+        for effect in names:
+            if effect not in some:
+                fit = first.reduced(fit, effect)
+        if fit.jacobian is None:
+            shown = problem.predictions(fit.spec, fit.values)
+            fit = replace(fit, jacobian=problem.jacobian(fit.spec, fit.values, shown))
+        if not (grown := find(problem, fit, kinds, (), most=1)):
+            continue
+        problem.leave_out(grown[0].column)
+        beside = problem.fit(fit.spec, fit.as_dict(), tolerance=1e-3, max_steps=STEPS_OF_FIT)
+        problem.leave_out(None)
+        if beside.sse < (final if best is None else best).sse:
+            best = replace(beside, jacobian=None)
+    return best
 
 
-def search_beside(
-    problem: Problem, first: Search, final: Fit
-) -> tuple[Search, tuple[Fit, dict[str, Fit], list[tuple[str, Fit]]], list[Hidden]] | None:
+def search_beside(problem: Problem, first: Search, final: Fit) -> Beside | None:
     """Search the library again beside what has no name; None where nothing of these kinds is there.
 
     The problem leaves the unnamed causes out when this returns.
     """
+    out = _search_beside(problem, first, final)
+    return None if out is None else _or_lasting(problem, *out)
+
+
+def _or_lasting(problem: Problem, found: Search, result: Found, hidden: list[Hidden]) -> Beside:
+    """Return what was found less the names of one spring that an unnamed cause there, found for a while, would nearly explain
+    if it were there all the time: whether it came or went, nothing but those names says.
+    """
+    final, without = result[0], result[1]
+    at = {effect: _spring_of(final, effect) for effect in without}
+    begun = {id(one.cause): one for one in hidden if one.cause.edges and _place(one.cause) in at.values()}
+    whole = [_all_the_time(problem, one).around(problem, final) for one in begun.values()]
+    if not whole:
+        return found, result, hidden
+    taken_out = problem.unnamed
+    problem.leave_out(np.column_stack([taken_out, *(one.column for one in whole)]))
+    base = problem.fit(found.base.spec, found.base.as_dict(), errors=True)
+    search = Search(problem, found.candidates, base, found.progress)
+    kept = beside = problem.fit(final.spec, final.as_dict(), tolerance=1e-3, max_steps=STEPS_OF_FIT)
+    for effect in (effect for effect in without if at[effect] is not None):
+        other = search.reduced(kept, effect)
+        if other.sse - kept.sse < MIN_SHARE * (without[effect].sse - final.sse):
+            kept = other
+    if kept is beside:
+        problem.unnamed = taken_out
+        return found, result, hidden
+    left_out = problem.unnamed
+    needed = {effect: search.reduced(kept, effect) for effect in without if effect in kept.spec.effects}
+    contenders = search.rivals(kept, needed)
+    judged = weighed(problem, kept, [*hidden, *whole])
+    problem.unnamed = left_out
+    return search, (kept, needed, contenders), [one for one, nats in judged if nats > LEAST_NATS]
+
+
+def _spring_of(fit: Fit, effect: str) -> int | None:
+    """Return the spring, from 0, of which alone an effect is; None where it is of several."""
+    names = {name for free in fit.spec.free if free.effect == effect for name in free.names}
+    springs = {name.partition("[")[2] for name in names}
+    one = springs.pop() if len(springs) == 1 else ""
+    return int(one[:-1]) - 1 if one else None
+
+
+def _place(cause: Cause) -> int:
+    """Return the spring, from 0, at which alone a cause acts; -1 where at several."""
+    there = {int(k) for profile in cause.profiles if profile is not None for k in np.flatnonzero(profile.any(axis=0))}
+    return there.pop() if len(there) == 1 else -1
+
+
+def _all_the_time(problem: Problem, one: Hidden) -> Hidden:
+    """Return a cause that begins and ends in a run as one that is there all of it."""
+    run = next(run for run, profile in zip(problem.runs, one.cause.profiles, strict=True) if profile is not None)
+    return replace(one, text=one.cause.text.format(f"0 to {run.duration_s:.0f} s"), rows=(0, None))
+
+
+def _search_beside(problem: Problem, first: Search, final: Fit) -> Beside | None:
     first.progress("causes without a name")
-    if (nearer := _alone(problem, first.base, final)) is not None:
-        final = nearer
     kinds = library(problem, final)
+    if (nearer := _with_fewer(problem, first, final, kinds)) is not None:
+        final, kinds = nearer, library(problem, nearer)
     hidden: list[Hidden] = []
     out = taken_out = None
+    begun = longest = 0
     for turn in range(ROUNDS):
-        if turn and problem.simulations > ENOUGH:
+        if turn:
+            longest = max(longest, problem.simulations - begun)
+        begun = problem.simulations
+        if turn and begun + longest > ENOUGH:
             break
         hidden = [one.around(problem, final) for one in hidden]
         problem.leave_out(np.column_stack([one.column for one in hidden]) if hidden else None)
@@ -505,7 +595,7 @@ def search_beside(
             break
         problem.leave_out(np.column_stack([one.column for one in grown]))
         # what they add depends on the numbers, which they spoilt until now
-        nearer = problem.fit(final.spec, final.as_dict(), tolerance=1e-3, max_steps=14)
+        nearer = problem.fit(final.spec, final.as_dict(), tolerance=1e-3, max_steps=STEPS_OF_FIT)
         grown = [one.around(problem, nearer) for one in grown]
         taken_out = np.column_stack([one.column for one in grown])
         problem.leave_out(taken_out)

@@ -288,8 +288,9 @@ def _diagnose(
         # from here on everything is in the error again: a model is for an array in which what has no name still acts
         problem.leave_out(None)
         base = declared_alone
-        steps = [(effect, with_everything(problem, fit, base)) for effect, fit in steps]
-        final = with_everything(problem, final, base)
+        again = {id(fit): with_everything(problem, fit, base) for fit in [final, *(fit for _, fit in steps)]}
+        steps = [(effect, again[id(fit)]) for effect, fit in steps]
+        final = again[id(final)]
     base_out, final_out = problem.holdout_rmse(base), problem.holdout_rmse(final)
 
     listed, runs_differ = [], []
