@@ -6,6 +6,7 @@ truth_t truth;
 sensor_t sensor;
 spring_estimator_t estimator;
 thermal_model_t model;
+char where[120];
 
 static unsigned count;
 static double power_sum_w;
@@ -157,4 +158,12 @@ double hold_current_a(double margin_k)
     const unsigned place = count % 32u;
     const double dither_a = 0.3 * ((double)(place < 16u ? place : 31u - place) / 16.0 - 0.5);
     return fmax(1e-3 * spring_estimator_current_ma(&estimator, 0, power_w) + dither_a, 0.4);
+}
+
+double heat_then_hold(double most_s)
+{
+    const double took_s = heat(most_s);
+    spring_estimator_disturb(&BELIEF);
+    spring_estimator_begin_hold(&estimator, &model, 0, true);
+    return took_s;
 }

@@ -27,6 +27,7 @@ extern truth_t truth;
 extern sensor_t sensor;
 extern spring_estimator_t estimator;
 extern thermal_model_t model;
+extern char where[120]; /* to be said where a test fails */
 #define BELIEF (estimator.spring[0])
 
 /* The declared spring at 20 degC, and an estimator that knows nothing of it. */
@@ -39,6 +40,8 @@ bool tick(double current_a);
 void ticks(double current_a, double seconds);
 /* 3 A until it has transformed as far as the estimator knows; returns s, or `most_s`. */
 double heat(double most_s);
+/* The same, then a hold begins. */
+double heat_then_hold(double most_s);
 /* Current that holds it where the estimator has `margin_k` above martensite start, with the dither
  * of the drive. */
 double hold_current_a(double margin_k);

@@ -1,0 +1,17 @@
+/* What it is for: tests of what a hold tells: phase that is lost, or a contact, or the sensor.
+ * What it owns: nothing. What it never does: run by itself; test_spring_estimator.c runs them. */
+#ifndef LOST_PHASE_H
+#define LOST_PHASE_H
+
+void offset_is_learnt_where_the_current_drops(void);
+void phase_lost_on_the_way_to_the_hold_is_counted(void);
+void slope_is_told_on_the_way_down(void);
+void contact_is_not_taken_for_phase(void);
+void contact_that_comes_and_goes_is_blind_for_a_while(void);
+void doubt_grows_with_a_heating_after_a_jump(void);
+void loss_that_does_not_come_back_was_none(void);
+void loss_that_is_still_missing_at_rest_is_taken_back(void);
+void loss_that_is_back_at_rest_is_not_taken_back(void);
+void loss_too_small_to_tell_stays_in_doubt(void);
+
+#endif
