@@ -419,7 +419,7 @@ void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, 
     const float now_c = spring_now_c(model, k);
     const bool lacks =
         full && b->possible != SPRING_PHASE_AUSTENITE && spring_lacks_phase(b, model, k);
-    const float phase = lacks ? spring_estimator_phase(e, model, k) : 1.0f;
+    const float phase = lacks ? spring_phase_by_resistance(b) : 1.0f; /* as it read last */
     b->unproven = full && b->gone_k > 0.0f && b->possible != SPRING_PHASE_AUSTENITE &&
                   thermal_model_temperature_c7(model, k) <
                       thermal_model_transformation(model, k).austenite_finish_c7;

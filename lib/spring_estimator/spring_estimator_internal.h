@@ -64,6 +64,8 @@ void spring_jump(spring_belief_t *belief, float by);
  * temperature coefficient. */
 bool spring_lacks_phase(const spring_belief_t *belief, const thermal_model_t *model,
                         uint8_t spring);
+/* Told by its own resistances, both of which were learnt, 0..1. */
+float spring_phase_by_resistance(const spring_belief_t *belief);
 /* It has transformed: what it reads now is its own austenite's, and the way there its change. */
 void spring_learn_austenite(spring_belief_t *belief);
 
