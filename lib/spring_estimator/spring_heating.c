@@ -16,6 +16,8 @@
 #define PLACE_SD_K     3.0f
 #define CAPACITY_BOUND 1.25f /* the same of a heat capacity */
 #define SAME_CURRENT   0.1f  /* within it a sensor's offset shows alike */
+#define LEAST_PART     0.5f  /* of a known change: a contact's step, flat afterwards, is less */
+#define LONE_PART      0.7f  /* where its resistance is not its austenite's either */
 #define LEAST_HEAT     0.74f /* latent heat 15 % less than declared, heat capacity 15 % more */
 #define COLD_SPAN_K    20.0f /* least, over which a coefficient is learnt */
 
@@ -130,11 +132,11 @@ static bool may_transform(const spring_belief_t *b, const thermal_model_t *model
                spring_c(thermal_model_transformation(model, k).austenite_start_c7);
 }
 
-/* By as much as a transformation does: one whose change is known, by half of it at least. */
-static bool has_changed(const spring_belief_t *b)
+/* By as much as a transformation does: one whose change is known, by so much of it at least. */
+static bool has_changed(const spring_belief_t *b, float part)
 {
     const float least = b->learnt.austenite_ohm > 0.0f
-                            ? 0.5f * fabsf(b->learnt.change) * b->run.heat.begun_missing
+                            ? part * fabsf(b->learnt.change) * b->run.heat.begun_missing
                             : CHANGE_LEAST;
     return fabsf(b->ohm / b->run.heat.onset_ohm - 1.0f) > fmaxf(least, CHANGE_LEAST);
 }
@@ -211,8 +213,10 @@ void spring_heating_watch(const spring_estimator_t *e, spring_belief_t *b, therm
             spring_jump(b, b->ohm / b->run.heat.onset_ohm); /* too cold: a contact */
             b->run.heat.excess = 0.0f;
         }
-    } else if (b->run.heat.flat_k >= FLAT_K && has_changed(b) &&
-               (b->run.heat.flat_k >= FLAT_K + SHIFT_BOUND_K || has_taken_enough(e, b, model, k))) {
+    } else if (b->run.heat.flat_k >= FLAT_K &&
+               (has_taken_enough(e, b, model, k)
+                    ? has_changed(b, LEAST_PART)
+                    : b->run.heat.flat_k >= FLAT_K + SHIFT_BOUND_K && has_changed(b, LONE_PART))) {
         see_finish(e, b, model, k);
     }
     b->run.heat.mark_ohm = b->ohm;
