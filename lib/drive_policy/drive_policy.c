@@ -18,21 +18,19 @@
 #define LEVEL_POWER_W       0.4f  /* beyond the hold: heating to a level slows down */
 #define LEVEL_ROOM_K        1.0f  /* a held level stays so far below austenite start */
 
-#define LOST_AT_ONCE  0.03f  /* phase lost: it is heated back */
-#define LOST_SETTLED  0.004f /* the same once the hold is at rest: a search has cost it */
-#define SETTLED_TURNS 45     /* of a hold at rest: the estimator has a line to compare with */
-#define SEARCH_SD_K   3.0f   /* a distance known so badly is worth a search */
-#define SEARCH_END_K  (-1.0f)
-#define MARGIN_PER_SD 1.6f /* 95 % of a normal distribution, one side */
-#define MARGIN_SD_K   1.5f /* that hold_margin_k itself allows for */
-#define BLIND_BEGIN_K 4.0f /* above austenite finish: it has transformed at the likely worst */
-#define BLIND_K_PER_S (1.0f / 40.0f) /* slower than its time constant, C / G = 52 s, follows */
-#define SUSPECTED_W   0.038f         /* stops a fall of 0.1 K/s */
-#define FOLLOW_S      4.0f           /* a distance from the held temperature is closed in */
-#define SHORT_MOST_K  20.0f
-#define COOLS_SHARE                                                                                \
-    0.5f /* of its power is taken off on the way down: a current that still reads                  \
-          */
+#define LOST_AT_ONCE        0.03f  /* phase lost: it is heated back */
+#define LOST_SETTLED        0.004f /* the same once the hold is at rest: a search has cost it */
+#define SETTLED_TURNS       45     /* of a hold at rest: the estimator has a line to compare with */
+#define SEARCH_SD_K         3.0f   /* a distance known so badly is worth a search */
+#define SEARCH_END_K        (-1.0f)
+#define MARGIN_PER_SD       1.6f /* 95 % of a normal distribution, one side */
+#define MARGIN_SD_K         1.5f /* that hold_margin_k itself allows for */
+#define BLIND_BEGIN_K       4.0f /* above austenite finish: it has transformed at the likely worst */
+#define BLIND_K_PER_S       (1.0f / 40.0f) /* slower than its time constant, C / G = 52 s, follows */
+#define SUSPECTED_W         0.038f         /* stops a fall of 0.1 K/s */
+#define FOLLOW_S            4.0f           /* a distance from the held temperature is closed in */
+#define SHORT_MOST_K        20.0f
+#define COOLS_SHARE         0.4f /* of its power, at the most, is off on the way down: it still reads */
 #define STILL_K_PER_S       0.3f
 #define RISE_BEGINS_K_PER_S 4.0f      /* with the boost, until it is measured */
 #define KEPT_C7             (3 * 128) /* above austenite start what was reached is worth keeping */
