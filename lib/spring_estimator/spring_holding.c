@@ -314,6 +314,7 @@ void spring_holding_watch(const spring_estimator_t *e, spring_belief_t *b, therm
             if (away && is_above(b, model, k, distance_k2)) {
                 const float offset = spring_offset_may_show(b, b->slow_a) * (1.0f / OFFSET_SDS);
                 tell_slope(b, left, noise2 + offset * offset);
+                b->seen = true; /* it is acted on in the next turn */
             }
             begin_line(b, true, share); /* a coefficient explains only the way since */
         }
