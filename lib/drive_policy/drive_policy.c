@@ -152,16 +152,17 @@ static void enter(drive_policy_t *policy, thermal_model_t *model, uint8_t k,
     }
 }
 
-/* What heats a spring at a temperature, against its neighbours as they are now, and takes it
- * there. */
-static uint16_t hold_current_ma(const drive_policy_t *policy, const thermal_model_t *model,
-                                uint8_t k, float target_c, float more_w)
+/* What holds a spring so much above where it is, against its neighbours as they are now, and takes
+ * it there. */
+static uint16_t hold_current_ma(const drive_policy_t *policy, uint8_t k, float short_k,
+                                float more_w)
 {
     const spring_estimator_t *e = &policy->estimator;
-    const float short_k = fminf(target_c - now_c(model, k), SHORT_MOST_K);
-    const float hold_w = spring_estimator_hold_w(e, model, k, target_c) + more_w;
-    const float closes_w = short_k * e->heat_capacity_j_per_k / FOLLOW_S;
-    return spring_estimator_current_ma(e, k, hold_w + fmaxf(closes_w, -COOLS_SHARE * hold_w));
+    const float hold_w = spring_estimator_hold_w(e, k, short_k) + more_w;
+    const float most_k = short_k < SHORT_MOST_K ? short_k : SHORT_MOST_K;
+    const float closes_w = most_k * e->heat_capacity_j_per_k / FOLLOW_S;
+    const float cools_w = -COOLS_SHARE * hold_w;
+    return spring_estimator_current_ma(e, k, hold_w + (closes_w > cools_w ? closes_w : cools_w));
 }
 
 static bool waits_for_supply(const drive_policy_spring_t *s)
@@ -209,8 +210,7 @@ static void heat(drive_policy_t *policy, thermal_model_t *model, uint8_t k, uint
                                                phase_of(policy, model, k) > 0.5f * level);
     s->floor_ma = 0;
     if (slows || keeps) {
-        const uint16_t keeps_ma =
-            hold_current_ma(policy, model, k, spring_c(c7), slows ? LEVEL_POWER_W : 0.0f);
+        const uint16_t keeps_ma = hold_current_ma(policy, k, 0.0f, slows ? LEVEL_POWER_W : 0.0f);
         if (slows && keeps_ma < s->wanted_ma) {
             s->wanted_ma = keeps_ma;
         }
@@ -265,9 +265,9 @@ static void hold(drive_policy_t *policy, thermal_model_t *model, uint8_t k, uint
         s->margin_k -= 0.001f * TURN_S * (float)policy->parameters.search_mk_per_s;
     }
     const int16_t start_c7 = thermal_model_transformation(model, k).martensite_start_c7;
-    const float target_c = spring_c(start_c7) + s->margin_k;
-    const uint16_t holds_ma =
-        hold_current_ma(policy, model, k, target_c, b->losing != 0 ? SUSPECTED_W : 0.0f);
+    const int16_t below_c7 = (int16_t)(start_c7 - thermal_model_temperature_c7(model, k));
+    const uint16_t holds_ma = hold_current_ma(policy, k, spring_c(below_c7) + s->margin_k,
+                                              b->losing != 0 ? SUSPECTED_W : 0.0f);
     const uint16_t wanted_ma = (uint16_t)(holds_ma + policy->parameters.dither_ma / 2u);
     s->wanted_ma = wanted_ma < policy->parameters.probe_current_ma
                        ? policy->parameters.probe_current_ma

@@ -545,11 +545,10 @@ uint32_t spring_estimator_model_power_uw(const spring_estimator_t *e, uint8_t k,
     return own_uw <= 0 ? 0 : (uint32_t)own_uw;
 }
 
-float spring_estimator_hold_w(const spring_estimator_t *e, const thermal_model_t *model, uint8_t k,
-                              float temperature_c)
+float spring_estimator_hold_w(const spring_estimator_t *e, uint8_t k, float above_k)
 {
     const spring_belief_t *b = &e->spring[k];
-    return b->gives_w + spring_stiffness_w_per_k(b) * (temperature_c - spring_now_c(model, k));
+    return b->gives_w + spring_stiffness_w_per_k(b) * above_k;
 }
 
 uint16_t spring_estimator_current_ma(const spring_estimator_t *e, uint8_t k, float power_w)

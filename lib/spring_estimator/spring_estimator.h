@@ -67,6 +67,8 @@ typedef struct {
     float sd;         /* of the line itself, relative */
     float way_k;      /* how far its temperature has moved since */
     float slow_k;     /* the same, averaged as the readings are */
+    float from_ohm;   /* what it read on the way down first; 0: nothing yet */
+    float from_k;     /* and how far it had moved from there when the line began */
     float rise_per_k; /* what a kelvin adds to it, relative */
     float rise_sd_per_k;
 } spring_line_t;
@@ -245,9 +247,8 @@ spring_bounds_t spring_estimator_austenite(const spring_estimator_t *estimator,
  * beyond it. */
 uint32_t spring_estimator_model_power_uw(const spring_estimator_t *estimator, uint8_t spring,
                                          uint32_t power_uw);
-/* Power that holds it there, on the declared scale, W: from what it gave off in its last turn. */
-float spring_estimator_hold_w(const spring_estimator_t *estimator, const thermal_model_t *model,
-                              uint8_t spring, float temperature_c);
+/* Power that holds it so much above where it is, W: from what it gave off in its last turn. */
+float spring_estimator_hold_w(const spring_estimator_t *estimator, uint8_t spring, float above_k);
 /* Current for a power in the resistance that it has now, 0..3200 mA. */
 uint16_t spring_estimator_current_ma(const spring_estimator_t *estimator, uint8_t spring,
                                      float power_w);

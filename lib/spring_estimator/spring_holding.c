@@ -7,6 +7,7 @@
 /* Of a turn, 60 s: what the line follows is no loss of phase. */
 #define LINE_SHARE     (1.0f / 240.0f)
 #define LOSS_LEAST     0.0012f /* of the resistance: what a sensor's steps leave in the average */
+#define LEAST_AT_A     1.4f    /* at this current, and as 1 / I below it */
 #define NOISE_IN_SLOW  0.18f   /* of one turn's, with all turns in it: sqrt(share / (2 - share)) */
 #define ANCHOR_TURNS   8       /* of an average: three times as sure as one */
 #define ANCHOR_K       3.0f    /* 0.45 % of the resistance by the largest coefficient */
@@ -60,22 +61,11 @@ static void begin_line(spring_belief_t *b, bool rough, float share)
     b->run.line.ohm = b->slow_ohm;
     b->run.line.a = b->slow_a;
     b->run.line.sd = sqrtf(slow_variance(b, share));
+    b->run.line.from_k += b->run.line.slow_k;
     b->run.line.way_k -= b->run.line.slow_k;
     b->run.line.slow_k = 0.0f;
     b->rough = rough;
     b->losing = 0;
-}
-
-void spring_begin_hold_line(spring_belief_t *b, bool now)
-{
-    /* its slope is still to be told: no phase's coefficient tells the other's */
-    b->run.line =
-        (spring_line_t){.rise_per_k = b->learnt.martensite_rise_per_k,
-                        .rise_sd_per_k = COEFFICIENT_MOST_PER_K / SPRING_ESTIMATOR_BOUND_SDS};
-    if (now) {
-        average_anew(b);
-        begin_line(b, true, 1.0f);
-    }
 }
 
 static float start_c(const thermal_model_t *model, uint8_t k)
@@ -182,8 +172,9 @@ static bool learn_offset(spring_belief_t *b)
 
 float spring_offset_may_show(const spring_belief_t *b, float current_a)
 {
-    return OFFSET_SDS * b->offset_sd_v * fabsf(1.0f / current_a - 1.0f / b->run.line.a) /
-           b->run.line.ohm;
+    const spring_line_t *line = &b->run.line;
+    return OFFSET_SDS * b->offset_sd_v * fabsf(line->a - current_a) /
+           (current_a * line->a * line->ohm);
 }
 
 /* By how much, squared, the resistance may have left its line with the phase kept: its temperature
@@ -196,21 +187,50 @@ static float may_move_squared(const spring_belief_t *b)
 }
 
 /* It keeps its phase: how what it reads goes with a moving temperature is its slope. */
-static void tell_slope(spring_belief_t *b, float left, float variance)
+static void tell_slope(spring_line_t *line, float way_k, float left, float variance)
 {
-    const float slow_k = b->run.line.slow_k;
-    const float prior = b->run.line.rise_sd_per_k * b->run.line.rise_sd_per_k;
-    const float gain = prior * slow_k / (prior * slow_k * slow_k + variance);
-    b->run.line.rise_per_k = spring_clamp(b->run.line.rise_per_k + gain * left,
-                                          -COEFFICIENT_MOST_PER_K, COEFFICIENT_MOST_PER_K);
-    b->run.line.rise_sd_per_k = sqrtf(prior * (1.0f - gain * slow_k));
+    const float prior = line->rise_sd_per_k * line->rise_sd_per_k;
+    const float gain = prior * way_k / (prior * way_k * way_k + variance);
+    line->rise_per_k = spring_clamp(line->rise_per_k + gain * left, -COEFFICIENT_MOST_PER_K,
+                                    COEFFICIENT_MOST_PER_K);
+    line->rise_sd_per_k = sqrtf(prior * (1.0f - gain * way_k));
+}
+
+static void begin_slope(spring_belief_t *b)
+{
+    /* no phase's coefficient tells the other's */
+    b->run.line.rise_per_k = b->learnt.martensite_rise_per_k;
+    b->run.line.rise_sd_per_k = COEFFICIENT_MOST_PER_K / SPRING_ESTIMATOR_BOUND_SDS;
+}
+
+/* On the way down, for certain above martensite start: by all of the way so far, as what a sensor's
+ * steps leave is the same over a short one. */
+static void tell_slope_on_way(spring_belief_t *b, float noise2, float least)
+{
+    spring_line_t *line = &b->run.line;
+    const float way_k = line->from_k + line->slow_k;
+    const float offset = spring_offset_may_show(b, b->slow_a) * (1.0f / OFFSET_SDS);
+    begin_slope(b);
+    const float left = b->slow_ohm / line->from_ohm - 1.0f - line->rise_per_k * way_k;
+    tell_slope(line, way_k, left, noise2 + 2.0f * least * least + offset * offset);
+    b->seen = true; /* it is acted on in the next turn */
+}
+
+void spring_begin_hold_line(spring_belief_t *b, bool now)
+{
+    b->run.line = (spring_line_t){0};
+    begin_slope(b);
+    if (now) {
+        average_anew(b);
+        begin_line(b, true, 1.0f);
+    }
 }
 
 /* And at rest the line follows what it reads. */
 static void follow(spring_belief_t *b, float left)
 {
     if (fabsf(b->run.line.slow_k) > AWAY_LEAST_K && fabsf(left) < LOSS_LEAST) {
-        tell_slope(b, left, LINE_VARIANCE);
+        tell_slope(&b->run.line, b->run.line.slow_k, left, LINE_VARIANCE);
     }
     b->run.line.ohm += b->run.line.ohm * left * LINE_SHARE;
     b->run.line.way_k -= b->run.line.slow_k * LINE_SHARE;
@@ -297,7 +317,8 @@ void spring_holding_watch(const spring_estimator_t *e, spring_belief_t *b, therm
     const float changed = as_lost(b, model, k, left, distance_k2);
     /* as its temperature may have moved unseen, so may the resistance */
     const float rise = line->rise_per_k;
-    const float least2 = fmaxf(LOSS_LEAST * LOSS_LEAST, rise * rise * distance_k2);
+    const float least = b->slow_a < LEAST_AT_A ? LOSS_LEAST * LEAST_AT_A / b->slow_a : LOSS_LEAST;
+    const float least2 = fmaxf(least * least, rise * rise * distance_k2);
     const float noise2 = slow_variance(b, share) + line->sd * line->sd;
     const float changed2 = changed * changed;
     float sure2 = fmaxf(least2, SURE_SDS * SURE_SDS * noise2);
@@ -311,10 +332,11 @@ void spring_holding_watch(const spring_estimator_t *e, spring_belief_t *b, therm
         b->losing = 0;
         const bool away = fabsf(line->slow_k) > ANCHOR_K;
         if (b->rough && (b->averaged == ANCHOR_TURNS || (b->averaged > ANCHOR_TURNS && away))) {
-            if (away && is_above(b, model, k, distance_k2)) {
-                const float offset = spring_offset_may_show(b, b->slow_a) * (1.0f / OFFSET_SDS);
-                tell_slope(b, left, noise2 + offset * offset);
-                b->seen = true; /* it is acted on in the next turn */
+            if (!away || line->from_ohm == 0.0f) {
+                line->from_ohm = b->slow_ohm;
+                line->from_k = -line->slow_k;
+            } else if (is_above(b, model, k, distance_k2)) {
+                tell_slope_on_way(b, noise2, least);
             }
             begin_line(b, true, share); /* a coefficient explains only the way since */
         }

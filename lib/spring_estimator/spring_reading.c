@@ -35,6 +35,7 @@ void spring_jump(spring_belief_t *b, float by)
         b->run.heat.cold_ohm *= by;
     } else if (b->run.line.ohm > 0.0f) {
         b->run.line.ohm *= by;
+        b->run.line.from_ohm *= by;
         b->slow_ohm = b->run.line.ohm * (1.0f + b->run.line.rise_per_k * b->run.line.slow_k);
     }
     b->full_ohm *= by;

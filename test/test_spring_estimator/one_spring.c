@@ -153,7 +153,7 @@ double hold_current_a(double margin_k)
     const int16_t start_c7 = thermal_model_transformation(&model, 0).martensite_start_c7;
     const float target_c = spring_c(start_c7) + (float)margin_k;
     const float now_c = (float)thermal_model_temperature_c7(&model, 0) / 128.0f;
-    const float power_w = spring_estimator_hold_w(&estimator, &model, 0, target_c) +
+    const float power_w = spring_estimator_hold_w(&estimator, 0, target_c - now_c) +
                           fmaxf(target_c - now_c, -20.0f) * estimator.heat_capacity_j_per_k / 4.0f;
     const unsigned place = count % 32u;
     const double dither_a = 0.3 * ((double)(place < 16u ? place : 31u - place) / 16.0 - 0.5);
