@@ -29,7 +29,6 @@
 #define BLIND_K_PER_S       (1.0f / 40.0f) /* slower than its time constant, C / G = 52 s, follows */
 #define SUSPECTED_W         0.038f         /* stops a fall of 0.1 K/s */
 #define FOLLOW_S            4.0f           /* a distance from the held temperature is closed in */
-#define SHORT_MOST_K        20.0f
 #define COOLS_SHARE         0.4f /* of its power, at the most, is off on the way down: it still reads */
 #define STILL_K_PER_S       0.3f
 #define RISE_BEGINS_K_PER_S 4.0f      /* with the boost, until it is measured */
@@ -159,8 +158,7 @@ static uint16_t hold_current_ma(const drive_policy_t *policy, uint8_t k, float s
 {
     const spring_estimator_t *e = &policy->estimator;
     const float hold_w = spring_estimator_hold_w(e, k, short_k) + more_w;
-    const float most_k = short_k < SHORT_MOST_K ? short_k : SHORT_MOST_K;
-    const float closes_w = most_k * e->heat_capacity_j_per_k / FOLLOW_S;
+    const float closes_w = short_k * e->heat_capacity_j_per_k / FOLLOW_S;
     const float cools_w = -COOLS_SHARE * hold_w;
     return spring_estimator_current_ma(e, k, hold_w + (closes_w > cools_w ? closes_w : cools_w));
 }

@@ -5,6 +5,7 @@
 #define QUIET_K     0.08f /* a turn's: 0.3 K/s */
 #define QUIET_TURNS 40    /* 10 s: the average has settled */
 /* Of a turn, 60 s: what the line follows is no loss of phase. */
+#define WEAK_A         0.6f /* on the way down; what noise and steps do at more is counted */
 #define LINE_SHARE     (1.0f / 240.0f)
 #define LOSS_LEAST     0.0012f /* of the resistance: what a sensor's steps leave in the average */
 #define LEAST_AT_A     1.4f    /* at this current, and as 1 / I below it */
@@ -146,7 +147,8 @@ static bool learn_offset(spring_belief_t *b)
 {
     const float less_a = b->run.line.a - b->current_a;
     const float product_a2 = b->current_a * b->run.line.a;
-    if (less_a < APART_PER_A * product_a2) { /* as a rule: no division */
+    if (less_a < APART_PER_A * product_a2 || b->run.line.way_k < -ANCHOR_K) {
+        /* as a rule: no division. Over a longer way a coefficient may have made as much */
         return false;
     }
     const float apart_a = product_a2 / less_a;
@@ -302,7 +304,7 @@ void spring_holding_watch(const spring_estimator_t *e, spring_belief_t *b, therm
     } else if (b->quiet == 0 && b->offset_sd_v > OFFSET_LEAST_V && learn_offset(b)) {
         return;
     }
-    if (b->quiet < (b->rough ? QUIET_TURNS : 1) && b->current_a < STRONG_A) {
+    if (b->quiet < (b->rough ? QUIET_TURNS : 1) && b->current_a < WEAK_A) {
         /* on its way to the hold: too weak to tell */
         b->slow_ohm = line->ohm * (1.0f + line->rise_per_k * line->way_k);
         b->slow_a = line->a;
