@@ -4,8 +4,8 @@
 
 #define QUIET_K     0.08f /* a turn's: 0.3 K/s */
 #define QUIET_TURNS 40    /* 10 s: the average has settled */
+#define WEAK_A      0.6f  /* on the way down; what noise and steps do at more is counted */
 /* Of a turn, 60 s: what the line follows is no loss of phase. */
-#define WEAK_A         0.6f /* on the way down; what noise and steps do at more is counted */
 #define LINE_SHARE     (1.0f / 240.0f)
 #define LOSS_LEAST     0.0012f /* of the resistance: what a sensor's steps leave in the average */
 #define LEAST_AT_A     1.4f    /* at this current, and as 1 / I below it */
