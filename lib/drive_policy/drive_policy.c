@@ -18,18 +18,21 @@
 #define LEVEL_POWER_W       0.4f  /* beyond the hold: heating to a level slows down */
 #define LEVEL_ROOM_K        1.0f  /* a held level stays so far below austenite start */
 
-#define LOST_AT_ONCE        0.03f  /* phase lost: it is heated back */
-#define LOST_SETTLED        0.004f /* the same once the hold is at rest: a search has cost it */
-#define SETTLED_TURNS       45     /* of a hold at rest: the estimator has a line to compare with */
-#define SEARCH_SD_K         3.0f   /* a distance known so badly is worth a search */
-#define SEARCH_END_K        (-1.0f)
-#define MARGIN_PER_SD       1.6f /* 95 % of a normal distribution, one side */
-#define MARGIN_SD_K         1.5f /* that hold_margin_k itself allows for */
-#define BLIND_BEGIN_K       4.0f /* above austenite finish: it has transformed at the likely worst */
-#define BLIND_K_PER_S       (1.0f / 40.0f) /* slower than its time constant, C / G = 52 s, follows */
-#define SUSPECTED_W         0.038f         /* stops a fall of 0.1 K/s */
-#define FOLLOW_S            4.0f           /* a distance from the held temperature is closed in */
-#define COOLS_SHARE         0.4f /* of its power, at the most, is off on the way down: it still reads */
+#define LOST_AT_ONCE  0.03f  /* phase lost: it is heated back */
+#define LOST_SETTLED  0.004f /* the same once the hold is at rest: a search has cost it */
+#define SETTLED_TURNS 45     /* of a hold at rest: the estimator has a line to compare with */
+#define SEARCH_SD_K   3.0f   /* a distance known so badly is worth a search */
+#define SEARCH_END_K  (-1.0f)
+#define MARGIN_PER_SD 1.6f /* 95 % of a normal distribution, one side */
+#define MARGIN_SD_K   1.5f /* that hold_margin_k itself allows for */
+#define BLIND_BEGIN_K 4.0f /* above austenite finish: it has transformed at the likely worst */
+#define BLIND_K_PER_S (1.0f / 40.0f) /* slower than its time constant, C / G = 52 s, follows */
+#define SUSPECTED_W   0.038f         /* stops a fall of 0.1 K/s */
+#define FOLLOW_S      4.0f           /* a distance from the held temperature is closed in */
+/* On the last of the way down so much of its power is off, at the most: it still reads. Before, and
+ * while somebody waits for current, all of it. */
+#define COOLS_SHARE         0.4f
+#define TELLS_K             10.0f
 #define STILL_K_PER_S       0.3f
 #define RISE_BEGINS_K_PER_S 4.0f      /* with the boost, until it is measured */
 #define KEPT_C7             (3 * 128) /* above austenite start what was reached is worth keeping */
@@ -159,7 +162,8 @@ static uint16_t hold_current_ma(const drive_policy_t *policy, uint8_t k, float s
     const spring_estimator_t *e = &policy->estimator;
     const float hold_w = spring_estimator_hold_w(e, k, short_k) + more_w;
     const float closes_w = short_k * e->heat_capacity_j_per_k / FOLLOW_S;
-    const float cools_w = -COOLS_SHARE * hold_w;
+    const bool coasts = policy->waits || short_k < -TELLS_K;
+    const float cools_w = coasts ? -hold_w : -COOLS_SHARE * hold_w;
     return spring_estimator_current_ma(e, k, hold_w + (closes_w > cools_w ? closes_w : cools_w));
 }
 
@@ -483,8 +487,11 @@ static void rotate_queue(drive_policy_t *policy, const thermal_model_t *model)
     int16_t warmest_c7 = INT16_MIN; /* of those that heat, but have not begun to transform */
     uint8_t warmest = 0;
     int room = 0; /* that heat, less twice those that wait */
+    policy->waits = false;
     for (uint8_t n = 0; n < policy->queue.count; n++) {
         const uint8_t k = policy->queue.spring[n];
+        const drive_policy_spring_t *s = &policy->spring[k];
+        policy->waits = policy->waits || s->granted_ma < s->wanted_ma;
         const int16_t c7 = thermal_model_temperature_c7(model, k);
         if (policy->spring[k].granted_ma < policy->spring[k].wanted_ma / 2u) {
             room -= 2;
