@@ -30,7 +30,7 @@
 #define SUSPECTED_W   0.038f         /* stops a fall of 0.1 K/s */
 #define FOLLOW_S      4.0f           /* a distance from the held temperature is closed in */
 /* On the last of the way down so much of its power is off, at the most: it still reads. Before, and
- * while somebody waits for current, all of it. */
+ * while another one heats, all of it. */
 #define COOLS_SHARE         0.4f
 #define TELLS_K             10.0f
 #define STILL_K_PER_S       0.3f
@@ -162,7 +162,7 @@ static uint16_t hold_current_ma(const drive_policy_t *policy, uint8_t k, float s
     const spring_estimator_t *e = &policy->estimator;
     const float hold_w = spring_estimator_hold_w(e, k, short_k) + more_w;
     const float closes_w = short_k * e->heat_capacity_j_per_k / FOLLOW_S;
-    const bool coasts = policy->waits || short_k < -TELLS_K;
+    const bool coasts = policy->queue.count != 0 || short_k < -TELLS_K;
     const float cools_w = coasts ? -hold_w : -COOLS_SHARE * hold_w;
     return spring_estimator_current_ma(e, k, hold_w + (closes_w > cools_w ? closes_w : cools_w));
 }
@@ -487,11 +487,8 @@ static void rotate_queue(drive_policy_t *policy, const thermal_model_t *model)
     int16_t warmest_c7 = INT16_MIN; /* of those that heat, but have not begun to transform */
     uint8_t warmest = 0;
     int room = 0; /* that heat, less twice those that wait */
-    policy->waits = false;
     for (uint8_t n = 0; n < policy->queue.count; n++) {
         const uint8_t k = policy->queue.spring[n];
-        const drive_policy_spring_t *s = &policy->spring[k];
-        policy->waits = policy->waits || s->granted_ma < s->wanted_ma;
         const int16_t c7 = thermal_model_temperature_c7(model, k);
         if (policy->spring[k].granted_ma < policy->spring[k].wanted_ma / 2u) {
             room -= 2;

@@ -77,7 +77,6 @@ typedef struct {
     supply_queue_t queue;       /* springs that heat */
     uint16_t overload_quarters; /* s */
     uint16_t sum_ma;            /* of the last targets */
-    bool waits;                 /* one that heats has not got its current */
     uint8_t springs;
     uint8_t columns;
     uint8_t tick;           /* counts to the next in which no spring is updated */
