@@ -29,10 +29,10 @@
 #define BLIND_K_PER_S (1.0f / 40.0f) /* slower than its time constant, C / G = 52 s, follows */
 #define SUSPECTED_W   0.038f         /* stops a fall of 0.1 K/s */
 #define FOLLOW_S      4.0f           /* a distance from the held temperature is closed in */
-/* On the last of the way down so much of its power is off, at the most: it still reads. Before, and
- * while another one heats, all of it. */
+/* Of its power, at the most, is off on the last of the way down, where it is to be read. */
 #define COOLS_SHARE         0.4f
 #define TELLS_K             10.0f
+#define TELLS_NOISE         0.02f /* with more, what is sure is an eighth of the phase */
 #define STILL_K_PER_S       0.3f
 #define RISE_BEGINS_K_PER_S 4.0f      /* with the boost, until it is measured */
 #define KEPT_C7             (3 * 128) /* above austenite start what was reached is worth keeping */
@@ -154,15 +154,15 @@ static void enter(drive_policy_t *policy, thermal_model_t *model, uint8_t k,
     }
 }
 
-/* What holds a spring so much above where it is, against its neighbours as they are now, and takes
- * it there. */
+/* What holds a spring so much above where it is now, and takes it there. */
 static uint16_t hold_current_ma(const drive_policy_t *policy, uint8_t k, float short_k,
                                 float more_w)
 {
     const spring_estimator_t *e = &policy->estimator;
     const float hold_w = spring_estimator_hold_w(e, k, short_k) + more_w;
     const float closes_w = short_k * e->heat_capacity_j_per_k / FOLLOW_S;
-    const bool coasts = policy->queue.count != 0 || short_k < -TELLS_K;
+    const bool coasts =
+        policy->queue.count != 0 || short_k < -TELLS_K || e->spring[k].noise > TELLS_NOISE;
     const float cools_w = coasts ? -hold_w : -COOLS_SHARE * hold_w;
     return spring_estimator_current_ma(e, k, hold_w + (closes_w > cools_w ? closes_w : cools_w));
 }
