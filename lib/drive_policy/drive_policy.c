@@ -30,10 +30,9 @@
 #define SUSPECTED_W   0.038f         /* stops a fall of 0.1 K/s */
 #define FOLLOW_S      4.0f           /* a distance from the held temperature is closed in */
 /* Of its power, at the most, is off on the last of the way down, where it is to be read. */
-#define COOLS_SHARE 0.4f
-#define TELLS_K     10.0f
-#define TELLS_NOISE                                                                                \
-    0.015f /* with more, what is sure is a tenth of the phase: 5 sd of two averages */
+#define COOLS_SHARE         0.4f
+#define TELLS_K             10.0f
+#define TELLS_NOISE         0.015f /* with more, what is sure is a tenth of the phase */
 #define STILL_K_PER_S       0.3f
 #define RISE_BEGINS_K_PER_S 4.0f      /* with the boost, until it is measured */
 #define KEPT_C7             (3 * 128) /* above austenite start what was reached is worth keeping */

@@ -76,7 +76,6 @@ static bool unpack(const record_store_t *record, uint8_t spring, spring_learnt_t
     return learnt->austenite_ohm > 0.0f;
 }
 
-/* A spring goes on learning while others are written: its numbers are taken all at once. */
 /* Its losses were learnt beside the model that the controller has. */
 static bool fits_model(const learnt_store_t *store, const controller_t *controller)
 {
@@ -85,6 +84,7 @@ static bool fits_model(const learnt_store_t *store, const controller_t *controll
            take(&store->record, &at, LEARNT_STORE_MARK_BYTES) == controller_model_mark(controller);
 }
 
+/* A spring goes on learning while others are written: its numbers are taken all at once. */
 static uint8_t byte_of(void *context, uint16_t position)
 {
     learnt_store_t *const store = context;

@@ -192,8 +192,8 @@ static float predict(const spring_estimator_t *e, spring_belief_t *b, const ther
         b->variance_k2 = LEAST_SD_K * LEAST_SD_K;
     }
     const float heat_k = per_w * (power_w - b->gives_w);
-    if (b->gone_k >
-        0.0f) { /* where a contact has moved, what it takes up to transform may warm it */
+    if (b->gone_k > 0.0f) {
+        /* where a contact has moved, what it takes up to transform may warm it */
         const bool by_contact = b->heating && b->unsteady != 0;
         const float latent_k = by_contact ? fmaxf(heat_k - (now_c - b->last_c), 0.0f) : 0.0f;
         b->gone_k = keeps * b->gone_k + per_w * above_k * b->gone_w_per_k + latent_k;

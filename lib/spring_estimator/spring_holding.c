@@ -325,7 +325,7 @@ void spring_holding_watch(const spring_estimator_t *e, spring_belief_t *b, therm
     const float changed2 = changed * changed;
     float sure2 = fmaxf(least2, SURE_SDS * SURE_SDS * noise2);
     float suspected2 = SUSPECTED * SUSPECTED * sure2;
-    if (changed2 >= suspected2) { /* as a rule not: two divisions are saved */
+    if (changed2 >= suspected2) { /* as a rule not: a division is saved */
         const float moves2 = may_move_squared(b);
         sure2 += moves2;
         suspected2 += moves2;
