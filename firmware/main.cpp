@@ -254,6 +254,9 @@ static void start(void)
         settings_default(&settings);
         controller_init(&controller, &settings.controller, ambient_c7(), nullptr);
     }
+    static_assert(LEARNT_STORE_BYTES(THERMAL_MODEL_MAX_SPRINGS) + RECORD_OVERHEAD_BYTES <=
+                      SETTINGS_LEARNT_SLOT_BYTES,
+                  "what is learnt of all springs must fit its slot");
     learnt_store_open(&learnt, &eeprom, SETTINGS_LEARNT_BASE, SETTINGS_LEARNT_SLOT_BYTES,
                       &controller);
     start_model(cause);

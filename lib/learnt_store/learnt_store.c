@@ -8,80 +8,30 @@
 #define WORTH_SHARE     0.02f
 #define WORTH_HEATING_K 80.0f
 
-/* Of each field: units of one, bytes. Signed ones are in two's complement. */
-#define UOHM          1e6f
-#define CHANGE        1e4f
-#define RISE          1e6f
-#define UW_PER_K      1e6f
-#define OHM_BYTES     3u
-#define CHANGE_BYTES  2u
-#define RISE_BYTES    2u
-#define LOSS_BYTES    3u
-#define LOSS_SD_BYTES 2u
-_Static_assert(2u * OHM_BYTES + CHANGE_BYTES + RISE_BYTES + LOSS_BYTES + LOSS_SD_BYTES ==
-                   LEARNT_STORE_SPRING_BYTES,
-               "a spring's fields fill its bytes");
-
-/* --- bytes ---------------------------------------------------------------------------------- */
-
-/* Towards zero, so that what is at a limit is not beyond it when it is read again. */
-static uint8_t *put(uint8_t *at, float value, float units, uint8_t bytes)
-{
-    const uint32_t number = (uint32_t)(int32_t)(value * units);
-    for (uint8_t k = 0; k < bytes; k++) {
-        *at++ = (uint8_t)(number >> (8u * k));
-    }
-    return at;
-}
-
-static void pack(const spring_learnt_t *learnt, uint8_t *at)
-{
-    at = put(at, learnt->austenite_ohm, UOHM, OHM_BYTES);
-    at = put(at, learnt->martensite_ohm, UOHM, OHM_BYTES);
-    at = put(at, learnt->change, CHANGE, CHANGE_BYTES);
-    at = put(at, learnt->martensite_rise_per_k, RISE, RISE_BYTES);
-    at = put(at, learnt->loss_w_per_k, UW_PER_K, LOSS_BYTES);
-    (void)put(at, learnt->loss_sd_w_per_k, UW_PER_K, LOSS_SD_BYTES);
-}
-
-static uint32_t take(const record_store_t *record, uint16_t *at, uint8_t bytes)
-{
-    uint32_t number = 0;
-    for (uint8_t k = 0; k < bytes; k++) {
-        number |= (uint32_t)record_store_read(record, (*at)++) << (8u * k);
-    }
-    return number;
-}
-
-static float take_signed(const record_store_t *record, uint16_t *at, uint8_t bytes, float units)
-{
-    const uint32_t number = take(record, at, bytes);
-    const uint32_t sign = 1ul << (8u * bytes - 1u);
-    return (float)((int32_t)(number ^ sign) - (int32_t)sign) / units;
-}
+/* --- bytes: a spring's are those of its struct, alike on the Mega and on a host ----------------
+ */
 
 /* What the record has of a spring. False where it has nothing. */
 static bool unpack(const record_store_t *record, uint8_t spring, spring_learnt_t *learnt)
 {
-    uint16_t at = (uint16_t)(LEARNT_STORE_MARK_BYTES + spring * LEARNT_STORE_SPRING_BYTES);
-    if (at + LEARNT_STORE_SPRING_BYTES > record_store_length(record)) {
+    const uint16_t at = LEARNT_STORE_BYTES(spring);
+    uint8_t *const bytes = (uint8_t *)learnt;
+    if (at + sizeof *learnt > record_store_length(record)) {
         return false;
     }
-    learnt->austenite_ohm = (float)take(record, &at, OHM_BYTES) / UOHM;
-    learnt->martensite_ohm = (float)take(record, &at, OHM_BYTES) / UOHM;
-    learnt->change = take_signed(record, &at, CHANGE_BYTES, CHANGE);
-    learnt->martensite_rise_per_k = take_signed(record, &at, RISE_BYTES, RISE);
-    learnt->loss_w_per_k = take_signed(record, &at, LOSS_BYTES, UW_PER_K);
-    learnt->loss_sd_w_per_k = (float)take(record, &at, LOSS_SD_BYTES) / UW_PER_K;
+    for (uint8_t k = 0; k < sizeof *learnt; k++) {
+        bytes[k] = record_store_read(record, (uint16_t)(at + k));
+    }
     return learnt->austenite_ohm > 0.0f;
 }
 
 /* Its losses were learnt beside the model that the controller has. */
 static bool fits_model(const learnt_store_t *store, const controller_t *controller)
 {
-    uint16_t at = 0;
-    return record_store_length(&store->record) >= LEARNT_STORE_MARK_BYTES &&
-           take(&store->record, &at, LEARNT_STORE_MARK_BYTES) == controller_model_mark(controller);
+    const record_store_t *const record = &store->record;
+    return learnt_store_keeps(store) &&
+           (uint16_t)(record_store_read(record, 0) | record_store_read(record, 1) << 8u) ==
+               controller_model_mark(controller);
 }
 
 /* A spring goes on learning while others are written: its numbers are taken all at once. */
@@ -92,13 +42,12 @@ static uint8_t byte_of(void *context, uint16_t position)
         return (uint8_t)(controller_model_mark(store->controller) >> (8u * position));
     }
     position = (uint16_t)(position - LEARNT_STORE_MARK_BYTES);
-    const uint8_t within = (uint8_t)(position % LEARNT_STORE_SPRING_BYTES);
+    const uint8_t within = (uint8_t)(position % sizeof store->written);
     if (within == 0) {
-        const uint8_t spring = (uint8_t)(position / LEARNT_STORE_SPRING_BYTES);
-        const spring_learnt_t learnt = controller_learnt(store->controller, spring);
-        pack(&learnt, store->bytes);
+        store->written =
+            controller_learnt(store->controller, (uint8_t)(position / sizeof store->written));
     }
-    return store->bytes[within];
+    return ((const uint8_t *)&store->written)[within];
 }
 
 static void save(learnt_store_t *store, uint16_t length)
@@ -169,7 +118,7 @@ void learnt_store_second(learnt_store_t *store, const controller_t *controller)
     if (!worth) {
         return;
     }
-    save(store, (uint16_t)(LEARNT_STORE_MARK_BYTES + springs * LEARNT_STORE_SPRING_BYTES));
+    save(store, LEARNT_STORE_BYTES(springs));
 }
 
 record_save_t learnt_store_step(learnt_store_t *store)

@@ -15,9 +15,10 @@ extern "C" {
 #endif
 
 #define LEARNT_STORE_KIND                                                                          \
-    4u /* of record; a change of its bytes or of their meaning takes a new one */
-#define LEARNT_STORE_MARK_BYTES   2u /* controller_model_mark, beside which losses were learnt */
-#define LEARNT_STORE_SPRING_BYTES 15u
+    5u /* of record; a change of its bytes or of their meaning takes a new one */
+#define LEARNT_STORE_MARK_BYTES 2u /* controller_model_mark, beside which losses were learnt */
+#define LEARNT_STORE_BYTES(springs)                                                                \
+    ((uint16_t)(LEARNT_STORE_MARK_BYTES + (springs) * sizeof(spring_learnt_t)))
 
 /* After so long with every driven spring held, and no sooner than that after the save before: an
  * EEPROM's 100,000 writes of the two slots are then 3.8 years of saves without a pause. */
@@ -29,13 +30,12 @@ typedef struct {
     uint16_t since_s;               /* the last save began; stays at LEARNT_STORE_PAUSE_S */
     uint8_t held_s;                 /* all driven springs, on end; stays at LEARNT_STORE_HELD_S */
     const controller_t *controller; /* whose springs are kept */
-    uint8_t bytes[LEARNT_STORE_SPRING_BYTES]; /* of a save under way: the mark, or the spring, that
-                                                 is written */
+    spring_learnt_t written;        /* of the spring that is written, of a save under way */
 } learnt_store_t;
 
 /* Finds the record and gives the controller, which has been initialised, what it holds of each of
  * its springs, but no losses that were learnt beside another model than it has; it must stay valid.
- * slot_bytes must hold RECORD_OVERHEAD_BYTES, the mark's and the bytes of all springs. */
+ * slot_bytes must hold LEARNT_STORE_BYTES and RECORD_OVERHEAD_BYTES. */
 record_found_t learnt_store_open(learnt_store_t *store, const record_storage_t *storage,
                                  uint16_t base, uint16_t slot_bytes, controller_t *controller);
 

@@ -53,10 +53,10 @@ settings_result_t settings_assign(settings_t *settings, const char *name, const 
 #define SETTINGS_BASE        0u
 #if THERMAL_MODEL_MAX_SPRINGS <= 16
 #define SETTINGS_SLOT_BYTES        1024u
-#define SETTINGS_LEARNT_SLOT_BYTES 256u
+#define SETTINGS_LEARNT_SLOT_BYTES 512u
 #else
 #define SETTINGS_SLOT_BYTES        2048u
-#define SETTINGS_LEARNT_SLOT_BYTES 1024u
+#define SETTINGS_LEARNT_SLOT_BYTES 2048u
 #endif
 /* Behind the settings lies what has been learnt of each spring (learnt_store). */
 #define SETTINGS_LEARNT_BASE (SETTINGS_BASE + 2u * SETTINGS_SLOT_BYTES)

@@ -11,7 +11,6 @@
 #define LOSS_DRIFT_SD  0.0005f /* of the declared loss, in a second: 3 % in an hour */
 #define LOSS_DRIFT     (SPRING_ESTIMATOR_TURN_S * LOSS_DRIFT_SD * LOSS_DRIFT_SD)
 #define NEIGHBOUR_SD   0.15f /* of the rise of a spring that its neighbours heat */
-#define SHIFT_SD_K     3.0f  /* of declared transformation temperatures */
 #define SHIFT_MOST_K   30.0f
 #define TRUST_SD_K     5.0f    /* of ambient, or of what a reset has kept */
 #define LEAST_SD_K     0.6f    /* parts of one spring differ by so much */
@@ -290,8 +289,9 @@ static void look(spring_estimator_t *e, thermal_model_t *model, uint8_t k)
     b->seen = true;
     if (heating) {
         spring_estimator_begin_heating(e, model, k);
+        /* a contact may have moved since, by less than would make it austenite */
         b->run.heat.begun_c =
-            spring_ambient_c(model); /* a look may take another current's offset for phase */
+            phase == SPRING_PHASE_AUSTENITE ? spring_c(low_c7) : spring_ambient_c(model);
     }
 }
 

@@ -40,6 +40,7 @@ typedef struct {
     float martensite_rise_per_k; /* of that, relative */
     float loss_w_per_k;          /* beyond the declared one */
     float loss_sd_w_per_k;
+    float offset_v; /* of its sensor: of what is read of the voltage */
 } spring_learnt_t;
 
 /* Of the running heating. */
@@ -126,10 +127,9 @@ typedef struct {
     float slow_ohm;      /* over 4 s */
     float slow_a;        /* the current over the same */
     float phase_ohm;     /* the last at a strong current: what tells the phase */
-    float offset_v;      /* of the sensor: of what is read of the voltage */
-    float offset_sd_v;
-    float noise;  /* standard deviation of one turn's, relative */
-    float last_c; /* the model's temperature a turn ago */
+    float offset_sd_v;   /* of its sensor's offset */
+    float noise;         /* standard deviation of one turn's, relative */
+    float last_c;        /* the model's temperature a turn ago */
     /* the last loss, until its heating has brought it back */
     float full_ohm;     /* what it read before, at martensite start; 0: no such loss */
     float gone;         /* and by how much less it read then, relative, signed */

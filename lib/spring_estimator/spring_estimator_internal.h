@@ -17,7 +17,8 @@
 /* A reading at less is coarse: 4 mV are 3 % of its voltage. */
 #define STRONG_A 0.8f
 
-#define SHIFT_BOUND_K 8.0f /* 2.6 standard deviations of a declared transformation, or a load */
+#define SHIFT_SD_K    3.0f /* of declared transformation temperatures */
+#define SHIFT_BOUND_K 8.0f /* 2.6 of it, or a load */
 
 #define SLOW_TURNS 16 /* of the average: 4 s, six periods of the dither */
 #define SLOW_SHARE (1.0f / SLOW_TURNS)
@@ -26,6 +27,8 @@
 
 #define LOSS_SD   0.12f /* of a declared loss: 20 % */
 #define LOSS_MOST 0.45f /* of the declared loss: no more is ever believed */
+
+#define OFFSET_MOST_V 0.012f /* no sensor's is larger */
 
 float spring_clamp(float value, float low, float high);
 /* The value with its bounds, SPRING_ESTIMATOR_BOUND_SDS either way. */

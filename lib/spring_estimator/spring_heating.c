@@ -108,7 +108,8 @@ bool spring_heated_enough(const spring_estimator_t *e, const spring_belief_t *b,
 }
 
 /* A spring that still transforms, or is known to show it and has not yet, is not hotter than that
- * lets it be, whatever the model says, until it must have come so far. */
+ * lets it be, whatever the model says, until it must have come so far. Where it pauses, heat warms
+ * it. */
 static void hold_back(const spring_estimator_t *e, const spring_belief_t *b, thermal_model_t *model,
                       uint8_t k)
 {
@@ -116,8 +117,11 @@ static void hold_back(const spring_estimator_t *e, const spring_belief_t *b, the
     const bool martensite = b->possible == SPRING_PHASE_MARTENSITE;
     const int16_t limit_c7 =
         martensite ? (int16_t)(t.austenite_start_c7 + ONSET_C7) : t.austenite_finish_c7;
-    const bool shows = b->steep || (b->learnt.austenite_ohm > 0.0f && !b->blind &&
-                                    (martensite || spring_lacks_phase(b, model, k)));
+    /* after a look its temperature is a guess; once its transformation was seen, it is known */
+    const bool guess = b->shift_variance_k2 >= SHIFT_SD_K * SHIFT_SD_K;
+    const bool waits = martensite || ((b->onset ? b->run.heat.flat_k < FLAT_K : guess) &&
+                                      spring_lacks_phase(b, model, k));
+    const bool shows = b->steep || (b->learnt.austenite_ohm > 0.0f && !b->blind && waits);
     if (shows && thermal_model_temperature_c7(model, k) > limit_c7 &&
         b->run.heat.heat_k < most_heat_k(e, b, limit_c7)) {
         spring_set_temperature(model, k, spring_c(limit_c7), SPRING_PHASE_MARTENSITE);

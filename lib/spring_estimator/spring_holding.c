@@ -23,7 +23,6 @@
 #define APART_PER_A    0.5f    /* between two currents, as of 3 and 1.2 A */
 #define OFFSET_LEAST_V 0.0005f /* what a turn's steps of 4 mV leave, and its noise */
 #define OFFSET_SDS     3.0f
-#define OFFSET_MOST_V  0.012f
 #define AWAY_LEAST_K   1.0f /* less tells nothing of a coefficient */
 /* Of an average: so little phase may be lost unseen, and it tells anew in 2 x 16 turns. */
 #define LINE_VARIANCE (32.0f * LOSS_LEAST * LOSS_LEAST)
@@ -124,13 +123,20 @@ void spring_is_back(spring_belief_t *b)
     b->unproven = false;
 }
 
-/* Phase that was lost comes back with heat. What has not was a contact, or the sensor. */
+/* Phase that was lost comes back with heat. What has not was a contact, or the sensor; where still
+ * more is gone, it has been lost on the way down. */
 static void look_back(const spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model,
                       uint8_t k)
 {
     const float above_k = spring_now_c(model, k) - start_c(model, k);
     const float full_ohm = b->full_ohm * (1.0f + b->run.line.rise_per_k * above_k);
     const float missing = b->slow_ohm / full_ohm - 1.0f;
+    const float per_change = -1.0f / b->learnt.change;
+    if (missing * per_change > (fabsf(b->gone) + BACK_LEAST) * fabsf(per_change)) {
+        b->gone = missing;
+        see_crossing(e, b, model, k, missing * per_change, BACK_LEAST * fabsf(per_change));
+        return;
+    }
     if (fabsf(b->gone) > BACK_LEAST) {
         if (missing * b->gone > BACK_SHARE * b->gone * b->gone) {
             spring_take_back(e, b, model, k);
@@ -158,10 +164,10 @@ static bool learn_offset(spring_belief_t *b)
     const float read_v2 = OFFSET_LEAST_V * OFFSET_LEAST_V + noise_v * noise_v + moved_v * moved_v;
     const float gain = prior_v2 / (prior_v2 + read_v2);
     const float more_v = gain * (b->ohm - b->run.line.ohm) * apart_a;
-    if (fabsf(b->offset_v + more_v) > OFFSET_MOST_V) {
+    if (fabsf(b->learnt.offset_v + more_v) > OFFSET_MOST_V) {
         return false; /* no offset is so large */
     }
-    b->offset_v += more_v;
+    b->learnt.offset_v += more_v;
     b->offset_sd_v = sqrtf(gain * read_v2);
     const float more_ohm = more_v / b->run.line.a;
     b->run.line.ohm -= more_ohm;
@@ -356,7 +362,8 @@ void spring_holding_watch(const spring_estimator_t *e, spring_belief_t *b, therm
         return;
     }
     b->losing = b->losing < UINT8_MAX ? (uint8_t)(b->losing + 1) : UINT8_MAX;
-    if ((changed2 > sure2 && b->losing >= CONFIRM_TURNS) || b->losing >= LASTING_TURNS) {
+    const bool sure = changed2 > sure2 && b->averaged >= ANCHOR_TURNS;
+    if ((sure && b->losing >= CONFIRM_TURNS) || b->losing >= LASTING_TURNS) {
         if (b->rough && !may_have_cooled(b, model, k, sqrtf(distance_k2))) {
             begin_line(b, true, share);
             return;

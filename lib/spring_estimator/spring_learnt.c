@@ -30,7 +30,8 @@ void spring_estimator_restore(spring_estimator_t *e, uint8_t k, const spring_lea
         fabsf(l->change) < 1.0f && l->change != 0.0f &&
         fabsf(l->loss_w_per_k) <= LOSS_MOST * e->loss_w_per_k && l->loss_sd_w_per_k >= 0.0f &&
         l->loss_sd_w_per_k <= LOSS_SD * e->loss_w_per_k &&
-        fabsf(l->martensite_rise_per_k) <= COEFFICIENT_MOST_PER_HEAT_K;
+        fabsf(l->martensite_rise_per_k) <= COEFFICIENT_MOST_PER_HEAT_K &&
+        fabsf(l->offset_v) <= OFFSET_MOST_V;
     if (possible) {
         e->spring[k].learnt = *l;
         e->spring[k].loss_variance = l->loss_sd_w_per_k * l->loss_sd_w_per_k;

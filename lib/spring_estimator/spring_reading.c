@@ -114,7 +114,7 @@ float spring_take_readings(spring_belief_t *b)
     b->reads = b->readings >= LEAST_READINGS && b->current_sum_ma >= LEAST_MEAN_MA * b->readings &&
                b->voltage_sum_mv > 0;
     if (b->reads) {
-        const float offset_mv = 1e3f * b->offset_v * (float)b->readings;
+        const float offset_mv = 1e3f * b->learnt.offset_v * (float)b->readings;
         const float ohm = ((float)b->voltage_sum_mv - offset_mv) / (float)b->current_sum_ma;
         const float current_a = (float)b->current_sum_ma * 1e-3f / (float)b->readings;
         if (!leave_out(b, ohm, current_a)) {

@@ -575,6 +575,9 @@ int main(void)
     RUN_TEST(loss_that_is_still_missing_at_rest_is_taken_back);
     RUN_TEST(loss_that_is_back_at_rest_is_not_taken_back);
     RUN_TEST(loss_too_small_to_tell_stays_in_doubt);
+    RUN_TEST(loss_on_the_way_down_from_a_heating_is_seen_at_rest);
+    RUN_TEST(heating_for_a_loss_that_was_none_ends);
+    RUN_TEST(restored_spring_is_not_overheated);
     RUN_TEST(slope_that_no_metal_has_is_not_learnt);
     RUN_TEST(heating_that_a_limit_ends_is_doubted);
     RUN_TEST(heating_that_is_cut_between_two_readings_is_doubted);
