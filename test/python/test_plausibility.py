@@ -71,3 +71,18 @@ def test_a_clock_that_is_right_is_not_suspected(make_log) -> None:
     run = read_log(make_log(effects=TRUE))
     problem, fit, _ = diagnosis.fit_effects(Array(), [run], [])
     assert plausibility.shifted_clock(problem, (fit,)) == []
+
+
+@pytest.mark.parametrize(("step", "said"), [(1.5, 1), (0.5, 0), (0.01, 0)])
+def test_thermometers_that_step_are_said_where_the_steps_are_most_of_their_noise(
+    make_log, step: float, said: int
+) -> None:
+    """With 0.3 K of noise: steps of half a kelvin are within it."""
+
+    def rounded(columns: dict[str, np.ndarray]) -> None:
+        for k in range(1, 10):
+            columns[f"t{k}_c"] = step * np.round(columns[f"t{k}_c"] / step)
+
+    warnings = plausibility.coarse([read_log(make_log(effects=TRUE, change=rounded))])
+    assert len(warnings) == said
+    assert all(f"t8_c, t9_c step by {step:g} K" in one for one in warnings)

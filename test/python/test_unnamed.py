@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
 import numpy as np
 import pytest
 from ninespring import native
@@ -33,6 +37,12 @@ def astray(columns: dict[str, np.ndarray], extra: np.ndarray, effects: dict[str,
         columns[f"t{k + 1}_c"] = columns[f"t{k + 1}_c"] + shown[1][:, k] - shown[0][:, k]
 
 
+def diagnosed(make_log: Callable[..., Path], **kind: Any) -> dict[str, Any]:
+    """Diagnose two logs of one kind: effects and change as `make_log` takes them."""
+    runs = [read_log(make_log(f"{seed}.csv", seed=seed, **kind)) for seed in (3, 4)]
+    return diagnosis.diagnose(Array(), runs).result
+
+
 def crosstalk(columns: dict[str, np.ndarray]) -> None:
     """Let the drive of spring 1 heat spring 9 by a fifth."""
     extra = np.zeros((len(columns["fan"]), 9))
@@ -41,8 +51,7 @@ def crosstalk(columns: dict[str, np.ndarray]) -> None:
 
 
 def test_a_known_effect_is_named_beside_heat_that_goes_astray(make_log) -> None:
-    runs = [read_log(make_log(f"{seed}.csv", effects=EDGES, seed=seed, change=crosstalk)) for seed in (3, 4)]
-    found = diagnosis.diagnose(Array(), runs).result
+    found = diagnosed(make_log, effects=EDGES, change=crosstalk)
     (named,) = found["effects"]
     assert named["name"] == "edge_loss"
     assert named["parameters"]["edge_loss_fraction"]["value"] == pytest.approx(0.2, abs=0.01)
@@ -53,8 +62,7 @@ def test_a_known_effect_is_named_beside_heat_that_goes_astray(make_log) -> None:
 
 
 def test_nothing_without_a_name_where_the_library_explains_all(make_log) -> None:
-    runs = [read_log(make_log(f"{seed}.csv", effects=EDGES, seed=seed)) for seed in (3, 4)]
-    found = diagnosis.diagnose(Array(), runs).result
+    found = diagnosed(make_log, effects=EDGES)
     assert found["unnamed"] == [] and not found["unexplained"]
 
 
@@ -66,8 +74,7 @@ def test_a_trickle_of_heat_is_no_thermometer_with_an_offset(make_log) -> None:
         extra[:, 3] = 0.06
         astray(columns, extra)
 
-    runs = [read_log(make_log(f"{seed}.csv", effects=EDGES, seed=seed, change=trickle)) for seed in (3, 4)]
-    found = diagnosis.diagnose(Array(), runs).result
+    found = diagnosed(make_log, effects=EDGES, change=trickle)
     assert [one["name"] for one in found["effects"]] == ["edge_loss"] and found["unexplained"]
     (cause,) = found["unnamed"]
     assert "spring 4 is given heat all the time" in cause["text"]
@@ -82,8 +89,7 @@ def test_names_that_stand_in_for_a_trickle_of_heat_go_and_the_true_one_stays(mak
         extra[:, 6] = 0.06
         astray(columns, extra, LATENT)
 
-    runs = [read_log(make_log(f"{seed}.csv", effects=LATENT, seed=seed, change=trickle)) for seed in (3, 4)]
-    found = diagnosis.diagnose(Array(), runs).result
+    found = diagnosed(make_log, effects=LATENT, change=trickle)
     assert [one["name"] for one in found["effects"]] == ["latent_heat"] and found["unexplained"]
     assert any("spring 7 is given heat all the time" in one["text"] for one in found["unnamed"])
 
@@ -94,8 +100,7 @@ def test_a_thermometer_that_comes_loose_is_none_that_always_shows_less(make_log)
     def loosens(columns: dict[str, np.ndarray]) -> None:
         columns["t2_c"][150:] = 20.0 + 0.7 * (columns["t2_c"][150:] - 20.0)
 
-    runs = [read_log(make_log(f"{seed}.csv", effects=WAKE, seed=seed, change=loosens)) for seed in (3, 4)]
-    found = diagnosis.diagnose(Array(), runs).result
+    found = diagnosed(make_log, effects=WAKE, change=loosens)
     assert [one["name"] for one in found["effects"]] == ["fan_wake"] and found["unexplained"]
     assert any("thermometer 2 shows more of its spring's rise" in one["text"] for one in found["unnamed"])
 
@@ -106,7 +111,6 @@ def test_what_only_leads_on_what_is_there_is_not_found_the_other_way_round(make_
     def apart(columns: dict[str, np.ndarray]) -> None:
         columns["t2_c"] = columns["t2_c"] + 0.08 * (columns["t2_c"] - columns["t3_c"])
 
-    runs = [read_log(make_log(f"{seed}.csv", seed=seed, change=apart)) for seed in (3, 4)]
-    found = diagnosis.diagnose(Array(), runs).result
+    found = diagnosed(make_log, change=apart)
     assert found["unexplained"] or found["effects"]
     assert all(one["size"] > 0 for one in found["unnamed"] if one["kind"] in unnamed.GIVES_ONLY)

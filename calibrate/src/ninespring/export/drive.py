@@ -20,7 +20,7 @@ ENOUGH_K = 12.0
 own target while it is unsure (`unsure_margin_k`)."""
 WORSE = {
     "held": (0.03, "springs that are on hold {old:.0%} austenite as the chip is now, {new:.0%} with the new settings"),
-    "heating_s": (8.0, "heating takes {old:.0f} s as the chip is now, {new:.0f} s with the new settings"),
+    "heating_s": (5.0, "heating takes {old:.0f} s as the chip is now, {new:.0f} s with the new settings"),
     "hottest_c": (3.0, "the hottest spring reaches {old:.0f} degC as the chip is now, {new:.0f} with the new settings"),
     "undriven": (
         0.03,

@@ -327,6 +327,7 @@ def _diagnose(
     if any(free.knot is not None for free in final.spec.free):
         warnings.append(f"model.toml: {DRIFT_LEFT_OUT}; log ambient_c to have it predicted")
     warnings += plausibility.swapped(problem.runs)
+    warnings += plausibility.coarse(runs)
     warnings += [text for run in problem.runs for text in plausibility.undriven_but_hottest(run)]
     if left_over:
         warnings += plausibility.shifted_clock(problem, (base,) if final is base else (base, final))

@@ -6,6 +6,7 @@ changed: what is found is said, in words for `warnings`.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -16,9 +17,14 @@ from ..fit import statistics
 from ..fit.problem import Problem
 from ..fit.spec import Fit
 from ..logs.run import Run
+from ..search.evidence import UNEXPLAINED
 
 OWN_DRIVE_SHARE = 0.5
 """Standardised coefficient (1 about: the drive alone moves the spring) from which a drive is a spring's own."""
+ON_A_STEP = 0.01
+"""Of a step, how far from a whole number of them a reading may be: what the digits of a log leave."""
+FINE_K = 0.15
+"""Steps of a thermometer that matter to nobody: what the chip's arithmetic may be off by."""
 HOTTER_C = 5.0
 """By how much, degC, a spring that is never driven must outdo all others before its current is called missing."""
 
@@ -91,6 +97,32 @@ def undriven_but_hottest(run: Run) -> list[str]:
                 "any other: is its current missing from the log?"
             )
     return out
+
+
+def step_of(values: np.ndarray) -> float:
+    """Return the step of readings, all multiples of one; 0 where they have none."""
+    gaps = np.diff(np.unique(values[np.isfinite(values)]))
+    if gaps.size < 2:
+        return 0.0
+    many = gaps / gaps.min()
+    return float(gaps.min()) if np.abs(many - np.round(many)).max() < ON_A_STEP else 0.0
+
+
+def coarse(runs: Sequence[Run]) -> list[str]:
+    """Return a warning where thermometers step so far that rounding makes structure that matters, hidden in the noise."""
+    steps: dict[float, set[int]] = {}
+    for run in runs:
+        noise = statistics.noise_floor(run.temperature_c, run.starts)
+        for k in range(run.springs):
+            step = step_of(run.temperature_c[:, k])
+            # rounding is off by anything up to half a step
+            if step > FINE_K and step / math.sqrt(12.0) > UNEXPLAINED * noise[k]:
+                steps.setdefault(round(step, 6), set()).add(k + 1)
+    return [
+        f"{'t' + '_c, t'.join(map(str, sorted(springs)))}_c step{'s' * (len(springs) == 1)} by {step:g} K: what is finer "
+        "than that counts as noise and is not seen; a finer thermometer, or its finer setting, shows it"
+        for step, springs in steps.items()
+    ]
 
 
 def _moved(run: Run, rows: int) -> Run:
