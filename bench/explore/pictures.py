@@ -63,7 +63,7 @@ def paper(work: Path) -> Any:
         axis.plot(pitches, [COMSOL[p, fan] for p in pitches], "ks", label="paper, COMSOL")
         axis.plot(pitches, [CAMERA[p, fan] for p in pitches], "k^", mfc="none", label="paper, camera")
         more = [4, 4.5, 5, 5.5, 6, 7, 8]
-        for size, (style, _) in SIZES.items():
+        for size, style in ((3, "-"), (16, ":")):
             law = [fitted_c(p, fan, size) for p in more]
             axis.plot(more, law, style, color="#6b7280", label=f"spacing law, fitted to COMSOL, {size} x {size}")
         for reading, size, style, colour in (
@@ -86,14 +86,13 @@ def paper(work: Path) -> Any:
 def pitch(work: Path) -> Any:
     """Draw interference, speed, supply and energy against pitch and size."""
     table = swept("pitch", work)
-    driven = table["size"] ** 2 - 1
-    table["spring_a"], table["spring_j"] = table.supply_a / driven, table.energy_j / driven
+    table["spring_j"] = table.energy_j / (table["size"] ** 2 - 1)
     figure, axes = plt.subplots(2, 2, figsize=(7.2, 5.6))
     for (metric, label), axis in zip(
         {
             "undriven_c": "undriven middle at most, degC",
             "pictures_per_min": "pictures a minute",
-            "spring_a": "highest supply current, A a driven spring",
+            "supply_a": "highest current of all supplies, A",
             "spring_j": "energy of a picture, J a driven spring",
         }.items(),
         axes.flat,
@@ -111,8 +110,9 @@ def pitch(work: Path) -> Any:
                 color=FAN if fan else STILL,
                 label=f"{size} x {size}{', fan' if fan else ''}",
             )
-        axis.set(xlabel="pitch, mm", ylabel=label, ylim=(0, None))
+        axis.set(xlabel="pitch, mm", ylabel=label, ylim=(0, 1.15 * table[metric].max()))
     axes[0, 0].set_ylim(20, None)
+    axes[1, 0].set(yscale="log", ylim=(10, 2000))
     axes[0, 0].legend(fontsize=7, handlelength=4, ncols=2)
     return figure
 
@@ -198,7 +198,8 @@ def which(work: Path) -> Any:
     for y, metric in enumerate(found):
         for x, key in enumerate(keys):
             one = found[metric][key]
-            axis.text(x, y, f"{one['ST']:.2f}\n± {one['ST_conf']:.2f}", ha="center", va="center", fontsize=6)
+            words, colour = f"{one['ST']:.2f}\n± {one['ST_conf']:.2f}", "white" if one["ST"] > 0.7 else "black"
+            axis.text(x, y, words, color=colour, ha="center", va="center", fontsize=6)
     return figure
 
 

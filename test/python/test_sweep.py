@@ -96,6 +96,20 @@ def test_what_is_there_is_not_done_again(tmp_path: Path, client: Any) -> None:
         Results(tmp_path / "out", spec_of(tmp_path, GRID.replace("0.1", "0.2"))).open()
 
 
+def test_a_damaged_folder_is_named(tmp_path: Path) -> None:
+    spec = spec_of(tmp_path, GRID)
+    (tmp_path / "out" / "points").mkdir(parents=True)
+    kept, part = tmp_path / "out" / "spec.json", tmp_path / "out" / "points" / "00000000-00000001.parquet"
+    kept.write_text("half a fi")
+    with pytest.raises(InputError, match=r"spec\.json.*no sweep wrote this"):
+        Results(tmp_path / "out", spec).open()
+    kept.unlink()
+    Results(tmp_path / "out", spec).open()
+    part.write_text("junk")
+    with pytest.raises(InputError, match=r"00000001\.parquet.*is damaged"):
+        Results(tmp_path / "out", spec).open()
+
+
 def test_numbers_are_of_one_kind_in_every_file(tmp_path: Path) -> None:
     spec = spec_of(tmp_path, f"[sweep]\n{SHORT}[vary]\npitch_mm = [5, 6.5]\nsize = [1, 2]\n")
     results = Results(tmp_path / "out", spec)

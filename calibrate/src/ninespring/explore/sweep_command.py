@@ -107,14 +107,14 @@ def _run(spec: Any, results: Any, done: Any, scheduler: str | None, workers: int
 
 
 def _evaluate(spec: Any, table: Any, output: Path) -> dict[str, Any]:
-    from .spec import UNITS
+    from .spec import UNITS, named
     from .sweep import best_of, indices_of
 
     if spec.method == "optimise":
         best = best_of(spec, table)
         if best is None:
             raise WorkError(f"no point keeps the limits and has {spec.metric}: all {len(table)} are in {output}/points")
-        words = ", ".join(f"{axis.key} {best[axis.key]}" for axis in spec.axes)
+        words = named({axis.key: best[axis.key] for axis in spec.axes})
         out.print(
             f"best {spec.metric}: {best[spec.metric]:.4g} {UNITS[spec.metric]} at {words}", soft_wrap=True, markup=False
         )
