@@ -137,8 +137,8 @@ def patterns(work: Path) -> Any:
                 f"{100 * row.undriven_austenite:.0f} % austenite, with {row.pattern}"
             )
     moves(axis)
-    axis.set(xlabel="pitch, mm", ylabel="undriven at most, degC\n(worst of 512 patterns)", ylim=(20, 110))
-    axis.legend(fontsize=7, handlelength=4, ncols=5, loc="upper center")
+    axis.set(xlabel="pitch, mm", ylabel="undriven at most, degC\n(worst of 512 patterns)", ylim=(20, 125))
+    axis.legend(fontsize=7, handlelength=4, ncols=3, loc="upper center")
     return figure
 
 
