@@ -106,7 +106,7 @@ def throughput(folder: Path, cores: int) -> list[dict[str, Any]]:
                 "figure": f"  by the clock, {cores} cores",
                 "value": round(100 * alone / took),
                 "unit": "%",
-                "target": None,
+                "target": ">= 85",
             }
         )
     return out

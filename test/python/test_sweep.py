@@ -353,6 +353,16 @@ def test_the_command_runs_and_says_where_the_dashboard_is(tmp_path: Path) -> Non
     assert nowhere.returncode == 1 and "no Dask scheduler" in nowhere.stderr
 
 
+def test_a_cluster_as_it_stands_is_used(tmp_path: Path, client: Any) -> None:
+    (tmp_path / "spec.toml").write_text(GRID)
+    words = ["sweep", str(tmp_path / "spec.toml"), "-o", str(tmp_path / "out"), "--scheduler"]
+    done = CliRunner().invoke(cli.cli, [*words, client.scheduler.address])
+    assert done.exit_code == 0, done.output
+    assert (
+        client.dashboard_link in done.output and len(Results(tmp_path / "out", read_spec(Path(words[1]))).read()) == 6
+    )
+
+
 def test_one_point_is_what_the_controller_does(tmp_path: Path) -> None:
     spec = spec_of(tmp_path, "[sweep]\n[vary]\nfan = [0, 1]\n")
     plant = point.plant_of_point(spec, next(spec.all_points()))

@@ -77,6 +77,13 @@ class Results:
         parquet.write_table(table, made)
         os.replace(made, self.points / f"{name}.parquet")
 
+    def count(self) -> tuple[int, int]:
+        """Return how many points there are, and how many of them could not be run; nothing is read whole."""
+        import pyarrow.dataset as dataset
+
+        rows = dataset.dataset(self.points, format="parquet")
+        return rows.count_rows(), rows.count_rows(filter=dataset.field("error") != "")
+
     def read(self) -> Any:
         """Return all rows as a table (pandas), by point."""
         import pyarrow.dataset as dataset
