@@ -106,7 +106,7 @@ def test_exploring_is_walked_to_its_end(tmp_path: Path) -> None:
     walk = commands("exploring.md")
     assert [words[1] for words in walk[:6]] == ["couplings", "couplings", "scenario", "run", "plot", "plot"]
     *walk, (_, everything) = walk
-    assert everything == "bench/explore/pictures.py"  # half an hour: not here
+    assert everything == "bench/explore/pictures.py"  # twenty minutes: not here
     for program, *words in walk:
         words = [word.replace("111101111/000010000", "10/01") for word in words]
         more = ["--mesh", "coarse"] if words[0] == "couplings" and "--mesh" not in words else []
