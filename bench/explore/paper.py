@@ -16,15 +16,17 @@ from pathlib import Path
 import numpy as np
 from ninespring import native
 from ninespring.errors import InputError
-from ninespring.explore.couplings import fields_of
+from ninespring.explore.couplings import fields_of, model_of, plant_of
 from ninespring.explore.field import MESHES
 from ninespring.explore.geometry import geometry_of
+from ninespring.explore.lumped import lumped_of
 from ninespring.explore.modes import Modes
 from ninespring.models import Array
 
 HOT_C, AMBIENT_C, CENTRE = 105.0, 20.0, 4
 COMSOL = {(4, 0): 52, (4, 1): 42, (5, 0): 45, (5, 1): 35, (6, 0): 40, (6, 1): 31}
 CAMERA = {(4, 0): 63, (4, 1): 55, (5, 0): 57, (5, 1): 50, (6, 0): 55, (6, 1): 49}
+LARGER = (8, 16)
 READINGS = {"outer 3.45": 2.65, "mean 3.45": 3.45}
 
 
@@ -36,15 +38,21 @@ def centre_c(modes: Modes) -> tuple[float, float]:
     return AMBIENT_C + float(response[CENTRE, hot] @ power), float(power[0])
 
 
-def fitted_c(pitch_mm: float, fan: int) -> float:
-    """Return what the paper's spacing law, fitted to these six, makes of it."""
-    plant = native.Plant(3, 3)
+def fitted_c(pitch_mm: float, fan: int, size: int = 3) -> float:
+    """Return what the paper's spacing law, fitted to these six, makes of it, or of more springs."""
+    plant = native.Plant(size, size)
     native.paper_configure(plant, pitch_mm)
+    return middle_c(plant, fan)
+
+
+def middle_c(plant: native.Plant, fan: int) -> float:
+    """Return the middle spring's steady temperature where all others are held."""
+    middle = plant.rows // 2 * plant.cols + plant.cols // 2
     plant.set_fan(fan)
-    for k in range(9):
-        plant.drive(k, *((native.POWER, 0.0) if k == CENTRE else (native.TEMPERATURE, HOT_C)))
+    for k in range(plant.springs):
+        plant.drive(k, *((native.POWER, 0.0) if k == middle else (native.TEMPERATURE, HOT_C)))
     plant.settle()
-    return float(plant.temperature_c()[CENTRE])
+    return float(plant.temperature_c()[middle])
 
 
 def main() -> None:
@@ -65,7 +73,8 @@ def main() -> None:
             except InputError as error:
                 print(f"{reading:>12} {pitch:5}  {error}")
                 continue
-            for fan, modes in enumerate(fields_of(geometry, MESHES[options.mesh])):
+            fields = fields_of(geometry, MESHES[options.mesh])
+            for fan, modes in enumerate(fields):
                 assert modes is not None
                 found, corner_w = centre_c(modes)
                 case = pitch, fan
@@ -80,6 +89,18 @@ def main() -> None:
                     {"figure": f"centre, {reading} mm, pitch {pitch} mm, {'fan' if fan else 'still'}"}
                     | {"value": round(found, 1), "unit": "degC", "target": None}
                 )
+            lumped = lumped_of(geometry, *fields)
+            for size in LARGER:  # the network: its middle, sides and corners are those of the field
+                array = Array(size, size, float(pitch), {"coil_diameter_mm": coil})
+                plant = plant_of(model_of(array, geometry_of(array), geometry, lumped, {}))
+                for fan, air in enumerate(("still", "fan")):
+                    figures.append(
+                        {"figure": f"centre, {reading} mm, {size} x {size}, pitch {pitch} mm, {air}"}
+                        | {"value": round(middle_c(plant, fan), 1), "unit": "degC", "target": None}
+                    )
+                    print(
+                        f"{reading:>12} {pitch:5} {fan:3} {size} x {size}, network: {figures[-1]['value']}", flush=True
+                    )
         for against, errors in off.items():
             rms = float(np.sqrt(np.mean(np.square(errors))))
             print(f"{reading:>12} rms from {against}: {rms:.1f} K over {len(errors)} cases")

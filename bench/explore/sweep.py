@@ -86,11 +86,11 @@ def throughput(folder: Path, cores: int) -> list[dict[str, Any]]:
     By the time on the clock, and by that of the processors: on a machine that others use only the second says something.
     """
     out = []
-    for duration, lots in ((300, 40), (3000, 10)):
-        spec = spec_of(folder, lots * cores, duration)
+    for duration, each in ((400, 150), (3000, 25)):
+        spec = spec_of(folder, each * cores, duration)
         with multiprocessing.get_context("spawn").Pool(cores) as pool:
             jobs = [(spec, k, cores) for k in range(cores)]
-            pool.map(bare, jobs)  # all is loaded
+            pool.map(bare, [(spec, k, spec.points // 2) for k in range(cores)])  # all is loaded
             begin = time.perf_counter()
             alone_cpu = sum(pool.map(bare, jobs))
             alone = time.perf_counter() - begin
@@ -106,7 +106,7 @@ def throughput(folder: Path, cores: int) -> list[dict[str, Any]]:
                 "figure": f"  by the clock, {cores} cores",
                 "value": round(100 * alone / took),
                 "unit": "%",
-                "target": None,
+                "target": ">= 85",
             }
         )
     return out

@@ -1,4 +1,4 @@
-"""docs/calibrating.md, walked to its end with nothing plugged in: its own commands, on the simulated board of its first lines."""
+"""docs/calibrating.md and docs/exploring.md, walked to their ends with nothing plugged in, by their own commands."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import json
 import os
 import re
 import shlex
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -15,13 +16,17 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 SIM = Path(os.environ.get("NINESPRING_SIM", ROOT / "build" / "host" / "ninespring-sim"))
 ELF = Path(os.environ.get("NINESPRING_AVR_DIR", ROOT / "build" / "avr")) / "firmware.elf"
-PROGRAMS = {".venv/bin/ninespring": [sys.executable, "-m", "ninespring"], "build/host/ninespring-sim": [str(SIM)]}
+PROGRAMS = {
+    ".venv/bin/ninespring": [sys.executable, "-m", "ninespring"],
+    ".venv/bin/python": [sys.executable],
+    "build/host/ninespring-sim": [str(SIM)],
+}
 WALKED = ("board", "plan", "record", "diagnose", "verify", "export", "upload", "replay", "predict")
 
 
-def commands() -> list[list[str]]:
-    """Return the page's commands in their order, as a shell splits them."""
-    text = (ROOT / "docs" / "calibrating.md").read_text().replace("\\\n", " ")
+def commands(page: str) -> list[list[str]]:
+    """Return a page's commands in their order, as a shell splits them."""
+    text = (ROOT / "docs" / page).read_text().replace("\\\n", " ")
     lines = re.findall(rf"^    ((?:{'|'.join(map(re.escape, PROGRAMS))}) .*)$", text, re.MULTILINE)
     return [shlex.split(line, comments=True) for line in lines]
 
@@ -31,7 +36,7 @@ def commands() -> list[list[str]]:
 )
 def test_the_page_is_walked_to_its_end(tmp_path: Path) -> None:
     said: dict[str, str] = {}
-    board, *walk = (words for words in commands() if words[1] in WALKED)
+    board, *walk = (words for words in commands("calibrating.md") if words[1] in WALKED)
     assert board[1] == "board" and [words[1] for words in walk].count("record") == 3
     with subprocess.Popen(
         [*PROGRAMS[board[0]], *board[1:], "--elf", str(ELF)], stdout=subprocess.PIPE, text=True
@@ -58,3 +63,60 @@ def test_the_page_is_walked_to_its_end(tmp_path: Path) -> None:
     on_board, again = (float(one) for one in re.findall(r"([\d.]+) K", said["verify --port"]))
     assert on_board == pytest.approx(after, abs=0.02) == again
     assert len((tmp_path / "predicted.csv").read_text().splitlines()) > 890
+
+
+SMALL = (
+    ("rows = 3\ncols = 3", "rows = 1\ncols = 2"),
+    ("[cooling]\n", "[cooling]\nmargin_mm = 5\n"),
+    ("margin_mm = 15", ""),
+    ("steps = 4", "steps = 2"),
+    ("size = [3, 4, 8, 16]", "size = [3, 4]"),
+    ("points = 48", "points = 8"),
+    ("duration_s = 400\non_s = 240", "duration_s = 200\non_s = 120"),
+)
+"""The arrays and sweeps of docs/exploring.md, smaller: what it says of them stands in docs/results-tables.md."""
+
+
+def smaller(text: str) -> str:
+    for what, small in SMALL:
+        text = text.replace(what, small)
+    return text
+
+
+@pytest.mark.skipif(not SIM.exists(), reason=f"SKIPPED: {SIM} is not there: script/build makes it")
+def test_exploring_is_walked_to_its_end(tmp_path: Path) -> None:
+    import pandas as pd
+    from ninespring.explore.spec import read_spec
+
+    for name in ("skfem", "gmsh", "distributed", "pyarrow", "optuna"):
+        pytest.importorskip(name, reason=f"SKIPPED: {name} is missing: script/setup", exc_type=Exception)
+    shutil.copytree(ROOT / "bench" / "explore", tmp_path / "bench" / "explore")  # it looks for docs/ from there
+    (tmp_path / "docs" / "exploring").mkdir(parents=True)
+    for spec in (ROOT / "docs" / "exploring").glob("*.toml"):
+        (tmp_path / "docs" / "exploring" / spec.name).write_text(smaller(spec.read_text()))
+    # the two files that the page prints: an array to save, and a sweep with all its keys
+    page = (ROOT / "docs" / "exploring.md").read_text()
+    printed = [
+        re.sub("^    ", "", one, flags=re.MULTILINE) for one in re.findall(r"(?:^(?:    .*)?\n)+", page, re.MULTILINE)
+    ]
+    array, spec = (next(one for one in printed if one.strip().startswith(head)) for head in ("[array]\n", "[sweep]\n"))
+    (tmp_path / "array.toml").write_text(smaller(array.strip() + "\n"))
+    (tmp_path / "printed.toml").write_text(spec)
+    assert read_spec(tmp_path / "printed.toml").points == 8
+    walk = commands("exploring.md")
+    assert [words[1] for words in walk[:6]] == ["couplings", "couplings", "scenario", "run", "plot", "plot"]
+    *walk, (_, everything) = walk
+    assert everything == "bench/explore/pictures.py"  # twenty minutes: not here
+    for program, *words in walk:
+        words = [word.replace("111101111/000010000", "10/01") for word in words]
+        more = ["--mesh", "coarse"] if words[0] == "couplings" and "--mesh" not in words else []
+        done = subprocess.run(
+            [*PROGRAMS[program], *words, *more], capture_output=True, text=True, cwd=tmp_path, check=False, timeout=600
+        )
+        assert done.returncode == 0, (words, done.stdout, done.stderr)
+    assert "best pictures_per_min" in done.stdout
+    table = pd.read_parquet(tmp_path / "pitch" / "points")
+    assert len(table) == 8 and (table["error"] == "").all()
+    assert table.undriven_c[table.fan == 1].max() < table.undriven_c[table.fan == 0].max()
+    for made in ("model.toml", "stack.png", "layers.png", "exploring_pitch.svg"):
+        assert (tmp_path / made).stat().st_size > 500

@@ -18,7 +18,8 @@
 EXPORT int chip_run(const plant_t *plant, int board_rows, int board_columns,
                     const char *const lines[], const int *pattern, double fan, uint64_t seed,
                     size_t rows, size_t on_rows, double *temperature_c, double *austenite,
-                    double *power_w, double *sum_a, char *message, size_t message_size);
+                    double *power_w, double *sum_a, int *faults, char *message,
+                    size_t message_size);
 
 /* Settings of every board: the firmware's defaults with its console lines. NULL where a line is
  * refused. */
@@ -69,15 +70,30 @@ static void advance(boards_t *boards, double seconds)
     }
 }
 
+/* Springs that their boards have switched off for good. */
+static int faults_of(const boards_t *boards)
+{
+    int out = 0;
+    for (int k = 0; k < boards_of(boards); k++) {
+        const controller_t *controller = loop_controller(boards_loop(boards, k));
+        for (uint8_t i = 0; i < controller_springs(controller); i++) {
+            out += controller_fault(controller, i) != SAFETY_FAULT_NONE ||
+                   controller_board_fault(controller) != SAFETY_FAULT_NONE;
+        }
+    }
+    return out;
+}
+
 /* The plant from where it is (cold, and the boards are told so), cut into boards of board_rows x
  * board_columns springs (boards.h), board k with the firmware's defaults and lines[k]: pattern[n]
  * on for on_rows seconds, then off; the fan at 0..1 throughout; seed is the sensors' noise. Row r
  * is what is true after r + 1 seconds: temperature_c, austenite (n each), power_w and sum_a of all
- * (one each). 0 done; -1 a line is refused, -2 a board refuses its settings (message says which).
+ * (one each); faults: springs that a fault has switched off by the end. 0 done; -1 a line is
+ * refused, -2 a board refuses its settings (message says which).
  */
 int chip_run(const plant_t *plant, int board_rows, int board_columns, const char *const lines[],
              const int *pattern, double fan, uint64_t seed, size_t rows, size_t on_rows,
-             double *temperature_c, double *austenite, double *power_w, double *sum_a,
+             double *temperature_c, double *austenite, double *power_w, double *sum_a, int *faults,
              char *message, size_t message_size)
 {
     controller_settings_t *settings =
@@ -114,6 +130,7 @@ int chip_run(const plant_t *plant, int board_rows, int board_columns, const char
             sum_a[r] += loop_sum_current_a(boards_loop(boards, k));
         }
     }
+    *faults = faults_of(boards);
     boards_destroy(boards);
     return 0;
 }

@@ -468,16 +468,18 @@ def chip_run(
     seed: int,
     rows: int,
     on_rows: int,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, int]:
     """Drive a copy of a plant from cold by its boards: the pattern on for `on_rows` seconds, then off.
 
     `board`: rows and columns of springs of one board; `lines`: console lines of each (`boards_of`).
-    Return true temperatures (degC) and austenite, (rows, springs), and of each second heat (W) and current (A) of all.
+    Return true temperatures (degC) and austenite, (rows, springs), of each second heat (W) and current (A) of all, and
+    how many springs a fault has switched off by the end.
     """
     if len(lines) != len(boards_of(plant.rows, plant.cols, *board, plant.layers)):
         raise ValueError("lines of every board")
     temperature, austenite = np.empty((rows, plant.springs)), np.empty((rows, plant.springs))
     power, current = np.empty(rows), np.empty(rows)
+    faults = ctypes.c_int()
     _chip(
         "the chip refuses",
         "chip_run",
@@ -490,8 +492,9 @@ def chip_run(
         ctypes.c_size_t(rows),
         ctypes.c_size_t(on_rows),
         *(_pointer(one) for one in (temperature, austenite, power, current)),
+        ctypes.byref(faults),
     )
-    return temperature, austenite, power, current
+    return temperature, austenite, power, current, faults.value
 
 
 def paper_configure(plant: Plant, pitch_mm: float) -> None:

@@ -50,7 +50,7 @@ def scenario(model_path: Path, pattern: str | None, fan: int, duration: float, o
 
 def scenario_text(model: Model, on: list[bool], pattern: str, fan: int, duration_s: float) -> str:
     """Return scenario.ini: the model's plant under boards that are told its numbers."""
-    from .fit.simulate import array_parameters
+    from .fit.simulate import array_parameters, board_settings
 
     array = model.array
     shifted = ("transformation_shift",) if (array.stiffness or {}).get("transformation_shift_k") else ()
@@ -63,6 +63,8 @@ def scenario_text(model: Model, on: list[bool], pattern: str, fan: int, duration
     lines += ["[plant]", "effects = " + ",\n    ".join(effects)]
     values = array_parameters(array) | model.parameters
     lines += [f"{name} = {value:.7g}" for name, value in values.items()]
+    if settings := board_settings(array):
+        lines += ["[chip]", *(f"{name} = {value:.3f}" for name, value in settings.items())]
     for number, own in array.boards.items():
         lines += [f"[board.{number}]", *(f"{key} = {value:g}" for key, value in own.items())]
     lines += ["[events]", f"at 0 = fan {fan}"]

@@ -12,7 +12,7 @@ import numpy as np
 
 from .. import native
 from ..errors import InputError, WorkError
-from ..fit.simulate import array_parameters
+from ..fit.simulate import array_parameters, board_settings
 from ..models import Array
 from .spec import METRICS, Spec, array_of_point, board_of_point, patterns_of
 
@@ -94,6 +94,7 @@ def _layer_pattern(wanted: str, rows: int, cols: int, rng: np.random.Generator) 
 def settings_of(point: Mapping[str, Any]) -> str:
     """Return a board's console lines besides its model."""
     lines = [f"$policy={int(point.get('policy', 'precompensate') == 'precompensate')}"]
+    lines += [f"${name}={value:.3f}" for name, value in board_settings(array_of_point(point)).items()]
     lines += [
         f"${name}={point[name]:.3f}"
         for name in ("supply_limit_a", "boost_current_a", "open_current_a")
@@ -127,9 +128,10 @@ def metrics_of(spec: Spec, point: dict[str, Any], seed: int) -> dict[str, float]
     pattern = pattern_of(point, array, rng)
     fan = float(point.get("fan", 0.0))
     on = spec.on_s
-    t, x, power, current = native.chip_run(real, board, lines, list(pattern), fan, seed, spec.duration_s, on)
+    t, x, power, current, faults = native.chip_run(real, board, lines, list(pattern), fan, seed, spec.duration_s, on)
     out = dict.fromkeys(METRICS, math.nan)
     out |= {"hottest_c": float(t.max()), "energy_j": float(power.sum()), "supply_a": float(current.max())}
+    out["faults"] = float(faults)
     out["hold_w"] = float(power[3 * on // 4 : on].mean())
     if pattern.any():
         moved = x[:on, pattern] >= STARTED

@@ -44,8 +44,12 @@ class Results:
             raise InputError("another sweep is writing into this folder", self.folder) from None
         kept = self.folder / "spec.json"
         if kept.exists():
-            before = json.loads(kept.read_text())
-            if (before["sha256"], before["version"]) != (self.spec.sha256, __version__):
+            try:
+                before = json.loads(kept.read_text())
+                its = before["sha256"], before["version"]
+            except (ValueError, KeyError, TypeError) as error:
+                raise InputError(f"no sweep wrote this ({error}): give another folder", kept) from None
+            if its != (self.spec.sha256, __version__):
                 raise InputError(
                     "holds the results of another spec, or of another version: give another folder", self.folder
                 )
@@ -53,7 +57,10 @@ class Results:
             raise InputError("holds Parquet files that no sweep of this spec wrote: give another folder", self.folder)
         done = np.zeros(self.spec.points, dtype=bool)
         for part in self.points.glob("*.parquet"):
-            done[parquet.read_table(part, columns=["point"])["point"].to_numpy()] = True
+            try:
+                done[parquet.read_table(part, columns=["point"])["point"].to_numpy()] = True
+            except (OSError, ValueError, KeyError) as error:
+                raise InputError(f"is damaged ({error}): remove it, its points are then run again", part) from None
         for left in self.points.glob("*.part"):
             left.unlink()  # of a sweep that was killed while it wrote
         _whole(kept, self.meta.encode())
@@ -69,6 +76,13 @@ class Results:
         made = self.points / f"{name}.part"
         parquet.write_table(table, made)
         os.replace(made, self.points / f"{name}.parquet")
+
+    def count(self) -> tuple[int, int]:
+        """Return how many points there are, and how many of them could not be run; nothing is read whole."""
+        import pyarrow.dataset as dataset
+
+        rows = dataset.dataset(self.points, format="parquet")
+        return rows.count_rows(), rows.count_rows(filter=dataset.field("error") != "")
 
     def read(self) -> Any:
         """Return all rows as a table (pandas), by point."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 import hashlib
 import itertools
 import json
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -30,27 +31,27 @@ EVERY = "every"
 EVERY_SPRINGS = 12
 POLICIES = ("open", "precompensate")
 COUPLINGS = ("law", "field")
-OWN: dict[str, tuple[Any, float, float]] = {
-    "rows": (3, 1, native.MAX_SPRINGS),
-    "cols": (3, 1, native.MAX_SPRINGS),
-    "size": (0, 0, 32),
-    "layers": (1, 1, 2),
-    "board_rows": (8, 1, native.BOARD_SPRINGS),
-    "board_cols": (8, 1, native.BOARD_SPRINGS),
-    "pitch_mm": (5.0, 1.0, 100.0),
-    "fan": (0.0, 0.0, 1.0),
-    "ambient_c": (20.0, -40.0, 80.0),
-    "supply_limit_a": (15.0, 0.1, 60.0),
-    "boost_current_a": (3.0, 0.1, 3.2),
-    "open_current_a": (1.5, 0.0, 3.2),
-    "tolerance": (0.0, 0.0, 0.5),
-    "transformation_spread_k": (0.0, 0.0, 20.0),
+OWN: dict[str, tuple[float, float]] = {
+    "rows": (1, native.MAX_SPRINGS),
+    "cols": (1, native.MAX_SPRINGS),
+    "size": (1, 32),
+    "layers": (1, 2),
+    "board_rows": (1, native.BOARD_SPRINGS),
+    "board_cols": (1, native.BOARD_SPRINGS),
+    "pitch_mm": (1.0, 100.0),
+    "fan": (0.0, 1.0),
+    "ambient_c": (-40.0, 80.0),
+    "supply_limit_a": (0.1, 60.0),
+    "boost_current_a": (0.1, 3.2),
+    "open_current_a": (0.0, 3.2),
+    "tolerance": (0.0, 0.5),
+    "transformation_spread_k": (0.0, 20.0),
 }
-"""Key: what it is where nothing is said, and its limits. `size` n is rows = cols = n."""
+"""Key: its limits. `size` n is rows = cols = n."""
 STIFFNESS = {f"stiffness_{key}": key for key in (*STIFFNESS_KEYS, *stiffness.WORDS)}
 """Key: that of `[stiffness]` in array.toml."""
 LIMITS: dict[str, tuple[float, float]] = (
-    {key: (low, high) for key, (_, low, high) in OWN.items()}
+    OWN
     | SPRING_KEYS
     | MATERIAL_KEYS
     | cooling.NUMBERS
@@ -73,8 +74,9 @@ METRICS = (
     "hold_w",
     "energy_j",
     "supply_a",
+    "faults",
 )
-UNITS = dict(zip(METRICS, ("s", "1", "s", "1/min", "degC", "degC", "1", "W", "J", "A"), strict=True))
+UNITS = dict(zip(METRICS, ("s", "1", "s", "1/min", "degC", "degC", "1", "W", "J", "A", "springs"), strict=True))
 
 
 @dataclass
@@ -143,9 +145,9 @@ class Spec:
         return self.fixed | {axis.key: value for axis, value in zip(self.axes, values, strict=True)}
 
     def all_points(self) -> Iterator[dict[str, Any]]:
-        """Return every point, in order (none of an optimiser's)."""
-        if self.method == "grid":
-            for values in itertools.product(*(axis.values for axis in self.axes)):
+        """Return every point, in order; of an optimiser, which asks where it likes, the corners."""
+        if self.method in ("grid", "optimise"):
+            for values in itertools.product(*(axis.values or (axis.low, axis.high) for axis in self.axes)):
                 yield self.table(values)
         shares = self.shares()
         for row in () if shares is None else shares:
@@ -310,8 +312,8 @@ class _Reader:
             raise self.refuse("a grid has as many points as its steps make: leave out points", "points")
         if spec.method != "grid":
             spec.points = spec.asked = int(self.number(head.get("points", 0), 1, MOST_POINTS, "points", True))
-        if spec.method == "saltelli" and spec.points & (spec.points - 1):
-            raise self.refuse(f"points is {spec.points}: saltelli wants a power of two", "points")
+        if spec.method in ("sobol", "saltelli") and spec.points & (spec.points - 1):
+            raise self.refuse(f"points is {spec.points}: {spec.method} wants a power of two", "points")
         fixed, vary = self.table("fixed"), self.table("vary")
         for table, where in ((fixed, "[fixed]"), (vary, "[vary]")):
             for key in table:
@@ -327,6 +329,10 @@ class _Reader:
         ]
         if not spec.axes:
             raise self.refuse("nothing is varied: [vary] is empty or missing", "vary")
+        if spec.method == "grid":
+            spec.points = math.prod(len(axis.values) for axis in spec.axes)
+            if spec.points > MOST_POINTS:
+                raise self.refuse(f"{spec.points} points are more than {MOST_POINTS}", "vary")
         if {"size", "rows"} <= {*fixed, *vary} or {"size", "cols"} <= {*fixed, *vary}:
             raise self.refuse("size stands for rows and cols: give one or the other", "size")
         if spec.couplings == "law":
@@ -364,7 +370,12 @@ class _Reader:
                 bound = part[key]
                 if not isinstance(bound, dict) or not bound or set(bound) - {"least", "most"}:
                     raise self.refuse(f"[optimise] {key} = {{least = .., most = ..}}", key)
-                spec.limits[key] = (bound.get("least"), bound.get("most"))
+                least, most = (
+                    self.number(bound[name], -1e9, 1e9, key) if name in bound else None for name in ("least", "most")
+                )
+                if least is not None and most is not None and least > most:
+                    raise self.refuse(f"{key} is at least {least:g} and at most {most:g}: the wrong way round", key)
+                spec.limits[key] = (least, most)
 
 
 def named(point: Mapping[str, Any]) -> str:
@@ -396,5 +407,6 @@ def read_spec(path: Path) -> Spec:
                 raise InputError(f"[board.{max(spec.boards)}], but the array has {boards} boards")
         except InputError as error:
             raise InputError(f"point {count} ({named(point)}) cannot exist: {error.message}", path) from None
-    spec.points = count or spec.points
+    if spec.method == "saltelli":
+        spec.points = count
     return spec

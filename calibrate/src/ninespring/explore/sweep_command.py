@@ -60,18 +60,17 @@ def sweep(
     if before < spec.points:
         _run(spec, results, done, scheduler, workers or os.cpu_count() or 1)
     took = time.monotonic() - begin
-    table = results.read()
-    failed = int((table["error"] != "").sum())
+    points, failed = results.count()
     out.print(
-        f"{len(table)} points in {output}/points ({before} were there), {took:.1f} s"
+        f"{points} points in {output}/points ({before} were there), {took:.1f} s"
         + (f"; {failed} could not be run: column error says why" if failed else ""),
         soft_wrap=True,
         markup=False,
     )
     result = result_of(
-        "sweep", spec=spec_path.name, sha256=spec.sha256, points=len(table), done_before=before, failed=failed
+        "sweep", spec=spec_path.name, sha256=spec.sha256, points=points, done_before=before, failed=failed
     )
-    result |= _evaluate(spec, table, output)
+    result |= _evaluate(spec, results, output)
     write({json_path: checked(result)})
 
 
@@ -106,21 +105,22 @@ def _run(spec: Any, results: Any, done: Any, scheduler: str | None, workers: int
         run(client, spec, results, done, lambda count: progress.update(task, completed=count))
 
 
-def _evaluate(spec: Any, table: Any, output: Path) -> dict[str, Any]:
-    from .spec import UNITS
+def _evaluate(spec: Any, results: Any, output: Path) -> dict[str, Any]:
+    from .spec import UNITS, named
     from .sweep import best_of, indices_of
 
+    if spec.method not in ("optimise", "saltelli"):
+        return {}
+    table = results.read()
     if spec.method == "optimise":
         best = best_of(spec, table)
         if best is None:
             raise WorkError(f"no point keeps the limits and has {spec.metric}: all {len(table)} are in {output}/points")
-        words = ", ".join(f"{axis.key} {best[axis.key]}" for axis in spec.axes)
+        words = named({axis.key: best[axis.key] for axis in spec.axes})
         out.print(
             f"best {spec.metric}: {best[spec.metric]:.4g} {UNITS[spec.metric]} at {words}", soft_wrap=True, markup=False
         )
         return {"best": {axis.key: _plain(best[axis.key]) for axis in spec.axes} | {spec.metric: best[spec.metric]}}
-    if spec.method != "saltelli":
-        return {}
     found = indices_of(spec, table)
     shown = Table("metric", *(axis.key for axis in spec.axes), title="Sobol indices, total (+- 95 %)")
     for metric, one in found.items():

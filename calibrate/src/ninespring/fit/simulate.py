@@ -118,6 +118,13 @@ def load_changes(load_n: np.ndarray) -> np.ndarray:
     return np.array(out, dtype=int)
 
 
+RESISTANCES = ("resistance_martensite_ohm", "resistance_austenite_ohm")
+WHOLE_OHM = 0.08, 0.5
+"""The firmware's own resistance_minimum_ohm and _maximum_ohm (lib/parameters/parameters.def)."""
+MOST_OHM = 10.0
+"""What that setting can hold."""
+
+
 def array_parameters(array: Array) -> dict[str, float]:
     """Return the plant's parameters that follow from array.toml: the host tools' rules (docs/files.md)."""
     out = _layer_parameters(array)
@@ -129,6 +136,21 @@ def array_parameters(array: Array) -> dict[str, float]:
         if name in own:
             out |= {f"{name}[{array.springs // 2 + k + 1}]": own[name] for k in range(array.springs // 2)}
     return out
+
+
+def board_settings(array: Array) -> dict[str, float]:
+    """Return what a board must be told besides its model where array.toml describes another spring: which are whole.
+
+    The firmware's limits of a spring's resistance, as far from this array's springs as they are from the paper's.
+    """
+    if not (array.spring or array.material or array.stiffness):
+        return {}
+    declared = {name: native.parameter_table()[name].default for name in RESISTANCES}
+    given = declared | array_parameters(array)
+    ohm = [value for name, value in given.items() if name.partition("[")[0] in RESISTANCES]
+    low, high = min(ohm) / min(declared.values()), max(ohm) / max(declared.values())
+    least, most = WHOLE_OHM
+    return {"resistance_minimum_ohm": least * low, "resistance_maximum_ohm": min(MOST_OHM, most * high)}
 
 
 def _layer_parameters(array: Array) -> dict[str, float]:
