@@ -104,6 +104,19 @@ def wrong(tmp_path: Path) -> Path:
     return path
 
 
+def test_a_board_is_told_what_resistance_another_wire_has(cold: Path) -> None:
+    model = read_model(cold)
+    assert not [name for name in settings_of(model).written if name.endswith("imum_ohm")]
+    for wire_mm in (0.4, 1.2):
+        model.array.spring = {"wire_diameter_mm": wire_mm}
+        written = settings_of(model).written
+        assert float(written["resistance_minimum_ohm"]) == pytest.approx(0.08 * (0.8 / wire_mm) ** 2, rel=0.05)
+        assert float(written["resistance_maximum_ohm"]) == pytest.approx(0.5 * (0.8 / wire_mm) ** 2, rel=0.05)
+        # told in this order, the lower never meets the upper
+        limits = [name for name in written if name.endswith("imum_ohm")]
+        assert limits[0] == ("resistance_maximum_ohm" if wire_mm < 0.8 else "resistance_minimum_ohm")
+
+
 def test_settings_that_drive_worse_are_refused_and_written_only_by_force(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

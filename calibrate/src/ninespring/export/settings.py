@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .. import effects, native
-from ..fit.simulate import array_parameters
+from ..fit.simulate import array_parameters, board_settings
 from ..models import Model
 
 FIRMWARE_EFFECTS = ("latent_heat", "resistance_phase")
@@ -117,6 +117,7 @@ def settings_of(model: Model) -> Settings:
             wanted -= moves(name)
     written = {name: value for name, value in full.items() if name in wanted}
     kept = {name: weak.get(name) or _reason(model, name, plant) for name in full if name not in wanted}
+    written |= {name: f"{value:.3f}" for name, value in board_settings(model.array).items()}
     return Settings(written, kept, remarks)
 
 

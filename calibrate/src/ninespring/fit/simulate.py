@@ -123,6 +123,8 @@ WHOLE_OHM = 0.08, 0.5
 """The firmware's own resistance_minimum_ohm and _maximum_ohm (lib/parameters/parameters.def)."""
 MOST_OHM = 10.0
 """What that setting can hold."""
+SAME = 0.01
+"""Part of a resistance by which springs are the same."""
 
 
 def array_parameters(array: Array) -> dict[str, float]:
@@ -143,14 +145,16 @@ def board_settings(array: Array) -> dict[str, float]:
 
     The firmware's limits of a spring's resistance, as far from this array's springs as they are from the paper's.
     """
-    if not (array.spring or array.material or array.stiffness):
-        return {}
     declared = {name: native.parameter_table()[name].default for name in RESISTANCES}
     given = declared | array_parameters(array)
     ohm = [value for name, value in given.items() if name.partition("[")[0] in RESISTANCES]
     low, high = min(ohm) / min(declared.values()), max(ohm) / max(declared.values())
+    if max(abs(low - 1.0), abs(high - 1.0)) < SAME:  # the paper's springs
+        return {}
     least, most = WHOLE_OHM
-    return {"resistance_minimum_ohm": least * low, "resistance_maximum_ohm": min(MOST_OHM, most * high)}
+    out = {"resistance_maximum_ohm": min(MOST_OHM, most * high), "resistance_minimum_ohm": least * low}
+    # told one after the other, the lower never meets the upper
+    return out if high > 1.0 else dict(reversed(out.items()))
 
 
 def _layer_parameters(array: Array) -> dict[str, float]:
