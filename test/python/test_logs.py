@@ -177,6 +177,15 @@ def test_a_glitch_is_left_out_and_nothing_else(make_log) -> None:
     assert np.flatnonzero(np.isnan(run.temperature_c[:, 0])).tolist() == [250]
 
 
+def test_a_peak_without_noise_is_no_glitch(make_log) -> None:
+    def peak(columns: dict[str, np.ndarray]) -> None:  # heated fast and switched off, again and again
+        row = np.arange(600.0) % 150.0
+        columns["t1_c"] = np.where(row < 10.0, 40.0 + 5.0 * row, 40.0 + 50.0 * np.exp((10.0 - row) / 12.0))
+
+    run = read_log(make_log(change=peak))
+    assert not np.isnan(run.temperature_c[:, 0]).any(), run.notes
+
+
 def test_columns_of_the_simulator_are_skipped(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     path.write_text(

@@ -184,7 +184,10 @@ def _longest_run(flags: np.ndarray) -> int:
 
 
 def mask_glitches(run: Run) -> None:
-    """Single samples far from the straight line between their neighbours: no spring moves like that."""
+    """Single samples far from the straight line between their neighbours, and from those that lead there and away.
+
+    No spring moves like that; one that is switched goes on in another direction, and is where one of the lines leads.
+    """
     noise = noise_floor(run.temperature_c)
     for k in range(run.springs):
         values = run.temperature_c[:, k]
@@ -192,6 +195,8 @@ def mask_glitches(run: Run) -> None:
             continue
         before, after = values[:-2], values[2:]
         away = np.abs(values[1:-1] - 0.5 * (before + after))
+        away[1:] = np.fmin(away[1:], np.abs(values[2:-1] - 2.0 * values[1:-2] + values[:-3]))
+        away[:-1] = np.fmin(away[:-1], np.abs(values[1:-2] - 2.0 * values[2:-1] + values[3:]))
         limit = 10.0 * max(float(noise[k]), 0.02) + 2.0 * np.abs(after - before)
         bad = np.flatnonzero(away > limit) + 1
         # a spike of one sample also lifts its neighbours' distance: keep the largest of three in a row
