@@ -1,9 +1,10 @@
 """Causes that have no name in the library, in kinds that need none: heat that goes where it should not, losses and drives
 that change in time, thermometers that see what is not theirs.
 
-What one of them makes of the readings is simulated by the fitted model and is nearly linear in its size. Beside an unknown
-cause of such a kind a known one shows as clearly as alone; without it every name is a stand-in. They are taken out of the
-readings while the library is searched, priced for all that they were chosen from, and are no part of the model.
+What one of them makes of the readings is simulated by the fitted model and nearly linear in its size; where not, its heat is
+simulated with that size. Beside an unknown cause of such a kind a known one shows as clearly as alone; without it every name
+is a stand-in. They are taken out of the readings while the library is searched, priced for all that they were chosen from,
+and are no part of the model.
 """
 
 from __future__ import annotations
