@@ -62,7 +62,7 @@ static double supply_voltage(const plant_t *p, const double *t, const double *au
         const double spring_ohm = terminal_ohm(p, i, t[i], austenite[i]);
         switch (p->mode[i]) {
         case PLANT_DRIVE_POWER:
-            power += p->quantity[i];
+            power += fmax(p->quantity[i], 0.0);
             break;
         case PLANT_DRIVE_CURRENT:
             power += p->quantity[i] * p->quantity[i] * (spring_ohm + loop_ohm);

@@ -45,11 +45,13 @@ void plant_network_lay(plant_t *p)
 double plant_network_ambient(const plant_t *p, double time_s)
 {
     double ambient = p->value[P_ambient_c][0];
-    if (p->on[E_ambient_drift])
-        ambient += scalar(p, P_ambient_ramp_k_per_h) * time_s / 3600.0 +
-                   scalar(p, P_ambient_amplitude_k) *
-                       sin(2.0 * PI * time_s / scalar(p, P_ambient_period_s) +
-                           scalar(p, P_ambient_phase_rad));
+    if (!p->on[E_ambient_drift])
+        return ambient;
+    ambient += scalar(p, P_ambient_ramp_k_per_h) * time_s / 3600.0;
+    const double amplitude = scalar(p, P_ambient_amplitude_k);
+    if (amplitude != 0.0) /* a fit has none, and would take the sine of each stage for nothing */
+        ambient += amplitude * sin(2.0 * PI * time_s / scalar(p, P_ambient_period_s) +
+                                   scalar(p, P_ambient_phase_rad));
     return ambient;
 }
 

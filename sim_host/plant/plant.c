@@ -148,7 +148,7 @@ static bool drive_is_valid(plant_drive_mode_t mode, double quantity)
 {
     switch (mode) {
     case PLANT_DRIVE_POWER:
-        return within(quantity, 0.0, 100.0);
+        return within(quantity, -100.0, 100.0);
     case PLANT_DRIVE_CURRENT:
         return within(quantity, 0.0, 20.0);
     case PLANT_DRIVE_DUTY:

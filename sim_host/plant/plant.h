@@ -95,14 +95,14 @@ plant_status_t plant_set_temperature(plant_t *plant, int spring, double temperat
 /* How a spring is driven until the next call; quantity in the unit of the mode. */
 typedef enum {
     PLANT_DRIVE_POWER,   /* W at the spring's terminals (all of it heats the spring but for what a
-                            contact takes) */
+                            contact takes); below 0: heat taken away, none of it from the supply */
     PLANT_DRIVE_CURRENT, /* A through the spring: power = i^2 R(T, phase) */
     PLANT_DRIVE_DUTY,    /* 0..1 of the buck stage: current follows from supply and resistances */
     PLANT_DRIVE_COMMAND, /* 0..1 of command_power_w (where neither current nor voltage was measured)
                           */
     PLANT_DRIVE_TEMPERATURE /* degC, held (its power is whatever that takes) */
 } plant_drive_mode_t;
-/* Limits: 0..100 W, 0..20 A, duty and command 0..1, -60..300 degC; others PLANT_ERROR_RANGE. */
+/* Limits: -100..100 W, 0..20 A, duty and command 0..1, -60..300 degC; others PLANT_ERROR_RANGE. */
 plant_status_t plant_drive(plant_t *plant, int spring, plant_drive_mode_t mode, double quantity);
 typedef enum {
     PLANT_FAULT_NONE = 0,

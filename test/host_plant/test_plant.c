@@ -282,12 +282,12 @@ static void transformation_temperatures_out_of_order_stop_the_step(void)
 
 static void bad_drives_and_steps_are_refused(void)
 {
-    static const double top[5] = {100, 20, 1, 1, 300};
+    static const double top[5] = {100, 20, 1, 1, 300}, bottom[5] = {-100, 0, 0, 0, -60};
     for (int mode = 0; mode < 5; mode++) {
         TEST_ASSERT_EQUAL_INT(PLANT_ERROR_RANGE,
                               plant_drive(plant, 0, (plant_drive_mode_t)mode, top[mode] * 1.001));
         TEST_ASSERT_EQUAL_INT(PLANT_ERROR_RANGE,
-                              plant_drive(plant, 0, (plant_drive_mode_t)mode, -61.0));
+                              plant_drive(plant, 0, (plant_drive_mode_t)mode, bottom[mode] - 0.1));
         TEST_ASSERT_EQUAL_INT(PLANT_ERROR_RANGE,
                               plant_drive(plant, 0, (plant_drive_mode_t)mode, (double)NAN));
     }
@@ -352,7 +352,7 @@ static void a_bad_log_is_refused_whole(void)
     TEST_ASSERT_EQUAL_INT(PLANT_ERROR_TIME, plant_simulate(plant, ROWS, log_time, log_mode,
                                                            log_drive, NULL, NULL, shown[0], NULL));
     log_time[599] = good_time;
-    log_drive[4000] = -0.1;
+    log_drive[4000] = -100.1;
     TEST_ASSERT_EQUAL_INT(PLANT_ERROR_RANGE, plant_simulate(plant, ROWS, log_time, log_mode,
                                                             log_drive, NULL, NULL, shown[0], NULL));
     log_drive[4000] = good_drive;

@@ -61,6 +61,24 @@ def test_a_known_effect_is_named_beside_heat_that_goes_astray(make_log) -> None:
     assert cause["size"] == pytest.approx(0.2, abs=0.01)
 
 
+def swinging_drives(columns: dict[str, np.ndarray]) -> None:
+    """Let every spring be heated more and less, by a third, within ten minutes."""
+    power = np.column_stack([columns[f"i{k + 1}_a"] ** 2 * 0.2 for k in range(9)])
+    astray(columns, power * np.sin(np.arange(float(len(power))) / 600.0 * 2.0 * np.pi)[:, None] / 3.0, LATENT)
+
+
+def test_a_name_has_its_size_beside_heat_that_moves_the_transformation(make_log) -> None:
+    log = read_log(make_log("3.csv", seed=3, effects=LATENT, change=swinging_drives))
+    problem, alone, _ = diagnosis.fit_effects(Array(), [log], ["latent_heat"])
+    kinds = unnamed.library(problem, alone)
+    swing = next(one for one in kinds if one.text == "all drives change again and again")
+    hidden = unnamed.taken_out(problem, alone, [unnamed.Hidden(swing, swing.text, (0, None), swing.columns)])
+    straight = problem.fit(alone.spec, alone.as_dict())
+    fit, _ = unnamed.simulated(problem, straight, hidden)
+    assert fit.sse < 1.5 * fit.count < straight.sse
+    assert fit.value("latent_heat_j") == pytest.approx(7.0, rel=0.25)
+
+
 def test_nothing_without_a_name_where_the_library_explains_all(make_log) -> None:
     found = diagnosed(make_log, effects=EDGES)
     assert found["unnamed"] == [] and not found["unexplained"]

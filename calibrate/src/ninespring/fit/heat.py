@@ -42,7 +42,7 @@ def _with_heat(problem: Problem, fit: Fit, r: int, run: Run, power_w: np.ndarray
     """Return a run whose springs are given `extra_w` (rows, springs) beside what was logged."""
     wanted = np.maximum(power_w + extra_w, 0.0)
     if run.mode == "power":
-        return replace(run, drive=wanted)
+        return problem.heated(replace(run, drive=wanted), r)
     factor = np.where(power_w > 0, wanted / np.where(power_w > 0, power_w, 1.0), 0.0)
     plant = problem.plant_for(fit.spec, fit.values, r)
     if run.mode == "current":

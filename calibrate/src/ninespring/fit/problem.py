@@ -80,6 +80,7 @@ class Problem:
         self.basis: list[np.ndarray | None] = [None] * len(self.runs)
         self.start_response: list[np.ndarray | None] = [None] * len(self.runs)
         self.unnamed: np.ndarray | None = None
+        self.heat: list[np.ndarray] | None = None
         self._pool = concurrent.futures.ThreadPoolExecutor(WORKERS) if WORKERS > 1 else None
         self.simulations = 0
         self._count_lock = threading.Lock()
@@ -165,6 +166,10 @@ class Problem:
             run = replace(run, drive=run.drive * (gain if run.mode == "power" else math.sqrt(gain)))
         return replace(run, temperature_c=run.temperature_c - off_k) if off_k else run
 
+    def heated(self, run: Run, run_index: int) -> Run:
+        """Return a run with the heat that its springs are given without a name, or that is taken away."""
+        return run if self.heat is None else replace(run, drive=run.drive + self.heat[run_index])
+
     def simulate(
         self,
         spec: Spec,
@@ -176,7 +181,7 @@ class Problem:
         with self._count_lock:
             self.simulations += 1
         by_key = {f.key: float(v) for f, v in zip(spec.free, values, strict=True)}
-        run = self.run_of(run_index, by_key)
+        run = self.heated(self.run_of(run_index, by_key), run_index)
         try:
             plant = self.plant_for(spec, values, run_index)
             shown = simulate_run(plant, run, self.ambient_of(run_index, by_key), by_key, start_offset)
@@ -217,9 +222,13 @@ class Problem:
         """Return what is measured of fields (per run, degC), in units of the noise, one vector a run."""
         return [(value / noise)[mask] for value, mask, noise in zip(fields, self.mask, self.noise, strict=True)]
 
-    def leave_out(self, columns: np.ndarray | None) -> None:
-        """Take what these columns (count, causes) can explain out of all that follows; None: take nothing out."""
+    def leave_out(self, columns: np.ndarray | None, heat: list[np.ndarray] | None = None) -> None:
+        """Take what these columns (count, causes) can explain out of all that follows; None: take nothing out.
+
+        Around `heat`, where it is given: per run (rows, springs), W, which is simulated beside what was logged.
+        """
         self.unnamed = None if columns is None or not columns.size else np.linalg.qr(columns)[0]
+        self.heat = heat
 
     def evaluate(self, fit: Fit) -> Fit:
         """Return a fit's numbers with what they leave here, nothing fitted again."""

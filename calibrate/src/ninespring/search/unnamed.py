@@ -1,9 +1,10 @@
 """Causes that have no name in the library, in kinds that need none: heat that goes where it should not, losses and drives
 that change in time, thermometers that see what is not theirs.
 
-What one of them makes of the readings is simulated by the fitted model and is nearly linear in its size. Beside an unknown
-cause of such a kind a known one shows as clearly as alone; without it every name is a stand-in. They are taken out of the
-readings while the library is searched, priced for all that they were chosen from, and are no part of the model.
+What one of them makes of the readings is simulated by the fitted model and nearly linear in its size; where not, its heat is
+simulated with that size. Beside an unknown cause of such a kind a known one shows as clearly as alone; without it every name
+is a stand-in. They are taken out of the readings while the library is searched, priced for all that they were chosen from,
+and are no part of the model.
 """
 
 from __future__ import annotations
@@ -23,8 +24,9 @@ from ..fit.problem import Problem
 from ..fit.simulate import simulate_run
 from ..fit.spec import Fit
 from ..logs.run import Run
+from . import evidence
 from .evidence import fit_factor, unexplained
-from .search import MIN_SHARE, Search
+from .search import MIN_GAIN, MIN_SHARE, Search
 
 COARSER = 2
 """Of those times, as many as one where something comes and goes all the time."""
@@ -65,8 +67,8 @@ SHARE = 0.1
 """Of what is left beyond the noise, the part that an unnamed cause must explain."""
 LEAST_NATS = 3.0
 """Evidence after all prices: one in twenty."""
-
-
+AGAIN = 2
+"""Times that heat without a name is simulated with the sizes found beside it: once where it is, once as large as it is there."""
 STEPS_OF_FIT = 14
 """Of one fit beside them, at most."""
 
@@ -105,6 +107,8 @@ class Hidden:
     column: np.ndarray
     size: float = math.nan
     error: float = math.nan
+    inside: np.ndarray | None = None
+    """Of each column, the size that is simulated as heat: the columns lead on from there."""
 
     def around(self, problem: Problem, fit: Fit) -> Hidden:
         """Return it with what it adds as another fit has it."""
@@ -452,9 +456,65 @@ def find(
     return found
 
 
+def _heat(problem: Problem, hidden: Sequence[Hidden]) -> list[np.ndarray] | None:
+    """Return the heat of unnamed causes that is simulated, per run (rows, springs), W; None where none is."""
+    given = [one for one in hidden if one.inside is not None]
+    out = [np.zeros_like(run.drive) for run in problem.runs]
+    for one in given:
+        always = [(r, *one.rows) for r in range(len(out))]
+        for size, acts in zip(one.inside, [[span] for span in one.cause.spans] or [always], strict=True):
+            for r, begin, end in acts:
+                if (profile := one.cause.profiles[r]) is not None:
+                    out[r][begin:end] += size * profile[begin:end]
+    return out if given else None
+
+
+def _with_sizes(problem: Problem, fit: Fit, hidden: Sequence[Hidden]) -> list[Hidden]:
+    """Return unnamed causes with the sizes that they have beside a fit, heat to be simulated with them."""
+    problem.leave_out(None, problem.heat)
+    columns = np.column_stack([one.column for one in hidden])
+    left = np.concatenate(problem.scaled(problem.without_starts(problem.evaluate(fit).residual)))
+    size, out = _least_squares(columns.T @ columns, columns.T @ left)[0], []
+    for one in hidden:
+        own, size = np.split(size, [one.column.shape[1]])
+        out.append(one if one.cause.shown else replace(one, inside=own + (0.0 if one.inside is None else one.inside)))
+    return out
+
+
+def simulated(problem: Problem, fit: Fit, hidden: list[Hidden]) -> tuple[Fit, list[Hidden]]:
+    """Return the fit beside unnamed heat that is simulated, for what heat adds is straight only about the temperatures that
+    it makes, and those causes; both as they were where that explains nothing that matters, or power was not logged."""
+    before, near, given = (problem.unnamed, problem.heat), fit, hidden
+    if any(run.mode != "power" for run in problem.runs) or all(one.cause.shown for one in hidden):
+        return fit, hidden
+    for _ in range(AGAIN):
+        given = taken_out(problem, near, _with_sizes(problem, near, given))
+        near = problem.fit(near.spec, near.as_dict(), tolerance=1e-3, max_steps=STEPS_OF_FIT)
+    if evidence.gain(near, fit) >= MIN_GAIN:
+        return near, given
+    problem.unnamed, problem.heat = before
+    return fit, hidden
+
+
+def taken_out(problem: Problem, fit: Fit, hidden: Sequence[Hidden]) -> list[Hidden]:
+    """Take unnamed causes out of the readings, their heat simulated; return them as they are around a fit."""
+    problem.heat = _heat(problem, hidden)
+    around = [one.around(problem, fit) for one in hidden]
+    problem.leave_out(np.column_stack([one.column for one in around]) if around else None, problem.heat)
+    return around
+
+
+def _needed(problem: Problem, fit: Fit, hidden: Sequence[Hidden]) -> list[Hidden]:
+    """Return the unnamed causes that are needed beside a fit, with their sizes; what is taken out stays as it is."""
+    left_out = problem.unnamed
+    judged = weighed(problem, fit, hidden)
+    problem.unnamed = left_out
+    return [one for one, nats in judged if nats > LEAST_NATS]
+
+
 def weighed(problem: Problem, fit: Fit, hidden: Sequence[Hidden]) -> list[tuple[Hidden, float]]:
     """Return unnamed causes with their sizes beside a fit's numbers, and the nats by which each is needed there."""
-    problem.leave_out(None)
+    problem.leave_out(None, problem.heat)
     bare = problem.evaluate(fit)
     slopes = problem.jacobian(fit.spec, fit.values, problem.predictions(fit.spec, fit.values))
     slopes = slopes[:, np.linalg.norm(slopes, axis=0) > 1e-6]
@@ -462,10 +522,12 @@ def weighed(problem: Problem, fit: Fit, hidden: Sequence[Hidden]) -> list[tuple[
     matrix = np.column_stack([columns, slopes])
     scale = np.maximum(np.linalg.norm(matrix, axis=0), 1e-9)
     left = np.concatenate(problem.scaled(problem.without_starts(bare.residual)))
+    for one in hidden:
+        left += 0.0 if one.inside is None else one.column @ one.inside
     inverse = np.linalg.pinv((matrix / scale).T @ (matrix / scale), rcond=1e-10)
     size = inverse @ ((matrix / scale).T @ left)
     rest = left - (matrix / scale) @ size
-    problem.leave_out(columns)
+    problem.leave_out(columns, problem.heat)
     factor = fit_factor(problem, problem.evaluate(fit))
     spread = factor * max(1.0, float(rest @ rest) / problem.count)
     out = []
@@ -530,24 +592,20 @@ def _or_lasting(problem: Problem, found: Search, result: Found, hidden: list[Hid
     whole = [_all_the_time(problem, one).around(problem, final) for one in begun.values()]
     if not whole:
         return found, result, hidden
-    taken_out = problem.unnamed
-    problem.leave_out(np.column_stack([taken_out, *(one.column for one in whole)]))
-    base = problem.fit(found.base.spec, found.base.as_dict(), errors=True)
-    search = Search(problem, found.candidates, base, found.progress)
+    before = problem.unnamed
+    problem.leave_out(np.column_stack([before, *(one.column for one in whole)]), problem.heat)
+    search = _beside(problem, found)
     kept = beside = problem.fit(final.spec, final.as_dict(), tolerance=1e-3, max_steps=STEPS_OF_FIT)
     for effect in (effect for effect in without if at[effect] is not None):
         other = search.reduced(kept, effect)
         if other.sse - kept.sse < MIN_SHARE * (without[effect].sse - final.sse):
             kept = other
     if kept is beside:
-        problem.unnamed = taken_out
+        problem.unnamed = before
         return found, result, hidden
-    left_out = problem.unnamed
     needed = {effect: search.reduced(kept, effect) for effect in without if effect in kept.spec.effects}
     contenders = search.rivals(kept, needed)
-    judged = weighed(problem, kept, [*hidden, *whole])
-    problem.unnamed = left_out
-    return search, (kept, needed, contenders), [one for one, nats in judged if nats > LEAST_NATS]
+    return search, (kept, needed, contenders), _needed(problem, kept, [*hidden, *whole])
 
 
 def _spring_of(fit: Fit, effect: str) -> int | None:
@@ -567,7 +625,13 @@ def _place(cause: Cause) -> int:
 def _all_the_time(problem: Problem, one: Hidden) -> Hidden:
     """Return a cause that begins and ends in a run as one that is there all of it."""
     run = next(run for run, profile in zip(problem.runs, one.cause.profiles, strict=True) if profile is not None)
-    return replace(one, text=one.cause.text.format(f"0 to {run.duration_s:.0f} s"), rows=(0, None))
+    return replace(one, text=one.cause.text.format(f"0 to {run.duration_s:.0f} s"), rows=(0, None), inside=None)
+
+
+def _beside(problem: Problem, first: Search) -> Search:
+    """Return a search of the library beside what is taken out by now."""
+    base = problem.fit(first.base.spec, first.base.as_dict(), errors=True)
+    return Search(problem, first.candidates, base, first.progress)
 
 
 def _search_beside(problem: Problem, first: Search, final: Fit) -> Beside | None:
@@ -576,7 +640,8 @@ def _search_beside(problem: Problem, first: Search, final: Fit) -> Beside | None
     if (nearer := _with_fewer(problem, first, final, kinds)) is not None:
         final, kinds = nearer, library(problem, nearer)
     hidden: list[Hidden] = []
-    out = taken_out = None
+    out = names = None
+    left_out = None, None
     begun = longest = 0
     for turn in range(ROUNDS):
         if turn:
@@ -584,8 +649,7 @@ def _search_beside(problem: Problem, first: Search, final: Fit) -> Beside | None
         begun = problem.simulations
         if turn and begun + longest > ENOUGH:
             break
-        hidden = [one.around(problem, final) for one in hidden]
-        problem.leave_out(np.column_stack([one.column for one in hidden]) if hidden else None)
+        hidden = taken_out(problem, final, hidden)
         final = problem.evaluate(final)
         if final.jacobian is None:
             shown = problem.predictions(final.spec, final.values)
@@ -593,26 +657,31 @@ def _search_beside(problem: Problem, first: Search, final: Fit) -> Beside | None
         grown = find(problem, final, kinds, hidden)
         if len(grown) == len(hidden):
             break
-        problem.leave_out(np.column_stack([one.column for one in grown]))
+        problem.leave_out(np.column_stack([one.column for one in grown]), problem.heat)
         # what they add depends on the numbers, which they spoilt until now
         nearer = problem.fit(final.spec, final.as_dict(), tolerance=1e-3, max_steps=STEPS_OF_FIT)
-        grown = [one.around(problem, nearer) for one in grown]
-        taken_out = np.column_stack([one.column for one in grown])
-        problem.leave_out(taken_out)
-        base = problem.fit(first.base.spec, first.base.as_dict(), errors=True)
-        search = Search(problem, first.candidates, base, first.progress)
+        grown = taken_out(problem, nearer, grown)
+        search, left_out = _beside(problem, first), (problem.unnamed, problem.heat)
         # what only helps together was looked for before: beside a cause without a name, what shows alone is enough
         result = search.run(downwards=False)
         final = result[0]
         # what stood in for an effect that is named by now goes again
-        judged = weighed(problem, final, [one.around(problem, final) for one in grown])
-        problem.leave_out(taken_out)
-        hidden = [one for one, nats in judged if nats > LEAST_NATS]
+        hidden = _needed(problem, final, [one.around(problem, final) for one in grown])
+        near, given = simulated(problem, final, hidden) if hidden else (final, hidden)
+        if near is not final:
+            search, left_out = _beside(problem, first), (problem.unnamed, problem.heat)
+            result = search.settle(near)
+            final = result[0]
+            hidden = _needed(problem, final, [one.around(problem, final) for one in given])
         out = (search, result, hidden)
         if len(hidden) == len(grown) and not unexplained(problem, final):
             break
+        # the same names twice: what more without a name would be found beside them changes them no more
+        if final.spec.variant == names:
+            break
+        names = final.spec.variant
         final = replace(final, jacobian=None)
-    problem.leave_out(taken_out)
+    problem.unnamed, problem.heat = left_out
     return out
 
 
