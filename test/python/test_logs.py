@@ -177,6 +177,14 @@ def test_a_glitch_is_left_out_and_nothing_else(make_log) -> None:
     assert np.flatnonzero(np.isnan(run.temperature_c[:, 0])).tolist() == [250]
 
 
+def test_offsets_of_the_sensors_about_zero_heat_nothing(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text("time_s,i1_a,v1_v,t1_c\n0,-0.005,0.004,20\n1,1,0.2,20\n2,0.005,-0.004,20\n")
+    assert read_log(path).drive[:, 0].tolist() == [0.0, 0.2, 0.0]
+    path.write_text("time_s,i1_a,t1_c\n0,-0.005,20\n1,1,20\n2,0,20\n")
+    assert read_log(path).drive[:, 0].tolist() == [0.0, 1.0, 0.0]
+
+
 def test_a_peak_without_noise_is_no_glitch(make_log) -> None:
     def peak(columns: dict[str, np.ndarray]) -> None:  # heated fast and switched off, again and again
         row = np.arange(600.0) % 150.0

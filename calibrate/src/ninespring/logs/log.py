@@ -204,9 +204,9 @@ def read_log(
         current = matrix("i{}_a")
         if has_voltages:
             voltage = matrix("v{}_v")
-            mode, drive = "power", current * voltage
+            mode, drive = "power", np.maximum(current * voltage, 0.0)  # offsets about zero heat nothing
         else:
-            mode, drive = "current", current
+            mode, drive = "current", np.maximum(current, 0.0)
     else:
         mode, drive = "command", matrix("u{}")
     ambient = None
