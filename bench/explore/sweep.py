@@ -125,7 +125,7 @@ def killer(client: Any, stop: threading.Event) -> None:
 
 def killed(folder: Path, cores: int) -> list[dict[str, Any]]:
     """Compare a disturbed sweep with an undisturbed one."""
-    spec = spec_of(folder, COUNT, 600)
+    spec = spec_of(folder, COUNT, 2400)
     _, _, calm = swept(spec, folder / "calm", cores)
     kills = []
 
