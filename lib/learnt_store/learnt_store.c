@@ -8,10 +8,10 @@
 #define WORTH_SHARE     0.02f
 #define WORTH_HEATING_K 80.0f
 
-/* --- bytes: a spring's are those of its struct, alike on the Mega and on a host ----------------
- */
+/* --- bytes ---------------------------------------------------------------------------------- */
 
-/* What the record has of a spring. False where it has nothing. */
+/* What the record has of a spring: its struct's bytes, alike on the Mega and on a host. False where
+ * it has nothing. */
 static bool unpack(const record_store_t *record, uint8_t spring, spring_learnt_t *learnt)
 {
     const uint16_t at = LEARNT_STORE_BYTES(spring);

@@ -76,9 +76,9 @@ static int faults_of(const boards_t *boards)
     int out = 0;
     for (int k = 0; k < boards_of(boards); k++) {
         const controller_t *controller = loop_controller(boards_loop(boards, k));
+        const bool all = controller_board_fault(controller) != SAFETY_FAULT_NONE;
         for (uint8_t i = 0; i < controller_springs(controller); i++) {
-            out += controller_fault(controller, i) != SAFETY_FAULT_NONE ||
-                   controller_board_fault(controller) != SAFETY_FAULT_NONE;
+            out += all || controller_fault(controller, i) != SAFETY_FAULT_NONE;
         }
     }
     return out;

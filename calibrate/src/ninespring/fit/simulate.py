@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from .. import native
+from .. import native, tables
 from ..logs.run import Run
 from ..models import Array
 
@@ -119,10 +119,6 @@ def load_changes(load_n: np.ndarray) -> np.ndarray:
 
 
 RESISTANCES = ("resistance_martensite_ohm", "resistance_austenite_ohm")
-WHOLE_OHM = 0.08, 0.5
-"""The firmware's own resistance_minimum_ohm and _maximum_ohm (lib/parameters/parameters.def)."""
-MOST_OHM = 10.0
-"""What that setting can hold."""
 SAME = 0.01
 """Part of a resistance by which springs are the same."""
 
@@ -151,8 +147,8 @@ def board_settings(array: Array) -> dict[str, float]:
     low, high = min(ohm) / min(declared.values()), max(ohm) / max(declared.values())
     if max(abs(low - 1.0), abs(high - 1.0)) < SAME:  # the paper's springs
         return {}
-    least, most = WHOLE_OHM
-    out = {"resistance_maximum_ohm": min(MOST_OHM, most * high), "resistance_minimum_ohm": least * low}
+    least, most = (tables.settings()[f"resistance_{end}imum_ohm"] for end in ("min", "max"))
+    out = {most.name: min(most.maximum, most.default * high), least.name: least.default * low}
     # told one after the other, the lower never meets the upper
     return out if high > 1.0 else dict(reversed(out.items()))
 

@@ -199,7 +199,7 @@ def mask_glitches(run: Run) -> None:
         away[:-1] = np.fmin(away[:-1], np.abs(values[1:-2] - 2.0 * values[2:-1] + values[3:]))
         limit = 10.0 * max(float(noise[k]), 0.02) + 2.0 * np.abs(after - before)
         bad = np.flatnonzero(away > limit) + 1
-        # a spike of one sample also lifts its neighbours' distance: keep the largest of three in a row
+        # where a log ends or has a hole a spike also lifts its neighbours' distance: keep the largest of three in a row
         peak = np.zeros(len(values))
         peak[1:-1] = np.nan_to_num(away)
         bad = bad[(peak[bad] >= peak[bad - 1]) & (peak[bad] >= peak[np.minimum(bad + 1, len(values) - 1)])]
