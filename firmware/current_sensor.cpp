@@ -20,8 +20,9 @@ static Adafruit_INA219 library[CONTROLLER_MAX_SPRINGS] = {
 
 /* Register that the sensor's pointer is at; POINTER_UNKNOWN after anything else was read. */
 #define POINTER_UNKNOWN 0xFFu
+#define NOT_CONFIGURED                                                                             \
+    0u /* where it is when the sensor's power comes on; no result is read there */
 static uint8_t pointer[CONTROLLER_MAX_SPRINGS];
-static bool configured[CONTROLLER_MAX_SPRINGS];
 static uint8_t samples;
 /* One sensor in turn is looked at more closely: in rounds over all of them. */
 static uint8_t checked;
@@ -43,7 +44,7 @@ static uint8_t address_of(uint8_t spring)
 
 static controller_sensor_status_t configure(uint8_t spring)
 {
-    controller_sensor_status_t status;
+    pointer[spring] = NOT_CONFIGURED;
 #ifdef NINESPRING_SENSOR_ADAFRUIT
     const bool found = library[spring].begin(&Wire); /* goes back to 100 kHz */
     twi_setFrequency(TWO_WIRE_HZ);
@@ -51,9 +52,10 @@ static controller_sensor_status_t configure(uint8_t spring)
         return CONTROLLER_SENSOR_ABSENT;
     }
 #endif
-    status = ina219_configure(address_of(spring), samples);
-    pointer[spring] = POINTER_UNKNOWN;
-    configured[spring] = status == CONTROLLER_SENSOR_OK;
+    const controller_sensor_status_t status = ina219_configure(address_of(spring), samples);
+    if (status == CONTROLLER_SENSOR_OK) {
+        pointer[spring] = POINTER_UNKNOWN;
+    }
     return status;
 }
 
@@ -134,7 +136,7 @@ static controller_sensor_status_t read_one(uint8_t spring, controller_sensor_t *
     uint16_t power;
     int16_t tenth_ma = 0;
 
-    if (!configured[spring]) {
+    if (pointer[spring] == NOT_CONFIGURED) {
         status = configure(spring);
         return status == CONTROLLER_SENSOR_OK ? CONTROLLER_SENSOR_STALE : status;
     }
@@ -146,11 +148,8 @@ static controller_sensor_status_t read_one(uint8_t spring, controller_sensor_t *
             status = ina219_check(address, samples, check_register);
         }
     }
-    if (status == CONTROLLER_SENSOR_ABSENT) {
-        configured[spring] = false;
-    }
     if (status != CONTROLLER_SENSOR_OK) {
-        pointer[spring] = POINTER_UNKNOWN;
+        pointer[spring] = status == CONTROLLER_SENSOR_ABSENT ? NOT_CONFIGURED : POINTER_UNKNOWN;
         return status;
     }
     if (!(bus & INA219_BUS_READY)) {
@@ -165,9 +164,8 @@ void current_sensor_read(controller_sensor_t sensor[], uint8_t count)
 {
     bool stuck = false;
     for (uint8_t k = 0; k < count; k++) {
-        sensor[k].status = stuck ? CONTROLLER_SENSOR_BUS : read_one(k, &sensor[k]);
+        sensor[k].status = (uint8_t)(stuck ? CONTROLLER_SENSOR_BUS : read_one(k, &sensor[k]));
         if (sensor[k].status == CONTROLLER_SENSOR_RESET) {
-            configured[k] = false;
             configure(k);
         } else if (sensor[k].status == CONTROLLER_SENSOR_BUS && !stuck) {
             stuck = true;

@@ -56,7 +56,7 @@ void current_sensor_read(controller_sensor_t sensor[], uint8_t count)
             sensor[k].status = CONTROLLER_SENSOR_STALE;
             continue;
         }
-        sensor[k].status = (controller_sensor_status_t)newest.sensor[k].status;
+        sensor[k].status = newest.sensor[k].status;
         sensor[k].current_ma = newest.sensor[k].current_ma;
         sensor[k].voltage_mv = newest.sensor[k].voltage_mv;
     }

@@ -139,7 +139,7 @@ static void run_tick(uint8_t behind)
     follow_averaging();
     current_sensor_read(inputs.sensor, CONTROLLER_MAX_SPRINGS);
     for (uint8_t k = 0; k < CONTROLLER_MAX_SPRINGS; k++) {
-        status.sensor_status[k] = (uint8_t)inputs.sensor[k].status;
+        status.sensor_status[k] = inputs.sensor[k].status;
     }
     inputs.ambient_c7 = ambient_c7();
 #ifdef NINESPRING_HIL
@@ -197,6 +197,15 @@ static int16_t next_console_octet(void)
 #endif
 }
 
+static void take_stop(void)
+{
+    if (board_stop_take()) {
+        controller_emergency_stop(&controller);
+        memset(outputs.duty, 0, sizeof outputs.duty);
+        console_stop(&console);
+    }
+}
+
 static void take_input(void)
 {
     if (board_serial_lost_take()) {
@@ -206,6 +215,7 @@ static void take_input(void)
     take_frames();
 #endif
     while (console_ready(&console)) {
+        take_stop(); // before what came behind it
         const bool obsolete = board_serial_before_stop();
         const int16_t octet = next_console_octet();
         if (octet < 0) {
@@ -278,11 +288,7 @@ static void start(void)
 static void turn(void)
 {
     uint8_t behind;
-    if (board_stop_take()) {
-        controller_emergency_stop(&controller);
-        memset(outputs.duty, 0, sizeof outputs.duty);
-        console_stop(&console);
-    }
+    take_stop();
     if (board_tick_take(&behind)) {
         run_tick(behind);
     }

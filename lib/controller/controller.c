@@ -155,7 +155,7 @@ static uint32_t take_sensors(controller_t *controller, const controller_sensor_t
     uint32_t sum_ma = 0;
     for (uint8_t k = 0; k < controller->springs; k++) {
         const safety_sample_t sample = {
-            .sensor_status = (uint8_t)sensor[k].status,
+            .sensor_status = sensor[k].status,
             .current_ma = sensor[k].current_ma,
             .voltage_mv = sensor[k].voltage_mv,
             .expected_ma = current_control_reference_ma(&controller->current, k),

@@ -32,7 +32,7 @@ typedef enum {
 } controller_sensor_status_t;
 
 typedef struct {
-    controller_sensor_status_t status;
+    uint8_t status;     /* controller_sensor_status_t */
     int16_t current_ma; /* mean current */
     int16_t voltage_mv; /* across the spring */
 } controller_sensor_t;

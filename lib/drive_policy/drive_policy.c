@@ -6,7 +6,7 @@
 #include "derating.h"
 #include "invariant.h"
 
-#define TURNS_PER_S 4u
+#define TURNS_PER_S SPRING_AWAY_TURNS_PER_S
 #define TURN_S      SPRING_ESTIMATOR_TURN_S
 #define TICKS_PER_REST                                                                             \
     5u /* in which the model steps and no spring is updated: a round takes 1/4 s */
@@ -44,9 +44,7 @@
 #define NEIGHBOUR_SD        0.15f /* of the rise of a spring that its neighbours heat */
 #define RISE_SHARE          0.25f /* of a turn in the average */
 
-#define AWAY_FIRST_TURNS (85u * TURNS_PER_S) /* since it was asked for */
-#define AWAY_TURNS       (15u * TURNS_PER_S) /* since it was there */
-#define THERE            0.95f
+#define THERE 0.95f
 
 #define WALK_MA     20                             /* a tick, after a change of policy */
 #define WALK_TURNS  (2u * DRIVE_POLICY_ROUND + 1u) /* every spring has had two */
@@ -131,6 +129,7 @@ static void enter(drive_policy_t *policy, thermal_model_t *model, uint8_t k,
     s->floor_ma = s->stage == DRIVE_POLICY_STAGE_HOLD ? s->wanted_ma : 0; /* until its turn */
     s->stage = (uint8_t)stage;
     const thermal_model_transformation_t points = thermal_model_transformation(model, k);
+    s->wanted_ma = (uint16_t)(LOWER_MA + policy->parameters.dither_ma); /* for a turn */
     switch (stage) {
     case DRIVE_POLICY_STAGE_OFF:
         s->wanted_ma = 0;
@@ -145,11 +144,9 @@ static void enter(drive_policy_t *policy, thermal_model_t *model, uint8_t k,
         spring_estimator_begin_hold(&policy->estimator, model, k, is_full(level_permille));
         s->margin_k = spring_c((int16_t)(points.austenite_finish_c7 - points.martensite_start_c7)) +
                       BLIND_BEGIN_K;
-        s->wanted_ma = (uint16_t)(LOWER_MA + policy->parameters.dither_ma); /* for a turn */
         break;
     case DRIVE_POLICY_STAGE_LOWER:
         spring_estimator_begin_hold(&policy->estimator, model, k, false);
-        s->wanted_ma = (uint16_t)(LOWER_MA + policy->parameters.dither_ma);
         break;
     }
 }
@@ -177,14 +174,14 @@ static bool waits_for_supply(const drive_policy_spring_t *s)
 static bool is_limited(const drive_policy_t *policy, const thermal_model_t *model, uint8_t k)
 {
     const drive_policy_spring_t *s = &policy->spring[k];
+    const spring_belief_t *b = &policy->estimator.spring[k];
     const uint16_t boost_ma = policy->parameters.boost_current_ma;
     if (s->ceiling_ma >= boost_ma - (boost_ma >> 2)) {
         return false;
     }
     const float finish_c = spring_c(thermal_model_transformation(model, k).austenite_finish_c7);
-    return now_c(model, k) > finish_c ||
-           (s->rise_k_per_s < STILL_K_PER_S &&
-            spring_estimator_hottest_c(&policy->estimator.spring[k], model, k) > finish_c);
+    return (now_c(model, k) > finish_c && !spring_estimator_lacks_phase(b, model, k)) ||
+           (s->rise_k_per_s < STILL_K_PER_S && spring_estimator_hottest_c(b, model, k) > finish_c);
 }
 
 static void heat(drive_policy_t *policy, thermal_model_t *model, uint8_t k, uint16_t level_permille)
@@ -208,8 +205,10 @@ static void heat(drive_policy_t *policy, thermal_model_t *model, uint8_t k, uint
         return;
     }
     const bool slows = !full && c7 > points.austenite_start_c7 - 128;
-    const bool keeps = waits_for_supply(s) && (c7 > points.austenite_start_c7 + KEPT_C7 ||
-                                               phase_of(policy, model, k) > 0.5f * level);
+    /* what it keeps it keeps until its turn: else what its current reads could take it away */
+    const bool keeps =
+        waits_for_supply(s) && (s->floor_ma != 0 || c7 > points.austenite_start_c7 + KEPT_C7 ||
+                                phase_of(policy, model, k) > 0.5f * level);
     s->floor_ma = 0;
     if (slows || keeps) {
         const uint16_t keeps_ma = hold_current_ma(policy, k, 0.0f, slows ? LEVEL_POWER_W : 0.0f);
@@ -248,7 +247,7 @@ static void hold(drive_policy_t *policy, thermal_model_t *model, uint8_t k, uint
         full && b->possible == SPRING_PHASE_AUSTENITE
             ? b->lost > LOST_AT_ONCE || (b->lost > LOST_SETTLED && b->quiet >= SETTLED_TURNS)
             : phase_of(policy, model, k) < level - 2.0f * LEVEL_BAND;
-    if (lost) {
+    if (lost && spring_away_try(&s->away)) {
         enter(policy, model, k, DRIVE_POLICY_STAGE_HEAT, level_permille);
         return;
     }
@@ -282,8 +281,8 @@ static void lower(drive_policy_t *policy, thermal_model_t *model, uint8_t k,
     const float level = 0.001f * (float)level_permille;
     const float phase = phase_of(policy, model, k);
     if (phase <= level) {
-        enter(policy, model, k,
-              phase < level - LEVEL_BAND ? DRIVE_POLICY_STAGE_HEAT : DRIVE_POLICY_STAGE_HOLD,
+        const bool heats = phase < level - LEVEL_BAND && spring_away_try(&policy->spring[k].away);
+        enter(policy, model, k, heats ? DRIVE_POLICY_STAGE_HEAT : DRIVE_POLICY_STAGE_HOLD,
               level_permille);
     }
 }
@@ -421,12 +420,7 @@ static void watch_away(drive_policy_t *policy, const thermal_model_t *model, uin
     const spring_belief_t *b = &policy->estimator.spring[k];
     const bool there = s->stage == DRIVE_POLICY_STAGE_HOLD && spring_estimator_sees(b) &&
                        !b->unproven && fabsf(phase_of(policy, model, k) - level) < band;
-    if (there) {
-        s->arrived = true;
-        s->away_turns = 0;
-    } else if (s->away_turns < UINT16_MAX) {
-        s->away_turns++;
-    }
+    spring_away_turn(&s->away, there);
 }
 
 static uint16_t said_of(const drive_policy_t *policy, uint8_t k)
@@ -440,7 +434,7 @@ static uint16_t said_of(const drive_policy_t *policy, uint8_t k)
     if (s->stage == DRIVE_POLICY_STAGE_HEAT && s->wanted_ma == 0) {
         said |= DRIVE_POLICY_LIMIT_COOLING;
     }
-    if (s->away_turns >= (s->arrived ? AWAY_TURNS : AWAY_FIRST_TURNS)) {
+    if (spring_away_says(&s->away)) {
         said |= DRIVE_POLICY_LIMIT_AWAY;
     }
     return said;
@@ -451,11 +445,11 @@ static void switch_off(drive_policy_t *policy, uint8_t k)
     drive_policy_spring_t *s = &policy->spring[k];
     if (s->stage != DRIVE_POLICY_STAGE_OFF) {
         supply_queue_remove(&policy->queue, k);
+        spring_estimator_leave(&policy->estimator, k);
         s->stage = DRIVE_POLICY_STAGE_OFF;
     }
     s->wanted_ma = s->floor_ma = 0;
-    s->away_turns = 0;
-    s->arrived = false;
+    s->away = (spring_away_t){0, 0};
 }
 
 static void update(drive_policy_t *policy, const drive_policy_input_t *input, uint8_t k)

@@ -10,6 +10,7 @@
 #include <stdint.h>
 
 #include "parameters.h"
+#include "spring_away.h"
 #include "spring_estimator.h"
 #include "supply_share.h"
 #include "thermal_model.h"
@@ -63,10 +64,9 @@ typedef struct {
     uint16_t granted_ma;    /* share of the supply, before dither */
     uint16_t target_ma;     /* given in the last tick */
     uint16_t derated_turns; /* fully, on end */
-    uint16_t away_turns;    /* since it was asked for, or was last there */
     int16_t last_c7;        /* temperature a turn ago */
+    spring_away_t away;     /* since it was asked for */
     uint8_t stage;          /* drive_policy_stage_t */
-    bool arrived : 1;       /* has been there since it was asked for */
     bool released : 1;      /* switched off hot: no false actuation */
     bool tripped : 1;
 } drive_policy_spring_t;

@@ -333,6 +333,8 @@ void spring_estimator_update(spring_estimator_t *e, thermal_model_t *model, uint
     if (b->heating && (b->reads || b->fresh == 0)) { /* while a current settles, who knows */
         /* a spring that waits cools by no less than the least loss: more would hide a finish */
         b->run.heat.heat_k += heat_k < 0.0f ? LEAST_LOSS * heat_k : heat_k;
+        /* and one that may lose more takes up less: a weak heating that looks like an end */
+        b->run.heat.flat_k += heat_k - (1.0f - LEAST_LOSS) * e->turn_k_per_w * b->gives_w;
     }
     if (b->reads && e->observes && !spring_is_loose(b)) {
         look(e, model, k);
@@ -341,6 +343,13 @@ void spring_estimator_update(spring_estimator_t *e, thermal_model_t *model, uint
             spring_holding_watch(e, b, model, k, moved_k, share);
         }
     } else {
+        if (spring_is_loose(b)) {
+            if (b->full_ohm > 0.0f) { /* what it seemed to lose was the contact */
+                spring_take_back(e, b, model, k);
+                spring_is_back(b);
+            }
+            b->unproven = true; /* and so may have been what it seemed to gain */
+        }
         if (b->heating) {
             b->run.heat.mark_ohm = 0.0f;
             b->steep = false;
@@ -374,7 +383,7 @@ void spring_estimator_update(spring_estimator_t *e, thermal_model_t *model, uint
 /* It reads less than when it had transformed last, and the difference is neither noise nor a
  * temperature coefficient. Or it is still to come: its alloy is another one, if the model is hot.
  */
-bool spring_lacks_phase(const spring_belief_t *b, const thermal_model_t *model, uint8_t k)
+bool spring_estimator_lacks_phase(const spring_belief_t *b, const thermal_model_t *model, uint8_t k)
 {
     const spring_learnt_t *l = &b->learnt;
     if (b->fresh == 0 || spring_estimator_blind(b) || l->austenite_ohm == 0.0f ||
@@ -389,10 +398,12 @@ bool spring_lacks_phase(const spring_belief_t *b, const thermal_model_t *model, 
     return (l->change < 0.0f ? -less : less) > explained;
 }
 
+/* By its temperature. Where what it reads says otherwise, a load may have moved the rest away. */
 static bool surely_finished(const spring_belief_t *b, const thermal_model_t *model, uint8_t k,
-                            float sds)
+                            float sds, bool lacks)
 {
-    return spring_now_c(model, k) - sds * spring_estimator_sd_k(b) >
+    const float unsure_k = sds * spring_estimator_sd_k(b);
+    return spring_now_c(model, k) - (lacks ? fmaxf(unsure_k, SHIFT_BOUND_K) : unsure_k) >
            spring_c(thermal_model_transformation(model, k).austenite_finish_c7);
 }
 
@@ -406,10 +417,11 @@ bool spring_estimator_has_transformed(const spring_estimator_t *e, const thermal
     if (b->steep && b->reads) {
         return false;
     }
-    const float sds = spring_lacks_phase(b, model, k) ? SPRING_ESTIMATOR_BOUND_SDS
-                      : b->onset                      ? TRUST_ONSET_SDS
-                                                      : TRUST_STILL_SDS;
-    return surely_finished(b, model, k, sds);
+    const bool lacks = spring_estimator_lacks_phase(b, model, k);
+    const float sds = lacks      ? SPRING_ESTIMATOR_BOUND_SDS
+                      : b->onset ? TRUST_ONSET_SDS
+                                 : TRUST_STILL_SDS;
+    return surely_finished(b, model, k, sds, lacks);
 }
 
 void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, uint8_t k,
@@ -418,7 +430,7 @@ void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, 
     spring_belief_t *b = &e->spring[k];
     const float now_c = spring_now_c(model, k);
     const bool lacks =
-        full && b->possible != SPRING_PHASE_AUSTENITE && spring_lacks_phase(b, model, k);
+        full && b->possible != SPRING_PHASE_AUSTENITE && spring_estimator_lacks_phase(b, model, k);
     const float phase = lacks ? spring_phase_by_resistance(b) : 1.0f; /* as it read last */
     b->unproven = full && b->gone_k > 0.0f && b->possible != SPRING_PHASE_AUSTENITE &&
                   thermal_model_temperature_c7(model, k) <
@@ -433,7 +445,7 @@ void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, 
     /* as hot as it takes whatever it reads, or ended twice by a limit: what it reads tells nothing
      */
     const bool certain = lacks && ((b->heating && spring_heated_enough(e, b, model, k)) ||
-                                   surely_finished(b, model, k, SPRING_ESTIMATOR_BOUND_SDS));
+                                   surely_finished(b, model, k, SPRING_ESTIMATOR_BOUND_SDS, true));
     if (certain && !b->onset) {
         spring_take_back(e, b, model, k);
     }
@@ -452,6 +464,15 @@ void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, 
     spring_begin_hold_line(b, strong);
     if (strong) {
         b->offset_sd_v = fmaxf(b->offset_sd_v, OFFSET_AGAIN_V);
+    }
+}
+
+void spring_estimator_leave(spring_estimator_t *e, uint8_t k)
+{
+    spring_belief_t *b = &e->spring[k];
+    if (b->heating) {
+        b->heating = b->onset = b->steep = false;
+        spring_begin_hold_line(b, false);
     }
 }
 

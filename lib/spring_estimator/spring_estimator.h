@@ -100,11 +100,12 @@ typedef struct {
     uint8_t quiet;      /* turns in which its temperature hardly moved, saturating */
     uint8_t losing;     /* turns on end in which it seems to lose phase */
     uint8_t averaged;   /* turns in slow_ohm, saturating */
+    uint8_t unread;     /* turns since the last that had readings fit for use, saturating */
     uint16_t unsteady;  /* turns, of all that a contact or the sensor has jumped lately */
     /* bits: of nine springs they are a good part of the RAM that is spare */
     bool doubted : 1;   /* its last heating ended before its resistance said so */
-    bool unproven : 1;  /* by what it may be hotter it was spared: it may not have transformed again
-                         */
+    bool unproven : 1;  /* it may not have transformed: what it may be hotter by has spared it heat,
+                         * or its contact came and went */
     bool odd : 1;       /* the turn before read what no phase changes to so fast */
     bool reads : 1;     /* the last turn had readings fit for use */
     bool seen : 1;      /* the last turn has moved it to where it was seen */
@@ -208,6 +209,12 @@ void spring_estimator_look_at_stiffness(spring_estimator_t *estimator, const the
 /* A heating begins: what the resistance does from here on tells of the transformation. */
 void spring_estimator_begin_heating(spring_estimator_t *estimator, const thermal_model_t *model,
                                     uint8_t spring);
+/* It reads less than when it had transformed last, and the difference is neither noise nor a
+ * temperature coefficient. */
+bool spring_estimator_lacks_phase(const spring_belief_t *belief, const thermal_model_t *model,
+                                  uint8_t spring);
+/* Nothing is asked of it any more, or by others: a heating that ran is over, and tells nothing. */
+void spring_estimator_leave(spring_estimator_t *estimator, uint8_t spring);
 /* The heating has fully transformed it: seen, or as hot as it takes whatever it reads. */
 bool spring_estimator_has_transformed(const spring_estimator_t *estimator,
                                       const thermal_model_t *model, uint8_t spring);

@@ -11,17 +11,22 @@
 #define COEFFICIENT_MOST_PER_K      0.0015f
 #define COEFFICIENT_MOST_PER_HEAT_K (COEFFICIENT_MOST_PER_K / 0.85f)
 
-/* And the least, with what noise and offset add over 20 K. */
-#define COEFFICIENT_LEAST_PER_K (-0.0003f - 0.00025f)
+/* And the least; learnt with what noise and offset add over 20 K. */
+#define COEFFICIENT_IN_PRINT_PER_K (-0.0003f)
+#define COEFFICIENT_LEAST_PER_K    (COEFFICIENT_IN_PRINT_PER_K - 0.00025f)
 
 /* A reading at less is coarse: 4 mV are 3 % of its voltage. */
 #define STRONG_A 0.8f
+/* The same on the way down to a hold, where what noise and steps do at more is counted. */
+#define WEAK_A 0.6f
 
 #define SHIFT_SD_K    3.0f /* of declared transformation temperatures */
 #define SHIFT_BOUND_K 8.0f /* 2.6 of it, or a load */
 
 #define SLOW_TURNS 16 /* of the average: 4 s, six periods of the dither */
 #define SLOW_SHARE (1.0f / SLOW_TURNS)
+/* Of an average that is worth comparing: three times as sure as one. */
+#define ANCHOR_TURNS 8
 
 #define LEARNT_AT_C 20.0f /* a learnt martensite's resistance is that at this temperature */
 
@@ -63,10 +68,6 @@ float spring_take_readings(spring_belief_t *belief);
 bool spring_is_loose(const spring_belief_t *belief);
 /* All that readings are compared with jumps along: a contact, or the sensor. */
 void spring_jump(spring_belief_t *belief, float by);
-/* It reads less than when it had transformed last, and the difference is neither noise nor a
- * temperature coefficient. */
-bool spring_lacks_phase(const spring_belief_t *belief, const thermal_model_t *model,
-                        uint8_t spring);
 /* Told by its own resistances, both of which were learnt, 0..1. */
 float spring_phase_by_resistance(const spring_belief_t *belief);
 /* It has transformed: what it reads now is its own austenite's, and the way there its change. */
@@ -82,8 +83,8 @@ void spring_take_back(const spring_estimator_t *estimator, spring_belief_t *beli
                       thermal_model_t *model, uint8_t spring);
 /* What it had lost was phase: it comes back. */
 void spring_is_back(spring_belief_t *belief);
-/* What the sensor's offset may add to it at another current than its line's, relative. */
-float spring_offset_may_show(const spring_belief_t *belief, float current_a);
+/* What the sensor's offset may add to a resistance from one current to another, relative. */
+float spring_offset_may_show(const spring_belief_t *belief, float ohm, float from_a, float to_a);
 /* While it heats: what heat does to its resistance. */
 void spring_heating_watch(const spring_estimator_t *estimator, spring_belief_t *belief,
                           thermal_model_t *model, uint8_t spring);

@@ -52,12 +52,13 @@ static void see_onset(const spring_estimator_t *e, spring_belief_t *b, thermal_m
         if (b->run.heat.cold_ohm > 0.0f && now_c > b->run.heat.cold_c + COLD_SPAN_K) {
             const float rise_per_k = (b->run.heat.onset_ohm / b->run.heat.cold_ohm - 1.0f) /
                                      (now_c - b->run.heat.cold_c);
-            if (rise_per_k > COEFFICIENT_LEAST_PER_K &&
-                rise_per_k < COEFFICIENT_MOST_PER_HEAT_K) { /* else a contact has moved */
+            if (rise_per_k > COEFFICIENT_LEAST_PER_K && rise_per_k < COEFFICIENT_MOST_PER_HEAT_K) {
                 l->martensite_rise_per_k = rise_per_k;
                 l->martensite_ohm =
                     b->run.heat.cold_ohm / (1.0f + rise_per_k * (b->run.heat.cold_c - LEARNT_AT_C));
-            }
+            } else if (rise_per_k * l->change > 0.0f) { /* it had begun while nothing was read */
+                b->run.heat.onset_ohm = b->run.heat.cold_ohm;
+            } /* else a contact has moved */
         }
         const int16_t start_c7 = thermal_model_transformation(model, k).austenite_start_c7;
         (void)spring_see(e, b, model, k, spring_c(start_c7) + ONSET_K, PLACE_SD_K,
@@ -120,7 +121,7 @@ static void hold_back(const spring_estimator_t *e, const spring_belief_t *b, the
     /* after a look its temperature is a guess; once its transformation was seen, it is known */
     const bool guess = b->shift_variance_k2 >= SHIFT_SD_K * SHIFT_SD_K;
     const bool waits = martensite || ((b->onset ? b->run.heat.flat_k < FLAT_K : guess) &&
-                                      spring_lacks_phase(b, model, k));
+                                      spring_estimator_lacks_phase(b, model, k));
     const bool shows = b->steep || (b->learnt.austenite_ohm > 0.0f && !b->blind && waits);
     if (shows && thermal_model_temperature_c7(model, k) > limit_c7 &&
         b->run.heat.heat_k < most_heat_k(e, b, limit_c7)) {
@@ -150,7 +151,7 @@ static bool has_taken_enough(const spring_estimator_t *e, const spring_belief_t 
                              const thermal_model_t *model, uint8_t k)
 {
     if (b->learnt.austenite_ohm > 0.0f) {
-        return !spring_lacks_phase(b, model, k);
+        return !spring_estimator_lacks_phase(b, model, k);
     }
     const float latent_k = b->run.heat.begun_missing * e->latent_heat_j / e->heat_capacity_j_per_k;
     return b->run.heat.heat_k - b->run.heat.onset_k > LEAST_HEAT * latent_k;
@@ -169,10 +170,6 @@ void spring_heating_watch(const spring_estimator_t *e, spring_belief_t *b, therm
         b->possible == SPRING_PHASE_ANY || b->settling != 0) {
         b->run.heat.mark_ohm = 0.0f;
         return;
-    }
-    if (b->run.heat.mark_ohm > 0.0f &&
-        fabsf(b->current_a - b->run.heat.mark_a) > SAME_CURRENT * b->current_a) {
-        b->run.heat.mark_ohm = b->run.heat.excess = 0.0f; /* the sensor's offset shows otherwise */
     }
     if (b->possible == SPRING_PHASE_MARTENSITE &&
         (b->run.heat.cold_ohm == 0.0f ||
@@ -196,7 +193,10 @@ void spring_heating_watch(const spring_estimator_t *e, spring_belief_t *b, therm
         return;
     }
     const float change = b->ohm / b->run.heat.mark_ohm - 1.0f;
-    const float explained = COEFFICIENT_MOST_PER_HEAT_K * step_k;
+    float explained = COEFFICIENT_MOST_PER_HEAT_K * step_k;
+    if (fabsf(b->current_a - b->run.heat.mark_a) > SAME_CURRENT * b->current_a) {
+        explained += spring_offset_may_show(b, b->ohm, b->run.heat.mark_a, b->current_a);
+    }
     const float excess = change > explained    ? change - explained
                          : change < -explained ? change + explained
                                                : 0.0f;
@@ -208,7 +208,9 @@ void spring_heating_watch(const spring_estimator_t *e, spring_belief_t *b, therm
     }
     b->run.heat.excess += against ? 0.0f : excess;
     b->steep = b->onset && fabsf(excess) > STEEP_SDS * b->noise;
-    b->run.heat.flat_k = b->steep || !b->onset ? 0.0f : b->run.heat.flat_k + step_k;
+    if (b->steep || !b->onset) {
+        b->run.heat.flat_k = 0.0f;
+    }
     if (!b->onset && fabsf(b->run.heat.excess) > EXCESS_SEEN + EXCESS_SDS * b->noise) {
         if (may_transform(b, model, k)) {
             see_onset(e, b, model, k);
@@ -224,5 +226,6 @@ void spring_heating_watch(const spring_estimator_t *e, spring_belief_t *b, therm
         see_finish(e, b, model, k);
     }
     b->run.heat.mark_ohm = b->ohm;
+    b->run.heat.mark_a = b->current_a;
     b->run.heat.mark_k = b->run.heat.heat_k;
 }

@@ -4,13 +4,11 @@
 
 #define QUIET_K     0.08f /* a turn's: 0.3 K/s */
 #define QUIET_TURNS 40    /* 10 s: the average has settled */
-#define WEAK_A      0.6f  /* on the way down; what noise and steps do at more is counted */
 /* Of a turn, 60 s: what the line follows is no loss of phase. */
 #define LINE_SHARE     (1.0f / 240.0f)
 #define LOSS_LEAST     0.0012f /* of the resistance: what a sensor's steps leave in the average */
 #define LEAST_AT_A     1.4f    /* at this current, and as 1 / I below it */
 #define NOISE_IN_SLOW  0.18f   /* of one turn's, with all turns in it: sqrt(share / (2 - share)) */
-#define ANCHOR_TURNS   8       /* of an average: three times as sure as one */
 #define ANCHOR_K       3.0f    /* 0.45 % of the resistance by the largest coefficient */
 #define SURE_SDS       5.0f
 #define SUSPECTED      0.6f /* of what is sure: 3 of 5 */
@@ -178,11 +176,9 @@ static bool learn_offset(spring_belief_t *b)
     return true;
 }
 
-float spring_offset_may_show(const spring_belief_t *b, float current_a)
+float spring_offset_may_show(const spring_belief_t *b, float ohm, float from_a, float to_a)
 {
-    const spring_line_t *line = &b->run.line;
-    return OFFSET_SDS * b->offset_sd_v * fabsf(line->a - current_a) /
-           (current_a * line->a * line->ohm);
+    return OFFSET_SDS * b->offset_sd_v * fabsf(from_a - to_a) / (from_a * to_a * ohm);
 }
 
 /* By how much, squared, the resistance may have left its line with the phase kept: its temperature
@@ -190,7 +186,7 @@ float spring_offset_may_show(const spring_belief_t *b, float current_a)
 static float may_move_squared(const spring_belief_t *b)
 {
     const float moves = SPRING_ESTIMATOR_BOUND_SDS * b->run.line.rise_sd_per_k * b->run.line.slow_k;
-    const float offset = spring_offset_may_show(b, b->slow_a);
+    const float offset = spring_offset_may_show(b, b->run.line.ohm, b->run.line.a, b->slow_a);
     return moves * moves + offset * offset;
 }
 
@@ -206,9 +202,10 @@ static void tell_slope(spring_line_t *line, float way_k, float left, float varia
 
 static void begin_slope(spring_belief_t *b)
 {
-    /* no phase's coefficient tells the other's */
-    b->run.line.rise_per_k = b->learnt.martensite_rise_per_k;
-    b->run.line.rise_sd_per_k = COEFFICIENT_MOST_PER_K / SPRING_ESTIMATOR_BOUND_SDS;
+    /* any in print: no phase's coefficient tells the other's */
+    b->run.line.rise_per_k = 0.5f * (COEFFICIENT_MOST_PER_K + COEFFICIENT_IN_PRINT_PER_K);
+    b->run.line.rise_sd_per_k =
+        0.5f * (COEFFICIENT_MOST_PER_K - COEFFICIENT_IN_PRINT_PER_K) / SPRING_ESTIMATOR_BOUND_SDS;
 }
 
 /* On the way down, for certain above martensite start: by all of the way so far, as what a sensor's
@@ -217,7 +214,8 @@ static void tell_slope_on_way(spring_belief_t *b, float noise2, float least)
 {
     spring_line_t *line = &b->run.line;
     const float way_k = line->from_k + line->slow_k;
-    const float offset = spring_offset_may_show(b, b->slow_a) * (1.0f / OFFSET_SDS);
+    const float offset =
+        spring_offset_may_show(b, b->run.line.ohm, b->run.line.a, b->slow_a) * (1.0f / OFFSET_SDS);
     begin_slope(b);
     const float left = b->slow_ohm / line->from_ohm - 1.0f - line->rise_per_k * way_k;
     tell_slope(line, way_k, left, noise2 + 2.0f * least * least + offset * offset);

@@ -9,10 +9,13 @@
 #define NOISE_SHARE    0.06f
 #define NOISE_SAME     0.1f   /* a current that has moved by more tells nothing of the noise */
 #define BEND_TO_SD     0.512f /* mean size of a second difference: 1 / (sqrt(6) sqrt(2 / pi)) */
-#define JUMP_LEAST     0.03f  /* of a resistance in a turn: 2 W change 6 % of the phase in it */
-#define JUMP_OF_LOAD   0.08f  /* 16 K at once, latent heat kept: 40 % of the phase */
-#define JUMP_SDS       5.0f
-#define JUMP_TURNS     1024u /* a jump is forgotten in four minutes, one after the other */
+/* Of a resistance in a turn. */
+#define JUMP_OF_HOLD 0.01f  /* 0.4 W change 1 % of the phase, 0.3 % of it */
+#define HEATS_A_TURN 0.015f /* 2 W change 6 % of the phase */
+#define JUMP_ON_WAY  0.03f  /* 20 K since it was read, by the largest coefficient */
+#define JUMP_OF_LOAD 0.08f  /* 16 K at once, latent heat kept: 40 % of the phase */
+#define JUMP_SDS     5.0f
+#define JUMP_TURNS   1024u /* a jump is forgotten in four minutes, one after the other */
 /* One jump has moved it, two went and came back: a third will come. */
 #define LOOSE_TURNS (2u * JUMP_TURNS)
 
@@ -49,18 +52,27 @@ void spring_jump(spring_belief_t *b, float by)
 static bool leave_out(spring_belief_t *b, float ohm, float current_a)
 {
     const bool holds = !b->heating && b->run.line.ohm > 0.0f;
-    const float was_ohm = holds ? b->slow_ohm : b->ohm_before[0];
+    const bool half_way = b->ohm_before[1] > 0.0f; /* the turn between may have been */
+    const float was_ohm = holds ? b->slow_ohm : b->ohm_before[half_way];
     const float step = ohm - was_ohm;
-    if (fabsf(step) <= JUMP_LEAST * was_ohm || b->fresh == 0 || was_ohm <= 0.0f) {
+    const float likely = holds ? JUMP_OF_HOLD : JUMP_OF_LOAD;
+    if (fabsf(step) <= likely * was_ohm || b->fresh == 0 || was_ohm <= 0.0f) {
         b->odd = false;
         return false;
     }
     /* a line compares with any current, but for the sensor's offset; a heating only with its own */
     const bool compares =
-        current_a > STRONG_A && (holds || b->current_a > fmaxf(STRONG_A, 0.5f * current_a));
-    const bool by_load = !holds || step * b->learnt.change < 0.0f;
-    const float most = (by_load ? JUMP_OF_LOAD : JUMP_LEAST) + JUMP_SDS * b->noise +
-                       (holds ? spring_offset_may_show(b, current_a) : 0.0f);
+        holds ? current_a > WEAK_A
+              : current_a > STRONG_A && b->current_a > fmaxf(STRONG_A, 0.5f * current_a);
+    /* no hold gains phase at once; it loses it by a load, where no contact has moved lately */
+    const bool by_load = step * b->learnt.change < 0.0f && b->unsteady == 0;
+    const float least = !holds || by_load             ? JUMP_OF_LOAD
+                        : b->averaged >= ANCHOR_TURNS ? JUMP_OF_HOLD
+                                                      : JUMP_ON_WAY;
+    const float noise = b->noise * fmaxf(b->current_a / current_a, 1.0f); /* it is the voltage's */
+    const float explained = holds ? spring_offset_may_show(b, was_ohm, b->run.line.a, current_a)
+                                  : HEATS_A_TURN * (float)(b->unread + half_way);
+    const float most = least + JUMP_SDS * noise + explained;
     const bool jumps = compares && fabsf(step) > most * was_ohm;
     if (jumps && b->odd) {
         spring_jump(b, ohm / was_ohm);
@@ -88,7 +100,7 @@ static void take_noise(spring_belief_t *b, float ohm, float current_a)
         const float bend = fabsf(ohm - 2.0f * b->ohm_before[0] + b->ohm_before[1]) / ohm;
         b->noise += (fminf(BEND_TO_SD * bend, NOISE_MOST) - b->noise) * NOISE_SHARE;
     }
-    b->ohm_before[1] = same ? b->ohm_before[0] : 0.0f;
+    b->ohm_before[1] = same && b->unread == 0 ? b->ohm_before[0] : 0.0f;
     b->ohm_before[0] = ohm;
 }
 
@@ -100,6 +112,7 @@ static float take_reading(spring_belief_t *b, float ohm, float current_a)
     const float share = b->averaged < SLOW_TURNS ? 1.0f / (float)b->averaged : SLOW_SHARE;
     b->slow_ohm += (ohm - b->slow_ohm) * share;
     b->slow_a += (current_a - b->slow_a) * share;
+    b->unread = 0;
     b->current_a = current_a;
     b->ohm = ohm;
     b->phase_ohm = current_a > STRONG_A || b->fresh == 0 ? ohm : b->phase_ohm;
@@ -120,8 +133,12 @@ float spring_take_readings(spring_belief_t *b)
         if (!leave_out(b, ohm, current_a)) {
             share = take_reading(b, ohm, current_a);
         }
-    } else if (b->current_sum_ma < LEAST_MEAN_MA && !b->cut_short) {
-        b->fresh = 0; /* no current, or no sensor */
+    } else {
+        b->unread = b->unread < UINT8_MAX ? (uint8_t)(b->unread + 1) : UINT8_MAX;
+        b->ohm_before[1] = 0.0f;
+        if (b->current_sum_ma < LEAST_MEAN_MA && !b->cut_short) {
+            b->fresh = 0; /* no current, or no sensor */
+        }
     }
     b->cut_short = false;
     b->current_sum_ma = b->voltage_sum_mv = 0;

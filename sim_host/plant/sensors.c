@@ -26,15 +26,24 @@ void plant_sensors_prepare(plant_t *p)
         memcpy(p->sensor_c, p->temperature_c, (size_t)p->n * sizeof(double));
 }
 
+/* Sides or corners of a spring at which the array has no neighbour. */
+static double missing(const neighbours_t *neighbours, int i)
+{
+    return 4.0 - (double)(neighbours->start[i + 1] - neighbours->start[i]);
+}
+
 double plant_measured_c(const plant_t *p, int spring)
 {
     double seen = p->sensor_c[spring];
     const double ambient = plant_network_ambient(p, p->time_s);
     if (p->on[E_optical_mixing]) {
+        const neighbours_t *const sides = &p->neighbours[NEIGHBOUR_ORTHOGONAL];
+        const neighbours_t *const corners = &p->neighbours[NEIGHBOUR_DIAGONAL];
+        const double beyond = scalar(p, P_optical_beyond) * (ambient - seen);
         const double orthogonal =
-            neighbour_difference(&p->neighbours[NEIGHBOUR_ORTHOGONAL], p->sensor_c, spring);
+            neighbour_difference(sides, p->sensor_c, spring) + missing(sides, spring) * beyond;
         const double diagonal =
-            neighbour_difference(&p->neighbours[NEIGHBOUR_DIAGONAL], p->sensor_c, spring);
+            neighbour_difference(corners, p->sensor_c, spring) + missing(corners, spring) * beyond;
         const double background = ambient + scalar(p, P_optical_background_rise_k);
         seen +=
             scalar(p, P_optical_orthogonal) * orthogonal + scalar(p, P_optical_diagonal) * diagonal;

@@ -45,8 +45,9 @@ struct plant_deleter {
 class rig
 {
 public:
-    explicit rig(const std::string &firmware = elf(), std::uint64_t seed = 1)
-        : plant(plant_create(3, 3)), board(firmware, plant.get(), seed)
+    explicit rig(const std::string &firmware = elf(), std::uint64_t seed = 1,
+                 double shunt_noise_v = 0.0, double bus_noise_v = 0.0)
+        : plant(plant_create(3, 3)), board(firmware, plant.get(), seed, shunt_noise_v, bus_noise_v)
     {
     }
 
@@ -127,6 +128,24 @@ public:
 private:
     double ahead_ms_ = 0.0; /* that looks have taken: the next run is shorter by it */
 };
+
+inline void switch_on(plant_t *plant, const char *effect)
+{
+    TEST_ASSERT_EQUAL_MESSAGE(PLANT_OK, plant_set_effect(plant, effect, true), effect);
+}
+
+/* The springs are of NiTi: they take up latent heat, and their resistance shows their phase. */
+inline void make_niti(plant_t *plant)
+{
+    switch_on(plant, "latent_heat");
+    switch_on(plant, "resistance_phase");
+}
+
+/* Austenite, 0..1, as it is. */
+inline double phase(const rig &mega, unsigned spring)
+{
+    return plant_austenite(mega.plant.get(), static_cast<int>(spring));
+}
 
 inline bool contains(const std::string &text, const std::string &part)
 {

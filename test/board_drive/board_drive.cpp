@@ -20,9 +20,7 @@ constexpr unsigned BUDGET_MA = 14800; /* less the default reserve */
 std::unique_ptr<rig> powered(const char *settings = "")
 {
     auto mega = std::make_unique<rig>();
-    plant_t *plant = mega->plant.get();
-    TEST_ASSERT_EQUAL(PLANT_OK, plant_set_effect(plant, "latent_heat", true));
-    TEST_ASSERT_EQUAL(PLANT_OK, plant_set_effect(plant, "resistance_phase", true));
+    make_niti(mega->plant.get());
     mega->boot();
     mega->expect_ok("policy precompensate");
     std::string line;
@@ -43,11 +41,6 @@ std::unique_ptr<rig> powered(const char *settings = "")
 double temperature(const rig &mega, unsigned k)
 {
     return plant_temperature_c(mega.plant.get(), static_cast<int>(k));
-}
-
-double phase(const rig &mega, unsigned k)
-{
-    return plant_austenite(mega.plant.get(), static_cast<int>(k));
 }
 
 /* One control tick; what is asked of the supply and what flows stay below its limits. */
@@ -109,9 +102,7 @@ void heats_then_holds_above_martensite_start_then_lets_go()
 void pattern_of_the_readme_is_there_after_power_on()
 {
     auto mega = std::make_unique<rig>();
-    plant_t *plant = mega->plant.get();
-    TEST_ASSERT_EQUAL(PLANT_OK, plant_set_effect(plant, "latent_heat", true));
-    TEST_ASSERT_EQUAL(PLANT_OK, plant_set_effect(plant, "resistance_phase", true));
+    make_niti(mega->plant.get());
     mega->boot(false);
     mega->expect_ok("pattern 111101111");
     mega->expect_ok("policy precompensate");

@@ -18,11 +18,6 @@ constexpr double ON = 0.95;          /* austenite of a spring that is on */
 constexpr double UNDRIVEN_ON = 0.05; /* and what an undriven one may have */
 constexpr double HOTTEST_C = 120.0;
 
-double phase(const rig &mega, unsigned k)
-{
-    return plant_austenite(mega.plant.get(), static_cast<int>(k));
-}
-
 void type_what_the_readme_says(rig &mega)
 {
     mega.expect_ok("pattern 111101111");
@@ -72,8 +67,7 @@ void expect_no_fault(rig &mega)
 std::unique_ptr<rig> new_board(const std::uint8_t *eeprom = nullptr)
 {
     auto mega = std::make_unique<rig>();
-    TEST_ASSERT_EQUAL(PLANT_OK, plant_set_effect(mega->plant.get(), "latent_heat", true));
-    TEST_ASSERT_EQUAL(PLANT_OK, plant_set_effect(mega->plant.get(), "resistance_phase", true));
+    make_niti(mega->plant.get());
     if (eeprom != nullptr) {
         std::copy_n(eeprom, BOARD_EEPROM_BYTES, board_eeprom(mega->raw()));
     }

@@ -126,6 +126,21 @@ void what_was_sent_before_the_stop_does_not_start_anything_after()
     off_and_stays_off(mega, "on 1\non 2\non 3\n");
 }
 
+/* Sent in one go: what comes behind the stop is none of what it drops. */
+void a_line_right_behind_the_stop_is_obeyed_at_any_moment_of_a_tick()
+{
+    for (int k = 0; k < 20; ++k) {
+        rig mega;
+        all_on(mega);
+        mega.run_ms(k + 0.13 * k);
+        mega.board.take_output();
+        mega.board.send("!clear\n");
+        mega.run_ms(60.0);
+        TEST_ASSERT_EQUAL_STRING("ok\r\n", mega.board.take_output().c_str());
+        TEST_ASSERT_EQUAL_UINT8(SAFETY_FAULT_NONE, mega.view().board_fault);
+    }
+}
+
 void the_console_still_answers_and_the_board_can_be_cleared()
 {
     rig mega;
@@ -156,6 +171,7 @@ int main()
     RUN_TEST(stops_behind_a_full_line_of_garbage);
     RUN_TEST(stops_in_the_middle_of_telemetry);
     RUN_TEST(what_was_sent_before_the_stop_does_not_start_anything_after);
+    RUN_TEST(a_line_right_behind_the_stop_is_obeyed_at_any_moment_of_a_tick);
     RUN_TEST(the_console_still_answers_and_the_board_can_be_cleared);
     return UNITY_END();
 }

@@ -61,6 +61,7 @@ SCALARS = {
     "ambient_phase_rad": (-3, 3),
     "optical_orthogonal": (0, 0.15),
     "optical_diagonal": (0, 0.05),
+    "optical_beyond": (0, 1),
     "optical_background": (0, 0.3),
     "optical_background_rise_k": (0, 10),
 }
@@ -312,7 +313,9 @@ class Model:
         t = y[self.n + 1 + self.layers :] if "sensor_lag" in self.on else y[: self.n]
         if "optical_mixing" in self.on:
             share = v["optical_orthogonal"] * self.orthogonal + v["optical_diagonal"] * self.diagonal
-            t = (1 - share.sum(1)) * t + share @ t
+            absent = v["optical_orthogonal"] * (4 - self.orthogonal.sum(1))
+            absent = v["optical_beyond"] * (absent + v["optical_diagonal"] * (4 - self.diagonal.sum(1)))
+            t = (1 - share.sum(1) - absent) * t + share @ t + absent * ambient
             b = v["optical_background"]
             t = (1 - b) * t + b * (ambient + v["optical_background_rise_k"])
         if "sensor_gain" in self.on:

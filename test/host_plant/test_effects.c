@@ -249,6 +249,13 @@ static void a_pixel_sees_its_neighbours(void)
     TEST_ASSERT_DOUBLE_WITHIN(1e-9, 50.0 + 55.0 * 0.25, plant_measured_c(plant, 4));
     TEST_ASSERT_DOUBLE_WITHIN(1e-9, 105.0 - 55.0 * 0.05, plant_measured_c(plant, 1));
     TEST_ASSERT_DOUBLE_WITHIN(1e-9, 105.0 - 55.0 * 0.0125, plant_measured_c(plant, 0));
+    set("optical_beyond",
+        1.0); /* of 20 degC: one side and two corners at spring 2, two and three at spring 1 */
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 50.0 + 55.0 * 0.25, plant_measured_c(plant, 4));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 105.0 - 55.0 * 0.05 - 85.0 * (0.05 + 2 * 0.0125),
+                              plant_measured_c(plant, 1));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 105.0 - 55.0 * 0.0125 - 85.0 * (2 * 0.05 + 3 * 0.0125),
+                              plant_measured_c(plant, 0));
     set("optical_background", 0.1);
     set("optical_background_rise_k", 5.0);
     TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.9 * (50.0 + 55.0 * 0.25) + 2.5, plant_measured_c(plant, 4));

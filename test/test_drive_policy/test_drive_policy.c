@@ -175,6 +175,53 @@ static void spring_that_cannot_get_there_is_said_to_be_away(void)
     TEST_ASSERT_EQUAL_UINT16(0, drive_policy_limits(&policy, 0));
 }
 
+/* Heatings of spring 1 that begin while each of them is lost again at once. */
+static unsigned heatings_in_vain(double seconds)
+{
+    unsigned begun = 0;
+    bool heated = drive_policy_stage(&policy, 0) == DRIVE_POLICY_STAGE_HEAT;
+    for (double s = 0.0; s < seconds; s += TICK_S) {
+        (void)tick();
+        const bool heats = drive_policy_stage(&policy, 0) == DRIVE_POLICY_STAGE_HEAT;
+        begun += heats && !heated ? 1u : 0u;
+        heated = heats;
+        if (!heats && policy.estimator.spring[0].possible == SPRING_PHASE_AUSTENITE) {
+            policy.estimator.spring[0].lost = 0.5f;
+        }
+    }
+    return begun;
+}
+
+static void tries_are_bounded_and_then_it_is_said_to_be_away(void)
+{
+    begin_cold(1, 2);
+    level[0] = 1000;
+    TEST_ASSERT_EQUAL_UINT(1 + 4, heatings_in_vain(500.0));
+    TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_HOLD, drive_policy_stage(&policy, 0));
+    TEST_ASSERT_BITS_HIGH(DRIVE_POLICY_LIMIT_AWAY, drive_policy_limits(&policy, 0));
+    TEST_ASSERT_EQUAL_UINT(2, heatings_in_vain(1200.0)); /* one in ten minutes */
+    level[0] = 0;
+    (void)run(60.0);
+    level[0] = 1000; /* asked anew */
+    TEST_ASSERT_EQUAL_UINT(1 + 4, heatings_in_vain(500.0));
+}
+
+/* The near miss: one that loses its phase every minute, and gets it back, is heated each time. */
+static void tries_that_bring_it_back_are_not_counted(void)
+{
+    begin_cold(1, 2);
+    level[0] = 1000;
+    (void)run(120.0);
+    for (unsigned n = 0; n < 8; n++) {
+        policy.estimator.spring[0].lost = 0.05f;
+        (void)run(1.0);
+        TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_HEAT, drive_policy_stage(&policy, 0));
+        (void)run(60.0);
+        TEST_ASSERT_TRUE(truth[0].austenite > 0.95);
+        TEST_ASSERT_BITS_LOW(DRIVE_POLICY_LIMIT_AWAY, drive_policy_limits(&policy, 0));
+    }
+}
+
 /* ---- the inverse: what is believed stands still ---- */
 
 static void two_springs_hold_by_the_hand_computed_inverse(void)
@@ -252,6 +299,45 @@ static void holds_come_before_boosts(void)
     TEST_ASSERT_EQUAL_UINT(0, cut);
     TEST_ASSERT_GREATER_THAN_UINT16(1000, target_ma[8]);
     TEST_ASSERT_GREATER_THAN_UINT16(1500, target_ma[0]);
+}
+
+/* It is taken for half transformed, and what its current reads says that it is not: the one
+ * that heats would read nothing either if that current came and went. */
+static void what_is_kept_while_waiting_does_not_come_and_go(void)
+{
+    begin_cold(1, 2);
+    level[1] = 1000;
+    (void)run(60.0); /* both its resistances are learnt */
+    level[1] = 0;
+    (void)run(400.0);
+    believe(1, 75, true);
+    supply_limit_ma = 3300;
+    level[0] = level[1] = 1000;
+    unsigned jumps = 0;
+    uint16_t last_ma = 0;
+    for (unsigned n = 0; n < 250; n++) {
+        (void)tick();
+        const uint16_t granted_ma = policy.spring[0].granted_ma;
+        jumps += granted_ma + 100 < last_ma || granted_ma > last_ma + 100;
+        last_ma = granted_ma;
+    }
+    (void)snprintf(where, sizeof where, "%u jumps", jumps);
+    TEST_ASSERT_TRUE_MESSAGE(jumps <= 3, where);
+}
+
+/* Its heating has not gone on since: by that of before it would be held back from its warmth. */
+static void heating_that_another_policy_interrupts_is_over(void)
+{
+    begin_cold(1, 2);
+    level[0] = 1000;
+    (void)run(5.0);
+    TEST_ASSERT_TRUE(policy.estimator.spring[0].heating);
+    drive_policy_parameters_t other = parameters;
+    other.policy = DRIVE_POLICY_OPEN;
+    TEST_ASSERT_TRUE(drive_policy_apply(&policy, &other, &model, NULL));
+    (void)run(1.0);
+    TEST_ASSERT_FALSE(policy.estimator.spring[0].heating);
+    TEST_ASSERT_EQUAL_FLOAT(0.0f, policy.estimator.spring[0].run.line.ohm);
 }
 
 static void own_temperature_derates_linearly_then_trips(void)
@@ -477,9 +563,13 @@ int main(void)
     RUN_TEST(level_is_held);
     RUN_TEST(levels_one_after_the_other_are_held);
     RUN_TEST(spring_that_cannot_get_there_is_said_to_be_away);
+    RUN_TEST(tries_are_bounded_and_then_it_is_said_to_be_away);
+    RUN_TEST(tries_that_bring_it_back_are_not_counted);
     RUN_TEST(two_springs_hold_by_the_hand_computed_inverse);
     RUN_TEST(boosts_are_staggered_not_diluted);
     RUN_TEST(who_waits_longest_is_next);
+    RUN_TEST(what_is_kept_while_waiting_does_not_come_and_go);
+    RUN_TEST(heating_that_another_policy_interrupts_is_over);
     RUN_TEST(holds_come_before_boosts);
     RUN_TEST(own_temperature_derates_linearly_then_trips);
     RUN_TEST(spring_that_may_be_hotter_is_derated_by_that);

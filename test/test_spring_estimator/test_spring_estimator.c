@@ -399,6 +399,68 @@ static void contact_that_steps_in_a_heating_does_not_end_it(void)
     }
 }
 
+/* Its share of the supply changes all the time: no turn has readings for half of its
+ * transformation. What it reads then is no jump of a contact. */
+static void transformation_that_is_not_read_is_no_jump(void)
+{
+    (void)heat_then_hold(60.0);
+    begin_cold_as_learnt();
+    const float learnt_ohm = BELIEF.learnt.austenite_ohm;
+    spring_estimator_begin_heating(&estimator, &model, 0);
+    for (unsigned n = 0; truth.austenite < 0.7; n++) {
+        if (truth.austenite > 0.02 && n % 4u == 0) {
+            spring_estimator_disturb(&BELIEF);
+        }
+        (void)tick(3.0);
+    }
+    TEST_ASSERT_FALSE(BELIEF.onset);
+    for (double s = 0.0; s < 60.0 && !spring_estimator_has_transformed(&estimator, &model, 0);
+         s += TICK_S) {
+        (void)tick(3.0);
+    }
+    (void)snprintf(where, sizeof where, "%.4f ohm, learnt %.4f; %.1f degC",
+                   (double)BELIEF.learnt.austenite_ohm, (double)learnt_ohm, truth.temperature_c);
+    TEST_ASSERT_FLOAT_WITHIN_MESSAGE(0.01f * learnt_ohm, learnt_ohm, BELIEF.learnt.austenite_ohm,
+                                     where);
+    TEST_ASSERT_TRUE_MESSAGE(truth.austenite > 0.99 && truth.temperature_c < 115.0, where);
+}
+
+/* The current goes up and down by a quarter each second, at twice the noise: a turn is compared
+ * with one at another current. */
+static void transformation_is_seen_through_changes_of_current(void)
+{
+    (void)heat_then_hold(60.0);
+    begin_cold_as_learnt();
+    truth.noise_v = 0.008;
+    spring_estimator_begin_heating(&estimator, &model, 0);
+    double s = 0.0, began_at = -1.0;
+    for (; s < 60.0 && !spring_estimator_has_transformed(&estimator, &model, 0); s += TICK_S) {
+        (void)tick(fmod(s, 2.0) < 1.0 ? 2.9 : 2.2);
+        began_at = began_at < 0.0 && BELIEF.onset ? truth.austenite : began_at;
+    }
+    (void)snprintf(where, sizeof where, "onset at %.2f, end at %.3f, %.1f degC", began_at,
+                   truth.austenite, truth.temperature_c);
+    TEST_ASSERT_TRUE_MESSAGE(began_at > 0.0 && began_at < 0.5, where);
+    TEST_ASSERT_TRUE_MESSAGE(truth.austenite > 0.99 && truth.temperature_c < 115.0, where);
+}
+
+/* A third of its current is left to it in mid-transformation, and it loses a fifth more than
+ * declared: it stands still, and the model thinks that it takes up heat. That is no end. */
+static void transformation_that_waits_for_current_is_not_over(void)
+{
+    truth.loss_w_per_k *= 1.2;
+    spring_estimator_begin_heating(&estimator, &model, 0);
+    while (truth.austenite < 0.85) {
+        (void)tick(3.0);
+    }
+    const double holds_w = truth.loss_w_per_k * (truth.temperature_c - 20.0);
+    for (double s = 0.0; s < 120.0; s += TICK_S) {
+        (void)tick(sqrt(holds_w / resistance_ohm()));
+        TEST_ASSERT_TRUE(BELIEF.possible != SPRING_PHASE_AUSTENITE);
+    }
+    TEST_ASSERT_TRUE(truth.austenite < 0.95);
+}
+
 /* A sensor's offset shows otherwise at the current of a look than at that of the heating. */
 static void offset_between_two_currents_is_no_onset(void)
 {
@@ -570,6 +632,10 @@ int main(void)
     RUN_TEST(slope_is_told_on_the_way_down);
     RUN_TEST(contact_is_not_taken_for_phase);
     RUN_TEST(contact_that_comes_and_goes_is_blind_for_a_while);
+    RUN_TEST(jump_in_the_middle_of_a_turn_is_a_jump);
+    RUN_TEST(jump_on_the_way_to_a_hold_is_a_jump);
+    RUN_TEST(load_that_comes_within_a_second_is_no_contact);
+    RUN_TEST(what_a_loose_contact_seemed_to_lose_is_taken_back);
     RUN_TEST(doubt_grows_with_a_heating_after_a_jump);
     RUN_TEST(loss_that_does_not_come_back_was_none);
     RUN_TEST(loss_that_is_still_missing_at_rest_is_taken_back);
@@ -582,6 +648,9 @@ int main(void)
     RUN_TEST(heating_that_a_limit_ends_is_doubted);
     RUN_TEST(heating_that_is_cut_between_two_readings_is_doubted);
     RUN_TEST(contact_that_steps_in_a_heating_does_not_end_it);
+    RUN_TEST(transformation_that_is_not_read_is_no_jump);
+    RUN_TEST(transformation_is_seen_through_changes_of_current);
+    RUN_TEST(transformation_that_waits_for_current_is_not_over);
     RUN_TEST(offset_between_two_currents_is_no_onset);
     RUN_TEST(martensite_resistance_is_learnt_at_20_degrees);
     RUN_TEST(look_tells_the_phase_by_what_was_learnt);
