@@ -11,6 +11,8 @@ from world import EFFECTS, OUTSIDE, SPRINGS, Inputs, World, random_inputs, simul
 
 DURATION_S = 900
 NOISE_C = 0.3
+CONVERSIONS = 3
+"""Of a board's sensor in one row."""
 DEVELOPMENT_SEEDS = range(1000)
 """Seeds that the diagnosis was developed on. Never reported."""
 REPORTING_SEEDS = range(300_000, 400_000)
@@ -37,7 +39,7 @@ class Case:
     columns: str = "iv"
     """iv: current and voltage, i: current, u: command."""
     sensors: bool = False
-    """Currents and voltages have the noise of a board's sensors, 0.5 mA and 0.5 mV."""
+    """Currents and voltages are as a board's sensors give them."""
 
     @property
     def name(self) -> str:
@@ -130,6 +132,25 @@ def make_case(group: str, truth: tuple[str, ...], seed: int) -> Case:
     return Case(group, truth, seed, world, runs, columns)
 
 
+def as_read(rng: np.random.Generator, current: np.ndarray, voltage: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return rows of currents and voltages as a board's sensors give them: means of CONVERSIONS until the next row.
+
+    Its regulator hunts by half a step of the duty; a conversion is rounded to 0.1 mA and 4 mV.
+    """
+    on = current > 0
+    ohm = np.where(on, voltage / np.where(on, current, 1.0), 0.0)
+    share = (np.arange(CONVERSIONS) + 0.5) / CONVERSIONS
+    after = np.append(ohm[1:], ohm[-1])
+    after = np.where(after > 0, after, ohm)
+    ohm = ohm[:, None] + (after - ohm)[:, None] * share
+    ampere = np.where(on[:, None], current[:, None] + rng.uniform(-0.008, 0.008, ohm.shape), 0.0)
+    volt = ampere * ohm + on[:, None] * rng.normal(0.0, 5e-4, ohm.shape)
+    ampere, volt = 1e-4 * np.round(ampere / 1e-4), 4e-3 * np.round(volt / 4e-3)
+    mean = ampere.mean(axis=1)
+    weighted = (volt * ampere).sum(axis=1) / np.where(on, ampere.sum(axis=1), 1.0)
+    return mean, np.where(on, weighted, 0.0)
+
+
 def write_logs(case: Case, folder: Path) -> tuple[list[Path], Path, np.ndarray]:
     """Write the two logs, the held-out log, and return their paths and the held-out truth without noise."""
     out = simulate(case.world, case.runs)
@@ -146,9 +167,7 @@ def write_logs(case: Case, folder: Path) -> tuple[list[Path], Path, np.ndarray]:
             else:
                 current, voltage = out["current"][r][:, k], out["voltage"][r][:, k]
                 if case.sensors:
-                    on = current > 0
-                    current = current + on * rng.normal(0.0, 5e-4, len(current))
-                    voltage = voltage + on * rng.normal(0.0, 5e-4, len(current))
+                    current, voltage = as_read(rng, current, voltage)
                 names.append(f"i{k + 1}_a")
                 columns.append(current)
                 if case.columns == "iv":

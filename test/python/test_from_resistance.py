@@ -11,7 +11,8 @@ from click.testing import CliRunner
 from ninespring import native
 from ninespring.cli import cli
 from ninespring.errors import InputError
-from ninespring.logs import log_text
+from ninespring.fit import from_resistance
+from ninespring.logs import log_text, read_log
 from ninespring.models import read_model
 
 TRUE = {"heat_capacity_j_per_k": 0.34, "loss_w_per_k": 0.0052, "orthogonal_w_per_k": 0.0007, "latent_heat_j": 7.5}
@@ -28,8 +29,8 @@ def board_log(
         for at in range(10 + 11 * k, rows, 150):
             current[at : at + 70, k] = strongest_a * rng.uniform(0.75, 1.0)
     plant = native.Plant(3, 3)
-    plant.set_effects(["latent_heat", "resistance_phase", *(effects or {})])
-    plant.set_all(TRUE)
+    plant.set_effects(["latent_heat", "resistance_phase", "spring_mismatch", *(effects or {})])
+    plant.set_all(TRUE | {f"resistance_scale[{k + 1}]": 1.0 + 0.03 * (k - 4) / 4 for k in range(9)})
     for numbers in (effects or {}).values():
         plant.set_all(numbers)
     plant.reset()
@@ -39,12 +40,25 @@ def board_log(
         for k in range(9):
             plant.drive(k, native.CURRENT, current[row, k])
         native.library().plant_step(plant._plant, 1.0)
-    ohm = ohm * (1.0 + 0.03 * np.linspace(-1, 1, 9))
-    voltage = current * ohm + rng.normal(0.0, 5e-4, current.shape)
+    ohm = 0.5 * (ohm + np.concatenate([ohm[1:], ohm[-1:]]))
+    # means of four readings that are rounded as the board's are
+    hunting = current + rng.uniform(-0.008, 0.008, (4, *current.shape))
+    voltage = (4e-3 * np.round(hunting * ohm / 4e-3)).mean(axis=0)
+    current = hunting.mean(axis=0)
     columns = {f"i{k + 1}_a": current[:, k] for k in range(9)} | {f"v{k + 1}_v": voltage[:, k] for k in range(9)}
     columns |= {"ambient_c": np.full(rows, 20.0)} | more
     path.write_text(log_text(time_s, {name: one for name, one in columns.items() if one is not None}))
     return path
+
+
+def test_a_row_in_which_the_current_changed_is_no_resistance(tmp_path: Path) -> None:
+    run = read_log(board_log(tmp_path / "board.csv"), or_resistance=True)
+    assert run.current_a is not None and run.voltage_v is not None
+    # on for half a row: the mean of the current, the voltage as it was while there was one
+    run.current_a[21, 0], run.voltage_v[21, 0] = 0.5 * run.current_a[22, 0], run.voltage_v[22, 0]
+    ohm = from_resistance.ohm_of(run)
+    assert np.isnan(ohm[21, 0]) and ohm[30, 0] == pytest.approx(run.voltage_v[30, 0] / run.current_a[30, 0])
+    assert np.isfinite(ohm).mean() > 0.9
 
 
 def fit(*words: object) -> None:
@@ -62,7 +76,7 @@ def test_a_board_alone_tells_capacity_loss_coupling_and_latent_heat(tmp_path: Pa
     assert "only a thermometer can say" in model.provenance["note"]
     assert model.provenance["hottest_c"] > 88.0 and "rmse_after_c" not in model.provenance
     result = json.loads((tmp_path / "r.json").read_text())
-    assert result["rmse_c"] is None and result["rmse_ohm"] < 0.5 * result["rmse_before_ohm"]
+    assert result["rmse_c"] is None and result["rmse_v"] < 0.5 * result["rmse_before_v"]
     own = [model.parameters[f"resistance_scale[{k}]"] for k in range(1, 10)]
     assert np.all(np.diff(own) > 0), "each wire has a resistance of its own"
 
@@ -85,14 +99,23 @@ def test_logs_with_and_without_temperatures_are_not_mixed(tmp_path: Path, make_l
         fit(board_log(tmp_path / "board.csv"), make_log(), "-o", tmp_path / "m.toml")
 
 
-def test_a_board_alone_is_diagnosed_with_its_effect_and_no_degrees(tmp_path: Path) -> None:
-    log = board_log(tmp_path / "board.csv", effects={"edge_loss": {"edge_loss_fraction": 0.25}})
+OUTER_ALIKE = {"edge_loss_fraction": 0.0} | {f"loss_scale[{k}]": 1.25 for k in range(1, 10) if k != 5}
+
+
+@pytest.mark.parametrize(
+    ("numbers", "name", "true"),
+    [({"edge_loss_fraction": 0.25}, "edge_loss_fraction", 0.25), (OUTER_ALIKE, "outer_loss_scale", 1.25)],
+)
+def test_a_board_alone_is_diagnosed_with_its_effect_and_no_degrees(
+    tmp_path: Path, numbers: dict[str, float], name: str, true: float
+) -> None:
+    log = board_log(tmp_path / "board.csv", effects={"edge_loss": numbers})
     done = CliRunner().invoke(cli, ["diagnose", str(log), "-o", str(tmp_path / "out")], catch_exceptions=False)
     assert done.exit_code == 0, done.output
     result = json.loads((tmp_path / "out" / "diagnosis.json").read_text())
     assert [one["name"] for one in result["effects"]] == ["edge_loss"]
-    fraction = result["effects"][0]["parameters"]["edge_loss_fraction"]
-    assert abs(fraction["value"] - 0.25) < 4.0 * fraction["stderr"]
-    assert result["after"]["rmse_c"] is None and result["after"]["rmse_ohm"] < 0.5 * result["baseline"]["rmse_ohm"]
+    found = result["effects"][0]["parameters"][name]
+    assert abs(found["value"] - true) < 4.0 * found["stderr"]
+    assert result["after"]["rmse_c"] is None and result["after"]["rmse_v"] < 0.5 * result["baseline"]["rmse_v"]
     assert "edge_loss" in read_model(tmp_path / "out" / "model.toml").effects
     assert "only a thermometer can say" in (tmp_path / "out" / "report.html").read_text()

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from ninespring.logs import read_log
 from ninespring.models import Array
+from ninespring.report import page
 from ninespring.verdict import diagnosis, plausibility
 
 TRUE = {"latent_heat": {"latent_heat_j": 8.0}, "shared_air": {"air_exchange_w_per_k": 0.2}}
@@ -42,6 +43,16 @@ def test_swapped_columns_are_named_through_a_phase_change_and_warm_air(make_log,
         assert {text.split(",")[0] for text in found} == {
             f"t{k}_c follows the drive of spring {o}" for k, o in pairs.items()
         }
+
+
+def test_of_a_log_with_swapped_columns_the_mistake_is_said_first_and_nothing_else_is_made_of_it(make_log) -> None:
+    def swap(columns: dict[str, np.ndarray]) -> None:
+        pairs = {1: 2, 2: 1, 4: 9, 9: 4}
+        columns.update({f"t{k}_c": v for k, v in [(k, columns[f"t{o}_c"]) for k, o in pairs.items()]})
+
+    result = diagnosis.diagnose(Array(), [read_log(make_log(effects=TRUE, change=swap))]).result
+    assert [kind for kind, _ in page.findings(result)[:4]] == ["a mistake in the log?"] * 4
+    assert not any(one.get("seen_by") for one in result["effects"]) and result["unnamed"] == []
 
 
 def test_a_spring_that_is_hot_and_never_driven_is_said(make_log) -> None:

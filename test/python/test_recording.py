@@ -554,10 +554,10 @@ def test_monitor_shows_the_array_as_a_grid_with_totals_limits_and_trend() -> Non
 
 
 def test_a_rows_inputs_are_their_means_until_the_next_row(tmp_path: Path) -> None:
-    """A spring that is switched on between two rows is on for that part of the interval, not from the next row on."""
+    """A spring or the fan that is switched on between two rows is on for that part of the interval, not from a row on."""
     board = FakeBoard()
     board.stream = [
-        f"{0.05 * k:.2f},{0.0 if k < 35 else 2.0:.3f},{0.0 if k < 35 else 0.4:.3f},20.00,0.00,20.00,ok"
+        f"{0.05 * k:.2f},{0.0 if k < 35 else 2.0:.3f},{0.0 if k < 35 else 0.4:.3f},20.00,{float(k >= 35):.2f},20.00,ok"
         for k in range(1, 90)
     ]
     done = record(board, tmp_path, "--duration", 3)
@@ -565,6 +565,7 @@ def test_a_rows_inputs_are_their_means_until_the_next_row(tmp_path: Path) -> Non
     assert "telemetry csv 20" in board.sent()
     frame = read_table(tmp_path / "log.csv", ("state",)).frame
     assert frame["time_s"].tolist() == pytest.approx(np.arange(0.05, 3.1, 0.5))
-    # on from 1.75 s: in the row of 1.55 s for 0.3 of 0.5 s, as mean current and as mean power
-    assert frame["i1_a"].tolist() == pytest.approx([0, 0, 0, 1.2, 2, 2, 2], abs=1e-3)
-    assert (frame["i1_a"] * frame["v1_v"]).tolist() == pytest.approx([0, 0, 0, 0.48, 0.8, 0.8, 0.8], abs=1e-3)
+    # first read at 1.75 s, so on since 1.70 s: in the row of 1.55 s for 0.35 of 0.5 s, as mean current and as mean power
+    assert frame["i1_a"].tolist() == pytest.approx([0, 0, 0, 1.4, 2, 2, 2], abs=1e-3)
+    assert (frame["i1_a"] * frame["v1_v"]).tolist() == pytest.approx([0, 0, 0, 0.56, 0.8, 0.8, 0.8], abs=1e-3)
+    assert frame["fan"].tolist() == pytest.approx([0, 0, 0, 0.7, 1, 1, 1])

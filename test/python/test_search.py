@@ -47,6 +47,16 @@ def heaters() -> Model:
     return model
 
 
+@pytest.mark.parametrize("beyond", [0.0, 1.0])
+def test_a_camera_that_sees_the_surroundings_beyond_the_array_makes_no_edge_loss(make_log, beyond: float) -> None:
+    camera = {"optical_orthogonal": 0.04, "optical_diagonal": 0.01, "optical_beyond": beyond}
+    found = diagnosis.diagnose(Array(), [read_log(make_log(effects={"optical_mixing": camera}), 9)])
+    (one,) = found.result["effects"]
+    assert one["name"] == "optical_mixing" and ("beyond the array" in one["variant"]) == (beyond > 0)
+    assert found.model.parameters["optical_beyond"] == beyond
+    assert found.result["unexplained"] is False
+
+
 @pytest.mark.parametrize(("chopped", "variant"), [(1.0, "chopped loads"), (0.0, "loads that draw their mean")])
 def test_the_way_the_supply_sags_is_told_from_the_other(tmp_path: Path, chopped: float, variant: str) -> None:
     sag = {"supply_sag": {"supply_resistance_ohm": 8.0, "supply_chopped": chopped}}

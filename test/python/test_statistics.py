@@ -13,6 +13,9 @@ def test_the_noise_is_found_under_a_smooth_curve_and_outliers() -> None:
     series = curve + rng.normal(0, 0.3, (900, 9))
     series[::100] += 30.0
     assert statistics.noise_floor(series) == pytest.approx(np.full(9, 0.3), rel=0.12)
+    # read half way between two readings of another clock
+    between = 0.5 * (series[1:] + series[:-1])
+    assert statistics.noise_floor(between) == pytest.approx(np.full(9, 0.3 / np.sqrt(2.0)), rel=0.12)
 
 
 def test_correlated_residuals_count_less() -> None:

@@ -295,8 +295,9 @@ def record(
 class RowSink:
     """Rows on their way to the log, and comments between them.
 
-    With `every_s`, rows that came faster become one: currents and voltages are their means until the next one begins, as a
-    log's inputs hold from its row on (the voltage is weighted with the current, so that their product is the mean power); the
+    With `every_s`, rows that came faster become one: currents, voltages and the fan are means until the next one begins, as a
+    log's inputs hold from its row on (the voltage is weighted with the current, so that their product is the mean power). A
+    reading tells of the time before it, so they are means of the readings after the first, the next one's among them. The
     rest is that of the first. With thermometers, a row waits for the readings around it.
     """
 
@@ -327,7 +328,7 @@ class RowSink:
         if self._bucket and row.time_s - self._bucket[0].time_s < (1.0 - 0.5 / FINER) * self._every_s:
             self._bucket.append(row)
             return
-        self._end_bucket()
+        self._end_bucket([row])
         self._bucket = [row]
         if not self._every_s:
             self._end_bucket()
@@ -347,13 +348,13 @@ class RowSink:
         self._end_bucket()
         self._write(math.inf)
 
-    def _end_bucket(self) -> None:
+    def _end_bucket(self, following: Sequence[Row] = ()) -> None:
         if self._bucket:
-            first = self._bucket[0]
+            first, *rest = self._bucket
+            inputs = [*rest, *following] if rest else []
+            text = mean_row(self._names, first.text, [one.text for one in inputs])
             self.rows += 1
-            self._waiting.append(
-                (mean_row(self._names, [one.text for one in self._bucket]), first.time_s, self._comments)
-            )
+            self._waiting.append((text, first.time_s, self._comments))
             self._bucket, self._comments = [], []
 
     def _write(self, now_s: float) -> None:
@@ -371,13 +372,12 @@ class RowSink:
                 self._log.write(f"# {one}")
 
 
-def mean_row(names: Sequence[str], rows: Sequence[str]) -> str:
-    """Return the first row with the currents and voltages that all of them mean."""
-    if len(rows) == 1:
-        return rows[0]
-    cells = [row.split(",") for row in rows]
-    out = list(cells[0])
-    for at, name in enumerate(names):
+def mean_row(names: Sequence[str], first: str, rows: Sequence[str]) -> str:
+    """Return the first row with the currents, voltages and fan that these rows mean; as it is where there are none."""
+    cells, out = [row.split(",") for row in rows], first.split(",")
+    for at, name in enumerate(names) if rows else ():
+        if name == "fan":
+            out[at] = f"{sum(float(one[at]) for one in cells) / len(cells):.2f}"
         if re.fullmatch(r"i\d+_a", name):
             current = [float(one[at]) for one in cells]
             out[at] = f"{sum(current) / len(cells):.4f}"

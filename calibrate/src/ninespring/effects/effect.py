@@ -116,7 +116,7 @@ def scene_of(problem: Problem) -> Scene:
         problem.array.cols,
         frozenset(run.mode for run in runs),
         bool((fan > 0.1).any()),
-        max(float(np.nanmax(run.temperature_c)) for run in runs),
+        problem.hottest_c,
         float(np.median(np.diff(runs[0].time_s))),
         max(run.duration_s for run in runs),
         {key: tuple(one.shape[1] for one in hats) for key, hats in problem.hats.items()},

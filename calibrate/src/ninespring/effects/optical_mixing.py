@@ -4,6 +4,8 @@ from collections.abc import Iterator
 
 from .effect import Candidate, Effect, Numbers, Scene, Steady, linear, sized
 
+BEYOND = "neighbours, and the surroundings beyond the array"
+
 
 def _candidates(scene: Scene) -> Iterator[Candidate]:
     if scene.springs < 2:
@@ -14,17 +16,21 @@ def _candidates(scene: Scene) -> Iterator[Candidate]:
     if scene.plane:
         free.append(linear(corner, 0.0, 0.05, 0.005, 0.01))
         probes.append({side: 0.0, corner: 0.01})
-    yield Candidate(
-        "neighbours",
-        tuple(free),
-        tuple({f.key: one[f.key] for f in free} for one in probes),
-        most=6.0,
-        fixed=() if scene.plane else ((corner, 0.0),),
-    )
+    still = () if scene.plane else ((corner, 0.0),)
+    for variant, beyond in (("neighbours", 0.0), (BEYOND, 1.0)):
+        yield Candidate(
+            variant,
+            tuple(free),
+            tuple({f.key: one[f.key] for f in free} for one in probes),
+            most=6.0,
+            fixed=(*still, ("optical_beyond", beyond)),
+        )
 
 
 def _says(numbers: Numbers, variant: str) -> str:
-    return f"The camera sees {sized(*numbers['optical_orthogonal'], '%', 100.0)} of each neighbour in a spring's place."
+    beyond = ", and as much of the surroundings beyond the array" if variant == BEYOND else ""
+    share = sized(*numbers["optical_orthogonal"], "%", 100.0)
+    return f"The camera sees {share} of each neighbour in a spring's place{beyond}."
 
 
 EFFECT = Effect(

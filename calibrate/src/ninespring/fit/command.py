@@ -116,7 +116,7 @@ def _fit_from_resistance(array: Array, runs: list[Run], output: Path, json_path:
         problem, found, first = from_resistance.fit(array, runs)
         found, witnesses = from_resistance.with_effects(problem, found, say)
     model = from_resistance.model_of_fit(problem, found)
-    errors = {"rmse_before_ohm": first.residual, "rmse_ohm": found.residual}
+    errors = {"rmse_before_v": first.residual, "rmse_v": found.residual}
     result = result_of(
         "fit",
         logs=logs_of(runs),
@@ -125,7 +125,7 @@ def _fit_from_resistance(array: Array, runs: list[Run], output: Path, json_path:
         holdout_rmse_c=None,
         noise_c=None,
         **{name: 1e-3 * rms(left) for name, left in errors.items()},
-        noise_ohm=1e-3 * problem.noise_c,
+        noise_v=1e-3 * problem.noise_c,
         effects=list(found.spec.effects),
         parameters={k: v for e in (None, *found.spec.effects) for k, v in parameters_of(problem, found, e).items()},
         not_identifiable=sorted(found.stuck),
@@ -135,8 +135,8 @@ def _fit_from_resistance(array: Array, runs: list[Run], output: Path, json_path:
     write({output: model_text(model), json_path: checked(result)})
     print_parameters(beside(output), result["parameters"])
     beside(output).print(
-        f"no thermometer: fitted to v / i, error {1e3 * result['rmse_before_ohm']:.2f} mohm as declared, "
-        f"{1e3 * result['rmse_ohm']:.2f} fitted, noise {1e3 * result['noise_ohm']:.2f} -> {output}"
+        f"no thermometer: fitted to v / i, error {1e3 * result['rmse_before_v']:.1f} mV as declared, "
+        f"{1e3 * result['rmse_v']:.1f} fitted, readings are good for {1e3 * result['noise_v']:.1f} -> {output}"
     )
     for name, one in witnesses.items():
         said = effects.sentence(name, parameters_of(problem, found, name), dict(found.spec.variant)[name])

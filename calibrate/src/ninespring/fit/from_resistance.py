@@ -8,6 +8,7 @@ that scale is, and nothing else, only a thermometer can say.
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -25,9 +26,16 @@ from .spec import Fit, Free, Spec
 
 if TYPE_CHECKING:
     from ..search.certainty import Witness
+    from ..search.search import Search
 
 DRIVEN_A = 0.2
 """Currents from which v / i is a measurement of resistance, not of the sensor's offset."""
+ROUNDING_V = 4e-3 / math.sqrt(12.0)
+"""What rounding leaves in a voltage of the board, rms: its sensors step by 4 mV, and where the current is steady so is the error."""
+NOISE_V = 2.0 * ROUNDING_V
+"""What a voltage is told to, at best: rounding that stays the same is then never structure of half the noise."""
+WEAK_EVERY = 10
+"""Rows of which one counts while a spring's current is weak."""
 CROSSED = 0.03
 """Part of its cold resistance by which a spring's v / i must have changed to have passed its transformation."""
 LIKE_DECLARED = math.log(1.3)
@@ -45,23 +53,68 @@ def has_none(runs: Sequence[Run]) -> bool:
     return all(run.voltage_v is not None and not np.isfinite(run.temperature_c).any() for run in runs)
 
 
+def steady(run: Run) -> np.ndarray:
+    """Return where v / i of a run is a resistance, (rows, springs): driven, by a current that does not change in the row.
+
+    A row's current is a mean and its voltage is weighted by it. Half a row at another current, off by some share of the
+    mean, makes their ratio wrong by the square of half that share at most: less than rounding does, or the row is left out.
+    """
+    assert run.current_a is not None and run.voltage_v is not None
+    change = np.abs(np.diff(run.current_a, axis=0, prepend=run.current_a[:1], append=run.current_a[-1:]))
+    change = np.maximum(change[1:], change[:-1])
+    driven = run.current_a > DRIVEN_A
+    share = change / np.where(driven, 2.0 * run.current_a, 1.0)
+    return driven & (run.voltage_v * share**2 < ROUNDING_V)
+
+
+def ohm_of(run: Run) -> np.ndarray:
+    """Return v / i of a run, (rows, springs), ohm; NaN where it is no resistance."""
+    assert run.current_a is not None and run.voltage_v is not None
+    here = steady(run)
+    return np.where(here, run.voltage_v / np.where(here, run.current_a, 1.0), np.nan)
+
+
 class Resistances(Problem):
-    """A problem whose readings are milliohms, not degrees: everything else is as with thermometers."""
+    """A problem whose readings are millivolts, not degrees: each spring's voltage less what its current would make of it cold.
+
+    Everything else is as with thermometers. Volts, because what a board's reading is off by is the same at every current.
+    """
 
     def __init__(self, array: Array, runs: Sequence[Run]) -> None:
         self.boards = list(runs)
-        read = []
-        for run in runs:
-            assert run.current_a is not None and run.voltage_v is not None
-            driven = run.current_a > DRIVEN_A
-            ohm = np.where(driven, run.voltage_v / np.where(driven, run.current_a, 1.0), np.nan)
-            read.append(replace(run, temperature_c=1e3 * ohm))
+        ohm = np.concatenate([ohm_of(run) for run in runs])
+        current = np.concatenate([run.current_a for run in runs if run.current_a is not None])
+        with np.errstate(all="ignore"), warnings.catch_warnings():
+            warnings.simplefilter("ignore", RuntimeWarning)
+            # at small currents rounding is a good part of v / i
+            strong = current > 0.5 * np.nanmax(np.where(np.isfinite(ohm), current, np.nan), axis=0)
+            ohm = np.where(strong, ohm, np.nan)
+            self.cold_ohm, self.hot_ohm = np.nanpercentile(ohm, 5, axis=0), np.nanpercentile(ohm, 98, axis=0)
+            self.strong_a = np.nanmedian(np.where(np.isfinite(ohm), current, np.nan), axis=0)
+        read = [replace(run, temperature_c=self._over_cold(self._told(run), run)) for run in runs]
         super().__init__(array, read)
+        self.noise = [np.maximum(one, 1e3 * NOISE_V) for one in self.noise]
+
+    @property
+    def hottest_c(self) -> float:
+        """How hot nobody measured: springs that have passed their transformation may show all that heat does."""
+        return math.inf
+
+    def _told(self, run: Run) -> np.ndarray:
+        """Return v / i, one in WEAK_EVERY where a spring is only kept readable: there rounding is off by the same again and again."""
+        assert run.current_a is not None
+        weak = run.current_a <= 0.5 * self.strong_a
+        weak[::WEAK_EVERY] = False
+        return np.where(weak, np.nan, ohm_of(run))
+
+    def _over_cold(self, ohm: np.ndarray, run: Run) -> np.ndarray:
+        assert run.current_a is not None
+        return 1e3 * run.current_a * (ohm - self.cold_ohm)
 
     def simulate(
         self, spec: Spec, values: Sequence[float], run_index: int, start_offset: np.ndarray | None = None
     ) -> np.ndarray:
-        """Return what v / i of one run should be, (rows, springs), milliohm; from cold, at the logged ambient."""
+        """Return what the springs of one run should show, (rows, springs), mV; from cold, at the logged ambient."""
         run = self.boards[run_index]
         with self._count_lock:
             self.simulations += 1
@@ -71,7 +124,9 @@ class Resistances(Problem):
                 plant.set_ambient(float(run.ambient_c[0]))
             plant.set_fan(float(run.fan[0]))
             plant.reset()
-            return 1e3 * plant.readings(run.time_s, run.drive, run.fan, run.ambient_c)
+            ohm = plant.readings(run.time_s, run.drive, run.fan, run.ambient_c)
+            # a row's readings are means until the next
+            return self._over_cold(0.5 * (ohm + np.concatenate([ohm[1:], ohm[-1:]])), run)
         except native.NativeError:
             return np.full(run.drive.shape, _BAD)
 
@@ -84,12 +139,10 @@ def fit(array: Array, runs: Sequence[Run]) -> tuple[Resistances, Fit, Fit]:
         if len(run.starts) > 1:
             raise InputError("without thermometers nothing says how warm the springs are after a gap in time", run.name)
     problem = Resistances(array, runs)
-    read = np.concatenate([run.temperature_c for run in problem.runs]) * 1e-3
-    with np.errstate(all="ignore"):
-        cold, highest = np.nanpercentile(read, 5, axis=0), np.nanpercentile(read, 98, axis=0)
-    # far beyond what noise makes of so many readings
-    noise = 1e-3 * np.max(problem.noise, axis=0)
-    crossed = np.flatnonzero(highest - cold > np.maximum(CROSSED * cold, 8.0 * noise))
+    cold, rise = problem.cold_ohm, problem.hot_ohm - problem.cold_ohm
+    # far beyond what rounding and noise make of so many readings
+    seen = 8e-3 * np.max(problem.noise, axis=0) / problem.strong_a
+    crossed = np.flatnonzero(rise > np.maximum(CROSSED * cold, seen))
     if not crossed.size:
         raise InputError(
             "no spring's v / i ever changes: without a thermometer each spring must pass its transformation, on heating and "
@@ -126,16 +179,16 @@ def with_effects(
 ) -> tuple[Fit, dict[str, Witness]]:
     """Search for the effects of the array that v / i shows; return the fit with those named, and what speaks for each."""
     from .. import effects
+    from ..search import search as searching
     from ..search.certainty import NAMED, witness
-    from ..search.search import Search
 
     known = [
         one
         for one in effects.candidates(problem)
         if one.effect in effects.ON_CHIP and one.effect not in found.spec.effects and not one.flexible
     ]
-    search = Search(problem, known, found, progress)
-    chosen, without, _ = search.run()
+    search = searching.Search(problem, known, found, progress)
+    chosen, without = of_the_array(problem, search, *search.run()[:2])
     witnesses = {name: witness(problem, chosen, name, other, False) for name, other in without.items()}
     for name in [one for one, said in witnesses.items() if said.probability() < NAMED]:
         chosen = search.reduced(chosen, name)
@@ -143,6 +196,28 @@ def with_effects(
     if witnesses:
         chosen = problem.fit(chosen.spec, chosen.as_dict(), tolerance=1e-6, max_steps=20, errors=True)
     return chosen, witnesses
+
+
+def of_the_array(
+    problem: Resistances, search: Search, chosen: Fit, without: dict[str, Fit]
+) -> tuple[Fit, dict[str, Fit]]:
+    """Return the fit with what is said of one spring said of the array, where that explains as much with no more numbers.
+
+    All outer springs losing more is the middle one losing less: only from numbers that are about right does it show.
+    """
+    for name, variant in chosen.spec.variant:
+        if name not in without or not variant.startswith("spring "):
+            continue
+        for one in search.candidates:
+            if one.effect in chosen.spec.effects or one.variant.startswith("spring "):
+                continue
+            search.progress(f"could it be {one.effect} instead of {name}?")
+            spec = chosen.spec.without(name).with_effect(one.effect, one.free, one.fixed, one.variant, one.also_on)
+            other = problem.fit(spec, chosen.as_dict() | one.start_at(1.0), tolerance=1e-3, max_steps=14)
+            search.fits[search.key(spec)] = other
+            if search.preferred(other, chosen):
+                return search.settle(other)[:2]
+    return chosen, without
 
 
 def model_of_fit(problem: Resistances, found: Fit) -> Model:

@@ -94,6 +94,11 @@ class Problem:
         """Return what the declared array has for a parameter of the plant."""
         return self._base.get(name)
 
+    @property
+    def hottest_c(self) -> float:
+        """Highest temperature that was measured."""
+        return max(float(np.nanmax(run.temperature_c)) for run in self.runs)
+
     def _tidy_noise(self) -> None:
         """A column too short or too clean to estimate takes the median of the others; 0.005 degC at least."""
         everything = np.concatenate(self.noise)

@@ -38,17 +38,25 @@ def noise_floor(series: np.ndarray, starts: Sequence[int] = (0,)) -> np.ndarray:
     """Return the white noise of each column, from third differences, same unit as `series`.
 
     Third differences remove anything smooth; white noise of variance s^2 leaves 20 s^2 in them. Outliers
-    and the few kinks where an input steps are cut. Columns with too few values give NaN.
+    and the few kinks where an input steps are cut. Columns with too few values give NaN. Readings put onto another clock by
+    straight lines share their noise with the next and look up to twice too clean: every second row tells, where it says
+    no more than that.
     """
+    near, apart = (_third_differences(series, starts, stride) for stride in (1, 2))
+    return np.where(apart <= 1.1 * 2.0 * near, np.fmax(near, apart), near)  # a tenth: chance
+
+
+def _third_differences(series: np.ndarray, starts: Sequence[int], stride: int) -> np.ndarray:
+    """Return the white noise of each column by its values so many rows apart."""
     rows, columns = series.shape
     bounds = [*starts, rows]
     out = np.full(columns, np.nan)
     for k in range(columns):
         pieces = []
         for begin, end in zip(bounds[:-1], bounds[1:], strict=True):
-            part = series[begin:end, k]
-            if len(part) > 3:
-                pieces.append(part[3:] - 3 * part[2:-1] + 3 * part[1:-2] - part[:-3])
+            a, b, c, d = (series[begin + j * stride : end - (3 - j) * stride, k] for j in range(4))
+            if end - begin > 3 * stride:
+                pieces.append(d - 3 * c + 3 * b - a)
         if pieces:
             out[k] = clipped_std(np.concatenate(pieces)) / np.sqrt(20.0)
     return out

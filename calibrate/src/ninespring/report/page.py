@@ -81,7 +81,7 @@ def verdict(result: dict[str, Any]) -> str:
 
 def findings(result: dict[str, Any]) -> list[tuple[str, str]]:
     """Return what was found in words and sizes, each with how sure it is: effects, unknown heat, what is left."""
-    out = []
+    out = [("a mistake in the log?", text) for text in result["warnings"] if "columns swapped" in text]
     for one in result["effects"]:
         sure = f"{one['certainty']}, {100 * one['probability']:.0f} %" if "probability" in one else ""
         out.append((f"{one['name']}: {sure}" if sure else one["name"], one.get("text", one["in_words"])))
@@ -102,26 +102,26 @@ def findings(result: dict[str, Any]) -> list[tuple[str, str]]:
     return out
 
 
-def next_steps(result: dict[str, Any]) -> list[str]:
-    """Return what to do next, as commands."""
+def next_steps(result: dict[str, Any], folder: str) -> list[str]:
+    """Return what to do next, as commands; `folder` is where the diagnosis is written."""
     out = [f"# {one['separating_experiment']}" for one in result["rivals"][:2]]
     if out:
         run = next((one["experiment"]["duration_s"] for one in result["rivals"] if "experiment" in one), 900.0) + 10.0
         out += [
-            "ninespring plan --for diagnosis/diagnosis.json -o steps.txt     # the first of them",
+            f"ninespring plan --for {folder}/diagnosis.json -o steps.txt     # the first of them",
             f"ninespring record --port PORT --thermometers PORT --run steps.txt --duration {run:g} -o run3.csv",
-            f"ninespring diagnose {' '.join(log['file'] for log in result.get('logs', []))} run3.csv -o diagnosis",
+            f"ninespring diagnose {' '.join(log['file'] for log in result.get('logs', []))} run3.csv -o {folder}",
         ]
     return [
         *out,
-        "ninespring verify --model diagnosis/model.toml another.csv      # a log that this fit never saw",
-        "ninespring export --model diagnosis/model.toml -o settings.txt",
+        f"ninespring verify --model {folder}/model.toml another.csv      # a log that this fit never saw",
+        f"ninespring export --model {folder}/model.toml -o settings.txt",
         "ninespring upload --port PORT settings.txt",
     ]
 
 
-def html_report(found: Diagnosis) -> str:
-    """Return the report as HTML."""
+def html_report(found: Diagnosis, folder: str = "diagnosis") -> str:
+    """Return the report as HTML; `folder` is where the diagnosis is written."""
     result = found.result
     before, after = result["baseline"], result["after"]
     parts = ["<h1>What the array does that the model did not</h1>", f'<p class="lead">{_e(verdict(result))}</p>']
@@ -131,7 +131,7 @@ def html_report(found: Diagnosis) -> str:
         f'<div class="first"><div><ul class="said">{lines}</ul></div><div>'
         f"<figure>{figures.array_map(found)}<figcaption>What the best model leaves at each spring, in multiples of its "
         f"sensor's noise.</figcaption></figure><figure>{figures.error_bars(result)}</figure></div></div>"
-        f"<h2>What to do next</h2><pre>{_e(chr(10).join(next_steps(result)))}</pre>"
+        f"<h2>What to do next</h2><pre>{_e(chr(10).join(next_steps(result, folder)))}</pre>"
     )
     parts.append(
         "<h2>Errors before and after</h2>"
@@ -280,7 +280,7 @@ def steady_report(result: dict[str, Any]) -> str:
     return _page(parts)
 
 
-def board_report(result: dict[str, Any]) -> str:
+def board_report(result: dict[str, Any], folder: str = "diagnosis") -> str:
     """Return the report of a diagnosis without thermometers as HTML."""
     said = "".join(
         f"<li><b>{_e(one['certainty'])}, {100 * one['probability']:.0f} %</b>{_e(one['text'])}</li>"
@@ -289,6 +289,7 @@ def board_report(result: dict[str, Any]) -> str:
     parts = ["<h1>A board without thermometers</h1>", f'<p class="lead">{_e(board_alone.verdict(result))}</p>']
     if said:
         parts.append(f'<ul class="said">{said}</ul>')
+    parts.append(f"<h2>What to do next</h2><pre>{_e(chr(10).join(next_steps(result, folder)))}</pre>")
     parts.append('<h2>About the data</h2><div class="warn">' + "<br>".join(map(_e, result["warnings"])) + "</div>")
     parts.append("<h2>The array's numbers</h2>" + _parameters(result["after"]["parameters"]))
     parts += [f"<h2>{_e(one['name'])}</h2>{_parameters(one['parameters'])}" for one in result["effects"]]

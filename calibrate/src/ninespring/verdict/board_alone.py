@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from threadpoolctl import threadpool_limits
 
 from .. import __version__, effects
@@ -62,24 +63,24 @@ def diagnose(
         "baseline": {
             **no_degrees,
             "noise_c": None,
-            "rmse_ohm": 1e-3 * statistics.rms(first.residual),
-            "noise_ohm": 1e-3 * problem.noise_c,
+            "rmse_v": 1e-3 * statistics.rms(first.residual),
+            "noise_v": 1e-3 * problem.noise_c,
             "effects": list(alone.spec.effects),
         },
         "effects": listed,
         "rivals": [],
         "after": {
             **no_degrees,
-            "rmse_ohm": 1e-3 * statistics.rms(found.residual),
+            "rmse_v": 1e-3 * statistics.rms(found.residual),
             "parameters": {
                 key: one for e in (None, *alone.spec.effects) for key, one in parameters_of(problem, found, e).items()
             },
         },
         "unexplained": bool(left_over),
         "residual": {
-            "autocorrelation_lag1": float(statistics.autocorrelation(found.residual, 1)[1]),
+            "autocorrelation_lag1": float(np.clip(statistics.autocorrelation(found.residual, 1)[1], -1.0, 1.0)),
             "depends_on": depends,
-            "note": f"{LEFT}. {note}".strip() if left_over else note or "white at the noise of v / i",
+            "note": f"{LEFT}. {note}".strip() if left_over else note or "white at the noise of v",
         },
         "identifiability": {
             "not_identifiable": sorted(set(found.stuck)),
@@ -99,8 +100,8 @@ def verdict(result: dict[str, Any]) -> str:
     before, after = result["baseline"], result["after"]
     names = " and ".join(one["name"] for one in result["effects"])
     error = (
-        f"v / i is met to {1e3 * after['rmse_ohm']:.2f} mohm ({1e3 * before['rmse_ohm']:.2f} as declared, "
-        f"noise {1e3 * before['noise_ohm']:.2f})"
+        f"voltages are met to {1e3 * after['rmse_v']:.1f} mV ({1e3 * before['rmse_v']:.1f} as declared, "
+        f"{1e3 * before['noise_v']:.1f} is what a board's readings are good for)"
     )
     more = " Something else is missing that no effect of the library explains." if result["unexplained"] else ""
     return (

@@ -76,7 +76,7 @@ def diagnose(
     if not steady_table and alone:
         with working("fitting v / i") as say:
             result, made = board_alone.diagnose(array, runs, say)
-        page = report.board_report(result)
+        page = report.board_report(result, str(output))
     elif not steady_table:
         with working("fitting") as say:
             found = diagnosis.diagnose(array, runs, model=model, frozen=frozen, progress=say)
@@ -84,7 +84,7 @@ def diagnose(
                 say("empirical surrogate")
                 found.result["surrogate"] = empirical(found.problem, found.final)
             say("writing the report")
-            page = report.html_report(found)
+            page = report.html_report(found, str(output))
         result, made = found.result, found.model
     text = checked(result)
     files: dict[Path | None, str] = {

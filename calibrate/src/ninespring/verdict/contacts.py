@@ -11,8 +11,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..fit.from_resistance import DRIVEN_A
 from ..fit.problem import Problem
-from .readings import DRIVEN_A, SEEN, Linear, Readings, nats_of, solve
+from .readings import SEEN, Linear, Readings, nats_of, solve
 
 LEAST_NATS = 3.0
 """Evidence, after all prices, of a change: one in twenty."""

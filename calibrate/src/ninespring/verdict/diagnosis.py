@@ -34,6 +34,8 @@ from .result import DRIFT_LEFT_OUT, model_of, parameters_of
 SCHEMA = "ninespring.diagnosis/1"
 MOST_OF_IT = 0.5
 """Part of what is beyond the noise without an effect that it explains, where more is explained than left."""
+LEAST_PART = 0.01
+"""Of a drive or a reading, less is not told as a cause: a board measures power no better, its voltages step by 4 mV."""
 PINNED = 1e-5
 """Spread, in a number's inner coordinate, that leaves it where it is."""
 
@@ -247,14 +249,16 @@ def _diagnose(
     found = search.Search(problem, [c for c in (*known, *own) if c.effect not in spec.effects], base, progress)
     final, without, contenders = found.run()
     progress("what v / i says")
-    if steps := (resistance.witness(problem, final) or {}).get("contacts"):
+    swapped = plausibility.swapped(problem.runs)
+    # beside another spring's temperature v / i would only accuse contacts
+    if steps := ({} if swapped else resistance.witness(problem, final) or {}).get("contacts"):
         # v i is measured with the contact: its heat is not the spring's, and everything is looked for again without it
         contacts.take_heat_out(problem, steps)
         base = first_fit(problem, spec)
         found = search.Search(problem, found.candidates, base, progress)
         final, without, contenders = found.run()
     hidden: list[unnamed.Hidden] = []
-    if unexplained(problem, final) and (beside := unnamed.search_beside(problem, found, final)):
+    if not swapped and unexplained(problem, final) and (beside := unnamed.search_beside(problem, found, final)):
         found, (final, without, contenders), hidden = beside
     declared_alone, base = base, found.base
     progress("held-out blocks")
@@ -318,7 +322,7 @@ def _diagnose(
         listed.append(entry)
 
     progress("what v / i says")
-    second = resistance.witness(problem, final)
+    second = None if swapped else resistance.witness(problem, final)
     listed += [resistance.entry(one, final, problem) for one in (second or {}).get("effects", [])]
 
     rho = statistics.autocorrelation([r / n for r, n in zip(final.residual, problem.noise, strict=True)], 1)
@@ -326,7 +330,7 @@ def _diagnose(
     warnings = [f"{Path(run.name).name}: {text}" for run in problem.runs for text in run.notes]
     if any(free.knot is not None for free in final.spec.free):
         warnings.append(f"model.toml: {DRIFT_LEFT_OUT}; log ambient_c to have it predicted")
-    warnings += plausibility.swapped(problem.runs)
+    warnings += swapped
     warnings += plausibility.coarse(runs)
     warnings += [text for run in problem.runs for text in plausibility.undriven_but_hottest(run)]
     if left_over:
@@ -357,7 +361,7 @@ def _diagnose(
         "unexplained": bool(left_over),
         "unknown_heat": heat.as_dict(),
         "runs_differ": runs_differ,
-        "unnamed": [one.as_dict() for one in hidden],
+        "unnamed": [one.as_dict() for one in hidden if one.cause.kind in unnamed.UNITS or abs(one.size) >= LEAST_PART],
         **(
             {"resistance": {key: one for key, one in second.items() if key not in ("effects", "contacts")}}
             if second

@@ -13,12 +13,11 @@ import pandas as pd
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from ..fit import statistics
+from ..fit.from_resistance import ROUNDING_V, ohm_of
 from ..fit.problem import Problem
 from ..fit.simulate import simulate_run
 from ..fit.spec import Fit
 
-DRIVEN_A = 0.2
-"""Currents from which v / i is a measurement of resistance, not of the sensor's offset."""
 REFERENCE_C = 20.0
 """Temperature of the declared resistances."""
 BELIEVED_RISE = 0.001
@@ -53,20 +52,18 @@ def readings(problem: Problem, fit: Fit) -> Readings | None:
         if run.current_a is None or run.voltage_v is None:
             continue
         traced = _as_measured(problem, fit, r)
-        driven = run.current_a > DRIVEN_A
         width = 1 + 2 * max(1, round(NEAR_S / float(np.median(np.diff(run.time_s)))))
-        ohm = np.where(driven, run.voltage_v / np.where(driven, run.current_a, 1.0), np.nan)
+        ohm = ohm_of(run)
         noise = statistics.noise_floor(ohm, run.starts)
         for k in range(run.springs):
             # on the way between the phases the model's part of austenite is no better than its temperature
             moving = maximum_filter1d(traced[:, k, 1], width) - minimum_filter1d(traced[:, k, 1], width) > SETTLED
             between = (traced[:, k, 1] > SETTLED) & (traced[:, k, 1] < 1.0 - SETTLED)
-            here = np.flatnonzero(driven[:, k] & ~moving & ~between)
+            here = np.flatnonzero(np.isfinite(ohm[:, k]) & ~moving & ~between)
             if len(here) >= 20 and np.isfinite(noise[k]):
                 n = len(here)
                 columns = (ohm[here, k], np.full(n, k), np.full(n, r), run.time_s[here])
-                # what a volt's and an ampere's last digit leave is noise as well
-                sigma = np.full(n, max(noise[k], 1e-4 * float(np.median(ohm[here, k]))))
+                sigma = np.hypot(noise[k], ROUNDING_V / run.current_a[here, k])
                 parts.append((*columns, traced[here, k, 1], traced[here, k, 0] - REFERENCE_C, sigma))
     if not parts:
         return None
