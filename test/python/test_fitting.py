@@ -221,9 +221,9 @@ def test_only_what_the_noise_of_a_first_reading_leaves_is_taken_away(make_log) -
     problem = Problem(Array(), [read_log(make_log(seed=9))])
     fit = diagnosis.first_fit(problem, base_spec(problem))
     response = problem.simulate(fit.spec, fit.values, 0, np.eye(9)[3]) - problem.simulate(fit.spec, fit.values, 0)
-    rest = problem.without_starts(fit.residual)[0]
+    rest = problem.without_errors(fit.residual)[0]
     for off, left in ((0.6, 0.0), (6.0, 6.0 - 0.9)):  # K: twice the noise, twenty times the noise
-        moved = problem.without_starts([fit.residual[0] + off * response])[0]
+        moved = problem.without_errors([fit.residual[0] + off * response])[0]
         apart = np.nansum((moved - rest) * response) / np.nansum(response**2)
         assert apart == pytest.approx(left, abs=0.45)
     untouched = fit.residual[0][300:] - rest[300:]

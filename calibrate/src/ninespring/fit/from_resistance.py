@@ -21,6 +21,7 @@ from ..logs.run import Run
 from ..models import Array, Model
 from .declared import base_spec
 from .problem import _BAD, Problem
+from .rounding import ROUNDING_V, steady
 from .simulate import simulate_run
 from .spec import Fit, Free, Spec
 
@@ -28,10 +29,6 @@ if TYPE_CHECKING:
     from ..search.certainty import Witness
     from ..search.search import Search
 
-DRIVEN_A = 0.2
-"""Currents from which v / i is a measurement of resistance, not of the sensor's offset."""
-ROUNDING_V = 4e-3 / math.sqrt(12.0)
-"""What rounding leaves in a voltage of the board, rms: its sensors step by 4 mV, and where the current is steady so is the error."""
 NOISE_V = 2.0 * ROUNDING_V
 """What a voltage is told to, at best: rounding that stays the same is then never structure of half the noise."""
 WEAK_EVERY = 10
@@ -51,20 +48,6 @@ SCALE = (
 def has_none(runs: Sequence[Run]) -> bool:
     """Return whether these runs have currents and voltages but no temperature at all."""
     return all(run.voltage_v is not None and not np.isfinite(run.temperature_c).any() for run in runs)
-
-
-def steady(run: Run) -> np.ndarray:
-    """Return where v / i of a run is a resistance, (rows, springs): driven, by a current that does not change in the row.
-
-    A row's current is a mean and its voltage is weighted by it. Half a row at another current, off by some share of the
-    mean, makes their ratio wrong by the square of half that share at most: less than rounding does, or the row is left out.
-    """
-    assert run.current_a is not None and run.voltage_v is not None
-    change = np.abs(np.diff(run.current_a, axis=0, prepend=run.current_a[:1], append=run.current_a[-1:]))
-    change = np.maximum(change[1:], change[:-1])
-    driven = run.current_a > DRIVEN_A
-    share = change / np.where(driven, 2.0 * run.current_a, 1.0)
-    return driven & (run.voltage_v * share**2 < ROUNDING_V)
 
 
 def ohm_of(run: Run) -> np.ndarray:

@@ -22,6 +22,7 @@ from .. import native
 from ..logs.run import Run
 from ..models import Array
 from . import statistics
+from .rounding import power_errors
 from .simulate import array_parameters, simulate_run
 from .spec import AMBIENT_OFFSET, DRIVE_GAIN, RUN_DRIVE, SENSOR_OFFSET, Fit, Spec
 
@@ -79,6 +80,7 @@ class Problem:
         self.count = int(sum(mask.sum() for mask in self.mask))
         self.basis: list[np.ndarray | None] = [None] * len(self.runs)
         self.start_response: list[np.ndarray | None] = [None] * len(self.runs)
+        self.power_response: list[np.ndarray | None] = [None] * len(self.runs)
         self.unnamed: np.ndarray | None = None
         self.heat: list[np.ndarray] | None = None
         self._pool = concurrent.futures.ThreadPoolExecutor(WORKERS) if WORKERS > 1 else None
@@ -181,12 +183,15 @@ class Problem:
         values: Sequence[float],
         run_index: int,
         start_offset: np.ndarray | None = None,
+        power_w: np.ndarray | None = None,
     ) -> np.ndarray:
-        """Return what the sensors of one run should show, (rows, springs), degC."""
+        """Return what the sensors of one run should show, (rows, springs), degC; with so much more power than was logged."""
         with self._count_lock:
             self.simulations += 1
         by_key = {f.key: float(v) for f, v in zip(spec.free, values, strict=True)}
         run = self.heated(self.run_of(run_index, by_key), run_index)
+        if power_w is not None:
+            run = replace(run, drive=run.drive + power_w)
         try:
             plant = self.plant_for(spec, values, run_index)
             shown = simulate_run(plant, run, self.ambient_of(run_index, by_key), by_key, start_offset)
@@ -314,19 +319,33 @@ class Problem:
                 self.basis[r] = u * np.sqrt(1.0 - 1.0 / np.sqrt(1.0 + size**2))
                 self.start_response[r] = np.column_stack(columns)
 
-    def without_starts(self, residual: Sequence[np.ndarray]) -> list[np.ndarray]:
-        """Return residuals less what errors of the first readings, as large as their noise makes them, leave in them.
+    def learn_power(self, spec: Spec, values: Sequence[float]) -> None:
+        """Find what rounding of the board's voltages leaves in each run: to keep it out of what is judged."""
+        for r, run in enumerate(self.runs):
+            if errors := power_errors(run):
+                base, *shown = self.each(
+                    lambda job: self.simulate(spec, values, *job), [(r, None, more) for more in (None, *errors)]
+                )
+                self.power_response[r] = np.column_stack([((one - base) / self.noise[r])[self.mask[r]] for one in shown])
 
-        The errors are estimated with the noise as their spread and cut at 3 of it: a start that is further off is
-        structure like any other.
+    def without_errors(self, residual: Sequence[np.ndarray]) -> list[np.ndarray]:
+        """Return residuals less what errors of the first readings and of the board's voltages leave in them.
+
+        They are estimated with the noise, or what rounding leaves, as their spread and cut at 3 of the noise and at half a
+        step: what is further off is structure like any other.
         """
         out = []
-        for left, mask, noise, response in zip(residual, self.mask, self.noise, self.start_response, strict=True):
+        for left, mask, noise, *known in zip(
+            residual, self.mask, self.noise, self.start_response, self.power_response, strict=True
+        ):
             left = left.copy()
-            if response is not None:
+            of_each = [(one, most) for one, most in zip(known, (3.0, math.sqrt(3.0)), strict=True) if one is not None]
+            if of_each:
+                response = np.column_stack([one for one, _ in of_each])
+                most = np.concatenate([np.full(one.shape[1], limit) for one, limit in of_each])
                 scaled = (left / noise)[mask]
                 normal = response.T @ response + np.eye(response.shape[1])
-                size = np.clip(np.linalg.solve(normal, response.T @ scaled), -3.0, 3.0)
+                size = np.clip(np.linalg.solve(normal, response.T @ scaled), -most, most)
                 left[mask] -= (response @ size) * np.broadcast_to(noise, mask.shape)[mask]
             out.append(left)
         return out
@@ -570,6 +589,13 @@ class Problem:
             if fit.factor < 1.5:
                 ratio = np.ones_like(ratio)
             covariance[np.ix_(used, used)] = white * np.outer(ratio, ratio)
+            begin = 0
+            for mask, response in zip(self.mask, self.power_response, strict=True):
+                end = begin + int(mask.sum())
+                if response is not None:
+                    moved = inner @ (jac[begin:end, used].T @ response)
+                    covariance[np.ix_(used, used)] += moved @ moved.T
+                begin = end
         fit.covariance = covariance
 
     def longest_lag(self) -> int:

@@ -233,6 +233,7 @@ def read_log(
         layers=_layers(table, count, path),
         load_n=load,
         notes=notes,
+        of_board=table.keys.get("version", "").startswith("ninespring "),
     )
     if mode == "command":
         run.drive = np.clip(run.drive, 0.0, 1.0)

@@ -33,6 +33,8 @@ class Run:
     load_n: np.ndarray | None = None
     """(n, k), N, or None where the log has none; row r holds until time r + 1."""
     notes: list[str] = field(default_factory=list)
+    of_board: bool = False
+    """Currents and voltages are a board's: its voltages step."""
     warm: bool = False
     """The run begins warm and steady: hidden heat is in balance with the first inputs."""
     starts: list[int] = field(default_factory=lambda: [0])

@@ -87,7 +87,7 @@ def witness(problem: Problem, fit: Fit, effect: str, without: Fit, flexible: boo
     values = [fit.value(free.key) for free in off.free]
     bare = problem.predictions(off, values)
     shown = problem.predictions(fit.spec, fit.values)
-    left = problem.without_starts(fit.residual)
+    left = problem.without_errors(fit.residual)
     factor = statistics.correlation_factor(
         [one / noise for one, noise in zip(left, problem.noise, strict=True)], problem.longest_lag()
     )

@@ -88,7 +88,7 @@ def excess(problem: Problem, fit: Fit) -> float:
 def structure_by_width(problem: Problem, fit: Fit) -> np.ndarray:
     """Return pooled structure (mean square, noise units) at block widths of 4, 12 and 40 rows."""
     out = []
-    residual = problem.without_starts(fit.residual)
+    residual = problem.without_errors(fit.residual)
     for width in (4, 12, 40):
         part = statistics.structure(residual, problem.noise, width, [run.starts for run in problem.runs])
         weight = np.array([mask.sum(axis=0) for mask in problem.mask], dtype=float)
@@ -110,7 +110,7 @@ def unexplained(problem: Problem, fit: Fit) -> bool:
     pooled = structure_by_width(problem, fit)
     if math.sqrt(max(0.0, float(pooled.max()))) > UNEXPLAINED:
         return True
-    residual = problem.without_starts(fit.residual)
+    residual = problem.without_errors(fit.residual)
     for width in (12, 40):
         local = statistics.structure(residual, problem.noise, width, [run.starts for run in problem.runs])
         blocks = np.array([mask.sum(axis=0) for mask in problem.mask]) / width

@@ -395,7 +395,7 @@ def find(
     used = jac[:, np.linalg.norm(jac, axis=0) > 1e-6]
     taken = [used, *_starts(problem), *([] if problem.unnamed is None else [problem.unnamed])]
     basis = np.linalg.qr(_thinned(problem, np.column_stack(taken)))[0]
-    left = _thinned(problem, np.concatenate(problem.scaled(problem.without_starts(fit.residual)))[:, None])[:, 0]
+    left = _thinned(problem, np.concatenate(problem.scaled(problem.without_errors(fit.residual)))[:, None])[:, 0]
     left = left - basis @ (basis.T @ left)
     typical = typical_power(problem, fit)
     found = list(already)
@@ -473,7 +473,7 @@ def _with_sizes(problem: Problem, fit: Fit, hidden: Sequence[Hidden]) -> list[Hi
     """Return unnamed causes with the sizes that they have beside a fit, heat to be simulated with them."""
     problem.leave_out(None, problem.heat)
     columns = np.column_stack([one.column for one in hidden])
-    left = np.concatenate(problem.scaled(problem.without_starts(problem.evaluate(fit).residual)))
+    left = np.concatenate(problem.scaled(problem.without_errors(problem.evaluate(fit).residual)))
     size, out = _least_squares(columns.T @ columns, columns.T @ left)[0], []
     for one in hidden:
         own, size = np.split(size, [one.column.shape[1]])
@@ -521,7 +521,7 @@ def weighed(problem: Problem, fit: Fit, hidden: Sequence[Hidden]) -> list[tuple[
     columns = np.column_stack([one.column for one in hidden])
     matrix = np.column_stack([columns, slopes])
     scale = np.maximum(np.linalg.norm(matrix, axis=0), 1e-9)
-    left = np.concatenate(problem.scaled(problem.without_starts(bare.residual)))
+    left = np.concatenate(problem.scaled(problem.without_errors(bare.residual)))
     for one in hidden:
         left += 0.0 if one.inside is None else one.column @ one.inside
     inverse = np.linalg.pinv((matrix / scale).T @ (matrix / scale), rcond=1e-10)

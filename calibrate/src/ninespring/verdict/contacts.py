@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..fit.from_resistance import DRIVEN_A
+from ..fit.rounding import DRIVEN_A
 from ..fit.problem import Problem
 from .readings import SEEN, Linear, Readings, nats_of, solve
 

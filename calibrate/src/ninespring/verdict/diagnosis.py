@@ -257,6 +257,7 @@ def _diagnose(
         base = first_fit(problem, spec)
         found = search.Search(problem, found.candidates, base, progress)
         final, without, contenders = found.run()
+    problem.learn_power(final.spec, final.values)
     hidden: list[unnamed.Hidden] = []
     if not swapped and unexplained(problem, final) and (beside := unnamed.search_beside(problem, found, final)):
         found, (final, without, contenders), hidden = beside
@@ -433,4 +434,5 @@ def fit_effects(
             best = max(options, key=lambda k: screen.forecast([k])[0])
             progress(f"fitting {effect}")
             fit = found.refit(fit, [screen.candidates[best]], [screen.forecast([best])[1].get(best, 1.0)])
+        problem.learn_power(fit.spec, fit.values)
         return problem, _finish(problem, fit), base

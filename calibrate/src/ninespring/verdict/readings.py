@@ -13,8 +13,9 @@ import pandas as pd
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from ..fit import statistics
-from ..fit.from_resistance import ROUNDING_V, ohm_of
+from ..fit.from_resistance import ohm_of
 from ..fit.problem import Problem
+from ..fit.rounding import ROUNDING_V
 from ..fit.simulate import simulate_run
 from ..fit.spec import Fit
 

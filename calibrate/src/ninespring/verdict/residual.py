@@ -21,7 +21,7 @@ def depends_on(problem: Problem, fit: Fit) -> tuple[list[str], str]:
     structure = excess(problem, fit)
     width = 10
     blocks, owners, times, runs_of = [], [], [], []
-    residual = problem.without_starts(fit.residual)
+    residual = problem.without_errors(fit.residual)
     for r, (run, left, noise) in enumerate(zip(problem.runs, residual, problem.noise, strict=True)):
         mean, _, begins = statistics.block_means(left / noise, width, run.starts)
         blocks.append(mean)

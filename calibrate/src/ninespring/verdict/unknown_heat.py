@@ -166,7 +166,7 @@ def _pieces_of(problem: Problem, fit: Fit, r: int, slopes: np.ndarray, factor: f
     spread_out = np.zeros((*mask.shape, used.shape[1]))
     spread_out[mask] = used
     basis = np.linalg.qr(thin(spread_out))[0] if used.shape[1] else np.zeros((-(-rows // THIN) * springs, 0))
-    left = thinned(problem.without_starts(fit.residual)[r][None])[:, 0].astype(float)
+    left = thinned(problem.without_errors(fit.residual)[r][None])[:, 0].astype(float)
     left = left - basis @ (basis.T @ left)
     steps = {one: columns_of(*one) for one in kinds}
     grams = {}
