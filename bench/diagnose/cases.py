@@ -13,6 +13,8 @@ DURATION_S = 900
 NOISE_C = 0.3
 CONVERSIONS = 3
 """Of a board's sensor in one row."""
+BOARD = "# version: ninespring 0.1.0 mega2560, sensors integer\n"
+"""What a board's log begins with."""
 DEVELOPMENT_SEEDS = range(1000)
 """Seeds that the diagnosis was developed on. Never reported."""
 REPORTING_SEEDS = range(300_000, 400_000)
@@ -184,7 +186,7 @@ def write_logs(case: Case, folder: Path) -> tuple[list[Path], Path, np.ndarray]:
             np.column_stack(columns),
             delimiter=",",
             fmt="%.5g",
-            header=",".join(names),
+            header=(BOARD if case.sensors else "") + ",".join(names),
             comments="",
         )
         paths.append(path)

@@ -141,6 +141,31 @@ def test_a_drive_is_measured_as_it_was() -> None:
     assert weak.held < 0.1 and weak.heating_s > 150
 
 
+@pytest.mark.parametrize(
+    ("later_s", "more", "refused"),
+    [
+        ([9, 8, 9, 8, 9], 0.0, True),  # each time
+        ([9, 3, 9, 8, 9], 0.0, False),  # which spring is heated first is chance
+        ([9, 8, 9, 8, 9], 0.027, False),  # what comes later does more afterwards
+        ([60, 60, 60, 60, 60], 0.027, True),  # not enough of it
+    ],
+)
+def test_heating_takes_longer_where_it_does_each_time_and_nothing_makes_up_for_it(
+    cold: Path, monkeypatch: pytest.MonkeyPatch, later_s: list[int], more: float, refused: bool
+) -> None:
+    on_s, later = 250.0, iter(2 * later_s)
+
+    def drive_(plant: native.Plant, lines: str, pattern: np.ndarray) -> drive.Drive:
+        heating_s = 70.0 + (next(later) if lines else 0)
+        held = 0.97 + (more if lines else 0.0)
+        return drive.Drive(held, heating_s, 103.0, 110.0, 0.0, held * (1.0 - 0.5 * heating_s / on_s))
+
+    monkeypatch.setattr(drive, "drive", drive_)
+    worse, rows = drive.compare(read_model(cold), "", "$loss_w_per_k=0.006")
+    assert [one.split()[0] for one in worse] == ["heating"] * refused
+    assert len(rows) == 2 * 5 * len(drive.WORSE)
+
+
 def test_the_chips_error_is_told_before_and_after_on_a_log_that_was_not_fitted(make_log, tmp_path: Path) -> None:
     other = {"spring_mismatch": {"loss_scale[5]": 1.3}}
     fitted, fresh = make_log("fitted.csv", effects=other, seed=1), make_log("fresh.csv", effects=other, seed=2)

@@ -12,7 +12,9 @@ from ninespring import effects, native
 from ninespring.fit import statistics
 from ninespring.fit.declared import base_spec
 from ninespring.fit.problem import FOLDS, Problem, fold_of_rows
+from ninespring.fit.spec import Fit
 from ninespring.logs import read_log
+from ninespring.logs.run import Run
 from ninespring.models import Array
 from ninespring.search import evidence, search
 from ninespring.verdict import diagnosis
@@ -228,3 +230,41 @@ def test_only_what_the_noise_of_a_first_reading_leaves_is_taken_away(make_log) -
         assert apart == pytest.approx(left, abs=0.45)
     untouched = fit.residual[0][300:] - rest[300:]
     assert np.nanmax(np.abs(untouched)) < 0.03
+
+
+def test_what_rounding_of_a_boards_voltages_leaves_is_no_structure_and_heat_beside_it_is(make_log) -> None:
+    """Voltages that step by 4 mV tell the power to 1 % or so: the same error as long as a current stays the same."""
+    plant = native.Plant(3, 3)
+
+    def logged(name: str, of_board: bool, to_spring_9: float) -> Run:
+        def change(columns: dict[str, np.ndarray]) -> None:
+            power = np.column_stack([columns[f"i{k}_a"] * columns[f"v{k}_v"] for k in range(1, 10)])
+            shown = []
+            for share in (0.0, to_spring_9):
+                plant.reset()
+                given = power + share * np.outer(power[:, 0], np.arange(9) == 8)
+                time_s = np.arange(float(len(power)))
+                shown.append(plant.simulate(time_s, native.POWER, given, columns["fan"], columns["ambient_c"]))
+            for k in range(1, 10):
+                columns[f"t{k}_c"] = columns[f"t{k}_c"] + (shown[1] - shown[0])[:, k - 1]
+                columns[f"v{k}_v"] = 4e-3 * np.round(columns[f"v{k}_v"] / 4e-3)
+
+        path = make_log(name, seconds=900, noise=0.1, change=change)
+        if of_board:
+            path.write_text("# version: ninespring 0.1.0 mega2560, sensors integer\n" + path.read_text())
+        return read_log(path)
+
+    def left_over(run: Run) -> tuple[bool, Fit]:
+        problem, fit, _ = diagnosis.fit_effects(Array(), [run], [])
+        return evidence.unexplained(problem, fit), fit
+
+    board, by_board = left_over(logged("board.csv", True, 0.0))
+    meter, by_meter = left_over(logged("meter.csv", False, 0.0))
+    assert meter and not board
+    assert left_over(logged("heated.csv", True, 0.03))[0]
+    # the numbers are the same, and known as well as the power is
+    assert by_board.values == pytest.approx(by_meter.values)
+    off = np.log(by_board.value("loss_w_per_k") / plant.get("loss_w_per_k"))
+    at = [free.key for free in by_board.spec.free].index("loss_w_per_k")
+    few, many = (np.sqrt(one.covariance[at, at]) for one in (by_meter, by_board))
+    assert many > 1.5 * few and abs(off) < 3.0 * many < 0.01

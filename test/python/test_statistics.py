@@ -36,6 +36,14 @@ def test_structure_is_zero_for_white_noise_and_its_variance_otherwise() -> None:
     starts = [[0]]
     assert abs(np.mean(statistics.structure([white], noise, 12, starts))) < 0.02
     assert np.mean(statistics.structure([white + wave], noise, 12, starts)) == pytest.approx(1.0, rel=0.1)
+    # read between two readings of another clock: neighbours share their noise, and that is none either
+    for part in (0.25, 0.5):
+        between = (1 - part) * white[1:] + part * white[:-1]
+        own = [statistics.noise_floor(between)]
+        for width in (4, 12, 40):
+            assert abs(np.mean(statistics.structure([between], own, width, starts))) < 0.03
+        seen = np.mean(statistics.structure([between + wave[1:]], own, 12, starts)) * np.mean(own[0]) ** 2
+        assert seen == pytest.approx(0.09, rel=0.1)
 
 
 def test_a_spike_is_found_and_a_step_is_not() -> None:

@@ -58,6 +58,7 @@ def test_the_page_is_walked_to_its_end(tmp_path: Path) -> None:
             simulated.terminate()
     found = json.loads((tmp_path / "diagnosis" / "diagnosis.json").read_text())
     assert {one["name"] for one in found["effects"]} == {"edge_loss", "latent_heat"}
+    assert not found["unexplained"], found["residual"]["note"]
     before, after = (float(one) for one in re.findall(r"([\d.]+) K", said["verify"]))
     assert before > 3.0 and after < 0.3  # noise is 0.1 K
     on_board, again = (float(one) for one in re.findall(r"([\d.]+) K", said["verify --port"]))

@@ -12,7 +12,8 @@ from ..models import Model
 from .settings import best_plant, draw
 
 DRAWS = 4
-"""Further arrays, drawn from the uncertainty of the model's numbers."""
+"""Further arrays, drawn from the uncertainty of the model's numbers. Which spring is heated before which is chaotic, by seconds:
+by chance alone all of five get slower once in 32 times."""
 TRANSFORMED = 0.9
 """Austenite from which a spring counts as heated."""
 ENOUGH_K = 12.0
@@ -44,6 +45,8 @@ class Drive:
     """What a spring that is heated through may reach."""
     undriven: float
     """Highest austenite of a spring that is off."""
+    done: float
+    """Mean austenite of the driven springs over all the time that they are on."""
 
 
 def patterns(springs: int) -> list[np.ndarray]:
@@ -71,23 +74,24 @@ def drive(plant: native.Plant, lines: str, pattern: np.ndarray) -> Drive:
         float(temperature.max()),
         plant.get("austenite_finish_c") + ENOUGH_K,
         float(off.max()) if off.size else 0.0,
+        float(austenite[:on, pattern].mean()),
     )
 
 
 def worse_than(old: Drive, new: Drive) -> list[str]:
     """Return the measures in which one drive is worse than another.
 
-    A spring that is heated further takes longer and gets hotter: that is no fault of settings that hold more of it. Nor is it
-    one to heat a spring through that was not quite.
+    A spring that is heated further takes longer and gets hotter: that is no fault of settings that hold more of it, and heating
+    later none of those with which the springs do no less in all. Nor is it one to heat a spring through that was not quite.
     """
     out = []
-    holds_more = new.held - old.held > WORSE["held"][0]
+    excused = {"hottest_c": new.held - old.held > WORSE["held"][0], "heating_s": new.done >= old.done}
     for measure, (limit, _) in WORSE.items():
         a, b = getattr(old, measure), getattr(new, measure)
         if measure == "hottest_c":
             a = max(a, old.enough_c)
         more = a - b if measure == "held" else b - a
-        if measure in ("heating_s", "hottest_c") and holds_more:
+        if excused.get(measure):
             continue
         if more > max(limit, 0.1 * a * (measure == "heating_s")):
             out.append(measure)
@@ -100,7 +104,7 @@ def compare(
     """Return what gets worse with the new settings, in words, and every measure of every drive.
 
     Tried on the array as it is best known, and on others drawn from the model's uncertainty; worse is what is worse on
-    the first, or on most of all of them.
+    the first, or on most of all of them. Heating takes longer where it does on every one.
     """
     rng = np.random.default_rng(0)
     plants = [best_plant(model), *(best_plant(model, draw(model, rng)) for _ in range(DRAWS))]
@@ -117,7 +121,7 @@ def compare(
             values = [(getattr(a, measure), getattr(b, measure)) for a, b in pairs]
             worse = [measure in one for one in judged]
             rows += [{"array": k + 1, "measure": measure, "old": a, "new": b} for k, (a, b) in enumerate(values)]
-            if worse[0] or sum(worse) > len(worse) / 2:
+            if all(worse) or (measure != "heating_s" and (worse[0] or sum(worse) > len(worse) / 2)):
                 a, b = values[0] if worse[0] else values[worse.index(True)]
                 said.append(words.format(old=a, new=b))
         best = pairs[0]

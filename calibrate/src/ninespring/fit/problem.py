@@ -326,7 +326,9 @@ class Problem:
                 base, *shown = self.each(
                     lambda job: self.simulate(spec, values, *job), [(r, None, more) for more in (None, *errors)]
                 )
-                self.power_response[r] = np.column_stack([((one - base) / self.noise[r])[self.mask[r]] for one in shown])
+                self.power_response[r] = np.column_stack(
+                    [((one - base) / self.noise[r])[self.mask[r]] for one in shown]
+                )
 
     def without_errors(self, residual: Sequence[np.ndarray]) -> list[np.ndarray]:
         """Return residuals less what errors of the first readings and of the board's voltages leave in them.

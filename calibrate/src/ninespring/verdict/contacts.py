@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..fit.rounding import DRIVEN_A
 from ..fit.problem import Problem
+from ..fit.rounding import DRIVEN_A
 from .readings import SEEN, Linear, Readings, nats_of, solve
 
 LEAST_NATS = 3.0

@@ -79,6 +79,7 @@ def first_fit(problem: Problem, spec: Spec) -> Fit:
     noise = [statistics.noise_floor(left, run.starts) for left, run in zip(fit.residual, problem.runs, strict=True)]
     problem.noise = [np.fmin(a, b) for a, b in zip(problem.noise, noise, strict=True)]
     problem._tidy_noise()
+    problem.learn_power(fit.spec, fit.values)
     return problem.fit(spec, fit.as_dict(), tolerance=1e-5, errors=True)
 
 
