@@ -95,7 +95,12 @@ class Resistances(Problem):
         return 1e3 * run.current_a * (ohm - self.cold_ohm)
 
     def simulate(
-        self, spec: Spec, values: Sequence[float], run_index: int, start_offset: np.ndarray | None = None
+        self,
+        spec: Spec,
+        values: Sequence[float],
+        run_index: int,
+        start_offset: np.ndarray | None = None,
+        power_w: np.ndarray | None = None,
     ) -> np.ndarray:
         """Return what the springs of one run should show, (rows, springs), mV; from cold, at the logged ambient."""
         run = self.boards[run_index]

@@ -14,6 +14,8 @@ STEP_V = 4e-3
 """Of the board's sensors."""
 ROUNDING_V = STEP_V / math.sqrt(12.0)
 """What rounding leaves in a voltage of the board, rms: where the current is steady so is the error."""
+MOST = 300
+"""So many errors of a run are followed, the largest: each is a simulation."""
 
 
 def steady(run: Run) -> np.ndarray:
@@ -43,4 +45,4 @@ def power_errors(run: Run) -> list[np.ndarray]:
             one = np.zeros(run.drive.shape)
             one[begin:end, k] = ROUNDING_V * run.current_a[begin:end, k]
             out.append(one)
-    return out
+    return sorted(out, key=lambda one: -float(one.sum()))[:MOST]
