@@ -419,7 +419,8 @@ static void watch_away(drive_policy_t *policy, const thermal_model_t *model, uin
     const float band = 1.0f - THERE + (is_full(level_permille) ? 0.0f : LEVEL_BAND);
     const spring_belief_t *b = &policy->estimator.spring[k];
     const bool there = s->stage == DRIVE_POLICY_STAGE_HOLD && spring_estimator_sees(b) &&
-                       !b->unproven && fabsf(phase_of(policy, model, k) - level) < band;
+                       spring_estimator_knows(b) && !b->unproven &&
+                       fabsf(phase_of(policy, model, k) - level) < band;
     spring_away_turn(&s->away, there);
 }
 

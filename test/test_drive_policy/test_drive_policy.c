@@ -175,6 +175,25 @@ static void spring_that_cannot_get_there_is_said_to_be_away(void)
     TEST_ASSERT_EQUAL_UINT16(0, drive_policy_limits(&policy, 0));
 }
 
+/* Held, and nobody knows how near to its transformation: who knows whether it is there. */
+static void spring_whose_distance_is_lost_is_said_to_be_away(void)
+{
+    begin_cold(1, 2);
+    level[0] = 1000;
+    (void)run(120.0);
+    TEST_ASSERT_BITS_LOW(DRIVE_POLICY_LIMIT_AWAY, drive_policy_limits(&policy, 0));
+    for (double s = 0.0; s < 16.0; s += TICK_S) {
+        policy.estimator.spring[0].variance_k2 = 81.0f;
+        (void)tick();
+    }
+    TEST_ASSERT_BITS_HIGH(DRIVE_POLICY_LIMIT_AWAY, drive_policy_limits(&policy, 0));
+    for (double s = 0.0; s < 1.0; s += TICK_S) {
+        policy.estimator.spring[0].variance_k2 = 49.0f; /* the near miss */
+        (void)tick();
+    }
+    TEST_ASSERT_BITS_LOW(DRIVE_POLICY_LIMIT_AWAY, drive_policy_limits(&policy, 0));
+}
+
 /* Heatings of spring 1 that begin while each of them is lost again at once. */
 static unsigned heatings_in_vain(double seconds)
 {
@@ -563,6 +582,7 @@ int main(void)
     RUN_TEST(level_is_held);
     RUN_TEST(levels_one_after_the_other_are_held);
     RUN_TEST(spring_that_cannot_get_there_is_said_to_be_away);
+    RUN_TEST(spring_whose_distance_is_lost_is_said_to_be_away);
     RUN_TEST(tries_are_bounded_and_then_it_is_said_to_be_away);
     RUN_TEST(tries_that_bring_it_back_are_not_counted);
     RUN_TEST(two_springs_hold_by_the_hand_computed_inverse);

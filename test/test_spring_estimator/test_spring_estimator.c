@@ -630,6 +630,7 @@ int main(void)
     RUN_TEST(offset_is_learnt_where_the_current_drops);
     RUN_TEST(phase_lost_on_the_way_to_the_hold_is_counted);
     RUN_TEST(slope_is_told_on_the_way_down);
+    RUN_TEST(coefficient_is_no_loss_above_the_transformation);
     RUN_TEST(contact_is_not_taken_for_phase);
     RUN_TEST(contact_that_comes_and_goes_is_blind_for_a_while);
     RUN_TEST(jump_in_the_middle_of_a_turn_is_a_jump);
@@ -643,6 +644,7 @@ int main(void)
     RUN_TEST(loss_too_small_to_tell_stays_in_doubt);
     RUN_TEST(loss_on_the_way_down_from_a_heating_is_seen_at_rest);
     RUN_TEST(heating_for_a_loss_that_was_none_ends);
+    RUN_TEST(loss_that_was_a_sensor_is_taken_back_when_said);
     RUN_TEST(restored_spring_is_not_overheated);
     RUN_TEST(slope_that_no_metal_has_is_not_learnt);
     RUN_TEST(heating_that_a_limit_ends_is_doubted);
