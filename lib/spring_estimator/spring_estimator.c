@@ -437,7 +437,8 @@ void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, 
                   thermal_model_temperature_c7(model, k) <
                       thermal_model_transformation(model, k).austenite_finish_c7;
     if (full && b->possible != SPRING_PHASE_AUSTENITE) {
-        b->blind = b->blind || b->possible == SPRING_PHASE_MARTENSITE;
+        b->blind = b->blind || b->possible == SPRING_PHASE_MARTENSITE ||
+                   (!lacks && b->heating && b->onset && !spring_has_grown(b));
         b->possible = SPRING_PHASE_AUSTENITE;
         spring_set_temperature(model, k, now_c, SPRING_PHASE_AUSTENITE);
     } else if (!full && b->possible == SPRING_PHASE_AUSTENITE) {
