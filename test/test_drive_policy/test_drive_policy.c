@@ -454,6 +454,21 @@ static void spring_just_released_is_no_false_actuation(void)
     }
 }
 
+/* Its power is gone: it falls fast, then, as it gives off its latent heat, slowly. */
+static void spring_just_released_is_none_while_it_transforms_either(void)
+{
+    begin_cold(3, 3);
+    believe(1, 80, true);
+    level[0] = level[1] = 1000;
+    decisions(2u * TURN_TICKS);
+    level[1] = 0;
+    for (unsigned n = 0; n < 8u * TURN_TICKS; n++) {
+        policy.spring[1].rise_k_per_s = n < 2u * TURN_TICKS ? -8.0f : -0.2f;
+        (void)decide();
+        TEST_ASSERT_BITS_LOW(DRIVE_POLICY_LIMIT_UNDRIVEN, drive_policy_limits(&policy, 0));
+    }
+}
+
 static void spring_released_from_the_other_policy_is_none_either(void)
 {
     parameters.policy = DRIVE_POLICY_OPEN;
@@ -596,6 +611,7 @@ int main(void)
     RUN_TEST(limited_heating_ends_where_it_may_be_hot_enough);
     RUN_TEST(undriven_spring_derates_its_neighbours_only);
     RUN_TEST(spring_just_released_is_no_false_actuation);
+    RUN_TEST(spring_just_released_is_none_while_it_transforms_either);
     RUN_TEST(spring_released_from_the_other_policy_is_none_either);
     RUN_TEST(what_was_driven_open_and_is_off_again_trips_no_neighbour);
     RUN_TEST(overload_takes_the_excess_away_in_time);
