@@ -108,7 +108,8 @@ static void score_driven(score_t *score, score_spring_t *spring, const world_t *
     }
     bool settled = since_s >= SCORE_SETTLED_S && !isnan(spring->reached_s);
     spring->settled_hold_s += settled ? SAMPLE_S : 0.0;
-    bool heats = world_current_a(world, k) > SCORE_REHEAT_A;
+    spring->mean_a += (world_current_a(world, k) - spring->mean_a) * SAMPLE_S;
+    bool heats = spring->mean_a > (spring->heats ? SCORE_REHEATED_A : SCORE_REHEAT_A);
     spring->reheats += settled && heats && !spring->heats;
     spring->heats = heats;
 }

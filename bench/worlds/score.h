@@ -16,7 +16,8 @@
 #define SCORE_UNDRIVEN     0.05  /* austenite that an undriven spring may have */
 #define SCORE_HOLD_S       300.0 /* from then on after a start a spring counts as held */
 #define SCORE_SETTLED_S    600.0 /* from then on reheats count */
-#define SCORE_REHEAT_A     2.2   /* a reheat begins: no hold needs so much */
+#define SCORE_REHEAT_A     2.2   /* mean of a second, a reheat begins: no hold needs so much */
+#define SCORE_REHEATED_A   1.9   /* and ends: further down than a dither takes that mean */
 #define SCORE_REPORT_GAP_S 1.0   /* a report still stands over shorter gaps */
 
 typedef struct {
@@ -33,6 +34,7 @@ typedef struct {
     bool was_low;          /* undriven: it has been below SCORE_UNDRIVEN */
     double undriven_most;  /* austenite, since then */
     double hold_c, hold_s; /* sum of mean temperature times time held, and that time */
+    double mean_a;         /* current, over the last second */
     bool heats;            /* with the current of a heating */
     bool fault;            /* of its own, now */
     int reheats;

@@ -94,7 +94,6 @@ bool drive_policy_init(drive_policy_t *policy, const drive_policy_parameters_t *
     policy->walks = 0;
     for (uint8_t k = 0; k < policy->springs; k++) {
         policy->spring[k].ceiling_ma = parameters->boost_current_ma;
-        policy->spring[k].last_c7 = thermal_model_temperature_c7(model, k);
     }
     return true;
 }
@@ -334,7 +333,9 @@ static float severity(const drive_policy_t *policy, const thermal_model_t *model
     const float c = now_c(model, k);
     const float rise_k = c - spring_c(thermal_model_ambient_c7(model));
     const float highest_c = c + UNDRIVEN_SDS * (spring_estimator_sd_k(b) + NEIGHBOUR_SD * rise_k);
-    const float severe = derating_severity(highest_c, s->rise_k_per_s, limit_c);
+    /* as it is released it falls faster than it is going to: that does not end it */
+    const float rise_k_per_s = s->released ? fmaxf(s->rise_k_per_s, 0.0f) : s->rise_k_per_s;
+    const float severe = derating_severity(highest_c, rise_k_per_s, limit_c);
     if (severe <= 0.0f) {
         s->released = false;
     }
@@ -419,7 +420,8 @@ static void watch_away(drive_policy_t *policy, const thermal_model_t *model, uin
     const float band = 1.0f - THERE + (is_full(level_permille) ? 0.0f : LEVEL_BAND);
     const spring_belief_t *b = &policy->estimator.spring[k];
     const bool there = s->stage == DRIVE_POLICY_STAGE_HOLD && spring_estimator_sees(b) &&
-                       !b->unproven && fabsf(phase_of(policy, model, k) - level) < band;
+                       spring_estimator_knows(b) && !b->unproven &&
+                       fabsf(phase_of(policy, model, k) - level) < band;
     spring_away_turn(&s->away, there);
 }
 
@@ -457,11 +459,10 @@ static void update(drive_policy_t *policy, const drive_policy_input_t *input, ui
     drive_policy_spring_t *s = &policy->spring[k];
     const uint16_t level_permille = input->level_permille[k];
     const bool driven = level_permille != 0 && input->allowed[k];
+    const float before_c = policy->estimator.spring[k].last_c;
     spring_estimator_update(&policy->estimator, input->model, k);
-    const int16_t c7 = thermal_model_temperature_c7(input->model, k);
-    const float rise_k_per_s = (float)(c7 - s->last_c7) / (128.0f * TURN_S);
+    const float rise_k_per_s = (now_c(input->model, k) - before_c) * (1.0f / TURN_S);
     s->rise_k_per_s += (rise_k_per_s - s->rise_k_per_s) * RISE_SHARE;
-    s->last_c7 = c7;
     s->released = s->released || driven; /* also where its turn comes before it is off */
     s->severity = driven ? 0.0f : severity(policy, input->model, k, s);
     /* what was just seen is acted on in the next turn: a tick has no time for both */

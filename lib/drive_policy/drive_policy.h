@@ -64,7 +64,6 @@ typedef struct {
     uint16_t granted_ma;    /* share of the supply, before dither */
     uint16_t target_ma;     /* given in the last tick */
     uint16_t derated_turns; /* fully, on end */
-    int16_t last_c7;        /* temperature a turn ago */
     spring_away_t away;     /* since it was asked for */
     uint8_t stage;          /* drive_policy_stage_t */
     bool released : 1;      /* switched off hot: no false actuation */

@@ -14,6 +14,7 @@
 #define SHIFT_MOST_K   30.0f
 #define TRUST_SD_K     5.0f    /* of ambient, or of what a reset has kept */
 #define LEAST_SD_K     0.6f    /* parts of one spring differ by so much */
+#define KNOWN_SD_K     8.0f    /* farther off than a touch or another batch moves it */
 #define UNIFORM_SD     0.29f   /* of a width */
 #define OFFSET_SD_V    0.005f  /* 8 mV, and 5 mA in 0.2 ohm: evenly */
 #define OFFSET_AGAIN_V 0.001f  /* by the next hold it may have moved by so much */
@@ -436,7 +437,8 @@ void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, 
                   thermal_model_temperature_c7(model, k) <
                       thermal_model_transformation(model, k).austenite_finish_c7;
     if (full && b->possible != SPRING_PHASE_AUSTENITE) {
-        b->blind = b->blind || b->possible == SPRING_PHASE_MARTENSITE;
+        b->blind = b->blind || b->possible == SPRING_PHASE_MARTENSITE ||
+                   (!lacks && b->heating && b->onset && !spring_has_grown(b));
         b->possible = SPRING_PHASE_AUSTENITE;
         spring_set_temperature(model, k, now_c, SPRING_PHASE_AUSTENITE);
     } else if (!full && b->possible == SPRING_PHASE_AUSTENITE) {
@@ -446,10 +448,11 @@ void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, 
      */
     const bool certain = lacks && ((b->heating && spring_heated_enough(e, b, model, k)) ||
                                    surely_finished(b, model, k, SPRING_ESTIMATOR_BOUND_SDS, true));
-    if (certain && !b->onset) {
+    const bool wrong = certain || (lacks && b->doubted);
+    if (wrong && !b->onset) { /* so it was when it seemed to lose phase */
         spring_take_back(e, b, model, k);
     }
-    b->blind = b->blind || certain || (lacks && b->doubted);
+    b->blind = b->blind || wrong;
     b->doubted = lacks && !b->blind;
     if (full && !lacks && b->heating && b->onset && spring_estimator_sees(b) &&
         b->current_a > STRONG_A) {
@@ -486,6 +489,11 @@ bool spring_estimator_sees(const spring_belief_t *b)
 bool spring_estimator_blind(const spring_belief_t *b)
 {
     return b->blind || spring_is_loose(b);
+}
+
+bool spring_estimator_knows(const spring_belief_t *b)
+{
+    return spring_distance_k2(b) < KNOWN_SD_K * KNOWN_SD_K;
 }
 
 float spring_estimator_sd_k(const spring_belief_t *b)

@@ -226,6 +226,8 @@ void spring_estimator_begin_hold(spring_estimator_t *estimator, thermal_model_t 
 bool spring_estimator_sees(const spring_belief_t *belief);
 /* What it reads tells nothing of its phase: it shows none, or its contact is loose. */
 bool spring_estimator_blind(const spring_belief_t *belief);
+/* Its distance to the transformation is known at all. */
+bool spring_estimator_knows(const spring_belief_t *belief);
 /* Of the distance to the transformation. */
 float spring_estimator_sd_k(const spring_belief_t *belief);
 /* The same while it is held at its present temperature, at its largest: an error of the loss shows

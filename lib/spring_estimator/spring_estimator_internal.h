@@ -70,6 +70,9 @@ bool spring_is_loose(const spring_belief_t *belief);
 void spring_jump(spring_belief_t *belief, float by);
 /* Told by its own resistances, both of which were learnt, 0..1. */
 float spring_phase_by_resistance(const spring_belief_t *belief);
+/* What looked like martensite's onset went on as only a transformation does: it was no contact's
+ * step. */
+bool spring_has_grown(const spring_belief_t *belief);
 /* It has transformed: what it reads now is its own austenite's, and the way there its change. */
 void spring_learn_austenite(spring_belief_t *belief);
 

@@ -146,6 +146,11 @@ static bool has_changed(const spring_belief_t *b, float part)
     return fabsf(b->ohm / b->run.heat.onset_ohm - 1.0f) > fmaxf(least, CHANGE_LEAST);
 }
 
+bool spring_has_grown(const spring_belief_t *b)
+{
+    return b->run.heat.cold_ohm == 0.0f || fabsf(b->run.heat.excess) > EXCESS_SEEN;
+}
+
 /* Else it may only pause: a load may have moved the rest of its transformation away. */
 static bool has_taken_enough(const spring_estimator_t *e, const spring_belief_t *b,
                              const thermal_model_t *model, uint8_t k)
@@ -206,7 +211,9 @@ void spring_heating_watch(const spring_estimator_t *e, spring_belief_t *b, therm
         b->run.heat.excess = 0.0f; /* none, or the other way: counted anew */
         b->run.heat.onset_ohm = b->run.heat.mark_ohm;
     }
-    b->run.heat.excess += against ? 0.0f : excess;
+    /* a jump in mid-turn shows half in each: an onset's next step may be the rest of it */
+    const bool rest = b->onset && b->run.heat.mark_k <= b->run.heat.onset_k;
+    b->run.heat.excess += against || rest ? 0.0f : excess;
     b->steep = b->onset && fabsf(excess) > STEEP_SDS * b->noise;
     if (b->steep || !b->onset) {
         b->run.heat.flat_k = 0.0f;
@@ -214,12 +221,13 @@ void spring_heating_watch(const spring_estimator_t *e, spring_belief_t *b, therm
     if (!b->onset && fabsf(b->run.heat.excess) > EXCESS_SEEN + EXCESS_SDS * b->noise) {
         if (may_transform(b, model, k)) {
             see_onset(e, b, model, k);
+            b->run.heat.excess = 0.0f; /* from here on: how it grows */
             b->steep = true;
         } else {
             spring_jump(b, b->ohm / b->run.heat.onset_ohm); /* too cold: a contact */
             b->run.heat.excess = 0.0f;
         }
-    } else if (b->run.heat.flat_k >= FLAT_K &&
+    } else if (b->run.heat.flat_k >= FLAT_K && spring_has_grown(b) &&
                (has_taken_enough(e, b, model, k)
                     ? has_changed(b, LEAST_PART)
                     : b->run.heat.flat_k >= FLAT_K + SHIFT_BOUND_K && has_changed(b, LONE_PART))) {

@@ -279,6 +279,18 @@ static bool may_have_cooled(const spring_belief_t *b, const thermal_model_t *mod
     return now_c - most_k < start_c(model, k);
 }
 
+/* A coefficient in print explains, give or take tolerance, what it reads by now on its way down. */
+static bool slope_explains(const spring_belief_t *b, float tolerance)
+{
+    const spring_line_t *line = &b->run.line;
+    const bool longer = line->from_ohm > 0.0f;
+    const float way_k = longer ? line->from_k + line->slow_k : line->slow_k;
+    const float moved = b->slow_ohm / (longer ? line->from_ohm : line->ohm) - 1.0f;
+    const float most = COEFFICIENT_MOST_PER_K * way_k;
+    const float least = COEFFICIENT_IN_PRINT_PER_K * way_k;
+    return moved > fminf(most, least) - tolerance && moved < fmaxf(most, least) + tolerance;
+}
+
 /* A phase that is kept changes the resistance no faster than temperature does. */
 void spring_holding_watch(const spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model,
                           uint8_t k, float moved_k, float share)
@@ -363,6 +375,14 @@ void spring_holding_watch(const spring_estimator_t *e, spring_belief_t *b, therm
     const bool sure = changed2 > sure2 && b->averaged >= ANCHOR_TURNS;
     if ((sure && b->losing >= CONFIRM_TURNS) || b->losing >= LASTING_TURNS) {
         if (b->rough && !may_have_cooled(b, model, k, sqrtf(distance_k2))) {
+            begin_line(b, true, share);
+            return;
+        }
+        if (b->rough && is_above(b, model, k, distance_k2) &&
+            slope_explains(b, sqrtf(fmaxf(least2, SURE_SDS * SURE_SDS * noise2)))) {
+            if (line->from_ohm > 0.0f) {
+                tell_slope_on_way(b, noise2, least);
+            }
             begin_line(b, true, share);
             return;
         }

@@ -175,6 +175,25 @@ static void spring_that_cannot_get_there_is_said_to_be_away(void)
     TEST_ASSERT_EQUAL_UINT16(0, drive_policy_limits(&policy, 0));
 }
 
+/* Held, and nobody knows how near to its transformation: who knows whether it is there. */
+static void spring_whose_distance_is_lost_is_said_to_be_away(void)
+{
+    begin_cold(1, 2);
+    level[0] = 1000;
+    (void)run(120.0);
+    TEST_ASSERT_BITS_LOW(DRIVE_POLICY_LIMIT_AWAY, drive_policy_limits(&policy, 0));
+    for (double s = 0.0; s < 16.0; s += TICK_S) {
+        policy.estimator.spring[0].variance_k2 = 81.0f;
+        (void)tick();
+    }
+    TEST_ASSERT_BITS_HIGH(DRIVE_POLICY_LIMIT_AWAY, drive_policy_limits(&policy, 0));
+    for (double s = 0.0; s < 1.0; s += TICK_S) {
+        policy.estimator.spring[0].variance_k2 = 49.0f; /* the near miss */
+        (void)tick();
+    }
+    TEST_ASSERT_BITS_LOW(DRIVE_POLICY_LIMIT_AWAY, drive_policy_limits(&policy, 0));
+}
+
 /* Heatings of spring 1 that begin while each of them is lost again at once. */
 static unsigned heatings_in_vain(double seconds)
 {
@@ -435,6 +454,21 @@ static void spring_just_released_is_no_false_actuation(void)
     }
 }
 
+/* Its power is gone: it falls fast, then, as it gives off its latent heat, slowly. */
+static void spring_just_released_is_none_while_it_transforms_either(void)
+{
+    begin_cold(3, 3);
+    believe(1, 80, true);
+    level[0] = level[1] = 1000;
+    decisions(2u * TURN_TICKS);
+    level[1] = 0;
+    for (unsigned n = 0; n < 8u * TURN_TICKS; n++) {
+        policy.spring[1].rise_k_per_s = n < 2u * TURN_TICKS ? -8.0f : -0.2f;
+        (void)decide();
+        TEST_ASSERT_BITS_LOW(DRIVE_POLICY_LIMIT_UNDRIVEN, drive_policy_limits(&policy, 0));
+    }
+}
+
 static void spring_released_from_the_other_policy_is_none_either(void)
 {
     parameters.policy = DRIVE_POLICY_OPEN;
@@ -563,6 +597,7 @@ int main(void)
     RUN_TEST(level_is_held);
     RUN_TEST(levels_one_after_the_other_are_held);
     RUN_TEST(spring_that_cannot_get_there_is_said_to_be_away);
+    RUN_TEST(spring_whose_distance_is_lost_is_said_to_be_away);
     RUN_TEST(tries_are_bounded_and_then_it_is_said_to_be_away);
     RUN_TEST(tries_that_bring_it_back_are_not_counted);
     RUN_TEST(two_springs_hold_by_the_hand_computed_inverse);
@@ -576,6 +611,7 @@ int main(void)
     RUN_TEST(limited_heating_ends_where_it_may_be_hot_enough);
     RUN_TEST(undriven_spring_derates_its_neighbours_only);
     RUN_TEST(spring_just_released_is_no_false_actuation);
+    RUN_TEST(spring_just_released_is_none_while_it_transforms_either);
     RUN_TEST(spring_released_from_the_other_policy_is_none_either);
     RUN_TEST(what_was_driven_open_and_is_off_again_trips_no_neighbour);
     RUN_TEST(overload_takes_the_excess_away_in_time);

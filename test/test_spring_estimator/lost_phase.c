@@ -67,6 +67,29 @@ void slope_is_told_on_the_way_down(void)
     }
 }
 
+/* A coefficient in print is no loss where none is possible, whatever the change of the alloy. */
+void coefficient_is_no_loss_above_the_transformation(void)
+{
+    static const struct {
+        double ratio, rise_per_k;
+    } cases[] = {{1.25, 0.0014}, {1.4, 0.0014}, {0.85, -0.0002}, {0.85, 0.0}};
+    for (unsigned n = 0; n < 4; n++) {
+        unsigned t = 0; /* the dither */
+        begin_cold();
+        truth.ratio = cases[n].ratio;
+        truth.apart_per_k = cases[n].rise_per_k;
+        (void)heat_then_hold(60.0);
+        float lost = 0.0f;
+        for (double s = 0.0; s < 60.0 && distance_k() > 4.0; s += TICK_S) {
+            (void)tick(1.05 + 0.05 * (double)(t++ % 8u) / 8.0);
+            lost = fmaxf(lost, BELIEF.lost);
+        }
+        (void)snprintf(where, sizeof where, "%.2f, %.4f /K: lost %.3f", cases[n].ratio,
+                       cases[n].rise_per_k, (double)lost);
+        TEST_ASSERT_EQUAL_FLOAT_MESSAGE(0.0f, lost, where);
+    }
+}
+
 /* A contact that steps is no phase, whatever the sign; nor one that ages. */
 void contact_is_not_taken_for_phase(void)
 {
@@ -345,6 +368,28 @@ void heating_for_a_loss_that_was_none_ends(void)
     TEST_ASSERT_TRUE_MESSAGE(lost > 0.2f, where);
     TEST_ASSERT_TRUE_MESSAGE(truth.temperature_c < 120.0, where);
     TEST_ASSERT_TRUE_MESSAGE(BELIEF.blind, where); /* and it is said */
+}
+
+/* A sensor's gain falls by 8 % in a hold. Two heatings later that is said, and what it seemed to
+ * have lost was none. */
+void loss_that_was_a_sensor_is_taken_back_when_said(void)
+{
+    hold_with_contact(0.0, 0.004);
+    truth.contact_ohm = -0.08 * resistance_ohm();
+    for (unsigned n = 0; n < 3 && !BELIEF.blind; n++) {
+        for (double s = 0.0; s < 60.0 && BELIEF.lost < 0.03f; s += TICK_S) {
+            (void)tick(hold_current_a(8.0));
+        }
+        TEST_ASSERT_TRUE(BELIEF.lost >= 0.03f);
+        spring_estimator_begin_heating(&estimator, &model, 0);
+        ticks(3.0, 2.0);
+        spring_estimator_begin_hold(&estimator, &model, 0, true); /* by a limit */
+    }
+    (void)snprintf(where, sizeof where, "%.1f K in doubt; %.1f degC, true %.1f",
+                   (double)BELIEF.gone_k, (double)believed_c(), truth.temperature_c);
+    TEST_ASSERT_TRUE_MESSAGE(BELIEF.blind, where);
+    TEST_ASSERT_EQUAL_FLOAT_MESSAGE(0.0f, BELIEF.gone_k, where);
+    TEST_ASSERT_FLOAT_WITHIN_MESSAGE(7.0f, (float)truth.temperature_c, believed_c(), where);
 }
 
 /* Power off in mid-hold: what was learnt holds only beside the sensor's offset, and a spring that

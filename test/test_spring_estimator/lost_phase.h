@@ -6,6 +6,7 @@
 void offset_is_learnt_where_the_current_drops(void);
 void phase_lost_on_the_way_to_the_hold_is_counted(void);
 void slope_is_told_on_the_way_down(void);
+void coefficient_is_no_loss_above_the_transformation(void);
 void contact_is_not_taken_for_phase(void);
 void contact_that_comes_and_goes_is_blind_for_a_while(void);
 void jump_in_the_middle_of_a_turn_is_a_jump(void);
@@ -19,6 +20,7 @@ void loss_that_is_back_at_rest_is_not_taken_back(void);
 void loss_too_small_to_tell_stays_in_doubt(void);
 void loss_on_the_way_down_from_a_heating_is_seen_at_rest(void);
 void heating_for_a_loss_that_was_none_ends(void);
+void loss_that_was_a_sensor_is_taken_back_when_said(void);
 void restored_spring_is_not_overheated(void);
 
 #endif

@@ -353,6 +353,30 @@ static void heating_that_a_limit_ends_is_doubted(void)
     }
 }
 
+/* Just below its transformation a contact or a gain steps, all at once or in mid-turn. What does
+ * not go on is no transformation, and what came after it is. */
+static void step_that_looks_like_an_onset_ends_no_heating(void)
+{
+    static const double steps[] = {-0.06, -0.045, 0.045, 0.06};
+    for (unsigned n = 0; n < 4 * 4 * 3; n++) {
+        const double at_c = 68.0 + 5.0 * (n / 4 % 4);
+        begin_cold();
+        spring_estimator_begin_heating(&estimator, &model, 0);
+        while (truth.temperature_c < at_c) {
+            (void)tick(3.0);
+        }
+        ticks(3.0, n / 16 * 4 * TICK_S);
+        truth.contact_ohm = steps[n % 4] * resistance_ohm();
+        for (double s = 0.0; s < 60.0 && !spring_estimator_has_transformed(&estimator, &model, 0);
+             s += TICK_S) {
+            (void)tick(3.0);
+        }
+        (void)snprintf(where, sizeof where, "step of %.3f at %.0f degC: %.3f at %.1f degC",
+                       steps[n % 4], at_c, truth.austenite, truth.temperature_c);
+        TEST_ASSERT_TRUE_MESSAGE(truth.austenite > 0.95 && truth.temperature_c < 120.0, where);
+    }
+}
+
 /* As the limit cuts its current, the turn has no reading: the last one counts. */
 static void heating_that_is_cut_between_two_readings_is_doubted(void)
 {
@@ -630,6 +654,7 @@ int main(void)
     RUN_TEST(offset_is_learnt_where_the_current_drops);
     RUN_TEST(phase_lost_on_the_way_to_the_hold_is_counted);
     RUN_TEST(slope_is_told_on_the_way_down);
+    RUN_TEST(coefficient_is_no_loss_above_the_transformation);
     RUN_TEST(contact_is_not_taken_for_phase);
     RUN_TEST(contact_that_comes_and_goes_is_blind_for_a_while);
     RUN_TEST(jump_in_the_middle_of_a_turn_is_a_jump);
@@ -643,11 +668,13 @@ int main(void)
     RUN_TEST(loss_too_small_to_tell_stays_in_doubt);
     RUN_TEST(loss_on_the_way_down_from_a_heating_is_seen_at_rest);
     RUN_TEST(heating_for_a_loss_that_was_none_ends);
+    RUN_TEST(loss_that_was_a_sensor_is_taken_back_when_said);
     RUN_TEST(restored_spring_is_not_overheated);
     RUN_TEST(slope_that_no_metal_has_is_not_learnt);
     RUN_TEST(heating_that_a_limit_ends_is_doubted);
     RUN_TEST(heating_that_is_cut_between_two_readings_is_doubted);
     RUN_TEST(contact_that_steps_in_a_heating_does_not_end_it);
+    RUN_TEST(step_that_looks_like_an_onset_ends_no_heating);
     RUN_TEST(transformation_that_is_not_read_is_no_jump);
     RUN_TEST(transformation_is_seen_through_changes_of_current);
     RUN_TEST(transformation_that_waits_for_current_is_not_over);

@@ -151,6 +151,32 @@ static void reheats_are_counted_once_settled(void)
     TEST_ASSERT_TRUE(hold_c > 80.0 && hold_c < 95.0);
 }
 
+/* The least duty with which it takes more than that. */
+static uint16_t duty_above(int spring, double current_a)
+{
+    uint16_t duty = 0;
+    do {
+        run_s(spring, ++duty, 0.1);
+    } while (world_current_a(world, spring) <= current_a);
+    return duty;
+}
+
+static void a_dither_across_the_limit_is_no_reheat(void)
+{
+    heat_to_austenite(4);
+    run_s(4, 93, SCORE_SETTLED_S);
+    const uint16_t duty = duty_above(4, SCORE_REHEAT_A);
+    run_s(4, 0, 60.0);
+    score.spring[4].reheats = 0;
+    for (int sweep = 0; sweep < 10; sweep++) {
+        run_s(4, duty, 0.3);
+        run_s(4, (uint16_t)(duty - 20), 0.3);
+    }
+    TEST_ASSERT_EQUAL_INT(0, score.spring[4].reheats);
+    run_s(4, (uint16_t)(duty + 20), 5.0);
+    TEST_ASSERT_EQUAL_INT(1, score.spring[4].reheats);
+}
+
 /* 'declared' is what every world is drawn from. */
 static void an_array_is_the_same_specimen_in_every_world(void)
 {
@@ -218,6 +244,7 @@ int main(void)
     RUN_TEST(after_a_restart_it_must_be_reached_again);
     RUN_TEST(an_undriven_spring_that_transforms_is_seen);
     RUN_TEST(reheats_are_counted_once_settled);
+    RUN_TEST(a_dither_across_the_limit_is_no_reheat);
     RUN_TEST(an_array_is_the_same_specimen_in_every_world);
     RUN_TEST(patterns_are_of_one_to_nine_springs);
     RUN_TEST(every_world_runs_and_tells_the_same_twice);
