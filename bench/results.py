@@ -58,13 +58,13 @@ SECTIONS: tuple[Section, ...] = (
     Section(
         "worlds",
         "Worlds that are not as declared: the first start ever",
-        f"{HOST}/bench/worlds/bench_worlds --seed 2033",
+        f"{HOST}/bench/worlds/bench_worlds --seed 2034",
         markdown=True,
     ),
     Section(
         "worlds_learnt",
         "Worlds that are not as declared: later starts",
-        f"{HOST}/bench/worlds/bench_worlds --seed 2033 --learnt",
+        f"{HOST}/bench/worlds/bench_worlds --seed 2034 --learnt",
         markdown=True,
     ),
     Section("replay", "Measured logs through the on-chip model", f"{PYTHON} script/replay_fit.py"),
@@ -72,7 +72,7 @@ SECTIONS: tuple[Section, ...] = (
     Section(
         "diagnose",
         "Undeclared effects",
-        f"{PYTHON} bench/diagnose/run.py --seeds 2 --first 300300 --cases build/results/diagnose.json",
+        f"{PYTHON} bench/diagnose/run.py --seeds 2 --first 300400 --cases build/results/diagnose.json",
         markdown=True,
     ),
     Section("closed_forms", "The field against closed forms", f"{PYTHON} bench/explore/closed_forms.py"),
@@ -86,7 +86,7 @@ SECTIONS: tuple[Section, ...] = (
     Section(
         "real_logs",
         "What real logs bring",
-        f"{PYTHON} bench/diagnose/real_logs.py --first 310800 --resume build/results/real_logs.json",
+        f"{PYTHON} bench/diagnose/real_logs.py --first 310900 --resume build/results/real_logs.json",
     ),
     Section("dashboard", "The live page", f"{PYTHON} bench/dashboard/run.py"),
 )
