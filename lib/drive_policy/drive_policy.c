@@ -461,7 +461,7 @@ static void update(drive_policy_t *policy, const drive_policy_input_t *input, ui
     const bool driven = level_permille != 0 && input->allowed[k];
     const float before_c = policy->estimator.spring[k].last_c;
     spring_estimator_update(&policy->estimator, input->model, k);
-    const float rise_k_per_s = (now_c(input->model, k) - before_c) * (1.0f / TURN_S);
+    const float rise_k_per_s = (policy->estimator.spring[k].last_c - before_c) * (1.0f / TURN_S);
     s->rise_k_per_s += (rise_k_per_s - s->rise_k_per_s) * RISE_SHARE;
     s->released = s->released || driven; /* also where its turn comes before it is off */
     s->severity = driven ? 0.0f : severity(policy, input->model, k, s);
