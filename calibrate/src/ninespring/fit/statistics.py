@@ -42,8 +42,8 @@ def noise_floor(series: np.ndarray, starts: Sequence[int] = (0,)) -> np.ndarray:
     straight lines share their noise with the next and look up to twice too clean: every second row tells, where it says
     no more than that.
     """
-    near, apart = (_third_differences(series, starts, stride) for stride in (1, 2))
-    return np.where(apart <= 1.1 * 2.0 * near, np.fmax(near, apart), near)  # a tenth: chance
+    near, apart, tells = _near_and_apart(series, starts)
+    return np.where(tells, np.fmax(near, apart), near)
 
 
 def shared_noise(series: np.ndarray, starts: Sequence[int] = (0,)) -> np.ndarray:
@@ -51,10 +51,16 @@ def shared_noise(series: np.ndarray, starts: Sequence[int] = (0,)) -> np.ndarray
 
     A share r leaves 20 - 30 r of a variance in third differences, and 20 in those of every second row.
     """
-    near, apart = (_third_differences(series, starts, stride) for stride in (1, 2))
+    near, apart, tells = _near_and_apart(series, starts)
     with np.errstate(invalid="ignore", divide="ignore"):
         share = np.clip((1.0 - (near / apart) ** 2) / 1.5, 0.0, 0.5)
-    return np.where(apart <= 1.1 * 2.0 * near, share, 0.0)
+    return np.where(tells, share, 0.0)
+
+
+def _near_and_apart(series: np.ndarray, starts: Sequence[int]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return each column's white noise by every row, by every second one, and whether the latter tells of the former."""
+    near, apart = (_third_differences(series, starts, stride) for stride in (1, 2))
+    return near, apart, apart <= 1.1 * 2.0 * near  # a tenth: chance
 
 
 def _third_differences(series: np.ndarray, starts: Sequence[int], stride: int) -> np.ndarray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from scipy.signal import lfilter
@@ -19,6 +20,8 @@ UNEXPLAINED_LOCAL = 1.0
 """The same for one spring of one run, where the two laws of a phase change may differ for a while."""
 
 
+WIDTHS = (4, 12, 40)
+"""Of the blocks in which structure is looked for, rows; in each spring by itself at all but the first."""
 LAGS = 6
 """Of the autoregression that stands for a residual's colour."""
 
@@ -82,19 +85,24 @@ def gain(better: Fit, other: Fit) -> float:
 
 def excess(problem: Problem, fit: Fit) -> float:
     """Return what the residual holds beyond white noise, as a mean square in units of the noise (>= 0)."""
-    return max(0.0, float(np.nanmax(structure_by_width(problem, fit))))
+    return _pooled(problem, _structures(problem, fit))
 
 
-def structure_by_width(problem: Problem, fit: Fit) -> np.ndarray:
-    """Return pooled structure (mean square, noise units) at block widths of 4, 12 and 40 rows."""
-    out = []
+def _structures(problem: Problem, fit: Fit) -> list[np.ndarray]:
+    """Return the structure (mean square, noise units) of each run and spring at block widths of WIDTHS."""
     residual = problem.without_errors(fit.residual)
-    for width in (4, 12, 40):
-        part = statistics.structure(residual, problem.noise, width, [run.starts for run in problem.runs])
-        weight = np.array([mask.sum(axis=0) for mask in problem.mask], dtype=float)
-        weight = np.where(np.isfinite(part), weight, 0.0)
+    starts = [run.starts for run in problem.runs]
+    return [statistics.structure(residual, problem.noise, width, starts) for width in WIDTHS]
+
+
+def _pooled(problem: Problem, structures: Sequence[np.ndarray]) -> float:
+    """Return the largest of structures, each pooled over runs and springs (>= 0)."""
+    readings = np.array([mask.sum(axis=0) for mask in problem.mask], dtype=float)
+    out = []
+    for part in structures:
+        weight = np.where(np.isfinite(part), readings, 0.0)
         out.append(float(np.nansum(np.nan_to_num(part) * weight) / max(1.0, weight.sum())))
-    return np.array(out)
+    return max(0.0, float(np.nanmax(out)))
 
 
 def difference(problem: Problem, a: Fit, b: Fit) -> float:
@@ -107,12 +115,10 @@ def difference(problem: Problem, a: Fit, b: Fit) -> float:
 
 def unexplained(problem: Problem, fit: Fit) -> bool:
     """Return whether structure well above the noise is left in a fit's residual."""
-    pooled = structure_by_width(problem, fit)
-    if math.sqrt(max(0.0, float(pooled.max()))) > UNEXPLAINED:
+    structures = _structures(problem, fit)
+    if math.sqrt(_pooled(problem, structures)) > UNEXPLAINED:
         return True
-    residual = problem.without_errors(fit.residual)
-    for width in (12, 40):
-        local = statistics.structure(residual, problem.noise, width, [run.starts for run in problem.runs])
+    for width, local in zip(WIDTHS[1:], structures[1:], strict=True):
         blocks = np.array([mask.sum(axis=0) for mask in problem.mask]) / width
         spread = np.sqrt(2.0 / np.maximum(blocks, 1.0)) / width
         if np.any(local > np.maximum(UNEXPLAINED_LOCAL**2, 6 * spread)):
