@@ -20,8 +20,8 @@ static Adafruit_INA219 library[CONTROLLER_MAX_SPRINGS] = {
 
 /* Register that the sensor's pointer is at; POINTER_UNKNOWN after anything else was read. */
 #define POINTER_UNKNOWN 0xFFu
-#define NOT_CONFIGURED                                                                             \
-    0u /* where it is when the sensor's power comes on; no result is read there */
+/* Where it is when the sensor's power comes on; no result is read there. */
+#define NOT_CONFIGURED 0u
 static uint8_t pointer[CONTROLLER_MAX_SPRINGS];
 static uint8_t samples;
 /* One sensor in turn is looked at more closely: in rounds over all of them. */

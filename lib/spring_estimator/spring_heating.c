@@ -221,12 +221,11 @@ void spring_heating_watch(const spring_estimator_t *e, spring_belief_t *b, therm
     if (!b->onset && fabsf(b->run.heat.excess) > EXCESS_SEEN + EXCESS_SDS * b->noise) {
         if (may_transform(b, model, k)) {
             see_onset(e, b, model, k);
-            b->run.heat.excess = 0.0f; /* from here on: how it grows */
             b->steep = true;
         } else {
             spring_jump(b, b->ohm / b->run.heat.onset_ohm); /* too cold: a contact */
-            b->run.heat.excess = 0.0f;
         }
+        b->run.heat.excess = 0.0f; /* from here on: how it grows, or the next one */
     } else if (b->run.heat.flat_k >= FLAT_K && spring_has_grown(b) &&
                (has_taken_enough(e, b, model, k)
                     ? has_changed(b, LEAST_PART)
