@@ -65,7 +65,7 @@ typedef struct {
 typedef struct {
     float ohm;        /* what it reads while it keeps its phase; 0: none yet */
     float a;          /* at this current */
-    float sd;         /* of the line itself, relative */
+    float variance;   /* of the line itself, relative */
     float way_k;      /* how far its temperature has moved since */
     float slow_k;     /* the same, averaged as the readings are */
     float from_ohm;   /* what it read on the way down first; 0: nothing yet */

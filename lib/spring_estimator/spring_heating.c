@@ -11,8 +11,11 @@
 #define CHANGE_LEAST   0.03f /* of a whole transformation, else it is none */
 #define CHANGE_PART    0.15f /* of a transformation: less to come may not show */
 #define FLAT_K         4.0f  /* of heat without a change: it is over */
-#define ONSET_K        2.0f  /* beyond austenite start it is noticed */
-#define ONSET_C7       256   /* the same */
+/* The last of a cosine is flatter than the largest coefficient, the longer the less it changes:
+ * 2 (0.0015 / 0.85) H^2 / pi^2, H = 47 K of heat from its start to its finish. */
+#define FLAT_CHANGE_K  0.8f
+#define ONSET_K        2.0f /* beyond austenite start it is noticed */
+#define ONSET_C7       256  /* the same */
 #define PLACE_SD_K     3.0f
 #define CAPACITY_BOUND 1.25f /* the same of a heat capacity */
 #define SAME_CURRENT   0.1f  /* within it a sensor's offset shows alike */
@@ -78,7 +81,7 @@ void spring_learn_austenite(spring_belief_t *b)
 }
 
 static void see_finish(const spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model,
-                       uint8_t k)
+                       uint8_t k, float beyond_k)
 {
     spring_learn_austenite(b);
     b->possible = SPRING_PHASE_AUSTENITE;
@@ -86,7 +89,7 @@ static void see_finish(const spring_estimator_t *e, spring_belief_t *b, thermal_
     b->steep = false;
     b->lost = 0.0f;
     const int16_t finish_c7 = thermal_model_transformation(model, k).austenite_finish_c7;
-    (void)spring_see(e, b, model, k, spring_c(finish_c7) + b->run.heat.flat_k, PLACE_SD_K,
+    (void)spring_see(e, b, model, k, spring_c(finish_c7) + beyond_k, PLACE_SD_K,
                      SPRING_PHASE_AUSTENITE);
 }
 
@@ -162,6 +165,17 @@ static bool has_taken_enough(const spring_estimator_t *e, const spring_belief_t 
     return b->run.heat.heat_k - b->run.heat.onset_k > LEAST_HEAT * latent_k;
 }
 
+/* unseen_k: heat in which the last of its change may hide. */
+static bool is_over(const spring_estimator_t *e, const spring_belief_t *b,
+                    const thermal_model_t *model, uint8_t k, float unseen_k)
+{
+    const float flat_k = b->run.heat.flat_k - FLAT_K;
+    return flat_k >= unseen_k && spring_has_grown(b) &&
+           (has_taken_enough(e, b, model, k)
+                ? has_changed(b, LEAST_PART)
+                : flat_k >= SHIFT_BOUND_K && has_changed(b, LONE_PART));
+}
+
 /* Change of resistance over heat, a step at a time: more than any temperature coefficient makes is
  * a transformation, whatever its sign. */
 void spring_heating_watch(const spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model,
@@ -226,11 +240,12 @@ void spring_heating_watch(const spring_estimator_t *e, spring_belief_t *b, therm
             spring_jump(b, b->ohm / b->run.heat.onset_ohm); /* too cold: a contact */
         }
         b->run.heat.excess = 0.0f; /* from here on: how it grows, or the next one */
-    } else if (b->run.heat.flat_k >= FLAT_K && spring_has_grown(b) &&
-               (has_taken_enough(e, b, model, k)
-                    ? has_changed(b, LEAST_PART)
-                    : b->run.heat.flat_k >= FLAT_K + SHIFT_BOUND_K && has_changed(b, LONE_PART))) {
-        see_finish(e, b, model, k);
+    } else if (b->run.heat.flat_k >= FLAT_K) {
+        const float unseen_k =
+            spring_clamp(FLAT_CHANGE_K / fabsf(b->learnt.change) - FLAT_K, 0.0f, SHIFT_BOUND_K);
+        if (is_over(e, b, model, k, unseen_k)) {
+            see_finish(e, b, model, k, b->run.heat.flat_k - unseen_k);
+        }
     }
     b->run.heat.mark_ohm = b->ohm;
     b->run.heat.mark_a = b->current_a;

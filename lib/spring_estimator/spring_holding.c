@@ -58,7 +58,7 @@ static void begin_line(spring_belief_t *b, bool rough, float share)
 {
     b->run.line.ohm = b->slow_ohm;
     b->run.line.a = b->slow_a;
-    b->run.line.sd = sqrtf(slow_variance(b, share));
+    b->run.line.variance = slow_variance(b, share);
     b->run.line.from_k += b->run.line.slow_k;
     b->run.line.way_k -= b->run.line.slow_k;
     b->run.line.slow_k = 0.0f;
@@ -241,7 +241,7 @@ static void follow(spring_belief_t *b, float left)
     b->run.line.ohm += b->run.line.ohm * left * LINE_SHARE;
     b->run.line.way_k -= b->run.line.slow_k * LINE_SHARE;
     b->run.line.slow_k -= b->run.line.slow_k * LINE_SHARE;
-    b->run.line.sd -= b->run.line.sd * LINE_SHARE;
+    b->run.line.variance -= 2.0f * b->run.line.variance * LINE_SHARE;
 }
 
 /* Of what the resistance has left its line by, the part that lost phase may explain. */
@@ -337,7 +337,7 @@ void spring_holding_watch(const spring_estimator_t *e, spring_belief_t *b, therm
     const float rise = line->rise_per_k;
     const float least = b->slow_a < LEAST_AT_A ? LOSS_LEAST * LEAST_AT_A / b->slow_a : LOSS_LEAST;
     const float least2 = fmaxf(least * least, rise * rise * distance_k2);
-    const float noise2 = slow_variance(b, share) + line->sd * line->sd;
+    const float noise2 = slow_variance(b, share) + line->variance;
     const float changed2 = changed * changed;
     float sure2 = fmaxf(least2, SURE_SDS * SURE_SDS * noise2);
     float suspected2 = SUSPECTED * SUSPECTED * sure2;

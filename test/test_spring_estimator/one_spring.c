@@ -2,6 +2,8 @@
 
 #include <math.h>
 
+#define PI 3.14159265358979
+
 truth_t truth;
 sensor_t sensor;
 spring_estimator_t estimator;
@@ -49,7 +51,8 @@ void begin_cold(void)
 static double share(double from_c, double to_c)
 {
     const double at = (truth.temperature_c - truth.shift_k - from_c) / (to_c - from_c);
-    return at < 0.0 ? 0.0 : at > 1.0 ? 1.0 : at;
+    const double line = at < 0.0 ? 0.0 : at > 1.0 ? 1.0 : at;
+    return truth.cosine ? 0.5 - 0.5 * cos(PI * line) : line;
 }
 
 static void live(double power_w)

@@ -1,6 +1,6 @@
 /* What it is for: one spring as it is, its sensor, and the estimator that reads it.
- * What it owns: the truth: temperature, phase (straight lines over temperature, not the model's
- * cosine), resistance. What it never does: decide, but for the plain heating and hold below. */
+ * What it owns: the truth: temperature, phase (straight lines over temperature, as a rule not the
+ * model's cosine), resistance. What it never does: decide, but for the plain heating and hold below. */
 #ifndef ONE_SPRING_H
 #define ONE_SPRING_H
 
@@ -18,6 +18,7 @@ typedef struct {
     double contact_ohm;    /* in series, read with it */
     double offset_v;       /* of what is read of the voltage */
     double noise_v;        /* evenly within +- so much, of one reading of the voltage */
+    bool cosine;           /* its phase over temperature: it ends gently */
     double temperature_c, austenite;
 } truth_t;
 

@@ -126,6 +126,24 @@ static void transformation_is_seen_through_noise(void)
     TEST_ASSERT_FALSE(BELIEF.blind);
 }
 
+/* The last of a small change is flatter than a coefficient may be: it is waited for. */
+static void small_change_is_heated_to_its_end(void)
+{
+    for (double ratio = 1.10; ratio < 1.3; ratio += 0.02) {
+        begin_cold();
+        truth.cosine = true;
+        truth.ratio = ratio;
+        (void)heat_then_hold(60.0);
+        begin_cold_as_learnt();
+        truth.cosine = true;
+        truth.ratio = ratio;
+        (void)heat_then_hold(60.0);
+        (void)snprintf(where, sizeof where, "ratio %.2f: %.3f at %.1f C", ratio, truth.austenite,
+                       truth.temperature_c);
+        TEST_ASSERT_TRUE_MESSAGE(truth.austenite > 0.95 && truth.temperature_c < 112.0, where);
+    }
+}
+
 /* No change, or a temperature coefficient alone (of those in print), is no transformation. */
 static void coefficient_alone_is_never_an_onset(void)
 {
@@ -644,6 +662,7 @@ int main(void)
     RUN_TEST(what_is_heated_before_it_is_known_is_not_cold_by_the_time_alone);
     RUN_TEST(transformation_is_seen_whatever_its_sign_and_size);
     RUN_TEST(transformation_is_seen_through_noise);
+    RUN_TEST(small_change_is_heated_to_its_end);
     RUN_TEST(coefficient_alone_is_never_an_onset);
     RUN_TEST(driven_spring_is_within_its_bounds);
     RUN_TEST(spring_that_is_off_is_within_its_bounds);
