@@ -53,7 +53,7 @@ typedef struct {
     float mark_ohm;      /* 0: nowhere yet */
     float mark_a;        /* at this current */
     float onset_ohm;
-    float onset_k;  /* heat taken up until then */
+    float onset_k;  /* heat taken up until then; until it is seen, until its change began */
     float cold_ohm; /* at its beginning, martensite; 0: it was not */
     float cold_c;
     float cold_a;

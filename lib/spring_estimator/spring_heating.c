@@ -41,6 +41,18 @@ void spring_estimator_begin_heating(spring_estimator_t *e, const thermal_model_t
     b->heating = true;
 }
 
+/* Where it is when its onset is seen: what a small change shows late has taken up heat by then. */
+static float onset_c(const spring_estimator_t *e, const spring_belief_t *b,
+                     const thermal_model_t *model, uint8_t k)
+{
+    const thermal_model_transformation_t t = thermal_model_transformation(model, k);
+    const float width_k = spring_c((int16_t)(t.austenite_finish_c7 - t.austenite_start_c7));
+    const float latent_k = e->latent_heat_j / e->heat_capacity_j_per_k;
+    const float taken_k = b->run.heat.heat_k - b->run.heat.onset_k;
+    return spring_c(t.austenite_start_c7) +
+           spring_clamp(width_k / (width_k + latent_k) * taken_k, ONSET_K, width_k);
+}
+
 static void see_onset(const spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model,
                       uint8_t k)
 {
@@ -49,7 +61,6 @@ static void see_onset(const spring_estimator_t *e, spring_belief_t *b, thermal_m
     if (b->unsteady == 0) { /* else it may be the contact again */
         spring_is_back(b);
     }
-    b->run.heat.onset_k = b->run.heat.heat_k;
     if (b->possible == SPRING_PHASE_MARTENSITE) {
         spring_learnt_t *l = &b->learnt;
         if (b->run.heat.cold_ohm > 0.0f && now_c > b->run.heat.cold_c + COLD_SPAN_K) {
@@ -63,10 +74,10 @@ static void see_onset(const spring_estimator_t *e, spring_belief_t *b, thermal_m
                 b->run.heat.onset_ohm = b->run.heat.cold_ohm;
             } /* else a contact has moved */
         }
-        const int16_t start_c7 = thermal_model_transformation(model, k).austenite_start_c7;
-        (void)spring_see(e, b, model, k, spring_c(start_c7) + ONSET_K, PLACE_SD_K,
+        (void)spring_see(e, b, model, k, onset_c(e, b, model, k), PLACE_SD_K,
                          SPRING_PHASE_MARTENSITE);
     }
+    b->run.heat.onset_k = b->run.heat.heat_k;
     b->possible = SPRING_PHASE_BETWEEN;
 }
 
@@ -224,6 +235,7 @@ void spring_heating_watch(const spring_estimator_t *e, spring_belief_t *b, therm
     if (!b->onset && (against || excess * b->run.heat.excess <= 0.0f)) {
         b->run.heat.excess = 0.0f; /* none, or the other way: counted anew */
         b->run.heat.onset_ohm = b->run.heat.mark_ohm;
+        b->run.heat.onset_k = b->run.heat.mark_k;
     }
     /* a jump in mid-turn shows half in each: an onset's next step may be the rest of it */
     const bool rest = b->onset && b->run.heat.mark_k <= b->run.heat.onset_k;
