@@ -16,7 +16,6 @@
 #define LEVEL_FULL_PERMILLE 960
 #define LEVEL_BAND          0.05f /* a held level may be off by so much before it is sought again */
 #define LEVEL_POWER_W       0.4f  /* beyond the hold: heating to a level slows down */
-#define LEVEL_ROOM_K        1.0f  /* a held level stays so far below austenite start */
 
 #define LOST_AT_ONCE  0.03f  /* phase lost: it is heated back */
 #define LOST_SETTLED  0.004f /* the same once the hold is at rest: a search has cost it */
