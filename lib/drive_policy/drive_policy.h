@@ -2,7 +2,7 @@
  * within the limits of springs and supply.
  * What it owns: the choice of policy, each spring's stage, its margin, what is said of it.
  * What it never does: judge a reading (spring_estimator does), close a current loop, switch an
- * output. */
+ * output. It uses floating point, one spring at a time. */
 #ifndef DRIVE_POLICY_H
 #define DRIVE_POLICY_H
 
