@@ -74,7 +74,7 @@ typedef struct {
     drive_policy_parameters_t parameters;
     spring_estimator_t estimator;
     supply_queue_t queue;       /* springs that heat */
-    uint16_t overload_quarters; /* s */
+    uint16_t overload_quarters; /* of a second */
     uint16_t sum_ma;            /* of the last targets */
     uint8_t springs;
     uint8_t columns;
