@@ -32,7 +32,7 @@ BENCH_SUFFIX = {"b105": " - B105", "b15": " - B1.5", "eight": ""}
 DRIVEN = [1, 2, 3, 4, 6, 7, 8, 9]
 CENTRE = 5
 CURRENTS = [f"i{k}_a" for k in DRIVEN]
-LOOK_A = 1.5
+HEATS_A = 1.5
 PHASES = [f"x{k}" for k in DRIVEN]
 MARTENSITE_START_C, AUSTENITE_START_C = 78.0, 88.0
 NOTHING_KNOWN = "at 0.5 = fail brown_out\nat 1 = unlock\n"
@@ -175,8 +175,8 @@ holds it in the hysteresis band (green), where it stays austenite at the least h
 
 
 def moments(trace: Columns) -> tuple[float, float]:
-    """Return when the first spring is heated, not only looked at with 1 A, and when all driven springs have transformed, s."""
-    first_s = next((t for k, t in enumerate(trace["time_s"]) if any(trace[c][k] > LOOK_A for c in CURRENTS)), None)
+    """Return when the first spring is heated, and when all driven springs have transformed, s."""
+    first_s = next((t for k, t in enumerate(trace["time_s"]) if any(trace[c][k] > HEATS_A for c in CURRENTS)), None)
     full_s = next((t for k, t in enumerate(trace["time_s"]) if all(trace[x][k] >= 0.99 for x in PHASES)), None)
     if first_s is None or full_s is None:
         sys.exit("demo: the springs were not driven, or did not transform")
@@ -213,7 +213,7 @@ def start() -> str:
     axes[0][0].legend(loc="upper left")
     return f"""<h2>From power-on</h2>
 <p>Two console lines, at 2 and at 5 s: <code>policy precompensate</code>, <code>pattern 111101111</code>. A board that was just switched on
-cannot know that the springs are cold: it looks at them with at most 1 A, and waits until none can still be hot. The hint <code>model cold</code> makes it begin at once.</p>
+cannot know that the springs are cold: it waits until none can still be hot. The hint <code>model cold</code> makes it begin at once.</p>
 {table(["", "heats from", "all eight transformed"], rows)}
 {picture(figure, "start", "temperatures of nine springs from power-on, with and without the hint")}"""
 

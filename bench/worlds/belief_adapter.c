@@ -41,7 +41,7 @@ bool belief_reported(const controller_t *controller, int spring)
            (controller_limits(controller, (uint8_t)spring) & ~silent) != 0;
 }
 
-/* As lib/learnt_store does, without its rounding to bytes. */
+/* As lib/learnt_store does, at once and without an EEPROM. */
 void belief_keep(const controller_t *controller, belief_memory_t *memory)
 {
     for (uint8_t k = 0; k < controller_springs(controller); k++) {

@@ -85,7 +85,7 @@ void controller_settings_default(controller_settings_t *settings);
 
 /* Everything off, all temperatures at ambient_c7, no faults, unlocked. Fails (false, *controller
  * unchanged) if and only if a part refuses its settings or model.step_ms is not 100; then *bad
- * is the byte offset of the refused field in *settings (bad may be NULL). */
+ * (may be NULL) is the row of parameters.def, PARAMETER_COUNT where it is step_ms. */
 bool controller_init(controller_t *controller, const controller_settings_t *settings,
                      int16_t ambient_c7, uint16_t *bad);
 

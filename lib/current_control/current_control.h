@@ -44,8 +44,8 @@ typedef struct {
     current_control_channel_t channel[CURRENT_CONTROL_MAX_CHANNELS];
 } current_control_t;
 
-/* Fails if and only if a parameter is outside the range above; then *bad is its
- * byte offset in *parameters (bad may be NULL). */
+/* Fails if and only if a parameter is outside its row's range; then *bad (may be NULL) is the row
+ * of parameters.def. */
 bool current_control_check(const current_control_parameters_t *parameters, uint16_t *bad);
 
 /* All channels off, with these parameters. Fails (false, nothing changed) as current_control_check

@@ -16,7 +16,6 @@
 #define LEVEL_FULL_PERMILLE 960
 #define LEVEL_BAND          0.05f /* a held level may be off by so much before it is sought again */
 #define LEVEL_POWER_W       0.4f  /* beyond the hold: heating to a level slows down */
-#define LEVEL_ROOM_K        1.0f  /* a held level stays so far below austenite start */
 
 #define LOST_AT_ONCE  0.03f  /* phase lost: it is heated back */
 #define LOST_SETTLED  0.004f /* the same once the hold is at rest: a search has cost it */
@@ -41,7 +40,6 @@
 #define LOOK_MA             2000u /* of a spring of which much was learnt and nothing is known */
 #define LOWER_MA            800u  /* the least at which a resistance tells the phase */
 #define UNDRIVEN_SDS        2.0f
-#define NEIGHBOUR_SD        0.15f /* of the rise of a spring that its neighbours heat */
 #define RISE_SHARE          0.25f /* of a turn in the average */
 
 #define THERE 0.95f
@@ -332,7 +330,8 @@ static float severity(const drive_policy_t *policy, const thermal_model_t *model
     const float limit_c = spring_c(start_c7) - kelvin(policy->parameters.undriven_margin_cc);
     const float c = now_c(model, k);
     const float rise_k = c - spring_c(thermal_model_ambient_c7(model));
-    const float highest_c = c + UNDRIVEN_SDS * (spring_estimator_sd_k(b) + NEIGHBOUR_SD * rise_k);
+    const float highest_c =
+        c + UNDRIVEN_SDS * (spring_estimator_sd_k(b) + SPRING_ESTIMATOR_NEIGHBOUR_SD * rise_k);
     /* as it is released it falls faster than it is going to: that does not end it */
     const float rise_k_per_s = s->released ? fmaxf(s->rise_k_per_s, 0.0f) : s->rise_k_per_s;
     const float severe = derating_severity(highest_c, rise_k_per_s, limit_c);

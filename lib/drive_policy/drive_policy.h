@@ -2,7 +2,7 @@
  * within the limits of springs and supply.
  * What it owns: the choice of policy, each spring's stage, its margin, what is said of it.
  * What it never does: judge a reading (spring_estimator does), close a current loop, switch an
- * output. */
+ * output. It uses floating point, one spring at a time. */
 #ifndef DRIVE_POLICY_H
 #define DRIVE_POLICY_H
 
@@ -74,7 +74,7 @@ typedef struct {
     drive_policy_parameters_t parameters;
     spring_estimator_t estimator;
     supply_queue_t queue;       /* springs that heat */
-    uint16_t overload_quarters; /* s */
+    uint16_t overload_quarters; /* of a second */
     uint16_t sum_ma;            /* of the last targets */
     uint8_t springs;
     uint8_t columns;

@@ -79,17 +79,17 @@ typedef struct {
     int16_t temperature_c7; /* of the model, degC in Q9.7 */
 } safety_sample_t;
 
-/* Fails if and only if a parameter is outside the range above; then *bad is its
- * byte offset in *parameters (bad may be NULL). */
+/* Fails if and only if a parameter is outside its row's range, or resistance_maximum_ohm is neither
+ * 0 nor above resistance_minimum_ohm; then *bad (may be NULL) is the row of parameters.def. */
 bool safety_check(const safety_parameters_t *parameters, uint16_t *bad);
 
 /* No faults, unlocked. Fails (false, nothing changed) if and only if springs is 0 or above
- * SAFETY_MAX_SPRINGS or a parameter is outside the range above; then *bad is its
- * byte offset in *parameters (bad may be NULL). */
+ * SAFETY_MAX_SPRINGS (*bad stays) or as safety_check does. */
 bool safety_init(safety_t *safety, const safety_parameters_t *parameters, uint8_t springs,
                  uint16_t *bad);
 
-/* Replaces the parameters, keeps faults and counters. Fails as safety_init does. */
+/* Replaces the parameters, keeps faults and counters. Fails (false, nothing changed) as
+ * safety_check does. */
 bool safety_apply(safety_t *safety, const safety_parameters_t *parameters, uint16_t *bad);
 
 /* One tick (20 ms): every spring once, then the board once with the sum of the valid currents.

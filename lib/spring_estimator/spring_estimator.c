@@ -10,7 +10,6 @@
 #define CAPACITY_SD    0.09f   /* of a declared heat capacity: 15 %, uniform */
 #define LOSS_DRIFT_SD  0.0005f /* of the declared loss, in a second: 3 % in an hour */
 #define LOSS_DRIFT     (SPRING_ESTIMATOR_TURN_S * LOSS_DRIFT_SD * LOSS_DRIFT_SD)
-#define NEIGHBOUR_SD   0.15f /* of the rise of a spring that its neighbours heat */
 #define SHIFT_MOST_K   30.0f
 #define TRUST_SD_K     5.0f    /* of ambient, or of what a reset has kept */
 #define LEAST_SD_K     0.6f    /* parts of one spring differ by so much */
@@ -550,7 +549,8 @@ spring_bounds_t spring_estimator_temperature_c(const spring_estimator_t *e,
         return (spring_bounds_t){now_c, coldest_c, b->hottest_c};
     }
     if (b->possible == SPRING_PHASE_MARTENSITE) { /* as warm as room and neighbours make it */
-        const float neighbours_k = NEIGHBOUR_SD * (now_c - spring_ambient_c(model));
+        const float neighbours_k =
+            SPRING_ESTIMATOR_NEIGHBOUR_SD * (now_c - spring_ambient_c(model));
         others_k2 = TRUST_SD_K * TRUST_SD_K + neighbours_k * neighbours_k;
     }
     spring_bounds_t bounds =

@@ -16,10 +16,11 @@
 extern "C" {
 #endif
 
-#define SPRING_ESTIMATOR_MAX_SPRINGS THERMAL_MODEL_MAX_SPRINGS
-#define SPRING_ESTIMATOR_TURN_S      0.25f  /* between two updates of a spring */
-#define SPRING_ESTIMATOR_HOTTEST_C   120.0f /* that a spring may be when the power comes on */
-#define SPRING_ESTIMATOR_BOUND_SDS   2.6f   /* standard deviations: 99 % of a normal distribution */
+#define SPRING_ESTIMATOR_MAX_SPRINGS  THERMAL_MODEL_MAX_SPRINGS
+#define SPRING_ESTIMATOR_TURN_S       0.25f  /* between two updates of a spring */
+#define SPRING_ESTIMATOR_HOTTEST_C    120.0f /* that a spring may be when the power comes on */
+#define SPRING_ESTIMATOR_BOUND_SDS    2.6f  /* standard deviations: 99 % of a normal distribution */
+#define SPRING_ESTIMATOR_NEIGHBOUR_SD 0.15f /* of the rise of a spring that its neighbours heat */
 
 /* Phases that nothing has excluded; bits. */
 enum {

@@ -17,7 +17,7 @@
 #define ONSET_K        2.0f /* beyond austenite start it is noticed */
 #define ONSET_C7       256  /* the same */
 #define PLACE_SD_K     3.0f
-#define CAPACITY_BOUND 1.25f /* the same of a heat capacity */
+#define CAPACITY_BOUND 1.25f /* 2.6 standard deviations of a heat capacity more */
 #define SAME_CURRENT   0.1f  /* within it a sensor's offset shows alike */
 #define LEAST_PART     0.5f  /* of a known change: a contact's step, flat afterwards, is less */
 #define LONE_PART      0.7f  /* where its resistance is not its austenite's either */

@@ -60,7 +60,8 @@ static bool leave_out(spring_belief_t *b, float ohm, float current_a)
         b->odd = false;
         return false;
     }
-    /* a line compares with any current, but for the sensor's offset; a heating only with its own */
+    /* a line compares with any current, but for the sensor's offset; a heating with none that has
+     * doubled */
     const bool compares =
         holds ? current_a > WEAK_A
               : current_a > STRONG_A && b->current_a > fmaxf(STRONG_A, 0.5f * current_a);

@@ -5,8 +5,8 @@
  * much as bench/worlds draws them, the ceiling stays a tenth below. */
 #define RISE_SHARE_NUMERATOR   9
 #define RISE_SHARE_DENOMINATOR 10
-/* Of the power that duty and supply give: with 4.2 V for 5 and 0.04 ohm more in the wiring it is no
- * less. */
+/* Of the power that duty and supply give: with a supply a fifth lower than declared it is no less.
+ * At 4.2 V for 5 with 0.04 ohm more in the wiring it is a tenth less than this. */
 #define POWER_SHARE 0.64f
 
 #define HIGHEST_C7 (215 * 128)

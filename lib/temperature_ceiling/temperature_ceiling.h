@@ -32,10 +32,11 @@ void temperature_ceiling_set(temperature_ceiling_t *ceiling, const thermal_model
 void temperature_ceiling_step(temperature_ceiling_t *ceiling, const thermal_model_t *model,
                               uint8_t spring, float power_w);
 
+/* degC. */
 float temperature_ceiling_c(const temperature_ceiling_t *ceiling, uint8_t spring);
 
-/* It is a tenth more above ambient than trip_cc (0.01 degC), which an array within its tolerances
- * does not reach; or as hot as it can be. */
+/* Its rise above ambient is a ninth more than that of trip_cc (0.01 degC), which an array within
+ * its tolerances does not reach; or as hot as it can be. */
 bool temperature_ceiling_trips(const temperature_ceiling_t *ceiling, const thermal_model_t *model,
                                uint8_t spring, int16_t trip_cc);
 
@@ -43,7 +44,7 @@ bool temperature_ceiling_trips(const temperature_ceiling_t *ceiling, const therm
 void temperature_ceiling_prepare(temperature_ceiling_t *ceiling, const thermal_model_t *model,
                                  const current_control_parameters_t *circuit);
 
-/* Power that the duty (steps of 800) must at least bring, whatever is read: the supply may be a
+/* Power, W, that the duty (steps of 800) must at least bring, whatever is read: the supply may be a
  * fifth lower than declared. */
 float temperature_ceiling_power_w(const temperature_ceiling_t *ceiling, float duty);
 

@@ -63,7 +63,7 @@ std::unique_ptr<runner> make_native_runner(const runner_request &request);
  * setting. */
 std::unique_ptr<runner> make_avr_runner(const runner_request &request);
 
-/* The setting at a byte offset of controller_settings_t, as the user writes it. */
+/* The setting of a row of parameters.def, as the user writes it. */
 std::string setting_name(std::uint16_t row);
 
 } // namespace ninespring

@@ -153,9 +153,6 @@ comparison_t compare_fixed_with_double(uint32_t first_set, uint32_t sets, uint32
                     }
                 } else if (error > result.max_c) {
                     result.max_c = error;
-                    result.max_set = set;
-                    result.max_time_s = 0.1 * (k + 1);
-                    result.max_spring = i;
                 }
             }
         }

@@ -16,9 +16,6 @@ typedef struct {
      * reference fell on different sides of that: */
     uint64_t parted;     /* samples since, in that spring and set */
     double max_parted_c; /* largest error in those; max_c is over the others */
-    uint32_t max_set;    /* the set it was in */
-    double max_time_s;
-    int max_spring;
     uint64_t samples;
     double highest_c;   /* temperature reached: the drive must have exercised the range */
     double transformed; /* share of samples with a phase between 0.02 and 0.98 */

@@ -73,7 +73,7 @@ static void no_correction_of_the_model_lowers_it(void)
 }
 
 /* As hot as the model may be at rest, it does not trip; with a fifth more power it does. */
-static void it_trips_a_tenth_above_the_model(void)
+static void it_trips_a_ninth_above_the_model(void)
 {
     run(0.0058f * 110.0f, 638000u, 1200.0f); /* all alike: nothing flows between them */
     TEST_ASSERT_FLOAT_WITHIN(0.5f, 130.0f, temperature_ceiling_c(&ceiling, 4));
@@ -100,7 +100,7 @@ static void duty_and_supply_bound_the_power_from_below(void)
     const float power_w = temperature_ceiling_power_w(&ceiling, 100.0f);
     TEST_ASSERT_FLOAT_WITHIN(1e-3f, 0.64f * 0.219f * 1.5664f * 1.5664f, power_w);
     TEST_ASSERT_EQUAL_FLOAT(0.0f, temperature_ceiling_power_w(&ceiling, 0.0f));
-    /* no honest reading is below: 4.2 V, 0.22 ohm */
+    /* an honest reading at 4.2 V, 0.22 ohm is a tenth below */
     const float least_a = 4.2f / 8.0f / (0.219f + 0.22f);
     TEST_ASSERT_TRUE(least_a * least_a * 0.219f > 0.85f * power_w);
     circuit.freewheel_mv = 500;
@@ -124,7 +124,7 @@ int main(void)
     UNITY_BEGIN();
     RUN_TEST(it_follows_the_declared_network);
     RUN_TEST(no_correction_of_the_model_lowers_it);
-    RUN_TEST(it_trips_a_tenth_above_the_model);
+    RUN_TEST(it_trips_a_ninth_above_the_model);
     RUN_TEST(a_trip_beyond_the_model_still_trips);
     RUN_TEST(duty_and_supply_bound_the_power_from_below);
     RUN_TEST(it_is_stable_whatever_the_heat_capacity);

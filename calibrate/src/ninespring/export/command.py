@@ -67,8 +67,8 @@ def export(
     """Write the console lines that put a model into the chip.
 
     Only what the logs determined is written: the rest stays as the chip has it, and the file says which and why. Before
-    writing, an array like the model's is driven with the old and the new settings, and settings that hold, heat or
-    limit worse are refused.
+    writing, arrays like the model's are driven with the old and the new settings, and settings with which springs hold
+    less, heat later, get hotter than transforming takes or disturb the ones that are off are refused.
     """
     from .. import effects
     from .drive import compare

@@ -90,7 +90,6 @@ class Problem:
         base.set_all(array_parameters(array))
         base.set_all(self.declared)
         self._base = base
-        self._local = threading.local()
 
     def base_value(self, name: str) -> float:
         """Return what the declared array has for a parameter of the plant."""
