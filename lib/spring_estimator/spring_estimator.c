@@ -98,7 +98,9 @@ void spring_estimator_prepare(spring_estimator_t *e, const thermal_model_t *mode
     e->turn_k_per_w = SPRING_ESTIMATOR_TURN_S / e->heat_capacity_j_per_k;
     e->loss_w_per_k = (float)p->loss_uw_per_k * 1e-6f;
     e->loss_drift = LOSS_DRIFT * e->loss_w_per_k * e->loss_w_per_k;
-    e->latent_heat_j = (float)p->latent_heat_mj * 1e-3f;
+    e->latent_k = (float)p->latent_heat_mj * 1e-3f / e->heat_capacity_j_per_k;
+    const float width_k = 0.01f * (float)(p->austenite_finish_cc - p->austenite_start_cc);
+    e->transforms_k_per_k = width_k / (width_k + e->latent_k);
     e->martensite_ohm = (float)p->resistance_martensite_uohm * 1e-6f;
     e->change = 1.0f - (float)p->resistance_martensite_uohm / (float)p->resistance_austenite_uohm;
     for (uint8_t k = 0; k < model->springs; k++) {
@@ -299,11 +301,10 @@ static void look(spring_estimator_t *e, thermal_model_t *model, uint8_t k)
 static float hottest_capacity_j_per_k(const spring_estimator_t *e, const spring_belief_t *b,
                                       const thermal_model_transformation_t *t)
 {
+    const float width_k = spring_c((int16_t)(t->martensite_start_c7 - t->martensite_finish_c7));
     return b->hottest_c > spring_c(t->martensite_start_c7)
                ? e->heat_capacity_j_per_k
-               : e->heat_capacity_j_per_k +
-                     e->latent_heat_j /
-                         spring_c((int16_t)(t->martensite_start_c7 - t->martensite_finish_c7));
+               : e->heat_capacity_j_per_k * (1.0f + e->latent_k / width_k);
 }
 
 /* Of a spring of which nothing is known: the hottest that it can be, and whether that is

@@ -148,8 +148,9 @@ typedef struct {
     uint8_t springs;
     bool observes; /* readings are used */
     float heat_capacity_j_per_k;
-    float turn_k_per_w; /* what 1 W adds in a turn */
-    float latent_heat_j;
+    float turn_k_per_w;       /* what 1 W adds in a turn */
+    float latent_k;           /* latent heat over heat capacity */
+    float transforms_k_per_k; /* what it warms by for a kelvin of heat while it transforms */
     float loss_w_per_k;
     float loss_drift; /* of its variance in a turn, (W/K)^2 */
     float martensite_ohm;

@@ -45,12 +45,9 @@ void spring_estimator_begin_heating(spring_estimator_t *e, const thermal_model_t
 static float onset_c(const spring_estimator_t *e, const spring_belief_t *b,
                      const thermal_model_t *model, uint8_t k)
 {
-    const thermal_model_transformation_t t = thermal_model_transformation(model, k);
-    const float width_k = spring_c((int16_t)(t.austenite_finish_c7 - t.austenite_start_c7));
-    const float latent_k = e->latent_heat_j / e->heat_capacity_j_per_k;
     const float taken_k = b->run.heat.heat_k - b->run.heat.onset_k;
-    return spring_c(t.austenite_start_c7) +
-           spring_clamp(width_k / (width_k + latent_k) * taken_k, ONSET_K, width_k);
+    return spring_c(thermal_model_transformation(model, k).austenite_start_c7) +
+           fmaxf(e->transforms_k_per_k * taken_k, ONSET_K);
 }
 
 static void see_onset(const spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model,
@@ -108,8 +105,7 @@ static void see_finish(const spring_estimator_t *e, spring_belief_t *b, thermal_
 static float most_heat_k(const spring_estimator_t *e, const spring_belief_t *b, int16_t limit_c7)
 {
     /* what does not show takes no latent heat */
-    const float latent_k =
-        b->onset ? b->run.heat.begun_missing * e->latent_heat_j / e->heat_capacity_j_per_k : 0.0f;
+    const float latent_k = b->onset ? b->run.heat.begun_missing * e->latent_k : 0.0f;
     /* where some austenite is left for certain, its transformation is where it was */
     const float shift_k = (b->possible & SPRING_PHASE_AUSTENITE) != 0 ? 0.0f : SHIFT_BOUND_K;
     return (spring_c(limit_c7) + shift_k - b->run.heat.begun_c + latent_k) * CAPACITY_BOUND;
@@ -172,7 +168,7 @@ static bool has_taken_enough(const spring_estimator_t *e, const spring_belief_t 
     if (b->learnt.austenite_ohm > 0.0f) {
         return !spring_estimator_lacks_phase(b, model, k);
     }
-    const float latent_k = b->run.heat.begun_missing * e->latent_heat_j / e->heat_capacity_j_per_k;
+    const float latent_k = b->run.heat.begun_missing * e->latent_k;
     return b->run.heat.heat_k - b->run.heat.onset_k > LEAST_HEAT * latent_k;
 }
 
