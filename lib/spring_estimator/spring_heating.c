@@ -61,12 +61,14 @@ static void see_onset(const spring_estimator_t *e, spring_belief_t *b, thermal_m
     if (b->possible == SPRING_PHASE_MARTENSITE) {
         spring_learnt_t *l = &b->learnt;
         if (b->run.heat.cold_ohm > 0.0f && now_c > b->run.heat.cold_c + COLD_SPAN_K) {
-            const float rise_per_k = (b->run.heat.onset_ohm / b->run.heat.cold_ohm - 1.0f) /
-                                     (now_c - b->run.heat.cold_c);
+            const float ohm_per_k =
+                (b->run.heat.onset_ohm - b->run.heat.cold_ohm) / (now_c - b->run.heat.cold_c);
+            const float martensite_ohm =
+                b->run.heat.cold_ohm - ohm_per_k * (b->run.heat.cold_c - LEARNT_AT_C);
+            const float rise_per_k = ohm_per_k / martensite_ohm;
             if (rise_per_k > COEFFICIENT_LEAST_PER_K && rise_per_k < COEFFICIENT_MOST_PER_HEAT_K) {
                 l->martensite_rise_per_k = rise_per_k;
-                l->martensite_ohm =
-                    b->run.heat.cold_ohm / (1.0f + rise_per_k * (b->run.heat.cold_c - LEARNT_AT_C));
+                l->martensite_ohm = martensite_ohm;
             } else if (rise_per_k * l->change > 0.0f) { /* it had begun while nothing was read */
                 b->run.heat.onset_ohm = b->run.heat.cold_ohm;
             } /* else a contact has moved */
