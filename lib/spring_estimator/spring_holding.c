@@ -135,6 +135,9 @@ static void look_back(const spring_estimator_t *e, spring_belief_t *b, thermal_m
         see_crossing(e, b, model, k, missing * per_change, BACK_LEAST * fabsf(per_change));
         return;
     }
+    if (b->unproven) {
+        return; /* a limit ended the heating too soon to tell */
+    }
     if (fabsf(b->gone) > BACK_LEAST) {
         if (missing * b->gone > BACK_SHARE * b->gone * b->gone) {
             spring_take_back(e, b, model, k);

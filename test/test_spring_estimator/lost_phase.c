@@ -321,6 +321,26 @@ void loss_that_is_back_at_rest_is_not_taken_back(void)
                                      believed_c(), where);
 }
 
+/* A limit ends the heating before it could come back: that it has not tells nothing. */
+void loss_that_a_limit_left_is_not_taken_back(void)
+{
+    hold_with_contact(0.0, 0.016);
+    while (BELIEF.lost < 0.05f) {
+        truth.shift_k += 0.1 * TICK_S; /* a load that grows */
+        (void)tick(hold_current_a(3.0));
+    }
+    spring_estimator_begin_heating(&estimator, &model, 0);
+    ticks(3.0, 1.0);
+    spring_estimator_begin_hold(&estimator, &model, 0, true);
+    TEST_ASSERT_TRUE(BELIEF.unproven && !BELIEF.doubted);
+    for (double s = 0.0; s < 60.0; s += TICK_S) {
+        (void)tick(hold_current_a(12.0));
+    }
+    (void)snprintf(where, sizeof where, "%.1f K in doubt; %.1f degC, true %.1f",
+                   (double)BELIEF.gone_k, (double)believed_c(), truth.temperature_c);
+    TEST_ASSERT_TRUE_MESSAGE(BELIEF.unproven && BELIEF.gone_k > 0.0f, where);
+}
+
 /* Less than 1 % tells nothing: what may be hotter stays so. */
 void loss_too_small_to_tell_stays_in_doubt(void)
 {

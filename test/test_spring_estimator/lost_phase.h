@@ -17,6 +17,7 @@ void doubt_grows_with_a_heating_after_a_jump(void);
 void loss_that_does_not_come_back_was_none(void);
 void loss_that_is_still_missing_at_rest_is_taken_back(void);
 void loss_that_is_back_at_rest_is_not_taken_back(void);
+void loss_that_a_limit_left_is_not_taken_back(void);
 void loss_too_small_to_tell_stays_in_doubt(void);
 void loss_on_the_way_down_from_a_heating_is_seen_at_rest(void);
 void heating_for_a_loss_that_was_none_ends(void);

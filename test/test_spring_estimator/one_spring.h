@@ -1,6 +1,7 @@
 /* What it is for: one spring as it is, its sensor, and the estimator that reads it.
  * What it owns: the truth: temperature, phase (straight lines over temperature, as a rule not the
- * model's cosine), resistance. What it never does: decide, but for the plain heating and hold below. */
+ * model's cosine), resistance. What it never does: decide, but for the plain heating and hold
+ * below. */
 #ifndef ONE_SPRING_H
 #define ONE_SPRING_H
 

@@ -144,6 +144,21 @@ static void small_change_is_heated_to_its_end(void)
     }
 }
 
+/* A change of some percent shows late: by then it has nearly transformed, and is not heated as if
+ * it had just begun. */
+static void onset_that_shows_late_heats_no_further(void)
+{
+    for (double ratio = 1.06; ratio < 1.12; ratio += 0.005) {
+        begin_cold();
+        truth.cosine = true;
+        truth.ratio = ratio;
+        (void)heat_then_hold(60.0);
+        (void)snprintf(where, sizeof where, "ratio %.3f: %.3f at %.1f C", ratio, truth.austenite,
+                       truth.temperature_c);
+        TEST_ASSERT_TRUE_MESSAGE(truth.austenite > 0.99 && truth.temperature_c < 115.0, where);
+    }
+}
+
 /* No change, or a temperature coefficient alone (of those in print), is no transformation. */
 static void coefficient_alone_is_never_an_onset(void)
 {
@@ -663,6 +678,7 @@ int main(void)
     RUN_TEST(transformation_is_seen_whatever_its_sign_and_size);
     RUN_TEST(transformation_is_seen_through_noise);
     RUN_TEST(small_change_is_heated_to_its_end);
+    RUN_TEST(onset_that_shows_late_heats_no_further);
     RUN_TEST(coefficient_alone_is_never_an_onset);
     RUN_TEST(driven_spring_is_within_its_bounds);
     RUN_TEST(spring_that_is_off_is_within_its_bounds);
@@ -684,6 +700,7 @@ int main(void)
     RUN_TEST(loss_that_does_not_come_back_was_none);
     RUN_TEST(loss_that_is_still_missing_at_rest_is_taken_back);
     RUN_TEST(loss_that_is_back_at_rest_is_not_taken_back);
+    RUN_TEST(loss_that_a_limit_left_is_not_taken_back);
     RUN_TEST(loss_too_small_to_tell_stays_in_doubt);
     RUN_TEST(loss_on_the_way_down_from_a_heating_is_seen_at_rest);
     RUN_TEST(heating_for_a_loss_that_was_none_ends);
