@@ -231,8 +231,8 @@ public:
             event.word = first == "fail" ? scenario_word::fail : scenario_word::repair;
             failure(event);
         } else if (first[0] == '$' || first[0] == '?' || first == "telemetry" || first == "model" ||
-                   first == "faults" || first == "selftest" || first == "help" ||
-                   first == "version") {
+                   first == "learnt" || first == "faults" || first == "selftest" ||
+                   first == "help" || first == "version") {
             event.word = scenario_word::console;
         } else {
             throw wrong(fmt::format(

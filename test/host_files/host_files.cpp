@@ -160,6 +160,17 @@ void scenario_of_two_layers_is_read(void)
     TEST_ASSERT_EQUAL(2, s.boards[0].number);
 }
 
+/* Every other word of the console's help goes to a board that has a console. */
+void scenario_takes_the_words_of_the_console(void)
+{
+    for (const std::string word : {"help", "version", "model cold", "learnt clear", "faults",
+                                   "selftest", "telemetry csv 5", "$$", "?"}) {
+        const scenario s =
+            parse_scenario(make_text_file("s.ini", SCENARIO + "[events]\nat 1 = " + word + "\n"));
+        TEST_ASSERT_TRUE_MESSAGE(s.events[0].word == scenario_word::console, word.c_str());
+    }
+}
+
 void scenario_with_errors_is_refused(void)
 {
     refuses_scenario(SCENARIO + "colour = 3\n", "s.ini:3:1: ", "no key 'colour'");
@@ -251,6 +262,7 @@ int main(void)
     RUN_TEST(file_is_written_whole_or_not_at_all);
     RUN_TEST(scenario_is_read);
     RUN_TEST(scenario_of_two_layers_is_read);
+    RUN_TEST(scenario_takes_the_words_of_the_console);
     RUN_TEST(scenario_with_errors_is_refused);
     RUN_TEST(scenario_events_with_errors_are_refused);
     RUN_TEST(scenario_arguments_with_errors_are_refused);
