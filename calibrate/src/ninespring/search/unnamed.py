@@ -28,8 +28,6 @@ from . import evidence
 from .evidence import fit_factor, unexplained
 from .search import MIN_GAIN, MIN_SHARE, Search
 
-COARSER = 2
-"""Of those times, as many as one where something comes and goes all the time."""
 GRID_S = 15.0
 """Times at which something may begin or end."""
 STEPS = 600
@@ -46,13 +44,15 @@ MOST = 12
 """Unnamed causes, at most: where more would help, it is no cause of these kinds."""
 ROUNDS = 4
 """Of finding what has no name and searching the library beside it, at most ..."""
-ENOUGH = 15_000
-"""... and none is begun that, if it takes as many simulations as the longest before it, ends after so many: half a minute of
-one core for two 15 min logs of nine springs."""
+ENOUGH = 10_000
+"""... and none is begun that, if it takes as many simulations as the longest search before it, ends after so many: twenty-five
+seconds of one core for two 15 min logs of nine springs."""
 SHOWN = ("pickup", "mixing", "sensor", "reading", "share")
 """Kinds that are the thermometers' own: the springs are as they would be without."""
 GIVES_ONLY = ("mixing", "crosstalk", "bridge", "plume", "delay")
 """Kinds whose size cannot be negative: they lead on what is there, and a part of it at most."""
+NAMED = "named"
+"""Kind of what is in the library: looked at beside the others, never found here."""
 UNITS = {
     "pickup": "K",
     "bridge": "W/K",
@@ -88,8 +88,9 @@ class Cause:
     edges: tuple[int, ...] = ()
     """Where given, the columns begin at one of these rows each and stay, the last is the end: a window is one less another."""
 
-    spans: tuple[tuple[int, int, int], ...] = ()
-    """Where given, each column acts in one run between two rows only, all of them together: it comes and goes."""
+    bumps: tuple[tuple[int, int, int, int], ...] = ()
+    """Where given, each column acts in one run about one row only, and less towards those before and after it, all of them
+    together: it comes and goes."""
 
     @property
     def shown(self) -> bool:
@@ -153,10 +154,8 @@ def column_of(
     problem: Problem, fit: Fit, cause: Cause, typical_w: float, begin: int = 0, end: int | None = None
 ) -> np.ndarray:
     """Return what a unit of a cause, from one row to another, adds to the readings of all runs, (count, numbers)."""
-    if cause.spans:
-        alone = [replace(cause, spans=(), profiles=_of_run(cause.profiles, r)) for r in range(len(problem.runs))]
-        parts = [column_of(problem, fit, alone[r], typical_w, first, last) for r, first, last in cause.spans]
-        return np.column_stack(parts)
+    if cause.bumps:
+        return np.column_stack([_bumps(problem, fit, cause, r, typical_w) for r in range(len(problem.runs))])
     fields = []
     for r, (run, profile) in enumerate(zip(problem.runs, cause.profiles, strict=True)):
         if profile is None:
@@ -168,8 +167,24 @@ def column_of(
     return np.concatenate(problem.scaled(fields))[:, None]
 
 
-def _of_run(profiles: Sequence[np.ndarray | None], r: int) -> tuple[np.ndarray | None, ...]:
-    return tuple(one if k == r else None for k, one in enumerate(profiles))
+def _bump(first: int, top: int, last: int, rows: int) -> np.ndarray:
+    """Return the part of a cause that comes and goes in each row, (rows, 1): straight up to all of it, and down again."""
+    row = np.arange(rows)
+    return np.clip(np.minimum((row - first) / (top - first), (last - row) / (last - top)), 0.0, 1.0)[:, None]
+
+
+def _bumps(problem: Problem, fit: Fit, cause: Cause, r: int, typical_w: float) -> np.ndarray:
+    """Return what the bumps of a cause in one run add to the readings of all, (count, bumps)."""
+    profile, bumps = cause.profiles[r], [one[1:] for one in cause.bumps if one[0] == r]
+    if profile is None or not bumps:
+        return np.zeros((problem.count, 0))
+    shown = answers(problem, fit, r, [_bump(*one, len(profile)) * profile for one in bumps], typical_w)
+    out = np.zeros((problem.count, len(bumps)))
+    begin = sum(int(mask.sum()) for mask in problem.mask[:r])
+    here = slice(begin, begin + int(problem.mask[r].sum()))
+    for k, field in enumerate(shown):
+        out[here, k] = (field / problem.noise[r])[problem.mask[r]]
+    return out
 
 
 def typical_power(problem: Problem, fit: Fit) -> float:
@@ -213,26 +228,35 @@ def library(problem: Problem, fit: Fit) -> list[Cause]:
 
 
 def _often(windows: Sequence[Cause]) -> list[Cause]:
-    """Return what comes and goes all the time: the windows of one kind and place in all runs, COARSER edges as one."""
+    """Return what comes and goes all the time: bumps at the edges of the windows of one kind and place in all runs."""
     together: dict[tuple[str, str], list[Cause]] = {}
     for one in windows:
         if not one.shown:
             together.setdefault((one.kind, one.text.partition(", {}")[0]), []).append(one)
     out = []
     for (kind, text), parts in together.items():
-        spans, columns = [], []
+        bumps, columns = [], []
         for one in parts:
             run = next(r for r, profile in enumerate(one.profiles) if profile is not None)
-            for first in range(0, len(one.edges) - 1, COARSER):
-                last = min(first + COARSER, len(one.edges) - 1)
-                spans.append((run, one.edges[first], one.edges[last]))
-                until = one.columns[:, last] if last < one.columns.shape[1] else 0.0
-                columns.append(one.columns[:, first] - until)
+            times = [one.edges[0] - one.edges[1], *one.edges, 2 * one.edges[-1] - one.edges[-2]]
+            bumps += [(run, *about) for about in zip(times, times[1:], times[2:], strict=False)]
+            # half of what acts from the edge before to this one, and half from there to the next
+            between = 0.5 * (one.columns - np.column_stack([one.columns[:, 1:], np.zeros(len(one.columns))]))
+            nothing = np.zeros((len(between), 1))
+            columns.append(np.column_stack([between, nothing]) + np.column_stack([nothing, between]))
         merged = [
             next((p.profiles[r] for p in parts if p.profiles[r] is not None), None)
             for r in range(len(parts[0].profiles))
         ]
-        out.append(Cause(kind, f"{text} again and again", tuple(merged), np.column_stack(columns), spans=tuple(spans)))
+        out.append(
+            Cause(
+                kind,
+                f"{text} again and again",
+                tuple(merged),
+                np.column_stack(columns).astype(np.float32),
+                bumps=tuple(bumps),
+            )
+        )
     return out
 
 
@@ -389,7 +413,8 @@ def find(
 ) -> list[Hidden]:
     """Return the unnamed causes that a fit's residual calls for, beside those that are taken out already.
 
-    The best first, while it beats its price and explains a fair share of what is left.
+    The best first, while it beats its price and explains a fair share of what is left, and more than any name would: the
+    library is searched again before more is found.
     """
     jac = fit.jacobian if fit.jacobian is not None else np.zeros((problem.count, 0))
     used = jac[:, np.linalg.norm(jac, axis=0) > 1e-6]
@@ -400,12 +425,13 @@ def find(
     typical = typical_power(problem, fit)
     found = list(already)
     samples = problem.count / fit_factor(problem, fit)
-    single = [one for one in kinds if not one.edges and not one.spans]
-    known = {one.text for one in already}
-    often = [one for one in kinds if one.spans and one.text not in known]
+    single = [one for one in kinds if not one.edges and not one.bumps]
+    # two that come and go as they like would explain whatever all springs do together, and leave nothing to be named
+    often = [] if any(one.cause.bumps for one in already) else [one for one in kinds if one.bumps]
     windows = [one for one in kinds if one.edges]
     matrix = np.column_stack([one.columns[:, 0] for one in single])
     either = np.array([one.kind not in GIVES_ONLY for one in single])
+    named = np.array([one.kind == NAMED for one in single])
     whole = (matrix**2).sum(axis=0)
     power = whole - ((basis.T @ matrix) ** 2).sum(axis=0)
     grams, often_grams = ([_gram(one.columns, basis) for one in some] for some in (windows, often))
@@ -414,7 +440,8 @@ def find(
         moment = matrix.T @ left
         possible = (power > 1e-3 * whole) & (either | (moment > 0))
         gain = np.where(possible, moment**2 / np.maximum(power, 1e-12), 0.0)
-        k = int(np.argmax(gain))
+        names = float(gain[named].max(initial=0.0))
+        k = int(np.argmax(np.where(named, 0.0, gain)))
         drop, vector, best, span = float(gain[k]), matrix[:, k], single[k], (0, None)
         for one, gram in zip(windows, grams, strict=True):
             value, a, b = _best_window(one.columns.T @ left, gram)
@@ -435,7 +462,7 @@ def find(
             explained = float(size @ moment)
             if (more := nats_of(explained, numbers)) > nats:
                 nats, drop, vectors, best, span = more, explained, one.columns, one, (0, None)
-        if nats < LEAST_NATS or drop < SHARE * max(0.0, rest - len(left)):
+        if nats < LEAST_NATS or drop < SHARE * max(0.0, rest - len(left)) or (len(found) > len(already) and names > drop):
             break
         text = best.text
         if best.edges:
@@ -445,6 +472,8 @@ def find(
         if any(text == one.text for one in found):
             break  # what is left of one of its size is no second of it
         found.append(Hidden(best, text, span, column_of(problem, fit, best, typical, *span)))
+        if best.bumps:
+            often, often_grams = [], []
         vectors = vectors - basis @ (basis.T @ vectors)
         units = np.linalg.qr(vectors[:, np.linalg.norm(vectors, axis=0) > 1e-3])[0]
         left = left - units @ (units.T @ left)
@@ -461,11 +490,14 @@ def _heat(problem: Problem, hidden: Sequence[Hidden]) -> list[np.ndarray] | None
     given = [one for one in hidden if one.inside is not None]
     out = [np.zeros_like(run.drive) for run in problem.runs]
     for one in given:
-        always = [(r, *one.rows) for r in range(len(out))]
-        for size, acts in zip(one.inside, [[span] for span in one.cause.spans] or [always], strict=True):
-            for r, begin, end in acts:
-                if (profile := one.cause.profiles[r]) is not None:
-                    out[r][begin:end] += size * profile[begin:end]
+        if one.cause.bumps:
+            for size, (r, *about) in zip(one.inside, one.cause.bumps, strict=True):
+                out[r] += size * _bump(*about, len(out[r])) * one.cause.profiles[r]
+            continue
+        (size,), (begin, end) = one.inside, one.rows
+        for heat, profile in zip(out, one.cause.profiles, strict=True):
+            if profile is not None:
+                heat[begin:end] += size * profile[begin:end]
     return out if given else None
 
 
@@ -546,6 +578,16 @@ def weighed(problem: Problem, fit: Fit, hidden: Sequence[Hidden]) -> list[tuple[
         )
         out.append((replace(one, size=value, error=float(np.sqrt(np.mean(errors**2)))), nats))
     return out
+
+
+def _named(problem: Problem, first: Search, fit: Fit) -> list[Cause]:
+    """Return what the library's own candidates would add to the readings around a fit: a name goes before what has none."""
+    screen = Search(problem, first.candidates, first.base).screen(fit)
+    kept = [k for k, owner in enumerate(screen.owner) if not screen.candidates[owner].flexible]
+    columns = _thinned(problem, screen.directions[:, kept])
+    return [
+        Cause(NAMED, screen.candidates[screen.owner[k]].effect, (), columns[:, [j]]) for j, k in enumerate(kept)
+    ]
 
 
 def _with_fewer(problem: Problem, first: Search, final: Fit, kinds: Sequence[Cause]) -> Fit | None:
@@ -642,11 +684,9 @@ def _search_beside(problem: Problem, first: Search, final: Fit) -> Beside | None
     hidden: list[Hidden] = []
     out = names = None
     left_out = None, None
-    begun = longest = 0
+    begun, longest = 0, 0
     for turn in range(ROUNDS):
-        if turn:
-            longest = max(longest, problem.simulations - begun)
-        begun = problem.simulations
+        longest, begun = max(longest, problem.simulations - begun), problem.simulations
         if turn and begun + longest > ENOUGH:
             break
         hidden = taken_out(problem, final, hidden)
@@ -654,14 +694,14 @@ def _search_beside(problem: Problem, first: Search, final: Fit) -> Beside | None
         if final.jacobian is None:
             shown = problem.predictions(final.spec, final.values)
             final = replace(final, jacobian=problem.jacobian(final.spec, final.values, shown))
-        grown = find(problem, final, kinds, hidden)
+        grown = find(problem, final, [*kinds, *_named(problem, first, final)], hidden)
         if len(grown) == len(hidden):
             break
         problem.leave_out(np.column_stack([one.column for one in grown]), problem.heat)
         # what they add depends on the numbers, which they spoilt until now
         nearer = problem.fit(final.spec, final.as_dict(), tolerance=1e-3, max_steps=STEPS_OF_FIT)
         grown = taken_out(problem, nearer, grown)
-        search, left_out = _beside(problem, first), (problem.unnamed, problem.heat)
+        search, taken = _beside(problem, first), (problem.unnamed, problem.heat)
         # what only helps together was looked for before: beside a cause without a name, what shows alone is enough
         result = search.run(downwards=False)
         final = result[0]
@@ -669,11 +709,13 @@ def _search_beside(problem: Problem, first: Search, final: Fit) -> Beside | None
         hidden = _needed(problem, final, [one.around(problem, final) for one in grown])
         near, given = simulated(problem, final, hidden) if hidden else (final, hidden)
         if near is not final:
-            search, left_out = _beside(problem, first), (problem.unnamed, problem.heat)
+            search, taken = _beside(problem, first), (problem.unnamed, problem.heat)
             result = search.settle(near)
             final = result[0]
             hidden = _needed(problem, final, [one.around(problem, final) for one in given])
-        out = (search, result, hidden)
+        if out is not None and final.sse > out[1][0].sse:
+            break  # beside what this round found, the names do not come back that explained more
+        out, left_out = (search, result, hidden), taken
         if len(hidden) == len(grown) and not unexplained(problem, final):
             break
         # the same names twice: what more without a name would be found beside them changes them no more
