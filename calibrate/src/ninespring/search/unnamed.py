@@ -462,7 +462,11 @@ def find(
             explained = float(size @ moment)
             if (more := nats_of(explained, numbers)) > nats:
                 nats, drop, vectors, best, span = more, explained, one.columns, one, (0, None)
-        if nats < LEAST_NATS or drop < SHARE * max(0.0, rest - len(left)) or (len(found) > len(already) and names > drop):
+        if (
+            nats < LEAST_NATS
+            or drop < SHARE * max(0.0, rest - len(left))
+            or (len(found) > len(already) and names > drop)
+        ):
             break
         text = best.text
         if best.edges:
@@ -585,9 +589,7 @@ def _named(problem: Problem, first: Search, fit: Fit) -> list[Cause]:
     screen = Search(problem, first.candidates, first.base).screen(fit)
     kept = [k for k, owner in enumerate(screen.owner) if not screen.candidates[owner].flexible]
     columns = _thinned(problem, screen.directions[:, kept])
-    return [
-        Cause(NAMED, screen.candidates[screen.owner[k]].effect, (), columns[:, [j]]) for j, k in enumerate(kept)
-    ]
+    return [Cause(NAMED, screen.candidates[screen.owner[k]].effect, (), columns[:, [j]]) for j, k in enumerate(kept)]
 
 
 def _with_fewer(problem: Problem, first: Search, final: Fit, kinds: Sequence[Cause]) -> Fit | None:
