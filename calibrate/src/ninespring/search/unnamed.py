@@ -155,7 +155,10 @@ def column_of(
 ) -> np.ndarray:
     """Return what a unit of a cause, from one row to another, adds to the readings of all runs, (count, numbers)."""
     if cause.bumps:
-        return np.column_stack([_bumps(problem, fit, cause, r, typical_w) for r in range(len(problem.runs))])
+        columns = np.column_stack([_bumps(problem, fit, cause, r, typical_w) for r in range(len(problem.runs))])
+        # there all the time it would be a declared number that is off: that is left to the number, which nothing held else
+        basis = np.linalg.qr(_declared_slopes(problem, fit))[0]
+        return columns - basis @ (basis.T @ columns)
     fields = []
     for r, (run, profile) in enumerate(zip(problem.runs, cause.profiles, strict=True)):
         if profile is None:
@@ -165,6 +168,15 @@ def column_of(
         within[begin:end] = profile[begin:end]
         fields.append(within if cause.shown else answers(problem, fit, r, [within], typical_w)[0])
     return np.concatenate(problem.scaled(fields))[:, None]
+
+
+def _declared_slopes(problem: Problem, fit: Fit) -> np.ndarray:
+    """Return what the declared numbers move of the readings, nothing taken out, (count, numbers)."""
+    taken, problem.unnamed = problem.unnamed, None
+    numbers = [k for k, free in enumerate(fit.spec.free) if free.effect is None]
+    slopes = problem.jacobian(fit.spec, fit.values, problem.predictions(fit.spec, fit.values), numbers)
+    problem.unnamed = taken
+    return slopes[:, np.linalg.norm(slopes, axis=0) > 1e-6]
 
 
 def _bump(first: int, top: int, last: int, rows: int) -> np.ndarray:
@@ -409,12 +421,12 @@ def _least_squares(gram: np.ndarray, moment: np.ndarray) -> tuple[np.ndarray, in
 
 
 def find(
-    problem: Problem, fit: Fit, kinds: Sequence[Cause], already: Sequence[Hidden], most: int = MOST
+    problem: Problem, fit: Fit, kinds: Sequence[Cause], already: Sequence[Hidden], most: int = MOST, searched: int = 0
 ) -> list[Hidden]:
     """Return the unnamed causes that a fit's residual calls for, beside those that are taken out already.
 
-    The best first, while it beats its price and explains a fair share of what is left, and more than any name would: the
-    library is searched again before more is found.
+    The best first, while it beats its price and explains a fair share of what is left, and more than any name would where
+    there are more than the library was `searched` beside: it is searched again before more is found.
     """
     jac = fit.jacobian if fit.jacobian is not None else np.zeros((problem.count, 0))
     used = jac[:, np.linalg.norm(jac, axis=0) > 1e-6]
@@ -462,11 +474,7 @@ def find(
             explained = float(size @ moment)
             if (more := nats_of(explained, numbers)) > nats:
                 nats, drop, vectors, best, span = more, explained, one.columns, one, (0, None)
-        if (
-            nats < LEAST_NATS
-            or drop < SHARE * max(0.0, rest - len(left))
-            or (len(found) > len(already) and names > drop)
-        ):
+        if nats < LEAST_NATS or drop < SHARE * max(0.0, rest - len(left)) or (len(found) > searched and names > drop):
             break
         text = best.text
         if best.edges:
@@ -560,8 +568,9 @@ def weighed(problem: Problem, fit: Fit, hidden: Sequence[Hidden]) -> list[tuple[
     left = np.concatenate(problem.scaled(problem.without_errors(bare.residual)))
     for one in hidden:
         left += 0.0 if one.inside is None else one.column @ one.inside
-    inverse = np.linalg.pinv((matrix / scale).T @ (matrix / scale), rcond=1e-10)
-    size = inverse @ ((matrix / scale).T @ left)
+    gram, moment = (matrix / scale).T @ (matrix / scale), (matrix / scale).T @ left
+    inverse = np.linalg.pinv(gram, rcond=1e-10)
+    size = inverse @ moment
     rest = left - (matrix / scale) @ size
     problem.leave_out(columns, problem.heat)
     factor = fit_factor(problem, problem.evaluate(fit))
@@ -572,7 +581,11 @@ def weighed(problem: Problem, fit: Fit, hidden: Sequence[Hidden]) -> list[tuple[
         own = slice(begin, begin + one.column.shape[1])
         begin = own.stop
         numbers = begin - own.start
-        drop = float(size[own] @ np.linalg.solve(inverse[own, own] + 1e-12 * np.eye(numbers), size[own]))
+        # all at once of one that comes and goes is what a number of the model does, too: only what is left without it tells
+        other = np.r_[: own.start, own.stop : len(size)]
+        drop = float(
+            moment @ size - moment[other] @ np.linalg.pinv(gram[np.ix_(other, other)], rcond=1e-10) @ moment[other]
+        )
         nats = 0.5 * drop / spread - 0.5 * (numbers - 1) * math.log(max(2.0, problem.count / factor))
         errors = np.sqrt(np.maximum(np.diag(inverse[own, own]), 0.0) * spread) / scale[own]
         value = (
@@ -592,13 +605,13 @@ def _named(problem: Problem, first: Search, fit: Fit) -> list[Cause]:
     return [Cause(NAMED, screen.candidates[screen.owner[k]].effect, (), columns[:, [j]]) for j, k in enumerate(kept)]
 
 
-def _with_fewer(problem: Problem, first: Search, final: Fit, kinds: Sequence[Cause]) -> Fit | None:
-    """Return the best fit of some of the names, or none, beside the one unnamed cause that it calls for: where that explains
-    more than all the names, the others may stand in for it. None where it does not.
+def _with_fewer(problem: Problem, first: Search, final: Fit, kinds: Sequence[Cause]) -> tuple[Fit, list[Hidden]] | None:
+    """Return the best fit of some of the names, or none, beside the one unnamed cause that it calls for, and that: where it
+    explains more than all the names, the others may stand in for it. None where it does not.
     """
     names = [effect for effect in final.spec.effects if effect not in first.base.spec.effects]
     kept = {()} | {(one,) for one in names} | {tuple(other for other in names if other != one) for one in names}
-    best: Fit | None = None
+    best: tuple[Fit, list[Hidden]] | None = None
     for some in sorted(kept - {tuple(names)}):
         fit = final
         for effect in names:
@@ -612,8 +625,8 @@ def _with_fewer(problem: Problem, first: Search, final: Fit, kinds: Sequence[Cau
         problem.leave_out(grown[0].column)
         beside = problem.fit(fit.spec, fit.as_dict(), tolerance=1e-3, max_steps=STEPS_OF_FIT)
         problem.leave_out(None)
-        if beside.sse < (final if best is None else best).sse:
-            best = replace(beside, jacobian=None)
+        if beside.sse < (final if best is None else best[0]).sse:
+            best = replace(beside, jacobian=None), grown
     return best
 
 
@@ -681,9 +694,10 @@ def _beside(problem: Problem, first: Search) -> Search:
 def _search_beside(problem: Problem, first: Search, final: Fit) -> Beside | None:
     first.progress("causes without a name")
     kinds = library(problem, final)
-    if (nearer := _with_fewer(problem, first, final, kinds)) is not None:
-        final, kinds = nearer, library(problem, nearer)
     hidden: list[Hidden] = []
+    if (nearer := _with_fewer(problem, first, final, kinds)) is not None:
+        final, hidden = nearer
+        kinds = library(problem, final)
     out = names = None
     left_out = None, None
     begun, longest = 0, 0
@@ -696,8 +710,9 @@ def _search_beside(problem: Problem, first: Search, final: Fit) -> Beside | None
         if final.jacobian is None:
             shown = problem.predictions(final.spec, final.values)
             final = replace(final, jacobian=problem.jacobian(final.spec, final.values, shown))
-        grown = find(problem, final, [*kinds, *_named(problem, first, final)], hidden)
-        if len(grown) == len(hidden):
+        searched = len(hidden) if turn else 0
+        grown = find(problem, final, [*kinds, *_named(problem, first, final)], hidden, searched=searched)
+        if len(grown) == searched:
             break
         problem.leave_out(np.column_stack([one.column for one in grown]), problem.heat)
         # what they add depends on the numbers, which they spoilt until now
