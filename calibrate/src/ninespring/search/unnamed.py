@@ -119,6 +119,12 @@ def _least_squares(gram: np.ndarray, moment: np.ndarray) -> tuple[np.ndarray, in
     return vector[:, used] @ ((vector[:, used].T @ (moment / scale)) / value[used]) / scale, int(used.sum())
 
 
+def _within(window: Cause, found: Sequence[Hidden]) -> bool:
+    """Return whether what acts for a while is part of what comes and goes as it likes already."""
+    often = f"{window.text.partition(', {}')[0]} again and again"
+    return any(one.cause.bumps and one.text == often for one in found)
+
+
 def find(
     problem: Problem, fit: Fit, kinds: Sequence[Cause], already: Sequence[Hidden], most: int = MOST, searched: int = 0
 ) -> list[Hidden]:
@@ -155,6 +161,8 @@ def find(
         k = int(np.argmax(np.where(named, 0.0, gain)))
         drop, vector, best, span = float(gain[k]), matrix[:, k], single[k], (0, None)
         for one, gram in zip(windows, grams, strict=True):
+            if _within(one, found):
+                continue
             value, a, b = _best_window(one.columns.T @ left, gram)
             if value > drop:
                 vector = one.columns[:, a] - (0.0 if b == len(gram) else one.columns[:, b])
