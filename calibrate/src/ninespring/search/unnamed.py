@@ -405,6 +405,8 @@ def _search_beside(problem: Problem, first: Search, final: Fit) -> Beside | None
     if (nearer := _with_fewer(problem, first, final, kinds)) is not None:
         final, hidden = nearer
         kinds = library(problem, final)
+        # the same cause as it is by the numbers that it had spoilt
+        hidden = [replace(one, cause=next(k for k in kinds if k.text == one.cause.text)) for one in hidden]
     out = names = None
     left_out = None, None
     begun, longest = 0, 0
