@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+from dataclasses import replace
 
 import jsonschema
 import numpy as np
@@ -11,8 +12,10 @@ from ninespring import effects, native
 from ninespring.fit.declared import base_spec
 from ninespring.fit.predict import plant_of, predict
 from ninespring.fit.problem import Problem
+from ninespring.fit.spec import Fit
 from ninespring.logs import read_log
 from ninespring.models import Array, model_text, read_model
+from ninespring.search.certainty import Witness, witness
 from ninespring.verdict import diagnosis
 
 
@@ -63,6 +66,20 @@ def test_two_effects_that_hide_one_another_are_both_found(make_log) -> None:
     }
     runs = [read_log(make_log(f"{k}.csv", both, seed=k)) for k in (1, 2)]
     assert set(names(diagnosis.diagnose(Array(), runs).result)) == set(both)
+
+
+def test_what_is_not_believed_leaves_its_place_to_another(make_log, monkeypatch: pytest.MonkeyPatch) -> None:
+    judged = []
+
+    def doubted(problem: Problem, fit: Fit, effect: str, *rest: object) -> Witness:
+        judged.append(effect)
+        return replace(witness(problem, fit, effect, *rest), share=0.97 * (effect != "natural_convection"))
+
+    monkeypatch.setattr(diagnosis, "witness", doubted)
+    strong = {"natural_convection": {"convection_exponent": 0.25}}
+    result = diagnosis.diagnose(Array(), [read_log(make_log(effects=strong, seed=3))]).result
+    assert judged[0] == "natural_convection" and len(judged) > 1
+    assert names(result) and "natural_convection" not in names(result)
 
 
 def test_what_no_effect_explains_is_called_unexplained(make_log) -> None:

@@ -184,6 +184,16 @@ def test_another_variant_of_an_adopted_effect_is_tried(make_log) -> None:
     assert found.preferred(right, wrong) and not found.preferred(wrong, right)
 
 
+def test_a_search_that_has_had_its_simulations_begins_no_further_step(make_log) -> None:
+    problem = Problem(Array(), [read_log(make_log(effects={"edge_loss": {"edge_loss_fraction": 0.2}}, seed=3))])
+    base = diagnosis.first_fit(problem, base_spec(problem))
+    found = search.Search(problem, effects.candidates(problem), base)
+    found.until = problem.simulations - 1
+    assert found.forward(base) is base
+    found.until = problem.simulations
+    assert found.forward(base).spec.effects == ("edge_loss",)
+
+
 def test_a_forecast_keeps_to_what_is_physical(plain: search.Search) -> None:
     screen = plain.screen(plain.base)
     k = next(k for k, c in enumerate(screen.candidates) if c.effect == "radiation")

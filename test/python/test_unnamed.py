@@ -8,10 +8,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from ninespring import native
+from ninespring import effects, native
 from ninespring.logs import read_log
 from ninespring.models import Array
-from ninespring.search import unnamed
+from ninespring.search import search, unnamed
+from ninespring.search.evidence import excess
 from ninespring.verdict import diagnosis
 
 EDGES = {"edge_loss": {"edge_loss_fraction": 0.2}}
@@ -61,10 +62,55 @@ def test_a_known_effect_is_named_beside_heat_that_goes_astray(make_log) -> None:
     assert cause["size"] == pytest.approx(0.2, abs=0.01)
 
 
-def swinging_drives(columns: dict[str, np.ndarray]) -> None:
-    """Let every spring be heated more and less, by a third, within ten minutes."""
+def test_a_name_goes_before_what_has_none(make_log) -> None:
+    """Thermometers that show more, beside heat that goes astray, are no heat that comes with the drives."""
+
+    def change(columns: dict[str, np.ndarray]) -> None:
+        crosstalk(columns)
+        for k in range(9):
+            columns[f"t{k + 1}_c"] = 1.05 * columns[f"t{k + 1}_c"]
+
+    log = read_log(make_log(seed=3, effects=EDGES, change=change))
+    problem, fit, _ = diagnosis.fit_effects(Array(), [log], ["edge_loss"])
+    kinds, first = unnamed.library(problem, fit), search.Search(problem, effects.candidates(problem), fit)
+    alone = unnamed.find(problem, fit, kinds, ())
+    before_it = unnamed.find(problem, fit, [*kinds, *unnamed._named(problem, first, fit)], ())
+    assert [one.cause.kind for one in before_it] == ["crosstalk"] and len(alone) > 1
+
+
+def swinging(columns: dict[str, np.ndarray], period_s: float) -> np.ndarray:
+    """Return heat by which every spring is heated more and less, by a third, (rows, springs), W."""
     power = np.column_stack([columns[f"i{k + 1}_a"] ** 2 * 0.2 for k in range(9)])
-    astray(columns, power * np.sin(np.arange(float(len(power))) / 600.0 * 2.0 * np.pi)[:, None] / 3.0, LATENT)
+    return power * np.sin(np.arange(float(len(power))) / period_s * 2.0 * np.pi)[:, None] / 3.0
+
+
+def swinging_drives(columns: dict[str, np.ndarray]) -> None:
+    """Let every spring be heated more and less within ten minutes."""
+    astray(columns, swinging(columns, 600.0), LATENT)
+
+
+def test_what_comes_and_goes_within_a_minute_leaves_nothing_that_matters(make_log) -> None:
+    log = read_log(make_log(seed=3, effects=EDGES, change=lambda columns: astray(columns, swinging(columns, 80.0))))
+    problem, fit, _ = diagnosis.fit_effects(Array(), [log], ["edge_loss"])
+    kinds = unnamed.library(problem, fit)
+    swing = next(one for one in kinds if one.text == "all drives change again and again")
+    unnamed.taken_out(problem, fit, [unnamed.Hidden(swing, swing.text, (0, None), swing.columns)])
+    beside = problem.fit(fit.spec, fit.as_dict())
+    assert excess(problem, beside) < 0.5**2 < 3.0**2 < excess(problem, fit)
+
+
+def test_only_one_cause_comes_and_goes_as_it_likes(make_log) -> None:
+    def warmed(columns: dict[str, np.ndarray]) -> None:
+        astray(columns, np.zeros((600, 9)) + 0.15 * np.sin(np.arange(600.0) / 11.0)[:, None])
+
+    problem, fit, _ = diagnosis.fit_effects(Array(), [read_log(make_log(seed=3, change=warmed))], [])
+    kinds = unnamed.library(problem, fit)
+    (first, *_) = unnamed.find(problem, fit, kinds, ())
+    assert first.cause.bumps
+    other = next(one for one in kinds if one.bumps and one.kind == "gust")
+    hidden = unnamed.taken_out(problem, fit, [unnamed.Hidden(other, other.text, (0, None), other.columns)])
+    found = unnamed.find(problem, problem.evaluate(fit), kinds, hidden)
+    assert len(found) > 1 and sum(bool(one.cause.bumps) for one in found) == 1
 
 
 def test_a_name_has_its_size_beside_heat_that_moves_the_transformation(make_log) -> None:

@@ -19,17 +19,36 @@ TRANSFORMED = 0.9
 ENOUGH_K = 12.0
 """Above its austenite finish, what a spring may reach without being called hotter: the margin that the chip keeps above its
 own target while it is unsure (`unsure_margin_k`)."""
+
+
+@dataclass(frozen=True)
+class Measure:
+    """What can be worse about a drive: by how much it must differ, and how it is said."""
+
+    limit: float
+    words: str
+    part: float = 0.0
+    """Of what it was: less is no difference either."""
+    chance: bool = False
+    """One array says nothing of it: worse is what is so on every one."""
+
+
 WORSE = {
-    "held": (0.03, "springs that are on hold {old:.0%} austenite as the chip is now, {new:.0%} with the new settings"),
-    "heating_s": (5.0, "heating takes {old:.0f} s as the chip is now, {new:.0f} s with the new settings"),
-    "hottest_c": (3.0, "the hottest spring reaches {old:.0f} degC as the chip is now, {new:.0f} with the new settings"),
-    "undriven": (
-        0.03,
-        "springs that are off reach {old:.0%} austenite as the chip is now, {new:.0%} with the new settings",
+    "held": Measure(
+        0.03, "springs that are on hold {old:.0%} austenite as the chip is now, {new:.0%} with the new settings"
+    ),
+    "heating_s": Measure(
+        5.0, "heating takes {old:.0f} s as the chip is now, {new:.0f} s with the new settings", part=0.1, chance=True
+    ),
+    "hottest_c": Measure(
+        3.0, "the hottest spring reaches {old:.0f} degC as the chip is now, {new:.0f} with the new settings"
+    ),
+    "undriven": Measure(
+        0.03, "springs that are off reach {old:.0%} austenite as the chip is now, {new:.0%} with the new settings"
     ),
 }
-"""Per measure of a drive: the difference that is worse (three hundredths of a stroke, the noise of a hold, a tenth of a
-heating and of the way to the limit), and how it is said."""
+"""What is compared: differences of three hundredths of a stroke, the noise of a hold, a tenth of a heating and of the way to
+the limit."""
 
 
 @dataclass
@@ -85,15 +104,13 @@ def worse_than(old: Drive, new: Drive) -> list[str]:
     later none of those with which the springs do no less in all. Nor is it one to heat a spring through that was not quite.
     """
     out = []
-    excused = {"hottest_c": new.held - old.held > WORSE["held"][0], "heating_s": new.done >= old.done}
-    for measure, (limit, _) in WORSE.items():
+    excused = {"hottest_c": new.held - old.held > WORSE["held"].limit, "heating_s": new.done >= old.done}
+    for measure, one in WORSE.items():
         a, b = getattr(old, measure), getattr(new, measure)
         if measure == "hottest_c":
             a = max(a, old.enough_c)
         more = a - b if measure == "held" else b - a
-        if excused.get(measure):
-            continue
-        if more > max(limit, 0.1 * a * (measure == "heating_s")):
+        if more > max(one.limit, one.part * a) and not excused.get(measure):
             out.append(measure)
     return out
 
@@ -104,7 +121,7 @@ def compare(
     """Return what gets worse with the new settings, in words, and every measure of every drive.
 
     Tried on the array as it is best known, and on others drawn from the model's uncertainty; worse is what is worse on
-    the first, or on most of all of them. Heating takes longer where it does on every one.
+    the first, or on most of all of them; what is by chance on one, on every one.
     """
     rng = np.random.default_rng(0)
     plants = [best_plant(model), *(best_plant(model, draw(model, rng)) for _ in range(DRAWS))]
@@ -117,16 +134,16 @@ def compare(
             say(f"driving array {k + 1} of {len(plants)}")
             pairs.append((drive(plant, old, pattern), drive(plant, new, pattern)))
         judged = [worse_than(a, b) for a, b in pairs]
-        for measure, (_, words) in WORSE.items():
+        for measure, one in WORSE.items():
             values = [(getattr(a, measure), getattr(b, measure)) for a, b in pairs]
-            worse = [measure in one for one in judged]
+            worse = [measure in found for found in judged]
             rows += [{"array": k + 1, "measure": measure, "old": a, "new": b} for k, (a, b) in enumerate(values)]
-            if all(worse) or (measure != "heating_s" and (worse[0] or sum(worse) > len(worse) / 2)):
+            if all(worse) or (not one.chance and (worse[0] or sum(worse) > len(worse) / 2)):
                 a, b = values[0] if worse[0] else values[worse.index(True)]
-                said.append(words.format(old=a, new=b))
+                said.append(one.words.format(old=a, new=b))
         best = pairs[0]
         if said and "undriven" in worse_than(best[1], best[0]):
             # a pattern that this array cannot hold without heating the springs that are off
-            words = WORSE["undriven"][1].format(old=best[0].undriven, new=best[1].undriven)
+            words = WORSE["undriven"].words.format(old=best[0].undriven, new=best[1].undriven)
             gained.append(f"for it {words}: that pattern cannot have both here")
     return list(dict.fromkeys([*said, *gained])), rows

@@ -41,6 +41,8 @@ SPRINT = 5
 """... and of each of several starts, before the best of them goes on."""
 
 MAX_EFFECTS = 4
+ENOUGH = 4_000
+"""Simulations after which one search begins no further step: ten seconds of one core for two 15 min logs of nine springs."""
 
 
 @dataclass
@@ -54,6 +56,11 @@ class Search:
     fits: dict[tuple[tuple[str, str], ...], Fit] = field(default_factory=dict)
     screens: dict[tuple[tuple[str, str], ...], Screen] = field(default_factory=dict)
     thorough: bool = True
+    until: int = 0
+    """Simulations after which no further step is begun."""
+
+    def __post_init__(self) -> None:
+        self.until = self.problem.simulations + ENOUGH
 
     @staticmethod
     def key(spec: Spec) -> tuple[tuple[str, str], ...]:
@@ -288,7 +295,7 @@ class Search:
     def forward(self, current: Fit) -> Fit:
         """Add effects, one or two at a time, while they earn their place."""
         while len(current.spec.effects) - len(self.base.spec.effects) < MAX_EFFECTS:
-            if excess(self.problem, current) < 0.5 * MIN_GAIN**2:
+            if self.problem.simulations > self.until or excess(self.problem, current) < 0.5 * MIN_GAIN**2:
                 break
             options = self.extend(current)
             if not options:
@@ -385,7 +392,7 @@ class Search:
             fit, without = self.backward(fit, share)
             contenders = self.rivals(fit, without)
             better = [(other.chi2, k) for k, (_, other) in enumerate(contenders) if self.preferred(other, fit)]
-            if turn == 3 or not better:
+            if turn == 3 or not better or self.problem.simulations > self.until:
                 break
             fit = contenders[min(better)[1]][1]
             if grow:
@@ -440,6 +447,6 @@ class Search:
         Return the chosen fit, the fits without each effect, and the contenders.
         """
         found = self.forward(self.base)
-        if downwards and excess(self.problem, found) >= MIN_GAIN**2:
+        if downwards and self.problem.simulations < self.until and excess(self.problem, found) >= MIN_GAIN**2:
             found = self.forward(self.downward(found))
         return self.settle(found)

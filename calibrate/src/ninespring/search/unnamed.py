@@ -15,44 +15,26 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-import pandas as pd
-from scipy.signal import lfilter
 
 from ..effects.effect import sized
-from ..fit.heat import THIN, answers, power_of, step_answers, thin
 from ..fit.problem import Problem
-from ..fit.simulate import simulate_run
 from ..fit.spec import Fit
-from ..logs.run import Run
 from . import evidence
+from .causes import SHORTEST, Cause, bump, column_of, library, thinned, typical_power
 from .evidence import fit_factor, unexplained
 from .search import MIN_GAIN, MIN_SHARE, Search
 
-COARSER = 2
-"""Of those times, as many as one where something comes and goes all the time."""
-GRID_S = 15.0
-"""Times at which something may begin or end."""
-STEPS = 600
-"""Of them at all springs together, at most: an array of many springs has a coarser grid."""
-EDGES = 60
-"""Of them in one run, at most."""
-SHORTEST = 2
-"""Of those times, how many anything lasts."""
-SMOOTHED = 5
-"""Readings of a thermometer that are taken together."""
-DELAYS_S = (10.0, 30.0, 90.0)
-"""By which heat may come late."""
 MOST = 12
 """Unnamed causes, at most: where more would help, it is no cause of these kinds."""
 ROUNDS = 4
 """Of finding what has no name and searching the library beside it, at most ..."""
-ENOUGH = 15_000
-"""... and none is begun that, if it takes as many simulations as the longest before it, ends after so many: half a minute of
-one core for two 15 min logs of nine springs."""
-SHOWN = ("pickup", "mixing", "sensor", "reading", "share")
-"""Kinds that are the thermometers' own: the springs are as they would be without."""
+ENOUGH = 10_000
+"""... and none is begun that, if it takes as many simulations as the longest search before it, ends after so many: twenty-five
+seconds of one core for two 15 min logs of nine springs."""
 GIVES_ONLY = ("mixing", "crosstalk", "bridge", "plume", "delay")
 """Kinds whose size cannot be negative: they lead on what is there, and a part of it at most."""
+NAMED = "named"
+"""Kind of what is in the library: looked at beside the others, never found here."""
 UNITS = {
     "pickup": "K",
     "bridge": "W/K",
@@ -74,27 +56,6 @@ STEPS_OF_FIT = 14
 
 Found = tuple[Fit, dict[str, Fit], list[tuple[str, Fit]]]
 """As `Search.run` returns it."""
-
-
-@dataclass(frozen=True)
-class Cause:
-    """One kind of unnamed cause at one place, and what a unit of it adds to the readings, thinned (samples, numbers)."""
-
-    kind: str
-    text: str
-    profiles: tuple[np.ndarray | None, ...]
-    """Per run (rows, springs): the heat of a unit, W, or what the thermometers show more, K; None: not in this run."""
-    columns: np.ndarray
-    edges: tuple[int, ...] = ()
-    """Where given, the columns begin at one of these rows each and stay, the last is the end: a window is one less another."""
-
-    spans: tuple[tuple[int, int, int], ...] = ()
-    """Where given, each column acts in one run between two rows only, all of them together: it comes and goes."""
-
-    @property
-    def shown(self) -> bool:
-        """Whether it is the thermometers that show it."""
-        return self.kind in SHOWN
 
 
 @dataclass(frozen=True)
@@ -131,232 +92,6 @@ Beside = tuple[Search, Found, list[Hidden]]
 """A search beside unnamed causes, what it found, and those causes."""
 
 
-def _delayed(power: np.ndarray, time_s: np.ndarray, delay_s: float) -> np.ndarray:
-    step = float(np.median(np.diff(time_s)))
-    keep = math.exp(-step / delay_s)
-    return lfilter([1.0 - keep], [1.0, -keep], power, axis=0)
-
-
-def _thinned(problem: Problem, columns: np.ndarray) -> np.ndarray:
-    """Return columns (count, n) with every THIN rows as one sample, unit noise kept: causes are slower than rows."""
-    out, begin = [], 0
-    for mask in problem.mask:
-        whole = np.zeros((*mask.shape, columns.shape[1]))
-        end = begin + int(mask.sum())
-        whole[mask] = columns[begin:end]
-        out.append(thin(whole))
-        begin = end
-    return np.concatenate(out)
-
-
-def column_of(
-    problem: Problem, fit: Fit, cause: Cause, typical_w: float, begin: int = 0, end: int | None = None
-) -> np.ndarray:
-    """Return what a unit of a cause, from one row to another, adds to the readings of all runs, (count, numbers)."""
-    if cause.spans:
-        alone = [replace(cause, spans=(), profiles=_of_run(cause.profiles, r)) for r in range(len(problem.runs))]
-        parts = [column_of(problem, fit, alone[r], typical_w, first, last) for r, first, last in cause.spans]
-        return np.column_stack(parts)
-    fields = []
-    for r, (run, profile) in enumerate(zip(problem.runs, cause.profiles, strict=True)):
-        if profile is None:
-            fields.append(np.zeros_like(run.temperature_c))
-            continue
-        within = np.zeros_like(profile)
-        within[begin:end] = profile[begin:end]
-        fields.append(within if cause.shown else answers(problem, fit, r, [within], typical_w)[0])
-    return np.concatenate(problem.scaled(fields))[:, None]
-
-
-def _of_run(profiles: Sequence[np.ndarray | None], r: int) -> tuple[np.ndarray | None, ...]:
-    return tuple(one if k == r else None for k, one in enumerate(profiles))
-
-
-def typical_power(problem: Problem, fit: Fit) -> float:
-    """Return the mean power of a spring while it is driven, W."""
-    powers = np.concatenate([power_of(problem, fit, r) for r in range(len(problem.runs))])
-    return float(powers[powers > 0].mean()) if (powers > 0).any() else 1.0
-
-
-def library(problem: Problem, fit: Fit) -> list[Cause]:
-    """Return every unnamed cause, simulated around a fit."""
-    typical = typical_power(problem, fit)
-    profiles: dict[tuple[str, str], list[np.ndarray | None]] = {}
-    columns: dict[tuple[str, str], list[np.ndarray]] = {}
-    windows: list[Cause] = []
-    samples = [len(range(0, len(mask), THIN)) * mask.shape[1] for mask in problem.mask]
-    for r, run in enumerate(problem.runs):
-        power, by_key = power_of(problem, fit, r), fit.as_dict()
-        plant = problem.plant_for(fit.spec, fit.values, r)
-        ambient = problem.ambient_of(r, by_key)
-        shown = simulate_run(plant, run, ambient, by_key)
-        around = np.full(len(run.time_s), plant.get("ambient_c")) if ambient is None else ambient
-        rise = shown - around[:, None]
-        # where something unknown acts, the readings know better than the fit how warm the springs are
-        read = pd.DataFrame(run.temperature_c).rolling(SMOOTHED, center=True, min_periods=1).mean().to_numpy()
-        shown = np.where(np.isfinite(read), read, shown)
-        over = shown - around[:, None]
-        still, blown = plant.get("loss_w_per_k"), plant.get("loss_fan_w_per_k")
-        loss_w_per_k = still + run.fan * (blown - still)
-        lost = over * loss_w_per_k[:, None]
-        acting = _everywhere(problem, run, power, shown, over, lost)
-        heating = [key for key in acting if key[0] not in SHOWN]
-        moved = dict(zip(heating, answers(problem, fit, r, [acting[key] for key in heating], typical), strict=True))
-        for key, profile in acting.items():
-            nothing = [np.zeros((one, 1), dtype=np.float32) for one in samples]
-            profiles.setdefault(key, [None] * len(problem.runs))[r] = profile
-            scaled = np.where(problem.mask[r], moved.get(key, profile) / problem.noise[r], 0.0)
-            columns.setdefault(key, nothing)[r] = thin(scaled[:, :, None])
-        windows += _windows(problem, fit, r, samples, power, lost, rise, loss_w_per_k, typical)
-    everywhere = [Cause(*key, tuple(profiles[key]), np.concatenate(parts)) for key, parts in columns.items()]
-    return everywhere + windows + _often(windows)
-
-
-def _often(windows: Sequence[Cause]) -> list[Cause]:
-    """Return what comes and goes all the time: the windows of one kind and place in all runs, COARSER edges as one."""
-    together: dict[tuple[str, str], list[Cause]] = {}
-    for one in windows:
-        if not one.shown:
-            together.setdefault((one.kind, one.text.partition(", {}")[0]), []).append(one)
-    out = []
-    for (kind, text), parts in together.items():
-        spans, columns = [], []
-        for one in parts:
-            run = next(r for r, profile in enumerate(one.profiles) if profile is not None)
-            for first in range(0, len(one.edges) - 1, COARSER):
-                last = min(first + COARSER, len(one.edges) - 1)
-                spans.append((run, one.edges[first], one.edges[last]))
-                until = one.columns[:, last] if last < one.columns.shape[1] else 0.0
-                columns.append(one.columns[:, first] - until)
-        merged = [
-            next((p.profiles[r] for p in parts if p.profiles[r] is not None), None)
-            for r in range(len(parts[0].profiles))
-        ]
-        out.append(Cause(kind, f"{text} again and again", tuple(merged), np.column_stack(columns), spans=tuple(spans)))
-    return out
-
-
-def _only(k: int, values: np.ndarray, springs: int) -> np.ndarray:
-    out = np.zeros((len(values), springs))
-    out[:, k] = values
-    return out
-
-
-def _everywhere(
-    problem: Problem, run: Run, power: np.ndarray, shown: np.ndarray, over: np.ndarray, lost: np.ndarray
-) -> dict[tuple[str, str], np.ndarray]:
-    """Return, per kind and words, what acts all the time: heat (rows, springs), W, or what thermometers show, K."""
-    springs, (rows, cols) = run.springs, (problem.array.rows, problem.array.cols)
-    place = [divmod(k, cols) for k in range(springs)]
-    ramp = (run.time_s - run.time_s[0]) / max(1.0, run.duration_s)
-    out: dict[tuple[str, str], np.ndarray] = {}
-    for j in range(springs):
-        for k in range(springs):
-            apart = max(abs(a - b) for a, b in zip(place[j], place[k], strict=True))
-            if j == k or (springs > 16 and apart > 2):
-                continue
-            out["crosstalk", f"the drive of spring {j + 1} also heats spring {k + 1}"] = _only(k, power[:, j], springs)
-            seen = _only(k, shown[:, j] - shown[:, k], springs)
-            out["mixing", f"thermometer {k + 1} also sees spring {j + 1}"] = seen
-            if j < k and apart > 1:
-                flow = over[:, j] - over[:, k]
-                text = f"springs {j + 1} and {k + 1} are joined, though no neighbours"
-                out["bridge", text] = _only(k, flow, springs) - _only(j, flow, springs)
-    for words, step in (("above", (1, 0)), ("below", (-1, 0)), ("to the left", (0, 1)), ("to the right", (0, -1))):
-        warmed = np.zeros_like(power)
-        for k, (row, col) in enumerate(place):
-            beside = (row - step[0], col - step[1])
-            if 0 <= beside[0] < rows and 0 <= beside[1] < cols:
-                warmed[:, k] = np.maximum(over[:, beside[0] * cols + beside[1]], 0.0)
-        if warmed.any():
-            out["plume", f"each spring is warmed by the one {words}"] = warmed
-            if run.fan.any():
-                still = (1.0 - run.fan)[:, None]
-                out["plume", f"each spring is warmed by the one {words}, without the fan"] = warmed * still
-    for delay_s in DELAYS_S:
-        out["delay", f"a part of the heat comes {delay_s:g} s late"] = _delayed(power, run.time_s, delay_s) - power
-    out["trend", "all losses change over the run"] = -lost * ramp[:, None]
-    out["trend", "all drives change over the run"] = power * ramp[:, None]
-    amperes = np.sqrt(np.maximum(power, 0.0) / max(1e-12, float(power.mean())))
-    out["pickup", "each thermometer shows its spring's current"] = amperes
-    out["pickup", "each thermometer shows its spring's power"] = power / max(1e-12, float(power.mean()))
-    for k in range(springs):
-        out["trend", f"the loss of spring {k + 1} changes over the run"] = _only(k, -lost[:, k] * ramp, springs)
-        out["trend", f"the drive of spring {k + 1} changes over the run"] = _only(k, power[:, k] * ramp, springs)
-        out["reading", f"thermometer {k + 1} drifts"] = _only(k, ramp, springs)
-        out["heat", f"spring {k + 1} is given heat all the time"] = _only(k, np.ones_like(ramp), springs)
-        if springs > 1:
-            out["pickup", f"thermometer {k + 1} shows its spring's current"] = _only(k, amperes[:, k], springs)
-    return out
-
-
-def _windows(
-    problem: Problem,
-    fit: Fit,
-    r: int,
-    samples: Sequence[int],
-    power: np.ndarray,
-    lost: np.ndarray,
-    rise: np.ndarray,
-    loss_w_per_k: np.ndarray,
-    typical_w: float,
-) -> list[Cause]:
-    """Return what may begin and end in one run: heat, drives, losses and thermometers, each in steps at the edges."""
-    run, mask, noise = problem.runs[r], problem.mask[r], problem.noise[r]
-    step = float(np.median(np.diff(run.time_s)))
-    rows, springs = run.temperature_c.shape
-    grid = max(1, round(GRID_S / step), -(-rows // min(EDGES, max(8, STEPS // springs))))
-    edges = np.arange(0, rows, grid)
-    if len(edges) < 4:
-        return []
-    answer = step_answers(problem, fit, r, edges, typical_w)
-    ends = (*(int(edge) for edge in edges), rows)
-    begin = sum(samples[:r])
-
-    def cause(kind: str, text: str, profile: np.ndarray, block: np.ndarray) -> Cause:
-        """Return the cause of a block of fields (edges, rows, springs)."""
-        columns = np.zeros((sum(samples), len(block)), dtype=np.float32)
-        scaled = np.where(mask, block / noise, 0.0)
-        columns[begin : begin + samples[r]] = thin(np.moveaxis(scaled, 0, 2))
-        profiles = [None] * len(problem.runs)
-        profiles[r] = profile
-        return Cause(kind, f"{text}, {{}} of run {r + 1}", tuple(profiles), columns, ends)
-
-    def shaped(k: int, heat: np.ndarray) -> np.ndarray:
-        """Return the answers to a heat of spring k that begins at each edge, from those to constant heat between edges."""
-        mean = np.add.reduceat(heat, edges) / np.diff(ends)
-        steps = answer["heat", k]
-        between = steps - np.concatenate([steps[1:], np.zeros_like(steps[:1])])
-        return np.cumsum((mean[:, None, None] * between)[::-1], axis=0)[::-1]
-
-    out = []
-    everything_lost, everything_driven, warmer = (np.zeros_like(answer["heat", 0]) for _ in range(3))
-    one = np.ones(rows)
-    for k in range(springs):
-        everything_lost += shaped(k, -lost[:, k])
-        warmer += shaped(k, loss_w_per_k)
-        driven = shaped(k, power[:, k])
-        everything_driven += driven
-        jumps = np.zeros((len(edges), rows, springs))
-        for number, edge in enumerate(edges):
-            jumps[number, edge:, k] = 1.0
-        out.append(cause("contact", f"the drive of spring {k + 1} changes", _only(k, power[:, k], springs), driven))
-        out.append(cause("heat", f"spring {k + 1} is given heat", _only(k, one, springs), answer["heat", k]))
-        out.append(cause("sensor", f"thermometer {k + 1} jumps", _only(k, one, springs), jumps))
-        text = f"thermometer {k + 1} shows more of its spring's rise"
-        # of the fit's own rise: a part of the readings would explain all that they show
-        out.append(cause("share", text, _only(k, rise[:, k], springs), jumps * rise))
-    out.append(cause("gust", "all losses change", -lost, everything_lost))
-    out.append(cause("surroundings", "the surroundings are warmer", np.outer(loss_w_per_k, np.ones(springs)), warmer))
-    if springs > 1:
-        every = np.zeros((len(edges), rows, springs))
-        for number, edge in enumerate(edges):
-            every[number, edge:] = 1.0
-        out.append(cause("sensor", "all thermometers jump", np.ones((rows, springs)), every))
-        out.append(cause("supply", "all drives change", power, everything_driven))
-    return out
-
-
 def _starts(problem: Problem) -> list[np.ndarray]:
     """Return what errors of the first readings do, as columns (count, springs)."""
     out, begin = [], 0
@@ -384,28 +119,36 @@ def _least_squares(gram: np.ndarray, moment: np.ndarray) -> tuple[np.ndarray, in
     return vector[:, used] @ ((vector[:, used].T @ (moment / scale)) / value[used]) / scale, int(used.sum())
 
 
+def _within(window: Cause, found: Sequence[Hidden]) -> bool:
+    """Return whether what acts for a while is part of what comes and goes as it likes already."""
+    often = f"{window.text.partition(', {}')[0]} again and again"
+    return any(one.cause.bumps and one.text == often for one in found)
+
+
 def find(
-    problem: Problem, fit: Fit, kinds: Sequence[Cause], already: Sequence[Hidden], most: int = MOST
+    problem: Problem, fit: Fit, kinds: Sequence[Cause], already: Sequence[Hidden], most: int = MOST, searched: int = 0
 ) -> list[Hidden]:
     """Return the unnamed causes that a fit's residual calls for, beside those that are taken out already.
 
-    The best first, while it beats its price and explains a fair share of what is left.
+    The best first, while it beats its price and explains a fair share of what is left, and more than any name would where
+    there are more than the library was `searched` beside: it is searched again before more is found.
     """
     jac = fit.jacobian if fit.jacobian is not None else np.zeros((problem.count, 0))
     used = jac[:, np.linalg.norm(jac, axis=0) > 1e-6]
     taken = [used, *_starts(problem), *([] if problem.unnamed is None else [problem.unnamed])]
-    basis = np.linalg.qr(_thinned(problem, np.column_stack(taken)))[0]
-    left = _thinned(problem, np.concatenate(problem.scaled(problem.without_errors(fit.residual)))[:, None])[:, 0]
+    basis = np.linalg.qr(thinned(problem, np.column_stack(taken)))[0]
+    left = thinned(problem, np.concatenate(problem.scaled(problem.without_errors(fit.residual)))[:, None])[:, 0]
     left = left - basis @ (basis.T @ left)
     typical = typical_power(problem, fit)
     found = list(already)
     samples = problem.count / fit_factor(problem, fit)
-    single = [one for one in kinds if not one.edges and not one.spans]
-    known = {one.text for one in already}
-    often = [one for one in kinds if one.spans and one.text not in known]
+    single = [one for one in kinds if not one.edges and not one.bumps]
+    # two that come and go as they like would explain whatever all springs do together, and leave nothing to be named
+    often = [] if any(one.cause.bumps for one in already) else [one for one in kinds if one.bumps]
     windows = [one for one in kinds if one.edges]
     matrix = np.column_stack([one.columns[:, 0] for one in single])
     either = np.array([one.kind not in GIVES_ONLY for one in single])
+    named = np.array([one.kind == NAMED for one in single])
     whole = (matrix**2).sum(axis=0)
     power = whole - ((basis.T @ matrix) ** 2).sum(axis=0)
     grams, often_grams = ([_gram(one.columns, basis) for one in some] for some in (windows, often))
@@ -414,9 +157,12 @@ def find(
         moment = matrix.T @ left
         possible = (power > 1e-3 * whole) & (either | (moment > 0))
         gain = np.where(possible, moment**2 / np.maximum(power, 1e-12), 0.0)
-        k = int(np.argmax(gain))
+        names = float(gain[named].max(initial=0.0))
+        k = int(np.argmax(np.where(named, 0.0, gain)))
         drop, vector, best, span = float(gain[k]), matrix[:, k], single[k], (0, None)
         for one, gram in zip(windows, grams, strict=True):
+            if _within(one, found):
+                continue
             value, a, b = _best_window(one.columns.T @ left, gram)
             if value > drop:
                 vector = one.columns[:, a] - (0.0 if b == len(gram) else one.columns[:, b])
@@ -435,7 +181,7 @@ def find(
             explained = float(size @ moment)
             if (more := nats_of(explained, numbers)) > nats:
                 nats, drop, vectors, best, span = more, explained, one.columns, one, (0, None)
-        if nats < LEAST_NATS or drop < SHARE * max(0.0, rest - len(left)):
+        if nats < LEAST_NATS or drop < SHARE * max(0.0, rest - len(left)) or (len(found) > searched and names > drop):
             break
         text = best.text
         if best.edges:
@@ -445,6 +191,8 @@ def find(
         if any(text == one.text for one in found):
             break  # what is left of one of its size is no second of it
         found.append(Hidden(best, text, span, column_of(problem, fit, best, typical, *span)))
+        if best.bumps:
+            often, often_grams = [], []
         vectors = vectors - basis @ (basis.T @ vectors)
         units = np.linalg.qr(vectors[:, np.linalg.norm(vectors, axis=0) > 1e-3])[0]
         left = left - units @ (units.T @ left)
@@ -461,11 +209,14 @@ def _heat(problem: Problem, hidden: Sequence[Hidden]) -> list[np.ndarray] | None
     given = [one for one in hidden if one.inside is not None]
     out = [np.zeros_like(run.drive) for run in problem.runs]
     for one in given:
-        always = [(r, *one.rows) for r in range(len(out))]
-        for size, acts in zip(one.inside, [[span] for span in one.cause.spans] or [always], strict=True):
-            for r, begin, end in acts:
-                if (profile := one.cause.profiles[r]) is not None:
-                    out[r][begin:end] += size * profile[begin:end]
+        if one.cause.bumps:
+            for size, (r, *about) in zip(one.inside, one.cause.bumps, strict=True):
+                out[r] += size * bump(*about, len(out[r])) * one.cause.profiles[r]
+            continue
+        (size,), (begin, end) = one.inside, one.rows
+        for heat, profile in zip(out, one.cause.profiles, strict=True):
+            if profile is not None:
+                heat[begin:end] += size * profile[begin:end]
     return out if given else None
 
 
@@ -524,8 +275,9 @@ def weighed(problem: Problem, fit: Fit, hidden: Sequence[Hidden]) -> list[tuple[
     left = np.concatenate(problem.scaled(problem.without_errors(bare.residual)))
     for one in hidden:
         left += 0.0 if one.inside is None else one.column @ one.inside
-    inverse = np.linalg.pinv((matrix / scale).T @ (matrix / scale), rcond=1e-10)
-    size = inverse @ ((matrix / scale).T @ left)
+    gram, moment = (matrix / scale).T @ (matrix / scale), (matrix / scale).T @ left
+    inverse = np.linalg.pinv(gram, rcond=1e-10)
+    size = inverse @ moment
     rest = left - (matrix / scale) @ size
     problem.leave_out(columns, problem.heat)
     factor = fit_factor(problem, problem.evaluate(fit))
@@ -536,7 +288,11 @@ def weighed(problem: Problem, fit: Fit, hidden: Sequence[Hidden]) -> list[tuple[
         own = slice(begin, begin + one.column.shape[1])
         begin = own.stop
         numbers = begin - own.start
-        drop = float(size[own] @ np.linalg.solve(inverse[own, own] + 1e-12 * np.eye(numbers), size[own]))
+        # all at once of one that comes and goes is what a number of the model does, too: only what is left without it tells
+        other = np.r_[: own.start, own.stop : len(size)]
+        drop = float(
+            moment @ size - moment[other] @ np.linalg.pinv(gram[np.ix_(other, other)], rcond=1e-10) @ moment[other]
+        )
         nats = 0.5 * drop / spread - 0.5 * (numbers - 1) * math.log(max(2.0, problem.count / factor))
         errors = np.sqrt(np.maximum(np.diag(inverse[own, own]), 0.0) * spread) / scale[own]
         value = (
@@ -548,13 +304,21 @@ def weighed(problem: Problem, fit: Fit, hidden: Sequence[Hidden]) -> list[tuple[
     return out
 
 
-def _with_fewer(problem: Problem, first: Search, final: Fit, kinds: Sequence[Cause]) -> Fit | None:
-    """Return the best fit of some of the names, or none, beside the one unnamed cause that it calls for: where that explains
-    more than all the names, the others may stand in for it. None where it does not.
+def _named(problem: Problem, first: Search, fit: Fit) -> list[Cause]:
+    """Return what the library's own candidates would add to the readings around a fit: a name goes before what has none."""
+    screen = Search(problem, first.candidates, first.base).screen(fit)
+    kept = [k for k, owner in enumerate(screen.owner) if not screen.candidates[owner].flexible]
+    columns = thinned(problem, screen.directions[:, kept])
+    return [Cause(NAMED, screen.candidates[screen.owner[k]].effect, (), columns[:, [j]]) for j, k in enumerate(kept)]
+
+
+def _with_fewer(problem: Problem, first: Search, final: Fit, kinds: Sequence[Cause]) -> tuple[Fit, list[Hidden]] | None:
+    """Return the best fit of some of the names, or none, beside the one unnamed cause that it calls for, and that: where it
+    explains more than all the names, the others may stand in for it. None where it does not.
     """
     names = [effect for effect in final.spec.effects if effect not in first.base.spec.effects]
     kept = {()} | {(one,) for one in names} | {tuple(other for other in names if other != one) for one in names}
-    best: Fit | None = None
+    best: tuple[Fit, list[Hidden]] | None = None
     for some in sorted(kept - {tuple(names)}):
         fit = final
         for effect in names:
@@ -568,8 +332,8 @@ def _with_fewer(problem: Problem, first: Search, final: Fit, kinds: Sequence[Cau
         problem.leave_out(grown[0].column)
         beside = problem.fit(fit.spec, fit.as_dict(), tolerance=1e-3, max_steps=STEPS_OF_FIT)
         problem.leave_out(None)
-        if beside.sse < (final if best is None else best).sse:
-            best = replace(beside, jacobian=None)
+        if beside.sse < (final if best is None else best[0]).sse:
+            best = replace(beside, jacobian=None), grown
     return best
 
 
@@ -637,16 +401,17 @@ def _beside(problem: Problem, first: Search) -> Search:
 def _search_beside(problem: Problem, first: Search, final: Fit) -> Beside | None:
     first.progress("causes without a name")
     kinds = library(problem, final)
-    if (nearer := _with_fewer(problem, first, final, kinds)) is not None:
-        final, kinds = nearer, library(problem, nearer)
     hidden: list[Hidden] = []
+    if (nearer := _with_fewer(problem, first, final, kinds)) is not None:
+        final, hidden = nearer
+        kinds = library(problem, final)
+        # the same cause as it is by the numbers that it had spoilt
+        hidden = [replace(one, cause=next(k for k in kinds if k.text == one.cause.text)) for one in hidden]
     out = names = None
     left_out = None, None
-    begun = longest = 0
+    begun, longest = 0, 0
     for turn in range(ROUNDS):
-        if turn:
-            longest = max(longest, problem.simulations - begun)
-        begun = problem.simulations
+        longest, begun = max(longest, problem.simulations - begun), problem.simulations
         if turn and begun + longest > ENOUGH:
             break
         hidden = taken_out(problem, final, hidden)
@@ -654,14 +419,15 @@ def _search_beside(problem: Problem, first: Search, final: Fit) -> Beside | None
         if final.jacobian is None:
             shown = problem.predictions(final.spec, final.values)
             final = replace(final, jacobian=problem.jacobian(final.spec, final.values, shown))
-        grown = find(problem, final, kinds, hidden)
-        if len(grown) == len(hidden):
+        searched = len(hidden) if turn else 0
+        grown = find(problem, final, [*kinds, *_named(problem, first, final)], hidden, searched=searched)
+        if len(grown) == searched:
             break
         problem.leave_out(np.column_stack([one.column for one in grown]), problem.heat)
         # what they add depends on the numbers, which they spoilt until now
         nearer = problem.fit(final.spec, final.as_dict(), tolerance=1e-3, max_steps=STEPS_OF_FIT)
         grown = taken_out(problem, nearer, grown)
-        search, left_out = _beside(problem, first), (problem.unnamed, problem.heat)
+        search, taken = _beside(problem, first), (problem.unnamed, problem.heat)
         # what only helps together was looked for before: beside a cause without a name, what shows alone is enough
         result = search.run(downwards=False)
         final = result[0]
@@ -669,11 +435,13 @@ def _search_beside(problem: Problem, first: Search, final: Fit) -> Beside | None
         hidden = _needed(problem, final, [one.around(problem, final) for one in grown])
         near, given = simulated(problem, final, hidden) if hidden else (final, hidden)
         if near is not final:
-            search, left_out = _beside(problem, first), (problem.unnamed, problem.heat)
+            search, taken = _beside(problem, first), (problem.unnamed, problem.heat)
             result = search.settle(near)
             final = result[0]
             hidden = _needed(problem, final, [one.around(problem, final) for one in given])
-        out = (search, result, hidden)
+        if out is not None and final.sse > out[1][0].sse:
+            break  # beside what this round found, the names do not come back that explained more
+        out, left_out = (search, result, hidden), taken
         if len(hidden) == len(grown) and not unexplained(problem, final):
             break
         # the same names twice: what more without a name would be found beside them changes them no more

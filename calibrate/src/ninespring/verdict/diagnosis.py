@@ -25,7 +25,7 @@ from ..logs import condense
 from ..logs.run import Run
 from ..models import Array, Model
 from ..search import search, unnamed
-from ..search.certainty import CERTAIN, NAMED, witness
+from ..search.certainty import CERTAIN, NAMED, Witness, witness
 from ..search.evidence import EQUIVALENT, difference, excess, log_evidence, unexplained
 from . import contacts, experiments, plausibility, resistance, runs_apart, unknown_heat
 from .residual import depends_on
@@ -268,20 +268,27 @@ def _diagnose(
     # where the ambient was not logged, that it drifted is no stand-in
     guessed = all(run.ambient_c is None for run in problem.runs)
     free_to_bend = (*RUNS_OWN, *(["ambient_drift"] if guessed else []))
-    witnesses = {
-        effect: witness(problem, final, effect, other, found.is_flexible(final, effect) and effect not in free_to_bend)
-        for effect, other in without.items()
-    }
-    # beside causes without a name that leave structure themselves, a name must explain more than it leaves
-    least = MOST_OF_IT if hidden and unexplained(problem, final) else 0.0
-    doubtful = [effect for effect, one in witnesses.items() if one.probability() < NAMED or one.share < least]
-    if doubtful:
+    witnesses: dict[str, Witness] = {}
+    judge = found
+    while fresh := [effect for effect in without if effect not in witnesses]:
+        for effect in fresh:
+            flexible = found.is_flexible(final, effect) and effect not in free_to_bend
+            witnesses[effect] = witness(problem, final, effect, without[effect], flexible)
+        # beside causes without a name that leave structure themselves, a name must explain more than it leaves
+        least = MOST_OF_IT if hidden and unexplained(problem, final) else 0.0
+        doubtful = [
+            effect for effect in fresh if witnesses[effect].probability() < NAMED or witnesses[effect].share < least
+        ]
+        if not doubtful:
+            break
         # judged together, beside one another: what one of them stood in for does not count against the rest
         for effect in doubtful:
-            final = found.reduced(final, effect)
+            final = judge.reduced(final, effect)
+        # another may be what it stood in for
+        others = [one for one in judge.candidates if one.effect not in doubtful]
+        judge = search.Search(problem, others, found.base, progress, found.fits)
+        final, without, contenders = judge.settle(judge.forward(final))
         final = _finish(problem, final)
-        without = {effect: found.reduced(final, effect) for effect in without if effect not in doubtful}
-        contenders = found.rivals(final, without)
     final = runs_apart.with_spread(problem, final)
     left_over = unexplained(problem, final) or bool(hidden)
     adopted = [e for e in final.spec.effects if e not in base.spec.effects]
