@@ -78,6 +78,36 @@ def test_a_name_goes_before_what_has_none(make_log) -> None:
     assert [one.cause.kind for one in before_it] == ["crosstalk"] and len(alone) > 1
 
 
+def drying(columns: dict[str, np.ndarray]) -> None:
+    """Let every loss rise by a third over the run, and log no ambient."""
+    over = np.column_stack([columns[f"t{k + 1}_c"] for k in range(9)]) - 20.0
+    ramp = np.linspace(0.0, 1.0, len(over))[:, None]
+    astray(columns, -0.34 * ramp * 0.006 * over / (1.0 + 0.34 * ramp), {})
+    del columns["ambient_c"]
+
+
+def test_a_cause_that_stood_for_names_is_taken_as_it_is_by_the_numbers_that_it_had_spoilt(
+    make_log, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    libraries: list[list[unnamed.Cause]] = []
+    taken: list[unnamed.Hidden] = []
+    library, taken_out = unnamed.library, unnamed.taken_out
+
+    def library_of(*around: Any) -> list[unnamed.Cause]:
+        libraries.append(library(*around))
+        return libraries[-1]
+
+    def take(problem: Any, fit: Any, hidden: list[unnamed.Hidden]) -> list[unnamed.Hidden]:
+        taken.extend([] if taken else hidden)
+        return taken_out(problem, fit, hidden)
+
+    monkeypatch.setattr(unnamed, "library", library_of)
+    monkeypatch.setattr(unnamed, "taken_out", take)
+    found = diagnosed(make_log, change=drying)
+    assert not found["effects"] and found["unnamed"][0]["text"].startswith("all losses change over the run")
+    assert len(libraries) == 2 and taken and all(any(one.cause is k for k in libraries[1]) for one in taken)
+
+
 def swinging(columns: dict[str, np.ndarray], period_s: float) -> np.ndarray:
     """Return heat by which every spring is heated more and less, by a third, (rows, springs), W."""
     power = np.column_stack([columns[f"i{k + 1}_a"] ** 2 * 0.2 for k in range(9)])
