@@ -77,8 +77,8 @@ public:
         }
     }
 
-    /* Spring 1 and no other; the others are on. */
-    void expect_only_the_first(safety_fault_t fault)
+    /* Spring 1 and no other; the others have at least so much austenite. */
+    void expect_only_the_first(safety_fault_t fault, double least = ON)
     {
         const board_view_t seen = mega.view();
         TEST_ASSERT_EQUAL_UINT8(SAFETY_FAULT_NONE, seen.board_fault);
@@ -88,7 +88,7 @@ public:
             if (k == 0 && fault != SAFETY_FAULT_NONE) {
                 TEST_ASSERT_TRUE(board_duty(mega.raw(), 0) == 0.0);
             } else if (k != CENTRE) {
-                TEST_ASSERT_TRUE_MESSAGE(phase(k) >= ON, what().c_str());
+                TEST_ASSERT_TRUE_MESSAGE(phase(k) >= least, what().c_str());
             }
         }
     }
@@ -204,7 +204,8 @@ void a_fingertip_on_every_spring_is_lived_with_within_bounds()
     switch_on(w.plant(), "transformation_shift");
     set(w.plant(), "transformation_shift_k", 8.0);
     w.until(500);
-    w.expect_only_the_first(SAFETY_FAULT_NONE);
+    /* 5 % of phase are as much as a line differs by from one heating to the next */
+    w.expect_only_the_first(SAFETY_FAULT_NONE, LEFT);
     w.expect_truth_within_bounds();
 }
 
