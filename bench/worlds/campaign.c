@@ -149,6 +149,14 @@ static void sensor_noise(run_case_t *run, random_t *random, double value)
     }
 }
 
+static void slow_noise(run_case_t *run, random_t *random, double value)
+{
+    (void)random;
+    for (int k = 0; k < count(run); k++) {
+        run->world.spring[k].sensor.slow_voltage_noise_v = value;
+    }
+}
+
 /* Half of them while the springs still heat. */
 static double fault_s(const run_case_t *run, random_t *random)
 {
@@ -355,6 +363,7 @@ static const struct {
     {"couplings", couplings, 2.0, false, "couplings x 0.5 to 2"},
     {"sensor", sensor_errors, 0.03, false, "gain off by 3 %, offsets by 5 mA and 8 mV"},
     {"noisy", sensor_noise, 4.0, false, "sensor noise x 4"},
+    {"slow_noise", slow_noise, 0.001, false, "noise of 1 mV that lasts for a second"},
     {"noiseless", sensor_noise, 0.0, false, "no sensor noise at all: only its steps"},
     {"freezing", freezing, 0.0, true, "a driven spring's sensor freezes"},
     {"supply", supply, 0.0, false, "supply 4.2 to 5.5 V"},

@@ -458,9 +458,10 @@ static void update(drive_policy_t *policy, const drive_policy_input_t *input, ui
     drive_policy_spring_t *s = &policy->spring[k];
     const uint16_t level_permille = input->level_permille[k];
     const bool driven = level_permille != 0 && input->allowed[k];
-    const float before_c = policy->estimator.spring[k].last_c;
+    const int16_t before_c7 = policy->estimator.spring[k].last_c7;
     spring_estimator_update(&policy->estimator, input->model, k);
-    const float rise_k_per_s = (policy->estimator.spring[k].last_c - before_c) * (1.0f / TURN_S);
+    const int16_t rise_c7 = (int16_t)(policy->estimator.spring[k].last_c7 - before_c7);
+    const float rise_k_per_s = spring_c(rise_c7) * (1.0f / TURN_S);
     s->rise_k_per_s += (rise_k_per_s - s->rise_k_per_s) * RISE_SHARE;
     s->released = s->released || driven; /* also where its turn comes before it is off */
     s->severity = driven ? 0.0f : severity(policy, input->model, k, s);

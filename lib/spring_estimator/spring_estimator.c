@@ -5,7 +5,8 @@
 #include "invariant.h"
 #include "spring_estimator_internal.h"
 
-#define NOISE_FIRST 0.002f
+#define NOISE_FIRST      0.002f
+#define SLOW_NOISE_FIRST 0.0007f /* 0.2 mV of 0.3 V, a twentieth of a step */
 
 #define CAPACITY_SD    0.09f   /* of a declared heat capacity: 15 %, uniform */
 #define LOSS_DRIFT_SD  0.0005f /* of the declared loss, in a second: 3 % in an hour */
@@ -122,9 +123,10 @@ static void begin(spring_belief_t *b, float temperature_c, float sd_k, uint8_t p
                            .loss_variance = learnt.loss_sd_w_per_k * learnt.loss_sd_w_per_k,
                            .possible = possible,
                            .noise = NOISE_FIRST,
+                           .slow_noise = SLOW_NOISE_FIRST,
                            .offset_sd_v = OFFSET_SD_V,
                            .learnt = learnt,
-                           .last_c = temperature_c};
+                           .last_c7 = as_c7(temperature_c)};
 }
 
 void spring_estimator_init(spring_estimator_t *e, thermal_model_t *model)
@@ -174,7 +176,7 @@ static float predict(const spring_estimator_t *e, spring_belief_t *b, const ther
                      uint8_t k, float power_w)
 {
     const int16_t now_c7 = thermal_model_temperature_c7(model, k);
-    const float now_c = spring_c(now_c7);
+    const float rise_k = spring_c((int16_t)(now_c7 - b->last_c7));
     const float balance_w = 1e-6f * (float)thermal_model_power_to_hold_uw(model, k, now_c7);
     const float per_w = e->turn_k_per_w;
     const float above_k = above_ambient_k(model, k);
@@ -188,7 +190,7 @@ static float predict(const spring_estimator_t *e, spring_belief_t *b, const ther
     b->variance_k2 = keeps * keeps * b->variance_k2 + by_loss * (kept + kept + joins);
     b->covariance = kept + joins;
     b->loss_variance += e->loss_drift;
-    b->capacity_k = keeps * b->capacity_k + CAPACITY_SD * (now_c - b->last_c);
+    b->capacity_k = keeps * b->capacity_k + CAPACITY_SD * rise_k;
     if (b->variance_k2 < LEAST_SD_K * LEAST_SD_K) {
         b->variance_k2 = LEAST_SD_K * LEAST_SD_K;
     }
@@ -196,10 +198,10 @@ static float predict(const spring_estimator_t *e, spring_belief_t *b, const ther
     if (b->gone_k > 0.0f) {
         /* where a contact has moved, what it takes up to transform may warm it */
         const bool by_contact = b->heating && b->unsteady != 0;
-        const float latent_k = by_contact ? fmaxf(heat_k - (now_c - b->last_c), 0.0f) : 0.0f;
+        const float latent_k = by_contact ? fmaxf(heat_k - rise_k, 0.0f) : 0.0f;
         b->gone_k = keeps * b->gone_k + per_w * above_k * b->gone_w_per_k + latent_k;
     }
-    b->last_c = now_c;
+    b->last_c7 = now_c7;
     return heat_k;
 }
 
@@ -218,7 +220,7 @@ float spring_see(const spring_estimator_t *e, spring_belief_t *b, thermal_model_
     const float left = 1.0f - gain;
     const float by_loss = b->covariance * per_total;
     spring_set_temperature(model, k, seen_c - left * error_k, from);
-    b->last_c = spring_now_c(model, k);
+    b->last_c7 = thermal_model_temperature_c7(model, k);
     b->seen = true;
     b->shift_k = spring_clamp(b->shift_k - fminf(b->shift_variance_k2 * per_total, gain) * error_k,
                               -SHIFT_MOST_K, SHIFT_MOST_K);
@@ -249,7 +251,7 @@ void spring_keep_above(const spring_estimator_t *e, spring_belief_t *b, thermal_
             b->lost = 1.0f;
         }
         spring_set_temperature(model, k, limit_c, SPRING_PHASE_AUSTENITE);
-        b->last_c = spring_now_c(model, k);
+        b->last_c7 = thermal_model_temperature_c7(model, k);
     }
 }
 
@@ -286,7 +288,7 @@ static void look(spring_estimator_t *e, thermal_model_t *model, uint8_t k)
     begin(b, middle_c, UNIFORM_SD * spring_c((int16_t)(high_c7 - low_c7)), phase);
     spring_set_temperature(model, k, middle_c,
                            austenite > 0.5f ? SPRING_PHASE_AUSTENITE : SPRING_PHASE_MARTENSITE);
-    b->last_c = spring_now_c(model, k);
+    b->last_c7 = thermal_model_temperature_c7(model, k);
     b->fresh = fresh;
     b->seen = true;
     if (heating) {
@@ -324,12 +326,12 @@ static void cool(const spring_estimator_t *e, spring_belief_t *b, const thermal_
 void spring_estimator_update(spring_estimator_t *e, thermal_model_t *model, uint8_t k)
 {
     spring_belief_t *b = &e->spring[k];
-    const float before_c = b->last_c;
+    const int16_t before_c7 = b->last_c7;
     b->seen = false;
     const float share = spring_take_readings(b);
     const float power_w = b->reads ? b->current_a * b->current_a * b->ohm : 0.0f;
     const float heat_k = predict(e, b, model, k, power_w);
-    const float moved_k = b->last_c - before_c;
+    const float moved_k = spring_c((int16_t)(b->last_c7 - before_c7));
     b->disturbance_k *= FORGETS;
     if (b->heating && (b->reads || b->fresh == 0)) { /* while a current settles, who knows */
         /* a spring that waits cools by no less than the least loss: more would hide a finish */

@@ -5,23 +5,29 @@
 #define QUIET_K     0.08f /* a turn's: 0.3 K/s */
 #define QUIET_TURNS 40    /* 10 s: the average has settled */
 /* Of a turn, 60 s: what the line follows is no loss of phase. */
-#define LINE_SHARE     (1.0f / 240.0f)
-#define LOSS_LEAST     0.0012f /* of the resistance: what a sensor's steps leave in the average */
-#define LEAST_AT_A     1.4f    /* at this current, and as 1 / I below it */
-#define NOISE_IN_SLOW  0.18f   /* of one turn's, with all turns in it: sqrt(share / (2 - share)) */
-#define ANCHOR_K       3.0f    /* 0.45 % of the resistance by the largest coefficient */
-#define SURE_SDS       5.0f
-#define SUSPECTED      0.6f /* of what is sure: 3 of 5 */
-#define OTHER_WAY      3.0f /* times as much: an intermediate phase, where drifts go either way */
-#define CONFIRM_TURNS  2
-#define LASTING_TURNS  60    /* 15 s of suspicion are as sure */
-#define LARGE_LOSS     0.04f /* no hold drifts so far: the transformation may have moved */
-#define LARGE_SD_K     5.0f
-#define CROSSING_SD_K  1.0f
-#define APART_PER_A    0.5f    /* between two currents, as of 3 and 1.2 A */
-#define OFFSET_LEAST_V 0.0005f /* what a turn's steps of 4 mV leave, and its noise */
-#define OFFSET_SDS     3.0f
-#define AWAY_LEAST_K   1.0f /* less tells nothing of a coefficient */
+#define LINE_SHARE    (1.0f / 240.0f)
+#define LOSS_LEAST    0.0012f /* of the resistance: what a sensor's steps leave in the average */
+#define LEAST_AT_A    1.4f    /* at this current, and as 1 / I below it */
+#define NOISE_IN_SLOW 0.18f   /* of one turn's, with all turns in it: sqrt(share / (2 - share)) */
+/* Mean size of a second difference of averages, each of which still has a third of the one before
+ * in it. */
+#define SLOW_BEND_TO_SD  0.68f
+#define SLOW_NOISE_MOST  0.01f
+#define SLOW_NOISE_RISES 0.06f /* 70 s: what is taken for a loss is heated */
+#define SLOW_NOISE_FALLS 0.03f
+#define ANCHOR_K         3.0f /* 0.45 % of the resistance by the largest coefficient */
+#define SURE_SDS         5.0f
+#define SUSPECTED        0.6f /* of what is sure: 3 of 5 */
+#define OTHER_WAY        3.0f /* times as much: an intermediate phase, where drifts go either way */
+#define CONFIRM_TURNS    2
+#define LASTING_TURNS    60    /* 15 s of suspicion are as sure */
+#define LARGE_LOSS       0.04f /* no hold drifts so far: the transformation may have moved */
+#define LARGE_SD_K       5.0f
+#define CROSSING_SD_K    1.0f
+#define APART_PER_A      0.5f    /* between two currents, as of 3 and 1.2 A */
+#define OFFSET_LEAST_V   0.0005f /* what a turn's steps of 4 mV leave, and its noise */
+#define OFFSET_SDS       3.0f
+#define AWAY_LEAST_K     1.0f /* less tells nothing of a coefficient */
 /* Of an average: so little phase may be lost unseen, and it tells anew in 2 x 16 turns. */
 #define LINE_VARIANCE (32.0f * LOSS_LEAST * LOSS_LEAST)
 #define BACK_SHARE    0.5f  /* of a loss: as near to being back as to being gone */
@@ -49,7 +55,8 @@ static void average_anew(spring_belief_t *b)
 
 static float slow_variance(const spring_belief_t *b, float share)
 {
-    return b->noise * b->noise * (b->averaged < SLOW_TURNS ? share : NOISE_IN_SLOW * NOISE_IN_SLOW);
+    const float averages = b->averaged < SLOW_TURNS ? share : NOISE_IN_SLOW * NOISE_IN_SLOW;
+    return fmaxf(b->noise * b->noise * averages, b->slow_noise * b->slow_noise);
 }
 
 /* What it reads on average now is what it reads with the phase that it has. Rough: it still moves,
@@ -105,7 +112,7 @@ void spring_take_back(const spring_estimator_t *e, spring_belief_t *b, thermal_m
     const float more_k = b->gone_k;
     const float less_w_per_k = b->gone_w_per_k;
     spring_set_temperature(model, k, spring_now_c(model, k) + more_k, SPRING_PHASE_AUSTENITE);
-    b->last_c = spring_now_c(model, k);
+    b->last_c7 = thermal_model_temperature_c7(model, k);
     b->seen = true;
     spring_correct_loss(e, b, -less_w_per_k);
     b->variance_k2 += more_k * more_k;
@@ -294,6 +301,27 @@ static bool slope_explains(const spring_belief_t *b, float tolerance)
     return moved > fminf(most, least) - tolerance && moved < fmaxf(most, least) + tolerance;
 }
 
+/* Noise that the average does not take away, as it is slower than a turn. Second differences, 4 s
+ * apart: phase that goes steadily does not show in them. */
+static void take_slow_noise(spring_belief_t *b)
+{
+    spring_line_t *line = &b->run.line;
+    if (b->quiet == 0) {
+        line->rest_ohm[0] = line->rest_ohm[1] = 0.0f;
+    }
+    if (b->quiet % SLOW_TURNS != 0 || b->quiet == 0) {
+        return;
+    }
+    if (line->rest_ohm[1] > 0.0f) {
+        const float bend = fabsf(b->slow_ohm - 2.0f * line->rest_ohm[0] + line->rest_ohm[1]);
+        const float more =
+            fminf(SLOW_BEND_TO_SD * bend / b->slow_ohm, SLOW_NOISE_MOST) - b->slow_noise;
+        b->slow_noise += more * (more > 0.0f ? SLOW_NOISE_RISES : SLOW_NOISE_FALLS);
+    }
+    line->rest_ohm[1] = line->rest_ohm[0];
+    line->rest_ohm[0] = b->slow_ohm;
+}
+
 /* A phase that is kept changes the resistance no faster than temperature does. */
 void spring_holding_watch(const spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model,
                           uint8_t k, float moved_k, float share)
@@ -304,7 +332,8 @@ void spring_holding_watch(const spring_estimator_t *e, spring_belief_t *b, therm
     }
     b->quiet = fabsf(moved_k) > QUIET_K ? 0
                : b->quiet < UINT8_MAX   ? (uint8_t)(b->quiet + 1)
-                                        : UINT8_MAX;
+                                        : (uint8_t)(UINT8_MAX + 1 - SLOW_TURNS); /* and goes on */
+    take_slow_noise(b);
     spring_line_t *line = &b->run.line;
     line->way_k += moved_k;
     line->slow_k += (line->way_k - line->slow_k) * share;

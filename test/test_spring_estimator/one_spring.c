@@ -83,9 +83,19 @@ double distance_k(void)
     return truth.temperature_c - truth.shift_k - 78.0;
 }
 
+static double one_to_minus_one(void)
+{
+    return (double)(random_bits() % 2001u) / 1000.0 - 1.0;
+}
+
 static void read_sensor(double current_a, int16_t *ma, int16_t *mv)
 {
-    const double noise_v = truth.noise_v * ((double)(random_bits() % 2001u) / 1000.0 - 1.0);
+    static double slow; /* of standard deviation 1 */
+    double noise_v = truth.noise_v * one_to_minus_one();
+    if (truth.slow_noise_v > 0.0) {
+        slow = slow * 0.98 + 0.345 * one_to_minus_one();
+        noise_v += truth.slow_noise_v * slow;
+    }
     switch (sensor) {
     case SENSOR_GOOD:
         frozen_ma = (int16_t)lround(1000.0 * current_a);

@@ -19,6 +19,7 @@ typedef struct {
     double contact_ohm;    /* in series, read with it */
     double offset_v;       /* of what is read of the voltage */
     double noise_v;        /* evenly within +- so much, of one reading of the voltage */
+    double slow_noise_v;   /* standard deviation of a noise of it that lasts for a second */
     bool cosine;           /* its phase over temperature: it ends gently */
     double temperature_c, austenite;
 } truth_t;

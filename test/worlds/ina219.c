@@ -7,12 +7,19 @@ static double measured(double true_value, double gain, double offset, double noi
     return step * round(fmin(fmax(value, low), high) / step);
 }
 
-void ina219_read(const ina219_t *sensor, random_t *random, double current_a, double voltage_v,
+void ina219_read(ina219_t *sensor, random_t *random, double current_a, double voltage_v,
                  int16_t *current_ma, int16_t *voltage_mv)
 {
     /* Drawn even if frozen: the other sensors' noise does not depend on this one's fault. */
     double current_noise_a = sensor->current_noise_a * random_noise(random);
     double voltage_noise_v = sensor->voltage_noise_v * random_noise(random);
+    if (sensor->slow_voltage_noise_v > 0.0) {
+        const double share = 0.02 / INA219_SLOW_S;
+        sensor->slow_v +=
+            sqrt(share * (2.0 - share)) * sensor->slow_voltage_noise_v * random_noise(random) -
+            share * sensor->slow_v;
+        voltage_noise_v += sensor->slow_v;
+    }
     if (sensor->frozen) {
         return;
     }

@@ -395,13 +395,13 @@ static void the_sensor_reads_whole_steps_of_what_flowed_in_the_tick(void)
 
 static void a_sensor_has_gain_offset_and_noise(void)
 {
-    ina219_t sensor = {1.03, 0.97, 0.005, -0.008, 0.0, 0.0, false};
+    ina219_t sensor = {1.03, 0.97, 0.005, -0.008, 0.0, 0.0, 0.0, 0.0, false};
     random_t random = random_seeded(3, 4);
     int16_t ma = 0, mv = 0;
     ina219_read(&sensor, &random, 1.0, 0.4, &ma, &mv);
     TEST_ASSERT_EQUAL_INT(1035, ma);
     TEST_ASSERT_EQUAL_INT(380, mv);
-    sensor = (ina219_t){1.0, 1.0, 0.0, 0.0, 0.01, 0.02, false};
+    sensor = (ina219_t){1.0, 1.0, 0.0, 0.0, 0.01, 0.02, 0.0, 0.0, false};
     double sum = 0.0, squares = 0.0;
     const int readings = 20000;
     for (int i = 0; i < readings; i++) {
@@ -411,6 +411,18 @@ static void a_sensor_has_gain_offset_and_noise(void)
     }
     TEST_ASSERT_DOUBLE_WITHIN(0.3, 0.0, sum / readings);
     TEST_ASSERT_DOUBLE_WITHIN(0.4, 20.0, sqrt(squares / readings));
+
+    sensor = (ina219_t){1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.1, 0.0, false};
+    double apart = 0.0;
+    squares = 0.0;
+    for (int i = 0; i < 10 * readings; i++) {
+        const double before_mv = mv;
+        ina219_read(&sensor, &random, 1.0, 1.0, &ma, &mv);
+        squares += (mv - 1000.0) * (mv - 1000.0);
+        apart += (mv - before_mv) * (mv - before_mv);
+    }
+    TEST_ASSERT_DOUBLE_WITHIN(10.0, 100.0, sqrt(squares / (10 * readings)));
+    TEST_ASSERT_DOUBLE_WITHIN(3.0, 20.0, sqrt(apart / (10 * readings))); /* sqrt(2 * 0.02) */
 }
 
 static void a_frozen_sensor_keeps_its_last_registers_and_changes_no_other(void)

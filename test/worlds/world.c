@@ -70,7 +70,7 @@ void world_parameters_default(world_parameters_t *parameters)
         .r_phase_ohm = 0.245, /* 12 % above austenite: the peak seen on cooling */
         .start_c = 20.0,
         /* 12 bit, 8 averaged: about a third of a step, and the buck's ripple in the current. */
-        .sensor = {1.0, 1.0, 0.0, 0.0, 0.001, 0.0014, false},
+        .sensor = {1.0, 1.0, 0.0, 0.0, 0.001, 0.0014, 0.0, 0.0, false},
     };
     parameters->rows = parameters->columns = 3;
     for (int k = 0; k < WORLD_SPRINGS_MAX; k++) {
