@@ -47,8 +47,8 @@ WORSE = {
         0.03, "springs that are off reach {old:.0%} austenite as the chip is now, {new:.0%} with the new settings"
     ),
 }
-"""What is compared: differences of three hundredths of a stroke, the noise of a hold, a tenth of a heating and of the way to
-the limit."""
+"""What is compared, by the least that counts: `held` and `undriven` three hundredths of a stroke, the noise of a hold;
+`heating_s` 5 s and a tenth of the heating; `hottest_c` 3 K, a tenth of the way to the limit."""
 
 
 @dataclass

@@ -53,6 +53,11 @@ class Cause:
         """Whether it is the thermometers that show it."""
         return self.kind in SHOWN
 
+    @property
+    def often(self) -> str:
+        """The words for what acts for a while where it comes and goes all the time, in any run."""
+        return f"{self.text.partition(', {}')[0]} again and again"
+
 
 def _delayed(power: np.ndarray, time_s: np.ndarray, delay_s: float) -> np.ndarray:
     step = float(np.median(np.diff(time_s)))
@@ -166,7 +171,7 @@ def _often(windows: Sequence[Cause]) -> list[Cause]:
     together: dict[tuple[str, str], list[Cause]] = {}
     for one in windows:
         if not one.shown:
-            together.setdefault((one.kind, one.text.partition(", {}")[0]), []).append(one)
+            together.setdefault((one.kind, one.often), []).append(one)
     out = []
     for (kind, text), parts in together.items():
         bumps, columns = [], []
@@ -185,7 +190,7 @@ def _often(windows: Sequence[Cause]) -> list[Cause]:
         out.append(
             Cause(
                 kind,
-                f"{text} again and again",
+                text,
                 tuple(merged),
                 np.column_stack(columns).astype(np.float32),
                 bumps=tuple(bumps),

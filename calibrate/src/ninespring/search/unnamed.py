@@ -121,8 +121,7 @@ def _least_squares(gram: np.ndarray, moment: np.ndarray) -> tuple[np.ndarray, in
 
 def _within(window: Cause, found: Sequence[Hidden]) -> bool:
     """Return whether what acts for a while is part of what comes and goes as it likes already."""
-    often = f"{window.text.partition(', {}')[0]} again and again"
-    return any(one.cause.bumps and one.text == often for one in found)
+    return any(one.cause.bumps and one.text == window.often for one in found)
 
 
 def find(
