@@ -104,8 +104,7 @@ class Resistances(Problem):
     ) -> np.ndarray:
         """Return what the springs of one run should show, (rows, springs), mV; from cold, at the logged ambient."""
         run = self.boards[run_index]
-        with self._count_lock:
-            self.simulations += 1
+        self.budget.take()
         try:
             plant = self.plant_for(spec, values)
             if run.ambient_c is not None:

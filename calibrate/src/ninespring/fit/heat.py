@@ -85,6 +85,7 @@ def step_answers(
             if since > at:
                 part(plant, usual, at, since + 1)
                 at = since
+            problem.budget.take(round(run.springs * (end - since) / len(run.time_s)))
             twins = [plant.copy() for _ in given]
             shown = problem.each(lambda k: part(twins[k], given[k], since, end), range(run.springs))  # noqa: B023
             for k, one in enumerate(shown):
@@ -129,6 +130,7 @@ def _shown(problem: Problem, fit: Fit, r: int, extra_w: Sequence[np.ndarray]) ->
     ambient = problem.ambient_of(r, fit.as_dict())
 
     def one(extra: np.ndarray) -> np.ndarray:
+        problem.budget.take()
         plant = problem.plant_for(fit.spec, fit.values, r)
         return simulate_run(plant, _with_heat(problem, fit, r, run, power, extra), ambient, {})
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 import concurrent.futures
 import math
 import os
-import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -22,6 +21,7 @@ from .. import native
 from ..logs.run import Run
 from ..models import Array
 from . import statistics
+from .budget import Budget
 from .rounding import power_errors
 from .simulate import array_parameters, simulate_run
 from .spec import AMBIENT_OFFSET, DRIVE_GAIN, RUN_DRIVE, SENSOR_OFFSET, Fit, Spec
@@ -84,8 +84,7 @@ class Problem:
         self.unnamed: np.ndarray | None = None
         self.heat: list[np.ndarray] | None = None
         self._pool = concurrent.futures.ThreadPoolExecutor(WORKERS) if WORKERS > 1 else None
-        self.simulations = 0
-        self._count_lock = threading.Lock()
+        self.budget = Budget()
         base = native.Plant(array.rows, array.cols)
         base.set_all(array_parameters(array))
         base.set_all(self.declared)
@@ -94,6 +93,11 @@ class Problem:
     def base_value(self, name: str) -> float:
         """Return what the declared array has for a parameter of the plant."""
         return self._base.get(name)
+
+    @property
+    def simulations(self) -> int:
+        """Simulations of a run so far."""
+        return self.budget.taken
 
     @property
     def hottest_c(self) -> float:
@@ -185,8 +189,7 @@ class Problem:
         power_w: np.ndarray | None = None,
     ) -> np.ndarray:
         """Return what the sensors of one run should show, (rows, springs), degC; with so much more power than was logged."""
-        with self._count_lock:
-            self.simulations += 1
+        self.budget.take()
         by_key = {f.key: float(v) for f, v in zip(spec.free, values, strict=True)}
         run = self.heated(self.run_of(run_index, by_key), run_index)
         if power_w is not None:

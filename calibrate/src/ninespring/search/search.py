@@ -41,8 +41,6 @@ SPRINT = 5
 """... and of each of several starts, before the best of them goes on."""
 
 MAX_EFFECTS = 4
-ENOUGH = 4_000
-"""Simulations after which one search begins no further step: ten seconds of one core for two 15 min logs of nine springs."""
 
 
 @dataclass
@@ -56,11 +54,15 @@ class Search:
     fits: dict[tuple[tuple[str, str], ...], Fit] = field(default_factory=dict)
     screens: dict[tuple[tuple[str, str], ...], Screen] = field(default_factory=dict)
     thorough: bool = True
-    until: int = 0
-    """Simulations after which no further step is begun."""
+    until: int = field(init=False)
+    """Simulations of the problem after which no further step is begun."""
 
     def __post_init__(self) -> None:
-        self.until = self.problem.simulations + ENOUGH
+        self.until = self.problem.budget.share()
+
+    def goes_on(self) -> bool:
+        """Return whether another step may begin."""
+        return self.problem.budget.allows() and self.problem.simulations <= self.until
 
     @staticmethod
     def key(spec: Spec) -> tuple[tuple[str, str], ...]:
@@ -251,7 +253,7 @@ class Search:
             effect = screen.candidates[k].effect
             if tried.get(effect, 0) >= (2 if alone[k][0] > 0.9 * best_drop else 1):
                 continue
-            if len(out) >= singles or alone[k][0] < max(0.3 * floor, 0.05 * best_drop):
+            if len(out) >= singles or alone[k][0] < max(0.3 * floor, 0.05 * best_drop) or not self.goes_on():
                 break
             tried[effect] = tried.get(effect, 0) + 1
             self.progress(f"fitting {effect}")
@@ -273,7 +275,7 @@ class Search:
         forecasts.sort(key=lambda one: -one[0])
         done: set[frozenset[str]] = set()
         for drop, a, b, sizes in forecasts:
-            if len(done) >= pairs or fit.chi2 - drop > best_single - floor:
+            if len(done) >= pairs or fit.chi2 - drop > best_single - floor or not self.goes_on():
                 break
             names = frozenset((screen.candidates[a].effect, screen.candidates[b].effect))
             if names in done:
@@ -295,7 +297,7 @@ class Search:
     def forward(self, current: Fit) -> Fit:
         """Add effects, one or two at a time, while they earn their place."""
         while len(current.spec.effects) - len(self.base.spec.effects) < MAX_EFFECTS:
-            if self.problem.simulations > self.until or excess(self.problem, current) < 0.5 * MIN_GAIN**2:
+            if not self.goes_on() or excess(self.problem, current) < 0.5 * MIN_GAIN**2:
                 break
             options = self.extend(current)
             if not options:
@@ -369,7 +371,7 @@ class Search:
                 name = screen.candidates[k].effect
                 # where something flexible took up something slow, a linear forecast says too little of a slow node
                 slow = own is not None and own.flexible and screen.candidates[k].slow_node
-                if name in seen or (not slow and (len(seen) >= most or drop < 0.5 * needed)):
+                if name in seen or (not slow and (len(seen) >= most or drop < 0.5 * needed)) or not self.goes_on():
                     continue
                 seen.add(name)
                 self.progress(f"could it be {name} instead of {effect}?")
@@ -392,7 +394,7 @@ class Search:
             fit, without = self.backward(fit, share)
             contenders = self.rivals(fit, without)
             better = [(other.chi2, k) for k, (_, other) in enumerate(contenders) if self.preferred(other, fit)]
-            if turn == 3 or not better or self.problem.simulations > self.until:
+            if turn == 3 or not better or not self.goes_on():
                 break
             fit = contenders[min(better)[1]][1]
             if grow:
@@ -428,7 +430,7 @@ class Search:
         screen = self.screen(self.base)
         for chosen in self.together(self.base):
             sizes = screen.forecast(chosen)[1]
-            if len(sizes) < len(chosen):
+            if len(sizes) < len(chosen) or not self.goes_on():
                 continue
             self.progress(f"fitting {' + '.join(screen.candidates[k].effect for k in chosen)}")
             fit = self.refit(self.base, [screen.candidates[k] for k in chosen], [sizes[k] for k in chosen])
@@ -447,6 +449,6 @@ class Search:
         Return the chosen fit, the fits without each effect, and the contenders.
         """
         found = self.forward(self.base)
-        if downwards and self.problem.simulations < self.until and excess(self.problem, found) >= MIN_GAIN**2:
+        if downwards and self.goes_on() and excess(self.problem, found) >= MIN_GAIN**2:
             found = self.forward(self.downward(found))
         return self.settle(found)

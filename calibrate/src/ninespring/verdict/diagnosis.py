@@ -342,6 +342,10 @@ def _diagnose(
     warnings += swapped
     warnings += plausibility.coarse(runs)
     warnings += [text for run in problem.runs for text in plausibility.undriven_but_hottest(run)]
+    if left_over and problem.budget.short:
+        warnings.append(
+            f"the search ended at its bound of {problem.budget.enough} simulations: there may be more to find"
+        )
     if left_over:
         warnings += plausibility.shifted_clock(problem, (base,) if final is base else (base, final))
     if left_over:
