@@ -24,6 +24,8 @@ EDGES = 60
 """Of them in one run, at most."""
 SHORTEST = 2
 """Of those times, how many anything lasts."""
+EVERY = (1, 2, 4, 8)
+"""Of those times, how many apart are those between which what comes and goes is straight: the fewer numbers, the cheaper."""
 SMOOTHED = 5
 """Readings of a thermometer that are taken together."""
 DELAYS_S = (10.0, 30.0, 90.0)
@@ -163,11 +165,11 @@ def library(problem: Problem, fit: Fit) -> list[Cause]:
             columns.setdefault(key, nothing)[r] = thin(scaled[:, :, None])
         windows += _windows(problem, fit, r, samples, power, lost, rise, loss_w_per_k, typical)
     everywhere = [Cause(*key, tuple(profiles[key]), np.concatenate(parts)) for key, parts in columns.items()]
-    return everywhere + windows + _often(windows)
+    return everywhere + windows + [one for every in EVERY for one in _often(windows, every)]
 
 
-def _often(windows: Sequence[Cause]) -> list[Cause]:
-    """Return what comes and goes all the time: bumps at the edges of the windows of one kind and place in all runs."""
+def _often(windows: Sequence[Cause], every: int) -> list[Cause]:
+    """Return what comes and goes all the time: bumps at every so many edges of the windows of one kind and place in all runs."""
     together: dict[tuple[str, str], list[Cause]] = {}
     for one in windows:
         if not one.shown:
@@ -176,13 +178,16 @@ def _often(windows: Sequence[Cause]) -> list[Cause]:
     for (kind, text), parts in together.items():
         bumps, columns = [], []
         for one in parts:
-            run = next(r for r, profile in enumerate(one.profiles) if profile is not None)
-            times = [one.edges[0] - one.edges[1], *one.edges, 2 * one.edges[-1] - one.edges[-2]]
-            bumps += [(run, *about) for about in zip(times, times[1:], times[2:], strict=False)]
-            # half of what acts from the edge before to this one, and half from there to the next
-            between = 0.5 * (one.columns - np.column_stack([one.columns[:, 1:], np.zeros(len(one.columns))]))
-            nothing = np.zeros((len(between), 1))
-            columns.append(np.column_stack([between, nothing]) + np.column_stack([nothing, between]))
+            run, profile = next((r, p) for r, p in enumerate(one.profiles) if p is not None)
+            tops = [*one.edges[:-1:every], one.edges[-1]]
+            times = [2 * tops[0] - tops[1], *tops, 2 * tops[-1] - tops[-2]]
+            about = list(zip(times, times[1:], times[2:], strict=False))
+            bumps += [(run, *times) for times in about]
+            # what acts from each edge to the next, as much of it as the bump is there
+            between = one.columns - np.column_stack([one.columns[:, 1:], np.zeros(len(one.columns))])
+            whole = np.column_stack([bump(*times, len(profile)) for times in about])
+            part = np.add.reduceat(whole, one.edges[:-1], axis=0) / np.diff(one.edges)[:, None]
+            columns.append(between @ part)
         merged = [
             next((p.profiles[r] for p in parts if p.profiles[r] is not None), None)
             for r in range(len(parts[0].profiles))

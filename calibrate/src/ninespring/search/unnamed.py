@@ -17,8 +17,10 @@ from typing import Any
 import numpy as np
 
 from ..effects.effect import sized
+from ..fit.heat import THIN
 from ..fit.problem import Problem
 from ..fit.spec import Fit
+from ..fit.statistics import correlation_factor
 from . import evidence
 from .causes import SHORTEST, Cause, bump, column_of, library, thinned, typical_power
 from .evidence import fit_factor, unexplained
@@ -27,10 +29,7 @@ from .search import MIN_GAIN, MIN_SHARE, Search
 MOST = 12
 """Unnamed causes, at most: where more would help, it is no cause of these kinds."""
 ROUNDS = 4
-"""Of finding what has no name and searching the library beside it, at most ..."""
-ENOUGH = 10_000
-"""... and none is begun that, if it takes as many simulations as the longest search before it, ends after so many: twenty-five
-seconds of one core for two 15 min logs of nine springs."""
+"""Of finding what has no name and searching the library beside it, at most."""
 GIVES_ONLY = ("mixing", "crosstalk", "bridge", "plume", "delay")
 """Kinds whose size cannot be negative: they lead on what is there, and a part of it at most."""
 NAMED = "named"
@@ -119,6 +118,18 @@ def _least_squares(gram: np.ndarray, moment: np.ndarray) -> tuple[np.ndarray, in
     return vector[:, used] @ ((vector[:, used].T @ (moment / scale)) / value[used]) / scale, int(used.sum())
 
 
+def _nats(samples: float, before: float, after: float, numbers: int) -> float:
+    """Return the evidence of so many independent samples for so many numbers by which squares fall from one sum to another."""
+    return 0.5 * samples * math.log(before / max(1e-9, after)) - 0.5 * numbers * math.log(max(2.0, samples))
+
+
+def _independent(problem: Problem, left: np.ndarray) -> float:
+    """Return the independent samples of what is left, thinned as causes are."""
+    ends = np.cumsum([len(range(0, len(mask), THIN)) * mask.shape[1] for mask in problem.mask])[:-1]
+    series = [part.reshape(-1, problem.array.springs) for part in np.split(left, ends)]
+    return len(left) / correlation_factor(series, problem.longest_lag() // THIN)
+
+
 def _within(window: Cause, found: Sequence[Hidden]) -> bool:
     """Return whether what acts for a while is part of what comes and goes as it likes already."""
     return any(one.cause.bumps and one.text == window.often for one in found)
@@ -168,18 +179,20 @@ def find(
                 drop, best, span = value, one, (one.edges[a], one.edges[b])
         rest = float(left @ left)
 
-        def nats_of(explained: float, numbers: int) -> float:
-            price = math.log(tried) + 0.5 * numbers * math.log(max(2.0, samples))
-            return 0.5 * samples * math.log(rest / max(1e-9, rest - explained)) - price  # noqa: B023 - of this turn
-
-        nats, vectors = nats_of(drop, 1), vector[:, None]
-        # the half that one window leaves may be many more like it
-        for one, gram in zip(often, often_grams, strict=True) if drop < 0.5 * (rest - len(left)) else ():
+        nats = _nats(samples, rest, rest - drop, 1) - math.log(tried)
+        vectors, spent = vector[:, None], 1
+        # the half that one window leaves may be many more like it, and one where another was found says that there are more
+        many = drop < 0.5 * (rest - len(left)) or any(one.cause.text == best.text and best.edges for one in found)
+        for one, gram in zip(often, often_grams, strict=True) if many else ():
             moment = one.columns.T @ left
             size, numbers = _least_squares(gram, moment)
             explained = float(size @ moment)
-            if (more := nats_of(explained, numbers)) > nats:
-                nats, drop, vectors, best, span = more, explained, one.columns, one, (0, None)
+            answer = one.columns @ size
+            # as between two fits, what the better one leaves tells how many samples are independent
+            own = _independent(problem, left - answer + basis @ (basis.T @ answer))
+            if _nats(own, rest - drop, rest - explained, numbers - spent) > 0.0:
+                nats = _nats(own, rest, rest - explained, numbers) - math.log(tried)
+                drop, vectors, spent, best, span = explained, one.columns, numbers, one, (0, None)
         if nats < LEAST_NATS or drop < SHARE * max(0.0, rest - len(left)) or (len(found) > searched and names > drop):
             break
         text = best.text
@@ -408,17 +421,18 @@ def _search_beside(problem: Problem, first: Search, final: Fit) -> Beside | None
         hidden = [replace(one, cause=next(k for k in kinds if k.text == one.cause.text)) for one in hidden]
     out = names = None
     left_out = None, None
-    begun, longest = 0, 0
-    for turn in range(ROUNDS):
-        longest, begun = max(longest, problem.simulations - begun), problem.simulations
-        if turn and begun + longest > ENOUGH:
+    longest = 0
+    for _ in range(ROUNDS):
+        # as much again is for what follows from what the round finds
+        if out is not None and not problem.budget.allows(2 * longest):
             break
+        begun = problem.simulations
         hidden = taken_out(problem, final, hidden)
         final = problem.evaluate(final)
         if final.jacobian is None:
             shown = problem.predictions(final.spec, final.values)
             final = replace(final, jacobian=problem.jacobian(final.spec, final.values, shown))
-        searched = len(hidden) if turn else 0
+        searched = 0 if out is None else len(hidden)
         grown = find(problem, final, [*kinds, *_named(problem, first, final)], hidden, searched=searched)
         if len(grown) == searched:
             break
@@ -438,6 +452,7 @@ def _search_beside(problem: Problem, first: Search, final: Fit) -> Beside | None
             result = search.settle(near)
             final = result[0]
             hidden = _needed(problem, final, [one.around(problem, final) for one in given])
+        longest = max(longest, problem.simulations - begun)
         if out is not None and final.sse > out[1][0].sse:
             break  # beside what this round found, the names do not come back that explained more
         out, left_out = (search, result, hidden), taken
