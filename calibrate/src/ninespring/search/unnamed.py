@@ -155,13 +155,16 @@ def find(
     single = [one for one in kinds if not one.edges and not one.bumps]
     # two that come and go as they like would explain whatever all springs do together, and leave nothing to be named
     often = [] if any(one.cause.bumps for one in already) else [one for one in kinds if one.bumps]
+    # and one at a spring alone would explain whatever is named of that spring
+    springs = {_spring_of(fit, effect) for effect in fit.spec.effects}
+    often = [one for one in often if _place(one) not in springs]
     windows = [one for one in kinds if one.edges]
     matrix = np.column_stack([one.columns[:, 0] for one in single])
     either = np.array([one.kind not in GIVES_ONLY for one in single])
     named = np.array([one.kind == NAMED for one in single])
     whole = (matrix**2).sum(axis=0)
     power = whole - ((basis.T @ matrix) ** 2).sum(axis=0)
-    grams, often_grams = ([_gram(one.columns, basis) for one in some] for some in (windows, often))
+    grams, often_grams = [_gram(one.columns, basis) for one in windows], []
     tried = len(single) + sum(one.columns.shape[1] ** 2 / 2 for one in windows)
     while len(found) < most:
         moment = matrix.T @ left
@@ -183,6 +186,8 @@ def find(
         vectors, spent = vector[:, None], 1
         # the half that one window leaves may be many more like it, and one where another was found says that there are more
         many = drop < 0.5 * (rest - len(left)) or any(one.cause.text == best.text and best.edges for one in found)
+        if many and not often_grams:
+            often_grams = [_gram(one.columns, basis) for one in often]
         for one, gram in zip(often, often_grams, strict=True) if many else ():
             moment = one.columns.T @ left
             size, numbers = _least_squares(gram, moment)
@@ -210,7 +215,7 @@ def find(
         left = left - units @ (units.T @ left)
         basis = np.column_stack([basis, units])
         power = power - ((units.T @ matrix) ** 2).sum(axis=0)
-        for one, gram in zip([*windows, *often], [*grams, *often_grams], strict=True):
+        for one, gram in zip([*windows, *often], [*grams, *often_grams], strict=False):
             inside = units.T @ one.columns
             gram -= inside.T @ inside
     return found
