@@ -7,7 +7,7 @@ import threading
 ENOUGH = 12_000
 """Simulations of a run, after which nothing further is begun: twenty-five seconds of one core for two 15 min logs of nine
 springs."""
-PARTS = 3
+PARTS = 4
 """A search may take one part in so many of what is left when it begins: the rest is for what follows from what it finds."""
 
 

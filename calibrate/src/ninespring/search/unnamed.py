@@ -19,7 +19,7 @@ import numpy as np
 from ..effects.effect import sized
 from ..fit.heat import THIN
 from ..fit.problem import Problem
-from ..fit.spec import Fit
+from ..fit.spec import RUNS_OWN, Fit
 from ..fit.statistics import correlation_factor
 from . import evidence
 from .causes import SHORTEST, Cause, bump, column_of, library, thinned, typical_power
@@ -375,7 +375,7 @@ def _or_lasting(problem: Problem, found: Search, result: Found, hidden: list[Hid
         return found, result, hidden
     before = problem.unnamed
     problem.leave_out(np.column_stack([before, *(one.column for one in whole)]), problem.heat)
-    search = _beside(problem, found)
+    search = _beside(problem, found, hidden)
     kept = beside = problem.fit(final.spec, final.as_dict(), tolerance=1e-3, max_steps=STEPS_OF_FIT)
     for effect in (effect for effect in without if at[effect] is not None):
         other = search.reduced(kept, effect)
@@ -409,10 +409,16 @@ def _all_the_time(problem: Problem, one: Hidden) -> Hidden:
     return replace(one, text=one.cause.text.format(f"0 to {run.duration_s:.0f} s"), rows=(0, None), inside=None)
 
 
-def _beside(problem: Problem, first: Search) -> Search:
-    """Return a search of the library beside what is taken out by now."""
+def _beside(problem: Problem, first: Search, hidden: Sequence[Hidden]) -> Search:
+    """Return a search of the library beside what is taken out by now.
+
+    Where one of that comes and goes as it likes, a drift of an ambient that was logged does so, too, and leaves as little to
+    be named.
+    """
     base = problem.fit(first.base.spec, first.base.as_dict(), errors=True)
-    return Search(problem, first.candidates, base, first.progress)
+    stays = any(one.cause.bumps for one in hidden) and any(run.ambient_c is not None for run in problem.runs)
+    rest = [one for one in first.candidates if not (stays and one.flexible and one.effect not in RUNS_OWN)]
+    return Search(problem, rest, base, first.progress)
 
 
 def _search_beside(problem: Problem, first: Search, final: Fit) -> Beside | None:
@@ -428,8 +434,7 @@ def _search_beside(problem: Problem, first: Search, final: Fit) -> Beside | None
     left_out = None, None
     longest = 0
     for _ in range(ROUNDS):
-        # as much again is for what follows from what the round finds
-        if out is not None and not problem.budget.allows(2 * longest):
+        if out is not None and not problem.budget.allows(longest):
             break
         begun = problem.simulations
         hidden = taken_out(problem, final, hidden)
@@ -445,7 +450,7 @@ def _search_beside(problem: Problem, first: Search, final: Fit) -> Beside | None
         # what they add depends on the numbers, which they spoilt until now
         nearer = problem.fit(final.spec, final.as_dict(), tolerance=1e-3, max_steps=STEPS_OF_FIT)
         grown = taken_out(problem, nearer, grown)
-        search, taken = _beside(problem, first), (problem.unnamed, problem.heat)
+        search, taken = _beside(problem, first, grown), (problem.unnamed, problem.heat)
         # what only helps together was looked for before: beside a cause without a name, what shows alone is enough
         result = search.run(downwards=False)
         final = result[0]
@@ -453,7 +458,7 @@ def _search_beside(problem: Problem, first: Search, final: Fit) -> Beside | None
         hidden = _needed(problem, final, [one.around(problem, final) for one in grown])
         near, given = simulated(problem, final, hidden) if hidden else (final, hidden)
         if near is not final:
-            search, taken = _beside(problem, first), (problem.unnamed, problem.heat)
+            search, taken = _beside(problem, first, given), (problem.unnamed, problem.heat)
             result = search.settle(near)
             final = result[0]
             hidden = _needed(problem, final, [one.around(problem, final) for one in given])
