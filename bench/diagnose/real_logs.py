@@ -226,7 +226,7 @@ def _read(log: dict[str, np.ndarray]) -> Run:
 
 
 def hides(known: str, runs: list[Run], without: list[Run]) -> float:
-    """Return what a cause leaves beside the declared numbers and the known effect's, rms in units of the noise.
+    """Return what a cause leaves beside the declared numbers and a known effect's, if any, rms in units of the noise.
 
     By the truth, no diagnosis: the readings with the cause less those without it, noise and all else the same; what the
     numbers of a fit could take up is projected out.
@@ -243,13 +243,15 @@ def apart(seed: int) -> dict[str, Any]:
     """Diagnose a case of the other world, a known effect beside a cause without a name; every eighth without the known."""
     known = (*elsewhere.KNOWN, "")[seed % 8]
     unknown = list(elsewhere.UNKNOWN)[(3 * seed + seed // 8) % len(elsewhere.UNKNOWN)]
-    runs, without = ([_read(log) for log in elsewhere.make(seed, known, one).logs] for one in (unknown, ""))
+    acting = ((known, unknown), (known, ""), ("", unknown))
+    runs, without, plain = ([_read(log) for log in elsewhere.make(seed, *both).logs] for both in acting)
     begun = time.process_time()
     result = diagnosis.diagnose(Array(), runs).result
     names = [e["name"] for e in result["effects"]]
     said = {"names": names, "rivals": [r["name"] for r in result["rivals"]], "unexplained": result["unexplained"]}
     # rounding is white: it is no structure, and a warning tells it
     said["left"] = hides(known, runs, without)
+    said["shown"] = hides("", runs, plain) if known else 0.0
     said["told"] = unknown == "coarse" and any(" step by " in one for one in result["warnings"])
     return {"known": known, "unknown": unknown, "cpu_s": time.process_time() - begun} | said
 
@@ -357,11 +359,13 @@ def figures(done: list[dict[str, Any]]) -> list[dict[str, Any]]:
         out.append(
             percent("another world: the known effect named", [o["known"] in o["names"] for o in beside], ">= 90")
         )
+        seen = [o["known"] in o["names"] for o in beside if o["shown"] >= MATTERS]
+        out.append(percent("the same, where by the truth it leaves half the noise", seen, ""))
         out.append(percent("another world: flagged (`unexplained`)", [o["unexplained"] for o in others], ">= 95"))
         told = [o["unexplained"] or o["told"] for o in others]
         out.append(percent("another world: flagged, or the cause told in a warning", told, ""))
         loud = [o["unexplained"] or o["told"] for o in others if o["left"] >= MATTERS]
-        out.append(percent("the same, where by the truth the cause leaves half the noise", loud, ""))
+        out.append(percent("the same, where by the truth the unknown cause leaves half the noise", loud, ""))
         false = [bool(set(o["names"]) - {o["known"]}) for o in others]
         out.append(percent("another world: a false name", false, "<= 10"))
         seconds = [o["cpu_s"] for o in others]
