@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ninespring import effects, native
+from ninespring.fit import budget
 from ninespring.fit.declared import base_spec
 from ninespring.fit.predict import predict
 from ninespring.fit.problem import Problem
@@ -189,9 +190,36 @@ def test_a_search_that_has_had_its_simulations_begins_no_further_step(make_log) 
     base = diagnosis.first_fit(problem, base_spec(problem))
     found = search.Search(problem, effects.candidates(problem), base)
     found.until = problem.simulations - 1
-    assert found.forward(base) is base
-    found.until = problem.simulations
+    assert found.forward(base) is base and not problem.budget.short
+    found.until = problem.simulations + 1000
     assert found.forward(base).spec.effects == ("edge_loss",)
+
+
+def test_all_searches_draw_from_one_budget(make_log) -> None:
+    problem = Problem(Array(), [read_log(make_log(effects={"edge_loss": {"edge_loss_fraction": 0.2}}, seed=3))])
+    base = diagnosis.first_fit(problem, base_spec(problem))
+    problem.budget.enough = problem.simulations + 400
+    shares = []
+    for _ in range(2):
+        shares.append(search.Search(problem, effects.candidates(problem), base).until - problem.simulations)
+        problem.budget.take(200)
+    assert shares == [100, 50] and not problem.budget.short
+    problem.budget.take()
+    assert search.Search(problem, effects.candidates(problem), base).forward(base) is base
+    assert problem.budget.short
+
+
+def test_a_diagnosis_that_could_not_go_on_says_so_and_answers_with_what_it_has(
+    make_log, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def jumps(columns: dict[str, np.ndarray]) -> None:
+        columns["t4_c"][200:400] += 5.0
+
+    runs = [read_log(make_log(f"{seed}.csv", seed=seed, change=jumps)) for seed in (3, 4)]
+    monkeypatch.setattr(budget, "ENOUGH", 300)
+    found = diagnosis.diagnose(Array(), runs).result
+    assert found["unexplained"]
+    assert any("ended at its bound of 300 simulations" in one for one in found["warnings"])
 
 
 def test_a_forecast_keeps_to_what_is_physical(plain: search.Search) -> None:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import threading
 
-ENOUGH = 12_000
-"""Simulations of a run, after which nothing further is begun: twenty-five seconds of one core for two 15 min logs of nine
+ENOUGH = 11_000
+"""Simulations of a run, after which nothing further is begun: some twenty-two seconds of one core for two 15 min logs of nine
 springs."""
 PARTS = 4
 """A search may take one part in so many of what is left when it begins: the rest is for what follows from what it finds."""
