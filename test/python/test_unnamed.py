@@ -143,6 +143,96 @@ def test_only_one_cause_comes_and_goes_as_it_likes(make_log) -> None:
     assert len(found) > 1 and sum(bool(one.cause.bumps) for one in found) == 1
 
 
+MISMATCH = {"spring_mismatch": {"loss_scale[6]": 1.18}}
+
+
+def swinging_losses(columns: dict[str, np.ndarray]) -> None:
+    """Let every loss swing by a third within eleven minutes, about that of an array with one other spring."""
+    rows = len(columns["fan"])
+    power = np.column_stack([columns[f"i{k + 1}_a"] ** 2 * 0.2 for k in range(9)])
+    shown = []
+    for size in (0.0, 0.33):
+        plant = native.Plant(3, 3)
+        plant.set_effects(MISMATCH)
+        plant.set_all({**MISMATCH["spring_mismatch"], "ambient_c": 20.0})
+        still, blown = plant.get("loss_w_per_k"), plant.get("loss_fan_w_per_k")
+        plant.reset()
+        out = np.empty((rows, 9))
+        for row in range(rows):
+            swing = 1.0 + size * np.sin(2.0 * np.pi * row / 660.0)
+            plant.set_all({"loss_w_per_k": still * swing, "loss_fan_w_per_k": blown * swing})
+            here = slice(row, row + 2)
+            time_s = np.arange(2.0)[: len(power[here])]
+            out[row] = plant.simulate(time_s, native.POWER, power[here], columns["fan"][here])[0]
+        shown.append(out)
+    for k in range(9):
+        columns[f"t{k + 1}_c"] = columns[f"t{k + 1}_c"] + shown[1][:, k] - shown[0][:, k]
+
+
+def test_what_comes_and_goes_slowly_needs_few_numbers(make_log) -> None:
+    """Beside another spring that nothing has named yet, which leaves few samples that are independent."""
+    log = read_log(make_log(seed=3, effects=MISMATCH, change=swinging_losses, seconds=900))
+    problem, fit, _ = diagnosis.fit_effects(Array(), [log], [])
+    found = unnamed.find(problem, fit, unnamed.library(problem, fit), ())
+    (swing,) = (one for one in found if one.cause.bumps)
+    assert len(swing.cause.bumps) < 20
+
+
+def test_small_causes_at_a_spring_are_no_reason_to_doubt_its_name(make_log) -> None:
+    """All the time they would nearly explain the other loss of that spring; they are as small as they were found."""
+    log = read_log(make_log(seed=3, effects=MISMATCH))
+    problem, fit, base = diagnosis.fit_effects(Array(), [log], ["spring_mismatch"])
+    places = ("the drive of spring 6 changes", "spring 6 is given heat", "thermometer 6 shows more")
+    kinds = [one for one in unnamed.library(problem, fit) if one.edges and one.text.startswith(places)]
+    assert len(kinds) == 3
+    hidden = [unnamed.Hidden(one, one.text, (200, 260), np.zeros(()), 0.01) for one in kinds]
+    hidden = unnamed.taken_out(problem, fit, hidden)
+    first = search.Search(problem, effects.candidates(problem), base)
+    result = (problem.evaluate(fit), {"spring_mismatch": problem.evaluate(base)}, [])
+    _, kept, _ = unnamed._or_lasting(problem, first, result, hidden)
+    assert kept is result
+
+
+def test_what_comes_and_goes_is_straight_between_edges_as_far_apart_as_it_says(make_log) -> None:
+    problem, fit, _ = diagnosis.fit_effects(Array(), [read_log(make_log(seed=3))], [])
+    gusts = [one for one in unnamed.library(problem, fit) if one.text == "all losses change again and again"]
+    assert [len(one.bumps) for one in gusts] == [41, 21, 11, 6]
+    for one in gusts:
+        # all together they are there all the time, however wide each is
+        together = sum(unnamed.bump(*times, 600) for _, *times in one.bumps)
+        assert np.allclose(together, 1.0)
+        summed = one.columns.sum(axis=1)
+        assert np.allclose(summed, gusts[0].columns.sum(axis=1), atol=1e-3 * np.abs(summed).max())
+
+
+def test_a_name_goes_before_what_comes_and_goes_at_its_spring(make_log) -> None:
+    def blown(columns: dict[str, np.ndarray]) -> None:
+        extra = np.zeros((len(columns["fan"]), 9))
+        extra[:, 5] = 0.1 * np.sin(np.arange(float(len(extra))) / 9.0)
+        astray(columns, extra, {})
+
+    log = read_log(make_log(seed=3, change=blown))
+    at_spring = []
+    for names in ([], ["spring_mismatch"]):
+        problem, fit, _ = diagnosis.fit_effects(Array(), [log], names)
+        found = unnamed.find(problem, fit, unnamed.library(problem, fit), ())
+        at_spring.append([one.text for one in found if one.cause.bumps])
+    assert at_spring == [["spring 6 is given heat again and again"], []]
+
+
+def test_no_drift_of_a_logged_ambient_is_a_name_beside_what_comes_and_goes(make_log) -> None:
+    log = read_log(make_log(seed=3, change=lambda columns: astray(columns, swinging(columns, 80.0), {})))
+    problem, fit, _ = diagnosis.fit_effects(Array(), [log], [])
+    first = search.Search(problem, effects.candidates(problem), fit)
+    swing = next(one for one in unnamed.library(problem, fit) if one.text == "all drives change again and again")
+    hidden = [unnamed.Hidden(swing, swing.text, (0, None), swing.columns)]
+    drifts = [
+        {one.variant for one in unnamed._beside(problem, first, beside).candidates if one.effect == "ambient_drift"}
+        for beside in ([], hidden)
+    ]
+    assert drifts == [{"ramp", "free"}, {"ramp"}]
+
+
 def test_a_name_has_its_size_beside_heat_that_moves_the_transformation(make_log) -> None:
     log = read_log(make_log("3.csv", seed=3, effects=LATENT, change=swinging_drives))
     problem, alone, _ = diagnosis.fit_effects(Array(), [log], ["latent_heat"])

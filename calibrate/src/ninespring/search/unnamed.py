@@ -50,6 +50,9 @@ LEAST_NATS = 3.0
 """Evidence after all prices: one in twenty."""
 AGAIN = 2
 """Times that heat without a name is simulated with the sizes found beside it: once where it is, once as large as it is there."""
+UNDONE = 0.5
+"""Of what a name shows, the part that an unnamed cause takes back for a while where it may be the same cause, come or gone:
+the greater one."""
 STEPS_OF_FIT = 14
 """Of one fit beside them, at most."""
 
@@ -180,8 +183,9 @@ def find(
             if value > drop:
                 vector = one.columns[:, a] - (0.0 if b == len(gram) else one.columns[:, b])
                 drop, best, span = value, one, (one.edges[a], one.edges[b])
+        if len(found) > searched and names > drop:
+            break
         rest = float(left @ left)
-
         nats = _nats(samples, rest, rest - drop, 1) - math.log(tried)
         vectors, spent = vector[:, None], 1
         # the half that one window leaves may be many more like it, and one where another was found says that there are more
@@ -198,7 +202,7 @@ def find(
             if _nats(own, rest - drop, rest - explained, numbers - spent) > 0.0:
                 nats = _nats(own, rest, rest - explained, numbers) - math.log(tried)
                 drop, vectors, spent, best, span = explained, one.columns, numbers, one, (0, None)
-        if nats < LEAST_NATS or drop < SHARE * max(0.0, rest - len(left)) or (len(found) > searched and names > drop):
+        if nats < LEAST_NATS or drop < SHARE * max(0.0, rest - len(left)):
             break
         text = best.text
         if best.edges:
@@ -364,29 +368,52 @@ def search_beside(problem: Problem, first: Search, final: Fit) -> Beside | None:
 
 
 def _or_lasting(problem: Problem, found: Search, result: Found, hidden: list[Hidden]) -> Beside:
-    """Return what was found less the names of one spring that an unnamed cause there, found for a while, would nearly explain
-    if it were there all the time: whether it came or went, nothing but those names says.
+    """Return what was found less the names of one spring that unnamed causes there, found for a while, would nearly explain if
+    they were there all the time: whether they came or went, nothing but those names says.
+
+    Only names that those causes undo while they are there: a small one at its spring is no reason to doubt it.
     """
     final, without = result[0], result[1]
-    at = {effect: _spring_of(final, effect) for effect in without}
-    begun = {id(one.cause): one for one in hidden if one.cause.edges and _place(one.cause) in at.values()}
-    whole = [_all_the_time(problem, one).around(problem, final) for one in begun.values()]
-    if not whole:
-        return found, result, hidden
     before = problem.unnamed
-    problem.leave_out(np.column_stack([before, *(one.column for one in whole)]), problem.heat)
-    search = _beside(problem, found, hidden)
-    kept = beside = problem.fit(final.spec, final.as_dict(), tolerance=1e-3, max_steps=STEPS_OF_FIT)
-    for effect in (effect for effect in without if at[effect] is not None):
-        other = search.reduced(kept, effect)
-        if other.sse - kept.sse < MIN_SHARE * (without[effect].sse - final.sse):
-            kept = other
-    if kept is beside:
+    for spring in sorted({_place(one.cause) for one in hidden if one.cause.edges} - {-1}):
+        begun = [one for one in hidden if one.cause.edges and _place(one.cause) == spring]
+        doubted = [
+            effect
+            for effect in without
+            if _spring_of(final, effect) == spring and _undone(problem, final, effect, begun, spring) > UNDONE
+        ]
+        if not doubted:
+            continue
+        causes = {id(one.cause): one for one in begun}
+        whole = [_all_the_time(problem, one).around(problem, final) for one in causes.values()]
+        problem.leave_out(np.column_stack([before, *(one.column for one in whole)]), problem.heat)
+        search = _beside(problem, found, hidden)
+        kept = beside = problem.fit(final.spec, final.as_dict(), tolerance=1e-3, max_steps=STEPS_OF_FIT)
+        for effect in doubted:
+            other = search.reduced(kept, effect)
+            if other.sse - kept.sse < MIN_SHARE * (without[effect].sse - final.sse):
+                kept = other
+        if kept is not beside:
+            needed = {effect: search.reduced(kept, effect) for effect in without if effect in kept.spec.effects}
+            contenders = search.rivals(kept, needed)
+            return search, (kept, needed, contenders), _needed(problem, kept, [*hidden, *whole])
         problem.unnamed = before
-        return found, result, hidden
-    needed = {effect: search.reduced(kept, effect) for effect in without if effect in kept.spec.effects}
-    contenders = search.rivals(kept, needed)
-    return search, (kept, needed, contenders), _needed(problem, kept, [*hidden, *whole])
+    return found, result, hidden
+
+
+def _undone(problem: Problem, fit: Fit, effect: str, begun: Sequence[Hidden], spring: int) -> float:
+    """Return the part of what an effect shows at a spring that unnamed causes there take back while they are there."""
+    off = fit.spec.without(effect)
+    bare = problem.predictions(off, [fit.value(free.key) for free in off.free])
+    there = [np.zeros_like(mask) for mask in problem.mask]
+    for one in begun:
+        r = next(r for r, profile in enumerate(one.cause.profiles) if profile is not None)
+        there[r][slice(*one.rows), spring] = True
+    here = np.concatenate([rows[mask] for rows, mask in zip(there, problem.mask, strict=True)])
+    full = problem.predictions(fit.spec, fit.values)
+    shows = np.concatenate(problem.scaled([a - b for a, b in zip(full, bare, strict=True)]))[here]
+    takes = sum(one.column[here, 0] * one.size for one in begun)
+    return -float(shows @ takes) / max(1e-12, float(shows @ shows))
 
 
 def _spring_of(fit: Fit, effect: str) -> int | None:
