@@ -50,6 +50,8 @@ LEAST_NATS = 3.0
 """Evidence after all prices: one in twenty."""
 AGAIN = 2
 """Times that heat without a name is simulated with the sizes found beside it: once where it is, once as large as it is there."""
+LEAST_LEFT = 1e-3
+"""Of the squares of what a cause adds, the part that must be left beside what is taken out: of less, rounding is the most."""
 UNDONE = 0.5
 """Of what a name shows, the part that an unnamed cause takes back for a while where it may be the same cause, come or gone:
 the greater one."""
@@ -168,18 +170,19 @@ def find(
     whole = (matrix**2).sum(axis=0)
     power = whole - ((basis.T @ matrix) ** 2).sum(axis=0)
     grams, often_grams = [_gram(one.columns, basis) for one in windows], []
+    powers = [_powers((one.columns.T @ one.columns).astype(float)) for one in windows]
     tried = len(single) + sum(one.columns.shape[1] ** 2 / 2 for one in windows)
     while len(found) < most:
         moment = matrix.T @ left
-        possible = (power > 1e-3 * whole) & (either | (moment > 0))
+        possible = (power > LEAST_LEFT * whole) & (either | (moment > 0))
         gain = np.where(possible, moment**2 / np.maximum(power, 1e-12), 0.0)
         names = float(gain[named].max(initial=0.0))
         k = int(np.argmax(np.where(named, 0.0, gain)))
         drop, vector, best, span = float(gain[k]), matrix[:, k], single[k], (0, None)
-        for one, gram in zip(windows, grams, strict=True):
+        for one, gram, of_all in zip(windows, grams, powers, strict=True):
             if _within(one, found):
                 continue
-            value, a, b = _best_window(one.columns.T @ left, gram)
+            value, a, b = _best_window(one.columns.T @ left, gram, of_all)
             if value > drop:
                 vector = one.columns[:, a] - (0.0 if b == len(gram) else one.columns[:, b])
                 drop, best, span = value, one, (one.edges[a], one.edges[b])
@@ -187,7 +190,7 @@ def find(
             break
         rest = float(left @ left)
         nats = _nats(samples, rest, rest - drop, 1) - math.log(tried)
-        vectors, spent = vector[:, None], 1
+        vectors, spent, independent = vector[:, None], 1, samples
         # the half that one window leaves may be many more like it, and one where another was found says that there are more
         many = drop < 0.5 * (rest - len(left)) or any(one.cause.text == best.text and best.edges for one in found)
         if many and not often_grams:
@@ -197,10 +200,10 @@ def find(
             size, numbers = _least_squares(gram, moment)
             explained = float(size @ moment)
             answer = one.columns @ size
-            # as between two fits, what the better one leaves tells how many samples are independent
             own = _independent(problem, left - answer + basis @ (basis.T @ answer))
-            if _nats(own, rest - drop, rest - explained, numbers - spent) > 0.0:
-                nats = _nats(own, rest, rest - explained, numbers) - math.log(tried)
+            # as between two fits, what is left by the one that explains more tells how many samples are independent
+            if _nats(own if explained > drop else independent, rest - drop, rest - explained, numbers - spent) > 0.0:
+                nats, independent = _nats(own, rest, rest - explained, numbers) - math.log(tried), own
                 drop, vectors, spent, best, span = explained, one.columns, numbers, one, (0, None)
         if nats < LEAST_NATS or drop < SHARE * max(0.0, rest - len(left)):
             break
@@ -504,15 +507,21 @@ def _search_beside(problem: Problem, first: Search, final: Fit) -> Beside | None
     return out
 
 
-def _best_window(moment: np.ndarray, gram: np.ndarray) -> tuple[float, int, int]:
-    """Return what the best step up and down would explain, and its edges; the last edge is the end of the run."""
+def _powers(gram: np.ndarray) -> np.ndarray:
+    """Return the squares of every step up and down, (edges, edges + 1), from the products of steps up; the last edge is the end."""
+    square = np.append(np.diag(gram), 0.0)
+    return np.diag(gram)[:, None] + square[None, :] - 2.0 * np.pad(gram, ((0, 0), (0, 1)))
+
+
+def _best_window(moment: np.ndarray, gram: np.ndarray, of_all: np.ndarray) -> tuple[float, int, int]:
+    """Return what the best step up and down would explain, and its edges, of those that are not taken out nearly whole by now.
+
+    `of_all` are their squares with nothing taken out; the last edge is the end of the run.
+    """
+    power = _powers(gram)
+    gain = (moment[:, None] - np.append(moment, 0.0)[None, :]) ** 2 / np.maximum(power, 1e-9)
     count = len(moment)
-    diagonal = np.diag(gram)
-    top, square = np.append(moment, 0.0), np.append(diagonal, 0.0)
-    cross = np.pad(gram, ((0, 0), (0, 1)))
-    power = diagonal[:, None] + square[None, :] - 2.0 * cross
-    gain = (moment[:, None] - top[None, :]) ** 2 / np.maximum(power, 1e-9)
     long = np.arange(count + 1)[None, :] - np.arange(count)[:, None] >= SHORTEST
-    gain = np.where(long & (power > 1e-6), gain, 0.0)
+    gain = np.where(long & (power > LEAST_LEFT * of_all) & (power > 1e-6), gain, 0.0)
     a, b = np.unravel_index(int(np.argmax(gain)), gain.shape)
     return float(gain[a, b]), int(a), int(b)
