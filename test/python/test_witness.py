@@ -13,10 +13,11 @@ from ninespring.fit.declared import base_spec
 from ninespring.fit.problem import Problem
 from ninespring.fit.spec import Fit
 from ninespring.logs import log_text, read_log
+from ninespring.logs.mending import RUN_IN_S
 from ninespring.models import Array
 from ninespring.search import certainty
 from ninespring.verdict import contacts, diagnosis, resistance, unknown_heat
-from ninespring.verdict.readings import Readings
+from ninespring.verdict.readings import Readings, readings
 
 ROWS = 700
 Change = Callable[[np.ndarray], None]
@@ -25,9 +26,11 @@ Change = Callable[[np.ndarray], None]
 def array_log(
     path: Path,
     heat: Change = lambda watts: None,
-    readings: Change = lambda shown: None,
+    thermometers: Change = lambda shown: None,
     ohms: Change = lambda ohm: None,
     effects: dict[str, float] | None = None,
+    drive: Change = lambda watts: None,
+    gap: slice = slice(0),
 ) -> tuple[Problem, Fit]:
     """Write a 3 x 3 log with changes to the heat, the thermometers and the resistances that nothing logs; fit it."""
     rng = np.random.default_rng(2)
@@ -39,6 +42,7 @@ def array_log(
             watts[at : at + hold, k] = 0.05 if rng.random() < 0.4 else rng.uniform(0.2, 0.65)
             at += hold
     fan = ((time_s // 200) % 2 == 1).astype(float)
+    drive(watts)
     given = watts.copy()
     heat(given)
     plant = native.Plant(3, 3)
@@ -49,12 +53,13 @@ def array_log(
     ohm = plant.readings(time_s, given, fan, np.full(ROWS, 20.0)) * (1.0 + 0.04 * np.linspace(-1, 1, 9))
     ohms(ohm)
     shown = traced[:, :, 0] + rng.normal(0.0, 0.3, (ROWS, 9))
-    readings(shown)
+    thermometers(shown)
     current = np.sqrt(watts / ohm)
     voltage = watts / current + rng.normal(0.0, 3e-4, (ROWS, 9))
     columns = {f"i{k + 1}_a": current[:, k] for k in range(9)} | {f"v{k + 1}_v": voltage[:, k] for k in range(9)}
     columns |= {f"t{k + 1}_c": shown[:, k] for k in range(9)} | {"fan": fan, "ambient_c": np.full(ROWS, 20.0)}
-    path.write_text(log_text(time_s, columns, decimals=5))
+    logged = np.delete(np.arange(ROWS), gap)
+    path.write_text(log_text(time_s[logged], {name: one[logged] for name, one in columns.items()}, decimals=5))
     problem = Problem(Array(), [read_log(path, 9)])
     return problem, diagnosis.first_fit(problem, base_spec(problem))
 
@@ -78,7 +83,7 @@ def test_a_thermometer_that_jumps_is_no_heat(tmp_path: Path) -> None:
     def jump(shown: np.ndarray) -> None:
         shown[400:, 6] += 2.5
 
-    problem, fit = array_log(tmp_path / "log.csv", readings=jump)
+    problem, fit = array_log(tmp_path / "log.csv", thermometers=jump)
     pieces = unknown_heat.find(problem, fit).pieces
     assert [(p.kind, p.spring) for p in pieces] == [("sensor", 6)]
     assert pieces[0].size == pytest.approx(2.5, abs=0.3) and pieces[0].begin_s == pytest.approx(400, abs=15)
@@ -126,6 +131,75 @@ def test_a_contact_that_comes_and_goes_is_told_each_time_and_its_heat_taken_out(
     assert np.abs(taken[int(steps[1].from_s) :, 4]).max() < 0.1 * taken[within, 4].max()
 
 
+def told_by(monkeypatch: pytest.MonkeyPatch, *times: tuple[int, float, float, float, float]) -> list[str]:
+    """Return what v / i names of two springs; each time: seconds, austenite, from and to what temperature, ohm, of the first."""
+    rng = np.random.default_rng(3)
+    parts = []
+    begin_s = 0.0
+    for spring in (0, 1):
+        for long_s, phase, from_c, to_c, ohm in times if spring == 0 else [(900, 0.0, 20.0, 80.0, 0.175)]:
+            each = (spring, 0, 0.0, phase, 0.0, 1e-3)
+            columns = [np.full(long_s, one) for one in (ohm, *each)]
+            columns[0] = columns[0] + rng.normal(0.0, 1e-3, long_s)
+            columns[3] = begin_s + np.arange(long_s)
+            columns[5] = np.linspace(from_c, to_c, long_s) - 20.0
+            parts.append([columns[n] for n in (0, 1, 2, 3, 4, 5, 6)])
+            begin_s += long_s + 60.0
+    read = Readings(*(np.concatenate([part[n] for part in parts]) for n in range(7)))
+    read.spring, read.run = read.spring.astype(int), read.run.astype(int)
+    monkeypatch.setattr(resistance, "readings", lambda problem, fit: read)
+    monkeypatch.setattr(contacts, "dated", lambda problem, steps: steps)
+    second = resistance.witness(Problem.__new__(Problem), Fit.__new__(Fit))
+    assert second is not None
+    return [one["name"] for one in second["effects"]]
+
+
+COLD = (200, 0.0, 20.0, 70.0, 0.175)
+
+
+def test_a_few_readings_of_austenite_are_no_contact(monkeypatch: pytest.MonkeyPatch) -> None:
+    seldom = (15, 1.0, 100.0, 110.0, 0.215)
+    assert told_by(monkeypatch, COLD, (29, 0.0, 57.0, 75.0, 0.175), seldom, COLD, COLD) == []
+
+
+def test_a_spring_that_did_not_transform_wholly_is_neither_a_contact_nor_a_coefficient(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    partly, wholly = (80, 1.0, 95.0, 85.0, 0.209), (100, 1.0, 120.0, 105.0, 0.2145)
+    assert told_by(monkeypatch, COLD, partly, COLD, wholly, COLD, wholly, partly) == ["resistance_phase"]
+
+
+def test_a_contact_that_cold_wire_shows_is_placed_by_hot_readings_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    hot, worse = (100, 1.0, 110.0, 100.0, 0.215), (100, 1.0, 110.0, 100.0, 0.225)
+    cold = (200, 0.0, 20.0, 70.0, 0.185)
+    named = told_by(monkeypatch, COLD, hot, COLD, worse, cold, worse, cold)
+    assert sorted(named) == ["contact_resistance", "resistance_phase"]
+
+
+def test_what_a_spring_was_before_a_gap_is_not_guessed(tmp_path: Path) -> None:
+    def held(watts: np.ndarray) -> None:
+        watts[:] = 0.05
+        watts[100:180, 4], watts[180:, 4] = 0.75, 0.56  # through the transformation, and held above where it goes back
+        watts[200:400, 4] = watts[600:, 4] = 0.92  # with the fan
+
+    problem, fit = array_log(tmp_path / "log.csv", drive=held, gap=slice(300, 380))
+    read = readings(problem, fit)
+    assert read is not None
+    middle = read.spring == 4
+    before, after = (read.time_s < 300.0) & middle, (read.time_s > 380.0) & middle
+    assert (read.phase[before] > 0.5).any() and not after.any()
+    assert ((read.time_s > 380.0 + RUN_IN_S) & ~middle).any()
+
+
+def test_a_reading_that_a_simulation_starts_from_is_no_spike(tmp_path: Path) -> None:
+    problem, fit = array_log(tmp_path / "log.csv", gap=slice(300, 380))
+    begin = problem.runs[0].starts[1]
+    left = [np.where(np.isfinite(one), 0.0, np.nan) for one in fit.residual]
+    left[0][begin, 4] = 40.0
+    problem.mask_spikes(left)
+    assert np.isfinite(problem.runs[0].temperature_c[begin, 4])
+
+
 def test_a_resistance_that_rises_with_temperature_is_told(tmp_path: Path) -> None:
     rises = {"resistance_martensite_rise_per_k": 0.0008, "resistance_austenite_rise_per_k": 0.0005}
     problem, fit = array_log(tmp_path / "log.csv", effects=rises)
@@ -167,10 +241,10 @@ def test_what_is_far_below_a_finding_is_not_taken_apart(monkeypatch: pytest.Monk
     solve = contacts.solve
     monkeypatch.setattr(contacts, "solve", lambda *given: asked.append(1) or solve(*given))
     columns = {"own 0": np.ones(rows)}
-    steps, _ = contacts.find(read, columns, solve(read, columns))
+    steps, _ = contacts.find(read, columns)
     assert steps == []
-    assert len(asked) == 1
+    assert len(asked) == 3  # cold readings without and with the best of changes, and all
     read.ohm = ohm + 0.006 * (time_s > 900.0)
-    steps, _ = contacts.find(read, columns, solve(read, columns))
+    steps, _ = contacts.find(read, columns)
     assert [round(one.ohm, 3) for one in steps] == [0.006]
     assert abs(steps[0].from_s - 901.0) < 40.0

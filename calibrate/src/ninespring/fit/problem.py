@@ -124,6 +124,7 @@ class Problem:
         total = 0
         for run, mask, noise, left in zip(self.runs, self.mask, self.noise, residual, strict=True):
             bad = statistics.spikes(left, noise)
+            bad[run.starts] = False  # the simulation starts from them
             share = bad.mean() if bad.size else 0.0
             if 0 < share < 0.02:
                 run.temperature_c[bad] = np.nan

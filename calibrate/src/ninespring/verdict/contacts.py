@@ -1,12 +1,14 @@
 """Contacts that get worse, or better, at some time: steps of v / i that neither phase nor temperature makes.
 
-What a contact always had is in its spring's own resistance: v / i alone cannot tell wire from clamp.
+What a contact always had is in its spring's own resistance: v / i alone cannot tell wire from clamp. How far a spring has
+transformed once it is hot depends on kinetics that nobody knows exactly: only what cold wire shows makes a contact loose, and
+then hot readings, too, say when it changed.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -50,9 +52,20 @@ class Step:
         return ((read.spring == self.spring) & later).astype(float)
 
 
-def find(read: Readings, columns: dict[str, np.ndarray], model: Linear) -> tuple[list[Step], Linear]:
+def find(read: Readings, columns: dict[str, np.ndarray]) -> tuple[list[Step], Linear]:
     """Return the changes that earn their price beside `columns`, in time's order, and the fit with them."""
+    cold = read.phase < 0.5
+    shown = {key: one[cold] for key, one in columns.items() if one[cold].any()}
+    loose = {one.spring for one in _among(read.of(cold), shown)[0]} if shown else set()
+    return _among(read, columns, loose)
+
+
+def _among(
+    read: Readings, columns: dict[str, np.ndarray], only: Collection[int] | None = None
+) -> tuple[list[Step], Linear]:
+    """Return the changes that these readings show, of some springs `only`, and the fit with them."""
     steps: list[Step] = []
+    model = solve(read, columns)
     tried = len(read.ohm)
     own = [np.flatnonzero(read.spring == k) for k in range(int(read.spring.max()) + 1)]
     own = [rows[np.lexsort((read.time_s[rows], read.run[rows]))] for rows in own]
@@ -92,7 +105,8 @@ def find(read: Readings, columns: dict[str, np.ndarray], model: Linear) -> tuple
 
     # what one change leaves of the others is no noise: all are put in first, then each must be needed beside the rest
     most = MOST_A_RUN * (1 + int(read.run.max()))
-    while springs := [k for k in range(len(own)) if sum(one.spring == k for one in steps) < most]:
+    possible = range(len(own)) if only is None else sorted(only)
+    while springs := [k for k in possible if sum(one.spring == k for one in steps) < most]:
         one = best(steps, springs)
         if one is None:
             break

@@ -6,7 +6,7 @@ A reading counts where the spring is driven and settled in one phase; how hot it
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 import pandas as pd
@@ -18,6 +18,8 @@ from ..fit.problem import Problem
 from ..fit.rounding import ROUNDING_V
 from ..fit.simulate import simulate_run
 from ..fit.spec import Fit
+from ..logs.mending import RUN_IN_S
+from ..logs.run import Run
 
 REFERENCE_C = 20.0
 """Temperature of the declared resistances."""
@@ -26,6 +28,8 @@ BELIEVED_RISE = 0.001
 SETTLED = 0.02
 NEAR_S = 15.0
 """A reading counts where austenite moves by less than SETTLED within NEAR_S before and after."""
+COLDEST_C, HOTTEST_C = -60.0, 300.0
+"""Between them the plant takes temperatures: at one every spring is martensite, at the other austenite."""
 SMOOTHED = 5
 """Readings of a thermometer that are taken together for a spring's temperature."""
 SEEN = 30
@@ -45,6 +49,20 @@ class Readings:
     noise: np.ndarray
     """Of each row, ohm."""
 
+    def of(self, rows: np.ndarray) -> Readings:
+        """Return some of the rows."""
+        return Readings(*(getattr(self, field.name)[rows] for field in fields(self)))
+
+    def hot_times(self) -> dict[str, np.ndarray]:
+        """Return which readings are of each time that a spring was hot, as numbers: it may have transformed further in each."""
+        order = np.lexsort((self.time_s, self.run, self.spring))
+        apart = (np.diff(self.spring[order]) != 0) | (np.diff(self.run[order]) != 0)
+        apart |= np.diff(self.time_s[order]) > NEAR_S
+        which = np.empty(len(order), dtype=int)
+        which[order] = np.concatenate(([0], np.cumsum(apart)))
+        hot = self.phase > 0.5
+        return {f"hot {n}": ((which == n) & hot).astype(float) for n in np.unique(which[hot])}
+
 
 def readings(problem: Problem, fit: Fit) -> Readings | None:
     """Return the readings of runs whose currents and voltages are known; None where there are none."""
@@ -52,7 +70,7 @@ def readings(problem: Problem, fit: Fit) -> Readings | None:
     for r, run in enumerate(problem.runs):
         if run.current_a is None or run.voltage_v is None:
             continue
-        traced = _as_measured(problem, fit, r)
+        traced, known = _as_measured(problem, fit, r)
         width = 1 + 2 * max(1, round(NEAR_S / float(np.median(np.diff(run.time_s)))))
         ohm = ohm_of(run)
         noise = statistics.noise_floor(ohm, run.starts)
@@ -60,7 +78,7 @@ def readings(problem: Problem, fit: Fit) -> Readings | None:
             # on the way between the phases the model's part of austenite is no better than its temperature
             moving = maximum_filter1d(traced[:, k, 1], width) - minimum_filter1d(traced[:, k, 1], width) > SETTLED
             between = (traced[:, k, 1] > SETTLED) & (traced[:, k, 1] < 1.0 - SETTLED)
-            here = np.flatnonzero(np.isfinite(ohm[:, k]) & ~moving & ~between)
+            here = np.flatnonzero(np.isfinite(ohm[:, k]) & known[:, k] & ~moving & ~between)
             if len(here) >= 20 and np.isfinite(noise[k]):
                 n = len(here)
                 columns = (ohm[here, k], np.full(n, k), np.full(n, r), run.time_s[here])
@@ -71,17 +89,35 @@ def readings(problem: Problem, fit: Fit) -> Readings | None:
     return Readings(*(np.concatenate([part[j] for part in parts]) for j in range(7)))
 
 
-def _as_measured(problem: Problem, fit: Fit, r: int) -> np.ndarray:
-    """Return temperatures and austenite of a run, (rows, springs, 2), springs as hot as the thermometers say.
+def _as_measured(problem: Problem, fit: Fit, r: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return temperatures and austenite of a run, (rows, springs, 2), springs as hot as the thermometers say, and where they
+    say the phase, too, (rows, springs).
 
-    What heat the model has wrong, as that of a contact which is measured with its spring, is in neither.
+    What heat the model has wrong, as that of a contact which is measured with its spring, is in neither. What a spring was
+    before the log, or before a gap in it, nobody saw: the phase is known from where it is the same whatever it was.
     """
     run = problem.run_of(r, fit.as_dict())
     ambient = problem.ambient_of(r, fit.as_dict())
     traced = simulate_run(problem.plant_for(fit.spec, fit.values, r), run, ambient, {}, trace=True)
     left = pd.DataFrame(fit.residual[r]).rolling(SMOOTHED, center=True, min_periods=1).mean().fillna(0.0).to_numpy()
-    hot = np.clip(traced[:, :, 0] + left, -60.0, 500.0)
-    given = replace(run, mode="temperature", drive=hot, warm=False, starts=[0])
+    hot = np.clip(traced[:, :, 0] + left, COLDEST_C, HOTTEST_C)
+    told = np.ones(len(run.time_s), dtype=bool)
+    first = [0]
+    for begin in run.starts[1:]:
+        end = int(np.searchsorted(run.time_s, run.time_s[begin] + RUN_IN_S))
+        told[begin:end] = False
+        first.append(end - 1)
+    cold, warm = (_driven_to(problem, fit, replace(run, drive=hot), ambient, first, was) for was in (COLDEST_C, HOTTEST_C))
+    return cold, (np.abs(cold[:, :, 1] - warm[:, :, 1]) <= SETTLED) & told[:, None]
+
+
+def _driven_to(
+    problem: Problem, fit: Fit, run: Run, ambient: np.ndarray | None, first: list[int], was_c: float
+) -> np.ndarray:
+    """Return temperatures and austenite of springs as hot as `run` has them, and before its `first` rows at `was_c`."""
+    drive = run.drive.copy()
+    drive[first] = was_c
+    given = replace(run, mode="temperature", drive=drive, warm=False, starts=[0])
     return simulate_run(problem.plant_for(fit.spec, fit.values), given, ambient, {}, trace=True)
 
 

@@ -61,8 +61,13 @@ def witness(problem: Problem, fit: Fit) -> dict[str, Any] | None:
     read = readings(problem, fit)
     if read is None:
         return None
-    austenite = int((read.phase > 0.5).sum())
-    two_phases = SEEN <= austenite <= len(read.ohm) - SEEN
+    hot = read.phase > 0.5
+    rare = hot if hot.sum() < SEEN else ~hot if (~hot).sum() < SEEN else np.zeros_like(hot)
+    # too few readings of a phase tell nothing of it, and left among the others they would be a contact
+    read = read.of(~rare)
+    if not len(read.ohm):
+        return None
+    two_phases = bool(np.ptp(read.phase) > 0.5)
     # every spring has a resistance of its own: wires differ; what is shared is how it changes
     own = {f"own {k}": (read.spring == k).astype(float) for k in sorted({int(one) for one in read.spring})}
     columns = own
@@ -87,7 +92,7 @@ def witness(problem: Problem, fit: Fit) -> dict[str, Any] | None:
     plain = own | ({"phase": read.phase, "rise austenite": read.over_k * read.phase} if two_phases else {})
     plain |= {"rise martensite": read.over_k * (1.0 - read.phase) if two_phases else read.over_k}
     # a contact that got worse is no longer wire
-    alike = contacts.find(read, plain, solve(read, plain))[1].values[: len(own)]
+    alike = contacts.find(read, plain)[1].values[: len(own)]
     # a longer wire has more of everything: what is shared counts in proportion to a spring's own resistance
     share = (alike / alike.mean())[np.searchsorted(sorted({int(one) for one in read.spring}), read.spring)]
     if two_phases:
@@ -105,7 +110,9 @@ def witness(problem: Problem, fit: Fit) -> dict[str, Any] | None:
         rising = {"rise martensite": over_k}
     trial = solve(read, columns | rising)
     rise_nats = nats_of(read, model, trial)
-    if rise_nats > LEAST_NATS:
+    # how far a spring transformed each time nobody knows: what rises does so while it stays hot, too
+    each = own | read.hot_times()
+    if min(rise_nats, nats_of(read, solve(read, each), solve(read, each | rising))) > LEAST_NATS:
         columns, model = columns | rising, trial
     if "phase" in columns and "rise martensite" in columns:
         # each beside the other: what one explains alone the other may explain as well
@@ -129,7 +136,7 @@ def witness(problem: Problem, fit: Fit) -> dict[str, Any] | None:
             rises[name] = shares
         if max(abs(one["value"]) for one in rises.values()) > SMALLEST_RISE:
             named("resistance_temperature", rise_nats, 1, rises)
-    steps, model = contacts.find(read, columns, model)
+    steps, model = contacts.find(read, columns)
     steps = contacts.dated(problem, steps)
     for one in steps:
         parameters = {f"contact_ohm[{one.spring + 1}]": {"value": one.ohm, "stderr": one.error, "unit": "ohm"}}
