@@ -275,6 +275,13 @@ def test_one_column_in_fahrenheit_is_refused_by_its_name(make_log) -> None:
     assert (caught.value.line, caught.value.column) == (2, path.read_text().splitlines()[1].index(",68.") + 2)
 
 
+def test_days_of_rows_that_show_no_warming_are_in_milliseconds(tmp_path: Path) -> None:
+    rows = "".join(f"{500 * n},{n // 100 % 2},{20.0 + 0.1 * (n % 7):g}\n" for n in range(1800))
+    error = refused(tmp_path, HEADER + rows)
+    assert (error.line, error.column) == (1801, 1)
+    assert "spans 10.4 days, its rows 500 s apart: if its time is in ms, divide by 1000" in error.message
+
+
 def test_a_hot_start_is_not_fahrenheit(make_log) -> None:
     def hot(columns: dict[str, np.ndarray]) -> None:
         columns["t3_c"] = 20.0 + 48.0 * np.exp(-np.arange(600.0) / 60) + columns["t3_c"] * 1e-3
@@ -285,7 +292,7 @@ def test_a_hot_start_is_not_fahrenheit(make_log) -> None:
 @pytest.mark.parametrize(
     ("change", "word"),
     [
-        (lambda c: c.update(time_s=np.arange(600.0) * 1000), "milliseconds"),
+        (lambda c: c.update(time_s=np.arange(600.0) * 120), "milliseconds"),
         (lambda c: c.update(time_s=np.arange(600.0) / 60), "minutes"),
         (lambda c: c["ambient_c"].__setitem__(0, 0.0), "jumps from 0 to 20"),
         (

@@ -298,3 +298,42 @@ def test_what_only_leads_on_what_is_there_is_not_found_the_other_way_round(make_
     found = diagnosed(make_log, change=apart)
     assert found["unexplained"] or found["effects"]
     assert all(one["size"] > 0 for one in found["unnamed"] if one["kind"] in unnamed.GIVES_ONLY)
+
+
+def told(kind: str, text: str, *sizes: float) -> list[unnamed.Hidden]:
+    """Return unnamed causes of one kind and place, each with its size, that begin at 60 s, 120 s ... and stay."""
+    cause = unnamed.Cause(kind, text, (), np.zeros((0, 1)))
+    starts = [60 * (n + 1) for n in range(len(sizes))]
+    return [
+        unnamed.Hidden(cause, text.format(f"{start} to 899 s"), (start, 900), cause.columns, size, 0.03)
+        for start, size in zip(starts, sizes, strict=True)
+    ]
+
+
+@pytest.mark.parametrize(
+    ("kind", "text", "size", "words"),
+    [
+        ("heat", "spring 2 is given heat, {} of run 1", -0.5, "spring 2 loses heat, 60 to 899 s of run 1: 0.50 W"),
+        ("heat", "spring 2 is given heat, {} of run 1", 0.5, "spring 2 is given heat, 60 to 899 s of run 1: 0.50 W"),
+        ("share", "thermometer 2 shows more of its spring's rise, {}", -0.3, "thermometer 2 shows less of its spring's rise"),
+        ("surroundings", "the surroundings are warmer, {}", -2.0, "the surroundings are cooler, 60 to 899 s: 2.00 K"),
+        ("gust", "all losses change, {}", -0.4, "all losses change, 60 to 899 s: -40 %"),
+    ],
+)
+def test_a_negative_size_is_said_in_words_that_have_none(kind: str, text: str, size: float, words: str) -> None:
+    (cause,) = told(kind, text, size)
+    said = cause.as_dict()
+    assert said["text"].startswith(words) and said["size"] == size
+
+
+def test_no_part_loses_more_than_all() -> None:
+    assert not told("gust", "all losses change, {}", -1.01)[0].possible
+    assert told("gust", "all losses change, {}", -0.9)[0].possible and told("heat", "spring 1 is given heat, {}", -2.0)[0].possible
+
+
+def test_jumps_that_go_on_one_way_are_a_drift() -> None:
+    jumps = told("sensor", "all thermometers jump, {} of run 1", 0.3, 0.2, 0.3)
+    (drift,) = unnamed.drifts(jumps)
+    assert drift.as_dict()["text"].startswith("all thermometers drift, 60 to 899 s of run 1: 0.80 K")
+    assert unnamed.drifts(jumps[:2]) == jumps[:2]
+    assert len(unnamed.drifts(told("sensor", "all thermometers jump, {}", 0.3, -0.3, 0.3))) == 3

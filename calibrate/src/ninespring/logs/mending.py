@@ -16,6 +16,9 @@ from .table import Table
 
 LONGEST_S = 60.0 * 86400.0
 """No bench logs two months in one go: a longer log is in milliseconds."""
+SPARSE_S = 100.0
+"""Rows so far apart show no spring's warming, which takes a minute: of days of them, none is a second's."""
+DAY_S = 86400.0
 RUN_IN_S = 120.0
 """After a gap: how long the noise of the temperatures that the simulation starts from is still felt."""
 
@@ -44,12 +47,14 @@ def rising_rows(table: Table, notes: list[str]) -> np.ndarray:
 
 
 def refuse_wrong_units(run: Run, table: Table) -> None:
-    """Months in one log: milliseconds. Springs above 45 degC though nothing is driven: Fahrenheit or kelvin."""
-    if run.duration_s > LONGEST_S:
+    """Months in one log, or days of rows minutes apart: milliseconds. Springs above 45 degC though nothing is driven: Fahrenheit or kelvin."""
+    usual = float(np.median(np.diff(run.time_s)))
+    if run.duration_s > LONGEST_S or (usual > SPARSE_S and run.duration_s > DAY_S):
         line, column = table.where(len(table.lines) - 1, "time_s")
-        days = run.duration_s / 86400.0
+        days = run.duration_s / DAY_S
         said = (
-            f"the log spans {days:.3g} days: if its time is in ms, divide by 1000 (`ninespring import --map` converts)"
+            f"the log spans {days:.3g} days, its rows {usual:g} s apart: if its time is in ms, divide by 1000 "
+            "(`ninespring import --map` converts)"
         )
         raise InputError(said, run.name, line, column)
     if not np.isfinite(run.temperature_c[:5]).any():
@@ -90,7 +95,7 @@ def refuse_wrong_units(run: Run, table: Table) -> None:
 def doubt_units(run: Run) -> None:
     """Say what is possible but unlikely: it may be so, or a unit or a column is wrong."""
     usual = float(np.median(np.diff(run.time_s)))
-    if usual > 100.0:
+    if usual > SPARSE_S:
         run.notes.append(f"the rows are {usual:g} s apart: is the time in milliseconds?")
     if run.duration_s < 60.0 and len(run.time_s) >= 60:
         run.notes.append(f"the whole log lasts {run.duration_s:.3g} s: is the time in minutes or hours?")

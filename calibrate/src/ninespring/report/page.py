@@ -87,18 +87,25 @@ def findings(result: dict[str, Any]) -> list[tuple[str, str]]:
         out.append((f"{one['name']}: {sure}" if sure else one["name"], one.get("text", one["in_words"])))
     for one in result.get("runs_differ", []):
         out.append((f"runs differ: {one['certainty']}, {100 * one['probability']:.0f} %", one["text"]))
-    for one in result.get("unnamed", []):
-        out.append(("a cause without a name", one["text"][0].upper() + one["text"][1:] + "."))
-    for event in result.get("unknown_heat", {}).get("events", []):
-        kind = "a thermometer that jumped" if event["kind"] == "sensor" else "heat of unknown origin"
-        sure = f" (+-{event['stderr']:.2g} {event['unit']})"
-        out.append((kind + sure, event["text"][0].upper() + event["text"][1:] + "."))
+    out += without_name(result)
     if result["unexplained"]:
         left = result["residual"].get("structure_c")
         size = f"{left:.2f} K rms of structure is left" if left is not None else "Structure is left"
         out.append(("unexplained", f"{size} beyond the noise of {result['baseline']['noise_c']:.2f} K."))
     if not out:
         out.append(("nothing is missing", "The declared model explains the logs to the noise of the sensors."))
+    return out
+
+
+def without_name(result: dict[str, Any]) -> list[tuple[str, str]]:
+    """Return what acts without a name in the library, in words and sizes, as `findings` does."""
+    out = []
+    for one in result.get("unnamed", []):
+        out.append(("a cause without a name", one["text"][0].upper() + one["text"][1:] + "."))
+    for event in result.get("unknown_heat", {}).get("events", []):
+        kind = "a thermometer that jumped" if event["kind"] == "sensor" else "heat of unknown origin"
+        sure = f" (+-{event['stderr']:.2g} {event['unit']})"
+        out.append((kind + sure, event["text"][0].upper() + event["text"][1:] + "."))
     return out
 
 

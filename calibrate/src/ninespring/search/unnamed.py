@@ -44,6 +44,10 @@ UNITS = {
     "surroundings": "K",
 }
 """Of a cause's size; the others are parts of what they take from."""
+DRIFT = 3
+"""Jumps of the same thermometers one way, from which they drift: two may be two."""
+LESS = (("is given heat", "loses heat"), ("shows more of", "shows less of"), ("are warmer", "are cooler"))
+"""What is said where the size is negative."""
 SHARE = 0.1
 """Of what is left beyond the noise, the part that an unnamed cause must explain."""
 LEAST_NATS = 3.0
@@ -80,16 +84,41 @@ class Hidden:
         column = column_of(problem, fit, self.cause, typical_power(problem, fit), *self.rows)
         return replace(self, column=column)
 
+    @property
+    def possible(self) -> bool:
+        """Whether anything can be like that: of a part no more than all can be missing."""
+        return self.cause.kind in UNITS or self.size >= -1.0
+
     def as_dict(self) -> dict[str, Any]:
         """Return it for diagnosis.json."""
         unit = UNITS.get(self.cause.kind, "1")
+        text, size = self.text, self.size
+        for more, less in LESS if size < 0.0 else ():
+            if more in text:
+                text, size = text.replace(more, less), -self.size
+        said = sized(size, self.error, unit) if unit != "1" else sized(size, self.error, "%", 100.0)
         return {
             "kind": self.cause.kind,
             "size": self.size,
             "stderr": self.error,
             "unit": unit,
-            "text": f"{self.text}: {sized(self.size, self.error, unit) if unit != '1' else sized(self.size, self.error, '%', 100.0)}",
+            "text": f"{text}: {said}",
         }
+
+
+def drifts(hidden: Sequence[Hidden]) -> list[Hidden]:
+    """Return unnamed causes as they are told: jumps of the same thermometers that go on and on one way are a drift."""
+    ways = [(one.cause.text, one.rows[1], one.size > 0.0) if one.cause.kind == "sensor" else id(one) for one in hidden]
+    out = []
+    for n, (one, way) in enumerate(zip(hidden, ways, strict=True)):
+        jumps = [other for other, same in zip(hidden, ways, strict=True) if same == way]
+        if len(jumps) < DRIFT:
+            out.append(one)
+        elif way not in ways[:n]:
+            first = min(jumps, key=lambda jump: jump.rows[0])
+            size, error = sum(jump.size for jump in jumps), math.hypot(*(jump.error for jump in jumps))
+            out.append(replace(first, text=first.text.replace(" jump", " drift"), size=size, error=error))
+    return out
 
 
 Beside = tuple[Search, Found, list[Hidden]]

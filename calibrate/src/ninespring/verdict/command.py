@@ -112,7 +112,7 @@ def diagnose(
 
 
 def _print_diagnosis(result: dict[str, Any], verdict: str) -> None:
-    from ..report.page import with_unit
+    from ..report.page import with_unit, without_name
 
     out.print(verdict, style="bold", markup=False)
     if result["effects"]:
@@ -134,6 +134,7 @@ def _print_diagnosis(result: dict[str, Any], verdict: str) -> None:
         f"{one['instead_of']} or {one['name']}: these data cannot tell. {one['separating_experiment']}"
         for one in result["rivals"]
     ]
+    lines += [f"{what}: {text}" for what, text in without_name(result)]
     if result["unexplained"]:
         lines.append(f"unexplained: {result['residual']['note']}")
     lines += [

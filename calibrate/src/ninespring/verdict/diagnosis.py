@@ -374,7 +374,11 @@ def _diagnose(
         "unexplained": bool(left_over),
         "unknown_heat": heat.as_dict(),
         "runs_differ": runs_differ,
-        "unnamed": [one.as_dict() for one in hidden if one.cause.kind in unnamed.UNITS or abs(one.size) >= LEAST_PART],
+        "unnamed": [
+            one.as_dict()
+            for one in unnamed.drifts(hidden)
+            if one.possible and (one.cause.kind in unnamed.UNITS or abs(one.size) >= LEAST_PART)
+        ],
         **(
             {"resistance": {key: one for key, one in second.items() if key not in ("effects", "contacts")}}
             if second
