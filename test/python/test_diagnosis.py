@@ -171,3 +171,15 @@ def test_simulations_in_threads_give_the_same_as_alone(make_log) -> None:
     alone = problem.simulate(spec, values, 0)
     for one in problem.simulate_many([(spec, values, 0)] * 8):
         assert np.array_equal(alone, one)
+
+
+def test_what_the_same_readings_say_of_another_is_not_certain() -> None:
+    edge = {"name": "edge_loss", "probability": 0.99, "certainty": "certain", "text": "Outer springs lose 23 % less."}
+    number = {"unit": "1", "stderr": 0.001}
+    middle = {"loss_scale[5]": number | {"value": 1.3}, "heat_capacity_scale[5]": number | {"value": 1.0}}
+    rival = {"instead_of": "edge_loss", "name": "spring_mismatch", "variant": "spring 5", "parameters": middle}
+    for evidence, apart_c, shared in ((3.7, 0.0003, True), (30.0, 0.0003, False), (3.7, 0.3, False)):
+        entry = dict(edge)
+        diagnosis.share_with([entry], [rival | {"evidence": evidence, "predictions_differ_c": apart_c}], 0.06)
+        assert (entry["certainty"] == "probable" and entry["probability"] < 0.5) == shared
+        assert ("Or: Spring 5 loses 30" in entry["text"] and "only in combination" in entry["text"]) == shared

@@ -12,7 +12,7 @@ import pytest
 from ninespring.logs import read_log
 from ninespring.models import Array
 from ninespring.report import page as report
-from ninespring.verdict import diagnosis
+from ninespring.verdict import command, diagnosis
 
 
 class Page(HTMLParser):
@@ -170,3 +170,10 @@ def test_the_verdict_says_the_outcome() -> None:
     named = result | {"effects": [{"name": "spring_mismatch", "variant": "spring 3"}, {"name": "sensor_lag"}]}
     assert report.verdict(named).startswith("Missing: spring_mismatch (spring 3) and sensor_lag; held-out error 2.00 →")
     assert "and something that no effect" in report.verdict(named | {"unexplained": True})
+
+
+def test_the_terminal_tells_what_acts_without_a_name(capsys: pytest.CaptureFixture[str]) -> None:
+    cause = {"text": "spring 8 is given heat, 300 to 600 s of run 1: 0.1003 W (+-0.0002)"}
+    result = {"effects": [], "runs_differ": [], "rivals": [], "unexplained": False, "unnamed": [cause]}
+    command._print_diagnosis(result, "Missing: nothing.")
+    assert "a cause without a name: Spring 8 is given heat" in capsys.readouterr().out

@@ -220,6 +220,27 @@ def rivals_of(
     return rivals
 
 
+def share_with(listed: Sequence[dict[str, Any]], rivals: Sequence[Mapping[str, Any]], same_c: float) -> None:
+    """Share what speaks for a named effect with rivals that show the same readings: only the two in combination are fixed.
+
+    That one of them has fewer numbers makes it simpler, not truer.
+    """
+    for entry in listed:
+        alike = [
+            one
+            for one in rivals
+            if one["instead_of"] == entry["name"]
+            and one["evidence"] < search.TOLD_APART
+            and one["predictions_differ_c"] < same_c
+        ]
+        if not alike:
+            continue
+        instead = [effects.sentence(one["name"], one["parameters"], one["variant"]) for one in alike]
+        entry["probability"] /= 1 + len(alike)
+        entry["certainty"] = "probable"
+        entry["text"] += f" Or: {' Or: '.join(instead)} These readings fix them only in combination."
+
+
 def candidates_of(found: search.Search, final: Fit, base: Fit) -> list[dict[str, Any]]:
     """Return every model that the search fitted, the likeliest first."""
     candidates = [
@@ -329,6 +350,8 @@ def _diagnose(
         if effect in effects.WHY_NOT_ON_CHIP:
             entry["why_not_on_chip"] = effects.WHY_NOT_ON_CHIP[effect]
         listed.append(entry)
+
+    share_with(listed, apart_from_final, EQUIVALENT * problem.noise_c)
 
     progress("what v / i says")
     second = None if swapped else resistance.witness(problem, final)
