@@ -13,7 +13,8 @@ from ninespring.cli import cli
 from ninespring.errors import InputError
 from ninespring.fit import from_resistance
 from ninespring.logs import log_text, read_log
-from ninespring.models import read_model
+from ninespring.models import Array, read_model
+from ninespring.verdict import board_alone
 
 TRUE = {"heat_capacity_j_per_k": 0.34, "loss_w_per_k": 0.0052, "orthogonal_w_per_k": 0.0007, "latent_heat_j": 7.5}
 
@@ -119,3 +120,26 @@ def test_a_board_alone_is_diagnosed_with_its_effect_and_no_degrees(
     assert result["after"]["rmse_c"] is None and result["after"]["rmse_v"] < 0.5 * result["baseline"]["rmse_v"]
     assert "edge_loss" in read_model(tmp_path / "out" / "model.toml").effects
     assert "only a thermometer can say" in (tmp_path / "out" / "report.html").read_text()
+
+
+def test_a_board_alone_tells_a_contact_that_got_worse(tmp_path: Path) -> None:
+    run = read_log(board_log(tmp_path / "board.csv"), or_resistance=True)
+    assert run.current_a is not None and run.voltage_v is not None
+    run.voltage_v[300:, 3] += 0.02 * run.current_a[300:, 3]
+    run.drive[:, 3] = run.current_a[:, 3] * run.voltage_v[:, 3]
+    result, model = board_alone.diagnose(Array(), [run])
+    (contact,) = result["effects"]
+    assert contact["name"] == "contact_resistance" and contact["variant"].startswith("spring 4, from 3")
+    assert contact["parameters"]["contact_ohm[4]"]["value"] == pytest.approx(0.02, rel=0.1)
+    assert not result["unexplained"] and "Missing: contact_resistance" in board_alone.verdict(result)
+    assert model.parameters["loss_w_per_k"] == pytest.approx(TRUE["loss_w_per_k"], rel=0.05)
+
+
+def test_a_board_alone_tells_a_resistance_that_rises_with_temperature(tmp_path: Path) -> None:
+    rises = {"resistance_martensite_rise_per_k": 8e-4, "resistance_austenite_rise_per_k": 8e-4}
+    path = board_log(tmp_path / "board.csv", effects={"resistance_temperature": rises})
+    result, model = board_alone.diagnose(Array(), [read_log(path, or_resistance=True)])
+    (rise,) = result["effects"]
+    assert rise["name"] == "resistance_temperature" and not result["unexplained"]
+    for name, value in rises.items():
+        assert model.parameters[name] == pytest.approx(value, rel=0.15)

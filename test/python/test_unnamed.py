@@ -315,7 +315,12 @@ def told(kind: str, text: str, *sizes: float) -> list[unnamed.Hidden]:
     [
         ("heat", "spring 2 is given heat, {} of run 1", -0.5, "spring 2 loses heat, 60 to 899 s of run 1: 0.50 W"),
         ("heat", "spring 2 is given heat, {} of run 1", 0.5, "spring 2 is given heat, 60 to 899 s of run 1: 0.50 W"),
-        ("share", "thermometer 2 shows more of its spring's rise, {}", -0.3, "thermometer 2 shows less of its spring's rise"),
+        (
+            "share",
+            "thermometer 2 shows more of its spring's rise, {}",
+            -0.3,
+            "thermometer 2 shows less of its spring's rise",
+        ),
         ("surroundings", "the surroundings are warmer, {}", -2.0, "the surroundings are cooler, 60 to 899 s: 2.00 K"),
         ("gust", "all losses change, {}", -0.4, "all losses change, 60 to 899 s: -40 %"),
     ],
@@ -328,7 +333,10 @@ def test_a_negative_size_is_said_in_words_that_have_none(kind: str, text: str, s
 
 def test_no_part_loses_more_than_all() -> None:
     assert not told("gust", "all losses change, {}", -1.01)[0].possible
-    assert told("gust", "all losses change, {}", -0.9)[0].possible and told("heat", "spring 1 is given heat, {}", -2.0)[0].possible
+    assert (
+        told("gust", "all losses change, {}", -0.9)[0].possible
+        and told("heat", "spring 1 is given heat, {}", -2.0)[0].possible
+    )
 
 
 def test_jumps_that_go_on_one_way_are_a_drift() -> None:

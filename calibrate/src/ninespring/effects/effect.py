@@ -90,6 +90,8 @@ class Scene:
     """In every run."""
     load_moves: bool = False
     """A load was logged, and was not always the same."""
+    reads_ohm: bool = False
+    """The readings are the springs' own resistances."""
 
     @property
     def springs(self) -> int:
@@ -124,6 +126,7 @@ def scene_of(problem: Problem) -> Scene:
         len(runs),
         all(run.ambient_c is not None for run in runs),
         any(run.load_n is not None and np.ptp(run.load_n) > 0.0 for run in runs),
+        problem.reads_ohm,
     )
 
 

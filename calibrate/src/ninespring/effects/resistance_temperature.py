@@ -9,7 +9,7 @@ NAMES = ("resistance_martensite_rise_per_k", "resistance_austenite_rise_per_k")
 
 
 def _candidates(scene: Scene) -> Iterator[Candidate]:
-    if "current" in scene.modes:
+    if "current" in scene.modes or scene.reads_ohm:
         key = "resistance_rise_per_k"
         yield Candidate(
             "both phases alike",

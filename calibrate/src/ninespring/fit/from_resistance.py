@@ -63,6 +63,8 @@ class Resistances(Problem):
     Everything else is as with thermometers. Volts, because what a board's reading is off by is the same at every current.
     """
 
+    reads_ohm = True
+
     def __init__(self, array: Array, runs: Sequence[Run]) -> None:
         self.boards = list(runs)
         ohm = np.concatenate([ohm_of(run) for run in runs])

@@ -59,6 +59,9 @@ def fold_of_rows(run: Run) -> np.ndarray:
 class Problem:
     """Runs to be explained by an array. Holds what does not depend on the model."""
 
+    reads_ohm = False
+    """Whether the readings are the springs' own resistances, no temperatures."""
+
     def __init__(self, array: Array, runs: Sequence[Run], declared: Mapping[str, float] | None = None) -> None:
         array.one_layer("fit and diagnose know")
         self.array = array

@@ -15,6 +15,7 @@ import numpy as np
 
 from ..fit.problem import Problem
 from ..fit.rounding import DRIVEN_A
+from ..logs.run import Run
 from .readings import SEEN, Linear, Readings, nats_of, solve
 
 LEAST_NATS = 3.0
@@ -159,14 +160,23 @@ def dated(problem: Problem, steps: Sequence[Step]) -> list[Step]:
     return out
 
 
+def added_ohm(run: Run, r: int, steps: Sequence[Step]) -> np.ndarray:
+    """Return what contacts add in series by their changes, (rows, springs), in the run that is number `r`."""
+    ohm = np.zeros_like(run.drive)
+    for one in steps:
+        if r >= one.run:
+            ohm[:, one.spring] += one.ohm * ((run.time_s >= one.from_s) | (r > one.run))
+    return ohm
+
+
+def without_heat(run: Run, ohm: np.ndarray) -> Run:
+    """Return a run without the heat that contacts of so many ohm take of what the springs are given."""
+    heat = np.nan_to_num(run.current_a) ** 2 * ohm
+    return replace(run, drive=np.maximum(run.drive - heat, 0.0))
+
+
 def take_heat_out(problem: Problem, steps: Sequence[Step]) -> None:
     """Take out of what the springs are given the heat that contacts take: v i is measured with them."""
     for r, run in enumerate(problem.runs):
-        if run.mode != "power" or run.current_a is None:
-            continue
-        ohm = np.zeros_like(run.drive)
-        for one in steps:
-            if r >= one.run:
-                ohm[:, one.spring] += one.ohm * ((run.time_s >= one.from_s) | (r > one.run))
-        drive = np.maximum(run.drive - np.nan_to_num(run.current_a) ** 2 * ohm, 0.0)
-        problem.runs[r] = replace(run, drive=drive)
+        if run.mode == "power" and run.current_a is not None:
+            problem.runs[r] = without_heat(run, added_ohm(run, r, steps))

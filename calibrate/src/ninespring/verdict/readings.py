@@ -71,14 +71,11 @@ def readings(problem: Problem, fit: Fit) -> Readings | None:
         if run.current_a is None or run.voltage_v is None:
             continue
         traced, known = _as_measured(problem, fit, r)
-        width = 1 + 2 * max(1, round(NEAR_S / float(np.median(np.diff(run.time_s)))))
+        told = known & settled(run, traced[:, :, 1])
         ohm = ohm_of(run)
         noise = statistics.noise_floor(ohm, run.starts)
         for k in range(run.springs):
-            # on the way between the phases the model's part of austenite is no better than its temperature
-            moving = maximum_filter1d(traced[:, k, 1], width) - minimum_filter1d(traced[:, k, 1], width) > SETTLED
-            between = (traced[:, k, 1] > SETTLED) & (traced[:, k, 1] < 1.0 - SETTLED)
-            here = np.flatnonzero(np.isfinite(ohm[:, k]) & known[:, k] & ~moving & ~between)
+            here = np.flatnonzero(np.isfinite(ohm[:, k]) & told[:, k])
             if len(here) >= 20 and np.isfinite(noise[k]):
                 n = len(here)
                 columns = (ohm[here, k], np.full(n, k), np.full(n, r), run.time_s[here])
@@ -87,6 +84,14 @@ def readings(problem: Problem, fit: Fit) -> Readings | None:
     if not parts:
         return None
     return Readings(*(np.concatenate([part[j] for part in parts]) for j in range(7)))
+
+
+def settled(run: Run, austenite: np.ndarray) -> np.ndarray:
+    """Return where springs are in one phase and stay there, (rows, springs)."""
+    width = 1 + 2 * max(1, round(NEAR_S / float(np.median(np.diff(run.time_s)))))
+    # on the way between the phases the model's part of austenite is no better than its temperature
+    moving = maximum_filter1d(austenite, width, axis=0) - minimum_filter1d(austenite, width, axis=0) > SETTLED
+    return ~moving & ((austenite <= SETTLED) | (austenite >= 1.0 - SETTLED))
 
 
 def _as_measured(problem: Problem, fit: Fit, r: int) -> tuple[np.ndarray, np.ndarray]:
@@ -107,7 +112,9 @@ def _as_measured(problem: Problem, fit: Fit, r: int) -> tuple[np.ndarray, np.nda
         end = int(np.searchsorted(run.time_s, run.time_s[begin] + RUN_IN_S))
         told[begin:end] = False
         first.append(end - 1)
-    cold, warm = (_driven_to(problem, fit, replace(run, drive=hot), ambient, first, was) for was in (COLDEST_C, HOTTEST_C))
+    cold, warm = (
+        _driven_to(problem, fit, replace(run, drive=hot), ambient, first, was) for was in (COLDEST_C, HOTTEST_C)
+    )
     return cold, (np.abs(cold[:, :, 1] - warm[:, :, 1]) <= SETTLED) & told[:, None]
 
 

@@ -41,6 +41,25 @@ def entry(found: dict[str, Any], fit: Fit, problem: Problem) -> dict[str, Any]:
     }
 
 
+def told(name: str, nats: float, parameters: dict[str, Any], chosen_from: int = 1) -> dict[str, Any]:
+    """Return an effect; certain or probable by the evidence that is left after the price of choosing."""
+    probability = 1.0 / (1.0 + math.exp(-min(nats - math.log(chosen_from), 50.0)))
+    certainty = "certain" if probability >= CERTAIN else "probable"
+    return {
+        "name": name,
+        "evidence": nats,
+        "parameters": parameters,
+        "probability": probability,
+        "certainty": certainty,
+    }
+
+
+def of_contact(one: contacts.Step) -> dict[str, Any]:
+    """Return a contact's change as an effect."""
+    parameters = {f"contact_ohm[{one.spring + 1}]": {"value": one.ohm, "stderr": one.error, "unit": "ohm"}}
+    return told("contact_resistance", one.nats, parameters, one.tried) | {"variant": one.words}
+
+
 def into_model(model: Model, second: dict[str, Any] | None) -> None:
     """Put what v / i determined into a model, where both phases were seen: one without the other would be wrong.
 
@@ -74,13 +93,9 @@ def witness(problem: Problem, fit: Fit) -> dict[str, Any] | None:
     model = first = solve(read, columns)
     found: list[dict[str, Any]] = []
 
-    def named(name: str, nats: float, chosen_from: int, parameters: dict[str, Any], variant: str = "") -> None:
-        """Write down an effect; certain or probable by the evidence that is left after the price of choosing."""
-        net = nats - math.log(max(1, chosen_from))
-        probability = 1.0 / (1.0 + math.exp(-min(net, 50.0)))
-        certainty = "certain" if probability >= CERTAIN else "probable"
-        one = {"name": name, "evidence": nats, "parameters": parameters, "probability": probability}
-        found.append(one | {"certainty": certainty} | ({"variant": variant} if variant else {}))
+    def named(name: str, nats: float, parameters: dict[str, Any]) -> None:
+        """Write down an effect."""
+        found.append(told(name, nats, parameters))
 
     def combined(parts: dict[str, float]) -> dict[str, Any]:
         """Return a sum of fitted numbers as one, with its error."""
@@ -123,7 +138,7 @@ def witness(problem: Problem, fit: Fit) -> dict[str, Any] | None:
             rise_nats = nats_of(read, first, model)
     change = model.values[model.names.index("phase")] if "phase" in columns else 0.0
     if "phase" in columns and abs(change) > SMALLEST_PHASE * float(np.median(read.ohm)):
-        named("resistance_phase", phase_nats, 1, {key: combined(parts) for key, parts in resistances.items()})
+        named("resistance_phase", phase_nats, {key: combined(parts) for key, parts in resistances.items()})
     if "rise martensite" in columns:
         rises = {}
         for key in rising:
@@ -135,12 +150,10 @@ def witness(problem: Problem, fit: Fit) -> dict[str, Any] | None:
             shares = {"value": slope["value"] / base["value"], "stderr": slope["stderr"] / base["value"], "unit": "1/K"}
             rises[name] = shares
         if max(abs(one["value"]) for one in rises.values()) > SMALLEST_RISE:
-            named("resistance_temperature", rise_nats, 1, rises)
+            named("resistance_temperature", rise_nats, rises)
     steps, model = contacts.find(read, columns)
     steps = contacts.dated(problem, steps)
-    for one in steps:
-        parameters = {f"contact_ohm[{one.spring + 1}]": {"value": one.ohm, "stderr": one.error, "unit": "ohm"}}
-        named("contact_resistance", one.nats, one.tried, parameters, one.words)
+    found += [of_contact(one) for one in steps]
     typical = float(np.sqrt(np.mean(read.noise**2)))
     count = len(read.ohm)
     return {
