@@ -117,6 +117,7 @@ def test_a_board_alone_is_diagnosed_with_its_effect_and_no_degrees(
     assert [one["name"] for one in result["effects"]] == ["edge_loss"]
     found = result["effects"][0]["parameters"][name]
     assert abs(found["value"] - true) < 4.0 * found["stderr"]
+    assert ("Or: Spring 5 loses 20" in result["effects"][0]["text"]) == (name == "outer_loss_scale")
     assert result["after"]["rmse_c"] is None and result["after"]["rmse_v"] < 0.5 * result["baseline"]["rmse_v"]
     assert "edge_loss" in read_model(tmp_path / "out" / "model.toml").effects
     assert "only a thermometer can say" in (tmp_path / "out" / "report.html").read_text()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -21,7 +22,7 @@ from ..models import Array, Model
 from ..search.certainty import CERTAIN
 from ..search.evidence import unexplained
 from . import contacts, resistance
-from .diagnosis import SCHEMA, validate
+from .diagnosis import SCHEMA, share_with, validate
 from .readings import REFERENCE_C, Readings, settled
 from .residual import depends_on
 from .result import parameters_of
@@ -56,6 +57,20 @@ def without(run: Run, r: int, steps: Sequence[contacts.Step]) -> Run:
     assert run.current_a is not None and run.voltage_v is not None
     ohm = contacts.added_ohm(run, r, steps)
     return replace(contacts.without_heat(run, ohm), voltage_v=run.voltage_v - run.current_a * ohm)
+
+
+def middle_instead(array: Array, listed: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Return what else all outer springs alike are where there is one other spring: that one, with the losses of all free."""
+    if (array.rows, array.cols) != (3, 3):
+        return []
+    number = next((one["parameters"].get("outer_loss_scale") for one in listed if one["name"] == "edge_loss"), None)
+    if number is None:
+        return []
+    other = {"value": 1.0 / number["value"], "stderr": (number["stderr"] or 0.0) / number["value"] ** 2, "unit": "1"}
+    mass = {"value": 1.0, "stderr": 0.0, "unit": "1"}
+    rival = {"instead_of": "edge_loss", "name": "spring_mismatch", "variant": "spring 5", "evidence": 0.0}
+    numbers = {"loss_scale[5]": other, "heat_capacity_scale[5]": mass}
+    return [rival | {"parameters": numbers, "predictions_differ_c": 0.0}]
 
 
 def diagnose(
@@ -112,6 +127,7 @@ def diagnose(
                 "seen_by": "v / i",
             }
         )
+    share_with(listed, middle_instead(array, listed), math.inf)
     listed.sort(key=lambda one: -one["evidence"])
     no_degrees = {"rmse_c": None, "holdout_rmse_c": None}
     result: dict[str, Any] = {
