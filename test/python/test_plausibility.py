@@ -9,7 +9,7 @@ import pytest
 from ninespring.logs import read_log
 from ninespring.models import Array
 from ninespring.report import page
-from ninespring.verdict import diagnosis, plausibility
+from ninespring.verdict import diagnosis, doubt, plausibility
 
 TRUE = {"latent_heat": {"latent_heat_j": 8.0}, "shared_air": {"air_exchange_w_per_k": 0.2}}
 
@@ -97,3 +97,13 @@ def test_thermometers_that_step_are_said_where_the_steps_are_most_of_their_noise
     warnings = plausibility.coarse([read_log(make_log(effects=TRUE, change=rounded))])
     assert len(warnings) == said
     assert all(f"t8_c, t9_c step by {step:g} K" in one for one in warnings)
+
+
+def test_what_v_over_i_says_beside_wrong_temperatures_is_nothing_that_a_spring_can_have() -> None:
+    rise = {"name": "resistance_temperature", "parameters": {"resistance_austenite_rise_per_k": {"value": 0.0215}}}
+    contact = {"name": "contact_resistance", "parameters": {"contact_ohm[5]": {"value": -0.008}}}
+    (said,) = doubt.impossible({"effects": [contact, rise]})
+    assert said.startswith(
+        "v / i does not go with the temperatures (resistance_austenite_rise_per_k would be 0.0215 1/K)"
+    )
+    assert doubt.impossible({"effects": [contact]}) == doubt.impossible(None) == []

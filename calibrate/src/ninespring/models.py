@@ -109,6 +109,8 @@ class Model:
     parameters: dict[str, float] = field(default_factory=dict)
     stderr: dict[str, float] = field(default_factory=dict)
     provenance: dict[str, Any] = field(default_factory=dict)
+    kept: dict[str, str] = field(default_factory=dict)
+    """Parameters that `export` leaves as the chip has them, and why."""
     name: str = ""
     places: dict[str, tuple[int, int]] = field(default_factory=dict)
     """Line and column of each parameter's value, where the model was read from a file."""
@@ -255,7 +257,7 @@ def read_model(path: str | Path) -> Model:
 
 
 def _read_parameter(file: TomlFile, at: At, model: Model) -> None:
-    entry = file.table(at, ("name", "value", "unit", "stderr", "spring", "effect"))
+    entry = file.table(at, ("name", "value", "unit", "stderr", "spring", "effect", "kept"))
     name, table = file.text_at((*at, "name")), native.parameter_table()
     if name not in table:
         raise file.refuse(f"there is no parameter '{name}'{did_you_mean(name, table)}", (*at, "name"))
@@ -277,15 +279,19 @@ def _read_parameter(file: TomlFile, at: At, model: Model) -> None:
     model.places[full] = file.place((*at, "value"))
     if "stderr" in entry:
         model.stderr[full] = file.number((*at, "stderr"), 0.0, 1e12, f"{name} stderr")
+    if "kept" in entry:
+        model.kept[full] = file.text_at((*at, "kept"))
 
 
 def _check_provenance(file: TomlFile) -> None:
-    given = file.table(("provenance",), ("tool", "date", "logs", *ERRORS, "note"))
+    given = file.table(("provenance",), ("tool", "date", "logs", *ERRORS, "note", "doubts"))
     for key in given:
         if key in ERRORS:
             file.number(("provenance", key), -100.0, 1e6)
-        elif key != "logs":
+        elif key not in ("logs", "doubts"):
             file.text_at(("provenance", key))
+    for at in file.tables(("provenance", "doubts")):
+        file.text_at(at)
     for at in file.tables(("provenance", "logs")):
         file.table(at, ("file", "sha256"))
         file.text_at((*at, "file"))
@@ -325,6 +331,8 @@ def model_text(model: Model) -> str:
             lines.append(f"stderr = {_value(model.stderr[full])}")
         if known.effect:
             lines.append(f'effect = "{known.effect}"')
+        if full in model.kept:
+            lines.append(f"kept = {json.dumps(model.kept[full], ensure_ascii=False)}")
     made = {
         "tool": f"ninespring {__version__}",
         "date": datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%dT%H:%M:%SZ"),
@@ -333,6 +341,8 @@ def model_text(model: Model) -> str:
     for key in ("tool", "date", "note"):
         if key in made:
             lines.append(f"{key} = {json.dumps(made[key])}")
+    if made.get("doubts"):
+        lines.append(f"doubts = {json.dumps(made['doubts'], ensure_ascii=False)}")
     for key in ERRORS:
         if made.get(key) is not None:
             lines.append(f"{key} = {_value(made[key])}")

@@ -59,7 +59,9 @@ Examples:
 @click.option("-o", "--output", type=FILE, required=True, help="console lines to write, `$name=value`; - prints them")
 @CHIP
 @LAYER
-@click.option("--force", is_flag=True, help="write even settings that drive worse than the board's own")
+@click.option(
+    "--force", is_flag=True, help="write even settings of a doubted log, or that drive worse than the board's own"
+)
 @JSON
 def export(
     model_path: Path, output: Path, chip_path: Path | None, layer: str | None, force: bool, json_path: Path | None
@@ -68,7 +70,8 @@ def export(
 
     Only what the logs determined is written: the rest stays as the chip has it, and the file says which and why. Before
     writing, arrays like the model's are driven with the old and the new settings, and settings with which springs hold
-    less, heat later, get hotter than transforming takes or disturb the ones that are off are refused.
+    less, heat later, get hotter than transforming takes or disturb the ones that are off are refused. So is a model of a log
+    that the diagnosis doubted.
     """
     from .. import effects
     from .drive import compare
@@ -76,6 +79,11 @@ def export(
 
     check_folder(output, json_path)
     model = _model(model_path, layer)
+    doubts = list(model.provenance.get("doubts", []))
+    if doubts and not force:
+        raise WorkError(
+            f"the log of this model is doubted, nothing is written: {'; '.join(doubts)} (--force writes it all the same)"
+        )
     made = settings_of(model)
     left = {e: effects.WHY_NOT_ON_CHIP[e] for e in model.effects if e in effects.WHY_NOT_ON_CHIP}
     old = _chip_lines(chip_path)
@@ -90,6 +98,7 @@ def export(
         kept.setdefault(why, []).append(name)
     head = [
         f"# from {model_path.name}",
+        *(f"# doubted, written by --force: {one}" for one in doubts),
         *(f"# worse, written by --force: {one}" for one in worse),
         *(f"# {e} is left out: {why}" for e, why in left.items()),
         *(f"# not written, {why}: {', '.join(_together(names))}" for why, names in kept.items()),

@@ -6,7 +6,7 @@ it are the ones it determines.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,10 +14,14 @@ from .. import effects, native
 from ..fit.simulate import array_parameters, board_settings
 from ..models import Model
 
+TEMPERATURES = ("martensite_finish_c", "martensite_start_c", "austenite_start_c", "austenite_finish_c")
 FIRMWARE_EFFECTS = ("latent_heat", "resistance_phase")
 """What the firmware's defaults carry: what no log determines keeps these."""
 KNOWN = 0.5
-"""That an effect is not there is known where the error of its number is less than this part of what the chip has of it."""
+"""A number is known, or known not to be there, where what it may be off by is less than this part of it."""
+CROSSED = 3.0
+"""Standard errors of where a transformation ends, by which a spring must have been beyond it: a fit takes for its end what
+was reached."""
 
 
 @dataclass
@@ -55,16 +59,36 @@ def determined(model: Model) -> dict[str, str]:
     """
     table = native.parameter_table()
     out: dict[str, str] = dict.fromkeys(array_parameters(model.array), "")
-    for name in model.parameters:
-        effect, error = table[name.partition("[")[0]].effect, model.stderr.get(name)
-        if effect in model.effects:
+    uncrossed = not_crossed(model)
+    for name, value in model.parameters.items():
+        known, error = table[name.partition("[")[0]], model.stderr.get(name)
+        of_phases = known.effect in FIRMWARE_EFFECTS
+        if name in model.kept:
+            out[name] = model.kept[name]
+        elif error is None and known.effect not in model.effects:
+            continue
+        elif uncrossed and (known.name in TEMPERATURES or (of_phases and known.effect in model.effects)):
+            out[name] = uncrossed
+        elif known.effect is None or (known.effect in model.effects and not of_phases):
             out[name] = ""
-        elif error is not None and effect:
-            size = abs(table[name.partition("[")[0]].default)
-            out[name] = "" if error < KNOWN * size else "the log says too little of it"
         elif error is not None:
+            size = max(abs(known.default), abs(value) if known.effect in model.effects else 0.0)
+            out[name] = "" if error < KNOWN * size else "the log says too little of it"
+        else:
             out[name] = ""
     return out
+
+
+def not_crossed(model: Model) -> str:
+    """Return why a model's transformation stays as the chip has it, '' where a spring was seen to go through all of it."""
+    hottest = model.provenance.get("hottest_c")
+    finish, error = best_plant(model).get("austenite_finish_c"), model.stderr.get("austenite_finish_c", 0.0)
+    if hottest is None or hottest >= finish + CROSSED * error:
+        return ""
+    return (
+        f"the log's hottest spring reached {hottest:.1f} degC, which is not clearly beyond the end of the transformation "
+        f"({finish:.1f} +- {error:.1f} degC): transformation kept as it is"
+    )
 
 
 def _lines(plant: native.Plant) -> tuple[dict[str, str], str]:
@@ -82,7 +106,7 @@ def _moved(plant: native.Plant, name: str) -> native.Plant:
     step = max(0.1 * abs(value), 0.05 * abs(known.default)) or min(0.05 * span, 1.0)
     if float(value).is_integer() and span <= 8:
         step = 1.0
-    for other in (value + step, value - step):
+    for other in (value + step, value - step, value + 0.1 * step, value - 0.1 * step):  # a narrow transformation: less
         if known.minimum <= other <= known.maximum:
             try:
                 twin.set(name, other)
@@ -96,9 +120,11 @@ def _moved(plant: native.Plant, name: str) -> native.Plant:
 
 def settings_of(model: Model) -> Settings:
     """Return the settings that a model determines; refused (WorkError) where one does not fit the chip."""
-    plant = best_plant(model)
-    full, remarks = _lines(plant)
     why = determined(model)
+    declared = array_parameters(model.array)
+    told = {name: value for name, value in model.parameters.items() if not why.get(name)}
+    plant = best_plant(replace(model, parameters=told))
+    full, remarks = _lines(plant)
     wanted = {"rows", "columns"} & set(full)
 
     def moves(name: str) -> set[str]:
@@ -107,7 +133,7 @@ def settings_of(model: Model) -> Settings:
 
     weak: dict[str, str] = {}
     for name, reason in why.items():
-        if reason:
+        if reason and name not in declared:
             weak |= dict.fromkeys(moves(name), reason)
         else:
             wanted |= moves(name)
@@ -116,19 +142,16 @@ def settings_of(model: Model) -> Settings:
         if known.effect in FIRMWARE_EFFECTS and name not in why:
             wanted -= moves(name)
     written = {name: value for name, value in full.items() if name in wanted}
-    kept = {name: weak.get(name) or _reason(model, name, plant) for name in full if name not in wanted}
+    kept = {name: weak.get(name) or _reason(model, name) for name in full if name not in wanted}
     written |= {name: f"{value:.3f}" for name, value in board_settings(model.array).items()}
     return Settings(written, kept, remarks)
 
 
-def _reason(model: Model, setting: str, plant: native.Plant) -> str:
+def _reason(model: Model, setting: str) -> str:
     table = native.parameter_table()
     known = table.get(setting.rstrip("0123456789").rstrip("_")) or table.get(setting)
-    hottest = model.provenance.get("hottest_c")
-    transformation = setting == "latent_heat_j" or setting.endswith(("_start_c", "_finish_c"))
-    begins = plant.get("austenite_start_c")
-    if transformation and hottest is not None and hottest < begins:
-        return f"the log's hottest spring reached {hottest:.0f} degC: transformation kept as it is"
+    if (setting == "latent_heat_j" or setting in TEMPERATURES) and (why := not_crossed(model)):
+        return why
     if known is not None and known.effect and known.effect not in model.effects:
         return f"the diagnosis named no {known.effect}"
     return "these logs do not determine it"

@@ -81,7 +81,7 @@ def verdict(result: dict[str, Any]) -> str:
 
 def findings(result: dict[str, Any]) -> list[tuple[str, str]]:
     """Return what was found in words and sizes, each with how sure it is: effects, unknown heat, what is left."""
-    out = [("a mistake in the log?", text) for text in result["warnings"] if "columns swapped" in text]
+    out = [("a mistake in the log?", text) for text in result.get("doubts", [])]
     for one in result["effects"]:
         sure = f"{one['certainty']}, {100 * one['probability']:.0f} %" if "probability" in one else ""
         out.append((f"{one['name']}: {sure}" if sure else one["name"], one.get("text", one["in_words"])))
@@ -111,6 +111,12 @@ def without_name(result: dict[str, Any]) -> list[tuple[str, str]]:
 
 def next_steps(result: dict[str, Any], folder: str) -> list[str]:
     """Return what to do next, as commands; `folder` is where the diagnosis is written."""
+    if result.get("doubts"):
+        logs = " ".join(log["file"] for log in result.get("logs", []))
+        return [
+            *(f"# {text}" for text in result["doubts"]),
+            f"ninespring diagnose {logs} -o {folder}     # when that is mended; export refuses this model",
+        ]
     out = [f"# {one['separating_experiment']}" for one in result["rivals"][:2]]
     if out:
         run = next((one["experiment"]["duration_s"] for one in result["rivals"] if "experiment" in one), 900.0) + 10.0

@@ -27,15 +27,17 @@ from ..models import Array, Model
 from ..search import search, unnamed
 from ..search.certainty import CERTAIN, NAMED, Witness, witness
 from ..search.evidence import EQUIVALENT, difference, excess, log_evidence, unexplained
-from . import contacts, experiments, plausibility, resistance, runs_apart, unknown_heat
+from . import contacts, doubt, experiments, plausibility, resistance, runs_apart, unknown_heat
 from .residual import depends_on
-from .result import DRIFT_LEFT_OUT, model_of, parameters_of
+from .result import DRIFT_LEFT_OUT, as_shown, model_of, parameters_of
 
 SCHEMA = "ninespring.diagnosis/1"
 MOST_OF_IT = 0.5
 """Part of what is beyond the noise without an effect that it explains, where more is explained than left."""
 LEAST_PART = 0.01
 """Of a drive or a reading, less is not told as a cause: a board measures power no better, its voltages step by 4 mV."""
+PROBABLE = CERTAIN - 0.01
+"""The most that an effect is sure with a number at its bound."""
 PINNED = 1e-5
 """Spread, in a number's inner coordinate, that leaves it where it is."""
 
@@ -327,19 +329,24 @@ def _diagnose(
         final = again[id(final)]
     base_out, final_out = problem.holdout_rmse(base), problem.holdout_rmse(final)
 
+    bounds = set(final.at_bounds())
     listed, runs_differ = [], []
     for effect, growing in steps:
         if effect in RUNS_OWN:
             runs_differ.append(runs_apart.entry(problem, final, effect, strength[effect], witnesses[effect]))
             continue
+        probability = witnesses[effect].probability()
+        if bounds & {free.key for free in final.spec.free if free.effect == effect}:
+            # what would be beyond it is no such effect
+            probability = min(probability, PROBABLE)
         entry = {
             "name": effect,
             "rmse_c": statistics.rms(growing.residual),
             "holdout_rmse_c": problem.holdout_rmse(growing),
             "evidence": strength[effect],
             "parameters": parameters_of(problem, final, effect),
-            "probability": witnesses[effect].probability(),
-            "certainty": "certain" if witnesses[effect].probability() >= CERTAIN else "probable",
+            "probability": probability,
+            "certainty": "certain" if probability >= CERTAIN else "probable",
             "witness": asdict(witnesses[effect]),
             "on_chip": effect in effects.ON_CHIP,
             "in_words": effects.IN_WORDS[effect],
@@ -355,6 +362,9 @@ def _diagnose(
 
     progress("what v / i says")
     second = None if swapped else resistance.witness(problem, final)
+    impossible = doubt.impossible(second)
+    if second and impossible:
+        second |= {"effects": []}
     listed += [resistance.entry(one, final, problem) for one in (second or {}).get("effects", [])]
 
     rho = statistics.autocorrelation([r / n for r, n in zip(final.residual, problem.noise, strict=True)], 1)
@@ -362,15 +372,15 @@ def _diagnose(
     warnings = [f"{Path(run.name).name}: {text}" for run in problem.runs for text in run.notes]
     if any(free.knot is not None for free in final.spec.free):
         warnings.append(f"model.toml: {DRIFT_LEFT_OUT}; log ambient_c to have it predicted")
-    warnings += swapped
-    warnings += plausibility.coarse(runs)
-    warnings += [text for run in problem.runs for text in plausibility.undriven_but_hottest(run)]
     if left_over and problem.budget.short:
         warnings.append(
             f"the search ended at its bound of {problem.budget.enough} simulations: there may be more to find"
         )
+    doubts = swapped + [text for run in problem.runs for text in plausibility.undriven_but_hottest(run)]
     if left_over:
-        warnings += plausibility.shifted_clock(problem, (base,) if final is base else (base, final))
+        doubts += plausibility.shifted_clock(problem, (base,) if final is base else (base, final))
+    doubts = doubts or doubt.misfit(problem, final)
+    warnings += doubts + impossible + doubt.about_power(problem) + plausibility.coarse(runs)
     if left_over:
         note = ("structure well above the noise remains that no effect of the library explains. " + note).strip()
     else:
@@ -410,7 +420,7 @@ def _diagnose(
         "residual": {
             "autocorrelation_lag1": float(np.clip(rho[1], -1.0, 1.0)),
             "structure_c": math.sqrt(excess(problem, final)) * problem.noise_c,
-            "rmse_per_spring_c": [finite(v) for v in per_spring(final.residual)],
+            "rmse_per_spring_c": [finite(v) for v in doubt.per_spring(final.residual)],
             "noise_per_spring_c": [
                 finite(v) for v in np.sqrt(np.nanmean(np.square(np.asarray(problem.noise)), axis=0))
             ],
@@ -424,11 +434,13 @@ def _diagnose(
             "correlated": [{"a": a, "b": b, "correlation": r} for a, b, r in final.correlations()],
         },
         "warnings": warnings,
+        "doubts": doubts,
         "seconds": round(time.monotonic() - begun, 2),
         "simulations": problem.simulations,
     }
-    made = model_of(problem, final, runs, result, found.absent(final))
+    made = model_of(problem, final, as_shown(problem, final), result, found.absent(final))
     resistance.into_model(made, second)
+    doubt.into_model(made, problem, final, doubts)
     validate(result)
     return Diagnosis(result, made, problem, base, final, heat)
 
@@ -436,13 +448,6 @@ def _diagnose(
 def finite(value: float) -> float | None:
     """Return the number, None where it is none (JSON has no NaN)."""
     return float(value) if math.isfinite(value) else None
-
-
-def per_spring(residual: Sequence[np.ndarray]) -> np.ndarray:
-    """Return the rms of each spring over all runs, (springs,)."""
-    total = sum(np.nansum(r**2, axis=0) for r in residual)
-    count = sum(np.isfinite(r).sum(axis=0) for r in residual)
-    return np.sqrt(np.where(count > 0, total / np.maximum(count, 1), np.nan))
 
 
 def schema() -> dict[str, Any]:

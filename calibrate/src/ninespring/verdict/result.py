@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -43,6 +44,12 @@ def parameters_of(problem: Problem, fit: Fit, effect: str | None = None) -> dict
             entry["note"] = "at its bound"
         out[free.key] = entry
     return out
+
+
+def as_shown(problem: Problem, fit: Fit) -> list[Run]:
+    """Return the runs as hot as both the thermometers and the fit have them: with neither's noise nor overshoot."""
+    parts = zip(problem.runs, fit.residual, strict=True)
+    return [replace(run, temperature_c=run.temperature_c - np.maximum(0.0, left)) for run, left in parts]
 
 
 def model_of(
