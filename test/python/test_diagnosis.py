@@ -15,7 +15,7 @@ from ninespring.fit.problem import Problem
 from ninespring.fit.spec import Fit
 from ninespring.logs import read_log
 from ninespring.models import Array, model_text, read_model
-from ninespring.search.certainty import Witness, witness
+from ninespring.search.certainty import CERTAIN, Witness, witness
 from ninespring.verdict import diagnosis
 
 
@@ -183,3 +183,11 @@ def test_what_the_same_readings_say_of_another_is_not_certain() -> None:
         diagnosis.share_with([entry], [rival | {"evidence": evidence, "predictions_differ_c": apart_c}], 0.06)
         assert (entry["certainty"] == "probable" and entry["probability"] < 0.5) == shared
         assert ("Or: Spring 5 loses 30" in entry["text"] and "only in combination" in entry["text"]) == shared
+
+
+def test_an_effect_with_a_number_at_its_bound_is_never_certain(make_log) -> None:
+    outer = {"edge_loss": {"edge_loss_fraction": 1.9}}  # more than any edge_loss of the library
+    found = diagnosis.diagnose(Array(), [read_log(make_log(effects=outer))]).result
+    (edge,) = (one for one in found["effects"] if one["name"] == "edge_loss")
+    assert edge["parameters"]["edge_loss_fraction"]["note"] == "at its bound"
+    assert edge["certainty"] == "probable" and edge["probability"] < CERTAIN < Witness(**edge["witness"]).probability()

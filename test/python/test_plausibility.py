@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
-from ninespring.logs import read_log
-from ninespring.models import Array
+from ninespring.logs import read_log, write_atomically
+from ninespring.models import Array, model_text, read_model
 from ninespring.report import page
 from ninespring.verdict import diagnosis, doubt, plausibility
 
@@ -107,3 +109,22 @@ def test_what_v_over_i_says_beside_wrong_temperatures_is_nothing_that_a_spring_c
         "v / i does not go with the temperatures (resistance_austenite_rise_per_k would be 0.0215 1/K)"
     )
     assert doubt.impossible({"effects": [contact]}) == doubt.impossible(None) == []
+
+
+def test_a_diagnosis_writes_no_model_that_its_readers_refuse(
+    make_log, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def beside_a_wrong_clock(*_: object) -> dict[str, Any]:
+        known = {"stderr": 1e-4, "evidence": 99.0, "probability": 1.0, "certainty": "certain"}
+        number = {"value": 0.0215, "stderr": 1e-4, "unit": "1/K"}
+        rise = known | {"name": "resistance_temperature", "parameters": {"resistance_austenite_rise_per_k": number}}
+        ohm = {"value": 0.08, "stderr": 1e-4, "unit": "ohm"}
+        phase = known | {"name": "resistance_phase", "parameters": {"resistance_austenite_ohm": ohm}}
+        seen = {"rows": 1000, "noise_ohm": 1e-3, "before_ohm": 2e-3, "after_ohm": 1e-3, "parameters": {}}
+        return seen | {"effects": [phase, rise], "contacts": []}
+
+    monkeypatch.setattr(diagnosis.resistance, "witness", beside_a_wrong_clock)
+    found = diagnosis.diagnose(Array(), [read_log(make_log())])
+    assert found.effects == [] and found.result["warnings"][0].startswith("v / i does not go with the temperatures")
+    write_atomically({tmp_path / "m.toml": model_text(found.model)})
+    assert "resistance_austenite_ohm" not in read_model(tmp_path / "m.toml").parameters

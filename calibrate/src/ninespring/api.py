@@ -47,15 +47,14 @@ def fit(*logs: Log, effects: Sequence[str] = (), array: Array | str | Path | Non
     their names (`heat_capacity_j_per_k`, `loss_w_per_k`, ...); `provenance["rmse_after_c"]` is its error, K rms.
     """
     from . import native
-    from .verdict import diagnosis
-    from .verdict.result import model_of
+    from .verdict import diagnosis, doubt
 
     for name in effects:
         if name not in native.effect_names():
             raise InputError(f"there is no effect '{name}': {', '.join(native.effect_names())}")
     declared, runs = _array_and_runs(logs, array)
     problem, chosen, _ = diagnosis.fit_effects(declared, runs, list(dict.fromkeys(effects)), lambda text: None)
-    return model_of(problem, chosen, runs)
+    return doubt.model_of_fit(problem, chosen, runs)[0]
 
 
 def diagnose(

@@ -85,9 +85,10 @@ def not_crossed(model: Model) -> str:
     finish, error = best_plant(model).get("austenite_finish_c"), model.stderr.get("austenite_finish_c", 0.0)
     if hottest is None or hottest >= finish + CROSSED * error:
         return ""
+    end = f"{finish:.1f} +- {error:.1f} degC" if error else f"{finish:.1f} degC"
     return (
         f"the log's hottest spring reached {hottest:.1f} degC, which is not clearly beyond the end of the transformation "
-        f"({finish:.1f} +- {error:.1f} degC): transformation kept as it is"
+        f"({end}): transformation kept as it is"
     )
 
 

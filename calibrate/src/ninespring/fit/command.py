@@ -50,8 +50,8 @@ def fit(logs: tuple[Path, ...], array_path: Path | None, effects: str, output: P
     from .. import effects as library
     from .. import native
     from ..models import model_text
-    from ..verdict import diagnosis, doubt, plausibility, steady
-    from ..verdict.result import as_shown, model_of, parameters_of
+    from ..verdict import diagnosis, doubt, steady
+    from ..verdict.result import parameters_of
     from . import from_resistance
     from .statistics import rms
 
@@ -74,16 +74,9 @@ def fit(logs: tuple[Path, ...], array_path: Path | None, effects: str, output: P
         problem, chosen, base = diagnosis.fit_effects(array, runs, wanted, say)
         say("held-out blocks")
         held = problem.holdout_rmse(chosen)
-        suspect = plausibility.swapped(runs)
-        suspect += [text for run in runs for text in plausibility.undriven_but_hottest(run)]
-        if rms(chosen.residual) > 1.5 * problem.noise_c:
-            say("is a clock off?")
-            suspect += plausibility.shifted_clock(problem, (chosen,))
-    model = model_of(problem, chosen, as_shown(problem, chosen))
+        say("is the log to be doubted?")
+        model, suspect = doubt.model_of_fit(problem, chosen, runs)
     model.provenance["rmse_before_c"] = rms(base.residual)
-    suspect = suspect or doubt.misfit(problem, chosen)
-    doubt.into_model(model, problem, chosen, suspect)
-    suspect = suspect + doubt.about_power(problem)
     result = result_of(
         "fit",
         logs=logs_of(runs),

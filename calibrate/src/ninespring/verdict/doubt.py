@@ -12,7 +12,10 @@ from ..export.settings import KNOWN
 from ..fit import statistics
 from ..fit.problem import Problem
 from ..fit.spec import Fit
+from ..logs.run import Run
 from ..models import Model
+from . import plausibility
+from .result import as_shown, model_of
 
 POWER_UNITS = ("W", "J", "ohm")
 """Of numbers that are known no better than the power of the springs."""
@@ -111,3 +114,14 @@ def into_model(model: Model, problem: Problem, fit: Fit, doubts: Sequence[str]) 
             if known.unit.split("/")[0] in POWER_UNITS or known.name == "emissivity":
                 model.kept[name] = why
     model.kept |= {name: why for name, why in _of_springs(problem, fit).items() if name in model.parameters}
+
+
+def model_of_fit(problem: Problem, fit: Fit, runs: Sequence[Run]) -> tuple[Model, list[str]]:
+    """Return the model.toml of a fit that no search made, and what is to be said of its log."""
+    doubts = plausibility.swapped(runs) + [text for run in runs for text in plausibility.undriven_but_hottest(run)]
+    if statistics.rms(fit.residual) > 1.5 * problem.noise_c:
+        doubts += plausibility.shifted_clock(problem, (fit,))
+    doubts = doubts or misfit(problem, fit)
+    model = model_of(problem, fit, as_shown(problem, fit))
+    into_model(model, problem, fit, doubts)
+    return model, doubts + about_power(problem)
