@@ -376,6 +376,13 @@ def _diagnose(
         warnings.append(
             f"the search ended at its bound of {problem.budget.enough} simulations: there may be more to find"
         )
+    if left_over and not adopted:
+        warnings += [
+            f"{effect} ({effects.IN_WORDS[effect]}) would explain {one.share:.0%} of what is left, but not as well at all "
+            f"times: {one.probability():.0%} likely, it is not named"
+            for effect, one in witnesses.items()
+            if one.share > MOST_OF_IT
+        ]
     doubts = swapped + [text for run in problem.runs for text in plausibility.undriven_but_hottest(run)]
     if left_over:
         doubts += plausibility.shifted_clock(problem, (base,) if final is base else (base, final))
