@@ -72,7 +72,7 @@ SECTIONS: tuple[Section, ...] = (
     Section(
         "diagnose",
         "Undeclared effects",
-        f"{PYTHON} bench/diagnose/run.py --seeds 2 --first 300500 --cases build/results/diagnose.json",
+        f"{PYTHON} bench/diagnose/run.py --seeds 2 --first 300600 --cases build/results/diagnose.json",
         markdown=True,
     ),
     Section("closed_forms", "The field against closed forms", f"{PYTHON} bench/explore/closed_forms.py"),
@@ -86,7 +86,7 @@ SECTIONS: tuple[Section, ...] = (
     Section(
         "real_logs",
         "What real logs bring",
-        f"{PYTHON} bench/diagnose/real_logs.py --first 311200 --resume build/results/real_logs.json",
+        f"{PYTHON} bench/diagnose/real_logs.py --first 311300 --resume build/results/real_logs.json",
     ),
     Section("dashboard", "The live page", f"{PYTHON} bench/dashboard/run.py"),
 )
