@@ -19,7 +19,7 @@ from ninespring.errors import WorkError
 from ninespring.fit.predict import predict
 from ninespring.logs import log_text, read_log, read_table, write_atomically
 from ninespring.models import Array, Model, model_text, read_model
-from ninespring.verdict import result as fitted
+from ninespring.verdict import doubt
 from rich.console import Console
 
 
@@ -46,7 +46,9 @@ def test_diagnose_predict_and_export_in_a_row(make_log, tmp_path: Path) -> None:
     assert ninespring("predict", "--model", model, log, "-o", tmp_path / "p.csv").returncode == 0
     assert (tmp_path / "p.csv").read_text().startswith("time_s,t1_c,")
     assert ninespring("export", "--model", model, "-o", tmp_path / "s.txt").returncode == 0
-    assert "$latent_heat_j=" in (tmp_path / "s.txt").read_text()
+    text = (tmp_path / "s.txt").read_text()
+    assert "$loss_w_per_k=" in text
+    assert "reached 95.5 degC, which is not clearly beyond the end of the transformation (98.0 degC)" in text
 
 
 def test_fit_with_an_effect_writes_a_model(make_log, tmp_path: Path) -> None:
@@ -198,7 +200,7 @@ def test_work_that_ends_early_leaves_nothing_and_says_one_line(
         raise raised
 
     stream = io.StringIO()
-    monkeypatch.setattr(fitted, "model_of", ends)
+    monkeypatch.setattr(doubt, "model_of_fit", ends)
     monkeypatch.setattr(cli, "err", Console(file=stream, width=200))
     monkeypatch.setattr(sys, "argv", ["ninespring", "fit", str(log), "-o", str(tmp_path / "m.toml")])
     before = signal.getsignal(signal.SIGTERM)

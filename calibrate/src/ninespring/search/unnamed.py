@@ -396,7 +396,14 @@ def search_beside(problem: Problem, first: Search, final: Fit) -> Beside | None:
     The problem leaves the unnamed causes out when this returns.
     """
     out = _search_beside(problem, first, final)
-    return None if out is None else _or_lasting(problem, *out)
+    if out is None or out[2]:
+        return None if out is None else _or_lasting(problem, *out)
+    # what was taken out stood in for names: with all in the error again, they stand for themselves
+    problem.leave_out(None)
+    named = out[1][0]
+    if set(named.spec.effects) == set(final.spec.effects):
+        return None
+    return first, first.settle(problem.fit(named.spec, named.as_dict())), []
 
 
 def _or_lasting(problem: Problem, found: Search, result: Found, hidden: list[Hidden]) -> Beside:
