@@ -308,8 +308,9 @@ static void take_slow_noise(spring_belief_t *b)
     spring_line_t *line = &b->run.line;
     if (b->quiet == 0) {
         line->rest_ohm[0] = line->rest_ohm[1] = 0.0f;
+        return;
     }
-    if (b->quiet % SLOW_TURNS != 0 || b->quiet == 0) {
+    if (b->quiet % SLOW_TURNS != 0) {
         return;
     }
     if (line->rest_ohm[1] > 0.0f) {

@@ -219,6 +219,11 @@ class Problem:
         """Return what all runs should show."""
         return self.simulate_many([(spec, values, r) for r in range(len(self.runs))])
 
+    def predictions_without(self, fit: Fit, effect: str) -> list[np.ndarray]:
+        """Return what all runs should show with one effect of a fit switched off and every other number as it is."""
+        off = fit.spec.without(effect)
+        return self.predictions(off, [fit.value(free.key) for free in off.free])
+
     # ---- residuals --------------------------------------------------------------------------------------
 
     def residuals(self, predicted: Sequence[np.ndarray]) -> list[np.ndarray]:

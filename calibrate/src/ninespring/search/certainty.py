@@ -83,9 +83,7 @@ def scatter(signal: list[np.ndarray], residual: list[np.ndarray], noise_factor: 
 def witness(problem: Problem, fit: Fit, effect: str, without: Fit, flexible: bool) -> Witness:
     """Return what speaks for an effect in a fit; `without` is the best fit that lacks it."""
     beyond = max(1e-9, excess(problem, without))
-    off = fit.spec.without(effect)
-    values = [fit.value(free.key) for free in off.free]
-    bare = problem.predictions(off, values)
+    bare = problem.predictions_without(fit, effect)
     shown = problem.predictions(fit.spec, fit.values)
     left = problem.without_errors(fit.residual)
     factor = statistics.correlation_factor(

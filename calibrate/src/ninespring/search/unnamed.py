@@ -396,8 +396,10 @@ def search_beside(problem: Problem, first: Search, final: Fit) -> Beside | None:
     The problem leaves the unnamed causes out when this returns.
     """
     out = _search_beside(problem, first, final)
-    if out is None or out[2]:
-        return None if out is None else _or_lasting(problem, *out)
+    if out is None:
+        return None
+    if out[2]:
+        return _or_lasting(problem, *out)
     # what was taken out stood in for names: with all in the error again, they stand for themselves
     problem.leave_out(None)
     named = out[1][0]
@@ -442,8 +444,7 @@ def _or_lasting(problem: Problem, found: Search, result: Found, hidden: list[Hid
 
 def _undone(problem: Problem, fit: Fit, effect: str, begun: Sequence[Hidden], spring: int) -> float:
     """Return the part of what an effect shows at a spring that unnamed causes there take back while they are there."""
-    off = fit.spec.without(effect)
-    bare = problem.predictions(off, [fit.value(free.key) for free in off.free])
+    bare = problem.predictions_without(fit, effect)
     there = [np.zeros_like(mask) for mask in problem.mask]
     for one in begun:
         r = next(r for r, profile in enumerate(one.cause.profiles) if profile is not None)

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from .. import __version__, effects
+from .. import __version__
 from ..fit import from_resistance, statistics
 from ..fit.rounding import DRIVEN_A
 from ..fit.simulate import simulate_run
@@ -98,35 +98,10 @@ def diagnose(
     for name, one in witnesses.items():
         variant, parameters = dict(found.spec.variant).get(name, ""), parameters_of(problem, found, name)
         probability = one.probability()
-        listed.append(
-            {
-                "name": name,
-                "rmse_c": None,
-                "holdout_rmse_c": None,
-                "evidence": float(one.nats),
-                "parameters": parameters,
-                "probability": probability,
-                "certainty": "certain" if probability >= CERTAIN else "probable",
-                "on_chip": name in effects.ON_CHIP,
-                "in_words": effects.IN_WORDS[name],
-                "text": effects.sentence(name, parameters, variant),
-                "seen_by": "v / i",
-                **({"variant": variant} if variant else {}),
-            }
-        )
-    for said in (resistance.of_contact(one) for one in steps):
-        name = said["name"]
-        listed.append(
-            said
-            | {
-                "rmse_c": None,
-                "holdout_rmse_c": None,
-                "on_chip": name in effects.ON_CHIP,
-                "in_words": effects.IN_WORDS[name],
-                "text": effects.sentence(name, said["parameters"], said["variant"]),
-                "seen_by": "v / i",
-            }
-        )
+        said = {"name": name, "evidence": float(one.nats), "parameters": parameters, "probability": probability}
+        said |= {"certainty": "certain" if probability >= CERTAIN else "probable"}
+        listed.append(resistance.entry(said | ({"variant": variant} if variant else {}), None, None))
+    listed += [resistance.entry(resistance.of_contact(one), None, None) for one in steps]
     share_with(listed, middle_instead(array, listed), math.inf)
     listed.sort(key=lambda one: -one["evidence"])
     no_degrees = {"rmse_c": None, "holdout_rmse_c": None}

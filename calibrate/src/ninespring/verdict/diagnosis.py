@@ -365,7 +365,9 @@ def _diagnose(
     impossible = doubt.impossible(second)
     if second and impossible:
         second |= {"effects": []}
-    listed += [resistance.entry(one, final, problem) for one in (second or {}).get("effects", [])]
+    listed += [
+        resistance.entry(one, statistics.rms(final.residual), final_out) for one in (second or {}).get("effects", [])
+    ]
 
     rho = statistics.autocorrelation([r / n for r, n in zip(final.residual, problem.noise, strict=True)], 1)
     depends, note = depends_on(problem, final)
@@ -383,10 +385,7 @@ def _diagnose(
             for effect, one in witnesses.items()
             if one.share > MOST_OF_IT
         ]
-    doubts = swapped + [text for run in problem.runs for text in plausibility.undriven_but_hottest(run)]
-    if left_over:
-        doubts += plausibility.shifted_clock(problem, (base,) if final is base else (base, final))
-    doubts = doubts or doubt.misfit(problem, final)
+    doubts = doubt.of_log(problem, problem.runs, swapped, (base,) if final is base else (base, final), left_over)
     warnings += doubts + impossible + doubt.about_power(problem) + plausibility.coarse(runs)
     if left_over:
         note = ("structure well above the noise remains that no effect of the library explains. " + note).strip()

@@ -65,23 +65,22 @@ def impossible(second: Mapping[str, Any] | None) -> list[str]:
     ]
 
 
-def scale_of_power(problem: Problem) -> str:
-    """Return what the scale of all powers rests on where no run has measured any, in words; '' where one has."""
+def scale_of_power(problem: Problem) -> tuple[str, str] | None:
+    """Return what is missing where no run has measured any power, and what the scale of all powers is, in words."""
     modes = {run.mode for run in problem.runs}
     if "power" in modes:
-        return ""
+        return None
     if "current" in modes:
         ohm = problem.base_value("resistance_martensite_ohm")
-        return f"no voltages were logged: it is known in proportion to the declared {ohm:g} ohm only"
-    return "no currents were logged: it is known in proportion to the declared heat capacity only"
+        return "no voltages were logged", f"known in proportion to the declared {ohm:g} ohm only"
+    return "no currents were logged", "known in proportion to the declared heat capacity only"
 
 
 def about_power(problem: Problem) -> list[str]:
     """Return a warning where no run has measured any power."""
-    if not (why := scale_of_power(problem)):
+    if not (scale := scale_of_power(problem)):
         return []
-    what, rest = why.split(": it is ")
-    return [f"{what}: what is in W, J or ohm is {rest}, and is not exported"]
+    return [f"{scale[0]}: what is in W, J or ohm is {scale[1]}, and is not exported"]
 
 
 def _of_springs(problem: Problem, fit: Fit) -> dict[str, str]:
@@ -90,9 +89,7 @@ def _of_springs(problem: Problem, fit: Fit) -> dict[str, str]:
     left = left_per_spring(problem, fit)
     own = [(free, name) for free in fit.spec.free for name in free.names if free.effect and "[" in name]
     for effect in dict.fromkeys(free.effect for free, _ in own):
-        bare = fit.spec.without(effect)
-        shown = problem.predictions(bare, [fit.value(free.key) for free in bare.free])
-        parts = zip(problem.runs, fit.residual, shown, strict=True)
+        parts = zip(problem.runs, fit.residual, problem.predictions_without(fit, effect), strict=True)
         signal = per_spring([run.temperature_c - rest - less for run, rest, less in parts])
         for name in (name for free, name in own if free.effect == effect):
             k = int(name.partition("[")[2].rstrip("]")) - 1
@@ -107,21 +104,32 @@ def into_model(model: Model, problem: Problem, fit: Fit, doubts: Sequence[str]) 
     """Put into a model what `export` must know of its log: why it is doubted, and which numbers are kept as the chip has them."""
     if doubts:
         model.provenance["doubts"] = list(doubts)
-    if why := scale_of_power(problem):
+    if scale := scale_of_power(problem):
         table = native.parameter_table()
         for name in model.stderr:
             known = table[name.partition("[")[0]]
             if known.unit.split("/")[0] in POWER_UNITS or known.name == "emissivity":
-                model.kept[name] = why
+                model.kept[name] = f"{scale[0]}: it is {scale[1]}"
     model.kept |= {name: why for name, why in _of_springs(problem, fit).items() if name in model.parameters}
+
+
+def of_log(
+    problem: Problem, runs: Sequence[Run], swapped: Sequence[str], fits: Sequence[Fit], left_over: bool
+) -> list[str]:
+    """Return why a log is to be doubted, beside `swapped` columns.
+
+    Where structure is left another clock is tried with each of the fits, the last of which is the answer.
+    """
+    doubts = [*swapped, *(text for run in runs for text in plausibility.undriven_but_hottest(run))]
+    if left_over:
+        doubts += plausibility.shifted_clock(problem, fits)
+    return doubts or misfit(problem, fits[-1])
 
 
 def model_of_fit(problem: Problem, fit: Fit, runs: Sequence[Run]) -> tuple[Model, list[str]]:
     """Return the model.toml of a fit that no search made, and what is to be said of its log."""
-    doubts = plausibility.swapped(runs) + [text for run in runs for text in plausibility.undriven_but_hottest(run)]
-    if statistics.rms(fit.residual) > 1.5 * problem.noise_c:
-        doubts += plausibility.shifted_clock(problem, (fit,))
-    doubts = doubts or misfit(problem, fit)
+    left_over = statistics.rms(fit.residual) > 1.5 * problem.noise_c
+    doubts = of_log(problem, runs, plausibility.swapped(runs), (fit,), left_over)
     model = model_of(problem, fit, as_shown(problem, fit))
     into_model(model, problem, fit, doubts)
     return model, doubts + about_power(problem)

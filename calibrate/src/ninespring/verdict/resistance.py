@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 
 from .. import effects
-from ..fit import statistics
 from ..fit.problem import Problem
 from ..fit.spec import Fit
 from ..models import Model
@@ -28,12 +27,12 @@ SMALLEST_PHASE = 0.02
 """Difference between the phases, as a part of the resistance, that is told."""
 
 
-def entry(found: dict[str, Any], fit: Fit, problem: Problem) -> dict[str, Any]:
-    """Return an effect that v / i names as diagnosis.json lists it: the temperatures' errors stay as they are."""
+def entry(found: dict[str, Any], rmse_c: float | None, holdout_rmse_c: float | None) -> dict[str, Any]:
+    """Return an effect that v / i names as diagnosis.json lists it: the temperatures' errors, if any, stay as they are."""
     name, variant = found["name"], found.get("variant", "")
     return found | {
-        "rmse_c": statistics.rms(fit.residual),
-        "holdout_rmse_c": problem.holdout_rmse(fit),
+        "rmse_c": rmse_c,
+        "holdout_rmse_c": holdout_rmse_c,
         "on_chip": name in effects.ON_CHIP,
         "in_words": effects.IN_WORDS[name],
         "text": effects.sentence(name, found["parameters"], variant),
@@ -93,10 +92,6 @@ def witness(problem: Problem, fit: Fit) -> dict[str, Any] | None:
     model = first = solve(read, columns)
     found: list[dict[str, Any]] = []
 
-    def named(name: str, nats: float, parameters: dict[str, Any]) -> None:
-        """Write down an effect."""
-        found.append(told(name, nats, parameters))
-
     def combined(parts: dict[str, float]) -> dict[str, Any]:
         """Return a sum of fitted numbers as one, with its error."""
         weights = np.array([parts.get(key, 0.0) for key in model.names])
@@ -138,7 +133,7 @@ def witness(problem: Problem, fit: Fit) -> dict[str, Any] | None:
             rise_nats = nats_of(read, first, model)
     change = model.values[model.names.index("phase")] if "phase" in columns else 0.0
     if "phase" in columns and abs(change) > SMALLEST_PHASE * float(np.median(read.ohm)):
-        named("resistance_phase", phase_nats, {key: combined(parts) for key, parts in resistances.items()})
+        found.append(told("resistance_phase", phase_nats, {key: combined(parts) for key, parts in resistances.items()}))
     if "rise martensite" in columns:
         rises = {}
         for key in rising:
@@ -150,7 +145,7 @@ def witness(problem: Problem, fit: Fit) -> dict[str, Any] | None:
             shares = {"value": slope["value"] / base["value"], "stderr": slope["stderr"] / base["value"], "unit": "1/K"}
             rises[name] = shares
         if max(abs(one["value"]) for one in rises.values()) > SMALLEST_RISE:
-            named("resistance_temperature", rise_nats, rises)
+            found.append(told("resistance_temperature", rise_nats, rises))
     steps, model = contacts.find(read, columns)
     steps = contacts.dated(problem, steps)
     found += [of_contact(one) for one in steps]
