@@ -168,7 +168,9 @@ static void freezing(run_case_t *run, random_t *random, double value)
 {
     (void)value;
     double time_s = fault_s(run, random);
-    add_event(run, WORLD_SENSOR_FREEZE, time_s, any_driven(run, random), 0.0);
+    int spring = any_driven(run, random);
+    double registers = floor(random_uniform(random, 0.0, 3.0));
+    add_event(run, WORLD_SENSOR_FREEZE, time_s, spring, registers);
 }
 
 static void lying(run_case_t *run, random_t *random, double value)
@@ -365,7 +367,7 @@ static const struct {
     {"noisy", sensor_noise, 4.0, false, "sensor noise x 4"},
     {"slow_noise", slow_noise, 0.001, false, "noise of 1 mV that lasts for a second"},
     {"noiseless", sensor_noise, 0.0, false, "no sensor noise at all: only its steps"},
-    {"freezing", freezing, 0.0, true, "a driven spring's sensor freezes"},
+    {"freezing", freezing, 0.0, true, "a driven spring's sensor freezes, or one of its registers"},
     {"supply", supply, 0.0, false, "supply 4.2 to 5.5 V"},
     {"linear", law, KINETICS_LINEAR, true, "linear kinetics"},
     {"exponential", law, KINETICS_EXPONENTIAL, true, "exponential kinetics (Tanaka)"},

@@ -78,7 +78,8 @@ static bool worth_a_save(const learnt_store_t *store, const controller_t *contro
            differs(now.martensite_rise_per_k, kept.martensite_rise_per_k,
                    WORTH_SHARE / WORTH_HEATING_K) ||
            differs(now.loss_w_per_k, kept.loss_w_per_k, now.loss_sd_w_per_k) ||
-           2.0f * now.loss_sd_w_per_k < kept.loss_sd_w_per_k;
+           2.0f * now.loss_sd_w_per_k < kept.loss_sd_w_per_k ||
+           now.slow_noise > 2.0f * kept.slow_noise;
 }
 
 /* At least one is driven, and those that are, are held. */

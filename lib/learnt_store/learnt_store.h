@@ -15,7 +15,7 @@ extern "C" {
 #endif
 
 #define LEARNT_STORE_KIND                                                                          \
-    5u /* of record; a change of its bytes or of their meaning takes a new one */
+    6u /* of record; a change of its bytes or of their meaning takes a new one */
 #define LEARNT_STORE_MARK_BYTES 2u /* controller_model_mark, beside which losses were learnt */
 #define LEARNT_STORE_BYTES(springs)                                                                \
     ((uint16_t)(LEARNT_STORE_MARK_BYTES + (springs) * sizeof(spring_learnt_t)))
@@ -42,7 +42,7 @@ record_found_t learnt_store_open(learnt_store_t *store, const record_storage_t *
 /* Once a second. Starts a save if and only if both times above have passed and of a spring
  * something is known that the record has not: its first numbers, losses beside the present model, a
  * resistance that differs by 2 %, a loss that differs by its standard deviation or is known twice
- * as well. */
+ * as well, a noise that has doubled. */
 void learnt_store_second(learnt_store_t *store, const controller_t *controller);
 /* Goes on with a save under way: at most one byte. May be left out for a while. */
 record_save_t learnt_store_step(learnt_store_t *store);

@@ -16,8 +16,9 @@
  * as others switch, adds half of it at the most. */
 #define SLOPE_SHARE 0.05f
 /* Off by more than the same tolerances, and the offsets of both readings. */
-#define BALANCE_SHARE 0.3f
-#define BALANCE_MV    15.0f
+#define BALANCE_SHARE   0.3f
+#define BALANCE_MV      15.0f
+#define VOLTAGE_STEP_MV 4.0f /* of the INA219; a current's is 1 mA */
 
 static uint16_t amount(int16_t value)
 {
@@ -38,13 +39,11 @@ void circuit_check_take(circuit_check_t *c, uint16_t fixed_mohm, uint16_t duty, 
     const uint16_t dropped_mv = (uint16_t)(((uint32_t)amount(current_ma) * fixed_mohm) >>
                                            10); /* 2 % low: tolerances are 30 */
     const uint16_t behind_mv = (uint16_t)(amount(voltage_mv) + dropped_mv);
-    if (c->readings == 0 || behind_mv < c->lowest_mv) {
-        c->lowest_mv = behind_mv;
-    }
-    if (behind_mv > c->highest_mv) {
-        c->highest_mv = behind_mv;
-    }
-    c->readings++;
+    c->current_moved = c->current_moved || current_ma != c->last_ma;
+    c->voltage_moved = c->voltage_moved || voltage_mv != c->last_mv;
+    c->last_ma = current_ma;
+    c->last_mv = voltage_mv;
+    c->readings = (c->readings + 1u) & 63u;
     c->duty = (uint16_t)(c->duty + duty);
     c->voltage_mv += behind_mv;
     c->duty_square += (uint32_t)duty * duty;
@@ -58,6 +57,16 @@ static void count(uint8_t *windows, bool bad)
     } else if (*windows < UINT8_MAX) {
         (*windows)++;
     }
+}
+
+/* What is swept moves by two deviations at least: a register that shows none of it is frozen, if
+ * they are a step of it. */
+static bool stands(const circuit_check_t *c, float swept_mv2, float found_mv)
+{
+    const float own_mv = (float)c->last_mv; /* the spring's part of what was found */
+    const float half_mv = 0.5f * VOLTAGE_STEP_MV * found_mv;
+    return !c->current_moved ||
+           (!c->voltage_moved && swept_mv2 * own_mv * own_mv > half_mv * half_mv);
 }
 
 bool circuit_check_judge(circuit_check_t *c, const current_control_parameters_t *p)
@@ -79,15 +88,16 @@ bool circuit_check_judge(circuit_check_t *c, const current_control_parameters_t 
         const bool tells = variance >= fmaxf(LEAST_VARIANCE, slope_variance);
         const bool other =
             follows_mv < LEAST_SLOPE * should_mv || follows_mv > MOST_SLOPE * should_mv;
-        /* what is swept moves by two deviations at least: half of that is none */
-        const float moved_mv = (float)(c->highest_mv - c->lowest_mv);
-        const bool stands = variance >= LEAST_VARIANCE && moved_mv * moved_mv < should_mv * step_mv;
-        astray = stands || (tells && other);
+        astray = (tells && other) ||
+                 (variance >= LEAST_VARIANCE && stands(c, should_mv * step_mv, found_mv));
         unbalanced = fabsf(found_mv - expected_mv) > BALANCE_SHARE * expected_mv + BALANCE_MV;
     }
     count(&c->astray, astray);
     count(&c->unbalanced, unbalanced);
-    *c = (circuit_check_t){
-        .last_duty = c->last_duty, .astray = c->astray, .unbalanced = c->unbalanced};
+    *c = (circuit_check_t){.last_duty = c->last_duty,
+                           .last_ma = c->last_ma,
+                           .last_mv = c->last_mv,
+                           .astray = c->astray,
+                           .unbalanced = c->unbalanced};
     return c->astray >= CIRCUIT_CHECK_WINDOWS || c->unbalanced >= CIRCUIT_CHECK_BALANCE_WINDOWS;
 }

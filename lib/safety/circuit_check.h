@@ -26,10 +26,12 @@ typedef struct {
     uint32_t duty_square;
     uint32_t duty_voltage;
     uint32_t voltage_mv;
-    uint16_t lowest_mv, highest_mv;
     uint16_t duty;
     uint16_t last_duty;
-    uint8_t readings;
+    int16_t last_ma, last_mv;
+    uint8_t readings : 6;
+    bool current_moved : 1; /* in this window */
+    bool voltage_moved : 1;
     uint8_t astray;     /* windows on end in which the voltage did not follow the duty */
     uint8_t unbalanced; /* windows on end in which it was not what the duty should bring */
 } circuit_check_t;

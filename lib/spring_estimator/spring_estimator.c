@@ -5,8 +5,7 @@
 #include "invariant.h"
 #include "spring_estimator_internal.h"
 
-#define NOISE_FIRST      0.002f
-#define SLOW_NOISE_FIRST 0.0007f /* 0.2 mV of 0.3 V, a twentieth of a step */
+#define NOISE_FIRST 0.002f
 
 #define CAPACITY_SD    0.09f   /* of a declared heat capacity: 15 %, uniform */
 #define LOSS_DRIFT_SD  0.0005f /* of the declared loss, in a second: 3 % in an hour */
@@ -123,7 +122,6 @@ static void begin(spring_belief_t *b, float temperature_c, float sd_k, uint8_t p
                            .loss_variance = learnt.loss_sd_w_per_k * learnt.loss_sd_w_per_k,
                            .possible = possible,
                            .noise = NOISE_FIRST,
-                           .slow_noise = SLOW_NOISE_FIRST,
                            .offset_sd_v = OFFSET_SD_V,
                            .learnt = learnt,
                            .last_c7 = as_c7(temperature_c)};

@@ -41,7 +41,8 @@ typedef struct {
     float martensite_rise_per_k; /* of that, relative */
     float loss_w_per_k;          /* beyond the declared one */
     float loss_sd_w_per_k;
-    float offset_v; /* of its sensor: of what is read of the voltage */
+    float offset_v;   /* of its sensor: of what is read of the voltage */
+    float slow_noise; /* of its sensor: standard deviation of a resistance over 4 s, relative */
 } spring_learnt_t;
 
 /* Of the running heating. */
@@ -73,7 +74,8 @@ typedef struct {
     float from_k;     /* and how far it had moved from there when the line began */
     float rise_per_k; /* what a kelvin adds to it, relative */
     float rise_sd_per_k;
-    float rest_ohm[2]; /* its average 4 and 8 s earlier, at rest; 0: it moved */
+    float was_ohm[2];  /* its average 4 and 8 s earlier; 0: it was begun anew since */
+    uint16_t turns;    /* since then */
 } spring_line_t;
 
 /* What is believed of one spring. To be read by anyone, written by this module alone.
@@ -99,7 +101,7 @@ typedef struct {
     float lost;         /* phase lost since it had transformed, 0..1 */
     uint8_t possible;   /* SPRING_PHASE_ bits */
     uint8_t fresh;      /* turns with readings since current flows, saturating */
-    uint8_t quiet;      /* turns in which its temperature hardly moved; beyond 255: from 240 on */
+    uint8_t quiet;      /* turns in which its temperature hardly moved; saturating */
     uint8_t losing;     /* turns on end in which it seems to lose phase */
     uint8_t averaged;   /* turns in slow_ohm, saturating */
     uint8_t unread;     /* turns since the last that had readings fit for use, saturating */
@@ -132,7 +134,6 @@ typedef struct {
     float phase_ohm;     /* the last at a strong current: what tells the phase */
     float offset_sd_v;   /* of its sensor's offset */
     float noise;         /* standard deviation of one turn's, relative */
-    float slow_noise;    /* and of that average */
     int16_t last_c7;     /* the model's temperature a turn ago */
     /* the last loss, until its heating has brought it back */
     float full_ohm;     /* what it read before, at martensite start; 0: no such loss */

@@ -35,6 +35,8 @@
 
 #define OFFSET_MOST_V 0.012f /* no sensor's is larger */
 
+#define SLOW_NOISE_MOST 0.01f /* of an average: more is no noise */
+
 float spring_clamp(float value, float low, float high);
 /* The value with its bounds, SPRING_ESTIMATOR_BOUND_SDS either way. */
 spring_bounds_t spring_around(float value, float sd);

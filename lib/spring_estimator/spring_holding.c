@@ -11,23 +11,24 @@
 #define NOISE_IN_SLOW 0.18f   /* of one turn's, with all turns in it: sqrt(share / (2 - share)) */
 /* Mean size of a second difference of averages, each of which still has a third of the one before
  * in it. */
-#define SLOW_BEND_TO_SD  0.68f
-#define SLOW_NOISE_MOST  0.01f
-#define SLOW_NOISE_RISES 0.06f /* 70 s: what is taken for a loss is heated */
-#define SLOW_NOISE_FALLS 0.03f
-#define ANCHOR_K         3.0f /* 0.45 % of the resistance by the largest coefficient */
-#define SURE_SDS         5.0f
-#define SUSPECTED        0.6f /* of what is sure: 3 of 5 */
-#define OTHER_WAY        3.0f /* times as much: an intermediate phase, where drifts go either way */
-#define CONFIRM_TURNS    2
-#define LASTING_TURNS    60    /* 15 s of suspicion are as sure */
-#define LARGE_LOSS       0.04f /* no hold drifts so far: the transformation may have moved */
-#define LARGE_SD_K       5.0f
-#define CROSSING_SD_K    1.0f
-#define APART_PER_A      0.5f    /* between two currents, as of 3 and 1.2 A */
-#define OFFSET_LEAST_V   0.0005f /* what a turn's steps of 4 mV leave, and its noise */
-#define OFFSET_SDS       3.0f
-#define AWAY_LEAST_K     1.0f /* less tells nothing of a coefficient */
+#define SLOW_BEND_TO_SD   0.68f
+#define SLOW_NOISE_RISES  280.0f /* turns, 70 s: what is taken for a loss is heated */
+#define SLOW_NOISE_FALLS  560.0f
+#define SLOW_NOISE_BEGINS 64.0f /* what was known before a rest counts as so many turns of it */
+#define SLOW_NOISE_GROWS  2.0f  /* in one reading of it, at the most */
+#define ANCHOR_K          3.0f  /* 0.45 % of the resistance by the largest coefficient */
+#define SURE_SDS          5.0f
+#define SUSPECTED         0.6f /* of what is sure: 3 of 5 */
+#define OTHER_WAY         3.0f /* times as much: an intermediate phase, where drifts go either way */
+#define CONFIRM_TURNS     2
+#define LASTING_TURNS     60    /* 15 s of suspicion are as sure */
+#define LARGE_LOSS        0.04f /* no hold drifts so far: the transformation may have moved */
+#define LARGE_SD_K        5.0f
+#define CROSSING_SD_K     1.0f
+#define APART_PER_A       0.5f    /* between two currents, as of 3 and 1.2 A */
+#define OFFSET_LEAST_V    0.0005f /* what a turn's steps of 4 mV leave, and its noise */
+#define OFFSET_SDS        3.0f
+#define AWAY_LEAST_K      1.0f /* less tells nothing of a coefficient */
 /* Of an average: so little phase may be lost unseen, and it tells anew in 2 x 16 turns. */
 #define LINE_VARIANCE (32.0f * LOSS_LEAST * LOSS_LEAST)
 #define BACK_SHARE    0.5f  /* of a loss: as near to being back as to being gone */
@@ -56,7 +57,7 @@ static void average_anew(spring_belief_t *b)
 static float slow_variance(const spring_belief_t *b, float share)
 {
     const float averages = b->averaged < SLOW_TURNS ? share : NOISE_IN_SLOW * NOISE_IN_SLOW;
-    return fmaxf(b->noise * b->noise * averages, b->slow_noise * b->slow_noise);
+    return fmaxf(b->noise * b->noise * averages, b->learnt.slow_noise * b->learnt.slow_noise);
 }
 
 /* What it reads on average now is what it reads with the phase that it has. Rough: it still moves,
@@ -302,25 +303,32 @@ static bool slope_explains(const spring_belief_t *b, float tolerance)
 }
 
 /* Noise that the average does not take away, as it is slower than a turn. Second differences, 4 s
- * apart: phase that goes steadily does not show in them. */
+ * apart: neither a phase nor a temperature that goes steadily shows in them. */
 static void take_slow_noise(spring_belief_t *b)
 {
     spring_line_t *line = &b->run.line;
-    if (b->quiet == 0) {
-        line->rest_ohm[0] = line->rest_ohm[1] = 0.0f;
+    if (b->quiet == 0 || b->averaged < SLOW_TURNS) {
+        line->turns = 0;
+        line->was_ohm[0] = line->was_ohm[1] = 0.0f;
         return;
     }
-    if (b->quiet % SLOW_TURNS != 0) {
+    line->turns++;
+    if (line->turns % SLOW_TURNS != 0) {
         return;
     }
-    if (line->rest_ohm[1] > 0.0f) {
-        const float bend = fabsf(b->slow_ohm - 2.0f * line->rest_ohm[0] + line->rest_ohm[1]);
-        const float more =
-            fminf(SLOW_BEND_TO_SD * bend / b->slow_ohm, SLOW_NOISE_MOST) - b->slow_noise;
-        b->slow_noise += more * (more > 0.0f ? SLOW_NOISE_RISES : SLOW_NOISE_FALLS);
+    if (line->was_ohm[1] > 0.0f) {
+        const float bend = fabsf(b->slow_ohm - 2.0f * line->was_ohm[0] + line->was_ohm[1]);
+        /* a loss bends it once where it begins; and noise that is less than this is none */
+        const float known = fmaxf(b->learnt.slow_noise, LOSS_LEAST / SURE_SDS);
+        const float most = fminf(SLOW_NOISE_GROWS * known, SLOW_NOISE_MOST);
+        const float seen_ohm = fminf(SLOW_BEND_TO_SD * bend, most * b->slow_ohm);
+        const float more_ohm = seen_ohm - b->learnt.slow_noise * b->slow_ohm;
+        const float over = more_ohm > 0.0f ? SLOW_NOISE_RISES : SLOW_NOISE_FALLS;
+        const float turns = fminf(SLOW_NOISE_BEGINS + (float)line->turns, over);
+        b->learnt.slow_noise += SLOW_TURNS * more_ohm / (turns * b->slow_ohm);
     }
-    line->rest_ohm[1] = line->rest_ohm[0];
-    line->rest_ohm[0] = b->slow_ohm;
+    line->was_ohm[1] = line->was_ohm[0];
+    line->was_ohm[0] = b->slow_ohm;
 }
 
 /* A phase that is kept changes the resistance no faster than temperature does. */
@@ -333,7 +341,7 @@ void spring_holding_watch(const spring_estimator_t *e, spring_belief_t *b, therm
     }
     b->quiet = fabsf(moved_k) > QUIET_K ? 0
                : b->quiet < UINT8_MAX   ? (uint8_t)(b->quiet + 1)
-                                        : (uint8_t)(UINT8_MAX + 1 - SLOW_TURNS); /* and goes on */
+                                        : UINT8_MAX;
     take_slow_noise(b);
     spring_line_t *line = &b->run.line;
     line->way_k += moved_k;

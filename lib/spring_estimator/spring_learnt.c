@@ -4,6 +4,7 @@
 
 #define LEARNT_OHM_LEAST 0.01f
 #define LEARNT_OHM_MOST  16.0f
+#define SLOW_NOISE_FIRST 0.0007f /* 0.2 mV of 0.3 V, a twentieth of a step */
 
 void spring_estimator_forget_loss(spring_estimator_t *e, uint8_t k)
 {
@@ -18,7 +19,7 @@ void spring_estimator_forget_loss(spring_estimator_t *e, uint8_t k)
 
 void spring_estimator_forget(spring_estimator_t *e, uint8_t k)
 {
-    e->spring[k].learnt = (spring_learnt_t){.change = e->change};
+    e->spring[k].learnt = (spring_learnt_t){.change = e->change, .slow_noise = SLOW_NOISE_FIRST};
     spring_estimator_forget_loss(e, k);
 }
 
@@ -31,7 +32,8 @@ void spring_estimator_restore(spring_estimator_t *e, uint8_t k, const spring_lea
         fabsf(l->loss_w_per_k) <= LOSS_MOST * e->loss_w_per_k && l->loss_sd_w_per_k >= 0.0f &&
         l->loss_sd_w_per_k <= LOSS_SD * e->loss_w_per_k &&
         fabsf(l->martensite_rise_per_k) <= COEFFICIENT_MOST_PER_HEAT_K &&
-        fabsf(l->offset_v) <= OFFSET_MOST_V;
+        fabsf(l->offset_v) <= OFFSET_MOST_V && l->slow_noise >= 0.0f &&
+        l->slow_noise <= SLOW_NOISE_MOST;
     if (possible) {
         e->spring[k].learnt = *l;
         e->spring[k].loss_variance = l->loss_sd_w_per_k * l->loss_sd_w_per_k;

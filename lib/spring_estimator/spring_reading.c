@@ -39,7 +39,7 @@ void spring_jump(spring_belief_t *b, float by)
     } else if (b->run.line.ohm > 0.0f) {
         b->run.line.ohm *= by;
         b->run.line.from_ohm *= by;
-        b->run.line.rest_ohm[0] = b->run.line.rest_ohm[1] = 0.0f;
+        b->run.line.was_ohm[0] = b->run.line.was_ohm[1] = 0.0f;
         b->slow_ohm = b->run.line.ohm * (1.0f + b->run.line.rise_per_k * b->run.line.slow_k);
     }
     b->full_ohm *= by;

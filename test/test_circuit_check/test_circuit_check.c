@@ -117,9 +117,9 @@ static void resistance_that_changes_is_no_mismatch(void)
 {
     for (uint32_t tick = 0; tick < 150; tick++) {
         const double spring_ohm = 0.175 * (1.0 + 0.4 * tick / 150.0);
-        const double ma = 3000.0;
-        const uint16_t duty = (uint16_t)lround(ma * (spring_ohm + 0.18) * 0.8 / 5.0);
-        circuit_check_take(&check, 180, duty, true, (int16_t)ma,
+        const uint16_t duty = (uint16_t)lround(3000.0 * (spring_ohm + 0.18) * 0.8 / 5.0);
+        const double ma = 1e3 * 5.0 * duty / 800.0 / (spring_ohm + 0.18);
+        circuit_check_take(&check, 180, duty, true, (int16_t)lround(ma),
                            (int16_t)(4 * lround(ma * spring_ohm / 4.0)));
         if (tick % CIRCUIT_CHECK_TICKS == 29u) {
             TEST_ASSERT_FALSE(circuit_check_judge(&check, &parameters));
@@ -132,6 +132,37 @@ static void frozen_reading_is_found_within_two_seconds(void)
     TEST_ASSERT_LESS_OR_EQUAL_UINT32(100, found_after(&declared, 60, 16, frozen, 1000)); /* holds */
     setUp();
     TEST_ASSERT_LESS_OR_EQUAL_UINT32(100, found_after(&declared, 190, 3, frozen, 1000)); /* heats */
+}
+
+/* One of its registers still reads, and follows. */
+static void frozen_register_is_found_within_two_seconds(void)
+{
+    for (unsigned n = 0; n < 8; n++) {
+        const bool heats = (n & 1u) != 0;
+        const bool current_stands = (n & 2u) != 0;
+        circuit_t c = declared;
+        c.noise_mv = (n & 4u) ? 5.6 : 0.0;
+        setUp();
+        uint32_t tick = 0;
+        for (bool found = false; !found; tick++) {
+            TEST_ASSERT_LESS_THAN_UINT32(100, tick);
+            const uint16_t duty = swept(heats ? 190 : 60, heats ? 3 : 16, tick);
+            const double ma = current_ma(&c, current_stands ? 60 : duty, 0);
+            const double mv = current_ma(&c, current_stands ? duty : 60, 0) * c.spring_ohm;
+            const double shown_mv = mv + (current_stands ? c.noise_mv * noise() : 0.0);
+            circuit_check_take(&check, 180, duty, true, (int16_t)lround(ma),
+                               (int16_t)(4 * lround(shown_mv / 4.0)));
+            found = tick % CIRCUIT_CHECK_TICKS == 29u && circuit_check_judge(&check, &parameters);
+        }
+    }
+}
+
+/* Of a thick wire a step of the register hides the sweep: it may well stand. */
+static void voltage_too_small_to_show_the_sweep_is_none(void)
+{
+    circuit_t c = declared;
+    c.spring_ohm = 0.03;
+    TEST_ASSERT_EQUAL_UINT32(HOUR / 20u, found_after(&c, 128, 3, same, HOUR / 20u));
 }
 
 /* As others switch, a supply with a long cable moves by 5 %. */
@@ -214,6 +245,8 @@ int main(void)
     RUN_TEST(every_corner_of_the_tolerances_is_a_circuit);
     RUN_TEST(resistance_that_changes_is_no_mismatch);
     RUN_TEST(frozen_reading_is_found_within_two_seconds);
+    RUN_TEST(frozen_register_is_found_within_two_seconds);
+    RUN_TEST(voltage_too_small_to_show_the_sweep_is_none);
     RUN_TEST(supply_that_moves_is_none);
     RUN_TEST(reading_that_stands_still_with_its_duty_is_none);
     RUN_TEST(reading_of_one_tick_earlier_is_none);

@@ -16,7 +16,8 @@ static const spring_learnt_t numbers = {.austenite_ohm = 0.2191f,
                                         .martensite_rise_per_k = 0.000431f,
                                         .loss_w_per_k = -0.000417f,
                                         .loss_sd_w_per_k = 0.000121f,
-                                        .offset_v = -0.0031f};
+                                        .offset_v = -0.0031f,
+                                        .slow_noise = 0.0004f};
 
 static void power_on(void)
 {
@@ -132,6 +133,10 @@ static void only_what_differs_enough_is_worth_a_save_and_that_once_in_ten_minute
     next.martensite_ohm *= 0.97f;
     TEST_ASSERT_TRUE(saved_after(&next) > 0);
     next.loss_sd_w_per_k *= 0.4f;
+    TEST_ASSERT_TRUE(saved_after(&next) > 0);
+    next.slow_noise *= 1.9f;
+    TEST_ASSERT_EQUAL_UINT(0, saved_after(&next));
+    next.slow_noise *= 1.2f;
     TEST_ASSERT_TRUE(saved_after(&next) > 0);
 
     /* no sooner than so long after the save before */

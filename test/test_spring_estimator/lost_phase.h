@@ -22,6 +22,8 @@ void loss_too_small_to_tell_stays_in_doubt(void);
 void loss_on_the_way_down_from_a_heating_is_seen_at_rest(void);
 void heating_for_a_loss_that_was_none_ends(void);
 void noise_slower_than_a_turn_is_no_loss(void);
+void noise_of_an_average_is_known_after_a_minute_of_rest(void);
+void noise_that_was_learnt_is_no_loss_of_the_next_start(void);
 void loss_that_was_a_sensor_is_taken_back_when_said(void);
 void restored_spring_is_not_overheated(void);
 

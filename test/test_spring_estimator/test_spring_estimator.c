@@ -588,8 +588,8 @@ static void look_without_anything_learnt_tells_nothing(void)
 static void numbers_that_no_spring_has_are_not_restored(void)
 {
     const spring_learnt_t good = {.austenite_ohm = 0.22f, .change = 0.2f, .loss_sd_w_per_k = 1e-4f};
-    spring_learnt_t bad[8];
-    for (unsigned n = 0; n < 8; n++) {
+    spring_learnt_t bad[10];
+    for (unsigned n = 0; n < 10; n++) {
         bad[n] = good;
     }
     bad[0].austenite_ohm = NAN;
@@ -600,7 +600,9 @@ static void numbers_that_no_spring_has_are_not_restored(void)
     bad[5].loss_sd_w_per_k = -1e-4f;
     bad[6].martensite_rise_per_k = INFINITY;
     bad[7].loss_sd_w_per_k = NAN;
-    for (unsigned n = 0; n < 8; n++) {
+    bad[8].slow_noise = NAN;
+    bad[9].slow_noise = 0.02f;
+    for (unsigned n = 0; n < 10; n++) {
         power_comes_on();
         spring_estimator_restore(&estimator, 0, &bad[n]);
         (void)snprintf(where, sizeof where, "%u", n);
@@ -705,6 +707,8 @@ int main(void)
     RUN_TEST(loss_on_the_way_down_from_a_heating_is_seen_at_rest);
     RUN_TEST(heating_for_a_loss_that_was_none_ends);
     RUN_TEST(noise_slower_than_a_turn_is_no_loss);
+    RUN_TEST(noise_of_an_average_is_known_after_a_minute_of_rest);
+    RUN_TEST(noise_that_was_learnt_is_no_loss_of_the_next_start);
     RUN_TEST(loss_that_was_a_sensor_is_taken_back_when_said);
     RUN_TEST(restored_spring_is_not_overheated);
     RUN_TEST(slope_that_no_metal_has_is_not_learnt);

@@ -20,13 +20,14 @@ void ina219_read(ina219_t *sensor, random_t *random, double current_a, double vo
             share * sensor->slow_v;
         voltage_noise_v += sensor->slow_v;
     }
-    if (sensor->frozen) {
-        return;
-    }
     double a = measured(current_a, sensor->current_gain, sensor->current_offset_a, current_noise_a,
                         INA219_CURRENT_STEP_A, -INA219_CURRENT_MAX_A, INA219_CURRENT_MAX_A);
     double v = measured(voltage_v, sensor->voltage_gain, sensor->voltage_offset_v, voltage_noise_v,
                         INA219_VOLTAGE_STEP_V, 0.0, INA219_VOLTAGE_MAX_V);
-    *current_ma = (int16_t)lround(1000.0 * a);
-    *voltage_mv = (int16_t)lround(1000.0 * v);
+    if (!sensor->current_frozen) {
+        *current_ma = (int16_t)lround(1000.0 * a);
+    }
+    if (!sensor->voltage_frozen) {
+        *voltage_mv = (int16_t)lround(1000.0 * v);
+    }
 }

@@ -22,7 +22,7 @@ typedef struct {
     double current_noise_a, voltage_noise_v; /* standard deviation of an averaged reading */
     double slow_voltage_noise_v;             /* the same, of one that lasts for INA219_SLOW_S */
     double slow_v;                           /* and what it is now */
-    bool frozen;                             /* both registers stay as they are */
+    bool current_frozen, voltage_frozen;     /* its register stays as it is */
 } ina219_t;
 
 /* A reading, 20 ms after the one before, as the board hands it on: whole mA and mV. If frozen it is

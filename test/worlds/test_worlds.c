@@ -395,13 +395,13 @@ static void the_sensor_reads_whole_steps_of_what_flowed_in_the_tick(void)
 
 static void a_sensor_has_gain_offset_and_noise(void)
 {
-    ina219_t sensor = {1.03, 0.97, 0.005, -0.008, 0.0, 0.0, 0.0, 0.0, false};
+    ina219_t sensor = {1.03, 0.97, 0.005, -0.008, 0.0, 0.0, 0.0, 0.0, false, false};
     random_t random = random_seeded(3, 4);
     int16_t ma = 0, mv = 0;
     ina219_read(&sensor, &random, 1.0, 0.4, &ma, &mv);
     TEST_ASSERT_EQUAL_INT(1035, ma);
     TEST_ASSERT_EQUAL_INT(380, mv);
-    sensor = (ina219_t){1.0, 1.0, 0.0, 0.0, 0.01, 0.02, 0.0, 0.0, false};
+    sensor = (ina219_t){1.0, 1.0, 0.0, 0.0, 0.01, 0.02, 0.0, 0.0, false, false};
     double sum = 0.0, squares = 0.0;
     const int readings = 20000;
     for (int i = 0; i < readings; i++) {
@@ -412,7 +412,7 @@ static void a_sensor_has_gain_offset_and_noise(void)
     TEST_ASSERT_DOUBLE_WITHIN(0.3, 0.0, sum / readings);
     TEST_ASSERT_DOUBLE_WITHIN(0.4, 20.0, sqrt(squares / readings));
 
-    sensor = (ina219_t){1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.1, 0.0, false};
+    sensor = (ina219_t){1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.1, 0.0, false, false};
     double apart = 0.0;
     squares = 0.0;
     for (int i = 0; i < 10 * readings; i++) {
@@ -428,9 +428,9 @@ static void a_sensor_has_gain_offset_and_noise(void)
 static void a_frozen_sensor_keeps_its_last_registers_and_changes_no_other(void)
 {
     controller_inputs_t sound;
-    for (int broken = 0; broken < 2; broken++) {
-        parameters.events = broken;
-        parameters.event[0] = (world_event_t){WORLD_SENSOR_FREEZE, 5.0, 2, 0.0};
+    for (int broken = 0; broken < 4; broken++) { /* none, both registers, either */
+        parameters.events = broken > 0;
+        parameters.event[0] = (world_event_t){WORLD_SENSOR_FREEZE, 5.0, 2, broken - 1.0};
         make_world();
         for (int k = 0; k < 9; k++) {
             outputs.duty[k] = 60;
@@ -446,9 +446,11 @@ static void a_frozen_sensor_keeps_its_last_registers_and_changes_no_other(void)
             TEST_ASSERT_GREATER_THAN(last.current_ma + 500, sound.sensor[2].current_ma);
             continue;
         }
-        TEST_ASSERT_EQUAL_INT(last.current_ma, inputs.sensor[2].current_ma);
-        TEST_ASSERT_EQUAL_INT(last.voltage_mv, inputs.sensor[2].voltage_mv);
-        sound.sensor[2] = inputs.sensor[2];
+        TEST_ASSERT_EQUAL_INT(broken != 3 ? last.current_ma : sound.sensor[2].current_ma,
+                              inputs.sensor[2].current_ma);
+        TEST_ASSERT_EQUAL_INT(broken != 2 ? last.voltage_mv : sound.sensor[2].voltage_mv,
+                              inputs.sensor[2].voltage_mv);
+        inputs.sensor[2] = sound.sensor[2];
         TEST_ASSERT_EQUAL_MEMORY(&sound, &inputs, sizeof inputs);
     }
 }

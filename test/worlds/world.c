@@ -280,7 +280,8 @@ static void happen(world_t *world, const world_event_t *event)
         spring->contact_ohm_per_s = event->value;
         break;
     case WORLD_SENSOR_FREEZE:
-        spring->sensor.frozen = event->value == 0.0;
+        spring->sensor.current_frozen = event->value == 0.0 || event->value == 1.0;
+        spring->sensor.voltage_frozen = event->value == 0.0 || event->value == 2.0;
         break;
     case WORLD_SENSOR_CURRENT_GAIN:
         spring->sensor.current_gain = event->value;

@@ -45,7 +45,8 @@ typedef enum {
     WORLD_STRESS_MPA,          /* value: stress from now on, MPa, taken up within 0.3 s */
     WORLD_CONTACT_OHM,         /* value: contact resistance from now on */
     WORLD_CONTACT_OHM_PER_S,   /* value: its drift from now on */
-    WORLD_SENSOR_FREEZE,       /* value 0: the last registers from now on; else it reads again */
+    WORLD_SENSOR_FREEZE,       /* the last registers from now on: value 0 both, 1 the current's, 2
+                                  the voltage's; else it reads again */
     WORLD_SENSOR_CURRENT_GAIN, /* value: gain from now on: a lie */
     WORLD_SENSOR_VOLTAGE_GAIN, /* the same */
     WORLD_SENSOR_SWAP, /* value: spring whose sensor answers for this one, and the reverse */
