@@ -181,6 +181,11 @@ static void lying(run_case_t *run, random_t *random, double value)
               any_driven(run, random), random_uniform(random, 1.0 - value, 1.0 + value));
 }
 
+static void shunt(run_case_t *run, random_t *random, double value)
+{
+    run->world.spring[any_driven(run, random)].sensor.current_gain = value;
+}
+
 static void swapped(run_case_t *run, random_t *random, double value)
 {
     (void)value;
@@ -367,6 +372,7 @@ static const struct {
     {"noisy", sensor_noise, 4.0, false, "sensor noise x 4"},
     {"slow_noise", slow_noise, 0.001, false, "noise of 1 mV that lasts for a second"},
     {"noiseless", sensor_noise, 0.0, false, "no sensor noise at all: only its steps"},
+    {"shunt", shunt, 0.5, true, "a driven spring's shunt is half of the declared one"},
     {"freezing", freezing, 0.0, true, "a driven spring's sensor freezes, or one of its registers"},
     {"supply", supply, 0.0, false, "supply 4.2 to 5.5 V"},
     {"linear", law, KINETICS_LINEAR, true, "linear kinetics"},

@@ -185,7 +185,8 @@ static uint32_t take_sensors(controller_t *controller, const controller_sensor_t
 /* What no belief can talk away: is it a circuit, and how hot could it be by now? */
 static void judge_circuit(controller_t *controller, uint8_t k)
 {
-    if (circuit_check_judge(&controller->circuit[k], &controller->current.parameters)) {
+    if (circuit_check_judge(&controller->circuit[k], &controller->current.parameters) ||
+        controller->policy.estimator.spring[k].unlike) {
         safety_trip(&controller->safety, k, SAFETY_FAULT_SENSOR_MISMATCH);
     }
 }

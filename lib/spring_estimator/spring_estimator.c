@@ -150,6 +150,7 @@ void spring_estimator_trust_model(spring_estimator_t *e, const thermal_model_t *
               austenite == 0                              ? SPRING_PHASE_MARTENSITE
               : austenite == THERMAL_MODEL_AUSTENITE_FULL ? SPRING_PHASE_AUSTENITE
                                                           : SPRING_PHASE_BETWEEN);
+        e->spring[k].told = austenite == 0;
     }
 }
 
@@ -254,15 +255,17 @@ void spring_keep_above(const spring_estimator_t *e, spring_belief_t *b, thermal_
 }
 
 /* After power-on what was learnt before tells the phase, and so between which temperatures it is.
- */
+ * Where someone said that it is martensite, it tells whether that can be. */
 static void look(spring_estimator_t *e, thermal_model_t *model, uint8_t k)
 {
     spring_belief_t *b = &e->spring[k];
     const spring_learnt_t *l = &b->learnt;
-    if (b->possible != SPRING_PHASE_ANY || l->austenite_ohm == 0.0f || b->current_a < STRONG_A ||
-        b->fresh < LOOK_TURNS) {
+    const bool told = b->told && b->possible == SPRING_PHASE_MARTENSITE;
+    if ((b->possible != SPRING_PHASE_ANY && !told) || l->austenite_ohm == 0.0f ||
+        b->current_a < STRONG_A || b->fresh < LOOK_TURNS) {
         return;
     }
+    b->told = false;
     const float unsure = LOOK_SD + LOOK_SDS * b->noise / fabsf(l->change);
     if (unsure > LOOK_MOST) {
         return;
@@ -272,6 +275,9 @@ static void look(spring_estimator_t *e, thermal_model_t *model, uint8_t k)
     int16_t low_c7 = t.martensite_finish_c7;
     int16_t high_c7 = t.austenite_finish_c7;
     uint8_t phase = SPRING_PHASE_BETWEEN;
+    if (told && austenite <= 1.0f - unsure) {
+        return;
+    }
     if (austenite < unsure) {
         low_c7 = thermal_model_ambient_c7(model);
         high_c7 = t.austenite_start_c7;
@@ -566,7 +572,9 @@ spring_bounds_t spring_estimator_distance_k(const spring_estimator_t *e,
     const int16_t start_c7 = thermal_model_transformation(model, k).martensite_start_c7;
     const float away_k = spring_c((int16_t)(thermal_model_temperature_c7(model, k) - start_c7));
     const spring_belief_t *b = &e->spring[k];
-    return disturbed(b, spring_around(away_k, spring_estimator_sd_k(b)));
+    /* what has cooled is known by the room; where it transforms is no more known than it was */
+    const float place_k2 = b->possible == SPRING_PHASE_MARTENSITE ? b->shift_variance_k2 : 0.0f;
+    return disturbed(b, spring_around(away_k, sqrtf(spring_distance_k2(b) + place_k2)));
 }
 
 uint32_t spring_estimator_model_power_uw(const spring_estimator_t *e, uint8_t k, uint32_t power_uw)

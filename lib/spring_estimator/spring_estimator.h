@@ -119,6 +119,8 @@ typedef struct {
     bool rough : 1;     /* the line is of few turns, not of a spring at rest */
     bool steep : 1;     /* and its resistance still changes as only that explains */
     bool cut_short : 1; /* there was a jump of the current in the running turn */
+    bool told : 1;      /* it is martensite because someone said so */
+    bool unlike : 1;    /* this heating's martensite was not of the declared resistance */
     spring_learnt_t learnt;
 
     /* the running turn's readings */

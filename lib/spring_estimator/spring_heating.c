@@ -22,7 +22,11 @@
 #define LEAST_PART     0.5f  /* of a known change: a contact's step, flat afterwards, is less */
 #define LONE_PART      0.7f  /* where its resistance is not its austenite's either */
 #define LEAST_HEAT     0.74f /* latent heat 15 % less than declared, heat capacity 15 % more */
-#define COLD_SPAN_K    20.0f /* least, over which a coefficient is learnt */
+/* Of a declared martensite's resistance: 15 %, a sensor's gain of 3 %, a contact of 30 mohm, a
+ * coefficient in print over 68 K: 0.81 to 1.53. */
+#define UNLIKE_LEAST 0.75f
+#define UNLIKE_MOST  1.6f
+#define COLD_SPAN_K  20.0f /* least, over which a coefficient is learnt */
 
 void spring_estimator_begin_heating(spring_estimator_t *e, const thermal_model_t *model, uint8_t k)
 {
@@ -37,7 +41,7 @@ void spring_estimator_begin_heating(spring_estimator_t *e, const thermal_model_t
         .begun_c = fmaxf(coldest_c, spring_ambient_c(model)),
         .begun_missing = 1.0f - spring_estimator_austenite(e, model, k).low,
     };
-    b->onset = b->steep = false;
+    b->onset = b->steep = b->unlike = false;
     b->heating = true;
 }
 
@@ -214,6 +218,8 @@ void spring_heating_watch(const spring_estimator_t *e, spring_belief_t *b, therm
         b->run.heat.cold_ohm = b->ohm;
         b->run.heat.cold_a = b->current_a;
         b->run.heat.cold_c = spring_now_c(model, k);
+        b->unlike =
+            b->ohm < UNLIKE_LEAST * e->martensite_ohm || b->ohm > UNLIKE_MOST * e->martensite_ohm;
     }
     if (b->run.heat.heat_k < b->run.heat.peak_k) {
         return; /* it had to wait: on the way back up nothing transforms, and that tells nothing */

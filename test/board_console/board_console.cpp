@@ -380,6 +380,16 @@ void selftest_wants_everything_off_and_finds_an_open_spring()
     TEST_ASSERT_TRUE_MESSAGE(contains(text, "spring 7"), text.c_str());
 }
 
+void selftest_finds_a_resistance_beyond_its_limits()
+{
+    auto mega = booted();
+    mega->expect_ok("$resistance_minimum_ohm=0.3");
+    const std::string text = mega->say("selftest", 20000.0);
+    TEST_ASSERT_TRUE_MESSAGE(contains(text, "error:17 "), text.c_str());
+    TEST_ASSERT_TRUE_MESSAGE(contains(text, "spring 1: sensor ok, fault 3 short_spring"),
+                             text.c_str());
+}
+
 void what_this_version_lacks_says_so()
 {
     auto mega = booted();
@@ -433,6 +443,7 @@ int main()
     RUN_TEST(bytes_that_found_no_room_are_reported);
     RUN_TEST(an_eeprom_that_keeps_nothing_fails_the_save);
     RUN_TEST(selftest_wants_everything_off_and_finds_an_open_spring);
+    RUN_TEST(selftest_finds_a_resistance_beyond_its_limits);
     RUN_TEST(what_this_version_lacks_says_so);
     RUN_TEST(no_error_of_the_table_was_left_out);
     return UNITY_END();

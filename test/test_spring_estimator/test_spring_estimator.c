@@ -585,6 +585,72 @@ static void look_without_anything_learnt_tells_nothing(void)
     TEST_ASSERT_EQUAL_UINT8(SPRING_PHASE_ANY, BELIEF.possible);
 }
 
+/* A hint that is wrong: it is hot, and reads the austenite that was learnt. */
+static void reading_excludes_what_was_told(void)
+{
+    for (int learnt = 0; learnt < 2; learnt++) {
+        begin_cold();
+        (void)heat_then_hold(60.0);
+        ticks(1.3, 10.0);
+        const spring_learnt_t own = spring_estimator_learnt(&estimator, 0);
+        const truth_t hot = truth;
+        begin_cold();
+        truth = hot;
+        if (learnt) {
+            spring_estimator_restore(&estimator, 0, &own);
+        }
+        TEST_ASSERT_EQUAL_UINT8(SPRING_PHASE_MARTENSITE, BELIEF.possible);
+        spring_estimator_begin_heating(&estimator, &model, 0);
+        ticks(1.5, 1.2);
+        TEST_ASSERT_EQUAL_UINT8(learnt ? SPRING_PHASE_BETWEEN | SPRING_PHASE_AUSTENITE
+                                       : SPRING_PHASE_MARTENSITE,
+                                BELIEF.possible);
+    }
+    begin_cold(); /* and a right one stays */
+    (void)heat_then_hold(60.0);
+    const spring_learnt_t own = spring_estimator_learnt(&estimator, 0);
+    begin_cold();
+    spring_estimator_restore(&estimator, 0, &own);
+    spring_estimator_begin_heating(&estimator, &model, 0);
+    ticks(3.0, 1.2);
+    TEST_ASSERT_EQUAL_UINT8(SPRING_PHASE_MARTENSITE, BELIEF.possible);
+}
+
+/* Half the shunt reads half the current. What tolerances add up to is none. */
+static void martensite_of_another_resistance_is_noticed(void)
+{
+    static const struct {
+        double scale, contact_ohm, offset_v, rise_per_k;
+        bool unlike;
+    } cases[] = {{2.0 * 0.85, 0.0, 0.0, 0.0, true},
+                 {0.65, 0.0, 0.0, 0.0, true},
+                 {1.15, 0.030, 0.008, 0.0012, false},
+                 {0.85, 0.0, -0.008, -0.0003, false},
+                 {1.0, 0.0, 0.0, 0.0, false}};
+    for (unsigned n = 0; n < 5; n++) {
+        begin_cold();
+        truth.martensite_ohm *= cases[n].scale;
+        truth.contact_ohm = cases[n].contact_ohm;
+        truth.offset_v = cases[n].offset_v;
+        truth.rise_per_k = cases[n].rise_per_k;
+        spring_estimator_begin_heating(&estimator, &model, 0);
+        ticks(1.0, 1.0);
+        ticks(3.0, 4.0);
+        (void)snprintf(where, sizeof where, "%u: %.3f ohm", n, (double)BELIEF.ohm);
+        TEST_ASSERT_EQUAL_MESSAGE(cases[n].unlike, BELIEF.unlike, where);
+    }
+}
+
+/* Of a spring that was never seen to transform, 3 K of standard deviation stay in the distance. */
+static void distance_of_a_cold_spring_has_the_tolerance_of_its_transformation(void)
+{
+    begin_cold();
+    ticks(0.0, 600.0);
+    const spring_bounds_t distance = spring_estimator_distance_k(&estimator, &model, 0);
+    TEST_ASSERT_TRUE(distance.high - distance.value > 2.6f * 3.0f);
+    TEST_ASSERT_TRUE(distance.high - distance.value < 2.6f * 5.0f);
+}
+
 static void numbers_that_no_spring_has_are_not_restored(void)
 {
     const spring_learnt_t good = {.austenite_ohm = 0.22f, .change = 0.2f, .loss_sd_w_per_k = 1e-4f};
@@ -723,6 +789,9 @@ int main(void)
     RUN_TEST(martensite_resistance_is_learnt_at_20_degrees);
     RUN_TEST(look_tells_the_phase_by_what_was_learnt);
     RUN_TEST(look_without_anything_learnt_tells_nothing);
+    RUN_TEST(reading_excludes_what_was_told);
+    RUN_TEST(martensite_of_another_resistance_is_noticed);
+    RUN_TEST(distance_of_a_cold_spring_has_the_tolerance_of_its_transformation);
     RUN_TEST(numbers_that_no_spring_has_are_not_restored);
     RUN_TEST(bad_readings_leave_a_belief_that_can_be_believed);
     RUN_TEST(counts_and_sums_saturate);
