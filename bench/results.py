@@ -58,13 +58,13 @@ SECTIONS: tuple[Section, ...] = (
     Section(
         "worlds",
         "Worlds that are not as declared: the first start ever",
-        f"{HOST}/bench/worlds/bench_worlds --seed 2036",
+        f"{HOST}/bench/worlds/bench_worlds --seed 2037",
         markdown=True,
     ),
     Section(
         "worlds_learnt",
         "Worlds that are not as declared: later starts",
-        f"{HOST}/bench/worlds/bench_worlds --seed 2036 --learnt",
+        f"{HOST}/bench/worlds/bench_worlds --seed 2037 --learnt",
         markdown=True,
     ),
     Section("replay", "Measured logs through the on-chip model", f"{PYTHON} script/replay_fit.py"),

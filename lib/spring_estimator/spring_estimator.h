@@ -74,8 +74,8 @@ typedef struct {
     float from_k;     /* and how far it had moved from there when the line began */
     float rise_per_k; /* what a kelvin adds to it, relative */
     float rise_sd_per_k;
-    float was_ohm[2];  /* its average 4 and 8 s earlier; 0: it was begun anew since */
-    uint16_t turns;    /* since then */
+    float was_ohm[2]; /* its average 4 and 8 s earlier; 0: it was begun anew since */
+    uint16_t turns;   /* since then */
 } spring_line_t;
 
 /* What is believed of one spring. To be read by anyone, written by this module alone.
