@@ -372,8 +372,11 @@ static void another_shunt_is_found_before_it_is_hot(void)
     }
     TEST_ASSERT_LESS_THAN_UINT32(100, ticks);
     TEST_ASSERT_EQUAL(SAFETY_FAULT_SENSOR_MISMATCH, controller_fault(&controller, 4));
+    controller_set_target(&controller, 4, 0);
     run(50);
     controller_clear_faults(&controller);
+    run(50);
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, controller_fault(&controller, 4));
     controller_set_target(&controller, 4, 1000);
     run(300);
     TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, controller_fault(&controller, 4));
