@@ -7,7 +7,8 @@
 
 /* Of the duty, steps^2. A quarter of the default dither gives 1; below that, four times a sensor's
  * noise (6 mV) would be more than an eighth of what the window should show. */
-#define LEAST_VARIANCE 0.5f
+#define LEAST_VARIANCE  0.5f
+#define VOLTAGE_STEP_MV 4.0f /* of the INA219's register; a current's is 1 mA */
 /* Share of the voltage that should follow: 1, less (4.2 V for 5, wiring 0.04 ohm more, gain 3 %)
  * 0.73 to 1.28. */
 #define LEAST_SLOPE 0.25f
@@ -16,9 +17,8 @@
  * as others switch, adds half of it at the most. */
 #define SLOPE_SHARE 0.05f
 /* Off by more than the same tolerances, and the offsets of both readings. */
-#define BALANCE_SHARE   0.3f
-#define BALANCE_MV      15.0f
-#define VOLTAGE_STEP_MV 4.0f /* of the INA219; a current's is 1 mA */
+#define BALANCE_SHARE 0.3f
+#define BALANCE_MV    15.0f
 
 static uint16_t amount(int16_t value)
 {

@@ -480,7 +480,7 @@ void spring_estimator_leave(spring_estimator_t *e, uint8_t k)
 {
     spring_belief_t *b = &e->spring[k];
     if (b->heating) {
-        b->heating = b->onset = b->steep = false;
+        b->heating = b->onset = b->steep = b->unlike = false;
         spring_begin_hold_line(b, false);
     }
 }

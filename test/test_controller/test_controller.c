@@ -357,6 +357,32 @@ static void frozen_sensor_is_found_within_two_seconds_and_stops_its_spring_alone
     TEST_ASSERT_NOT_EQUAL(0, outputs.duty[0]);
 }
 
+/* Half of the shunt shows half of the current, of which the loop makes twice as much. The right one
+ * is put in, the fault cleared: it heats as any. */
+static void another_shunt_is_found_before_it_is_hot(void)
+{
+    settings.policy.policy = DRIVE_POLICY_PRECOMPENSATE;
+    start();
+    controller_set_temperature(&controller, AMBIENT_C7);
+    controller_set_target(&controller, 4, 1000);
+    uint32_t ticks = 0;
+    for (; controller_fault(&controller, 4) == SAFETY_FAULT_NONE && ticks < 500; ticks++) {
+        run(1);
+        inputs.sensor[4].current_ma = (int16_t)(inputs.sensor[4].current_ma / 2);
+    }
+    TEST_ASSERT_LESS_THAN_UINT32(100, ticks);
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_SENSOR_MISMATCH, controller_fault(&controller, 4));
+    controller_set_target(&controller, 4, 0);
+    run(50);
+    controller_clear_faults(&controller);
+    run(50);
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, controller_fault(&controller, 4));
+    controller_set_target(&controller, 4, 1000);
+    run(300);
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, controller_fault(&controller, 4));
+    TEST_ASSERT_GREATER_THAN_INT16(2000, controller_measured_ma(&controller, 4));
+}
+
 /* Above the policy's limit, below safety's: after trip_time_s it is off, and says why. */
 static void limit_that_stays_is_a_fault_until_cleared(void)
 {
@@ -622,6 +648,7 @@ int main(void)
     RUN_TEST(ceiling_begins_where_it_was_given_nothing_yet);
     RUN_TEST(ceiling_lets_a_current_pass_that_cannot_overheat);
     RUN_TEST(frozen_sensor_is_found_within_two_seconds_and_stops_its_spring_alone);
+    RUN_TEST(another_shunt_is_found_before_it_is_hot);
     RUN_TEST(limit_that_stays_is_a_fault_until_cleared);
     RUN_TEST(stop_acts_in_the_next_tick);
     RUN_TEST(locked_board_drives_nothing_until_unlocked);
