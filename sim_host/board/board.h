@@ -45,9 +45,11 @@ typedef enum {
     BOARD_FAULT_NACK,     /* its INA219 does not answer */
     BOARD_FAULT_STALE,    /* its INA219 converts no more, and says so: CNVR stays clear */
     BOARD_FAULT_FREEZE,   /* its INA219 acknowledges and converts, with the same result for ever */
-    BOARD_FAULT_SDA_LOW,  /* the bus's data line is held low (channel ignored) */
-    BOARD_FAULT_EEPROM,   /* the EEPROM keeps nothing that is written (channel ignored) */
-    BOARD_FAULT_FAN       /* the fan stands still whatever it is told (channel ignored) */
+    BOARD_FAULT_FREEZE_CURRENT, /* the same of the shunt's voltage alone */
+    BOARD_FAULT_FREEZE_VOLTAGE, /* and of the bus's */
+    BOARD_FAULT_SDA_LOW,        /* the bus's data line is held low (channel ignored) */
+    BOARD_FAULT_EEPROM,         /* the EEPROM keeps nothing that is written (channel ignored) */
+    BOARD_FAULT_FAN             /* the fan stands still whatever it is told (channel ignored) */
 } board_fault_t;
 
 typedef void (*board_byte_t)(void *context, uint64_t cycle, uint8_t byte);

@@ -192,7 +192,13 @@ void board_set_fault(board_t *board, board_fault_t fault, unsigned channel, bool
         board->sensor[channel].stale = on;
         break;
     case BOARD_FAULT_FREEZE:
-        board->sensor[channel].frozen = on;
+        board->sensor[channel].shunt_frozen = board->sensor[channel].bus_frozen = on;
+        break;
+    case BOARD_FAULT_FREEZE_CURRENT:
+        board->sensor[channel].shunt_frozen = on;
+        break;
+    case BOARD_FAULT_FREEZE_VOLTAGE:
+        board->sensor[channel].bus_frozen = on;
         break;
     case BOARD_FAULT_SDA_LOW:
         board_twi_hold_sda(&board->twi, on);

@@ -71,7 +71,8 @@ void ina219_power_on(ina219_t *sensor, const ina219_inputs_t *now)
     *sensor = (ina219_t){.config = CONFIG_RESET,
                          .absent = before.absent,
                          .stale = before.stale,
-                         .frozen = before.frozen,
+                         .shunt_frozen = before.shunt_frozen,
+                         .bus_frozen = before.bus_frozen,
                          .shunt_gain_error = before.shunt_gain_error,
                          .bus_gain_error = before.bus_gain_error,
                          .shunt_noise_v = before.shunt_noise_v,
@@ -142,7 +143,8 @@ void ina219_conversion_ended(ina219_t *sensor, const ina219_inputs_t *now)
     uint8_t mode = mode_of(sensor);
     bool last_of_sequence = sensor->phase == INA219_CONVERTS_BUS || (mode & MODE_BUS) == 0;
     if (!sensor->stale && cycles > 0) {
-        if (!sensor->frozen) {
+        const bool shunt = sensor->phase == INA219_CONVERTS_SHUNT;
+        if (!(shunt ? sensor->shunt_frozen : sensor->bus_frozen)) {
             take_result(sensor, now, cycles);
         }
         sensor->conversions++;

@@ -61,7 +61,7 @@ typedef struct {
     /* faults */
     bool absent; /* answers no address */
     bool stale;  /* converts no more: registers stay as they are and CNVR stays clear */
-    bool frozen; /* converts, with the results that it has */
+    bool shunt_frozen, bus_frozen;           /* converts, with the result that it has */
     double shunt_gain_error, bus_gain_error; /* it shows 1 + error times what is there */
 } ina219_t;
 

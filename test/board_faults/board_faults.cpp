@@ -109,24 +109,51 @@ void frozen_lying_and_swapped_sensors_show_what_they_should_not()
     TEST_ASSERT_EQUAL_DOUBLE(0.0, shown_a(*mega, 7));
 }
 
-/* The policy sweeps the current; the sensor answers, converts, and shows the same for ever. */
+/* The policy sweeps the current; the sensor, or one of its registers, answers, converts, and shows
+ * the same for ever: while it heats, and in a hold. */
 void a_frozen_sensor_is_found_within_two_seconds_and_its_neighbours_go_on()
 {
+    for (const board_fault_t fault :
+         {BOARD_FAULT_FREEZE, BOARD_FAULT_FREEZE_CURRENT, BOARD_FAULT_FREEZE_VOLTAGE}) {
+        for (const double after_ms : {4000.0, 120000.0}) {
+            auto mega = std::make_unique<rig>();
+            make_niti(mega->plant.get());
+            mega->boot();
+            mega->expect_ok("model cold");
+            mega->expect_ok("policy precompensate");
+            mega->expect_ok("on 1");
+            mega->expect_ok("on 5");
+            mega->run_ms(after_ms);
+            TEST_ASSERT_EQUAL_UINT8(SAFETY_FAULT_NONE, mega->view().spring[4].fault);
+            board_set_fault(mega->raw(), fault, 4, true);
+            mega->run_ms(2000.0);
+            const board_view_t seen = mega->view();
+            const std::string where =
+                "fault " + std::to_string(fault) + " after " + std::to_string(after_ms);
+            TEST_ASSERT_EQUAL_INT_MESSAGE(SAFETY_FAULT_SENSOR_MISMATCH, seen.spring[4].fault,
+                                          where.c_str());
+            TEST_ASSERT_EQUAL_DOUBLE(0.0, board_duty(mega->raw(), 4));
+            TEST_ASSERT_EQUAL_INT(SAFETY_FAULT_NONE, seen.spring[0].fault);
+            TEST_ASSERT_TRUE(board_duty(mega->raw(), 0) > 0.0);
+        }
+    }
+}
+
+/* Half of the shunt, as R050 for R100. */
+void another_shunt_is_found_as_its_spring_begins_to_heat()
+{
     auto mega = std::make_unique<rig>();
+    make_niti(mega->plant.get());
     mega->boot();
+    board_scale_sensor(mega->raw(), 4, 0.5, 1.0);
     mega->expect_ok("model cold");
     mega->expect_ok("policy precompensate");
     mega->expect_ok("on 1");
     mega->expect_ok("on 5");
     mega->run_ms(4000.0);
-    TEST_ASSERT_EQUAL_UINT8(SAFETY_FAULT_NONE, mega->view().spring[4].fault);
-    board_set_fault(mega->raw(), BOARD_FAULT_FREEZE, 4, true);
-    mega->run_ms(2000.0);
-    const board_view_t seen = mega->view();
-    TEST_ASSERT_EQUAL_INT(SAFETY_FAULT_SENSOR_MISMATCH, seen.spring[4].fault);
-    TEST_ASSERT_EQUAL_DOUBLE(0.0, board_duty(mega->raw(), 4));
-    TEST_ASSERT_EQUAL_INT(SAFETY_FAULT_NONE, seen.spring[0].fault);
-    TEST_ASSERT_TRUE(board_duty(mega->raw(), 0) > 0.0);
+    TEST_ASSERT_EQUAL_INT(SAFETY_FAULT_SENSOR_MISMATCH, mega->view().spring[4].fault);
+    TEST_ASSERT_EQUAL_INT(SAFETY_FAULT_NONE, mega->view().spring[0].fault);
+    TEST_ASSERT_TRUE(plant_temperature_c(mega->plant.get(), 4) < 60.0);
 }
 
 /* The near miss: both numbers off by as much as a bad sensor's may be. */
@@ -254,6 +281,7 @@ int main()
     RUN_TEST(a_sensor_that_converts_no_more_is_stale);
     RUN_TEST(frozen_lying_and_swapped_sensors_show_what_they_should_not);
     RUN_TEST(a_frozen_sensor_is_found_within_two_seconds_and_its_neighbours_go_on);
+    RUN_TEST(another_shunt_is_found_as_its_spring_begins_to_heat);
     RUN_TEST(a_sensor_that_is_a_little_off_is_no_fault);
     RUN_TEST(a_sensor_that_shows_half_is_a_mismatch);
     RUN_TEST(a_stuck_bus_switches_everything_off_without_missing_the_watchdog);

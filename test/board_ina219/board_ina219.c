@@ -214,7 +214,7 @@ static void a_frozen_sensor_is_ready_again_and_again_with_the_same_result(void)
 {
     bus_v = 1.0;
     pass_us(2 * 532);
-    sensor.frozen = true;
+    sensor.bus_frozen = true;
     bus_v = 2.0;
     for (int k = 0; k < 3; k++) {
         read_register(INA219_REGISTER_POWER);
@@ -223,7 +223,7 @@ static void a_frozen_sensor_is_ready_again_and_again_with_the_same_result(void)
         TEST_ASSERT_TRUE(ready());
         TEST_ASSERT_EQUAL_UINT16(250, read_register(INA219_REGISTER_BUS) >> 3);
     }
-    sensor.frozen = false;
+    sensor.bus_frozen = false;
     pass_us(2 * 532);
     TEST_ASSERT_EQUAL_UINT16(500, read_register(INA219_REGISTER_BUS) >> 3);
 }
