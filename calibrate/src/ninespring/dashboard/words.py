@@ -22,7 +22,7 @@ FAULTS = {
     12: "sum of currents above supply_limit_a",
     13: "stopped",
     14: "held at no current by a temperature limit for trip_time_s",
-    15: "what its sensor reads cannot be the circuit of its output: frozen, swapped or of another shunt; or supply_v or the declared resistance is wrong",
+    15: "what its sensor reads cannot be the circuit of its output: frozen or swapped or of another shunt; or supply_v or the declared resistance is wrong",
     16: "the host has been silent for host_timeout_s",
 }
 LIMITS = {
