@@ -120,22 +120,16 @@ void contact_that_comes_and_goes_is_blind_for_a_while(void)
     for (unsigned small = 0; small < 2; small++) {
         begin_cold();
         (void)heat_then_hold(60.0);
-        for (double s = 0.0; s < 60.0; s += TICK_S) {
-            (void)tick(hold_current_a(12.0));
-        }
+        hold(12.0, 60.0);
         for (unsigned n = 0; n < 3; n++) {
             TEST_ASSERT_FALSE(spring_estimator_blind(&BELIEF));
             truth.contact_ohm = n % 2u == 0 ? step_ohm[small] : 0.0;
-            for (double s = 0.0; s < 20.0; s += TICK_S) {
-                (void)tick(hold_current_a(12.0));
-            }
+            hold(12.0, 20.0);
         }
         TEST_ASSERT_TRUE(spring_estimator_blind(&BELIEF));
         TEST_ASSERT_FALSE(spring_estimator_sees(&BELIEF));
         TEST_ASSERT_TRUE(BELIEF.unproven);
-        for (double s = 0.0; s < 256.0; s += TICK_S) {
-            (void)tick(hold_current_a(12.0));
-        }
+        hold(12.0, 256.0);
         TEST_ASSERT_FALSE(spring_estimator_blind(&BELIEF));
     }
 }
@@ -175,9 +169,7 @@ void load_that_comes_within_a_second_is_no_contact(void)
 {
     begin_cold();
     (void)heat_then_hold(60.0);
-    for (double s = 0.0; s < 60.0; s += TICK_S) {
-        (void)tick(hold_current_a(3.0));
-    }
+    hold(3.0, 60.0);
     for (double s = 0.0; s < 20.0 && BELIEF.lost < ACTED_ON; s += TICK_S) {
         truth.shift_k = fmin(8.0, 8.0 * s);
         (void)tick(hold_current_a(3.0));
@@ -241,9 +233,7 @@ void loss_that_does_not_come_back_was_none(void)
     begin_cold();
     truth.contact_ohm = 0.012;
     (void)heat_then_hold(60.0);
-    for (double s = 0.0; s < 60.0; s += TICK_S) {
-        (void)tick(hold_current_a(12.0));
-    }
+    hold(12.0, 60.0);
     truth.contact_ohm = 0.0;
     for (double s = 0.0; s < 60.0 && BELIEF.lost < 0.03f; s += TICK_S) {
         (void)tick(hold_current_a(12.0));
@@ -257,9 +247,7 @@ void loss_that_does_not_come_back_was_none(void)
     TEST_ASSERT_FLOAT_WITHIN_MESSAGE(4.0f, (float)truth.temperature_c,
                                      spring_estimator_hottest_c(&BELIEF, &model, 0), where);
     (void)heat_then_hold(60.0);
-    for (double s = 0.0; s < 90.0; s += TICK_S) {
-        (void)tick(hold_current_a(12.0));
-    }
+    hold(12.0, 90.0);
     (void)snprintf(where, sizeof where, "at rest: %.1f degC, true %.1f", (double)believed_c(),
                    truth.temperature_c);
     TEST_ASSERT_EQUAL_FLOAT_MESSAGE(0.0f, BELIEF.gone_k, where);
@@ -335,9 +323,7 @@ void loss_that_a_limit_left_is_not_taken_back(void)
     ticks(3.0, 1.0);
     spring_estimator_begin_hold(&estimator, &model, 0, true);
     TEST_ASSERT_TRUE(BELIEF.unproven && !BELIEF.doubted);
-    for (double s = 0.0; s < 60.0; s += TICK_S) {
-        (void)tick(hold_current_a(12.0));
-    }
+    hold(12.0, 60.0);
     (void)snprintf(where, sizeof where, "%.1f K in doubt; %.1f degC, true %.1f",
                    (double)BELIEF.gone_k, (double)believed_c(), truth.temperature_c);
     TEST_ASSERT_TRUE_MESSAGE(BELIEF.unproven && BELIEF.gone_k > 0.0f, where);
@@ -420,9 +406,7 @@ void noise_of_an_average_is_known_after_a_minute_of_rest(void)
     for (double s = 0.0; s < 120.0 && BELIEF.quiet < 40; s += TICK_S) {
         (void)tick(hold_current_a(6.0));
     }
-    for (double s = 0.0; s < 60.0; s += TICK_S) {
-        (void)tick(hold_current_a(6.0));
-    }
+    hold(6.0, 60.0);
     (void)snprintf(where, sizeof where, "%.5f", (double)BELIEF.learnt.slow_noise);
     TEST_ASSERT_TRUE_MESSAGE(BELIEF.learnt.slow_noise < 0.0005f, where);
 }
@@ -433,9 +417,7 @@ void noise_that_was_learnt_is_no_loss_of_the_next_start(void)
     begin_cold();
     truth.slow_noise_v = 0.003;
     (void)heat_then_hold(60.0);
-    for (double s = 0.0; s < 300.0; s += TICK_S) {
-        (void)tick(hold_current_a(6.0));
-    }
+    hold(6.0, 300.0);
     const spring_learnt_t learnt = spring_estimator_learnt(&estimator, 0);
     begin_cold();
     spring_estimator_restore(&estimator, 0, &learnt);

@@ -173,6 +173,13 @@ double hold_current_a(double margin_k)
     return fmax(1e-3 * spring_estimator_current_ma(&estimator, 0, power_w) + dither_a, 0.4);
 }
 
+void hold(double margin_k, double seconds)
+{
+    for (double s = 0.0; s < seconds; s += TICK_S) {
+        (void)tick(hold_current_a(margin_k));
+    }
+}
+
 double heat_then_hold(double most_s)
 {
     const double took_s = heat(most_s);

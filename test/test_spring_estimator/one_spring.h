@@ -48,6 +48,7 @@ double heat_then_hold(double most_s);
 /* Current that holds it where the estimator has `margin_k` above martensite start, with the dither
  * of the drive. */
 double hold_current_a(double margin_k);
+void hold(double margin_k, double seconds);
 double resistance_ohm(void);
 double distance_k(void); /* true, to the true martensite start */
 

@@ -308,9 +308,7 @@ static void hold_that_loses_nothing_shows_no_crossing(void)
         truth.rise_per_k = of_martensite[n];
         truth.apart_per_k = of_austenite[n] - of_martensite[n];
         (void)heat_then_hold(60.0);
-        for (double s = 0.0; s < 600.0; s += TICK_S) {
-            (void)tick(hold_current_a(9.0));
-        }
+        hold(9.0, 600.0);
         (void)snprintf(where, sizeof where, "%.4f and %.4f per K: lost %.3f of %.3f",
                        of_martensite[n], of_austenite[n], (double)BELIEF.lost,
                        1.0 - truth.austenite);
@@ -323,9 +321,7 @@ static void hold_that_loses_nothing_shows_no_crossing(void)
 static void transformation_that_moves_is_noticed(void)
 {
     (void)heat_then_hold(60.0);
-    for (double s = 0.0; s < 120.0; s += TICK_S) {
-        (void)tick(hold_current_a(5.0));
-    }
+    hold(5.0, 120.0);
     truth.shift_k = 8.0;
     double after_s = 0.0;
     while (BELIEF.lost == 0.0f && after_s < 60.0) {
@@ -730,9 +726,7 @@ static void counts_and_sums_saturate(void)
     TEST_ASSERT_EQUAL_UINT16(15u * 4095u, BELIEF.voltage_sum_mv);
     begin_cold();
     (void)heat_then_hold(60.0);
-    for (double s = 0.0; s < 300.0; s += TICK_S) {
-        (void)tick(hold_current_a(6.0));
-    }
+    hold(6.0, 300.0);
     TEST_ASSERT_EQUAL_UINT8(UINT8_MAX, BELIEF.fresh);
     TEST_ASSERT_GREATER_OR_EQUAL_UINT8(240, BELIEF.quiet); /* where it goes round */
 }
