@@ -72,6 +72,21 @@ static void latch(safety_t *safety, safety_spring_t *spring, safety_fault_t faul
     }
 }
 
+safety_fault_t safety_resistance_fault(const safety_parameters_t *p, uint16_t current_ma,
+                                       int16_t voltage_mv)
+{
+    /* without a division: u against i R */
+    const uint16_t positive_mv = voltage_mv > 0 ? (uint16_t)voltage_mv : 0u;
+    const uint32_t voltage_uv = fixed_point_mac_u16(0, positive_mv, 1000u);
+    if (voltage_uv < fixed_point_mac_u16(0, current_ma, p->resistance_minimum_mohm)) {
+        return SAFETY_FAULT_SHORT_SPRING;
+    }
+    return p->resistance_maximum_mohm != 0 &&
+                   voltage_uv > fixed_point_mac_u16(0, current_ma, p->resistance_maximum_mohm)
+               ? SAFETY_FAULT_HIGH_RESISTANCE
+               : SAFETY_FAULT_NONE;
+}
+
 static uint8_t find_electrical(const safety_parameters_t *p, const safety_sample_t *s)
 {
     int16_t current_ma = s->current_ma;
@@ -90,13 +105,10 @@ static uint8_t find_electrical(const safety_parameters_t *p, const safety_sample
         found |= STUCK_ON;
     }
     if (amount_ma >= p->check_current_ma) {
-        /* resistance against its limits without a division: u against i R */
-        uint16_t voltage_mv = s->voltage_mv > 0 ? (uint16_t)s->voltage_mv : 0u;
-        uint32_t voltage_uv = fixed_point_mac_u16(0, voltage_mv, 1000u);
-        if (voltage_uv < fixed_point_mac_u16(0, amount_ma, p->resistance_minimum_mohm)) {
+        const safety_fault_t fault = safety_resistance_fault(p, amount_ma, s->voltage_mv);
+        if (fault == SAFETY_FAULT_SHORT_SPRING) {
             found |= SHORT;
-        } else if (p->resistance_maximum_mohm != 0 &&
-                   voltage_uv > fixed_point_mac_u16(0, amount_ma, p->resistance_maximum_mohm)) {
+        } else if (fault == SAFETY_FAULT_HIGH_RESISTANCE) {
             found |= HIGH_RESISTANCE;
         }
     }

@@ -100,6 +100,10 @@ bool safety_apply(safety_t *safety, const safety_parameters_t *parameters, uint1
 bool safety_tick_spring(safety_t *safety, uint8_t spring, const safety_sample_t *sample);
 void safety_tick_board(safety_t *safety, uint32_t sum_ma);
 
+/* What a resistance is against its limits: SAFETY_FAULT_SHORT_SPRING, _HIGH_RESISTANCE or _NONE. A
+ * voltage below 0 counts as 0. */
+safety_fault_t safety_resistance_fault(const safety_parameters_t *parameters, uint16_t current_ma,
+                                       int16_t voltage_mv);
 /* The sensor of a spring with SAFETY_FAULT_SENSOR_MISMATCH has shown one current ever since, on and
  * off alike: it is no reading, and no current in a spring that is off. */
 bool safety_is_frozen(const safety_t *safety, uint8_t spring, int16_t current_ma);

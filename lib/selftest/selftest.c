@@ -21,15 +21,10 @@ static void judge(const controller_t *controller, uint8_t spring, uint8_t sensor
     result->sound = result->sensor == CONTROLLER_SENSOR_OK && result->fault == SAFETY_FAULT_NONE &&
                     current_ma > (int16_t)(SELFTEST_CURRENT_MA / 2u);
     if (result->sound) {
-        const safety_parameters_t *p = &controller->safety.parameters;
-        result->resistance_mohm =
-            (int32_t)controller_measured_mv(controller, spring) * 1000 / current_ma;
-        if (result->resistance_mohm < p->resistance_minimum_mohm) {
-            result->fault = SAFETY_FAULT_SHORT_SPRING;
-        } else if (p->resistance_maximum_mohm != 0 &&
-                   result->resistance_mohm > p->resistance_maximum_mohm) {
-            result->fault = SAFETY_FAULT_HIGH_RESISTANCE;
-        }
+        const int16_t voltage_mv = controller_measured_mv(controller, spring);
+        result->resistance_mohm = (int32_t)voltage_mv * 1000 / current_ma;
+        result->fault = safety_resistance_fault(&controller->safety.parameters,
+                                                (uint16_t)current_ma, voltage_mv);
         result->sound = result->fault == SAFETY_FAULT_NONE;
     }
 }
