@@ -41,6 +41,24 @@ bool belief_reported(const controller_t *controller, int spring)
            (controller_limits(controller, (uint8_t)spring) & ~silent) != 0;
 }
 
+unsigned belief_said(const controller_t *controller, int spring)
+{
+    const unsigned limits = controller_limits(controller, (uint8_t)spring);
+    const unsigned known =
+        DRIVE_POLICY_LIMIT_CURRENT | DRIVE_POLICY_LIMIT_BLIND | DRIVE_POLICY_LIMIT_AWAY;
+    const unsigned others = limits & ~known;
+    return (belief_fault(controller, spring) != SAFETY_FAULT_NONE ? BELIEF_SAID_FAULT : 0u) |
+           ((limits & DRIVE_POLICY_LIMIT_AWAY) != 0 ? BELIEF_SAID_AWAY : 0u) |
+           (others != 0 ? BELIEF_SAID_LIMIT : 0u) |
+           ((limits & DRIVE_POLICY_LIMIT_BLIND) != 0 ? BELIEF_SAID_BLIND : 0u);
+}
+
+int belief_fault(const controller_t *controller, int spring)
+{
+    const safety_fault_t own = controller_fault(controller, (uint8_t)spring);
+    return (int)(own != SAFETY_FAULT_NONE ? own : controller_board_fault(controller));
+}
+
 /* As lib/learnt_store does, at once and without an EEPROM. */
 void belief_keep(const controller_t *controller, belief_memory_t *memory)
 {

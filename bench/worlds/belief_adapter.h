@@ -24,6 +24,15 @@ belief_bounds_t belief_distance_bounds_k(const controller_t *controller, int spr
 /* A fault, or a limit that says why the spring is not where it was asked to be. */
 bool belief_reported(const controller_t *controller, int spring);
 
+/* What is said of it, of any kind: BELIEF_SAID_ bits. */
+#define BELIEF_SAID_FAULT 1u
+#define BELIEF_SAID_AWAY  2u
+#define BELIEF_SAID_LIMIT 4u /* any other that cuts the drive */
+#define BELIEF_SAID_BLIND 8u
+unsigned belief_said(const controller_t *controller, int spring);
+/* The fault of a spring, else of the board; SAFETY_FAULT_NONE (0): none. */
+int belief_fault(const controller_t *controller, int spring);
+
 /* What is kept over power-off. */
 typedef struct {
     spring_learnt_t learnt[CONTROLLER_MAX_SPRINGS];

@@ -3,7 +3,6 @@
 // What it never does: decide what is drawn (campaign.c) or what a figure means (score.c).
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <fmt/format.h>
 #include <fstream>
@@ -11,8 +10,10 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
-#include <thread>
 #include <vector>
+
+#include "parallel.hpp"
+#include "swarm_bench.hpp"
 
 extern "C" {
 #include "campaign.h"
@@ -31,6 +32,9 @@ struct options_t {
     unsigned jobs = 2;
     bool learnt = false, verbose = false;
     std::string json, markdown, trace, command;
+    int swarm = 0, swarm_run = -1;
+    bool gives_up = false;
+    std::string keep, against;
 };
 
 struct run_t {
@@ -271,15 +275,7 @@ std::vector<run_t> do_all(const options_t &options, const std::vector<int> &worl
     for (int world : worlds)
         for (int array = options.first; array < options.first + options.arrays; array++)
             runs.push_back({world, array, 0, false, {}});
-    std::atomic<std::size_t> next{0};
-    std::vector<std::thread> threads;
-    for (unsigned j = 0; j < options.jobs; j++)
-        threads.emplace_back([&] {
-            for (std::size_t i = next++; i < runs.size(); i = next++)
-                do_run(options, runs[i], nullptr);
-        });
-    for (std::thread &thread : threads)
-        thread.join();
+    in_parallel(runs, options.jobs, [&](run_t &run) { do_run(options, run, nullptr); });
     for (const run_t &run : runs)
         if (!run.done)
             throw std::runtime_error(fmt::format("{}, array {}: the world or the controller "
@@ -340,14 +336,15 @@ std::string footer()
     std::string page = "Worlds:\n";
     for (int w = 0; w < campaign_worlds(); w++)
         page += fmt::format("  {:<14} {}\n", campaign_name(w), campaign_says(w));
-    return page + "Columns: 'late' springs were neither at 95 % austenite nor reported in time "
-                  "(180 s, nine "
-                  "springs 210 s;\nwith --learnt 90 and 120 s), 'never' ones in the whole run; "
-                  "'silent' ones "
-                  "were below 90 % for more than 20 s,\nunreported, for 'silent s' beyond that; "
-                  "'faults': springs that ended with one;\n'-': nothing "
-                  "is said, or nothing was held.\n"
-                  "Seeds: 1 to 99 are for development. Results are reported for seed 2037, once.\n";
+    return page + swarm_bench::list() +
+           "Columns: 'late' springs were neither at 95 % austenite nor reported in time "
+           "(180 s, nine "
+           "springs 210 s;\nwith --learnt 90 and 120 s), 'never' ones in the whole run; "
+           "'silent' ones "
+           "were below 90 % for more than 20 s,\nunreported, for 'silent s' beyond that; "
+           "'faults': springs that ended with one;\n'-': nothing "
+           "is said, or nothing was held.\n"
+           "Seeds: 1 to 99 are for development. Results are reported for seed 2037, once.\n";
 }
 
 } // namespace
@@ -383,6 +380,17 @@ int main(int argc, char **argv)
     app.add_option("--markdown", options.markdown, "Writes the table for docs/results.md");
     app.add_option("--trace", options.trace,
                    "Only the first array of the first world: truth and belief, every 0.2 s, CSV");
+    app.add_option("--swarm", options.swarm,
+                   "Instead of the worlds: so many runs, everything drawn at once")
+        ->check(CLI::Range(1, 1000000));
+    app.add_option("--swarm-run", options.swarm_run,
+                   "This run of the swarm alone, in words; with --trace also as CSV")
+        ->check(CLI::Range(0, 10000000));
+    app.add_option("--keep", options.keep, "Swarm: writes each run, for --against");
+    app.add_option("--against", options.against,
+                   "Swarm: each run beside the same run of a file of --keep");
+    app.add_flag("--gives-up", options.gives_up,
+                 "Swarm: a controller that never heats a spring again: figures must be worse");
     app.footer(footer());
     try {
         app.parse(argc, argv);
@@ -393,8 +401,15 @@ int main(int argc, char **argv)
         "build/host/bench/worlds/bench_worlds --seed {} --arrays {} --seconds {:g}{}", options.seed,
         options.arrays, options.seconds, options.learnt ? " --learnt" : "");
     try {
+        const swarm_bench::options_t swarm{
+            options.swarm,    options.first, options.seed,     options.seconds, options.jobs,
+            options.gives_up, options.json,  options.markdown, options.keep,    options.against};
         const std::vector<int> worlds = chosen(options);
-        if (options.trace.empty())
+        if (options.swarm_run >= 0)
+            swarm_bench::replay(swarm, options.swarm_run, options.trace);
+        else if (options.swarm > 0)
+            swarm_bench::measure(swarm);
+        else if (options.trace.empty())
             do_campaign(options, worlds);
         else
             do_trace(options, worlds);

@@ -415,8 +415,7 @@ bool campaign_is_structural(int world)
     return worlds[world].structural;
 }
 
-/* One to nine springs, each number as often, each set of so many as often. */
-static void draw_pattern(run_case_t *run, random_t *random)
+void campaign_draw_pattern(run_case_t *run, random_t *random)
 {
     int left = count(run), wanted = 1 + (int)random_uniform(random, 0.0, left);
     for (int k = 0; left > 0; k++, left--) {
@@ -430,9 +429,10 @@ void campaign_draw(int world, uint64_t seed, int array, double seconds, run_case
     memset(run, 0, sizeof *run);
     run->seconds = seconds;
     world_parameters_default(&run->world);
+    controller_settings_default(&run->settings);
     uint64_t specimen = seed * 1000003u + (uint64_t)array;
     random_t random = random_seeded(specimen, 2);
-    draw_pattern(run, &random);
+    campaign_draw_pattern(run, &random);
     world_draw(&run->world, specimen, CAMPAIGN_TOLERANCE);
     worlds[world].alter(run, &random, worlds[world].value);
 }

@@ -11,6 +11,9 @@
 
 #define CAMPAIGN_TOLERANCE 0.15
 
+/* One to all springs, each number as often, each set of so many as often. */
+void campaign_draw_pattern(run_case_t *run, random_t *random);
+
 int campaign_worlds(void);
 const char *campaign_name(int world);
 const char *campaign_says(int world); /* one line for --help */

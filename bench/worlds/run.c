@@ -9,7 +9,8 @@
 #define FIRST_START_S 180.0 /* what one to eight springs may take; nine share the supply */
 #define LATER_START_S 90.0
 #define NINE_MORE_S   30.0
-#define TRACE_TICKS   10 /* 0.2 s */
+#define TRACE_TICKS   10   /* 0.2 s */
+#define GIVES_UP_S    30.0 /* after it was reached: the heating itself is over */
 
 typedef struct {
     const run_case_t *run;
@@ -30,8 +31,7 @@ static double thread_s(void)
 /* The board's power comes on, and the README's two words are typed. */
 static bool power_on(bench_t *bench)
 {
-    controller_settings_t settings;
-    controller_settings_default(&settings);
+    controller_settings_t settings = bench->run->settings;
     settings.model.rows = (uint8_t)bench->run->world.rows;
     settings.model.columns = (uint8_t)bench->run->world.columns;
     int16_t ambient_c7 = (int16_t)lround(bench->run->world.ambient_setting_c * 128.0);
@@ -40,19 +40,20 @@ static bool power_on(bench_t *bench)
     }
     belief_restore(&bench->controller, &bench->memory);
     controller_set_pattern(&bench->controller, bench->run->on);
+    (void)controller_set_fan(&bench->controller, bench->run->fan_percent);
     return controller_set_policy(&bench->controller, DRIVE_POLICY_PRECOMPENSATE);
 }
 
 static void trace_head(FILE *trace, int springs)
 {
-    (void)fprintf(trace, "time_s,loss_factor");
+    (void)fprintf(trace, "time_s,loss_factor,ambient_c");
     for (int k = 1; k <= springs; k++) {
-        (void)fprintf(
-            trace,
-            ",duty%d,i%d_a,v%d_v,read%d_ma,read%d_mv,end%d_c,middle%d_c,t%d_c,a%d,ms%d_c,"
-            "ohm%d,believed%d_c,low%d_c,high%d_c,believed_a%d,low_a%d,high_a%d,target%d_ma,"
-            "limits%d,fault%d",
-            k, k, k, k, k, k, k, k, k, k, k, k, k, k, k, k, k, k, k, k);
+        (void)fprintf(trace,
+                      ",duty%d,i%d_a,v%d_v,read%d_ma,read%d_mv,end%d_c,middle%d_c,t%d_c,a%d,ms%d_c,"
+                      "ohm%d,draught%d,stage%d,believed%d_c,low%d_c,high%d_c,believed_a%d,low_a%d,"
+                      "high_a%d,target%d_ma,"
+                      "limits%d,fault%d",
+                      k, k, k, k, k, k, k, k, k, k, k, k, k, k, k, k, k, k, k, k, k, k);
     }
     (void)fputc('\n', trace);
 }
@@ -61,16 +62,18 @@ static void trace_row(const bench_t *bench, FILE *trace)
 {
     const world_t *world = bench->world;
     const controller_t *controller = &bench->controller;
-    (void)fprintf(trace, "%.2f,%.3f", world_time_s(world), world_loss_factor(world));
+    (void)fprintf(trace, "%.2f,%.3f,%.2f", world_time_s(world), world_loss_factor(world),
+                  world_ambient_c(world));
     for (int k = 0; k < world_springs(world); k++) {
         belief_bounds_t c = belief_temperature_bounds_c(controller, k);
         belief_bounds_t phase = belief_austenite_bounds(controller, k);
-        (void)fprintf(trace, ",%u,%.4f,%.4f,%d,%d,%.2f,%.2f,%.2f,%.4f,%.2f,%.5f",
+        (void)fprintf(trace, ",%u,%.4f,%.4f,%d,%d,%.2f,%.2f,%.2f,%.4f,%.2f,%.5f,%.3f,%d",
                       bench->outputs.duty[k], world_current_a(world, k), world_voltage_v(world, k),
                       bench->inputs.sensor[k].current_ma, bench->inputs.sensor[k].voltage_mv,
                       world_node_c(world, k, 0), world_node_c(world, k, 1), world_mean_c(world, k),
                       world_austenite(world, k), world_martensite_start_c(world, k),
-                      world_resistance_ohm(world, k));
+                      world_resistance_ohm(world, k), world_spring_loss_factor(world, k),
+                      (int)controller_stage(controller, (uint8_t)k));
         (void)fprintf(
             trace, ",%.2f,%.2f,%.2f,%.4f,%.4f,%.4f,%u,%u,%d", belief_temperature_c(controller, k),
             c.low, c.high, belief_austenite(controller, k), phase.low, phase.high,
@@ -117,8 +120,20 @@ static void type(bench_t *bench, score_t *score, int *typed)
     }
 }
 
-static bool drive(bench_t *bench, score_t *score, FILE *trace)
+static void give_up(bench_t *bench, const score_t *score)
 {
+    for (int k = 0; k < score->springs; k++) {
+        if (!isnan(score->spring[k].reached_s) &&
+            world_time_s(bench->world) - score->spring[k].reached_s > GIVES_UP_S &&
+            controller_stage(&bench->controller, (uint8_t)k) == DRIVE_POLICY_STAGE_HEAT) {
+            (void)controller_set_target(&bench->controller, (uint8_t)k, 0);
+        }
+    }
+}
+
+static bool drive(bench_t *bench, run_result_t *result, FILE *trace)
+{
+    score_t *score = &result->score;
     int typed = 0;
     const run_case_t *run = bench->run;
     long ticks = lround(run->seconds * TICKS_PER_S);
@@ -139,8 +154,12 @@ static bool drive(bench_t *bench, score_t *score, FILE *trace)
         if (powered) {
             type(bench, score, &typed);
             controller_tick(&bench->controller, &bench->inputs, &bench->outputs);
+            if (run->gives_up) {
+                give_up(bench, score);
+            }
         }
         score_tick(score, bench->world, powered ? &bench->controller : NULL);
+        losses_tick(&result->losses, score, bench->world, powered ? &bench->controller : NULL);
         if (trace != NULL && tick % TRACE_TICKS == 0) {
             trace_row(bench, trace);
         }
@@ -167,10 +186,11 @@ bool run_case(const run_case_t *run, run_result_t *result, FILE *trace)
     }
     score_begin(&result->score, bench.world, run->on,
                 (run->learnt ? LATER_START_S : FIRST_START_S) + (driven > 8 ? NINE_MORE_S : 0.0));
+    losses_begin(&result->losses, run->step_s, run->stepped_s);
     if (trace != NULL) {
         trace_head(trace, springs);
     }
-    bool done = drive(&bench, &result->score, trace);
+    bool done = drive(&bench, result, trace);
     world_destroy(bench.world);
     result->wall_s = thread_s() - begin_s;
     return done;

@@ -7,6 +7,7 @@
 #include <stdbool.h>
 #include <stdio.h>
 
+#include "losses.h"
 #include "score.h"
 #include "world.h"
 
@@ -24,12 +25,17 @@ typedef struct {
     int commands;
     run_command_t command[RUN_COMMANDS_MAX]; /* in order of time */
     double seconds;
-    double reset_s, reset_gap_s; /* power goes off then, for so long; 0: never */
-    bool learnt; /* the same array was driven before, and the board has kept what it learnt */
+    controller_settings_t settings; /* what the board is told of its array */
+    uint8_t fan_percent;            /* the same of its fan: typed at power-on */
+    double reset_s, reset_gap_s;    /* power goes off then, for so long; 0: never */
+    double step_s, stepped_s; /* the surroundings change for good from then to then; 0: never */
+    bool gives_up; /* a worse controller, for tests: what must be heated again is switched off */
+    bool learnt;   /* the same array was driven before, and the board has kept what it learnt */
 } run_case_t;
 
 typedef struct {
     score_t score;
+    losses_t losses;
     double wall_s; /* processor time of this thread */
 } run_result_t;
 
