@@ -1,124 +1,136 @@
-"""A long log made short enough to be fitted, and how."""
+"""A long log made short enough to be fitted: averaged, no row of it left out."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
 import numpy as np
-import pandas as pd
 
-from .mending import mask_run_in
 from .run import Run
 
 FINEST_S = 1.0
 """Rows closer than this are averaged where a log is too long to be simulated row by row."""
-STRETCH_S = 1500.0
-"""Length of the stretches that are taken of a log that is still too long, about."""
+LONGEST_S = 60.0
+"""Of a row, however long nothing has happened."""
+HAPPENS = 0.05
+"""Change of a drive, in parts of its largest, or of the fan, that makes a row begin."""
+SHARES = np.geomspace(0.01, 1.0, 25)
+"""Of the time since something happened, how long a row may be: the first that makes the log short enough."""
 
 
 def condense(run: Run, max_rows: int = 4000) -> Run:
     """Return the run with at most about `max_rows` rows, and say how.
 
-    First rows are averaged to FINEST_S. What is then still too long is cut to stretches, evenly spread from beginning to
-    end, at full rate: averaging further would blur what the springs were given. Each stretch starts from the measured
-    temperatures, as after a gap; between two of them one row holds the mean of what was given, for air and plate.
+    First rows are averaged to FINEST_S. What is then still too long is averaged the more the longer nothing has happened, to
+    LONGEST_S at most; where something happens all the time, evenly.
     """
-    run = _averaged(run, max_rows)
     n = len(run.time_s)
     usual = float(np.median(np.diff(run.time_s)))
-    pieces = max(2, round(max_rows * usual / STRETCH_S))
-    each = max_rows // pieces
-    if n <= max_rows or each < 50:
+    even = min(-(-n // max_rows), int(FINEST_S / usual + 1e-9))
+    if even > 1:
+        run = _averaged(run, _evenly(run, even), f"{n} rows averaged {even} by {even} for the fit")
+    if len(run.time_s) <= max_rows:
         return run
-    begins = np.linspace(0, n - each, pieces).round().astype(int)
-    rows: list[np.ndarray] = []
-    starts: list[int] = []
-    bridges: list[tuple[int, int, int]] = []
-    total = 0
-    for begin, following in zip(begins, [*begins[1:], n], strict=True):
-        end = int(begin) + each
-        starts += [total, *(total + one - int(begin) for one in run.starts if begin < one < end)]
-        rows.append(np.arange(begin, min(end + 1, following)))
-        total += len(rows[-1])
-        if following > end and following < n:
-            bridges.append((total - 1, end, int(following)))
-    pick = np.concatenate(rows)
-    out = replace(
-        run,
-        time_s=run.time_s[pick],
-        drive=run.drive[pick],
-        temperature_c=run.temperature_c[pick],
-        fan=run.fan[pick],
-        load_n=None if run.load_n is None else run.load_n[pick],
-        ambient_c=None if run.ambient_c is None else run.ambient_c[pick],
-        current_a=None if run.current_a is None else run.current_a[pick],
-        voltage_v=None if run.voltage_v is None else run.voltage_v[pick],
-        starts=starts,
-        notes=[
-            *run.notes,
-            f"{n} rows: the fit takes {pieces} stretches of {each * usual / 60.0:.0f} min, evenly spread; "
-            "what was given between them counts as its mean",
-        ],
-    )
-    weight = np.diff(run.time_s, append=run.time_s[-1] + usual)
-    for at, begin, end in bridges:
-        span = slice(begin, end)
-        out.temperature_c[at] = np.nan
-        out.drive[at] = weight[span] @ run.drive[span] / weight[span].sum()
-        out.fan[at] = weight[span] @ run.fan[span] / weight[span].sum()
-        if out.ambient_c is not None and run.ambient_c is not None:
-            out.ambient_c[at] = weight[span] @ run.ambient_c[span] / weight[span].sum()
-    for begin in starts[1:]:
-        mask_run_in(out, begin)
-    return out
+    rows = _where_nothing_happens(run, max_rows)
+    said = f"{n} rows averaged to {len(rows)} for the fit, the more the longer nothing was switched"
+    return _averaged(run, rows, said)
 
 
-def _averaged(run: Run, max_rows: int) -> Run:
-    """Return the run with rows averaged to at most FINEST_S, no more than `max_rows` asks for.
+def _evenly(run: Run, each: int) -> np.ndarray:
+    """Return the rows at which a new one begins, so many by so many from each start."""
+    return np.concatenate([np.arange(a, b, each) for a, b in _pieces(run)])
+
+
+def _pieces(run: Run) -> list[tuple[int, int]]:
+    return list(zip(run.starts, [*run.starts[1:], len(run.time_s)], strict=True))
+
+
+def _happens(run: Run) -> np.ndarray:
+    """Return the rows at which a drive or the fan changes by what counts."""
+    given = np.column_stack([run.drive, run.fan])
+    most = np.maximum(np.abs(given).max(axis=0), 1e-12)
+    most[-1] = 1.0
+    return np.flatnonzero((np.abs(np.diff(given, axis=0)) > HAPPENS * most).any(axis=1)) + 1
+
+
+def _where_nothing_happens(run: Run, max_rows: int) -> np.ndarray:
+    """Return the rows at which a new one begins: soon where something has just happened, later where nothing has."""
+    events = np.union1d(_happens(run), run.starts)
+    if 2 * len(events) > max_rows:
+        return _evenly(run, -(-len(run.time_s) // max_rows))
+    base = 1
+    while True:
+        for share in SHARES:
+            rows = _begins(run, events, base, float(share))
+            if len(rows) <= max_rows:
+                return rows
+        base *= 2
+
+
+def _begins(run: Run, events: np.ndarray, base: int, share: float) -> np.ndarray:
+    """Return where rows begin that are `base` long at an event and grow by a share of the time since."""
+    out = []
+    n = len(run.time_s)
+    for begin, end in zip(events, [*events[1:], n], strict=True):
+        at = int(begin)
+        while at < end:
+            out.append(at)
+            since = run.time_s[at] - run.time_s[begin]
+            long = min(LONGEST_S, share * since)
+            at = max(at + base, int(np.searchsorted(run.time_s, run.time_s[at] + long)))
+    return np.array(out)
+
+
+def _averaged(run: Run, rows: np.ndarray, said: str) -> Run:
+    """Return the run with a row beginning at each of these.
 
     A row's drive and fan are the means over the time until the next one; its temperature is the mean of an odd number of
-    readings around its time, none of them used twice: nothing is shifted, and the noise stays white.
+    readings around its time, none of them used twice: nothing is shifted, and the noise stays white. Where something is
+    switched it is the one reading: a mean across a kink is beside it.
     """
     n = len(run.time_s)
     usual = float(np.median(np.diff(run.time_s)))
-    factor = min(-(-n // max_rows), int(FINEST_S / usual + 1e-9))
-    if factor <= 1:
-        return run
     weight = np.diff(run.time_s, append=run.time_s[-1] + usual)
-    pieces: dict[str, list[np.ndarray]] = {"row": [], "drive": [], "fan": [], "temperature": []}
-    starts: list[int] = []
-    for begin, end in zip(run.starts, [*run.starts[1:], n], strict=True):
-        starts.append(sum(map(len, pieces["row"])))
-        rows = np.arange(begin, end, factor)
-        span = np.add.reduceat(weight[begin:end], rows - begin)
-        pieces["row"].append(rows)
-        pieces["drive"].append(
-            np.add.reduceat(weight[begin:end, None] * run.drive[begin:end], rows - begin, axis=0) / span[:, None]
-        )
-        pieces["fan"].append(np.add.reduceat(weight[begin:end] * run.fan[begin:end], rows - begin) / span)
-        measured = pd.DataFrame(run.temperature_c[begin:end])
-        smooth = measured.rolling(factor - (factor + 1) % 2, center=True, min_periods=1).mean().to_numpy()
-        pieces["temperature"].append(smooth[rows - begin])
-    row = np.concatenate(pieces["row"])
+    for begin in run.starts[1:]:
+        weight[begin - 1] = usual  # what was given in a gap nobody knows
+    span = np.add.reduceat(weight, rows)
+
+    def mean(values: np.ndarray) -> np.ndarray:
+        shape = (-1,) + (1,) * (values.ndim - 1)
+        return np.add.reduceat(weight.reshape(shape) * values, rows, axis=0) / span.reshape(shape)
+
     current = voltage = None
     if run.current_a is not None and run.voltage_v is not None:
         # the voltage weighted by the current, as the board averages it: their product stays the mean power
-        begins = [np.arange(a, b, factor) for a, b in zip(run.starts, [*run.starts[1:], n], strict=True)]
-        at = np.concatenate(begins)
-        span = np.add.reduceat(weight, at)
-        current = np.add.reduceat(weight[:, None] * run.current_a, at, axis=0) / span[:, None]
-        power = np.add.reduceat(weight[:, None] * run.current_a * run.voltage_v, at, axis=0) / span[:, None]
+        current, power = mean(run.current_a), mean(run.current_a * run.voltage_v)
         voltage = np.where(current > 0, power / np.where(current > 0, current, 1.0), 0.0)
+    starts = np.searchsorted(rows, run.starts)
+    after = np.append(np.diff(rows), n - rows[-1])
+    before = np.append(1, np.diff(rows))
+    before[starts] = 1
+    side = np.where(np.isin(rows, _happens(run)), 0, (np.minimum(before, after) - 1) // 2)
     return replace(
         run,
-        time_s=run.time_s[row],
-        drive=np.ascontiguousarray(np.concatenate(pieces["drive"])),
-        temperature_c=np.ascontiguousarray(np.concatenate(pieces["temperature"])),
-        fan=np.concatenate(pieces["fan"]),
-        load_n=None if run.load_n is None else run.load_n[row],
-        ambient_c=None if run.ambient_c is None else run.ambient_c[row],
+        time_s=run.time_s[rows],
+        drive=np.ascontiguousarray(mean(run.drive)),
+        temperature_c=_around(run.temperature_c, rows, side),
+        fan=mean(run.fan),
+        load_n=None if run.load_n is None else run.load_n[rows],
+        ambient_c=None if run.ambient_c is None else run.ambient_c[rows],
         current_a=current,
         voltage_v=voltage,
-        starts=starts,
-        notes=[*run.notes, f"{n} rows averaged {factor} by {factor} for the fit"],
+        starts=[int(one) for one in starts],
+        notes=[*run.notes, said],
     )
+
+
+def _around(readings: np.ndarray, rows: np.ndarray, side: np.ndarray) -> np.ndarray:
+    """Return the mean of what is there of the readings up to `side` rows before and after each of `rows`."""
+    good = np.isfinite(readings)
+    sums = np.vstack([np.zeros((1, readings.shape[1])), np.cumsum(np.where(good, readings, 0.0), axis=0)])
+    counts = np.vstack([np.zeros((1, readings.shape[1])), np.cumsum(good, axis=0)])
+    first, last = rows - side, rows + side + 1
+    count = counts[last] - counts[first]
+    out = (sums[last] - sums[first]) / np.maximum(count, 1.0)
+    # a mean of fewer than half has another middle
+    return np.where(2.0 * count > (last - first)[:, None], out, np.nan)

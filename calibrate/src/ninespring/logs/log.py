@@ -9,8 +9,10 @@ import re
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 
 from ..errors import InputError
+from ..ranges import LOG_TIME_S
 from . import mending
 from .run import DriveMode, Run
 from .table import Table, read_table
@@ -22,6 +24,12 @@ EXTRA = re.compile(r"^(?:[mpy][1-9][0-9]?_c|(?:[xd]|px|limits)[1-9][0-9]?|(?:s|c
 """Columns that the simulator and the board write beside the measured ones: skipped."""
 UNIT_OF = {"i": "a", "v": "v", "t": "c", "f": "n"}
 LIMITS = {
+    "time_s": (
+        LOG_TIME_S.low,
+        LOG_TIME_S.high,
+        "s",
+        "not a time in seconds: milliseconds are divided by 1000 (`ninespring import --map`)",
+    ),
     "i": (-0.5, 20.0, "A", "looks like milliamperes: divide by 1000 (`ninespring import --map`)"),
     "v": (-0.5, 60.0, "V", "looks like millivolts: divide by 1000 (`ninespring import --map`)"),
     "u": (-1e-9, 1.0 + 1e-9, "", "commands run from 0 to 1: a command in % is divided by 100"),
@@ -147,6 +155,21 @@ def _layers(table: Table, springs: int, path: str | Path) -> int:
     return int(table.keys.get("layers", "1"))
 
 
+CUT_SHORT = "a fault cut this run short"
+"""So begins what is said first of a log whose springs a fault switched off."""
+
+
+def _cut_short(table: Table, frame: pd.DataFrame) -> list[str]:
+    """Return what is to be said of the board's faults: what its recorder wrote, or what the state of the rows shows."""
+    said = [fault.removeprefix("fault ") for fault in table.faults]
+    if not said and "state" in frame:
+        state = frame["state"].astype(str)
+        bad = np.flatnonzero(state.str.startswith("fault_") & (state != state.shift()))
+        said = [f"at {frame['time_s'].iloc[k]:.1f} s: {state.iloc[k].replace('_', ' ')}" for k in bad]
+    more = f" and {len(said) - 1} more" if len(said) > 1 else ""
+    return [f"{CUT_SHORT}, {said[0]}{more}: its springs were off from then on"] if said else []
+
+
 def read_log(
     path: str | Path, springs: int | None = None, temperatures: bool = True, why: str = "", or_resistance: bool = False
 ) -> Run:
@@ -167,9 +190,7 @@ def read_log(
     for name in table.names:
         if EXTRA.match(name):
             continue
-        if name != "time_s":
-            kind = name if name in LIMITS else name[0]
-            _check_range(table, name, kind)
+        _check_range(table, name, name if name in LIMITS else name[0])
         if name == "time_s" or name[0] in "iuvf":
             holes = np.flatnonzero(frame[name].isna().to_numpy())
             if holes.size:
@@ -182,6 +203,7 @@ def read_log(
     if table.cut_off or (table.unfinished and len(frame) > 3):
         notes.append("the last line has no end, it may be cut off: left out")
     frame = frame.iloc[keep]
+    notes[:0] = _cut_short(table, frame)
     if len(frame) < 3:
         raise InputError(f"{len(frame)} rows: too short to say anything", path, int(table.lines[-1]))
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import io
+import re
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -35,6 +36,8 @@ class Table:
     """The last line has no end: its last number may have been cut off."""
     cut_off: bool = False
     """The last line was cut off in the middle and is left out."""
+    faults: list[str] = field(default_factory=list)
+    """What a recorder wrote of the board's faults when they came."""
 
     def where(self, row: int, name: str) -> tuple[int, int]:
         """Line and 1-based character column of a cell."""
@@ -74,12 +77,15 @@ def read_table(path: str | Path, text_columns: Iterable[str] = (), header_check:
         number = next(k for k, one in enumerate(lines, start=1) if len(one) > MAX_LINE)
         raise InputError(f"a line of {longest} characters: not a log (line ends missing?)", path, number)
     keys: dict[str, str] = {}
+    faults: list[str] = []
     kept: list[str] = []
     numbers: list[int] = []
     for number, line in enumerate(lines, start=1):
         if line.startswith("#"):
             name, colon, value = line[1:].partition(":")
-            if colon and not kept:  # further down a board's status is kept
+            if re.fullmatch(r" ?fault at (?:the end|[\d.]+ s)", name):
+                faults.append(f"{name.strip()}: {value.strip()}")
+            elif colon and not kept:  # further down a board's status is kept
                 keys.setdefault(name.strip().lower(), value.strip())
         elif line.strip():
             kept.append(line)
@@ -163,6 +169,7 @@ def read_table(path: str | Path, text_columns: Iterable[str] = (), header_check:
     table = Table(str(path), header_line, names, starts, frame, places, keys)
     table.unfinished = unfinished and not cut_off
     table.cut_off = cut_off
+    table.faults = faults
     numeric = [name for name in names if name not in words]
     if frame is None or np.isfinite(frame[numeric].to_numpy(float)).sum() != int(
         frame[numeric].notna().to_numpy().sum()
