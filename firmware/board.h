@@ -38,12 +38,17 @@ uint8_t board_reset_cause(void);
 
 /* Timer counts of the nine outputs, 0..800; 0 is off: pin low, no pulse. More than 800 counts as 0.
  * Ignored from '!' until board_stop_take() has reported it. */
-void board_set_duties(const uint16_t duty[BOARD_SPRINGS]);
-void board_set_fan(uint8_t percent); /* 0..100, above counts as 100 */
+void board_set_duties(const uint16_t duty[BOARD_SPRINGS]); /* once a tick, as the next */
+void board_set_fan(uint8_t percent);                       /* 0..100, above counts as 100 */
 
-/* True once after '!' was received: the outputs have been off since, and stay so until this call.
- */
-bool board_stop_take(void);
+/* 1 once after '!' was received, 2 after a second one in a row, else 0: the outputs have been off
+ * since, and stay so until this call. */
+uint8_t board_stop_take(void);
+
+/* The line that holds the supply of the stages: a pulse of 100 us where hold is true, else low, as
+ * from the start and after '!'. The cut-off counts pulses, so nothing but the end of each control
+ * tick calls this. */
+void board_hold_supply(bool hold);
 
 /* --- time --------------------------------------------------------------------------------- */
 
@@ -76,6 +81,10 @@ uint8_t board_eeprom_read(uint16_t address);
 void board_eeprom_write(uint16_t address, uint8_t octet);
 
 /* --- the rest ----------------------------------------------------------------------------- */
+
+/* Writes anew what the clock, the serial port and the ADC rest on, as a register may have lost a
+ * bit. Once a tick. board_set_duties and board_set_fan do so for the outputs. */
+void board_hold(void);
 
 void board_watchdog_start(void); /* 250 ms */
 void board_watchdog_kick(void);

@@ -5,6 +5,7 @@
 #include <avr/io.h>
 #include <avr/sleep.h>
 #include <avr/wdt.h>
+#include <util/delay.h>
 
 #define SERIAL_RECEIVE_BYTES 128u /* 11 ms of input: more than the longest time away, a tick */
 #define SERIAL_TRANSMIT_BYTES                                                                      \
@@ -20,10 +21,23 @@
 #define PWM_B     (_BV(WGM33) | _BV(WGM32) | _BV(CS30))
 #define PWM_COM_A _BV(COM3A1)
 #define PWM_COM_C _BV(COM3C1)
+/* Of ports E (OC3A D5 PE3, OC3B D2 PE4, OC3C D3 PE5), H (OC4A D6 PH3, OC4B D7, OC4C D8) and L (OC5A
+ * D46 PL3, OC5B D45, OC5C D44); fan OC1A D11 PB5. */
+#define PWM_PINS (_BV(3) | _BV(4) | _BV(5))
+#define FAN_PIN  _BV(5)
+/* D12 PB6: to the cut-off's charge pump (hardware/circuit.py) */
+#define SUPPLY_PIN      _BV(6)
+#define SUPPLY_PULSE_US 100
+
+#define SERIAL_RATE 16u /* 117647 baud with U2X, +2.1 %: the Mega's usual way to 115200 */
+#define SERIAL_ON   (_BV(RXEN0) | _BV(TXEN0) | _BV(RXCIE0))
+#define SERIAL_8N1  (_BV(UCSZ01) | _BV(UCSZ00))
+#define ADC_ON      (_BV(ADEN) | _BV(ADPS2) | _BV(ADPS1) | _BV(ADPS0)) /* 125 kHz */
 
 /* What survives a reset. start_check tells RAM that kept its content from RAM that woke up random.
  */
 #define START_CHECK 0x9A5B1E27ul
+#define BITTEN_MS   200u /* since the last kick: only the watchdog ended that */
 static volatile uint32_t start_check __attribute__((section(".noinit")));
 static volatile uint16_t ms_since_kick __attribute__((section(".noinit")));
 static volatile uint8_t driving __attribute__((section(".noinit")));
@@ -35,10 +49,10 @@ static volatile uint32_t time_ms;
 static volatile uint8_t ms_of_tick;
 static volatile uint8_t ticks_due;
 
-static volatile bool stop_pending; /* outputs stay off while true */
-static volatile bool stop_received;
-static volatile uint8_t stop_head; /* receive position of the last '!' */
-static volatile bool stop_queued;  /* bytes before stop_head may still be queued */
+static volatile bool stop_pending;     /* outputs stay off while true */
+static volatile uint8_t stop_received; /* '!' in a row, up to 2 */
+static volatile uint8_t stop_head;     /* receive position of the last '!' */
+static volatile bool stop_queued;      /* bytes before stop_head may still be queued */
 static volatile bool status_requested;
 static volatile bool receive_lost;
 
@@ -117,7 +131,7 @@ static uint8_t find_reset_cause(void)
          * was on. */
         if (!warm) {
             cause = BOARD_RESET_POWER_ON;
-        } else if (ms_since_kick >= 200u) {
+        } else if (ms_since_kick >= BITTEN_MS) {
             cause = BOARD_RESET_WATCHDOG;
         } else {
             cause = driving ? BOARD_RESET_UNKNOWN : BOARD_RESET_EXTERNAL;
@@ -136,49 +150,64 @@ uint8_t board_reset_cause(void)
 
 /* --- outputs ------------------------------------------------------------------------------ */
 
+/* What off and a duty rest on, beside the compare outputs. Set at the start, and again in each tick
+ * and wherever everything goes off, as a register may have lost a bit: an output that is
+ * disconnected shows its PORT. Called with interrupts off: they write ICR, too, by the same
+ * temporary register. */
+static void hold_pwm(void)
+{
+    PORTE &= (uint8_t)~PWM_PINS; /* low before it becomes an output */
+    PORTH &= (uint8_t)~PWM_PINS;
+    PORTL &= (uint8_t)~PWM_PINS;
+    DDRE |= PWM_PINS;
+    DDRH |= PWM_PINS;
+    DDRL |= PWM_PINS;
+    ICR3 = PWM_TOP;
+    ICR4 = PWM_TOP;
+    ICR5 = PWM_TOP;
+    TCCR3B = PWM_B;
+    TCCR4B = PWM_B;
+    TCCR5B = PWM_B;
+}
+
+/* Single instructions: no interrupt can come between. */
+static void supply_pin_low(void)
+{
+    PORTB &= (uint8_t)~SUPPLY_PIN;
+    DDRB |= SUPPLY_PIN;
+}
+
 /* Called with interrupts off. */
 static void outputs_off(void)
 {
+    hold_pwm();
+    supply_pin_low();
     TCCR3A = PWM_A_OFF;
     TCCR4A = PWM_A_OFF;
     TCCR5A = PWM_A_OFF;
     driving = 0;
 }
 
+/* A vector that nobody has: an interrupt that nothing here enables. The outputs stay off, and the
+ * watchdog does what it does for a program that hangs. */
+ISR(BADISR_vect)
+{
+    outputs_off();
+    ms_since_kick = BITTEN_MS; /* for a boot loader that passes no reset flags on */
+    wdt_enable(WDTO_15MS);
+    for (;;) {
+    }
+}
+
 static void outputs_init(void)
 {
-    /* Pins low before they become outputs. OC3A D5 PE3, OC3B D2 PE4, OC3C D3 PE5; OC4A D6 PH3, OC4B
-     * D7 PH4, OC4C D8 PH5; OC5A D46 PL3, OC5B D45 PL4, OC5C D44 PL5; fan OC1A D11 PB5. */
-    const uint8_t three = _BV(3) | _BV(4) | _BV(5);
-    PORTE &= (uint8_t)~three;
-    PORTH &= (uint8_t)~three;
-    PORTL &= (uint8_t)~three;
-    PORTB &= (uint8_t)~_BV(5);
-    DDRE |= three;
-    DDRH |= three;
-    DDRL |= three;
-    DDRB |= _BV(5);
-
     GTCCR = _BV(TSM) | _BV(PSRSYNC); /* the three timers start on the same clock */
-    TCCR3B = 0;
-    TCCR4B = 0;
-    TCCR5B = 0;
     outputs_off();
-    ICR3 = PWM_TOP;
-    ICR4 = PWM_TOP;
-    ICR5 = PWM_TOP;
     TCNT3 = 0;
     TCNT4 = 0;
     TCNT5 = 0;
-    TCCR3B = PWM_B;
-    TCCR4B = PWM_B;
-    TCCR5B = PWM_B;
     GTCCR = 0;
-
-    TCCR1A = _BV(WGM11);
-    TCCR1B = _BV(WGM13) | _BV(WGM12) | _BV(CS12) | _BV(CS10);
-    ICR1 = FAN_TOP;
-    OCR1A = 0;
+    board_set_fan(0);
 }
 
 /* Compare values of one timer's three outputs; returns its mode with the COM bits of those that are
@@ -199,10 +228,11 @@ static uint8_t set_timer(volatile uint16_t *compare, const uint16_t duty[3])
 
 void board_set_duties(const uint16_t duty[BOARD_SPRINGS])
 {
+    cli();
     const uint8_t three = set_timer(&OCR3A, &duty[0]);
     const uint8_t four = set_timer(&OCR4A, &duty[3]);
     const uint8_t five = set_timer(&OCR5A, &duty[6]);
-    cli();
+    hold_pwm();
     if (!stop_pending) {
         TCCR3A = three;
         TCCR4A = four;
@@ -214,6 +244,10 @@ void board_set_duties(const uint16_t duty[BOARD_SPRINGS])
 
 void board_set_fan(uint8_t percent)
 {
+    PORTB &= (uint8_t)~FAN_PIN;
+    DDRB |= FAN_PIN;
+    TCCR1B = _BV(WGM13) | _BV(WGM12) | _BV(CS12) | _BV(CS10);
+    ICR1 = FAN_TOP;
     if (percent == 0) {
         TCCR1A = _BV(WGM11);
         return;
@@ -222,12 +256,23 @@ void board_set_fan(uint8_t percent)
     TCCR1A = _BV(WGM11) | _BV(COM1A1);
 }
 
-bool board_stop_take(void)
+/* The fan's timer, which could drive the pin, is written in each tick, too. */
+void board_hold_supply(bool hold)
 {
-    bool received;
+    supply_pin_low();
+    if (hold) {
+        PORTB |= SUPPLY_PIN;
+        _delay_us(SUPPLY_PULSE_US);
+        supply_pin_low();
+    }
+}
+
+uint8_t board_stop_take(void)
+{
+    uint8_t received;
     cli();
     received = stop_received;
-    stop_received = false;
+    stop_received = 0;
     stop_pending = false;
     sei();
     return received;
@@ -288,6 +333,7 @@ bool board_tick_take(uint8_t *behind)
 
 ISR(USART0_RX_vect)
 {
+    static uint8_t last_octet;
     const uint8_t errors = UCSR0A & (_BV(FE0) | _BV(DOR0));
     const uint8_t octet = UDR0;
     if (errors) {
@@ -299,7 +345,8 @@ ISR(USART0_RX_vect)
     if (octet == '!') {
         outputs_off();
         stop_pending = true;
-        stop_received = true;
+        stop_received = last_octet == '!' ? 2u : 1u;
+        last_octet = octet;
         stop_head = receive_head;
         stop_queued = true;
         return;
@@ -308,6 +355,7 @@ ISR(USART0_RX_vect)
         status_requested = true;
         return;
     }
+    last_octet = octet;
     const uint8_t next = (uint8_t)((receive_head + 1u) % SERIAL_RECEIVE_BYTES);
     if (next == receive_tail) {
         receive_lost = true;
@@ -315,6 +363,25 @@ ISR(USART0_RX_vect)
     }
     receive_buffer[receive_head] = octet;
     receive_head = next;
+}
+
+/* Nothing but what is wrong is written: a rate that is written anew ends the byte under way. */
+static void hold_serial(void)
+{
+    if (UBRR0 != SERIAL_RATE) {
+        UBRR0 = SERIAL_RATE;
+    }
+    if ((UCSR0A & (_BV(U2X0) | _BV(MPCM0))) != _BV(U2X0)) {
+        UCSR0A = _BV(U2X0);
+    }
+    if (UCSR0C != SERIAL_8N1) {
+        UCSR0C = SERIAL_8N1;
+    }
+    const uint8_t on =
+        transmit_head != transmit_tail ? (uint8_t)(SERIAL_ON | _BV(UDRIE0)) : SERIAL_ON;
+    if ((UCSR0B & (uint8_t) ~(_BV(RXB80) | _BV(TXB80))) != on) {
+        UCSR0B = on;
+    }
 }
 
 static inline uint16_t transmit_next(uint16_t position)
@@ -437,9 +504,32 @@ void board_watchdog_start(void)
 
 void board_watchdog_kick(void)
 {
-    wdt_reset();
+    wdt_enable(WDTO_250MS); /* it may have been lost, too */
     cli();
     ms_since_kick = 0;
+    sei();
+}
+
+static void hold_clock(void)
+{
+    GTCCR = 0;
+    ASSR = 0;
+    TCCR2A = _BV(WGM21); /* compare match 1000 times a second */
+    TCCR2B = _BV(CS22);  /* 16 MHz / 64 / 250 */
+    OCR2A = COUNTS_PER_MS - 1u;
+    TIMSK2 = _BV(OCIE2A);
+}
+
+/* Where a bit of these is lost, nothing else may notice: the board is deaf, or its second another
+ * one. What is enabled beyond them ends in BADISR_vect. */
+void board_hold(void)
+{
+    cli();
+    PRR0 = 0; /* everything has its clock */
+    PRR1 = 0;
+    hold_clock();
+    hold_serial();
+    ADCSRA |= ADC_ON;
     sei();
 }
 
@@ -499,17 +589,6 @@ void board_init(void)
     ms_since_kick = 0;
     outputs_init();
 
-    TCCR2A = _BV(WGM21); /* compare match 1000 times a second */
-    TCCR2B = _BV(CS22);  /* 16 MHz / 64 / 250 */
-    OCR2A = COUNTS_PER_MS - 1u;
     TCNT2 = 0;
-    TIMSK2 = _BV(OCIE2A);
-
-    ADCSRA = _BV(ADEN) | _BV(ADPS2) | _BV(ADPS1) | _BV(ADPS0); /* 125 kHz */
-
-    UBRR0 = 16; /* 117647 baud with U2X, +2.1 %: the Mega's usual way to 115200 */
-    UCSR0A = _BV(U2X0);
-    UCSR0C = _BV(UCSZ01) | _BV(UCSZ00);
-    UCSR0B = _BV(RXEN0) | _BV(TXEN0) | _BV(RXCIE0);
-    sei();
+    board_hold();
 }

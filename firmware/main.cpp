@@ -1,6 +1,7 @@
 // The firmware: sensors, one call of controller_tick, outputs, 50 times a second; in between the
 // console.
 #include <avr/pgmspace.h>
+#include <stddef.h>
 #include <string.h>
 
 #include "board.h"
@@ -36,13 +37,16 @@ static console_status_t status;
 static controller_inputs_t inputs;
 static controller_outputs_t outputs;
 
-// The model's state over a warm reset.
+// Over a warm reset: the heat that was given, and the model's state.
 typedef struct {
+    temperature_ceiling_t delivered;
     thermal_model_state_t state;
+    bool known; // else the state is a guess: after the reset the board waits anew
     uint16_t crc;
 } kept_t;
 static kept_t kept __attribute__((section(".noinit")));
 
+static uint32_t last_tick_ms;
 static uint8_t tick_of_step;
 static bool status_wanted;
 
@@ -99,19 +103,29 @@ static int16_t ambient_c7(void)
     return fixed_point_c7_from_cc(settings.board.ambient_cc);
 }
 
-static void keep_model(void)
+static uint16_t crc_of_kept(void)
 {
-    controller_get_model_state(&controller, &kept.state);
-    kept.crc = crc16_add_bytes(CRC16_START, &kept.state, sizeof kept.state);
+    return crc16_add_bytes(CRC16_START, &kept, offsetof(kept_t, crc));
 }
 
-// Without a state that survived nothing is known of the springs, as controller_init leaves them.
+static void keep_model(void)
+{
+    controller_get_delivered(&controller, &kept.delivered);
+    controller_get_model_state(&controller, &kept.state);
+    kept.known = controller_is_known(&controller);
+    kept.crc = crc_of_kept();
+}
+
+// Without a record that survived nothing is known of the springs, as controller_init leaves them.
 static void start_model(uint8_t cause)
 {
-    const bool whole = kept.crc == crc16_add_bytes(CRC16_START, &kept.state, sizeof kept.state);
-    if ((cause & BOARD_RESET_WARM) && whole) {
+    if (!(cause & BOARD_RESET_WARM) || kept.crc != crc_of_kept()) {
+        return;
+    }
+    if (kept.known) {
         (void)controller_set_model_state(&controller, &kept.state);
     }
+    controller_set_delivered(&controller, &kept.delivered);
 }
 
 // Configures the sensors at the start and when the setting has changed: they then convert anew, and
@@ -132,7 +146,9 @@ static void run_tick(uint8_t behind)
         status.ticks_late++;
     }
     status.ticks++;
-    status.time_ms = board_time_ms();
+    const uint32_t now_ms = board_time_ms(); // comes round after 50 days
+    text_time_add(&status.time, now_ms - last_tick_ms);
+    last_tick_ms = now_ms;
 #ifdef NINESPRING_HIL
     current_sensor_hil_tick((uint16_t)status.ticks);
 #endif
@@ -155,16 +171,18 @@ static void run_tick(uint8_t behind)
 #endif
     board_set_duties(outputs.duty);
     board_set_fan(outputs.fan_percent);
+    board_hold();
     if (++tick_of_step == 5u) {
         tick_of_step = 0;
         keep_model();
     }
     board_watchdog_kick();
+    board_hold_supply(outputs.supply); // last: a tick that does not end holds nothing
     const uint32_t tick_us = board_time_us() - begin_us;
     if (tick_us > status.tick_longest_us) {
         status.tick_longest_us = tick_us > UINT16_MAX ? UINT16_MAX : (uint16_t)tick_us;
     }
-    telemetry_tick(&telemetry, &controller, status.time_ms, inputs.ambient_c7, &serial_output);
+    telemetry_tick(&telemetry, &controller, &status.time, inputs.ambient_c7, &serial_output);
 }
 
 #ifdef NINESPRING_HIL
@@ -199,8 +217,13 @@ static int16_t next_console_octet(void)
 
 static void take_stop(void)
 {
-    if (board_stop_take()) {
-        controller_emergency_stop(&controller);
+    const uint8_t stops = board_stop_take();
+    if (stops != 0) {
+        if (stops > 1) {
+            controller_emergency_cut(&controller);
+        } else {
+            controller_emergency_stop(&controller);
+        }
         memset(outputs.duty, 0, sizeof outputs.duty);
         console_stop(&console);
     }

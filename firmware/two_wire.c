@@ -52,8 +52,6 @@ controller_sensor_status_t two_wire_transfer(uint8_t address, two_wire_direction
 void two_wire_begin(void)
 {
     PORTD |= SCL_PIN | SDA_PIN; /* pull-ups */
-    TWSR = 0;
-    TWBR = (uint8_t)((F_CPU / TWO_WIRE_HZ - 16u) / 2u);
 }
 
 static void release_pins(void)
@@ -88,6 +86,8 @@ static bool stop(void)
 controller_sensor_status_t two_wire_transfer(uint8_t address, two_wire_direction_t direction,
                                              uint8_t bytes[], uint8_t length)
 {
+    TWSR = 0; /* each time: a lost bit would slow all reads and nothing would fail */
+    TWBR = (uint8_t)((F_CPU / TWO_WIRE_HZ - 16u) / 2u);
     uint8_t status = step(_BV(TWSTA));
     if (status == TW_START) {
         TWDR = (uint8_t)(address << 1 | (uint8_t)direction);

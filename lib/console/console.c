@@ -7,6 +7,40 @@
 
 /* --- lines out ------------------------------------------------------------------------------ */
 
+static void add_usage(text_line_t *line, uint16_t word);
+
+void console_hint_text(console_t *console, const char *text, int32_t first, int32_t second)
+{
+    console->hint = CONSOLE_HINT_TEXT;
+    console->hint_text = text;
+    console->hint_values[0] = first;
+    console->hint_values[1] = second;
+}
+
+void console_hint_setting(console_t *console, console_hint_t hint, uint16_t row, uint8_t element)
+{
+    console->hint = (uint8_t)hint;
+    console->hint_of = row;
+    console->hint_element = element;
+}
+
+/* What the line's form was at fault for. */
+static void add_hint(const console_t *console, console_error_t error, text_line_t *line)
+{
+    if (console->hint == CONSOLE_HINT_NONE ||
+        (error > CONSOLE_ERROR_OUT_OF_RANGE && error != CONSOLE_ERROR_UNKNOWN_SETTING)) {
+        return;
+    }
+    text_add_flash(line, FLASH_TEXT(": "));
+    if (console->hint == CONSOLE_HINT_TEXT) {
+        text_add_values(line, console->hint_text, console->hint_values);
+    } else if (console->hint == CONSOLE_HINT_WORD) {
+        add_usage(line, console->hint_of);
+    } else {
+        console_add_setting_hint(console, line);
+    }
+}
+
 static void answer(const console_t *console, console_error_t error)
 {
     console_out_t out;
@@ -17,6 +51,7 @@ static void answer(const console_t *console, console_error_t error)
         const int32_t number = (int32_t)error;
         text_add_values(&out.line, FLASH_TEXT("error:#0 "), &number);
         text_add_flash(&out.line, console_error_text(error));
+        add_hint(console, error, &out.line);
     }
     console_out_end(console, &out);
 }
@@ -33,27 +68,22 @@ typedef struct {
     const char *argument[MAX_ARGUMENTS];
 } arguments_t;
 
-static console_error_t parse_number(const char *text, uint8_t decimals, int32_t lowest,
-                                    int32_t highest, int32_t *value)
+/* A whole number; range says, with the two limits, what it may be. */
+static console_error_t parse_number(console_t *console, const char *text, const char *range,
+                                    int32_t lowest, int32_t highest, int32_t *value)
 {
     int32_t number;
-    switch (text_parse_decimal(text, decimals, &number)) {
-    case TEXT_OK:
-        break;
-    case TEXT_TOO_LARGE:
-        return CONSOLE_ERROR_OUT_OF_RANGE;
-    default:
-        return CONSOLE_ERROR_BAD_ARGUMENT;
+    const text_result_t result = text_parse_decimal(text, 0, &number);
+    if (result == TEXT_OK && number >= lowest && number <= highest) {
+        *value = number;
+        return CONSOLE_OK;
     }
-    if (number < lowest || number > highest) {
-        return CONSOLE_ERROR_OUT_OF_RANGE;
-    }
-    *value = number;
-    return CONSOLE_OK;
+    console_hint_text(console, range, lowest, highest);
+    return result == TEXT_NOT_A_NUMBER ? CONSOLE_ERROR_BAD_ARGUMENT : CONSOLE_ERROR_OUT_OF_RANGE;
 }
 
 /* "all" or a spring's number; first..last count from 0. */
-static console_error_t parse_springs(const console_t *console, const char *text, uint8_t *first,
+static console_error_t parse_springs(console_t *console, const char *text, uint8_t *first,
                                      uint8_t *last)
 {
     const uint8_t springs = controller_springs(console->controller);
@@ -63,7 +93,8 @@ static console_error_t parse_springs(const console_t *console, const char *text,
     if (flash_equal(text, FLASH_TEXT("all"))) {
         return CONSOLE_OK;
     }
-    const console_error_t error = parse_number(text, 0, 1, springs, &number);
+    const console_error_t error = parse_number(
+        console, text, FLASH_TEXT("springs are #0 to #0, or all"), 1, springs, &number);
     if (error == CONSOLE_OK) {
         *first = *last = (uint8_t)(number - 1);
     }
@@ -71,13 +102,19 @@ static console_error_t parse_springs(const console_t *console, const char *text,
 }
 
 /* Whether anything may be switched on at all. */
-static console_error_t may_drive(const console_t *console)
+static console_error_t may_drive(console_t *console)
 {
+    if (console->conflict) {
+        console_apply_settings(console); /* says which */
+        return CONSOLE_ERROR_SETTINGS_CONFLICT;
+    }
     if (controller_is_locked(console->controller)) {
         return CONSOLE_ERROR_LOCKED;
     }
-    return controller_board_fault(console->controller) == SAFETY_FAULT_NONE ? CONSOLE_OK
-                                                                            : CONSOLE_ERROR_FAULT;
+    if (controller_board_fault(console->controller) != SAFETY_FAULT_NONE) {
+        return CONSOLE_ERROR_FAULT;
+    }
+    return controller_supply_is_off(console->controller) ? CONSOLE_ERROR_SUPPLY_OFF : CONSOLE_OK;
 }
 
 /* Springs off, or on at a level: what keeps one from being switched on does not keep it from being
@@ -89,7 +126,8 @@ static console_error_t switch_springs(console_t *console, const arguments_t *arg
     int32_t percent = on ? 100 : 0;
     console_error_t error = parse_springs(console, arguments->argument[0], &first, &last);
     if (error == CONSOLE_OK && arguments->count > 1) {
-        error = parse_number(arguments->argument[1], 0, 0, 100, &percent);
+        error = parse_number(console, arguments->argument[1],
+                             FLASH_TEXT("the level is #0 to #0 percent"), 0, 100, &percent);
     }
     if (error == CONSOLE_OK && on) {
         error = may_drive(console);
@@ -123,6 +161,9 @@ static console_error_t word_pattern(console_t *console, const arguments_t *argum
     bool any = false;
     const char *const bits = arguments->argument[0];
     const uint8_t springs = controller_springs(console->controller);
+    console_hint_text(console,
+                      FLASH_TEXT("a pattern has #0 digits, 0 or 1; this has #0 characters"),
+                      springs, (int32_t)strlen(bits));
     for (uint8_t k = 0; k < springs; k++) {
         if (bits[k] != '0' && bits[k] != '1') { /* the end, too */
             return CONSOLE_ERROR_BAD_ARGUMENT;
@@ -160,7 +201,9 @@ static console_error_t word_policy(console_t *console, const arguments_t *argume
 static console_error_t word_fan(console_t *console, const arguments_t *arguments)
 {
     int32_t percent = 0;
-    const console_error_t error = parse_number(arguments->argument[0], 0, 0, 100, &percent);
+    const console_error_t error =
+        parse_number(console, arguments->argument[0], FLASH_TEXT("the fan is #0 to #0 percent"), 0,
+                     100, &percent);
     if (error == CONSOLE_OK) {
         controller_set_fan(console->controller, (uint8_t)percent);
     }
@@ -169,6 +212,7 @@ static console_error_t word_fan(console_t *console, const arguments_t *arguments
 
 static console_error_t word_ambient(console_t *console, const arguments_t *arguments)
 {
+    console_hint_setting(console, CONSOLE_HINT_RANGE, PARAMETER_ambient_c, 0);
     return console_error_of(
         settings_assign(console->settings, "ambient_c", arguments->argument[0]));
 }
@@ -186,7 +230,8 @@ static console_error_t word_telemetry(console_t *console, const arguments_t *arg
     }
     if (arguments->count > 1) {
         const console_error_t error =
-            parse_number(arguments->argument[1], 0, 1, TELEMETRY_TICKS_PER_S, &hz);
+            parse_number(console, arguments->argument[1], FLASH_TEXT("#0 to #0 lines a second"), 1,
+                         TELEMETRY_TICKS_PER_S, &hz);
         if (error != CONSOLE_OK) {
             return error;
         }
@@ -222,6 +267,18 @@ static bool any_spring_on(const console_t *console)
     return false;
 }
 
+static console_error_t word_supply(console_t *console, const arguments_t *arguments)
+{
+    const bool on = flash_equal(arguments->argument[0], FLASH_TEXT("on"));
+    if (!on && !flash_equal(arguments->argument[0], FLASH_TEXT("off"))) {
+        return CONSOLE_ERROR_BAD_ARGUMENT;
+    }
+    if (!controller_supply_is_fitted(console->controller)) {
+        return CONSOLE_ERROR_NOT_AVAILABLE;
+    }
+    return controller_set_supply(console->controller, on) ? CONSOLE_OK : CONSOLE_ERROR_FAULT;
+}
+
 static console_error_t word_selftest(console_t *console, const arguments_t *arguments)
 {
     (void)arguments;
@@ -250,6 +307,7 @@ static console_error_t word_model(console_t *console, const arguments_t *argumen
         return CONSOLE_ERROR_SPRINGS_ON;
     }
     controller_set_temperature(console->controller, console->status->ambient_c7);
+    console_start_job(console, CONSOLE_JOB_COLD);
     return CONSOLE_OK;
 }
 
@@ -270,6 +328,16 @@ static console_error_t word_learnt(console_t *console, const arguments_t *argume
     return CONSOLE_OK;
 }
 
+static console_error_t word_echo(console_t *console, const arguments_t *arguments)
+{
+    const bool on = flash_equal(arguments->argument[0], FLASH_TEXT("on"));
+    if (!on && !flash_equal(arguments->argument[0], FLASH_TEXT("off"))) {
+        return CONSOLE_ERROR_BAD_ARGUMENT;
+    }
+    console->echo = on;
+    return CONSOLE_OK;
+}
+
 /* X(word, least arguments, most arguments, job or NONE, function or NULL, usage after the word) */
 #define WORDS(X)                                                                                   \
     X(help, 0, 0, HELP, NULL, "  this list")                                                       \
@@ -281,13 +349,16 @@ static console_error_t word_learnt(console_t *console, const arguments_t *argume
     X(fan, 1, 1, NONE, word_fan, " 0..100  in percent")                                            \
     X(ambient, 1, 1, NONE, word_ambient, " C  air temperature, where no sensor measures it")       \
     X(model, 0, 1, NONE, word_model,                                                               \
-      " [cold]  what is believed of each spring, with bounds; cold: it is at ambient")             \
+      " [cold]  what is believed of each spring, with bounds; cold: what was off for long is at "  \
+      "ambient")                                                                                   \
     X(learnt, 0, 1, NONE, word_learnt, " [clear]  each spring's own numbers; clear: forget them")  \
     X(faults, 0, 0, FAULTS, NULL, "  what is latched")                                             \
     X(clear, 0, 0, NONE, word_clear, "  forget faults; all springs off")                           \
     X(unlock, 0, 0, NONE, word_unlock, "  after a watchdog or brown-out reset")                    \
+    X(supply, 1, 1, NONE, word_supply, " on|off  of all stages, where a cut-off is fitted")        \
     X(selftest, 0, 0, NONE, word_selftest, "  each sensor, and each spring with 0.3 A")            \
-    X(telemetry, 1, 2, NONE, word_telemetry, " off|csv|teleplot [1..50]  lines per second")
+    X(telemetry, 1, 2, NONE, word_telemetry, " off|csv|teleplot [1..50]  lines per second")        \
+    X(echo, 1, 1, NONE, word_echo, " on|off  show what is typed; backspace works either way")
 
 #define WORD_TEXT(word, least, most, job, function, usage) #word usage "\0"
 static const char word_texts[] FLASH_MEMORY = WORDS(WORD_TEXT);
@@ -315,6 +386,47 @@ static bool begins_with(const char *text, const char *word)
     return flash_byte(text) == ' ';
 }
 
+/* "write on K|all [0..100]": a word's text as far as its explanation. */
+static void add_usage(text_line_t *line, uint16_t word)
+{
+    const char *text = text_item(word_texts, (uint8_t)word);
+    text_add_flash(line, FLASH_TEXT("write "));
+    for (;; text++) {
+        const char character = (char)flash_byte(text);
+        if (character == '\0' || (character == ' ' && flash_byte(text + 1) == ' ')) {
+            return;
+        }
+        text_add_char(line, character);
+    }
+}
+
+/* The word that has most of its first letters, two at least. */
+static void hint_nearest_word(console_t *console, const char *name)
+{
+    uint8_t longest = 1;
+    const char *text = word_texts;
+    for (uint8_t i = 0; i < WORD_COUNT; i++, text = text_item(text, 1)) {
+        uint8_t same = 0;
+        while (name[same] != '\0' && name[same] == (char)flash_byte(text + same)) {
+            same++;
+        }
+        if (same > longest) {
+            longest = same;
+            console->hint = CONSOLE_HINT_WORD;
+            console->hint_of = i;
+        }
+    }
+}
+
+static void make_small(char *text)
+{
+    for (; *text != '\0'; text++) {
+        if (*text >= 'A' && *text <= 'Z') {
+            *text = (char)(*text - 'A' + 'a');
+        }
+    }
+}
+
 /* The next word of a line, which then ends with it; NULL where none is left. */
 static char *next_word(char **rest)
 {
@@ -336,6 +448,7 @@ static char *next_word(char **rest)
 
 static console_error_t execute(console_t *console)
 {
+    make_small(console->line);
     if (console->line[0] == '$') {
         return console_settings_line(console, console->line);
     }
@@ -359,6 +472,8 @@ static console_error_t execute(console_t *console)
             continue;
         }
         flash_copy(&word, &words[i], sizeof word);
+        console->hint = CONSOLE_HINT_WORD;
+        console->hint_of = i;
         if (given < word.least) {
             return CONSOLE_ERROR_MISSING_ARGUMENT;
         }
@@ -372,6 +487,7 @@ static console_error_t execute(console_t *console)
         }
         return word.function(console, &arguments);
     }
+    hint_nearest_word(console, name);
     return CONSOLE_ERROR_UNKNOWN_WORD;
 }
 
@@ -379,10 +495,11 @@ static console_error_t execute(console_t *console)
 
 static bool help_line(const console_t *console, console_out_t *out)
 {
-    static const char more[] FLASH_MEMORY = "$$  all settings   $NAME  one   $NAME=VALUE  set it\0"
-                                            "$save  keep them   $defaults  the built-in ones\0"
-                                            "!  all springs off at once, at any moment\0"
-                                            "?  one line of status, at any moment";
+    static const char more[] FLASH_MEMORY =
+        "$$  all settings   $NAME  one   $NAME=VALUE  set it\0"
+        "$save  keep them   $defaults  the built-in ones\0"
+        "!  all springs off at once, at any moment; !! their supply, too\0"
+        "?  one line of status, at any moment";
     if (console->step < WORD_COUNT) {
         text_add_flash(&out->line, text_item(word_texts, console->step));
         return true;
@@ -483,6 +600,9 @@ static void print_job_line(console_t *console)
     case CONSOLE_JOB_MODEL:
         more = console_model_line(console, &out);
         break;
+    case CONSOLE_JOB_COLD:
+        more = console_warm_line(console, &out);
+        break;
     case CONSOLE_JOB_LEARNT:
         more = console_learnt_line(console, &out);
         break;
@@ -559,10 +679,25 @@ void console_stop(console_t *console)
     }
 }
 
+#define BACKSPACE 0x08u
+#define DELETE    0x7Fu
+
+/* What is typed is worth less than the answer that needs the room. */
+static void echo(const console_t *console, const char *bytes, uint8_t length)
+{
+    if (console->echo && room_for(console, 2u * CONSOLE_ROOM_BYTES + length)) {
+        console->output.write(console->output.context, bytes, length);
+    }
+}
+
 void console_receive(console_t *console, uint8_t octet)
 {
     if (octet == '\n' || octet == '\r') {
         const uint8_t length = console->length;
+        if (length > 0 || console->broken != CONSOLE_OK) {
+            echo(console, "\r\n", 2);
+        }
+        console->hint = CONSOLE_HINT_NONE;
         controller_host_heard(console->controller);
         console_error_t error = (console_error_t)console->broken;
         console->line[length] = '\0';
@@ -579,6 +714,13 @@ void console_receive(console_t *console, uint8_t octet)
         }
         return;
     }
+    if (octet == BACKSPACE || octet == DELETE) {
+        if (console->length > 0) {
+            console->length--;
+            echo(console, "\b \b", 3);
+        }
+        return;
+    }
     if (octet < ' ' || octet > '~') {
         if (console->broken == CONSOLE_OK) {
             console->broken = CONSOLE_ERROR_BAD_CHARACTER;
@@ -592,6 +734,7 @@ void console_receive(console_t *console, uint8_t octet)
         return;
     }
     console->line[console->length++] = (char)octet;
+    echo(console, &console->line[console->length - 1u], 1);
 }
 
 /* --- start and status ----------------------------------------------------------------------- */

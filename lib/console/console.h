@@ -26,7 +26,7 @@ extern "C" {
 
 /* What the console shows but does not find in the controller; kept by whoever runs the loop. */
 typedef struct {
-    uint32_t time_ms;         /* since start */
+    text_time_t time;         /* since start */
     uint32_t ticks;           /* control ticks since start */
     uint16_t ticks_late;      /* that began after the next one was due; stays at 65535 */
     uint16_t tick_longest_us; /* sensors, controller and outputs */
@@ -58,6 +58,12 @@ typedef struct {
     bool conflict;       /* settings differ from what is active, since they do not fit together */
     uint8_t next_format; /* telemetry that starts after its header */
     uint8_t next_hz;
+    bool echo;        /* what is typed is shown */
+    uint8_t hint;     /* console_hint_t: what would have been right, of the line that is answered */
+    uint16_t hint_of; /* a word, or a row of parameters.def */
+    uint8_t hint_element;
+    const char *hint_text;
+    int32_t hint_values[2];
     uint8_t broken; /* console_error_t of the line under construction */
     uint8_t length;
     char line[CONSOLE_LINE_BYTES + 1u];
@@ -75,7 +81,8 @@ void console_greet(console_t *console);
  * there is room for the next one. */
 bool console_ready(const console_t *console);
 /* One received byte; '\n' or '\r' ends a line, an empty line is not answered.
- * Each end of a line tells the controller that the host is there. */
+ * Backspace and delete take the last byte back. Letters are as good as small ones. Each end of a
+ * line tells the controller that the host is there. */
 void console_receive(console_t *console, uint8_t octet);
 
 /* Goes on with an answer under way, at most one line or one EEPROM byte. Call it in each turn of

@@ -132,18 +132,44 @@ static void add_belief(text_line_t *line, const controller_t *controller, uint8_
     text_add_flash(line, text_item(stages, (uint8_t)controller_stage(controller, k)));
 }
 
-/* What the spring waits for, or why it is not where it was asked to be. */
+/* What the spring waits for, or would wait for, or why it is not where it was asked to be. */
 static void add_reason(text_line_t *line, const controller_t *controller, uint8_t k)
 {
     const uint16_t limits = controller_limits(controller, k);
-    if ((limits & DRIVE_POLICY_LIMIT_COOLING) != 0) {
-        const int32_t seconds = rounded(controller_cooling_s(controller, k) + 0.5f);
-        text_add_values(line, FLASH_TEXT("  waits #0 s: it may still be hot from before power-on"),
-                        &seconds);
-    } else if ((limits & DRIVE_POLICY_LIMIT_AWAY) != 0) {
+    const bool waits = (limits & DRIVE_POLICY_LIMIT_COOLING) != 0;
+    const float cooling_s = controller_cooling_s(controller, k);
+    if (!waits && (limits & DRIVE_POLICY_LIMIT_AWAY) != 0) {
         text_add_flash(line, FLASH_TEXT("  away: not where it was asked to be, "
                                         "or that cannot be seen"));
+    } else if (waits || cooling_s > 0.0f) {
+        const int32_t seconds = rounded(cooling_s + 0.5f);
+        text_add_flash(line, waits ? FLASH_TEXT("  waits") : FLASH_TEXT("  not known for"));
+        text_add_values(line, FLASH_TEXT(" #0 s: it may still be hot from before power-on"),
+                        &seconds);
     }
+}
+
+/* "[spring 2 was heated 12 s ago: 88 degC or more]": what the hint `model cold` does not take away.
+ */
+bool console_warm_line(const console_t *console, console_out_t *out)
+{
+    const controller_t *const controller = console->controller;
+    const uint8_t k = console->step;
+    if (k >= controller_springs(controller)) {
+        return false;
+    }
+    if (controller_is_warm(controller, k)) {
+        const int32_t rest_s = controller_rest_s(controller, k);
+        const int32_t values[] = {k + 1, rest_s};
+        const int32_t warm_c = rounded(controller_delivered_c(controller, k) - 0.5f);
+        text_add_values(&out->line,
+                        rest_s == TEMPERATURE_CEILING_NEVER
+                            ? FLASH_TEXT("[spring #0 was heated by others")
+                            : FLASH_TEXT("[spring #0 was heated #0 s ago"),
+                        values);
+        text_add_values(&out->line, FLASH_TEXT(": #0 degC or more]"), &warm_c);
+    }
+    return true;
 }
 
 /* Steps: three for each spring, the ambient; lines only where there is something. */
@@ -226,9 +252,12 @@ static void add_fault(text_line_t *line, safety_fault_t fault)
     const int32_t number = (int32_t)fault;
     text_add_values(line, FLASH_TEXT("fault #0 "), &number);
     text_add_flash(line, safety_fault_name(fault));
+    if (fault == SAFETY_FAULT_STUCK_ON) {
+        text_add_flash(line, FLASH_TEXT(": cut the supply"));
+    }
 }
 
-/* Steps: the lock, the board, each spring; lines only where there is something. */
+/* Steps: the lock and the supply, the board, each spring; lines only where there is something. */
 bool console_faults_line(const console_t *console, console_out_t *out)
 {
     const controller_t *const controller = console->controller;
@@ -236,6 +265,8 @@ bool console_faults_line(const console_t *console, console_out_t *out)
     if (console->step == 0) {
         if (controller_is_locked(controller)) {
             text_add_flash(line, FLASH_TEXT("locked"));
+        } else if (controller_supply_is_off(controller)) {
+            text_add_flash(line, FLASH_TEXT("supply: off"));
         }
     } else if (console->step == 1) {
         const safety_fault_t fault = controller_board_fault(controller);
@@ -327,16 +358,16 @@ void console_print_status(const console_t *console)
                          : fault != 0                     ? FLASH_TEXT("fault")
                          : on                             ? FLASH_TEXT("on")
                                                           : FLASH_TEXT("off"));
-    const int32_t values[] = {(int32_t)(console->status->time_ms & 0x7FFFFFFFul),
-                              sum_ma,
+    const int32_t values[] = {sum_ma,
                               text_centi_from_c7(hottest_c7),
                               hottest + 1,
                               controller_fan_percent(controller),
                               fault,
                               console->status->ticks_late,
                               console->status->load_percent};
-    text_add_values(line,
-                    FLASH_TEXT("|t:#3|sum_a:#3|hottest_c:#2@#0|fan:#0|fault:#0|late:#0|load:#0>"),
+    text_add_flash(line, FLASH_TEXT("|t:"));
+    text_add_time_s(line, &console->status->time);
+    text_add_values(line, FLASH_TEXT("|sum_a:#3|hottest_c:#2@#0|fan:#0|fault:#0|late:#0|load:#0>"),
                     values);
     console_out_end(console, &out);
 }

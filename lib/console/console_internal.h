@@ -11,6 +11,7 @@ typedef enum {
     CONSOLE_JOB_HELP,
     CONSOLE_JOB_VERSION,
     CONSOLE_JOB_MODEL,
+    CONSOLE_JOB_COLD,
     CONSOLE_JOB_LEARNT,
     CONSOLE_JOB_FAULTS,
     CONSOLE_JOB_SETTINGS,
@@ -31,13 +32,30 @@ void console_out_end(const console_t *console, console_out_t *out);
 /* One line of an answer that has several, by console->step; false after the last one. */
 bool console_version_line(const console_t *console, console_out_t *out);
 bool console_model_line(const console_t *console, console_out_t *out);
+bool console_warm_line(const console_t *console, console_out_t *out);
 bool console_learnt_line(const console_t *console, console_out_t *out);
 bool console_faults_line(const console_t *console, console_out_t *out);
 
 void console_start_job(console_t *console, console_job_t job);
 
+/* What follows the text of an error. */
+typedef enum {
+    CONSOLE_HINT_NONE = 0,
+    CONSOLE_HINT_TEXT,   /* hint_text with hint_values */
+    CONSOLE_HINT_WORD,   /* how word number hint_of is written */
+    CONSOLE_HINT_RANGE,  /* of setting hint_of, hint_element */
+    CONSOLE_HINT_SETTING /* its name */
+} console_hint_t;
+
+/* text in flash; values as text_add_values takes them. */
+void console_hint_text(console_t *console, const char *text, int32_t first, int32_t second);
+void console_hint_setting(console_t *console, console_hint_t hint, uint16_t row, uint8_t element);
+void console_add_setting_hint(const console_t *console, text_line_t *line);
+
 /* A line that starts with '$'. */
 console_error_t console_settings_line(console_t *console, char *line);
+/* Activates the settings as they are set, or says which two of them do not fit together. */
+void console_apply_settings(console_t *console);
 console_error_t console_error_of(settings_result_t result);
 /* As `$$` has it. */
 void console_print_setting(const console_t *console, uint16_t index, uint8_t element);

@@ -2,23 +2,46 @@
 
 #include <string.h>
 
-/* Activates the settings as they are set. Where they do not fit together the active ones stay, and
- * the console says which value is in the way: `$$` of another board can only be pasted line by
- * line. */
-static void apply_settings(console_t *console)
+static void add_value(const console_t *console, text_line_t *line, uint16_t row)
+{
+    const parameter_row_t known = parameter_row(row);
+    text_add(line, known.name);
+    if (known.count == 1) { /* of those with one for each spring, who knows which */
+        text_add_char(line, '=');
+        text_add_decimal(line, settings_get(console->settings, row, 0), known.decimals);
+    }
+}
+
+static void print_conflict(const console_t *console, uint16_t bad)
+{
+    console_out_t out;
+    const uint16_t partner = parameter_partner(bad);
+    uint16_t pair[2] = {bad, partner};
+    (void)controller_settings_pair(&console->settings->controller, pair);
+    console_out_start(&out);
+    text_add_flash(&out.line, FLASH_TEXT("[not active yet: "));
+    add_value(console, &out.line, pair[0]);
+    text_add_flash(&out.line, FLASH_TEXT(" does not fit "));
+    if (pair[1] < PARAMETER_COUNT) {
+        add_value(console, &out.line, pair[1]);
+    } else {
+        text_add_flash(&out.line, FLASH_TEXT("the others"));
+    }
+    text_add_char(&out.line, ']');
+    console_out_end(console, &out);
+}
+
+/* Activates the settings as they are set. Where they do not fit together the active ones stay, the
+ * console says which two stand in each other's way, and nothing is driven or saved until they fit:
+ * `$$` of another board can only be pasted line by line, in any order. */
+void console_apply_settings(console_t *console)
 {
     uint16_t bad = PARAMETER_COUNT;
     console->conflict =
         !controller_apply_settings(console->controller, &console->settings->controller, &bad);
-    if (!console->conflict) {
-        return;
+    if (console->conflict) {
+        print_conflict(console, bad);
     }
-    console_out_t out;
-    console_out_start(&out);
-    text_add_flash(&out.line, FLASH_TEXT("[not active yet: "));
-    text_add(&out.line, parameter_row(bad).name);
-    text_add_flash(&out.line, FLASH_TEXT(" does not fit the others]"));
-    console_out_end(console, &out);
 }
 
 console_error_t console_error_of(settings_result_t result)
@@ -45,16 +68,73 @@ static void follow_board_settings(console_t *console)
     }
 }
 
+/* "supply_v is 1.000 to 16.000 V", or "did you mean $supply_v?" */
+void console_add_setting_hint(const console_t *console, text_line_t *line)
+{
+    const parameter_row_t row = parameter_row(console->hint_of);
+    char name[SETTINGS_NAME_SIZE];
+    settings_name(console->hint_of, console->hint_element, name);
+    if (console->hint == CONSOLE_HINT_SETTING) {
+        text_add_flash(line, FLASH_TEXT("did you mean $"));
+        text_add(line, name);
+        text_add_char(line, '?');
+        return;
+    }
+    text_add(line, name);
+    text_add_flash(line, FLASH_TEXT(" is "));
+    text_add_decimal(line, row.minimum, row.decimals);
+    text_add_flash(line, FLASH_TEXT(" to "));
+    text_add_decimal(line, row.maximum, row.decimals);
+    if (row.unit[0] != '\0') {
+        text_add_char(line, ' ');
+        text_add(line, row.unit);
+    }
+}
+
+#define ALIKE 3u /* so many first letters are no chance */
+
+static void hint_nearest(console_t *console, const char *name)
+{
+    uint8_t longest = ALIKE - 1u;
+    if (strchr(name, ' ') != NULL) {
+        console_hint_text(console, FLASH_TEXT("write $NAME=VALUE, without blanks"), 0, 0);
+        return;
+    }
+    for (uint16_t k = 0; k < PARAMETER_COUNT; k++) {
+        const parameter_row_t row = parameter_row(k);
+        uint8_t same = 0;
+        while (name[same] != '\0' && name[same] == row.name[same]) {
+            same++;
+        }
+        if (same > longest) {
+            longest = same;
+            console_hint_setting(console, CONSOLE_HINT_SETTING, k, 0);
+        }
+    }
+}
+
+static console_error_t refuse(console_t *console, const char *name, console_error_t error)
+{
+    uint16_t row;
+    uint8_t element;
+    if (error == CONSOLE_ERROR_UNKNOWN_SETTING) {
+        hint_nearest(console, name);
+    } else if (settings_find(name, &row, &element)) {
+        console_hint_setting(console, CONSOLE_HINT_RANGE, row, element);
+    }
+    return error;
+}
+
 static console_error_t assign(console_t *console, const char *name, const char *value)
 {
     const settings_t before = *console->settings;
     const console_error_t error = console_error_of(settings_assign(console->settings, name, value));
     if (error != CONSOLE_OK) {
-        return error;
+        return refuse(console, name, error);
     }
     if (memcmp(&before.controller, &console->settings->controller, sizeof before.controller) != 0 ||
         console->conflict) {
-        apply_settings(console);
+        console_apply_settings(console);
     }
     follow_board_settings(console);
     return CONSOLE_OK;
@@ -83,6 +163,7 @@ console_error_t console_settings_line(console_t *console, char *line)
     }
     if (flash_equal(line, FLASH_TEXT("$save"))) {
         if (console->conflict) {
+            console_apply_settings(console); /* says which */
             return CONSOLE_ERROR_SETTINGS_CONFLICT;
         }
         settings_save_start(console->store, console->settings);
@@ -91,12 +172,12 @@ console_error_t console_settings_line(console_t *console, char *line)
     }
     if (flash_equal(line, FLASH_TEXT("$defaults"))) {
         settings_default(console->settings);
-        apply_settings(console);
+        console_apply_settings(console);
         follow_board_settings(console);
         return CONSOLE_OK;
     }
     if (!settings_find(line + 1, &index, &element)) {
-        return CONSOLE_ERROR_UNKNOWN_SETTING;
+        return refuse(console, line + 1, CONSOLE_ERROR_UNKNOWN_SETTING);
     }
     console_print_setting(console, index, element);
     return CONSOLE_OK;

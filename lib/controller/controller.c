@@ -7,12 +7,14 @@
 #include "fixed_point.h"
 #include "invariant.h"
 
-#define MODEL_STEP_MS   100u
-#define TICKS_PER_STEP  (MODEL_STEP_MS / CONTROLLER_TICK_MS)
-#define TICKS_PER_S     (1000u / CONTROLLER_TICK_MS)
-#define SILENT_MOST     (3600ul * TICKS_PER_S) /* host_timeout_s at its most */
-#define FLOOR_TURNS     (CIRCUIT_CHECK_TICKS - CIRCUIT_CHECK_TICKS / TICKS_PER_STEP)
-#define CURRENT_MOST_MA 4095 /* the sensor ends at 3200: a step's sum of power fits 32 bits */
+#define MODEL_STEP_MS        100u
+#define TICKS_PER_STEP       (MODEL_STEP_MS / CONTROLLER_TICK_MS)
+#define TICKS_PER_S          (1000u / CONTROLLER_TICK_MS)
+#define SILENT_MOST          (3600ul * TICKS_PER_S) /* host_timeout_s at its most */
+#define SUPPLY_TICKS         3u /* the relay closes 10 ms after the second pulse */
+#define FLOOR_TURNS          (CIRCUIT_CHECK_TICKS - CIRCUIT_CHECK_TICKS / TICKS_PER_STEP)
+#define TIME_CONSTANT_MOST_S 3600ul
+#define CURRENT_MOST_MA      4095 /* the sensor ends at 3200: a step's sum of power fits 32 bits */
 
 void controller_settings_default(controller_settings_t *settings)
 {
@@ -20,6 +22,53 @@ void controller_settings_default(controller_settings_t *settings)
     current_control_parameters_default(&settings->current);
     safety_parameters_default(&settings->safety);
     drive_policy_parameters_default(&settings->policy);
+}
+
+static int32_t value_of(const controller_settings_t *settings, uint16_t row, spring_index_t spring)
+{
+    const parameter_row_t known = parameter_row(row);
+    const void *const parts[] = {&settings->model, &settings->current, &settings->safety,
+                                 &settings->policy};
+    return parameter_get(parts[known.part], &known, spring);
+}
+
+bool controller_settings_pair(const controller_settings_t *settings, uint16_t pair[2])
+{
+    for (uint8_t k = 0; k < PARAMETER_PAIRS; k++) {
+        const parameter_pair_t judged = parameter_pair(k);
+        const int32_t larger = value_of(settings, judged.larger, 0);
+        if (larger - value_of(settings, judged.smaller, 0) < judged.least &&
+            !(judged.zero_is_off && larger == 0)) {
+            pair[0] = judged.larger;
+            pair[1] = judged.smaller;
+            return false;
+        }
+    }
+    return true;
+}
+
+/* Every spring cools to a part of its excess within TIME_CONSTANT_MOST_S: else what waits for it
+ * waits for ever. */
+static bool check_time_constants(const thermal_model_parameters_t *p, uint16_t *bad)
+{
+    for (spring_index_t k = 0;
+         k < (spring_index_t)(p->rows * p->columns) && k < (spring_index_t)CONTROLLER_MAX_SPRINGS;
+         k++) {
+        const uint32_t capacity_uj_per_k =
+            (uint32_t)p->heat_capacity_mj_per_k * p->heat_capacity_scale_permille[k];
+        const uint16_t losses_uw_per_k[] = {p->loss_uw_per_k, p->loss_fan_uw_per_k};
+        for (uint8_t n = 0; n < 2; n++) {
+            const uint32_t loss_uw_per_k =
+                (uint32_t)losses_uw_per_k[n] * p->loss_scale_permille[k] / 1000u;
+            if (capacity_uj_per_k > TIME_CONSTANT_MOST_S * loss_uw_per_k) {
+                if (bad != NULL) {
+                    *bad = n == 0 ? PARAMETER_loss_w_per_k : PARAMETER_loss_fan_w_per_k;
+                }
+                return false;
+            }
+        }
+    }
+    return true;
 }
 
 /* All parts but the model, which checks itself when it takes its parameters. */
@@ -31,7 +80,15 @@ static bool check(const controller_settings_t *settings, uint16_t *bad)
         }
         return false;
     }
-    return current_control_check(&settings->current, bad) && safety_check(&settings->safety, bad) &&
+    uint16_t pair[2];
+    if (!controller_settings_pair(settings, pair)) {
+        if (bad != NULL) {
+            *bad = pair[0];
+        }
+        return false;
+    }
+    return check_time_constants(&settings->model, bad) &&
+           current_control_check(&settings->current, bad) && safety_check(&settings->safety, bad) &&
            drive_policy_check(&settings->policy, bad);
 }
 
@@ -63,14 +120,12 @@ static void start(controller_t *controller, const controller_settings_t *setting
                   int16_t ambient_c7)
 {
     thermal_model_t *model = &controller->model;
-    memset((uint8_t *)controller + sizeof *model, 0, sizeof *controller - sizeof *model);
+    const size_t kept = offsetof(controller_t, current); /* model, and what was delivered */
+    memset((uint8_t *)controller + kept, 0, sizeof *controller - kept);
     controller->ambient_c7 = ambient_c7;
     controller->springs = (uint8_t)(settings->model.rows * settings->model.columns);
     thermal_model_set_ambient(model, ambient_c7);
     thermal_model_reset(model, ambient_c7);
-    /* by what it is given from here on: where it may be from before is the estimator's to wait for
-     */
-    temperature_ceiling_set(&controller->ceiling, model);
     temperature_ceiling_prepare(&controller->ceiling, model, &settings->current);
     (void)current_control_init(&controller->current, &settings->current, NULL);
     (void)safety_init(&controller->safety, &settings->safety, controller->springs, NULL);
@@ -84,6 +139,11 @@ bool controller_init(controller_t *controller, const controller_settings_t *sett
     if (!check(settings, bad) || !init_model(&controller->model, &settings->model, bad)) {
         return false;
     }
+    /* by what it is given from here on: where it may be from before is the estimator's to wait for
+     */
+    temperature_ceiling_begin(&controller->ceiling, ambient_c7);
+    controller->supply_off = false;
+    controller->supply_ticks = 0;
     start(controller, settings, ambient_c7);
     return true;
 }
@@ -106,13 +166,22 @@ bool controller_apply_settings(controller_t *controller, const controller_settin
     const uint16_t mark = controller_model_mark(controller);
     bool same_size = settings->model.rows == old->rows && settings->model.columns == old->columns;
     thermal_model_state_t state;
+    int32_t held_uw[CONTROLLER_MAX_SPRINGS];
     thermal_model_get_state(&controller->model, &state);
+    for (uint8_t k = 0; k < controller->springs; k++) {
+        held_uw[k] = temperature_ceiling_hold_uw(&controller->ceiling, &controller->model, k);
+    }
     if (!check(settings, bad) || !init_model(&controller->model, &settings->model, bad)) {
         return false;
     }
     if (same_size) {
         thermal_model_set_ambient(&controller->model, controller->ambient_c7);
         restore(&controller->model, &state, controller->springs);
+        for (uint8_t k = 0; k < controller->springs; k++) {
+            temperature_ceiling_keep_loss(
+                &controller->ceiling, k, held_uw[k],
+                temperature_ceiling_hold_uw(&controller->ceiling, &controller->model, k));
+        }
         (void)current_control_apply(&controller->current, &settings->current, NULL);
         temperature_ceiling_prepare(&controller->ceiling, &controller->model, &settings->current);
         (void)safety_apply(&controller->safety, &settings->safety, NULL);
@@ -154,13 +223,14 @@ static uint32_t take_sensors(controller_t *controller, const controller_sensor_t
 {
     uint32_t sum_ma = 0;
     for (uint8_t k = 0; k < controller->springs; k++) {
+        const uint16_t duty = controller_duty(controller, k);
         const safety_sample_t sample = {
             .sensor_status = sensor[k].status,
             .current_ma = sensor[k].current_ma,
             .voltage_mv = sensor[k].voltage_mv,
+            .off = duty == 0 && controller->circuit[k].last_duty == 0,
             .expected_ma = current_control_reference_ma(&controller->current, k),
             .temperature_c7 = thermal_model_temperature_c7(&controller->model, k)};
-        const uint16_t duty = controller_duty(controller, k);
         valid[k] = safety_tick_spring(&controller->safety, k, &sample);
         circuit_check_take(&controller->circuit[k], controller->current.fixed_mohm, duty, valid[k],
                            sensor[k].current_ma, sensor[k].voltage_mv);
@@ -200,7 +270,7 @@ static void raise_ceiling(controller_t *controller, uint8_t k)
                              measured_w > driven_w ? measured_w : driven_w);
     controller->heat_sum_uw[k] = 0;
     controller->duty_sum[k] = 0;
-    if (temperature_ceiling_trips(&controller->ceiling, &controller->model, k,
+    if (temperature_ceiling_trips(&controller->ceiling, k,
                                   controller->safety.parameters.temperature_trip_cc)) {
         safety_trip(&controller->safety, k, SAFETY_FAULT_OVER_TEMPERATURE);
     }
@@ -259,6 +329,24 @@ static void step_model(controller_t *controller, const controller_inputs_t *inpu
     memset(controller->power_sum_uw, 0, sizeof controller->power_sum_uw);
 }
 
+/* Held from one tick to the next, or off for good. */
+static void watch_supply(controller_t *controller)
+{
+    if (!controller_supply_is_fitted(controller)) {
+        controller->supply_off = false;
+        controller->supply_ticks = SUPPLY_TICKS;
+        return;
+    }
+    if (safety_cuts_supply(&controller->safety)) {
+        (void)controller_set_supply(controller, false);
+    }
+    if (controller->supply_off || controller_is_locked(controller)) {
+        controller->supply_ticks = 0;
+    } else if (controller->supply_ticks < SUPPLY_TICKS) {
+        controller->supply_ticks++;
+    }
+}
+
 static bool targets_are_allowed(const controller_t *controller, const bool allowed[],
                                 const uint16_t target_ma[])
 {
@@ -276,7 +364,8 @@ static void drive(controller_t *controller, const bool valid[], uint32_t sum_ma,
 {
     bool allowed[CONTROLLER_MAX_SPRINGS];
     for (uint8_t k = 0; k < controller->springs; k++) {
-        allowed[k] = safety_allows(&controller->safety, k);
+        allowed[k] =
+            controller->supply_ticks == SUPPLY_TICKS && safety_allows(&controller->safety, k);
         if (!allowed[k]) {
             current_control_reset(&controller->current, k);
         }
@@ -333,9 +422,11 @@ void controller_tick(controller_t *controller, const controller_inputs_t *inputs
     uint32_t sum_ma = take_sensors(controller, inputs->sensor, valid);
     listen(controller);
     step_model(controller, inputs);
+    watch_supply(controller);
     memset(outputs->duty, 0, sizeof outputs->duty);
     drive(controller, valid, sum_ma, outputs->duty);
     outputs->fan_percent = controller->fan_percent;
+    outputs->supply = controller_supply_is_fitted(controller) && controller->supply_ticks != 0;
 }
 
 bool controller_set_target(controller_t *controller, uint8_t spring, uint16_t level_permille)
@@ -381,6 +472,36 @@ void controller_emergency_stop(controller_t *controller)
     safety_emergency_stop(&controller->safety);
 }
 
+void controller_emergency_cut(controller_t *controller)
+{
+    controller_emergency_stop(controller);
+    (void)controller_set_supply(controller, false);
+}
+
+bool controller_set_supply(controller_t *controller, bool on)
+{
+    if (!controller_supply_is_fitted(controller) ||
+        (on && (safety_cuts_supply(&controller->safety) ||
+                controller_board_fault(controller) == SAFETY_FAULT_EMERGENCY_STOP))) {
+        return false;
+    }
+    if (!on || controller->supply_off) { /* nothing starts by switching it on, either */
+        controller_stop(controller);
+    }
+    controller->supply_off = !on;
+    return true;
+}
+
+bool controller_supply_is_fitted(const controller_t *controller)
+{
+    return controller->safety.parameters.cut_off != 0;
+}
+
+bool controller_supply_is_off(const controller_t *controller)
+{
+    return controller->supply_off;
+}
+
 void controller_host_heard(controller_t *controller)
 {
     controller->silent_ticks = 0;
@@ -405,6 +526,26 @@ void controller_unlock(controller_t *controller)
     safety_unlock(&controller->safety);
 }
 
+static bool any_is_warm(const controller_t *controller)
+{
+    for (uint8_t k = 0; k < controller->springs; k++) {
+        if (controller_is_warm(controller, k)) {
+            return true;
+        }
+    }
+    return false;
+}
+
+bool controller_is_known(const controller_t *controller)
+{
+    for (uint8_t k = 0; k < controller->springs; k++) {
+        if (controller_cooling_s(controller, k) > 0.0f) {
+            return false;
+        }
+    }
+    return true;
+}
+
 void controller_get_model_state(const controller_t *controller, thermal_model_state_t *state)
 {
     thermal_model_get_state(&controller->model, state);
@@ -412,21 +553,64 @@ void controller_get_model_state(const controller_t *controller, thermal_model_st
 
 bool controller_set_model_state(controller_t *controller, const thermal_model_state_t *state)
 {
-    if (!thermal_model_set_state(&controller->model, state)) {
+    if (any_is_warm(controller) || !thermal_model_set_state(&controller->model, state)) {
         return false;
     }
     spring_estimator_trust_model(&controller->policy.estimator, &controller->model);
-    temperature_ceiling_set(&controller->ceiling, &controller->model);
+    temperature_ceiling_raise(&controller->ceiling, &controller->model);
     tell_resistances(controller);
     return true;
 }
 
+void controller_get_delivered(const controller_t *controller, temperature_ceiling_t *delivered)
+{
+    *delivered = controller->ceiling;
+}
+
+void controller_set_delivered(controller_t *controller, const temperature_ceiling_t *delivered)
+{
+    controller->ceiling = *delivered;
+    temperature_ceiling_prepare(&controller->ceiling, &controller->model,
+                                &controller->current.parameters);
+}
+
+/* By way of martensite. */
+static void cool_to(thermal_model_t *model, uint8_t k, int16_t temperature_c7)
+{
+    const int16_t finish_c7 = thermal_model_transformation(model, k).martensite_finish_c7;
+    thermal_model_set_temperature(model, k, (int16_t)(finish_c7 - 128));
+    thermal_model_set_temperature(model, k, temperature_c7);
+}
+
 void controller_set_temperature(controller_t *controller, int16_t temperature_c7)
 {
-    thermal_model_reset(&controller->model, temperature_c7);
-    spring_estimator_trust_model(&controller->policy.estimator, &controller->model);
-    temperature_ceiling_set(&controller->ceiling, &controller->model);
+    if (!any_is_warm(controller)) { /* then air and plate are not, either */
+        thermal_model_reset(&controller->model, temperature_c7);
+    }
+    for (uint8_t k = 0; k < controller->springs; k++) {
+        if (controller_is_warm(controller, k)) {
+            continue;
+        }
+        cool_to(&controller->model, k, temperature_c7);
+        spring_estimator_trust_spring(&controller->policy.estimator, &controller->model, k);
+    }
+    temperature_ceiling_raise(&controller->ceiling, &controller->model);
     tell_resistances(controller);
+}
+
+bool controller_is_warm(const controller_t *controller, uint8_t spring)
+{
+    return temperature_ceiling_is_warm(&controller->ceiling, spring);
+}
+
+float controller_delivered_c(const controller_t *controller, uint8_t spring)
+{
+    return temperature_ceiling_c(&controller->ceiling, spring);
+}
+
+uint16_t controller_rest_s(const controller_t *controller, uint8_t spring)
+{
+    return temperature_ceiling_rest_s(&controller->ceiling, spring);
 }
 
 spring_bounds_t controller_temperature_bounds_c(const controller_t *controller, uint8_t spring)
@@ -452,7 +636,9 @@ float controller_shift_k(const controller_t *controller, uint8_t spring)
 
 float controller_cooling_s(const controller_t *controller, uint8_t spring)
 {
-    return spring_estimator_cooling_s(&controller->policy.estimator, &controller->model, spring);
+    const float cooling_s =
+        spring_estimator_cooling_s(&controller->policy.estimator, &controller->model, spring);
+    return cooling_s < CONTROLLER_COOLING_MOST_S ? cooling_s : CONTROLLER_COOLING_MOST_S;
 }
 
 spring_learnt_t controller_learnt(const controller_t *controller, uint8_t spring)

@@ -47,6 +47,7 @@ typedef struct {
     /* Whole duty steps, 0..800, already dithered. 0 = output off and low. */
     uint16_t duty[CONTROLLER_MAX_SPRINGS];
     uint8_t fan_percent;
+    bool supply; /* the cut-off gets its pulse: see controller_set_supply */
 } controller_outputs_t;
 
 /* Everything a user can set. lib/settings holds the one table of names, limits and units over these
@@ -60,7 +61,10 @@ typedef struct {
 
 typedef struct {
     thermal_model_t model;
-    current_control_t current;
+    temperature_ceiling_t ceiling;
+    bool supply_off;           /* until controller_set_supply */
+    uint8_t supply_ticks;      /* that the supply has been held, up to those that a relay takes */
+    current_control_t current; /* what is before it outlives another size of the array */
     safety_t safety;
     drive_policy_t policy;
     uint32_t silent_ticks; /* since the host was heard; no more than the longest host_timeout_s */
@@ -74,7 +78,6 @@ typedef struct {
     int16_t measured_ma[CONTROLLER_MAX_SPRINGS]; /* last valid reading */
     int16_t measured_mv[CONTROLLER_MAX_SPRINGS];
     uint32_t power_sum_uw[CONTROLLER_MAX_SPRINGS]; /* over the ticks of the running model step */
-    temperature_ceiling_t ceiling;
     circuit_check_t circuit[CONTROLLER_MAX_SPRINGS];
     uint32_t heat_sum_uw[CONTROLLER_MAX_SPRINGS]; /* over the ticks of the ceiling's running step */
     uint16_t duty_sum[CONTROLLER_MAX_SPRINGS];    /* the same */
@@ -83,9 +86,14 @@ typedef struct {
 /* The paper's spring and 3 x 3 array on the reference board. */
 void controller_settings_default(controller_settings_t *settings);
 
+/* True if and only if every two settings of parameter_pair fit together; else pair are the two
+ * rows, the larger first. */
+bool controller_settings_pair(const controller_settings_t *settings, uint16_t pair[2]);
+
 /* Everything off, all temperatures at ambient_c7, no faults, unlocked. Fails (false, *controller
- * unchanged) if and only if a part refuses its settings or model.step_ms is not 100; then *bad
- * (may be NULL) is the row of parameters.def, PARAMETER_COUNT where it is step_ms. */
+ * unchanged) if and only if a part refuses its settings, two settings do not fit together, a spring
+ * would take longer than an hour to cool by two thirds, or model.step_ms is not 100; then *bad (may
+ * be NULL) is the row of parameters.def, PARAMETER_COUNT where it is step_ms. */
 bool controller_init(controller_t *controller, const controller_settings_t *settings,
                      int16_t ambient_c7, uint16_t *bad);
 
@@ -121,6 +129,18 @@ bool controller_set_fan(controller_t *controller, uint8_t percent);
 void controller_stop(controller_t *controller);
 /* All levels to 0 and SAFETY_FAULT_EMERGENCY_STOP until cleared. */
 void controller_emergency_stop(controller_t *controller);
+/* The same, and the supply off. */
+void controller_emergency_cut(controller_t *controller);
+/* The supply of all stages, where a cut-off is fitted (setting cut_off; without one it counts as
+ * on, and outputs.supply is false). It is held from the start, but not while the board is locked.
+ * False here, controller_emergency_cut, and each fault of safety_cuts_supply switch it off, with
+ * all levels to 0; only true here switches it on again. Nothing is driven until the relay has
+ * closed: 40 ms. Fails (nothing changed) if and only if on is true and a fault of
+ * safety_cuts_supply or SAFETY_FAULT_EMERGENCY_STOP stands, or no cut-off is fitted. */
+bool controller_set_supply(controller_t *controller, bool on);
+bool controller_supply_is_fitted(const controller_t *controller);
+/* Switched off; not while it is only locked, nor where it is not fitted. */
+bool controller_supply_is_off(const controller_t *controller);
 /* Whoever asked for the springs is still there. host_timeout_s (0: never) after the last call, in
  * the tick in which a spring is wanted, all levels are set to 0 with SAFETY_FAULT_HOST_SILENT. */
 void controller_host_heard(controller_t *controller);
@@ -130,12 +150,28 @@ void controller_lock(controller_t *controller);
 /* Levels are set to 0: nothing starts by unlocking. */
 void controller_unlock(controller_t *controller);
 
-/* What the model remembers, to be kept over a warm reset. */
+/* What the model remembers, to be kept over a warm reset: worth it once all springs are known, as
+ * until then its temperatures are guesses that a reset must not make certain. */
+bool controller_is_known(const controller_t *controller);
 void controller_get_model_state(const controller_t *controller, thermal_model_state_t *state);
-/* False, and nothing changed, if and only if the state is not one this model could be in. */
+/* False, and nothing changed, if and only if the state is not one this model could be in, or a
+ * spring is warm by what this board has given since it started. */
 bool controller_set_model_state(controller_t *controller, const thermal_model_state_t *state);
-/* Springs, air and plate are taken to be at one temperature, reached from cold. */
+/* The heat that this board has given since power-on, to be kept over a warm reset whatever is known
+ * of the springs; given back after the model's state, with the same settings of size. */
+void controller_get_delivered(const controller_t *controller, temperature_ceiling_t *delivered);
+void controller_set_delivered(controller_t *controller, const temperature_ceiling_t *delivered);
+/* A hint: springs, air and plate are taken to be at one temperature, reached from cold. It takes
+ * away what is not known of the time before power-on, and no heat that this board gave: a spring
+ * that is warm by that keeps its temperature and all that is believed of it, and then air and plate
+ * keep theirs. */
 void controller_set_temperature(controller_t *controller, int16_t temperature_c7);
+/* By the heat that this board gave since power-on, measured, and the declared losses
+ * (temperature_ceiling): too warm for the hint; how warm, degC, if it was cold before; since when
+ * it was given none itself, s, TEMPERATURE_CEILING_NEVER where it never was. */
+bool controller_is_warm(const controller_t *controller, uint8_t spring);
+float controller_delivered_c(const controller_t *controller, uint8_t spring);
+uint16_t controller_rest_s(const controller_t *controller, uint8_t spring);
 
 /* What is known of each spring, with the bounds of 99 % (spring_estimator); spring, here and below,
  * must be below controller_springs. Temperature in degC, distance to martensite start in K,
@@ -145,7 +181,9 @@ spring_bounds_t controller_distance_bounds_k(const controller_t *controller, uin
 spring_bounds_t controller_austenite_bounds(const controller_t *controller, uint8_t spring);
 /* By how much the transformation is believed to lie above where it is declared (a load), K. */
 float controller_shift_k(const controller_t *controller, uint8_t spring);
-/* How long it may still be hot from before power-on, s; 0 where that is over. */
+/* How long it may still be hot from before power-on, s, never more than
+ * CONTROLLER_COOLING_MOST_S; 0 where that is over. */
+#define CONTROLLER_COOLING_MOST_S 86400.0f
 float controller_cooling_s(const controller_t *controller, uint8_t spring);
 /* The spring's own numbers, to be kept over power-off. Those that no spring has are not restored.
  */

@@ -63,23 +63,28 @@ static bool differs(float a, float b, float by)
     return fabsf(a - b) > by;
 }
 
-static bool worth_a_save(const learnt_store_t *store, const controller_t *controller,
-                         uint8_t spring)
+typedef enum { WORTH_NOTHING, WORTH_REFINES, WORTH_NEW } worth_t;
+
+static worth_t worth_of(const learnt_store_t *store, const controller_t *controller, uint8_t spring)
 {
     const spring_learnt_t now = controller_learnt(controller, spring);
     spring_learnt_t kept;
     if (!(now.austenite_ohm > 0.0f)) {
-        return false;
+        return WORTH_NOTHING;
     }
-    return !unpack(&store->record, spring, &kept) ||
-           differs(now.austenite_ohm, kept.austenite_ohm, WORTH_SHARE * now.austenite_ohm) ||
-           differs(now.martensite_ohm, kept.martensite_ohm, WORTH_SHARE * now.martensite_ohm) ||
-           differs(now.change, kept.change, WORTH_SHARE) ||
-           differs(now.martensite_rise_per_k, kept.martensite_rise_per_k,
-                   WORTH_SHARE / WORTH_HEATING_K) ||
-           differs(now.loss_w_per_k, kept.loss_w_per_k, now.loss_sd_w_per_k) ||
-           2.0f * now.loss_sd_w_per_k < kept.loss_sd_w_per_k ||
-           now.slow_noise > 2.0f * kept.slow_noise;
+    if (!unpack(&store->record, spring, &kept)) {
+        return WORTH_NEW;
+    }
+    const bool refines =
+        differs(now.austenite_ohm, kept.austenite_ohm, WORTH_SHARE * now.austenite_ohm) ||
+        differs(now.martensite_ohm, kept.martensite_ohm, WORTH_SHARE * now.martensite_ohm) ||
+        differs(now.change, kept.change, WORTH_SHARE) ||
+        differs(now.martensite_rise_per_k, kept.martensite_rise_per_k,
+                WORTH_SHARE / WORTH_HEATING_K) ||
+        differs(now.loss_w_per_k, kept.loss_w_per_k, now.loss_sd_w_per_k) ||
+        2.0f * now.loss_sd_w_per_k < kept.loss_sd_w_per_k ||
+        now.slow_noise > 2.0f * kept.slow_noise;
+    return refines ? WORTH_REFINES : WORTH_NOTHING;
 }
 
 /* At least one is driven, and those that are, are held. */
@@ -101,7 +106,7 @@ static bool all_held(const controller_t *controller)
 void learnt_store_second(learnt_store_t *store, const controller_t *controller)
 {
     const uint8_t springs = controller_springs(controller);
-    if (store->since_s < LEARNT_STORE_PAUSE_S) {
+    if (store->since_s < UINT16_MAX) {
         store->since_s++;
     }
     if (!all_held(controller)) {
@@ -112,12 +117,19 @@ void learnt_store_second(learnt_store_t *store, const controller_t *controller)
     if (store->since_s < LEARNT_STORE_PAUSE_S || store->held_s < LEARNT_STORE_HELD_S) {
         return;
     }
-    bool worth = learnt_store_keeps(store) && !fits_model(store, controller);
-    for (uint8_t k = 0; k < springs && !worth; k++) {
-        worth = worth_a_save(store, controller, k);
+    worth_t worth =
+        learnt_store_keeps(store) && !fits_model(store, controller) ? WORTH_NEW : WORTH_NOTHING;
+    for (uint8_t k = 0; k < springs && worth != WORTH_NEW; k++) {
+        const worth_t of_spring = worth_of(store, controller, k);
+        worth = of_spring > worth ? of_spring : worth;
     }
-    if (!worth) {
+    if (worth == WORTH_NOTHING ||
+        (worth == WORTH_REFINES &&
+         store->since_s < (uint16_t)(LEARNT_STORE_PAUSE_S << store->refined))) {
         return;
+    }
+    if (worth == WORTH_REFINES && store->refined < LEARNT_STORE_LONGEST_SHIFT) {
+        store->refined++;
     }
     save(store, LEARNT_STORE_BYTES(springs));
 }

@@ -20,14 +20,20 @@ extern "C" {
 #define LEARNT_STORE_BYTES(springs)                                                                \
     ((uint16_t)(LEARNT_STORE_MARK_BYTES + (springs) * sizeof(spring_learnt_t)))
 
-/* After so long with every driven spring held, and no sooner than that after the save before: an
- * EEPROM's 100,000 writes of the two slots are then 3.8 years of saves without a pause. */
-#define LEARNT_STORE_HELD_S  60u
-#define LEARNT_STORE_PAUSE_S 600u
+/* After so long with every driven spring held, and no sooner than a pause after the save before.
+ * Each save that only refines doubles the pause until the next: where learning never settles these
+ * are 7 in the first day and 2.2 in each that follows.
+ * A save writes byte 0 of one of the two slots twice, so 100,000 writes are 100,000 saves: 120
+ * years of a board that is never switched off. The pause begins anew with the power: at worst, one
+ * that is switched off after each save, every 11 minutes and never rests, 2 years. */
+#define LEARNT_STORE_HELD_S        60u
+#define LEARNT_STORE_PAUSE_S       600u
+#define LEARNT_STORE_LONGEST_SHIFT 6u /* 10.7 h */
 
 typedef struct {
     record_store_t record;
-    uint16_t since_s;               /* the last save began; stays at LEARNT_STORE_PAUSE_S */
+    uint16_t since_s;               /* the last save began; stays at 65535 */
+    uint8_t refined;                /* saves that only refined; stays at the longest shift */
     uint8_t held_s;                 /* all driven springs, on end; stays at LEARNT_STORE_HELD_S */
     const controller_t *controller; /* whose springs are kept */
     spring_learnt_t written;        /* of the spring that is written, of a save under way */
@@ -39,7 +45,8 @@ typedef struct {
 record_found_t learnt_store_open(learnt_store_t *store, const record_storage_t *storage,
                                  uint16_t base, uint16_t slot_bytes, controller_t *controller);
 
-/* Once a second. Starts a save if and only if both times above have passed and of a spring
+/* Once a second. Starts a save if and only if both times above have passed (after what is new, the
+ * shortest pause) and of a spring
  * something is known that the record has not: its first numbers, losses beside the present model, a
  * resistance that differs by 2 %, a loss that differs by its standard deviation or is known twice
  * as well, a noise that has doubled. */

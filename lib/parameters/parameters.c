@@ -68,6 +68,51 @@ void parameter_set(void *values, const parameter_row_t *row, spring_index_t elem
     memcpy((uint8_t *)values + place(row, element), &value, parameter_width(row->type));
 }
 
+static const parameter_pair_t pairs[PARAMETER_PAIRS] FLASH_MEMORY = {
+    {PARAMETER_martensite_finish_c, PARAMETER_martensite_start_c, 200, 0},
+    {PARAMETER_martensite_start_c, PARAMETER_austenite_start_c, 0, 0},
+    {PARAMETER_austenite_start_c, PARAMETER_austenite_finish_c, 200, 0},
+    {PARAMETER_hold_margin_k, PARAMETER_unsure_margin_k, 0, 0},
+    {PARAMETER_temperature_limit_c, PARAMETER_temperature_trip_c, 0, 0},
+    {PARAMETER_maximum_current_a, PARAMETER_over_current_a, 0, 0},
+    {PARAMETER_check_current_a, PARAMETER_over_current_a, 0, 0},
+    {PARAMETER_stuck_on_a, PARAMETER_over_current_a, 0, 0},
+    {PARAMETER_probe_current_a, PARAMETER_boost_current_a, 0, 0},
+    {PARAMETER_supply_reserve_a, PARAMETER_supply_limit_a, 1, 0},
+    {PARAMETER_resistance_minimum_ohm, PARAMETER_resistance_maximum_ohm, 1, 1}};
+
+parameter_pair_t parameter_pair(uint8_t index)
+{
+    parameter_pair_t copy;
+    flash_copy(&copy, &pairs[index], sizeof copy);
+    return copy;
+}
+
+uint16_t parameter_partner(uint16_t row)
+{
+    /* those whose judgement is more than one being above the other */
+    static const uint8_t others[][2] FLASH_MEMORY = {
+        {PARAMETER_columns, PARAMETER_rows},
+        {PARAMETER_latent_heat_j, PARAMETER_heat_capacity_j_per_k},
+        {PARAMETER_loss_w_per_k, PARAMETER_heat_capacity_j_per_k},
+        {PARAMETER_loss_fan_w_per_k, PARAMETER_heat_capacity_j_per_k},
+        {PARAMETER_plate_heat_capacity_j_per_k, PARAMETER_plate_coupling_w_per_k},
+        {PARAMETER_wake_w_per_k, PARAMETER_loss_fan_w_per_k},
+        {PARAMETER_transformation_shift_k, PARAMETER_austenite_finish_c}};
+    for (uint8_t k = 0; k < PARAMETER_PAIRS; k++) {
+        const parameter_pair_t pair = parameter_pair(k);
+        if (pair.larger == row) {
+            return pair.smaller;
+        }
+    }
+    for (uint8_t k = 0; k < sizeof others / sizeof others[0]; k++) {
+        if (flash_byte(&others[k][0]) == row) {
+            return flash_byte(&others[k][1]);
+        }
+    }
+    return PARAMETER_COUNT;
+}
+
 bool parameter_check(parameter_part_t part, const void *values, uint16_t *bad)
 {
     for (uint16_t k = 0; k < PARAMETER_COUNT; k++) {

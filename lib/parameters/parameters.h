@@ -119,6 +119,20 @@ int32_t parameter_decode(const void *bytes, uint8_t type);
 int32_t parameter_get(const void *values, const parameter_row_t *row, spring_index_t element);
 void parameter_set(void *values, const parameter_row_t *row, spring_index_t element, int32_t value);
 
+/* The row beside which a value of that row is judged, where both stand in the way of each other;
+ * PARAMETER_COUNT: none. */
+uint16_t parameter_partner(uint16_t row);
+
+/* Two settings of which one must not be above the other. */
+typedef struct {
+    uint8_t smaller;     /* rows of as many decimals */
+    uint8_t larger;      /* whose partner the other is */
+    uint8_t least;       /* the larger is above by at least this, in units of 10^-decimals */
+    uint8_t zero_is_off; /* of the larger: then it stands alone */
+} parameter_pair_t;
+#define PARAMETER_PAIRS 11
+parameter_pair_t parameter_pair(uint8_t index);
+
 /* True if and only if all values of a part keep the limits of their rows; else *bad (may be NULL)
  * is the first row that is not kept. O(rows). */
 bool parameter_check(parameter_part_t part, const void *values, uint16_t *bad);

@@ -14,7 +14,6 @@
 #define OPEN            2u
 #define SHORT           4u
 #define HIGH_RESISTANCE 8u
-#define STUCK_ON        16u
 
 bool safety_check(const safety_parameters_t *p, uint16_t *bad)
 {
@@ -62,11 +61,8 @@ static void latch_board(safety_t *safety, safety_fault_t fault)
     }
 }
 
-static void latch(safety_t *safety, safety_spring_t *spring, safety_fault_t fault)
+static void latch(safety_spring_t *spring, safety_fault_t fault)
 {
-    if (fault >= SAFETY_FAULT_STUCK_ON && fault <= SAFETY_FAULT_EMERGENCY_STOP) {
-        latch_board(safety, fault);
-    }
     if (spring->fault == SAFETY_FAULT_NONE) {
         spring->fault = (uint8_t)fault;
     }
@@ -101,9 +97,6 @@ static uint8_t find_electrical(const safety_parameters_t *p, const safety_sample
     if (amount_ma > p->over_current_ma) {
         found |= OVER_CURRENT;
     }
-    if (s->expected_ma == 0 && amount_ma > p->stuck_on_ma) {
-        found |= STUCK_ON;
-    }
     if (amount_ma >= p->check_current_ma) {
         const safety_fault_t fault = safety_resistance_fault(p, amount_ma, s->voltage_mv);
         if (fault == SAFETY_FAULT_SHORT_SPRING) {
@@ -115,22 +108,19 @@ static uint8_t find_electrical(const safety_parameters_t *p, const safety_sample
     return found;
 }
 
-static void latch_suspects(safety_t *safety, safety_spring_t *spring)
+static void latch_suspects(safety_spring_t *spring)
 {
     if ((spring->suspects & OVER_CURRENT) != 0) {
-        latch(safety, spring, SAFETY_FAULT_OVER_CURRENT);
+        latch(spring, SAFETY_FAULT_OVER_CURRENT);
     }
     if ((spring->suspects & OPEN) != 0) {
-        latch(safety, spring, SAFETY_FAULT_OPEN_SPRING);
+        latch(spring, SAFETY_FAULT_OPEN_SPRING);
     }
     if ((spring->suspects & SHORT) != 0) {
-        latch(safety, spring, SAFETY_FAULT_SHORT_SPRING);
+        latch(spring, SAFETY_FAULT_SHORT_SPRING);
     }
     if ((spring->suspects & HIGH_RESISTANCE) != 0) {
-        latch(safety, spring, SAFETY_FAULT_HIGH_RESISTANCE);
-    }
-    if ((spring->suspects & STUCK_ON) != 0) {
-        latch(safety, spring, SAFETY_FAULT_STUCK_ON);
+        latch(spring, SAFETY_FAULT_HIGH_RESISTANCE);
     }
 }
 
@@ -144,17 +134,55 @@ static void count_electrical(safety_t *safety, safety_spring_t *spring, uint8_t 
     spring->suspects = still;
     if (still != 0 && ++spring->electrical >= safety->parameters.bad_samples) {
         spring->electrical = safety->parameters.bad_samples;
-        latch_suspects(safety, spring);
+        latch_suspects(spring);
     }
 }
 
 #define NOT_FROZEN INT16_MIN /* the sensor ends far above */
 
-bool safety_is_frozen(const safety_t *safety, uint8_t spring, int16_t current_ma)
+static bool flows_without_duty(const safety_parameters_t *p, const safety_sample_t *sample)
 {
-    const safety_spring_t *s = &safety->spring[spring];
-    return s->fault == SAFETY_FAULT_SENSOR_MISMATCH && current_ma == s->frozen_ma &&
-           current_ma != NOT_FROZEN;
+    return sample->off && sample->current_ma > (int16_t)p->stuck_on_ma;
+}
+
+static bool is_frozen(const safety_parameters_t *p, const safety_spring_t *s,
+                      const safety_sample_t *sample)
+{
+    return sample->current_ma == s->frozen_ma && sample->current_ma != NOT_FROZEN &&
+           (s->fault == SAFETY_FAULT_SENSOR_MISMATCH ||
+            (flows_without_duty(p, sample) && sample->current_ma <= (int16_t)p->over_current_ma));
+}
+
+/* What no fault before it may hide: whatever else is wrong, only the supply's switch helps. */
+static void count_stuck(safety_t *safety, safety_spring_t *s, const safety_sample_t *sample)
+{
+    if (!flows_without_duty(&safety->parameters, sample)) {
+        s->stuck = 0;
+    } else if (++s->stuck >= safety->parameters.bad_samples) {
+        s->stuck = safety->parameters.bad_samples;
+        s->fault = SAFETY_FAULT_STUCK_ON;
+        safety->board_fault = SAFETY_FAULT_STUCK_ON;
+    }
+}
+
+static void take_reading(safety_t *safety, safety_spring_t *s, const safety_sample_t *sample)
+{
+    s->frozen = 0;
+    if (s->fault == SAFETY_FAULT_NONE && !sample->off) {
+        s->frozen_ma = sample->current_ma;
+    } else if (sample->current_ma != s->frozen_ma) {
+        s->frozen_ma = NOT_FROZEN;
+    }
+    count_electrical(safety, s, find_electrical(&safety->parameters, sample));
+    count_stuck(safety, s, sample);
+}
+
+static void take_frozen(safety_t *safety, safety_spring_t *s)
+{
+    if (++s->frozen >= safety->parameters.bad_samples) {
+        s->frozen = safety->parameters.bad_samples;
+        latch(s, SAFETY_FAULT_SENSOR_MISMATCH);
+    }
 }
 
 bool safety_tick_spring(safety_t *safety, uint8_t spring, const safety_sample_t *sample)
@@ -162,23 +190,23 @@ bool safety_tick_spring(safety_t *safety, uint8_t spring, const safety_sample_t 
     safety_spring_t *s = &safety->spring[spring];
     uint8_t limit = safety->parameters.bad_samples;
     uint8_t status = sample->sensor_status;
-    const bool reads = status == 0 && !safety_is_frozen(safety, spring, sample->current_ma);
+    const bool reads = status == 0 && !is_frozen(&safety->parameters, s, sample);
     if (status == 0) {
         s->sensor = 0;
         if (reads) {
-            s->frozen_ma = s->fault == SAFETY_FAULT_NONE ? sample->current_ma : NOT_FROZEN;
-            count_electrical(safety, s, find_electrical(&safety->parameters, sample));
+            take_reading(safety, s, sample);
+        } else {
+            take_frozen(safety, s);
         }
     } else if (++s->sensor >= limit) { /* nothing is known: the electrical count stays */
         s->sensor = limit;
-        latch(safety, s,
-              (safety_fault_t)(SAFETY_FAULT_SENSOR_ABSENT + (status <= 4 ? status - 1 : 0)));
+        latch(s, (safety_fault_t)(SAFETY_FAULT_SENSOR_ABSENT + (status <= 4 ? status - 1 : 0)));
     }
     if (sample->temperature_c7 <= safety->temperature_trip_c7) {
         s->temperature = 0;
     } else if (++s->temperature >= limit) {
         s->temperature = limit;
-        latch(safety, s, SAFETY_FAULT_OVER_TEMPERATURE);
+        latch(s, SAFETY_FAULT_OVER_TEMPERATURE);
     }
 
     INVARIANT(s->sensor <= limit && s->temperature <= limit);
@@ -190,7 +218,7 @@ bool safety_tick_spring(safety_t *safety, uint8_t spring, const safety_sample_t 
         s->on_s++;
         uint16_t most_s = safety->parameters.maximum_on_s;
         if (most_s != 0 && s->on_s > most_s) {
-            latch(safety, s, SAFETY_FAULT_ON_TIME);
+            latch(s, SAFETY_FAULT_ON_TIME);
         }
     }
     return reads;
@@ -215,6 +243,15 @@ bool safety_allows(const safety_t *safety, uint8_t spring)
 {
     return !safety->locked && safety->board_fault == SAFETY_FAULT_NONE &&
            safety->spring[spring].fault == SAFETY_FAULT_NONE;
+}
+
+bool safety_cuts_supply(const safety_t *safety)
+{
+    bool cuts = safety->board_fault == SAFETY_FAULT_STUCK_ON;
+    for (uint8_t k = 0; k < safety->springs; k++) {
+        cuts = cuts || safety->spring[k].fault == SAFETY_FAULT_OVER_TEMPERATURE;
+    }
+    return cuts;
 }
 
 safety_fault_t safety_fault(const safety_t *safety, uint8_t spring)
@@ -254,12 +291,15 @@ void safety_clear(safety_t *safety)
 {
     safety->board_fault = SAFETY_FAULT_NONE;
     safety->supply_count = 0;
-    memset(safety->spring, 0, sizeof safety->spring);
+    for (uint8_t k = 0; k < SAFETY_MAX_SPRINGS; k++) {
+        const int16_t frozen_ma = safety->spring[k].frozen_ma;
+        safety->spring[k] = (safety_spring_t){.frozen_ma = frozen_ma};
+    }
 }
 
 void safety_trip(safety_t *safety, uint8_t spring, safety_fault_t fault)
 {
-    latch(safety, &safety->spring[spring], fault);
+    latch(&safety->spring[spring], fault);
 }
 
 void safety_host_silent(safety_t *safety)

@@ -36,7 +36,8 @@ typedef enum {
     SAFETY_FAULT_OVER_TEMPERATURE = 9, /* of the model, or of the ceiling on it */
     SAFETY_FAULT_ON_TIME = 10,         /* on for longer than maximum_on_s */
     /* of the board: every spring is off until cleared */
-    SAFETY_FAULT_STUCK_ON = 11,       /* current flows in a spring that is off: cut the supply */
+    SAFETY_FAULT_STUCK_ON = 11, /* current flows in a spring that is off: cut the supply. Takes the
+                                   place of whatever was latched before */
     SAFETY_FAULT_SUPPLY_CURRENT = 12, /* sum of currents above supply_limit_ma */
     SAFETY_FAULT_EMERGENCY_STOP = 13, /* '!' or safety_emergency_stop */
     /* of one spring */
@@ -49,20 +50,24 @@ typedef enum {
 
 /* What is remembered of one spring: internal. Bad ticks in a row are counted up to bad_samples. */
 typedef struct {
-    uint8_t fault;       /* safety_fault_t, first one since the last clear */
+    uint8_t fault;       /* safety_fault_t, first one since the last clear, or STUCK_ON */
     uint8_t suspects;    /* electrical conditions, bits: found in every tick that is counted */
     uint8_t electrical;  /* ticks */
+    uint8_t stuck;       /* ticks with current and without duty */
+    uint8_t frozen;      /* ticks without duty that showed what was shown with it */
     uint8_t sensor;      /* ticks */
     uint8_t temperature; /* ticks */
     uint16_t on_s;
-    int16_t frozen_ma; /* after SAFETY_FAULT_SENSOR_MISMATCH, while the sensor shows nothing else */
+    int16_t
+        frozen_ma; /* last reading while driven without a fault, as long as nothing else is shown
+                    */
 } safety_spring_t;
 
 typedef struct {
     safety_parameters_t parameters;
     int16_t temperature_trip_c7;
     uint8_t springs;
-    uint8_t board_fault; /* safety_fault_t, first one since the last clear */
+    uint8_t board_fault; /* as of a spring */
     uint8_t supply_count;
     uint8_t second_ticks; /* ticks in the running second of the on-times */
     bool locked;
@@ -71,11 +76,13 @@ typedef struct {
 
 /* What is known about one spring in this tick. */
 typedef struct {
-    uint8_t sensor_status;  /* 0 valid, else 1 absent, 2 bus, 3 stale, 4 reset
-                               (controller_sensor_status_t) */
-    int16_t current_ma;     /* any value; ignored unless valid */
-    int16_t voltage_mv;     /* any value; ignored unless valid */
-    uint16_t expected_ma;   /* reference of the current loop in the measured tick; 0: it was off */
+    uint8_t sensor_status; /* 0 valid, else 1 absent, 2 bus, 3 stale, 4 reset
+                              (controller_sensor_status_t) */
+    int16_t current_ma;    /* any value; ignored unless valid */
+    int16_t voltage_mv;    /* any value; ignored unless valid */
+    bool off;             /* no duty in the measured tick, nor in the one before, of which a reading
+                             may still have a part */
+    uint16_t expected_ma; /* reference of the current loop in the measured tick; 0: it was off */
     int16_t temperature_c7; /* of the model, degC in Q9.7 */
 } safety_sample_t;
 
@@ -93,10 +100,12 @@ bool safety_init(safety_t *safety, const safety_parameters_t *parameters, uint8_
 bool safety_apply(safety_t *safety, const safety_parameters_t *parameters, uint16_t *bad);
 
 /* One tick (20 ms): every spring once, then the board once with the sum of the valid currents.
- * Conditions of the sensor, of the temperature and of current and voltage are counted apart. Where
- * one of the last passes into another without a good tick, the second is counted from where the
- * first ends. True if and only if the sample is a reading: valid, and not safety_is_frozen.
- */
+ * Conditions of the sensor, of the temperature, of current without duty, and of current and voltage
+ * are counted apart. Where one of the last passes into another without a good tick, the second is
+ * counted from where the first ends. True if and only if the sample is a reading: valid, and not of
+ * a sensor that shows to the mA what it showed before its output went off or before it had
+ * SAFETY_FAULT_SENSOR_MISMATCH: that is no current in a spring that is off, but that fault. Above
+ * over_current_ma nobody is driven: there it is a current. */
 bool safety_tick_spring(safety_t *safety, uint8_t spring, const safety_sample_t *sample);
 void safety_tick_board(safety_t *safety, uint32_t sum_ma);
 
@@ -104,12 +113,14 @@ void safety_tick_board(safety_t *safety, uint32_t sum_ma);
  * voltage below 0 counts as 0. */
 safety_fault_t safety_resistance_fault(const safety_parameters_t *parameters, uint16_t current_ma,
                                        int16_t voltage_mv);
-/* The sensor of a spring with SAFETY_FAULT_SENSOR_MISMATCH has shown one current ever since, on and
- * off alike: it is no reading, and no current in a spring that is off. */
-bool safety_is_frozen(const safety_t *safety, uint8_t spring, int16_t current_ma);
 
 /* True if and only if the output may be on: not locked, no board fault, no fault of this spring. */
 bool safety_allows(const safety_t *safety, uint8_t spring);
+
+/* True if and only if a fault stands that no switch of an output can be trusted to end: current in
+ * a spring that is off (STUCK_ON), or one that became hotter than temperature_trip_c
+ * (OVER_TEMPERATURE). */
+bool safety_cuts_supply(const safety_t *safety);
 
 safety_fault_t safety_fault(const safety_t *safety, uint8_t spring);
 safety_fault_t safety_board_fault(const safety_t *safety);
@@ -118,7 +129,7 @@ safety_fault_t safety_board_fault(const safety_t *safety);
 const char *safety_fault_name(safety_fault_t fault);
 
 /* Forgets all faults and counters. A condition that persists trips again after bad_samples ticks.
- * Not the lock. */
+ * Not the lock, nor what a frozen sensor shows. */
 void safety_clear(safety_t *safety);
 /* Latches a fault of one spring that others have found, at once: SAFETY_FAULT_OVER_TEMPERATURE,
  * _LIMIT_TRIP or _SENSOR_MISMATCH. */

@@ -142,15 +142,20 @@ void spring_estimator_init(spring_estimator_t *e, thermal_model_t *model)
     }
 }
 
+void spring_estimator_trust_spring(spring_estimator_t *e, const thermal_model_t *model, uint8_t k)
+{
+    const uint16_t austenite = thermal_model_austenite(model, k);
+    begin(&e->spring[k], spring_now_c(model, k), TRUST_SD_K,
+          austenite == 0                              ? SPRING_PHASE_MARTENSITE
+          : austenite == THERMAL_MODEL_AUSTENITE_FULL ? SPRING_PHASE_AUSTENITE
+                                                      : SPRING_PHASE_BETWEEN);
+    e->spring[k].told = austenite == 0;
+}
+
 void spring_estimator_trust_model(spring_estimator_t *e, const thermal_model_t *model)
 {
     for (uint8_t k = 0; k < e->springs; k++) {
-        const uint16_t austenite = thermal_model_austenite(model, k);
-        begin(&e->spring[k], spring_now_c(model, k), TRUST_SD_K,
-              austenite == 0                              ? SPRING_PHASE_MARTENSITE
-              : austenite == THERMAL_MODEL_AUSTENITE_FULL ? SPRING_PHASE_AUSTENITE
-                                                          : SPRING_PHASE_BETWEEN);
-        e->spring[k].told = austenite == 0;
+        spring_estimator_trust_spring(e, model, k);
     }
 }
 

@@ -177,6 +177,9 @@ void spring_estimator_prepare(spring_estimator_t *estimator, const thermal_model
 /* The model's temperatures and phases are right, to some kelvin: a hint, or what a warm reset has
  * kept. */
 void spring_estimator_trust_model(spring_estimator_t *estimator, const thermal_model_t *model);
+/* Those of one spring. */
+void spring_estimator_trust_spring(spring_estimator_t *estimator, const thermal_model_t *model,
+                                   uint8_t spring);
 /* What was learnt before. Numbers that no spring has are left out. */
 void spring_estimator_restore(spring_estimator_t *estimator, uint8_t spring,
                               const spring_learnt_t *learnt);

@@ -2,7 +2,7 @@
 
 #include <string.h>
 
-#define PIECE_BYTES 208u /* the last spring's Teleplot lines, with the array's */
+#define PIECE_BYTES 240u /* the last spring's Teleplot lines, with the array's */
 #define CUT_SHIFT   6u   /* cuts are remembered in 64 mA */
 #define CUT_STEPS   8u   /* and told again when they differ by more */
 
@@ -84,8 +84,8 @@ static void add_state(piece_t *piece, const controller_t *controller)
     }
 }
 
-static void write_csv(telemetry_t *telemetry, const controller_t *controller, uint32_t time_ms,
-                      int16_t ambient_c7, const text_output_t *output)
+static void write_csv(telemetry_t *telemetry, const controller_t *controller,
+                      const text_time_t *time, int16_t ambient_c7, const text_output_t *output)
 {
     piece_t piece;
     text_line_t *const line = &piece.line;
@@ -95,7 +95,7 @@ static void write_csv(telemetry_t *telemetry, const controller_t *controller, ui
         return;
     }
     start_piece(&piece);
-    text_add_decimal(line, (int32_t)(time_ms & 0x7FFFFFFFul), 3);
+    text_add_time_s(line, time);
     for (uint8_t k = 0; k < springs; k++) {
         piece.values[0] = controller_measured_ma(controller, k);
         piece.values[1] = controller_measured_mv(controller, k);
@@ -126,24 +126,32 @@ void telemetry_add_limits(text_line_t *line, uint16_t limits, char separator)
     }
 }
 
-/* After its number and the time. */
-static void add_bounds(piece_t *piece, const controller_t *controller, uint8_t k)
+/* "name:ms:value": name with the first of the values, value with the second. */
+static void add_point(piece_t *piece, const char *name, const text_time_t *time, const char *value,
+                      int32_t number)
+{
+    add(piece, name);
+    text_add_time_ms(&piece->line, time);
+    text_add_values(&piece->line, value, &number);
+}
+
+static void add_bounds(piece_t *piece, const controller_t *controller, const text_time_t *time,
+                       uint8_t k)
 {
     const spring_bounds_t bounds_c = controller_temperature_bounds_c(controller, k);
-    piece->values[2] = (int32_t)(100.0f * bounds_c.low);
-    add(piece, FLASH_TEXT(">low#0:#0:#2\r\n"));
-    piece->values[2] = (int32_t)(100.0f * bounds_c.high);
-    add(piece, FLASH_TEXT(">high#0:#0:#2\r\n"));
+    add_point(piece, FLASH_TEXT(">low#0:"), time, FLASH_TEXT(":#2\r\n"),
+              (int32_t)(100.0f * bounds_c.low));
+    add_point(piece, FLASH_TEXT(">high#0:"), time, FLASH_TEXT(":#2\r\n"),
+              (int32_t)(100.0f * bounds_c.high));
 }
 
 /* What is due of the next spring: its round of Teleplot, or what is new of its limits. Gives
  * whether the one after it may have its turn in this tick, too. */
-static bool write_spring(telemetry_t *telemetry, const controller_t *controller, uint32_t time_ms,
-                         const text_output_t *output)
+static bool write_spring(telemetry_t *telemetry, const controller_t *controller,
+                         const text_time_t *time, const text_output_t *output)
 {
     piece_t piece;
     text_line_t *const line = &piece.line;
-    int32_t *const values = piece.values;
     const uint8_t springs = controller_springs(controller);
     const uint8_t k = telemetry->next < springs ? telemetry->next : 0;
     const uint8_t number = (uint8_t)(k + 1u);
@@ -155,33 +163,32 @@ static bool write_spring(telemetry_t *telemetry, const controller_t *controller,
     const uint8_t change = (uint8_t)(cut - told->cut);
 
     start_piece(&piece);
-    values[0] = number;
-    values[1] = (int32_t)(time_ms & 0x7FFFFFFFul);
-    values[2] = cut_ma;
+    piece.values[0] = number;
     if (csv) {
         if (limits != told->limits || (uint8_t)(change + CUT_STEPS) > 2u * CUT_STEPS) {
-            add(&piece, FLASH_TEXT("<limits|spring:#0|t:#3"));
+            const int32_t cut_value = cut_ma;
+            add(&piece, FLASH_TEXT("<limits|spring:#0|t:"));
+            text_add_time_s(line, time);
             telemetry_add_limits(line, limits, '|');
-            text_add_values(line, FLASH_TEXT("|cut_a:#3>\r\n"), &values[2]);
+            text_add_values(line, FLASH_TEXT("|cut_a:#3>\r\n"), &cut_value);
         }
     } else {
         if ((limits | told->limits) != 0) {
-            add(&piece, FLASH_TEXT(">cut#0:#0:#3\r\n"));
-            values[2] = limits;
-            add(&piece, FLASH_TEXT(">limits#0:#0:#0\r\n"));
+            add_point(&piece, FLASH_TEXT(">cut#0:"), time, FLASH_TEXT(":#3\r\n"), cut_ma);
+            add_point(&piece, FLASH_TEXT(">limits#0:"), time, FLASH_TEXT(":#0\r\n"), limits);
         }
-        values[2] = controller_measured_ma(controller, k);
-        add(&piece, FLASH_TEXT(">i#0:#0:#3\r\n"));
-        values[2] = text_centi_from_c7(controller_temperature_c7(controller, k));
-        add(&piece, FLASH_TEXT(">m#0:#0:#2\r\n"));
+        add_point(&piece, FLASH_TEXT(">i#0:"), time, FLASH_TEXT(":#3\r\n"),
+                  controller_measured_ma(controller, k));
+        add_point(&piece, FLASH_TEXT(">m#0:"), time, FLASH_TEXT(":#2\r\n"),
+                  text_centi_from_c7(controller_temperature_c7(controller, k)));
         if (telemetry->rounds == 0) {
-            add_bounds(&piece, controller, k);
+            add_bounds(&piece, controller, time, k);
         }
         if (number == springs) {
-            values[2] = controller_fan_percent(controller);
-            text_add_values(line, FLASH_TEXT(">fan:#0:#2\r\n"), &values[1]);
-            values[2] = first_fault(controller);
-            text_add_values(line, FLASH_TEXT(">fault:#0:#0\r\n"), &values[1]);
+            add_point(&piece, FLASH_TEXT(">fan:"), time, FLASH_TEXT(":#2\r\n"),
+                      controller_fan_percent(controller));
+            add_point(&piece, FLASH_TEXT(">fault:"), time, FLASH_TEXT(":#0\r\n"),
+                      first_fault(controller));
         }
     }
     const bool says = line->length != 0;
@@ -199,7 +206,7 @@ static bool write_spring(telemetry_t *telemetry, const controller_t *controller,
     return !csv || !says; /* of status at most one line a tick */
 }
 
-void telemetry_tick(telemetry_t *telemetry, const controller_t *controller, uint32_t time_ms,
+void telemetry_tick(telemetry_t *telemetry, const controller_t *controller, const text_time_t *time,
                     int16_t ambient_c7, const text_output_t *output)
 {
     if (telemetry->format == TELEMETRY_OFF) {
@@ -209,14 +216,14 @@ void telemetry_tick(telemetry_t *telemetry, const controller_t *controller, uint
     if (telemetry->phase >= TELEMETRY_TICKS_PER_S) {
         telemetry->phase = (uint8_t)(telemetry->phase - TELEMETRY_TICKS_PER_S);
         if (telemetry->format == TELEMETRY_CSV) {
-            write_csv(telemetry, controller, time_ms, ambient_c7, output);
+            write_csv(telemetry, controller, time, ambient_c7, output);
         } else {
             count_dropped(telemetry, telemetry->left);
             telemetry->rounds = (uint8_t)((telemetry->rounds + 1u) % telemetry->hz);
         }
         telemetry->left = controller_springs(controller);
     }
-    while (telemetry->left != 0 && write_spring(telemetry, controller, time_ms, output)) {
+    while (telemetry->left != 0 && write_spring(telemetry, controller, time, output)) {
     }
 }
 

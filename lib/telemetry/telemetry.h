@@ -25,12 +25,12 @@ typedef enum {
     50u /* rates are 1..50 Hz; those that do not divide 50 alternate two gaps */
 /* One CSV line: time, per spring current, voltage, temperature and duty, and the end of the line.
  */
-#define TELEMETRY_LINE_BYTES(springs) ((uint16_t)(36u + 29u * (springs)))
-/* Teleplot leaves this much of the transmit buffer free: the console waits for 256 bytes of room,
- * the port sends 230 in a tick, so a buffer that is filled in every tick still lets it answer. A
- * CSV line is so long that its own room is more than that, and one line of status a tick does not
- * fill the port. */
-#define TELEMETRY_LEAVES_FREE_BYTES 64u
+#define TELEMETRY_LINE_BYTES(springs) ((uint16_t)(39u + 29u * (springs)))
+/* Teleplot leaves this much of the transmit buffer free: the console waits for 256 bytes of room.
+ * The port sends 158 between the end of one tick of 100,000 cycles, which fills the buffer so far,
+ * and the begin of the next: it still lets the console answer. A CSV line is so long that its own
+ * room is more than that, and one line of status a tick does not fill the port. */
+#define TELEMETRY_LEAVES_FREE_BYTES 112u
 
 /* What was last said of a spring's limits. */
 typedef struct {
@@ -55,7 +55,7 @@ void telemetry_init(telemetry_t *telemetry);
  * (false, nothing changed) if and only if the format does not exist or hz is not 1..50. */
 bool telemetry_set(telemetry_t *telemetry, uint8_t format, uint8_t hz);
 
-/* Once per control tick; writes when a line is due. time_ms is the tick's, ambient_c7 as the
+/* Once per control tick; writes when a line is due. time is the tick's, ambient_c7 as the
  * controller got it.
  * CSV is the log of docs/files.md with the simulator's extra columns: per spring i{k}_a and v{k}_v
  * as measured, m{k}_c the model's temperature, d{k} the duty; then fan, ambient_c and state: "ok",
@@ -69,7 +69,7 @@ bool telemetry_set(telemetry_t *telemetry, uint8_t format, uint8_t hz);
  * fan and fault with the last spring. A round takes as many ticks as
  * it needs; what is left of it when the next one is due is dropped, counted once a spring, and the
  * next one begins there. */
-void telemetry_tick(telemetry_t *telemetry, const controller_t *controller, uint32_t time_ms,
+void telemetry_tick(telemetry_t *telemetry, const controller_t *controller, const text_time_t *time,
                     int16_t ambient_c7, const text_output_t *output);
 
 /* The names of the limits (bits of drive_policy_limit_t), each after the separator. */

@@ -9,6 +9,8 @@
  * At 4.2 V for 5 with 0.04 ohm more in the wiring it is a tenth less than this. */
 #define POWER_SHARE 0.64f
 
+#define GIVEN_W 0.01f /* more than a sensor's offset makes of nothing */
+
 #define HIGHEST_C7 (215 * 128)
 #define HIGHEST_C  215.0f
 #define LOWEST_C   (-40.0f)
@@ -24,12 +26,97 @@ static int16_t c7_of(int32_t temperature_c23)
     return (int16_t)(temperature_c23 >> 16);
 }
 
-void temperature_ceiling_set(temperature_ceiling_t *ceiling, const thermal_model_t *model)
+void temperature_ceiling_begin(temperature_ceiling_t *ceiling, int16_t ambient_c7)
+{
+    for (uint8_t k = 0; k < THERMAL_MODEL_MAX_SPRINGS; k++) {
+        ceiling->temperature_c23[k] = (int32_t)ambient_c7 * 65536;
+        ceiling->austenite[k] = 0.0f;
+        ceiling->loss_share[k] = 1.0f;
+        ceiling->rest_turns[k] = TEMPERATURE_CEILING_NEVER;
+    }
+    ceiling->ambient_c7 = ambient_c7;
+    ceiling->delivered = false;
+}
+
+static bool is_above_ambient(const temperature_ceiling_t *ceiling, uint8_t k)
+{
+    return temperature_ceiling_c(ceiling, k) >
+           from_c7(ceiling->ambient_c7) + TEMPERATURE_CEILING_WARM_K;
+}
+
+bool temperature_ceiling_is_warm(const temperature_ceiling_t *ceiling, uint8_t k)
+{
+    return ceiling->delivered && is_above_ambient(ceiling, k);
+}
+
+void temperature_ceiling_raise(temperature_ceiling_t *ceiling, const thermal_model_t *model)
 {
     for (uint8_t k = 0; k < model->springs; k++) {
-        ceiling->temperature_c23[k] = (int32_t)thermal_model_temperature_c7(model, k) * 65536;
-        ceiling->austenite[k] =
-            (float)thermal_model_austenite(model, k) / (float)THERMAL_MODEL_AUSTENITE_FULL;
+        const int32_t model_c23 = (int32_t)thermal_model_temperature_c7(model, k) * 65536;
+        if (model_c23 > ceiling->temperature_c23[k]) {
+            ceiling->temperature_c23[k] = model_c23;
+            ceiling->austenite[k] =
+                (float)thermal_model_austenite(model, k) / (float)THERMAL_MODEL_AUSTENITE_FULL;
+            if (is_above_ambient(ceiling, k)) {
+                ceiling->rest_turns[k] = 0;
+                ceiling->delivered = true;
+            }
+        }
+    }
+}
+
+uint16_t temperature_ceiling_rest_s(const temperature_ceiling_t *ceiling, uint8_t k)
+{
+    const uint16_t turns = ceiling->rest_turns[k];
+    return turns == TEMPERATURE_CEILING_NEVER
+               ? TEMPERATURE_CEILING_NEVER
+               : (uint16_t)(TEMPERATURE_CEILING_TURN_S * (float)turns);
+}
+
+/* Given, or until the springs are cold again. */
+static void account(temperature_ceiling_t *ceiling, const thermal_model_t *model, uint8_t k,
+                    float power_w)
+{
+    const int16_t ambient_c7 = thermal_model_ambient_c7(model);
+    if (k == 0) {
+        bool warm = false;
+        for (uint8_t j = 0; j < model->springs && !warm; j++) {
+            warm = temperature_ceiling_is_warm(ceiling, j);
+        }
+        if (!warm) {
+            ceiling->delivered = false;
+            for (uint8_t j = 0; j < model->springs; j++) {
+                ceiling->loss_share[j] = 1.0f;
+            }
+        }
+        if (!warm || ambient_c7 > ceiling->ambient_c7) {
+            ceiling->ambient_c7 = ambient_c7;
+        }
+    }
+    if (power_w > GIVEN_W) {
+        ceiling->rest_turns[k] = 0;
+        ceiling->delivered = true;
+    } else if (ceiling->rest_turns[k] < TEMPERATURE_CEILING_NEVER) {
+        ceiling->rest_turns[k]++;
+    }
+}
+
+int32_t temperature_ceiling_hold_uw(const temperature_ceiling_t *ceiling,
+                                    const thermal_model_t *model, uint8_t k)
+{
+    /* as in the warmest air that was told: not colder by what was said since */
+    const int16_t dropped_c7 = (int16_t)(ceiling->ambient_c7 - thermal_model_ambient_c7(model));
+    return thermal_model_power_to_hold_uw(
+        model, k,
+        (int16_t)(c7_of(ceiling->temperature_c23[k]) - (dropped_c7 > 0 ? dropped_c7 : 0)));
+}
+
+void temperature_ceiling_keep_loss(temperature_ceiling_t *ceiling, uint8_t k, int32_t before_uw,
+                                   int32_t now_uw)
+{
+    if (temperature_ceiling_is_warm(ceiling, k) && before_uw > 0 && now_uw > 0) {
+        const float share = ceiling->loss_share[k] * (float)before_uw / (float)now_uw;
+        ceiling->loss_share[k] = share < 1.0f ? share : 1.0f;
     }
 }
 
@@ -78,8 +165,11 @@ void temperature_ceiling_step(temperature_ceiling_t *ceiling, const thermal_mode
     const uint32_t capacity_uj_per_k =
         (uint32_t)p->heat_capacity_scale_permille[k] * p->heat_capacity_mj_per_k;
     const float latent_k = (float)model->latent_full_c8 * (1.0f / 256.0f);
-    const int32_t hold_uw =
-        thermal_model_power_to_hold_uw(model, k, c7_of(ceiling->temperature_c23[k]));
+    account(ceiling, model, k, power_w);
+    float hold_uw = (float)temperature_ceiling_hold_uw(ceiling, model, k);
+    if (hold_uw > 0.0f) {
+        hold_uw *= ceiling->loss_share[k];
+    }
     /* What the model's neighbours take beyond those of the ceiling, uW / 128: a spring's couplings
      * and the span of temperatures keep it within 32 bits. */
     int32_t colder = 0;
@@ -94,7 +184,7 @@ void temperature_ceiling_step(temperature_ceiling_t *ceiling, const thermal_mode
                                               (int32_t)thermal_model_temperature_c7(model, j));
         }
     }
-    const float into_w = power_w + 1e-6f * (float)(colder / 128 - hold_uw);
+    const float into_w = power_w + 1e-6f * ((float)(colder / 128) - hold_uw);
     /* stable whatever the heat capacity: the flow's own change is taken at the end of the step */
     const float gain_k =
         into_w * (1e6f * TEMPERATURE_CEILING_TURN_S) /
@@ -102,11 +192,10 @@ void temperature_ceiling_step(temperature_ceiling_t *ceiling, const thermal_mode
     add_heat(ceiling, model, k, gain_k, latent_k);
 }
 
-bool temperature_ceiling_trips(const temperature_ceiling_t *ceiling, const thermal_model_t *model,
-                               uint8_t k, int16_t trip_cc)
+bool temperature_ceiling_trips(const temperature_ceiling_t *ceiling, uint8_t k, int16_t trip_cc)
 {
     const int16_t c7 = c7_of(ceiling->temperature_c23[k]);
-    const int32_t ambient = 100 * (int32_t)thermal_model_ambient_c7(model); /* degC / 12800 */
+    const int32_t ambient = 100 * (int32_t)ceiling->ambient_c7; /* degC / 12800 */
     return c7 >= HIGHEST_C7 - 128 ||
            (100 * (int32_t)c7 - ambient) * RISE_SHARE_NUMERATOR >
                (128 * (int32_t)trip_cc - ambient) * RISE_SHARE_DENOMINATOR;

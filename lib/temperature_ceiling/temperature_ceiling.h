@@ -1,7 +1,8 @@
-/* What it is for: how hot a spring can be by the power it was given, whatever is believed of it.
+/* What it is for: how hot a spring can be by the power it was given, whatever is believed of it or
+ * said of it: the account of the heat that this board has delivered since power-on.
  * What it owns: that temperature and its phase for each spring, from power and time alone.
- * What it never does: learn, follow a correction of the model, latch a fault. It uses floating
- * point, one spring at a time. */
+ * What it never does: learn, follow a correction of the model or a hint, latch a fault. It uses
+ * floating point, one spring at a time. */
 #ifndef TEMPERATURE_CEILING_H
 #define TEMPERATURE_CEILING_H
 
@@ -15,6 +16,8 @@ extern "C" {
 #endif
 
 #define TEMPERATURE_CEILING_TURN_S 0.6f /* between two steps of a spring */
+#define TEMPERATURE_CEILING_WARM_K 5.0f /* above ambient, that who says 'cold' may be off by */
+#define TEMPERATURE_CEILING_NEVER  UINT16_MAX
 
 typedef struct {
     int32_t temperature_c23[THERMAL_MODEL_MAX_SPRINGS]; /* Q9.23 degC */
@@ -22,10 +25,28 @@ typedef struct {
     float v_per_step;                                   /* of duty */
     float drop_v;                                       /* of the freewheeling diode */
     float w_per_v2; /* least power of a spring, by the voltage behind its switch */
+    float loss_share[THERMAL_MODEL_MAX_SPRINGS];    /* of the loss now declared, 0..1 */
+    uint16_t rest_turns[THERMAL_MODEL_MAX_SPRINGS]; /* since it was given power */
+    int16_t ambient_c7; /* the highest that was told since the springs were cold */
+    bool delivered;     /* power was given since then */
 } temperature_ceiling_t;
 
-/* From here on it begins where the model is. */
-void temperature_ceiling_set(temperature_ceiling_t *ceiling, const thermal_model_t *model);
+/* Power-on: nothing was given yet. Also for springs that only another size of the array has. */
+void temperature_ceiling_begin(temperature_ceiling_t *ceiling, int16_t ambient_c7);
+/* What the model has of before a warm reset was given by this board, too: raises, never lowers. */
+void temperature_ceiling_raise(temperature_ceiling_t *ceiling, const thermal_model_t *model);
+/* Of what was given so much is left that nobody can call the spring cold. */
+bool temperature_ceiling_is_warm(const temperature_ceiling_t *ceiling, uint8_t spring);
+/* Since it was given power itself, s; TEMPERATURE_CEILING_NEVER: not since power-on, or so long. */
+uint16_t temperature_ceiling_rest_s(const temperature_ceiling_t *ceiling, uint8_t spring);
+
+/* Another model is declared: power, uW, that holds the spring where the ceiling is, of the model
+ * before and now. Heat that was given goes no faster than it would have: the smaller loss counts
+ * until the springs are cold. */
+int32_t temperature_ceiling_hold_uw(const temperature_ceiling_t *ceiling,
+                                    const thermal_model_t *model, uint8_t spring);
+void temperature_ceiling_keep_loss(temperature_ceiling_t *ceiling, uint8_t spring,
+                                   int32_t before_uw, int32_t now_uw);
 
 /* One spring's step of TEMPERATURE_CEILING_TURN_S with the mean power of that time: the model's
  * declared numbers, but of its state only air and plate, which nothing corrects. */
@@ -37,8 +58,8 @@ float temperature_ceiling_c(const temperature_ceiling_t *ceiling, uint8_t spring
 
 /* Its rise above ambient is a ninth more than that of trip_cc (0.01 degC), which an array within
  * its tolerances does not reach; or as hot as it can be. */
-bool temperature_ceiling_trips(const temperature_ceiling_t *ceiling, const thermal_model_t *model,
-                               uint8_t spring, int16_t trip_cc);
+bool temperature_ceiling_trips(const temperature_ceiling_t *ceiling, uint8_t spring,
+                               int16_t trip_cc);
 
 /* Takes what it needs of the settings; where it is stays. */
 void temperature_ceiling_prepare(temperature_ceiling_t *ceiling, const thermal_model_t *model,

@@ -152,6 +152,41 @@ void text_add_values(text_line_t *line, const char *text, const int32_t values[]
     }
 }
 
+void text_time_add(text_time_t *time, uint32_t by_ms)
+{
+    const uint32_t ms = time->ms + (by_ms < UINT32_MAX - 999u ? by_ms : UINT32_MAX - 999u);
+    if (ms < 1000u) {
+        time->ms = (uint16_t)ms;
+        return;
+    }
+    time->s += ms / 1000u;
+    time->ms = (uint16_t)(ms % 1000u);
+}
+
+static void add_thousandths(text_line_t *line, uint16_t ms)
+{
+    char digits[TEXT_DECIMAL_SIZE];
+    text_format_decimal(1000 + (int32_t)ms, 0, digits); /* with its leading zeros */
+    text_add(line, digits + 1);
+}
+
+void text_add_time_s(text_line_t *line, const text_time_t *time)
+{
+    text_add_decimal(line, (int32_t)(time->s & LARGEST), 0);
+    text_add_char(line, '.');
+    add_thousandths(line, time->ms);
+}
+
+void text_add_time_ms(text_line_t *line, const text_time_t *time)
+{
+    if (time->s == 0) {
+        text_add_decimal(line, time->ms, 0);
+        return;
+    }
+    text_add_decimal(line, (int32_t)(time->s & LARGEST), 0);
+    add_thousandths(line, time->ms);
+}
+
 const char *text_item(const char *texts, uint8_t index)
 {
     while (index > 0) {

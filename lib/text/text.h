@@ -35,6 +35,15 @@ text_result_t text_parse_decimal(const char *text, uint8_t decimals, int32_t *va
  * 3 digits of a temperature cost a tenth of what the AVR's 32-bit division does. */
 uint8_t text_format_decimal(int32_t value, uint8_t decimals, char *text);
 
+/* Since the start, for as long as a board runs: 68 years. */
+typedef struct {
+    uint32_t s;
+    uint16_t ms; /* 0..999 */
+} text_time_t;
+
+/* by_ms later. O(1), divides where a second is full. */
+void text_time_add(text_time_t *time, uint32_t by_ms);
+
 /* A line under construction. */
 typedef struct {
     char *bytes;
@@ -51,6 +60,11 @@ void text_add_decimal(text_line_t *line, int32_t value, uint8_t decimals);
 /* The same as text_add_flash, but each "#" and the digit after it become the next of `values`, with
  * so many decimals. */
 void text_add_values(text_line_t *line, const char *text, const int32_t values[]);
+
+/* "12.340" s. */
+void text_add_time_s(text_line_t *line, const text_time_t *time);
+/* "12340" ms. */
+void text_add_time_ms(text_line_t *line, const text_time_t *time);
 
 /* Of texts in flash, one behind the other with its terminating zero, the one with that index. */
 const char *text_item(const char *texts, uint8_t index);

@@ -105,11 +105,20 @@ static void after_reset(board_t *board, uint8_t flag)
     board_twi_reset(&board->twi);
     board_uart_reset(&board->uart);
     board_eeprom_reset(&board->eeprom);
+    board->oscillator_stopped = false;
+    board_enable_changed(board);
     board_pwm_update(&board->pwm);
     board_schedule(board);
     if (board->twi.sda_stuck_low) {
         board_twi_hold_sda(&board->twi, true);
     }
+}
+
+static void port_b_changed(struct avr_irq_t *irq, uint32_t value, void *param)
+{
+    (void)irq;
+    (void)value;
+    board_enable_changed(param);
 }
 
 static bool make_core(board_t *board)
@@ -138,6 +147,9 @@ static bool make_core(board_t *board)
     board_uart_attach(&board->uart, avr, uart_byte, board);
     board_eeprom_attach(&board->eeprom, avr);
     board_pwm_attach(&board->pwm, avr, board_pwm_changed, board);
+    avr_irq_t *port_b = avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ('B'), 0);
+    avr_irq_register_notify(port_b + IOPORT_IRQ_REG_PORT, port_b_changed, board);
+    avr_irq_register_notify(port_b + IOPORT_IRQ_DIRECTION_ALL, port_b_changed, board);
     board_take_register(avr, REGISTER_GPIOR0, NULL, write_mark, board);
     board_take_register(avr, REGISTER_GPIOR1, NULL, write_mark, board);
     board_take_register(avr, REGISTER_GPIOR2, NULL, write_mark, board);
@@ -240,6 +252,10 @@ board_state_t board_run_until(board_t *board, uint64_t cycle)
 {
     avr_t *avr = board->avr;
     complaining = board;
+    if (board->oscillator_stopped) { /* the world goes on without the core */
+        board_handle_events(board, cycle);
+        avr->cycle = cycle;
+    }
     while (avr->cycle < cycle && board_state(board) == BOARD_RUNNING) {
         board->stop_now = false;
         avr_cycle_timer_register(avr, cycle - avr->cycle, on_stop, board);
@@ -312,6 +328,13 @@ void board_hang(board_t *board)
     }
 }
 
+void board_stop_oscillator(board_t *board)
+{
+    board_handle_events(board, board->avr->cycle);
+    board->oscillator_stopped = true;
+    board_move_plant(board, board->avr->cycle);
+}
+
 unsigned board_reset_count(const board_t *board)
 {
     return board->resets;
@@ -352,6 +375,36 @@ uint64_t board_all_off_since(const board_t *board)
 double board_fan(const board_t *board)
 {
     return board_pwm_fan(&board->pwm);
+}
+
+bool board_raise_interrupt(board_t *board, unsigned vector)
+{
+    avr_t *avr = board->avr;
+    for (unsigned k = 0; k < avr->interrupts.vector_count; k++) {
+        avr_int_vector_t *one = avr->interrupts.vector[k];
+        if (one->vector == vector) {
+            (void)avr_regbit_set(avr, one->enable);
+            (void)avr_raise_interrupt(avr, one);
+            return true;
+        }
+    }
+    return false;
+}
+
+void board_flip_register(board_t *board, unsigned address, uint8_t bits)
+{
+    avr_t *avr = board->avr;
+    const uint8_t value = avr->data[address] ^ bits;
+    complaining = board;
+    board_handle_events(board, avr->cycle);
+    const avr_io_addr_t io = (avr_io_addr_t)AVR_DATA_TO_IO(address);
+    if (!board_pwm_poke(&board->pwm, address, value) && avr->io[io].w.c != NULL) {
+        avr->io[io].w.c(avr, (avr_io_addr_t)address, value, avr->io[io].w.param);
+    } else {
+        avr->data[address] = value;
+    }
+    board_pwm_update(&board->pwm);
+    board_schedule(board);
 }
 
 void board_set_analog_v(board_t *board, unsigned input, double volt)

@@ -42,6 +42,7 @@ typedef enum {
 typedef enum {
     BOARD_FAULT_OPEN = 0, /* spring broken */
     BOARD_FAULT_SHORT,    /* spring's ends connected */
+    BOARD_FAULT_CLOSED,   /* its switch has failed closed: full duty whatever the pin says */
     BOARD_FAULT_NACK,     /* its INA219 does not answer */
     BOARD_FAULT_STALE,    /* its INA219 converts no more, and says so: CNVR stays clear */
     BOARD_FAULT_FREEZE,   /* its INA219 acknowledges and converts, with the same result for ever */
@@ -49,6 +50,9 @@ typedef enum {
     BOARD_FAULT_FREEZE_VOLTAGE, /* and of the bus's */
     BOARD_FAULT_SDA_LOW,        /* the bus's data line is held low (channel ignored) */
     BOARD_FAULT_EEPROM,         /* the EEPROM keeps nothing that is written (channel ignored) */
+    BOARD_FAULT_ENABLE_LOW,     /* the pin that holds the cut-off is shorted to ground (channel
+                                   ignored) */
+    BOARD_FAULT_ENABLE_HIGH,    /* and to 5 V */
     BOARD_FAULT_FAN             /* the fan stands still whatever it is told (channel ignored) */
 } board_fault_t;
 
@@ -62,6 +66,7 @@ typedef struct {
     uint64_t seed;        /* of what RAM holds at power-on, and of the sensors' noise */
     double shunt_noise_v; /* standard deviation of one conversion of an INA219 */
     double bus_noise_v;
+    bool without_cut_off; /* the stages have their supply whatever the program does */
     void *context;        /* of the two functions below, both optional */
     board_byte_t on_uart; /* a byte has left USART0 */
     board_mark_t on_mark; /* the program wrote general purpose register 0, 1 or 2 */
@@ -87,6 +92,11 @@ void board_reset(board_t *board, board_reset_t cause);
 void board_hang(board_t *board);
 /* Resets since the board was made, its power-on not counted. */
 unsigned board_reset_count(const board_t *board);
+/* The crystal stands still until the next board_reset, and with it the program, its timers and its
+ * pins: an output that was driven is left high, the worst that can be. The watchdog has a clock of
+ * its own, and its reset would make the pins float; that is left out. Time is still counted in
+ * cycles. */
+void board_stop_oscillator(board_t *board);
 
 /* While the plant is held its time stands still and no current flows: for the time before an
  * experiment. */
@@ -104,6 +114,8 @@ double board_duty(const board_t *board, unsigned channel);
 bool board_all_off(const board_t *board);
 /* Cycle at which the last of them went off; 0 if none was ever on. */
 uint64_t board_all_off_since(const board_t *board);
+/* Whether the cut-off feeds the stages (electrics_cut_off_t). */
+bool board_is_fed(const board_t *board);
 double board_fan(const board_t *board); /* what the pin says, 0..1 */
 
 /* What flows at this moment, from the plant and the faults. */
@@ -119,6 +131,12 @@ void board_swap_sensors(board_t *board, unsigned a, unsigned b);
 void board_reset_sensor(board_t *board, unsigned channel);
 /* A register (0..5) of an INA219, without side effects. */
 uint16_t board_sensor_register(const board_t *board, unsigned channel, unsigned number);
+/* A bit or more of a register turns over by itself: `address` as the program sees it (0x20..0x1FF).
+ */
+void board_flip_register(board_t *board, unsigned address, uint8_t bits);
+/* An interrupt that nothing asked for: its enable bit is set and it is raised. False if and only if
+ * the simulated chip has no such vector (its number by the data sheet, less one: the program's). */
+bool board_raise_interrupt(board_t *board, unsigned vector);
 void board_set_analog_v(board_t *board, unsigned input, double volt);
 
 /* BOARD_EEPROM_BYTES bytes; may be written between runs. */

@@ -14,6 +14,7 @@
 #include "board_pwm.h"
 #include "board_twi.h"
 #include "board_uart.h"
+#include "electrics.h"
 #include "ina219.h"
 
 /* simavr looks at its timers after each instruction unless told that it may run on until the next
@@ -40,7 +41,13 @@ struct board {
     uint64_t synchronised_cycle;
     uint64_t plant_cycle;
     uint64_t next_plant_cycle;
+    bool switch_closed[BOARD_CHANNELS]; /* whatever the pin says */
     bool fan_stopped;
+    electrics_cut_off_t cut_off;
+    bool enable_high;            /* as its pump sees it */
+    uint64_t enable_since_cycle; /* since when it is so */
+    bool enable_low_fault, enable_high_fault;
+    bool oscillator_stopped;
     bool plant_held;
     /* resets */
     bool reset_seen;
@@ -63,6 +70,8 @@ void board_move_plant(board_t *board, uint64_t cycle);
 /* Tells the simulator when board_handle_events is due next. */
 void board_schedule(board_t *board);
 void board_sensors_power_on(board_t *board);
+/* The pin that holds the cut-off, or what shorts it, may have changed. */
+void board_enable_changed(board_t *board);
 /* For board_twi and board_pwm; the context is the board. */
 bool board_sensor_begin(void *context, uint8_t address, bool read);
 void board_sensor_write(void *context, uint8_t address, uint8_t byte);

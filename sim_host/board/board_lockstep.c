@@ -29,6 +29,49 @@ static ina219_inputs_t sensor_inputs(const board_t *board, unsigned k)
                              board->bus_v_cycles[k]};
 }
 
+#define DDRB           0x24u
+#define PORTB          0x25u
+#define ENABLE_BIT     6u
+#define ENABLE_LEAST_S 50e-6 /* a pulse that is shorter moves too little charge */
+
+void board_enable_changed(board_t *board)
+{
+    const uint8_t *data = board->avr->data;
+    const uint64_t now = board->avr->cycle;
+    bool high = (data[DDRB] & data[PORTB]) >> ENABLE_BIT & 1u;
+    high = (high || board->enable_high_fault) && !board->enable_low_fault;
+    if (high == board->enable_high) {
+        return;
+    }
+    if (!high && (double)(now - board->enable_since_cycle) >= ENABLE_LEAST_S * BOARD_FREQUENCY_HZ) {
+        electrics_cut_off_pulse(&board->cut_off, (double)now / BOARD_FREQUENCY_HZ);
+    }
+    board->cut_off.high = high;
+    board->cut_off.rose_s = (double)now / BOARD_FREQUENCY_HZ;
+    board->enable_high = high;
+    board->enable_since_cycle = now;
+}
+
+static bool is_fed(const board_t *board, uint64_t cycle)
+{
+    return board->options.without_cut_off ||
+           electrics_cut_off_is_closed(&board->cut_off, (double)cycle / BOARD_FREQUENCY_HZ);
+}
+
+bool board_is_fed(const board_t *board)
+{
+    return is_fed(board, board->avr->cycle);
+}
+
+static double switched_on(const board_t *board, unsigned k)
+{
+    const double duty = board->pwm.duty[k];
+    if (board->switch_closed[k] || (board->oscillator_stopped && duty > 0.0)) {
+        return 1.0;
+    }
+    return duty;
+}
+
 static double fan_of(const board_t *board)
 {
     return board->fan_stopped ? 0.0 : board_pwm_fan(&board->pwm);
@@ -45,8 +88,10 @@ void board_move_plant(board_t *board, uint64_t cycle)
         (void)plant_step(board->plant, (double)(cycle - board->plant_cycle) / BOARD_FREQUENCY_HZ);
         board->plant_cycle = cycle;
     }
+    const bool fed = is_fed(board, cycle);
     for (unsigned k = 0; k < board->springs; k++) {
-        (void)plant_drive(board->plant, (int)k, PLANT_DRIVE_DUTY, board->pwm.duty[k]);
+        (void)plant_drive(board->plant, (int)k, PLANT_DRIVE_DUTY,
+                          fed ? switched_on(board, k) : 0.0);
     }
     (void)plant_set_fan(board->plant, fan_of(board));
     for (unsigned k = 0; k < board->springs; k++) {
@@ -185,6 +230,9 @@ void board_set_fault(board_t *board, board_fault_t fault, unsigned channel, bool
             (void)plant_set_fault(board->plant, (int)channel, on ? wanted : PLANT_FAULT_NONE);
         }
         break;
+    case BOARD_FAULT_CLOSED:
+        board->switch_closed[channel] = on;
+        break;
     case BOARD_FAULT_NACK:
         board->sensor[channel].absent = on;
         break;
@@ -205,6 +253,14 @@ void board_set_fault(board_t *board, board_fault_t fault, unsigned channel, bool
         break;
     case BOARD_FAULT_EEPROM:
         board->eeprom.worn = on;
+        break;
+    case BOARD_FAULT_ENABLE_LOW:
+        board->enable_low_fault = on;
+        board_enable_changed(board);
+        break;
+    case BOARD_FAULT_ENABLE_HIGH:
+        board->enable_high_fault = on;
+        board_enable_changed(board);
         break;
     case BOARD_FAULT_FAN:
         board->fan_stopped = on;

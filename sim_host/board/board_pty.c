@@ -3,6 +3,8 @@
 
 #include <errno.h>
 #include <fcntl.h>
+#include <math.h>
+#include <poll.h>
 #include <stdlib.h>
 #include <sys/ioctl.h>
 #include <termios.h>
@@ -66,4 +68,10 @@ size_t board_pty_unread(const board_pty_t *pty)
 {
     int count = 0;
     return ioctl(pty->terminal, FIONREAD, &count) == 0 && count > 0 ? (size_t)count : 0;
+}
+
+void board_pty_await(const board_pty_t *pty, double longest_s)
+{
+    struct pollfd client = {.fd = pty->master, .events = POLLIN};
+    (void)poll(&client, 1, (int)ceil(1e3 * longest_s));
 }

@@ -2,7 +2,7 @@
  * board's port.
  * What it owns: both ends: it keeps the terminal's end open itself, so that clients may come and
  * go.
- * What it never does: wait. What no client reads in time is lost, as on a wire. */
+ * What it never does: wait unless asked to. What no client reads in time is lost, as on a wire. */
 #ifndef BOARD_PTY_H
 #define BOARD_PTY_H
 
@@ -27,6 +27,8 @@ size_t board_pty_read(board_pty_t *pty, uint8_t *bytes, size_t size);
 size_t board_pty_write(board_pty_t *pty, const uint8_t *bytes, size_t count);
 /* Bytes that no client has read yet. */
 size_t board_pty_unread(const board_pty_t *pty);
+/* Waits until a client has written, a signal has come, or so long, s. */
+void board_pty_await(const board_pty_t *pty, double longest_s);
 
 #ifdef __cplusplus
 }

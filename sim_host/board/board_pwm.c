@@ -132,6 +132,18 @@ static void write_timer(avr_t *avr, avr_io_addr_t address, uint8_t value, void *
     board_pwm_update(timer->pwm);
 }
 
+bool board_pwm_poke(board_pwm_t *pwm, unsigned address, uint8_t value)
+{
+    for (unsigned t = 0; t < 3; t++) {
+        if (address >= timer_base[t] && address < timer_base[t] + REGISTERS) {
+            pwm->avr->data[address] = value;
+            board_pwm_update(pwm);
+            return true;
+        }
+    }
+    return false;
+}
+
 /* The counters are not stepped, but a program that looks sees them run. */
 static uint8_t read_counter(avr_t *avr, avr_io_addr_t address, void *param)
 {

@@ -39,6 +39,8 @@ struct board_pwm {
 
 void board_pwm_attach(board_pwm_t *pwm, avr_t *avr, board_pwm_changed_t changed, void *context);
 void board_pwm_update(board_pwm_t *pwm);
+/* A register of timers 3 to 5 as it lies in memory; false: it is none of them. */
+bool board_pwm_poke(board_pwm_t *pwm, unsigned address, uint8_t value);
 /* OC1A, or its pin as a plain output. */
 double board_pwm_fan(const board_pwm_t *pwm);
 

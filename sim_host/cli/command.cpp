@@ -19,20 +19,24 @@ CLI::Option *add_output_option(CLI::App &command, const std::string &names, std:
             ""));
 }
 
-void add_seconds_option(CLI::App &command, const std::string &name, double &seconds,
-                        const std::string &text)
+CLI::Validator number_from_to(double least, double most)
 {
-    command.add_option(name, seconds, text)
-        ->check(CLI::Validator(
-            [](const std::string &value) {
+    return {[least, most](const std::string &value) {
                 double parsed = 0.0;
                 std::string problem = parse_number(value, parsed);
-                if (problem.empty() && parsed < 0.0) {
-                    problem = fmt::format("{} is negative; write 0 or more seconds", value);
+                if (problem.empty() && !(parsed >= least && parsed <= most)) {
+                    problem = fmt::format("{} must be {} to {}", in_quotes(value), least, most);
                 }
                 return problem;
             },
-            ""));
+            ""};
+}
+
+void add_seconds_option(CLI::App &command, const std::string &name, double &seconds,
+                        const std::string &text)
+{
+    constexpr double year_s = 31536000.0;
+    command.add_option(name, seconds, text)->check(number_from_to(0.0, year_s));
 }
 
 bool check_outputs(const std::vector<std::string> &outputs, const std::vector<std::string> &inputs)
@@ -69,6 +73,7 @@ bool check_outputs(const std::vector<std::string> &outputs, const std::vector<st
                                   "is an input of this command; write to another file");
             }
         }
+        check_replaceable(output);
     }
     return table;
 }

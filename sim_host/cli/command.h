@@ -34,13 +34,15 @@ using plant_pointer = std::unique_ptr<plant_t, plant_deleter>;
 /* An option that names a file to write (an empty name is refused), or `-` for standard output. */
 CLI::Option *add_output_option(CLI::App &command, const std::string &names, std::string &path,
                                const std::string &text);
-/* An option of seconds, 0 or more; anything else is refused. */
+/* What must be a finite number from least to most; anything else is refused in one line. */
+CLI::Validator number_from_to(double least, double most);
+/* An option of seconds, 0 to a year. */
 void add_seconds_option(CLI::App &command, const std::string &name, double &seconds,
                         const std::string &text);
 
-/* Before the work: an output in a missing folder, over an input, or named for two, is refused
- * (input_error). Empty paths are skipped. True if standard output is free for a table: no output is
- * `-`. */
+/* Before the work: an output in a missing folder, over an input, over a file that this tool did not
+ * write, or named for two, is refused (input_error). Empty paths are skipped. True if standard
+ * output is free for a table: no output is `-`. */
 bool check_outputs(const std::vector<std::string> &outputs, const std::vector<std::string> &inputs);
 
 /* The JSON as it is written everywhere: two blanks of indent, NaN as null, a line end. */

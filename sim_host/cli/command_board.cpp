@@ -1,5 +1,6 @@
 /* ninespring-sim board: the firmware's ELF in a simulated Mega, in real time, behind a
  * pseudo-terminal. */
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <csignal>
@@ -118,6 +119,48 @@ private:
     bool reads_ = false;
 };
 
+/* Whoever is heard now and then by the clock on the wall is never silent for longer by the board's:
+ * as fast as it goes, an instant between a client's words would be seconds, and `host_timeout_s` is
+ * by the board's clock. A client that is silent for long has left: then time is free again. */
+class listener
+{
+public:
+    listener(const board_pty_t *pty, std::chrono::seconds left_alone)
+        : pty_(pty), left_alone_s_(static_cast<double>(left_alone.count()))
+    {
+    }
+    void heard(double board_s)
+    {
+        heard_board_s_ = board_s;
+        heard_ = std::chrono::steady_clock::now();
+        somebody_ = true;
+    }
+    void await(double board_s)
+    {
+        const double silent_s = board_s - heard_board_s_;
+        if (!somebody_ || silent_s < FREE_S) {
+            return;
+        }
+        const double wall_s =
+            std::chrono::duration<double>(std::chrono::steady_clock::now() - heard_).count();
+        somebody_ = wall_s < left_alone_s_;
+        if (somebody_ && silent_s > wall_s) {
+            board_pty_await(pty_, std::min(silent_s, left_alone_s_) - wall_s);
+        }
+    }
+
+private:
+    static constexpr double FREE_S = 1.5; /* more than from one word of a host to the next */
+    const board_pty_t *pty_;
+    double left_alone_s_;
+    double heard_board_s_ = 0.0;
+    std::chrono::steady_clock::time_point heard_;
+    bool somebody_ = false;
+};
+
+/* Of a client, by the clock on the wall. */
+constexpr std::chrono::seconds LEFT_ALONE{10};
+
 /* A row of nine springs: to wait after each byte would cost more than the simulation. */
 constexpr std::size_t BOARD_UNREAD_MOST = 256;
 
@@ -160,13 +203,18 @@ void run_board(const board_arguments &arguments)
     std::fflush(stdout);
 
     pace clock(speed);
-    reader of_board(port.get(), BOARD_UNREAD_MOST, std::chrono::seconds(10));
+    reader of_board(port.get(), BOARD_UNREAD_MOST, LEFT_ALONE);
+    listener to_client(port.get(), LEFT_ALONE);
     reader of_logger(logger.port(), 0, std::chrono::seconds(1));
     std::uint8_t bytes[256];
     while (interrupted == 0 &&
            (arguments.duration_s == 0.0 || board_time_s(board.get()) < arguments.duration_s)) {
         if (board_send_backlog(board.get()) < sizeof bytes) {
-            board_send(board.get(), bytes, board_pty_read(port.get(), bytes, sizeof bytes));
+            const std::size_t count = board_pty_read(port.get(), bytes, sizeof bytes);
+            if (count > 0) {
+                to_client.heard(board_time_s(board.get()));
+            }
+            board_send(board.get(), bytes, count);
         }
         board.run_ms(1.0);
         const std::string text = board.take_output();
@@ -176,6 +224,7 @@ void run_board(const board_arguments &arguments)
         if (speed == 0.0) {
             of_board.await();
             of_logger.await();
+            to_client.await(board_time_s(board.get()));
         }
         eeprom.save_when_idle();
         clock.wait(board_time_s(board.get()));

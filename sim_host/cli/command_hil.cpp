@@ -8,6 +8,7 @@
 #include <cstring>
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <limits>
 #include <poll.h>
 #include <termios.h>
 #include <unistd.h>
@@ -108,6 +109,7 @@ struct hil_statistics {
     unsigned max_lag_ticks = 0;
     double max_answer_ms = 0.0;
     double simulated_s = 0.0;
+    double highest_c = 0.0;
     std::array<double, SPRINGS> final_current_a{};
 };
 
@@ -128,6 +130,16 @@ public:
         }
     }
 
+    /* From then on its switch is closed, whatever the board says. */
+    void close_switch(int spring, double from_s)
+    {
+        if (spring < 1 || spring > springs_) {
+            throw input_error(fmt::format("--closed {}: there is no such spring; write 1 to {}",
+                                          spring, springs_));
+        }
+        closed_from_s_[static_cast<std::size_t>(spring - 1)] = from_s;
+    }
+
     void advance(unsigned ticks)
     {
         const auto parts = static_cast<unsigned>(std::lround(ticks * TICK_S / PART_S));
@@ -145,7 +157,10 @@ public:
     {
         for (int k = 0; k < std::min<int>(springs_, duties.springs); ++k) {
             const double steps = std::min<double>(duties.duty[k], CONTROLLER_DUTY_MAX);
-            plant_drive(plant_.get(), k, PLANT_DRIVE_DUTY, steps / CONTROLLER_DUTY_MAX);
+            const bool closed = time_s() >= closed_from_s_[static_cast<std::size_t>(k)];
+            plant_drive(plant_.get(), k, PLANT_DRIVE_DUTY,
+                        closed ? 1.0 : steps / CONTROLLER_DUTY_MAX);
+            highest_c_ = std::max(highest_c_, plant_temperature_c(plant_.get(), k));
         }
         plant_set_fan(plant_.get(), std::min<double>(duties.fan_percent, 100.0) / 100.0);
     }
@@ -174,10 +189,14 @@ public:
         return k < springs_ ? plant_current_a(plant_.get(), k) : 0.0;
     }
     [[nodiscard]] double time_s() const { return plant_time_s(plant_.get()); }
+    [[nodiscard]] double highest_c() const { return highest_c_; }
 
 private:
     plant_pointer plant_;
     int springs_;
+    std::vector<double> closed_from_s_ =
+        std::vector<double>(SPRINGS, std::numeric_limits<double>::infinity());
+    double highest_c_ = -std::numeric_limits<double>::infinity();
     electrics_ina219_t sensors_[SPRINGS];
 };
 
@@ -223,6 +242,7 @@ public:
         }
     }
 
+    hil_world &world() { return world_; }
     [[nodiscard]] const hil_statistics &statistics() const { return statistics_; }
     /* Lines that the board's console has answered: `ok` or `error:...`. */
     [[nodiscard]] std::size_t answers() const { return answers_; }
@@ -257,6 +277,7 @@ private:
         tick_ = duties.tick;
         ++statistics_.ticks;
         statistics_.simulated_s = world_.time_s();
+        statistics_.highest_c = world_.highest_c();
         for (int k = 0; k < SPRINGS; ++k) {
             statistics_.final_current_a[static_cast<std::size_t>(k)] = world_.current_a(k);
         }
@@ -276,6 +297,8 @@ struct hil_arguments {
     plant_arguments array;
     std::string port;
     std::vector<std::string> lines;
+    int closed = 0; /* spring, from 1; 0: none */
+    double closed_at_s = 0.0;
     double duration_s = 0.0;
     std::string json;
 };
@@ -300,6 +323,7 @@ void report(const hil_statistics &statistics, const std::string &json)
         value["max_lag_ticks"] = statistics.max_lag_ticks;
         value["allowed_lag_ticks"] = HIL_FRAME_MAX_LAG_TICKS;
         value["max_answer_ms"] = statistics.max_answer_ms;
+        value["highest_c"] = statistics.highest_c;
         value["final_current_a"] = statistics.final_current_a;
         write_file_whole(json, json_text(value));
     }
@@ -321,6 +345,9 @@ void run_hil(const hil_arguments &arguments)
     described_plant array = describe_plant(arguments.array);
     serial_port port(arguments.port);
     hil_session session(port, std::move(array));
+    if (arguments.closed != 0) {
+        session.world().close_switch(arguments.closed, arguments.closed_at_s);
+    }
     std::signal(SIGINT, on_signal);
     std::signal(SIGTERM, on_signal);
     const bool typed = isatty(STDIN_FILENO) != 0;
@@ -360,6 +387,14 @@ void add_command_hil(CLI::App &app)
         ->add_option("--send", arguments->lines,
                      "Console line for the board, half a second apart; may be repeated")
         ->allow_extra_args(false);
+    CLI::Option *closed =
+        command
+            ->add_option("--closed", arguments->closed,
+                         "Spring whose switch fails closed: full duty whatever the board says")
+            ->check(number_from_to(1.0, SPRINGS));
+    add_seconds_option(*command, "--closed-at", arguments->closed_at_s,
+                       "Simulated seconds at which it does so");
+    command->get_option("--closed-at")->needs(closed);
     add_plant_options(*command, arguments->array);
     add_seconds_option(*command, "--duration", arguments->duration_s,
                        "Simulated seconds after which it ends; 0: Ctrl-C");

@@ -178,6 +178,12 @@ struct spring_summary {
 /* Columns of a spring that are known when a row begins. */
 constexpr std::size_t BEGIN_VALUES = 8;
 
+/* The one fault that takes another's place. */
+std::string overriding()
+{
+    return safety_fault_name(SAFETY_FAULT_STUCK_ON);
+}
+
 class recorder
 {
 public:
@@ -253,11 +259,11 @@ public:
             summary.highest_c = std::max(summary.highest_c, true_c);
             summary.error_square_sum += error * error;
             summary.energy_j += plant_power_w(board.plant(), k) * RUNNER_TICK_S;
-            if (summary.fault == "none") {
+            if (summary.fault == "none" || reading.fault == overriding()) {
                 summary.fault = reading.fault;
             }
         }
-        if (board_fault_ == "none") {
+        if (board_fault_ == "none" || board.board_fault() == overriding()) {
             board_fault_ = board.board_fault();
         }
     }

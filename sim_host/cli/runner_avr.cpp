@@ -238,6 +238,9 @@ private:
         case scenario_failure::short_circuit:
             board_set_fault(board_->get(), BOARD_FAULT_SHORT, channel, on);
             break;
+        case scenario_failure::closed:
+            board_set_fault(board_->get(), BOARD_FAULT_CLOSED, channel, on);
+            break;
         case scenario_failure::nack:
             board_set_fault(board_->get(), BOARD_FAULT_NACK, channel, on);
             break;

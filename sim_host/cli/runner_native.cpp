@@ -142,6 +142,17 @@ private:
                               static_cast<std::uint16_t>(std::lround(permille)));
     }
 
+    /* As the console's word does. */
+    static void tell_cold(controller_t *controller, std::int16_t ambient_c7)
+    {
+        for (std::uint8_t k = 0; k < controller_springs(controller); ++k) {
+            if (controller_level_permille(controller, k) != 0) {
+                return; /* it answers error:16 */
+            }
+        }
+        controller_set_temperature(controller, ambient_c7);
+    }
+
     static void tell(loop_t *loop, const scenario_event &event)
     {
         controller_t *controller = loop_controller(loop);
@@ -174,6 +185,14 @@ private:
             controller_emergency_stop(controller);
             return;
         case scenario_word::console:
+            if (event.text == "model cold") {
+                tell_cold(controller, loop_inputs(loop)->ambient_c7);
+                return;
+            }
+            if (event.text == "supply on" || event.text == "supply off") {
+                (void)controller_set_supply(controller, event.text == "supply on");
+                return;
+            }
             throw event.place.error(
                 fmt::format("{} needs a console; run with --board avr", in_quotes(event.text)));
         default:
@@ -193,6 +212,9 @@ private:
             break;
         case scenario_failure::short_circuit:
             action = good ? LOOP_ACTION_SPRING_GOOD : LOOP_ACTION_SHORT_SPRING;
+            break;
+        case scenario_failure::closed:
+            action = good ? LOOP_ACTION_SWITCH_GOOD : LOOP_ACTION_SWITCH_CLOSED;
             break;
         case scenario_failure::nack:
             action = good ? LOOP_ACTION_SENSOR_GOOD : LOOP_ACTION_SENSOR_NACK;

@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 #include <sstream>
 
+#include "command.h"
 #include "text_file.h"
 
 namespace ninespring
@@ -58,11 +59,11 @@ void add_thermometer_options(CLI::App &command, thermometer_arguments &arguments
         return command.add_option(name, value, text)->capture_default_str()->needs(target);
     };
     option("--thermometer-rate", arguments.rate_hz, "Lines a second")
-        ->check(CLI::Range(0.01, 50.0));
+        ->check(number_from_to(0.01, 50.0));
     option("--thermometer-noise", arguments.noise_c, "Standard deviation of a reading, degC")
-        ->check(CLI::Range(0.0, 100.0));
+        ->check(number_from_to(0.0, 100.0));
     option("--thermometer-lag", arguments.lag_s, "Time constant, s; 0: as the scenario has it")
-        ->check(CLI::Range(0.0, 1e4));
+        ->check(number_from_to(0.0, 1e4));
     option("--thermometer-springs", arguments.springs, "Which have one: all, or as in 1,3,5");
 }
 
@@ -90,10 +91,12 @@ thermometers::thermometers(const thermometer_arguments &arguments, plant_t *plan
         name_ = pty_.name;
     } else {
         name_ = arguments.target;
+        check_replaceable(name_);
         file_.open(name_, std::ios::trunc);
         if (!file_) {
             throw work_error(fmt::format("{}: cannot be written: {}", name_, std::strerror(errno)));
         }
+        say("# tool: ninespring-sim " NINESPRING_VERSION " thermometers");
     }
 }
 

@@ -30,6 +30,25 @@ double electrics_supply_v(double open_circuit_v, double source_ohm, double condu
 }
 
 /* splitmix64 (Steele, Lea, Flood 2014) */
+void electrics_cut_off_pulse(electrics_cut_off_t *cut_off, double time_s)
+{
+    if (time_s - cut_off->last_s > ELECTRICS_CUT_OFF_GATE_S) {
+        cut_off->pulses = 0;
+    }
+    cut_off->last_s = time_s;
+    if (cut_off->pulses < 2 && ++cut_off->pulses == 2) {
+        cut_off->closes_s = time_s + ELECTRICS_CUT_OFF_RELAY_S;
+    }
+}
+
+bool electrics_cut_off_is_closed(const electrics_cut_off_t *cut_off, double time_s)
+{
+    const double gate_s = cut_off->high ? cut_off->rose_s + ELECTRICS_CUT_OFF_HIGH_S
+                                        : cut_off->last_s + ELECTRICS_CUT_OFF_GATE_S;
+    return cut_off->pulses == 2 && time_s >= cut_off->closes_s &&
+           time_s < gate_s + ELECTRICS_CUT_OFF_RELAY_S;
+}
+
 void electrics_noise_seed(electrics_noise_t *noise, uint64_t seed)
 {
     noise->state = seed;

@@ -40,6 +40,24 @@ double electrics_buck_current_a(double duty, double bus_v, double freewheel_drop
 double electrics_supply_v(double open_circuit_v, double source_ohm, double conductance_s,
                           double constant_power_w);
 
+/* The cut-off of the stages' supply (hardware/circuit.py; figures: docs/hardware-figures.md): a
+ * charge pump whose gate falls ELECTRICS_CUT_OFF_GATE_S after the last pulse, or
+ * ELECTRICS_CUT_OFF_HIGH_S after its pin rose and stayed high, and a relay that takes
+ * ELECTRICS_CUT_OFF_RELAY_S both ways. It closes after the second pulse. All zero: open. */
+#define ELECTRICS_CUT_OFF_GATE_S  0.082
+#define ELECTRICS_CUT_OFF_HIGH_S  0.264
+#define ELECTRICS_CUT_OFF_RELAY_S 0.010
+typedef struct {
+    unsigned pulses; /* in a row, up to 2 */
+    double last_s;   /* time of the last one */
+    double closes_s; /* meaningless before the second */
+    bool high;       /* the pin, since */
+    double rose_s;
+} electrics_cut_off_t;
+void electrics_cut_off_pulse(electrics_cut_off_t *cut_off, double time_s);
+/* Whether the stages have their supply; time_s never before the last pulse. */
+bool electrics_cut_off_is_closed(const electrics_cut_off_t *cut_off, double time_s);
+
 /* Seeded normal noise; the same seed gives the same numbers on every machine. */
 typedef struct {
     uint64_t state;

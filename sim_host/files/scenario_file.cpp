@@ -147,9 +147,10 @@ struct failure_word {
     bool lasts;
 };
 
-constexpr std::array<failure_word, 11> FAILURES = {
+constexpr std::array<failure_word, 12> FAILURES = {
     {{"open", scenario_failure::open, " K", 1, true},
      {"short", scenario_failure::short_circuit, " K", 1, true},
+     {"closed", scenario_failure::closed, " K", 1, true},
      {"nack", scenario_failure::nack, " K", 1, true},
      {"stale", scenario_failure::stale, " K", 1, true},
      {"freeze", scenario_failure::freeze, " K", 1, true},
@@ -231,8 +232,8 @@ public:
             event.word = first == "fail" ? scenario_word::fail : scenario_word::repair;
             failure(event);
         } else if (first[0] == '$' || first[0] == '?' || first == "telemetry" || first == "model" ||
-                   first == "learnt" || first == "faults" || first == "selftest" ||
-                   first == "help" || first == "version") {
+                   first == "supply" || first == "learnt" || first == "faults" ||
+                   first == "selftest" || first == "help" || first == "version") {
             event.word = scenario_word::console;
         } else {
             throw wrong(fmt::format(

@@ -43,6 +43,7 @@ enum class scenario_failure {
     none,
     open,
     short_circuit,
+    closed, /* the switch, whatever the duty */
     nack,
     sda_low,
     stale,

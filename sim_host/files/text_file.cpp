@@ -207,6 +207,37 @@ std::string did_you_mean(std::string_view wrong, const std::vector<std::string> 
     return best == nullptr ? std::string() : fmt::format("; did you mean {}?", *best);
 }
 
+namespace
+{
+
+/* The first line of what this tool writes: its version may be another one. */
+bool is_own(const std::string &path)
+{
+    constexpr std::string_view csv = "# tool: ninespring-sim ";
+    constexpr std::string_view json = "{\n  \"schema\": \"ninespring.";
+    std::array<char, 64> bytes{};
+    std::FILE *file = std::fopen(path.c_str(), "rb");
+    if (file == nullptr) {
+        return false;
+    }
+    const std::string_view begin(bytes.data(), std::fread(bytes.data(), 1, bytes.size(), file));
+    std::fclose(file);
+    return begin.empty() || begin.substr(0, csv.size()) == csv ||
+           begin.substr(0, json.size()) == json;
+}
+
+} // namespace
+
+void check_replaceable(const std::string &path)
+{
+    std::error_code ignored;
+    if (std::filesystem::is_regular_file(path, ignored) && !is_own(path)) {
+        throw input_error(path, 0, 0,
+                          "was not written by ninespring-sim, and may be a measurement; name "
+                          "another file, or remove it first");
+    }
+}
+
 void write_file_whole(const std::string &path, const std::string &content)
 {
     if (path == "-") {

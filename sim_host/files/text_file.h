@@ -70,6 +70,10 @@ std::string parse_number(std::string_view text, double &value);
 /* The name in `names` nearest to `wrong`, as `; did you mean X?`, or an empty text. */
 std::string did_you_mean(std::string_view wrong, const std::vector<std::string> &names);
 
+/* An output may replace what this tool wrote before, by its first line, or an empty file: anything
+ * else that is there is refused (input_error). */
+void check_replaceable(const std::string &path);
+
 /* Writes a file whole or not at all: into a temporary file beside `path`, which is then renamed.
  * `-` is standard output. Fails (input_error) if `path` is a folder, (work_error) if the folder is
  * not there or the disk refuses; nothing is left behind then. */

@@ -10,6 +10,7 @@
 typedef struct {
     electrics_ina219_t sensor;
     electrics_fault_t fault;
+    bool switch_closed;                /* whatever the duty */
     controller_sensor_status_t status; /* lasting failure of the sensor */
     bool lost_configuration;           /* told once, then written again */
     int stage;                         /* whose current the sensor measures */
@@ -40,6 +41,7 @@ struct loop {
     double source_ohm;
     double freewheel_drop_v;
     double highest_sum_a;
+    electrics_cut_off_t cut_off;
     channel_t channel[CONTROLLER_MAX_SPRINGS];
 };
 
@@ -211,11 +213,13 @@ static void flow(loop_t *loop)
     double duty[CONTROLLER_MAX_SPRINGS];
     double spring_ohm[CONTROLLER_MAX_SPRINGS];
     double load_s = 0.0;
+    const bool fed = !controller_supply_is_fitted(&loop->controller) ||
+                     electrics_cut_off_is_closed(&loop->cut_off, loop_time_s(loop));
     for (int k = 0; k < loop->springs; k++) {
         const channel_t *c = &loop->channel[k];
-        duty[k] = c->fault == ELECTRICS_FAULT_OPEN
-                      ? 0.0
-                      : (double)loop->outputs.duty[k] / CONTROLLER_DUTY_MAX;
+        duty[k] = !fed || c->fault == ELECTRICS_FAULT_OPEN ? 0.0
+                  : c->switch_closed                       ? 1.0
+                                     : (double)loop->outputs.duty[k] / CONTROLLER_DUTY_MAX;
         spring_ohm[k] = c->fault == ELECTRICS_FAULT_SHORT ? ELECTRICS_SHORT_OHM : c->terminal_ohm;
         load_s += duty[k] * duty[k] / (spring_ohm[k] + c->loop_ohm);
     }
@@ -272,6 +276,9 @@ double loop_tick_part(loop_t *loop)
     loop->inputs.ambient_c7 = told_ambient_c7(loop);
     loop->inputs.fan_percent = loop->outputs.fan_percent;
     controller_tick(&loop->controller, &loop->inputs, &loop->outputs);
+    if (loop->outputs.supply) {
+        electrics_cut_off_pulse(&loop->cut_off, loop_time_s(loop));
+    }
     uint8_t fan_percent = loop->fan_stopped ? 0 : loop->outputs.fan_percent;
     if (fan_percent != loop->fan_percent) {
         loop->fan_percent = fan_percent;
@@ -303,10 +310,16 @@ void loop_advance(loop_t *loop, double seconds)
 static void boot(loop_t *loop, bool keeps_memory)
 {
     thermal_model_state_t state;
+    const bool known = controller_is_known(&loop->controller);
     controller_get_model_state(&loop->controller, &state);
+    temperature_ceiling_t delivered;
+    controller_get_delivered(&loop->controller, &delivered);
     (void)controller_init(&loop->controller, &loop->settings, told_ambient_c7(loop), NULL);
-    if (keeps_memory) {
+    if (keeps_memory && known) {
         (void)controller_set_model_state(&loop->controller, &state);
+    }
+    if (keeps_memory) {
+        controller_set_delivered(&loop->controller, &delivered);
     }
     controller_lock(&loop->controller);
 }
@@ -364,6 +377,10 @@ bool loop_act(loop_t *loop, loop_action_t action, int spring)
         break;
     case LOOP_ACTION_SPRING_GOOD:
         c->fault = ELECTRICS_FAULT_NONE;
+        break;
+    case LOOP_ACTION_SWITCH_CLOSED:
+    case LOOP_ACTION_SWITCH_GOOD:
+        c->switch_closed = action == LOOP_ACTION_SWITCH_CLOSED;
         break;
     case LOOP_ACTION_SENSOR_NACK:
         c->status = CONTROLLER_SENSOR_ABSENT;

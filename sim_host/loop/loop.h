@@ -25,6 +25,8 @@ typedef enum {
     LOOP_ACTION_SHORT_SPRING,  /* one spring: ELECTRICS_SHORT_OHM between its ends; it is not heated
                                 */
     LOOP_ACTION_SPRING_GOOD,   /* one spring: connected again */
+    LOOP_ACTION_SWITCH_CLOSED, /* one spring: its switch has failed closed: full duty for ever */
+    LOOP_ACTION_SWITCH_GOOD,
     LOOP_ACTION_SENSOR_NACK,   /* one sensor: no acknowledge */
     LOOP_ACTION_SENSOR_BUS,    /* all sensors: SDA stuck low */
     LOOP_ACTION_SENSOR_STALE,  /* one sensor: no new conversions, and it says so */

@@ -5,6 +5,7 @@
 #ifndef BOARD_TEST_H
 #define BOARD_TEST_H
 
+#include <cmath>
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
@@ -54,7 +55,7 @@ public:
     board_t *raw() { return board.get(); }
 
     /* Waits for the greeting. A board that was off takes its springs to be hot; a new one is told
-     * that they are cold. */
+     * that they are cold, and drives open loop unless the test says otherwise. */
     std::string boot(bool cold = true)
     {
         std::string text;
@@ -66,6 +67,8 @@ public:
         text += board.take_output();
         if (cold) {
             expect_ok("model cold");
+            expect_ok("policy open"); /* what a level gives is then a set current... */
+            board.run_ms(600.0);      /* ...at once, when no target walks any more */
         }
         return text;
     }
@@ -139,6 +142,15 @@ inline void make_niti(plant_t *plant)
 {
     switch_on(plant, "latent_heat");
     switch_on(plant, "resistance_phase");
+}
+
+inline double hottest_c(const rig &mega)
+{
+    double highest = -300.0;
+    for (unsigned k = 0; k < BOARD_CHANNELS; ++k) {
+        highest = std::fmax(highest, plant_temperature_c(mega.plant.get(), static_cast<int>(k)));
+    }
+    return highest;
 }
 
 /* Austenite, 0..1, as it is. */

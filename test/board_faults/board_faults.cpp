@@ -45,6 +45,52 @@ void an_open_spring_is_found_and_its_neighbours_go_on()
     only(*mega, 4, SAFETY_FAULT_OPEN_SPRING);
 }
 
+/* Ticks until the board has named it; every switch is off then. */
+unsigned named_after(rig &mega)
+{
+    for (unsigned ticks = 0; ticks < 100; ++ticks) {
+        if (mega.view().board_fault == SAFETY_FAULT_STUCK_ON) {
+            TEST_ASSERT_TRUE(board_all_off(mega.raw()));
+            TEST_ASSERT_EQUAL_INT(SAFETY_FAULT_STUCK_ON, mega.view().spring[4].fault);
+            const std::string text = mega.say("faults");
+            TEST_ASSERT_TRUE_MESSAGE(contains(text, "board: fault 11 stuck_on: cut the supply\r\n"),
+                                     text.c_str());
+            TEST_ASSERT_TRUE_MESSAGE(contains(text, "spring 5: fault 11 stuck_on"), text.c_str());
+            return ticks;
+        }
+        mega.run_ms(TICK_MS);
+    }
+    TEST_FAIL_MESSAGE("not named in 2 s");
+    return 0;
+}
+
+/* Driven (one and eight springs more), off, and after a stop: what is found first is what the
+ * current does while it is driven; without duty it is named. */
+void a_switch_that_fails_closed_is_named_and_everything_is_off()
+{
+    for (const char *const pattern : {"000010000", "010010000", "111111111", "000000000"}) {
+        for (const bool stopped : {false, true}) {
+            rig mega;
+            make_niti(mega.plant.get());
+            mega.boot();
+            mega.expect_ok(std::string("pattern ") + pattern);
+            mega.run_ms(600.0);
+            board_set_fault(mega.raw(), BOARD_FAULT_CLOSED, 4, true);
+            if (stopped) {
+                mega.board.send("!");
+            }
+            const unsigned ticks = named_after(mega);
+            std::printf("closed, %s%s: named after %u ticks, hottest %.1f degC\n", pattern,
+                        stopped ? ", stopped" : "", ticks, hottest_c(mega));
+            TEST_ASSERT_LESS_OR_EQUAL_UINT(15, ticks);
+            board_set_fault(mega.raw(), BOARD_FAULT_CLOSED, 4, false); /* the supply is cut */
+            mega.expect_ok("clear");
+            mega.run_ms(500.0);
+            TEST_ASSERT_EQUAL_UINT8(SAFETY_FAULT_NONE, mega.view().board_fault);
+        }
+    }
+}
+
 void a_short_is_off_within_half_a_second()
 {
     auto mega = driven();
@@ -276,6 +322,7 @@ int main()
     need_elf(elf());
     UNITY_BEGIN();
     RUN_TEST(an_open_spring_is_found_and_its_neighbours_go_on);
+    RUN_TEST(a_switch_that_fails_closed_is_named_and_everything_is_off);
     RUN_TEST(a_short_is_off_within_half_a_second);
     RUN_TEST(a_sensor_that_does_not_answer_is_absent);
     RUN_TEST(a_sensor_that_converts_no_more_is_stale);

@@ -37,6 +37,7 @@ public:
         options.on_mark = [](void *context, std::uint64_t cycle, unsigned, std::uint8_t value) {
             static_cast<probe *>(context)->marks.push_back({cycle, value});
         };
+        options.without_cut_off = true; /* the probe gives no pulses */
         board = board_create(&options, message, sizeof message);
         TEST_ASSERT_NOT_NULL_MESSAGE(board, message);
         board_run_ms(board, 2.0);

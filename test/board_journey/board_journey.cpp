@@ -1,6 +1,7 @@
 /* From power-on to eight springs held, with the README's words and nothing else: nobody tells the
  * board anything of its springs. */
 #include <algorithm>
+#include <vector>
 
 #include "board_test.h"
 
@@ -21,7 +22,6 @@ constexpr double HOTTEST_C = 120.0;
 void type_what_the_readme_says(rig &mega)
 {
     mega.expect_ok("pattern 111101111");
-    mega.expect_ok("policy precompensate");
 }
 
 bool eight_are_on(const rig &mega)
@@ -106,10 +106,59 @@ void the_readmes_words_bring_eight_springs_up_and_hold_them()
     expect_no_fault(*later);
 }
 
+/* What is typed, and for how many seconds nothing is typed after it. */
+struct typed {
+    const char *line;
+    unsigned then_s;
+};
+
+/* The hottest that a spring becomes. */
+double hottest_of(const std::vector<typed> &order)
+{
+    const auto mega = new_board();
+    double hottest_c = -273.0;
+    for (const typed &one : order) {
+        const std::string said = mega->say(one.line);
+        for (unsigned s = 0; s < one.then_s; ++s) {
+            mega->run_ms(1000.0);
+            for (unsigned k = 0; k < SPRINGS; ++k) {
+                hottest_c = std::max(hottest_c,
+                                     plant_temperature_c(mega->plant.get(), static_cast<int>(k)));
+            }
+        }
+        std::printf("  %s -> %s", one.line, said.c_str());
+    }
+    expect_no_fault(*mega);
+    std::printf("hottest: %.1f degC\n", hottest_c);
+    return hottest_c;
+}
+
+void any_order_of_the_readmes_words_is_safe()
+{
+    constexpr double limit_c = 110.0;
+    const std::vector<std::vector<typed>> orders = {
+        {{"pattern 111101111", 2}, {"model", 30}, {"policy precompensate", 90}},
+        {{"model cold", 1},
+         {"pattern 111101111", 60},
+         {"off all", 1},
+         {"model cold", 1},
+         {"pattern 111101111", 50}},
+        {{"policy open", 1},
+         {"pattern 111101111", 40},
+         {"off all", 1},
+         {"policy precompensate", 1},
+         {"model cold", 1},
+         {"pattern 111111111", 60}}};
+    for (const std::vector<typed> &order : orders) {
+        TEST_ASSERT_TRUE(hottest_of(order) < limit_c);
+    }
+}
+
 void a_host_that_leaves_takes_its_springs_with_it()
 {
     const auto mega = new_board();
     mega->expect_ok("$host_timeout_s=2");
+    mega->expect_ok("policy open"); /* driven at once */
     mega->expect_ok("on 1");
     mega->run_ms(1900.0);
     mega->board.send("?");
@@ -132,6 +181,7 @@ int main()
     need_elf(elf());
     UNITY_BEGIN();
     RUN_TEST(the_readmes_words_bring_eight_springs_up_and_hold_them);
+    RUN_TEST(any_order_of_the_readmes_words_is_safe);
     RUN_TEST(a_host_that_leaves_takes_its_springs_with_it);
     return UNITY_END();
 }

@@ -31,7 +31,7 @@ def main() -> int:
             [
                 program, "hil", "--port", board.port, "--duration", str(SIMULATED_S), "--json", str(result),
                 "--set", "array.rows=1", "--set", "array.cols=2",
-                "--send", "on 1", "--send", "on 3", "--send", "model", "--send", "frobnicate",
+                "--send", "policy open", "--send", "on 1", "--send", "on 3", "--send", "model", "--send", "frobnicate",
             ],
             check=False, capture_output=True, text=True, timeout=120,
         )  # fmt: skip
@@ -51,6 +51,21 @@ def main() -> int:
     assert summary["final_current_a"][1] == 0.0, summary
     # A 1 x 2 array: nothing is connected to channel 3.
     assert summary["final_current_a"][2] == 0.0, summary
+    with Board(program, elf, "--speed", "0.2") as board:
+        run = subprocess.run(
+            [
+                program, "hil", "--port", board.port, "--duration", "2.6", "--json", str(result),
+                "--set", "array.rows=1", "--set", "array.cols=2", "--closed", "1", "--closed-at", "1.2",
+                "--send", "policy open", "--send", "on 1", "--send", "on 2", "--send", "faults",
+            ],
+            check=False, capture_output=True, text=True, timeout=120,
+        )  # fmt: skip
+    print(run.stdout, run.stderr)
+    assert "board: fault 11 stuck_on: cut the supply" in run.stdout, run
+    summary = json.loads(result.read_text())
+    result.unlink()
+    assert summary["final_current_a"][0] > 10.0, summary
+    assert summary["final_current_a"][1] == 0.0, summary
     missing = subprocess.run(
         [program, "hil", "--port", "/no/such/port"],
         check=False,

@@ -106,8 +106,20 @@ def waits_for_a_slow_reader(program: str, elf: Path) -> None:
             cells = port.readline().split(b",")
             if len(cells) > 30:
                 times.append(float(cells[0]))
+                port.write(b"\n" * (len(times) % 20 == 0))  # it is still there
         steps = [later - earlier for earlier, later in itertools.pairwise(times)]
         assert max(steps) < 0.09, max(steps)  # a lost row would make it 0.1
+
+
+def a_host_alive_by_the_wall_clock_is_not_silent(program: str, elf: Path) -> None:
+    """As fast as it goes, seconds of the board pass in an instant of the host: its timeout is then by the wall clock."""
+    with Board(program, elf, "--speed", "max") as board, first_contact(board) as port:
+        for line in ("model cold", "$host_timeout_s=5", "telemetry csv 20", "on 1"):
+            assert ask(port, line)[-1] == "ok", line
+        begun = time.monotonic()
+        while b"fault_16" not in port.readline():
+            assert time.monotonic() < begun + 30.0
+        assert time.monotonic() - begun > 4.5, time.monotonic() - begun
 
 
 def keeps_its_eeprom(program: str, elf: Path, folder: Path) -> None:
@@ -140,7 +152,8 @@ def thermometers_beside_the_board(program: str, elf: Path, folder: Path) -> None
     rates = ("--thermometer-rate", "5", "--thermometer-noise", "0.5", "--thermometer-springs", "2,9")
     with Board(program, elf, "--speed", "max", "--duration", "40", "--thermometers", str(log), *rates) as board:
         assert board.process.wait(timeout=100) == 0
-    header, *lines = log.read_text().splitlines()
+    tool, header, *lines = log.read_text().splitlines()
+    assert tool.startswith("# tool: ninespring-sim "), tool  # so that another run may replace it
     assert header == "time_s,t2_c,t9_c", header
     rows = [[float(cell) for cell in line.split(",")] for line in lines]
     assert len(rows) == 201, len(rows)  # 0 to 40 s
@@ -197,6 +210,7 @@ def main() -> int:
     talks_like_a_board(program, elf)
     survives_clients_that_leave(program, elf)
     waits_for_a_slow_reader(program, elf)
+    a_host_alive_by_the_wall_clock_is_not_silent(program, elf)
     keeps_its_eeprom(program, elf, Path.cwd())
     ends_cleanly(program, elf)
     thermometers_beside_the_board(program, elf, Path.cwd())

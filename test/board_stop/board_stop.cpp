@@ -1,6 +1,8 @@
 /* `!` switches every output off within 1 ms, whatever the board is doing; counted in CPU cycles. */
 #include "board_test.h"
 
+#include <vector>
+
 using namespace board_test;
 
 namespace
@@ -141,6 +143,103 @@ void a_line_right_behind_the_stop_is_obeyed_at_any_moment_of_a_tick()
     }
 }
 
+/* --- bits that turn over by themselves ------------------------------------------------------ */
+
+constexpr unsigned DDRE = 0x2D, DDRH = 0x101, DDRL = 0x10A;
+constexpr double TICK_MS = CONTROLLER_TICK_MS + 3.0; /* one of the chip's lies in it, whole */
+
+struct bit {
+    unsigned address;
+    std::uint8_t mask;
+};
+
+/* Of the nine outputs: PORT and DDR of their pins, and timers 3 to 5 but for their counters. */
+std::vector<bit> bits_of_the_outputs()
+{
+    std::vector<bit> all;
+    for (const unsigned ddr : {DDRE, DDRH, DDRL}) {
+        for (const unsigned address : {ddr, ddr + 1}) {
+            for (int k = 3; k <= 5; ++k) {
+                all.push_back({address, static_cast<std::uint8_t>(1u << k)});
+            }
+        }
+    }
+    for (const unsigned timer : {0x90u, 0xA0u, 0x120u}) {
+        for (const unsigned offset : {0u, 1u, 2u, 6u, 7u, 8u, 9u, 10u, 11u, 12u, 13u}) {
+            for (int k = 0; k < 8; ++k) {
+                all.push_back({timer + offset, static_cast<std::uint8_t>(1u << k)});
+            }
+        }
+    }
+    return all;
+}
+
+std::string text_of(const bit &one)
+{
+    char text[40];
+    std::snprintf(text, sizeof text, "register 0x%03X, bits 0x%02X", one.address, one.mask);
+    return text;
+}
+
+void stops_whatever_bit_of_an_output_has_turned_over()
+{
+    rig mega;
+    all_on(mega);
+    for (const bit &one : bits_of_the_outputs()) {
+        board_flip_register(mega.raw(), one.address, one.mask);
+        const double ms = off_after_ms(mega);
+        TEST_ASSERT_TRUE_MESSAGE(ms <= LIMIT_MS, text_of(one).c_str());
+        mega.run_ms(2.0 * TICK_MS);
+        TEST_ASSERT_TRUE_MESSAGE(board_all_off(mega.raw()), text_of(one).c_str());
+        mega.expect_ok("clear");
+        mega.expect_ok("on all 30");
+        mega.run_ms(2.0 * TICK_MS);
+        for (unsigned k = 0; k < BOARD_CHANNELS; ++k) {
+            TEST_ASSERT_TRUE_MESSAGE(board_duty(mega.raw(), k) > 0.0, text_of(one).c_str());
+        }
+    }
+}
+
+void off_is_off_again_within_a_tick_whatever_bit_turns_over()
+{
+    rig mega;
+    mega.boot();
+    for (const bit &one : bits_of_the_outputs()) {
+        board_flip_register(mega.raw(), one.address, one.mask);
+        mega.run_ms(TICK_MS);
+        TEST_ASSERT_TRUE_MESSAGE(board_all_off(mega.raw()), text_of(one).c_str());
+    }
+    mega.run_ms(500.0);
+    TEST_ASSERT_EQUAL_UINT8(SAFETY_FAULT_NONE, mega.view().board_fault);
+    mega.expect_ok("on all");
+    mega.run_ms(500.0);
+    for (unsigned k = 0; k < BOARD_CHANNELS; ++k) {
+        TEST_ASSERT_DOUBLE_WITHIN(0.05, 1.5, board_current_a(mega.raw(), k));
+    }
+}
+
+/* 14 A may flow for a tick, from which the current loop has to recover: nothing is latched. */
+void a_driven_spring_has_its_current_again_whatever_bit_turns_over()
+{
+    rig mega;
+    all_on(mega);
+    mega.expect_ok("on all 50");
+    mega.run_ms(300.0);
+    for (const bit &one : bits_of_the_outputs()) {
+        const bool port_h_or_timer_4 = one.address / 0x10u == 0x10u || one.address / 0x10u == 0xAu;
+        if (!port_h_or_timer_4 || (one.mask & 0x29u) == 0) {
+            continue; /* some, as each takes its time */
+        }
+        board_flip_register(mega.raw(), one.address, one.mask);
+        mega.run_ms(1300.0); /* two windows of the circuit's check */
+        for (unsigned k = 0; k < BOARD_CHANNELS; ++k) {
+            TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(0.2, 0.75, board_current_a(mega.raw(), k),
+                                              text_of(one).c_str());
+        }
+    }
+    TEST_ASSERT_EQUAL_UINT8(SAFETY_FAULT_NONE, mega.view().board_fault);
+}
+
 void the_console_still_answers_and_the_board_can_be_cleared()
 {
     rig mega;
@@ -172,6 +271,9 @@ int main()
     RUN_TEST(stops_in_the_middle_of_telemetry);
     RUN_TEST(what_was_sent_before_the_stop_does_not_start_anything_after);
     RUN_TEST(a_line_right_behind_the_stop_is_obeyed_at_any_moment_of_a_tick);
+    RUN_TEST(stops_whatever_bit_of_an_output_has_turned_over);
+    RUN_TEST(off_is_off_again_within_a_tick_whatever_bit_turns_over);
+    RUN_TEST(a_driven_spring_has_its_current_again_whatever_bit_turns_over);
     RUN_TEST(the_console_still_answers_and_the_board_can_be_cleared);
     return UNITY_END();
 }

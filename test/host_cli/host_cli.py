@@ -3,6 +3,7 @@
 import csv
 import json
 import os
+import re
 import subprocess
 import sys
 import tempfile
@@ -14,6 +15,7 @@ SCENARIO = """[scenario]
 duration_s = 20
 log_interval_s = 0.5
 seed = 5
+policy = open
 [plant]
 effects = latent_heat, resistance_phase
 [chip]
@@ -37,6 +39,7 @@ def rows_of(path: Path) -> list[dict[str, str]]:
 EVENTS = """[scenario]
 duration_s = 40
 log_interval_s = 1
+policy = open
 [chip]
 open_current_a = 1
 [events]
@@ -144,6 +147,29 @@ class Arguments(Case):
         self.refused("", "not a serial port", "hil", "--port", "/dev/null")
         self.refused("none.ini: ", "cannot be read", "hil", "--port", "/dev/null", "--scenario", "none.ini")
         self.refused("--set 'loss=1': ", "loss", "hil", "--port", "/dev/null", "--set", "loss=1")
+
+    def test_every_number_has_a_finite_range(self) -> None:
+        """All numeric options that there are, by the commands' own help."""
+        self.file("s.ini", SCENARIO)
+        before = {
+            "run": ("run", "s.ini", "-o", "y.csv"),
+            "hil": ("hil", "--port", "/dev/null"),
+            "board": ("board", "--elf", "none.elf"),
+        }
+        with_another = {"--closed-at": ("--closed", "1")}
+        commands = [line.split()[0] for line in self.works("--help").split("Subcommands:")[1].splitlines() if line]
+        walked = set()
+        for command, arguments in before.items():
+            if command not in commands:  # board is where libsimavr is
+                continue
+            for option in set(
+                re.findall(r"(--seed|--speed|--[a-z-]+(?= (?:FLOAT|INT|UINT)))", self.works(command, "--help"))
+            ):
+                walked.add(option)
+                more = with_another.get(option, ("--thermometers", "t.csv") if "thermometer-" in option else ())
+                for value in ("nan", "inf", "-inf", "-1", "1e300", "9" * 30, "soon", "1,5"):
+                    self.refused("", option, *arguments, *more, option, value)
+        self.assertLessEqual({"--seed", "--duration", "--closed", "--closed-at"}, walked)
 
     def test_outputs_are_checked_before_the_work(self) -> None:
         scenario = self.file("s.ini", SCENARIO)
@@ -302,20 +328,22 @@ class Run(Case):
         ohm = [float(row["v3_v"]) / float(row["i3_a"]) for row in (rows[15], rows[20])]
         self.assertAlmostEqual(ohm[1] - ohm[0], 0.05, delta=0.008)  # 4 mV steps at 1 A
         refused = self.scenario_refused
-        refused("s.ini:15:", "belongs to 'contact_resistance', which is off", SCENARIO + "at 1 = set contact_ohm 1\n")
-        refused("s.ini:15:", "no parameter", SCENARIO + "at 1 = set contact 1\n")
-        refused("s.ini:15:", "austenite_start_c must be", SCENARIO + "at 1 = set austenite_start_c 150\n")
-        refused("s.ini:15:", "write `fail lie K CURRENT_SCALE VOLTAGE_SCALE`", SCENARIO + "at 1 = fail lie 2\n")
+        refused("s.ini:16:", "belongs to 'contact_resistance', which is off", SCENARIO + "at 1 = set contact_ohm 1\n")
+        refused("s.ini:16:", "no parameter", SCENARIO + "at 1 = set contact 1\n")
+        refused("s.ini:16:", "austenite_start_c must be", SCENARIO + "at 1 = set austenite_start_c 150\n")
+        refused("s.ini:16:", "write `fail lie K CURRENT_SCALE VOLTAGE_SCALE`", SCENARIO + "at 1 = fail lie 2\n")
 
     def test_an_array_on_several_boards(self) -> None:
         """Two boards of 2 x 2 side by side, the second with a current of its own."""
-        wide = "[scenario]\nduration_s = 20\n[array]\nrows = 2\ncols = 4\nboard_rows = 2\nboard_cols = 2\n"
+        wide = (
+            "[scenario]\nduration_s = 20\npolicy = open\n[array]\nrows = 2\ncols = 4\nboard_rows = 2\nboard_cols = 2\n"
+        )
         wide += "[plant]\neffects = latent_heat, resistance_phase\n[chip]\nopen_current_a = 1.5\n"
         wide += "[board.2]\nopen_current_a = 1\n[events]\nat 1 = pattern 11111101\n"
         last = rows_of_text(self.run_it("a.csv", scenario=wide))[-2]
         for spring, current_a in ((1, 1.5), (2, 1.5), (3, 1.0), (4, 1.0), (5, 1.5), (6, 1.5), (7, 0.0), (8, 1.0)):
             self.assertAlmostEqual(float(last[f"i{spring}_a"]), current_a, delta=0.05)
-        self.scenario_refused("s.ini:16:", "on two boards", wide + "at 2 = fail swap 1 3\n")
+        self.scenario_refused("s.ini:17:", "on two boards", wide + "at 2 = fail swap 1 3\n")
 
     def test_what_the_chip_leaves_out_is_told(self) -> None:
         path = self.file("s.ini", SCENARIO)
@@ -420,7 +448,7 @@ class Run(Case):
         def targets(text: str, *more: object) -> list[str]:
             return [row["s1_a"] for row in rows_of_text(self.run_it("a.csv", *more, scenario=text))]
 
-        named = SCENARIO.replace("seed = 5", "seed = 5\npolicy = precompensate")
+        named = SCENARIO.replace("policy = open", "policy = precompensate")
         precompensate = targets(named)
         self.assertNotEqual(precompensate, targets(SCENARIO))
         self.assertEqual(precompensate, targets(SCENARIO, "--policy", "precompensate"))
@@ -435,7 +463,7 @@ class Run(Case):
         rows = rows_of_text(self.run_it("a.csv", scenario=told))
         self.assertLess(float(rows[-1]["m1_c"]), float(rows[-1]["p1_c"]) - 10)
         for line, place, said in (
-            ("$rows=1\n", "s.ini:8:9: ", "is of 1 x 3 springs, the scenario of 3 x 3"),
+            ("$rows=1\n", "s.ini:9:9: ", "is of 1 x 3 springs, the scenario of 3 x 3"),
             ("[array]\nrows = 1\n", "fitted.txt:1:1: ", "`ninespring export --model model.toml -o FILE`"),
             ("# a\n$loss_w_per_kk=1\n", "fitted.txt:2:2: ", "did you mean loss_w_per_k?"),
             ("$loss_w_per_k=9\n", "fitted.txt:1:15: ", "must be"),
@@ -445,8 +473,20 @@ class Run(Case):
 
     def test_output_is_replaced_whole(self) -> None:
         self.output.write_text("old")
+        self.scenario_refused(f"{self.output}: ", "not written by ninespring-sim", SCENARIO)
+        self.output.write_text("# tool: ninespring-sim 0.0.1\nold")
+        self.json.write_text('{\n  "schema": "ninespring.run/1"\n}\n')
+        self.works("paper", "-o", self.output, "--json", self.json)
+        self.json.write_text("{}\n")
+        self.scenario_refused(f"{self.json}: ", "not written by ninespring-sim", SCENARIO)
+        self.json.unlink()
+        self.output.write_text("# tool: ninespring 0.0.1\nold")
+        self.refused(f"{self.output}: ", "may be a measurement", "paper", "-o", self.output)
+        self.output.unlink()
+        self.works("run", self.file("s.ini", SCENARIO), "-o", self.output)
+        old = self.output.read_text()
         self.scenario_refused("s.ini:4:8: ", "seed", SCENARIO.replace("seed = 5", "seed = x"))
-        self.assertEqual(self.output.read_text(), "old")
+        self.assertEqual(self.output.read_text(), old)
         self.works("run", self.file("s.ini", SCENARIO), "-o", self.output)
         self.assertEqual(sorted(path.name for path in self.folder.iterdir()), ["out.csv", "s.ini"])
 
@@ -464,18 +504,18 @@ class Run(Case):
 class BadScenario(Case):
     def test_refused_with_place(self) -> None:
         refused = self.scenario_refused
-        refused("s.ini:16:1: ", "appears twice", SCENARIO + "[chip]\nopen_current_a = 1\n")
-        refused("s.ini:6:1: ", "no key", SCENARIO.replace("[plant]", "[array]"))
-        refused("s.ini:15:1: ", "there is no section", SCENARIO + "[plants]\n")
+        refused("s.ini:17:1: ", "appears twice", SCENARIO + "[chip]\nopen_current_a = 1\n")
+        refused("s.ini:7:1: ", "no key", SCENARIO.replace("[plant]", "[array]"))
+        refused("s.ini:16:1: ", "there is no section", SCENARIO + "[plants]\n")
         refused("s.ini:2:14: ", "decimal comma", SCENARIO.replace("= 20", "= 20,5"))
         refused("s.ini:2:14: ", "not a number", SCENARIO.replace("= 20", "= 20 min"))
         refused("s.ini:2:14: ", "finite", SCENARIO.replace("= 20", "= nan"))
-        refused("s.ini:14:", "no word 'dance'", SCENARIO.replace("off all", "dance"))
+        refused("s.ini:15:", "no word 'dance'", SCENARIO.replace("off all", "dance"))
         refused("s.ini:1:1: ", "empty", "")
-        refused("s.ini:15:198: ", "at most 197", SCENARIO + "x" * 1000000)
-        refused("s.ini:15:1: ", "neither", SCENARIO + "at 16")
+        refused("s.ini:16:198: ", "at most 197", SCENARIO + "x" * 1000000)
+        refused("s.ini:16:1: ", "neither", SCENARIO + "at 16")
         refused("s.ini:1:1: ", "UTF-16", SCENARIO.encode("utf-16"))
-        refused("s.ini:15:1: ", "zero byte", SCENARIO.encode() + b"\0")
+        refused("s.ini:16:1: ", "zero byte", SCENARIO.encode() + b"\0")
 
     def test_names_of_the_plant_and_the_chip(self) -> None:
         plant = "[plant]\n{}\n[scenario]\nduration_s = 1\n"

@@ -18,6 +18,7 @@ static const unsigned patterns[] = {0x1EF /* all but the centre */, 0x1FF, 0x010
 void setUp(void)
 {
     controller_settings_default(&settings);
+    settings.policy.policy = DRIVE_POLICY_OPEN;
     plant = plant_create(3, 3);
     TEST_ASSERT_NOT_NULL(plant);
     TEST_ASSERT_EQUAL(PLANT_OK, plant_set_effect(plant, "latent_heat", true));
@@ -352,6 +353,70 @@ static void frozen_lying_and_swapped_sensors_show_what_they_should_not(void)
     TEST_ASSERT_FALSE(loop_scale_sensor(loop, 0, (double)NAN, 1.0));
 }
 
+static uint32_t ticks_until_named(void)
+{
+    for (uint32_t ticks = 0; ticks < 200; ticks++) {
+        if (controller_board_fault(loop_controller(loop)) == SAFETY_FAULT_STUCK_ON) {
+            TEST_ASSERT_EQUAL(SAFETY_FAULT_STUCK_ON, controller_fault(loop_controller(loop), 4));
+            for (int k = 0; k < 9; k++) {
+                TEST_ASSERT_EQUAL_UINT16(0, loop_outputs(loop)->duty[k]);
+            }
+            return ticks;
+        }
+        loop_tick(loop);
+    }
+    TEST_FAIL_MESSAGE("not named in 4 s");
+    return 0;
+}
+
+/* Driven alone, with all others, not at all; and after a stop. */
+static void switch_that_fails_closed_is_named_within_15_ticks(void)
+{
+    static const unsigned driven[] = {0x010, 0x1FF, 0x000};
+    for (unsigned n = 0; n < 6; n++) {
+        start();
+        command(driven[n / 2]);
+        loop_advance(loop, 3.0);
+        TEST_ASSERT_TRUE(loop_act(loop, LOOP_ACTION_SWITCH_CLOSED, 4));
+        if (n % 2 != 0) {
+            controller_emergency_stop(loop_controller(loop));
+        }
+        TEST_ASSERT_LESS_OR_EQUAL_UINT32(15, ticks_until_named());
+        TEST_ASSERT_TRUE(loop_current_a(loop, 4) >
+                         10.0);  /* nothing but the supply's switch helps */
+        loop_advance(loop, 0.1); /* the cut-off opens, and `clear` does not close it */
+        TEST_ASSERT_TRUE(loop_current_a(loop, 4) == 0.0);
+        TEST_ASSERT_FALSE(controller_set_supply(loop_controller(loop), true));
+        controller_clear_faults(loop_controller(loop));
+        loop_advance(loop, 1.0);
+        TEST_ASSERT_TRUE(loop_current_a(loop, 4) == 0.0);
+        TEST_ASSERT_TRUE(loop_act(loop, LOOP_ACTION_SWITCH_GOOD, 4));
+        TEST_ASSERT_TRUE(controller_set_supply(loop_controller(loop), true));
+        loop_advance(loop, 1.0);
+        TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, controller_board_fault(loop_controller(loop)));
+    }
+}
+
+/* Near misses: switched on and off again and again; and a sensor that froze before its spring was
+ * switched off. */
+static void what_flows_no_more_is_not_named(void)
+{
+    start();
+    for (int n = 0; n < 100; n++) {
+        command(n % 2 == 0 ? 0x1FF : 0x000);
+        loop_advance(loop, 0.02 * (5 + n % 7));
+    }
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, controller_board_fault(loop_controller(loop)));
+    command(0x1FF);
+    loop_advance(loop, 2.0);
+    TEST_ASSERT_TRUE(loop_act(loop, LOOP_ACTION_SENSOR_FREEZE, 4));
+    command(0x1EF);
+    loop_advance(loop, 2.0);
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, controller_board_fault(loop_controller(loop)));
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_SENSOR_MISMATCH, controller_fault(loop_controller(loop), 4));
+    TEST_ASSERT_TRUE(loop_outputs(loop)->duty[0] > 0);
+}
+
 static void a_contact_in_mid_run_takes_voltage_and_heats_nothing(void)
 {
     start();
@@ -445,6 +510,7 @@ static void watchdog_keeps_the_model_as_it_is(void)
     settings.policy.open_current_ma = 2000;
     start();
     controller_t *controller = loop_controller(loop);
+    controller_set_temperature(controller, 20 * 128); /* a guess would not be kept */
     for (int n = 0; n < 60; n++) {
         controller_unlock(controller);
         command(n % 20 < 14 ? 0x1EF : 0);
@@ -528,6 +594,8 @@ int main(void)
     RUN_TEST(stuck_bus_switches_everything_off);
     RUN_TEST(a_repair_ends_its_own_failure_only);
     RUN_TEST(frozen_lying_and_swapped_sensors_show_what_they_should_not);
+    RUN_TEST(switch_that_fails_closed_is_named_within_15_ticks);
+    RUN_TEST(what_flows_no_more_is_not_named);
     RUN_TEST(a_contact_in_mid_run_takes_voltage_and_heats_nothing);
     RUN_TEST(the_chip_believes_the_ambient_that_it_is_told);
     RUN_TEST(sensor_that_reset_once_is_no_fault);

@@ -29,6 +29,8 @@ static void start(void)
 void setUp(void)
 {
     controller_settings_default(&settings);
+    settings.policy.policy =
+        DRIVE_POLICY_OPEN; /* most of these are of the tick, not of the policy */
     for (int k = 0; k < CONTROLLER_MAX_SPRINGS; k++) {
         spring_mohm[k] = 175;
     }
@@ -313,6 +315,109 @@ static void ceiling_begins_where_it_was_given_nothing_yet(void)
     for (uint8_t k = 0; k < settings.model.rows * settings.model.columns; k++) {
         TEST_ASSERT_EQUAL_FLOAT(20.0f, temperature_ceiling_c(&controller.ceiling, k));
     }
+}
+
+/* All that can be said of a spring which this board has heated: none of it takes a kelvin away. */
+static void no_hint_takes_heat_that_was_given(void)
+{
+    controller_settings_t other;
+    thermal_model_state_t cold;
+    for (int hint = 0; hint < 7; hint++) {
+        controller_settings_default(&settings);
+        settings.policy.policy = DRIVE_POLICY_OPEN;
+        start();
+        controller_get_model_state(&controller, &cold);
+        controller_set_temperature(&controller, AMBIENT_C7);
+        TEST_ASSERT_EQUAL_INT16(AMBIENT_C7, controller_temperature_c7(&controller, 4));
+        controller_set_target(&controller, 4, 1000);
+        run(50u * 60u);
+        controller_stop(&controller);
+        run(50u * 12u);
+        other = settings;
+        const int16_t before_c7 = controller_temperature_c7(&controller, 4);
+        const float given_c = controller_delivered_c(&controller, 4);
+        TEST_ASSERT_GREATER_THAN_INT16(40 * 128, before_c7);
+        TEST_ASSERT_TRUE(controller_is_warm(&controller, 4));
+        TEST_ASSERT_UINT16_WITHIN(1, 12, controller_rest_s(&controller, 4));
+        bool model_stays = true;
+        switch (hint) {
+        case 0:
+            break;
+        case 1:
+            TEST_ASSERT_FALSE(controller_set_model_state(&controller, &cold));
+            break;
+        case 2: /* another size and back: what is believed begins anew, from unknown */
+            other.model.rows = 1;
+            TEST_ASSERT_TRUE(controller_apply_settings(&controller, &other, NULL));
+            TEST_ASSERT_TRUE(controller_apply_settings(&controller, &settings, NULL));
+            model_stays = false;
+            break;
+        case 3: /* it seems to cool at once */
+            inputs.ambient_c7 = -40 * 128;
+            run(50u * 10u);
+            inputs.ambient_c7 = AMBIENT_C7;
+            model_stays = false;
+            break;
+        case 4:
+            other.model.loss_uw_per_k = 60000;
+            other.model.loss_fan_uw_per_k = 60000;
+            TEST_ASSERT_TRUE(controller_apply_settings(&controller, &other, NULL));
+            TEST_ASSERT_EQUAL_INT16(before_c7, controller_temperature_c7(&controller, 4));
+            run(50u * 10u);
+            model_stays = false;
+            break;
+        case 5:
+            other.model.heat_capacity_mj_per_k *= 4u;
+            TEST_ASSERT_TRUE(controller_apply_settings(&controller, &other, NULL));
+            break;
+        default:
+            other.model.heat_capacity_mj_per_k /= 2u;
+            other.model.loss_scale_permille[4] = 2000;
+            TEST_ASSERT_TRUE(controller_apply_settings(&controller, &other, NULL));
+            break;
+        }
+        controller_set_temperature(&controller, AMBIENT_C7); /* `model cold` */
+        TEST_ASSERT_TRUE(controller_is_warm(&controller, 4));
+        TEST_ASSERT_TRUE(controller_delivered_c(&controller, 4) > given_c - 8.0f);
+        if (model_stays) {
+            TEST_ASSERT_INT16_WITHIN(1, before_c7, controller_temperature_c7(&controller, 4));
+        }
+    }
+}
+
+/* Open loop heats springs of which nobody knows anything, so their model is no more than a guess:
+ * what they were given is known all the same. */
+static void heat_that_was_given_is_kept_over_a_warm_reset(void)
+{
+    settings.policy.policy = DRIVE_POLICY_OPEN;
+    start();
+    controller_set_target(&controller, 4, 1000);
+    run(50u * 40u);
+    TEST_ASSERT_FALSE(controller_is_known(&controller));
+    const float given_c = controller_delivered_c(&controller, 4);
+    temperature_ceiling_t delivered;
+    controller_get_delivered(&controller, &delivered);
+    start();
+    TEST_ASSERT_FALSE(controller_is_warm(&controller, 4));
+    controller_set_delivered(&controller, &delivered);
+    TEST_ASSERT_TRUE(controller_is_warm(&controller, 4));
+    TEST_ASSERT_EQUAL_FLOAT(given_c, controller_delivered_c(&controller, 4));
+    TEST_ASSERT_UINT16_WITHIN(1, 0, controller_rest_s(&controller, 4));
+    run(50u * 10u);
+    TEST_ASSERT_UINT16_WITHIN(1, 10, controller_rest_s(&controller, 4));
+}
+
+/* And when it has cooled, the hint is taken again. */
+static void a_hint_is_taken_once_it_has_cooled(void)
+{
+    controller_set_temperature(&controller, AMBIENT_C7);
+    controller_set_target(&controller, 4, 1000);
+    run(50u * 60u);
+    controller_stop(&controller);
+    run(50u * 600u);
+    TEST_ASSERT_FALSE(controller_is_warm(&controller, 4));
+    controller_set_temperature(&controller, AMBIENT_C7);
+    TEST_ASSERT_EQUAL_INT16(AMBIENT_C7, controller_temperature_c7(&controller, 4));
 }
 
 /* The near miss: from the same cold belief, a current that keeps it below the trip for ever. */
@@ -646,6 +751,9 @@ int main(void)
     RUN_TEST(hot_model_trips);
     RUN_TEST(ceiling_trips_whatever_is_believed);
     RUN_TEST(ceiling_begins_where_it_was_given_nothing_yet);
+    RUN_TEST(heat_that_was_given_is_kept_over_a_warm_reset);
+    RUN_TEST(no_hint_takes_heat_that_was_given);
+    RUN_TEST(a_hint_is_taken_once_it_has_cooled);
     RUN_TEST(ceiling_lets_a_current_pass_that_cannot_overheat);
     RUN_TEST(frozen_sensor_is_found_within_two_seconds_and_stops_its_spring_alone);
     RUN_TEST(another_shunt_is_found_before_it_is_hot);

@@ -111,6 +111,7 @@ static unsigned saved_after(const spring_learnt_t *change)
 {
     learn(0, change);
     writes = 0;
+    store.refined = 0;
     seconds(LEARNT_STORE_PAUSE_S);
     return writes;
 }
@@ -140,6 +141,7 @@ static void only_what_differs_enough_is_worth_a_save_and_that_once_in_ten_minute
     TEST_ASSERT_TRUE(saved_after(&next) > 0);
 
     /* no sooner than so long after the save before */
+    store.refined = 0;
     next.austenite_ohm *= 1.03f;
     learn(0, &next);
     for (writes = 0; writes == 0;) {
@@ -148,10 +150,36 @@ static void only_what_differs_enough_is_worth_a_save_and_that_once_in_ten_minute
     next.austenite_ohm *= 1.03f;
     learn(0, &next);
     writes = 0;
-    seconds(LEARNT_STORE_PAUSE_S - 1u);
+    seconds(2u * LEARNT_STORE_PAUSE_S - 1u);
     TEST_ASSERT_EQUAL_UINT(0, writes);
     seconds(1);
     TEST_ASSERT_TRUE(writes > 0);
+}
+
+/* Learning that never settles: 7 saves in the first day, fewer in those that follow. */
+static void what_never_settles_is_saved_ever_less_often(void)
+{
+    spring_learnt_t next = numbers;
+    unsigned saves[2] = {0, 0};
+    hold(0, DRIVE_POLICY_STAGE_HOLD);
+    learn(0, &numbers);
+    for (unsigned day = 0; day < 2u; day++) {
+        for (unsigned minute = 0; minute < 24u * 60u; minute++) {
+            next.austenite_ohm = minute % 2u == 0 ? 0.21f : 0.23f;
+            learn(0, &next);
+            writes = 0;
+            for (unsigned s = 0; s < 60u; s++) {
+                learnt_store_second(&store, &controller);
+            }
+            while (learnt_store_step(&store) == RECORD_SAVE_BUSY) {
+            }
+            saves[day] += writes > 0;
+        }
+    }
+    TEST_ASSERT_LESS_OR_EQUAL_UINT(9, saves[0]);
+    TEST_ASSERT_GREATER_OR_EQUAL_UINT(5, saves[0]);
+    TEST_ASSERT_LESS_OR_EQUAL_UINT(3, saves[1]);
+    TEST_ASSERT_GREATER_OR_EQUAL_UINT(1, saves[1]);
 }
 
 static void wherever_the_power_is_cut_the_old_or_the_new_is_whole(void)
@@ -242,6 +270,7 @@ int main(void)
     RUN_TEST(it_is_saved_a_minute_after_all_that_are_driven_are_held_and_no_sooner);
     RUN_TEST(nothing_driven_or_nothing_learnt_writes_nothing);
     RUN_TEST(only_what_differs_enough_is_worth_a_save_and_that_once_in_ten_minutes);
+    RUN_TEST(what_never_settles_is_saved_ever_less_often);
     RUN_TEST(wherever_the_power_is_cut_the_old_or_the_new_is_whole);
     RUN_TEST(clear_forgets_in_memory_and_over_power_off);
     RUN_TEST(a_loss_that_was_learnt_beside_another_model_is_left_out);

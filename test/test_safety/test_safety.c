@@ -16,7 +16,7 @@ static const safety_sample_t running = {.sensor_status = 0,
                                         .voltage_mv = 285, /* 190 mohm */
                                         .expected_ma = 1500,
                                         .temperature_c7 = 90 * 128};
-static const safety_sample_t off = {.temperature_c7 = 20 * 128};
+static const safety_sample_t off = {.off = true, .temperature_c7 = 20 * 128};
 
 void setUp(void)
 {
@@ -223,15 +223,94 @@ static void frozen_sensor_is_no_current_in_a_spring_that_is_off(void)
     safety_trip(&safety, 4, SAFETY_FAULT_SENSOR_MISMATCH);
     safety_sample_t sample = running;
     sample.expected_ma = 0;
+    sample.off = true;
     ticks(4, &sample, 100);
     TEST_ASSERT_EQUAL(SAFETY_FAULT_SENSOR_MISMATCH, safety_fault(&safety, 4));
     TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, safety_board_fault(&safety));
-    TEST_ASSERT_TRUE(safety_is_frozen(&safety, 4, sample.current_ma));
+    TEST_ASSERT_FALSE(safety_tick_spring(&safety, 4, &sample));
     sample.current_ma++; /* it lives: that current flows */
-    ticks(4, &sample, 1);
-    TEST_ASSERT_FALSE(safety_is_frozen(&safety, 4, sample.current_ma));
+    TEST_ASSERT_TRUE(safety_tick_spring(&safety, 4, &sample));
     ticks(4, &sample, parameters.bad_samples - 1u);
     TEST_ASSERT_EQUAL(SAFETY_FAULT_STUCK_ON, safety_board_fault(&safety));
+}
+
+/* Switched off before anything was noticed; and it freezes no less for being cleared. */
+static void sensor_that_goes_on_showing_what_flowed_is_frozen(void)
+{
+    safety_sample_t sample = running;
+    ticks(4, &sample, 10);
+    sample.expected_ma = 0;
+    ticks(4, &sample, 1); /* of the moment before, in part */
+    sample.off = true;
+    for (uint8_t cleared = 0; cleared < 2; cleared++) {
+        ticks(4, &sample, parameters.bad_samples - 1u);
+        TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, safety_fault(&safety, 4));
+        ticks(4, &sample, 100);
+        TEST_ASSERT_EQUAL(SAFETY_FAULT_SENSOR_MISMATCH, safety_fault(&safety, 4));
+        TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, safety_board_fault(&safety));
+        safety_clear(&safety);
+    }
+    sample.current_ma--;
+    ticks(4, &sample, parameters.bad_samples);
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_STUCK_ON, safety_board_fault(&safety));
+}
+
+/* A switch that is closed shows the end of the sensor, on and off alike. */
+static void current_that_no_output_gives_is_no_frozen_sensor(void)
+{
+    safety_sample_t sample = {
+        .current_ma = 3200, .voltage_mv = 2450, .expected_ma = 1500, .temperature_c7 = 0};
+    ticks(4, &sample, 2);
+    sample.off = true;
+    ticks(4, &sample, parameters.bad_samples);
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_STUCK_ON, safety_board_fault(&safety));
+}
+
+/* Whatever was found before it, of the spring and of the board, and while that goes on. */
+static void current_without_duty_overrides_every_other_fault(void)
+{
+    for (int fault = 0; fault < SAFETY_FAULT_COUNT; fault++) {
+        setUp();
+        ticks(4, &running, 10);
+        safety_sample_t sample = {.current_ma = 3200, .voltage_mv = 2450, .expected_ma = 1500};
+        safety_trip(&safety, 4, (safety_fault_t)fault);
+        safety_emergency_stop(&safety);
+        ticks(4, &sample, 20); /* as over_current and high_resistance, too */
+        sample.off = true;
+        ticks(4, &sample, parameters.bad_samples - 1u);
+        TEST_ASSERT_EQUAL(SAFETY_FAULT_EMERGENCY_STOP, safety_board_fault(&safety));
+        ticks(4, &sample, 1);
+        TEST_ASSERT_EQUAL(SAFETY_FAULT_STUCK_ON, safety_board_fault(&safety));
+        TEST_ASSERT_EQUAL(SAFETY_FAULT_STUCK_ON, safety_fault(&safety, 4));
+        TEST_ASSERT_FALSE(safety_allows(&safety, 0));
+        safety_emergency_stop(&safety);
+        TEST_ASSERT_EQUAL(SAFETY_FAULT_STUCK_ON, safety_board_fault(&safety));
+    }
+}
+
+/* Near misses: a reading of which a part is of the moment before, an offset, noise around the
+ * limit.
+ */
+static void what_is_no_current_without_duty_is_no_fault(void)
+{
+    safety_sample_t sample = running;
+    for (uint8_t pulse = 0; pulse < 20; pulse++) {
+        sample = running;
+        ticks(4, &sample, 10);
+        sample.expected_ma = 0;
+        ticks(4, &sample, 1);
+        sample = off;
+        sample.current_ma = 90;
+        ticks(4, &sample, 20);
+        for (uint8_t n = 0; n < 100; n++) {
+            sample.current_ma = n % parameters.bad_samples == 0 ? 95 : 300;
+            ticks(4, &sample, 1);
+        }
+        sample.current_ma = -2000;
+        ticks(4, &sample, 20);
+    }
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, safety_board_fault(&safety));
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, safety_fault(&safety, 4));
 }
 
 static void other_faults_do_not_silence_a_sensor(void)
@@ -239,7 +318,9 @@ static void other_faults_do_not_silence_a_sensor(void)
     ticks(4, &running, 10);
     safety_trip(&safety, 4, SAFETY_FAULT_LIMIT_TRIP);
     safety_sample_t sample = running;
+    sample.current_ma++;
     sample.expected_ma = 0;
+    sample.off = true;
     ticks(4, &sample, parameters.bad_samples);
     TEST_ASSERT_EQUAL(SAFETY_FAULT_STUCK_ON, safety_board_fault(&safety));
 }
@@ -407,6 +488,10 @@ int main(void)
     RUN_TEST(sum_above_the_supply_trips_everything);
     RUN_TEST(limit_trip_is_of_its_spring_alone_until_cleared);
     RUN_TEST(frozen_sensor_is_no_current_in_a_spring_that_is_off);
+    RUN_TEST(sensor_that_goes_on_showing_what_flowed_is_frozen);
+    RUN_TEST(current_that_no_output_gives_is_no_frozen_sensor);
+    RUN_TEST(current_without_duty_overrides_every_other_fault);
+    RUN_TEST(what_is_no_current_without_duty_is_no_fault);
     RUN_TEST(other_faults_do_not_silence_a_sensor);
     RUN_TEST(silent_host_stops_the_board_until_cleared);
     RUN_TEST(emergency_stop_holds_until_cleared);

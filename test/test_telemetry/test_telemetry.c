@@ -43,6 +43,12 @@ void setUp(void)
 
 void tearDown(void) {}
 
+static void tick_at(uint32_t time_ms, int16_t ambient_c7)
+{
+    const text_time_t time = {time_ms / 1000u, (uint16_t)(time_ms % 1000u)};
+    telemetry_tick(&telemetry, &controller, &time, ambient_c7, &output);
+}
+
 static unsigned lines(void)
 {
     unsigned count = 0;
@@ -72,7 +78,7 @@ static void header_and_line_have_as_many_columns(void)
     TEST_ASSERT_EQUAL_STRING_LEN("time_s,i1_a,v1_v,m1_c,d1,", header, 25);
     TEST_ASSERT_NOT_NULL(strstr(header, ",d9,fan,ambient_c,state\r\n"));
     TEST_ASSERT_TRUE(telemetry_set(&telemetry, TELEMETRY_CSV, 50));
-    telemetry_tick(&telemetry, &controller, 12345, 20 * 128, &output);
+    tick_at(12345, 20 * 128);
     for (const char *c = header; *c != '\0'; c++) {
         columns += *c == ',';
     }
@@ -95,7 +101,8 @@ static void the_longest_line_fits_what_is_asked_for(void)
     }
     TEST_ASSERT_TRUE(telemetry_set(&telemetry, TELEMETRY_CSV, 50));
     room = TELEMETRY_LINE_BYTES(9);
-    telemetry_tick(&telemetry, &controller, 0x7FFFFFFFul, -40 * 128, &output);
+    const text_time_t years = {INT32_MAX, 999};
+    telemetry_tick(&telemetry, &controller, &years, -40 * 128, &output);
     TEST_ASSERT_EQUAL_UINT(1, lines());
     TEST_ASSERT_NOT_NULL(strstr(said, ",fault_13\r\n"));
     TEST_ASSERT_EQUAL_UINT16(0, telemetry.dropped);
@@ -105,11 +112,11 @@ static void a_line_without_room_is_dropped_whole_and_counted(void)
 {
     TEST_ASSERT_TRUE(telemetry_set(&telemetry, TELEMETRY_CSV, 50));
     room = (uint16_t)(TELEMETRY_LINE_BYTES(9) - 1u);
-    telemetry_tick(&telemetry, &controller, 0, 0, &output);
+    tick_at(0, 0);
     TEST_ASSERT_EQUAL_UINT(0, said_length);
     TEST_ASSERT_EQUAL_UINT16(1, telemetry.dropped);
     telemetry.dropped = 65535;
-    telemetry_tick(&telemetry, &controller, 20, 0, &output);
+    tick_at(20, 0);
     TEST_ASSERT_EQUAL_UINT16(65535, telemetry.dropped);
 }
 
@@ -121,7 +128,7 @@ static void every_rate_gives_that_many_lines_a_second(void)
         for (unsigned tick = 0; tick < 500; tick++) {
             said_length = 0;
             room = 8000;
-            telemetry_tick(&telemetry, &controller, tick * 20u, 0, &output);
+            tick_at(tick * 20u, 0);
             count += said_length > 0;
         }
         TEST_ASSERT_EQUAL_UINT(10u * hz, count);
@@ -132,7 +139,7 @@ static void teleplot_lines_are_name_ms_value(void)
 {
     controller.measured_ma[1] = 1500;
     TEST_ASSERT_TRUE(telemetry_set(&telemetry, TELEMETRY_TELEPLOT, 50));
-    telemetry_tick(&telemetry, &controller, 1234, 0, &output);
+    tick_at(1234, 0);
     TEST_ASSERT_NOT_NULL(strstr(said, ">i2:1234:1.500\r\n"));
     TEST_ASSERT_NOT_NULL(strstr(said, ">m9:1234:20.00\r\n"));
     TEST_ASSERT_NOT_NULL(strstr(said, ">fault:1234:0\r\n"));
@@ -159,7 +166,7 @@ static void a_round_of_teleplot_goes_on_where_it_found_no_room(void)
     TEST_ASSERT_TRUE(telemetry_set(&telemetry, TELEMETRY_TELEPLOT, 5));
     for (uint32_t tick = 1; tick <= 14; tick++) { /* due in the tenth */
         room = TELEMETRY_LEAVES_FREE_BYTES + 80;  /* two springs, and a piece of the third */
-        telemetry_tick(&telemetry, &controller, tick * 20u, 0, &output);
+        tick_at(tick * 20u, 0);
         TEST_ASSERT_TRUE(room >= TELEMETRY_LEAVES_FREE_BYTES);
         TEST_ASSERT_EQUAL_UINT(tick < 10 ? 0 : tick < 14 ? (tick - 9u) * 4u : 20u, lines());
     }
@@ -174,7 +181,7 @@ static void what_of_a_round_found_no_room_is_dropped_and_every_spring_has_its_tu
     TEST_ASSERT_TRUE(telemetry_set(&telemetry, TELEMETRY_TELEPLOT, 50));
     for (uint32_t tick = 1; tick <= 45; tick++) {
         room = TELEMETRY_LEAVES_FREE_BYTES + 80; /* two springs of nine */
-        telemetry_tick(&telemetry, &controller, tick * 20u, 0, &output);
+        tick_at(tick * 20u, 0);
     }
     TEST_ASSERT_EQUAL_UINT16(45u * 9u - occurrences(">i") - telemetry.left, telemetry.dropped);
     TEST_ASSERT_UINT_WITHIN(1, 9, occurrences(">i1:"));
@@ -182,7 +189,7 @@ static void what_of_a_round_found_no_room_is_dropped_and_every_spring_has_its_tu
     TEST_ASSERT_UINT_WITHIN(1, 9, occurrences(">fault:"));
     telemetry.dropped = 65533;
     room = 0;
-    telemetry_tick(&telemetry, &controller, 1000, 0, &output);
+    tick_at(1000, 0);
     TEST_ASSERT_EQUAL_UINT16(65535, telemetry.dropped);
 }
 
@@ -199,7 +206,7 @@ static void ticks(unsigned count, uint32_t time_ms)
 {
     for (unsigned tick = 0; tick < count; tick++) {
         room = 329;
-        telemetry_tick(&telemetry, &controller, time_ms + tick * 20u, 20 * 128, &output);
+        tick_at(time_ms + tick * 20u, 20 * 128);
     }
 }
 
@@ -251,7 +258,7 @@ static void limits_that_find_no_room_are_told_later(void)
     }
     for (unsigned tick = 0; tick < 100; tick++) {
         room = 40;
-        telemetry_tick(&telemetry, &controller, tick * 20u, 0, &output);
+        tick_at(tick * 20u, 0);
     }
     TEST_ASSERT_EQUAL_UINT(0, said_length);
     TEST_ASSERT_EQUAL_UINT16(10, telemetry.dropped); /* CSV lines; what is told later is not */
@@ -349,15 +356,16 @@ static void teleplots_longest_lines_are_whole(void)
     TEST_ASSERT_TRUE(telemetry_set(&telemetry, TELEMETRY_TELEPLOT, 50));
     telemetry.rounds = 49; /* of this second the last one: with bounds */
     room = 8000;
-    telemetry_tick(&telemetry, &controller, 0x7FFFFFFFul, 0, &output);
-    TEST_ASSERT_NOT_NULL(strstr(said, ">i9:2147483647:-32.768\r\n"));
-    TEST_ASSERT_NOT_NULL(strstr(said, ">m9:2147483647:-40.00\r\n"));
-    TEST_ASSERT_NOT_NULL(strstr(said, ">limits9:2147483647:1023\r\n"));
-    TEST_ASSERT_NOT_NULL(strstr(said, ">cut9:2147483647:3.000\r\n"));
-    TEST_ASSERT_NOT_NULL(strstr(said, ">fan:2147483647:0.00\r\n"));
-    TEST_ASSERT_NOT_NULL(strstr(said, ">fault:2147483647:13\r\n"));
-    TEST_ASSERT_NOT_NULL(strstr(said, ">low9:2147483647:-1"));
-    TEST_ASSERT_NOT_NULL(strstr(said, ">high9:2147483647:1"));
+    const text_time_t years = {INT32_MAX, 7};
+    telemetry_tick(&telemetry, &controller, &years, 0, &output);
+    TEST_ASSERT_NOT_NULL(strstr(said, ">i9:2147483647007:-32.768\r\n"));
+    TEST_ASSERT_NOT_NULL(strstr(said, ">m9:2147483647007:-40.00\r\n"));
+    TEST_ASSERT_NOT_NULL(strstr(said, ">limits9:2147483647007:1023\r\n"));
+    TEST_ASSERT_NOT_NULL(strstr(said, ">cut9:2147483647007:3.000\r\n"));
+    TEST_ASSERT_NOT_NULL(strstr(said, ">fan:2147483647007:0.00\r\n"));
+    TEST_ASSERT_NOT_NULL(strstr(said, ">fault:2147483647007:13\r\n"));
+    TEST_ASSERT_NOT_NULL(strstr(said, ">low9:2147483647007:-1"));
+    TEST_ASSERT_NOT_NULL(strstr(said, ">high9:2147483647007:1"));
     TEST_ASSERT_EQUAL_UINT(40, lines());
 }
 
@@ -381,7 +389,7 @@ static void teleplot_has_the_bounds_of_temperature_once_a_second(void)
 
 static void off_says_nothing_and_bad_settings_are_refused(void)
 {
-    telemetry_tick(&telemetry, &controller, 0, 0, &output);
+    tick_at(0, 0);
     TEST_ASSERT_EQUAL_UINT(0, said_length);
     TEST_ASSERT_FALSE(telemetry_set(&telemetry, TELEMETRY_FORMAT_COUNT, 5));
     TEST_ASSERT_FALSE(telemetry_set(&telemetry, TELEMETRY_CSV, 0));

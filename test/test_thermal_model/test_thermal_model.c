@@ -225,7 +225,7 @@ static void stepping_takes_the_same_loop_as_setting(void)
 static void latent_heat_delays_by_its_energy(void)
 {
     parameters.rows = parameters.columns = 1;
-    parameters.loss_uw_per_k = parameters.loss_fan_uw_per_k = 0;
+    parameters.loss_uw_per_k = parameters.loss_fan_uw_per_k = 1;
     start();
     power_uw[0] = 1000000;
     uint32_t steps = 0;

@@ -134,11 +134,43 @@ static void move_preisach(grain_t *grain, const alloy_t *alloy, double heating_c
                           KINETICS_R_LATENT * on * slope;
 }
 
+/* What a branch has of austenite that goes from 1 % at one of these temperatures to 99 % at the
+ * other, as a hyperbolic tangent; and its slope. */
+static double smooth_branch(double c, double low_c, double high_c, double *slope)
+{
+    static const double ends = 2.2976; /* artanh 0.98 */
+    double rate = 2.0 * ends / (high_c - low_c);
+    double way = tanh(rate * (c - 0.5 * (low_c + high_c)));
+    *slope = 0.5 * rate * (1.0 - way * way);
+    return 0.5 * (1.0 + way);
+}
+
+/* A play operator: what is austenite stays as it is between the branch of heating and that of
+ * cooling, and goes along either. */
+static void move_play(grain_t *grain, const alloy_t *alloy, double heating_c, double cooling_c)
+{
+    double rising, falling;
+    double least =
+        smooth_branch(heating_c, alloy->austenite_start_c, alloy->austenite_finish_c, &rising);
+    double most =
+        smooth_branch(cooling_c, alloy->martensite_finish_c, alloy->martensite_start_c, &falling);
+    if (grain->austenite < least) {
+        grain->austenite = least;
+        grain->latent_per_k = rising;
+    } else if (grain->austenite > fmax(least, most)) { /* wide tails may cross */
+        grain->austenite = fmax(least, most);
+        grain->latent_per_k = least > most ? rising : falling;
+    }
+    grain->latent = grain->austenite;
+}
+
 void grain_move(grain_t *grain, const alloy_t *alloy, double heating_c, double cooling_c)
 {
     grain->latent_per_k = 0.0;
     if (alloy->law == KINETICS_PREISACH || alloy->law == KINETICS_R_PHASE) {
         move_preisach(grain, alloy, heating_c, cooling_c);
+    } else if (alloy->law == KINETICS_PLAY) {
+        move_play(grain, alloy, heating_c, cooling_c);
     } else {
         move_restarting(grain, alloy, heating_c, cooling_c);
     }

@@ -1,5 +1,5 @@
 /* What it is for: how much of a piece of NiTi is austenite, after the temperatures it has seen.
- * What it owns: five laws of transformation, and the memory that each needs.
+ * What it owns: six laws of transformation, and the memory that each needs.
  * What it never does: know of heat or time: it is rate-independent, as the alloy is. */
 #ifndef WORLDS_KINETICS_H
 #define WORLDS_KINETICS_H
@@ -12,6 +12,7 @@ typedef enum {
     KINETICS_EXPONENTIAL, /* Tanaka 1986; Koistinen and Marburger 1959: 1 % left at 'finish' */
     KINETICS_PREISACH,    /* relays of all switching temperatures: minor loops close */
     KINETICS_R_PHASE,     /* Preisach, and on cooling through an intermediate R-phase */
+    KINETICS_PLAY,        /* smooth branches without ends, between which nothing transforms */
     KINETICS_COUNT
 } kinetics_law_t;
 

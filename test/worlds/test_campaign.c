@@ -10,6 +10,8 @@
 #include "campaign.h"
 #include "run.h"
 #include "score.h"
+#include "shares.h"
+#include "swarm.h"
 
 #define TICKS_PER_S 50
 #define ALLOWED_S   60.0
@@ -19,6 +21,7 @@ static controller_t controller;
 static controller_outputs_t outputs;
 static controller_inputs_t inputs;
 static score_t score;
+static losses_t losses;
 
 /* The middle spring is asked for; the controller says nothing unless a test makes it. */
 void setUp(void)
@@ -33,6 +36,7 @@ void setUp(void)
     world = world_create(&parameters);
     TEST_ASSERT_NOT_NULL(world);
     score_begin(&score, world, driven, ALLOWED_S);
+    losses_begin(&losses, 0.0, 0.0);
 }
 
 void tearDown(void)
@@ -46,6 +50,7 @@ static void run_s(int spring, uint16_t duty, double seconds)
     for (long tick = lround(seconds * TICKS_PER_S); tick > 0; tick--) {
         world_tick(world, &outputs, &inputs);
         score_tick(&score, world, &controller);
+        losses_tick(&losses, &score, world, &controller);
     }
 }
 
@@ -234,6 +239,235 @@ static void every_world_runs_and_tells_the_same_twice(void)
     }
 }
 
+/* Heated, and held above martensite start, by hand. */
+static void hold_until(int spring, double until_s)
+{
+    while (world_time_s(world) < until_s) {
+        const bool there = world_austenite(world, spring) > 0.999;
+        run_s(spring, !there ? 150 : world_node_c(world, spring, 1) < 90.0 ? 120 : 60, 0.1);
+    }
+}
+
+static void a_spring_is_lost_after_a_minute_below_90_percent_and_silent_if_nothing_is_said(void)
+{
+    hold_until(4, LOSSES_DUE_S + 20.0);
+    const losses_spring_t *spring = &losses.spring[4];
+    TEST_ASSERT_DOUBLE_WITHIN(0.2, 20.0, spring->judged_s);
+    TEST_ASSERT_DOUBLE_WITHIN(0.2, 20.0, spring->there_s);
+    while (world_austenite(world, 4) >= SCORE_LOST) {
+        run_s(4, 0, 0.1);
+    }
+    const double fell_s = world_time_s(world);
+    run_s(4, 0, LOSSES_LOST_S - 1.0);
+    TEST_ASSERT_TRUE(isnan(spring->lost_at_s) && isnan(spring->silent_at_s));
+    run_s(4, 0, 11.0);
+    TEST_ASSERT_DOUBLE_WITHIN(0.2, fell_s + LOSSES_LOST_S, spring->lost_at_s);
+    TEST_ASSERT_DOUBLE_WITHIN(0.2, fell_s + LOSSES_LOST_S, spring->silent_at_s);
+    TEST_ASSERT_DOUBLE_WITHIN(0.2, 10.0, spring->lost_s);
+    TEST_ASSERT_TRUE(spring->blind_only);
+    TEST_ASSERT_TRUE(isnan(losses.spring[0].lost_at_s)); /* not asked for */
+}
+
+static void a_spring_that_is_lost_with_a_fault_is_lost_but_not_silent(void)
+{
+    run_s(4, 0, LOSSES_DUE_S + 1.0);
+    controller_emergency_stop(&controller);
+    run_s(4, 0, 70.0);
+    TEST_ASSERT_FALSE(isnan(losses.spring[4].lost_at_s));
+    TEST_ASSERT_TRUE(isnan(losses.spring[4].silent_at_s));
+    TEST_ASSERT_EQUAL_INT(SAFETY_FAULT_EMERGENCY_STOP, losses.spring[4].fault);
+}
+
+static void what_is_said_for_a_moment_ends_no_silence(void)
+{
+    run_s(4, 0, LOSSES_DUE_S);
+    for (int i = 0; i < 8; i++) {
+        run_s(4, 0, 9.5);
+        controller_emergency_stop(&controller);
+        run_s(4, 0, 0.5);
+        controller_clear_faults(&controller);
+    }
+    TEST_ASSERT_FALSE(isnan(losses.spring[4].silent_at_s));
+}
+
+/* The surroundings change at 100 s; the spring is let go of for a while, or for good. */
+static losses_back_t let_go_after_a_step(double let_go_s, double again_s, double until_s)
+{
+    tearDown();
+    setUp();
+    losses_begin(&losses, 100.0, 110.0);
+    hold_until(4, let_go_s);
+    run_s(4, 0, again_s - let_go_s);
+    hold_until(4, until_s);
+    return losses.spring[4].back;
+}
+
+static void after_a_step_a_spring_is_back_in_two_minutes_and_stays(void)
+{
+    TEST_ASSERT_EQUAL_INT(LOSSES_BACK, let_go_after_a_step(120.0, 160.0, 360.0));
+    TEST_ASSERT_EQUAL_INT(LOSSES_NOT_BACK, let_go_after_a_step(120.0, 260.0, 360.0));
+    TEST_ASSERT_EQUAL_INT(LOSSES_NOT_BACK, let_go_after_a_step(300.0, 330.0, 360.0));
+    TEST_ASSERT_EQUAL_INT(LOSSES_NOT_JUDGED, let_go_after_a_step(120.0, 160.0, 330.0));
+    /* it was lost before */
+    TEST_ASSERT_EQUAL_INT(LOSSES_NOT_JUDGED, let_go_after_a_step(40.0, 120.0, 360.0));
+}
+
+/* Wilson 1927; the table of Newcombe 1998 (method 3). */
+static void shares_have_wilsons_interval(void)
+{
+    shares_t x = shares_wilson(81.0 / 263.0, 263.0);
+    TEST_ASSERT_DOUBLE_WITHIN(5e-5, 0.2553, x.low);
+    TEST_ASSERT_DOUBLE_WITHIN(5e-5, 0.3662, x.high);
+    x = shares_wilson(0.0, 20.0);
+    TEST_ASSERT_DOUBLE_WITHIN(5e-5, 0.0, x.low);
+    TEST_ASSERT_DOUBLE_WITHIN(5e-5, 0.1611, x.high);
+}
+
+/* Eight springs that are always lost together are one. */
+static void springs_of_a_run_that_go_together_count_for_one(void)
+{
+    enum { RUNS = 200 };
+    shares_run_t together[RUNS], each[RUNS];
+    for (int i = 0; i < RUNS; i++) {
+        together[i] = (shares_run_t){i % 10 == 0 ? 8.0 : 0.0, 8.0};
+        each[i] = (shares_run_t){i % 10 < 8 ? 1.0 : 0.0, 8.0};
+    }
+    const shares_t one = shares_wilson(0.1, RUNS), few = shares_share(together, RUNS);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.1, few.value);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-3, one.low, few.low);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-3, one.high, few.high);
+    const shares_t many = shares_share(each, RUNS), all = shares_wilson(0.1, 8.0 * RUNS);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, all.low, many.low); /* never more than there are */
+    for (int i = 0; i < RUNS; i++) {
+        together[i].hits = 0.0;
+    }
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, shares_wilson(0.0, RUNS).high,
+                              shares_share(together, RUNS).high);
+    TEST_ASSERT_TRUE(isnan(shares_share(together, 0).value));
+}
+
+static void a_mean_has_its_runs_scatter(void)
+{
+    const shares_run_t run[] = {{80.0, 1.0}, {164.0, 2.0}, {84.0, 1.0}, {164.0, 2.0}};
+    const shares_t x = shares_mean(run, 4);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 82.0, x.value);
+    /* residuals -2, 0, 2, 0 of 6: sqrt(8 / 36 * 4 / 3) */
+    TEST_ASSERT_DOUBLE_WITHIN(1e-3, 1.96 * sqrt(8.0 / 27.0), x.high - x.value);
+    TEST_ASSERT_TRUE(isnan(shares_mean(run, 1).low));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 2.0 / 32.0, shares_sign_test(0, 5));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 1.0, shares_sign_test(3, 3));
+}
+
+/* 900 s: what the events' times are drawn within. */
+static void every_disturbance_is_drawn_as_often_as_is_said(void)
+{
+    enum { RUNS = 3000 };
+    static swarm_case_t swarm;
+    int drawn[64] = {0}, group[SWARM_GROUPS] = {0}, second = 0;
+    for (int i = 0; i < RUNS; i++) {
+        swarm_draw(1, i, 900.0, &swarm);
+        const world_parameters_t *parameters = &swarm.run.world;
+        int driven = 0;
+        for (int k = 0; k < parameters->rows * parameters->columns; k++) {
+            driven += swarm.run.on[k];
+        }
+        TEST_ASSERT_TRUE_MESSAGE(driven > 0, swarm.says);
+        TEST_ASSERT_TRUE_MESSAGE(parameters->events < WORLD_EVENTS_MAX, swarm.says);
+        TEST_ASSERT_TRUE(strlen(swarm.says) < SWARM_SAYS_MAX - 2);
+        TEST_ASSERT_TRUE(swarm.loss_change >= -0.35 && swarm.loss_change <= 0.45);
+        TEST_ASSERT_TRUE(fabs(swarm.ambient_change_k) <= 12.0);
+        TEST_ASSERT_EQUAL_INT(swarm.loss_change != 0.0 || swarm.ambient_change_k != 0.0,
+                              swarm.group == SWARM_SURROUNDINGS);
+        TEST_ASSERT_TRUE(swarm.run.step_s == 0.0 || swarm.run.stepped_s < 700.0);
+        for (int d = 0; d < 64; d++) {
+            drawn[d] += (int)(swarm.drawn >> d & 1u);
+        }
+        group[swarm.group]++;
+        second += swarm.second;
+    }
+    TEST_ASSERT_INT_WITHIN(110, RUNS / 3, second);
+    TEST_ASSERT_INT_WITHIN(110, (int)(0.35 * RUNS), group[SWARM_SURROUNDINGS]);
+    TEST_ASSERT_TRUE(group[SWARM_LOAD] > 200);
+    double probability;
+    int d = 0;
+    for (; swarm_says(d, &probability) != NULL; d++) {
+        TEST_ASSERT_TRUE_MESSAGE(drawn[d] > (int)(probability * RUNS) - 110,
+                                 swarm_says(d, &probability));
+        const bool more = strstr(swarm_says(d, &probability), "second truth") != NULL;
+        TEST_ASSERT_TRUE(more || drawn[d] < (int)(probability * RUNS) + 110);
+    }
+    TEST_ASSERT_TRUE(d > 25 && d <= 64);
+}
+
+static double first_loss_w(world_parameters_t *parameters)
+{
+    for (int k = 0; k < parameters->rows * parameters->columns; k++) {
+        parameters->spring[k].start_c = parameters->ambient_c + 60.0;
+    }
+    memset(&outputs, 0, sizeof outputs);
+    tearDown();
+    world = world_create(parameters);
+    TEST_ASSERT_NOT_NULL(world);
+    world_tick(world, &outputs, &inputs);
+    return world_energy(world).lost_j * TICKS_PER_S;
+}
+
+/* By the world itself: with its events of loss at the beginning, and without. */
+static void a_draught_changes_the_whole_loss_by_what_is_said(void)
+{
+    static swarm_case_t swarm;
+    int seen = 0;
+    for (int i = 0; seen < 20; i++) {
+        swarm_draw(2, i, 900.0, &swarm);
+        if (swarm.loss_change == 0.0 || strstr(swarm.says, "or less of it") != NULL) {
+            continue;
+        }
+        seen++;
+        world_parameters_t *parameters = &swarm.run.world;
+        int kept = 0;
+        for (int e = 0; e < parameters->events; e++) {
+            if (parameters->event[e].kind == WORLD_LOSS_FACTOR) {
+                parameters->event[kept] = parameters->event[e];
+                parameters->event[kept++].time_s = 0.0;
+            }
+        }
+        parameters->events = kept;
+        const double after_w = first_loss_w(parameters);
+        parameters->events = 0;
+        const double change = after_w / first_loss_w(parameters) - 1.0;
+        TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(0.03, swarm.loss_change, change, swarm.says);
+    }
+}
+
+/* Springs lost in some runs. */
+static int lost_springs(bool gives_up, double *there_s)
+{
+    static swarm_case_t swarm;
+    static run_result_t result;
+    int lost = 0;
+    *there_s = 0.0;
+    for (int i = 0; i < 6; i++) {
+        swarm_draw(3, i, 420.0, &swarm);
+        swarm.run.gives_up = gives_up;
+        TEST_ASSERT_TRUE_MESSAGE(run_case(&swarm.run, &result, NULL), swarm.says);
+        for (int k = 0; k < result.score.springs; k++) {
+            lost += !isnan(result.losses.spring[k].lost_at_s);
+            *there_s += result.losses.spring[k].there_s;
+        }
+    }
+    return lost;
+}
+
+static void a_controller_that_never_heats_again_is_seen_and_a_run_is_the_same_twice(void)
+{
+    double there_s, again_s, given_up_s;
+    const int lost = lost_springs(false, &there_s);
+    TEST_ASSERT_EQUAL_INT(lost, lost_springs(false, &again_s));
+    TEST_ASSERT_EQUAL_DOUBLE(there_s, again_s);
+    TEST_ASSERT_TRUE(lost_springs(true, &given_up_s) > lost + 2);
+    TEST_ASSERT_TRUE(given_up_s < 0.9 * there_s);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -248,5 +482,15 @@ int main(void)
     RUN_TEST(an_array_is_the_same_specimen_in_every_world);
     RUN_TEST(patterns_are_of_one_to_nine_springs);
     RUN_TEST(every_world_runs_and_tells_the_same_twice);
+    RUN_TEST(a_spring_is_lost_after_a_minute_below_90_percent_and_silent_if_nothing_is_said);
+    RUN_TEST(a_spring_that_is_lost_with_a_fault_is_lost_but_not_silent);
+    RUN_TEST(what_is_said_for_a_moment_ends_no_silence);
+    RUN_TEST(after_a_step_a_spring_is_back_in_two_minutes_and_stays);
+    RUN_TEST(shares_have_wilsons_interval);
+    RUN_TEST(springs_of_a_run_that_go_together_count_for_one);
+    RUN_TEST(a_mean_has_its_runs_scatter);
+    RUN_TEST(every_disturbance_is_drawn_as_often_as_is_said);
+    RUN_TEST(a_draught_changes_the_whole_loss_by_what_is_said);
+    RUN_TEST(a_controller_that_never_heats_again_is_seen_and_a_run_is_the_same_twice);
     return UNITY_END();
 }

@@ -78,6 +78,7 @@ static void energy_closes_in_every_law(void)
         parameters.air_j_per_k = 0.3;
         parameters.plate_w_per_k = 0.03;
         parameters.plate_j_per_k = 10.0;
+        parameters.convection = (world_convection_t)(law % WORLD_CONVECTION_COUNT);
         parameters.gust_every_s = 10.0;
         parameters.gust_lasts_s = 5.0;
         parameters.gust_factor = 1.8;
@@ -98,6 +99,79 @@ static void energy_closes_in_every_law(void)
         tearDown();
     }
     world = NULL;
+}
+
+/* What a wire gives off, W, that is that much above the air, in moving air or not. */
+static double given_off_w(world_convection_t convection, double rise_k, double moved)
+{
+    setUp();
+    single_spring();
+    parameters.convection = convection;
+    parameters.spring[0].start_c = parameters.ambient_c + rise_k;
+    parameters.events = 1;
+    parameters.event[0] = (world_event_t){WORLD_LOSS_FACTOR, 0.0, 0, moved};
+    make_world();
+    run_s(1.0 / TICKS_PER_S);
+    const double w = world_energy(world).lost_j * TICKS_PER_S;
+    tearDown();
+    world = NULL;
+    return w;
+}
+
+static void both_laws_of_convection_lose_what_is_declared_where_it_is_declared(void)
+{
+    for (int law = 0; law < WORLD_CONVECTION_COUNT; law++) {
+        const world_convection_t convection = (world_convection_t)law;
+        TEST_ASSERT_DOUBLE_WITHIN(1e-4, 0.0058 * WORLD_LOSS_RISE_K,
+                                  given_off_w(convection, WORLD_LOSS_RISE_K, 1.0));
+        /* less for each kelvin further down */
+        const double cooler_w = given_off_w(convection, 30.0, 1.0);
+        TEST_ASSERT_TRUE(cooler_w < 0.95 * 0.0058 * 30.0 && cooler_w > 0.75 * 0.0058 * 30.0);
+    }
+    TEST_ASSERT_TRUE(fabs(given_off_w(WORLD_CONVECTION_MORGAN, 30.0, 1.0) -
+                          given_off_w(WORLD_CONVECTION_CHURCHILL, 30.0, 1.0)) > 1e-3);
+}
+
+static void moved_air_carries_off_as_much_more_as_is_said(void)
+{
+    const double still_w = given_off_w(WORLD_CONVECTION_MORGAN, WORLD_LOSS_RISE_K, 1.0);
+    const double none_w = given_off_w(WORLD_CONVECTION_MORGAN, WORLD_LOSS_RISE_K, 0.0);
+    for (int law = 0; law < WORLD_CONVECTION_COUNT; law++) {
+        const world_convection_t convection = (world_convection_t)law;
+        for (double moved = 0.5; moved < 2.0; moved += 0.25) {
+            TEST_ASSERT_DOUBLE_WITHIN(1e-6, none_w + moved * (still_w - none_w),
+                                      given_off_w(convection, WORLD_LOSS_RISE_K, moved));
+        }
+    }
+    /* in a draught what rises of itself matters less */
+    const double churchill = given_off_w(WORLD_CONVECTION_CHURCHILL, 30.0, 1.6) /
+                             given_off_w(WORLD_CONVECTION_CHURCHILL, 30.0, 1.0);
+    const double morgan = given_off_w(WORLD_CONVECTION_MORGAN, 30.0, 1.6) /
+                          given_off_w(WORLD_CONVECTION_MORGAN, 30.0, 1.0);
+    TEST_ASSERT_TRUE(churchill > morgan);
+}
+
+static void between_its_branches_a_play_transforms_nothing(void)
+{
+    const alloy_t alloy = {KINETICS_PLAY, 68.0, 78.0, 88.0, 98.0};
+    grain_t grain;
+    grain_start(&grain, &alloy, 20.0, false);
+    grain_move(&grain, &alloy, 88.0, 88.0);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-5, 0.01, grain.austenite);
+    grain_move(&grain, &alloy, 93.0, 93.0);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.5, grain.austenite);
+    TEST_ASSERT_TRUE(grain.latent_per_k > 0.2); /* steeper than straight: 0.1 */
+    grain_move(&grain, &alloy, 79.0, 79.0);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.5, grain.austenite);
+    TEST_ASSERT_EQUAL_DOUBLE(0.0, grain.latent_per_k);
+    grain_move(&grain, &alloy, 92.0, 92.0); /* and on where it was */
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.5, grain.austenite);
+    grain_move(&grain, &alloy, 98.0, 98.0);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-5, 0.99, grain.austenite);
+    grain_move(&grain, &alloy, 73.0, 73.0);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.5, grain.austenite);
+    grain_move(&grain, &alloy, 40.0, 40.0);
+    TEST_ASSERT_TRUE(grain.austenite < 1e-5);
 }
 
 /* Without any loss, the heat that leads from 20 degC martensite to 110 degC austenite is known. */
@@ -558,6 +632,9 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(energy_closes_in_every_law);
+    RUN_TEST(both_laws_of_convection_lose_what_is_declared_where_it_is_declared);
+    RUN_TEST(moved_air_carries_off_as_much_more_as_is_said);
+    RUN_TEST(between_its_branches_a_play_transforms_nothing);
     RUN_TEST(transforming_takes_the_latent_heat);
     RUN_TEST(loss_is_as_declared_at_105_and_less_per_kelvin_below);
     RUN_TEST(crimped_ends_are_colder_by_what_the_crimps_take);

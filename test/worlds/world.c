@@ -29,6 +29,7 @@ typedef struct {
     double stress_mpa, stress_aim_mpa;
     double contact_ohm, contact_ohm_per_s;
     double convection_full_w_per_k; /* of a third, WORLD_LOSS_RISE_K above the air */
+    double loss_factor;             /* on it, from outside */
     double current_a, voltage_v;
     ina219_t sensor;
     int sensor_of; /* whose current and voltage this sensor sees */
@@ -218,6 +219,7 @@ static void start_spring(world_t *world, int k)
     spring->contact_ohm = parameters->contact_ohm;
     spring->sensor = parameters->sensor;
     spring->sensor_of = k;
+    spring->loss_factor = 1.0;
     double ambient_c = world->parameters.ambient_c;
     double radiated_w = radiation_w(parameters, ambient_c + WORLD_LOSS_RISE_K, ambient_c);
     double third_w_per_k = SHARE * (parameters->loss_w_per_k - 2.0 * parameters->crimp_w_per_k);
@@ -296,6 +298,9 @@ static void happen(world_t *world, const world_event_t *event)
         other->sensor_of = seen;
         break;
     }
+    case WORLD_LOSS_FACTOR:
+        spring->loss_factor = event->value;
+        break;
     case WORLD_SUPPLY_V:
         world->supply_v = event->value;
         break;
@@ -330,6 +335,26 @@ static void blow(world_t *world, double now_s, uint8_t fan_percent)
                          (1.0 + (p->fan_loss_factor - 1.0) * fan_percent / 100.0);
 }
 
+/* Churchill and Chu 1975, (0.60 + 0.321 Ra^(1/6))^2 in air, for a wire whose Rayleigh number is 2.5
+ * at the rise that loss is meant at, and the film's conductivity; 1 there. */
+static double free_convection(double rise_k, double sink_c)
+{
+    static const double of_rise = 0.374; /* 0.321 * 2.5^(1/6) */
+    double root = (0.60 + of_rise * cbrt(sqrt(rise_k / WORLD_LOSS_RISE_K))) / (0.60 + of_rise);
+    double film_k = sink_c + ZERO_C + 0.5 * rise_k;
+    double film_meant_k = sink_c + ZERO_C + 0.5 * WORLD_LOSS_RISE_K;
+    return root * root * (1.0 + 0.8 * (film_k - film_meant_k) / film_meant_k);
+}
+
+static double convection(world_convection_t law, double rise_k, double sink_c, double moved)
+{
+    if (law == WORLD_CONVECTION_MORGAN) {
+        return moved * pow(rise_k / WORLD_LOSS_RISE_K, CONVECTION_POWER);
+    }
+    double free = free_convection(rise_k, sink_c);
+    return moved <= 1.0 ? moved * free : cbrt(free * free * free + moved * moved * moved - 1.0);
+}
+
 /* Still air carries heat off a thin wire a little better the hotter it is; moving air as it comes.
  */
 static void weigh_convection(world_t *world)
@@ -338,9 +363,11 @@ static void weigh_convection(world_t *world)
     for (int k = 0; k < world->springs; k++) {
         spring_t *spring = &world->spring[k];
         for (int n = 0; n < WORLD_NODES; n++) {
-            double rise = fabs(spring->node[n].temperature_c - sink_c) / WORLD_LOSS_RISE_K;
             spring->node[n].convection_w_per_k =
-                world->loss_factor * spring->convection_full_w_per_k * pow(rise, CONVECTION_POWER);
+                spring->convection_full_w_per_k *
+                convection(world->parameters.convection,
+                           fabs(spring->node[n].temperature_c - sink_c), sink_c,
+                           world->loss_factor * spring->loss_factor);
         }
     }
 }
@@ -568,6 +595,16 @@ double world_voltage_v(const world_t *world, int spring)
 double world_loss_factor(const world_t *world)
 {
     return world->loss_factor;
+}
+
+double world_spring_loss_factor(const world_t *world, int spring)
+{
+    return world->spring[spring].loss_factor;
+}
+
+double world_ambient_c(const world_t *world)
+{
+    return world->ambient_c;
 }
 
 world_energy_t world_energy(const world_t *world)

@@ -15,7 +15,7 @@
 
 #define WORLD_SPRINGS_MAX 16
 #define WORLD_NODES       3 /* thirds of the wire: crimped end, middle, crimped end */
-#define WORLD_EVENTS_MAX  256
+#define WORLD_EVENTS_MAX  1024
 #define WORLD_TICK_S      0.02
 
 /* Stress moves the transformation: Flexinol, measured (docs/worlds.md). */
@@ -50,6 +50,8 @@ typedef enum {
     WORLD_SENSOR_CURRENT_GAIN, /* value: gain from now on: a lie */
     WORLD_SENSOR_VOLTAGE_GAIN, /* the same */
     WORLD_SENSOR_SWAP, /* value: spring whose sensor answers for this one, and the reverse */
+    WORLD_LOSS_FACTOR, /* value: factor on the loss to the air by convection from now on: a door,
+                          a draught, dust; gust and fan come on top */
     WORLD_SUPPLY_V,    /* value: supply from now on */
     WORLD_AMBIENT_C    /* value: true ambient from now on */
 } world_event_kind_t;
@@ -61,8 +63,17 @@ typedef struct {
     double value;
 } world_event_t;
 
+typedef enum {
+    WORLD_CONVECTION_MORGAN = 0, /* conductance rises with the rise's power; moving air scales it */
+    /* Churchill and Chu 1975 for what rises, with the film's conductivity; moving air by itself,
+       the two blended by their cubes (Churchill 1977): a draught flattens the rise. */
+    WORLD_CONVECTION_CHURCHILL,
+    WORLD_CONVECTION_COUNT
+} world_convection_t;
+
 typedef struct {
     int rows, columns;
+    world_convection_t convection;
     world_spring_t spring[WORLD_SPRINGS_MAX];
     double orthogonal_w_per_k, diagonal_w_per_k; /* between neighbouring springs */
     double fan_loss_factor;                      /* loss to the air with the fan full on */
@@ -112,10 +123,12 @@ double world_mean_c(const world_t *world, int spring);
 double world_austenite(const world_t *world, int spring);          /* 0..1, mean of its nodes */
 double world_martensite_start_c(const world_t *world, int spring); /* under the present load */
 double world_austenite_start_c(const world_t *world, int spring);
-double world_resistance_ohm(const world_t *world, int spring); /* with its contacts */
-double world_current_a(const world_t *world, int spring);      /* mean of the last tick */
-double world_voltage_v(const world_t *world, int spring);      /* the same, across the spring */
-double world_loss_factor(const world_t *world);                /* by gust and fan */
+double world_resistance_ohm(const world_t *world, int spring);     /* with its contacts */
+double world_current_a(const world_t *world, int spring);          /* mean of the last tick */
+double world_voltage_v(const world_t *world, int spring);          /* the same, across the spring */
+double world_loss_factor(const world_t *world);                    /* by gust and fan */
+double world_spring_loss_factor(const world_t *world, int spring); /* by WORLD_LOSS_FACTOR alone */
+double world_ambient_c(const world_t *world);                      /* true, now */
 
 /* Where the heat is, J: what the wires hold above 0 degC of martensite, what currents have put in
  * since the start, and what went out to air, crimps and room. stored - supplied + lost stays. */

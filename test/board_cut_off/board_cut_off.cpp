@@ -1,0 +1,211 @@
+/* The stages' supply is off within 0.1 s of a program that no longer runs, and a switch that has
+ * failed closed heats until then and no longer. */
+#include "board_test.h"
+
+#include <cmath>
+#include <functional>
+
+using namespace board_test;
+
+namespace
+{
+
+constexpr double LIMIT_MS = 100.0;
+constexpr double HIGH_MS = 300.0; /* its pump then empties by two capacitors */
+/* Ten bad readings of a driven spring, five of one that is off, and what the sensor averages. */
+constexpr double FOUND_MS = 320.0;
+
+/* All nine at 1.5 A for 25 s: 45 degC. */
+void heat(rig &mega)
+{
+    make_niti(mega.plant.get());
+    mega.boot();
+    mega.expect_ok("on all");
+    mega.run_ms(25000.0);
+    TEST_ASSERT_TRUE(board_is_fed(mega.raw()));
+    TEST_ASSERT_FALSE(board_all_off(mega.raw()));
+}
+
+/* ms until the supply is off; then it stays so, no current flows and no spring becomes hotter. */
+double off_after_ms(rig &mega, const char *what, double limit_ms)
+{
+    double ms = 0.0;
+    double hottest = hottest_c(mega);
+    const double before = hottest;
+    for (; board_is_fed(mega.raw()) && ms < 1000.0; ms += 1.0) {
+        (void)board_run_ms(mega.raw(), 1.0);
+        hottest = std::fmax(hottest, hottest_c(mega));
+    }
+    std::printf("%s: supply off after %.0f ms, hottest %.1f degC, %.1f K more\n", what, ms, hottest,
+                hottest - before);
+    TEST_ASSERT_TRUE_MESSAGE(ms <= limit_ms, what);
+    for (int k = 0; k < 100; ++k) {
+        (void)board_run_ms(mega.raw(), 10.0);
+        TEST_ASSERT_FALSE_MESSAGE(board_is_fed(mega.raw()), what);
+        for (unsigned spring = 0; spring < BOARD_CHANNELS; ++spring) {
+            TEST_ASSERT_TRUE_MESSAGE(board_current_a(mega.raw(), spring) < 0.001, what);
+        }
+        TEST_ASSERT_TRUE_MESSAGE(hottest_c(mega) <= hottest + 0.1, what);
+    }
+    return ms;
+}
+
+void a_welded_switch_heats_until_the_supply_is_off()
+{
+    for (const bool driven : {true, false}) {
+        rig mega;
+        heat(mega);
+        if (!driven) {
+            mega.expect_ok("off 5");
+            mega.run_ms(200.0);
+        }
+        board_set_fault(mega.raw(), BOARD_FAULT_CLOSED, 4, true);
+        off_after_ms(mega,
+                     driven ? "switch of a driven spring closed"
+                            : "switch of a spring that is off closed",
+                     FOUND_MS + LIMIT_MS);
+        TEST_ASSERT_EQUAL_INT(SAFETY_FAULT_STUCK_ON, mega.view().board_fault);
+        TEST_ASSERT_TRUE(contains(mega.say("faults"), "supply: off\r\n"));
+        TEST_ASSERT_EQUAL_STRING("error:11", mega.answer("supply on").substr(0, 8).c_str());
+
+        mega.expect_ok("clear"); /* and nothing comes back by that */
+        mega.run_ms(200.0);
+        TEST_ASSERT_FALSE(board_is_fed(mega.raw()));
+        TEST_ASSERT_EQUAL_STRING("error:18", mega.answer("on 1").substr(0, 8).c_str());
+
+        mega.expect_ok("supply on"); /* still closed: found and cut again */
+        mega.run_ms(60.0);
+        TEST_ASSERT_TRUE(board_is_fed(mega.raw()));
+        off_after_ms(mega, "the supply on again", FOUND_MS + LIMIT_MS);
+
+        board_set_fault(mega.raw(), BOARD_FAULT_CLOSED, 4, false);
+        mega.expect_ok("clear");
+        mega.expect_ok("supply on");
+        mega.run_ms(100.0);
+        TEST_ASSERT_TRUE_MESSAGE(board_all_off(mega.raw()), "the supply started a spring");
+        mega.expect_ok("on 1");
+        mega.run_ms(300.0);
+        TEST_ASSERT_TRUE(board_current_a(mega.raw(), 0) > 0.1);
+        TEST_ASSERT_EQUAL_INT(SAFETY_FAULT_NONE, mega.view().spring[0].fault);
+    }
+}
+
+/* With a closed switch, too: nothing of the program is needed. */
+void a_program_that_hangs_holds_nothing()
+{
+    for (const bool closed : {false, true}) {
+        rig mega;
+        heat(mega);
+        board_set_fault(mega.raw(), BOARD_FAULT_CLOSED, 4, closed);
+        board_hang(mega.raw());
+        off_after_ms(mega, closed ? "hung, a switch closed" : "hung", LIMIT_MS);
+        TEST_ASSERT_EQUAL_UINT(1, board_reset_count(mega.raw()));
+        TEST_ASSERT_TRUE(mega.view().locked);
+        board_set_fault(mega.raw(), BOARD_FAULT_CLOSED, 4, false);
+        mega.boot(false);
+        mega.expect_ok("unlock");
+        mega.run_ms(60.0);
+        TEST_ASSERT_TRUE(board_is_fed(mega.raw()));
+    }
+}
+
+void what_stops_its_pulses_stops_the_supply()
+{
+    const struct {
+        const char *what;
+        double limit_ms;
+        std::function<void(rig &)> happens;
+    } ends[] = {
+        {"interrupts off for ever", LIMIT_MS,
+         [](rig &m) {
+             board_flip_register(m.raw(), 0x5F, 0x80);
+             board_hang(m.raw());
+         }},
+        {"crystal stopped", LIMIT_MS, [](rig &m) { board_stop_oscillator(m.raw()); }},
+        {"pin shorted to ground", LIMIT_MS,
+         [](rig &m) { board_set_fault(m.raw(), BOARD_FAULT_ENABLE_LOW, 0, true); }},
+        {"pin shorted to 5 V", HIGH_MS,
+         [](rig &m) { board_set_fault(m.raw(), BOARD_FAULT_ENABLE_HIGH, 0, true); }},
+        {"supply off", LIMIT_MS + 25.0, [](rig &m) { m.board.send("supply off\n"); }},
+        {"!!", LIMIT_MS + 25.0, [](rig &m) { m.board.send("!!"); }},
+    };
+    for (const auto &end : ends) {
+        rig mega;
+        heat(mega);
+        end.happens(mega);
+        off_after_ms(mega, end.what, end.limit_ms);
+    }
+}
+
+void one_stop_leaves_the_supply_and_two_take_it()
+{
+    rig mega;
+    heat(mega);
+    mega.board.send("!");
+    mega.run_ms(500.0);
+    TEST_ASSERT_TRUE(board_is_fed(mega.raw()));
+    mega.board.take_output();
+    mega.expect_ok("clear");
+    mega.board.send("!x\n!"); /* not in a row */
+    mega.run_ms(500.0);
+    TEST_ASSERT_TRUE(board_is_fed(mega.raw()));
+    mega.board.send("!");
+    mega.run_ms(150.0);
+    TEST_ASSERT_FALSE(board_is_fed(mega.raw()));
+    mega.board.take_output();
+    TEST_ASSERT_EQUAL_STRING("error:11", mega.answer("supply on").substr(0, 8).c_str());
+    mega.expect_ok("clear");
+    mega.expect_ok("supply on");
+}
+
+/* PORT, DDR and the timer that can drive the pin: the next tick writes them. */
+void a_bit_of_the_pin_that_turns_over_is_written_again()
+{
+    constexpr struct {
+        unsigned address;
+        std::uint8_t mask;
+    } bits[] = {{0x24, 0x40}, {0x25, 0x40}, {0x80, 0x20}, {0x80, 0x10}};
+    rig mega;
+    mega.boot();
+    mega.expect_ok("on all 50");
+    for (const auto &one : bits) {
+        for (int k = 0; k < 10; ++k) { /* at any moment of a tick */
+            mega.run_ms(23.0);
+            board_flip_register(mega.raw(), one.address, one.mask);
+            for (int ms = 0; ms < 150; ms += 5) {
+                mega.run_ms(5.0);
+                TEST_ASSERT_TRUE(board_is_fed(mega.raw()));
+            }
+        }
+    }
+    TEST_ASSERT_EQUAL_INT(SAFETY_FAULT_NONE, mega.view().spring[0].fault);
+}
+
+void without_a_cut_off_there_are_no_pulses()
+{
+    rig mega;
+    mega.boot();
+    TEST_ASSERT_TRUE(board_is_fed(mega.raw()));
+    mega.expect_ok("$cut_off=0");
+    mega.run_ms(150.0);
+    TEST_ASSERT_FALSE(board_is_fed(mega.raw()));
+    TEST_ASSERT_EQUAL_STRING("error:15", mega.answer("supply on").substr(0, 8).c_str());
+}
+
+} // namespace
+
+void setUp() {}
+void tearDown() {}
+
+int main()
+{
+    need_elf(elf());
+    UNITY_BEGIN();
+    RUN_TEST(a_welded_switch_heats_until_the_supply_is_off);
+    RUN_TEST(a_program_that_hangs_holds_nothing);
+    RUN_TEST(what_stops_its_pulses_stops_the_supply);
+    RUN_TEST(one_stop_leaves_the_supply_and_two_take_it);
+    RUN_TEST(a_bit_of_the_pin_that_turns_over_is_written_again);
+    RUN_TEST(without_a_cut_off_there_are_no_pulses);
+    return UNITY_END();
+}
