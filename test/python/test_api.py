@@ -79,3 +79,34 @@ def test_plot_refuses_a_picture_that_it_cannot_make(make_log, tmp_path: Path) ->
     command = [sys.executable, "-m", "ninespring", "plot", str(make_log(seconds=60)), "-o", str(tmp_path / "p.bmp")]
     done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
     assert done.returncode == 2 and ".png, .svg, .pdf, .gif" in done.stderr
+
+
+def test_a_log_where_a_model_belongs_is_said(make_log) -> None:
+    run = ns.read_log(make_log(seconds=60))
+    with pytest.raises(ns.InputError, match="a model is wanted"):
+        ns.predict(run, run)
+    with pytest.raises(ns.InputError, match="a log is wanted"):
+        ns.fit(ns.Model(ns.Array()))
+    with pytest.raises(ns.InputError, match="duration_s = nan"):
+        ns.make_plan(duration_s=float("nan"))
+
+
+def test_what_the_commands_do_can_be_called(make_log, tmp_path: Path) -> None:
+    run, model = ns.read_log(make_log(seconds=60)), ns.Model(ns.Array())
+    model.parameters, model.stderr = {"loss_w_per_k": 0.0058}, {"loss_w_per_k": 1e-4}
+    temperature, austenite = ns.replay(model, run)
+    assert temperature.shape == austenite.shape == run.temperature_c.shape
+    before, after = ns.verify(model, run)
+    assert 0.0 < after < 10.0 and before > 0.0
+    assert "on 5 100" in " ".join(ns.plan_through(model, 5).steps)
+    table = tmp_path / "table.csv"
+    table.write_text(
+        "Time (sec),Heater 1,Heater 2,Temperature 1,Temperature 2\n0,0,0,21,21\n1,50,0,21,21\n2,50,0,22,21\n"
+    )
+    assert ns.import_log(table, "tclab", tmp_path / "tclab.csv").springs == 2
+    fake = FakeBoard({})
+    fake.stream = [row(float(k), 0.5) for k in range(1, 8)]
+    got = ns.record(fake.port, tmp_path / "board.csv", duration_s=3.0)
+    assert not got.ended and (tmp_path / "board.csv").exists()
+    with pytest.raises(ns.InputError, match="never written over"):
+        ns.record(fake.port, tmp_path / "board.csv", duration_s=3.0)

@@ -29,6 +29,7 @@ LAB = """
 duration_s = 600
 log_interval_s = 1
 seed = {seed}
+policy = open
 [plant]
 effects = latent_heat, resistance_phase, edge_loss
 edge_loss_fraction = 0.25
@@ -126,7 +127,7 @@ def test_an_effect_found_in_a_log_is_in_the_model_of_the_chip_that_it_was_upload
     assert verified() == pytest.approx((as_it_will_be, as_it_will_be), abs=0.01)
 
     # and the chip's model does what the model does: its telemetry, recorded, against a replay of what it measured
-    (tmp_path / "steps.txt").write_text("at 1 = pattern 111101111\nat 45 = off all\n")
+    (tmp_path / "steps.txt").write_text("policy open\nmodel cold\nat 2 = pattern 111101111\nat 45 = off all\n")
     record = ("record", "--port", board, "--hz", 2, "--duration", 60, "--run", tmp_path / "steps.txt")
     ninespring(*record, "-o", tmp_path / "board.csv")
     got = read_table(tmp_path / "board.csv", ("state",)).frame
@@ -179,14 +180,18 @@ def faults_of(port: str) -> list[str]:
 
 @pytest.mark.skipif(not (SIM.exists() and ELF.exists()), reason=f"SKIPPED: {SIM} or {ELF} is not there")
 @pytest.mark.parametrize("board", ["4"], indirect=True)
-@pytest.mark.parametrize("program", ["record", "dashboard"])
+@pytest.mark.parametrize("program", ["record", "dashboard", "script"])
 def test_a_program_that_is_killed_leaves_no_spring_on(board: str, tmp_path: Path, program: str) -> None:
     (tmp_path / "steps.txt").write_text("at 1 = on all 50\n")
     words = {
         "record": ["record", "--run", tmp_path / "steps.txt", "-o", tmp_path / "log.csv"],
         "dashboard": ["dashboard", "--listen", "127.0.0.1:0", "--folder", tmp_path],
+        "script": [],
     }[program]
+    script = "from ninespring import Board; import sys, time; b = Board(sys.argv[1]); b.on(5, 50); print('on', flush=True); time.sleep(99)"
     command = [sys.executable, "-m", "ninespring", *map(str, words), "--port", board]
+    if program == "script":
+        command = [sys.executable, "-c", script, board]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         if program == "dashboard":
             url = process.stdout.readline().split()[0].rstrip("/")
@@ -196,6 +201,8 @@ def test_a_program_that_is_killed_leaves_no_spring_on(board: str, tmp_path: Path
                 page.send('{"do": "all", "level": 50}')
                 while (state := json.loads(page.recv(30))).get("sum_a", 0.0) < 5.0:
                     assert state.get("connected", True)
+        elif program == "script":
+            assert process.stdout is not None and process.stdout.readline() == "on\n"
         else:
             until = time.monotonic() + 60.0
             while not flows(tmp_path / "log.csv.part"):
@@ -207,6 +214,23 @@ def test_a_program_that_is_killed_leaves_no_spring_on(board: str, tmp_path: Path
         if faults := faults_of(board):
             break
     assert any("host_silent" in line for line in faults)
+
+
+@pytest.mark.skipif(not (SIM.exists() and ELF.exists()), reason=f"SKIPPED: {SIM} or {ELF} is not there")
+@pytest.mark.parametrize("board", ["4"], indirect=True)
+def test_a_script_that_sleeps_keeps_its_springs_and_gives_the_timeout_back(board: str) -> None:
+    with Board(board) as connection:
+        connection.ask("echo on")  # as a user's terminal may have left it
+        assert connection.ask("$host_timeout_s") == ["$host_timeout_s=0"]
+        connection.ask("policy open")
+        connection.on(5, 30)
+        time.sleep(3.0)
+        assert connection.ask("$host_timeout_s") == ["$host_timeout_s=5"]
+        assert connection.ask("faults") == []
+        assert connection.read().duty[4] > 0
+    with Board(board) as connection:
+        assert connection.version[0].startswith("ninespring ") and "echo off" not in connection.version
+        assert connection.ask("$host_timeout_s") == ["$host_timeout_s=0"]
 
 
 def flows(part: Path) -> bool:

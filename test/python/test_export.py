@@ -12,7 +12,7 @@ from ninespring import native
 from ninespring.cli import cli
 from ninespring.errors import InputError, WorkError
 from ninespring.export import drive
-from ninespring.export.settings import settings_of
+from ninespring.export.settings import judged, left_out, settings_of, together
 from ninespring.fit.predict import predict_by_chip
 from ninespring.logs import read_log, write_atomically
 from ninespring.models import Array, Model, model_text, read_model
@@ -200,7 +200,8 @@ def test_what_rests_on_a_declared_resistance_is_said_and_not_written(make_log, t
     run("export", "--model", tmp_path / "d" / "model.toml", "-o", tmp_path / "s.txt")
     lines = (tmp_path / "s.txt").read_text().splitlines()
     assert {line.split("=")[0] for line in lines if line.startswith("$")} == {"$rows", "$columns"}
-    said = next(line for line in lines if "no voltages were logged" in line)
+    assert any("no voltages were logged" in line for line in lines)
+    said = " ".join(line for line in lines if line.startswith("#"))
     assert all(
         name in said for name in ("heat_capacity_j_per_k", "loss_w_per_k", "orthogonal_w_per_k", "latent_heat_j")
     )
@@ -271,7 +272,7 @@ def test_the_chips_error_is_told_before_and_after_on_a_log_that_was_not_fitted(m
     page = report.read_text()
     assert page.count("The chip on fresh.csv, which the fit never saw") == 1, "what was said before is replaced"
     assert f"{result['after']['rmse_c']:.2f}" in page and page.rstrip().endswith("</html>")
-    with pytest.raises(InputError, match="is no report"):
+    with pytest.raises(InputError, match="is there already"):
         run("verify", "--model", tmp_path / "d" / "model.toml", fresh, "--report", fresh)
     with pytest.raises(InputError, match="never saw"):
         run("verify", "--model", tmp_path / "d" / "model.toml", fitted)
@@ -293,8 +294,29 @@ def test_a_link_stays_a_link_a_device_a_device_and_a_dash_is_standard_output(
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
     reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
-    write_atomically({link: "new\n", pipe: "piped\n", Path("-"): "shown\n", Path("/dev/null"): "gone"})
+    write_atomically({link: "new\n", pipe: "piped\n", Path("-"): "shown\n", Path("/dev/null"): "gone"}, force=True)
     assert link.is_symlink() and target.read_text() == "new\n"
     assert os.read(reader, 100) == b"piped\n" and pipe.is_fifo()
     os.close(reader)
     assert capsys.readouterr().out == "shown\n"
+
+
+def test_one_judgement_says_what_goes_into_the_chip_and_how_to_have_it_go(tmp_path: Path) -> None:
+    for hottest_c, goes in ((95.0, True), (91.5, False)):
+        model = transforming(hottest_c)
+        listed = [{"name": "latent_heat"}]
+        judged(listed, model)
+        assert listed[0]["on_chip"] == goes == ("latent_heat" not in left_out(model))
+        assert goes == ("latent_heat_j" in settings_of(model).written)
+    said = listed[0]["why_not_on_chip"]
+    words = said[said.index("ninespring plan") :].split()[1:]
+    (tmp_path / "model.toml").write_text(model_text(model))
+    words = [str(tmp_path / one) if "." in one else one for one in words]
+    done = CliRunner().invoke(cli, words, standalone_mode=False)
+    assert done.exception is None, done.output
+    assert "on 5 100" in (tmp_path / "steps.txt").read_text()
+
+
+def test_what_is_not_written_never_names_a_spring_that_is() -> None:
+    kept = {"wire_1": "unknown", "wire_3": "unknown", "loss_1": "unknown", "loss_2": "unknown"}
+    assert together(kept, {"wire_2": "1"}) == {"unknown": ["wire_1", "wire_3", "loss"]}

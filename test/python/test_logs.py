@@ -236,24 +236,37 @@ def test_fast_logs_are_averaged_without_a_shift_and_with_white_noise(tmp_path: P
     assert any("averaged 8 by 8" in note for note in short.notes)
 
 
-def test_endless_logs_are_cut_to_stretches_that_a_simulation_follows_as_well_as_the_whole(make_log) -> None:
+def test_endless_logs_are_averaged_where_nothing_happens_and_simulated_as_well_as_the_whole(make_log) -> None:
     true = {"plate_conduction": {"plate_coupling_w_per_k": 0.002}, "latent_heat": {"latent_heat_j": 8.0}}
     run = read_log(make_log(effects=true, seconds=20000, noise=0.05))
     short = condense(run, 4000)
-    assert len(short.time_s) <= 4000 + 3
-    assert short.time_s[0] == run.time_s[0] and short.time_s[-1] == run.time_s[-1]
-    assert len(short.starts) == 3
+    assert 2000 < len(short.time_s) <= 4000
+    assert short.time_s[0] == run.time_s[0] and short.starts == [0]
+    # what was given is the same in sum, and what was switched is switched at that very time
+    span = np.diff(short.time_s, append=run.time_s[-1] + 1.0)
+    assert span @ short.drive == pytest.approx(run.drive.sum(axis=0))
+    switched = run.time_s[1:][(np.abs(np.diff(run.drive, axis=0)) > 0.05 * run.drive.max(axis=0)).any(axis=1)]
+    assert np.isin(switched, short.time_s).all()
     plant = native.Plant(3, 3)
     plant.set_effects(true)
     for values in true.values():
         plant.set_all(values)
     left = short.temperature_c - simulate_run(plant, short, short.ambient_c, {})
-    # two minutes after each start do not count: the noise of one reading has died out by then
-    for begin in short.starts[1:]:
-        assert np.isnan(left[begin + 1 : begin + 100]).all()
-    assert np.isfinite(left).mean() > 0.9
-    assert np.sqrt(np.nanmean(left**2)) < 0.1
-    assert any("stretches" in note for note in short.notes)
+    assert np.isfinite(left).mean() > 0.99
+    assert np.sqrt(np.nanmean(left**2)) < 0.06
+    assert any("20000 rows averaged" in note for note in short.notes)
+
+
+def test_no_row_of_a_log_that_is_switched_all_the_time_is_left_out(make_log) -> None:
+    def restless(columns: dict[str, np.ndarray]) -> None:
+        rng = np.random.default_rng(2)
+        for k in range(9):
+            columns[f"i{k + 1}_a"] = rng.choice([0.0, 1.5], 9000)
+
+    run = read_log(make_log(seconds=9000, change=restless))
+    short = condense(run, 3000)
+    assert len(short.time_s) == 3000 and short.starts == [0]
+    assert short.drive.sum(axis=0) * 3.0 == pytest.approx(run.drive.sum(axis=0), rel=1e-3)
 
 
 def test_rows_here_and_there_that_are_missing_are_said(make_log) -> None:
@@ -410,4 +423,11 @@ def test_what_is_written_is_read_back(tmp_path: Path, rows: list[tuple[float, fl
 def test_a_negative_current_is_not_taken_for_milliamperes(make_log, value: float, said: str) -> None:
     log = make_log(change=lambda c: c["i3_a"].__setitem__(slice(50, 60), value))
     with pytest.raises(InputError, match=said):
+        read_log(log)
+
+
+def test_a_time_that_is_no_time_is_refused_at_its_own_line(tmp_path: Path) -> None:
+    log = tmp_path / "far.csv"
+    log.write_text("time_s,i1_a,t1_c\n0,0,20\n1e308,0,20\n2,0,20\n3,0,20\n")
+    with pytest.raises(InputError, match=r"far.csv:3:1: time_s = 1e\+308 s"):
         read_log(log)

@@ -33,7 +33,7 @@ def commands(make_log, tmp_path: Path) -> dict[str, tuple[list[str], list[Path],
         't1_c = "Temperature 1"\nt2_c = "Temperature 2"\n'
     )
     return {
-        "predict": (["predict", str(log), "--model", str(model)], [log, model], "time_s,"),
+        "predict": (["predict", str(log), "--model", str(model)], [log, model], "# tool: ninespring "),
         "export": (["export", "--model", str(model)], [model], "# from m.toml"),
         "import": (["import", str(table), "--map", str(regions)], [table, regions], "# "),
     }
@@ -65,7 +65,7 @@ def test_an_input_is_never_written_over_by_name_link_or_second_name(commands, tm
 def test_a_link_is_followed_a_device_stays_one_and_a_dash_prints(commands, tmp_path: Path, name: str) -> None:
     words, _, begins = commands[name]
     target, link = tmp_path / "target", tmp_path / "link"
-    target.write_text("old")
+    target.touch()
     link.symlink_to(target)
     run(words, link)
     assert link.is_symlink() and target.read_text().startswith(begins)

@@ -70,7 +70,7 @@ def test_the_log_says_what_board_it_was_and_how_it_was_set(tmp_path: Path) -> No
     assert "# version: ninespring 9.9.9 mega2560, sensors fake" in head
     assert "# fault: board: fault 13 emergency_stop" in head
     assert "# $loss_w_per_k=0.005800" in head and "# $rows=1" in head
-    assert text.endswith("# fault at the end: board: fault 13 emergency_stop\n")
+    assert text.endswith("# latched at the end: board: fault 13 emergency_stop\n")
     assert times(tmp_path / "log.csv") == [0.5 * k for k in range(1, 8)]
     assert read_log(tmp_path / "log.csv", 1, temperatures=False).current_a is not None
     assert_off(board)
@@ -310,7 +310,7 @@ def test_a_reader_that_goes_away_ends_the_recording(tmp_path: Path) -> None:
 def test_a_link_stays_a_link_and_no_input_is_written_over(tmp_path: Path) -> None:
     board = FakeBoard()
     board.stream = STREAM
-    (tmp_path / "real.csv").write_text("old\n")
+    (tmp_path / "real.csv").touch()
     (tmp_path / "log.csv").symlink_to("real.csv")
     assert record(board, tmp_path, "--duration", 2).returncode == 0
     assert (tmp_path / "log.csv").is_symlink()
@@ -323,6 +323,63 @@ def test_a_link_stays_a_link_and_no_input_is_written_over(tmp_path: Path) -> Non
         assert done.returncode == 2
         assert "would be written over" in done.stderr or "one file" in done.stderr
     assert steps.read_text() == "on 1\n"
+
+
+def faulty(time_s: float) -> str:
+    return row(time_s, 0.0).replace(",ok", ",fault_2")
+
+
+def test_a_fault_is_said_as_it_comes_in_the_log_and_at_the_end(tmp_path: Path) -> None:
+    board = FakeBoard()
+    board.stream = [*STREAM[:6], "FAULT spring 1: fault 2 open_circuit", *(faulty(0.5 * k) for k in range(7, 12))]
+    board.stream, board.every_s = [*board.stream, "<limits|spring:1|t:6.0|safety|cut_a:0.000>", faulty(6.0)], 0.01
+    done = record(board, tmp_path, "--duration", 5, "--json", tmp_path / "r.json")
+    assert done.returncode == 1
+    words = "at 3.5 s: spring 1: fault 2 open_circuit (driven and no current: a broken spring or wire)"
+    assert done.stderr.splitlines()[0] == f"fault {words}"
+    assert done.stderr.splitlines()[-1].startswith(f"ninespring: a fault cut this run short, {words}; what came is in")
+    result = json.loads((tmp_path / "r.json").read_text())
+    assert result["faults"] == [{"time_s": 3.5, "spring": 1, "number": 2, "name": "open_circuit"}]
+    assert words in result["ended"]
+    lines = (tmp_path / "log.csv").read_text().splitlines()
+    assert f"# fault {words}" in lines and f"# ended: {result['ended']}" in lines
+    assert times(tmp_path / "log.csv")[-1] == 5.5  # it went on
+    assert_off(board)
+
+
+@pytest.mark.parametrize("commented", [True, False])
+def test_whoever_uses_a_log_is_told_first_that_a_fault_cut_it_short(tmp_path: Path, commented: bool) -> None:
+    log = tmp_path / "log.csv"
+    rows = [
+        f"{k}.0,{float(k < 20)},{0.2 * (k < 20)},{20 + min(k, 20)},0,20,{'ok' if k < 20 else 'fault_16'}"
+        for k in range(60)
+    ]
+    comment = "# fault at 20.0 s: board: fault 16 host_silent (why)"
+    rows[20:20] = [comment] * commented
+    log.write_text("\n".join(["time_s,i1_a,v1_v,t1_c,fan,ambient_c,state", *rows]) + "\n")
+    said = "a fault cut this run short, at 20.0 s: " + (
+        "board: fault 16 host_silent (why)" if commented else "fault 16"
+    )
+    assert read_log(log).notes[0].startswith(said)
+    array = tmp_path / "array.toml"
+    array.write_text("[array]\nrows = 1\ncols = 1\n")
+    plotted = ninespring("plot", log, "--array", array, "-o", tmp_path / "p.svg")
+    assert plotted.stderr.startswith(f"log.csv: {said}"), plotted
+    diagnosed = ninespring("diagnose", log, "--array", array, "-o", tmp_path / "d")
+    assert diagnosed.stdout.startswith(f"note: log.csv: {said}"), diagnosed
+    page = (tmp_path / "d" / "report.html").read_text()
+    assert page.index(said) < page.index('<p class="lead">')
+
+
+def test_a_host_that_was_held_up_does_not_blame_the_board(tmp_path: Path) -> None:
+    master, slave = pty.openpty()
+    tty.setraw(slave)
+    port = Port(os.ttyname(slave))
+    os.write(master, b"1.0,ok\n2.0,ok\n")
+    assert port.read_line(time.monotonic() - 1.0) == "1.0,ok"
+    assert port.read_line(time.monotonic() - 1.0) == "2.0,ok"
+    assert port.read_line(time.monotonic() - 1.0) is None
+    port.close()
 
 
 def test_the_host_timeout_is_set_while_recording_and_given_back(tmp_path: Path) -> None:
@@ -386,10 +443,10 @@ def test_a_second_program_on_the_port_is_named(tmp_path: Path) -> None:
     with subprocess.Popen(command("record", "--port", board.port, "-o", tmp_path / "log.csv")) as process:
         while "telemetry csv 10" not in board.seen:
             time.sleep(0.02)
-        done = ninespring("monitor", "--port", board.port)
+        done = ninespring("monitor", "--port", board.port)  # this process is the board
         process.terminate()
     assert done.returncode == 1
-    assert "another program has the port" in done.stderr
+    assert re.search(rf"another program has the port \(.*, pid {process.pid}\): end it first", done.stderr), done.stderr
 
 
 def test_a_port_that_is_not_there_or_is_none_is_said(tmp_path: Path) -> None:

@@ -191,7 +191,7 @@ def test_what_knows_one_layer_refuses_two(tmp_path: Path) -> None:
 def test_a_picture_has_both_layers_side_by_side(tmp_path: Path) -> None:
     ini = tmp_path / "two.ini"
     ini.write_text(
-        "[scenario]\nduration_s = 30\n[array]\nrows = 1\ncols = 2\nlayers = 2\n"
+        "[scenario]\nduration_s = 30\npolicy = open\n[array]\nrows = 1\ncols = 2\nlayers = 2\n"
         "[plant]\neffects = latent_heat, resistance_phase\n[events]\nat 1 = pattern 10/01\n"
     )
     subprocess.run([simulator(), "run", str(ini), "-o", str(tmp_path / "two.csv")], check=True, capture_output=True)

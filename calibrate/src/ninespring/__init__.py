@@ -10,7 +10,22 @@ from importlib.metadata import version
 
 __version__ = version("ninespring")
 
-from .api import diagnose, fit, plot, predict, save
+from .api import (
+    chip_settings,
+    diagnose,
+    fit,
+    import_log,
+    make_plan,
+    plan_through,
+    plot,
+    predict,
+    record,
+    replay,
+    save,
+    sweep,
+    upload,
+    verify,
+)
 from .board import Board, Reading
 from .errors import InputError, WorkError
 from .logs import Run, read_log
@@ -24,12 +39,21 @@ __all__ = [
     "Reading",
     "Run",
     "WorkError",
+    "chip_settings",
     "diagnose",
     "fit",
+    "import_log",
+    "make_plan",
+    "plan_through",
     "plot",
     "predict",
     "read_array",
     "read_log",
     "read_model",
+    "record",
+    "replay",
     "save",
+    "sweep",
+    "upload",
+    "verify",
 ]

@@ -6,26 +6,53 @@ a path. n is the number of rows, k of springs. Heavy imports happen when a funct
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import contextlib
+from collections.abc import Callable, Sequence
+from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .errors import InputError
-from .logs import Run, read_log, write_atomically
+from . import ranges
+from .errors import InputError, WorkError
+from .logs import Run, check_folder, read_log, write_atomically
 from .models import Array, Model, model_text, read_array, read_model
 
 if TYPE_CHECKING:
+    import pandas as pd
     from matplotlib.figure import Figure
 
+    from .export.settings import Settings
+    from .plan import Plan
+    from .recording import Recording
     from .verdict.diagnosis import Diagnosis
 
 Log = Run | str | Path
 
 
 def _model(model: Model | str | Path) -> Model:
-    return model if isinstance(model, Model) else read_model(model)
+    if isinstance(model, str | Path):
+        return read_model(model)
+    if not isinstance(model, Model):
+        raise InputError(f"a model is wanted, or a path to model.toml, not {model!r}")
+    return model
+
+
+def _run(log: Log, springs: int | None = None, temperatures: bool = True) -> Run:
+    if isinstance(log, str | Path):
+        return read_log(log, springs, temperatures)
+    if not isinstance(log, Run):
+        raise InputError(f"a log is wanted, as read_log returns it, or a path, not {log!r}")
+    return log
+
+
+def _array(array: Array | str | Path | None) -> Array | None:
+    if isinstance(array, str | Path):
+        return read_array(array)
+    if not isinstance(array, Array | None):
+        raise InputError(f"an array is wanted, or a path to array.toml, not {array!r}")
+    return array
 
 
 def _array_and_runs(
@@ -35,8 +62,8 @@ def _array_and_runs(
 
     if not logs:
         raise InputError("no log is given")
-    given = model.array if model else array if isinstance(array, Array) or array is None else read_array(array)
-    runs = [one if isinstance(one, Run) else read_log(one, given.springs if given else None) for one in logs]
+    given = model.array if model else _array(array)
+    runs = [_run(one, given.springs if given else None) for one in logs]
     return array_of(given, runs), runs
 
 
@@ -82,7 +109,7 @@ def predict(model: Model | str | Path, log: Log, chip: bool = False) -> np.ndarr
     from .fit import predict as prediction
 
     model = _model(model)
-    run = log if isinstance(log, Run) else read_log(log, model.array.springs, temperatures=False)
+    run = _run(log, model.array.springs, temperatures=False)
     if run.springs != model.array.springs:
         raise InputError(f"{run.springs} springs, and the model has {model.array.springs}", run.name)
     return prediction.predict(model, run, chip)
@@ -92,10 +119,161 @@ def plot(log: Log, model: Model | str | Path | None = None) -> Figure:
     """Return a figure of a log: each spring's temperature and drive; beside it what a model makes of it, dashed."""
     from .plotting import figure
 
-    run = log if isinstance(log, Run) else read_log(log, temperatures=False)
+    run = _run(log, temperatures=False)
     return figure(run, None if model is None else predict(model, run))
+
+
+def make_plan(
+    array: Array | str | Path | None = None,
+    duration_s: float = 900.0,
+    current_a: float = 2.0,
+    supply_a: float = 14.0,
+    hottest_c: float = 105.0,
+    seed: int = 1,
+    board_alone: bool = False,
+) -> Plan:
+    """Return the steps of a recording that identifies an array: `ninespring plan`. `.steps` are lines for `record`.
+
+    `current_a` is one spring's at full level, `supply_a` all springs' together, `hottest_c` any spring's as declared.
+    """
+    from .plan import make_plan as make
+
+    return make(_array(array) or Array(), duration_s, current_a, supply_a, hottest_c, seed, board_alone)
+
+
+def plan_through(model: Model | str | Path, spring: int, supply_a: float = 14.0, hottest_c: float = 105.0) -> Plan:
+    """Return the steps that take one spring (from 1) through its transformation: `ninespring plan --through`. A, degC."""
+    from .plan import plan_through as make
+
+    return make(_model(model), spring, supply_a, hottest_c)
+
+
+def record(
+    port: str,
+    output: str | Path,
+    duration_s: float = 900.0,
+    hz: int = 1,
+    steps: Sequence[str] = (),
+    thermometers: str | None = None,
+    force: bool = False,
+) -> Recording:
+    """Record a board's telemetry as a log: `ninespring record`. `steps` are lines as of steps.txt; s by the board's clock.
+
+    The springs are off afterwards, whatever ends it; `.ended` says why where that was nobody's wish. A log that is there is
+    kept (InputError) unless `force`.
+    """
+    from . import recording
+    from .board import Board
+    from .thermometers import Thermometers
+
+    ranges.RECORD_S.check("duration_s", duration_s)
+    ranges.RECORD_HZ.check("hz", hz)
+    script = recording.script_lines("\n".join(steps), "steps", duration_s)
+    keys = {"port": port, "tool": f"ninespring {version('ninespring')}"}
+    with contextlib.ExitStack() as stack:
+        log = recording.LogFile(Path(output), force)
+        stack.callback(log.close)
+        board = stack.enter_context(Board(port, off_at_end=False))
+        logger = Thermometers(thermometers) if thermometers else None
+        if logger:
+            stack.callback(logger.close)
+        return recording.record(board, log, hz, duration_s, script, keys=keys, thermometers=logger)
+
+
+def import_log(table: str | Path, mapping: str | Path, output: str | Path, force: bool = False) -> Run:
+    """Make a log of another logger's table by a mapping (a path, or built in: 'tclab'): `ninespring import --map`. Return it."""
+    from .importing import import_table
+
+    check_folder(Path(output), measured=True, force=force)
+    write_atomically({Path(output): import_table(Path(table), str(mapping))}, force)
+    return read_log(output, temperatures=False)
+
+
+def chip_settings(model: Model | str | Path, force: bool = False) -> Settings:
+    """Return what `ninespring export` writes of a model: `.lines` for `upload`, `.kept` what stays as the chip has it, and why.
+
+    WorkError where the log was doubted or the settings would drive worse than the firmware's, unless `force`.
+    """
+    from .export.command import checked_settings
+
+    return checked_settings(_model(model), "", force)[0]
+
+
+def upload(
+    port: str, settings: str, save: bool = True, say: Callable[[str, int], None] = lambda line, count: None
+) -> int:
+    """Send console lines (`chip_settings(model).lines`) to a board, read them back, save them: `ninespring upload`.
+
+    Return how many. WorkError, and nothing is saved, where the board refuses one or shows another value.
+    """
+    from .board import Board, settings_lines, settings_that_differ
+
+    lines = settings_lines(settings, "settings")
+    with Board(port, off_at_end=False) as board:
+        remarks = board.ask("learnt clear", 10.0)
+        for k, line in enumerate(lines):
+            say(line, k)
+            try:
+                remarks = board.ask(line)
+            except WorkError as error:
+                raise WorkError(f"{error}: nothing is saved, a reset of the board gives back what it had") from None
+        if remarks:
+            raise WorkError(f"the board does not take them together: {remarks[-1]}")
+        say("reading back", len(lines))
+        if wrong := settings_that_differ(lines, board.settings()):
+            raise WorkError(f"the board shows other values than were sent, nothing is saved: {'; '.join(wrong)}")
+        if save:
+            board.ask("$save", 10.0)
+    return len(lines)
+
+
+def verify(model: Model | str | Path, log: Log, before: str = "") -> tuple[float, float]:
+    """Return the chip's error on a log that the fit never saw, K rms: with the lines `before`, and with the model's over them.
+
+    `before`: console lines that the board has; left out, the firmware's defaults. `ninespring verify`.
+    """
+    from .export.settings import settings_of
+    from .fit.predict import predict_by_chip
+
+    model = _model(model)
+    run = _run(log, model.array.springs)
+    if any(one.get("sha256") == run.sha256 for one in model.provenance.get("logs", [])):
+        raise InputError("the model was fitted to this log: give one that the fit never saw", run.name)
+
+    def error_c(lines: str) -> float:
+        return float(np.sqrt(np.nanmean((run.temperature_c - predict_by_chip(model, lines, run)) ** 2)))
+
+    return error_c(before), error_c(f"{before}\n{settings_of(model).lines}")
+
+
+def replay(model: Model | str | Path, log: Log) -> tuple[np.ndarray, np.ndarray]:
+    """Return temperatures (n, k), degC, and austenite (n, k), 0..1, that the on-chip model believes along a log."""
+    from .fit import predict as prediction
+
+    model = _model(model)
+    run = _run(log, model.array.springs, temperatures=False)
+    return prediction.chip_trace(model, prediction.chip_lines(model)[0], run)
+
+
+def sweep(spec: str | Path, output: str | Path, workers: int = 1) -> pd.DataFrame:
+    """Run a sweep's points (docs/exploring.md) on this machine into a folder, and return them: `ninespring sweep`."""
+    from distributed import Client
+
+    from .explore.results import Results
+    from .explore.spec import read_spec
+    from .explore.sweep import local_cluster
+    from .explore.sweep import sweep as run
+
+    ranges.WORKERS.check("workers", workers)
+    wanted = read_spec(Path(spec))
+    results = Results(Path(output), wanted)
+    done = results.open()
+    if not done.all():
+        with local_cluster(workers) as where, Client(where) as client:
+            run(client, wanted, results, done, lambda count: None)
+    return results.read()
 
 
 def save(model: Model, path: str | Path) -> None:
     """Write a model as model.toml, for `export`, `predict` and the chip."""
-    write_atomically({Path(path): model_text(model)})
+    write_atomically({Path(path): model_text(_model(model))})

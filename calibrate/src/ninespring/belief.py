@@ -11,7 +11,7 @@ FIRST = re.compile(
     r"austenite (?P<austenite>[\d.]+) %, .*?(?:, (?P<doing>[a-z]+))?"
 )
 TARGET = re.compile(r"  .*, target (\d+\.\d+) A\b.*")
-WHY = re.compile(r"  ((?:waits|away)\b.*)")
+WHY = re.compile(r"  ((?:waits|away|not known)\b(?:\D*(?P<unknown_s>\d+) s: .*)?.*)")
 
 
 @dataclass
@@ -26,7 +26,9 @@ class Belief:
     """heat, hold, lower; empty: nothing."""
     target_a: float | None = None
     why: str = ""
-    """Why it is not where it was asked to be."""
+    """Why it is not where it was asked to be, or not known."""
+    unknown_s: float | None = None
+    """So long it may still be hot from before power-on."""
 
 
 def beliefs(lines: Iterable[str]) -> dict[int, Belief]:
@@ -45,4 +47,5 @@ def beliefs(lines: Iterable[str]) -> dict[int, Belief]:
             out[spring].target_a = float(match[1])
         elif spring and (match := WHY.fullmatch(line)):
             out[spring].why = match[1]
+            out[spring].unknown_s = float(match["unknown_s"]) if match["unknown_s"] else None
     return out

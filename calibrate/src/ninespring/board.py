@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import re
 import subprocess
+import threading
 import time
 from collections import deque
 from collections.abc import Callable
@@ -31,6 +32,11 @@ HOST_TIMEOUT_S = 5
 """Springs go off when nothing came from here for so long, where the board has that setting."""
 ALIVE_EVERY_S = 1.0
 """By the clock here and by the board's: that of a simulated one may run faster."""
+SCRIPT_ALIVE_EVERY_S = 0.2
+"""For a script that may sleep or compute between two lines: a simulated board's second may be so short."""
+DRIVES = re.compile(r"\s*(on|pattern)\b", re.IGNORECASE)
+STATUS = re.compile(r"^<(off|on|fault|locked)\|t:.*>$")
+"""What `?` is answered with."""
 ROW_TIME = re.compile(r"^(\d+\.\d+),")
 
 
@@ -83,6 +89,9 @@ class Board:
         """Answers that are still to come."""
         self._unguarded: str | None = None
         """The setting host_timeout_s as it was."""
+        self._guards = False
+        """Whether somebody has seen to that setting."""
+        self._script_ends = threading.Event()
         self.thermometers: str | None = None
         """Port of the simulated board's thermometers."""
         self._simulated: subprocess.Popen[str] | None = None
@@ -119,6 +128,7 @@ class Board:
             if self.off_at_end:
                 self.make_safe()
         finally:
+            self._script_ends.set()
             self._port.close()
             self._end_simulation()
 
@@ -153,13 +163,14 @@ class Board:
 
     def _end_of_greeting(self) -> None:
         """Read the rest of the answer, and those to what was asked while the board was still starting."""
-        self._port.write("telemetry off\n")
+        sent = ("echo off", "telemetry off")  # a board that knows no echo refuses the first
+        self._port.write("".join(f"{line}\n" for line in sent))
         quiet_s, answered = 0.2 * self.patience, False
         until = time.monotonic() + self.patience
         while (line := self._wait(until)) is not None:
             if TELEMETRY.match(line):
                 continue
-            if not answered and line not in ("", "ok"):
+            if not answered and line not in ("", "ok", "version", *sent) and not ERROR.match(line):
                 self.version.append(line)
             answered = answered or line == "ok"
             until = time.monotonic() + (quiet_s if answered else self.patience)
@@ -177,6 +188,10 @@ class Board:
         """
         if not re.fullmatch("[ -~]+", line):
             raise InputError(f"{line[:40]!r} is not one line of plain ASCII")
+        if re.search("[!?]", line):
+            raise InputError(f"{line[:40]!r}: ! and ? are no part of a line, they act at once: stop_now, status")
+        if DRIVES.match(line):
+            self._guard_script()
         self._port.write(line + "\n")
         self._alive_s = time.monotonic()
         timeout_s *= self.patience
@@ -196,11 +211,22 @@ class Board:
                 raise RefusedError(f"'{line}' refused: error {match[1]} {match[2]}".rstrip())
             if TELEMETRY.match(got):
                 self._telemetry.append(got)
-            elif got:
+            elif got and got != line:  # that is the board's echo
                 answer.append(got)
                 until = time.monotonic() + timeout_s
         self._owed = 0
         raise WorkError(f"{self.port}: no answer to '{line}' for {timeout_s:g} s")
+
+    def status(self, timeout_s: float = 3.0) -> str:
+        """Return the line of status that `?` is answered with, at any moment."""
+        self._port.write("?")
+        until = time.monotonic() + self.patience * timeout_s
+        while (got := self._wait(until)) is not None:
+            if STATUS.match(got):
+                return got
+            if TELEMETRY.match(got):
+                self._telemetry.append(got)
+        raise RefusedError(f"'?' is not answered within {self.patience * timeout_s:g} s")
 
     def next_line(self, until_s: float) -> str | None:
         """Return the next line that nobody asked for (telemetry), None where none came until that monotonic time."""
@@ -231,11 +257,39 @@ class Board:
         pairs = (line[1:].split("=", 1) for line in self.ask("$$", 10.0) if line.startswith("$") and "=" in line)
         return {name: value.split()[0] for name, value in pairs if value.strip()}
 
+    @property
+    def unguarded(self) -> str | None:
+        """The setting host_timeout_s as it will be again when nothing guards any more; None where nothing does."""
+        return self._unguarded
+
     def guard(self, settings: dict[str, str]) -> None:
         """Have the springs go off when this program falls silent, where the board can: ended by `make_safe`."""
+        self._guards = True
         if "host_timeout_s" in settings:
             self._unguarded = settings["host_timeout_s"]
             self.ask(f"$host_timeout_s={HOST_TIMEOUT_S}")
+
+    def _guard_script(self) -> None:
+        """Do so for a script that is about to drive and has not: it is kept alive as long as this process lives."""
+        if self._guards:
+            return
+        self._guards = True
+        try:
+            said = self.ask("$host_timeout_s")
+        except RefusedError:  # a board without it
+            return
+        value = next((line.partition("=")[2] for line in said if line.startswith("$host_timeout_s=")), "")
+        if value and not 0 < float(value) <= HOST_TIMEOUT_S:
+            self.guard({"host_timeout_s": value})
+        if value:
+            threading.Thread(target=self._live, daemon=True).start()
+
+    def _live(self) -> None:
+        while not self._script_ends.wait(SCRIPT_ALIVE_EVERY_S):
+            try:
+                self._port.write("\n")
+            except WorkError:
+                return
 
     def unguard(self) -> None:
         """Give the board back the timeout that it had."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import datetime
 import os
 import time
@@ -9,13 +10,13 @@ from pathlib import Path
 
 import click
 
-from . import __version__
-from .console import FILE, JSON, PORT, Command, beside, checked, out, result_of, working, write
+from . import __version__, ranges
+from .console import FILE, FORCE, JSON, PORT, Command, Real, Whole, beside, checked, err, out, result_of, working, write
 from .errors import InputError, WorkError
 from .logs import check_folder, read_bytes
 
-HZ = click.IntRange(1, 50)
-SECONDS = click.FloatRange(min=0, min_open=True)
+HZ = Whole(ranges.RECORD_HZ)
+SECONDS = Real(ranges.RECORD_S)
 
 
 @click.command(
@@ -39,6 +40,7 @@ steps.txt (console words; `at S =` waits until so many seconds after the first r
 )
 @click.option("--run", "script", type=FILE, help="console lines to send, one a line, each at its time")
 @click.option("--thermometers", help="port of a thermocouple logger: its temperatures (degC) become t1_c, t2_c, ...")
+@FORCE
 @JSON
 def record(
     port: str,
@@ -47,20 +49,23 @@ def record(
     duration: float,
     script: Path | None,
     thermometers: str | None,
+    force: bool,
     json_path: Path | None,
 ) -> None:
     """Log a board's telemetry: currents (A), voltages (V), the model's temperatures (degC).
 
     What has come is kept and the springs are switched off, whatever ends the recording: Ctrl-C, a closed terminal, a
     cable, a full disk, a reset of the board. While it runs, rows go to OUTPUT.part; at the end that becomes OUTPUT.
-    The log begins with the board's version, faults and settings as comments.
+    The log begins with the board's version, faults and settings as comments. A fault of the board is said as it comes and at the
+    end, and stands in the log where it came; the command then exits with 1.
     """
     from .board import Board
     from .recording import LogFile, script_lines, told_to_stop
     from .recording import record as record_board
     from .thermometers import Thermometers
 
-    check_folder(output, json_path)
+    check_folder(output, measured=True, force=force)
+    check_folder(json_path)
     if thermometers and os.path.realpath(thermometers) == os.path.realpath(port):
         raise InputError(f"--thermometers {thermometers}: that is the board's port, a logger has its own")
     text = read_bytes(script).decode("utf-8", "replace") if script else ""
@@ -76,23 +81,31 @@ def record(
             Board(port, stopped=stopped, off_at_end=False) as board,
         ):
             logger = Thermometers(thermometers) if thermometers else None
-            log = LogFile(output)
+            log = LogFile(output, force)
             try:
+                alarm = lambda fault: err.print(f"fault {fault}", style="bold red", markup=False)  # noqa: E731
                 tell = lambda rows, seconds: say(f"{rows} rows", seconds)  # noqa: E731
-                got = record_board(board, log, hz, duration, steps, tell, keys, logger)
+                got = record_board(board, log, hz, duration, steps, tell, keys, logger, alarm)
             finally:
                 log.close()
                 if logger:
                     logger.close()
         if not log.rows:
             raise WorkError(got.ended or "stopped before the first row came")
-        write({json_path: checked(result_of("record", rows=log.rows, dropped_lines=got.dropped, ended=got.ended))})
+        faults = [dataclasses.asdict(one) for one in got.faults]
+        write(
+            {
+                json_path: checked(
+                    result_of("record", rows=log.rows, dropped_lines=got.dropped, ended=got.ended, faults=faults)
+                )
+            }
+        )
         lines = f", {got.dropped} corrupt lines dropped" if got.dropped else ""
         if got.offset_s is not None:
             lines += f"; the thermometers' clock was {got.offset_s:+.2f} s from the board's"
         beside(output).print(f"{log.rows} rows -> {output}{lines}", markup=False)
     if got.ended:
-        raise WorkError(f"{got.ended}; what had come until then is in {output}")
+        raise WorkError(f"{got.ended}; what came is in {output}")
 
 
 @click.command(
@@ -112,25 +125,13 @@ def upload(settings: Path, port: str, save: bool, json_path: Path | None) -> Non
     Nothing is saved unless the board took every line and shows every value in `$$`. What the board has learnt of its
     springs it has learnt beside its old numbers, and forgets. All springs must be off.
     """
-    from .board import Board, settings_lines, settings_that_differ
+    from . import api
+    from .board import settings_lines
 
     check_folder(json_path)
     lines = settings_lines(read_bytes(settings).decode("utf-8", "replace"), str(settings))
-    with working("sending", len(lines)) as say, Board(port, off_at_end=False) as board:
-        remarks = board.ask("learnt clear", 10.0)
-        for k, line in enumerate(lines):
-            say(line, k)
-            try:
-                remarks = board.ask(line)
-            except WorkError as error:
-                raise WorkError(f"{error}: nothing is saved, a reset of the board gives back what it had") from None
-        if remarks:
-            raise WorkError(f"the board does not take them together: {remarks[-1]}")
-        say("reading back", len(lines))
-        if wrong := settings_that_differ(lines, board.settings()):
-            raise WorkError(f"the board shows other values than were sent, nothing is saved: {'; '.join(wrong)}")
-        if save:
-            board.ask("$save", 10.0)
+    with working("sending", len(lines)) as say:
+        api.upload(port, "\n".join(lines), save, say)
     write({json_path: checked(result_of("upload", settings=len(lines), saved=save))})
     out.print(f"{len(lines)} settings sent and read back{', saved' if save else ''}")
 
@@ -144,7 +145,7 @@ Example:
 )
 @PORT
 @click.option("--hz", type=HZ, default=2, show_default=True, help="updates a second")
-@click.option("--duration", type=SECONDS, default=1e9, help="s; Ctrl-C ends it")
+@click.option("--duration", type=SECONDS, default=ranges.RECORD_S.high, help="s; Ctrl-C ends it")
 def monitor(port: str, hz: int, duration: float) -> None:
     """Show a board's array as it is: per spring the model's temperature (degC) and its trend, current (A), limits."""
     from rich.live import Live

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import sys
 from collections.abc import Callable, Iterator, Mapping
@@ -21,6 +22,7 @@ from rich.table import Table
 from . import __version__
 from .errors import InputError
 from .logs import Run, read_log, write_atomically
+from .ranges import Range
 
 WIDE = 160
 """Columns of a table that goes to a file or a pipe."""
@@ -38,6 +40,7 @@ ARRAY = click.option(
 )
 MODEL = click.option("--model", "model_path", type=FILE, required=True, help="model.toml that fit or diagnose wrote")
 PORT = click.option("--port", required=True, help="serial port, e.g. /dev/ttyACM0; 115200 baud")
+FORCE = click.option("--force", is_flag=True, help="write over a file that is there, whatever it is")
 OUTPUTS = ("output", "json_path")
 """Parameters of commands that name files to write; every other path is an input."""
 IN_A_FOLDER = ("diagnosis.json", "report.html", "model.toml")
@@ -83,6 +86,27 @@ def _same(one: Path, other: Path) -> bool:
     return one.resolve() == other.resolve()
 
 
+class Real(click.FloatRange):
+    """An option's number: finite, and in its range."""
+
+    def __init__(self, within: Range) -> None:
+        super().__init__(within.low, within.high, min_open=within.above)
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """Return the number; a comparison with NaN is never true, so that the range alone would let it through."""
+        number = super().convert(value, param, ctx)
+        if not math.isfinite(number):
+            self.fail(f"{value} is not in the range {self._describe_range()}.", param, ctx)
+        return number
+
+
+class Whole(click.IntRange):
+    """An option's whole number, in its range."""
+
+    def __init__(self, within: Range) -> None:
+        super().__init__(int(within.low), int(within.high))
+
+
 class Group(click.Group):
     """The commands."""
 
@@ -119,9 +143,9 @@ def result_of(name: str, **more: Any) -> dict[str, Any]:
     return {"schema": f"ninespring.{name}/1", "tool": f"ninespring {__version__}"} | more
 
 
-def write(files: Mapping[Path | None, str]) -> None:
+def write(files: Mapping[Path | None, str | bytes], force: bool = False) -> None:
     """Write a command's files, all or none as far as a file system goes; a file named None is not wanted."""
-    write_atomically({path: text for path, text in files.items() if path})
+    write_atomically({path: text for path, text in files.items() if path}, force)
 
 
 def array_and_runs(

@@ -7,7 +7,8 @@ from pathlib import Path
 import click
 import numpy as np
 
-from .console import FILE, JSON, Command, beside, checked, result_of, working, write
+from . import ranges
+from .console import FILE, FORCE, JSON, Command, Real, beside, checked, result_of, working, write
 from .errors import InputError
 from .logs import check_folder, log_text
 
@@ -37,14 +38,14 @@ map.toml:                                          regions.toml (pixels):
 @click.argument("source", type=click.Path(path_type=Path))
 @click.option("--map", "mapping", help="mapping file (TOML) of columns and units, or built in: tclab, tclab-prbs")
 @click.option("--regions", type=FILE, help="regions file (TOML) for thermal-camera frames: pixels of each spring")
-@click.option(
-    "--interval", type=click.FloatRange(min=0, min_open=True), default=1.0, show_default=True, help="s a frame"
-)
+@click.option("--interval", type=Real(ranges.FRAME_S), default=1.0, show_default=True, help="s a frame")
 @click.option(
     "--unit", type=click.Choice(["degC", "degF", "K"]), default="degC", show_default=True, help="of the frames"
 )
 @click.option("--times", type=FILE, help="times of the frames, s on the log's clock, one a line")
-@click.option("--offset", type=float, default=0.0, show_default=True, help="s to add to the frames' times")
+@click.option(
+    "--offset", type=Real(ranges.OFFSET_S), default=0.0, show_default=True, help="s to add to the frames' times"
+)
 @click.option(
     "--statistic",
     type=click.Choice(["mean", "median", "max"]),
@@ -59,6 +60,7 @@ map.toml:                                          regions.toml (pixels):
     help="log of currents to put the frames' temperatures into; without --times the first frame is at its first row",
 )
 @click.option("-o", "--output", type=FILE, required=True, help="log to write")
+@FORCE
 @JSON
 def import_(
     source: Path,
@@ -71,6 +73,7 @@ def import_(
     statistic: str,
     log_path: Path | None,
     output: Path,
+    force: bool,
     json_path: Path | None,
 ) -> None:
     """Make a log of another logger's file (--map) or of thermal-camera frames (--regions).
@@ -79,7 +82,8 @@ def import_(
     """
     from . import importing
 
-    check_folder(output, json_path)
+    check_folder(output, measured=True, force=force)
+    check_folder(json_path)
     if bool(mapping) == bool(regions):
         raise InputError("give either --map (a table) or --regions (camera frames)")
     if mapping and (log_path or times):
@@ -104,6 +108,7 @@ def import_(
             text = log_text(when, columns, {"imported_from": source.name})
     header, *rows = [line for line in text.splitlines() if not line.startswith("#")]
     result = result_of("import", source=source.name, columns=header.split(","), rows=len(rows))
-    write({output: text, json_path: checked(result)})
+    write({output: text}, force)
+    write({json_path: checked(result)})
     seen = sum(name.startswith("t") for name in result["columns"][1:])
     beside(output).print(f"{len(rows)} rows, temperatures of {seen} springs -> {output}", soft_wrap=True, markup=False)

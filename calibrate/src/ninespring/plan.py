@@ -15,10 +15,10 @@ from typing import Any
 
 import numpy as np
 
-from . import native
+from . import native, ranges
 from .errors import InputError
 from .fit.simulate import array_parameters
-from .models import Array
+from .models import Array, Model
 
 LEVELS = (100, 100, 75, 50)
 """Percent of the current; full level half of the time, for only that transforms."""
@@ -31,7 +31,8 @@ COOL_FROM = 0.88
 RESTING_A = 0.25
 """A spring's current at rest where v / i is all there is: a quarter more than what v / i is read from."""
 BACK_OFF_S = 5.0
-LEAST_S = 300.0
+THROUGH_S, BEYOND_K = 240.0, 1.0
+"""A spring is driven so long at the most to pass its transformation, and so far beyond its end."""
 FIRST_S = 5.0
 """An experiment begins so long after the recording: what was there before is seen."""
 BACK_OFF, LEAST_A = 0.97, 0.05
@@ -72,10 +73,11 @@ def make_plan(
 
     `board_alone`: for a recording without any thermometer.
     """
+    ranges.PLAN_S.check("duration_s", duration_s)
+    ranges.SEED.check("seed", seed)
+    _check_limits(supply_a, hottest_c, current_a)
     resting = math.ceil(100.0 * RESTING_A / current_a) if board_alone else 0
     levels, fan = ((100,), FAN_OFTEN) if board_alone else (LEVELS, FAN)
-    if duration_s < LEAST_S:
-        raise InputError(f"{duration_s:g} s are too short to identify an array: {LEAST_S:g} s or more")
     if supply_a < current_a:
         raise InputError(f"the supply's {supply_a:g} A do not drive one spring with {current_a:g} A")
     most = supply_a / current_a * 100.0 - resting * array.springs
@@ -115,6 +117,7 @@ def plan_experiment(
 
     `experiment` is what diagnosis.json has of a rival; `current_a` is a spring's at full level where that has none.
     """
+    _check_limits(supply_a, hottest_c, current_a)
     steps = experiment["steps"]
     percent = np.array([one["percent"] for one in steps], dtype=float)
     if percent.shape[1] != array.springs:
@@ -143,6 +146,49 @@ def plan_experiment(
         before, blows = np.array(one["percent"]), one["fan"]
     drive = percent[at] / 100.0 * full_a
     return Plan(lines, float(temperature.max()), float(drive.sum(axis=1).max()), (drive > 0).mean(axis=0))
+
+
+def plan_through(model: Model, spring: int, supply_a: float, hottest_c: float) -> Plan:
+    """Return the plan that drives one spring (from 1) through all of its transformation and lets it cool.
+
+    With the least current that takes it clearly beyond the end, as the model has it with its error; `hottest_c` is the limit.
+    """
+    from .export.settings import CROSSED, best_plant
+
+    _check_limits(supply_a, hottest_c, None)
+    if not 1 <= spring <= model.array.springs:
+        raise InputError(f"there is no spring {spring}: the array has {model.array.springs}")
+    plant = best_plant(model)
+    end_c = plant.get("austenite_finish_c") + CROSSED * model.stderr.get("austenite_finish_c", 0.0) + BEYOND_K
+    if end_c > hottest_c:
+        raise InputError(
+            f"the transformation may end as late as {end_c:.0f} degC, and the hottest may be {hottest_c:g}"
+        )
+    time_s = np.arange(0.0, 2.0 * THROUGH_S)
+    for current_a in np.arange(0.6, min(ranges.PLAN_CURRENT_A.high, supply_a) + 1e-9, 0.1):
+        drive = np.zeros((len(time_s), model.array.springs))
+        drive[: int(THROUGH_S), spring - 1] = current_a
+        beyond = np.flatnonzero(_temperatures_of(plant, drive)[: int(THROUGH_S), spring - 1] >= end_c)
+        if not beyond.size:
+            continue
+        off_s = int(beyond[0]) + 1
+        drive[off_s:] = 0.0
+        hottest = float(_temperatures_of(plant, drive).max())
+        if hottest > hottest_c:
+            break
+        lines = ["policy open", f"$open_current_a={current_a:.3f}", "off all", "fan 0"]
+        lines += [f"at {FIRST_S:g} = on {spring} 100", f"at {FIRST_S + off_s:g} = off {spring}"]
+        return Plan(lines, hottest, float(current_a), (drive > 0).mean(axis=0))
+    raise InputError(
+        f"no current up to the limits takes spring {spring} to {end_c:.0f} degC and not above {hottest_c:g}"
+    )
+
+
+def _check_limits(supply_a: float, hottest_c: float, current_a: float | None) -> None:
+    ranges.PLAN_SUPPLY_A.check("supply_a", supply_a)
+    ranges.PLAN_HOTTEST_C.check("hottest_c", hottest_c)
+    if current_a is not None:
+        ranges.PLAN_CURRENT_A.check("current_a", current_a)
 
 
 def _stretches(
@@ -198,6 +244,13 @@ def _temperatures(array: Array, drive: np.ndarray, fan: np.ndarray) -> np.ndarra
     plant.reset()
     ambient = np.full(len(time_s), plant.get("ambient_c"))
     return plant.simulate(time_s, native.CURRENT, drive, fan, ambient)
+
+
+def _temperatures_of(plant: native.Plant, drive: np.ndarray) -> np.ndarray:
+    """Return (s, springs) degC of a plant from rest, in still air, given currents (s, springs) each second."""
+    plant.reset()
+    still = np.zeros(len(drive))
+    return plant.simulate(np.arange(0.0, len(drive)), native.CURRENT, drive, still, still + plant.get("ambient_c"))
 
 
 def _lines(

@@ -8,10 +8,11 @@ from typing import Any
 
 import click
 
-from .console import ARRAY, FILE, Command, beside, write
+from . import ranges
+from .console import ARRAY, FILE, Command, Real, Whole, beside, write
 from .errors import InputError
 from .logs import check_folder, read_bytes
-from .models import Array, read_array
+from .models import Array, read_array, read_model
 
 
 @click.command(
@@ -22,6 +23,7 @@ Examples:
   ninespring plan --array array.toml --supply 10 --duration 1200 -o steps.txt
   ninespring record --port /dev/ttyACM0 --run steps.txt --duration 900 -o board1.csv
   ninespring plan --no-thermometer -o steps.txt
+  ninespring plan --through 5 --model diagnosis/model.toml -o steps.txt
   ninespring plan --for diagnosis/diagnosis.json -o steps.txt
 """,
 )
@@ -33,28 +35,34 @@ Examples:
     is_flag=True,
     help="for the board's own v and i alone: every turn crosses the transformation, and a little current always flows",
 )
-@click.option("--duration", type=click.FloatRange(1, 36000), help="s  [default: 900; without a thermometer 1800]")
+@click.option(
+    "--through", type=Whole(ranges.SPRING), help="drive this spring alone through its transformation; needs --model"
+)
+@click.option("--model", "model_path", type=FILE, help="with --through: model.toml that says where that ends")
+@click.option("--duration", type=Real(ranges.PLAN_S), help="s  [default: 900; without a thermometer 1800]")
 @click.option(
     "--current",
-    type=click.FloatRange(0.1, 3.2),
+    type=Real(ranges.PLAN_CURRENT_A),
     help="A, one spring at full level  [default: 2.0; without a thermometer 2.6, to transform in the fan's air too]",
 )
 @click.option(
-    "--supply", type=click.FloatRange(0.1, 60), default=14.0, show_default=True, help="A, all springs together"
+    "--supply", type=Real(ranges.PLAN_SUPPLY_A), default=14.0, show_default=True, help="A, all springs together"
 )
 @click.option(
     "--hottest",
-    type=click.FloatRange(40, 200),
+    type=Real(ranges.PLAN_HOTTEST_C),
     default=105.0,
     show_default=True,
     help="degC, of any spring, as declared",
 )
-@click.option("--seed", type=click.IntRange(0), default=1, show_default=True, help="another one: another plan")
+@click.option("--seed", type=Whole(ranges.SEED), default=1, show_default=True, help="another one: another plan")
 @click.option("-o", "--output", type=FILE, required=True, help="steps.txt to write; - prints it")
 def plan(
     array_path: Path | None,
     diagnosis: Path | None,
     board_alone: bool,
+    through: int | None,
+    model_path: Path | None,
     duration: float | None,
     current: float | None,
     supply: float,
@@ -66,15 +74,24 @@ def plan(
 
     The springs' temperatures are those of the declared array; the board's own limits hold all the same.
     """
-    from .plan import FIRST_S, make_plan, plan_experiment
+    from .plan import FIRST_S, THROUGH_S, make_plan, plan_experiment, plan_through
 
     check_folder(output)
-    array = read_array(array_path) if array_path else Array()
+    if (through is None) != (model_path is None):
+        raise InputError("--through and --model go together")
+    if through and (diagnosis or array_path or board_alone or duration or current):
+        raise InputError("--through takes the array, the current and the time from the model: no other of these")
+    model = read_model(model_path) if model_path else None
+    array = model.array if model else read_array(array_path) if array_path else Array()
     array.one_layer("a plan is for")
     head = []
     duration = duration or (1800.0 if board_alone else 900.0)
     current = current or (2.6 if board_alone else 2.0)
-    if diagnosis:
+    if model and through:
+        head = [f"# spring {through} through its transformation, as {model_path.name if model_path else ''} has it"]
+        duration = 2.0 * THROUGH_S
+        made = plan_through(model, through, supply, hottest)
+    elif diagnosis:
         asked = asked_for(diagnosis)
         head = [f"# {asked['separating_experiment']}"]
         duration = asked["experiment"]["duration_s"] + 2.0 * FIRST_S

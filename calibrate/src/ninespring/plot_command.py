@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import tempfile
 from pathlib import Path
 
 import click
 
-from .console import ARRAY, FILE, Command, array_of, notes_of, out, working
+from . import ranges
+from .console import ARRAY, FILE, Command, Real, array_of, notes_of, out, working, write
 from .errors import InputError
 from .logs import check_folder, read_log
 from .models import read_array, read_model
@@ -28,7 +28,7 @@ Examples:
 @click.argument("log", type=FILE)
 @click.option("--model", "model_path", type=FILE, help="model.toml: what it makes of the log, dashed")
 @ARRAY
-@click.option("--at", "at_s", type=click.FloatRange(0.0), help="s: the array at that time instead, spring by spring")
+@click.option("--at", "at_s", type=Real(ranges.PICTURE_S), help="s: the array at that time instead, spring by spring")
 @click.option("-o", "--output", type=FILE, required=True, help="picture: .png, .svg, .pdf; .gif: the array in motion")
 def plot(log: Path, model_path: Path | None, array_path: Path | None, at_s: float | None, output: Path) -> None:
     """Draw a log: each spring's temperature (degC) and what it was given."""
@@ -45,17 +45,16 @@ def plot(log: Path, model_path: Path | None, array_path: Path | None, at_s: floa
     array = model.array if model else read_array(array_path) if array_path else None
     run = read_log(log, array.springs if array else None, temperatures=False)
     notes_of([run])
-    with working("drawing"), tempfile.TemporaryDirectory(dir=output.parent, prefix=".plot-") as folder:
-        made = Path(folder) / f"picture{kind}"
+    with working("drawing"):
         if kind == ".gif" or at_s is not None:
             array = array_of(array, [run])
         if array is not None:
             run.layers = array.layers
         if kind == ".gif":
-            plotting.animate(run, array.rows, array.cols, made)
+            picture = plotting.animation_of(run, array.rows, array.cols)
         elif at_s is not None:
-            plotting.map_at(run, array.rows, array.cols, at_s).savefig(made, dpi=150)
+            picture = plotting.drawn(plotting.map_at(run, array.rows, array.cols, at_s), kind)
         else:
-            plotting.figure(run, predict(model, run) if model else None).savefig(made, dpi=150)
-        made.replace(output.resolve())
+            picture = plotting.drawn(plotting.figure(run, predict(model, run) if model else None), kind)
+    write({output: picture})
     out.print(f"{len(run.time_s)} rows -> {output}", soft_wrap=True, markup=False)

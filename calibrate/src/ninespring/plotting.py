@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Callable
 from pathlib import Path
 
@@ -122,8 +123,32 @@ def map_at(run: Run, rows: int, cols: int, time_s: float) -> Figure:
     return out
 
 
-def animate(run: Run, rows: int, cols: int, path: Path) -> None:
-    """Write an animation (GIF) of the array's temperatures."""
+def drawn(figure: Figure, kind: str) -> bytes:
+    """Return a figure as a file of its kind (.png, .svg, .pdf)."""
+    out = io.BytesIO()
+    figure.savefig(out, format=kind.removeprefix("."), dpi=150)
+    return out.getvalue()
+
+
+class _Gif(animation.PillowWriter):
+    """Writes into memory, and says in the file who wrote it, as matplotlib does in all other kinds."""
+
+    made = b""
+
+    def finish(self) -> None:
+        out = io.BytesIO()
+        first, *more = self._frames
+        duration = int(1000 / self.fps)
+        first.save(
+            out, "GIF", save_all=True, append_images=more, duration=duration, loop=0, comment="Matplotlib, ninespring"
+        )
+        self.made = out.getvalue()
+
+
+def animation_of(run: Run, rows: int, cols: int) -> bytes:
+    """Return an animation (GIF) of the array's temperatures."""
     pick = np.unique(np.linspace(0, len(run.time_s) - 1, min(FRAMES, len(run.time_s))).astype(int))
     out, draw = _map(run, rows, cols)
-    animation.FuncAnimation(out, draw, frames=list(pick), blit=False).save(path, writer=animation.PillowWriter(fps=10))
+    writer = _Gif(fps=10)
+    animation.FuncAnimation(out, draw, frames=list(pick), blit=False).save("array.gif", writer=writer)
+    return writer.made

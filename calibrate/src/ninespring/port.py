@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import os
 import termios
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -28,6 +29,7 @@ class Port:
         """Open and lock the port; a Mega resets when it is opened."""
         self.name = name
         self._arrived = b""
+        self._writes = threading.Lock()
         try:
             self._serial = serial.Serial(name, BAUD, timeout=0.1, write_timeout=2.0, exclusive=True)
         except (*GONE, ValueError) as error:
@@ -56,16 +58,18 @@ class Port:
             raise WorkError(f"{self.name}: the board went away{_who_has(self.name)}") from None
 
     def read_line(self, until_s: float, stopped: Callable[[], bool] = lambda: False) -> str | None:
-        """Return the next line without its end; None where none came until that monotonic time, or when stopped."""
+        """Return the next line without its end (an indent is part of it); None where none came until that monotonic time, or when stopped."""
         while b"\n" not in self._arrived:
             if len(self._arrived) > LONGEST_LINE:
                 raise WorkError(f"{self.name}: {len(self._arrived)} bytes without a line end: this is no board")
-            if stopped() or time.monotonic() >= until_s:
-                return None
+            late = time.monotonic() >= until_s
             with self._still_there():
-                self._arrived += self._serial.read(max(1, self._serial.in_waiting))
+                waiting = self._serial.in_waiting
+                if stopped() or (late and not waiting):  # what came while this program was held up has come
+                    return None
+                self._arrived += self._serial.read(max(1, waiting))
         line, _, self._arrived = self._arrived.partition(b"\n")
-        return line.decode("ascii", "replace").strip()
+        return line.decode("ascii", "replace").rstrip()
 
     def write(self, text: str) -> None:
         """Send text as it is."""
@@ -73,7 +77,7 @@ class Port:
             raw = text.encode("ascii")
         except UnicodeEncodeError:
             raise InputError(f"'{text.strip()}' is not plain ASCII") from None
-        with self._still_there():
+        with self._writes, self._still_there():
             self._serial.write(raw)
 
     def close(self) -> None:
@@ -94,16 +98,37 @@ def _how_to_be_allowed(name: str) -> str:
 
 
 def _who_has(name: str) -> str:
-    """Return ` (program, pid)` of another process that has the port open, as far as this system tells."""
-    try:
-        target = os.path.realpath(name)
-        for link in Path("/proc").glob("[0-9]*/fd/*"):
-            pid = int(link.parts[2])
-            try:
-                if pid != os.getpid() and os.readlink(link) == target:
-                    return f" ({(link.parents[1] / 'comm').read_text().strip()}, pid {pid})"
-            except OSError:
-                continue
-    except OSError:
-        pass
+    """Return ` (program, pid)` of another process that has the port open, as far as this system tells.
+
+    The one at the server's end of a pseudo-terminal is no other program: it is the board.
+    """
+    port = os.path.realpath(name)
+    with suppress(OSError):
+        for process in Path("/proc").glob("[0-9]*"):
+            with suppress(OSError):
+                if int(process.name) == os.getpid() or not _has_open(process, port) or _serves(process, port):
+                    continue
+                return f" ({(process / 'comm').read_text().strip()}, pid {process.name})"
     return ""
+
+
+def _has_open(process: Path, port: str) -> bool:
+    return any(_target(link) == port for link in (process / "fd").iterdir())
+
+
+def _serves(process: Path, port: str) -> bool:
+    """Return whether a process has the server's end of a pseudo-terminal /dev/pts/N."""
+    number = Path(port).name
+    for link in (process / "fd").iterdir():
+        if _target(link).endswith("/ptmx"):
+            told = (process / "fdinfo" / link.name).read_text().split()
+            if "tty-index:" in told and told[told.index("tty-index:") + 1] == number:
+                return Path(port).parent == Path("/dev/pts")
+    return False
+
+
+def _target(link: Path) -> str:
+    try:
+        return os.readlink(link)
+    except OSError:
+        return ""

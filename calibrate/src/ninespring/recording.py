@@ -12,12 +12,13 @@ import sys
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from .board import Board
+from .dashboard.words import FAULTS
 from .errors import InputError, WorkError
-from .logs import COLUMN, EXTRA, LIMITS
+from .logs import COLUMN, EXTRA, LIMITS, check_folder
 from .thermometers import Thermometers
 
 FINER = 10
@@ -31,6 +32,9 @@ SILENT_S = 5.0
 STATE = re.compile(r"ok|locked|fault_\d+")
 NUMBER = re.compile(r"-?\d+(?:\.(\d+))?")
 COMMENT = re.compile(r"[<\[][ -~]*[>\]]")
+FAULT = re.compile(r"(?:board|spring (\d+)): fault (\d+) (\w+)")
+SWITCHED_OFF = "|safety"
+"""In a status line: the limit that acts on a spring with a fault."""
 
 
 @dataclass
@@ -39,6 +43,24 @@ class Step:
 
     line: str
     at_s: float | None = None
+
+
+@dataclass(frozen=True)
+class Fault:
+    """A fault that the board has latched."""
+
+    time_s: float | None
+    """By the board's clock, as in the log; None: after its last row."""
+    spring: int | None
+    """None: of the board, and all springs are off."""
+    number: int
+    name: str
+
+    def __str__(self) -> str:
+        when = "at the end" if self.time_s is None else f"at {self.time_s:.1f} s"
+        where = "board" if self.spring is None else f"spring {self.spring}"
+        words = f" ({FAULTS[self.number]})" if self.number in FAULTS else ""
+        return f"{when}: {where}: fault {self.number} {self.name}{words}"
 
 
 @dataclass
@@ -50,7 +72,38 @@ class Recording:
     offset_s: float | None = None
     """What was added to the thermometers' clock to have the board's, s."""
     ended: str = ""
-    """Why it ended early where that was nobody's wish."""
+    """Why it ended early, or drove less than it was asked to, where that was nobody's wish."""
+    faults: list[Fault] = field(default_factory=list)
+
+
+class FaultWatch:
+    """Asks the board for its faults when telemetry shows that they have changed, and tells each new one."""
+
+    def __init__(self, board: Board, faults: list[Fault], alarm: Callable[[Fault], None]) -> None:
+        self._board, self._faults, self._alarm = board, faults, alarm
+        self.latched: set[str] = set()
+        """What the board said last."""
+        self._state = "ok"
+        self._time_s: float | None = None
+
+    def row(self, time_s: float, state: str) -> None:
+        """Take the time and the state of a row."""
+        changed, self._state, self._time_s = state != self._state, state, time_s
+        if changed:
+            self.ask()
+
+    def ask(self) -> None:
+        """Ask for what is latched now."""
+        self.take(self._board.ask("faults"), self._time_s)
+
+    def take(self, lines: Sequence[str], time_s: float | None) -> None:
+        """Take the answer to `faults`."""
+        for line in lines:
+            if line not in self.latched and (match := FAULT.fullmatch(line)):
+                fault = Fault(time_s, int(match[1]) if match[1] else None, int(match[2]), match[3])
+                self._faults.append(fault)
+                self._alarm(fault)
+        self.latched = set(lines)
 
 
 def script_lines(text: str, name: str, duration_s: float = math.inf) -> list[Step]:
@@ -167,11 +220,13 @@ class LogFile:
     """Takes a log line by line. Lines are in the file at once; the file has its name when it is finished.
 
     A regular file grows as NAME.part, which is a readable log at every moment. A device or a pipe is written as it is, `-`
-    is standard output.
+    is standard output. A log that is there already is kept: InputError, unless `force`; where one has come while this one
+    grew, this one stays as NAME.part, and `path` says so.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, force: bool = False) -> None:
         self.path = path
+        self._force = force
         self.part: Path | None = None
         self.rows = 0
         self._whole = 0
@@ -182,6 +237,7 @@ class LogFile:
             elif path.exists() and not stat.S_ISREG(path.stat().st_mode):
                 self._file = os.open(path, os.O_WRONLY)
             else:
+                check_folder(path, measured=True, force=force)
                 self.path = path.resolve()
                 self._file = self._new_part()
         except OSError as error:
@@ -220,9 +276,25 @@ class LogFile:
                 os.fsync(self._file)
         os.close(self._file)
         if self.part and self.rows:
-            os.replace(self.part, self.path)
+            self._give_name(self.part)
         elif self.part:
             self.part.unlink()
+
+    def _give_name(self, part: Path) -> None:
+        if self._force or (self.path.exists() and self.path.stat().st_size == 0):
+            os.replace(part, self.path)
+            return
+        try:
+            os.link(part, self.path)  # unlike a rename, it takes the place of nothing
+        except FileExistsError:
+            self.path = part
+        except OSError:  # a file system without links
+            if self.path.exists():
+                self.path = part
+            else:
+                os.replace(part, self.path)
+        else:
+            part.unlink()
 
 
 @contextlib.contextmanager
@@ -252,21 +324,30 @@ def record(
     say: Callable[[int, float], None] = lambda rows, seconds: None,
     keys: Mapping[str, str] | None = None,
     thermometers: Thermometers | None = None,
+    alarm: Callable[[Fault], None] = lambda fault: None,
 ) -> Recording:
     """Record a board's telemetry, `hz` rows a second; `duration_s` and the steps' times are by the board's clock, from the first row.
 
     Steps without a time are sent first. The log begins with what the board is and how it is set, ends with its faults,
     and has its status (which limits act on a spring) between the rows, all as comments. Whatever ends it, the springs are
-    off afterwards, and `ended` says why where it was no wish. `thermometers` add columns t1_c ...: each row waits until a
+    off afterwards, and `ended` says why where it was no wish. A fault does not end it; `alarm` is told of each as it comes, and
+    `ended` begins with the first. `thermometers` add columns t1_c ...: each row waits until a
     reading after it has come.
     """
     got = Recording()
     answers = False
     finer_hz = max(hz, min(FINER * hz, FINEST_HZ))
     sink = RowSink(log, thermometers, 1.0 / hz if finer_hz > hz else 0.0)
+
+    def note(fault: Fault) -> None:
+        sink.comment(f"fault {fault}")
+        alarm(fault)
+
+    watch = FaultWatch(board, got.faults, note)
+    before: list[str] = []
     try:
-        _head(board, log, steps, keys or {})
-        _rows(board, finer_hz, duration_s, steps, got, say, sink)
+        before = _head(board, log, steps, keys or {})
+        _rows(board, finer_hz, duration_s, steps, got, say, sink, watch)
     except KeyboardInterrupt:
         pass
     except WorkError as error:
@@ -276,8 +357,16 @@ def record(
             got.ended = (got.ended or f"{board.port}: the board does not answer") + (
                 "; the springs could not be switched off from here: cut their supply"
             )
+    latched: list[str] = []
     with contextlib.suppress(WorkError):
         sink.flush()
+        latched = board.ask("faults") if answers else []
+        watch.latched |= set(before)
+        watch.take(latched, None)
+    if got.faults:
+        more = f" and {len(got.faults) - 1} more" if len(got.faults) > 1 else ""
+        got.ended = f"a fault cut this run short, {got.faults[0]}{more}" + (f"; {got.ended}" if got.ended else "")
+    with contextlib.suppress(WorkError):
         if thermometers:
             got.offset_s = thermometers.offset_s
             if got.offset_s is not None:
@@ -287,8 +376,8 @@ def record(
             log.write(f"# dropped_lines: {got.dropped}")
         if got.ended:
             log.write(f"# ended: {got.ended}")
-        for line in board.ask("faults") if answers else ():
-            log.write(f"# fault at the end: {line}")
+        for line in latched:
+            log.write(f"# latched at the end: {line}")
     return got
 
 
@@ -390,11 +479,12 @@ def mean_row(names: Sequence[str], first: str, rows: Sequence[str]) -> str:
     return ",".join(out)
 
 
-def _head(board: Board, log: LogFile, steps: Sequence[Step], keys: Mapping[str, str]) -> None:
+def _head(board: Board, log: LogFile, steps: Sequence[Step], keys: Mapping[str, str]) -> list[str]:
     for step in steps:
         if step.at_s is None:
             board.ask(step.line)
     board.guard(write_head(board, log, keys))
+    return board.ask("faults")
 
 
 def write_head(board: Board, log: LogFile, keys: Mapping[str, str]) -> dict[str, str]:
@@ -419,6 +509,7 @@ def _rows(
     got: Recording,
     say: Callable[[int, float], None],
     sink: RowSink,
+    watch: FaultWatch,
 ) -> None:
     waiting = [step for step in steps if step.at_s is not None]
     for _ in range(3):
@@ -429,6 +520,7 @@ def _rows(
         raise WorkError(f"{board.port}: the board's telemetry has no header that can be read")
     sink.begin(names)
     check = RowCheck(names, hz)
+    state = names.index("state") if "state" in names else None
     first_s = math.nan
     while True:
         line = board.next_line(time.monotonic() + SILENT_S)
@@ -438,6 +530,8 @@ def _rows(
             continue
         if COMMENT.fullmatch(line):
             sink.comment(line)
+            if SWITCHED_OFF in line:
+                watch.ask()
             continue
         good = check.feed(line)
         got.dropped = check.dropped
@@ -448,6 +542,8 @@ def _rows(
             if row.time_s - first_s > duration_s:
                 return
             sink.row(row)
+            if state is not None:
+                watch.row(row.time_s, row.text.split(",")[state])
             say(sink.rows, row.time_s - first_s)
             while waiting and (waiting[0].at_s or 0.0) <= row.time_s - first_s:
                 board.ask(waiting.pop(0).line)

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import click
 
-from .console import FILE, MODEL, Command, beside, write
+from . import ranges
+from .console import FILE, MODEL, Command, Real, Whole, beside, write
 from .errors import InputError
 from .logs import check_folder
 from .models import Model, read_model
@@ -31,8 +32,8 @@ Examples:
 @click.option(
     "--pattern", help="springs that are on from 1 s: 111101111; of two layers elongation/stiffness; default: none"
 )
-@click.option("--fan", type=click.IntRange(0, 100), default=0, show_default=True, help="percent")
-@click.option("--duration", type=click.FloatRange(2.0, 1e6), default=300.0, show_default=True, help="s")
+@click.option("--fan", type=Whole(ranges.FAN_PERCENT), default=0, show_default=True, help="percent")
+@click.option("--duration", type=Real(ranges.SCENARIO_S), default=300.0, show_default=True, help="s")
 @click.option("-o", "--output", type=FILE, required=True, help="scenario.ini to write; - prints it")
 def scenario(model_path: Path, pattern: str | None, fan: int, duration: float, output: Path) -> None:
     """Write a model as a scenario that `ninespring-sim run` runs: its array, boards and numbers, and one pattern.

@@ -156,7 +156,7 @@ class Thermometers:
         try:
             while not self._closing.is_set():
                 line = self._port.read_line(time.monotonic() + 0.5, self._closing.is_set)
-                got = self._lines.read(line) if line else None
+                got = self._lines.read(line.strip()) if line else None
                 if got is None:
                     continue
                 now = time.monotonic()

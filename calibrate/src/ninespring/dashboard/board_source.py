@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import contextlib
 import datetime
-import queue
 import re
-import sys
 import threading
 import time
-import traceback
-from collections.abc import Iterator
+from collections import deque
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -19,26 +18,62 @@ import numpy as np
 
 from .. import __version__
 from ..belief import beliefs
-from ..board import SIMULATED, Board, reading
+from ..board import HOST_TIMEOUT_S, PATIENCE, SIMULATED, Board, reading
 from ..console import err
 from ..errors import InputError, RefusedError, WorkError
 from ..recording import SILENT_S, LogFile, Row, RowCheck, RowSink, telemetry_names, write_head
 from ..thermometers import Thermometers
 from . import words
 from .source import Source, at_once
+from .wishes import WISHES, drives, switches_off
 
 LOOK_EVERY_S = 1.0
 """So often the board is asked what telemetry does not tell: phase, targets, faults."""
+LATE_S = 1.0
+"""Telemetry that does not come for so long is asked for again."""
+ENDS_PLAYING = frozenset({"clear", "unlock", "cold", "end_play"})
+"""What ends the list that is played, beside all that switches a spring."""
+
+
+@dataclass(frozen=True)
+class Play:
+    """A list of patterns that is played in turn, and when it began (monotonic)."""
+
+    patterns: list[str]
+    seconds: float
+
+
+class OffFirst(Board):
+    """A board that is asked nothing before what is to be switched off is off."""
+
+    def __init__(self, port: str, stopped: Callable[[], bool], offs: Callable[[Board], None]) -> None:
+        self._offs: Callable[[Board], None] | None = None
+        super().__init__(port, stopped=stopped)
+        self._offs = offs
+
+    def ask(self, line: str, timeout_s: float = 3.0) -> list[str]:
+        """Ask as any board, after the offs that wait."""
+        if offs := self._offs:
+            self._offs = None  # an off waits for no other
+            try:
+                offs(self)
+            finally:
+                self._offs = offs
+        return super().ask(line, timeout_s)
 
 
 class BoardSource(Source):
     """A board at a port, real or simulated."""
 
+    words = "a board"
+    takes = frozenset(WISHES) - {"stop", "settings", "pause", "seek", "speed"}
+
     def __init__(self, port: str, hz: int, folder: Path, thermometers: str | None = None) -> None:
         super().__init__()
         self.kind = "simulated" if port == SIMULATED else "board"
         self._port, self._hz, self._folder = port, hz, folder
-        self._wishes: queue.Queue[tuple[str, Future[str]]] = queue.Queue()
+        self._wishes: deque[tuple[dict[str, Any], Future[str]]] = deque()
+        self._wishing = threading.Lock()
         self._board: Board | None = None
         self._settings: dict[str, str] = {}
         self._thermometers_port = thermometers
@@ -46,8 +81,12 @@ class BoardSource(Source):
         self._log: LogFile | None = None
         self._sink: RowSink | None = None
         self._check: RowCheck | None = None
-        self._play: tuple[list[str], float] | None = None
-        self._played, self._play_next_s = 0, 0.0
+        self._play: Play | None = None
+        self._played: Play | None = None
+        """That of which the next pattern and its time are known."""
+        self._play_at, self._play_next_s = 0, 0.0
+        if port == SIMULATED:
+            self.off_within_s *= PATIENCE
         self._change(name="simulated board" if port == SIMULATED else port, recording=None, said="")
         self._thread = threading.Thread(target=self._run, name="board")
 
@@ -62,14 +101,15 @@ class BoardSource(Source):
         self.closing.set()
         self._thread.join(20)
 
-    def stop_now(self) -> None:
+    def stop_now(self) -> str:
         """Send the stop that the board obeys from its receive interrupt; whatever was wished before is dropped."""
         self._play = None
-        self._drop_wishes("dropped by the stop")
+        self._drop("dropped by the stop")
         board = self._board
         if board is None:
             raise WorkError("the board is not there")
         board.stop_now()
+        return "STOP was sent: when the state says so, all springs are off. Clear faults to go on."
 
     def settings(self) -> list[dict[str, Any]]:
         """Return the board's settings with value, unit and range."""
@@ -87,59 +127,54 @@ class BoardSource(Source):
         return out
 
     def do(self, wish: dict[str, Any]) -> Future[str]:
-        """Have the board's thread carry out a wish as a console line; what the board answers comes later."""
-        what = wish["do"]
-        if what not in ("play", "record", "end_recording", "set", "ambient", "policy"):
-            self._play = None
+        """Have the board's thread carry out a wish; what the board answers comes later."""
         springs = int(self._state.get("springs", 0))
-        if "spring" in wish and wish["spring"] > springs:
+        if wish.get("spring", 0) > springs:
             raise InputError(f"there are {springs} springs")
-        for pattern in [wish["springs"]] if what == "pattern" else wish.get("patterns", []):
+        for pattern in [wish["springs"]] if wish["do"] == "pattern" else wish.get("patterns", []):
             if len(pattern) != springs:
                 raise InputError(f"a pattern of {springs} springs has {springs} digits")
-        if what == "play":
-            self._play, self._played, self._play_next_s = (wish["patterns"], wish["seconds"]), 0, 0.0
-            return at_once("playing")
-        if what == "say":
-            if wish["line"].split()[0].lower() == "telemetry":
-                raise InputError("the page needs the telemetry as it is")
-            return self._ask(wish["line"])
-        line = {
-            "level": lambda: (
-                f"on {int(wish['spring'])} {int(wish['level'])}" if wish["level"] else f"off {int(wish['spring'])}"
-            ),
-            "all": lambda: f"on all {int(wish['level'])}" if wish["level"] else "off all",
-            "pattern": lambda: f"pattern {wish['springs']}",
-            "policy": lambda: f"policy {wish['policy']}",
-            "fan": lambda: f"fan {int(wish['percent'])}",
-            "ambient": lambda: f"ambient {wish['celsius']:.2f}",
-            "set": lambda: f"${wish['name']}={wish['value']}",
-            "clear": lambda: "clear",
-            "unlock": lambda: "unlock",
-            "record": lambda: "record",
-            "end_recording": lambda: "end_recording",
-        }[what]()
-        return self._ask(line)
-
-    def _ask(self, line: str) -> Future[str]:
         if self._board is None:
             raise WorkError("the board is not there")
+        if wish["do"] == "play":
+            self._play = Play(wish["patterns"], wish["seconds"])
+            return at_once("")
+        if drives(wish) or wish["do"] in ENDS_PLAYING:
+            self._play = None
+        if wish["do"] == "end_play":
+            return at_once("")
+        return self._queue({name: value for name, value in wish.items() if name != "id"})
+
+    def _queue(self, wish: dict[str, Any]) -> Future[str]:
+        """Queue a wish. An off comes first, and what was wished of its springs before it is dropped."""
         answer: Future[str] = Future()
-        self._wishes.put((line, answer))
+        with self._wishing:
+            same = next((one for queued, one in self._wishes if queued == wish), None)
+            if not switches_off(wish):
+                self._wishes.append((wish, answer))
+                return answer
+            if same:
+                answer = same
+            dropped = [one for one in self._wishes if drives(one[0], wish.get("spring")) and one[1] is not answer]
+            self._wishes = deque(one for one in self._wishes if one not in dropped and one[1] is not answer)
+            self._wishes.appendleft((wish, answer))
+        for _, one in dropped:
+            if one.set_running_or_notify_cancel():
+                one.set_exception(RefusedError("dropped by an off that came after it"))
         return answer
 
-    def _next_wish(self) -> tuple[str, Future[str]] | None:
-        """Return the next wish that somebody still waits for, None where there is none."""
-        with contextlib.suppress(queue.Empty):
-            while True:
-                line, answer = self._wishes.get_nowait()
+    def _next_wish(self, *, off: bool = False) -> tuple[dict[str, Any], Future[str]] | None:
+        """Return the next wish (or the next that only switches off) that somebody still waits for, None without one."""
+        with self._wishing:
+            while self._wishes and (not off or switches_off(self._wishes[0][0])):
+                wish, answer = self._wishes.popleft()
                 if answer.set_running_or_notify_cancel():
-                    return line, answer
+                    return wish, answer
         return None
 
-    def _drop_wishes(self, why: str) -> None:
-        while wish := self._next_wish():
-            wish[1].set_exception(WorkError(why))
+    def _drop(self, why: str) -> None:
+        while got := self._next_wish():
+            got[1].set_exception(WorkError(why))
 
     # from the board's side
 
@@ -149,7 +184,7 @@ class BoardSource(Source):
         while not self.closing.is_set():
             trouble, found = "", False
             try:
-                with Board(self._port, stopped=self.closing.is_set) as board:
+                with OffFirst(self._port, self.closing.is_set, self._switch_off) as board:
                     found = True
                     try:
                         self._converse(board)
@@ -164,17 +199,16 @@ class BoardSource(Source):
             except WorkError as error:
                 trouble = str(error)
             except Exception as error:
-                traceback.print_exc(file=sys.stderr)
                 trouble = f"a defect of the tool: {type(error).__name__}: {error}"
             self._play = None
-            self._drop_wishes("the board went away")
+            self._drop("the board went away")
             if found:
                 lost = trouble
             elif lost:
                 trouble = f"{lost}. Since then: {trouble}"
             if trouble and trouble != self._state.get("trouble"):
                 err.print(f"ninespring: {trouble}", soft_wrap=True, markup=False)
-            self._change(connected=False, trouble=trouble)
+            self._change(connected=False, trouble=trouble, play=None)
             self.closing.wait(1.0)
 
     def _converse(self, board: Board) -> None:
@@ -182,10 +216,8 @@ class BoardSource(Source):
         board.guard(self._settings)
         if logger := self._thermometers_port or board.thermometers:
             self._thermometers = Thermometers(logger)
-        names = next(filter(None, map(telemetry_names, board.ask(f"telemetry csv {self._hz}"))), None)
-        if not names:
-            raise WorkError(f"{board.port}: the board's telemetry has no header that can be read")
-        self._names, self._check = names, RowCheck(names, self._hz)
+        self._names = names = self._begin_telemetry(board)
+        self._check = RowCheck(names, self._hz)
         rows, columns = (int(float(self._settings.get(one, 0))) for one in ("rows", "columns"))
         springs = sum(re.fullmatch(r"i\d+_a", name) is not None for name in names)
         if rows * columns != springs:
@@ -201,6 +233,8 @@ class BoardSource(Source):
             bounds_c=[None] * springs,
             phase=[None] * springs,
             doing=[""] * springs,
+            unknown_s=[None] * springs,
+            every_s=1.0 / self._hz,
             target_a=[None] * springs,
             limits=[[] for _ in range(springs)],
             cut_a=[0.0] * springs,
@@ -210,50 +244,82 @@ class BoardSource(Source):
         )
         self._board = board
         heard_s = look_s = time.monotonic()
+        again_s = heard_s + LATE_S * board.patience
         looked_at = self._state.get("state")
         """The board's state when it was last asked for its faults."""
         while not self.closing.is_set():
             now = time.monotonic()
             self._play_on(board, now)
-            if wish := self._next_wish():
-                self._obey(board, *wish)
+            if got := self._next_wish():
+                self._obey(board, *got)
             elif now >= look_s or self._state.get("state") != looked_at:
                 look_s, looked_at = now + LOOK_EVERY_S, self._state.get("state")
                 with contextlib.suppress(RefusedError):  # a stop drops what is being answered: the next look tells
                     self._look(board)
-            got = board.next_line(time.monotonic() + 0.05)
-            if got:
+            if line := board.next_line(time.monotonic() + 0.05):
                 heard_s = time.monotonic()
-                self._take(got)
+                again_s = heard_s + LATE_S * board.patience
+                self._take(line)
             elif (silent_s := time.monotonic() - heard_s) > SILENT_S * board.patience:
                 raise WorkError(f"{board.port}: no telemetry for {silent_s:.0f} s")
+            elif time.monotonic() > again_s:
+                again_s += LATE_S * board.patience
+                with contextlib.suppress(RefusedError):
+                    self._begin_telemetry(board)
+
+    def _begin_telemetry(self, board: Board) -> list[str]:
+        names = next(filter(None, map(telemetry_names, board.ask(f"telemetry csv {self._hz}"))), None)
+        if not names:
+            raise WorkError(f"{board.port}: the board's telemetry has no header that can be read")
+        return names
 
     def _read_settings(self, board: Board) -> None:
-        self._settings = board.settings()
-        self._change(settings_read=time.time())
+        settings = board.settings()
+        if board.unguarded is not None and float(settings.get("host_timeout_s", 0)) == HOST_TIMEOUT_S:
+            settings["host_timeout_s"] = board.unguarded  # what it will be again
+        self._settings = settings
+        self._change(settings_read=time.time(), policy="precompensate" if settings.get("policy") == "1" else "open")
 
-    def _obey(self, board: Board, line: str, answer: Future[str]) -> None:
+    def _switch_off(self, board: Board) -> None:
+        while got := self._next_wish(off=True):
+            self._obey(board, *got)
+
+    def _obey(self, board: Board, wish: dict[str, Any], answer: Future[str]) -> None:
+        """Carry out a wish. Whatever is wrong with it ends it alone; only a board that is silent or gone ends more."""
         try:
-            if line == "record":
-                said = self._begin_recording(board)
-            elif line == "end_recording":
-                self._end_recording("")
-                said = ""  # every page is told
-            else:
-                if line == "$save":
-                    board.unguard()  # what is saved is what was set, not what this page needs
-                said = "\n".join(board.ask(line, 10.0))
-                self._note(board, line)
-                if line == "$save":
-                    board.guard(self._settings)
-            answer.set_result(said)
-        except (WorkError, InputError) as error:
+            said = self._carry_out(board, wish)
+        except (RefusedError, InputError) as error:
             answer.set_exception(error)
-            if not isinstance(error, (RefusedError, InputError)):
-                raise  # no answer: look for the board anew
+        except WorkError as error:
+            answer.set_exception(error)
+            raise  # no answer: look for the board anew
+        except Exception as error:
+            answer.set_exception(WorkError(f"a defect of the tool: {type(error).__name__}: {error}"))
         except BaseException as error:
             answer.set_exception(WorkError(str(error)))
             raise
+        else:
+            answer.set_result(said)
+
+    def _carry_out(self, board: Board, wish: dict[str, Any]) -> str:
+        do = wish["do"]
+        if do == "record":
+            return self._begin_recording(board)
+        if do == "end_recording":
+            self._end_recording("")
+            return ""  # every page is told
+        line = _line(wish)
+        if line == "?":
+            return board.status()
+        if line == "$save":
+            board.unguard()  # what is saved is what was set, not what this page needs
+        try:
+            said = board.ask(line, 10.0)
+        finally:
+            if line == "$save":
+                board.guard(self._settings)
+        self._note(board, line)
+        return "\n".join(said)
 
     def _note(self, board: Board, line: str) -> None:
         """Keep what the board took and telemetry does not tell."""
@@ -261,7 +327,7 @@ class BoardSource(Source):
         level = list(self._state["level"])
         if word in ("on", "off") and rest:
             percent = float(rest[1]) if word == "on" and len(rest) > 1 else 100.0 * (word == "on")
-            for k in range(len(level)) if rest[0] == "all" else [int(rest[0]) - 1]:
+            for k in range(len(level)) if rest[0] == "all" else [int(float(rest[0])) - 1]:
                 level[k] = percent
         elif word == "pattern":
             level = [100.0 * (one == "1") for one in rest[0]]
@@ -272,24 +338,31 @@ class BoardSource(Source):
             self._change(policy=rest[0])
         if word.startswith("$") or word == "ambient":
             self._read_settings(board)
-            self._change(policy="precompensate" if self._settings.get("policy") == "1" else "open")
+        if word.startswith("$"):  # it may have ended what this page needs of the board
+            board.guard(self._settings)
+            self._begin_telemetry(board)
 
     def _play_on(self, board: Board, now: float) -> None:
-        if self._play and now >= self._play_next_s:
-            patterns, seconds = self._play
-            line = f"pattern {patterns[self._played % len(patterns)]}"
-            self._played += 1
-            self._play_next_s = now + seconds
-            try:
-                board.ask(line)
-                self._note(board, line)
-            except WorkError as error:
+        play = self._play
+        if play is not self._played:
+            self._played, self._play_at, self._play_next_s = play, 0, now
+            if not play:
+                self._change(play=None)
+        if not play or now < self._play_next_s:
+            return
+        at = self._play_at % len(play.patterns)
+        self._play_at, self._play_next_s = at + 1, now + play.seconds
+        try:
+            line = f"pattern {play.patterns[at]}"
+            board.ask(line)
+            self._note(board, line)
+            self._change(play={"patterns": play.patterns, "seconds": play.seconds, "at": at})
+        except WorkError as error:
+            if self._play is play:
                 self._play = None
-                self._change(said=str(error))
-                if not isinstance(error, RefusedError):
-                    raise
-        if (self._state.get("playing") or False) != (self._play is not None):
-            self._change(playing=self._play is not None)
+            self._change(said=str(error))
+            if not isinstance(error, RefusedError):
+                raise
 
     def _look(self, board: Board) -> None:
         believed = beliefs(board.ask("model"))
@@ -309,6 +382,7 @@ class BoardSource(Source):
             bounds_c=[one and [one.low_c, one.high_c] for one in each],
             phase=[one and one.austenite for one in each],
             doing=[one.why or one.doing if one else "" for one in each],
+            unknown_s=[one and one.unknown_s for one in each],
             target_a=[one and one.target_a for one in each],
             faults=shown,
             level=level,
@@ -348,8 +422,10 @@ class BoardSource(Source):
                 "corrupt": self._check.dropped,
                 "measured_c": self._measured(len(now.current_a)),
             }
+            self._row_at_s = time.monotonic()
             self._change(**values)
-            self._remember(self._state)
+            bounds = [one or (None, None) for one in self._state["bounds_c"]]
+            self._remember(self._state | {"low_c": [low for low, _ in bounds], "high_c": [high for _, high in bounds]})
         if self._check.restarted:
             raise WorkError("the board has started again")
 
@@ -406,6 +482,31 @@ class BoardSource(Source):
         log.close()
         said = f"{log.rows} rows in {log.path}" if log.rows else f"nothing came for {log.path.name}"
         self._change(recording=None, said=f"{why}; {said}" if why else said)
+
+
+def _line(wish: dict[str, Any]) -> str:
+    """Return a wish as the console's line."""
+    match wish["do"]:
+        case "level":
+            return f"on {int(wish['spring'])} {int(wish['level'])}" if wish["level"] else f"off {int(wish['spring'])}"
+        case "all":
+            return f"on all {int(wish['level'])}" if wish["level"] else "off all"
+        case "pattern":
+            return f"pattern {wish['springs']}"
+        case "policy":
+            return f"policy {wish['policy']}"
+        case "fan":
+            return f"fan {int(wish['percent'])}"
+        case "ambient":
+            return f"ambient {wish['celsius']:.2f}"
+        case "set":
+            return f"${wish['name']}={wish['value']}"
+        case "cold":
+            return "model cold"
+        case "say":
+            return str(wish["line"])
+        case word:
+            return str(word)  # clear, unlock
 
 
 def _plain(values: np.ndarray) -> list[float | None]:

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import click
 
-from ..console import ARRAY, FILE, array_of, notes_of, out
+from .. import ranges
+from ..console import ARRAY, FILE, Real, Whole, array_of, notes_of, out
 from ..errors import InputError
 from ..logs import read_log
 
@@ -28,9 +29,11 @@ Examples:
 @click.option("--model", "model_path", type=FILE, help="with --replay: model.toml, shown beside what was measured")
 @ARRAY
 @click.option(
-    "--speed", type=click.FloatRange(0.1, 1000), default=1.0, show_default=True, help="with --replay: times real time"
+    "--speed", type=Real(ranges.REPLAY_SPEED), default=1.0, show_default=True, help="with --replay: times real time"
 )
-@click.option("--hz", type=click.IntRange(1, 20), default=10, show_default=True, help="rows a second from the board")
+@click.option(
+    "--hz", type=Whole(ranges.DASHBOARD_HZ), default=10, show_default=True, help="rows a second from the board"
+)
 @click.option(
     "--folder",
     type=click.Path(file_okay=False, exists=True, path_type=Path),
@@ -39,6 +42,13 @@ Examples:
 )
 @click.option(
     "--listen", "address", default=USUAL, show_default=True, help="HOST:PORT of the page; port 0: any free one"
+)
+@click.option(
+    "--host-name",
+    "host_names",
+    multiple=True,
+    metavar="NAME",
+    help="a name by which browsers call this machine, as raspberrypi.local; may be given again. Other names are refused",
 )
 def dashboard(
     port: str | None,
@@ -51,17 +61,19 @@ def dashboard(
     hz: int,
     folder: Path,
     address: str,
+    host_names: tuple[str, ...],
 ) -> None:
     """Show an array live on a page in the browser, and drive it from there. Ctrl-C ends it and switches everything off.
 
-    The page is for this machine alone unless --listen names another address: then whoever reaches it drives the array.
+    The page is for this machine alone unless --listen names another address: then whoever has the printed address, which
+    holds a token, drives the array.
     """
     from ..models import read_array, read_model
     from ..recording import told_to_stop
     from ..simulated import simulator
     from .board_source import SIMULATED, BoardSource
     from .replay_source import ReplaySource
-    from .server import listen, serve
+    from .server import HOST, address_of, door_of, listen, serve
     from .source import Source
 
     if sum((port is not None, simulate, replay is not None)) != 1:
@@ -71,6 +83,8 @@ def dashboard(
     host, colon, number = address.rpartition(":")
     if not colon or not number.isdigit() or int(number) > 65535:
         raise InputError(f"--listen {address}: not HOST:PORT, as in {USUAL}")
+    if wrong := next((one for one in host_names if not HOST.fullmatch(one) or ":" in one), None):
+        raise InputError(f"--host-name {wrong}: not a name, as in raspberrypi.local")
     source: Source
     if replay:
         model = read_model(model_path) if model_path else None
@@ -85,9 +99,7 @@ def dashboard(
             simulator()  # what is not built does not come back, as a port does
         source = BoardSource(port or SIMULATED, hz, folder, thermometers)
     here = listen(host.strip("[]"), int(number))
-    name, at = here.getsockname()[:2]
+    door = door_of(here, host_names)
     with told_to_stop() as stopped:
-        out.print(
-            f"http://{f'[{name}]' if ':' in name else name}:{at}/   (Ctrl-C ends it)", soft_wrap=True, markup=False
-        )
-        serve(source, here, stopped)
+        out.print(f"{address_of(here, door, host_names)}   (Ctrl-C ends it)", soft_wrap=True, markup=False)
+        serve(source, here, stopped, door)

@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError
 from ..logs import Run
 from ..models import Model
 from .source import Source, at_once
@@ -22,6 +21,8 @@ class ReplaySource(Source):
     """A log, and perhaps a model of it."""
 
     kind = "replay"
+    words = "a log that is replayed"
+    takes = frozenset({"pause", "seek", "speed"})
 
     def __init__(self, run: Run, rows: int, cols: int, model: Model | None, speed: float) -> None:
         from ..fit.predict import predict
@@ -73,10 +74,11 @@ class ReplaySource(Source):
         self.closing.set()
         self._thread.join(5)
 
-    def stop_now(self) -> None:
+    def stop_now(self) -> str:
         """Pause: there is nothing to switch off."""
         self._playing = False
         self._show(self._row)
+        return "paused: a log is replayed, there is nothing to switch off"
 
     def do(self, wish: dict[str, Any]) -> Future[str]:
         """Play, pause, seek, or change the speed."""
@@ -91,10 +93,8 @@ class ReplaySource(Source):
                 self._show(row)
             elif wish["do"] == "speed":
                 self._speed = wish["speed"]
-            elif wish["do"] == "pause":
-                self._playing = not self._playing
             else:
-                raise InputError("a log is replayed: there is nothing to drive")
+                self._playing = not self._playing
         self._show(self._row)
         return at_once("")
 

@@ -4,24 +4,29 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import json
+import ipaddress
+import re
+import secrets
 import socket
+import time
 from collections.abc import AsyncIterator, Callable, Iterator
+from dataclasses import dataclass, field
+from http.cookies import CookieError, SimpleCookie
 from pathlib import Path
 from typing import Any
-from urllib.parse import urlsplit
+from urllib.parse import parse_qs
 
-import jsonschema
 import plotly
 import uvicorn
 from starlette.applications import Starlette
-from starlette.responses import FileResponse, PlainTextResponse
+from starlette.responses import FileResponse, PlainTextResponse, RedirectResponse, Response
 from starlette.routing import Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
 from starlette.types import ASGIApp, Receive, Scope, Send
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from ..errors import InputError, WorkError
+from . import wishes
 from .source import Source
 
 PAGE = Path(__file__).with_name("page")
@@ -32,99 +37,132 @@ EVERY_S = 0.05
 ANSWER_S = 15.0
 """So long a page waits for the board's words."""
 LONGEST_WISH = 65536
+A_SECOND, AT_ONCE = 20.0, 100.0
+"""So many wishes a page may have a second, and so many in a burst; to switch off is always free."""
+MOST_ANSWERS = 1000
+"""A page that does not read so many answers is not there."""
+HOST = re.compile(r"(\[[0-9a-f:.]+\]|[a-z0-9._-]+)(:[0-9]{1,5})?", re.IGNORECASE)
 
 
-def _wish(do: str, /, **properties: Any) -> dict[str, Any]:
-    return {
-        "type": "object",
-        "properties": {"do": {"const": do}, "id": {"type": "integer"}} | properties,
-        "required": ["do", *properties],
-        "additionalProperties": False,
-    }
+@dataclass(frozen=True)
+class Door:
+    """Who may come in: by which names the page is called, and with which token (none on the loopback address)."""
 
+    names: frozenset[str] = frozenset(LOOPBACK)
+    any_address: bool = False
+    """Whether every address in numbers is a name of this machine: no other site can have its pages come from one."""
+    token: str | None = None
+    cookie: str = field(default_factory=lambda: f"ninespring-{secrets.token_hex(4)}")
+    """Of this run: two dashboards of one machine share their cookies."""
 
-_LEVEL = {"type": "integer", "minimum": 0, "maximum": 100}
-_PATTERN = {"type": "string", "pattern": r"^[01]{1,64}\Z"}
-WISHES = jsonschema.Draft202012Validator(
-    {
-        "oneOf": [
-            *(_wish(name) for name in ("stop", "clear", "unlock", "record", "end_recording", "settings", "pause")),
-            _wish("level", spring={"type": "integer", "minimum": 1, "maximum": 64}, level=_LEVEL),
-            _wish("all", level=_LEVEL),
-            _wish("pattern", springs=_PATTERN),
-            _wish(
-                "play",
-                patterns={"type": "array", "items": _PATTERN, "minItems": 1, "maxItems": 100},
-                seconds={"type": "number", "minimum": 0.5, "maximum": 3600},
-            ),
-            _wish("policy", policy={"enum": ["open", "precompensate"]}),
-            _wish("fan", percent=_LEVEL),
-            _wish("ambient", celsius={"type": "number", "minimum": -40, "maximum": 85}),
-            _wish(
-                "set",
-                name={"type": "string", "pattern": r"^[a-z0-9_]{1,40}\Z"},
-                value={"type": "string", "pattern": r"^-?[0-9]{1,9}(\.[0-9]{1,9})?\Z"},
-            ),
-            _wish("say", line={"type": "string", "pattern": r'^["-~][ -~]{0,62}\Z'}),
-            _wish("seek", time_s={"type": "number"}),
-            _wish("speed", speed={"type": "number", "minimum": 0.1, "maximum": 1000}),
-        ]
-    }
-)
-"""Everything that a page may wish, exactly; what is not one of these changes nothing."""
+    def knows(self, host: str) -> bool:
+        """Return whether a Host header is one of this machine's names."""
+        match = HOST.fullmatch(host)
+        if not match:
+            return False
+        name = match[1].strip("[]").lower()
+        if name in self.names:
+            return True
+        try:
+            ipaddress.ip_address(name)
+        except ValueError:
+            return False
+        return self.any_address
+
+    def fits(self, token: str | None) -> bool:
+        """Return whether that is the token."""
+        return self.token is None or (
+            token is not None and secrets.compare_digest(token.encode("utf-8", "replace"), self.token.encode())
+        )
 
 
 class OwnPagesOnly:
-    """Refuses requests that a page of another site made, or that came by another name (DNS rebinding)."""
+    """Refuses requests that a page of another site made, that came by another name (DNS rebinding), or without token."""
 
-    def __init__(self, app: ASGIApp, loopback: bool) -> None:
-        self.app, self.loopback = app, loopback
+    def __init__(self, app: ASGIApp, door: Door) -> None:
+        self.app, self.door = app, door
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass on what may be, refuse the rest with 403."""
-        if scope["type"] in ("http", "websocket") and not self._may(scope):
-            if scope["type"] == "websocket":
-                await WebSocket(scope, receive, send).close(1008)
-            else:
-                await PlainTextResponse("not from here", 403)(scope, receive, send)
+        if scope["type"] not in ("http", "websocket"):
+            await self.app(scope, receive, send)
             return
-        await self.app(scope, receive, send)
-
-    def _may(self, scope: Scope) -> bool:
         headers = [(name, value.decode("latin-1")) for name, value in scope["headers"]]
+        answer: Response | None = None
+        if not self._own(scope, headers):
+            answer = PlainTextResponse("not from here: --host-name NAME adds a name of this machine", 403)
+        elif not self.door.fits(self._token(headers)):
+            answer = self._let_in(scope)
+        if answer is None:
+            await self.app(scope, receive, send)
+        elif scope["type"] == "websocket":
+            await WebSocket(scope, receive, send).close(1008)
+        else:
+            await answer(scope, receive, send)
+
+    def _own(self, scope: Scope, headers: list[tuple[bytes, str]]) -> bool:
         hosts = [value for name, value in headers if name == b"host"]
         origins = [value for name, value in headers if name == b"origin"]
-        if len(hosts) != 1 or len(origins) > 1:
-            return False
-        if self.loopback and urlsplit(f"//{hosts[0]}").hostname not in LOOPBACK:
+        if len(hosts) != 1 or len(origins) > 1 or not self.door.knows(hosts[0]):
             return False
         if scope["type"] == "websocket" and not origins:
             return False
         return not origins or origins[0] == f"http://{hosts[0]}"
 
+    def _token(self, headers: list[tuple[bytes, str]]) -> str | None:
+        for name, value in headers:
+            if name == b"cookie":
+                with contextlib.suppress(CookieError):
+                    if morsel := SimpleCookie(value).get(self.door.cookie):
+                        return morsel.value
+        return None
 
-def application(source: Source, loopback: bool = True) -> ASGIApp:
+    def _let_in(self, scope: Scope) -> Response:
+        """Keep the token of the printed address in a cookie, so that it stands in no address bar."""
+        query = parse_qs(scope.get("query_string", b"").decode("latin-1"))
+        if scope.get("path") == "/" and "token" in query and self.door.fits(query["token"][0]):
+            answer = RedirectResponse("/", 303, headers={"cache-control": "no-store", "referrer-policy": "no-referrer"})
+            answer.set_cookie(self.door.cookie, query["token"][0], httponly=True, samesite="lax")
+            return answer
+        return PlainTextResponse("open the address that the dashboard printed, with its token", 403)
+
+
+class _Rate:
+    """How many wishes a page still has."""
+
+    def __init__(self) -> None:
+        self._left, self._at_s = AT_ONCE, time.monotonic()
+
+    def take(self) -> bool:
+        now = time.monotonic()
+        self._left, self._at_s = min(AT_ONCE, self._left + A_SECOND * (now - self._at_s)), now
+        if self._left < 1.0:
+            return False
+        self._left -= 1.0
+        return True
+
+
+def application(source: Source, door: Door) -> ASGIApp:
     """Return the application that shows one source."""
 
     async def page(websocket: WebSocket) -> None:
         await websocket.accept()
-        answers: asyncio.Queue[dict[str, Any]] = asyncio.Queue()
+        answers: asyncio.Queue[dict[str, Any]] = asyncio.Queue(MOST_ANSWERS)
         await websocket.send_json(source.history())
         await websocket.send_json({"kind": "settings", "settings": source.settings()})
-        tell = asyncio.create_task(_tell(websocket, source, answers))
-        wishes: set[asyncio.Task[None]] = set()
+        both = {
+            asyncio.create_task(_tell(websocket, source, answers)),
+            asyncio.create_task(_listen(websocket, source, answers)),
+        }
         try:
-            while True:
-                text = await websocket.receive_text()
-                one = asyncio.create_task(_carry_out(source, text, answers))
-                wishes.add(one)
-                one.add_done_callback(wishes.discard)
-        except (WebSocketDisconnect, KeyError, RuntimeError):
-            pass  # gone, or it sent bytes
+            await asyncio.wait(both, return_when=asyncio.FIRST_COMPLETED)
         finally:
-            tell.cancel()
-            with contextlib.suppress(asyncio.CancelledError, WebSocketDisconnect, RuntimeError):
-                await tell
+            for one in both:
+                one.cancel()
+            # gone, or it sent bytes, or it reads no answers: this page ends, and nothing else
+            await asyncio.gather(*both, return_exceptions=True)
+            with contextlib.suppress(RuntimeError, WebSocketDisconnect):
+                await websocket.close(1008)
 
     @contextlib.asynccontextmanager
     async def life(app: Starlette) -> AsyncIterator[None]:
@@ -143,7 +181,7 @@ def application(source: Source, loopback: bool = True) -> ASGIApp:
         ],
         lifespan=life,
     )
-    return OwnPagesOnly(inner, loopback)
+    return OwnPagesOnly(inner, door)
 
 
 POLICY = {
@@ -169,32 +207,53 @@ async def _tell(websocket: WebSocket, source: Source, answers: asyncio.Queue[dic
         await asyncio.sleep(EVERY_S)
 
 
-def _no_number(text: str) -> float:
-    raise ValueError(text)
+async def _listen(websocket: WebSocket, source: Source, answers: asyncio.Queue[dict[str, Any]]) -> None:
+    """Take a page's wishes as they come."""
+    rate = _Rate()
+    running: set[asyncio.Task[None]] = set()
+    while not answers.full():
+        text = await websocket.receive_text()
+        one = asyncio.create_task(_answer(source, text, rate, answers))
+        running.add(one)
+        one.add_done_callback(running.discard)
 
 
-async def _carry_out(source: Source, text: str, answers: asyncio.Queue[dict[str, Any]]) -> None:
-    """Do what a page wishes, or say why not."""
-    number = None
+async def _answer(source: Source, text: str, rate: _Rate, answers: asyncio.Queue[dict[str, Any]]) -> None:
+    """Do what a page wishes, or say why not: whatever is wrong with a wish is the answer to that wish."""
+    number, wish = wishes.read(text)
     try:
-        wish = json.loads(text, parse_constant=_no_number)
-        WISHES.validate(wish)
-        number = wish.get("id")
-        if wish["do"] == "stop":
-            source.stop_now()
-            said = "stopped"
-        elif wish["do"] == "settings":
-            answers.put_nowait({"kind": "settings", "settings": source.settings()})
-            said = ""
-        else:
-            # taken before anything is awaited: a page's wishes keep their order
-            said = await asyncio.wait_for(asyncio.wrap_future(source.do(wish)), ANSWER_S)
-    except (ValueError, jsonschema.ValidationError, RecursionError):
-        answers.put_nowait({"kind": "refused", "id": number, "why": "not a wish that this page can have"})
-    except (WorkError, InputError, TimeoutError) as error:
-        answers.put_nowait({"kind": "refused", "id": number, "why": str(error) or "the board does not answer"})
-    else:
-        answers.put_nowait({"kind": "done", "id": number, "said": said})
+        said = await _carry_out(source, wish, rate, answers)
+        answer = {"kind": "done", "id": number, "said": said}
+    except (WorkError, InputError) as error:
+        answer = {"kind": "refused", "id": number, "why": str(error)}
+    except TimeoutError:
+        answer = {"kind": "refused", "id": number, "why": f"the board does not answer for {ANSWER_S:g} s"}
+    except Exception as error:
+        answer = {"kind": "refused", "id": number, "why": f"a defect of the tool: {type(error).__name__}: {error}"}
+    with contextlib.suppress(asyncio.QueueFull):
+        answers.put_nowait(answer)
+
+
+async def _carry_out(source: Source, wish: dict[str, Any], rate: _Rate, answers: asyncio.Queue[dict[str, Any]]) -> str:
+    # a wish is taken before anything is awaited: a page's wishes keep their order
+    wish = wishes.validated(wish)
+    if wish["do"] == "stop":
+        return source.stop_now()
+    off = wishes.switches_off(wish)
+    if not off and not rate.take():
+        raise WorkError(f"too many wishes of this page: {A_SECOND:g} a second, {AT_ONCE:g} at once")
+    if wish["do"] == "settings":
+        answers.put_nowait({"kind": "settings", "settings": source.settings()})
+        return ""
+    if wish["do"] not in source.takes:
+        raise InputError(f"'{wish['do']}' is nothing that {source.words} can do")
+    answer = asyncio.wrap_future(source.do(wish))
+    if not off:
+        return await asyncio.wait_for(answer, ANSWER_S)
+    try:
+        return await asyncio.wait_for(asyncio.shield(answer), source.off_within_s)
+    except TimeoutError:
+        return f"the board was busy, so that it was stopped. {source.stop_now()}"
 
 
 class _Server(uvicorn.Server):
@@ -214,11 +273,28 @@ def listen(host: str, port: int) -> socket.socket:
         raise WorkError(f"{host}:{port}: {error.strerror or error}: another one with --listen HOST:PORT") from None
 
 
-def serve(source: Source, here: socket.socket, stopped: Callable[[], bool]) -> None:
+def door_of(here: socket.socket, host_names: tuple[str, ...] = ()) -> Door:
+    """Return who may come in at a listening socket: beyond the loopback address only with a token."""
+    names = {*LOOPBACK, *(one.lower() for one in host_names)}
+    if here.getsockname()[0] in LOOPBACK:
+        return Door(frozenset(names))
+    return Door(frozenset({*names, socket.gethostname().lower()}), True, secrets.token_urlsafe(16))
+
+
+def address_of(here: socket.socket, door: Door, host_names: tuple[str, ...] = ()) -> str:
+    """Return the page's address, with its token where it has one."""
+    name, port = here.getsockname()[:2]
+    if host_names:
+        name = host_names[0]
+    elif name in ("0.0.0.0", "::"):
+        name = socket.gethostname()
+    return f"http://{f'[{name}]' if ':' in name else name}:{port}/" + (f"?token={door.token}" if door.token else "")
+
+
+def serve(source: Source, here: socket.socket, stopped: Callable[[], bool], door: Door) -> None:
     """Serve until told to stop; then the springs are off and the log is finished."""
-    host = here.getsockname()[0]
     config = uvicorn.Config(
-        application(source, host in LOOPBACK),
+        application(source, door),
         log_level="warning",
         ws_max_size=LONGEST_WISH,
         ws_ping_interval=5,

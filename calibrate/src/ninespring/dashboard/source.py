@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections import deque
 from concurrent.futures import Future
 from typing import Any
@@ -10,7 +11,7 @@ from typing import Any
 HISTORY_S = 600.0
 POINTS = 1200
 """Most points of history that a new page gets."""
-SERIES = ("temperature_c", "measured_c", "current_a", "voltage_v", "power_w", "duty", "phase")
+SERIES = ("temperature_c", "low_c", "high_c", "measured_c", "current_a", "voltage_v", "power_w", "duty", "phase")
 """What is kept of each spring over time."""
 
 
@@ -18,11 +19,19 @@ class Source:
     """One array as all pages see it."""
 
     kind = ""
+    words = ""
+    """What it is, in words."""
+    takes: frozenset[str] = frozenset()
+    """The wishes that it can carry out, beside stop and settings."""
+    off_within_s = 0.8
+    """An off that is not confirmed within so long becomes a stop."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._state: dict[str, Any] = {"connected": False, "trouble": "looking for the board"}
         self._revision = 0
+        self._row_at_s: float | None = None
+        """When the newest row came, monotonic; None where what is shown does not age."""
         self._history: deque[dict[str, Any]] = deque()
         self.closing = threading.Event()
 
@@ -34,7 +43,10 @@ class Source:
     def state(self) -> dict[str, Any]:
         """Return the state as it is now."""
         with self._lock:
-            return self._state | {"kind": "state", "source": self.kind, "revision": self._revision}
+            state = self._state | {"kind": "state", "source": self.kind, "revision": self._revision}
+            if self._row_at_s is not None:
+                state["age_s"] = round(time.monotonic() - self._row_at_s, 3)
+        return state
 
     def history(self) -> dict[str, Any]:
         """Return the last minutes: {time_s: (n,), name: (k, n) ...}."""
@@ -43,7 +55,8 @@ class Source:
         rows = rows[:: 1 + len(rows) // POINTS]
         out: dict[str, Any] = {"kind": "history", "time_s": [row["time_s"] for row in rows]}
         for name in SERIES:
-            out[name] = [list(one) for one in zip(*(row[name] for row in rows), strict=True)] if rows else []
+            none = [None] * max((len(row[name] or ()) for row in rows), default=0)
+            out[name] = [list(one) for one in zip(*(row[name] or none for row in rows), strict=True)]
         return out
 
     def _change(self, **values: Any) -> None:
@@ -55,7 +68,7 @@ class Source:
         with self._lock:
             if self._history and row["time_s"] < self._history[-1]["time_s"]:
                 self._history.clear()
-            self._history.append({name: row[name] for name in ("time_s", *SERIES)})
+            self._history.append({name: row.get(name) for name in ("time_s", *SERIES)})
             while row["time_s"] - self._history[0]["time_s"] > HISTORY_S:
                 self._history.popleft()
 
@@ -66,11 +79,13 @@ class Source:
     def start(self) -> None:
         """Begin."""
 
-    def stop_now(self) -> None:
-        """Switch everything off, at once, from any thread."""
+    def stop_now(self) -> str:
+        """Switch everything off, at once, from any thread; return what was done, in words."""
+        raise NotImplementedError
 
     def do(self, wish: dict[str, Any]) -> Future[str]:
-        """Take a wish, without waiting: wishes are carried out in the order in which they are taken.
+        """Take a valid wish, one of `takes`, without waiting: wishes are carried out in the order in which they are
+        taken, but those that only switch off come first.
 
         The board's words come later; WorkError or InputError, at once or as what comes, where it is refused.
         """

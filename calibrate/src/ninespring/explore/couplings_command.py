@@ -24,7 +24,7 @@ def need(*modules: str) -> None:
             importlib.import_module(name)
         except ImportError as error:
             raise WorkError(
-                f"{name} is missing ({error}): script/setup installs it in the tree, elsewhere pip install 'ninespring[explore]'"
+                f"{name} is missing ({error}): script/setup installs it in the tree, elsewhere pip install '.[explore]' in the source tree"
             ) from None
         except OSError as error:
             raise WorkError(f"{name} does not load ({error}): docs/exploring.md names the system's libraries") from None
@@ -47,7 +47,7 @@ def couplings(array_path: Path, mesh: str, output: Path, json_path: Path | None)
 
     What cools it stands in [cooling] of array.toml. Nothing measured goes in: docs/exploring.md says how far that carries.
     """
-    check_folder(output)
+    check_folder(output, json_path)
     array = read_array(array_path)
     from .geometry import geometry_of
 

@@ -36,8 +36,13 @@ class Results:
 
         if self.folder.exists() and not self.folder.is_dir():
             raise InputError("is a file; give a folder", self.folder)
+        begun = (self.folder / "spec.json").exists() or not self.folder.exists()
+        if not begun and (
+            {one.name for one in self.folder.iterdir()} - {"lock", "points"} or any(self.points.glob("*"))
+        ):
+            raise InputError("holds files, and no sweep's: give another folder", self.folder)
         self.points.mkdir(parents=True, exist_ok=True)
-        self.lock = (self.folder / "lock").open("w")
+        self.lock = (self.folder / "lock").open("a")
         try:
             fcntl.flock(self.lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:
@@ -53,8 +58,6 @@ class Results:
                 raise InputError(
                     "holds the results of another spec, or of another version: give another folder", self.folder
                 )
-        elif any(self.folder.glob("points/*.parquet")):
-            raise InputError("holds Parquet files that no sweep of this spec wrote: give another folder", self.folder)
         done = np.zeros(self.spec.points, dtype=bool)
         for part in self.points.glob("*.parquet"):
             try:

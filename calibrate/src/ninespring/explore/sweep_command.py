@@ -13,8 +13,10 @@ import click
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
 
-from ..console import FILE, JSON, Command, checked, err, out, result_of, write
+from .. import ranges
+from ..console import FILE, JSON, Command, Whole, checked, err, out, result_of, write
 from ..errors import WorkError
+from ..logs import check_folder, write_atomically
 from .couplings_command import need
 
 CONNECT_S = 10
@@ -33,7 +35,7 @@ Read the results: pandas.read_parquet("pitch/points")
 @click.argument("spec_path", metavar="SPEC.TOML", type=FILE)
 @click.option("-o", "--output", type=click.Path(file_okay=False, path_type=Path), required=True, help="folder to write")
 @click.option("--scheduler", help="a Dask cluster as it stands, tcp://host:8786; left out: this machine's cores")
-@click.option("--workers", type=click.IntRange(1, 1024), help="processes on this machine; left out: one a core")
+@click.option("--workers", type=Whole(ranges.WORKERS), help="processes on this machine; left out: one a core")
 @click.option("--check", is_flag=True, help="look at the spec and every point of it, and run nothing")
 @JSON
 def sweep(
@@ -45,6 +47,7 @@ def sweep(
     """
     from .spec import read_spec
 
+    check_folder(json_path)
     spec = read_spec(spec_path)
     if check:
         out.print(f"{spec_path}: {spec.points} points, {', '.join(axis.key for axis in spec.axes)}", soft_wrap=True)
@@ -126,7 +129,9 @@ def _evaluate(spec: Any, results: Any, output: Path) -> dict[str, Any]:
     for metric, one in found.items():
         shown.add_row(metric, *(f"{v['ST']:.2f} +- {v['ST_conf']:.2f}" for v in one.values()))
     out.print(shown)
-    (output / "indices.json").write_text(json.dumps(found, indent=1) + "\n")
+    write_atomically(
+        {output / "indices.json": json.dumps(found, indent=1) + "\n"}, force=True
+    )  # the folder is a sweep's
     return {"indices": found}
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from ..errors import InputError, WorkError
 from ..explore.stiffness import LAYERS
 from ..logs import check_folder, read_bytes, read_log, sha256_of
 from ..models import Model
+from .settings import Settings
 
 CHIP = click.option(
     "--chip",
@@ -47,6 +49,26 @@ def _chip_lines(path: Path | None) -> str:
     return "\n".join(settings_lines(text, str(path)))
 
 
+def checked_settings(
+    model: Model, old: str, force: bool = False, say: Callable[..., None] = lambda text, done=None: None
+) -> tuple[Settings, list[str], dict[str, Any]]:
+    """Return a model's settings, in what they drive worse than the lines `old`, and both drives; WorkError where they should not be used."""
+    from .drive import compare
+    from .settings import settings_of
+
+    if (doubts := model.provenance.get("doubts", [])) and not force:
+        raise WorkError(
+            f"the log of this model is doubted, nothing is written: {'; '.join(doubts)} (--force writes it all the same)"
+        )
+    made = settings_of(model)
+    worse, drives = compare(model, old, f"{old}\n{made.lines}", say)
+    if worse and not force:
+        raise WorkError(
+            f"these settings would drive worse, nothing is written: {'; '.join(worse)} (--force writes them all the same)"
+        )
+    return made, worse, drives
+
+
 @click.command(
     cls=Command,
     epilog="""\b
@@ -73,35 +95,20 @@ def export(
     less, heat later, get hotter than transforming takes or disturb the ones that are off are refused. So is a model of a log
     that the diagnosis doubted.
     """
-    from .. import effects
-    from .drive import compare
-    from .settings import settings_of
+    from .settings import left_out, together
 
     check_folder(output, json_path)
     model = _model(model_path, layer)
     doubts = list(model.provenance.get("doubts", []))
-    if doubts and not force:
-        raise WorkError(
-            f"the log of this model is doubted, nothing is written: {'; '.join(doubts)} (--force writes it all the same)"
-        )
-    made = settings_of(model)
-    left = {e: effects.WHY_NOT_ON_CHIP[e] for e in model.effects if e in effects.WHY_NOT_ON_CHIP}
-    old = _chip_lines(chip_path)
     with working("driving the old and the new settings") as say:
-        worse, drives = compare(model, old, f"{old}\n{made.lines}", say)
-    if worse and not force:
-        raise WorkError(
-            f"these settings would drive worse, nothing is written: {'; '.join(worse)} (--force writes them all the same)"
-        )
-    kept: dict[str, list[str]] = {}
-    for name, why in made.kept.items():
-        kept.setdefault(why, []).append(name)
+        made, worse, drives = checked_settings(model, _chip_lines(chip_path), force, say)
+    left = left_out(model)
     head = [
-        f"# from {model_path.name}",
+        f"# from {model_path.name}, by `ninespring export`",
         *(f"# doubted, written by --force: {one}" for one in doubts),
         *(f"# worse, written by --force: {one}" for one in worse),
         *(f"# {e} is left out: {why}" for e, why in left.items()),
-        *(f"# not written, {why}: {', '.join(_together(names))}" for why, names in kept.items()),
+        *(f"# not written, {why}: {', '.join(names)}" for why, names in together(made.kept, made.written).items()),
     ]
     result = result_of(
         "export",
@@ -119,11 +126,6 @@ def export(
     for line in head[1:]:
         said.print(line[2:], markup=False)
     said.print(f"{len(made.written)} settings -> {output} (`ninespring upload` sends them)")
-
-
-def _together(names: list[str]) -> list[str]:
-    """Return names with those of single springs as one."""
-    return list(dict.fromkeys(n.rstrip("0123456789").rstrip("_") if n[-1:].isdigit() else n for n in names))
 
 
 @click.command(

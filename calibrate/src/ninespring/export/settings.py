@@ -6,7 +6,11 @@ it are the ones it determines.
 
 from __future__ import annotations
 
+import re
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -88,8 +92,51 @@ def not_crossed(model: Model) -> str:
     end = f"{finish:.1f} +- {error:.1f} degC" if error else f"{finish:.1f} degC"
     return (
         f"the log's hottest spring reached {hottest:.1f} degC, which is not clearly beyond the end of the transformation "
-        f"({end}): transformation kept as it is"
+        f"({end}): transformation kept as it is. Drive one spring through it: "
+        f"ninespring plan --through {(model.array.springs + 1) // 2} --model {Path(model.name or 'model.toml').name} -o steps.txt"
     )
+
+
+def left_out(model: Model) -> dict[str, str]:
+    """Return the effects of a model of which nothing goes into the chip, and why: what report, diagnosis.json and export tell.
+
+    An effect of the thermometers or of that day never does; any other does with the numbers of it that may be written.
+    """
+    why = determined(model)
+    table = native.parameter_table()
+    out = {}
+    for effect in model.effects:
+        of_it = [reason for name, reason in why.items() if table[name.partition("[")[0]].effect == effect]
+        if effect in effects.WHY_NOT_ON_CHIP:
+            out[effect] = effects.WHY_NOT_ON_CHIP[effect]
+        elif of_it and all(of_it):
+            out[effect] = of_it[0]
+    return out
+
+
+def judged(listed: list[dict[str, Any]], model: Model) -> None:
+    """Say of effects as diagnosis.json lists them whether they go into the chip, and why not."""
+    left = left_out(model)
+    for one in listed:
+        # not in the model (v / i alone names it, a run's own): never exported
+        why = left.get(one["name"], "" if one["name"] in model.effects else "it is not in model.toml")
+        why = effects.WHY_NOT_ON_CHIP.get(one["name"], why)
+        one["on_chip"] = not why
+        one.pop("why_not_on_chip", None)
+        if why:
+            one["why_not_on_chip"] = why
+
+
+def together(kept: Mapping[str, str], written: Mapping[str, str]) -> dict[str, list[str]]:
+    """Return what is not written, by reason: settings of all springs as one name, of some of them by their numbers."""
+    base = lambda name: re.sub(r"_?\d+$", "", name)  # noqa: E731
+    mixed = {base(name) for name in written}
+    out: dict[str, list[str]] = {}
+    for name, why in kept.items():
+        said = base(name)
+        others = {reason for other, reason in kept.items() if base(other) == said}
+        out.setdefault(why, []).append(name if said in mixed or len(others) > 1 else said)
+    return {why: list(dict.fromkeys(names)) for why, names in out.items()}
 
 
 def _lines(plant: native.Plant) -> tuple[dict[str, str], str]:

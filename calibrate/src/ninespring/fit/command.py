@@ -47,8 +47,8 @@ def fit(logs: tuple[Path, ...], array_path: Path | None, effects: str, output: P
     is a fixed point of its temperature, and effects of the array that it shows are looked for and named. Errors are root mean squares in K (of v / i: in mohm); numbers are in J/K, W/K, J, s as the table says. Held out: on blocks of two and a
     half minutes that the numbers were not fitted to.
     """
-    from .. import effects as library
     from .. import native
+    from ..export.settings import left_out
     from ..models import model_text
     from ..verdict import diagnosis, doubt, steady
     from ..verdict.result import parameters_of
@@ -96,9 +96,8 @@ def fit(logs: tuple[Path, ...], array_path: Path | None, effects: str, output: P
     beside(output).print(
         f"error {result['rmse_c']:.3f} K, held out {held:.3f} K, noise {problem.noise_c:.3f} K -> {output}"
     )
-    for effect in wanted:
-        if effect in library.WHY_NOT_ON_CHIP:
-            beside(output).print(f"{effect}: not for the chip: {library.WHY_NOT_ON_CHIP[effect]}")
+    for effect, why in left_out(model).items():
+        beside(output).print(f"{effect}: not for the chip: {why}", markup=False)
 
 
 def _fit_from_resistance(array: Array, runs: list[Run], output: Path, json_path: Path | None) -> None:

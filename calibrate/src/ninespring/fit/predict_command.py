@@ -52,6 +52,7 @@ def predict(log: Path, model_path: Path, output: Path, chip: bool, json_path: Pa
     left = shown - run.temperature_c
     rmse, each = _rms(left), [_rms(one) for one in left.T]
     note = model.provenance.get("note")
+    keys = {"tool": f"ninespring {__version__} predict", "model": model_path.name}
     result = result_of(
         "predict",
         logs=logs_of([run]),
@@ -62,7 +63,7 @@ def predict(log: Path, model_path: Path, output: Path, chip: bool, json_path: Pa
         rmse_per_spring_c=each,
         **({"note": note} if note else {}),
     )
-    write({output: log_text(run.time_s, columns), json_path: checked(result)})
+    write({output: log_text(run.time_s, columns, keys), json_path: checked(result)})
     beside(output).print(
         f"{len(run.time_s)} rows" + ("" if rmse is None else f", error {rmse:.3f} K rms") + f" -> {output}"
     )

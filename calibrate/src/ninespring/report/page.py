@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import html
 import re
+from collections.abc import Sequence
 from typing import Any
 
 from .. import effects, native
+from ..logs import CUT_SHORT
 from ..search import search
 from ..verdict import board_alone, steady
 from ..verdict.diagnosis import Diagnosis
@@ -133,11 +135,21 @@ def next_steps(result: dict[str, Any], folder: str) -> list[str]:
     ]
 
 
+def cut_short(warnings: Sequence[str]) -> list[str]:
+    """Return, to be said before anything else, which runs a fault of the board cut short."""
+    lines = [one for one in warnings if CUT_SHORT in one]
+    return [f'<div class="warn bad">{"<br>".join(map(_e, lines))}</div>'] if lines else []
+
+
 def html_report(found: Diagnosis, folder: str = "diagnosis") -> str:
     """Return the report as HTML; `folder` is where the diagnosis is written."""
     result = found.result
     before, after = result["baseline"], result["after"]
-    parts = ["<h1>What the array does that the model did not</h1>", f'<p class="lead">{_e(verdict(result))}</p>']
+    parts = [
+        "<h1>What the array does that the model did not</h1>",
+        *cut_short(result["warnings"]),
+        f'<p class="lead">{_e(verdict(result))}</p>',
+    ]
     said = [(one, text) for one, text in findings(result)]
     lines = "".join(f"<li><b>{_e(one)}</b>{_e(text)}</li>" for one, text in said)
     parts.append(
@@ -299,7 +311,11 @@ def board_report(result: dict[str, Any], folder: str = "diagnosis") -> str:
         f"<li><b>{_e(one['certainty'])}, {100 * one['probability']:.0f} %</b>{_e(one['text'])}</li>"
         for one in result["effects"]
     )
-    parts = ["<h1>A board without thermometers</h1>", f'<p class="lead">{_e(board_alone.verdict(result))}</p>']
+    parts = [
+        "<h1>A board without thermometers</h1>",
+        *cut_short(result["warnings"]),
+        f'<p class="lead">{_e(board_alone.verdict(result))}</p>',
+    ]
     if said:
         parts.append(f'<ul class="said">{said}</ul>')
     parts.append(f"<h2>What to do next</h2><pre>{_e(chr(10).join(next_steps(result, folder)))}</pre>")

@@ -6,6 +6,8 @@ import html
 import re
 from typing import Any
 
+from ..logs import CUT_SHORT
+
 BEGIN, END = "<!-- verified -->", "<!-- /verified -->"
 
 
@@ -23,8 +25,10 @@ def with_verification(page: str, result: dict[str, Any]) -> str:
         f'<tr><td>{name}</td><td class="n">{cell(a)}</td><td class="n">{cell(b)}</td></tr>' for name, a, b in rows
     )
     log = html.escape(result["logs"][0]["file"])
+    bad = "<br>".join(html.escape(note) for note in result["logs"][0]["notes"] if CUT_SHORT in note)
+    first = f'<div class="warn bad">{log}: {bad}</div>' if bad else ""
     section = (
-        f"{BEGIN}<h2>The chip on {log}, which the fit never saw</h2>"
+        f"{BEGIN}<h2>The chip on {log}, which the fit never saw</h2>{first}"
         '<div class="table"><table><tr><th></th><th class="n">error as it was, K rms</th>'
         f'<th class="n">with these settings, K rms</th></tr>{body}</table></div>{END}'
     )

@@ -8,7 +8,7 @@ from typing import Any
 import click
 from rich.table import Table
 
-from ..console import ARRAY, FILE, Command, array_and_runs, checked, out, working, write
+from ..console import ARRAY, FILE, IN_A_FOLDER, Command, array_and_runs, checked, out, working, write
 from ..errors import InputError
 from ..logs import check_folder
 
@@ -51,6 +51,7 @@ def diagnose(
     temperature, are diagnosed from v / i: degrees stay open. Errors are root mean squares in K; evidence is in
     nats, the logarithm of how many times likelier the data are with the effect.
     """
+    from ..export.settings import judged
     from ..fit import from_resistance
     from ..models import model_text, read_model
     from ..report import page as report
@@ -58,6 +59,8 @@ def diagnose(
     from .residual import surrogate as empirical
 
     check_folder(json_path)
+    if output.is_dir():
+        check_folder(*(output / name for name in IN_A_FOLDER))
     if frozen and not model_path:
         raise InputError("--frozen needs --model")
     model = read_model(model_path) if model_path else None
@@ -67,7 +70,9 @@ def diagnose(
             raise InputError("give one steady table, or logs")
         with working("fitting") as say:
             result = steady.diagnose_table(logs[0], model, array_path, frozen, say)
-        page, made = report.steady_report(result), steady.model_after(result, model, array_path)
+        made = steady.model_after(result, model, array_path)
+        judged(result["effects"], made)
+        page = report.steady_report(result)
     else:
         array, runs = array_and_runs(array_path, logs, model, or_resistance=True)
         alone = from_resistance.has_none(runs)
@@ -76,6 +81,7 @@ def diagnose(
     if not steady_table and alone:
         with working("fitting v / i") as say:
             result, made = board_alone.diagnose(array, runs, say)
+        judged(result["effects"], made)
         page = report.board_report(result, str(output))
     elif not steady_table:
         with working("fitting") as say:

@@ -17,6 +17,7 @@ from threadpoolctl import threadpool_limits
 
 from .. import __version__, effects
 from ..errors import InputError
+from ..export.settings import judged
 from ..fit import statistics
 from ..fit.declared import base_spec
 from ..fit.problem import Problem
@@ -447,6 +448,7 @@ def _diagnose(
     made = model_of(problem, final, as_shown(problem, final), result, found.absent(final))
     resistance.into_model(made, second)
     doubt.into_model(made, problem, final, doubts)
+    judged(result["effects"], made)
     validate(result)
     return Diagnosis(result, made, problem, base, final, heat)
 

@@ -8,9 +8,12 @@ const COLOURS = ["#4477aa", "#ee6677", "#228833", "#b8a01c", "#66ccee", "#aa3377
 const WARM = [[27, 17, 68], [86, 20, 125], [165, 44, 96], [225, 86, 53], [251, 155, 6], [252, 255, 164]];
 const LOW_C = 20, HIGH_C = 120, MOST_POINTS = 6000;
 
-let socket = null, state = {}, shape = "", wishes = 0, drawn = [], list = [], held = new Set();
+let socket = null, state = {}, shape = "", wishes = 0, drawn = [], held = new Set();
+let list = kept(), played = "null", rowAt = null;
 const waiting = new Map();
 const past = { time_s: [], each: {}, sum_a: [] };
+const KEPT = [...Object.keys(QUANTITIES).filter((name) => name !== "sum_a"), "measured_c", "low_c", "high_c"];
+const OLD_S = 1; // what is older, beyond the time between two rows, is shown as old
 
 function wish(what) {
   if (!socket || socket.readyState !== WebSocket.OPEN) {
@@ -44,7 +47,7 @@ function connect() {
     waiting.clear();
     newest = null;
     badge($("connection"), "page not connected", "bad");
-    trouble("This page has lost its server: what it shows is old. It tries again.");
+    trouble("This page has lost its server. It tries again.");
     setTimeout(connect, 1000);
   };
 }
@@ -53,6 +56,7 @@ function connect() {
 let newest = null;
 
 function takeState(now) {
+  rowAt = now.age_s === undefined ? null : performance.now() - 1000 * now.age_s;
   if (now.time_s !== undefined && now.time_s !== past.time_s.at(-1)) append(now);
   if (!newest) {
     requestAnimationFrame(() => {
@@ -76,6 +80,18 @@ function take(message) {
     else tell(message.why, true);
   }
 }
+
+// By this page's own clock: nothing has to come for it to be said that nothing comes.
+function showAge() {
+  const age_s = rowAt === null ? 0 : (performance.now() - rowAt) / 1000;
+  const old = age_s > OLD_S + (state.every_s ?? 0);
+  document.body.classList.toggle("old", old);
+  const words = old ? `What is shown is ${age_s < 100 ? Math.floor(age_s) : `${Math.floor(age_s / 60)} min`}${age_s < 100 ? " s" : ""} old.` : "";
+  if ($("old").textContent !== words) $("old").textContent = words;
+  $("old").hidden = !old;
+  if (old && state.connected && socket.readyState === WebSocket.OPEN) badge($("connection"), "silent", "bad");
+}
+setInterval(showAge, 250);
 
 function badge(where, text, kind) {
   where.textContent = text;
@@ -102,6 +118,7 @@ function show(now) {
   $("name").textContent = now.name ?? "";
   document.title = `${now.name ?? ""} - Ninespring`;
   for (const one of document.querySelectorAll(".live")) one.hidden = !live;
+  $("stop").hidden = !live; // Escape pauses a replay
   document.querySelector(".replay").hidden = live;
   badge($("connection"), now.connected ? { board: "connected", simulated: "simulated", replay: "replay" }[now.source] : "no board",
     now.connected ? "good" : "bad");
@@ -116,8 +133,12 @@ function show(now) {
   $("supply").textContent = now.supply_limit_a ? `of ${shown(now.supply_limit_a, 1)} A` : "";
   const known = now.temperature_c.map((one) => one ?? -999);
   const hottest = known.indexOf(Math.max(...known));
-  $("hottest").textContent = `${shown(now.temperature_c[hottest], 1)} degC (${hottest + 1})`;
-  badge($("state"), now.state_words ?? now.state, now.state === "ok" ? "good" : "bad");
+  const unknown_s = Math.max(0, ...(now.unknown_s ?? []));
+  $("hottest").textContent = unknown_s ? "not known" : `${shown(now.temperature_c[hottest], 1)} degC (${hottest + 1})`;
+  badge($("state"), now.state === "ok" && unknown_s ? "not known yet" : now.state_words ?? now.state, now.state === "ok" && !unknown_s ? "good" : "bad");
+  $("unknown").hidden = !unknown_s;
+  $("unknown-s").textContent = unknown_s ? `${unknown_s} s` : "";
+  $("cold").disabled = now.level.some((one) => one > 0);
   $("unlock").hidden = now.state !== "locked";
   for (let k = 0; k < now.springs; k++) showSpring(k, now);
   $("bounds-legend").hidden = !now.bounds_c?.some((one) => one);
@@ -134,7 +155,7 @@ function show(now) {
     $("fan-shown").textContent = `${held.has("fan") ? $("fan").value : Math.round(now.fan * 100)} %`;
     $("record").textContent = now.recording ? "End recording" : "Record";
     $("recording").textContent = now.recording ? `recording ${now.recording.file}: ${now.recording.rows} rows` : "";
-    $("play").textContent = now.playing ? "Playing" : "Play";
+    showPlay(now.play);
   } else {
     $("pause").textContent = now.playing ? "Pause" : "Play";
     if (!held.has("speed")) $("speed").value = now.speed;
@@ -152,6 +173,7 @@ function build(rows, cols) {
   draw.style.gridTemplateColumns = `repeat(${cols}, auto)`;
   array.replaceChildren();
   draw.replaceChildren();
+  for (const one of described.splice(0)) one.remove();
   for (let k = 0; k < count; k++) {
     const spring = document.createElement("button");
     for (const name of ["number", "level", "temperature", "bounds", "measured", "amps", "limits", "phase"]) {
@@ -160,8 +182,15 @@ function build(rows, cols) {
       spring.append(part);
     }
     spring.querySelector(".number").textContent = k + 1;
+    spring.setAttribute("aria-label", `spring ${k + 1}`); // one name for ever; what changes is its description
+    spring.setAttribute("aria-describedby", `spring-${k + 1}`);
+    const description = document.createElement("span");
+    description.id = `spring-${k + 1}`;
+    description.hidden = true;
+    described.push(description);
     spring.onclick = () => quietly({ do: "level", spring: k + 1, level: state.level[k] > 0 ? 0 : Number($("level").value) });
     array.append(spring);
+    $("array-card").append(description);
     const cell = document.createElement("button");
     cell.setAttribute("aria-pressed", "false");
     cell.setAttribute("aria-label", `spring ${k + 1}`);
@@ -170,23 +199,38 @@ function build(rows, cols) {
   }
 }
 
+// What a screen reader says of a spring, once in five seconds: ten times a second nobody could listen.
+const described = [];
+function describe() {
+  if (state.time_s !== undefined) for (const [k, one] of described.entries()) {
+    const on = state.level[k] > 0 ? `on at ${Math.round(state.level[k])} percent` : "off";
+    const unknown_s = state.unknown_s?.[k];
+    const words = `${on}, ${unknown_s > 0 ? `temperature not known for ${unknown_s} seconds` : `${shown(state.temperature_c[k], 0)} degC`}`
+      + (state.limits[k].length ? `, ${state.limits[k].join(", ")}` : "") + (document.body.classList.contains("old") ? ", old" : "");
+    if (one.textContent !== words) one.textContent = words;
+  }
+}
+setInterval(describe, 5000);
+
 function showSpring(k, now) {
   const spring = $("array").children[k], celsius = now.temperature_c[k], on = now.level[k] > 0;
+  const unknown = now.unknown_s?.[k] > 0;
   const part = (name) => spring.querySelector(`.${name}`);
   const [red, green, blue] = celsius === null ? [120, 120, 120] : colour(celsius);
   spring.style.background = `rgb(${red} ${green} ${blue})`;
   spring.style.color = red * 0.3 + green * 0.59 + blue * 0.11 > 110 ? "#111" : "#fff";
   spring.classList.toggle("on", on);
+  spring.classList.toggle("unknown", unknown);
   spring.setAttribute("aria-pressed", on);
   part("level").textContent = on ? `${Math.round(now.level[k])} %` : "";
-  part("temperature").textContent = `${shown(celsius, 1)}°`;
+  part("temperature").textContent = unknown ? "?" : `${shown(celsius, 1)}°`;
   const [low, high] = now.bounds_c?.[k] ?? [];
   part("bounds").textContent = low === undefined ? "" : `${shown(low, 0)}…${shown(high, 0)}°`;
   part("measured").textContent = now.measured_c[k] == null ? "" : `${shown(now.measured_c[k], 1)}°`;
-  part("amps").textContent = `${shown(now.current_a[k], 2)} A`;
+  part("amps").textContent = now.doing?.[k]?.startsWith("waits") ? `waits ${now.unknown_s[k]} s` : `${shown(now.current_a[k], 2)} A`;
   part("limits").textContent = now.limits[k].join("; ");
   part("phase").style.width = `${100 * (now.phase?.[k] ?? 0)}%`;
-  spring.title = `spring ${k + 1}: ${shown(now.temperature_c[k], 2)} degC, ${shown(now.current_a[k], 3)} A`
+  if (spring.matches(":hover")) spring.title = `spring ${k + 1}: ${unknown ? "not known" : `${shown(celsius, 2)} degC`}, ${shown(now.current_a[k], 3)} A`
     + (low === undefined ? "" : `; surely ${shown(low, 1)} to ${shown(high, 1)} degC (99 %)`)
     + (now.measured_c[k] != null ? `, measured ${shown(now.measured_c[k], 2)} degC` : "")
     + (now.phase?.[k] != null ? `, ${shown(100 * now.phase[k], 0)} % austenite` : "")
@@ -200,7 +244,7 @@ function showSpring(k, now) {
 function remember(history) {
   past.time_s = history.time_s;
   past.each = {};
-  for (const name of [...Object.keys(QUANTITIES), "measured_c"]) past.each[name] = history[name] ?? [];
+  for (const name of KEPT) past.each[name] = history[name] ?? [];
   past.sum_a = past.time_s.map((_, row) => past.each.current_a.reduce((sum, one) => sum + (one[row] ?? 0), 0));
 }
 
@@ -213,10 +257,10 @@ function append(now) {
   }
   past.time_s.push(now.time_s);
   past.sum_a.push(now.sum_a);
-  for (const name of [...Object.keys(QUANTITIES), "measured_c"]) {
-    if (name === "sum_a") continue;
+  const values = { ...now, low_c: now.bounds_c?.map((one) => one?.[0]), high_c: now.bounds_c?.map((one) => one?.[1]) };
+  for (const name of KEPT) {
     const each = (past.each[name] ??= []);
-    for (let k = 0; k < now.springs; k++) (each[k] ??= []).push(now[name]?.[k] ?? null);
+    for (let k = 0; k < now.springs; k++) (each[k] ??= []).push(values[name]?.[k] ?? null);
   }
   if (past.time_s.length > MOST_POINTS) {
     const cut = MOST_POINTS / 4;
@@ -236,6 +280,13 @@ function plot(number) {
   if (name === "sum_a") line(past.sum_a, null);
   else (past.each[name] ?? []).forEach((one, k) => line(one, k));
   if (name === "temperature_c") {
+    (past.each.high_c ?? []).forEach((high, k) => {
+      const low = past.each.low_c[k];
+      if (!high.some((value) => value !== null)) return;
+      const band = { x: time, mode: "lines", legendgroup: `${k}`, showlegend: false, hoverinfo: "skip", line: { width: 0 } };
+      traces.unshift({ ...band, y: low.slice(from) },
+        { ...band, y: high.slice(from), fill: "tonexty", fillcolor: `${COLOURS[k % COLOURS.length]}${past.each.high_c.length > 3 ? "0f" : "24"}` });
+    });
     (past.each.measured_c ?? []).forEach((one, k) => one.some((value) => value !== null) && line(one, k, { line: { dash: "dot" } }));
   }
   const style = getComputedStyle(document.documentElement);
@@ -277,20 +328,31 @@ function newSetting(one) {
   input.setAttribute("aria-label", one.name);
   const words = document.createElement("span");
   words.className = "words";
+  words.setAttribute("role", "status");
   value.append(input, words);
   // What was asked for last stands for the board's value until the board has answered: what is typed meanwhile is not lost.
   const known = () => input.dataset.asked ?? input.dataset.value;
   input.oninput = () => input.classList.toggle("changed", input.value.trim() !== known());
   const set = () => {
     const wanted = input.value.trim();
-    if (wanted === known()) return; // Enter commits twice, as a key and as a change
+    if (wanted === known()) { // Enter commits twice, as a key and as a change
+      if (input.dataset.asked === undefined && input.hasAttribute("aria-invalid")) {
+        words.textContent = ""; // what was refused is gone
+        input.removeAttribute("aria-invalid");
+      }
+      return;
+    }
     input.dataset.asked = wanted;
-    ask({ do: "set", name: one.name, value: wanted })
+    wish({ do: "set", name: one.name, value: wanted })
       .then((said) => {
         words.textContent = said;
+        input.removeAttribute("aria-invalid");
         if (input.value.trim() === wanted) input.classList.remove("changed");
       })
-      .catch((error) => { words.textContent = error.message; })
+      .catch((error) => {
+        words.textContent = error.message;
+        input.setAttribute("aria-invalid", "true");
+      })
       .finally(() => {
         if (input.dataset.asked === wanted) delete input.dataset.asked;
       });
@@ -312,14 +374,42 @@ const MAKE = {
 const drawing = () => drawn.map((one) => (one ? "1" : "0")).join("");
 
 function stop() {
-  wish({ do: "stop" }).then(() => tell("STOP: all springs off. Clear faults to go on.")).catch((error) => tell(error.message, true));
+  wish({ do: "stop" }).catch((error) => tell(error.message, true)); // what was done, the server says
+}
+
+// The list of patterns outlives a reload of the page; what is played is the board's, and all pages show it.
+function kept() {
+  try {
+    const list = JSON.parse(localStorage.getItem("patterns") ?? "[]");
+    return Array.isArray(list) ? list.filter((one) => /^[01]{1,64}$/.test(one)) : [];
+  } catch { return []; }
+}
+
+function showPlay(play) {
+  const now = JSON.stringify(play ?? null);
+  if (now === played) return;
+  const before = JSON.parse(played);
+  played = now;
+  if (play && String(play.patterns) !== String(before?.patterns)) {
+    list = [...play.patterns];
+    $("seconds").value = play.seconds;
+  }
+  $("end-play").hidden = !play;
+  showList();
 }
 
 function showList() {
+  try { localStorage.setItem("patterns", JSON.stringify(list)); } catch { /* a page without storage forgets */ }
+  const play = JSON.parse(played);
   $("list").replaceChildren(...list.map((one, at) => {
     const item = document.createElement("li"), remove = document.createElement("button");
     item.textContent = one;
+    if (play && play.at === at && String(play.patterns) === String(list)) {
+      item.className = "now";
+      item.setAttribute("aria-current", "true");
+    }
     remove.textContent = "remove";
+    remove.setAttribute("aria-label", `remove pattern ${at + 1}`);
     remove.onclick = () => { list.splice(at, 1); showList(); };
     item.append(remove);
     return item;
@@ -338,6 +428,8 @@ for (const one of document.querySelectorAll("[data-make]")) one.onclick = () => 
 $("apply").onclick = () => quietly({ do: "pattern", springs: drawing() });
 $("add").onclick = () => { list.push(drawing()); showList(); };
 $("play").onclick = () => quietly({ do: "play", patterns: list, seconds: Number($("seconds").value) });
+$("end-play").onclick = () => quietly({ do: "end_play" });
+$("cold").onclick = () => quietly({ do: "cold" });
 $("level").oninput = () => { $("level-shown").textContent = `${$("level").value} %`; };
 $("policy").onchange = () => quietly({ do: "policy", policy: $("policy").value });
 $("fan").onchange = () => quietly({ do: "fan", percent: Number($("fan").value) });
@@ -374,5 +466,6 @@ function plots() {
   if (!document.hidden) { plot(0); plot(1); }
   setTimeout(plots, Math.max(500, 4 * (performance.now() - begun)));
 }
+showList();
 plots();
 connect();

@@ -1,0 +1,151 @@
+"""Arguments: every number of every command has a range, and nothing that was measured is written over."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import click
+import ninespring as ns
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from ninespring import ranges
+from ninespring.cli import cli
+from ninespring.console import Real, Whole
+from ninespring.logs import kind_of, write_atomically
+from ninespring.models import Array, Model, model_text
+from ninespring.recording import LogFile
+
+NUMBERS = [
+    (name, one)
+    for name, command in cli.commands.items()
+    for one in command.params
+    if isinstance(one, click.Option) and isinstance(one.type, click.types.IntParamType | click.types.FloatParamType)
+]
+
+
+def ended(*words: object) -> tuple[int, str]:
+    """Return exit code and message as the terminal shows them."""
+    done = CliRunner().invoke(cli, [str(one) for one in words], standalone_mode=False)
+    if isinstance(done.exception, click.UsageError):
+        return 2, done.exception.format_message()
+    if isinstance(done.exception, ns.InputError):
+        return 2, str(done.exception)
+    if done.exception and not isinstance(done.exception, SystemExit):
+        raise done.exception
+    return done.exit_code, done.output
+
+
+def test_every_number_of_every_command_is_refused_beyond_its_range() -> None:
+    assert len(NUMBERS) >= 15
+    for name, option in NUMBERS:
+        assert isinstance(option.type, Real | Whole), f"{name} {option.opts[0]}: give it a range"
+        low, high = option.type.min, option.type.max
+        for value in ("nan", "inf", "-inf", "-1", "1e308", "x", ""):
+            if value == "-1" and low <= -1:
+                continue
+            code, said = ended(name, option.opts[0], value)
+            assert code == 2 and option.opts[0] in said and "\n" not in said, (name, option.opts, value, said)
+        assert np.isfinite([low, high]).all()
+
+
+@pytest.mark.parametrize(
+    "words",
+    [["plan", "--hottest", "nan"], ["record", "--duration", "nan"], ["dashboard", "--speed", "nan"]],
+)
+def test_nan_ends_with_exit_code_2_and_one_line(words: list[str]) -> None:
+    done = subprocess.run([sys.executable, "-m", "ninespring", *words], capture_output=True, text=True, check=False)
+    assert done.returncode == 2 and done.stderr.count("\n") == 1 and words[1] in done.stderr and not done.stdout
+
+
+@pytest.mark.parametrize("bad", [float("nan"), float("inf"), -1.0, 1e308, "900", None, True])
+def test_a_function_refuses_what_its_option_refuses(bad: object) -> None:
+    with pytest.raises(ns.InputError, match="duration_s = "):
+        ranges.PLAN_S.check("duration_s", bad)
+
+
+@pytest.fixture
+def derived(make_log, tmp_path: Path) -> dict[str, list[str]]:
+    """Return, per command that derives a file, its words without the output."""
+    log, model = make_log("run.csv", seconds=60), tmp_path / "m.toml"
+    made = Model(Array())
+    made.parameters, made.stderr = {"loss_w_per_k": 0.0058}, {"loss_w_per_k": 1e-4}
+    model.write_text(model_text(made))
+    given = ["--model", str(model)]
+    return {
+        "p.csv": ["predict", str(log), *given],
+        "steps.txt": ["plan", "--duration", "300"],
+        "run.ini": ["scenario", *given],
+        "p.png": ["plot", str(log)],
+        "p.gif": ["plot", str(log)],
+    }
+
+
+def test_what_is_derived_replaces_its_like_and_nothing_else(derived, tmp_path: Path) -> None:
+    kinds = []
+    for name, words in derived.items():
+        output = tmp_path / name
+        for _ in range(2):
+            assert ended(*words, "-o", output)[0] == 0
+        kinds.append(kind_of(output.read_bytes()))
+    assert kinds == ["what predict wrote", "a plan", "a scenario", "a picture of a log", "a picture of a log"]
+    before = (tmp_path / "steps.txt").read_bytes()
+    code, said = ended(*derived["run.ini"], "-o", tmp_path / "steps.txt")
+    assert code == 2 and "is a plan, and a scenario would take its place" in said
+    assert (tmp_path / "steps.txt").read_bytes() == before
+    assert not [one for one in tmp_path.iterdir() if one.name.startswith(".")]
+
+
+def test_a_log_or_somebodys_own_file_is_never_replaced(derived, tmp_path: Path) -> None:
+    for name, words in derived.items():
+        for content in ("time_s,i1_a,t1_c\n0,1,20\n", "my notes\n", '{"a": 1}', "[array]\nrows = 3\n"):
+            target = tmp_path / f"own{Path(name).suffix}"
+            target.write_text(content)
+            code, said = ended(*words, "-o", target)
+            assert code == 2 and said.startswith(f"{target}: is there already") and target.read_text() == content
+
+
+def test_diagnose_refuses_a_folder_whose_files_are_not_its_own_before_it_works(make_log, tmp_path: Path) -> None:
+    folder = tmp_path / "out"
+    folder.mkdir()
+    (folder / "model.toml").write_text("[array]\nrows = 3\ncols = 3\n")
+    code, said = ended("diagnose", make_log(seconds=60), "-o", folder)
+    assert code == 2 and "model.toml: is there already" in said
+    assert [one.name for one in folder.iterdir()] == ["model.toml"]
+
+
+def test_a_recording_and_an_import_keep_the_log_that_is_there(tmp_path: Path) -> None:
+    table, output = tmp_path / "table.txt", tmp_path / "run1.csv"
+    rows = np.column_stack([np.arange(60.0), *(np.full(60, v) for v in (50.0, 0.0, 21.0, 21.0))])
+    head = "Time (sec),Heater 1,Heater 2,Temperature 1,Temperature 2"
+    np.savetxt(table, rows, delimiter=",", header=head, comments="")
+    words = ["import", table, "--map", "tclab", "-o", output]
+    assert ended(*words)[0] == 0
+    before = output.read_bytes()
+    for again in (words, ["record", "--port", "/dev/null", "-o", output]):
+        code, said = ended(*again)
+        assert code == 2 and "never written over" in said and "--force" in said
+    with pytest.raises(ns.InputError, match="never written over"):
+        LogFile(output)
+    assert output.read_bytes() == before and ended(*words, "--force")[0] == 0
+
+
+@pytest.mark.parametrize(("force", "kept"), [(False, "first\n"), (True, "second\n")])
+def test_a_log_that_came_while_another_grew_is_kept_too(tmp_path: Path, force: bool, kept: str) -> None:
+    log = LogFile(tmp_path / "run.csv", force)
+    log.write_row("second")
+    (tmp_path / "run.csv").write_text("first\n")
+    log.close()
+    assert (tmp_path / "run.csv").read_text() == kept and log.path.read_text() == "second\n"
+
+
+def test_a_full_disk_names_the_file_and_leaves_what_was_there(small_disk: Path) -> None:
+    path = small_disk / "model.toml"
+    path.write_text('schema = "ninespring.model/1"\n')
+    with pytest.raises(ns.WorkError, match=f"{path}: cannot be written: No space left"):
+        write_atomically({path: 'schema = "ninespring.model/1"\n' + "#" * 100_000})
+    assert path.read_text() == 'schema = "ninespring.model/1"\n' and [one.name for one in small_disk.iterdir()] == [
+        "model.toml"
+    ]
