@@ -455,8 +455,9 @@ def cutoff_table() -> Table:
         stop = 25 * TICK_S
         points.append(f"{stop + 1e-5:.5f} {last}")
         time, held = hold_v("PWL(" + " ".join(points) + ")", stop + 0.4)
-        after = time > stop
-        off = time[after][np.argmax(held[after] < GATE_OFF_V)] - stop
+        begin = stop - TICK_S + PULSE_S if last == "0" else stop  # the end of the last pulse; the pin's last rise
+        after = time > begin + PULSE_S
+        off = time[after][np.argmax(held[after] < GATE_OFF_V)] - begin
         rows.append(
             [what, "", f"{held[-1]:.2f}", f"gate below {GATE_OFF_V} V after {off:.3f} s, relay open 10 ms later"]
         )
