@@ -13,7 +13,7 @@ controller_sensor_status_t ina219_read_again(uint8_t address, uint16_t *value)
     uint8_t bytes[2] = {0, 0};
     const controller_sensor_status_t status =
         two_wire_transfer(address, TWO_WIRE_READ, bytes, sizeof bytes);
-    *value = (uint16_t)((uint16_t)(bytes[0] << 8) | bytes[1]);
+    *value = (uint16_t)((uint16_t)((uint16_t)bytes[0] << 8) | bytes[1]);
     return status;
 }
 

@@ -103,7 +103,8 @@ static int8_t digit_value(uint8_t byte)
 
 static uint16_t word_at(const hil_frame_decoder_t *decoder, uint8_t index)
 {
-    return (uint16_t)((uint16_t)(decoder->payload[index] << 8) | decoder->payload[index + 1u]);
+    return (uint16_t)((uint16_t)((uint16_t)decoder->payload[index] << 8) |
+                      decoder->payload[index + 1u]);
 }
 
 /* Springs in the payload; 0 where its length fits no whole number of springs from 1 to 9. */

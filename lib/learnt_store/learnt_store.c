@@ -29,9 +29,9 @@ static bool unpack(const record_store_t *record, uint8_t spring, spring_learnt_t
 static bool fits_model(const learnt_store_t *store, const controller_t *controller)
 {
     const record_store_t *const record = &store->record;
-    return learnt_store_keeps(store) &&
-           (uint16_t)(record_store_read(record, 0) | record_store_read(record, 1) << 8u) ==
-               controller_model_mark(controller);
+    return learnt_store_keeps(store) && (uint16_t)(record_store_read(record, 0) |
+                                                   (uint16_t)record_store_read(record, 1) << 8u) ==
+                                            controller_model_mark(controller);
 }
 
 /* A spring goes on learning while others are written: its numbers are taken all at once. */
