@@ -31,13 +31,19 @@ belief_bounds_t belief_distance_bounds_k(const controller_t *c, int spring)
     return bounds(controller_distance_bounds_k(c, (uint8_t)spring));
 }
 
+/* For a fault of another spring, which stands in the status line, all are off. */
+static bool stands_still(const controller_t *controller)
+{
+    return controller_is_locked(controller) || controller_supply_is_off(controller);
+}
+
 bool belief_reported(const controller_t *controller, int spring)
 {
     /* 'current' only says that the spring heats as fast as it may, and 'blind' says how the spring
      * is known, not that it is not where it was asked to be. */
     const unsigned silent = DRIVE_POLICY_LIMIT_CURRENT | DRIVE_POLICY_LIMIT_BLIND;
     return controller_fault(controller, (uint8_t)spring) != SAFETY_FAULT_NONE ||
-           controller_board_fault(controller) != SAFETY_FAULT_NONE ||
+           controller_board_fault(controller) != SAFETY_FAULT_NONE || stands_still(controller) ||
            (controller_limits(controller, (uint8_t)spring) & ~silent) != 0;
 }
 
@@ -47,7 +53,9 @@ unsigned belief_said(const controller_t *controller, int spring)
     const unsigned known =
         DRIVE_POLICY_LIMIT_CURRENT | DRIVE_POLICY_LIMIT_BLIND | DRIVE_POLICY_LIMIT_AWAY;
     const unsigned others = limits & ~known;
-    return (belief_fault(controller, spring) != SAFETY_FAULT_NONE ? BELIEF_SAID_FAULT : 0u) |
+    return (belief_fault(controller, spring) != SAFETY_FAULT_NONE || stands_still(controller)
+                ? BELIEF_SAID_FAULT
+                : 0u) |
            ((limits & DRIVE_POLICY_LIMIT_AWAY) != 0 ? BELIEF_SAID_AWAY : 0u) |
            (others != 0 ? BELIEF_SAID_LIMIT : 0u) |
            ((limits & DRIVE_POLICY_LIMIT_BLIND) != 0 ? BELIEF_SAID_BLIND : 0u);
