@@ -20,6 +20,7 @@
 #define SURE_SDS          5.0f
 #define SUSPECTED         0.6f /* of what is sure: 3 of 5 */
 #define OTHER_WAY         3.0f /* times as much: an intermediate phase, where drifts go either way */
+#define STEP_OF_RISE      0.3f /* of it goes where the losses grow by 43 %: a draught, a door */
 #define CONFIRM_TURNS     2
 #define LASTING_TURNS     60    /* 15 s of suspicion are as sure */
 #define LARGE_LOSS        0.04f /* no hold drifts so far: the transformation may have moved */
@@ -263,11 +264,12 @@ static float as_lost(const spring_belief_t *b, const thermal_model_t *model, uin
     if (less > 0.0f) {
         return less;
     }
-    /* the other way is an intermediate phase, which comes where it may be cold enough; else it is
-     * the last of the austenite that comes */
+    /* the other way is an intermediate phase, which comes where it may be cold enough, also after
+     * a step of the surroundings that nothing has told; else the last of the austenite comes */
     const float above_k = spring_now_c(model, k) - start_c(model, k);
     const float most_k2 = SPRING_ESTIMATOR_BOUND_SDS * SPRING_ESTIMATOR_BOUND_SDS * distance_k2;
-    return above_k < 0.0f || above_k * above_k < most_k2 ? -less * (1.0f / OTHER_WAY) : 0.0f;
+    const float step_k = STEP_OF_RISE * (spring_now_c(model, k) - spring_ambient_c(model));
+    return above_k < step_k || above_k * above_k < most_k2 ? -less * (1.0f / OTHER_WAY) : 0.0f;
 }
 
 /* For certain above martensite start, where nothing is lost. */
