@@ -42,6 +42,19 @@ def test_the_site_builds_without_a_warning(tmp_path: Path) -> None:
     assert not re.findall(r'<(?:script|link)[^>]+(?:src|href)="https?://(?!127)[^"]+\.(?:js|css)', index)
 
 
+def test_each_test_that_the_page_of_failures_names_is_run() -> None:
+    named = 0
+    for line in (ROOT / "docs" / "safety.md").read_text().splitlines():
+        cell = line.rsplit("|", 2)[-2] if line.startswith("| ") else ""
+        words = re.findall(r"`(\w+)`", cell)
+        programs = [word for word in words if (ROOT / "test" / word).is_dir()]
+        text = "".join(path.read_text() for program in programs for path in (ROOT / "test" / program).glob("*.c*"))
+        for word in words:
+            assert word in programs or f"RUN_TEST({word});" in text, f"docs/safety.md: {line}"
+        named += bool(words)
+    assert named > 30
+
+
 def test_the_results_first_page_has_a_figure_for_each_of_its_lines() -> None:
     sys.path.insert(0, str(ROOT / "bench"))
     import results
