@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import os
 import random
@@ -13,13 +14,15 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator
+from concurrent.futures import Future
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
 from fake_board import FakeBoard, row
 from ninespring.belief import Belief, beliefs
-from ninespring.dashboard import words
+from ninespring.dashboard import server, source, words
 from ninespring.logs import read_log, read_table
 from playwright.sync_api import Browser, Page, expect, sync_playwright
 from websockets.exceptions import ConnectionClosed, InvalidStatus
@@ -384,6 +387,22 @@ def answer_to(socket: ClientConnection, wish: dict[str, object], within_s: float
     while (got := json.loads(socket.recv(until - time.monotonic()))).get("id") != wish["id"]:
         pass
     return got
+
+
+def test_a_wish_that_fails_as_nobody_thought_of_is_answered() -> None:
+    class Broken(source.Source):
+        takes = frozenset({"level"})
+
+        def do(self, wish: dict[str, Any]) -> Future[str]:
+            raise KeyError("springs")
+
+    async def wish() -> list[dict[str, Any]]:
+        answers: asyncio.Queue[dict[str, Any]] = asyncio.Queue(9)
+        text = '{"do": "level", "spring": 1, "level": 50, "id": 7}'
+        await server._answer(Broken(), text, server._Rate(), answers)
+        return [answers.get_nowait() for _ in range(answers.qsize())]
+
+    assert asyncio.run(wish()) == [{"kind": "refused", "id": 7, "why": "a defect of the tool: KeyError: 'springs'"}]
 
 
 def test_foreign_pages_are_refused_and_malformed_messages_change_nothing(tmp_path: Path) -> None:
