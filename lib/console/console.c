@@ -82,6 +82,12 @@ static console_error_t parse_number(console_t *console, const char *text, const 
     return result == TEXT_NOT_A_NUMBER ? CONSOLE_ERROR_BAD_ARGUMENT : CONSOLE_ERROR_OUT_OF_RANGE;
 }
 
+static bool parse_on_off(const char *text, bool *on)
+{
+    *on = flash_equal(text, FLASH_TEXT("on"));
+    return *on || flash_equal(text, FLASH_TEXT("off"));
+}
+
 /* "all" or a spring's number; first..last count from 0. */
 static console_error_t parse_springs(console_t *console, const char *text, uint8_t *first,
                                      uint8_t *last)
@@ -269,8 +275,8 @@ static bool any_spring_on(const console_t *console)
 
 static console_error_t word_supply(console_t *console, const arguments_t *arguments)
 {
-    const bool on = flash_equal(arguments->argument[0], FLASH_TEXT("on"));
-    if (!on && !flash_equal(arguments->argument[0], FLASH_TEXT("off"))) {
+    bool on;
+    if (!parse_on_off(arguments->argument[0], &on)) {
         return CONSOLE_ERROR_BAD_ARGUMENT;
     }
     if (!controller_supply_is_fitted(console->controller)) {
@@ -330,8 +336,8 @@ static console_error_t word_learnt(console_t *console, const arguments_t *argume
 
 static console_error_t word_echo(console_t *console, const arguments_t *arguments)
 {
-    const bool on = flash_equal(arguments->argument[0], FLASH_TEXT("on"));
-    if (!on && !flash_equal(arguments->argument[0], FLASH_TEXT("off"))) {
+    bool on;
+    if (!parse_on_off(arguments->argument[0], &on)) {
         return CONSOLE_ERROR_BAD_ARGUMENT;
     }
     console->echo = on;
