@@ -39,17 +39,14 @@ static bool stands_still(const controller_t *controller)
 
 bool belief_reported(const controller_t *controller, int spring)
 {
-    /* 'current' only says that the spring heats as fast as it may, and 'blind' says how the spring
-     * is known, not that it is not where it was asked to be. */
-    const unsigned silent = DRIVE_POLICY_LIMIT_CURRENT | DRIVE_POLICY_LIMIT_BLIND;
-    return controller_fault(controller, (uint8_t)spring) != SAFETY_FAULT_NONE ||
-           controller_board_fault(controller) != SAFETY_FAULT_NONE || stands_still(controller) ||
-           (controller_limits(controller, (uint8_t)spring) & ~silent) != 0;
+    /* 'blind' says how the spring is known, not that it is not where it was asked to be. */
+    return (belief_said(controller, spring) & ~BELIEF_SAID_BLIND) != 0u;
 }
 
 unsigned belief_said(const controller_t *controller, int spring)
 {
     const unsigned limits = controller_limits(controller, (uint8_t)spring);
+    /* 'current' only says that the spring heats as fast as it may */
     const unsigned known =
         DRIVE_POLICY_LIMIT_CURRENT | DRIVE_POLICY_LIMIT_BLIND | DRIVE_POLICY_LIMIT_AWAY;
     const unsigned others = limits & ~known;
