@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
-#include <fstream>
 #include <limits>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -14,6 +13,7 @@
 
 #include "parallel.hpp"
 #include "swarm_bench.hpp"
+#include "written.hpp"
 
 extern "C" {
 #include "campaign.h"
@@ -236,16 +236,6 @@ std::string markdown(const std::vector<named_t> &rows)
         page += "\n";
     }
     return page;
-}
-
-void write(const std::string &path, const std::string &content)
-{
-    if (path.empty())
-        return;
-    std::ofstream file(path);
-    file << content << std::flush;
-    if (!file)
-        throw std::runtime_error(path + ": cannot be written");
 }
 
 std::vector<int> chosen(const options_t &options)

@@ -1,6 +1,7 @@
 #include "swarm_bench.hpp"
 
 #include "parallel.hpp"
+#include "written.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -485,16 +486,6 @@ json_t kept(const options_t &options, const std::vector<run_t> &runs)
         list.push_back(one);
     }
     return file;
-}
-
-void write(const std::string &path, const std::string &content)
-{
-    if (path.empty())
-        return;
-    std::ofstream file(path);
-    file << content << std::flush;
-    if (!file)
-        throw std::runtime_error(path + ": cannot be written");
 }
 
 json_t read(const std::string &path)
