@@ -359,6 +359,21 @@ static float worst_neighbour(const drive_policy_t *policy, uint8_t k)
     return worst;
 }
 
+/* By how much the other driven springs were found colder lately, on average: the surroundings', and
+ * no contact's. */
+static float common_k(const drive_policy_t *policy, uint8_t k)
+{
+    float sum_k = 0.0f;
+    uint8_t others = 0;
+    for (uint8_t i = 0; i < policy->springs; i++) {
+        if (i != k && policy->spring[i].stage != DRIVE_POLICY_STAGE_OFF) {
+            sum_k += policy->estimator.spring[i].disturbance_k;
+            others++;
+        }
+    }
+    return others != 0 ? sum_k / (float)others : 0.0f;
+}
+
 static void derate(drive_policy_t *policy, const thermal_model_t *model, uint8_t k, bool driven)
 {
     drive_policy_spring_t *s = &policy->spring[k];
@@ -366,7 +381,7 @@ static void derate(drive_policy_t *policy, const thermal_model_t *model, uint8_t
     const float limit_c = 0.01f * (float)p->temperature_limit_cc;
     const float band_k = kelvin(p->temperature_band_cc);
     /* a touch of 8 K and a search are such doubts: half of the band is left to them */
-    const float doubt_k = policy->estimator.spring[k].gone_k - 0.5f * band_k;
+    const float doubt_k = policy->estimator.spring[k].gone_k - 0.5f * band_k - common_k(policy, k);
     const float c = now_c(model, k);
     float share = derating_share(doubt_k > 0.0f ? c + doubt_k : c, limit_c, band_k);
     s->derating = share < 1.0f ? DRIVE_POLICY_LIMIT_TEMPERATURE : DRIVE_POLICY_LIMIT_NONE;

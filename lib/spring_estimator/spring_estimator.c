@@ -419,11 +419,26 @@ static bool surely_finished(const spring_belief_t *b, const thermal_model_t *mod
            spring_c(thermal_model_transformation(model, k).austenite_finish_c7);
 }
 
+/* Above austenite start it reads, in two turns, what it read when it had transformed last, or more:
+ * it has, and is as hot as it was then. */
+static bool reads_austenite(const spring_belief_t *b, const thermal_model_t *model, uint8_t k)
+{
+    const spring_learnt_t *l = &b->learnt;
+    const int16_t start_c7 = thermal_model_transformation(model, k).austenite_start_c7;
+    if (!spring_estimator_sees(b) || l->austenite_ohm == 0.0f || b->unsteady != 0 ||
+        b->current_a < STRONG_A || b->ohm_before[1] == 0.0f ||
+        thermal_model_temperature_c7(model, k) < start_c7) {
+        return false;
+    }
+    const float more_ohm = 0.5f * (b->ohm_before[0] + b->ohm_before[1]) - l->austenite_ohm;
+    return l->change < 0.0f ? more_ohm < 0.0f : more_ohm > 0.0f;
+}
+
 bool spring_estimator_has_transformed(const spring_estimator_t *e, const thermal_model_t *model,
                                       uint8_t k)
 {
     const spring_belief_t *b = &e->spring[k];
-    if (b->possible == SPRING_PHASE_AUSTENITE) {
+    if (b->possible == SPRING_PHASE_AUSTENITE || reads_austenite(b, model, k)) {
         return true;
     }
     if (b->steep && b->reads) {
@@ -460,9 +475,6 @@ void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, 
     const bool certain = lacks && ((b->heating && spring_heated_enough(e, b, model, k)) ||
                                    surely_finished(b, model, k, SPRING_ESTIMATOR_BOUND_SDS, true));
     const bool wrong = certain || (lacks && b->doubted);
-    if (wrong && !b->onset) { /* so it was when it seemed to lose phase */
-        spring_take_back(e, b, model, k);
-    }
     b->blind = b->blind || wrong;
     b->doubted = lacks && !b->blind;
     if (full && !lacks && b->heating && b->onset && spring_estimator_sees(b) &&

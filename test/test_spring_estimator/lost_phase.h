@@ -14,7 +14,8 @@ void jump_on_the_way_to_a_hold_is_a_jump(void);
 void load_that_comes_within_a_second_is_no_contact(void);
 void what_a_loose_contact_seemed_to_lose_is_taken_back(void);
 void doubt_grows_with_a_heating_after_a_jump(void);
-void loss_that_does_not_come_back_was_none(void);
+void loss_that_does_not_come_back_stays_in_doubt(void);
+void heating_ends_where_it_reads_what_it_did_when_it_had_transformed(void);
 void loss_that_is_still_missing_at_rest_is_taken_back(void);
 void loss_that_is_back_at_rest_is_not_taken_back(void);
 void loss_that_a_limit_left_is_not_taken_back(void);
@@ -24,7 +25,7 @@ void heating_for_a_loss_that_was_none_ends(void);
 void noise_slower_than_a_turn_is_no_loss(void);
 void noise_of_an_average_is_known_after_a_minute_of_rest(void);
 void noise_that_was_learnt_is_no_loss_of_the_next_start(void);
-void loss_that_was_a_sensor_is_taken_back_when_said(void);
+void loss_that_was_a_sensor_is_said_and_stays_in_doubt(void);
 void restored_spring_is_not_overheated(void);
 
 #endif

@@ -759,7 +759,8 @@ int main(void)
     RUN_TEST(load_that_comes_within_a_second_is_no_contact);
     RUN_TEST(what_a_loose_contact_seemed_to_lose_is_taken_back);
     RUN_TEST(doubt_grows_with_a_heating_after_a_jump);
-    RUN_TEST(loss_that_does_not_come_back_was_none);
+    RUN_TEST(loss_that_does_not_come_back_stays_in_doubt);
+    RUN_TEST(heating_ends_where_it_reads_what_it_did_when_it_had_transformed);
     RUN_TEST(loss_that_is_still_missing_at_rest_is_taken_back);
     RUN_TEST(loss_that_is_back_at_rest_is_not_taken_back);
     RUN_TEST(loss_that_a_limit_left_is_not_taken_back);
@@ -769,7 +770,7 @@ int main(void)
     RUN_TEST(noise_slower_than_a_turn_is_no_loss);
     RUN_TEST(noise_of_an_average_is_known_after_a_minute_of_rest);
     RUN_TEST(noise_that_was_learnt_is_no_loss_of_the_next_start);
-    RUN_TEST(loss_that_was_a_sensor_is_taken_back_when_said);
+    RUN_TEST(loss_that_was_a_sensor_is_said_and_stays_in_doubt);
     RUN_TEST(restored_spring_is_not_overheated);
     RUN_TEST(slope_that_no_metal_has_is_not_learnt);
     RUN_TEST(heating_that_a_limit_ends_is_doubted);

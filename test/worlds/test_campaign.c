@@ -489,6 +489,24 @@ static void an_intermediate_phase_that_a_draught_brings_is_heated_away(void)
     }
 }
 
+/* A draught, a colder room, losses that fall late in a hold: what a reheat did not bring back at
+ * once stayed lost for the rest of the run, and a spring that was hotter than believed was heated
+ * to 123 degC. Runs of the swarm, as drawn. */
+static void surroundings_that_change_lose_no_spring_and_overheat_none(void)
+{
+    static const int indices[] = {378, 470, 542, 633, 552, 725, 713};
+    static swarm_case_t drawn;
+    static run_result_t result;
+    for (size_t r = 0; r < sizeof indices / sizeof indices[0]; r++) {
+        swarm_draw(15, indices[r], SWARM_TEST_S, &drawn);
+        TEST_ASSERT_TRUE(run_case(&drawn.run, &result, NULL));
+        for (int k = 0; k < WORLD_SPRINGS_MAX; k++) {
+            TEST_ASSERT_TRUE_MESSAGE(isnan(result.losses.spring[k].lost_at_s), drawn.says);
+            TEST_ASSERT_TRUE_MESSAGE(result.score.spring[k].hottest_c < 120.0, drawn.says);
+        }
+    }
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -513,6 +531,7 @@ int main(void)
     RUN_TEST(every_disturbance_is_drawn_as_often_as_is_said);
     RUN_TEST(a_draught_changes_the_whole_loss_by_what_is_said);
     RUN_TEST(an_intermediate_phase_that_a_draught_brings_is_heated_away);
+    RUN_TEST(surroundings_that_change_lose_no_spring_and_overheat_none);
     RUN_TEST(a_controller_that_never_heats_again_is_seen_and_a_run_is_the_same_twice);
     return UNITY_END();
 }
