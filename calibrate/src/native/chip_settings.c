@@ -19,7 +19,8 @@ bool chip_settings(settings_t *settings, int rows, int columns, const char *line
                    size_t size)
 {
     settings_default(settings);
-    if (rows * columns > CONTROLLER_MAX_SPRINGS) {
+    if (rows < 1 || columns < 1 || rows > CONTROLLER_MAX_SPRINGS ||
+        columns > CONTROLLER_MAX_SPRINGS / rows) {
         (void)snprintf(message, size, "%d x %d springs: a board has %d", rows, columns,
                        CONTROLLER_MAX_SPRINGS);
         return false;
@@ -35,6 +36,12 @@ bool chip_settings(settings_t *settings, int rows, int columns, const char *line
             return false;
         }
         at += length + (at[length] == '\n' ? 1u : 0u);
+    }
+    const thermal_model_parameters_t *model = &settings->controller.model;
+    if (model->rows != rows || model->columns != columns) {
+        (void)snprintf(message, size, "$rows=%d $columns=%d: the array is %d x %d", model->rows,
+                       model->columns, rows, columns);
+        return false;
     }
     return true;
 }

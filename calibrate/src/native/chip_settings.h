@@ -10,8 +10,8 @@
 #include "settings.h"
 
 /* Defaults for an array of rows x columns, then each line; comments (#) and empty lines mean
- * nothing. Fails if and only if a line is refused, message (size > 0) gets that line, or a board
- * has not so many springs. */
+ * nothing. Fails if and only if a line is refused, message (size > 0) gets that line, the lines are
+ * of an array of another size, or a board has not so many springs. */
 bool chip_settings(settings_t *settings, int rows, int columns, const char *lines, char *message,
                    size_t size);
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from importlib import resources
 
 import numpy as np
+import numpy.typing as npt
 
 from .errors import WorkError
 
@@ -167,6 +168,35 @@ def _pointer(array: np.ndarray | None) -> object:
     return None if array is None else array.ctypes.data_as(_double_p)
 
 
+def _shaped(name: str, given: npt.ArrayLike, shape: tuple[int, ...]) -> np.ndarray:
+    """Return an argument as the C code reads it: doubles in a row, exactly so many."""
+    out = np.asarray(given, dtype=float)
+    if out.shape != shape:
+        raise ValueError(f"{name} has shape {out.shape}, wanted {shape}")
+    return np.ascontiguousarray(out)
+
+
+def _log(
+    springs: int,
+    time_s: npt.ArrayLike,
+    drive: npt.ArrayLike,
+    fan: npt.ArrayLike | None,
+    ambient_c: npt.ArrayLike | None,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray | None, np.ndarray | None]:
+    """Return the columns of a log, each of as many rows as it has times; at least one."""
+    rows = max(1, np.size(time_s))
+    return (
+        _shaped("time_s", time_s, (rows,)),
+        _shaped("drive", drive, (rows, springs)),
+        None if fan is None else _shaped("fan", fan, (rows,)),
+        None if ambient_c is None else _shaped("ambient_c", ambient_c, (rows,)),
+    )
+
+
+def _switches(pattern: Sequence[bool], springs: int) -> ctypes.Array[ctypes.c_int]:
+    return (ctypes.c_int * springs)(*_shaped("pattern", pattern, (springs,)).astype(bool).tolist())
+
+
 class Plant:
     """One simulated array. Not for two threads at once; make a `copy` for each."""
 
@@ -276,6 +306,7 @@ class Plant:
 
     def start_from_measured(self, first_c: np.ndarray) -> None:
         """Put the springs where the sensors would show `first_c` (NaN: stays where it is)."""
+        first_c = _shaped("first_c", first_c, (self.springs,))
         seen = np.flatnonzero(np.isfinite(first_c))
         if not seen.size:
             return
@@ -294,14 +325,13 @@ class Plant:
         self, time_s: np.ndarray, power_w: np.ndarray, fan: np.ndarray, ambient_c: np.ndarray | None
     ) -> np.ndarray:
         """Run a whole log; return what a board would read of each spring as v / i, (rows, springs), ohm."""
-        arrays = [np.ascontiguousarray(one, dtype=float) for one in (time_s, power_w, fan)]
-        ambient = None if ambient_c is None else np.ascontiguousarray(ambient_c, dtype=float)
-        ohm, temperature = np.empty_like(arrays[1]), np.empty_like(arrays[1])
+        log = _log(self.springs, time_s, power_w, fan, ambient_c)
+        ohm, temperature = np.empty_like(log[1]), np.empty_like(log[1])
         call = self._lib.plant_readings
         call.restype = ctypes.c_int
         call.argtypes = (ctypes.c_void_p, ctypes.c_size_t, *(_double_p,) * 6)
-        pointers = [_pointer(one) for one in (*arrays, ambient, ohm, temperature)]
-        self._check(call(self._plant, len(arrays[0]), *pointers), "readings")
+        pointers = [_pointer(one) for one in (*log, ohm, temperature)]
+        self._check(call(self._plant, len(log[0]), *pointers), "readings")
         return ohm
 
     def trace(
@@ -313,6 +343,7 @@ class Plant:
         ambient_c: np.ndarray | None = None,
     ) -> np.ndarray:
         """Run a whole log row by row; return true temperatures (degC) and austenite, (rows, springs, 2)."""
+        time_s, drive, fan, ambient_c = _log(self.springs, time_s, drive, fan, ambient_c)
         rows, n = drive.shape
         out = np.empty((rows, n, 2))
         for row in range(rows):
@@ -339,13 +370,8 @@ class Plant:
         true_c: bool = False,
     ) -> np.ndarray:
         """Run a whole log; return what the sensors show (or the springs have), (rows, springs), degC."""
+        time_s, drive, fan, ambient_c = _log(self.springs, time_s, drive, fan, ambient_c)
         rows, n = drive.shape
-        if n != self.springs or len(time_s) != rows:
-            raise ValueError(f"drive is {drive.shape}, the plant has {self.springs} springs")
-        time_s = np.ascontiguousarray(time_s, dtype=float)
-        drive = np.ascontiguousarray(drive, dtype=float)
-        fan = None if fan is None else np.ascontiguousarray(fan, dtype=float)
-        ambient_c = None if ambient_c is None else np.ascontiguousarray(ambient_c, dtype=float)
         modes = (ctypes.c_int * n)(*([mode] * n))
         out = np.empty((rows, n))
         self._check(
@@ -394,12 +420,15 @@ def chip_export(plant: Plant, part: Part | None = None) -> tuple[str, str]:
 
     `part`: of a board that has only these springs.
     """
+    row, col, rows, cols = part or (0, 0, plant.layers * plant.rows, plant.cols)
+    if min(row, col, rows - 1, cols - 1) < 0 or row + rows > plant.layers * plant.rows or col + cols > plant.cols:
+        raise ValueError(f"part is {part}, the plant has {plant.layers * plant.rows} rows and {plant.cols} columns")
     text = ctypes.create_string_buffer(16384)
     left_out = _chip(
         "the model does not fit the chip:",
         "chip_export",
         ctypes.c_void_p(plant._plant),
-        *(part or (0, 0, plant.layers * plant.rows, plant.cols)),
+        *(row, col, rows, cols),
         text,
         ctypes.c_size_t(len(text)),
     )
@@ -421,8 +450,9 @@ def chip_simulate(
 
     `command_power_w`: (springs,), W at full command. Return its temperatures (degC) and austenite, (rows, springs).
     """
-    given = (time_s, drive, command_power_w, fan, ambient_c, first_c)
-    times, drive, *others = (np.ascontiguousarray(one, dtype=float) for one in given)
+    springs = shape[0] * shape[1]
+    times, drive, *along = _log(springs, time_s, drive, fan, ambient_c)
+    power, first = _shaped("command_power_w", command_power_w, (springs,)), _shaped("first_c", first_c, (springs,))
     temperature, austenite = np.empty_like(drive), np.empty_like(drive)
     _chip(
         "the chip refuses",
@@ -432,7 +462,7 @@ def chip_simulate(
         ctypes.c_size_t(len(times)),
         _pointer(times),
         mode,
-        *(_pointer(one) for one in (drive, *others, temperature, austenite)),
+        *(_pointer(one) for one in (drive, power, *along, first, temperature, austenite)),
     )
     return temperature, austenite
 
@@ -450,7 +480,7 @@ def chip_drive(
         "chip_drive",
         ctypes.c_void_p(plant._plant),
         lines.encode(),
-        (ctypes.c_int * plant.springs)(*map(int, pattern)),
+        _switches(pattern, plant.springs),
         ctypes.c_size_t(rows),
         ctypes.c_size_t(on_rows),
         _pointer(temperature),
@@ -475,8 +505,9 @@ def chip_run(
     Return true temperatures (degC) and austenite, (rows, springs), of each second heat (W) and current (A) of all, and
     how many springs a fault has switched off by the end.
     """
-    if len(lines) != len(boards_of(plant.rows, plant.cols, *board, plant.layers)):
-        raise ValueError("lines of every board")
+    boards = len(boards_of(plant.rows, plant.cols, *board, plant.layers))
+    if len(lines) != boards:
+        raise ValueError(f"lines of {len(lines)} boards, wanted {boards}")
     temperature, austenite = np.empty((rows, plant.springs)), np.empty((rows, plant.springs))
     power, current = np.empty(rows), np.empty(rows)
     faults = ctypes.c_int()
@@ -486,7 +517,7 @@ def chip_run(
         ctypes.c_void_p(plant._plant),
         *board,
         (ctypes.c_char_p * len(lines))(*(one.encode() for one in lines)),
-        (ctypes.c_int * plant.springs)(*map(int, pattern)),
+        _switches(pattern, plant.springs),
         ctypes.c_double(fan),
         ctypes.c_uint64(seed),
         ctypes.c_size_t(rows),
