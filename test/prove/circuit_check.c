@@ -1,0 +1,31 @@
+/* sources: lib/safety/circuit_check.c
+ * options: -eva-precision 2 */
+#include "circuit_check.h"
+
+#include "prove.h"
+
+static void any_settings(current_control_parameters_t *values)
+{
+#define CURRENT PROVE_ANY
+#include "parameters.def"
+}
+
+/* Frama-C knows its declaration only. */
+float fmaxf(float a, float b)
+{
+    return a > b ? a : b;
+}
+
+void main(void)
+{
+    circuit_check_t check = {0};
+    current_control_parameters_t settings;
+    any_settings(&settings);
+    while (any_bool()) {
+        for (uint8_t tick = 0; tick < CIRCUIT_CHECK_TICKS; tick++) {
+            circuit_check_take(&check, any_u16(), (uint16_t)any_between(0, 800), any_bool(),
+                               any_s16(), any_s16());
+        }
+        (void)circuit_check_judge(&check, &settings);
+    }
+}
