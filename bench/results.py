@@ -70,7 +70,7 @@ SECTIONS: tuple[Section, ...] = (
     Section(
         "swarm",
         "Worlds that nobody listed: everything drawn at once",
-        f"{HOST}/bench/worlds/bench_worlds --swarm 2000 --seed 2039",
+        f"{HOST}/bench/worlds/bench_worlds --swarm 2000 --seed 2040",
         markdown=True,
     ),
     Section("replay", "Measured logs through the on-chip model", f"{PYTHON} script/replay_fit.py"),
