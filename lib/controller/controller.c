@@ -179,7 +179,7 @@ bool controller_apply_settings(controller_t *controller, const controller_settin
         restore(&controller->model, &state, controller->springs);
         for (uint8_t k = 0; k < controller->springs; k++) {
             temperature_ceiling_keep_loss(
-                &controller->ceiling, k, held_uw[k],
+                &controller->ceiling, &controller->model, k, held_uw[k],
                 temperature_ceiling_hold_uw(&controller->ceiling, &controller->model, k));
         }
         (void)current_control_apply(&controller->current, &settings->current, NULL);

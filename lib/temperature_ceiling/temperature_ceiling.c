@@ -20,6 +20,11 @@ static float from_c7(int16_t c7)
     return (float)c7 * (1.0f / 128.0f);
 }
 
+static float clamp(float value, float low, float high)
+{
+    return value < low ? low : value > high ? high : value;
+}
+
 /* Q9.23, as the model keeps its own: the upper half is the temperature in Q9.7. */
 static int16_t c7_of(int32_t temperature_c23)
 {
@@ -31,7 +36,7 @@ void temperature_ceiling_begin(temperature_ceiling_t *ceiling, int16_t ambient_c
     for (uint8_t k = 0; k < THERMAL_MODEL_MAX_SPRINGS; k++) {
         ceiling->temperature_c23[k] = (int32_t)ambient_c7 * 65536;
         ceiling->austenite[k] = 0.0f;
-        ceiling->loss_share[k] = 1.0f;
+        ceiling->spared_w[k] = ceiling->spared_per_s[k] = 0.0f;
         ceiling->rest_turns[k] = TEMPERATURE_CEILING_NEVER;
     }
     ceiling->ambient_c7 = ambient_c7;
@@ -86,7 +91,7 @@ static void account(temperature_ceiling_t *ceiling, const thermal_model_t *model
         if (!warm) {
             ceiling->delivered = false;
             for (uint8_t j = 0; j < model->springs; j++) {
-                ceiling->loss_share[j] = 1.0f;
+                ceiling->spared_w[j] = 0.0f;
             }
         }
         if (!warm || ambient_c7 > ceiling->ambient_c7) {
@@ -111,23 +116,47 @@ int32_t temperature_ceiling_hold_uw(const temperature_ceiling_t *ceiling,
         (int16_t)(c7_of(ceiling->temperature_c23[k]) - (dropped_c7 > 0 ? dropped_c7 : 0)));
 }
 
-void temperature_ceiling_keep_loss(temperature_ceiling_t *ceiling, uint8_t k, int32_t before_uw,
-                                   int32_t now_uw)
+static float capacity_j_per_k(const thermal_model_t *model, uint8_t k)
 {
-    if (temperature_ceiling_is_warm(ceiling, k) && before_uw > 0 && now_uw > 0) {
-        const float share = ceiling->loss_share[k] * (float)before_uw / (float)now_uw;
-        ceiling->loss_share[k] = share < 1.0f ? share : 1.0f;
+    const thermal_model_parameters_t *p = &model->parameters;
+    return 1e-6f *
+           (float)((uint32_t)p->heat_capacity_scale_permille[k] * p->heat_capacity_mj_per_k);
+}
+
+static float latent_k(const thermal_model_t *model)
+{
+    return (float)model->latent_full_c8 * (1.0f / 256.0f);
+}
+
+void temperature_ceiling_keep_loss(temperature_ceiling_t *ceiling, const thermal_model_t *model,
+                                   uint8_t k, int32_t before_uw, int32_t now_uw)
+{
+    const float before_w = 1e-6f * (float)before_uw - ceiling->spared_w[k];
+    const float spared_w = 1e-6f * (float)now_uw - before_w;
+    ceiling->spared_w[k] = 0.0f;
+    if (temperature_ceiling_is_warm(ceiling, k) && before_w > 0.0f && spared_w > 0.0f) {
+        /* all that it holds, its latent heat, too, leaves as it did */
+        const float rise_k = temperature_ceiling_c(ceiling, k) - from_c7(ceiling->ambient_c7);
+        const float heat_j =
+            capacity_j_per_k(model, k) * (rise_k + latent_k(model) * ceiling->austenite[k]);
+        ceiling->spared_w[k] = spared_w;
+        ceiling->spared_per_s[k] = before_w / heat_j;
     }
+}
+
+/* What it gives off, W: of what was there before a change of the losses no more than then. */
+static float given_off_w(temperature_ceiling_t *ceiling, const thermal_model_t *model, uint8_t k)
+{
+    const float declared_w = 1e-6f * (float)temperature_ceiling_hold_uw(ceiling, model, k);
+    const float spared_w = ceiling->spared_w[k];
+    ceiling->spared_w[k] -=
+        spared_w * clamp(TEMPERATURE_CEILING_TURN_S * ceiling->spared_per_s[k], 0.0f, 1.0f);
+    return declared_w > 0.0f ? clamp(declared_w - spared_w, 0.0f, declared_w) : declared_w;
 }
 
 float temperature_ceiling_c(const temperature_ceiling_t *ceiling, uint8_t k)
 {
     return (float)ceiling->temperature_c23[k] * (1.0f / 8388608.0f);
-}
-
-static float clamp(float value, float low, float high)
-{
-    return value < low ? low : value > high ? high : value;
 }
 
 /* Along the line from none at low to all at high, with the heat that there is. */
@@ -142,34 +171,29 @@ static float phase_on(int16_t low_c7, int16_t high_c7, float heat_c, float laten
 }
 
 static void add_heat(temperature_ceiling_t *ceiling, const thermal_model_t *model, uint8_t k,
-                     float gain_k, float latent_k)
+                     float gain_k)
 {
+    const float whole_k = latent_k(model);
     const thermal_model_transformation_t t = thermal_model_transformation(model, k);
     const float before = ceiling->austenite[k];
-    const float heat_c = temperature_ceiling_c(ceiling, k) + gain_k + latent_k * before;
-    float after = phase_on(t.austenite_start_c7, t.austenite_finish_c7, heat_c, latent_k);
+    const float heat_c = temperature_ceiling_c(ceiling, k) + gain_k + whole_k * before;
+    float after = phase_on(t.austenite_start_c7, t.austenite_finish_c7, heat_c, whole_k);
     if (after <= before && before > 0.0f) {
         const float cooled =
-            phase_on(t.martensite_finish_c7, t.martensite_start_c7, heat_c, latent_k);
+            phase_on(t.martensite_finish_c7, t.martensite_start_c7, heat_c, whole_k);
         after = cooled < before ? cooled : before;
     }
     ceiling->austenite[k] = after;
     ceiling->temperature_c23[k] =
-        (int32_t)(clamp(heat_c - latent_k * after, LOWEST_C, HIGHEST_C) * 8388608.0f);
+        (int32_t)(clamp(heat_c - whole_k * after, LOWEST_C, HIGHEST_C) * 8388608.0f);
 }
 
 void temperature_ceiling_step(temperature_ceiling_t *ceiling, const thermal_model_t *model,
                               uint8_t k, float power_w)
 {
     const thermal_model_parameters_t *p = &model->parameters;
-    const uint32_t capacity_uj_per_k =
-        (uint32_t)p->heat_capacity_scale_permille[k] * p->heat_capacity_mj_per_k;
-    const float latent_k = (float)model->latent_full_c8 * (1.0f / 256.0f);
     account(ceiling, model, k, power_w);
-    float hold_uw = (float)temperature_ceiling_hold_uw(ceiling, model, k);
-    if (hold_uw > 0.0f) {
-        hold_uw *= ceiling->loss_share[k];
-    }
+    const float loss_w = given_off_w(ceiling, model, k);
     /* What the model's neighbours take beyond those of the ceiling, uW / 128: a spring's couplings
      * and the span of temperatures keep it within 32 bits. */
     int32_t colder = 0;
@@ -184,12 +208,12 @@ void temperature_ceiling_step(temperature_ceiling_t *ceiling, const thermal_mode
                                               (int32_t)thermal_model_temperature_c7(model, j));
         }
     }
-    const float into_w = power_w + 1e-6f * ((float)(colder / 128) - hold_uw);
+    const float into_w = power_w + 1e-6f * (float)(colder / 128) - loss_w;
     /* stable whatever the heat capacity: the flow's own change is taken at the end of the step */
-    const float gain_k =
-        into_w * (1e6f * TEMPERATURE_CEILING_TURN_S) /
-        ((float)capacity_uj_per_k + TEMPERATURE_CEILING_TURN_S * (float)stiffness_uw_per_k);
-    add_heat(ceiling, model, k, gain_k, latent_k);
+    const float gain_k = into_w * TEMPERATURE_CEILING_TURN_S /
+                         (capacity_j_per_k(model, k) +
+                          1e-6f * TEMPERATURE_CEILING_TURN_S * (float)stiffness_uw_per_k);
+    add_heat(ceiling, model, k, gain_k);
 }
 
 bool temperature_ceiling_trips(const temperature_ceiling_t *ceiling, uint8_t k, int16_t trip_cc)

@@ -25,7 +25,10 @@ typedef struct {
     float v_per_step;                                   /* of duty */
     float drop_v;                                       /* of the freewheeling diode */
     float w_per_v2; /* least power of a spring, by the voltage behind its switch */
-    float loss_share[THERMAL_MODEL_MAX_SPRINGS];    /* of the loss now declared, 0..1 */
+    /* what the heat that was there at a change of the losses gives off less than is declared now,
+     * and the share of it that is over in a second */
+    float spared_w[THERMAL_MODEL_MAX_SPRINGS];
+    float spared_per_s[THERMAL_MODEL_MAX_SPRINGS];
     uint16_t rest_turns[THERMAL_MODEL_MAX_SPRINGS]; /* since it was given power */
     int16_t ambient_c7; /* the highest that was told since the springs were cold */
     bool delivered;     /* power was given since then */
@@ -41,12 +44,12 @@ bool temperature_ceiling_is_warm(const temperature_ceiling_t *ceiling, uint8_t s
 uint16_t temperature_ceiling_rest_s(const temperature_ceiling_t *ceiling, uint8_t spring);
 
 /* Another model is declared: power, uW, that holds the spring where the ceiling is, of the model
- * before and now. Heat that was given goes no faster than it would have: the smaller loss counts
- * until the springs are cold. */
+ * before and now. Heat that was given before goes no faster than it would have gone; what is given
+ * from now on goes by what is declared now. */
 int32_t temperature_ceiling_hold_uw(const temperature_ceiling_t *ceiling,
                                     const thermal_model_t *model, uint8_t spring);
-void temperature_ceiling_keep_loss(temperature_ceiling_t *ceiling, uint8_t spring,
-                                   int32_t before_uw, int32_t now_uw);
+void temperature_ceiling_keep_loss(temperature_ceiling_t *ceiling, const thermal_model_t *model,
+                                   uint8_t spring, int32_t before_uw, int32_t now_uw);
 
 /* One spring's step of TEMPERATURE_CEILING_TURN_S with the mean power of that time: the model's
  * declared numbers, but of its state only air and plate, which nothing corrects. */

@@ -72,6 +72,74 @@ static void no_correction_of_the_model_lowers_it(void)
     }
 }
 
+/* Other losses are declared, by settings that arrive now. */
+static void declare_loss(float factor)
+{
+    int32_t held_uw[THERMAL_MODEL_MAX_SPRINGS];
+    thermal_model_state_t state;
+    for (uint8_t k = 0; k < model.springs; k++) {
+        held_uw[k] = temperature_ceiling_hold_uw(&ceiling, &model, k);
+    }
+    thermal_model_get_state(&model, &state);
+    parameters.loss_uw_per_k = (uint16_t)(factor * (float)parameters.loss_uw_per_k);
+    TEST_ASSERT_EQUAL(THERMAL_MODEL_OK, thermal_model_init(&model, &parameters, NULL));
+    TEST_ASSERT_TRUE(thermal_model_set_state(&model, &state));
+    for (uint8_t k = 0; k < model.springs; k++) {
+        temperature_ceiling_keep_loss(&ceiling, &model, k, held_uw[k],
+                                      temperature_ceiling_hold_uw(&ceiling, &model, k));
+    }
+}
+
+/* Beside a twin to which nothing was declared: what was there cools no faster than it does there,
+ * also where settings arrive twice. */
+static void heat_of_before_goes_no_faster_by_another_loss(void)
+{
+    for (int twice = 0; twice < 2; twice++) {
+        setUp();
+        run(0.6f, 600000u, 60.0f);
+        const temperature_ceiling_t then = ceiling;
+        float twin_c[40];
+        for (int n = 0; n < 40; n++) {
+            run(0.0f, 0, 6.0f);
+            twin_c[n] = temperature_ceiling_c(&ceiling, 4);
+        }
+        setUp();
+        run(0.6f, 600000u, 60.0f);
+        ceiling = then;
+        declare_loss(1.4f);
+        for (int n = 0; n < 40; n++) {
+            if (twice != 0 && n == 3) {
+                declare_loss(1.3f);
+            }
+            run(0.0f, 0, 6.0f);
+            TEST_ASSERT_TRUE(temperature_ceiling_c(&ceiling, 4) > twin_c[n] - 2.0f);
+        }
+    }
+}
+
+/* Who uploads settings to warm springs and drives at once is not told that they burn: after a few
+ * minutes all heat that is there was given since. */
+static void heat_given_afterwards_goes_by_the_loss_of_now(void)
+{
+    run(0.6f, 600000u, 60.0f);
+    declare_loss(1.4f);
+    run(0.75f, 750000u, 400.0f);
+    const float told_warm_c = temperature_ceiling_c(&ceiling, 4);
+    temperature_ceiling_begin(&ceiling, 20 * 128);
+    run(0.75f, 750000u, 1000.0f);
+    TEST_ASSERT_FLOAT_WITHIN(2.0f, temperature_ceiling_c(&ceiling, 4), told_warm_c);
+}
+
+/* A smaller loss needs no such account. */
+static void a_smaller_loss_counts_at_once(void)
+{
+    run(0.6f, 600000u, 60.0f);
+    declare_loss(0.7f);
+    for (uint8_t k = 0; k < model.springs; k++) {
+        TEST_ASSERT_EQUAL_FLOAT(0.0f, ceiling.spared_w[k]);
+    }
+}
+
 /* As hot as the model may be at rest, it does not trip; with a fifth more power it does. */
 static void it_trips_a_ninth_above_the_model(void)
 {
@@ -124,6 +192,9 @@ int main(void)
     UNITY_BEGIN();
     RUN_TEST(it_follows_the_declared_network);
     RUN_TEST(no_correction_of_the_model_lowers_it);
+    RUN_TEST(heat_of_before_goes_no_faster_by_another_loss);
+    RUN_TEST(heat_given_afterwards_goes_by_the_loss_of_now);
+    RUN_TEST(a_smaller_loss_counts_at_once);
     RUN_TEST(it_trips_a_ninth_above_the_model);
     RUN_TEST(a_trip_beyond_the_model_still_trips);
     RUN_TEST(duty_and_supply_bound_the_power_from_below);
