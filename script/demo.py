@@ -39,7 +39,7 @@ INK = "#010203"
 """What is drawn in it is as light or dark as the page's text."""
 MARTENSITE_START_C, AUSTENITE_START_C = 78.0, 88.0
 EFFECT, EDGE_LOSS = "edge_loss", 0.25
-PLAN_S, DRIVE_S, HELD_S, REST_S, COLD_S = 600, 300, 100, 600, 400
+PLAN_S, DRIVE_S, HELD_S, REST_S = 600, 300, 100, 600
 DRIVE_STEPS = """policy precompensate
 off all
 fan 0
@@ -275,8 +275,6 @@ def undeclared() -> str:
         return f"{title}<p>Left out: it needs the simulated Mega, and avr-gcc is missing.</p>"
     plan, drive_steps = OUT / "plan.txt", OUT / "drive.txt"
     drive_steps.write_text(DRIVE_STEPS, encoding="utf-8")
-    rest_steps = OUT / "rest.txt"
-    rest_steps.write_text("off all\n", encoding="utf-8")
     run(NINESPRING, "plan", "--duration", PLAN_S, "-o", plan)
     with undeclared_board() as ports:
         measured = record(ports, "measured", plan, PLAN_S)
@@ -284,8 +282,6 @@ def undeclared() -> str:
         run(NINESPRING, "diagnose", measured, "-o", OUT / "diagnosis")
         run(NINESPRING, "export", "--model", OUT / "diagnosis" / "model.toml", "-o", OUT / "settings.txt")
         run(NINESPRING, "upload", "--port", ports[0], OUT / "settings.txt")
-        # cold, as the first drive began: until then the board's ceiling goes by the smaller of both losses
-        record(ports, "rest", rest_steps, COLD_S)
         traces["after"] = read(record(ports, "after", drive_steps, DRIVE_S))
     model = tomllib.loads((OUT / "diagnosis" / "model.toml").read_text(encoding="utf-8"))
     found = {p["name"]: p for p in model["parameter"] if p.get("effect") == EFFECT}.get(f"{EFFECT}_fraction")
