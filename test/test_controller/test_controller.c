@@ -433,6 +433,27 @@ static void ceiling_lets_a_current_pass_that_cannot_overheat(void)
     TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, controller_fault(&controller, 4));
 }
 
+/* Settings with a larger loss arrive at warm springs, and they are driven at once: minutes later the
+ * ceiling is where that drive takes it from cold. */
+static void a_drive_after_other_losses_goes_by_them(void)
+{
+    const uint16_t loss_uw_per_k = settings.model.loss_uw_per_k;
+    settings.policy.open_current_ma = 1800;
+    settings.model.loss_uw_per_k = (uint16_t)(loss_uw_per_k / 2u);
+    start();
+    controller_set_target(&controller, 4, 1000);
+    run(50u * 45u);
+    settings.model.loss_uw_per_k = loss_uw_per_k;
+    TEST_ASSERT_TRUE(controller_apply_settings(&controller, &settings, NULL));
+    TEST_ASSERT_TRUE(controller_is_warm(&controller, 4));
+    run(50u * 600u);
+    const float warm_c = controller_delivered_c(&controller, 4);
+    start();
+    controller_set_target(&controller, 4, 1000);
+    run(50u * 645u);
+    TEST_ASSERT_FLOAT_WITHIN(2.0f, controller_delivered_c(&controller, 4), warm_c);
+}
+
 /* It answers, converts, and shows the same for ever. */
 static void frozen_sensor_is_found_within_two_seconds_and_stops_its_spring_alone(void)
 {
@@ -755,6 +776,7 @@ int main(void)
     RUN_TEST(no_hint_takes_heat_that_was_given);
     RUN_TEST(a_hint_is_taken_once_it_has_cooled);
     RUN_TEST(ceiling_lets_a_current_pass_that_cannot_overheat);
+    RUN_TEST(a_drive_after_other_losses_goes_by_them);
     RUN_TEST(frozen_sensor_is_found_within_two_seconds_and_stops_its_spring_alone);
     RUN_TEST(another_shunt_is_found_before_it_is_hot);
     RUN_TEST(limit_that_stays_is_a_fault_until_cleared);
