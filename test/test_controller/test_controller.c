@@ -433,8 +433,8 @@ static void ceiling_lets_a_current_pass_that_cannot_overheat(void)
     TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, controller_fault(&controller, 4));
 }
 
-/* Settings with a larger loss arrive at warm springs, and they are driven at once: minutes later the
- * ceiling is where that drive takes it from cold. */
+/* Settings with a larger loss arrive at warm springs, and they are driven at once: minutes later
+ * the ceiling is where that drive takes it from cold. */
 static void a_drive_after_other_losses_goes_by_them(void)
 {
     const uint16_t loss_uw_per_k = settings.model.loss_uw_per_k;
