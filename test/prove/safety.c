@@ -1,5 +1,6 @@
 /* sources: lib/safety/safety.c lib/text/text.c lib/fixed_point/fixed_point.c
- * test/prove/stand_ins/parameter_check.c options: -eva-slevel-function text_item:600 */
+ * sources: test/prove/stand_ins/parameter_check.c
+ * options: -eva-slevel-function text_item:600 */
 #include "safety.h"
 
 #include "prove.h"
