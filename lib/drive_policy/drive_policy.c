@@ -381,7 +381,10 @@ static void derate(drive_policy_t *policy, const thermal_model_t *model, uint8_t
     const float limit_c = 0.01f * (float)p->temperature_limit_cc;
     const float band_k = kelvin(p->temperature_band_cc);
     /* a touch of 8 K and a search are such doubts: half of the band is left to them */
-    const float doubt_k = policy->estimator.spring[k].gone_k - 0.5f * band_k - common_k(policy, k);
+    float doubt_k = policy->estimator.spring[k].gone_k - 0.5f * band_k;
+    if (doubt_k > 0.0f) { /* as a rule not: nine springs need not be asked */
+        doubt_k -= common_k(policy, k);
+    }
     const float c = now_c(model, k);
     float share = derating_share(doubt_k > 0.0f ? c + doubt_k : c, limit_c, band_k);
     s->derating = share < 1.0f ? DRIVE_POLICY_LIMIT_TEMPERATURE : DRIVE_POLICY_LIMIT_NONE;

@@ -97,7 +97,6 @@ static void heat_of_before_goes_no_faster_by_another_loss(void)
     for (int twice = 0; twice < 2; twice++) {
         setUp();
         run(0.6f, 600000u, 60.0f);
-        const temperature_ceiling_t then = ceiling;
         float twin_c[40];
         for (int n = 0; n < 40; n++) {
             run(0.0f, 0, 6.0f);
@@ -105,7 +104,6 @@ static void heat_of_before_goes_no_faster_by_another_loss(void)
         }
         setUp();
         run(0.6f, 600000u, 60.0f);
-        ceiling = then;
         declare_loss(1.4f);
         for (int n = 0; n < 40; n++) {
             if (twice != 0 && n == 3) {
