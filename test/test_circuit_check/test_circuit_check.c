@@ -292,6 +292,40 @@ static void what_follows_too_little_or_too_much_is_found_after_its_windows(void)
     }
 }
 
+/* The diode's drop takes its part of the voltage, and it stays found however long it lasts. */
+static void the_drop_counts_and_what_is_found_stays_found(void)
+{
+    parameters.freewheel_mv = 1000;
+    for (int off_mv = 0; off_mv <= 800; off_mv += 800) {
+        memset(&check, 0, sizeof check);
+        for (int window = 0; window < 300; window++) {
+            for (uint32_t tick = 0; tick < 30u; tick++) {
+                const double behind_mv = 400.0 * 6000.0 / 800.0 - 1000.0 + off_mv;
+                const double ma = behind_mv / (0.2 + 180.0 / 1024.0);
+                circuit_check_take(&check, 180, 400, true, (int16_t)fmin(ma, 4095.0),
+                                   (int16_t)lround(behind_mv - fmin(ma, 4095.0) * 180.0 / 1024.0));
+            }
+            TEST_ASSERT_EQUAL(off_mv != 0 && window >= 2, circuit_check_judge(&check, &parameters));
+        }
+    }
+}
+
+/* A voltage that stands though the sweep moves it by 3.2 mV, more than half a step of its register.
+ */
+static void voltage_that_should_move_by_more_than_half_a_step_is_frozen(void)
+{
+    int window = 0;
+    for (bool found = false; !found; window++) {
+        TEST_ASSERT_LESS_THAN_INT(4, window);
+        for (uint32_t tick = 0; tick < 30u; tick++) {
+            const uint16_t given = swept(120, 3, tick);
+            const double ma = 5000.0 / 800.0 * given / (0.2 + 180.0 / 1024.0);
+            circuit_check_take(&check, 180, given, true, (int16_t)lround(ma), 404);
+        }
+        found = circuit_check_judge(&check, &parameters);
+    }
+}
+
 /* Too few readings tell nothing, and end the row. */
 static void eleven_readings_tell_nothing(void)
 {
@@ -351,6 +385,8 @@ int main(void)
     RUN_TEST(one_bad_window_is_none);
     RUN_TEST(any_reading_is_taken_without_overflow);
     RUN_TEST(what_follows_too_little_or_too_much_is_found_after_its_windows);
+    RUN_TEST(the_drop_counts_and_what_is_found_stays_found);
+    RUN_TEST(voltage_that_should_move_by_more_than_half_a_step_is_frozen);
     RUN_TEST(eleven_readings_tell_nothing);
     RUN_TEST(a_reading_after_a_jump_is_left_out);
     RUN_TEST(readings_beyond_the_sensor_count_as_its_ends);

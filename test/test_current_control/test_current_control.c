@@ -561,6 +561,50 @@ static void what_is_fed_forward_is_ohm_s_law(void)
     TEST_ASSERT_EQUAL_INT16(24575, control.channel[0].estimate_q16);
 }
 
+/* The same by hand for the declared circuit: 2684 millionths of a step, 180 mohm, 12.3 % of drop.
+ */
+static void a_new_one_is_off_and_has_the_numbers_of_its_circuit(void)
+{
+    mean_ua(1500, 50);
+    parameters.freewheel_mv = 700;
+    parameters.integral_permille = 500;
+    TEST_ASSERT_TRUE(current_control_init(&control, &parameters, NULL));
+    const uint32_t gain_q24 = 13421773ul / 5700ul;
+    TEST_ASSERT_EQUAL_UINT16(2354, gain_q24);
+    TEST_ASSERT_EQUAL_UINT16(gain_q24, control.gain_q24_per_mohm);
+    TEST_ASSERT_EQUAL_INT32(6287 * 1024, control.offset_q16);
+    TEST_ASSERT_EQUAL_UINT16(32767, control.integral_q16);
+    for (uint8_t k = 0; k < CURRENT_CONTROL_MAX_CHANNELS; k++) {
+        const current_control_channel_t fresh = {.estimate_q16 = 180 * 2354 / 256};
+        TEST_ASSERT_EQUAL_MEMORY(&fresh, &control.channel[k], sizeof fresh);
+    }
+}
+
+/* Off is nothing at all, also of what was left of a step; 25 mA are small, 26 wait. */
+static void off_is_nothing_and_small_ends_at_25_ma(void)
+{
+    mean_ua(1500, 60);
+    tick(0);
+    TEST_ASSERT_EQUAL_UINT16(0, current_control_duty(&control, 0));
+    TEST_ASSERT_EQUAL_UINT16(0, control.channel[0].residue_q16);
+    for (uint16_t rise_ma = 25; rise_ma <= 26; rise_ma++) {
+        for (int odd = 0; odd < 2; odd++) {
+            mean_ua(1500, 60 + odd);
+            tick((uint16_t)(1500 + rise_ma));
+            const bool at_once =
+                current_control_reference_ma(&control, 0) == (uint16_t)(1500 + rise_ma);
+            TEST_ASSERT_TRUE(rise_ma > 25 || at_once);
+            if (rise_ma > 25) {
+                tick((uint16_t)(1500 + rise_ma));
+                TEST_ASSERT_EQUAL_UINT16(1500 + rise_ma, current_control_reference_ma(&control, 0));
+            }
+            mean_ua(1500, 60);
+            tick((uint16_t)(1500 - rise_ma));
+            TEST_ASSERT_EQUAL(rise_ma > 25, control.channel[0].fell);
+        }
+    }
+}
+
 /* A target above the limit is the limit; a channel without readings that its limit of ticks
  * passed is off; the count of them ends. */
 static void target_is_cut_to_the_most_and_blindness_does_not_wrap(void)
@@ -600,6 +644,8 @@ int main(void)
     RUN_TEST(a_parameter_out_of_range_is_refused_and_found);
     RUN_TEST(reset_forgets_what_was_learnt_but_not_the_estimate);
     RUN_TEST(what_is_fed_forward_is_ohm_s_law);
+    RUN_TEST(a_new_one_is_off_and_has_the_numbers_of_its_circuit);
+    RUN_TEST(off_is_nothing_and_small_ends_at_25_ma);
     RUN_TEST(target_is_cut_to_the_most_and_blindness_does_not_wrap);
     return UNITY_END();
 }

@@ -501,17 +501,17 @@ static void the_supply_is_cut_where_nothing_else_helps(void)
 static void a_good_tick_and_clear_begin_every_count_anew(void)
 {
     const uint8_t almost = (uint8_t)(parameters.bad_samples - 1u);
-    for (int round = 0; round < 3; round++) {
+    for (int round = 0; round < 4; round++) {
         for (uint8_t n = 0; n < almost; n++) {
             safety_tick_board(&safety, 15001);
         }
-        if (round == 1) {
-            safety_clear(&safety);
-        } else {
+        TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, safety_board_fault(&safety));
+        if (round < 2) {
             safety_tick_board(&safety, 15000);
+        } else {
+            safety_clear(&safety);
         }
     }
-    TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, safety_board_fault(&safety));
 
     safety_sample_t was = running;
     was.expected_ma = 0;
@@ -533,6 +533,43 @@ static void only_a_reading_that_is_one_is_said_to_be_valid(void)
         sample.sensor_status = status;
         TEST_ASSERT_FALSE(safety_tick_spring(&safety, 4, &sample));
     }
+}
+
+/* One tick that shows another current, and what it shows after that flows, though it be the same as
+ * before; and the largest current that an output may give can be frozen, too. */
+static void a_sensor_that_moved_once_is_not_frozen(void)
+{
+    safety_sample_t sample = running;
+    ticks(4, &sample, 10);
+    sample.expected_ma = 0;
+    sample.off = true;
+    ticks(4, &sample, 2);
+    sample.current_ma--;
+    ticks(4, &sample, 1);
+    sample.current_ma++;
+    ticks(4, &sample, parameters.bad_samples - 1u);
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_STUCK_ON, safety_board_fault(&safety));
+
+    setUp();
+    sample = running;
+    sample.current_ma = 3150;
+    sample.voltage_mv = 600;
+    ticks(4, &sample, 10);
+    sample.off = true;
+    ticks(4, &sample, 10);
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_SENSOR_MISMATCH, safety_fault(&safety, 4));
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, safety_board_fault(&safety));
+}
+
+static void limits_are_as_they_are_written(void)
+{
+    safety_sample_t sample = {.current_ma = 74, .voltage_mv = 15, .expected_ma = 300};
+    ticks(4, &sample, parameters.bad_samples);
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_OPEN_SPRING, safety_fault(&safety, 4));
+    sample.sensor_status = 5; /* of a later driver */
+    ticks(3, &sample, parameters.bad_samples);
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_SENSOR_ABSENT, safety_fault(&safety, 3));
+    TEST_ASSERT_TRUE(safety_init(&safety, &parameters, SAFETY_MAX_SPRINGS, NULL));
 }
 
 /* From the first tick on: counted at the first of each 50. */
@@ -573,6 +610,8 @@ int main(void)
     RUN_TEST(parameters_that_do_not_fit_are_refused_and_found);
     RUN_TEST(the_supply_is_cut_where_nothing_else_helps);
     RUN_TEST(a_good_tick_and_clear_begin_every_count_anew);
+    RUN_TEST(a_sensor_that_moved_once_is_not_frozen);
+    RUN_TEST(limits_are_as_they_are_written);
     RUN_TEST(only_a_reading_that_is_one_is_said_to_be_valid);
     RUN_TEST(on_time_ends_in_the_tick_after_its_last_second);
     return UNITY_END();

@@ -284,6 +284,93 @@ static void rest_is_counted_from_the_last_power(void)
     TEST_ASSERT_UINT16_WITHIN(1, 60, temperature_ceiling_rest_s(&ceiling, 4));
 }
 
+static void begin_forgets_all_that_was(void)
+{
+    run(0.6f, 600000u, 60.0f);
+    for (uint8_t k = 0; k < 9; k++) {
+        ceiling.spared_w[k] = ceiling.spared_per_s[k] = 0.1f;
+    }
+    temperature_ceiling_begin(&ceiling, 25 * 128);
+    TEST_ASSERT_FALSE(ceiling.delivered);
+    TEST_ASSERT_EQUAL_INT16(25 * 128, ceiling.ambient_c7);
+    for (uint8_t k = 0; k < THERMAL_MODEL_MAX_SPRINGS; k++) {
+        TEST_ASSERT_EQUAL_INT32(25 * 128 * 65536, ceiling.temperature_c23[k]);
+        TEST_ASSERT_EQUAL_FLOAT(0.0f, ceiling.austenite[k]);
+        TEST_ASSERT_EQUAL_FLOAT(0.0f, ceiling.spared_w[k]);
+        TEST_ASSERT_EQUAL_FLOAT(0.0f, ceiling.spared_per_s[k]);
+        TEST_ASSERT_EQUAL_UINT16(TEMPERATURE_CEILING_NEVER, ceiling.rest_turns[k]);
+    }
+}
+
+/* Warm is what power was given to and is still so far above the warmest air that was told. */
+static void warm_is_what_was_heated_and_has_not_cooled(void)
+{
+    for (uint8_t k = 0; k < 9; k += 4) {
+        temperature_ceiling_begin(&ceiling, 20 * 128);
+        ceiling.temperature_c23[k] = 60 * 128 * 65536;
+        TEST_ASSERT_FALSE(temperature_ceiling_is_warm(&ceiling, k)); /* nobody gave it power */
+        ceiling.delivered = true;
+        TEST_ASSERT_TRUE(temperature_ceiling_is_warm(&ceiling, k));
+        TEST_ASSERT_FALSE(temperature_ceiling_is_warm(&ceiling, (uint8_t)((k + 1) % 9)));
+        const double edge_c = 20.0 + (double)TEMPERATURE_CEILING_WARM_K;
+        ceiling.temperature_c23[k] = (int32_t)((edge_c - 0.01) * 8388608.0);
+        TEST_ASSERT_FALSE(temperature_ceiling_is_warm(&ceiling, k));
+        ceiling.temperature_c23[k] = (int32_t)((edge_c + 0.01) * 8388608.0);
+        TEST_ASSERT_TRUE(temperature_ceiling_is_warm(&ceiling, k));
+    }
+}
+
+/* A model that is told to be hotter takes the ceiling with it, spring by spring, and that is heat.
+ */
+static void a_hotter_model_raises_it_and_a_colder_one_does_not(void)
+{
+    for (uint8_t k = 0; k < 9; k += 4) {
+        setUp();
+        run(0.0f, 0, 6.0f);
+        thermal_model_set_temperature(&model, k, 110 * 128);
+        temperature_ceiling_raise(&ceiling, &model);
+        TEST_ASSERT_FLOAT_WITHIN(0.01f, 110.0f, temperature_ceiling_c(&ceiling, k));
+        TEST_ASSERT_FLOAT_WITHIN(0.01f, 1.0f, ceiling.austenite[k]);
+        TEST_ASSERT_EQUAL_UINT16(0, ceiling.rest_turns[k]);
+        TEST_ASSERT_TRUE(temperature_ceiling_is_warm(&ceiling, k));
+        TEST_ASSERT_EQUAL_UINT16(TEMPERATURE_CEILING_NEVER, ceiling.rest_turns[(k + 1) % 9]);
+        thermal_model_set_temperature(&model, k, 30 * 128);
+        temperature_ceiling_raise(&ceiling, &model);
+        TEST_ASSERT_FLOAT_WITHIN(0.01f, 110.0f, temperature_ceiling_c(&ceiling, k));
+    }
+}
+
+/* The air's warmest counts while anything is warm, and what is told after that. */
+static void warmest_air_counts_until_all_are_cold(void)
+{
+    for (uint8_t k = 0; k < 9; k += 4) {
+        setUp();
+        ceiling.temperature_c23[k] = 100 * 128 * 65536;
+        ceiling.delivered = true;
+        ceiling.spared_w[k] = 0.01f;
+        thermal_model_set_ambient(&model, 30 * 128);
+        temperature_ceiling_step(&ceiling, &model, 0, 0.0f);
+        TEST_ASSERT_EQUAL_INT16(30 * 128, ceiling.ambient_c7);
+        thermal_model_set_ambient(&model, 15 * 128);
+        temperature_ceiling_step(&ceiling, &model, 0, 0.0f);
+        TEST_ASSERT_EQUAL_INT16(30 * 128, ceiling.ambient_c7);
+        /* and what it gives off is as in that air */
+        TEST_ASSERT_INT32_WITHIN(
+            1,
+            thermal_model_power_to_hold_uw(
+                &model, 8, (int16_t)((ceiling.temperature_c23[8] >> 16) - 15 * 128)),
+            temperature_ceiling_hold_uw(&ceiling, &model, 8));
+        TEST_ASSERT_TRUE(ceiling.delivered);
+        ceiling.temperature_c23[k] = 20 * 128 * 65536;
+        temperature_ceiling_step(&ceiling, &model, 1, 0.0f); /* looked at once a round */
+        TEST_ASSERT_TRUE(ceiling.delivered);
+        temperature_ceiling_step(&ceiling, &model, 0, 0.0f);
+        TEST_ASSERT_FALSE(ceiling.delivered);
+        TEST_ASSERT_EQUAL_FLOAT(0.0f, ceiling.spared_w[k]);
+        TEST_ASSERT_EQUAL_INT16(15 * 128, ceiling.ambient_c7);
+    }
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -301,5 +388,9 @@ int main(void)
     RUN_TEST(it_trips_a_ninth_above_the_rise_that_trips_the_model);
     RUN_TEST(it_ends_at_its_highest_and_lowest);
     RUN_TEST(rest_is_counted_from_the_last_power);
+    RUN_TEST(begin_forgets_all_that_was);
+    RUN_TEST(warm_is_what_was_heated_and_has_not_cooled);
+    RUN_TEST(a_hotter_model_raises_it_and_a_colder_one_does_not);
+    RUN_TEST(warmest_air_counts_until_all_are_cold);
     return UNITY_END();
 }
