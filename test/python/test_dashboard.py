@@ -738,6 +738,13 @@ def test_what_a_board_believes_reaches_the_page(tmp_path: Path) -> None:
         assert state["doing"] == ["not known for 75 s: it may still be hot from before power-on"]
 
 
+def test_each_id_of_the_page_is_of_one_element_and_the_script_finds_it() -> None:
+    page = ROOT / "calibrate" / "src" / "ninespring" / "dashboard" / "page"
+    ids = re.findall(r' id="([^"]+)"', (page / "index.html").read_text())
+    assert len(ids) == len(set(ids))
+    assert set(re.findall(r'\$\("([^"]+)"\)', (page / "page.js").read_text())) <= set(ids)
+
+
 def test_limits_in_words_are_those_of_the_table() -> None:
     table = re.findall(r"^\| \d+ \| `([a-z]+)` \|", (ROOT / "docs" / "driving.md").read_text(), re.MULTILINE)
     assert set(table) == words.LIMITS.keys()
