@@ -12,6 +12,7 @@ import ninespring as ns
 import numpy as np
 import pytest
 from fake_board import FakeBoard, row
+from ninespring.cli import cli
 
 ROOT = Path(__file__).resolve().parents[2]
 SIM = Path(os.environ.get("NINESPRING_SIM", ROOT / "build" / "host" / "ninespring-sim"))
@@ -110,3 +111,31 @@ def test_what_the_commands_do_can_be_called(make_log, tmp_path: Path) -> None:
     assert not got.ended and (tmp_path / "board.csv").exists()
     with pytest.raises(ns.InputError, match="never written over"):
         ns.record(fake.port, tmp_path / "board.csv", duration_s=3.0)
+    settings = ns.chip_settings(model, force=True)
+    assert "$loss_w_per_k=0.005800" in settings.lines
+    assert (
+        ns.upload(fake.port, settings.lines) == settings.lines.count("$") == len(fake.settings) and "$save" in fake.seen
+    )
+    assert ns.make_plan(duration_s=300).steps
+
+
+def test_a_sweep_can_be_called(tmp_path: Path) -> None:
+    pytest.importorskip("distributed", reason="SKIPPED: dask is missing: pip install 'ninespring[explore]'")
+    pytest.importorskip("pyarrow", reason="SKIPPED: pyarrow is missing: pip install 'ninespring[explore]'")
+    (tmp_path / "fan.toml").write_text("[sweep]\nduration_s = 60\non_s = 40\n[vary]\nfan = [0, 1]\n")
+    for _ in range(2):  # the second finds them
+        assert ns.sweep(tmp_path / "fan.toml", tmp_path / "fan", workers=1)["fan"].tolist() == [0, 1]
+
+
+def test_every_command_stands_on_the_page_about_python() -> None:
+    page = (ROOT / "docs" / "python.md").read_text()
+    table = re.findall(r"^\| (`.*`) \| (.*) \|$", page, re.MULTILINE)
+    called = set(re.findall(r"ns\.([a-z]\w*)\(?", page))
+    readers = {"read_array", "read_model"}
+    assert called <= set(ns.__all__) and {name for name in ns.__all__ if name.islower()} <= called | readers
+    told = {word for left, _ in table for word in re.findall(r"`(\w+)", left)}
+    only = set(
+        re.findall(r"`?(\w+)", page[page.index("\n| command") :].partition("\n\n")[2].partition("commands only")[0])
+    )
+    for name in cli.commands:
+        assert name in told | only | called, f"docs/python.md does not say how `{name}` is called"

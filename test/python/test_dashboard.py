@@ -15,7 +15,7 @@ import tempfile
 import time
 from collections.abc import Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -463,6 +463,21 @@ def page_of(board: FakeBoard, folder: Path, every_s: float = 0.1) -> Iterator[Cl
         assert dashboard.end() == 0
 
 
+def test_the_board_that_gets_the_number_of_a_lost_terminal_is_left_alone(tmp_path: Path) -> None:
+    first = FakeBoard()
+    with page_of(first, tmp_path) as socket:
+        first.pull()
+        while json.loads(socket.recv(10)).get("connected", True):
+            pass
+        second = FakeBoard()  # somebody else's, beside it
+        assert second.port == first.port
+        trouble, until = "", time.monotonic() + 60.0
+        while "another one has that number now" not in trouble and time.monotonic() < until and not second.seen:
+            with suppress(TimeoutError):
+                trouble = json.loads(socket.recv(1)).get("trouble", "")
+    assert second.seen == [] and "another one has that number now" in trouble
+
+
 def test_a_pages_wishes_are_carried_out_in_their_order(tmp_path: Path) -> None:
     board = FakeBoard()
     with page_of(board, tmp_path) as socket:
@@ -721,6 +736,13 @@ def test_what_a_board_believes_reaches_the_page(tmp_path: Path) -> None:
             pass
         assert state["unknown_s"] == [75.0] and state["target_a"] == [0.0]
         assert state["doing"] == ["not known for 75 s: it may still be hot from before power-on"]
+
+
+def test_each_id_of_the_page_is_of_one_element_and_the_script_finds_it() -> None:
+    page = ROOT / "calibrate" / "src" / "ninespring" / "dashboard" / "page"
+    ids = re.findall(r' id="([^"]+)"', (page / "index.html").read_text())
+    assert len(ids) == len(set(ids))
+    assert set(re.findall(r'\$\("([^"]+)"\)', (page / "page.js").read_text())) <= set(ids)
 
 
 def test_limits_in_words_are_those_of_the_table() -> None:

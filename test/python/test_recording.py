@@ -439,7 +439,7 @@ def test_a_silent_or_foreign_port_is_recognised_within_five_seconds(said: bytes,
 
 def test_a_second_program_on_the_port_is_named(tmp_path: Path) -> None:
     board = FakeBoard()
-    board.stream, board.every_s = STREAM, 0.1
+    board.stream, board.every_s = (row(0.1 * k) for k in range(10, 99999)), 0.1
     with subprocess.Popen(command("record", "--port", board.port, "-o", tmp_path / "log.csv")) as process:
         while "telemetry csv 10" not in board.seen:
             time.sleep(0.02)

@@ -97,6 +97,26 @@ def _how_to_be_allowed(name: str) -> str:
     return f"`sudo usermod --append --groups {group} $USER`, then log in again"
 
 
+def pseudo_terminal(name: str) -> tuple[int, ...] | None:
+    """Return which pseudo-terminal a name stands for, None where it is none or not there.
+
+    Its number does not tell: once it is gone, the next one that anybody opens gets it. When it was made does, and so does a link that was made anew.
+    """
+    if Path(os.path.realpath(name)).parent != Path("/dev/pts"):
+        return None
+    try:
+        link, device = os.lstat(name), os.stat(name)
+    except OSError:
+        return None
+    return (
+        device.st_dev,
+        device.st_ino,
+        device.st_ctime_ns,
+        link.st_ino,
+        link.st_mtime_ns if Path(name).is_symlink() else 0,
+    )
+
+
 def _who_has(name: str) -> str:
     """Return ` (program, pid)` of another process that has the port open, as far as this system tells.
 

@@ -140,6 +140,7 @@ function show(now) {
   $("unknown-s").textContent = unknown_s ? `${unknown_s} s` : "";
   $("cold").disabled = now.level.some((one) => one > 0);
   $("unlock").hidden = now.state !== "locked";
+  $("supply-on").hidden = !live || !now.faults.includes("supply: off");
   for (let k = 0; k < now.springs; k++) showSpring(k, now);
   $("bounds-legend").hidden = !now.bounds_c?.some((one) => one);
   if (String(now.faults) !== String(before.faults)) {
@@ -436,6 +437,7 @@ $("fan").onchange = () => quietly({ do: "fan", percent: Number($("fan").value) }
 $("record").onclick = () => quietly({ do: state.recording ? "end_recording" : "record" });
 $("clear").onclick = () => quietly({ do: "clear" });
 $("unlock").onclick = () => quietly({ do: "unlock" });
+$("supply-on").onclick = () => quietly({ do: "say", line: "supply on" });
 $("save").onclick = () => quietly({ do: "say", line: "$save" });
 $("pause").onclick = () => quietly({ do: "pause" });
 $("speed").onchange = () => quietly({ do: "speed", speed: Number($("speed").value) });
