@@ -26,7 +26,7 @@ from .api import (
     upload,
     verify,
 )
-from .board import Board, Reading
+from .board import Board, Reading, to_pandas
 from .errors import InputError, WorkError
 from .logs import Run, read_log
 from .models import Array, Model, read_array, read_model
@@ -54,6 +54,7 @@ __all__ = [
     "replay",
     "save",
     "sweep",
+    "to_pandas",
     "upload",
     "verify",
 ]
