@@ -23,6 +23,7 @@ from .api import (
     replay,
     save,
     sweep,
+    undo_upload,
     upload,
     verify,
 )
@@ -55,6 +56,7 @@ __all__ = [
     "save",
     "sweep",
     "to_pandas",
+    "undo_upload",
     "upload",
     "verify",
 ]

@@ -435,6 +435,29 @@ def reading(cells: dict[str, str], believed: Mapping[int, Belief] | None = None)
     )
 
 
+def send_settings(
+    board: Board, lines: list[str], save: bool = True, say: Callable[[str, int], None] = lambda line, count: None
+) -> None:
+    """Send `$name=value` lines, read them back, save them; what the board has learnt beside its old numbers it forgets.
+
+    WorkError, and nothing is saved, where the board refuses one or shows another value.
+    """
+    remarks = board.ask("learnt clear", 10.0)
+    for k, line in enumerate(lines):
+        say(line, k)
+        try:
+            remarks = board.ask(line)
+        except WorkError as error:
+            raise WorkError(f"{error}: nothing is saved, a reset of the board gives back what it had") from None
+    if remarks:
+        raise WorkError(f"the board does not take them together: {remarks[-1]}")
+    say("reading back", len(lines))
+    if wrong := settings_that_differ(lines, board.settings()):
+        raise WorkError(f"the board shows other values than were sent, nothing is saved: {'; '.join(wrong)}")
+    if save:
+        board.ask("$save", 10.0)
+
+
 def settings_that_differ(sent: list[str], has: dict[str, str]) -> list[str]:
     """Return what a board shows otherwise than it was sent (`$name=value`), in words."""
     out = []

@@ -24,6 +24,7 @@ from .import_command import import_
 from .plan_command import plan
 from .plot_command import plot
 from .scenario_command import scenario
+from .settings_command import settings
 from .verdict.command import diagnose
 
 
@@ -52,6 +53,7 @@ for command in (
     sweep,
     scenario,
     dashboard,
+    settings,
 ):
     cli.add_command(command)
 add_board_commands(cli)
