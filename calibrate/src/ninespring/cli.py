@@ -12,6 +12,7 @@ import click
 
 from . import __version__
 from .board_commands import add_board_commands
+from .calibration.command import calibrate
 from .console import Group, err
 from .dashboard.command import dashboard
 from .errors import InputError, WorkError
@@ -53,6 +54,7 @@ for command in (
     sweep,
     scenario,
     dashboard,
+    calibrate,
     settings,
 ):
     cli.add_command(command)
