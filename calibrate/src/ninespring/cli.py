@@ -26,6 +26,7 @@ from .plan_command import plan
 from .plot_command import plot
 from .scenario_command import scenario
 from .settings_command import settings
+from .terminal import console
 from .verdict.command import diagnose
 
 
@@ -56,6 +57,7 @@ for command in (
     dashboard,
     calibrate,
     settings,
+    console,
 ):
     cli.add_command(command)
 add_board_commands(cli)
