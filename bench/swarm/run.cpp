@@ -670,6 +670,9 @@ private:
         while (v_.broken.empty() && now_s() < until_s &&
                (v_.answers < before + 3 || !waiting_.empty() || pending_)) {
             run_until(now_s() + SLICE_S);
+            if (waiting_.empty() && !pending_) { /* a reset took them */
+                waiting_.push_back("version");
+            }
             type();
             judge();
         }

@@ -409,7 +409,8 @@ void board_flip(board_t *board, unsigned address, uint8_t bits)
         return;
     }
     const avr_io_addr_t io = (avr_io_addr_t)AVR_DATA_TO_IO(address);
-    if (!board_pwm_poke(&board->pwm, address, value) && avr->io[io].w.c != NULL) {
+    const bool is_known = io < sizeof avr->io / sizeof avr->io[0]; /* reserved ones lie beyond */
+    if (!board_pwm_poke(&board->pwm, address, value) && is_known && avr->io[io].w.c != NULL) {
         avr->io[io].w.c(avr, (avr_io_addr_t)address, value, avr->io[io].w.param);
     } else {
         avr->data[address] = value;
