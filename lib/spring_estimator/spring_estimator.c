@@ -421,8 +421,8 @@ static bool surely_finished(const spring_belief_t *b, const thermal_model_t *mod
 
 /* It is over, by what it reads in two turns above austenite start: what its austenite read when it
  * had transformed last, or beyond; from above, what the largest coefficient makes of that where it
- * is colder. Where it had gone the other way, as an intermediate
- * phase does, that is back well below austenite start; what is not, was none. */
+ * is colder. What had gone the other way, as an intermediate phase does, is back well below
+ * austenite start; what is not, was none. */
 static bool reads_austenite(const spring_belief_t *b, const thermal_model_t *model, uint8_t k)
 {
     const spring_learnt_t *l = &b->learnt;

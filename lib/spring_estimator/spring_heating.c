@@ -144,6 +144,9 @@ static void hold_back(const spring_estimator_t *e, spring_belief_t *b, thermal_m
     const bool martensite = b->possible == SPRING_PHASE_MARTENSITE;
     const int16_t limit_c7 =
         martensite ? (int16_t)(t.austenite_start_c7 + ONSET_C7) : t.austenite_finish_c7;
+    if (thermal_model_temperature_c7(model, k) <= limit_c7) {
+        return;
+    }
     const bool again = !martensite && b->full_ohm > 0.0f &&
                        spring_estimator_hottest_c(b, model, k) < spring_c(limit_c7) + SHIFT_BOUND_K;
     /* after a look its temperature is a guess; once its transformation was seen, it is known, but
@@ -153,7 +156,7 @@ static void hold_back(const spring_estimator_t *e, spring_belief_t *b, thermal_m
                                       spring_estimator_lacks_phase(b, model, k));
     const bool shows = b->steep || (b->learnt.austenite_ohm > 0.0f && !b->blind && waits);
     const float most_k = again ? again_heat_k(e, b, limit_c7) : most_heat_k(e, b, limit_c7);
-    if (shows && thermal_model_temperature_c7(model, k) > limit_c7 && b->run.heat.heat_k < most_k) {
+    if (shows && b->run.heat.heat_k < most_k) {
         if (again) { /* if nothing was lost, it is warmer by that */
             b->gone_k += spring_now_c(model, k) - spring_c(limit_c7);
         }
