@@ -347,6 +347,19 @@ def test_a_fault_is_said_as_it_comes_in_the_log_and_at_the_end(tmp_path: Path) -
     assert_off(board)
 
 
+def test_what_the_board_remarks_on_a_step_is_said_and_stands_in_the_log(tmp_path: Path) -> None:
+    remark = "[not active yet: over_current_a=0.200 does not fit open_current_a=1.500]"
+    board = FakeBoard({"$over_current_a=0.2": [remark, "ok"], "$open_current_a=9": [remark, "ok"]})
+    board.stream, board.every_s = STREAM, 0.01
+    (tmp_path / "steps.txt").write_text("$open_current_a=9\nat 2 = $over_current_a=0.2\n")
+    done = record(board, tmp_path, "--duration", 3, "--run", tmp_path / "steps.txt")
+    assert done.returncode == 0, done.stderr
+    assert [line.partition(": ")[0] for line in done.stderr.splitlines()] == ["'$open_current_a=9'", "'$over_current_a=0.2'"]
+    lines = (tmp_path / "log.csv").read_text().splitlines()
+    assert lines.index(f"# '$open_current_a=9': {remark}") < lines.index(TELEMETRY)
+    assert lines.index(f"# '$over_current_a=0.2': {remark}") > lines.index(TELEMETRY)
+
+
 @pytest.mark.parametrize("commented", [True, False])
 def test_whoever_uses_a_log_is_told_first_that_a_fault_cut_it_short(tmp_path: Path, commented: bool) -> None:
     log = tmp_path / "log.csv"
