@@ -33,10 +33,11 @@ typedef enum {
  * follows is called with interrupts on, and leaves them on. */
 void board_init(void);
 uint8_t board_reset_cause(void);
-#ifdef NINESPRING_CHECKED
-/* Once: the invariant, a text in flash, that ended the run before this one; else NULL. */
-const char *board_broken_take(void);
-#endif
+/* The program cannot go on as it is: outputs off, and a reset by the watchdog. why: a text in
+ * flash, which board_ended_take tells once after that reset; NULL where the program ended
+ * otherwise. */
+void board_end(const char *why) __attribute__((noreturn));
+const char *board_ended_take(void);
 
 /* --- outputs ------------------------------------------------------------------------------ */
 

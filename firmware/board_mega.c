@@ -206,27 +206,32 @@ ISR(BADISR_vect)
     end_as_a_hang_does();
 }
 
-#ifdef NINESPRING_CHECKED
-#include "invariant.h"
+static const char *ended_by __attribute__((section(".noinit"))); /* in flash */
+static uint16_t ended_check __attribute__((section(".noinit")));
 
-static const char *broken __attribute__((section(".noinit"))); /* in flash */
-static uint16_t broken_check __attribute__((section(".noinit")));
-
-void invariant_broken(const char *condition)
+void board_end(const char *why)
 {
     cli();
-    broken = condition;
-    broken_check = (uint16_t) ~(uint16_t)condition;
+    ended_by = why;
+    ended_check = (uint16_t) ~(uint16_t)why;
     end_as_a_hang_does();
     for (;;) {
     }
 }
 
-const char *board_broken_take(void)
+const char *board_ended_take(void)
 {
-    const bool is_one = (uint16_t)broken == (uint16_t)~broken_check;
-    broken_check = (uint16_t)broken;
-    return is_one ? broken : NULL;
+    const bool is_one = (uint16_t)ended_by == (uint16_t)~ended_check;
+    ended_check = (uint16_t)ended_by;
+    return is_one ? ended_by : NULL;
+}
+
+#ifdef NINESPRING_CHECKED
+#include "invariant.h"
+
+void invariant_broken(const char *condition)
+{
+    board_end(condition);
 }
 #endif
 

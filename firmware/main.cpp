@@ -27,8 +27,8 @@
 
 // Not static: debugger and simulator look at it by name.
 controller_t controller;
+settings_t settings;
 
-static settings_t settings;
 static settings_store_t store;
 static learnt_store_t learnt;
 static telemetry_t telemetry;
@@ -76,11 +76,9 @@ static const record_storage_t eeprom = {nullptr, eeprom_read, eeprom_ready, eepr
 
 static const char *reset_text(uint8_t cause)
 {
-#ifdef NINESPRING_CHECKED
-    if (const char *const broken = board_broken_take()) {
-        return broken;
+    if (const char *const ended_by = board_ended_take()) {
+        return ended_by;
     }
-#endif
     if (cause & BOARD_RESET_WATCHDOG) {
         return PSTR("watchdog");
     }
@@ -133,6 +131,17 @@ static void start_model(uint8_t cause)
     controller_set_delivered(&controller, &kept.delivered);
 }
 
+// Settings, limits, or what is derived of them, are not what they were: a bit of RAM has turned
+// over. All of it is made anew from what is saved, and of the springs nothing counts as known: what
+// is kept of them was made with those numbers. Ahead of whatever uses or saves them.
+static void hold_settings()
+{
+    if (!console_hold_settings(&console) || !controller_is_sound(&controller)) {
+        kept.crc = static_cast<uint16_t>(~crc_of_kept());
+        board_end(PSTR("memory: a setting had changed by itself"));
+    }
+}
+
 // Configures the sensors at the start and when the setting has changed: they then convert anew, and
 // a reading or two is missing.
 static void follow_averaging()
@@ -157,6 +166,7 @@ static void run_tick(uint8_t behind)
 #ifdef NINESPRING_HIL
     current_sensor_hil_tick((uint16_t)status.ticks);
 #endif
+    hold_settings();
     follow_averaging();
     current_sensor_read(inputs.sensor, CONTROLLER_MAX_SPRINGS);
     for (uint8_t k = 0; k < CONTROLLER_MAX_SPRINGS; k++) {

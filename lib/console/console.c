@@ -204,7 +204,9 @@ static console_error_t word_policy(console_t *console, const arguments_t *argume
     if (!controller_set_policy(console->controller, kind)) {
         return CONSOLE_ERROR_NOT_AVAILABLE;
     }
+    console_open_settings(console);
     console->settings->controller.policy.policy = (uint8_t)kind;
+    console_seal_settings(console);
     return CONSOLE_OK;
 }
 
@@ -223,8 +225,11 @@ static console_error_t word_fan(console_t *console, const arguments_t *arguments
 static console_error_t word_ambient(console_t *console, const arguments_t *arguments)
 {
     console_hint_setting(console, CONSOLE_HINT_RANGE, PARAMETER_ambient_c, 0);
-    return console_error_of(
-        settings_assign(console->settings, "ambient_c", arguments->argument[0]));
+    console_open_settings(console);
+    const console_error_t error =
+        console_error_of(settings_assign(console->settings, "ambient_c", arguments->argument[0]));
+    console_seal_settings(console);
+    return error;
 }
 
 static console_error_t word_telemetry(console_t *console, const arguments_t *arguments)
@@ -558,8 +563,10 @@ static void start_telemetry(console_t *console)
             out.line.length = 0;
         }
     }
+    console_open_settings(console);
     console->settings->board.telemetry_format = console->next_format;
     console->settings->board.telemetry_hz = console->next_hz;
+    console_seal_settings(console);
     telemetry_set(console->telemetry, console->next_format, console->next_hz);
     end_job(console, CONSOLE_OK);
 }
@@ -761,4 +768,5 @@ void console_init(console_t *console, const text_output_t *output, controller_t 
     console->learnt = learnt;
     console->telemetry = telemetry;
     console->status = status;
+    console_seal_settings(console);
 }

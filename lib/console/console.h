@@ -12,6 +12,7 @@
 #include "console_codes.h"
 #include "controller.h"
 #include "learnt_store.h"
+#include "scrub.h"
 #include "selftest.h"
 #include "settings.h"
 #include "telemetry.h"
@@ -64,6 +65,7 @@ typedef struct {
     uint8_t hint_element;
     const char *hint_text;
     int32_t hint_values[2];
+    scrub_t scrub;  /* of settings, which nobody but the console changes */
     uint8_t broken; /* console_error_t of the line under construction */
     uint8_t length;
     char line[CONSOLE_LINE_BYTES + 1u];
@@ -90,6 +92,10 @@ void console_receive(console_t *console, uint8_t octet);
 void console_service(console_t *console);
 /* True while console_service has something to go on with. */
 bool console_busy(const console_t *console);
+
+/* Looks through the next 16 bytes of the settings. False if and only if one of them has changed by
+ * itself, as RAM may, since console_init: then none of them is to be used or saved. Once a tick. */
+bool console_hold_settings(console_t *console);
 
 /* The line under construction will be answered with this error. For bytes that were lost. */
 void console_break_line(console_t *console, console_error_t error);

@@ -54,6 +54,9 @@ void console_add_setting_hint(const console_t *console, text_line_t *line);
 
 /* A line that starts with '$'. */
 console_error_t console_settings_line(console_t *console, char *line);
+/* Around each change of the settings. */
+void console_open_settings(console_t *console);
+void console_seal_settings(console_t *console);
 /* Activates the settings as they are set, or says which two of them do not fit together. */
 void console_apply_settings(console_t *console);
 console_error_t console_error_of(settings_result_t result);

@@ -2,6 +2,29 @@
 
 #include <string.h>
 
+#define SCRUB_BYTES 16u
+
+static scrub_stretch_t stretch_of(const void *settings, uint8_t index)
+{
+    return (scrub_stretch_t){settings, (uint16_t)(index == 0 ? sizeof(settings_t) : 0u)};
+}
+
+void console_open_settings(console_t *console)
+{
+    scrub_open(&console->scrub, stretch_of, console->settings);
+}
+
+void console_seal_settings(console_t *console)
+{
+    scrub_seal(&console->scrub, stretch_of, console->settings);
+}
+
+bool console_hold_settings(console_t *console)
+{
+    (void)scrub_step(&console->scrub, stretch_of, console->settings, SCRUB_BYTES);
+    return scrub_is_sound(&console->scrub);
+}
+
 static void add_value(const console_t *console, text_line_t *line, uint16_t row)
 {
     const parameter_row_t known = parameter_row(row);
@@ -128,7 +151,9 @@ static console_error_t refuse(console_t *console, const char *name, console_erro
 static console_error_t assign(console_t *console, const char *name, const char *value)
 {
     const settings_t before = *console->settings;
+    console_open_settings(console);
     const console_error_t error = console_error_of(settings_assign(console->settings, name, value));
+    console_seal_settings(console);
     if (error != CONSOLE_OK) {
         return refuse(console, name, error);
     }
@@ -166,12 +191,18 @@ console_error_t console_settings_line(console_t *console, char *line)
             console_apply_settings(console); /* says which */
             return CONSOLE_ERROR_SETTINGS_CONFLICT;
         }
+        console_open_settings(console); /* nothing is saved that nobody set */
+        if (!scrub_is_sound(&console->scrub)) {
+            return CONSOLE_ERROR_SAVE_FAILED;
+        }
         settings_save_start(console->store, console->settings);
         console_start_job(console, CONSOLE_JOB_SAVE);
         return CONSOLE_OK;
     }
     if (flash_equal(line, FLASH_TEXT("$defaults"))) {
+        console_open_settings(console);
         settings_default(console->settings);
+        console_seal_settings(console);
         console_apply_settings(console);
         follow_board_settings(console);
         return CONSOLE_OK;

@@ -1,4 +1,4 @@
-#include "controller.h"
+#include "controller_internal.h"
 
 #include <stddef.h>
 #include <string.h>
@@ -131,6 +131,7 @@ static void start(controller_t *controller, const controller_settings_t *setting
     (void)safety_init(&controller->safety, &settings->safety, controller->springs, NULL);
     (void)drive_policy_init(&controller->policy, &settings->policy, model, NULL);
     tell_resistances(controller);
+    scrub_start(&controller->scrub, controller_fixed, controller);
 }
 
 bool controller_init(controller_t *controller, const controller_settings_t *settings,
@@ -162,6 +163,10 @@ static void restore(thermal_model_t *model, const thermal_model_state_t *state, 
 bool controller_apply_settings(controller_t *controller, const controller_settings_t *settings,
                                uint16_t *bad)
 {
+    scrub_open(&controller->scrub, controller_fixed, controller);
+    if (!controller_is_sound(controller)) {
+        return false; /* not even how many springs there are is known */
+    }
     const thermal_model_parameters_t *old = &controller->model.parameters;
     const uint16_t mark = controller_model_mark(controller);
     bool same_size = settings->model.rows == old->rows && settings->model.columns == old->columns;
@@ -191,6 +196,7 @@ bool controller_apply_settings(controller_t *controller, const controller_settin
             controller_forget_loss(controller, k);
         }
         tell_resistances(controller);
+        scrub_seal(&controller->scrub, controller_fixed, controller); /* all of it is new */
         return true;
     }
     uint8_t board_fault = controller->safety.board_fault;
@@ -312,6 +318,9 @@ static void take_floor_turn(controller_t *controller)
     if (raised >= controller->springs) {
         take_resistance_turn(controller);
     }
+    if (scrub_step(&controller->scrub, controller_fixed, controller, CONTROLLER_SCRUB_BYTES)) {
+        thermal_model_refresh(&controller->model);
+    }
 }
 
 /* A fifth, 16 millionths less than that: a division of 32 bits takes 600 cycles of the target. */
@@ -351,7 +360,8 @@ static void watch_supply(controller_t *controller)
     if (safety_cuts_supply(&controller->safety)) {
         (void)controller_set_supply(controller, false);
     }
-    if (controller->supply_off || controller_is_locked(controller)) {
+    if (controller->supply_off || controller_is_locked(controller) ||
+        !controller_is_sound(controller)) {
         controller->supply_ticks = 0;
     } else if (controller->supply_ticks < SUPPLY_TICKS) {
         controller->supply_ticks++;
@@ -386,8 +396,8 @@ static void drive(controller_t *controller, const bool valid[], uint32_t sum_ma,
 {
     bool allowed[CONTROLLER_MAX_SPRINGS];
     for (uint8_t k = 0; k < controller->springs; k++) {
-        allowed[k] =
-            controller->supply_ticks == SUPPLY_TICKS && safety_allows(&controller->safety, k);
+        allowed[k] = controller->supply_ticks == SUPPLY_TICKS &&
+                     safety_allows(&controller->safety, k) && controller_is_sound(controller);
         if (!allowed[k]) {
             current_control_reset(&controller->current, k);
         }
@@ -453,6 +463,11 @@ void controller_tick(controller_t *controller, const controller_inputs_t *inputs
         controller_supply_is_held(controller) && !safety_doubts_supply(&controller->safety);
 }
 
+bool controller_is_sound(const controller_t *controller)
+{
+    return scrub_is_sound(&controller->scrub);
+}
+
 bool controller_set_target(controller_t *controller, uint8_t spring, uint16_t level_permille)
 {
     if (spring >= controller->springs || level_permille > DRIVE_POLICY_LEVEL_FULL) {
@@ -473,7 +488,11 @@ bool controller_set_policy(controller_t *controller, drive_policy_kind_t kind)
 {
     drive_policy_parameters_t parameters = controller->policy.parameters;
     parameters.policy = (uint8_t)kind;
-    return drive_policy_apply(&controller->policy, &parameters, &controller->model, NULL);
+    scrub_open(&controller->scrub, controller_fixed, controller);
+    const bool applied =
+        drive_policy_apply(&controller->policy, &parameters, &controller->model, NULL);
+    scrub_seal(&controller->scrub, controller_fixed, controller);
+    return applied;
 }
 
 bool controller_set_fan(controller_t *controller, uint8_t percent)
@@ -598,9 +617,11 @@ void controller_get_delivered(const controller_t *controller, temperature_ceilin
 
 void controller_set_delivered(controller_t *controller, const temperature_ceiling_t *delivered)
 {
+    scrub_open(&controller->scrub, controller_fixed, controller);
     controller->ceiling = *delivered;
     temperature_ceiling_prepare(&controller->ceiling, &controller->model,
                                 &controller->current.parameters);
+    scrub_seal(&controller->scrub, controller_fixed, controller);
 }
 
 /* By way of martensite. */

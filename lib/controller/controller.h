@@ -11,6 +11,7 @@
 #include "current_control.h"
 #include "drive_policy.h"
 #include "safety.h"
+#include "scrub.h"
 #include "temperature_ceiling.h"
 #include "thermal_model.h"
 
@@ -81,6 +82,7 @@ typedef struct {
     circuit_check_t circuit[CONTROLLER_MAX_SPRINGS];
     uint32_t heat_sum_uw[CONTROLLER_MAX_SPRINGS]; /* over the ticks of the ceiling's running step */
     uint16_t duty_sum[CONTROLLER_MAX_SPRINGS];    /* the same */
+    scrub_t scrub;                                /* of what settings decide */
 } controller_t;
 
 /* The paper's spring and 3 x 3 array on the reference board. */
@@ -101,7 +103,8 @@ bool controller_init(controller_t *controller, const controller_settings_t *sett
  * current loops, faults, levels and fan, and what was learnt of the springs; but not of their
  * losses where the model's parameters differ, beside which these were learnt. Else as
  * controller_init at the last ambient, but faults of the board, lock and fan stay. Fails as
- * controller_init does, and then nothing is changed. Divides. */
+ * controller_init does, and where controller_is_sound is false; then nothing is changed. Divides.
+ */
 bool controller_apply_settings(controller_t *controller, const controller_settings_t *settings,
                                uint16_t *bad);
 
@@ -113,6 +116,15 @@ bool controller_apply_settings(controller_t *controller, const controller_settin
  * so that is not too low. */
 void controller_tick(controller_t *controller, const controller_inputs_t *inputs,
                      controller_outputs_t *outputs);
+
+/* False if and only if what settings decide (limits, the model's numbers, what is derived of them)
+ * has changed by itself, as RAM may, since controller_init: it is looked through every
+ * CONTROLLER_SCRUB_MS, and before each change of a part of it. From then on nothing is driven and
+ * the supply is not held; there is no way back but controller_init, as nothing here can be trusted.
+ */
+#define CONTROLLER_SCRUB_BYTES 16u /* a tick between two steps of the model */
+#define CONTROLLER_SCRUB_MS    1000u
+bool controller_is_sound(const controller_t *controller);
 
 /* Commands. Springs count from 0. They take effect in the next tick. */
 

@@ -72,17 +72,17 @@ typedef struct {
 
 typedef struct {
     drive_policy_parameters_t parameters;
+    uint8_t springs; /* up to here, and of the estimator up to its springs, by parameters alone */
+    uint8_t columns;
     spring_estimator_t estimator;
     supply_queue_t queue;       /* springs that heat */
     uint16_t overload_quarters; /* of a second */
     uint16_t sum_ma;            /* of the last targets */
-    uint8_t springs;
-    uint8_t columns;
-    uint8_t tick;           /* counts to the next in which no spring is updated */
-    uint8_t slot;           /* of the round in which each spring is updated once */
-    uint8_t sweep;          /* of the dither */
-    uint8_t stiffness_turn; /* whose stiffness is looked at next */
-    uint8_t walks;          /* turns in which no target jumps: the policy has changed */
+    uint8_t tick;               /* counts to the next in which no spring is updated */
+    uint8_t slot;               /* of the round in which each spring is updated once */
+    uint8_t sweep;              /* of the dither */
+    uint8_t stiffness_turn;     /* whose stiffness is looked at next */
+    uint8_t walks;              /* turns in which no target jumps: the policy has changed */
     drive_policy_spring_t spring[DRIVE_POLICY_MAX_SPRINGS];
 } drive_policy_t;
 

@@ -365,6 +365,11 @@ void thermal_model_set_fan(thermal_model_t *model, uint8_t percent)
     }
 }
 
+void thermal_model_refresh(thermal_model_t *model)
+{
+    thermal_model_apply_fan(model);
+}
+
 void thermal_model_reset(thermal_model_t *model, int16_t temperature_c7)
 {
     temperature_c7 = clamp_c7(temperature_c7);

@@ -78,47 +78,49 @@ typedef struct {
     int16_t austenite_finish_c7;
 } thermal_model_transformation_t;
 
-/* Derived from the parameters: internal, read it through the functions. */
+/* Derived from the parameters: internal, read it through the functions. In each of the three
+ * structs what the parameters alone decide comes first, and then what moves: the controller looks
+ * whether the former stays as it is. */
 typedef struct {
-    int32_t step_gain;      /* 2^48 1e-6 step / heat capacity: 2^-31 of 2^-23 K for 1/64 uW */
-    uint16_t loss_uw_per_k; /* at the present fan; natural and fan: with the fan off and full */
-    uint16_t loss_natural_uw_per_k;
+    int32_t step_gain; /* 2^48 1e-6 step / heat capacity: 2^-31 of 2^-23 K for 1/64 uW */
+    uint16_t loss_natural_uw_per_k; /* with the fan off, and full */
     uint16_t loss_fan_uw_per_k;
-    uint16_t loss_rise; /* uW/K per 1024 K */
-    uint16_t loss_rise_natural;
-    int16_t midstep_c6; /* temperature expected at the middle of the next step, Q9.6 degC */
+    uint16_t loss_rise_natural; /* uW/K per 1024 K */
     int16_t transformation_shift_c7;
     uint16_t contact_q16; /* 2^-16 ohm */
     uint8_t row;
     uint8_t column;
     spring_index_t upstream; /* spring from which the fan blows; THERMAL_MODEL_MAX_SPRINGS: none */
+    uint16_t loss_uw_per_k;  /* at the present fan, as loss_rise */
+    uint16_t loss_rise;
+    int16_t midstep_c6; /* temperature expected at the middle of the next step, Q9.6 degC */
 } thermal_model_spring_t;
 
 /* Air or plate: how flow becomes temperature. Internal. */
 typedef struct {
     int64_t gain;           /* 2^45 1e-6 step / heat capacity: 2^-28 of 2^-23 K for 1/64 uW */
     uint32_t loss_uw_per_k; /* to ambient */
-    int16_t midstep_c6;
     bool quick; /* a step is long against its own time: taken implicitly, not extrapolated */
+    int16_t midstep_c6;
 } thermal_model_slow_node_t;
 
 typedef struct {
     thermal_model_parameters_t parameters;
-    thermal_model_state_t state;
-    thermal_model_slow_node_t air;
-    thermal_model_slow_node_t plate;
     thermal_model_transformation_t transformation; /* of a spring that is not shifted */
     uint16_t heating_position;                     /* 2^21 / width of the transformation, 1/128 K */
     uint16_t cooling_position;
-    uint16_t latent_full_c8;      /* Q8.8 K: latent heat over heat capacity */
+    uint16_t latent_full_c8;   /* Q8.8 K: latent heat over heat capacity */
+    uint16_t radiation_factor; /* 1/64 uW at 512 K */
+    int16_t highest_c7;        /* of a spring: temperature plus latent heat must fit */
+    spring_index_t springs;
+    uint8_t fan_percent;
+    int16_t ambient_c7;
     uint16_t orthogonal_uw_per_k; /* at the present fan */
     uint16_t diagonal_uw_per_k;
     uint16_t wake_uw_per_k;
-    uint16_t radiation_factor; /* 1/64 uW at 512 K */
-    int16_t ambient_c7;
-    int16_t highest_c7; /* of a spring: temperature plus latent heat must fit */
-    uint8_t fan_percent;
-    spring_index_t springs;
+    thermal_model_state_t state;
+    thermal_model_slow_node_t air;
+    thermal_model_slow_node_t plate;
     thermal_model_spring_t spring[THERMAL_MODEL_MAX_SPRINGS];
 } thermal_model_t;
 
@@ -203,6 +205,9 @@ void thermal_model_get_state(const thermal_model_t *model, thermal_model_state_t
 /* False, and the model unchanged, if and only if the state is not one this model could be in. O(n).
  */
 bool thermal_model_set_state(thermal_model_t *model, const thermal_model_state_t *state);
+
+/* What the fan decides is taken from those anew. O(n), no division. */
+void thermal_model_refresh(thermal_model_t *model);
 
 /* Everything remembered is within its limits and fits together. O(n). */
 bool thermal_model_is_consistent(const thermal_model_t *model);

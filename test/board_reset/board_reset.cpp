@@ -125,6 +125,40 @@ void whatever_bit_turns_over_the_board_answers_and_nothing_stays_hot()
     }
 }
 
+/* A bit of RAM, in what the user set and in what the controller made of it: never driven by it for
+ * longer than two passes, never saved, and afterwards all is as it was saved and nothing is known.
+ */
+void a_setting_that_turns_over_by_itself_ends_in_a_reset_that_says_so()
+{
+    struct place {
+        const char *variable;
+        std::uint32_t offset;
+    };
+    for (const place &where :
+         {place{"controller", 0}, place{"controller", 41}, place{"settings", 7},
+          place{"settings", 120}, place{"settings", 225}}) {
+        rig mega;
+        heat(mega);
+        std::uint32_t size = 0;
+        auto *const bytes =
+            const_cast<std::uint8_t *>(board_variable(mega.raw(), where.variable, &size));
+        TEST_ASSERT_NOT_NULL(bytes);
+        TEST_ASSERT_TRUE(where.offset < size);
+        bytes[where.offset] ^= 0x10U;
+        mega.run_ms(2.0 * CONTROLLER_SCRUB_MS);
+        TEST_ASSERT_EQUAL_UINT_MESSAGE(1, board_reset_count(mega.raw()), where.variable);
+        TEST_ASSERT_TRUE(board_all_off(mega.raw()));
+        const std::string greeting = mega.boot(false) + mega.say("version");
+        TEST_ASSERT_TRUE_MESSAGE(contains(greeting, "memory"), greeting.c_str());
+        TEST_ASSERT_TRUE(mega.view().locked);
+        mega.expect_ok("unlock");
+        mega.expect_ok("on 5");
+        mega.run_ms(1000.0);
+        TEST_ASSERT_TRUE_MESSAGE(board_all_off(mega.raw()), "it takes the spring to be cold");
+        TEST_ASSERT_BITS_HIGH(DRIVE_POLICY_LIMIT_COOLING, mega.view().spring[4].limits);
+    }
+}
+
 void a_brown_out_leaves_the_board_locked()
 {
     rig mega;
@@ -223,6 +257,7 @@ int main()
     RUN_TEST(a_hang_ends_with_the_watchdog_and_leaves_the_board_locked);
     RUN_TEST(an_interrupt_that_nobody_has_ends_as_a_hang_does);
     RUN_TEST(whatever_bit_turns_over_the_board_answers_and_nothing_stays_hot);
+    RUN_TEST(a_setting_that_turns_over_by_itself_ends_in_a_reset_that_says_so);
     RUN_TEST(a_brown_out_leaves_the_board_locked);
     RUN_TEST(the_reset_button_keeps_the_models_temperatures);
     RUN_TEST(a_watchdog_reset_keeps_the_models_temperatures);

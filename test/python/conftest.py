@@ -15,6 +15,11 @@ from ninespring.logs import log_text
 Make = Callable[..., Path]
 
 
+def pytest_configure(config: pytest.Config) -> None:
+    """Name the mark of what takes minutes: a test of its own to ctest, of the label nightly."""
+    config.addinivalue_line("markers", "nightly: a whole journey, of minutes")
+
+
 @pytest.fixture(scope="session", autouse=True)
 def kept_elsewhere(tmp_path_factory: pytest.TempPathFactory) -> None:
     """Have what ninespring keeps on a computer (settings that boards had, console history) kept in a folder of the tests' own."""

@@ -83,6 +83,7 @@ def settings_of(port: str) -> dict[str, float]:
         return {name: float(value) for name, value in connection.settings().items()}
 
 
+@pytest.mark.nightly
 @pytest.mark.skipif(not SIM.exists(), reason=f"SKIPPED: {SIM} is not there: build it, or set NINESPRING_SIM")
 @pytest.mark.skipif(not ELF.exists(), reason=f"SKIPPED: {ELF} is not there: build the avr target first")
 def test_an_effect_found_in_a_log_is_in_the_model_of_the_chip_that_it_was_uploaded_to(

@@ -78,6 +78,7 @@ def interrupted(folder: Path, name: str, rows: int, how: signal.Signals, *words:
     return process.returncode, said
 
 
+@pytest.mark.nightly
 @pytest.mark.skipif(not SIM.exists(), reason=f"SKIPPED: {SIM} is not there: build it, or set NINESPRING_SIM")
 @pytest.mark.skipif(not ELF.exists(), reason=f"SKIPPED: {ELF} is not there: build the avr target first")
 def test_a_board_learns_its_array_in_one_command_that_is_stopped_and_killed_on_the_way(

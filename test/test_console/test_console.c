@@ -82,6 +82,9 @@ static void tick(void)
     }
     controller_tick(&controller, &inputs, &outputs);
     status.ticks++;
+    /* whatever is typed in these tests writes in the ways that are known */
+    TEST_ASSERT_TRUE(controller_is_sound(&controller));
+    TEST_ASSERT_TRUE(console_hold_settings(&console));
 }
 
 static void type(const char *text)
@@ -516,6 +519,8 @@ static void every_corner_of_the_settings_is_answered_in_numbers(void)
                     continue;
                 }
                 active++;
+                console_init(&console, &output, &controller, &settings, &store, &learnt, &telemetry,
+                             &status);
                 (void)controller_set_target(&controller, 0, 1000);
                 for (int t = 0; t < 150; t++) {
                     tick();
@@ -924,6 +929,37 @@ static void documentation_names_every_error_fault_and_word(void)
     }
 }
 
+/* `$save` would keep what nobody set. */
+static void a_setting_that_turned_over_is_found_and_never_saved(void)
+{
+    for (size_t at = 0; at < sizeof settings; at += 5) {
+        setUp();
+        ((uint8_t *)&settings)[at] ^= 0x20u;
+        if (at % 2 == 0) {
+            const uint16_t before = console.scrub.sealed;
+            type("echo off\n"); /* a line that sets nothing seals nothing */
+            TEST_ASSERT_EQUAL_UINT(before, console.scrub.sealed);
+            for (size_t tick_of_two = 0; tick_of_two < sizeof settings / 4; tick_of_two++) {
+                (void)console_hold_settings(&console);
+            }
+        } else {
+            (void)ask("$save");
+            TEST_ASSERT_NOT_NULL(strstr(said, "error:14"));
+            TEST_ASSERT_EQUAL_UINT8(0xFF, memory[0]);
+        }
+        TEST_ASSERT_FALSE(console_hold_settings(&console));
+    }
+    static const char *const writers[] = {"$loss_w_per_k=0.006", "$defaults", "policy open",
+                                          "ambient 21"};
+    for (size_t n = 0; n < sizeof writers / sizeof writers[0]; n++) {
+        setUp();
+        settings.board.sensor_averaging ^= 8u;
+        type(writers[n]);
+        console_receive(&console, '\n');
+        TEST_ASSERT_FALSE_MESSAGE(console_hold_settings(&console), writers[n]);
+    }
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -957,6 +993,7 @@ int main(void)
     RUN_TEST(model_says_how_long_a_spring_waits_and_when_it_is_away);
     RUN_TEST(learnt_says_what_is_known_and_clear_forgets_it);
     RUN_TEST(a_host_that_falls_silent_switches_its_springs_off);
+    RUN_TEST(a_setting_that_turned_over_is_found_and_never_saved);
     RUN_TEST(random_bytes_get_one_answer_a_line);
     RUN_TEST(codes_table_holds_what_the_code_says);
     RUN_TEST(documentation_names_every_error_fault_and_word);

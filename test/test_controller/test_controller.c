@@ -781,6 +781,96 @@ static void any_input_is_taken_and_the_same_input_gives_the_same_output(void)
     }
 }
 
+/* ---- RAM that turns over ---- */
+
+#define PASSES_TICKS 700 /* two passes over 64 springs */
+
+/* One byte of each part; the last one of a stretch, where there is a choice. */
+static void what_settings_decide_and_a_bit_turned_over_drives_nothing(void)
+{
+    void *const places[] = {&controller.model.parameters.rows,
+                            &controller.model.parameters.step_ms,
+                            &controller.model.springs,
+                            &controller.model.highest_c7,
+                            &controller.model.air.gain,
+                            &controller.model.plate.quick,
+                            &controller.model.spring[3].step_gain,
+                            &controller.model.spring[63].upstream,
+                            &controller.ceiling.v_per_step,
+                            &controller.ceiling.w_per_v2,
+                            &controller.current.parameters,
+                            &controller.current.integral_q16,
+                            &controller.safety.parameters.temperature_trip_cc,
+                            &controller.safety.temperature_trip_c7,
+                            &controller.safety.springs,
+                            &controller.policy.parameters.boost_current_ma,
+                            &controller.policy.columns,
+                            &controller.policy.estimator.springs,
+                            &controller.policy.estimator.change};
+    settings.safety.cut_off = 1;
+    for (size_t n = 0; n < sizeof places / sizeof places[0]; n++) {
+        start();
+        TEST_ASSERT_TRUE(controller_set_target(&controller, 0, 1000));
+        run(60);
+        TEST_ASSERT_TRUE(outputs.duty[0] != 0);
+        TEST_ASSERT_TRUE(outputs.supply);
+        *(uint8_t *)places[n] ^= 4u;
+        const controller_t as_it_is = controller;
+        controller_settings_t other = settings;
+        other.safety.maximum_on_s = 7;
+        TEST_ASSERT_FALSE_MESSAGE(controller_apply_settings(&controller, &other, NULL),
+                                  "sealed by other settings");
+        controller = as_it_is;
+        (void)controller_set_policy(&controller, DRIVE_POLICY_OPEN);
+        TEST_ASSERT_FALSE_MESSAGE(controller_is_sound(&controller), "sealed by another policy");
+        controller = as_it_is;
+        *(uint8_t *)places[n] ^= 4u; /* with most of them no tick is to be run */
+        TEST_ASSERT_TRUE(controller_is_sound(&controller));
+        controller.safety.parameters.maximum_on_s ^= 4u;
+        run(PASSES_TICKS);
+        TEST_ASSERT_FALSE(controller_is_sound(&controller));
+        TEST_ASSERT_EQUAL_UINT(0, outputs.duty[0]);
+        TEST_ASSERT_FALSE(outputs.supply);
+    }
+    start();
+    TEST_ASSERT_TRUE(controller_is_sound(&controller));
+}
+
+static void what_writes_settings_is_no_bit_that_turned_over(void)
+{
+    controller_set_pattern(&controller, (bool[CONTROLLER_MAX_SPRINGS]){true, true});
+    run(100);
+    TEST_ASSERT_TRUE(controller_set_policy(&controller, DRIVE_POLICY_PRECOMPENSATE));
+    TEST_ASSERT_TRUE(controller_set_fan(&controller, 60));
+    inputs.fan_percent = 60;
+    run(PASSES_TICKS);
+    settings.model.loss_uw_per_k = 6000;
+    settings.safety.maximum_on_s = 7;
+    TEST_ASSERT_TRUE(controller_apply_settings(&controller, &settings, NULL));
+    run(PASSES_TICKS);
+    temperature_ceiling_t delivered;
+    controller_get_delivered(&controller, &delivered);
+    controller_set_delivered(&controller, &delivered);
+    controller_set_temperature(&controller, 30 * 128);
+    controller_clear_faults(&controller);
+    inputs.ambient_c7 = 25 * 128;
+    run(PASSES_TICKS);
+    settings.model.rows = 2;
+    TEST_ASSERT_TRUE(controller_apply_settings(&controller, &settings, NULL));
+    run(PASSES_TICKS);
+    TEST_ASSERT_TRUE(controller_is_sound(&controller));
+}
+
+/* What the fan decides of the conductances is taken anew with each pass. */
+static void a_conductance_of_the_fan_that_turned_over_comes_back(void)
+{
+    const uint16_t loss_uw_per_k = controller.model.spring[1].loss_uw_per_k;
+    controller.model.spring[1].loss_uw_per_k ^= 0x1000u;
+    run(PASSES_TICKS);
+    TEST_ASSERT_EQUAL_UINT(loss_uw_per_k, controller.model.spring[1].loss_uw_per_k);
+    TEST_ASSERT_TRUE(controller_is_sound(&controller));
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -814,6 +904,9 @@ int main(void)
     RUN_TEST(each_number_of_the_model_changes_its_mark);
     RUN_TEST(another_declared_resistance_is_taken_where_none_was_learnt);
     RUN_TEST(another_size_starts_anew_but_stays_locked);
+    RUN_TEST(what_settings_decide_and_a_bit_turned_over_drives_nothing);
+    RUN_TEST(what_writes_settings_is_no_bit_that_turned_over);
+    RUN_TEST(a_conductance_of_the_fan_that_turned_over_comes_back);
     RUN_TEST(any_input_is_taken_and_the_same_input_gives_the_same_output);
     return UNITY_END();
 }
