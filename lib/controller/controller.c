@@ -371,6 +371,17 @@ static bool targets_are_allowed(const controller_t *controller, const bool allow
     return sum_ma <= controller->safety.parameters.supply_limit_ma;
 }
 
+static bool duties_are_allowed(const controller_t *controller, const bool allowed[],
+                               const uint16_t duty[])
+{
+    for (uint8_t k = 0; k < controller->springs; k++) {
+        if (duty[k] > CONTROLLER_DUTY_MAX || (duty[k] != 0 && !allowed[k])) {
+            return false;
+        }
+    }
+    return true;
+}
+
 static void drive(controller_t *controller, const bool valid[], uint32_t sum_ma, uint16_t duty[])
 {
     bool allowed[CONTROLLER_MAX_SPRINGS];
@@ -401,6 +412,7 @@ static void drive(controller_t *controller, const bool valid[], uint32_t sum_ma,
         sum_ma + controller->policy.parameters.supply_reserve_ma <= limits->supply_limit_ma;
     current_control_tick(&controller->current, controller->springs, target_ma,
                          controller->measured_ma, valid, may_rise, duty);
+    INVARIANT(duties_are_allowed(controller, allowed, duty));
     for (uint8_t k = 0; k < controller->springs; k++) {
         if ((drive_policy_limits(&controller->policy, k) & DRIVE_POLICY_LIMIT_TRIP) != 0) {
             safety_trip(&controller->safety, k, SAFETY_FAULT_LIMIT_TRIP);

@@ -161,7 +161,7 @@ void what_stops_its_pulses_stops_the_supply()
     } ends[] = {
         {"interrupts off for ever", LIMIT_MS,
          [](rig &m) {
-             board_flip_register(m.raw(), 0x5F, 0x80);
+             board_flip(m.raw(), 0x5F, 0x80);
              board_hang(m.raw());
          }},
         {"crystal stopped", LIMIT_MS, [](rig &m) { board_stop_oscillator(m.raw()); }},
@@ -214,7 +214,7 @@ void a_bit_of_the_pin_that_turns_over_is_written_again()
     for (const auto &one : bits) {
         for (int k = 0; k < 10; ++k) { /* at any moment of a tick */
             mega.run_ms(23.0);
-            board_flip_register(mega.raw(), one.address, one.mask);
+            board_flip(mega.raw(), one.address, one.mask);
             for (int ms = 0; ms < 150; ms += 5) {
                 mega.run_ms(5.0);
                 TEST_ASSERT_TRUE(board_is_fed(mega.raw()));

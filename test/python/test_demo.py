@@ -43,7 +43,7 @@ def test_the_demo_finds_what_nobody_declared_and_drives_better_right_after_its_u
     monkeypatch.setattr(demo, "DRIVE_STEPS", demo.DRIVE_STEPS.replace("fan 0\n", "fan 0\nmodel cold\n"))
     text = re.sub(r"<[^>]*>", "", demo.undeclared())
     assert re.search(rf"names\s+{demo.EFFECT}", text), text
-    before, after = (float(re.search(rf"([\d.]+) K\s+{word}", text)[1]) for word in ("wrong \\(", "wrong\\."))
+    before, after = (float(re.search(rf"([\d.]+) K\s+{word}", text)[1]) for word in ("wrong after", "wrong\\."))
     assert before > 2.0 and after < 0.5 * before
     assert ("before" in text and "What is left" in text) or "No spring loses its phase" in text
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import errno
 import os
-import termios
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -13,13 +12,18 @@ from pathlib import Path
 
 import serial
 
+try:
+    from termios import error as terminal_error
+except ImportError:  # Windows
+    terminal_error = OSError
+
 from .errors import InputError, WorkError
 
 BAUD = 115200
 LONGEST_LINE = 8192
 """Bytes: what is longer has no line ends and is no console."""
-GONE = (serial.SerialException, OSError, termios.error)
-"""What pyserial raises when a cable is pulled; termios.error is no OSError."""
+GONE = (serial.SerialException, OSError, terminal_error)
+"""What pyserial raises when a cable is pulled; the error of termios is no OSError."""
 
 
 class Port:
@@ -90,7 +94,7 @@ def _how_to_be_allowed(name: str) -> str:
     """Return what gives a user the port: on Debian its group is dialout."""
     try:
         group = Path(name).group()
-    except (OSError, KeyError):
+    except (OSError, KeyError, NotImplementedError):
         group = "dialout"
     if group == "root":
         return "only root may"
