@@ -7,9 +7,9 @@
 #include <cstring>
 #include <fmt/format.h>
 #include <fstream>
-#include <sstream>
 #include <thread>
 
+#include "bench.h"
 #include "board.h"
 #include "board_pty.h"
 #include "scenario_plant.h"
@@ -32,12 +32,11 @@ void on_signal(int)
 struct board_arguments {
     plant_arguments array;
     thermometer_arguments thermometers;
+    bench_arguments wiring;
     std::string elf;
     std::string speed = "1";
     std::string eeprom;
     double duration_s = 0.0; /* 0: until interrupted */
-    bool without_springs = false;
-    std::vector<std::string> wiring;
 };
 
 /* 0 is as fast as it goes. */
@@ -185,66 +184,13 @@ private:
     board_pty_t pty_{};
 };
 
-/* Springs of a mistake, `name=K` or `name=K,L`. */
-std::vector<unsigned> channels_of(const std::string &text, std::size_t count)
-{
-    std::vector<unsigned> channels;
-    std::istringstream numbers(text.substr(std::min(text.find('=') + 1, text.size())));
-    for (std::string one; std::getline(numbers, one, ',');) {
-        double number = 0.0;
-        if (!parse_number(one, number).empty() || number != std::floor(number) || number < 1.0 ||
-            number > BOARD_CHANNELS) {
-            break;
-        }
-        channels.push_back(static_cast<unsigned>(number) - 1u);
-    }
-    if (channels.size() != count || (count == 2 && channels[0] == channels[1])) {
-        throw input_error(fmt::format("--wiring {}: name {} of 1 to {}", in_quotes(text),
-                                      count == 1 ? "a spring" : "two springs, as in swapped=3,4,",
-                                      BOARD_CHANNELS));
-    }
-    return channels;
-}
-
-/* What a hand may wire wrongly: before anything is switched on, and for good. */
-void miswire(board_t *board, const std::string &mistake)
-{
-    const std::string name = mistake.substr(0, mistake.find('='));
-    if (name == "swapped") {
-        const std::vector<unsigned> two = channels_of(mistake, 2);
-        board_swap_sensors(board, two[0], two[1]);
-    } else if (name == "half-shunt") {
-        board_scale_sensor(board, channels_of(mistake, 1)[0], 0.5, 1.0);
-    } else if (name == "reversed") {
-        board_scale_sensor(board, channels_of(mistake, 1)[0], -1.0, 1.0);
-    } else if (name == "open") {
-        board_set_fault(board, BOARD_FAULT_OPEN, channels_of(mistake, 1)[0], true);
-    } else if (name == "absent") {
-        board_set_fault(board, BOARD_FAULT_NACK, channels_of(mistake, 1)[0], true);
-    } else if (mistake == "no-pull-up") {
-        board_set_fault(board, BOARD_FAULT_SDA_LOW, 0, true);
-    } else {
-        throw input_error(fmt::format("--wiring {}: one of swapped=K,L half-shunt=K reversed=K "
-                                      "open=K absent=K no-pull-up",
-                                      in_quotes(mistake)));
-    }
-}
-
 void run_board(const board_arguments &arguments)
 {
     const double speed = speed_of(arguments.speed);
-    plant_arguments described = arguments.array;
-    if (arguments.without_springs) { /* 0.22 ohm, 10 W, on a plate: they hardly warm */
-        described.sets.insert(described.sets.begin(),
-                              {"plant.resistance_ohm=0.22", "plant.heat_capacity_j_per_k=20",
-                               "plant.loss_w_per_k=0.06"});
-    }
-    const described_plant array = describe_plant(described);
+    const described_plant array = describe_plant(arguments.array);
     simulated_board board(arguments.elf, array.plant.get(), array.seed, array.shunt_noise_v,
                           array.bus_noise_v);
-    for (const std::string &mistake : arguments.wiring) {
-        miswire(board.get(), mistake);
-    }
+    bench around(arguments.wiring, board.get());
     eeprom_file eeprom(arguments.eeprom, board.get());
     terminal port;
     thermometers logger(arguments.thermometers, array.plant.get(), array.seed);
@@ -269,6 +215,7 @@ void run_board(const board_arguments &arguments)
         if (board_send_backlog(board.get()) < sizeof bytes) {
             const std::size_t count = board_pty_read(port.get(), bytes, sizeof bytes);
             if (count > 0) {
+                around.look_again(); /* before what comes is obeyed */
                 to_client.heard(board_time_s(board.get()));
             }
             board_send(board.get(), bytes, count);
@@ -307,13 +254,8 @@ void add_command_board(CLI::App &app)
         ->capture_default_str();
     command->add_option("--eeprom", arguments->eeprom,
                         "File that keeps the EEPROM; made if it is not there");
-    command->add_flag("--without-springs", arguments->without_springs,
-                      "Resistors of 0.22 ohm in their places, as for a first power-up");
-    command->add_option("--wiring", arguments->wiring,
-                        "A mistake: swapped=K,L (addresses or outputs of two springs) "
-                        "half-shunt=K (R050) reversed=K (sensor) open=K (gate or spring) absent=K "
-                        "(address) no-pull-up (bus)");
     add_plant_options(*command, arguments->array);
+    add_bench_options(*command, arguments->wiring);
     add_thermometer_options(*command, arguments->thermometers);
     add_seconds_option(*command, "--duration", arguments->duration_s,
                        "Simulated seconds after which it ends; 0: never");

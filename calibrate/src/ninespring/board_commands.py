@@ -1,4 +1,4 @@
-"""The commands that talk to a board: record, upload, monitor, bringup."""
+"""The commands that talk to a board: record, upload, monitor."""
 
 from __future__ import annotations
 
@@ -187,79 +187,7 @@ def monitor(port: str, hz: int, duration: float) -> None:
         board.ask("telemetry off")
 
 
-@click.command(
-    cls=Command,
-    epilog="""\b
-Examples:
-  ninespring bringup --port /dev/ttyACM0
-  ninespring bringup --port /dev/ttyACM0 --again sensors
-  ninespring-sim board --without-springs --wiring swapped=3,4     # to try it at
-""",
-)
-@PORT
-@click.option(
-    "-o",
-    "--output",
-    type=FILE,
-    default=Path("bringup.html"),
-    show_default=True,
-    help="page; beside it a .json to resume from",
-)
-@click.option("--again", "again", metavar="STEP", help="repeat from this step on, though it was right before")
-@click.option("--to", "last", metavar="STEP", default="springs", show_default=True, help="the last step")
-@click.option("--yes", is_flag=True, help="do not ask before each step")
-def bringup(port: str, output: Path, again: str | None, last: str, yes: bool) -> None:
-    """Bring up a new board in a conversation: what to do, what is measured, what is wrong, in the order of docs/building.md.
-
-    Steps: board, sensors, supply, channels (on resistors of 0.22 ohm), air, spring, springs. A step that was right before is left out. Ends with 1 at the
-    first step in which something is wrong: mend it and type the same again.
-    """
-    from . import bringup as steps
-    from .board import Board
-
-    for one in (again, last):
-        if one is not None and one not in steps.STEPS:
-            raise InputError(f"there is no step '{one}': {', '.join(steps.STEPS)}")
-    kept = output.with_suffix(".json")
-    if output.exists() and not kept.exists():
-        raise InputError("this is not a page that bringup has begun: name another one", str(output))
-    done = steps.load(kept)
-    names = list(steps.STEPS)
-    if again:
-        done = {name: step for name, step in done.items() if names.index(name) < names.index(again)}
-    wanted = [one for one in names[: names.index(last) + 1] if one not in done or not done[one].passed]
-    with Board(port) as board:
-        was = steps.prepared(board)
-        try:
-            for name in wanted:
-                title, what, _ = steps.STEPS[name]
-                out.print(f"\n{title}. {what}", markup=False, highlight=False)
-                if not yes and not click.confirm("Done?", default=True):
-                    break
-                step = steps.do_step(board, name)
-                done[name] = step
-                steps.save(output, done)
-                for row in step.numbers:
-                    out.print(
-                        "  " + ": ".join(row[:2]) + (f" (should be {row[2]})" if row[2] else ""),
-                        markup=False,
-                        highlight=False,
-                    )
-                if not step.passed:
-                    raise WorkError(
-                        f"{title}: {'; '.join(step.found)}. Told in {output}; mend it, then the same command again"
-                    )
-                out.print("  right", markup=False)
-        finally:
-            steps.given_back(board, was)
-    left = [one for one in names if one not in done]
-    out.print(
-        f"\n{len(done)} of {len(names)} steps are right -> {output}" + (f"; next: {left[0]}" if left else ""),
-        markup=False,
-    )
-
-
 def add_board_commands(group: click.Group) -> None:
     """Add the commands to the command line."""
-    for one in (record, upload, monitor, bringup):
+    for one in (record, upload, monitor):
         group.add_command(one)
