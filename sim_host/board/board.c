@@ -196,6 +196,7 @@ board_t *board_create(const board_options_t *options, char *error, size_t error_
     }
     for (unsigned k = 0; k < BOARD_CHANNELS; k++) {
         board->stage_of_sensor[k] = k;
+        board->pin_of_stage[k] = k;
         board->sensor[k].shunt_noise_v = options->shunt_noise_v;
         board->sensor[k].bus_noise_v = options->bus_noise_v;
         electrics_noise_seed(&board->sensor[k].noise, options->seed + k);

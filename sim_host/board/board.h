@@ -42,6 +42,8 @@ typedef enum {
 typedef enum {
     BOARD_FAULT_OPEN = 0, /* spring broken */
     BOARD_FAULT_SHORT,    /* spring's ends connected */
+    BOARD_FAULT_RESISTOR, /* a resistor in the spring's place (ELECTRICS_DUMMY_OHM) */
+    BOARD_FAULT_GATE,     /* its switch's gate is not connected: never on */
     BOARD_FAULT_CLOSED,   /* its switch has failed closed: full duty whatever the pin says */
     BOARD_FAULT_NACK,     /* its INA219 does not answer */
     BOARD_FAULT_STALE,    /* its INA219 converts no more, and says so: CNVR stays clear */
@@ -141,6 +143,8 @@ void board_scale_sensor(board_t *board, unsigned channel, double current_scale,
                         double voltage_scale);
 /* The two INA219s change their places in the stages; done twice, they are back. */
 void board_swap_sensors(board_t *board, unsigned a, unsigned b);
+/* The pins' wires to the gates of two channels change places; done twice, they are back. */
+void board_swap_gates(board_t *board, unsigned a, unsigned b);
 /* The INA219 loses its configuration. */
 void board_reset_sensor(board_t *board, unsigned channel);
 /* A register (0..5) of an INA219, without side effects. */

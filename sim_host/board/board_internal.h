@@ -42,6 +42,8 @@ struct board {
     uint64_t synchronised_cycle;
     uint64_t plant_cycle;
     uint64_t next_plant_cycle;
+    unsigned pin_of_stage[BOARD_CHANNELS]; /* which output its gate is wired to */
+    bool gate_open[BOARD_CHANNELS];
     bool switch_closed[BOARD_CHANNELS]; /* whatever the pin says */
     bool fan_stopped;
     electrics_cut_off_t cut_off;

@@ -65,7 +65,7 @@ bool board_is_fed(const board_t *board)
 
 static double switched_on(const board_t *board, unsigned k)
 {
-    const double duty = board->pwm.duty[k];
+    const double duty = board->gate_open[k] ? 0.0 : board->pwm.duty[board->pin_of_stage[k]];
     if (board->switch_closed[k] || (board->oscillator_stopped && duty > 0.0)) {
         return 1.0;
     }
@@ -246,18 +246,37 @@ double board_current_a(const board_t *board, unsigned channel)
     return board->current_a[channel];
 }
 
+static plant_fault_t fault_of_spring(board_fault_t fault, bool on)
+{
+    if (!on) {
+        return PLANT_FAULT_NONE;
+    }
+    switch (fault) {
+    case BOARD_FAULT_OPEN:
+        return PLANT_FAULT_OPEN;
+    case BOARD_FAULT_RESISTOR:
+        return PLANT_FAULT_RESISTOR;
+    default:
+        return PLANT_FAULT_SHORT;
+    }
+}
+
 void board_set_fault(board_t *board, board_fault_t fault, unsigned channel, bool on)
 {
-    plant_fault_t wanted = fault == BOARD_FAULT_OPEN ? PLANT_FAULT_OPEN : PLANT_FAULT_SHORT;
+    const plant_fault_t wanted = fault_of_spring(fault, on);
     board_handle_events(board, board->avr->cycle);
     switch (fault) {
     case BOARD_FAULT_OPEN:
     case BOARD_FAULT_SHORT:
+    case BOARD_FAULT_RESISTOR:
         if (board->array.step != NULL && channel < board->springs) {
-            board->array.fault(board->array.context, channel, on ? wanted : PLANT_FAULT_NONE);
+            board->array.fault(board->array.context, channel, wanted);
         } else if (board->plant != NULL && channel < board->springs) {
-            (void)plant_set_fault(board->plant, (int)channel, on ? wanted : PLANT_FAULT_NONE);
+            (void)plant_set_fault(board->plant, (int)channel, wanted);
         }
+        break;
+    case BOARD_FAULT_GATE:
+        board->gate_open[channel] = on;
         break;
     case BOARD_FAULT_CLOSED:
         board->switch_closed[channel] = on;
@@ -314,6 +333,16 @@ void board_swap_sensors(board_t *board, unsigned a, unsigned b)
     unsigned stage = board->stage_of_sensor[a];
     board->stage_of_sensor[a] = board->stage_of_sensor[b];
     board->stage_of_sensor[b] = stage;
+}
+
+void board_swap_gates(board_t *board, unsigned a, unsigned b)
+{
+    board_handle_events(board, board->avr->cycle);
+    const unsigned pin = board->pin_of_stage[a];
+    board->pin_of_stage[a] = board->pin_of_stage[b];
+    board->pin_of_stage[b] = pin;
+    board_move_plant(board, board->avr->cycle);
+    board_schedule(board);
 }
 
 void board_reset_sensor(board_t *board, unsigned channel)

@@ -9,6 +9,7 @@
 #include <fstream>
 #include <thread>
 
+#include "bench.h"
 #include "board.h"
 #include "board_pty.h"
 #include "scenario_plant.h"
@@ -31,6 +32,7 @@ void on_signal(int)
 struct board_arguments {
     plant_arguments array;
     thermometer_arguments thermometers;
+    bench_arguments wiring;
     std::string elf;
     std::string speed = "1";
     std::string eeprom;
@@ -188,6 +190,7 @@ void run_board(const board_arguments &arguments)
     const described_plant array = describe_plant(arguments.array);
     simulated_board board(arguments.elf, array.plant.get(), array.seed, array.shunt_noise_v,
                           array.bus_noise_v);
+    bench around(arguments.wiring, board.get());
     eeprom_file eeprom(arguments.eeprom, board.get());
     terminal port;
     thermometers logger(arguments.thermometers, array.plant.get(), array.seed);
@@ -212,6 +215,7 @@ void run_board(const board_arguments &arguments)
         if (board_send_backlog(board.get()) < sizeof bytes) {
             const std::size_t count = board_pty_read(port.get(), bytes, sizeof bytes);
             if (count > 0) {
+                around.look_again(); /* before what comes is obeyed */
                 to_client.heard(board_time_s(board.get()));
             }
             board_send(board.get(), bytes, count);
@@ -251,6 +255,7 @@ void add_command_board(CLI::App &app)
     command->add_option("--eeprom", arguments->eeprom,
                         "File that keeps the EEPROM; made if it is not there");
     add_plant_options(*command, arguments->array);
+    add_bench_options(*command, arguments->wiring);
     add_thermometer_options(*command, arguments->thermometers);
     add_seconds_option(*command, "--duration", arguments->duration_s,
                        "Simulated seconds after which it ends; 0: never");

@@ -20,6 +20,8 @@ typedef enum {
     ELECTRICS_FAULT_SHORT /* ELECTRICS_SHORT_OHM between the spring's ends */
 } electrics_fault_t;
 #define ELECTRICS_SHORT_OHM 0.005
+/* Stands in for a spring at a first power-up (docs/building.md). */
+#define ELECTRICS_DUMMY_OHM 0.22
 
 /* Share of the period for which a fast-PWM output (mode 14, ICR = top) is high: (compare + 1) /
  * (top + 1), so compare = 0 is a pulse of one clock, not off. Off (0) only with the output

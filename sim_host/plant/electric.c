@@ -25,8 +25,14 @@ static double resistance_at(const plant_t *p, int i, double t, double austenite)
 /* Between the terminals, contact and faults included; an open spring is left to its callers. */
 static double terminal_ohm(const plant_t *p, int i, double t, double austenite)
 {
-    return p->fault[i] == PLANT_FAULT_SHORT ? ELECTRICS_SHORT_OHM
-                                            : resistance_at(p, i, t, austenite) + p->contact_ohm[i];
+    switch (p->fault[i]) {
+    case PLANT_FAULT_SHORT:
+        return ELECTRICS_SHORT_OHM;
+    case PLANT_FAULT_RESISTOR:
+        return ELECTRICS_DUMMY_OHM;
+    default:
+        return resistance_at(p, i, t, austenite) + p->contact_ohm[i];
+    }
 }
 
 /* Of the power at its terminals, what heats spring i: the rest heats its contact, which is at the

@@ -184,7 +184,7 @@ plant_status_t plant_set_fault(plant_t *p, int spring, plant_fault_t fault)
 {
     if (spring < 0 || spring >= p->n)
         return PLANT_ERROR_INDEX;
-    if (fault != PLANT_FAULT_NONE && fault != PLANT_FAULT_OPEN && fault != PLANT_FAULT_SHORT)
+    if ((unsigned)fault > PLANT_FAULT_RESISTOR)
         return PLANT_ERROR_RANGE;
     p->fault[spring] = fault;
     p->inputs_changed = true;

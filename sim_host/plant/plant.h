@@ -106,8 +106,10 @@ typedef enum {
 plant_status_t plant_drive(plant_t *plant, int spring, plant_drive_mode_t mode, double quantity);
 typedef enum {
     PLANT_FAULT_NONE = 0,
-    PLANT_FAULT_OPEN, /* no current, whatever the drive */
-    PLANT_FAULT_SHORT /* the current flows beside the spring (5 milliohm), which stays cold */
+    PLANT_FAULT_OPEN,    /* no current, whatever the drive */
+    PLANT_FAULT_SHORT,   /* the current flows beside the spring (5 milliohm), which stays cold */
+    PLANT_FAULT_RESISTOR /* and here through ELECTRICS_DUMMY_OHM in its place, as before a first
+                            spring is in */
 } plant_fault_t;
 plant_status_t plant_set_fault(plant_t *plant, int spring, plant_fault_t fault);
 plant_status_t plant_set_fan(plant_t *plant, double fraction); /* 0..1 */

@@ -186,6 +186,9 @@ static void faults_stop_the_heat(void)
     TEST_ASSERT_EQUAL_DOUBLE(20.0, at(0));
     TEST_ASSERT_EQUAL_DOUBLE(20.0, at(1));
     TEST_ASSERT_TRUE(at(2) > 40.0);
+    OK(plant_set_fault(plant, 1, PLANT_FAULT_RESISTOR));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.5 / (0.18 + ELECTRICS_DUMMY_OHM), plant_current_a(plant, 1));
+    TEST_ASSERT_EQUAL_DOUBLE(0.0, plant_power_w(plant, 1));
     OK(plant_set_fault(plant, 0, PLANT_FAULT_NONE));
     OK(plant_step(plant, 50.0));
     TEST_ASSERT_TRUE(at(0) > 40.0);

@@ -12,6 +12,7 @@ import click
 
 from . import __version__
 from .board_commands import add_board_commands
+from .bringup_command import bringup
 from .calibration.command import calibrate
 from .console import Group, err
 from .dashboard.command import dashboard
@@ -56,6 +57,7 @@ for command in (
     scenario,
     dashboard,
     calibrate,
+    bringup,
     settings,
     console,
 ):
