@@ -25,10 +25,10 @@ from ..fit.spec import RUNS_OWN, Fit, Spec
 from ..logs import condense
 from ..logs.run import Run
 from ..models import Array, Model
-from ..search import search, unnamed
+from ..search import lasting, search, unnamed
 from ..search.certainty import CERTAIN, NAMED, Witness, witness
 from ..search.evidence import EQUIVALENT, difference, excess, log_evidence, unexplained
-from . import contacts, doubt, experiments, plausibility, resistance, runs_apart, unknown_heat
+from . import contacts, doubt, experiments, plausibility, resistance, runs_apart, unknown_heat, unseen
 from .residual import depends_on
 from .result import DRIFT_LEFT_OUT, as_shown, model_of, parameters_of
 
@@ -284,8 +284,10 @@ def _diagnose(
         final, without, contenders = found.run()
     problem.learn_power(final.spec, final.values)
     hidden: list[unnamed.Hidden] = []
-    if not swapped and unexplained(problem, final) and (beside := unnamed.search_beside(problem, found, final)):
-        found, (final, without, contenders), hidden = beside
+    if not swapped and unexplained(problem, final):
+        found, (final, without, contenders), hidden = _where_something_is_left(
+            problem, found, final, without, contenders
+        )
     declared_alone, base = base, found.base
     progress("held-out blocks")
     final = _finish(problem, final)
@@ -313,6 +315,15 @@ def _diagnose(
         judge = search.Search(problem, others, found.base, progress, found.fits)
         final, without, contenders = judge.settle(judge.forward(final))
         final = _finish(problem, final)
+    progress("a run that the fit never saw")
+    judged_by = unseen.Unseen(problem, found, found.base)
+    not_kept: list[str] = []
+    if not hidden and len(problem.runs) > 1:
+        kept, not_kept = judged_by.kept(final, judge.reduced)
+        if not_kept:
+            final = _finish(problem, kept)
+            without = {e: judge.reduced(final, e) for e in final.spec.effects if e not in base.spec.effects}
+    headline = judged_by.as_dict(final)
     final = runs_apart.with_spread(problem, final)
     left_over = unexplained(problem, final) or bool(hidden)
     adopted = [e for e in final.spec.effects if e not in base.spec.effects]
@@ -373,6 +384,7 @@ def _diagnose(
     rho = statistics.autocorrelation([r / n for r, n in zip(final.residual, problem.noise, strict=True)], 1)
     depends, note = depends_on(problem, final)
     warnings = [f"{Path(run.name).name}: {text}" for run in problem.runs for text in run.notes]
+    warnings += not_kept
     if any(free.knot is not None for free in final.spec.free):
         warnings.append(f"model.toml: {DRIFT_LEFT_OUT}; log ambient_c to have it predicted")
     if left_over and problem.budget.short:
@@ -392,6 +404,11 @@ def _diagnose(
         note = ("structure well above the noise remains that no effect of the library explains. " + note).strip()
     else:
         note = note or "white at the noise floor"
+    absent = found.absent(final)
+    if problem.colour is not None:
+        slopes = problem.plain_slopes(final)
+        problem.take_for(None)
+        final = replace(final, jacobian=slopes)
     heat = unknown_heat.find(problem, final, progress)
     result: dict[str, Any] = {
         "schema": SCHEMA,
@@ -411,6 +428,7 @@ def _diagnose(
             "holdout_rmse_c": final_out,
             "parameters": parameters_of(problem, final),
         },
+        **({"unseen": headline} if headline else {}),
         "unexplained": bool(left_over),
         "unknown_heat": heat.as_dict(),
         "runs_differ": runs_differ,
@@ -445,12 +463,31 @@ def _diagnose(
         "seconds": round(time.monotonic() - begun, 2),
         "simulations": problem.simulations,
     }
-    made = model_of(problem, final, as_shown(problem, final), result, found.absent(final))
+    made = model_of(problem, final, as_shown(problem, final), result, absent)
     resistance.into_model(made, second)
     doubt.into_model(made, problem, final, doubts)
     judged(result["effects"], made)
     validate(result)
     return Diagnosis(result, made, problem, base, final, heat)
+
+
+def _where_something_is_left(
+    problem: Problem, first: search.Search, final: Fit, without: dict[str, Fit], contenders: list[tuple[str, Fit]]
+) -> unnamed.Beside:
+    """Search again, beside causes without a name and with what is left taken for noise that lasts: the likelier of both."""
+    found, result, hidden = unnamed.search_beside(problem, first, final) or (first, (final, without, contenders), [])
+    taken = problem.unnamed, problem.heat
+    begun = lasting.nats_beside(problem, result[0], hidden, unnamed.KINDS)
+    if not all(one.possible for one in hidden):
+        begun = -math.inf
+    problem.leave_out(None)
+    first.progress("noise that lasts")
+    search_, other = lasting.search_lasting(problem, first, final)
+    if lasting.nats_beside(problem, other[0], (), 1) > begun:
+        return search_, other, []
+    problem.unnamed, problem.heat = taken
+    problem.take_for(None)
+    return found, result, hidden
 
 
 def finite(value: float) -> float | None:

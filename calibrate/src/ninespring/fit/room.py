@@ -1,0 +1,112 @@
+"""Where a log has no ambient: how warm its room was, told by its first minute.
+
+A run's first readings say how warm its springs are, and how they move from there says what they lose heat to. Beside that stands
+what the runs of the fit were like: so much warmer than their coldest spring was at first, and so far apart in that.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ..logs.run import Run
+from . import statistics
+
+FIRST_S = 60.0
+"""Of a run, what it is told by."""
+FEWER = 6.0
+"""Readings that count as one: at first all errors are each other's, of rounding, start and model."""
+DRIVE_OFF = 0.03
+"""Part by which a drive is usually off, one sigma: it must not count as a room's."""
+LOSS_OFF = 0.1
+"""Part of a warm spring's loss that may be another node's: a room is told so much worse by one that begins warm."""
+ROOMS_K = 3.0
+"""How far a room is from what it was on another day, one sigma."""
+SAME_K = 0.3
+"""How well runs that agree know how much warmer than its first reading a room is, at best."""
+
+
+def first_c(run: Run) -> float:
+    """Return what a run's coldest spring shows at first, degC."""
+    first = run.temperature_c[: max(3, int(np.searchsorted(run.time_s - run.time_s[0], 5.0)))]
+    middle = [np.median(one[np.isfinite(one)]) for one in first.T if np.isfinite(one).any()]
+    return float(min(middle)) if middle else math.nan
+
+
+def over_first(runs: Sequence[Run], ambient_c: Sequence[float]) -> tuple[float, float] | None:
+    """Return by how much rooms are warmer than what their runs begin at, K, and one sigma of that for another run; None of one
+    run alone: it may have begun as no other does."""
+    over = np.array([room - first_c(run) for run, room in zip(runs, ambient_c, strict=True)])
+    over = over[np.isfinite(over)]
+    if over.size < 2:
+        return None
+    apart = max(SAME_K, float(np.std(over, ddof=1)))
+    return float(np.mean(over)), apart * math.sqrt(1.0 + 1.0 / over.size)
+
+
+def guessed(run: Run, usual_c: float, over: tuple[float, float] | None) -> tuple[float, float]:
+    """Return what is believed of a run's room before it moves, degC, and one sigma of it: rooms of other days, and what other runs
+    began like."""
+    said = [(usual_c, ROOMS_K)]
+    if over is not None and math.isfinite(first := first_c(run)):
+        said.append((first + over[0], over[1]))
+    weight = [1.0 / sigma**2 for _, sigma in said]
+    return sum(w * value for w, (value, _) in zip(weight, said, strict=True)) / sum(weight), 1.0 / math.sqrt(
+        sum(weight)
+    )
+
+
+def begun(run: Run) -> Run | None:
+    """Return a run's first minute, None where it has nothing to tell a room by."""
+    end = int(np.searchsorted(run.time_s - run.time_s[0], FIRST_S, side="right"))
+    if len(run.starts) > 1:
+        end = min(end, run.starts[1])
+    if end < 5 or not np.isfinite(run.temperature_c[:end]).any():
+        return None
+    return replace(
+        run,
+        time_s=run.time_s[:end],
+        drive=np.ascontiguousarray(run.drive[:end]),
+        temperature_c=run.temperature_c[:end],
+        fan=run.fan[:end],
+        load_n=None if run.load_n is None else run.load_n[:end],
+        starts=[0],
+    )
+
+
+def of_run(
+    run: Run, guess: tuple[float, float], shows: Callable[[Run, float, np.ndarray], np.ndarray]
+) -> tuple[float, float]:
+    """Return how warm the room of a run is and one sigma of it, by its first minute and a guess before it (value, sigma).
+
+    `shows` simulates a run with a room (degC) and errors of the first readings (springs,), K. Least squares of the room, of these
+    errors and of the drive's, which are believed to be small.
+    """
+    part = begun(run)
+    if part is None:
+        return guess
+    noise = np.nan_to_num(statistics.noise_floor(part.temperature_c), nan=0.1)
+    noise = np.maximum(np.maximum(noise, statistics.rounding(part.temperature_c)), 0.02)
+    there = np.isfinite(part.temperature_c)
+    value, springs = guess[0], run.springs
+    sigma = guess[1]
+    for _ in range(2):  # what heats is not straight, but nearly
+        base = shows(part, value, np.zeros(springs))
+        moved = [shows(part, value + 1.0, np.zeros(springs)) - base]
+        weaker = replace(part, drive=part.drive * (1.0 - DRIVE_OFF))  # a command is 1 at most
+        moved.append((base - shows(weaker, value, np.zeros(springs))) / DRIVE_OFF)
+        moved += [shows(part, value, one) - base for one in np.eye(springs)]
+        trust = np.array([1e-6, 1.0 / DRIVE_OFF, *(1.0 / noise)])  # nothing of the room: what the readings alone say
+        scale = noise * math.sqrt(FEWER)
+        columns = np.column_stack([(one / scale)[there] for one in moved])
+        left = ((part.temperature_c - base) / scale)[there]
+        spread = np.linalg.inv(columns.T @ columns + np.diag(trust**2))
+        said = value + float((spread @ (columns.T @ left))[0])
+        variance = float(spread[0, 0]) + (LOSS_OFF * max(0.0, np.nanmax(part.temperature_c[0]) - guess[0])) ** 2
+        share = guess[1] ** 2 / (guess[1] ** 2 + variance)
+        value = float(np.clip(guess[0] + share * (said - guess[0]), -35.0, 75.0))
+        sigma = guess[1] * math.sqrt(1.0 - share)
+    return value, sigma
