@@ -1,13 +1,14 @@
-/* What it is for: what a model leaves of readings as the innovations of a filter that knows how errors last.
- * What it owns: the walk over rows. What it never does: fit, or know what a spring is.
+/* What it is for: what a model leaves of readings as the innovations of a filter that knows how
+ * errors last. What it owns: the walk over rows. What it never does: fit, or know what a spring is.
  *
- * A reading's error is white noise of unit variance and up to WHITEN_ERRORS errors that fade, each with its own time constant
- * (Ornstein-Uhlenbeck processes: what heat that nobody logged leaves in a node that loses it). The filter is Kalman's
- * (Anderson and Moore, Optimal Filtering, 1979, chapter 6), its gains those of each row: rows may be missing and uneven. */
+ * A reading's error is white noise of unit variance and up to WHITEN_ERRORS errors that fade, each
+ * with its own time constant (Ornstein-Uhlenbeck processes: what heat that nobody logged leaves in
+ * a node that loses it). The filter is Kalman's (Anderson and Moore, Optimal Filtering, 1979,
+ * chapter 6), its gains those of each row: rows may be missing and uneven. */
 #include <math.h>
 #include <stddef.h>
 
-#define EXPORT __attribute__((visibility("default")))
+#define EXPORT        __attribute__((visibility("default")))
 #define WHITEN_ERRORS 4
 
 typedef struct {
@@ -32,10 +33,11 @@ static void go_on(const errors_t *errors, const double *keep,
     }
 }
 
-/* Turns fields (rows * columns) into innovations over their standard deviations, in place, 0 in rows where there[row] is 0.
- * step_s[row] leads to a row from the one before. variance, time_constant_s: of each of `errors` (at most WHITEN_ERRORS)
- * errors; their variance in units of the white noise's. Returns the sum over rows of the logarithm of the innovations'
- * deviations, the same for each column; NaN where there are too many errors. states: room for errors * columns. */
+/* Turns fields (rows * columns) into innovations over their standard deviations, in place, 0 in
+ * rows where there[row] is 0. step_s[row] leads to a row from the one before. variance,
+ * time_constant_s: of each of `errors` (at most WHITEN_ERRORS) errors; their variance in units of
+ * the white noise's. Returns the sum over rows of the logarithm of the innovations' deviations, the
+ * same for each column; NaN where there are too many errors. states: room for errors * columns. */
 double whiten(size_t rows, size_t errors, const double *step_s, const unsigned char *there,
               const double *variance, const double *time_constant_s, size_t columns, double *states,
               double *fields)

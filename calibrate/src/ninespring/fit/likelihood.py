@@ -26,6 +26,8 @@ NONE = 1e-7
 LARGEST = 1e5
 QUICK_S, SLOW_S = (3.0, 600.0), (600.0, 14400.0)
 """Time constants: of what a spring and its thermometer keep, and of what a box or a room keeps."""
+BEGIN_S = (10.0, 100.0)
+"""Quick time constants from which the fit begins: a likelihood of several errors has more than one hill."""
 FULL = 0.9
 """Part of the rows with readings that must have all of them for thermometers to be told apart from their mean."""
 _double_p = ctypes.POINTER(ctypes.c_double)
@@ -142,7 +144,7 @@ class Rows:
         return [np.ascontiguousarray(part[:, :1]), np.ascontiguousarray(part[:, 1:])]
 
 
-def fitted(rows: Sequence[Rows], vectors: Sequence[np.ndarray], near: Colour | None = None) -> tuple[Colour, float]:
+def fitted(rows: Sequence[Rows], vectors: Sequence[np.ndarray]) -> tuple[Colour, float]:
     """Return how errors last by what a model leaves, per run in units of the noise, and the logarithm of its likelihood."""
     channels = [one.turned(vector) for one, vector in zip(rows, vectors, strict=True)]
     count = sum(one.count for one in rows)
@@ -177,23 +179,24 @@ def fitted(rows: Sequence[Rows], vectors: Sequence[np.ndarray], near: Colour | N
         return 0.5 * count * math.log(max(squares, 1e-300) / count) + logarithms
 
     free = [0, 1, 2, 3, 4, 5] if together else [0, 1, 4, 5]
-    begin = np.log([1.0, 0.3, 1.0, 0.3, 60.0, 2400.0])
-    if near is not None:
-        begin = np.log([*near.apart, *near.together, *near.time_s])
-        begin[:4] = np.maximum(begin[:4], math.log(1e-3))
-
-    def only(z: np.ndarray) -> float:
-        whole = begin.copy()
-        whole[free] = z
-        return loss(whole)
-
     bounds = [(low[k], high[k]) for k in free]
-    best = minimize(
-        only, begin[free], method="L-BFGS-B", bounds=bounds, options={"maxiter": 25, "eps": 0.02, "ftol": 1e-7}
-    )
-    whole = begin.copy()
-    whole[free] = best.x
-    colour, value = colour_of(whole), float(best.fun)
+    best: tuple[float, np.ndarray] = (math.inf, low)
+    for quick_s in BEGIN_S:
+        begin = np.log([1.0, 0.3, 1.0, 0.3, quick_s, 2400.0])
+
+        def only(z: np.ndarray, begin: np.ndarray = begin) -> float:
+            whole = begin.copy()
+            whole[free] = z
+            return loss(whole)
+
+        found = minimize(
+            only, begin[free], method="L-BFGS-B", bounds=bounds, options={"eps": 1e-4, "maxiter": 30, "ftol": 1e-6}
+        )
+        if float(found.fun) < best[0]:
+            begin[free] = found.x
+            best = float(found.fun), begin
+    value, whole = best
+    colour = colour_of(whole)
     alone = Colour()
     squares, logarithms = parts(alone)
     white = 0.5 * count * math.log(max(squares, 1e-300) / count) + logarithms
