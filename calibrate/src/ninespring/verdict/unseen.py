@@ -91,6 +91,9 @@ def error(split: Split, fit: Fit, colour: Colour | None) -> tuple[float, int]:
     if colour is not None:
         problem.take_for(colour)
     fitted = problem.fit(spec, start, tolerance=1e-3, max_steps=STEPS)
+    # what only the left-out run shows, these do not tell: it stays
+    known = {key: start[key] for key in fitted.stuck if key in start}
+    fitted.values = np.array([known.get(f.key, value) for f, value in zip(spec.free, fitted.values, strict=True)])
     run, values = split.left_out, fitted.as_dict()
     if split.alone:
         shown = problem.simulate(spec, fitted.values, 0)
