@@ -41,6 +41,37 @@ def test_the_filter_is_the_gaussian_of_its_covariance() -> None:
     assert rows.step_s[25] == BROKEN
 
 
+def test_what_lasts_in_a_gap_is_told_as_a_gaussian_tells_it() -> None:
+    rng = np.random.default_rng(6)
+    time_s = np.cumsum(rng.uniform(0.5, 4.0, 30))
+    mask = np.ones((30, 3), dtype=bool)
+    mask[4] = False
+    rows = Rows.of(time_s, [0], mask)
+    colour = Colour((4.0, 0.5), (9.0, 2.0), (10.0, 900.0))
+    vector = rng.standard_normal(87)
+    fields = np.zeros(mask.shape)
+    fields[mask] = vector
+    hidden = np.zeros(mask.shape, dtype=bool)
+    hidden[12:20] = True
+    told = rows.between(vector, colour, hidden[mask])
+    apart = np.abs(time_s[:, None] - time_s[None, :])
+    known = np.flatnonzero(mask[:, 0] & ~hidden[:, 0])
+    gone = np.flatnonzero(hidden[:, 0])
+
+    def by_the_covariance(channel: np.ndarray, sizes: tuple[float, float]) -> np.ndarray:
+        covariance = sum(v * np.exp(-apart / t) for v, t in zip(sizes, colour.time_s, strict=True))
+        inside = covariance[np.ix_(known, known)] + np.eye(len(known))
+        return covariance[np.ix_(gone, known)] @ np.linalg.solve(inside, channel[known])
+
+    assert rows.turn is not None
+    turned = fields @ rows.turn.T
+    wanted = [by_the_covariance(turned[:, k], colour.apart if k else colour.together) for k in range(3)]
+    found = np.zeros(mask.shape)
+    found[mask] = told
+    assert found[gone] == pytest.approx(np.column_stack(wanted) @ rows.turn, abs=1e-8)
+    assert not found[known].any()
+
+
 def test_what_all_thermometers_share_is_told_from_what_each_has() -> None:
     rng = np.random.default_rng(2)
     rows, springs = 1500, 9
@@ -106,11 +137,23 @@ def test_the_first_minute_tells_a_room(room_c: float) -> None:
         end = ambient_c + 80.0 * part.drive[0]
         return end + (warm - end) * np.exp(-since / 180.0)
 
-    value, sigma = room.of_run(run, room.guessed(run, 20.5, (0.0, 0.4)), shows)
+    value, sigma = room.of_run(run, room.guessed(run, 20.5, (0.0, 0.4)), shows, 1.0 / 180.0)
     assert value == pytest.approx(room_c, abs=0.6) and sigma < 0.4
     # of one run before it nothing is known but its room
-    value, sigma = room.of_run(run, room.guessed(run, 20.5, None), shows)
+    value, sigma = room.of_run(run, room.guessed(run, 20.5, None), shows, 1.0 / 180.0)
     assert abs(value - room_c) < abs(20.5 - room_c) + 0.5 and sigma < room.ROOMS_K
+
+
+def test_a_run_that_began_warm_is_not_taken_for_one_at_rest() -> None:
+    def nothing(part: Run, ambient_c: float, offset: np.ndarray) -> np.ndarray:
+        """A plant that a room does not change: the first minute says nothing."""
+        return part.temperature_c + offset
+
+    warm, cold = one_run(20.0, 45.0, 0.0), one_run(22.0, 22.0, 0.0)
+    value, sigma = room.of_run(warm, room.guessed(warm, 20.5, (0.5, 0.4)), nothing, 1.0 / 180.0)
+    assert value == pytest.approx(20.5, abs=0.1) and sigma > 2.0
+    value, sigma = room.of_run(cold, room.guessed(cold, 20.5, (0.0, 0.4)), nothing, 1.0 / 180.0)
+    assert value == pytest.approx(22.0, abs=0.3) and sigma < 1.0
 
 
 def test_runs_that_began_at_rest_say_that_another_does() -> None:

@@ -25,7 +25,7 @@ from . import statistics
 from .budget import Budget
 from .likelihood import Colour, Rows
 from .rounding import power_errors
-from .simulate import array_parameters, simulate_run
+from .simulate import array_parameters, fades_per_s, hidden_k, simulate_run
 from .spec import AMBIENT_OFFSET, DRIVE_GAIN, RUN_DRIVE, SENSOR_OFFSET, Fit, Spec
 
 WORKERS = max(1, min(8, os.cpu_count() or 1))
@@ -349,8 +349,8 @@ class Problem:
     def learn_starts(self, spec: Spec, values: Sequence[float]) -> None:
         """Find how an error of each starting temperature dies out, to keep it out of all that follows.
 
-        A simulation starts at the first measured temperatures, which carry the sensor's noise. Its effect is
-        nearly linear and the same in all models: it is computed once, and residuals are whitened by it.
+        A simulation starts at the first measured temperatures, which carry the sensor's noise and hide what a spring was about.
+        The effect is nearly linear and the same in all models: it is computed once, and residuals are whitened by it.
         """
         jobs = []
         for r, run in enumerate(self.runs):
@@ -358,13 +358,17 @@ class Problem:
             for k in range(run.springs):
                 jobs.append((r, np.eye(run.springs)[k]))
         shown = self.each(lambda job: self.simulate(spec, values, job[0], job[1]), jobs)
+        plant = self.plant_for(spec, values)
         at = 0
         for r, run in enumerate(self.runs):
             base = shown[at]
+            ambient = self.ambient_of(r, {f.key: float(v) for f, v in zip(spec.free, values, strict=True)})
+            around_c = plant.get("ambient_c") if ambient is None else float(ambient[0])
+            sigma = np.hypot(self.noise[r], hidden_k(run, around_c, fades_per_s(plant)))
             columns = []
             for k in range(run.springs):
                 response = ((shown[at + 1 + k] - base) / self.noise[r])[self.mask[r]]
-                response = response * self.noise[r][k]
+                response = response * sigma[k]
                 if np.isfinite(run.temperature_c[0, k]) and np.linalg.norm(response) > 1:
                     columns.append(response)
             at += 1 + run.springs
@@ -582,7 +586,8 @@ class Problem:
         """Return the rms error, degC, on blocks held out of the fit, one fold after the other.
 
         Every fifth block of about two minutes is left out, the numbers are fitted to the rest, and the error counts where
-        they have not seen the data. They move little: by the fit's slopes, within their bounds, nothing simulated.
+        they have not seen the data, less what errors that last (`take_for`) are there by the readings around. They move little: by the
+        fit's slopes, within their bounds, nothing simulated.
         """
         if not len(fit.values):
             return statistics.rms(fit.residual)
@@ -612,9 +617,18 @@ class Problem:
             inside = np.linalg.qr(rows, mode="r")
             bounds = (np.minimum(low - z, -1e-9), np.maximum(high - z, 1e-9))
             moved = lsq_linear(inside[:, :-1], -inside[:, -1], bounds, method="bvls").x
-            total += float(((noise * (left + slopes @ moved))[out] ** 2).sum())
+            rest = left + slopes @ moved
+            total += float(((noise * (rest - self.lasting(rest, out)))[out] ** 2).sum())
         fit.holdout = math.sqrt(total / max(1, self.count))
         return fit.holdout
+
+    def lasting(self, vector: np.ndarray, out: np.ndarray) -> np.ndarray:
+        """Return what lasts of a vector (count,), in units of the noise, where `out` is set, as all other readings tell it."""
+        if self.colour is None:
+            return np.zeros_like(vector)
+        ends = np.cumsum([int(mask.sum()) for mask in self.mask])[:-1]
+        parts = zip(self.rows, np.split(vector, ends), np.split(out, ends), strict=True)
+        return np.concatenate([rows.between(part, self.colour, gone) for rows, part, gone in parts])
 
     def plain_slopes(self, fit: Fit) -> np.ndarray:
         """Return a fit's slopes with no error whitened out, (count, free)."""

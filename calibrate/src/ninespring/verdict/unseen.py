@@ -16,7 +16,7 @@ import numpy as np
 from ..fit import room
 from ..fit.likelihood import Colour
 from ..fit.problem import Problem
-from ..fit.simulate import simulate_run
+from ..fit.simulate import fades_per_s, simulate_run
 from ..fit.spec import Fit, Free, Spec
 from ..logs.run import Run
 from ..search.search import Search
@@ -116,7 +116,7 @@ def _room(problem: Problem, run: Run, values: dict[str, float], plant: Any) -> f
     def shows(part: Run, ambient_c: float, offset: np.ndarray) -> np.ndarray:
         return simulate_run(plant.copy(), part, np.full(len(part.time_s), ambient_c), {}, offset)
 
-    return room.of_run(run, room.guessed(run, usual, over), shows)[0]
+    return room.of_run(run, room.guessed(run, usual, over), shows, fades_per_s(plant))[0]
 
 
 @dataclass
