@@ -506,11 +506,15 @@ def validate(result: Mapping[str, Any]) -> None:
 
 
 def fit_effects(
-    array: Array, runs: Sequence[Run], wanted: Sequence[str], progress: Callable[[str], None] = lambda text: None
+    array: Array,
+    runs: Sequence[Run],
+    wanted: Sequence[str],
+    progress: Callable[[str], None] = lambda text: None,
+    declared: Mapping[str, float] | None = None,
 ) -> tuple[Problem, Fit, Fit]:
     """Fit the declared model with the effects named; return the problem, the fit and the declared model's fit."""
     with threadpool_limits(1):
-        problem = prepare(array, runs)
+        problem = prepare(array, runs, declared)
         known = effects.candidates(problem)
         base = first_fit(problem, base_spec(problem))
         found = search.Search(problem, known, base, progress)
