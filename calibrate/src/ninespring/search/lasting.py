@@ -2,7 +2,7 @@
 
 Least squares of readings that go astray together for minutes believe the slow ones far too much, and what explains any of it gets
 a name. Here the numbers, the forecasts and the names are those of innovations (fit/likelihood.py), whose noise is the one that the
-first search left.
+first search left: names that only followed what lasts are dropped, and what it hid is looked for.
 """
 
 from __future__ import annotations
@@ -21,15 +21,20 @@ TIMES = 2
 
 
 def search_lasting(problem: Problem, first: Search, final: Fit) -> tuple[Search, Found]:
-    """Search again, errors that last taken for that; the problem weighs readings so when this returns."""
+    """Search on from what was found, errors that last taken for that; the problem weighs readings so when this returns."""
     found, result = first, (final, {}, [])
     for _ in range(TIMES):
-        likelihood(problem, result[0])
-        names = result[0].spec.variant
-        problem.take_for(result[0].colour)
+        begin, names = result[0], result[0].spec.variant
+        likelihood(problem, begin)
+        problem.take_for(begin.colour)
         base = problem.fit(first.base.spec, first.base.as_dict(), errors=True)
         found = Search(problem, first.candidates, base, first.progress)
-        result = found.run(downwards=False)
+        if begin.spec.variant != base.spec.variant:
+            begin = problem.fit(begin.spec, begin.as_dict(), errors=True)
+            found.fits[found.key(begin.spec)] = begin
+            result = found.settle(found.forward(found.backward(begin)[0]))
+        else:
+            result = found.run(downwards=False)
         if result[0].spec.variant == names:
             break
     return found, result

@@ -316,7 +316,7 @@ def _diagnose(
         final, without, contenders = judge.settle(judge.forward(final))
         final = _finish(problem, final)
     progress("a run that the fit never saw")
-    judged_by = unseen.Unseen(problem, found, found.base)
+    judged_by = unseen.Unseen(problem, found, declared_alone)
     not_kept: list[str] = []
     if not hidden and len(problem.runs) > 1:
         kept, not_kept = judged_by.kept(final, judge.reduced)
@@ -339,7 +339,9 @@ def _diagnose(
         again = {id(fit): with_everything(problem, fit, base) for fit in [final, *(fit for _, fit in steps)]}
         steps = [(effect, again[id(fit)]) for effect, fit in steps]
         final = again[id(final)]
-    base_out, final_out = problem.holdout_rmse(base), problem.holdout_rmse(final)
+    # as declared, by itself: with what lasts as the found model leaves it, it would be fitted to that
+    before = base if problem.colour is None else problem.evaluate(declared_alone)
+    before_out, final_out = problem.holdout_rmse(before), problem.holdout_rmse(final)
 
     bounds = set(final.at_bounds())
     listed, runs_differ = [], []
@@ -415,10 +417,10 @@ def _diagnose(
         "tool": f"ninespring {__version__}",
         "logs": [{"file": Path(r.name).name, "sha256": r.sha256, "rows": len(r.time_s)} for r in runs],
         "baseline": {
-            "rmse_c": statistics.rms(base.residual),
-            "holdout_rmse_c": base_out,
+            "rmse_c": statistics.rms(before.residual),
+            "holdout_rmse_c": before_out,
             "noise_c": problem.noise_c,
-            "parameters": parameters_of(problem, base),
+            "parameters": parameters_of(problem, before),
             "effects": list(base.spec.effects),
         },
         "effects": listed,
@@ -474,20 +476,25 @@ def _diagnose(
 def _where_something_is_left(
     problem: Problem, first: search.Search, final: Fit, without: dict[str, Fit], contenders: list[tuple[str, Fit]]
 ) -> unnamed.Beside:
-    """Search again, beside causes without a name and with what is left taken for noise that lasts: the likelier of both."""
-    found, result, hidden = unnamed.search_beside(problem, first, final) or (first, (final, without, contenders), [])
-    taken = problem.unnamed, problem.heat
-    begun = lasting.nats_beside(problem, result[0], hidden, unnamed.KINDS)
-    if not all(one.possible for one in hidden):
-        begun = -math.inf
+    """Search again, beside causes without a name and with what is left taken for noise that lasts: the likeliest of all."""
+    plain: unnamed.Beside = (first, (final, without, contenders), [])
+    beside = unnamed.search_beside(problem, first, final) or plain
+    if not all(one.possible for one in beside[2]):
+        problem.leave_out(None)
+        beside = plain
+    hidden, taken = beside[2], (problem.unnamed, problem.heat)
+    nats = lasting.nats_beside(problem, beside[1][0], hidden, unnamed.KINDS)
     problem.leave_out(None)
+    if hidden and lasting.nats_beside(problem, final, (), 1) > nats:
+        beside, hidden, taken = plain, [], (None, None)
+        nats = lasting.nats_beside(problem, final, (), 1)
     first.progress("noise that lasts")
-    search_, other = lasting.search_lasting(problem, first, final)
-    if lasting.nats_beside(problem, other[0], (), 1) > begun:
-        return search_, other, []
+    searched, result = lasting.search_lasting(problem, first, final)
+    if lasting.nats_beside(problem, result[0], (), 1) > nats:
+        return searched, result, []
     problem.unnamed, problem.heat = taken
     problem.take_for(None)
-    return found, result, hidden
+    return beside
 
 
 def finite(value: float) -> float | None:

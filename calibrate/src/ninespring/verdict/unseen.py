@@ -130,36 +130,45 @@ class Unseen:
     def __post_init__(self) -> None:
         self.splits = splits(self.problem)
         self.known: dict[Any, float] = {}
-        lag = next((one for one in self.found.candidates if one.effect == LAG), None)
+        self.lag = next((one for one in self.found.candidates if one.effect == LAG), None)
         self.lagged = self.base
-        if lag is not None and LAG not in self.base.spec.effects:
-            self.lagged = self.found.refit(self.base, [lag], [1.0])
+        if self.lag is not None and LAG not in self.base.spec.effects:
+            lag = self.lag
+            spec = self.base.spec.with_effect(lag.effect, lag.free, lag.fixed, lag.variant, lag.also_on)
+            start = self.base.as_dict() | lag.start_at(1.0)
+            self.lagged = replace(self.base, spec=spec, values=np.array([start[f.key] for f in spec.free]))
 
-    def rmse(self, fit: Fit) -> float:
-        """Return the error, degC rms, of runs left out; NaN where none can be."""
-        key = fit.spec.variant
+    def rmse(self, fit: Fit, colour: Colour | None = None) -> float:
+        """Return the error, degC rms, of runs left out, the others fitted by how errors last; NaN where none can be."""
+        key = fit.spec.variant, colour
         if key not in self.known:
-            parts = [error(one, fit, self.problem.colour) for one in self.splits]
+            parts = [error(one, fit, colour) for one in self.splits]
             count = sum(n for _, n in parts)
             self.known[key] = math.sqrt(sum(square for square, _ in parts) / count) if count else math.nan
         return self.known[key]
 
+    def own(self, fit: Fit) -> float:
+        """Return the error of what was found, or a part of it, its numbers as likely as the problem's colour has them."""
+        return self.rmse(fit, self.problem.colour)
+
     @property
     def better(self) -> Fit:
-        """The better one of both that know no physics but the declared."""
+        """The better one of both that know no physics but the declared, by least squares as anybody fits them."""
         return min((self.base, self.lagged), key=self.rmse)
 
     def kept(self, fit: Fit, reduced: Callable[[Fit, str], Fit]) -> tuple[Fit, list[str]]:
         """Return what predicts no worse than the better of both, names left out one by one; and what is to be said of them."""
         said = []
-        while self.splits and self.rmse(fit) > WORSE * self.rmse(self.better):
+        while self.splits and self.own(fit) > WORSE * self.rmse(self.better):
             names = [effect for effect in fit.spec.effects if effect not in self.base.spec.effects]
             if not names:
                 break
             fewer = {effect: reduced(fit, effect) for effect in names}
-            best = min(fewer, key=lambda effect: self.rmse(fewer[effect]))
-            if self.rmse(fewer[best]) >= self.rmse(fit):
-                best_fit = self.better
+            best = min(fewer, key=lambda effect: self.own(fewer[effect]))
+            if self.own(fewer[best]) >= self.own(fit):
+                best_fit = self.found.base
+                if self.lag is not None and self.better is not self.base:
+                    best_fit = self.found.refit(best_fit, [self.lag], [1.0])
                 said += [
                     self._left_out(effect, fit, best_fit) for effect in names if effect not in best_fit.spec.effects
                 ]
@@ -171,17 +180,17 @@ class Unseen:
 
     def _left_out(self, effect: str, fit: Fit, other: Fit) -> str:
         return (
-            f"{effect} is not named: a run that the fit did not see is predicted to {self.rmse(fit):.2f} K with it and to "
-            f"{self.rmse(other):.2f} K without"
+            f"{effect} is not named: a run that the fit did not see is predicted to {self.own(fit):.2f} K with it and to "
+            f"{min(self.own(other), self.rmse(other)):.2f} K without"
         )
 
     def as_dict(self, fit: Fit) -> dict[str, Any] | None:
         """Return it for diagnosis.json, None where nothing can be left out."""
-        if not self.splits or not math.isfinite(self.rmse(fit)):
+        if not self.splits or not math.isfinite(self.own(fit)):
             return None
         alone = self.splits[0].alone
         what = "the last third of the run" if alone else "a run that the fit did not see"
-        mine, declared, lagged = (self.rmse(one) for one in (fit, self.base, self.lagged))
+        mine, declared, lagged = self.own(fit), self.rmse(self.base), self.rmse(self.lagged)
         return {
             "what": "last third" if alone else "each run left out in turn",
             "rmse_c": mine,
