@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.stats import trim_mean
 
 from ..logs.run import Run
 from . import statistics
@@ -55,9 +56,13 @@ class Guess:
 
 
 def first_c(run: Run) -> float:
-    """Return what a run's coldest spring shows at first, degC."""
-    first = run.temperature_c[: max(3, int(np.searchsorted(run.time_s - run.time_s[0], 5.0)))]
-    middle = [np.median(one[np.isfinite(one)]) for one in first.T if np.isfinite(one).any()]
+    """Return what a run's coldest spring shows before anything is driven, within a first minute, or in its first 5 s, degC."""
+    since = run.time_s - run.time_s[0]
+    driven = np.flatnonzero((run.drive != 0.0).any(axis=1))
+    rests_s = min(FIRST_S, since[driven[0]] if driven.size else FIRST_S)
+    first = run.temperature_c[: max(3, int(np.searchsorted(since, max(5.0, rests_s))))]
+    # a mean: where thermometers step, it is finer than any of them; without what is nonsense
+    middle = [trim_mean(one[np.isfinite(one)], 0.1) for one in first.T if np.isfinite(one).any()]
     return float(min(middle)) if middle else math.nan
 
 
