@@ -582,16 +582,16 @@ class Problem:
         fit.simulations = self.simulations - begun
         return fit
 
-    def holdout_rmse(self, fit: Fit) -> float:
+    def holdout_rmse(self, fit: Fit, colour: Colour | None = None) -> float:
         """Return the rms error, degC, on blocks held out of the fit, one fold after the other.
 
         Every fifth block of about two minutes is left out, the numbers are fitted to the rest, and the error counts where
-        they have not seen the data, less what errors that last (`take_for`) are there by the readings around. They move little: by the
-        fit's slopes, within their bounds, nothing simulated.
+        they have not seen the data, less what errors that last (`colour`, or that of `take_for`) are there by the readings around.
+        They move little: by the fit's slopes, within their bounds, nothing simulated.
         """
         if not len(fit.values):
             return statistics.rms(fit.residual)
-        if math.isfinite(fit.holdout):
+        if colour is None and math.isfinite(fit.holdout):
             return fit.holdout
         free = fit.spec.free
         z = np.array([f.inner(v) for f, v in zip(free, fit.values, strict=True)])
@@ -618,17 +618,17 @@ class Problem:
             bounds = (np.minimum(low - z, -1e-9), np.maximum(high - z, 1e-9))
             moved = lsq_linear(inside[:, :-1], -inside[:, -1], bounds, method="bvls").x
             rest = left + slopes @ moved
-            total += float(((noise * (rest - self.lasting(rest, out)))[out] ** 2).sum())
+            total += float(((noise * (rest - self.lasting(rest, out, colour or self.colour)))[out] ** 2).sum())
         fit.holdout = math.sqrt(total / max(1, self.count))
         return fit.holdout
 
-    def lasting(self, vector: np.ndarray, out: np.ndarray) -> np.ndarray:
+    def lasting(self, vector: np.ndarray, out: np.ndarray, colour: Colour | None) -> np.ndarray:
         """Return what lasts of a vector (count,), in units of the noise, where `out` is set, as all other readings tell it."""
-        if self.colour is None:
+        if colour is None:
             return np.zeros_like(vector)
         ends = np.cumsum([int(mask.sum()) for mask in self.mask])[:-1]
         parts = zip(self.rows, np.split(vector, ends), np.split(out, ends), strict=True)
-        return np.concatenate([rows.between(part, self.colour, gone) for rows, part, gone in parts])
+        return np.concatenate([rows.between(part, colour, gone) for rows, part, gone in parts])
 
     def plain_slopes(self, fit: Fit) -> np.ndarray:
         """Return a fit's slopes with no error whitened out, (count, free)."""

@@ -27,7 +27,7 @@ from ..logs.run import Run
 from ..models import Array, Model
 from ..search import lasting, search, unnamed
 from ..search.certainty import CERTAIN, NAMED, Witness, witness
-from ..search.evidence import EQUIVALENT, difference, excess, log_evidence, unexplained
+from ..search.evidence import EQUIVALENT, difference, excess, likelihood, log_evidence, unexplained
 from . import contacts, doubt, experiments, plausibility, resistance, runs_apart, unknown_heat, unseen
 from .residual import depends_on
 from .result import DRIFT_LEFT_OUT, as_shown, model_of, parameters_of
@@ -341,6 +341,9 @@ def _diagnose(
         final = again[id(final)]
     # as declared, by itself: with what lasts as the found model leaves it, it would be fitted to that
     before = base if problem.colour is None else problem.evaluate(declared_alone)
+    if left_over and not hidden and problem.colour is None:
+        likelihood(problem, final)
+        final.holdout = problem.holdout_rmse(final, final.colour)
     before_out, final_out = problem.holdout_rmse(before), problem.holdout_rmse(final)
 
     bounds = set(final.at_bounds())
