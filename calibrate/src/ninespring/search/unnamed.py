@@ -90,10 +90,11 @@ class Hidden:
 
     @property
     def possible(self) -> bool:
-        """Whether anything can be like that: a part is no more than all, and a room is where somebody works."""
+        """Whether anything can be like that: what leads on a part leads on no more than all, of a part no more than all can be
+        missing, and a room is where somebody works."""
         if self.cause.kind == "surroundings":
             return abs(self.size) <= ROOM_K
-        return self.cause.kind in UNITS or abs(self.size) <= 1.0
+        return self.cause.kind in UNITS or -1.0 <= self.size <= (1.0 if self.cause.kind in GIVES_ONLY else math.inf)
 
     def as_dict(self) -> dict[str, Any]:
         """Return it for diagnosis.json."""

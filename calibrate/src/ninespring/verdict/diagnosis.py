@@ -401,7 +401,7 @@ def _diagnose(
             f"{effect} ({effects.IN_WORDS[effect]}) would explain {one.share:.0%} of what is left, but not as well at all "
             f"times: {one.probability():.0%} likely, it is not named"
             for effect, one in witnesses.items()
-            if one.share > MOST_OF_IT
+            if one.share > MOST_OF_IT and effect in effects.IN_WORDS
         ]
     doubts = doubt.of_log(problem, problem.runs, swapped, (base,) if final is base else (base, final), left_over)
     warnings += doubts + impossible + doubt.about_power(problem) + plausibility.coarse(runs)

@@ -17,7 +17,7 @@ from ..fit import room
 from ..fit.likelihood import Colour
 from ..fit.problem import Problem
 from ..fit.simulate import fades_per_s, simulate_run
-from ..fit.spec import Fit, Free, Spec
+from ..fit.spec import RUNS_OWN, Fit, Free, Spec
 from ..logs.run import Run
 from ..search.search import Search
 
@@ -30,6 +30,8 @@ WORSE = 1.05
 STEPS = 10
 """Of one fit: it begins where the whole data had it."""
 LAG = "sensor_lag"
+OF_THAT_DAY = (*RUNS_OWN, "ambient_drift")
+"""Effects that no other run can tell: it has its own."""
 
 
 @dataclass(frozen=True)
@@ -160,7 +162,7 @@ class Unseen:
         """Return what predicts no worse than the better of both, names left out one by one; and what is to be said of them."""
         said = []
         while self.splits and self.own(fit) > WORSE * self.rmse(self.better):
-            names = [effect for effect in fit.spec.effects if effect not in self.base.spec.effects]
+            names = [e for e in fit.spec.effects if e not in (*self.base.spec.effects, *OF_THAT_DAY)]
             if not names:
                 break
             fewer = {effect: reduced(fit, effect) for effect in names}
@@ -169,9 +171,7 @@ class Unseen:
                 best_fit = self.found.base
                 if self.lag is not None and self.better is not self.base:
                     best_fit = self.found.refit(best_fit, [self.lag], [1.0])
-                said += [
-                    self._left_out(effect, fit, best_fit) for effect in names if effect not in best_fit.spec.effects
-                ]
+                said += [self._left_out(e, fit, best_fit) for e in names if e not in best_fit.spec.effects]
                 fit = best_fit
                 break
             said.append(self._left_out(best, fit, fewer[best]))
