@@ -167,17 +167,21 @@ static console_error_t word_pattern(console_t *console, const arguments_t *argum
     bool any = false;
     const char *const bits = arguments->argument[0];
     const uint8_t springs = controller_springs(console->controller);
-    console_hint_text(console,
-                      FLASH_TEXT("a pattern has #0 digits, 0 or 1; this has #0 characters"),
-                      springs, (int32_t)strlen(bits));
-    for (uint8_t k = 0; k < springs; k++) {
-        if (bits[k] != '0' && bits[k] != '1') { /* the end, too */
+    for (uint8_t k = 0; k < springs && bits[k] != '\0'; k++) {
+        if (bits[k] != '0' && bits[k] != '1') {
+            console_hint_text(
+                console, FLASH_TEXT("a pattern has #0 digits, 0 or 1; character #0 is neither"),
+                springs, k + 1);
             return CONSOLE_ERROR_BAD_ARGUMENT;
         }
         on[k] = bits[k] == '1';
         any = any || on[k];
     }
-    if (bits[springs] != '\0') {
+    const size_t characters = strlen(bits);
+    if (characters != springs) {
+        console_hint_text(console,
+                          FLASH_TEXT("a pattern has #0 digits, 0 or 1; this has #0 characters"),
+                          springs, (int32_t)characters);
         return CONSOLE_ERROR_BAD_ARGUMENT;
     }
     const console_error_t error = any ? may_drive(console) : CONSOLE_OK;

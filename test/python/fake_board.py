@@ -52,6 +52,7 @@ class FakeBoard:
         return [line for line in self.seen if line]
 
     def _stream(self, number: int) -> None:
+        last = ""
         for line in self.stream:
             if self._streaming != number or self.gone:
                 return
@@ -59,10 +60,20 @@ class FakeBoard:
                 self.answers["faults"] = [line[6:], "ok"]
                 continue
             if line == "PULL":
+                self._wait_for_life(number, last)
                 self.pull()
                 return
             self.say(line)
+            last = line
             time.sleep(self.every_s)
+
+    def _wait_for_life(self, number: int, last: str) -> None:
+        """Wait until the other end has read that row: what is on its way goes with the cable.
+
+        It sends an empty line with the first row, and with each that is a second of the board's after the last such one.
+        """
+        while self.seen[number:].count("") < int(float(last.split(",")[0])):
+            time.sleep(0.01)
 
     def _serve(self) -> None:
         buffer = b""

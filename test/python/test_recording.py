@@ -15,7 +15,7 @@ import sys
 import threading
 import time
 import tty
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -347,6 +347,22 @@ def test_a_fault_is_said_as_it_comes_in_the_log_and_at_the_end(tmp_path: Path) -
     assert_off(board)
 
 
+def test_what_the_board_remarks_on_a_step_is_said_and_stands_in_the_log(tmp_path: Path) -> None:
+    remark = "[not active yet: over_current_a=0.200 does not fit open_current_a=1.500]"
+    board = FakeBoard({"$over_current_a=0.2": [remark, "ok"], "$open_current_a=9": [remark, "ok"]})
+    board.stream, board.every_s = STREAM, 0.01
+    (tmp_path / "steps.txt").write_text("$open_current_a=9\nat 2 = $over_current_a=0.2\n")
+    done = record(board, tmp_path, "--duration", 3, "--run", tmp_path / "steps.txt")
+    assert done.returncode == 0, done.stderr
+    assert [line.partition(": ")[0] for line in done.stderr.splitlines()] == [
+        "'$open_current_a=9'",
+        "'$over_current_a=0.2'",
+    ]
+    lines = (tmp_path / "log.csv").read_text().splitlines()
+    assert lines.index(f"# '$open_current_a=9': {remark}") < lines.index(TELEMETRY)
+    assert lines.index(f"# '$over_current_a=0.2': {remark}") > lines.index(TELEMETRY)
+
+
 @pytest.mark.parametrize("commented", [True, False])
 def test_whoever_uses_a_log_is_told_first_that_a_fault_cut_it_short(tmp_path: Path, commented: bool) -> None:
     log = tmp_path / "log.csv"
@@ -431,12 +447,22 @@ def other_thing(said: bytes) -> str:
         (bytes(range(128, 256)) * 100, "no board"),
     ],
 )
-def test_a_silent_or_foreign_port_is_recognised_within_five_seconds(said: bytes, message: str) -> None:
+def test_a_silent_or_foreign_port_is_recognised_within_five_seconds(
+    monkeypatch: pytest.MonkeyPatch, said: bytes, message: str
+) -> None:
     port = other_thing(said)
-    begun = time.monotonic()
+    asked: list[tuple[float, float]] = []
+    """When a line was waited for, and until when: by this, whatever the machine makes of it."""
+    read_line = Port.read_line
+
+    def watched(self: Port, until_s: float, stopped: Callable[[], bool] = lambda: False) -> str | None:
+        asked.append((time.monotonic(), until_s))
+        return read_line(self, until_s, stopped)
+
+    monkeypatch.setattr(Port, "read_line", watched)
     with pytest.raises(WorkError, match=re.escape(message)):
         Board(port)
-    assert time.monotonic() - begun < 5.0
+    assert max(until_s for _, until_s in asked) - asked[0][0] < 5.0
 
 
 def test_a_second_program_on_the_port_is_named(tmp_path: Path) -> None:

@@ -141,7 +141,7 @@ def test_lines_from_a_pipe_are_answered_one_after_the_other() -> None:
     done = piped(fake.port, "on 99\nfaults\n")
     assert done.returncode == 1
     assert "refused: error 5" in done.stdout
-    assert "1 of these lines were refused" in done.stderr
+    assert "1 of these lines was refused" in done.stderr
 
 
 @pytest.mark.skipif(not SIM.exists(), reason=f"SKIPPED: {SIM} is not there: build it, or set NINESPRING_SIM")

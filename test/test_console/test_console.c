@@ -267,6 +267,8 @@ static void every_refusal_says_what_would_be_right(void)
          "error:4 an argument is not of the right form: a pattern has 9 digits, "
          "0 or 1; this has 8 characters\r\n"},
         {"pattern 1111011112", ": a pattern has 9 digits, 0 or 1; this has 10 characters\r\n"},
+        {"pattern 111101112", ": a pattern has 9 digits, 0 or 1; character 9 is neither\r\n"},
+        {"pattern 1l1101112", ": a pattern has 9 digits, 0 or 1; character 2 is neither\r\n"},
         {"pattern 111 101 111", ": write pattern 111101111\r\n"},
         {"policy", ": write policy open|precompensate\r\n"},
         {"policy closed", ": write policy open|precompensate\r\n"},

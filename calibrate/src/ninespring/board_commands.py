@@ -57,7 +57,8 @@ def record(
     What has come is kept and the springs are switched off, whatever ends the recording: Ctrl-C, a closed terminal, a
     cable, a full disk, a reset of the board. While it runs, rows go to OUTPUT.part; at the end that becomes OUTPUT.
     The log begins with the board's version, faults and settings as comments. A fault of the board is said as it comes and at the
-    end, and stands in the log where it came; the command then exits with 1.
+    end, and stands in the log where it came; the command then exits with 1. What the board remarks on a line of --run (a
+    setting that is not active yet, springs that are still warm) is said and logged likewise, and is no failure.
     """
     from .board import Board
     from .recording import LogFile, script_lines, told_to_stop
@@ -85,7 +86,8 @@ def record(
             try:
                 alarm = lambda fault: err.print(f"fault {fault}", style="bold red", markup=False)  # noqa: E731
                 tell = lambda rows, seconds: say(f"{rows} rows", seconds)  # noqa: E731
-                got = record_board(board, log, hz, duration, steps, tell, keys, logger, alarm)
+                remark = lambda words: err.print(words, markup=False)  # noqa: E731
+                got = record_board(board, log, hz, duration, steps, tell, keys, logger, alarm, remark)
             finally:
                 log.close()
                 if logger:

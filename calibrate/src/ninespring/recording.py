@@ -325,13 +325,14 @@ def record(
     keys: Mapping[str, str] | None = None,
     thermometers: Thermometers | None = None,
     alarm: Callable[[Fault], None] = lambda fault: None,
+    remark: Callable[[str], None] = lambda words: None,
 ) -> Recording:
     """Record a board's telemetry, `hz` rows a second; `duration_s` and the steps' times are by the board's clock, from the first row.
 
     Steps without a time are sent first. The log begins with what the board is and how it is set, ends with its faults,
     and has its status (which limits act on a spring) between the rows, all as comments. Whatever ends it, the springs are
     off afterwards, and `ended` says why where it was no wish. A fault does not end it; `alarm` is told of each as it comes, and
-    `ended` begins with the first. `thermometers` add columns t1_c ...: each row waits until a
+    `ended` begins with the first. `remark` is told what the board answers to a step beside `ok`. `thermometers` add columns t1_c ...: each row waits until a
     reading after it has come.
     """
     got = Recording()
@@ -343,11 +344,16 @@ def record(
         sink.comment(f"fault {fault}")
         alarm(fault)
 
+    def send(step: Step) -> None:
+        for words in board.ask(step.line):
+            sink.comment(f"'{step.line}': {words}")
+            remark(f"'{step.line}': {words}")
+
     watch = FaultWatch(board, got.faults, note)
     before: list[str] = []
     try:
-        before = _head(board, log, steps, keys or {})
-        _rows(board, finer_hz, duration_s, steps, got, say, sink, watch)
+        before = _head(board, log, steps, keys or {}, send)
+        _rows(board, finer_hz, duration_s, steps, got, say, sink, watch, send)
     except KeyboardInterrupt:
         pass
     except WorkError as error:
@@ -479,10 +485,12 @@ def mean_row(names: Sequence[str], first: str, rows: Sequence[str]) -> str:
     return ",".join(out)
 
 
-def _head(board: Board, log: LogFile, steps: Sequence[Step], keys: Mapping[str, str]) -> list[str]:
+def _head(
+    board: Board, log: LogFile, steps: Sequence[Step], keys: Mapping[str, str], send: Callable[[Step], None]
+) -> list[str]:
     for step in steps:
         if step.at_s is None:
-            board.ask(step.line)
+            send(step)
     board.guard(write_head(board, log, keys))
     return board.ask("faults")
 
@@ -510,6 +518,7 @@ def _rows(
     say: Callable[[int, float], None],
     sink: RowSink,
     watch: FaultWatch,
+    send: Callable[[Step], None],
 ) -> None:
     waiting = [step for step in steps if step.at_s is not None]
     for _ in range(3):
@@ -546,4 +555,4 @@ def _rows(
                 watch.row(row.time_s, row.text.split(",")[state])
             say(sink.rows, row.time_s - first_s)
             while waiting and (waiting[0].at_s or 0.0) <= row.time_s - first_s:
-                board.ask(waiting.pop(0).line)
+                send(waiting.pop(0))

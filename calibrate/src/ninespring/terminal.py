@@ -215,7 +215,7 @@ def talk_from_a_pipe(board: Board, lines: Iterable[str]) -> None:
         if line.strip():
             talk.say(line.strip())
     if talk.refused:
-        raise WorkError(f"{talk.refused} of these lines were refused")
+        raise WorkError(f"{talk.refused} of these lines {'was' if talk.refused == 1 else 'were'} refused")
 
 
 @click.command(
