@@ -184,7 +184,10 @@ class Search:
         return added * math.log(max(1, len(self.candidates)))
 
     def worth(self, better: Fit, other: Fit, added: int = 1, share: float = MIN_SHARE) -> bool:
-        """Return whether `better` earns its place over `other`."""
+        """Return whether `better` earns its place over `other`: no effect does whose numbers the data cannot fix at all."""
+        fixed = {free.effect for free in better.spec.free if free.key not in better.stuck}
+        if any(effect not in fixed for effect in better.spec.effects if effect not in other.spec.effects):
+            return False
         if self.problem.colour is not None:
             # what is taken for noise that lasts may be any part of the error: what counts is that predictions change
             return (
