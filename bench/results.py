@@ -81,6 +81,11 @@ SECTIONS: tuple[Section, ...] = (
         f"{PYTHON} bench/diagnose/run.py --seeds 2 --first 300600 --cases build/results/diagnose.json",
         markdown=True,
     ),
+    Section(
+        "hours",
+        "Hours of log",
+        f"{PYTHON} bench/diagnose/hours.py --cases 10 --first 320000 --resume build/results/hours.json",
+    ),
     Section("closed_forms", "The field against closed forms", f"{PYTHON} bench/explore/closed_forms.py"),
     Section(
         "explore_paper", "The paper's temperatures from geometry", f"{PYTHON} bench/explore/paper.py --mesh coarse"

@@ -2,7 +2,7 @@
 
 Explicit Euler at a tenth of a second of five stores of heat (two heaters, two thermometers, the air of the box) and of two
 wandering heat flows. Thermometers step by half a kelvin and now and then show nonsense; the room is not logged. Read by
-`likelihood.py`; nothing of the diagnosis is used here.
+`hours.py`; nothing of the diagnosis is used here.
 """
 
 from __future__ import annotations

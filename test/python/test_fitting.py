@@ -180,8 +180,7 @@ def test_springs_start_where_the_sensors_would_show_the_first_row() -> None:
     assert plant.temperature_c()[1] == 20.0
 
 
-def test_evidence_prices_numbers_and_counts_correlated_samples_for_less(make_log) -> None:
-    """A number that explains nothing costs; the same gain is worth less where the residual remembers."""
+def test_a_number_that_explains_nothing_costs(make_log) -> None:
     problem = Problem(Array(), [read_log(make_log(seed=2))])
     base = diagnosis.first_fit(problem, base_spec(problem))
     known = effects.candidates(problem)
@@ -189,11 +188,6 @@ def test_evidence_prices_numbers_and_counts_correlated_samples_for_less(make_log
     lag = next(c for c in known if c.effect == "sensor_lag")
     spare = found.refit(base, [lag], [0.1])
     assert evidence.log_evidence(problem, spare, base) < -3.0  # half the logarithm of 5400 samples, less what it found
-    better = problem.fit(base.spec, base.as_dict(), errors=True)
-    better.chi2, better.sse = 0.9 * base.chi2, 0.9 * base.sse
-    white = evidence.log_evidence(problem, better, base)
-    better.factor = 20.0
-    assert 0 < evidence.log_evidence(problem, better, base) < 0.2 * white
 
 
 def test_a_thermometer_that_wanders_says_less_of_what_is_slow_than_of_what_is_quick(make_log) -> None:

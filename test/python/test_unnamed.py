@@ -104,7 +104,7 @@ def test_a_cause_that_stood_for_names_is_taken_as_it_is_by_the_numbers_that_it_h
     monkeypatch.setattr(unnamed, "library", library_of)
     monkeypatch.setattr(unnamed, "taken_out", take)
     found = diagnosed(make_log, change=drying)
-    assert not found["effects"] and found["unnamed"][0]["text"].startswith("all losses change over the run")
+    assert not found["effects"] and found["unnamed"][0]["text"].startswith("all losses change")
     assert len(libraries) == 2 and taken and all(any(one.cause is k for k in libraries[1]) for one in taken)
 
 

@@ -18,7 +18,7 @@ from .toml_file import At, TomlFile, did_you_mean
 
 SCHEMA = "ninespring.model/1"
 TABLES = ("array", "spring", "material", "sensor", "stiffness", "board")
-ERRORS = ("rmse_before_c", "rmse_after_c", "hottest_c")
+ERRORS = ("rmse_before_c", "rmse_after_c", "hottest_c", "room_over_first_k", "room_over_first_sigma_k")
 SPRING_KEYS = {
     "wire_diameter_mm": (0.01, 10.0),
     "coil_diameter_mm": (0.1, 100.0),

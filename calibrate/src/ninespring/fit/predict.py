@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import numpy as np
 
@@ -10,7 +11,8 @@ from .. import effects, native
 from ..errors import InputError, WorkError
 from ..logs.run import Run
 from ..models import Model
-from .simulate import array_parameters, simulate_run
+from . import room
+from .simulate import array_parameters, fades_per_s, simulate_run
 
 
 def plant_of(model: Model) -> native.Plant:
@@ -34,8 +36,26 @@ def chip_lines(model: Model) -> tuple[str, str]:
         raise InputError(str(error), model.name, *(model.places[names[-1]] if names else ())) from None
 
 
+def in_its_room(model: Model, run: Run) -> Run:
+    """Return a run without an ambient with the one that its first minute tells, and say so; others as they are."""
+    if run.ambient_c is not None or room.begun(run) is None:
+        return run
+    plant = plant_of(model)
+    known = model.provenance
+    over = known.get("room_over_first_k"), known.get("room_over_first_sigma_k")
+    guess = room.guessed(run, plant.get("ambient_c"), None if None in over else over)
+
+    def shows(part: Run, ambient_c: float, offset: np.ndarray) -> np.ndarray:
+        return simulate_run(plant.copy(), part, np.full(len(part.time_s), ambient_c), {}, offset)
+
+    value, sigma = room.of_run(run, guess, shows, fades_per_s(plant))
+    said = f"no ambient_c: by the first minute the room is at {value:.1f} degC (+-{sigma:.1f})"
+    return replace(run, ambient_c=np.full(len(run.time_s), value), notes=[*run.notes, said])
+
+
 def predict(model: Model, run: Run, chip: bool = False) -> np.ndarray:
     """Return what the sensors should show, (rows, springs), degC; `chip`: by the on-chip model, seen by the same sensors."""
+    run = in_its_room(model, run)
     if chip:
         return predict_by_chip(model, chip_lines(model)[0], run)
     return simulate_run(plant_of(model), run, run.ambient_c, {})
@@ -43,6 +63,7 @@ def predict(model: Model, run: Run, chip: bool = False) -> np.ndarray:
 
 def predict_by_chip(model: Model, lines: str, run: Run) -> np.ndarray:
     """Return what a chip with these console lines predicts, (rows, springs), degC, seen by the model's sensors."""
+    run = in_its_room(model, run)
     plant = plant_of(model)
     shown = simulate_run(plant, run, run.ambient_c, {})
     # What lag, gain and mixing of the sensors add is the plant's: the chip has none of them.
@@ -54,6 +75,7 @@ def predict_by_chip(model: Model, lines: str, run: Run) -> np.ndarray:
 
 def chip_trace(model: Model, lines: str, run: Run) -> tuple[np.ndarray, np.ndarray]:
     """Return temperatures (degC) and austenite, (rows, springs), that a chip with these lines believes along a log."""
+    run = in_its_room(model, run)
     plant = plant_of(model)
     ambient = run.ambient_c if run.ambient_c is not None else np.full(len(run.time_s), plant.get("ambient_c"))
     power = np.array([plant.get(f"command_power_w[{k + 1}]") for k in range(run.springs)])

@@ -45,6 +45,7 @@ def predict(log: Path, model_path: Path, output: Path, chip: bool, json_path: Pa
     array = model.array
     run = read_log(log, array.springs, temperatures=False, why=f"{model_path.name} is of {array.rows} x {array.cols}")
     run.notes += plausibility.swapped([run]) + plausibility.undriven_but_hottest(run)
+    run = prediction.in_its_room(model, run)
     notes_of([run])
     with working("simulating"):
         shown = prediction.predict(model, run, chip)
@@ -99,6 +100,7 @@ def replay(log: Path, model_path: Path, output: Path, json_path: Path | None) ->
         temperatures=False,
         why=f"{model_path.name} is of {model.array.rows} x {model.array.cols}",
     )
+    run = prediction.in_its_room(model, run)
     notes_of([run])
     lines, left_out = prediction.chip_lines(model)
     believed, austenite = prediction.chip_trace(model, lines, run)

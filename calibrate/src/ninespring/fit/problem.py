@@ -7,9 +7,10 @@ All residuals are measured minus model, degC.
 from __future__ import annotations
 
 import concurrent.futures
+import contextlib
 import math
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -22,8 +23,9 @@ from ..logs.run import Run
 from ..models import Array
 from . import statistics
 from .budget import Budget
+from .likelihood import Colour, Rows
 from .rounding import power_errors
-from .simulate import array_parameters, simulate_run
+from .simulate import array_parameters, fades_per_s, hidden_k, simulate_run
 from .spec import AMBIENT_OFFSET, DRIVE_GAIN, RUN_DRIVE, SENSOR_OFFSET, Fit, Spec
 
 WORKERS = max(1, min(8, os.cpu_count() or 1))
@@ -78,7 +80,13 @@ class Problem:
             ],
         }
         self.noise = [statistics.noise_floor(run.temperature_c, run.starts) for run in self.runs]
+        self.rounding = [
+            statistics.rounding(run.temperature_c, run.starts) if run.rounding_c is None else run.rounding_c
+            for run in self.runs
+        ]
         self._tidy_noise()
+        self.colour: Colour | None = None
+        self._rows: list[Rows] | None = None
         self.mask = [np.isfinite(run.temperature_c) for run in self.runs]
         self.count = int(sum(mask.sum() for mask in self.mask))
         self.basis: list[np.ndarray | None] = [None] * len(self.runs)
@@ -108,11 +116,15 @@ class Problem:
         return max(float(np.nanmax(run.temperature_c)) for run in self.runs)
 
     def _tidy_noise(self) -> None:
-        """A column too short or too clean to estimate takes the median of the others; 0.005 degC at least."""
+        """A column too short or too clean to estimate takes the median of the others; 0.005 degC, and what its steps leave, at least."""
         everything = np.concatenate(self.noise)
         usable = everything[np.isfinite(everything) & (everything > 0)]
         usual = float(np.median(usable)) if usable.size else 0.05
-        self.noise = [np.maximum(np.where(np.isfinite(one), one, usual), max(0.005, 0.2 * usual)) for one in self.noise]
+        least = max(0.005, 0.2 * usual)
+        self.noise = [
+            np.maximum(np.maximum(np.where(np.isfinite(one), one, usual), least), steps)
+            for one, steps in zip(self.noise, self.rounding, strict=True)
+        ]
 
     @property
     def noise_c(self) -> float:
@@ -134,7 +146,30 @@ class Problem:
                 mask &= ~bad
                 total += int(bad.sum())
         self.count = int(sum(mask.sum() for mask in self.mask))
+        self._rows = None
         return total
+
+    @property
+    def rows(self) -> list[Rows]:
+        """Return the runs' rows as a filter of what is left walks them."""
+        if self._rows is None:
+            self._rows = [Rows.of(run.time_s, run.starts, mask) for run, mask in zip(self.runs, self.mask, strict=True)]
+        return self._rows
+
+    @contextlib.contextmanager
+    def as_white(self) -> Iterator[None]:
+        """Take errors for white noise meanwhile, those of the first readings too."""
+        kept = self.colour, self.basis
+        self.colour, self.basis = None, [None] * len(self.runs)
+        try:
+            yield
+        finally:
+            self.colour, self.basis = kept
+
+    def take_for(self, colour: Colour | None) -> None:
+        """Weigh all that follows by how errors last; None: as white noise."""
+        self.colour = colour
+        self._start_bases()
 
     # ---- simulation -------------------------------------------------------------------------------------
 
@@ -263,6 +298,7 @@ class Problem:
             sse=self.plain(left),
             factor=math.nan,
             colour=None,
+            nats=math.nan,
             holdout=math.nan,
         )
 
@@ -282,7 +318,15 @@ class Problem:
             begin = end
         if self.unnamed is not None:
             out -= (out @ self.unnamed) @ self.unnamed.T
-        return self._whitened(out.T).T
+        return self._whitened(self.filtered(out.T)).T
+
+    def filtered(self, columns: np.ndarray) -> np.ndarray:
+        """Return columns (count, n), in units of the noise, as innovations of a filter that knows how errors last, if any is known."""
+        if self.colour is None:
+            return columns
+        ends = np.cumsum([int(mask.sum()) for mask in self.mask])[:-1]
+        parts = zip(self.rows, np.split(columns, ends), strict=True)
+        return np.concatenate([rows.whitened(part, self.colour)[0] for rows, part in parts])
 
     def _whitened(self, columns: np.ndarray, back: bool = False) -> np.ndarray:
         """Return columns (count, n) with errors of the first readings whitened out, or `back` from there."""
@@ -305,8 +349,8 @@ class Problem:
     def learn_starts(self, spec: Spec, values: Sequence[float]) -> None:
         """Find how an error of each starting temperature dies out, to keep it out of all that follows.
 
-        A simulation starts at the first measured temperatures, which carry the sensor's noise. Its effect is
-        nearly linear and the same in all models: it is computed once, and residuals are whitened by it.
+        A simulation starts at the first measured temperatures, which carry the sensor's noise and hide what a spring was about.
+        The effect is nearly linear and the same in all models: it is computed once, and residuals are whitened by it.
         """
         jobs = []
         for r, run in enumerate(self.runs):
@@ -314,21 +358,31 @@ class Problem:
             for k in range(run.springs):
                 jobs.append((r, np.eye(run.springs)[k]))
         shown = self.each(lambda job: self.simulate(spec, values, job[0], job[1]), jobs)
+        plant = self.plant_for(spec, values)
         at = 0
         for r, run in enumerate(self.runs):
             base = shown[at]
+            ambient = self.ambient_of(r, {f.key: float(v) for f, v in zip(spec.free, values, strict=True)})
+            around_c = plant.get("ambient_c") if ambient is None else float(ambient[0])
+            sigma = np.hypot(self.noise[r], hidden_k(run, around_c, fades_per_s(plant)))
             columns = []
             for k in range(run.springs):
                 response = ((shown[at + 1 + k] - base) / self.noise[r])[self.mask[r]]
-                response = response * self.noise[r][k]
+                response = response * sigma[k]
                 if np.isfinite(run.temperature_c[0, k]) and np.linalg.norm(response) > 1:
                     columns.append(response)
             at += 1 + run.springs
             if columns:
-                # whitening by the covariance 1 + S S', S the response to one sigma of each start
-                u, size, _ = np.linalg.svd(np.column_stack(columns), full_matrices=False)
-                self.basis[r] = u * np.sqrt(1.0 - 1.0 / np.sqrt(1.0 + size**2))
                 self.start_response[r] = np.column_stack(columns)
+        self._start_bases()
+
+    def _start_bases(self) -> None:
+        """Find what whitens errors of the first readings out: by the covariance 1 + S S', S the response to one sigma of each."""
+        for r, (rows, response) in enumerate(zip(self.rows, self.start_response, strict=True)):
+            if response is not None:
+                white = response if self.colour is None else rows.whitened(response, self.colour)[0]
+                u, size, _ = np.linalg.svd(white, full_matrices=False)
+                self.basis[r] = u * np.sqrt(1.0 - 1.0 / np.sqrt(1.0 + size**2))
 
     def learn_power(self, spec: Spec, values: Sequence[float]) -> None:
         """Find what rounding of the board's voltages leaves in each run: to keep it out of what is judged."""
@@ -528,25 +582,23 @@ class Problem:
         fit.simulations = self.simulations - begun
         return fit
 
-    def holdout_rmse(self, fit: Fit) -> float:
+    def holdout_rmse(self, fit: Fit, colour: Colour | None = None) -> float:
         """Return the rms error, degC, on blocks held out of the fit, one fold after the other.
 
         Every fifth block of about two minutes is left out, the numbers are fitted to the rest, and the error counts where
-        they have not seen the data. They move little: by the fit's slopes, within their bounds, nothing simulated.
+        they have not seen the data, less what errors that last (`colour`, or that of `take_for`) are there by the readings around.
+        They move little: by the fit's slopes, within their bounds, nothing simulated.
         """
         if not len(fit.values):
             return statistics.rms(fit.residual)
-        if math.isfinite(fit.holdout):
+        if colour is None and math.isfinite(fit.holdout):
             return fit.holdout
         free = fit.spec.free
         z = np.array([f.inner(v) for f, v in zip(free, fit.values, strict=True)])
         low, high = np.array([f.inner(f.low) for f in free]), np.array([f.inner(f.high) for f in free])
         trust = np.array([1.0 / f.prior if f.prior else 0.0 for f in free])
         believed = trust * (z - np.array([f.inner(f.start) for f in free]))
-        jac = fit.jacobian
-        if jac is None:
-            jac = self.jacobian(fit.spec, fit.values, self.predictions(fit.spec, fit.values))
-        slopes = self._whitened(jac, back=True)
+        slopes = self.plain_slopes(fit)
         left = np.concatenate(self.scaled(fit.residual))
         fold = np.concatenate(
             [
@@ -559,14 +611,31 @@ class Problem:
         total = 0.0
         for number in range(FOLDS):
             out = fold == number
-            rows = self._whitened(np.where(out[:, None], 0.0, both))
+            rows = np.where(out[:, None], 0.0, both)
+            rows = rows if self.colour is not None else self._whitened(rows)
             rows = np.vstack([rows, np.column_stack([np.diag(trust), believed])])
             inside = np.linalg.qr(rows, mode="r")
             bounds = (np.minimum(low - z, -1e-9), np.maximum(high - z, 1e-9))
             moved = lsq_linear(inside[:, :-1], -inside[:, -1], bounds, method="bvls").x
-            total += float(((noise * (left + slopes @ moved))[out] ** 2).sum())
+            rest = left + slopes @ moved
+            total += float(((noise * (rest - self.lasting(rest, out, colour or self.colour)))[out] ** 2).sum())
         fit.holdout = math.sqrt(total / max(1, self.count))
         return fit.holdout
+
+    def lasting(self, vector: np.ndarray, out: np.ndarray, colour: Colour | None) -> np.ndarray:
+        """Return what lasts of a vector (count,), in units of the noise, where `out` is set, as all other readings tell it."""
+        if colour is None:
+            return np.zeros_like(vector)
+        ends = np.cumsum([int(mask.sum()) for mask in self.mask])[:-1]
+        parts = zip(self.rows, np.split(vector, ends), np.split(out, ends), strict=True)
+        return np.concatenate([rows.between(part, colour, gone) for rows, part, gone in parts])
+
+    def plain_slopes(self, fit: Fit) -> np.ndarray:
+        """Return a fit's slopes with no error whitened out, (count, free)."""
+        if fit.jacobian is not None and self.colour is None:
+            return self._whitened(fit.jacobian, back=True)
+        with self.as_white():
+            return self.jacobian(fit.spec, fit.values, self.predictions(fit.spec, fit.values))
 
     def add_errors(self, fit: Fit) -> None:
         """Compute the covariance at the fit, with the residual's size and autocorrelation taken into account.
@@ -580,10 +649,10 @@ class Problem:
         fit.jacobian = jac
         used = [k for k, f in enumerate(fit.spec.free) if f.key not in fit.stuck]
         covariance = np.full((jac.shape[1], jac.shape[1]), 0.0)
-        fit.factor = statistics.correlation_factor(
-            [left / noise for left, noise in zip(fit.residual, self.noise, strict=True)],
-            self.longest_lag(),
-        )
+        fit.factor = 1.0  # innovations are white
+        if self.colour is None:
+            series = [left / noise for left, noise in zip(fit.residual, self.noise, strict=True)]
+            fit.factor = statistics.correlation_factor(series, self.longest_lag())
         if used:
             spread = max(1.0, fit.chi2 / max(1, fit.count - len(used)))
             trust = np.array([1.0 / f.prior if f.prior else 0.0 for f in fit.spec.free])[used]
@@ -603,9 +672,11 @@ class Problem:
                 ratio = np.ones_like(ratio)
             covariance[np.ix_(used, used)] = white * np.outer(ratio, ratio)
             begin = 0
-            for mask, response in zip(self.mask, self.power_response, strict=True):
+            for r, (mask, response) in enumerate(zip(self.mask, self.power_response, strict=True)):
                 end = begin + int(mask.sum())
                 if response is not None:
+                    if self.colour is not None:
+                        response = self.rows[r].whitened(response, self.colour)[0]
                     moved = inner @ (jac[begin:end, used].T @ response)
                     covariance[np.ix_(used, used)] += moved @ moved.T
                 begin = end

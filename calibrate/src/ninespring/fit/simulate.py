@@ -20,6 +20,9 @@ EACH = (
 )
 """What each spring has of its own by wire, coil and material."""
 
+HIDES_S = 20.0
+"""Of what a spring does, thermometers show this much later at most, about."""
+
 SHIFT_PER_N = "transformation_shift_k_per_n"
 LOAD_STEP_N = 0.1
 """A change of load that counts: half a kelvin of the transformation (docs/physics.md: 4 K/N)."""
@@ -41,6 +44,21 @@ def started(
         plant.settle_without("ambient_drift", 1e6)
     plant.start_from_measured(first + (0.0 if start_offset is None else start_offset))
     return plant
+
+
+def hidden_k(run: Run, ambient_c: float, fades_per_s: float) -> np.ndarray:
+    """Return how far springs may be from what their thermometers show at first, (springs,), K, one sigma.
+
+    One that is warmer than its room may be cooling, or be held: a thermometer that lags does not show which. A run that begins
+    steady hides nothing.
+    """
+    warm = np.nan_to_num(np.maximum(run.temperature_c[0] - ambient_c, 0.0))
+    return np.zeros(run.springs) if run.warm else HIDES_S * fades_per_s * warm
+
+
+def fades_per_s(plant: native.Plant) -> float:
+    """Return how quickly a plant's spring fades towards its room, 1/s."""
+    return plant.get("loss_w_per_k") / plant.get("heat_capacity_j_per_k")
 
 
 def simulate_run(

@@ -8,6 +8,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from .likelihood import Colour
+
 RUN_DRIVE, RUN_AMBIENT, RUN_SENSOR = RUNS_OWN = ("run_drive_gain", "run_ambient_offset", "run_sensor_offset")
 """What may be a run's own (effects/runs_differ.py): of the measurement, unknown to the plant."""
 DRIVE_GAIN, AMBIENT_OFFSET, SENSOR_OFFSET = "drive_gain", "ambient_offset_k", "run_sensor_offset_k"
@@ -132,8 +134,10 @@ class Fit:
     """Plain sum of squared residuals in units of the noise."""
     factor: float = math.nan
     """Samples per independent sample of the residual, where it has been computed."""
-    colour: np.ndarray | None = None
-    """Autoregression of the residual, where it has been computed."""
+    colour: Colour | None = None
+    """How what it leaves lasts, where it has been fitted ..."""
+    nats: float = math.nan
+    """... and the logarithm of its likelihood with that."""
     holdout: float = math.nan
     """Held-out rms error, degC, where it has been computed."""
     simulations: int = 0

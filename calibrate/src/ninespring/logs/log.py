@@ -12,6 +12,7 @@ import numpy as np
 import pandas as pd
 
 from ..errors import InputError
+from ..fit.statistics import rounding
 from ..ranges import LOG_TIME_S
 from . import mending
 from .run import DriveMode, Run
@@ -269,6 +270,7 @@ def read_log(
     mending.mask_glitches(run)
     mending.find_gaps(run)
     run.warm = mending.begins_warm(run)
+    run.rounding_c = rounding(run.temperature_c, run.starts)
     mending.doubt_units(run)
     if (
         temperatures

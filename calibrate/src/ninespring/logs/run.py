@@ -40,6 +40,9 @@ class Run:
     starts: list[int] = field(default_factory=lambda: [0])
     """Rows at which a simulation starts again from the measured temperatures (the first; after gaps)."""
 
+    rounding_c: np.ndarray | None = None
+    """(k,): what the thermometers' steps leave in a reading as it was logged, rms, where they hide its noise."""
+
     def __repr__(self) -> str:
         measured = int(np.isfinite(self.temperature_c).any(axis=0).sum())
         return (

@@ -70,6 +70,8 @@ def verdict(result: dict[str, Any]) -> str:
     names = [e["name"] + (f" ({e['variant']})" if e.get("variant") else "") for e in result["effects"]]
     apart = result.get("runs_differ")
     held = f"held-out error {before['holdout_rmse_c']:.2f} → {after['holdout_rmse_c']:.2f} K at a noise of {before['noise_c']:.2f} K"
+    if "unseen" in result:
+        held = f"{result['unseen']['text']}; {held}"
     if names and not result["unexplained"]:
         return f"Missing: {' and '.join(names)}; {held}."
     if names:

@@ -1,4 +1,4 @@
-"""What speaks for one fit against another: nats with autocorrelation accounted for, structure, differences."""
+"""What speaks for one fit against another: nats of one likelihood, structure, differences."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.signal import lfilter
 
 from ..fit import statistics
+from ..fit.likelihood import fitted
 from ..fit.problem import Problem
 from ..fit.spec import Fit
 
@@ -22,54 +22,27 @@ UNEXPLAINED_LOCAL = 1.0
 
 WIDTHS = (4, 12, 40)
 """Of the blocks in which structure is looked for, rows; in each spring by itself at all but the first."""
-LAGS = 6
-"""Of the autoregression that stands for a residual's colour."""
 
 
 def log_evidence(problem: Problem, better: Fit, other: Fit) -> float:
-    """Return by how many nats the data prefer `better`: half the difference of BIC, autocorrelation accounted for.
-
-    Two accounts, the clearer one counts. Slow structure: residuals at their effective sample size. Everything faster:
-    generalised least squares. What `better` leaves tells the noise's colour, as an autoregression; both residuals are
-    whitened by it. A thermometer that wanders then says little of what is slow, and no less of what is quick.
-    """
-    factor = fit_factor(problem, better)
-    n = better.count / factor
+    """Return by how many nats the data prefer `better`: the difference of likelihoods, each with what it leaves taken for noise that
+    lasts as long as it does, less half the logarithm of the readings for each number more (BIC)."""
     k = len(better.spec.free) - len(better.stuck) - (len(other.spec.free) - len(other.stuck))
-    slow = 0.5 * n * math.log(max(other.chi2, 1e-12) / max(better.chi2, 1e-12)) - 0.5 * k * math.log(max(n, 2.0))
-    if better.chi2 > other.chi2:
-        return slow
-    colour = coefficients(problem, better)
-    left, would_be_left = innovations(problem, better, colour), innovations(problem, other, colour)
-    spread = max(1e-12, left / better.count)
-    whitened = 0.5 * (would_be_left - left) / spread - 0.5 * k * math.log(better.count)
-    return max(slow, whitened)
+    return likelihood(problem, better) - likelihood(problem, other) - 0.5 * k * math.log(max(2, better.count))
 
 
-def _in_noise(problem: Problem, fit: Fit) -> list[np.ndarray]:
-    return [np.nan_to_num(left / noise) for left, noise in zip(fit.residual, problem.noise, strict=True)]
-
-
-def coefficients(problem: Problem, fit: Fit) -> np.ndarray:
-    """Return the autoregression of a fit's residual, (LAGS,): least squares over all runs and springs."""
-    if fit.colour is None:
-        normal, moment = np.eye(LAGS), np.zeros(LAGS)
-        for one in _in_noise(problem, fit):
-            before = np.stack([one[LAGS - k : len(one) - k].ravel() for k in range(1, LAGS + 1)])
-            normal += before @ before.T
-            moment += before @ one[LAGS:].ravel()
-        fit.colour = np.linalg.solve(normal, moment)
-    return fit.colour
-
-
-def innovations(problem: Problem, fit: Fit, colour: np.ndarray) -> float:
-    """Return the sum of squares of a fit's residual, in units of the noise, whitened by an autoregression."""
-    filtered = [lfilter(np.concatenate(([1.0], -colour)), [1.0], one, axis=0) for one in _in_noise(problem, fit)]
-    return sum(float((one[LAGS:] ** 2).sum()) for one in filtered)
+def likelihood(problem: Problem, fit: Fit) -> float:
+    """Return the logarithm of a fit's likelihood, errors that last fitted beside the white noise (fit/likelihood.py)."""
+    if not math.isfinite(fit.nats):
+        left = problem.scaled(problem.without_errors(fit.residual))
+        fit.colour, fit.nats = fitted(problem.rows, left)
+    return fit.nats
 
 
 def fit_factor(problem: Problem, fit: Fit) -> float:
     """Return samples per independent sample of a fit's residual."""
+    if problem.colour is not None:
+        return 1.0
     if not math.isfinite(fit.factor):
         fit.factor = statistics.correlation_factor(
             [left / noise for left, noise in zip(fit.residual, problem.noise, strict=True)],

@@ -18,7 +18,7 @@ from .. import effects
 from ..effects import Candidate
 from ..fit.problem import Problem
 from ..fit.spec import RUNS_OWN, Fit, Spec
-from .evidence import excess, fit_factor, gain, log_evidence
+from .evidence import difference, excess, fit_factor, gain, log_evidence
 from .screen import Screen
 
 MIN_EVIDENCE = 3.0
@@ -184,7 +184,16 @@ class Search:
         return added * math.log(max(1, len(self.candidates)))
 
     def worth(self, better: Fit, other: Fit, added: int = 1, share: float = MIN_SHARE) -> bool:
-        """Return whether `better` earns its place over `other`."""
+        """Return whether `better` earns its place over `other`: no effect does whose numbers the data cannot fix at all."""
+        fixed = {free.effect for free in better.spec.free if free.key not in better.stuck}
+        if any(effect not in fixed for effect in better.spec.effects if effect not in other.spec.effects):
+            return False
+        if self.problem.colour is not None:
+            # what is taken for noise that lasts may be any part of the error: what counts is that predictions change
+            return (
+                log_evidence(self.problem, better, other) - self.price(added) >= MIN_EVIDENCE
+                and difference(self.problem, better, other) >= MIN_GAIN
+            )
         beyond = excess(self.problem, other)
         explained = (other.sse - better.sse) / better.count
         return (
@@ -203,10 +212,7 @@ class Search:
             return False
         if own[0] < own[1] and gain(other, one) < MIN_GAIN:
             return True
-        ahead = (
-            log_evidence(self.problem, one, other) if one.chi2 < other.chi2 else -log_evidence(self.problem, other, one)
-        )
-        return ahead > self.handicap(one, other)
+        return log_evidence(self.problem, one, other) > self.handicap(one, other)
 
     def candidate_of(self, fit: Fit, effect: str) -> Candidate | None:
         """Return the candidate by which a fit has an effect."""
@@ -234,16 +240,24 @@ class Search:
 
     def holds_out(self, better: Fit, other: Fit) -> bool:
         """Return whether `better` also predicts blocks better that neither was fitted to."""
+        if self.problem.colour is not None:
+            return True  # the likelihood of innovations is that of each reading by those before it
         noise = self.problem.noise_c
         gained = self.problem.holdout_rmse(other) ** 2 - self.problem.holdout_rmse(better) ** 2
         return gained > (0.6 * MIN_GAIN * noise) ** 2
+
+    def floor(self) -> float:
+        """Return the squares that an addition must explain: what matters, or, of innovations, what is evidence."""
+        if self.problem.colour is not None:
+            return 2.0 * (MIN_EVIDENCE + self.price())
+        return MIN_GAIN**2 * self.problem.count
 
     def extend(self, fit: Fit, singles: int = 6, pairs: int = 2) -> list[tuple[Fit, int]]:
         """Return refits of the most promising single and paired additions to `fit`, with how many were added."""
         screen = self.screen(fit)
         count = len(screen.candidates)
         alone = [screen.forecast([k]) for k in range(count)]
-        floor = MIN_GAIN**2 * self.problem.count
+        floor = self.floor()
         out: list[tuple[Fit, int]] = []
         # one variant an effect (the best by forecast), several where close
         order = sorted(range(count), key=lambda k: -alone[k][0])

@@ -26,6 +26,8 @@ from .causes import SHORTEST, Cause, bump, column_of, library, thinned, typical_
 from .evidence import fit_factor, unexplained
 from .search import MIN_GAIN, MIN_SHARE, Search
 
+KINDS = 500
+"""Of causes that there are to choose from, at all places and times, about so many that differ."""
 MOST = 12
 """Unnamed causes, at most: where more would help, it is no cause of these kinds."""
 ROUNDS = 4
@@ -44,6 +46,8 @@ UNITS = {
     "surroundings": "K",
 }
 """Of a cause's size; the others are parts of what they take from."""
+ROOM_K = 10.0
+"""What a room can change by while somebody measures."""
 DRIFT = 3
 """Jumps of the same thermometers one way, from which they drift: two may be two."""
 LESS = (("is given heat", "loses heat"), ("shows more of", "shows less of"), ("are warmer", "are cooler"))
@@ -86,8 +90,11 @@ class Hidden:
 
     @property
     def possible(self) -> bool:
-        """Whether anything can be like that: of a part no more than all can be missing."""
-        return self.cause.kind in UNITS or self.size >= -1.0
+        """Whether anything can be like that: what leads on a part leads on no more than all, of a part no more than all can be
+        missing, and a room is where somebody works."""
+        if self.cause.kind == "surroundings":
+            return abs(self.size) <= ROOM_K
+        return self.cause.kind in UNITS or -1.0 <= self.size <= (1.0 if self.cause.kind in GIVES_ONLY else math.inf)
 
     def as_dict(self) -> dict[str, Any]:
         """Return it for diagnosis.json."""

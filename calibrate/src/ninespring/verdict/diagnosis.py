@@ -25,10 +25,10 @@ from ..fit.spec import RUNS_OWN, Fit, Spec
 from ..logs import condense
 from ..logs.run import Run
 from ..models import Array, Model
-from ..search import search, unnamed
+from ..search import lasting, search, unnamed
 from ..search.certainty import CERTAIN, NAMED, Witness, witness
-from ..search.evidence import EQUIVALENT, difference, excess, log_evidence, unexplained
-from . import contacts, doubt, experiments, plausibility, resistance, runs_apart, unknown_heat
+from ..search.evidence import EQUIVALENT, difference, excess, likelihood, log_evidence, unexplained
+from . import contacts, doubt, experiments, plausibility, resistance, runs_apart, unknown_heat, unseen
 from .residual import depends_on
 from .result import DRIFT_LEFT_OUT, as_shown, model_of, parameters_of
 
@@ -284,8 +284,10 @@ def _diagnose(
         final, without, contenders = found.run()
     problem.learn_power(final.spec, final.values)
     hidden: list[unnamed.Hidden] = []
-    if not swapped and unexplained(problem, final) and (beside := unnamed.search_beside(problem, found, final)):
-        found, (final, without, contenders), hidden = beside
+    if not swapped and unexplained(problem, final):
+        found, (final, without, contenders), hidden = _where_something_is_left(
+            problem, found, final, without, contenders
+        )
     declared_alone, base = base, found.base
     progress("held-out blocks")
     final = _finish(problem, final)
@@ -313,6 +315,15 @@ def _diagnose(
         judge = search.Search(problem, others, found.base, progress, found.fits)
         final, without, contenders = judge.settle(judge.forward(final))
         final = _finish(problem, final)
+    progress("a run that the fit never saw")
+    judged_by = unseen.Unseen(problem, found, declared_alone)
+    not_kept: list[str] = []
+    if not hidden and len(problem.runs) > 1:
+        kept, not_kept = judged_by.kept(final, judge.reduced)
+        if not_kept:
+            final = _finish(problem, kept)
+            without = {e: judge.reduced(final, e) for e in final.spec.effects if e not in base.spec.effects}
+    headline = judged_by.as_dict(final)
     final = runs_apart.with_spread(problem, final)
     left_over = unexplained(problem, final) or bool(hidden)
     adopted = [e for e in final.spec.effects if e not in base.spec.effects]
@@ -328,7 +339,12 @@ def _diagnose(
         again = {id(fit): with_everything(problem, fit, base) for fit in [final, *(fit for _, fit in steps)]}
         steps = [(effect, again[id(fit)]) for effect, fit in steps]
         final = again[id(final)]
-    base_out, final_out = problem.holdout_rmse(base), problem.holdout_rmse(final)
+    # as declared, by itself: with what lasts as the found model leaves it, it would be fitted to that
+    before = base if problem.colour is None else problem.evaluate(declared_alone)
+    if left_over and not hidden and problem.colour is None:
+        likelihood(problem, final)
+        final.holdout = problem.holdout_rmse(final, final.colour)
+    before_out, final_out = problem.holdout_rmse(before), problem.holdout_rmse(final)
 
     bounds = set(final.at_bounds())
     listed, runs_differ = [], []
@@ -373,6 +389,7 @@ def _diagnose(
     rho = statistics.autocorrelation([r / n for r, n in zip(final.residual, problem.noise, strict=True)], 1)
     depends, note = depends_on(problem, final)
     warnings = [f"{Path(run.name).name}: {text}" for run in problem.runs for text in run.notes]
+    warnings += not_kept
     if any(free.knot is not None for free in final.spec.free):
         warnings.append(f"model.toml: {DRIFT_LEFT_OUT}; log ambient_c to have it predicted")
     if left_over and problem.budget.short:
@@ -384,7 +401,7 @@ def _diagnose(
             f"{effect} ({effects.IN_WORDS[effect]}) would explain {one.share:.0%} of what is left, but not as well at all "
             f"times: {one.probability():.0%} likely, it is not named"
             for effect, one in witnesses.items()
-            if one.share > MOST_OF_IT
+            if one.share > MOST_OF_IT and effect in effects.IN_WORDS
         ]
     doubts = doubt.of_log(problem, problem.runs, swapped, (base,) if final is base else (base, final), left_over)
     warnings += doubts + impossible + doubt.about_power(problem) + plausibility.coarse(runs)
@@ -392,16 +409,21 @@ def _diagnose(
         note = ("structure well above the noise remains that no effect of the library explains. " + note).strip()
     else:
         note = note or "white at the noise floor"
+    absent = found.absent(final)
+    if problem.colour is not None:
+        slopes = problem.plain_slopes(final)
+        problem.take_for(None)
+        final = replace(final, jacobian=slopes)
     heat = unknown_heat.find(problem, final, progress)
     result: dict[str, Any] = {
         "schema": SCHEMA,
         "tool": f"ninespring {__version__}",
         "logs": [{"file": Path(r.name).name, "sha256": r.sha256, "rows": len(r.time_s)} for r in runs],
         "baseline": {
-            "rmse_c": statistics.rms(base.residual),
-            "holdout_rmse_c": base_out,
+            "rmse_c": statistics.rms(before.residual),
+            "holdout_rmse_c": before_out,
             "noise_c": problem.noise_c,
-            "parameters": parameters_of(problem, base),
+            "parameters": parameters_of(problem, before),
             "effects": list(base.spec.effects),
         },
         "effects": listed,
@@ -411,6 +433,7 @@ def _diagnose(
             "holdout_rmse_c": final_out,
             "parameters": parameters_of(problem, final),
         },
+        **({"unseen": headline} if headline else {}),
         "unexplained": bool(left_over),
         "unknown_heat": heat.as_dict(),
         "runs_differ": runs_differ,
@@ -445,12 +468,36 @@ def _diagnose(
         "seconds": round(time.monotonic() - begun, 2),
         "simulations": problem.simulations,
     }
-    made = model_of(problem, final, as_shown(problem, final), result, found.absent(final))
+    made = model_of(problem, final, as_shown(problem, final), result, absent)
     resistance.into_model(made, second)
     doubt.into_model(made, problem, final, doubts)
     judged(result["effects"], made)
     validate(result)
     return Diagnosis(result, made, problem, base, final, heat)
+
+
+def _where_something_is_left(
+    problem: Problem, first: search.Search, final: Fit, without: dict[str, Fit], contenders: list[tuple[str, Fit]]
+) -> unnamed.Beside:
+    """Search again, beside causes without a name and with what is left taken for noise that lasts: the likeliest of all."""
+    plain: unnamed.Beside = (first, (final, without, contenders), [])
+    beside = unnamed.search_beside(problem, first, final) or plain
+    if not all(one.possible for one in beside[2]):
+        problem.leave_out(None)
+        beside = plain
+    hidden, taken = beside[2], (problem.unnamed, problem.heat)
+    nats = lasting.nats_beside(problem, beside[1][0], hidden, unnamed.KINDS)
+    problem.leave_out(None)
+    if hidden and lasting.nats_beside(problem, final, (), 1) > nats:
+        beside, hidden, taken = plain, [], (None, None)
+        nats = lasting.nats_beside(problem, final, (), 1)
+    first.progress("noise that lasts")
+    searched, result = lasting.search_lasting(problem, first, final)
+    if lasting.nats_beside(problem, result[0], (), 1) > nats:
+        return searched, result, []
+    problem.unnamed, problem.heat = taken
+    problem.take_for(None)
+    return beside
 
 
 def finite(value: float) -> float | None:
@@ -469,11 +516,15 @@ def validate(result: Mapping[str, Any]) -> None:
 
 
 def fit_effects(
-    array: Array, runs: Sequence[Run], wanted: Sequence[str], progress: Callable[[str], None] = lambda text: None
+    array: Array,
+    runs: Sequence[Run],
+    wanted: Sequence[str],
+    progress: Callable[[str], None] = lambda text: None,
+    declared: Mapping[str, float] | None = None,
 ) -> tuple[Problem, Fit, Fit]:
     """Fit the declared model with the effects named; return the problem, the fit and the declared model's fit."""
     with threadpool_limits(1):
-        problem = prepare(array, runs)
+        problem = prepare(array, runs, declared)
         known = effects.candidates(problem)
         base = first_fit(problem, base_spec(problem))
         found = search.Search(problem, known, base, progress)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from .. import native
-from ..fit import statistics
+from ..fit import room, statistics
 from ..fit.problem import Problem
 from ..fit.spec import Fit
 from ..logs.run import Run
@@ -75,6 +75,7 @@ def model_of(
             for name, weight in free.shifts:
                 model.stderr[name] = math.hypot(model.stderr.get(name, 0.0), weight * errors[free.key])
     constants = [fit.value(f.key) for f in fit.spec.free if f.key.startswith("ambient_c@")]
+    rooms = [f.run for f in fit.spec.free if f.key.startswith("ambient_c@") and f.run is not None]
     if constants:
         model.parameters["ambient_c"] = float(np.mean(constants))
     drifts = [k for k, f in enumerate(fit.spec.free) if f.knot is not None]
@@ -97,6 +98,8 @@ def model_of(
         "rmse_after_c": statistics.rms(fit.residual),
         "hottest_c": max(float(np.nanmax(run.temperature_c)) for run in runs),
     }
+    if rooms and (over := room.over_first([problem.runs[r] for r in rooms], constants)):
+        model.provenance["room_over_first_k"], model.provenance["room_over_first_sigma_k"] = over
     if result:
         model.provenance["rmse_before_c"] = result["baseline"]["rmse_c"]
     if drifts:

@@ -1,0 +1,234 @@
+"""Hours of log: is a run that the fit never saw predicted, and is nothing named where heat only wanders?
+
+    .venv/bin/python bench/diagnose/hours.py [--cases N] [--first SEED] [--parts unseen,wander,halves] [--json FILE]
+
+The data are of `boards.py`, which shares nothing with the product, and the boards in data/.
+"""
+
+from __future__ import annotations
+
+import argparse
+import concurrent.futures
+import json
+import os
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import boards
+import numpy as np
+import pandas as pd
+from kept import Kept
+from ninespring import importing
+from ninespring.fit import problem as fitting
+from ninespring.fit.predict import predict
+from ninespring.logs import read_log
+from ninespring.logs.run import Run
+from ninespring.models import Array, Model
+from ninespring.verdict import diagnosis
+from ninespring.verdict.result import model_of
+from paper import data
+from tclab import LOGS, textbook
+
+HOURS = 2.0
+NONSENSE_K = 20.0
+"""A thermometer that is so far off shows nonsense: no model is to blame."""
+BOXES = ("shared_air", "plate_conduction")
+"""Effects that are heat kept beside the heaters."""
+
+
+def read(columns: dict[str, np.ndarray], folder: Path, name: str) -> Run:
+    """Return a log of a board as it is read from its file."""
+    rows = len(columns["u1"])
+    table = pd.DataFrame({"time_s": np.arange(float(rows))} | columns)
+    path = folder / f"{name}.csv"
+    path.write_text(table.to_csv(index=False))
+    return read_log(path, boards.HEATERS)
+
+
+def off(run: Run, shown: np.ndarray) -> float:
+    """Return how far a prediction is from a run's readings, K rms, nonsense left out."""
+    left = (run.temperature_c - shown)[np.isfinite(run.temperature_c)]
+    left = left[np.abs(left) < NONSENSE_K]
+    return float(np.sqrt(np.mean(left**2)))
+
+
+def declared() -> Model:
+    """Return what is told of such a board: roughly its heat, its losses, its power."""
+    model = Model(Array(1, boards.HEATERS))
+    model.parameters = {
+        "heat_capacity_j_per_k": 2.0,
+        "loss_w_per_k": 0.012,
+        "orthogonal_w_per_k": 0.003,
+        "command_power_w": 1.0,
+    }
+    return model
+
+
+def set_of(seed: int, part: int, wander: float, board: boards.Board | None = None) -> tuple[list[Run], Run, float]:
+    """Return three runs of a board (each heater, both), another of both, and the true model's own error of that."""
+    rng = np.random.default_rng([seed, part])
+    board = board or boards.random_board(rng, wander)
+    runs, rows = [], int(HOURS * boards.HOUR_S)
+    with tempfile.TemporaryDirectory() as folder:
+        for number, which in enumerate(((0,), (1,), (0, 1), (0, 1))):
+            command = boards.random_steps(rng, rows, which)
+            columns, truth = boards.log_of(rng, board, command, float(rng.uniform(18.0, 25.0)))
+            runs.append(read(columns, Path(folder), f"run{number}"))
+    return runs[:3], runs[3], off(runs[3], truth)
+
+
+def unseen(seed: int) -> dict[str, Any]:
+    """Fit three two-hour runs of a board with a box and a lag; return how well another is predicted."""
+    runs, other, true_model = set_of(seed, 1, 0.005)
+    begun = time.process_time()
+    found = diagnosis.diagnose(Array(1, boards.HEATERS), runs, model=declared())
+    names = [one["name"] for one in found.result["effects"]]
+    return {
+        "part": "unseen",
+        "seed": seed,
+        "names": names,
+        "lag": "sensor_lag" in names,
+        "box": any(name in names for name in BOXES),
+        "said": found.result.get("unseen", {}).get("rmse_c"),
+        "error": off(other, predict(found.model, other)),
+        "true_model": true_model,
+        "cpu_s": time.process_time() - begun,
+    }
+
+
+def wander(seed: int) -> dict[str, Any]:
+    """Fit two one-node boards whose heat wanders, nothing else missing; return what was named."""
+    rng = np.random.default_rng([seed, 3])
+    plain = replace(boards.random_board(rng), lag_s=0.0, box_s=0.0)
+    runs, _, _ = set_of(seed, 2, 0.005, plain)
+    found = diagnosis.diagnose(Array(1, boards.HEATERS), runs[1:], model=declared())
+    return {"part": "wander", "seed": seed, "names": [one["name"] for one in found.result["effects"]]}
+
+
+def part_of(run: Run, begin: float, end: float) -> Run:
+    """Return what of a run lies between two parts of its duration."""
+    since = (run.time_s - run.time_s[0]) / run.duration_s
+    here = (since >= begin) & (since <= end)
+    return replace(
+        run,
+        time_s=run.time_s[here] - run.time_s[here][0],
+        drive=np.ascontiguousarray(run.drive[here]),
+        temperature_c=run.temperature_c[here].copy(),
+        fan=run.fan[here],
+        ambient_c=None if run.ambient_c is None else run.ambient_c[here],
+        starts=[0],
+    )
+
+
+def halves(number: int) -> dict[str, Any] | None:
+    """Fit the first half of one of the boards in data/; return how well its second half is predicted."""
+    if number >= len(LOGS):
+        return None
+    name, file, mapping, _ = LOGS[number]
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / f"{name}.csv"
+        path.write_text(importing.import_table(data() / file, mapping))
+        run = read_log(path, boards.HEATERS)
+    first, second = part_of(run, 0.0, 0.5), part_of(run, 0.5, 1.0)
+    found = diagnosis.diagnose(Array(1, boards.HEATERS), [first], model=textbook())
+    baselines = []
+    for effects in ([], ["sensor_lag"]):
+        problem, fit, _ = diagnosis.fit_effects(
+            Array(1, boards.HEATERS), [first], effects, declared=textbook().parameters
+        )
+        baselines.append(off(second, predict(model_of(problem, fit, [first]), second)))
+    return {
+        "part": "halves",
+        "name": name,
+        "names": [one["name"] for one in found.result["effects"]],
+        "error": off(second, predict(found.model, second)),
+        "baseline": min(baselines),
+    }
+
+
+def row(figure: str, value: float, unit: str, target: str = "") -> dict[str, Any]:
+    """Return one figure as results.py wants it."""
+    return {
+        "figure": figure,
+        "value": round(value, 3),
+        "unit": unit,
+        "target": target,
+        "command": "python bench/diagnose/hours.py",
+    }
+
+
+def share(figure: str, held: list[bool], target: str) -> dict[str, Any]:
+    """Return how many of all, in percent."""
+    return row(f"{figure} ({sum(held)} of {len(held)})", 100.0 * sum(held) / max(1, len(held)), "%", target)
+
+
+def figures(done: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Return the figures of what was done."""
+    out = []
+    of = {part: [one for one in done if one["part"] == part] for part in ("unseen", "wander", "halves")}
+    if sets := of["unseen"]:
+        out.append(share("two-hour logs: the lag named", [one["lag"] for one in sets], ">= 90"))
+        out.append(share("two-hour logs: the box named", [one["box"] for one in sets], ">= 90"))
+        worse = np.array([one["error"] / one["true_model"] for one in sets])
+        out.append(share("two-hour logs: unseen run within 1.15 of the true model's error", list(worse <= 1.15), ""))
+        out.append(
+            row("two-hour logs: unseen run, of the true model's error, median", float(np.median(worse)), "x", "<= 1.15")
+        )
+        out.append(row("two-hour logs: unseen run, error, median", float(np.median([o["error"] for o in sets])), "K"))
+        out.append(
+            row("two-hour logs: a diagnosis, longest", max(one["cpu_s"] for one in sets), "s of one core", "<= 20")
+        )
+    if sets := of["wander"]:
+        out.append(
+            share("heat that wanders and nothing else: nothing named", [not one["names"] for one in sets], ">= 97")
+        )
+    for one in of["halves"]:
+        named = " + ".join(one["names"]) or "nothing"
+        out.append(
+            row(f"{one['name']}: second half by its first ({named})", one["error"], "K", f"<= {one['baseline']:.3f}")
+        )
+    return out
+
+
+def main() -> int:
+    """Run the benchmark."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--cases", type=int, default=30, help="of unseen; of wander twice as many")
+    parser.add_argument("--first", type=int, default=320000)
+    parser.add_argument("--parts", default="unseen,wander,halves")
+    parser.add_argument("--processes", type=int, default=os.cpu_count() or 2)
+    parser.add_argument("--json", type=Path)
+    parser.add_argument(
+        "--resume", type=Path, help="keep each case here; what it has of this very code is not done again"
+    )
+    options = parser.parse_args()
+    seeds = {"unseen": options.cases, "wander": 2 * options.cases, "halves": len(LOGS)}
+    parts: dict[str, Callable[[int], dict[str, Any] | None]] = {f.__name__: f for f in (unseen, wander, halves)}
+    wanted = {
+        f"{name} {seed}": (parts[name], seed)
+        for name in options.parts.split(",")
+        for seed in (range(len(LOGS)) if name == "halves" else range(options.first, options.first + seeds[name]))
+    }
+    fitting.WORKERS = 1
+    kept = Kept(options.resume)
+    with concurrent.futures.ProcessPoolExecutor(options.processes) as pool:
+        todo = {pool.submit(part, seed): key for key, (part, seed) in wanted.items() if key not in kept.cases}
+        for future in concurrent.futures.as_completed(todo):
+            one = future.result()
+            kept.add(todo[future], one)
+            print(json.dumps(one), file=sys.stderr, flush=True)
+    out = figures([kept.cases[key] for key in wanted])
+    for one in out:
+        print(f"{one['figure']:90} {one['value']:8} {one['unit']:14} {one['target']}")
+    if options.json:
+        options.json.write_text(json.dumps(out, indent=1) + "\n")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,163 @@
+"""One likelihood: what a model leaves is whitened as a filter does, and every reading counts for what it is worth."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from ninespring.fit import room, statistics
+from ninespring.fit.likelihood import BROKEN, Colour, Rows, fitted
+from ninespring.logs.run import Run
+
+
+def lasting(rng: np.random.Generator, rows: int, columns: int, sigma: float, time_s: float) -> np.ndarray:
+    """Return errors that fade with a time constant, a row a second, (rows, columns)."""
+    keep, out = math.exp(-1.0 / time_s), np.empty((rows, columns))
+    out[0] = sigma * rng.standard_normal(columns)
+    for row in range(1, rows):
+        out[row] = keep * out[row - 1] + sigma * math.sqrt(1.0 - keep**2) * rng.standard_normal(columns)
+    return out
+
+
+def test_the_filter_is_the_gaussian_of_its_covariance() -> None:
+    rng = np.random.default_rng(1)
+    time_s = np.cumsum(rng.uniform(0.5, 4.0, 40))
+    mask = np.ones((40, 1), dtype=bool)
+    mask[[7, 8, 20]] = False
+    rows = Rows.of(time_s, [0, 25], mask)
+    colour = Colour((4.0, 0.5), (4.0, 0.5), (10.0, 900.0))
+    vector = rng.standard_normal((37, 1))
+    white, logarithms = rows.whitened(vector, colour)
+    at = time_s[mask[:, 0]]
+    apart = np.abs(at[:, None] - at[None, :])
+    covariance = sum(v * np.exp(-apart / t) for v, t in zip(colour.apart, colour.time_s, strict=True))
+    piece = np.flatnonzero(mask[:, 0]) >= 25
+    covariance = np.where(piece[:, None] == piece[None, :], covariance, 0.0) + np.eye(37)
+    assert float(white[:, 0] @ white[:, 0]) == pytest.approx(
+        float(vector[:, 0] @ np.linalg.solve(covariance, vector[:, 0])), rel=1e-9
+    )
+    assert logarithms == pytest.approx(0.5 * np.linalg.slogdet(covariance)[1], rel=1e-9)
+    assert rows.step_s[25] == BROKEN
+
+
+def test_what_lasts_in_a_gap_is_told_as_a_gaussian_tells_it() -> None:
+    rng = np.random.default_rng(6)
+    time_s = np.cumsum(rng.uniform(0.5, 4.0, 30))
+    mask = np.ones((30, 3), dtype=bool)
+    mask[4] = False
+    rows = Rows.of(time_s, [0], mask)
+    colour = Colour((4.0, 0.5), (9.0, 2.0), (10.0, 900.0))
+    vector = rng.standard_normal(87)
+    fields = np.zeros(mask.shape)
+    fields[mask] = vector
+    hidden = np.zeros(mask.shape, dtype=bool)
+    hidden[12:20] = True
+    told = rows.between(vector, colour, hidden[mask])
+    apart = np.abs(time_s[:, None] - time_s[None, :])
+    known = np.flatnonzero(mask[:, 0] & ~hidden[:, 0])
+    gone = np.flatnonzero(hidden[:, 0])
+
+    def by_the_covariance(channel: np.ndarray, sizes: tuple[float, float]) -> np.ndarray:
+        covariance = sum(v * np.exp(-apart / t) for v, t in zip(sizes, colour.time_s, strict=True))
+        inside = covariance[np.ix_(known, known)] + np.eye(len(known))
+        return covariance[np.ix_(gone, known)] @ np.linalg.solve(inside, channel[known])
+
+    assert rows.turn is not None
+    turned = fields @ rows.turn.T
+    wanted = [by_the_covariance(turned[:, k], colour.apart if k else colour.together) for k in range(3)]
+    found = np.zeros(mask.shape)
+    found[mask] = told
+    assert found[gone] == pytest.approx(np.column_stack(wanted) @ rows.turn, abs=1e-8)
+    assert not found[known].any()
+
+
+def test_what_all_thermometers_share_is_told_from_what_each_has() -> None:
+    rng = np.random.default_rng(2)
+    rows, springs = 1500, 9
+    shared = lasting(rng, rows, 1, 1.0, 100.0)
+    readings = shared + rng.standard_normal((rows, springs))
+    walk = Rows.of(np.arange(float(rows)), [0], np.ones((rows, springs), dtype=bool))
+    colour, nats = fitted([walk], [readings.ravel()])
+    assert sum(colour.together) > 0.4 * springs  # a mean of nine has nine times one's
+    assert sum(colour.apart) < 0.05 and colour.white == pytest.approx(1.0, abs=0.1)
+    alone = -0.5 * readings.size * (math.log(np.mean(readings**2)) + 1.0)
+    assert nats > alone + 1000.0
+
+
+def test_white_noise_stays_white() -> None:
+    rng = np.random.default_rng(3)
+    walk = Rows.of(np.arange(900.0), [0], np.ones((900, 3), dtype=bool))
+    readings = 1.1 * rng.standard_normal((900, 3))
+    colour, nats = fitted([walk], [readings.ravel()])
+    assert nats == pytest.approx(-0.5 * readings.size * (math.log(np.mean(readings**2)) + 1.0), abs=3.0)
+    assert colour.share < 0.05
+
+
+def test_evidence_counts_a_reading_for_what_it_is_worth() -> None:
+    """A ramp taken out of errors that wander for minutes: a third of their squares, and next to no evidence."""
+    rng = np.random.default_rng(4)
+    time_s = np.arange(900.0)
+    walk = Rows.of(time_s, [0], np.ones((900, 1), dtype=bool))
+    gained = []
+    for _ in range(10):
+        left = 3.0 * lasting(rng, 900, 1, 1.0, 300.0)[:, 0] + rng.standard_normal(900)
+        ramp = np.column_stack([np.ones(900), time_s])
+        less = left - ramp @ np.linalg.lstsq(ramp, left, rcond=None)[0]
+        gained.append(fitted([walk], [less])[1] - fitted([walk], [left])[1])
+        counted_alone = 450.0 * math.log(float(left @ left) / float(less @ less))
+        assert gained[-1] < 0.1 * max(60.0, counted_alone)
+    assert np.median(gained) < 4.0
+
+
+def test_steps_of_a_thermometer_are_its_noise() -> None:
+    slow = 20.0 + 30.0 * (1.0 - np.exp(-np.arange(900.0) / 200.0))
+    stepped = (np.round(slow / 0.32) * 0.32)[:, None]
+    assert statistics.noise_floor(stepped)[0] < 0.01
+    assert statistics.rounding(stepped)[0] == pytest.approx(0.32 / math.sqrt(12.0), rel=0.01)
+    fine = slow[:, None] + np.random.default_rng(5).normal(0.0, 0.3, (900, 1))
+    assert statistics.rounding(np.round(fine / 0.0625) * 0.0625)[0] == 0.0
+
+
+def one_run(room_c: float, first_c: float, u: float = 0.5) -> Run:
+    """Return two minutes of one node that loses to its room with 180 s, read in steps of 0.1 K."""
+    time_s = np.arange(120.0)
+    shown = room_c + 80.0 * u + (first_c - room_c - 80.0 * u) * np.exp(-time_s / 180.0)
+    shown = np.round(shown[:, None] / 0.1) * 0.1
+    return Run("one", "", time_s, "command", np.full((120, 1), u), shown, np.zeros(120), None)
+
+
+@pytest.mark.parametrize("room_c", [16.0, 20.0, 25.0])
+def test_the_first_minute_tells_a_room(room_c: float) -> None:
+    run = one_run(room_c, room_c)
+
+    def shows(part: Run, ambient_c: float, offset: np.ndarray) -> np.ndarray:
+        since = part.time_s[:, None]
+        warm = part.temperature_c[0] + offset
+        end = ambient_c + 80.0 * part.drive[0]
+        return end + (warm - end) * np.exp(-since / 180.0)
+
+    value, sigma = room.of_run(run, room.guessed(run, 20.5, (0.0, 0.4)), shows, 1.0 / 180.0)
+    assert value == pytest.approx(room_c, abs=0.6) and sigma < 0.4
+    # of one run before it nothing is known but its room
+    value, sigma = room.of_run(run, room.guessed(run, 20.5, None), shows, 1.0 / 180.0)
+    assert abs(value - room_c) < abs(20.5 - room_c) + 0.5 and sigma < room.ROOMS_K
+
+
+def test_a_run_that_began_warm_is_not_taken_for_one_at_rest() -> None:
+    def nothing(part: Run, ambient_c: float, offset: np.ndarray) -> np.ndarray:
+        """A plant that a room does not change: the first minute says nothing."""
+        return part.temperature_c + offset
+
+    warm, cold = one_run(20.0, 45.0, 0.0), one_run(22.0, 22.0, 0.0)
+    value, sigma = room.of_run(warm, room.guessed(warm, 20.5, (0.5, 0.4)), nothing, 1.0 / 180.0)
+    assert value == pytest.approx(20.5, abs=0.1) and sigma > 2.0
+    value, sigma = room.of_run(cold, room.guessed(cold, 20.5, (0.0, 0.4)), nothing, 1.0 / 180.0)
+    assert value == pytest.approx(22.0, abs=0.3) and sigma < 1.0
+
+
+def test_runs_that_began_at_rest_say_that_another_does() -> None:
+    runs = [one_run(at, at, 0.0) for at in (18.0, 21.0, 23.0)]
+    over = room.over_first(runs, [18.1, 21.1, 23.1])
+    assert over is not None and over[0] == pytest.approx(0.1, abs=0.06) and over[1] < 0.5
+    assert room.over_first(runs[:1], [18.0]) is None
