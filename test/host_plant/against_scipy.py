@@ -59,8 +59,9 @@ SCALARS = {
     "ambient_amplitude_k": (0, 3),
     "ambient_period_s": (100, 1000),
     "ambient_phase_rad": (-3, 3),
-    "optical_orthogonal": (0, 0.15),
-    "optical_diagonal": (0, 0.05),
+    "optical_share": (0, 0.9),
+    "optical_width": (0.3, 2.5),
+    "optical_shape": (0.7, 8),
     "optical_beyond": (0, 1),
     "optical_background": (0, 0.3),
     "optical_background_rise_k": (0, 10),
@@ -97,6 +98,7 @@ class Model:
         self.layers, rows, columns = shape
         self.n, self.v, self.on, self.modes = self.layers * rows * columns, values, on, modes
         layer, row, column = np.unravel_index(np.arange(self.n), shape)
+        self.layer, self.row, self.column = layer, row, column
         dl, dr, dc = (abs(one[:, None] - one) for one in (layer, row, column))
         dr = dr + 99 * dl  # those of the other layer are nobody's neighbours
         self.series = ((dl == 1) & (dr == 99) & (dc == 0)).astype(float)
@@ -307,15 +309,24 @@ class Model:
         out[sensors:] = (t - sensor) / v["sensor_lag_s"]
         return out
 
+    def blurred(self, t: np.ndarray, ambient: float) -> np.ndarray:
+        """What a camera shows (n,): the whole plane's places weighed by a point-spread, those beyond the array too."""
+        v, far = self.v, 60
+        away = np.arange(-far, far + 1)
+        weight = np.exp(-((np.hypot(away[:, None], away) / v["optical_width"]) ** v["optical_shape"]))
+        weight[far, far] = 0.0
+        weight *= v["optical_share"] / weight.sum()
+        dr, dc = (np.abs(one[:, None] - one).astype(int) for one in (self.row, self.column))
+        share = weight[far + dr, far + dc] * (self.layer[:, None] == self.layer)
+        absent = v["optical_beyond"] * (v["optical_share"] - share.sum(1))
+        return (1 - share.sum(1) - absent) * t + share @ t + absent * ambient
+
     def seen(self, time: float, y: np.ndarray) -> np.ndarray:
         """What the sensors show (n,), degC."""
         v, ambient = self.v, self.ambient(time)
         t = y[self.n + 1 + self.layers :] if "sensor_lag" in self.on else y[: self.n]
         if "optical_mixing" in self.on:
-            share = v["optical_orthogonal"] * self.orthogonal + v["optical_diagonal"] * self.diagonal
-            absent = v["optical_orthogonal"] * (4 - self.orthogonal.sum(1))
-            absent = v["optical_beyond"] * (absent + v["optical_diagonal"] * (4 - self.diagonal.sum(1)))
-            t = (1 - share.sum(1) - absent) * t + share @ t + absent * ambient
+            t = self.blurred(t, ambient)
             b = v["optical_background"]
             t = (1 - b) * t + b * (ambient + v["optical_background_rise_k"])
         if "sensor_gain" in self.on:

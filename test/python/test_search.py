@@ -49,13 +49,35 @@ def heaters() -> Model:
 
 
 @pytest.mark.parametrize("beyond", [0.0, 1.0])
-def test_a_camera_that_sees_the_surroundings_beyond_the_array_makes_no_edge_loss(make_log, beyond: float) -> None:
-    camera = {"optical_orthogonal": 0.04, "optical_diagonal": 0.01, "optical_beyond": beyond}
+@pytest.mark.parametrize("width", [0.1, 0.9])
+def test_a_camera_that_sees_the_surroundings_beyond_the_array_makes_no_edge_loss(
+    make_log, beyond: float, width: float
+) -> None:
+    camera = {"optical_share": 0.2, "optical_width": width, "optical_beyond": beyond}
     found = diagnosis.diagnose(Array(), [read_log(make_log(effects={"optical_mixing": camera}), 9)])
     (one,) = found.result["effects"]
-    assert one["name"] == "optical_mixing" and ("beyond the array" in one["variant"]) == (beyond > 0)
-    assert found.model.parameters["optical_beyond"] == beyond
+    assert one["name"] == "optical_mixing" and one["certainty"] == "certain"
+    assert ("room beyond" in one["text"]) == (beyond > 0)
+    assert found.model.parameters["optical_beyond"] == pytest.approx(beyond, abs=0.1)
+    assert found.model.parameters["optical_share"] == pytest.approx(0.2, rel=0.1)
     assert found.result["unexplained"] is False
+
+
+def test_a_blur_over_more_than_the_nearest_is_found_as_it_is(make_log) -> None:
+    camera = {"optical_share": 0.6, "optical_width": 1.2, "optical_shape": 1.0}
+    found = diagnosis.diagnose(Array(), [read_log(make_log(effects={"optical_mixing": camera}), 9)])
+    (one,) = found.result["effects"]
+    assert one["name"] == "optical_mixing" and found.result["unexplained"] is False
+    # share and width of a long tail can stand for one another: what a spring sees of the next does not move
+    plants = [native.Plant(3, 3) for _ in range(2)]
+    for plant, numbers in zip(plants, (camera, found.model.parameters), strict=True):
+        plant.set_effects(["optical_mixing"])
+        plant.set_all({key: value for key, value in numbers.items() if key.startswith("optical_")})
+        plant.reset()
+        plant.set_temperature(4, 120.0)
+    true, fitted = (plant.measured_c() - 20.0 for plant in plants)
+    assert fitted[1] / fitted[4] == pytest.approx(true[1] / true[4], rel=0.1)
+    assert fitted[0] / fitted[4] == pytest.approx(true[0] / true[4], rel=0.1)
 
 
 @pytest.mark.parametrize(("chopped", "variant"), [(1.0, "chopped loads"), (0.0, "loads that draw their mean")])
