@@ -60,6 +60,9 @@ static void draw(thermal_model_parameters_t *p, bool latent)
     }
     p->wake_uw_per_k = often() ? (uint16_t)between(0, p->loss_uw_per_k / 4u) : 0;
     p->wake_direction = (uint8_t)between(0, 3);
+    /* with latent heat in proportion: its sets, and their figure, as they were before fans had a
+     * curve */
+    p->fan_half_share_permille = latent ? 500 : (uint16_t)between(100, 900);
     for (int i = 0; i < p->rows * p->columns; i++) {
         p->loss_scale_permille[i] = (uint16_t)between(850, 1150);
         p->heat_capacity_scale_permille[i] = (uint16_t)between(850, 1150);

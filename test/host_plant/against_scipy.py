@@ -44,6 +44,7 @@ SCALARS = {
     "convection_scale": (0.4, 1),
     "forced_scale": (0.3, 1),
     "fan_velocity_m_per_s": (0.2, 2),
+    "fan_half_share": (0.1, 0.9),
     "latent_cooling_ratio": (0.3, 1),
     "resistance_martensite_rise_per_k": (-3e-4, 1.5e-3),
     "resistance_austenite_rise_per_k": (-3e-4, 1.5e-3),
@@ -250,11 +251,17 @@ class Model:
             ),
         )
 
+    def blown(self, fan: float) -> float:
+        """Part of what the fan adds at full."""
+        half = self.v["fan_half_share"] if "fan_curve" in self.on else 0.5
+        return fan * half / (fan * half + (1 - fan) * (1 - half))
+
     def loss(self, t: np.ndarray, air: float, fan: float) -> np.ndarray:
         """Conductance to the air (n,), W/K."""
         v = self.v
-        natural = v["loss_w_per_k"] * (1 - fan) * self.loss_scale
-        forced = v["loss_fan_w_per_k"] * fan * self.fan_loss_scale
+        part = self.blown(fan)
+        natural = v["loss_w_per_k"] * (1 - part) * self.loss_scale
+        forced = v["loss_fan_w_per_k"] * part * self.fan_loss_scale
         if "natural_convection" not in self.on:
             return natural + forced
         rise = abs(t - air)
@@ -272,8 +279,9 @@ class Model:
         both = ((v["convection_scale"] * h_natural) ** 4 + (v["forced_scale"] * h_forced) ** 4) ** 0.25
         return both * v["surface_mm2"] * 1e-6 * self.loss_scale
 
-    def slope(self, time: float, y: np.ndarray, u: np.ndarray, fan: float) -> np.ndarray:
+    def slope(self, time: float, y: np.ndarray, u: np.ndarray, commanded: float) -> np.ndarray:
         """Time derivative of the state."""
+        fan = self.blown(commanded)
         n, v, on = self.n, self.v, self.on
         sensors = n + 1 + self.layers
         t, plate, sensor = y[:n], y[n + 1 : sensors], y[sensors:]
@@ -285,7 +293,7 @@ class Model:
         g_s = v["second_w_per_k"] * (1 - fan) + v["second_fan_w_per_k"] * fan
         g = self.scale[:, None] * (g_o * self.orthogonal + g_d * self.diagonal + g_s * self.second)
         g += (v["series_w_per_k"] * (1 - fan) + v["series_fan_w_per_k"] * fan) * self.series
-        given = self.loss(t, air, fan) * (t - air)
+        given = self.loss(t, air, commanded) * (t - air)
         if "fan_wake" in on:
             reached = self.downstream @ t - self.downstream.sum(1) * air
             given = given - v["wake_w_per_k"] * fan * self.scale * reached

@@ -27,6 +27,7 @@ static void each_effect_changes_what_it_should_and_only_that(void)
         {"resistance_temperature", CURRENT | DUTY},
         {"transformation_shift", 0}, /* alone: nothing depends on the phase */
         {"contact_resistance", POWER | DUTY},
+        {"fan_curve", HEAT},
     };
     static const double largest[4] = {0.8, 2.2, 0.2, 1.0};
     TEST_ASSERT_EQUAL_UINT(plant_effect_count(), sizeof expected / sizeof expected[0]);
@@ -241,6 +242,34 @@ static void sensor_gain_is_about_ambient(void)
     TEST_ASSERT_DOUBLE_WITHIN(1e-9, 20.0, plant_measured_c(plant, 1));
 }
 
+/* A spring's steady rise at a fixed power tells its loss. */
+static double loss_with_fan(double fan)
+{
+    OK(plant_set_fan(plant, fan));
+    settle();
+    return plant_power_w(plant, 0) / (at(0) - 20.0);
+}
+
+static void half_a_fan_gives_its_part_of_the_cooling(void)
+{
+    uncouple();
+    drive(0, PLANT_DRIVE_POWER, 0.3);
+    const double still = get("loss_w_per_k"), blown = get("loss_fan_w_per_k");
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0.5 * (still + blown), loss_with_fan(0.5));
+    on("fan_curve");
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, still + 0.735 * (blown - still), loss_with_fan(0.5));
+    set("fan_half_share", 0.3);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, still + 0.3 * (blown - still), loss_with_fan(0.5));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, still, loss_with_fan(0.0));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, blown, loss_with_fan(1.0));
+    double before = still;
+    for (int k = 1; k <= 20; k++) {
+        const double now = loss_with_fan(0.05 * k);
+        TEST_ASSERT_TRUE(now > before);
+        before = now;
+    }
+}
+
 static void a_pixel_sees_its_neighbours(void)
 {
     on("optical_mixing");
@@ -350,6 +379,7 @@ int main(void)
     RUN_TEST(an_undriven_spring_follows_the_drift_by_its_time_constant);
     RUN_TEST(sensor_lags_by_its_time_constant);
     RUN_TEST(sensor_gain_is_about_ambient);
+    RUN_TEST(half_a_fan_gives_its_part_of_the_cooling);
     RUN_TEST(a_pixel_sees_its_neighbours);
     RUN_TEST(a_camera_blurs_as_its_point_spread_falls);
     RUN_TEST(resistance_follows_phase_and_each_phase_its_temperature);

@@ -80,6 +80,25 @@ def test_a_blur_over_more_than_the_nearest_is_found_as_it_is(make_log) -> None:
     assert fitted[0] / fitted[4] == pytest.approx(true[0] / true[4], rel=0.1)
 
 
+@pytest.mark.parametrize("share", [0.3, 0.735])
+def test_what_half_a_fan_gives_is_found_where_it_blew_at_half(make_log, share: float) -> None:
+    log = make_log(effects={"fan_curve": {"fan_half_share": share}}, seconds=900, half=True)
+    found = diagnosis.diagnose(Array(), [read_log(log, 9)])
+    (one,) = found.result["effects"]
+    assert one["name"] == "fan_curve" and one["certainty"] == "certain" and one["on_chip"]
+    number = one["parameters"]["fan_half_share"]
+    assert abs(number["value"] - share) < 3 * number["stderr"] < 0.06
+    assert found.result["unexplained"] is False
+
+
+def test_no_fan_curve_is_named_where_there_is_none_or_nothing_shows_it(make_log) -> None:
+    proportional = diagnosis.diagnose(Array(), [read_log(make_log(seconds=900, half=True), 9)])
+    assert proportional.result["effects"] == []
+    curve = {"fan_curve": {"fan_half_share": 0.735}}
+    only_full = diagnosis.diagnose(Array(), [read_log(make_log(effects=curve, seconds=900), 9)])
+    assert only_full.result["effects"] == [] and "fan_half_share" not in only_full.model.parameters
+
+
 @pytest.mark.parametrize(("chopped", "variant"), [(1.0, "chopped loads"), (0.0, "loads that draw their mean")])
 def test_the_way_the_supply_sags_is_told_from_the_other(tmp_path: Path, chopped: float, variant: str) -> None:
     sag = {"supply_sag": {"supply_resistance_ohm": 8.0, "supply_chopped": chopped}}
