@@ -60,9 +60,10 @@ static void draw(thermal_model_parameters_t *p, bool latent)
     }
     p->wake_uw_per_k = often() ? (uint16_t)between(0, p->loss_uw_per_k / 4u) : 0;
     p->wake_direction = (uint8_t)between(0, 3);
-    /* with latent heat in proportion: its sets, and their figure, as they were before fans had a
+    /* with latent heat not drawn, so that all else of its sets is what it was before fans had a
      * curve */
-    p->fan_half_share_permille = latent ? 500 : (uint16_t)between(100, 900);
+    p->fan_half_share_permille =
+        (uint16_t)(latent ? 100u + p->heat_capacity_mj_per_k * 7u % 801u : between(100, 900));
     for (int i = 0; i < p->rows * p->columns; i++) {
         p->loss_scale_permille[i] = (uint16_t)between(850, 1150);
         p->heat_capacity_scale_permille[i] = (uint16_t)between(850, 1150);
