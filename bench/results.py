@@ -81,6 +81,12 @@ SECTIONS: tuple[Section, ...] = (
         f"{PYTHON} bench/diagnose/run.py --seeds 2 --first 300600 --cases build/results/diagnose.json",
         markdown=True,
     ),
+    Section(
+        "camera",
+        "A camera's blur",
+        f"{PYTHON} bench/diagnose/camera.py --sets 30 --cases build/results/camera.json",
+        markdown=True,
+    ),
     Section("closed_forms", "The field against closed forms", f"{PYTHON} bench/explore/closed_forms.py"),
     Section(
         "explore_paper", "The paper's temperatures from geometry", f"{PYTHON} bench/explore/paper.py --mesh coarse"
