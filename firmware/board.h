@@ -33,6 +33,10 @@ typedef enum {
  * follows is called with interrupts on, and leaves them on. */
 void board_init(void);
 uint8_t board_reset_cause(void);
+#ifdef NINESPRING_CHECKED
+/* Once: the invariant, a text in flash, that ended the run before this one; else NULL. */
+const char *board_broken_take(void);
+#endif
 
 /* --- outputs ------------------------------------------------------------------------------ */
 

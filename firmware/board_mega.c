@@ -5,6 +5,7 @@
 #include <avr/io.h>
 #include <avr/sleep.h>
 #include <avr/wdt.h>
+#include <stddef.h>
 #include <util/delay.h>
 
 #define SERIAL_RECEIVE_BYTES 128u /* 11 ms of input: more than the longest time away, a tick */
@@ -188,9 +189,9 @@ static void outputs_off(void)
     driving = 0;
 }
 
-/* A vector that nobody has: an interrupt that nothing here enables. The outputs stay off, and the
- * watchdog does what it does for a program that hangs. */
-ISR(BADISR_vect)
+/* The outputs stay off, and the watchdog does what it does for a program that hangs. Called with
+ * interrupts off. */
+static void end_as_a_hang_does(void)
 {
     outputs_off();
     ms_since_kick = BITTEN_MS; /* for a boot loader that passes no reset flags on */
@@ -198,6 +199,36 @@ ISR(BADISR_vect)
     for (;;) {
     }
 }
+
+/* A vector that nobody has: an interrupt that nothing here enables. */
+ISR(BADISR_vect)
+{
+    end_as_a_hang_does();
+}
+
+#ifdef NINESPRING_CHECKED
+#include "invariant.h"
+
+static const char *broken __attribute__((section(".noinit"))); /* in flash */
+static uint16_t broken_check __attribute__((section(".noinit")));
+
+void invariant_broken(const char *condition)
+{
+    cli();
+    broken = condition;
+    broken_check = (uint16_t) ~(uint16_t)condition;
+    end_as_a_hang_does();
+    for (;;) {
+    }
+}
+
+const char *board_broken_take(void)
+{
+    const bool is_one = (uint16_t)broken == (uint16_t)~broken_check;
+    broken_check = (uint16_t)broken;
+    return is_one ? broken : NULL;
+}
+#endif
 
 static void outputs_init(void)
 {

@@ -76,6 +76,11 @@ static const record_storage_t eeprom = {nullptr, eeprom_read, eeprom_ready, eepr
 
 static const char *reset_text(uint8_t cause)
 {
+#ifdef NINESPRING_CHECKED
+    if (const char *const broken = board_broken_take()) {
+        return broken;
+    }
+#endif
     if (cause & BOARD_RESET_WATCHDOG) {
         return PSTR("watchdog");
     }

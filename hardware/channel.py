@@ -414,6 +414,7 @@ Vpin pin 0 {pin}
 Rpin pin out 25
 Rseries out in {p["cut_off_series"]["ohm"]}
 Cpump in pump {p["cut_off_capacitor"]["farad"]}
+Rdischarge pump 0 {p["cut_off_discharge"]["ohm"]}
 D1 0 pump small
 D2 pump held small
 Chold held 0 {p["cut_off_reservoir"]["farad"]}

@@ -155,6 +155,7 @@ class Board:
         self.part("C3", "cut_off_capacitor", a="passive:PUMP_IN", b="passive:PUMP")
         self.part("D1", "cut_off_diode", anode="passive:GND", cathode="passive:PUMP")
         self.part("D2", "cut_off_diode", anode="passive:PUMP", cathode="passive:HELD")
+        self.part("R6", "cut_off_discharge", a="passive:PUMP", b="passive:GND")
         self.part("C4", "cut_off_reservoir", a="passive:HELD", b="passive:GND")
         self.part("R2", "cut_off_bleed", a="passive:HELD", b="passive:GND")
         self.part("Q1", "cut_off_switch", gate="in:HELD", drain="open:COIL", source="passive:GND")

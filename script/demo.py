@@ -40,6 +40,8 @@ INK = "#010203"
 MARTENSITE_START_C, AUSTENITE_START_C = 78.0, 88.0
 EFFECT, EDGE_LOSS = "edge_loss", 0.25
 PLAN_S, DRIVE_S, HELD_S, REST_S = 600, 300, 100, 600
+START_S = 60
+"""By then what was believed of warm springs beside wrong numbers, before an upload, has gone: errors are told from then on."""
 DRIVE_STEPS = """policy precompensate
 off all
 fan 0
@@ -221,8 +223,9 @@ def record(ports: tuple[str, str], name: str, steps: Path, duration_s: int) -> P
 
 
 def chip_error(trace: Columns, springs: Iterable[int] = range(1, 10)) -> float:
-    """Return by how much the chip's temperatures are off the thermometers', K rms of these springs."""
-    off = [m - t for k in springs for m, t in zip(trace[f"m{k}_c"], trace[f"t{k}_c"], strict=True)]
+    """Return by how much the chip's temperatures are off the thermometers' after the drive's first minute, K rms of these springs."""
+    first = next(k for k, t in enumerate(trace["time_s"]) if t - trace["time_s"][0] >= START_S)
+    off = [m - t for k in springs for m, t in zip(trace[f"m{k}_c"][first:], trace[f"t{k}_c"][first:], strict=True)]
     known = [one for one in off if not math.isnan(one)]
     return math.sqrt(sum(one**2 for one in known) / len(known))
 
@@ -309,7 +312,7 @@ def undeclared() -> str:
     lost = {name: sum(map(len, again(trace))) for name, trace in traces.items()}
     drives = {name: held(trace) for name, trace in traces.items()}
     rows = [
-        ["the chip's temperatures are off by, K rms", *(f"{one:.2f}" for one in error.values())],
+        ["after the first minute the chip's temperatures are off by, K rms", *(f"{one:.2f}" for one in error.values())],
         [f"spring {odd}'s alone, K rms", *(f"{chip_error(trace, [odd]):.2f}" for trace in traces.values())],
         ["springs lost their phase and were heated again", *(f"{one}" for one in lost.values())],
         ["held springs, coolest to warmest, °C", *(f"{low:.1f} to {high:.1f}" for low, high, _ in drives.values())],
@@ -319,7 +322,7 @@ def undeclared() -> str:
     beside = f" (and {html.escape(', '.join(others))}, which this array has not)" if others else ""
     return f"""{title}
 <p>Eight of nine springs are to be held, the centre stays off. At this array's edge springs lose more heat, a share of
-{EDGE_LOSS:g} for each free side, and nobody has told the chip: its temperatures are <b>{error["before"]:.1f} K</b> wrong (spring
+{EDGE_LOSS:g} for each free side, and nobody has told the chip: its temperatures are <b>{error["before"]:.1f} K</b> wrong after the first minute (spring
 {odd}'s {chip_error(traces["before"], [odd]):.0f} K), and it holds springs where they <b>lose their phase, {times(lost["before"])}</b> in {DRIVE_S // 60} minutes.</p>
 {picture(draw, "undeclared", "temperatures of three springs, measured and believed by the chip, before and after")}
 <p><code>record</code> logs {PLAN_S // 60} minutes with thermometers, and <code>diagnose</code>, which is not told either, names

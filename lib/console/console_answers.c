@@ -367,7 +367,11 @@ void console_print_status(const console_t *console)
                               console->status->load_percent};
     text_add_flash(line, FLASH_TEXT("|t:"));
     text_add_time_s(line, &console->status->time);
-    text_add_values(line, FLASH_TEXT("|sum_a:#3|hottest_c:#2@#0|fan:#0|fault:#0|late:#0|load:#0>"),
+    text_add_values(line,
+                    FLASH_TEXT("|sum_a:#3|hottest_c:#2@#0|fan:#0|fault:#0|late:#0|load:#0|supply:"),
                     values);
+    text_add_flash(line, !controller_supply_is_fitted(controller) ? FLASH_TEXT("none>")
+                         : !controller_supply_is_held(controller) ? FLASH_TEXT("off>")
+                                                                  : FLASH_TEXT("on>"));
     console_out_end(console, &out);
 }

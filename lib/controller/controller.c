@@ -217,6 +217,16 @@ static uint16_t positive_mv(int16_t voltage_mv)
     return voltage_mv > 0 ? (uint16_t)voltage_mv : 0u;
 }
 
+/* The most that a duty brings to a spring, and a quarter more for a supply that is another one. */
+static uint16_t most_mv(const controller_t *controller, uint8_t spring, uint16_t duty)
+{
+    const uint16_t before = controller->circuit[spring].last_duty;
+    const uint32_t duty_mv = fixed_point_mac_u16(0, duty > before ? duty : before,
+                                                 controller->current.parameters.supply_mv);
+    const uint16_t share_q16 = 26214u; /* 0.4: times 256 / 800 is 1.25 of the duty's share */
+    return fixed_point_high_u16((uint16_t)(duty_mv >> 8), share_q16);
+}
+
 /* Takes the readings and has them judged; returns the sum of what flows. */
 static uint32_t take_sensors(controller_t *controller, const controller_sensor_t sensor[],
                              bool valid[])
@@ -230,6 +240,7 @@ static uint32_t take_sensors(controller_t *controller, const controller_sensor_t
             .voltage_mv = sensor[k].voltage_mv,
             .off = duty == 0 && controller->circuit[k].last_duty == 0,
             .expected_ma = current_control_reference_ma(&controller->current, k),
+            .most_mv = most_mv(controller, k, duty),
             .temperature_c7 = thermal_model_temperature_c7(&controller->model, k)};
         valid[k] = safety_tick_spring(&controller->safety, k, &sample);
         circuit_check_take(&controller->circuit[k], controller->current.fixed_mohm, duty, valid[k],
@@ -360,6 +371,17 @@ static bool targets_are_allowed(const controller_t *controller, const bool allow
     return sum_ma <= controller->safety.parameters.supply_limit_ma;
 }
 
+static bool duties_are_allowed(const controller_t *controller, const bool allowed[],
+                               const uint16_t duty[])
+{
+    for (uint8_t k = 0; k < controller->springs; k++) {
+        if (duty[k] > CONTROLLER_DUTY_MAX || (duty[k] != 0 && !allowed[k])) {
+            return false;
+        }
+    }
+    return true;
+}
+
 static void drive(controller_t *controller, const bool valid[], uint32_t sum_ma, uint16_t duty[])
 {
     bool allowed[CONTROLLER_MAX_SPRINGS];
@@ -390,6 +412,7 @@ static void drive(controller_t *controller, const bool valid[], uint32_t sum_ma,
         sum_ma + controller->policy.parameters.supply_reserve_ma <= limits->supply_limit_ma;
     current_control_tick(&controller->current, controller->springs, target_ma,
                          controller->measured_ma, valid, may_rise, duty);
+    INVARIANT(duties_are_allowed(controller, allowed, duty));
     for (uint8_t k = 0; k < controller->springs; k++) {
         if ((drive_policy_limits(&controller->policy, k) & DRIVE_POLICY_LIMIT_TRIP) != 0) {
             safety_trip(&controller->safety, k, SAFETY_FAULT_LIMIT_TRIP);
@@ -426,7 +449,8 @@ void controller_tick(controller_t *controller, const controller_inputs_t *inputs
     memset(outputs->duty, 0, sizeof outputs->duty);
     drive(controller, valid, sum_ma, outputs->duty);
     outputs->fan_percent = controller->fan_percent;
-    outputs->supply = controller_supply_is_fitted(controller) && controller->supply_ticks != 0;
+    outputs->supply =
+        controller_supply_is_held(controller) && !safety_doubts_supply(&controller->safety);
 }
 
 bool controller_set_target(controller_t *controller, uint8_t spring, uint16_t level_permille)
@@ -495,6 +519,11 @@ bool controller_set_supply(controller_t *controller, bool on)
 bool controller_supply_is_fitted(const controller_t *controller)
 {
     return controller->safety.parameters.cut_off != 0;
+}
+
+bool controller_supply_is_held(const controller_t *controller)
+{
+    return controller_supply_is_fitted(controller) && controller->supply_ticks != 0;
 }
 
 bool controller_supply_is_off(const controller_t *controller)

@@ -139,6 +139,8 @@ void controller_emergency_cut(controller_t *controller);
  * safety_cuts_supply or SAFETY_FAULT_EMERGENCY_STOP stands, or no cut-off is fitted. */
 bool controller_set_supply(controller_t *controller, bool on);
 bool controller_supply_is_fitted(const controller_t *controller);
+/* Whether the cut-off gets its pulses: not while it is off, locked or not fitted. */
+bool controller_supply_is_held(const controller_t *controller);
 /* Switched off; not while it is only locked, nor where it is not fitted. */
 bool controller_supply_is_off(const controller_t *controller);
 /* Whoever asked for the springs is still there. host_timeout_s (0: never) after the last call, in

@@ -153,13 +153,24 @@ static bool is_frozen(const safety_parameters_t *p, const safety_spring_t *s,
             (flows_without_duty(p, sample) && sample->current_ma <= (int16_t)p->over_current_ma));
 }
 
+/* Of a driven spring: a stage's mean voltage is its duty's share of the supply, whatever hangs on
+ * it; an open one may have more, but no current. */
+static bool flows_beyond_duty(const safety_parameters_t *p, const safety_sample_t *sample)
+{
+    return sample->current_ma > (int16_t)p->over_current_ma && sample->voltage_mv > 0 &&
+           (uint16_t)sample->voltage_mv > sample->most_mv;
+}
+
 /* What no fault before it may hide: whatever else is wrong, only the supply's switch helps. */
 static void count_stuck(safety_t *safety, safety_spring_t *s, const safety_sample_t *sample)
 {
-    if (!flows_without_duty(&safety->parameters, sample)) {
+    const safety_parameters_t *p = &safety->parameters;
+    const uint8_t limit =
+        p->bad_samples < SAFETY_STUCK_TICKS ? p->bad_samples : (uint8_t)SAFETY_STUCK_TICKS;
+    if (!flows_without_duty(p, sample) && !flows_beyond_duty(p, sample)) {
         s->stuck = 0;
-    } else if (++s->stuck >= safety->parameters.bad_samples) {
-        s->stuck = safety->parameters.bad_samples;
+    } else if (++s->stuck >= limit) {
+        s->stuck = limit;
         s->fault = SAFETY_FAULT_STUCK_ON;
         safety->board_fault = SAFETY_FAULT_STUCK_ON;
     }
@@ -252,6 +263,15 @@ bool safety_cuts_supply(const safety_t *safety)
         cuts = cuts || safety->spring[k].fault == SAFETY_FAULT_OVER_TEMPERATURE;
     }
     return cuts;
+}
+
+bool safety_doubts_supply(const safety_t *safety)
+{
+    bool doubts = false;
+    for (uint8_t k = 0; k < safety->springs; k++) {
+        doubts = doubts || (safety->spring[k].stuck != 0 && safety->spring[k].sensor == 0);
+    }
+    return doubts;
 }
 
 safety_fault_t safety_fault(const safety_t *safety, uint8_t spring)

@@ -21,6 +21,9 @@ extern "C" {
 #endif
 #endif
 
+/* Readings in a row: by the fourth the supply has gone, and the current with it. */
+#define SAFETY_STUCK_TICKS 3u
+
 /* The numbers are part of the console's contract: never renumber, only add. */
 typedef enum {
     SAFETY_FAULT_NONE = 0,
@@ -53,7 +56,7 @@ typedef struct {
     uint8_t fault;       /* safety_fault_t, first one since the last clear, or STUCK_ON */
     uint8_t suspects;    /* electrical conditions, bits: found in every tick that is counted */
     uint8_t electrical;  /* ticks */
-    uint8_t stuck;       /* ticks with current and without duty */
+    uint8_t stuck;       /* ticks with current that no duty gives */
     uint8_t frozen;      /* ticks without duty that showed what was shown with it */
     uint8_t sensor;      /* ticks */
     uint8_t temperature; /* ticks */
@@ -83,6 +86,7 @@ typedef struct {
     bool off;             /* no duty in the measured tick, nor in the one before, of which a reading
                              may still have a part */
     uint16_t expected_ma; /* reference of the current loop in the measured tick; 0: it was off */
+    uint16_t most_mv;     /* the most that these duties can bring to the spring */
     int16_t temperature_c7; /* of the model, degC in Q9.7 */
 } safety_sample_t;
 
@@ -108,6 +112,12 @@ bool safety_apply(safety_t *safety, const safety_parameters_t *parameters, uint1
  * over_current_ma nobody is driven: there it is a current. */
 bool safety_tick_spring(safety_t *safety, uint8_t spring, const safety_sample_t *sample);
 void safety_tick_board(safety_t *safety, uint32_t sum_ma);
+
+/* True if and only if a spring's last reading was current that no duty gives: one that is off, or
+ * above over_current_ma at more than most_mv. Whoever holds the supply lets go at the first such
+ * reading; SAFETY_STUCK_TICKS in a row, or bad_samples if that is less, are SAFETY_FAULT_STUCK_ON.
+ */
+bool safety_doubts_supply(const safety_t *safety);
 
 /* What a resistance is against its limits: SAFETY_FAULT_SHORT_SPRING, _HIGH_RESISTANCE or _NONE. A
  * voltage below 0 counts as 0. */

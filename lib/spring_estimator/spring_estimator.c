@@ -419,19 +419,27 @@ static bool surely_finished(const spring_belief_t *b, const thermal_model_t *mod
            spring_c(thermal_model_transformation(model, k).austenite_finish_c7);
 }
 
-/* Above austenite start it reads, in two turns, what it read when it had transformed last, or more:
- * it has, and is as hot as it was then. */
+/* It is over, by what it reads in two turns above austenite start: what its austenite read when it
+ * had transformed last, or beyond; from above, what the largest coefficient makes of that where it
+ * is colder. What had gone the other way, as an intermediate phase does, is back well below
+ * austenite start; what is not, was none. */
 static bool reads_austenite(const spring_belief_t *b, const thermal_model_t *model, uint8_t k)
 {
     const spring_learnt_t *l = &b->learnt;
-    const int16_t start_c7 = thermal_model_transformation(model, k).austenite_start_c7;
+    const thermal_model_transformation_t t = thermal_model_transformation(model, k);
+    const int16_t now_c7 = thermal_model_temperature_c7(model, k);
     if (!spring_estimator_sees(b) || l->austenite_ohm == 0.0f || b->unsteady != 0 ||
-        b->current_a < STRONG_A || b->ohm_before[1] == 0.0f ||
-        thermal_model_temperature_c7(model, k) < start_c7) {
+        b->current_a < STRONG_A || b->ohm_before[1] == 0.0f || now_c7 < t.austenite_start_c7) {
         return false;
     }
-    const float more_ohm = 0.5f * (b->ohm_before[0] + b->ohm_before[1]) - l->austenite_ohm;
-    return l->change < 0.0f ? more_ohm < 0.0f : more_ohm > 0.0f;
+    const bool other_way = b->full_ohm > 0.0f && b->gone * l->change > 0.0f;
+    if (other_way && !spring_comes_back(b, b->ohm / b->full_ohm - 1.0f)) {
+        return true;
+    }
+    const float more = 0.5f * (b->ohm_before[0] + b->ohm_before[1]) / l->austenite_ohm - 1.0f;
+    const float colder_k = fmaxf(spring_c((int16_t)(t.austenite_finish_c7 - now_c7)), 0.0f);
+    return (l->change > 0.0f) != other_way ? more > 0.0f
+                                           : more < -COEFFICIENT_MOST_PER_K * colder_k;
 }
 
 bool spring_estimator_has_transformed(const spring_estimator_t *e, const thermal_model_t *model,

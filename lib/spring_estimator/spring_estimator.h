@@ -58,6 +58,7 @@ typedef struct {
     float onset_k;  /* heat taken up until then; until it is seen, until its change began */
     float cold_ohm; /* at its beginning, martensite; 0: it was not */
     float cold_c;
+    float cold_k; /* heat taken up until then */
     float cold_a;
     float excess; /* change that no temperature coefficient explains; signed */
     float flat_k; /* heat since, without such a change */

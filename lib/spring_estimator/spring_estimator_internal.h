@@ -12,8 +12,9 @@
 #define COEFFICIENT_MOST_PER_HEAT_K (COEFFICIENT_MOST_PER_K / 0.85f)
 
 /* And the least; learnt with what noise and offset add over 20 K. */
-#define COEFFICIENT_IN_PRINT_PER_K (-0.0003f)
-#define COEFFICIENT_LEAST_PER_K    (COEFFICIENT_IN_PRINT_PER_K - 0.00025f)
+#define COEFFICIENT_IN_PRINT_PER_K   (-0.0003f)
+#define COEFFICIENT_LEAST_PER_K      (COEFFICIENT_IN_PRINT_PER_K - 0.00025f)
+#define COEFFICIENT_LEAST_PER_HEAT_K (COEFFICIENT_IN_PRINT_PER_K / 0.85f)
 
 /* A reading at less is coarse: 4 mV are 3 % of its voltage. */
 #define STRONG_A 0.8f
@@ -86,6 +87,8 @@ bool spring_heated_enough(const spring_estimator_t *estimator, const spring_beli
 /* What it had lost was none: it is as hot as if it had not. */
 void spring_take_back(const spring_estimator_t *estimator, spring_belief_t *belief,
                       thermal_model_t *model, uint8_t spring);
+/* Of what it had gone by, missing (relative, signed) is still gone: nearer to being back. */
+bool spring_comes_back(const spring_belief_t *belief, float missing);
 /* What it had lost was phase: it comes back. */
 void spring_is_back(spring_belief_t *belief);
 /* What the sensor's offset may add to a resistance from one current to another, relative. */

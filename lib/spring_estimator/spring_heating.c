@@ -13,20 +13,23 @@
 #define FLAT_K         4.0f  /* of heat without a change: it is over */
 /* The last of a cosine is flatter than the largest coefficient, the longer the less it changes:
  * 2 (0.0015 / 0.85) H^2 / pi^2, H = 47 K of heat from its start to its finish. */
-#define FLAT_CHANGE_K  0.8f
-#define ONSET_K        2.0f /* beyond austenite start it is noticed */
-#define ONSET_C7       256  /* the same */
-#define PLACE_SD_K     3.0f
-#define CAPACITY_BOUND 1.25f /* 2.6 standard deviations of a heat capacity more */
-#define SAME_CURRENT   0.1f  /* within it a sensor's offset shows alike */
-#define LEAST_PART     0.5f  /* of a known change: a contact's step, flat afterwards, is less */
-#define LONE_PART      0.7f  /* where its resistance is not its austenite's either */
-#define LEAST_HEAT     0.74f /* latent heat 15 % less than declared, heat capacity 15 % more */
+#define FLAT_CHANGE_K   0.8f
+#define ONSET_K         2.0f /* beyond austenite start it is noticed */
+#define ONSET_C7        256  /* the same */
+#define PLACE_SD_K      3.0f
+#define CAPACITY_BOUND  1.25f /* 2.6 standard deviations of a heat capacity more */
+#define CAPACITY_LIKELY 1.12f /* 1.3 of them */
+#define SAME_CURRENT    0.1f  /* within it a sensor's offset shows alike */
+#define LEAST_PART      0.5f  /* of a known change: a contact's step, flat afterwards, is less */
+#define LONE_PART       0.7f  /* where its resistance is not its austenite's either */
+#define LEAST_HEAT      0.74f /* latent heat 15 % less than declared, heat capacity 15 % more */
 /* Of a declared martensite's resistance: 15 %, a sensor's gain of 3 %, a contact of 30 mohm, a
  * coefficient in print over 68 K: 0.81 to 1.53. */
-#define UNLIKE_LEAST 0.75f
-#define UNLIKE_MOST  1.6f
-#define COLD_SPAN_K  20.0f /* least, over which a coefficient is learnt */
+#define UNLIKE_LEAST    0.75f
+#define UNLIKE_MOST     1.6f
+#define COLD_SPAN_K     20.0f   /* least, over which a coefficient is learnt */
+#define OWN_SDS         3.7f    /* 2.6 standard deviations of a difference of two turns */
+#define OWN_LEAST_PER_K 0.0002f /* a martensite's line is as straight as that */
 
 void spring_estimator_begin_heating(spring_estimator_t *e, const thermal_model_t *model, uint8_t k)
 {
@@ -117,6 +120,13 @@ static float most_heat_k(const spring_estimator_t *e, const spring_belief_t *b, 
     return (spring_c(limit_c7) + shift_k - b->run.heat.begun_c + latent_k) * CAPACITY_BOUND;
 }
 
+/* The same of one that has lost phase in a hold, and is heated again: where it was is known, and
+ * so is how much it lacks. Beyond it a contact is as likely. */
+static float again_heat_k(const spring_estimator_t *e, const spring_belief_t *b, int16_t limit_c7)
+{
+    return (spring_c(limit_c7) - b->run.heat.begun_c + b->lost * e->latent_k) * CAPACITY_LIKELY;
+}
+
 bool spring_heated_enough(const spring_estimator_t *e, const spring_belief_t *b,
                           const thermal_model_t *model, uint8_t k)
 {
@@ -127,20 +137,29 @@ bool spring_heated_enough(const spring_estimator_t *e, const spring_belief_t *b,
 /* A spring that still transforms, or is known to show it and has not yet, is not hotter than that
  * lets it be, whatever the model says, until it must have come so far. Where it pauses, heat warms
  * it. */
-static void hold_back(const spring_estimator_t *e, const spring_belief_t *b, thermal_model_t *model,
+static void hold_back(const spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model,
                       uint8_t k)
 {
     const thermal_model_transformation_t t = thermal_model_transformation(model, k);
     const bool martensite = b->possible == SPRING_PHASE_MARTENSITE;
     const int16_t limit_c7 =
         martensite ? (int16_t)(t.austenite_start_c7 + ONSET_C7) : t.austenite_finish_c7;
-    /* after a look its temperature is a guess; once its transformation was seen, it is known */
+    if (thermal_model_temperature_c7(model, k) <= limit_c7) {
+        return;
+    }
+    const bool again = !martensite && b->full_ohm > 0.0f &&
+                       spring_estimator_hottest_c(b, model, k) < spring_c(limit_c7) + SHIFT_BOUND_K;
+    /* after a look its temperature is a guess; once its transformation was seen, it is known, but
+     * for what the surroundings have done since */
     const bool guess = b->shift_variance_k2 >= SHIFT_SD_K * SHIFT_SD_K;
-    const bool waits = martensite || ((b->onset ? b->run.heat.flat_k < FLAT_K : guess) &&
+    const bool waits = martensite || ((b->onset ? b->run.heat.flat_k < FLAT_K : guess || again) &&
                                       spring_estimator_lacks_phase(b, model, k));
     const bool shows = b->steep || (b->learnt.austenite_ohm > 0.0f && !b->blind && waits);
-    if (shows && thermal_model_temperature_c7(model, k) > limit_c7 &&
-        b->run.heat.heat_k < most_heat_k(e, b, limit_c7)) {
+    const float most_k = again ? again_heat_k(e, b, limit_c7) : most_heat_k(e, b, limit_c7);
+    if (shows && b->run.heat.heat_k < most_k) {
+        if (again) { /* if nothing was lost, it is warmer by that */
+            b->gone_k += spring_now_c(model, k) - spring_c(limit_c7);
+        }
         spring_set_temperature(model, k, spring_c(limit_c7), SPRING_PHASE_MARTENSITE);
     }
 }
@@ -198,6 +217,30 @@ static bool is_over(const spring_estimator_t *e, const spring_belief_t *b,
                : flat_k >= SHIFT_BOUND_K && spring_has_grown(b) && has_changed(b, LONE_PART);
 }
 
+/* What no temperature coefficient makes of a change over step_k of heat: one in print, and while it
+ * is martensite, as it has shown since it was cold, or less, as heat that transforms it warms it
+ * less. */
+static float unexplained(const spring_belief_t *b, float change, float step_k)
+{
+    const spring_heat_t *heat = &b->run.heat;
+    float least_per_k = COEFFICIENT_LEAST_PER_HEAT_K;
+    float most_per_k = COEFFICIENT_MOST_PER_HEAT_K;
+    const float way_k = heat->mark_k - heat->cold_k;
+    if (b->possible == SPRING_PHASE_MARTENSITE && heat->cold_ohm > 0.0f && way_k > COLD_SPAN_K) {
+        const float own_per_k = (heat->mark_ohm / heat->cold_ohm - 1.0f) / way_k;
+        const float unsure_per_k = OWN_SDS * b->noise / way_k + OWN_LEAST_PER_K;
+        least_per_k = fmaxf(least_per_k, fminf(own_per_k, 0.0f) - unsure_per_k);
+        most_per_k = fminf(most_per_k, fmaxf(own_per_k, 0.0f) + unsure_per_k);
+    }
+    float offset = 0.0f;
+    if (fabsf(b->current_a - heat->mark_a) > SAME_CURRENT * b->current_a) {
+        offset = spring_offset_may_show(b, b->ohm, heat->mark_a, b->current_a);
+    }
+    const float more = change - (most_per_k * step_k + offset);
+    const float less = change - (least_per_k * step_k - offset);
+    return more > 0.0f ? more : less < 0.0f ? less : 0.0f;
+}
+
 /* Change of resistance over heat, a step at a time: more than any temperature coefficient makes is
  * a transformation, whatever its sign. */
 void spring_heating_watch(const spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model,
@@ -218,6 +261,7 @@ void spring_heating_watch(const spring_estimator_t *e, spring_belief_t *b, therm
         b->run.heat.cold_ohm = b->ohm;
         b->run.heat.cold_a = b->current_a;
         b->run.heat.cold_c = spring_now_c(model, k);
+        b->run.heat.cold_k = b->run.heat.heat_k;
         b->unlike =
             b->ohm < UNLIKE_LEAST * e->martensite_ohm || b->ohm > UNLIKE_MOST * e->martensite_ohm;
     }
@@ -236,13 +280,7 @@ void spring_heating_watch(const spring_estimator_t *e, spring_belief_t *b, therm
         return;
     }
     const float change = b->ohm / b->run.heat.mark_ohm - 1.0f;
-    float explained = COEFFICIENT_MOST_PER_HEAT_K * step_k;
-    if (fabsf(b->current_a - b->run.heat.mark_a) > SAME_CURRENT * b->current_a) {
-        explained += spring_offset_may_show(b, b->ohm, b->run.heat.mark_a, b->current_a);
-    }
-    const float excess = change > explained    ? change - explained
-                         : change < -explained ? change + explained
-                                               : 0.0f;
+    const float excess = unexplained(b, change, step_k);
     /* a spring whose change is known changes that way */
     const bool against = b->learnt.austenite_ohm > 0.0f && excess * b->learnt.change < 0.0f;
     if (!b->onset && (against || excess * b->run.heat.excess <= 0.0f)) {
@@ -266,8 +304,11 @@ void spring_heating_watch(const spring_estimator_t *e, spring_belief_t *b, therm
         }
         b->run.heat.excess = 0.0f; /* from here on: how it grows, or the next one */
     } else if (b->run.heat.flat_k >= FLAT_K) {
-        const float unseen_k =
-            spring_clamp(FLAT_CHANGE_K / fabsf(b->learnt.change) - FLAT_K, 0.0f, SHIFT_BOUND_K);
+        const float change_seen = b->learnt.austenite_ohm > 0.0f
+                                      ? b->learnt.change
+                                      : b->ohm / b->run.heat.onset_ohm - 1.0f;
+        const float unseen_k = spring_clamp(FLAT_CHANGE_K / (fabsf(change_seen) + 0.001f) - FLAT_K,
+                                            0.0f, SHIFT_BOUND_K);
         if (is_over(e, b, model, k, unseen_k)) {
             see_finish(e, b, model, k, b->run.heat.flat_k - unseen_k);
         }

@@ -124,6 +124,11 @@ void spring_take_back(const spring_estimator_t *e, spring_belief_t *b, thermal_m
     b->unproven = false;
 }
 
+bool spring_comes_back(const spring_belief_t *b, float missing)
+{
+    return missing * b->gone <= BACK_SHARE * b->gone * b->gone;
+}
+
 void spring_is_back(spring_belief_t *b)
 {
     b->full_ohm = b->gone = b->gone_k = b->gone_w_per_k = 0.0f;
@@ -148,10 +153,10 @@ static void look_back(const spring_estimator_t *e, spring_belief_t *b, thermal_m
         return; /* a limit ended the heating too soon to tell */
     }
     if (fabsf(b->gone) > BACK_LEAST) {
-        if (missing * b->gone > BACK_SHARE * b->gone * b->gone) {
-            spring_take_back(e, b, model, k);
-        } else {
+        if (spring_comes_back(b, missing)) {
             spring_is_back(b);
+        } else {
+            spring_take_back(e, b, model, k);
         }
     }
     b->full_ohm = b->gone = 0.0f; /* too little to tell: it stays in doubt */

@@ -15,6 +15,7 @@
 #define SUPPLY_MV     5000u
 #define REGISTER_PIND 0x29u
 #define I2C_PINS      0x03u /* PD0 SCL, PD1 SDA: pulled up */
+#define RAM_BEGIN     0x200u
 #define PORF          0x01u
 #define EXTRF         0x02u
 #define BORF          0x04u
@@ -159,9 +160,11 @@ static bool make_core(board_t *board)
 
 board_t *board_create(const board_options_t *options, char *error, size_t error_size)
 {
-    int springs = options->plant != NULL ? plant_spring_count(options->plant) : 0;
+    int springs = options->array != NULL   ? (int)options->array->springs
+                  : options->plant != NULL ? plant_spring_count(options->plant)
+                                           : 0;
     if (springs > BOARD_CHANNELS) {
-        snprintf(error, error_size, "the board drives %d springs, the plant has %d", BOARD_CHANNELS,
+        snprintf(error, error_size, "the board drives %d springs, the array has %d", BOARD_CHANNELS,
                  springs);
         return NULL;
     }
@@ -180,6 +183,10 @@ board_t *board_create(const board_options_t *options, char *error, size_t error_
     board->elf = elf;
     board->plant = options->plant;
     board->springs = (unsigned)springs;
+    if (options->array != NULL) {
+        board->array = *options->array;
+        board->springs = options->array->springs;
+    }
     complaining = board;
     avr_global_logger_set(on_log);
     if (!make_core(board)) {
@@ -391,14 +398,19 @@ bool board_raise_interrupt(board_t *board, unsigned vector)
     return false;
 }
 
-void board_flip_register(board_t *board, unsigned address, uint8_t bits)
+void board_flip(board_t *board, unsigned address, uint8_t bits)
 {
     avr_t *avr = board->avr;
     const uint8_t value = avr->data[address] ^ bits;
     complaining = board;
     board_handle_events(board, avr->cycle);
+    if (address >= RAM_BEGIN) {
+        avr->data[address] = value;
+        return;
+    }
     const avr_io_addr_t io = (avr_io_addr_t)AVR_DATA_TO_IO(address);
-    if (!board_pwm_poke(&board->pwm, address, value) && avr->io[io].w.c != NULL) {
+    const bool is_known = io < sizeof avr->io / sizeof avr->io[0]; /* reserved ones lie beyond */
+    if (!board_pwm_poke(&board->pwm, address, value) && is_known && avr->io[io].w.c != NULL) {
         avr->io[io].w.c(avr, (avr_io_addr_t)address, value, avr->io[io].w.param);
     } else {
         avr->data[address] = value;

@@ -59,12 +59,26 @@ typedef enum {
 typedef void (*board_byte_t)(void *context, uint64_t cycle, uint8_t byte);
 typedef void (*board_mark_t)(void *context, uint64_t cycle, unsigned which, uint8_t value);
 
+/* An array of springs that is no plant: another truth, for the swarm. Its time is moved by `step`;
+ * a duty holds until the next. */
 typedef struct {
-    const char *elf;      /* path of the program */
-    plant_t *plant;       /* nine springs at most, not owned; its parameters may be set between
-                             runs; NULL: nothing is connected */
-    uint64_t seed;        /* of what RAM holds at power-on, and of the sensors' noise */
-    double shunt_noise_v; /* standard deviation of one conversion of an INA219 */
+    void *context;
+    unsigned springs; /* at most BOARD_CHANNELS */
+    void (*step)(void *context, double seconds);
+    void (*drive)(void *context, unsigned channel, double duty); /* 0 where the supply is off */
+    void (*fan)(void *context, double fraction);
+    void (*fault)(void *context, unsigned channel, plant_fault_t fault);
+    double (*current_a)(void *context, unsigned channel); /* now, with that duty */
+    double (*voltage_v)(void *context, unsigned channel); /* across the spring */
+} board_array_t;
+
+typedef struct {
+    const char *elf; /* path of the program */
+    plant_t *plant;  /* nine springs at most, not owned; its parameters may be set between
+                        runs; NULL: nothing is connected */
+    const board_array_t *array; /* in the plant's place, copied; NULL: the plant */
+    uint64_t seed;              /* of what RAM holds at power-on, and of the sensors' noise */
+    double shunt_noise_v;       /* standard deviation of one conversion of an INA219 */
     double bus_noise_v;
     bool without_cut_off; /* the stages have their supply whatever the program does */
     void *context;        /* of the two functions below, both optional */
@@ -131,9 +145,9 @@ void board_swap_sensors(board_t *board, unsigned a, unsigned b);
 void board_reset_sensor(board_t *board, unsigned channel);
 /* A register (0..5) of an INA219, without side effects. */
 uint16_t board_sensor_register(const board_t *board, unsigned channel, unsigned number);
-/* A bit or more of a register turns over by itself: `address` as the program sees it (0x20..0x1FF).
- */
-void board_flip_register(board_t *board, unsigned address, uint8_t bits);
+/* A bit or more of a register (0x20..0x1FF, as the program sees it) or of RAM (0x200..0x21FF) turns
+ * over by itself. */
+void board_flip(board_t *board, unsigned address, uint8_t bits);
 /* An interrupt that nothing asked for: its enable bit is set and it is raised. False if and only if
  * the simulated chip has no such vector (its number by the data sheet, less one: the program's). */
 bool board_raise_interrupt(board_t *board, unsigned vector);

@@ -26,6 +26,7 @@ struct board {
     board_elf_t *elf;
     board_options_t options;
     plant_t *plant;
+    board_array_t array; /* without a context's functions: the plant */
     unsigned springs;
     board_twi_t twi;
     board_uart_t uart;

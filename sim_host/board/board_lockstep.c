@@ -77,18 +77,25 @@ static double fan_of(const board_t *board)
     return board->fan_stopped ? 0.0 : board_pwm_fan(&board->pwm);
 }
 
-void board_move_plant(board_t *board, uint64_t cycle)
+static void move_array(board_t *board, double seconds, bool fed)
 {
-    integrate_until(board, cycle);
-    board->next_plant_cycle = cycle + PLANT_PERIOD_CYCLES;
-    if (board->plant == NULL || board->plant_held) {
-        return;
+    const board_array_t *array = &board->array;
+    if (seconds > 0.0) {
+        array->step(array->context, seconds);
     }
-    if (cycle > board->plant_cycle) {
-        (void)plant_step(board->plant, (double)(cycle - board->plant_cycle) / BOARD_FREQUENCY_HZ);
-        board->plant_cycle = cycle;
+    array->fan(array->context, fan_of(board));
+    for (unsigned k = 0; k < board->springs; k++) {
+        array->drive(array->context, k, fed ? switched_on(board, k) : 0.0);
+        board->current_a[k] = array->current_a(array->context, k);
+        board->voltage_v[k] = array->voltage_v(array->context, k);
     }
-    const bool fed = is_fed(board, cycle);
+}
+
+static void move_plant(board_t *board, double seconds, bool fed)
+{
+    if (seconds > 0.0) {
+        (void)plant_step(board->plant, seconds);
+    }
     for (unsigned k = 0; k < board->springs; k++) {
         (void)plant_drive(board->plant, (int)k, PLANT_DRIVE_DUTY,
                           fed ? switched_on(board, k) : 0.0);
@@ -97,6 +104,26 @@ void board_move_plant(board_t *board, uint64_t cycle)
     for (unsigned k = 0; k < board->springs; k++) {
         board->current_a[k] = plant_current_a(board->plant, (int)k);
         board->voltage_v[k] = plant_voltage_v(board->plant, (int)k);
+    }
+}
+
+void board_move_plant(board_t *board, uint64_t cycle)
+{
+    integrate_until(board, cycle);
+    board->next_plant_cycle = cycle + PLANT_PERIOD_CYCLES;
+    const bool is_array = board->array.step != NULL;
+    if ((board->plant == NULL && !is_array) || board->plant_held) {
+        return;
+    }
+    double seconds = 0.0;
+    if (cycle > board->plant_cycle) {
+        seconds = (double)(cycle - board->plant_cycle) / BOARD_FREQUENCY_HZ;
+        board->plant_cycle = cycle;
+    }
+    if (is_array) {
+        move_array(board, seconds, is_fed(board, cycle));
+    } else {
+        move_plant(board, seconds, is_fed(board, cycle));
     }
 }
 
@@ -226,7 +253,9 @@ void board_set_fault(board_t *board, board_fault_t fault, unsigned channel, bool
     switch (fault) {
     case BOARD_FAULT_OPEN:
     case BOARD_FAULT_SHORT:
-        if (board->plant != NULL && channel < board->springs) {
+        if (board->array.step != NULL && channel < board->springs) {
+            board->array.fault(board->array.context, channel, on ? wanted : PLANT_FAULT_NONE);
+        } else if (board->plant != NULL && channel < board->springs) {
             (void)plant_set_fault(board->plant, (int)channel, on ? wanted : PLANT_FAULT_NONE);
         }
         break;

@@ -44,8 +44,8 @@ double electrics_supply_v(double open_circuit_v, double source_ohm, double condu
  * charge pump whose gate falls ELECTRICS_CUT_OFF_GATE_S after the last pulse, or
  * ELECTRICS_CUT_OFF_HIGH_S after its pin rose and stayed high, and a relay that takes
  * ELECTRICS_CUT_OFF_RELAY_S both ways. It closes after the second pulse. All zero: open. */
-#define ELECTRICS_CUT_OFF_GATE_S  0.076
-#define ELECTRICS_CUT_OFF_HIGH_S  0.198
+#define ELECTRICS_CUT_OFF_GATE_S  0.061
+#define ELECTRICS_CUT_OFF_HIGH_S  0.061
 #define ELECTRICS_CUT_OFF_RELAY_S 0.010
 typedef struct {
     unsigned pulses; /* in a row, up to 2 */

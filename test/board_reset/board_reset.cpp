@@ -103,7 +103,7 @@ void whatever_bit_turns_over_the_board_answers_and_nothing_stays_hot()
             mega.say("on all 50");
             mega.run_ms(60.0);
             const unsigned resets = board_reset_count(mega.raw());
-            board_flip_register(mega.raw(), address, static_cast<std::uint8_t>(1u << k));
+            board_flip(mega.raw(), address, static_cast<std::uint8_t>(1u << k));
             mega.run_ms(WATCHDOG_MS + 60.0);
             mega.board.take_output();
             mega.board.send("\n"); /* ends what had begun */

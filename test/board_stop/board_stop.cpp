@@ -186,7 +186,7 @@ void stops_whatever_bit_of_an_output_has_turned_over()
     rig mega;
     all_on(mega);
     for (const bit &one : bits_of_the_outputs()) {
-        board_flip_register(mega.raw(), one.address, one.mask);
+        board_flip(mega.raw(), one.address, one.mask);
         const double ms = off_after_ms(mega);
         TEST_ASSERT_TRUE_MESSAGE(ms <= LIMIT_MS, text_of(one).c_str());
         mega.run_ms(2.0 * TICK_MS);
@@ -205,7 +205,7 @@ void off_is_off_again_within_a_tick_whatever_bit_turns_over()
     rig mega;
     mega.boot();
     for (const bit &one : bits_of_the_outputs()) {
-        board_flip_register(mega.raw(), one.address, one.mask);
+        board_flip(mega.raw(), one.address, one.mask);
         mega.run_ms(TICK_MS);
         TEST_ASSERT_TRUE_MESSAGE(board_all_off(mega.raw()), text_of(one).c_str());
     }
@@ -230,7 +230,7 @@ void a_driven_spring_has_its_current_again_whatever_bit_turns_over()
         if (!port_h_or_timer_4 || (one.mask & 0x29u) == 0) {
             continue; /* some, as each takes its time */
         }
-        board_flip_register(mega.raw(), one.address, one.mask);
+        board_flip(mega.raw(), one.address, one.mask);
         mega.run_ms(1300.0); /* two windows of the circuit's check */
         for (unsigned k = 0; k < BOARD_CHANNELS; ++k) {
             TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(0.2, 0.75, board_current_a(mega.raw(), k),

@@ -15,6 +15,12 @@ from ninespring.logs import log_text
 Make = Callable[..., Path]
 
 
+@pytest.fixture(scope="session", autouse=True)
+def kept_elsewhere(tmp_path_factory: pytest.TempPathFactory) -> None:
+    """Have what ninespring keeps on a computer (settings that boards had, console history) kept in a folder of the tests' own."""
+    os.environ["NINESPRING_HOME"] = str(tmp_path_factory.mktemp("kept"))
+
+
 @pytest.fixture
 def make_log(tmp_path: Path) -> Make:
     """Return a maker of 3 x 3 logs: effects and numbers of the plant, noise, seed, seconds, what is logged, the fan at half."""

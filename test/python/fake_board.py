@@ -80,7 +80,7 @@ class FakeBoard:
             if b"?" in buffer:
                 self.seen.append("?")
                 buffer = buffer.replace(b"?", b"")
-                self.say("<off|t:12.340|sum_a:0.000|hottest_c:21.30@5|fan:0|fault:0|late:0|load:26>")
+                self.say("<off|t:12.340|sum_a:0.000|hottest_c:21.30@5|fan:0|fault:0|late:0|load:26|supply:on>")
             while b"\n" in buffer and not self._busy:
                 line, buffer = buffer.split(b"\n", 1)
                 self._obey(line.decode().strip())

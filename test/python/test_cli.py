@@ -260,6 +260,7 @@ def test_files_are_written_together_or_not_at_all(tmp_path: Path) -> None:
         "import",
         "record",
         "upload",
+        "calibrate",
         "monitor",
         "plan",
         "plot",

@@ -15,10 +15,11 @@ import tempfile
 import time
 from collections.abc import Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from fake_board import FakeBoard, row
 from ninespring.belief import Belief, beliefs
@@ -463,6 +464,21 @@ def page_of(board: FakeBoard, folder: Path, every_s: float = 0.1) -> Iterator[Cl
         assert dashboard.end() == 0
 
 
+def test_the_board_that_gets_the_number_of_a_lost_terminal_is_left_alone(tmp_path: Path) -> None:
+    first = FakeBoard()
+    with page_of(first, tmp_path) as socket:
+        first.pull()
+        while json.loads(socket.recv(10)).get("connected", True):
+            pass
+        second = FakeBoard()  # somebody else's, beside it
+        assert second.port == first.port
+        trouble, until = "", time.monotonic() + 60.0
+        while "another one has that number now" not in trouble and time.monotonic() < until and not second.seen:
+            with suppress(TimeoutError):
+                trouble = json.loads(socket.recv(1)).get("trouble", "")
+    assert second.seen == [] and "another one has that number now" in trouble
+
+
 def test_a_pages_wishes_are_carried_out_in_their_order(tmp_path: Path) -> None:
     board = FakeBoard()
     with page_of(board, tmp_path) as socket:
@@ -723,6 +739,13 @@ def test_what_a_board_believes_reaches_the_page(tmp_path: Path) -> None:
         assert state["doing"] == ["not known for 75 s: it may still be hot from before power-on"]
 
 
+def test_each_id_of_the_page_is_of_one_element_and_the_script_finds_it() -> None:
+    page = ROOT / "calibrate" / "src" / "ninespring" / "dashboard" / "page"
+    ids = re.findall(r' id="([^"]+)"', (page / "index.html").read_text())
+    assert len(ids) == len(set(ids))
+    assert set(re.findall(r'\$\("([^"]+)"\)', (page / "page.js").read_text())) <= set(ids)
+
+
 def test_limits_in_words_are_those_of_the_table() -> None:
     table = re.findall(r"^\| \d+ \| `([a-z]+)` \|", (ROOT / "docs" / "driving.md").read_text(), re.MULTILINE)
     assert set(table) == words.LIMITS.keys()
@@ -775,3 +798,48 @@ def test_arguments_that_do_not_go_together_are_refused(arguments: tuple[str, ...
     done = subprocess.run(words, capture_output=True, text=True, timeout=60, check=False)
     assert done.returncode == 2
     assert len(done.stderr.strip().splitlines()) == 1
+
+
+def test_an_hour_is_kept_every_row_for_ten_minutes_and_one_a_second_before() -> None:
+    kept_by = source.Source()
+    for k in range(4500 * 4):  # 75 min at 4 Hz
+        kept_by._remember({"time_s": k / 4.0, "temperature_c": [20.0 + k]})
+    kept = [row["time_s"] for row in (*kept_by._older, *kept_by._history)]
+    end = kept[-1]
+    assert end - kept[0] == pytest.approx(3600.0, abs=1.5)
+    steps = np.diff(kept)
+    recent = np.array(kept[1:]) > end - 599.0
+    assert set(np.round(steps[recent], 3)) == {0.25}
+    assert steps.max() == 1.0
+    assert np.mean(steps[~recent] == 1.0) > 0.99
+    assert len(kept) < 3010 + 2410
+    told = kept_by.history()
+    assert len(told["time_s"]) <= 2 * 1200 + 2
+    assert told["time_s"][0] == kept[0]
+    kept_by._remember({"time_s": 1.0, "temperature_c": [20.0]})  # the board began anew
+    assert kept_by.history()["time_s"] == [1.0]
+
+
+@needs_browser
+@needs_board
+def test_patterns_are_shared_by_a_link_that_drives_nothing(browser: Browser, simulated: tuple[Dashboard, Path]) -> None:
+    page = opened(browser, simulated[0])
+    page.click("#draw button:nth-child(5)")
+    page.click("#add")
+    page.fill("#seconds", "7")
+    page.click("#share")
+    expect(page.locator("#log")).to_contain_text(re.compile(r"#patterns=000010000&every=7"))
+    assert page.evaluate("location.hash") == "#patterns=000010000&every=7"
+    assert "token" not in page.evaluate("location.href")
+    # whoever opens it sees the list, and has nothing driven; a list of one's own is kept
+    page.evaluate("location.hash = '#patterns=111101111,x,100000001&every=3'")
+    expect(page.locator("#list li")).to_have_count(2)
+    expect(page.locator("#seconds")).to_have_value("3")
+    expect(page.locator("#array button.on")).to_have_count(0)
+    page.reload()
+    expect(page.locator("#list li")).to_have_count(2)
+    page.click("#own")
+    expect(page.locator("#list li")).to_have_count(1)
+    expect(page.locator("#list li").first).to_contain_text("000010000")
+    assert page.problems == []
+    page.close()

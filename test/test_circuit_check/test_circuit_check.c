@@ -2,6 +2,7 @@
  * within 2 s. */
 #include <math.h>
 #include <stdint.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "circuit_check.h"
@@ -239,6 +240,135 @@ static void any_reading_is_taken_without_overflow(void)
     }
 }
 
+/* A window's readings: `share` of the sweep of so many steps shows, and the mean of all is as it
+ * should be but for beyond_mv. What is read is exact. */
+static bool judged(uint16_t duty, uint16_t steps, double share, double beyond_mv, uint8_t readings)
+{
+    for (uint32_t tick = 0; tick < 30u; tick++) {
+        const uint16_t given = tick < readings ? swept(duty, steps, tick) : duty;
+        const double middle = duty + 0.47 * steps;
+        const double behind_mv = 5000.0 / 800.0 * (middle + share * (given - middle)) + beyond_mv;
+        /* the spring's half, and what 180 mohm drop of the current, rounded as the check does */
+        const double ma = behind_mv / (0.2 + 180.0 / 1024.0);
+        circuit_check_take(&check, 180, given, tick < readings, (int16_t)lround(ma),
+                           (int16_t)lround(ma * 0.2));
+    }
+    return circuit_check_judge(&check, &parameters);
+}
+
+/* Windows on end until it is found; 9: it is not. */
+static int windows(uint16_t duty, uint16_t steps, double share, double beyond_mv)
+{
+    setUp();
+    for (int n = 1; n < 9; n++) {
+        if (judged(duty, steps, share, beyond_mv, 30)) {
+            return n;
+        }
+    }
+    return 9;
+}
+
+/* Each share and balance at both sides of its limit, and after how many windows on end. */
+static void what_follows_too_little_or_too_much_is_found_after_its_windows(void)
+{
+    static const struct {
+        uint16_t duty, steps;
+        double share, beyond_mv;
+        int windows;
+    } cases[] = {
+        {120, 30, 1.0, 0.0, 9},    {120, 30, 0.30, 0.0, 9},  {120, 30, 0.20, 0.0, 2},
+        {120, 30, 2.3, 0.0, 9},    {120, 30, 2.7, 0.0, 2},   {120, 30, -1.0, 0.0, 2},
+        {120, 30, 1.0, 220.0, 9},  {120, 30, 1.0, 300.0, 3}, {120, 30, 1.0, -220.0, 9},
+        {120, 30, 1.0, -300.0, 3}, {190, 3, 0.0, 0.0, 3},    {120, 0, 0.0, 0.0, 9},
+        {120, 0, 0.0, 300.0, 3},   {3, 0, 0.0, 10.0, 9},     {3, 0, 0.0, 30.0, 3},
+        {400, 3, 3.2, 0.0, 9}, /* too little of it moves to tell by how much */
+    };
+    for (size_t n = 0; n < sizeof cases / sizeof cases[0]; n++) {
+        const int found =
+            windows(cases[n].duty, cases[n].steps, cases[n].share, cases[n].beyond_mv);
+        char which[20];
+        (void)snprintf(which, sizeof which, "case %u", (unsigned)n);
+        TEST_ASSERT_EQUAL_INT_MESSAGE(cases[n].windows, found, which);
+    }
+}
+
+/* The diode's drop takes its part of the voltage, and it stays found however long it lasts. */
+static void the_drop_counts_and_what_is_found_stays_found(void)
+{
+    parameters.freewheel_mv = 1000;
+    for (int off_mv = 0; off_mv <= 800; off_mv += 800) {
+        memset(&check, 0, sizeof check);
+        for (int window = 0; window < 300; window++) {
+            for (uint32_t tick = 0; tick < 30u; tick++) {
+                const double behind_mv = 400.0 * 6000.0 / 800.0 - 1000.0 + off_mv;
+                const double ma = behind_mv / (0.2 + 180.0 / 1024.0);
+                circuit_check_take(&check, 180, 400, true, (int16_t)fmin(ma, 4095.0),
+                                   (int16_t)lround(behind_mv - fmin(ma, 4095.0) * 180.0 / 1024.0));
+            }
+            TEST_ASSERT_EQUAL(off_mv != 0 && window >= 2, circuit_check_judge(&check, &parameters));
+        }
+    }
+}
+
+/* A voltage that stands though the sweep moves it by 3.2 mV, more than half a step of its register.
+ */
+static void voltage_that_should_move_by_more_than_half_a_step_is_frozen(void)
+{
+    int window = 0;
+    for (bool found = false; !found; window++) {
+        TEST_ASSERT_LESS_THAN_INT(4, window);
+        for (uint32_t tick = 0; tick < 30u; tick++) {
+            const uint16_t given = swept(120, 3, tick);
+            const double ma = 5000.0 / 800.0 * given / (0.2 + 180.0 / 1024.0);
+            circuit_check_take(&check, 180, given, true, (int16_t)lround(ma), 404);
+        }
+        found = circuit_check_judge(&check, &parameters);
+    }
+}
+
+/* Too few readings tell nothing, and end the row. */
+static void eleven_readings_tell_nothing(void)
+{
+    for (int n = 0; n < 6; n++) {
+        TEST_ASSERT_FALSE(judged(120, 30, -1.0, 300.0, 11));
+    }
+    TEST_ASSERT_FALSE(judged(120, 30, -1.0, 0.0, 12));
+    TEST_ASSERT_FALSE(judged(120, 30, -1.0, 0.0, 11));
+    TEST_ASSERT_FALSE(judged(120, 30, -1.0, 0.0, 12));
+    TEST_ASSERT_TRUE(judged(120, 30, -1.0, 0.0, 12));
+}
+
+/* After a jump a reading may be of the duty before: it is none. */
+static void a_reading_after_a_jump_is_left_out(void)
+{
+    static const uint16_t duty[] = {2, 4, 2, 5, 5, 2, 1, 3};
+    static const uint8_t readings[] = {1, 2, 3, 3, 4, 4, 5, 6};
+    for (unsigned n = 0; n < 8; n++) {
+        circuit_check_take(&check, 180, duty[n], true, 100, 20);
+        TEST_ASSERT_EQUAL_UINT8(readings[n], check.readings);
+    }
+    circuit_check_take(&check, 180, 3, false, 100, 20);
+    TEST_ASSERT_EQUAL_UINT8(6, check.readings);
+    TEST_ASSERT_EQUAL_UINT16(2 + 4 + 2 + 5 + 1 + 3, check.duty);
+    TEST_ASSERT_EQUAL_UINT32(4 + 16 + 4 + 25 + 1 + 9, check.duty_square);
+    TEST_ASSERT_EQUAL_UINT32(6u * (20u + (100u * 180u >> 10)), check.voltage_mv);
+    TEST_ASSERT_EQUAL_UINT32(17u * (20u + (100u * 180u >> 10)), check.duty_voltage);
+}
+
+static void readings_beyond_the_sensor_count_as_its_ends(void)
+{
+    circuit_check_take(&check, 1024, 0, true, -1, -1);
+    TEST_ASSERT_EQUAL_UINT32(0, check.voltage_mv);
+    circuit_check_take(&check, 1024, 0, true, 0, 1);
+    TEST_ASSERT_EQUAL_UINT32(1, check.voltage_mv);
+    circuit_check_take(&check, 1024, 0, true, 1, 0);
+    TEST_ASSERT_EQUAL_UINT32(2, check.voltage_mv);
+    circuit_check_take(&check, 1024, 0, true, 0, 4095);
+    TEST_ASSERT_EQUAL_UINT32(2 + 4095, check.voltage_mv);
+    circuit_check_take(&check, 1024, 0, true, 4096, 5000);
+    TEST_ASSERT_EQUAL_UINT32(2 + 3 * 4095, check.voltage_mv);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -254,5 +384,11 @@ int main(void)
     RUN_TEST(reading_of_another_output_is_found_within_two_seconds);
     RUN_TEST(one_bad_window_is_none);
     RUN_TEST(any_reading_is_taken_without_overflow);
+    RUN_TEST(what_follows_too_little_or_too_much_is_found_after_its_windows);
+    RUN_TEST(the_drop_counts_and_what_is_found_stays_found);
+    RUN_TEST(voltage_that_should_move_by_more_than_half_a_step_is_frozen);
+    RUN_TEST(eleven_readings_tell_nothing);
+    RUN_TEST(a_reading_after_a_jump_is_left_out);
+    RUN_TEST(readings_beyond_the_sensor_count_as_its_ends);
     return UNITY_END();
 }

@@ -696,6 +696,20 @@ static void status_is_one_line(void)
     TEST_ASSERT_EQUAL_PTR(said + said_length - 1u, strchr(said, '\n'));
 }
 
+static void status_says_whether_the_stages_have_their_supply(void)
+{
+    const char *const lines[] = {"supply on", "supply off", "$cut_off=0", "$cut_off=1"};
+    const char *const ends[] = {"|supply:on>\r\n", "|supply:off>\r\n", "|supply:none>\r\n",
+                                "|supply:on>\r\n"};
+    for (unsigned k = 0; k < 4; k++) {
+        expect_ok(lines[k]);
+        controller_tick(&controller, &inputs, &outputs);
+        said_length = 0;
+        console_print_status(&console);
+        TEST_ASSERT_EQUAL_STRING(ends[k], said + said_length - strlen(ends[k]));
+    }
+}
+
 static void model_says_with_which_bounds(void)
 {
     char wanted[160];
@@ -936,6 +950,7 @@ int main(void)
     RUN_TEST(empty_lines_are_not_answered);
     RUN_TEST(nothing_is_said_without_room);
     RUN_TEST(status_is_one_line);
+    RUN_TEST(status_says_whether_the_stages_have_their_supply);
     RUN_TEST(model_says_with_which_bounds);
     RUN_TEST(model_says_how_long_a_spring_waits_and_when_it_is_away);
     RUN_TEST(learnt_says_what_is_known_and_clear_forgets_it);

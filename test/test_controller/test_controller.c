@@ -271,13 +271,37 @@ static void current_in_an_output_that_is_off_stops_the_board(void)
     run(100);
     inputs.sensor[5].current_ma = 400;
     inputs.sensor[5].voltage_mv = 70;
-    for (int n = 0; n < settings.safety.bad_samples; n++) {
+    TEST_ASSERT_TRUE(outputs.supply);
+    for (unsigned n = 0; n < SAFETY_STUCK_TICKS; n++) {
         TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, controller_board_fault(&controller));
         controller_tick(&controller, &inputs, &outputs);
+        TEST_ASSERT_FALSE(outputs.supply); /* from the first such reading on */
     }
     TEST_ASSERT_EQUAL(SAFETY_FAULT_STUCK_ON, controller_board_fault(&controller));
     TEST_ASSERT_EQUAL(SAFETY_FAULT_STUCK_ON, controller_fault(&controller, 5));
     TEST_ASSERT_TRUE(all_off());
+}
+
+/* One or two readings of current, a glitch, take a pulse or two and switch nothing off. */
+static void a_glitch_of_current_takes_a_pulse_and_no_more(void)
+{
+    controller_set_target(&controller, 0, 1000);
+    run(100);
+    for (unsigned length = 1; length < SAFETY_STUCK_TICKS; length++) {
+        for (int n = 0; n < 50; n++) {
+            inputs.sensor[5].current_ma = 400;
+            for (unsigned tick = 0; tick < length; tick++) {
+                controller_tick(&controller, &inputs, &outputs);
+                TEST_ASSERT_FALSE(outputs.supply);
+            }
+            inputs.sensor[5].current_ma = 0;
+            run(1);
+            TEST_ASSERT_TRUE(outputs.supply);
+        }
+    }
+    TEST_ASSERT_NOT_EQUAL(0, outputs.duty[0]);
+    TEST_ASSERT_FALSE(controller_supply_is_off(&controller));
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, controller_board_fault(&controller));
 }
 
 static void hot_model_trips(void)
@@ -769,6 +793,7 @@ int main(void)
     RUN_TEST(failing_sensor_is_a_fault_of_its_spring_alone);
     RUN_TEST(open_and_shorted_springs_are_told_apart);
     RUN_TEST(current_in_an_output_that_is_off_stops_the_board);
+    RUN_TEST(a_glitch_of_current_takes_a_pulse_and_no_more);
     RUN_TEST(hot_model_trips);
     RUN_TEST(ceiling_trips_whatever_is_believed);
     RUN_TEST(ceiling_begins_where_it_was_given_nothing_yet);

@@ -511,6 +511,113 @@ static void a_parameter_out_of_range_is_refused_and_found(void)
     TEST_ASSERT_EQUAL_MEMORY(&before, &control, sizeof control);
 }
 
+/* Whatever it had learnt: after a reset it is off, and begins as one that is new. */
+static void reset_forgets_what_was_learnt_but_not_the_estimate(void)
+{
+    load.spring_mohm = 240; /* the estimate says 190 */
+    mean_ua(1500, 100);
+    TEST_ASSERT_TRUE(control.channel[0].trim_q24 != 0);
+    (void)tick_with(0, 190, false, true);
+    (void)tick_with(1500, 190, true, true);
+    const int16_t estimate_q16 = control.channel[0].estimate_q16;
+    current_control_reset(&control, 0);
+    const current_control_channel_t fresh = {.estimate_q16 = estimate_q16};
+    TEST_ASSERT_EQUAL_MEMORY(&fresh, &control.channel[0], sizeof fresh);
+    TEST_ASSERT_EQUAL_UINT16(0, current_control_duty(&control, 0));
+    TEST_ASSERT_EQUAL_UINT16(0, current_control_reference_ma(&control, 0));
+}
+
+/* The arithmetic of the header, in double: gain, drop, limit of the trim. */
+static void what_is_fed_forward_is_ohm_s_law(void)
+{
+    static const uint16_t circuit[][4] = {/* supply, drop, shunt, wiring */
+                                          {5000, 0, 100, 80},
+                                          {5000, 400, 100, 80},
+                                          {12000, 700, 50, 300},
+                                          {3000, 300, 100, 20}};
+    for (size_t n = 0; n < 4; n++) {
+        parameters.supply_mv = circuit[n][0];
+        parameters.freewheel_mv = circuit[n][1];
+        parameters.shunt_mohm = circuit[n][2];
+        parameters.wiring_mohm = circuit[n][3];
+        TEST_ASSERT_TRUE(current_control_init(&control, &parameters, NULL));
+        const double swing_mv = circuit[n][0] + circuit[n][1];
+        const double drop_steps = 800.0 * circuit[n][1] / swing_mv;
+        TEST_ASSERT_DOUBLE_WITHIN(0.02, drop_steps, control.offset_q16 / 65536.0);
+        for (uint16_t mohm = 0; mohm < 600; mohm = (uint16_t)(mohm + 97u)) {
+            current_control_set_resistance(&control, 0, mohm);
+            const double steps_per_ma = 0.8 * (mohm + circuit[n][2] + circuit[n][3]) / swing_mv;
+            TEST_ASSERT_DOUBLE_WITHIN(2.0 + 0.001 * 65536.0 * steps_per_ma, 65536.0 * steps_per_ma,
+                                      control.channel[0].estimate_q16);
+        }
+        const double trim = 16777216.0 * 0.8 * parameters.trim_limit_mohm / swing_mv;
+        TEST_ASSERT_DOUBLE_WITHIN(600.0 + 0.002 * trim,
+                                  trim < 8191.0 * 256.0 ? trim : 8191.0 * 256.0,
+                                  control.trim_limit_q24);
+        TEST_ASSERT_EQUAL_UINT16(parameters.integral_permille * 65535ul / 1000u,
+                                 control.integral_q16);
+    }
+    current_control_set_resistance(&control, 0, UINT16_MAX);
+    TEST_ASSERT_EQUAL_INT16(24575, control.channel[0].estimate_q16);
+}
+
+/* The same by hand for the declared circuit: 2684 millionths of a step, 180 mohm, 12.3 % of drop.
+ */
+static void a_new_one_is_off_and_has_the_numbers_of_its_circuit(void)
+{
+    mean_ua(1500, 50);
+    parameters.freewheel_mv = 700;
+    parameters.integral_permille = 500;
+    TEST_ASSERT_TRUE(current_control_init(&control, &parameters, NULL));
+    const uint32_t gain_q24 = 13421773ul / 5700ul;
+    TEST_ASSERT_EQUAL_UINT16(2354, gain_q24);
+    TEST_ASSERT_EQUAL_UINT16(gain_q24, control.gain_q24_per_mohm);
+    TEST_ASSERT_EQUAL_INT32(6287 * 1024, control.offset_q16);
+    TEST_ASSERT_EQUAL_UINT16(32767, control.integral_q16);
+    for (uint8_t k = 0; k < CURRENT_CONTROL_MAX_CHANNELS; k++) {
+        const current_control_channel_t fresh = {.estimate_q16 = 180 * 2354 / 256};
+        TEST_ASSERT_EQUAL_MEMORY(&fresh, &control.channel[k], sizeof fresh);
+    }
+}
+
+/* Off is nothing at all, also of what was left of a step; 25 mA are small, 26 wait. */
+static void off_is_nothing_and_small_ends_at_25_ma(void)
+{
+    mean_ua(1500, 60);
+    tick(0);
+    TEST_ASSERT_EQUAL_UINT16(0, current_control_duty(&control, 0));
+    TEST_ASSERT_EQUAL_UINT16(0, control.channel[0].residue_q16);
+    for (uint16_t rise_ma = 25; rise_ma <= 26; rise_ma++) {
+        for (int odd = 0; odd < 2; odd++) {
+            mean_ua(1500, 60 + odd);
+            tick((uint16_t)(1500 + rise_ma));
+            const bool at_once =
+                current_control_reference_ma(&control, 0) == (uint16_t)(1500 + rise_ma);
+            TEST_ASSERT_TRUE(rise_ma > 25 || at_once);
+            if (rise_ma > 25) {
+                tick((uint16_t)(1500 + rise_ma));
+                TEST_ASSERT_EQUAL_UINT16(1500 + rise_ma, current_control_reference_ma(&control, 0));
+            }
+            mean_ua(1500, 60);
+            tick((uint16_t)(1500 - rise_ma));
+            TEST_ASSERT_EQUAL(rise_ma > 25, control.channel[0].fell);
+        }
+    }
+}
+
+/* A target above the limit is the limit; a channel without readings that its limit of ticks
+ * passed is off; the count of them ends. */
+static void target_is_cut_to_the_most_and_blindness_does_not_wrap(void)
+{
+    mean_ua(UINT16_MAX, 60);
+    TEST_ASSERT_EQUAL_UINT16(parameters.maximum_current_ma,
+                             current_control_reference_ma(&control, 0));
+    for (int n = 0; n < 600; n++) {
+        const uint16_t duty = tick_with(1500, 190, false, true);
+        TEST_ASSERT_EQUAL(n < parameters.hold_ticks, duty != 0);
+    }
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -535,5 +642,10 @@ int main(void)
     RUN_TEST(any_input_at_any_moment_stays_within_the_duty_range);
     RUN_TEST(channels_do_not_touch_each_other);
     RUN_TEST(a_parameter_out_of_range_is_refused_and_found);
+    RUN_TEST(reset_forgets_what_was_learnt_but_not_the_estimate);
+    RUN_TEST(what_is_fed_forward_is_ohm_s_law);
+    RUN_TEST(a_new_one_is_off_and_has_the_numbers_of_its_circuit);
+    RUN_TEST(off_is_nothing_and_small_ends_at_25_ma);
+    RUN_TEST(target_is_cut_to_the_most_and_blindness_does_not_wrap);
     return UNITY_END();
 }

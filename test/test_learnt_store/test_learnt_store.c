@@ -1,5 +1,6 @@
 /* What was learnt comes back after power-off as it was; it is saved when it is worth a save, and
  * only then; power may fail at any byte. */
+#include <stdio.h>
 #include <string.h>
 
 #include "learnt_store.h"
@@ -263,6 +264,68 @@ static void what_lies_at_its_limit_is_taken_back(void)
     TEST_ASSERT_EQUAL_FLOAT(most.austenite_ohm, controller_learnt(&controller, 0).austenite_ohm);
 }
 
+/* The minute is on end: one second that a spring is not held in begins it anew. */
+static void a_second_that_is_not_held_begins_the_minute_anew(void)
+{
+    hold(0, DRIVE_POLICY_STAGE_HOLD);
+    learn(0, &numbers);
+    for (int round = 0; round < 3; round++) {
+        seconds(LEARNT_STORE_HELD_S - 1u);
+        controller.policy.spring[0].stage = DRIVE_POLICY_STAGE_HEAT;
+        seconds(1);
+        controller.policy.spring[0].stage = DRIVE_POLICY_STAGE_HOLD;
+    }
+    TEST_ASSERT_EQUAL_UINT(0, writes);
+    seconds(LEARNT_STORE_HELD_S);
+    TEST_ASSERT_TRUE(writes > 0);
+}
+
+/* The last spring counts as the first does, and what is new is worth a save at once. */
+static void the_last_springs_first_numbers_are_saved_after_the_shortest_pause(void)
+{
+    hold(0, DRIVE_POLICY_STAGE_HOLD);
+    learn(0, &numbers);
+    seconds(LEARNT_STORE_HELD_S);
+    TEST_ASSERT_TRUE(writes > 0);
+    store.refined = LEARNT_STORE_LONGEST_SHIFT;
+    learn(8, &numbers);
+    writes = 0;
+    seconds(LEARNT_STORE_PAUSE_S - 1u);
+    TEST_ASSERT_EQUAL_UINT(0, writes);
+    seconds(1);
+    TEST_ASSERT_TRUE(writes > 0);
+    TEST_ASSERT_EQUAL_UINT8(LEARNT_STORE_LONGEST_SHIFT, store.refined);
+    hold(8, DRIVE_POLICY_STAGE_HEAT);
+    learn(7, &numbers);
+    writes = 0;
+    seconds(2000);
+    TEST_ASSERT_EQUAL_UINT(0, writes);
+}
+
+/* Each number by itself: a little less than what is worth a save, and a little more. */
+static void each_number_is_worth_a_save_at_its_own_limit(void)
+{
+    const float rise = 0.02f / 80.0f;
+    for (int n = 0; n < 5; n++) {
+        for (int more = 0; more < 2; more++) {
+            const float by = more ? 1.1f : 0.9f;
+            spring_learnt_t next = numbers;
+            setUp();
+            hold(0, DRIVE_POLICY_STAGE_HOLD);
+            learn(0, &numbers);
+            seconds(LEARNT_STORE_HELD_S);
+            next.austenite_ohm *= n == 0 ? 1.0f - 0.02f * by : 1.0f;
+            next.martensite_ohm *= n == 1 ? 1.0f + 0.02f * by : 1.0f;
+            next.change += n == 2 ? 0.02f * by : 0.0f;
+            next.martensite_rise_per_k += n == 3 ? rise * by : 0.0f;
+            next.loss_sd_w_per_k *= n == 4 ? 0.5f / by : 1.0f;
+            char which[20];
+            (void)snprintf(which, sizeof which, "number %d, %s", n, more ? "more" : "less");
+            TEST_ASSERT_EQUAL_MESSAGE(more, saved_after(&next) > 0, which);
+        }
+    }
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -275,5 +338,8 @@ int main(void)
     RUN_TEST(clear_forgets_in_memory_and_over_power_off);
     RUN_TEST(a_loss_that_was_learnt_beside_another_model_is_left_out);
     RUN_TEST(what_lies_at_its_limit_is_taken_back);
+    RUN_TEST(a_second_that_is_not_held_begins_the_minute_anew);
+    RUN_TEST(the_last_springs_first_numbers_are_saved_after_the_shortest_pause);
+    RUN_TEST(each_number_is_worth_a_save_at_its_own_limit);
     return UNITY_END();
 }

@@ -12,6 +12,7 @@ static safety_t safety;
 static safety_parameters_t parameters;
 
 static const safety_sample_t running = {.sensor_status = 0,
+                                        .most_mv = 5000,
                                         .current_ma = 1500,
                                         .voltage_mv = 285, /* 190 mohm */
                                         .expected_ma = 1500,
@@ -41,7 +42,7 @@ static void ticks(uint8_t spring, const safety_sample_t *sample, uint32_t count)
 static void trips(safety_fault_t fault, const safety_sample_t *sample)
 {
     setUp();
-    uint8_t limit = parameters.bad_samples;
+    uint8_t limit = fault == SAFETY_FAULT_STUCK_ON ? SAFETY_STUCK_TICKS : parameters.bad_samples;
     ticks(4, sample, limit - 1u);
     TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, safety_fault(&safety, 4));
     ticks(4, &running, 1); /* one good tick in between: counted anew */
@@ -262,7 +263,7 @@ static void current_that_no_output_gives_is_no_frozen_sensor(void)
         .current_ma = 3200, .voltage_mv = 2450, .expected_ma = 1500, .temperature_c7 = 0};
     ticks(4, &sample, 2);
     sample.off = true;
-    ticks(4, &sample, parameters.bad_samples);
+    ticks(4, &sample, SAFETY_STUCK_TICKS);
     TEST_ASSERT_EQUAL(SAFETY_FAULT_STUCK_ON, safety_board_fault(&safety));
 }
 
@@ -272,12 +273,15 @@ static void current_without_duty_overrides_every_other_fault(void)
     for (int fault = 0; fault < SAFETY_FAULT_COUNT; fault++) {
         setUp();
         ticks(4, &running, 10);
-        safety_sample_t sample = {.current_ma = 3200, .voltage_mv = 2450, .expected_ma = 1500};
+        safety_sample_t sample = {
+            .current_ma = 3200, .voltage_mv = 2450, .expected_ma = 1500, .most_mv = 3000};
         safety_trip(&safety, 4, (safety_fault_t)fault);
         safety_emergency_stop(&safety);
         ticks(4, &sample, 20); /* as over_current and high_resistance, too */
         sample.off = true;
-        ticks(4, &sample, parameters.bad_samples - 1u);
+        TEST_ASSERT_FALSE(safety_doubts_supply(&safety));
+        ticks(4, &sample, SAFETY_STUCK_TICKS - 1u);
+        TEST_ASSERT_TRUE(safety_doubts_supply(&safety));
         TEST_ASSERT_EQUAL(SAFETY_FAULT_EMERGENCY_STOP, safety_board_fault(&safety));
         ticks(4, &sample, 1);
         TEST_ASSERT_EQUAL(SAFETY_FAULT_STUCK_ON, safety_board_fault(&safety));
@@ -303,7 +307,7 @@ static void what_is_no_current_without_duty_is_no_fault(void)
         sample.current_ma = 90;
         ticks(4, &sample, 20);
         for (uint8_t n = 0; n < 100; n++) {
-            sample.current_ma = n % parameters.bad_samples == 0 ? 95 : 300;
+            sample.current_ma = n % SAFETY_STUCK_TICKS == 0 ? 95 : 300;
             ticks(4, &sample, 1);
         }
         sample.current_ma = -2000;
@@ -311,6 +315,53 @@ static void what_is_no_current_without_duty_is_no_fault(void)
     }
     TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, safety_board_fault(&safety));
     TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, safety_fault(&safety, 4));
+}
+
+/* A driven spring: the current alone may be a short's, the voltage alone an open spring's. */
+static void a_voltage_that_no_duty_gives_is_current_without_duty(void)
+{
+    safety_sample_t sample = running;
+    sample.current_ma = 3190;
+    sample.voltage_mv = 2450;
+    sample.most_mv = 2450;
+    ticks(4, &sample, 1);
+    TEST_ASSERT_FALSE(safety_doubts_supply(&safety));
+    sample.current_ma = (int16_t)parameters.over_current_ma;
+    sample.most_mv = 900;
+    ticks(4, &sample, 1);
+    TEST_ASSERT_FALSE(safety_doubts_supply(&safety));
+    sample.current_ma++;
+    ticks(4, &sample, 1);
+    TEST_ASSERT_TRUE(safety_doubts_supply(&safety));
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, safety_board_fault(&safety));
+    ticks(4, &running, 1); /* a glitch: one pulse less */
+    TEST_ASSERT_FALSE(safety_doubts_supply(&safety));
+    ticks(4, &sample, SAFETY_STUCK_TICKS);
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_STUCK_ON, safety_board_fault(&safety));
+    TEST_ASSERT_TRUE(safety_cuts_supply(&safety));
+}
+
+/* What was doubted by a sensor that then tells nothing is that sensor's fault, and not the
+ * supply's. */
+static void a_sensor_that_is_silent_holds_no_supply_back(void)
+{
+    safety_sample_t sample = off;
+    sample.current_ma = 900;
+    ticks(4, &sample, 1);
+    TEST_ASSERT_TRUE(safety_doubts_supply(&safety));
+    sample.sensor_status = 1;
+    ticks(4, &sample, 1);
+    TEST_ASSERT_FALSE(safety_doubts_supply(&safety));
+}
+
+static void one_bad_sample_is_enough_where_that_is_set(void)
+{
+    parameters.bad_samples = 1;
+    TEST_ASSERT_TRUE(safety_apply(&safety, &parameters, NULL));
+    safety_sample_t sample = off;
+    sample.current_ma = 900;
+    ticks(4, &sample, 1);
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_STUCK_ON, safety_board_fault(&safety));
 }
 
 static void other_faults_do_not_silence_a_sensor(void)
@@ -321,7 +372,7 @@ static void other_faults_do_not_silence_a_sensor(void)
     sample.current_ma++;
     sample.expected_ma = 0;
     sample.off = true;
-    ticks(4, &sample, parameters.bad_samples);
+    ticks(4, &sample, SAFETY_STUCK_TICKS);
     TEST_ASSERT_EQUAL(SAFETY_FAULT_STUCK_ON, safety_board_fault(&safety));
 }
 
@@ -476,6 +527,113 @@ static void parameters_that_do_not_fit_are_refused_and_found(void)
     TEST_ASSERT_FALSE(safety_init(&safety, &parameters, SAFETY_MAX_SPRINGS + 1, NULL));
 }
 
+/* Fault 11 of the board and fault 9 of any spring, and no other: only the supply's switch helps. */
+static void the_supply_is_cut_where_nothing_else_helps(void)
+{
+    TEST_ASSERT_FALSE(safety_cuts_supply(&safety));
+    for (int fault = 1; fault < SAFETY_FAULT_COUNT; fault++) {
+        for (uint8_t k = 0; k < 9; k += 4) {
+            setUp();
+            safety_trip(&safety, k, (safety_fault_t)fault);
+            TEST_ASSERT_EQUAL(fault == SAFETY_FAULT_OVER_TEMPERATURE, safety_cuts_supply(&safety));
+            safety_emergency_stop(&safety);
+            TEST_ASSERT_EQUAL(fault == SAFETY_FAULT_OVER_TEMPERATURE, safety_cuts_supply(&safety));
+            safety_clear(&safety);
+            TEST_ASSERT_FALSE(safety_cuts_supply(&safety));
+        }
+    }
+    setUp();
+    const safety_sample_t stuck = {.off = true, .current_ma = 500, .voltage_mv = 100};
+    ticks(0, &stuck, parameters.bad_samples);
+    TEST_ASSERT_TRUE(safety_cuts_supply(&safety));
+}
+
+/* Every count is of ticks in a row: a good one, and clear, begin it anew. */
+static void a_good_tick_and_clear_begin_every_count_anew(void)
+{
+    const uint8_t almost = (uint8_t)(parameters.bad_samples - 1u);
+    for (int round = 0; round < 4; round++) {
+        for (uint8_t n = 0; n < almost; n++) {
+            safety_tick_board(&safety, 15001);
+        }
+        TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, safety_board_fault(&safety));
+        if (round < 2) {
+            safety_tick_board(&safety, 15000);
+        } else {
+            safety_clear(&safety);
+        }
+    }
+
+    safety_sample_t was = running;
+    was.expected_ma = 0;
+    was.off = true;
+    for (int round = 0; round < 3; round++) {
+        ticks(4, &running, 10); /* it reads, and shows just that again */
+        ticks(4, &was, almost);
+    }
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, safety_fault(&safety, 4));
+    ticks(4, &was, 1);
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_SENSOR_MISMATCH, safety_fault(&safety, 4));
+}
+
+static void only_a_reading_that_is_one_is_said_to_be_valid(void)
+{
+    safety_sample_t sample = running;
+    TEST_ASSERT_TRUE(safety_tick_spring(&safety, 4, &sample));
+    for (uint8_t status = 1; status <= 4; status++) {
+        sample.sensor_status = status;
+        TEST_ASSERT_FALSE(safety_tick_spring(&safety, 4, &sample));
+    }
+}
+
+/* One tick that shows another current, and what it shows after that flows, though it be the same as
+ * before; and the largest current that an output may give can be frozen, too. */
+static void a_sensor_that_moved_once_is_not_frozen(void)
+{
+    safety_sample_t sample = running;
+    ticks(4, &sample, 10);
+    sample.expected_ma = 0;
+    sample.off = true;
+    ticks(4, &sample, 2);
+    sample.current_ma--;
+    ticks(4, &sample, 1);
+    sample.current_ma++;
+    ticks(4, &sample, parameters.bad_samples - 1u);
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_STUCK_ON, safety_board_fault(&safety));
+
+    setUp();
+    sample = running;
+    sample.current_ma = 3150;
+    sample.voltage_mv = 600;
+    ticks(4, &sample, 10);
+    sample.off = true;
+    ticks(4, &sample, 10);
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_SENSOR_MISMATCH, safety_fault(&safety, 4));
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, safety_board_fault(&safety));
+}
+
+static void limits_are_as_they_are_written(void)
+{
+    safety_sample_t sample = {.current_ma = 74, .voltage_mv = 15, .expected_ma = 300};
+    ticks(4, &sample, parameters.bad_samples);
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_OPEN_SPRING, safety_fault(&safety, 4));
+    sample.sensor_status = 5; /* of a later driver */
+    ticks(3, &sample, parameters.bad_samples);
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_SENSOR_ABSENT, safety_fault(&safety, 3));
+    TEST_ASSERT_TRUE(safety_init(&safety, &parameters, SAFETY_MAX_SPRINGS, NULL));
+}
+
+/* From the first tick on: counted at the first of each 50. */
+static void on_time_ends_in_the_tick_after_its_last_second(void)
+{
+    parameters.maximum_on_s = 10;
+    TEST_ASSERT_TRUE(safety_init(&safety, &parameters, 9, NULL));
+    ticks(4, &running, 500);
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, safety_fault(&safety, 4));
+    ticks(4, &running, 1);
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_ON_TIME, safety_fault(&safety, 4));
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -492,6 +650,9 @@ int main(void)
     RUN_TEST(current_that_no_output_gives_is_no_frozen_sensor);
     RUN_TEST(current_without_duty_overrides_every_other_fault);
     RUN_TEST(what_is_no_current_without_duty_is_no_fault);
+    RUN_TEST(a_voltage_that_no_duty_gives_is_current_without_duty);
+    RUN_TEST(a_sensor_that_is_silent_holds_no_supply_back);
+    RUN_TEST(one_bad_sample_is_enough_where_that_is_set);
     RUN_TEST(other_faults_do_not_silence_a_sensor);
     RUN_TEST(silent_host_stops_the_board_until_cleared);
     RUN_TEST(emergency_stop_holds_until_cleared);
@@ -501,5 +662,11 @@ int main(void)
     RUN_TEST(any_sample_is_taken_without_overflow);
     RUN_TEST(every_fault_has_a_name_of_its_own);
     RUN_TEST(parameters_that_do_not_fit_are_refused_and_found);
+    RUN_TEST(the_supply_is_cut_where_nothing_else_helps);
+    RUN_TEST(a_good_tick_and_clear_begin_every_count_anew);
+    RUN_TEST(a_sensor_that_moved_once_is_not_frozen);
+    RUN_TEST(limits_are_as_they_are_written);
+    RUN_TEST(only_a_reading_that_is_one_is_said_to_be_valid);
+    RUN_TEST(on_time_ends_in_the_tick_after_its_last_second);
     return UNITY_END();
 }

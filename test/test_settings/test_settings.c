@@ -405,6 +405,26 @@ static void another_record_has_its_own_slots(void)
     TEST_ASSERT_EQUAL(RECORD_FOREIGN, record_store_open(&other, &storage, base, 256, 4));
 }
 
+/* A record that claims more than its slot holds is damaged, whatever its CRC says: what lies behind
+ * the slot is another's. The longest that fits is one. */
+static void a_length_beyond_the_slot_is_no_record(void)
+{
+    uint8_t bytes[256];
+    const uint16_t base = 100;
+    memset(bytes, 7, sizeof bytes);
+    for (unsigned length = 247; length <= 249; length++) {
+        record_store_t other;
+        memset(memory + base, 0xFF, 512);
+        (void)record_store_open(&other, &storage, base, 256, 3);
+        record_store_save(&other, short_byte, bytes, (uint16_t)length);
+        while (record_store_step(&other) == RECORD_SAVE_BUSY) {
+        }
+        /* of 249 the crc's last byte lies in the second slot, and is right there */
+        TEST_ASSERT_EQUAL(length <= 248 ? RECORD_LOADED : RECORD_DAMAGED,
+                          record_store_open(&other, &storage, base, 256, 3));
+    }
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -423,5 +443,6 @@ int main(void)
     RUN_TEST(a_record_in_another_format_gives_defaults_and_says_so);
     RUN_TEST(a_memory_that_does_not_keep_is_reported);
     RUN_TEST(another_record_has_its_own_slots);
+    RUN_TEST(a_length_beyond_the_slot_is_no_record);
     return UNITY_END();
 }

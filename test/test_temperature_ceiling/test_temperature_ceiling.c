@@ -185,6 +185,192 @@ static void it_is_stable_whatever_the_heat_capacity(void)
     TEST_ASSERT_FLOAT_WITHIN(0.5f, 20.0f + 0.3f / 0.0058f, temperature_ceiling_c(&ceiling, 4));
 }
 
+/* Each number of one step by the equation of the header's network, in double: power in, losses out
+ * as the model declares them, the neighbours' excess, the flow's own change taken at its end. */
+static void one_step_is_the_implicit_one(void)
+{
+    for (int n = 0; n < 12; n++) {
+        setUp();
+        parameters.heat_capacity_mj_per_k = (uint16_t)(n % 2 == 0 ? 300 : 120);
+        parameters.plate_coupling_uw_per_k = (uint16_t)(n % 3 == 0 ? 0 : 4000);
+        parameters.plate_heat_capacity_mj_per_k = 13000;
+        TEST_ASSERT_EQUAL(THERMAL_MODEL_OK, thermal_model_init(&model, &parameters, NULL));
+        thermal_model_set_temperature(&model, 1, (int16_t)(30 * 128));
+        for (uint8_t k = 0; k < 9; k++) {
+            ceiling.temperature_c23[k] = (25 + 4 * k) * 128 * 65536;
+        }
+        const uint8_t k = (uint8_t)(n % 9);
+        const double power_w = 0.1 * n;
+        double stiffness_w_per_k =
+            1e-6 * (model.spring[k].loss_uw_per_k + parameters.plate_coupling_uw_per_k);
+        double from_neighbours_w = 0.0;
+        for (uint8_t j = 0; j < 9; j++) {
+            const double g = 1e-6 * thermal_model_coupling_uw_per_k(&model, k, j);
+            stiffness_w_per_k += g;
+            from_neighbours_w +=
+                g * ((25.0 + 4.0 * j) - thermal_model_temperature_c7(&model, j) / 128.0);
+        }
+        const double loss_w = 1e-6 * temperature_ceiling_hold_uw(&ceiling, &model, k);
+        const double dt_s = (double)TEMPERATURE_CEILING_TURN_S;
+        const double c = 1e-3 * parameters.heat_capacity_mj_per_k;
+        const double rise_k =
+            (power_w + from_neighbours_w - loss_w) * dt_s / (c + dt_s * stiffness_w_per_k);
+        temperature_ceiling_step(&ceiling, &model, k, (float)power_w);
+        TEST_ASSERT_FLOAT_WITHIN(0.002f + 0.001f * (float)fabs(rise_k),
+                                 (float)(25.0 + 4.0 * k + rise_k),
+                                 temperature_ceiling_c(&ceiling, k));
+    }
+}
+
+/* 0.64 of what the declared circuit gives an austenite, less the diode's drop. */
+static void power_of_a_duty_is_of_the_declared_circuit(void)
+{
+    current_control_parameters_t circuit;
+    current_control_parameters_default(&circuit);
+    for (uint16_t drop_mv = 0; drop_mv <= 700; drop_mv = (uint16_t)(drop_mv + 350u)) {
+        circuit.freewheel_mv = drop_mv;
+        temperature_ceiling_prepare(&ceiling, &model, &circuit);
+        const double ohm = 1e-6 * parameters.resistance_austenite_uohm;
+        const double loop_ohm = ohm + 1e-3 * (circuit.shunt_mohm + circuit.wiring_mohm);
+        for (int duty = 0; duty <= 800; duty += 100) {
+            const double behind_v =
+                1e-3 * (circuit.supply_mv + drop_mv) * duty / 800.0 - 1e-3 * drop_mv;
+            const double amps = behind_v > 0.0 ? behind_v / loop_ohm : 0.0;
+            TEST_ASSERT_FLOAT_WITHIN(1e-3f * (float)(1.0 + amps * amps * ohm),
+                                     (float)(0.64 * amps * amps * ohm),
+                                     temperature_ceiling_power_w(&ceiling, (float)duty));
+        }
+    }
+}
+
+/* Nine tenths: the rise that trips the ceiling over the one that trips the model; and its own end.
+ */
+static void it_trips_a_ninth_above_the_rise_that_trips_the_model(void)
+{
+    static const int16_t ambient_c[] = {0, 20, 35};
+    for (int n = 0; n < 3; n++) {
+        temperature_ceiling_begin(&ceiling, (int16_t)(ambient_c[n] * 128));
+        const double trips_c = ambient_c[n] + (130.0 - ambient_c[n]) / 0.9;
+        for (int side = -1; side <= 1; side += 2) {
+            ceiling.temperature_c23[3] = (int32_t)((trips_c + 0.05 * side) * 8388608.0);
+            TEST_ASSERT_EQUAL(side > 0, temperature_ceiling_trips(&ceiling, 3, 13000));
+            TEST_ASSERT_FALSE(temperature_ceiling_trips(&ceiling, 2, 13000));
+        }
+        ceiling.temperature_c23[3] = (int32_t)(213.9 * 8388608.0);
+        TEST_ASSERT_FALSE(temperature_ceiling_trips(&ceiling, 3, 30000));
+        ceiling.temperature_c23[3] = (int32_t)(214.1 * 8388608.0);
+        TEST_ASSERT_TRUE(temperature_ceiling_trips(&ceiling, 3, 30000));
+    }
+}
+
+static void it_ends_at_its_highest_and_lowest(void)
+{
+    run(50.0f, 0, 120.0f);
+    TEST_ASSERT_EQUAL_FLOAT(215.0f, temperature_ceiling_c(&ceiling, 0));
+    run(-50.0f, 0, 300.0f);
+    TEST_ASSERT_EQUAL_FLOAT(-40.0f, temperature_ceiling_c(&ceiling, 0));
+}
+
+/* Since power above a sensor's offset: turns of its own; and never before there was any. */
+static void rest_is_counted_from_the_last_power(void)
+{
+    TEST_ASSERT_EQUAL_UINT16(TEMPERATURE_CEILING_NEVER, temperature_ceiling_rest_s(&ceiling, 4));
+    run(0.009f, 0, 6.0f);
+    TEST_ASSERT_EQUAL_UINT16(TEMPERATURE_CEILING_NEVER, temperature_ceiling_rest_s(&ceiling, 4));
+    TEST_ASSERT_FALSE(ceiling.delivered);
+    run(0.011f, 0, 0.5f);
+    TEST_ASSERT_EQUAL_UINT16(0, temperature_ceiling_rest_s(&ceiling, 4));
+    run(0.0f, 0, 60.0f);
+    TEST_ASSERT_UINT16_WITHIN(1, 60, temperature_ceiling_rest_s(&ceiling, 4));
+}
+
+static void begin_forgets_all_that_was(void)
+{
+    run(0.6f, 600000u, 60.0f);
+    for (uint8_t k = 0; k < 9; k++) {
+        ceiling.spared_w[k] = ceiling.spared_per_s[k] = 0.1f;
+    }
+    temperature_ceiling_begin(&ceiling, 25 * 128);
+    TEST_ASSERT_FALSE(ceiling.delivered);
+    TEST_ASSERT_EQUAL_INT16(25 * 128, ceiling.ambient_c7);
+    for (uint8_t k = 0; k < THERMAL_MODEL_MAX_SPRINGS; k++) {
+        TEST_ASSERT_EQUAL_INT32(25 * 128 * 65536, ceiling.temperature_c23[k]);
+        TEST_ASSERT_EQUAL_FLOAT(0.0f, ceiling.austenite[k]);
+        TEST_ASSERT_EQUAL_FLOAT(0.0f, ceiling.spared_w[k]);
+        TEST_ASSERT_EQUAL_FLOAT(0.0f, ceiling.spared_per_s[k]);
+        TEST_ASSERT_EQUAL_UINT16(TEMPERATURE_CEILING_NEVER, ceiling.rest_turns[k]);
+    }
+}
+
+/* Warm is what power was given to and is still so far above the warmest air that was told. */
+static void warm_is_what_was_heated_and_has_not_cooled(void)
+{
+    for (uint8_t k = 0; k < 9; k += 4) {
+        temperature_ceiling_begin(&ceiling, 20 * 128);
+        ceiling.temperature_c23[k] = 60 * 128 * 65536;
+        TEST_ASSERT_FALSE(temperature_ceiling_is_warm(&ceiling, k)); /* nobody gave it power */
+        ceiling.delivered = true;
+        TEST_ASSERT_TRUE(temperature_ceiling_is_warm(&ceiling, k));
+        TEST_ASSERT_FALSE(temperature_ceiling_is_warm(&ceiling, (uint8_t)((k + 1) % 9)));
+        const double edge_c = 20.0 + (double)TEMPERATURE_CEILING_WARM_K;
+        ceiling.temperature_c23[k] = (int32_t)((edge_c - 0.01) * 8388608.0);
+        TEST_ASSERT_FALSE(temperature_ceiling_is_warm(&ceiling, k));
+        ceiling.temperature_c23[k] = (int32_t)((edge_c + 0.01) * 8388608.0);
+        TEST_ASSERT_TRUE(temperature_ceiling_is_warm(&ceiling, k));
+    }
+}
+
+/* A model that is told to be hotter takes the ceiling with it, spring by spring, and that is heat.
+ */
+static void a_hotter_model_raises_it_and_a_colder_one_does_not(void)
+{
+    for (uint8_t k = 0; k < 9; k += 4) {
+        setUp();
+        run(0.0f, 0, 6.0f);
+        thermal_model_set_temperature(&model, k, 110 * 128);
+        temperature_ceiling_raise(&ceiling, &model);
+        TEST_ASSERT_FLOAT_WITHIN(0.01f, 110.0f, temperature_ceiling_c(&ceiling, k));
+        TEST_ASSERT_FLOAT_WITHIN(0.01f, 1.0f, ceiling.austenite[k]);
+        TEST_ASSERT_EQUAL_UINT16(0, ceiling.rest_turns[k]);
+        TEST_ASSERT_TRUE(temperature_ceiling_is_warm(&ceiling, k));
+        TEST_ASSERT_EQUAL_UINT16(TEMPERATURE_CEILING_NEVER, ceiling.rest_turns[(k + 1) % 9]);
+        thermal_model_set_temperature(&model, k, 30 * 128);
+        temperature_ceiling_raise(&ceiling, &model);
+        TEST_ASSERT_FLOAT_WITHIN(0.01f, 110.0f, temperature_ceiling_c(&ceiling, k));
+    }
+}
+
+/* The air's warmest counts while anything is warm, and what is told after that. */
+static void warmest_air_counts_until_all_are_cold(void)
+{
+    for (uint8_t k = 0; k < 9; k += 4) {
+        setUp();
+        ceiling.temperature_c23[k] = 100 * 128 * 65536;
+        ceiling.delivered = true;
+        ceiling.spared_w[k] = 0.01f;
+        thermal_model_set_ambient(&model, 30 * 128);
+        temperature_ceiling_step(&ceiling, &model, 0, 0.0f);
+        TEST_ASSERT_EQUAL_INT16(30 * 128, ceiling.ambient_c7);
+        thermal_model_set_ambient(&model, 15 * 128);
+        temperature_ceiling_step(&ceiling, &model, 0, 0.0f);
+        TEST_ASSERT_EQUAL_INT16(30 * 128, ceiling.ambient_c7);
+        /* and what it gives off is as in that air */
+        TEST_ASSERT_INT32_WITHIN(
+            1,
+            thermal_model_power_to_hold_uw(
+                &model, 8, (int16_t)((ceiling.temperature_c23[8] >> 16) - 15 * 128)),
+            temperature_ceiling_hold_uw(&ceiling, &model, 8));
+        TEST_ASSERT_TRUE(ceiling.delivered);
+        ceiling.temperature_c23[k] = 20 * 128 * 65536;
+        temperature_ceiling_step(&ceiling, &model, 1, 0.0f); /* looked at once a round */
+        TEST_ASSERT_TRUE(ceiling.delivered);
+        temperature_ceiling_step(&ceiling, &model, 0, 0.0f);
+        TEST_ASSERT_FALSE(ceiling.delivered);
+        TEST_ASSERT_EQUAL_FLOAT(0.0f, ceiling.spared_w[k]);
+        TEST_ASSERT_EQUAL_INT16(15 * 128, ceiling.ambient_c7);
+    }
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -197,5 +383,14 @@ int main(void)
     RUN_TEST(a_trip_beyond_the_model_still_trips);
     RUN_TEST(duty_and_supply_bound_the_power_from_below);
     RUN_TEST(it_is_stable_whatever_the_heat_capacity);
+    RUN_TEST(one_step_is_the_implicit_one);
+    RUN_TEST(power_of_a_duty_is_of_the_declared_circuit);
+    RUN_TEST(it_trips_a_ninth_above_the_rise_that_trips_the_model);
+    RUN_TEST(it_ends_at_its_highest_and_lowest);
+    RUN_TEST(rest_is_counted_from_the_last_power);
+    RUN_TEST(begin_forgets_all_that_was);
+    RUN_TEST(warm_is_what_was_heated_and_has_not_cooled);
+    RUN_TEST(a_hotter_model_raises_it_and_a_colder_one_does_not);
+    RUN_TEST(warmest_air_counts_until_all_are_cold);
     return UNITY_END();
 }

@@ -489,22 +489,46 @@ static void an_intermediate_phase_that_a_draught_brings_is_heated_away(void)
     }
 }
 
-/* A draught, a colder room, losses that fall late in a hold: what a reheat did not bring back at
- * once stayed lost for the rest of the run, and a spring that was hotter than believed was heated
- * to 123 degC. Runs of the swarm, as drawn. */
-static void surroundings_that_change_lose_no_spring_and_overheat_none(void)
+/* Runs of the swarm, as drawn. */
+static void no_spring_is_lost_or_overheats(uint64_t seed, const int indices[], size_t runs)
 {
-    static const int indices[] = {378, 470, 542, 633, 552, 725, 713};
     static swarm_case_t drawn;
     static run_result_t result;
-    for (size_t r = 0; r < sizeof indices / sizeof indices[0]; r++) {
-        swarm_draw(15, indices[r], SWARM_TEST_S, &drawn);
+    for (size_t r = 0; r < runs; r++) {
+        swarm_draw(seed, indices[r], SWARM_TEST_S, &drawn);
         TEST_ASSERT_TRUE(run_case(&drawn.run, &result, NULL));
         for (int k = 0; k < WORLD_SPRINGS_MAX; k++) {
             TEST_ASSERT_TRUE_MESSAGE(isnan(result.losses.spring[k].lost_at_s), drawn.says);
             TEST_ASSERT_TRUE_MESSAGE(result.score.spring[k].hottest_c < 120.0, drawn.says);
         }
     }
+}
+
+/* A draught, a colder room, losses that fall late in a hold: what a reheat did not bring back at
+ * once stayed lost for the rest of the run, and a spring that was hotter than believed was heated
+ * to 123 degC. */
+static void surroundings_that_change_lose_no_spring_and_overheat_none(void)
+{
+    static const int indices[] = {470, 542, 633, 552, 725, 713};
+    no_spring_is_lost_or_overheats(15, indices, sizeof indices / sizeof indices[0]);
+}
+
+/* Resistances of both phases that differ by 4 to 11 %, either way: a change less than the largest
+ * coefficient in print makes over the same heat was not seen as a transformation, and a reheat
+ * ended where it was colder, not transformed. */
+static void phases_of_nearly_one_resistance_are_told_apart(void)
+{
+    static const int indices[] = {267, 281, 693};
+    no_spring_is_lost_or_overheats(22, indices, sizeof indices / sizeof indices[0]);
+}
+
+/* A reheat goes on while phase is missing, by no more heat than one that lost nothing may be given,
+ * and ends where what had risen was no intermediate phase: lost, 124 and 131 degC without these. */
+static void a_reheat_gives_what_is_missing_and_no_more(void)
+{
+    static const int goes_on[] = {124, 287}, ends[] = {623, 79};
+    no_spring_is_lost_or_overheats(31, goes_on, sizeof goes_on / sizeof goes_on[0]);
+    no_spring_is_lost_or_overheats(22, ends, sizeof ends / sizeof ends[0]);
 }
 
 int main(void)
@@ -532,6 +556,8 @@ int main(void)
     RUN_TEST(a_draught_changes_the_whole_loss_by_what_is_said);
     RUN_TEST(an_intermediate_phase_that_a_draught_brings_is_heated_away);
     RUN_TEST(surroundings_that_change_lose_no_spring_and_overheat_none);
+    RUN_TEST(phases_of_nearly_one_resistance_are_told_apart);
+    RUN_TEST(a_reheat_gives_what_is_missing_and_no_more);
     RUN_TEST(a_controller_that_never_heats_again_is_seen_and_a_run_is_the_same_twice);
     return UNITY_END();
 }

@@ -23,10 +23,11 @@ from .api import (
     replay,
     save,
     sweep,
+    undo_upload,
     upload,
     verify,
 )
-from .board import Board, Reading
+from .board import Board, Reading, to_pandas
 from .errors import InputError, WorkError
 from .logs import Run, read_log
 from .models import Array, Model, read_array, read_model
@@ -54,6 +55,8 @@ __all__ = [
     "replay",
     "save",
     "sweep",
+    "to_pandas",
+    "undo_upload",
     "upload",
     "verify",
 ]

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from . import ranges
-from .errors import InputError, WorkError
+from .errors import InputError
 from .logs import Run, check_folder, read_log, write_atomically
 from .models import Array, Model, model_text, read_array, read_model
 
@@ -200,31 +200,37 @@ def chip_settings(model: Model | str | Path, force: bool = False) -> Settings:
 
 
 def upload(
-    port: str, settings: str, save: bool = True, say: Callable[[str, int], None] = lambda line, count: None
+    port: str,
+    settings: str,
+    save: bool = True,
+    say: Callable[[str, int], None] = lambda line, count: None,
+    by: str = "ns.upload",
 ) -> int:
     """Send console lines (`chip_settings(model).lines`) to a board, read them back, save them: `ninespring upload`.
 
-    Return how many. WorkError, and nothing is saved, where the board refuses one or shows another value.
+    Return how many. WorkError, and nothing is saved, where the board refuses one or shows another value. What was saved can be
+    taken back: `undo_upload`; `by` is what the history calls it.
     """
-    from .board import Board, settings_lines, settings_that_differ
+    from . import history
+    from .board import Board, send_settings, settings_lines
 
     lines = settings_lines(settings, "settings")
     with Board(port, off_at_end=False) as board:
-        remarks = board.ask("learnt clear", 10.0)
-        for k, line in enumerate(lines):
-            say(line, k)
-            try:
-                remarks = board.ask(line)
-            except WorkError as error:
-                raise WorkError(f"{error}: nothing is saved, a reset of the board gives back what it had") from None
-        if remarks:
-            raise WorkError(f"the board does not take them together: {remarks[-1]}")
-        say("reading back", len(lines))
-        if wrong := settings_that_differ(lines, board.settings()):
-            raise WorkError(f"the board shows other values than were sent, nothing is saved: {'; '.join(wrong)}")
+        before = board.settings()
+        send_settings(board, lines, save, say)
         if save:
-            board.ask("$save", 10.0)
+            sent = dict(line[1:].split("=", 1) for line in lines)
+            history.keep(port, board.version[0], by, before, sent)
     return len(lines)
+
+
+def undo_upload(port: str, save: bool = True) -> list[str]:
+    """Give a board back what it had before the last upload from this computer: `ninespring upload --undo`. Return what changed."""
+    from . import history
+    from .board import Board
+
+    with Board(port, off_at_end=False) as board:
+        return history.undo(board, save).words()
 
 
 def verify(model: Model | str | Path, log: Log, before: str = "") -> tuple[float, float]:

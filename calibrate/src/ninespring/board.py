@@ -3,20 +3,27 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import re
 import subprocess
 import threading
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from types import TracebackType
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from . import ranges
+from .belief import Belief, beliefs
 from .errors import InputError, RefusedError, WorkError
 from .port import Port
 from .simulated import simulated_board
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 ERROR = re.compile(r"^error:(\d+) ?(.*)$")
 TELEMETRY = re.compile(r"^(?:\d+\.\d+,.*|<.*>)$")
@@ -32,6 +39,8 @@ HOST_TIMEOUT_S = 5
 """Springs go off when nothing came from here for so long, where the board has that setting."""
 ALIVE_EVERY_S = 1.0
 """By the clock here and by the board's: that of a simulated one may run faster."""
+LOOK_EVERY_S = 1.0
+"""By the board's clock: so often `stream` asks what telemetry does not tell."""
 SCRIPT_ALIVE_EVERY_S = 0.2
 """For a script that may sleep or compute between two lines: a simulated board's second may be so short."""
 DRIVES = re.compile(r"\s*(on|pattern)\b", re.IGNORECASE)
@@ -53,6 +62,11 @@ class Reading:
     fan: float
     ambient_c: float
     state: str
+    low_c: np.ndarray
+    """The temperature is above this and below `high_c` in 99 of 100 cases, as the board believes; NaN where it was not asked."""
+    high_c: np.ndarray
+    austenite: np.ndarray
+    """The phase that the board believes, 0..1; NaN where it was not asked."""
 
     def __repr__(self) -> str:
         hottest = int(np.argmax(self.temperature_c))
@@ -333,24 +347,78 @@ class Board:
         self.ask(f"fan {percent:g}")
 
     def read(self) -> Reading:
-        """Return what the board measures now."""
-        names = next((line.split(",") for line in self.ask("telemetry csv 50") if line.startswith("time_s,")), [])
-        until = time.monotonic() + 3.0 * self.patience
-        while (line := self.next_line(until)) is not None:
-            cells = line.split(",")
-            if line[:1].isdigit() and len(cells) == len(names):
+        """Return what the board measures now, and what it believes of the springs."""
+        with contextlib.closing(self.stream(50)) as rows:
+            return next(rows)
+
+    def stream(self, hz: int = 5, seconds: float = math.inf) -> Iterator[Reading]:
+        """Yield what the board measures, `hz` rows a second, for so many seconds of its own; ends telemetry with the loop.
+
+        Bounds and phase are asked for once a second. In the loop the board may be driven and asked as ever.
+
+        >>> for now in board.stream(hz=5, seconds=60):
+        ...     print(now.time_s, now.temperature_c.max())
+        """
+        ranges.RECORD_HZ.check("hz", hz)
+        if not seconds > 0.0:
+            raise InputError(f"seconds = {seconds!r}: not a number above 0")
+        names = next((line.split(",") for line in self.ask(f"telemetry csv {hz}") if line.startswith("time_s,")), [])
+        begins_s, looked_s, believed = math.nan, -math.inf, None
+        try:
+            while (line := self.next_line(time.monotonic() + 3.0 * self.patience)) is not None:
+                cells = line.split(",")
+                if not line[:1].isdigit() or len(cells) != len(names):
+                    continue
+                row = dict(zip(names, cells, strict=True))
+                now_s = float(row["time_s"])
+                begins_s = now_s if math.isnan(begins_s) else begins_s
+                if now_s - begins_s > seconds:
+                    return
+                if not 0.0 <= now_s - looked_s < LOOK_EVERY_S:
+                    looked_s = now_s
+                    with contextlib.suppress(RefusedError):  # a board that does not know the word
+                        believed = beliefs(self.ask("model"))
+                yield reading(row, believed)
+        finally:
+            with contextlib.suppress(WorkError):  # the loop may end after the board went away
                 self.ask("telemetry off")
-                self._telemetry.clear()
-                return reading(dict(zip(names, cells, strict=True)))
+            self._telemetry.clear()
         raise WorkError(f"{self.port}: no telemetry came")
 
 
-def reading(cells: dict[str, str]) -> Reading:
-    """Return a row of telemetry as numbers; ValueError where it is none."""
+def to_pandas(readings: Iterable[Reading]) -> pd.DataFrame:
+    """Return readings as a table, a row each, with a log's columns; `low1_c`, `high1_c` and `x1` (0..1) are bounds and phase."""
+    import pandas as pd
+
+    each = {
+        "i{}_a": "current_a",
+        "v{}_v": "voltage_v",
+        "m{}_c": "temperature_c",
+        "low{}_c": "low_c",
+        "high{}_c": "high_c",
+    }
+    each |= {"x{}": "austenite", "d{}": "duty"}
+    return pd.DataFrame(
+        {"time_s": one.time_s}
+        | {
+            column.format(k + 1): value
+            for column, name in each.items()
+            for k, value in enumerate(getattr(one, name).tolist())
+        }
+        | {"fan": one.fan, "ambient_c": one.ambient_c, "state": one.state}
+        for one in readings
+    )
+
+
+def reading(cells: dict[str, str], believed: Mapping[int, Belief] | None = None) -> Reading:
+    """Return a row of telemetry, and what is believed beside it, as numbers; ValueError where it is none."""
     springs = sum(re.fullmatch(r"i\d+_a", name) is not None for name in cells)
 
     def each(name: str) -> np.ndarray:
         return np.array([float(cells.get(name.format(k), "nan")) for k in range(1, springs + 1)])
+
+    def of_each(name: str) -> np.ndarray:
+        return np.array([getattr((believed or {}).get(k), name, math.nan) for k in range(1, springs + 1)])
 
     return Reading(
         time_s=float(cells["time_s"]),
@@ -361,7 +429,33 @@ def reading(cells: dict[str, str]) -> Reading:
         fan=float(cells["fan"]),
         ambient_c=float(cells["ambient_c"]),
         state=cells["state"],
+        low_c=of_each("low_c"),
+        high_c=of_each("high_c"),
+        austenite=of_each("austenite"),
     )
+
+
+def send_settings(
+    board: Board, lines: list[str], save: bool = True, say: Callable[[str, int], None] = lambda line, count: None
+) -> None:
+    """Send `$name=value` lines, read them back, save them; what the board has learnt beside its old numbers it forgets.
+
+    WorkError, and nothing is saved, where the board refuses one or shows another value.
+    """
+    remarks = board.ask("learnt clear", 10.0)
+    for k, line in enumerate(lines):
+        say(line, k)
+        try:
+            remarks = board.ask(line)
+        except WorkError as error:
+            raise WorkError(f"{error}: nothing is saved, a reset of the board gives back what it had") from None
+    if remarks:
+        raise WorkError(f"the board does not take them together: {remarks[-1]}")
+    say("reading back", len(lines))
+    if wrong := settings_that_differ(lines, board.settings()):
+        raise WorkError(f"the board shows other values than were sent, nothing is saved: {'; '.join(wrong)}")
+    if save:
+        board.ask("$save", 10.0)
 
 
 def settings_that_differ(sent: list[str], has: dict[str, str]) -> list[str]:

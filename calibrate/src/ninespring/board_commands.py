@@ -111,27 +111,42 @@ def record(
 @click.command(
     cls=Command,
     epilog="""\b
-Example:
+Examples:
   ninespring upload --port /dev/ttyACM0 settings.txt
+  ninespring upload --port /dev/ttyACM0 --undo
 """,
 )
-@click.argument("settings", type=FILE)
+@click.argument("settings", type=FILE, required=False)
 @PORT
+@click.option("--undo", is_flag=True, help="give the board back what it had before the last upload from this computer")
 @click.option("--save/--no-save", default=True, show_default=True, help="keep them in the EEPROM")
 @JSON
-def upload(settings: Path, port: str, save: bool, json_path: Path | None) -> None:
+def upload(settings: Path | None, port: str, undo: bool, save: bool, json_path: Path | None) -> None:
     """Send exported settings to a board, read them back, save them.
 
     Nothing is saved unless the board took every line and shows every value in `$$`. What the board has learnt of its
-    springs it has learnt beside its old numbers, and forgets. All springs must be off.
+    springs it has learnt beside its old numbers, and forgets. All springs must be off. What it had before is kept on this
+    computer: `ninespring settings history` shows it, --undo gives it back.
     """
-    from . import api
-    from .board import settings_lines
+    from . import api, history
+    from .board import Board, settings_lines
 
+    if (settings is None) != undo:
+        raise InputError("give either a file of settings or --undo")
     check_folder(json_path)
+    if settings is None:
+        with working("giving back"), Board(port, off_at_end=False) as board:
+            last = history.undo(board, save)
+        write({json_path: checked(result_of("upload", settings=len(last.sent), saved=save, undone=last.by))})
+        for line in last.words():
+            name, _, change = line.partition(": ")
+            old, _, new = change.partition(" -> ")
+            out.print(f"{name}: {new} -> {old}", markup=False)
+        out.print(f"`{last.by}` of {last.when} is taken back{', saved' if save else ''}", markup=False)
+        return
     lines = settings_lines(read_bytes(settings).decode("utf-8", "replace"), str(settings))
     with working("sending", len(lines)) as say:
-        api.upload(port, "\n".join(lines), save, say)
+        api.upload(port, "\n".join(lines), save, say, by=f"upload {settings.name}")
     write({json_path: checked(result_of("upload", settings=len(lines), saved=save))})
     out.print(f"{len(lines)} settings sent and read back{', saved' if save else ''}")
 

@@ -12,6 +12,7 @@ import click
 
 from . import __version__
 from .board_commands import add_board_commands
+from .calibration.command import calibrate
 from .console import Group, err
 from .dashboard.command import dashboard
 from .errors import InputError, WorkError
@@ -24,6 +25,8 @@ from .import_command import import_
 from .plan_command import plan
 from .plot_command import plot
 from .scenario_command import scenario
+from .settings_command import settings
+from .terminal import console
 from .verdict.command import diagnose
 
 
@@ -52,6 +55,9 @@ for command in (
     sweep,
     scenario,
     dashboard,
+    calibrate,
+    settings,
+    console,
 ):
     cli.add_command(command)
 add_board_commands(cli)

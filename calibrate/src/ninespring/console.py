@@ -224,8 +224,9 @@ def logs_of(runs: list[Run]) -> list[dict[str, Any]]:
 
 def print_parameters(console: Console, parameters: dict[str, Any]) -> None:
     """Print a table of numbers."""
-    table = Table("number", "value", "standard error", "unit", "")
+    table = Table("number", "value", "standard error", "in 95 of 100 cases", "unit", "")
     for name, one in parameters.items():
         error = "-" if one["stderr"] is None else f"{one['stderr']:.2g}"
-        table.add_row(name, f"{one['value']:.5g}", error, one["unit"], one.get("note", ""))
+        ends = "{:.4g} .. {:.4g}".format(*one["interval_95"]) if "interval_95" in one else "-"
+        table.add_row(name, f"{one['value']:.5g}", error, ends, one["unit"], one.get("note", ""))
     console.print(table)

@@ -304,6 +304,14 @@ class Plant:
         """Return the springs' temperatures now, (springs,), degC."""
         return np.array([self._lib.plant_temperature_c(self._plant, k) for k in range(self.springs)])
 
+    def austenite(self) -> np.ndarray:
+        """Return the springs' phase now, (springs,), 0..1."""
+        return np.array([self._lib.plant_austenite(self._plant, k) for k in range(self.springs)])
+
+    def step(self, seconds: float) -> None:
+        """Go on for so long with the inputs as they are."""
+        self._check(self._lib.plant_step(self._plant, float(seconds)), "step")
+
     def start_from_measured(self, first_c: np.ndarray) -> None:
         """Put the springs where the sensors would show `first_c` (NaN: stays where it is)."""
         first_c = _shaped("first_c", first_c, (self.springs,))

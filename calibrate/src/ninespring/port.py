@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import errno
 import os
-import termios
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -13,13 +12,18 @@ from pathlib import Path
 
 import serial
 
+try:
+    from termios import error as terminal_error
+except ImportError:  # Windows
+    terminal_error = OSError
+
 from .errors import InputError, WorkError
 
 BAUD = 115200
 LONGEST_LINE = 8192
 """Bytes: what is longer has no line ends and is no console."""
-GONE = (serial.SerialException, OSError, termios.error)
-"""What pyserial raises when a cable is pulled; termios.error is no OSError."""
+GONE = (serial.SerialException, OSError, terminal_error)
+"""What pyserial raises when a cable is pulled; the error of termios is no OSError."""
 
 
 class Port:
@@ -90,11 +94,31 @@ def _how_to_be_allowed(name: str) -> str:
     """Return what gives a user the port: on Debian its group is dialout."""
     try:
         group = Path(name).group()
-    except (OSError, KeyError):
+    except (OSError, KeyError, NotImplementedError):
         group = "dialout"
     if group == "root":
         return "only root may"
     return f"`sudo usermod --append --groups {group} $USER`, then log in again"
+
+
+def pseudo_terminal(name: str) -> tuple[int, ...] | None:
+    """Return which pseudo-terminal a name stands for, None where it is none or not there.
+
+    Its number does not tell: once it is gone, the next one that anybody opens gets it. When it was made does, and so does a link that was made anew.
+    """
+    if Path(os.path.realpath(name)).parent != Path("/dev/pts"):
+        return None
+    try:
+        link, device = os.lstat(name), os.stat(name)
+    except OSError:
+        return None
+    return (
+        device.st_dev,
+        device.st_ino,
+        device.st_ctime_ns,
+        link.st_ino,
+        link.st_mtime_ns if Path(name).is_symlink() else 0,
+    )
 
 
 def _who_has(name: str) -> str:

@@ -36,6 +36,7 @@ PLAN_SUPPLY_A = Range(0.1, 60, "A")
 PLAN_HOTTEST_C = Range(40, 200, "degC")
 SPRING = Range(1, 64, whole=True)
 SEED = Range(0, 2**32 - 1, whole=True)
+DRIVE_S = Range(120, 36_000, "s")
 RECORD_HZ = Range(1, 50, "rows a second", whole=True)
 RECORD_S = Range(0, 1e8, "s", above=True)
 """Three years, and not for ever: 'no end' is not a number."""

@@ -305,7 +305,7 @@ def told_to_stop() -> Iterator[Callable[[], bool]]:
     """
     told: list[int] = []
     before = {}
-    for one in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+    for one in filter(None, (signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGHUP", None))):  # Windows has no SIGHUP
         if signal.getsignal(one) != signal.SIG_IGN:
             before[one] = signal.signal(one, lambda number, frame: told.append(number))
     try:

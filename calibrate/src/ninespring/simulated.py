@@ -15,13 +15,29 @@ NITI = "plant.effects=latent_heat,resistance_phase"
 
 
 def simulator() -> Path:
-    """Return the program: NINESPRING_SIM, this source tree's build, or the PATH."""
+    """Return the program: NINESPRING_SIM, this source tree's build, what came with the package, or the PATH."""
     named = os.environ.get("NINESPRING_SIM")
-    tree = Path(__file__).resolve().parents[3] / "build" / "host" / "ninespring-sim"
-    for one in (named, tree, shutil.which("ninespring-sim")):
-        if one and os.access(one, os.X_OK):
+    here = Path(__file__).resolve()
+    tree = here.parents[3] / "build" / "host" / "ninespring-sim"
+    packed = here.parent / "simulator" / "bin" / "ninespring-sim"
+    for one in (named, tree, packed, shutil.which("ninespring-sim")):
+        if one and os.access(one, os.X_OK) and not _is_this_package(Path(one)):
             return Path(one)
-    raise WorkError("ninespring-sim is not there: script/build builds it, or set NINESPRING_SIM to it")
+    if os.name == "nt":
+        raise WorkError("the simulated board needs a pseudo-terminal, which Windows has not: use WSL, or a board")
+    raise WorkError(
+        "ninespring-sim is not there: this wheel came without it (the release's Linux wheel has it), script/build builds it, or "
+        "set NINESPRING_SIM to it"
+    )
+
+
+def _is_this_package(path: Path) -> bool:
+    """Return whether a program on the PATH is only the way back to here: the script that pip makes."""
+    try:
+        with path.open("rb") as file:
+            return file.read(2) == b"#!"
+    except OSError:
+        return True
 
 
 def simulated_board(more: Sequence[str] = ()) -> tuple[subprocess.Popen[str], str, str]:

@@ -21,6 +21,7 @@ from ..belief import beliefs
 from ..board import HOST_TIMEOUT_S, PATIENCE, SIMULATED, Board, reading
 from ..console import err
 from ..errors import InputError, RefusedError, WorkError
+from ..port import pseudo_terminal
 from ..recording import SILENT_S, LogFile, Row, RowCheck, RowSink, telemetry_names, write_head
 from ..thermometers import Thermometers
 from . import words
@@ -179,11 +180,13 @@ class BoardSource(Source):
     # from the board's side
 
     def _run(self) -> None:
+        terminal = pseudo_terminal(self._port)
         lost = ""
         """How the board was lost: it is shown until there is one again, before what the attempts to find it say."""
         while not self.closing.is_set():
             trouble, found = "", False
             try:
+                terminal = self._same_terminal(terminal)
                 with OffFirst(self._port, self.closing.is_set, self._switch_off) as board:
                     found = True
                     try:
@@ -210,6 +213,15 @@ class BoardSource(Source):
                 err.print(f"ninespring: {trouble}", soft_wrap=True, markup=False)
             self._change(connected=False, trouble=trouble, play=None)
             self.closing.wait(1.0)
+
+    def _same_terminal(self, terminal: tuple[int, ...] | None) -> tuple[int, ...] | None:
+        """Return the pseudo-terminal that the port is, None where it is none; whose number another one has now is refused: that is not this board."""
+        now = pseudo_terminal(self._port)
+        if terminal and now and now != terminal and now[3:] == terminal[3:]:
+            raise WorkError(
+                f"{self._port}: its pseudo-terminal is gone, and another one has that number now: start the dashboard again"
+            )
+        return now or terminal
 
     def _converse(self, board: Board) -> None:
         self._read_settings(board)

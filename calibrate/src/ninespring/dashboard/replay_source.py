@@ -87,7 +87,7 @@ class ReplaySource(Source):
                 self._at_s = float(np.clip(wish["time_s"], self._run.time_s[0], self._run.time_s[-1]))
                 row = int(np.searchsorted(self._run.time_s, self._at_s, "right")) - 1
                 with self._lock:
-                    self._history.clear()
+                    self._forget()
                 for one in range(max(0, row - 600), row):
                     self._remember(self._values(one))
                 self._show(row)

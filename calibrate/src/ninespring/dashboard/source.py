@@ -8,9 +8,11 @@ from collections import deque
 from concurrent.futures import Future
 from typing import Any
 
-HISTORY_S = 600.0
+RECENT_S, HISTORY_S = 600.0, 3600.0
+"""Every row is kept for ten minutes, one in OLD_EVERY_S for an hour."""
+OLD_EVERY_S = 1.0
 POINTS = 1200
-"""Most points of history that a new page gets."""
+"""Most points of each part of the history that a new page gets."""
 SERIES = ("temperature_c", "low_c", "high_c", "measured_c", "current_a", "voltage_v", "power_w", "duty", "phase")
 """What is kept of each spring over time."""
 
@@ -33,6 +35,7 @@ class Source:
         self._row_at_s: float | None = None
         """When the newest row came, monotonic; None where what is shown does not age."""
         self._history: deque[dict[str, Any]] = deque()
+        self._older: deque[dict[str, Any]] = deque()
         self.closing = threading.Event()
 
     @property
@@ -49,10 +52,10 @@ class Source:
         return state
 
     def history(self) -> dict[str, Any]:
-        """Return the last minutes: {time_s: (n,), name: (k, n) ...}."""
+        """Return the last hour: {time_s: (n,), name: (k, n) ...}."""
         with self._lock:
-            rows = list(self._history)
-        rows = rows[:: 1 + len(rows) // POINTS]
+            parts = [list(self._older), list(self._history)]
+        rows = [row for part in parts for row in part[:: 1 + len(part) // POINTS]]
         out: dict[str, Any] = {"kind": "history", "time_s": [row["time_s"] for row in rows]}
         for name in SERIES:
             none = [None] * max((len(row[name] or ()) for row in rows), default=0)
@@ -67,10 +70,19 @@ class Source:
     def _remember(self, row: dict[str, Any]) -> None:
         with self._lock:
             if self._history and row["time_s"] < self._history[-1]["time_s"]:
-                self._history.clear()
+                self._forget()
             self._history.append({name: row.get(name) for name in ("time_s", *SERIES)})
-            while row["time_s"] - self._history[0]["time_s"] > HISTORY_S:
-                self._history.popleft()
+            while row["time_s"] - self._history[0]["time_s"] > RECENT_S:
+                old = self._history.popleft()
+                if not self._older or old["time_s"] - self._older[-1]["time_s"] >= OLD_EVERY_S:
+                    self._older.append(old)
+            while self._older and row["time_s"] - self._older[0]["time_s"] > HISTORY_S:
+                self._older.popleft()
+
+    def _forget(self) -> None:
+        """Begin the history anew; the caller has the lock."""
+        self._history.clear()
+        self._older.clear()
 
     def settings(self) -> list[dict[str, Any]]:
         """Return the settings with value, unit and range; none where there is no board."""

@@ -6,7 +6,6 @@ its point's number and seed. A point that is in a file is done: that is all that
 
 from __future__ import annotations
 
-import fcntl
 import json
 import os
 from collections.abc import Sequence
@@ -18,6 +17,11 @@ import numpy as np
 from .. import __version__
 from ..errors import InputError
 from .spec import Spec
+
+try:
+    import fcntl
+except ImportError:  # Windows: two sweeps into one folder are not told apart there
+    fcntl = None  # type: ignore[assignment]
 
 META = b"ninespring"
 
@@ -44,7 +48,8 @@ class Results:
         self.points.mkdir(parents=True, exist_ok=True)
         self.lock = (self.folder / "lock").open("a")
         try:
-            fcntl.flock(self.lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            if fcntl:
+                fcntl.flock(self.lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:
             raise InputError("another sweep is writing into this folder", self.folder) from None
         kept = self.folder / "spec.json"

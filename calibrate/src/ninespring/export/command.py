@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,7 @@ import numpy as np
 from ..console import FILE, JSON, MODEL, Command, beside, checked, logs_of, notes_of, out, result_of, working, write
 from ..errors import InputError, WorkError
 from ..explore.stiffness import LAYERS
-from ..logs import check_folder, read_bytes, read_log, sha256_of
+from ..logs import Run, check_folder, read_bytes, read_log, sha256_of
 from ..models import Model
 from .settings import Settings
 
@@ -39,14 +39,16 @@ def _model(path: Path, layer: str | None) -> Model:
     return model
 
 
-def _chip_lines(path: Path | None) -> str:
+def console_lines(path: Path) -> list[str]:
+    """Return the `$name=value` lines of a file, also where `$$` told units behind the values; anything else is refused."""
     from ..board import settings_lines
 
-    if path is None:
-        return ""
-    # `$$` tells units behind the values
     text = re.sub(r"^(\$\S+=\S+)[ \t].*$", r"\1", read_bytes(path).decode("utf-8", "replace"), flags=re.M)
-    return "\n".join(settings_lines(text, str(path)))
+    return settings_lines(text, str(path))
+
+
+def _chip_lines(path: Path | None) -> str:
+    return "\n".join(console_lines(path)) if path else ""
 
 
 def checked_settings(
@@ -67,6 +69,19 @@ def checked_settings(
             f"these settings would drive worse, nothing is written: {'; '.join(worse)} (--force writes them all the same)"
         )
     return made, worse, drives
+
+
+def chip_error(model: Model, lines: str, runs: Sequence[Run]) -> dict[str, Any]:
+    """Return the error of a chip with these lines on logs, K rms: of all, and of each spring (None: not measured)."""
+    from ..fit.predict import predict_by_chip
+
+    left = np.concatenate([run.temperature_c - predict_by_chip(model, lines, run) for run in runs])
+    seen = np.isfinite(left)
+    each = [
+        float(np.sqrt(np.mean(one[mask] ** 2))) if mask.any() else None
+        for one, mask in zip(left.T, seen.T, strict=True)
+    ]
+    return {"rmse_c": float(np.sqrt(np.mean(left[seen] ** 2))), "rmse_per_spring_c": each}
 
 
 @click.command(
@@ -157,7 +172,6 @@ def verify(
     Before: the settings that the board has (--port, --chip) or the firmware's defaults. After: with what `export` writes
     of the model over them.
     """
-    from ..fit.predict import predict_by_chip
     from ..report.verified import with_verification
     from .settings import settings_of
 
@@ -175,14 +189,7 @@ def verify(
     notes_of([run])
     old = _port_lines(port) if port else _chip_lines(chip_path)
     made = settings_of(model)
-    errors: dict[str, Any] = {}
-    for name, lines in (("before", old), ("after", f"{old}\n{made.lines}")):
-        left = run.temperature_c - predict_by_chip(model, lines, run)
-        seen = np.isfinite(left)
-        each = [
-            float(np.sqrt(np.mean(left[seen[:, k], k] ** 2))) if seen[:, k].any() else None for k in range(run.springs)
-        ]
-        errors[name] = {"rmse_c": float(np.sqrt(np.mean(left[seen] ** 2))), "rmse_per_spring_c": each}
+    errors = {"before": chip_error(model, old, [run]), "after": chip_error(model, f"{old}\n{made.lines}", [run])}
     result = result_of(
         "verify",
         logs=logs_of([run]),

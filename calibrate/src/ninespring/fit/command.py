@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -25,6 +26,13 @@ from ..console import (
 from ..errors import InputError
 from ..logs import Run, check_folder
 from ..models import Array
+
+if TYPE_CHECKING:
+    from .problem import Problem
+    from .spec import Fit
+
+MOST_TOLD = 8
+"""Correlations that are printed."""
 
 
 @click.command(
@@ -51,7 +59,6 @@ def fit(logs: tuple[Path, ...], array_path: Path | None, effects: str, output: P
     from ..export.settings import left_out
     from ..models import model_text
     from ..verdict import diagnosis, doubt, steady
-    from ..verdict.result import parameters_of
     from . import from_resistance
     from .statistics import rms
 
@@ -85,7 +92,8 @@ def fit(logs: tuple[Path, ...], array_path: Path | None, effects: str, output: P
         holdout_rmse_c=held,
         noise_c=problem.noise_c,
         effects=list(chosen.spec.effects),
-        parameters={k: v for e in (None, *chosen.spec.effects) for k, v in parameters_of(problem, chosen, e).items()},
+        parameters=_numbers(problem, chosen),
+        correlations=_correlations(chosen),
         not_identifiable=sorted(chosen.stuck),
         at_bounds=chosen.at_bounds(),
         warnings=suspect,
@@ -93,11 +101,41 @@ def fit(logs: tuple[Path, ...], array_path: Path | None, effects: str, output: P
     write({output: model_text(model), json_path: checked(result)})
     notes("", suspect)
     print_parameters(beside(output), result["parameters"])
+    _print_correlations(output, result["correlations"])
     beside(output).print(
         f"error {result['rmse_c']:.3f} K, held out {held:.3f} K, noise {problem.noise_c:.3f} K -> {output}"
     )
     for effect, why in left_out(model).items():
         beside(output).print(f"{effect}: not for the chip: {why}", markup=False)
+
+
+def _numbers(problem: Problem, found: Fit) -> dict[str, Any]:
+    """Return a fit's numbers, each with the interval in which it lies in 95 of 100 cases."""
+    from ..verdict.result import parameters_of
+    from .intervals import intervals
+
+    out = {k: v for e in (None, *found.spec.effects) for k, v in parameters_of(problem, found, e).items()}
+    for name, ends in intervals(found).items():
+        out[name]["interval_95"] = list(ends)
+    return out
+
+
+def _correlations(found: Fit) -> list[dict[str, Any]]:
+    from .intervals import correlations
+
+    return [{"a": a, "b": b, "correlation": value} for a, b, value in correlations(found)]
+
+
+def _print_correlations(output: Path, found: list[dict[str, Any]]) -> None:
+    """Print which numbers' errors go together, strongest first; all of them are in --json."""
+    from .intervals import TOLD
+
+    if not found:
+        return
+    said = beside(output)
+    said.print(f"errors that go together, of {len(found)} pairs beyond {TOLD:g} (--json has all):", markup=False)
+    for one in found[:MOST_TOLD]:
+        said.print(f"  {one['correlation']:+.2f}  {one['a']}, {one['b']}", markup=False)
 
 
 def _fit_from_resistance(array: Array, runs: list[Run], output: Path, json_path: Path | None) -> None:
@@ -122,13 +160,15 @@ def _fit_from_resistance(array: Array, runs: list[Run], output: Path, json_path:
         **{name: 1e-3 * rms(left) for name, left in errors.items()},
         noise_v=1e-3 * problem.noise_c,
         effects=list(found.spec.effects),
-        parameters={k: v for e in (None, *found.spec.effects) for k, v in parameters_of(problem, found, e).items()},
+        parameters=_numbers(problem, found),
+        correlations=_correlations(found),
         not_identifiable=sorted(found.stuck),
         at_bounds=found.at_bounds(),
         warnings=[from_resistance.SCALE],
     )
     write({output: model_text(model), json_path: checked(result)})
     print_parameters(beside(output), result["parameters"])
+    _print_correlations(output, result["correlations"])
     beside(output).print(
         f"no thermometer: fitted to v / i, error {1e3 * result['rmse_before_v']:.1f} mV as declared, "
         f"{1e3 * result['rmse_v']:.1f} fitted, readings are good for {1e3 * result['noise_v']:.1f} -> {output}"

@@ -23,7 +23,8 @@ plt.rcParams.update(
 )
 
 
-def _svg(figure: Any) -> str:
+def as_svg(figure: Any) -> str:
+    """Return a figure as SVG text that stands in a page; it is closed."""
     out = io.StringIO()
     figure.savefig(out, format="svg", bbox_inches="tight")
     plt.close(figure)
@@ -82,7 +83,7 @@ def traces(found: Diagnosis) -> list[tuple[str, str]]:
             figure.supxlabel("time since the beginning of the run, s", fontsize=9)
             figure.supylabel("measured less model, K" if residual else "temperature, °C", fontsize=9)
             figure.tight_layout(rect=(0, 0, 1, 1.0 - 0.25 / figure.get_figheight()))
-            pair.append(_svg(figure))
+            pair.append(as_svg(figure))
         figures.append((pair[0], pair[1]))
     return figures
 
@@ -118,7 +119,7 @@ def array_map(found: Diagnosis) -> str:
     axis.set_xticks([])
     axis.set_yticks([])
     figure.colorbar(shown, ax=axis, shrink=0.8, label="rms error / noise")
-    return _svg(figure)
+    return as_svg(figure)
 
 
 def unknown_heat(found: Diagnosis) -> str:
@@ -144,7 +145,7 @@ def unknown_heat(found: Diagnosis) -> str:
         axis.tick_params(labelsize=7)
     axes[-1, 0].set_xlabel("s", fontsize=8)
     figure.colorbar(shown, ax=axes[:, 0], label="W more (red) or less (blue) than known")
-    return _svg(figure)
+    return as_svg(figure)
 
 
 def error_bars(result: dict[str, Any]) -> str:
@@ -163,7 +164,7 @@ def error_bars(result: dict[str, Any]) -> str:
     axis.set_xlim(0, max(value for _, value, _ in rows) * 1.25)
     axis.set_axis_off()
     axis.set_title("error on held-out blocks", fontsize=9, loc="left")
-    return _svg(figure)
+    return as_svg(figure)
 
 
 def _rows_of(run: Run, pick: slice) -> np.ndarray:
@@ -200,7 +201,7 @@ def maps(found: Diagnosis) -> str:
         axis.set_xticks([])
         axis.set_yticks([])
     figure.tight_layout()
-    return _svg(figure)
+    return as_svg(figure)
 
 
 def autocorrelation(found: Diagnosis) -> str:
@@ -233,7 +234,7 @@ def autocorrelation(found: Diagnosis) -> str:
         axis.grid(alpha=0.25)
         axis.tick_params(labelsize=8)
     figure.tight_layout()
-    return _svg(figure)
+    return as_svg(figure)
 
 
 def evidence(found: Diagnosis) -> str:
@@ -262,7 +263,7 @@ def evidence(found: Diagnosis) -> str:
     axis.set_xlabel("rms error, K (dashed: noise; red: before)", fontsize=9)
     axis.spines[["top", "right"]].set_visible(False)
     figure.tight_layout()
-    return _svg(figure)
+    return as_svg(figure)
 
 
 def cases(result: dict[str, Any]) -> str:
@@ -283,4 +284,4 @@ def cases(result: dict[str, Any]) -> str:
     axis.spines[["top", "right"]].set_visible(False)
     axis.legend(fontsize=9, frameon=False, ncols=3, loc="lower right", bbox_to_anchor=(1, 1))
     figure.tight_layout()
-    return _svg(figure)
+    return as_svg(figure)

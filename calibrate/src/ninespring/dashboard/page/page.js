@@ -6,10 +6,12 @@ const QUANTITIES = {
 };
 const COLOURS = ["#4477aa", "#ee6677", "#228833", "#b8a01c", "#66ccee", "#aa3377", "#999999", "#ee7733", "#44bb99"];
 const WARM = [[27, 17, 68], [86, 20, 125], [165, 44, 96], [225, 86, 53], [251, 155, 6], [252, 255, 164]];
-const LOW_C = 20, HIGH_C = 120, MOST_POINTS = 6000;
+const LOW_C = 20, HIGH_C = 120;
+// Every row for ten minutes, one a second for an hour: as the server keeps them. A trace is drawn with so many points at most.
+const RECENT_S = 600, HISTORY_S = 3600, THINNED_EVERY = 1000, MOST_DRAWN = 1500;
 
 let socket = null, state = {}, shape = "", wishes = 0, drawn = [], held = new Set();
-let list = kept(), played = "null", rowAt = null;
+let list = kept(), own = null, played = "null", rowAt = null;
 const waiting = new Map();
 const past = { time_s: [], each: {}, sum_a: [] };
 const KEPT = [...Object.keys(QUANTITIES).filter((name) => name !== "sum_a"), "measured_c", "low_c", "high_c"];
@@ -140,6 +142,7 @@ function show(now) {
   $("unknown-s").textContent = unknown_s ? `${unknown_s} s` : "";
   $("cold").disabled = now.level.some((one) => one > 0);
   $("unlock").hidden = now.state !== "locked";
+  $("supply-on").hidden = !live || !now.faults.includes("supply: off");
   for (let k = 0; k < now.springs; k++) showSpring(k, now);
   $("bounds-legend").hidden = !now.bounds_c?.some((one) => one);
   if (String(now.faults) !== String(before.faults)) {
@@ -248,6 +251,22 @@ function remember(history) {
   past.sum_a = past.time_s.map((_, row) => past.each.current_a.reduce((sum, one) => sum + (one[row] ?? 0), 0));
 }
 
+let appended = 0;
+
+function thin() {
+  const end = past.time_s.at(-1);
+  let last = -Infinity;
+  const keep = past.time_s.map((one) => {
+    const kept = end - one <= RECENT_S || (end - one <= HISTORY_S && one - last >= 1);
+    if (kept) last = one;
+    return kept;
+  });
+  const left = (values) => values.filter((_, row) => keep[row]);
+  for (const name of KEPT) past.each[name] = (past.each[name] ?? []).map(left);
+  past.sum_a = left(past.sum_a);
+  past.time_s = left(past.time_s);
+}
+
 function append(now) {
   const last = past.time_s.at(-1);
   if (last !== undefined && now.time_s < last) {
@@ -262,19 +281,18 @@ function append(now) {
     const each = (past.each[name] ??= []);
     for (let k = 0; k < now.springs; k++) (each[k] ??= []).push(values[name]?.[k] ?? null);
   }
-  if (past.time_s.length > MOST_POINTS) {
-    const cut = MOST_POINTS / 4;
-    for (const one of [past.time_s, past.sum_a, ...Object.values(past.each).flat()]) one.splice(0, cut);
-  }
+  if (++appended % THINNED_EVERY === 0) thin();
 }
 
 function plot(number) {
   const name = document.querySelector(`[data-plot="${number}"]`).value;
   const end = past.time_s.at(-1) ?? 0, begin = Math.max(end - Number($("window").value), past.time_s[0] ?? 0);
   const from = past.time_s.findIndex((one) => one >= begin);
-  const time = past.time_s.slice(from), traces = [];
+  const stride = Math.ceil((past.time_s.length - from) / MOST_DRAWN);
+  const drawnOf = (values) => values.filter((_, row) => row >= from && (row - from) % stride === 0);
+  const time = drawnOf(past.time_s), traces = [];
   const line = (y, k, more = {}) => traces.push({
-    x: time, y: y.slice(from), mode: "lines", name: k === null ? "sum" : `${k + 1}`, legendgroup: `${k}`,
+    x: time, y: drawnOf(y), mode: "lines", name: k === null ? "sum" : `${k + 1}`, legendgroup: `${k}`,
     line: { width: 1.6, color: k === null ? COLOURS[0] : COLOURS[k % COLOURS.length], ...more.line }, showlegend: !more.line,
   });
   if (name === "sum_a") line(past.sum_a, null);
@@ -284,8 +302,8 @@ function plot(number) {
       const low = past.each.low_c[k];
       if (!high.some((value) => value !== null)) return;
       const band = { x: time, mode: "lines", legendgroup: `${k}`, showlegend: false, hoverinfo: "skip", line: { width: 0 } };
-      traces.unshift({ ...band, y: low.slice(from) },
-        { ...band, y: high.slice(from), fill: "tonexty", fillcolor: `${COLOURS[k % COLOURS.length]}${past.each.high_c.length > 3 ? "0f" : "24"}` });
+      traces.unshift({ ...band, y: drawnOf(low) },
+        { ...band, y: drawnOf(high), fill: "tonexty", fillcolor: `${COLOURS[k % COLOURS.length]}${past.each.high_c.length > 3 ? "0f" : "24"}` });
     });
     (past.each.measured_c ?? []).forEach((one, k) => one.some((value) => value !== null) && line(one, k, { line: { dash: "dot" } }));
   }
@@ -385,6 +403,29 @@ function kept() {
   } catch { return []; }
 }
 
+// A list as a link: `#patterns=111101111,101000101&every=20`. It is shown, and not played: who opens it plays it.
+function fromLink() {
+  const link = new URLSearchParams(location.hash.slice(1));
+  const linked = (link.get("patterns") ?? "").split(",").filter((one) => /^[01]{1,64}$/.test(one));
+  if (!linked.length) return;
+  const every = Number(link.get("every"));
+  if (every >= 0.5 && every <= 3600) $("seconds").value = every;
+  if (list.length && String(list) !== String(linked)) {
+    own = list;
+    $("own").hidden = false;
+  }
+  list = linked;
+  showList();
+  tell(`${linked.length} pattern${linked.length > 1 ? "s" : ""} from the link: Play plays them`);
+}
+
+function share() {
+  history.replaceState(null, "", `#patterns=${list.join(",")}&every=${$("seconds").value}`);
+  const link = location.href;
+  const said = () => tell(`the list as a link: ${link}`);
+  navigator.clipboard?.writeText(link).then(() => tell(`copied: ${link}`), said) ?? said();
+}
+
 function showPlay(play) {
   const now = JSON.stringify(play ?? null);
   if (now === played) return;
@@ -399,7 +440,7 @@ function showPlay(play) {
 }
 
 function showList() {
-  try { localStorage.setItem("patterns", JSON.stringify(list)); } catch { /* a page without storage forgets */ }
+  if (!own) try { localStorage.setItem("patterns", JSON.stringify(list)); } catch { /* a page without storage forgets */ }
   const play = JSON.parse(played);
   $("list").replaceChildren(...list.map((one, at) => {
     const item = document.createElement("li"), remove = document.createElement("button");
@@ -415,6 +456,7 @@ function showList() {
     return item;
   }));
   $("play").disabled = !list.length;
+  $("share").disabled = !list.length;
 }
 
 $("stop").onclick = stop;
@@ -426,6 +468,14 @@ for (const one of document.querySelectorAll("[data-all]")) {
 }
 for (const one of document.querySelectorAll("[data-make]")) one.onclick = () => quietly({ do: "pattern", springs: MAKE[one.dataset.make]() });
 $("apply").onclick = () => quietly({ do: "pattern", springs: drawing() });
+$("share").onclick = share;
+$("own").onclick = () => {
+  list = own;
+  own = null;
+  $("own").hidden = true;
+  showList();
+};
+addEventListener("hashchange", fromLink);
 $("add").onclick = () => { list.push(drawing()); showList(); };
 $("play").onclick = () => quietly({ do: "play", patterns: list, seconds: Number($("seconds").value) });
 $("end-play").onclick = () => quietly({ do: "end_play" });
@@ -436,6 +486,7 @@ $("fan").onchange = () => quietly({ do: "fan", percent: Number($("fan").value) }
 $("record").onclick = () => quietly({ do: state.recording ? "end_recording" : "record" });
 $("clear").onclick = () => quietly({ do: "clear" });
 $("unlock").onclick = () => quietly({ do: "unlock" });
+$("supply-on").onclick = () => quietly({ do: "say", line: "supply on" });
 $("save").onclick = () => quietly({ do: "say", line: "$save" });
 $("pause").onclick = () => quietly({ do: "pause" });
 $("speed").onchange = () => quietly({ do: "speed", speed: Number($("speed").value) });
@@ -467,5 +518,6 @@ function plots() {
   setTimeout(plots, Math.max(500, 4 * (performance.now() - begun)));
 }
 showList();
+fromLink();
 plots();
 connect();

@@ -1,28 +1,36 @@
 /* Worlds and faults that nobody told the board of: from power-on, with the README's words and no
  * hint. No spring becomes too hot, none acts that was not asked to, and each is where it was asked
- * to be, or that is said. */
+ * to be, or that is said. board_native holds this loop to the ELF. */
+#include <cmath>
 #include <functional>
+#include <memory>
+#include <string>
 
-#include "board_test.h"
+#include <unity.h>
 
-using namespace board_test;
+#include "loop.h"
 
 namespace
 {
 
-constexpr unsigned SPRINGS = BOARD_CHANNELS;
-constexpr unsigned CENTRE = 4;
+constexpr int SPRINGS = 9;
+constexpr int CENTRE = 4;
 constexpr double HOTTEST_C = 120.0;
 constexpr unsigned FIRST_START_S = 180; /* of a board that has learnt nothing */
 constexpr double ON = 0.95;
 constexpr double LEFT = 0.9;      /* below it, it has left */
 constexpr unsigned UNSAID_S = 20; /* for so long it may have, without a word */
 constexpr double UNDRIVEN_ON = 0.05;
-constexpr double FAULT_MS = 2000.0; /* in which what cannot be a circuit has its fault */
+constexpr double FAULT_S = 2.0; /* in which what cannot be a circuit has its fault */
 /* What says on the console and in telemetry that a spring is not where it was asked to be. */
 constexpr unsigned SAYS = DRIVE_POLICY_LIMIT_SAFETY | DRIVE_POLICY_LIMIT_TRIP |
                           DRIVE_POLICY_LIMIT_BLIND | DRIVE_POLICY_LIMIT_COOLING |
                           DRIVE_POLICY_LIMIT_AWAY;
+
+struct deleter {
+    void operator()(plant_t *plant) const { plant_destroy(plant); }
+    void operator()(loop_t *loop) const { loop_destroy(loop); }
+};
 
 using differs_t = std::function<void(plant_t *)>;
 
@@ -31,39 +39,70 @@ void set(plant_t *plant, const char *name, double value)
     TEST_ASSERT_EQUAL_MESSAGE(PLANT_OK, plant_set(plant, name, value), name);
 }
 
-/* A board around nine springs that differ from what is declared; the README's words are typed. */
+void switch_on(plant_t *plant, const char *effect)
+{
+    TEST_ASSERT_EQUAL_MESSAGE(PLANT_OK, plant_set_effect(plant, effect, true), effect);
+}
+
+/* A board around nine springs that differ from what is declared, told what the README types. */
 class world
 {
 public:
     explicit world(const differs_t &differs = {}, double shunt_noise_v = 0.0,
-                   double bus_noise_v = 0.0)
-        : mega(elf(), 1, shunt_noise_v, bus_noise_v)
+                   double bus_noise_v = 0.0, double ambient_error_c = 0.0)
     {
-        make_niti(plant());
+        std::unique_ptr<plant_t, deleter> drawn(plant_create(3, 3));
+        switch_on(drawn.get(), "latent_heat");
+        switch_on(drawn.get(), "resistance_phase");
         if (differs) {
-            differs(plant());
+            differs(drawn.get());
         }
-        plant_reset(plant());
-        mega.boot(false);
-        mega.expect_ok("pattern 111101111");
-        mega.expect_ok("policy precompensate");
+        plant_reset(drawn.get());
+        controller_settings_t settings;
+        controller_settings_default(&settings);
+        settings.policy.policy = DRIVE_POLICY_PRECOMPENSATE;
+        loop_options_t options;
+        loop_options_default(&options);
+        options.shunt_noise_v = shunt_noise_v;
+        options.bus_noise_v = bus_noise_v;
+        options.ambient_error_c = ambient_error_c;
+        loop.reset(loop_create(&settings, drawn.get(), &options, 1, nullptr));
+        TEST_ASSERT_NOT_NULL(loop.get());
+        bool on[CONTROLLER_MAX_SPRINGS] = {};
+        for (int k = 0; k < SPRINGS; ++k) {
+            on[k] = k != CENTRE;
+        }
+        controller_set_pattern(chip(), on);
     }
 
-    plant_t *plant() { return mega.plant.get(); }
-    double phase(unsigned k) { return board_test::phase(mega, k); }
-    std::string what() { return mega.say("faults") + mega.say("model"); }
+    controller_t *chip() { return loop_controller(loop.get()); }
+    plant_t *plant() { return loop_plant(loop.get()); }
+    double phase(int k) { return plant_austenite(plant(), k); }
+    bool driven(int k) { return controller_duty(chip(), static_cast<std::uint8_t>(k)) > 0; }
+    safety_fault_t fault(int k) { return controller_fault(chip(), static_cast<std::uint8_t>(k)); }
+    std::string what()
+    {
+        std::string text;
+        for (int k = 0; k < SPRINGS; ++k) {
+            const auto one = static_cast<std::uint8_t>(k);
+            text += "spring " + std::to_string(k + 1) + ": fault " + std::to_string(fault(k)) +
+                    ", limits " + std::to_string(controller_limits(chip(), one)) + ", " +
+                    std::to_string(plant_temperature_c(plant(), k)) + " degC, austenite " +
+                    std::to_string(phase(k)) + "\n";
+        }
+        return text;
+    }
 
     /* Goes on to a time since power-on, and looks once a second. */
     void until(unsigned end_s)
     {
         for (; now_s_ < end_s; ++now_s_) {
-            mega.run_ms(1000.0);
-            const board_view_t seen = mega.view();
-            for (unsigned k = 0; k < SPRINGS; ++k) {
-                TEST_ASSERT_TRUE_MESSAGE(
-                    plant_temperature_c(plant(), static_cast<int>(k)) < HOTTEST_C, what().c_str());
+            loop_advance(loop.get(), 1.0);
+            for (int k = 0; k < SPRINGS; ++k) {
+                TEST_ASSERT_TRUE_MESSAGE(plant_temperature_c(plant(), k) < HOTTEST_C,
+                                         what().c_str());
                 if (k != CENTRE) {
-                    look_at_driven(k, seen.spring[k]);
+                    look_at_driven(k);
                 }
             }
             TEST_ASSERT_TRUE_MESSAGE(phase(CENTRE) < UNDRIVEN_ON, what().c_str());
@@ -72,58 +111,56 @@ public:
 
     void expect_eight_on()
     {
-        for (unsigned k = 0; k < SPRINGS; ++k) {
+        for (int k = 0; k < SPRINGS; ++k) {
             TEST_ASSERT_TRUE_MESSAGE(k == CENTRE || phase(k) >= ON, what().c_str());
         }
     }
 
     /* Spring 1 and no other; the others have at least so much austenite. */
-    void expect_only_the_first(safety_fault_t fault, double least = ON)
+    void expect_only_the_first(safety_fault_t wanted, double least = ON)
     {
-        const board_view_t seen = mega.view();
-        TEST_ASSERT_EQUAL_UINT8(SAFETY_FAULT_NONE, seen.board_fault);
-        for (unsigned k = 0; k < SPRINGS; ++k) {
-            TEST_ASSERT_EQUAL_UINT8_MESSAGE(k == 0 ? fault : SAFETY_FAULT_NONE,
-                                            seen.spring[k].fault, what().c_str());
-            if (k == 0 && fault != SAFETY_FAULT_NONE) {
-                TEST_ASSERT_TRUE(board_duty(mega.raw(), 0) == 0.0);
+        TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, controller_board_fault(chip()));
+        for (int k = 0; k < SPRINGS; ++k) {
+            TEST_ASSERT_EQUAL_MESSAGE(k == 0 ? wanted : SAFETY_FAULT_NONE, fault(k),
+                                      what().c_str());
+            if (k == 0 && wanted != SAFETY_FAULT_NONE) {
+                TEST_ASSERT_FALSE(driven(0));
             } else if (k != CENTRE) {
                 TEST_ASSERT_TRUE_MESSAGE(phase(k) >= least, what().c_str());
             }
         }
     }
 
-    /* Of what `model` prints: "spring 1: 80.9 degC, 66.4 to 95.3, ...". */
+    /* As `model` prints them. */
     void expect_truth_within_bounds()
     {
-        const std::string model = mega.say("model");
-        for (unsigned k = 0; k < SPRINGS; ++k) {
-            const std::size_t at = model.find("spring " + std::to_string(k + 1) + ": ");
-            double value_c = 0.0, low_c = 0.0, high_c = 0.0;
-            TEST_ASSERT_TRUE(at != std::string::npos);
-            TEST_ASSERT_EQUAL_INT(3, std::sscanf(model.c_str() + at,
-                                                 "spring %*u: %lf degC, %lf to %lf", &value_c,
-                                                 &low_c, &high_c));
-            const double true_c = plant_temperature_c(plant(), static_cast<int>(k));
-            TEST_ASSERT_TRUE_MESSAGE(low_c <= true_c && true_c <= high_c, model.c_str());
-            TEST_ASSERT_TRUE(low_c <= value_c && value_c <= high_c);
+        for (int k = 0; k < SPRINGS; ++k) {
+            const spring_bounds_t bounds =
+                controller_temperature_bounds_c(chip(), static_cast<std::uint8_t>(k));
+            const double true_c = plant_temperature_c(plant(), k);
+            TEST_ASSERT_TRUE_MESSAGE(static_cast<double>(bounds.low) <= true_c &&
+                                         true_c <= static_cast<double>(bounds.high),
+                                     what().c_str());
+            TEST_ASSERT_TRUE(bounds.low <= bounds.value && bounds.value <= bounds.high);
         }
     }
 
     /* Heatings that have begun so far, of all springs. */
     unsigned heatings() const { return heatings_; }
 
-    rig mega;
+    std::unique_ptr<loop_t, deleter> loop;
 
 private:
-    void look_at_driven(unsigned k, const board_view_spring_t &seen)
+    void look_at_driven(int k)
     {
+        const auto one = static_cast<std::uint8_t>(k);
         arrived_[k] = arrived_[k] || phase(k) >= ON;
         const bool missing = arrived_[k] ? phase(k) < LEFT : now_s_ >= FIRST_START_S;
-        const bool said = seen.fault != SAFETY_FAULT_NONE || (seen.limits & SAYS) != 0;
+        const bool said =
+            fault(k) != SAFETY_FAULT_NONE || (controller_limits(chip(), one) & SAYS) != 0;
         unsaid_s_[k] = missing && !said ? unsaid_s_[k] + 1 : 0;
         TEST_ASSERT_TRUE_MESSAGE(unsaid_s_[k] <= UNSAID_S, what().c_str());
-        const bool heats = seen.stage == DRIVE_POLICY_STAGE_HEAT;
+        const bool heats = controller_stage(chip(), one) == DRIVE_POLICY_STAGE_HEAT;
         heatings_ += heats && !heated_[k] ? 1u : 0u;
         heated_[k] = heats;
     }
@@ -185,7 +222,7 @@ void another_supply_is_no_fault()
 
 void a_room_ten_kelvin_warmer_than_the_setting_leaves_no_spring_unsettled()
 {
-    world w([](plant_t *plant) { set(plant, "ambient_c", 30.0); });
+    world w([](plant_t *plant) { set(plant, "ambient_c", 30.0); }, 0.0, 0.0, -10.0);
     w.until(600);
     w.expect_eight_on();
     const unsigned before = w.heatings();
@@ -217,13 +254,10 @@ void a_sensor_that_freezes_while_its_spring_is_driven_is_found_in_two_seconds()
     for (const unsigned frozen_s : {112u, 250u}) { /* it heats; it is held */
         world w;
         w.until(frozen_s);
-        TEST_ASSERT_TRUE(board_duty(w.mega.raw(), 0) > 0.0);
-        board_set_fault(w.mega.raw(), BOARD_FAULT_FREEZE, 0, true);
-        w.mega.run_ms(FAULT_MS);
-        TEST_ASSERT_EQUAL_UINT8(SAFETY_FAULT_SENSOR_MISMATCH, w.mega.view().spring[0].fault);
-        const std::string faults = w.mega.say("faults");
-        TEST_ASSERT_TRUE_MESSAGE(contains(faults, "spring 1: fault 15 sensor_mismatch"),
-                                 faults.c_str());
+        TEST_ASSERT_TRUE(w.driven(0));
+        TEST_ASSERT_TRUE(loop_act(w.loop.get(), LOOP_ACTION_SENSOR_FREEZE, 0));
+        loop_advance(w.loop.get(), FAULT_S);
+        TEST_ASSERT_EQUAL(SAFETY_FAULT_SENSOR_MISMATCH, w.fault(0));
         w.until(300);
         w.expect_only_the_first(SAFETY_FAULT_SENSOR_MISMATCH);
     }
@@ -235,33 +269,32 @@ void a_sensor_that_froze_while_the_board_waited_is_found_when_its_spring_is_driv
     for (const unsigned frozen_s : {45u, 100u}) {
         world w;
         w.until(frozen_s);
-        TEST_ASSERT_TRUE(board_duty(w.mega.raw(), 0) == 0.0);
-        board_set_fault(w.mega.raw(), BOARD_FAULT_FREEZE, 0, true);
+        TEST_ASSERT_FALSE(w.driven(0));
+        TEST_ASSERT_TRUE(loop_act(w.loop.get(), LOOP_ACTION_SENSOR_FREEZE, 0));
         w.until(FIRST_START_S);
-        const int fault = w.mega.view().spring[0].fault;
+        const safety_fault_t fault = w.fault(0);
         TEST_ASSERT_TRUE_MESSAGE(fault == SAFETY_FAULT_OPEN_SPRING ||
                                      fault == SAFETY_FAULT_SENSOR_MISMATCH,
                                  w.what().c_str());
         TEST_ASSERT_TRUE(plant_temperature_c(w.plant(), 0) < 60.0); /* it never got warm */
         w.until(240);
-        w.expect_only_the_first(static_cast<safety_fault_t>(fault));
+        w.expect_only_the_first(fault);
     }
 }
 
 void sensors_that_are_swapped_switch_their_springs_off_in_two_seconds()
 {
-    for (const unsigned other : {1u, CENTRE}) { /* a driven one; one that is off */
+    for (const int other : {1, CENTRE}) { /* a driven one; one that is off */
         world w;
         w.until(200);
-        board_swap_sensors(w.mega.raw(), 0, other);
-        w.mega.run_ms(FAULT_MS);
-        const board_view_t seen = w.mega.view();
-        TEST_ASSERT_TRUE(seen.spring[other].fault != SAFETY_FAULT_NONE);
+        TEST_ASSERT_TRUE(loop_swap_sensors(w.loop.get(), 0, other));
+        loop_advance(w.loop.get(), FAULT_S);
+        TEST_ASSERT_TRUE(w.fault(other) != SAFETY_FAULT_NONE);
         /* current where nothing is driven switches all off, before the other is named */
-        TEST_ASSERT_TRUE(seen.spring[0].fault != SAFETY_FAULT_NONE ||
-                         seen.spring[other].fault == SAFETY_FAULT_STUCK_ON);
-        TEST_ASSERT_TRUE(board_duty(w.mega.raw(), 0) == 0.0);
-        TEST_ASSERT_TRUE(board_duty(w.mega.raw(), other) == 0.0);
+        TEST_ASSERT_TRUE(w.fault(0) != SAFETY_FAULT_NONE ||
+                         w.fault(other) == SAFETY_FAULT_STUCK_ON);
+        TEST_ASSERT_FALSE(w.driven(0));
+        TEST_ASSERT_FALSE(w.driven(other));
     }
 }
 
@@ -269,7 +302,7 @@ void sensors_that_are_swapped_switch_their_springs_off_in_two_seconds()
 void a_sensor_that_shows_a_fifth_too_little_overheats_nothing()
 {
     world w;
-    board_scale_sensor(w.mega.raw(), 0, 0.8, 0.8);
+    TEST_ASSERT_TRUE(loop_scale_sensor(w.loop.get(), 0, 0.8, 0.8));
     w.until(300);
 }
 
@@ -277,7 +310,7 @@ void a_sensor_that_shows_a_fifth_too_little_overheats_nothing()
 void a_sensor_within_its_data_sheet_is_no_fault()
 {
     world w;
-    board_scale_sensor(w.mega.raw(), 0, 0.97, 1.03);
+    TEST_ASSERT_TRUE(loop_scale_sensor(w.loop.get(), 0, 0.97, 1.03));
     w.until(FIRST_START_S);
     w.expect_eight_on();
     w.until(400);
@@ -291,7 +324,6 @@ void tearDown() {}
 
 int main()
 {
-    need_elf(elf());
     UNITY_BEGIN();
     RUN_TEST(a_resistance_that_rises_with_temperature_overheats_nothing);
     RUN_TEST(a_resistance_that_falls_where_it_should_rise_is_no_loss_of_phase);

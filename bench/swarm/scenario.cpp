@@ -1,0 +1,292 @@
+#include "scenario.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <istream>
+#include <ostream>
+#include <sstream>
+#include <stdexcept>
+
+#include "random.h"
+
+namespace swarm
+{
+
+namespace
+{
+
+constexpr std::array<const char *, static_cast<std::size_t>(kind::count)> names = {
+    "say",       "bytes",     "open",    "shorted", "closed",  "absent",     "stale",
+    "frozen",    "scaled",    "swapped", "unset",   "sda",     "worn",       "torn",
+    "power",     "brown_out", "button",  "hang",    "crystal", "enable_low", "enable_high",
+    "fan_stops", "interrupt", "flip",    "stress",  "supply",  "ambient"};
+
+class dice
+{
+public:
+    explicit dice(std::uint64_t seed) : state_(random_seeded(seed, 29)) {}
+    double uniform(double low, double high) { return random_uniform(&state_, low, high); }
+    unsigned below(unsigned limit) { return static_cast<unsigned>(random_bits(&state_) % limit); }
+    bool chance(double share) { return uniform(0.0, 1.0) < share; }
+    unsigned spring() { return below(9); }
+
+private:
+    random_t state_;
+};
+
+/* A user: patterns most of all, now and then a setting, a look, something silly. */
+std::string line(dice &d)
+{
+    static const char *const looks[] = {"model", "faults", "version", "learnt", "help", "?", "$$"};
+    static const char *const settings[] = {"$boost_current_a=2.5",
+                                           "$boost_current_a=3.0",
+                                           "$temperature_limit_c=100",
+                                           "$temperature_limit_c=110",
+                                           "$temperature_trip_c=60",
+                                           "$temperature_trip_c=130",
+                                           "$supply_limit_a=8",
+                                           "$supply_limit_a=15",
+                                           "$maximum_on_s=5",
+                                           "$maximum_on_s=0",
+                                           "$host_timeout_s=5",
+                                           "$host_timeout_s=0",
+                                           "$loss_w_per_k=0.0060",
+                                           "$loss_w_per_k=0.0058",
+                                           "$loss_scale_3=1.05",
+                                           "$fault_bad_samples=3",
+                                           "$fault_bad_samples=5",
+                                           "$nonsense=1",
+                                           "$supply_v=99",
+                                           "$cut_off=1",
+                                           "$defaults",
+                                           "$heat_capacity_scale_9=0.9"};
+    static const char *const silly[] = {"on 10", "on 0 50", "pattern 12", "fan 101",  "on all 200",
+                                        "",      "ambient", "selftest x", "clear now"};
+    const double what = d.uniform(0.0, 1.0);
+    if (what < 0.30) {
+        std::string pattern = "pattern ";
+        for (unsigned k = 0; k < 9; ++k) {
+            pattern += d.chance(0.6) ? '1' : '0';
+        }
+        return pattern;
+    }
+    const std::string spring = std::to_string(d.spring() + 1);
+    if (what < 0.42) {
+        return "on " + spring + (d.chance(0.5) ? "" : " " + std::to_string(d.below(101)));
+    }
+    if (what < 0.50) {
+        return d.chance(0.2) ? "off all" : "off " + spring;
+    }
+    if (what < 0.56) {
+        return d.chance(0.5) ? "policy open" : "policy precompensate";
+    }
+    if (what < 0.66) {
+        return settings[d.below(sizeof settings / sizeof settings[0])];
+    }
+    if (what < 0.71) {
+        return "$save";
+    }
+    if (what < 0.84) {
+        static const char *const again[] = {"clear", "unlock",     "supply on",
+                                            "clear", "supply off", "learnt clear"};
+        return again[d.below(6)];
+    }
+    if (what < 0.88) {
+        return "telemetry " + std::string(d.chance(0.5) ? "csv " : "teleplot ") +
+               std::to_string(1 + d.below(50));
+    }
+    if (what < 0.90) {
+        return "telemetry off";
+    }
+    if (what < 0.92) {
+        return "fan " + std::to_string(d.below(101));
+    }
+    if (what < 0.93) {
+        return "selftest";
+    }
+    return what < 0.97 ? looks[d.below(7)] : silly[d.below(9)];
+}
+
+std::string hex(dice &d, unsigned count)
+{
+    static const char digits[] = "0123456789abcdef";
+    std::string text;
+    for (unsigned k = 0; k < 2 * count; ++k) {
+        text += digits[d.below(16)];
+    }
+    return text;
+}
+
+/* What lasts ends again, sooner or later, in three of four cases. */
+void last(dice &d, scenario &s, const event &one)
+{
+    s.events.push_back(one);
+    if (d.chance(0.75)) {
+        event end = one;
+        end.at_s += std::exp(d.uniform(std::log(0.02), std::log(20.0)));
+        end.on = false;
+        s.events.push_back(end);
+    }
+}
+
+void fault(dice &d, scenario &s)
+{
+    const auto what = static_cast<kind>(1 + d.below(static_cast<unsigned>(kind::count) - 1));
+    event one{d.uniform(2.0, s.duration_s), what, d.spring(), true, 0.0, ""};
+    switch (what) {
+    case kind::bytes:
+        one.text = hex(d, 1 + d.below(300));
+        s.events.push_back(one);
+        break;
+    case kind::frozen:
+        one.value = d.below(3);
+        last(d, s, one);
+        break;
+    case kind::scaled:
+        one.value = d.uniform(0.3, 2.0);
+        s.events.push_back(one);
+        break;
+    case kind::swapped:
+        one.value = (one.channel + 1 + d.below(8)) % 9;
+        s.events.push_back(one);
+        break;
+    case kind::torn:
+        one.value = d.below(3072);
+        s.events.push_back(one);
+        break;
+    case kind::power:
+    case kind::crystal: {
+        one.value = std::exp(d.uniform(std::log(20.0), std::log(5000.0)));
+        s.events.push_back(one);
+        if (what == kind::crystal) { /* only the power ends it */
+            one.what = kind::power;
+            one.at_s += d.uniform(0.5, 2.0);
+            s.events.push_back(one);
+        }
+        break;
+    }
+    case kind::interrupt:
+        one.value = 1 + d.below(56);
+        s.events.push_back(one);
+        break;
+    case kind::flip:
+        one.value = d.chance(0.5) ? 0x20 + d.below(0x1E0) : 0x200 + d.below(0x2000);
+        one.channel = d.below(8);
+        s.events.push_back(one);
+        break;
+    case kind::stress:
+        one.value = d.uniform(0.0, 70.0);
+        s.events.push_back(one);
+        break;
+    case kind::supply:
+        one.value = d.uniform(3.0, 5.5);
+        s.events.push_back(one);
+        one.at_s += d.uniform(0.1, 10.0);
+        one.value = 5.0;
+        s.events.push_back(one);
+        break;
+    case kind::ambient:
+        one.value = s.ambient_c + d.uniform(-3.0, 3.0);
+        s.events.push_back(one);
+        break;
+    case kind::unset:
+    case kind::brown_out:
+    case kind::button:
+    case kind::hang:
+        s.events.push_back(one);
+        break;
+    default:
+        last(d, s, one);
+        break;
+    }
+}
+
+} // namespace
+
+const char *name_of(kind what)
+{
+    return names[static_cast<std::size_t>(what)];
+}
+
+scenario draw(std::uint64_t seed)
+{
+    dice d(seed);
+    scenario s;
+    s.seed = seed;
+    s.duration_s = std::round(d.uniform(15.0, 90.0));
+    s.tolerance = d.uniform(0.0, 0.1);
+    s.ambient_c = 20.0;
+    s.events.push_back({0.6, kind::say, 0, true, 0.0, "model cold"});
+    s.events.push_back({0.7, kind::say, 0, true, 0.0, "pattern 111101111"});
+    double at_s = 1.0;
+    while (at_s < s.duration_s) {
+        at_s += d.chance(0.1) ? d.uniform(5.0, 20.0) /* he stalls */ : d.uniform(0.1, 4.0);
+        if (d.chance(0.04)) {
+            s.events.push_back({at_s, kind::bytes, 0, true, 0.0, d.chance(0.5) ? "21" : "2121"});
+        } else {
+            s.events.push_back({at_s, kind::say, 0, true, 0.0, line(d)});
+        }
+    }
+    for (unsigned n = 1 + d.below(3); n > 0; --n) {
+        fault(d, s);
+    }
+    std::stable_sort(s.events.begin(), s.events.end(),
+                     [](const event &a, const event &b) { return a.at_s < b.at_s; });
+    return s;
+}
+
+void write(std::ostream &out, const scenario &one)
+{
+    out.precision(17);
+    out << "# swarm: replay with bench_swarm --replay FILE\n";
+    out << "seed " << one.seed << "\nduration_s " << one.duration_s << "\ntolerance "
+        << one.tolerance << "\nambient_c " << one.ambient_c << '\n';
+    for (const event &e : one.events) {
+        out << e.at_s << ' ' << name_of(e.what) << ' ' << e.channel << ' ' << (e.on ? 1 : 0) << ' '
+            << e.value << (e.text.empty() ? "" : " ") << e.text << '\n';
+    }
+}
+
+scenario read(std::istream &in)
+{
+    scenario s;
+    std::string line_text;
+    for (unsigned number = 1; std::getline(in, line_text); ++number) {
+        if (line_text.empty() || line_text[0] == '#') {
+            continue;
+        }
+        std::istringstream words(line_text);
+        std::string first, second;
+        words >> first;
+        bool good = true;
+        if (first == "seed") {
+            good = static_cast<bool>(words >> s.seed);
+        } else if (first == "duration_s") {
+            good = static_cast<bool>(words >> s.duration_s);
+        } else if (first == "tolerance") {
+            good = static_cast<bool>(words >> s.tolerance);
+        } else if (first == "ambient_c") {
+            good = static_cast<bool>(words >> s.ambient_c);
+        } else {
+            event e{};
+            std::istringstream again(line_text);
+            unsigned on = 0;
+            good = static_cast<bool>(again >> e.at_s >> second >> e.channel >> on >> e.value);
+            e.on = on != 0;
+            const auto found = std::find(names.begin(), names.end(), second);
+            good = good && found != names.end() && e.channel < 9;
+            e.what = static_cast<kind>(found - names.begin());
+            again.get(); /* the blank */
+            std::getline(again, e.text);
+            s.events.push_back(e);
+        }
+        if (!good) {
+            throw std::runtime_error("line " + std::to_string(number) + ": not an event: '" +
+                                     line_text + "'; write TIME_S KIND CHANNEL ON VALUE [TEXT]");
+        }
+    }
+    return s;
+}
+
+} // namespace swarm

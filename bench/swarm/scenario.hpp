@@ -1,0 +1,74 @@
+/* What it is for: one life of a board: an array, a user, and what goes wrong, as events in time.
+ * What it owns: how they are drawn from a seed, and their text: what a failing seed leaves behind.
+ * What it never does: run anything, or judge. */
+#ifndef SWARM_SCENARIO_HPP
+#define SWARM_SCENARIO_HPP
+
+#include <cstdint>
+#include <iosfwd>
+#include <string>
+#include <vector>
+
+namespace swarm
+{
+
+/* Names are those of the text. on: begins or ends what lasts. */
+enum class kind {
+    say,         /* text: a line; sent when the one before has been answered */
+    bytes,       /* text: octets in hex, sent at once, whatever they are */
+    open,        /* channel, on: a spring is broken */
+    shorted,     /* channel, on: its ends are connected */
+    closed,      /* channel, on: its switch has failed closed */
+    absent,      /* channel, on: a sensor does not acknowledge */
+    stale,       /* channel, on: it converts no more and says so */
+    frozen,      /* channel, on: it shows the same for ever; value 1, 2: one register alone */
+    scaled,      /* channel, value: it shows so many times the current; 1 ends it */
+    swapped,     /* channel, value: it and another change their places */
+    unset,       /* channel: it loses its configuration */
+    sda,         /* on: the bus hangs */
+    worn,        /* on: the EEPROM keeps nothing */
+    torn,        /* value: a byte of the EEPROM is another one */
+    power,       /* value ms without power, to the cycle */
+    brown_out,   /* a reset */
+    button,      /* a reset, as by a serial port that is opened */
+    hang,        /* the program stays where it is until the watchdog bites */
+    crystal,     /* stands still; a power cut ends it */
+    enable_low,  /* on: the cut-off's pin is shorted to ground */
+    enable_high, /* on: to 5 V */
+    fan_stops,   /* on */
+    interrupt,   /* value: a vector that nobody asked for */
+    flip,        /* value: a register or a byte of RAM; channel: which bit */
+    stress,      /* channel, value MPa: a finger */
+    supply,      /* value V: sags and comes back */
+    ambient,     /* value degC: the room */
+    count
+};
+
+const char *name_of(kind what);
+
+struct event {
+    double at_s;
+    kind what;
+    unsigned channel = 0;
+    bool on = true;
+    double value = 0.0;
+    std::string text;
+};
+
+struct scenario {
+    std::uint64_t seed = 0;
+    double duration_s = 0.0;
+    double tolerance = 0.0; /* of the array */
+    double ambient_c = 20.0;
+    std::vector<event> events; /* by time */
+};
+
+/* Everything at once from one seed: an array, a user, one to three faults. */
+scenario draw(std::uint64_t seed);
+/* A line an event; read(write(s)) is s. read fails (std::runtime_error, which names the line) where
+ * a line is none. */
+void write(std::ostream &out, const scenario &one);
+scenario read(std::istream &in);
+
+} // namespace swarm
+#endif

@@ -1,0 +1,386 @@
+"""`ninespring calibrate`: the whole way on the simulated board, gone on with after interrupts; what it refuses; what it takes back."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import click
+import pytest
+from click.testing import CliRunner
+from fake_board import FakeBoard
+from ninespring.board import Board
+from ninespring.calibration import chain, judged
+from ninespring.calibration.chain import Calibration
+from ninespring.calibration.command import FROM
+from ninespring.calibration.cut import left_of
+from ninespring.calibration.progress import Progress
+from ninespring.cli import cli
+from ninespring.errors import InputError, WorkError
+from ninespring.export.drive import Drive
+from ninespring.models import Array
+from ninespring.recording import Fault, Recording, Step
+
+ROOT = Path(__file__).resolve().parents[2]
+SIM = Path(os.environ.get("NINESPRING_SIM", ROOT / "build" / "host" / "ninespring-sim"))
+ELF = Path(os.environ.get("NINESPRING_AVR_DIR", ROOT / "build" / "avr")) / "firmware.elf"
+HAD = {"rows": "3", "columns": "3", "loss_w_per_k": "0.005800", "policy": "1", "open_current_a": "1.500"}
+FOUND = {"loss_w_per_k": "0.006100"}
+
+
+def calibrate(*words: object, timeout: float = 900) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "ninespring", "calibrate", *map(str, words)]
+    return subprocess.run(
+        command, capture_output=True, text=True, timeout=timeout, check=False, stdin=subprocess.DEVNULL
+    )
+
+
+def refused(*words: object) -> str:
+    """Return what is said of arguments that are wrong."""
+    error = CliRunner().invoke(cli, ["calibrate", *map(str, words)], standalone_mode=False).exception
+    assert isinstance(error, InputError | click.UsageError)
+    return error.format_message() if isinstance(error, click.UsageError) else str(error)
+
+
+@pytest.fixture
+def ports() -> Iterator[tuple[str, str]]:
+    """Yield the ports of a simulated board, whose array loses more at its edge than its chip knows, and of its thermometers."""
+    words = [SIM, "board", "--elf", ELF, "--speed", "max", "--thermometers", "pty"]
+    words += ["--set", "plant.effects=latent_heat,resistance_phase,edge_loss", "--set", "plant.edge_loss_fraction=0.25"]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        yield process.stdout.readline().strip(), process.stdout.readline().strip()
+        process.send_signal(signal.SIGINT)
+
+
+def rows_in(folder: Path, name: str) -> int:
+    """Return how many rows a log that grows has."""
+    parts = [*folder.glob(f"{name}.csv.part"), *folder.glob(f"{name}.csv")]
+    return sum(line[:1].isdigit() for line in parts[0].read_text().splitlines()) if parts else 0
+
+
+def interrupted(folder: Path, name: str, rows: int, how: signal.Signals, *words: object) -> tuple[int, str]:
+    """Begin a calibration, and end it by a signal once a log has so many rows; return how it ended and what it said."""
+    command = [sys.executable, "-m", "ninespring", "calibrate", *map(str, words)]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, stdin=subprocess.DEVNULL) as process:
+        until = time.monotonic() + 600
+        while rows_in(folder, name) < rows:
+            assert process.poll() is None and time.monotonic() < until
+            time.sleep(0.1)
+        process.send_signal(how)
+        said = process.communicate(timeout=120)[1]
+    return process.returncode, said
+
+
+@pytest.mark.skipif(not SIM.exists(), reason=f"SKIPPED: {SIM} is not there: build it, or set NINESPRING_SIM")
+@pytest.mark.skipif(not ELF.exists(), reason=f"SKIPPED: {ELF} is not there: build the avr target first")
+def test_a_board_learns_its_array_in_one_command_that_is_stopped_and_killed_on_the_way(
+    ports: tuple[str, str], tmp_path: Path
+) -> None:
+    board, thermometers = ports
+    folder = tmp_path / "calibration"
+    words = ("--port", board, "--thermometers", thermometers, "-o", folder, "--yes")
+    short = ("--duration", 400, "--drive-for", 200)
+
+    code, said = interrupted(folder, "run1", 150, signal.SIGTERM, *words, *short)
+    assert code == 1
+    assert "the same command goes on" in said
+    with Board(board) as connection:
+        had = connection.settings()
+        assert "off" in connection.status()
+    # killed so that it can do nothing more: the board switches its springs off by itself, the log stays
+    code, _ = interrupted(folder, "run1-2", 130, signal.SIGKILL, *words)
+    assert code == -signal.SIGKILL
+
+    done = calibrate(*words, "--json", tmp_path / "result.json")
+    assert done.returncode == 0, done.stderr
+    found = json.loads((tmp_path / "result.json").read_text())["done"]
+    pieces = found["run1"]["pieces"]
+    assert [one["log"] for one in pieces][:2] == ["run1.csv", "run1-2.csv"]
+    assert pieces[1]["from_s"] == pytest.approx(pieces[0]["to_s"])
+    assert pieces[0]["used"]
+    assert pieces[0]["to_s"] > 140
+    assert any("edge_loss" in name for name, _ in found["diagnose"]["findings"])
+    assert found["verify"]["after"]["rmse_c"] < 0.5 * found["verify"]["before"]["rmse_c"]
+    assert found["after"]["saved"]
+    assert found["after"]["drives"][-1]["error_c"] < 0.5 * found["before"]["error_c"]
+    with Board(board) as connection:
+        now = connection.settings()
+    assert {name: float(now[name]) for name in found["export"]["settings"]} == {
+        name: float(value) for name, value in found["export"]["settings"].items()
+    }
+    # what only recording needs is as it was, and what it had can be had again
+    assert [now[name] for name in chain.OWN] == [had[name] for name in chain.OWN]
+    assert f"$loss_scale_1={had['loss_scale_1']}" in (folder / "settings-before.txt").read_text()
+    page = (folder / "report.html").read_text()
+    assert "The new settings are on the board" in page
+    assert page.count("<svg") == 1
+
+    # done: nothing is heated again
+    before = time.monotonic()
+    again = calibrate(*words)
+    assert again.returncode == 0, again.stderr
+    assert "saved" in again.stdout
+    assert time.monotonic() - before < 60
+    assert sorted(path.name for path in folder.glob("*.csv")) == sorted(
+        {name for step in found.values() for name in step["files"] if name.endswith(".csv")}
+    )
+
+
+# ---- what is refused before anything is done
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        ((), "give --port, or --simulate"),
+        (("--port", "/dev/x", "--simulate"), "give --port, or --simulate"),
+        (("--port", "/dev/x"), "--thermometers is missing"),
+        (("--port", "/dev/x", "--thermometers", "/dev/x"), "a logger has its own"),
+        (("--simulate", "--thermometers", "/dev/x"), "goes with --port"),
+        (("--simulate",), "give --yes"),
+        (("--simulate", "--yes", "--duration", "10"), "300<=x"),
+        (("--simulate", "--yes", "--pattern", "111"), "pattern has 3 digits for 9 springs"),
+    ],
+)
+def test_what_cannot_be_done_is_said_before_anything_is(words: tuple[str, ...], says: str, tmp_path: Path) -> None:
+    assert says in refused(*words, "-o", tmp_path / "c")
+    assert not (tmp_path / "c").exists()
+
+
+def test_a_folder_with_something_else_in_it_is_left_alone(tmp_path: Path) -> None:
+    (tmp_path / "mine.txt").write_text("mine")
+    assert "no calibration was begun in it" in refused("--simulate", "--yes", "-o", tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
+
+
+def test_a_calibration_goes_on_as_it_was_begun_and_with_its_own_files(tmp_path: Path) -> None:
+    options = FROM | {"simulate": False, "pattern": "111101111"}
+    begun = Progress(tmp_path, options)
+    (tmp_path / "run1.csv").write_text("time_s\n")
+    begun.keep("run1", {"pieces": [], "complete": True}, "run1.csv")
+    assert Progress(tmp_path, {"duration": 900.0, "supply": None}).done["run1"]["complete"]
+    with pytest.raises(InputError, match=r"--duration was 900\.0"):
+        Progress(tmp_path, {"duration": 600.0})
+    (tmp_path / "run1.csv").write_text("time_s\n1\n")
+    with pytest.raises(InputError, match=r"run1\.csv: is another one than was written here"):
+        Progress(tmp_path, {})
+    (tmp_path / "run1.csv").unlink()
+    with pytest.raises(InputError, match="is gone"):
+        Progress(tmp_path, {})
+    (tmp_path / "calibration.json").write_text('{"schema": "ninespring.calibrate/1"}')
+    with pytest.raises(InputError, match="is no progress"):
+        Progress(tmp_path, {})
+
+
+# ---- the board
+
+
+class Told:
+    """What a calibration asked and told, and a board that it was about."""
+
+    def __init__(self, folder: Path, answers: dict[str, list[str]] | None = None, yes: bool = True) -> None:
+        self.fake = FakeBoard(answers)
+        self.fake.settings = dict(HAD)
+        self.asked: list[str] = []
+        self.said: list[str] = []
+        self.yes = yes
+        self.progress = Progress(folder, FROM | {"simulate": False, "pattern": "111101111"})
+        self.board = Board(self.fake.port, off_at_end=False)
+        self.chain = Calibration(self.progress, Array(), self.board, "/dev/none", self._ask, self._tell)
+
+    def _ask(self, text: str) -> bool:
+        self.asked.append(text)
+        return self.yes
+
+    def _tell(self, step: str, text: str) -> None:
+        self.said.append(text)
+
+    def run(self) -> str:
+        """Run it; return what it ended with."""
+        try:
+            self.chain.run()
+        except WorkError as error:
+            return str(error)
+        finally:
+            self.board.close()
+        return ""
+
+
+def test_a_board_with_a_fault_is_not_heated(tmp_path: Path) -> None:
+    told = Told(tmp_path, {"faults": ["spring 3: fault 4 open", "ok"]})
+    assert "spring 3: fault 4 open" in told.run()
+    assert not told.asked
+
+
+def test_a_board_of_another_shape_is_refused(tmp_path: Path) -> None:
+    told = Told(tmp_path)
+    told.fake.settings["columns"] = "2"
+    with pytest.raises(InputError, match="drives 3 x 2 springs, the array is 3 x 3"):
+        told.run()
+
+
+def test_whoever_says_no_has_nothing_heated_and_is_asked_again(tmp_path: Path) -> None:
+    told = Told(tmp_path, yes=False)
+    assert "before anything was heated" in told.run()
+    assert "with at most" in told.asked[0]
+    assert not any(line.startswith(("on ", "pattern", "policy")) for line in told.fake.sent())
+    again = Told(tmp_path, yes=False)
+    assert "before anything was heated" in again.run()
+
+
+def test_settings_that_became_others_meanwhile_are_refused(tmp_path: Path) -> None:
+    Told(tmp_path, yes=False).run()
+    told = Told(tmp_path)
+    told.fake.settings["loss_w_per_k"] = "0.007000"
+    assert "$loss_w_per_k is 0.007000, not 0.005800" in told.run()
+    assert not told.asked
+
+
+def measured(**more: float) -> judged.Judged:
+    numbers = {"held": 0.95, "heating_s": 40.0, "hottest_c": 100.0, "enough_c": 110.0, "undriven": 0.0, "done": 0.9}
+    error = more.pop("error_c", 2.0)
+    return judged.Judged(Drive(**numbers | more), error, 1, error)
+
+
+def until_export(
+    folder: Path, drives: list[judged.Judged], monkeypatch: pytest.MonkeyPatch, fault: bool = False
+) -> Told:
+    """Return a calibration of which only the drives and the upload are left, whose drives do this."""
+    told = Told(folder)
+    keep = told.progress.keep
+    told.progress.board(["ninespring 9.9.9"], HAD)
+    keep("plan", {"most_a": 1.0, "hottest_c": 50.0})
+    for name in ("run1", "run2"):
+        keep(name, {"pieces": [], "complete": True})
+    keep("diagnose", {"doubts": [], "noise_c": 0.3, "verdict": "", "findings": [], "experiments": []})
+    keep("verify", {"before": {"rmse_c": 2.0}, "after": {"rmse_c": 0.5}})
+    keep("export", {"settings": FOUND, "kept": {}, "worse": []})
+    faults = [Fault(1.0, 2, 4, "open")] if fault else []
+
+    def drive(self: Calibration, name: str, pattern: str) -> tuple[str, Recording]:
+        log = self.free(name)
+        (folder / log).write_text(self.board.settings()["loss_w_per_k"])
+        return log, Recording(faults=faults if name == "after" else [])
+
+    found = iter(drives)
+    monkeypatch.setattr(Calibration, "_drive", drive)
+    monkeypatch.setattr(Calibration, "model", lambda self: None)
+    monkeypatch.setattr(judged, "judge", lambda model, log, pattern: next(found))
+    return told
+
+
+def test_settings_with_which_the_board_drives_no_worse_are_saved(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told = until_export(tmp_path, [measured(), measured(error_c=0.5)], monkeypatch)
+    assert told.run() == ""
+    assert told.fake.settings == HAD | FOUND
+    assert "$save" in told.fake.sent()
+    assert ((tmp_path / "before.csv").read_text(), (tmp_path / "after.csv").read_text()) == ("0.005800", "0.006100")
+
+
+@pytest.mark.parametrize(
+    ("after", "says"),
+    [
+        ({"error_c": 2.4}, "was 2.00 K wrong (rms), and is 2.40 K"),
+        ({"held": 0.9, "error_c": 0.5}, "hold 95% austenite as the chip is now, 90% with the new"),
+        ({"hottest_c": 118.0, "error_c": 0.5}, "reaches 100 degC as the chip is now, 118"),
+        ({"undriven": 0.2, "error_c": 0.5}, "springs that are off reach"),
+    ],
+)
+def test_settings_with_which_the_board_drives_worse_are_taken_back(
+    after: dict[str, float], says: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told = until_export(tmp_path, [measured(), measured(**after), measured(**after)], monkeypatch)
+    assert says in told.run()
+    assert told.fake.settings == HAD
+    assert "$save" not in told.fake.sent()
+    assert told.progress.data["refused"]
+    # asked again it says the same, and drives nothing
+    told = Told(tmp_path)
+    assert says in told.run()
+    assert not told.asked
+
+
+def test_a_fault_with_the_new_settings_is_worse(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    told = until_export(tmp_path, [measured(), measured(error_c=0.5)], monkeypatch, fault=True)
+    assert "spring 2: fault 4 open" in told.run()
+    assert told.fake.settings == HAD
+
+
+def test_a_first_drive_that_finds_where_the_springs_transform_is_not_the_last_word(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told = until_export(tmp_path, [measured(), measured(held=0.85), measured(error_c=0.5)], monkeypatch)
+    assert told.run() == ""
+    assert "$save" in told.fake.sent()
+
+
+def test_a_stop_between_upload_and_save_gives_the_board_its_own_settings(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told = until_export(tmp_path, [measured()], monkeypatch)
+    drive = Calibration._drive
+
+    def stopped(self: Calibration, name: str, pattern: str) -> tuple[str, Recording]:
+        if name == "after":
+            raise KeyboardInterrupt
+        return drive(self, name, pattern)
+
+    monkeypatch.setattr(Calibration, "_drive", stopped)
+    with pytest.raises(KeyboardInterrupt):
+        told.run()
+    assert told.fake.settings == HAD
+    assert "before" in told.progress.done
+    assert "after" not in told.progress.done
+
+
+def test_a_model_that_is_more_wrong_or_drives_worse_never_gets_to_the_board(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for number, (step, found) in enumerate(
+        (
+            ("verify", {"before": {"rmse_c": 0.5}, "after": {"rmse_c": 0.6}}),
+            ("export", {"settings": FOUND, "kept": {}, "worse": ["springs hold less"]}),
+            ("diagnose", {"doubts": ["columns 1 and 2 are swapped"], "noise_c": 0.3}),
+        )
+    ):
+        folder = tmp_path / str(number)
+        folder.mkdir()
+        told = until_export(folder, [], monkeypatch)
+        told.progress.keep(step, found)
+        assert "nothing is saved on the board" in told.run()
+        assert not told.asked
+        assert not any(line.startswith("$loss") for line in told.fake.sent())
+
+
+# ---- a plan that is gone on with
+
+
+def test_what_is_left_of_a_plan_begins_with_what_was_on() -> None:
+    steps = [
+        Step("policy open"),
+        Step("fan 0"),
+        Step("on 1 100", 10.0),
+        Step("on 2 75", 20.0),
+        Step("fan 100", 30.0),
+        Step("off 1", 40.0),
+        Step("on 3 50", 60.0),
+        Step("off all", 90.0),
+    ]
+    assert left_of(steps, 0.0, 9) == steps
+    assert left_of(steps, 50.0, 9) == [
+        Step("policy open"),
+        Step("fan 0"),
+        Step("fan 100", 1.0),
+        Step("on 2 75", 1.0),
+        Step("on 3 50", 11.0),
+        Step("off all", 41.0),
+    ]

@@ -1,0 +1,125 @@
+"""A board's settings: kept before an upload, taken back, as a file that diffs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+import ninespring as ns
+import pytest
+from click.testing import CliRunner
+from fake_board import FakeBoard
+from ninespring import history
+from ninespring.cli import cli
+
+HAD = {"rows": "3", "loss_w_per_k": "0.005800", "loss_scale_1": "1.000", "ambient_c": "21.00"}
+
+
+@pytest.fixture(autouse=True)
+def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Keep what is kept in a folder of the test's own."""
+    monkeypatch.setenv(history.HOME, str(tmp_path / "home"))
+    return tmp_path / "home"
+
+
+@pytest.fixture
+def fake() -> FakeBoard:
+    board = FakeBoard()
+    board.settings = dict(HAD)
+    return board
+
+
+def ninespring(*words: object) -> tuple[int, str]:
+    """Return how a command ended and what it said."""
+    done = CliRunner().invoke(cli, list(map(str, words)), standalone_mode=False)
+    if isinstance(done.exception, click.exceptions.Exit):
+        return done.exception.exit_code, done.output
+    if done.exception is None:
+        return int(done.return_value or 0), done.output
+    assert isinstance(done.exception, ns.WorkError | ns.InputError), done.exception
+    return 1 if isinstance(done.exception, ns.WorkError) else 2, str(done.exception)
+
+
+def upload(fake: FakeBoard, tmp_path: Path, *lines: str) -> None:
+    (tmp_path / "s.txt").write_text("".join(f"{line}\n" for line in lines))
+    assert ninespring("upload", "--port", fake.port, tmp_path / "s.txt")[0] == 0
+
+
+def test_an_upload_is_taken_back_and_the_one_before_it_next(fake: FakeBoard, tmp_path: Path) -> None:
+    upload(fake, tmp_path, "$loss_w_per_k=0.006000", "$loss_scale_1=1.100")
+    upload(fake, tmp_path, "$loss_w_per_k=0.007000")
+    fake.settings["ambient_c"] = "25.00"  # set by hand since: none of the upload's
+    said = ninespring("settings", "history", "--port", fake.port)[1]
+    assert "upload s.txt: 2 sent, 2 changed" in said
+    assert "$loss_w_per_k: 0.006000 -> 0.007000" in said
+    code, said = ninespring("upload", "--port", fake.port, "--undo")
+    assert (code, "$loss_w_per_k: 0.007000 -> 0.006000" in said) == (0, True)
+    assert fake.settings == HAD | {"loss_w_per_k": "0.006000", "loss_scale_1": "1.100", "ambient_c": "25.00"}
+    assert fake.sent().count("$save") == 3
+    assert ns.undo_upload(fake.port) == ["$loss_w_per_k: 0.005800 -> 0.006000", "$loss_scale_1: 1.000 -> 1.100"]
+    assert fake.settings == HAD | {"ambient_c": "25.00"}
+    code, said = ninespring("upload", "--port", fake.port, "--undo")
+    assert (code, "no upload to this board is kept" in said) == (1, True)
+
+
+def test_what_the_board_has_otherwise_than_sent_is_not_taken_back(fake: FakeBoard, tmp_path: Path) -> None:
+    upload(fake, tmp_path, "$loss_w_per_k=0.006000")
+    fake.settings["loss_w_per_k"] = "0.009000"
+    code, said = ninespring("upload", "--port", fake.port, "--undo")
+    assert code == 1
+    assert "loss_w_per_k is 0.009000, not 0.006000" in said
+    assert fake.settings["loss_w_per_k"] == "0.009000"
+
+
+def test_what_a_board_had_is_a_file_that_upload_takes(fake: FakeBoard, tmp_path: Path, home: Path) -> None:
+    upload(fake, tmp_path, "$loss_w_per_k=0.006000")
+    (kept,) = home.rglob("*.txt")
+    assert ninespring("upload", "--port", fake.port, kept)[0] == 0
+    assert fake.settings == HAD
+
+
+def test_what_is_not_saved_is_not_kept(fake: FakeBoard, tmp_path: Path, home: Path) -> None:
+    (tmp_path / "s.txt").write_text("$loss_w_per_k=0.006000\n")
+    assert ninespring("upload", "--no-save", "--port", fake.port, tmp_path / "s.txt")[0] == 0
+    assert not list(home.rglob("*.txt"))
+
+
+@pytest.mark.parametrize("words", [("--undo", "s.txt"), ()])
+def test_an_upload_is_of_a_file_or_taken_back(words: tuple[str, ...], fake: FakeBoard) -> None:
+    code, said = ninespring("upload", "--port", fake.port, *words)
+    assert (code, "either a file of settings or --undo" in said) == (2, True)
+
+
+def test_settings_as_a_file_that_diffs(fake: FakeBoard, tmp_path: Path) -> None:
+    assert ninespring("settings", "read", "--port", fake.port, "-o", tmp_path / "a.txt")[0] == 0
+    lines = (tmp_path / "a.txt").read_text().splitlines()
+    assert lines[0].startswith("# from /dev/")
+    assert lines[1:] == [
+        "$rows=3",
+        "$loss_w_per_k=0.005800",
+        "$loss_scale_1=1.000",
+        "$ambient_c=21.00  # built in: 20.00",
+    ]
+    assert ninespring("settings", "diff", tmp_path / "a.txt", "--port", fake.port)[0] == 0
+    fake.settings |= {"loss_w_per_k": "0.0070", "cut_off": "1"}
+    code, said = ninespring("settings", "diff", tmp_path / "a.txt", "--port", fake.port)
+    assert code == 1
+    assert said.splitlines() == ["$loss_w_per_k: 0.005800 -> 0.0070", f"1 only in {fake.port}", "1 of 4 differ"]
+    # what was read goes back onto a board, comments and all
+    upload(fake, tmp_path, *lines)
+    assert fake.settings["loss_w_per_k"] == "0.005800"
+    fake.settings["loss_w_per_k"] = "0.007000"
+    _, said = ninespring("settings", "read", "--port", fake.port, "--changed")
+    assert [line for line in said.splitlines() if line[0] == "$"] == [
+        "$loss_w_per_k=0.007000  # built in: 0.005800",
+        "$ambient_c=21.00  # built in: 20.00",
+    ]
+
+
+def test_a_diff_is_of_two(tmp_path: Path) -> None:
+    (tmp_path / "a.txt").write_text("$rows=3\n")
+    assert ninespring("settings", "diff", tmp_path / "a.txt")[0] == 2
+    (tmp_path / "b.txt").write_text("rows 3\n")
+    code, said = ninespring("settings", "diff", tmp_path / "a.txt", tmp_path / "b.txt")
+    assert code == 2
+    assert "b.txt:1:1: 'rows 3' is not a setting" in said

@@ -1,0 +1,163 @@
+"""`ninespring console`: what it completes, what it sends, what it prints; at a terminal and from a pipe."""
+
+from __future__ import annotations
+
+import os
+import pty
+import re
+import select
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from fake_board import FakeBoard, row
+from ninespring.terminal import Known, words_of
+from prompt_toolkit.completion import CompleteEvent
+from prompt_toolkit.document import Document
+
+ROOT = Path(__file__).resolve().parents[2]
+SIM = Path(os.environ.get("NINESPRING_SIM", ROOT / "build" / "host" / "ninespring-sim"))
+ELF = Path(os.environ.get("NINESPRING_AVR_DIR", ROOT / "build" / "avr")) / "firmware.elf"
+HELP = [
+    "help  this list",
+    "on K|all [0..100]  drive a spring or all, at a level in percent",
+    "off K|all",
+    "policy open|precompensate",
+    "model [cold]  what is believed of each spring",
+    "telemetry off|csv|teleplot [1..50]  lines per second",
+    "$$  all settings   $NAME  one   $NAME=VALUE  set it",
+    "!  all springs off at once, at any moment; !! their supply, too",
+]
+SETTINGS = {"rows": "1", "columns": "2", "loss_w_per_k": "0.005800", "loss_scale_1": "1.000"}
+
+
+def completed(text: str) -> dict[str, str]:
+    """Return what a line may become, and what is said beside it."""
+    known = Known(words_of(HELP), SETTINGS)
+    found = known.get_completions(Document(text), CompleteEvent())
+    return {text[: len(text) + one.start_position] + one.text: one.display_meta_text for one in found}
+
+
+@pytest.mark.parametrize(
+    ("text", "becomes"),
+    [
+        ("o", ["on", "off"]),
+        ("on ", ["on all", "on 1", "on 2"]),
+        ("on 1 ", []),
+        ("policy p", ["policy precompensate"]),
+        ("model ", ["model cold"]),
+        ("telemetry c", ["telemetry csv"]),
+        ("nothing ", []),
+        ("$sa", ["$save"]),
+        ("$scale", ["$loss_scale_1"]),
+        ("$loss_w", ["$loss_w_per_k"]),
+        ("$loss_w_per_k=", []),
+    ],
+)
+def test_words_and_settings_are_completed(text: str, becomes: list[str]) -> None:
+    assert list(completed(text)) == becomes
+
+
+def test_help_stands_beside_what_is_typed() -> None:
+    assert completed("$loss_w")["$loss_w_per_k"].startswith(
+        "0.000001 .. 0.065535 W/K, built in 0.005800: one spring to the air"
+    )
+    known = Known(words_of(HELP), SETTINGS)
+    assert known.beside("on 1") == "on K|all [0..100]  drive a spring or all, at a level in percent"
+    assert known.beside("$loss_scale_1=").startswith("$loss_scale_1=1.000  0.001 .. 8.000")
+    assert "! everything off" in known.beside("")
+
+
+def at_a_terminal(port: str, typed: list[str], until: str, seconds: float = 40.0) -> tuple[int, str]:
+    """Type at `ninespring console` in a terminal of its own, each text when the last was answered; return how it ended."""
+    master, slave = pty.openpty()
+    environment = os.environ | {"TERM": "xterm", "COLUMNS": "120", "LINES": "40"}
+    command = [sys.executable, "-m", "ninespring", "console", "--port", port]
+    with subprocess.Popen(command, stdin=slave, stdout=slave, stderr=slave, env=environment) as process:
+        os.close(slave)
+        seen, ends = "", time.monotonic() + seconds
+
+        def read() -> None:
+            nonlocal seen
+            while select.select([master], [], [], 0.3)[0]:
+                try:
+                    came = os.read(master, 4096).decode("utf-8", "replace")
+                except OSError:
+                    return
+                seen += came
+                for _ in range(came.count("\x1b[6n")):  # where the cursor is, a terminal tells
+                    os.write(master, b"\x1b[1;1R")
+
+        while "Tab completes" not in seen and time.monotonic() < ends:
+            read()
+        for text in typed:
+            os.write(master, text.encode())
+            read()
+        while not re.search(until, seen) and time.monotonic() < ends:
+            read()
+        os.write(master, b"\x04")
+        while process.poll() is None and time.monotonic() < ends:
+            read()
+        read()
+        if process.poll() is None:
+            process.kill()
+    os.close(master)
+    return process.returncode, seen
+
+
+def test_what_is_typed_is_completed_sent_and_answered_and_a_stop_acts_as_it_is_pressed() -> None:
+    fake = FakeBoard(
+        {"help": [*HELP, "ok"], "faults": ["spring 2: fault 2 open", "ok"], "model": ["spring 1: cold", "ok"]}
+    )
+    fake.settings = dict(SETTINGS)
+    fake.stream = [row(1.0), row(2.0)]
+    code, seen = at_a_terminal(
+        fake.port, ["mod", "\t", "\r", "on 9!", "\x03", "telemetry csv 1\r", "$loss_w_per_k=0.006\r"], r"2\.0,1\.000"
+    )
+    assert code == 0, seen
+    assert "spring 1: cold" in seen
+    assert "2.0,1.000" in seen  # telemetry comes while nothing is asked
+    sent = fake.sent()
+    assert sent.index("model") < sent.index("!") < sent.index("telemetry csv 1") < sent.index("$loss_w_per_k=0.006")
+    assert not any(line.startswith("on 9") for line in sent)
+    assert not any(line.startswith(("off", "$host_timeout_s")) for line in sent)  # leaving switches nothing off
+    history = Path(os.environ["NINESPRING_HOME"]) / "console-history"
+    assert "+telemetry csv 1" in history.read_text()
+
+
+def piped(port: str, text: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "ninespring", "console", "--port", port]
+    return subprocess.run(command, input=text, capture_output=True, text=True, timeout=60, check=False)
+
+
+def test_lines_from_a_pipe_are_answered_one_after_the_other() -> None:
+    fake = FakeBoard({"faults": ["spring 2: fault 2 open", "ok"], "on 99": ["error:5 out of range", "ok"][:1]})
+    done = piped(fake.port, "faults\n\n?\n")
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.splitlines() == ["spring 2: fault 2 open", "ok", *done.stdout.splitlines()[2:3]]
+    assert done.stdout.splitlines()[2].startswith("<off|")
+    done = piped(fake.port, "on 99\nfaults\n")
+    assert done.returncode == 1
+    assert "refused: error 5" in done.stdout
+    assert "1 of these lines were refused" in done.stderr
+
+
+@pytest.mark.skipif(not SIM.exists(), reason=f"SKIPPED: {SIM} is not there: build it, or set NINESPRING_SIM")
+@pytest.mark.skipif(not ELF.exists(), reason=f"SKIPPED: {ELF} is not there: build the avr target first")
+def test_the_words_of_the_board_itself_are_known() -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "ninespring", "console", "--simulate"],
+        input="help\n",
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    words = words_of(done.stdout.splitlines())
+    assert {"on", "off", "pattern", "model", "supply", "telemetry"} <= set(words)
+    assert words["telemetry"].choices(0, 9) == ["off", "csv", "teleplot"]
+    assert words["on"].choices(0, 2) == ["all", "1", "2"]
+    assert all(one.usage.split()[0] == name for name, one in words.items())
