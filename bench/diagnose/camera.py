@@ -128,7 +128,7 @@ def main() -> int:
     for k in range(options.sets):
         seed = options.first + k
         jobs += [("single", None, seed)] if "single" in options.groups else []
-        jobs += [("pair", OTHERS[k % len(OTHERS)], seed)] if "pair" in options.groups else []
+        jobs += [("pair", OTHERS[seed % len(OTHERS)], seed)] if "pair" in options.groups else []
     kept = Kept(options.cases)
     keys = [f"camera {group} {other} {seed}" for group, other, seed in jobs]
     todo = [(key, job) for key, job in zip(keys, jobs, strict=True) if key not in kept.cases]

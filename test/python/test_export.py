@@ -61,17 +61,11 @@ def test_a_latent_heat_that_the_data_speak_against_is_written_as_what_it_is(make
     assert abs(float(made.written["latent_heat_j"])) < 0.6
 
 
-def test_a_fan_that_cools_in_proportion_is_told_to_the_chip_by_a_log_that_shows_it(make_log) -> None:
-    shown = settings_of(diagnosis.diagnose(Array(), [read_log(make_log(seconds=900, half=True))]).model)
-    assert float(shown.written["fan_half_share"]) == pytest.approx(0.5, abs=0.05)
-    silent = settings_of(diagnosis.diagnose(Array(), [read_log(make_log(seconds=900))]).model)
-    assert "fan_half_share" not in silent.written and "fan_half_share" in silent.kept
-
-
-def test_a_fan_curve_is_written_beside_what_it_bends() -> None:
-    model = Model(Array(), ["fan_curve"])
-    model.parameters, model.stderr = {"fan_half_share": 0.42}, {"fan_half_share": 0.01}
-    assert settings_of(model).written["fan_half_share"] == "0.420"
+def test_a_fan_curve_is_written_where_it_was_found_and_stays_as_it_is_elsewhere() -> None:
+    found = Model(Array(), ["fan_curve"])
+    found.parameters, found.stderr = {"fan_half_share": 0.42}, {"fan_half_share": 0.01}
+    assert settings_of(found).written["fan_half_share"] == "0.420"
+    assert settings_of(Model(Array())).kept["fan_half_share"] == "the diagnosis named no fan_curve"
 
 
 def test_numbers_that_are_known_in_combination_only_are_written_together(make_log) -> None:

@@ -134,10 +134,14 @@ def test_only_what_the_log_could_show_is_a_candidate(make_log, tmp_path: Path) -
         "supply_sag",
         "resistance_phase",
         "resistance_temperature",
-        "contact_resistance",
-    }  # power is logged
+        "contact_resistance",  # power is logged
+        "fan_curve",  # the fan is off or full
+    }
     assert names_of(Problem(Array(), [read_log(make_log("a.csv"))])) == everything
     assert names_of(Problem(Array(), [read_log(make_log("b.csv", change=without_fan))])) == everything - {"fan_wake"}
+    assert names_of(Problem(Array(), [read_log(make_log("f.csv", seconds=700, half=True))])) == everything | {
+        "fan_curve"
+    }
     # 30 K below the declared transformation an alloy may transform all the same, at half the way to it none does
     assert names_of(Problem(Array(), [read_log(make_log("c.csv", change=lukewarm))])) == everything
     assert names_of(Problem(Array(), [read_log(make_log("e.csv", change=cold))])) == everything - {

@@ -26,7 +26,6 @@ static void one_spring_warms_by_its_time_constant(void)
 static void fan_full_and_half_are_the_given_and_the_mean_loss(void)
 {
     parameters.rows = parameters.columns = 1;
-    parameters.fan_half_share_permille = 500; /* in proportion */
     start();
     power_uw[0] = 226000;
     thermal_model_set_fan(&model, 100);
@@ -41,6 +40,7 @@ static void fan_full_and_half_are_the_given_and_the_mean_loss(void)
 static void half_a_fan_cools_by_most_of_it(void)
 {
     parameters.rows = parameters.columns = 1;
+    parameters.fan_half_share_permille = 735;
     start();
     power_uw[0] = 226000;
     thermal_model_set_fan(&model, 50);

@@ -35,8 +35,6 @@ class Candidate:
     """Further effects of the plant that carry it."""
     neutral: float = 0.0
     """The value of its (one) number at which it does nothing."""
-    told_absent: bool = False
-    """Where it is not there, its neutral value is told to the chip, whose own is another."""
     flexible: bool = False
     """Follows anything slow: it must beat a physical cause clearly."""
     alternatives: bool = False

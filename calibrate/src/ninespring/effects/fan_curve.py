@@ -15,7 +15,6 @@ def _candidates(scene: Scene) -> Iterator[Candidate]:
             ({NAME: 0.735},),
             signed=True,
             neutral=0.5,
-            told_absent=True,
         )
 
 

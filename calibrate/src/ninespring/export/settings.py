@@ -19,8 +19,7 @@ from ..fit.simulate import array_parameters, board_settings
 from ..models import Model
 
 TEMPERATURES = ("martensite_finish_c", "martensite_start_c", "austenite_start_c", "austenite_finish_c")
-OF_PHASES = ("latent_heat", "resistance_phase")
-FIRMWARE_EFFECTS = (*OF_PHASES, "fan_curve")
+FIRMWARE_EFFECTS = ("latent_heat", "resistance_phase")
 """What the firmware's defaults carry: what no log determines keeps these."""
 KNOWN = 0.5
 """A number is known, or known not to be there, where what it may be off by is less than this part of it."""
@@ -67,15 +66,14 @@ def determined(model: Model) -> dict[str, str]:
     uncrossed = not_crossed(model)
     for name, value in model.parameters.items():
         known, error = table[name.partition("[")[0]], model.stderr.get(name)
-        firmware = known.effect in FIRMWARE_EFFECTS
-        of_phases = known.effect in OF_PHASES
+        of_phases = known.effect in FIRMWARE_EFFECTS
         if name in model.kept:
             out[name] = model.kept[name]
         elif error is None and known.effect not in model.effects:
             continue
         elif uncrossed and (known.name in TEMPERATURES or (of_phases and known.effect in model.effects)):
             out[name] = uncrossed
-        elif known.effect is None or (known.effect in model.effects and not firmware):
+        elif known.effect is None or (known.effect in model.effects and not of_phases):
             out[name] = ""
         elif error is not None:
             size = max(abs(known.default), abs(value) if known.effect in model.effects else 0.0)

@@ -122,7 +122,7 @@ class Search:
         return screen
 
     def absent(self, fit: Fit) -> dict[str, tuple[float, float]]:
-        """Return what the data say of the one number of effects that are not in the fit and do nothing at its neutral value.
+        """Return what the data say of the one number of effects that are not in the fit and would do nothing at zero.
 
         (value, standard error), for effects with no more than one variant: a chip that has another value is wrong.
         """
@@ -130,14 +130,12 @@ class Search:
         spread = math.sqrt(max(1.0, fit_factor(self.problem, fit) * fit.chi2 / fit.count))
         out = {}
         for k, one in enumerate(screen.candidates):
-            if one.variant or len(one.free) != 1 or one.free[0].log or one.effect not in effects.ON_CHIP:
-                continue
-            if one.neutral and not one.told_absent:
+            if one.variant or len(one.free) != 1 or one.free[0].log or one.neutral or one.effect not in effects.ON_CHIP:
                 continue
             free, column = one.free[0], int(np.flatnonzero(screen.owner == k)[0])
             if (size := float(screen.gram[column, column])) > 0:
-                unit = one.probes[0][free.key] - one.neutral
-                value = one.neutral + unit * float(screen.moment[column]) / size
+                unit = one.probes[0][free.key]
+                value = unit * float(screen.moment[column]) / size
                 out[free.key] = (min(free.high, max(free.low, value)), abs(unit) * spread / math.sqrt(size))
         return out
 
