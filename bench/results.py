@@ -86,6 +86,12 @@ SECTIONS: tuple[Section, ...] = (
         "Hours of log",
         f"{PYTHON} bench/diagnose/hours.py --cases 10 --first 320000 --resume build/results/hours.json",
     ),
+    Section(
+        "camera",
+        "A camera's blur",
+        f"{PYTHON} bench/diagnose/camera.py --sets 30 --cases build/results/camera.json",
+        markdown=True,
+    ),
     Section("closed_forms", "The field against closed forms", f"{PYTHON} bench/explore/closed_forms.py"),
     Section(
         "explore_paper", "The paper's temperatures from geometry", f"{PYTHON} bench/explore/paper.py --mesh coarse"

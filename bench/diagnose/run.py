@@ -100,8 +100,12 @@ def alloy_error(case: Case, model: Any) -> list[float]:
 
 def run_case(job: tuple[str, tuple[str, ...], int]) -> dict[str, Any]:
     """Make one case, diagnose it, compare."""
-    group, truth, seed = job
-    case = make_case(group, truth, seed)
+    return judge(make_case(*job))
+
+
+def judge(case: Case) -> dict[str, Any]:
+    """Diagnose a case, compare."""
+    group, truth, seed = case.group, case.truth, case.seed
     with tempfile.TemporaryDirectory() as folder:
         train, held, _ = write_logs(case, Path(folder))
         runs = [read_log(path, 9) for path in train]

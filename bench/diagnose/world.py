@@ -61,6 +61,8 @@ class World:
     command_power: float = 0.9
     effects: dict[str, dict[str, float]] = field(default_factory=dict)
     """Effects that act (library or outside), each with its numbers."""
+    camera: np.ndarray | None = None
+    """What a camera shows of each spring: (9, 9) weights of the springs, the rest is the room's (camera.py)."""
 
 
 @dataclass
@@ -255,6 +257,11 @@ def simulate(world: World, runs: list[Inputs]) -> dict[str, np.ndarray]:
             phase = np.clip(phase, 0.0, 1.0)
 
     shown_t = out["temperature"]
+    if world.camera is not None:
+        room = ambient[:, :, None]
+        if drift:
+            room = room + (drift["kelvin"] * np.sin(0.5 * np.pi * time_s / drift["period_s"]))[:, None]
+        shown_t = room + (shown_t - room) @ world.camera.T
     if e := effect.get("optical_mixing"):
         shown_t = shown_t + e["fraction"] * (shown_t @ orthogonal.T - shown_t * orthogonal.sum(axis=1))
     if e := effect.get("sensor_lag"):

@@ -158,11 +158,20 @@ static uint16_t between(uint16_t natural, uint16_t forced, uint16_t fan)
     return (uint16_t)(natural + ((difference + 8192) >> 14));
 }
 
+/* What the fan adds at a command, of what it adds at full, Q2.14: f h / (f h + (1 - f)(1 - h)), h
+ * its part at half. Steep at first where h > 1/2, never falling, 0 at 0 and 1 at full, whatever h.
+ * One division, on a change of the fan. 100 x 999 x 2^14 is below 2^31. */
+static uint16_t fan_part(uint8_t percent, uint16_t half_permille)
+{
+    const uint32_t there = (uint32_t)percent * half_permille;
+    const uint32_t rest = (uint32_t)(100u - percent) * (1000u - (uint32_t)half_permille);
+    return (uint16_t)(((there << 14) + (there + rest) / 2u) / (there + rest));
+}
+
 void thermal_model_apply_fan(thermal_model_t *model)
 {
     const thermal_model_parameters_t *p = &model->parameters;
-    const uint16_t fan =
-        (uint16_t)(((uint32_t)model->fan_percent * 41943u + 128u) >> 8); /* Q2.14 */
+    const uint16_t fan = fan_part(model->fan_percent, p->fan_half_share_permille);
     model->orthogonal_uw_per_k = between(p->orthogonal_uw_per_k, p->orthogonal_fan_uw_per_k, fan);
     model->diagonal_uw_per_k = between(p->diagonal_uw_per_k, p->diagonal_fan_uw_per_k, fan);
     model->wake_uw_per_k = between(0, p->wake_uw_per_k, fan);

@@ -174,10 +174,20 @@ void plant_network_prepare(plant_t *p)
         p->temperature_c[plate_node(p, layer)] = plant_network_ambient(p, p->time_s);
 }
 
+/* Of all that the fan adds, the part that it adds at its present command: the odds f / (1 - f)
+ * times h / (1 - h), h (fan_half_share) what they are at half. */
+static double fan_part(const plant_t *p)
+{
+    if (!p->on[E_fan_curve] || p->fan <= 0.0)
+        return p->fan;
+    const double half = scalar(p, P_fan_half_share);
+    return 1.0 / (1.0 + (1.0 - half) / half * (1.0 - p->fan) / p->fan);
+}
+
 void plant_network_prepare_inputs(plant_t *p)
 {
     const int n = p->n;
-    const double fan = p->fan;
+    const double fan = fan_part(p);
     static const enum parameter_id natural[NEIGHBOUR_KINDS] = {
         P_orthogonal_w_per_k, P_diagonal_w_per_k, P_second_w_per_k, P_series_w_per_k};
     static const enum parameter_id forced[NEIGHBOUR_KINDS] = {

@@ -19,12 +19,12 @@ static void *take(unsigned char *memory, size_t *taken, size_t bytes)
 static size_t lay_out(plant_t *p, unsigned char *memory)
 {
     const size_t n = (size_t)p->n, nodes = (size_t)p->nodes;
-    double **const of_springs[] = {&p->quantity,         &p->austenite,      &p->sensor_c,
-                                   &p->heat_start,       &p->heat_from_c,    &p->cool_start,
-                                   &p->cool_from_c,      &p->latent_j,       &p->power_w,
-                                   &p->latent_cooling_j, &p->contact_ohm,    &p->resistance_scale,
-                                   &p->loss_scale,       &p->loss_scale_fan, &p->loss_natural,
-                                   &p->loss_forced,      &p->loss_sum,       &p->stage_austenite};
+    double **const of_springs[] = {
+        &p->quantity,    &p->austenite,        &p->sensor_c,      &p->heat_start,
+        &p->heat_from_c, &p->cool_start,       &p->cool_from_c,   &p->latent_j,
+        &p->power_w,     &p->latent_cooling_j, &p->contact_ohm,   &p->resistance_scale,
+        &p->loss_scale,  &p->loss_scale_fan,   &p->loss_natural,  &p->loss_forced,
+        &p->loss_sum,    &p->stage_austenite,  &p->optical_weight};
     double **const of_nodes[] = {&p->temperature_c, &p->capacity, &p->inverse_capacity, &p->stage_c,
                                  &p->increment_j};
     size_t taken = 0;

@@ -107,6 +107,10 @@ struct plant {
     double radiation_w_per_k4;
     bool any_held;
 
+    /* derived by sensors: what a camera sees of a spring so many rows and columns away, in a layer
+     */
+    double *optical_weight;
+
     /* of the solver */
     double step_limit_s;
     bool flows_known; /* k[0] is of the present state */
@@ -204,6 +208,10 @@ void plant_network_flows(plant_t *p, double time_s, const double *t, const doubl
 /* ----------------------------------------------------------------- sensors */
 
 void plant_sensors_prepare(plant_t *p);
+/* After a change of optical_share, optical_width or optical_shape: a point-spread over the lattice
+ * of places, those beyond the array too, exp(-(distance / width)^shape), of which all but the
+ * spring's own place make up the share. */
+void plant_sensors_spread(plant_t *p);
 /* What the sensor of spring i shows h_s later, when its spring went from the accepted temperature
  * through middle_c to end_c. */
 double plant_sensors_follow(const plant_t *p, int i, double middle_c, double end_c, double h_s);

@@ -115,6 +115,8 @@ plant_status_t plant_set_index(plant_t *p, size_t k, int spring, double value)
     } else {
         p->parameters_changed = true;
     }
+    if (k == P_optical_share || k == P_optical_width || k == P_optical_shape)
+        plant_sensors_spread(p); /* now: a picture may be taken before anything moves */
     return PLANT_OK;
 }
 

@@ -14,7 +14,8 @@ typedef struct {
     /* The law itself is discontinuous in one place: a spring that cools to within a hair of
      * martensite start either forgets how far it had been heated or does not. Where chip and
      * reference fell on different sides of that: */
-    uint64_t parted;     /* samples since, in that spring and set */
+    uint64_t parted;     /* samples since, in that spring and set, until both agree again: the heat
+                          * that one gave and the other kept outlasts their phases */
     double max_parted_c; /* largest error in those; max_c is over the others */
     uint64_t samples;
     double highest_c;   /* temperature reached: the drive must have exercised the range */

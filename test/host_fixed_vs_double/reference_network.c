@@ -122,14 +122,22 @@ static double mixed(double natural, double forced, double fan)
     return natural + (forced - natural) * fan;
 }
 
+/* Of all that the fan adds at full: the curve through 0, the part at half, and 1. */
+static double blown(const reference_network_t *r)
+{
+    const double half = 1e-3 * r->p.fan_half_share_permille;
+    return r->fan * half / (half * r->fan + (1.0 - half) * (1.0 - r->fan));
+}
+
 /* Rates: K/s of each enthalpy, of air and of plate. */
 static void rates(const reference_network_t *r, const double t[], double air, double plate,
                   const double power[], double rate[], double *air_rate, double *plate_rate)
 {
     const thermal_model_parameters_t *p = &r->p;
+    const double fan = blown(r);
     int rows = p->rows, columns = p->columns;
-    double orthogonal = 1e-6 * mixed(p->orthogonal_uw_per_k, p->orthogonal_fan_uw_per_k, r->fan);
-    double diagonal = 1e-6 * mixed(p->diagonal_uw_per_k, p->diagonal_fan_uw_per_k, r->fan);
+    double orthogonal = 1e-6 * mixed(p->orthogonal_uw_per_k, p->orthogonal_fan_uw_per_k, fan);
+    double diagonal = 1e-6 * mixed(p->diagonal_uw_per_k, p->diagonal_fan_uw_per_k, fan);
     double to_air = 0.0, to_plate = 0.0;
     if (p->air_exchange_uw_per_k == 0) {
         air = r->ambient_c;
@@ -151,12 +159,12 @@ static void rates(const reference_network_t *r, const double t[], double air, do
         double natural = 1e-6 * p->loss_uw_per_k *
                          (1.0 + 1e-6 * p->loss_rise_ppm_per_k * (above > 0.0 ? above : 0.0));
         double loss = 1e-3 * p->loss_scale_permille[i] *
-                      mixed(natural, 1e-6 * p->loss_fan_uw_per_k, r->fan) * above;
+                      mixed(natural, 1e-6 * p->loss_fan_uw_per_k, fan) * above;
         flow -= loss;
         to_air += loss;
         int ur = row - down[p->wake_direction], uc = column - right[p->wake_direction];
         if (ur >= 0 && ur < rows && uc >= 0 && uc < columns) {
-            double brought = 1e-6 * p->wake_uw_per_k * r->fan * (t[ur * columns + uc] - air);
+            double brought = 1e-6 * p->wake_uw_per_k * fan * (t[ur * columns + uc] - air);
             flow += brought;
             to_air -= brought;
         }

@@ -44,6 +44,7 @@ SCALARS = {
     "convection_scale": (0.4, 1),
     "forced_scale": (0.3, 1),
     "fan_velocity_m_per_s": (0.2, 2),
+    "fan_half_share": (0.1, 0.9),
     "latent_cooling_ratio": (0.3, 1),
     "resistance_martensite_rise_per_k": (-3e-4, 1.5e-3),
     "resistance_austenite_rise_per_k": (-3e-4, 1.5e-3),
@@ -59,8 +60,9 @@ SCALARS = {
     "ambient_amplitude_k": (0, 3),
     "ambient_period_s": (100, 1000),
     "ambient_phase_rad": (-3, 3),
-    "optical_orthogonal": (0, 0.15),
-    "optical_diagonal": (0, 0.05),
+    "optical_share": (0, 0.9),
+    "optical_width": (0.3, 2.5),
+    "optical_shape": (0.7, 8),
     "optical_beyond": (0, 1),
     "optical_background": (0, 0.3),
     "optical_background_rise_k": (0, 10),
@@ -97,6 +99,7 @@ class Model:
         self.layers, rows, columns = shape
         self.n, self.v, self.on, self.modes = self.layers * rows * columns, values, on, modes
         layer, row, column = np.unravel_index(np.arange(self.n), shape)
+        self.layer, self.row, self.column = layer, row, column
         dl, dr, dc = (abs(one[:, None] - one) for one in (layer, row, column))
         dr = dr + 99 * dl  # those of the other layer are nobody's neighbours
         self.series = ((dl == 1) & (dr == 99) & (dc == 0)).astype(float)
@@ -248,11 +251,17 @@ class Model:
             ),
         )
 
+    def blown(self, fan: float) -> float:
+        """Part of what the fan adds at full."""
+        half = self.v["fan_half_share"] if "fan_curve" in self.on else 0.5
+        return fan * half / (fan * half + (1 - fan) * (1 - half))
+
     def loss(self, t: np.ndarray, air: float, fan: float) -> np.ndarray:
         """Conductance to the air (n,), W/K."""
         v = self.v
-        natural = v["loss_w_per_k"] * (1 - fan) * self.loss_scale
-        forced = v["loss_fan_w_per_k"] * fan * self.fan_loss_scale
+        part = self.blown(fan)
+        natural = v["loss_w_per_k"] * (1 - part) * self.loss_scale
+        forced = v["loss_fan_w_per_k"] * part * self.fan_loss_scale
         if "natural_convection" not in self.on:
             return natural + forced
         rise = abs(t - air)
@@ -270,8 +279,9 @@ class Model:
         both = ((v["convection_scale"] * h_natural) ** 4 + (v["forced_scale"] * h_forced) ** 4) ** 0.25
         return both * v["surface_mm2"] * 1e-6 * self.loss_scale
 
-    def slope(self, time: float, y: np.ndarray, u: np.ndarray, fan: float) -> np.ndarray:
+    def slope(self, time: float, y: np.ndarray, u: np.ndarray, commanded: float) -> np.ndarray:
         """Time derivative of the state."""
+        fan = self.blown(commanded)
         n, v, on = self.n, self.v, self.on
         sensors = n + 1 + self.layers
         t, plate, sensor = y[:n], y[n + 1 : sensors], y[sensors:]
@@ -283,7 +293,7 @@ class Model:
         g_s = v["second_w_per_k"] * (1 - fan) + v["second_fan_w_per_k"] * fan
         g = self.scale[:, None] * (g_o * self.orthogonal + g_d * self.diagonal + g_s * self.second)
         g += (v["series_w_per_k"] * (1 - fan) + v["series_fan_w_per_k"] * fan) * self.series
-        given = self.loss(t, air, fan) * (t - air)
+        given = self.loss(t, air, commanded) * (t - air)
         if "fan_wake" in on:
             reached = self.downstream @ t - self.downstream.sum(1) * air
             given = given - v["wake_w_per_k"] * fan * self.scale * reached
@@ -307,15 +317,24 @@ class Model:
         out[sensors:] = (t - sensor) / v["sensor_lag_s"]
         return out
 
+    def blurred(self, t: np.ndarray, ambient: float) -> np.ndarray:
+        """What a camera shows (n,): the whole plane's places weighed by a point-spread, those beyond the array too."""
+        v, far = self.v, 60
+        away = np.arange(-far, far + 1)
+        weight = np.exp(-((np.hypot(away[:, None], away) / v["optical_width"]) ** v["optical_shape"]))
+        weight[far, far] = 0.0
+        weight *= v["optical_share"] / weight.sum()
+        dr, dc = (np.abs(one[:, None] - one).astype(int) for one in (self.row, self.column))
+        share = weight[far + dr, far + dc] * (self.layer[:, None] == self.layer)
+        absent = v["optical_beyond"] * (v["optical_share"] - share.sum(1))
+        return (1 - share.sum(1) - absent) * t + share @ t + absent * ambient
+
     def seen(self, time: float, y: np.ndarray) -> np.ndarray:
         """What the sensors show (n,), degC."""
         v, ambient = self.v, self.ambient(time)
         t = y[self.n + 1 + self.layers :] if "sensor_lag" in self.on else y[: self.n]
         if "optical_mixing" in self.on:
-            share = v["optical_orthogonal"] * self.orthogonal + v["optical_diagonal"] * self.diagonal
-            absent = v["optical_orthogonal"] * (4 - self.orthogonal.sum(1))
-            absent = v["optical_beyond"] * (absent + v["optical_diagonal"] * (4 - self.diagonal.sum(1)))
-            t = (1 - share.sum(1) - absent) * t + share @ t + absent * ambient
+            t = self.blurred(t, ambient)
             b = v["optical_background"]
             t = (1 - b) * t + b * (ambient + v["optical_background_rise_k"])
         if "sensor_gain" in self.on:

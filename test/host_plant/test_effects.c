@@ -27,6 +27,7 @@ static void each_effect_changes_what_it_should_and_only_that(void)
         {"resistance_temperature", CURRENT | DUTY},
         {"transformation_shift", 0}, /* alone: nothing depends on the phase */
         {"contact_resistance", POWER | DUTY},
+        {"fan_curve", HEAT},
     };
     static const double largest[4] = {0.8, 2.2, 0.2, 1.0};
     TEST_ASSERT_EQUAL_UINT(plant_effect_count(), sizeof expected / sizeof expected[0]);
@@ -241,25 +242,77 @@ static void sensor_gain_is_about_ambient(void)
     TEST_ASSERT_DOUBLE_WITHIN(1e-9, 20.0, plant_measured_c(plant, 1));
 }
 
+/* A spring's steady rise at a fixed power tells its loss. */
+static double loss_with_fan(double fan)
+{
+    OK(plant_set_fan(plant, fan));
+    settle();
+    return plant_power_w(plant, 0) / (at(0) - 20.0);
+}
+
+static void half_a_fan_gives_its_part_of_the_cooling(void)
+{
+    uncouple();
+    drive(0, PLANT_DRIVE_POWER, 0.3);
+    const double still = get("loss_w_per_k"), blown = get("loss_fan_w_per_k");
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0.5 * (still + blown), loss_with_fan(0.5));
+    on("fan_curve");
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, still + 0.735 * (blown - still), loss_with_fan(0.5));
+    set("fan_half_share", 0.3);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, still + 0.3 * (blown - still), loss_with_fan(0.5));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, still, loss_with_fan(0.0));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, blown, loss_with_fan(1.0));
+    double before = still;
+    for (int k = 1; k <= 20; k++) {
+        const double now = loss_with_fan(0.05 * k);
+        TEST_ASSERT_TRUE(now > before);
+        before = now;
+    }
+}
+
 static void a_pixel_sees_its_neighbours(void)
 {
     on("optical_mixing");
+    set("optical_share", 0.2);
+    set("optical_width", 0.1); /* so narrow that only the nearest count: a quarter each */
+    set("optical_beyond", 0.0);
     for (int i = 0; i < 9; i++)
         hold(i, i == 4 ? 50.0 : 105.0);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 50.0 + 55.0 * 0.25, plant_measured_c(plant, 4));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 50.0 + 55.0 * 0.2, plant_measured_c(plant, 4));
     TEST_ASSERT_DOUBLE_WITHIN(1e-9, 105.0 - 55.0 * 0.05, plant_measured_c(plant, 1));
-    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 105.0 - 55.0 * 0.0125, plant_measured_c(plant, 0));
-    set("optical_beyond",
-        1.0); /* of 20 degC: one side and two corners at spring 2, two and three at spring 1 */
-    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 50.0 + 55.0 * 0.25, plant_measured_c(plant, 4));
-    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 105.0 - 55.0 * 0.05 - 85.0 * (0.05 + 2 * 0.0125),
-                              plant_measured_c(plant, 1));
-    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 105.0 - 55.0 * 0.0125 - 85.0 * (2 * 0.05 + 3 * 0.0125),
-                              plant_measured_c(plant, 0));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 105.0, plant_measured_c(plant, 0));
+    set("optical_beyond", 1.0); /* of 20 degC: one side at spring 2, two at spring 1 */
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 50.0 + 55.0 * 0.2, plant_measured_c(plant, 4));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 105.0 - 55.0 * 0.05 - 85.0 * 0.05, plant_measured_c(plant, 1));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 105.0 - 85.0 * 0.1, plant_measured_c(plant, 0));
     set("optical_background", 0.1);
     set("optical_background_rise_k", 5.0);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.9 * (50.0 + 55.0 * 0.25) + 2.5, plant_measured_c(plant, 4));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.9 * (50.0 + 55.0 * 0.2) + 2.5, plant_measured_c(plant, 4));
     TEST_ASSERT_DOUBLE_WITHIN(1e-12, 50.0, at(4));
+}
+
+/* Spring 1 alone is warmer: what the others show above the ambient is what they see of it. */
+static void a_camera_blurs_as_its_point_spread_falls(void)
+{
+    on("optical_mixing");
+    hold(0, 120.0);
+    for (int i = 1; i < 9; i++)
+        hold(i, 20.0);
+    const double shapes[] = {1.0, 2.0, 6.0};
+    for (int k = 0; k < 3; k++) {
+        set("optical_width", 1.3);
+        set("optical_shape", shapes[k]);
+        set("optical_share", 0.6);
+        const double side = plant_measured_c(plant, 1) - 20.0;
+        const double corner = plant_measured_c(plant, 4) - 20.0;
+        const double far = plant_measured_c(plant, 8) - 20.0;
+        const double one = pow(1.0 / 1.3, shapes[k]);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-9, exp(one - pow(sqrt(2.0) / 1.3, shapes[k])), corner / side);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-9, exp(one - pow(sqrt(8.0) / 1.3, shapes[k])), far / side);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-9, 40.0, plant_measured_c(plant, 0) - 20.0);
+        set("optical_share", 0.3); /* the same picture, half of it */
+        TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.5 * side, plant_measured_c(plant, 1) - 20.0);
+    }
 }
 
 static void resistance_follows_phase_and_each_phase_its_temperature(void)
@@ -326,7 +379,9 @@ int main(void)
     RUN_TEST(an_undriven_spring_follows_the_drift_by_its_time_constant);
     RUN_TEST(sensor_lags_by_its_time_constant);
     RUN_TEST(sensor_gain_is_about_ambient);
+    RUN_TEST(half_a_fan_gives_its_part_of_the_cooling);
     RUN_TEST(a_pixel_sees_its_neighbours);
+    RUN_TEST(a_camera_blurs_as_its_point_spread_falls);
     RUN_TEST(resistance_follows_phase_and_each_phase_its_temperature);
     RUN_TEST(a_contact_takes_voltage_and_keeps_its_heat);
     return UNITY_END();

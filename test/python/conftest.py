@@ -28,7 +28,7 @@ def kept_elsewhere(tmp_path_factory: pytest.TempPathFactory) -> None:
 
 @pytest.fixture
 def make_log(tmp_path: Path) -> Make:
-    """Return a maker of 3 x 3 logs: effects and numbers of the plant, noise, seed, seconds, what is logged."""
+    """Return a maker of 3 x 3 logs: effects and numbers of the plant, noise, seed, seconds, what is logged, the fan at half."""
 
     def make(
         name: str = "run.csv",
@@ -38,6 +38,7 @@ def make_log(tmp_path: Path) -> Make:
         noise: float = 0.3,
         columns: str = "iv",
         change: Callable[[dict[str, np.ndarray]], None] | None = None,
+        half: bool = False,
     ) -> Path:
         rng = np.random.default_rng(seed)
         time_s = np.arange(float(seconds))
@@ -49,6 +50,8 @@ def make_log(tmp_path: Path) -> Make:
                 current[at : at + hold, k] = 0.0 if rng.random() < 0.4 else rng.uniform(1.0, 1.8)
                 at += hold
         fan = ((time_s // 200) % 2 == 1).astype(float)
+        if half:  # of its command, after the first time
+            fan[400:] *= 0.5
         plant = native.Plant(3, 3)
         plant.set_effects(effects or {})
         for values in (effects or {}).values():

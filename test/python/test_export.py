@@ -61,6 +61,13 @@ def test_a_latent_heat_that_the_data_speak_against_is_written_as_what_it_is(make
     assert abs(float(made.written["latent_heat_j"])) < 0.6
 
 
+def test_a_fan_curve_is_written_where_it_was_found_and_stays_as_it_is_elsewhere() -> None:
+    found = Model(Array(), ["fan_curve"])
+    found.parameters, found.stderr = {"fan_half_share": 0.42}, {"fan_half_share": 0.01}
+    assert settings_of(found).written["fan_half_share"] == "0.420"
+    assert settings_of(Model(Array())).kept["fan_half_share"] == "the diagnosis named no fan_curve"
+
+
 def test_numbers_that_are_known_in_combination_only_are_written_together(make_log) -> None:
     """One run of all springs alike: losses and couplings cannot be told, and what is written must still be right."""
 

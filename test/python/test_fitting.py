@@ -173,7 +173,7 @@ def test_a_copy_of_a_plant_leads_its_own_life() -> None:
 def test_springs_start_where_the_sensors_would_show_the_first_row() -> None:
     plant = native.Plant(1, 2)
     plant.set_effects(["sensor_gain", "optical_mixing"])
-    plant.set_all({"sensor_gain": 1.2, "sensor_offset_k": 1.5, "optical_orthogonal": 0.1})
+    plant.set_all({"sensor_gain": 1.2, "sensor_offset_k": 1.5, "optical_share": 0.6, "optical_width": 0.3})
     plant.reset()
     plant.start_from_measured(np.array([40.0, math.nan]))
     assert plant.measured_c()[0] == pytest.approx(40.0, abs=0.001)

@@ -41,6 +41,7 @@ def test_a_plan_keeps_the_limits_and_drives_every_spring(rows: int, cols: int, s
     assert ((current > 0).mean(axis=0) > 0.05).all()
     assert len(np.unique(current[current > 0])) >= 3
     assert 0.2 < fan.mean() < 0.3 and not current[-60:].any()
+    assert (fan == 0.5).mean() > 0.1 and (fan == 1.0).mean() > 0.1, "half the fan tells its curve"
     plant = native.Plant(rows, cols)
     plant.set_effects(["latent_heat", "resistance_phase"])
     plant.reset()
@@ -61,6 +62,7 @@ def test_without_a_thermometer_every_spring_crosses_often_and_none_is_ever_witho
         crossings = (np.abs(np.diff((phase > 0.5).astype(int), axis=0))).sum(axis=0)
         assert crossings.min() >= 4, f"up and down twice, fan {blown}"
     assert traced[:, :, 0].max() <= 105.0
+    assert (fan == 0.5).mean() > 0.09
 
 
 def test_what_was_planned_identifies_the_array(tmp_path: Path) -> None:

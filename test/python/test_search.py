@@ -49,13 +49,54 @@ def heaters() -> Model:
 
 
 @pytest.mark.parametrize("beyond", [0.0, 1.0])
-def test_a_camera_that_sees_the_surroundings_beyond_the_array_makes_no_edge_loss(make_log, beyond: float) -> None:
-    camera = {"optical_orthogonal": 0.04, "optical_diagonal": 0.01, "optical_beyond": beyond}
+@pytest.mark.parametrize("width", [0.1, 0.9])
+def test_a_camera_that_sees_the_surroundings_beyond_the_array_makes_no_edge_loss(
+    make_log, beyond: float, width: float
+) -> None:
+    camera = {"optical_share": 0.2, "optical_width": width, "optical_beyond": beyond}
     found = diagnosis.diagnose(Array(), [read_log(make_log(effects={"optical_mixing": camera}), 9)])
     (one,) = found.result["effects"]
-    assert one["name"] == "optical_mixing" and ("beyond the array" in one["variant"]) == (beyond > 0)
-    assert found.model.parameters["optical_beyond"] == beyond
+    assert one["name"] == "optical_mixing" and one["certainty"] == "certain"
+    assert ("room beyond" in one["text"]) == (beyond > 0)
+    assert found.model.parameters["optical_beyond"] == pytest.approx(beyond, abs=0.1)
+    assert found.model.parameters["optical_share"] == pytest.approx(0.2, rel=0.1)
     assert found.result["unexplained"] is False
+
+
+def test_a_blur_over_more_than_the_nearest_is_found_as_it_is(make_log) -> None:
+    camera = {"optical_share": 0.6, "optical_width": 1.2, "optical_shape": 1.0}
+    found = diagnosis.diagnose(Array(), [read_log(make_log(effects={"optical_mixing": camera}), 9)])
+    (one,) = found.result["effects"]
+    assert one["name"] == "optical_mixing" and found.result["unexplained"] is False
+    # share and width of a long tail can stand for one another: what a spring sees of the next does not move
+    plants = [native.Plant(3, 3) for _ in range(2)]
+    for plant, numbers in zip(plants, (camera, found.model.parameters), strict=True):
+        plant.set_effects(["optical_mixing"])
+        plant.set_all({key: value for key, value in numbers.items() if key.startswith("optical_")})
+        plant.reset()
+        plant.set_temperature(4, 120.0)
+    true, fitted = (plant.measured_c() - 20.0 for plant in plants)
+    assert fitted[1] / fitted[4] == pytest.approx(true[1] / true[4], rel=0.1)
+    assert fitted[0] / fitted[4] == pytest.approx(true[0] / true[4], rel=0.1)
+
+
+@pytest.mark.parametrize("share", [0.3, 0.735])
+def test_what_half_a_fan_gives_is_found_where_it_blew_at_half(make_log, share: float) -> None:
+    log = make_log(effects={"fan_curve": {"fan_half_share": share}}, seconds=900, half=True)
+    found = diagnosis.diagnose(Array(), [read_log(log, 9)])
+    (one,) = found.result["effects"]
+    assert one["name"] == "fan_curve" and one["certainty"] == "certain" and one["on_chip"]
+    number = one["parameters"]["fan_half_share"]
+    assert abs(number["value"] - share) < 3 * number["stderr"] < 0.06
+    assert found.result["unexplained"] is False
+
+
+def test_no_fan_curve_is_named_where_there_is_none_or_nothing_shows_it(make_log) -> None:
+    proportional = diagnosis.diagnose(Array(), [read_log(make_log(seconds=900, half=True), 9)])
+    assert proportional.result["effects"] == []
+    curve = {"fan_curve": {"fan_half_share": 0.735}}
+    only_full = diagnosis.diagnose(Array(), [read_log(make_log(effects=curve, seconds=900), 9)])
+    assert only_full.result["effects"] == [] and "fan_half_share" not in only_full.model.parameters
 
 
 @pytest.mark.parametrize(("chopped", "variant"), [(1.0, "chopped loads"), (0.0, "loads that draw their mean")])
@@ -93,10 +134,14 @@ def test_only_what_the_log_could_show_is_a_candidate(make_log, tmp_path: Path) -
         "supply_sag",
         "resistance_phase",
         "resistance_temperature",
-        "contact_resistance",
-    }  # power is logged
+        "contact_resistance",  # power is logged
+        "fan_curve",  # the fan is off or full
+    }
     assert names_of(Problem(Array(), [read_log(make_log("a.csv"))])) == everything
     assert names_of(Problem(Array(), [read_log(make_log("b.csv", change=without_fan))])) == everything - {"fan_wake"}
+    assert names_of(Problem(Array(), [read_log(make_log("f.csv", seconds=700, half=True))])) == everything | {
+        "fan_curve"
+    }
     # 30 K below the declared transformation an alloy may transform all the same, at half the way to it none does
     assert names_of(Problem(Array(), [read_log(make_log("c.csv", change=lukewarm))])) == everything
     assert names_of(Problem(Array(), [read_log(make_log("e.csv", change=cold))])) == everything - {

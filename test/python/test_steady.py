@@ -11,7 +11,7 @@ from ninespring.errors import InputError
 from ninespring.models import Array
 from ninespring.verdict import diagnosis, steady
 
-MIXING = {"optical_mixing": {"optical_orthogonal": 0.06, "optical_diagonal": 0.015}}
+MIXING = {"optical_mixing": {"optical_share": 0.3}}
 
 
 def states(on: dict[str, dict[str, float]]) -> list[steady.State]:
@@ -32,8 +32,7 @@ def test_the_number_behind_six_states_is_found_again() -> None:
     result = steady.diagnose_states(Array(), {}, states(MIXING))
     found = result["effects"][0]
     assert found["name"] == "optical_mixing"
-    assert found["parameters"]["optical_orthogonal"]["value"] == pytest.approx(0.06, rel=0.01)
-    assert found["parameters"]["optical_diagonal"]["value"] == pytest.approx(0.015, rel=0.01)
+    assert found["parameters"]["optical_share"]["value"] == pytest.approx(0.3, rel=0.01)
     assert result["after"]["holdout_rmse_c"] < 0.1 < 5.0 < result["baseline"]["rmse_c"]
     diagnosis.validate(result)
 

@@ -25,5 +25,6 @@ def test_the_plant_takes_what_it_shares_with_the_chip_from_the_same_rows() -> No
         assert plant[name].unit == (shared[name].unit or "1")
         assert plant[name].effect == shared[name].effect
         assert plant[name].description == shared[name].sentence
-        switched_off = shared[name].default == 0.0 and shared[name].effect is not None
+        off = 0.5 if name == "fan_half_share" else 0.0  # in proportion: no curve
+        switched_off = shared[name].default == off and shared[name].effect is not None
         assert plant[name].default == shared[name].default or switched_off, name

@@ -36,6 +36,43 @@ static void fan_full_and_half_are_the_given_and_the_mean_loss(void)
     TEST_ASSERT_DOUBLE_WITHIN(0.02, 20.0 + 0.226 / 0.00855, degrees(0));
 }
 
+/* As printed of printers' fans: 70 to 77 % of the extra loss at half the command. */
+static void half_a_fan_cools_by_most_of_it(void)
+{
+    parameters.rows = parameters.columns = 1;
+    parameters.fan_half_share_permille = 735;
+    start();
+    power_uw[0] = 226000;
+    thermal_model_set_fan(&model, 50);
+    run(10000);
+    TEST_ASSERT_DOUBLE_WITHIN(0.02, 20.0 + 0.226 / (0.0058 + 0.735 * 0.0055), degrees(0));
+}
+
+/* Whatever the curve: what was declared at 0 and 100 %, between ever more. */
+static void a_fan_that_blows_harder_never_cools_less(void)
+{
+    parameters.rows = parameters.columns = 1;
+    parameters.wake_uw_per_k = 1000;
+    for (uint16_t half = 100; half <= 900; half = (uint16_t)(half + 100u)) {
+        parameters.fan_half_share_permille = half;
+        start();
+        TEST_ASSERT_EQUAL_UINT16(5800, model.spring[0].loss_uw_per_k);
+        uint16_t before = 0;
+        for (uint8_t percent = 0; percent <= 100; percent++) {
+            thermal_model_set_fan(&model, percent);
+            TEST_ASSERT_TRUE(model.spring[0].loss_uw_per_k >= before);
+            before = model.spring[0].loss_uw_per_k;
+            if (percent == 50) {
+                TEST_ASSERT_DOUBLE_WITHIN(1.0, 5800.0 + 5.5 * half, before);
+                TEST_ASSERT_DOUBLE_WITHIN(1.0, 586.0 + 0.072 * half, model.orthogonal_uw_per_k);
+                TEST_ASSERT_DOUBLE_WITHIN(1.0, half, model.wake_uw_per_k);
+            }
+        }
+        TEST_ASSERT_EQUAL_UINT16(11300, before);
+        TEST_ASSERT_EQUAL_UINT16(658, model.orthogonal_uw_per_k);
+    }
+}
+
 static void two_springs_share_heat_by_their_coupling(void)
 {
     parameters.rows = 1;
@@ -346,6 +383,8 @@ int main(void)
     RUN_TEST(one_spring_settles_where_power_equals_loss);
     RUN_TEST(one_spring_warms_by_its_time_constant);
     RUN_TEST(fan_full_and_half_are_the_given_and_the_mean_loss);
+    RUN_TEST(half_a_fan_cools_by_most_of_it);
+    RUN_TEST(a_fan_that_blows_harder_never_cools_less);
     RUN_TEST(two_springs_share_heat_by_their_coupling);
     RUN_TEST(loss_that_rises_and_radiation_settle_where_computed);
     RUN_TEST(shared_air_and_plate_settle_where_computed);

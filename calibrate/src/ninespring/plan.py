@@ -1,7 +1,7 @@
 """A steps.txt that identifies an array: every spring on and off at its own times and levels, within the limits.
 
 What a fit needs: each spring heats while its neighbours do and while they do not, at more than one level, some beyond the
-transformation; the fan blows for a part; at the end everything cools. Without a thermometer v / i tells all, and tells nothing
+transformation; the fan blows for a part, at half its command and at full; at the end everything cools. Without a thermometer v / i tells all, and tells nothing
 without a current: then a spring that rests keeps a little, and every turn crosses the transformation. What the array stands: the supply's current, the
 springs' temperature, as the declared array's simulation has it.
 """
@@ -24,10 +24,11 @@ LEVELS = (100, 100, 75, 50)
 """Percent of the current; full level half of the time, for only that transforms."""
 SHORTEST_S, LONGEST_S = 30.0, 150.0
 """A spring stays on or off for so long: from less to more than a time constant (50 s)."""
-FAN = ((0.45, 0.7),)
-FAN_OFTEN = ((0.15, 0.35), (0.55, 0.75))
+FAN = ((0.42, 0.56, 50), (0.56, 0.72, 100))
+FAN_OFTEN = ((0.15, 0.33, 100), (0.38, 0.48, 50), (0.55, 0.75, 100))
+"""From and to, in parts of the duration, and percent: half the command tells what the fan gives there, which is not half."""
 COOL_FROM = 0.88
-"""Parts of the duration."""
+"""Part of the duration."""
 RESTING_A = 0.25
 """A spring's current at rest where v / i is all there is: a quarter more than what v / i is read from."""
 BACK_OFF_S = 5.0
@@ -223,15 +224,15 @@ def _simulated(
     duration_s: float,
     current_a: float,
     resting: int,
-    blows: tuple[tuple[float, float], ...],
+    blows: tuple[tuple[float, float, int], ...],
 ) -> tuple[np.ndarray, np.ndarray]:
     time_s = np.arange(0.0, duration_s)
     drive = np.full((len(time_s), array.springs), resting / 100.0 * current_a)
     for one in stretches:
         drive[(time_s >= one.begin_s) & (time_s < one.end_s), one.spring] = one.level / 100.0 * current_a
     fan = np.zeros(len(time_s))
-    for begin, end in blows:
-        fan[(time_s >= begin * duration_s) & (time_s < end * duration_s)] = 1.0
+    for begin, end, percent in blows:
+        fan[(time_s >= begin * duration_s) & (time_s < end * duration_s)] = percent / 100.0
     return drive, _temperatures(array, drive, fan)
 
 
@@ -259,11 +260,13 @@ def _lines(
     duration_s: float,
     current_a: float,
     resting: int,
-    blows: tuple[tuple[float, float], ...],
+    blows: tuple[tuple[float, float, int], ...],
 ) -> list[str]:
     events: list[tuple[float, int, str]] = []
-    for begin, end in blows:
-        events += [(round(begin * duration_s), 0, "fan 100"), (round(end * duration_s), 0, "fan 0")]
+    for begin, end, percent in blows:
+        events.append((round(begin * duration_s), 0, f"fan {percent}"))
+        if all(end != following for following, _, _ in blows):
+            events.append((round(end * duration_s), 0, "fan 0"))
     for one in stretches:
         rest = f"on {one.spring + 1} {resting}" if resting else f"off {one.spring + 1}"
         events.append((one.end_s, 0, rest))

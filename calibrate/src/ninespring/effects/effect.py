@@ -70,6 +70,10 @@ class Steady:
     """What speaks against it in a table of the paper's kind."""
 
 
+FAN_ROWS = 20
+"""So many rows at a part of the fan's command say something of it: one or two are means across a switch."""
+
+
 @dataclass(frozen=True)
 class Scene:
     """What logs could show: the array, how it was driven, how hot and how long."""
@@ -78,6 +82,8 @@ class Scene:
     cols: int
     modes: frozenset[str]
     fan_seen: bool
+    fan_between: bool
+    """It also blew at a part of its command."""
     hottest_c: float
     step_s: float
     duration_s: float
@@ -118,6 +124,7 @@ def scene_of(problem: Problem) -> Scene:
         problem.array.cols,
         frozenset(run.mode for run in runs),
         bool((fan > 0.1).any()),
+        bool((np.abs(fan - 0.5) < 0.35).sum() >= FAN_ROWS),
         problem.hottest_c,
         float(np.median(np.diff(runs[0].time_s))),
         max(run.duration_s for run in runs),

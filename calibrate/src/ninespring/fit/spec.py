@@ -40,6 +40,8 @@ class Free:
     """Parameters of the plant to which it is added, times a weight, instead of being their value."""
     prior: float | None = None
     """Standard deviation, in the inner coordinate, of what is believed of it before: about its start."""
+    ends: bool = False
+    """Its bounds are the ends of what there is (none, all): a number that lies there is as good as any."""
 
     def inner(self, value: float) -> float:
         """Map to the coordinate the optimiser works in."""
@@ -180,6 +182,8 @@ class Fit:
         out = []
         for f, v in zip(self.spec.free, self.values, strict=True):
             z, low, high = f.inner(v), f.inner(f.low), f.inner(f.high)
+            if f.ends:
+                continue
             if z <= low + 1e-3 * (high - low) or z >= high - 1e-3 * (high - low):
                 out.append(f.key)
         return out
