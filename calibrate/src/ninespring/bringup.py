@@ -344,12 +344,19 @@ def step_channels(board: Board, step: Step, hands: Hands | None) -> None:
             "no channel has current: the supply is off, its fuse is open, or the relay does not hold (D12 to the pump; docs/hardware.md)"
         )
         return
+    pairs: set[frozenset[int]] = set()
     for k, got in driven:
         for one in judge_channel(k, got):
             pair = re.match(r"channels (\d+) and (\d+) are swapped", one)
-            if pair and any(other == int(pair[2]) and other < k for other, _ in driven):
+            if pair and frozenset({k, int(pair[2])}) in pairs:
                 continue  # told from the other one's side
+            if pair:
+                pairs.add(frozenset({k, int(pair[2])}))
             step.found.append(which_swap(board, k, int(pair[2]), hands) if pair and hands else one)
+    alike = {one.partition(" ohm, ")[2] for one in step.found}
+    if len(step.found) == springs and len(alike) == 1 and alike != {""}:
+        ohm = float(np.median([got.ohm(k) for k, got in driven]))
+        step.found = [f"all channels read {ohm:.3f} ohm, {alike.pop()}"]
     whole = [(k, got) for k, got in driven if not judge_channel(k, got)]
     if not whole:
         return
