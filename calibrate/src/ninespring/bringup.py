@@ -38,7 +38,7 @@ APART = 0.1
 """By which share a spring may differ from the others."""
 HEATING_S, WARM_C = 12.0, 60.0
 SCHEMA = "ninespring.bringup/1"
-JUMPERS = ("GND", "VS", "SDA", "SCL")
+JUMPERS = ("GND", "V+", "SDA", "SCL")
 PINS = (5, 2, 3, 6, 7, 8, 46, 45, 44)
 """The Mega's, of channels 1 to 9."""
 
