@@ -602,7 +602,7 @@ def save(output: Path, steps: dict[str, Step]) -> None:
 
 
 def do_step(board: Board, name: str, hands: Hands | None) -> Step:
-    """Do one step, all springs off before and after it; settings that it needs are given back, and nothing is saved."""
+    """Do one step, all springs off before and after it; settings that it needs are given back, and none is saved."""
     step = Step(name, at=time.strftime("%Y-%m-%d %H:%M"))
     settings = board.settings()
     board.ask("off all")
