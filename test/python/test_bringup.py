@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -59,7 +60,7 @@ def bench(tmp_path: Path) -> Iterator[Make]:
 WRONG = [
     ("no-pull-up", "sensors", "SDA (D20) or SCL (D21) has no pull-up"),
     ("absent=4", "sensors", "sensor 4 does not answer at 0x43 (A1 to GND, A0 to SCL)"),
-    ("r050=2", "channels", "channel 2 reads 0.44"),
+    ("r050=2", "channels", "2 times 0.22: its shunt says R050"),
     ("reversed=5", "channels", "sensor 5 is reversed"),
     ("gate=6", "channels", "no current in channel 6 (0.000 V though it is driven): the gate's wire (D8)"),
     ("welded=7", "channels", "current flows in channel 7 with everything off"),
@@ -117,6 +118,7 @@ def test_a_diode_that_drops_more_than_declared_is_told_from_a_low_supply(bench: 
 def test_from_nothing_to_nine_springs(bench: Make, tmp_path: Path) -> None:
     """As docs/building.md walks: what hands do between the steps is done when it is asked for."""
     made, page = bench(), tmp_path / "bringup.html"
+    made.board.ask("$open_current_a=1.2")
     heard: list[str] = []
     left = [
         ("The Mega alone", ["absent=all", "open=all"]),
@@ -160,7 +162,8 @@ def test_from_nothing_to_nine_springs(bench: Make, tmp_path: Path) -> None:
     done = converse(made.board, page, None, heard.append, again="springs")
     assert done["springs"].found == ["no current in spring 9: it, a crimp or a lead is open"]
     assert "6 of 7 steps are right" in page.read_text()
-    assert not [one for one in made.board.settings().items() if one[0] == "open_current_a" and one[1] != "1.500"]
+    settings = made.board.settings()
+    assert settings["open_current_a"] == "1.200" and settings["policy"] == "1"  # given back
 
 
 @pytest.mark.parametrize(
@@ -196,6 +199,18 @@ def test_what_lies_apart_is_named(bench: Make, world: str, step: str, named: str
     made.wire("")
     (found,) = do_step(made.board, step, None).found
     assert named in found
+
+
+def test_springs_where_resistors_belong_are_told_once(bench: Make) -> None:
+    made = bench()
+    made.wire("")
+    (found,) = do_step(made.board, "channels", None).found
+    assert re.match(
+        r"all channels read 0\.17\d ohm, not 0\.22 within 15 %: leads, crimps or another resistor", found
+    ), found
+    made.wire("resistor=all", "r050=all")
+    (found,) = do_step(made.board, "channels", None).found
+    assert "all channels read 0.44" in found and "its shunt says R050" in found, found
 
 
 def test_what_no_sensor_tells_is_asked(bench: Make) -> None:

@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from ninespring import bringup
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "hardware"))
@@ -79,6 +80,12 @@ def test_pins_and_addresses_are_the_firmwares() -> None:
     )
     for w in circuit.WIRING:
         assert w.address == first + w.spring - 1 == circuit.address_of(w.a1, w.a0)
+
+
+def test_what_bringup_names_is_the_circuits() -> None:
+    assert [f"D{pin}" for pin in bringup.PINS] == [w.pin for w in circuit.WIRING]
+    for w in circuit.WIRING:
+        assert bringup.jumpers(w.spring) == f"0x{w.address:02X} (A1 to {w.a1}, A0 to {w.a0})"
 
 
 def test_the_wiring_table_of_the_page_is_the_circuits() -> None:

@@ -38,7 +38,7 @@ APART = 0.1
 """By which share a spring may differ from the others."""
 HEATING_S, WARM_C = 12.0, 60.0
 SCHEMA = "ninespring.bringup/1"
-JUMPERS = ("GND", "VS", "SDA", "SCL")
+JUMPERS = ("GND", "V+", "SDA", "SCL")
 PINS = (5, 2, 3, 6, 7, 8, 46, 45, 44)
 """The Mega's, of channels 1 to 9."""
 
@@ -344,12 +344,19 @@ def step_channels(board: Board, step: Step, hands: Hands | None) -> None:
             "no channel has current: the supply is off, its fuse is open, or the relay does not hold (D12 to the pump; docs/hardware.md)"
         )
         return
+    pairs: set[frozenset[int]] = set()
     for k, got in driven:
         for one in judge_channel(k, got):
             pair = re.match(r"channels (\d+) and (\d+) are swapped", one)
-            if pair and any(other == int(pair[2]) and other < k for other, _ in driven):
+            if pair and frozenset({k, int(pair[2])}) in pairs:
                 continue  # told from the other one's side
+            if pair:
+                pairs.add(frozenset({k, int(pair[2])}))
             step.found.append(which_swap(board, k, int(pair[2]), hands) if pair and hands else one)
+    alike = {one.partition(" ohm, ")[2] for one in step.found}
+    if len(step.found) == springs and len(alike) == 1 and alike != {""}:
+        ohm = float(np.median([got.ohm(k) for k, got in driven]))
+        step.found = [f"all channels read {ohm:.3f} ohm, {alike.pop()}"]
     whole = [(k, got) for k, got in driven if not judge_channel(k, got)]
     if not whole:
         return
@@ -595,7 +602,7 @@ def save(output: Path, steps: dict[str, Step]) -> None:
 
 
 def do_step(board: Board, name: str, hands: Hands | None) -> Step:
-    """Do one step, all springs off before and after it; settings that it needs are given back, and nothing is saved."""
+    """Do one step, all springs off before and after it; settings that it needs are given back, and none is saved."""
     step = Step(name, at=time.strftime("%Y-%m-%d %H:%M"))
     settings = board.settings()
     board.ask("off all")

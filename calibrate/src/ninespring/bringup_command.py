@@ -36,7 +36,8 @@ def bringup(port: str, output: Path, again: str | None, last: str, yes: bool) ->
     """Bring up a new board in a conversation: what to do, what is measured, what is wrong and where, in the order of docs/building.md.
 
     Steps: board, sensors, supply, channels (on resistors of 0.22 ohm), air, spring, springs. A step that was right before is left out. Ends
-    with 1 at the first step in which something is wrong: mend it and type the same again. It saves nothing in the board.
+    with 1 at the first step in which something is wrong: mend it and type the same again. No setting is saved; what the board
+    has learnt of its springs is forgotten before the first one, as resistors have stood there.
     """
     from .board import Board
     from .bringup import STEPS, converse
