@@ -68,7 +68,7 @@ def draw(run: Run, before: Model, after: Model) -> None:
     )
     shown = {"declared network, fitted": (foretold(before, run), "--"), "diagnosed": (foretold(after, run), "-")}
     for k, colour in enumerate(("C3", "C0")):
-        above.plot(run.time_s, run.temperature_c[:, k], ".", color="0.6", ms=3, label="read" if k == 0 else None)
+        above.plot(run.time_s[::5], run.temperature_c[::5, k], ".", color="0.6", ms=3, label=None if k else "read")
         for text, (value, style) in shown.items():
             label = f"heater {k + 1}, {text}"
             above.plot(run.time_s, value[:, k], style, color=colour, lw=1.2, label=label)
@@ -77,7 +77,7 @@ def draw(run: Run, before: Model, after: Model) -> None:
     below.set_ylabel("read less\nforetold, K")
     below.set_xlabel("time, s")
     below.axhline(0.0, color="0.7", lw=0.8)
-    above.legend(fontsize=8, loc="lower right")
+    above.legend(fontsize=8, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, frameon=False)
     mpl.rcParams["svg.hashsalt"] = "ninespring"
     figure.savefig(PICTURE, metadata={"Date": None})
     plt.close(figure)
