@@ -197,13 +197,6 @@ static bool has_taken_enough(const spring_estimator_t *e, const spring_belief_t 
     return b->run.heat.heat_k - b->run.heat.onset_k > LEAST_HEAT * latent_k;
 }
 
-/* Most of its change, also what came while nothing was read. */
-static bool has_come_from_cold(const spring_belief_t *b)
-{
-    return b->learnt.austenite_ohm > 0.0f && b->run.heat.cold_ohm > 0.0f &&
-           fabsf(b->ohm / b->run.heat.cold_ohm - 1.0f) > LEAST_PART * fabsf(b->learnt.change);
-}
-
 /* unseen_k: heat in which the last of its change may hide. */
 static bool is_over(const spring_estimator_t *e, const spring_belief_t *b,
                     const thermal_model_t *model, uint8_t k, float unseen_k)
@@ -213,7 +206,7 @@ static bool is_over(const spring_estimator_t *e, const spring_belief_t *b,
         return false;
     }
     return has_taken_enough(e, b, model, k)
-               ? (spring_has_grown(b) && has_changed(b, LEAST_PART)) || has_come_from_cold(b)
+               ? spring_has_grown(b) && has_changed(b, LEAST_PART)
                : flat_k >= SHIFT_BOUND_K && spring_has_grown(b) && has_changed(b, LONE_PART);
 }
 
