@@ -6,10 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from ninespring import native
 from ninespring.errors import InputError
 from ninespring.export.settings import settings_of
 from ninespring.fit.predict import predict
-from ninespring.fit.simulate import LOAD_STEP_N, load_changes
+from ninespring.fit.simulate import LOAD_STEP_N, load_changes, simulate_run
 from ninespring.logs import log_text, read_log
 from ninespring.models import Array, model_text, read_model
 from ninespring.verdict import diagnosis
@@ -59,6 +60,20 @@ def loaded(path: Path, k_per_n: float, seed: int) -> Path:
     columns |= {f"t{k + 1}_c": shown[:, k] for k in range(2)} | {"ambient_c": np.full(rows, ROOM_C)}
     path.write_text(log_text(np.arange(float(rows)), columns | {f"f{k + 1}_n": load[:, k] for k in range(2)}))
     return path
+
+
+def test_what_is_shown_as_a_load_moves_is_from_before(tmp_path: Path) -> None:
+    run = read_log(loaded(tmp_path / "log.csv", K_PER_N, 1), 2)
+    shown = []
+    for lag_s in (None, 0.02):
+        plant = native.Plant(1, 2)
+        plant.set_effects(["latent_heat", "transformation_shift", *([] if lag_s is None else ["sensor_lag"])])
+        plant.set("transformation_shift_k_per_n", K_PER_N)
+        if lag_s is not None:
+            plant.set("sensor_lag_s", lag_s)
+        shown.append(simulate_run(plant, run, run.ambient_c, {}))
+    # the spring itself jumps by kelvins with its load: a thermometer that is quick shows that in the row after
+    assert np.abs(shown[0] - shown[1]).max() < 0.3
 
 
 def test_a_load_is_found_sized_and_predicted(tmp_path: Path) -> None:

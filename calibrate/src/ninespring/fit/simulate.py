@@ -117,7 +117,9 @@ class _Along:
         pieces = []
         for first, last in zip([begin, *inside], [*inside, end], strict=True):
             self.lay_load(first)
-            pieces.append(self._straight(first, min(last + 1, end))[: last - first])
+            shown = self._straight(first, min(last + 1, end))
+            # a load that moves heats or cools a spring at once: what is shown as it moves is from before
+            pieces.append(shown if first == begin else shown[1:])
         return np.concatenate(pieces)
 
     def _straight(self, begin: int, end: int) -> np.ndarray:
