@@ -8,8 +8,6 @@ The data are of `boards.py`, which shares nothing with the product, and the boar
 from __future__ import annotations
 
 import argparse
-import concurrent.futures
-import json
 import os
 import sys
 import tempfile
@@ -33,10 +31,13 @@ from ninespring.verdict import diagnosis
 from ninespring.verdict.result import model_of
 from paper import data
 from tclab import LOGS, textbook
+from tell import Figures, tell
 
 HOURS = 2.0
 NONSENSE_K = 20.0
 """A thermometer that is so far off shows nonsense: no model is to blame."""
+FIGURES = Figures("python bench/diagnose/hours.py")
+row, percent = FIGURES.row, FIGURES.percent
 BOXES = ("shared_air", "plate_conduction")
 """Effects that are heat kept beside the heaters."""
 
@@ -114,21 +115,12 @@ def part_of(run: Run, begin: float, end: float) -> Run:
     """Return what of a run lies between two parts of its duration."""
     since = (run.time_s - run.time_s[0]) / run.duration_s
     here = (since >= begin) & (since <= end)
-    return replace(
-        run,
-        time_s=run.time_s[here] - run.time_s[here][0],
-        drive=np.ascontiguousarray(run.drive[here]),
-        temperature_c=run.temperature_c[here].copy(),
-        fan=run.fan[here],
-        ambient_c=None if run.ambient_c is None else run.ambient_c[here],
-        starts=[0],
-    )
+    part = run.part(here)
+    return replace(part, time_s=part.time_s - part.time_s[0])
 
 
-def halves(number: int) -> dict[str, Any] | None:
+def halves(number: int) -> dict[str, Any]:
     """Fit the first half of one of the boards in data/; return how well its second half is predicted."""
-    if number >= len(LOGS):
-        return None
     name, file, mapping, _ = LOGS[number]
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / f"{name}.csv"
@@ -151,31 +143,15 @@ def halves(number: int) -> dict[str, Any] | None:
     }
 
 
-def row(figure: str, value: float, unit: str, target: str = "") -> dict[str, Any]:
-    """Return one figure as results.py wants it."""
-    return {
-        "figure": figure,
-        "value": round(value, 3),
-        "unit": unit,
-        "target": target,
-        "command": "python bench/diagnose/hours.py",
-    }
-
-
-def share(figure: str, held: list[bool], target: str) -> dict[str, Any]:
-    """Return how many of all, in percent."""
-    return row(f"{figure} ({sum(held)} of {len(held)})", 100.0 * sum(held) / max(1, len(held)), "%", target)
-
-
 def figures(done: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """Return the figures of what was done."""
     out = []
     of = {part: [one for one in done if one["part"] == part] for part in ("unseen", "wander", "halves")}
     if sets := of["unseen"]:
-        out.append(share("two-hour logs: the lag named", [one["lag"] for one in sets], ">= 90"))
-        out.append(share("two-hour logs: the box named", [one["box"] for one in sets], ">= 90"))
+        out.append(percent("two-hour logs: the lag named", [one["lag"] for one in sets], ">= 90"))
+        out.append(percent("two-hour logs: the box named", [one["box"] for one in sets], ">= 90"))
         worse = np.array([one["error"] / one["true_model"] for one in sets])
-        out.append(share("two-hour logs: unseen run within 1.15 of the true model's error", list(worse <= 1.15), ""))
+        out.append(percent("two-hour logs: unseen run within 1.15 of the true model's error", list(worse <= 1.15), ""))
         out.append(
             row("two-hour logs: unseen run, of the true model's error, median", float(np.median(worse)), "x", "<= 1.15")
         )
@@ -185,7 +161,7 @@ def figures(done: list[dict[str, Any]]) -> list[dict[str, Any]]:
         )
     if sets := of["wander"]:
         out.append(
-            share("heat that wanders and nothing else: nothing named", [not one["names"] for one in sets], ">= 97")
+            percent("heat that wanders and nothing else: nothing named", [not one["names"] for one in sets], ">= 97")
         )
     for one in of["halves"]:
         named = " + ".join(one["names"]) or "nothing"
@@ -208,25 +184,14 @@ def main() -> int:
     )
     options = parser.parse_args()
     seeds = {"unseen": options.cases, "wander": 2 * options.cases, "halves": len(LOGS)}
-    parts: dict[str, Callable[[int], dict[str, Any] | None]] = {f.__name__: f for f in (unseen, wander, halves)}
+    parts: dict[str, Callable[[int], dict[str, Any]]] = {f.__name__: f for f in (unseen, wander, halves)}
     wanted = {
         f"{name} {seed}": (parts[name], seed)
         for name in options.parts.split(",")
         for seed in (range(len(LOGS)) if name == "halves" else range(options.first, options.first + seeds[name]))
     }
     fitting.WORKERS = 1
-    kept = Kept(options.resume)
-    with concurrent.futures.ProcessPoolExecutor(options.processes) as pool:
-        todo = {pool.submit(part, seed): key for key, (part, seed) in wanted.items() if key not in kept.cases}
-        for future in concurrent.futures.as_completed(todo):
-            one = future.result()
-            kept.add(todo[future], one)
-            print(json.dumps(one), file=sys.stderr, flush=True)
-    out = figures([kept.cases[key] for key in wanted])
-    for one in out:
-        print(f"{one['figure']:90} {one['value']:8} {one['unit']:14} {one['target']}")
-    if options.json:
-        options.json.write_text(json.dumps(out, indent=1) + "\n")
+    tell(figures(Kept(options.resume).all_of(wanted, options.processes)), options.json)
     return 0
 
 

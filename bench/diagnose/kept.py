@@ -3,8 +3,11 @@ the same."""
 
 from __future__ import annotations
 
+import concurrent.futures
 import hashlib
 import json
+import sys
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -40,3 +43,15 @@ class Kept:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             text = json.dumps({"stamp": self.stamp, "cases": self.cases}, indent=1)
             self.path.write_text(text + "\n", encoding="utf-8")
+
+    def all_of(
+        self, wanted: Mapping[str, tuple[Callable[[Any], dict[str, Any]], Any]], processes: int, unsaid: str = ""
+    ) -> list[dict[str, Any]]:
+        """Do what is not done of (call, argument) by key, each told as it ends but for its entry `unsaid`; return all cases."""
+        with concurrent.futures.ProcessPoolExecutor(processes) as pool:
+            todo = {pool.submit(*job): key for key, job in wanted.items() if key not in self.cases}
+            for future in concurrent.futures.as_completed(todo):
+                one = future.result()
+                self.add(todo[future], one)
+                print(json.dumps({k: v for k, v in one.items() if k != unsaid}), file=sys.stderr, flush=True)
+        return [self.cases[key] for key in wanted]

@@ -10,8 +10,6 @@ plant, with other numbers, are driven by the chip's controller with the settings
 from __future__ import annotations
 
 import argparse
-import concurrent.futures
-import json
 import math
 import os
 import sys
@@ -39,9 +37,11 @@ from ninespring.recording import script_lines
 from ninespring.search.evidence import excess
 from ninespring.verdict import board_alone as verdict_of_board
 from ninespring.verdict import diagnosis
+from tell import Figures, tell
 from world import Inputs, World, random_inputs, simulate
 
-COMMAND = "python bench/diagnose/real_logs.py"
+FIGURES = Figures("python bench/diagnose/real_logs.py")
+row, percent = FIGURES.row, FIGURES.percent
 
 
 def diagnosed(case: Case) -> tuple[diagnosis.Diagnosis, float]:
@@ -302,16 +302,6 @@ def _all(job: tuple[Callable[[int], dict[str, Any]], int]) -> dict[str, Any]:
     return out | {"part": job[0].__name__, "seed": job[1], "seconds": time.monotonic() - begun}
 
 
-def row(figure: str, value: float, unit: str, target: str) -> dict[str, Any]:
-    """Return one figure of the results."""
-    return {"figure": figure, "value": round(value, 3), "unit": unit, "target": target, "command": COMMAND}
-
-
-def percent(name: str, hits: list[bool], target: str) -> dict[str, Any]:
-    """Return how many of these are so."""
-    return row(f"{name} ({sum(hits)} of {len(hits)})", 100.0 * sum(hits) / max(1, len(hits)), "%", target)
-
-
 def figures(done: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """Return the figures of all parts."""
     part = {name: [one for one in done if one["part"] == name] for name in {one["part"] for one in done}}
@@ -404,14 +394,8 @@ def main() -> int:
     ]
     fitting.WORKERS = 1
     kept = Kept(options.resume)
-    wanted = {f"{part.__name__} {seed}": (part, seed) for part, seed in jobs}
-    with concurrent.futures.ProcessPoolExecutor(options.processes) as pool:
-        todo = {pool.submit(_all, job): key for key, job in wanted.items() if key not in kept.cases}
-        for future in concurrent.futures.as_completed(todo):
-            one = future.result()
-            kept.add(todo[future], one)
-            print(json.dumps({k: v for k, v in one.items() if k != "events"}), file=sys.stderr, flush=True)
-    done = [kept.cases[key] for key in wanted]
+    wanted = {f"{part.__name__} {seed}": (_all, (part, seed)) for part, seed in jobs}
+    done = kept.all_of(wanted, options.processes, unsaid="events")
     out = figures(done)
     private = os.environ.get("NINESPRING_PRIVATE")
     for one in niti(Path(private) / "niti_pulse") if private else []:
@@ -426,10 +410,7 @@ def main() -> int:
         text = f"the same, {one['file']}: least of any model that only cools once the drive is off"
         out.append(row(text, one["least"], "K", ""))
     out = [one for one in out if "(0 of 0)" not in one["figure"]]
-    for one in out:
-        print(f"{one['figure']:90} {one['value']:8} {one['unit']:4} {one['target']}")
-    if options.json:
-        options.json.write_text(json.dumps(out, indent=1) + "\n")
+    tell(out, options.json)
     return 0
 
 

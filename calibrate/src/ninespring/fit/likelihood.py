@@ -51,11 +51,6 @@ class Colour:
         """Variance of all that lasts, in units of the white noise's."""
         return max(sum(self.apart), sum(self.together))
 
-    @property
-    def plain(self) -> bool:
-        """Whether nothing lasts that is worth a filter."""
-        return self.share < 1e-3
-
 
 @functools.cache
 def _whiten() -> ctypes._CFuncPtr:
@@ -137,6 +132,10 @@ class Rows:
         """Readings that count."""
         return sum(one.count(1) for one in self.there)
 
+    def sizes(self, colour: Colour, channel: int) -> tuple[float, float]:
+        """Return the variances of a channel's errors that last."""
+        return colour.together if self.turn is not None and channel == 0 else colour.apart
+
     def whitened(self, columns: np.ndarray, colour: Colour) -> tuple[np.ndarray, float]:
         """Return columns (readings, n), in units of the noise, as innovations, and the sum of the logarithms of their deviations.
 
@@ -150,9 +149,8 @@ class Rows:
             part = np.einsum("ab,rbc->rac", self.turn, part)
         logarithms = 0.0
         for k, there in enumerate(self.there):
-            sizes = colour.together if self.turn is not None and k == 0 else colour.apart
             one = np.ascontiguousarray(part[:, k])
-            logarithms += _filtered(self.step_s, there, sizes, colour.time_s, one)
+            logarithms += _filtered(self.step_s, there, self.sizes(colour, k), colour.time_s, one)
             part[:, k] = one
         fields[:, self.seen] = part
         return fields[self.mask], logarithms
@@ -165,16 +163,12 @@ class Rows:
         rows, springs = self.mask.shape
         hidden = np.zeros((rows, springs), dtype=bool)
         hidden[self.mask] = out
-        fields = self.turned(vector)
-        mean, own = fields
+        field = np.concatenate(self.turned(vector), axis=1)
         told = np.zeros((rows, len(self.seen)))
         for k, there in enumerate(self.there):
-            together = self.turn is not None and k == 0
-            field = mean[:, 0] if together else own[:, k - mean.shape[1]]
             gone = hidden[:, self.seen].any(axis=1) if self.turn is not None else hidden[:, self.seen[k]]
             known = np.frombuffer(there, dtype=np.uint8).astype(bool) & ~gone
-            sizes = colour.together if together else colour.apart
-            told[:, k] = _smoothed(self.step_s, known, sizes, colour.time_s, field)
+            told[:, k] = _smoothed(self.step_s, known, self.sizes(colour, k), colour.time_s, field[:, k])
         part = np.zeros((rows, springs))
         part[:, self.seen] = told if self.turn is None else told @ self.turn
         return np.where(out, part[self.mask], 0.0)

@@ -12,7 +12,7 @@ from ..errors import InputError, WorkError
 from ..logs.run import Run
 from ..models import Model
 from . import room
-from .simulate import array_parameters, fades_per_s, simulate_run
+from .simulate import array_parameters, simulate_run
 
 
 def plant_of(model: Model) -> native.Plant:
@@ -43,12 +43,7 @@ def in_its_room(model: Model, run: Run) -> Run:
     plant = plant_of(model)
     known = model.provenance
     over = known.get("room_over_first_k"), known.get("room_over_first_sigma_k")
-    guess = room.guessed(run, plant.get("ambient_c"), None if None in over else over)
-
-    def shows(part: Run, ambient_c: float, offset: np.ndarray) -> np.ndarray:
-        return simulate_run(plant.copy(), part, np.full(len(part.time_s), ambient_c), {}, offset)
-
-    value, sigma = room.of_run(run, guess, shows, fades_per_s(plant))
+    value, sigma = room.by_plant(run, plant, plant.get("ambient_c"), None if None in over else over)
     said = f"no ambient_c: by the first minute the room is at {value:.1f} degC (+-{sigma:.1f})"
     return replace(run, ambient_c=np.full(len(run.time_s), value), notes=[*run.notes, said])
 

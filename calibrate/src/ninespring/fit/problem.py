@@ -320,12 +320,15 @@ class Problem:
             out -= (out @ self.unnamed) @ self.unnamed.T
         return self._whitened(self.filtered(out.T)).T
 
+    def by_run(self, columns: np.ndarray) -> list[np.ndarray]:
+        """Return columns (count, ...) as one piece a run."""
+        return np.split(columns, np.cumsum([int(mask.sum()) for mask in self.mask])[:-1])
+
     def filtered(self, columns: np.ndarray) -> np.ndarray:
         """Return columns (count, n), in units of the noise, as innovations of a filter that knows how errors last, if any is known."""
         if self.colour is None:
             return columns
-        ends = np.cumsum([int(mask.sum()) for mask in self.mask])[:-1]
-        parts = zip(self.rows, np.split(columns, ends), strict=True)
+        parts = zip(self.rows, self.by_run(columns), strict=True)
         return np.concatenate([rows.whitened(part, self.colour)[0] for rows, part in parts])
 
     def _whitened(self, columns: np.ndarray, back: bool = False) -> np.ndarray:
@@ -626,8 +629,7 @@ class Problem:
         """Return what lasts of a vector (count,), in units of the noise, where `out` is set, as all other readings tell it."""
         if colour is None:
             return np.zeros_like(vector)
-        ends = np.cumsum([int(mask.sum()) for mask in self.mask])[:-1]
-        parts = zip(self.rows, np.split(vector, ends), np.split(out, ends), strict=True)
+        parts = zip(self.rows, self.by_run(vector), self.by_run(out), strict=True)
         return np.concatenate([rows.between(part, colour, gone) for rows, part, gone in parts])
 
     def plain_slopes(self, fit: Fit) -> np.ndarray:

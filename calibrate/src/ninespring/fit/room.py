@@ -13,9 +13,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import trim_mean
 
+from .. import native
 from ..logs.run import Run
 from . import statistics
-from .simulate import hidden_k
+from .simulate import fades_per_s, hidden_k, simulate_run
 
 FIRST_S = 60.0
 """Of a run, what it is told by."""
@@ -102,15 +103,7 @@ def begun(run: Run) -> Run | None:
         end = min(end, run.starts[1])
     if end < 5 or not np.isfinite(run.temperature_c[:end]).any():
         return None
-    return replace(
-        run,
-        time_s=run.time_s[:end],
-        drive=np.ascontiguousarray(run.drive[:end]),
-        temperature_c=run.temperature_c[:end],
-        fan=run.fan[:end],
-        load_n=None if run.load_n is None else run.load_n[:end],
-        starts=[0],
-    )
+    return run.part(slice(end))
 
 
 def of_run(
@@ -156,3 +149,12 @@ def _moments(parts: Sequence[Guess]) -> tuple[float, float]:
         weight
     )
     return middle, math.sqrt(square)
+
+
+def by_plant(run: Run, plant: native.Plant, usual_c: float, over: tuple[float, float] | None) -> tuple[float, float]:
+    """Return how warm the room of a run is and one sigma of it, as a fitted plant shows its first minute; `over` as `over_first`."""
+
+    def shows(part: Run, ambient_c: float, offset: np.ndarray) -> np.ndarray:
+        return simulate_run(plant.copy(), part, np.full(len(part.time_s), ambient_c), {}, offset)
+
+    return of_run(run, guessed(run, usual_c, over), shows, fades_per_s(plant))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
@@ -59,3 +59,19 @@ class Run:
     def duration_s(self) -> float:
         """From the first row to the last, s."""
         return float(self.time_s[-1] - self.time_s[0])
+
+    def part(self, rows: slice | np.ndarray) -> Run:
+        """Return some rows on end, a slice or a mask, as a run of its own; v and i are left out."""
+        ambient, load = self.ambient_c, self.load_n
+        return replace(
+            self,
+            time_s=self.time_s[rows],
+            drive=np.ascontiguousarray(self.drive[rows]),
+            temperature_c=self.temperature_c[rows].copy(),
+            fan=self.fan[rows],
+            ambient_c=None if ambient is None else ambient[rows],
+            current_a=None,
+            voltage_v=None,
+            load_n=None if load is None else load[rows],
+            starts=[0],
+        )

@@ -16,7 +16,7 @@ import numpy as np
 from ..fit import room
 from ..fit.likelihood import Colour
 from ..fit.problem import Problem
-from ..fit.simulate import fades_per_s, simulate_run
+from ..fit.simulate import simulate_run
 from ..fit.spec import RUNS_OWN, Fit, Free, Spec
 from ..logs.run import Run
 from ..search.search import Search
@@ -114,11 +114,7 @@ def _room(problem: Problem, run: Run, values: dict[str, float], plant: Any) -> f
     rooms = {r: values[f"ambient_c@{r + 1}"] for r in range(len(problem.runs)) if f"ambient_c@{r + 1}" in values}
     usual = float(np.mean(list(rooms.values()))) if rooms else plant.get("ambient_c")
     over = room.over_first([problem.runs[r] for r in rooms], list(rooms.values())) if rooms else None
-
-    def shows(part: Run, ambient_c: float, offset: np.ndarray) -> np.ndarray:
-        return simulate_run(plant.copy(), part, np.full(len(part.time_s), ambient_c), {}, offset)
-
-    return room.of_run(run, room.guessed(run, usual, over), shows, fades_per_s(plant))[0]
+    return room.by_plant(run, plant, usual, over)[0]
 
 
 @dataclass
