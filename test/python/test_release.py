@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
 import yaml
 from ninespring import simulated
 from ninespring.errors import WorkError
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
 
 ROOT = Path(__file__).resolve().parents[2]
 WORKFLOW = (ROOT / ".github" / "workflows" / "release.yml").read_text()
@@ -23,7 +27,7 @@ def test_the_workflow_names_jobs_scripts_and_presets_that_are_there() -> None:
         needs = job.get("needs", [])
         assert set([needs] if isinstance(needs, str) else needs) <= set(jobs)
     scripts = re.findall(r"\bscript/([\w-]+)", WORKFLOW)
-    assert {"wheel", "release-version"} <= set(scripts)
+    assert {"wheel", "release-version", "sbom"} <= set(scripts)
     for name in scripts:
         assert os.access(ROOT / "script" / name, os.X_OK), name
     presets = (ROOT / "CMakePresets.json").read_text()
@@ -32,6 +36,60 @@ def test_the_workflow_names_jobs_scripts_and_presets_that_are_there() -> None:
     firmware = (ROOT / "firmware" / "CMakeLists.txt").read_text()
     for name in ("firmware", "firmware_hil"):
         assert f"ninespring_add_firmware({name}" in firmware
+
+
+def locked(name: str) -> dict[str, list[str]]:
+    """The versions of each package in requirements/NAME.txt; fails where one has no hash."""
+    versions: dict[str, list[str]] = {}
+    for entry in re.split(r"\n(?=\S)", (ROOT / "requirements" / f"{name}.txt").read_text()):
+        if not entry.startswith("#"):
+            assert "--hash=sha256:" in entry, entry
+            package, version = re.match(r"([\w.-]+)==(\S+)", entry).groups()
+            versions.setdefault(package, []).append(version)
+    return versions
+
+
+def test_what_the_package_asks_for_is_locked_with_hashes() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())
+    wanted = {"run": project["project"]["dependencies"] + project["build-system"]["requires"]}
+    wanted["test"] = wanted["run"] + [
+        line for extra in project["project"]["optional-dependencies"].values() for line in extra
+    ]
+    for name, requirements in wanted.items():
+        versions = locked(name)
+        for requirement in map(Requirement, requirements):
+            found = versions.get(canonicalize_name(requirement.name), [])
+            assert found, f"{requirement} is not in requirements/{name}.txt: script/lock"
+            assert all(requirement.specifier.contains(version) for version in found), f"{requirement}: script/lock"
+    tested = locked("test")
+    assert {name: versions for name, versions in locked("run").items() if tested.get(name) != versions} == {}
+
+
+@pytest.mark.parametrize("name", ["run", "test"])
+def test_the_lock_names_no_index(name: str) -> None:
+    lines = (ROOT / "requirements" / f"{name}.txt").read_text().splitlines()
+    assert [line for line in lines if "://" in line or line.startswith("-")] == []
+
+
+@pytest.mark.parametrize(
+    ("kind", "whole", "parts"),
+    [
+        ("firmware", "MIT", {"avr-libc", "libgcc"}),
+        ("simulator", "GPL-3.0-or-later", {"avr-libc", "libgcc", "simavr", "libelf", "numpy"}),
+        ("package", "MIT", {"numpy", "scipy", "starlette"}),
+    ],
+)
+def test_a_release_says_what_it_is_made_of(kind: str, whole: str, parts: set[str]) -> None:
+    run = subprocess.run([sys.executable, ROOT / "script" / "sbom", kind], capture_output=True, text=True, check=True)
+    document = json.loads(run.stdout)
+    product = document["metadata"]["component"]
+    assert product["licenses"] == [{"expression": whole}]
+    assert product["version"] == release_version().stdout.strip().removeprefix("version=")
+    found = {part["name"]: part for part in document["components"]}
+    assert parts <= set(found)
+    for name in parts & set(locked("run")):
+        assert found[name]["version"] in locked("run")[name]
+    assert all("version" in part or part["name"] in run.stderr for part in found.values())
 
 
 def release_version(*words: str) -> subprocess.CompletedProcess[str]:
