@@ -47,15 +47,12 @@ bool scrub_step(scrub_t *scrub, scrub_stretches_t stretches, const void *owner, 
             begin_pass(scrub);
             return true;
         }
-        /* at is below the length, or a bit of it has turned over, too: then the pass fails */
-        const uint16_t left =
-            scrub->at < stretch.length ? (uint16_t)(stretch.length - scrub->at) : 0u;
-        const uint8_t now = (uint8_t)(left < bytes ? left : bytes);
-        scrub->running =
-            crc16_add_bytes(scrub->running, (const uint8_t *)stretch.bytes + scrub->at, now);
-        scrub->at = (uint16_t)(scrub->at + now);
-        bytes = (uint8_t)(bytes - now);
-        if (now == left) {
+        /* a bit of at may have turned over, too: where it is beyond the end the pass fails */
+        const uint8_t *const next = stretch.bytes;
+        for (; bytes > 0 && scrub->at < stretch.length; bytes--, scrub->at++) {
+            scrub->running = crc16_add(scrub->running, next[scrub->at]);
+        }
+        if (scrub->at >= stretch.length) {
             scrub->at = 0;
             scrub->index++;
         }
