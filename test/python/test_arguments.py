@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from pathlib import Path
 
 import click
@@ -11,6 +9,7 @@ import ninespring as ns
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from command import ninespring
 from ninespring import ranges
 from ninespring.cli import cli
 from ninespring.console import Real, Whole
@@ -56,7 +55,7 @@ def test_every_number_of_every_command_is_refused_beyond_its_range() -> None:
     [["plan", "--hottest", "nan"], ["record", "--duration", "nan"], ["dashboard", "--speed", "nan"]],
 )
 def test_nan_ends_with_exit_code_2_and_one_line(words: list[str]) -> None:
-    done = subprocess.run([sys.executable, "-m", "ninespring", *words], capture_output=True, text=True, check=False)
+    done = ninespring(*words)
     assert done.returncode == 2 and done.stderr.count("\n") == 1 and words[1] in done.stderr and not done.stdout
 
 

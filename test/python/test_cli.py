@@ -14,6 +14,7 @@ import jsonschema
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from command import ninespring
 from ninespring import cli, console
 from ninespring.errors import WorkError
 from ninespring.fit.predict import predict
@@ -21,16 +22,6 @@ from ninespring.logs import log_text, read_log, read_table, write_atomically
 from ninespring.models import Array, Model, model_text, read_model
 from ninespring.verdict import doubt
 from rich.console import Console
-
-
-def ninespring(*arguments: object) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "ninespring", *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        timeout=300,
-        check=False,
-    )
 
 
 def test_diagnose_predict_and_export_in_a_row(make_log, tmp_path: Path) -> None:
@@ -288,15 +279,11 @@ def test_help_says_what_it_does_with_an_example(command: str) -> None:
         ("nonsense",),
     ],
 )
-def test_wrong_input_ends_with_two_and_one_line(arguments: tuple[str, ...], tmp_path: Path) -> None:
-    done = subprocess.run(
-        [sys.executable, "-m", "ninespring", *arguments],
-        capture_output=True,
-        text=True,
-        cwd=tmp_path,
-        timeout=60,
-        check=False,
-    )
+def test_wrong_input_ends_with_two_and_one_line(
+    arguments: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    done = ninespring(*arguments)
     assert done.returncode == 2
     assert len(done.stderr.strip().splitlines()) == 1
     assert list(tmp_path.iterdir()) == []

@@ -207,9 +207,11 @@ static void clear_forgets_in_memory_and_over_power_off(void)
 {
     hold(0, DRIVE_POLICY_STAGE_HOLD);
     learn(0, &numbers);
+    learn(8, &numbers);
     seconds(LEARNT_STORE_HELD_S);
     learnt_store_clear(&store, &controller);
     TEST_ASSERT_EQUAL_FLOAT(0.0f, controller_learnt(&controller, 0).austenite_ohm);
+    TEST_ASSERT_EQUAL_FLOAT(0.0f, controller_learnt(&controller, 8).austenite_ohm);
     seconds(1);
     TEST_ASSERT_FALSE(learnt_store_keeps(&store));
     power_on();
@@ -287,6 +289,7 @@ static void the_last_springs_first_numbers_are_saved_after_the_shortest_pause(vo
     learn(0, &numbers);
     seconds(LEARNT_STORE_HELD_S);
     TEST_ASSERT_TRUE(writes > 0);
+    TEST_ASSERT_EQUAL_UINT8(0, store.refined);
     store.refined = LEARNT_STORE_LONGEST_SHIFT;
     learn(8, &numbers);
     writes = 0;
@@ -300,6 +303,18 @@ static void the_last_springs_first_numbers_are_saved_after_the_shortest_pause(vo
     writes = 0;
     seconds(2000);
     TEST_ASSERT_EQUAL_UINT(0, writes);
+}
+
+/* The clock of the pause stays where it ends: it would begin anew after 18 hours. */
+static void a_day_without_a_save_puts_none_off(void)
+{
+    for (uint32_t s = 0; s < 65000u; s++) {
+        learnt_store_second(&store, &controller);
+    }
+    hold(0, DRIVE_POLICY_STAGE_HOLD);
+    learn(0, &numbers);
+    seconds(LEARNT_STORE_HELD_S);
+    TEST_ASSERT_TRUE(writes > 0);
 }
 
 /* Each number by itself: a little less than what is worth a save, and a little more. */
@@ -340,6 +355,7 @@ int main(void)
     RUN_TEST(what_lies_at_its_limit_is_taken_back);
     RUN_TEST(a_second_that_is_not_held_begins_the_minute_anew);
     RUN_TEST(the_last_springs_first_numbers_are_saved_after_the_shortest_pause);
+    RUN_TEST(a_day_without_a_save_puts_none_off);
     RUN_TEST(each_number_is_worth_a_save_at_its_own_limit);
     return UNITY_END();
 }
