@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import os
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import ninespring as ns
 import numpy as np
 import pytest
+from command import ninespring
 from fake_board import FakeBoard, row
 from ninespring.cli import cli
 
@@ -121,17 +120,15 @@ def test_a_board_that_tells_nothing_of_its_springs_still_streams() -> None:
 
 @pytest.mark.parametrize(("name", "begins"), [("p.png", b"\x89PNG"), ("p.svg", b"<?xml"), ("p.gif", b"GIF89a")])
 def test_plot_draws_a_log(make_log, tmp_path: Path, name: str, begins: bytes) -> None:
-    log = make_log(seconds=60)
-    command = [sys.executable, "-m", "ninespring", "plot", str(log), "-o", str(tmp_path / name)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    log = make_log(seconds=12)
+    done = ninespring("plot", log, "-o", tmp_path / name)
     assert done.returncode == 0, done.stderr
     assert (tmp_path / name).read_bytes().startswith(begins)
     assert sorted(one.name for one in tmp_path.iterdir()) == sorted([name, log.name])
 
 
 def test_plot_refuses_a_picture_that_it_cannot_make(make_log, tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "ninespring", "plot", str(make_log(seconds=60)), "-o", str(tmp_path / "p.bmp")]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    done = ninespring("plot", make_log(seconds=60), "-o", tmp_path / "p.bmp")
     assert done.returncode == 2 and ".png, .svg, .pdf, .gif" in done.stderr
 
 

@@ -68,7 +68,7 @@ def test_a_function_refuses_what_its_option_refuses(bad: object) -> None:
 @pytest.fixture
 def derived(make_log, tmp_path: Path) -> dict[str, list[str]]:
     """Return, per command that derives a file, its words without the output."""
-    log, model = make_log("run.csv", seconds=60), tmp_path / "m.toml"
+    log, model = make_log("run.csv", seconds=12), tmp_path / "m.toml"  # a frame a second
     made = Model(Array())
     made.parameters, made.stderr = {"loss_w_per_k": 0.0058}, {"loss_w_per_k": 1e-4}
     model.write_text(model_text(made))

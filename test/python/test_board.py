@@ -14,6 +14,7 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
+import command
 import numpy as np
 import pytest
 from ninespring.board import Board
@@ -56,7 +57,9 @@ def run(*words: object) -> str:
 
 
 def ninespring(*words: object) -> str:
-    return run(sys.executable, "-m", "ninespring", *words)
+    done = command.ninespring(*words)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
 
 
 def measured(folder: Path, name: str, **values: object) -> Path:

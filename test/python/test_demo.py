@@ -25,6 +25,7 @@ def demo(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> ModuleType:
     return module
 
 
+@pytest.mark.nightly
 def test_the_demo_finds_what_nobody_declared_and_drives_better_right_after_its_upload(
     demo: ModuleType, make_log, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

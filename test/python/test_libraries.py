@@ -43,30 +43,43 @@ def test_its_descriptions_say_the_same_as_its_build(name: str) -> None:
     assert (folder / data["headers"]).exists()
 
 
+@pytest.fixture(scope="module")
+def elsewhere(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder with a copy of each library, where each was compiled once, with nothing but what it names."""
+    folder = tmp_path_factory.mktemp("libraries")
+    for name, home in LIBRARIES.items():
+        shutil.copytree(home, folder / name, ignore=shutil.ignore_patterns("CMakeLists.txt"))
+    return folder
+
+
+def build(*words: object) -> None:
+    done = subprocess.run(list(map(str, words)), capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+def compiled(folder: Path, name: str) -> list[Path]:
+    """Return a library's objects."""
+    objects = []
+    for source in (folder / name).glob("*.c"):
+        objects.append(source.with_suffix(".o"))
+        if not objects[-1].exists():
+            include = [f"-I{folder / one}" for one in needed(name)]
+            build("avr-gcc", *MEGA, "-std=c99", *include, "-c", source, "-o", objects[-1])
+    return objects
+
+
 @pytest.mark.skipif(shutil.which("avr-gcc") is None, reason="SKIPPED: no avr-gcc: script/setup installs it")
 @pytest.mark.parametrize("name", LIBRARIES)
-def test_it_and_its_examples_compile_for_the_mega_outside_of_the_tree(name: str, tmp_path: Path) -> None:
-    libraries = []
-    for one in needed(name):
-        shutil.copytree(LIBRARIES[one], tmp_path / one, ignore=shutil.ignore_patterns("CMakeLists.txt"))
-        libraries.append(tmp_path / one)
-    include = [f"-I{one}" for one in libraries]
-
-    def build(*words: object) -> None:
-        done = subprocess.run(list(map(str, words)), capture_output=True, text=True, cwd=tmp_path, check=False)
-        assert done.returncode == 0, done.stderr
-
-    objects = []
-    for source in (one for folder in libraries for one in folder.glob("*.c")):
-        objects.append(tmp_path / f"{source.parent.name}_{source.stem}.o")
-        build("avr-gcc", *MEGA, "-std=c99", *include, "-c", source, "-o", objects[-1])
-    examples = list((tmp_path / name / "examples").glob("*/*.ino"))
+def test_it_and_its_examples_compile_for_the_mega_outside_of_the_tree(name: str, elsewhere: Path) -> None:
+    include = [f"-I{elsewhere / one}" for one in needed(name)]
+    objects = [made for one in needed(name) for made in compiled(elsewhere, one)]
+    examples = list((elsewhere / name / "examples").glob("*/*.ino"))
     assert len(examples) == len(described(name).get("examples", []))
     if examples and not CORE.is_dir():
         pytest.skip(f"SKIPPED: no Arduino core at {CORE}: script/setup installs it")
     core = [f"-I{CORE / 'cores/arduino'}", f"-I{CORE / 'variants/mega'}"]
     for example in examples:
-        made = tmp_path / f"{example.stem}.o"
+        made = example.with_suffix(".o")
         cpp = ("-std=gnu++11", "-x", "c++", "-include", "Arduino.h", *core)
         build("avr-g++", *MEGA, *cpp, *include, "-c", example, "-o", made)
         # whatever it calls is in the libraries that it names, in the core, or in the compiler's own

@@ -64,6 +64,7 @@ def test_the_results_first_page_has_a_figure_for_each_of_its_lines() -> None:
     assert page.split("Page written")[0] == results.first_page().split("Page written")[0]  # by nobody's hand
 
 
+@pytest.mark.nightly
 def test_the_notebook_runs_from_its_first_cell_to_its_last(tmp_path: Path) -> None:
     sim = Path(os.environ.get("NINESPRING_SIM", ROOT / "build" / "host" / "ninespring-sim"))
     if not sim.exists():

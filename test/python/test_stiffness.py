@@ -212,6 +212,7 @@ def simulator() -> str:
     return str(SIM)
 
 
+@pytest.mark.nightly
 def test_from_geometry_to_a_picture(tmp_path: Path) -> None:
     """The journey of docs/exploring.md, in small."""
     pytest.importorskip("skfem", reason="SKIPPED: scikit-fem is missing: pip install 'ninespring[explore]'")
