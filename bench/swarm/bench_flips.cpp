@@ -145,12 +145,13 @@ const char *kind_of(const result &r, const result &sound)
 int main(int argc, char **argv)
 {
     CLI::App app{"Bits of RAM and registers turned over in a board that holds springs hot."};
-    unsigned runs = 100;
+    unsigned runs = 50, boards = 2;
     std::uint64_t seed = 1;
     double watch_s = 40.0, registers = 0.25;
     std::string elf = ninespring::default_elf("firmware.elf"), json;
     unsigned from = 0, bytes = 0;
-    app.add_option("--runs", runs, "flips")->capture_default_str();
+    app.add_option("--runs", runs, "flips in each board")->capture_default_str();
+    app.add_option("--boards", boards, "arrays, with seeds from --seed on")->capture_default_str();
     app.add_option("--seed", seed)->capture_default_str();
     app.add_option("--watch", watch_s, "seconds after each")->capture_default_str();
     app.add_option("--registers", registers, "share of them in registers, not in RAM that is used")
@@ -166,40 +167,44 @@ int main(int argc, char **argv)
     }
     std::map<std::string, unsigned> found;
     try {
-        random_t dice = random_seeded(seed, 31);
-        bench b(seed, elf);
-        board_run_ms(b.board.get(), 600.0);
-        b.type("model cold\n");
-        b.type("pattern 111101111\n");
-        board_run_ms(b.board.get(), 45000.0);
-        const unsigned used = board_static_ram_bytes(b.board.get());
-        result sound{};
-        for (unsigned n = 0; n < runs; ++n) {
-            board_run_ms(b.board.get(), 7.0); /* another moment of the tick each time */
-            unsigned address;
-            if (bytes > 0) {
-                address = from + static_cast<unsigned>(random_bits(&dice) % bytes);
-            } else if (random_uniform(&dice, 0.0, 1.0) < registers) {
-                address = REGISTERS_BEGIN +
-                          static_cast<unsigned>(random_bits(&dice) % (RAM_BEGIN - REGISTERS_BEGIN));
-            } else {
-                const auto at = static_cast<unsigned>(random_bits(&dice) % (used + STACK_BYTES));
-                address = at < used ? RAM_BEGIN + at : RAM_END - 1u - (at - used);
-            }
-            const auto bit = static_cast<unsigned>(random_bits(&dice) % 8u);
-            if (n % SOUND_EVERY == 0) {
-                sound = apart([&] { return b.watch(watch_s); });
-            }
-            const result r = apart([&] {
-                board_flip(b.board.get(), address, static_cast<std::uint8_t>(1u << bit));
-                return b.watch(watch_s);
-            });
-            const char *const kind = kind_of(r, sound);
-            ++found[kind];
-            if (std::string(kind) != "no effect" && std::string(kind) != "said") {
-                fmt::print("0x{:04X} bit {}: {}, {:.1f} degC\n", address, bit, kind,
-                           *std::max_element(r.hottest_c.begin(), r.hottest_c.end()));
-                std::fflush(stdout);
+        for (unsigned m = 0; m < boards; ++m) {
+            random_t dice = random_seeded(seed + m, 31);
+            bench b(seed + m, elf);
+            board_run_ms(b.board.get(), 600.0);
+            b.type("model cold\n");
+            b.type("pattern 111101111\n");
+            board_run_ms(b.board.get(), 45000.0);
+            const unsigned used = board_static_ram_bytes(b.board.get());
+            result sound{};
+            for (unsigned n = 0; n < runs; ++n) {
+                board_run_ms(b.board.get(), 7.0); /* another moment of the tick each time */
+                unsigned address;
+                if (bytes > 0) {
+                    address = from + static_cast<unsigned>(random_bits(&dice) % bytes);
+                } else if (random_uniform(&dice, 0.0, 1.0) < registers) {
+                    address =
+                        REGISTERS_BEGIN +
+                        static_cast<unsigned>(random_bits(&dice) % (RAM_BEGIN - REGISTERS_BEGIN));
+                } else {
+                    const auto at =
+                        static_cast<unsigned>(random_bits(&dice) % (used + STACK_BYTES));
+                    address = at < used ? RAM_BEGIN + at : RAM_END - 1u - (at - used);
+                }
+                const auto bit = static_cast<unsigned>(random_bits(&dice) % 8u);
+                if (n % SOUND_EVERY == 0) {
+                    sound = apart([&] { return b.watch(watch_s); });
+                }
+                const result r = apart([&] {
+                    board_flip(b.board.get(), address, static_cast<std::uint8_t>(1u << bit));
+                    return b.watch(watch_s);
+                });
+                const char *const kind = kind_of(r, sound);
+                ++found[kind];
+                if (std::string(kind) != "no effect" && std::string(kind) != "said") {
+                    fmt::print("0x{:04X} bit {}: {}, {:.1f} degC\n", address, bit, kind,
+                               *std::max_element(r.hottest_c.begin(), r.hottest_c.end()));
+                    std::fflush(stdout);
+                }
             }
         }
     } catch (const std::exception &error) {
@@ -210,8 +215,23 @@ int main(int argc, char **argv)
         fmt::print("{:15} {}\n", kind, count);
     }
     if (!json.empty()) {
-        std::ofstream(json)
-            << nlohmann::json{{"flips", runs}, {"seed", seed}, {"found", found}}.dump(1) << '\n';
+        const std::string command =
+            fmt::format("bench_flips --runs {} --boards {} --seed {}", runs, boards, seed);
+        nlohmann::json figures = nlohmann::json::array();
+        const auto figure = [&](const std::string &name, unsigned count, const char *target) {
+            figures.push_back({{"figure", name},
+                               {"value", count},
+                               {"unit", "1"},
+                               {"target", target},
+                               {"command", command}});
+        };
+        figure("flips", runs * boards, "");
+        figure("... that leave a spring hotter by 10 K unsaid", found["HOTTER, UNSAID"], "0");
+        for (const char *kind :
+             {"hotter, said", "said", "console dead", "off, unsaid", "no effect"}) {
+            figure(fmt::format("... {}", kind), found[kind], "");
+        }
+        std::ofstream(json) << figures.dump(1) << '\n';
     }
     return found.count("HOTTER, UNSAID") == 0 ? 0 : 1;
 }

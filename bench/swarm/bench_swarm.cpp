@@ -142,15 +142,25 @@ int main(int argc, char **argv)
         failed += count;
     }
     if (!json.empty()) {
-        std::ofstream(json) << nlohmann::json{{"runs", runs},
-                                              {"seed", seed},
-                                              {"simulated_h", simulated_s / 3600.0},
-                                              {"answers", answers},
-                                              {"hottest_c", hottest_c},
-                                              {"drawn", drawn},
-                                              {"broken", broken}}
-                                   .dump(1)
-                            << '\n';
+        const std::string command = fmt::format("bench_swarm --runs {} --seed {}", runs, seed);
+        nlohmann::json figures = nlohmann::json::array();
+        const auto figure = [&](const std::string &name, nlohmann::json value, const char *unit,
+                                const char *target) {
+            figures.push_back({{"figure", name},
+                               {"value", value},
+                               {"unit", unit},
+                               {"target", target},
+                               {"command", command}});
+        };
+        figure("lives", runs, "1", "");
+        figure("simulated hours", simulated_s / 3600.0, "h", ">= 200");
+        figure("lives in which something that must hold was broken", failed, "1", "0");
+        figure("hottest that any spring came", hottest_c, "degC", "");
+        figure("lines answered", answers, "1", "");
+        for (const auto &[name, count] : drawn) {
+            figure(fmt::format("faults drawn: {}", name), count, "1", "");
+        }
+        std::ofstream(json) << figures.dump(1) << '\n';
     }
     return failed == 0 ? 0 : 1;
 }

@@ -618,6 +618,30 @@ static void target_is_cut_to_the_most_and_blindness_does_not_wrap(void)
     }
 }
 
+/* What still flows from before is no answer to a duty that was not given. */
+static void what_is_read_before_the_start_teaches_nothing(void)
+{
+    const uint16_t fresh = tick(1000);
+    setUp();
+    load.now_ua = load.before_ua = 2000000;
+    TEST_ASSERT_EQUAL_UINT16(fresh, tick(1000));
+}
+
+/* A change as small as that need not wait; a start of any size does, for what is read at it. */
+static void a_small_start_has_its_turn_and_one_mA_is_given(void)
+{
+    unsigned given = 0;
+    (void)tick(0);
+    (void)tick(3);
+    TEST_ASSERT_EQUAL_UINT16(0, current_control_reference_ma(&control, 0));
+    (void)tick(3);
+    TEST_ASSERT_EQUAL_UINT16(3, current_control_reference_ma(&control, 0));
+    for (int n = 0; n < 100; n++) {
+        given += tick(1);
+    }
+    TEST_ASSERT_UINT_WITHIN(4, 6, given); /* 800 steps x 1 mA x 0.37 ohm / 5 V, in each tick */
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -647,5 +671,7 @@ int main(void)
     RUN_TEST(a_new_one_is_off_and_has_the_numbers_of_its_circuit);
     RUN_TEST(off_is_nothing_and_small_ends_at_25_ma);
     RUN_TEST(target_is_cut_to_the_most_and_blindness_does_not_wrap);
+    RUN_TEST(what_is_read_before_the_start_teaches_nothing);
+    RUN_TEST(a_small_start_has_its_turn_and_one_mA_is_given);
     return UNITY_END();
 }

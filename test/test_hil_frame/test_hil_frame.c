@@ -144,6 +144,8 @@ static void endless_frame_is_dropped_and_does_not_overflow(void)
     for (uint16_t i = 0; i < 1000; i++) {
         TEST_ASSERT_EQUAL(HIL_FRAME_PART, hil_frame_decode(&decoder, 'A'));
     }
+    /* they lie behind the payload */
+    TEST_ASSERT_EQUAL_UINT8(2u * HIL_FRAME_MAX_PAYLOAD, decoder.digits);
     TEST_ASSERT_EQUAL(HIL_FRAME_BAD, hil_frame_decode(&decoder, '\n'));
 }
 
