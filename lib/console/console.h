@@ -65,7 +65,7 @@ typedef struct {
     uint8_t hint_element;
     const char *hint_text;
     int32_t hint_values[2];
-    scrub_t scrub;  /* of settings, which nobody but the console changes */
+    scrub_t scrub;  /* of settings, which nobody but the console changes, and of all above job */
     uint8_t broken; /* console_error_t of the line under construction */
     uint8_t length;
     char line[CONSOLE_LINE_BYTES + 1u];

@@ -1,27 +1,38 @@
 #include "console_internal.h"
 
+#include <stddef.h>
 #include <string.h>
 
 #define SCRUB_BYTES 16u
 
-static scrub_stretch_t stretch_of(const void *settings, uint8_t index)
+/* The settings, and what the console works on: with a pointer that has turned over its words would
+ * land beside the controller. */
+static scrub_stretch_t stretch_of(const void *owner, uint8_t index)
 {
-    return (scrub_stretch_t){settings, (uint16_t)(index == 0 ? sizeof(settings_t) : 0u)};
+    const console_t *const console = owner;
+    switch (index) {
+    case 0:
+        return (scrub_stretch_t){console, offsetof(console_t, job)};
+    case 1:
+        return (scrub_stretch_t){console->settings, sizeof(settings_t)};
+    default:
+        return (scrub_stretch_t){0};
+    }
 }
 
 void console_open_settings(console_t *console)
 {
-    scrub_open(&console->scrub, stretch_of, console->settings);
+    scrub_open(&console->scrub, stretch_of, console);
 }
 
 void console_seal_settings(console_t *console)
 {
-    scrub_seal(&console->scrub, stretch_of, console->settings);
+    scrub_seal(&console->scrub, stretch_of, console);
 }
 
 bool console_hold_settings(console_t *console)
 {
-    (void)scrub_step(&console->scrub, stretch_of, console->settings, SCRUB_BYTES);
+    (void)scrub_step(&console->scrub, stretch_of, console, SCRUB_BYTES);
     return scrub_is_sound(&console->scrub);
 }
 

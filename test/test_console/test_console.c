@@ -929,6 +929,23 @@ static void documentation_names_every_error_fault_and_word(void)
     }
 }
 
+/* What the console works on: its words would land beside it. */
+static void a_pointer_that_turned_over_is_found(void)
+{
+    uint8_t *const bytes[] = {(uint8_t *)&console.controller, (uint8_t *)&console.output.context,
+                              (uint8_t *)&console.status};
+    for (size_t k = 0; k < sizeof bytes / sizeof *bytes; k++) {
+        setUp();
+        TEST_ASSERT_TRUE(console_hold_settings(&console));
+        *bytes[k] ^= 2u;
+        bool sound = true;
+        for (size_t tick_of_two = 0; tick_of_two < sizeof settings / 4; tick_of_two++) {
+            sound = console_hold_settings(&console);
+        }
+        TEST_ASSERT_FALSE(sound);
+    }
+}
+
 /* `$save` would keep what nobody set. */
 static void a_setting_that_turned_over_is_found_and_never_saved(void)
 {
@@ -993,6 +1010,7 @@ int main(void)
     RUN_TEST(model_says_how_long_a_spring_waits_and_when_it_is_away);
     RUN_TEST(learnt_says_what_is_known_and_clear_forgets_it);
     RUN_TEST(a_host_that_falls_silent_switches_its_springs_off);
+    RUN_TEST(a_pointer_that_turned_over_is_found);
     RUN_TEST(a_setting_that_turned_over_is_found_and_never_saved);
     RUN_TEST(random_bytes_get_one_answer_a_line);
     RUN_TEST(codes_table_holds_what_the_code_says);

@@ -102,6 +102,11 @@ static void every_setting_is_found_by_its_name(void)
     TEST_ASSERT_FALSE(settings_find("loss_scale_0", &row, &at));
     TEST_ASSERT_FALSE(settings_find("loss_scale_01", &row, &at));
     TEST_ASSERT_FALSE(settings_find("loss_scale_65", &row, &at));
+    /* none of these is a number, whatever its bytes would come to */
+    TEST_ASSERT_FALSE(settings_find("loss_scale_x", &row, &at));
+    TEST_ASSERT_FALSE(settings_find("loss_scale_1/", &row, &at));
+    TEST_ASSERT_FALSE(settings_find("loss_scale_24A", &row, &at));
+    TEST_ASSERT_FALSE(settings_find("loss_scale_257", &row, &at));
     TEST_ASSERT_FALSE(settings_find("loss_w_per_kk", &row, &at));
     TEST_ASSERT_FALSE(settings_find("", &row, &at));
 }
@@ -120,6 +125,17 @@ static void assigns_fixed_decimals(void)
     TEST_ASSERT_EQUAL_UINT16(200, settings.controller.safety.stuck_on_ma);
     TEST_ASSERT_EQUAL(SETTINGS_OK, settings_assign(&settings, "shunt_ohm", "0.01"));
     TEST_ASSERT_EQUAL_UINT16(10, settings.controller.current.shunt_mohm);
+}
+
+/* What lies between them, too: it is under the checksum of the scrub. */
+static void defaults_are_the_same_in_every_byte(void)
+{
+    static settings_t one, other;
+    memset(&one, 0xA5, sizeof one);
+    memset(&other, 0x5A, sizeof other);
+    settings_default(&one);
+    settings_default(&other);
+    TEST_ASSERT_EQUAL_MEMORY(&one, &other, sizeof one);
 }
 
 static void a_refused_value_changes_nothing(void)
@@ -430,6 +446,7 @@ int main(void)
     UNITY_BEGIN();
     RUN_TEST(every_setting_is_found_by_its_name);
     RUN_TEST(assigns_fixed_decimals);
+    RUN_TEST(defaults_are_the_same_in_every_byte);
     RUN_TEST(a_refused_value_changes_nothing);
     RUN_TEST(a_saved_record_is_loaded);
     RUN_TEST(ids_keep_their_meaning);
