@@ -73,6 +73,13 @@ SECTIONS: tuple[Section, ...] = (
         f"{HOST}/bench/worlds/bench_worlds --swarm 2000 --seed 2040",
         markdown=True,
     ),
+    Section(
+        "board_swarm",
+        "The board in everything at once",
+        f"{HOST}/bench/swarm/bench_swarm --runs 40 --seed 2911000",
+    ),
+    Section("flips", "Bits that turn over", f"{HOST}/bench/swarm/bench_flips --runs 50 --boards 4 --seed 3001"),
+    Section("mutate", "What the tests notice", "script/mutate"),
     Section("replay", "Measured logs through the on-chip model", f"{PYTHON} script/replay_fit.py"),
     Section("measured", "Measured data", f"{PYTHON} bench/diagnose/measured.py", json=False, markdown=True),
     Section(
@@ -211,6 +218,15 @@ HEADLINES: tuple[tuple[str, tuple[tuple[str, str, str], ...]], ...] = (
             ("... where nothing steps", "swarm", "nothing steps: time at 95 %"),
             ("back at 95 % two minutes after a draught, a door, a fan", "swarm", "all: after a lasting step"),
             ("temperature and phase within their bounds", "swarm", "all: time in which true"),
+        ),
+    ),
+    (
+        "What if parts of it fail? The firmware on a simulated board, faults drawn from seeds",
+        (
+            ("lives in which something that must hold was broken", "board_swarm", "lives in which"),
+            ("... over simulated hours", "board_swarm", "simulated hours"),
+            ("bits turned over, RAM and registers", "flips", "flips"),
+            ("... that leave a spring hotter by 10 K unsaid", "flips", "... that leave"),
         ),
     ),
     (
