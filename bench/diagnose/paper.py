@@ -11,8 +11,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from ninespring.models import Array
-from ninespring.verdict import steady
+from ninespring.find import steady
+from ninespring.model.models import Array
 
 COMMAND = "python bench/diagnose/measured.py"
 ROOT = Path(__file__).resolve().parents[2]

@@ -25,18 +25,18 @@ import numpy as np
 import pandas as pd
 from cases import REPORTING_SEEDS, SPRINGS, Case, effect_numbers, make_case, write_logs
 from kept import Kept
-from ninespring import native, plan
 from ninespring.export import drive
 from ninespring.export.settings import settings_of
-from ninespring.fit import from_resistance
-from ninespring.fit import problem as fitting
-from ninespring.logs import log_text, read_log
-from ninespring.logs.run import Run
-from ninespring.models import Array, Model
-from ninespring.recording import script_lines
-from ninespring.search.evidence import excess
-from ninespring.verdict import board_alone as verdict_of_board
-from ninespring.verdict import diagnosis
+from ninespring.find import board_alone as verdict_of_board
+from ninespring.find import diagnosis, plan
+from ninespring.find.evidence import excess
+from ninespring.infer import from_resistance
+from ninespring.infer import problem as fitting
+from ninespring.io.logs import log_text, read_log
+from ninespring.io.logs.run import Run
+from ninespring.io.recording import script_lines
+from ninespring.model import native
+from ninespring.model.models import Array, Model
 from tell import Figures, tell
 from world import Inputs, World, random_inputs, simulate
 

@@ -9,11 +9,11 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from ninespring import importing
-from ninespring.fit.problem import BLOCK_S
-from ninespring.logs import read_log
-from ninespring.models import Array, Model
-from ninespring.verdict import diagnosis, residual
+from ninespring.find import diagnosis, residual
+from ninespring.infer.problem import BLOCK_S
+from ninespring.io import importing
+from ninespring.io.logs import read_log
+from ninespring.model.models import Array, Model
 from paper import COMMAND, data
 
 LOGS = (

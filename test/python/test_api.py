@@ -12,7 +12,7 @@ import ninespring as ns
 import numpy as np
 import pytest
 from fake_board import FakeBoard, row
-from ninespring.cli import cli
+from ninespring.cli.main import cli
 
 ROOT = Path(__file__).resolve().parents[2]
 SIM = Path(os.environ.get("NINESPRING_SIM", ROOT / "build" / "host" / "ninespring-sim"))

@@ -11,12 +11,12 @@ import ninespring as ns
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from ninespring import ranges
-from ninespring.cli import cli
-from ninespring.console import Real, Whole
-from ninespring.logs import kind_of, write_atomically
-from ninespring.models import Array, Model, model_text
-from ninespring.recording import LogFile
+from ninespring.cli.console import Real, Whole
+from ninespring.cli.main import cli
+from ninespring.io import ranges
+from ninespring.io.logs import kind_of, write_atomically
+from ninespring.io.recording import LogFile
+from ninespring.model.models import Array, Model, model_text
 
 NUMBERS = [
     (name, one)

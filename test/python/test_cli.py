@@ -14,12 +14,13 @@ import jsonschema
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from ninespring import cli, console
+from ninespring.cli import console
+from ninespring.cli import main as cli
 from ninespring.errors import WorkError
-from ninespring.fit.predict import predict
-from ninespring.logs import log_text, read_log, read_table, write_atomically
-from ninespring.models import Array, Model, model_text, read_model
-from ninespring.verdict import doubt
+from ninespring.find import doubt
+from ninespring.infer.predict import predict
+from ninespring.io.logs import log_text, read_log, read_table, write_atomically
+from ninespring.model.models import Array, Model, model_text, read_model
 from rich.console import Console
 
 

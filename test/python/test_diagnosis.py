@@ -8,16 +8,16 @@ from dataclasses import replace
 import jsonschema
 import numpy as np
 import pytest
-from ninespring import native
 from ninespring.export.settings import left_out
-from ninespring.fit.declared import base_spec
-from ninespring.fit.predict import plant_of, predict
-from ninespring.fit.problem import Problem
-from ninespring.fit.spec import Fit
-from ninespring.logs import read_log
-from ninespring.models import Array, model_text, read_model
-from ninespring.search.certainty import CERTAIN, Witness, witness
-from ninespring.verdict import diagnosis
+from ninespring.find import diagnosis
+from ninespring.find.certainty import CERTAIN, Witness, witness
+from ninespring.infer.declared import base_spec
+from ninespring.infer.predict import plant_of, predict
+from ninespring.infer.problem import Problem
+from ninespring.io.logs import read_log
+from ninespring.model import native
+from ninespring.model.models import Array, model_text, read_model
+from ninespring.model.spec import Fit
 
 
 def names(result: dict) -> list[str]:

@@ -8,15 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from ninespring import native
-from ninespring.cli import cli
+from ninespring.cli.main import cli
 from ninespring.errors import InputError, WorkError
 from ninespring.export import drive
 from ninespring.export.settings import judged, left_out, settings_of, together
-from ninespring.fit.predict import predict_by_chip
-from ninespring.logs import read_log, write_atomically
-from ninespring.models import Array, Model, model_text, read_model
-from ninespring.verdict import diagnosis
+from ninespring.find import diagnosis
+from ninespring.infer.predict import predict_by_chip
+from ninespring.io.logs import read_log, write_atomically
+from ninespring.model import native
+from ninespring.model.models import Array, Model, model_text, read_model
 
 
 def run(*words: object) -> str:

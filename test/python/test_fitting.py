@@ -8,16 +8,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from ninespring import effects, native
-from ninespring.fit import statistics
-from ninespring.fit.declared import base_spec
-from ninespring.fit.problem import FOLDS, Problem, fold_of_rows
-from ninespring.fit.spec import Fit
-from ninespring.logs import read_log
-from ninespring.logs.run import Run
-from ninespring.models import Array
-from ninespring.search import evidence, search
-from ninespring.verdict import diagnosis
+from ninespring.find import diagnosis, evidence, search
+from ninespring.infer.declared import base_spec
+from ninespring.infer.problem import FOLDS, Problem, fold_of_rows
+from ninespring.io import statistics
+from ninespring.io.logs import read_log
+from ninespring.io.logs.run import Run
+from ninespring.model import effects, native
+from ninespring.model.models import Array
+from ninespring.model.spec import Fit
 
 TRUE = {
     "heat_capacity_j_per_k": 0.3,

@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from ninespring import native
-from ninespring.cli import cli
+from ninespring.cli.main import cli
 from ninespring.errors import InputError
-from ninespring.fit import from_resistance
-from ninespring.logs import log_text, read_log
-from ninespring.models import Array, read_model
-from ninespring.verdict import board_alone
+from ninespring.find import board_alone
+from ninespring.infer import from_resistance
+from ninespring.io.logs import log_text, read_log
+from ninespring.model import native
+from ninespring.model.models import Array, read_model
 
 TRUE = {"heat_capacity_j_per_k": 0.34, "loss_w_per_k": 0.0052, "orthogonal_w_per_k": 0.0007, "latent_heat_j": 7.5}
 

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from ninespring import importing
 from ninespring.errors import InputError
-from ninespring.logs import log_text, read_log, read_table
+from ninespring.io import importing
+from ninespring.io.logs import log_text, read_log, read_table
 
 fuzzed = settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
-from ninespring import importing
-from ninespring.logs import log_text, read_log
-from ninespring.models import Array, Model
-from ninespring.verdict import diagnosis, steady
+from ninespring.find import diagnosis, steady
+from ninespring.io import importing
+from ninespring.io.logs import log_text, read_log
+from ninespring.model.models import Array, Model
 
 
 def test_six_camera_values_are_explained_by_one_number_and_rivals_have_experiments(

@@ -9,11 +9,13 @@ import ninespring as ns
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from ninespring import cli, native, plan
+from ninespring.cli import main as cli
 from ninespring.errors import InputError
-from ninespring.logs import log_text
-from ninespring.models import Array
-from ninespring.recording import Step, script_lines
+from ninespring.find import plan
+from ninespring.io.logs import log_text
+from ninespring.io.recording import Step, script_lines
+from ninespring.model import native
+from ninespring.model.models import Array
 
 
 def driven(steps: list[Step], springs: int, duration_s: float, current_a: float) -> tuple[np.ndarray, np.ndarray]:

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from ninespring.logs import read_log, write_atomically
-from ninespring.models import Array, model_text, read_model
-from ninespring.report import page
-from ninespring.verdict import diagnosis, doubt, plausibility
+from ninespring.find import diagnosis, doubt, plausibility
+from ninespring.io.logs import read_log, write_atomically
+from ninespring.model.models import Array, model_text, read_model
+from ninespring.say import page
 
 TRUE = {"latent_heat": {"latent_heat_j": 8.0}, "shared_air": {"air_exchange_w_per_k": 0.2}}
 

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 import yaml
-from ninespring import simulated
 from ninespring.errors import WorkError
+from ninespring.io import simulated
 
 ROOT = Path(__file__).resolve().parents[2]
 WORKFLOW = (ROOT / ".github" / "workflows" / "release.yml").read_text()
@@ -54,7 +54,7 @@ def test_the_package_is_loaded_where_posix_is_not() -> None:
         "import signal, sys\n"
         "sys.modules['termios'] = sys.modules['fcntl'] = sys.modules['pwd'] = sys.modules['resource'] = None\n"
         "del signal.SIGHUP\n"
-        "import ninespring.cli, ninespring.board, ninespring.explore.results, ninespring.dashboard.server\n"
+        "import ninespring.cli.main, ninespring.io.board, ninespring.explore.results, ninespring.dashboard.server\n"
         "from ninespring.recording import told_to_stop\n"
         "with told_to_stop() as stopped: print(stopped())\n"
     )

@@ -9,10 +9,11 @@ from html.parser import HTMLParser
 
 import numpy as np
 import pytest
-from ninespring.logs import read_log
-from ninespring.models import Array
-from ninespring.report import page as report
-from ninespring.verdict import command, diagnosis
+from ninespring.cli import diagnose as command
+from ninespring.find import diagnosis
+from ninespring.io.logs import read_log
+from ninespring.model.models import Array
+from ninespring.say import page as report
 
 
 class Page(HTMLParser):

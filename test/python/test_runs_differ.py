@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from ninespring.logs import log_text, read_log
-from ninespring.models import Array, Model
-from ninespring.report.page import findings
-from ninespring.verdict import diagnosis
+from ninespring.find import diagnosis
+from ninespring.io.logs import log_text, read_log
+from ninespring.model.models import Array, Model
+from ninespring.say.page import findings
 from two_heaters import levels
 
 CAPACITY, LOSS, LINK, FULL_W, ROOM_C, NOISE_C = 2.0, 0.012, 0.004, 0.7, 21.0, 0.05

@@ -7,19 +7,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ninespring import effects, native
-from ninespring.fit import budget
-from ninespring.fit.declared import base_spec
-from ninespring.fit.predict import predict
-from ninespring.fit.problem import Problem
-from ninespring.fit.spec import Fit
-from ninespring.logs import log_text, read_log
-from ninespring.models import Array, Model
-from ninespring.plan import plan_experiment
-from ninespring.recording import script_lines
-from ninespring.search import evidence, search
-from ninespring.verdict import diagnosis, experiments
-from ninespring.verdict.residual import surrogate
+from ninespring.find import diagnosis, evidence, experiments, search
+from ninespring.find.plan import plan_experiment
+from ninespring.find.residual import surrogate
+from ninespring.infer import budget
+from ninespring.infer.declared import base_spec
+from ninespring.infer.predict import predict
+from ninespring.infer.problem import Problem
+from ninespring.io.logs import log_text, read_log
+from ninespring.io.recording import script_lines
+from ninespring.model import effects, native
+from ninespring.model.models import Array, Model
+from ninespring.model.spec import Fit
 from two_heaters import levels
 
 

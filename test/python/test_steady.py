@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ninespring.errors import InputError
-from ninespring.models import Array
-from ninespring.verdict import diagnosis, steady
+from ninespring.find import diagnosis, steady
+from ninespring.model.models import Array
 
 MIXING = {"optical_mixing": {"optical_share": 0.3}}
 

@@ -8,12 +8,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from ninespring import effects, native
-from ninespring.logs import read_log
-from ninespring.models import Array
-from ninespring.search import search, unnamed
-from ninespring.search.evidence import excess
-from ninespring.verdict import diagnosis
+from ninespring.find import diagnosis, search, unnamed
+from ninespring.find.evidence import excess
+from ninespring.io.logs import read_log
+from ninespring.model import effects, native
+from ninespring.model.models import Array
 
 EDGES = {"edge_loss": {"edge_loss_fraction": 0.2}}
 LATENT = {"latent_heat": {"latent_heat_j": 7.0}}

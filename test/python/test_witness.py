@@ -8,16 +8,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ninespring import native
-from ninespring.fit.declared import base_spec
-from ninespring.fit.problem import Problem
-from ninespring.fit.spec import Fit
-from ninespring.logs import log_text, read_log
-from ninespring.logs.mending import RUN_IN_S
-from ninespring.models import Array
-from ninespring.search import certainty
-from ninespring.verdict import contacts, diagnosis, resistance, unknown_heat
-from ninespring.verdict.readings import Readings, readings
+from ninespring.find import certainty, contacts, diagnosis, resistance, unknown_heat
+from ninespring.find.readings import Readings, readings
+from ninespring.infer.declared import base_spec
+from ninespring.infer.problem import Problem
+from ninespring.io.logs import log_text, read_log
+from ninespring.io.logs.mending import RUN_IN_S
+from ninespring.model import native
+from ninespring.model.models import Array
+from ninespring.model.spec import Fit
 
 ROWS = 700
 Change = Callable[[np.ndarray], None]

@@ -27,10 +27,10 @@ from .api import (
     upload,
     verify,
 )
-from .board import Board, Reading, to_pandas
 from .errors import InputError, WorkError
-from .logs import Run, read_log
-from .models import Array, Model, read_array, read_model
+from .io.board import Board, Reading, to_pandas
+from .io.logs import Run, read_log
+from .model.models import Array, Model, read_array, read_model
 
 __all__ = [
     "Array",

@@ -14,19 +14,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from . import ranges
 from .errors import InputError
-from .logs import Run, check_folder, read_log, write_atomically
-from .models import Array, Model, model_text, read_array, read_model
+from .io import ranges
+from .io.logs import Run, check_folder, read_log, write_atomically
+from .model.models import Array, Model, model_text, read_array, read_model
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
     from .export.settings import Settings
-    from .plan import Plan
-    from .recording import Recording
-    from .verdict.diagnosis import Diagnosis
+    from .find.diagnosis import Diagnosis
+    from .find.plan import Plan
+    from .io.recording import Recording
 
 Log = Run | str | Path
 
@@ -58,7 +58,7 @@ def _array(array: Array | str | Path | None) -> Array | None:
 def _array_and_runs(
     logs: Sequence[Log], array: Array | str | Path | None, model: Model | None = None
 ) -> tuple[Array, list[Run]]:
-    from .console import array_of
+    from .cli.console import array_of
 
     if not logs:
         raise InputError("no log is given")
@@ -73,8 +73,8 @@ def fit(*logs: Log, effects: Sequence[str] = (), array: Array | str | Path | Non
     `array` left out: a square (or 1 x 2) of the paper's spring. The model's `parameters` and `stderr` are in the units of
     their names (`heat_capacity_j_per_k`, `loss_w_per_k`, ...); `provenance["rmse_after_c"]` is its error, K rms.
     """
-    from . import native
-    from .verdict import diagnosis, doubt
+    from .find import diagnosis, doubt
+    from .model import native
 
     for name in effects:
         if name not in native.effect_names():
@@ -95,7 +95,7 @@ def diagnose(
     `.effects` are their names, strongest first, `.model` the model with them, `.result` what diagnosis.json holds
     (docs/files.md). `model` gives declared values and effects already on, `frozen` keeps its values as they are.
     """
-    from .verdict import diagnosis
+    from .find import diagnosis
 
     given = None if model is None else _model(model)
     if frozen and given is None:
@@ -106,7 +106,7 @@ def diagnose(
 
 def predict(model: Model | str | Path, log: Log, chip: bool = False) -> np.ndarray:
     """Return what the sensors should show of a log by a model, (n, k) in degC; `chip`: by the on-chip fixed-point model."""
-    from .fit import predict as prediction
+    from .infer import predict as prediction
 
     model = _model(model)
     run = _run(log, model.array.springs, temperatures=False)
@@ -117,7 +117,7 @@ def predict(model: Model | str | Path, log: Log, chip: bool = False) -> np.ndarr
 
 def plot(log: Log, model: Model | str | Path | None = None) -> Figure:
     """Return a figure of a log: each spring's temperature and drive; beside it what a model makes of it, dashed."""
-    from .plotting import figure
+    from .say.plotting import figure
 
     run = _run(log, temperatures=False)
     return figure(run, None if model is None else predict(model, run))
@@ -136,14 +136,14 @@ def make_plan(
 
     `current_a` is one spring's at full level, `supply_a` all springs' together, `hottest_c` any spring's as declared.
     """
-    from .plan import make_plan as make
+    from .find.plan import make_plan as make
 
     return make(_array(array) or Array(), duration_s, current_a, supply_a, hottest_c, seed, board_alone)
 
 
 def plan_through(model: Model | str | Path, spring: int, supply_a: float = 14.0, hottest_c: float = 105.0) -> Plan:
     """Return the steps that take one spring (from 1) through its transformation: `ninespring plan --through`. A, degC."""
-    from .plan import plan_through as make
+    from .find.plan import plan_through as make
 
     return make(_model(model), spring, supply_a, hottest_c)
 
@@ -162,9 +162,9 @@ def record(
     The springs are off afterwards, whatever ends it; `.ended` says why where that was nobody's wish. A log that is there is
     kept (InputError) unless `force`.
     """
-    from . import recording
-    from .board import Board
-    from .thermometers import Thermometers
+    from .io import recording
+    from .io.board import Board
+    from .io.thermometers import Thermometers
 
     ranges.RECORD_S.check("duration_s", duration_s)
     ranges.RECORD_HZ.check("hz", hz)
@@ -182,7 +182,7 @@ def record(
 
 def import_log(table: str | Path, mapping: str | Path, output: str | Path, force: bool = False) -> Run:
     """Make a log of another logger's table by a mapping (a path, or built in: 'tclab'): `ninespring import --map`. Return it."""
-    from .importing import import_table
+    from .io.importing import import_table
 
     check_folder(Path(output), measured=True, force=force)
     write_atomically({Path(output): import_table(Path(table), str(mapping))}, force)
@@ -194,7 +194,7 @@ def chip_settings(model: Model | str | Path, force: bool = False) -> Settings:
 
     WorkError where the log was doubted or the settings would drive worse than the firmware's, unless `force`.
     """
-    from .export.command import checked_settings
+    from .cli.export import checked_settings
 
     return checked_settings(_model(model), "", force)[0]
 
@@ -211,8 +211,8 @@ def upload(
     Return how many. WorkError, and nothing is saved, where the board refuses one or shows another value. What was saved can be
     taken back: `undo_upload`; `by` is what the history calls it.
     """
-    from . import history
-    from .board import Board, send_settings, settings_lines
+    from .io import history
+    from .io.board import Board, send_settings, settings_lines
 
     lines = settings_lines(settings, "settings")
     with Board(port, off_at_end=False) as board:
@@ -226,8 +226,8 @@ def upload(
 
 def undo_upload(port: str, save: bool = True) -> list[str]:
     """Give a board back what it had before the last upload from this computer: `ninespring upload --undo`. Return what changed."""
-    from . import history
-    from .board import Board
+    from .io import history
+    from .io.board import Board
 
     with Board(port, off_at_end=False) as board:
         return history.undo(board, save).words()
@@ -239,7 +239,7 @@ def verify(model: Model | str | Path, log: Log, before: str = "") -> tuple[float
     `before`: console lines that the board has; left out, the firmware's defaults. `ninespring verify`.
     """
     from .export.settings import settings_of
-    from .fit.predict import predict_by_chip
+    from .infer.predict import predict_by_chip
 
     model = _model(model)
     run = _run(log, model.array.springs)
@@ -254,7 +254,7 @@ def verify(model: Model | str | Path, log: Log, before: str = "") -> tuple[float
 
 def replay(model: Model | str | Path, log: Log) -> tuple[np.ndarray, np.ndarray]:
     """Return temperatures (n, k), degC, and austenite (n, k), 0..1, that the on-chip model believes along a log."""
-    from .fit import predict as prediction
+    from .infer import predict as prediction
 
     model = _model(model)
     run = _run(log, model.array.springs, temperatures=False)

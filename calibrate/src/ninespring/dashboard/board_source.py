@@ -17,14 +17,14 @@ from typing import Any
 import numpy as np
 
 from .. import __version__
-from ..belief import beliefs
-from ..board import HOST_TIMEOUT_S, PATIENCE, SIMULATED, Board, reading
-from ..console import err
+from ..cli.console import err
 from ..errors import InputError, RefusedError, WorkError
-from ..port import pseudo_terminal
-from ..recording import SILENT_S, LogFile, Row, RowCheck, RowSink, telemetry_names, write_head
-from ..thermometers import Thermometers
-from . import words
+from ..io import words
+from ..io.belief import beliefs
+from ..io.board import HOST_TIMEOUT_S, PATIENCE, SIMULATED, Board, reading
+from ..io.port import pseudo_terminal
+from ..io.recording import SILENT_S, LogFile, Row, RowCheck, RowSink, telemetry_names, write_head
+from ..io.thermometers import Thermometers
 from .source import Source, at_once
 from .wishes import WISHES, drives, switches_off
 
@@ -114,7 +114,7 @@ class BoardSource(Source):
 
     def settings(self) -> list[dict[str, Any]]:
         """Return the board's settings with value, unit and range."""
-        from .. import tables
+        from ..model import tables
 
         known = tables.settings()
         out = []

@@ -11,10 +11,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..models import Array
+from ..model import stiffness
+from ..model.cooling import MATERIALS, Cooling
+from ..model.models import Array
 from . import correlations as by
-from . import stiffness
-from .cooling import MATERIALS, Cooling
 from .field import MM, PLATE_EMISSIVITY, PLATE_RISE_K, Film, Mesh, build, film_of
 from .geometry import Below, Geometry, spring_of
 from .mesh import plan_mesh

@@ -14,8 +14,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy import optimize, sparse, special
 
+from ..model.cooling import MATERIALS
 from . import correlations as by
-from .cooling import MATERIALS
 from .geometry import Geometry
 from .mesh import Box, plan_mesh, within
 

@@ -14,9 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import InputError
-from ..models import Array
-from . import stiffness
-from .cooling import MATERIALS, Cooling, Material, cooling_of
+from ..model import stiffness
+from ..model.cooling import MATERIALS, Cooling, Material, cooling_of
+from ..model.models import Array
 
 SLOWEST_M_PER_S = 0.05
 NITI_CONDUCTIVITY = 18.0
@@ -110,7 +110,7 @@ class Geometry:
 
 def spring_of(array: Array, cooling: Cooling) -> Spring:
     """Return the spring that array.toml describes (docs/files.md); what cannot be wound is refused."""
-    from ..fit.simulate import array_parameters
+    from ..model.simulate import array_parameters
 
     given = array.spring
     wire, coil, turns = (

@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from .. import native
 from ..errors import InputError, WorkError
-from ..fit.simulate import array_parameters, board_settings
-from ..models import Array
+from ..model import native
+from ..model.models import Array
+from ..model.simulate import array_parameters, board_settings
 from .spec import METRICS, Spec, array_of_point, board_of_point, patterns_of
 
 STARTED = 0.95

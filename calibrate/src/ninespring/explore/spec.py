@@ -16,13 +16,12 @@ from typing import Any
 
 import numpy as np
 
-from .. import native
 from ..errors import InputError
-from ..logs import read_bytes
-from ..models import MATERIAL_KEYS, SPRING_KEYS, STIFFNESS_KEYS, Array
-from ..pattern import pattern_of
-from ..toml_file import TomlFile, did_you_mean
-from . import cooling, stiffness
+from ..io.logs import read_bytes
+from ..io.toml_file import TomlFile, did_you_mean
+from ..model import cooling, native, stiffness
+from ..model.models import MATERIAL_KEYS, SPRING_KEYS, STIFFNESS_KEYS, Array
+from ..model.pattern import pattern_of
 
 METHODS = ("grid", "latin", "sobol", "saltelli", "optimise")
 PATTERNS = ("all", "all_but_middle", "middle", "checkerboard", "random", "none")

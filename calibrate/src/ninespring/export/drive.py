@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .. import native
-from ..models import Model
+from ..model import native
+from ..model.models import Model
 from .settings import best_plant, draw
 
 DRAWS = 4

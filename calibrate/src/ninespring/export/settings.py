@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from .. import effects, native
-from ..fit.simulate import array_parameters, board_settings
-from ..models import Model
+from ..model import effects, native
+from ..model.models import Model
+from ..model.simulate import array_parameters, board_settings
 
 TEMPERATURES = ("martensite_finish_c", "martensite_start_c", "austenite_start_c", "austenite_finish_c")
 FIRMWARE_EFFECTS = ("latent_heat", "resistance_phase")
