@@ -12,12 +12,12 @@ from ninespring.export.settings import left_out
 from ninespring.find import diagnosis
 from ninespring.find.certainty import CERTAIN, Witness, witness
 from ninespring.infer.declared import base_spec
+from ninespring.infer.fit import Fit
 from ninespring.infer.predict import plant_of, predict
 from ninespring.infer.problem import Problem
 from ninespring.io.logs import read_log
 from ninespring.model import native
 from ninespring.model.models import Array, model_text, read_model
-from ninespring.model.spec import Fit
 
 
 def names(result: dict) -> list[str]:

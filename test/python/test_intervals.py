@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from ninespring.cli.main import cli
+from ninespring.infer.fit import Fit
 from ninespring.infer.intervals import correlations, intervals
-from ninespring.model.spec import Fit, Free, Spec
+from ninespring.model.spec import Free, Spec
 
 FREE = (
     Free("loss", 0.006, 0.001, 0.1, "W/K", log=True),

@@ -12,13 +12,14 @@ from ninespring.find.plan import plan_experiment
 from ninespring.find.residual import surrogate
 from ninespring.infer import budget
 from ninespring.infer.declared import base_spec
+from ninespring.infer.fit import Fit
 from ninespring.infer.predict import predict
 from ninespring.infer.problem import Problem
+from ninespring.infer.scene import scene_of
 from ninespring.io.logs import log_text, read_log
 from ninespring.io.recording import script_lines
 from ninespring.model import effects, native
 from ninespring.model.models import Array, Model
-from ninespring.model.spec import Fit
 from two_heaters import levels
 
 
@@ -114,7 +115,7 @@ def test_the_way_the_supply_sags_is_told_from_the_other(tmp_path: Path, chopped:
 
 
 def names_of(problem: Problem) -> set[str]:
-    return {c.effect for c in effects.candidates(problem)}
+    return {c.effect for c in effects.candidates(scene_of(problem))}
 
 
 def test_only_what_the_log_could_show_is_a_candidate(make_log, tmp_path: Path) -> None:
@@ -159,8 +160,10 @@ def test_every_probe_is_within_its_bounds_and_moves_what_is_seen(make_log, tmp_p
     ):
         problem = Problem(array, [run])
         base = problem.fit(base_spec(problem))
-        latent = next((c for c in effects.candidates(problem) if c.effect == "latent_heat" and not c.variant), None)
-        for one in effects.candidates(problem):
+        latent = next(
+            (c for c in effects.candidates(scene_of(problem)) if c.effect == "latent_heat" and not c.variant), None
+        )
+        for one in effects.candidates(scene_of(problem)):
             if one.effect == "transformation_shift" and latent is None:
                 continue  # nothing here transforms
             rides = latent is not None and one.effect == "transformation_shift"  # it shows by what goes with it
@@ -182,7 +185,7 @@ def plain(make_log) -> search.Search:
     """Return a search on a log of the declared model and nothing else."""
     problem = Problem(Array(), [read_log(make_log(seed=11))])
     base = diagnosis.first_fit(problem, base_spec(problem))
-    return search.Search(problem, effects.candidates(problem), base)
+    return search.Search(problem, effects.candidates(scene_of(problem)), base)
 
 
 def with_effect(found: search.Search, effect: str, variant: str) -> Fit:
@@ -221,7 +224,7 @@ def test_slow_nodes_are_tried_in_the_place_of_a_drift_whatever_the_forecast_says
 def test_another_variant_of_an_adopted_effect_is_tried(make_log) -> None:
     problem = Problem(Array(), [read_log(make_log(effects={"spring_mismatch": {"loss_scale[4]": 1.4}}, seed=3))])
     base = diagnosis.first_fit(problem, base_spec(problem))
-    found = search.Search(problem, effects.candidates(problem), base)
+    found = search.Search(problem, effects.candidates(scene_of(problem)), base)
     wrong = with_effect(found, "spring_mismatch", "spring 5")
     contenders = [other for _, other in found.rivals(wrong, {"spring_mismatch": base})]
     right = next(other for other in contenders if dict(other.spec.variant) == {"spring_mismatch": "spring 4"})
@@ -231,7 +234,7 @@ def test_another_variant_of_an_adopted_effect_is_tried(make_log) -> None:
 def test_a_search_that_has_had_its_simulations_begins_no_further_step(make_log) -> None:
     problem = Problem(Array(), [read_log(make_log(effects={"edge_loss": {"edge_loss_fraction": 0.2}}, seed=3))])
     base = diagnosis.first_fit(problem, base_spec(problem))
-    found = search.Search(problem, effects.candidates(problem), base)
+    found = search.Search(problem, effects.candidates(scene_of(problem)), base)
     found.until = problem.simulations - 1
     assert found.forward(base) is base and not problem.budget.short
     found.until = problem.simulations + 1000
@@ -244,11 +247,11 @@ def test_all_searches_draw_from_one_budget(make_log) -> None:
     problem.budget.enough = problem.simulations + 400
     shares = []
     for _ in range(2):
-        shares.append(search.Search(problem, effects.candidates(problem), base).until - problem.simulations)
+        shares.append(search.Search(problem, effects.candidates(scene_of(problem)), base).until - problem.simulations)
         problem.budget.take(200)
     assert shares == [100, 50] and not problem.budget.short
     problem.budget.take()
-    assert search.Search(problem, effects.candidates(problem), base).forward(base) is base
+    assert search.Search(problem, effects.candidates(scene_of(problem)), base).forward(base) is base
     assert problem.budget.short
 
 
@@ -304,7 +307,7 @@ def test_structure_of_half_the_noise_is_unexplained_and_less_is_not(plain: searc
 def test_the_experiment_that_separates_is_one_in_which_both_models_differ(make_log) -> None:
     problem = Problem(Array(), [read_log(make_log(effects={"latent_heat": {"latent_heat_j": 8.0}}))])
     base = problem.fit(base_spec(problem))
-    latent = next(c for c in effects.candidates(problem) if c.effect == "latent_heat")
+    latent = next(c for c in effects.candidates(scene_of(problem)) if c.effect == "latent_heat")
     spec = base.spec.with_effect(latent.effect, latent.free, latent.fixed, latent.variant)
     with_heat = problem.fit(spec, base.as_dict())
     same = experiments.separate(problem, base, base)
@@ -369,7 +372,7 @@ def test_a_run_that_begins_warm_needs_no_effect(tmp_path: Path) -> None:
     assert run.warm
     problem = Problem(Array(1, 2), [run])
     base = base_spec(problem)
-    plate = next(c for c in effects.candidates(problem) if c.effect == "plate_conduction")
+    plate = next(c for c in effects.candidates(scene_of(problem)) if c.effect == "plate_conduction")
     spec = base.with_effect(plate.effect, plate.free, (), "")
     values = {"heat_capacity_j_per_k": 2.0, "loss_w_per_k": 0.012, "orthogonal_w_per_k": 0.004}
     values |= {"plate_coupling_w_per_k": 0.01, "plate_heat_capacity_j_per_k": 60.0, "plate_loss_w_per_k": 0.02}

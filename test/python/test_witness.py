@@ -11,12 +11,12 @@ import pytest
 from ninespring.find import certainty, contacts, diagnosis, resistance, unknown_heat
 from ninespring.find.readings import Readings, readings
 from ninespring.infer.declared import base_spec
+from ninespring.infer.fit import Fit
 from ninespring.infer.problem import Problem
 from ninespring.io.logs import log_text, read_log
 from ninespring.io.logs.mending import RUN_IN_S
 from ninespring.model import native
 from ninespring.model.models import Array
-from ninespring.model.spec import Fit
 
 ROWS = 700
 Change = Callable[[np.ndarray], None]

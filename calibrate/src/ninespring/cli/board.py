@@ -9,11 +9,17 @@ import time
 from pathlib import Path
 
 import click
+from rich.live import Live
 
-from .. import __version__
+from .. import __version__, api
 from ..errors import InputError, WorkError
-from ..io import ranges
+from ..io import history, ranges
+from ..io.board import Board, settings_lines
 from ..io.logs import check_folder, read_bytes
+from ..io.recording import LogFile, script_lines, told_to_stop
+from ..io.recording import record as record_board
+from ..io.thermometers import Thermometers
+from ..say.monitoring import Screen
 from .console import FILE, FORCE, JSON, PORT, Command, Real, Whole, beside, checked, err, out, result_of, working, write
 
 HZ = Whole(ranges.RECORD_HZ)
@@ -61,11 +67,6 @@ def record(
     end, and stands in the log where it came; the command then exits with 1. What the board remarks on a line of --run (a
     setting that is not active yet, springs that are still warm) is said and logged likewise, and is no failure.
     """
-    from ..io.board import Board
-    from ..io.recording import LogFile, script_lines, told_to_stop
-    from ..io.recording import record as record_board
-    from ..io.thermometers import Thermometers
-
     check_folder(output, measured=True, force=force)
     check_folder(json_path)
     if thermometers and os.path.realpath(thermometers) == os.path.realpath(port):
@@ -131,10 +132,6 @@ def upload(settings: Path | None, port: str, undo: bool, save: bool, json_path: 
     springs it has learnt beside its old numbers, and forgets. All springs must be off. What it had before is kept on this
     computer: `ninespring settings history` shows it, --undo gives it back.
     """
-    from .. import api
-    from ..io import history
-    from ..io.board import Board, settings_lines
-
     if (settings is None) != undo:
         raise InputError("give either a file of settings or --undo")
     check_folder(json_path)
@@ -167,11 +164,6 @@ Example:
 @click.option("--duration", type=SECONDS, default=ranges.RECORD_S.high, help="s; Ctrl-C ends it")
 def monitor(port: str, hz: int, duration: float) -> None:
     """Show a board's array as it is: per spring the model's temperature (degC) and its trend, current (A), limits."""
-    from rich.live import Live
-
-    from ..io.board import Board
-    from ..say.monitoring import Screen
-
     with Board(port, off_at_end=False) as board:
         until = time.monotonic() + duration
         try:
@@ -187,9 +179,3 @@ def monitor(port: str, hz: int, duration: float) -> None:
         except KeyboardInterrupt:
             pass
         board.ask("telemetry off")
-
-
-def add_board_commands(group: click.Group) -> None:
-    """Add the commands to the command line."""
-    for one in (record, upload, monitor):
-        group.add_command(one)

@@ -8,6 +8,8 @@ from pathlib import Path
 import click
 
 from ..errors import InputError, WorkError
+from ..io.board import Board
+from ..io.bringup import STEPS, converse
 from .console import FILE, PORT, Command, out
 
 
@@ -39,9 +41,6 @@ def bringup(port: str, output: Path, again: str | None, last: str, yes: bool) ->
     with 1 at the first step in which something is wrong: mend it and type the same again. No setting is saved; what the board
     has learnt of its springs is forgotten before the first one, as resistors have stood there.
     """
-    from ..io.board import Board
-    from ..io.bringup import STEPS, converse
-
     if not yes and not sys.stdin.isatty():
         raise InputError("it asks before each step, and nobody can answer here: give --yes")
 

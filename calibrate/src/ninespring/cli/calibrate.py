@@ -11,8 +11,16 @@ from pathlib import Path
 import click
 
 from ..errors import InputError, WorkError
+from ..export.drive import patterns
 from ..io import ranges
+from ..io.board import Board
 from ..io.logs import check_folder, write_atomically
+from ..io.simulated import simulated_board
+from ..model.models import Array, read_array
+from ..model.pattern import pattern_of
+from .calibration.chain import Calibration
+from .calibration.progress import FILE, Progress
+from .calibration.report import page
 from .console import ARRAY, JSON, Command, Real, checked, out, write
 
 FROM = {"duration": 900.0, "drive_for": 300.0, "current": 2.0, "supply": 14.0, "hottest": 105.0}
@@ -76,14 +84,6 @@ def calibrate(
     asks before it heats and before it writes. Ctrl-C, a pulled cable, a fault: the springs go off, what was measured is
     kept, and the same command goes on from there. Ends in report.html in the folder.
     """
-    from ..export.drive import patterns
-    from ..io.board import Board
-    from ..model.models import Array, read_array
-    from ..model.pattern import pattern_of
-    from .calibration.chain import Calibration
-    from .calibration.progress import FILE, Progress
-    from .calibration.report import page
-
     if (port is not None) == simulate:
         raise InputError("give --port, or --simulate where there is no board")
     if simulate and thermometers:
@@ -154,8 +154,6 @@ def _text(path: Path | None) -> str | None:
 @contextlib.contextmanager
 def _ports(port: str | None, thermometers: str | None) -> Iterator[tuple[str, str]]:
     """Yield the ports of a board and its thermometers; of a simulated board where none is named."""
-    from ..io.simulated import simulated_board
-
     if port and thermometers:
         yield port, thermometers
         return

@@ -23,13 +23,12 @@ from .. import __version__
 from ..errors import InputError
 from ..io.logs import Run, read_log, write_atomically
 from ..io.ranges import Range
+from ..model.models import array_of, read_array
 
 WIDE = 160
 """Columns of a table that goes to a file or a pipe."""
 FEWEST_ROWS = 50
 """Logs with fewer rows than this, all together, are no measurement to fit to."""
-SHAPES = {1: (1, 1), 2: (1, 2), 4: (2, 2), 9: (3, 3), 16: (4, 4), 25: (5, 5), 36: (6, 6), 49: (7, 7), 64: (8, 8)}
-"""Springs of a log, and the array they are taken for where no array.toml says it."""
 
 out = Console(highlight=False, width=None if sys.stdout.isatty() else WIDE)
 err = Console(stderr=True, highlight=False, width=None if sys.stderr.isatty() else WIDE)
@@ -107,12 +106,6 @@ class Whole(click.IntRange):
         super().__init__(int(within.low), int(within.high))
 
 
-class Group(click.Group):
-    """The commands."""
-
-    command_class = Command
-
-
 @contextmanager
 def working(text: str, total: float | None = None) -> Iterator[Callable[..., None]]:
     """Show that work goes on, on the terminal's error stream: say(words), say(words, done) with a total."""
@@ -155,8 +148,6 @@ def array_and_runs(
 
     `or_resistance`: logs of currents and voltages need no temperature.
     """
-    from ..model.models import read_array
-
     array = model.array if model else read_array(array_path) if array_path else None
     runs = [read_log(path, array.springs if array else None, or_resistance=or_resistance) for path in logs]
     array = array_of(array, runs)
@@ -172,32 +163,6 @@ def array_and_runs(
             "no spring is ever driven: log what the springs were given (i1_a ... or u1 ...)", runs[0].name, 1
         )
     return array, runs
-
-
-def array_of(array: Any, runs: list[Run]) -> Any:
-    """Return the array of these runs; refuse what does not go together."""
-    from ..model.models import Array
-
-    for k, run in enumerate(runs):
-        for other in runs[:k]:
-            if run.sha256 == other.sha256:
-                raise InputError(f"is the same as {other.name}: it would count twice, give it once", run.name)
-    counts = {run.springs for run in runs}
-    if len(counts) > 1:
-        raise InputError(f"the logs have {' and '.join(map(str, sorted(counts)))} springs: give logs of one array")
-    if array is None:
-        count = counts.pop()
-        below: dict[str, Any] | None = None
-        if runs[0].layers == 2 and count % 2 == 0:
-            count, below = count // 2, {}
-        if count not in SHAPES:
-            raise InputError(
-                f"{count} springs: say how they are arranged, `--array array.toml` with [array] rows and cols",
-                runs[0].name,
-                1,
-            )
-        array = Array(*SHAPES[count], stiffness=below)
-    return array
 
 
 def notes_of(runs: list[Run]) -> None:

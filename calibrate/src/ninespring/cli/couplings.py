@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import importlib
 from pathlib import Path
 
 import click
 from rich.table import Table
 
 from ..errors import InputError, WorkError
+from ..explore.couplings import couplings as find
+from ..explore.geometry import geometry_of
 from ..io.logs import check_folder
 from ..model.models import model_text, read_array
+from ..model.native import parameter_table
 from .console import FILE, JSON, Command, beside, checked, result_of, working, write
 
 MESHES = ("coarse", "normal", "fine")
@@ -17,8 +21,6 @@ MESHES = ("coarse", "normal", "fine")
 
 def need(*modules: str) -> None:
     """Refuse where what `ninespring[explore]` installs is not there."""
-    import importlib
-
     for name in modules:
         try:
             importlib.import_module(name)
@@ -49,15 +51,11 @@ def couplings(array_path: Path, mesh: str, output: Path, json_path: Path | None)
     """
     check_folder(output, json_path)
     array = read_array(array_path)
-    from ..explore.geometry import geometry_of
-
     try:
         geometry_of(array)
     except InputError as error:
         raise InputError(error.message, array_path) from None
     need("skfem", "gmsh")
-    from ..explore.couplings import couplings as find
-
     with working("meshing") as say:
         found = find(array, mesh, say)
     shown = Table("number", "value", "reduction", "mesh", "unit")
@@ -117,8 +115,6 @@ def _found(full: str) -> str:
 
 
 def _parameters(found: object) -> dict[str, dict[str, object]]:
-    from ..model.native import parameter_table
-
     return {
         name: {
             "value": value,

@@ -6,10 +6,17 @@ from pathlib import Path
 
 import click
 
+from ..dashboard.board_source import SIMULATED, BoardSource
+from ..dashboard.replay_source import ReplaySource
+from ..dashboard.server import HOST, address_of, door_of, listen, serve
+from ..dashboard.source import Source
 from ..errors import InputError
 from ..io import ranges
 from ..io.logs import read_log
-from .console import ARRAY, FILE, Real, Whole, array_of, notes_of, out
+from ..io.recording import told_to_stop
+from ..io.simulated import simulator
+from ..model.models import array_of, read_array, read_model
+from .console import ARRAY, FILE, Real, Whole, notes_of, out
 
 USUAL = "127.0.0.1:8765"
 
@@ -68,14 +75,6 @@ def dashboard(
     The page is for this machine alone unless --listen names another address: then whoever has the printed address, which
     holds a token, drives the array.
     """
-    from ..dashboard.board_source import SIMULATED, BoardSource
-    from ..dashboard.replay_source import ReplaySource
-    from ..dashboard.server import HOST, address_of, door_of, listen, serve
-    from ..dashboard.source import Source
-    from ..io.recording import told_to_stop
-    from ..io.simulated import simulator
-    from ..model.models import read_array, read_model
-
     if sum((port is not None, simulate, replay is not None)) != 1:
         raise InputError("give one of --port, --simulate, --replay")
     if (model_path or array_path) and not replay:

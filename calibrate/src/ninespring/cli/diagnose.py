@@ -9,7 +9,14 @@ import click
 from rich.table import Table
 
 from ..errors import InputError
+from ..export.settings import judged
+from ..find import board_alone, diagnosis, steady
+from ..find.residual import surrogate as empirical
+from ..infer import from_resistance
 from ..io.logs import check_folder
+from ..model.models import model_text, read_model
+from ..say import page as report
+from ..say.page import with_unit, without_name
 from .console import ARRAY, FILE, IN_A_FOLDER, Command, array_and_runs, checked, out, working, write
 
 
@@ -51,13 +58,6 @@ def diagnose(
     temperature, are diagnosed from v / i: degrees stay open. Errors are root mean squares in K; evidence is in
     nats, the logarithm of how many times likelier the data are with the effect.
     """
-    from ..export.settings import judged
-    from ..find import board_alone, diagnosis, steady
-    from ..find.residual import surrogate as empirical
-    from ..infer import from_resistance
-    from ..model.models import model_text, read_model
-    from ..say import page as report
-
     check_folder(json_path)
     if output.is_dir():
         check_folder(*(output / name for name in IN_A_FOLDER))
@@ -118,8 +118,6 @@ def diagnose(
 
 
 def _print_diagnosis(result: dict[str, Any], verdict: str) -> None:
-    from ..say.page import with_unit, without_name
-
     out.print(verdict, style="bold", markup=False)
     if result["effects"]:
         table = Table("effect", "error, K", "held out, K", "evidence, nats", "numbers", "chip")

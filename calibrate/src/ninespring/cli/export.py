@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
 
 import click
-import numpy as np
 
 from ..errors import InputError, WorkError
-from ..export.settings import Settings
-from ..io.logs import Run, check_folder, read_bytes, read_log, sha256_of
-from ..model.models import Model
+from ..export.drive import checked_settings
+from ..export.settings import left_out, settings_of, together
+from ..infer.predict import chip_error
+from ..io.board import Board, console_lines
+from ..io.logs import check_folder, read_bytes, read_log, sha256_of
+from ..model.models import Model, model_of_layer, read_model
 from ..model.stiffness import LAYERS
+from ..say.verified import with_verification
 from .console import FILE, JSON, MODEL, Command, beside, checked, logs_of, notes_of, out, result_of, working, write
 
 CHIP = click.option(
@@ -29,8 +29,6 @@ LAYER = click.option(
 
 
 def _model(path: Path, layer: str | None) -> Model:
-    from ..model.models import model_of_layer, read_model
-
     model = read_model(path)
     if layer:
         return model_of_layer(model, layer)
@@ -39,49 +37,8 @@ def _model(path: Path, layer: str | None) -> Model:
     return model
 
 
-def console_lines(path: Path) -> list[str]:
-    """Return the `$name=value` lines of a file, also where `$$` told units behind the values; anything else is refused."""
-    from ..io.board import settings_lines
-
-    text = re.sub(r"^(\$\S+=\S+)[ \t].*$", r"\1", read_bytes(path).decode("utf-8", "replace"), flags=re.M)
-    return settings_lines(text, str(path))
-
-
 def _chip_lines(path: Path | None) -> str:
     return "\n".join(console_lines(path)) if path else ""
-
-
-def checked_settings(
-    model: Model, old: str, force: bool = False, say: Callable[..., None] = lambda text, done=None: None
-) -> tuple[Settings, list[str], dict[str, Any]]:
-    """Return a model's settings, in what they drive worse than the lines `old`, and both drives; WorkError where they should not be used."""
-    from ..export.drive import compare
-    from ..export.settings import settings_of
-
-    if (doubts := model.provenance.get("doubts", [])) and not force:
-        raise WorkError(
-            f"the log of this model is doubted, nothing is written: {'; '.join(doubts)} (--force writes it all the same)"
-        )
-    made = settings_of(model)
-    worse, drives = compare(model, old, f"{old}\n{made.lines}", say)
-    if worse and not force:
-        raise WorkError(
-            f"these settings would drive worse, nothing is written: {'; '.join(worse)} (--force writes them all the same)"
-        )
-    return made, worse, drives
-
-
-def chip_error(model: Model, lines: str, runs: Sequence[Run]) -> dict[str, Any]:
-    """Return the error of a chip with these lines on logs, K rms: of all, and of each spring (None: not measured)."""
-    from ..infer.predict import predict_by_chip
-
-    left = np.concatenate([run.temperature_c - predict_by_chip(model, lines, run) for run in runs])
-    seen = np.isfinite(left)
-    each = [
-        float(np.sqrt(np.mean(one[mask] ** 2))) if mask.any() else None
-        for one, mask in zip(left.T, seen.T, strict=True)
-    ]
-    return {"rmse_c": float(np.sqrt(np.mean(left[seen] ** 2))), "rmse_per_spring_c": each}
 
 
 @click.command(
@@ -110,8 +67,6 @@ def export(
     less, heat later, get hotter than transforming takes or disturb the ones that are off are refused. So is a model of a log
     that the diagnosis doubted.
     """
-    from ..export.settings import left_out, together
-
     check_folder(output, json_path)
     model = _model(model_path, layer)
     doubts = list(model.provenance.get("doubts", []))
@@ -172,9 +127,6 @@ def verify(
     Before: the settings that the board has (--port, --chip) or the firmware's defaults. After: with what `export` writes
     of the model over them.
     """
-    from ..export.settings import settings_of
-    from ..say.verified import with_verification
-
     check_folder(report_path, json_path)
     report = read_bytes(report_path).decode("utf-8", "replace") if report_path else ""
     if report and "</main>" not in report:
@@ -207,7 +159,5 @@ def verify(
 
 
 def _port_lines(port: str) -> str:
-    from ..io.board import Board
-
     with Board(port, off_at_end=False) as board:
         return "\n".join(f"${name}={value}" for name, value in board.settings().items())

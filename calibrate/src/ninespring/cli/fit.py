@@ -3,13 +3,22 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from ..errors import InputError
+from ..export.settings import left_out
+from ..find import board_alone, diagnosis, doubt, steady
+from ..infer import from_resistance
+from ..infer.fit import Fit
+from ..infer.intervals import TOLD, correlations, intervals
+from ..infer.problem import Problem
+from ..infer.result import parameters_of
 from ..io.logs import Run, check_folder
-from ..model.models import Array
+from ..io.statistics import rms
+from ..model import effects, native
+from ..model.models import Array, model_text
 from .console import (
     ARRAY,
     FILE,
@@ -26,10 +35,6 @@ from .console import (
     working,
     write,
 )
-
-if TYPE_CHECKING:
-    from ..infer.problem import Problem
-    from ..model.spec import Fit
 
 MOST_TOLD = 8
 """Correlations that are printed."""
@@ -55,13 +60,6 @@ def fit(logs: tuple[Path, ...], array_path: Path | None, effects: str, output: P
     is a fixed point of its temperature, and effects of the array that it shows are looked for and named. Errors are root mean squares in K (of v / i: in mohm); numbers are in J/K, W/K, J, s as the table says. Held out: on blocks of two and a
     half minutes that the numbers were not fitted to.
     """
-    from ..export.settings import left_out
-    from ..find import diagnosis, doubt, steady
-    from ..infer import from_resistance
-    from ..io.statistics import rms
-    from ..model import native
-    from ..model.models import model_text
-
     check_folder(output, json_path)
     wanted = list(dict.fromkeys(e.strip() for e in effects.split(",") if e.strip()))
     for name in wanted:
@@ -111,9 +109,6 @@ def fit(logs: tuple[Path, ...], array_path: Path | None, effects: str, output: P
 
 def _numbers(problem: Problem, found: Fit) -> dict[str, Any]:
     """Return a fit's numbers, each with the interval in which it lies in 95 of 100 cases."""
-    from ..infer.intervals import intervals
-    from ..infer.result import parameters_of
-
     out = {k: v for e in (None, *found.spec.effects) for k, v in parameters_of(problem, found, e).items()}
     for name, ends in intervals(found).items():
         out[name]["interval_95"] = list(ends)
@@ -121,15 +116,11 @@ def _numbers(problem: Problem, found: Fit) -> dict[str, Any]:
 
 
 def _correlations(found: Fit) -> list[dict[str, Any]]:
-    from ..infer.intervals import correlations
-
     return [{"a": a, "b": b, "correlation": value} for a, b, value in correlations(found)]
 
 
 def _print_correlations(output: Path, found: list[dict[str, Any]]) -> None:
     """Print which numbers' errors go together, strongest first; all of them are in --json."""
-    from ..infer.intervals import TOLD
-
     if not found:
         return
     said = beside(output)
@@ -139,15 +130,9 @@ def _print_correlations(output: Path, found: list[dict[str, Any]]) -> None:
 
 
 def _fit_from_resistance(array: Array, runs: list[Run], output: Path, json_path: Path | None) -> None:
-    from ..infer import from_resistance
-    from ..infer.result import parameters_of
-    from ..io.statistics import rms
-    from ..model import effects
-    from ..model.models import model_text
-
     with working("fitting v / i") as say:
         problem, found, first = from_resistance.fit(array, runs)
-        found, witnesses = from_resistance.with_effects(problem, found, say)
+        found, witnesses = board_alone.with_effects(problem, found, say)
     model = from_resistance.model_of_fit(problem, found)
     errors = {"rmse_before_v": first.residual, "rmse_v": found.residual}
     result = result_of(

@@ -8,7 +8,7 @@ import click
 import numpy as np
 
 from ..errors import InputError
-from ..io import ranges
+from ..io import importing, ranges
 from ..io.logs import check_folder, log_text
 from .console import FILE, FORCE, JSON, Command, Real, beside, checked, result_of, working, write
 
@@ -80,8 +80,6 @@ def import_(
 
     SOURCE is a table with a header; or frames: a .npy of (frames, height, width), a .csv, or a folder of .csv.
     """
-    from ..io import importing
-
     check_folder(output, measured=True, force=force)
     check_folder(json_path)
     if bool(mapping) == bool(regions):

@@ -1,7 +1,8 @@
-"""The command line: what commands there are, and how they end. Each command is beside its idea."""
+"""The command line: what commands there are, and how they end. Each command is a file beside this."""
 
 from __future__ import annotations
 
+import importlib
 import os
 import signal
 import sys
@@ -12,23 +13,46 @@ import click
 
 from .. import __version__
 from ..errors import InputError, WorkError
-from .board import add_board_commands
-from .bringup import bringup
-from .calibrate import calibrate
-from .console import Group, err
-from .couplings import couplings
-from .dashboard import dashboard
-from .diagnose import diagnose
-from .export import export, verify
-from .fit import fit
-from .import_log import import_
-from .plan import plan
-from .plot import plot
-from .predict import predict, replay
-from .scenario import scenario
-from .settings import settings
-from .sweep import sweep
-from .terminal import console
+from .console import err
+
+COMMANDS = {
+    "fit": "fit",
+    "diagnose": "diagnose",
+    "predict": "predict",
+    "replay": "predict",
+    "export": "export",
+    "verify": "export",
+    "import": "import_log",
+    "plan": "plan",
+    "plot": "plot",
+    "couplings": "couplings",
+    "sweep": "sweep",
+    "scenario": "scenario",
+    "dashboard": "dashboard",
+    "calibrate": "calibrate",
+    "bringup": "bringup",
+    "settings": "settings",
+    "console": "terminal",
+    "record": "board",
+    "upload": "board",
+    "monitor": "board",
+}
+"""Each command's file. A file is loaded when its command is asked for: a console at a board waits for no SciPy."""
+
+
+class Group(click.Group):
+    """The commands."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Return their names."""
+        return sorted(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """Return one of them, loaded; None where there is none of this name."""
+        if cmd_name not in COMMANDS:
+            return None
+        module = importlib.import_module(f".{COMMANDS[cmd_name]}", __package__)
+        return next(one for one in vars(module).values() if isinstance(one, click.Command) and one.name == cmd_name)
 
 
 @click.group(
@@ -40,29 +64,6 @@ from .terminal import console
 @click.version_option(__version__)
 def cli() -> None:
     """Calibrate the thermal model of an array of NiTi springs, and say what the model lacks."""
-
-
-for command in (
-    fit,
-    diagnose,
-    predict,
-    replay,
-    export,
-    verify,
-    import_,
-    plan,
-    plot,
-    couplings,
-    sweep,
-    scenario,
-    dashboard,
-    calibrate,
-    bringup,
-    settings,
-    console,
-):
-    cli.add_command(command)
-add_board_commands(cli)
 
 
 def _end(message: str, code: int) -> NoReturn:

@@ -9,6 +9,7 @@ from typing import Any
 import click
 
 from ..errors import InputError
+from ..find.plan import FIRST_S, THROUGH_S, make_plan, plan_experiment, plan_through
 from ..io import ranges
 from ..io.logs import check_folder, read_bytes
 from ..model.models import Array, read_array, read_model
@@ -74,8 +75,6 @@ def plan(
 
     The springs' temperatures are those of the declared array; the board's own limits hold all the same.
     """
-    from ..find.plan import FIRST_S, THROUGH_S, make_plan, plan_experiment, plan_through
-
     check_folder(output)
     if (through is None) != (model_path is None):
         raise InputError("--through and --model go together")

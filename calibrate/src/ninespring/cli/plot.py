@@ -7,10 +7,12 @@ from pathlib import Path
 import click
 
 from ..errors import InputError
+from ..infer.predict import predict
 from ..io import ranges
 from ..io.logs import check_folder, read_log
-from ..model.models import read_array, read_model
-from .console import ARRAY, FILE, Command, Real, array_of, notes_of, out, working, write
+from ..model.models import array_of, read_array, read_model
+from ..say import plotting
+from .console import ARRAY, FILE, Command, Real, notes_of, out, working, write
 
 PICTURES = (".png", ".svg", ".pdf", ".gif")
 
@@ -38,9 +40,6 @@ def plot(log: Path, model_path: Path | None, array_path: Path | None, at_s: floa
     if kind not in PICTURES:
         raise InputError(f"'{kind}' is none of {', '.join(PICTURES)}", output)
     check_folder(output)
-    from ..infer.predict import predict
-    from ..say import plotting
-
     model = read_model(model_path) if model_path else None
     array = model.array if model else read_array(array_path) if array_path else None
     run = read_log(log, array.springs if array else None, temperatures=False)

@@ -9,7 +9,11 @@ import numpy as np
 from rich.table import Table
 
 from .. import __version__
+from ..find import plausibility
+from ..infer import predict as prediction
 from ..io.logs import check_folder, log_text, read_log, sha256_of
+from ..model import effects
+from ..model.models import read_model
 from .console import FILE, JSON, MODEL, Command, beside, checked, logs_of, notes_of, result_of, working, write
 
 
@@ -36,10 +40,6 @@ def predict(log: Path, model_path: Path, output: Path, chip: bool, json_path: Pa
 
     The array is the model's; the log needs no temperatures, and starts at the first ones where it has them.
     """
-    from ..find import plausibility
-    from ..infer import predict as prediction
-    from ..model.models import read_model
-
     check_folder(output, json_path)
     model = read_model(model_path)
     array = model.array
@@ -88,10 +88,6 @@ def replay(log: Path, model_path: Path, output: Path, json_path: Path | None) ->
 
     m1_c is what the chip believes, x1 its austenite; y1_c is what the model's sensors would make of m1_c.
     """
-    from ..infer import predict as prediction
-    from ..model import effects
-    from ..model.models import read_model
-
     check_folder(output, json_path)
     model = read_model(model_path)
     run = read_log(

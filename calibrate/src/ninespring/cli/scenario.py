@@ -11,6 +11,7 @@ from ..io import ranges
 from ..io.logs import check_folder
 from ..model.models import Model, read_model
 from ..model.pattern import pattern_of
+from ..model.simulate import array_parameters, board_settings
 from .console import FILE, MODEL, Command, Real, Whole, beside, write
 
 ALWAYS = ("latent_heat", "resistance_phase")
@@ -51,8 +52,6 @@ def scenario(model_path: Path, pattern: str | None, fan: int, duration: float, o
 
 def scenario_text(model: Model, on: list[bool], pattern: str, fan: int, duration_s: float) -> str:
     """Return scenario.ini: the model's plant under boards that are told its numbers."""
-    from ..model.simulate import array_parameters, board_settings
-
     array = model.array
     shifted = ("transformation_shift",) if (array.stiffness or {}).get("transformation_shift_k") else ()
     effects = dict.fromkeys((*model.effects, *ALWAYS, *shifted))

@@ -8,7 +8,10 @@ from pathlib import Path
 import click
 
 from ..errors import InputError
+from ..io import history as kept
+from ..io.board import Board, console_lines
 from ..io.logs import check_folder
+from ..model import tables
 from .console import FILE, PORT, Command, beside, out, write
 
 
@@ -19,8 +22,6 @@ def settings() -> None:
 
 def _default(name: str) -> str | None:
     """Return a setting's built-in value, None where this version does not know it."""
-    from ..model import tables
-
     known = tables.settings()
     bare = re.sub(r"_\d+$", "", name)
     row = known.get(name) or known.get(f"{bare}_K") or known.get(bare)
@@ -28,14 +29,10 @@ def _default(name: str) -> str | None:
 
 
 def _of_file(path: Path) -> dict[str, str]:
-    from .export import console_lines
-
     return dict(line[1:].split("=", 1) for line in console_lines(path))
 
 
 def _of_port(port: str) -> tuple[str, dict[str, str]]:
-    from ..io.board import Board
-
     with Board(port, off_at_end=False) as board:
         return board.version[0], board.settings()
 
@@ -115,8 +112,6 @@ def history(port: str) -> None:
 
     `ninespring upload --undo` takes the last one back. A board is known again by its USB serial number, else by its port.
     """
-    from ..io import history as kept
-
     found = kept.entries(port)
     for one in found:
         out.print(f"{one.when}  {one.by}: {len(one.sent)} sent, {len(one.words())} changed", markup=False)

@@ -14,6 +14,10 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 
 from ..errors import WorkError
+from ..explore.results import Results
+from ..explore.spec import UNITS, named, read_spec
+from ..explore.sweep import best_of, indices_of, local_cluster
+from ..explore.sweep import sweep as run
 from ..io import ranges
 from ..io.logs import check_folder, write_atomically
 from .console import FILE, JSON, Command, Whole, checked, err, out, result_of, write
@@ -45,8 +49,6 @@ def sweep(
 
     Stopped or killed, the same command carries on where it was: no point is lost or done twice.
     """
-    from ..explore.spec import read_spec
-
     check_folder(json_path)
     spec = read_spec(spec_path)
     if check:
@@ -55,8 +57,6 @@ def sweep(
     need("distributed", "pyarrow", *{"saltelli": ["SALib"], "optimise": ["optuna"]}.get(spec.method, []))
     if spec.couplings == "field":
         need("skfem", "gmsh")
-    from ..explore.results import Results
-
     results = Results(output, spec)
     done = results.open()
     begin, before = time.monotonic(), int(done.sum())
@@ -79,9 +79,6 @@ def sweep(
 
 def _run(spec: Any, results: Any, done: Any, scheduler: str | None, workers: int) -> None:
     from distributed import Client
-
-    from ..explore.sweep import local_cluster
-    from ..explore.sweep import sweep as run
 
     with ExitStack() as stack:
         where = scheduler or stack.enter_context(local_cluster(workers))
@@ -109,9 +106,6 @@ def _run(spec: Any, results: Any, done: Any, scheduler: str | None, workers: int
 
 
 def _evaluate(spec: Any, results: Any, output: Path) -> dict[str, Any]:
-    from ..explore.spec import UNITS, named
-    from ..explore.sweep import best_of, indices_of
-
     if spec.method not in ("optimise", "saltelli"):
         return {}
     table = results.read()

@@ -19,7 +19,7 @@ from prompt_toolkit.key_binding import KeyBindings, KeyPressEvent
 from prompt_toolkit.patch_stdout import patch_stdout
 
 from ..errors import InputError, WorkError
-from ..io.board import Board
+from ..io.board import SIMULATED, Board
 from ..io.history import home
 from ..model import tables
 from .console import Command, out
@@ -235,8 +235,6 @@ def console(port: str | None, simulate: bool) -> None:
     `!` acts as it is pressed: everything off. Leaving (Ctrl-D) switches nothing off. Lines that come from a pipe are sent
     one after the other; exit code 1 where the board refused one.
     """
-    from ..io.board import SIMULATED
-
     if (port is not None) == simulate:
         raise InputError("give --port, or --simulate where there is no board")
     with Board(port or SIMULATED, off_at_end=False) as board:

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
+from scipy.sparse.linalg import splu
 
 from ..model import stiffness
 from ..model.cooling import MATERIALS, Cooling
@@ -66,8 +67,6 @@ def plate_as_fin(mesh: Mesh) -> tuple[float, float]:
 
     One face gives heat to the room; the other has air that takes nothing, and a spring that leads nowhere.
     """
-    from scipy.sparse.linalg import splu
-
     geometry = _geometry(1, 5.0, plate="steel", plate_thickness_mm=0.5, margin_mm=40.0)
     field = build(geometry, False, replace(mesh, along=1), Film(0.0, 1e-9, 1e3))
     side = 2 * (geometry.cooling.margin_mm + geometry.spring.radius_mm) * MM

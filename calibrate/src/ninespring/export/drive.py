@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
+from ..errors import WorkError
 from ..model import native
 from ..model.models import Model
-from .settings import best_plant, draw
+from .settings import Settings, best_plant, draw, settings_of
 
 DRAWS = 4
 """Further arrays, drawn from the uncertainty of the model's numbers. Which spring is heated before which is chaotic, by seconds:
@@ -147,3 +149,20 @@ def compare(
             words = WORSE["undriven"].words.format(old=best[0].undriven, new=best[1].undriven)
             gained.append(f"for it {words}: that pattern cannot have both here")
     return list(dict.fromkeys([*said, *gained])), rows
+
+
+def checked_settings(
+    model: Model, old: str, force: bool = False, say: Callable[..., None] = lambda text, done=None: None
+) -> tuple[Settings, list[str], dict[str, Any]]:
+    """Return a model's settings, in what they drive worse than the lines `old`, and both drives; WorkError where they should not be used."""
+    if (doubts := model.provenance.get("doubts", [])) and not force:
+        raise WorkError(
+            f"the log of this model is doubted, nothing is written: {'; '.join(doubts)} (--force writes it all the same)"
+        )
+    made = settings_of(model)
+    worse, drives = compare(model, old, f"{old}\n{made.lines}", say)
+    if worse and not force:
+        raise WorkError(
+            f"these settings would drive worse, nothing is written: {'; '.join(worse)} (--force writes them all the same)"
+        )
+    return made, worse, drives

@@ -14,19 +14,22 @@ from threadpoolctl import threadpool_limits
 
 from .. import __version__
 from ..infer import from_resistance
+from ..infer.fit import Fit
 from ..infer.result import parameters_of
 from ..infer.rounding import DRIVEN_A
+from ..infer.scene import scene_of
 from ..io import statistics
 from ..io.logs.run import Run
+from ..model import effects
 from ..model.models import Array, Model
 from ..model.simulate import simulate_run
-from ..model.spec import Fit
 from . import contacts, resistance
-from .certainty import CERTAIN
+from .certainty import CERTAIN, NAMED, Witness, witness
 from .diagnosis import SCHEMA, share_with, validate
 from .evidence import unexplained
 from .readings import REFERENCE_C, Readings, settled
 from .residual import depends_on
+from .search import Search
 
 LEFT = "structure well above the noise of v / i remains that no effect of the library explains"
 
@@ -82,13 +85,13 @@ def diagnose(
     with threadpool_limits(1):
         problem, alone, first = from_resistance.fit(array, runs)
         progress("effects that v / i shows")
-        found, witnesses = from_resistance.with_effects(problem, alone, progress)
+        found, witnesses = with_effects(problem, alone, progress)
         left_over = unexplained(problem, found)
         steps = changed_contacts(problem, found) if left_over else []
         if steps:
             progress("contacts that changed")
             other, cleared, _ = from_resistance.fit(array, [without(run, r, steps) for r, run in enumerate(runs)])
-            again, seen = from_resistance.with_effects(other, cleared, progress)
+            again, seen = with_effects(other, cleared, progress)
             # while more than contacts is missing, phases are not known well enough to accuse them
             if unexplained(other, again):
                 steps = []
@@ -157,3 +160,45 @@ def verdict(result: dict[str, Any]) -> str:
     return (
         f"No thermometer: {error}. {f'Missing: {names}.' if names else 'No effect is missing that v / i shows.'}{more}"
     )
+
+
+def with_effects(
+    problem: from_resistance.Resistances, found: Fit, progress: Callable[[str], None] = lambda text: None
+) -> tuple[Fit, dict[str, Witness]]:
+    """Search for the effects of the array that v / i shows; return the fit with those named, and what speaks for each."""
+    known = [
+        one
+        for one in effects.candidates(scene_of(problem))
+        if one.effect in effects.ON_CHIP and one.effect not in found.spec.effects and not one.flexible
+    ]
+    search = Search(problem, known, found, progress)
+    chosen, without = of_the_array(problem, search, *search.run()[:2])
+    witnesses = {name: witness(problem, chosen, name, other, False) for name, other in without.items()}
+    for name in [one for one, said in witnesses.items() if said.probability() < NAMED]:
+        chosen = search.reduced(chosen, name)
+        del witnesses[name]
+    if witnesses:
+        chosen = problem.fit(chosen.spec, chosen.as_dict(), tolerance=1e-6, max_steps=20, errors=True)
+    return chosen, witnesses
+
+
+def of_the_array(
+    problem: from_resistance.Resistances, search: Search, chosen: Fit, without: dict[str, Fit]
+) -> tuple[Fit, dict[str, Fit]]:
+    """Return the fit with what is said of one spring said of the array, where that explains as much with no more numbers.
+
+    All outer springs losing more is the middle one losing less: only from numbers that are about right does it show.
+    """
+    for name, variant in chosen.spec.variant:
+        if name not in without or not variant.startswith("spring "):
+            continue
+        for one in search.candidates:
+            if one.effect in chosen.spec.effects or one.variant.startswith("spring "):
+                continue
+            search.progress(f"could it be {one.effect} instead of {name}?")
+            spec = chosen.spec.without(name).with_effect(one.effect, one.free, one.fixed, one.variant, one.also_on)
+            other = problem.fit(spec, chosen.as_dict() | one.start_at(1.0), tolerance=1e-3, max_steps=14)
+            search.fits[search.key(spec)] = other
+            if search.preferred(other, chosen):
+                return search.settle(other)[:2]
+    return chosen, without

@@ -10,11 +10,11 @@ import numpy as np
 import pandas as pd
 from scipy.signal import lfilter
 
+from ..infer.fit import Fit
 from ..infer.heat import THIN, answers, power_of, step_answers, thin
 from ..infer.problem import Problem
 from ..io.logs.run import Run
 from ..model.simulate import simulate_run
-from ..model.spec import Fit
 
 GRID_S = 15.0
 """Times at which something may begin or end."""

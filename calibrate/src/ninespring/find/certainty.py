@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..infer.fit import Fit
 from ..infer.problem import Problem
 from ..io import statistics
-from ..model.spec import Fit
 from .evidence import excess, log_evidence
 
 STRETCHES = 4

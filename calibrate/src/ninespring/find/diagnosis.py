@@ -19,14 +19,16 @@ from .. import __version__
 from ..errors import InputError
 from ..export.settings import judged
 from ..infer.declared import base_spec
+from ..infer.fit import Fit
 from ..infer.problem import Problem
 from ..infer.result import DRIFT_LEFT_OUT, as_shown, model_of, parameters_of
+from ..infer.scene import scene_of
 from ..io import statistics
 from ..io.logs import condense
 from ..io.logs.run import Run
 from ..model import effects
 from ..model.models import Array, Model
-from ..model.spec import RUNS_OWN, Fit, Spec
+from ..model.spec import RUNS_OWN, Spec
 from . import (
     contacts,
     doubt,
@@ -278,11 +280,11 @@ def _diagnose(
     problem = prepare(model.array if model else array, runs, declared)
     progress("fitting what is declared")
     spec = base_spec(problem, frozen)
-    known = effects.candidates(problem)
+    known = effects.candidates(scene_of(problem))
     if model:
         spec = with_effects_of(spec, model, known, frozen)
     base = first_fit(problem, spec)
-    own = effects.of_runs(problem)
+    own = effects.of_runs(scene_of(problem))
     found = search.Search(problem, [c for c in (*known, *own) if c.effect not in spec.effects], base, progress)
     final, without, contenders = found.run()
     progress("what v / i says")
@@ -537,7 +539,7 @@ def fit_effects(
     """Fit the declared model with the effects named; return the problem, the fit and the declared model's fit."""
     with threadpool_limits(1):
         problem = prepare(array, runs, declared)
-        known = effects.candidates(problem)
+        known = effects.candidates(scene_of(problem))
         base = first_fit(problem, base_spec(problem))
         found = search.Search(problem, known, base, progress)
         fit = base

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 
 from ..export.settings import KNOWN
+from ..infer.fit import Fit
 from ..infer.problem import Problem
 from ..infer.result import as_shown, model_of
 from ..io import statistics
 from ..io.logs.run import Run
 from ..model import native, tables
 from ..model.models import Model
-from ..model.spec import Fit
 from . import plausibility
 
 POWER_UNITS = ("W", "J", "ohm")

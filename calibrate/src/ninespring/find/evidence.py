@@ -7,10 +7,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..infer.fit import Fit
 from ..infer.likelihood import fitted
 from ..infer.problem import Problem
 from ..io import statistics
-from ..model.spec import Fit
 
 EQUIVALENT = 0.3
 """Two models whose predictions differ by less than this (rms, in units of the noise) are the same in practice."""

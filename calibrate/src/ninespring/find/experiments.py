@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
+from ..infer.fit import Fit
 from ..infer.problem import Problem
 from ..io.logs.run import Run
 from ..model import native
 from ..model.simulate import simulate_run
-from ..model.spec import Fit
 
 
 @dataclass

@@ -10,8 +10,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from ..infer.fit import Fit
 from ..infer.problem import Problem
-from ..model.spec import Fit
 from .evidence import likelihood
 from .search import Search
 from .unnamed import Found, Hidden

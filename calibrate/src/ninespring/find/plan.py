@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from ..export.settings import CROSSED, best_plant
 from ..io import ranges
 from ..model import native
 from ..model.models import Array, Model
@@ -155,8 +156,6 @@ def plan_through(model: Model, spring: int, supply_a: float, hottest_c: float) -
 
     With the least current that takes it clearly beyond the end, as the model has it with its error; `hottest_c` is the limit.
     """
-    from ..export.settings import CROSSED, best_plant
-
     _check_limits(supply_a, hottest_c, None)
     if not 1 <= spring <= model.array.springs:
         raise InputError(f"there is no spring {spring}: the array has {model.array.springs}")

@@ -13,10 +13,10 @@ from dataclasses import replace
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
+from ..infer.fit import Fit
 from ..infer.problem import Problem
 from ..io import statistics
 from ..io.logs.run import Run
-from ..model.spec import Fit
 from .evidence import UNEXPLAINED
 
 OWN_DRIVE_SHARE = 0.5

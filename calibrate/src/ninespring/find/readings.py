@@ -12,6 +12,7 @@ import numpy as np
 import pandas as pd
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
+from ..infer.fit import Fit
 from ..infer.from_resistance import ohm_of
 from ..infer.problem import Problem
 from ..infer.rounding import ROUNDING_V
@@ -19,7 +20,6 @@ from ..io import statistics
 from ..io.logs.mending import RUN_IN_S
 from ..io.logs.run import Run
 from ..model.simulate import simulate_run
-from ..model.spec import Fit
 
 REFERENCE_C = 20.0
 """Temperature of the declared resistances."""

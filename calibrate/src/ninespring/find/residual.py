@@ -6,10 +6,11 @@ import math
 from typing import Any
 
 import numpy as np
+from scipy.signal import lfilter
 
+from ..infer.fit import Fit
 from ..infer.problem import FOLDS, Problem, fold_of_rows
 from ..io import statistics
-from ..model.spec import Fit
 from .evidence import excess
 
 WHITE = 0.2
@@ -109,8 +110,6 @@ def surrogate(problem: Problem, fit: Fit) -> dict[str, Any]:
     Ridge regression of each spring's residual on every drive, filtered with time constants of 3 to 300 s, on
     the fan and on time; the strength of the ridge and the error by held-out fifths of the runs.
     """
-    from scipy.signal import lfilter
-
     tables = []
     for run in problem.runs:
         step = float(np.median(np.diff(run.time_s)))

@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
+from ..infer.fit import Fit
 from ..infer.problem import Problem
 from ..model import effects
 from ..model.models import Model
-from ..model.spec import Fit
 from . import contacts
 from .certainty import CERTAIN
 from .readings import SEEN, nats_of, readings, solve

@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from ..infer.fit import Fit
 from ..infer.problem import Problem
 from ..infer.result import parameters_of
 from ..model import effects
-from ..model.spec import RUN_DRIVE, RUNS_OWN, Fit
+from ..model.spec import RUN_DRIVE, RUNS_OWN
 from .certainty import CERTAIN, Witness
 
 ROUNDS = 3

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..infer.fit import Fit
 from ..model.effects import Candidate
-from ..model.spec import Fit
 
 
 @dataclass

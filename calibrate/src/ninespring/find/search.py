@@ -14,10 +14,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ..infer.fit import Fit
 from ..infer.problem import Problem
 from ..model import effects
 from ..model.effects import Candidate
-from ..model.spec import RUNS_OWN, Fit, Spec
+from ..model.spec import RUNS_OWN, Spec
 from .evidence import difference, excess, fit_factor, gain, log_evidence
 from .screen import Screen
 

@@ -19,6 +19,7 @@ from ..io.logs import read_bytes, read_table, sha256_of
 from ..model import effects, native
 from ..model.effects import Effect
 from ..model.models import Array, Model, read_array
+from .diagnosis import validate
 from .search import TOLD_APART
 
 
@@ -379,8 +380,6 @@ def diagnose_table(
     result["logs"] = [{"file": path.name, "sha256": sha256_of(path), "rows": len(states)}]
     if not frozen and model is None:
         result["warnings"].append("no --model: the paper's declared model (docs/physics.md) was taken, frozen")
-    from .diagnosis import validate
-
     validate(result)
     return result
 

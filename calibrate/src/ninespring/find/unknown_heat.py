@@ -15,9 +15,9 @@ from typing import Any
 
 import numpy as np
 
+from ..infer.fit import Fit
 from ..infer.heat import THIN, power_of, step_answers, thin
 from ..infer.problem import Problem
-from ..model.spec import Fit
 from .evidence import fit_factor
 
 GRID_S = 15.0

@@ -16,11 +16,12 @@ from typing import Any
 
 import numpy as np
 
+from ..infer.fit import Fit
 from ..infer.heat import THIN
 from ..infer.problem import Problem
 from ..io.statistics import correlation_factor
 from ..model.effects.effect import sized
-from ..model.spec import RUNS_OWN, Fit
+from ..model.spec import RUNS_OWN
 from . import evidence
 from .causes import SHORTEST, Cause, bump, column_of, library, thinned, typical_power
 from .evidence import fit_factor, unexplained

@@ -14,11 +14,12 @@ from typing import Any
 import numpy as np
 
 from ..infer import room
+from ..infer.fit import Fit
 from ..infer.likelihood import Colour
 from ..infer.problem import Problem
 from ..io.logs.run import Run
 from ..model.simulate import simulate_run
-from ..model.spec import RUNS_OWN, Fit, Free, Spec
+from ..model.spec import RUNS_OWN, Free, Spec
 from .search import Search
 
 MOST = 3

@@ -9,9 +9,8 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,14 +19,12 @@ from ..io.logs.run import Run
 from ..model import native
 from ..model.models import Array, Model
 from ..model.simulate import simulate_run
-from ..model.spec import Fit, Free, Spec
+from ..model.spec import Free, Spec
 from .declared import base_spec
+from .fit import Fit
 from .problem import _BAD, Problem
+from .result import model_of
 from .rounding import ROUNDING_V, steady
-
-if TYPE_CHECKING:
-    from ..find.certainty import Witness
-    from ..find.search import Search
 
 NOISE_V = 2.0 * ROUNDING_V
 """What a voltage is told to, at best: rounding that stays the same is then never structure of half the noise."""
@@ -163,56 +160,8 @@ def fit(array: Array, runs: Sequence[Run]) -> tuple[Resistances, Fit, Fit]:
     return problem, problem.fit(spec, found.as_dict(), tolerance=1e-6, max_steps=20, errors=True), first
 
 
-def with_effects(
-    problem: Resistances, found: Fit, progress: Callable[[str], None] = lambda text: None
-) -> tuple[Fit, dict[str, Witness]]:
-    """Search for the effects of the array that v / i shows; return the fit with those named, and what speaks for each."""
-    from ..find import search as searching
-    from ..find.certainty import NAMED, witness
-    from ..model import effects
-
-    known = [
-        one
-        for one in effects.candidates(problem)
-        if one.effect in effects.ON_CHIP and one.effect not in found.spec.effects and not one.flexible
-    ]
-    search = searching.Search(problem, known, found, progress)
-    chosen, without = of_the_array(problem, search, *search.run()[:2])
-    witnesses = {name: witness(problem, chosen, name, other, False) for name, other in without.items()}
-    for name in [one for one, said in witnesses.items() if said.probability() < NAMED]:
-        chosen = search.reduced(chosen, name)
-        del witnesses[name]
-    if witnesses:
-        chosen = problem.fit(chosen.spec, chosen.as_dict(), tolerance=1e-6, max_steps=20, errors=True)
-    return chosen, witnesses
-
-
-def of_the_array(
-    problem: Resistances, search: Search, chosen: Fit, without: dict[str, Fit]
-) -> tuple[Fit, dict[str, Fit]]:
-    """Return the fit with what is said of one spring said of the array, where that explains as much with no more numbers.
-
-    All outer springs losing more is the middle one losing less: only from numbers that are about right does it show.
-    """
-    for name, variant in chosen.spec.variant:
-        if name not in without or not variant.startswith("spring "):
-            continue
-        for one in search.candidates:
-            if one.effect in chosen.spec.effects or one.variant.startswith("spring "):
-                continue
-            search.progress(f"could it be {one.effect} instead of {name}?")
-            spec = chosen.spec.without(name).with_effect(one.effect, one.free, one.fixed, one.variant, one.also_on)
-            other = problem.fit(spec, chosen.as_dict() | one.start_at(1.0), tolerance=1e-3, max_steps=14)
-            search.fits[search.key(spec)] = other
-            if search.preferred(other, chosen):
-                return search.settle(other)[:2]
-    return chosen, without
-
-
 def model_of_fit(problem: Resistances, found: Fit) -> Model:
     """Return the model.toml of such a fit; its provenance says whose scale its temperatures have."""
-    from .result import model_of
-
     plant = problem.plant_for(found.spec, found.values)
     shown = [replace(run, temperature_c=simulate_run(plant.copy(), run, run.ambient_c, {})) for run in problem.boards]
     model = model_of(problem, found, shown)

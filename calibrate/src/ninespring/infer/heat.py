@@ -11,7 +11,7 @@ import numpy as np
 from ..io.logs.run import Run
 from ..model import native
 from ..model.simulate import simulate_run, started
-from ..model.spec import Fit
+from .fit import Fit
 from .problem import Problem
 
 PROBE = 0.05

@@ -6,7 +6,7 @@ import math
 
 from scipy.stats import norm
 
-from ..model.spec import Fit
+from .fit import Fit
 
 TOLD = 0.1
 """Correlations below this are not told."""

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -94,3 +96,14 @@ def chip_trace(model: Model, lines: str, run: Run) -> tuple[np.ndarray, np.ndarr
             first,
         )
     return temperature, austenite
+
+
+def chip_error(model: Model, lines: str, runs: Sequence[Run]) -> dict[str, Any]:
+    """Return the error of a chip with these lines on logs, K rms: of all, and of each spring (None: not measured)."""
+    left = np.concatenate([run.temperature_c - predict_by_chip(model, lines, run) for run in runs])
+    seen = np.isfinite(left)
+    each = [
+        float(np.sqrt(np.mean(one[mask] ** 2))) if mask.any() else None
+        for one, mask in zip(left.T, seen.T, strict=True)
+    ]
+    return {"rmse_c": float(np.sqrt(np.mean(left[seen] ** 2))), "rmse_per_spring_c": each}

@@ -23,8 +23,9 @@ from ..io.logs.run import Run
 from ..model import native
 from ..model.models import Array
 from ..model.simulate import array_parameters, fades_per_s, hidden_k, simulate_run
-from ..model.spec import AMBIENT_OFFSET, DRIVE_GAIN, RUN_DRIVE, SENSOR_OFFSET, Fit, Spec
+from ..model.spec import AMBIENT_OFFSET, DRIVE_GAIN, RUN_DRIVE, SENSOR_OFFSET, Spec
 from .budget import Budget
+from .fit import Fit
 from .likelihood import Colour, Rows
 from .rounding import power_errors
 

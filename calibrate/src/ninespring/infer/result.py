@@ -14,8 +14,8 @@ from ..io import statistics
 from ..io.logs.run import Run
 from ..model import native
 from ..model.models import Model
-from ..model.spec import Fit
 from . import room
+from .fit import Fit
 from .problem import Problem
 
 DRIFT_LEFT_OUT = (

@@ -11,19 +11,18 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
 
 from ..errors import InputError, RefusedError, WorkError
 from . import ranges
 from .belief import Belief, beliefs
+from .logs import read_bytes
 from .port import Port
 from .simulated import simulated_board
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 ERROR = re.compile(r"^error:(\d+) ?(.*)$")
 TELEMETRY = re.compile(r"^(?:\d+\.\d+,.*|<.*>)$")
@@ -388,8 +387,6 @@ class Board:
 
 def to_pandas(readings: Iterable[Reading]) -> pd.DataFrame:
     """Return readings as a table, a row each, with a log's columns; `low1_c`, `high1_c` and `x1` (0..1) are bounds and phase."""
-    import pandas as pd
-
     each = {
         "i{}_a": "current_a",
         "v{}_v": "voltage_v",
@@ -483,3 +480,9 @@ def settings_lines(text: str, name: str) -> list[str]:
     if not out:
         raise InputError("no setting in it", name)
     return out
+
+
+def console_lines(path: Path) -> list[str]:
+    """Return the `$name=value` lines of a file, also where `$$` told units behind the values; anything else is refused."""
+    text = re.sub(r"^(\$\S+=\S+)[ \t].*$", r"\1", read_bytes(path).decode("utf-8", "replace"), flags=re.M)
+    return settings_lines(text, str(path))

@@ -18,8 +18,8 @@ def simulator() -> Path:
     """Return the program: NINESPRING_SIM, this source tree's build, what came with the package, or the PATH."""
     named = os.environ.get("NINESPRING_SIM")
     here = Path(__file__).resolve()
-    tree = here.parents[3] / "build" / "host" / "ninespring-sim"
-    packed = here.parent / "simulator" / "bin" / "ninespring-sim"
+    tree = here.parents[4] / "build" / "host" / "ninespring-sim"
+    packed = here.parents[1] / "simulator" / "bin" / "ninespring-sim"
     for one in (named, tree, packed, shutil.which("ninespring-sim")):
         if one and os.access(one, os.X_OK) and not _is_this_package(Path(one)):
             return Path(one)

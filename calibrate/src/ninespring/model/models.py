@@ -7,12 +7,14 @@ from __future__ import annotations
 
 import datetime
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from .. import __version__
 from ..errors import InputError
+from ..io.logs import Run
 from ..io.toml_file import At, TomlFile, did_you_mean
 from . import cooling, native, stiffness
 
@@ -350,3 +352,31 @@ def model_text(model: Model) -> str:
         lines += ["", "[[provenance.logs]]", f"file = {json.dumps(log['file'])}"]
         lines.append(f'sha256 = "{log["sha256"]}"')
     return "\n".join(lines) + "\n"
+
+
+SHAPES = {1: (1, 1), 2: (1, 2), 4: (2, 2), 9: (3, 3), 16: (4, 4), 25: (5, 5), 36: (6, 6), 49: (7, 7), 64: (8, 8)}
+"""Springs of a log, and the array they are taken for where no array.toml says it."""
+
+
+def array_of(array: Array | None, runs: Sequence[Run]) -> Array:
+    """Return the array of these runs; refuse what does not go together."""
+    for k, run in enumerate(runs):
+        for other in runs[:k]:
+            if run.sha256 == other.sha256:
+                raise InputError(f"is the same as {other.name}: it would count twice, give it once", run.name)
+    counts = {run.springs for run in runs}
+    if len(counts) > 1:
+        raise InputError(f"the logs have {' and '.join(map(str, sorted(counts)))} springs: give logs of one array")
+    if array is None:
+        count = counts.pop()
+        below: dict[str, Any] | None = None
+        if runs[0].layers == 2 and count % 2 == 0:
+            count, below = count // 2, {}
+        if count not in SHAPES:
+            raise InputError(
+                f"{count} springs: say how they are arranged, `--array array.toml` with [array] rows and cols",
+                runs[0].name,
+                1,
+            )
+        array = Array(*SHAPES[count], stiffness=below)
+    return array

@@ -14,7 +14,11 @@ from typing import Any
 
 from ... import __version__
 from ...errors import InputError, WorkError
+from ...export.drive import checked_settings
+from ...export.settings import settings_of, together
+from ...find import diagnosis
 from ...find.plan import make_plan
+from ...infer.predict import chip_error
 from ...io import history
 from ...io.board import ROW_TIME, Board, send_settings, settings_that_differ
 from ...io.logs import Run, read_bytes, read_log, write_atomically
@@ -22,6 +26,7 @@ from ...io.logs.mending import RUN_IN_S
 from ...io.recording import LogFile, Recording, Step, record, script_lines, told_to_stop
 from ...io.thermometers import Thermometers
 from ...model.models import Array, Model, model_text, read_model
+from ...say import page
 from ..console import checked, working
 from . import judged
 from .cut import left_of
@@ -289,9 +294,6 @@ class Calibration:
         return [read_log(self.folder / one["log"], self.array.springs) for one in pieces]
 
     def _diagnose(self) -> None:
-        from ...find import diagnosis
-        from ...say import page
-
         if "diagnose" not in self.progress.done:
             with working("diagnosing") as say:
                 found = diagnosis.diagnose(self.array, self._runs("run1"), progress=say)
@@ -331,9 +333,6 @@ class Calibration:
         return as_lines(self.had)
 
     def _verify(self) -> None:
-        from ...export.settings import settings_of
-        from ..export import chip_error
-
         if "verify" not in self.progress.done:
             model, old, runs = self.model(), self._old_lines(), self._runs("run2")
             lines = settings_of(model).lines
@@ -353,9 +352,6 @@ class Calibration:
             self._refuse("the chip would be more wrong with the new settings on a log that the fit never saw")
 
     def _export(self) -> None:
-        from ...export.settings import together
-        from ..export import checked_settings
-
         if "export" not in self.progress.done:
             with working("driving the old and the new settings in simulation") as say:
                 made, worse, _ = checked_settings(self.model(), self._old_lines(), True, say)

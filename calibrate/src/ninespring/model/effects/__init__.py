@@ -12,14 +12,12 @@ import pkgutil
 from collections.abc import Mapping
 from typing import Any
 
-from ...infer.problem import Problem
 from .. import native
 from . import runs_differ
 from .effect import Candidate as Candidate
 from .effect import Effect as Effect
 from .effect import Scene as Scene
 from .effect import Steady as Steady
-from .effect import scene_of
 from .names import IN_WORDS as IN_WORDS
 from .names import MEASUREMENT as MEASUREMENT
 from .names import ON_CHIP as ON_CHIP
@@ -39,12 +37,11 @@ def sentence(name: str, parameters: Mapping[str, Any], variant: str = "") -> str
     return next(one for one in (*library(), *runs_differ.EFFECTS) if one.name == name).sentence(parameters, variant)
 
 
-def candidates(problem: Problem) -> list[Candidate]:
-    """Return every effect, in every variant, that these runs could show."""
-    scene = scene_of(problem)
+def candidates(scene: Scene) -> list[Candidate]:
+    """Return every effect, in every variant, that logs could show."""
     return [candidate for effect in library() for candidate in effect.candidates_for(scene)]
 
 
-def of_runs(problem: Problem) -> list[Candidate]:
-    """Return what may be a run's own, and not the array's, in these runs."""
-    return runs_differ.candidates(scene_of(problem))
+def of_runs(scene: Scene) -> list[Candidate]:
+    """Return what may be a run's own, and not the array's, in logs."""
+    return runs_differ.candidates(scene)

@@ -7,9 +7,6 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-import numpy as np
-
-from ...infer.problem import Problem
 from .. import native
 from ..spec import Free
 
@@ -70,10 +67,6 @@ class Steady:
     """What speaks against it in a table of the paper's kind."""
 
 
-FAN_ROWS = 20
-"""So many rows at a part of the fan's command say something of it: one or two are means across a switch."""
-
-
 @dataclass(frozen=True)
 class Scene:
     """What logs could show: the array, how it was driven, how hot and how long."""
@@ -113,28 +106,6 @@ class Scene:
     def transforms(self) -> bool:
         """Whether the hottest spring comes near the declared transformation."""
         return self.hottest_c > self.declared("austenite_start_c") - 8.0
-
-
-def scene_of(problem: Problem) -> Scene:
-    """Return what a problem's runs could show."""
-    runs = problem.runs
-    fan = np.concatenate([run.fan for run in runs])
-    return Scene(
-        problem.array.rows,
-        problem.array.cols,
-        frozenset(run.mode for run in runs),
-        bool((fan > 0.1).any()),
-        bool((np.abs(fan - 0.5) < 0.35).sum() >= FAN_ROWS),
-        problem.hottest_c,
-        float(np.median(np.diff(runs[0].time_s))),
-        max(run.duration_s for run in runs),
-        {key: tuple(one.shape[1] for one in hats) for key, hats in problem.hats.items()},
-        problem.base_value,
-        len(runs),
-        all(run.ambient_c is not None for run in runs),
-        any(run.load_n is not None and np.ptp(run.load_n) > 0.0 for run in runs),
-        problem.reads_ohm,
-    )
 
 
 Numbers = Mapping[str, tuple[float, float | None]]
