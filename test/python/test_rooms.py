@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import ast
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
 import ninespring
 
 HOME = Path(ninespring.__file__).parent
+ROOT = Path(__file__).parents[2]
+OVERVIEW = ROOT / "docs" / "overview.md"
 ROOMS = ("errors", "io", "model", "export", "infer", "find", "say", "explore", "dashboard", "api", "cli")
 """From below: what each is for stands in CONTRIBUTING.md. `explore` and `dashboard` are apart: neither knows the other."""
 INSIDE = {
@@ -78,3 +81,13 @@ def test_imports_are_at_the_top() -> None:
         if inside and not {module, module.partition(".")[0]} & INSIDE
     ]
     assert not hidden
+
+
+def test_the_overview_names_files_that_there_are() -> None:
+    """Where a file lives is a newcomer's first question: docs/overview.md answers it by name."""
+    names = re.findall(r"`((?:[a-z_]+/)*[a-z_]+\.(?:py|c|cpp|def|ini|toml))`", OVERVIEW.read_text("utf-8"))
+    known = [str(path) for top in (HOME, ROOT / "lib", ROOT / "firmware") for path in top.rglob("*.*")]
+    known += [str(path) for path in (ROOT / "sim_host").rglob("*.*")] + [str(ROOT / "test/python/test_rooms.py")]
+    written = {"array.toml", "model.toml"}  # by the user and by the tool
+    assert len(names) > 40
+    assert not [name for name in names if name not in written and not any(path.endswith(f"/{name}") for path in known)]
