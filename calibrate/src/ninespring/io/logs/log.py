@@ -186,82 +186,10 @@ def read_log(
 
     table = read_table(path, header_check=check)
     letter, count, has_voltages = found[0]
-    mode: DriveMode
-    frame = table.frame
-    for name in table.names:
-        if EXTRA.match(name):
-            continue
-        _check_range(table, name, name if name in LIMITS else name[0])
-        if name == "time_s" or name[0] in "iuvf":
-            holes = np.flatnonzero(frame[name].isna().to_numpy())
-            if holes.size:
-                line, column = table.where(int(holes[0]), name)
-                raise InputError(f"{name} is empty: only temperatures and ambient_c may be", path, line, column)
+    _check_cells(table)
     notes: list[str] = []
-    keep = mending.rising_rows(table, notes)
-    if table.unfinished and len(frame) > 3:
-        keep[-1] = False
-    if table.cut_off or (table.unfinished and len(frame) > 3):
-        notes.append("the last line has no end, it may be cut off: left out")
-    frame = frame.iloc[keep]
-    notes[:0] = _cut_short(table, frame)
-    if len(frame) < 3:
-        raise InputError(f"{len(frame)} rows: too short to say anything", path, int(table.lines[-1]))
-
-    def matrix(pattern: str) -> np.ndarray:
-        return np.ascontiguousarray(
-            np.column_stack(
-                [
-                    frame[pattern.format(k)].to_numpy(float)
-                    if pattern.format(k) in frame
-                    else np.full(len(frame), np.nan)
-                    for k in range(1, count + 1)
-                ]
-            )
-        )
-
-    time_s = frame["time_s"].to_numpy(float)
-    temperature = matrix("t{}_c")
-    current = voltage = None
-    if letter == "i":
-        current = matrix("i{}_a")
-        if has_voltages:
-            voltage = matrix("v{}_v")
-            mode, drive = "power", np.maximum(current * voltage, 0.0)  # offsets about zero heat nothing
-        else:
-            mode, drive = "current", np.maximum(current, 0.0)
-    else:
-        mode, drive = "command", matrix("u{}")
-    ambient = None
-    if "ambient_c" in frame and frame["ambient_c"].notna().any():
-        ambient = frame["ambient_c"].ffill().bfill().to_numpy(float)
-    fan = frame["fan"].to_numpy(float) if "fan" in frame else np.zeros(len(frame))
-    loads = [f"f{k}_n" for k in range(1, count + 1)]
-    load = None
-    if any(name in frame for name in loads):
-        # a spring without a column carries none; a balance's offset is no pull
-        load = np.column_stack([frame[name] if name in frame else np.zeros(len(frame)) for name in loads])
-        load = np.maximum(load, 0.0)
-    run = Run(
-        name=str(path),
-        sha256=sha256_of(path),
-        time_s=time_s,
-        mode=mode,
-        drive=drive,
-        temperature_c=temperature,
-        fan=np.clip(fan, 0.0, 1.0),
-        ambient_c=ambient,
-        current_a=current,
-        voltage_v=voltage,
-        layers=_layers(table, count, path),
-        load_n=load,
-        notes=notes,
-        of_board=table.keys.get("version", "").startswith("ninespring "),
-    )
-    if mode == "command":
-        run.drive = np.clip(run.drive, 0.0, 1.0)
-        if has_voltages:
-            notes.append("voltages without currents say nothing of the power: not used")
+    frame = _kept_rows(table, notes)
+    run = _run_of(table, frame, letter, count, has_voltages, notes)
     without = [str(k) for k in range(1, count + 1) if f"t{k}_c" not in frame]
     if without and temperatures and len(without) < count:
         notes.append(f"no temperature of spring {', '.join(without)}: simulated, but not compared")
@@ -274,9 +202,83 @@ def read_log(
     mending.doubt_units(run)
     if (
         temperatures
-        and not (or_resistance and voltage is not None and len(without) == count)
+        and not (or_resistance and run.voltage_v is not None and len(without) == count)
         and not np.isfinite(run.temperature_c).any()
     ):
         why = f" ({notes[-1]})" if notes else ""
         raise InputError(f"no usable temperature in the whole log{why}", path)
     return run
+
+
+def _check_cells(table: Table) -> None:
+    """Refuse a number out of its range, or an empty cell where something must stand."""
+    for name in table.names:
+        if EXTRA.match(name):
+            continue
+        _check_range(table, name, name if name in LIMITS else name[0])
+        if name == "time_s" or name[0] in "iuvf":
+            holes = np.flatnonzero(table.frame[name].isna().to_numpy())
+            if holes.size:
+                line, column = table.where(int(holes[0]), name)
+                raise InputError(f"{name} is empty: only temperatures and ambient_c may be", table.path, line, column)
+
+
+def _kept_rows(table: Table, notes: list[str]) -> pd.DataFrame:
+    """Return the rows that count: time rises, and the last one is whole."""
+    rows = len(table.frame)
+    keep = mending.rising_rows(table, notes)
+    if table.unfinished and rows > 3:
+        keep[-1] = False
+    if table.cut_off or (table.unfinished and rows > 3):
+        notes.append("the last line has no end, it may be cut off: left out")
+    frame = table.frame.iloc[keep]
+    notes[:0] = _cut_short(table, frame)
+    if len(frame) < 3:
+        raise InputError(f"{len(frame)} rows: too short to say anything", table.path, int(table.lines[-1]))
+    return frame
+
+
+def _run_of(table: Table, frame: pd.DataFrame, letter: str, count: int, has_voltages: bool, notes: list[str]) -> Run:
+    """Return a run of the rows as they are: what drives the springs is a power, a current or a command."""
+    nothing = np.full(len(frame), np.nan)
+
+    def matrix(pattern: str, missing: np.ndarray = nothing) -> np.ndarray:
+        names = [pattern.format(k) for k in range(1, count + 1)]
+        return np.column_stack([frame[name].to_numpy(float) if name in frame else missing for name in names])
+
+    mode: DriveMode
+    current = voltage = None
+    if letter == "i":
+        current = matrix("i{}_a")
+        if has_voltages:
+            voltage = matrix("v{}_v")
+            mode, drive = "power", np.maximum(current * voltage, 0.0)  # offsets about zero heat nothing
+        else:
+            mode, drive = "current", np.maximum(current, 0.0)
+    else:
+        mode, drive = "command", np.clip(matrix("u{}"), 0.0, 1.0)
+        if has_voltages:
+            notes.append("voltages without currents say nothing of the power: not used")
+    ambient = None
+    if "ambient_c" in frame and frame["ambient_c"].notna().any():
+        ambient = frame["ambient_c"].ffill().bfill().to_numpy(float)
+    load = None
+    if any(f"f{k}_n" in frame for k in range(1, count + 1)):
+        # a spring without a column carries none; a balance's offset is no pull
+        load = np.maximum(matrix("f{}_n", np.zeros(len(frame))), 0.0)
+    return Run(
+        name=table.path,
+        sha256=sha256_of(table.path),
+        time_s=frame["time_s"].to_numpy(float),
+        mode=mode,
+        drive=drive,
+        temperature_c=matrix("t{}_c"),
+        fan=np.clip(frame["fan"].to_numpy(float), 0.0, 1.0) if "fan" in frame else np.zeros(len(frame)),
+        ambient_c=ambient,
+        current_a=current,
+        voltage_v=voltage,
+        layers=_layers(table, count, table.path),
+        load_n=load,
+        notes=notes,
+        of_board=table.keys.get("version", "").startswith("ninespring "),
+    )

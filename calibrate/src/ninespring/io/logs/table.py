@@ -7,6 +7,7 @@ import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NoReturn
 
 import numpy as np
 import pandas as pd
@@ -54,8 +55,50 @@ Header = Callable[[list[str], int, list[int]], None]
 """Takes names, line and columns of a header; raises InputError where it is not the right one."""
 
 
+@dataclass
+class _Lines:
+    """A file's lines: its header and rows, where they stand, and what the comments say."""
+
+    kept: list[str]
+    numbers: list[int]
+    """1-based line of each."""
+    keys: dict[str, str]
+    faults: list[str]
+    ended: bool
+    """The last line has an end."""
+
+
 def read_table(path: str | Path, text_columns: Iterable[str] = (), header_check: Header | None = None) -> Table:
     """Read a comma-separated file with a header, `#` comments, and numbers or empty cells."""
+    lines = _lines_of(path, _text_of(path))
+    names, starts = _names_of(path, lines.kept[0], lines.numbers[0])
+    if header_check:
+        header_check(names, lines.numbers[0], starts)
+    body, numbers = lines.kept[1:], lines.numbers[1:]
+    cut_off = not lines.ended and len(body) > 3 and body[-1].count(",") < len(names) - 1
+    if cut_off:
+        body.pop()
+    if not body:
+        raise InputError("there is a header but no row", path, lines.numbers[0])
+    _refuse_ragged(path, len(names), body, numbers)
+    words = {name for name in names if name == "state" or name.startswith("note_")} | set(text_columns)
+    frame = _frame_of(path, names, words, body, numbers)
+    return Table(
+        str(path),
+        lines.numbers[0],
+        names,
+        starts,
+        frame,
+        np.asarray(numbers[: len(body)], dtype=np.int64),
+        lines.keys,
+        not lines.ended and not cut_off,
+        cut_off,
+        lines.faults,
+    )
+
+
+def _text_of(path: str | Path) -> str:
+    """Return a file's text, lines ended by a line feed; what is no text of lines is refused."""
     raw = read_bytes(path)
     if not raw.strip():
         raise InputError("the file is empty", path)
@@ -67,51 +110,53 @@ def read_table(path: str | Path, text_columns: Iterable[str] = (), header_check:
     except UnicodeDecodeError as error:
         line = raw.count(b"\n", 0, error.start) + 1
         raise InputError("not UTF-8 text: save the log as UTF-8 CSV", path, line) from None
-    if "\r" in text:
-        text = text.replace("\r\n", "\n").replace("\r", "\n")
+    return text.replace("\r\n", "\n").replace("\r", "\n") if "\r" in text else text
+
+
+def _lines_of(path: str | Path, text: str) -> _Lines:
     lines = text.split("\n")
-    if lines and lines[-1] == "":
+    if lines[-1] == "":
         lines.pop()
     longest = max(map(len, lines))
     if longest > MAX_LINE:
         number = next(k for k, one in enumerate(lines, start=1) if len(one) > MAX_LINE)
         raise InputError(f"a line of {longest} characters: not a log (line ends missing?)", path, number)
-    keys: dict[str, str] = {}
-    faults: list[str] = []
-    kept: list[str] = []
-    numbers: list[int] = []
+    out = _Lines([], [], {}, [], text.endswith("\n"))
     for number, line in enumerate(lines, start=1):
         if line.startswith("#"):
             name, colon, value = line[1:].partition(":")
             if re.fullmatch(r" ?fault at (?:the end|[\d.]+ s)", name):
-                faults.append(f"{name.strip()}: {value.strip()}")
-            elif colon and not kept:  # further down a board's status is kept
-                keys.setdefault(name.strip().lower(), value.strip())
+                out.faults.append(f"{name.strip()}: {value.strip()}")
+            elif colon and not out.kept:  # further down a board's status is kept
+                out.keys.setdefault(name.strip().lower(), value.strip())
         elif line.strip():
-            kept.append(line)
-            numbers.append(number)
-    if not kept:
+            out.kept.append(line)
+            out.numbers.append(number)
+    if not out.kept:
         raise InputError("only comments: there is no header line", path, 1)
-    header, header_line = kept[0], numbers[0]
     for separator, called in ((";", "semicolons"), ("\t", "tabs")):
-        if separator in header and "," not in header:
+        if separator in out.kept[0] and "," not in out.kept[0]:
             raise InputError(
                 f"columns are separated by {called}: save with commas and decimal points "
                 "(`ninespring import --map` converts)",
                 path,
-                header_line,
-                header.index(separator) + 1,
+                out.numbers[0],
+                out.kept[0].index(separator) + 1,
             )
     if '"' in text:
-        # Quotes around plain cells mean nothing. A comma inside of them shows in the count of cells below.
-        kept = [line.replace('"', "") for line in kept]
-        header = kept[0]
+        # Quotes around plain cells mean nothing. A comma inside of them shows in the count of cells.
+        out.kept = [line.replace('"', "") for line in out.kept]
+    return out
+
+
+def _names_of(path: str | Path, header: str, line: int) -> tuple[list[str], list[int]]:
+    """Return a header's names and the column at which each begins."""
     names = [name.strip() for name in header.split(",")]
     if all(_is_number(name) for name in names):
         raise InputError(
             "the first line holds numbers: begin the file with a line of column names (time_s,i1_a,t1_c,...)",
             path,
-            header_line,
+            line,
             1,
         )
     starts = [1]
@@ -119,42 +164,34 @@ def read_table(path: str | Path, text_columns: Iterable[str] = (), header_check:
         starts.append(starts[-1] + len(cell) + 1)
     for k, name in enumerate(names):
         if name == "":
-            raise InputError(f"column {k + 1} has no name", path, header_line, starts[k])
+            raise InputError(f"column {k + 1} has no name", path, line, starts[k])
         if name in names[:k]:
-            raise InputError(f"column '{name}' is there twice", path, header_line, starts[k])
-    if header_check:
-        header_check(names, header_line, starts)
-    wanted = header.count(",")
-    body = kept[1:]
-    unfinished = not text.endswith("\n")
-    cut_off = unfinished and len(body) > 3 and body[-1].count(",") < wanted
-    if cut_off:
-        body.pop()
-    if not body:
-        raise InputError("there is a header but no row", path, header_line)
+            raise InputError(f"column '{name}' is there twice", path, line, starts[k])
+    return names, starts
+
+
+def _refuse_ragged(path: str | Path, cells: int, body: list[str], numbers: list[int]) -> None:
     for row, line in enumerate(body):
-        if (found := line.count(",")) != wanted:
+        if (found := line.count(",") + 1) != cells:
             advice = (
                 "cut off here?"
                 if row == len(body) - 1
                 else "decimal commas? write 20.5, not 20,5"
-                if found > wanted
+                if found > cells
                 else "a cell is missing: leave it empty between two commas"
             )
-            raise InputError(
-                f"{found + 1} cells where the header has {wanted + 1}: {advice}",
-                path,
-                numbers[row + 1],
-                len(line) + 1,
-            )
-    words = {name for name in names if name == "state" or name.startswith("note_")} | set(text_columns)
-    types = {name: (str if name in words else np.float64) for name in names}
+            message = f"{found} cells where the header has {cells}: {advice}"
+            raise InputError(message, path, numbers[row], len(line) + 1)
+
+
+def _frame_of(path: str | Path, names: list[str], words: set[str], body: list[str], numbers: list[int]) -> pd.DataFrame:
+    """Return the rows as numbers, but for the columns of `words`; the first cell that is none is refused."""
     try:
         frame = pd.read_csv(
             io.StringIO("\n".join(body)),
             header=None,
             names=names,
-            dtype=types,
+            dtype={name: (str if name in words else np.float64) for name in names},
             na_values=[""],
             keep_default_na=False,
             skipinitialspace=True,
@@ -164,18 +201,11 @@ def read_table(path: str | Path, text_columns: Iterable[str] = (), header_check:
             low_memory=False,
         )
     except (ValueError, OverflowError):
-        frame = None
-    places = np.asarray(numbers[1 : len(body) + 1], dtype=np.int64)
-    table = Table(str(path), header_line, names, starts, frame, places, keys)
-    table.unfinished = unfinished and not cut_off
-    table.cut_off = cut_off
-    table.faults = faults
-    numeric = [name for name in names if name not in words]
-    if frame is None or np.isfinite(frame[numeric].to_numpy(float)).sum() != int(
-        frame[numeric].notna().to_numpy().sum()
-    ):
-        _refuse_first_bad_cell(path, names, words, body, numbers[1:])
-    return table
+        _refuse_first_bad_cell(path, names, words, body, numbers)
+    numeric = frame[[name for name in names if name not in words]]
+    if np.isfinite(numeric.to_numpy(float)).sum() != int(numeric.notna().to_numpy().sum()):
+        _refuse_first_bad_cell(path, names, words, body, numbers)
+    return frame
 
 
 def _is_number(text: str) -> bool:
@@ -188,7 +218,7 @@ def _is_number(text: str) -> bool:
 
 def _refuse_first_bad_cell(
     path: str | Path, names: list[str], words: set[str], body: list[str], numbers: list[int]
-) -> None:
+) -> NoReturn:
     for row, line in enumerate(body):
         at = 1
         if [cell.strip() for cell in line.split(",")] == names:
