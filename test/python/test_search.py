@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from ninespring.find import diagnosis, evidence, experiments, search
 from ninespring.find.plan import plan_experiment
-from ninespring.find.residual import surrogate
 from ninespring.infer import budget
 from ninespring.infer.declared import base_spec
 from ninespring.infer.fit import Fit
@@ -315,7 +314,7 @@ def test_the_experiment_that_separates_is_one_in_which_both_models_differ(make_l
     told = experiments.separate(problem, base, with_heat)
     assert told.difference_c > 3.0 and 1 <= told.spring <= 9 and 0 < told.at_s <= told.duration_s
     assert told.name in told.text and f"spring {told.spring}" in told.text
-    planned = plan_experiment(Array(), told.as_dict(), 14.0, 105.0)
+    planned = plan_experiment(Array(), told.told(), 14.0, 105.0)
     assert script_lines("\n".join(planned.steps), "steps.txt", told.duration_s + 10.0)[-1].at_s
 
 
@@ -378,20 +377,6 @@ def test_a_run_that_begins_warm_needs_no_effect(tmp_path: Path) -> None:
     values |= {"plate_coupling_w_per_k": 0.01, "plate_heat_capacity_j_per_k": 60.0, "plate_loss_w_per_k": 0.02}
     left = run.temperature_c - problem.simulate(spec, [values[f.key] for f in spec.free], 0)
     assert np.abs(left[100:200].mean(axis=0)).max() < 0.08
-
-
-def test_the_empirical_model_finds_what_the_drives_explain_and_nothing_in_noise(make_log) -> None:
-    problem = Problem(Array(), [read_log(make_log(seed=5))])
-    fit = problem.fit(base_spec(problem))
-    rng = np.random.default_rng(7)
-    white = [rng.normal(0.0, 0.3, (600, 9))]
-    fit.residual = white
-    nothing = surrogate(problem, fit)
-    assert nothing["holdout_after_c"] > 0.98 * nothing["holdout_before_c"]
-    fit.residual = [white[0] + 3.0 * problem.runs[0].drive[:, [3]]]
-    found = surrogate(problem, fit)
-    assert found["empirical"] is True
-    assert found["holdout_after_c"] < 0.7 * found["holdout_before_c"]
 
 
 def test_a_model_with_effects_needs_no_other_on_the_log_it_came_from(make_log, tmp_path: Path) -> None:

@@ -327,8 +327,8 @@ def told(kind: str, text: str, *sizes: float) -> list[unnamed.Hidden]:
 )
 def test_a_negative_size_is_said_in_words_that_have_none(kind: str, text: str, size: float, words: str) -> None:
     (cause,) = told(kind, text, size)
-    said = cause.as_dict()
-    assert said["text"].startswith(words) and said["size"] == size
+    said = cause.told()
+    assert said.text.startswith(words) and said.size == size
 
 
 def test_no_part_loses_more_than_all() -> None:
@@ -342,6 +342,6 @@ def test_no_part_loses_more_than_all() -> None:
 def test_jumps_that_go_on_one_way_are_a_drift() -> None:
     jumps = told("sensor", "all thermometers jump, {} of run 1", 0.3, 0.2, 0.3)
     (drift,) = unnamed.drifts(jumps)
-    assert drift.as_dict()["text"].startswith("all thermometers drift, 60 to 899 s of run 1: 0.80 K")
+    assert drift.told().text.startswith("all thermometers drift, 60 to 899 s of run 1: 0.80 K")
     assert unnamed.drifts(jumps[:2]) == jumps[:2]
     assert len(unnamed.drifts(told("sensor", "all thermometers jump, {}", 0.3, -0.3, 0.3))) == 3

@@ -13,14 +13,14 @@ from rich.live import Live
 
 from .. import __version__, api
 from ..errors import InputError, WorkError
-from ..io import history, ranges
+from ..io import history, ranges, results
 from ..io.board import Board, settings_lines
 from ..io.logs import check_folder, read_bytes
 from ..io.recording import LogFile, script_lines, told_to_stop
 from ..io.recording import record as record_board
 from ..io.thermometers import Thermometers
 from ..say.monitoring import Screen
-from .console import FILE, FORCE, JSON, PORT, Command, Real, Whole, beside, checked, err, out, result_of, working, write
+from .console import FILE, FORCE, JSON, PORT, Command, Real, Whole, beside, err, out, working, write
 
 HZ = Whole(ranges.RECORD_HZ)
 SECONDS = Real(ranges.RECORD_S)
@@ -96,11 +96,11 @@ def record(
                     logger.close()
         if not log.rows:
             raise WorkError(got.ended or "stopped before the first row came")
-        faults = [dataclasses.asdict(one) for one in got.faults]
+        faults = [results.Fault(**dataclasses.asdict(one)) for one in got.faults]
         write(
             {
-                json_path: checked(
-                    result_of("record", rows=log.rows, dropped_lines=got.dropped, ended=got.ended, faults=faults)
+                json_path: results.checked(
+                    results.Record(rows=log.rows, dropped_lines=got.dropped, ended=got.ended, faults=faults)
                 )
             }
         )
@@ -138,7 +138,7 @@ def upload(settings: Path | None, port: str, undo: bool, save: bool, json_path: 
     if settings is None:
         with working("giving back"), Board(port, off_at_end=False) as board:
             last = history.undo(board, save)
-        write({json_path: checked(result_of("upload", settings=len(last.sent), saved=save, undone=last.by))})
+        write({json_path: results.checked(results.Upload(settings=len(last.sent), saved=save, undone=last.by))})
         for line in last.words():
             name, _, change = line.partition(": ")
             old, _, new = change.partition(" -> ")
@@ -148,7 +148,7 @@ def upload(settings: Path | None, port: str, undo: bool, save: bool, json_path: 
     lines = settings_lines(read_bytes(settings).decode("utf-8", "replace"), str(settings))
     with working("sending", len(lines)) as say:
         api.upload(port, "\n".join(lines), save, say, by=f"upload {settings.name}")
-    write({json_path: checked(result_of("upload", settings=len(lines), saved=save))})
+    write({json_path: results.checked(results.Upload(settings=len(lines), saved=save))})
     out.print(f"{len(lines)} settings sent and read back{', saved' if save else ''}")
 
 

@@ -21,7 +21,7 @@ from ..model.pattern import pattern_of
 from .calibration.chain import Calibration
 from .calibration.progress import FILE, Progress
 from .calibration.report import page
-from .console import ARRAY, JSON, Command, Real, checked, out, write
+from .console import ARRAY, JSON, Command, Real, out, write
 
 FROM = {"duration": 900.0, "drive_for": 300.0, "current": 2.0, "supply": 14.0, "hottest": 105.0}
 """What is taken where nothing is said."""
@@ -143,7 +143,7 @@ def calibrate(
         if "diagnose" in progress.done:
             write_atomically({output / REPORT: page(progress, array)})
             out.print(f"-> {output / REPORT}", soft_wrap=True, markup=False)
-        write({json_path: checked(progress.data)})
+        write({json_path: progress.text()})
 
 
 def _text(path: Path | None) -> str | None:

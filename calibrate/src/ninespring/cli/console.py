@@ -2,26 +2,23 @@
 
 from __future__ import annotations
 
-import json
 import math
 import os
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
 import click
-import jsonschema
 import numpy as np
 from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from .. import __version__
 from ..errors import InputError
-from ..io.logs import Run, read_log, write_atomically
+from ..io import results
+from ..io.logs import Run, read_log, sha256_of, write_atomically
 from ..io.ranges import Range
 from ..model.models import array_of, read_array
 
@@ -122,20 +119,6 @@ def working(text: str, total: float | None = None) -> Iterator[Callable[..., Non
         yield lambda now, done=None: progress.update(task, description=now, completed=done)
 
 
-def checked(data: Mapping[str, Any]) -> str:
-    """Return a command's result as JSON text, held to its schema (results.schema.json, diagnosis.schema.json)."""
-    diagnosed = str(data.get("schema", "")).startswith("ninespring.diagnosis/")
-    name = "say/diagnosis.schema.json" if diagnosed else "say/results.schema.json"
-    schema = json.loads((resources.files("ninespring") / name).read_text("utf-8"))
-    jsonschema.validate(data, schema)
-    return json.dumps(data, indent=1, allow_nan=False) + "\n"
-
-
-def result_of(name: str, **more: Any) -> dict[str, Any]:
-    """Return a command's result for programs, with what wrote it."""
-    return {"schema": f"ninespring.{name}/1", "tool": f"ninespring {__version__}"} | more
-
-
 def write(files: Mapping[Path | None, str | bytes], force: bool = False) -> None:
     """Write a command's files, all or none as far as a file system goes; a file named None is not wanted."""
     write_atomically({path: text for path, text in files.items() if path}, force)
@@ -182,16 +165,21 @@ def beside(output: Path) -> Console:
     return err if str(output) == "-" else out
 
 
-def logs_of(runs: list[Run]) -> list[dict[str, Any]]:
+def logs_of(runs: Sequence[Run]) -> list[results.Log]:
     """Return which logs a result is from."""
-    return [{"file": Path(r.name).name, "sha256": r.sha256, "rows": len(r.time_s), "notes": r.notes} for r in runs]
+    return [results.Log(file=Path(r.name).name, sha256=r.sha256, rows=len(r.time_s), notes=list(r.notes)) for r in runs]
 
 
-def print_parameters(console: Console, parameters: dict[str, Any]) -> None:
+def source_of(path: Path) -> results.Source:
+    """Return which file a result is from."""
+    return results.Source(file=path.name, sha256=sha256_of(path))
+
+
+def print_parameters(console: Console, parameters: results.Parameters) -> None:
     """Print a table of numbers."""
     table = Table("number", "value", "standard error", "in 95 of 100 cases", "unit", "")
     for name, one in parameters.items():
-        error = "-" if one["stderr"] is None else f"{one['stderr']:.2g}"
-        ends = "{:.4g} .. {:.4g}".format(*one["interval_95"]) if "interval_95" in one else "-"
-        table.add_row(name, f"{one['value']:.5g}", error, ends, one["unit"], one.get("note", ""))
+        error = "-" if one.stderr is None else f"{one.stderr:.2g}"
+        ends = "{:.4g} .. {:.4g}".format(*one.interval_95) if one.interval_95 else "-"
+        table.add_row(name, f"{one.value:.5g}", error, ends, one.unit, one.note or "")
     console.print(table)

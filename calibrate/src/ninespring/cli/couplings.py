@@ -11,10 +11,11 @@ from rich.table import Table
 from ..errors import InputError, WorkError
 from ..explore.couplings import couplings as find
 from ..explore.geometry import geometry_of
+from ..io import results
 from ..io.logs import check_folder
 from ..model.models import model_text, read_array
 from ..model.native import parameter_table
-from .console import FILE, JSON, Command, beside, checked, result_of, working, write
+from .console import FILE, JSON, Command, beside, working, write
 
 MESHES = ("coarse", "normal", "fine")
 
@@ -92,8 +93,7 @@ def couplings(array_path: Path, mesh: str, output: Path, json_path: Path | None)
         )
     for line in lines:
         talk.print(line, soft_wrap=True, markup=False)
-    result = result_of(
-        "couplings",
+    result = results.Couplings(
         mesh=mesh,
         unknowns=found.still.unknowns,
         cylinder_diameter_mm=2 * spring.radius_mm,
@@ -103,7 +103,7 @@ def couplings(array_path: Path, mesh: str, output: Path, json_path: Path | None)
         second_fan_w_per_k=found.pairs_blown.second if found.pairs_blown else None,
         parameters=_parameters(found),
     )
-    write({output: model_text(found.model), json_path: checked(result)})
+    write({output: model_text(found.model), json_path: results.checked(result)})
     if str(output) != "-":
         talk.print(f"-> {output}", soft_wrap=True, markup=False)
 
@@ -114,13 +114,13 @@ def _found(full: str) -> str:
     return f"stiffness_{name}" if of_one else name
 
 
-def _parameters(found: object) -> dict[str, dict[str, object]]:
+def _parameters(found: object) -> dict[str, results.Coupling]:
     return {
-        name: {
-            "value": value,
-            "unit": parameter_table()[name.partition("[")[0]].unit,
-            "reduction_error": found.lumped.reduction.get(_found(name)),
-            "mesh_error": found.mesh_error.get(_found(name)),
-        }
+        name: results.Coupling(
+            value=value,
+            unit=parameter_table()[name.partition("[")[0]].unit,
+            reduction_error=found.lumped.reduction.get(_found(name)),
+            mesh_error=found.mesh_error.get(_found(name)),
+        )
         for name, value in found.model.parameters.items()
     }

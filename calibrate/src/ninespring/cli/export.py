@@ -10,12 +10,13 @@ from ..errors import InputError, WorkError
 from ..export.drive import checked_settings
 from ..export.settings import left_out, settings_of, together
 from ..infer.predict import chip_error
+from ..io import results
 from ..io.board import Board, console_lines
-from ..io.logs import check_folder, read_bytes, read_log, sha256_of
+from ..io.logs import check_folder, read_bytes, read_log
 from ..model.models import Model, model_of_layer, read_model
 from ..model.stiffness import LAYERS
 from ..say.verified import with_verification
-from .console import FILE, JSON, MODEL, Command, beside, checked, logs_of, notes_of, out, result_of, working, write
+from .console import FILE, JSON, MODEL, Command, beside, logs_of, notes_of, out, source_of, working, write
 
 CHIP = click.option(
     "--chip",
@@ -80,16 +81,15 @@ def export(
         *(f"# {e} is left out: {why}" for e, why in left.items()),
         *(f"# not written, {why}: {', '.join(names)}" for why, names in together(made.kept, made.written).items()),
     ]
-    result = result_of(
-        "export",
-        model={"file": model_path.name, "sha256": sha256_of(model_path)},
+    result = results.Export(
+        model=source_of(model_path),
         settings={name: float(value) for name, value in made.written.items()},
         kept=made.kept,
         left_out=left,
         worse=worse,
         drives=drives,
     )
-    write({output: "\n".join([*head, made.lines]), json_path: checked(result)})
+    write({output: "\n".join([*head, made.lines]), json_path: results.checked(result)})
     said = beside(output)
     if made.remarks:
         said.print(made.remarks, markup=False)
@@ -141,20 +141,19 @@ def verify(
     notes_of([run])
     old = _port_lines(port) if port else _chip_lines(chip_path)
     made = settings_of(model)
-    errors = {"before": chip_error(model, old, [run]), "after": chip_error(model, f"{old}\n{made.lines}", [run])}
-    result = result_of(
-        "verify",
+    result = results.Verify(
         logs=logs_of([run]),
-        model={"file": model_path.name, "sha256": sha256_of(model_path)},
-        **errors,
+        model=source_of(model_path),
+        before=chip_error(model, old, [run]),
+        after=chip_error(model, f"{old}\n{made.lines}", [run]),
     )
-    write({json_path: checked(result), report_path: with_verification(report, result)})
+    write({json_path: results.checked(result), report_path: with_verification(report, result)})
     out.print(
-        f"the chip's model on {log.name}: error {errors['before']['rmse_c']:.2f} K rms as it is, "
-        f"{errors['after']['rmse_c']:.2f} K with the model's settings",
+        f"the chip's model on {log.name}: error {result.before.rmse_c:.2f} K rms as it is, "
+        f"{result.after.rmse_c:.2f} K with the model's settings",
         markup=False,
     )
-    if errors["after"]["rmse_c"] > errors["before"]["rmse_c"]:
+    if result.after.rmse_c > result.before.rmse_c:
         raise WorkError("the model's settings make the chip's error larger on this log: do not upload them")
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import click
 
@@ -15,6 +14,7 @@ from ..infer.fit import Fit
 from ..infer.intervals import TOLD, correlations, intervals
 from ..infer.problem import Problem
 from ..infer.result import parameters_of
+from ..io import results
 from ..io.logs import Run, check_folder
 from ..io.statistics import rms
 from ..model import effects, native
@@ -26,12 +26,10 @@ from .console import (
     Command,
     array_and_runs,
     beside,
-    checked,
     logs_of,
     notes,
     notes_of,
     print_parameters,
-    result_of,
     working,
     write,
 )
@@ -82,8 +80,7 @@ def fit(logs: tuple[Path, ...], array_path: Path | None, effects: str, output: P
         say("is the log to be doubted?")
         model, suspect = doubt.model_of_fit(problem, chosen, runs)
     model.provenance["rmse_before_c"] = rms(base.residual)
-    result = result_of(
-        "fit",
+    result = results.Fit(
         logs=logs_of(runs),
         rmse_before_c=rms(base.residual),
         rmse_c=rms(chosen.residual),
@@ -96,37 +93,37 @@ def fit(logs: tuple[Path, ...], array_path: Path | None, effects: str, output: P
         at_bounds=chosen.at_bounds(),
         warnings=suspect,
     )
-    write({output: model_text(model), json_path: checked(result)})
+    write({output: model_text(model), json_path: results.checked(result)})
     notes("", suspect)
-    print_parameters(beside(output), result["parameters"])
-    _print_correlations(output, result["correlations"])
+    print_parameters(beside(output), result.parameters)
+    _print_correlations(output, result.correlations)
     beside(output).print(
-        f"error {result['rmse_c']:.3f} K, held out {held:.3f} K, noise {problem.noise_c:.3f} K -> {output}"
+        f"error {result.rmse_c:.3f} K, held out {held:.3f} K, noise {problem.noise_c:.3f} K -> {output}"
     )
     for effect, why in left_out(model).items():
         beside(output).print(f"{effect}: not for the chip: {why}", markup=False)
 
 
-def _numbers(problem: Problem, found: Fit) -> dict[str, Any]:
+def _numbers(problem: Problem, found: Fit) -> results.Parameters:
     """Return a fit's numbers, each with the interval in which it lies in 95 of 100 cases."""
     out = {k: v for e in (None, *found.spec.effects) for k, v in parameters_of(problem, found, e).items()}
     for name, ends in intervals(found).items():
-        out[name]["interval_95"] = list(ends)
+        out[name].interval_95 = ends
     return out
 
 
-def _correlations(found: Fit) -> list[dict[str, Any]]:
-    return [{"a": a, "b": b, "correlation": value} for a, b, value in correlations(found)]
+def _correlations(found: Fit) -> list[results.Correlation]:
+    return [results.Correlation(a=a, b=b, correlation=value) for a, b, value in correlations(found)]
 
 
-def _print_correlations(output: Path, found: list[dict[str, Any]]) -> None:
+def _print_correlations(output: Path, found: list[results.Correlation]) -> None:
     """Print which numbers' errors go together, strongest first; all of them are in --json."""
     if not found:
         return
     said = beside(output)
     said.print(f"errors that go together, of {len(found)} pairs beyond {TOLD:g} (--json has all):", markup=False)
     for one in found[:MOST_TOLD]:
-        said.print(f"  {one['correlation']:+.2f}  {one['a']}, {one['b']}", markup=False)
+        said.print(f"  {one.correlation:+.2f}  {one.a}, {one.b}", markup=False)
 
 
 def _fit_from_resistance(array: Array, runs: list[Run], output: Path, json_path: Path | None) -> None:
@@ -135,8 +132,7 @@ def _fit_from_resistance(array: Array, runs: list[Run], output: Path, json_path:
         found, witnesses = board_alone.with_effects(problem, found, say)
     model = from_resistance.model_of_fit(problem, found)
     errors = {"rmse_before_v": first.residual, "rmse_v": found.residual}
-    result = result_of(
-        "fit",
+    result = results.Fit(
         logs=logs_of(runs),
         rmse_before_c=None,
         rmse_c=None,
@@ -151,12 +147,12 @@ def _fit_from_resistance(array: Array, runs: list[Run], output: Path, json_path:
         at_bounds=found.at_bounds(),
         warnings=[from_resistance.SCALE],
     )
-    write({output: model_text(model), json_path: checked(result)})
-    print_parameters(beside(output), result["parameters"])
-    _print_correlations(output, result["correlations"])
+    write({output: model_text(model), json_path: results.checked(result)})
+    print_parameters(beside(output), result.parameters)
+    _print_correlations(output, result.correlations)
     beside(output).print(
-        f"no thermometer: fitted to v / i, error {1e3 * result['rmse_before_v']:.1f} mV as declared, "
-        f"{1e3 * result['rmse_v']:.1f} fitted, readings are good for {1e3 * result['noise_v']:.1f} -> {output}"
+        f"no thermometer: fitted to v / i, error {1e3 * result.rmse_before_v:.1f} mV as declared, "
+        f"{1e3 * result.rmse_v:.1f} fitted, readings are good for {1e3 * result.noise_v:.1f} -> {output}"
     )
     for name, one in witnesses.items():
         said = effects.sentence(name, parameters_of(problem, found, name), dict(found.spec.variant)[name])

@@ -8,9 +8,9 @@ import click
 import numpy as np
 
 from ..errors import InputError
-from ..io import importing, ranges
+from ..io import importing, ranges, results
 from ..io.logs import check_folder, log_text
-from .console import FILE, FORCE, JSON, Command, Real, beside, checked, result_of, working, write
+from .console import FILE, FORCE, JSON, Command, Real, beside, working, write
 
 
 @click.command(
@@ -105,8 +105,8 @@ def import_(
             when = (np.arange(count) * interval if stamps is None else stamps) + offset
             text = log_text(when, columns, {"imported_from": source.name})
     header, *rows = [line for line in text.splitlines() if not line.startswith("#")]
-    result = result_of("import", source=source.name, columns=header.split(","), rows=len(rows))
+    result = results.Import(source=source.name, columns=header.split(","), rows=len(rows))
     write({output: text}, force)
-    write({json_path: checked(result)})
-    seen = sum(name.startswith("t") for name in result["columns"][1:])
+    write({json_path: results.checked(result)})
+    seen = sum(name.startswith("t") for name in result.columns[1:])
     beside(output).print(f"{len(rows)} rows, temperatures of {seen} springs -> {output}", soft_wrap=True, markup=False)

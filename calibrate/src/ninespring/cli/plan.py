@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
 
 import click
 
 from ..errors import InputError
 from ..find.plan import FIRST_S, THROUGH_S, make_plan, plan_experiment, plan_through
-from ..io import ranges
+from ..io import ranges, results
 from ..io.logs import check_folder, read_bytes
 from ..model.models import Array, read_array, read_model
 from .console import ARRAY, FILE, Command, Real, Whole, beside, write
@@ -91,10 +90,10 @@ def plan(
         duration = 2.0 * THROUGH_S
         made = plan_through(model, through, supply, hottest)
     elif diagnosis:
-        asked = asked_for(diagnosis)
-        head = [f"# {asked['separating_experiment']}"]
-        duration = asked["experiment"]["duration_s"] + 2.0 * FIRST_S
-        made = plan_experiment(array, asked["experiment"], supply, hottest, current)
+        said, asked = asked_for(diagnosis)
+        head = [f"# {said}"]
+        duration = asked.duration_s + 2.0 * FIRST_S
+        made = plan_experiment(array, asked, supply, hottest, current)
     else:
         made = make_plan(array, duration, current, supply, hottest, seed, board_alone)
     thermometers = "" if board_alone else " --thermometers PORT"
@@ -112,13 +111,13 @@ def plan(
     )
 
 
-def asked_for(path: Path) -> dict[str, Any]:
-    """Return the first rival in a diagnosis.json that has an experiment."""
+def asked_for(path: Path) -> tuple[str, results.Experiment]:
+    """Return the first experiment that a diagnosis.json asks for, and that in words."""
     try:
         rivals = json.loads(read_bytes(path))["rivals"]
         found = next((one for one in rivals if one.get("experiment", {}).get("steps")), None)
+        if found:
+            return str(found["separating_experiment"]), results.read(results.Experiment, found["experiment"])
     except (ValueError, KeyError, TypeError, AttributeError):
         raise InputError("no diagnosis.json that `ninespring diagnose` wrote", path) from None
-    if not found:
-        raise InputError("asks for no experiment: these logs tell all effects apart", path)
-    return found
+    raise InputError("asks for no experiment: these logs tell all effects apart", path)

@@ -11,10 +11,11 @@ from rich.table import Table
 from .. import __version__
 from ..find import plausibility
 from ..infer import predict as prediction
-from ..io.logs import check_folder, log_text, read_log, sha256_of
+from ..io import results
+from ..io.logs import check_folder, log_text, read_log
 from ..model import effects
 from ..model.models import read_model
-from .console import FILE, JSON, MODEL, Command, beside, checked, logs_of, notes_of, result_of, working, write
+from .console import FILE, JSON, MODEL, Command, beside, logs_of, notes_of, source_of, working, write
 
 
 def _rms(left: np.ndarray) -> float | None:
@@ -54,17 +55,16 @@ def predict(log: Path, model_path: Path, output: Path, chip: bool, json_path: Pa
     rmse, each = _rms(left), [_rms(one) for one in left.T]
     note = model.provenance.get("note")
     keys = {"tool": f"ninespring {__version__} predict", "model": model_path.name}
-    result = result_of(
-        "predict",
+    result = results.Predict(
         logs=logs_of([run]),
-        model={"file": model_path.name, "sha256": sha256_of(model_path)},
+        model=source_of(model_path),
         by="chip" if chip else "plant",
         rows=len(run.time_s),
         rmse_c=rmse,
         rmse_per_spring_c=each,
-        **({"note": note} if note else {}),
+        note=note or results.UNSET,
     )
-    write({output: log_text(run.time_s, columns, keys), json_path: checked(result)})
+    write({output: log_text(run.time_s, columns, keys), json_path: results.checked(result)})
     beside(output).print(
         f"{len(run.time_s)} rows" + ("" if rmse is None else f", error {rmse:.3f} K rms") + f" -> {output}"
     )
@@ -113,20 +113,19 @@ def replay(log: Path, model_path: Path, output: Path, json_path: Path | None) ->
         columns["ambient_c"] = run.ambient_c
     left, seen_left = believed - run.temperature_c, shown - run.temperature_c
     springs = [
-        {
-            "spring": k + 1,
-            "samples": int(np.isfinite(one).sum()),
-            "rmse_c": _rms(one),
-            "mean_error_c": float(np.nanmean(one)) if np.isfinite(one).any() else None,
-            "largest_error_c": float(np.nanmax(np.abs(one))) if np.isfinite(one).any() else None,
-            "shown_rmse_c": _rms(seen_left[:, k]),
-        }
+        results.Replayed(
+            spring=k + 1,
+            samples=int(np.isfinite(one).sum()),
+            rmse_c=_rms(one),
+            mean_error_c=float(np.nanmean(one)) if np.isfinite(one).any() else None,
+            largest_error_c=float(np.nanmax(np.abs(one))) if np.isfinite(one).any() else None,
+            shown_rmse_c=_rms(seen_left[:, k]),
+        )
         for k, one in enumerate(left.T)
     ]
-    result = result_of(
-        "replay",
+    result = results.Replay(
         logs=logs_of([run]),
-        model={"file": model_path.name, "sha256": sha256_of(model_path)},
+        model=source_of(model_path),
         rows=len(run.time_s),
         duration_s=run.duration_s,
         rmse_c=_rms(left),
@@ -135,15 +134,15 @@ def replay(log: Path, model_path: Path, output: Path, json_path: Path | None) ->
         springs=springs,
     )
     keys = {"tool": f"ninespring {__version__} replay", "model": model_path.name}
-    write({output: log_text(run.time_s, columns, keys), json_path: checked(result)})
+    write({output: log_text(run.time_s, columns, keys), json_path: results.checked(result)})
     table = Table("spring", "samples", "rms, K", "mean", "largest", *(["seen by the sensors, rms"] * through_sensors))
     for one in springs:
-        numbers = [one[key] for key in ("rmse_c", "mean_error_c", "largest_error_c", "shown_rmse_c")]
+        numbers = [one.rmse_c, one.mean_error_c, one.largest_error_c, one.shown_rmse_c]
         cells = ["-" if value is None else f"{value:.3f}" for value in numbers[: 3 + through_sensors]]
-        table.add_row(str(one["spring"]), str(one["samples"]), *cells)
+        table.add_row(str(one.spring), str(one.samples), *cells)
     said = beside(output)
     said.print(table)
-    rms = result["rmse_c"]
+    rms = result.rmse_c
     said.print("the log holds no temperature to compare with" if rms is None else f"all: {rms:.3f} K rms")
     if left_out:
         said.print(left_out, markup=False)

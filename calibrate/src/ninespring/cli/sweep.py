@@ -20,7 +20,8 @@ from ..explore.sweep import best_of, indices_of, local_cluster
 from ..explore.sweep import sweep as run
 from ..io import ranges
 from ..io.logs import check_folder, write_atomically
-from .console import FILE, JSON, Command, Whole, checked, err, out, result_of, write
+from ..io.results import Sweep, checked
+from .console import FILE, JSON, Command, Whole, err, out, write
 from .couplings import need
 
 CONNECT_S = 10
@@ -70,10 +71,8 @@ def sweep(
         soft_wrap=True,
         markup=False,
     )
-    result = result_of(
-        "sweep", spec=spec_path.name, sha256=spec.sha256, points=points, done_before=before, failed=failed
-    )
-    result |= _evaluate(spec, results, output)
+    result = Sweep(spec=spec_path.name, sha256=spec.sha256, points=points, done_before=before, failed=failed)
+    _evaluate(spec, results, output, result)
     write({json_path: checked(result)})
 
 
@@ -105,9 +104,10 @@ def _run(spec: Any, results: Any, done: Any, scheduler: str | None, workers: int
         run(client, spec, results, done, lambda count: progress.update(task, completed=count))
 
 
-def _evaluate(spec: Any, results: Any, output: Path) -> dict[str, Any]:
+def _evaluate(spec: Any, results: Any, output: Path, result: Sweep) -> None:
+    """Tell the best point, or the indices, of a sweep that looks for them, and put them into its result."""
     if spec.method not in ("optimise", "saltelli"):
-        return {}
+        return
     table = results.read()
     if spec.method == "optimise":
         best = best_of(spec, table)
@@ -117,7 +117,8 @@ def _evaluate(spec: Any, results: Any, output: Path) -> dict[str, Any]:
         out.print(
             f"best {spec.metric}: {best[spec.metric]:.4g} {UNITS[spec.metric]} at {words}", soft_wrap=True, markup=False
         )
-        return {"best": {axis.key: _plain(best[axis.key]) for axis in spec.axes} | {spec.metric: best[spec.metric]}}
+        result.best = {axis.key: _plain(best[axis.key]) for axis in spec.axes} | {spec.metric: best[spec.metric]}
+        return
     found = indices_of(spec, table)
     shown = Table("metric", *(axis.key for axis in spec.axes), title="Sobol indices, total (+- 95 %)")
     for metric, one in found.items():
@@ -126,7 +127,7 @@ def _evaluate(spec: Any, results: Any, output: Path) -> dict[str, Any]:
     write_atomically(
         {output / "indices.json": json.dumps(found, indent=1) + "\n"}, force=True
     )  # the folder is a sweep's
-    return {"indices": found}
+    result.indices = found
 
 
 def _plain(value: Any) -> Any:

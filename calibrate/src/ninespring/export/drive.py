@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from ..errors import WorkError
+from ..io import results
 from ..model import native
 from ..model.models import Model
 from .settings import Settings, best_plant, draw, settings_of
@@ -119,7 +119,7 @@ def worse_than(old: Drive, new: Drive) -> list[str]:
 
 def compare(
     model: Model, old: str, new: str, say: Callable[[str], None] = lambda text: None
-) -> tuple[list[str], list[dict[str, float]]]:
+) -> tuple[list[str], list[results.Drive]]:
     """Return what gets worse with the new settings, in words, and every measure of every drive.
 
     Tried on the array as it is best known, and on others drawn from the model's uncertainty; worse is what is worse on
@@ -139,7 +139,7 @@ def compare(
         for measure, one in WORSE.items():
             values = [(getattr(a, measure), getattr(b, measure)) for a, b in pairs]
             worse = [measure in found for found in judged]
-            rows += [{"array": k + 1, "measure": measure, "old": a, "new": b} for k, (a, b) in enumerate(values)]
+            rows += [results.Drive(array=k + 1, measure=measure, old=a, new=b) for k, (a, b) in enumerate(values)]
             if all(worse) or (not one.chance and (worse[0] or sum(worse) > len(worse) / 2)):
                 a, b = values[0] if worse[0] else values[worse.index(True)]
                 said.append(one.words.format(old=a, new=b))
@@ -153,7 +153,7 @@ def compare(
 
 def checked_settings(
     model: Model, old: str, force: bool = False, say: Callable[..., None] = lambda text, done=None: None
-) -> tuple[Settings, list[str], dict[str, Any]]:
+) -> tuple[Settings, list[str], list[results.Drive]]:
     """Return a model's settings, in what they drive worse than the lines `old`, and both drives; WorkError where they should not be used."""
     if (doubts := model.provenance.get("doubts", [])) and not force:
         raise WorkError(

@@ -7,25 +7,24 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from .. import __version__
+from ..export.settings import judged
 from ..infer import from_resistance
 from ..infer.fit import Fit
 from ..infer.result import parameters_of
 from ..infer.rounding import DRIVEN_A
 from ..infer.scene import scene_of
-from ..io import statistics
+from ..io import results, statistics
 from ..io.logs.run import Run
 from ..model import effects
 from ..model.models import Array, Model
 from ..model.simulate import simulate_run
 from . import contacts, resistance
 from .certainty import CERTAIN, NAMED, Witness, witness
-from .diagnosis import SCHEMA, share_with, validate
+from .diagnosis import identifiability_of, share_with
 from .evidence import unexplained
 from .readings import REFERENCE_C, Readings, settled
 from .residual import depends_on
@@ -63,23 +62,31 @@ def without(run: Run, r: int, steps: Sequence[contacts.Step]) -> Run:
     return replace(contacts.without_heat(run, ohm), voltage_v=run.voltage_v - run.current_a * ohm)
 
 
-def middle_instead(array: Array, listed: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+def middle_instead(array: Array, listed: Sequence[results.Effect]) -> list[results.Rival]:
     """Return what else all outer springs alike are where there is one other spring: that one, with the losses of all free."""
     if (array.rows, array.cols) != (3, 3):
         return []
-    number = next((one["parameters"].get("outer_loss_scale") for one in listed if one["name"] == "edge_loss"), None)
+    number = next((one.parameters.get("outer_loss_scale") for one in listed if one.name == "edge_loss"), None)
     if number is None:
         return []
-    other = {"value": 1.0 / number["value"], "stderr": (number["stderr"] or 0.0) / number["value"] ** 2, "unit": "1"}
-    mass = {"value": 1.0, "stderr": 0.0, "unit": "1"}
-    rival = {"instead_of": "edge_loss", "name": "spring_mismatch", "variant": "spring 5", "evidence": 0.0}
-    numbers = {"loss_scale[5]": other, "heat_capacity_scale[5]": mass}
-    return [rival | {"parameters": numbers, "predictions_differ_c": 0.0}]
+    other = results.Number(value=1.0 / number.value, stderr=(number.stderr or 0.0) / number.value**2, unit="1")
+    mass = results.Number(value=1.0, stderr=0.0, unit="1")
+    same = results.Rival(
+        instead_of="edge_loss",
+        name="spring_mismatch",
+        variant="spring 5",
+        rmse_c=0.0,
+        evidence=0.0,
+        predictions_differ_c=0.0,
+        parameters={"loss_scale[5]": other, "heat_capacity_scale[5]": mass},
+        separating_experiment="none: it is the same in other words",
+    )
+    return [same]
 
 
 def diagnose(
     array: Array, runs: Sequence[Run], progress: Callable[[str], None] = lambda text: None
-) -> tuple[dict[str, Any], Model]:
+) -> tuple[results.BoardDiagnosis, Model]:
     """Return the diagnosis, every error in degrees left open, and the model that comes of it."""
     begun = time.monotonic()
     with threadpool_limits(1):
@@ -98,68 +105,51 @@ def diagnose(
             else:
                 problem, alone, found, witnesses, left_over = other, cleared, again, seen, False
         depends, note = depends_on(problem, found)
-    listed = []
-    for name, one in witnesses.items():
-        variant, parameters = dict(found.spec.variant).get(name, ""), parameters_of(problem, found, name)
-        probability = one.probability()
-        said = {"name": name, "evidence": float(one.nats), "parameters": parameters, "probability": probability}
-        said |= {"certainty": "certain" if probability >= CERTAIN else "probable"}
-        listed.append(resistance.entry(said | ({"variant": variant} if variant else {}), None, None))
-    listed += [resistance.entry(resistance.of_contact(one), None, None) for one in steps]
+    listed = [_named(problem, found, name, one) for name, one in witnesses.items()]
+    listed += [resistance.of_contact(one) for one in steps]
     share_with(listed, middle_instead(array, listed), math.inf)
-    listed.sort(key=lambda one: -one["evidence"])
-    no_degrees = {"rmse_c": None, "holdout_rmse_c": None}
-    result: dict[str, Any] = {
-        "schema": SCHEMA,
-        "tool": f"ninespring {__version__}",
-        "logs": [{"file": Path(r.name).name, "sha256": r.sha256, "rows": len(r.time_s)} for r in runs],
-        "baseline": {
-            **no_degrees,
-            "noise_c": None,
-            "rmse_v": 1e-3 * statistics.rms(first.residual),
-            "noise_v": 1e-3 * problem.noise_c,
-            "effects": list(alone.spec.effects),
-        },
-        "effects": listed,
-        "rivals": [],
-        "after": {
-            **no_degrees,
-            "rmse_v": 1e-3 * statistics.rms(found.residual),
-            "parameters": {
-                key: one for e in (None, *alone.spec.effects) for key, one in parameters_of(problem, found, e).items()
-            },
-        },
-        "unexplained": bool(left_over),
-        "residual": {
-            "autocorrelation_lag1": float(np.clip(statistics.autocorrelation(found.residual, 1)[1], -1.0, 1.0)),
-            "depends_on": depends,
-            "note": f"{LEFT}. {note}".strip() if left_over else note or "white at the noise of v",
-        },
-        "identifiability": {
-            "not_identifiable": sorted(set(found.stuck)),
-            "at_bounds": found.at_bounds(),
-            "correlated": [{"a": a, "b": b, "correlation": r} for a, b, r in found.correlations()],
-        },
-        "warnings": [from_resistance.SCALE, *(f"{Path(run.name).name}: {text}" for run in runs for text in run.notes)],
-        "seconds": round(time.monotonic() - begun, 2),
-        "simulations": problem.simulations,
-    }
-    validate(result)
-    return result, from_resistance.model_of_fit(problem, found)
+    listed.sort(key=lambda one: -one.evidence)
+    numbers = {key: one for e in (None, *alone.spec.effects) for key, one in parameters_of(problem, found, e).items()}
+    told = results.BoardDiagnosis(
+        logs=[results.Read(file=Path(r.name).name, sha256=r.sha256, rows=len(r.time_s)) for r in runs],
+        baseline=results.Baseline(
+            rmse_c=None,
+            holdout_rmse_c=None,
+            noise_c=None,
+            rmse_v=1e-3 * statistics.rms(first.residual),
+            noise_v=1e-3 * problem.noise_c,
+            effects=list(alone.spec.effects),
+        ),
+        effects=listed,
+        rivals=[],
+        after=results.After(
+            rmse_c=None, holdout_rmse_c=None, rmse_v=1e-3 * statistics.rms(found.residual), parameters=numbers
+        ),
+        unexplained=bool(left_over),
+        residual=results.Residual(
+            autocorrelation_lag1=float(np.clip(statistics.autocorrelation(found.residual, 1)[1], -1.0, 1.0)),
+            depends_on=depends,
+            note=f"{LEFT}. {note}".strip() if left_over else note or "white at the noise of v",
+        ),
+        identifiability=identifiability_of(found),
+        warnings=[from_resistance.SCALE, *(f"{Path(run.name).name}: {text}" for run in runs for text in run.notes)],
+        seconds=round(time.monotonic() - begun, 2),
+        simulations=problem.simulations,
+    )
+    made = from_resistance.model_of_fit(problem, found)
+    judged(told.effects, made)
+    results.checked(told)
+    return told, made
 
 
-def verdict(result: dict[str, Any]) -> str:
-    """Return the outcome in one sentence."""
-    before, after = result["baseline"], result["after"]
-    names = " and ".join(one["name"] for one in result["effects"])
-    error = (
-        f"voltages are met to {1e3 * after['rmse_v']:.1f} mV ({1e3 * before['rmse_v']:.1f} as declared, "
-        f"{1e3 * before['noise_v']:.1f} is what a board's readings are good for)"
-    )
-    more = " Something else is missing that no effect of the library explains." if result["unexplained"] else ""
-    return (
-        f"No thermometer: {error}. {f'Missing: {names}.' if names else 'No effect is missing that v / i shows.'}{more}"
-    )
+def _named(problem: from_resistance.Resistances, found: Fit, name: str, sure: Witness) -> results.Effect:
+    """Return an effect that the search named, as sure as v / i is of it."""
+    variant, numbers = dict(found.spec.variant).get(name, ""), parameters_of(problem, found, name)
+    probability = sure.probability()
+    one = resistance.told(name, float(sure.nats), numbers, variant=variant)
+    one.probability = probability
+    one.certainty = "certain" if probability >= CERTAIN else "probable"
+    return one
 
 
 def with_effects(

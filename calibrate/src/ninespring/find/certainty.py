@@ -8,13 +8,12 @@ what it shows with this effect switched off and every other number as it is.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
 from ..infer.fit import Fit
 from ..infer.problem import Problem
-from ..io import statistics
+from ..io import results, statistics
 from .evidence import excess, log_evidence
 
 STRETCHES = 4
@@ -36,21 +35,8 @@ WEIGHTS = {
 ENOUGH_NATS from 30 to 10, so that what has more than enough is as likely as it was."""
 
 
-@dataclass(frozen=True)
-class Witness:
-    """What speaks for an effect in a fit."""
-
-    nats: float
-    share: float
-    """Of what the fit without it leaves beyond the noise, the part that it explains, 0..1."""
-    in_time: float
-    """How its size scatters from stretch to stretch, relative to its size (0: the same always)."""
-    in_place: float
-    """The same from spring to spring."""
-    left: float
-    """What the whole model leaves beyond the noise, relative to the noise."""
-    flexible: bool
-    """It follows anything slow: as likely a stand-in as a cause, where what it says changed was logged."""
+class Witness(results.Witness):
+    """What speaks for an effect in a fit, weighed."""
 
     def features(self) -> dict[str, float]:
         """Return what the probability is computed from, each bounded."""

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import json
+import functools
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
-from importlib import resources
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-import jsonschema
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from .. import __version__
 from ..errors import InputError
 from ..export.settings import judged
 from ..infer.declared import base_spec
@@ -23,7 +20,7 @@ from ..infer.fit import Fit
 from ..infer.problem import Problem
 from ..infer.result import DRIFT_LEFT_OUT, as_shown, model_of, parameters_of
 from ..infer.scene import scene_of
-from ..io import statistics
+from ..io import results, statistics
 from ..io.logs import condense
 from ..io.logs.run import Run
 from ..model import effects
@@ -46,7 +43,6 @@ from .certainty import CERTAIN, NAMED, Witness, witness
 from .evidence import EQUIVALENT, difference, excess, likelihood, log_evidence, unexplained
 from .residual import depends_on
 
-SCHEMA = "ninespring.diagnosis/1"
 MOST_OF_IT = 0.5
 """Part of what is beyond the noise without an effect that it explains, where more is explained than left."""
 LEAST_PART = 0.01
@@ -59,9 +55,9 @@ PINNED = 1e-5
 
 @dataclass
 class Diagnosis:
-    """Everything a diagnosis found: the result for programs and what the report draws."""
+    """Everything a diagnosis found: what is told of it and what the report draws."""
 
-    result: dict[str, Any]
+    told: results.Diagnosis
     model: Model
     problem: Problem
     baseline: Fit
@@ -71,10 +67,15 @@ class Diagnosis:
     @property
     def effects(self) -> list[str]:
         """Names of what was found, strongest first."""
-        return [one["name"] for one in self.result["effects"]]
+        return [one.name for one in self.told.effects]
+
+    @functools.cached_property
+    def result(self) -> dict[str, Any]:
+        """What diagnosis.json holds."""
+        return results.plain(self.told)
 
     def __repr__(self) -> str:
-        before, after = self.result["baseline"]["rmse_c"], self.result["after"]["rmse_c"]
+        before, after = self.told.baseline.rmse_c, self.told.after.rmse_c
         return f"<diagnosis: {', '.join(self.effects) or 'nothing found'}; {before:.2f} K before, {after:.2f} K after>"
 
 
@@ -203,10 +204,10 @@ def rivals_of(
     adopted: Sequence[str],
     contenders: Sequence[tuple[str, Fit]],
     progress: Callable[[str], None],
-) -> list[dict[str, Any]]:
+) -> list[results.Rival]:
     """Return what the data cannot tell from an effect that was named, each with the experiment that would."""
     problem = found.problem
-    rivals: list[dict[str, Any]] = []
+    rivals: list[results.Rival] = []
     seen = set()
     for instead, other in sorted(contenders, key=lambda one: one[1].chi2):
         extra = [e for e in other.spec.effects if e not in final.spec.effects]
@@ -221,23 +222,23 @@ def rivals_of(
         trial = experiments.separate(problem, final, other)
         other = _finish(problem, other)
         rivals.append(
-            {
-                "instead_of": instead,
-                "name": extra[0],
-                "variant": variant_of(other, extra[0]),
-                "rmse_c": statistics.rms(other.residual),
-                "holdout_rmse_c": problem.holdout_rmse(other),
-                "evidence": ahead,
-                "predictions_differ_c": apart * problem.noise_c,
-                "parameters": parameters_of(problem, other, extra[0]),
-                "separating_experiment": trial.text,
-                "experiment": trial.as_dict(),
-            }
+            results.Rival(
+                instead_of=instead,
+                name=extra[0],
+                variant=variant_of(other, extra[0]),
+                rmse_c=statistics.rms(other.residual),
+                holdout_rmse_c=problem.holdout_rmse(other),
+                evidence=ahead,
+                predictions_differ_c=apart * problem.noise_c,
+                parameters=parameters_of(problem, other, extra[0]),
+                separating_experiment=trial.text,
+                experiment=trial.told(),
+            )
         )
     return rivals
 
 
-def share_with(listed: Sequence[dict[str, Any]], rivals: Sequence[Mapping[str, Any]], same_c: float) -> None:
+def share_with(listed: Sequence[results.Effect], rivals: Sequence[results.Rival], same_c: float) -> None:
     """Share what speaks for a named effect with rivals that show the same readings: only the two in combination are fixed.
 
     That one of them has fewer numbers makes it simpler, not truer.
@@ -246,53 +247,147 @@ def share_with(listed: Sequence[dict[str, Any]], rivals: Sequence[Mapping[str, A
         alike = [
             one
             for one in rivals
-            if one["instead_of"] == entry["name"]
-            and one["evidence"] < search.TOLD_APART
-            and one["predictions_differ_c"] < same_c
+            if one.instead_of == entry.name and one.evidence < search.TOLD_APART and one.predictions_differ_c < same_c
         ]
         if not alike:
             continue
-        instead = [effects.sentence(one["name"], one["parameters"], one["variant"]) for one in alike]
-        entry["probability"] /= 1 + len(alike)
-        entry["certainty"] = "probable"
-        entry["text"] += f" Or: {' Or: '.join(instead)} These readings fix them only in combination."
+        instead = [effects.sentence(one.name, one.parameters, one.variant or "") for one in alike]
+        entry.probability /= 1 + len(alike)
+        entry.certainty = "probable"
+        entry.text += f" Or: {' Or: '.join(instead)} These readings fix them only in combination."
 
 
-def candidates_of(found: search.Search, final: Fit, base: Fit) -> list[dict[str, Any]]:
+def candidates_of(found: search.Search, final: Fit, base: Fit) -> list[results.Candidate]:
     """Return every model that the search fitted, the likeliest first."""
     candidates = [
-        {
-            "effects": [f"{e} ({v})" if v else e for e, v in key],
-            "rmse_c": statistics.rms(fit.residual),
-            "evidence_over_baseline": float(log_evidence(found.problem, fit, base)),
-            "adopted": fit.spec.variant == final.spec.variant,
-        }
+        results.Candidate(
+            effects=[f"{e} ({v})" if v else e for e, v in key],
+            rmse_c=statistics.rms(fit.residual),
+            evidence_over_baseline=float(log_evidence(found.problem, fit, base)),
+            adopted=fit.spec.variant == final.spec.variant,
+        )
         for key, fit in found.fits.items()
     ]
-    return sorted(candidates, key=lambda one: -one["evidence_over_baseline"])
+    return sorted(candidates, key=lambda one: -one.evidence_over_baseline)
+
+
+@dataclass
+class _Case:
+    """A diagnosis under way: what was found so far."""
+
+    problem: Problem
+    progress: Callable[[str], None]
+    search: search.Search
+    declared: Fit
+    """The declared model alone."""
+    base: Fit
+    """What the effects are found beside: that, with what lasts taken for noise where something is left."""
+    final: Fit
+    without: dict[str, Fit]
+    """The final fit without each effect that it has found."""
+    contenders: list[tuple[str, Fit]]
+    swapped: list[str]
+    """Columns that are, in words."""
+    hidden: list[unnamed.Hidden]
+    witnesses: dict[str, Witness] = field(default_factory=dict)
+    not_kept: list[str] = field(default_factory=list)
+    """Effects that foretell a run no better, in words."""
+
+    @property
+    def adopted(self) -> list[str]:
+        """Effects that were found."""
+        return [e for e in self.final.spec.effects if e not in self.base.spec.effects]
 
 
 def _diagnose(
     array: Array, runs: Sequence[Run], model: Model | None, frozen: bool, progress: Callable[[str], None]
 ) -> Diagnosis:
     begun = time.monotonic()
-    declared = dict(model.parameters) if model else {}
-    problem = prepare(model.array if model else array, runs, declared)
+    problem = prepare(model.array if model else array, runs, dict(model.parameters) if model else {})
+    case = _searched(problem, model, frozen, progress)
+    judge = _judged(case)
+    progress("a run that the fit never saw")
+    headline = _foretold(case, judge)
+    case.final = runs_apart.with_spread(problem, case.final)
+    left_over = unexplained(problem, case.final) or bool(case.hidden)
+    strength = {e: log_evidence(problem, case.final, case.without[e]) for e in case.adopted}
+    steps = in_order(case.search, case.base, case.final, case.adopted)
+    rivals = rivals_of(case.search, case.final, [effect for effect, _ in steps], case.contenders, progress)
+    tried = candidates_of(case.search, case.final, case.base)
+    if case.hidden:
+        steps = _with_what_has_no_name(case, steps)
+    # as declared, by itself: with what lasts as the found model leaves it, it would be fitted to that
+    before = case.base if problem.colour is None else problem.evaluate(case.declared)
+    if left_over and not case.hidden and problem.colour is None:
+        likelihood(problem, case.final)
+        case.final.holdout = problem.holdout_rmse(case.final, case.final.colour)
+    baseline, after = _errors(case, before)
+    listed, differ = _listed(case, steps, strength)
+    share_with(listed, rivals, EQUIVALENT * problem.noise_c)
+    progress("what v / i says")
+    second = None if case.swapped else resistance.witness(problem, case.final)
+    impossible = doubt.impossible(second)
+    if second and impossible:
+        second.effects = []
+    for one in second.effects if second else ():
+        one.rmse_c, one.holdout_rmse_c = after.rmse_c, after.holdout_rmse_c
+        listed.append(one)
+    residual = _left(case, left_over)
+    warnings, doubts = _warned(case, runs, left_over, impossible)
+    absent = case.search.absent(case.final)
+    if problem.colour is not None:
+        slopes = problem.plain_slopes(case.final)
+        problem.take_for(None)
+        case.final = replace(case.final, jacobian=slopes)
+    heat = unknown_heat.find(problem, case.final, progress)
+    final = case.final
+    told = results.Diagnosis(
+        logs=[results.Read(file=Path(r.name).name, sha256=r.sha256, rows=len(r.time_s)) for r in runs],
+        baseline=baseline,
+        effects=listed,
+        rivals=rivals,
+        after=after,
+        unseen=headline or results.UNSET,
+        unexplained=bool(left_over),
+        unknown_heat=heat.told(),
+        runs_differ=differ,
+        unnamed=[one.told() for one in unnamed.drifts(case.hidden) if _counts(one)],
+        resistance=second.told if second else results.UNSET,
+        residual=residual,
+        candidates=tried[:40],
+        identifiability=identifiability_of(final),
+        warnings=warnings,
+        doubts=doubts,
+        seconds=round(time.monotonic() - begun, 2),
+        simulations=problem.simulations,
+    )
+    made = model_of(problem, final, as_shown(problem, final), baseline.rmse_c, absent)
+    resistance.into_model(made, second)
+    doubt.into_model(made, problem, final, doubts)
+    judged(told.effects, made)
+    results.checked(told)
+    return Diagnosis(told, made, problem, case.base, final, heat)
+
+
+def _searched(problem: Problem, model: Model | None, frozen: bool, progress: Callable[[str], None]) -> _Case:
+    """Fit what is declared, and search the library; again where contacts changed, and where something is left."""
     progress("fitting what is declared")
     spec = base_spec(problem, frozen)
-    known = effects.candidates(scene_of(problem))
+    scene = scene_of(problem)
+    known = effects.candidates(scene)
     if model:
         spec = with_effects_of(spec, model, known, frozen)
     base = first_fit(problem, spec)
-    own = effects.of_runs(scene_of(problem))
+    own = effects.of_runs(scene)
     found = search.Search(problem, [c for c in (*known, *own) if c.effect not in spec.effects], base, progress)
     final, without, contenders = found.run()
     progress("what v / i says")
     swapped = plausibility.swapped(problem.runs)
     # beside another spring's temperature v / i would only accuse contacts
-    if steps := ({} if swapped else resistance.witness(problem, final) or {}).get("contacts"):
+    second = None if swapped else resistance.witness(problem, final)
+    if second and second.contacts:
         # v i is measured with the contact: its heat is not the spring's, and everything is looked for again without it
-        contacts.take_heat_out(problem, steps)
+        contacts.take_heat_out(problem, second.contacts)
         base = first_fit(problem, spec)
         found = search.Search(problem, found.candidates, base, progress)
         final, without, contenders = found.run()
@@ -302,192 +397,168 @@ def _diagnose(
         found, (final, without, contenders), hidden = _where_something_is_left(
             problem, found, final, without, contenders
         )
-    declared_alone, base = base, found.base
     progress("held-out blocks")
-    final = _finish(problem, final)
+    return _Case(
+        problem, progress, found, base, found.base, _finish(problem, final), without, contenders, swapped, hidden
+    )
+
+
+def _judged(case: _Case) -> search.Search:
+    """Drop the names that are not sure enough, and search for what they stood in for; return the last search."""
+    problem, judge, witnesses = case.problem, case.search, case.witnesses
     # where the ambient was not logged, that it drifted is no stand-in
     guessed = all(run.ambient_c is None for run in problem.runs)
     free_to_bend = (*RUNS_OWN, *(["ambient_drift"] if guessed else []))
-    witnesses: dict[str, Witness] = {}
-    judge = found
-    while fresh := [effect for effect in without if effect not in witnesses]:
+    while fresh := [effect for effect in case.without if effect not in witnesses]:
         for effect in fresh:
-            flexible = found.is_flexible(final, effect) and effect not in free_to_bend
-            witnesses[effect] = witness(problem, final, effect, without[effect], flexible)
+            flexible = case.search.is_flexible(case.final, effect) and effect not in free_to_bend
+            witnesses[effect] = witness(problem, case.final, effect, case.without[effect], flexible)
         # beside causes without a name that leave structure themselves, a name must explain more than it leaves
-        least = MOST_OF_IT if hidden and unexplained(problem, final) else 0.0
+        least = MOST_OF_IT if case.hidden and unexplained(problem, case.final) else 0.0
         doubtful = [
             effect for effect in fresh if witnesses[effect].probability() < NAMED or witnesses[effect].share < least
         ]
         if not doubtful:
             break
         # judged together, beside one another: what one of them stood in for does not count against the rest
+        final = case.final
         for effect in doubtful:
             final = judge.reduced(final, effect)
         # another may be what it stood in for
         others = [one for one in judge.candidates if one.effect not in doubtful]
-        judge = search.Search(problem, others, found.base, progress, found.fits)
-        final, without, contenders = judge.settle(judge.forward(final))
-        final = _finish(problem, final)
-    progress("a run that the fit never saw")
-    judged_by = unseen.Unseen(problem, found, declared_alone)
-    not_kept: list[str] = []
-    if not hidden and len(problem.runs) > 1:
-        kept, not_kept = judged_by.kept(final, judge.reduced)
-        if not_kept:
-            final = _finish(problem, kept)
-            without = {e: judge.reduced(final, e) for e in final.spec.effects if e not in base.spec.effects}
-    headline = judged_by.as_dict(final)
-    final = runs_apart.with_spread(problem, final)
-    left_over = unexplained(problem, final) or bool(hidden)
-    adopted = [e for e in final.spec.effects if e not in base.spec.effects]
-    strength = {e: log_evidence(problem, final, without[e]) for e in adopted}
-    steps = in_order(found, base, final, adopted)
-    adopted = [effect for effect, _ in steps]
-    apart_from_final = rivals_of(found, final, adopted, contenders, progress)
-    tried = candidates_of(found, final, base)
-    if hidden:
-        # from here on everything is in the error again: a model is for an array in which what has no name still acts
-        problem.leave_out(None)
-        base = declared_alone
-        again = {id(fit): with_everything(problem, fit, base) for fit in [final, *(fit for _, fit in steps)]}
-        steps = [(effect, again[id(fit)]) for effect, fit in steps]
-        final = again[id(final)]
-    # as declared, by itself: with what lasts as the found model leaves it, it would be fitted to that
-    before = base if problem.colour is None else problem.evaluate(declared_alone)
-    if left_over and not hidden and problem.colour is None:
-        likelihood(problem, final)
-        final.holdout = problem.holdout_rmse(final, final.colour)
-    before_out, final_out = problem.holdout_rmse(before), problem.holdout_rmse(final)
+        judge = search.Search(problem, others, case.base, case.progress, case.search.fits)
+        final, case.without, case.contenders = judge.settle(judge.forward(final))
+        case.final = _finish(problem, final)
+    return judge
 
+
+def _foretold(case: _Case, judge: search.Search) -> results.Unseen | None:
+    """Drop what foretells a run that the fit never saw no better; return how well such a run is foretold."""
+    judged_by = unseen.Unseen(case.problem, case.search, case.declared)
+    if not case.hidden and len(case.problem.runs) > 1:
+        kept, case.not_kept = judged_by.kept(case.final, judge.reduced)
+        if case.not_kept:
+            case.final = _finish(case.problem, kept)
+            case.without = {effect: judge.reduced(case.final, effect) for effect in case.adopted}
+    return judged_by.told(case.final)
+
+
+def _with_what_has_no_name(case: _Case, steps: list[tuple[str, Fit]]) -> list[tuple[str, Fit]]:
+    """Return the steps with everything in the error again: a model is for an array in which what has no name still acts."""
+    case.problem.leave_out(None)
+    case.base = case.declared
+    again = {id(fit): with_everything(case.problem, fit, case.base) for fit in [case.final, *(fit for _, fit in steps)]}
+    case.final = again[id(case.final)]
+    return [(effect, again[id(fit)]) for effect, fit in steps]
+
+
+def _errors(case: _Case, before: Fit) -> tuple[results.Baseline, results.After]:
+    problem, final = case.problem, case.final
+    baseline = results.Baseline(
+        rmse_c=statistics.rms(before.residual),
+        holdout_rmse_c=problem.holdout_rmse(before),
+        noise_c=problem.noise_c,
+        parameters=parameters_of(problem, before),
+        effects=list(case.base.spec.effects),
+    )
+    after = results.After(
+        rmse_c=statistics.rms(final.residual),
+        holdout_rmse_c=problem.holdout_rmse(final),
+        parameters=parameters_of(problem, final),
+    )
+    return baseline, after
+
+
+def _listed(
+    case: _Case, steps: Sequence[tuple[str, Fit]], strength: Mapping[str, float]
+) -> tuple[list[results.Effect], list[results.RunsDiffer]]:
+    """Return the effects of the array, the one that explains most first, and what is a run's own."""
+    problem, final = case.problem, case.final
     bounds = set(final.at_bounds())
-    listed, runs_differ = [], []
+    listed, differ = [], []
     for effect, growing in steps:
+        sure = case.witnesses[effect]
         if effect in RUNS_OWN:
-            runs_differ.append(runs_apart.entry(problem, final, effect, strength[effect], witnesses[effect]))
+            differ.append(runs_apart.entry(problem, final, effect, strength[effect], sure))
             continue
-        probability = witnesses[effect].probability()
+        probability = sure.probability()
         if bounds & {free.key for free in final.spec.free if free.effect == effect}:
             # what would be beyond it is no such effect
             probability = min(probability, PROBABLE)
-        entry = {
-            "name": effect,
-            "rmse_c": statistics.rms(growing.residual),
-            "holdout_rmse_c": problem.holdout_rmse(growing),
-            "evidence": strength[effect],
-            "parameters": parameters_of(problem, final, effect),
-            "probability": probability,
-            "certainty": "certain" if probability >= CERTAIN else "probable",
-            "witness": asdict(witnesses[effect]),
-            "on_chip": effect in effects.ON_CHIP,
-            "in_words": effects.IN_WORDS[effect],
-            "text": effects.sentence(effect, parameters_of(problem, final, effect), variant_of(final, effect)),
-        }
-        if variant := variant_of(final, effect):
-            entry["variant"] = variant
-        if effect in effects.WHY_NOT_ON_CHIP:
-            entry["why_not_on_chip"] = effects.WHY_NOT_ON_CHIP[effect]
-        listed.append(entry)
+        parameters, variant = parameters_of(problem, final, effect), variant_of(final, effect)
+        listed.append(
+            results.Effect(
+                name=effect,
+                rmse_c=statistics.rms(growing.residual),
+                holdout_rmse_c=problem.holdout_rmse(growing),
+                evidence=strength[effect],
+                parameters=parameters,
+                probability=probability,
+                certainty="certain" if probability >= CERTAIN else "probable",
+                witness=sure,
+                on_chip=effect in effects.ON_CHIP,
+                in_words=effects.IN_WORDS[effect],
+                text=effects.sentence(effect, parameters, variant),
+                variant=variant or results.UNSET,
+            )
+        )
+    return listed, differ
 
-    share_with(listed, apart_from_final, EQUIVALENT * problem.noise_c)
 
-    progress("what v / i says")
-    second = None if swapped else resistance.witness(problem, final)
-    impossible = doubt.impossible(second)
-    if second and impossible:
-        second |= {"effects": []}
-    listed += [
-        resistance.entry(one, statistics.rms(final.residual), final_out) for one in (second or {}).get("effects", [])
-    ]
-
+def _left(case: _Case, left_over: bool) -> results.Residual:
+    """Return what is left, what it depends on, and that in words."""
+    problem, final = case.problem, case.final
     rho = statistics.autocorrelation([r / n for r, n in zip(final.residual, problem.noise, strict=True)], 1)
     depends, note = depends_on(problem, final)
+    if left_over:
+        note = ("structure well above the noise remains that no effect of the library explains. " + note).strip()
+    noise = np.sqrt(np.nanmean(np.square(np.asarray(problem.noise)), axis=0))
+    return results.Residual(
+        autocorrelation_lag1=float(np.clip(rho[1], -1.0, 1.0)),
+        structure_c=math.sqrt(excess(problem, final)) * problem.noise_c,
+        rmse_per_spring_c=[finite(v) for v in doubt.per_spring(final.residual)],
+        noise_per_spring_c=[finite(v) for v in noise],
+        depends_on=depends,
+        note=note or "white at the noise floor",
+    )
+
+
+def _warned(
+    case: _Case, runs: Sequence[Run], left_over: bool, impossible: Sequence[str]
+) -> tuple[list[str], list[str]]:
+    """Return what is to be said of the logs, and for which of it `export` refuses the model."""
+    problem, base, final = case.problem, case.base, case.final
     warnings = [f"{Path(run.name).name}: {text}" for run in problem.runs for text in run.notes]
-    warnings += not_kept
+    warnings += case.not_kept
     if any(free.knot is not None for free in final.spec.free):
         warnings.append(f"model.toml: {DRIFT_LEFT_OUT}; log ambient_c to have it predicted")
     if left_over and problem.budget.short:
         warnings.append(
             f"the search ended at its bound of {problem.budget.enough} simulations: there may be more to find"
         )
-    if left_over and not adopted:
+    if left_over and not case.adopted:
         warnings += [
             f"{effect} ({effects.IN_WORDS[effect]}) would explain {one.share:.0%} of what is left, but not as well at all "
             f"times: {one.probability():.0%} likely, it is not named"
-            for effect, one in witnesses.items()
+            for effect, one in case.witnesses.items()
             if one.share > MOST_OF_IT and effect in effects.IN_WORDS
         ]
-    doubts = doubt.of_log(problem, problem.runs, swapped, (base,) if final is base else (base, final), left_over)
-    warnings += doubts + impossible + doubt.about_power(problem) + plausibility.coarse(runs)
-    if left_over:
-        note = ("structure well above the noise remains that no effect of the library explains. " + note).strip()
-    else:
-        note = note or "white at the noise floor"
-    absent = found.absent(final)
-    if problem.colour is not None:
-        slopes = problem.plain_slopes(final)
-        problem.take_for(None)
-        final = replace(final, jacobian=slopes)
-    heat = unknown_heat.find(problem, final, progress)
-    result: dict[str, Any] = {
-        "schema": SCHEMA,
-        "tool": f"ninespring {__version__}",
-        "logs": [{"file": Path(r.name).name, "sha256": r.sha256, "rows": len(r.time_s)} for r in runs],
-        "baseline": {
-            "rmse_c": statistics.rms(before.residual),
-            "holdout_rmse_c": before_out,
-            "noise_c": problem.noise_c,
-            "parameters": parameters_of(problem, before),
-            "effects": list(base.spec.effects),
-        },
-        "effects": listed,
-        "rivals": apart_from_final,
-        "after": {
-            "rmse_c": statistics.rms(final.residual),
-            "holdout_rmse_c": final_out,
-            "parameters": parameters_of(problem, final),
-        },
-        **({"unseen": headline} if headline else {}),
-        "unexplained": bool(left_over),
-        "unknown_heat": heat.as_dict(),
-        "runs_differ": runs_differ,
-        "unnamed": [
-            one.as_dict()
-            for one in unnamed.drifts(hidden)
-            if one.possible and (one.cause.kind in unnamed.UNITS or abs(one.size) >= LEAST_PART)
-        ],
-        **(
-            {"resistance": {key: one for key, one in second.items() if key not in ("effects", "contacts")}}
-            if second
-            else {}
-        ),
-        "residual": {
-            "autocorrelation_lag1": float(np.clip(rho[1], -1.0, 1.0)),
-            "structure_c": math.sqrt(excess(problem, final)) * problem.noise_c,
-            "rmse_per_spring_c": [finite(v) for v in doubt.per_spring(final.residual)],
-            "noise_per_spring_c": [
-                finite(v) for v in np.sqrt(np.nanmean(np.square(np.asarray(problem.noise)), axis=0))
-            ],
-            "depends_on": depends,
-            "note": note,
-        },
-        "candidates": tried[:40],
-        "identifiability": {
-            "not_identifiable": sorted(set(final.stuck)),
-            "at_bounds": final.at_bounds(),
-            "correlated": [{"a": a, "b": b, "correlation": r} for a, b, r in final.correlations()],
-        },
-        "warnings": warnings,
-        "doubts": doubts,
-        "seconds": round(time.monotonic() - begun, 2),
-        "simulations": problem.simulations,
-    }
-    made = model_of(problem, final, as_shown(problem, final), result, absent)
-    resistance.into_model(made, second)
-    doubt.into_model(made, problem, final, doubts)
-    judged(result["effects"], made)
-    validate(result)
-    return Diagnosis(result, made, problem, base, final, heat)
+    doubts = doubt.of_log(problem, problem.runs, case.swapped, (base,) if final is base else (base, final), left_over)
+    return warnings + doubts + [*impossible, *doubt.about_power(problem), *plausibility.coarse(runs)], doubts
+
+
+def _counts(one: unnamed.Hidden) -> bool:
+    """Return whether a cause without a name is told: it can be, and a board would measure as much."""
+    return one.possible and (one.cause.kind in unnamed.UNITS or abs(one.size) >= LEAST_PART)
+
+
+def identifiability_of(fit: Fit) -> results.Identifiability:
+    """Return which numbers of a fit the data do not fix."""
+    return results.Identifiability(
+        not_identifiable=sorted(set(fit.stuck)),
+        at_bounds=fit.at_bounds(),
+        correlated=[results.Correlation(a=a, b=b, correlation=r) for a, b, r in fit.correlations()],
+    )
 
 
 def _where_something_is_left(
@@ -517,16 +588,6 @@ def _where_something_is_left(
 def finite(value: float) -> float | None:
     """Return the number, None where it is none (JSON has no NaN)."""
     return float(value) if math.isfinite(value) else None
-
-
-def schema() -> dict[str, Any]:
-    """Return the JSON schema of diagnosis.json."""
-    return json.loads((resources.files("ninespring.say") / "diagnosis.schema.json").read_text("utf-8"))
-
-
-def validate(result: Mapping[str, Any]) -> None:
-    """Check a result against the schema."""
-    jsonschema.validate(result, schema())
 
 
 def fit_effects(

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -16,6 +15,7 @@ from ..io.logs.run import Run
 from ..model import native, tables
 from ..model.models import Model
 from . import plausibility
+from .resistance import Second
 
 POWER_UNITS = ("W", "J", "ohm")
 """Of numbers that are known no better than the power of the springs."""
@@ -49,14 +49,14 @@ def misfit(problem: Problem, fit: Fit) -> list[str]:
     ]
 
 
-def impossible(second: Mapping[str, Any] | None) -> list[str]:
+def impossible(second: Second | None) -> list[str]:
     """Return a warning where what v / i says of the phases is nothing that a spring can have, beside these temperatures."""
     table = native.parameter_table()
     numbers = {
-        name: one["value"]
-        for effect in (second or {}).get("effects", [])
-        if effect["name"] != "contact_resistance"  # its is a change
-        for name, one in effect["parameters"].items()
+        name: one.value
+        for effect in (second.effects if second else ())
+        if effect.name != "contact_resistance"  # its is a change
+        for name, one in effect.parameters.items()
     }
     wrong = [n for n, value in numbers.items() if not table[n].minimum <= value <= table[n].maximum]
     return [

@@ -10,6 +10,7 @@ from scipy.ndimage import uniform_filter1d
 
 from ..infer.fit import Fit
 from ..infer.problem import Problem
+from ..io import results
 from ..io.logs.run import Run
 from ..model import native
 from ..model.simulate import simulate_run
@@ -30,21 +31,21 @@ class Experiment:
     text: str
     current_a: float | None = None
     """Of a spring at 100 %; None where the logs have no current."""
-    steps: list[dict[str, Any]] = field(default_factory=list)
+    steps: list[results.Step] = field(default_factory=list)
     """What is set when: at_s, percent of the current (one per spring), fan in percent."""
 
-    def as_dict(self) -> dict[str, Any]:
-        """Return it for JSON."""
-        return {
-            "name": self.name,
-            "inputs": self.inputs,
-            "spring": self.spring,
-            "difference_c": self.difference_c,
-            "at_s": self.at_s,
-            "duration_s": self.duration_s,
-            "current_a": self.current_a,
-            "steps": self.steps,
-        }
+    def told(self) -> results.Experiment:
+        """Return what diagnosis.json says of it."""
+        return results.Experiment(
+            name=self.name,
+            inputs=self.inputs,
+            spring=self.spring,
+            difference_c=self.difference_c,
+            at_s=self.at_s,
+            duration_s=self.duration_s,
+            current_a=self.current_a,
+            steps=self.steps,
+        )
 
 
 def _inputs(rows: int, cols: int, fan_seen: bool) -> list[tuple[str, str, np.ndarray, np.ndarray, float]]:
@@ -110,11 +111,11 @@ def _inputs(rows: int, cols: int, fan_seen: bool) -> list[tuple[str, str, np.nda
     return out
 
 
-def _steps(time_s: np.ndarray, share: np.ndarray, fan: np.ndarray) -> list[dict[str, Any]]:
+def _steps(time_s: np.ndarray, share: np.ndarray, fan: np.ndarray) -> list[results.Step]:
     """Return the changes of an experiment: share of the current (rows, n), fan (rows,), 0..1."""
     table = np.rint(100.0 * np.column_stack([share, fan])).astype(int)
     changes = np.flatnonzero(np.r_[True, (np.diff(table, axis=0) != 0).any(axis=1)])
-    return [{"at_s": float(time_s[k]), "percent": table[k, :-1].tolist(), "fan": int(table[k, -1])} for k in changes]
+    return [results.Step(at_s=float(time_s[k]), percent=table[k, :-1].tolist(), fan=int(table[k, -1])) for k in changes]
 
 
 def separate(problem: Problem, a: Fit, b: Fit) -> Experiment:

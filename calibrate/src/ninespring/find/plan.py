@@ -9,15 +9,13 @@ springs' temperature, as the declared array's simulation has it.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from ..errors import InputError
 from ..export.settings import CROSSED, best_plant
-from ..io import ranges
+from ..io import ranges, results
 from ..model import native
 from ..model.models import Array, Model
 from ..model.simulate import array_parameters
@@ -114,23 +112,23 @@ def make_plan(
 
 
 def plan_experiment(
-    array: Array, experiment: Mapping[str, Any], supply_a: float, hottest_c: float, current_a: float | None = None
+    array: Array, experiment: results.Experiment, supply_a: float, hottest_c: float, current_a: float | None = None
 ) -> Plan:
     """Return the plan of an experiment that a diagnosis asks for, with less current where a limit would be passed.
 
-    `experiment` is what diagnosis.json has of a rival; `current_a` is a spring's at full level where that has none.
+    `experiment` is a rival's; `current_a` is a spring's at full level where that has none.
     """
     _check_limits(supply_a, hottest_c, current_a)
-    steps = experiment["steps"]
-    percent = np.array([one["percent"] for one in steps], dtype=float)
+    steps = experiment.steps
+    percent = np.array([one.percent for one in steps], dtype=float)
     if percent.shape[1] != array.springs:
         raise InputError(f"the experiment is for {percent.shape[1]} springs, the array has {array.springs}")
-    full_a = experiment["current_a"] or current_a
+    full_a = experiment.current_a or current_a
     if not full_a:
         raise InputError("the diagnosed logs have no current: give that of a spring at full level, --current")
-    time_s = np.arange(0.0, experiment["duration_s"])
-    at = np.searchsorted([one["at_s"] for one in steps], time_s, "right") - 1
-    fan = np.array([one["fan"] for one in steps])[at] / 100.0
+    time_s = np.arange(0.0, experiment.duration_s)
+    at = np.searchsorted([one.at_s for one in steps], time_s, "right") - 1
+    fan = np.array([one.fan for one in steps])[at] / 100.0
     full_a = min(full_a, supply_a / max(percent.sum(axis=1).max() / 100.0, 1e-9))
     temperature = _temperatures(array, percent[at] / 100.0 * full_a, fan)
     while temperature.max() > hottest_c:
@@ -141,12 +139,12 @@ def plan_experiment(
     lines = ["policy open", f"$open_current_a={full_a:.3f}", "off all", "fan 0"]
     before, blows = np.zeros(array.springs), 0
     for one in steps:
-        stamp = f"at {one['at_s'] + FIRST_S:g} = "
-        lines += [f"{stamp}fan {one['fan']}"] * (one["fan"] != blows)
-        for k in np.flatnonzero(np.array(one["percent"]) != before):
-            level = one["percent"][k]
+        stamp = f"at {one.at_s + FIRST_S:g} = "
+        lines += [f"{stamp}fan {one.fan}"] * (one.fan != blows)
+        for k in np.flatnonzero(np.array(one.percent) != before):
+            level = one.percent[k]
             lines.append(f"{stamp}on {k + 1} {level}" if level else f"{stamp}off {k + 1}")
-        before, blows = np.array(one["percent"]), one["fan"]
+        before, blows = np.array(one.percent), one.fan
     drive = percent[at] / 100.0 * full_a
     return Plan(lines, float(temperature.max()), float(drive.sum(axis=1).max()), (drive > 0).mean(axis=0))
 

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
-from scipy.signal import lfilter
 
 from ..infer.fit import Fit
-from ..infer.problem import FOLDS, Problem, fold_of_rows
+from ..infer.problem import Problem
 from ..io import statistics
 from .evidence import excess
 
@@ -102,49 +100,3 @@ def depends_on(problem: Problem, fit: Fit) -> tuple[list[str], str]:
     out.sort(key=lambda one: -one[0])
     names = [text for _, text in out[:6]]
     return names, ("It depends on " + "; ".join(names) + "." if names else "No single input goes with it.")
-
-
-def surrogate(problem: Problem, fit: Fit) -> dict[str, Any]:
-    """Return how far an empirical model of the residual would get. Not physics; it is never exported.
-
-    Ridge regression of each spring's residual on every drive, filtered with time constants of 3 to 300 s, on
-    the fan and on time; the strength of the ridge and the error by held-out fifths of the runs.
-    """
-    tables = []
-    for run in problem.runs:
-        step = float(np.median(np.diff(run.time_s)))
-        columns = [np.ones(len(run.time_s)), run.fan, run.time_s / 1000.0]
-        for tau in (3.0, 10.0, 30.0, 100.0, 300.0):
-            keep = math.exp(-step / tau)
-            for k in range(run.springs):
-                columns.append(lfilter([1 - keep], [1, -keep], run.drive[:, k]))
-        tables.append(np.column_stack(columns))
-    x = np.concatenate(tables)
-    x = (x - x.mean(axis=0)) / np.where(x.std(axis=0) > 0, x.std(axis=0), 1.0)
-    x[:, 0] = 1.0
-    y = np.concatenate(fit.residual)
-    folds = np.concatenate([fold_of_rows(run) for run in problem.runs])
-    best: tuple[float, float] | None = None
-    for strength in (0.1, 1.0, 10.0, 100.0, 1e3, 1e4):
-        total, count = 0.0, 0
-        for fold in range(FOLDS):
-            for k in range(y.shape[1]):
-                good = np.isfinite(y[:, k])
-                train, test = good & (folds != fold), good & (folds == fold)
-                if not train.any() or not test.any():
-                    continue
-                a = x[train]
-                weights = np.linalg.solve(a.T @ a + strength * np.eye(a.shape[1]), a.T @ y[train, k])
-                total += float(((y[test, k] - x[test] @ weights) ** 2).sum())
-                count += int(test.sum())
-        error = math.sqrt(total / max(1, count))
-        if best is None or error < best[0]:
-            best = (error, strength)
-    assert best is not None
-    return {
-        "empirical": True,
-        "what": "ridge regression of the residual on filtered drives, fan and time: no physics, not exported",
-        "holdout_before_c": statistics.rms(fit.residual),
-        "holdout_after_c": best[0],
-        "ridge": best[1],
-    }

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, replace
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 
 from ..infer.fit import Fit
 from ..infer.problem import Problem
 from ..infer.result import parameters_of
+from ..io import results
 from ..model import effects
 from ..model.spec import RUN_DRIVE, RUNS_OWN
 from .certainty import CERTAIN, Witness
@@ -51,20 +51,20 @@ def with_spread(problem: Problem, fit: Fit) -> Fit:
     return fit
 
 
-def entry(problem: Problem, fit: Fit, effect: str, nats: float, sure: Witness) -> dict[str, Any]:
+def entry(problem: Problem, fit: Fit, effect: str, nats: float, sure: Witness) -> results.RunsDiffer:
     """Return what diagnosis.json says of it: each run's number, and how far they lie apart."""
     parameters = parameters_of(problem, fit, effect)
     at, covariance = _own(fit, effect)
     if effect == RUN_DRIVE and fit.covariance is not None:
         for k, variance in zip(at, np.diag(covariance), strict=True):
-            parameters[fit.spec.free[k].key]["stderr"] = float(fit.values[k] * np.sqrt(max(0.0, variance)))
-    return {
-        "name": effect,
-        "evidence": nats,
-        "probability": sure.probability(),
-        "certainty": "certain" if sure.probability() >= CERTAIN else "probable",
-        "witness": asdict(sure),
-        "spread": {"value": spread_of(fit, effect), "unit": "1" if effect == RUN_DRIVE else "K"},
-        "parameters": parameters,
-        "text": effects.sentence(effect, parameters),
-    }
+            parameters[fit.spec.free[k].key].stderr = float(fit.values[k] * np.sqrt(max(0.0, variance)))
+    return results.RunsDiffer(
+        name=effect,
+        evidence=nats,
+        probability=sure.probability(),
+        certainty="certain" if sure.probability() >= CERTAIN else "probable",
+        witness=sure,
+        spread=results.Spread(value=spread_of(fit, effect), unit="1" if effect == RUN_DRIVE else "K"),
+        parameters=parameters,
+        text=effects.sentence(effect, parameters),
+    )

@@ -4,22 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from rich.console import Console
-from rich.table import Table
 from scipy.optimize import minimize_scalar
 
-from .. import __version__
 from ..errors import InputError
+from ..export.settings import judged
+from ..io import results
 from ..io.logs import read_bytes, read_table, sha256_of
 from ..model import effects, native
 from ..model.effects import Effect
 from ..model.models import Array, Model, read_array
-from .diagnosis import validate
 from .search import TOLD_APART
 
 
@@ -196,150 +193,146 @@ def fit_one(
     return value, set_by(effect, value, watched)
 
 
+@dataclass
+class _Tried:
+    """An effect tried on a steady table: what is told of it, all that its number sets, what it leaves, K."""
+
+    told: results.SteadyCandidate
+    sets: dict[str, float] = field(default_factory=dict)
+    left: np.ndarray = field(default_factory=lambda: np.empty(0))
+
+    def parameters(self) -> results.Parameters:
+        """Return its number, and what is set with it."""
+        told = self.told
+        number = results.Number(value=told.value, stderr=told.stderr, unit=told.unit)
+        if told.at_bound:
+            number.note = "at its bound"
+        out = {told.parameter: number}
+        for name, value in self.sets.items():
+            if name != told.parameter:
+                unit = native.parameter_table()[name].unit
+                out[name] = results.Number(value=value, stderr=None, unit=unit, note="set with it, not fitted")
+        return out
+
+
+def _tried(
+    array: Array,
+    declared: Mapping[str, float],
+    effect: Effect,
+    states: list[State],
+    watched: int,
+    before: np.ndarray,
+) -> _Tried:
+    """Fit an effect's one number to all states, and to all but each in turn; its error by the slope at what was found."""
+    name, steady = effect.name, effect.steady
+    if steady is None:
+        note = "cannot show in a steady state of given temperatures"
+        rmse = _rms(before)
+        return _Tried(results.SteadyCandidate(name=name, rmse_c=rmse, holdout_rmse_c=rmse, note=note))
+    value, on = fit_one(array, declared, effect, states, watched)
+    left = errors(array, declared, {name: on}, states)
+    held = []
+    for k in range(len(states)):
+        _, other = fit_one(array, declared, effect, states[:k] + states[k + 1 :], watched)
+        held.append(errors(array, declared, {name: other}, [states[k]]))
+    low, high = steady.low, steady.high
+    at = min(high, value + max(1e-6, 1e-3 * (high - low)))
+    slope = (errors(array, declared, {name: set_by(effect, at, watched)}, states) - left) / max(1e-12, at - value)
+    spread = math.sqrt(float((left**2).sum()) / max(1, len(left) - 1))
+    n, steep = len(left), float(np.linalg.norm(slope))
+    gained = math.log(max(float((before**2).sum()), 1e-9) / max(float((left**2).sum()), 1e-9))
+    told = results.SteadyCandidate(
+        name=name,
+        parameter=key_of(effect, watched),
+        value=value,
+        stderr=spread / steep if steep > 0 else None,
+        unit=native.parameter_table()[steady.number].unit,
+        rmse_c=_rms(left),
+        holdout_rmse_c=_rms(np.concatenate(held)),
+        evidence=0.5 * n * gained - 0.5 * math.log(n),
+        at_bound=bool(value - low < 1e-3 * (high - low) or high - value < 1e-3 * (high - low)),
+        note="changes nothing here" if np.abs(left - before).max() < 1e-6 else steady.against,
+    )
+    return _Tried(told, on, left)
+
+
 def diagnose_states(
     array: Array, declared: Mapping[str, float], states: list[State], progress: Callable[[str], None] = lambda t: None
-) -> dict[str, Any]:
+) -> results.SteadyDiagnosis:
     """Try every effect with one number on steady states; return a result of the diagnosis' shape.
 
     The declared model stays frozen. Held out: one state after the other.
     """
     before = errors(array, declared, {}, states)
     watched = int(np.flatnonzero(np.isfinite(states[0].measured_c))[0])
-    rows = []
+    tried = []
     for effect in effects.library():
-        name, steady = effect.name, effect.steady
-        if steady is None:
-            rows.append(
-                {
-                    "name": name,
-                    "rmse_c": _rms(before),
-                    "holdout_rmse_c": _rms(before),
-                    "value": None,
-                    "note": "cannot show in a steady state of given temperatures",
-                }
-            )
-            continue
-        progress(f"fitting {name}")
-        value, on = fit_one(array, declared, effect, states, watched)
-        left = errors(array, declared, {name: on}, states)
-        held = []
-        for k in range(len(states)):
-            rest = states[:k] + states[k + 1 :]
-            _, other = fit_one(array, declared, effect, rest, watched)
-            held.append(errors(array, declared, {name: other}, [states[k]]))
-        low, high, key = steady.low, steady.high, key_of(effect, watched)
-        step = max(1e-6, 1e-3 * (high - low))
-        at = min(high, value + step)
-        slope = (errors(array, declared, {name: set_by(effect, at, watched)}, states) - left) / max(1e-12, at - value)
-        spread = math.sqrt(float((left**2).sum()) / max(1, len(left) - 1))
-        error = spread / float(np.linalg.norm(slope)) if np.linalg.norm(slope) > 0 else None
-        n = len(left)
-        same = np.abs(left - before).max() < 1e-6
-        rows.append(
-            {
-                "name": name,
-                "rmse_c": _rms(left),
-                "holdout_rmse_c": _rms(np.concatenate(held)),
-                "value": value,
-                "set": on,
-                "parameter": key,
-                "stderr": error,
-                "unit": native.parameter_table()[steady.number].unit,
-                "at_bound": bool(value - low < 1e-3 * (high - low) or high - value < 1e-3 * (high - low)),
-                "evidence": 0.5 * n * math.log(max(float((before**2).sum()), 1e-9) / max(float((left**2).sum()), 1e-9))
-                - 0.5 * math.log(n),
-                "residual_c": [float(v) for v in left],
-                "note": "changes nothing here" if same else steady.against,
-            }
-        )
-    order = sorted(rows, key=lambda r: r["holdout_rmse_c"])
+        progress(f"fitting {effect.name}")
+        tried.append(_tried(array, declared, effect, states, watched, before))
+    tried.sort(key=lambda one: one.told.holdout_rmse_c)
+    rmse = _rms(before)
     useful = [
-        r for r in order if r["value"] is not None and r["evidence"] > 2.0 and r["holdout_rmse_c"] < 0.7 * _rms(before)
+        one
+        for one in tried
+        if one.told.evidence is not None and one.told.evidence > 2.0 and one.told.holdout_rmse_c < 0.7 * rmse
     ]
-    adopted = useful[:1]
-    contenders = [r for r in useful[1:] if adopted and adopted[0]["evidence"] - r["evidence"] < TOLD_APART]
-
-    def parameters(r: dict[str, Any]) -> dict[str, Any]:
-        out = {r["parameter"]: {"value": r["value"], "stderr": r["stderr"], "unit": r["unit"]}}
-        if r["at_bound"]:
-            out[r["parameter"]]["note"] = "at its bound"
-        for name, value in r["set"].items():
-            if name != r["parameter"]:
-                unit = native.parameter_table()[name].unit
-                out[name] = {"value": value, "stderr": None, "unit": unit, "note": "set with it, not fitted"}
-        return out
-
-    rivals = []
-    for r in contenders:
-        best = separate(array, declared, states[0], adopted[0], r)
-        rivals.append(
-            {
-                "instead_of": adopted[0]["name"],
-                "name": r["name"],
-                "rmse_c": r["rmse_c"],
-                "holdout_rmse_c": r["holdout_rmse_c"],
-                "evidence": adopted[0]["evidence"] - r["evidence"],
-                "parameters": parameters(r),
-                "separating_experiment": best,
-                "against": r["note"],
-            }
-        )
-    final = adopted[0] if adopted else None
-    after = _rms(before) if final is None else final["rmse_c"]
-    return {
-        "schema": "ninespring.diagnosis/1",
-        "tool": f"ninespring {__version__}",
-        "logs": [],
-        "baseline": {"rmse_c": _rms(before), "holdout_rmse_c": _rms(before), "noise_c": 1.0},
-        "effects": [
-            {
-                "name": r["name"],
-                "rmse_c": r["rmse_c"],
-                "holdout_rmse_c": r["holdout_rmse_c"],
-                "evidence": r["evidence"],
-                "parameters": parameters(r),
-                "on_chip": r["name"] in effects.ON_CHIP,
-                "in_words": effects.IN_WORDS[r["name"]],
-            }
-            for r in adopted
-        ],
-        "rivals": rivals,
-        "after": {"rmse_c": after, "holdout_rmse_c": final["holdout_rmse_c"] if final else _rms(before)},
-        "unexplained": bool(after > 3.0),
-        "residual": {
-            "autocorrelation_lag1": 0.0,
-            "depends_on": [],
-            "note": f"{len(before)} numbers: no noise can be estimated; 1 degC is assumed (the table gives whole degrees)",
-        },
-        "candidates": [
-            {
-                k: r.get(k)
-                for k in (
-                    "name",
-                    "parameter",
-                    "value",
-                    "stderr",
-                    "unit",
-                    "rmse_c",
-                    "holdout_rmse_c",
-                    "evidence",
-                    "at_bound",
-                    "note",
-                )
-            }
-            for r in order
-        ],
-        "cases": [
-            {"case": s.case, "measured_c": float(s.measured_c[watched]), "before_c": float(s.measured_c[watched] - b)}
-            | ({"after_c": float(s.measured_c[watched] - final["residual_c"][k])} if final else {})
-            for k, (s, b) in enumerate(zip(states, before, strict=True))
-        ],
-        "identifiability": {"not_identifiable": [], "at_bounds": [], "correlated": []},
-        "warnings": [],
-    }
+    best = useful[0] if useful else None
+    after = best.told if best else None
+    note = f"{len(before)} numbers: no noise can be estimated; 1 degC is assumed (the table gives whole degrees)"
+    measured = [float(state.measured_c[watched]) for state in states]
+    cases = [
+        results.Case(case=state.case, measured_c=shown, before_c=shown - float(left))
+        for state, shown, left in zip(states, measured, before, strict=True)
+    ]
+    for case, left in zip(cases, best.left if best else (), strict=bool(best)):
+        case.after_c = case.measured_c - float(left)
+    return results.SteadyDiagnosis(
+        logs=[],
+        baseline=results.Baseline(rmse_c=rmse, holdout_rmse_c=rmse, noise_c=1.0),
+        effects=[_adopted(best)] if best else [],
+        rivals=[_rival(array, declared, states[0], best, one) for one in useful[1:] if _near(best, one)],
+        after=results.After(
+            rmse_c=after.rmse_c if after else rmse, holdout_rmse_c=after.holdout_rmse_c if after else rmse
+        ),
+        unexplained=bool((after.rmse_c if after else rmse) > 3.0),
+        residual=results.Residual(autocorrelation_lag1=0.0, depends_on=[], note=note),
+        candidates=[one.told for one in tried],
+        cases=cases,
+        identifiability=results.Identifiability(not_identifiable=[], at_bounds=[], correlated=[]),
+        warnings=[],
+    )
 
 
-def separate(array: Array, declared: Mapping[str, float], like: State, a: dict[str, Any], b: dict[str, Any]) -> str:
+def _near(best: _Tried, one: _Tried) -> bool:
+    return best.told.evidence - one.told.evidence < TOLD_APART
+
+
+def _adopted(one: _Tried) -> results.Effect:
+    return results.Effect(
+        name=one.told.name,
+        rmse_c=one.told.rmse_c,
+        holdout_rmse_c=one.told.holdout_rmse_c,
+        evidence=one.told.evidence,
+        parameters=one.parameters(),
+        on_chip=one.told.name in effects.ON_CHIP,
+        in_words=effects.IN_WORDS[one.told.name],
+    )
+
+
+def _rival(array: Array, declared: Mapping[str, float], like: State, best: _Tried, one: _Tried) -> results.Rival:
+    return results.Rival(
+        instead_of=best.told.name,
+        name=one.told.name,
+        rmse_c=one.told.rmse_c,
+        holdout_rmse_c=one.told.holdout_rmse_c,
+        evidence=best.told.evidence - one.told.evidence,
+        parameters=one.parameters(),
+        separating_experiment=separate(array, declared, like, best, one),
+        against=one.told.note,
+    )
+
+
+def separate(array: Array, declared: Mapping[str, float], like: State, a: _Tried, b: _Tried) -> str:
     """Return the steady or cooling experiment in which two fitted effects differ most, computed with both."""
     n, cols = array.springs, array.cols
     best: tuple[float, str] = (-1.0, "")
@@ -355,14 +348,14 @@ def separate(array: Array, declared: Mapping[str, float], like: State, a: dict[s
             hold = np.full(n, math.nan)
             hold[held] = hot
             state = State("", like.pitch_mm, fan, like.ambient_c, hold, np.full(n, math.nan), np.full(n, math.nan))
-            shown = [settle(array, declared, {r["name"]: r["set"]}, state) for r in (a, b)]
+            shown = [settle(array, declared, {one.told.name: one.sets}, state) for one in (a, b)]
             apart = np.abs(shown[0] - shown[1])
             k = int(np.argmax(apart))
             if apart[k] > best[0]:
                 best = (
                     float(apart[k]),
                     f"hold {words} at {hot:.0f} degC {'with' if fan else 'without'} the fan until steady (15 min); watch "
-                    f"spring {k + 1}: {a['name']} says {shown[0][k]:.1f}, {b['name']} {shown[1][k]:.1f} degC, "
+                    f"spring {k + 1}: {a.told.name} says {shown[0][k]:.1f}, {b.told.name} {shown[1][k]:.1f} degC, "
                     f"{apart[k]:.1f} apart",
                 )
     return best[1]
@@ -370,63 +363,37 @@ def separate(array: Array, declared: Mapping[str, float], like: State, a: dict[s
 
 def diagnose_table(
     path: Path, model: Model | None, array_path: Path | None, frozen: bool, progress: Callable[[str], None]
-) -> dict[str, Any]:
+) -> tuple[results.SteadyDiagnosis, Model]:
     """Diagnose a steady table by the declared (frozen) model; without one, by the paper's."""
     array = model.array if model else read_array(array_path) if array_path else Array()
     array.one_layer("diagnose knows")
     states = read_steady(path, array.springs)
     declared = dict(model.parameters) if model else {}
-    result = diagnose_states(array, declared, states, progress)
-    result["logs"] = [{"file": path.name, "sha256": sha256_of(path), "rows": len(states)}]
+    told = diagnose_states(array, declared, states, progress)
+    told.logs = [results.Read(file=path.name, sha256=sha256_of(path), rows=len(states))]
     if not frozen and model is None:
-        result["warnings"].append("no --model: the paper's declared model (docs/physics.md) was taken, frozen")
-    validate(result)
-    return result
+        told.warnings.append("no --model: the paper's declared model (docs/physics.md) was taken, frozen")
+    made = model_after(told, model, array)
+    judged(told.effects, made)
+    results.checked(told)
+    return told, made
 
 
-def model_after(result: Mapping[str, Any], model: Model | None, array_path: Path | None) -> Model:
+def model_after(told: results.SteadyDiagnosis, model: Model | None, array: Array) -> Model:
     """Return the model with the adopted effect."""
-    out = Model(model.array if model else read_array(array_path) if array_path else Array())
-    out.effects = [e["name"] for e in result["effects"]]
+    out = Model(array)
+    out.effects = [one.name for one in told.effects]
     if model:
         out.parameters = dict(model.parameters)
         out.effects = [*model.effects, *(e for e in out.effects if e not in model.effects)]
-    for effect in result["effects"]:
-        for name, one in effect["parameters"].items():
-            out.parameters[name] = one["value"]
-            if one["stderr"] is not None:
-                out.stderr[name] = one["stderr"]
+    for effect in told.effects:
+        for name, one in effect.parameters.items():
+            out.parameters[name] = one.value
+            if one.stderr is not None:
+                out.stderr[name] = one.stderr
     out.provenance = {
-        "rmse_before_c": result["baseline"]["rmse_c"],
-        "rmse_after_c": result["after"]["rmse_c"],
-        "logs": result["logs"],
+        "rmse_before_c": told.baseline.rmse_c,
+        "rmse_after_c": told.after.rmse_c,
+        "logs": [results.plain(one) for one in told.logs],
     }
     return out
-
-
-def candidate_rows(result: Mapping[str, Any]) -> list[list[str]]:
-    """Return the candidates as rows of text."""
-    rows = []
-    for one in result["candidates"]:
-        unit = "" if one["unit"] in (None, "1") else f" {one['unit']}"
-        value = "" if one["value"] is None else f"{one['parameter']} = {one['value']:.4g}{unit}"
-        if one.get("at_bound"):
-            value += " (at its bound)"
-        rows.append([one["name"], value, f"{one['rmse_c']:.2f}", f"{one['holdout_rmse_c']:.2f}", one.get("note") or ""])
-    return rows
-
-
-HEADER = ["effect", "its one number", "error, K", "left one out, K", "what speaks against it"]
-
-
-def print_result(console: Console, result: Mapping[str, Any]) -> None:
-    """Print a steady diagnosis, short."""
-    table = Table(*HEADER)
-    for row in candidate_rows(result):
-        table.add_row(*row)
-    console.print(f"before: {result['baseline']['rmse_c']:.2f} K rms, frozen model")
-    console.print(table)
-    for one in result["rivals"]:
-        console.print(
-            f"{one['instead_of']} or {one['name']}: these numbers cannot tell. {one['separating_experiment']}"
-        )

@@ -11,13 +11,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from ..infer.fit import Fit
 from ..infer.heat import THIN, power_of, step_answers, thin
 from ..infer.problem import Problem
+from ..io import results
 from .evidence import fit_factor
 
 GRID_S = 15.0
@@ -48,21 +48,21 @@ class Piece:
     error: float
     nats: float
 
-    def as_dict(self, share: float | None) -> dict[str, Any]:
-        """Return it for JSON; `share` is its size in parts of the spring's usual power."""
-        return {
-            "run": self.run + 1,
-            "kind": self.kind,
-            "spring": self.spring + 1 if self.spring >= 0 else None,
-            "from_s": self.begin_s,
-            "to_s": self.end_s,
-            "size": self.size,
-            "stderr": self.error,
-            "unit": "K" if self.kind == "sensor" else "W",
-            "share": share,
-            "evidence": self.nats,
-            "text": self.words(share),
-        }
+    def told(self, share: float | None) -> results.Event:
+        """Return what diagnosis.json says of it; `share` is its size in parts of the spring's usual power."""
+        return results.Event(
+            run=self.run + 1,
+            kind=self.kind,
+            spring=self.spring + 1 if self.spring >= 0 else None,
+            from_s=self.begin_s,
+            to_s=self.end_s,
+            size=self.size,
+            stderr=self.error,
+            unit="K" if self.kind == "sensor" else "W",
+            share=share,
+            evidence=self.nats,
+            text=self.words(share),
+        )
 
     def words(self, share: float | None) -> str:
         """Return it as a sentence."""
@@ -91,13 +91,13 @@ class UnknownHeat:
         usual = float(self.usual_w[piece.spring]) if piece.spring >= 0 else float(np.nanmean(self.usual_w))
         return piece.size / usual if piece.kind != "sensor" and usual > 0 else None
 
-    def as_dict(self) -> dict[str, Any]:
-        """Return it for diagnosis.json."""
-        return {
-            "events": [piece.as_dict(self.share(piece)) for piece in self.pieces],
-            "mean_w": [[float(v) for v in run.mean(axis=0)] for run in self.watts],
-            "usual_w": [float(v) if math.isfinite(v) else None for v in self.usual_w],
-        }
+    def told(self) -> results.UnknownHeat:
+        """Return what diagnosis.json says of it."""
+        return results.UnknownHeat(
+            events=[piece.told(self.share(piece)) for piece in self.pieces],
+            mean_w=[[float(v) for v in run.mean(axis=0)] for run in self.watts],
+            usual_w=[float(v) if math.isfinite(v) else None for v in self.usual_w],
+        )
 
 
 def find(problem: Problem, fit: Fit, say: Callable[[str], None] = lambda text: None) -> UnknownHeat:

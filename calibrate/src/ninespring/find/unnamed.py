@@ -12,13 +12,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from ..infer.fit import Fit
 from ..infer.heat import THIN
 from ..infer.problem import Problem
+from ..io import results
 from ..io.statistics import correlation_factor
 from ..model.effects.effect import sized
 from ..model.spec import RUNS_OWN
@@ -97,21 +97,17 @@ class Hidden:
             return abs(self.size) <= ROOM_K
         return self.cause.kind in UNITS or -1.0 <= self.size <= (1.0 if self.cause.kind in GIVES_ONLY else math.inf)
 
-    def as_dict(self) -> dict[str, Any]:
-        """Return it for diagnosis.json."""
+    def told(self) -> results.Unnamed:
+        """Return what diagnosis.json says of it."""
         unit = UNITS.get(self.cause.kind, "1")
         text, size = self.text, self.size
         for more, less in LESS if size < 0.0 else ():
             if more in text:
                 text, size = text.replace(more, less), -self.size
         said = sized(size, self.error, unit) if unit != "1" else sized(size, self.error, "%", 100.0)
-        return {
-            "kind": self.cause.kind,
-            "size": self.size,
-            "stderr": self.error,
-            "unit": unit,
-            "text": f"{text}: {said}",
-        }
+        return results.Unnamed(
+            kind=self.cause.kind, size=self.size, stderr=self.error, unit=unit, text=f"{text}: {said}"
+        )
 
 
 def drifts(hidden: Sequence[Hidden]) -> list[Hidden]:

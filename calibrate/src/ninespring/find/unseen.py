@@ -17,6 +17,7 @@ from ..infer import room
 from ..infer.fit import Fit
 from ..infer.likelihood import Colour
 from ..infer.problem import Problem
+from ..io import results
 from ..io.logs.run import Run
 from ..model.simulate import simulate_run
 from ..model.spec import RUNS_OWN, Free, Spec
@@ -181,17 +182,17 @@ class Unseen:
             f"{min(self.own(other), self.rmse(other)):.2f} K without"
         )
 
-    def as_dict(self, fit: Fit) -> dict[str, Any] | None:
-        """Return it for diagnosis.json, None where nothing can be left out."""
+    def told(self, fit: Fit) -> results.Unseen | None:
+        """Return what diagnosis.json says of it, None where nothing can be left out."""
         if not self.splits or not math.isfinite(self.own(fit)):
             return None
         alone = self.splits[0].alone
         what = "the last third of the run" if alone else "a run that the fit did not see"
         mine, declared, lagged = self.own(fit), self.rmse(self.base), self.rmse(self.lagged)
-        return {
-            "what": "last third" if alone else "each run left out in turn",
-            "rmse_c": mine,
-            "declared_rmse_c": declared,
-            "with_lag_rmse_c": lagged,
-            "text": f"{what} is predicted to {mine:.2f} K (declared model, fitted: {declared:.2f}, with a lag: {lagged:.2f})",
-        }
+        return results.Unseen(
+            what="last third" if alone else "each run left out in turn",
+            rmse_c=mine,
+            declared_rmse_c=declared,
+            with_lag_rmse_c=lagged,
+            text=f"{what} is predicted to {mine:.2f} K (declared model, fitted: {declared:.2f}, with a lag: {lagged:.2f})",
+        )

@@ -5,11 +5,11 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from ..errors import InputError, WorkError
+from ..io import results
 from ..io.logs.run import Run
 from ..model import effects, native
 from ..model.models import Model
@@ -98,7 +98,7 @@ def chip_trace(model: Model, lines: str, run: Run) -> tuple[np.ndarray, np.ndarr
     return temperature, austenite
 
 
-def chip_error(model: Model, lines: str, runs: Sequence[Run]) -> dict[str, Any]:
+def chip_error(model: Model, lines: str, runs: Sequence[Run]) -> results.ChipError:
     """Return the error of a chip with these lines on logs, K rms: of all, and of each spring (None: not measured)."""
     left = np.concatenate([run.temperature_c - predict_by_chip(model, lines, run) for run in runs])
     seen = np.isfinite(left)
@@ -106,4 +106,4 @@ def chip_error(model: Model, lines: str, runs: Sequence[Run]) -> dict[str, Any]:
         float(np.sqrt(np.mean(one[mask] ** 2))) if mask.any() else None
         for one, mask in zip(left.T, seen.T, strict=True)
     ]
-    return {"rmse_c": float(np.sqrt(np.mean(left[seen] ** 2))), "rmse_per_spring_c": each}
+    return results.ChipError(rmse_c=float(np.sqrt(np.mean(left[seen] ** 2))), rmse_per_spring_c=each)

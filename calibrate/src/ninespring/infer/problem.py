@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 from scipy.interpolate import CubicSpline
-from scipy.optimize import OptimizeResult, least_squares, lsq_linear
+from scipy.optimize import lsq_linear
 
 from ..io import statistics
 from ..io.logs.run import Run
@@ -25,16 +25,12 @@ from ..model.models import Array
 from ..model.simulate import array_parameters, fades_per_s, hidden_k, simulate_run
 from ..model.spec import AMBIENT_OFFSET, DRIVE_GAIN, RUN_DRIVE, SENSOR_OFFSET, Spec
 from .budget import Budget
+from .descent import Descent, Shown
 from .fit import Fit
 from .likelihood import Colour, Rows
 from .rounding import power_errors
 
 WORKERS = max(1, min(8, os.cpu_count() or 1))
-REUSED = 0.1
-"""Movement, in the inner coordinates, up to which a slope is used again: a tenth of what matters."""
-FORETOLD = 0.5
-"""Part of what a step changed that slopes may have foretold wrongly and still be mended, not simulated again: they are right
-for the greater part."""
 _BAD = 1e3
 """What a simulation that the plant refuses 'shows', degC: so far off that no fit goes there."""
 
@@ -476,105 +472,25 @@ class Problem:
         values = np.array([(start or {}).get(f.key, f.start) for f in free], dtype=float)
         values = np.array([min(f.high, max(f.low, v)) for f, v in zip(free, values, strict=True)], dtype=float)
         if not free:
-            predicted = self.predictions(spec, values)
-            left = self.residuals(predicted)
-            vector = self.vector(left)
-            return Fit(
-                spec,
-                values,
-                float(vector @ vector),
-                self.count,
-                left,
-                np.zeros((self.count, 0)),
-                vector,
-                np.zeros((0, 0)),
-                sse=self.plain(left),
-            )
-        low = np.array([f.inner(f.low) for f in free])
-        high = np.array([f.inner(f.high) for f in free])
-        cache: dict[bytes, tuple[list[np.ndarray], np.ndarray]] = {}
+            return self._as_it_is(spec, values)
 
-        def outer(z: np.ndarray) -> np.ndarray:
-            return np.array([f.outer(one) for f, one in zip(free, z, strict=True)])
+        def show(numbers: np.ndarray) -> Shown:
+            shown = self.predictions(spec, numbers)
+            return shown, self.vector(self.residuals(shown))
 
-        def run(z: np.ndarray) -> tuple[list[np.ndarray], np.ndarray]:
-            key = z.tobytes()
-            if key not in cache:
-                shown = self.predictions(spec, outer(z))
-                cache[key] = (shown, self.vector(self.residuals(shown)))
-                if len(cache) > 4:
-                    cache.pop(next(iter(cache)))
-            return cache[key]
-
-        keys = [f.key for f in free]
-        known: dict[int, tuple[np.ndarray, np.ndarray]] = {}
+        way = Descent(free, show, lambda numbers, shown, columns: self.jacobian(spec, numbers, shown, columns))
         if near is not None and near.jacobian is not None and len(near.jacobian) == self.count:
-            there = {f.key: f.inner(v) for f, v in zip(near.spec.free, near.values, strict=True)}
-            at = np.array([there.get(key, np.nan) for key in keys])
-            for column, f in enumerate(near.spec.free):
-                if f.key in keys:
-                    known[keys.index(f.key)] = (at, near.jacobian[:, column])
-
-        mended: list[bool] = []
-        secant: list[tuple[np.ndarray, np.ndarray]] = []
-
-        def slope(z: np.ndarray) -> np.ndarray:
-            vector = run(z)[1]
-            foretold = False
-            if secant and len(known) == len(free):
-                # what the slopes foretold of the last step says whether they still hold; the rest of it mends them
-                # (Broyden 1965)
-                moved, changed = z - secant[-1][0], vector - secant[-1][1]
-                missed = changed - sum(known[c][1] * one for c, one in enumerate(moved))
-                length = float(moved @ moved)
-                foretold = length > 0 and float(missed @ missed) < FORETOLD**2 * float(changed @ changed)
-                if foretold:
-                    mended.append(True)
-                    known.update({c: (z, known[c][1] + missed * (moved[c] / length)) for c in known})
-            if not foretold:
-                stale = [c for c in range(len(free)) if c not in known or np.nanmax(np.abs(z - known[c][0])) > REUSED]
-                if stale:
-                    fresh = self.jacobian(spec, outer(z), run(z)[0], stale)
-                    known.update({c: (z.copy(), fresh[:, k]) for k, c in enumerate(stale)})
-            secant[:] = [(z.copy(), vector)]
-            return np.column_stack([known[c][1] for c in range(len(free))])
-
-        # what is believed before, as further residuals: (z - believed) / its standard deviation
-        believed = np.array([f.inner(f.start) for f in free])
-        trust = np.array([1.0 / f.prior if f.prior else 0.0 for f in free])
-        some = trust > 0
-        z0 = np.array([f.inner(v) for f, v in zip(free, values, strict=True)])
-        margin = 1e-6 * (high - low)
-        z0 = np.clip(z0, low + margin, high - margin)
-
-        def descend(begin: np.ndarray) -> OptimizeResult:
-            return least_squares(
-                lambda z: np.concatenate([run(z)[1], (trust * (z - believed))[some]]),
-                begin,
-                jac=lambda z: np.vstack([slope(z), np.diag(trust)[some]]),
-                bounds=(low, high),
-                x_scale="jac",
-                ftol=tolerance,
-                xtol=1e-6,
-                gtol=1e-10,
-                max_nfev=max_steps,
-            )
-
-        found = descend(z0)
-        if mended and settle:
-            # slopes that were mended may end before the minimum: fresh ones say whether they did
-            known.clear()
-            secant.clear()
-            found = descend(found.x)
-        z, jac = found.x, found.jac[: self.count]
-        shown, vector = run(z)
+            way.begin_near(near)
+        found = way.to_minimum(values, tolerance, max_steps, settle)
+        jac = found.jac[: self.count]
+        shown, vector = way.shown(found.x)
         fit = Fit(
             spec,
-            outer(z),
+            way.outer(found.x),
             float(vector @ vector),
             self.count,
             self.residuals(shown),
-            jac if settle or not mended else None,
+            jac if settle or not way.mended else None,
             vector,
         )
         fit.sse = self.plain(fit.residual)
@@ -585,6 +501,13 @@ class Problem:
             self.add_errors(fit)
         fit.simulations = self.simulations - begun
         return fit
+
+    def _as_it_is(self, spec: Spec, values: np.ndarray) -> Fit:
+        """Return the fit of a spec that has nothing free."""
+        left = self.residuals(self.predictions(spec, values))
+        vector = self.vector(left)
+        nothing = np.zeros((self.count, 0)), vector, np.zeros((0, 0))
+        return Fit(spec, values, float(vector @ vector), self.count, left, *nothing, sse=self.plain(left))
 
     def holdout_rmse(self, fit: Fit, colour: Colour | None = None) -> float:
         """Return the rms error, degC, on blocks held out of the fit, one fold after the other.

@@ -6,11 +6,10 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from ..io import statistics
+from ..io import results, statistics
 from ..io.logs.run import Run
 from ..model import native
 from ..model.models import Model
@@ -25,25 +24,21 @@ DRIFT_LEFT_OUT = (
 """Why a model.toml is without a drift of several knots: no other log has it, and a log's own is no prediction."""
 
 
-def parameters_of(problem: Problem, fit: Fit, effect: str | None = None) -> dict[str, Any]:
+def parameters_of(problem: Problem, fit: Fit, effect: str | None = None) -> results.Parameters:
     """Return numbers with standard errors and units; of one effect, or those of the declared model."""
     errors = fit.stderr()
     bounds = set(fit.at_bounds())
-    out: dict[str, Any] = {}
+    out = {}
     for free, value in zip(fit.spec.free, fit.values, strict=True):
         if free.effect != effect:
             continue
         error = errors[free.key]
-        entry: dict[str, Any] = {
-            "value": float(value),
-            "stderr": float(error) if math.isfinite(error) else None,
-            "unit": free.unit,
-        }
+        one = results.Number(value=float(value), stderr=float(error) if math.isfinite(error) else None, unit=free.unit)
         if free.key in fit.stuck:
-            entry["note"] = "the data cannot fix it: held"
+            one.note = "the data cannot fix it: held"
         elif free.key in bounds:
-            entry["note"] = "at its bound"
-        out[free.key] = entry
+            one.note = "at its bound"
+        out[free.key] = one
     return out
 
 
@@ -57,7 +52,7 @@ def model_of(
     problem: Problem,
     fit: Fit,
     runs: Sequence[Run],
-    result: Mapping[str, Any] | None = None,
+    rmse_before_c: float | None = None,
     absent: Mapping[str, tuple[float, float]] | None = None,
 ) -> Model:
     """Return the model.toml of a fit: declared, fixed and fitted numbers, effects, provenance.
@@ -101,8 +96,8 @@ def model_of(
     }
     if rooms and (over := room.over_first([problem.runs[r] for r in rooms], constants)):
         model.provenance["room_over_first_k"], model.provenance["room_over_first_sigma_k"] = over
-    if result:
-        model.provenance["rmse_before_c"] = result["baseline"]["rmse_c"]
+    if rmse_before_c is not None:
+        model.provenance["rmse_before_c"] = rmse_before_c
     if drifts:
         model.provenance["note"] = DRIFT_LEFT_OUT
     return model

@@ -13,7 +13,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from ..find.diagnosis import Diagnosis
-from ..io import statistics
+from ..io import results, statistics
 from ..io.logs.run import Run
 
 INK, MEASURED, BEFORE, AFTER = "#1d2733", "#9aa7b4", "#c8553d", "#1f77a4"
@@ -148,13 +148,13 @@ def unknown_heat(found: Diagnosis) -> str:
     return as_svg(figure)
 
 
-def error_bars(result: dict[str, Any]) -> str:
+def error_bars(told: results.Diagnosis) -> str:
     """Draw the held-out errors before and after, and the noise."""
-    before, after = result["baseline"], result["after"]
+    before = told.baseline
     rows = (
-        ("before", before["holdout_rmse_c"], BEFORE),
-        ("after", after["holdout_rmse_c"], AFTER),
-        ("noise", before["noise_c"], MEASURED),
+        ("before", before.holdout_rmse_c, BEFORE),
+        ("after", told.after.holdout_rmse_c, AFTER),
+        ("noise", before.noise_c, MEASURED),
     )
     figure, axis = plt.subplots(figsize=(4.2, 1.5))
     for at, (name, value, colour) in enumerate(rows):
@@ -239,36 +239,36 @@ def autocorrelation(found: Diagnosis) -> str:
 
 def evidence(found: Diagnosis) -> str:
     """Draw the errors of the models that were fitted on the way."""
-    rows = [c for c in found.result["candidates"] if len(c["effects"])][:14]
+    rows = [one for one in found.told.candidates if one.effects][:14]
     if not rows:
         return ""
     figure, axis = plt.subplots(figsize=(12, 0.34 * len(rows) + 0.9))
     y = np.arange(len(rows))[::-1]
-    colours = [AFTER if c["adopted"] else MEASURED for c in rows]
-    axis.barh(y, [c["rmse_c"] for c in rows], color=colours, height=0.7)
-    axis.axvline(found.result["baseline"]["noise_c"], color=INK, lw=1, ls="--", zorder=0)
-    axis.axvline(found.result["baseline"]["rmse_c"], color=BEFORE, lw=1, zorder=0)
-    axis.set_yticks(y, [" + ".join(c["effects"]) for c in rows], fontsize=8)
-    for at, c in zip(y, rows, strict=True):
+    colours = [AFTER if one.adopted else MEASURED for one in rows]
+    axis.barh(y, [one.rmse_c for one in rows], color=colours, height=0.7)
+    axis.axvline(found.told.baseline.noise_c, color=INK, lw=1, ls="--", zorder=0)
+    axis.axvline(found.told.baseline.rmse_c, color=BEFORE, lw=1, zorder=0)
+    axis.set_yticks(y, [" + ".join(one.effects) for one in rows], fontsize=8)
+    for at, one in zip(y, rows, strict=True):
         axis.annotate(
-            f"{c['rmse_c']:.3f} K, {c['evidence_over_baseline']:+.0f} nats",
-            (c["rmse_c"], at),
+            f"{one.rmse_c:.3f} K, {one.evidence_over_baseline:+.0f} nats",
+            (one.rmse_c, at),
             (5, 0),
             textcoords="offset points",
             va="center",
             fontsize=8,
             bbox=PAPER,
         )
-    axis.set_xlim(0, max(c["rmse_c"] for c in rows) * 1.3)
+    axis.set_xlim(0, max(one.rmse_c for one in rows) * 1.3)
     axis.set_xlabel("rms error, K (dashed: noise; red: before)", fontsize=9)
     axis.spines[["top", "right"]].set_visible(False)
     figure.tight_layout()
     return as_svg(figure)
 
 
-def cases(result: dict[str, Any]) -> str:
+def cases(told: results.SteadyDiagnosis) -> str:
     """Draw a steady table's cases: measured, model before, model after."""
-    listed = result["cases"]
+    listed = told.cases
     figure, axis = plt.subplots(figsize=(12, 0.34 * len(listed) + 1.2))
     y = np.arange(len(listed))[::-1]
     for key, colour, label, marker, size in (
@@ -276,9 +276,9 @@ def cases(result: dict[str, Any]) -> str:
         ("before_c", BEFORE, "model before", "o", 6),
         ("after_c", AFTER, "model after", "D", 5),
     ):
-        if key in listed[0]:
-            axis.plot([c[key] for c in listed], y, marker, color=colour, ms=size, label=label)
-    axis.set_yticks(y, [c["case"] for c in listed], fontsize=9)
+        if getattr(listed[0], key) is not results.UNSET:
+            axis.plot([getattr(one, key) for one in listed], y, marker, color=colour, ms=size, label=label)
+    axis.set_yticks(y, [one.case for one in listed], fontsize=9)
     axis.set_xlabel("temperature, °C", fontsize=9)
     axis.grid(alpha=0.25)
     axis.spines[["top", "right"]].set_visible(False)

@@ -2,36 +2,28 @@
 
 from __future__ import annotations
 
-import html
 import re
-from typing import Any
 
-from ..io.logs import CUT_SHORT
+from ..io import results
+from .page import cut_short, render
 
 BEGIN, END = "<!-- verified -->", "<!-- /verified -->"
 
 
-def with_verification(page: str, result: dict[str, Any]) -> str:
+def error_rows(before: results.ChipError, after: results.ChipError) -> list[tuple[str, str, str]]:
+    """Return the chip's error before and after, of all springs and of each, as rows of text."""
+    pairs = zip(before.rmse_per_spring_c, after.rmse_per_spring_c, strict=True)
+    rows = [("all springs", before.rmse_c, after.rmse_c), *((f"spring {k}", *one) for k, one in enumerate(pairs, 1))]
+    cell = lambda value: "–" if value is None else f"{value:.2f}"  # noqa: E731
+    return [(name, cell(a), cell(b)) for name, a, b in rows]
+
+
+def with_verification(page: str, verified: results.Verify) -> str:
     """Return a report with the chip's error before and after in it; what an earlier verification said is replaced."""
-    before, after = result["before"], result["after"]
-
-    def cell(value: float | None) -> str:
-        return "–" if value is None else f"{value:.2f}"
-
-    springs = zip(before["rmse_per_spring_c"], after["rmse_per_spring_c"], strict=True)
-    rows = [("all springs", before["rmse_c"], after["rmse_c"])]
-    rows += [(f"spring {k + 1}", a, b) for k, (a, b) in enumerate(springs)]
-    body = "".join(
-        f'<tr><td>{name}</td><td class="n">{cell(a)}</td><td class="n">{cell(b)}</td></tr>' for name, a, b in rows
-    )
-    log = html.escape(result["logs"][0]["file"])
-    bad = "<br>".join(html.escape(note) for note in result["logs"][0]["notes"] if CUT_SHORT in note)
-    first = f'<div class="warn bad">{log}: {bad}</div>' if bad else ""
-    section = (
-        f"{BEGIN}<h2>The chip on {log}, which the fit never saw</h2>{first}"
-        '<div class="table"><table><tr><th></th><th class="n">error as it was, K rms</th>'
-        f'<th class="n">with these settings, K rms</th></tr>{body}</table></div>{END}'
-    )
+    log = verified.logs[0]
+    bad = [f"{log.file}: {note}" for note in cut_short(log.notes)]
+    rows = error_rows(verified.before, verified.after)
+    section = BEGIN + render("verified.html", log=log, cut_short=bad, rows=rows) + END
     bare = re.sub(f"{BEGIN}.*?{END}", "", page, flags=re.S)
     at = bare.find("<h2")
     at = at if at >= 0 else bare.find("</main>")

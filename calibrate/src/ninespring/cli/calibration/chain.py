@@ -19,7 +19,7 @@ from ...export.settings import settings_of, together
 from ...find import diagnosis
 from ...find.plan import make_plan
 from ...infer.predict import chip_error
-from ...io import history
+from ...io import history, results
 from ...io.board import ROW_TIME, Board, send_settings, settings_that_differ
 from ...io.logs import Run, read_bytes, read_log, write_atomically
 from ...io.logs.mending import RUN_IN_S
@@ -27,7 +27,7 @@ from ...io.recording import LogFile, Recording, Step, record, script_lines, told
 from ...io.thermometers import Thermometers
 from ...model.models import Array, Model, model_text, read_model
 from ...say import page
-from ..console import checked, working
+from ..console import working
 from . import judged
 from .cut import left_of
 from .progress import Progress
@@ -302,25 +302,25 @@ class Calibration:
                 folder.mkdir(exist_ok=True)
                 write_atomically(
                     {
-                        folder / "diagnosis.json": checked(found.result),
+                        folder / "diagnosis.json": results.checked(found.told),
                         folder / "report.html": page.html_report(found, DIAGNOSIS),
                         folder / "model.toml": model_text(found.model),
                     }
                 )
-            result = found.result
+            told = found.told
             self.progress.keep(
                 "diagnose",
                 {
-                    "verdict": page.verdict(result),
-                    "findings": [list(one) for one in page.findings(result)],
-                    "doubts": result.get("doubts", []),
-                    "noise_c": result["baseline"]["noise_c"],
-                    "experiments": [one["separating_experiment"] for one in result["rivals"]],
+                    "verdict": page.verdict(told),
+                    "findings": [list(one) for one in page.findings(told)],
+                    "doubts": told.doubts,
+                    "noise_c": told.baseline.noise_c,
+                    "experiments": [one.separating_experiment for one in told.rivals],
                 },
                 f"{DIAGNOSIS}/model.toml",
             )
-            self._tell("diagnose", page.verdict(result))
-            for name, text in page.findings(result):
+            self._tell("diagnose", page.verdict(told))
+            for name, text in page.findings(told):
                 self._tell("", f"{name}: {text}")
         if doubts := self.progress.done["diagnose"]["doubts"]:
             self._refuse(f"the log is doubted: {'; '.join(doubts)}. Mend that, and begin another folder")
@@ -338,8 +338,8 @@ class Calibration:
             lines = settings_of(model).lines
             with working("verifying on the second run"):
                 errors = {
-                    "before": chip_error(model, old, runs),
-                    "after": chip_error(model, f"{old}\n{lines}", runs),
+                    "before": results.plain(chip_error(model, old, runs)),
+                    "after": results.plain(chip_error(model, f"{old}\n{lines}", runs)),
                 }
             self.progress.keep("verify", errors)
             self._tell(

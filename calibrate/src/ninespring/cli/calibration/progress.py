@@ -8,11 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from ...errors import InputError
+from ...io import results
 from ...io.logs import read_bytes, sha256_of, write_atomically
-from ..console import checked, result_of
 
 FILE = "calibration.json"
-NAME = "calibrate"
 
 
 class Progress:
@@ -34,17 +33,17 @@ class Progress:
                 )
             self._check_files()
         else:
-            self.data = result_of(NAME, options=given, board={}, done={}, refused="")
+            self.data = results.plain(results.Calibrate(options=given, board={}, done={}, refused=""))
 
     def _read(self) -> dict[str, Any]:
         try:
             data = json.loads(read_bytes(self._path))
-            if data["schema"] == f"ninespring.{NAME}/1":
-                checked(data)
-                return dict(data)
-        except Exception:  # whatever is wrong with it, it is not what was written here
-            pass
-        raise InputError("is no progress that `ninespring calibrate` wrote: give another folder", self._path)
+            results.read(results.Calibrate, data)
+        except (ValueError, TypeError):
+            raise InputError(
+                "is no progress that `ninespring calibrate` wrote: give another folder", self._path
+            ) from None
+        return dict(data)
 
     def _check_files(self) -> None:
         for step in self.done.values():
@@ -79,5 +78,10 @@ class Progress:
         self.data["refused"] = why
         self._write()
 
+    def text(self) -> str:
+        """Return it as it is written."""
+        results.read(results.Calibrate, self.data)
+        return json.dumps(self.data, indent=1, allow_nan=False) + "\n"
+
     def _write(self) -> None:
-        write_atomically({self._path: checked(self.data)})
+        write_atomically({self._path: self.text()})

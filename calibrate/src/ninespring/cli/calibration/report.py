@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import html
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import matplotlib
@@ -12,29 +10,19 @@ import matplotlib
 matplotlib.use("svg")
 import matplotlib.pyplot as plt
 import numpy as np
+from markupsafe import Markup
 
+from ...io import results
 from ...io.logs import read_log
 from ...model.models import Array
 from ...say.figures import AFTER, BEFORE, INK, MEASURED, as_svg
-from ...say.page import STYLE
+from ...say.page import render
+from ...say.verified import error_rows
 from .chain import DIAGNOSIS, OLD_SETTINGS, SETTINGS
 from .judged import believed
 from .progress import Progress
 
 COLOURS = [BEFORE, AFTER, "#8a6d3b"]
-
-
-def _e(text: object) -> str:
-    return html.escape(str(text))
-
-
-def _table(head: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
-    """Return a table whose first column is text and the others are numbers."""
-    cells = lambda row, tag: "".join(  # noqa: E731
-        f"<{tag}{' class=n' if k else ''}>{_e(cell)}</{tag}>" for k, cell in enumerate(row)
-    )
-    body = "".join(f"<tr>{cells(row, 'td')}</tr>" for row in rows)
-    return f'<div class="table"><table><tr>{cells(head, "th")}</tr>{body}</table></div>'
 
 
 def verdict(progress: Progress) -> str:
@@ -56,37 +44,25 @@ def verdict(progress: Progress) -> str:
 def page(progress: Progress, array: Array) -> str:
     """Return the report of what is done so far, as HTML."""
     done = progress.done
-    diagnosed = done["diagnose"]
-    bad = " bad" if progress.data["refused"] else ""
-    found = "".join(f"<li><b>{_e(name)}</b>{_e(text)}</li>" for name, text in diagnosed["findings"])
-    parts = [
-        "<h1>Calibration</h1>",
-        f'<p class="lead">{"<span class=" + chr(34) + "warn bad" + chr(34) + ">" if bad else ""}{_e(verdict(progress))}'
-        f"{'</span>' if bad else ''}</p>",
-    ]
     drives = [one for one in (done.get("before"), *done.get("after", {}).get("drives", [])) if one]
-    if drives:
-        parts += _drives(progress, array, drives)
-    parts.append(
-        f'<h2>What was found</h2><ul class="said">{found}</ul><p>{_e(diagnosed["verdict"])} '
-        f'<a href="{DIAGNOSIS}/report.html">The diagnosis in full</a>.</p>'
-    )
-    if diagnosed["experiments"]:
-        told = "".join(f"<li>{_e(one)}</li>" for one in diagnosed["experiments"])
-        parts.append(f"<p>These data cannot tell everything apart; what would:</p><ul>{told}</ul>")
-    if "verify" in done:
-        parts.append("<h2>On the second run, which the fit never saw</h2>" + _verified(done["verify"]))
-    if "export" in done:
-        parts += _settings(progress)
-    parts.append("<h2>What was measured</h2>" + _measured(progress))
-    parts.append(f"<p><small>{_e(progress.data['tool'])}; {_e(progress.data['board']['version'][0])}</small></p>")
-    return (
-        '<!doctype html><html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width">'
-        f"<title>Ninespring calibration</title><style>{STYLE}</style></head><body><main>{''.join(parts)}</main></body></html>\n"
+    return render(
+        "calibration.html",
+        title="Ninespring calibration",
+        refused=progress.data["refused"],
+        verdict=verdict(progress),
+        pattern=progress.option("pattern"),
+        drives=_drives(progress, array, drives) if drives else None,
+        diagnosed=done["diagnose"],
+        diagnosis=DIAGNOSIS,
+        verified=_verified(done["verify"]) if "verify" in done else None,
+        exported=_exported(progress) if "export" in done else None,
+        measured=_measured(progress),
+        tool=progress.data["tool"],
+        version=progress.data["board"]["version"][0],
     )
 
 
-def _drives(progress: Progress, array: Array, drives: Sequence[dict[str, Any]]) -> list[str]:
+def _drives(progress: Progress, array: Array, drives: Sequence[dict[str, Any]]) -> dict[str, Any]:
     names = ["as the board was", *(["with the new settings"] if len(drives) > 1 else [])]
     shown = [drives[0], *drives[-1:]] if len(drives) > 1 else [drives[0]]
     measures = (
@@ -97,17 +73,12 @@ def _drives(progress: Progress, array: Array, drives: Sequence[dict[str, Any]]) 
         ("hottest, degC", "hottest_c", "{:.0f}"),
         ("from the first current until all have transformed, s", "heating_s", "{:.0f}"),
     )
-    rows = [[label, *(form.format(one[key]).rstrip("%") for one in shown)] for label, key, form in measures]
-    faults = [f for one in drives for f in one["faults"]]
-    out = [f"<h2>The same drive before and after</h2><figure>{_picture(progress, array, shown, names)}"]
-    out.append(
-        "<figcaption>Grey: what the thermometers show of each spring; coloured: what the chip believed of it. "
-        f"Pattern {_e(progress.option('pattern'))}.</figcaption></figure>"
-    )
-    out.append(_table(["", *names], rows))
-    if faults:
-        out.append(f'<p class="warn bad">{"<br>".join(map(_e, faults))}</p>')
-    return out
+    return {
+        "figure": Markup(_picture(progress, array, shown, names)),
+        "header": ["", *names],
+        "rows": [[label, *(form.format(one[key]).rstrip("%") for one in shown)] for label, key, form in measures],
+        "faults": [fault for one in drives for fault in one["faults"]],
+    }
 
 
 def _picture(progress: Progress, array: Array, shown: Sequence[dict[str, Any]], names: Sequence[str]) -> str:
@@ -135,36 +106,30 @@ def _picture(progress: Progress, array: Array, shown: Sequence[dict[str, Any]], 
     return as_svg(figure)
 
 
-def _verified(errors: dict[str, Any]) -> str:
-    before, after = errors["before"], errors["after"]
-    cell = lambda value: "–" if value is None else f"{value:.2f}"  # noqa: E731
-    pairs = zip(before["rmse_per_spring_c"], after["rmse_per_spring_c"], strict=True)
-    rows = [["all springs", cell(before["rmse_c"]), cell(after["rmse_c"])]]
-    rows += [[f"spring {k}", cell(a), cell(b)] for k, (a, b) in enumerate(pairs, start=1)]
-    return _table(["the chip's model, error in K rms", "as the board was", "with what was found"], rows)
+def _verified(errors: dict[str, Any]) -> list[tuple[str, str, str]]:
+    return error_rows(*(results.read(results.ChipError, errors[when]) for when in ("before", "after")))
 
 
-def _settings(progress: Progress) -> list[str]:
+def _exported(progress: Progress) -> dict[str, Any]:
     export, had = progress.done["export"], progress.data["board"]["settings"]
     sent = {name: value for name, value in export["settings"].items() if float(had.get(name, "nan")) != float(value)}
-    out = ["<h2>What it means for the board</h2>"]
-    if sent:
-        out.append(_table(["setting", "it had", "was found"], [[f"${n}", had.get(n, "–"), v] for n, v in sent.items()]))
-    kept = "".join(f"<li>{_e(', '.join(names))}: {_e(why)}</li>" for why, names in export["kept"].items())
-    if kept:
-        out.append(f"<p>Not written, and why:</p><ul>{kept}</ul>")
-    folder: Path = progress.folder
-    out.append(
-        f"<p>{_e(SETTINGS)} holds what was found, {_e(OLD_SETTINGS)} what the board had before; either goes onto the board by</p>"
-        f"<pre>ninespring upload --port PORT {_e(folder / OLD_SETTINGS)}</pre>"
-    )
-    return out
+    return {
+        "sent": [(f"${name}", had.get(name, "–"), value) for name, value in sent.items()],
+        "kept": export["kept"],
+        "new": SETTINGS,
+        "old": OLD_SETTINGS,
+        "old_path": progress.folder / OLD_SETTINGS,
+    }
 
 
-def _measured(progress: Progress) -> str:
-    rows: list[list[object]] = []
-    for name in ("run1", "run2"):
-        for one in progress.done.get(name, {}).get("pieces", []):
-            note = one["ended"] or ("" if one["used"] else "too short to count")
-            rows.append([one["log"], f"{one['from_s']:.0f} to {one['to_s']:.0f}", one["rows"], note])
-    return _table(["log", "of its plan, s", "rows", ""], rows)
+def _measured(progress: Progress) -> list[tuple[object, ...]]:
+    return [
+        (
+            one["log"],
+            f"{one['from_s']:.0f} to {one['to_s']:.0f}",
+            one["rows"],
+            one["ended"] or ("" if one["used"] else "too short to count"),
+        )
+        for name in ("run1", "run2")
+        for one in progress.done.get(name, {}).get("pieces", [])
+    ]

@@ -9,9 +9,8 @@ from __future__ import annotations
 import functools
 import importlib
 import pkgutil
-from collections.abc import Mapping
-from typing import Any
 
+from ...io.results import Parameters
 from .. import native
 from . import runs_differ
 from .effect import Candidate as Candidate
@@ -32,7 +31,7 @@ def library() -> tuple[Effect, ...]:
     return tuple(sorted(known, key=lambda one: native.effect_names().index(one.name)))
 
 
-def sentence(name: str, parameters: Mapping[str, Any], variant: str = "") -> str:
+def sentence(name: str, parameters: Parameters, variant: str = "") -> str:
     """Return what was found of an effect, in words and sizes."""
     return next(one for one in (*library(), *runs_differ.EFFECTS) if one.name == name).sentence(parameters, variant)
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
 
+from ...io.results import Parameters
 from .. import native
 from ..spec import Free
 
@@ -122,12 +122,12 @@ class Effect:
     says: Callable[[Numbers, str], str] | None = None
     """What was found in one sentence: of the numbers' values with errors, and the variant."""
 
-    def sentence(self, parameters: Mapping[str, Mapping[str, Any]], variant: str) -> str:
-        """Return what was found, in words and sizes; parameters as diagnosis.json has them."""
-        numbers = {name: (float(one["value"]), one["stderr"]) for name, one in parameters.items()}
+    def sentence(self, parameters: Parameters, variant: str) -> str:
+        """Return what was found, in words and sizes."""
+        numbers = {name: (one.value, one.stderr) for name, one in parameters.items()}
         if self.says:
             return self.says(numbers, variant)
-        sizes = [sized(value, error, str(parameters[name]["unit"])) for name, (value, error) in numbers.items()]
+        sizes = [sized(value, error, parameters[name].unit) for name, (value, error) in numbers.items()]
         return (
             f"{self.name.replace('_', ' ').capitalize()}{f' ({variant})' if variant else ''}: {', '.join(sizes[:3])}."
         )
