@@ -67,10 +67,10 @@ def couplings(array_path: Path, mesh: str, output: Path, json_path: Path | None)
             seen.add(name)
             shown.add_row(
                 name,
-                f"{one['value']:.4g}",
-                f"{one['reduction_error']:.1g}",
-                f"{one['mesh_error'] or 0.0:.1g}",
-                one["unit"],
+                f"{one.value:.4g}",
+                f"{one.reduction_error:.1g}",
+                f"{one.mesh_error or 0.0:.1g}",
+                one.unit,
             )
     talk = beside(output)
     talk.print(shown)
