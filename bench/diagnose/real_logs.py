@@ -198,7 +198,7 @@ def board_alone(seed: int) -> dict[str, Any]:
         paths, _ = write_logs(replace(case, runs=[*case.runs, case.runs[1]]), Path(folder))[:2]
         board, later = (read_log(path, SPRINGS) for path in paths)
     board = replace(board, temperature_c=np.full_like(board.temperature_c, np.nan))
-    result, model = verdict_of_board.diagnose(Array(), [board])
+    told, model = verdict_of_board.diagnose(Array(), [board])
     structure = 0.0
     if what:
         problem, alone, _ = from_resistance.fit(Array(), [board])
@@ -213,7 +213,7 @@ def board_alone(seed: int) -> dict[str, Any]:
             settings, (3, 3), later.time_s, native.POWER, later.drive, power, later.fan, ambient, first
         )
         errors.append(float(np.sqrt(np.mean((shown - truth) ** 2))))
-    names = [e["name"] for e in result["effects"]]
+    names = [one.name for one in told.effects]
     return {"what": what, "names": names, "before": errors[0], "after": errors[1], "structure": structure}
 
 
