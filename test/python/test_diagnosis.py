@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 import json
-from dataclasses import replace
 from pathlib import Path
 
 import jsonschema
@@ -82,7 +81,9 @@ def test_what_is_not_believed_leaves_its_place_to_another(make_log, monkeypatch:
 
     def doubted(problem: Problem, fit: Fit, effect: str, *rest: object) -> Witness:
         judged.append(effect)
-        return replace(witness(problem, fit, effect, *rest), share=0.97 * (effect != "natural_convection"))
+        return msgspec.structs.replace(
+            witness(problem, fit, effect, *rest), share=0.97 * (effect != "natural_convection")
+        )
 
     monkeypatch.setattr(diagnosis, "witness", doubted)
     strong = {"natural_convection": {"convection_exponent": 0.25}}
