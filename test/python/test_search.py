@@ -15,6 +15,7 @@ from ninespring.infer.fit import Fit
 from ninespring.infer.predict import predict
 from ninespring.infer.problem import Problem
 from ninespring.infer.scene import scene_of
+from ninespring.io import results
 from ninespring.io.logs import log_text, read_log
 from ninespring.io.recording import script_lines
 from ninespring.model import effects, native
@@ -404,10 +405,10 @@ def test_a_model_with_effects_needs_no_other_on_the_log_it_came_from(make_log, t
 
 def test_every_effect_of_the_table_has_its_file_and_a_sentence() -> None:
     assert [one.name for one in effects.library()] == list(native.effect_names())
-    said = effects.sentence("sensor_lag", {"sensor_lag_s": {"value": 5.04, "stderr": 0.21, "unit": "s"}})
+    said = effects.sentence("sensor_lag", {"sensor_lag_s": results.Number(value=5.04, stderr=0.21, unit="s")})
     assert said == "The thermometers lag 5.0 s (+-0.2)."
     mismatch = {
-        f"{name}[4]": {"value": value, "stderr": 0.03, "unit": "1"}
+        f"{name}[4]": results.Number(value=value, stderr=0.03, unit="1")
         for name, value in (("loss_scale", 1.16), ("heat_capacity_scale", 1.01))
     }
     assert effects.sentence("spring_mismatch", mismatch, "spring 4") == "Spring 4 loses 16 % more (+-3)."
