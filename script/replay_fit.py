@@ -24,8 +24,8 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     import numpy as np
-    from ninespring.logs import Run
-    from ninespring.models import Model
+    from ninespring.io.logs import Run
+    from ninespring.model.models import Model
 
 ROOT = Path(__file__).resolve().parent.parent
 SKIPPED = 77  # what ctest counts as skipped
@@ -75,7 +75,7 @@ def convert(source: Path, target: Path, sha256: str) -> None:
 
 def model_of(values: list[float], errors: list[float] | None = None) -> Model:
     """The plain network with these numbers."""
-    from ninespring.models import Array, Model
+    from ninespring.model.models import Array, Model
 
     names = [free.name + (f"[{free.spring}]" if free.spring else "") for free in FREE]
     model = Model(Array(1, 2, sensor={"kind": "thermistor"}), parameters=dict(zip(names, values, strict=True)))
@@ -91,7 +91,7 @@ def model_of(values: list[float], errors: list[float] | None = None) -> Model:
 
 def replay(log: Run, model: Model) -> np.ndarray:
     """The on-chip model less what was measured, (rows, springs), degC."""
-    from ninespring.fit.predict import chip_lines, chip_trace
+    from ninespring.infer.predict import chip_lines, chip_trace
 
     return chip_trace(model, chip_lines(model)[0], log)[0] - log.temperature_c
 
@@ -163,8 +163,8 @@ def figure(text: str, rms_c: float) -> dict:
 
 
 def work(source: Path, folder: Path, json_path: Path | None) -> int:
-    from ninespring.logs import read_log, sha256_of
-    from ninespring.models import model_text
+    from ninespring.io.logs import read_log, sha256_of
+    from ninespring.model.models import model_text
 
     logs, models, figures = {}, {}, []
     for file in LOGS:

@@ -19,12 +19,12 @@ import numpy as np
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt
-from ninespring import importing
-from ninespring.fit.predict import predict
-from ninespring.logs import Run, read_log
-from ninespring.models import Array, Model
-from ninespring.verdict import diagnosis
-from ninespring.verdict.result import model_of
+from ninespring.find import diagnosis
+from ninespring.infer.predict import predict
+from ninespring.infer.result import model_of
+from ninespring.io import importing
+from ninespring.io.logs import Run, read_log
+from ninespring.model.models import Array, Model
 
 ROOT = Path(__file__).resolve().parent.parent
 DATA = ROOT / "data" / "tclab_doe"

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from cases import Case, make_case
 from kept import Kept
-from ninespring.fit import problem as fitting
+from ninespring.infer import problem as fitting
 from run import judge, named, ratio
 from world import COLUMNS, EFFECTS, ROWS, SPRINGS
 

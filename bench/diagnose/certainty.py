@@ -14,7 +14,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from ninespring.search.certainty import WEIGHTS, Witness
+from ninespring.find.certainty import WEIGHTS, Witness
 from scipy.optimize import minimize
 
 RIDGE = 0.05

@@ -17,14 +17,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from ninespring import native
 from ninespring.explore.couplings import fields_of, random_drive
 from ninespring.explore.field import MESHES
 from ninespring.explore.geometry import geometry_of
-from ninespring.fit.simulate import simulate_run
-from ninespring.logs import read_log
-from ninespring.models import Array
-from ninespring.verdict import diagnosis
+from ninespring.find import diagnosis
+from ninespring.io.logs import read_log
+from ninespring.model import native
+from ninespring.model.models import Array
+from ninespring.model.simulate import simulate_run
 
 COMMAND = "bench/diagnose/field.py"
 NOISE_C, AMBIENT_C, OHM = 0.3, 20.0, 0.219

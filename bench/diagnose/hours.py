@@ -21,14 +21,14 @@ import boards
 import numpy as np
 import pandas as pd
 from kept import Kept
-from ninespring import importing
-from ninespring.fit import problem as fitting
-from ninespring.fit.predict import predict
-from ninespring.logs import read_log
-from ninespring.logs.run import Run
-from ninespring.models import Array, Model
-from ninespring.verdict import diagnosis
-from ninespring.verdict.result import model_of
+from ninespring.find import diagnosis
+from ninespring.infer import problem as fitting
+from ninespring.infer.predict import predict
+from ninespring.infer.result import model_of
+from ninespring.io import importing
+from ninespring.io.logs import read_log
+from ninespring.io.logs.run import Run
+from ninespring.model.models import Array, Model
 from paper import data
 from tclab import LOGS, textbook
 from tell import Figures, tell

@@ -11,8 +11,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from ninespring.models import Array
-from ninespring.verdict import steady
+from ninespring.find import steady
+from ninespring.io import results
+from ninespring.model.models import Array
+from ninespring.say import page
 
 COMMAND = "python bench/diagnose/measured.py"
 ROOT = Path(__file__).resolve().parents[2]
@@ -31,12 +33,12 @@ def section() -> tuple[str, list[dict[str, Any]]]:
     table = data() / "paper" / "steady.csv"
     camera = steady.paper_states(table, "camera")
     comsol = steady.paper_states(table, "comsol")
-    result = steady.diagnose_states(Array(), {}, camera)
+    told = steady.diagnose_states(Array(), {}, camera)
     fitted = float((steady.errors(Array(), {}, {}, comsol) ** 2).mean() ** 0.5)
     # the same six model values against the camera's, hot springs at 105 as in COMSOL
     as_comsol = [replace(c, hold_c=k.hold_c) for c, k in zip(camera, comsol, strict=True)]
     at_105 = float((steady.errors(Array(), {}, {}, as_comsol) ** 2).mean() ** 0.5)
-    before = result["baseline"]["rmse_c"]
+    before = told.baseline.rmse_c
     lines = [
         "### The paper: six camera values against the model of its six COMSOL values",
         "",
@@ -46,24 +48,24 @@ def section() -> tuple[str, list[dict[str, Any]]]:
             "Every effect of the library with one number, hot springs at 99, best first:"
         ),
         "",
-        "| " + " | ".join(steady.HEADER) + " |",
-        "|" + "---|" * len(steady.HEADER),
+        "| " + " | ".join(page.HEADER) + " |",
+        "|" + "---|" * len(page.HEADER),
     ]
-    lines += ["| " + " | ".join(row) + " |" for row in steady.candidate_rows(result)]
+    lines += ["| " + " | ".join(row) + " |" for row in page.candidate_rows(told)]
     lines += ["", "| case | camera | declared | with the best |", "|---|---|---|---|"]
-    for case in result["cases"]:
-        after = case.get("after_c", float("nan"))
-        lines.append(f"| {case['case']} | {case['measured_c']:.0f} | {case['before_c']:.1f} | {after:.1f} |")
-    if result["rivals"]:
+    for case in told.cases:
+        after = float("nan") if case.after_c is results.UNSET else case.after_c
+        lines.append(f"| {case.case} | {case.measured_c:.0f} | {case.before_c:.1f} | {after:.1f} |")
+    if told.rivals:
         lines += [
             "",
             "Six numbers cannot separate these; the experiment that would, computed with both fitted models:",
             "",
         ]
-        for rival in result["rivals"]:
+        for rival in told.rivals:
             lines.append(
-                f"- {rival['instead_of']} or {rival['name']} (behind by {rival['evidence']:.1f} nats): "
-                f"{rival['separating_experiment']}."
+                f"- {rival.instead_of} or {rival.name} (behind by {rival.evidence:.1f} nats): "
+                f"{rival.separating_experiment}."
             )
     figures = [
         (
@@ -73,11 +75,11 @@ def section() -> tuple[str, list[dict[str, Any]]]:
         ),
         ("paper: the same, hot springs at 99", before, ""),
         (
-            f"paper: with {result['effects'][0]['name']}, one number",
-            result["after"]["rmse_c"],
+            f"paper: with {told.effects[0].name}, one number",
+            told.after.rmse_c,
             "",
         ),
-        ("paper: the same, left one out", result["after"]["holdout_rmse_c"], ""),
+        ("paper: the same, left one out", told.after.holdout_rmse_c, ""),
     ]
     return "\n".join(lines) + "\n", [
         {

@@ -25,18 +25,18 @@ import numpy as np
 import pandas as pd
 from cases import REPORTING_SEEDS, SPRINGS, Case, effect_numbers, make_case, write_logs
 from kept import Kept
-from ninespring import native, plan
 from ninespring.export import drive
 from ninespring.export.settings import settings_of
-from ninespring.fit import from_resistance
-from ninespring.fit import problem as fitting
-from ninespring.logs import log_text, read_log
-from ninespring.logs.run import Run
-from ninespring.models import Array, Model
-from ninespring.recording import script_lines
-from ninespring.search.evidence import excess
-from ninespring.verdict import board_alone as verdict_of_board
-from ninespring.verdict import diagnosis
+from ninespring.find import board_alone as verdict_of_board
+from ninespring.find import diagnosis, plan
+from ninespring.find.evidence import excess
+from ninespring.infer import from_resistance
+from ninespring.infer import problem as fitting
+from ninespring.io.logs import log_text, read_log
+from ninespring.io.logs.run import Run
+from ninespring.io.recording import script_lines
+from ninespring.model import native
+from ninespring.model.models import Array, Model
 from tell import Figures, tell
 from world import Inputs, World, random_inputs, simulate
 
@@ -198,7 +198,7 @@ def board_alone(seed: int) -> dict[str, Any]:
         paths, _ = write_logs(replace(case, runs=[*case.runs, case.runs[1]]), Path(folder))[:2]
         board, later = (read_log(path, SPRINGS) for path in paths)
     board = replace(board, temperature_c=np.full_like(board.temperature_c, np.nan))
-    result, model = verdict_of_board.diagnose(Array(), [board])
+    told, model = verdict_of_board.diagnose(Array(), [board])
     structure = 0.0
     if what:
         problem, alone, _ = from_resistance.fit(Array(), [board])
@@ -213,7 +213,7 @@ def board_alone(seed: int) -> dict[str, Any]:
             settings, (3, 3), later.time_s, native.POWER, later.drive, power, later.fan, ambient, first
         )
         errors.append(float(np.sqrt(np.mean((shown - truth) ** 2))))
-    names = [e["name"] for e in result["effects"]]
+    names = [one.name for one in told.effects]
     return {"what": what, "names": names, "before": errors[0], "after": errors[1], "structure": structure}
 
 

@@ -30,15 +30,14 @@ from cases import (
     write_logs,
 )
 from kept import Kept
-from ninespring import native
-from ninespring.effects import candidates
-from ninespring.fit import problem as fitting
-from ninespring.fit.simulate import simulate_run
-from ninespring.logs import read_log
-from ninespring.models import Array
-from ninespring.search import search
-from ninespring.search.evidence import excess
-from ninespring.verdict import diagnosis
+from ninespring.find import diagnosis, search
+from ninespring.find.evidence import excess
+from ninespring.infer import problem as fitting
+from ninespring.io.logs import read_log
+from ninespring.model import native
+from ninespring.model.effects import candidates
+from ninespring.model.models import Array
+from ninespring.model.simulate import simulate_run
 from world import EFFECTS, OUTSIDE
 
 MATTERS = 0.5

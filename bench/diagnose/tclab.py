@@ -9,11 +9,11 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from ninespring import importing
-from ninespring.fit.problem import BLOCK_S
-from ninespring.logs import read_log
-from ninespring.models import Array, Model
-from ninespring.verdict import diagnosis, residual
+from ninespring.find import diagnosis
+from ninespring.infer.problem import BLOCK_S
+from ninespring.io import importing
+from ninespring.io.logs import read_log
+from ninespring.model.models import Array, Model
 from paper import COMMAND, data
 
 LOGS = (
@@ -76,8 +76,7 @@ def section() -> tuple[str, list[dict[str, Any]]]:
             path = Path(temporary) / f"{name}.csv"
             path.write_text(importing.import_table(folder / file, mapping))
             run = read_log(path, 2)
-        diagnosed = diagnosis.diagnose(Array(1, 2), [run], model=textbook())
-        found = diagnosed.result
+        found = diagnosis.diagnose(Array(1, 2), [run], model=textbook()).result
         base = found["baseline"]
         lines.append(
             f"| {name} | {base['noise_c']:.3f} | declared | {base['rmse_c']:.3f} | {base['holdout_rmse_c']:.3f} | | {scale} |"
@@ -110,12 +109,6 @@ def section() -> tuple[str, list[dict[str, Any]]]:
             said += (
                 f" Structure of {found['residual']['structure_c']:.2f} K rms remains above the sensor's noise. "
                 + found["residual"]["note"].split(". ", 1)[-1]
-            )
-            empirical = residual.surrogate(diagnosed.problem, diagnosed.final)
-            said += (
-                f" How much of it the drives could still explain: an empirical model of them, filtered by 3 to 300 s, takes "
-                f"{empirical['holdout_before_c']:.3f} to {empirical['holdout_after_c']:.3f} K held out; "
-                "the rest is in nothing that was logged."
             )
         bounds = found["identifiability"]["at_bounds"]
         if bounds:

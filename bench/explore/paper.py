@@ -14,14 +14,14 @@ import json
 from pathlib import Path
 
 import numpy as np
-from ninespring import native
 from ninespring.errors import InputError
 from ninespring.explore.couplings import fields_of, model_of, plant_of
 from ninespring.explore.field import MESHES
 from ninespring.explore.geometry import geometry_of
 from ninespring.explore.lumped import lumped_of
 from ninespring.explore.modes import Modes
-from ninespring.models import Array
+from ninespring.model import native
+from ninespring.model.models import Array
 
 HOT_C, AMBIENT_C, CENTRE = 105.0, 20.0, 4
 COMSOL = {(4, 0): 52, (4, 1): 42, (5, 0): 45, (5, 1): 35, (6, 0): 40, (6, 1): 31}

@@ -205,8 +205,8 @@ def which(work: Path) -> Any:
 
 def stiffness(work: Path) -> Any:
     """Draw both layers after four minutes, by the commands of the page."""
-    from ninespring import plotting
-    from ninespring.logs import read_log
+    from ninespring.io.logs import read_log
+    from ninespring.say import plotting
 
     folder = work / "stiffness"
     folder.mkdir(exist_ok=True)

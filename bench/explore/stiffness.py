@@ -16,7 +16,7 @@ from typing import Any
 from ninespring.explore.couplings import couplings
 from ninespring.explore.point import metrics_of
 from ninespring.explore.spec import Spec
-from ninespring.models import read_array
+from ninespring.model.models import read_array
 
 ROOT = Path(__file__).resolve().parents[2]
 AUSTENITE_START_C = 88

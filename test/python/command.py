@@ -10,7 +10,7 @@ from contextlib import redirect_stderr, redirect_stdout
 from io import StringIO
 from unittest.mock import patch
 
-from ninespring import cli
+from ninespring.cli import main as cli
 
 
 def ninespring(*words: object) -> subprocess.CompletedProcess[str]:

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ninespring import native
-from ninespring.logs import log_text
+from ninespring.io.logs import log_text
+from ninespring.model import native
 
 Make = Callable[..., Path]
 

@@ -1,5 +1,5 @@
 # Runs pytest where the package is installed; says loudly where it is not.
-execute_process(COMMAND ${PYTHON} -c "import ninespring.native, pytest; ninespring.native.library()"
+execute_process(COMMAND ${PYTHON} -c "import ninespring.model.native as n, pytest; n.library()"
                 RESULT_VARIABLE missing OUTPUT_QUIET ERROR_QUIET)
 if(missing)
     message(STATUS "SKIPPED: ninespring is not installed for ${PYTHON}: run script/setup")

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from command import ninespring
 from fake_board import FakeBoard, row
-from ninespring.cli import cli
+from ninespring.cli.main import COMMANDS
 
 ROOT = Path(__file__).resolve().parents[2]
 SIM = Path(os.environ.get("NINESPRING_SIM", ROOT / "build" / "host" / "ninespring-sim"))
@@ -187,5 +187,5 @@ def test_every_command_stands_on_the_page_about_python() -> None:
     only = set(
         re.findall(r"`?(\w+)", page[page.index("\n| command") :].partition("\n\n")[2].partition("commands only")[0])
     )
-    for name in cli.commands:
+    for name in COMMANDS:
         assert name in told | only | called, f"docs/python.md does not say how `{name}` is called"

@@ -10,17 +10,17 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from command import ninespring
-from ninespring import ranges
-from ninespring.cli import cli
-from ninespring.console import Real, Whole
-from ninespring.logs import kind_of, write_atomically
-from ninespring.models import Array, Model, model_text
-from ninespring.recording import LogFile
+from ninespring.cli.console import Real, Whole
+from ninespring.cli.main import COMMANDS, cli
+from ninespring.io import ranges
+from ninespring.io.logs import kind_of, write_atomically
+from ninespring.io.recording import LogFile
+from ninespring.model.models import Array, Model, model_text
 
 NUMBERS = [
     (name, one)
-    for name, command in cli.commands.items()
-    for one in command.params
+    for name in COMMANDS
+    for one in cli.get_command(click.Context(cli), name).params
     if isinstance(one, click.Option) and isinstance(one.type, click.types.IntParamType | click.types.FloatParamType)
 ]
 

@@ -17,8 +17,8 @@ from pathlib import Path
 import command
 import numpy as np
 import pytest
-from ninespring.board import Board
-from ninespring.logs import read_log, read_table
+from ninespring.io.board import Board
+from ninespring.io.logs import read_log, read_table
 from websockets.sync.client import connect
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -11,10 +11,11 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
-from ninespring import bringup, cli
-from ninespring.board import PATIENCE, Board
-from ninespring.bringup import converse, do_step
+from ninespring.cli import main as cli
 from ninespring.errors import InputError
+from ninespring.io import bringup
+from ninespring.io.board import PATIENCE, Board
+from ninespring.io.bringup import converse, do_step
 
 ROOT = Path(__file__).resolve().parents[2]
 SIM = Path(os.environ.get("NINESPRING_SIM", ROOT / "build" / "host" / "ninespring-sim"))

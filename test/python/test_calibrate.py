@@ -15,17 +15,17 @@ import click
 import pytest
 from click.testing import CliRunner
 from fake_board import FakeBoard
-from ninespring.board import Board
-from ninespring.calibration import chain, judged
-from ninespring.calibration.chain import Calibration
-from ninespring.calibration.command import FROM
-from ninespring.calibration.cut import left_of
-from ninespring.calibration.progress import Progress
-from ninespring.cli import cli
+from ninespring.cli.calibrate import FROM
+from ninespring.cli.calibration import chain, judged
+from ninespring.cli.calibration.chain import Calibration
+from ninespring.cli.calibration.cut import left_of
+from ninespring.cli.calibration.progress import Progress
+from ninespring.cli.main import cli
 from ninespring.errors import InputError, WorkError
 from ninespring.export.drive import Drive
-from ninespring.models import Array
-from ninespring.recording import Fault, Recording, Step
+from ninespring.io.board import Board
+from ninespring.io.recording import Fault, Recording, Step
+from ninespring.model.models import Array
 
 ROOT = Path(__file__).resolve().parents[2]
 SIM = Path(os.environ.get("NINESPRING_SIM", ROOT / "build" / "host" / "ninespring-sim"))

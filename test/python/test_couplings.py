@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from ninespring import cli
+from ninespring.cli import main as cli
 from ninespring.errors import InputError
 from ninespring.explore import closed_forms, couplings, geometry
-from ninespring.explore.cooling import Cooling
 from ninespring.explore.field import Mesh, screening_length
-from ninespring.models import Array, read_array, read_model
+from ninespring.model.cooling import Cooling
+from ninespring.model.models import Array, read_array, read_model
 
 pytest.importorskip("skfem", reason="SKIPPED: scikit-fem is missing: pip install 'ninespring[explore]'")
 pytest.importorskip("gmsh", reason="SKIPPED: gmsh is missing: pip install 'ninespring[explore]'", exc_type=Exception)

@@ -22,9 +22,10 @@ from typing import Any
 import numpy as np
 import pytest
 from fake_board import FakeBoard, row
-from ninespring.belief import Belief, beliefs
-from ninespring.dashboard import server, source, words
-from ninespring.logs import read_log, read_table
+from ninespring.dashboard import server, source
+from ninespring.io import words
+from ninespring.io.belief import Belief, beliefs
+from ninespring.io.logs import read_log, read_table
 from playwright.sync_api import Browser, Page, expect, sync_playwright
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect

@@ -3,21 +3,28 @@
 from __future__ import annotations
 
 import copy
-from dataclasses import replace
+import json
+from pathlib import Path
 
 import jsonschema
+import msgspec
+import ninespring
 import numpy as np
 import pytest
-from ninespring import native
 from ninespring.export.settings import left_out
-from ninespring.fit.declared import base_spec
-from ninespring.fit.predict import plant_of, predict
-from ninespring.fit.problem import Problem
-from ninespring.fit.spec import Fit
-from ninespring.logs import read_log
-from ninespring.models import Array, model_text, read_model
-from ninespring.search.certainty import CERTAIN, Witness, witness
-from ninespring.verdict import diagnosis
+from ninespring.find import diagnosis
+from ninespring.find.certainty import CERTAIN, Witness, witness
+from ninespring.infer.declared import base_spec
+from ninespring.infer.fit import Fit
+from ninespring.infer.predict import plant_of, predict
+from ninespring.infer.problem import Problem
+from ninespring.io import results
+from ninespring.io.logs import read_log
+from ninespring.model import native
+from ninespring.model.models import Array, model_text, read_model
+
+HOME = Path(ninespring.__file__).parent
+PUBLISHED = jsonschema.Draft202012Validator(json.loads((HOME / "diagnosis.schema.json").read_text()))
 
 
 def names(result: dict) -> list[str]:
@@ -55,7 +62,7 @@ def test_the_missing_effect_is_named_with_its_number(make_log, effect: str, numb
     first = next(iter(numbers))
     assert fitted[first]["value"] == pytest.approx(numbers[first], rel=0.15)
     assert result["after"]["holdout_rmse_c"] < 1.1 * 0.3
-    diagnosis.validate(result)
+    PUBLISHED.validate(result)
     on_chip = effect not in left_out(found.model)
     assert (effect in found.model.effects) and result["effects"][0]["on_chip"] == on_chip
 
@@ -74,7 +81,9 @@ def test_what_is_not_believed_leaves_its_place_to_another(make_log, monkeypatch:
 
     def doubted(problem: Problem, fit: Fit, effect: str, *rest: object) -> Witness:
         judged.append(effect)
-        return replace(witness(problem, fit, effect, *rest), share=0.97 * (effect != "natural_convection"))
+        return msgspec.structs.replace(
+            witness(problem, fit, effect, *rest), share=0.97 * (effect != "natural_convection")
+        )
 
     monkeypatch.setattr(diagnosis, "witness", doubted)
     strong = {"natural_convection": {"convection_exponent": 0.25}}
@@ -123,10 +132,27 @@ def test_numbers_the_data_cannot_fix_are_reported(make_log) -> None:
 
 def test_the_schema_refuses_what_is_not_a_diagnosis(make_log) -> None:
     result = diagnosis.diagnose(Array(), [read_log(make_log(seconds=300))]).result
-    broken = copy.deepcopy(result)
-    broken["effects"] = [{"name": "ghost"}]
+    PUBLISHED.validate(result)
     with pytest.raises(jsonschema.ValidationError):
-        diagnosis.validate(broken)
+        PUBLISHED.validate(result | {"effects": [{"name": "ghost"}]})
+
+
+def test_what_is_written_is_held_to_its_units_and_ranges() -> None:
+    number = results.Number(value=1.0, stderr=-0.1, unit="J")
+    with pytest.raises(msgspec.ValidationError, match="stderr"):
+        results.checked(number)
+    assert results.plain(results.Number(value=np.float64(1.0), stderr=None, unit="J")) == {
+        "value": 1.0,
+        "stderr": None,
+        "unit": "J",
+    }
+
+
+def test_the_published_schemas_are_those_of_the_results() -> None:
+    """`script/schemas` writes them."""
+    for name, text in results.schemas().items():
+        assert (HOME / name).read_text() == text, "run script/schemas"
+        jsonschema.Draft202012Validator.check_schema(json.loads(text))
 
 
 def test_the_model_file_is_read_back_and_predicts(make_log, tmp_path) -> None:
@@ -175,15 +201,36 @@ def test_simulations_in_threads_give_the_same_as_alone(make_log) -> None:
 
 
 def test_what_the_same_readings_say_of_another_is_not_certain() -> None:
-    edge = {"name": "edge_loss", "probability": 0.99, "certainty": "certain", "text": "Outer springs lose 23 % less."}
-    number = {"unit": "1", "stderr": 0.001}
-    middle = {"loss_scale[5]": number | {"value": 1.3}, "heat_capacity_scale[5]": number | {"value": 1.0}}
-    rival = {"instead_of": "edge_loss", "name": "spring_mismatch", "variant": "spring 5", "parameters": middle}
+    def number(value: float) -> results.Number:
+        return results.Number(value=value, stderr=0.001, unit="1")
+
+    middle = {"loss_scale[5]": number(1.3), "heat_capacity_scale[5]": number(1.0)}
     for evidence, apart_c, shared in ((3.7, 0.0003, True), (30.0, 0.0003, False), (3.7, 0.3, False)):
-        entry = dict(edge)
-        diagnosis.share_with([entry], [rival | {"evidence": evidence, "predictions_differ_c": apart_c}], 0.06)
-        assert (entry["certainty"] == "probable" and entry["probability"] < 0.5) == shared
-        assert ("Or: Spring 5 loses 30" in entry["text"] and "only in combination" in entry["text"]) == shared
+        entry = results.Effect(
+            name="edge_loss",
+            rmse_c=0.3,
+            holdout_rmse_c=0.3,
+            evidence=100.0,
+            parameters={},
+            on_chip=True,
+            in_words="",
+            probability=0.99,
+            certainty="certain",
+            text="Outer springs lose 23 % less.",
+        )
+        rival = results.Rival(
+            instead_of="edge_loss",
+            name="spring_mismatch",
+            variant="spring 5",
+            rmse_c=0.3,
+            evidence=evidence,
+            predictions_differ_c=apart_c,
+            parameters=middle,
+            separating_experiment="none",
+        )
+        diagnosis.share_with([entry], [rival], 0.06)
+        assert (entry.certainty == "probable" and entry.probability < 0.5) == shared
+        assert ("Or: Spring 5 loses 30" in entry.text and "only in combination" in entry.text) == shared
 
 
 def test_an_effect_with_a_number_at_its_bound_is_never_certain(make_log) -> None:

@@ -8,15 +8,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from ninespring import native
-from ninespring.cli import cli
+from ninespring.cli.main import cli
 from ninespring.errors import InputError, WorkError
 from ninespring.export import drive
 from ninespring.export.settings import judged, left_out, settings_of, together
-from ninespring.fit.predict import predict_by_chip
-from ninespring.logs import read_log, write_atomically
-from ninespring.models import Array, Model, model_text, read_model
-from ninespring.verdict import diagnosis
+from ninespring.find import diagnosis
+from ninespring.infer.predict import predict_by_chip
+from ninespring.io import results
+from ninespring.io.logs import read_log, write_atomically
+from ninespring.model import native
+from ninespring.model.models import Array, Model, model_text, read_model
 
 
 def run(*words: object) -> str:
@@ -130,7 +131,7 @@ def test_settings_that_drive_worse_are_refused_and_written_only_by_force(
     path, out = wrong(tmp_path), tmp_path / "s.txt"
     made = settings_of(read_model(path))
     made.written |= {"loss_w_per_k": "0.002000"}  # too little power to hold anything
-    monkeypatch.setattr("ninespring.export.settings.settings_of", lambda model: made)
+    monkeypatch.setattr("ninespring.export.drive.settings_of", lambda model: made)
     with pytest.raises(WorkError) as refused:
         run("export", "--model", path, "-o", out)
     assert "would drive worse" in str(refused.value) and not out.exists()
@@ -311,11 +312,19 @@ def test_a_link_stays_a_link_a_device_a_device_and_a_dash_is_standard_output(
 def test_one_judgement_says_what_goes_into_the_chip_and_how_to_have_it_go(tmp_path: Path) -> None:
     for hottest_c, goes in ((95.0, True), (91.5, False)):
         model = transforming(hottest_c)
-        listed = [{"name": "latent_heat"}]
-        judged(listed, model)
-        assert listed[0]["on_chip"] == goes == ("latent_heat" not in left_out(model))
+        one = results.Effect(
+            name="latent_heat",
+            rmse_c=0.3,
+            holdout_rmse_c=0.3,
+            evidence=100.0,
+            parameters={},
+            on_chip=not goes,
+            in_words="",
+        )
+        judged([one], model)
+        assert one.on_chip == goes == ("latent_heat" not in left_out(model))
         assert goes == ("latent_heat_j" in settings_of(model).written)
-    said = listed[0]["why_not_on_chip"]
+    said = one.why_not_on_chip
     words = said[said.index("ninespring plan") :].split()[1:]
     (tmp_path / "model.toml").write_text(model_text(model))
     words = [str(tmp_path / one) if "." in one else one for one in words]

@@ -8,16 +8,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from ninespring import effects, native
-from ninespring.fit import statistics
-from ninespring.fit.declared import base_spec
-from ninespring.fit.problem import FOLDS, Problem, fold_of_rows
-from ninespring.fit.spec import Fit
-from ninespring.logs import read_log
-from ninespring.logs.run import Run
-from ninespring.models import Array
-from ninespring.search import evidence, search
-from ninespring.verdict import diagnosis
+from ninespring.find import diagnosis, evidence, search
+from ninespring.infer.declared import base_spec
+from ninespring.infer.fit import Fit
+from ninespring.infer.problem import FOLDS, Problem, fold_of_rows
+from ninespring.infer.scene import scene_of
+from ninespring.io import statistics
+from ninespring.io.logs import read_log
+from ninespring.io.logs.run import Run
+from ninespring.model import effects, native
+from ninespring.model.models import Array
 
 TRUE = {
     "heat_capacity_j_per_k": 0.3,
@@ -81,7 +81,9 @@ def test_held_out_blocks_are_not_fitted(make_log) -> None:
     clean = problem.holdout_rmse(fit)
     assert clean == pytest.approx(0.05, rel=0.1)
     # a number that is free in one block only: fitted in sample, unknown when the block is left out
-    drift = next(c for c in effects.candidates(problem) if c.effect == "ambient_drift" and c.variant == "free")
+    drift = next(
+        c for c in effects.candidates(scene_of(problem)) if c.effect == "ambient_drift" and c.variant == "free"
+    )
     spec = fit.spec.with_effect("ambient_drift", drift.free, drift.fixed, "free")
     run.temperature_c[at] += 2.0
     freer = problem.fit(spec, fit.as_dict())
@@ -146,7 +148,7 @@ def test_values_that_the_plant_refuses_are_merely_bad(make_log) -> None:
 def test_bounds_hold_and_are_reported(make_log) -> None:
     problem = Problem(Array(), [read_log(make_log(effects={"edge_loss": {"edge_loss_fraction": -0.2}}))])
     spec = base_spec(problem)
-    side = next(c for c in effects.candidates(problem) if c.variant == "per free side")
+    side = next(c for c in effects.candidates(scene_of(problem)) if c.variant == "per free side")
     spec = spec.with_effect(side.effect, side.free, (), side.variant)
     fit = problem.fit(spec)
     low = next(f.low for f in side.free)
@@ -183,7 +185,7 @@ def test_springs_start_where_the_sensors_would_show_the_first_row() -> None:
 def test_a_number_that_explains_nothing_costs(make_log) -> None:
     problem = Problem(Array(), [read_log(make_log(seed=2))])
     base = diagnosis.first_fit(problem, base_spec(problem))
-    known = effects.candidates(problem)
+    known = effects.candidates(scene_of(problem))
     found = search.Search(problem, known, base)
     lag = next(c for c in known if c.effect == "sensor_lag")
     spare = found.refit(base, [lag], [0.1])

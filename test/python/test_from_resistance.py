@@ -8,13 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from ninespring import native
-from ninespring.cli import cli
+from ninespring.cli.main import cli
 from ninespring.errors import InputError
-from ninespring.fit import from_resistance
-from ninespring.logs import log_text, read_log
-from ninespring.models import Array, read_model
-from ninespring.verdict import board_alone
+from ninespring.find import board_alone
+from ninespring.infer import from_resistance
+from ninespring.io import results
+from ninespring.io.logs import log_text, read_log
+from ninespring.model import native
+from ninespring.model.models import Array, read_model
+from ninespring.say import page
 
 TRUE = {"heat_capacity_j_per_k": 0.34, "loss_w_per_k": 0.0052, "orthogonal_w_per_k": 0.0007, "latent_heat_j": 7.5}
 
@@ -128,18 +130,20 @@ def test_a_board_alone_tells_a_contact_that_got_worse(tmp_path: Path) -> None:
     assert run.current_a is not None and run.voltage_v is not None
     run.voltage_v[300:, 3] += 0.02 * run.current_a[300:, 3]
     run.drive[:, 3] = run.current_a[:, 3] * run.voltage_v[:, 3]
-    result, model = board_alone.diagnose(Array(), [run])
+    told, model = board_alone.diagnose(Array(), [run])
+    result = results.plain(told)
     (contact,) = result["effects"]
     assert contact["name"] == "contact_resistance" and contact["variant"].startswith("spring 4, from 3")
     assert contact["parameters"]["contact_ohm[4]"]["value"] == pytest.approx(0.02, rel=0.1)
-    assert not result["unexplained"] and "Missing: contact_resistance" in board_alone.verdict(result)
+    assert not result["unexplained"] and "Missing: contact_resistance" in page.board_verdict(told)
     assert model.parameters["loss_w_per_k"] == pytest.approx(TRUE["loss_w_per_k"], rel=0.05)
 
 
 def test_a_board_alone_tells_a_resistance_that_rises_with_temperature(tmp_path: Path) -> None:
     rises = {"resistance_martensite_rise_per_k": 8e-4, "resistance_austenite_rise_per_k": 8e-4}
     path = board_log(tmp_path / "board.csv", effects={"resistance_temperature": rises})
-    result, model = board_alone.diagnose(Array(), [read_log(path, or_resistance=True)])
+    told, model = board_alone.diagnose(Array(), [read_log(path, or_resistance=True)])
+    result = results.plain(told)
     (rise,) = result["effects"]
     assert rise["name"] == "resistance_temperature" and not result["unexplained"]
     for name, value in rises.items():

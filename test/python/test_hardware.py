@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from ninespring import bringup
+from ninespring.io import bringup
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "hardware"))

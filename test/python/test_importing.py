@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
-from ninespring import importing
 from ninespring.errors import InputError
-from ninespring.logs import log_text, read_log, read_table
+from ninespring.io import importing
+from ninespring.io.logs import log_text, read_log, read_table
 
 fuzzed = settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
@@ -122,6 +122,7 @@ def test_wrong_mappings_and_loggers_are_refused_where_they_are_wrong(
 
 @fuzzed
 @given(st.text(alphabet='t/min;heatp,0123456789.-\n#[]="{}', max_size=200), st.booleans())
+@example('"0\n0"', False)
 def test_any_text_is_imported_or_refused_with_one_line(tmp_path: Path, text: str, as_mapping: bool) -> None:
     good_logger = "t/min;heat;temp\n0;1;68\n"
     (tmp_path / "map.toml").write_text("[columns]\n" + text if as_mapping else MAP)

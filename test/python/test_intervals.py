@@ -9,9 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from ninespring.cli import cli
-from ninespring.fit.intervals import correlations, intervals
-from ninespring.fit.spec import Fit, Free, Spec
+from ninespring.cli.main import cli
+from ninespring.infer.fit import Fit
+from ninespring.infer.intervals import correlations, intervals
+from ninespring.model.spec import Free, Spec
 
 FREE = (
     Free("loss", 0.006, 0.001, 0.1, "W/K", log=True),

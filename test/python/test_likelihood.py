@@ -6,9 +6,10 @@ import math
 
 import numpy as np
 import pytest
-from ninespring.fit import room, statistics
-from ninespring.fit.likelihood import BROKEN, Colour, Rows, fitted
-from ninespring.logs.run import Run
+from ninespring.infer import room
+from ninespring.infer.likelihood import BROKEN, Colour, Rows, fitted
+from ninespring.io import statistics
+from ninespring.io.logs.run import Run
 
 
 def lasting(rng: np.random.Generator, rows: int, columns: int, sigma: float, time_s: float) -> np.ndarray:

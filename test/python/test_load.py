@@ -6,14 +6,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ninespring import native
 from ninespring.errors import InputError
 from ninespring.export.settings import settings_of
-from ninespring.fit.predict import predict
-from ninespring.fit.simulate import LOAD_STEP_N, load_changes, simulate_run
-from ninespring.logs import log_text, read_log
-from ninespring.models import Array, model_text, read_model
-from ninespring.verdict import diagnosis
+from ninespring.find import diagnosis
+from ninespring.infer.predict import predict
+from ninespring.io.logs import log_text, read_log
+from ninespring.model import native
+from ninespring.model.models import Array, model_text, read_model
+from ninespring.model.simulate import LOAD_STEP_N, load_changes, simulate_run
 
 K_PER_N, NOISE_C, ROOM_C = 4.5, 0.2, 21.0
 

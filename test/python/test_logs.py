@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from ninespring import native
 from ninespring.errors import InputError
-from ninespring.fit.simulate import simulate_run
-from ninespring.logs import condense, log_text, read_log, read_table
+from ninespring.io.logs import condense, log_text, read_log, read_table
+from ninespring.model import native
+from ninespring.model.simulate import simulate_run
 
 HEADER = "time_s,i1_a,t1_c\n"
 SWAP = (("i", "a", "v", "v"), ("v", "v", "i", "a"))

@@ -7,17 +7,17 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
-from ninespring import importing
-from ninespring.logs import log_text, read_log
-from ninespring.models import Array, Model
-from ninespring.verdict import diagnosis, steady
+from ninespring.find import diagnosis, steady
+from ninespring.io import importing, results
+from ninespring.io.logs import log_text, read_log
+from ninespring.model.models import Array, Model
 
 
 def test_six_camera_values_are_explained_by_one_number_and_rivals_have_experiments(
     measured: Path,
 ) -> None:
     states = steady.paper_states(measured / "paper" / "steady.csv", "camera")
-    result = steady.diagnose_states(Array(), {}, states)
+    result = results.plain(steady.diagnose_states(Array(), {}, states))
     assert result["baseline"]["rmse_c"] > 13.0
     assert result["after"]["holdout_rmse_c"] < 1.5
     assert result["rivals"]

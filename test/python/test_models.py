@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from ninespring import native
 from ninespring.errors import InputError
-from ninespring.fit.predict import plant_of
-from ninespring.models import SCHEMA, Array, Model, model_text, read_array, read_model
+from ninespring.infer.predict import plant_of
+from ninespring.model import native
+from ninespring.model.models import SCHEMA, Array, Model, model_text, read_array, read_model
 
 HEAD = f'schema = "{SCHEMA}"\neffects = ["latent_heat"]\n\n[array]\nrows = 1\ncols = 2\n\n'
 

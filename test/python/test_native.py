@@ -7,8 +7,8 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from ninespring import native
 from ninespring.errors import WorkError
+from ninespring.model import native
 
 ROWS, SPRINGS = 40, 4
 GOOD: dict[str, object] = {

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from ninespring.cli import cli
+from ninespring.cli.main import cli
 from ninespring.errors import InputError
-from ninespring.models import Array, Model, model_text
+from ninespring.model.models import Array, Model, model_text
 
 
 @pytest.fixture

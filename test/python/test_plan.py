@@ -9,11 +9,14 @@ import ninespring as ns
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from ninespring import cli, native, plan
+from ninespring.cli import main as cli
 from ninespring.errors import InputError
-from ninespring.logs import log_text
-from ninespring.models import Array
-from ninespring.recording import Step, script_lines
+from ninespring.find import plan
+from ninespring.io import results
+from ninespring.io.logs import log_text
+from ninespring.io.recording import Step, script_lines
+from ninespring.model import native
+from ninespring.model.models import Array
 
 
 def driven(steps: list[Step], springs: int, duration_s: float, current_a: float) -> tuple[np.ndarray, np.ndarray]:
@@ -98,6 +101,11 @@ def test_what_cannot_be_planned_is_refused(tmp_path: Path) -> None:
 ASKED = {
     "separating_experiment": "staircase: all springs on; watch spring 5",
     "experiment": {
+        "name": "staircase",
+        "inputs": "all springs on",
+        "spring": 5,
+        "difference_c": 1.5,
+        "at_s": 300.0,
         "duration_s": 600.0,
         "current_a": 1.8,
         "steps": [
@@ -121,10 +129,11 @@ def test_the_experiment_that_a_diagnosis_asks_for_is_planned_within_the_limits(t
     timed = [(one.at_s, one.line) for one in lines if one.at_s is not None]
     assert timed[:3] == [(5.0, "on 2 50"), (245.0, "fan 100"), (245.0, "on 1 100")]
     assert timed[-1] == (305.0, "off 9") and len(timed) == 1 + 10 + 10
-    cooler = plan.plan_experiment(Array(), ASKED["experiment"], 14.0, 45.0)
+    asked = results.read(results.Experiment, ASKED["experiment"])
+    cooler = plan.plan_experiment(Array(), asked, 14.0, 45.0)
     assert 40.0 < cooler.hottest_c <= 45.0 and cooler.most_a < 13.9
     with pytest.raises(InputError, match="for 9 springs, the array has 2"):
-        plan.plan_experiment(Array(1, 2), ASKED["experiment"], 14.0, 105.0)
+        plan.plan_experiment(Array(1, 2), asked, 14.0, 105.0)
 
 
 @pytest.mark.parametrize(

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from ninespring.logs import read_log, write_atomically
-from ninespring.models import Array, model_text, read_model
-from ninespring.report import page
-from ninespring.verdict import diagnosis, doubt, plausibility
+from ninespring.find import diagnosis, doubt, plausibility, resistance
+from ninespring.io import results
+from ninespring.io.logs import read_log, write_atomically
+from ninespring.model.models import Array, model_text, read_model
+from ninespring.say import page
 
 TRUE = {"latent_heat": {"latent_heat_j": 8.0}, "shared_air": {"air_exchange_w_per_k": 0.2}}
 
@@ -52,9 +52,9 @@ def test_of_a_log_with_swapped_columns_the_mistake_is_said_first_and_nothing_els
         pairs = {1: 2, 2: 1, 4: 9, 9: 4}
         columns.update({f"t{k}_c": v for k, v in [(k, columns[f"t{o}_c"]) for k, o in pairs.items()]})
 
-    result = diagnosis.diagnose(Array(), [read_log(make_log(effects=TRUE, change=swap))]).result
-    assert [kind for kind, _ in page.findings(result)[:4]] == ["a mistake in the log?"] * 4
-    assert not any(one.get("seen_by") for one in result["effects"]) and result["unnamed"] == []
+    told = diagnosis.diagnose(Array(), [read_log(make_log(effects=TRUE, change=swap))]).told
+    assert [kind for kind, _ in page.findings(told)[:4]] == ["a mistake in the log?"] * 4
+    assert not any(one.seen_by for one in told.effects) and told.unnamed == []
 
 
 def test_a_spring_that_is_hot_and_never_driven_is_said(make_log) -> None:
@@ -101,27 +101,31 @@ def test_thermometers_that_step_are_said_where_the_steps_are_most_of_their_noise
     assert all(f"t8_c, t9_c step by {step:g} K" in one for one in warnings)
 
 
+def by_resistance(name: str, number: str, value: float, unit: str) -> results.Effect:
+    return resistance.told(name, 99.0, {number: results.Number(value=value, stderr=1e-4, unit=unit)})
+
+
+def second(*effects: results.Effect) -> resistance.Second:
+    told = results.Resistance(rows=1000, noise_ohm=1e-3, before_ohm=2e-3, after_ohm=1e-3, parameters={})
+    return resistance.Second(told, list(effects), [])
+
+
 def test_what_v_over_i_says_beside_wrong_temperatures_is_nothing_that_a_spring_can_have() -> None:
-    rise = {"name": "resistance_temperature", "parameters": {"resistance_austenite_rise_per_k": {"value": 0.0215}}}
-    contact = {"name": "contact_resistance", "parameters": {"contact_ohm[5]": {"value": -0.008}}}
-    (said,) = doubt.impossible({"effects": [contact, rise]})
+    rise = by_resistance("resistance_temperature", "resistance_austenite_rise_per_k", 0.0215, "1/K")
+    contact = by_resistance("contact_resistance", "contact_ohm[5]", -0.008, "ohm")
+    (said,) = doubt.impossible(second(contact, rise))
     assert said.startswith(
         "v / i does not go with the temperatures (resistance_austenite_rise_per_k would be 0.0215 1/K)"
     )
-    assert doubt.impossible({"effects": [contact]}) == doubt.impossible(None) == []
+    assert doubt.impossible(second(contact)) == doubt.impossible(None) == []
 
 
 def test_a_diagnosis_writes_no_model_that_its_readers_refuse(
     make_log, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def beside_a_wrong_clock(*_: object) -> dict[str, Any]:
-        known = {"stderr": 1e-4, "evidence": 99.0, "probability": 1.0, "certainty": "certain"}
-        number = {"value": 0.0215, "stderr": 1e-4, "unit": "1/K"}
-        rise = known | {"name": "resistance_temperature", "parameters": {"resistance_austenite_rise_per_k": number}}
-        ohm = {"value": 0.08, "stderr": 1e-4, "unit": "ohm"}
-        phase = known | {"name": "resistance_phase", "parameters": {"resistance_austenite_ohm": ohm}}
-        seen = {"rows": 1000, "noise_ohm": 1e-3, "before_ohm": 2e-3, "after_ohm": 1e-3, "parameters": {}}
-        return seen | {"effects": [phase, rise], "contacts": []}
+    def beside_a_wrong_clock(*_: object) -> resistance.Second:
+        rise = by_resistance("resistance_temperature", "resistance_austenite_rise_per_k", 0.0215, "1/K")
+        return second(by_resistance("resistance_phase", "resistance_austenite_ohm", 0.08, "ohm"), rise)
 
     monkeypatch.setattr(diagnosis.resistance, "witness", beside_a_wrong_clock)
     found = diagnosis.diagnose(Array(), [read_log(make_log())])

@@ -25,14 +25,14 @@ from click.testing import CliRunner
 from fake_board import TELEMETRY, FakeBoard, row
 from hypothesis import given
 from hypothesis import strategies as st
-from ninespring import cli
-from ninespring.board import Board
+from ninespring.cli import main as cli
 from ninespring.errors import WorkError
-from ninespring.logs import read_log, read_table
-from ninespring.monitoring import Screen
-from ninespring.port import Port
-from ninespring.recording import RowCheck, script_lines
-from ninespring.thermometers import Lines
+from ninespring.io.board import Board
+from ninespring.io.logs import read_log, read_table
+from ninespring.io.port import Port
+from ninespring.io.recording import RowCheck, script_lines
+from ninespring.io.thermometers import Lines
+from ninespring.say.monitoring import Screen
 from rich.console import Console
 
 STREAM = [row(0.5 * k) for k in range(1, 40)]

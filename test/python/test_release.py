@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pytest
 import yaml
-from ninespring import simulated
 from ninespring.errors import WorkError
+from ninespring.io import simulated
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
@@ -112,8 +112,8 @@ def test_the_package_is_loaded_where_posix_is_not() -> None:
         "import signal, sys\n"
         "sys.modules['termios'] = sys.modules['fcntl'] = sys.modules['pwd'] = sys.modules['resource'] = None\n"
         "del signal.SIGHUP\n"
-        "import ninespring.cli, ninespring.board, ninespring.explore.results, ninespring.dashboard.server\n"
-        "from ninespring.recording import told_to_stop\n"
+        "import ninespring.cli.main, ninespring.io.board, ninespring.explore.results, ninespring.dashboard.server\n"
+        "from ninespring.io.recording import told_to_stop\n"
         "with told_to_stop() as stopped: print(stopped())\n"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120, check=False)
@@ -131,7 +131,7 @@ def test_a_wheel_finds_the_simulator_in_itself_and_never_its_own_script(
     script.chmod(0o755)
     monkeypatch.delenv("NINESPRING_SIM", raising=False)
     monkeypatch.setenv("PATH", str(scripts))
-    monkeypatch.setattr(simulated, "__file__", str(home / "simulated.py"))
+    monkeypatch.setattr(simulated, "__file__", str(home / "io" / "simulated.py"))
     with pytest.raises(WorkError, match="this wheel came without it"):
         simulated.simulator()
     program = home / "simulator" / "bin" / "ninespring-sim"

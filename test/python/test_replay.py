@@ -10,7 +10,7 @@ from typing import Any
 import pandas as pd
 import pytest
 from click.testing import CliRunner
-from ninespring.cli import cli
+from ninespring.cli.main import cli
 from ninespring.errors import InputError
 
 MODEL = """schema = "ninespring.model/1"

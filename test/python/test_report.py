@@ -7,12 +7,15 @@ import dataclasses
 import re
 from html.parser import HTMLParser
 
+import msgspec
 import numpy as np
 import pytest
-from ninespring.logs import read_log
-from ninespring.models import Array
-from ninespring.report import page as report
-from ninespring.verdict import command, diagnosis
+from ninespring.cli import diagnose as command
+from ninespring.find import diagnosis
+from ninespring.io import results
+from ninespring.io.logs import read_log
+from ninespring.model.models import Array
+from ninespring.say import page as report
 
 
 class Page(HTMLParser):
@@ -126,16 +129,23 @@ def test_the_report_shows_what_was_found_and_needs_nothing_else(found: diagnosis
 
 def test_the_report_shows_rivals_what_is_unexplained_and_what_is_not_determined(found: diagnosis.Diagnosis) -> None:
     changed = copy.copy(found)
-    changed.result = copy.deepcopy(found.result)
-    rival = {"instead_of": "latent_heat", "name": "shared_air", "rmse_c": 0.4, "evidence": 3.0}
-    changed.result["rivals"] = [rival | {"separating_experiment": "all springs on for 60 min; watch spring 1"}]
-    changed.result["unexplained"] = True
-    changed.result["residual"]["note"] = "It depends on the moon."
-    changed.result["identifiability"] = {
-        "not_identifiable": ["latent_heat_j"],
-        "at_bounds": ["sensor_lag_s"],
-        "correlated": [{"a": "loss_w_per_k", "b": "sensor_lag_s", "correlation": 0.99}],
-    }
+    told = changed.told = copy.deepcopy(found.told)
+    rival = results.Rival(
+        instead_of="latent_heat",
+        name="shared_air",
+        rmse_c=0.4,
+        evidence=3.0,
+        parameters={},
+        separating_experiment="all springs on for 60 min; watch spring 1",
+    )
+    told.rivals = [rival]
+    told.unexplained = True
+    told.residual.note = "It depends on the moon."
+    told.identifiability = results.Identifiability(
+        not_identifiable=["latent_heat_j"],
+        at_bounds=["sensor_lag_s"],
+        correlated=[results.Correlation(a="loss_w_per_k", b="sensor_lag_s", correlation=0.99)],
+    )
     assert "Heat of unknown origin" not in Page(report.html_report(changed)).headings, "there is none"
     watts = [np.zeros_like(run.temperature_c) for run in found.problem.runs]
     watts[1][100:200, 3] = -0.2
@@ -159,22 +169,61 @@ def test_the_report_shows_rivals_what_is_unexplained_and_what_is_not_determined(
         assert words in text
 
 
+def told(**more: object) -> results.Diagnosis:
+    """Return a diagnosis that found nothing, but for `more`."""
+    usual = results.Diagnosis(
+        logs=[],
+        baseline=results.Baseline(rmse_c=2.0, holdout_rmse_c=2.0, noise_c=0.3),
+        effects=[],
+        rivals=[],
+        after=results.After(rmse_c=0.3, holdout_rmse_c=0.31),
+        unexplained=False,
+        residual=results.Residual(autocorrelation_lag1=0.0, depends_on=[], note="", structure_c=0.0),
+        identifiability=results.Identifiability(not_identifiable=[], at_bounds=[], correlated=[]),
+        warnings=[],
+        unknown_heat=results.UnknownHeat(events=[], mean_w=[], usual_w=[]),
+        runs_differ=[],
+        unnamed=[],
+        candidates=[],
+        doubts=[],
+        seconds=1.0,
+        simulations=1,
+    )
+    return msgspec.structs.replace(usual, **more)
+
+
+def effect(name: str, variant: str = "") -> results.Effect:
+    return results.Effect(
+        name=name,
+        variant=variant or results.UNSET,
+        rmse_c=0.3,
+        holdout_rmse_c=0.31,
+        evidence=100.0,
+        parameters={},
+        on_chip=True,
+        in_words="",
+        probability=0.99,
+        certainty="certain",
+        text="",
+    )
+
+
 def test_the_verdict_says_the_outcome() -> None:
-    result = {
-        "baseline": {"holdout_rmse_c": 2.0, "noise_c": 0.3},
-        "after": {"holdout_rmse_c": 0.31},
-        "effects": [],
-        "unexplained": False,
-    }
-    assert report.verdict(result).startswith("Nothing is missing")
-    assert report.verdict(result | {"unexplained": True}).startswith("Something is missing that no effect")
-    named = result | {"effects": [{"name": "spring_mismatch", "variant": "spring 3"}, {"name": "sensor_lag"}]}
-    assert report.verdict(named).startswith("Missing: spring_mismatch (spring 3) and sensor_lag; held-out error 2.00 →")
-    assert "and something that no effect" in report.verdict(named | {"unexplained": True})
+    assert report.verdict(told()).startswith("Nothing is missing")
+    assert report.verdict(told(unexplained=True)).startswith("Something is missing that no effect")
+    both = [effect("spring_mismatch", "spring 3"), effect("sensor_lag")]
+    named = report.verdict(told(effects=both))
+    assert named.startswith("Missing: spring_mismatch (spring 3) and sensor_lag; held-out error 2.00 →")
+    assert "and something that no effect" in report.verdict(told(effects=both, unexplained=True))
 
 
 def test_the_terminal_tells_what_acts_without_a_name(capsys: pytest.CaptureFixture[str]) -> None:
-    cause = {"text": "spring 8 is given heat, 300 to 600 s of run 1: 0.1003 W (+-0.0002)"}
-    result = {"effects": [], "runs_differ": [], "rivals": [], "unexplained": False, "unnamed": [cause]}
-    command._print_diagnosis(result, "Missing: nothing.")
+    cause = results.Unnamed(
+        kind="heat",
+        size=0.1003,
+        stderr=0.0002,
+        unit="W",
+        text="spring 8 is given heat, 300 to 600 s of run 1: 0.1003 W (+-0.0002)",
+    )
+    command._print_diagnosis(told(unnamed=[cause]), "Missing: nothing.")
     assert "a cause without a name: Spring 8 is given heat" in capsys.readouterr().out

@@ -107,7 +107,7 @@ def test_the_wheel_works_without_the_tree_beside_it(wheel: Path, tmp_path: Path)
     run(sys.executable, "-m", "pip", "install", "-q", "--no-deps", "--target", home, wheel)
     # what it depends on, from here; not what is installed here in editable form
     (home / "dependencies.pth").write_text("\n".join(site.getsitepackages()) + "\n")
-    code = "import ninespring, ninespring.native as n; n.library(); print(ninespring.__file__, ninespring.__version__)"
+    code = "import ninespring, ninespring.model.native as n; n.library(); print(ninespring.__file__, ninespring.__version__)"
     clean = {name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "NINESPRING"))}
     said = run(python, "-c", code, cwd=tmp_path, env=clean).stdout.split()
     assert said == [str(home / "ninespring" / "__init__.py"), VERSION]

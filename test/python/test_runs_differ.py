@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from ninespring.logs import log_text, read_log
-from ninespring.models import Array, Model
-from ninespring.report.page import findings
-from ninespring.verdict import diagnosis
+from ninespring.find import diagnosis
+from ninespring.io import results
+from ninespring.io.logs import log_text, read_log
+from ninespring.model.models import Array, Model
+from ninespring.say.page import findings
 from two_heaters import levels
 
 CAPACITY, LOSS, LINK, FULL_W, ROOM_C, NOISE_C = 2.0, 0.012, 0.004, 0.7, 21.0, 0.05
@@ -65,7 +66,7 @@ def test_a_drive_that_is_stronger_in_one_run_is_found_and_sized(tmp_path: Path, 
     assert one["spread"]["value"] == pytest.approx(np.std(np.log([1.0, 1.12, 0.95])), rel=0.3)
     assert not result["unexplained"]
     assert result["after"]["rmse_c"] < 1.1 * NOISE_C < result["baseline"]["rmse_c"]
-    assert any("run 2" in text for _, text in findings(result))
+    assert any("run 2" in text for _, text in findings(results.read(results.Diagnosis, result)))
 
 
 def test_surroundings_that_are_not_as_logged_are_found_in_a_single_run(tmp_path: Path) -> None:

@@ -9,8 +9,8 @@ import ninespring as ns
 import pytest
 from click.testing import CliRunner
 from fake_board import FakeBoard
-from ninespring import history
-from ninespring.cli import cli
+from ninespring.cli.main import cli
+from ninespring.io import history
 
 HAD = {"rows": "3", "loss_w_per_k": "0.005800", "loss_scale_1": "1.000", "ambient_c": "21.00"}
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from ninespring.fit import statistics
+from ninespring.io import statistics
 
 
 def test_the_noise_is_found_under_a_smooth_curve_and_outliers() -> None:

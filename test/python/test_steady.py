@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ninespring.errors import InputError
-from ninespring.models import Array
-from ninespring.verdict import diagnosis, steady
+from ninespring.find import steady
+from ninespring.io import results
+from ninespring.model.models import Array
 
 MIXING = {"optical_mixing": {"optical_share": 0.3}}
 
@@ -29,20 +30,21 @@ def states(on: dict[str, dict[str, float]]) -> list[steady.State]:
 
 
 def test_the_number_behind_six_states_is_found_again() -> None:
-    result = steady.diagnose_states(Array(), {}, states(MIXING))
+    told = steady.diagnose_states(Array(), {}, states(MIXING))
+    result = results.plain(told)
     found = result["effects"][0]
     assert found["name"] == "optical_mixing"
     assert found["parameters"]["optical_share"]["value"] == pytest.approx(0.3, rel=0.01)
     assert result["after"]["holdout_rmse_c"] < 0.1 < 5.0 < result["baseline"]["rmse_c"]
-    diagnosis.validate(result)
+    assert results.checked(told)
 
 
 def test_the_model_afterwards_has_everything_that_was_set() -> None:
     truth = {"plate_conduction": {"plate_coupling_w_per_k": 0.004, "plate_loss_w_per_k": 0.01}}
     table = states(truth)
-    result = steady.diagnose_states(Array(), {}, table)
-    assert result["effects"][0]["name"] == "plate_conduction"
-    model = steady.model_after(result, None, None)
+    told = steady.diagnose_states(Array(), {}, table)
+    assert told.effects[0].name == "plate_conduction"
+    model = steady.model_after(told, None, Array())
     on = {"plate_conduction": {k: v for k, v in model.parameters.items() if k.startswith("plate_")}}
     assert np.abs(steady.errors(Array(), {}, on, table)).max() < 0.2
 
@@ -50,14 +52,14 @@ def test_the_model_afterwards_has_everything_that_was_set() -> None:
 def test_a_state_that_is_left_out_is_not_fitted() -> None:
     table = states(MIXING)
     table[0].measured_c[4] += 10.0
-    best = steady.diagnose_states(Array(), {}, table)["after"]
+    best = steady.diagnose_states(Array(), {}, table).after
     # one of six that no number explains: left out, it pulls the number no longer
-    assert best["holdout_rmse_c"] > 1.08 * best["rmse_c"]
+    assert best.holdout_rmse_c > 1.08 * best.rmse_c
 
 
 def test_nothing_is_adopted_where_the_declared_model_is_right() -> None:
-    result = steady.diagnose_states(Array(), {}, states({}))
-    assert result["effects"] == [] and result["baseline"]["rmse_c"] < 1e-6
+    told = steady.diagnose_states(Array(), {}, states({}))
+    assert told.effects == [] and told.baseline.rmse_c < 1e-6
 
 
 @pytest.mark.parametrize(

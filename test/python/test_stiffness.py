@@ -10,16 +10,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from ninespring import cli, native, plotting
+from ninespring.cli import main as cli
 from ninespring.errors import InputError
-from ninespring.explore import stiffness
 from ninespring.explore.point import run_point
 from ninespring.explore.spec import read_spec
-from ninespring.fit.predict import plant_of
-from ninespring.fit.simulate import array_parameters
-from ninespring.logs import read_log
-from ninespring.models import Array, Model, model_of_layer, model_text, read_array, read_model
-from ninespring.pattern import pattern_of
+from ninespring.infer.predict import plant_of
+from ninespring.io.logs import read_log
+from ninespring.model import native, stiffness
+from ninespring.model.models import Array, Model, model_of_layer, model_text, read_array, read_model
+from ninespring.model.pattern import pattern_of
+from ninespring.model.simulate import array_parameters
+from ninespring.say import plotting
 
 ROOT = Path(__file__).resolve().parents[2]
 SIM = Path(os.environ.get("NINESPRING_SIM", ROOT / "build" / "host" / "ninespring-sim"))
@@ -53,8 +54,8 @@ def test_the_joints_closed_form_is_what_two_fins_do(joint: float) -> None:
 
 
 def test_what_the_plant_has_by_default_is_the_papers_spring_by_that_form() -> None:
-    from ninespring.explore.cooling import Cooling
     from ninespring.explore.geometry import spring_of
+    from ninespring.model.cooling import Cooling
 
     pytest.importorskip("skfem")
     spring = spring_of(Array(), Cooling())

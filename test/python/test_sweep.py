@@ -15,13 +15,14 @@ from typing import Any
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from ninespring import cli, native
+from ninespring.cli import main as cli
 from ninespring.errors import InputError
 from ninespring.explore import point, sweep
 from ninespring.explore.results import Results
 from ninespring.explore.spec import METRICS, Spec, read_spec
-from ninespring.fit.simulate import board_settings
-from ninespring.models import Array
+from ninespring.model import native
+from ninespring.model.models import Array
+from ninespring.model.simulate import board_settings
 
 distributed = pytest.importorskip("distributed", reason="SKIPPED: dask is missing: pip install 'ninespring[explore]'")
 pytest.importorskip("pyarrow", reason="SKIPPED: pyarrow is missing: pip install 'ninespring[explore]'")

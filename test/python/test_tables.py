@@ -1,6 +1,6 @@
 """The tables that Python reads are those that the firmware and the plant were compiled from."""
 
-from ninespring import native, tables
+from ninespring.model import native, tables
 
 
 def test_a_row_arrives_with_its_numbers_in_the_unit() -> None:

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 from fake_board import FakeBoard, row
-from ninespring.terminal import Known, words_of
+from ninespring.cli.terminal import Known, words_of
 from prompt_toolkit.completion import CompleteEvent
 from prompt_toolkit.document import Document
 

@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from ninespring import effects, native
-from ninespring.logs import read_log
-from ninespring.models import Array
-from ninespring.search import search, unnamed
-from ninespring.search.evidence import excess
-from ninespring.verdict import diagnosis
+from ninespring.find import diagnosis, search, unnamed
+from ninespring.find.evidence import excess
+from ninespring.infer.scene import scene_of
+from ninespring.io.logs import read_log
+from ninespring.model import effects, native
+from ninespring.model.models import Array
 
 EDGES = {"edge_loss": {"edge_loss_fraction": 0.2}}
 LATENT = {"latent_heat": {"latent_heat_j": 7.0}}
@@ -72,7 +72,7 @@ def test_a_name_goes_before_what_has_none(make_log) -> None:
 
     log = read_log(make_log(seed=3, effects=EDGES, change=change))
     problem, fit, _ = diagnosis.fit_effects(Array(), [log], ["edge_loss"])
-    kinds, first = unnamed.library(problem, fit), search.Search(problem, effects.candidates(problem), fit)
+    kinds, first = unnamed.library(problem, fit), search.Search(problem, effects.candidates(scene_of(problem)), fit)
     alone = unnamed.find(problem, fit, kinds, ())
     before_it = unnamed.find(problem, fit, [*kinds, *unnamed._named(problem, first, fit)], ())
     assert [one.cause.kind for one in before_it] == ["crosstalk"] and len(alone) > 1
@@ -187,7 +187,7 @@ def test_small_causes_at_a_spring_are_no_reason_to_doubt_its_name(make_log) -> N
     assert len(kinds) == 3
     hidden = [unnamed.Hidden(one, one.text, (200, 260), np.zeros(()), 0.01) for one in kinds]
     hidden = unnamed.taken_out(problem, fit, hidden)
-    first = search.Search(problem, effects.candidates(problem), base)
+    first = search.Search(problem, effects.candidates(scene_of(problem)), base)
     result = (problem.evaluate(fit), {"spring_mismatch": problem.evaluate(base)}, [])
     _, kept, _ = unnamed._or_lasting(problem, first, result, hidden)
     assert kept is result
@@ -223,7 +223,7 @@ def test_a_name_goes_before_what_comes_and_goes_at_its_spring(make_log) -> None:
 def test_no_drift_of_a_logged_ambient_is_a_name_beside_what_comes_and_goes(make_log) -> None:
     log = read_log(make_log(seed=3, change=lambda columns: astray(columns, swinging(columns, 80.0), {})))
     problem, fit, _ = diagnosis.fit_effects(Array(), [log], [])
-    first = search.Search(problem, effects.candidates(problem), fit)
+    first = search.Search(problem, effects.candidates(scene_of(problem)), fit)
     swing = next(one for one in unnamed.library(problem, fit) if one.text == "all drives change again and again")
     hidden = [unnamed.Hidden(swing, swing.text, (0, None), swing.columns)]
     drifts = [
@@ -327,8 +327,8 @@ def told(kind: str, text: str, *sizes: float) -> list[unnamed.Hidden]:
 )
 def test_a_negative_size_is_said_in_words_that_have_none(kind: str, text: str, size: float, words: str) -> None:
     (cause,) = told(kind, text, size)
-    said = cause.as_dict()
-    assert said["text"].startswith(words) and said["size"] == size
+    said = cause.told()
+    assert said.text.startswith(words) and said.size == size
 
 
 def test_no_part_loses_more_than_all() -> None:
@@ -342,6 +342,6 @@ def test_no_part_loses_more_than_all() -> None:
 def test_jumps_that_go_on_one_way_are_a_drift() -> None:
     jumps = told("sensor", "all thermometers jump, {} of run 1", 0.3, 0.2, 0.3)
     (drift,) = unnamed.drifts(jumps)
-    assert drift.as_dict()["text"].startswith("all thermometers drift, 60 to 899 s of run 1: 0.80 K")
+    assert drift.told().text.startswith("all thermometers drift, 60 to 899 s of run 1: 0.80 K")
     assert unnamed.drifts(jumps[:2]) == jumps[:2]
     assert len(unnamed.drifts(told("sensor", "all thermometers jump, {}", 0.3, -0.3, 0.3))) == 3

@@ -8,16 +8,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ninespring import native
-from ninespring.fit.declared import base_spec
-from ninespring.fit.problem import Problem
-from ninespring.fit.spec import Fit
-from ninespring.logs import log_text, read_log
-from ninespring.logs.mending import RUN_IN_S
-from ninespring.models import Array
-from ninespring.search import certainty
-from ninespring.verdict import contacts, diagnosis, resistance, unknown_heat
-from ninespring.verdict.readings import Readings, readings
+from ninespring.find import certainty, contacts, diagnosis, resistance, unknown_heat
+from ninespring.find.readings import Readings, readings
+from ninespring.infer.declared import base_spec
+from ninespring.infer.fit import Fit
+from ninespring.infer.problem import Problem
+from ninespring.io.logs import log_text, read_log
+from ninespring.io.logs.mending import RUN_IN_S
+from ninespring.model import native
+from ninespring.model.models import Array
 
 ROWS = 700
 Change = Callable[[np.ndarray], None]
@@ -94,7 +93,7 @@ def test_nothing_is_told_where_nothing_is(tmp_path: Path) -> None:
     assert unknown_heat.find(problem, fit).pieces == []
     second = resistance.witness(problem, fit)
     assert second is not None
-    assert {one["name"] for one in second["effects"]} <= {"resistance_phase"}
+    assert {one.name for one in second.effects} <= {"resistance_phase"}
 
 
 def test_a_contact_that_gets_worse_is_told_with_its_spring_time_and_size(tmp_path: Path) -> None:
@@ -104,9 +103,9 @@ def test_a_contact_that_gets_worse_is_told_with_its_spring_time_and_size(tmp_pat
     problem, fit = array_log(tmp_path / "log.csv", ohms=worse)
     second = resistance.witness(problem, fit)
     assert second is not None
-    contacts = [one for one in second["effects"] if one["name"] == "contact_resistance"]
-    assert len(contacts) == 1 and contacts[0]["variant"].startswith("spring 5, from 3")
-    assert contacts[0]["parameters"]["contact_ohm[5]"]["value"] == pytest.approx(0.008, rel=0.15)
+    contacts = [one for one in second.effects if one.name == "contact_resistance"]
+    assert len(contacts) == 1 and contacts[0].variant.startswith("spring 5, from 3")
+    assert contacts[0].parameters["contact_ohm[5]"].value == pytest.approx(0.008, rel=0.15)
 
 
 def test_a_contact_that_comes_and_goes_is_told_each_time_and_its_heat_taken_out(tmp_path: Path) -> None:
@@ -116,7 +115,7 @@ def test_a_contact_that_comes_and_goes_is_told_each_time_and_its_heat_taken_out(
     problem, fit = array_log(tmp_path / "log.csv", ohms=loose)
     second = resistance.witness(problem, fit)
     assert second is not None
-    steps = second["contacts"]
+    steps = second.contacts
     assert [one.spring for one in steps] == [4, 4]
     assert [one.ohm for one in steps] == pytest.approx([0.008, -0.008], rel=0.1)
     run = problem.runs[0]
@@ -151,7 +150,7 @@ def told_by(monkeypatch: pytest.MonkeyPatch, *times: tuple[int, float, float, fl
     monkeypatch.setattr(contacts, "dated", lambda problem, steps: steps)
     second = resistance.witness(Problem.__new__(Problem), Fit.__new__(Fit))
     assert second is not None
-    return [one["name"] for one in second["effects"]]
+    return [one.name for one in second.effects]
 
 
 COLD = (200, 0.0, 20.0, 70.0, 0.175)
@@ -205,9 +204,9 @@ def test_a_resistance_that_rises_with_temperature_is_told(tmp_path: Path) -> Non
     problem, fit = array_log(tmp_path / "log.csv", effects=rises)
     second = resistance.witness(problem, fit)
     assert second is not None
-    named = {one["name"]: one["parameters"] for one in second["effects"]}
+    named = {one.name: one.parameters for one in second.effects}
     rise = named["resistance_temperature"]["resistance_martensite_rise_per_k"]
-    assert rise["value"] == pytest.approx(0.0008, rel=0.15)
+    assert rise.value == pytest.approx(0.0008, rel=0.15)
 
 
 def test_a_cause_of_one_size_always_is_likelier_than_one_that_fits_here_and_not_there() -> None:

@@ -7,30 +7,33 @@
 """
 
 from importlib.metadata import version
+from typing import TYPE_CHECKING, Any
 
 __version__ = version("ninespring")
 
-from .api import (
-    chip_settings,
-    diagnose,
-    fit,
-    import_log,
-    make_plan,
-    plan_through,
-    plot,
-    predict,
-    record,
-    replay,
-    save,
-    sweep,
-    undo_upload,
-    upload,
-    verify,
-)
-from .board import Board, Reading, to_pandas
 from .errors import InputError, WorkError
-from .logs import Run, read_log
-from .models import Array, Model, read_array, read_model
+from .io.board import Board, Reading, to_pandas
+from .io.logs import Run, read_log
+from .model.models import Array, Model, read_array, read_model
+
+if TYPE_CHECKING:
+    from .api import (
+        chip_settings,
+        diagnose,
+        fit,
+        import_log,
+        make_plan,
+        plan_through,
+        plot,
+        predict,
+        record,
+        replay,
+        save,
+        sweep,
+        undo_upload,
+        upload,
+        verify,
+    )
 
 __all__ = [
     "Array",
@@ -60,3 +63,16 @@ __all__ = [
     "upload",
     "verify",
 ]
+
+
+def __dir__() -> list[str]:
+    return __all__
+
+
+def __getattr__(name: str) -> Any:
+    """Load what fits, searches and draws (`api`) when one of it is asked for: whoever only talks to a board waits for no SciPy."""
+    if name not in __all__:
+        raise AttributeError(f"module 'ninespring' has no attribute '{name}'")
+    from . import api
+
+    return getattr(api, name)

@@ -1,7 +1,7 @@
 """What `import ninespring as ns` offers beside the board: the commands' work as functions.
 
 A log is given as what `read_log` returned, or as a path; a model as what `fit`, `diagnose` or `read_model` returned, or as
-a path. n is the number of rows, k of springs. Heavy imports happen when a function is called.
+a path. n is the number of rows, k of springs.
 """
 
 from __future__ import annotations
@@ -10,23 +10,33 @@ import contextlib
 from collections.abc import Callable, Sequence
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
 
-from . import ranges
 from .errors import InputError
-from .logs import Run, check_folder, read_log, write_atomically
-from .models import Array, Model, model_text, read_array, read_model
-
-if TYPE_CHECKING:
-    import pandas as pd
-    from matplotlib.figure import Figure
-
-    from .export.settings import Settings
-    from .plan import Plan
-    from .recording import Recording
-    from .verdict.diagnosis import Diagnosis
+from .explore.results import Results
+from .explore.spec import read_spec
+from .explore.sweep import local_cluster
+from .explore.sweep import sweep as run_sweep
+from .export.drive import checked_settings
+from .export.settings import Settings, settings_of
+from .find import diagnosis, doubt
+from .find import plan as planning
+from .find.diagnosis import Diagnosis
+from .find.plan import Plan
+from .infer import predict as prediction
+from .infer.predict import predict_by_chip
+from .io import history, ranges, recording
+from .io.board import Board, send_settings, settings_lines
+from .io.importing import import_table
+from .io.logs import Run, check_folder, read_log, write_atomically
+from .io.recording import Recording
+from .io.thermometers import Thermometers
+from .model import native
+from .model.models import Array, Model, array_of, model_text, read_array, read_model
+from .say.plotting import figure
 
 Log = Run | str | Path
 
@@ -58,8 +68,6 @@ def _array(array: Array | str | Path | None) -> Array | None:
 def _array_and_runs(
     logs: Sequence[Log], array: Array | str | Path | None, model: Model | None = None
 ) -> tuple[Array, list[Run]]:
-    from .console import array_of
-
     if not logs:
         raise InputError("no log is given")
     given = model.array if model else _array(array)
@@ -73,9 +81,6 @@ def fit(*logs: Log, effects: Sequence[str] = (), array: Array | str | Path | Non
     `array` left out: a square (or 1 x 2) of the paper's spring. The model's `parameters` and `stderr` are in the units of
     their names (`heat_capacity_j_per_k`, `loss_w_per_k`, ...); `provenance["rmse_after_c"]` is its error, K rms.
     """
-    from . import native
-    from .verdict import diagnosis, doubt
-
     for name in effects:
         if name not in native.effect_names():
             raise InputError(f"there is no effect '{name}': {', '.join(native.effect_names())}")
@@ -95,8 +100,6 @@ def diagnose(
     `.effects` are their names, strongest first, `.model` the model with them, `.result` what diagnosis.json holds
     (docs/files.md). `model` gives declared values and effects already on, `frozen` keeps its values as they are.
     """
-    from .verdict import diagnosis
-
     given = None if model is None else _model(model)
     if frozen and given is None:
         raise InputError("frozen needs a model")
@@ -106,8 +109,6 @@ def diagnose(
 
 def predict(model: Model | str | Path, log: Log, chip: bool = False) -> np.ndarray:
     """Return what the sensors should show of a log by a model, (n, k) in degC; `chip`: by the on-chip fixed-point model."""
-    from .fit import predict as prediction
-
     model = _model(model)
     run = _run(log, model.array.springs, temperatures=False)
     if run.springs != model.array.springs:
@@ -117,8 +118,6 @@ def predict(model: Model | str | Path, log: Log, chip: bool = False) -> np.ndarr
 
 def plot(log: Log, model: Model | str | Path | None = None) -> Figure:
     """Return a figure of a log: each spring's temperature and drive; beside it what a model makes of it, dashed."""
-    from .plotting import figure
-
     run = _run(log, temperatures=False)
     return figure(run, None if model is None else predict(model, run))
 
@@ -136,16 +135,12 @@ def make_plan(
 
     `current_a` is one spring's at full level, `supply_a` all springs' together, `hottest_c` any spring's as declared.
     """
-    from .plan import make_plan as make
-
-    return make(_array(array) or Array(), duration_s, current_a, supply_a, hottest_c, seed, board_alone)
+    return planning.make_plan(_array(array) or Array(), duration_s, current_a, supply_a, hottest_c, seed, board_alone)
 
 
 def plan_through(model: Model | str | Path, spring: int, supply_a: float = 14.0, hottest_c: float = 105.0) -> Plan:
     """Return the steps that take one spring (from 1) through its transformation: `ninespring plan --through`. A, degC."""
-    from .plan import plan_through as make
-
-    return make(_model(model), spring, supply_a, hottest_c)
+    return planning.plan_through(_model(model), spring, supply_a, hottest_c)
 
 
 def record(
@@ -162,10 +157,6 @@ def record(
     The springs are off afterwards, whatever ends it; `.ended` says why where that was nobody's wish. A log that is there is
     kept (InputError) unless `force`.
     """
-    from . import recording
-    from .board import Board
-    from .thermometers import Thermometers
-
     ranges.RECORD_S.check("duration_s", duration_s)
     ranges.RECORD_HZ.check("hz", hz)
     script = recording.script_lines("\n".join(steps), "steps", duration_s)
@@ -182,8 +173,6 @@ def record(
 
 def import_log(table: str | Path, mapping: str | Path, output: str | Path, force: bool = False) -> Run:
     """Make a log of another logger's table by a mapping (a path, or built in: 'tclab'): `ninespring import --map`. Return it."""
-    from .importing import import_table
-
     check_folder(Path(output), measured=True, force=force)
     write_atomically({Path(output): import_table(Path(table), str(mapping))}, force)
     return read_log(output, temperatures=False)
@@ -194,8 +183,6 @@ def chip_settings(model: Model | str | Path, force: bool = False) -> Settings:
 
     WorkError where the log was doubted or the settings would drive worse than the firmware's, unless `force`.
     """
-    from .export.command import checked_settings
-
     return checked_settings(_model(model), "", force)[0]
 
 
@@ -211,9 +198,6 @@ def upload(
     Return how many. WorkError, and nothing is saved, where the board refuses one or shows another value. What was saved can be
     taken back: `undo_upload`; `by` is what the history calls it.
     """
-    from . import history
-    from .board import Board, send_settings, settings_lines
-
     lines = settings_lines(settings, "settings")
     with Board(port, off_at_end=False) as board:
         before = board.settings()
@@ -226,9 +210,6 @@ def upload(
 
 def undo_upload(port: str, save: bool = True) -> list[str]:
     """Give a board back what it had before the last upload from this computer: `ninespring upload --undo`. Return what changed."""
-    from . import history
-    from .board import Board
-
     with Board(port, off_at_end=False) as board:
         return history.undo(board, save).words()
 
@@ -238,9 +219,6 @@ def verify(model: Model | str | Path, log: Log, before: str = "") -> tuple[float
 
     `before`: console lines that the board has; left out, the firmware's defaults. `ninespring verify`.
     """
-    from .export.settings import settings_of
-    from .fit.predict import predict_by_chip
-
     model = _model(model)
     run = _run(log, model.array.springs)
     if any(one.get("sha256") == run.sha256 for one in model.provenance.get("logs", [])):
@@ -254,8 +232,6 @@ def verify(model: Model | str | Path, log: Log, before: str = "") -> tuple[float
 
 def replay(model: Model | str | Path, log: Log) -> tuple[np.ndarray, np.ndarray]:
     """Return temperatures (n, k), degC, and austenite (n, k), 0..1, that the on-chip model believes along a log."""
-    from .fit import predict as prediction
-
     model = _model(model)
     run = _run(log, model.array.springs, temperatures=False)
     return prediction.chip_trace(model, prediction.chip_lines(model)[0], run)
@@ -265,18 +241,13 @@ def sweep(spec: str | Path, output: str | Path, workers: int = 1) -> pd.DataFram
     """Run a sweep's points (docs/exploring.md) on this machine into a folder, and return them: `ninespring sweep`."""
     from distributed import Client
 
-    from .explore.results import Results
-    from .explore.spec import read_spec
-    from .explore.sweep import local_cluster
-    from .explore.sweep import sweep as run
-
     ranges.WORKERS.check("workers", workers)
     wanted = read_spec(Path(spec))
     results = Results(Path(output), wanted)
     done = results.open()
     if not done.all():
         with local_cluster(workers) as where, Client(where) as client:
-            run(client, wanted, results, done, lambda count: None)
+            run_sweep(client, wanted, results, done, lambda count: None)
     return results.read()
 
 

@@ -15,7 +15,7 @@ class InputError(Exception):
         line: int | None = None,
         column: int | None = None,
     ) -> None:
-        self.message = message
+        self.message = " ".join(message.splitlines())  # a quoted cell may hold line ends
         self.file = None if file is None else str(file)
         self.line = line
         self.column = column

@@ -7,7 +7,7 @@ import sys
 def main() -> None:
     """Load the command line and run it."""
     try:
-        from ninespring.cli import main as run
+        from ninespring.cli.main import main as run
     except KeyboardInterrupt:
         sys.exit("ninespring: stopped")
     run()
@@ -16,7 +16,7 @@ def main() -> None:
 def simulator() -> None:
     """Become the simulator that came with the package, or that the tree has built."""
     from ninespring.errors import WorkError
-    from ninespring.simulated import simulator as find
+    from ninespring.io.simulated import simulator as find
 
     try:
         program = find()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import datetime
 import re
+import sys
 import threading
 import time
 from collections import deque
@@ -17,14 +18,14 @@ from typing import Any
 import numpy as np
 
 from .. import __version__
-from ..belief import beliefs
-from ..board import HOST_TIMEOUT_S, PATIENCE, SIMULATED, Board, reading
-from ..console import err
 from ..errors import InputError, RefusedError, WorkError
-from ..port import pseudo_terminal
-from ..recording import SILENT_S, LogFile, Row, RowCheck, RowSink, telemetry_names, write_head
-from ..thermometers import Thermometers
-from . import words
+from ..io import words
+from ..io.belief import beliefs
+from ..io.board import HOST_TIMEOUT_S, PATIENCE, SIMULATED, Board, reading
+from ..io.port import pseudo_terminal
+from ..io.recording import SILENT_S, LogFile, Row, RowCheck, RowSink, telemetry_names, write_head
+from ..io.thermometers import Thermometers
+from ..model import tables
 from .source import Source, at_once
 from .wishes import WISHES, drives, switches_off
 
@@ -114,8 +115,6 @@ class BoardSource(Source):
 
     def settings(self) -> list[dict[str, Any]]:
         """Return the board's settings with value, unit and range."""
-        from .. import tables
-
         known = tables.settings()
         out = []
         for name, value in self._settings.items():
@@ -210,7 +209,7 @@ class BoardSource(Source):
             elif lost:
                 trouble = f"{lost}. Since then: {trouble}"
             if trouble and trouble != self._state.get("trouble"):
-                err.print(f"ninespring: {trouble}", soft_wrap=True, markup=False)
+                print(f"ninespring: {trouble}", file=sys.stderr)
             self._change(connected=False, trouble=trouble, play=None)
             self.closing.wait(1.0)
 

@@ -10,8 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from ..logs import Run
-from ..models import Model
+from ..infer.predict import predict
+from ..io.logs import Run
+from ..model.models import Model
+from ..say.plotting import believed
 from .source import Source, at_once
 
 TICK_S = 0.1
@@ -25,9 +27,6 @@ class ReplaySource(Source):
     takes = frozenset({"pause", "seek", "speed"})
 
     def __init__(self, run: Run, rows: int, cols: int, model: Model | None, speed: float) -> None:
-        from ..fit.predict import predict
-        from ..plotting import believed
-
         super().__init__()
         self._run = run
         modelled = predict(model, run) if model else believed(run)

@@ -10,11 +10,12 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
+from scipy.sparse.linalg import splu
 
-from ..models import Array
+from ..model import stiffness
+from ..model.cooling import MATERIALS, Cooling
+from ..model.models import Array
 from . import correlations as by
-from . import stiffness
-from .cooling import MATERIALS, Cooling
 from .field import MM, PLATE_EMISSIVITY, PLATE_RISE_K, Film, Mesh, build, film_of
 from .geometry import Below, Geometry, spring_of
 from .mesh import plan_mesh
@@ -66,8 +67,6 @@ def plate_as_fin(mesh: Mesh) -> tuple[float, float]:
 
     One face gives heat to the room; the other has air that takes nothing, and a spring that leads nowhere.
     """
-    from scipy.sparse.linalg import splu
-
     geometry = _geometry(1, 5.0, plate="steel", plate_thickness_mm=0.5, margin_mm=40.0)
     field = build(geometry, False, replace(mesh, along=1), Film(0.0, 1e-9, 1e3))
     side = 2 * (geometry.cooling.margin_mm + geometry.spring.radius_mm) * MM

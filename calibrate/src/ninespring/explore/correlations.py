@@ -5,7 +5,7 @@ from __future__ import annotations
 import ctypes
 import math
 
-from ..native import library
+from ..model.native import library
 
 KELVIN = 273.15
 STEFAN_BOLTZMANN = 5.670374419e-8

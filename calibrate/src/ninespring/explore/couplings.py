@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .. import native
-from ..models import Array, Model
-from .cooling import DIRECTIONS
+from ..model import native
+from ..model.cooling import DIRECTIONS
+from ..model.models import Array, Model
 from .field import COARSER, MESHES, Mesh, build
 from .geometry import Geometry, geometry_of
 from .lumped import Lumped, Pairs, lumped_of, pairs_of

@@ -14,8 +14,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy import optimize, sparse, special
 
+from ..model.cooling import MATERIALS
 from . import correlations as by
-from .cooling import MATERIALS
 from .geometry import Geometry
 from .mesh import Box, plan_mesh, within
 
@@ -266,45 +266,92 @@ def radiation_of(geometry: Geometry) -> np.ndarray:
     return out
 
 
-def build(geometry: Geometry, fan: bool, mesh: Mesh, film: Film | None = None) -> Field:
-    """Assemble an array's field, the air still or blown; `film`: another than the correlations'."""
+@dataclass
+class _Section:
+    """The array seen along its springs: its parts, and what of each belongs to which spring."""
+
+    doflocs: np.ndarray
+    """Where the unknowns are, (2, unknowns), m."""
+    side_m: float
+    """Of a square as large as the plates."""
+    regions: dict[str, tuple[sparse.csr_matrix, sparse.csr_matrix]]
+    """Laplacian and mass of core, ring, air and wall."""
+    ones: np.ndarray
+    in_core: np.ndarray
+    in_ring: np.ndarray
+    in_cell: np.ndarray
+    """Integrals over a spring's core, its ring and the air of its cell, (unknowns, springs of a layer)."""
+
+
+def _section(geometry: Geometry, mesh: Mesh) -> _Section:
+    """Mesh an array's cross-section and assemble its parts."""
     from skfem import Basis, ElementTriP2
     from skfem.models.poisson import laplace, mass
 
-    cooling, pitch = geometry.cooling, geometry.pitch_mm * MM
     radius, inner = geometry.radii_mm[-1] * MM, geometry.radii_mm[0] * MM
-    films = [film or film_of(geometry, fan, layer) for layer in range(len(geometry.springs))]
-    centres, margin = centres_of(geometry), cooling.margin_mm * MM + radius
-    box = (*(centres.min(axis=0) - margin), *(centres.max(axis=0) + margin))
-    box = (box[0], box[1], box[2], box[3])
+    centres, margin = centres_of(geometry), geometry.cooling.margin_mm * MM + radius
+    (x0, y0), (x1, y1) = centres.min(axis=0) - margin, centres.max(axis=0) + margin
     walls = walls_of(geometry)
     plan = plan_mesh(
-        box, [tuple(one) for one in centres], radius, walls, mesh.corners, inner if inner < radius else None
+        (x0, y0, x1, y1),
+        [tuple(one) for one in centres],
+        radius,
+        walls,
+        mesh.corners,
+        inner if inner < radius else None,
     )
     at = plan.p[:, plan.t].mean(axis=1)  # (2, triangles)
     owner = np.hypot(at[0, :, None] - centres[:, 0], at[1, :, None] - centres[:, 1]).argmin(axis=1)
     inside, core = (within(*(at - centres[owner].T), one, mesh.corners) for one in (radius, inner))
     wall = np.zeros(at.shape[1], dtype=bool)
-    for x0, y0, x1, y1 in walls:
-        wall |= (at[0] > x0) & (at[0] < x1) & (at[1] > y0) & (at[1] < y1)
+    for left, low, right, high in walls:
+        wall |= (at[0] > left) & (at[0] < right) & (at[1] > low) & (at[1] < high)
     wall &= ~inside
-    cell = (np.abs(at.T - centres[owner]) < pitch / 2.0).all(axis=1) & ~inside & ~wall
+    cell = (np.abs(at.T - centres[owner]) < geometry.pitch_mm * MM / 2.0).all(axis=1) & ~inside & ~wall
 
     def parts(elements: np.ndarray) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:
         basis = Basis(plan, ElementTriP2(), elements=np.flatnonzero(elements))
         return laplace.assemble(basis), mass.assemble(basis)
 
-    n = len(centres)
     places = {"core": core, "ring": inside & ~core, "air": ~inside & ~wall, "wall": wall}
     regions = {name: parts(where) for name, where in places.items() if where.any()}
     ones = np.ones(regions["air"][1].shape[0])
 
     def of_each(where: np.ndarray) -> np.ndarray:
-        return np.array([parts(where & (owner == j))[1] @ ones for j in range(n)]).T
+        return np.array([parts(where & (owner == j))[1] @ ones for j in range(len(centres))]).T
 
     in_core, in_cell = of_each(core), of_each(cell)
     in_ring = of_each(inside & ~core) if "ring" in regions else np.zeros_like(in_core)
+    side = math.sqrt((x1 - x0) * (y1 - y0))
+    return _Section(Basis(plan, ElementTriP2()).doflocs, side, regions, ones, in_core, in_ring, in_cell)
 
+
+def _plates(
+    geometry: Geometry, section: _Section, heights: np.ndarray, mirrored: bool
+) -> tuple[sparse.csr_matrix | None, np.ndarray]:
+    """Return what the plates' outer faces add to the stiffness, and the heat that they give to the room, per K."""
+    levels = len(heights)
+    outer = np.zeros(len(section.ones) * levels)
+    if geometry.cooling.plate == "none":
+        return None, outer
+    hot = geometry.ambient_c + PLATE_RISE_K
+    h = by.natural_plate(section.side_m, hot, geometry.ambient_c)
+    h += by.radiation(PLATE_EMISSIVITY, hot, geometry.ambient_c)
+    plan_mass = sum(one[1] for one in section.regions.values())
+    order = np.argsort(heights)
+    ends = (order[0],) if mirrored else (order[0], order[-1])
+    face = sparse.csr_matrix((np.ones(len(ends)), (ends, ends)), shape=(levels, levels))
+    outer += h * np.kron(np.asarray(plan_mass.sum(axis=1)).ravel(), face.diagonal())
+    return h * sparse.kron(plan_mass, face), outer
+
+
+def build(geometry: Geometry, fan: bool, mesh: Mesh, film: Film | None = None) -> Field:
+    """Assemble an array's field, the air still or blown; `film`: another than the correlations'."""
+    cooling, pitch = geometry.cooling, geometry.pitch_mm * MM
+    films = [film or film_of(geometry, fan, layer) for layer in range(len(geometry.springs))]
+    section = _section(geometry, mesh)
+    regions, ones, n = section.regions, section.ones, section.in_core.shape[1]
+    in_core, in_ring, in_cell = section.in_core, section.in_ring, section.in_cell
     layers, mirrored = _layers(geometry, films, mesh)
     times = 2.0 if mirrored else 1.0
     heights, lines = _line(layers)
@@ -332,18 +379,9 @@ def build(geometry: Geometry, fan: bool, mesh: Mesh, film: Film | None = None) -
             taken[:, its] += layer.air.sink * np.kron(airs, weight[:, None])
             free = free - (airs.sum(axis=1) if fan else 0.0)
         freed += layer.air.sink * np.kron(free, weight)
-    # both outer faces of the plates give heat to the room
-    plan_mass = sum(one[1] for one in regions.values())
-    outer = np.zeros(len(spring))
-    if cooling.plate != "none":
-        side = math.sqrt((box[2] - box[0]) * (box[3] - box[1]))
-        hot = geometry.ambient_c + PLATE_RISE_K
-        h = by.natural_plate(side, hot, geometry.ambient_c) + by.radiation(PLATE_EMISSIVITY, hot, geometry.ambient_c)
-        order = np.argsort(heights)
-        for end in (order[0],) if mirrored else (order[0], order[-1]):
-            face = sparse.csr_matrix(([1.0], ([end], [end])), shape=(levels, levels))
-            stiff = stiff + h * sparse.kron(plan_mass, face)
-            outer += h * np.kron(np.asarray(plan_mass.sum(axis=1)).ravel(), face.diagonal())
+    faces, outer = _plates(geometry, section, heights, mirrored)
+    if faces is not None:
+        stiff = stiff + faces
     stiff, capacity = times * sparse.csc_matrix(stiff), times * sparse.csc_matrix(capacity)
     lanes, flows = [], []
     for layer, one in enumerate(geometry.springs):
@@ -363,7 +401,7 @@ def build(geometry: Geometry, fan: bool, mesh: Mesh, film: Film | None = None) -
         times * freed,
         np.hstack(
             [
-                np.repeat(Basis(plan, ElementTriP2()).doflocs.T, levels, axis=0),
+                np.repeat(section.doflocs.T, levels, axis=0),
                 np.tile(heights, len(ones))[:, None],
             ]
         ),

@@ -14,9 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import InputError
-from ..models import Array
-from . import stiffness
-from .cooling import MATERIALS, Cooling, Material, cooling_of
+from ..model import stiffness
+from ..model.cooling import MATERIALS, Cooling, Material, cooling_of
+from ..model.models import Array
+from ..model.simulate import array_parameters
+from .mesh import ring_mesh
 
 SLOWEST_M_PER_S = 0.05
 NITI_CONDUCTIVITY = 18.0
@@ -110,8 +112,6 @@ class Geometry:
 
 def spring_of(array: Array, cooling: Cooling) -> Spring:
     """Return the spring that array.toml describes (docs/files.md); what cannot be wound is refused."""
-    from ..fit.simulate import array_parameters
-
     given = array.spring
     wire, coil, turns = (
         given.get("wire_diameter_mm", 0.8),
@@ -200,8 +200,6 @@ def ring_radius_mm(wire_mm: float, coil_mm: float, spacing_mm: float, elements: 
     """
     from skfem import Basis, BilinearForm, ElementTriP2, condense, solve
     from skfem.helpers import dot, grad
-
-    from .mesh import ring_mesh
 
     a, far = coil_mm / 2.0, 2.0 * coil_mm
     mesh, on_wire = ring_mesh(wire_mm / 2.0, a, spacing_mm / 2.0, far, elements)

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import optimize
 
-from ..models import COUPLED
-from .cooling import DIRECTIONS
+from ..model.cooling import DIRECTIONS
+from ..model.models import COUPLED
 from .geometry import Geometry
 from .modes import Modes
 

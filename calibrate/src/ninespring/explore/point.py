@@ -10,10 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from .. import native
 from ..errors import InputError, WorkError
-from ..fit.simulate import array_parameters, board_settings
-from ..models import Array
+from ..model import native
+from ..model.models import Array
+from ..model.simulate import array_parameters, board_settings
+from .couplings import couplings
 from .spec import METRICS, Spec, array_of_point, board_of_point, patterns_of
 
 STARTED = 0.95
@@ -27,8 +28,6 @@ ALWAYS = ("latent_heat", "resistance_phase")
 @functools.lru_cache(maxsize=256)
 def _field(described: str, mesh: str) -> tuple[tuple[str, ...], dict[str, float]]:
     """Return effects and parameters of an array's geometry; each process reckons a geometry once."""
-    from .couplings import couplings
-
     given = json.loads(described)
     model = couplings(Array(**given), mesh).model
     return tuple(model.effects), model.parameters

@@ -15,14 +15,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.stats import qmc
 
-from .. import native
 from ..errors import InputError
-from ..logs import read_bytes
-from ..models import MATERIAL_KEYS, SPRING_KEYS, STIFFNESS_KEYS, Array
-from ..pattern import pattern_of
-from ..toml_file import TomlFile, did_you_mean
-from . import cooling, stiffness
+from ..io.logs import read_bytes
+from ..io.toml_file import TomlFile, did_you_mean
+from ..model import cooling, native, stiffness
+from ..model.models import MATERIAL_KEYS, SPRING_KEYS, STIFFNESS_KEYS, Array
+from ..model.pattern import pattern_of
+from .geometry import geometry_of
 
 METHODS = ("grid", "latin", "sobol", "saltelli", "optimise")
 PATTERNS = ("all", "all_but_middle", "middle", "checkerboard", "random", "none")
@@ -123,8 +124,6 @@ class Spec:
 
     def shares(self) -> np.ndarray | None:
         """Return the sample in the unit cube, (points, axes); None for a grid or where an optimiser asks."""
-        from scipy.stats import qmc
-
         if self.method == "latin":
             return qmc.LatinHypercube(len(self.axes), rng=self.seed).random(self.asked)
         if self.method == "sobol":
@@ -193,8 +192,6 @@ def patterns_of(point: Mapping[str, Any], array: Array) -> list[str]:
 
 def check_point(point: Mapping[str, Any]) -> None:
     """Refuse (InputError) what cannot exist."""
-    from .geometry import geometry_of
-
     array = array_of_point(point)
     patterns_of(point, array)
     if array.layers == 1 and (below := sorted(set(STIFFNESS) & set(point))):

@@ -8,6 +8,7 @@ from __future__ import annotations
 import itertools
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import CancelledError
 from dataclasses import replace
 from typing import Any
 
@@ -16,7 +17,7 @@ import numpy as np
 from ..errors import WorkError
 from .point import run_point
 from .results import Results
-from .spec import Spec
+from .spec import METRICS, Spec
 
 LOT_S = 2.0
 """A lot of points takes about so long: Dask's own work for it is some milliseconds."""
@@ -62,8 +63,6 @@ def run_points(
     keep: Callable[[list[dict[str, Any]]], None],
 ) -> None:
     """Run the `left` points of an iterator; hand over the rows of each lot once, in the order in which they end."""
-    from concurrent.futures import CancelledError
-
     from distributed import KilledWorker, as_completed
 
     slim = replace(spec, text="")
@@ -172,8 +171,6 @@ def best_of(spec: Spec, table: Any) -> dict[str, Any] | None:
 def indices_of(spec: Spec, table: Any) -> dict[str, dict[str, dict[str, float]]]:
     """Return the Sobol indices of every metric that every point has: first order, total, each with its 95 % half width."""
     from SALib.analyze import sobol
-
-    from .spec import METRICS
 
     problem = {
         "num_vars": len(spec.axes),

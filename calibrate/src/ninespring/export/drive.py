@@ -7,9 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .. import native
-from ..models import Model
-from .settings import best_plant, draw
+from ..errors import WorkError
+from ..io import results
+from ..model import native
+from ..model.models import Model
+from .settings import Settings, best_plant, draw, settings_of
 
 DRAWS = 4
 """Further arrays, drawn from the uncertainty of the model's numbers. Which spring is heated before which is chaotic, by seconds:
@@ -117,7 +119,7 @@ def worse_than(old: Drive, new: Drive) -> list[str]:
 
 def compare(
     model: Model, old: str, new: str, say: Callable[[str], None] = lambda text: None
-) -> tuple[list[str], list[dict[str, float]]]:
+) -> tuple[list[str], list[results.Drive]]:
     """Return what gets worse with the new settings, in words, and every measure of every drive.
 
     Tried on the array as it is best known, and on others drawn from the model's uncertainty; worse is what is worse on
@@ -137,7 +139,7 @@ def compare(
         for measure, one in WORSE.items():
             values = [(getattr(a, measure), getattr(b, measure)) for a, b in pairs]
             worse = [measure in found for found in judged]
-            rows += [{"array": k + 1, "measure": measure, "old": a, "new": b} for k, (a, b) in enumerate(values)]
+            rows += [results.Drive(array=k + 1, measure=measure, old=a, new=b) for k, (a, b) in enumerate(values)]
             if all(worse) or (not one.chance and (worse[0] or sum(worse) > len(worse) / 2)):
                 a, b = values[0] if worse[0] else values[worse.index(True)]
                 said.append(one.words.format(old=a, new=b))
@@ -147,3 +149,20 @@ def compare(
             words = WORSE["undriven"].words.format(old=best[0].undriven, new=best[1].undriven)
             gained.append(f"for it {words}: that pattern cannot have both here")
     return list(dict.fromkeys([*said, *gained])), rows
+
+
+def checked_settings(
+    model: Model, old: str, force: bool = False, say: Callable[..., None] = lambda text, done=None: None
+) -> tuple[Settings, list[str], list[results.Drive]]:
+    """Return a model's settings, in what they drive worse than the lines `old`, and both drives; WorkError where they should not be used."""
+    if (doubts := model.provenance.get("doubts", [])) and not force:
+        raise WorkError(
+            f"the log of this model is doubted, nothing is written: {'; '.join(doubts)} (--force writes it all the same)"
+        )
+    made = settings_of(model)
+    worse, drives = compare(model, old, f"{old}\n{made.lines}", say)
+    if worse and not force:
+        raise WorkError(
+            f"these settings would drive worse, nothing is written: {'; '.join(worse)} (--force writes them all the same)"
+        )
+    return made, worse, drives

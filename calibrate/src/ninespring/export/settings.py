@@ -7,16 +7,16 @@ it are the ones it determines.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from .. import effects, native
-from ..fit.simulate import array_parameters, board_settings
-from ..models import Model
+from ..io import results
+from ..model import effects, native
+from ..model.models import Model
+from ..model.simulate import array_parameters, board_settings
 
 TEMPERATURES = ("martensite_finish_c", "martensite_start_c", "austenite_start_c", "austenite_finish_c")
 FIRMWARE_EFFECTS = ("latent_heat", "resistance_phase")
@@ -114,17 +114,14 @@ def left_out(model: Model) -> dict[str, str]:
     return out
 
 
-def judged(listed: list[dict[str, Any]], model: Model) -> None:
+def judged(listed: Sequence[results.Effect], model: Model) -> None:
     """Say of effects as diagnosis.json lists them whether they go into the chip, and why not."""
     left = left_out(model)
     for one in listed:
         # not in the model (v / i alone names it, a run's own): never exported
-        why = left.get(one["name"], "" if one["name"] in model.effects else "it is not in model.toml")
-        why = effects.WHY_NOT_ON_CHIP.get(one["name"], why)
-        one["on_chip"] = not why
-        one.pop("why_not_on_chip", None)
-        if why:
-            one["why_not_on_chip"] = why
+        why = left.get(one.name, "" if one.name in model.effects else "it is not in model.toml")
+        why = effects.WHY_NOT_ON_CHIP.get(one.name, why)
+        one.on_chip, one.why_not_on_chip = not why, why or results.UNSET
 
 
 def together(kept: Mapping[str, str], written: Mapping[str, str]) -> dict[str, list[str]]:

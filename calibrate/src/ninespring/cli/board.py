@@ -1,0 +1,181 @@
+"""The commands that talk to a board: record, upload, monitor."""
+
+from __future__ import annotations
+
+import dataclasses
+import datetime
+import os
+import time
+from pathlib import Path
+
+import click
+from rich.live import Live
+
+from .. import __version__, api
+from ..errors import InputError, WorkError
+from ..io import history, ranges, results
+from ..io.board import Board, settings_lines
+from ..io.logs import check_folder, read_bytes
+from ..io.recording import LogFile, script_lines, told_to_stop
+from ..io.recording import record as record_board
+from ..io.thermometers import Thermometers
+from ..say.monitoring import Screen
+from .console import FILE, FORCE, JSON, PORT, Command, Real, Whole, beside, err, out, working, write
+
+HZ = Whole(ranges.RECORD_HZ)
+SECONDS = Real(ranges.RECORD_S)
+
+
+@click.command(
+    cls=Command,
+    epilog="""\b
+Example:
+  ninespring record --port /dev/ttyACM0 --hz 1 --duration 900 --run steps.txt -o board1.csv
+\b
+steps.txt (console words; `at S =` waits until so many seconds after the first row):
+  ambient 21.5
+  at 5 = pattern 101000101
+  at 300 = fan 100
+  at 600 = off all
+""",
+)
+@PORT
+@click.option("-o", "--output", type=FILE, required=True, help="log to write; - is standard output")
+@click.option("--hz", type=HZ, default=1, show_default=True, help="rows a second")
+@click.option(
+    "--duration", type=SECONDS, default=900.0, show_default=True, help="s by the board's clock; Ctrl-C ends it earlier"
+)
+@click.option("--run", "script", type=FILE, help="console lines to send, one a line, each at its time")
+@click.option("--thermometers", help="port of a thermocouple logger: its temperatures (degC) become t1_c, t2_c, ...")
+@FORCE
+@JSON
+def record(
+    port: str,
+    output: Path,
+    hz: int,
+    duration: float,
+    script: Path | None,
+    thermometers: str | None,
+    force: bool,
+    json_path: Path | None,
+) -> None:
+    """Log a board's telemetry: currents (A), voltages (V), the model's temperatures (degC).
+
+    What has come is kept and the springs are switched off, whatever ends the recording: Ctrl-C, a closed terminal, a
+    cable, a full disk, a reset of the board. While it runs, rows go to OUTPUT.part; at the end that becomes OUTPUT.
+    The log begins with the board's version, faults and settings as comments. A fault of the board is said as it comes and at the
+    end, and stands in the log where it came; the command then exits with 1. What the board remarks on a line of --run (a
+    setting that is not active yet, springs that are still warm) is said and logged likewise, and is no failure.
+    """
+    check_folder(output, measured=True, force=force)
+    check_folder(json_path)
+    if thermometers and os.path.realpath(thermometers) == os.path.realpath(port):
+        raise InputError(f"--thermometers {thermometers}: that is the board's port, a logger has its own")
+    text = read_bytes(script).decode("utf-8", "replace") if script else ""
+    steps = script_lines(text, str(script), duration)
+    keys = {
+        "recorded": datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%dT%H:%M:%SZ"),
+        "port": port,
+        "tool": f"ninespring {__version__}",
+    }
+    with told_to_stop() as stopped:
+        with (
+            working(f"recording from {port}", duration) as say,
+            Board(port, stopped=stopped, off_at_end=False) as board,
+        ):
+            logger = Thermometers(thermometers) if thermometers else None
+            log = LogFile(output, force)
+            try:
+                alarm = lambda fault: err.print(f"fault {fault}", style="bold red", markup=False)  # noqa: E731
+                tell = lambda rows, seconds: say(f"{rows} rows", seconds)  # noqa: E731
+                remark = lambda words: err.print(words, markup=False)  # noqa: E731
+                got = record_board(board, log, hz, duration, steps, tell, keys, logger, alarm, remark)
+            finally:
+                log.close()
+                if logger:
+                    logger.close()
+        if not log.rows:
+            raise WorkError(got.ended or "stopped before the first row came")
+        faults = [results.Fault(**dataclasses.asdict(one)) for one in got.faults]
+        write(
+            {
+                json_path: results.checked(
+                    results.Record(rows=log.rows, dropped_lines=got.dropped, ended=got.ended, faults=faults)
+                )
+            }
+        )
+        lines = f", {got.dropped} corrupt lines dropped" if got.dropped else ""
+        if got.offset_s is not None:
+            lines += f"; the thermometers' clock was {got.offset_s:+.2f} s from the board's"
+        beside(output).print(f"{log.rows} rows -> {output}{lines}", markup=False)
+    if got.ended:
+        raise WorkError(f"{got.ended}; what came is in {output}")
+
+
+@click.command(
+    cls=Command,
+    epilog="""\b
+Examples:
+  ninespring upload --port /dev/ttyACM0 settings.txt
+  ninespring upload --port /dev/ttyACM0 --undo
+""",
+)
+@click.argument("settings", type=FILE, required=False)
+@PORT
+@click.option("--undo", is_flag=True, help="give the board back what it had before the last upload from this computer")
+@click.option("--save/--no-save", default=True, show_default=True, help="keep them in the EEPROM")
+@JSON
+def upload(settings: Path | None, port: str, undo: bool, save: bool, json_path: Path | None) -> None:
+    """Send exported settings to a board, read them back, save them.
+
+    Nothing is saved unless the board took every line and shows every value in `$$`. What the board has learnt of its
+    springs it has learnt beside its old numbers, and forgets. All springs must be off. What it had before is kept on this
+    computer: `ninespring settings history` shows it, --undo gives it back.
+    """
+    if (settings is None) != undo:
+        raise InputError("give either a file of settings or --undo")
+    check_folder(json_path)
+    if settings is None:
+        with working("giving back"), Board(port, off_at_end=False) as board:
+            last = history.undo(board, save)
+        write({json_path: results.checked(results.Upload(settings=len(last.sent), saved=save, undone=last.by))})
+        for line in last.words():
+            name, _, change = line.partition(": ")
+            old, _, new = change.partition(" -> ")
+            out.print(f"{name}: {new} -> {old}", markup=False)
+        out.print(f"`{last.by}` of {last.when} is taken back{', saved' if save else ''}", markup=False)
+        return
+    lines = settings_lines(read_bytes(settings).decode("utf-8", "replace"), str(settings))
+    with working("sending", len(lines)) as say:
+        api.upload(port, "\n".join(lines), save, say, by=f"upload {settings.name}")
+    write({json_path: results.checked(results.Upload(settings=len(lines), saved=save))})
+    out.print(f"{len(lines)} settings sent and read back{', saved' if save else ''}")
+
+
+@click.command(
+    cls=Command,
+    epilog="""\b
+Example:
+  ninespring monitor --port /dev/ttyACM0
+""",
+)
+@PORT
+@click.option("--hz", type=HZ, default=2, show_default=True, help="updates a second")
+@click.option("--duration", type=SECONDS, default=ranges.RECORD_S.high, help="s; Ctrl-C ends it")
+def monitor(port: str, hz: int, duration: float) -> None:
+    """Show a board's array as it is: per spring the model's temperature (degC) and its trend, current (A), limits."""
+    with Board(port, off_at_end=False) as board:
+        until = time.monotonic() + duration
+        try:
+            screen = Screen(board.settings())
+            with Live(console=out, refresh_per_second=8) as live:
+                for line in board.ask(f"telemetry csv {hz}"):
+                    screen.take(line)
+                while (line := board.next_line(min(until, time.monotonic() + 5.0))) is not None:
+                    if screen.take(line):
+                        live.update(screen.picture())
+            if time.monotonic() < until:
+                raise WorkError(f"{port}: no telemetry for 5 s")
+        except KeyboardInterrupt:
+            pass
+        board.ask("telemetry off")

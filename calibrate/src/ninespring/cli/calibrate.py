@@ -1,0 +1,165 @@
+"""`ninespring calibrate`."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import click
+
+from ..errors import InputError, WorkError
+from ..export.drive import patterns
+from ..io import ranges
+from ..io.board import Board
+from ..io.logs import check_folder, write_atomically
+from ..io.simulated import simulated_board
+from ..model.models import Array, read_array
+from ..model.pattern import pattern_of
+from .calibration.chain import Calibration
+from .calibration.progress import FILE, Progress
+from .calibration.report import page
+from .console import ARRAY, JSON, Command, Real, out, write
+
+FROM = {"duration": 900.0, "drive_for": 300.0, "current": 2.0, "supply": 14.0, "hottest": 105.0}
+"""What is taken where nothing is said."""
+UNKNOWN = ("--speed", "max", "--set", "plant.effects=latent_heat,resistance_phase,edge_loss")
+UNKNOWN += ("--set", "plant.edge_loss_fraction=0.25")
+"""The simulated board's array does what its chip has not been told: its edge loses more heat."""
+REPORT, ARRAY_FILE = "report.html", "array.toml"
+
+
+@click.command(
+    cls=Command,
+    epilog="""\b
+Examples:
+  ninespring calibrate --simulate
+  ninespring calibrate --port /dev/ttyACM0 --thermometers /dev/ttyUSB0
+  ninespring calibrate --port /dev/ttyACM0 --thermometers /dev/ttyUSB0 -o second --array array.toml --supply 10 --yes
+""",
+)
+@click.option("--port", help="serial port of the board, e.g. /dev/ttyACM0")
+@click.option("--thermometers", help="port of a thermocouple logger, one thermometer a spring; with --port")
+@click.option(
+    "--simulate", is_flag=True, help="a simulated board with thermometers, whose array nobody has told the chip"
+)
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(file_okay=False, path_type=Path),
+    default=Path("calibration"),
+    show_default=True,
+    help="folder for all that is measured and found; one that was begun is gone on with",
+)
+@ARRAY
+@click.option("--duration", type=Real(ranges.PLAN_S), help="s, each of the two measured runs  [default: 900]")
+@click.option("--drive-for", type=Real(ranges.DRIVE_S), help="s, the drive before and the one after  [default: 300]")
+@click.option("--pattern", help="what is driven before and after  [default: all but the middle, 111101111]")
+@click.option("--current", type=Real(ranges.PLAN_CURRENT_A), help="A, one spring at full level  [default: 2.0]")
+@click.option("--supply", type=Real(ranges.PLAN_SUPPLY_A), help="A, all springs together  [default: 14]")
+@click.option("--hottest", type=Real(ranges.PLAN_HOTTEST_C), help="degC, of any spring, as declared  [default: 105]")
+@click.option("--yes", is_flag=True, help="do not ask before heating and before writing: for scripts")
+@JSON
+def calibrate(
+    port: str | None,
+    thermometers: str | None,
+    simulate: bool,
+    output: Path,
+    array_path: Path | None,
+    duration: float | None,
+    drive_for: float | None,
+    pattern: str | None,
+    current: float | None,
+    supply: float | None,
+    hottest: float | None,
+    yes: bool,
+    json_path: Path | None,
+) -> None:
+    """From a board as it is to one that knows its array: all seven commands of docs/calibrating.md in one.
+
+    Plans and measures two runs, finds on the first what the model lacks, verifies that on the second, drives old and new
+    settings in simulation, then drives the board as it is and with the new settings, and saves them if it drives no worse. It
+    asks before it heats and before it writes. Ctrl-C, a pulled cable, a fault: the springs go off, what was measured is
+    kept, and the same command goes on from there. Ends in report.html in the folder.
+    """
+    if (port is not None) == simulate:
+        raise InputError("give --port, or --simulate where there is no board")
+    if simulate and thermometers:
+        raise InputError("--thermometers goes with --port: the simulated board has its own")
+    if port and not thermometers:
+        raise InputError(
+            "--thermometers is missing: degrees come from one thermometer a spring. Without any: `ninespring plan "
+            "--no-thermometer`, `record`, `diagnose`, as docs/calibrating.md says"
+        )
+    if port and thermometers and os.path.realpath(thermometers) == os.path.realpath(port):
+        raise InputError(f"--thermometers {thermometers}: that is the board's port, a logger has its own")
+    if not yes and not sys.stdin.isatty():
+        raise InputError("it asks before it heats and before it writes, and nobody can answer here: give --yes")
+    check_folder(json_path)
+    begun = (output / FILE).exists()
+    kept = output / ARRAY_FILE if begun and (output / ARRAY_FILE).exists() else array_path
+    array = read_array(kept) if kept else Array()
+    array.one_layer("a board drives")
+    if pattern is not None:
+        pattern_of(pattern, array)
+    if output.is_dir() and not begun and any(output.iterdir()):
+        raise InputError("is there, and no calibration was begun in it: give another folder, -o", output)
+    given = {
+        "simulate": simulate,
+        "array": _text(array_path),
+        "duration": duration,
+        "drive_for": drive_for,
+        "pattern": pattern,
+        "current": current,
+        "supply": supply,
+        "hottest": hottest,
+    }
+    if not begun:
+        middle = "".join("1" if one else "0" for one in patterns(array.springs)[0])
+        given = FROM | {"pattern": middle} | {name: value for name, value in given.items() if value is not None}
+    progress = Progress(output, given)
+    try:
+        output.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"cannot be made a folder: {error.strerror}", output) from None
+    if array_path and not begun:
+        (output / ARRAY_FILE).write_text(array_path.read_text("utf-8"), "utf-8")
+
+    def tell(step: str, text: str) -> None:
+        out.print(f"[bold]{step:>9}[/bold]  " if step else " " * 11, end="")
+        out.print(text, markup=False, soft_wrap=True)
+
+    def ask(text: str) -> bool:
+        return yes or click.confirm(text, default=False)
+
+    try:
+        with _ports(port, thermometers) as (at, logger), Board(at) as board:
+            Calibration(progress, array, board, logger, ask, tell).run()
+    except KeyboardInterrupt:
+        raise WorkError(f"stopped; what was measured is in {output}: the same command goes on from there") from None
+    finally:
+        if "diagnose" in progress.done:
+            write_atomically({output / REPORT: page(progress, array)})
+            out.print(f"-> {output / REPORT}", soft_wrap=True, markup=False)
+        write({json_path: progress.text()})
+
+
+def _text(path: Path | None) -> str | None:
+    """Return what an array.toml says: another one in its place would be another calibration."""
+    return path.read_text("utf-8") if path else None
+
+
+@contextlib.contextmanager
+def _ports(port: str | None, thermometers: str | None) -> Iterator[tuple[str, str]]:
+    """Yield the ports of a board and its thermometers; of a simulated board where none is named."""
+    if port and thermometers:
+        yield port, thermometers
+        return
+    process, board, logger = simulated_board(UNKNOWN)
+    try:
+        yield board, logger
+    finally:
+        process.terminate()
+        process.communicate(timeout=10)

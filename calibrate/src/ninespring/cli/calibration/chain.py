@@ -1,0 +1,485 @@
+"""The steps of a calibration, each from what the folder and the board have: done ones are told, the others are done.
+
+Nothing is saved on the board unless the chip is less wrong with the new settings on a log that the fit never saw, drives no
+worse with them in simulation, and drove no worse with them when it was measured; else the board has its own again.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import datetime
+import time
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
+
+from ... import __version__
+from ...errors import InputError, WorkError
+from ...export.drive import checked_settings
+from ...export.settings import settings_of, together
+from ...find import diagnosis
+from ...find.plan import make_plan
+from ...infer.predict import chip_error
+from ...io import history, results
+from ...io.board import ROW_TIME, Board, send_settings, settings_that_differ
+from ...io.logs import Run, read_bytes, read_log, write_atomically
+from ...io.logs.mending import RUN_IN_S
+from ...io.recording import LogFile, Recording, Step, record, script_lines, told_to_stop
+from ...io.thermometers import Thermometers
+from ...model.models import Array, Model, model_text, read_model
+from ...say import page
+from ..console import working
+from . import judged
+from .cut import left_of
+from .progress import Progress
+
+RUNS = ("run1", "run2")
+STEPS = ("board", "plan", "run1", "diagnose", "run2", "verify", "export", "before", "after")
+DIAGNOSIS = "diagnosis"
+SETTINGS, OLD_SETTINGS = "settings.txt", "settings-before.txt"
+OWN = ("policy", "open_current_a", "host_timeout_s", "telemetry_format", "telemetry_hz")
+"""Settings that recording changes, and that are given back."""
+COOLED_K, COOLED_S = 2.0, 60.0
+"""A spring that falls by less than so much in so long is within 1 K of where it is going: that is more than a time constant (50 s)."""
+COOLING_S = 1200.0
+"""So long it is waited for that, by the board's clock."""
+PATTERN_AT_S = 5.0
+DRIVES = 2
+"""So often a drive with new settings is looked at before it is called worse: `upload` has the board forget what it had learnt,
+and in the first it lets every spring cool until it loses its phase, to find out where that is."""
+
+Ask = Callable[[str], bool]
+Tell = Callable[[str, str], None]
+
+
+class Calibration:
+    """One board, one folder."""
+
+    def __init__(self, progress: Progress, array: Array, board: Board, thermometers: str, ask: Ask, tell: Tell) -> None:
+        self.progress, self.array, self.board = progress, array, board
+        self.folder = progress.folder
+        self._thermometers, self._ask, self._tell = thermometers, ask, tell
+        self._may_heat = False
+
+    def run(self) -> None:
+        """Do what is left. WorkError where it ends without new settings on the board."""
+        self._look_at_the_board()
+        self._plan()
+        self._measure("run1")
+        self._diagnose()
+        self._measure("run2")
+        self._verify()
+        self._export()
+        self._drive_before_and_after()
+
+    @property
+    def had(self) -> dict[str, str]:
+        """The board's settings before anything was done to it."""
+        return dict(self.progress.data["board"]["settings"])
+
+    def model(self) -> Model:
+        """Return the model that was found."""
+        return read_model(self.folder / DIAGNOSIS / "model.toml")
+
+    # ---- the board
+
+    def _look_at_the_board(self) -> None:
+        board, version = self.board, self.board.version
+        if faults := board.ask("faults"):
+            raise WorkError(
+                f"{board.port}: nothing is heated while this stands: {'; '.join(faults)} "
+                "(docs/console.md says what it is; `clear`, `supply on`, then the same command goes on)"
+            )
+        if board.status().startswith("<locked"):
+            raise WorkError(f"{board.port}: the board is locked after a reset: type `unlock`, then the same command")
+        if self.progress.data["board"]:
+            self._give_back_its_own()
+            self._same_board(board.settings())
+            return
+        settings = board.settings()
+        shape = tuple(int(float(settings.get(name, "0"))) for name in ("rows", "columns"))
+        if shape != (self.array.rows, self.array.cols):
+            raise InputError(
+                f"the board drives {shape[0]} x {shape[1]} springs, the array is {self.array.rows} x {self.array.cols}: "
+                "give the array that is there, --array array.toml, or set $rows and $columns"
+            )
+        write_atomically(
+            {self.folder / OLD_SETTINGS: "# from the board, before anything was done\n" + as_lines(settings)}
+        )
+        self.progress.board(version, settings)
+        self._tell("board", f"{version[0]}; {len(settings)} settings kept, no fault")
+
+    def _same_board(self, now: dict[str, str]) -> None:
+        """Refuse a board that is neither as it was nor as this calibration has set it."""
+        sent = self.progress.done.get("export", {}).get("settings", {})
+        apart = [
+            f"${name} is {now.get(name, 'not there')}, not {value}"
+            for name, value in self.had.items()
+            if name not in now or float(now[name]) not in {float(value), float(sent.get(name, value))}
+        ]
+        if apart:
+            raise WorkError(
+                f"the board's settings are not those that this calibration began with ({'; '.join(apart[:3])}): what was "
+                "measured was measured beside others. Give them back, or begin another folder"
+            )
+
+    def _give_back_its_own(self) -> None:
+        for name in OWN:
+            if name in self.had:
+                self.board.ask(f"${name}={self.had[name]}")
+
+    # ---- measuring
+
+    def _plan(self) -> None:
+        option = self.progress.option
+        if "plan" in self.progress.done:
+            return
+        files, most, hottest = {}, 0.0, 0.0
+        for seed, name in enumerate(RUNS, start=1):
+            made = make_plan(
+                self.array, option("duration"), option("current"), option("supply"), option("hottest"), seed
+            )
+            files[f"{name}-steps.txt"] = "\n".join([f"# ninespring record --run {name}-steps.txt", *made.steps]) + "\n"
+            most, hottest = max(most, made.most_a), max(hottest, made.hottest_c)
+        write_atomically({self.folder / name: text for name, text in files.items()})
+        self.progress.keep("plan", {"most_a": most, "hottest_c": hottest}, *files)
+        self._tell(
+            "plan",
+            f"two runs of {option('duration'):g} s: at most {most:.1f} A together, {hottest:.0f} degC "
+            "if the array is as declared",
+        )
+
+    def _asks_to_heat(self) -> None:
+        if self._may_heat:
+            return
+        plan, option = self.progress.done["plan"], self.progress.option
+        left = [name for name in RUNS if not self.progress.done.get(name, {}).get("complete")]
+        times = "twice" if len(left) == 2 else "once"
+        if not self._ask(
+            f"Now the springs are heated {times}, for up to {option('duration') / 60:.0f} min, with at most "
+            f"{plan['most_a']:.1f} A together, to about {plan['hottest_c']:.0f} degC. Is everybody's hand off, may it begin?"
+        ):
+            raise WorkError("stopped before anything was heated; the same command goes on from here")
+        self._may_heat = True
+
+    def _measure(self, name: str) -> None:
+        done = self.progress.done.get(name, {"pieces": [], "complete": False})
+        if done["complete"]:
+            return
+        self._asks_to_heat()
+        pieces, duration = list(done["pieces"]), self.progress.option("duration")
+        text = read_bytes(self.folder / f"{name}-steps.txt").decode()
+        steps = script_lines(text, f"{name}-steps.txt")
+        if killed := self._adopt(name, pieces):
+            pieces.append(killed)
+        from_s = max((one["to_s"] for one in pieces if one["used"]), default=0.0)
+        if from_s:
+            self._tell(name, f"goes on at {from_s:.0f} s of {duration:g}: what was measured until then is kept")
+        if duration - from_s > 1.0:
+            log = self.free(name)
+            got = self._record(log, left_of(steps, from_s, self.array.springs), duration - from_s, f"{name}: measuring")
+            pieces.append(self._piece(log, from_s, got))
+        last = pieces[-1]
+        complete = last["to_s"] >= duration - 2.0 and not last["ended"]
+        used = [one["log"] for one in pieces]
+        self.progress.keep(name, {"pieces": pieces, "complete": complete}, *used)
+        if not complete:
+            if last["ended"]:
+                raise WorkError(f"{last['ended']}; {last['log']} is kept: the same command goes on from there")
+            raise KeyboardInterrupt
+        rows = sum(one["rows"] for one in pieces)
+        self._tell(name, f"{rows} rows in {', '.join(used)}")
+
+    def _adopt(self, name: str, pieces: Sequence[dict[str, Any]]) -> dict[str, Any] | None:
+        """Return the piece that a killed program left as NAME.part, now with a name of its own."""
+        for part in sorted(self.folder.glob(f"{name}*.csv.part")):
+            log = self.free(name)
+            part.rename(self.folder / log)
+            from_s = max((one["to_s"] for one in pieces if one["used"]), default=0.0)
+            return self._piece(log, from_s, Recording(ended=""))
+        return None
+
+    def _piece(self, log: str, from_s: float, got: Recording) -> dict[str, Any]:
+        """Return what is kept of a recording: a part of a plan that is shorter than a log's run-in tells nothing."""
+        run = read_log(self.folder / log, self.array.springs, temperatures=False)
+        began = float(run.time_s[0])
+        fault_s = next((one.time_s for one in got.faults if one.time_s is not None), None)
+        lasted = (float(run.time_s[-1]) if fault_s is None else min(fault_s, float(run.time_s[-1]))) - began
+        return {
+            "log": log,
+            "rows": len(run.time_s),
+            "from_s": from_s,
+            "to_s": from_s + lasted,
+            "ended": got.ended,
+            "used": lasted >= RUN_IN_S or (not from_s and lasted >= self.progress.option("duration") - 2.0),
+        }
+
+    def free(self, stem: str) -> str:
+        """Return the next name of a log in the folder."""
+        taken = {path.name for path in self.folder.iterdir()}
+        names = (f"{stem}.csv" if k == 1 else f"{stem}-{k}.csv" for k in range(1, 1000))
+        return next(one for one in names if one not in taken)
+
+    def _record(self, log: str, steps: Sequence[Step], duration_s: float, words: str) -> Recording:
+        """Record into the folder; the springs are off afterwards and the board has its own settings."""
+        keys = {
+            "recorded": datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%dT%H:%M:%SZ"),
+            "port": self.board.port,
+            "tool": f"ninespring {__version__} calibrate",
+        }
+        with told_to_stop() as stopped, working(words, duration_s) as say, self._logger() as logger:
+            file = LogFile(self.folder / log)
+            self.board.stopped = stopped
+            try:
+                got = record(
+                    self.board,
+                    file,
+                    1,
+                    duration_s,
+                    steps,
+                    lambda rows, seconds: say(f"{words}, {max(0.0, duration_s - seconds):.0f} s left", seconds),
+                    keys,
+                    logger,
+                )
+            finally:
+                file.close()
+            self.board.stopped = lambda: False
+            told = stopped()
+        if not file.rows:
+            if told:
+                raise KeyboardInterrupt
+            raise WorkError(got.ended or "no row came")
+        with contextlib.suppress(WorkError):
+            self._give_back_its_own()
+        return got
+
+    @contextlib.contextmanager
+    def _logger(self) -> Iterator[Thermometers]:
+        logger = Thermometers(self._thermometers)
+        try:
+            missing = set(range(1, self.array.springs + 1)) - set(logger.springs)
+            if missing:
+                raise WorkError(
+                    f"{self._thermometers}: no temperature of spring {', '.join(map(str, sorted(missing)))}: "
+                    "the logger's columns are t1_c, t2_c, ... (docs/calibrating.md)"
+                )
+            yield logger
+        finally:
+            logger.close()
+
+    def _cool(self) -> None:
+        """Wait until the thermometers have stopped falling: two drives are only alike from the same temperature."""
+        seen: list[tuple[float, float]] = []
+        with self._logger() as logger, working("waiting until the springs are cold") as say:
+            self.board.ask("telemetry csv 1")
+            try:
+                while (line := self.board.next_line(time.monotonic() + 10.0 * self.board.patience)) is not None:
+                    if not (match := ROW_TIME.match(line)):
+                        continue
+                    now_s, hottest = float(match[1]), max(logger.latest.values())
+                    seen.append((now_s, hottest))
+                    say(f"waiting until the springs are cold: the hottest is at {hottest:.0f} degC")
+                    before = [one for at_s, one in seen if at_s <= now_s - COOLED_S]
+                    if before and before[-1] - hottest < COOLED_K:
+                        return
+                    if now_s - seen[0][0] > COOLING_S:
+                        break
+            finally:
+                self.board.ask("telemetry off")
+        raise WorkError(f"the springs do not cool: still {seen[-1][1] if seen else float('nan'):.0f} degC")
+
+    # ---- what they tell
+
+    def _runs(self, name: str) -> list[Run]:
+        pieces = [one for one in self.progress.done[name]["pieces"] if one["used"]]
+        return [read_log(self.folder / one["log"], self.array.springs) for one in pieces]
+
+    def _diagnose(self) -> None:
+        if "diagnose" not in self.progress.done:
+            with working("diagnosing") as say:
+                found = diagnosis.diagnose(self.array, self._runs("run1"), progress=say)
+                say("writing its report")
+                folder = self.folder / DIAGNOSIS
+                folder.mkdir(exist_ok=True)
+                write_atomically(
+                    {
+                        folder / "diagnosis.json": results.checked(found.told),
+                        folder / "report.html": page.html_report(found, DIAGNOSIS),
+                        folder / "model.toml": model_text(found.model),
+                    }
+                )
+            told = found.told
+            self.progress.keep(
+                "diagnose",
+                {
+                    "verdict": page.verdict(told),
+                    "findings": [list(one) for one in page.findings(told)],
+                    "doubts": told.doubts,
+                    "noise_c": told.baseline.noise_c,
+                    "experiments": [one.separating_experiment for one in told.rivals],
+                },
+                f"{DIAGNOSIS}/model.toml",
+            )
+            self._tell("diagnose", page.verdict(told))
+            for name, text in page.findings(told):
+                self._tell("", f"{name}: {text}")
+        if doubts := self.progress.done["diagnose"]["doubts"]:
+            self._refuse(f"the log is doubted: {'; '.join(doubts)}. Mend that, and begin another folder")
+
+    def _refuse(self, why: str) -> None:
+        self.progress.refuse(why)
+        raise WorkError(f"nothing is saved on the board: {why}")
+
+    def _old_lines(self) -> str:
+        return as_lines(self.had)
+
+    def _verify(self) -> None:
+        if "verify" not in self.progress.done:
+            model, old, runs = self.model(), self._old_lines(), self._runs("run2")
+            lines = settings_of(model).lines
+            with working("verifying on the second run"):
+                errors = {
+                    "before": results.plain(chip_error(model, old, runs)),
+                    "after": results.plain(chip_error(model, f"{old}\n{lines}", runs)),
+                }
+            self.progress.keep("verify", errors)
+            self._tell(
+                "verify",
+                f"on the second run, which the fit never saw, the chip's model is {errors['before']['rmse_c']:.2f} K wrong "
+                f"(rms) as it is, {errors['after']['rmse_c']:.2f} K with what was found",
+            )
+        errors = self.progress.done["verify"]
+        if errors["after"]["rmse_c"] > errors["before"]["rmse_c"]:
+            self._refuse("the chip would be more wrong with the new settings on a log that the fit never saw")
+
+    def _export(self) -> None:
+        if "export" not in self.progress.done:
+            with working("driving the old and the new settings in simulation") as say:
+                made, worse, _ = checked_settings(self.model(), self._old_lines(), True, say)
+            head = ["# from model.toml, by `ninespring calibrate`"]
+            write_atomically({self.folder / SETTINGS: "\n".join([*head, made.lines])})
+            self.progress.keep(
+                "export",
+                {"settings": made.written, "kept": together(made.kept, made.written), "worse": worse},
+                SETTINGS,
+            )
+            self._tell(
+                "export",
+                f"{len(made.written)} settings were determined, {len(settings_that_differ(self._lines(), self.had))} of "
+                "them are others than the board has; in simulation they drive "
+                + ("worse: " + "; ".join(worse) if worse else "no worse"),
+            )
+        if worse := self.progress.done["export"]["worse"]:
+            self._refuse(f"the new settings would drive worse: {'; '.join(worse)}")
+
+    def _lines(self) -> list[str]:
+        return [f"${name}={value}" for name, value in self.progress.done["export"]["settings"].items()]
+
+    # ---- onto the board
+
+    def _drive(self, name: str, pattern: str) -> tuple[str, Recording]:
+        """Drive the pattern from cold and return its log; one that was interrupted stays, and is driven again."""
+        self._cool()
+        seconds = self.progress.option("drive_for")
+        lines = ["policy precompensate", "off all", "fan 0", f"at {PATTERN_AT_S:g} = pattern {pattern}"]
+        log = self.free(name)
+        got = self._record(log, script_lines("\n".join(lines), "drive"), seconds, f"{name}: driving")
+        run = read_log(self.folder / log, self.array.springs)
+        if run.duration_s < seconds - 2.0 and not got.faults:
+            if got.ended:
+                raise WorkError(f"{got.ended}; the same command drives again")
+            raise KeyboardInterrupt
+        return log, got
+
+    def _drive_before_and_after(self) -> None:
+        if "after" in self.progress.done:
+            self._say_how_it_ended()
+            return
+        lines = self._lines()
+        pattern, seconds = self.progress.option("pattern"), self.progress.option("drive_for")
+        changed = settings_that_differ(lines, self.had)
+        if not changed:
+            self.progress.keep("after", {"saved": False, "worse": [], "drives": []})
+            self._tell("upload", "the board has these settings already: nothing is written")
+            return
+        if not self._ask(
+            f"Now {pattern} is driven for {seconds / 60:.0f} min as the board is, {len(changed)} settings are sent, and it "
+            "is driven again; they are saved only if it drives no worse. What the board has learnt of its springs it forgets. "
+            "May it?"
+        ):
+            raise WorkError("stopped before anything was written; the same command goes on from here")
+        model, noise = self.model(), self.progress.done["diagnose"]["noise_c"]
+        if "before" not in self.progress.done:
+            log, got = self._drive("before", pattern)
+            made = judged.judge(model, self.folder / log, pattern)
+            self.progress.keep("before", {"log": log, "faults": list(map(str, got.faults)), **made.as_dict()}, log)
+            self._tell("drive", _words("as the board was", made.as_dict(), got.faults))
+            if got.faults:
+                raise WorkError(
+                    f"{got.ended}: `clear` the fault, then the same command goes on (the drive is kept as it was)"
+                )
+        before = self.progress.done["before"]
+        saved = False
+        try:
+            with working("sending the settings", len(lines)) as say:
+                send_settings(self.board, lines, False, say)
+            self._tell("upload", f"{len(lines)} settings sent and read back, not yet saved")
+            drives, worse = [], []
+            for _ in range(DRIVES):
+                log, got = self._drive("after", pattern)
+                made = judged.judge(model, self.folder / log, pattern)
+                worse = judged.worse_than(judged.of(before), made, noise)
+                if got.faults and not before["faults"]:
+                    worse.append(f"it ended in {got.faults[0]}")
+                drives.append({"log": log, "faults": list(map(str, got.faults)), "worse": worse, **made.as_dict()})
+                self._tell("drive", _words("with the new settings", made.as_dict(), got.faults))
+                if not worse or got.faults:
+                    break
+            if not worse:
+                self.board.ask("$save", 10.0)
+                saved = True
+                sent = dict(line[1:].split("=", 1) for line in lines)
+                by = f"calibrate -o {self.folder.name}"
+                history.keep(self.board.port, self.board.version[0], by, self.had, sent)
+        finally:
+            if not saved:
+                self._take_back(lines)
+        self.progress.keep("after", {"saved": saved, "worse": worse, "drives": drives}, *(one["log"] for one in drives))
+        self._say_how_it_ended()
+
+    def _say_how_it_ended(self) -> None:
+        after = self.progress.done["after"]
+        if after["worse"]:
+            self._refuse(
+                f"the board drove worse with the new settings: {'; '.join(after['worse'])}. It has its own again"
+            )
+        self._tell("upload", "the new settings are saved" if after["saved"] else "there was nothing to write")
+
+    def _take_back(self, lines: Sequence[str]) -> None:
+        """Give the board back the settings that it had in place of these: nothing of them was saved."""
+        names = [line[1:].partition("=")[0] for line in lines]
+        old = [f"${name}={self.had[name]}" for name in names if name in self.had]
+        try:
+            for line in old:
+                self.board.ask(line)
+            wrong = settings_that_differ(old, self.board.settings())
+        except (WorkError, KeyboardInterrupt):
+            wrong = ["it does not answer"]
+        if wrong:
+            self._tell(
+                "", f"the board could not be given back its settings ({wrong[0]}): a reset does it, none was saved"
+            )
+        else:
+            self._tell("", "the board has its own settings again; none was saved")
+
+
+def as_lines(settings: dict[str, str]) -> str:
+    """Return settings as console lines."""
+    return "".join(f"${name}={value}\n" for name, value in settings.items())
+
+
+def _words(how: str, found: dict[str, float], faults: Sequence[Any]) -> str:
+    said = (
+        f"{how}: the chip {found['error_c']:.2f} K wrong (rms), springs that are on hold {found['held']:.0%} austenite, "
+        f"hottest {found['hottest_c']:.0f} degC"
+    )
+    return said + (f"; {faults[0]}" if faults else "")

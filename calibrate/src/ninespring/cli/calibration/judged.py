@@ -1,0 +1,120 @@
+"""A drive that was measured, judged like those that `export` tries: what held, how hot it got, what the chip believed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...export import drive as tried
+from ...export.settings import best_plant
+from ...io.logs import Run, read_log, read_table
+from ...model import native
+from ...model.models import Model
+from ...model.simulate import started
+
+FLOWING_A = 0.3
+"""From the first row with this much a spring counts as driven: after power-on a board first waits until it knows its springs."""
+
+
+@dataclass
+class Judged:
+    """A measured drive."""
+
+    drive: tried.Drive
+    error_c: float
+    """The chip's temperatures less the thermometers', K rms."""
+    worst_spring: int
+    """1 = top left: the one that the chip knows worst."""
+    worst_c: float
+    """Its error, K rms."""
+
+    def as_dict(self) -> dict[str, float]:
+        """Return all numbers."""
+        return {name: float(value) for name, value in asdict(self.drive).items()} | {
+            "error_c": self.error_c,
+            "worst_spring": self.worst_spring,
+            "worst_c": self.worst_c,
+        }
+
+
+def believed(log: Path, run: Run) -> np.ndarray:
+    """Return the chip's temperatures at a recorded log's rows, (rows, springs), degC."""
+    frame = read_table(log, ("state",)).frame
+    rows = np.searchsorted(frame["time_s"].to_numpy(float), run.time_s)
+    return frame[[f"m{k + 1}_c" for k in range(run.springs)]].to_numpy(float)[rows]
+
+
+def austenite_of(model: Model, run: Run) -> np.ndarray:
+    """Return the phase along a log, (rows, springs): each spring as hot as its thermometer says, by power where it has none."""
+    plant = best_plant(model)
+    plant.reset()
+    plant = started(plant, run, run.ambient_c, 0)
+    mode = native.MODES[run.mode]
+    out = np.empty_like(run.temperature_c)
+    for row in range(len(run.time_s)):
+        for k in range(run.springs):
+            seen = run.temperature_c[row, k]
+            if np.isfinite(seen):
+                plant.set_temperature(k, float(seen))
+        out[row] = plant.austenite()
+        if row + 1 == len(run.time_s):
+            break
+        for k in range(run.springs):
+            plant.drive(k, mode, float(run.drive[row, k]))
+        plant.set_fan(float(run.fan[row]))
+        plant.step(float(run.time_s[row + 1] - run.time_s[row]))
+    return out
+
+
+def judge(model: Model, log: Path, springs_on: str) -> Judged:
+    """Return what a recorded drive of a pattern (`111101111`) did."""
+    pattern = np.array([one == "1" for one in springs_on])
+    run = read_log(log, len(pattern))
+    austenite = austenite_of(model, run)
+    current = run.current_a if run.current_a is not None else run.drive
+    flowing = np.flatnonzero((current > FLOWING_A).any(axis=1))
+    first = int(flowing[0]) if flowing.size else 0
+    on, measured = austenite[first:][:, pattern], run.temperature_c
+    heated = np.minimum.reduce(on, axis=1) >= tried.TRANSFORMED
+    off = austenite[:, ~pattern]
+    plant = best_plant(model)
+    made = tried.Drive(
+        held=float(on[len(on) // 2 :].mean()),
+        heating_s=float(run.time_s[first + int(np.argmax(heated))] - run.time_s[first])
+        if heated.any()
+        else run.duration_s,
+        hottest_c=float(np.nanmax(measured)),
+        enough_c=plant.get("austenite_finish_c") + tried.ENOUGH_K,
+        undriven=float(off.max()) if off.size else 0.0,
+        done=float(on.mean()),
+    )
+    left = believed(log, run) - measured
+    each = np.sqrt(np.nanmean(left**2, axis=0))
+    return Judged(made, float(np.sqrt(np.nanmean(left**2))), int(np.nanargmax(each)) + 1, float(np.nanmax(each)))
+
+
+def worse_than(before: Judged, after: Judged, noise_c: float) -> list[str]:
+    """Return in what a measured drive is worse than the one before it, in words.
+
+    By the measures of `export`, without those of which one drive tells nothing; and by the chip's error, where it grew by
+    more than a thermometer's noise.
+    """
+    found = [one for one in tried.worse_than(before.drive, after.drive) if not tried.WORSE[one].chance]
+    out = [
+        tried.WORSE[one].words.format(old=getattr(before.drive, one), new=getattr(after.drive, one)) for one in found
+    ]
+    if after.error_c > before.error_c + noise_c:
+        out.append(
+            f"the chip was {before.error_c:.2f} K wrong (rms), and is {after.error_c:.2f} K with the new settings"
+        )
+    return out
+
+
+def of(found: Mapping[str, Any]) -> Judged:
+    """Return what `as_dict` told."""
+    made = tried.Drive(**{one.name: found[one.name] for one in fields(tried.Drive)})
+    return Judged(made, found["error_c"], int(found["worst_spring"]), found["worst_c"])

@@ -1,0 +1,135 @@
+"""report.html of a calibration: what was found step by step, how the board drove before and after, what it was sent."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import matplotlib
+
+matplotlib.use("svg")
+import matplotlib.pyplot as plt
+import numpy as np
+from markupsafe import Markup
+
+from ...io import results
+from ...io.logs import read_log
+from ...model.models import Array
+from ...say.figures import AFTER, BEFORE, INK, MEASURED, as_svg
+from ...say.page import render
+from ...say.verified import error_rows
+from .chain import DIAGNOSIS, OLD_SETTINGS, SETTINGS
+from .judged import believed
+from .progress import Progress
+
+COLOURS = [BEFORE, AFTER, "#8a6d3b"]
+
+
+def verdict(progress: Progress) -> str:
+    """Return how it ended, in a sentence."""
+    done = progress.done
+    if progress.data["refused"]:
+        return f"Nothing was saved on the board: {progress.data['refused']}."
+    if "after" not in done:
+        return "Not finished: the same command goes on from here."
+    if not done["after"]["saved"]:
+        return "The board had these settings already: nothing was written."
+    before, after = done["before"], done["after"]["drives"][-1]
+    return (
+        f"The new settings are on the board. It was {before['error_c']:.1f} K wrong (rms) about its springs while it drove "
+        f"them, and is {after['error_c']:.1f} K wrong now."
+    )
+
+
+def page(progress: Progress, array: Array) -> str:
+    """Return the report of what is done so far, as HTML."""
+    done = progress.done
+    drives = [one for one in (done.get("before"), *done.get("after", {}).get("drives", [])) if one]
+    return render(
+        "calibration.html",
+        title="Ninespring calibration",
+        refused=progress.data["refused"],
+        verdict=verdict(progress),
+        pattern=progress.option("pattern"),
+        drives=_drives(progress, array, drives) if drives else None,
+        diagnosed=done["diagnose"],
+        diagnosis=DIAGNOSIS,
+        verified=_verified(done["verify"]) if "verify" in done else None,
+        exported=_exported(progress) if "export" in done else None,
+        measured=_measured(progress),
+        tool=progress.data["tool"],
+        version=progress.data["board"]["version"][0],
+    )
+
+
+def _drives(progress: Progress, array: Array, drives: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    names = ["as the board was", *(["with the new settings"] if len(drives) > 1 else [])]
+    shown = [drives[0], *drives[-1:]] if len(drives) > 1 else [drives[0]]
+    measures = (
+        ("the chip's error, K rms", "error_c", "{:.2f}"),
+        ("its worst spring's, K rms", "worst_c", "{:.1f}"),
+        ("springs that are on hold, % austenite", "held", "{:.0%}"),
+        ("springs that are off reach, % austenite", "undriven", "{:.0%}"),
+        ("hottest, degC", "hottest_c", "{:.0f}"),
+        ("from the first current until all have transformed, s", "heating_s", "{:.0f}"),
+    )
+    return {
+        "figure": Markup(_picture(progress, array, shown, names)),
+        "header": ["", *names],
+        "rows": [[label, *(form.format(one[key]).rstrip("%") for one in shown)] for label, key, form in measures],
+        "faults": [fault for one in drives for fault in one["faults"]],
+    }
+
+
+def _picture(progress: Progress, array: Array, shown: Sequence[dict[str, Any]], names: Sequence[str]) -> str:
+    """Draw the worst and the best known spring and one that is off, measured and believed, a panel a drive."""
+    logs = [progress.folder / one["log"] for one in shown]
+    runs = [read_log(log, array.springs) for log in logs]
+    thought = [believed(log, run) for log, run in zip(logs, runs, strict=True)]
+    error = np.sqrt(np.nanmean((thought[0] - runs[0].temperature_c) ** 2, axis=0))
+    on = [k for k, one in enumerate(progress.option("pattern")) if one == "1"]
+    off = [k for k in range(array.springs) if k not in on]
+    picked = list(dict.fromkeys([max(on, key=lambda k: error[k]), min(on, key=lambda k: error[k]), *off[:1]]))
+    figure, axes = plt.subplots(1, len(runs), figsize=(5.2 * len(runs), 3.6), sharey=True, squeeze=False)
+    for axis, run, belief, name in zip(axes[0], runs, thought, names, strict=True):
+        since = run.time_s - run.time_s[0]
+        for k, colour in zip(picked, COLOURS, strict=False):
+            axis.plot(since, run.temperature_c[:, k], color=MEASURED, lw=3.0)
+            axis.plot(since, belief[:, k], color=colour, lw=1.2, label=f"spring {k + 1}{'' if k in on else ', off'}")
+        axis.set_title(name, fontsize=10, loc="left", color=INK)
+        axis.set_xlabel("time, s", fontsize=9)
+        axis.grid(alpha=0.25)
+        axis.tick_params(labelsize=8)
+    axes[0][0].set_ylabel("temperature, °C", fontsize=9)
+    axes[0][0].legend(fontsize=8, frameon=False, loc="lower right")
+    figure.tight_layout()
+    return as_svg(figure)
+
+
+def _verified(errors: dict[str, Any]) -> list[tuple[str, str, str]]:
+    return error_rows(*(results.read(results.ChipError, errors[when]) for when in ("before", "after")))
+
+
+def _exported(progress: Progress) -> dict[str, Any]:
+    export, had = progress.done["export"], progress.data["board"]["settings"]
+    sent = {name: value for name, value in export["settings"].items() if float(had.get(name, "nan")) != float(value)}
+    return {
+        "sent": [(f"${name}", had.get(name, "–"), value) for name, value in sent.items()],
+        "kept": export["kept"],
+        "new": SETTINGS,
+        "old": OLD_SETTINGS,
+        "old_path": progress.folder / OLD_SETTINGS,
+    }
+
+
+def _measured(progress: Progress) -> list[tuple[object, ...]]:
+    return [
+        (
+            one["log"],
+            f"{one['from_s']:.0f} to {one['to_s']:.0f}",
+            one["rows"],
+            one["ended"] or ("" if one["used"] else "too short to count"),
+        )
+        for name in ("run1", "run2")
+        for one in progress.done.get(name, {}).get("pieces", [])
+    ]

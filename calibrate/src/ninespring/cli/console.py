@@ -1,0 +1,185 @@
+"""What all commands share: consoles, options, how a result is written."""
+
+from __future__ import annotations
+
+import math
+import os
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+from rich.console import Console
+from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from ..errors import InputError
+from ..io import results
+from ..io.logs import Run, read_log, sha256_of, write_atomically
+from ..io.ranges import Range
+from ..model.models import array_of, read_array
+
+WIDE = 160
+"""Columns of a table that goes to a file or a pipe."""
+FEWEST_ROWS = 50
+"""Logs with fewer rows than this, all together, are no measurement to fit to."""
+
+out = Console(highlight=False, width=None if sys.stdout.isatty() else WIDE)
+err = Console(stderr=True, highlight=False, width=None if sys.stderr.isatty() else WIDE)
+FILE = click.Path(dir_okay=False, path_type=Path)
+JSON = click.option("--json", "json_path", type=FILE, help="write the result for programs")
+ARRAY = click.option(
+    "--array", "array_path", type=FILE, help="array.toml; left out: a square (or 1 x 2) of the paper's spring"
+)
+MODEL = click.option("--model", "model_path", type=FILE, required=True, help="model.toml that fit or diagnose wrote")
+PORT = click.option("--port", required=True, help="serial port, e.g. /dev/ttyACM0; 115200 baud")
+FORCE = click.option("--force", is_flag=True, help="write over a file that is there, whatever it is")
+OUTPUTS = ("output", "json_path")
+"""Parameters of commands that name files to write; every other path is an input."""
+IN_A_FOLDER = ("diagnosis.json", "report.html", "model.toml")
+"""What is written where the output is a folder."""
+
+
+class Command(click.Command):
+    """A command that never writes over what it reads, nor two results into one file."""
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Compare the command's paths before any work is done."""
+        written: list[Path] = []
+        read: list[Path] = []
+        for name, value in ctx.params.items():
+            paths = [Path(one) for one in (value if isinstance(value, tuple) else (value,)) if _names_a_file(one)]
+            if name in OUTPUTS:
+                written += [path / one for path in paths for one in IN_A_FOLDER] if _is_folder(ctx, name) else paths
+            else:
+                read += paths
+        for number, path in enumerate(written):
+            if str(path) == "-" or (path.exists() and not path.is_file()):
+                continue  # standard output, a device
+            for other in read:
+                if _same(path, other):
+                    raise InputError("would be written over, and it is read: give the result another name", path)
+            if any(_same(path, other) for other in written[:number]):
+                raise InputError("two results cannot be written into one file", path)
+        return super().invoke(ctx)
+
+
+def _names_a_file(value: Any) -> bool:
+    return isinstance(value, Path) or (isinstance(value, str) and Path(value).is_file())
+
+
+def _is_folder(ctx: click.Context, name: str) -> bool:
+    kinds = {one.name: one.type for one in ctx.command.params}
+    return isinstance(kinds[name], click.Path) and not kinds[name].file_okay
+
+
+def _same(one: Path, other: Path) -> bool:
+    if one.exists() and other.exists():
+        return os.path.samefile(one, other)
+    return one.resolve() == other.resolve()
+
+
+class Real(click.FloatRange):
+    """An option's number: finite, and in its range."""
+
+    def __init__(self, within: Range) -> None:
+        super().__init__(within.low, within.high, min_open=within.above)
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """Return the number; a comparison with NaN is never true, so that the range alone would let it through."""
+        number = super().convert(value, param, ctx)
+        if not math.isfinite(number):
+            self.fail(f"{value} is not in the range {self._describe_range()}.", param, ctx)
+        return number
+
+
+class Whole(click.IntRange):
+    """An option's whole number, in its range."""
+
+    def __init__(self, within: Range) -> None:
+        super().__init__(int(within.low), int(within.high))
+
+
+@contextmanager
+def working(text: str, total: float | None = None) -> Iterator[Callable[..., None]]:
+    """Show that work goes on, on the terminal's error stream: say(words), say(words, done) with a total."""
+    with Progress(
+        SpinnerColumn(),
+        *(() if total is None else (BarColumn(),)),
+        TextColumn("{task.description}"),
+        TimeElapsedColumn(),
+        console=err,
+        transient=True,
+        disable=not err.is_terminal,
+    ) as progress:
+        task = progress.add_task(text, total=total)
+        yield lambda now, done=None: progress.update(task, description=now, completed=done)
+
+
+def write(files: Mapping[Path | None, str | bytes], force: bool = False) -> None:
+    """Write a command's files, all or none as far as a file system goes; a file named None is not wanted."""
+    write_atomically({path: text for path, text in files.items() if path}, force)
+
+
+def array_and_runs(
+    array_path: Path | None, logs: tuple[Path, ...], model: Any = None, or_resistance: bool = False
+) -> tuple[Any, list[Run]]:
+    """Read logs of one array; refuse what does not go together or is no measurement.
+
+    `or_resistance`: logs of currents and voltages need no temperature.
+    """
+    array = model.array if model else read_array(array_path) if array_path else None
+    runs = [read_log(path, array.springs if array else None, or_resistance=or_resistance) for path in logs]
+    array = array_of(array, runs)
+    if len({bool(np.isfinite(run.temperature_c).any()) for run in runs}) > 1:
+        raise InputError("some of these logs have temperatures and others none: give one kind at a time", logs[0])
+    modes = {run.mode for run in runs}
+    if len(modes) > 1:
+        raise InputError(f"the logs are driven by {' and '.join(sorted(modes))}: diagnose one kind at a time")
+    if (rows := sum(len(run.time_s) for run in runs)) < FEWEST_ROWS:
+        raise InputError(f"{rows} rows are too few to fit to: log some minutes (docs/calibrating.md)", runs[0].name)
+    if not any(np.any(run.drive) for run in runs):
+        raise InputError(
+            "no spring is ever driven: log what the springs were given (i1_a ... or u1 ...)", runs[0].name, 1
+        )
+    return array, runs
+
+
+def notes_of(runs: list[Run]) -> None:
+    """Print what was mended of logs, and what is doubted."""
+    for run in runs:
+        notes(f"{Path(run.name).name}: ", run.notes)
+
+
+def notes(where: str, lines: list[str]) -> None:
+    """Print lines about the data, each behind `where`."""
+    for note in lines:
+        err.print(where + note, style="yellow", markup=False)
+
+
+def beside(output: Path) -> Console:
+    """Return where to talk: standard output, unless the result itself goes there."""
+    return err if str(output) == "-" else out
+
+
+def logs_of(runs: Sequence[Run]) -> list[results.Log]:
+    """Return which logs a result is from."""
+    return [results.Log(file=Path(r.name).name, sha256=r.sha256, rows=len(r.time_s), notes=list(r.notes)) for r in runs]
+
+
+def source_of(path: Path) -> results.Source:
+    """Return which file a result is from."""
+    return results.Source(file=path.name, sha256=sha256_of(path))
+
+
+def print_parameters(console: Console, parameters: results.Parameters) -> None:
+    """Print a table of numbers."""
+    table = Table("number", "value", "standard error", "in 95 of 100 cases", "unit", "")
+    for name, one in parameters.items():
+        error = "-" if one.stderr is None else f"{one.stderr:.2g}"
+        ends = "{:.4g} .. {:.4g}".format(*one.interval_95) if one.interval_95 else "-"
+        table.add_row(name, f"{one.value:.5g}", error, ends, one.unit, one.note or "")
+    console.print(table)

@@ -1,0 +1,126 @@
+"""`ninespring couplings`."""
+
+from __future__ import annotations
+
+import importlib
+from pathlib import Path
+
+import click
+from rich.table import Table
+
+from ..errors import InputError, WorkError
+from ..explore.couplings import couplings as find
+from ..explore.geometry import geometry_of
+from ..io import results
+from ..io.logs import check_folder
+from ..model.models import model_text, read_array
+from ..model.native import parameter_table
+from .console import FILE, JSON, Command, beside, working, write
+
+MESHES = ("coarse", "normal", "fine")
+
+
+def need(*modules: str) -> None:
+    """Refuse where what `ninespring[explore]` installs is not there."""
+    for name in modules:
+        try:
+            importlib.import_module(name)
+        except ImportError as error:
+            raise WorkError(
+                f"{name} is missing ({error}): script/setup installs it in the tree, elsewhere pip install '.[explore]' in the source tree"
+            ) from None
+        except OSError as error:
+            raise WorkError(f"{name} does not load ({error}): docs/exploring.md names the system's libraries") from None
+
+
+@click.command(
+    cls=Command,
+    epilog="""\b
+Examples:
+  ninespring couplings array.toml -o model.toml
+  ninespring couplings array.toml --mesh fine --json couplings.json -o model.toml
+""",
+)
+@click.argument("array_path", metavar="ARRAY.TOML", type=FILE)
+@click.option("--mesh", type=click.Choice(MESHES), default="normal", show_default=True, help="size of the elements")
+@click.option("-o", "--output", type=FILE, required=True, help="model.toml to write; - prints it")
+@JSON
+def couplings(array_path: Path, mesh: str, output: Path, json_path: Path | None) -> None:
+    """Reckon loss and couplings of an array from its geometry: a field solution, reduced to the model's numbers.
+
+    What cools it stands in [cooling] of array.toml. Nothing measured goes in: docs/exploring.md says how far that carries.
+    """
+    check_folder(output, json_path)
+    array = read_array(array_path)
+    try:
+        geometry_of(array)
+    except InputError as error:
+        raise InputError(error.message, array_path) from None
+    need("skfem", "gmsh")
+    with working("meshing") as say:
+        found = find(array, mesh, say)
+    shown = Table("number", "value", "reduction", "mesh", "unit")
+    seen: set[str] = set()
+    for full, one in _parameters(found).items():
+        name = _found(full)
+        if name in found.lumped.reduction and name not in seen:
+            seen.add(name)
+            shown.add_row(
+                name,
+                f"{one.value:.4g}",
+                f"{one.reduction_error:.1g}",
+                f"{one.mesh_error or 0.0:.1g}",
+                one.unit,
+            )
+    talk = beside(output)
+    talk.print(shown)
+    spring, part = found.geometry.spring, found.geometry
+    lines = [
+        f"a coil of {spring.coil_mm:g} mm, {spring.spacing_mm:.3g} mm from turn to turn, conducts into the air like a "
+        f"cylinder of {2 * spring.radius_mm:.3g} mm",
+        f"between springs two apart, from the field: {1e3 * found.pairs.second:.3f} mW/K"
+        + (f", blown {1e3 * found.pairs_blown.second:.3f}" if found.pairs_blown else ""),
+        f"network against field, random drive, 15 min: {100 * found.drive_error:.1f} % of the rise, rms",
+        f"field: {part.rows} x {part.cols} springs, {found.still.unknowns} unknowns; heat in less heat out "
+        f"{100 * max(found.still.balance, found.blown.balance if found.blown else 0.0):.1g} %",
+    ]
+    if part.below:
+        lines.insert(
+            1,
+            f"[stiffness] springs: {part.below.spring.spacing_mm:.3g} mm from turn to turn, like a cylinder of "
+            f"{2 * part.below.spring.radius_mm:.3g} mm; between the two of a taxel, from the field: "
+            f"{1e3 * found.pairs.series:.3f} mW/K",
+        )
+    for line in lines:
+        talk.print(line, soft_wrap=True, markup=False)
+    result = results.Couplings(
+        mesh=mesh,
+        unknowns=found.still.unknowns,
+        cylinder_diameter_mm=2 * spring.radius_mm,
+        drive_error=found.drive_error,
+        balance_error=found.still.balance,
+        second_w_per_k=found.pairs.second,
+        second_fan_w_per_k=found.pairs_blown.second if found.pairs_blown else None,
+        parameters=_parameters(found),
+    )
+    write({output: model_text(found.model), json_path: results.checked(result)})
+    if str(output) != "-":
+        talk.print(f"-> {output}", soft_wrap=True, markup=False)
+
+
+def _found(full: str) -> str:
+    """Return what the network calls a parameter of the model: those of single springs are the stiffness layer's."""
+    name, _, of_one = full.partition("[")
+    return f"stiffness_{name}" if of_one else name
+
+
+def _parameters(found: object) -> dict[str, results.Coupling]:
+    return {
+        name: results.Coupling(
+            value=value,
+            unit=parameter_table()[name.partition("[")[0]].unit,
+            reduction_error=found.lumped.reduction.get(_found(name)),
+            mesh_error=found.mesh_error.get(_found(name)),
+        )
+        for name, value in found.model.parameters.items()
+    }

@@ -1,0 +1,140 @@
+"""`ninespring diagnose`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+from rich.table import Table
+
+from ..errors import InputError
+from ..find import board_alone, diagnosis, steady
+from ..infer import from_resistance
+from ..io import results
+from ..io.logs import check_folder
+from ..model.models import model_text, read_model
+from ..say import page as report
+from .console import ARRAY, FILE, IN_A_FOLDER, Command, array_and_runs, out, working, write
+
+
+@click.command(
+    cls=Command,
+    epilog="""\b
+Examples:
+  ninespring diagnose run1.csv run2.csv -o diagnosis
+  ninespring diagnose --array array.toml tclab.csv -o diagnosis
+  ninespring diagnose --model model.toml --frozen run3.csv -o check
+  ninespring diagnose --model model.toml --frozen steady.csv -o steady
+""",
+)
+@click.argument("logs", nargs=-1, required=True, type=FILE)
+@ARRAY
+@click.option("--model", "model_path", type=FILE, help="model.toml: declared values and effects already on")
+@click.option("--frozen", is_flag=True, help="keep the model's values as they are; fit effects only")
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(file_okay=False, path_type=Path),
+    required=True,
+    help="folder for diagnosis.json, report.html, model.toml",
+)
+@click.option("--json", "json_path", type=FILE, help="write diagnosis.json here too")
+def diagnose(
+    logs: tuple[Path, ...],
+    array_path: Path | None,
+    model_path: Path | None,
+    frozen: bool,
+    output: Path,
+    json_path: Path | None,
+) -> None:
+    """Find the effect that the model lacks: writes diagnosis.json, report.html, model.toml.
+
+    LOGS are logs of one array, or one steady table (docs/files.md). Logs of a board alone, currents and voltages without any
+    temperature, are diagnosed from v / i: degrees stay open. Errors are root mean squares in K; evidence is in
+    nats, the logarithm of how many times likelier the data are with the effect.
+    """
+    check_folder(json_path)
+    if output.is_dir():
+        check_folder(*(output / name for name in IN_A_FOLDER))
+    if frozen and not model_path:
+        raise InputError("--frozen needs --model")
+    model = read_model(model_path) if model_path else None
+    if any(steady.is_steady(path) for path in logs):
+        if len(logs) > 1:
+            raise InputError("give one steady table, or logs")
+        with working("fitting") as say:
+            told, made = steady.diagnose_table(logs[0], model, array_path, frozen, say)
+        page = report.steady_report(told)
+    else:
+        array, runs = array_and_runs(array_path, logs, model, or_resistance=True)
+        if from_resistance.has_none(runs):
+            if model_path:
+                raise InputError("without a thermometer give logs and an array only, no --model", logs[0])
+            with working("fitting v / i") as say:
+                told, made = board_alone.diagnose(array, runs, say)
+            page = report.board_report(told, str(output))
+        else:
+            with working("fitting") as say:
+                found = diagnosis.diagnose(array, runs, model=model, frozen=frozen, progress=say)
+                say("writing the report")
+                page = report.html_report(found, str(output))
+            told, made = found.told, found.model
+    text = results.checked(told)
+    files: dict[Path | None, str] = {
+        output / "diagnosis.json": text,
+        output / "report.html": page,
+        output / "model.toml": model_text(made),
+        json_path: text,
+    }
+    try:
+        output.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"cannot be made a folder: {error.strerror}", output) from None
+    write(files)
+    for note in told.warnings:
+        if "isolated spike" not in note:
+            out.print(f"note: {note}", style="yellow", markup=False)
+    if isinstance(told, results.SteadyDiagnosis):
+        _print_steady(told)
+    elif isinstance(told, results.BoardDiagnosis):
+        for line in (report.board_verdict(told), *(one.text for one in told.effects)):
+            out.print(line, markup=False)
+    else:
+        _print_diagnosis(told, report.verdict(told))
+    out.print(f"-> {output / 'report.html'}", soft_wrap=True)
+
+
+def _print_steady(told: results.SteadyDiagnosis) -> None:
+    table = Table(*report.HEADER)
+    for row in report.candidate_rows(told):
+        table.add_row(*row)
+    out.print(f"before: {told.baseline.rmse_c:.2f} K rms, frozen model")
+    out.print(table)
+    for one in told.rivals:
+        out.print(f"{one.instead_of} or {one.name}: these numbers cannot tell. {one.separating_experiment}")
+
+
+def _print_diagnosis(told: results.Diagnosis, verdict: str) -> None:
+    out.print(verdict, style="bold", markup=False)
+    if told.effects:
+        table = Table("effect", "error, K", "held out, K", "evidence, nats", "numbers", "chip")
+        for one in told.effects:
+            table.add_row(
+                one.called,
+                f"{one.rmse_c:.3f}",
+                f"{one.holdout_rmse_c:.3f}",
+                f"{one.evidence:.0f}",
+                "\n".join(f"{k} {report.with_unit(v)}" for k, v in list(one.parameters.items())[:4]),
+                "yes" if one.on_chip else "no",
+            )
+        out.print(table)
+    lines = [f"{one.text} Its own in each run: not in model.toml." for one in told.runs_differ]
+    lines += [
+        f"{one.instead_of} or {one.name}: these data cannot tell. {one.separating_experiment}" for one in told.rivals
+    ]
+    lines += [f"{what}: {text}" for what, text in report.without_name(told)]
+    if told.unexplained:
+        lines.append(f"unexplained: {told.residual.note}")
+    lines += [f"{one.name} is not exported: {one.why_not_on_chip}" for one in told.effects if one.why_not_on_chip]
+    for line in lines:
+        out.print(line, markup=False)

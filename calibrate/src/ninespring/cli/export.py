@@ -1,0 +1,162 @@
+"""`ninespring export` and `ninespring verify`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from ..errors import InputError, WorkError
+from ..export.drive import checked_settings
+from ..export.settings import left_out, settings_of, together
+from ..infer.predict import chip_error
+from ..io import results
+from ..io.board import Board, console_lines
+from ..io.logs import check_folder, read_bytes, read_log
+from ..model.models import Model, model_of_layer, read_model
+from ..model.stiffness import LAYERS
+from ..say.verified import with_verification
+from .console import FILE, JSON, MODEL, Command, beside, logs_of, notes_of, out, source_of, working, write
+
+CHIP = click.option(
+    "--chip",
+    "chip_path",
+    type=FILE,
+    help="what the board has now, the lines that `$$` prints; left out: the firmware's defaults",
+)
+LAYER = click.option(
+    "--layer", type=click.Choice(LAYERS), help="of a model with a stiffness layer: whose board it is, a board for each"
+)
+
+
+def _model(path: Path, layer: str | None) -> Model:
+    model = read_model(path)
+    if layer:
+        return model_of_layer(model, layer)
+    if model.array.layers > 1:
+        raise InputError("a stiffness layer, and a board is of one: say --layer elongation or --layer stiffness", path)
+    return model
+
+
+def _chip_lines(path: Path | None) -> str:
+    return "\n".join(console_lines(path)) if path else ""
+
+
+@click.command(
+    cls=Command,
+    epilog="""\b
+Examples:
+  ninespring export --model diagnosis/model.toml -o settings.txt
+  ninespring export --model diagnosis/model.toml --chip now.txt -o -
+""",
+)
+@MODEL
+@click.option("-o", "--output", type=FILE, required=True, help="console lines to write, `$name=value`; - prints them")
+@CHIP
+@LAYER
+@click.option(
+    "--force", is_flag=True, help="write even settings of a doubted log, or that drive worse than the board's own"
+)
+@JSON
+def export(
+    model_path: Path, output: Path, chip_path: Path | None, layer: str | None, force: bool, json_path: Path | None
+) -> None:
+    """Write the console lines that put a model into the chip.
+
+    Only what the logs determined is written: the rest stays as the chip has it, and the file says which and why. Before
+    writing, arrays like the model's are driven with the old and the new settings, and settings with which springs hold
+    less, heat later, get hotter than transforming takes or disturb the ones that are off are refused. So is a model of a log
+    that the diagnosis doubted.
+    """
+    check_folder(output, json_path)
+    model = _model(model_path, layer)
+    doubts = list(model.provenance.get("doubts", []))
+    with working("driving the old and the new settings") as say:
+        made, worse, drives = checked_settings(model, _chip_lines(chip_path), force, say)
+    left = left_out(model)
+    head = [
+        f"# from {model_path.name}, by `ninespring export`",
+        *(f"# doubted, written by --force: {one}" for one in doubts),
+        *(f"# worse, written by --force: {one}" for one in worse),
+        *(f"# {e} is left out: {why}" for e, why in left.items()),
+        *(f"# not written, {why}: {', '.join(names)}" for why, names in together(made.kept, made.written).items()),
+    ]
+    result = results.Export(
+        model=source_of(model_path),
+        settings={name: float(value) for name, value in made.written.items()},
+        kept=made.kept,
+        left_out=left,
+        worse=worse,
+        drives=drives,
+    )
+    write({output: "\n".join([*head, made.lines]), json_path: results.checked(result)})
+    said = beside(output)
+    if made.remarks:
+        said.print(made.remarks, markup=False)
+    for line in head[1:]:
+        said.print(line[2:], markup=False)
+    said.print(f"{len(made.written)} settings -> {output} (`ninespring upload` sends them)")
+
+
+@click.command(
+    cls=Command,
+    epilog="""\b
+Examples:
+  ninespring verify --model diagnosis/model.toml run3.csv --report diagnosis/report.html
+  ninespring verify --model diagnosis/model.toml --port /dev/ttyACM0 run3.csv
+""",
+)
+@click.argument("log", type=FILE)
+@MODEL
+@CHIP
+@LAYER
+@click.option("--port", help="serial port of the board: what it has now is the 'before'")
+@click.option("--report", "report_path", type=FILE, help="report.html of the diagnosis: put before and after into it")
+@JSON
+def verify(
+    log: Path,
+    model_path: Path,
+    chip_path: Path | None,
+    layer: str | None,
+    port: str | None,
+    report_path: Path | None,
+    json_path: Path | None,
+) -> None:
+    """Tell the chip's error before and after, on a log that the fit never saw.
+
+    Before: the settings that the board has (--port, --chip) or the firmware's defaults. After: with what `export` writes
+    of the model over them.
+    """
+    check_folder(report_path, json_path)
+    report = read_bytes(report_path).decode("utf-8", "replace") if report_path else ""
+    if report and "</main>" not in report:
+        raise InputError("is no report of `ninespring diagnose`", report_path)
+    if port and chip_path:
+        raise InputError("give either --port or --chip: what the board has now")
+    model = _model(model_path, layer)
+    shape = f"{model_path.name} is of {model.array.rows} x {model.array.cols}"
+    run = read_log(log, model.array.springs, why=shape)
+    if any(one.get("sha256") == run.sha256 for one in model.provenance.get("logs", [])):
+        raise InputError("the model was fitted to this log: give one that the fit never saw", log)
+    notes_of([run])
+    old = _port_lines(port) if port else _chip_lines(chip_path)
+    made = settings_of(model)
+    result = results.Verify(
+        logs=logs_of([run]),
+        model=source_of(model_path),
+        before=chip_error(model, old, [run]),
+        after=chip_error(model, f"{old}\n{made.lines}", [run]),
+    )
+    write({json_path: results.checked(result), report_path: with_verification(report, result)})
+    out.print(
+        f"the chip's model on {log.name}: error {result.before.rmse_c:.2f} K rms as it is, "
+        f"{result.after.rmse_c:.2f} K with the model's settings",
+        markup=False,
+    )
+    if result.after.rmse_c > result.before.rmse_c:
+        raise WorkError("the model's settings make the chip's error larger on this log: do not upload them")
+
+
+def _port_lines(port: str) -> str:
+    with Board(port, off_at_end=False) as board:
+        return "\n".join(f"${name}={value}" for name, value in board.settings().items())

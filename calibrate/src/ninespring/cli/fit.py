@@ -1,0 +1,160 @@
+"""`ninespring fit`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from ..errors import InputError
+from ..export.settings import left_out
+from ..find import board_alone, diagnosis, doubt, steady
+from ..infer import from_resistance
+from ..infer.fit import Fit
+from ..infer.intervals import TOLD, correlations, intervals
+from ..infer.problem import Problem
+from ..infer.result import parameters_of
+from ..io import results
+from ..io.logs import Run, check_folder
+from ..io.statistics import rms
+from ..model import effects, native
+from ..model.models import Array, model_text
+from .console import (
+    ARRAY,
+    FILE,
+    JSON,
+    Command,
+    array_and_runs,
+    beside,
+    logs_of,
+    notes,
+    notes_of,
+    print_parameters,
+    working,
+    write,
+)
+
+MOST_TOLD = 8
+"""Correlations that are printed."""
+
+
+@click.command(
+    cls=Command,
+    epilog="""\b
+Examples:
+  ninespring fit run1.csv run2.csv -o model.toml
+  ninespring fit --effects latent_heat,shared_air run1.csv -o model.toml
+""",
+)
+@click.argument("logs", nargs=-1, required=True, type=FILE)
+@ARRAY
+@click.option("--effects", default="", help="effects to switch on and fit, comma-separated")
+@click.option("-o", "--output", type=FILE, required=True, help="model.toml to write")
+@JSON
+def fit(logs: tuple[Path, ...], array_path: Path | None, effects: str, output: Path, json_path: Path | None) -> None:
+    """Fit the declared model, with the effects named, to logs.
+
+    Logs of a board alone, currents and voltages without any temperature, are fitted to v / i: each spring's transformation
+    is a fixed point of its temperature, and effects of the array that it shows are looked for and named. Errors are root mean squares in K (of v / i: in mohm); numbers are in J/K, W/K, J, s as the table says. Held out: on blocks of two and a
+    half minutes that the numbers were not fitted to.
+    """
+    check_folder(output, json_path)
+    wanted = list(dict.fromkeys(e.strip() for e in effects.split(",") if e.strip()))
+    for name in wanted:
+        if name not in native.effect_names():
+            raise InputError(f"there is no effect '{name}': {', '.join(native.effect_names())}")
+    for path in logs:
+        if steady.is_steady(path):
+            raise InputError("a steady table: `ninespring diagnose` fits it, effect by effect", path, 1)
+    array, runs = array_and_runs(array_path, logs, or_resistance=True)
+    notes_of(runs)
+    if from_resistance.has_none(runs):
+        if wanted:
+            raise InputError("without a thermometer the effects are looked for: leave --effects out", logs[0])
+        _fit_from_resistance(array, runs, output, json_path)
+        return
+    with working("fitting") as say:
+        problem, chosen, base = diagnosis.fit_effects(array, runs, wanted, say)
+        say("held-out blocks")
+        held = problem.holdout_rmse(chosen)
+        say("is the log to be doubted?")
+        model, suspect = doubt.model_of_fit(problem, chosen, runs)
+    model.provenance["rmse_before_c"] = rms(base.residual)
+    result = results.Fit(
+        logs=logs_of(runs),
+        rmse_before_c=rms(base.residual),
+        rmse_c=rms(chosen.residual),
+        holdout_rmse_c=held,
+        noise_c=problem.noise_c,
+        effects=list(chosen.spec.effects),
+        parameters=_numbers(problem, chosen),
+        correlations=_correlations(chosen),
+        not_identifiable=sorted(chosen.stuck),
+        at_bounds=chosen.at_bounds(),
+        warnings=suspect,
+    )
+    write({output: model_text(model), json_path: results.checked(result)})
+    notes("", suspect)
+    print_parameters(beside(output), result.parameters)
+    _print_correlations(output, result.correlations)
+    beside(output).print(
+        f"error {result.rmse_c:.3f} K, held out {held:.3f} K, noise {problem.noise_c:.3f} K -> {output}"
+    )
+    for effect, why in left_out(model).items():
+        beside(output).print(f"{effect}: not for the chip: {why}", markup=False)
+
+
+def _numbers(problem: Problem, found: Fit) -> results.Parameters:
+    """Return a fit's numbers, each with the interval in which it lies in 95 of 100 cases."""
+    out = {k: v for e in (None, *found.spec.effects) for k, v in parameters_of(problem, found, e).items()}
+    for name, ends in intervals(found).items():
+        out[name].interval_95 = ends
+    return out
+
+
+def _correlations(found: Fit) -> list[results.Correlation]:
+    return [results.Correlation(a=a, b=b, correlation=value) for a, b, value in correlations(found)]
+
+
+def _print_correlations(output: Path, found: list[results.Correlation]) -> None:
+    """Print which numbers' errors go together, strongest first; all of them are in --json."""
+    if not found:
+        return
+    said = beside(output)
+    said.print(f"errors that go together, of {len(found)} pairs beyond {TOLD:g} (--json has all):", markup=False)
+    for one in found[:MOST_TOLD]:
+        said.print(f"  {one.correlation:+.2f}  {one.a}, {one.b}", markup=False)
+
+
+def _fit_from_resistance(array: Array, runs: list[Run], output: Path, json_path: Path | None) -> None:
+    with working("fitting v / i") as say:
+        problem, found, first = from_resistance.fit(array, runs)
+        found, witnesses = board_alone.with_effects(problem, found, say)
+    model = from_resistance.model_of_fit(problem, found)
+    errors = {"rmse_before_v": first.residual, "rmse_v": found.residual}
+    result = results.Fit(
+        logs=logs_of(runs),
+        rmse_before_c=None,
+        rmse_c=None,
+        holdout_rmse_c=None,
+        noise_c=None,
+        **{name: 1e-3 * rms(left) for name, left in errors.items()},
+        noise_v=1e-3 * problem.noise_c,
+        effects=list(found.spec.effects),
+        parameters=_numbers(problem, found),
+        correlations=_correlations(found),
+        not_identifiable=sorted(found.stuck),
+        at_bounds=found.at_bounds(),
+        warnings=[from_resistance.SCALE],
+    )
+    write({output: model_text(model), json_path: results.checked(result)})
+    print_parameters(beside(output), result.parameters)
+    _print_correlations(output, result.correlations)
+    beside(output).print(
+        f"no thermometer: fitted to v / i, error {1e3 * result.rmse_before_v:.1f} mV as declared, "
+        f"{1e3 * result.rmse_v:.1f} fitted, readings are good for {1e3 * result.noise_v:.1f} -> {output}"
+    )
+    for name, one in witnesses.items():
+        said = effects.sentence(name, parameters_of(problem, found, name), dict(found.spec.variant)[name])
+        beside(output).print(f"{said} ({100 * one.probability():.0f} %)", markup=False)
+    notes("", [from_resistance.SCALE])

@@ -1,0 +1,122 @@
+"""`ninespring settings`: a board's settings as a file, what differs, and what it had."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import click
+
+from ..errors import InputError
+from ..io import history as kept
+from ..io.board import Board, console_lines
+from ..io.logs import check_folder
+from ..model import tables
+from .console import FILE, PORT, Command, beside, out, write
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+def settings() -> None:
+    """A board's settings: as a file, what differs between two, what it had before each upload."""
+
+
+def _default(name: str) -> str | None:
+    """Return a setting's built-in value, None where this version does not know it."""
+    known = tables.settings()
+    bare = re.sub(r"_\d+$", "", name)
+    row = known.get(name) or known.get(f"{bare}_K") or known.get(bare)
+    return f"{row.default:.{row.decimals}f}" if row else None
+
+
+def _of_file(path: Path) -> dict[str, str]:
+    return dict(line[1:].split("=", 1) for line in console_lines(path))
+
+
+def _of_port(port: str) -> tuple[str, dict[str, str]]:
+    with Board(port, off_at_end=False) as board:
+        return board.version[0], board.settings()
+
+
+@settings.command(
+    cls=Command,
+    epilog="""\b
+Examples:
+  ninespring settings read --port /dev/ttyACM0 -o board.txt
+  ninespring settings read --port /dev/ttyACM0 --changed
+""",
+)
+@PORT
+@click.option("-o", "--output", type=FILE, default=Path("-"), help="file to write; left out, it is printed")
+@click.option("--changed", is_flag=True, help="only those that are not as built in")
+def read(port: str, output: Path, changed: bool) -> None:
+    """Write a board's settings as console lines, one a line and in the board's order: two such files diff, `upload` takes one.
+
+    Behind each stands what is built in, where it is another.
+    """
+    check_folder(output)
+    version, has = _of_port(port)
+    lines = [f"# from {port}: {version}"]
+    count = 0
+    for name, value in has.items():
+        usual = _default(name)
+        same = usual is not None and float(usual) == float(value)
+        if not (changed and same):
+            lines.append(f"${name}={value}" + ("" if same or usual is None else f"  # built in: {usual}"))
+            count += 1
+    write({output: "\n".join(lines) + "\n"})
+    if str(output) != "-":
+        beside(output).print(f"{count} settings -> {output}", markup=False, soft_wrap=True)
+
+
+@settings.command(
+    cls=Command,
+    epilog="""\b
+Examples:
+  ninespring settings diff before.txt after.txt
+  ninespring settings diff board.txt --port /dev/ttyACM0
+""",
+)
+@click.argument("files", nargs=-1, type=FILE, required=True)
+@click.option("--port", help="serial port of a board: what it has now is the second")
+def diff(files: tuple[Path, ...], port: str | None) -> None:
+    """Say which settings differ between two files, or a file and a board; what only one of them has is not compared but counted.
+
+    Exit code 1 where some differ.
+    """
+    if len(files) + (port is not None) != 2:
+        raise InputError("give two files, or one file and --port")
+    first = _of_file(files[0])
+    second = _of_port(port)[1] if port else _of_file(files[1])
+    apart = {name for name in first.keys() & second.keys() if float(first[name]) != float(second[name])}
+    for name in first:
+        if name in apart:
+            out.print(f"${name}: {first[name]} -> {second[name]}", markup=False)
+    for here, there, where in ((first, second, files[0]), (second, first, port or files[-1])):
+        if count := len(here.keys() - there.keys()):
+            out.print(f"{count} only in {where}", markup=False)
+    out.print(f"{len(apart)} of {len(first.keys() & second.keys())} differ", markup=False)
+    if apart:
+        raise click.exceptions.Exit(1)
+
+
+@settings.command(
+    cls=Command,
+    epilog="""\b
+Example:
+  ninespring settings history --port /dev/ttyACM0
+""",
+)
+@PORT
+def history(port: str) -> None:
+    """Say what a board had before each upload from this computer, and in which file that is kept.
+
+    `ninespring upload --undo` takes the last one back. A board is known again by its USB serial number, else by its port.
+    """
+    found = kept.entries(port)
+    for one in found:
+        out.print(f"{one.when}  {one.by}: {len(one.sent)} sent, {len(one.words())} changed", markup=False)
+        for line in one.words():
+            out.print(f"    {line}", markup=False)
+        out.print(f"    what it had: {one.path}", markup=False, soft_wrap=True)
+    if not found:
+        out.print(f"no upload to the board at {port} is kept on this computer", markup=False)

@@ -1,0 +1,325 @@
+"""What may act without a name in the library, and what a unit of it adds to the readings."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from scipy.signal import lfilter
+
+from ..infer.fit import Fit
+from ..infer.heat import THIN, answers, power_of, step_answers, thin
+from ..infer.problem import Problem
+from ..io.logs.run import Run
+from ..model.simulate import simulate_run
+
+GRID_S = 15.0
+"""Times at which something may begin or end."""
+STEPS = 600
+"""Of them at all springs together, at most: an array of many springs has a coarser grid."""
+EDGES = 60
+"""Of them in one run, at most."""
+SHORTEST = 2
+"""Of those times, how many anything lasts."""
+EVERY = (1, 2, 4, 8)
+"""Of those times, how many apart are those between which what comes and goes is straight: the fewer numbers, the cheaper."""
+SMOOTHED = 5
+"""Readings of a thermometer that are taken together."""
+DELAYS_S = (10.0, 30.0, 90.0)
+"""By which heat may come late."""
+SHOWN = ("pickup", "mixing", "sensor", "reading", "share")
+"""Kinds that are the thermometers' own: the springs are as they would be without."""
+
+
+@dataclass(frozen=True)
+class Cause:
+    """One kind of unnamed cause at one place, and what a unit of it adds to the readings, thinned (samples, numbers)."""
+
+    kind: str
+    text: str
+    profiles: tuple[np.ndarray | None, ...]
+    """Per run (rows, springs): the heat of a unit, W, or what the thermometers show more, K; None: not in this run."""
+    columns: np.ndarray
+    edges: tuple[int, ...] = ()
+    """Where given, the columns begin at one of these rows each and stay, the last is the end: a window is one less another."""
+
+    bumps: tuple[tuple[int, int, int, int], ...] = ()
+    """Where given, each column acts in one run about one row only, and less towards those before and after it, all of them
+    together: it comes and goes."""
+
+    @property
+    def shown(self) -> bool:
+        """Whether it is the thermometers that show it."""
+        return self.kind in SHOWN
+
+    @property
+    def often(self) -> str:
+        """The words for what acts for a while where it comes and goes all the time, in any run."""
+        return f"{self.text.partition(', {}')[0]} again and again"
+
+
+def _delayed(power: np.ndarray, time_s: np.ndarray, delay_s: float) -> np.ndarray:
+    step = float(np.median(np.diff(time_s)))
+    keep = math.exp(-step / delay_s)
+    return lfilter([1.0 - keep], [1.0, -keep], power, axis=0)
+
+
+def thinned(problem: Problem, columns: np.ndarray) -> np.ndarray:
+    """Return columns (count, n) with every THIN rows as one sample, unit noise kept: causes are slower than rows."""
+    out, begin = [], 0
+    for mask in problem.mask:
+        whole = np.zeros((*mask.shape, columns.shape[1]))
+        end = begin + int(mask.sum())
+        whole[mask] = columns[begin:end]
+        out.append(thin(whole))
+        begin = end
+    return np.concatenate(out)
+
+
+def column_of(
+    problem: Problem, fit: Fit, cause: Cause, typical_w: float, begin: int = 0, end: int | None = None
+) -> np.ndarray:
+    """Return what a unit of a cause, from one row to another, adds to the readings of all runs, (count, numbers)."""
+    if cause.bumps:
+        columns = np.column_stack([_bumps(problem, fit, cause, r, typical_w) for r in range(len(problem.runs))])
+        # there all the time it would be a declared number that is off: that is left to the number, which nothing held else
+        basis = np.linalg.qr(_declared_slopes(problem, fit))[0]
+        return columns - basis @ (basis.T @ columns)
+    fields = []
+    for r, (run, profile) in enumerate(zip(problem.runs, cause.profiles, strict=True)):
+        if profile is None:
+            fields.append(np.zeros_like(run.temperature_c))
+            continue
+        within = np.zeros_like(profile)
+        within[begin:end] = profile[begin:end]
+        fields.append(within if cause.shown else answers(problem, fit, r, [within], typical_w)[0])
+    return np.concatenate(problem.scaled(fields))[:, None]
+
+
+def _declared_slopes(problem: Problem, fit: Fit) -> np.ndarray:
+    """Return what the declared numbers move of the readings, nothing taken out, (count, numbers)."""
+    taken, problem.unnamed = problem.unnamed, None
+    numbers = [k for k, free in enumerate(fit.spec.free) if free.effect is None]
+    slopes = problem.jacobian(fit.spec, fit.values, problem.predictions(fit.spec, fit.values), numbers)
+    problem.unnamed = taken
+    return slopes[:, np.linalg.norm(slopes, axis=0) > 1e-6]
+
+
+def bump(first: int, top: int, last: int, rows: int) -> np.ndarray:
+    """Return the part of a cause that comes and goes in each row, (rows, 1): straight up to all of it, and down again."""
+    row = np.arange(rows)
+    return np.clip(np.minimum((row - first) / (top - first), (last - row) / (last - top)), 0.0, 1.0)[:, None]
+
+
+def _bumps(problem: Problem, fit: Fit, cause: Cause, r: int, typical_w: float) -> np.ndarray:
+    """Return what the bumps of a cause in one run add to the readings of all, (count, bumps)."""
+    profile, bumps = cause.profiles[r], [one[1:] for one in cause.bumps if one[0] == r]
+    if profile is None or not bumps:
+        return np.zeros((problem.count, 0))
+    shown = answers(problem, fit, r, [bump(*one, len(profile)) * profile for one in bumps], typical_w)
+    out = np.zeros((problem.count, len(bumps)))
+    begin = sum(int(mask.sum()) for mask in problem.mask[:r])
+    here = slice(begin, begin + int(problem.mask[r].sum()))
+    for k, field in enumerate(shown):
+        out[here, k] = (field / problem.noise[r])[problem.mask[r]]
+    return out
+
+
+def typical_power(problem: Problem, fit: Fit) -> float:
+    """Return the mean power of a spring while it is driven, W."""
+    powers = np.concatenate([power_of(problem, fit, r) for r in range(len(problem.runs))])
+    return float(powers[powers > 0].mean()) if (powers > 0).any() else 1.0
+
+
+def library(problem: Problem, fit: Fit) -> list[Cause]:
+    """Return every unnamed cause, simulated around a fit."""
+    typical = typical_power(problem, fit)
+    profiles: dict[tuple[str, str], list[np.ndarray | None]] = {}
+    columns: dict[tuple[str, str], list[np.ndarray]] = {}
+    windows: list[Cause] = []
+    samples = [len(range(0, len(mask), THIN)) * mask.shape[1] for mask in problem.mask]
+    for r, run in enumerate(problem.runs):
+        power, by_key = power_of(problem, fit, r), fit.as_dict()
+        plant = problem.plant_for(fit.spec, fit.values, r)
+        ambient = problem.ambient_of(r, by_key)
+        shown = simulate_run(plant, run, ambient, by_key)
+        around = np.full(len(run.time_s), plant.get("ambient_c")) if ambient is None else ambient
+        rise = shown - around[:, None]
+        # where something unknown acts, the readings know better than the fit how warm the springs are
+        read = pd.DataFrame(run.temperature_c).rolling(SMOOTHED, center=True, min_periods=1).mean().to_numpy()
+        shown = np.where(np.isfinite(read), read, shown)
+        over = shown - around[:, None]
+        still, blown = plant.get("loss_w_per_k"), plant.get("loss_fan_w_per_k")
+        loss_w_per_k = still + run.fan * (blown - still)
+        lost = over * loss_w_per_k[:, None]
+        acting = _everywhere(problem, run, power, shown, over, lost)
+        heating = [key for key in acting if key[0] not in SHOWN]
+        moved = dict(zip(heating, answers(problem, fit, r, [acting[key] for key in heating], typical), strict=True))
+        for key, profile in acting.items():
+            nothing = [np.zeros((one, 1), dtype=np.float32) for one in samples]
+            profiles.setdefault(key, [None] * len(problem.runs))[r] = profile
+            scaled = np.where(problem.mask[r], moved.get(key, profile) / problem.noise[r], 0.0)
+            columns.setdefault(key, nothing)[r] = thin(scaled[:, :, None])
+        windows += _windows(problem, fit, r, samples, power, lost, rise, loss_w_per_k, typical)
+    everywhere = [Cause(*key, tuple(profiles[key]), np.concatenate(parts)) for key, parts in columns.items()]
+    return everywhere + windows + [one for every in EVERY for one in _often(windows, every)]
+
+
+def _often(windows: Sequence[Cause], every: int) -> list[Cause]:
+    """Return what comes and goes all the time: bumps at every so many edges of the windows of one kind and place in all runs."""
+    together: dict[tuple[str, str], list[Cause]] = {}
+    for one in windows:
+        if not one.shown:
+            together.setdefault((one.kind, one.often), []).append(one)
+    out = []
+    for (kind, text), parts in together.items():
+        bumps, columns = [], []
+        for one in parts:
+            run, profile = next((r, p) for r, p in enumerate(one.profiles) if p is not None)
+            tops = [*one.edges[:-1:every], one.edges[-1]]
+            times = [2 * tops[0] - tops[1], *tops, 2 * tops[-1] - tops[-2]]
+            about = list(zip(times, times[1:], times[2:], strict=False))
+            bumps += [(run, *times) for times in about]
+            # what acts from each edge to the next, as much of it as the bump is there
+            between = one.columns - np.column_stack([one.columns[:, 1:], np.zeros(len(one.columns))])
+            whole = np.column_stack([bump(*times, len(profile)) for times in about])
+            part = np.add.reduceat(whole, one.edges[:-1], axis=0) / np.diff(one.edges)[:, None]
+            columns.append(between @ part)
+        merged = [
+            next((p.profiles[r] for p in parts if p.profiles[r] is not None), None)
+            for r in range(len(parts[0].profiles))
+        ]
+        out.append(
+            Cause(
+                kind,
+                text,
+                tuple(merged),
+                np.column_stack(columns).astype(np.float32),
+                bumps=tuple(bumps),
+            )
+        )
+    return out
+
+
+def _only(k: int, values: np.ndarray, springs: int) -> np.ndarray:
+    out = np.zeros((len(values), springs))
+    out[:, k] = values
+    return out
+
+
+def _everywhere(
+    problem: Problem, run: Run, power: np.ndarray, shown: np.ndarray, over: np.ndarray, lost: np.ndarray
+) -> dict[tuple[str, str], np.ndarray]:
+    """Return, per kind and words, what acts all the time: heat (rows, springs), W, or what thermometers show, K."""
+    springs, (rows, cols) = run.springs, (problem.array.rows, problem.array.cols)
+    place = [divmod(k, cols) for k in range(springs)]
+    ramp = (run.time_s - run.time_s[0]) / max(1.0, run.duration_s)
+    out: dict[tuple[str, str], np.ndarray] = {}
+    for j in range(springs):
+        for k in range(springs):
+            apart = max(abs(a - b) for a, b in zip(place[j], place[k], strict=True))
+            if j == k or (springs > 16 and apart > 2):
+                continue
+            out["crosstalk", f"the drive of spring {j + 1} also heats spring {k + 1}"] = _only(k, power[:, j], springs)
+            seen = _only(k, shown[:, j] - shown[:, k], springs)
+            out["mixing", f"thermometer {k + 1} also sees spring {j + 1}"] = seen
+            if j < k and apart > 1:
+                flow = over[:, j] - over[:, k]
+                text = f"springs {j + 1} and {k + 1} are joined, though no neighbours"
+                out["bridge", text] = _only(k, flow, springs) - _only(j, flow, springs)
+    for words, step in (("above", (1, 0)), ("below", (-1, 0)), ("to the left", (0, 1)), ("to the right", (0, -1))):
+        warmed = np.zeros_like(power)
+        for k, (row, col) in enumerate(place):
+            beside = (row - step[0], col - step[1])
+            if 0 <= beside[0] < rows and 0 <= beside[1] < cols:
+                warmed[:, k] = np.maximum(over[:, beside[0] * cols + beside[1]], 0.0)
+        if warmed.any():
+            out["plume", f"each spring is warmed by the one {words}"] = warmed
+            if run.fan.any():
+                still = (1.0 - run.fan)[:, None]
+                out["plume", f"each spring is warmed by the one {words}, without the fan"] = warmed * still
+    for delay_s in DELAYS_S:
+        out["delay", f"a part of the heat comes {delay_s:g} s late"] = _delayed(power, run.time_s, delay_s) - power
+    out["trend", "all losses change over the run"] = -lost * ramp[:, None]
+    out["trend", "all drives change over the run"] = power * ramp[:, None]
+    amperes = np.sqrt(np.maximum(power, 0.0) / max(1e-12, float(power.mean())))
+    out["pickup", "each thermometer shows its spring's current"] = amperes
+    out["pickup", "each thermometer shows its spring's power"] = power / max(1e-12, float(power.mean()))
+    for k in range(springs):
+        out["trend", f"the loss of spring {k + 1} changes over the run"] = _only(k, -lost[:, k] * ramp, springs)
+        out["trend", f"the drive of spring {k + 1} changes over the run"] = _only(k, power[:, k] * ramp, springs)
+        out["reading", f"thermometer {k + 1} drifts"] = _only(k, ramp, springs)
+        out["heat", f"spring {k + 1} is given heat all the time"] = _only(k, np.ones_like(ramp), springs)
+        if springs > 1:
+            out["pickup", f"thermometer {k + 1} shows its spring's current"] = _only(k, amperes[:, k], springs)
+    return out
+
+
+def _windows(
+    problem: Problem,
+    fit: Fit,
+    r: int,
+    samples: Sequence[int],
+    power: np.ndarray,
+    lost: np.ndarray,
+    rise: np.ndarray,
+    loss_w_per_k: np.ndarray,
+    typical_w: float,
+) -> list[Cause]:
+    """Return what may begin and end in one run: heat, drives, losses and thermometers, each in steps at the edges."""
+    run, mask, noise = problem.runs[r], problem.mask[r], problem.noise[r]
+    step = float(np.median(np.diff(run.time_s)))
+    rows, springs = run.temperature_c.shape
+    grid = max(1, round(GRID_S / step), -(-rows // min(EDGES, max(8, STEPS // springs))))
+    edges = np.arange(0, rows, grid)
+    if len(edges) < 4:
+        return []
+    answer = step_answers(problem, fit, r, edges, typical_w)
+    ends = (*(int(edge) for edge in edges), rows)
+    begin = sum(samples[:r])
+
+    def cause(kind: str, text: str, profile: np.ndarray, block: np.ndarray) -> Cause:
+        """Return the cause of a block of fields (edges, rows, springs)."""
+        columns = np.zeros((sum(samples), len(block)), dtype=np.float32)
+        scaled = np.where(mask, block / noise, 0.0)
+        columns[begin : begin + samples[r]] = thin(np.moveaxis(scaled, 0, 2))
+        profiles = [None] * len(problem.runs)
+        profiles[r] = profile
+        return Cause(kind, f"{text}, {{}} of run {r + 1}", tuple(profiles), columns, ends)
+
+    def shaped(k: int, heat: np.ndarray) -> np.ndarray:
+        """Return the answers to a heat of spring k that begins at each edge, from those to constant heat between edges."""
+        mean = np.add.reduceat(heat, edges) / np.diff(ends)
+        steps = answer["heat", k]
+        between = steps - np.concatenate([steps[1:], np.zeros_like(steps[:1])])
+        return np.cumsum((mean[:, None, None] * between)[::-1], axis=0)[::-1]
+
+    out = []
+    everything_lost, everything_driven, warmer = (np.zeros_like(answer["heat", 0]) for _ in range(3))
+    one = np.ones(rows)
+    for k in range(springs):
+        everything_lost += shaped(k, -lost[:, k])
+        warmer += shaped(k, loss_w_per_k)
+        driven = shaped(k, power[:, k])
+        everything_driven += driven
+        jumps = np.zeros((len(edges), rows, springs))
+        for number, edge in enumerate(edges):
+            jumps[number, edge:, k] = 1.0
+        out.append(cause("contact", f"the drive of spring {k + 1} changes", _only(k, power[:, k], springs), driven))
+        out.append(cause("heat", f"spring {k + 1} is given heat", _only(k, one, springs), answer["heat", k]))
+        out.append(cause("sensor", f"thermometer {k + 1} jumps", _only(k, one, springs), jumps))
+        text = f"thermometer {k + 1} shows more of its spring's rise"
+        # of the fit's own rise: a part of the readings would explain all that they show
+        out.append(cause("share", text, _only(k, rise[:, k], springs), jumps * rise))
+    out.append(cause("gust", "all losses change", -lost, everything_lost))
+    out.append(cause("surroundings", "the surroundings are warmer", np.outer(loss_w_per_k, np.ones(springs)), warmer))
+    if springs > 1:
+        every = np.zeros((len(edges), rows, springs))
+        for number, edge in enumerate(edges):
+            every[number, edge:] = 1.0
+        out.append(cause("sensor", "all thermometers jump", np.ones((rows, springs)), every))
+        out.append(cause("supply", "all drives change", power, everything_driven))
+    return out

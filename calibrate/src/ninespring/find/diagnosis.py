@@ -1,0 +1,616 @@
+"""The diagnosis: fit what is declared, look at what is left, find what is missing, say what cannot be told apart."""
+
+from __future__ import annotations
+
+import functools
+import math
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from ..errors import InputError
+from ..export.settings import judged
+from ..infer.declared import base_spec
+from ..infer.fit import Fit
+from ..infer.problem import Problem
+from ..infer.result import DRIFT_LEFT_OUT, as_shown, model_of, parameters_of
+from ..infer.scene import scene_of
+from ..io import results, statistics
+from ..io.logs import condense
+from ..io.logs.run import Run
+from ..model import effects
+from ..model.models import Array, Model
+from ..model.spec import RUNS_OWN, Spec
+from . import (
+    contacts,
+    doubt,
+    experiments,
+    lasting,
+    plausibility,
+    resistance,
+    runs_apart,
+    search,
+    unknown_heat,
+    unnamed,
+    unseen,
+)
+from .certainty import CERTAIN, NAMED, Witness, witness
+from .evidence import EQUIVALENT, difference, excess, likelihood, log_evidence, unexplained
+from .residual import depends_on
+
+MOST_OF_IT = 0.5
+"""Part of what is beyond the noise without an effect that it explains, where more is explained than left."""
+LEAST_PART = 0.01
+"""Of a drive or a reading, less is not told as a cause: a board measures power no better, its voltages step by 4 mV."""
+PROBABLE = CERTAIN - 0.01
+"""The most that an effect is sure with a number at its bound."""
+PINNED = 1e-5
+"""Spread, in a number's inner coordinate, that leaves it where it is."""
+
+
+@dataclass
+class Diagnosis:
+    """Everything a diagnosis found: what is told of it and what the report draws."""
+
+    told: results.Diagnosis
+    model: Model
+    problem: Problem
+    baseline: Fit
+    final: Fit
+    heat: unknown_heat.UnknownHeat
+
+    @property
+    def effects(self) -> list[str]:
+        """Names of what was found, strongest first."""
+        return [one.name for one in self.told.effects]
+
+    @functools.cached_property
+    def result(self) -> dict[str, Any]:
+        """What diagnosis.json holds."""
+        return results.plain(self.told)
+
+    def __repr__(self) -> str:
+        before, after = self.told.baseline.rmse_c, self.told.after.rmse_c
+        return f"<diagnosis: {', '.join(self.effects) or 'nothing found'}; {before:.2f} K before, {after:.2f} K after>"
+
+
+def prepare(array: Array, runs: Sequence[Run], declared: Mapping[str, float] | None = None) -> Problem:
+    """Return the problem of these runs, condensed where they are long."""
+    share = max(600, 6000 // max(1, len(runs)))
+    return Problem(array, [condense(run, share) for run in runs], declared)
+
+
+def first_fit(problem: Problem, spec: Spec) -> Fit:
+    """Fit the declared model, errors of the first readings projected out; then with spikes left out and those errors as
+    this model has them, again."""
+    problem.learn_starts(spec, [free.start for free in spec.free])
+    fit = problem.fit(spec, tolerance=1e-3)
+    if problem.mask_spikes(fit.residual):
+        problem.learn_starts(fit.spec, fit.values)
+        fit = problem.fit(spec, fit.as_dict(), tolerance=1e-3)
+    problem.learn_starts(fit.spec, fit.values)
+    noise = [statistics.noise_floor(left, run.starts) for left, run in zip(fit.residual, problem.runs, strict=True)]
+    problem.noise = [np.fmin(a, b) for a, b in zip(problem.noise, noise, strict=True)]
+    problem._tidy_noise()
+    problem.learn_power(fit.spec, fit.values)
+    return problem.fit(spec, fit.as_dict(), tolerance=1e-5, errors=True)
+
+
+def _finish(problem: Problem, fit: Fit) -> Fit:
+    if fit.covariance is None:
+        again = problem.fit(fit.spec, fit.as_dict(), tolerance=1e-6, errors=True)
+        return again if again.chi2 <= fit.chi2 * (1 + 1e-6) else fit
+    return fit
+
+
+def with_everything(problem: Problem, clean: Fit, base: Fit) -> Fit:
+    """Return a fit that was made beside what has no name, with that in the error: the effects' numbers stay, with their
+    errors, and the declared numbers, and those of a run alone, take up what they can.
+
+    All are fitted again where that would leave more than the declared model alone does.
+    """
+    own = np.array([free.effect is None or free.run is not None for free in clean.spec.free])
+    pinned = [
+        free if mine else replace(free, start=float(value), prior=PINNED)
+        for free, value, mine in zip(clean.spec.free, clean.values, own, strict=True)
+    ]
+    spec = replace(clean.spec, free=tuple(pinned))
+    fit = problem.fit(spec, clean.as_dict(), tolerance=1e-4, errors=True)
+    if fit.sse > base.sse:
+        return problem.fit(clean.spec, clean.as_dict(), tolerance=1e-4, errors=True)
+    covariance = fit.covariance
+    if clean.covariance is not None and covariance is not None:
+        together = np.outer(own, own)
+        covariance = np.where(together, covariance, np.where(np.outer(~own, ~own), clean.covariance, 0.0))
+    return replace(fit, spec=clean.spec, covariance=covariance)
+
+
+def in_order(found: search.Search, base: Fit, final: Fit, adopted: Sequence[str]) -> list[tuple[str, Fit]]:
+    """Return adopted effects, the one that explains most first, each with the fit of all up to it."""
+    out: list[tuple[str, Fit]] = []
+    rest = list(adopted)
+    while rest:
+        options = []
+        for effect in rest:
+            spec = final.spec
+            for other in rest:
+                if other != effect:
+                    spec = spec.without(other)
+            key = found.key(spec)
+            if len(rest) == 1:
+                fit = final
+            elif key in found.fits:
+                fit = found.fits[key]
+            else:
+                fit = found.fits[key] = found.problem.fit(spec, final.as_dict(), tolerance=1e-3, max_steps=14)
+            options.append((fit.sse, effect, fit))
+        _, effect, fit = min(options, key=lambda one: one[0])
+        rest.remove(effect)
+        out.append((effect, fit))
+    return out
+
+
+def variant_of(fit: Fit, effect: str) -> str:
+    """Return which variant of an effect a fit has."""
+    return dict(fit.spec.variant).get(effect, "")
+
+
+def diagnose(
+    array: Array,
+    runs: Sequence[Run],
+    *,
+    model: Model | None = None,
+    frozen: bool = False,
+    progress: Callable[[str], None] = lambda text: None,
+) -> Diagnosis:
+    """Diagnose logs. `model` gives declared values and effects already on; `frozen` keeps them as they are."""
+    # Simulations run in threads of their own: a linear algebra that starts more only gets in their way.
+    with threadpool_limits(1):
+        return _diagnose(array, runs, model, frozen, progress)
+
+
+def with_effects_of(spec: Spec, model: Model, known: Sequence[effects.Candidate], frozen: bool) -> Spec:
+    """Return the spec with a model's effects on, each in the variant that the model's parameters speak of.
+
+    Its numbers start at the model's values; where frozen they stay there.
+    """
+    given = model.parameters
+
+    def matches(one: effects.Candidate) -> int:
+        numbers = sum(name in given for free in one.free for name in free.names)
+        return numbers + sum(1 if given.get(name) == value else -1 for name, value in one.fixed if name in given)
+
+    for effect in model.effects:
+        if effect in spec.plant_effects:
+            continue
+        options = [c for c in known if c.effect == effect]
+        if frozen or not options:
+            spec = spec.with_effect(effect, (), (), max(options, key=matches).variant if options else "")
+            continue
+        one = max(options, key=matches)
+        free = [replace(f, start=next((given[n] for n in f.names if n in given), f.start)) for f in one.free]
+        spec = spec.with_effect(effect, free, one.fixed, one.variant, one.also_on)
+    return spec
+
+
+def rivals_of(
+    found: search.Search,
+    final: Fit,
+    adopted: Sequence[str],
+    contenders: Sequence[tuple[str, Fit]],
+    progress: Callable[[str], None],
+) -> list[results.Rival]:
+    """Return what the data cannot tell from an effect that was named, each with the experiment that would."""
+    problem = found.problem
+    rivals: list[results.Rival] = []
+    seen = set()
+    for instead, other in sorted(contenders, key=lambda one: one[1].chi2):
+        extra = [e for e in other.spec.effects if e not in final.spec.effects]
+        if instead not in adopted or not extra or (instead, extra[0]) in seen:
+            continue
+        apart = difference(problem, final, other)
+        ahead = log_evidence(problem, final, other)
+        if ahead >= search.TOLD_APART and apart >= EQUIVALENT:
+            continue
+        seen.add((instead, extra[0]))
+        progress(f"how to tell {extra[0]} from {instead}")
+        trial = experiments.separate(problem, final, other)
+        other = _finish(problem, other)
+        rivals.append(
+            results.Rival(
+                instead_of=instead,
+                name=extra[0],
+                variant=variant_of(other, extra[0]),
+                rmse_c=statistics.rms(other.residual),
+                holdout_rmse_c=problem.holdout_rmse(other),
+                evidence=ahead,
+                predictions_differ_c=apart * problem.noise_c,
+                parameters=parameters_of(problem, other, extra[0]),
+                separating_experiment=trial.text,
+                experiment=trial.told(),
+            )
+        )
+    return rivals
+
+
+def share_with(listed: Sequence[results.Effect], rivals: Sequence[results.Rival], same_c: float) -> None:
+    """Share what speaks for a named effect with rivals that show the same readings: only the two in combination are fixed.
+
+    That one of them has fewer numbers makes it simpler, not truer.
+    """
+    for entry in listed:
+        alike = [
+            one
+            for one in rivals
+            if one.instead_of == entry.name and one.evidence < search.TOLD_APART and one.predictions_differ_c < same_c
+        ]
+        if not alike:
+            continue
+        instead = [effects.sentence(one.name, one.parameters, one.variant or "") for one in alike]
+        entry.probability /= 1 + len(alike)
+        entry.certainty = "probable"
+        entry.text += f" Or: {' Or: '.join(instead)} These readings fix them only in combination."
+
+
+def candidates_of(found: search.Search, final: Fit, base: Fit) -> list[results.Candidate]:
+    """Return every model that the search fitted, the likeliest first."""
+    candidates = [
+        results.Candidate(
+            effects=[f"{e} ({v})" if v else e for e, v in key],
+            rmse_c=statistics.rms(fit.residual),
+            evidence_over_baseline=float(log_evidence(found.problem, fit, base)),
+            adopted=fit.spec.variant == final.spec.variant,
+        )
+        for key, fit in found.fits.items()
+    ]
+    return sorted(candidates, key=lambda one: -one.evidence_over_baseline)
+
+
+@dataclass
+class _Case:
+    """A diagnosis under way: what was found so far."""
+
+    problem: Problem
+    progress: Callable[[str], None]
+    search: search.Search
+    declared: Fit
+    """The declared model alone."""
+    base: Fit
+    """What the effects are found beside: that, with what lasts taken for noise where something is left."""
+    final: Fit
+    without: dict[str, Fit]
+    """The final fit without each effect that it has found."""
+    contenders: list[tuple[str, Fit]]
+    swapped: list[str]
+    """Columns that are, in words."""
+    hidden: list[unnamed.Hidden]
+    witnesses: dict[str, Witness] = field(default_factory=dict)
+    not_kept: list[str] = field(default_factory=list)
+    """Effects that foretell a run no better, in words."""
+
+    @property
+    def adopted(self) -> list[str]:
+        """Effects that were found."""
+        return [e for e in self.final.spec.effects if e not in self.base.spec.effects]
+
+
+def _diagnose(
+    array: Array, runs: Sequence[Run], model: Model | None, frozen: bool, progress: Callable[[str], None]
+) -> Diagnosis:
+    begun = time.monotonic()
+    problem = prepare(model.array if model else array, runs, dict(model.parameters) if model else {})
+    case = _searched(problem, model, frozen, progress)
+    judge = _judged(case)
+    progress("a run that the fit never saw")
+    headline = _foretold(case, judge)
+    case.final = runs_apart.with_spread(problem, case.final)
+    left_over = unexplained(problem, case.final) or bool(case.hidden)
+    strength = {e: log_evidence(problem, case.final, case.without[e]) for e in case.adopted}
+    steps = in_order(case.search, case.base, case.final, case.adopted)
+    rivals = rivals_of(case.search, case.final, [effect for effect, _ in steps], case.contenders, progress)
+    tried = candidates_of(case.search, case.final, case.base)
+    if case.hidden:
+        steps = _with_what_has_no_name(case, steps)
+    # as declared, by itself: with what lasts as the found model leaves it, it would be fitted to that
+    before = case.base if problem.colour is None else problem.evaluate(case.declared)
+    if left_over and not case.hidden and problem.colour is None:
+        likelihood(problem, case.final)
+        case.final.holdout = problem.holdout_rmse(case.final, case.final.colour)
+    baseline, after = _errors(case, before)
+    listed, differ = _listed(case, steps, strength)
+    share_with(listed, rivals, EQUIVALENT * problem.noise_c)
+    progress("what v / i says")
+    second = None if case.swapped else resistance.witness(problem, case.final)
+    impossible = doubt.impossible(second)
+    if second and impossible:
+        second.effects = []
+    for one in second.effects if second else ():
+        one.rmse_c, one.holdout_rmse_c = after.rmse_c, after.holdout_rmse_c
+        listed.append(one)
+    residual = _left(case, left_over)
+    warnings, doubts = _warned(case, runs, left_over, impossible)
+    absent = case.search.absent(case.final)
+    if problem.colour is not None:
+        slopes = problem.plain_slopes(case.final)
+        problem.take_for(None)
+        case.final = replace(case.final, jacobian=slopes)
+    heat = unknown_heat.find(problem, case.final, progress)
+    final = case.final
+    told = results.Diagnosis(
+        logs=[results.Read(file=Path(r.name).name, sha256=r.sha256, rows=len(r.time_s)) for r in runs],
+        baseline=baseline,
+        effects=listed,
+        rivals=rivals,
+        after=after,
+        unseen=headline or results.UNSET,
+        unexplained=bool(left_over),
+        unknown_heat=heat.told(),
+        runs_differ=differ,
+        unnamed=[one.told() for one in unnamed.drifts(case.hidden) if _counts(one)],
+        resistance=second.told if second else results.UNSET,
+        residual=residual,
+        candidates=tried[:40],
+        identifiability=identifiability_of(final),
+        warnings=warnings,
+        doubts=doubts,
+        seconds=round(time.monotonic() - begun, 2),
+        simulations=problem.simulations,
+    )
+    made = model_of(problem, final, as_shown(problem, final), baseline.rmse_c, absent)
+    resistance.into_model(made, second)
+    doubt.into_model(made, problem, final, doubts)
+    judged(told.effects, made)
+    results.checked(told)
+    return Diagnosis(told, made, problem, case.base, final, heat)
+
+
+def _searched(problem: Problem, model: Model | None, frozen: bool, progress: Callable[[str], None]) -> _Case:
+    """Fit what is declared, and search the library; again where contacts changed, and where something is left."""
+    progress("fitting what is declared")
+    spec = base_spec(problem, frozen)
+    scene = scene_of(problem)
+    known = effects.candidates(scene)
+    if model:
+        spec = with_effects_of(spec, model, known, frozen)
+    base = first_fit(problem, spec)
+    own = effects.of_runs(scene)
+    found = search.Search(problem, [c for c in (*known, *own) if c.effect not in spec.effects], base, progress)
+    final, without, contenders = found.run()
+    progress("what v / i says")
+    swapped = plausibility.swapped(problem.runs)
+    # beside another spring's temperature v / i would only accuse contacts
+    second = None if swapped else resistance.witness(problem, final)
+    if second and second.contacts:
+        # v i is measured with the contact: its heat is not the spring's, and everything is looked for again without it
+        contacts.take_heat_out(problem, second.contacts)
+        base = first_fit(problem, spec)
+        found = search.Search(problem, found.candidates, base, progress)
+        final, without, contenders = found.run()
+    problem.learn_power(final.spec, final.values)
+    hidden: list[unnamed.Hidden] = []
+    if not swapped and unexplained(problem, final):
+        found, (final, without, contenders), hidden = _where_something_is_left(
+            problem, found, final, without, contenders
+        )
+    progress("held-out blocks")
+    return _Case(
+        problem, progress, found, base, found.base, _finish(problem, final), without, contenders, swapped, hidden
+    )
+
+
+def _judged(case: _Case) -> search.Search:
+    """Drop the names that are not sure enough, and search for what they stood in for; return the last search."""
+    problem, judge, witnesses = case.problem, case.search, case.witnesses
+    # where the ambient was not logged, that it drifted is no stand-in
+    guessed = all(run.ambient_c is None for run in problem.runs)
+    free_to_bend = (*RUNS_OWN, *(["ambient_drift"] if guessed else []))
+    while fresh := [effect for effect in case.without if effect not in witnesses]:
+        for effect in fresh:
+            flexible = case.search.is_flexible(case.final, effect) and effect not in free_to_bend
+            witnesses[effect] = witness(problem, case.final, effect, case.without[effect], flexible)
+        # beside causes without a name that leave structure themselves, a name must explain more than it leaves
+        least = MOST_OF_IT if case.hidden and unexplained(problem, case.final) else 0.0
+        doubtful = [
+            effect for effect in fresh if witnesses[effect].probability() < NAMED or witnesses[effect].share < least
+        ]
+        if not doubtful:
+            break
+        # judged together, beside one another: what one of them stood in for does not count against the rest
+        final = case.final
+        for effect in doubtful:
+            final = judge.reduced(final, effect)
+        # another may be what it stood in for
+        others = [one for one in judge.candidates if one.effect not in doubtful]
+        judge = search.Search(problem, others, case.base, case.progress, case.search.fits)
+        final, case.without, case.contenders = judge.settle(judge.forward(final))
+        case.final = _finish(problem, final)
+    return judge
+
+
+def _foretold(case: _Case, judge: search.Search) -> results.Unseen | None:
+    """Drop what foretells a run that the fit never saw no better; return how well such a run is foretold."""
+    judged_by = unseen.Unseen(case.problem, case.search, case.declared)
+    if not case.hidden and len(case.problem.runs) > 1:
+        kept, case.not_kept = judged_by.kept(case.final, judge.reduced)
+        if case.not_kept:
+            case.final = _finish(case.problem, kept)
+            case.without = {effect: judge.reduced(case.final, effect) for effect in case.adopted}
+    return judged_by.told(case.final)
+
+
+def _with_what_has_no_name(case: _Case, steps: list[tuple[str, Fit]]) -> list[tuple[str, Fit]]:
+    """Return the steps with everything in the error again: a model is for an array in which what has no name still acts."""
+    case.problem.leave_out(None)
+    case.base = case.declared
+    again = {id(fit): with_everything(case.problem, fit, case.base) for fit in [case.final, *(fit for _, fit in steps)]}
+    case.final = again[id(case.final)]
+    return [(effect, again[id(fit)]) for effect, fit in steps]
+
+
+def _errors(case: _Case, before: Fit) -> tuple[results.Baseline, results.After]:
+    problem, final = case.problem, case.final
+    baseline = results.Baseline(
+        rmse_c=statistics.rms(before.residual),
+        holdout_rmse_c=problem.holdout_rmse(before),
+        noise_c=problem.noise_c,
+        parameters=parameters_of(problem, before),
+        effects=list(case.base.spec.effects),
+    )
+    after = results.After(
+        rmse_c=statistics.rms(final.residual),
+        holdout_rmse_c=problem.holdout_rmse(final),
+        parameters=parameters_of(problem, final),
+    )
+    return baseline, after
+
+
+def _listed(
+    case: _Case, steps: Sequence[tuple[str, Fit]], strength: Mapping[str, float]
+) -> tuple[list[results.Effect], list[results.RunsDiffer]]:
+    """Return the effects of the array, the one that explains most first, and what is a run's own."""
+    problem, final = case.problem, case.final
+    bounds = set(final.at_bounds())
+    listed, differ = [], []
+    for effect, growing in steps:
+        sure = case.witnesses[effect]
+        if effect in RUNS_OWN:
+            differ.append(runs_apart.entry(problem, final, effect, strength[effect], sure))
+            continue
+        probability = sure.probability()
+        if bounds & {free.key for free in final.spec.free if free.effect == effect}:
+            # what would be beyond it is no such effect
+            probability = min(probability, PROBABLE)
+        parameters, variant = parameters_of(problem, final, effect), variant_of(final, effect)
+        listed.append(
+            results.Effect(
+                name=effect,
+                rmse_c=statistics.rms(growing.residual),
+                holdout_rmse_c=problem.holdout_rmse(growing),
+                evidence=strength[effect],
+                parameters=parameters,
+                probability=probability,
+                certainty="certain" if probability >= CERTAIN else "probable",
+                witness=sure,
+                on_chip=effect in effects.ON_CHIP,
+                in_words=effects.IN_WORDS[effect],
+                text=effects.sentence(effect, parameters, variant),
+                variant=variant or results.UNSET,
+            )
+        )
+    return listed, differ
+
+
+def _left(case: _Case, left_over: bool) -> results.Residual:
+    """Return what is left, what it depends on, and that in words."""
+    problem, final = case.problem, case.final
+    rho = statistics.autocorrelation([r / n for r, n in zip(final.residual, problem.noise, strict=True)], 1)
+    depends, note = depends_on(problem, final)
+    if left_over:
+        note = ("structure well above the noise remains that no effect of the library explains. " + note).strip()
+    noise = np.sqrt(np.nanmean(np.square(np.asarray(problem.noise)), axis=0))
+    return results.Residual(
+        autocorrelation_lag1=float(np.clip(rho[1], -1.0, 1.0)),
+        structure_c=math.sqrt(excess(problem, final)) * problem.noise_c,
+        rmse_per_spring_c=[finite(v) for v in doubt.per_spring(final.residual)],
+        noise_per_spring_c=[finite(v) for v in noise],
+        depends_on=depends,
+        note=note or "white at the noise floor",
+    )
+
+
+def _warned(
+    case: _Case, runs: Sequence[Run], left_over: bool, impossible: Sequence[str]
+) -> tuple[list[str], list[str]]:
+    """Return what is to be said of the logs, and for which of it `export` refuses the model."""
+    problem, base, final = case.problem, case.base, case.final
+    warnings = [f"{Path(run.name).name}: {text}" for run in problem.runs for text in run.notes]
+    warnings += case.not_kept
+    if any(free.knot is not None for free in final.spec.free):
+        warnings.append(f"model.toml: {DRIFT_LEFT_OUT}; log ambient_c to have it predicted")
+    if left_over and problem.budget.short:
+        warnings.append(
+            f"the search ended at its bound of {problem.budget.enough} simulations: there may be more to find"
+        )
+    if left_over and not case.adopted:
+        warnings += [
+            f"{effect} ({effects.IN_WORDS[effect]}) would explain {one.share:.0%} of what is left, but not as well at all "
+            f"times: {one.probability():.0%} likely, it is not named"
+            for effect, one in case.witnesses.items()
+            if one.share > MOST_OF_IT and effect in effects.IN_WORDS
+        ]
+    doubts = doubt.of_log(problem, problem.runs, case.swapped, (base,) if final is base else (base, final), left_over)
+    return warnings + doubts + [*impossible, *doubt.about_power(problem), *plausibility.coarse(runs)], doubts
+
+
+def _counts(one: unnamed.Hidden) -> bool:
+    """Return whether a cause without a name is told: it can be, and a board would measure as much."""
+    return one.possible and (one.cause.kind in unnamed.UNITS or abs(one.size) >= LEAST_PART)
+
+
+def identifiability_of(fit: Fit) -> results.Identifiability:
+    """Return which numbers of a fit the data do not fix."""
+    return results.Identifiability(
+        not_identifiable=sorted(set(fit.stuck)),
+        at_bounds=fit.at_bounds(),
+        correlated=[results.Correlation(a=a, b=b, correlation=r) for a, b, r in fit.correlations()],
+    )
+
+
+def _where_something_is_left(
+    problem: Problem, first: search.Search, final: Fit, without: dict[str, Fit], contenders: list[tuple[str, Fit]]
+) -> unnamed.Beside:
+    """Search again, beside causes without a name and with what is left taken for noise that lasts: the likeliest of all."""
+    plain: unnamed.Beside = (first, (final, without, contenders), [])
+    beside = unnamed.search_beside(problem, first, final) or plain
+    if not all(one.possible for one in beside[2]):
+        problem.leave_out(None)
+        beside = plain
+    hidden, taken = beside[2], (problem.unnamed, problem.heat)
+    nats = lasting.nats_beside(problem, beside[1][0], hidden, unnamed.KINDS)
+    problem.leave_out(None)
+    if hidden and lasting.nats_beside(problem, final, (), 1) > nats:
+        beside, hidden, taken = plain, [], (None, None)
+        nats = lasting.nats_beside(problem, final, (), 1)
+    first.progress("noise that lasts")
+    searched, result = lasting.search_lasting(problem, first, final)
+    if lasting.nats_beside(problem, result[0], (), 1) > nats:
+        return searched, result, []
+    problem.unnamed, problem.heat = taken
+    problem.take_for(None)
+    return beside
+
+
+def finite(value: float) -> float | None:
+    """Return the number, None where it is none (JSON has no NaN)."""
+    return float(value) if math.isfinite(value) else None
+
+
+def fit_effects(
+    array: Array,
+    runs: Sequence[Run],
+    wanted: Sequence[str],
+    progress: Callable[[str], None] = lambda text: None,
+    declared: Mapping[str, float] | None = None,
+) -> tuple[Problem, Fit, Fit]:
+    """Fit the declared model with the effects named; return the problem, the fit and the declared model's fit."""
+    with threadpool_limits(1):
+        problem = prepare(array, runs, declared)
+        known = effects.candidates(scene_of(problem))
+        base = first_fit(problem, base_spec(problem))
+        found = search.Search(problem, known, base, progress)
+        fit = base
+        for effect in wanted:
+            screen = found.screen(fit)
+            options = [k for k, c in enumerate(screen.candidates) if c.effect == effect]
+            if not options:
+                raise InputError(f"{effect} cannot show in these logs: nothing in them depends on it")
+            best = max(options, key=lambda k: screen.forecast([k])[0])
+            progress(f"fitting {effect}")
+            fit = found.refit(fit, [screen.candidates[best]], [screen.forecast([best])[1].get(best, 1.0)])
+        problem.learn_power(fit.spec, fit.values)
+        return problem, _finish(problem, fit), base

@@ -1,0 +1,70 @@
+"""How far runs lie apart in what may be a run's own: the spread of these random effects, fitted, and what is said of it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..infer.fit import Fit
+from ..infer.problem import Problem
+from ..infer.result import parameters_of
+from ..io import results
+from ..model import effects
+from ..model.spec import RUN_DRIVE, RUNS_OWN
+from .certainty import CERTAIN, Witness
+
+ROUNDS = 3
+"""Of fitting the runs' numbers and their spread in turn (expectation maximisation): more moves neither."""
+
+
+def _own(fit: Fit, effect: str) -> tuple[list[int], np.ndarray]:
+    """Return where an effect's numbers stand in a fit, and the covariance of their inner coordinates.
+
+    Of gains it is that of each one's distance from their mean: what they have in common is the command's power, the heat
+    capacity or the losses.
+    """
+    at = [k for k, free in enumerate(fit.spec.free) if free.effect == effect]
+    if fit.covariance is None:
+        return at, np.zeros((len(at), len(at)))
+    covariance = fit.covariance[np.ix_(at, at)]
+    if effect == RUN_DRIVE:
+        apart = np.eye(len(at)) - 1.0 / len(at)
+        covariance = apart @ covariance @ apart.T
+    return at, covariance
+
+
+def spread_of(fit: Fit, effect: str) -> float:
+    """Return how far runs lie apart about the array's own number, rms, in the inner coordinate: sizes and errors both count."""
+    at, covariance = _own(fit, effect)
+    z = np.array([fit.spec.free[k].inner(fit.values[k]) - fit.spec.free[k].inner(fit.spec.free[k].start) for k in at])
+    return float(np.sqrt(np.mean(z**2 + np.diag(covariance))))
+
+
+def with_spread(problem: Problem, fit: Fit) -> Fit:
+    """Return the fit with what is a run's own believed to lie as far apart as it does."""
+    mine = [effect for effect in fit.spec.effects if effect in RUNS_OWN]
+    for _ in range(ROUNDS if mine else 0):
+        spread = {effect: max(1e-6, spread_of(fit, effect)) for effect in mine}
+        free = tuple(replace(f, prior=spread.get(f.effect or "", f.prior)) for f in fit.spec.free)
+        fit = problem.fit(replace(fit.spec, free=free), fit.as_dict(), tolerance=1e-5, errors=True)
+    return fit
+
+
+def entry(problem: Problem, fit: Fit, effect: str, nats: float, sure: Witness) -> results.RunsDiffer:
+    """Return what diagnosis.json says of it: each run's number, and how far they lie apart."""
+    parameters = parameters_of(problem, fit, effect)
+    at, covariance = _own(fit, effect)
+    if effect == RUN_DRIVE and fit.covariance is not None:
+        for k, variance in zip(at, np.diag(covariance), strict=True):
+            parameters[fit.spec.free[k].key].stderr = float(fit.values[k] * np.sqrt(max(0.0, variance)))
+    return results.RunsDiffer(
+        name=effect,
+        evidence=nats,
+        probability=sure.probability(),
+        certainty="certain" if sure.probability() >= CERTAIN else "probable",
+        witness=sure,
+        spread=results.Spread(value=spread_of(fit, effect), unit="1" if effect == RUN_DRIVE else "K"),
+        parameters=parameters,
+        text=effects.sentence(effect, parameters),
+    )

@@ -1,0 +1,198 @@
+"""A run that the fit never saw, predicted: by what was found, by the declared model and by that with a lag, each fitted to the rest.
+
+Of several runs each is left out in turn (MOST of them); of one alone its last third. What is a run's own (its room where none
+was logged, its drift) is not carried over: a room is told by the run's first minute, as `predict` does.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ..infer import room
+from ..infer.fit import Fit
+from ..infer.likelihood import Colour
+from ..infer.problem import Problem
+from ..io import results
+from ..io.logs.run import Run
+from ..model.simulate import simulate_run
+from ..model.spec import RUNS_OWN, Free, Spec
+from .search import Search
+
+MOST = 3
+"""Runs that are left out, each in turn, at most."""
+SEEN = 2.0 / 3.0
+"""Part of a run alone that is fitted."""
+WORSE = 1.05
+"""Of an error, so much more is worse; less is chance."""
+STEPS = 10
+"""Of one fit: it begins where the whole data had it."""
+LAG = "sensor_lag"
+OF_THAT_DAY = (*RUNS_OWN, "ambient_drift")
+"""Effects that no other run can tell: it has its own."""
+
+
+@dataclass(frozen=True)
+class Split:
+    """Runs to fit, and the one to predict."""
+
+    problem: Problem
+    kept: tuple[int, ...]
+    left_out: Run
+    counts: np.ndarray
+    """(rows, springs): where the left-out run's error counts."""
+    alone: bool = False
+
+
+def splits(problem: Problem) -> list[Split]:
+    """Return the ways in which a problem's runs are fitted and predicted."""
+    runs = problem.runs
+    if len(runs) == 1:
+        run = runs[0]
+        late = run.time_s - run.time_s[0] > SEEN * run.duration_s
+        shown = np.where(late[:, None], np.nan, run.temperature_c)
+        if not np.isfinite(shown).any() or not (problem.mask[0] & late[:, None]).any():
+            return []
+        part = _problem(problem, [replace(run, temperature_c=shown)], [0])
+        return [Split(part, (0,), run, problem.mask[0] & late[:, None], alone=True)]
+    out = []
+    for r in range(max(0, len(runs) - MOST), len(runs)):
+        kept = [k for k in range(len(runs)) if k != r]
+        part = _problem(problem, [runs[k] for k in kept], kept)
+        out.append(Split(part, tuple(kept), runs[r], problem.mask[r]))
+    return out
+
+
+def _problem(whole: Problem, runs: Sequence[Run], kept: Sequence[int]) -> Problem:
+    part = Problem(whole.array, runs, whole.declared)
+    part.noise = [whole.noise[k] for k in kept]
+    part.budget = whole.budget
+    return part
+
+
+def _own(free: Free, kept: Sequence[int]) -> str:
+    """Return the key that a number has where only these runs are fitted."""
+    return free.key if free.run is None else free.key.replace(f"@{free.run + 1}", f"@{kept.index(free.run) + 1}")
+
+
+def _of_these(fit: Fit, kept: Sequence[int]) -> tuple[Spec, dict[str, float]]:
+    """Return a fit's model with the numbers of these runs only, and where they begin: a drift from nothing."""
+    mine = [(f, float(v)) for f, v in zip(fit.spec.free, fit.values, strict=True) if f.run is None or f.run in kept]
+    free = [replace(f, key=_own(f, kept), run=None if f.run is None else kept.index(f.run)) for f, _ in mine]
+    return replace(fit.spec, free=tuple(free)), {_own(f, kept): v for f, v in mine if f.knot is None}
+
+
+def error(split: Split, fit: Fit, colour: Colour | None) -> tuple[float, int]:
+    """Return the sum of squared errors, degC^2, at which a model fitted to a split's runs predicts the other, and of how many."""
+    problem, kept = split.problem, list(split.kept)
+    spec, start = _of_these(fit, kept)
+    problem.colour = None
+    problem.learn_starts(spec, [start.get(f.key, f.start) for f in spec.free])
+    if colour is not None:
+        problem.take_for(colour)
+    fitted = problem.fit(spec, start, tolerance=1e-3, max_steps=STEPS)
+    # what only the left-out run shows, these do not tell: it stays
+    known = {key: start[key] for key in fitted.stuck if key in start}
+    fitted.values = np.array([known.get(f.key, value) for f, value in zip(spec.free, fitted.values, strict=True)])
+    run, values = split.left_out, fitted.as_dict()
+    if split.alone:
+        shown = problem.simulate(spec, fitted.values, 0)
+    else:
+        plant = problem.plant_for(spec, fitted.values)
+        ambient = run.ambient_c
+        if ambient is None:
+            ambient = np.full(len(run.time_s), _room(problem, run, values, plant))
+        shown = simulate_run(plant, run, ambient, {})
+    off = (run.temperature_c - shown)[split.counts]
+    return float(off @ off), int(off.size)
+
+
+def _room(problem: Problem, run: Run, values: dict[str, float], plant: Any) -> float:
+    """Return how warm the room of a run was, as `predict` tells it by the runs that were fitted."""
+    rooms = {r: values[f"ambient_c@{r + 1}"] for r in range(len(problem.runs)) if f"ambient_c@{r + 1}" in values}
+    usual = float(np.mean(list(rooms.values()))) if rooms else plant.get("ambient_c")
+    over = room.over_first([problem.runs[r] for r in rooms], list(rooms.values())) if rooms else None
+    return room.by_plant(run, plant, usual, over)[0]
+
+
+@dataclass
+class Unseen:
+    """How well models predict runs that they were not fitted to."""
+
+    problem: Problem
+    found: Search
+    base: Fit
+
+    def __post_init__(self) -> None:
+        self.splits = splits(self.problem)
+        self.known: dict[Any, float] = {}
+        self.lag = next((one for one in self.found.candidates if one.effect == LAG), None)
+        self.lagged = self.base
+        if self.lag is not None and LAG not in self.base.spec.effects:
+            lag = self.lag
+            spec = self.base.spec.with_effect(lag.effect, lag.free, lag.fixed, lag.variant, lag.also_on)
+            start = self.base.as_dict() | lag.start_at(1.0)
+            self.lagged = replace(self.base, spec=spec, values=np.array([start[f.key] for f in spec.free]))
+
+    def rmse(self, fit: Fit, colour: Colour | None = None) -> float:
+        """Return the error, degC rms, of runs left out, the others fitted by how errors last; NaN where none can be."""
+        key = fit.spec.variant, colour
+        if key not in self.known:
+            parts = [error(one, fit, colour) for one in self.splits]
+            count = sum(n for _, n in parts)
+            self.known[key] = math.sqrt(sum(square for square, _ in parts) / count) if count else math.nan
+        return self.known[key]
+
+    def own(self, fit: Fit) -> float:
+        """Return the error of what was found, or a part of it, its numbers as likely as the problem's colour has them."""
+        return self.rmse(fit, self.problem.colour)
+
+    @property
+    def better(self) -> Fit:
+        """The better one of both that know no physics but the declared, by least squares as anybody fits them."""
+        return min((self.base, self.lagged), key=self.rmse)
+
+    def kept(self, fit: Fit, reduced: Callable[[Fit, str], Fit]) -> tuple[Fit, list[str]]:
+        """Return what predicts no worse than the better of both, names left out one by one; and what is to be said of them."""
+        said = []
+        while self.splits and self.own(fit) > WORSE * self.rmse(self.better):
+            names = [e for e in fit.spec.effects if e not in (*self.base.spec.effects, *OF_THAT_DAY)]
+            if not names:
+                break
+            fewer = {effect: reduced(fit, effect) for effect in names}
+            best = min(fewer, key=lambda effect: self.own(fewer[effect]))
+            if self.own(fewer[best]) >= self.own(fit):
+                best_fit = self.found.base
+                if self.lag is not None and self.better is not self.base:
+                    best_fit = self.found.refit(best_fit, [self.lag], [1.0])
+                said += [self._left_out(e, fit, best_fit) for e in names if e not in best_fit.spec.effects]
+                fit = best_fit
+                break
+            said.append(self._left_out(best, fit, fewer[best]))
+            fit = fewer[best]
+        return fit, said
+
+    def _left_out(self, effect: str, fit: Fit, other: Fit) -> str:
+        return (
+            f"{effect} is not named: a run that the fit did not see is predicted to {self.own(fit):.2f} K with it and to "
+            f"{min(self.own(other), self.rmse(other)):.2f} K without"
+        )
+
+    def told(self, fit: Fit) -> results.Unseen | None:
+        """Return what diagnosis.json says of it, None where nothing can be left out."""
+        if not self.splits or not math.isfinite(self.own(fit)):
+            return None
+        alone = self.splits[0].alone
+        what = "the last third of the run" if alone else "a run that the fit did not see"
+        mine, declared, lagged = self.own(fit), self.rmse(self.base), self.rmse(self.lagged)
+        return results.Unseen(
+            what="last third" if alone else "each run left out in turn",
+            rmse_c=mine,
+            declared_rmse_c=declared,
+            with_lag_rmse_c=lagged,
+            text=f"{what} is predicted to {mine:.2f} K (declared model, fitted: {declared:.2f}, with a lag: {lagged:.2f})",
+        )

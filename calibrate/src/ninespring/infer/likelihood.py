@@ -1,0 +1,246 @@
+"""How likely readings are by a model: what it leaves, as innovations of a filter that knows how its errors last.
+
+A model's error is no white noise: heat that nobody logged stays in a spring for as long as the spring holds heat, a room that
+wanders for an hour longer. Both are processes here, of each thermometer's own and of all together (their mean), with variance
+and time constant fitted beside the white noise of the sensors: what is left is then a likelihood, whatever its colour. A
+difference of two of them is what the data say for one model against another, and every row counts for what it is worth.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import solveh_banded
+from scipy.optimize import minimize
+
+from ..model import native
+
+BROKEN = 1e12
+"""Step, s, over a gap: nothing lasts that long."""
+NONE = 1e-7
+"""Variance, in units of the white noise's, of an error that is not there."""
+LARGEST = 1e5
+QUICK_S, SLOW_S = (3.0, 600.0), (600.0, 14400.0)
+"""Time constants: of what a spring and its thermometer keep, and of what a box or a room keeps."""
+BEGIN_S = (10.0, 100.0)
+"""Quick time constants from which the fit begins: a likelihood of several errors has more than one hill."""
+FULL = 0.9
+"""Part of the rows with readings that must have all of them for thermometers to be told apart from their mean."""
+_double_p = ctypes.POINTER(ctypes.c_double)
+
+
+@dataclass(frozen=True)
+class Colour:
+    """How errors last: variances in units of the white noise's, time constants."""
+
+    apart: tuple[float, float] = (NONE, NONE)
+    """Of each thermometer's own, quick and slow."""
+    together: tuple[float, float] = (NONE, NONE)
+    """Of the mean of all of them, quick and slow."""
+    time_s: tuple[float, float] = (60.0, 3600.0)
+    white: float = 1.0
+    """Variance of the white noise, in units of what was taken for it."""
+
+    @property
+    def share(self) -> float:
+        """Variance of all that lasts, in units of the white noise's."""
+        return max(sum(self.apart), sum(self.together))
+
+
+@functools.cache
+def _whiten() -> ctypes._CFuncPtr:
+    call = native.library().whiten
+    call.restype = ctypes.c_double
+    size = ctypes.c_size_t
+    call.argtypes = (
+        *(size, size, _double_p, ctypes.c_char_p, _double_p, _double_p),
+        *(size, _double_p, _double_p),
+    )
+    return call
+
+
+def _filtered(
+    step_s: np.ndarray, there: bytes, variance: Sequence[float], time_s: Sequence[float], fields: np.ndarray
+) -> float:
+    """Whiten fields (rows, columns) in place; return the sum of the logarithms of the deviations of one column."""
+    rows, columns = fields.shape
+    sizes, lasts = np.asarray(variance, dtype=float), np.asarray(time_s, dtype=float)
+    states = np.empty(len(sizes) * columns)
+    pointers = [one.ctypes.data_as(_double_p) for one in (step_s, sizes, lasts, states, fields)]
+    step, size, last, room, data = pointers
+    return float(_whiten()(rows, len(sizes), step, there, size, last, columns, room, data))
+
+
+def _smoothed(
+    step_s: np.ndarray, known: np.ndarray, variance: Sequence[float], time_s: Sequence[float], field: np.ndarray
+) -> np.ndarray:
+    """Return the mean of the sum of errors that last, (rows,), given a field where it is known, white noise of unit variance on it.
+
+    Errors are Markov: their precision has a band of one row, and the mean is a banded solution.
+    """
+    rows, errors = len(step_s), len(variance)
+    band = np.zeros((errors + 1, rows, errors))
+    for a, (size, lasts) in enumerate(zip(variance, time_s, strict=True)):
+        keep = np.exp(-step_s / lasts)
+        keep[0] = 0.0
+        fresh = 1.0 / (size * np.maximum(1.0 - keep**2, 1e-12))
+        band[errors, :, a] += fresh
+        band[errors, :-1, a] += (keep**2 * fresh)[1:]
+        band[0, 1:, a] -= (keep * fresh)[1:]
+    for apart in range(errors):
+        band[errors - apart, :, apart:] += known[:, None]
+    right = np.repeat(np.where(known, field, 0.0), errors)
+    found = solveh_banded(band.reshape(errors + 1, rows * errors), right)
+    return np.asarray(found).reshape(rows, errors).sum(axis=1)
+
+
+@dataclass(frozen=True)
+class Rows:
+    """The rows of one run as the filter walks them."""
+
+    step_s: np.ndarray
+    mask: np.ndarray
+    """(rows, springs): where something was read."""
+    turn: np.ndarray | None
+    """Thermometers turned into their mean and what is not it, (seen, seen); None: each is its own."""
+    seen: np.ndarray
+    there: tuple[bytes, ...]
+    """Per channel of `seen`, where it has readings; of all together where they are turned."""
+
+    @staticmethod
+    def of(time_s: np.ndarray, starts: Sequence[int], mask: np.ndarray) -> Rows:
+        """Return them for a run's times, the rows at which it begins again, and where it has readings."""
+        step = np.ascontiguousarray(np.diff(time_s, prepend=time_s[0]))
+        step[list(starts)] = BROKEN
+        seen = np.flatnonzero(mask.any(axis=0))
+        some = mask[:, seen]
+        all_there = some.all(axis=1)
+        turn = None
+        if len(seen) > 1 and all_there.sum() >= FULL * some.any(axis=1).sum():
+            turn = np.linalg.qr(np.column_stack([np.ones(len(seen)), np.eye(len(seen))[:, 1:]]))[0].T
+            some = np.repeat(all_there[:, None], len(seen), axis=1)
+        there = tuple(np.ascontiguousarray(some[:, k]).astype(np.uint8).tobytes() for k in range(len(seen)))
+        return Rows(step, mask, turn, seen, there)
+
+    @property
+    def count(self) -> int:
+        """Readings that count."""
+        return sum(one.count(1) for one in self.there)
+
+    def sizes(self, colour: Colour, channel: int) -> tuple[float, float]:
+        """Return the variances of a channel's errors that last."""
+        return colour.together if self.turn is not None and channel == 0 else colour.apart
+
+    def whitened(self, columns: np.ndarray, colour: Colour) -> tuple[np.ndarray, float]:
+        """Return columns (readings, n), in units of the noise, as innovations, and the sum of the logarithms of their deviations.
+
+        They stand where the readings stood; where thermometers are turned, what is their mean is the first one's.
+        """
+        rows, springs = self.mask.shape
+        fields = np.zeros((rows, springs, columns.shape[1]))
+        fields[self.mask] = columns
+        part = fields[:, self.seen]
+        if self.turn is not None:
+            part = np.einsum("ab,rbc->rac", self.turn, part)
+        logarithms = 0.0
+        for k, there in enumerate(self.there):
+            one = np.ascontiguousarray(part[:, k])
+            logarithms += _filtered(self.step_s, there, self.sizes(colour, k), colour.time_s, one)
+            part[:, k] = one
+        fields[:, self.seen] = part
+        return fields[self.mask], logarithms
+
+    def between(self, vector: np.ndarray, colour: Colour, out: np.ndarray) -> np.ndarray:
+        """Return the part of a vector (readings,), in units of the noise, that lasts, where `out` is set: told by all other readings.
+
+        What a smoother says of the errors in a gap, by what they were before and after it.
+        """
+        rows, springs = self.mask.shape
+        hidden = np.zeros((rows, springs), dtype=bool)
+        hidden[self.mask] = out
+        field = np.concatenate(self.turned(vector), axis=1)
+        told = np.zeros((rows, len(self.seen)))
+        for k, there in enumerate(self.there):
+            gone = hidden[:, self.seen].any(axis=1) if self.turn is not None else hidden[:, self.seen[k]]
+            known = np.frombuffer(there, dtype=np.uint8).astype(bool) & ~gone
+            told[:, k] = _smoothed(self.step_s, known, self.sizes(colour, k), colour.time_s, field[:, k])
+        part = np.zeros((rows, springs))
+        part[:, self.seen] = told if self.turn is None else told @ self.turn
+        return np.where(out, part[self.mask], 0.0)
+
+    def turned(self, vector: np.ndarray) -> list[np.ndarray]:
+        """Return a vector (readings,) as the filter's channels, (rows, channels of one kind): their mean, and each its own."""
+        fields = np.zeros(self.mask.shape)
+        fields[self.mask] = vector
+        part = fields[:, self.seen]
+        if self.turn is None:
+            return [np.zeros((len(part), 0)), part]
+        part = part @ self.turn.T
+        return [np.ascontiguousarray(part[:, :1]), np.ascontiguousarray(part[:, 1:])]
+
+
+def fitted(rows: Sequence[Rows], vectors: Sequence[np.ndarray]) -> tuple[Colour, float]:
+    """Return how errors last by what a model leaves, per run in units of the noise, and the logarithm of its likelihood."""
+    channels = [one.turned(vector) for one, vector in zip(rows, vectors, strict=True)]
+    count = sum(one.count for one in rows)
+    low = np.log([NONE, NONE, NONE, NONE, QUICK_S[0], SLOW_S[0]])
+    high = np.log([LARGEST, LARGEST, LARGEST, LARGEST, QUICK_S[1], SLOW_S[1]])
+    together = any(one.turn is not None for one in rows)
+
+    def colour_of(z: np.ndarray) -> Colour:
+        size = np.exp(np.clip(z, low, high))
+        return Colour((size[0], size[1]), (size[2], size[3]), (size[4], size[5]))
+
+    def parts(colour: Colour) -> tuple[float, float]:
+        squares = logarithms = 0.0
+        for one, (mean, own) in zip(rows, channels, strict=True):
+            for field, sizes, there in ((mean, colour.together, one.there[0]), (own, colour.apart, None)):
+                if not field.shape[1]:
+                    continue
+                if there is not None or one.turn is not None:
+                    work = field.copy()
+                    value = _filtered(one.step_s, one.there[0], sizes, colour.time_s, work)
+                    logarithms += field.shape[1] * value
+                    squares += float(np.vdot(work, work))
+                    continue
+                for k, its in enumerate(one.there):
+                    work = np.ascontiguousarray(field[:, [k]])
+                    logarithms += _filtered(one.step_s, its, sizes, colour.time_s, work)
+                    squares += float(np.vdot(work, work))
+        return squares, logarithms
+
+    def loss(z: np.ndarray) -> float:
+        squares, logarithms = parts(colour_of(z))
+        return 0.5 * count * math.log(max(squares, 1e-300) / count) + logarithms
+
+    free = [0, 1, 2, 3, 4, 5] if together else [0, 1, 4, 5]
+    bounds = [(low[k], high[k]) for k in free]
+    best: tuple[float, np.ndarray] = (math.inf, low)
+    for quick_s in BEGIN_S:
+        begin = np.log([1.0, 0.3, 1.0, 0.3, quick_s, 2400.0])
+
+        def only(z: np.ndarray, begin: np.ndarray = begin) -> float:
+            whole = begin.copy()
+            whole[free] = z
+            return loss(whole)
+
+        found = minimize(
+            only, begin[free], method="L-BFGS-B", bounds=bounds, options={"eps": 1e-4, "maxiter": 30, "ftol": 1e-6}
+        )
+        if float(found.fun) < best[0]:
+            begin[free] = found.x
+            best = float(found.fun), begin
+    value, whole = best
+    colour = colour_of(whole)
+    alone = Colour()
+    squares, logarithms = parts(alone)
+    white = 0.5 * count * math.log(max(squares, 1e-300) / count) + logarithms
+    if white <= value:
+        colour, value = alone, white
+    squares, _ = parts(colour)
+    return Colour(colour.apart, colour.together, colour.time_s, squares / count), -value - 0.5 * count

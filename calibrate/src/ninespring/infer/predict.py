@@ -1,0 +1,109 @@
+"""What a model.toml predicts of a log: by the plant, or by the on-chip model seen through the same sensors."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ..errors import InputError, WorkError
+from ..io import results
+from ..io.logs.run import Run
+from ..model import effects, native
+from ..model.models import Model
+from ..model.simulate import array_parameters, simulate_run
+from . import room
+
+
+def plant_of(model: Model) -> native.Plant:
+    """Return the plant that a model.toml describes."""
+    plant = native.Plant(model.array.rows, model.array.cols, model.array.layers)
+    plant.set_all(array_parameters(model.array))
+    plant.set_effects(model.effects)
+    plant.set_all(model.parameters)
+    return plant
+
+
+def chip_lines(model: Model) -> tuple[str, str]:
+    """Return the console lines of the on-chip model with a model's numbers, and what was left out; refused at its place."""
+    plant = plant_of(model)
+    try:
+        if why := plant.check():
+            raise WorkError(why)
+        return native.chip_export(plant)
+    except WorkError as error:
+        names = [name for name in model.places if re.search(rf"\b{name.partition('[')[0]}\b", str(error))]
+        raise InputError(str(error), model.name, *(model.places[names[-1]] if names else ())) from None
+
+
+def in_its_room(model: Model, run: Run) -> Run:
+    """Return a run without an ambient with the one that its first minute tells, and say so; others as they are."""
+    if run.ambient_c is not None or room.begun(run) is None:
+        return run
+    plant = plant_of(model)
+    known = model.provenance
+    over = known.get("room_over_first_k"), known.get("room_over_first_sigma_k")
+    value, sigma = room.by_plant(run, plant, plant.get("ambient_c"), None if None in over else over)
+    said = f"no ambient_c: by the first minute the room is at {value:.1f} degC (+-{sigma:.1f})"
+    return replace(run, ambient_c=np.full(len(run.time_s), value), notes=[*run.notes, said])
+
+
+def predict(model: Model, run: Run, chip: bool = False) -> np.ndarray:
+    """Return what the sensors should show, (rows, springs), degC; `chip`: by the on-chip model, seen by the same sensors."""
+    run = in_its_room(model, run)
+    if chip:
+        return predict_by_chip(model, chip_lines(model)[0], run)
+    return simulate_run(plant_of(model), run, run.ambient_c, {})
+
+
+def predict_by_chip(model: Model, lines: str, run: Run) -> np.ndarray:
+    """Return what a chip with these console lines predicts, (rows, springs), degC, seen by the model's sensors."""
+    run = in_its_room(model, run)
+    plant = plant_of(model)
+    shown = simulate_run(plant, run, run.ambient_c, {})
+    # What lag, gain and mixing of the sensors add is the plant's: the chip has none of them.
+    plant = plant_of(model)
+    plant.set_effects([e for e in model.effects if e not in effects.MEASUREMENT])
+    seen_by = shown - simulate_run(plant, run, run.ambient_c, {})
+    return chip_trace(model, lines, run)[0] + seen_by
+
+
+def chip_trace(model: Model, lines: str, run: Run) -> tuple[np.ndarray, np.ndarray]:
+    """Return temperatures (degC) and austenite, (rows, springs), that a chip with these lines believes along a log."""
+    run = in_its_room(model, run)
+    plant = plant_of(model)
+    ambient = run.ambient_c if run.ambient_c is not None else np.full(len(run.time_s), plant.get("ambient_c"))
+    power = np.array([plant.get(f"command_power_w[{k + 1}]") for k in range(run.springs)])
+    if run.mode == "command" and (without := np.flatnonzero(power <= 0)).size:
+        said = f"the log has only commands, and the model no command_power_w of spring {without[0] + 1}; add it"
+        raise InputError(said, model.name)
+    temperature, austenite = np.empty_like(run.temperature_c), np.empty_like(run.temperature_c)
+    for begin, end in zip(run.starts, [*run.starts[1:], len(run.time_s)], strict=True):
+        part = slice(begin, end)
+        before = temperature[begin - 1] if begin else np.full(run.springs, ambient[0])
+        first = np.where(np.isfinite(run.temperature_c[begin]), run.temperature_c[begin], before)
+        temperature[part], austenite[part] = native.chip_simulate(
+            lines,
+            (model.array.rows, model.array.cols),
+            run.time_s[part],
+            native.MODES[run.mode],
+            run.drive[part],
+            power,
+            run.fan[part],
+            ambient[part],
+            first,
+        )
+    return temperature, austenite
+
+
+def chip_error(model: Model, lines: str, runs: Sequence[Run]) -> results.ChipError:
+    """Return the error of a chip with these lines on logs, K rms: of all, and of each spring (None: not measured)."""
+    left = np.concatenate([run.temperature_c - predict_by_chip(model, lines, run) for run in runs])
+    seen = np.isfinite(left)
+    each = [
+        float(np.sqrt(np.mean(one[mask] ** 2))) if mask.any() else None
+        for one, mask in zip(left.T, seen.T, strict=True)
+    ]
+    return results.ChipError(rmse_c=float(np.sqrt(np.mean(left[seen] ** 2))), rmse_per_spring_c=each)

@@ -1,0 +1,160 @@
+"""Where a log has no ambient: how warm its room was, told by its first minute.
+
+A run's first readings say how warm its springs are, and how they move from there says what they lose heat to. Beside that stands
+what the runs of the fit were like: so much warmer than their coldest spring was at first, and so far apart in that.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.stats import trim_mean
+
+from ..io import statistics
+from ..io.logs.run import Run
+from ..model import native
+from ..model.simulate import fades_per_s, hidden_k, simulate_run
+
+FIRST_S = 60.0
+"""Of a run, what it is told by."""
+FEWER = 6.0
+"""Readings that count as one: at first all errors are each other's, of rounding, start and model."""
+DRIVE_OFF = 0.03
+"""Part by which a drive is usually off, one sigma: it must not count as a room's."""
+LOSS_OFF = 0.1
+"""Part of a warm spring's loss that may be another node's: a room is told so much worse by one that begins warm."""
+ROOMS_K = 3.0
+"""How far a room is from what it was on another day, one sigma."""
+WARM_K = 60.0
+"""Within which a spring is of its room that was driven shortly before its run began."""
+AS_OTHERS = 0.9
+"""How likely a run begins as those did that were fitted, before it is seen."""
+SAME_K = 0.3
+"""How well runs that agree know how much warmer than its first reading a room is, at best."""
+
+
+@dataclass(frozen=True)
+class Guess:
+    """How warm a room may be, degC, one sigma of it, and the logarithm of how likely that is beside others."""
+
+    nats: float
+    room_c: float
+    sigma_k: float
+
+    def told(self, room_c: float, variance: float) -> float:
+        """Return the logarithm of how likely it is that something with this variance, K^2, says so of the room."""
+        spread = self.sigma_k**2 + variance
+        return -0.5 * ((room_c - self.room_c) ** 2 / spread + math.log(2.0 * math.pi * spread))
+
+    def with_told(self, room_c: float, variance: float) -> Guess:
+        """Return it with what something says of the room."""
+        share = self.sigma_k**2 / (self.sigma_k**2 + variance)
+        middle = self.room_c + share * (room_c - self.room_c)
+        return Guess(self.nats + self.told(room_c, variance), middle, self.sigma_k * math.sqrt(1.0 - share))
+
+
+def first_c(run: Run) -> float:
+    """Return what a run's coldest spring shows before anything is driven, within a first minute, or in its first 5 s, degC."""
+    since = run.time_s - run.time_s[0]
+    driven = np.flatnonzero((run.drive != 0.0).any(axis=1))
+    rests_s = min(FIRST_S, since[driven[0]] if driven.size else FIRST_S)
+    first = run.temperature_c[: max(3, int(np.searchsorted(since, max(5.0, rests_s))))]
+    # a mean: where thermometers step, it is finer than any of them; without what is nonsense
+    middle = [trim_mean(one[np.isfinite(one)], 0.1) for one in first.T if np.isfinite(one).any()]
+    return float(min(middle)) if middle else math.nan
+
+
+def over_first(runs: Sequence[Run], ambient_c: Sequence[float]) -> tuple[float, float] | None:
+    """Return by how much rooms are warmer than what their runs begin at, K, and one sigma of that for another run; None of one
+    run alone: it may have begun as no other does."""
+    over = np.array([room - first_c(run) for run, room in zip(runs, ambient_c, strict=True)])
+    over = over[np.isfinite(over)]
+    if over.size < 2:
+        return None
+    apart = max(SAME_K, float(np.std(over, ddof=1)))
+    return float(np.mean(over)), apart * math.sqrt(1.0 + 1.0 / over.size)
+
+
+def guessed(run: Run, usual_c: float, over: tuple[float, float] | None) -> list[Guess]:
+    """Return what is believed of a run's room before it moves.
+
+    Rooms of other days say one thing. What other runs began like says another, if this one began so, too: it may have begun warm,
+    and is then anywhere within WARM_K above its room.
+    """
+    warm = Guess(0.0, usual_c, ROOMS_K)
+    first = first_c(run)
+    if over is None or not math.isfinite(first):
+        return [warm]
+    here = first + over[0]
+    both = warm.with_told(here, over[1] ** 2)
+    return [
+        replace(both, nats=both.nats + math.log(AS_OTHERS)),
+        replace(warm, nats=math.log((1.0 - AS_OTHERS) / WARM_K)),
+    ]
+
+
+def begun(run: Run) -> Run | None:
+    """Return a run's first minute, None where it has nothing to tell a room by."""
+    end = int(np.searchsorted(run.time_s - run.time_s[0], FIRST_S, side="right"))
+    if len(run.starts) > 1:
+        end = min(end, run.starts[1])
+    if end < 5 or not np.isfinite(run.temperature_c[:end]).any():
+        return None
+    return run.part(slice(end))
+
+
+def of_run(
+    run: Run, guess: Sequence[Guess], shows: Callable[[Run, float, np.ndarray], np.ndarray], fades: float
+) -> tuple[float, float]:
+    """Return how warm the room of a run is and one sigma of it, by its first minute and guesses before it.
+
+    `shows` simulates a run with a room (degC) and errors of the first readings (springs,), K. Least squares of the room, of the
+    drive's errors, which are believed to be small, and of those of the start: noise, and what a thermometer that lags hides of a
+    spring that `fades` (1/s) towards its room.
+    """
+    part, usual = begun(run), _moments(guess)
+    if part is None:
+        return usual
+    noise = np.nan_to_num(statistics.noise_floor(part.temperature_c), nan=0.1)
+    noise = np.maximum(np.maximum(noise, statistics.rounding(part.temperature_c)), 0.02)
+    there = np.isfinite(part.temperature_c)
+    (value, sigma), springs = usual, run.springs
+    for _ in range(2):  # what heats is not straight, but nearly
+        base = shows(part, value, np.zeros(springs))
+        moved = [shows(part, value + 1.0, np.zeros(springs)) - base]
+        weaker = replace(part, drive=part.drive * (1.0 - DRIVE_OFF))  # a command is 1 at most
+        moved.append((base - shows(weaker, value, np.zeros(springs))) / DRIVE_OFF)
+        moved += [shows(part, value, one) - base for one in np.eye(springs)]
+        start = np.hypot(noise, hidden_k(part, value, fades))
+        trust = np.array([1e-6, 1.0 / DRIVE_OFF, *(1.0 / start)])  # nothing of the room: what the readings alone say
+        scale = noise * math.sqrt(FEWER)
+        columns = np.column_stack([(one / scale)[there] for one in moved])
+        left = ((part.temperature_c - base) / scale)[there]
+        spread = np.linalg.inv(columns.T @ columns + np.diag(trust**2))
+        said = value + float((spread @ (columns.T @ left))[0])
+        variance = float(spread[0, 0]) + (LOSS_OFF * max(0.0, np.nanmax(part.temperature_c[0]) - usual[0])) ** 2
+        value, sigma = _moments([one.with_told(said, variance) for one in guess])
+        value = float(np.clip(value, -35.0, 75.0))
+    return value, sigma
+
+
+def _moments(parts: Sequence[Guess]) -> tuple[float, float]:
+    most = max(one.nats for one in parts)
+    weight = [math.exp(one.nats - most) for one in parts]
+    middle = sum(w * one.room_c for w, one in zip(weight, parts, strict=True)) / sum(weight)
+    square = sum(w * (one.sigma_k**2 + (one.room_c - middle) ** 2) for w, one in zip(weight, parts, strict=True)) / sum(
+        weight
+    )
+    return middle, math.sqrt(square)
+
+
+def by_plant(run: Run, plant: native.Plant, usual_c: float, over: tuple[float, float] | None) -> tuple[float, float]:
+    """Return how warm the room of a run is and one sigma of it, as a fitted plant shows its first minute; `over` as `over_first`."""
+
+    def shows(part: Run, ambient_c: float, offset: np.ndarray) -> np.ndarray:
+        return simulate_run(plant.copy(), part, np.full(len(part.time_s), ambient_c), {}, offset)
+
+    return of_run(run, guessed(run, usual_c, over), shows, fades_per_s(plant))

@@ -1,0 +1,488 @@
+"""A board and its console (docs/console.md): one line out, lines in until `ok` or `error:N`."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import re
+import subprocess
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+
+import numpy as np
+import pandas as pd
+
+from ..errors import InputError, RefusedError, WorkError
+from . import ranges
+from .belief import Belief, beliefs
+from .logs import read_bytes
+from .port import Port
+from .simulated import simulated_board
+
+ERROR = re.compile(r"^error:(\d+) ?(.*)$")
+TELEMETRY = re.compile(r"^(?:\d+\.\d+,.*|<.*>)$")
+"""A row, or a status line: comes at any moment, also in the middle of an answer."""
+FOUND_WITHIN_S = 5.0
+"""So soon a board is found, or it is said that there is none."""
+BOOTING_S = 2.0
+"""A Mega's boot loader listens for so long after a reset, and takes what is sent meanwhile for a program."""
+SIMULATED = "simulated"
+PATIENCE = 6.0
+"""So many times longer an answer of the simulated board is awaited: it has what the machine leaves it."""
+HOST_TIMEOUT_S = 5
+"""Springs go off when nothing came from here for so long, where the board has that setting."""
+ALIVE_EVERY_S = 1.0
+"""By the clock here and by the board's: that of a simulated one may run faster."""
+LOOK_EVERY_S = 1.0
+"""By the board's clock: so often `stream` asks what telemetry does not tell."""
+SCRIPT_ALIVE_EVERY_S = 0.2
+"""For a script that may sleep or compute between two lines: a simulated board's second may be so short."""
+DRIVES = re.compile(r"\s*(on|pattern)\b", re.IGNORECASE)
+STATUS = re.compile(r"^<(off|on|fault|locked)\|t:.*>$")
+"""What `?` is answered with."""
+ROW_TIME = re.compile(r"^(\d+\.\d+),")
+
+
+@dataclass(frozen=True)
+class Reading:
+    """One row of telemetry: arrays have one entry per spring (n,)."""
+
+    time_s: float
+    current_a: np.ndarray
+    voltage_v: np.ndarray
+    temperature_c: np.ndarray
+    """What the model on the chip believes."""
+    duty: np.ndarray
+    fan: float
+    ambient_c: float
+    state: str
+    low_c: np.ndarray
+    """The temperature is above this and below `high_c` in 99 of 100 cases, as the board believes; NaN where it was not asked."""
+    high_c: np.ndarray
+    austenite: np.ndarray
+    """The phase that the board believes, 0..1; NaN where it was not asked."""
+
+    def __repr__(self) -> str:
+        hottest = int(np.argmax(self.temperature_c))
+        return (
+            f"<{self.time_s:.1f} s, {self.current_a.sum():.2f} A, hottest spring {hottest + 1} at "
+            f"{self.temperature_c[hottest]:.1f} degC, {self.state}>"
+        )
+
+
+class Board:
+    """A board at a serial port. Leaving its `with` block switches all springs off.
+
+    >>> with Board("/dev/ttyACM0") as board:  # or Board("simulated")
+    ...     board.on(5, 80)
+    ...     print(board.read().temperature_c)
+    """
+
+    def __init__(
+        self,
+        port: str = SIMULATED,
+        *,
+        stopped: Callable[[], bool] = lambda: False,
+        off_at_end: bool = True,
+    ) -> None:
+        """Open the port and find the board; `stopped` is asked while waiting, and ends it with KeyboardInterrupt."""
+        self.off_at_end = off_at_end
+        self.stopped = stopped
+        self.version: list[str] = []
+        """What the board says of itself."""
+        self._telemetry: deque[str] = deque()
+        self._alive_s = 0.0
+        self._alive_board_s = 0.0
+        self._owed = 0
+        """Answers that are still to come."""
+        self._unguarded: str | None = None
+        """The setting host_timeout_s as it was."""
+        self._guards = False
+        """Whether somebody has seen to that setting."""
+        self._script_ends = threading.Event()
+        self.thermometers: str | None = None
+        """Port of the simulated board's thermometers."""
+        self._simulated: subprocess.Popen[str] | None = None
+        self.patience = PATIENCE if port == SIMULATED else 1.0
+        """Times as long as usual everything may take."""
+        if port == SIMULATED:
+            self._simulated, port, self.thermometers = simulated_board()
+        self.port = port
+        try:
+            self._port = Port(port)
+            try:
+                self._greet()
+            except BaseException:
+                self._port.close()
+                raise
+        except BaseException:
+            self._end_simulation()
+            raise
+
+    def __repr__(self) -> str:
+        return f"<board at {self.port}: {self.version[0] if self.version else 'closed'}>"
+
+    def __enter__(self) -> Board:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Switch everything off (unless told otherwise) and close the port."""
+        try:
+            if self.off_at_end:
+                self.make_safe()
+        finally:
+            self._script_ends.set()
+            self._port.close()
+            self._end_simulation()
+
+    def _end_simulation(self) -> None:
+        if self._simulated:
+            self._simulated.terminate()
+            self._simulated.communicate(timeout=10)
+            self._simulated = None
+
+    def _greet(self) -> None:
+        """Find out what is there: a board says `ninespring` to `version`."""
+        until = time.monotonic() + self.patience * FOUND_WITHIN_S - 0.2
+        heard: list[str] = []
+        if self._port.resets_the_board:
+            line = self._wait(time.monotonic() + BOOTING_S)
+            heard += [line] if line else []
+        while (left := until - time.monotonic()) > 0:
+            self._port.write("\nversion\n")
+            ends = time.monotonic() + min(self.patience, left)
+            while (line := self._wait(ends)) is not None:
+                heard.append(line)
+                if line.startswith("ninespring "):
+                    self.version = [line]
+                    break
+            if self.version:
+                self._end_of_greeting()
+                return
+        shown = next((re.sub(r"[^ -~]", "?", line)[:40] for line in heard if line), "")
+        if shown:
+            raise WorkError(f"{self.port}: what is there is no Ninespring board: it says '{shown}'")
+        raise WorkError(f"{self.port}: silent at 115200 baud: is it the right port, does the board run Ninespring?")
+
+    def _end_of_greeting(self) -> None:
+        """Read the rest of the answer, and those to what was asked while the board was still starting."""
+        sent = ("echo off", "telemetry off")  # a board that knows no echo refuses the first
+        self._port.write("".join(f"{line}\n" for line in sent))
+        quiet_s, answered = 0.2 * self.patience, False
+        until = time.monotonic() + self.patience
+        while (line := self._wait(until)) is not None:
+            if TELEMETRY.match(line):
+                continue
+            if not answered and line not in ("", "ok", "version", *sent) and not ERROR.match(line):
+                self.version.append(line)
+            answered = answered or line == "ok"
+            until = time.monotonic() + (quiet_s if answered else self.patience)
+
+    def _wait(self, until_s: float) -> str | None:
+        line = None if self.stopped() else self._port.read_line(until_s, self.stopped)
+        if line is None and self.stopped():
+            raise KeyboardInterrupt
+        return line
+
+    def ask(self, line: str, timeout_s: float = 3.0) -> list[str]:
+        """Send one line; return the answer's lines. WorkError where it is refused, or nothing of it comes for so long.
+
+        Telemetry that comes meanwhile is kept for `next_line`.
+        """
+        if not re.fullmatch("[ -~]+", line):
+            raise InputError(f"{line[:40]!r} is not one line of plain ASCII")
+        if re.search("[!?]", line):
+            raise InputError(f"{line[:40]!r}: ! and ? are no part of a line, they act at once: stop_now, status")
+        if DRIVES.match(line):
+            self._guard_script()
+        self._port.write(line + "\n")
+        self._alive_s = time.monotonic()
+        timeout_s *= self.patience
+        until = self._alive_s + timeout_s
+        self._owed += 1
+        answer: list[str] = []
+        while (got := self._wait(until)) is not None:
+            match = ERROR.match(got)
+            if got == "ok" or match:
+                self._owed -= 1
+                if self._owed:  # the end of an answer that was not waited for
+                    answer = []
+                    continue
+            if got == "ok":
+                return answer
+            if match:
+                raise RefusedError(f"'{line}' refused: error {match[1]} {match[2]}".rstrip())
+            if TELEMETRY.match(got):
+                self._telemetry.append(got)
+            elif got and got != line:  # that is the board's echo
+                answer.append(got)
+                until = time.monotonic() + timeout_s
+        self._owed = 0
+        raise WorkError(f"{self.port}: no answer to '{line}' for {timeout_s:g} s")
+
+    def status(self, timeout_s: float = 3.0) -> str:
+        """Return the line of status that `?` is answered with, at any moment."""
+        self._port.write("?")
+        until = time.monotonic() + self.patience * timeout_s
+        while (got := self._wait(until)) is not None:
+            if STATUS.match(got):
+                return got
+            if TELEMETRY.match(got):
+                self._telemetry.append(got)
+        raise RefusedError(f"'?' is not answered within {self.patience * timeout_s:g} s")
+
+    def next_line(self, until_s: float) -> str | None:
+        """Return the next line that nobody asked for (telemetry), None where none came until that monotonic time."""
+        if self._telemetry:
+            return self._came(self._telemetry.popleft())
+        while True:
+            if time.monotonic() >= self._alive_s + ALIVE_EVERY_S:
+                self._show_life()
+            if (line := self._wait(min(until_s, self._alive_s + ALIVE_EVERY_S))) is not None:
+                return self._came(line)
+            if time.monotonic() >= until_s:
+                return None
+
+    def _show_life(self) -> None:
+        self._alive_s = time.monotonic()
+        self._port.write("\n")  # an empty line is not answered, but shows that this end lives
+
+    def _came(self, line: str) -> str:
+        if match := ROW_TIME.match(line):
+            board_s = float(match[1])
+            if not 0.0 <= board_s - self._alive_board_s < ALIVE_EVERY_S:
+                self._alive_board_s = board_s
+                self._show_life()
+        return line
+
+    def settings(self) -> dict[str, str]:
+        """Return the settings as `$$` shows them, without their units."""
+        pairs = (line[1:].split("=", 1) for line in self.ask("$$", 10.0) if line.startswith("$") and "=" in line)
+        return {name: value.split()[0] for name, value in pairs if value.strip()}
+
+    @property
+    def unguarded(self) -> str | None:
+        """The setting host_timeout_s as it will be again when nothing guards any more; None where nothing does."""
+        return self._unguarded
+
+    def guard(self, settings: dict[str, str]) -> None:
+        """Have the springs go off when this program falls silent, where the board can: ended by `make_safe`."""
+        self._guards = True
+        if "host_timeout_s" in settings:
+            self._unguarded = settings["host_timeout_s"]
+            self.ask(f"$host_timeout_s={HOST_TIMEOUT_S}")
+
+    def _guard_script(self) -> None:
+        """Do so for a script that is about to drive and has not: it is kept alive as long as this process lives."""
+        if self._guards:
+            return
+        self._guards = True
+        try:
+            said = self.ask("$host_timeout_s")
+        except RefusedError:  # a board without it
+            return
+        value = next((line.partition("=")[2] for line in said if line.startswith("$host_timeout_s=")), "")
+        if value and not 0 < float(value) <= HOST_TIMEOUT_S:
+            self.guard({"host_timeout_s": value})
+        if value:
+            threading.Thread(target=self._live, daemon=True).start()
+
+    def _live(self) -> None:
+        while not self._script_ends.wait(SCRIPT_ALIVE_EVERY_S):
+            try:
+                self._port.write("\n")
+            except WorkError:
+                return
+
+    def unguard(self) -> None:
+        """Give the board back the timeout that it had."""
+        if self._unguarded is not None:
+            self.ask(f"$host_timeout_s={self._unguarded}", 1.0)
+            self._unguarded = None
+
+    def make_safe(self) -> bool:
+        """Switch telemetry and all springs off; True where the board confirms it. Never raises, and nothing stops it."""
+        self.stopped = lambda: False
+        for urgent in (False, False, True):
+            with contextlib.suppress(WorkError):
+                if urgent:
+                    self._port.write("!")
+                else:
+                    self.ask("off all", 1.0)
+                self.ask("telemetry off", 1.0)
+                self._telemetry.clear()
+                self.unguard()
+                return True
+        return False
+
+    def stop_now(self) -> None:
+        """Stop at once, from any thread, whatever is under way: `clear` goes on."""
+        self._port.write("!")
+
+    def on(self, spring: int | None = None, level: float = 100) -> None:
+        """Drive a spring (1 = top left, row by row; None: all) at a level of 0..100 percent."""
+        self.ask(f"on {'all' if spring is None else spring} {level:g}")
+
+    def off(self, spring: int | None = None) -> None:
+        """Stop driving a spring, or all."""
+        self.ask(f"off {'all' if spring is None else spring}")
+
+    def pattern(self, springs: str) -> None:
+        """Drive exactly the springs that are 1 in a text of 0 and 1, row by row."""
+        self.ask(f"pattern {springs}")
+
+    def fan(self, percent: float) -> None:
+        """Set the fan, 0..100 percent."""
+        self.ask(f"fan {percent:g}")
+
+    def read(self) -> Reading:
+        """Return what the board measures now, and what it believes of the springs."""
+        with contextlib.closing(self.stream(50)) as rows:
+            return next(rows)
+
+    def stream(self, hz: int = 5, seconds: float = math.inf) -> Iterator[Reading]:
+        """Yield what the board measures, `hz` rows a second, for so many seconds of its own; ends telemetry with the loop.
+
+        Bounds and phase are asked for once a second. In the loop the board may be driven and asked as ever.
+
+        >>> for now in board.stream(hz=5, seconds=60):
+        ...     print(now.time_s, now.temperature_c.max())
+        """
+        ranges.RECORD_HZ.check("hz", hz)
+        if not seconds > 0.0:
+            raise InputError(f"seconds = {seconds!r}: not a number above 0")
+        names = next((line.split(",") for line in self.ask(f"telemetry csv {hz}") if line.startswith("time_s,")), [])
+        begins_s, looked_s, believed = math.nan, -math.inf, None
+        try:
+            while (line := self.next_line(time.monotonic() + 3.0 * self.patience)) is not None:
+                cells = line.split(",")
+                if not line[:1].isdigit() or len(cells) != len(names):
+                    continue
+                row = dict(zip(names, cells, strict=True))
+                now_s = float(row["time_s"])
+                begins_s = now_s if math.isnan(begins_s) else begins_s
+                if now_s - begins_s > seconds:
+                    return
+                if not 0.0 <= now_s - looked_s < LOOK_EVERY_S:
+                    looked_s = now_s
+                    with contextlib.suppress(RefusedError):  # a board that does not know the word
+                        believed = beliefs(self.ask("model"))
+                yield reading(row, believed)
+        finally:
+            with contextlib.suppress(WorkError):  # the loop may end after the board went away
+                self.ask("telemetry off")
+            self._telemetry.clear()
+        raise WorkError(f"{self.port}: no telemetry came")
+
+
+def to_pandas(readings: Iterable[Reading]) -> pd.DataFrame:
+    """Return readings as a table, a row each, with a log's columns; `low1_c`, `high1_c` and `x1` (0..1) are bounds and phase."""
+    each = {
+        "i{}_a": "current_a",
+        "v{}_v": "voltage_v",
+        "m{}_c": "temperature_c",
+        "low{}_c": "low_c",
+        "high{}_c": "high_c",
+    }
+    each |= {"x{}": "austenite", "d{}": "duty"}
+    return pd.DataFrame(
+        {"time_s": one.time_s}
+        | {
+            column.format(k + 1): value
+            for column, name in each.items()
+            for k, value in enumerate(getattr(one, name).tolist())
+        }
+        | {"fan": one.fan, "ambient_c": one.ambient_c, "state": one.state}
+        for one in readings
+    )
+
+
+def reading(cells: dict[str, str], believed: Mapping[int, Belief] | None = None) -> Reading:
+    """Return a row of telemetry, and what is believed beside it, as numbers; ValueError where it is none."""
+    springs = sum(re.fullmatch(r"i\d+_a", name) is not None for name in cells)
+
+    def each(name: str) -> np.ndarray:
+        return np.array([float(cells.get(name.format(k), "nan")) for k in range(1, springs + 1)])
+
+    def of_each(name: str) -> np.ndarray:
+        return np.array([getattr((believed or {}).get(k), name, math.nan) for k in range(1, springs + 1)])
+
+    return Reading(
+        time_s=float(cells["time_s"]),
+        current_a=each("i{}_a"),
+        voltage_v=each("v{}_v"),
+        temperature_c=each("m{}_c"),
+        duty=each("d{}"),
+        fan=float(cells["fan"]),
+        ambient_c=float(cells["ambient_c"]),
+        state=cells["state"],
+        low_c=of_each("low_c"),
+        high_c=of_each("high_c"),
+        austenite=of_each("austenite"),
+    )
+
+
+def send_settings(
+    board: Board, lines: list[str], save: bool = True, say: Callable[[str, int], None] = lambda line, count: None
+) -> None:
+    """Send `$name=value` lines, read them back, save them; what the board has learnt beside its old numbers it forgets.
+
+    WorkError, and nothing is saved, where the board refuses one or shows another value.
+    """
+    remarks = board.ask("learnt clear", 10.0)
+    for k, line in enumerate(lines):
+        say(line, k)
+        try:
+            remarks = board.ask(line)
+        except WorkError as error:
+            raise WorkError(f"{error}: nothing is saved, a reset of the board gives back what it had") from None
+    if remarks:
+        raise WorkError(f"the board does not take them together: {remarks[-1]}")
+    say("reading back", len(lines))
+    if wrong := settings_that_differ(lines, board.settings()):
+        raise WorkError(f"the board shows other values than were sent, nothing is saved: {'; '.join(wrong)}")
+    if save:
+        board.ask("$save", 10.0)
+
+
+def settings_that_differ(sent: list[str], has: dict[str, str]) -> list[str]:
+    """Return what a board shows otherwise than it was sent (`$name=value`), in words."""
+    out = []
+    for line in sent:
+        name, value = line[1:].split("=", 1)
+        if name not in has:
+            out.append(f"{name} is missing")
+        elif float(has[name]) != float(value):
+            out.append(f"{name} is {has[name]}, not {value}")
+    return out
+
+
+def settings_lines(text: str, name: str) -> list[str]:
+    """Return the `$name=value` lines of an exported file; anything else is refused."""
+    out = []
+    for number, line in enumerate(text.splitlines(), start=1):
+        line = line.partition("#")[0].strip()
+        if not line:
+            continue
+        if not re.fullmatch(r"\$[a-z0-9_]+=-?\d+(\.\d+)?", line):
+            raise InputError(f"'{line[:40]}' is not a setting, `$name=value`", name, number, 1)
+        out.append(line)
+    if not out:
+        raise InputError("no setting in it", name)
+    return out
+
+
+def console_lines(path: Path) -> list[str]:
+    """Return the `$name=value` lines of a file, also where `$$` told units behind the values; anything else is refused."""
+    text = re.sub(r"^(\$\S+=\S+)[ \t].*$", r"\1", read_bytes(path).decode("utf-8", "replace"), flags=re.M)
+    return settings_lines(text, str(path))

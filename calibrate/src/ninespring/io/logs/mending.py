@@ -1,0 +1,258 @@
+"""What is mended of a log without guessing, and what is doubted of it: both are said in `Run.notes`.
+
+Repeated rows, gaps, glitches, a saturated, dead or frozen sensor are mended; wrong units are refused or doubted.
+"""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+
+from ...errors import InputError
+from ..statistics import noise_floor
+from .run import Run
+from .table import Table
+
+LONGEST_S = 60.0 * 86400.0
+"""No bench logs two months in one go: a longer log is in milliseconds."""
+SPARSE_S = 100.0
+"""Rows so far apart show no spring's warming, which takes a minute: of days of them, none is a second's."""
+DAY_S = 86400.0
+RUN_IN_S = 120.0
+"""After a gap: how long the noise of the temperatures that the simulation starts from is still felt."""
+
+
+def rising_rows(table: Table, notes: list[str]) -> np.ndarray:
+    """Rows whose time rises. Exact repeats are dropped and said; anything else is refused."""
+    time_s = table.frame["time_s"].to_numpy(float)
+    keep = np.ones(len(time_s), dtype=bool)
+    if (np.diff(time_s) > 0).all():
+        return keep
+    keep = ~table.frame.duplicated().to_numpy()
+    rows = np.flatnonzero(keep)
+    step = np.diff(time_s[rows])
+    if (step <= 0).any():
+        at = int(np.flatnonzero(step <= 0)[0])
+        before, now = time_s[rows[at]], time_s[rows[at + 1]]
+        line, column = table.where(int(rows[at + 1]), "time_s")
+        said = (
+            f"time_s repeats {now:.10g} with other values"
+            if now == before
+            else f"time_s falls from {before:.10g} to {now:.10g}"
+        )
+        raise InputError(f"{said}: times must rise strictly", table.path, line, column)
+    notes.append(f"{int((~keep).sum())} repeated rows dropped")
+    return keep
+
+
+def refuse_wrong_units(run: Run, table: Table) -> None:
+    """Months in one log, or days of rows minutes apart: milliseconds. Springs above 45 degC though nothing is driven: Fahrenheit or kelvin."""
+    usual = float(np.median(np.diff(run.time_s)))
+    if run.duration_s > LONGEST_S or (usual > SPARSE_S and run.duration_s > DAY_S):
+        line, column = table.where(len(table.lines) - 1, "time_s")
+        days = run.duration_s / DAY_S
+        said = (
+            f"the log spans {days:.3g} days, its rows {usual:g} s apart: if its time is in ms, divide by 1000 "
+            "(`ninespring import --map` converts)"
+        )
+        raise InputError(said, run.name, line, column)
+    if not np.isfinite(run.temperature_c[:5]).any():
+        return
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # a column may be empty
+        lowest = np.nanmin(run.temperature_c, axis=0)
+        first = np.nanmedian(run.temperature_c[:5], axis=0)
+    quiet = not np.any(run.drive[0] > 0)
+    ambient = None if run.ambient_c is None else float(run.ambient_c[0])
+
+    def refuse(k: int, said: str) -> InputError:
+        line, column = table.where(0, f"t{k + 1}_c")
+        return InputError(f"{said}, a log has degC (`ninespring import --map` converts)", run.name, line, column)
+
+    seen = np.flatnonzero(np.isfinite(lowest))
+    coldest = float(lowest[seen].min())
+    begins = f"nothing is driven yet the springs start at {coldest:.0f}: looks like"
+    if coldest > 240.0:
+        raise refuse(int(seen[0]), f"{begins} kelvin")
+    together = float(np.nanmax(first) - np.nanmin(first)) < 8.0
+    if quiet and coldest > 45.0 and together and (ambient is None or abs(coldest - ambient) > 20.0):
+        raise refuse(int(seen[0]), f"{begins} degrees Fahrenheit")
+    for k in seen:
+        others = first[seen[seen != k]]
+        usual = ambient if ambient is not None else float(np.nanmedian(others)) if len(others) > 1 else None
+        if not quiet or usual is None or lowest[k] - usual < 20.0:
+            continue
+        for name, celsius in (("degrees Fahrenheit", (lowest[k] - 32.0) / 1.8), ("kelvin", lowest[k] - 273.15)):
+            if abs(celsius - usual) < 8.0:
+                raise refuse(
+                    int(k),
+                    f"nothing is driven, the rest is at {usual:.0f} degC, yet spring {k + 1} starts at "
+                    f"{first[k]:.0f} and never falls below {lowest[k]:.0f}: looks like {name}",
+                )
+
+
+def doubt_units(run: Run) -> None:
+    """Say what is possible but unlikely: it may be so, or a unit or a column is wrong."""
+    usual = float(np.median(np.diff(run.time_s)))
+    if usual > SPARSE_S:
+        run.notes.append(f"the rows are {usual:g} s apart: is the time in milliseconds?")
+    if run.duration_s < 60.0 and len(run.time_s) >= 60:
+        run.notes.append(f"the whole log lasts {run.duration_s:.3g} s: is the time in minutes or hours?")
+    if run.ambient_c is not None and np.isfinite(run.temperature_c).any():
+        coldest, ambient = float(np.nanmin(run.temperature_c)), float(np.median(run.ambient_c))
+        if coldest > 45.0 and abs((coldest - 32.0) / 1.8 - ambient) < 5.0:
+            run.notes.append(
+                f"no spring is ever below {coldest:.0f}, which in Fahrenheit would be the ambient, {ambient:.0f} degC: "
+                "are the temperatures in Fahrenheit?"
+            )
+    if run.ambient_c is not None and np.any(jumps := np.abs(np.diff(run.ambient_c)) > 5.0):
+        at = int(np.flatnonzero(jumps)[0])
+        run.notes.append(
+            f"ambient_c jumps from {run.ambient_c[at]:g} to {run.ambient_c[at + 1]:g} degC at {run.time_s[at + 1]:g} s: "
+            "the air of a room does not, is the column right?"
+        )
+    if run.voltage_v is not None and run.current_a is not None and np.any(driven := run.current_a > 0.05):
+        ohm = float(np.median(run.voltage_v[driven] / run.current_a[driven]))
+        if not 0.02 < ohm < 2.0:
+            run.notes.append(
+                f"v/i is {ohm:.2g} ohm, and a spring like the paper's has 0.2: if yours has not, currents and voltages "
+                "are swapped or in another unit"
+            )
+
+
+def mask_bad_sensors(run: Run) -> None:
+    """Saturated and dead sensors are not measurements: masked, and said."""
+    noise = np.nan_to_num(noise_floor(run.temperature_c))
+    for k in range(run.springs):
+        values = run.temperature_c[:, k]
+        seen = np.flatnonzero(np.isfinite(values))
+        if seen.size < 10:
+            continue
+        measured = values[seen]
+        if np.all(measured == measured[0]) and np.ptp(run.drive.sum(axis=1)) > 0:
+            others = [
+                np.nanmax(run.temperature_c[:, j]) - np.nanmin(run.temperature_c[:, j])
+                for j in range(run.springs)
+                if j != k and np.isfinite(run.temperature_c[:, j]).any()
+            ]
+            if np.ptp(run.drive[:, k]) > 0 or (others and max(others) > 5.0):
+                run.temperature_c[:, k] = np.nan
+                run.notes.append(f"t{k + 1}_c never moves ({measured[0]:g} degC): dead sensor, left out")
+                continue
+        for edge, extreme in (("highest", measured.max()), ("lowest", measured.min())):
+            flat = measured == extreme
+            longest = _longest_run(flat)
+            typical = _longest_run(np.diff(measured) == 0) + 1
+            inner = measured[~flat]
+            if inner.size < 10:
+                continue
+            # Ordinary quantisation also repeats values; a clipped sensor stays at ITS extreme far longer
+            # than it ever stays at any other value.
+            elsewhere = _longest_run(np.diff(inner) == 0) + 1
+            if longest >= 15 and longest > 4 * elsewhere and longest >= typical:
+                # near the limit only what the noise carried down is seen: those rows would pull the fit
+                run.temperature_c[seen[np.abs(measured - extreme) <= 4.0 * noise[k]], k] = np.nan
+                run.notes.append(
+                    f"t{k + 1}_c stays at its {edge} value {extreme:g} degC for {longest} rows: "
+                    "saturated, those rows left out"
+                )
+        _mask_frozen(run, k)
+
+
+def _mask_frozen(run: Run, k: int) -> None:
+    """A sensor that goes on showing one value after its spring's drive has changed, far longer than it ever shows another."""
+    seen = np.flatnonzero(np.isfinite(run.temperature_c[:, k]))
+    measured = run.temperature_c[seen, k]
+    bounds = np.concatenate(([0], np.flatnonzero(np.diff(measured) != 0) + 1, [len(measured)]))
+    lengths = np.diff(bounds)
+    if len(lengths) < 2:
+        return
+    longest = int(np.argmax(lengths))
+    begin, end = int(bounds[longest]), int(bounds[longest + 1])
+    moved = np.flatnonzero(np.diff(run.drive[seen[begin:end], k]) != 0)
+    since = end - begin - int(moved[0]) if moved.size else 0
+    elsewhere = int(np.delete(lengths, longest).max())
+    if since >= 30 and since > 4 * elsewhere:
+        run.temperature_c[seen[begin + 1 : end], k] = np.nan
+        run.notes.append(
+            f"t{k + 1}_c shows {measured[begin]:g} degC from {run.time_s[seen[begin]]:g} to {run.time_s[seen[end - 1]]:g} s "
+            "whatever its spring is given: frozen, those rows left out"
+        )
+
+
+def _longest_run(flags: np.ndarray) -> int:
+    if not flags.any():
+        return 0
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], flags.astype(np.int8), [0]))))
+    return int((edges[1::2] - edges[::2]).max())
+
+
+def mask_glitches(run: Run) -> None:
+    """Single samples far from the straight line between their neighbours, and from those that lead there and away.
+
+    No spring moves like that; one that is switched goes on in another direction, and is where one of the lines leads.
+    """
+    noise = noise_floor(run.temperature_c)
+    for k in range(run.springs):
+        values = run.temperature_c[:, k]
+        if np.isfinite(values).sum() < 30 or not np.isfinite(noise[k]):
+            continue
+        before, after = values[:-2], values[2:]
+        away = np.abs(values[1:-1] - 0.5 * (before + after))
+        away[1:] = np.fmin(away[1:], np.abs(values[2:-1] - 2.0 * values[1:-2] + values[:-3]))
+        away[:-1] = np.fmin(away[:-1], np.abs(values[1:-2] - 2.0 * values[2:-1] + values[3:]))
+        limit = 10.0 * max(float(noise[k]), 0.02) + 2.0 * np.abs(after - before)
+        bad = np.flatnonzero(away > limit) + 1
+        # where a log ends or has a hole a spike also lifts its neighbours' distance: keep the largest of three in a row
+        peak = np.zeros(len(values))
+        peak[1:-1] = np.nan_to_num(away)
+        bad = bad[(peak[bad] >= peak[bad - 1]) & (peak[bad] >= peak[np.minimum(bad + 1, len(values) - 1)])]
+        if 0 < bad.size <= max(3, 0.01 * len(values)):
+            run.temperature_c[bad, k] = np.nan
+            run.notes.append(
+                f"t{k + 1}_c: {bad.size} isolated spike(s) left out, the first at {run.time_s[bad[0]]:g} s"
+            )
+
+
+def begins_warm(run: Run) -> bool:
+    """Driven from the first row on, the same for half a minute, and no spring moves by more than half a degree."""
+    first = run.time_s - run.time_s[0] <= 30.0
+    if first.sum() < 5 or not np.any(run.drive[0] > 0) or np.ptp(run.drive[first], axis=0).max() > 0:
+        return False
+    seen = run.temperature_c[first]
+    seen = seen[:, np.isfinite(seen).all(axis=0)]
+    if not seen.shape[1]:
+        return False
+    third = max(1, len(seen) // 3)
+    moved = np.abs(seen[-third:].mean(axis=0) - seen[:third].mean(axis=0))
+    return bool(moved.max() < 0.5)
+
+
+def find_gaps(run: Run) -> None:
+    """Find gaps in time: after each the simulation starts again from what is measured."""
+    step = np.diff(run.time_s)
+    usual = float(np.median(step))
+    limit = max(10.0, 5.0 * usual)
+    gaps = np.flatnonzero(step > limit)
+    for row in gaps:
+        run.starts.append(int(row) + 1)
+        mask_run_in(run, int(row) + 1)
+    if gaps.size:
+        longest = float(step[gaps].max())
+        run.notes.append(
+            f"{gaps.size} gap(s) in time, the longest {longest:.0f} s: the simulation starts again from the measured "
+            f"temperatures after each, and what is measured in the first {RUN_IN_S:.0f} s does not count"
+        )
+    missing = int(np.rint(step[(step > 1.5 * usual) & (step <= limit)] / usual - 1.0).sum())
+    if missing:
+        run.notes.append(
+            f"about {missing} rows are missing here and there: an input that changed meanwhile is taken for the old one "
+            "until the next row"
+        )
+
+
+def mask_run_in(run: Run, begin: int) -> None:
+    """Leave out what is measured while a simulation that starts at row `begin` forgets how it started."""
+    end = int(np.searchsorted(run.time_s, run.time_s[begin] + RUN_IN_S))
+    run.temperature_c[begin + 1 : end] = np.nan

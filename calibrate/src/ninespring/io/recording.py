@@ -1,0 +1,558 @@
+"""Recording a board's telemetry as a log: what comes is checked line by line, kept whatever ends it, and nothing stays on."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import os
+import re
+import signal
+import stat
+import sys
+import time
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from ..errors import InputError, WorkError
+from .board import Board
+from .logs import COLUMN, EXTRA, LIMITS, check_folder
+from .thermometers import Thermometers
+from .words import FAULTS
+
+FINER = 10
+"""So many rows of telemetry become one of the log, where the line has room for them."""
+FINEST_HZ = 20
+"""Nine springs' rows fill half the line at this rate."""
+LONGEST_WAIT_S = 15.0
+"""So long, by the board's clock, a row waits for a thermometer's reading after it."""
+SILENT_S = 5.0
+"""Telemetry that does not come for so long has ended."""
+STATE = re.compile(r"ok|locked|fault_\d+")
+NUMBER = re.compile(r"-?\d+(?:\.(\d+))?")
+COMMENT = re.compile(r"[<\[][ -~]*[>\]]")
+FAULT = re.compile(r"(?:board|spring (\d+)): fault (\d+) (\w+)")
+SWITCHED_OFF = "|safety"
+"""In a status line: the limit that acts on a spring with a fault."""
+
+
+@dataclass
+class Step:
+    """A console line to send so many seconds after the first row (None: before the recording)."""
+
+    line: str
+    at_s: float | None = None
+
+
+@dataclass(frozen=True)
+class Fault:
+    """A fault that the board has latched."""
+
+    time_s: float | None
+    """By the board's clock, as in the log; None: after its last row."""
+    spring: int | None
+    """None: of the board, and all springs are off."""
+    number: int
+    name: str
+
+    def __str__(self) -> str:
+        when = "at the end" if self.time_s is None else f"at {self.time_s:.1f} s"
+        where = "board" if self.spring is None else f"spring {self.spring}"
+        words = f" ({FAULTS[self.number]})" if self.number in FAULTS else ""
+        return f"{when}: {where}: fault {self.number} {self.name}{words}"
+
+
+@dataclass
+class Recording:
+    """What came of a recording."""
+
+    dropped: int = 0
+    """Lines that were corrupt."""
+    offset_s: float | None = None
+    """What was added to the thermometers' clock to have the board's, s."""
+    ended: str = ""
+    """Why it ended early, or drove less than it was asked to, where that was nobody's wish."""
+    faults: list[Fault] = field(default_factory=list)
+
+
+class FaultWatch:
+    """Asks the board for its faults when telemetry shows that they have changed, and tells each new one."""
+
+    def __init__(self, board: Board, faults: list[Fault], alarm: Callable[[Fault], None]) -> None:
+        self._board, self._faults, self._alarm = board, faults, alarm
+        self.latched: set[str] = set()
+        """What the board said last."""
+        self._state = "ok"
+        self._time_s: float | None = None
+
+    def row(self, time_s: float, state: str) -> None:
+        """Take the time and the state of a row."""
+        changed, self._state, self._time_s = state != self._state, state, time_s
+        if changed:
+            self.ask()
+
+    def ask(self) -> None:
+        """Ask for what is latched now."""
+        self.take(self._board.ask("faults"), self._time_s)
+
+    def take(self, lines: Sequence[str], time_s: float | None) -> None:
+        """Take the answer to `faults`."""
+        for line in lines:
+            if line not in self.latched and (match := FAULT.fullmatch(line)):
+                fault = Fault(time_s, int(match[1]) if match[1] else None, int(match[2]), match[3])
+                self._faults.append(fault)
+                self._alarm(fault)
+        self.latched = set(lines)
+
+
+def script_lines(text: str, name: str, duration_s: float = math.inf) -> list[Step]:
+    """Return the steps of a script: console lines, or `at SECONDS = line` as in scenarios; # and ; begin comments."""
+    steps: list[Step] = []
+    for number, raw in enumerate(text.splitlines(), start=1):
+        line = re.split("[#;]", raw, maxsplit=1)[0].strip()
+        if not line:
+            continue
+        if not line.isascii():
+            raise InputError("the console takes plain ASCII", name, number, 1)
+        step = Step(line)
+        if re.match(r"at\b", line):
+            match = re.fullmatch(r"at\s+(\d+(?:\.\d*)?)\s*=\s*(\S.*)", line)
+            if not match:
+                raise InputError(f"'{line[:40]}' is not `at SECONDS = console line`", name, number, 1)
+            at_s = float(match[1])
+            step = Step(match[2], at_s)
+            if steps and steps[-1].at_s is not None and steps[-1].at_s > at_s:
+                raise InputError("times of a script must not fall", name, number, 1)
+            if at_s >= duration_s:
+                raise InputError(
+                    f"{at_s:g} s is not before the end of the recording, `--duration {duration_s:g}`", name, number, 1
+                )
+        elif steps and steps[-1].at_s is not None:
+            raise InputError(
+                f"'{line[:40]}' comes after timed lines: give it a time, `at SECONDS = ...`", name, number, 1
+            )
+        steps.append(step)
+    return steps
+
+
+@dataclass(frozen=True)
+class Row:
+    """One row of telemetry."""
+
+    text: str
+    time_s: float
+    form: tuple[tuple[int, ...], frozenset[str]]
+    """Digits after each point, and the columns that are out of range: the same in neighbours unless one is corrupt."""
+
+
+class RowCheck:
+    """Tells a board's rows from what a bad line made of them.
+
+    A row has a cell per column, each a finite number, and it follows the row before: the same digits after each point,
+    the same columns in range, a time that goes on. One that does not follow is held until the next one follows it (then
+    something really changed) or not (then it was corrupt).
+    """
+
+    def __init__(self, names: Sequence[str], hz: float) -> None:
+        self.names = names
+        self.dropped = 0
+        self.restarted = False
+        """Time began anew: the board was reset."""
+        self._longest_step_s = max(1.0, 3.0 / hz)
+        self._last: Row | None = None
+        self._held: Row | None = None
+
+    def feed(self, line: str) -> list[Row]:
+        """Return the rows that are now known to be good, in order."""
+        row = self._parse(line)
+        if row is None:
+            self.dropped += 1
+            return []
+        if self._last and self._follows(self._last, row):
+            self.dropped += self._held is not None
+            good = [row]
+        elif self._held and self._follows(self._held, row):
+            if self._last and self._held.time_s <= self._last.time_s:
+                self.restarted = True
+                return []
+            good = [self._held, row]
+        else:
+            self.dropped += self._held is not None
+            self._held = row
+            return []
+        self._held, self._last = None, row
+        return good
+
+    def _parse(self, line: str) -> Row | None:
+        cells = line.split(",")
+        if len(cells) != len(self.names):
+            return None
+        digits: list[int] = []
+        out: set[str] = set()
+        for name, cell in zip(self.names, cells, strict=True):
+            if name == "state":
+                if not STATE.fullmatch(cell):
+                    return None
+                continue
+            if not (match := NUMBER.fullmatch(cell)):
+                return None
+            digits.append(len(match[1] or ""))
+            low, high = LIMITS.get(name if name in LIMITS else name[0], (-math.inf, math.inf))[:2]
+            if not low <= float(cell) <= high:
+                out.add(name)
+        return Row(line, float(cells[self.names.index("time_s")]), (tuple(digits), frozenset(out)))
+
+    def _follows(self, before: Row, row: Row) -> bool:
+        return row.form == before.form and 0.0 < row.time_s - before.time_s <= self._longest_step_s
+
+
+def telemetry_names(header: str) -> list[str] | None:
+    """Return the columns of a telemetry header, None where it is none or corrupt."""
+    names = header.split(",")
+    springs = sum(re.fullmatch(r"i\d+_a", name) is not None for name in names)
+    wanted = {"time_s", *(f"i{k}_a" for k in range(1, springs + 1))}
+    whole = all(COLUMN.match(name) or EXTRA.match(name) for name in names) and len(set(names)) == len(names)
+    return names if springs and whole and wanted <= set(names) else None
+
+
+class LogFile:
+    """Takes a log line by line. Lines are in the file at once; the file has its name when it is finished.
+
+    A regular file grows as NAME.part, which is a readable log at every moment. A device or a pipe is written as it is, `-`
+    is standard output. A log that is there already is kept: InputError, unless `force`; where one has come while this one
+    grew, this one stays as NAME.part, and `path` says so.
+    """
+
+    def __init__(self, path: Path, force: bool = False) -> None:
+        self.path = path
+        self._force = force
+        self.part: Path | None = None
+        self.rows = 0
+        self._whole = 0
+        """Bytes of whole lines."""
+        try:
+            if str(path) == "-":
+                self._file = os.dup(sys.stdout.fileno())
+            elif path.exists() and not stat.S_ISREG(path.stat().st_mode):
+                self._file = os.open(path, os.O_WRONLY)
+            else:
+                check_folder(path, measured=True, force=force)
+                self.path = path.resolve()
+                self._file = self._new_part()
+        except OSError as error:
+            raise InputError(f"cannot be written: {error.strerror}", path) from None
+
+    def _new_part(self) -> int:
+        """Open a new file beside the log: an old .part is what a killed recording left, and is kept."""
+        count = 1
+        while True:
+            self.part = self.path.with_name(f"{self.path.name}.part{'' if count == 1 else count}")
+            with contextlib.suppress(FileExistsError):
+                return os.open(self.part, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
+            count += 1
+
+    def write(self, line: str) -> None:
+        """Write one line. WorkError where the disk is full or the reader went away."""
+        left = (line + "\n").encode()
+        whole = self._whole + len(left)
+        try:
+            while left:
+                left = left[os.write(self._file, left) :]
+        except OSError as error:
+            raise WorkError(f"{self.part or self.path}: {error.strerror}") from None
+        self._whole = whole
+
+    def write_row(self, line: str) -> None:
+        """Write one row of numbers."""
+        self.write(line)
+        self.rows += 1
+
+    def close(self) -> None:
+        """Cut off a line that was not written whole, and give the file its name; without a row, remove it."""
+        if self.part:
+            with contextlib.suppress(OSError):
+                os.ftruncate(self._file, self._whole)
+                os.fsync(self._file)
+        os.close(self._file)
+        if self.part and self.rows:
+            self._give_name(self.part)
+        elif self.part:
+            self.part.unlink()
+
+    def _give_name(self, part: Path) -> None:
+        if self._force or (self.path.exists() and self.path.stat().st_size == 0):
+            os.replace(part, self.path)
+            return
+        try:
+            os.link(part, self.path)  # unlike a rename, it takes the place of nothing
+        except FileExistsError:
+            self.path = part
+        except OSError:  # a file system without links
+            if self.path.exists():
+                self.path = part
+            else:
+                os.replace(part, self.path)
+        else:
+            part.unlink()
+
+
+@contextlib.contextmanager
+def told_to_stop() -> Iterator[Callable[[], bool]]:
+    """Have SIGINT, SIGTERM and SIGHUP (a closed terminal) only be noted, and tell whether one came.
+
+    What is under way is then ended in order. A signal that is ignored (nohup) stays so.
+    """
+    told: list[int] = []
+    before = {}
+    for one in filter(None, (signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGHUP", None))):  # Windows has no SIGHUP
+        if signal.getsignal(one) != signal.SIG_IGN:
+            before[one] = signal.signal(one, lambda number, frame: told.append(number))
+    try:
+        yield lambda: bool(told)
+    finally:
+        for one, handler in before.items():
+            signal.signal(one, handler)
+
+
+def record(
+    board: Board,
+    log: LogFile,
+    hz: int,
+    duration_s: float,
+    steps: Sequence[Step] = (),
+    say: Callable[[int, float], None] = lambda rows, seconds: None,
+    keys: Mapping[str, str] | None = None,
+    thermometers: Thermometers | None = None,
+    alarm: Callable[[Fault], None] = lambda fault: None,
+    remark: Callable[[str], None] = lambda words: None,
+) -> Recording:
+    """Record a board's telemetry, `hz` rows a second; `duration_s` and the steps' times are by the board's clock, from the first row.
+
+    Steps without a time are sent first. The log begins with what the board is and how it is set, ends with its faults,
+    and has its status (which limits act on a spring) between the rows, all as comments. Whatever ends it, the springs are
+    off afterwards, and `ended` says why where it was no wish. A fault does not end it; `alarm` is told of each as it comes, and
+    `ended` begins with the first. `remark` is told what the board answers to a step beside `ok`. `thermometers` add columns t1_c ...: each row waits until a
+    reading after it has come.
+    """
+    got = Recording()
+    answers = False
+    finer_hz = max(hz, min(FINER * hz, FINEST_HZ))
+    sink = RowSink(log, thermometers, 1.0 / hz if finer_hz > hz else 0.0)
+
+    def note(fault: Fault) -> None:
+        sink.comment(f"fault {fault}")
+        alarm(fault)
+
+    def send(step: Step) -> None:
+        for words in board.ask(step.line):
+            sink.comment(f"'{step.line}': {words}")
+            remark(f"'{step.line}': {words}")
+
+    watch = FaultWatch(board, got.faults, note)
+    before: list[str] = []
+    try:
+        before = _head(board, log, steps, keys or {}, send)
+        _rows(board, finer_hz, duration_s, steps, got, say, sink, watch, send)
+    except KeyboardInterrupt:
+        pass
+    except WorkError as error:
+        got.ended = str(error)
+    finally:
+        if not (answers := board.make_safe()):
+            got.ended = (got.ended or f"{board.port}: the board does not answer") + (
+                "; the springs could not be switched off from here: cut their supply"
+            )
+    latched: list[str] = []
+    with contextlib.suppress(WorkError):
+        sink.flush()
+        latched = board.ask("faults") if answers else []
+        watch.latched |= set(before)
+        watch.take(latched, None)
+    if got.faults:
+        more = f" and {len(got.faults) - 1} more" if len(got.faults) > 1 else ""
+        got.ended = f"a fault cut this run short, {got.faults[0]}{more}" + (f"; {got.ended}" if got.ended else "")
+    with contextlib.suppress(WorkError):
+        if thermometers:
+            got.offset_s = thermometers.offset_s
+            if got.offset_s is not None:
+                log.write(f"# thermometers_offset_s: {got.offset_s:.3f}")
+            got.ended = got.ended or thermometers.trouble
+        if got.dropped:
+            log.write(f"# dropped_lines: {got.dropped}")
+        if got.ended:
+            log.write(f"# ended: {got.ended}")
+        for line in latched:
+            log.write(f"# latched at the end: {line}")
+    return got
+
+
+class RowSink:
+    """Rows on their way to the log, and comments between them.
+
+    With `every_s`, rows that came faster become one: currents, voltages and the fan are means until the next one begins, as a
+    log's inputs hold from its row on (the voltage is weighted with the current, so that their product is the mean power). A
+    reading tells of the time before it, so they are means of the readings after the first, the next one's among them. The
+    rest is that of the first. With thermometers, a row waits for the readings around it.
+    """
+
+    def __init__(self, log: LogFile, thermometers: Thermometers | None, every_s: float = 0.0) -> None:
+        self.rows = 0
+        self._log, self._thermometers, self._every_s = log, thermometers, every_s
+        self._names: list[str] = []
+        self._springs: list[int] = []
+        """Those with a thermometer."""
+        self._bucket: list[Row] = []
+        self._comments: list[str] = []
+        """What came since the bucket's first row."""
+        self._waiting: deque[tuple[str, float, list[str]]] = deque()
+
+    def begin(self, names: Sequence[str]) -> None:
+        """Write the header; a thermometer of a spring that the array has not is left out."""
+        self._names = list(names)
+        if self._thermometers:
+            self._springs = [k for k in self._thermometers.springs if f"i{k}_a" in names]
+            if not self._springs:
+                raise WorkError("the thermometers are of no spring of this array: their columns are t1_c, t2_c, ...")
+        self._log.write(",".join([*names, *(f"t{k}_c" for k in self._springs)]))
+
+    def row(self, row: Row) -> None:
+        """Take one row."""
+        if self._thermometers:
+            self._thermometers.row_came(row.time_s)
+        if self._bucket and row.time_s - self._bucket[0].time_s < (1.0 - 0.5 / FINER) * self._every_s:
+            self._bucket.append(row)
+            return
+        self._end_bucket([row])
+        self._bucket = [row]
+        if not self._every_s:
+            self._end_bucket()
+        self._write(row.time_s)
+
+    def comment(self, text: str) -> None:
+        """Take a comment: it comes after the rows that were taken before it."""
+        if self._bucket:
+            self._comments.append(text)
+        elif self._waiting:
+            self._waiting[-1][2].append(text)
+        else:
+            self._log.write(f"# {text}")
+
+    def flush(self) -> None:
+        """Write all that was taken, with the temperatures that have come."""
+        self._end_bucket()
+        self._write(math.inf)
+
+    def _end_bucket(self, following: Sequence[Row] = ()) -> None:
+        if self._bucket:
+            first, *rest = self._bucket
+            inputs = [*rest, *following] if rest else []
+            text = mean_row(self._names, first.text, [one.text for one in inputs])
+            self.rows += 1
+            self._waiting.append((text, first.time_s, self._comments))
+            self._bucket, self._comments = [], []
+
+    def _write(self, now_s: float) -> None:
+        """Write those whose temperatures are known, and those that have waited too long for them."""
+        while self._waiting:
+            text, time_s, comments = self._waiting[0]
+            if self._thermometers:
+                values = self._thermometers.at(time_s)
+                if values is None and now_s - time_s < LONGEST_WAIT_S and not self._thermometers.trouble:
+                    return
+                text = ",".join([text, *(f"{values[k]:.3f}" if k in (values or {}) else "" for k in self._springs)])
+            self._waiting.popleft()
+            self._log.write_row(text)
+            for one in comments:
+                self._log.write(f"# {one}")
+
+
+def mean_row(names: Sequence[str], first: str, rows: Sequence[str]) -> str:
+    """Return the first row with the currents, voltages and fan that these rows mean; as it is where there are none."""
+    cells, out = [row.split(",") for row in rows], first.split(",")
+    for at, name in enumerate(names) if rows else ():
+        if name == "fan":
+            out[at] = f"{sum(float(one[at]) for one in cells) / len(cells):.2f}"
+        if re.fullmatch(r"i\d+_a", name):
+            current = [float(one[at]) for one in cells]
+            out[at] = f"{sum(current) / len(cells):.4f}"
+            voltage_name = f"v{name[1:-2]}_v"
+            if voltage_name in names:
+                where = names.index(voltage_name)
+                voltage = [float(one[where]) for one in cells]
+                weight = current if sum(current) > 0 else [1.0] * len(cells)
+                out[where] = f"{sum(v * w for v, w in zip(voltage, weight, strict=True)) / sum(weight):.4f}"
+    return ",".join(out)
+
+
+def _head(
+    board: Board, log: LogFile, steps: Sequence[Step], keys: Mapping[str, str], send: Callable[[Step], None]
+) -> list[str]:
+    for step in steps:
+        if step.at_s is None:
+            send(step)
+    board.guard(write_head(board, log, keys))
+    return board.ask("faults")
+
+
+def write_head(board: Board, log: LogFile, keys: Mapping[str, str]) -> dict[str, str]:
+    """Write, as comments, what is known of a log and of the board: version, faults, settings. Return the settings."""
+    for name, value in keys.items():
+        log.write(f"# {name}: {value}")
+    for line in board.version:
+        log.write(f"# version: {line}")
+    for line in board.ask("faults") or ["none"]:
+        log.write(f"# fault: {line}")
+    settings = board.settings()
+    for name, value in settings.items():
+        log.write(f"# ${name}={value}")
+    return settings
+
+
+def _rows(
+    board: Board,
+    hz: int,
+    duration_s: float,
+    steps: Sequence[Step],
+    got: Recording,
+    say: Callable[[int, float], None],
+    sink: RowSink,
+    watch: FaultWatch,
+    send: Callable[[Step], None],
+) -> None:
+    waiting = [step for step in steps if step.at_s is not None]
+    for _ in range(3):
+        names = next(filter(None, map(telemetry_names, board.ask(f"telemetry csv {hz}"))), None)
+        if names:
+            break
+    else:
+        raise WorkError(f"{board.port}: the board's telemetry has no header that can be read")
+    sink.begin(names)
+    check = RowCheck(names, hz)
+    state = names.index("state") if "state" in names else None
+    first_s = math.nan
+    while True:
+        line = board.next_line(time.monotonic() + SILENT_S)
+        if line is None:
+            raise WorkError(f"{board.port}: no telemetry for {SILENT_S:g} s")
+        if not line:
+            continue
+        if COMMENT.fullmatch(line):
+            sink.comment(line)
+            if SWITCHED_OFF in line:
+                watch.ask()
+            continue
+        good = check.feed(line)
+        got.dropped = check.dropped
+        if check.restarted:
+            raise WorkError("the board has started again")
+        for row in good:
+            first_s = row.time_s if math.isnan(first_s) else first_s
+            if row.time_s - first_s > duration_s:
+                return
+            sink.row(row)
+            if state is not None:
+                watch.row(row.time_s, row.text.split(",")[state])
+            say(sink.rows, row.time_s - first_s)
+            while waiting and (waiting[0].at_s or 0.0) <= row.time_s - first_s:
+                send(waiting.pop(0))

@@ -1,0 +1,46 @@
+"""The effects that a diagnosis knows, one file each: numbers, bounds, variants, sizes to try.
+
+A file of this folder with an `EFFECT` is in the library; nothing else lists them. Order, sentences and where an effect
+acts are the table's (`native.effects`).
+"""
+
+from __future__ import annotations
+
+import functools
+import importlib
+import pkgutil
+
+from ...io.results import Parameters
+from .. import native
+from . import runs_differ
+from .effect import Candidate as Candidate
+from .effect import Effect as Effect
+from .effect import Scene as Scene
+from .effect import Steady as Steady
+from .names import IN_WORDS as IN_WORDS
+from .names import MEASUREMENT as MEASUREMENT
+from .names import ON_CHIP as ON_CHIP
+from .names import WHY_NOT_ON_CHIP as WHY_NOT_ON_CHIP
+
+
+@functools.cache
+def library() -> tuple[Effect, ...]:
+    """Return every effect of this folder, in the table's order."""
+    modules = (importlib.import_module(f"{__name__}.{one.name}") for one in pkgutil.iter_modules(__path__))
+    known = [module.EFFECT for module in modules if hasattr(module, "EFFECT")]
+    return tuple(sorted(known, key=lambda one: native.effect_names().index(one.name)))
+
+
+def sentence(name: str, parameters: Parameters, variant: str = "") -> str:
+    """Return what was found of an effect, in words and sizes."""
+    return next(one for one in (*library(), *runs_differ.EFFECTS) if one.name == name).sentence(parameters, variant)
+
+
+def candidates(scene: Scene) -> list[Candidate]:
+    """Return every effect, in every variant, that logs could show."""
+    return [candidate for effect in library() for candidate in effect.candidates_for(scene)]
+
+
+def of_runs(scene: Scene) -> list[Candidate]:
+    """Return what may be a run's own, and not the array's, in logs."""
+    return runs_differ.candidates(scene)

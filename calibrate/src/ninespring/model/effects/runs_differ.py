@@ -1,0 +1,78 @@
+"""What may be a run's own: the drive's gain, where the surroundings are, what the thermometers are off by.
+
+Random effects: every run has its number, all of them scatter about what the array's model says, and how far is fitted, too.
+They are of the measurement, not of the array: no model.toml has them. The plant knows none of them (`infer/problem.py` does).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from ..spec import AMBIENT_OFFSET, DRIVE_GAIN, RUN_AMBIENT, RUN_DRIVE, RUN_SENSOR, SENSOR_OFFSET, Free
+from .effect import Candidate, Effect, Numbers, Scene, percent, sized
+
+GAIN_SPREAD, OFFSET_SPREAD_K = 0.2, 3.0
+"""What is believed before of how far runs lie apart: next to nothing; the data's own spread takes its place."""
+
+
+def _number(key: str, r: int) -> Free:
+    run = f"{key}@{r + 1}"
+    if key == DRIVE_GAIN:
+        return Free(run, 1.0, 0.2, 5.0, "1", log=True, run=r, prior=GAIN_SPREAD)
+    return Free(run, 0.0, -20.0, 20.0, "K", run=r, prior=OFFSET_SPREAD_K)
+
+
+def _each_run(scene: Scene, key: str) -> Candidate:
+    free = tuple(_number(key, r) for r in range(scene.runs))
+    still, moved = (1.0, 1.05) if key == DRIVE_GAIN else (0.0, 1.0)
+    probes = tuple({f.key: moved if f is one else still for f in free} for one in free)
+    # flexible: what is the array's own, and the same in all runs, comes first
+    return Candidate("each run its own", free, probes, signed=True, most=10.0, neutral=still, flexible=True)
+
+
+def _drive(scene: Scene) -> Iterator[Candidate]:
+    if scene.runs > 1:  # the gain of all is in the heat capacity, the losses or the command's power
+        yield _each_run(scene, DRIVE_GAIN)
+
+
+def _ambient(scene: Scene) -> Iterator[Candidate]:
+    if scene.ambient_logged:
+        yield _each_run(scene, AMBIENT_OFFSET)
+
+
+def _sensor(scene: Scene) -> Iterator[Candidate]:
+    if scene.ambient_logged and scene.runs > 1:  # of one run it is `sensor_gain`'s offset
+        yield _each_run(scene, SENSOR_OFFSET)
+
+
+def _gains(numbers: Numbers, variant: str) -> str:
+    each = [f"{percent(*number)} in run {name.partition('@')[2]}" for name, number in numbers.items()]
+    return f"The drive gives each run a share of its own: {', '.join(each)}."
+
+
+def _surroundings(numbers: Numbers, variant: str) -> str:
+    each = [_off(number, "warmer", "colder", name) for name, number in numbers.items()]
+    return f"The surroundings are not as warm as ambient_c says: {', '.join(each)}."
+
+
+def _readings(numbers: Numbers, variant: str) -> str:
+    each = [_off(number, "too much", "too little", name) for name, number in numbers.items()]
+    return f"The thermometers read {', '.join(each)}."
+
+
+def _off(number: tuple[float, float | None], more: str, less: str, name: str) -> str:
+    value, error = number
+    size, bracket, rest = sized(abs(value), error, "K").partition(" (")
+    return f"{size} {more if value > 0 else less}{bracket}{rest} in run {name.partition('@')[2]}"
+
+
+EFFECTS = (
+    Effect(RUN_DRIVE, _drive, says=_gains),
+    Effect(RUN_AMBIENT, _ambient, says=_surroundings),
+    Effect(RUN_SENSOR, _sensor, says=_readings),
+)
+
+
+def candidates(scene: Scene) -> list[Candidate]:
+    """Return what of these may be a run's own in these logs."""
+    return [one for effect in EFFECTS for one in effect.candidates_for(scene)]

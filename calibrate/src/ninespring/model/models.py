@@ -1,0 +1,382 @@
+"""array.toml (what was built) and model.toml (what was fitted): reading, checking, writing (docs/files.md).
+
+Names, units and limits of parameters are the plant's own table (`native.parameter_table`).
+"""
+
+from __future__ import annotations
+
+import datetime
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from .. import __version__
+from ..errors import InputError
+from ..io.logs import Run
+from ..io.toml_file import At, TomlFile, did_you_mean
+from . import cooling, native, stiffness
+
+SCHEMA = "ninespring.model/1"
+TABLES = ("array", "spring", "material", "sensor", "stiffness", "board")
+ERRORS = ("rmse_before_c", "rmse_after_c", "hottest_c", "room_over_first_k", "room_over_first_sigma_k")
+SPRING_KEYS = {
+    "wire_diameter_mm": (0.01, 10.0),
+    "coil_diameter_mm": (0.1, 100.0),
+    "turns": (0.1, 1000.0),
+    "wire_length_mm": (1.0, 10000.0),
+}
+MATERIAL_KEYS = {
+    "density_kg_per_m3": (500.0, 20000.0),
+    "heat_capacity_j_per_kgk": (50.0, 5000.0),
+    "latent_heat_j_per_kg": (0.0, 100000.0),
+    "resistivity_martensite_uohm_cm": (1.0, 1000.0),
+    "resistivity_austenite_uohm_cm": (1.0, 1000.0),
+    "martensite_finish_c": (-50.0, 200.0),
+    "martensite_start_c": (-50.0, 200.0),
+    "austenite_start_c": (-50.0, 200.0),
+    "austenite_finish_c": (-50.0, 200.0),
+    "emissivity": (0.0, 1.0),
+}
+STIFFNESS_KEYS = SPRING_KEYS | {key: MATERIAL_KEYS[key] for key in stiffness.MATERIAL} | stiffness.NUMBERS
+"""Of `[stiffness]`: its numbers."""
+COUPLED = ("orthogonal_", "diagonal_", "second_", "wake_w")
+"""What the stiffness layer has times `stiffness_coupling_scale`."""
+BOARD_KEYS = {"supply_limit_a": (0.1, 60.0), "boost_current_a": (0.1, 3.2), "open_current_a": (0.0, 3.2)}
+"""Of `[board.K]`: settings of the chip, within its limits."""
+
+
+@dataclass
+class Array:
+    """What was built: shape, spring, material, sensor. Tables hold only what the file gives."""
+
+    rows: int = 3
+    cols: int = 3
+    pitch_mm: float | None = None
+    spring: dict[str, float] = field(default_factory=dict)
+    material: dict[str, float] = field(default_factory=dict)
+    sensor: dict[str, Any] = field(default_factory=dict)
+    cooling: dict[str, Any] = field(default_factory=dict)
+    """What `ninespring couplings` reckons with; nothing else looks at it, and no model keeps it."""
+    stiffness: dict[str, Any] | None = None
+    """What the springs of the stiffness layer have of their own; None: there is no such layer."""
+    board: tuple[int, int] | None = None
+    """Rows and columns of springs of a board; None: all of a layer."""
+    boards: dict[int, dict[str, float]] = field(default_factory=dict)
+    """What board k (from 1) has of its own."""
+
+    @property
+    def layers(self) -> int:
+        """1, or 2 with a stiffness layer: spring k's is spring k + rows x cols."""
+        return 1 if self.stiffness is None else 2
+
+    @property
+    def springs(self) -> int:
+        """Number of springs, in all layers."""
+        return self.layers * self.rows * self.cols
+
+    def one_layer(self, who: str) -> None:
+        """Refuse a stiffness layer where only one is known."""
+        if self.layers > 1:
+            raise InputError(
+                f"a stiffness layer, but {who} one layer, as a board has: give that board's log, "
+                "and an array or model without [stiffness]"
+            )
+
+    def of_layer(self, layer: str) -> Array:
+        """Return one layer alone: its springs, where `[stiffness]` says nothing those above; no boards, nothing of the other."""
+        own = (self.stiffness or {}) if stiffness.LAYERS.index(layer) else {}
+        return Array(
+            self.rows,
+            self.cols,
+            self.pitch_mm,
+            self.spring | {key: own[key] for key in SPRING_KEYS if key in own},
+            self.material | {key: own[key] for key in stiffness.MATERIAL if key in own},
+            self.sensor,
+        )
+
+    @property
+    def parts(self) -> list[native.Part]:
+        """Springs of each board."""
+        return native.boards_of(self.rows, self.cols, *(self.board or (self.rows, self.cols)), self.layers)
+
+
+@dataclass
+class Model:
+    """A model: array, effects that are on, parameters by the plant's names (`name` or `name[k]`)."""
+
+    array: Array
+    effects: list[str] = field(default_factory=list)
+    parameters: dict[str, float] = field(default_factory=dict)
+    stderr: dict[str, float] = field(default_factory=dict)
+    provenance: dict[str, Any] = field(default_factory=dict)
+    kept: dict[str, str] = field(default_factory=dict)
+    """Parameters that `export` leaves as the chip has them, and why."""
+    name: str = ""
+    places: dict[str, tuple[int, int]] = field(default_factory=dict)
+    """Line and column of each parameter's value, where the model was read from a file."""
+
+    def __repr__(self) -> str:
+        effects = ", ".join(self.effects) or "no effects"
+        return f"<model of {self.array.rows} x {self.array.cols}: {effects}; {len(self.parameters)} parameters>"
+
+
+def model_of_layer(model: Model, layer: str) -> Model:
+    """Return a model of two layers as one of one layer knows it: its springs, its couplings, nothing of the other."""
+    array, which = model.array, stiffness.LAYERS.index(layer)
+    if array.stiffness is None:
+        raise InputError(f"--layer {layer}: the model has one layer", model.name)
+    out = Model(array.of_layer(layer), list(model.effects), provenance=model.provenance, name=model.name)
+    n, scale = out.array.springs, model.parameters.get("stiffness_coupling_scale", 1.0)
+    values = dict(model.parameters)
+    if which and scale != 1.0:  # what the model does not say, and the plant has
+        table = native.parameter_table()
+        values = {name: one.default for name, one in table.items() if name.startswith(COUPLED)} | values
+    for each in (False, True):  # what is said of one spring is over what is said of all
+        for full, value in values.items():
+            name, _, spring = full.partition("[")
+            if name.startswith(("series_", "stiffness_")) or bool(spring) != each:
+                continue
+            scaled = scale if which and name.startswith(COUPLED) else 1.0
+            at = int(spring[:-1]) - 1 - which * n if spring else -1
+            if spring and not 0 <= at < n:
+                continue
+            to = f"{name}[{at + 1}]" if spring else name
+            out.parameters[to] = scaled * value
+            if full in model.stderr:
+                out.stderr[to] = scaled * model.stderr[full]
+    for name in {full.partition("[")[0] for full in out.parameters if "[" in full}:
+        values = [out.parameters.get(f"{name}[{k + 1}]") for k in range(n)]
+        if values[0] is not None and len(set(values)) == 1:  # all the same: said once
+            errors = [out.stderr.pop(f"{name}[{k + 1}]", None) for k in range(n)]
+            for k in range(n):
+                del out.parameters[f"{name}[{k + 1}]"]
+            out.parameters[name] = values[0]
+            if errors[0] is not None:
+                out.stderr[name] = errors[0]
+    return out
+
+
+def _array(file: TomlFile) -> Array:
+    if file.get(("array",)) is None:
+        raise file.refuse("there is no [array] table; add rows and cols", ())
+    file.table(("array",), ("rows", "cols", "pitch_mm", "board_rows", "board_cols"))
+    array = Array(*(file.whole(("array", key), 1, native.MAX_SPRINGS) for key in ("rows", "cols")))
+    array.stiffness = _stiffness(file)
+    if array.springs > native.MAX_SPRINGS:
+        two = " in two layers" if array.layers == 2 else ""
+        said = f"{array.rows} x {array.cols}{two} are more than {native.MAX_SPRINGS} springs"
+        raise file.refuse(said, ("array", "cols"))
+    _boards(file, array)
+    if file.get(("array", "pitch_mm")) is not None:
+        array.pitch_mm = file.number(("array", "pitch_mm"), 0.1, 1000.0)
+    for name, keys in (("spring", SPRING_KEYS), ("material", MATERIAL_KEYS)):
+        given = file.table((name,), keys)
+        getattr(array, name).update({key: file.number((name, key), *keys[key]) for key in given})
+    array.sensor = dict(file.table(("sensor",), ("kind", "noise_c")))
+    if "kind" in array.sensor:
+        file.text_at(("sensor", "kind"))
+    if "noise_c" in array.sensor:
+        file.number(("sensor", "noise_c"), 0.0, 50.0)
+    return array
+
+
+def _stiffness(file: TomlFile) -> dict[str, Any] | None:
+    if file.get(("stiffness",)) is None:
+        return None
+    given = dict(file.table(("stiffness",), (*STIFFNESS_KEYS, *stiffness.WORDS)))
+    for key, value in given.items():
+        at = ("stiffness", key)
+        if key in STIFFNESS_KEYS:
+            given[key] = file.number(at, *STIFFNESS_KEYS[key])
+        elif value not in (words := stiffness.WORDS[key]):
+            has = f"{did_you_mean(str(value), words)}; it has {', '.join(words)}"
+            raise file.refuse(f"[stiffness] {key} has no '{value}'{has}", at)
+    return given
+
+
+def _boards(file: TomlFile, array: Array) -> None:
+    sizes = [key for key in ("board_rows", "board_cols") if file.get(("array", key)) is not None]
+    if len(sizes) == 1:
+        raise file.refuse("[array] board_rows and board_cols go together", ("array", sizes[0]))
+    if sizes:
+        rows, cols = (file.whole(("array", key), 1, native.BOARD_SPRINGS) for key in sizes)
+        if min(rows, array.rows) * min(cols, array.cols) > native.BOARD_SPRINGS:
+            said = f"{rows} x {cols} are more than {native.BOARD_SPRINGS} springs on a board"
+            raise file.refuse(said, ("array", "board_cols"))
+        array.board = rows, cols
+    count = len(array.parts)
+    for number in file.table(("board",), file.get(("board",)) or ()):
+        if not number.isdecimal() or not 1 <= int(number) <= count or number.startswith("0"):
+            raise file.refuse(f"[board.{number}], but the array has board 1 to {count}", ("board", number))
+        own = file.table(("board", number), BOARD_KEYS)
+        limits = {key: file.number(("board", number, key), *BOARD_KEYS[key], f"[board.{number}] {key}") for key in own}
+        array.boards[int(number)] = limits
+
+
+def _cooling(file: TomlFile) -> dict[str, Any]:
+    given = dict(file.table(("cooling",), cooling.KEYS))
+    for key, value in given.items():
+        at = ("cooling", key)
+        if key in cooling.NUMBERS:
+            given[key] = file.number(at, *cooling.NUMBERS[key])
+        elif value not in (words := cooling.WORDS[key]):
+            has = f"{did_you_mean(str(value), words)}; it has {', '.join(words)}"
+            raise file.refuse(f"[cooling] {key} has no '{value}'{has}", at)
+    return given
+
+
+def read_array(path: str | Path) -> Array:
+    """Read array.toml; refused with file, line and column where it breaks docs/files.md."""
+    file = TomlFile(path)
+    file.table((), (*TABLES, "cooling"))
+    array = _array(file)
+    array.cooling = _cooling(file)
+    return array
+
+
+def read_model(path: str | Path) -> Model:
+    """Read model.toml; refused with file, line and column where it breaks docs/files.md."""
+    file = TomlFile(path)
+    file.table((), ("schema", *TABLES, "effects", "parameter", "provenance"))
+    if (schema := file.text_at(("schema",))) != SCHEMA:
+        raise file.refuse(f"schema is '{schema}'; this version reads \"{SCHEMA}\"", ("schema",))
+    model = Model(_array(file), name=str(path))
+    for at in file.tables(("effects",)):
+        name = file.get(at)
+        if name not in native.effect_names():
+            said = f"there is no effect '{name}'{did_you_mean(str(name), native.effect_names())}"
+            raise file.refuse(said, ("effects",), word=str(name))
+        if name in model.effects:
+            raise file.refuse(f"effect {name} appears twice; remove one", ("effects",), word=str(name))
+        model.effects.append(name)
+    for at in file.tables(("parameter",)):
+        _read_parameter(file, at, model)
+    _check_provenance(file)
+    model.provenance = dict(file.data.get("provenance", {}))
+    return model
+
+
+def _read_parameter(file: TomlFile, at: At, model: Model) -> None:
+    entry = file.table(at, ("name", "value", "unit", "stderr", "spring", "effect", "kept"))
+    name, table = file.text_at((*at, "name")), native.parameter_table()
+    if name not in table:
+        raise file.refuse(f"there is no parameter '{name}'{did_you_mean(name, table)}", (*at, "name"))
+    known = table[name]
+    value = file.number((*at, "value"), known.minimum, known.maximum, name)
+    if (unit := file.text_at((*at, "unit"))) != known.unit:
+        raise file.refuse(f"{name} is in '{known.unit}', not in '{unit}'; convert the value", (*at, "unit"))
+    if "effect" in entry and entry["effect"] != known.effect:
+        raise file.refuse(f"{name} belongs to {known.effect or 'no effect'}; remove or correct effect", (*at, "effect"))
+    full = name
+    if "spring" in entry:
+        spring = file.whole((*at, "spring"), 1, model.array.springs)
+        if not known.per_spring:
+            raise file.refuse(f"{name} is of the whole array; remove spring", (*at, "spring"))
+        full = f"{name}[{spring}]"
+    if full in model.parameters:
+        raise file.refuse(f"parameter {full} appears twice; remove one", (*at, "value"))
+    model.parameters[full] = value
+    model.places[full] = file.place((*at, "value"))
+    if "stderr" in entry:
+        model.stderr[full] = file.number((*at, "stderr"), 0.0, 1e12, f"{name} stderr")
+    if "kept" in entry:
+        model.kept[full] = file.text_at((*at, "kept"))
+
+
+def _check_provenance(file: TomlFile) -> None:
+    given = file.table(("provenance",), ("tool", "date", "logs", *ERRORS, "note", "doubts"))
+    for key in given:
+        if key in ERRORS:
+            file.number(("provenance", key), -100.0, 1e6)
+        elif key not in ("logs", "doubts"):
+            file.text_at(("provenance", key))
+    for at in file.tables(("provenance", "doubts")):
+        file.text_at(at)
+    for at in file.tables(("provenance", "logs")):
+        file.table(at, ("file", "sha256"))
+        file.text_at((*at, "file"))
+        file.text_at((*at, "sha256"))
+
+
+def _value(number: float) -> str:
+    text = f"{number:.7g}"
+    return text if any(c in text for c in ".en") else f"{text}.0"
+
+
+def model_text(model: Model) -> str:
+    """Return model.toml as text: what `read_model` and the host tools read."""
+    lines = [f'schema = "{SCHEMA}"']
+    lines.append(f"effects = [{', '.join(json.dumps(e) for e in model.effects)}]")
+    array = model.array
+    lines += ["", "[array]", f"rows = {array.rows}", f"cols = {array.cols}"]
+    if array.pitch_mm is not None:
+        lines.append(f"pitch_mm = {_value(array.pitch_mm)}")
+    if array.board is not None:
+        lines += [f"board_rows = {array.board[0]}", f"board_cols = {array.board[1]}"]
+    tables = {name: getattr(array, name) for name in ("spring", "material", "sensor")}
+    tables |= {f"board.{number}": own for number, own in array.boards.items()}
+    for name, part in (tables | {"stiffness": array.stiffness}).items():
+        if part or (name == "stiffness" and part is not None):
+            lines += ["", f"[{name}]"]
+            lines += [f"{key} = {json.dumps(v) if isinstance(v, str) else _value(v)}" for key, v in part.items()]
+    table = native.parameter_table()
+    for full, value in model.parameters.items():
+        name, _, rest = full.partition("[")
+        known = table[name]
+        lines += ["", "[[parameter]]", f'name = "{name}"']
+        if rest:
+            lines.append(f"spring = {int(rest[:-1])}")
+        lines += [f"value = {_value(value)}", f'unit = "{known.unit}"']
+        if full in model.stderr:
+            lines.append(f"stderr = {_value(model.stderr[full])}")
+        if known.effect:
+            lines.append(f'effect = "{known.effect}"')
+        if full in model.kept:
+            lines.append(f"kept = {json.dumps(model.kept[full], ensure_ascii=False)}")
+    made = {
+        "tool": f"ninespring {__version__}",
+        "date": datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%dT%H:%M:%SZ"),
+    } | model.provenance
+    lines += ["", "[provenance]"]
+    for key in ("tool", "date", "note"):
+        if key in made:
+            lines.append(f"{key} = {json.dumps(made[key])}")
+    if made.get("doubts"):
+        lines.append(f"doubts = {json.dumps(made['doubts'], ensure_ascii=False)}")
+    for key in ERRORS:
+        if made.get(key) is not None:
+            lines.append(f"{key} = {_value(made[key])}")
+    for log in made.get("logs", []):
+        lines += ["", "[[provenance.logs]]", f"file = {json.dumps(log['file'])}"]
+        lines.append(f'sha256 = "{log["sha256"]}"')
+    return "\n".join(lines) + "\n"
+
+
+SHAPES = {1: (1, 1), 2: (1, 2), 4: (2, 2), 9: (3, 3), 16: (4, 4), 25: (5, 5), 36: (6, 6), 49: (7, 7), 64: (8, 8)}
+"""Springs of a log, and the array they are taken for where no array.toml says it."""
+
+
+def array_of(array: Array | None, runs: Sequence[Run]) -> Array:
+    """Return the array of these runs; refuse what does not go together."""
+    for k, run in enumerate(runs):
+        for other in runs[:k]:
+            if run.sha256 == other.sha256:
+                raise InputError(f"is the same as {other.name}: it would count twice, give it once", run.name)
+    counts = {run.springs for run in runs}
+    if len(counts) > 1:
+        raise InputError(f"the logs have {' and '.join(map(str, sorted(counts)))} springs: give logs of one array")
+    if array is None:
+        count = counts.pop()
+        below: dict[str, Any] | None = None
+        if runs[0].layers == 2 and count % 2 == 0:
+            count, below = count // 2, {}
+        if count not in SHAPES:
+            raise InputError(
+                f"{count} springs: say how they are arranged, `--array array.toml` with [array] rows and cols",
+                runs[0].name,
+                1,
+            )
+        array = Array(*SHAPES[count], stiffness=below)
+    return array

@@ -1,0 +1,1 @@
+"""What was found in words: results and their schema, sentences, pages, pictures."""

@@ -1,0 +1,287 @@
+"""The report's pictures, as SVG text."""
+
+from __future__ import annotations
+
+import io
+import math
+from typing import Any
+
+import matplotlib
+
+matplotlib.use("svg")
+import matplotlib.pyplot as plt
+import numpy as np
+
+from ..find.diagnosis import Diagnosis
+from ..io import results, statistics
+from ..io.logs.run import Run
+
+INK, MEASURED, BEFORE, AFTER = "#1d2733", "#9aa7b4", "#c8553d", "#1f77a4"
+PAPER = {"facecolor": "white", "edgecolor": "none", "pad": 1.0, "alpha": 0.85}
+plt.rcParams.update(
+    {"svg.fonttype": "none", "font.family": "sans-serif", "text.color": INK, "axes.edgecolor": "#c3ccd4"}
+)
+
+
+def as_svg(figure: Any) -> str:
+    """Return a figure as SVG text that stands in a page; it is closed."""
+    out = io.StringIO()
+    figure.savefig(out, format="svg", bbox_inches="tight")
+    plt.close(figure)
+    text = out.getvalue()
+    return text[text.index("<svg") :]
+
+
+def _thin(n: int, most: int = 500) -> slice:
+    return slice(None, None, max(1, n // most))
+
+
+def traces(found: Diagnosis) -> list[tuple[str, str]]:
+    """Return two figures a run: temperatures, and what the models leave of them."""
+    array = found.problem.array
+    fits = ((found.baseline, BEFORE, "model before"), (found.final, AFTER, "model after"))
+    figures = []
+    for r, run in enumerate(found.problem.runs):
+        pick = _thin(len(run.time_s))
+        since = (run.time_s - run.time_s[0])[pick]
+        # a line across a gap or a stretch left out would be invented
+        breaks = np.unique([0, *(np.searchsorted(_rows_of(run, pick), run.starts))])
+        pair = []
+        for residual in (False, True):
+            figure, axes = plt.subplots(
+                array.rows,
+                array.cols,
+                figsize=(max(3.7 * array.cols, 7.4), 2.1 * array.rows + 0.9),
+                sharex=True,
+                sharey=True,
+                squeeze=False,
+            )
+            for k in range(run.springs):
+                axis = axes[k // array.cols][k % array.cols]
+                measured = run.temperature_c[:, k]
+                if not np.isfinite(measured).any():
+                    axis.text(
+                        0.5, 0.5, "not measured", ha="center", transform=axis.transAxes, color=MEASURED, fontsize=9
+                    )
+                if not residual:
+                    axis.plot(since, measured[pick], color=MEASURED, lw=2.6, label="measured")
+                else:
+                    noise = float(found.problem.noise[r][k])
+                    axis.axhspan(-2 * noise, 2 * noise, color="#e3e8ec", lw=0, label="noise, 2 sigma")
+                for fit, colour, label in fits:
+                    shown = fit.residual[r][:, k] if residual else measured - fit.residual[r][:, k]
+                    line = shown[pick].copy()
+                    line[breaks[1:] - 1] = np.nan
+                    axis.plot(since, line, color=colour, lw=0.9, label=label)
+                if residual:
+                    _shade_inputs(axis, run, k, pick)
+                axis.set_title(f"spring {k + 1}", fontsize=9, loc="left", color=INK)
+                axis.grid(alpha=0.25)
+                axis.tick_params(labelsize=8)
+            handles, labels = axes[0][0].get_legend_handles_labels()
+            figure.legend(handles, labels, fontsize=9, frameon=False, ncols=3, loc="upper right")
+            figure.supxlabel("time since the beginning of the run, s", fontsize=9)
+            figure.supylabel("measured less model, K" if residual else "temperature, °C", fontsize=9)
+            figure.tight_layout(rect=(0, 0, 1, 1.0 - 0.25 / figure.get_figheight()))
+            pair.append(as_svg(figure))
+        figures.append((pair[0], pair[1]))
+    return figures
+
+
+def _shade_inputs(axis: Any, run: Run, k: int, pick: slice) -> None:
+    """Shade a spring's drive and the fan into the lowest sixth of a picture."""
+    since = (run.time_s - run.time_s[0])[pick]
+    top = max(1e-12, float(run.drive.max()))
+    across = axis.get_xaxis_transform()
+    axis.fill_between(
+        since, 0.0, run.drive[pick, k] / top / 6.0, transform=across, color="#c9a14a", alpha=0.45, lw=0, step="post"
+    )
+    axis.fill_between(since, 0.0, run.fan[pick] / 40.0, transform=across, color="#5b8fd0", alpha=0.7, lw=0, step="post")
+
+
+def array_map(found: Diagnosis) -> str:
+    """Draw what is left at each spring in multiples of its sensor's noise, with a colour bar."""
+    problem = found.problem
+    shape = (problem.array.rows, problem.array.cols)
+    scaled = [left / noise for left, noise in zip(found.final.residual, problem.noise, strict=True)]
+    joined = np.concatenate(scaled)
+    seen = np.isfinite(joined)
+    rms = np.sqrt(np.nansum(joined**2, axis=0) / np.where(seen.any(axis=0), seen.sum(axis=0), np.nan))
+    figure, axis = plt.subplots(figsize=(4.2, min(4.2, 0.8 + 3.4 * shape[0] / shape[1])))
+    high = max(3.0, float(np.nanmax(rms)))
+    shown = axis.imshow(rms.reshape(shape), cmap="YlOrRd", vmin=1.0, vmax=high)
+    for k, value in enumerate(rms):
+        text = f"{k + 1}" if not math.isfinite(value) else f"{k + 1}\n{value:.1f}"
+        dark = math.isfinite(value) and value > 1.0 + 0.7 * (high - 1.0)
+        axis.text(
+            k % shape[1], k // shape[1], text, ha="center", va="center", fontsize=9, color="white" if dark else INK
+        )
+    axis.set_xticks([])
+    axis.set_yticks([])
+    figure.colorbar(shown, ax=axis, shrink=0.8, label="rms error / noise")
+    return as_svg(figure)
+
+
+def unknown_heat(found: Diagnosis) -> str:
+    """Draw the watts that no log has, springs over time, a panel a run, with a colour bar; empty where there are none."""
+    heat = found.heat
+    most = max((float(np.abs(watts).max()) for watts in heat.watts if watts.size), default=0.0)
+    if most <= 0:
+        return ""
+    springs, runs = found.problem.array.springs, len(heat.watts)
+    figure, axes = plt.subplots(
+        runs, 1, figsize=(9.0, 0.9 + runs * max(0.9, 0.2 * springs)), squeeze=False, layout="constrained"
+    )
+    for r, (axis, times, watts) in enumerate(zip(axes[:, 0], heat.times_s, heat.watts, strict=True)):
+        pick = _thin(len(times))
+        edges = np.append(times[pick], times[-1]) - times[0]
+        # red: more than was logged; blue: less
+        shown = axis.pcolormesh(
+            edges, np.arange(springs + 1) + 0.5, watts[pick].T, cmap="RdBu_r", vmin=-most, vmax=most
+        )
+        axis.set_yticks(np.arange(1, springs + 1))
+        axis.invert_yaxis()
+        axis.set_ylabel(f"run {r + 1}, spring", fontsize=8)
+        axis.tick_params(labelsize=7)
+    axes[-1, 0].set_xlabel("s", fontsize=8)
+    figure.colorbar(shown, ax=axes[:, 0], label="W more (red) or less (blue) than known")
+    return as_svg(figure)
+
+
+def error_bars(told: results.Diagnosis) -> str:
+    """Draw the held-out errors before and after, and the noise."""
+    before = told.baseline
+    rows = (
+        ("before", before.holdout_rmse_c, BEFORE),
+        ("after", told.after.holdout_rmse_c, AFTER),
+        ("noise", before.noise_c, MEASURED),
+    )
+    figure, axis = plt.subplots(figsize=(4.2, 1.5))
+    for at, (name, value, colour) in enumerate(rows):
+        axis.barh(-at, value, color=colour, height=0.7)
+        axis.text(value, -at, f" {value:.2f} K", va="center", fontsize=9)
+        axis.text(0, -at, f"{name} ", va="center", ha="right", fontsize=9)
+    axis.set_xlim(0, max(value for _, value, _ in rows) * 1.25)
+    axis.set_axis_off()
+    axis.set_title("error on held-out blocks", fontsize=9, loc="left")
+    return as_svg(figure)
+
+
+def _rows_of(run: Run, pick: slice) -> np.ndarray:
+    """Return the numbers of the rows that a slice picks."""
+    return np.arange(len(run.time_s))[pick]
+
+
+def maps(found: Diagnosis) -> str:
+    """Draw where the error sits: rms and mean of each spring, before and after."""
+    problem = found.problem
+    shape = (problem.array.rows, problem.array.cols)
+    pictures = []
+    for fit, label in ((found.baseline, "before"), (found.final, "after")):
+        left = np.concatenate(fit.residual)
+        seen = np.isfinite(left)
+        count = np.where(seen.any(axis=0), seen.sum(axis=0), np.nan)
+        square, mean = np.nansum(left**2, axis=0) / count, np.nansum(left, axis=0) / count
+        pictures.append((np.sqrt(square), f"rms error {label}, K", "YlOrRd", False))
+        pictures.append((mean, f"mean error {label}, K", "RdBu_r", True))
+    top = [max(float(np.nanmax(np.abs(pictures[k + 2 * j][0]))) for j in (0, 1)) for k in (0, 1)]
+    figure, axes = plt.subplots(1, 4, figsize=(12, min(3.2, 0.6 + 2.6 * shape[0] / shape[1])))
+    for axis, (values, title, colours, signed) in zip(axes, pictures, strict=True):
+        high = max(top[signed], 1e-9)
+        axis.imshow(values.reshape(shape), cmap=colours, vmin=-high if signed else 0.0, vmax=high)
+        for k, value in enumerate(values):
+            known = math.isfinite(value)
+            dark = known and abs(value) > (0.55 if signed else 0.7) * high
+            x, y = k % shape[1], k // shape[1]
+            shown = (f"{value:+.2f}" if signed else f"{value:.2f}") if known else "not\nmeasured"
+            colour = "white" if dark else INK
+            axis.text(x, y, shown, ha="center", va="center", fontsize=9 if known else 7, color=colour)
+            axis.text(x - 0.44, y - 0.42, str(k + 1), ha="left", va="top", fontsize=6, color=colour, alpha=0.8)
+        axis.set_title(title, fontsize=9)
+        axis.set_xticks([])
+        axis.set_yticks([])
+    figure.tight_layout()
+    return as_svg(figure)
+
+
+def autocorrelation(found: Diagnosis) -> str:
+    """Draw what is left: its autocorrelation and its distribution."""
+    problem = found.problem
+    lags = min(120, problem.longest_lag())
+    step = float(np.median(np.diff(problem.runs[0].time_s)))
+    figure, axes = plt.subplots(1, 2, figsize=(12, 3.0))
+    for fit, colour, label in ((found.baseline, BEFORE, "before"), (found.final, AFTER, "after")):
+        rho = statistics.autocorrelation(
+            [left / noise for left, noise in zip(fit.residual, problem.noise, strict=True)], lags
+        )
+        axes[0].plot(np.arange(1, lags + 1) * step, rho[1:], color=colour, label=label)
+        values = np.concatenate(
+            [(left / noise)[np.isfinite(left)] for left, noise in zip(fit.residual, problem.noise, strict=True)]
+        )
+        axes[1].hist(values, bins=80, range=(-6, 6), density=True, histtype="step", color=colour, label=label)
+    bound = 2 / math.sqrt(problem.count)
+    axes[0].axhspan(-bound, bound, color="#dfe5ea")
+    axes[0].set_xlabel("lag, s", fontsize=9)
+    axes[0].set_ylabel("correlation", fontsize=9)
+    axes[0].set_title("autocorrelation of the residual (grey: white noise)", fontsize=9)
+    x = np.linspace(-6, 6, 200)
+    axes[1].plot(x, np.exp(-(x**2) / 2) / math.sqrt(2 * math.pi), color=MEASURED, label="sensor noise alone")
+    axes[1].set_xlabel("residual / noise", fontsize=9)
+    axes[1].set_ylabel("density", fontsize=9)
+    axes[1].set_title("distribution of the residual", fontsize=9)
+    for axis in axes:
+        axis.legend(fontsize=8, frameon=False)
+        axis.grid(alpha=0.25)
+        axis.tick_params(labelsize=8)
+    figure.tight_layout()
+    return as_svg(figure)
+
+
+def evidence(found: Diagnosis) -> str:
+    """Draw the errors of the models that were fitted on the way."""
+    rows = [one for one in found.told.candidates if one.effects][:14]
+    if not rows:
+        return ""
+    figure, axis = plt.subplots(figsize=(12, 0.34 * len(rows) + 0.9))
+    y = np.arange(len(rows))[::-1]
+    colours = [AFTER if one.adopted else MEASURED for one in rows]
+    axis.barh(y, [one.rmse_c for one in rows], color=colours, height=0.7)
+    axis.axvline(found.told.baseline.noise_c, color=INK, lw=1, ls="--", zorder=0)
+    axis.axvline(found.told.baseline.rmse_c, color=BEFORE, lw=1, zorder=0)
+    axis.set_yticks(y, [" + ".join(one.effects) for one in rows], fontsize=8)
+    for at, one in zip(y, rows, strict=True):
+        axis.annotate(
+            f"{one.rmse_c:.3f} K, {one.evidence_over_baseline:+.0f} nats",
+            (one.rmse_c, at),
+            (5, 0),
+            textcoords="offset points",
+            va="center",
+            fontsize=8,
+            bbox=PAPER,
+        )
+    axis.set_xlim(0, max(one.rmse_c for one in rows) * 1.3)
+    axis.set_xlabel("rms error, K (dashed: noise; red: before)", fontsize=9)
+    axis.spines[["top", "right"]].set_visible(False)
+    figure.tight_layout()
+    return as_svg(figure)
+
+
+def cases(told: results.SteadyDiagnosis) -> str:
+    """Draw a steady table's cases: measured, model before, model after."""
+    listed = told.cases
+    figure, axis = plt.subplots(figsize=(12, 0.34 * len(listed) + 1.2))
+    y = np.arange(len(listed))[::-1]
+    for key, colour, label, marker, size in (
+        ("measured_c", MEASURED, "measured", "o", 11),
+        ("before_c", BEFORE, "model before", "o", 6),
+        ("after_c", AFTER, "model after", "D", 5),
+    ):
+        if getattr(listed[0], key) is not results.UNSET:
+            axis.plot([getattr(one, key) for one in listed], y, marker, color=colour, ms=size, label=label)
+    axis.set_yticks(y, [one.case for one in listed], fontsize=9)
+    axis.set_xlabel("temperature, °C", fontsize=9)
+    axis.grid(alpha=0.25)
+    axis.spines[["top", "right"]].set_visible(False)
+    axis.legend(fontsize=9, frameon=False, ncols=3, loc="lower right", bbox_to_anchor=(1, 1))
+    figure.tight_layout()
+    return as_svg(figure)
