@@ -20,9 +20,9 @@ typedef struct {
 EXPORT double whiten(size_t rows, size_t errors, const double *step_s, const unsigned char *there,
                      const double *variance, const double *time_constant_s, size_t columns,
                      double *states, double *fields);
-EXPORT double weigh(size_t rows, const double *keep, const double *fade,
-                    const unsigned char *there, const double *variance, size_t columns,
-                    double *states, const double *fields, double *out);
+EXPORT double weigh(size_t rows, const double *keep, const double *fade, const unsigned char *there,
+                    const double *variance, size_t columns, double *states, const double *fields,
+                    double *out);
 
 /* The covariance of the errors before a row is read, from that after the row before. */
 static void go_on(const errors_t *errors, const double *keep,

@@ -296,6 +296,7 @@ def _diagnose(
     free_to_bend = (*RUNS_OWN, *(["ambient_drift"] if guessed else []))
     witnesses: dict[str, Witness] = {}
     judge = found
+    judged_by = unseen.Unseen(problem, found, declared_alone)
     while fresh := [effect for effect in without if effect not in witnesses]:
         for effect in fresh:
             flexible = found.is_flexible(final, effect) and effect not in free_to_bend
@@ -303,7 +304,10 @@ def _diagnose(
         # beside causes without a name that leave structure themselves, a name must explain more than it leaves
         least = MOST_OF_IT if hidden and unexplained(problem, final) else 0.0
         doubtful = [
-            effect for effect in fresh if witnesses[effect].probability() < NAMED or witnesses[effect].share < least
+            effect
+            for effect in fresh
+            if (witnesses[effect].probability() < NAMED or witnesses[effect].share < least)
+            and (hidden or not judged_by.tells(final, without[effect]))
         ]
         if not doubtful:
             break
@@ -316,14 +320,23 @@ def _diagnose(
         final, without, contenders = judge.settle(judge.forward(final))
         final = _finish(problem, final)
     progress("a run that the fit never saw")
-    judged_by = unseen.Unseen(problem, found, declared_alone)
     not_kept: list[str] = []
-    if not hidden and len(problem.runs) > 1:
+    instead = ""
+    if not hidden:
         kept, not_kept = judged_by.kept(final, judge.reduced)
-        if not_kept:
+        if kept is None:
+            # as anybody fits it, by least squares: nothing that is known of its errors predicts better
+            problem.take_for(None)
+            base = declared_alone
+            found = judge = search.Search(problem, found.candidates, base, progress)
+            kept, contenders = judged_by.plain(found), []
+            instead = f". It is the declared model{unseen.WITH_LAG * (kept is not base)}: nothing found beyond it predicts as well"
+        if not_kept or instead:
             final = _finish(problem, kept)
             without = {e: judge.reduced(final, e) for e in final.spec.effects if e not in base.spec.effects}
-    headline = judged_by.as_dict(final)
+            for effect in without:
+                witnesses.setdefault(effect, witness(problem, final, effect, without[effect], flexible=False))
+    headline = judged_by.as_dict(final, instead)
     final = runs_apart.with_spread(problem, final)
     left_over = unexplained(problem, final) or bool(hidden)
     adopted = [e for e in final.spec.effects if e not in base.spec.effects]
@@ -352,7 +365,7 @@ def _diagnose(
         if effect in RUNS_OWN:
             runs_differ.append(runs_apart.entry(problem, final, effect, strength[effect], witnesses[effect]))
             continue
-        probability = witnesses[effect].probability()
+        probability = max(NAMED, witnesses[effect].probability())  # where less, what was not seen tells of it
         if bounds & {free.key for free in final.spec.free if free.effect == effect}:
             # what would be beyond it is no such effect
             probability = min(probability, PROBABLE)
