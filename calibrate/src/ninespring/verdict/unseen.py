@@ -171,7 +171,10 @@ class Unseen:
         what is to be said of the names."""
         said: list[str] = []
         while self.splits and self.own(fit) > WORSE * self.rmse(self.better):
-            names = [e for e in fit.spec.effects if e not in (*self.base.spec.effects, *OF_THAT_DAY)]
+            found = [e for e in fit.spec.effects if e not in self.base.spec.effects]
+            names = [e for e in found if e not in OF_THAT_DAY]
+            if found and not names:
+                break  # what is of that day no other tells
             fewer = {effect: reduced(fit, effect) for effect in names}
             best = min(fewer, key=lambda effect: self.own(fewer[effect]), default=None)
             if best is None or self.own(fewer[best]) >= self.own(fit):
