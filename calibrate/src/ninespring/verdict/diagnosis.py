@@ -298,15 +298,24 @@ def _diagnose(
     judge = found
     judged_by = unseen.Unseen(problem, found, declared_alone)
     while fresh := [effect for effect in without if effect not in witnesses]:
+        likely = final if hidden else lasting.likeliest(problem, final)
+        enough = {effect: True for effect in fresh}
         for effect in fresh:
             flexible = found.is_flexible(final, effect) and effect not in free_to_bend
             witnesses[effect] = witness(problem, final, effect, without[effect], flexible)
+            if not hidden:
+                # each account at its likeliest: what least squares made of the one without it is no evidence
+                other = lasting.likeliest(problem, without[effect])
+                nats = log_evidence(problem, likely, other)
+                witnesses[effect] = replace(witnesses[effect], nats=nats)
+                enough[effect] = nats - found.price() >= search.MIN_EVIDENCE
         # beside causes without a name that leave structure themselves, a name must explain more than it leaves
         least = MOST_OF_IT if hidden and unexplained(problem, final) else 0.0
         doubtful = [
             effect
             for effect in fresh
-            if (witnesses[effect].probability() < NAMED or witnesses[effect].share < least)
+            if not enough[effect]
+            or (witnesses[effect].probability() < NAMED or witnesses[effect].share < least)
             and (hidden or not judged_by.tells(final, without[effect]))
         ]
         if not doubtful:
@@ -330,7 +339,8 @@ def _diagnose(
             base = declared_alone
             found = judge = search.Search(problem, found.candidates, base, progress)
             kept, contenders = judged_by.plain(found), []
-            instead = f". It is the declared model{unseen.WITH_LAG * (kept is not base)}: nothing found beyond it predicts as well"
+            which = f"the declared model{unseen.WITH_LAG * (kept is not base)}, by least squares"
+            instead = f". The model is {which}: nothing else that was tried predicts as well"
         if not_kept or instead:
             final = _finish(problem, kept)
             without = {e: judge.reduced(final, e) for e in final.spec.effects if e not in base.spec.effects}

@@ -186,7 +186,7 @@ class Unseen:
 
     def plain(self, found: Search) -> Fit:
         """Return the better one of both, fitted to everything in a search that begins at the declared model."""
-        if self.better is self.base or self.lag is None:
+        if self.lag is None or self.rmse(self.lagged) > self.rmse(self.base) / WORSE:
             return found.base
         return found.refit(found.base, [self.lag], [1.0])
 
