@@ -81,7 +81,9 @@ def test_where_nothing_found_predicts_as_well_the_model_is_the_better_baseline_a
     found = diagnosis.diagnose(Array(1, 2), [run.part(slice(half))], model=declared())
     unseen = found.result["unseen"]
     assert unseen["rmse_c"] <= 1.05 * min(unseen["declared_rmse_c"], unseen["with_lag_rmse_c"])
-    assert "The model is the declared model with a lag, by least squares" in unseen["text"] and unseen["text"] in verdict(found.result)
+    assert "The model is the declared model with a lag, by least squares" in unseen["text"] and unseen[
+        "text"
+    ] in verdict(found.result)
     problem, fit, _ = diagnosis.fit_effects(
         Array(1, 2), [run.part(slice(half))], ["sensor_lag"], declared=declared().parameters
     )

@@ -315,8 +315,10 @@ def _diagnose(
             effect
             for effect in fresh
             if not enough[effect]
-            or (witnesses[effect].probability() < NAMED or witnesses[effect].share < least)
-            and (hidden or not judged_by.tells(final, without[effect]))
+            or (
+                (witnesses[effect].probability() < NAMED or witnesses[effect].share < least)
+                and (hidden or not judged_by.tells(final, without[effect]))
+            )
         ]
         if not doubtful:
             break
