@@ -77,6 +77,7 @@ def test_what_is_not_believed_leaves_its_place_to_another(make_log, monkeypatch:
         return replace(witness(problem, fit, effect, *rest), share=0.97 * (effect != "natural_convection"))
 
     monkeypatch.setattr(diagnosis, "witness", doubted)
+    monkeypatch.setattr(diagnosis.unseen.Unseen, "tells", lambda *_: False)  # what it is foretold by is true here
     strong = {"natural_convection": {"convection_exponent": 0.25}}
     result = diagnosis.diagnose(Array(), [read_log(make_log(effects=strong, seed=3))]).result
     assert judged[0] == "natural_convection" and len(judged) > 1

@@ -347,7 +347,7 @@ def _diagnose(
             final = _finish(problem, kept)
             without = {e: judge.reduced(final, e) for e in final.spec.effects if e not in base.spec.effects}
             for effect in without:
-                witnesses.setdefault(effect, witness(problem, final, effect, without[effect], flexible=False))
+                witnesses.setdefault(effect, witness(problem, final, effect, without[effect], False))
     headline = judged_by.as_dict(final, instead)
     final = runs_apart.with_spread(problem, final)
     left_over = unexplained(problem, final) or bool(hidden)
