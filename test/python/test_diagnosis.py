@@ -86,6 +86,7 @@ def test_what_is_not_believed_leaves_its_place_to_another(make_log, monkeypatch:
         )
 
     monkeypatch.setattr(diagnosis, "witness", doubted)
+    monkeypatch.setattr(diagnosis.unseen.Unseen, "tells", lambda *_: False)  # what it is foretold by is true here
     strong = {"natural_convection": {"convection_exponent": 0.25}}
     result = diagnosis.diagnose(Array(), [read_log(make_log(effects=strong, seed=3))]).result
     assert judged[0] == "natural_convection" and len(judged) > 1
@@ -243,6 +244,7 @@ def test_an_effect_with_a_number_at_its_bound_is_never_certain(make_log) -> None
 
 def test_what_explains_most_and_is_not_named_all_the_same_is_said(make_log, monkeypatch) -> None:
     monkeypatch.setattr(Witness, "probability", lambda self: 0.4)
+    monkeypatch.setattr(diagnosis.unseen.Unseen, "tells", lambda *_: False)  # what it is foretold by is true here
     found = diagnosis.diagnose(Array(), [read_log(make_log(effects={"plate_conduction": {}}))]).result
     assert not found["effects"] and found["unexplained"]
     assert any("plate_conduction" in one and "40% likely, it is not named" in one for one in found["warnings"])

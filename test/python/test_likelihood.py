@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 from ninespring.infer import room
-from ninespring.infer.likelihood import BROKEN, Colour, Rows, fitted
+from ninespring.infer.likelihood import BROKEN, Colour, Rows, Weighed, fitted
 from ninespring.io import statistics
 from ninespring.io.logs.run import Run
 
@@ -162,3 +162,36 @@ def test_runs_that_began_at_rest_say_that_another_does() -> None:
     over = room.over_first(runs, [18.1, 21.1, 23.1])
     assert over is not None and over[0] == pytest.approx(0.1, abs=0.06) and over[1] < 0.5
     assert room.over_first(runs[:1], [18.0]) is None
+
+
+def test_weighing_is_whitening_with_its_slopes() -> None:
+    rng = np.random.default_rng(7)
+    time_s = np.cumsum(rng.uniform(0.5, 4.0, 60))
+    mask = rng.random((60, 3)) < 0.9
+    walks = [Rows.of(time_s, [0, 25], np.ones((60, 3), dtype=bool)), Rows.of(time_s, [0], mask)]
+    vectors = [rng.standard_normal(walk.mask.sum()) for walk in walks]
+    weighed = Weighed(walks, vectors)
+    z = np.log([5.0, 2.0, 9.0, 0.5, 8.0, 900.0])
+    size = np.exp(z)
+    colour = Colour((size[0], size[1]), (size[2], size[3]), (size[4], size[5]))
+    white = [walk.whitened(vector[:, None], colour) for walk, vector in zip(walks, vectors, strict=True)]
+    loss, slope, squares = weighed.at(z)
+    assert squares == pytest.approx(sum(float(np.vdot(one, one)) for one, _ in white), rel=1e-9)
+    assert loss == pytest.approx(weighed.loss(squares, sum(one for _, one in white)), rel=1e-9)
+    moved = [weighed.at(z + 1e-5 * one)[0] - weighed.at(z - 1e-5 * one)[0] for one in np.eye(6)]
+    assert slope == pytest.approx(np.array(moved) / 2e-5, rel=1e-4, abs=1e-4)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_the_likeliest_errors_are_found_on_whichever_hill_they_are(seed: int) -> None:
+    """A flicker of seconds on what lasts for ten minutes, and all of it near the largest: one time constant fits half of each."""
+    rng = np.random.default_rng([8, seed])
+    rows, quick_s = 2500, (3.5, 20.0)[seed % 2]
+    together = lasting(rng, rows, 1, 20.0, 650.0) + lasting(rng, rows, 1, 1.5, quick_s)
+    apart = lasting(rng, rows, 2, 12.0, 650.0) + lasting(rng, rows, 2, 2.5, quick_s)
+    readings = together + apart + rng.standard_normal((rows, 2))
+    walk = Rows.of(np.arange(float(rows)), [0], np.ones((rows, 2), dtype=bool))
+    _, nats = fitted([walk], [readings.ravel()])
+    weighed = Weighed([walk], [readings.ravel()])
+    truth = np.log([2.5**2, 144.0, 2.5**2 + 2 * 1.5**2, 144.0 + 800.0, quick_s, 650.0])
+    assert nats > -weighed.at(truth)[0] - 0.5 * readings.size - 0.01

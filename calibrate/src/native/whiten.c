@@ -20,6 +20,9 @@ typedef struct {
 EXPORT double whiten(size_t rows, size_t errors, const double *step_s, const unsigned char *there,
                      const double *variance, const double *time_constant_s, size_t columns,
                      double *states, double *fields);
+EXPORT double weigh(size_t rows, const double *keep, const double *fade, const unsigned char *there,
+                    const double *variance, size_t columns, double *states, const double *fields,
+                    double *out);
 
 /* The covariance of the errors before a row is read, from that after the row before. */
 static void go_on(const errors_t *errors, const double *keep,
@@ -116,4 +119,103 @@ double whiten(size_t rows, size_t errors, const double *step_s, const unsigned c
         }
     }
     return logarithms;
+}
+
+#define SLOPES 4 /* by the logarithms of two variances and of two time constants */
+
+/* What is known of the two errors at a row, and its slopes. */
+typedef struct {
+    double aa, ab, bb;
+    double d_aa[SLOPES], d_ab[SLOPES], d_bb[SLOPES];
+} known_t;
+
+static void known_goes_on(known_t *known, const double *variance, const double *keep,
+                          const double *fade)
+{
+    const double va = variance[0], vb = variance[1], ka = keep[0], kb = keep[1];
+    for (size_t s = 0; s < SLOPES; s++) {
+        const double d_ka = s == 2 ? fade[0] : 0.0, d_kb = s == 3 ? fade[1] : 0.0;
+        const double d_va = s == 0 ? va : 0.0, d_vb = s == 1 ? vb : 0.0;
+        known->d_aa[s] =
+            d_va + ka * ka * (known->d_aa[s] - d_va) + 2.0 * ka * d_ka * (known->aa - va);
+        known->d_bb[s] =
+            d_vb + kb * kb * (known->d_bb[s] - d_vb) + 2.0 * kb * d_kb * (known->bb - vb);
+        known->d_ab[s] = ka * kb * known->d_ab[s] + (d_ka * kb + ka * d_kb) * known->ab;
+    }
+    known->aa = va + ka * ka * (known->aa - va);
+    known->bb = vb + kb * kb * (known->bb - vb);
+    known->ab *= ka * kb;
+}
+
+/* What fields (rows * columns) weigh with two errors that last: out[0] is the sum of the squares of
+ * what `whiten` would make of them, out[1] the sum of its logarithms, of one column; after each its
+ * slopes, by the logarithms of both variances and of both time constants: out[2..5], out[6..9].
+ * keep, fade (rows * 2): the part of each error that is left of it from the row before, and that
+ * times the step over the time constant, its slope. states: room for 10 * columns. Nothing else is
+ * written. Returns out[1]. */
+double weigh(size_t rows, const double *keep, const double *fade, const unsigned char *there,
+             const double *variance, size_t columns, double *states, const double *fields,
+             double *out)
+{
+    static const double nothing[2] = {0.0, 0.0};
+    known_t known = {.aa = 0.0}; /* at the first row all is forgotten */
+    double *quick = states, *slow = quick + columns, *d_quick = slow + columns;
+    double *d_slow = d_quick + SLOPES * columns;
+    double product = 1.0;
+    for (size_t c = 0; c < (2 + 2 * SLOPES) * columns; c++) {
+        states[c] = 0.0;
+    }
+    for (size_t k = 0; k < 2 + 2 * SLOPES; k++) {
+        out[k] = 0.0;
+    }
+    for (size_t row = 0; row < rows; row++) {
+        const double *k = row ? keep + 2 * row : nothing, *f = row ? fade + 2 * row : nothing;
+        known_goes_on(&known, variance, k, f);
+        double gain_a = 0.0, gain_b = 0.0, inverse = 0.0;
+        double d_gain_a[SLOPES] = {0.0}, d_gain_b[SLOPES] = {0.0}, d_spread[SLOPES] = {0.0};
+        if (there[row]) {
+            const double seen_a = known.aa + known.ab, seen_b = known.ab + known.bb;
+            const double spread = 1.0 + seen_a + seen_b;
+            inverse = 1.0 / spread;
+            gain_a = seen_a * inverse;
+            gain_b = seen_b * inverse;
+            for (size_t s = 0; s < SLOPES; s++) {
+                const double d_a = known.d_aa[s] + known.d_ab[s];
+                const double d_b = known.d_ab[s] + known.d_bb[s];
+                d_spread[s] = d_a + d_b;
+                d_gain_a[s] = (d_a - gain_a * d_spread[s]) * inverse;
+                d_gain_b[s] = (d_b - gain_b * d_spread[s]) * inverse;
+                known.d_aa[s] -= d_gain_a[s] * seen_a + gain_a * d_a;
+                known.d_ab[s] -= d_gain_a[s] * seen_b + gain_a * d_b;
+                known.d_bb[s] -= d_gain_b[s] * seen_b + gain_b * d_b;
+                out[6 + s] += 0.5 * d_spread[s] * inverse;
+            }
+            known.aa -= gain_a * seen_a;
+            known.ab -= gain_a * seen_b;
+            known.bb -= gain_b * seen_b;
+            product *= spread;
+            if (product > 1e200) { /* a logarithm a row would be most of the time */
+                out[1] += 0.5 * log(product);
+                product = 1.0;
+            }
+        }
+        const double *now = fields + row * columns;
+        for (size_t c = 0; c < columns; c++) {
+            const double a = k[0] * quick[c], b = k[1] * slow[c];
+            const double left = there[row] ? now[c] - a - b : 0.0, part = left * inverse;
+            for (size_t s = 0; s < SLOPES; s++) {
+                double *d_a = d_quick + SLOPES * c + s, *d_b = d_slow + SLOPES * c + s;
+                const double moved_a = k[0] * *d_a + (s == 2 ? f[0] * quick[c] : 0.0);
+                const double moved_b = k[1] * *d_b + (s == 3 ? f[1] * slow[c] : 0.0);
+                const double d_left = -moved_a - moved_b;
+                *d_a = moved_a + d_gain_a[s] * left + gain_a * d_left;
+                *d_b = moved_b + d_gain_b[s] * left + gain_b * d_left;
+                out[2 + s] += part * (2.0 * d_left - part * d_spread[s]);
+            }
+            quick[c] = a + gain_a * left;
+            slow[c] = b + gain_b * left;
+            out[0] += left * part;
+        }
+    }
+    return out[1] += 0.5 * log(product);
 }

@@ -67,26 +67,38 @@ def scatter(signal: list[np.ndarray], residual: list[np.ndarray], noise_factor: 
     return math.sqrt(top / bottom) if bottom > 0 else math.inf
 
 
+def _judged(problem: Problem, fields: list[np.ndarray]) -> list[np.ndarray]:
+    """Return fields (per run, degC) as the problem weighs readings: in units of the noise, as innovations where errors last."""
+    columns = problem.filtered(np.concatenate(problem.scaled(fields))[:, None])[:, 0]
+    out = []
+    for mask, part in zip(problem.mask, problem.by_run(columns), strict=True):
+        out.append(np.full(mask.shape, np.nan))
+        out[-1][mask] = part
+    return out
+
+
 def witness(problem: Problem, fit: Fit, effect: str, without: Fit, flexible: bool) -> Witness:
     """Return what speaks for an effect in a fit; `without` is the best fit that lacks it."""
     beyond = max(1e-9, excess(problem, without))
     bare = problem.predictions_without(fit, effect)
     shown = problem.predictions(fit.spec, fit.values)
     left = problem.without_errors(fit.residual)
-    factor = statistics.correlation_factor(
-        [one / noise for one, noise in zip(left, problem.noise, strict=True)], problem.longest_lag()
-    )
+    # beside errors that last a stretch tells of a size what their innovations tell of it: least squares would take what
+    # lasts for a size that changes
+    white = problem.colour.white if problem.colour is not None else None
+    signal = _judged(problem, [full - less for full, less in zip(shown, bare, strict=True)])
+    rest = _judged(problem, left)
+    factor = white or statistics.correlation_factor(rest, problem.longest_lag())
     times: tuple[list[np.ndarray], list[np.ndarray]] = ([], [])
     places: tuple[list[np.ndarray], list[np.ndarray]] = ([], [])
-    for full, less, rest, noise, mask in zip(shown, bare, left, problem.noise, problem.mask, strict=True):
-        signal, scaled = (full - less) / noise, rest / noise
-        stretch = np.arange(len(signal)) * STRETCHES // len(signal)
+    for one, scaled, mask in zip(signal, rest, problem.mask, strict=True):
+        stretch = np.arange(len(one)) * STRETCHES // len(one)
         for k in range(STRETCHES):
             here = mask & (stretch == k)[:, None]
-            times[0].append(signal[here])
+            times[0].append(one[here])
             times[1].append(scaled[here])
-        for k in range(signal.shape[1]):
-            places[0].append(signal[mask[:, k], k])
+        for k in range(one.shape[1]):
+            places[0].append(one[mask[:, k], k])
             places[1].append(scaled[mask[:, k], k])
     return Witness(
         log_evidence(problem, fit, without),

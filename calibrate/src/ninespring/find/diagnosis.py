@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import numpy as np
 from threadpoolctl import threadpool_limits
 
@@ -305,9 +306,10 @@ def _diagnose(
     begun = time.monotonic()
     problem = prepare(model.array if model else array, runs, dict(model.parameters) if model else {})
     case = _searched(problem, model, frozen, progress)
-    judge = _judged(case)
+    judged_by = unseen.Unseen(problem, case.search, case.declared)
+    judge = _judged(case, judged_by)
     progress("a run that the fit never saw")
-    headline = _foretold(case, judge)
+    headline = _foretold(case, judge, judged_by)
     case.final = runs_apart.with_spread(problem, case.final)
     left_over = unexplained(problem, case.final) or bool(case.hidden)
     strength = {e: log_evidence(problem, case.final, case.without[e]) for e in case.adopted}
@@ -403,20 +405,33 @@ def _searched(problem: Problem, model: Model | None, frozen: bool, progress: Cal
     )
 
 
-def _judged(case: _Case) -> search.Search:
+def _judged(case: _Case, judged_by: unseen.Unseen) -> search.Search:
     """Drop the names that are not sure enough, and search for what they stood in for; return the last search."""
     problem, judge, witnesses = case.problem, case.search, case.witnesses
     # where the ambient was not logged, that it drifted is no stand-in
     guessed = all(run.ambient_c is None for run in problem.runs)
     free_to_bend = (*RUNS_OWN, *(["ambient_drift"] if guessed else []))
     while fresh := [effect for effect in case.without if effect not in witnesses]:
+        likely = case.final if case.hidden else lasting.likeliest(problem, case.final)
+        enough = dict.fromkeys(fresh, True)
         for effect in fresh:
             flexible = case.search.is_flexible(case.final, effect) and effect not in free_to_bend
             witnesses[effect] = witness(problem, case.final, effect, case.without[effect], flexible)
+            if not case.hidden:
+                # each account at its likeliest: what least squares made of the one without it is no evidence
+                nats = log_evidence(problem, likely, lasting.likeliest(problem, case.without[effect]))
+                witnesses[effect] = msgspec.structs.replace(witnesses[effect], nats=nats)
+                enough[effect] = nats - case.search.price() >= search.MIN_EVIDENCE
         # beside causes without a name that leave structure themselves, a name must explain more than it leaves
         least = MOST_OF_IT if case.hidden and unexplained(problem, case.final) else 0.0
         doubtful = [
-            effect for effect in fresh if witnesses[effect].probability() < NAMED or witnesses[effect].share < least
+            effect
+            for effect in fresh
+            if not enough[effect]
+            or (
+                (witnesses[effect].probability() < NAMED or witnesses[effect].share < least)
+                and (case.hidden or not judged_by.tells(case.final, case.without[effect]))
+            )
         ]
         if not doubtful:
             break
@@ -432,15 +447,27 @@ def _judged(case: _Case) -> search.Search:
     return judge
 
 
-def _foretold(case: _Case, judge: search.Search) -> results.Unseen | None:
-    """Drop what foretells a run that the fit never saw no better; return how well such a run is foretold."""
-    judged_by = unseen.Unseen(case.problem, case.search, case.declared)
-    if not case.hidden and len(case.problem.runs) > 1:
-        kept, case.not_kept = judged_by.kept(case.final, judge.reduced)
-        if case.not_kept:
-            case.final = _finish(case.problem, kept)
-            case.without = {effect: judge.reduced(case.final, effect) for effect in case.adopted}
-    return judged_by.told(case.final)
+def _foretold(case: _Case, judge: search.Search, judged_by: unseen.Unseen) -> results.Unseen | None:
+    """Drop what foretells a run that the fit never saw worse; return how well such a run is foretold."""
+    problem = case.problem
+    if case.hidden:
+        return judged_by.told(case.final)
+    instead = ""
+    kept, case.not_kept = judged_by.kept(case.final, judge.reduced)
+    if kept is None:
+        # as anybody fits it, by least squares: nothing that is known of its errors predicts better
+        problem.take_for(None)
+        case.base = case.declared
+        case.search = judge = search.Search(problem, case.search.candidates, case.base, case.progress)
+        kept, case.contenders = judged_by.plain(judge), []
+        which = f"the declared model{unseen.WITH_LAG * (kept is not case.base)}, by least squares"
+        instead = f". The model is {which}: nothing else that was tried predicts as well"
+    if case.not_kept or instead:
+        case.final = _finish(problem, kept)
+        case.without = {effect: judge.reduced(case.final, effect) for effect in case.adopted}
+        for effect, without in case.without.items():
+            case.witnesses.setdefault(effect, witness(problem, case.final, effect, without, False))
+    return judged_by.told(case.final, instead)
 
 
 def _with_what_has_no_name(case: _Case, steps: list[tuple[str, Fit]]) -> list[tuple[str, Fit]]:
@@ -481,7 +508,7 @@ def _listed(
         if effect in RUNS_OWN:
             differ.append(runs_apart.entry(problem, final, effect, strength[effect], sure))
             continue
-        probability = sure.probability()
+        probability = max(NAMED, sure.probability())  # where less, what was not seen tells of it
         if bounds & {free.key for free in final.spec.free if free.effect == effect}:
             # what would be beyond it is no such effect
             probability = min(probability, PROBABLE)

@@ -18,6 +18,8 @@ from .unnamed import Found, Hidden
 
 TIMES = 2
 """The noise is that of what the last search left, and after so many of them no longer another."""
+LASTS = 0.1
+"""Variance of what lasts, in units of the white noise's, from which least squares may be beside the likeliest numbers."""
 
 
 def search_lasting(problem: Problem, first: Search, final: Fit) -> tuple[Search, Found]:
@@ -38,6 +40,20 @@ def search_lasting(problem: Problem, first: Search, final: Fit) -> tuple[Search,
         if result[0].spec.variant == names:
             break
     return found, result
+
+
+def likeliest(problem: Problem, fit: Fit) -> Fit:
+    """Return a fit by least squares, or its model fitted as what that leaves lasts: the likelier one.
+
+    Least squares may be far from it where much lasts, and another model only seems likelier then.
+    """
+    before = likelihood(problem, fit)
+    if problem.colour is not None or fit.colour is None or fit.colour.share < LASTS:
+        return fit
+    problem.take_for(fit.colour)
+    other = problem.fit(fit.spec, fit.as_dict(), tolerance=1e-3)
+    problem.take_for(None)
+    return other if likelihood(problem, other) > before else fit
 
 
 def nats_beside(problem: Problem, fit: Fit, hidden: Sequence[Hidden], chosen_from: int) -> float:

@@ -170,6 +170,12 @@ class Search:
         best = min(begun, key=lambda one: one.chi2)
         if race:
             best = self.problem.fit(spec, best.as_dict(), tolerance=1e-3, max_steps=STEPS, near=best)
+        if best.chi2 > fit.chi2:  # it lost on the way what it began with: with next to nothing added it has all of it
+            start = fit.as_dict()
+            for candidate in added:
+                start |= candidate.start_at(0.0, self.places(fit, candidate)[0])
+            again = self.problem.fit(spec, start, tolerance=1e-3, max_steps=STEPS, near=fit)
+            best = min(best, again, key=lambda one: one.chi2)
         self.fits[key] = best
         return best
 

@@ -1,6 +1,6 @@
 """A run that the fit never saw, predicted: by what was found, by the declared model and by that with a lag, each fitted to the rest.
 
-Of several runs each is left out in turn (MOST of them); of one alone its last third. What is a run's own (its room where none
+Of several runs each is left out in turn (MOST of them); of one alone its last part, a half and a third of it. What is a run's own (its room where none
 was logged, its drift) is not carried over: a room is told by the run's first minute, as `predict` does.
 """
 
@@ -25,13 +25,16 @@ from .search import Search
 
 MOST = 3
 """Runs that are left out, each in turn, at most."""
-SEEN = 2.0 / 3.0
-"""Part of a run alone that is fitted."""
+SEEN = (1.0 / 2.0, 2.0 / 3.0)
+"""Parts of a run alone that are fitted, the rest of it predicted: what a last third alone says of a model is chance."""
 WORSE = 1.05
 """Of an error, so much more is worse; less is chance."""
-STEPS = 10
-"""Of one fit: it begins where the whole data had it."""
+FORETOLD = 0.5
+"""Part of the squared error in the unseen that is left at most with an effect that is there, whatever else is said of it."""
+STEPS = 25
+"""Of one fit, at most: it begins where the whole data had it."""
 LAG = "sensor_lag"
+WITH_LAG = " with a lag"
 OF_THAT_DAY = (*RUNS_OWN, "ambient_drift")
 """Effects that no other run can tell: it has its own."""
 
@@ -52,19 +55,24 @@ def splits(problem: Problem) -> list[Split]:
     """Return the ways in which a problem's runs are fitted and predicted."""
     runs = problem.runs
     if len(runs) == 1:
-        run = runs[0]
-        late = run.time_s - run.time_s[0] > SEEN * run.duration_s
-        shown = np.where(late[:, None], np.nan, run.temperature_c)
-        if not np.isfinite(shown).any() or not (problem.mask[0] & late[:, None]).any():
-            return []
-        part = _problem(problem, [replace(run, temperature_c=shown)], [0])
-        return [Split(part, (0,), run, problem.mask[0] & late[:, None], alone=True)]
+        return [split for seen in SEEN if (split := _ahead(problem, seen)) is not None]
     out = []
     for r in range(max(0, len(runs) - MOST), len(runs)):
         kept = [k for k in range(len(runs)) if k != r]
         part = _problem(problem, [runs[k] for k in kept], kept)
         out.append(Split(part, tuple(kept), runs[r], problem.mask[r]))
     return out
+
+
+def _ahead(problem: Problem, seen: float) -> Split | None:
+    """Return a run alone, its first part to fit and the rest to predict; None where either has no readings."""
+    run = problem.runs[0]
+    late = run.time_s - run.time_s[0] > seen * run.duration_s
+    shown = np.where(late[:, None], np.nan, run.temperature_c)
+    if not np.isfinite(shown).any() or not (problem.mask[0] & late[:, None]).any():
+        return None
+    part = _problem(problem, [replace(run, temperature_c=shown)], [0])
+    return Split(part, (0,), run, problem.mask[0] & late[:, None], alone=True)
 
 
 def _problem(whole: Problem, runs: Sequence[Run], kept: Sequence[int]) -> Problem:
@@ -156,43 +164,55 @@ class Unseen:
         """The better one of both that know no physics but the declared, by least squares as anybody fits them."""
         return min((self.base, self.lagged), key=self.rmse)
 
-    def kept(self, fit: Fit, reduced: Callable[[Fit, str], Fit]) -> tuple[Fit, list[str]]:
-        """Return what predicts no worse than the better of both, names left out one by one; and what is to be said of them."""
-        said = []
+    def tells(self, fit: Fit, without: Fit) -> bool:
+        """Return whether most of what is off in the unseen without an effect is foretold with it: no stand-in does that."""
+        return bool(self.splits) and self.own(fit) ** 2 <= FORETOLD * self.own(without) ** 2
+
+    def kept(self, fit: Fit, reduced: Callable[[Fit, str], Fit]) -> tuple[Fit | None, list[str]]:
+        """Return what predicts no worse than the better of both, names left out one by one, None where nothing of it does; and
+        what is to be said of the names."""
+        said: list[str] = []
         while self.splits and self.own(fit) > WORSE * self.rmse(self.better):
-            names = [e for e in fit.spec.effects if e not in (*self.base.spec.effects, *OF_THAT_DAY)]
-            if not names:
-                break
+            found = [e for e in fit.spec.effects if e not in self.base.spec.effects]
+            names = [e for e in found if e not in OF_THAT_DAY]
+            if found and not names:
+                break  # what is of that day no other tells
             fewer = {effect: reduced(fit, effect) for effect in names}
-            best = min(fewer, key=lambda effect: self.own(fewer[effect]))
-            if self.own(fewer[best]) >= self.own(fit):
-                best_fit = self.found.base
-                if self.lag is not None and self.better is not self.base:
-                    best_fit = self.found.refit(best_fit, [self.lag], [1.0])
-                said += [self._left_out(e, fit, best_fit) for e in names if e not in best_fit.spec.effects]
-                fit = best_fit
-                break
+            best = min(fewer, key=lambda effect: self.own(fewer[effect]), default=None)
+            if best is None or self.own(fewer[best]) >= self.own(fit):
+                said += [self._left_out(e, fit, self.better) for e in names if e not in self.better.spec.effects]
+                return None, said
             said.append(self._left_out(best, fit, fewer[best]))
             fit = fewer[best]
         return fit, said
 
+    def plain(self, found: Search) -> Fit:
+        """Return the better one of both, fitted to everything in a search that begins at the declared model."""
+        if self.lag is None or self.rmse(self.lagged) > self.rmse(self.base) / WORSE:
+            return found.base
+        return found.refit(found.base, [self.lag], [1.0])
+
     def _left_out(self, effect: str, fit: Fit, other: Fit) -> str:
         return (
-            f"{effect} is not named: a run that the fit did not see is predicted to {self.own(fit):.2f} K with it and to "
+            f"{effect} is not named: {self._what} is predicted to {self.own(fit):.2f} K with it and to "
             f"{min(self.own(other), self.rmse(other)):.2f} K without"
         )
 
-    def told(self, fit: Fit) -> results.Unseen | None:
-        """Return what diagnosis.json says of it, None where nothing can be left out."""
+    @property
+    def _what(self) -> str:
+        alone = self.splits[0].alone
+        return "the last part of the run (a half and a third of it)" if alone else "a run that the fit did not see"
+
+    def told(self, fit: Fit, instead: str = "") -> results.Unseen | None:
+        """Return what diagnosis.json says of it, None where nothing can be left out; `instead`: what else is to be said first."""
         if not self.splits or not math.isfinite(self.own(fit)):
             return None
-        alone = self.splits[0].alone
-        what = "the last third of the run" if alone else "a run that the fit did not see"
         mine, declared, lagged = self.own(fit), self.rmse(self.base), self.rmse(self.lagged)
         return results.Unseen(
-            what="last third" if alone else "each run left out in turn",
+            what="last part" if self.splits[0].alone else "each run left out in turn",
             rmse_c=mine,
             declared_rmse_c=declared,
             with_lag_rmse_c=lagged,
-            text=f"{what} is predicted to {mine:.2f} K (declared model, fitted: {declared:.2f}, with a lag: {lagged:.2f})",
+            text=f"{self._what} is predicted to {mine:.2f} K (declared model, fitted: {declared:.2f}, with a lag: {lagged:.2f})"
+            + instead,
         )

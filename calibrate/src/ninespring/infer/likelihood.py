@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import ctypes
 import functools
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -27,8 +28,11 @@ NONE = 1e-7
 LARGEST = 1e5
 QUICK_S, SLOW_S = (3.0, 600.0), (600.0, 14400.0)
 """Time constants: of what a spring and its thermometer keep, and of what a box or a room keeps."""
-BEGIN_S = (10.0, 100.0)
-"""Quick time constants from which the fit begins: a likelihood of several errors has more than one hill."""
+BEGIN_S = (3.5, 12.0, 40.0, 130.0, 450.0), (700.0, 6000.0)
+"""Time constants at which the fit begins, from the likeliest of each quick one: a likelihood of several errors has more than
+one hill ..."""
+BEGIN_SLOW = (0.02, 0.5, 0.98)
+"""... and what of all that lasts is then slow."""
 FULL = 0.9
 """Part of the rows with readings that must have all of them for thermometers to be told apart from their mean."""
 _double_p = ctypes.POINTER(ctypes.c_double)
@@ -61,6 +65,15 @@ def _whiten() -> ctypes._CFuncPtr:
         *(size, size, _double_p, ctypes.c_char_p, _double_p, _double_p),
         *(size, _double_p, _double_p),
     )
+    return call
+
+
+@functools.cache
+def _weigh() -> ctypes._CFuncPtr:
+    call = native.library().weigh
+    call.restype = ctypes.c_double
+    size = ctypes.c_size_t
+    call.argtypes = (size, _double_p, _double_p, ctypes.c_char_p, _double_p, size, _double_p, _double_p, _double_p)
     return call
 
 
@@ -184,63 +197,121 @@ class Rows:
         return [np.ascontiguousarray(part[:, :1]), np.ascontiguousarray(part[:, 1:])]
 
 
+class Weighed:
+    """What a model leaves, as its likelihood weighs it: the runs' fields (rows, columns), of means and of what is not."""
+
+    def __init__(self, rows: Sequence[Rows], vectors: Sequence[np.ndarray]) -> None:
+        self.steps = [one.step_s for one in rows]
+        self.count = sum(one.count for one in rows)
+        self.together = any(one.turn is not None for one in rows)
+        self.parts: tuple[list[tuple[int, bytes, np.ndarray]], ...] = ([], [])
+        for r, (one, vector) in enumerate(zip(rows, vectors, strict=True)):
+            mean, own = one.turned(vector)
+            if one.turn is not None:
+                self.parts[1].append((r, one.there[0], mean))
+                self.parts[0].append((r, one.there[0], own))
+            else:
+                self.parts[0].extend((r, its, np.ascontiguousarray(own[:, [k]])) for k, its in enumerate(one.there))
+        widest = max((field.shape[1] for part in self.parts for *_, field in part), default=1)
+        self.states = np.empty(10 * widest)
+
+    def keeps(self, time_s: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Return the parts that are left of both errors from row to row, and their slopes."""
+        pace = [step[:, None] / time_s for step in self.steps]
+        return [(keep := np.exp(-one), keep * one) for one in pace]
+
+    def of(self, which: int, variance: np.ndarray, keeps: list[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
+        """Return squares and logarithms of one kind of fields, and the slopes of both: (10,), as whiten.c has them."""
+        total, out = np.zeros(10), np.empty(10)
+        pointers = [one.ctypes.data_as(_double_p) for one in (self.states, variance, out)]
+        for r, there, field in self.parts[which]:
+            keep, fade = (one.ctypes.data_as(_double_p) for one in keeps[r])
+            rows, columns = field.shape
+            _weigh()(
+                rows,
+                keep,
+                fade,
+                there,
+                pointers[1],
+                columns,
+                pointers[0],
+                field.ctypes.data_as(_double_p),
+                pointers[2],
+            )
+            out[[1, 6, 7, 8, 9]] *= columns
+            total += out
+        return total
+
+    def loss(self, squares: float, logarithms: float) -> float:
+        """Return the negative logarithm of the likelihood, white noise as large as fits, but for a constant."""
+        return 0.5 * self.count * math.log(max(squares, 1e-300) / self.count) + logarithms
+
+    def at(self, z: np.ndarray) -> tuple[float, np.ndarray, float]:
+        """Return the loss at logarithms of variances (own quick, slow, mean's quick, slow) and time constants, its slopes,
+        and the squares."""
+        size = np.exp(z)
+        keeps = self.keeps(size[4:])
+        own, mean = self.of(0, size[:2].copy(), keeps), self.of(1, size[2:4].copy(), keeps)
+        both = own + mean
+        slope = np.concatenate(
+            [0.5 * self.count / max(both[0], 1e-300) * one[2:6] + one[6:] for one in (own, mean, both)]
+        )
+        return self.loss(both[0], both[1]), slope[[0, 1, 4, 5, 10, 11]], float(both[0])
+
+    def begins(self) -> list[np.ndarray]:
+        """Return the likeliest of some simple errors with each quick time constant: as large as what is left."""
+        sizes = []
+        for part in self.parts:
+            readings = sum(there.count(1) * field.shape[1] for _, there, field in part)
+            squares = sum(float(np.vdot(field, field)) for *_, field in part)
+            sizes.append(max(0.1, squares / max(1, readings) - 1.0))
+        out = []
+        for quick_s in BEGIN_S[0]:
+            tried = []
+            for slow_s in BEGIN_S[1]:
+                keeps = self.keeps(np.array([quick_s, slow_s]))
+                split = [[np.array([(1.0 - slow) * size, slow * size]) for slow in BEGIN_SLOW] for size in sizes]
+                each = [[(one, self.of(which, one, keeps)) for one in split[which]] for which in (0, 1)]
+                for (own, a), (mean, b) in itertools.product(*each):
+                    z = np.log([*own, *mean, quick_s, slow_s])
+                    tried.append((self.loss(a[0] + b[0], a[1] + b[1]), tuple(z)))
+            out.append(np.array(min(tried)[1]))
+        return out
+
+
 def fitted(rows: Sequence[Rows], vectors: Sequence[np.ndarray]) -> tuple[Colour, float]:
     """Return how errors last by what a model leaves, per run in units of the noise, and the logarithm of its likelihood."""
-    channels = [one.turned(vector) for one, vector in zip(rows, vectors, strict=True)]
-    count = sum(one.count for one in rows)
+    weighed = Weighed(rows, vectors)
     low = np.log([NONE, NONE, NONE, NONE, QUICK_S[0], SLOW_S[0]])
     high = np.log([LARGEST, LARGEST, LARGEST, LARGEST, QUICK_S[1], SLOW_S[1]])
-    together = any(one.turn is not None for one in rows)
+    free = np.array([0, 1, 2, 3, 4, 5] if weighed.together else [0, 1, 4, 5])
+    alone = Colour()
+    nothing = np.log([*alone.apart, *alone.together, *alone.time_s])
+    value, _, squares = weighed.at(nothing)
+    best = value, nothing, squares
+    for begin in weighed.begins():
 
-    def colour_of(z: np.ndarray) -> Colour:
-        size = np.exp(np.clip(z, low, high))
-        return Colour((size[0], size[1]), (size[2], size[3]), (size[4], size[5]))
-
-    def parts(colour: Colour) -> tuple[float, float]:
-        squares = logarithms = 0.0
-        for one, (mean, own) in zip(rows, channels, strict=True):
-            for field, sizes, there in ((mean, colour.together, one.there[0]), (own, colour.apart, None)):
-                if not field.shape[1]:
-                    continue
-                if there is not None or one.turn is not None:
-                    work = field.copy()
-                    value = _filtered(one.step_s, one.there[0], sizes, colour.time_s, work)
-                    logarithms += field.shape[1] * value
-                    squares += float(np.vdot(work, work))
-                    continue
-                for k, its in enumerate(one.there):
-                    work = np.ascontiguousarray(field[:, [k]])
-                    logarithms += _filtered(one.step_s, its, sizes, colour.time_s, work)
-                    squares += float(np.vdot(work, work))
-        return squares, logarithms
-
-    def loss(z: np.ndarray) -> float:
-        squares, logarithms = parts(colour_of(z))
-        return 0.5 * count * math.log(max(squares, 1e-300) / count) + logarithms
-
-    free = [0, 1, 2, 3, 4, 5] if together else [0, 1, 4, 5]
-    bounds = [(low[k], high[k]) for k in free]
-    best: tuple[float, np.ndarray] = (math.inf, low)
-    for quick_s in BEGIN_S:
-        begin = np.log([1.0, 0.3, 1.0, 0.3, quick_s, 2400.0])
-
-        def only(z: np.ndarray, begin: np.ndarray = begin) -> float:
+        def only(z: np.ndarray, begin: np.ndarray = begin) -> tuple[float, np.ndarray]:
             whole = begin.copy()
             whole[free] = z
-            return loss(whole)
+            loss, slope, _ = weighed.at(whole)
+            return loss, slope[free]
 
         found = minimize(
-            only, begin[free], method="L-BFGS-B", bounds=bounds, options={"eps": 1e-4, "maxiter": 30, "ftol": 1e-6}
+            only,
+            begin[free],
+            jac=True,
+            method="L-BFGS-B",
+            bounds=list(zip(low[free], high[free], strict=True)),
+            options={"maxiter": 60, "ftol": 1e-8},
         )
         if float(found.fun) < best[0]:
-            begin[free] = found.x
-            best = float(found.fun), begin
-    value, whole = best
-    colour = colour_of(whole)
-    alone = Colour()
-    squares, logarithms = parts(alone)
-    white = 0.5 * count * math.log(max(squares, 1e-300) / count) + logarithms
-    if white <= value:
-        colour, value = alone, white
-    squares, _ = parts(colour)
-    return Colour(colour.apart, colour.together, colour.time_s, squares / count), -value - 0.5 * count
+            whole = begin.copy()
+            whole[free] = found.x
+            best = float(found.fun), whole, weighed.at(whole)[2]
+    value, whole, squares = best
+    size = [float(one) for one in np.exp(whole)]
+    if not weighed.together:
+        size[2:4] = [NONE, NONE]
+    colour = Colour((size[0], size[1]), (size[2], size[3]), (size[4], size[5]), squares / weighed.count)
+    return colour, -value - 0.5 * weighed.count

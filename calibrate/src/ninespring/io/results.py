@@ -198,7 +198,7 @@ class Unnamed(Part):
 class Unseen(Part):
     """A run that the fit never saw, predicted by what was found, by the declared model and by that with a lag."""
 
-    what: Literal["last third", "each run left out in turn"]
+    what: Literal["last part", "each run left out in turn"]
     rmse_c: Size
     declared_rmse_c: Size
     with_lag_rmse_c: Size

@@ -1,0 +1,109 @@
+"""What the fit never saw decides: names that foretell it worse go, and what nothing foretells better is the better baseline's."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from ninespring.find.diagnosis import first_fit
+from ninespring.find.evidence import likelihood
+from ninespring.find.lasting import likeliest
+from ninespring.find.unseen import LAG, Unseen, splits
+from ninespring.infer.declared import base_spec
+from ninespring.infer.problem import Problem
+from ninespring.io.logs.run import Run
+from ninespring.model.models import Array
+from ninespring.model.spec import RUN_AMBIENT
+
+
+def model(*effects: str) -> Any:
+    return SimpleNamespace(spec=SimpleNamespace(effects=effects))
+
+
+class Told(Unseen):
+    """Errors of models as they are told, K, by their effects; 'lag' is the baseline's."""
+
+    def __init__(self, errors: dict[str, float]) -> None:
+        self.errors = errors
+        self.splits = [SimpleNamespace(alone=True)]  # type: ignore[list-item]
+        self.base, self.lagged = model(), model(LAG)
+        self.lag = SimpleNamespace(effect=LAG)  # type: ignore[assignment]
+
+    def rmse(self, fit: Any, colour: Any = None) -> float:
+        return self.errors["lag" if fit is self.lagged else " ".join(fit.spec.effects)]
+
+    def own(self, fit: Any) -> float:
+        return self.rmse(fit)
+
+
+def without(fit: Any, effect: str) -> Any:
+    return model(*(one for one in fit.spec.effects if one != effect))
+
+
+def test_a_name_with_which_the_unseen_is_foretold_worse_goes_and_is_told() -> None:
+    told = Told({"": 2.0, "lag": 1.0, "shared_air sensor_gain": 3.0, "shared_air": 0.9, "sensor_gain": 4.0})
+    kept, said = told.kept(model("shared_air", "sensor_gain"), without)
+    assert kept is not None and kept.spec.effects == ("shared_air",)
+    assert len(said) == 1 and said[0].startswith("sensor_gain is not named") and "3.00 K with it and to 0.90" in said[0]
+
+
+def test_where_nothing_foretells_as_well_the_baseline_is_the_answer() -> None:
+    told = Told({"": 2.0, "lag": 1.0, "shared_air": 3.0})
+    kept, said = told.kept(model("shared_air"), lambda fit, effect: model("shared_air"))
+    assert kept is None and len(said) == 1
+    kept, said = Told({"": 2.0, "lag": 1.0}).kept(model(), without)
+    assert kept is None and not said
+
+
+def test_what_is_of_that_day_is_not_judged_by_another() -> None:
+    told = Told({"": 0.5, "lag": 0.5, "ambient_drift": 1.0, RUN_AMBIENT: 1.0})
+    for effect in ("ambient_drift", RUN_AMBIENT):
+        kept, said = told.kept(model(effect), without)
+        assert kept is not None and kept.spec.effects == (effect,) and not said
+
+
+@pytest.mark.parametrize(("lag", "taken"), [(0.99, False), (0.9, True)])
+def test_a_lag_that_foretells_no_better_is_left_out_of_the_baseline(lag: float, taken: bool) -> None:
+    told = Told({"": 1.0, "lag": lag})
+    search = SimpleNamespace(base=told.base, refit=lambda fit, added, sizes: told.lagged)
+    assert (told.plain(search) is told.lagged) == taken  # type: ignore[arg-type]
+
+
+def test_an_effect_without_which_most_is_not_foretold_is_no_stand_in() -> None:
+    told = Told({"": 2.0, "lag": 2.0, "latent_heat": 1.3, "shared_air": 1.6})
+    assert told.tells(model("latent_heat"), model())
+    assert not told.tells(model("shared_air"), model())
+
+
+def one_node(wander_k: float, seed: int = 1) -> Run:
+    """Return ten minutes of one node in a known room, its thermometer astray for minutes at a time."""
+    rng = np.random.default_rng(seed)
+    time_s = np.arange(600.0)
+    drive = np.repeat(rng.choice([0.0, 1.0], 10), 60)[:, None]
+    shown, astray = np.full(600, 20.0), np.zeros(600)
+    for k in range(1, 600):
+        shown[k] = shown[k - 1] + (0.5 * drive[k - 1, 0] - 0.01 * (shown[k - 1] - 20.0)) / 2.0
+        astray[k] = 0.995 * astray[k - 1] + 0.1 * wander_k * rng.standard_normal()
+    read = (shown + astray + 0.05 * rng.standard_normal(600))[:, None]
+    return Run("one", "", time_s, "command", drive, read, np.zeros(600), np.full(600, 20.0))
+
+
+def test_a_run_alone_is_foretold_from_its_half_and_from_two_thirds() -> None:
+    problem = Problem(Array(1, 1), [one_node(0.0)], {"heat_capacity_j_per_k": 2.0})
+    assert [int(one.counts.sum()) for one in splits(problem)] == [300, 200]
+    for one in splits(problem):
+        assert one.alone and not (np.isfinite(one.problem.runs[0].temperature_c) & one.counts).any()
+
+
+@pytest.mark.parametrize("wander_k", [0.0, 3.0])
+def test_each_account_is_taken_at_its_likeliest(wander_k: float) -> None:
+    problem = Problem(Array(1, 1), [one_node(wander_k)], {"heat_capacity_j_per_k": 2.0})
+    fit = first_fit(problem, base_spec(problem))
+    other = likeliest(problem, fit)
+    assert problem.colour is None, "as it was"
+    if wander_k:
+        assert likelihood(problem, other) > likelihood(problem, fit) + 0.1
+    else:
+        assert likelihood(problem, other) >= likelihood(problem, fit)
