@@ -337,6 +337,7 @@ void spring_estimator_update(spring_estimator_t *e, thermal_model_t *model, uint
     spring_belief_t *b = &e->spring[k];
     const int16_t before_c7 = b->last_c7;
     b->seen = false;
+    e->stepped_turns = e->stepped_turns > 0 ? (uint16_t)(e->stepped_turns - 1) : 0;
     const float share = spring_take_readings(b);
     const float power_w = b->reads ? b->current_a * b->current_a * b->ohm : 0.0f;
     const float heat_k = predict(e, b, model, k, power_w);

@@ -162,6 +162,9 @@ typedef struct {
     float martensite_ohm;
     float change; /* declared, as in spring_learnt_t */
     spring_belief_t spring[SPRING_ESTIMATOR_MAX_SPRINGS];
+    /* what all springs share: one was found colder than anything known explains */
+    uint16_t stepped_turns; /* of all springs: for so many more it counts as lately */
+    uint8_t stepped_spring;
 } spring_estimator_t;
 
 typedef struct {

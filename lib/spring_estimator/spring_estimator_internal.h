@@ -98,7 +98,7 @@ void spring_heating_watch(const spring_estimator_t *estimator, spring_belief_t *
                           thermal_model_t *model, uint8_t spring);
 /* While its temperature rests, moved_k in the last turn: whether it loses phase. The turn's share
  * in the average is that of its readings. */
-void spring_holding_watch(const spring_estimator_t *estimator, spring_belief_t *belief,
+void spring_holding_watch(spring_estimator_t *estimator, spring_belief_t *belief,
                           thermal_model_t *model, uint8_t spring, float moved_k, float share);
 
 #endif
