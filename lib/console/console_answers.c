@@ -172,7 +172,18 @@ bool console_warm_line(const console_t *console, console_out_t *out)
     return true;
 }
 
-/* Steps: three for each spring, the ambient; lines only where there is something. */
+/* "surroundings: losses 1.31 +-0.06 of what is declared": what the held springs have in common. */
+static void add_surroundings(text_line_t *line, const controller_t *controller)
+{
+    float factor, sd;
+    if (controller_losses(controller, &factor, &sd)) {
+        const int32_t values[] = {rounded(100.0f * factor), rounded(100.0f * sd)};
+        text_add_values(line, FLASH_TEXT("surroundings: losses #2 +-#2 of what is declared"),
+                        values);
+    }
+}
+
+/* Steps: three for each spring, the ambient, what all lose; lines only where there is something. */
 bool console_model_line(const console_t *console, console_out_t *out)
 {
     const controller_t *const controller = console->controller;
@@ -180,8 +191,15 @@ bool console_model_line(const console_t *console, console_out_t *out)
     const uint8_t k = console->step / 3u;
     if (k >= controller_springs(controller)) {
         const int32_t ambient_cc = text_centi_from_c7(console->status->ambient_c7);
-        text_add_values(line, FLASH_TEXT("ambient: #2 degC"), &ambient_cc);
-        return console->step % 3u == 0;
+        if (console->step % 3u == 0) {
+            text_add_values(line, FLASH_TEXT("ambient: #2 degC"), &ambient_cc);
+            return true;
+        }
+        if (console->step % 3u == 1) {
+            add_surroundings(line, controller);
+            return true;
+        }
+        return false;
     }
     if (console->step % 3u == 0) {
         add_belief(line, controller, k);

@@ -679,6 +679,11 @@ spring_bounds_t controller_austenite_bounds(const controller_t *controller, uint
     return spring_estimator_austenite(&controller->policy.estimator, &controller->model, spring);
 }
 
+bool controller_losses(const controller_t *controller, float *factor, float *sd)
+{
+    return spring_estimator_losses(&controller->policy.estimator, factor, sd);
+}
+
 float controller_shift_k(const controller_t *controller, uint8_t spring)
 {
     return controller->policy.estimator.spring[spring].shift_k;

@@ -195,6 +195,9 @@ spring_bounds_t controller_distance_bounds_k(const controller_t *controller, uin
 spring_bounds_t controller_austenite_bounds(const controller_t *controller, uint8_t spring);
 /* By how much the transformation is believed to lie above where it is declared (a load), K. */
 float controller_shift_k(const controller_t *controller, uint8_t spring);
+/* What the held springs lose, of what is declared, with its standard deviation. False where fewer
+ * than two are held. */
+bool controller_losses(const controller_t *controller, float *factor, float *sd);
 /* How long it may still be hot from before power-on, s, never more than
  * CONTROLLER_COOLING_MOST_S; 0 where that is over. */
 #define CONTROLLER_COOLING_MOST_S 86400.0f

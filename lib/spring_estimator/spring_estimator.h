@@ -266,6 +266,10 @@ float spring_estimator_phase(const spring_estimator_t *estimator, const thermal_
 spring_bounds_t spring_estimator_austenite(const spring_estimator_t *estimator,
                                            const thermal_model_t *model, uint8_t spring);
 
+/* What the springs that are held lose, of what is declared, with its standard deviation: what they
+ * have in common, a draught or the fan. False where fewer than two are held. O(springs). */
+bool spring_estimator_losses(const spring_estimator_t *estimator, float *factor, float *sd);
+
 /* What the model must be stepped with: measured power, below 2 kW, less what this spring loses
  * beyond it. */
 uint32_t spring_estimator_model_power_uw(const spring_estimator_t *estimator, uint8_t spring,

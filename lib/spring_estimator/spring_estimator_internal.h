@@ -65,6 +65,13 @@ void spring_correct_loss(const spring_estimator_t *estimator, spring_belief_t *b
 void spring_keep_above(const spring_estimator_t *estimator, spring_belief_t *belief,
                        thermal_model_t *model, uint8_t spring, float limit_c);
 
+/* It is found in error_k (below 0: colder), by a sight that is sure to sd_k. Where that is farther
+ * off than all that was known of it explains, one spring alone may have been touched, or its
+ * contact has moved; where another was found so lately, the surroundings have stepped: the losses
+ * of both are opened to it, so that what is seen from here on tells how much of it lasts. */
+void spring_open_to_step(spring_estimator_t *estimator, spring_belief_t *belief, uint8_t spring,
+                         float error_k, float sd_k);
+
 /* Takes the turn's readings. Returns the share of them in the average. */
 float spring_take_readings(spring_belief_t *belief);
 /* It has jumped again and again: what it reads tells nothing. */

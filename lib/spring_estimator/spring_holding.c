@@ -25,10 +25,6 @@
 #define LASTING_TURNS     60    /* 15 s of suspicion are as sure */
 #define LARGE_LOSS        0.04f /* no hold drifts so far: the transformation may have moved */
 #define LARGE_SD_K        5.0f
-#define STEP_SDS          2.0f /* farther off than 95 % of what is known explains, it has stepped */
-#define STEP_OF_LOSS      0.2f /* of the declared loss: a draught, a door; a standard deviation */
-#define STEP_LASTS        0.8f /* how much of such an error a step that lasts makes: a correlation */
-#define STEP_LATELY_S     60.0f /* a spring's time constant, C / G = 52 s */
 #define CROSSING_SD_K     1.0f
 #define APART_PER_A       0.5f    /* between two currents, as of 3 and 1.2 A */
 #define OFFSET_LEAST_V    0.0005f /* what a turn's steps of 4 mV leave, and its noise */
@@ -84,29 +80,6 @@ static float start_c(const thermal_model_t *model, uint8_t k)
     return spring_c(thermal_model_transformation(model, k).martensite_start_c7);
 }
 
-/* It is found colder than all that was known of it explains. One spring alone may have been
- * touched, or its contact has moved; where another was found so lately, the surroundings have
- * stepped: the losses of both are opened to it, so that what is seen from here on tells how much of
- * it lasts. */
-static void open_to_step(spring_estimator_t *e, spring_belief_t *b, uint8_t k, float error_k,
-                         float sd_k)
-{
-    const float known_k2 = spring_distance_k2(b) + sd_k * sd_k;
-    if (error_k >= 0.0f || error_k * error_k < STEP_SDS * STEP_SDS * known_k2) {
-        return;
-    }
-    if (e->stepped_turns > 0 && e->stepped_spring != k) {
-        const float step_w_per_k = STEP_OF_LOSS * e->loss_w_per_k;
-        spring_belief_t *other = &e->spring[e->stepped_spring];
-        other->loss_variance = fmaxf(other->loss_variance, step_w_per_k * step_w_per_k);
-        b->variance_k2 += error_k * error_k;
-        b->covariance += STEP_LASTS * error_k * step_w_per_k;
-        b->loss_variance += step_w_per_k * step_w_per_k;
-    }
-    e->stepped_turns = (uint16_t)((STEP_LATELY_S / SPRING_ESTIMATOR_TURN_S) * (float)e->springs);
-    e->stepped_spring = k;
-}
-
 static void see_crossing(spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model,
                          uint8_t k, float lost, float lost_sd)
 {
@@ -128,7 +101,7 @@ static void see_crossing(spring_estimator_t *e, spring_belief_t *b, thermal_mode
     const float unsure_k = seen_c - lost_at_c(model, k, b->lost + lost_sd);
     const float sd_k = sqrtf(CROSSING_SD_K * CROSSING_SD_K + unsure_k * unsure_k);
     if (first) { /* what goes on is the same step */
-        open_to_step(e, b, k, seen_c - spring_now_c(model, k), sd_k);
+        spring_open_to_step(e, b, k, seen_c - spring_now_c(model, k), sd_k);
     }
     const float error_k = spring_see(e, b, model, k, seen_c, sd_k, SPRING_PHASE_AUSTENITE);
     if (!searched && -error_k > b->disturbance_k) {

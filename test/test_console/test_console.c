@@ -741,6 +741,35 @@ static void model_says_with_which_bounds(void)
                                       "ambient: 20.00 degC\r\nok\r\n"));
 }
 
+/* What the held springs have in common; one alone has nothing in common. */
+static void model_says_what_the_surroundings_take(void)
+{
+    static const float more[] = {0.28f, 0.34f};
+    expect_ok("model cold");
+    spring_estimator_t *const estimator = &controller.policy.estimator;
+    for (unsigned k = 0; k < 2; k++) {
+        spring_belief_t *const belief = &estimator->spring[k];
+        const float sd_w_per_k = 0.05f * estimator->loss_w_per_k;
+        said_length = 0;
+        for (const char *next = "model\n"; *next != '\0'; next++) {
+            console_receive(&console, (uint8_t)*next);
+        }
+        belief->possible = SPRING_PHASE_AUSTENITE;
+        belief->fresh = 1;
+        belief->heating = false;
+        belief->learnt.loss_w_per_k = more[k] * estimator->loss_w_per_k;
+        belief->loss_variance = sd_w_per_k * sd_w_per_k;
+        while (console_busy(&console)) { /* without a tick, in which no current would flow */
+            console_service(&console);
+        }
+        TEST_ASSERT_EQUAL_MESSAGE(
+            k == 1,
+            strstr(said, "surroundings: losses 1.31 +-0.04 of what is declared\r\nok\r\n") != NULL,
+            said);
+        TEST_ASSERT_NOT_NULL_MESSAGE(strstr(said, "ok\r\n"), said);
+    }
+}
+
 static void model_says_how_long_a_spring_waits_and_when_it_is_away(void)
 {
     expect_ok("model"); /* before anybody asks for a spring, too */
@@ -1007,6 +1036,7 @@ int main(void)
     RUN_TEST(status_is_one_line);
     RUN_TEST(status_says_whether_the_stages_have_their_supply);
     RUN_TEST(model_says_with_which_bounds);
+    RUN_TEST(model_says_what_the_surroundings_take);
     RUN_TEST(model_says_how_long_a_spring_waits_and_when_it_is_away);
     RUN_TEST(learnt_says_what_is_known_and_clear_forgets_it);
     RUN_TEST(a_host_that_falls_silent_switches_its_springs_off);

@@ -1,0 +1,54 @@
+#include <math.h>
+
+#include "spring_estimator_internal.h"
+
+#define STEP_SDS      2.0f  /* farther off than 95 % of what is known explains, it has stepped */
+#define STEP_OF_LOSS  0.2f  /* of the declared loss: a draught, a door; a standard deviation */
+#define STEP_LASTS    0.8f  /* how much of such an error a step that lasts makes: a correlation */
+#define STEP_LATELY_S 60.0f /* a spring's time constant, C / G = 52 s */
+
+void spring_open_to_step(spring_estimator_t *e, spring_belief_t *b, uint8_t k, float error_k,
+                         float sd_k)
+{
+    const float known_k2 = spring_distance_k2(b) + sd_k * sd_k;
+    if (error_k >= 0.0f || error_k * error_k < STEP_SDS * STEP_SDS * known_k2) {
+        return;
+    }
+    if (e->stepped_turns > 0 && e->stepped_spring != k) {
+        const float step_w_per_k = STEP_OF_LOSS * e->loss_w_per_k;
+        spring_belief_t *other = &e->spring[e->stepped_spring];
+        other->loss_variance = fmaxf(other->loss_variance, step_w_per_k * step_w_per_k);
+        b->variance_k2 += error_k * error_k;
+        b->covariance += STEP_LASTS * error_k * step_w_per_k;
+        b->loss_variance += step_w_per_k * step_w_per_k;
+    }
+    e->stepped_turns = (uint16_t)((STEP_LATELY_S / SPRING_ESTIMATOR_TURN_S) * (float)e->springs);
+    e->stepped_spring = k;
+}
+
+bool spring_estimator_losses(const spring_estimator_t *e, float *factor, float *sd)
+{
+    float weights = 0.0f, sum = 0.0f, squares = 0.0f;
+    uint8_t held = 0;
+    for (uint8_t k = 0; k < e->springs; k++) {
+        const spring_belief_t *b = &e->spring[k];
+        if (b->fresh == 0 || b->heating || b->possible != SPRING_PHASE_AUSTENITE ||
+            !(b->loss_variance > 0.0f)) {
+            continue;
+        }
+        const float weight = e->loss_w_per_k * e->loss_w_per_k / b->loss_variance;
+        const float more = b->learnt.loss_w_per_k / e->loss_w_per_k;
+        weights += weight;
+        sum += weight * more;
+        squares += weight * more * more;
+        held++;
+    }
+    if (held < 2 || !(weights > 0.0f)) {
+        return false;
+    }
+    const float mean = sum / weights;
+    const float scatter = fmaxf(squares / weights - mean * mean, 0.0f) / (float)(held - 1);
+    *factor = 1.0f + mean;
+    *sd = sqrtf(fmaxf(scatter, 1.0f / weights));
+    return true;
+}
