@@ -100,7 +100,8 @@ static void see_crossing(spring_estimator_t *e, spring_belief_t *b, thermal_mode
     const float seen_c = lost_at_c(model, k, b->lost);
     const float unsure_k = seen_c - lost_at_c(model, k, b->lost + lost_sd);
     const float sd_k = sqrtf(CROSSING_SD_K * CROSSING_SD_K + unsure_k * unsure_k);
-    if (first) { /* what goes on is the same step */
+    /* what goes on is the same step; and what goes the other way in two springs may be warmth */
+    if (first && b->gone * b->learnt.change < 0.0f) {
         spring_open_to_step(e, b, k, seen_c - spring_now_c(model, k), sd_k);
     }
     const float error_k = spring_see(e, b, model, k, seen_c, sd_k, SPRING_PHASE_AUSTENITE);

@@ -509,7 +509,7 @@ static void no_spring_is_lost_or_overheats(uint64_t seed, const int indices[], s
  * to 123 degC. */
 static void surroundings_that_change_lose_no_spring_and_overheat_none(void)
 {
-    static const int indices[] = {542, 633, 725, 713};
+    static const int indices[] = {470, 542, 633, 725, 713};
     no_spring_is_lost_or_overheats(15, indices, sizeof indices / sizeof indices[0]);
 }
 
