@@ -49,6 +49,7 @@ bool spring_estimator_losses(const spring_estimator_t *e, float *factor, float *
     const float mean = sum / weights;
     const float scatter = fmaxf(squares / weights - mean * mean, 0.0f) / (float)(held - 1);
     *factor = 1.0f + mean;
-    *sd = sqrtf(fmaxf(scatter, 1.0f / weights));
+    /* what is not known yet is not known of all alike: more springs make it no surer */
+    *sd = sqrtf(fmaxf(scatter, (float)held / weights));
     return true;
 }
