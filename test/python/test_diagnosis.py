@@ -11,6 +11,7 @@ import msgspec
 import ninespring
 import numpy as np
 import pytest
+from made import an_effect
 from ninespring.export.settings import left_out
 from ninespring.find import diagnosis
 from ninespring.find.certainty import CERTAIN, Witness, witness
@@ -207,18 +208,7 @@ def test_what_the_same_readings_say_of_another_is_not_certain() -> None:
 
     middle = {"loss_scale[5]": number(1.3), "heat_capacity_scale[5]": number(1.0)}
     for evidence, apart_c, shared in ((3.7, 0.0003, True), (30.0, 0.0003, False), (3.7, 0.3, False)):
-        entry = results.Effect(
-            name="edge_loss",
-            rmse_c=0.3,
-            holdout_rmse_c=0.3,
-            evidence=100.0,
-            parameters={},
-            on_chip=True,
-            in_words="",
-            probability=0.99,
-            certainty="certain",
-            text="Outer springs lose 23 % less.",
-        )
+        entry = an_effect("edge_loss", probability=0.99, certainty="certain", text="Outer springs lose 23 % less.")
         rival = results.Rival(
             instead_of="edge_loss",
             name="spring_mismatch",

@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from made import an_effect
 from ninespring.cli.main import cli
 from ninespring.errors import InputError, WorkError
 from ninespring.export import drive
 from ninespring.export.settings import judged, left_out, settings_of, together
 from ninespring.find import diagnosis
 from ninespring.infer.predict import predict_by_chip
-from ninespring.io import results
 from ninespring.io.logs import read_log, write_atomically
 from ninespring.model import native
 from ninespring.model.models import Array, Model, model_text, read_model
@@ -312,15 +312,7 @@ def test_a_link_stays_a_link_a_device_a_device_and_a_dash_is_standard_output(
 def test_one_judgement_says_what_goes_into_the_chip_and_how_to_have_it_go(tmp_path: Path) -> None:
     for hottest_c, goes in ((95.0, True), (91.5, False)):
         model = transforming(hottest_c)
-        one = results.Effect(
-            name="latent_heat",
-            rmse_c=0.3,
-            holdout_rmse_c=0.3,
-            evidence=100.0,
-            parameters={},
-            on_chip=not goes,
-            in_words="",
-        )
+        one = an_effect("latent_heat", on_chip=not goes)
         judged([one], model)
         assert one.on_chip == goes == ("latent_heat" not in left_out(model))
         assert goes == ("latent_heat_j" in settings_of(model).written)

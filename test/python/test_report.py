@@ -10,6 +10,7 @@ from html.parser import HTMLParser
 import msgspec
 import numpy as np
 import pytest
+from made import an_effect
 from ninespring.cli import diagnose as command
 from ninespring.find import diagnosis
 from ninespring.io import results
@@ -193,15 +194,10 @@ def told(**more: object) -> results.Diagnosis:
 
 
 def effect(name: str, variant: str = "") -> results.Effect:
-    return results.Effect(
-        name=name,
+    return an_effect(
+        name,
         variant=variant or results.UNSET,
-        rmse_c=0.3,
         holdout_rmse_c=0.31,
-        evidence=100.0,
-        parameters={},
-        on_chip=True,
-        in_words="",
         probability=0.99,
         certainty="certain",
         text="",
