@@ -190,16 +190,13 @@ bool console_model_line(const console_t *console, console_out_t *out)
     text_line_t *const line = &out->line;
     const uint8_t k = console->step / 3u;
     if (k >= controller_springs(controller)) {
-        const int32_t ambient_cc = text_centi_from_c7(console->status->ambient_c7);
         if (console->step % 3u == 0) {
+            const int32_t ambient_cc = text_centi_from_c7(console->status->ambient_c7);
             text_add_values(line, FLASH_TEXT("ambient: #2 degC"), &ambient_cc);
-            return true;
-        }
-        if (console->step % 3u == 1) {
+        } else {
             add_surroundings(line, controller);
-            return true;
         }
-        return false;
+        return console->step % 3u < 2u;
     }
     if (console->step % 3u == 0) {
         add_belief(line, controller, k);

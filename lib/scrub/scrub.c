@@ -47,7 +47,9 @@ bool scrub_step(scrub_t *scrub, scrub_stretches_t stretches, const void *owner, 
             begin_pass(scrub);
             return true;
         }
-        /* a bit of at may have turned over, too: where it is beyond the end the pass fails */
+        /* a bit of at may have turned over, too: where it is beyond the end the pass fails. Byte by
+         * byte, not by crc16_add_bytes: that each is within the stretch is then proved
+         * (script/prove) */
         const uint8_t *const next = stretch.bytes;
         for (; bytes > 0 && scrub->at < stretch.length; bytes--, scrub->at++) {
             scrub->running = crc16_add(scrub->running, next[scrub->at]);

@@ -132,6 +132,7 @@ void spring_estimator_init(spring_estimator_t *e, thermal_model_t *model)
     const float coldest_c = spring_ambient_c(model);
     const float width_k = SPRING_ESTIMATOR_HOTTEST_C - coldest_c;
     e->springs = model->springs;
+    e->stepped_turns = 0;
     spring_estimator_prepare(e, model, true);
     for (uint8_t k = 0; k < e->springs; k++) {
         spring_estimator_forget(e, k);

@@ -43,7 +43,7 @@ bool spring_estimator_losses(const spring_estimator_t *e, float *factor, float *
         squares += weight * more * more;
         held++;
     }
-    if (held < 2 || !(weights > 0.0f)) {
+    if (held < 2) {
         return false;
     }
     const float mean = sum / weights;
