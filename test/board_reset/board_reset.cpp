@@ -109,8 +109,12 @@ void whatever_bit_turns_over_the_board_answers_and_nothing_stays_hot()
             mega.board.send("\n"); /* ends what had begun */
             mega.run_ms(20.0);
             mega.board.take_output();
+            const bool was_reset = board_reset_count(mega.raw()) != resets;
+            if (was_reset) {
+                mega.run_ms(60.0); /* says its greeting to the end */
+            }
             const std::uint32_t begins_ms = time_ms(mega);
-            if (board_reset_count(mega.raw()) != resets) {
+            if (was_reset) {
                 TEST_ASSERT_TRUE_MESSAGE(mega.view().locked, message);
                 TEST_ASSERT_TRUE_MESSAGE(board_all_off(mega.raw()), message);
                 continue;
