@@ -85,7 +85,7 @@ SECTIONS: tuple[Section, ...] = (
     Section(
         "diagnose",
         "Undeclared effects",
-        f"{PYTHON} bench/diagnose/run.py --seeds 2 --first 300640 --processes 1 --cases build/results/diagnose.json",
+        f"{PYTHON} bench/diagnose/run.py --seeds 1 --first 300640 --processes 1 --cases build/results/diagnose.json",
         markdown=True,
     ),
     Section(
