@@ -85,7 +85,7 @@ SECTIONS: tuple[Section, ...] = (
     Section(
         "diagnose",
         "Undeclared effects",
-        f"{PYTHON} bench/diagnose/run.py --seeds 1 --first 300640 --processes 1 --cases build/results/diagnose.json",
+        f"{PYTHON} bench/diagnose/run.py --seeds 1 --first 300680 --processes 1 --cases build/results/diagnose.json",
         markdown=True,
     ),
     Section(
@@ -96,7 +96,7 @@ SECTIONS: tuple[Section, ...] = (
     Section(
         "camera",
         "A camera's blur",
-        f"{PYTHON} bench/diagnose/camera.py --sets 30 --cases build/results/camera.json",
+        f"{PYTHON} bench/diagnose/camera.py --sets 15 --first 700100 --cases build/results/camera.json",
         markdown=True,
     ),
     Section("closed_forms", "The field against closed forms", f"{PYTHON} bench/explore/closed_forms.py"),

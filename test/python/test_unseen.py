@@ -10,12 +10,12 @@ import pytest
 from ninespring.find.diagnosis import first_fit
 from ninespring.find.evidence import likelihood
 from ninespring.find.lasting import likeliest
-from ninespring.find.unseen import LAG, Unseen, splits
+from ninespring.find.unseen import LAG, Unseen, _hardly_shown, splits
 from ninespring.infer.declared import base_spec
 from ninespring.infer.problem import Problem
 from ninespring.io.logs.run import Run
 from ninespring.model.models import Array
-from ninespring.model.spec import RUN_AMBIENT
+from ninespring.model.spec import RUN_AMBIENT, Free, Spec
 
 
 def model(*effects: str) -> Any:
@@ -134,3 +134,18 @@ def test_each_account_is_taken_at_its_likeliest(wander_k: float) -> None:
         assert likelihood(problem, other) > likelihood(problem, fit) + 0.1
     else:
         assert likelihood(problem, other) >= likelihood(problem, fit)
+
+
+def test_a_declared_number_that_a_part_hardly_shows_stays_as_all_had_it() -> None:
+    """The fan of one run alone: what a breath of it in the other makes of the loss would be said of whatever is judged by both."""
+    free = [Free(key, 1.0, 0.1, 10.0, "W/K", (key,), True) for key in ("loss_w_per_k", "loss_fan_w_per_k")]
+    free.append(Free("gain", 1.0, 0.1, 10.0, "1", ("gain",), True, effect="sensor_gain"))
+    spec = Spec(("sensor_gain",), (), tuple(free), ())
+
+    def told(*information: float) -> Any:
+        return SimpleNamespace(spec=spec, jacobian=np.sqrt(np.diag(information)))
+
+    assert _hardly_shown(told(100.0, 100.0, 100.0), told(50.0, 2.0, 2.0), [0]) == ["loss_fan_w_per_k"]
+    assert _hardly_shown(told(100.0, 100.0, 100.0), told(50.0, 50.0, 2.0), [0]) == [], (
+        "an effect's own number is judged"
+    )

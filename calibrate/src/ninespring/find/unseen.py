@@ -35,6 +35,8 @@ FORETOLD = 0.5
 COMES_TRUE = 0.75
 """Part of what an effect changes in the unseen that must come true: all of it does of a cause, a half where the unseen is foretold no
 better than without it. What only takes something else's place is between the two or below."""
+HARDLY = 0.1
+"""Part of what all runs tell of a declared number (its information) below which some of them leave it as all had it."""
 STEPS = 25
 """Of one fit, at most: it begins where the whole data had it."""
 LAG = "sensor_lag"
@@ -88,7 +90,9 @@ def _problem(whole: Problem, runs: Sequence[Run], kept: Sequence[int]) -> Proble
 
 def _own(free: Free, kept: Sequence[int]) -> str:
     """Return the key that a number has where only these runs are fitted."""
-    return free.key if free.run is None else free.key.replace(f"@{free.run + 1}", f"@{kept.index(free.run) + 1}")
+    if free.run is None or free.run not in kept:
+        return free.key
+    return free.key.replace(f"@{free.run + 1}", f"@{kept.index(free.run) + 1}")
 
 
 def _of_these(fit: Fit, kept: Sequence[int]) -> tuple[Spec, dict[str, float]]:
@@ -96,6 +100,21 @@ def _of_these(fit: Fit, kept: Sequence[int]) -> tuple[Spec, dict[str, float]]:
     mine = [(f, float(v)) for f, v in zip(fit.spec.free, fit.values, strict=True) if f.run is None or f.run in kept]
     free = [replace(f, key=_own(f, kept), run=None if f.run is None else kept.index(f.run)) for f, _ in mine]
     return replace(fit.spec, free=tuple(free)), {_own(f, kept): v for f, v in mine if f.knot is None}
+
+
+def _hardly_shown(whole: Fit, part: Fit, kept: Sequence[int]) -> list[str]:
+    """Return the declared numbers of which a part of the runs tells next to nothing beside all of them: that they are off there says
+    nothing of an effect."""
+    if whole.jacobian is None or part.jacobian is None:
+        return []
+    told = {f.key: float(np.sum(column**2)) for f, column in zip(part.spec.free, part.jacobian.T, strict=True)}
+    # an effect that is still to be fitted comes last, and has none
+    mine = [(f, float(np.sum(column**2))) for f, column in zip(whole.spec.free, whole.jacobian.T, strict=False)]
+    return [
+        _own(f, kept)
+        for f, all_of_it in mine
+        if f.effect is None and _own(f, kept) in told and told[_own(f, kept)] < HARDLY * all_of_it
+    ]
 
 
 def errors(split: Split, fit: Fit, colour: Colour | None) -> np.ndarray:
@@ -108,7 +127,7 @@ def errors(split: Split, fit: Fit, colour: Colour | None) -> np.ndarray:
         problem.take_for(colour)
     fitted = problem.fit(spec, start, tolerance=1e-3, max_steps=STEPS)
     # what only the left-out run shows, these do not tell: it stays
-    known = {key: start[key] for key in fitted.stuck if key in start}
+    known = {key: start[key] for key in (*fitted.stuck, *_hardly_shown(fit, fitted, kept)) if key in start}
     fitted.values = np.array([known.get(f.key, value) for f, value in zip(spec.free, fitted.values, strict=True)])
     run, values = split.left_out, fitted.as_dict()
     if split.alone:
