@@ -96,7 +96,7 @@ SECTIONS: tuple[Section, ...] = (
     Section(
         "camera",
         "A camera's blur",
-        f"{PYTHON} bench/diagnose/camera.py --sets 15 --cases build/results/camera.json",
+        f"{PYTHON} bench/diagnose/camera.py --sets 15 --first 700100 --processes 1 --cases build/results/camera.json",
         markdown=True,
     ),
     Section("closed_forms", "The field against closed forms", f"{PYTHON} bench/explore/closed_forms.py"),
