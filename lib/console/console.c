@@ -343,6 +343,20 @@ static console_error_t word_learnt(console_t *console, const arguments_t *argume
     return CONSOLE_OK;
 }
 
+static console_error_t word_why(console_t *console, const arguments_t *arguments)
+{
+    int32_t number = 0;
+    const console_error_t error =
+        parse_number(console, arguments->argument[0], FLASH_TEXT("springs are #0 to #0"), 1,
+                     controller_springs(console->controller), &number);
+    if (error == CONSOLE_OK) {
+        console_start_job(console, CONSOLE_JOB_WHY);
+        console->element = (uint8_t)(number - 1);
+        console->sight = spring_sights_first(controller_sights(console->controller));
+    }
+    return error;
+}
+
 static console_error_t word_echo(console_t *console, const arguments_t *arguments)
 {
     bool on;
@@ -367,6 +381,7 @@ static console_error_t word_echo(console_t *console, const arguments_t *argument
       " [cold]  what is believed of each spring, with bounds; cold: what was off for long is at "  \
       "ambient")                                                                                   \
     X(learnt, 0, 1, NONE, word_learnt, " [clear]  each spring's own numbers; clear: forget them")  \
+    X(why, 1, 1, NONE, word_why, " K  the last sights of a spring: read, believed, what was done") \
     X(faults, 0, 0, FAULTS, NULL, "  what is latched")                                             \
     X(clear, 0, 0, NONE, word_clear, "  forget faults; all springs off")                           \
     X(unlock, 0, 0, NONE, word_unlock, "  after a watchdog or brown-out reset")                    \
@@ -619,6 +634,9 @@ static void print_job_line(console_t *console)
         break;
     case CONSOLE_JOB_COLD:
         more = console_warm_line(console, &out);
+        break;
+    case CONSOLE_JOB_WHY:
+        more = console_why_line(console, &out);
         break;
     case CONSOLE_JOB_LEARNT:
         more = console_learnt_line(console, &out);

@@ -13,6 +13,7 @@ typedef enum {
     CONSOLE_JOB_MODEL,
     CONSOLE_JOB_COLD,
     CONSOLE_JOB_LEARNT,
+    CONSOLE_JOB_WHY,
     CONSOLE_JOB_FAULTS,
     CONSOLE_JOB_SETTINGS,
     CONSOLE_JOB_SAVE,
@@ -34,6 +35,7 @@ bool console_version_line(const console_t *console, console_out_t *out);
 bool console_model_line(const console_t *console, console_out_t *out);
 bool console_warm_line(const console_t *console, console_out_t *out);
 bool console_learnt_line(const console_t *console, console_out_t *out);
+bool console_why_line(console_t *console, console_out_t *out);
 bool console_faults_line(const console_t *console, console_out_t *out);
 
 void console_start_job(console_t *console, console_job_t job);

@@ -689,6 +689,11 @@ float controller_shift_k(const controller_t *controller, uint8_t spring)
     return controller->policy.estimator.spring[spring].shift_k;
 }
 
+const spring_sights_t *controller_sights(const controller_t *controller)
+{
+    return &controller->policy.estimator.sights;
+}
+
 float controller_cooling_s(const controller_t *controller, uint8_t spring)
 {
     const float cooling_s =

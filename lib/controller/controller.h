@@ -198,6 +198,8 @@ float controller_shift_k(const controller_t *controller, uint8_t spring);
 /* What the held springs lose, of what is declared, with its standard deviation. False where fewer
  * than two are held. */
 bool controller_losses(const controller_t *controller, float *factor, float *sd);
+/* The last sights of the springs: why they are believed to be where they are. */
+const spring_sights_t *controller_sights(const controller_t *controller);
 /* How long it may still be hot from before power-on, s, never more than
  * CONTROLLER_COOLING_MOST_S; 0 where that is over. */
 #define CONTROLLER_COOLING_MOST_S 86400.0f

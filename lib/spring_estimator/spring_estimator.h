@@ -10,6 +10,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "spring_sights.h"
 #include "thermal_model.h"
 
 #ifdef __cplusplus
@@ -165,6 +166,7 @@ typedef struct {
     /* what all springs share: one was found colder than anything known explains */
     uint16_t stepped_turns; /* of all springs: for so many more it counts as lately */
     uint8_t stepped_spring;
+    spring_sights_t sights; /* for whoever asks why */
 } spring_estimator_t;
 
 typedef struct {

@@ -4,6 +4,7 @@
 
 #include "lost_phase.h"
 #include "one_spring.h"
+#include "sights.h"
 #include "unity.h"
 
 void setUp(void)
@@ -790,5 +791,13 @@ int main(void)
     RUN_TEST(numbers_that_no_spring_has_are_not_restored);
     RUN_TEST(bad_readings_leave_a_belief_that_can_be_believed);
     RUN_TEST(counts_and_sums_saturate);
+    RUN_TEST(each_sight_of_a_life_is_noted_with_what_was_done);
+    RUN_TEST(sight_says_what_was_believed_read_and_moved);
+    RUN_TEST(hold_that_loses_nothing_is_one_sight);
+    RUN_TEST(contact_that_jumps_is_noted_and_blind_is_said);
+    RUN_TEST(time_and_look_after_power_on_are_noted);
+    RUN_TEST(heating_that_shows_no_finish_is_noted);
+    RUN_TEST(spring_that_has_most_gives_way);
+    RUN_TEST(sights_are_found_by_number_and_forgotten_after_four_hours);
     return UNITY_END();
 }
