@@ -54,6 +54,11 @@ static void fill(const spring_estimator_t *e, const thermal_model_t *model, uint
 void spring_note(spring_estimator_t *e, const thermal_model_t *model, uint8_t k,
                  spring_sight_kind_t kind, const spring_before_t *before, float seen_c, float sd_k)
 {
+    /* that it still transformed is told by what comes after it, too */
+    const spring_sight_t *const last = spring_sights_newest(&e->sights, k);
+    if (last != NULL && last->kind == SPRING_SIGHT_TRANSFORMS) {
+        spring_sights_drop(&e->sights, last);
+    }
     spring_sight_t *const sight = spring_sights_add(&e->sights, k);
     sight->kind = (uint8_t)kind;
     sight->believed = deci_k(before->distance_c7);

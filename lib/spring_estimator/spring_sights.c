@@ -3,8 +3,9 @@
 #include <stddef.h>
 #include <string.h>
 
-static void drop(spring_sights_t *sights, uint8_t at)
+void spring_sights_drop(spring_sights_t *sights, const spring_sight_t *sight)
 {
+    const uint8_t at = (uint8_t)(sight - sights->sight);
     sights->count--;
     memmove(&sights->sight[at], &sights->sight[at + 1u],
             (size_t)(sights->count - at) * sizeof(spring_sight_t));
@@ -15,7 +16,7 @@ void spring_sights_turn(spring_sights_t *sights)
     sights->turn++;
     if (sights->count != 0 &&
         spring_sights_age_turns(sights, &sights->sight[0]) > SPRING_SIGHTS_TURNS) {
-        drop(sights, 0);
+        spring_sights_drop(sights, &sights->sight[0]);
     }
 }
 
@@ -38,18 +39,17 @@ static uint8_t least_missed(const spring_sights_t *sights)
 spring_sight_t *spring_sights_add(spring_sights_t *sights, uint8_t spring)
 {
     if (sights->count == SPRING_SIGHTS_KEPT) {
-        drop(sights, least_missed(sights));
+        spring_sights_drop(sights, &sights->sight[least_missed(sights)]);
     }
     spring_sight_t *const sight = &sights->sight[sights->count++];
-    *sight =
-        (spring_sight_t){.turn = sights->turn, .number = sights->numbers++, .spring = spring};
+    *sight = (spring_sight_t){.turn = sights->turn, .number = sights->numbers++, .spring = spring};
     return sight;
 }
 
 spring_sight_t *spring_sights_renew(spring_sights_t *sights, const spring_sight_t *sight)
 {
     const spring_sight_t goes_on = *sight;
-    drop(sights, (uint8_t)(sight - sights->sight));
+    spring_sights_drop(sights, sight);
     spring_sight_t *const renewed = &sights->sight[sights->count++];
     *renewed = goes_on;
     renewed->turn = sights->turn;

@@ -29,9 +29,9 @@ typedef enum {
     SPRING_SIGHT_BACK,       /* what it had lost came back: it was phase */
     SPRING_SIGHT_TAKEN_BACK, /* what it had lost did not come back: it was none */
     SPRING_SIGHT_JUMPED,     /* a contact or the sensor jumped: no phase changes so fast */
-    SPRING_SIGHT_LOOKED,     /* nothing was known; by what was learnt its resistance tells a phase */
-    SPRING_SIGHT_TOLD,       /* a hint, or what a reset has kept */
-    SPRING_SIGHT_COOLED,     /* nothing was known; it must have cooled by now */
+    SPRING_SIGHT_LOOKED, /* nothing was known; by what was learnt its resistance tells a phase */
+    SPRING_SIGHT_TOLD,   /* a hint, or what a reset has kept */
+    SPRING_SIGHT_COOLED, /* nothing was known; it must have cooled by now */
     SPRING_SIGHT_KINDS
 } spring_sight_kind_t;
 
@@ -40,7 +40,8 @@ enum {
     SPRING_DID_HEAT = 1,  /* a heating began */
     SPRING_DID_HOLD = 2,  /* a hold began */
     SPRING_DID_BLIND = 4, /* from here on its resistance tells nothing */
-    SPRING_DID_OPEN = 8,  /* the surroundings have stepped: its loss and another spring's were opened */
+    SPRING_DID_OPEN =
+        8, /* the surroundings have stepped: its loss and another spring's were opened */
     SPRING_DID_DOUBT = 16 /* its resistance says that phase is still missing */
 };
 
@@ -51,14 +52,14 @@ typedef struct {
     uint32_t number; /* of all sights, comes round */
     uint16_t turn;   /* when, in quarters of a second: spring_sights_age_turns */
     uint8_t spring;
-    uint8_t kind;    /* spring_sight_kind_t */
-    uint8_t did;     /* SPRING_DID_ bits */
-    int16_t read;    /* what was read, less what was predicted */
-    uint8_t read_sd; /* of that difference; 0: none was compared */
+    uint8_t kind;        /* spring_sight_kind_t */
+    uint8_t did;         /* SPRING_DID_ bits */
+    int16_t read;        /* what was read, less what was predicted */
+    uint8_t read_sd;     /* of that difference; 0: none was compared */
     uint8_t believed_sd; /* 0: it was not known where */
     int16_t believed;    /* where it was believed before */
-    int16_t seen;     /* where what was read puts it */
-    uint8_t seen_sd;  /* 0: nowhere */
+    int16_t seen;        /* where what was read puts it */
+    uint8_t seen_sd;     /* 0: nowhere */
     uint8_t now_sd;
     int16_t now;   /* where it is believed by it */
     int16_t shift; /* by how much it has moved its transformation, 0.1 K */
@@ -66,9 +67,9 @@ typedef struct {
 } spring_sight_t;
 
 typedef struct {
-    uint32_t numbers; /* the next record's */
-    uint16_t turn;    /* now */
-    uint8_t count;    /* of records */
+    uint32_t numbers;                         /* the next record's */
+    uint16_t turn;                            /* now */
+    uint8_t count;                            /* of records */
     spring_sight_t sight[SPRING_SIGHTS_KEPT]; /* oldest first */
 } spring_sights_t;
 
@@ -76,6 +77,8 @@ typedef struct {
 void spring_sights_turn(spring_sights_t *sights);
 /* Room for one more, numbered and timed; the rest is 0. Never NULL. O(records). */
 spring_sight_t *spring_sights_add(spring_sights_t *sights, uint8_t spring);
+/* One is forgotten. O(records). */
+void spring_sights_drop(spring_sights_t *sights, const spring_sight_t *sight);
 /* That one goes on: it is the last one again, with the next number. O(records). */
 spring_sight_t *spring_sights_renew(spring_sights_t *sights, const spring_sight_t *sight);
 /* The last one of a spring; NULL where there is none. O(records). */
