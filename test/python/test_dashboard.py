@@ -131,6 +131,29 @@ def test_a_click_heats_a_spring_and_stop_ends_it_from_button_and_key(
 
 @needs_browser
 @needs_board
+def test_why_a_spring_is_believed_to_be_where_it_is_is_shown_and_follows(
+    browser: Browser, simulated: tuple[Dashboard, Path]
+) -> None:
+    page = opened(browser, simulated[0])
+    page.click("#clear")
+    page.click("#why-card summary")
+    page.select_option("#why-spring", "7")
+    expect(page.locator("#why")).to_contain_text("spring 7 in the last 4 hours")  # nothing yet
+    page.fill("#line", "model cold")
+    page.press("#line", "Enter")
+    expect(page.locator("#why")).to_contain_text("it is said to be known", timeout=30_000)
+    expect(page.locator("#why")).to_contain_text("of martensite start: now ")
+    page.select_option("#why-spring", "2")
+    expect(page.locator("#why")).to_contain_text("it is said to be known")
+    expect(page.locator("#log")).not_to_contain_text(
+        "it is said to be known"
+    )  # each is told once, where it was asked for
+    assert page.problems == []
+    page.close()
+
+
+@needs_browser
+@needs_board
 def test_two_pages_agree_and_patterns_are_drawn_and_played(browser: Browser, simulated: tuple[Dashboard, Path]) -> None:
     one, other = opened(browser, simulated[0]), opened(browser, simulated[0])
     one.click("[data-make=ring]")
@@ -738,6 +761,23 @@ def test_what_a_board_believes_reaches_the_page(tmp_path: Path) -> None:
             pass
         assert state["unknown_s"] == [75.0] and state["target_a"] == [0.0]
         assert state["doing"] == ["not known for 75 s: it may still be hot from before power-on"]
+
+
+def test_a_sight_reaches_the_page_and_the_log_and_counts_as_no_corrupt_line(tmp_path: Path) -> None:
+    board = FakeBoard()
+    sight = "<sight|spring:1|t:96.250|lost|read:-1.32|read_sd:0.05|now_k:0.1|now_sd:1.0|shift_k:0.4|loss:1.20|heated|opened>"
+    with page_of(board, tmp_path) as socket:
+        socket.send(json.dumps({"do": "record", "id": 1}))
+        while not json.loads(socket.recv(10)).get("recording"):
+            pass
+        board.say(sight)
+        while (state := json.loads(socket.recv(10))).get("sights") != [1]:
+            pass
+        while (now := json.loads(socket.recv(10))).get("time_s", 0.0) < state["time_s"] + 0.3:
+            pass
+        assert now["corrupt"] == 0
+    (log,) = tmp_path.iterdir()
+    assert f"# {sight}\n" in log.read_text()
 
 
 def test_each_id_of_the_page_is_of_one_element_and_the_script_finds_it() -> None:
