@@ -19,6 +19,7 @@ typedef enum {
     CONSOLE_JOB_SAVE,
     CONSOLE_JOB_FORGET,
     CONSOLE_JOB_TELEMETRY,
+    CONSOLE_JOB_INPUTS,
     CONSOLE_JOB_SELFTEST
 } console_job_t;
 
@@ -35,6 +36,9 @@ bool console_version_line(const console_t *console, console_out_t *out);
 bool console_model_line(const console_t *console, console_out_t *out);
 bool console_warm_line(const console_t *console, console_out_t *out);
 bool console_learnt_line(const console_t *console, console_out_t *out);
+bool console_inputs_line(console_t *console, console_out_t *out);
+/* Where inputs are streamed: a line takes effect here. In RAM. */
+void console_mark_typed(const console_t *console, const char *line);
 bool console_why_line(console_t *console, console_out_t *out);
 bool console_faults_line(const console_t *console, console_out_t *out);
 

@@ -209,6 +209,27 @@ bool controller_apply_settings(controller_t *controller, const controller_settin
     return true;
 }
 
+bool controller_restart(controller_t *controller, const controller_settings_t *settings)
+{
+    scrub_open(&controller->scrub, controller_fixed, controller);
+    if (!controller_is_sound(controller)) {
+        return false;
+    }
+    spring_learnt_t learnt[CONTROLLER_MAX_SPRINGS];
+    const uint8_t fan_percent = controller->fan_percent;
+    for (uint8_t k = 0; k < controller->springs; k++) {
+        learnt[k] = controller->policy.estimator.spring[k].learnt;
+    }
+    (void)init_model(&controller->model, &settings->model, NULL);
+    controller->supply_ticks = 0;
+    start(controller, settings, controller->ambient_c7);
+    controller->fan_percent = fan_percent;
+    for (uint8_t k = 0; k < controller->springs; k++) {
+        controller_restore_learnt(controller, k, &learnt[k]);
+    }
+    return true;
+}
+
 /* What flows, 0..CURRENT_MOST_MA. */
 static uint16_t flowing_ma(int16_t current_ma)
 {
@@ -687,6 +708,11 @@ bool controller_losses(const controller_t *controller, float *factor, float *sd)
 float controller_shift_k(const controller_t *controller, uint8_t spring)
 {
     return controller->policy.estimator.spring[spring].shift_k;
+}
+
+uint16_t controller_belief_mark(const controller_t *controller, uint8_t spring)
+{
+    return spring_estimator_mark(&controller->policy.estimator, &controller->model, spring);
 }
 
 const spring_sights_t *controller_sights(const controller_t *controller)

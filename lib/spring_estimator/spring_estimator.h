@@ -272,6 +272,11 @@ spring_bounds_t spring_estimator_austenite(const spring_estimator_t *estimator,
  * have in common, a draught or the fan. False where fewer than two are held. O(springs). */
 bool spring_estimator_losses(const spring_estimator_t *estimator, float *factor, float *sd);
 
+/* A CRC-16 of all that is believed of a spring and of its temperature in the model, to the last
+ * bit: two that agree believe the same. */
+uint16_t spring_estimator_mark(const spring_estimator_t *estimator, const thermal_model_t *model,
+                               uint8_t spring);
+
 /* What the model must be stepped with: measured power, below 2 kW, less what this spring loses
  * beyond it. */
 uint32_t spring_estimator_model_power_uw(const spring_estimator_t *estimator, uint8_t spring,

@@ -1,4 +1,4 @@
-#include "telemetry.h"
+#include "telemetry_internal.h"
 
 #include <stddef.h>
 #include <string.h>
@@ -31,7 +31,7 @@ bool telemetry_set(telemetry_t *telemetry, uint8_t format, uint8_t hz)
     return true;
 }
 
-static void count_dropped(telemetry_t *telemetry, uint8_t lines)
+void telemetry_count_dropped(telemetry_t *telemetry, uint8_t lines)
 {
     const uint16_t dropped = (uint16_t)(telemetry->dropped + lines);
     telemetry->dropped = dropped < lines ? UINT16_MAX : dropped;
@@ -95,7 +95,7 @@ static void write_csv(telemetry_t *telemetry, const controller_t *controller,
     text_line_t *const line = &piece.line;
     const uint8_t springs = controller_springs(controller);
     if (output->room(output->context) < TELEMETRY_LINE_BYTES((uint16_t)springs)) {
-        count_dropped(telemetry, 1);
+        telemetry_count_dropped(telemetry, 1);
         return;
     }
     start_piece(&piece);
@@ -293,7 +293,7 @@ static void write_sight(telemetry_t *telemetry, const controller_t *controller,
 void telemetry_tick(telemetry_t *telemetry, const controller_t *controller, const text_time_t *time,
                     int16_t ambient_c7, const text_output_t *output)
 {
-    if (telemetry->format == TELEMETRY_OFF) {
+    if (telemetry->format == TELEMETRY_OFF || telemetry->format == TELEMETRY_INPUTS) {
         return;
     }
     telemetry->phase = (uint8_t)(telemetry->phase + telemetry->hz);
@@ -302,7 +302,7 @@ void telemetry_tick(telemetry_t *telemetry, const controller_t *controller, cons
         if (telemetry->format == TELEMETRY_CSV) {
             write_csv(telemetry, controller, time, ambient_c7, output);
         } else {
-            count_dropped(telemetry, telemetry->left);
+            telemetry_count_dropped(telemetry, telemetry->left);
             telemetry->rounds = (uint8_t)((telemetry->rounds + 1u) % telemetry->hz);
         }
         telemetry->left = controller_springs(controller);

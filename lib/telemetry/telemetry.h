@@ -18,6 +18,7 @@ typedef enum {
     TELEMETRY_OFF = 0,
     TELEMETRY_CSV,
     TELEMETRY_TELEPLOT,
+    TELEMETRY_INPUTS, /* telemetry_inputs instead of telemetry_tick */
     TELEMETRY_FORMAT_COUNT
 } telemetry_format_t;
 
@@ -76,6 +77,16 @@ bool telemetry_set(telemetry_t *telemetry, uint8_t format, uint8_t hz);
  * next one begins there. */
 void telemetry_tick(telemetry_t *telemetry, const controller_t *controller, const text_time_t *time,
                     int16_t ambient_c7, const text_output_t *output);
+
+/* Once per control tick, after it: in the format TELEMETRY_INPUTS all that the controller was
+ * given, as a line of hil_frame.h ("~S..."), and the mark of one spring after the other:
+ * "<belief|spring:5|tick:1234|mark:4A6C>". Together with the lines that were typed, in their
+ * places, that is what a replay needs: sim_host/rerun. tick counts, modulo 65536. */
+void telemetry_inputs(telemetry_t *telemetry, const controller_t *controller,
+                      const controller_inputs_t *inputs, uint16_t tick,
+                      const text_output_t *output);
+/* " 3C0F": so many bytes from the lowest address on, as hexadecimal digits. */
+void telemetry_add_hex(text_line_t *line, const void *bytes, uint8_t count);
 
 /* The names of the limits (bits of drive_policy_limit_t), each after the separator. */
 void telemetry_add_limits(text_line_t *line, uint16_t limits, char separator);

@@ -210,6 +210,7 @@ static void each_error_says_its_number_and_changes_nothing(void)
     expect_error("pattern 11110111x", CONSOLE_ERROR_BAD_ARGUMENT);
     expect_error("policy closed", CONSOLE_ERROR_BAD_ARGUMENT);
     expect_error("model hot", CONSOLE_ERROR_BAD_ARGUMENT);
+    expect_error("telemetry inputs 5", CONSOLE_ERROR_SURPLUS_ARGUMENT);
     expect_error("why", CONSOLE_ERROR_MISSING_ARGUMENT);
     expect_error("why all", CONSOLE_ERROR_BAD_ARGUMENT);
     expect_error("why 0", CONSOLE_ERROR_OUT_OF_RANGE);
@@ -248,6 +249,7 @@ static void each_error_says_its_number_and_changes_nothing(void)
     expect_ok("on 1");
     expect_error("selftest", CONSOLE_ERROR_SPRINGS_ON);
     expect_error("model cold", CONSOLE_ERROR_SPRINGS_ON);
+    expect_error("telemetry inputs", CONSOLE_ERROR_SPRINGS_ON);
 }
 
 /* Every word, and every way to write it wrong; settings, too. */
@@ -297,8 +299,8 @@ static void every_refusal_says_what_would_be_right(void)
         {"clear 1", ": write clear\r\n"},
         {"unlock 1", ": write unlock\r\n"},
         {"selftest 1", ": write selftest\r\n"},
-        {"telemetry", ": write telemetry off|csv|teleplot [1..50]\r\n"},
-        {"telemetry json", ": write telemetry off|csv|teleplot [1..50]\r\n"},
+        {"telemetry", ": write telemetry off|csv|teleplot|inputs [1..50]\r\n"},
+        {"telemetry json", ": write telemetry off|csv|teleplot|inputs [1..50]\r\n"},
         {"telemetry csv 100", ": 1 to 50 lines a second\r\n"},
         {"echo", ": write echo on|off\r\n"},
         {"echo loud", ": write echo on|off\r\n"},
@@ -928,6 +930,36 @@ static void the_longest_why_fits_its_lines(void)
     }
 }
 
+/* All begins anew but what was learnt; then each line is told where it takes effect. */
+static void inputs_begin_anew_with_what_was_learnt(void)
+{
+    const spring_learnt_t numbers = {
+        .austenite_ohm = 0.219f, .change = 0.2f, .loss_sd_w_per_k = 0.000058f};
+    controller_restore_learnt(&controller, 8, &numbers);
+    expect_ok("model cold");
+    expect_ok("fan 30");
+    TEST_ASSERT_EQUAL_FLOAT(0.0f, controller_cooling_s(&controller, 0));
+    expect_ok("telemetry inputs");
+    TEST_ASSERT_NOT_NULL(strstr(said, "<learnt|spring:9|8941603E")); /* 0.219 as it lies in RAM */
+    TEST_ASSERT_NOT_NULL(strstr(said, ">\r\n<start|ambient_c7:2560|fan:30>\r\nok\r\n"));
+    TEST_ASSERT_EQUAL_UINT8(TELEMETRY_INPUTS, telemetry.format);
+    TEST_ASSERT_TRUE(controller_cooling_s(&controller, 0) > 30.0f);
+    TEST_ASSERT_EQUAL_UINT8(30, controller_fan_percent(&controller));
+    TEST_ASSERT_EQUAL_FLOAT(0.219f, controller_learnt(&controller, 8).austenite_ohm);
+    expect_ok("ON 3");
+    TEST_ASSERT_EQUAL_STRING("<typed|ON 3>\r\nok\r\n", said);
+    expect_ok("$supply_v=5.00"); /* a setting does not end it */
+    TEST_ASSERT_EQUAL_UINT8(TELEMETRY_INPUTS, telemetry.format);
+    said_length = 0;
+    console_stop(&console);
+    TEST_ASSERT_EQUAL_STRING("<typed|!>\r\n", said);
+    expect_ok("telemetry off");
+    expect_ok("off all");
+    TEST_ASSERT_EQUAL_STRING("ok\r\n", said);
+    controller_lock(&controller);
+    expect_error("telemetry inputs", CONSOLE_ERROR_LOCKED);
+}
+
 static void learnt_says_what_is_known_and_clear_forgets_it(void)
 {
     const spring_learnt_t numbers = {.austenite_ohm = 0.219f,
@@ -1161,6 +1193,7 @@ int main(void)
     RUN_TEST(status_says_whether_the_stages_have_their_supply);
     RUN_TEST(model_says_with_which_bounds);
     RUN_TEST(model_says_what_the_surroundings_take);
+    RUN_TEST(inputs_begin_anew_with_what_was_learnt);
     RUN_TEST(why_says_the_last_sights_of_a_spring_in_words);
     RUN_TEST(why_goes_on_with_what_is_left_where_sights_give_way);
     RUN_TEST(the_longest_why_fits_its_lines);
