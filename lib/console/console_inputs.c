@@ -1,7 +1,7 @@
 #include "console_internal.h"
 
-/* All that a replay begins with, beside the settings: what was learnt, to the bit, and that all else
- * begins anew in this moment. Steps: each spring, the start. */
+/* All that a replay begins with, beside the settings: what was learnt, to the bit, and that all
+ * else begins anew in this moment. Steps: each spring, the start. */
 bool console_inputs_line(console_t *console, console_out_t *out)
 {
     controller_t *const controller = console->controller;

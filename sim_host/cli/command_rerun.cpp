@@ -56,8 +56,8 @@ void run_again(const rerun_options &options)
                           "no readings; a tape is what `ninespring record --tape` writes");
     }
     if (!asked) {
-        throw input_error(fmt::format("--at {:g}: the tape ends at {:.2f} s", options.at_s,
-                                      again.time_s()));
+        throw input_error(
+            fmt::format("--at {:g}: the tape ends at {:.2f} s", options.at_s, again.time_s()));
     }
     if (options.at_s < 0.0) {
         ask_all(again, options);
@@ -65,16 +65,17 @@ void run_again(const rerun_options &options)
     fmt::print("{} ticks ({:.2f} s), {} lines typed, {} beliefs compared: ", tally.ticks,
                again.time_s(), tally.typed, tally.marks);
     if (tally.missing != 0) {
-        fmt::print("{} ticks are missing on the tape\n", tally.missing);
+        fmt::print("{} ticks are missing, the first at {:.2f} s\n", tally.missing, tally.missing_s);
+        throw work_error(fmt::format("the tape is whole until {:.2f} s: what is believed later is "
+                                     "not the board's; ask with --at before that",
+                                     tally.missing_s));
     }
     if (tally.other != 0) {
         fmt::print("{} differ, first spring {} at {:.2f} s\n", tally.other, tally.other_spring,
                    tally.other_s);
-        throw work_error("the belief is not the board's: another version, or missing ticks");
+        throw work_error("the belief is not the board's: is the tape of this version?");
     }
-    if (tally.missing == 0) {
-        fmt::print("the same to the last bit\n");
-    }
+    fmt::print("the same to the last bit\n");
 }
 
 } // namespace

@@ -48,8 +48,8 @@ std::vector<std::uint8_t> bytes_of(const std::string &digits)
 {
     std::vector<std::uint8_t> out;
     for (std::size_t i = 0; i + 1 < digits.size(); i += 2) {
-        out.push_back(static_cast<std::uint8_t>(
-            std::strtoul(digits.substr(i, 2).c_str(), nullptr, 16)));
+        out.push_back(
+            static_cast<std::uint8_t>(std::strtoul(digits.substr(i, 2).c_str(), nullptr, 16)));
     }
     return out;
 }
@@ -140,6 +140,11 @@ struct rerun::board {
         was_learnt.at(static_cast<std::size_t>(k)) = true;
     }
 
+    [[nodiscard]] double seconds() const
+    {
+        return 1e-3 * CONTROLLER_TICK_MS * static_cast<double>(tally_.ticks);
+    }
+
     /* As far as a job goes in the turns between two ticks. */
     void service()
     {
@@ -182,8 +187,12 @@ struct rerun::board {
         if (got.springs != controller_springs(&controller)) {
             throw std::invalid_argument("is of another number of springs than the settings");
         }
-        if (!first) {
-            tally_.missing += static_cast<std::uint16_t>(got.tick - tick - 1u);
+        const auto missing = static_cast<std::uint16_t>(got.tick - tick - 1u);
+        if (!first && missing != 0) {
+            if (tally_.missing == 0) {
+                tally_.missing_s = seconds();
+            }
+            tally_.missing += missing;
         }
         first = false;
         tick = got.tick;
@@ -216,7 +225,7 @@ struct rerun::board {
         ++tally_.marks;
         if (bytes.size() != sizeof mark || std::memcmp(bytes.data(), &mark, sizeof mark) != 0) {
             if (tally_.other == 0) {
-                tally_.other_s = 1e-3 * CONTROLLER_TICK_MS * static_cast<double>(tally_.ticks);
+                tally_.other_s = seconds();
                 tally_.other_spring = static_cast<unsigned>(k + 1);
             }
             ++tally_.other;
@@ -281,7 +290,7 @@ const controller_t *rerun::controller() const
 
 double rerun::time_s() const
 {
-    return 1e-3 * CONTROLLER_TICK_MS * static_cast<double>(board_->tally_.ticks);
+    return board_->seconds();
 }
 
 bool rerun::started() const

@@ -60,8 +60,7 @@ public:
         plant_.reset(plant_create(3, 3));
         TEST_ASSERT_EQUAL(PLANT_OK, plant_set_effect(plant_.get(), "latent_heat", true));
         TEST_ASSERT_EQUAL(PLANT_OK, plant_set_effect(plant_.get(), "resistance_phase", true));
-        loop_.reset(
-            loop_create(&settings_.controller, plant_.get(), &options, seed, nullptr));
+        loop_.reset(loop_create(&settings_.controller, plant_.get(), &options, seed, nullptr));
         TEST_ASSERT_NOT_NULL(loop_.get());
         (void)learnt_store_open(&learnt_, &storage_, SETTINGS_LEARNT_BASE,
                                 SETTINGS_LEARNT_SLOT_BYTES, loop_controller(loop_.get()));

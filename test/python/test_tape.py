@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import subprocess
+import threading
 from pathlib import Path
 
 import pytest
@@ -35,7 +36,8 @@ def test_a_day_that_was_recorded_is_believed_again_to_the_last_bit_and_says_why(
     ticks = [line for line in text.splitlines() if line.startswith("~S")]
     tape.write_text(text.replace(ticks[100] + "\n", ""))
     less = rerun(tape)
-    assert "1 ticks are missing on the tape" in less.stdout
+    assert less.returncode == 1
+    assert "1 ticks are missing, the first at 2.00 s" in less.stdout and "whole until 2.00 s" in less.stderr
     tape.write_text(text.replace("<typed|pattern 111101111>", "<typed|pattern 111101110>"))
     other = rerun(tape)
     assert other.returncode == 1 and "the belief is not the board's" in other.stderr
@@ -62,6 +64,17 @@ def test_a_board_with_a_spring_on_gives_no_tape_and_says_why(tmp_path: Path) -> 
     assert got.returncode == 1
     assert "a tape begins with all springs off and no fault" in got.stdout + got.stderr
     assert board.sent()[-2:] != [] and "off all" in board.sent()
+
+
+def test_ticks_that_are_lost_on_the_way_are_said(tmp_path: Path) -> None:
+    board = FakeBoard({"telemetry inputs": ["<start|ambient_c7:2560|fan:0>", "ok"]})
+    tape = tmp_path / "day.tape"
+    numbers = [0xFFFE, 0xFFFF, 0, 1, 5, 6, 9, *range(10, 200)]
+    threading.Timer(1.5, lambda: board.say(*(f"~S{number:04X}0A00" for number in numbers))).start()
+    got = run("record", "--port", board.port, "--tape", "--duration", "1", "-o", tape)
+    assert got.returncode == 1
+    assert "5 ticks were lost on the way here, the first after 0.1 s" in got.stdout + got.stderr
+    assert "\n# ended: 5 ticks were lost" in tape.read_text()
 
 
 def test_a_tape_has_each_tick_and_no_thermometers(tmp_path: Path) -> None:

@@ -10,6 +10,8 @@ from .board import Board
 from .recording import SILENT_S, LogFile, Step
 
 TICK_S = 0.02
+COUNTED = 1 << 16
+"""Ticks are numbered modulo this."""
 
 
 def record_tape(
@@ -37,7 +39,7 @@ def record_tape(
         for name, value in board.settings().items():
             log.write(f"# ${name}={value}")
         board.ask("telemetry inputs", 10.0)
-        _ticks(board, log, duration_s, list(steps), say, remark)
+        ended = _ticks(board, log, duration_s, list(steps), say, remark)
     except KeyboardInterrupt:
         pass
     except RefusedError as error:
@@ -65,19 +67,30 @@ def _ticks(
     steps: list[Step],
     say: Callable[[int, float], None],
     remark: Callable[[str], None],
-) -> None:
+) -> str:
+    """Return what is missing, in words."""
+    last, lost, lost_s = None, 0, 0.0
     while True:
         line = board.next_line(time.monotonic() + board.patience * SILENT_S)
         if line is None:
             raise WorkError(f"{board.port}: nothing came for {board.patience * SILENT_S:g} s")
         if line.startswith("~S"):
+            tick = int(line[2:6], 16)
+            if last is not None and tick != (last + 1) % COUNTED:
+                lost_s = lost_s if lost else TICK_S * log.rows
+                lost += (tick - last - 1) % COUNTED
+            last = tick
             log.write_row(line)
         elif line.startswith("<"):
             log.write(line)
         time_s = TICK_S * log.rows
         say(log.rows, time_s)
         if time_s >= duration_s:
-            return
+            return (
+                f"{lost} ticks were lost on the way here, the first after {lost_s:.1f} s: the tape tells nothing of what came after that"
+                if lost
+                else ""
+            )
         while log.rows and steps and (steps[0].at_s or 0.0) <= time_s:
             step = steps.pop(0)
             for words in board.ask(step.line):
