@@ -129,14 +129,25 @@ static void begin(spring_belief_t *b, float temperature_c, float sd_k, uint8_t p
 
 void spring_estimator_init(spring_estimator_t *e, thermal_model_t *model)
 {
+    for (uint8_t k = 0; k < model->springs; k++) {
+        e->spring[k].learnt = (spring_learnt_t){0};
+    }
+    spring_estimator_restart(e, model);
+}
+
+void spring_estimator_restart(spring_estimator_t *e, thermal_model_t *model)
+{
     const float coldest_c = spring_ambient_c(model);
     const float width_k = SPRING_ESTIMATOR_HOTTEST_C - coldest_c;
     e->springs = model->springs;
-    e->stepped_turns = 0;
-    e->sights.count = 0;
+    e->stepped_turns = e->stepped_spring = 0;
+    e->sights.turn = e->sights.count = 0;
+    e->sights.numbers = 0;
     spring_estimator_prepare(e, model, true);
     for (uint8_t k = 0; k < e->springs; k++) {
+        const spring_learnt_t learnt = e->spring[k].learnt;
         spring_estimator_forget(e, k);
+        spring_estimator_restore(e, k, &learnt);
         begin(&e->spring[k], coldest_c + 0.5f * width_k,
               UNIFORM_SD * width_k + TRUST_SD_K /* of ambient */, SPRING_PHASE_ANY);
         e->spring[k].hottest_c = SPRING_ESTIMATOR_HOTTEST_C;

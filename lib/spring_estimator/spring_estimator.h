@@ -176,6 +176,8 @@ typedef struct {
 /* Nothing is known of any spring: any phase, from the model's ambient to
  * SPRING_ESTIMATOR_HOTTEST_C. The model's temperatures are set to the middle. */
 void spring_estimator_init(spring_estimator_t *estimator, thermal_model_t *model);
+/* The same, but what was learnt stays: of an estimator that was initialised, or is 0. */
+void spring_estimator_restart(spring_estimator_t *estimator, thermal_model_t *model);
 /* Takes what it needs of the model's parameters; whether readings are used. What is believed stays.
  */
 void spring_estimator_prepare(spring_estimator_t *estimator, const thermal_model_t *model,
