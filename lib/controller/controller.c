@@ -222,7 +222,7 @@ bool controller_restart(controller_t *controller, const controller_settings_t *s
         return false;
     }
     const uint8_t fan_percent = controller->fan_percent;
-    (void)init_model(&controller->model, &settings->model, NULL);
+    thermal_model_set_fan(&controller->model, 0); /* as it is initialised; the next step tells */
     controller->supply_ticks = 0;
     start(controller, settings, controller->ambient_c7, true);
     controller->fan_percent = fan_percent;
