@@ -309,7 +309,8 @@ void telemetry_tick(telemetry_t *telemetry, const controller_t *controller, cons
     }
     while (telemetry->left != 0 && write_spring(telemetry, controller, time, output)) {
     }
-    if (telemetry->format == TELEMETRY_CSV && telemetry->left == 0) {
+    /* after the first row: who asked for it has had its answer by then */
+    if (telemetry->format == TELEMETRY_CSV && telemetry->left == 0 && telemetry->next != 0) {
         write_sight(telemetry, controller, time, output);
     }
 }
