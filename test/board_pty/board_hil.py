@@ -22,7 +22,7 @@ except ImportError:
 
 def goes_on_between_the_frames(program: str, elf: Path) -> None:
     result = Path.cwd() / "board_hil.json"
-    with Board(program, elf, "--speed", "0.2") as board:
+    with Board(program, elf, "--speed", "0.1") as board:
         run = subprocess.run(
             [
                 program, "hil", "--port", board.port, "--duration", str(SIMULATED_S), "--json", str(result),
@@ -51,7 +51,7 @@ def goes_on_between_the_frames(program: str, elf: Path) -> None:
 
 def a_closed_switch_is_found(program: str, elf: Path) -> None:
     result = Path.cwd() / "board_hil_closed.json"
-    with Board(program, elf, "--speed", "0.2") as board:
+    with Board(program, elf, "--speed", "0.1") as board:
         run = subprocess.run(
             [
                 program, "hil", "--port", board.port, "--duration", "2.6", "--json", str(result),
@@ -87,7 +87,7 @@ def main() -> int:
         print(f"SKIPPED: {elf} is not there: build the avr target first")
         return SKIPPED
     tests = (goes_on_between_the_frames, a_closed_switch_is_found, a_port_that_is_not_there_is_said)
-    with ThreadPoolExecutor(len(tests)) as pool:  # each has a board of its own, which has a fifth of a core to do
+    with ThreadPoolExecutor(len(tests)) as pool:  # each has a board of its own, that goes slowly
         for done in [pool.submit(test, program, elf) for test in tests]:
             done.result()
     print("PASS")
