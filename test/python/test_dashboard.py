@@ -21,6 +21,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from command import ninespring
 from fake_board import FakeBoard, row
 from ninespring.dashboard import server, source
 from ninespring.io import words
@@ -835,8 +836,7 @@ def test_what_hinders_is_said_in_the_terminal_too(tmp_path: Path) -> None:
     "arguments", [(), ("--simulate", "--port", "x"), ("--simulate", "--listen", "here"), ("--replay", "no-such.csv")]
 )
 def test_arguments_that_do_not_go_together_are_refused(arguments: tuple[str, ...]) -> None:
-    words = [sys.executable, "-m", "ninespring", "dashboard", *arguments]
-    done = subprocess.run(words, capture_output=True, text=True, timeout=60, check=False)
+    done = ninespring("dashboard", *arguments)
     assert done.returncode == 2
     assert len(done.stderr.strip().splitlines()) == 1
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import click
 from rich.live import Live
 
-from .. import __version__, api
+from .. import __version__
 from ..errors import InputError, WorkError
 from ..io import history, ranges, results
 from ..io.board import Board, settings_lines
@@ -161,7 +161,7 @@ def upload(settings: Path | None, port: str, undo: bool, save: bool, json_path: 
         return
     lines = settings_lines(read_bytes(settings).decode("utf-8", "replace"), str(settings))
     with working("sending", len(lines)) as say:
-        api.upload(port, "\n".join(lines), save, say, by=f"upload {settings.name}")
+        history.send(port, lines, f"upload {settings.name}", save, say)
     write({json_path: results.checked(results.Upload(settings=len(lines), saved=save))})
     out.print(f"{len(lines)} settings sent and read back{', saved' if save else ''}")
 
