@@ -85,18 +85,18 @@ SECTIONS: tuple[Section, ...] = (
     Section(
         "diagnose",
         "Undeclared effects",
-        f"{PYTHON} bench/diagnose/run.py --seeds 2 --first 300600 --cases build/results/diagnose.json",
+        f"{PYTHON} bench/diagnose/run.py --seeds 1 --first 300680 --processes 1 --cases build/results/diagnose.json",
         markdown=True,
     ),
     Section(
         "hours",
         "Hours of log",
-        f"{PYTHON} bench/diagnose/hours.py --cases 10 --first 320000 --resume build/results/hours.json",
+        f"{PYTHON} bench/diagnose/hours.py --cases 10 --first 331000 --processes 1 --resume build/results/hours.json",
     ),
     Section(
         "camera",
         "A camera's blur",
-        f"{PYTHON} bench/diagnose/camera.py --sets 30 --cases build/results/camera.json",
+        f"{PYTHON} bench/diagnose/camera.py --sets 15 --cases build/results/camera.json",
         markdown=True,
     ),
     Section("closed_forms", "The field against closed forms", f"{PYTHON} bench/explore/closed_forms.py"),
@@ -112,6 +112,8 @@ SECTIONS: tuple[Section, ...] = (
         "What real logs bring",
         f"{PYTHON} bench/diagnose/real_logs.py --first 311300 --resume build/results/real_logs.json",
     ),
+    Section("actuator", "A real actuator, each run alone", f"{PYTHON} bench/diagnose/actuator.py"),
+    Section("package", "The package's size", f"{PYTHON} bench/package.py"),
     Section("dashboard", "The live page", f"{PYTHON} bench/dashboard/run.py"),
 )
 

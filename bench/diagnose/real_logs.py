@@ -3,8 +3,7 @@
     .venv/bin/python bench/diagnose/real_logs.py [--cases N] [--first SEED] [--json FILE]
 
 The data are of `world.py`, which shares nothing with the product, but for the last part: there arrays of the product's own
-plant, with other numbers, are driven by the chip's controller with the settings before and after. The real actuator
-(niti_pulse) is read from NINESPRING_PRIVATE, and left out where that is not set: its licence does not let it be carried.
+plant, with other numbers, are driven by the chip's controller with the settings before and after.
 """
 
 from __future__ import annotations
@@ -22,7 +21,6 @@ from typing import Any
 
 import elsewhere
 import numpy as np
-import pandas as pd
 from cases import REPORTING_SEEDS, SPRINGS, Case, effect_numbers, make_case, write_logs
 from kept import Kept
 from ninespring.export import drive
@@ -36,7 +34,7 @@ from ninespring.io.logs import log_text, read_log
 from ninespring.io.logs.run import Run
 from ninespring.io.recording import script_lines
 from ninespring.model import native
-from ninespring.model.models import Array, Model
+from ninespring.model.models import Array
 from tell import Figures, tell
 from world import Inputs, World, random_inputs, simulate
 
@@ -256,46 +254,6 @@ def apart(seed: int) -> dict[str, Any]:
     return {"known": known, "unknown": unknown, "cpu_s": time.process_time() - begun} | said
 
 
-def only_falls(run: Run) -> float:
-    """Return the least error, K, of any model by which a spring only cools once its drive is off for good."""
-    from scipy.optimize import isotonic_regression  # SciPy 1.12: more than the package asks for
-
-    shown = run.temperature_c[:, 0]
-    off = int(np.flatnonzero(run.drive[:, 0] > 0)[-1]) + 1
-    off += int(np.argmax(shown[off:]))  # a late thermometer still rises
-    cooling = shown[off:]
-    return math.sqrt(float(np.sum((cooling - isotonic_regression(cooling, increasing=False).x) ** 2)) / len(shown))
-
-
-def niti(folder: Path) -> list[dict[str, Any]]:
-    """Diagnose the runs of the real actuator, each alone, its alloy declared roughly."""
-    out = []
-    for file in sorted(folder.glob("*.csv")):
-        raw = pd.read_csv(file)
-        raw.columns = ["row", "t", "ambient", "force", "pwm", "rate"]
-        raw = raw.rolling(15, center=True, min_periods=1).median().iloc[::20]
-        columns = {"u1": raw.pwm / 255.0, "t1_c": raw.t, "ambient_c": raw.ambient}
-        with tempfile.TemporaryDirectory() as temporary:
-            path = Path(temporary) / "log.csv"
-            path.write_text(log_text(raw.row.to_numpy() * 0.01, {k: v.to_numpy(float) for k, v in columns.items()}))
-            run = read_log(path, 1)
-        model = Model(Array(1, 1))
-        model.parameters = {"command_power_w": 10.0, "austenite_start_c": 48.0, "austenite_finish_c": 58.0}
-        model.parameters |= {"martensite_start_c": 42.0, "martensite_finish_c": 32.0}
-        result = diagnosis.diagnose(Array(1, 1), [run], model=model).result
-        names = [e["name"] for e in result["effects"]]
-        out.append(
-            {
-                "file": file.name,
-                "before": result["baseline"]["rmse_c"],
-                "after": result["after"]["rmse_c"],
-                "names": names,
-                "least": only_falls(run),
-            }
-        )
-    return out
-
-
 def _all(job: tuple[Callable[[int], dict[str, Any]], int]) -> dict[str, Any]:
     begun = time.monotonic()
     out = job[0](job[1])
@@ -397,18 +355,6 @@ def main() -> int:
     wanted = {f"{part.__name__} {seed}": (_all, (part, seed)) for part, seed in jobs}
     done = kept.all_of(wanted, options.processes, unsaid="events")
     out = figures(done)
-    private = os.environ.get("NINESPRING_PRIVATE")
-    for one in niti(Path(private) / "niti_pulse") if private else []:
-        out.append(
-            row(
-                f"real actuator, {one['file']}, {' + '.join(one['names']) or 'nothing'} named: error, {one['before']:.2f} before",
-                one["after"],
-                "K",
-                "<= 0.5",
-            )
-        )
-        text = f"the same, {one['file']}: least of any model that only cools once the drive is off"
-        out.append(row(text, one["least"], "K", ""))
     out = [one for one in out if "(0 of 0)" not in one["figure"]]
     tell(out, options.json)
     return 0

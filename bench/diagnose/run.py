@@ -33,6 +33,7 @@ from kept import Kept
 from ninespring.find import diagnosis, search
 from ninespring.find.evidence import excess
 from ninespring.infer import problem as fitting
+from ninespring.infer.scene import scene_of
 from ninespring.io.logs import read_log
 from ninespring.model import native
 from ninespring.model.effects import candidates
@@ -47,7 +48,7 @@ MATTERS = 0.5
 def marginal(found: diagnosis.Diagnosis, truth: tuple[str, ...], effect: str) -> float:
     """Return the structure (noise units) that remains when all of the truth but one effect is fitted."""
     problem = found.problem
-    hunt = search.Search(problem, candidates(problem), found.baseline)
+    hunt = search.Search(problem, candidates(scene_of(problem)), found.baseline)
     fit = found.baseline
     for other in truth:
         if other == effect:

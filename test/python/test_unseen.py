@@ -10,12 +10,12 @@ import pytest
 from ninespring.find.diagnosis import first_fit
 from ninespring.find.evidence import likelihood
 from ninespring.find.lasting import likeliest
-from ninespring.find.unseen import LAG, Unseen, splits
+from ninespring.find.unseen import LAG, Unseen, _hardly_shown, splits
 from ninespring.infer.declared import base_spec
 from ninespring.infer.problem import Problem
 from ninespring.io.logs.run import Run
 from ninespring.model.models import Array
-from ninespring.model.spec import RUN_AMBIENT
+from ninespring.model.spec import RUN_AMBIENT, Free, Spec
 
 
 def model(*effects: str) -> Any:
@@ -25,17 +25,20 @@ def model(*effects: str) -> Any:
 class Told(Unseen):
     """Errors of models as they are told, K, by their effects; 'lag' is the baseline's."""
 
-    def __init__(self, errors: dict[str, float]) -> None:
-        self.errors = errors
+    def __init__(self, errors: dict[str, float], true: dict[str, float] | None = None) -> None:
+        self.told, self.true = errors, true or {}
         self.splits = [SimpleNamespace(alone=True)]  # type: ignore[list-item]
         self.base, self.lagged = model(), model(LAG)
         self.lag = SimpleNamespace(effect=LAG)  # type: ignore[assignment]
 
     def rmse(self, fit: Any, colour: Any = None) -> float:
-        return self.errors["lag" if fit is self.lagged else " ".join(fit.spec.effects)]
+        return self.told["lag" if fit is self.lagged else " ".join(fit.spec.effects)]
 
     def own(self, fit: Any) -> float:
         return self.rmse(fit)
+
+    def comes_true(self, fit: Any, without: Any) -> float:
+        return self.true.get(*(set(fit.spec.effects) - set(without.spec.effects)), 1.0)
 
 
 def without(fit: Any, effect: str) -> Any:
@@ -47,6 +50,30 @@ def test_a_name_with_which_the_unseen_is_foretold_worse_goes_and_is_told() -> No
     kept, said = told.kept(model("shared_air", "sensor_gain"), without)
     assert kept is not None and kept.spec.effects == ("shared_air",)
     assert len(said) == 1 and said[0].startswith("sensor_gain is not named") and "3.00 K with it and to 0.90" in said[0]
+
+
+def test_a_name_that_others_carry_along_goes_by_itself() -> None:
+    errors = {"": 2.0, "lag": 2.0, "shared_air sensor_gain": 1.19, "shared_air": 1.29, "sensor_gain": 3.0}
+    both = model("shared_air", "sensor_gain")
+    kept, said = Told(errors, {"sensor_gain": 0.64}).kept(both, without)
+    assert kept is not None and kept.spec.effects == ("shared_air",)
+    assert len(said) == 1 and said[0].startswith("sensor_gain is not named") and said[0].endswith("64% comes true")
+    kept, said = Told(errors, {"sensor_gain": 0.95}).kept(both, without)
+    assert kept is both and not said
+
+
+@pytest.mark.parametrize("there", [0.0, 0.5, 1.0])
+def test_what_comes_true_of_an_effect_is_what_of_its_change_is_in_the_unseen(there: float) -> None:
+    shift = 0.7 * np.sin(np.arange(400.0))
+    told = Told({})
+    told.problem = SimpleNamespace(colour=None, noise_c=0.3)  # type: ignore[assignment]
+    left = {"": there * shift, "shared_air": (there - 1.0) * shift}
+    told.errors = lambda fit, colour=None: left[" ".join(fit.spec.effects)]  # type: ignore[method-assign]
+    assert Unseen.comes_true(told, model("shared_air"), model()) == pytest.approx(there)
+    told.problem.noise_c = 3.0
+    assert Unseen.comes_true(told, model("shared_air"), model()) == np.inf, (
+        "both foretell the same: nothing is told of it"
+    )
 
 
 def test_where_nothing_foretells_as_well_the_baseline_is_the_answer() -> None:
@@ -107,3 +134,18 @@ def test_each_account_is_taken_at_its_likeliest(wander_k: float) -> None:
         assert likelihood(problem, other) > likelihood(problem, fit) + 0.1
     else:
         assert likelihood(problem, other) >= likelihood(problem, fit)
+
+
+def test_a_declared_number_that_a_part_hardly_shows_stays_as_all_had_it() -> None:
+    """The fan of one run alone: what a breath of it in the other makes of the loss would be said of whatever is judged by both."""
+    free = [Free(key, 1.0, 0.1, 10.0, "W/K", (key,), True) for key in ("loss_w_per_k", "loss_fan_w_per_k")]
+    free.append(Free("gain", 1.0, 0.1, 10.0, "1", ("gain",), True, effect="sensor_gain"))
+    spec = Spec(("sensor_gain",), (), tuple(free), ())
+
+    def told(*information: float) -> Any:
+        return SimpleNamespace(spec=spec, jacobian=np.sqrt(np.diag(information)))
+
+    assert _hardly_shown(told(100.0, 100.0, 100.0), told(50.0, 2.0, 2.0), [0]) == ["loss_fan_w_per_k"]
+    assert _hardly_shown(told(100.0, 100.0, 100.0), told(50.0, 50.0, 2.0), [0]) == [], (
+        "an effect's own number is judged"
+    )

@@ -54,14 +54,14 @@ class Readings:
         return Readings(*(getattr(self, field.name)[rows] for field in fields(self)))
 
     def hot_times(self) -> dict[str, np.ndarray]:
-        """Return which readings are of each time that a spring was hot, as numbers: it may have transformed further in each."""
+        """Return which readings are of each time that a spring was hot: it may have transformed further in each."""
         order = np.lexsort((self.time_s, self.run, self.spring))
         apart = (np.diff(self.spring[order]) != 0) | (np.diff(self.run[order]) != 0)
         apart |= np.diff(self.time_s[order]) > NEAR_S
         which = np.empty(len(order), dtype=int)
         which[order] = np.concatenate(([0], np.cumsum(apart)))
         hot = self.phase > 0.5
-        return {f"hot {n}": ((which == n) & hot).astype(float) for n in np.unique(which[hot])}
+        return {f"hot {n}": (which == n) & hot for n in np.unique(which[hot])}
 
 
 def readings(problem: Problem, fit: Fit) -> Readings | None:
@@ -146,17 +146,21 @@ class Linear:
 
 def solve(read: Readings, columns: dict[str, np.ndarray]) -> Linear:
     """Fit; rises with temperature are believed to be within BELIEVED_RISE beforehand."""
-    matrix = np.column_stack(list(columns.values())) / read.noise[:, None]
+    # in place: of half a day there are hundreds of columns
+    matrix = np.empty((len(read.ohm), len(columns)))
+    for k, column in enumerate(columns.values()):
+        matrix[:, k] = column
+    matrix /= read.noise[:, None]
     wanted = read.ohm / read.noise
     usual = BELIEVED_RISE * float(np.median(read.ohm))
     trust = np.array([1.0 / usual**2 if key.startswith("rise") else 0.0 for key in columns])
-    scale = np.maximum(np.linalg.norm(matrix, axis=0), 1e-12)
-    normal = (matrix / scale).T @ (matrix / scale) + np.diag(trust / scale**2)
-    inverse = np.linalg.pinv(normal, rcond=1e-10)
-    values = inverse @ ((matrix / scale).T @ wanted) / scale
+    scale = np.maximum(np.sqrt(np.einsum("ij,ij->j", matrix, matrix)), 1e-12)
+    matrix /= scale
+    inverse = np.linalg.pinv(matrix.T @ matrix + np.diag(trust / scale**2), rcond=1e-10)
+    values = inverse @ (matrix.T @ wanted)
     rest = wanted - matrix @ values
     chi2 = float(rest @ rest)
-    found = Linear(list(columns), values, inverse, chi2, rest)
+    found = Linear(list(columns), values / scale, inverse, chi2, rest)
     found.covariance = inverse * found.spread / np.outer(scale, scale)
     return found
 

@@ -156,7 +156,7 @@ def _pieces_of(problem: Problem, fit: Fit, r: int, slopes: np.ndarray, factor: f
     def columns_of(kind: str, k: int) -> np.ndarray:
         """Return what a unit step that begins at each edge adds to the readings, (samples, edges)."""
         if kind != "sensor":
-            return thinned(answers[kind, k])
+            return thinned(answers.pop((kind, k)))
         fields = np.zeros((len(edges), rows, springs))
         for number, edge in enumerate(edges):
             fields[number, edge:, k] = 1.0

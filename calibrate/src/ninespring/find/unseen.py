@@ -21,6 +21,7 @@ from ..io import results
 from ..io.logs.run import Run
 from ..model.simulate import simulate_run
 from ..model.spec import RUNS_OWN, Free, Spec
+from .evidence import EQUIVALENT
 from .search import Search
 
 MOST = 3
@@ -31,6 +32,11 @@ WORSE = 1.05
 """Of an error, so much more is worse; less is chance."""
 FORETOLD = 0.5
 """Part of the squared error in the unseen that is left at most with an effect that is there, whatever else is said of it."""
+COMES_TRUE = 0.75
+"""Part of what an effect changes in the unseen that must come true: all of it does of a cause, a half where the unseen is foretold no
+better than without it. What only takes something else's place is between the two or below."""
+HARDLY = 0.1
+"""Part of what all runs tell of a declared number (its information) below which some of them leave it as all had it."""
 STEPS = 25
 """Of one fit, at most: it begins where the whole data had it."""
 LAG = "sensor_lag"
@@ -84,7 +90,9 @@ def _problem(whole: Problem, runs: Sequence[Run], kept: Sequence[int]) -> Proble
 
 def _own(free: Free, kept: Sequence[int]) -> str:
     """Return the key that a number has where only these runs are fitted."""
-    return free.key if free.run is None else free.key.replace(f"@{free.run + 1}", f"@{kept.index(free.run) + 1}")
+    if free.run is None or free.run not in kept:
+        return free.key
+    return free.key.replace(f"@{free.run + 1}", f"@{kept.index(free.run) + 1}")
 
 
 def _of_these(fit: Fit, kept: Sequence[int]) -> tuple[Spec, dict[str, float]]:
@@ -94,8 +102,23 @@ def _of_these(fit: Fit, kept: Sequence[int]) -> tuple[Spec, dict[str, float]]:
     return replace(fit.spec, free=tuple(free)), {_own(f, kept): v for f, v in mine if f.knot is None}
 
 
-def error(split: Split, fit: Fit, colour: Colour | None) -> tuple[float, int]:
-    """Return the sum of squared errors, degC^2, at which a model fitted to a split's runs predicts the other, and of how many."""
+def _hardly_shown(whole: Fit, part: Fit, kept: Sequence[int]) -> list[str]:
+    """Return the declared numbers of which a part of the runs tells next to nothing beside all of them: that they are off there says
+    nothing of an effect."""
+    if whole.jacobian is None or part.jacobian is None:
+        return []
+    told = {f.key: float(np.sum(column**2)) for f, column in zip(part.spec.free, part.jacobian.T, strict=True)}
+    # an effect that is still to be fitted comes last, and has none
+    mine = [(f, float(np.sum(column**2))) for f, column in zip(whole.spec.free, whole.jacobian.T, strict=False)]
+    return [
+        _own(f, kept)
+        for f, all_of_it in mine
+        if f.effect is None and _own(f, kept) in told and told[_own(f, kept)] < HARDLY * all_of_it
+    ]
+
+
+def errors(split: Split, fit: Fit, colour: Colour | None) -> np.ndarray:
+    """Return by how much what is left out differs from what a model fitted to a split's runs predicts, degC, where that counts."""
     problem, kept = split.problem, list(split.kept)
     spec, start = _of_these(fit, kept)
     problem.colour = None
@@ -104,7 +127,7 @@ def error(split: Split, fit: Fit, colour: Colour | None) -> tuple[float, int]:
         problem.take_for(colour)
     fitted = problem.fit(spec, start, tolerance=1e-3, max_steps=STEPS)
     # what only the left-out run shows, these do not tell: it stays
-    known = {key: start[key] for key in fitted.stuck if key in start}
+    known = {key: start[key] for key in (*fitted.stuck, *_hardly_shown(fit, fitted, kept)) if key in start}
     fitted.values = np.array([known.get(f.key, value) for f, value in zip(spec.free, fitted.values, strict=True)])
     run, values = split.left_out, fitted.as_dict()
     if split.alone:
@@ -115,8 +138,7 @@ def error(split: Split, fit: Fit, colour: Colour | None) -> tuple[float, int]:
         if ambient is None:
             ambient = np.full(len(run.time_s), _room(problem, run, values, plant))
         shown = simulate_run(plant, run, ambient, {})
-    off = (run.temperature_c - shown)[split.counts]
-    return float(off @ off), int(off.size)
+    return (run.temperature_c - shown)[split.counts]
 
 
 def _room(problem: Problem, run: Run, values: dict[str, float], plant: Any) -> float:
@@ -137,7 +159,7 @@ class Unseen:
 
     def __post_init__(self) -> None:
         self.splits = splits(self.problem)
-        self.known: dict[Any, float] = {}
+        self.known: dict[Any, np.ndarray] = {}
         self.lag = next((one for one in self.found.candidates if one.effect == LAG), None)
         self.lagged = self.base
         if self.lag is not None and LAG not in self.base.spec.effects:
@@ -146,14 +168,17 @@ class Unseen:
             start = self.base.as_dict() | lag.start_at(1.0)
             self.lagged = replace(self.base, spec=spec, values=np.array([start[f.key] for f in spec.free]))
 
-    def rmse(self, fit: Fit, colour: Colour | None = None) -> float:
-        """Return the error, degC rms, of runs left out, the others fitted by how errors last; NaN where none can be."""
+    def errors(self, fit: Fit, colour: Colour | None = None) -> np.ndarray:
+        """Return the errors, degC, of runs left out, the others fitted by how errors last; empty where none can be."""
         key = fit.spec.variant, colour
         if key not in self.known:
-            parts = [error(one, fit, colour) for one in self.splits]
-            count = sum(n for _, n in parts)
-            self.known[key] = math.sqrt(sum(square for square, _ in parts) / count) if count else math.nan
+            self.known[key] = np.concatenate([np.zeros(0), *(errors(one, fit, colour) for one in self.splits)])
         return self.known[key]
+
+    def rmse(self, fit: Fit, colour: Colour | None = None) -> float:
+        """Return the error, degC rms, of runs left out, the others fitted by how errors last; NaN where none can be."""
+        off = self.errors(fit, colour)
+        return float(np.sqrt(np.mean(off**2))) if off.size else math.nan
 
     def own(self, fit: Fit) -> float:
         """Return the error of what was found, or a part of it, its numbers as likely as the problem's colour has them."""
@@ -168,22 +193,40 @@ class Unseen:
         """Return whether most of what is off in the unseen without an effect is foretold with it: no stand-in does that."""
         return bool(self.splits) and self.own(fit) ** 2 <= FORETOLD * self.own(without) ** 2
 
+    def comes_true(self, fit: Fit, without: Fit) -> float:
+        """Return what part of that by which an effect changes what is foretold of the unseen is there: 1 of a cause, 0.5 where it
+        is foretold no better than without. Infinite where it changes next to nothing."""
+        off = self.errors(without, self.problem.colour)
+        moved = off - self.errors(fit, self.problem.colour)
+        if float(moved @ moved) < (EQUIVALENT * self.problem.noise_c) ** 2 * moved.size:
+            return math.inf
+        return float(off @ moved) / float(moved @ moved)
+
     def kept(self, fit: Fit, reduced: Callable[[Fit, str], Fit]) -> tuple[Fit | None, list[str]]:
         """Return what predicts no worse than the better of both, names left out one by one, None where nothing of it does; and
-        what is to be said of the names."""
+        what is to be said of the names. Each is judged by itself, too: others may carry it along."""
         said: list[str] = []
-        while self.splits and self.own(fit) > WORSE * self.rmse(self.better):
+        while self.splits:
             found = [e for e in fit.spec.effects if e not in self.base.spec.effects]
             names = [e for e in found if e not in OF_THAT_DAY]
-            if found and not names:
+            if not names and (found or self.own(fit) <= WORSE * self.rmse(self.better)):
                 break  # what is of that day no other tells
             fewer = {effect: reduced(fit, effect) for effect in names}
-            best = min(fewer, key=lambda effect: self.own(fewer[effect]), default=None)
-            if best is None or self.own(fewer[best]) >= self.own(fit):
-                said += [self._left_out(e, fit, self.better) for e in names if e not in self.better.spec.effects]
-                return None, said
-            said.append(self._left_out(best, fit, fewer[best]))
-            fit = fewer[best]
+            if self.own(fit) <= WORSE * self.rmse(self.better):
+                true = {effect: self.comes_true(fit, fewer[effect]) for effect in names}
+                out = min(true, key=true.__getitem__)
+                if true[out] >= COMES_TRUE:
+                    break
+                said.append(
+                    f"{out} is not named: of what it changes where {self._what} is predicted, {true[out]:.0%} comes true"
+                )
+            else:
+                out = min(fewer, key=lambda effect: self.own(fewer[effect]), default="")
+                if not out or self.own(fewer[out]) >= self.own(fit):
+                    said += [self._left_out(e, fit, self.better) for e in names if e not in self.better.spec.effects]
+                    return None, said
+                said.append(self._left_out(out, fit, fewer[out]))
+            fit = fewer[out]
         return fit, said
 
     def plain(self, found: Search) -> Fit:

@@ -94,7 +94,10 @@ def step_answers(
     for begin, end in zip(run.starts, [*run.starts[1:], len(run.time_s)], strict=True):
         of_piece(begin, end)
     if run.springs > 1:
-        out["common", -1] = np.sum([out["heat", k] for k in range(run.springs)], axis=0)
+        # one by one: of half a day each is tens of megabytes
+        common = out["common", -1] = np.zeros((len(edges), *power.shape))
+        for k in range(run.springs):
+            common += out["heat", k]
     return out
 
 
