@@ -17,7 +17,6 @@
 #define UNIFORM_SD     0.29f   /* of a width */
 #define OFFSET_SD_V    0.005f  /* 8 mV, and 5 mA in 0.2 ohm: evenly */
 #define OFFSET_AGAIN_V 0.001f  /* by the next hold it may have moved by so much */
-#define LEAST_LOSS     0.8f    /* of a declared loss: with it the hottest possible spring cools */
 #define FORGETS        0.9998f /* a turn's: a disturbance is forgotten within 20 minutes */
 
 #define TRUST_STILL_SDS 0.7f /* where the transformation may never show: probably over */

@@ -31,8 +31,9 @@
 
 #define LEARNT_AT_C 20.0f /* a learnt martensite's resistance is that at this temperature */
 
-#define LOSS_SD   0.12f /* of a declared loss: 20 % */
-#define LOSS_MOST 0.45f /* of the declared loss: no more is ever believed */
+#define LOSS_SD    0.12f /* of a declared loss: 20 % */
+#define LEAST_LOSS 0.8f  /* of a declared loss: with it the hottest possible spring cools */
+#define LOSS_MOST  0.45f /* of the declared loss: no more is ever believed */
 
 #define OFFSET_MOST_V 0.012f /* no sensor's is larger */
 
