@@ -198,6 +198,7 @@ static void run_tick(uint8_t behind)
         status.tick_longest_us = tick_us > UINT16_MAX ? UINT16_MAX : (uint16_t)tick_us;
     }
     telemetry_tick(&telemetry, &controller, &status.time, inputs.ambient_c7, &serial_output);
+    telemetry_inputs(&telemetry, &controller, &inputs, (uint16_t)status.ticks, &serial_output);
 }
 
 #ifdef NINESPRING_HIL

@@ -150,6 +150,7 @@ int main(int argc, char **argv)
     double watch_s = 40.0, registers = 0.25;
     std::string elf = ninespring::default_elf("firmware.elf"), json;
     unsigned from = 0, bytes = 0;
+    int one_bit = -1;
     app.add_option("--runs", runs, "flips in each board")->capture_default_str();
     app.add_option("--boards", boards, "arrays, with seeds from --seed on")->capture_default_str();
     app.add_option("--seed", seed)->capture_default_str();
@@ -158,6 +159,7 @@ int main(int argc, char **argv)
         ->capture_default_str();
     app.add_option("--from", from, "address: all of them in --bytes of RAM from here");
     app.add_option("--bytes", bytes)->capture_default_str();
+    app.add_option("--bit", one_bit, "always this one, 0..7");
     app.add_option("--elf", elf)->capture_default_str();
     app.add_option("--json", json, "the figures, for programs");
     try {
@@ -190,7 +192,8 @@ int main(int argc, char **argv)
                         static_cast<unsigned>(random_bits(&dice) % (used + STACK_BYTES));
                     address = at < used ? RAM_BEGIN + at : RAM_END - 1u - (at - used);
                 }
-                const auto bit = static_cast<unsigned>(random_bits(&dice) % 8u);
+                const auto any_bit = static_cast<unsigned>(random_bits(&dice) % 8u);
+                const unsigned bit = one_bit < 0 ? any_bit : static_cast<unsigned>(one_bit) % 8u;
                 if (n % SOUND_EVERY == 0) {
                     sound = apart([&] { return b.watch(watch_s); });
                 }
@@ -201,7 +204,8 @@ int main(int argc, char **argv)
                 const char *const kind = kind_of(r, sound);
                 ++found[kind];
                 if (std::string(kind) != "no effect" && std::string(kind) != "said") {
-                    fmt::print("0x{:04X} bit {}: {}, {:.1f} degC\n", address, bit, kind,
+                    fmt::print("seed {} run {}: 0x{:04X} bit {}: {}, {:.1f} degC\n", seed + m, n,
+                               address, bit, kind,
                                *std::max_element(r.hottest_c.begin(), r.hottest_c.end()));
                     std::fflush(stdout);
                 }
@@ -233,5 +237,5 @@ int main(int argc, char **argv)
         }
         std::ofstream(json) << figures.dump(1) << '\n';
     }
-    return found["HOTTER, UNSAID"] == 0 || !json.empty() /* then the page says it */ ? 0 : 1;
+    return found["HOTTER, UNSAID"] == 0 ? 0 : 1;
 }

@@ -36,7 +36,11 @@ constexpr double UNFED_S = 0.25; /* of what gives no pulses: 0.21 s (docs/safety
 constexpr double STOPPED_S = 0.003; /* '!': a byte, and 1 ms */
 constexpr double HEALED_S = 0.05; /* a register is written again in each tick; and a stop's byte */
 constexpr double ANSWER_S = 12.0; /* the longest: selftest, nine springs of 0.6 s; $save 3.4 s */
-constexpr double QUIET_S = 0.5;   /* after garbage: until what answers it has come */
+constexpr double QUIET_S = 0.5;   /* after garbage */
+/* Then it is asked this, and every answer before this one's is to what was garbage: telemetry may
+ * hold answers up for longer than any time that one would wait. */
+constexpr const char *SYNC = "$rows";
+constexpr const char *SYNC_ANSWER = "$rows=";
 constexpr double UNSAID_S = 5.0;
 
 using values = std::map<std::string, std::string>;
@@ -181,6 +185,10 @@ private:
         }
         if (!pending_) {
             return;
+        }
+        synced_ = synced_ || (*pending_ == SYNC && starts(line, SYNC_ANSWER));
+        if (!synced_ && (line == "ok" || starts(line, "error:"))) {
+            return; /* to what was garbage */
         }
         if (line == "ok" || starts(line, "error:")) {
             ++v_.answers;
@@ -398,13 +406,16 @@ private:
         hanging_ = false;
         reset_is_due_ = flipped_;
         quiet_until_s_ = now_s() + 0.8;
+        synced_ = true;
     }
 
     void quiet()
     {
         quiet_until_s_ = now_s() + QUIET_S + (saving_ ? 4.0 : 0.0);
         pending_.reset();
+        waiting_.push_front(SYNC);
         waiting_.push_front("");
+        synced_ = false;
         unsure_.clear();
     }
 
@@ -691,6 +702,7 @@ private:
     std::vector<std::string> answer_;
     std::deque<std::string> waiting_;
     std::optional<std::string> pending_;
+    bool synced_ = true; /* what comes answers what was asked */
     double asked_s_ = 0.0, quiet_until_s_ = 0.0, next_status_s_ = 1.0, tested_s_ = -10.0;
     bool greeted_ = false, was_fed_ = false;
     std::array<bool, SPRINGS> wish_{};

@@ -232,9 +232,36 @@ static console_error_t word_ambient(console_t *console, const arguments_t *argum
     return error;
 }
 
+static bool any_spring_on(const console_t *console)
+{
+    for (uint8_t k = 0; k < controller_springs(console->controller); k++) {
+        if (controller_level_permille(console->controller, k) != 0) {
+            return true;
+        }
+    }
+    return false;
+}
+
+static console_error_t begin_inputs(console_t *console, const arguments_t *arguments)
+{
+    if (arguments->count > 1) {
+        return CONSOLE_ERROR_SURPLUS_ARGUMENT; /* each tick has its line */
+    }
+    if (any_spring_on(console)) {
+        return CONSOLE_ERROR_SPRINGS_ON;
+    }
+    const console_error_t error = may_drive(console);
+    if (error == CONSOLE_OK) {
+        telemetry_set(console->telemetry, TELEMETRY_OFF, console->telemetry->hz);
+        console_start_job(console, CONSOLE_JOB_INPUTS);
+    }
+    return error;
+}
+
 static console_error_t word_telemetry(console_t *console, const arguments_t *arguments)
 {
-    static const char names[TELEMETRY_FORMAT_COUNT][9] FLASH_MEMORY = {"off", "csv", "teleplot"};
+    static const char names[TELEMETRY_FORMAT_COUNT][9] FLASH_MEMORY = {"off", "csv", "teleplot",
+                                                                       "inputs"};
     int32_t hz = console->settings->board.telemetry_hz;
     uint8_t format = 0;
     while (format < TELEMETRY_FORMAT_COUNT && !flash_equal(arguments->argument[0], names[format])) {
@@ -242,6 +269,9 @@ static console_error_t word_telemetry(console_t *console, const arguments_t *arg
     }
     if (format == TELEMETRY_FORMAT_COUNT) {
         return CONSOLE_ERROR_BAD_ARGUMENT;
+    }
+    if (format == TELEMETRY_INPUTS) {
+        return begin_inputs(console, arguments);
     }
     if (arguments->count > 1) {
         const console_error_t error =
@@ -270,16 +300,6 @@ static console_error_t word_unlock(console_t *console, const arguments_t *argume
     (void)arguments;
     controller_unlock(console->controller);
     return CONSOLE_OK;
-}
-
-static bool any_spring_on(const console_t *console)
-{
-    for (uint8_t k = 0; k < controller_springs(console->controller); k++) {
-        if (controller_level_permille(console->controller, k) != 0) {
-            return true;
-        }
-    }
-    return false;
 }
 
 static console_error_t word_supply(console_t *console, const arguments_t *arguments)
@@ -343,6 +363,20 @@ static console_error_t word_learnt(console_t *console, const arguments_t *argume
     return CONSOLE_OK;
 }
 
+static console_error_t word_why(console_t *console, const arguments_t *arguments)
+{
+    int32_t number = 0;
+    const console_error_t error =
+        parse_number(console, arguments->argument[0], FLASH_TEXT("springs are #0 to #0"), 1,
+                     controller_springs(console->controller), &number);
+    if (error == CONSOLE_OK) {
+        console_start_job(console, CONSOLE_JOB_WHY);
+        console->element = (uint8_t)(number - 1);
+        console->sight = spring_sights_first(controller_sights(console->controller));
+    }
+    return error;
+}
+
 static console_error_t word_echo(console_t *console, const arguments_t *arguments)
 {
     bool on;
@@ -367,12 +401,14 @@ static console_error_t word_echo(console_t *console, const arguments_t *argument
       " [cold]  what is believed of each spring, with bounds; cold: what was off for long is at "  \
       "ambient")                                                                                   \
     X(learnt, 0, 1, NONE, word_learnt, " [clear]  each spring's own numbers; clear: forget them")  \
+    X(why, 1, 1, NONE, word_why, " K  the last sights of a spring: read, believed, what was done") \
     X(faults, 0, 0, FAULTS, NULL, "  what is latched")                                             \
     X(clear, 0, 0, NONE, word_clear, "  forget faults; all springs off")                           \
     X(unlock, 0, 0, NONE, word_unlock, "  after a watchdog or brown-out reset")                    \
     X(supply, 1, 1, NONE, word_supply, " on|off  of all stages, where a cut-off is fitted")        \
     X(selftest, 0, 0, NONE, word_selftest, "  each sensor, and each spring with 0.3 A")            \
-    X(telemetry, 1, 2, NONE, word_telemetry, " off|csv|teleplot [1..50]  lines per second")        \
+    X(telemetry, 1, 2, NONE, word_telemetry,                                                       \
+      " off|csv|teleplot|inputs [1..50]  lines per second; inputs: for a replay")                  \
     X(echo, 1, 1, NONE, word_echo, " on|off  show what is typed; backspace works either way")
 
 #define WORD_TEXT(word, least, most, job, function, usage) #word usage "\0"
@@ -620,6 +656,12 @@ static void print_job_line(console_t *console)
     case CONSOLE_JOB_COLD:
         more = console_warm_line(console, &out);
         break;
+    case CONSOLE_JOB_INPUTS:
+        more = console_inputs_line(console, &out);
+        break;
+    case CONSOLE_JOB_WHY:
+        more = console_why_line(console, &out);
+        break;
     case CONSOLE_JOB_LEARNT:
         more = console_learnt_line(console, &out);
         break;
@@ -684,6 +726,7 @@ void console_break_line(console_t *console, console_error_t error)
 
 void console_stop(console_t *console)
 {
+    console_mark_typed(console, "!");
     if (console->job == CONSOLE_JOB_SELFTEST) {
         selftest_end(&console->selftest, console->controller);
     }
@@ -724,6 +767,7 @@ void console_receive(console_t *console, uint8_t octet)
             return;
         }
         if (error == CONSOLE_OK) {
+            console_mark_typed(console, console->line);
             error = execute(console);
         }
         if (console->job == CONSOLE_JOB_NONE) {

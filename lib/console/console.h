@@ -54,7 +54,8 @@ typedef struct {
     /* internal */
     uint8_t job;     /* what console_service goes on with */
     uint8_t step;    /* of the job */
-    uint8_t element; /* of a listed setting */
+    uint8_t element; /* of a listed setting; the spring that is asked about */
+    uint32_t sight;  /* number of the one that is printed */
     selftest_t selftest;
     bool conflict;       /* settings differ from what is active, since they do not fit together */
     uint8_t next_format; /* telemetry that starts after its header */

@@ -13,11 +13,13 @@ typedef enum {
     CONSOLE_JOB_MODEL,
     CONSOLE_JOB_COLD,
     CONSOLE_JOB_LEARNT,
+    CONSOLE_JOB_WHY,
     CONSOLE_JOB_FAULTS,
     CONSOLE_JOB_SETTINGS,
     CONSOLE_JOB_SAVE,
     CONSOLE_JOB_FORGET,
     CONSOLE_JOB_TELEMETRY,
+    CONSOLE_JOB_INPUTS,
     CONSOLE_JOB_SELFTEST
 } console_job_t;
 
@@ -34,6 +36,10 @@ bool console_version_line(const console_t *console, console_out_t *out);
 bool console_model_line(const console_t *console, console_out_t *out);
 bool console_warm_line(const console_t *console, console_out_t *out);
 bool console_learnt_line(const console_t *console, console_out_t *out);
+bool console_inputs_line(console_t *console, console_out_t *out);
+/* Where inputs are streamed: a line takes effect here. In RAM. */
+void console_mark_typed(const console_t *console, const char *line);
+bool console_why_line(console_t *console, console_out_t *out);
 bool console_faults_line(const console_t *console, console_out_t *out);
 
 void console_start_job(console_t *console, console_job_t job);

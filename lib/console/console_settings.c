@@ -96,8 +96,9 @@ console_error_t console_error_of(settings_result_t result)
 static void follow_board_settings(console_t *console)
 {
     const board_settings_t *const board = &console->settings->board;
-    if (console->telemetry->format != board->telemetry_format ||
-        console->telemetry->hz != board->telemetry_hz) {
+    if (console->telemetry->format != TELEMETRY_INPUTS && /* else a replay would end here */
+        (console->telemetry->format != board->telemetry_format ||
+         console->telemetry->hz != board->telemetry_hz)) {
         telemetry_set(console->telemetry, board->telemetry_format, board->telemetry_hz);
     }
 }

@@ -117,11 +117,17 @@ static void tell_resistances(controller_t *controller)
 
 /* After check and init_model nothing can be refused any more. */
 static void start(controller_t *controller, const controller_settings_t *settings,
-                  int16_t ambient_c7)
+                  int16_t ambient_c7, bool keeps_learnt)
 {
     thermal_model_t *model = &controller->model;
     const size_t kept = offsetof(controller_t, current); /* model, and what was delivered */
-    memset((uint8_t *)controller + kept, 0, sizeof *controller - kept);
+    const size_t policy = offsetof(controller_t, policy);
+    const size_t behind = policy + sizeof controller->policy;
+    if (!keeps_learnt) {
+        controller->policy = (drive_policy_t){0};
+    }
+    memset((uint8_t *)controller + kept, 0, policy - kept);
+    memset((uint8_t *)controller + behind, 0, sizeof *controller - behind);
     controller->ambient_c7 = ambient_c7;
     controller->springs = (uint8_t)(settings->model.rows * settings->model.columns);
     thermal_model_set_ambient(model, ambient_c7);
@@ -129,7 +135,7 @@ static void start(controller_t *controller, const controller_settings_t *setting
     temperature_ceiling_prepare(&controller->ceiling, model, &settings->current);
     (void)current_control_init(&controller->current, &settings->current, NULL);
     (void)safety_init(&controller->safety, &settings->safety, controller->springs, NULL);
-    (void)drive_policy_init(&controller->policy, &settings->policy, model, NULL);
+    (void)drive_policy_restart(&controller->policy, &settings->policy, model, NULL);
     tell_resistances(controller);
     scrub_start(&controller->scrub, controller_fixed, controller);
 }
@@ -145,7 +151,7 @@ bool controller_init(controller_t *controller, const controller_settings_t *sett
     temperature_ceiling_begin(&controller->ceiling, ambient_c7);
     controller->supply_off = false;
     controller->supply_ticks = 0;
-    start(controller, settings, ambient_c7);
+    start(controller, settings, ambient_c7, false);
     return true;
 }
 
@@ -202,9 +208,23 @@ bool controller_apply_settings(controller_t *controller, const controller_settin
     uint8_t board_fault = controller->safety.board_fault;
     bool locked = controller->safety.locked;
     uint8_t fan_percent = controller->fan_percent;
-    start(controller, settings, controller->ambient_c7);
+    start(controller, settings, controller->ambient_c7, false);
     controller->safety.board_fault = board_fault;
     controller->safety.locked = locked;
+    controller->fan_percent = fan_percent;
+    return true;
+}
+
+bool controller_restart(controller_t *controller, const controller_settings_t *settings)
+{
+    scrub_open(&controller->scrub, controller_fixed, controller);
+    if (!controller_is_sound(controller)) {
+        return false;
+    }
+    const uint8_t fan_percent = controller->fan_percent;
+    thermal_model_set_fan(&controller->model, 0); /* as it is initialised; the next step tells */
+    controller->supply_ticks = 0;
+    start(controller, settings, controller->ambient_c7, true);
     controller->fan_percent = fan_percent;
     return true;
 }
@@ -687,6 +707,16 @@ bool controller_losses(const controller_t *controller, float *factor, float *sd)
 float controller_shift_k(const controller_t *controller, uint8_t spring)
 {
     return controller->policy.estimator.spring[spring].shift_k;
+}
+
+uint16_t controller_belief_mark(const controller_t *controller, uint8_t spring)
+{
+    return spring_estimator_mark(&controller->policy.estimator, &controller->model, spring);
+}
+
+const spring_sights_t *controller_sights(const controller_t *controller)
+{
+    return &controller->policy.estimator.sights;
 }
 
 float controller_cooling_s(const controller_t *controller, uint8_t spring)

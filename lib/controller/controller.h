@@ -108,6 +108,13 @@ bool controller_init(controller_t *controller, const controller_settings_t *sett
 bool controller_apply_settings(controller_t *controller, const controller_settings_t *settings,
                                uint16_t *bad);
 
+/* All that is believed begins anew, as when the power comes on, with the settings that are active;
+ * what was learnt of the springs (as it was last restored or seen, less the drift of the losses
+ * since), what was delivered, and the fan stay; all springs are off. From here on the same inputs
+ * give the same outputs as after controller_init, the same learnt numbers and this. Fails where
+ * controller_is_sound is false; then nothing is changed. Divides. */
+bool controller_restart(controller_t *controller, const controller_settings_t *settings);
+
 /* One tick of 20 ms: sensors, safety, model (every 5th tick, with the mean power of the ticks),
  * policy, current loops.
  * inputs are of the tick that just ended, outputs are for the one that starts. outputs of springs
@@ -198,6 +205,10 @@ float controller_shift_k(const controller_t *controller, uint8_t spring);
 /* What the held springs lose, of what is declared, with its standard deviation. False where fewer
  * than two are held. */
 bool controller_losses(const controller_t *controller, float *factor, float *sd);
+/* A CRC-16 of all that is believed of a spring (spring_estimator_mark). */
+uint16_t controller_belief_mark(const controller_t *controller, uint8_t spring);
+/* The last sights of the springs: why they are believed to be where they are. */
+const spring_sights_t *controller_sights(const controller_t *controller);
 /* How long it may still be hot from before power-on, s, never more than
  * CONTROLLER_COOLING_MOST_S; 0 where that is over. */
 #define CONTROLLER_COOLING_MOST_S 86400.0f

@@ -2,6 +2,7 @@
 
 #include <math.h>
 #include <stddef.h>
+#include <string.h>
 
 #include "derating.h"
 #include "invariant.h"
@@ -86,8 +87,20 @@ bool drive_policy_init(drive_policy_t *policy, const drive_policy_parameters_t *
     if (!drive_policy_check(parameters, bad)) {
         return false;
     }
-    *policy = (drive_policy_t){.springs = model->springs};
-    spring_estimator_init(&policy->estimator, model);
+    *policy = (drive_policy_t){0};
+    return drive_policy_restart(policy, parameters, model, bad);
+}
+
+bool drive_policy_restart(drive_policy_t *policy, const drive_policy_parameters_t *parameters,
+                          thermal_model_t *model, uint16_t *bad)
+{
+    if (!drive_policy_check(parameters, bad)) {
+        return false;
+    }
+    const size_t behind = offsetof(drive_policy_t, queue);
+    memset((uint8_t *)policy + behind, 0, sizeof *policy - behind);
+    policy->springs = model->springs;
+    spring_estimator_restart(&policy->estimator, model);
     (void)drive_policy_apply(policy, parameters, model, NULL);
     policy->walks = 0;
     for (uint8_t k = 0; k < policy->springs; k++) {

@@ -105,6 +105,9 @@ bool drive_policy_check(const drive_policy_parameters_t *parameters, uint16_t *b
 /* Nothing is known of any spring yet. Fails (false, nothing changed) as drive_policy_check does. */
 bool drive_policy_init(drive_policy_t *policy, const drive_policy_parameters_t *parameters,
                        thermal_model_t *model, uint16_t *bad);
+/* The same, but what was learnt of the springs stays: of a policy that was initialised, or is 0. */
+bool drive_policy_restart(drive_policy_t *policy, const drive_policy_parameters_t *parameters,
+                          thermal_model_t *model, uint16_t *bad);
 /* Replaces the parameters, and takes over those of the model; what is believed stays. Fails as
  * drive_policy_check does. */
 bool drive_policy_apply(drive_policy_t *policy, const drive_policy_parameters_t *parameters,

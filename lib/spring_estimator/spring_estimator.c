@@ -17,7 +17,6 @@
 #define UNIFORM_SD     0.29f   /* of a width */
 #define OFFSET_SD_V    0.005f  /* 8 mV, and 5 mA in 0.2 ohm: evenly */
 #define OFFSET_AGAIN_V 0.001f  /* by the next hold it may have moved by so much */
-#define LEAST_LOSS     0.8f    /* of a declared loss: with it the hottest possible spring cools */
 #define FORGETS        0.9998f /* a turn's: a disturbance is forgotten within 20 minutes */
 
 #define TRUST_STILL_SDS 0.7f /* where the transformation may never show: probably over */
@@ -129,13 +128,25 @@ static void begin(spring_belief_t *b, float temperature_c, float sd_k, uint8_t p
 
 void spring_estimator_init(spring_estimator_t *e, thermal_model_t *model)
 {
+    for (uint8_t k = 0; k < model->springs; k++) {
+        e->spring[k].learnt = (spring_learnt_t){0};
+    }
+    spring_estimator_restart(e, model);
+}
+
+void spring_estimator_restart(spring_estimator_t *e, thermal_model_t *model)
+{
     const float coldest_c = spring_ambient_c(model);
     const float width_k = SPRING_ESTIMATOR_HOTTEST_C - coldest_c;
     e->springs = model->springs;
-    e->stepped_turns = 0;
+    e->stepped_turns = e->stepped_spring = 0;
+    e->sights.turn = e->sights.count = 0;
+    e->sights.numbers = 0;
     spring_estimator_prepare(e, model, true);
     for (uint8_t k = 0; k < e->springs; k++) {
+        const spring_learnt_t learnt = e->spring[k].learnt;
         spring_estimator_forget(e, k);
+        spring_estimator_restore(e, k, &learnt);
         begin(&e->spring[k], coldest_c + 0.5f * width_k,
               UNIFORM_SD * width_k + TRUST_SD_K /* of ambient */, SPRING_PHASE_ANY);
         e->spring[k].hottest_c = SPRING_ESTIMATOR_HOTTEST_C;
@@ -151,6 +162,7 @@ void spring_estimator_trust_spring(spring_estimator_t *e, const thermal_model_t 
           : austenite == THERMAL_MODEL_AUSTENITE_FULL ? SPRING_PHASE_AUSTENITE
                                                       : SPRING_PHASE_BETWEEN);
     e->spring[k].told = austenite == 0;
+    spring_note(e, model, k, SPRING_SIGHT_TOLD, &(spring_before_t){0}, 0.0f, 0.0f);
 }
 
 void spring_estimator_trust_model(spring_estimator_t *e, const thermal_model_t *model)
@@ -240,11 +252,13 @@ float spring_see(const spring_estimator_t *e, spring_belief_t *b, thermal_model_
     return error_k;
 }
 
-void spring_keep_above(const spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model,
-                       uint8_t k, float limit_c)
+void spring_keep_above(spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model, uint8_t k,
+                       float limit_c)
 {
     const float error_k = limit_c - spring_now_c(model, k);
     if (error_k > 0.0f) {
+        spring_before_t before = spring_before(b, model, k);
+        before.loss_w_per_k -= b->kept_w_per_k; /* since it was last seen, as all of this sight */
         const float less_w_per_k = b->covariance / spring_distance_k2(b) * error_k;
         spring_correct_loss(e, b, less_w_per_k);
         b->kept_w_per_k += less_w_per_k;
@@ -257,6 +271,7 @@ void spring_keep_above(const spring_estimator_t *e, spring_belief_t *b, thermal_
         }
         spring_set_temperature(model, k, limit_c, SPRING_PHASE_AUSTENITE);
         b->last_c7 = thermal_model_temperature_c7(model, k);
+        spring_note_on(e, model, k, SPRING_SIGHT_KEPT, &before, limit_c, 0.0f);
     }
 }
 
@@ -295,12 +310,15 @@ static void look(spring_estimator_t *e, thermal_model_t *model, uint8_t k)
     const float middle_c = 0.5f * (spring_c(low_c7) + spring_c(high_c7));
     const uint8_t fresh = b->fresh;
     const bool heating = b->heating;
-    begin(b, middle_c, UNIFORM_SD * spring_c((int16_t)(high_c7 - low_c7)), phase);
+    const spring_before_t before = spring_before(b, model, k);
+    const float sd_k = UNIFORM_SD * spring_c((int16_t)(high_c7 - low_c7));
+    begin(b, middle_c, sd_k, phase);
     spring_set_temperature(model, k, middle_c,
                            austenite > 0.5f ? SPRING_PHASE_AUSTENITE : SPRING_PHASE_MARTENSITE);
     b->last_c7 = thermal_model_temperature_c7(model, k);
     b->fresh = fresh;
     b->seen = true;
+    spring_note(e, model, k, SPRING_SIGHT_LOOKED, &before, middle_c, sd_k);
     if (heating) {
         spring_estimator_begin_heating(e, model, k);
         /* a contact may have moved since, by less than would make it austenite */
@@ -321,15 +339,17 @@ static float hottest_capacity_j_per_k(const spring_estimator_t *e, const spring_
 
 /* Of a spring of which nothing is known: the hottest that it can be, and whether that is
  * martensite. Its neighbours may be as hot. */
-static void cool(const spring_estimator_t *e, spring_belief_t *b, const thermal_model_t *model,
-                 uint8_t k, float power_w)
+static void cool(spring_estimator_t *e, spring_belief_t *b, const thermal_model_t *model, uint8_t k,
+                 float power_w)
 {
     const thermal_model_transformation_t t = thermal_model_transformation(model, k);
     const float above_k = b->hottest_c - spring_ambient_c(model);
     b->hottest_c += SPRING_ESTIMATOR_TURN_S * (power_w - LEAST_LOSS * e->loss_w_per_k * above_k) /
                     hottest_capacity_j_per_k(e, b, &t);
     if (b->hottest_c < spring_c(t.martensite_finish_c7)) {
+        const spring_before_t before = spring_before(b, model, k);
         b->possible = SPRING_PHASE_MARTENSITE;
+        spring_note(e, model, k, SPRING_SIGHT_COOLED, &before, 0.0f, 0.0f);
     }
 }
 
@@ -339,7 +359,10 @@ void spring_estimator_update(spring_estimator_t *e, thermal_model_t *model, uint
     const int16_t before_c7 = b->last_c7;
     b->seen = false;
     e->stepped_turns = e->stepped_turns > 0 ? (uint16_t)(e->stepped_turns - 1) : 0;
-    const float share = spring_take_readings(b);
+    if (k == 0) {
+        spring_sights_turn(&e->sights);
+    }
+    const float share = spring_take_readings(e, model, k);
     const float power_w = b->reads ? b->current_a * b->current_a * b->ohm : 0.0f;
     const float heat_k = predict(e, b, model, k, power_w);
     const float moved_k = spring_c((int16_t)(b->last_c7 - before_c7));
@@ -469,6 +492,8 @@ void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, 
     const bool lacks =
         full && b->possible != SPRING_PHASE_AUSTENITE && spring_estimator_lacks_phase(b, model, k);
     const float phase = lacks ? spring_phase_by_resistance(b) : 1.0f; /* as it read last */
+    const spring_before_t before = spring_before(b, model, k);
+    const bool unseen = full && b->heating && b->possible != SPRING_PHASE_AUSTENITE;
     b->unproven = full && b->gone_k > 0.0f && b->possible != SPRING_PHASE_AUSTENITE &&
                   thermal_model_temperature_c7(model, k) <
                       thermal_model_transformation(model, k).austenite_finish_c7;
@@ -501,6 +526,10 @@ void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, 
     if (strong) {
         b->offset_sd_v = fmaxf(b->offset_sd_v, OFFSET_AGAIN_V);
     }
+    if (unseen) {
+        spring_note(e, model, k, SPRING_SIGHT_UNSEEN, &before, 0.0f, 0.0f);
+    }
+    spring_note_did(e, k, b->doubted ? SPRING_DID_HOLD | SPRING_DID_DOUBT : SPRING_DID_HOLD);
 }
 
 void spring_estimator_leave(spring_estimator_t *e, uint8_t k)

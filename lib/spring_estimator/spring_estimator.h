@@ -10,6 +10,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "spring_sights.h"
 #include "thermal_model.h"
 
 #ifdef __cplusplus
@@ -165,6 +166,7 @@ typedef struct {
     /* what all springs share: one was found colder than anything known explains */
     uint16_t stepped_turns; /* of all springs: for so many more it counts as lately */
     uint8_t stepped_spring;
+    spring_sights_t sights; /* for whoever asks why */
 } spring_estimator_t;
 
 typedef struct {
@@ -174,6 +176,8 @@ typedef struct {
 /* Nothing is known of any spring: any phase, from the model's ambient to
  * SPRING_ESTIMATOR_HOTTEST_C. The model's temperatures are set to the middle. */
 void spring_estimator_init(spring_estimator_t *estimator, thermal_model_t *model);
+/* The same, but what was learnt stays: of an estimator that was initialised, or is 0. */
+void spring_estimator_restart(spring_estimator_t *estimator, thermal_model_t *model);
 /* Takes what it needs of the model's parameters; whether readings are used. What is believed stays.
  */
 void spring_estimator_prepare(spring_estimator_t *estimator, const thermal_model_t *model,
@@ -269,6 +273,11 @@ spring_bounds_t spring_estimator_austenite(const spring_estimator_t *estimator,
 /* What the springs that are held lose, of what is declared, with its standard deviation: what they
  * have in common, a draught or the fan. False where fewer than two are held. O(springs). */
 bool spring_estimator_losses(const spring_estimator_t *estimator, float *factor, float *sd);
+
+/* A CRC-16 of all that is believed of a spring and of its temperature in the model, to the last
+ * bit: two that agree believe the same. */
+uint16_t spring_estimator_mark(const spring_estimator_t *estimator, const thermal_model_t *model,
+                               uint8_t spring);
 
 /* What the model must be stepped with: measured power, below 2 kW, less what this spring loses
  * beyond it. */

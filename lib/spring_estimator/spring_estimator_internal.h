@@ -31,10 +31,37 @@
 
 #define LEARNT_AT_C 20.0f /* a learnt martensite's resistance is that at this temperature */
 
-#define LOSS_SD   0.12f /* of a declared loss: 20 % */
-#define LOSS_MOST 0.45f /* of the declared loss: no more is ever believed */
+#define LOSS_SD    0.12f /* of a declared loss: 20 % */
+#define LEAST_LOSS 0.8f  /* of a declared loss: with it the hottest possible spring cools */
+#define LOSS_MOST  0.45f /* of the declared loss: no more is ever believed */
 
 #define OFFSET_MOST_V 0.012f /* no sensor's is larger */
+
+/* ---- what is noted of a sight, for whoever asks why; nothing is decided by it ---- */
+
+/* What is believed before a sight. */
+typedef struct {
+    int16_t distance_c7; /* to martensite start */
+    float sd_k;          /* 0: nothing is known */
+    float shift_k;
+    float loss_w_per_k;
+} spring_before_t;
+
+spring_before_t spring_before(const spring_belief_t *belief, const thermal_model_t *model,
+                              uint8_t spring);
+/* A sight that puts it at seen_c, give or take sd_k (0: at no place), and what has become of what
+ * was believed. */
+void spring_note(spring_estimator_t *estimator, const thermal_model_t *model, uint8_t spring,
+                 spring_sight_kind_t kind, const spring_before_t *before, float seen_c, float sd_k);
+/* The same of one that is seen turn after turn: all of it is one sight. */
+void spring_note_on(spring_estimator_t *estimator, const thermal_model_t *model, uint8_t spring,
+                    spring_sight_kind_t kind, const spring_before_t *before, float seen_c,
+                    float sd_k);
+/* Of the sight that was noted last: what was read less what was predicted, relative, and how
+ * unsure that is. */
+void spring_note_read(spring_estimator_t *estimator, uint8_t spring, float read, float sd);
+/* What is done about it; SPRING_DID_ bits. */
+void spring_note_did(spring_estimator_t *estimator, uint8_t spring, uint8_t did);
 
 #define SLOW_NOISE_MOST 0.01f /* of an average: more is no noise */
 
@@ -62,18 +89,19 @@ void spring_correct_loss(const spring_estimator_t *estimator, spring_belief_t *b
                          float more_w_per_k);
 /* It is not colder than limit_c, or that would be seen: as much as it would teach of the loss, but
  * no surer than before. */
-void spring_keep_above(const spring_estimator_t *estimator, spring_belief_t *belief,
+void spring_keep_above(spring_estimator_t *estimator, spring_belief_t *belief,
                        thermal_model_t *model, uint8_t spring, float limit_c);
 
 /* It is found in error_k (below 0: colder), by a sight that is sure to sd_k. Where that is farther
  * off than all that was known of it explains, one spring alone may have been touched, or its
  * contact has moved; where another was found so lately, the surroundings have stepped: the losses
- * of both are opened to it, so that what is seen from here on tells how much of it lasts. */
-void spring_open_to_step(spring_estimator_t *estimator, spring_belief_t *belief, uint8_t spring,
+ * of both are opened to it, so that what is seen from here on tells how much of it lasts: true. */
+bool spring_open_to_step(spring_estimator_t *estimator, spring_belief_t *belief, uint8_t spring,
                          float error_k, float sd_k);
 
 /* Takes the turn's readings. Returns the share of them in the average. */
-float spring_take_readings(spring_belief_t *belief);
+float spring_take_readings(spring_estimator_t *estimator, const thermal_model_t *model,
+                           uint8_t spring);
 /* It has jumped again and again: what it reads tells nothing. */
 bool spring_is_loose(const spring_belief_t *belief);
 /* All that readings are compared with jumps along: a contact, or the sensor. */
@@ -92,7 +120,7 @@ void spring_begin_hold_line(spring_belief_t *belief, bool now);
 bool spring_heated_enough(const spring_estimator_t *estimator, const spring_belief_t *belief,
                           const thermal_model_t *model, uint8_t spring);
 /* What it had lost was none: it is as hot as if it had not. */
-void spring_take_back(const spring_estimator_t *estimator, spring_belief_t *belief,
+void spring_take_back(spring_estimator_t *estimator, spring_belief_t *belief,
                       thermal_model_t *model, uint8_t spring);
 /* Of what it had gone by, missing (relative, signed) is still gone: nearer to being back. */
 bool spring_comes_back(const spring_belief_t *belief, float missing);
@@ -101,7 +129,7 @@ void spring_is_back(spring_belief_t *belief);
 /* What the sensor's offset may add to a resistance from one current to another, relative. */
 float spring_offset_may_show(const spring_belief_t *belief, float ohm, float from_a, float to_a);
 /* While it heats: what heat does to its resistance. */
-void spring_heating_watch(const spring_estimator_t *estimator, spring_belief_t *belief,
+void spring_heating_watch(spring_estimator_t *estimator, spring_belief_t *belief,
                           thermal_model_t *model, uint8_t spring);
 /* While its temperature rests, moved_k in the last turn: whether it loses phase. The turn's share
  * in the average is that of its readings. */

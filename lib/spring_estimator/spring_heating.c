@@ -46,6 +46,7 @@ void spring_estimator_begin_heating(spring_estimator_t *e, const thermal_model_t
     };
     b->onset = b->steep = b->unlike = false;
     b->heating = true;
+    spring_note_did(e, k, SPRING_DID_HEAT);
 }
 
 /* Where it is when its onset is seen: what a small change shows late has taken up heat by then. */
@@ -57,9 +58,9 @@ static float onset_c(const spring_estimator_t *e, const spring_belief_t *b,
            fmaxf(e->transforms_k_per_k * taken_k, ONSET_K);
 }
 
-static void see_onset(const spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model,
-                      uint8_t k)
+static void see_onset(spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model, uint8_t k)
 {
+    const spring_before_t before = spring_before(b, model, k);
     const float now_c = spring_now_c(model, k);
     b->onset = true;
     if (b->unsteady == 0) { /* else it may be the contact again */
@@ -80,8 +81,11 @@ static void see_onset(const spring_estimator_t *e, spring_belief_t *b, thermal_m
                 b->run.heat.onset_ohm = b->run.heat.cold_ohm;
             } /* else a contact has moved */
         }
-        (void)spring_see(e, b, model, k, onset_c(e, b, model, k), PLACE_SD_K,
-                         SPRING_PHASE_MARTENSITE);
+        const float seen_c = onset_c(e, b, model, k);
+        (void)spring_see(e, b, model, k, seen_c, PLACE_SD_K, SPRING_PHASE_MARTENSITE);
+        spring_note(e, model, k, SPRING_SIGHT_ONSET, &before, seen_c, PLACE_SD_K);
+    } else {
+        spring_note(e, model, k, SPRING_SIGHT_ONSET, &before, 0.0f, 0.0f);
     }
     b->run.heat.onset_k = b->run.heat.heat_k;
     b->possible = SPRING_PHASE_BETWEEN;
@@ -97,17 +101,19 @@ void spring_learn_austenite(spring_belief_t *b)
     b->learnt.austenite_ohm = b->ohm;
 }
 
-static void see_finish(const spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model,
-                       uint8_t k, float beyond_k)
+static void see_finish(spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model, uint8_t k,
+                       float beyond_k)
 {
+    const spring_before_t before = spring_before(b, model, k);
     spring_learn_austenite(b);
     b->possible = SPRING_PHASE_AUSTENITE;
     b->blind = false;
     b->steep = false;
     b->lost = 0.0f;
     const int16_t finish_c7 = thermal_model_transformation(model, k).austenite_finish_c7;
-    (void)spring_see(e, b, model, k, spring_c(finish_c7) + beyond_k, PLACE_SD_K,
-                     SPRING_PHASE_AUSTENITE);
+    const float seen_c = spring_c(finish_c7) + beyond_k;
+    (void)spring_see(e, b, model, k, seen_c, PLACE_SD_K, SPRING_PHASE_AUSTENITE);
+    spring_note(e, model, k, SPRING_SIGHT_FINISH, &before, seen_c, PLACE_SD_K);
 }
 
 /* Heat by which even the coldest and heaviest spring has come so far. */
@@ -137,8 +143,7 @@ bool spring_heated_enough(const spring_estimator_t *e, const spring_belief_t *b,
 /* A spring that still transforms, or is known to show it and has not yet, is not hotter than that
  * lets it be, whatever the model says, until it must have come so far. Where it pauses, heat warms
  * it. */
-static void hold_back(const spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model,
-                      uint8_t k)
+static void hold_back(spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model, uint8_t k)
 {
     const thermal_model_transformation_t t = thermal_model_transformation(model, k);
     const bool martensite = b->possible == SPRING_PHASE_MARTENSITE;
@@ -160,7 +165,9 @@ static void hold_back(const spring_estimator_t *e, spring_belief_t *b, thermal_m
         if (again) { /* if nothing was lost, it is warmer by that */
             b->gone_k += spring_now_c(model, k) - spring_c(limit_c7);
         }
+        const spring_before_t before = spring_before(b, model, k);
         spring_set_temperature(model, k, spring_c(limit_c7), SPRING_PHASE_MARTENSITE);
+        spring_note_on(e, model, k, SPRING_SIGHT_TRANSFORMS, &before, spring_c(limit_c7), 0.0f);
     }
 }
 
@@ -234,9 +241,21 @@ static float unexplained(const spring_belief_t *b, float change, float step_k)
     return more > 0.0f ? more : less < 0.0f ? less : 0.0f;
 }
 
+/* What it can have given off since its peak, while it waited for its turn, as it is counted: its
+ * way back from its finish, and where it is below martensite start its latent heat. A peak above
+ * that was none: a bit has turned over. */
+static float most_waited_k(const spring_estimator_t *e, const thermal_model_t *model, uint8_t k)
+{
+    const thermal_model_transformation_t t = thermal_model_transformation(model, k);
+    const int16_t now_c7 = thermal_model_temperature_c7(model, k);
+    const float cooled_k = spring_c((int16_t)(t.austenite_finish_c7 - now_c7));
+    const float latent_k = now_c7 < t.martensite_start_c7 ? e->latent_k : 0.0f;
+    return LEAST_LOSS * (fmaxf(cooled_k, 0.0f) + latent_k);
+}
+
 /* Change of resistance over heat, a step at a time: more than any temperature coefficient makes is
  * a transformation, whatever its sign. */
-void spring_heating_watch(const spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model,
+void spring_heating_watch(spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model,
                           uint8_t k)
 {
     if (!b->heating) {
@@ -258,6 +277,7 @@ void spring_heating_watch(const spring_estimator_t *e, spring_belief_t *b, therm
         b->unlike =
             b->ohm < UNLIKE_LEAST * e->martensite_ohm || b->ohm > UNLIKE_MOST * e->martensite_ohm;
     }
+    b->run.heat.peak_k = fminf(b->run.heat.peak_k, b->run.heat.heat_k + most_waited_k(e, model, k));
     if (b->run.heat.heat_k < b->run.heat.peak_k) {
         return; /* it had to wait: on the way back up nothing transforms, and that tells nothing */
     }
@@ -293,8 +313,11 @@ void spring_heating_watch(const spring_estimator_t *e, spring_belief_t *b, therm
             see_onset(e, b, model, k);
             b->steep = true;
         } else {
+            const spring_before_t before = spring_before(b, model, k);
             spring_jump(b, b->ohm / b->run.heat.onset_ohm); /* too cold: a contact */
+            spring_note(e, model, k, SPRING_SIGHT_JUMPED, &before, 0.0f, 0.0f);
         }
+        spring_note_read(e, k, b->run.heat.excess, b->noise);
         b->run.heat.excess = 0.0f; /* from here on: how it grows, or the next one */
     } else if (b->run.heat.flat_k >= FLAT_K) {
         const float change_seen = b->learnt.austenite_ohm > 0.0f
@@ -304,6 +327,7 @@ void spring_heating_watch(const spring_estimator_t *e, spring_belief_t *b, therm
                                             0.0f, SHIFT_BOUND_K);
         if (is_over(e, b, model, k, unseen_k)) {
             see_finish(e, b, model, k, b->run.heat.flat_k - unseen_k);
+            spring_note_read(e, k, change, b->noise);
         }
     }
     b->run.heat.mark_ohm = b->ohm;

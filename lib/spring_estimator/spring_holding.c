@@ -83,6 +83,7 @@ static float start_c(const thermal_model_t *model, uint8_t k)
 static void see_crossing(spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model,
                          uint8_t k, float lost, float lost_sd)
 {
+    const spring_before_t before = spring_before(b, model, k);
     const float was_w_per_k = b->learnt.loss_w_per_k;
     const bool searched = spring_estimator_sd_k(b) > 3.0f * CROSSING_SD_K;
     if (lost > LARGE_LOSS) {
@@ -101,10 +102,11 @@ static void see_crossing(spring_estimator_t *e, spring_belief_t *b, thermal_mode
     const float unsure_k = seen_c - lost_at_c(model, k, b->lost + lost_sd);
     const float sd_k = sqrtf(CROSSING_SD_K * CROSSING_SD_K + unsure_k * unsure_k);
     /* what goes on is the same step; and what goes the other way in two springs may be warmth */
-    if (first && b->gone * b->learnt.change < 0.0f) {
-        spring_open_to_step(e, b, k, seen_c - spring_now_c(model, k), sd_k);
-    }
+    const bool opened = first && b->gone * b->learnt.change < 0.0f &&
+                        spring_open_to_step(e, b, k, seen_c - spring_now_c(model, k), sd_k);
     const float error_k = spring_see(e, b, model, k, seen_c, sd_k, SPRING_PHASE_AUSTENITE);
+    spring_note(e, model, k, SPRING_SIGHT_LOST, &before, seen_c, sd_k);
+    spring_note_did(e, k, opened ? SPRING_DID_OPEN : 0);
     if (!searched && -error_k > b->disturbance_k) {
         b->disturbance_k = -error_k;
     }
@@ -113,9 +115,9 @@ static void see_crossing(spring_estimator_t *e, spring_belief_t *b, thermal_mode
 }
 
 /* It is where it was believed before, as unsure as it was found wrong. */
-void spring_take_back(const spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model,
-                      uint8_t k)
+void spring_take_back(spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model, uint8_t k)
 {
+    const spring_before_t before = spring_before(b, model, k);
     const float more_k = b->gone_k;
     const float less_w_per_k = b->gone_w_per_k;
     spring_set_temperature(model, k, spring_now_c(model, k) + more_k, SPRING_PHASE_AUSTENITE);
@@ -127,6 +129,7 @@ void spring_take_back(const spring_estimator_t *e, spring_belief_t *b, thermal_m
     b->covariance -= more_k * less_w_per_k;
     b->gone_k = b->gone_w_per_k = 0.0f;
     b->unproven = false;
+    spring_note(e, model, k, SPRING_SIGHT_TAKEN_BACK, &before, 0.0f, 0.0f);
 }
 
 bool spring_comes_back(const spring_belief_t *b, float missing)
@@ -151,6 +154,7 @@ static void look_back(spring_estimator_t *e, spring_belief_t *b, thermal_model_t
     if (missing * per_change > (fabsf(b->gone) + BACK_LEAST) * fabsf(per_change)) {
         b->gone = missing;
         see_crossing(e, b, model, k, missing * per_change, BACK_LEAST * fabsf(per_change));
+        spring_note_read(e, k, missing, BACK_LEAST);
         return;
     }
     if (b->unproven) {
@@ -158,10 +162,13 @@ static void look_back(spring_estimator_t *e, spring_belief_t *b, thermal_model_t
     }
     if (fabsf(b->gone) > BACK_LEAST) {
         if (spring_comes_back(b, missing)) {
+            const spring_before_t before = spring_before(b, model, k);
             spring_is_back(b);
+            spring_note(e, model, k, SPRING_SIGHT_BACK, &before, 0.0f, 0.0f);
         } else {
             spring_take_back(e, b, model, k);
         }
+        spring_note_read(e, k, missing, BACK_LEAST);
     }
     b->full_ohm = b->gone = 0.0f; /* too little to tell: it stays in doubt */
 }
@@ -444,6 +451,7 @@ void spring_holding_watch(spring_estimator_t *e, spring_belief_t *b, thermal_mod
         const float per_change = 1.0f / fabsf(b->learnt.change);
         const float sd = sqrtf(may_move_squared(b)) / SPRING_ESTIMATOR_BOUND_SDS;
         see_crossing(e, b, model, k, changed * per_change, sd * per_change);
+        spring_note_read(e, k, left, sqrtf(noise2 + sd * sd));
         begin_line(b, true, share); /* the average still falls */
     }
 }

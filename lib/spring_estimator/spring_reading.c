@@ -48,10 +48,20 @@ void spring_jump(spring_belief_t *b, float by)
     b->ohm_before[0] = b->ohm_before[1] = 0.0f;
 }
 
+static void note_jump(spring_estimator_t *e, const thermal_model_t *model, uint8_t k, float by,
+                      float noise)
+{
+    const spring_before_t before = spring_before(&e->spring[k], model, k);
+    spring_note(e, model, k, SPRING_SIGHT_JUMPED, &before, 0.0f, 0.0f);
+    spring_note_read(e, k, by, noise);
+}
+
 /* No phase changes so fast: it is a contact or the sensor. A turn in which it may have jumped half
  * way is left out. */
-static bool leave_out(spring_belief_t *b, float ohm, float current_a)
+static bool leave_out(spring_estimator_t *e, const thermal_model_t *model, uint8_t k, float ohm,
+                      float current_a)
 {
+    spring_belief_t *b = &e->spring[k];
     const bool holds = !b->heating && b->run.line.ohm > 0.0f;
     const bool half_way = b->ohm_before[1] > 0.0f; /* the turn between may have been */
     const float was_ohm = holds ? b->slow_ohm : b->ohm_before[half_way];
@@ -78,10 +88,15 @@ static bool leave_out(spring_belief_t *b, float ohm, float current_a)
     const bool jumps = compares && fabsf(step) > most * was_ohm;
     if (jumps && b->odd) {
         spring_jump(b, ohm / was_ohm);
+        note_jump(e, model, k, step / was_ohm, noise);
     }
     b->odd = jumps && !b->odd;
     if (b->odd && !spring_is_loose(b)) {
         b->unsteady = (uint16_t)(b->unsteady + JUMP_TURNS);
+        if (spring_is_loose(b)) {
+            note_jump(e, model, k, step / was_ohm, noise);
+            spring_note_did(e, k, SPRING_DID_BLIND);
+        }
     }
     return b->odd;
 }
@@ -122,8 +137,9 @@ static float take_reading(spring_belief_t *b, float ohm, float current_a)
     return share;
 }
 
-float spring_take_readings(spring_belief_t *b)
+float spring_take_readings(spring_estimator_t *e, const thermal_model_t *model, uint8_t k)
 {
+    spring_belief_t *b = &e->spring[k];
     float share = SLOW_SHARE;
     b->unsteady = b->unsteady > 0 ? (uint16_t)(b->unsteady - 1) : 0;
     b->reads = b->readings >= LEAST_READINGS && b->current_sum_ma >= LEAST_MEAN_MA * b->readings &&
@@ -132,7 +148,7 @@ float spring_take_readings(spring_belief_t *b)
         const float offset_mv = 1e3f * b->learnt.offset_v * (float)b->readings;
         const float ohm = ((float)b->voltage_sum_mv - offset_mv) / (float)b->current_sum_ma;
         const float current_a = (float)b->current_sum_ma * 1e-3f / (float)b->readings;
-        if (!leave_out(b, ohm, current_a)) {
+        if (!leave_out(e, model, k, ohm, current_a)) {
             share = take_reading(b, ohm, current_a);
         }
     } else {

@@ -7,14 +7,15 @@
 #define STEP_LASTS    0.8f  /* how much of such an error a step that lasts makes: a correlation */
 #define STEP_LATELY_S 60.0f /* a spring's time constant, C / G = 52 s */
 
-void spring_open_to_step(spring_estimator_t *e, spring_belief_t *b, uint8_t k, float error_k,
+bool spring_open_to_step(spring_estimator_t *e, spring_belief_t *b, uint8_t k, float error_k,
                          float sd_k)
 {
     const float known_k2 = spring_distance_k2(b) + sd_k * sd_k;
     if (error_k >= 0.0f || error_k * error_k < STEP_SDS * STEP_SDS * known_k2) {
-        return;
+        return false;
     }
-    if (e->stepped_turns > 0 && e->stepped_spring != k) {
+    const bool opens = e->stepped_turns > 0 && e->stepped_spring != k;
+    if (opens) {
         const float step_w_per_k = STEP_OF_LOSS * e->loss_w_per_k;
         spring_belief_t *other = &e->spring[e->stepped_spring];
         other->loss_variance = fmaxf(other->loss_variance, step_w_per_k * step_w_per_k);
@@ -24,6 +25,7 @@ void spring_open_to_step(spring_estimator_t *e, spring_belief_t *b, uint8_t k, f
     }
     e->stepped_turns = (uint16_t)((STEP_LATELY_S / SPRING_ESTIMATOR_TURN_S) * (float)e->springs);
     e->stepped_spring = k;
+    return opens;
 }
 
 bool spring_estimator_losses(const spring_estimator_t *e, float *factor, float *sd)

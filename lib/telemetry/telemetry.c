@@ -1,10 +1,13 @@
-#include "telemetry.h"
+#include "telemetry_internal.h"
 
+#include <stddef.h>
 #include <string.h>
 
 #define PIECE_BYTES 240u /* the last spring's Teleplot lines, with the array's */
 #define CUT_SHIFT   6u   /* cuts are remembered in 64 mA */
 #define CUT_STEPS   8u   /* and told again when they differ by more */
+#define TOLD_AFTER_TURNS                                                                           \
+    2u /* of a sight: a drive acts on it in the next turn; one that goes on is over */
 
 void telemetry_init(telemetry_t *telemetry)
 {
@@ -23,11 +26,12 @@ bool telemetry_set(telemetry_t *telemetry, uint8_t format, uint8_t hz)
     telemetry->next = 0;
     telemetry->left = 0;
     telemetry->rounds = 0;
+    telemetry->tells = false;
     memset(telemetry->told, 0, sizeof telemetry->told);
     return true;
 }
 
-static void count_dropped(telemetry_t *telemetry, uint8_t lines)
+void telemetry_count_dropped(telemetry_t *telemetry, uint8_t lines)
 {
     const uint16_t dropped = (uint16_t)(telemetry->dropped + lines);
     telemetry->dropped = dropped < lines ? UINT16_MAX : dropped;
@@ -91,7 +95,7 @@ static void write_csv(telemetry_t *telemetry, const controller_t *controller,
     text_line_t *const line = &piece.line;
     const uint8_t springs = controller_springs(controller);
     if (output->room(output->context) < TELEMETRY_LINE_BYTES((uint16_t)springs)) {
-        count_dropped(telemetry, 1);
+        telemetry_count_dropped(telemetry, 1);
         return;
     }
     start_piece(&piece);
@@ -206,10 +210,90 @@ static bool write_spring(telemetry_t *telemetry, const controller_t *controller,
     return !csv || !says; /* of status at most one line a tick */
 }
 
+/* Some milliseconds before. */
+static text_time_t earlier(const text_time_t *time, uint32_t by_ms)
+{
+    text_time_t then = {time->s - by_ms / 1000u, (uint16_t)(time->ms + 1000u - by_ms % 1000u)};
+    if (then.ms >= 1000u) {
+        then.ms = (uint16_t)(then.ms - 1000u);
+    } else {
+        then.s--;
+    }
+    return then;
+}
+
+static void add_sight(piece_t *piece, const spring_sight_t *sight, const text_time_t *time)
+{
+    /* as spring_sight_kind_t and SPRING_DID_ have them */
+    static const char kinds[] FLASH_MEMORY =
+        "onset\0finish\0unseen\0lost\0kept\0transforms\0back\0taken_back\0jumped\0looked\0told\0"
+        "cooled";
+    static const char deeds[] FLASH_MEMORY = "heated\0held\0blind\0opened\0doubted";
+    text_line_t *const line = &piece->line;
+    piece->values[0] = sight->spring + 1;
+    add(piece, FLASH_TEXT("<sight|spring:#0|t:"));
+    text_add_time_s(line, time);
+    text_add_char(line, '|');
+    text_add_flash(line, text_item(kinds, sight->kind));
+    if (sight->read_sd != 0) {
+        piece->values[0] = sight->read;
+        piece->values[1] = sight->read_sd;
+        add(piece, FLASH_TEXT("|read:#2|read_sd:#2"));
+    }
+    if (sight->believed_sd != 0) {
+        piece->values[0] = sight->believed;
+        piece->values[1] = sight->believed_sd;
+        add(piece, FLASH_TEXT("|believed_k:#1|believed_sd:#1"));
+    }
+    if (sight->seen_sd != 0) {
+        piece->values[0] = sight->seen;
+        piece->values[1] = sight->seen_sd;
+        add(piece, FLASH_TEXT("|seen_k:#1|seen_sd:#1"));
+    }
+    piece->values[0] = sight->now;
+    piece->values[1] = sight->now_sd;
+    piece->values[2] = sight->shift;
+    piece->values[3] = sight->loss;
+    add(piece, FLASH_TEXT("|now_k:#1|now_sd:#1|shift_k:#1|loss:#2"));
+    for (uint8_t i = 0; (unsigned)sight->did >> i != 0; i++) {
+        if (((unsigned)sight->did >> i & 1u) != 0) {
+            text_add_char(line, '|');
+            text_add_flash(line, text_item(deeds, i));
+        }
+    }
+    text_add_flash(line, FLASH_TEXT(">\r\n"));
+}
+
+/* The next sight that is not told yet, where it is old enough and finds room. */
+static void write_sight(telemetry_t *telemetry, const controller_t *controller,
+                        const text_time_t *time, const text_output_t *output)
+{
+    const spring_sights_t *const sights = controller_sights(controller);
+    const spring_sight_t *const sight =
+        spring_sights_from(sights, SPRING_SIGHTS_ANY,
+                           telemetry->tells ? telemetry->sight : spring_sights_first(sights));
+    if (sight == NULL) {
+        return;
+    }
+    const uint16_t age_turns = spring_sights_age_turns(sights, sight);
+    if (age_turns < TOLD_AFTER_TURNS) {
+        return;
+    }
+    const text_time_t then = earlier(time, age_turns * (1000ul / SPRING_SIGHTS_TURNS_PER_S));
+    piece_t piece;
+    start_piece(&piece);
+    add_sight(&piece, sight, &then);
+    if (output->room(output->context) >= piece.line.length) {
+        telemetry->tells = true;
+        telemetry->sight = sight->number + 1u;
+        flush(&piece.line, output);
+    }
+}
+
 void telemetry_tick(telemetry_t *telemetry, const controller_t *controller, const text_time_t *time,
                     int16_t ambient_c7, const text_output_t *output)
 {
-    if (telemetry->format == TELEMETRY_OFF) {
+    if (telemetry->format == TELEMETRY_OFF || telemetry->format == TELEMETRY_INPUTS) {
         return;
     }
     telemetry->phase = (uint8_t)(telemetry->phase + telemetry->hz);
@@ -218,12 +302,16 @@ void telemetry_tick(telemetry_t *telemetry, const controller_t *controller, cons
         if (telemetry->format == TELEMETRY_CSV) {
             write_csv(telemetry, controller, time, ambient_c7, output);
         } else {
-            count_dropped(telemetry, telemetry->left);
+            telemetry_count_dropped(telemetry, telemetry->left);
             telemetry->rounds = (uint8_t)((telemetry->rounds + 1u) % telemetry->hz);
         }
         telemetry->left = controller_springs(controller);
     }
     while (telemetry->left != 0 && write_spring(telemetry, controller, time, output)) {
+    }
+    /* after the first row: who asked for it has had its answer by then */
+    if (telemetry->format == TELEMETRY_CSV && telemetry->left == 0 && telemetry->next != 0) {
+        write_sight(telemetry, controller, time, output);
     }
 }
 

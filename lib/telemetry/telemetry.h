@@ -18,6 +18,7 @@ typedef enum {
     TELEMETRY_OFF = 0,
     TELEMETRY_CSV,
     TELEMETRY_TELEPLOT,
+    TELEMETRY_INPUTS, /* telemetry_inputs instead of telemetry_tick */
     TELEMETRY_FORMAT_COUNT
 } telemetry_format_t;
 
@@ -46,6 +47,8 @@ typedef struct {
     uint8_t next;     /* spring whose turn it is; the array's springs: the first */
     uint8_t left;     /* springs that have not had theirs in this period */
     uint8_t rounds;   /* of Teleplot, since one with bounds */
+    bool tells;       /* sights from this number on are still to be told; else from the first */
+    uint32_t sight;
     telemetry_told_t told[CONTROLLER_MAX_SPRINGS];
 } telemetry_t;
 
@@ -63,14 +66,27 @@ bool telemetry_set(telemetry_t *telemetry, uint8_t format, uint8_t hz);
  * much: "<limits|spring:5|t:12.340|supply|temperature|cut_a:2.610>", "|none|" once they have ended.
  * Once a period each spring is looked at, and told where its limits are others than those last told
  * or the cut has changed by half an ampere: at most one such line a tick, later where there is no
- * room.
- * Teleplot is a round a period: i{k} and m{k} of each spring, limits{k} and cut{k} while limits act
- * and once when they have ended, once a second low{k} and high{k}, the bounds of its temperature,
- * fan and fault with the last spring. A round takes as many ticks as
- * it needs; what is left of it when the next one is due is dropped, counted once a spring, and the
+ * room. So is each sight of a spring (spring_sights.h), half a second later, when it is known what
+ * was done about it:
+ * "<sight|spring:5|t:12.340|lost|read:-1.32|read_sd:0.05|believed_k:2.4|believed_sd:1.8|seen_k:-0.8|
+ * seen_sd:1.2|now_k:0.1|now_sd:1.0|shift_k:0.4|loss:1.20|heated>": in the words of `why`, what does
+ * not apply left out. Teleplot is a round a period: i{k} and m{k} of each spring, limits{k} and
+ * cut{k} while limits act and once when they have ended, once a second low{k} and high{k}, the
+ * bounds of its temperature, fan and fault with the last spring. A round takes as many ticks as it
+ * needs; what is left of it when the next one is due is dropped, counted once a spring, and the
  * next one begins there. */
 void telemetry_tick(telemetry_t *telemetry, const controller_t *controller, const text_time_t *time,
                     int16_t ambient_c7, const text_output_t *output);
+
+/* Once per control tick, after it: in the format TELEMETRY_INPUTS all that the controller was
+ * given, as a line of hil_frame.h ("~S..."), and the mark of one spring after the other:
+ * "<belief|spring:5|tick:1234|mark:4A6C>". Together with the lines that were typed, in their
+ * places, that is what a replay needs: sim_host/rerun. tick counts, modulo 65536. */
+void telemetry_inputs(telemetry_t *telemetry, const controller_t *controller,
+                      const controller_inputs_t *inputs, uint16_t tick,
+                      const text_output_t *output);
+/* " 3C0F": so many bytes from the lowest address on, as hexadecimal digits. */
+void telemetry_add_hex(text_line_t *line, const void *bytes, uint8_t count);
 
 /* The names of the limits (bits of drive_policy_limit_t), each after the separator. */
 void telemetry_add_limits(text_line_t *line, uint16_t limits, char separator);

@@ -22,6 +22,7 @@ namespace ninespring
 void add_command_run(CLI::App &app);
 void add_command_paper(CLI::App &app);
 void add_command_replay(CLI::App &app);
+void add_command_rerun(CLI::App &app);
 void add_command_parameters(CLI::App &app);
 void add_command_hil(CLI::App &app);
 void add_command_board(CLI::App &app); /* only where libsimavr is */

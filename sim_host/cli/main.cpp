@@ -46,6 +46,7 @@ int main(int argc, char **argv)
         add_command_run(app);
         add_command_paper(app);
         add_command_replay(app);
+        add_command_rerun(app);
         add_command_parameters(app);
         add_command_hil(app);
 #ifdef NINESPRING_BOARD

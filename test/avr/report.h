@@ -1,6 +1,7 @@
 /* What it is for: programs that run on the simulated Mega: they say what they found over the
  * serial port.
- * What it owns: USART0, and GPIOR0 as the mark from which the runner counts cycles.
+ * What it owns: USART0, GPIOR0 as the mark from which the runner counts cycles, GPIOR1 as that at
+ * which it keeps the variables.
  * What it never does: decide whether a figure is good; that is the runner's. */
 #ifndef REPORT_H
 #define REPORT_H
@@ -39,6 +40,14 @@ static inline void report_number(uint32_t value)
     GPIOR0 = 1
 #define COUNTED()                                                                                  \
     GPIOR0 = 0;                                                                                    \
+    __asm__ volatile("" ::: "memory")
+
+/* All variables with a static place are afterwards what they were: the runner keeps them. */
+#define KEEP_VARIABLES()                                                                           \
+    __asm__ volatile("" ::: "memory");                                                             \
+    GPIOR1 = 1
+#define PUT_BACK_VARIABLES()                                                                       \
+    GPIOR1 = 2;                                                                                    \
     __asm__ volatile("" ::: "memory")
 
 /* Ends the program: the runner sees a sleep with interrupts off. */

@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 SKIPPED = 77
@@ -19,14 +20,9 @@ except ImportError:
     sys.exit(SKIPPED)
 
 
-def main() -> int:
-    program, avr = sys.argv[1], Path(sys.argv[2])
-    elf = avr / "firmware_hil.elf"
-    if not elf.exists():
-        print(f"SKIPPED: {elf} is not there: build the avr target first")
-        return SKIPPED
+def goes_on_between_the_frames(program: str, elf: Path) -> None:
     result = Path.cwd() / "board_hil.json"
-    with Board(program, elf, "--speed", "0.2") as board:
+    with Board(program, elf, "--speed", "0.1") as board:
         run = subprocess.run(
             [
                 program, "hil", "--port", board.port, "--duration", str(SIMULATED_S), "--json", str(result),
@@ -51,7 +47,11 @@ def main() -> int:
     assert summary["final_current_a"][1] == 0.0, summary
     # A 1 x 2 array: nothing is connected to channel 3.
     assert summary["final_current_a"][2] == 0.0, summary
-    with Board(program, elf, "--speed", "0.2") as board:
+
+
+def a_closed_switch_is_found(program: str, elf: Path) -> None:
+    result = Path.cwd() / "board_hil_closed.json"
+    with Board(program, elf, "--speed", "0.1") as board:
         run = subprocess.run(
             [
                 program, "hil", "--port", board.port, "--duration", "2.6", "--json", str(result),
@@ -66,6 +66,9 @@ def main() -> int:
     result.unlink()
     assert summary["final_current_a"][0] > 10.0, summary
     assert summary["final_current_a"][1] == 0.0, summary
+
+
+def a_port_that_is_not_there_is_said(program: str, elf: Path) -> None:
     missing = subprocess.run(
         [program, "hil", "--port", "/no/such/port"],
         check=False,
@@ -75,6 +78,18 @@ def main() -> int:
     )
     assert missing.returncode == 2
     assert missing.stderr.count("\n") == 1
+
+
+def main() -> int:
+    program, avr = sys.argv[1], Path(sys.argv[2])
+    elf = avr / "firmware_hil.elf"
+    if not elf.exists():
+        print(f"SKIPPED: {elf} is not there: build the avr target first")
+        return SKIPPED
+    tests = (goes_on_between_the_frames, a_closed_switch_is_found, a_port_that_is_not_there_is_said)
+    with ThreadPoolExecutor(len(tests)) as pool:  # each has a board of its own, that goes slowly
+        for done in [pool.submit(test, program, elf) for test in tests]:
+            done.result()
     print("PASS")
     return 0
 

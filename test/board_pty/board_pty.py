@@ -8,6 +8,7 @@ import statistics
 import subprocess
 import sys
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Self
 
@@ -207,14 +208,20 @@ def main() -> int:
     if not elf.exists():
         print(f"SKIPPED: {elf} is not there: build the avr target first")
         return SKIPPED
-    talks_like_a_board(program, elf)
-    survives_clients_that_leave(program, elf)
-    waits_for_a_slow_reader(program, elf)
-    a_host_alive_by_the_wall_clock_is_not_silent(program, elf)
-    keeps_its_eeprom(program, elf, Path.cwd())
-    ends_cleanly(program, elf)
-    thermometers_beside_the_board(program, elf, Path.cwd())
-    refuses_what_is_wrong(program, elf)
+    here = Path.cwd()
+    tests = (
+        (thermometers_beside_the_board, here),
+        (a_host_alive_by_the_wall_clock_is_not_silent,),
+        (waits_for_a_slow_reader,),
+        (keeps_its_eeprom, here),
+        (survives_clients_that_leave,),
+        (talks_like_a_board,),
+        (ends_cleanly,),
+        (refuses_what_is_wrong,),
+    )
+    with ThreadPoolExecutor(len(tests)) as pool:  # each has boards of its own, and waits for most of its time
+        for done in [pool.submit(test, program, elf, *more) for test, *more in tests]:
+            done.result()
     print("PASS")
     return 0
 

@@ -17,10 +17,12 @@
 #include <sim_io.h>
 
 #define GPIOR0_ADDRESS 0x3e
+#define GPIOR1_ADDRESS 0x4a
 #define NAMES_MAX      32
 #define CYCLES_MAX     2000000000u
 #define RAM_BEGIN      0x200u
 #define PAINT          0xC5
+#define RAM_BYTES      8192u
 #define PAINTED_BYTES  64u /* above the variables: that the stack must leave as they are */
 
 typedef struct {
@@ -37,6 +39,8 @@ typedef struct {
     char line[200];
     size_t length;
     bool passed;
+    size_t variable_bytes;
+    uint8_t kept[RAM_BYTES]; /* the variables, at the program's wish */
 } runner_t;
 
 static int figure_named(runner_t *runner, const char *name)
@@ -68,6 +72,17 @@ static void on_mark(avr_t *avr, avr_io_addr_t address, uint8_t value, void *para
         cycles = cycles > 1u ? cycles - 1u : 0u; /* the stop mark's OUT */
         figure->least = cycles < figure->least ? cycles : figure->least;
         figure->most = cycles > figure->most ? cycles : figure->most;
+    }
+}
+
+static void on_keep(avr_t *avr, avr_io_addr_t address, uint8_t value, void *parameter)
+{
+    runner_t *runner = parameter;
+    avr->data[address] = value;
+    if (value == 1) {
+        memcpy(runner->kept, avr->data + RAM_BEGIN, runner->variable_bytes);
+    } else {
+        memcpy(avr->data + RAM_BEGIN, runner->kept, runner->variable_bytes);
     }
 }
 
@@ -124,10 +139,16 @@ int main(int argc, char **argv)
     avr_init(avr);
     firmware.frequency = 16000000;
     avr_load_firmware(avr, &firmware);
-    uint8_t *const above_variables = avr->data + RAM_BEGIN + firmware.datasize + firmware.bsssize;
+    static runner_t runner = {.current = -1};
+    runner.variable_bytes = (size_t)firmware.datasize + firmware.bsssize;
+    if (runner.variable_bytes > RAM_BYTES - PAINTED_BYTES) {
+        fprintf(stderr, "%s: its variables leave no room for a stack\n", argv[1]);
+        return 2;
+    }
+    uint8_t *const above_variables = avr->data + RAM_BEGIN + runner.variable_bytes;
     memset(above_variables, PAINT, PAINTED_BYTES);
-    runner_t runner = {.current = -1};
     avr_register_io_write(avr, GPIOR0_ADDRESS, on_mark, &runner);
+    avr_register_io_write(avr, GPIOR1_ADDRESS, on_keep, &runner);
     avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_UART_GETIRQ('0'), UART_IRQ_OUTPUT),
                             on_byte, &runner);
     uint32_t flags = 0;

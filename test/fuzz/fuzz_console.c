@@ -100,6 +100,7 @@ static void happen(uint8_t what, fuzz_t *fuzz)
         for (unsigned n = 0; n <= what % 32u; n++) {
             tick();
             telemetry_tick(&telemetry, &controller, &status.time, inputs.ambient_c7, &output);
+            telemetry_inputs(&telemetry, &controller, &inputs, (uint16_t)status.ticks, &output);
         }
         break;
     }

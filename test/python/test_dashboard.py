@@ -21,6 +21,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from command import ninespring
 from fake_board import FakeBoard, row
 from ninespring.dashboard import server, source
 from ninespring.io import words
@@ -125,6 +126,29 @@ def test_a_click_heats_a_spring_and_stop_ends_it_from_button_and_key(
         expect(spring(page, 5)).not_to_have_class(re.compile("on"))
     page.click("#clear")
     expect(page.locator("#state")).to_have_text(re.compile("^(ready|not known yet)$"))
+    assert page.problems == []
+    page.close()
+
+
+@needs_browser
+@needs_board
+def test_why_a_spring_is_believed_to_be_where_it_is_is_shown_and_follows(
+    browser: Browser, simulated: tuple[Dashboard, Path]
+) -> None:
+    page = opened(browser, simulated[0])
+    page.click("#clear")
+    page.click("#why-card summary")
+    page.select_option("#why-spring", "7")
+    expect(page.locator("#why")).to_contain_text("spring 7 in the last 4 hours")  # nothing yet
+    page.fill("#line", "model cold")
+    page.press("#line", "Enter")
+    expect(page.locator("#why")).to_contain_text("it is said to be known", timeout=30_000)
+    expect(page.locator("#why")).to_contain_text("of martensite start: now ")
+    page.select_option("#why-spring", "2")
+    expect(page.locator("#why")).to_contain_text("it is said to be known")
+    expect(page.locator("#log")).not_to_contain_text(
+        "it is said to be known"
+    )  # each is told once, where it was asked for
     assert page.problems == []
     page.close()
 
@@ -740,6 +764,23 @@ def test_what_a_board_believes_reaches_the_page(tmp_path: Path) -> None:
         assert state["doing"] == ["not known for 75 s: it may still be hot from before power-on"]
 
 
+def test_a_sight_reaches_the_page_and_the_log_and_counts_as_no_corrupt_line(tmp_path: Path) -> None:
+    board = FakeBoard()
+    sight = "<sight|spring:1|t:96.250|lost|read:-1.32|read_sd:0.05|now_k:0.1|now_sd:1.0|shift_k:0.4|loss:1.20|heated|opened>"
+    with page_of(board, tmp_path) as socket:
+        socket.send(json.dumps({"do": "record", "id": 1}))
+        while not json.loads(socket.recv(10)).get("recording"):
+            pass
+        board.say(sight)
+        while (state := json.loads(socket.recv(10))).get("sights") != [1]:
+            pass
+        while (now := json.loads(socket.recv(10))).get("time_s", 0.0) < state["time_s"] + 0.3:
+            pass
+        assert now["corrupt"] == 0
+    (log,) = tmp_path.iterdir()
+    assert f"# {sight}\n" in log.read_text()
+
+
 def test_each_id_of_the_page_is_of_one_element_and_the_script_finds_it() -> None:
     page = ROOT / "calibrate" / "src" / "ninespring" / "dashboard" / "page"
     ids = re.findall(r' id="([^"]+)"', (page / "index.html").read_text())
@@ -795,8 +836,7 @@ def test_what_hinders_is_said_in_the_terminal_too(tmp_path: Path) -> None:
     "arguments", [(), ("--simulate", "--port", "x"), ("--simulate", "--listen", "here"), ("--replay", "no-such.csv")]
 )
 def test_arguments_that_do_not_go_together_are_refused(arguments: tuple[str, ...]) -> None:
-    words = [sys.executable, "-m", "ninespring", "dashboard", *arguments]
-    done = subprocess.run(words, capture_output=True, text=True, timeout=60, check=False)
+    done = ninespring("dashboard", *arguments)
     assert done.returncode == 2
     assert len(done.stderr.strip().splitlines()) == 1
 

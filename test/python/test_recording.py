@@ -22,11 +22,14 @@ import numpy as np
 import pytest
 import serial
 from click.testing import CliRunner
+from command import ninespring
 from fake_board import TELEMETRY, FakeBoard, row
 from hypothesis import given
 from hypothesis import strategies as st
 from ninespring.cli import main as cli
 from ninespring.errors import WorkError
+from ninespring.io import board as found_by
+from ninespring.io import recording, thermometers
 from ninespring.io.board import Board
 from ninespring.io.logs import read_log, read_table
 from ninespring.io.port import Port
@@ -38,12 +41,9 @@ from rich.console import Console
 STREAM = [row(0.5 * k) for k in range(1, 40)]
 
 
-def command(*arguments: object) -> list[str]:
+def process(*arguments: object) -> list[str]:
+    """Return the command as a process of its own, which can be told to end."""
     return [sys.executable, "-m", "ninespring", *map(str, arguments)]
-
-
-def ninespring(*arguments: object) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(command(*arguments), capture_output=True, text=True, timeout=120, check=False)
 
 
 def record(board: FakeBoard, folder: Path, *more: object) -> subprocess.CompletedProcess[str]:
@@ -82,14 +82,14 @@ def test_a_signal_keeps_what_came_and_switches_off(tmp_path: Path, told: signal.
     board.stream, board.every_s = STREAM, 0.1
     (tmp_path / "steps.txt").write_text("on 1\n")
     words = ("record", "--port", board.port, "--hz", 2, "--run", tmp_path / "steps.txt", "-o", tmp_path / "log.csv")
-    with subprocess.Popen(command(*words), stderr=subprocess.PIPE, text=True) as process:
+    with subprocess.Popen(process(*words), stderr=subprocess.PIPE, text=True) as running:
         part = tmp_path / "log.csv.part"
-        while process.poll() is None and not (part.exists() and "\n2.0," in part.read_text()):
+        while running.poll() is None and not (part.exists() and "\n2.0," in part.read_text()):
             time.sleep(0.02)
-        process.send_signal(told)
+        running.send_signal(told)
         time.sleep(0.05)
-        process.send_signal(told)  # an impatient second one does not cut it short
-        assert process.wait(30) == 0, process.stderr
+        running.send_signal(told)  # an impatient second one does not cut it short
+        assert running.wait(30) == 0, running.stderr
     assert times(tmp_path / "log.csv")[:4] == [0.5, 1.0, 1.5, 2.0]
     assert not part.exists()
     assert_off(board)
@@ -100,10 +100,10 @@ def test_a_recording_that_is_killed_leaves_its_rows_readable_and_the_next_one_ke
     board.stream, board.every_s = STREAM, 0.1
     part = tmp_path / "log.csv.part"
     words = ("record", "--port", board.port, "--hz", 2, "-o", tmp_path / "log.csv")
-    with subprocess.Popen(command(*words)) as process:
-        while process.poll() is None and not (part.exists() and "\n2.0," in part.read_text()):
+    with subprocess.Popen(process(*words)) as running:
+        while running.poll() is None and not (part.exists() and "\n2.0," in part.read_text()):
             time.sleep(0.02)
-        process.kill()
+        running.kill()
     assert times(part)[:4] == [0.5, 1.0, 1.5, 2.0]
     kept = part.read_bytes()
     board = FakeBoard()
@@ -158,12 +158,13 @@ def test_a_board_that_starts_again_ends_the_recording(tmp_path: Path) -> None:
     assert_off(board)
 
 
-def test_telemetry_that_falls_silent_ends_the_recording(tmp_path: Path) -> None:
+def test_telemetry_that_falls_silent_ends_the_recording(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(recording, "SILENT_S", recording.SILENT_S / 5)
     board = FakeBoard()
     board.stream = STREAM[:3]
     done = record(board, tmp_path)
     assert done.returncode == 1
-    assert "no telemetry for 5 s" in done.stderr
+    assert "no telemetry for 1 s" in done.stderr
     assert times(tmp_path / "log.csv") == [0.5, 1.0, 1.5]
     assert_off(board)
 
@@ -274,7 +275,7 @@ def test_a_wrong_script_is_refused_with_its_line(tmp_path: Path, text: str, line
     assert done.stderr.startswith(f"ninespring: {tmp_path / 'steps.txt'}:{line}:1: ")
 
 
-def test_the_example_in_its_help_runs(tmp_path: Path) -> None:
+def test_the_example_in_its_help_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     text = CliRunner().invoke(cli.cli, ["record", "--help"]).output
     words = shlex.split(re.search(r"^ +(ninespring record .*)$", text, re.MULTILINE)[1])
     steps = text.partition("steps.txt (")[2].partition("\n")[2]
@@ -282,7 +283,8 @@ def test_the_example_in_its_help_runs(tmp_path: Path) -> None:
     board = FakeBoard()
     board.stream = (f"{k}.0,1.000,0.200,20.00,0.00,20.00,ok" for k in range(1, 2000))
     words[words.index("--port") + 1] = board.port
-    done = subprocess.run(command(*words[1:]), capture_output=True, text=True, cwd=tmp_path, timeout=60, check=False)
+    monkeypatch.chdir(tmp_path)
+    done = ninespring(*words[1:])
     assert done.returncode == 0, done.stderr
     assert {"ambient 21.5", "pattern 101000101", "fan 100", "off all"} <= set(board.sent())
     assert times(tmp_path / "board1.csv")[-1] == 901.0
@@ -291,7 +293,8 @@ def test_the_example_in_its_help_runs(tmp_path: Path) -> None:
 def test_the_log_can_go_to_standard_output(tmp_path: Path) -> None:
     board = FakeBoard()
     board.stream = STREAM
-    done = ninespring("record", "--port", board.port, "--hz", 2, "--duration", 2, "-o", "-")
+    words = process("record", "--port", board.port, "--hz", 2, "--duration", 2, "-o", "-")
+    done = subprocess.run(words, capture_output=True, text=True, timeout=60, check=False)
     assert done.returncode == 0, done.stderr
     (tmp_path / "log.csv").write_text(done.stdout)
     assert times(tmp_path / "log.csv") == [0.5, 1.0, 1.5, 2.0, 2.5]
@@ -301,7 +304,7 @@ def test_the_log_can_go_to_standard_output(tmp_path: Path) -> None:
 def test_a_reader_that_goes_away_ends_the_recording(tmp_path: Path) -> None:
     board = FakeBoard()
     board.stream, board.every_s = [row(0.5 * k) for k in range(1, 2000)], 0.002
-    words = shlex.join(command("record", "--port", board.port, "--hz", 2, "--duration", 5000, "-o", "-"))
+    words = shlex.join(process("record", "--port", board.port, "--hz", 2, "--duration", 5000, "-o", "-"))
     done = subprocess.run(f"{words} | head -3", shell=True, capture_output=True, text=True, timeout=60, check=False)
     assert len(done.stdout.splitlines()) == 3
     assert_off(board)
@@ -450,6 +453,8 @@ def other_thing(said: bytes) -> str:
 def test_a_silent_or_foreign_port_is_recognised_within_five_seconds(
     monkeypatch: pytest.MonkeyPatch, said: bytes, message: str
 ) -> None:
+    assert found_by.FOUND_WITHIN_S <= 5.0
+    monkeypatch.setattr(found_by, "FOUND_WITHIN_S", 1.5)  # two questions, and what is left
     port = other_thing(said)
     asked: list[tuple[float, float]] = []
     """When a line was waited for, and until when: by this, whatever the machine makes of it."""
@@ -462,19 +467,19 @@ def test_a_silent_or_foreign_port_is_recognised_within_five_seconds(
     monkeypatch.setattr(Port, "read_line", watched)
     with pytest.raises(WorkError, match=re.escape(message)):
         Board(port)
-    assert max(until_s for _, until_s in asked) - asked[0][0] < 5.0
+    assert max(until_s for _, until_s in asked) - asked[0][0] < 1.5
 
 
 def test_a_second_program_on_the_port_is_named(tmp_path: Path) -> None:
     board = FakeBoard()
     board.stream, board.every_s = (row(0.1 * k) for k in range(10, 99999)), 0.1
-    with subprocess.Popen(command("record", "--port", board.port, "-o", tmp_path / "log.csv")) as process:
+    with subprocess.Popen(process("record", "--port", board.port, "-o", tmp_path / "log.csv")) as running:
         while "telemetry csv 10" not in board.seen:
             time.sleep(0.02)
         done = ninespring("monitor", "--port", board.port)  # this process is the board
-        process.terminate()
+        running.terminate()
     assert done.returncode == 1
-    assert re.search(rf"another program has the port \(.*, pid {process.pid}\): end it first", done.stderr), done.stderr
+    assert re.search(rf"another program has the port \(.*, pid {running.pid}\): end it first", done.stderr), done.stderr
 
 
 def test_a_port_that_is_not_there_or_is_none_is_said(tmp_path: Path) -> None:
@@ -602,7 +607,7 @@ def test_thermometers_are_merged_onto_the_boards_clock_and_the_offset_is_said(tm
 
     board.stream, board.every_s = rows(), 0.5
     threading.Thread(target=read, daemon=True).start()
-    done = record(board, tmp_path, "--duration", 8, "--thermometers", logger.port)
+    done = record(board, tmp_path, "--duration", 5, "--thermometers", logger.port)
     logger.gone = True
     assert done.returncode == 0, done.stderr
     frame = read_table(tmp_path / "log.csv", ("state",)).frame
@@ -615,7 +620,10 @@ def test_thermometers_are_merged_onto_the_boards_clock_and_the_offset_is_said(tm
     assert "the thermometers' clock was" in done.stdout
 
 
-def test_a_port_without_thermometers_is_said_before_anything_is_driven(tmp_path: Path) -> None:
+def test_a_port_without_thermometers_is_said_before_anything_is_driven(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(thermometers, "FOUND_WITHIN_S", 1.0)
     board = FakeBoard()
     done = record(board, tmp_path, "--thermometers", other_thing(b""))
     assert done.returncode == 1

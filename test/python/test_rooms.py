@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import ast
 import re
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -17,8 +19,11 @@ ROOMS = ("errors", "io", "model", "export", "infer", "find", "say", "explore", "
 INSIDE = {
     # what a user may not have: `pip install ninespring[explore]`, or a Windows that has no such thing
     *("SALib", "dask", "distributed", "gmsh", "optuna", "pyarrow", "skfem", "fcntl", "termios"),
-    # of the package's door: whoever only talks to a board waits for no SciPy
+    # of doors: whoever only talks to a board waits for no SciPy
     "ninespring.api",
+    "ninespring.dashboard.replay_source.ReplaySource",
+    # half a second that only a sweep that draws its points has to wait for
+    "scipy.stats.qmc",
 }
 """What may be imported inside a function; the other lazy door, the table of commands, is in cli/main.py."""
 
@@ -81,6 +86,17 @@ def test_imports_are_at_the_top() -> None:
         if inside and not {module, module.partition(".")[0]} & INSIDE
     ]
     assert not hidden
+
+
+def test_what_only_talks_to_a_board_waits_for_no_scipy() -> None:
+    commands = ("console", "record", "upload", "monitor", "settings", "bringup", "dashboard")
+    asks = f"""import sys
+from ninespring.cli.main import cli
+for name in {commands}:
+    cli.get_command(None, name)
+print(*sorted({{"scipy", "matplotlib"}} & set(sys.modules)))"""
+    done = subprocess.run([sys.executable, "-c", asks], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == []
 
 
 def test_the_overview_names_files_that_there_are() -> None:

@@ -158,6 +158,6 @@ def test_the_words_of_the_board_itself_are_known() -> None:
     assert done.returncode == 0, done.stderr
     words = words_of(done.stdout.splitlines())
     assert {"on", "off", "pattern", "model", "supply", "telemetry"} <= set(words)
-    assert words["telemetry"].choices(0, 9) == ["off", "csv", "teleplot"]
+    assert words["telemetry"].choices(0, 9) == ["off", "csv", "teleplot", "inputs"]
     assert words["on"].choices(0, 2) == ["all", "1", "2"]
     assert all(one.usage.split()[0] == name for name, one in words.items())

@@ -174,6 +174,8 @@ static void each_word_is_obeyed(void)
     expect_ok("model");
     TEST_ASSERT_NOT_NULL(strstr(said, "spring 9: "));
     expect_ok("model cold");
+    expect_ok("why 9");
+    TEST_ASSERT_NOT_NULL(strstr(said, "s ago: it is said to be known\r\n"));
     expect_ok("faults");
     expect_ok("clear");
     expect_ok("unlock");
@@ -208,6 +210,12 @@ static void each_error_says_its_number_and_changes_nothing(void)
     expect_error("pattern 11110111x", CONSOLE_ERROR_BAD_ARGUMENT);
     expect_error("policy closed", CONSOLE_ERROR_BAD_ARGUMENT);
     expect_error("model hot", CONSOLE_ERROR_BAD_ARGUMENT);
+    expect_error("telemetry inputs 5", CONSOLE_ERROR_SURPLUS_ARGUMENT);
+    expect_error("why", CONSOLE_ERROR_MISSING_ARGUMENT);
+    expect_error("why all", CONSOLE_ERROR_BAD_ARGUMENT);
+    expect_error("why 0", CONSOLE_ERROR_OUT_OF_RANGE);
+    expect_error("why 10", CONSOLE_ERROR_OUT_OF_RANGE);
+    expect_error("why 1 2", CONSOLE_ERROR_SURPLUS_ARGUMENT);
     expect_error("telemetry json", CONSOLE_ERROR_BAD_ARGUMENT);
     expect_error("$loss_w_per_k=1e-3", CONSOLE_ERROR_BAD_ARGUMENT);
     expect_error("on 0", CONSOLE_ERROR_OUT_OF_RANGE);
@@ -241,6 +249,7 @@ static void each_error_says_its_number_and_changes_nothing(void)
     expect_ok("on 1");
     expect_error("selftest", CONSOLE_ERROR_SPRINGS_ON);
     expect_error("model cold", CONSOLE_ERROR_SPRINGS_ON);
+    expect_error("telemetry inputs", CONSOLE_ERROR_SPRINGS_ON);
 }
 
 /* Every word, and every way to write it wrong; settings, too. */
@@ -282,13 +291,16 @@ static void every_refusal_says_what_would_be_right(void)
         {"ambient 200", ": ambient_c is -40.00 to 85.00 degC\r\n"},
         {"ambient warm", ": ambient_c is -40.00 to 85.00 degC\r\n"},
         {"model hot", ": write model [cold]\r\n"},
+        {"why", ": write why K\r\n"},
+        {"why 10", ": springs are 1 to 9\r\n"},
+        {"why all", ": springs are 1 to 9\r\n"},
         {"learnt all", ": write learnt [clear]\r\n"},
         {"faults 1", ": write faults\r\n"},
         {"clear 1", ": write clear\r\n"},
         {"unlock 1", ": write unlock\r\n"},
         {"selftest 1", ": write selftest\r\n"},
-        {"telemetry", ": write telemetry off|csv|teleplot [1..50]\r\n"},
-        {"telemetry json", ": write telemetry off|csv|teleplot [1..50]\r\n"},
+        {"telemetry", ": write telemetry off|csv|teleplot|inputs [1..50]\r\n"},
+        {"telemetry json", ": write telemetry off|csv|teleplot|inputs [1..50]\r\n"},
         {"telemetry csv 100", ": 1 to 50 lines a second\r\n"},
         {"echo", ": write echo on|off\r\n"},
         {"echo loud", ": write echo on|off\r\n"},
@@ -804,6 +816,150 @@ static void model_says_how_long_a_spring_waits_and_when_it_is_away(void)
     TEST_ASSERT_NOT_NULL(strstr(said, ", limits away\r\n  away: not where it was asked to be"));
 }
 
+/* Without a tick, which would age what it tells. */
+static void ask_at_once(const char *line)
+{
+    said_length = 0;
+    said[0] = '\0';
+    for (const char *next = line; *next != '\0'; next++) {
+        console_receive(&console, (uint8_t)*next);
+    }
+    console_receive(&console, '\n');
+    while (console_busy(&console)) {
+        console_service(&console);
+    }
+}
+
+static void why_says_the_last_sights_of_a_spring_in_words(void)
+{
+    spring_sights_t *const sights = &controller.policy.estimator.sights;
+    ask_at_once("why 5");
+    TEST_ASSERT_EQUAL_STRING("[nothing was seen of spring 5 in the last 4 hours]\r\nok\r\n", said);
+    spring_sight_t *sight = spring_sights_add(sights, 4);
+    sight->kind = SPRING_SIGHT_COOLED;
+    sight->now = -580;
+    sight->now_sd = 59;
+    sight->did = SPRING_DID_HEAT;
+    (void)spring_sights_add(sights, 3); /* of another spring */
+    sights->turn = 481;
+    *(sight = spring_sights_add(sights, 4)) =
+        (spring_sight_t){.number = 2,
+                         .turn = 481,
+                         .spring = 4,
+                         .kind = SPRING_SIGHT_LOST,
+                         .read = -132,
+                         .read_sd = 5,
+                         .believed = 24,
+                         .believed_sd = 18,
+                         .seen = -8,
+                         .seen_sd = 12,
+                         .now = 1,
+                         .now_sd = 10,
+                         .shift = 4,
+                         .loss = 120,
+                         .did = SPRING_DID_OPEN | SPRING_DID_BLIND};
+    sights->turn = 500;
+    ask_at_once("WHY 5");
+    TEST_ASSERT_EQUAL_STRING(
+        "  125.0 s ago: it must have cooled by now\r\n"
+        "    of martensite start: now 58.0 K below (sd 5.9)\r\n"
+        "    moved 0.0 K, shift 0.0 K, loss 0.00 %; heated\r\n"
+        "  4.7 s ago: it loses phase, reads 1.32 % less than predicted (sd 0.05)\r\n"
+        "    of martensite start: believed 2.4 K above (sd 1.8), seen 0.8 K below (sd 1.2), now "
+        "0.1 K above (sd 1.0)\r\n"
+        "    moved -2.3 K, shift 0.4 K, loss 1.20 %; blind, a step of the surroundings\r\n"
+        "ok\r\n",
+        said);
+}
+
+/* As a spring is driven, its lines come one by one; others have much to tell meanwhile. */
+static void why_goes_on_with_what_is_left_where_sights_give_way(void)
+{
+    spring_sights_t *const sights = &controller.policy.estimator.sights;
+    for (unsigned n = 0; n < SPRING_SIGHTS_KEPT; n++) {
+        spring_sights_add(sights, 8)->now_sd = 1;
+    }
+    said_length = 0;
+    said[0] = '\0';
+    for (const char *next = "why 9\n"; *next != '\0'; next++) {
+        console_receive(&console, (uint8_t)*next);
+    }
+    console_service(&console);
+    console_service(&console);
+    for (unsigned n = 0; n < SPRING_SIGHTS_KEPT - 1u; n++) { /* all but one, and it is not it */
+        spring_sights_add(sights, 8)->kind = SPRING_SIGHT_JUMPED;
+    }
+    while (console_busy(&console)) {
+        console_service(&console);
+    }
+    unsigned first = 0, jumps = 0;
+    for (const char *at = said; (at = strstr(at, "it begins to transform")) != NULL; at++) {
+        first++;
+    }
+    for (const char *at = said; (at = strstr(at, "contact or sensor jumps\r\n    of")) != NULL;
+         at++) {
+        jumps++;
+    }
+    TEST_ASSERT_EQUAL_UINT(2, first); /* one was begun, one was left */
+    TEST_ASSERT_EQUAL_UINT(SPRING_SIGHTS_KEPT - 1u, jumps);
+    TEST_ASSERT_EQUAL_UINT(1, answers());
+}
+
+static void the_longest_why_fits_its_lines(void)
+{
+    spring_sight_t *const sight = spring_sights_add(&controller.policy.estimator.sights, 8);
+    *sight = (spring_sight_t){.spring = 8,
+                              .read = -32767,
+                              .believed = -1234,
+                              .seen = -1234,
+                              .now = -1234,
+                              .shift = -600,
+                              .loss = -9000,
+                              .did = 31,
+                              .read_sd = 255,
+                              .believed_sd = 255,
+                              .seen_sd = 255,
+                              .now_sd = 255};
+    for (uint8_t kind = 0; kind < SPRING_SIGHT_KINDS; kind++) {
+        sight->kind = kind;
+        controller.policy.estimator.sights.turn = SPRING_SIGHTS_TURNS;
+        ask_at_once("why 9");
+        TEST_ASSERT_NOT_NULL_MESSAGE(strstr(said, "than predicted (sd 2.55)\r\n"), said);
+        TEST_ASSERT_NOT_NULL_MESSAGE(strstr(said, "now 123.4 K below (sd 25.5)\r\n"), said);
+        TEST_ASSERT_NOT_NULL_MESSAGE(strstr(said, "phase seems to be missing\r\nok\r\n"), said);
+    }
+}
+
+/* All begins anew but what was learnt; then each line is told where it takes effect. */
+static void inputs_begin_anew_with_what_was_learnt(void)
+{
+    const spring_learnt_t numbers = {
+        .austenite_ohm = 0.219f, .change = 0.2f, .loss_sd_w_per_k = 0.000058f};
+    controller_restore_learnt(&controller, 8, &numbers);
+    expect_ok("model cold");
+    expect_ok("fan 30");
+    TEST_ASSERT_EQUAL_FLOAT(0.0f, controller_cooling_s(&controller, 0));
+    expect_ok("telemetry inputs");
+    TEST_ASSERT_NOT_NULL(strstr(said, "<learnt|spring:9|8941603E")); /* 0.219 as it lies in RAM */
+    TEST_ASSERT_NOT_NULL(strstr(said, ">\r\n<start|ambient_c7:2560|fan:30>\r\nok\r\n"));
+    TEST_ASSERT_EQUAL_UINT8(TELEMETRY_INPUTS, telemetry.format);
+    TEST_ASSERT_TRUE(controller_cooling_s(&controller, 0) > 30.0f);
+    TEST_ASSERT_EQUAL_UINT8(30, controller_fan_percent(&controller));
+    TEST_ASSERT_EQUAL_FLOAT(0.219f, controller_learnt(&controller, 8).austenite_ohm);
+    expect_ok("ON 3");
+    TEST_ASSERT_EQUAL_STRING("<typed|ON 3>\r\nok\r\n", said);
+    expect_ok("$supply_v=5.00"); /* a setting does not end it */
+    TEST_ASSERT_EQUAL_UINT8(TELEMETRY_INPUTS, telemetry.format);
+    said_length = 0;
+    console_stop(&console);
+    TEST_ASSERT_EQUAL_STRING("<typed|!>\r\n", said);
+    expect_ok("telemetry off");
+    expect_ok("off all");
+    TEST_ASSERT_EQUAL_STRING("ok\r\n", said);
+    controller_lock(&controller);
+    expect_error("telemetry inputs", CONSOLE_ERROR_LOCKED);
+}
+
 static void learnt_says_what_is_known_and_clear_forgets_it(void)
 {
     const spring_learnt_t numbers = {.austenite_ohm = 0.219f,
@@ -1037,6 +1193,10 @@ int main(void)
     RUN_TEST(status_says_whether_the_stages_have_their_supply);
     RUN_TEST(model_says_with_which_bounds);
     RUN_TEST(model_says_what_the_surroundings_take);
+    RUN_TEST(inputs_begin_anew_with_what_was_learnt);
+    RUN_TEST(why_says_the_last_sights_of_a_spring_in_words);
+    RUN_TEST(why_goes_on_with_what_is_left_where_sights_give_way);
+    RUN_TEST(the_longest_why_fits_its_lines);
     RUN_TEST(model_says_how_long_a_spring_waits_and_when_it_is_away);
     RUN_TEST(learnt_says_what_is_known_and_clear_forgets_it);
     RUN_TEST(a_host_that_falls_silent_switches_its_springs_off);

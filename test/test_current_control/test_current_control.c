@@ -9,7 +9,12 @@
 #include "current_control.h"
 #include "unity.h"
 
-static current_control_t control;
+/* What lies behind it is nobody's to write. */
+static struct {
+    current_control_t control;
+    uint8_t behind[64];
+} owned;
+#define control owned.control
 static current_control_parameters_t parameters;
 
 /* One channel's load. Currents in nA so that whole steps and their means are exact enough. */
@@ -561,10 +566,92 @@ static void what_is_fed_forward_is_ohm_s_law(void)
     TEST_ASSERT_EQUAL_INT16(24575, control.channel[0].estimate_q16);
 }
 
+/* To the last bit: a drop of which a 51200th more would round otherwise; and the highest gain that
+ * an estimate and what is learnt beyond it come to, given to the thousandth of a step. */
+static void drop_and_limits_are_exact(void)
+{
+    parameters.supply_mv = 2000;
+    parameters.freewheel_mv = 27;
+    TEST_ASSERT_TRUE(current_control_init(&control, &parameters, NULL));
+    TEST_ASSERT_EQUAL_INT32(27 * 51200 / 2027 * 1024, control.offset_q16);
+    parameters.supply_mv = 1000;
+    parameters.freewheel_mv = 0;
+    parameters.trim_limit_mohm = 1000;
+    TEST_ASSERT_TRUE(current_control_init(&control, &parameters, NULL));
+    TEST_ASSERT_EQUAL_INT32(8191 * 256, control.trim_limit_q24);
+}
+
+/* A reading beyond 4095 mA counts as that, to the last bit of what is learnt of it. */
+static void readings_beyond_the_sensor_count_as_its_limit(void)
+{
+    static const int16_t beyond_ma[] = {4096, 4500, INT16_MAX, -4096, -4500, -INT16_MAX};
+    parameters.shunt_mohm = parameters.wiring_mohm = 0;
+    for (size_t n = 0; n < 6; n++) {
+        TEST_ASSERT_TRUE(current_control_init(&control, &parameters, NULL));
+        current_control_t by_limit = control;
+        for (int turn = 0; turn < 40; turn++) {
+            const uint16_t target_ma = 100;
+            const bool valid = true;
+            const int16_t limit_ma = beyond_ma[n] > 0 ? 4095 : -4095;
+            uint16_t duty, limit_duty;
+            current_control_set_resistance(&control, 0, 20);
+            current_control_set_resistance(&by_limit, 0, 20);
+            current_control_tick(&control, 1, &target_ma, &beyond_ma[n], &valid, true, &duty);
+            current_control_tick(&by_limit, 1, &target_ma, &limit_ma, &valid, true, &limit_duty);
+            TEST_ASSERT_EQUAL_UINT16(limit_duty, duty);
+            TEST_ASSERT_EQUAL_MEMORY(&by_limit, &control, sizeof control);
+        }
+    }
+}
+
+/* A circuit that nothing is declared of is given a step in 65536 a milliampere: it still answers.
+ */
+static void no_resistance_at_all_gives_the_least_there_is(void)
+{
+    parameters.shunt_mohm = parameters.wiring_mohm = 0;
+    parameters.hold_ticks = 250;
+    TEST_ASSERT_TRUE(current_control_init(&control, &parameters, NULL));
+    unsigned given = 0;
+    for (int n = 0; n < 220; n++) {
+        const uint16_t target_ma = 1000;
+        const int16_t measured_ma = 0;
+        const bool valid = n < 20; /* until it is at its target; then it learns no more */
+        uint16_t duty;
+        control.channel[0].trim_q24 = n <= 20 ? 0 : control.channel[0].trim_q24;
+        current_control_tick(&control, 1, &target_ma, &measured_ma, &valid, true, &duty);
+        given += n >= 20 ? duty : 0;
+    }
+    TEST_ASSERT_UINT_WITHIN(1, 3, given); /* 200 ticks x 1000 mA / 65536 */
+}
+
+/* Up to 128 steps each way an error is taken as it is, beyond as that. */
+static void an_error_is_taken_in_full_up_to_its_end(void)
+{
+    int32_t taken_q24[4];
+    static const int16_t measured_ma[] = {1690, 1694, 1698, 2600};
+    for (size_t n = 0; n < 4; n++) {
+        parameters.integral_permille = 1;
+        TEST_ASSERT_TRUE(current_control_init(&control, &parameters, NULL));
+        current_control_set_resistance(&control, 0, 290);
+        control.channel[0].reference_ma = 1;
+        control.channel[0].duty = 0;
+        const uint16_t target_ma = 1;
+        const bool valid = true;
+        uint16_t duty;
+        current_control_tick(&control, 1, &target_ma, &measured_ma[n], &valid, true, &duty);
+        taken_q24[n] = control.channel[0].trim_q24;
+    }
+    /* 0.8 x 470 / 5000 steps a mA: 127.1, 127.4, 127.7, and all beyond 128 */
+    TEST_ASSERT_TRUE(taken_q24[0] < 0);
+    TEST_ASSERT_TRUE(taken_q24[0] > taken_q24[1] && taken_q24[1] > taken_q24[2] &&
+                     taken_q24[2] > taken_q24[3]);
+}
+
 /* The same by hand for the declared circuit: 2684 millionths of a step, 180 mohm, 12.3 % of drop.
  */
 static void a_new_one_is_off_and_has_the_numbers_of_its_circuit(void)
 {
+    memset(owned.behind, 0xA5, sizeof owned.behind);
     mean_ua(1500, 50);
     parameters.freewheel_mv = 700;
     parameters.integral_permille = 500;
@@ -578,6 +665,7 @@ static void a_new_one_is_off_and_has_the_numbers_of_its_circuit(void)
         const current_control_channel_t fresh = {.estimate_q16 = 180 * 2354 / 256};
         TEST_ASSERT_EQUAL_MEMORY(&fresh, &control.channel[k], sizeof fresh);
     }
+    TEST_ASSERT_EACH_EQUAL_HEX8(0xA5, owned.behind, sizeof owned.behind);
 }
 
 /* Off is nothing at all, also of what was left of a step; 25 mA are small, 26 wait. */
@@ -671,6 +759,10 @@ int main(void)
     RUN_TEST(a_parameter_out_of_range_is_refused_and_found);
     RUN_TEST(reset_forgets_what_was_learnt_but_not_the_estimate);
     RUN_TEST(what_is_fed_forward_is_ohm_s_law);
+    RUN_TEST(drop_and_limits_are_exact);
+    RUN_TEST(readings_beyond_the_sensor_count_as_its_limit);
+    RUN_TEST(no_resistance_at_all_gives_the_least_there_is);
+    RUN_TEST(an_error_is_taken_in_full_up_to_its_end);
     RUN_TEST(a_new_one_is_off_and_has_the_numbers_of_its_circuit);
     RUN_TEST(off_is_nothing_and_small_ends_at_25_ma);
     RUN_TEST(target_is_cut_to_the_most_and_blindness_does_not_wrap);

@@ -179,8 +179,16 @@ static void a_saved_record_is_loaded(void)
         TEST_ASSERT_EQUAL(RECORD_LOADED, result.found);
         TEST_ASSERT_EQUAL_UINT8(0, result.missing);
         TEST_ASSERT_EQUAL_UINT8(0, result.dropped);
+        TEST_ASSERT_EQUAL_UINT8(0, result.dropped_id);
         TEST_ASSERT_TRUE(same(&settings, &loaded));
     }
+    /* and it holds every row's entry, and nothing else */
+    unsigned bytes = 0;
+    for (uint16_t k = 0; k < PARAMETER_COUNT; k++) {
+        const parameter_row_t row = parameter_row(k);
+        bytes += 2u + row.count * (unsigned)parameter_width(row.type);
+    }
+    TEST_ASSERT_EQUAL_UINT(bytes, record_store_length(&store.record));
 }
 
 /* What lies in boards: an id never means another row, nor another number of decimals. Who drops or
@@ -358,6 +366,10 @@ static void an_entry_that_leaves_the_record_is_not_read(void)
         TEST_ASSERT_EQUAL_INT16(-1000, loaded.board.ambient_cc);
         TEST_ASSERT_EQUAL_UINT16(1000, loaded.controller.model.loss_scale_permille[0]);
     }
+    static const uint8_t alone[] = {17, 3, 0xA0, 0x86, 0x01}; /* of four bytes three */
+    put_record(alone, sizeof alone);
+    TEST_ASSERT_EQUAL_UINT8(PARAMETER_COUNT, load().missing);
+    expect_defaults();
 }
 
 static void a_record_in_another_format_gives_defaults_and_says_so(void)

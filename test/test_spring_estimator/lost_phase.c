@@ -4,6 +4,7 @@
 #include <stdio.h>
 
 #include "one_spring.h"
+#include "sights.h"
 #include "unity.h"
 
 #define ACTED_ON 0.03f /* by the drive, which heats it then */
@@ -321,6 +322,7 @@ void loss_that_is_still_missing_at_rest_is_taken_back(void)
         (void)tick(hold_current_a(8.0));
     }
     heat_and_look_back();
+    TEST_ASSERT_TRUE_MESSAGE(is_noted(SPRING_SIGHT_TAKEN_BACK), where);
     TEST_ASSERT_EQUAL_FLOAT_MESSAGE(0.0f, BELIEF.gone_k, where);
     TEST_ASSERT_FLOAT_WITHIN_MESSAGE(4.0f, (float)truth.temperature_c, believed_c(), where);
 }
@@ -334,6 +336,7 @@ void loss_that_is_back_at_rest_is_not_taken_back(void)
         (void)tick(hold_current_a(3.0));
     }
     heat_and_look_back();
+    TEST_ASSERT_TRUE_MESSAGE(is_noted(SPRING_SIGHT_BACK), where);
     TEST_ASSERT_EQUAL_FLOAT_MESSAGE(0.0f, BELIEF.gone_k, where);
     TEST_ASSERT_FLOAT_WITHIN_MESSAGE(4.0f, (float)(truth.temperature_c - truth.shift_k),
                                      believed_c(), where);

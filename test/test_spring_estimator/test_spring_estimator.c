@@ -4,6 +4,7 @@
 
 #include "lost_phase.h"
 #include "one_spring.h"
+#include "sights.h"
 #include "unity.h"
 
 void setUp(void)
@@ -514,6 +515,28 @@ static void transformation_that_waits_for_current_is_not_over(void)
     TEST_ASSERT_TRUE(truth.austenite < 0.95);
 }
 
+/* A bit of the heat that a wait has to make up: no wait has cost so much. */
+static void heat_that_no_wait_has_cost_is_not_waited_for(void)
+{
+    for (float peak_k = 1e2f; peak_k < 1e9f; peak_k *= 1e3f) {
+        begin_cold();
+        ticks(3.0, 1.0);
+        spring_estimator_begin_heating(&estimator, &model, 0);
+        while (truth.austenite < 0.5) {
+            (void)tick(3.0);
+        }
+        BELIEF.run.heat.peak_k = peak_k;
+        for (double time_s = 0.0;
+             time_s < 60.0 && !spring_estimator_has_transformed(&estimator, &model, 0);
+             time_s += TICK_S) {
+            (void)tick(3.0);
+        }
+        (void)snprintf(where, sizeof where, "%.0e K: %.3f at %.1f C", (double)peak_k,
+                       truth.austenite, truth.temperature_c);
+        TEST_ASSERT_TRUE_MESSAGE(truth.austenite > 0.99 && truth.temperature_c < 115.0, where);
+    }
+}
+
 /* A sensor's offset shows otherwise at the current of a look than at that of the heating. */
 static void offset_between_two_currents_is_no_onset(void)
 {
@@ -780,6 +803,7 @@ int main(void)
     RUN_TEST(transformation_that_is_not_read_is_no_jump);
     RUN_TEST(transformation_is_seen_through_changes_of_current);
     RUN_TEST(transformation_that_waits_for_current_is_not_over);
+    RUN_TEST(heat_that_no_wait_has_cost_is_not_waited_for);
     RUN_TEST(offset_between_two_currents_is_no_onset);
     RUN_TEST(martensite_resistance_is_learnt_at_20_degrees);
     RUN_TEST(look_tells_the_phase_by_what_was_learnt);
@@ -790,5 +814,13 @@ int main(void)
     RUN_TEST(numbers_that_no_spring_has_are_not_restored);
     RUN_TEST(bad_readings_leave_a_belief_that_can_be_believed);
     RUN_TEST(counts_and_sums_saturate);
+    RUN_TEST(each_sight_of_a_life_is_noted_with_what_was_done);
+    RUN_TEST(sight_says_what_was_believed_read_and_moved);
+    RUN_TEST(hold_that_loses_nothing_is_one_sight);
+    RUN_TEST(contact_that_jumps_is_noted_and_blind_is_said);
+    RUN_TEST(time_and_look_after_power_on_are_noted);
+    RUN_TEST(heating_that_shows_no_finish_is_noted);
+    RUN_TEST(spring_that_has_most_gives_way);
+    RUN_TEST(sights_are_found_by_number_and_forgotten_after_four_hours);
     return UNITY_END();
 }

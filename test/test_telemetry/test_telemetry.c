@@ -250,6 +250,88 @@ static void csv_tells_again_when_the_cut_has_changed_by_half_an_ampere(void)
     TEST_ASSERT_EQUAL_UINT(1, occurrences("|temperature|cut_a:1.700>"));
 }
 
+static void pass(unsigned turns)
+{
+    for (unsigned n = 0; n < turns; n++) {
+        spring_sights_turn(&controller.policy.estimator.sights);
+    }
+}
+
+/* In setUp each spring was told to be cold. */
+static void csv_tells_each_sight_once_when_it_is_known_what_was_done(void)
+{
+    TEST_ASSERT_TRUE(telemetry_set(&telemetry, TELEMETRY_CSV, 5));
+    pass(8);
+    ticks(50, 10000);
+    TEST_ASSERT_EQUAL_UINT(9, occurrences("<sight|"));
+    TEST_ASSERT_NOT_NULL(strstr(said,
+                                "\r\n<sight|spring:9|t:8.340|told|now_k:-58.0|now_sd:5.8|shift_k:"
+                                "0.0|loss:0.00>\r\n"));
+    forget();
+    spring_sight_t *const sight = spring_sights_add(&controller.policy.estimator.sights, 4);
+    sight->kind = SPRING_SIGHT_LOST;
+    sight->read = -132;
+    sight->read_sd = 5;
+    sight->believed = 24;
+    sight->believed_sd = 18;
+    sight->seen = -8;
+    sight->seen_sd = 12;
+    sight->now = 1;
+    sight->now_sd = 10;
+    sight->shift = 4;
+    sight->loss = 120;
+    pass(1);
+    ticks(50, 12000);
+    TEST_ASSERT_EQUAL_UINT(0, occurrences("<"));
+    sight->did = SPRING_DID_HEAT | SPRING_DID_OPEN;
+    pass(1);
+    ticks(50, 13000);
+    TEST_ASSERT_EQUAL_UINT(1, occurrences("<"));
+    TEST_ASSERT_NOT_NULL_MESSAGE(
+        strstr(said, "\r\n<sight|spring:5|t:12.500|lost|read:-1.32|read_sd:0.05|believed_k:2.4|"
+                     "believed_sd:1.8|seen_k:-0.8|seen_sd:1.2|now_k:0.1|now_sd:1.0|shift_k:0.4|"
+                     "loss:1.20|heated|opened>\r\n"),
+        said);
+    TEST_ASSERT_TRUE(telemetry_set(&telemetry, TELEMETRY_CSV, 5));
+    ticks(50, 14000); /* to whoever comes anew, those that are kept */
+    TEST_ASSERT_EQUAL_UINT(11, occurrences("<sight|"));
+}
+
+static void longest_sight_is_told_whole_and_waits_for_room(void)
+{
+    spring_sights_t *const sights = &controller.policy.estimator.sights;
+    sights->count = 0;
+    TEST_ASSERT_TRUE(telemetry_set(&telemetry, TELEMETRY_CSV, 1));
+    ticks(50, 0); /* the first row */
+    forget();
+    *spring_sights_add(sights, 8) = (spring_sight_t){.number = sights->numbers - 1u,
+                                                     .spring = 8,
+                                                     .kind = SPRING_SIGHT_TRANSFORMS,
+                                                     .did = 31,
+                                                     .read = INT16_MIN,
+                                                     .read_sd = 255,
+                                                     .believed_sd = 255,
+                                                     .believed = -2550,
+                                                     .seen = -2550,
+                                                     .seen_sd = 255,
+                                                     .now_sd = 255,
+                                                     .now = -2550,
+                                                     .shift = -600,
+                                                     .loss = -9000};
+    pass(2);
+    for (unsigned tick = 0; tick < 10; tick++) {
+        room = 150;
+        const text_time_t years = {INT32_MAX, 999};
+        telemetry_tick(&telemetry, &controller, &years, 0, &output);
+    }
+    TEST_ASSERT_EQUAL_UINT(0, said_length);
+    const text_time_t years = {INT32_MAX, 999};
+    room = 329;
+    telemetry_tick(&telemetry, &controller, &years, 0, &output);
+    TEST_ASSERT_EQUAL_UINT(1, occurrences("|opened|doubted>\r\n"));
+    TEST_ASSERT_EQUAL_UINT(1, lines());
+}
+
 static void limits_that_find_no_room_are_told_later(void)
 {
     TEST_ASSERT_TRUE(telemetry_set(&telemetry, TELEMETRY_CSV, 5));
@@ -409,6 +491,8 @@ int main(void)
     RUN_TEST(what_of_a_round_found_no_room_is_dropped_and_every_spring_has_its_turn);
     RUN_TEST(csv_tells_a_limit_once_when_it_begins_and_once_when_it_ends);
     RUN_TEST(csv_tells_again_when_the_cut_has_changed_by_half_an_ampere);
+    RUN_TEST(csv_tells_each_sight_once_when_it_is_known_what_was_done);
+    RUN_TEST(longest_sight_is_told_whole_and_waits_for_room);
     RUN_TEST(limits_that_find_no_room_are_told_later);
     RUN_TEST(limits_that_toggle_are_told_once_a_period_and_take_no_other_springs_turn);
     RUN_TEST(all_limits_at_once_fit_and_are_told_whole);

@@ -29,7 +29,7 @@ from .find.plan import Plan
 from .infer import predict as prediction
 from .infer.predict import predict_by_chip
 from .io import history, ranges, recording
-from .io.board import Board, send_settings, settings_lines
+from .io.board import Board, settings_lines
 from .io.importing import import_table
 from .io.logs import Run, check_folder, read_log, write_atomically
 from .io.recording import Recording
@@ -199,12 +199,7 @@ def upload(
     taken back: `undo_upload`; `by` is what the history calls it.
     """
     lines = settings_lines(settings, "settings")
-    with Board(port, off_at_end=False) as board:
-        before = board.settings()
-        send_settings(board, lines, save, say)
-        if save:
-            sent = dict(line[1:].split("=", 1) for line in lines)
-            history.keep(port, board.version[0], by, before, sent)
+    history.send(port, lines, by, save, say)
     return len(lines)
 
 

@@ -13,38 +13,36 @@
 
 static controller_settings_t settings;
 static controller_t controller;
-/* As they were before the tick: they are counted on these. No more of the controller: the stack
- * would not fit below a second one. */
-static struct {
-    thermal_model_t model;
-    current_control_t current;
-    safety_t safety;
-    drive_policy_t policy;
-} aside;
 static controller_inputs_t inputs;
 static controller_outputs_t outputs;
 static bool broken[SPRINGS];
 static bool shorted[SPRINGS];
 static uint8_t failures;
 
-/* The parts as the tick calls them, in the state that it has just met. */
+/* The parts as the tick calls them, in the state that it is going to meet, and with its readings.
+ * Their work is undone. */
 static void count_parts(bool steps)
 {
     static uint32_t power_uw[SPRINGS];
     static uint16_t target_ma[SPRINGS];
     static bool yes[SPRINGS];
     static bool valid[SPRINGS];
+    KEEP_VARIABLES();
     for (uint8_t k = 0; k < SPRINGS; k++) {
-        power_uw[k] = controller_power_uw(&controller, k);
-        yes[k] = safety_allows(&aside.safety, k);
         valid[k] = inputs.sensor[k].status == CONTROLLER_SENSOR_OK;
+        if (valid[k]) {
+            controller.measured_ma[k] = inputs.sensor[k].current_ma;
+            controller.measured_mv[k] = inputs.sensor[k].voltage_mv;
+        }
+        power_uw[k] = controller_power_uw(&controller, k);
+        yes[k] = safety_allows(&controller.safety, k);
     }
     if (steps) {
         COUNT("model_step");
-        thermal_model_step(&aside.model, power_uw);
+        thermal_model_step(&controller.model, power_uw);
         COUNTED();
     }
-    drive_policy_input_t input = {.model = &aside.model,
+    drive_policy_input_t input = {.model = &controller.model,
                                   .level_permille = controller.level_permille,
                                   .allowed = yes,
                                   .maximum_current_ma = 3000,
@@ -53,27 +51,28 @@ static void count_parts(bool steps)
                                   .measured_mv = controller.measured_mv,
                                   .valid = valid};
     COUNT("policy");
-    drive_policy_tick(&aside.policy, &input, target_ma);
+    drive_policy_tick(&controller.policy, &input, target_ma);
     COUNTED();
     safety_sample_t sample = {.sensor_status = (uint8_t)inputs.sensor[0].status,
                               .current_ma = inputs.sensor[0].current_ma,
                               .voltage_mv = inputs.sensor[0].voltage_mv,
-                              .expected_ma = current_control_reference_ma(&aside.current, 0),
-                              .temperature_c7 = thermal_model_temperature_c7(&aside.model, 0)};
-    if (valid[0] && aside.safety.spring[0].electrical == 0 && !broken[0] && !shorted[0]) {
+                              .expected_ma = current_control_reference_ma(&controller.current, 0),
+                              .temperature_c7 = thermal_model_temperature_c7(&controller.model, 0)};
+    if (valid[0] && controller.safety.spring[0].electrical == 0 && !broken[0] && !shorted[0]) {
         COUNT("safety_of_one");
-        safety_tick_spring(&aside.safety, 0, &sample);
+        safety_tick_spring(&controller.safety, 0, &sample);
         COUNTED();
     } else {
         COUNT("safety_of_one_bad");
-        safety_tick_spring(&aside.safety, 0, &sample);
+        safety_tick_spring(&controller.safety, 0, &sample);
         COUNTED();
     }
     uint16_t duty[SPRINGS];
     COUNT("current_loops");
-    current_control_tick(&aside.current, SPRINGS, target_ma, controller.measured_ma, valid, true,
-                         duty);
+    current_control_tick(&controller.current, SPRINGS, target_ma, controller.measured_ma, valid,
+                         true, duty);
     COUNTED();
+    PUT_BACK_VARIABLES();
 }
 
 /* What the duties bring: 5 V, 180 mohm beyond the spring. */
@@ -95,13 +94,10 @@ static void respond(void)
 static void run(uint16_t ticks)
 {
     while (ticks-- > 0) {
-        aside.model = controller.model;
-        aside.current = controller.current;
-        aside.safety = controller.safety;
-        aside.policy = controller.policy;
         uint8_t before = controller.model_tick;
         /* a name is said before the tick: which one it is follows from how it counts */
         bool steps = (uint8_t)(before + 1u) * CONTROLLER_TICK_MS >= 100u;
+        count_parts(steps);
         if (steps) {
             COUNT("tick_with_model_step");
             controller_tick(&controller, &inputs, &outputs);
@@ -111,7 +107,6 @@ static void run(uint16_t ticks)
             controller_tick(&controller, &inputs, &outputs);
             COUNTED();
         }
-        count_parts(steps);
         respond();
         if ((controller.model_tick == 0) != steps) {
             failures = 1;

@@ -11,13 +11,14 @@ from pathlib import Path
 import click
 from rich.live import Live
 
-from .. import __version__, api
+from .. import __version__
 from ..errors import InputError, WorkError
 from ..io import history, ranges, results
 from ..io.board import Board, settings_lines
 from ..io.logs import check_folder, read_bytes
-from ..io.recording import LogFile, script_lines, told_to_stop
+from ..io.recording import LogFile, Recording, script_lines, told_to_stop
 from ..io.recording import record as record_board
+from ..io.tape import record_tape
 from ..io.thermometers import Thermometers
 from ..say.monitoring import Screen
 from .console import FILE, FORCE, JSON, PORT, Command, Real, Whole, beside, err, out, working, write
@@ -46,6 +47,11 @@ steps.txt (console words; `at S =` waits until so many seconds after the first r
     "--duration", type=SECONDS, default=900.0, show_default=True, help="s by the board's clock; Ctrl-C ends it earlier"
 )
 @click.option("--run", "script", type=FILE, help="console lines to send, one a line, each at its time")
+@click.option(
+    "--tape",
+    is_flag=True,
+    help="not a log, but all that the board is given, tick by tick: `ninespring-sim rerun` believes the same by it",
+)
 @click.option("--thermometers", help="port of a thermocouple logger: its temperatures (degC) become t1_c, t2_c, ...")
 @FORCE
 @JSON
@@ -55,6 +61,7 @@ def record(
     hz: int,
     duration: float,
     script: Path | None,
+    tape: bool,
     thermometers: str | None,
     force: bool,
     json_path: Path | None,
@@ -66,9 +73,12 @@ def record(
     The log begins with the board's version, faults and settings as comments. A fault of the board is said as it comes and at the
     end, and stands in the log where it came; the command then exits with 1. What the board remarks on a line of --run (a
     setting that is not active yet, springs that are still warm) is said and logged likewise, and is no failure.
+    With --tape what the board knows of its springs begins anew, as after power-on; what it has learnt of them stays.
     """
     check_folder(output, measured=True, force=force)
     check_folder(json_path)
+    if tape and (thermometers or hz != 1):
+        raise InputError("a tape has each tick and no thermometers: leave out --hz and --thermometers")
     if thermometers and os.path.realpath(thermometers) == os.path.realpath(port):
         raise InputError(f"--thermometers {thermometers}: that is the board's port, a logger has its own")
     text = read_bytes(script).decode("utf-8", "replace") if script else ""
@@ -85,11 +95,15 @@ def record(
         ):
             logger = Thermometers(thermometers) if thermometers else None
             log = LogFile(output, force)
+            got = Recording()
             try:
                 alarm = lambda fault: err.print(f"fault {fault}", style="bold red", markup=False)  # noqa: E731
                 tell = lambda rows, seconds: say(f"{rows} rows", seconds)  # noqa: E731
                 remark = lambda words: err.print(words, markup=False)  # noqa: E731
-                got = record_board(board, log, hz, duration, steps, tell, keys, logger, alarm, remark)
+                if tape:
+                    got.ended = record_tape(board, log, duration, steps, tell, keys, remark)
+                else:
+                    got = record_board(board, log, hz, duration, steps, tell, keys, logger, alarm, remark)
             finally:
                 log.close()
                 if logger:
@@ -147,7 +161,7 @@ def upload(settings: Path | None, port: str, undo: bool, save: bool, json_path: 
         return
     lines = settings_lines(read_bytes(settings).decode("utf-8", "replace"), str(settings))
     with working("sending", len(lines)) as say:
-        api.upload(port, "\n".join(lines), save, say, by=f"upload {settings.name}")
+        history.send(port, lines, f"upload {settings.name}", save, say)
     write({json_path: results.checked(results.Upload(settings=len(lines), saved=save))})
     out.print(f"{len(lines)} settings sent and read back{', saved' if save else ''}")
 

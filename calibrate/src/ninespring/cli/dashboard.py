@@ -7,7 +7,6 @@ from pathlib import Path
 import click
 
 from ..dashboard.board_source import SIMULATED, BoardSource
-from ..dashboard.replay_source import ReplaySource
 from ..dashboard.server import HOST, address_of, door_of, listen, serve
 from ..dashboard.source import Source
 from ..errors import InputError
@@ -86,6 +85,8 @@ def dashboard(
         raise InputError(f"--host-name {wrong}: not a name, as in raspberrypi.local")
     source: Source
     if replay:
+        from ..dashboard.replay_source import ReplaySource
+
         model = read_model(model_path) if model_path else None
         array = model.array if model else read_array(array_path) if array_path else None
         run = read_log(replay, array.springs if array else None, temperatures=False)

@@ -250,6 +250,7 @@ class BoardSource(Source):
             limits=[[] for _ in range(springs)],
             cut_a=[0.0] * springs,
             measured_c=[None] * springs,
+            sights=[0] * springs,
             faults=[],
             policy="precompensate" if self._settings.get("policy") == "1" else "open",
         )
@@ -400,7 +401,16 @@ class BoardSource(Source):
         )
 
     def _take(self, line: str) -> None:
-        """Take a line of telemetry: a row, or which limits act on a spring."""
+        """Take a line of telemetry: a row, which limits act on a spring, or that there is a new sight of it."""
+        if match := words.SIGHT.fullmatch(line):
+            sights, k = list(self._state["sights"]), int(match[1]) - 1
+            if k < len(sights):
+                sights[k] += 1
+                self._change(sights=sights)
+            with self._recording():
+                if self._sink:
+                    self._sink.comment(line)
+            return
         if match := words.ACTING.fullmatch(line):
             k = int(match[1]) - 1
             limits, cut = list(self._state["limits"]), list(self._state["cut_a"])

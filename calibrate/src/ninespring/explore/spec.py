@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.stats import qmc
 
 from ..errors import InputError
 from ..io.logs import read_bytes
@@ -124,6 +123,9 @@ class Spec:
 
     def shares(self) -> np.ndarray | None:
         """Return the sample in the unit cube, (points, axes); None for a grid or where an optimiser asks."""
+        if self.method in ("latin", "sobol"):
+            from scipy.stats import qmc
+
         if self.method == "latin":
             return qmc.LatinHypercube(len(self.axes), rng=self.seed).random(self.asked)
         if self.method == "sobol":

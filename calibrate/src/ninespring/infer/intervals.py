@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from .fit import Fit
 
@@ -18,7 +18,7 @@ def intervals(fit: Fit, share: float = 0.95) -> dict[str, tuple[float, float]]:
     Symmetric in the coordinate in which it was fitted: for a number that is fitted by its logarithm, in proportion. Within its
     bounds. Autocorrelation of what is left is in the covariance already.
     """
-    times = float(norm.ppf(0.5 + 0.5 * share))
+    times = float(ndtri(0.5 + 0.5 * share))
     out: dict[str, tuple[float, float]] = {}
     for k, free in enumerate(fit.spec.free):
         if fit.covariance is None or free.key in fit.stuck:

@@ -11,7 +11,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import trim_mean
 
 from ..io import statistics
 from ..io.logs.run import Run
@@ -63,7 +62,7 @@ def first_c(run: Run) -> float:
     rests_s = min(FIRST_S, since[driven[0]] if driven.size else FIRST_S)
     first = run.temperature_c[: max(3, int(np.searchsorted(since, max(5.0, rests_s))))]
     # a mean: where thermometers step, it is finer than any of them; without what is nonsense
-    middle = [trim_mean(one[np.isfinite(one)], 0.1) for one in first.T if np.isfinite(one).any()]
+    middle = [statistics.trimmed_mean(one[np.isfinite(one)], 0.1) for one in first.T if np.isfinite(one).any()]
     return float(min(middle)) if middle else math.nan
 
 

@@ -25,8 +25,8 @@ from .port import Port
 from .simulated import simulated_board
 
 ERROR = re.compile(r"^error:(\d+) ?(.*)$")
-TELEMETRY = re.compile(r"^(?:\d+\.\d+,.*|<.*>)$")
-"""A row, or a status line: comes at any moment, also in the middle of an answer."""
+TELEMETRY = re.compile(r"^(?:\d+\.\d+,.*|<.*>|~S[0-9A-F]+)$")
+"""A row, a status line, or a tick's inputs: comes at any moment, also in the middle of an answer."""
 FOUND_WITHIN_S = 5.0
 """So soon a board is found, or it is said that there is none."""
 BOOTING_S = 2.0
@@ -46,6 +46,8 @@ DRIVES = re.compile(r"\s*(on|pattern)\b", re.IGNORECASE)
 STATUS = re.compile(r"^<(off|on|fault|locked)\|t:.*>$")
 """What `?` is answered with."""
 ROW_TIME = re.compile(r"^(\d+\.\d+),")
+TICK_TIME = re.compile(r"^~S([0-9A-F]{4})")
+"""In ticks of 20 ms, modulo 65536."""
 
 
 @dataclass(frozen=True)
@@ -258,8 +260,9 @@ class Board:
         self._port.write("\n")  # an empty line is not answered, but shows that this end lives
 
     def _came(self, line: str) -> str:
-        if match := ROW_TIME.match(line):
-            board_s = float(match[1])
+        row, tick = ROW_TIME.match(line), TICK_TIME.match(line)
+        if row or tick:
+            board_s = float(row[1]) if row else 0.02 * int(tick[1], 16) if tick else 0.0
             if not 0.0 <= board_s - self._alive_board_s < ALIVE_EVERY_S:
                 self._alive_board_s = board_s
                 self._show_life()

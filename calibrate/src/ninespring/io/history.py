@@ -5,7 +5,7 @@ from __future__ import annotations
 import datetime
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -89,6 +89,21 @@ def _read(path: Path) -> Entry:
         raise InputError("is no settings that ninespring kept: remove it", path)
     pairs = lambda begins: dict(re.findall(rf"^{begins}\$(\w+)=(\S+)$", text, re.MULTILINE))  # noqa: E731
     return Entry(path, head[1], head[2], pairs(""), pairs("# sent "))
+
+
+def send(
+    port: str,
+    lines: list[str],
+    by: str,
+    save: bool = True,
+    say: Callable[[str, int], None] = lambda line, count: None,
+) -> None:
+    """Send `$name=value` lines to a board, read them back, save them; what it had before is kept, where they are saved."""
+    with Board(port, off_at_end=False) as board:
+        before = board.settings()
+        send_settings(board, lines, save, say)
+        if save:
+            keep(port, board.version[0], by, before, dict(line[1:].split("=", 1) for line in lines))
 
 
 def undo(board: Board, save: bool = True) -> Entry:

@@ -195,3 +195,9 @@ def spikes(residual: np.ndarray, noise: np.ndarray, limit: float = 6.0) -> np.nd
         spread = 1.4826 * np.nanmedian(np.abs(windows - middle[:, :, None]), axis=2)
     away = np.abs(residual - middle)
     return np.isfinite(away) & (away > limit * noise) & (away > 4.0 * spread)
+
+
+def trimmed_mean(values: np.ndarray, share: float) -> float:
+    """Return the mean without that share of the values at either end."""
+    cut = int(share * values.size)
+    return float(np.partition(values, (cut, values.size - cut - 1))[cut : values.size - cut].mean())

@@ -7,6 +7,9 @@ import re
 ACTING = re.compile(r"<limits\|spring:(\d+)\|t:[\d.]+((?:\|[a-z]+)+)\|cut_a:([\d.]+)>")
 """What telemetry says of the limits that act on a spring: its number, their names, the current that they cut."""
 
+SIGHT = re.compile(r"<sight\|spring:(\d+)\|t:[\d.]+\|[a-z_]+(?:\|[a-z_]+(?::-?[\d.]+)?)*>")
+"""What telemetry says of a sight of a spring (`why` in docs/console.md): its number."""
+
 FAULTS = {
     1: "current above over_current_a",
     2: "driven and no current: a broken spring or wire",

@@ -17,14 +17,14 @@ const past = { time_s: [], each: {}, sum_a: [] };
 const KEPT = [...Object.keys(QUANTITIES).filter((name) => name !== "sum_a"), "measured_c", "low_c", "high_c"];
 const OLD_S = 1; // what is older, beyond the time between two rows, is shown as old
 
-function wish(what) {
+function wish(what, silent = false) {
   if (!socket || socket.readyState !== WebSocket.OPEN) {
     tell("not connected: nothing was sent", true);
     return Promise.reject(new Error("not connected"));
   }
   const id = ++wishes;
   socket.send(JSON.stringify({ ...what, id }));
-  return new Promise((done, refused) => waiting.set(id, { done, refused }));
+  return new Promise((done, refused) => waiting.set(id, { done, refused, silent }));
 }
 
 function ask(what) {
@@ -77,7 +77,7 @@ function take(message) {
   else {
     const one = waiting.get(message.id);
     waiting.delete(message.id);
-    if (message.kind === "done") { tell(message.said); one?.done(message.said); }
+    if (message.kind === "done") { if (!one?.silent) tell(message.said); one?.done(message.said); }
     else if (one) one.refused(new Error(message.why));
     else tell(message.why, true);
   }
@@ -159,6 +159,7 @@ function show(now) {
     $("record").textContent = now.recording ? "End recording" : "Record";
     $("recording").textContent = now.recording ? `recording ${now.recording.file}: ${now.recording.rows} rows` : "";
     showPlay(now.play);
+    if (String(now.sights) !== String(before.sights)) why();
   } else {
     $("pause").textContent = now.playing ? "Pause" : "Play";
     if (!held.has("speed")) $("speed").value = now.speed;
@@ -172,6 +173,7 @@ function build(rows, cols) {
   const count = rows * cols;
   drawn = Array(count).fill(false);
   const array = $("array"), draw = $("draw");
+  $("why-spring").replaceChildren(...drawn.map((_, k) => new Option(k + 1)));
   array.style.gridTemplateColumns = `repeat(${cols}, minmax(0, 1fr))`;
   draw.style.gridTemplateColumns = `repeat(${cols}, auto)`;
   array.replaceChildren();
@@ -504,6 +506,18 @@ $("console").onsubmit = (event) => {
   quietly({ do: "say", line });
   $("line").value = "";
 };
+// The board's own words; asked for again with each new sight of that spring.
+let told = "";
+function why() {
+  const k = Number($("why-spring").value), asked = `${k} ${state.sights?.[k - 1]}`;
+  if (!$("why-card").open || !k || asked === told) return;
+  told = asked;
+  wish({ do: "say", line: `why ${k}` }, true)
+    .then((said) => { if (k === Number($("why-spring").value)) $("why").textContent = said; })
+    .catch((error) => { told = ""; $("why").textContent = error.message; });
+}
+$("why-spring").onchange = why;
+$("why-card").ontoggle = () => { told = ""; why(); };
 $("find").oninput = () => {
   for (const row of $("settings").rows) row.hidden = !row.textContent.toLowerCase().includes($("find").value.toLowerCase());
 };

@@ -1,0 +1,97 @@
+"""Recording a tape: all that a board is given, tick by tick, for `ninespring-sim rerun` (docs/files.md)."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+
+from ..errors import RefusedError, WorkError
+from .board import Board
+from .recording import SILENT_S, LogFile, Step
+
+TICK_S = 0.02
+COUNTED = 1 << 16
+"""Ticks are numbered modulo this."""
+
+
+def record_tape(
+    board: Board,
+    log: LogFile,
+    duration_s: float,
+    steps: Sequence[Step] = (),
+    say: Callable[[int, float], None] = lambda ticks, seconds: None,
+    keys: Mapping[str, str] | None = None,
+    remark: Callable[[str], None] = lambda words: None,
+) -> str:
+    """Record so many seconds by the board's clock; return why it ended early, where that was no wish.
+
+    The board begins anew: what it knows of its springs it forgets, but for what it has learnt of them. Steps without a time
+    are sent when the tape has begun. Whatever ends it, the springs are off afterwards.
+    """
+    ended = ""
+    latched: list[str] = []
+    try:
+        board.guard(board.settings())
+        for name, value in (keys or {}).items():
+            log.write(f"# {name}: {value}")
+        for line in board.version:
+            log.write(f"# version: {line}")
+        for name, value in board.settings().items():
+            log.write(f"# ${name}={value}")
+        board.ask("telemetry inputs", 10.0)
+        ended = _ticks(board, log, duration_s, list(steps), say, remark)
+    except KeyboardInterrupt:
+        pass
+    except RefusedError as error:
+        ended = f"{error}; a tape begins with all springs off and no fault"
+    except WorkError as error:
+        ended = str(error)
+    finally:
+        if not board.make_safe():
+            ended = (ended or f"{board.port}: the board does not answer") + (
+                "; the springs could not be switched off from here: cut their supply"
+            )
+        else:
+            latched = board.ask("faults")
+    for line in latched:
+        log.write(f"# latched at the end: {line}")
+    if ended:
+        log.write(f"# ended: {ended}")
+    return ended
+
+
+def _ticks(
+    board: Board,
+    log: LogFile,
+    duration_s: float,
+    steps: list[Step],
+    say: Callable[[int, float], None],
+    remark: Callable[[str], None],
+) -> str:
+    """Return what is missing, in words."""
+    last, lost, lost_s = None, 0, 0.0
+    while True:
+        line = board.next_line(time.monotonic() + board.patience * SILENT_S)
+        if line is None:
+            raise WorkError(f"{board.port}: nothing came for {board.patience * SILENT_S:g} s")
+        if line.startswith("~S"):
+            tick = int(line[2:6], 16)
+            if last is not None and tick != (last + 1) % COUNTED:
+                lost_s = lost_s if lost else TICK_S * log.rows
+                lost += (tick - last - 1) % COUNTED
+            last = tick
+            log.write_row(line)
+        elif line.startswith("<"):
+            log.write(line)
+        time_s = TICK_S * log.rows
+        say(log.rows, time_s)
+        if time_s >= duration_s:
+            return (
+                f"{lost} ticks were lost on the way here, the first after {lost_s:.1f} s: the tape tells nothing of what came after that"
+                if lost
+                else ""
+            )
+        while log.rows and steps and (steps[0].at_s or 0.0) <= time_s:
+            step = steps.pop(0)
+            for words in board.ask(step.line):
+                remark(f"'{step.line}': {words}")
