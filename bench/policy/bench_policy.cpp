@@ -465,7 +465,7 @@ void cost_rows(table_t &table, const options_t &options)
                   std::round(policy.awake_cycles_per_tick()), "cycles", "<= 112000", none,
                   std::round(open.awake_cycles_per_tick()));
         for (const auto &[function, target] :
-             {std::pair("drive_policy_tick", ""), std::pair("controller_tick", "<= 64000")}) {
+             {std::pair("drive_policy_tick", ""), std::pair("controller_tick", "<= 100000")}) {
             const double longest = policy.longest_cycles(function);
             if (std::isnan(longest))
                 fmt::print(stderr, "bench_policy: the linker left no {}\n", function);
