@@ -409,6 +409,16 @@ private:
         synced_ = true;
     }
 
+    /* But for what tells that garbage is answered: else no answer would count any more. */
+    void drop_waiting()
+    {
+        waiting_.clear();
+        if (!synced_) {
+            waiting_.push_back("");
+            waiting_.push_back(SYNC);
+        }
+    }
+
     void quiet()
     {
         quiet_until_s_ = now_s() + QUIET_S + (saving_ ? 4.0 : 0.0);
@@ -672,7 +682,7 @@ private:
             was_reset();
         }
         const double until_s = now_s() + 2.0 * ANSWER_S;
-        waiting_.clear();
+        drop_waiting();
         waiting_.push_back("telemetry off");
         waiting_.push_back("");
         waiting_.push_back("$$");
