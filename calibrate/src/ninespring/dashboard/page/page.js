@@ -159,7 +159,7 @@ function show(now) {
     $("record").textContent = now.recording ? "End recording" : "Record";
     $("recording").textContent = now.recording ? `recording ${now.recording.file}: ${now.recording.rows} rows` : "";
     showPlay(now.play);
-    if (String(now.sights) !== String(before.sights)) why();
+    why();
   } else {
     $("pause").textContent = now.playing ? "Pause" : "Play";
     if (!held.has("speed")) $("speed").value = now.speed;
@@ -506,15 +506,16 @@ $("console").onsubmit = (event) => {
   quietly({ do: "say", line });
   $("line").value = "";
 };
-// The board's own words; asked for again with each new sight of that spring.
+// The board's own words; asked for again with each new sight of that spring, and as how long ago they were grows.
+const WHY_AGAIN_S = 10;
 let told = "";
 function why() {
-  const k = Number($("why-spring").value), asked = `${k} ${state.sights?.[k - 1]}`;
+  const k = Number($("why-spring").value), asked = `${k} ${state.sights?.[k - 1]} ${Math.floor(state.time_s / WHY_AGAIN_S)}`;
   if (!$("why-card").open || !k || asked === told) return;
   told = asked;
   wish({ do: "say", line: `why ${k}` }, true)
     .then((said) => { if (k === Number($("why-spring").value)) $("why").textContent = said; })
-    .catch((error) => { told = ""; $("why").textContent = error.message; });
+    .catch((error) => { $("why").textContent = error.message; });
 }
 $("why-spring").onchange = why;
 $("why-card").ontoggle = () => { told = ""; why(); };
