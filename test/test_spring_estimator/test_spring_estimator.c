@@ -318,6 +318,27 @@ static void hold_that_loses_nothing_shows_no_crossing(void)
     }
 }
 
+/* A bit of the average: it is not compared with, and what was learnt does not follow it. */
+static void average_that_no_reading_made_is_begun_anew(void)
+{
+    for (float by = 1.0f / 65536.0f; by < 1e6f; by *= 256.0f) {
+        begin_cold();
+        (void)heat_then_hold(60.0);
+        hold(9.0, 60.0);
+        const float austenite_ohm = BELIEF.learnt.austenite_ohm;
+        BELIEF.slow_ohm *= by;
+        double most_a = 0.0;
+        for (double s = 0.0; s < 5.0; s += TICK_S) {
+            (void)tick(fmin(hold_current_a(9.0), 3.0));
+            most_a = fmax(most_a, s > 0.5 ? hold_current_a(9.0) : 0.0);
+        }
+        (void)snprintf(where, sizeof where, "x %.0e: %.2f A, %.1f C", (double)by, most_a,
+                       truth.temperature_c);
+        TEST_ASSERT_TRUE_MESSAGE(most_a < 2.0 && truth.temperature_c < 92.0, where);
+        TEST_ASSERT_FLOAT_WITHIN(0.01f * austenite_ohm, austenite_ohm, BELIEF.learnt.austenite_ohm);
+    }
+}
+
 /* A touch in mid-hold: all four temperatures rise by 8 K, and phase goes. */
 static void transformation_that_moves_is_noticed(void)
 {
@@ -769,6 +790,7 @@ int main(void)
     RUN_TEST(spring_that_is_off_is_within_its_bounds);
     RUN_TEST(crossing_is_seen_and_makes_the_distance_sure);
     RUN_TEST(hold_that_loses_nothing_shows_no_crossing);
+    RUN_TEST(average_that_no_reading_made_is_begun_anew);
     RUN_TEST(transformation_that_moves_is_noticed);
     RUN_TEST(heating_in_a_gust_goes_on_until_it_is_over);
     RUN_TEST(offset_is_learnt_where_the_current_drops);
