@@ -676,6 +676,7 @@ private:
         board_t *board = board_.get();
         for (unsigned k = 0; k < SPRINGS; ++k) {
             board_set_fault(board, BOARD_FAULT_CLOSED, k, false);
+            closed_s_[k] = -1.0;
         }
         if (quiet_until_s_ > 1e8) { /* the crystal */
             board_reset(board, BOARD_RESET_POWER_ON);
