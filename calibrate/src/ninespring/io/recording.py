@@ -359,10 +359,7 @@ def record(
     except WorkError as error:
         got.ended = str(error)
     finally:
-        if not (answers := board.make_safe()):
-            got.ended = (got.ended or f"{board.port}: the board does not answer") + (
-                "; the springs could not be switched off from here: cut their supply"
-            )
+        answers, got.ended = end_safely(board, got.ended)
     latched: list[str] = []
     with contextlib.suppress(WorkError):
         sink.flush()
@@ -483,6 +480,14 @@ def mean_row(names: Sequence[str], first: str, rows: Sequence[str]) -> str:
                 weight = current if sum(current) > 0 else [1.0] * len(cells)
                 out[where] = f"{sum(v * w for v, w in zip(voltage, weight, strict=True)) / sum(weight):.4f}"
     return ",".join(out)
+
+
+def end_safely(board: Board, ended: str) -> tuple[bool, str]:
+    """Switch all off. Return whether the board confirms it, and why a recording ended: that it does not is said there, too."""
+    if board.make_safe():
+        return True, ended
+    ended = ended or f"{board.port}: the board does not answer"
+    return False, f"{ended}; the springs could not be switched off from here: cut their supply"
 
 
 def _head(

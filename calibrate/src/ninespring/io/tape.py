@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 from ..errors import RefusedError, WorkError
 from .board import Board
-from .recording import SILENT_S, LogFile, Step
+from .recording import SILENT_S, LogFile, Step, end_safely, write_head
 
 TICK_S = 0.02
 COUNTED = 1 << 16
@@ -32,12 +32,7 @@ def record_tape(
     latched: list[str] = []
     try:
         board.guard(board.settings())
-        for name, value in (keys or {}).items():
-            log.write(f"# {name}: {value}")
-        for line in board.version:
-            log.write(f"# version: {line}")
-        for name, value in board.settings().items():
-            log.write(f"# ${name}={value}")
+        write_head(board, log, keys or {})
         board.ask("telemetry inputs", 10.0)
         ended = _ticks(board, log, duration_s, list(steps), say, remark)
     except KeyboardInterrupt:
@@ -47,11 +42,8 @@ def record_tape(
     except WorkError as error:
         ended = str(error)
     finally:
-        if not board.make_safe():
-            ended = (ended or f"{board.port}: the board does not answer") + (
-                "; the springs could not be switched off from here: cut their supply"
-            )
-        else:
+        answers, ended = end_safely(board, ended)
+        if answers:
             latched = board.ask("faults")
     for line in latched:
         log.write(f"# latched at the end: {line}")
