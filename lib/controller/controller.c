@@ -121,12 +121,12 @@ static void start(controller_t *controller, const controller_settings_t *setting
 {
     thermal_model_t *model = &controller->model;
     const size_t kept = offsetof(controller_t, current); /* model, and what was delivered */
-    const size_t policy = offsetof(controller_t, policy);
-    const size_t behind = policy + sizeof controller->policy;
+    const size_t belief = offsetof(controller_t, estimator);
+    const size_t behind = belief + sizeof controller->estimator;
     if (!keeps_learnt) {
-        controller->policy = (drive_policy_t){0};
+        controller->estimator = (spring_estimator_t){0};
     }
-    memset((uint8_t *)controller + kept, 0, policy - kept);
+    memset((uint8_t *)controller + kept, 0, belief - kept);
     memset((uint8_t *)controller + behind, 0, sizeof *controller - behind);
     controller->ambient_c7 = ambient_c7;
     controller->springs = (uint8_t)(settings->model.rows * settings->model.columns);
@@ -135,7 +135,9 @@ static void start(controller_t *controller, const controller_settings_t *setting
     temperature_ceiling_prepare(&controller->ceiling, model, &settings->current);
     (void)current_control_init(&controller->current, &settings->current, NULL);
     (void)safety_init(&controller->safety, &settings->safety, controller->springs, NULL);
-    (void)drive_policy_restart(&controller->policy, &settings->policy, model, NULL);
+    spring_estimator_restart(&controller->estimator, model);
+    (void)drive_policy_init(&controller->policy, &settings->policy, model, NULL);
+    spring_estimator_prepare(&controller->estimator, model, settings->policy.observer != 0);
     tell_resistances(controller);
     scrub_start(&controller->scrub, controller_fixed, controller);
 }
@@ -152,6 +154,15 @@ bool controller_init(controller_t *controller, const controller_settings_t *sett
     controller->supply_off = false;
     controller->supply_ticks = 0;
     start(controller, settings, ambient_c7, false);
+    return true;
+}
+
+static bool apply_policy(controller_t *controller, const drive_policy_parameters_t *parameters)
+{
+    if (!drive_policy_apply(&controller->policy, parameters, &controller->model, NULL)) {
+        return false;
+    }
+    spring_estimator_prepare(&controller->estimator, &controller->model, parameters->observer != 0);
     return true;
 }
 
@@ -196,7 +207,7 @@ bool controller_apply_settings(controller_t *controller, const controller_settin
         (void)current_control_apply(&controller->current, &settings->current, NULL);
         temperature_ceiling_prepare(&controller->ceiling, &controller->model, &settings->current);
         (void)safety_apply(&controller->safety, &settings->safety, NULL);
-        (void)drive_policy_apply(&controller->policy, &settings->policy, &controller->model, NULL);
+        (void)apply_policy(controller, &settings->policy);
         const bool other_model = mark != controller_model_mark(controller);
         for (uint8_t k = 0; other_model && k < controller->springs; k++) {
             controller_forget_loss(controller, k);
@@ -293,7 +304,7 @@ static uint32_t take_sensors(controller_t *controller, const controller_sensor_t
 static void judge_circuit(controller_t *controller, uint8_t k)
 {
     if (circuit_check_judge(&controller->circuit[k], &controller->current.parameters) ||
-        controller->policy.estimator.spring[k].unlike) {
+        spring_estimator_is_unlike(spring_estimator_of(&controller->estimator, k))) {
         safety_trip(&controller->safety, k, SAFETY_FAULT_SENSOR_MISMATCH);
     }
 }
@@ -360,7 +371,7 @@ static void step_model(controller_t *controller, const controller_inputs_t *inpu
     controller->model_tick = 0;
     for (uint8_t k = 0; k < controller->springs; k++) {
         controller->power_sum_uw[k] = spring_estimator_model_power_uw(
-            &controller->policy.estimator, k, mean_of_step(controller->power_sum_uw[k]));
+            &controller->estimator, k, mean_of_step(controller->power_sum_uw[k]));
     }
     controller->ambient_c7 = inputs->ambient_c7;
     thermal_model_set_ambient(&controller->model, inputs->ambient_c7);
@@ -424,15 +435,13 @@ static void drive(controller_t *controller, const bool valid[], uint32_t sum_ma,
     }
     uint16_t target_ma[CONTROLLER_MAX_SPRINGS];
     const safety_parameters_t *limits = &controller->safety.parameters;
-    drive_policy_input_t input = {.model = &controller->model,
+    drive_policy_input_t input = {.belief = &controller->estimator,
+                                  .model = &controller->model,
                                   .level_permille = controller->level_permille,
                                   .allowed = allowed,
                                   .maximum_current_ma =
                                       controller->current.parameters.maximum_current_ma,
-                                  .supply_limit_ma = limits->supply_limit_ma,
-                                  .measured_ma = controller->measured_ma,
-                                  .measured_mv = controller->measured_mv,
-                                  .valid = valid};
+                                  .supply_limit_ma = limits->supply_limit_ma};
     drive_policy_tick(&controller->policy, &input, target_ma);
     INVARIANT(targets_are_allowed(controller, allowed, target_ma));
 
@@ -475,6 +484,8 @@ void controller_tick(controller_t *controller, const controller_inputs_t *inputs
     uint32_t sum_ma = take_sensors(controller, inputs->sensor, valid);
     listen(controller);
     step_model(controller, inputs);
+    spring_estimator_tick(&controller->estimator, &controller->model, controller->measured_ma,
+                          controller->measured_mv, valid);
     watch_supply(controller);
     memset(outputs->duty, 0, sizeof outputs->duty);
     drive(controller, valid, sum_ma, outputs->duty);
@@ -509,8 +520,7 @@ bool controller_set_policy(controller_t *controller, drive_policy_kind_t kind)
     drive_policy_parameters_t parameters = controller->policy.parameters;
     parameters.policy = (uint8_t)kind;
     scrub_open(&controller->scrub, controller_fixed, controller);
-    const bool applied =
-        drive_policy_apply(&controller->policy, &parameters, &controller->model, NULL);
+    const bool applied = apply_policy(controller, &parameters);
     scrub_seal(&controller->scrub, controller_fixed, controller);
     return applied;
 }
@@ -624,7 +634,7 @@ bool controller_set_model_state(controller_t *controller, const thermal_model_st
     if (any_is_warm(controller) || !thermal_model_set_state(&controller->model, state)) {
         return false;
     }
-    spring_estimator_trust_model(&controller->policy.estimator, &controller->model);
+    spring_estimator_trust_model(&controller->estimator, &controller->model);
     temperature_ceiling_raise(&controller->ceiling, &controller->model);
     tell_resistances(controller);
     return true;
@@ -662,7 +672,7 @@ void controller_set_temperature(controller_t *controller, int16_t temperature_c7
             continue;
         }
         cool_to(&controller->model, k, temperature_c7);
-        spring_estimator_trust_spring(&controller->policy.estimator, &controller->model, k);
+        spring_estimator_trust_spring(&controller->estimator, &controller->model, k);
     }
     temperature_ceiling_raise(&controller->ceiling, &controller->model);
     tell_resistances(controller);
@@ -685,66 +695,65 @@ uint16_t controller_rest_s(const controller_t *controller, uint8_t spring)
 
 spring_bounds_t controller_temperature_bounds_c(const controller_t *controller, uint8_t spring)
 {
-    return spring_estimator_temperature_c(&controller->policy.estimator, &controller->model,
-                                          spring);
+    return spring_estimator_temperature_c(&controller->estimator, &controller->model, spring);
 }
 
 spring_bounds_t controller_distance_bounds_k(const controller_t *controller, uint8_t spring)
 {
-    return spring_estimator_distance_k(&controller->policy.estimator, &controller->model, spring);
+    return spring_estimator_distance_k(&controller->estimator, &controller->model, spring);
 }
 
 spring_bounds_t controller_austenite_bounds(const controller_t *controller, uint8_t spring)
 {
-    return spring_estimator_austenite(&controller->policy.estimator, &controller->model, spring);
+    return spring_estimator_austenite(&controller->estimator, &controller->model, spring);
 }
 
 bool controller_losses(const controller_t *controller, float *factor, float *sd)
 {
-    return spring_estimator_losses(&controller->policy.estimator, factor, sd);
+    return spring_estimator_losses(&controller->estimator, factor, sd);
 }
 
 float controller_shift_k(const controller_t *controller, uint8_t spring)
 {
-    return controller->policy.estimator.spring[spring].shift_k;
+    return spring_estimator_shift_k(spring_estimator_of(&controller->estimator, spring));
 }
 
 uint16_t controller_belief_mark(const controller_t *controller, uint8_t spring)
 {
-    return spring_estimator_mark(&controller->policy.estimator, &controller->model, spring);
+    return spring_estimator_mark(&controller->estimator, &controller->model, spring);
 }
 
 const spring_sights_t *controller_sights(const controller_t *controller)
 {
-    return &controller->policy.estimator.sights;
+    return spring_estimator_sights(&controller->estimator);
 }
 
 float controller_cooling_s(const controller_t *controller, uint8_t spring)
 {
     const float cooling_s =
-        spring_estimator_cooling_s(&controller->policy.estimator, &controller->model, spring);
+        spring_estimator_cooling_s(&controller->estimator, &controller->model, spring);
     return cooling_s < CONTROLLER_COOLING_MOST_S ? cooling_s : CONTROLLER_COOLING_MOST_S;
 }
 
 spring_learnt_t controller_learnt(const controller_t *controller, uint8_t spring)
 {
-    return spring_estimator_learnt(&controller->policy.estimator, spring);
+    return spring_estimator_learnt(&controller->estimator, spring);
 }
 
 void controller_restore_learnt(controller_t *controller, uint8_t spring,
                                const spring_learnt_t *learnt)
 {
-    spring_estimator_restore(&controller->policy.estimator, spring, learnt);
+    spring_estimator_restore(&controller->estimator, spring, learnt);
 }
 
 void controller_forget_learnt(controller_t *controller, uint8_t spring)
 {
-    spring_estimator_forget(&controller->policy.estimator, spring);
+    spring_estimator_forget(&controller->estimator, spring);
 }
 
 void controller_forget_loss(controller_t *controller, uint8_t spring)
 {
-    spring_estimator_forget_loss(&controller->policy.estimator, spring);
+    spring_estimator_forget_loss(&controller->estimator, spring);
 }
 
 uint16_t controller_model_mark(const controller_t *controller)

@@ -1,5 +1,5 @@
 /* What it is for: one control tick of the whole board: measured inputs in, duties out.
- * What it owns: the order in which safety, model, policy and current loops run.
+ * What it owns: the order in which safety, model, belief, policy and current loops run.
  * What it never does: touch hardware, keep time, print. Same inputs, same outputs, everywhere. */
 #ifndef CONTROLLER_H
 #define CONTROLLER_H
@@ -12,6 +12,7 @@
 #include "drive_policy.h"
 #include "safety.h"
 #include "scrub.h"
+#include "spring_estimator.h"
 #include "temperature_ceiling.h"
 #include "thermal_model.h"
 
@@ -67,6 +68,7 @@ typedef struct {
     uint8_t supply_ticks;      /* that the supply has been held, up to those that a relay takes */
     current_control_t current; /* what is before it outlives another size of the array */
     safety_t safety;
+    spring_estimator_t estimator; /* what is believed; it alone corrects the model */
     drive_policy_t policy;
     uint32_t silent_ticks; /* since the host was heard; no more than the longest host_timeout_s */
     uint8_t springs;
@@ -116,7 +118,7 @@ bool controller_apply_settings(controller_t *controller, const controller_settin
 bool controller_restart(controller_t *controller, const controller_settings_t *settings);
 
 /* One tick of 20 ms: sensors, safety, model (every 5th tick, with the mean power of the ticks),
- * policy, current loops.
+ * belief, policy, current loops.
  * inputs are of the tick that just ended, outputs are for the one that starts. outputs of springs
  * that do not exist are 0. Power is v x i of a valid reading. Without one it is the last valid
  * power if the output was on in the tick, else 0: the duty is not raised while a channel is blind,

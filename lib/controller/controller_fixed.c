@@ -23,13 +23,14 @@ scrub_stretch_t controller_fixed(const void *owner, uint8_t index)
     case 5:
         return (scrub_stretch_t){&c->safety, offsetof(safety_t, board_fault)};
     case 6:
-        return (scrub_stretch_t){&c->policy, offsetof(drive_policy_t, estimator) +
-                                                 offsetof(spring_estimator_t, spring)};
+        return (scrub_stretch_t){&c->estimator, SPRING_ESTIMATOR_FIXED_BYTES};
     case 7:
+        return (scrub_stretch_t){&c->policy, offsetof(drive_policy_t, queue)};
+    case 8:
         return (scrub_stretch_t){&c->springs, sizeof c->springs};
     default:
-        if (index - 8u < THERMAL_MODEL_MAX_SPRINGS) {
-            return (scrub_stretch_t){&model->spring[index - 8u],
+        if (index - 9u < THERMAL_MODEL_MAX_SPRINGS) {
+            return (scrub_stretch_t){&model->spring[index - 9u],
                                      offsetof(thermal_model_spring_t, loss_uw_per_k)};
         }
         return (scrub_stretch_t){0};

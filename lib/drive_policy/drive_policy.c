@@ -2,15 +2,12 @@
 
 #include <math.h>
 #include <stddef.h>
-#include <string.h>
 
 #include "derating.h"
 #include "invariant.h"
 
 #define TURNS_PER_S SPRING_AWAY_TURNS_PER_S
 #define TURN_S      SPRING_ESTIMATOR_TURN_S
-#define TICKS_PER_REST                                                                             \
-    5u /* in which the model steps and no spring is updated: a round takes 1/4 s */
 
 /* A spring counts as wanted fully on from here: the last percent of a transformation has no level.
  */
@@ -45,8 +42,8 @@
 
 #define THERE 0.95f
 
-#define WALK_MA     20                             /* a tick, after a change of policy */
-#define WALK_TURNS  (2u * DRIVE_POLICY_ROUND + 1u) /* every spring has had two */
+#define WALK_MA     20                                 /* a tick, after a change of policy */
+#define WALK_TURNS  (2u * SPRING_ESTIMATOR_ROUND + 1u) /* every spring has had two */
 #define JUMP_MA     100u /* of a current: readings on the way tell nothing */
 #define HEAT_DITHER 4    /* of the hold's: so that a reading that hangs is noticed */
 
@@ -77,30 +74,17 @@ bool drive_policy_apply(drive_policy_t *policy, const drive_policy_parameters_t 
     }
     policy->parameters = *parameters;
     policy->columns = model->parameters.columns;
-    spring_estimator_prepare(&policy->estimator, model, parameters->observer != 0);
     return true;
 }
 
 bool drive_policy_init(drive_policy_t *policy, const drive_policy_parameters_t *parameters,
-                       thermal_model_t *model, uint16_t *bad)
+                       const thermal_model_t *model, uint16_t *bad)
 {
     if (!drive_policy_check(parameters, bad)) {
         return false;
     }
     *policy = (drive_policy_t){0};
-    return drive_policy_restart(policy, parameters, model, bad);
-}
-
-bool drive_policy_restart(drive_policy_t *policy, const drive_policy_parameters_t *parameters,
-                          thermal_model_t *model, uint16_t *bad)
-{
-    if (!drive_policy_check(parameters, bad)) {
-        return false;
-    }
-    const size_t behind = offsetof(drive_policy_t, queue);
-    memset((uint8_t *)policy + behind, 0, sizeof *policy - behind);
     policy->springs = model->springs;
-    spring_estimator_restart(&policy->estimator, model);
     (void)drive_policy_apply(policy, parameters, model, NULL);
     policy->walks = 0;
     for (uint8_t k = 0; k < policy->springs; k++) {
@@ -116,9 +100,15 @@ static float kelvin(uint16_t value_ck)
     return 0.01f * (float)value_ck;
 }
 
-static float now_c(const thermal_model_t *model, uint8_t k)
+/* Nothing but these, and what it is told of heatings, holds and jumps, is asked of the belief. */
+static const spring_belief_t *belief_of(const drive_policy_input_t *in, uint8_t k)
 {
-    return spring_c(thermal_model_temperature_c7(model, k));
+    return spring_estimator_of(in->belief, k);
+}
+
+static float now_c(const drive_policy_input_t *in, uint8_t k)
+{
+    return spring_c(thermal_model_temperature_c7(in->model, k));
 }
 
 static bool is_full(uint16_t level_permille)
@@ -126,19 +116,19 @@ static bool is_full(uint16_t level_permille)
     return level_permille >= LEVEL_FULL_PERMILLE;
 }
 
-static float phase_of(const drive_policy_t *policy, const thermal_model_t *model, uint8_t k)
+static float phase_of(const drive_policy_input_t *in, uint8_t k)
 {
-    return spring_estimator_phase(&policy->estimator, model, k);
+    return spring_estimator_phase(in->belief, in->model, k);
 }
 
-static void enter(drive_policy_t *policy, thermal_model_t *model, uint8_t k,
+static void enter(drive_policy_t *policy, const drive_policy_input_t *in, uint8_t k,
                   drive_policy_stage_t stage, uint16_t level_permille)
 {
     drive_policy_spring_t *s = &policy->spring[k];
     supply_queue_remove(&policy->queue, k);
     s->floor_ma = s->stage == DRIVE_POLICY_STAGE_HOLD ? s->wanted_ma : 0; /* until its turn */
     s->stage = (uint8_t)stage;
-    const thermal_model_transformation_t points = thermal_model_transformation(model, k);
+    const thermal_model_transformation_t points = thermal_model_transformation(in->model, k);
     s->wanted_ma = (uint16_t)(LOWER_MA + policy->parameters.dither_ma); /* for a turn */
     switch (stage) {
     case DRIVE_POLICY_STAGE_OFF:
@@ -146,30 +136,30 @@ static void enter(drive_policy_t *policy, thermal_model_t *model, uint8_t k,
         break;
     case DRIVE_POLICY_STAGE_HEAT:
         supply_queue_add(&policy->queue, k);
-        spring_estimator_begin_heating(&policy->estimator, model, k);
+        spring_estimator_begin_heating(in->belief, in->model, k);
         s->rise_k_per_s = RISE_BEGINS_K_PER_S;
         s->wanted_ma = policy->parameters.boost_current_ma;
         break;
     case DRIVE_POLICY_STAGE_HOLD:
-        spring_estimator_begin_hold(&policy->estimator, model, k, is_full(level_permille));
+        spring_estimator_begin_hold(in->belief, in->model, k, is_full(level_permille));
         s->margin_k = spring_c((int16_t)(points.austenite_finish_c7 - points.martensite_start_c7)) +
                       BLIND_BEGIN_K;
         break;
     case DRIVE_POLICY_STAGE_LOWER:
-        spring_estimator_begin_hold(&policy->estimator, model, k, false);
+        spring_estimator_begin_hold(in->belief, in->model, k, false);
         break;
     }
 }
 
 /* What holds a spring so much above where it is now, and takes it there. */
-static uint16_t hold_current_ma(const drive_policy_t *policy, uint8_t k, float short_k,
-                                float more_w)
+static uint16_t hold_current_ma(const drive_policy_t *policy, const drive_policy_input_t *in,
+                                uint8_t k, float short_k, float more_w)
 {
-    const spring_estimator_t *e = &policy->estimator;
+    const spring_estimator_t *e = in->belief;
     const float hold_w = spring_estimator_hold_w(e, k, short_k) + more_w;
-    const float closes_w = short_k * e->heat_capacity_j_per_k / FOLLOW_S;
-    const bool coasts =
-        policy->queue.count != 0 || short_k < -TELLS_K || e->spring[k].noise > TELLS_NOISE;
+    const float closes_w = spring_estimator_follow_w(e, short_k, FOLLOW_S);
+    const bool coasts = policy->queue.count != 0 || short_k < -TELLS_K ||
+                        spring_estimator_noise(belief_of(in, k)) > TELLS_NOISE;
     const float cools_w = coasts ? -hold_w : -COOLS_SHARE * hold_w;
     return spring_estimator_current_ma(e, k, hold_w + (closes_w > cools_w ? closes_w : cools_w));
 }
@@ -181,47 +171,50 @@ static bool waits_for_supply(const drive_policy_spring_t *s)
 
 /* Its own limit leaves too little to go on, and it is hot enough to have transformed; or it may be,
  * and rises no more. */
-static bool is_limited(const drive_policy_t *policy, const thermal_model_t *model, uint8_t k)
+static bool is_limited(const drive_policy_t *policy, const drive_policy_input_t *in, uint8_t k)
 {
     const drive_policy_spring_t *s = &policy->spring[k];
-    const spring_belief_t *b = &policy->estimator.spring[k];
+    const spring_belief_t *b = belief_of(in, k);
     const uint16_t boost_ma = policy->parameters.boost_current_ma;
     if (s->ceiling_ma >= boost_ma - (boost_ma >> 2)) {
         return false;
     }
-    const float finish_c = spring_c(thermal_model_transformation(model, k).austenite_finish_c7);
-    return (now_c(model, k) > finish_c && !spring_estimator_lacks_phase(b, model, k)) ||
-           (s->rise_k_per_s < STILL_K_PER_S && spring_estimator_hottest_c(b, model, k) > finish_c);
+    const float finish_c = spring_c(thermal_model_transformation(in->model, k).austenite_finish_c7);
+    return (now_c(in, k) > finish_c && !spring_estimator_lacks_phase(b, in->model, k)) ||
+           (s->rise_k_per_s < STILL_K_PER_S &&
+            spring_estimator_hottest_c(b, in->model, k) > finish_c);
 }
 
-static void heat(drive_policy_t *policy, thermal_model_t *model, uint8_t k, uint16_t level_permille)
+static void heat(drive_policy_t *policy, const drive_policy_input_t *in, uint8_t k,
+                 uint16_t level_permille)
 {
     drive_policy_spring_t *s = &policy->spring[k];
-    const spring_belief_t *b = &policy->estimator.spring[k];
-    const thermal_model_transformation_t points = thermal_model_transformation(model, k);
+    const spring_belief_t *b = belief_of(in, k);
+    const thermal_model_transformation_t points = thermal_model_transformation(in->model, k);
     const uint16_t boost_ma = policy->parameters.boost_current_ma;
-    const int16_t c7 = thermal_model_temperature_c7(model, k);
-    if (b->possible == SPRING_PHASE_ANY) { /* nothing is known: a look, or until it is cold */
-        s->wanted_ma = b->learnt.austenite_ohm > 0.0f && policy->estimator.observes ? LOOK_MA : 0;
+    const int16_t c7 = thermal_model_temperature_c7(in->model, k);
+    if (spring_estimator_possible(b) == SPRING_PHASE_ANY) { /* a look, or until it is cold */
+        s->wanted_ma = spring_estimator_may_look(in->belief, k) ? LOOK_MA : 0;
         return;
     }
     s->wanted_ma = boost_ma;
     const bool full = is_full(level_permille);
     const float level = 0.001f * (float)level_permille;
-    if (is_limited(policy, model, k) ||
-        (full ? spring_estimator_has_transformed(&policy->estimator, model, k)
-              : phase_of(policy, model, k) >= level)) {
-        enter(policy, model, k, DRIVE_POLICY_STAGE_HOLD, level_permille);
+    if (is_limited(policy, in, k) ||
+        (full ? spring_estimator_has_transformed(in->belief, in->model, k)
+              : phase_of(in, k) >= level)) {
+        enter(policy, in, k, DRIVE_POLICY_STAGE_HOLD, level_permille);
         return;
     }
     const bool slows = !full && c7 > points.austenite_start_c7 - 128;
     /* what it keeps it keeps until its turn: else what its current reads could take it away */
     const bool keeps =
         waits_for_supply(s) && (s->floor_ma != 0 || c7 > points.austenite_start_c7 + KEPT_C7 ||
-                                phase_of(policy, model, k) > 0.5f * level);
+                                phase_of(in, k) > 0.5f * level);
     s->floor_ma = 0;
     if (slows || keeps) {
-        const uint16_t keeps_ma = hold_current_ma(policy, k, 0.0f, slows ? LEVEL_POWER_W : 0.0f);
+        const uint16_t keeps_ma =
+            hold_current_ma(policy, in, k, 0.0f, slows ? LEVEL_POWER_W : 0.0f);
         if (slows && keeps_ma < s->wanted_ma) {
             s->wanted_ma = keeps_ma;
         }
@@ -231,103 +224,104 @@ static void heat(drive_policy_t *policy, thermal_model_t *model, uint8_t k, uint
 
 /* Above martensite start: fully on by as much as its distance is unsure; a level as far from both
  * ends of the band as it can be. */
-static float safe_margin_k(const drive_policy_t *policy, const thermal_model_t *model, uint8_t k,
+static float safe_margin_k(const drive_policy_t *policy, const drive_policy_input_t *in, uint8_t k,
                            bool full, float sd_k)
 {
     const drive_policy_parameters_t *p = &policy->parameters;
     if (!full) {
-        const thermal_model_transformation_t points = thermal_model_transformation(model, k);
+        const thermal_model_transformation_t points = thermal_model_transformation(in->model, k);
         return 0.5f * spring_c((int16_t)(points.austenite_start_c7 - points.martensite_start_c7));
     }
     const float least_k = kelvin(p->hold_margin_cc);
     const float most_k = kelvin(p->unsure_margin_cc);
-    const float margin_k =
-        least_k + policy->estimator.spring[k].disturbance_k + MARGIN_PER_SD * (sd_k - MARGIN_SD_K);
+    const float margin_k = least_k + spring_estimator_disturbance_k(belief_of(in, k)) +
+                           MARGIN_PER_SD * (sd_k - MARGIN_SD_K);
     return margin_k > most_k ? most_k : margin_k < least_k ? least_k : margin_k;
 }
 
-static void hold(drive_policy_t *policy, thermal_model_t *model, uint8_t k, uint16_t level_permille)
+static void hold(drive_policy_t *policy, const drive_policy_input_t *in, uint8_t k,
+                 uint16_t level_permille)
 {
     drive_policy_spring_t *s = &policy->spring[k];
-    const spring_belief_t *b = &policy->estimator.spring[k];
+    const spring_belief_t *b = belief_of(in, k);
     const bool full = is_full(level_permille);
     const bool sees = spring_estimator_sees(b);
     const float level = full ? 1.0f : 0.001f * (float)level_permille;
-    const bool lost =
-        full && b->possible == SPRING_PHASE_AUSTENITE
-            ? b->lost > LOST_AT_ONCE || (b->lost > LOST_SETTLED && b->quiet >= SETTLED_TURNS)
-            : phase_of(policy, model, k) < level - 2.0f * LEVEL_BAND;
+    const bool settled = spring_estimator_rest_turns(b) >= SETTLED_TURNS;
+    const bool losing = spring_estimator_seems_to_lose(b);
+    const bool lost = full && spring_estimator_possible(b) == SPRING_PHASE_AUSTENITE
+                          ? spring_estimator_lost(b) > (settled ? LOST_SETTLED : LOST_AT_ONCE)
+                          : phase_of(in, k) < level - 2.0f * LEVEL_BAND;
     if (lost && spring_away_try(&s->away)) {
-        enter(policy, model, k, DRIVE_POLICY_STAGE_HEAT, level_permille);
+        enter(policy, in, k, DRIVE_POLICY_STAGE_HEAT, level_permille);
         return;
     }
-    if (!full && phase_of(policy, model, k) > level + LEVEL_BAND) {
-        enter(policy, model, k, DRIVE_POLICY_STAGE_LOWER, level_permille);
+    if (!full && phase_of(in, k) > level + LEVEL_BAND) {
+        enter(policy, in, k, DRIVE_POLICY_STAGE_LOWER, level_permille);
         return;
     }
-    const float sd_k = spring_estimator_hold_sd_k(&policy->estimator, model, k);
-    const float safe_k = safe_margin_k(policy, model, k, full, sd_k);
+    const float sd_k = spring_estimator_hold_sd_k(in->belief, in->model, k);
+    const float safe_k = safe_margin_k(policy, in, k, full, sd_k);
     if (full && !sees) { /* who knows whether it has transformed: above that first, then down */
         s->margin_k -= BLIND_K_PER_S * TURN_S;
         s->margin_k = s->margin_k < safe_k ? safe_k : s->margin_k;
     } else if (s->margin_k > safe_k || !full || sd_k < SEARCH_SD_K) {
         s->margin_k = safe_k;
-    } else if (b->quiet >= SETTLED_TURNS && b->losing == 0 && s->margin_k > SEARCH_END_K) {
+    } else if (settled && !losing && s->margin_k > SEARCH_END_K) {
         s->margin_k -= 0.001f * TURN_S * (float)policy->parameters.search_mk_per_s;
     }
-    const int16_t start_c7 = thermal_model_transformation(model, k).martensite_start_c7;
-    const int16_t below_c7 = (int16_t)(start_c7 - thermal_model_temperature_c7(model, k));
-    const uint16_t holds_ma = hold_current_ma(policy, k, spring_c(below_c7) + s->margin_k,
-                                              b->losing != 0 ? SUSPECTED_W : 0.0f);
+    const int16_t start_c7 = thermal_model_transformation(in->model, k).martensite_start_c7;
+    const int16_t below_c7 = (int16_t)(start_c7 - thermal_model_temperature_c7(in->model, k));
+    const uint16_t holds_ma = hold_current_ma(policy, in, k, spring_c(below_c7) + s->margin_k,
+                                              losing ? SUSPECTED_W : 0.0f);
     const uint16_t wanted_ma = (uint16_t)(holds_ma + policy->parameters.dither_ma / 2u);
     s->wanted_ma = wanted_ma < policy->parameters.probe_current_ma
                        ? policy->parameters.probe_current_ma
                        : wanted_ma;
 }
 
-static void lower(drive_policy_t *policy, thermal_model_t *model, uint8_t k,
+static void lower(drive_policy_t *policy, const drive_policy_input_t *in, uint8_t k,
                   uint16_t level_permille)
 {
     const float level = 0.001f * (float)level_permille;
-    const float phase = phase_of(policy, model, k);
+    const float phase = phase_of(in, k);
     if (phase <= level) {
         const bool heats = phase < level - LEVEL_BAND && spring_away_try(&policy->spring[k].away);
-        enter(policy, model, k, heats ? DRIVE_POLICY_STAGE_HEAT : DRIVE_POLICY_STAGE_HOLD,
+        enter(policy, in, k, heats ? DRIVE_POLICY_STAGE_HEAT : DRIVE_POLICY_STAGE_HOLD,
               level_permille);
     }
 }
 
 /* Switched on: it has the wanted phase already, and keeps it until the current flows. */
-static bool is_there(const drive_policy_t *policy, const thermal_model_t *model, uint8_t k,
-                     uint16_t level_permille)
+static bool is_there(const drive_policy_input_t *in, uint8_t k, uint16_t level_permille)
 {
-    const spring_belief_t *b = &policy->estimator.spring[k];
+    const spring_belief_t *b = belief_of(in, k);
     const float level = 0.001f * (float)level_permille;
     if (is_full(level_permille)) {
-        return b->possible == SPRING_PHASE_AUSTENITE && b->lost < LOST_AT_ONCE &&
-               spring_estimator_distance_k(&policy->estimator, model, k).low > 0.0f;
+        return spring_estimator_possible(b) == SPRING_PHASE_AUSTENITE &&
+               spring_estimator_lost(b) < LOST_AT_ONCE &&
+               spring_estimator_distance_k(in->belief, in->model, k).low > 0.0f;
     }
-    return phase_of(policy, model, k) >= level - LEVEL_BAND;
+    return phase_of(in, k) >= level - LEVEL_BAND;
 }
 
-static void precompensate(drive_policy_t *policy, thermal_model_t *model, uint8_t k,
+static void precompensate(drive_policy_t *policy, const drive_policy_input_t *in, uint8_t k,
                           uint16_t level_permille)
 {
     switch ((drive_policy_stage_t)policy->spring[k].stage) {
     case DRIVE_POLICY_STAGE_OFF:
-        enter(policy, model, k,
-              is_there(policy, model, k, level_permille) ? DRIVE_POLICY_STAGE_HOLD
-                                                         : DRIVE_POLICY_STAGE_HEAT,
+        enter(policy, in, k,
+              is_there(in, k, level_permille) ? DRIVE_POLICY_STAGE_HOLD : DRIVE_POLICY_STAGE_HEAT,
               level_permille);
         break;
     case DRIVE_POLICY_STAGE_HEAT:
-        heat(policy, model, k, level_permille);
+        heat(policy, in, k, level_permille);
         break;
     case DRIVE_POLICY_STAGE_HOLD:
-        hold(policy, model, k, level_permille);
+        hold(policy, in, k, level_permille);
         break;
     case DRIVE_POLICY_STAGE_LOWER:
-        lower(policy, model, k, level_permille);
+        lower(policy, in, k, level_permille);
         break;
     }
 }
@@ -335,14 +329,14 @@ static void precompensate(drive_policy_t *policy, thermal_model_t *model, uint8_
 /* ---- derating ---- */
 
 /* Undriven: how near austenite start it is going to come, as hot as it may be. */
-static float severity(const drive_policy_t *policy, const thermal_model_t *model, uint8_t k,
+static float severity(const drive_policy_t *policy, const drive_policy_input_t *in, uint8_t k,
                       drive_policy_spring_t *s)
 {
-    const spring_belief_t *b = &policy->estimator.spring[k];
-    const int16_t start_c7 = thermal_model_transformation(model, k).austenite_start_c7;
+    const spring_belief_t *b = belief_of(in, k);
+    const int16_t start_c7 = thermal_model_transformation(in->model, k).austenite_start_c7;
     const float limit_c = spring_c(start_c7) - kelvin(policy->parameters.undriven_margin_cc);
-    const float c = now_c(model, k);
-    const float rise_k = c - spring_c(thermal_model_ambient_c7(model));
+    const float c = now_c(in, k);
+    const float rise_k = c - spring_c(thermal_model_ambient_c7(in->model));
     const float highest_c =
         c + UNDRIVEN_SDS * (spring_estimator_sd_k(b) + SPRING_ESTIMATOR_NEIGHBOUR_SD * rise_k);
     /* as it is released it falls faster than it is going to: that does not end it */
@@ -351,7 +345,7 @@ static float severity(const drive_policy_t *policy, const thermal_model_t *model
     if (severe <= 0.0f) {
         s->released = false;
     }
-    return s->released || b->possible == SPRING_PHASE_ANY ? 0.0f : severe;
+    return s->released || spring_estimator_possible(b) == SPRING_PHASE_ANY ? 0.0f : severe;
 }
 
 static float worst_neighbour(const drive_policy_t *policy, uint8_t k)
@@ -374,31 +368,31 @@ static float worst_neighbour(const drive_policy_t *policy, uint8_t k)
 
 /* By how much the other driven springs were found colder lately, on average: the surroundings', and
  * no contact's. */
-static float common_k(const drive_policy_t *policy, uint8_t k)
+static float common_k(const drive_policy_t *policy, const drive_policy_input_t *in, uint8_t k)
 {
     float sum_k = 0.0f;
     uint8_t others = 0;
     for (uint8_t i = 0; i < policy->springs; i++) {
         if (i != k && policy->spring[i].stage != DRIVE_POLICY_STAGE_OFF) {
-            sum_k += policy->estimator.spring[i].disturbance_k;
+            sum_k += spring_estimator_disturbance_k(belief_of(in, i));
             others++;
         }
     }
     return others != 0 ? sum_k / (float)others : 0.0f;
 }
 
-static void derate(drive_policy_t *policy, const thermal_model_t *model, uint8_t k, bool driven)
+static void derate(drive_policy_t *policy, const drive_policy_input_t *in, uint8_t k, bool driven)
 {
     drive_policy_spring_t *s = &policy->spring[k];
     const drive_policy_parameters_t *p = &policy->parameters;
     const float limit_c = 0.01f * (float)p->temperature_limit_cc;
     const float band_k = kelvin(p->temperature_band_cc);
     /* a touch of 8 K and a search are such doubts: half of the band is left to them */
-    float doubt_k = policy->estimator.spring[k].gone_k - 0.5f * band_k;
+    float doubt_k = spring_estimator_doubt_k(belief_of(in, k)) - 0.5f * band_k;
     if (doubt_k > 0.0f) { /* as a rule not: nine springs need not be asked */
-        doubt_k -= common_k(policy, k);
+        doubt_k -= common_k(policy, in, k);
     }
-    const float c = now_c(model, k);
+    const float c = now_c(in, k);
     float share = derating_share(doubt_k > 0.0f ? c + doubt_k : c, limit_c, band_k);
     s->derating = share < 1.0f ? DRIVE_POLICY_LIMIT_TEMPERATURE : DRIVE_POLICY_LIMIT_NONE;
     const float allowed = 1.0f - worst_neighbour(policy, k);
@@ -442,25 +436,23 @@ static void count_overload(drive_policy_t *policy)
 /* ---- one spring, in its turn ---- */
 
 /* A driven spring that is not where it was asked to be is never passed over in silence. */
-static void watch_away(drive_policy_t *policy, const thermal_model_t *model, uint8_t k,
+static void watch_away(drive_policy_t *policy, const drive_policy_input_t *in, uint8_t k,
                        uint16_t level_permille)
 {
     drive_policy_spring_t *s = &policy->spring[k];
     const float level = is_full(level_permille) ? 1.0f : 0.001f * (float)level_permille;
     const float band = 1.0f - THERE + (is_full(level_permille) ? 0.0f : LEVEL_BAND);
-    const spring_belief_t *b = &policy->estimator.spring[k];
-    const bool there = s->stage == DRIVE_POLICY_STAGE_HOLD && spring_estimator_sees(b) &&
-                       spring_estimator_knows(b) && !b->unproven &&
-                       fabsf(phase_of(policy, model, k) - level) < band;
+    const spring_belief_t *b = belief_of(in, k);
+    const bool there = s->stage == DRIVE_POLICY_STAGE_HOLD && spring_estimator_knows(b) &&
+                       fabsf(phase_of(in, k) - level) < band;
     spring_away_turn(&s->away, there);
 }
 
-static uint16_t said_of(const drive_policy_t *policy, uint8_t k)
+static uint16_t said_of(const drive_policy_t *policy, const drive_policy_input_t *in, uint8_t k)
 {
     const drive_policy_spring_t *s = &policy->spring[k];
-    const spring_belief_t *b = &policy->estimator.spring[k];
     uint16_t said = DRIVE_POLICY_LIMIT_NONE;
-    if (spring_estimator_blind(b) || !policy->estimator.observes) {
+    if (spring_estimator_by_model(in->belief, k)) {
         said |= DRIVE_POLICY_LIMIT_BLIND;
     }
     if (s->stage == DRIVE_POLICY_STAGE_HEAT && s->wanted_ma == 0) {
@@ -472,42 +464,40 @@ static uint16_t said_of(const drive_policy_t *policy, uint8_t k)
     return said;
 }
 
-static void switch_off(drive_policy_t *policy, uint8_t k)
+static void switch_off(drive_policy_t *policy, const drive_policy_input_t *in, uint8_t k)
 {
     drive_policy_spring_t *s = &policy->spring[k];
     if (s->stage != DRIVE_POLICY_STAGE_OFF) {
         supply_queue_remove(&policy->queue, k);
-        spring_estimator_leave(&policy->estimator, k);
+        spring_estimator_leave(in->belief, k);
         s->stage = DRIVE_POLICY_STAGE_OFF;
     }
     s->wanted_ma = s->floor_ma = 0;
     s->away = (spring_away_t){0, 0};
 }
 
-static void update(drive_policy_t *policy, const drive_policy_input_t *input, uint8_t k)
+static void update(drive_policy_t *policy, const drive_policy_input_t *in, uint8_t k)
 {
     drive_policy_spring_t *s = &policy->spring[k];
-    const uint16_t level_permille = input->level_permille[k];
-    const bool driven = level_permille != 0 && input->allowed[k];
-    const int16_t before_c7 = policy->estimator.spring[k].last_c7;
-    spring_estimator_update(&policy->estimator, input->model, k);
-    const int16_t rise_c7 = (int16_t)(policy->estimator.spring[k].last_c7 - before_c7);
-    const float rise_k_per_s = spring_c(rise_c7) * (1.0f / TURN_S);
+    const uint16_t level_permille = in->level_permille[k];
+    const bool driven = level_permille != 0 && in->allowed[k];
+    const spring_belief_t *b = belief_of(in, k);
+    const float rise_k_per_s = spring_c(spring_estimator_moved_c7(b)) * (1.0f / TURN_S);
     s->rise_k_per_s += (rise_k_per_s - s->rise_k_per_s) * RISE_SHARE;
     s->released = s->released || driven; /* also where its turn comes before it is off */
-    s->severity = driven ? 0.0f : severity(policy, input->model, k, s);
+    s->severity = driven ? 0.0f : severity(policy, in, k, s);
     /* what was just seen is acted on in the next turn: a tick has no time for both */
     if (driven && policy->parameters.policy != DRIVE_POLICY_OPEN &&
-        !policy->estimator.spring[k].seen) {
-        precompensate(policy, input->model, k, level_permille);
-        watch_away(policy, input->model, k, level_permille);
+        !spring_estimator_has_just_seen(b)) {
+        precompensate(policy, in, k, level_permille);
+        watch_away(policy, in, k, level_permille);
     }
-    derate(policy, input->model, k, driven);
+    derate(policy, in, k, driven);
 }
 
 /* The last ones to heat take turns while they are cold: else the very last heats alone, with most
  * of the supply unused. Far more that wait are better served one after the other. */
-static void rotate_queue(drive_policy_t *policy, const thermal_model_t *model)
+static void rotate_queue(drive_policy_t *policy, const drive_policy_input_t *in)
 {
     int16_t coldest_c7 = INT16_MAX; /* of those that wait */
     int16_t warmest_c7 = INT16_MIN; /* of those that heat, but have not begun to transform */
@@ -515,14 +505,14 @@ static void rotate_queue(drive_policy_t *policy, const thermal_model_t *model)
     int room = 0; /* that heat, less twice those that wait */
     for (uint8_t n = 0; n < policy->queue.count; n++) {
         const uint8_t k = policy->queue.spring[n];
-        const int16_t c7 = thermal_model_temperature_c7(model, k);
+        const int16_t c7 = thermal_model_temperature_c7(in->model, k);
         if (policy->spring[k].granted_ma < policy->spring[k].wanted_ma / 2u) {
             room -= 2;
             coldest_c7 = c7 < coldest_c7 ? c7 : coldest_c7;
         } else {
             room++;
             if (c7 > warmest_c7 &&
-                c7 < thermal_model_transformation(model, k).austenite_start_c7 - GOES_ON_C7) {
+                c7 < thermal_model_transformation(in->model, k).austenite_start_c7 - GOES_ON_C7) {
                 warmest_c7 = c7;
                 warmest = k;
             }
@@ -534,22 +524,18 @@ static void rotate_queue(drive_policy_t *policy, const thermal_model_t *model)
     }
 }
 
-static void take_turn(drive_policy_t *policy, const drive_policy_input_t *input)
+/* Of the springs that were believed anew in this tick. */
+static void take_turn(drive_policy_t *policy, const drive_policy_input_t *in, uint8_t turn)
 {
-    for (uint16_t k = policy->slot; k < policy->springs; k = (uint16_t)(k + DRIVE_POLICY_ROUND)) {
-        update(policy, input, (uint8_t)k);
+    for (uint16_t k = turn; k < policy->springs; k = (uint16_t)(k + SPRING_ESTIMATOR_ROUND)) {
+        update(policy, in, (uint8_t)k);
     }
     if (policy->walks != 0) {
         policy->walks--;
     }
-    policy->slot++;
-    if (policy->slot == DRIVE_POLICY_ROUND) {
-        policy->slot = 0;
+    if (turn == SPRING_ESTIMATOR_ROUND - 1u) {
         count_overload(policy);
-        rotate_queue(policy, input->model);
-        policy->stiffness_turn = (uint8_t)((policy->stiffness_turn + 1u) % policy->springs);
-        spring_estimator_look_at_stiffness(&policy->estimator, input->model,
-                                           policy->stiffness_turn);
+        rotate_queue(policy, in);
     }
 }
 
@@ -563,7 +549,7 @@ static uint16_t share_of_ma(uint16_t full_ma, uint16_t level_permille)
 }
 
 /* What each spring asks for, after its own limits. */
-static void claim_of(drive_policy_t *policy, const drive_policy_input_t *input, uint8_t k,
+static void claim_of(drive_policy_t *policy, const drive_policy_input_t *in, uint8_t k,
                      supply_claim_t *claim)
 {
     drive_policy_spring_t *s = &policy->spring[k];
@@ -571,26 +557,26 @@ static void claim_of(drive_policy_t *policy, const drive_policy_input_t *input, 
     const bool open = p->policy == DRIVE_POLICY_OPEN;
     *claim = (supply_claim_t){0};
     s->limits = DRIVE_POLICY_LIMIT_NONE;
-    if (input->level_permille[k] == 0 || !input->allowed[k] || s->tripped) {
-        if (input->level_permille[k] != 0) {
-            s->limits = input->allowed[k] ? DRIVE_POLICY_LIMIT_TRIP : DRIVE_POLICY_LIMIT_SAFETY;
+    if (in->level_permille[k] == 0 || !in->allowed[k] || s->tripped) {
+        if (in->level_permille[k] != 0) {
+            s->limits = in->allowed[k] ? DRIVE_POLICY_LIMIT_TRIP : DRIVE_POLICY_LIMIT_SAFETY;
         }
-        switch_off(policy, k);
+        switch_off(policy, in, k);
         return;
     }
     if (open) {
-        switch_off(policy, k);
-        s->wanted_ma = share_of_ma(p->open_current_ma, input->level_permille[k]);
+        switch_off(policy, in, k);
+        s->wanted_ma = share_of_ma(p->open_current_ma, in->level_permille[k]);
     } else {
-        s->limits = said_of(policy, k);
+        s->limits = said_of(policy, in, k);
     }
     uint16_t asked_ma = s->wanted_ma;
     if (!open && s->ceiling_ma < asked_ma) {
         asked_ma = s->ceiling_ma;
         s->limits |= s->derating;
     }
-    if (asked_ma > input->maximum_current_ma) {
-        asked_ma = input->maximum_current_ma;
+    if (asked_ma > in->maximum_current_ma) {
+        asked_ma = in->maximum_current_ma;
         s->limits |= DRIVE_POLICY_LIMIT_CURRENT;
     }
     claim->asked_ma = asked_ma;
@@ -647,11 +633,11 @@ static void give(drive_policy_t *policy, uint16_t budget_ma, uint16_t target_ma[
     }
 }
 
-static void share(drive_policy_t *policy, const drive_policy_input_t *input, uint16_t *budget_ma)
+static void share(drive_policy_t *policy, const drive_policy_input_t *in, uint16_t *budget_ma)
 {
     const drive_policy_parameters_t *p = &policy->parameters;
-    const uint16_t supply_ma = input->supply_limit_ma > p->supply_reserve_ma
-                                   ? (uint16_t)(input->supply_limit_ma - p->supply_reserve_ma)
+    const uint16_t supply_ma = in->supply_limit_ma > p->supply_reserve_ma
+                                   ? (uint16_t)(in->supply_limit_ma - p->supply_reserve_ma)
                                    : 0;
     *budget_ma =
         p->policy == DRIVE_POLICY_OPEN
@@ -661,13 +647,13 @@ static void share(drive_policy_t *policy, const drive_policy_input_t *input, uin
     supply_claim_t claim[DRIVE_POLICY_MAX_SPRINGS];
     uint16_t granted_ma[DRIVE_POLICY_MAX_SPRINGS];
     for (uint8_t k = 0; k < policy->springs; k++) {
-        claim_of(policy, input, k, &claim[k]);
+        claim_of(policy, in, k, &claim[k]);
     }
     supply_share(&policy->queue, claim, policy->springs, *budget_ma, granted_ma);
     for (uint8_t k = 0; k < policy->springs; k++) {
         drive_policy_spring_t *s = &policy->spring[k];
         if ((uint16_t)(granted_ma[k] + JUMP_MA - s->granted_ma) > 2u * JUMP_MA) {
-            spring_estimator_disturb(&policy->estimator.spring[k]);
+            spring_estimator_disturb(in->belief, k);
         }
         s->granted_ma = granted_ma[k];
         if (granted_ma[k] < claim[k].asked_ma) {
@@ -677,21 +663,14 @@ static void share(drive_policy_t *policy, const drive_policy_input_t *input, uin
     }
 }
 
-void drive_policy_tick(drive_policy_t *policy, const drive_policy_input_t *input,
-                       uint16_t target_ma[])
+void drive_policy_tick(drive_policy_t *policy, const drive_policy_input_t *in, uint16_t target_ma[])
 {
-    for (uint8_t k = 0; input->valid != NULL && k < policy->springs; k++) {
-        if (input->valid[k]) {
-            spring_estimator_take(&policy->estimator.spring[k], input->measured_ma[k],
-                                  input->measured_mv[k]);
-        }
-    }
-    policy->tick = (uint8_t)(policy->tick + 1u < TICKS_PER_REST ? policy->tick + 1u : 0u);
-    if (policy->tick != 0) {
-        take_turn(policy, input);
+    const uint8_t turn = spring_estimator_turn(in->belief);
+    if (turn != SPRING_ESTIMATOR_NO_TURN) {
+        take_turn(policy, in, turn);
     }
     uint16_t budget_ma;
-    share(policy, input, &budget_ma);
+    share(policy, in, &budget_ma);
     give(policy, budget_ma, target_ma);
     INVARIANT(policy->sum_ma <= budget_ma);
 }

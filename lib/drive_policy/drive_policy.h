@@ -21,7 +21,6 @@ extern "C" {
 
 #define DRIVE_POLICY_MAX_SPRINGS THERMAL_MODEL_MAX_SPRINGS
 #define DRIVE_POLICY_LEVEL_FULL  1000u /* permille */
-#define DRIVE_POLICY_ROUND       10u   /* turns, each of one tick and of one spring in ten */
 
 typedef enum {
     DRIVE_POLICY_OPEN = 0,         /* a set current while on, nothing while off: the paper's way */
@@ -72,50 +71,43 @@ typedef struct {
 
 typedef struct {
     drive_policy_parameters_t parameters;
-    uint8_t springs; /* up to here, and of the estimator up to its springs, by parameters alone */
+    uint8_t springs;
     uint8_t columns;
-    spring_estimator_t estimator;
-    supply_queue_t queue;       /* springs that heat */
+    supply_queue_t queue;       /* springs that heat; up to here all is by settings alone */
     uint16_t overload_quarters; /* of a second */
     uint16_t sum_ma;            /* of the last targets */
-    uint8_t tick;               /* counts to the next in which no spring is updated */
-    uint8_t slot;               /* of the round in which each spring is updated once */
     uint8_t sweep;              /* of the dither */
-    uint8_t stiffness_turn;     /* whose stiffness is looked at next */
     uint8_t walks;              /* turns in which no target jumps: the policy has changed */
     drive_policy_spring_t spring[DRIVE_POLICY_MAX_SPRINGS];
 } drive_policy_t;
 
 typedef struct {
-    thermal_model_t
-        *model; /* temperatures as of the last model step; the estimator corrects them */
+    /* What is believed, after its tick. It is read, and told what is done to a spring: that it
+     * heats, holds, is left, that its current jumps. Of the model temperatures are read; a hold's
+     * beginning corrects them, which is the belief's. */
+    spring_estimator_t *belief;
+    thermal_model_t *model;
     const uint16_t *level_permille; /* wanted per spring, 0..1000 */
     const bool *allowed;            /* by safety, per spring */
     uint16_t maximum_current_ma;    /* of one spring */
     uint16_t supply_limit_ma;       /* of the sum */
-    const int16_t *measured_ma;     /* of the last tick; NULL: nothing is measured */
-    const int16_t *measured_mv;
-    const bool *valid; /* per spring: the two are readings of the last tick */
 } drive_policy_input_t;
 
 /* Fails if and only if a parameter is outside its row's range, or unsure_margin_k is below
  * hold_margin_k; then *bad (may be NULL) is the row of parameters.def. */
 bool drive_policy_check(const drive_policy_parameters_t *parameters, uint16_t *bad);
 
-/* Nothing is known of any spring yet. Fails (false, nothing changed) as drive_policy_check does. */
+/* All springs are off. Fails (false, nothing changed) as drive_policy_check does. */
 bool drive_policy_init(drive_policy_t *policy, const drive_policy_parameters_t *parameters,
-                       thermal_model_t *model, uint16_t *bad);
-/* The same, but what was learnt of the springs stays: of a policy that was initialised, or is 0. */
-bool drive_policy_restart(drive_policy_t *policy, const drive_policy_parameters_t *parameters,
-                          thermal_model_t *model, uint16_t *bad);
-/* Replaces the parameters, and takes over those of the model; what is believed stays. Fails as
+                       const thermal_model_t *model, uint16_t *bad);
+/* Replaces the parameters, and takes over those of the model; the rest stays. Fails as
  * drive_policy_check does. */
 bool drive_policy_apply(drive_policy_t *policy, const drive_policy_parameters_t *parameters,
                         const thermal_model_t *model, uint16_t *bad);
 
-/* One tick (20 ms). The targets' sum never exceeds supply_limit_ma - supply_reserve_ma. A spring is
- * off in the tick in which its level is 0 or it is not allowed. What else is decided of it follows
- * in its turn: four times a second. */
+/* One tick (20 ms), after that of the belief. The targets' sum never exceeds supply_limit_ma -
+ * supply_reserve_ma. A spring is off in the tick in which its level is 0 or it is not allowed. What
+ * else is decided of it follows in its turn, once it was believed anew: four times a second. */
 void drive_policy_tick(drive_policy_t *policy, const drive_policy_input_t *input,
                        uint16_t target_ma[]);
 

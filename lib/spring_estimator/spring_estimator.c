@@ -5,6 +5,8 @@
 #include "invariant.h"
 #include "spring_estimator_internal.h"
 
+#define TICKS_PER_REST 5u /* of them one, as the model steps, has no turn: a round takes 1/4 s */
+
 #define NOISE_FIRST 0.002f
 
 #define CAPACITY_SD    0.09f   /* of a declared heat capacity: 15 %, uniform */
@@ -140,6 +142,8 @@ void spring_estimator_restart(spring_estimator_t *e, thermal_model_t *model)
     const float width_k = SPRING_ESTIMATOR_HOTTEST_C - coldest_c;
     e->springs = model->springs;
     e->stepped_turns = e->stepped_spring = 0;
+    e->tick = e->turn = e->stiffness_turn = 0;
+    e->last_turn = SPRING_ESTIMATOR_NO_TURN;
     e->sights.turn = e->sights.count = 0;
     e->sights.numbers = 0;
     spring_estimator_prepare(e, model, true);
@@ -353,7 +357,7 @@ static void cool(spring_estimator_t *e, spring_belief_t *b, const thermal_model_
     }
 }
 
-void spring_estimator_update(spring_estimator_t *e, thermal_model_t *model, uint8_t k)
+static void update(spring_estimator_t *e, thermal_model_t *model, uint8_t k)
 {
     spring_belief_t *b = &e->spring[k];
     const int16_t before_c7 = b->last_c7;
@@ -412,6 +416,38 @@ void spring_estimator_update(spring_estimator_t *e, thermal_model_t *model, uint
     if (b->possible == SPRING_PHASE_AUSTENITE && b->fresh == 0 &&
         spring_estimator_distance_k(e, model, k).low < 0.0f) {
         b->possible = SPRING_PHASE_BETWEEN | SPRING_PHASE_AUSTENITE; /* nothing tells any more */
+    }
+}
+
+void spring_estimator_update(spring_estimator_t *e, thermal_model_t *model, uint8_t k)
+{
+    spring_belief_t *b = &e->spring[k];
+    const int16_t before_c7 = b->last_c7;
+    update(e, model, k);
+    b->moved_c7 = (int16_t)(b->last_c7 - before_c7);
+}
+
+void spring_estimator_tick(spring_estimator_t *e, thermal_model_t *model,
+                           const int16_t measured_ma[], const int16_t measured_mv[],
+                           const bool valid[])
+{
+    for (uint8_t k = 0; valid != NULL && k < e->springs; k++) {
+        if (valid[k]) {
+            spring_estimator_take(e, k, measured_ma[k], measured_mv[k]);
+        }
+    }
+    e->tick = (uint8_t)(e->tick + 1u < TICKS_PER_REST ? e->tick + 1u : 0u);
+    e->last_turn = e->tick != 0 ? e->turn : SPRING_ESTIMATOR_NO_TURN;
+    if (e->tick == 0) {
+        return;
+    }
+    for (uint16_t k = e->turn; k < e->springs; k = (uint16_t)(k + SPRING_ESTIMATOR_ROUND)) {
+        spring_estimator_update(e, model, (uint8_t)k);
+    }
+    e->turn = (uint8_t)(e->turn + 1u < SPRING_ESTIMATOR_ROUND ? e->turn + 1u : 0u);
+    if (e->turn == 0) {
+        e->stiffness_turn = (uint8_t)((e->stiffness_turn + 1u) % e->springs);
+        spring_estimator_look_at_stiffness(e, model, e->stiffness_turn);
     }
 }
 
@@ -555,7 +591,8 @@ bool spring_estimator_blind(const spring_belief_t *b)
 
 bool spring_estimator_knows(const spring_belief_t *b)
 {
-    return spring_distance_k2(b) < KNOWN_SD_K * KNOWN_SD_K;
+    return spring_estimator_sees(b) && !b->unproven &&
+           spring_distance_k2(b) < KNOWN_SD_K * KNOWN_SD_K;
 }
 
 float spring_estimator_sd_k(const spring_belief_t *b)

@@ -8,6 +8,7 @@
 #define SPRING_ESTIMATOR_H
 
 #include <stdbool.h>
+#include <stddef.h>
 #include <stdint.h>
 
 #include "spring_sights.h"
@@ -22,6 +23,10 @@ extern "C" {
 #define SPRING_ESTIMATOR_HOTTEST_C    120.0f /* that a spring may be when the power comes on */
 #define SPRING_ESTIMATOR_BOUND_SDS    2.6f  /* standard deviations: 99 % of a normal distribution */
 #define SPRING_ESTIMATOR_NEIGHBOUR_SD 0.15f /* of the rise of a spring that its neighbours heat */
+/* Ticks with a turn, each of one spring in ten; in every fifth tick, as the model steps, is none.
+ */
+#define SPRING_ESTIMATOR_ROUND   10u
+#define SPRING_ESTIMATOR_NO_TURN UINT8_MAX
 
 /* Phases that nothing has excluded; bits. */
 enum {
@@ -80,7 +85,8 @@ typedef struct {
     uint16_t turns;   /* since then */
 } spring_line_t;
 
-/* What is believed of one spring. To be read by anyone, written by this module alone.
+/* What is believed of one spring. Nobody but this module looks into it: what others may know of it
+ * is what the functions below say.
  *
  * The model keeps the temperature on the declared scale: there the transformation lies where it is
  * declared, and the distance to it is what readings tell. shift_k is how much of that is believed
@@ -139,6 +145,7 @@ typedef struct {
     float offset_sd_v;   /* of its sensor's offset */
     float noise;         /* standard deviation of one turn's, relative */
     int16_t last_c7;     /* the model's temperature a turn ago */
+    int16_t moved_c7;    /* by how much the last turn has moved it */
     /* the last loss, until its heating has brought it back */
     float full_ohm;     /* what it read before, at martensite start; 0: no such loss */
     float gone;         /* and by how much less it read then, relative, signed */
@@ -151,6 +158,7 @@ typedef struct {
     } run;
 } spring_belief_t;
 
+/* Of all springs; nobody looks into it, either. */
 typedef struct {
     uint8_t springs;
     bool observes; /* readings are used */
@@ -166,8 +174,15 @@ typedef struct {
     /* what all springs share: one was found colder than anything known explains */
     uint16_t stepped_turns; /* of all springs: for so many more it counts as lately */
     uint8_t stepped_spring;
+    uint8_t tick;           /* counts to the next that has no turn */
+    uint8_t turn;           /* of the round in which each spring has one */
+    uint8_t last_turn;      /* that of the last tick, or SPRING_ESTIMATOR_NO_TURN */
+    uint8_t stiffness_turn; /* whose stiffness is looked at next */
     spring_sights_t sights; /* for whoever asks why */
 } spring_estimator_t;
+
+/* Its first bytes are by settings alone. */
+#define SPRING_ESTIMATOR_FIXED_BYTES offsetof(spring_estimator_t, spring)
 
 typedef struct {
     float value, low, high;
@@ -199,10 +214,24 @@ void spring_estimator_forget_loss(spring_estimator_t *estimator, uint8_t spring)
 /* What has been learnt, with how surely. */
 spring_learnt_t spring_estimator_learnt(const spring_estimator_t *estimator, uint8_t spring);
 
-/* One tick's reading of one spring; negative ones are left out. Inline: every tick takes nine. */
-static inline void spring_estimator_take(spring_belief_t *belief, int16_t current_ma,
-                                         int16_t voltage_mv)
+/* One tick of 20 ms: takes the readings, of springs of which they are valid (NULL: nothing is
+ * measured), and of those whose turn it is believes what they say. */
+void spring_estimator_tick(spring_estimator_t *estimator, thermal_model_t *model,
+                           const int16_t measured_ma[], const int16_t measured_mv[],
+                           const bool valid[]);
+/* Whose turn it was in the last tick: this spring's and each SPRING_ESTIMATOR_ROUND-th one's from
+ * there; SPRING_ESTIMATOR_NO_TURN: nobody's. */
+static inline uint8_t spring_estimator_turn(const spring_estimator_t *estimator)
 {
+    return estimator->last_turn;
+}
+
+/* The parts of a tick. One reading of one spring; negative ones are left out. Inline: every tick
+ * takes nine. */
+static inline void spring_estimator_take(spring_estimator_t *estimator, uint8_t spring,
+                                         int16_t current_ma, int16_t voltage_mv)
+{
+    spring_belief_t *const belief = &estimator->spring[spring];
     if (belief->settling != 0) {
         belief->settling--;
     } else if (current_ma >= 0 && voltage_mv >= 0 && current_ma < 4096 && voltage_mv < 4096 &&
@@ -212,9 +241,6 @@ static inline void spring_estimator_take(spring_belief_t *belief, int16_t curren
         belief->readings++;
     }
 }
-/* The current jumps: readings on the way are left out. */
-void spring_estimator_disturb(spring_belief_t *belief);
-
 /* Once in a turn: takes the readings, and moves the model's temperature and phase to what they say.
  */
 void spring_estimator_update(spring_estimator_t *estimator, thermal_model_t *model, uint8_t spring);
@@ -224,27 +250,105 @@ void spring_estimator_update(spring_estimator_t *estimator, thermal_model_t *mod
 void spring_estimator_look_at_stiffness(spring_estimator_t *estimator, const thermal_model_t *model,
                                         uint8_t spring);
 
+/* ---- what it is told of what is done to a spring ---- */
+
+/* The current jumps: readings on the way are left out. */
+void spring_estimator_disturb(spring_estimator_t *estimator, uint8_t spring);
 /* A heating begins: what the resistance does from here on tells of the transformation. */
 void spring_estimator_begin_heating(spring_estimator_t *estimator, const thermal_model_t *model,
                                     uint8_t spring);
+/* Nothing is asked of it any more, or by others: a heating that ran is over, and tells nothing. */
+void spring_estimator_leave(spring_estimator_t *estimator, uint8_t spring);
+/* A hold begins, or a cooling to a level; full: of a spring that is taken to be fully on. */
+void spring_estimator_begin_hold(spring_estimator_t *estimator, thermal_model_t *model,
+                                 uint8_t spring, bool full);
+
+/* ---- what is believed of a spring ---- */
+
+static inline const spring_belief_t *spring_estimator_of(const spring_estimator_t *estimator,
+                                                         uint8_t spring)
+{
+    return &estimator->spring[spring];
+}
+/* Phases that nothing has excluded: SPRING_PHASE_ bits; SPRING_PHASE_ANY where nothing is known. */
+static inline uint8_t spring_estimator_possible(const spring_belief_t *belief)
+{
+    return belief->possible;
+}
+/* What was learnt before would tell its phase, if a current flowed. */
+static inline bool spring_estimator_may_look(const spring_estimator_t *estimator, uint8_t spring)
+{
+    return estimator->spring[spring].learnt.austenite_ohm > 0.0f && estimator->observes;
+}
+/* The heating has fully transformed it: seen, or as hot as it takes whatever it reads. */
+bool spring_estimator_has_transformed(const spring_estimator_t *estimator,
+                                      const thermal_model_t *model, uint8_t spring);
 /* It reads less than when it had transformed last, and the difference is neither noise nor a
  * temperature coefficient. */
 bool spring_estimator_lacks_phase(const spring_belief_t *belief, const thermal_model_t *model,
                                   uint8_t spring);
-/* Nothing is asked of it any more, or by others: a heating that ran is over, and tells nothing. */
-void spring_estimator_leave(spring_estimator_t *estimator, uint8_t spring);
-/* The heating has fully transformed it: seen, or as hot as it takes whatever it reads. */
-bool spring_estimator_has_transformed(const spring_estimator_t *estimator,
-                                      const thermal_model_t *model, uint8_t spring);
-/* A hold begins, or a cooling to a level; full: of a spring that is taken to be fully on. */
-void spring_estimator_begin_hold(spring_estimator_t *estimator, thermal_model_t *model,
-                                 uint8_t spring, bool full);
+/* Phase that it has lost since it had transformed, 0..1. */
+static inline float spring_estimator_lost(const spring_belief_t *belief)
+{
+    return belief->lost;
+}
+/* It seems to lose some, not yet for certain. */
+static inline bool spring_estimator_seems_to_lose(const spring_belief_t *belief)
+{
+    return belief->losing != 0;
+}
+/* Turns for which its temperature has hardly moved in its hold, saturating. */
+static inline uint8_t spring_estimator_rest_turns(const spring_belief_t *belief)
+{
+    return belief->quiet;
+}
+/* By how much its temperature has moved in its last turn, 1/128 K. */
+static inline int16_t spring_estimator_moved_c7(const spring_belief_t *belief)
+{
+    return belief->moved_c7;
+}
+/* Its last turn has seen it at a place of its transformation, or began anew what is compared. */
+static inline bool spring_estimator_has_just_seen(const spring_belief_t *belief)
+{
+    return belief->seen;
+}
+/* The martensite of its running heating is not of the declared resistance: another circuit. */
+static inline bool spring_estimator_is_unlike(const spring_belief_t *belief)
+{
+    return belief->unlike;
+}
+/* How far it was found from where it was believed, lately, K: a gust, and it may come again. */
+static inline float spring_estimator_disturbance_k(const spring_belief_t *belief)
+{
+    return belief->disturbance_k;
+}
+/* How much hotter it is if what it seems to have lost was no phase, K. */
+static inline float spring_estimator_doubt_k(const spring_belief_t *belief)
+{
+    return belief->gone_k;
+}
+/* By how much its transformation lies above where it is declared, K. */
+static inline float spring_estimator_shift_k(const spring_belief_t *belief)
+{
+    return belief->shift_k;
+}
+/* Standard deviation of its resistance in one turn, relative. */
+static inline float spring_estimator_noise(const spring_belief_t *belief)
+{
+    return belief->noise;
+}
 
 /* Its resistance tells the phase. */
 bool spring_estimator_sees(const spring_belief_t *belief);
 /* What it reads tells nothing of its phase: it shows none, or its contact is loose. */
 bool spring_estimator_blind(const spring_belief_t *belief);
-/* Its distance to the transformation is known at all. */
+/* So it is, or readings are not used: the model alone tells. */
+static inline bool spring_estimator_by_model(const spring_estimator_t *estimator, uint8_t spring)
+{
+    return spring_estimator_blind(&estimator->spring[spring]) || !estimator->observes;
+}
+/* Where it is is known: its resistance tells the phase, its distance to the transformation is known
+ * at all, and nothing is left that speaks against its having transformed. */
 bool spring_estimator_knows(const spring_belief_t *belief);
 /* Of the distance to the transformation. */
 float spring_estimator_sd_k(const spring_belief_t *belief);
@@ -274,6 +378,12 @@ spring_bounds_t spring_estimator_austenite(const spring_estimator_t *estimator,
  * have in common, a draught or the fan. False where fewer than two are held. O(springs). */
 bool spring_estimator_losses(const spring_estimator_t *estimator, float *factor, float *sd);
 
+/* The last sights of all springs: why they are believed to be where they are. */
+static inline const spring_sights_t *spring_estimator_sights(const spring_estimator_t *estimator)
+{
+    return &estimator->sights;
+}
+
 /* A CRC-16 of all that is believed of a spring and of its temperature in the model, to the last
  * bit: two that agree believe the same. */
 uint16_t spring_estimator_mark(const spring_estimator_t *estimator, const thermal_model_t *model,
@@ -285,6 +395,12 @@ uint32_t spring_estimator_model_power_uw(const spring_estimator_t *estimator, ui
                                          uint32_t power_uw);
 /* Power that holds it so much above where it is, W: from what it gave off in its last turn. */
 float spring_estimator_hold_w(const spring_estimator_t *estimator, uint8_t spring, float above_k);
+/* Power beyond that which takes it there, at the pace of so many seconds, W. */
+static inline float spring_estimator_follow_w(const spring_estimator_t *estimator, float above_k,
+                                              float in_s)
+{
+    return above_k * estimator->heat_capacity_j_per_k / in_s;
+}
 /* Current for a power in the resistance that it has now, 0..3200 mA. */
 uint16_t spring_estimator_current_ma(const spring_estimator_t *estimator, uint8_t spring,
                                      float power_w);

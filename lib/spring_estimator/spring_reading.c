@@ -19,8 +19,9 @@
 /* One jump has moved it, two went and came back: a third will come. */
 #define LOOSE_TURNS (2u * JUMP_TURNS)
 
-void spring_estimator_disturb(spring_belief_t *b)
+void spring_estimator_disturb(spring_estimator_t *e, uint8_t k)
 {
+    spring_belief_t *b = &e->spring[k];
     b->settling = SETTLING_TICKS;
     b->cut_short = true;
     b->current_sum_ma = b->voltage_sum_mv = 0;

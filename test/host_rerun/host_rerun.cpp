@@ -177,17 +177,17 @@ void the_same_day_again_is_believed_to_the_last_bit()
     TEST_ASSERT_EQUAL_UINT64(0, tally.missing);
     TEST_ASSERT_TRUE(tally.ticks > 400u * 50u && tally.marks > 4000u);
     TEST_ASSERT_EQUAL_UINT64(0, tally.other);
-    const drive_policy_t &was = board.controller()->policy;
-    const drive_policy_t &is = again.controller()->policy;
-    for (unsigned k = 0; k < 9; ++k) {
-        TEST_ASSERT_EQUAL_MEMORY(&was.estimator.spring[k], &is.estimator.spring[k],
-                                 sizeof was.estimator.spring[k]);
-        TEST_ASSERT_EQUAL_UINT16(was.spring[k].target_ma, is.spring[k].target_ma);
+    const controller_t &was = *board.controller();
+    const controller_t &is = *again.controller();
+    for (std::uint8_t k = 0; k < 9; ++k) {
+        TEST_ASSERT_EQUAL_MEMORY(spring_estimator_of(&was.estimator, k),
+                                 spring_estimator_of(&is.estimator, k), sizeof(spring_belief_t));
+        TEST_ASSERT_EQUAL_UINT16(controller_target_ma(&was, k), controller_target_ma(&is, k));
     }
-    TEST_ASSERT_TRUE(was.estimator.sights.count > 10);
-    TEST_ASSERT_EQUAL_UINT(was.estimator.sights.count, is.estimator.sights.count);
-    TEST_ASSERT_EQUAL_MEMORY(was.estimator.sights.sight, is.estimator.sights.sight,
-                             sizeof was.estimator.sights.sight);
+    const spring_sights_t &seen = *controller_sights(&was);
+    TEST_ASSERT_TRUE(seen.count > 10);
+    TEST_ASSERT_EQUAL_UINT(seen.count, controller_sights(&is)->count);
+    TEST_ASSERT_EQUAL_MEMORY(seen.sight, controller_sights(&is)->sight, sizeof seen.sight);
 }
 
 /* It begins in mid-life: what was learnt is on it. */

@@ -5,6 +5,7 @@
 #include "console.h"
 #include "unity.h"
 
+#include "../fakes/belief_inside.h"
 #include "../fakes/eeprom.h"
 
 #ifndef NINESPRING_SOURCE_DIR
@@ -758,19 +759,19 @@ static void model_says_what_the_surroundings_take(void)
 {
     static const float more[] = {0.28f, 0.34f};
     expect_ok("model cold");
-    spring_estimator_t *const estimator = &controller.policy.estimator;
+    const float loss_w_per_k = 1e-6f * (float)settings.controller.model.loss_uw_per_k;
     for (unsigned k = 0; k < 2; k++) {
-        spring_belief_t *const belief = &estimator->spring[k];
-        const float sd_w_per_k = 0.05f * estimator->loss_w_per_k;
+        spring_belief_t *const inside = belief_inside(&controller.estimator, (uint8_t)k);
+        const float sd_w_per_k = 0.05f * loss_w_per_k;
         said_length = 0;
         for (const char *next = "model\n"; *next != '\0'; next++) {
             console_receive(&console, (uint8_t)*next);
         }
-        belief->possible = SPRING_PHASE_AUSTENITE;
-        belief->fresh = 1;
-        belief->heating = false;
-        belief->learnt.loss_w_per_k = more[k] * estimator->loss_w_per_k;
-        belief->loss_variance = sd_w_per_k * sd_w_per_k;
+        inside->possible = SPRING_PHASE_AUSTENITE;
+        inside->fresh = 1;
+        inside->heating = false;
+        inside->learnt.loss_w_per_k = more[k] * loss_w_per_k;
+        inside->loss_variance = sd_w_per_k * sd_w_per_k;
         while (console_busy(&console)) { /* without a tick, in which no current would flow */
             console_service(&console);
         }
@@ -832,7 +833,7 @@ static void ask_at_once(const char *line)
 
 static void why_says_the_last_sights_of_a_spring_in_words(void)
 {
-    spring_sights_t *const sights = &controller.policy.estimator.sights;
+    spring_sights_t *const sights = sights_inside(&controller.estimator);
     ask_at_once("why 5");
     TEST_ASSERT_EQUAL_STRING("[nothing was seen of spring 5 in the last 4 hours]\r\nok\r\n", said);
     spring_sight_t *sight = spring_sights_add(sights, 4);
@@ -875,7 +876,7 @@ static void why_says_the_last_sights_of_a_spring_in_words(void)
 /* As a spring is driven, its lines come one by one; others have much to tell meanwhile. */
 static void why_goes_on_with_what_is_left_where_sights_give_way(void)
 {
-    spring_sights_t *const sights = &controller.policy.estimator.sights;
+    spring_sights_t *const sights = sights_inside(&controller.estimator);
     for (unsigned n = 0; n < SPRING_SIGHTS_KEPT; n++) {
         spring_sights_add(sights, 8)->now_sd = 1;
     }
@@ -907,7 +908,7 @@ static void why_goes_on_with_what_is_left_where_sights_give_way(void)
 
 static void the_longest_why_fits_its_lines(void)
 {
-    spring_sight_t *const sight = spring_sights_add(&controller.policy.estimator.sights, 8);
+    spring_sight_t *const sight = spring_sights_add(sights_inside(&controller.estimator), 8);
     *sight = (spring_sight_t){.spring = 8,
                               .read = -32767,
                               .believed = -1234,
@@ -922,7 +923,7 @@ static void the_longest_why_fits_its_lines(void)
                               .now_sd = 255};
     for (uint8_t kind = 0; kind < SPRING_SIGHT_KINDS; kind++) {
         sight->kind = kind;
-        controller.policy.estimator.sights.turn = SPRING_SIGHTS_TURNS;
+        sights_inside(&controller.estimator)->turn = SPRING_SIGHTS_TURNS;
         ask_at_once("why 9");
         TEST_ASSERT_NOT_NULL_MESSAGE(strstr(said, "than predicted (sd 2.55)\r\n"), said);
         TEST_ASSERT_NOT_NULL_MESSAGE(strstr(said, "now 123.4 K below (sd 25.5)\r\n"), said);
@@ -971,7 +972,7 @@ static void learnt_says_what_is_known_and_clear_forgets_it(void)
     expect_ok("learnt");
     TEST_ASSERT_NOT_NULL(strstr(said, "spring 9: nothing yet\r\n"));
     controller_restore_learnt(&controller, 8, &numbers);
-    controller.policy.estimator.spring[8].shift_k = 2.5f;
+    belief_inside(&controller.estimator, 8)->shift_k = 2.5f;
     expect_ok("learnt");
     TEST_ASSERT_NOT_NULL(strstr(said, "spring 8: nothing yet\r\n"
                                       "spring 9: 0.1752 ohm at 20 degC, 0.040 % per K, austenite "

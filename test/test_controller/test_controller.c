@@ -805,8 +805,8 @@ static void what_settings_decide_and_a_bit_turned_over_drives_nothing(void)
                             &controller.safety.springs,
                             &controller.policy.parameters.boost_current_ma,
                             &controller.policy.columns,
-                            &controller.policy.estimator.springs,
-                            &controller.policy.estimator.change};
+                            &controller.estimator,
+                            (uint8_t *)&controller.estimator + SPRING_ESTIMATOR_FIXED_BYTES - 4};
     settings.safety.cut_off = 1;
     for (size_t n = 0; n < sizeof places / sizeof places[0]; n++) {
         start();

@@ -12,6 +12,7 @@
 small_spring_t truth[SPRINGS];
 double loss_w_per_k, coupling_w_per_k;
 thermal_model_t model;
+spring_estimator_t belief;
 drive_policy_t policy;
 drive_policy_parameters_t parameters;
 uint16_t level[SPRINGS];
@@ -45,7 +46,9 @@ void power_on(uint8_t rows, uint8_t columns)
     p.columns = columns;
     p.diagonal_uw_per_k = 0; /* as below */
     TEST_ASSERT_EQUAL(THERMAL_MODEL_OK, thermal_model_init(&model, &p, NULL));
+    spring_estimator_init(&belief, &model);
     TEST_ASSERT_TRUE(drive_policy_init(&policy, &parameters, &model, NULL));
+    spring_estimator_prepare(&belief, &model, parameters.observer != 0);
     count = 0;
     random_state = 5;
     for (uint8_t k = 0; k < SPRINGS; k++) {
@@ -61,7 +64,7 @@ void begin_cold(uint8_t rows, uint8_t columns)
 {
     power_on(rows, columns);
     thermal_model_reset(&model, 20 * 128);
-    spring_estimator_trust_model(&policy.estimator, &model);
+    spring_estimator_trust_model(&belief, &model);
 }
 
 void believe(uint8_t spring, int16_t temperature_c, bool austenite)
@@ -70,20 +73,25 @@ void believe(uint8_t spring, int16_t temperature_c, bool austenite)
         thermal_model_set_temperature(&model, spring, 110 * 128);
     }
     thermal_model_set_temperature(&model, spring, (int16_t)(temperature_c * 128));
-    spring_estimator_trust_model(&policy.estimator, &model);
+    spring_estimator_trust_model(&belief, &model);
+}
+
+void apply(const drive_policy_parameters_t *other)
+{
+    TEST_ASSERT_TRUE(drive_policy_apply(&policy, other, &model, NULL));
+    spring_estimator_prepare(&belief, &model, other->observer != 0);
 }
 
 uint32_t decide(void)
 {
-    const drive_policy_input_t input = {.model = &model,
+    const drive_policy_input_t input = {.belief = &belief,
+                                        .model = &model,
                                         .level_permille = level,
                                         .allowed = allowed,
                                         .maximum_current_ma = maximum_current_ma,
-                                        .supply_limit_ma = supply_limit_ma,
-                                        .measured_ma = measured_ma,
-                                        .measured_mv = measured_mv,
-                                        .valid = valid};
+                                        .supply_limit_ma = supply_limit_ma};
     uint32_t sum_ma = 0;
+    spring_estimator_tick(&belief, &model, measured_ma, measured_mv, valid);
     drive_policy_tick(&policy, &input, target_ma);
     for (uint8_t k = 0; k < policy.springs; k++) {
         sum_ma += target_ma[k];
@@ -153,8 +161,7 @@ uint32_t tick(void)
     if (++count % 5u == 0) {
         uint32_t power_uw[SPRINGS] = {0};
         for (uint8_t k = 0; k < policy.springs; k++) {
-            power_uw[k] =
-                spring_estimator_model_power_uw(&policy.estimator, k, power_sum_uw[k] / 5u);
+            power_uw[k] = spring_estimator_model_power_uw(&belief, k, power_sum_uw[k] / 5u);
             power_sum_uw[k] = 0;
         }
         thermal_model_step(&model, power_uw);

@@ -1,9 +1,10 @@
-/* What it is for: a policy, its model, and nine springs as they are, tick by tick.
+/* What it is for: a policy, the belief and model it goes by, and nine springs, tick by tick.
  * What it owns: the truth: temperatures, phases (straight lines over temperature) and resistances.
  * What it never does: know what the chip believes. */
 #ifndef SMALL_ARRAY_H
 #define SMALL_ARRAY_H
 
+#include "../fakes/belief_inside.h"
 #include "drive_policy.h"
 
 #define SPRINGS 9
@@ -18,6 +19,7 @@ typedef struct {
 extern small_spring_t truth[SPRINGS];
 extern double loss_w_per_k, coupling_w_per_k;
 extern thermal_model_t model;
+extern spring_estimator_t belief;
 extern drive_policy_t policy;
 extern drive_policy_parameters_t parameters; /* what make takes; defaults at a test's begin */
 extern uint16_t level[SPRINGS];
@@ -33,6 +35,9 @@ void power_on(uint8_t rows, uint8_t columns);
 void begin_cold(uint8_t rows, uint8_t columns);
 /* What the policy is told of a spring, whatever it is: for limits, which go by what is believed. */
 void believe(uint8_t spring, int16_t temperature_c, bool austenite);
+
+/* The policy and the belief take over other parameters. */
+void apply(const drive_policy_parameters_t *other);
 
 /* One tick of policy, springs, readings and model. Gives the targets' sum, mA. */
 uint32_t tick(void);

@@ -83,9 +83,10 @@ static void jump_of_the_current_forgets_no_phase(void)
     level[0] = 1000;
     (void)run(300.0);
     for (unsigned n = 0; n < TURN_TICKS; n++) { /* one of them leaves a turn without readings */
-        spring_estimator_disturb(&policy.estimator.spring[0]);
+        spring_estimator_disturb(&belief, 0);
         (void)run(1.0 + TICK_S);
-        TEST_ASSERT_EQUAL_UINT8(SPRING_PHASE_AUSTENITE, policy.estimator.spring[0].possible);
+        TEST_ASSERT_EQUAL_UINT8(SPRING_PHASE_AUSTENITE,
+                                spring_estimator_possible(spring_estimator_of(&belief, 0)));
     }
 }
 
@@ -188,12 +189,12 @@ static void spring_whose_distance_is_lost_is_said_to_be_away(void)
     (void)run(120.0);
     TEST_ASSERT_BITS_LOW(DRIVE_POLICY_LIMIT_AWAY, drive_policy_limits(&policy, 0));
     for (double s = 0.0; s < 16.0; s += TICK_S) {
-        policy.estimator.spring[0].variance_k2 = 81.0f;
+        belief_inside(&belief, 0)->variance_k2 = 81.0f;
         (void)tick();
     }
     TEST_ASSERT_BITS_HIGH(DRIVE_POLICY_LIMIT_AWAY, drive_policy_limits(&policy, 0));
     for (double s = 0.0; s < 1.0; s += TICK_S) {
-        policy.estimator.spring[0].variance_k2 = 49.0f; /* the near miss */
+        belief_inside(&belief, 0)->variance_k2 = 49.0f; /* the near miss */
         (void)tick();
     }
     TEST_ASSERT_BITS_LOW(DRIVE_POLICY_LIMIT_AWAY, drive_policy_limits(&policy, 0));
@@ -209,8 +210,9 @@ static unsigned heatings_in_vain(double seconds)
         const bool heats = drive_policy_stage(&policy, 0) == DRIVE_POLICY_STAGE_HEAT;
         begun += heats && !heated ? 1u : 0u;
         heated = heats;
-        if (!heats && policy.estimator.spring[0].possible == SPRING_PHASE_AUSTENITE) {
-            policy.estimator.spring[0].lost = 0.5f;
+        if (!heats &&
+            spring_estimator_possible(spring_estimator_of(&belief, 0)) == SPRING_PHASE_AUSTENITE) {
+            belief_inside(&belief, 0)->lost = 0.5f;
         }
     }
     return begun;
@@ -237,7 +239,7 @@ static void tries_that_bring_it_back_are_not_counted(void)
     level[0] = 1000;
     (void)run(120.0);
     for (unsigned n = 0; n < 8; n++) {
-        policy.estimator.spring[0].lost = 0.05f;
+        belief_inside(&belief, 0)->lost = 0.05f;
         (void)run(1.0);
         TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_HEAT, drive_policy_stage(&policy, 0));
         (void)run(60.0);
@@ -355,13 +357,13 @@ static void heating_that_another_policy_interrupts_is_over(void)
     begin_cold(1, 2);
     level[0] = 1000;
     (void)run(5.0);
-    TEST_ASSERT_TRUE(policy.estimator.spring[0].heating);
+    TEST_ASSERT_TRUE(belief_inside(&belief, 0)->heating);
     drive_policy_parameters_t other = parameters;
     other.policy = DRIVE_POLICY_OPEN;
-    TEST_ASSERT_TRUE(drive_policy_apply(&policy, &other, &model, NULL));
+    apply(&other);
     (void)run(1.0);
-    TEST_ASSERT_FALSE(policy.estimator.spring[0].heating);
-    TEST_ASSERT_EQUAL_FLOAT(0.0f, policy.estimator.spring[0].run.line.ohm);
+    TEST_ASSERT_FALSE(belief_inside(&belief, 0)->heating);
+    TEST_ASSERT_EQUAL_FLOAT(0.0f, belief_inside(&belief, 0)->run.line.ohm);
 }
 
 static void own_temperature_derates_linearly_then_trips(void)
@@ -376,13 +378,13 @@ static void own_temperature_derates_linearly_then_trips(void)
     TEST_ASSERT_UINT16_WITHIN(20, FULL_BOOST_MA / 2, target_ma[0]);
     TEST_ASSERT_BITS_HIGH(DRIVE_POLICY_LIMIT_TEMPERATURE, drive_policy_limits(&policy, 0));
     parameters.temperature_limit_cc = 8000;
-    TEST_ASSERT_TRUE(drive_policy_apply(&policy, &parameters, &model, NULL));
+    apply(&parameters);
     decisions(2u * TURN_TICKS);
     TEST_ASSERT_EQUAL_UINT16(0, target_ma[0]);
     TEST_ASSERT_BITS_LOW(DRIVE_POLICY_LIMIT_TRIP, drive_policy_limits(&policy, 0));
     decisions(10u * TURN_TICKS);
     parameters.temperature_limit_cc = 11000; /* the cause is gone, the latch stays */
-    TEST_ASSERT_TRUE(drive_policy_apply(&policy, &parameters, &model, NULL));
+    apply(&parameters);
     decisions(4u * TURN_TICKS);
     TEST_ASSERT_EQUAL_UINT16(0, target_ma[0]);
     TEST_ASSERT_BITS_HIGH(DRIVE_POLICY_LIMIT_TRIP, drive_policy_limits(&policy, 0));
@@ -401,7 +403,7 @@ static void spring_that_may_be_hotter_is_derated_by_that(void)
     level[0] = 1000;
     believe(0, 80, false);
     for (unsigned n = 0; n < 2; n++) {
-        policy.estimator.spring[0].gone_k = n == 0 ? 6.9f : 12.0f; /* counted as 2 and 7 K */
+        belief_inside(&belief, 0)->gone_k = n == 0 ? 6.9f : 12.0f; /* counted as 2 and 7 K */
         decisions(2u * TURN_TICKS);
         TEST_ASSERT_UINT16_WITHIN(60, n == 0 ? FULL_BOOST_MA : FULL_BOOST_MA / 2, target_ma[0]);
         TEST_ASSERT_EQUAL(n == 1,
@@ -420,7 +422,7 @@ static void limited_heating_ends_where_it_may_be_hot_enough(void)
         decisions(TURN_TICKS);
         believe(0, 85, false);
         for (unsigned turn = 0; turn < 40; turn++) { /* until its rise has worn off */
-            policy.estimator.spring[0].gone_k = n == 0 ? 11.0f : 15.0f;
+            belief_inside(&belief, 0)->gone_k = n == 0 ? 11.0f : 15.0f;
             decisions(TURN_TICKS);
         }
         TEST_ASSERT_EQUAL(n == 0 ? DRIVE_POLICY_STAGE_HEAT : DRIVE_POLICY_STAGE_HOLD,
@@ -483,7 +485,7 @@ static void spring_released_from_the_other_policy_is_none_either(void)
     decisions(2u * TURN_TICKS);
     level[1] = 0;
     parameters.policy = DRIVE_POLICY_PRECOMPENSATE;
-    TEST_ASSERT_TRUE(drive_policy_apply(&policy, &parameters, &model, NULL));
+    apply(&parameters);
     decisions(3u * TURN_TICKS);
     TEST_ASSERT_BITS_LOW(DRIVE_POLICY_LIMIT_UNDRIVEN, drive_policy_limits(&policy, 0));
 }
@@ -538,7 +540,7 @@ static void budget_holds_in_every_tick_whatever_is_asked(void)
         }
         if (random_below(400) == 0) {
             parameters.policy ^= 1u;
-            TEST_ASSERT_TRUE(drive_policy_apply(&policy, &parameters, &model, NULL));
+            apply(&parameters);
         }
         TEST_ASSERT_LESS_OR_EQUAL_UINT32(RESERVED_MA, tick());
         for (uint8_t k = 0; k < SPRINGS; k++) {
@@ -560,7 +562,7 @@ static void policy_switch_never_jumps(void)
         decisions(at);
         uint16_t last[SPRINGS];
         parameters.policy ^= 1u;
-        TEST_ASSERT_TRUE(drive_policy_apply(&policy, &parameters, &model, NULL));
+        apply(&parameters);
         for (unsigned n = 0; n < 60; n++) {
             memcpy(last, target_ma, sizeof last);
             (void)decide();

@@ -124,7 +124,7 @@ bool tick(double current_a)
     live(current_a * current_a * resistance_ohm());
     read_sensor(current_a, &ma, &mv);
     if (sensor != SENSOR_SILENT) {
-        spring_estimator_take(&BELIEF, ma, mv);
+        spring_estimator_take(&estimator, 0, ma, mv);
     }
     power_sum_w += ma > 0 && mv > 0 ? 1e-6 * ma * mv : 0.0;
     count++;
@@ -152,7 +152,7 @@ void ticks(double current_a, double seconds)
 double heat(double most_s)
 {
     double time_s = 0.0;
-    spring_estimator_disturb(&BELIEF);
+    spring_estimator_disturb(&estimator, 0);
     spring_estimator_begin_heating(&estimator, &model, 0);
     while (time_s < most_s && !spring_estimator_has_transformed(&estimator, &model, 0)) {
         (void)tick(3.0);
@@ -166,8 +166,9 @@ double hold_current_a(double margin_k)
     const int16_t start_c7 = thermal_model_transformation(&model, 0).martensite_start_c7;
     const float target_c = spring_c(start_c7) + (float)margin_k;
     const float now_c = (float)thermal_model_temperature_c7(&model, 0) / 128.0f;
-    const float power_w = spring_estimator_hold_w(&estimator, 0, target_c - now_c) +
-                          fmaxf(target_c - now_c, -20.0f) * estimator.heat_capacity_j_per_k / 4.0f;
+    const float power_w =
+        spring_estimator_hold_w(&estimator, 0, target_c - now_c) +
+        spring_estimator_follow_w(&estimator, fmaxf(target_c - now_c, -20.0f), 4.0f);
     const unsigned place = count % 32u;
     const double dither_a = 0.3 * ((double)(place < 16u ? place : 31u - place) / 16.0 - 0.5);
     return fmax(1e-3 * spring_estimator_current_ma(&estimator, 0, power_w) + dither_a, 0.4);
@@ -183,7 +184,7 @@ void hold(double margin_k, double seconds)
 double heat_then_hold(double most_s)
 {
     const double took_s = heat(most_s);
-    spring_estimator_disturb(&BELIEF);
+    spring_estimator_disturb(&estimator, 0);
     spring_estimator_begin_hold(&estimator, &model, 0, true);
     return took_s;
 }

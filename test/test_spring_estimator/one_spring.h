@@ -5,7 +5,7 @@
 #ifndef ONE_SPRING_H
 #define ONE_SPRING_H
 
-#include "spring_estimator.h"
+#include "../fakes/belief_inside.h"
 
 #define TICK_S 0.02
 
@@ -31,7 +31,10 @@ extern sensor_t sensor;
 extern spring_estimator_t estimator;
 extern thermal_model_t model;
 extern char where[120]; /* to be said where a test fails */
-#define BELIEF (estimator.spring[0])
+#define BELIEF spring_estimator_of(&estimator, 0)
+#define LEARNT spring_estimator_learnt(&estimator, 0)
+/* What nobody else may see. */
+#define INSIDE (*belief_inside(&estimator, 0))
 
 /* The declared spring at 20 degC, and an estimator that knows nothing of it. */
 void power_comes_on(void);

@@ -10,18 +10,19 @@
 
 static const spring_sight_t *sight_at(unsigned at)
 {
-    TEST_ASSERT_TRUE_MESSAGE(at < estimator.sights.count, "there is no such sight");
-    return &estimator.sights.sight[at];
+    TEST_ASSERT_TRUE_MESSAGE(at < spring_estimator_sights(&estimator)->count,
+                             "there is no such sight");
+    return &spring_estimator_sights(&estimator)->sight[at];
 }
 
 static const spring_sight_t *newest(void)
 {
-    return sight_at(estimator.sights.count - 1u);
+    return sight_at(spring_estimator_sights(&estimator)->count - 1u);
 }
 
 bool is_noted(spring_sight_kind_t kind)
 {
-    for (unsigned i = 0; i < estimator.sights.count; i++) {
+    for (unsigned i = 0; i < spring_estimator_sights(&estimator)->count; i++) {
         if (sight_at(i)->kind == kind) {
             return true;
         }
@@ -32,10 +33,11 @@ bool is_noted(spring_sight_kind_t kind)
 static void expect_kinds(const spring_sight_kind_t kinds[], unsigned count)
 {
     size_t length = 0;
-    for (unsigned i = 0; i < estimator.sights.count && length < sizeof where - 8u; i++) {
+    for (unsigned i = 0;
+         i < spring_estimator_sights(&estimator)->count && length < sizeof where - 8u; i++) {
         length += (size_t)snprintf(where + length, sizeof where - length, "%u ", sight_at(i)->kind);
     }
-    TEST_ASSERT_EQUAL_UINT_MESSAGE(count, estimator.sights.count, where);
+    TEST_ASSERT_EQUAL_UINT_MESSAGE(count, spring_estimator_sights(&estimator)->count, where);
     for (unsigned i = 0; i < count; i++) {
         TEST_ASSERT_EQUAL_UINT_MESSAGE(kinds[i], sight_at(i)->kind, where);
     }
@@ -45,11 +47,14 @@ static void expect_kinds(const spring_sight_kind_t kinds[], unsigned count)
 static void search(double from_k)
 {
     double margin_k = from_k;
-    for (double s = 0.0; s < 300.0 && BELIEF.lost == 0.0f; s += TICK_S) {
-        margin_k -= BELIEF.quiet > 45 && BELIEF.losing == 0 ? 0.08 * TICK_S : 0.0;
+    for (double s = 0.0; s < 300.0 && spring_estimator_lost(BELIEF) == 0.0f; s += TICK_S) {
+        margin_k -=
+            spring_estimator_rest_turns(BELIEF) > 45 && !spring_estimator_seems_to_lose(BELIEF)
+                ? 0.08 * TICK_S
+                : 0.0;
         (void)tick(hold_current_a(margin_k));
     }
-    TEST_ASSERT_TRUE(BELIEF.lost > 0.0f);
+    TEST_ASSERT_TRUE(spring_estimator_lost(BELIEF) > 0.0f);
 }
 
 void each_sight_of_a_life_is_noted_with_what_was_done(void)
@@ -77,7 +82,8 @@ void each_sight_of_a_life_is_noted_with_what_was_done(void)
     }
     spring_estimator_begin_heating(&estimator, &model, 0);
     TEST_ASSERT_EQUAL_UINT8(SPRING_DID_HEAT, sight_at(3)->did);
-    const double ago_s = 0.25 * spring_sights_age_turns(&estimator.sights, sight_at(2));
+    const double ago_s =
+        0.25 * spring_sights_age_turns(spring_estimator_sights(&estimator), sight_at(2));
     TEST_ASSERT_TRUE(ago_s > 20.0 && ago_s < 330.0);
 }
 
@@ -86,7 +92,7 @@ void sight_says_what_was_believed_read_and_moved(void)
     begin_cold();
     (void)heat_then_hold(60.0);
     hold(4.0, 20.0);
-    const float shift_k = BELIEF.shift_k;
+    const float shift_k = spring_estimator_shift_k(BELIEF);
     search(4.0);
     const spring_sight_t *s = newest();
     (void)snprintf(where, sizeof where,
@@ -101,8 +107,9 @@ void sight_says_what_was_believed_read_and_moved(void)
     /* its change is 20 %: what is lost of it is read as less, and that for certain */
     TEST_ASSERT_TRUE_MESSAGE(s->read < 0 && s->read > -400 && s->read_sd > 0, where);
     TEST_ASSERT_TRUE_MESSAGE(s->read < -2 * s->read_sd, where);
-    TEST_ASSERT_INT_WITHIN_MESSAGE(1, (int)lround(10.0 * (double)(BELIEF.shift_k - shift_k)),
-                                   s->shift, where);
+    TEST_ASSERT_INT_WITHIN_MESSAGE(
+        1, (int)lround(10.0 * (double)(spring_estimator_shift_k(BELIEF) - shift_k)), s->shift,
+        where);
     const spring_bounds_t k = spring_estimator_distance_k(&estimator, &model, 0);
     TEST_ASSERT_INT_WITHIN_MESSAGE(2, (int)lround(10.0 * (double)k.value), s->now, where);
 }
@@ -119,16 +126,18 @@ void hold_that_loses_nothing_is_one_sight(void)
         margin_k -= 0.05;
         hold(margin_k, 1.0);
     }
-    const spring_sight_t *const s = sight_at(estimator.sights.count - 2u);
+    const spring_sight_t *const s = sight_at(spring_estimator_sights(&estimator)->count - 2u);
     TEST_ASSERT_EQUAL_UINT8(SPRING_SIGHT_LOST, newest()->kind);
     TEST_ASSERT_EQUAL_UINT8(SPRING_SIGHT_KEPT, s->kind);
     (void)snprintf(where, sizeof where, "%u turns ago, loss %d, %d to %d, newest %d",
-                   spring_sights_age_turns(&estimator.sights, s), s->loss, s->believed, s->now,
-                   newest()->loss);
-    TEST_ASSERT_TRUE_MESSAGE(spring_sights_age_turns(&estimator.sights, s) < 240, where);
+                   spring_sights_age_turns(spring_estimator_sights(&estimator), s), s->loss,
+                   s->believed, s->now, newest()->loss);
+    TEST_ASSERT_TRUE_MESSAGE(spring_sights_age_turns(spring_estimator_sights(&estimator), s) < 240,
+                             where);
     TEST_ASSERT_TRUE_MESSAGE(s->loss < -100,
                              where); /* of the declared loss, a hundredth less at least */
-    TEST_ASSERT_TRUE(sight_at(estimator.sights.count - 3u)->kind != SPRING_SIGHT_KEPT);
+    TEST_ASSERT_TRUE(sight_at(spring_estimator_sights(&estimator)->count - 3u)->kind !=
+                     SPRING_SIGHT_KEPT);
 }
 
 void contact_that_jumps_is_noted_and_blind_is_said(void)

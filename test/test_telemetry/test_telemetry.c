@@ -1,6 +1,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "../fakes/belief_inside.h"
 #include "telemetry.h"
 #include "unity.h"
 
@@ -253,7 +254,7 @@ static void csv_tells_again_when_the_cut_has_changed_by_half_an_ampere(void)
 static void pass(unsigned turns)
 {
     for (unsigned n = 0; n < turns; n++) {
-        spring_sights_turn(&controller.policy.estimator.sights);
+        spring_sights_turn(sights_inside(&controller.estimator));
     }
 }
 
@@ -268,7 +269,7 @@ static void csv_tells_each_sight_once_when_it_is_known_what_was_done(void)
                                 "\r\n<sight|spring:9|t:8.340|told|now_k:-58.0|now_sd:5.8|shift_k:"
                                 "0.0|loss:0.00>\r\n"));
     forget();
-    spring_sight_t *const sight = spring_sights_add(&controller.policy.estimator.sights, 4);
+    spring_sight_t *const sight = spring_sights_add(sights_inside(&controller.estimator), 4);
     sight->kind = SPRING_SIGHT_LOST;
     sight->read = -132;
     sight->read_sd = 5;
@@ -299,7 +300,7 @@ static void csv_tells_each_sight_once_when_it_is_known_what_was_done(void)
 
 static void longest_sight_is_told_whole_and_waits_for_room(void)
 {
-    spring_sights_t *const sights = &controller.policy.estimator.sights;
+    spring_sights_t *const sights = sights_inside(&controller.estimator);
     sights->count = 0;
     TEST_ASSERT_TRUE(telemetry_set(&telemetry, TELEMETRY_CSV, 1));
     ticks(50, 0); /* the first row */
@@ -433,7 +434,7 @@ static void teleplots_longest_lines_are_whole(void)
     controller.measured_ma[8] = -32768;
     controller.model.state.spring[8].temperature_c23 = -40 * 8388608;
     controller.safety.spring[8].fault = SAFETY_FAULT_EMERGENCY_STOP;
-    controller.policy.estimator.spring[8].variance_k2 = 3000.0f;
+    belief_inside(&controller.estimator, 8)->variance_k2 = 3000.0f;
     limit(8, 1023, 3000);
     TEST_ASSERT_TRUE(telemetry_set(&telemetry, TELEMETRY_TELEPLOT, 50));
     telemetry.rounds = 49; /* of this second the last one: with bounds */

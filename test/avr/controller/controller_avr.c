@@ -42,14 +42,16 @@ static void count_parts(bool steps)
         thermal_model_step(&controller.model, power_uw);
         COUNTED();
     }
-    drive_policy_input_t input = {.model = &controller.model,
+    COUNT("belief");
+    spring_estimator_tick(&controller.estimator, &controller.model, controller.measured_ma,
+                          controller.measured_mv, valid);
+    COUNTED();
+    drive_policy_input_t input = {.belief = &controller.estimator,
+                                  .model = &controller.model,
                                   .level_permille = controller.level_permille,
                                   .allowed = yes,
                                   .maximum_current_ma = 3000,
-                                  .supply_limit_ma = 15000,
-                                  .measured_ma = controller.measured_ma,
-                                  .measured_mv = controller.measured_mv,
-                                  .valid = valid};
+                                  .supply_limit_ma = 15000};
     COUNT("policy");
     drive_policy_tick(&controller.policy, &input, target_ma);
     COUNTED();
@@ -130,7 +132,7 @@ static void start(drive_policy_kind_t policy, int16_t temperature_c7)
         thermal_model_set_temperature(&controller.model, k, (int16_t)(temperature_c7 + k * 64));
     }
     if (temperature_c7 != UNKNOWN) { /* else they wait, or look */
-        spring_estimator_trust_model(&controller.policy.estimator, &controller.model);
+        spring_estimator_trust_model(&controller.estimator, &controller.model);
     }
 }
 
@@ -191,7 +193,7 @@ static void power_on(void)
                                     .loss_sd_w_per_k = 0.0003f};
     start(DRIVE_POLICY_PRECOMPENSATE, UNKNOWN);
     for (uint8_t k = 0; k < SPRINGS; k++) {
-        spring_estimator_restore(&controller.policy.estimator, k, &learnt);
+        spring_estimator_restore(&controller.estimator, k, &learnt);
     }
     all(1000);
     run(300);

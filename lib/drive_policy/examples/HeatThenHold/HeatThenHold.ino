@@ -4,6 +4,7 @@
 #include <drive_policy.h>
 
 static thermal_model_t model;
+static spring_estimator_t belief;
 static drive_policy_t policy;
 static unsigned long next_ms;
 
@@ -29,8 +30,9 @@ void setup()
         !drive_policy_init(&policy, &drive, &model, &bad)) {
         refused();
     }
+    spring_estimator_init(&belief, &model);
     thermal_model_reset(&model, thermal_model_ambient_c7(&model));
-    spring_estimator_trust_model(&policy.estimator, &model); // all are cold
+    spring_estimator_trust_model(&belief, &model); // all are cold
     next_ms = millis();
 }
 
@@ -45,12 +47,14 @@ void loop()
                                         0};
     const bool allowed[3] = {true, true, true};
     drive_policy_input_t input = {};
+    input.belief = &belief;
     input.model = &model;
     input.level_permille = level_permille;
     input.allowed = allowed;
     input.maximum_current_ma = 3000;
     input.supply_limit_ma = 5000;
     uint16_t target_ma[3];
+    spring_estimator_tick(&belief, &model, NULL, NULL, NULL); // nothing is measured
     drive_policy_tick(&policy, &input, target_ma);
     if (tick % 5 == 0) { // the model's step is 100 ms
         uint32_t power_uw[3];

@@ -34,7 +34,7 @@ void loop()
     next_ms += 20;
     const int16_t current_ma = 500;
     const int16_t voltage_mv = 88;
-    spring_estimator_take(&estimator.spring[0], current_ma, voltage_mv);
+    spring_estimator_take(&estimator, 0, current_ma, voltage_mv);
     tick++;
     if (tick % 5 == 0) { // the model's step is 100 ms
         const uint32_t power_uw = (uint32_t)current_ma * (uint32_t)voltage_mv;

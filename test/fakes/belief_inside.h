@@ -1,0 +1,19 @@
+/* What it is for: tests that must set or see what no caller of spring_estimator may.
+ * What it owns: the only way in: test_repository holds that there is no other.
+ * What it never does: serve anything but a test. */
+#ifndef BELIEF_INSIDE_H
+#define BELIEF_INSIDE_H
+
+#include "spring_estimator.h"
+
+static inline spring_belief_t *belief_inside(spring_estimator_t *estimator, uint8_t spring)
+{
+    return &estimator->spring[spring];
+}
+
+static inline spring_sights_t *sights_inside(spring_estimator_t *estimator)
+{
+    return &estimator->sights;
+}
+
+#endif
