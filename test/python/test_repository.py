@@ -55,6 +55,41 @@ def test_each_test_that_the_page_of_failures_names_is_run() -> None:
     assert named > 30
 
 
+INSIDE = ("lib/spring_estimator/", "test/fakes/belief_inside.h")  # the latter for tests alone
+BELIEF = r"\bspring_(?:belief|estimator)_t"
+TOLD = {"spring_estimator_" + what for what in ("begin_heating", "begin_hold", "leave", "disturb")}
+
+
+def looks_inside(text: str, members: set[str]) -> set[str]:
+    """Return the places of a C source that read or write a field of a belief."""
+    own = set(re.findall(BELIEF + r"\s*(?:\*\s*)?(?:const\s+)?(\w+)", text)) | members
+    by_the_way_in = set(re.findall(r"(\w+) = belief_inside\(", text))
+    names = "|".join(sorted(own - by_the_way_in)) or "-"
+    of = r"(?:spring_estimator_of\([^(){};]*\)|\b(?:" + names + r")(?:\[[^]]*\])?)\s*(?:->|\.)\s*\w+"
+    return {found[0] for found in re.finditer(of, text)}
+
+
+def test_nobody_looks_into_what_is_believed_but_the_estimator() -> None:
+    sources = [*ROOT.glob("lib/*/*.[ch]"), *ROOT.glob("lib/*/examples/*/*.ino")]
+    for folder in ("firmware", "sim_host", "calibrate/src/native", "bench", "test"):
+        sources += [path for path in (ROOT / folder).rglob("*.*") if path.suffix in {".c", ".h", ".cpp", ".hpp"}]
+    texts = {
+        str(path.relative_to(ROOT)): re.sub(r"/\*.*?\*/|//[^\n]*", "", path.read_text(), flags=re.S) for path in sources
+    }
+    members = {name for name in texts if name.startswith("lib/")}
+    members = {field for name in members for field in re.findall(BELIEF + r"\s*\*?\s*(\w+);", texts[name])}
+    assert {"belief", "estimator"} <= members
+    for name, text in texts.items():
+        if not name.startswith(INSIDE):
+            assert not looks_inside(text, members), f"{name} looks into what is believed"
+        assert "belief_inside.h" not in text or name.startswith("test/"), name
+    # the policy tells it what it does, and nothing else
+    surface = texts["lib/spring_estimator/spring_estimator.h"]
+    changing = set(re.findall(r"\bvoid (spring_estimator_\w+)\(spring_estimator_t \*", surface))
+    policy = set(re.findall(r"spring_estimator_\w+", texts["lib/drive_policy/drive_policy.c"]))
+    assert policy & changing == TOLD
+
+
 def test_the_results_first_page_has_a_figure_for_each_of_its_lines() -> None:
     sys.path.insert(0, str(ROOT / "bench"))
     import results
