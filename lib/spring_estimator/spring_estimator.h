@@ -1,7 +1,8 @@
 /* What it is for: what is known of each spring, and how surely: its distance to the transformation,
  * its phase, its own numbers (docs/believing.md).
  * What it owns: the average of its readings, the error of the model's temperature with its standard
- * deviation, the phases that nothing has excluded, what was learnt of this very spring.
+ * deviation and its correction, the phases that nothing has excluded, what was learnt of this very
+ * spring, whose turn it is.
  * What it never does: choose a current, touch hardware, allocate. It uses floating point, one
  * spring at a time. */
 #ifndef SPRING_ESTIMATOR_H
