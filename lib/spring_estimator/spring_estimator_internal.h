@@ -21,6 +21,9 @@
 /* The same on the way down to a hold, where what noise and steps do at more is counted. */
 #define WEAK_A 0.6f
 
+/* Currents that differ by less of them show a sensor's offset, and its noise, alike. */
+#define SAME_CURRENT 0.1f
+
 #define SHIFT_SD_K    3.0f /* of declared transformation temperatures */
 #define SHIFT_BOUND_K 8.0f /* 2.6 of it, or a load */
 

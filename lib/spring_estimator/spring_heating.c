@@ -15,11 +15,9 @@
  * 2 (0.0015 / 0.85) H^2 / pi^2, H = 47 K of heat from its start to its finish. */
 #define FLAT_CHANGE_K   0.8f
 #define ONSET_K         2.0f /* beyond austenite start it is noticed */
-#define ONSET_C7        256  /* the same */
 #define PLACE_SD_K      3.0f
 #define CAPACITY_BOUND  1.25f /* 2.6 standard deviations of a heat capacity more */
 #define CAPACITY_LIKELY 1.12f /* 1.3 of them */
-#define SAME_CURRENT    0.1f  /* within it a sensor's offset shows alike */
 #define LEAST_PART      0.5f  /* of a known change: a contact's step, flat afterwards, is less */
 #define LONE_PART       0.7f  /* where its resistance is not its austenite's either */
 #define LEAST_HEAT      0.74f /* latent heat 15 % less than declared, heat capacity 15 % more */
@@ -147,8 +145,9 @@ static void hold_back(spring_estimator_t *e, spring_belief_t *b, thermal_model_t
 {
     const thermal_model_transformation_t t = thermal_model_transformation(model, k);
     const bool martensite = b->possible == SPRING_PHASE_MARTENSITE;
-    const int16_t limit_c7 =
-        martensite ? (int16_t)(t.austenite_start_c7 + ONSET_C7) : t.austenite_finish_c7;
+    const int16_t limit_c7 = martensite
+                                 ? (int16_t)(t.austenite_start_c7 + (int16_t)(128.0f * ONSET_K))
+                                 : t.austenite_finish_c7;
     if (thermal_model_temperature_c7(model, k) <= limit_c7) {
         return;
     }

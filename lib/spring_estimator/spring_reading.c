@@ -7,7 +7,6 @@
 #define SETTLING_TICKS 8
 #define NOISE_MOST     0.05f
 #define NOISE_SHARE    0.06f
-#define NOISE_SAME     0.1f   /* a current that has moved by more tells nothing of the noise */
 #define BEND_TO_SD     0.512f /* mean size of a second difference: 1 / (sqrt(6) sqrt(2 / pi)) */
 /* Of a resistance in a turn. */
 #define JUMP_OF_HOLD 0.01f  /* 0.4 W change 1 % of the phase, 0.3 % of it */
@@ -110,7 +109,7 @@ bool spring_is_loose(const spring_belief_t *b)
 /* Second differences of turns at the same current: neither a level nor a slope shows in them. */
 static void take_noise(spring_belief_t *b, float ohm, float current_a)
 {
-    const bool same = fabsf(current_a - b->current_a) < NOISE_SAME * current_a;
+    const bool same = fabsf(current_a - b->current_a) < SAME_CURRENT * current_a;
     if (!same && b->fresh != 0) { /* it is one of the voltage */
         b->noise = fminf(b->noise * b->current_a / current_a, NOISE_MOST);
     }
