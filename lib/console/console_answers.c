@@ -85,6 +85,15 @@ bool console_version_line(const console_t *console, console_out_t *out)
                         values);
         return true;
     }
+    case 3: {
+        const int32_t broken = controller_broken_seals(console->controller);
+        if (broken != 0) {
+            text_add_values(
+                line, FLASH_TEXT("memory changed by itself in what was believed: #0, begun anew"),
+                &broken);
+        }
+        return broken != 0;
+    }
     default:
         return false;
     }

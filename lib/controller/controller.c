@@ -714,6 +714,11 @@ uint16_t controller_belief_mark(const controller_t *controller, uint8_t spring)
     return spring_estimator_mark(&controller->policy.estimator, &controller->model, spring);
 }
 
+uint8_t controller_broken_seals(const controller_t *controller)
+{
+    return controller->policy.estimator.broken_seals;
+}
+
 const spring_sights_t *controller_sights(const controller_t *controller)
 {
     return &controller->policy.estimator.sights;

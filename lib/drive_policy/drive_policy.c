@@ -477,7 +477,6 @@ static void switch_off(drive_policy_t *policy, uint8_t k)
     drive_policy_spring_t *s = &policy->spring[k];
     if (s->stage != DRIVE_POLICY_STAGE_OFF) {
         supply_queue_remove(&policy->queue, k);
-        spring_estimator_leave(&policy->estimator, k);
         s->stage = DRIVE_POLICY_STAGE_OFF;
     }
     s->wanted_ma = s->floor_ma = 0;
@@ -490,7 +489,12 @@ static void update(drive_policy_t *policy, const drive_policy_input_t *input, ui
     const uint16_t level_permille = input->level_permille[k];
     const bool driven = level_permille != 0 && input->allowed[k];
     const int16_t before_c7 = policy->estimator.spring[k].last_c7;
-    spring_estimator_update(&policy->estimator, input->model, k);
+    if (s->stage == DRIVE_POLICY_STAGE_OFF) { /* as it may be since the turn before */
+        spring_estimator_leave(&policy->estimator, k);
+    }
+    if (!spring_estimator_update(&policy->estimator, input->model, k)) {
+        switch_off(policy, k); /* it begins as if it were asked for just now */
+    }
     const int16_t rise_c7 = (int16_t)(policy->estimator.spring[k].last_c7 - before_c7);
     const float rise_k_per_s = spring_c(rise_c7) * (1.0f / TURN_S);
     s->rise_k_per_s += (rise_k_per_s - s->rise_k_per_s) * RISE_SHARE;

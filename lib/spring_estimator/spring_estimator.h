@@ -86,6 +86,13 @@ typedef struct {
  * declared, and the distance to it is what readings tell. shift_k is how much of that is believed
  * to be the transformation's own (a load, another batch) and not the temperature's. */
 typedef struct {
+    /* the running turn's readings: each tick writes them, so they alone have no seal
+     * (spring_seal.c) */
+    uint8_t readings;
+    uint8_t settling; /* to be left out, after a jump of the current */
+    bool cut_short;   /* there was such a jump in the running turn */
+    uint16_t current_sum_ma;
+    uint16_t voltage_sum_mv;
     /* the error of that temperature: variances of what the loss explains, and of the heat capacity
      */
     float variance_k2;
@@ -109,27 +116,21 @@ typedef struct {
     uint8_t unread;     /* turns since the last that had readings fit for use, saturating */
     uint16_t unsteady;  /* turns, of all that a contact or the sensor has jumped lately */
     /* bits: of nine springs they are a good part of the RAM that is spare */
-    bool doubted : 1;   /* its last heating ended before its resistance said so */
-    bool unproven : 1;  /* it may not have transformed: what it may be hotter by has spared it heat,
-                         * or its contact came and went */
-    bool odd : 1;       /* the turn before read what no phase changes to so fast */
-    bool reads : 1;     /* the last turn had readings fit for use */
-    bool seen : 1;      /* the last turn has moved it to where it was seen */
-    bool blind : 1;     /* a heating that must have transformed it did not show */
-    bool heating : 1;   /* between spring_estimator_begin_heating and _begin_hold */
-    bool onset : 1;     /* this heating was seen to begin to transform it */
-    bool rough : 1;     /* the line is of few turns, not of a spring at rest */
-    bool steep : 1;     /* and its resistance still changes as only that explains */
-    bool cut_short : 1; /* there was a jump of the current in the running turn */
-    bool told : 1;      /* it is martensite because someone said so */
-    bool unlike : 1;    /* this heating's martensite was not of the declared resistance */
+    bool doubted : 1;  /* its last heating ended before its resistance said so */
+    bool unproven : 1; /* it may not have transformed: what it may be hotter by has spared it heat,
+                        * or its contact came and went */
+    bool odd : 1;      /* the turn before read what no phase changes to so fast */
+    bool reads : 1;    /* the last turn had readings fit for use */
+    bool seen : 1;     /* the last turn has moved it to where it was seen */
+    bool blind : 1;    /* a heating that must have transformed it did not show */
+    bool heating : 1;  /* between spring_estimator_begin_heating and _begin_hold */
+    bool onset : 1;    /* this heating was seen to begin to transform it */
+    bool rough : 1;    /* the line is of few turns, not of a spring at rest */
+    bool steep : 1;    /* and its resistance still changes as only that explains */
+    bool told : 1;     /* it is martensite because someone said so */
+    bool unlike : 1;   /* this heating's martensite was not of the declared resistance */
     spring_learnt_t learnt;
 
-    /* the running turn's readings */
-    uint8_t readings;
-    uint8_t settling; /* to be left out, after a jump of the current */
-    uint16_t current_sum_ma;
-    uint16_t voltage_sum_mv;
     float current_a; /* of the last turn that had readings */
     float ohm;
     float ohm_before[2]; /* one and two turns earlier; 0: at another current */
@@ -163,9 +164,12 @@ typedef struct {
     float martensite_ohm;
     float change; /* declared, as in spring_learnt_t */
     spring_belief_t spring[SPRING_ESTIMATOR_MAX_SPRINGS];
+    uint16_t seal[SPRING_ESTIMATOR_MAX_SPRINGS]; /* checksums, of each belief and what is shared */
+    uint16_t shared_seal;
     /* what all springs share: one was found colder than anything known explains */
     uint16_t stepped_turns; /* of all springs: for so many more it counts as lately */
     uint8_t stepped_spring;
+    uint8_t broken_seals;   /* found so far, saturating: what was believed had changed by itself */
     spring_sights_t sights; /* for whoever asks why */
 } spring_estimator_t;
 
@@ -216,15 +220,18 @@ static inline void spring_estimator_take(spring_belief_t *belief, int16_t curren
 void spring_estimator_disturb(spring_belief_t *belief);
 
 /* Once in a turn: takes the readings, and moves the model's temperature and phase to what they say.
- */
-void spring_estimator_update(spring_estimator_t *estimator, thermal_model_t *model, uint8_t spring);
+ * False if and only if what was believed of it has changed by itself, as RAM may, since this module
+ * wrote it: then nothing is known of it from here, as when the power comes on, nor of its own
+ * numbers, and it is as if no heating or hold had begun. */
+bool spring_estimator_update(spring_estimator_t *estimator, thermal_model_t *model, uint8_t spring);
 
 /* What the spring gives off per kelvin, as the model has it by now: to be called once in some
  * seconds, in a tick that has room. */
 void spring_estimator_look_at_stiffness(spring_estimator_t *estimator, const thermal_model_t *model,
                                         uint8_t spring);
 
-/* A heating begins: what the resistance does from here on tells of the transformation. */
+/* A heating begins: what the resistance does from here on tells of the transformation. In its turn,
+ * once that has been updated; as a hold does. */
 void spring_estimator_begin_heating(spring_estimator_t *estimator, const thermal_model_t *model,
                                     uint8_t spring);
 /* It reads less than when it had transformed last, and the difference is neither noise nor a

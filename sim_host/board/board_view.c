@@ -32,6 +32,8 @@ static void view_spring(const controller_t *chip, unsigned k, board_view_spring_
     view->cooling_c7 = state->cooling_c7;
     view->amplitude = state->amplitude;
     view->branch = state->branch;
+    view->average_at = (uint32_t)((const uint8_t *)&chip->policy.estimator.spring[k].slow_ohm -
+                                  (const uint8_t *)chip);
     view->transformation_shift_c7 = chip->model.spring[k].transformation_shift_c7;
 }
 

@@ -1,10 +1,13 @@
 /* What is believed of one spring against the spring as it is. */
 #include <math.h>
+#include <stddef.h>
 #include <stdio.h>
+#include <string.h>
 
 #include "lost_phase.h"
 #include "one_spring.h"
 #include "sights.h"
+#include "spring_estimator_internal.h"
 #include "unity.h"
 
 void setUp(void)
@@ -12,7 +15,11 @@ void setUp(void)
     begin_cold();
 }
 
-void tearDown(void) {}
+/* In all that is done to it here nothing was taken for a bit that has turned over. */
+void tearDown(void)
+{
+    TEST_ASSERT_EQUAL_UINT8(0, estimator.broken_seals);
+}
 
 /* Off until it is cold; the estimator keeps what it has learnt. */
 static void begin_cold_as_learnt(void)
@@ -318,27 +325,6 @@ static void hold_that_loses_nothing_shows_no_crossing(void)
     }
 }
 
-/* A bit of the average: it is not compared with, and what was learnt does not follow it. */
-static void average_that_no_reading_made_is_begun_anew(void)
-{
-    for (float by = 1.0f / 65536.0f; by < 1e6f; by *= 256.0f) {
-        begin_cold();
-        (void)heat_then_hold(60.0);
-        hold(9.0, 60.0);
-        const float austenite_ohm = BELIEF.learnt.austenite_ohm;
-        BELIEF.slow_ohm *= by;
-        double most_a = 0.0;
-        for (double s = 0.0; s < 5.0; s += TICK_S) {
-            (void)tick(fmin(hold_current_a(9.0), 3.0));
-            most_a = fmax(most_a, s > 0.5 ? hold_current_a(9.0) : 0.0);
-        }
-        (void)snprintf(where, sizeof where, "x %.0e: %.2f A, %.1f C", (double)by, most_a,
-                       truth.temperature_c);
-        TEST_ASSERT_TRUE_MESSAGE(most_a < 2.0 && truth.temperature_c < 92.0, where);
-        TEST_ASSERT_FLOAT_WITHIN(0.01f * austenite_ohm, austenite_ohm, BELIEF.learnt.austenite_ohm);
-    }
-}
-
 /* A touch in mid-hold: all four temperatures rise by 8 K, and phase goes. */
 static void transformation_that_moves_is_noticed(void)
 {
@@ -534,28 +520,6 @@ static void transformation_that_waits_for_current_is_not_over(void)
         TEST_ASSERT_TRUE(BELIEF.possible != SPRING_PHASE_AUSTENITE);
     }
     TEST_ASSERT_TRUE(truth.austenite < 0.95);
-}
-
-/* A bit of the heat that a wait has to make up: no wait has cost so much. */
-static void heat_that_no_wait_has_cost_is_not_waited_for(void)
-{
-    for (float peak_k = 1e2f; peak_k < 1e9f; peak_k *= 1e3f) {
-        begin_cold();
-        ticks(3.0, 1.0);
-        spring_estimator_begin_heating(&estimator, &model, 0);
-        while (truth.austenite < 0.5) {
-            (void)tick(3.0);
-        }
-        BELIEF.run.heat.peak_k = peak_k;
-        for (double time_s = 0.0;
-             time_s < 60.0 && !spring_estimator_has_transformed(&estimator, &model, 0);
-             time_s += TICK_S) {
-            (void)tick(3.0);
-        }
-        (void)snprintf(where, sizeof where, "%.0e K: %.3f at %.1f C", (double)peak_k,
-                       truth.austenite, truth.temperature_c);
-        TEST_ASSERT_TRUE_MESSAGE(truth.austenite > 0.99 && truth.temperature_c < 115.0, where);
-    }
 }
 
 /* A sensor's offset shows otherwise at the current of a look than at that of the heating. */
@@ -775,6 +739,143 @@ static void counts_and_sums_saturate(void)
     TEST_ASSERT_GREATER_OR_EQUAL_UINT8(240, BELIEF.quiet); /* where it goes round */
 }
 
+/* ---- bits that turn over by themselves ---- */
+
+static spring_estimator_t sound;
+static thermal_model_t sound_model;
+
+static void keep_sound(void)
+{
+    sound = estimator;
+    sound_model = model;
+}
+
+/* As it was kept, but for one bit. */
+static void turn_over(size_t at, unsigned bit)
+{
+    estimator = sound;
+    model = sound_model;
+    ((uint8_t *)&estimator)[at] ^= (uint8_t)(1u << bit);
+    (void)snprintf(where, sizeof where, "byte %u, bit %u", (unsigned)at, bit);
+}
+
+static void expect_begun_anew(void)
+{
+    TEST_ASSERT_FALSE_MESSAGE(spring_estimator_update(&estimator, &model, 0), where);
+    TEST_ASSERT_EQUAL_UINT8_MESSAGE(SPRING_PHASE_ANY, BELIEF.possible, where);
+    TEST_ASSERT_EQUAL_FLOAT_MESSAGE(SPRING_ESTIMATOR_HOTTEST_C, BELIEF.hottest_c, where);
+    TEST_ASSERT_EQUAL_FLOAT_MESSAGE(0.0f, BELIEF.learnt.austenite_ohm, where);
+    TEST_ASSERT_EQUAL_FLOAT_MESSAGE(sound.change, BELIEF.learnt.change, where);
+    TEST_ASSERT_FLOAT_WITHIN(1e-5f, sound.spring[0].declared_stiffness_w_per_k,
+                             BELIEF.declared_stiffness_w_per_k);
+    TEST_ASSERT_FALSE_MESSAGE(BELIEF.heating, where);
+    TEST_ASSERT_EQUAL_UINT8_MESSAGE(1, estimator.broken_seals, where);
+    TEST_ASSERT_TRUE_MESSAGE(is_noted(SPRING_SIGHT_ANEW), where);
+    TEST_ASSERT_TRUE_MESSAGE(spring_estimator_update(&estimator, &model, 0), where);
+}
+
+static void whatever_bit_of_a_belief_turns_over_nothing_is_known_from_its_next_turn_on(void)
+{
+    for (unsigned held = 0; held < 2; held++) {
+        begin_cold();
+        if (held != 0) {
+            (void)heat_then_hold(60.0);
+        } else {
+            spring_estimator_begin_heating(&estimator, &model, 0);
+        }
+        ticks(2.0, 5.0);
+        keep_sound();
+        const size_t begin =
+            offsetof(spring_estimator_t, spring) + offsetof(spring_belief_t, variance_k2);
+        const size_t end = offsetof(spring_estimator_t, spring) + sizeof(spring_belief_t);
+        for (size_t at = begin; at < end; at++) {
+            for (unsigned bit = 0; bit < 8; bit++) {
+                turn_over(at, bit);
+                expect_begun_anew();
+            }
+        }
+    }
+    begin_cold();
+}
+
+static void whatever_bit_of_what_springs_share_turns_over_that_begins_anew(void)
+{
+    (void)heat_then_hold(60.0);
+    keep_sound();
+    TEST_ASSERT_TRUE(estimator.sights.count > 2);
+    const size_t end = offsetof(spring_estimator_t, sights.count);
+    for (size_t at = offsetof(spring_estimator_t, stepped_turns); at <= end; at++) {
+        for (unsigned bit = 0; bit < 8; bit++) {
+            turn_over(at, bit);
+            TEST_ASSERT_TRUE_MESSAGE(spring_estimator_update(&estimator, &model, 0), where);
+            TEST_ASSERT_EQUAL_UINT8_MESSAGE(0, estimator.sights.count, where);
+            TEST_ASSERT_EQUAL_UINT16_MESSAGE(0, estimator.stepped_turns, where);
+            TEST_ASSERT_EQUAL_UINT8_MESSAGE(0, estimator.stepped_spring, where);
+            TEST_ASSERT_EQUAL_UINT8_MESSAGE(SPRING_PHASE_AUSTENITE, BELIEF.possible, where);
+            TEST_ASSERT_TRUE_MESSAGE(spring_estimator_update(&estimator, &model, 0), where);
+        }
+    }
+    begin_cold();
+}
+
+/* What is done to a spring before its next turn. */
+static void and_is_left(void)
+{
+    spring_estimator_leave(&estimator, 0);
+}
+static void and_is_told(void)
+{
+    spring_estimator_trust_model(&estimator, &model);
+}
+static void and_forgets(void)
+{
+    spring_estimator_forget(&estimator, 0);
+}
+static void and_forgets_loss(void)
+{
+    spring_estimator_forget_loss(&estimator, 0);
+}
+static void and_is_restored(void)
+{
+    spring_estimator_restore(&estimator, 0, &sound.spring[0].learnt);
+}
+static void and_is_prepared(void)
+{
+    spring_estimator_prepare(&estimator, &model, true);
+}
+static void and_is_disturbed(void)
+{
+    spring_estimator_disturb(&BELIEF);
+}
+
+static void change_before_its_turn_hides_no_bit(void)
+{
+    static void (*const changes[])(void) = {and_is_left,      and_is_told,     and_forgets,
+                                            and_forgets_loss, and_is_restored, and_is_prepared,
+                                            and_is_disturbed};
+    (void)heat_then_hold(60.0);
+    spring_estimator_begin_heating(&estimator, &model, 0);
+    ticks(2.0, 1.0);
+    keep_sound();
+    for (unsigned n = 0; n < sizeof changes / sizeof changes[0]; n++) {
+        turn_over(offsetof(spring_estimator_t, spring) + offsetof(spring_belief_t, slow_ohm) + 2u,
+                  5);
+        changes[n]();
+        expect_begun_anew();
+        turn_over(0, 0); /* and is none itself */
+        estimator = sound;
+        changes[n]();
+        TEST_ASSERT_TRUE_MESSAGE(spring_estimator_update(&estimator, &model, 0), where);
+    }
+    turn_over(offsetof(spring_estimator_t, spring) + offsetof(spring_belief_t, learnt), 6);
+    spring_estimator_restart(&estimator, &model);
+    TEST_ASSERT_EQUAL_FLOAT(0.0f, BELIEF.learnt.austenite_ohm);
+    estimator = sound;
+    spring_estimator_restart(&estimator, &model);
+    TEST_ASSERT_TRUE(BELIEF.learnt.austenite_ohm > 0.0f);
+    begin_cold();
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -790,7 +891,6 @@ int main(void)
     RUN_TEST(spring_that_is_off_is_within_its_bounds);
     RUN_TEST(crossing_is_seen_and_makes_the_distance_sure);
     RUN_TEST(hold_that_loses_nothing_shows_no_crossing);
-    RUN_TEST(average_that_no_reading_made_is_begun_anew);
     RUN_TEST(transformation_that_moves_is_noticed);
     RUN_TEST(heating_in_a_gust_goes_on_until_it_is_over);
     RUN_TEST(offset_is_learnt_where_the_current_drops);
@@ -825,7 +925,6 @@ int main(void)
     RUN_TEST(transformation_that_is_not_read_is_no_jump);
     RUN_TEST(transformation_is_seen_through_changes_of_current);
     RUN_TEST(transformation_that_waits_for_current_is_not_over);
-    RUN_TEST(heat_that_no_wait_has_cost_is_not_waited_for);
     RUN_TEST(offset_between_two_currents_is_no_onset);
     RUN_TEST(martensite_resistance_is_learnt_at_20_degrees);
     RUN_TEST(look_tells_the_phase_by_what_was_learnt);
@@ -844,5 +943,8 @@ int main(void)
     RUN_TEST(heating_that_shows_no_finish_is_noted);
     RUN_TEST(spring_that_has_most_gives_way);
     RUN_TEST(sights_are_found_by_number_and_forgotten_after_four_hours);
+    RUN_TEST(whatever_bit_of_a_belief_turns_over_nothing_is_known_from_its_next_turn_on);
+    RUN_TEST(whatever_bit_of_what_springs_share_turns_over_that_begins_anew);
+    RUN_TEST(change_before_its_turn_hides_no_bit);
     return UNITY_END();
 }
