@@ -276,7 +276,7 @@ static void add_fault(text_line_t *line, safety_fault_t fault)
     const int32_t number = (int32_t)fault;
     text_add_values(line, FLASH_TEXT("fault #0 "), &number);
     text_add_flash(line, safety_fault_name(fault));
-    if (fault == SAFETY_FAULT_STUCK_ON) {
+    if (fault == SAFETY_FAULT_STUCK_ON || fault == SAFETY_FAULT_NO_SENSOR) {
         text_add_flash(line, FLASH_TEXT(": cut the supply"));
     }
 }
