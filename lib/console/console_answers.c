@@ -85,6 +85,15 @@ bool console_version_line(const console_t *console, console_out_t *out)
                         values);
         return true;
     }
+    case 3: {
+        const int32_t broken = controller_broken_seals(console->controller);
+        if (broken != 0) {
+            text_add_values(
+                line, FLASH_TEXT("memory changed by itself in what was believed: #0, begun anew"),
+                &broken);
+        }
+        return broken != 0;
+    }
     default:
         return false;
     }
@@ -267,7 +276,7 @@ static void add_fault(text_line_t *line, safety_fault_t fault)
     const int32_t number = (int32_t)fault;
     text_add_values(line, FLASH_TEXT("fault #0 "), &number);
     text_add_flash(line, safety_fault_name(fault));
-    if (fault == SAFETY_FAULT_STUCK_ON) {
+    if (fault == SAFETY_FAULT_STUCK_ON || fault == SAFETY_FAULT_NO_SENSOR) {
         text_add_flash(line, FLASH_TEXT(": cut the supply"));
     }
 }

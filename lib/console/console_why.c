@@ -14,7 +14,8 @@ static const char kinds[] FLASH_MEMORY = "it begins to transform\0"
                                          "its contact or sensor jumps\0"
                                          "its phase is read, by what was learnt\0"
                                          "it is said to be known\0"
-                                         "it must have cooled by now";
+                                         "it must have cooled by now\0"
+                                         "what was believed had changed by itself: it begins anew";
 
 /* As SPRING_DID_ has them. */
 static const char deeds[] FLASH_MEMORY = "heated\0"

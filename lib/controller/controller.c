@@ -723,6 +723,11 @@ uint16_t controller_belief_mark(const controller_t *controller, uint8_t spring)
     return spring_estimator_mark(&controller->estimator, &controller->model, spring);
 }
 
+uint8_t controller_broken_seals(const controller_t *controller)
+{
+    return spring_estimator_broken_seals(&controller->estimator);
+}
+
 const spring_sights_t *controller_sights(const controller_t *controller)
 {
     return spring_estimator_sights(&controller->estimator);

@@ -209,6 +209,9 @@ float controller_shift_k(const controller_t *controller, uint8_t spring);
 bool controller_losses(const controller_t *controller, float *factor, float *sd);
 /* A CRC-16 of all that is believed of a spring (spring_estimator_mark). */
 uint16_t controller_belief_mark(const controller_t *controller, uint8_t spring);
+/* How often what is believed had changed by itself, as RAM may, and began anew: of a spring as when
+ * the power comes on. Saturates at 255. */
+uint8_t controller_broken_seals(const controller_t *controller);
 /* The last sights of the springs: why they are believed to be where they are. */
 const spring_sights_t *controller_sights(const controller_t *controller);
 /* How long it may still be hot from before power-on, s, never more than

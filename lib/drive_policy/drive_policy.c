@@ -482,6 +482,9 @@ static void update(drive_policy_t *policy, const drive_policy_input_t *in, uint8
     const uint16_t level_permille = in->level_permille[k];
     const bool driven = level_permille != 0 && in->allowed[k];
     const spring_belief_t *b = belief_of(in, k);
+    if (spring_estimator_has_begun_anew(b)) {
+        switch_off(policy, in, k); /* it begins as if it were asked for just now */
+    }
     const float rise_k_per_s = spring_c(spring_estimator_moved_c7(b)) * (1.0f / TURN_S);
     s->rise_k_per_s += (rise_k_per_s - s->rise_k_per_s) * RISE_SHARE;
     s->released = s->released || driven; /* also where its turn comes before it is off */

@@ -9,6 +9,10 @@
 
 #define TICKS_PER_SECOND 50
 
+/* sensor_status; a sensor with any other answers */
+#define STATUS_ABSENT 1u
+#define STATUS_BUS    2u
+
 /* Electrical conditions, bits of safety_spring_t.suspects; their order is that of blame. */
 #define OVER_CURRENT    1u
 #define OPEN            2u
@@ -201,6 +205,7 @@ bool safety_tick_spring(safety_t *safety, uint8_t spring, const safety_sample_t 
     safety_spring_t *s = &safety->spring[spring];
     uint8_t limit = safety->parameters.bad_samples;
     uint8_t status = sample->sensor_status;
+    safety->answered = safety->answered || (status != STATUS_ABSENT && status != STATUS_BUS);
     const bool reads = status == 0 && !is_frozen(&safety->parameters, s, sample);
     if (status == 0) {
         s->sensor = 0;
@@ -235,9 +240,23 @@ bool safety_tick_spring(safety_t *safety, uint8_t spring, const safety_sample_t 
     return reads;
 }
 
+/* The bus hangs, or has come off. Springs have faults of their own by then, as a rule; but a switch
+ * that has welded heats on, and no reading shows it. */
+static void count_blind(safety_t *safety)
+{
+    if (safety->answered) {
+        safety->blind = 0;
+    } else if (++safety->blind >= SAFETY_BLIND_TICKS) {
+        safety->blind = SAFETY_BLIND_TICKS;
+        latch_board(safety, SAFETY_FAULT_NO_SENSOR);
+    }
+    safety->answered = false;
+}
+
 void safety_tick_board(safety_t *safety, uint32_t sum_ma)
 {
     const safety_parameters_t *p = &safety->parameters;
+    count_blind(safety);
     if (sum_ma <= p->supply_limit_ma) {
         safety->supply_count = 0;
     } else if (++safety->supply_count >= p->bad_samples) {
@@ -258,7 +277,7 @@ bool safety_allows(const safety_t *safety, uint8_t spring)
 
 bool safety_cuts_supply(const safety_t *safety)
 {
-    bool cuts = safety->board_fault == SAFETY_FAULT_STUCK_ON;
+    bool cuts = safety->board_fault == SAFETY_FAULT_STUCK_ON || safety->blind >= SAFETY_BLIND_TICKS;
     for (uint8_t k = 0; k < safety->springs; k++) {
         cuts = cuts || safety->spring[k].fault == SAFETY_FAULT_OVER_TEMPERATURE;
     }
@@ -303,6 +322,7 @@ const char *safety_fault_name(safety_fault_t fault)
                                              "limit_trip\0"
                                              "sensor_mismatch\0"
                                              "host_silent\0"
+                                             "no_sensor\0"
                                              "unknown";
     return text_item(names, (uint8_t)(fault < SAFETY_FAULT_COUNT ? fault : SAFETY_FAULT_COUNT));
 }
@@ -311,6 +331,7 @@ void safety_clear(safety_t *safety)
 {
     safety->board_fault = SAFETY_FAULT_NONE;
     safety->supply_count = 0;
+    safety->blind = 0;
     for (uint8_t k = 0; k < SAFETY_MAX_SPRINGS; k++) {
         const int16_t frozen_ma = safety->spring[k].frozen_ma;
         safety->spring[k] = (safety_spring_t){.frozen_ma = frozen_ma};

@@ -24,6 +24,10 @@ extern "C" {
 /* Readings in a row: by the fourth the supply has gone, and the current with it. */
 #define SAFETY_STUCK_TICKS 3u
 
+/* Ticks on end in which no sensor answers. A welded switch gives 120 K/s, which then nothing shows:
+ * 12 K, and 9 K more until the relay has opened. */
+#define SAFETY_BLIND_TICKS 5u
+
 /* The numbers are part of the console's contract: never renumber, only add. */
 typedef enum {
     SAFETY_FAULT_NONE = 0,
@@ -48,6 +52,7 @@ typedef enum {
     SAFETY_FAULT_SENSOR_MISMATCH = 15, /* what is read cannot be this output's circuit */
     /* of the board */
     SAFETY_FAULT_HOST_SILENT = 16, /* safety_host_silent */
+    SAFETY_FAULT_NO_SENSOR = 17,   /* none answers: nothing shows that current is off */
     SAFETY_FAULT_COUNT
 } safety_fault_t;
 
@@ -72,6 +77,8 @@ typedef struct {
     uint8_t springs;
     uint8_t board_fault; /* as of a spring */
     uint8_t supply_count;
+    uint8_t blind;        /* ticks on end in which no sensor answered, up to SAFETY_BLIND_TICKS */
+    bool answered;        /* one has in this tick */
     uint8_t second_ticks; /* ticks in the running second of the on-times */
     bool locked;
     safety_spring_t spring[SAFETY_MAX_SPRINGS];
@@ -129,7 +136,7 @@ bool safety_allows(const safety_t *safety, uint8_t spring);
 
 /* True if and only if a fault stands that no switch of an output can be trusted to end: current in
  * a spring that is off (STUCK_ON), or one that became hotter than temperature_trip_c
- * (OVER_TEMPERATURE). */
+ * (OVER_TEMPERATURE); or no sensor has answered for SAFETY_BLIND_TICKS, whatever fault stands. */
 bool safety_cuts_supply(const safety_t *safety);
 
 safety_fault_t safety_fault(const safety_t *safety, uint8_t spring);

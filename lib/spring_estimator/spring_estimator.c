@@ -106,8 +106,9 @@ void spring_estimator_prepare(spring_estimator_t *e, const thermal_model_t *mode
     e->change = 1.0f - (float)p->resistance_martensite_uohm / (float)p->resistance_austenite_uohm;
     for (uint8_t k = 0; k < model->springs; k++) {
         spring_estimator_look_at_stiffness(e, model, k);
-        if (e->spring[k].learnt.austenite_ohm == 0.0f) { /* the declared one stands in */
-            e->spring[k].learnt.change = e->change;
+        if (e->spring[k].learnt.austenite_ohm == 0.0f && spring_is_sound(e, k)) {
+            e->spring[k].learnt.change = e->change; /* the declared one stands in */
+            spring_seal(e, k);
         }
     }
 }
@@ -128,45 +129,73 @@ static void begin(spring_belief_t *b, float temperature_c, float sd_k, uint8_t p
                            .last_c7 = as_c7(temperature_c)};
 }
 
-void spring_estimator_init(spring_estimator_t *e, thermal_model_t *model)
+/* All but its own numbers is going to be written anew, and these, where they are not kept. */
+static void open_anew(spring_estimator_t *e, uint8_t k, bool keeps_learnt)
 {
-    for (uint8_t k = 0; k < model->springs; k++) {
+    if (!keeps_learnt || !spring_is_sound(e, k)) {
         e->spring[k].learnt = (spring_learnt_t){0};
     }
-    spring_estimator_restart(e, model);
+    spring_seal(e, k);
+}
+
+static void begin_unknown(spring_estimator_t *e, thermal_model_t *model, uint8_t k)
+{
+    spring_belief_t *b = &e->spring[k];
+    const spring_learnt_t learnt = b->learnt;
+    const float coldest_c = spring_ambient_c(model);
+    const float width_k = SPRING_ESTIMATOR_HOTTEST_C - coldest_c;
+    const float middle_c = coldest_c + 0.5f * width_k;
+    spring_estimator_forget(e, k);
+    spring_estimator_restore(e, k, &learnt);
+    begin(b, middle_c, UNIFORM_SD * width_k + TRUST_SD_K /* of ambient */, SPRING_PHASE_ANY);
+    b->hottest_c = SPRING_ESTIMATOR_HOTTEST_C;
+    spring_set_temperature(model, k, middle_c, SPRING_PHASE_MARTENSITE);
+    spring_seal(e, k);
+}
+
+static void begin_all(spring_estimator_t *e, thermal_model_t *model, bool keeps_learnt)
+{
+    e->springs = model->springs;
+    e->tick = e->turn = e->stiffness_turn = 0;
+    e->last_turn = SPRING_ESTIMATOR_NO_TURN;
+    spring_begin_shared(e);
+    e->sights.numbers = 0;
+    e->broken_seals = 0;
+    spring_seal_shared(e);
+    for (uint8_t k = 0; k < e->springs; k++) {
+        open_anew(e, k, keeps_learnt);
+    }
+    spring_estimator_prepare(e, model, true);
+    for (uint8_t k = 0; k < e->springs; k++) {
+        begin_unknown(e, model, k);
+    }
+}
+
+void spring_estimator_init(spring_estimator_t *e, thermal_model_t *model)
+{
+    begin_all(e, model, false);
 }
 
 void spring_estimator_restart(spring_estimator_t *e, thermal_model_t *model)
 {
-    const float coldest_c = spring_ambient_c(model);
-    const float width_k = SPRING_ESTIMATOR_HOTTEST_C - coldest_c;
-    e->springs = model->springs;
-    e->stepped_turns = e->stepped_spring = 0;
-    e->tick = e->turn = e->stiffness_turn = 0;
-    e->last_turn = SPRING_ESTIMATOR_NO_TURN;
-    e->sights.turn = e->sights.count = 0;
-    e->sights.numbers = 0;
-    spring_estimator_prepare(e, model, true);
-    for (uint8_t k = 0; k < e->springs; k++) {
-        const spring_learnt_t learnt = e->spring[k].learnt;
-        spring_estimator_forget(e, k);
-        spring_estimator_restore(e, k, &learnt);
-        begin(&e->spring[k], coldest_c + 0.5f * width_k,
-              UNIFORM_SD * width_k + TRUST_SD_K /* of ambient */, SPRING_PHASE_ANY);
-        e->spring[k].hottest_c = SPRING_ESTIMATOR_HOTTEST_C;
-        spring_set_temperature(model, k, coldest_c + 0.5f * width_k, SPRING_PHASE_MARTENSITE);
-    }
+    begin_all(e, model, true);
 }
 
 void spring_estimator_trust_spring(spring_estimator_t *e, const thermal_model_t *model, uint8_t k)
 {
+    if (!spring_is_sound(e, k)) {
+        return; /* its turn finds it so */
+    }
     const uint16_t austenite = thermal_model_austenite(model, k);
     begin(&e->spring[k], spring_now_c(model, k), TRUST_SD_K,
           austenite == 0                              ? SPRING_PHASE_MARTENSITE
           : austenite == THERMAL_MODEL_AUSTENITE_FULL ? SPRING_PHASE_AUSTENITE
                                                       : SPRING_PHASE_BETWEEN);
     e->spring[k].told = austenite == 0;
+    spring_open_shared(e);
     spring_note(e, model, k, SPRING_SIGHT_TOLD, &(spring_before_t){0}, 0.0f, 0.0f);
+    spring_seal_shared(e);
+    spring_seal(e, k);
 }
 
 void spring_estimator_trust_model(spring_estimator_t *e, const thermal_model_t *model)
@@ -182,9 +211,12 @@ void spring_estimator_trust_model(spring_estimator_t *e, const thermal_model_t *
 void spring_estimator_look_at_stiffness(spring_estimator_t *e, const thermal_model_t *model,
                                         uint8_t k)
 {
-    const float now_c = spring_now_c(model, k);
-    e->spring[k].declared_stiffness_w_per_k =
-        (hold_w(model, k, now_c + 8.0f) - hold_w(model, k, now_c)) * 0.125f;
+    if (spring_is_sound(e, k)) { /* else its turn finds it so */
+        const float now_c = spring_now_c(model, k);
+        e->spring[k].declared_stiffness_w_per_k =
+            (hold_w(model, k, now_c + 8.0f) - hold_w(model, k, now_c)) * 0.125f;
+        spring_seal(e, k);
+    }
 }
 
 float spring_stiffness_w_per_k(const spring_belief_t *b)
@@ -357,15 +389,21 @@ static void cool(spring_estimator_t *e, spring_belief_t *b, const thermal_model_
     }
 }
 
-static void update(spring_estimator_t *e, thermal_model_t *model, uint8_t k)
+/* In its next turn: nothing that has a seal is written in between. */
+static void end_what_was_left(spring_belief_t *b)
+{
+    if (b->left && b->heating) {
+        b->heating = b->onset = b->steep = b->unlike = false;
+        spring_begin_hold_line(b, false);
+    }
+    b->left = false;
+}
+
+static void take_turn(spring_estimator_t *e, thermal_model_t *model, uint8_t k)
 {
     spring_belief_t *b = &e->spring[k];
     const int16_t before_c7 = b->last_c7;
     b->seen = false;
-    e->stepped_turns = e->stepped_turns > 0 ? (uint16_t)(e->stepped_turns - 1) : 0;
-    if (k == 0) {
-        spring_sights_turn(&e->sights);
-    }
     const float share = spring_take_readings(e, model, k);
     const float power_w = b->reads ? b->current_a * b->current_a * b->ohm : 0.0f;
     const float heat_k = predict(e, b, model, k, power_w);
@@ -419,12 +457,31 @@ static void update(spring_estimator_t *e, thermal_model_t *model, uint8_t k)
     }
 }
 
-void spring_estimator_update(spring_estimator_t *e, thermal_model_t *model, uint8_t k)
+bool spring_estimator_update(spring_estimator_t *e, thermal_model_t *model, uint8_t k)
 {
     spring_belief_t *b = &e->spring[k];
     const int16_t before_c7 = b->last_c7;
-    update(e, model, k);
+    const bool sound = spring_is_sound(e, k);
+    spring_open_shared(e);
+    e->stepped_turns = e->stepped_turns > 0 ? (uint16_t)(e->stepped_turns - 1) : 0;
+    if (k == 0) {
+        spring_sights_turn(&e->sights);
+    }
+    if (sound) {
+        end_what_was_left(b);
+        take_turn(e, model, k);
+    } else {
+        open_anew(e, k, false);
+        spring_estimator_look_at_stiffness(e, model, k);
+        begin_unknown(e, model, k);
+        spring_count_broken(e);
+        spring_note(e, model, k, SPRING_SIGHT_ANEW, &(spring_before_t){0}, 0.0f, 0.0f);
+    }
+    b->anew = !sound;
     b->moved_c7 = (int16_t)(b->last_c7 - before_c7);
+    spring_seal(e, k);
+    spring_seal_shared(e);
+    return sound;
 }
 
 void spring_estimator_tick(spring_estimator_t *e, thermal_model_t *model,
@@ -442,7 +499,7 @@ void spring_estimator_tick(spring_estimator_t *e, thermal_model_t *model,
         return;
     }
     for (uint16_t k = e->turn; k < e->springs; k = (uint16_t)(k + SPRING_ESTIMATOR_ROUND)) {
-        spring_estimator_update(e, model, (uint8_t)k);
+        (void)spring_estimator_update(e, model, (uint8_t)k);
     }
     e->turn = (uint8_t)(e->turn + 1u < SPRING_ESTIMATOR_ROUND ? e->turn + 1u : 0u);
     if (e->turn == 0) {
@@ -552,7 +609,7 @@ void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, 
         b->current_a > STRONG_A) {
         spring_learn_austenite(b); /* hot enough, and its resistance had come to rest */
     }
-    b->heating = false;
+    b->heating = b->left = false;
     b->kept_w_per_k = 0.0f;
     b->lost = b->doubted ? 1.0f - phase : 0.0f;
     b->quiet = 0;
@@ -566,15 +623,13 @@ void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, 
         spring_note(e, model, k, SPRING_SIGHT_UNSEEN, &before, 0.0f, 0.0f);
     }
     spring_note_did(e, k, b->doubted ? SPRING_DID_HOLD | SPRING_DID_DOUBT : SPRING_DID_HOLD);
+    spring_seal(e, k);
+    spring_seal_shared(e);
 }
 
 void spring_estimator_leave(spring_estimator_t *e, uint8_t k)
 {
-    spring_belief_t *b = &e->spring[k];
-    if (b->heating) {
-        b->heating = b->onset = b->steep = b->unlike = false;
-        spring_begin_hold_line(b, false);
-    }
+    e->spring[k].left = true;
 }
 
 /* ---- what is believed ---- */

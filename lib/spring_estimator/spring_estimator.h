@@ -93,6 +93,14 @@ typedef struct {
  * declared, and the distance to it is what readings tell. shift_k is how much of that is believed
  * to be the transformation's own (a load, another batch) and not the temperature's. */
 typedef struct {
+    /* the running turn's readings: each tick writes them, so they alone have no seal
+     * (spring_seal.c) */
+    uint8_t readings;
+    uint8_t settling; /* to be left out, after a jump of the current */
+    bool cut_short;   /* there was such a jump in the running turn */
+    bool left;        /* nothing is asked of it any more: the next turn ends what ran */
+    uint16_t current_sum_ma;
+    uint16_t voltage_sum_mv;
     /* the error of that temperature: variances of what the loss explains, and of the heat capacity
      */
     float variance_k2;
@@ -116,27 +124,22 @@ typedef struct {
     uint8_t unread;     /* turns since the last that had readings fit for use, saturating */
     uint16_t unsteady;  /* turns, of all that a contact or the sensor has jumped lately */
     /* bits: of nine springs they are a good part of the RAM that is spare */
-    bool doubted : 1;   /* its last heating ended before its resistance said so */
-    bool unproven : 1;  /* it may not have transformed: what it may be hotter by has spared it heat,
-                         * or its contact came and went */
-    bool odd : 1;       /* the turn before read what no phase changes to so fast */
-    bool reads : 1;     /* the last turn had readings fit for use */
-    bool seen : 1;      /* the last turn has moved it to where it was seen */
-    bool blind : 1;     /* a heating that must have transformed it did not show */
-    bool heating : 1;   /* between spring_estimator_begin_heating and _begin_hold */
-    bool onset : 1;     /* this heating was seen to begin to transform it */
-    bool rough : 1;     /* the line is of few turns, not of a spring at rest */
-    bool steep : 1;     /* and its resistance still changes as only that explains */
-    bool cut_short : 1; /* there was a jump of the current in the running turn */
-    bool told : 1;      /* it is martensite because someone said so */
-    bool unlike : 1;    /* this heating's martensite was not of the declared resistance */
+    bool doubted : 1;  /* its last heating ended before its resistance said so */
+    bool unproven : 1; /* it may not have transformed: what it may be hotter by has spared it heat,
+                        * or its contact came and went */
+    bool odd : 1;      /* the turn before read what no phase changes to so fast */
+    bool reads : 1;    /* the last turn had readings fit for use */
+    bool anew : 1;     /* the last turn has found it changed by itself, and began it anew */
+    bool seen : 1;     /* the last turn has moved it to where it was seen */
+    bool blind : 1;    /* a heating that must have transformed it did not show */
+    bool heating : 1;  /* between spring_estimator_begin_heating and _begin_hold */
+    bool onset : 1;    /* this heating was seen to begin to transform it */
+    bool rough : 1;    /* the line is of few turns, not of a spring at rest */
+    bool steep : 1;    /* and its resistance still changes as only that explains */
+    bool told : 1;     /* it is martensite because someone said so */
+    bool unlike : 1;   /* this heating's martensite was not of the declared resistance */
     spring_learnt_t learnt;
 
-    /* the running turn's readings */
-    uint8_t readings;
-    uint8_t settling; /* to be left out, after a jump of the current */
-    uint16_t current_sum_ma;
-    uint16_t voltage_sum_mv;
     float current_a; /* of the last turn that had readings */
     float ohm;
     float ohm_before[2]; /* one and two turns earlier; 0: at another current */
@@ -172,13 +175,16 @@ typedef struct {
     float martensite_ohm;
     float change; /* declared, as in spring_learnt_t */
     spring_belief_t spring[SPRING_ESTIMATOR_MAX_SPRINGS];
-    /* what all springs share: one was found colder than anything known explains */
-    uint16_t stepped_turns; /* of all springs: for so many more it counts as lately */
-    uint8_t stepped_spring;
     uint8_t tick;           /* counts to the next that has no turn */
     uint8_t turn;           /* of the round in which each spring has one */
     uint8_t last_turn;      /* that of the last tick, or SPRING_ESTIMATOR_NO_TURN */
     uint8_t stiffness_turn; /* whose stiffness is looked at next */
+    uint16_t seal[SPRING_ESTIMATOR_MAX_SPRINGS]; /* checksums, of each belief and what is shared */
+    uint16_t shared_seal;
+    /* what all springs share: one was found colder than anything known explains */
+    uint16_t stepped_turns; /* of all springs: for so many more it counts as lately */
+    uint8_t stepped_spring;
+    uint8_t broken_seals;   /* found so far, saturating: what was believed had changed by itself */
     spring_sights_t sights; /* for whoever asks why */
 } spring_estimator_t;
 
@@ -243,8 +249,8 @@ static inline void spring_estimator_take(spring_estimator_t *estimator, uint8_t 
     }
 }
 /* Once in a turn: takes the readings, and moves the model's temperature and phase to what they say.
- */
-void spring_estimator_update(spring_estimator_t *estimator, thermal_model_t *model, uint8_t spring);
+ * False if and only if it has begun anew (spring_estimator_has_begun_anew). */
+bool spring_estimator_update(spring_estimator_t *estimator, thermal_model_t *model, uint8_t spring);
 
 /* What the spring gives off per kelvin, as the model has it by now: to be called once in some
  * seconds, in a tick that has room. */
@@ -255,7 +261,8 @@ void spring_estimator_look_at_stiffness(spring_estimator_t *estimator, const the
 
 /* The current jumps: readings on the way are left out. */
 void spring_estimator_disturb(spring_estimator_t *estimator, uint8_t spring);
-/* A heating begins: what the resistance does from here on tells of the transformation. */
+/* A heating begins: what the resistance does from here on tells of the transformation. In its turn,
+ * once that has been updated; as a hold does. */
 void spring_estimator_begin_heating(spring_estimator_t *estimator, const thermal_model_t *model,
                                     uint8_t spring);
 /* Nothing is asked of it any more, or by others: a heating that ran is over, and tells nothing. */
@@ -307,6 +314,13 @@ static inline uint8_t spring_estimator_rest_turns(const spring_belief_t *belief)
 static inline int16_t spring_estimator_moved_c7(const spring_belief_t *belief)
 {
     return belief->moved_c7;
+}
+/* Its last turn has found that what was believed of it had changed by itself, as RAM may: nothing
+ * is known of it from there, as when the power comes on, nor of its own numbers, and it is as if no
+ * heating or hold had begun. */
+static inline bool spring_estimator_has_begun_anew(const spring_belief_t *belief)
+{
+    return belief->anew;
 }
 /* Its last turn has seen it at a place of its transformation, or began anew what is compared. */
 static inline bool spring_estimator_has_just_seen(const spring_belief_t *belief)
@@ -379,6 +393,11 @@ spring_bounds_t spring_estimator_austenite(const spring_estimator_t *estimator,
  * have in common, a draught or the fan. False where fewer than two are held. O(springs). */
 bool spring_estimator_losses(const spring_estimator_t *estimator, float *factor, float *sd);
 
+/* How often that was so, of a spring or of what all share; saturating. */
+static inline uint8_t spring_estimator_broken_seals(const spring_estimator_t *estimator)
+{
+    return estimator->broken_seals;
+}
 /* The last sights of all springs: why they are believed to be where they are. */
 static inline const spring_sights_t *spring_estimator_sights(const spring_estimator_t *estimator)
 {

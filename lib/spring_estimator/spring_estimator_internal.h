@@ -102,6 +102,17 @@ void spring_keep_above(spring_estimator_t *estimator, spring_belief_t *belief,
 bool spring_open_to_step(spring_estimator_t *estimator, spring_belief_t *belief, uint8_t spring,
                          float error_k, float sd_k);
 
+/* What is believed of a spring, or shared, is as it was sealed: before it is used in a turn, and
+ * before a change of it is sealed, as else what has changed by itself would count as right.
+ * O(bytes), as is a seal. */
+bool spring_is_sound(const spring_estimator_t *estimator, uint8_t spring);
+void spring_seal(spring_estimator_t *estimator, uint8_t spring);
+/* Of what is shared: begun anew where it is not as it was sealed. */
+void spring_open_shared(spring_estimator_t *estimator);
+void spring_seal_shared(spring_estimator_t *estimator);
+void spring_begin_shared(spring_estimator_t *estimator);
+void spring_count_broken(spring_estimator_t *estimator);
+
 /* Takes the turn's readings. Returns the share of them in the average. */
 float spring_take_readings(spring_estimator_t *estimator, const thermal_model_t *model,
                            uint8_t spring);

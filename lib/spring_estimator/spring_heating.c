@@ -44,7 +44,10 @@ void spring_estimator_begin_heating(spring_estimator_t *e, const thermal_model_t
     };
     b->onset = b->steep = b->unlike = false;
     b->heating = true;
+    b->left = false;
     spring_note_did(e, k, SPRING_DID_HEAT);
+    spring_seal(e, k);
+    spring_seal_shared(e);
 }
 
 /* Where it is when its onset is seen: what a small change shows late has taken up heat by then. */
@@ -240,18 +243,6 @@ static float unexplained(const spring_belief_t *b, float change, float step_k)
     return more > 0.0f ? more : less < 0.0f ? less : 0.0f;
 }
 
-/* What it can have given off since its peak, while it waited for its turn, as it is counted: its
- * way back from its finish, and where it is below martensite start its latent heat. A peak above
- * that was none: a bit has turned over. */
-static float most_waited_k(const spring_estimator_t *e, const thermal_model_t *model, uint8_t k)
-{
-    const thermal_model_transformation_t t = thermal_model_transformation(model, k);
-    const int16_t now_c7 = thermal_model_temperature_c7(model, k);
-    const float cooled_k = spring_c((int16_t)(t.austenite_finish_c7 - now_c7));
-    const float latent_k = now_c7 < t.martensite_start_c7 ? e->latent_k : 0.0f;
-    return LEAST_LOSS * (fmaxf(cooled_k, 0.0f) + latent_k);
-}
-
 /* Change of resistance over heat, a step at a time: more than any temperature coefficient makes is
  * a transformation, whatever its sign. */
 void spring_heating_watch(spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model,
@@ -276,7 +267,6 @@ void spring_heating_watch(spring_estimator_t *e, spring_belief_t *b, thermal_mod
         b->unlike =
             b->ohm < UNLIKE_LEAST * e->martensite_ohm || b->ohm > UNLIKE_MOST * e->martensite_ohm;
     }
-    b->run.heat.peak_k = fminf(b->run.heat.peak_k, b->run.heat.heat_k + most_waited_k(e, model, k));
     if (b->run.heat.heat_k < b->run.heat.peak_k) {
         return; /* it had to wait: on the way back up nothing transforms, and that tells nothing */
     }

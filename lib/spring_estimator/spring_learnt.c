@@ -8,6 +8,9 @@
 
 void spring_estimator_forget_loss(spring_estimator_t *e, uint8_t k)
 {
+    if (!spring_is_sound(e, k)) {
+        return; /* its turn finds it so */
+    }
     spring_belief_t *b = &e->spring[k];
     const float sd = LOSS_SD * e->loss_w_per_k;
     b->learnt.loss_w_per_k = 0.0f;
@@ -15,12 +18,17 @@ void spring_estimator_forget_loss(spring_estimator_t *e, uint8_t k)
     b->loss_variance = sd * sd;
     b->covariance = 0.0f;
     b->gone_w_per_k = b->kept_w_per_k = 0.0f;
+    spring_seal(e, k);
 }
 
 void spring_estimator_forget(spring_estimator_t *e, uint8_t k)
 {
-    e->spring[k].learnt = (spring_learnt_t){.change = e->change, .slow_noise = SLOW_NOISE_FIRST};
-    spring_estimator_forget_loss(e, k);
+    if (spring_is_sound(e, k)) {
+        e->spring[k].learnt =
+            (spring_learnt_t){.change = e->change, .slow_noise = SLOW_NOISE_FIRST};
+        spring_seal(e, k);
+        spring_estimator_forget_loss(e, k);
+    }
 }
 
 void spring_estimator_restore(spring_estimator_t *e, uint8_t k, const spring_learnt_t *l)
@@ -34,9 +42,10 @@ void spring_estimator_restore(spring_estimator_t *e, uint8_t k, const spring_lea
         fabsf(l->martensite_rise_per_k) <= COEFFICIENT_MOST_PER_HEAT_K &&
         fabsf(l->offset_v) <= OFFSET_MOST_V && l->slow_noise >= 0.0f &&
         l->slow_noise <= SLOW_NOISE_MOST;
-    if (possible) {
+    if (possible && spring_is_sound(e, k)) {
         e->spring[k].learnt = *l;
         e->spring[k].loss_variance = l->loss_sd_w_per_k * l->loss_sd_w_per_k;
+        spring_seal(e, k);
     }
 }
 

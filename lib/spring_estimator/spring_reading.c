@@ -25,8 +25,6 @@ void spring_estimator_disturb(spring_estimator_t *e, uint8_t k)
     b->cut_short = true;
     b->current_sum_ma = b->voltage_sum_mv = 0;
     b->readings = 0;
-    b->quiet = 0;
-    b->ohm_before[1] = 0.0f;
 }
 
 void spring_jump(spring_belief_t *b, float by)
@@ -137,24 +135,15 @@ static float take_reading(spring_belief_t *b, float ohm, float current_a)
     return share;
 }
 
-/* An average is near what was read last: no metal's resistance doubles in 4 s. Else a bit of it has
- * turned over, and what it is compared with would be taken for a jump. */
-static void keep_average(spring_belief_t *b)
-{
-    const float last_ohm = b->ohm_before[0]; /* 0: none since a jump */
-    if (b->fresh != 0 && last_ohm > 0.0f &&
-        !(b->slow_ohm > 0.5f * last_ohm && b->slow_ohm < 2.0f * last_ohm)) {
-        b->slow_ohm = last_ohm;
-        b->averaged = 1;
-    }
-}
-
 float spring_take_readings(spring_estimator_t *e, const thermal_model_t *model, uint8_t k)
 {
     spring_belief_t *b = &e->spring[k];
     float share = SLOW_SHARE;
     b->unsteady = b->unsteady > 0 ? (uint16_t)(b->unsteady - 1) : 0;
-    keep_average(b);
+    if (b->cut_short) {
+        b->quiet = 0;
+        b->ohm_before[1] = 0.0f;
+    }
     b->reads = b->readings >= LEAST_READINGS && b->current_sum_ma >= LEAST_MEAN_MA * b->readings &&
                b->voltage_sum_mv > 0;
     if (b->reads) {

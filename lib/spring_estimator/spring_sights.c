@@ -20,12 +20,16 @@ void spring_sights_turn(spring_sights_t *sights)
     }
 }
 
-/* The oldest of the spring that has most: one that has much to tell leaves the others theirs. */
+/* The oldest of the spring that has most: one that has much to tell leaves the others theirs. One
+ * that is of no spring, as a bit of it has turned over, is missed least. */
 static uint8_t least_missed(const spring_sights_t *sights)
 {
     uint8_t of[THERMAL_MODEL_MAX_SPRINGS] = {0};
     uint8_t most = 0;
     for (uint8_t i = 0; i < sights->count; i++) {
+        if (sights->sight[i].spring >= THERMAL_MODEL_MAX_SPRINGS) {
+            return i;
+        }
         const uint8_t has = ++of[sights->sight[i].spring];
         most = has > most ? has : most;
     }

@@ -32,6 +32,7 @@ typedef enum {
     SPRING_SIGHT_LOOKED, /* nothing was known; by what was learnt its resistance tells a phase */
     SPRING_SIGHT_TOLD,   /* a hint, or what a reset has kept */
     SPRING_SIGHT_COOLED, /* nothing was known; it must have cooled by now */
+    SPRING_SIGHT_ANEW,   /* what was believed had changed by itself: nothing is known */
     SPRING_SIGHT_KINDS
 } spring_sight_kind_t;
 

@@ -18,7 +18,10 @@ bool spring_open_to_step(spring_estimator_t *e, spring_belief_t *b, uint8_t k, f
     if (opens) {
         const float step_w_per_k = STEP_OF_LOSS * e->loss_w_per_k;
         spring_belief_t *other = &e->spring[e->stepped_spring];
-        other->loss_variance = fmaxf(other->loss_variance, step_w_per_k * step_w_per_k);
+        if (spring_is_sound(e, e->stepped_spring)) { /* else its turn finds it so */
+            other->loss_variance = fmaxf(other->loss_variance, step_w_per_k * step_w_per_k);
+            spring_seal(e, e->stepped_spring);
+        }
         b->variance_k2 += error_k * error_k;
         b->covariance += STEP_LASTS * error_k * step_w_per_k;
         b->loss_variance += step_w_per_k * step_w_per_k;

@@ -32,6 +32,9 @@ static void view_spring(const controller_t *chip, unsigned k, board_view_spring_
     view->cooling_c7 = state->cooling_c7;
     view->amplitude = state->amplitude;
     view->branch = state->branch;
+    view->belief_at =
+        (uint32_t)((const uint8_t *)spring_estimator_of(&chip->estimator, (uint8_t)k) -
+                   (const uint8_t *)chip);
     view->transformation_shift_c7 = chip->model.spring[k].transformation_shift_c7;
 }
 

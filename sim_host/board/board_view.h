@@ -26,6 +26,7 @@ typedef struct {
     int16_t heating_c7, cooling_c7, transformation_shift_c7;
     uint16_t amplitude;
     uint8_t branch;
+    uint32_t belief_at; /* what is believed of it: bytes behind the symbol */
 } board_view_spring_t;
 
 typedef struct {

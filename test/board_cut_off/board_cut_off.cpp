@@ -111,6 +111,28 @@ void a_welded_switch_is_cut_at_any_moment_of_a_tick()
     std::printf("the longest: %.0f ms\n", longest_ms);
 }
 
+/* Nothing can be read, so nothing shows it. */
+void a_switch_that_welds_while_the_bus_hangs_is_cut()
+{
+    for (const bool driven : {true, false}) {
+        for (double weld_ms = 0.0; weld_ms < 100.0; weld_ms += 40.0) {
+            rig mega;
+            heat(mega);
+            if (!driven) {
+                mega.expect_ok("off all");
+                mega.run_ms(200.0);
+            }
+            const double before = hottest_c(mega);
+            board_set_fault(mega.raw(), BOARD_FAULT_SDA_LOW, 0, true);
+            mega.run_ms(weld_ms);
+            board_set_fault(mega.raw(), BOARD_FAULT_CLOSED, 4, true);
+            off_after_ms(mega, "switch closed, bus hangs", 2.0 * LIMIT_MS - weld_ms);
+            TEST_ASSERT_TRUE(hottest_c(mega) < before + 30.0);
+            TEST_ASSERT_EQUAL_INT(SAFETY_FAULT_NO_SENSOR, mega.view().board_fault);
+        }
+    }
+}
+
 /* Contacts that chatter and springs that are plugged in give no current that their duty does not.
  */
 void a_spring_that_is_plugged_in_leaves_the_supply()
@@ -246,6 +268,7 @@ int main()
     UNITY_BEGIN();
     RUN_TEST(a_welded_switch_heats_until_the_supply_is_off);
     RUN_TEST(a_welded_switch_is_cut_at_any_moment_of_a_tick);
+    RUN_TEST(a_switch_that_welds_while_the_bus_hangs_is_cut);
     RUN_TEST(a_spring_that_is_plugged_in_leaves_the_supply);
     RUN_TEST(a_program_that_hangs_holds_nothing);
     RUN_TEST(what_stops_its_pulses_stops_the_supply);

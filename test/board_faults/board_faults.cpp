@@ -234,17 +234,37 @@ void a_stuck_bus_switches_everything_off_without_missing_the_watchdog()
     TEST_ASSERT_EQUAL_UINT(0, board_reset_count(mega->raw()));
     TEST_ASSERT_TRUE(board_all_off(mega->raw()));
     TEST_ASSERT_EQUAL_INT(SAFETY_FAULT_SENSOR_BUS, mega->view().spring[0].fault);
+    const std::string text = mega->say("faults");
+    TEST_ASSERT_TRUE_MESSAGE(contains(text, "board: fault 17 no_sensor: cut the supply\r\n"),
+                             text.c_str());
 }
 
+/* For a moment, from any place of a tick on, nothing comes of it; for longer the supply is off, and
+ * it is for whoever clears it to switch it on. */
 void the_bus_comes_back_when_it_is_released()
 {
     auto mega = driven();
+    for (double at_ms = 0.0; at_ms < 20.0; at_ms += 3.0) {
+        board_set_fault(mega->raw(), BOARD_FAULT_SDA_LOW, 0, true);
+        mega->run_ms(60.0 + at_ms);
+        board_set_fault(mega->raw(), BOARD_FAULT_SDA_LOW, 0, false);
+        mega->run_ms(600.0);
+        only(*mega, BOARD_CHANNELS, SAFETY_FAULT_NONE);
+        TEST_ASSERT_TRUE(board_is_fed(mega->raw()));
+    }
     board_set_fault(mega->raw(), BOARD_FAULT_SDA_LOW, 0, true);
     mega->run_ms(500.0);
+    TEST_ASSERT_FALSE(board_is_fed(mega->raw()));
+    mega->expect_ok("clear");
+    mega->run_ms(150.0);
+    TEST_ASSERT_EQUAL_STRING("error:11", mega->answer("supply on").substr(0, 8).c_str());
     board_set_fault(mega->raw(), BOARD_FAULT_SDA_LOW, 0, false);
     mega->run_ms(500.0);
+    TEST_ASSERT_FALSE(board_is_fed(mega->raw()));
     mega->board.take_output();
     mega->expect_ok("clear");
+    mega->expect_ok("supply on");
+    mega->run_ms(100.0);
     mega->expect_ok("on all");
     mega->run_ms(600.0);
     only(*mega, BOARD_CHANNELS, SAFETY_FAULT_NONE);

@@ -163,6 +163,30 @@ void a_setting_that_turns_over_by_itself_ends_in_a_reset_that_says_so()
     }
 }
 
+/* A bit of what is believed of a spring: no reset, the others go on, and this one waits until it
+ * cannot be hot. */
+void a_belief_that_turns_over_by_itself_begins_anew_and_says_so()
+{
+    rig mega;
+    heat(mega);
+    mega.expect_ok("policy precompensate");
+    mega.run_ms(2000.0);
+    const std::uint32_t at = mega.view().spring[4].belief_at;
+    auto *const bytes =
+        const_cast<std::uint8_t *>(board_variable(mega.raw(), "controller", nullptr));
+    TEST_ASSERT_NOT_NULL(bytes);
+    bytes[at + 100] ^= 0x20U;
+    mega.run_ms(600.0); /* two turns */
+    TEST_ASSERT_EQUAL_UINT(0, board_reset_count(mega.raw()));
+    TEST_ASSERT_BITS_HIGH(DRIVE_POLICY_LIMIT_COOLING, mega.view().spring[4].limits);
+    TEST_ASSERT_EQUAL_UINT16(0, mega.view().spring[4].target_ma);
+    TEST_ASSERT_TRUE(mega.view().spring[0].target_ma > 0);
+    const std::string why = mega.say("why 5");
+    TEST_ASSERT_TRUE_MESSAGE(contains(why, "had changed by itself: it begins anew"), why.c_str());
+    const std::string version = mega.say("version");
+    TEST_ASSERT_TRUE_MESSAGE(contains(version, "in what was believed: 1, "), version.c_str());
+}
+
 void a_brown_out_leaves_the_board_locked()
 {
     rig mega;
@@ -262,6 +286,7 @@ int main()
     RUN_TEST(an_interrupt_that_nobody_has_ends_as_a_hang_does);
     RUN_TEST(whatever_bit_turns_over_the_board_answers_and_nothing_stays_hot);
     RUN_TEST(a_setting_that_turns_over_by_itself_ends_in_a_reset_that_says_so);
+    RUN_TEST(a_belief_that_turns_over_by_itself_begins_anew_and_says_so);
     RUN_TEST(a_brown_out_leaves_the_board_locked);
     RUN_TEST(the_reset_button_keeps_the_models_temperatures);
     RUN_TEST(a_watchdog_reset_keeps_the_models_temperatures);

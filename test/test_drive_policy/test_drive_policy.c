@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "small_array.h"
+#include "spring_estimator_internal.h"
 #include "unity.h"
 
 #define RESERVED_MA   14800u /* supply 15 A less the default reserve */
@@ -19,7 +20,10 @@ void setUp(void)
     set_defaults();
 }
 
-void tearDown(void) {}
+void tearDown(void)
+{
+    TEST_ASSERT_EQUAL_UINT8(0, spring_estimator_broken_seals(&belief));
+}
 
 static void want_all(uint16_t permille)
 {
@@ -127,6 +131,27 @@ static void spring_that_has_lost_its_phase_is_heated_back_or_that_is_said(void)
     }
 }
 
+/* What is believed of it has changed by itself: as after power-on it waits, whatever it did. */
+static void spring_of_which_nothing_is_known_any_more_waits_and_is_heated_anew(void)
+{
+    for (double at_s = 6.0; at_s < 200.0; at_s += 97.0) { /* heated, held */
+        begin_cold(1, 2);
+        level[0] = 1000;
+        (void)run(at_s);
+        belief_inside(&belief, 0)->slow_ohm *= 2.0f;
+        (void)run(1.0);
+        TEST_ASSERT_EQUAL_UINT8(1, spring_estimator_broken_seals(&belief));
+        TEST_ASSERT_EQUAL_UINT16(0, target_ma[0]);
+        TEST_ASSERT_EQUAL_UINT16(DRIVE_POLICY_LIMIT_COOLING, drive_policy_limits(&policy, 0));
+        const double highest_c = run(209.0);
+        (void)snprintf(where, sizeof where, "%.0f s: %.3f, highest %.1f", at_s, truth[0].austenite,
+                       highest_c);
+        TEST_ASSERT_TRUE_MESSAGE(truth[0].austenite > 0.95 && highest_c < 115.0, where);
+        TEST_ASSERT_EQUAL_UINT16(0, drive_policy_limits(&policy, 0));
+    }
+    begin_cold(1, 2);
+}
+
 static void resistance_without_a_change_is_driven_by_the_model_and_said(void)
 {
     begin_cold(1, 2);
@@ -190,11 +215,13 @@ static void spring_whose_distance_is_lost_is_said_to_be_away(void)
     TEST_ASSERT_BITS_LOW(DRIVE_POLICY_LIMIT_AWAY, drive_policy_limits(&policy, 0));
     for (double s = 0.0; s < 16.0; s += TICK_S) {
         belief_inside(&belief, 0)->variance_k2 = 81.0f;
+        spring_seal(&belief, 0);
         (void)tick();
     }
     TEST_ASSERT_BITS_HIGH(DRIVE_POLICY_LIMIT_AWAY, drive_policy_limits(&policy, 0));
     for (double s = 0.0; s < 1.0; s += TICK_S) {
         belief_inside(&belief, 0)->variance_k2 = 49.0f; /* the near miss */
+        spring_seal(&belief, 0);
         (void)tick();
     }
     TEST_ASSERT_BITS_LOW(DRIVE_POLICY_LIMIT_AWAY, drive_policy_limits(&policy, 0));
@@ -213,6 +240,7 @@ static unsigned heatings_in_vain(double seconds)
         if (!heats &&
             spring_estimator_possible(spring_estimator_of(&belief, 0)) == SPRING_PHASE_AUSTENITE) {
             belief_inside(&belief, 0)->lost = 0.5f;
+            spring_seal(&belief, 0);
         }
     }
     return begun;
@@ -240,6 +268,7 @@ static void tries_that_bring_it_back_are_not_counted(void)
     (void)run(120.0);
     for (unsigned n = 0; n < 8; n++) {
         belief_inside(&belief, 0)->lost = 0.05f;
+        spring_seal(&belief, 0);
         (void)run(1.0);
         TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_HEAT, drive_policy_stage(&policy, 0));
         (void)run(60.0);
@@ -404,6 +433,7 @@ static void spring_that_may_be_hotter_is_derated_by_that(void)
     believe(0, 80, false);
     for (unsigned n = 0; n < 2; n++) {
         belief_inside(&belief, 0)->gone_k = n == 0 ? 6.9f : 12.0f; /* counted as 2 and 7 K */
+        spring_seal(&belief, 0);
         decisions(2u * TURN_TICKS);
         TEST_ASSERT_UINT16_WITHIN(60, n == 0 ? FULL_BOOST_MA : FULL_BOOST_MA / 2, target_ma[0]);
         TEST_ASSERT_EQUAL(n == 1,
@@ -423,6 +453,7 @@ static void limited_heating_ends_where_it_may_be_hot_enough(void)
         believe(0, 85, false);
         for (unsigned turn = 0; turn < 40; turn++) { /* until its rise has worn off */
             belief_inside(&belief, 0)->gone_k = n == 0 ? 11.0f : 15.0f;
+            spring_seal(&belief, 0);
             decisions(TURN_TICKS);
         }
         TEST_ASSERT_EQUAL(n == 0 ? DRIVE_POLICY_STAGE_HEAT : DRIVE_POLICY_STAGE_HOLD,
@@ -600,6 +631,7 @@ int main(void)
     RUN_TEST(jump_of_the_current_forgets_no_phase);
     RUN_TEST(spring_that_had_to_wait_half_transformed_goes_on_to_the_end);
     RUN_TEST(spring_that_has_lost_its_phase_is_heated_back_or_that_is_said);
+    RUN_TEST(spring_of_which_nothing_is_known_any_more_waits_and_is_heated_anew);
     RUN_TEST(resistance_without_a_change_is_driven_by_the_model_and_said);
     RUN_TEST(level_is_held);
     RUN_TEST(levels_one_after_the_other_are_held);

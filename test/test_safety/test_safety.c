@@ -37,6 +37,13 @@ static void ticks(uint8_t spring, const safety_sample_t *sample, uint32_t count)
     }
 }
 
+/* All springs off and read, and so much flows in all. */
+static void ends_with(uint32_t sum_ma)
+{
+    (void)safety_tick_spring(&safety, 0, &off);
+    safety_tick_board(&safety, sum_ma);
+}
+
 /* The sample trips this fault, in the tick that it must, and neither a pause nor another spring is
  * in it. */
 static void trips(safety_fault_t fault, const safety_sample_t *sample)
@@ -184,7 +191,7 @@ static void the_first_fault_is_kept(void)
     TEST_ASSERT_EQUAL(SAFETY_FAULT_SHORT_SPRING, safety_fault(&safety, 4));
     safety_emergency_stop(&safety);
     for (int n = 0; n < 10; n++) {
-        safety_tick_board(&safety, 20000);
+        ends_with(20000);
     }
     TEST_ASSERT_EQUAL(SAFETY_FAULT_EMERGENCY_STOP, safety_board_fault(&safety));
 }
@@ -192,11 +199,11 @@ static void the_first_fault_is_kept(void)
 static void sum_above_the_supply_trips_everything(void)
 {
     for (uint8_t n = 0; n < 100; n++) {
-        safety_tick_board(&safety, 15000);
+        ends_with(15000);
     }
     for (uint8_t n = 0; n < parameters.bad_samples; n++) {
         TEST_ASSERT_TRUE(safety_allows(&safety, 0));
-        safety_tick_board(&safety, 15001);
+        ends_with(15001);
     }
     TEST_ASSERT_EQUAL(SAFETY_FAULT_SUPPLY_CURRENT, safety_board_fault(&safety));
     TEST_ASSERT_FALSE(safety_allows(&safety, 0));
@@ -549,17 +556,66 @@ static void the_supply_is_cut_where_nothing_else_helps(void)
     TEST_ASSERT_TRUE(safety_cuts_supply(&safety));
 }
 
+static void unread(uint8_t status, uint8_t but, uint32_t count)
+{
+    const safety_sample_t silent = {
+        .off = true, .sensor_status = status, .temperature_c7 = 20 * 128};
+    for (uint32_t n = 0; n < count; n++) {
+        for (uint8_t k = 0; k < 9; k++) {
+            (void)safety_tick_spring(&safety, k, k == but ? &off : &silent);
+        }
+        safety_tick_board(&safety, 0);
+    }
+}
+
+/* Where no sensor acknowledges, or the bus hangs, no reading shows that current is off. One that
+ * answers at all is enough: each switch has another sensor, but the bus is there. Whatever a fault
+ * takes to be one, and whatever was latched before. */
+static void supply_that_no_sensor_watches_is_cut(void)
+{
+    enum { NOBODY = 255, ABSENT = 1, HANGS = 2, STALE = 3, RESET = 4 };
+    for (uint8_t samples = 1; samples < 250; samples = (uint8_t)(samples + 83u)) {
+        for (uint8_t status = ABSENT; status <= RESET; status++) {
+            parameters.bad_samples = samples;
+            TEST_ASSERT_TRUE(safety_init(&safety, &parameters, 9, NULL));
+            const bool cuts = status <= HANGS;
+            for (int times = 0; times < 2; times++) {
+                unread(status, NOBODY, SAFETY_BLIND_TICKS - 1u);
+                TEST_ASSERT_FALSE(safety_cuts_supply(&safety));
+                unread(status, 8, 1); /* freed: counted anew */
+            }
+            unread(status, 8, 300);
+            TEST_ASSERT_FALSE(safety_cuts_supply(&safety));
+            TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, safety_board_fault(&safety));
+            unread(status, NOBODY, 300);
+            TEST_ASSERT_EQUAL(cuts, safety_cuts_supply(&safety));
+            TEST_ASSERT_EQUAL(cuts ? SAFETY_FAULT_NO_SENSOR : SAFETY_FAULT_NONE,
+                              safety_board_fault(&safety));
+            safety_clear(&safety);
+            TEST_ASSERT_FALSE(safety_cuts_supply(&safety));
+            safety_emergency_stop(&safety);
+            unread(status, NOBODY, SAFETY_BLIND_TICKS - 1u);
+            TEST_ASSERT_FALSE(safety_cuts_supply(&safety));
+            unread(status, NOBODY, 1);
+            TEST_ASSERT_EQUAL(cuts, safety_cuts_supply(&safety));
+            TEST_ASSERT_EQUAL(SAFETY_FAULT_EMERGENCY_STOP, safety_board_fault(&safety));
+            unread(status, 0, 1); /* whoever switches it on again can */
+            TEST_ASSERT_FALSE(safety_cuts_supply(&safety));
+        }
+    }
+}
+
 /* Every count is of ticks in a row: a good one, and clear, begin it anew. */
 static void a_good_tick_and_clear_begin_every_count_anew(void)
 {
     const uint8_t almost = (uint8_t)(parameters.bad_samples - 1u);
     for (int round = 0; round < 4; round++) {
         for (uint8_t n = 0; n < almost; n++) {
-            safety_tick_board(&safety, 15001);
+            ends_with(15001);
         }
         TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, safety_board_fault(&safety));
         if (round < 2) {
-            safety_tick_board(&safety, 15000);
+            ends_with(15000);
         } else {
             safety_clear(&safety);
         }
@@ -664,6 +720,7 @@ int main(void)
     RUN_TEST(every_fault_has_a_name_of_its_own);
     RUN_TEST(parameters_that_do_not_fit_are_refused_and_found);
     RUN_TEST(the_supply_is_cut_where_nothing_else_helps);
+    RUN_TEST(supply_that_no_sensor_watches_is_cut);
     RUN_TEST(a_good_tick_and_clear_begin_every_count_anew);
     RUN_TEST(a_sensor_that_moved_once_is_not_frozen);
     RUN_TEST(limits_are_as_they_are_written);

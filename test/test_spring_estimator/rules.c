@@ -1,0 +1,324 @@
+#include "rules.h"
+
+#include <math.h>
+#include <stddef.h>
+#include <stdio.h>
+
+#include "one_spring.h"
+#include "spring_estimator_internal.h"
+#include "unity.h"
+
+#define SPRINGS     3
+#define ROWS(table) (sizeof(table) / sizeof((table)[0]))
+
+static void row(size_t n)
+{
+    (void)snprintf(where, sizeof where, "row %u", (unsigned)n);
+}
+
+/* Several springs, all known to be cold. */
+static void begin_three(void)
+{
+    thermal_model_parameters_t p;
+    thermal_model_parameters_default(&p);
+    p.rows = 1;
+    p.columns = SPRINGS;
+    (void)thermal_model_init(&model, &p, NULL);
+    spring_estimator_init(&estimator, &model);
+    thermal_model_reset(&model, 20 * 128);
+    spring_estimator_trust_model(&estimator, &model);
+}
+
+/* ---- heat that is enough whatever is read: what bounds a heating that shows nothing ---- */
+
+static void heat_of_the_coldest_and_heaviest_spring_ends_a_heating(void)
+{
+    const float latent_k = 8.65f / 0.3f;
+    const struct {
+        float begun_c, missing;
+        bool onset;
+        uint8_t possible;
+        float most_k;
+    } table[] = {
+        {20.0f, 1.0f, false, SPRING_PHASE_MARTENSITE, 1.25f * (98.0f + 8.0f - 20.0f)},
+        {20.0f, 1.0f, true, SPRING_PHASE_BETWEEN, 1.25f * (98.0f + 8.0f - 20.0f + latent_k)},
+        {60.0f, 0.5f, true, SPRING_PHASE_BETWEEN, 1.25f * (98.0f + 8.0f - 60.0f + 0.5f * latent_k)},
+        {60.0f, 0.5f, true, SPRING_PHASE_BETWEEN | SPRING_PHASE_AUSTENITE,
+         1.25f * (98.0f - 60.0f + 0.5f * latent_k)},
+    };
+    for (size_t n = 0; n < ROWS(table); n++) {
+        row(n);
+        INSIDE.run.heat =
+            (spring_heat_t){.begun_c = table[n].begun_c, .begun_missing = table[n].missing};
+        INSIDE.onset = table[n].onset;
+        INSIDE.possible = table[n].possible;
+        INSIDE.run.heat.heat_k = table[n].most_k - 0.1f;
+        TEST_ASSERT_FALSE_MESSAGE(spring_heated_enough(&estimator, &INSIDE, &model, 0), where);
+        INSIDE.run.heat.heat_k = table[n].most_k + 0.1f;
+        TEST_ASSERT_TRUE_MESSAGE(spring_heated_enough(&estimator, &INSIDE, &model, 0), where);
+    }
+}
+
+/* ---- what is read against what it read when it had transformed last ---- */
+
+/* A heated spring that read 0.2 ohm then, a fifth more than its martensite. */
+static void begin_heated(float temperature_c, float change, float ohm)
+{
+    begin_cold();
+    thermal_model_set_temperature(&model, 0, (int16_t)(temperature_c * 128.0f));
+    INSIDE.learnt.austenite_ohm = 0.2f;
+    INSIDE.learnt.change = change;
+    INSIDE.fresh = 9;
+    INSIDE.reads = true;
+    INSIDE.heating = true;
+    INSIDE.possible = SPRING_PHASE_BETWEEN;
+    INSIDE.noise = 0.001f;
+    INSIDE.current_a = 3.0f;
+    INSIDE.ohm = INSIDE.ohm_before[0] = INSIDE.ohm_before[1] = ohm;
+}
+
+static void phase_is_missing_beyond_what_steps_noise_and_coefficient_explain(void)
+{
+    static const struct {
+        float temperature_c, change, less;
+        bool lacks;
+    } table[] = {
+        {98.0f, 0.2f, 0.0079f, false},  {98.0f, 0.2f, 0.0081f, true},
+        {90.0f, 0.2f, 0.0199f, false},  {90.0f, 0.2f, 0.0201f, true},
+        {106.0f, 0.2f, 0.0199f, false}, {98.0f, 0.2f, -0.1f, false},
+        {98.0f, -0.2f, -0.0081f, true}, {98.0f, -0.2f, -0.0079f, false},
+        {98.0f, -0.2f, 0.1f, false},
+    };
+    for (size_t n = 0; n < ROWS(table); n++) {
+        row(n);
+        begin_heated(table[n].temperature_c, table[n].change, 0.2f * (1.0f - table[n].less));
+        TEST_ASSERT_EQUAL_MESSAGE(table[n].lacks, spring_estimator_lacks_phase(&INSIDE, &model, 0),
+                                  where);
+        INSIDE.current_a = 0.79f; /* too weak to tell */
+        TEST_ASSERT_FALSE_MESSAGE(spring_estimator_lacks_phase(&INSIDE, &model, 0), where);
+    }
+}
+
+/* From austenite start on. What had gone the other way is back at half of it, from where on it says
+ * nothing; its austenite is then what it reads less than by more than a coefficient makes. */
+static void heating_is_over_where_its_austenite_is_read_twice(void)
+{
+    static const struct {
+        float temperature_c, change, ohm, before_ohm, gone;
+        bool over;
+    } table[] = {
+        {89.0f, 0.2f, 0.201f, 0.2f, 0.0f, true},     {89.0f, 0.2f, 0.199f, 0.2f, 0.0f, false},
+        {87.0f, 0.2f, 0.201f, 0.2f, 0.0f, false},    {89.0f, 0.2f, 0.201f, 0.0f, 0.0f, false},
+        {89.0f, 0.2f, 0.201f, 0.198f, 0.0f, false},  {89.0f, -0.2f, 0.199f, 0.198f, 0.0f, false},
+        {89.0f, -0.2f, 0.197f, 0.196f, 0.0f, true},  {89.0f, 0.2f, 0.207f, 0.207f, 0.05f, true},
+        {89.0f, 0.2f, 0.204f, 0.204f, 0.05f, false}, {89.0f, 0.2f, 0.196f, 0.196f, 0.05f, true},
+    };
+    for (size_t n = 0; n < ROWS(table); n++) {
+        row(n);
+        begin_heated(table[n].temperature_c, table[n].change, table[n].ohm);
+        INSIDE.ohm_before[1] = table[n].before_ohm;
+        INSIDE.gone = table[n].gone;
+        INSIDE.full_ohm = table[n].gone != 0.0f ? 0.2f : 0.0f;
+        INSIDE.steep = true; /* by nothing else */
+        TEST_ASSERT_EQUAL_MESSAGE(table[n].over,
+                                  spring_estimator_has_transformed(&estimator, &model, 0), where);
+    }
+}
+
+/* ---- what all springs share ---- */
+
+static void losses_are_those_that_held_springs_have_in_common(void)
+{
+    static const struct {
+        float more[SPRINGS], sd[SPRINGS]; /* of the declared loss */
+        bool held[SPRINGS];
+        bool known;
+        float factor, factor_sd;
+    } table[] = {
+        {{0.2f, 0.3f, 0.9f}, {0.1f, 0.1f, 0.1f}, {true, true, false}, true, 1.25f, 0.1f},
+        {{0.2f, 0.3f, 0.0f}, {0.1f, 0.2f, 0.1f}, {true, true, false}, true, 1.22f, 0.12649f},
+        {{-0.3f, 0.3f, 0.0f}, {0.01f, 0.01f, 0.01f}, {true, true, true}, true, 1.0f, 0.17321f},
+        {{0.2f, 0.2f, 0.2f}, {0.1f, 0.1f, 0.1f}, {false, false, true}, false, 0.0f, 0.0f},
+        {{0.2f, 0.2f, 0.2f}, {0.1f, 0.0f, 0.1f}, {true, true, false}, false, 0.0f, 0.0f},
+    };
+    for (size_t n = 0; n < ROWS(table); n++) {
+        begin_three();
+        for (uint8_t k = 0; k < SPRINGS; k++) {
+            spring_belief_t *const b = &estimator.spring[k];
+            const float sd = table[n].sd[k] * estimator.loss_w_per_k;
+            b->possible = table[n].held[k] ? SPRING_PHASE_AUSTENITE : SPRING_PHASE_BETWEEN;
+            b->fresh = 1;
+            b->learnt.loss_w_per_k = table[n].more[k] * estimator.loss_w_per_k;
+            b->loss_variance = sd * sd;
+        }
+        float factor = 0.0f, sd = 0.0f;
+        row(n);
+        TEST_ASSERT_EQUAL_MESSAGE(table[n].known, spring_estimator_losses(&estimator, &factor, &sd),
+                                  where);
+        TEST_ASSERT_FLOAT_WITHIN_MESSAGE(1e-4f, table[n].factor, factor, where);
+        TEST_ASSERT_FLOAT_WITHIN_MESSAGE(1e-4f, table[n].factor_sd, sd, where);
+    }
+}
+
+/* Colder than two standard deviations of what is known, two springs within a minute: both losses
+ * are opened by a fifth of the declared one. */
+static void two_springs_that_are_found_colder_are_a_step(void)
+{
+    static const struct {
+        float error_k; /* of the second, known to 3 and seen to 4 K */
+        uint8_t second;
+        unsigned turns_between;
+        bool opens;
+    } table[] = {{-10.1f, 1, 0, true},  {-9.9f, 1, 0, false},  {10.1f, 1, 0, false},
+                 {-10.1f, 0, 0, false}, {-10.1f, 1, 79, true}, {-10.1f, 1, 80, false}};
+    for (size_t n = 0; n < ROWS(table); n++) {
+        begin_three();
+        row(n);
+        for (uint8_t k = 0; k < 2; k++) {
+            estimator.spring[k].variance_k2 = 9.0f;
+            estimator.spring[k].capacity_k = 0.0f;
+            estimator.spring[k].loss_variance = 0.0f;
+            spring_seal(&estimator, k);
+        }
+        TEST_ASSERT_FALSE(spring_open_to_step(&estimator, &estimator.spring[0], 0, -10.1f, 4.0f));
+        estimator.stepped_turns = (uint16_t)(estimator.stepped_turns - 9u * table[n].turns_between);
+        const uint8_t k = table[n].second;
+        spring_belief_t *const b = &estimator.spring[k];
+        TEST_ASSERT_EQUAL_MESSAGE(
+            table[n].opens, spring_open_to_step(&estimator, b, k, table[n].error_k, 4.0f), where);
+        const float sd = 0.2f * estimator.loss_w_per_k;
+        const float variance = table[n].opens ? sd * sd : 0.0f;
+        TEST_ASSERT_FLOAT_WITHIN_MESSAGE(1e-9f, variance, estimator.spring[0].loss_variance, where);
+        TEST_ASSERT_FLOAT_WITHIN_MESSAGE(1e-9f, variance, estimator.spring[1].loss_variance, where);
+        TEST_ASSERT_FLOAT_WITHIN_MESSAGE(
+            1e-6f, table[n].opens ? 0.8f * table[n].error_k * sd : 0.0f, b->covariance, where);
+        TEST_ASSERT_TRUE_MESSAGE(spring_is_sound(&estimator, 0) || k == 0, where);
+    }
+}
+
+/* ---- what is believed of one ---- */
+
+static void upper_bound_has_what_lost_phase_may_hide(void)
+{
+    static const float gone_k[] = {-3.0f, 0.0f, 0.5f, 12.0f};
+    const float high_c = spring_estimator_temperature_c(&estimator, &model, 0).high;
+    for (size_t n = 0; n < ROWS(gone_k); n++) {
+        INSIDE.gone_k = gone_k[n];
+        TEST_ASSERT_FLOAT_WITHIN(1e-3f, high_c + fmaxf(gone_k[n], 0.0f),
+                                 spring_estimator_temperature_c(&estimator, &model, 0).high);
+    }
+}
+
+static void phase_is_told_by_the_best_that_there_is(void)
+{
+    static const struct {
+        uint8_t possible;
+        bool reads, blind;
+        float austenite_ohm, martensite_ohm;
+        float value, sd;
+    } table[] = {
+        {SPRING_PHASE_AUSTENITE, true, false, 0.22f, 0.176f, 0.9f, 0.02f}, /* by what was lost */
+        {SPRING_PHASE_AUSTENITE, true, true, 0.22f, 0.176f, 0.9f, 0.3f},
+        {SPRING_PHASE_BETWEEN, true, false, 0.22f, 0.176f, 0.5f, 0.08f},
+        {SPRING_PHASE_BETWEEN, true, false, 0.0f, 0.176f, 0.556f, 0.12f},
+        {SPRING_PHASE_BETWEEN, true, false, 0.0f, 0.0f, 0.0f, 0.3f}, /* by the model: cold */
+        {SPRING_PHASE_BETWEEN, false, false, 0.22f, 0.176f, 0.0f, 0.3f},
+        {SPRING_PHASE_MARTENSITE, true, false, 0.22f, 0.176f, 0.0f, 0.02f},
+    };
+    for (size_t n = 0; n < ROWS(table); n++) {
+        begin_cold();
+        row(n);
+        INSIDE.possible = table[n].possible;
+        INSIDE.reads = table[n].reads;
+        INSIDE.blind = table[n].blind;
+        INSIDE.lost = 0.1f;
+        INSIDE.phase_ohm = 0.198f;
+        INSIDE.learnt = (spring_learnt_t){.austenite_ohm = table[n].austenite_ohm,
+                                          .martensite_ohm = table[n].martensite_ohm,
+                                          .change = 0.2f};
+        const spring_bounds_t is = spring_estimator_austenite(&estimator, &model, 0);
+        TEST_ASSERT_FLOAT_WITHIN_MESSAGE(1e-3f, table[n].value, is.value, where);
+        TEST_ASSERT_FLOAT_WITHIN_MESSAGE(1e-3f, fmaxf(table[n].value - 2.6f * table[n].sd, 0.0f),
+                                         is.low, where);
+        TEST_ASSERT_FLOAT_WITHIN_MESSAGE(1e-3f, fminf(table[n].value + 2.6f * table[n].sd, 1.0f),
+                                         is.high, where);
+    }
+}
+
+/* A contact's step: the spring is what it was, so all that it is compared with steps along. */
+static void all_that_is_compared_with_jumps_along(void)
+{
+    for (int heating = 0; heating < 2; heating++) {
+        begin_cold();
+        float *const both[] = {&INSIDE.slow_ohm, &INSIDE.full_ohm, &INSIDE.learnt.austenite_ohm,
+                               &INSIDE.learnt.martensite_ohm};
+        float *const heat[] = {&INSIDE.run.heat.mark_ohm, &INSIDE.run.heat.onset_ohm,
+                               &INSIDE.run.heat.cold_ohm};
+        float *const line[] = {&INSIDE.run.line.ohm, &INSIDE.run.line.from_ohm};
+        float *const *const own = heating != 0 ? heat : line;
+        const size_t owned = heating != 0 ? ROWS(heat) : ROWS(line);
+        INSIDE.heating = heating != 0;
+        for (size_t n = 0; n < ROWS(both) + owned; n++) {
+            *(n < ROWS(both) ? both[n] : own[n - ROWS(both)]) = 0.2f;
+        }
+        spring_jump(&INSIDE, 1.1f);
+        for (size_t n = 0; n < ROWS(both) + owned; n++) {
+            row(n);
+            TEST_ASSERT_FLOAT_WITHIN_MESSAGE(
+                1e-5f, 0.22f, *(n < ROWS(both) ? both[n] : own[n - ROWS(both)]), where);
+        }
+    }
+}
+
+/* What is declared stands in for a change that is not learnt, and for no other. */
+static void declared_change_stands_in_until_one_is_learnt(void)
+{
+    for (int learnt = 0; learnt < 2; learnt++) {
+        begin_cold();
+        INSIDE.learnt.austenite_ohm = learnt != 0 ? 0.22f : 0.0f;
+        INSIDE.learnt.change = 0.1f;
+        spring_seal(&estimator, 0);
+        model.parameters.resistance_martensite_uohm = 150000;
+        model.parameters.resistance_austenite_uohm = 200000;
+        spring_estimator_prepare(&estimator, &model, true);
+        TEST_ASSERT_FLOAT_WITHIN(1e-6f, learnt != 0 ? 0.1f : 0.25f, INSIDE.learnt.change);
+    }
+}
+
+static void disturbance_is_forgotten_and_loss_is_known_less_and_less(void)
+{
+    INSIDE.disturbance_k = 10.0f;
+    INSIDE.loss_variance = 0.0f;
+    spring_seal(&estimator, 0);
+    for (unsigned n = 0; n < 4800; n++) { /* 20 minutes, without a current */
+        TEST_ASSERT_TRUE(spring_estimator_update(&estimator, &model, 0));
+    }
+    TEST_ASSERT_FLOAT_WITHIN(0.1f, 10.0f * expf(-0.96f), INSIDE.disturbance_k);
+    const float sd = 0.0005f * sqrtf(1200.0f); /* of the declared loss */
+    TEST_ASSERT_FLOAT_WITHIN(0.02f * sd, sd, sqrtf(INSIDE.loss_variance) / estimator.loss_w_per_k);
+}
+
+static void temperature_that_no_model_holds_is_its_nearest(void)
+{
+    static const float wanted_c[] = {-100.0f, -39.0f, 214.0f, 500.0f};
+    static const float is_c[] = {-40.0f, -39.0f, 214.0f, 215.0f};
+    for (size_t n = 0; n < ROWS(is_c); n++) {
+        spring_set_temperature(&model, 0, wanted_c[n], SPRING_PHASE_MARTENSITE);
+        TEST_ASSERT_FLOAT_WITHIN(0.02f, is_c[n], spring_now_c(&model, 0));
+    }
+}
+
+void run_rules(void)
+{
+    RUN_TEST(heat_of_the_coldest_and_heaviest_spring_ends_a_heating);
+    RUN_TEST(phase_is_missing_beyond_what_steps_noise_and_coefficient_explain);
+    RUN_TEST(heating_is_over_where_its_austenite_is_read_twice);
+    RUN_TEST(losses_are_those_that_held_springs_have_in_common);
+    RUN_TEST(two_springs_that_are_found_colder_are_a_step);
+    RUN_TEST(upper_bound_has_what_lost_phase_may_hide);
+    RUN_TEST(phase_is_told_by_the_best_that_there_is);
+    RUN_TEST(all_that_is_compared_with_jumps_along);
+    RUN_TEST(declared_change_stands_in_until_one_is_learnt);
+    RUN_TEST(disturbance_is_forgotten_and_loss_is_known_less_and_less);
+    RUN_TEST(temperature_that_no_model_holds_is_its_nearest);
+}

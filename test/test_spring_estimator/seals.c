@@ -1,0 +1,150 @@
+#include "seals.h"
+
+#include <stddef.h>
+#include <stdio.h>
+
+#include "one_spring.h"
+#include "sights.h"
+#include "unity.h"
+
+static spring_estimator_t sound;
+static thermal_model_t sound_model;
+
+static void keep_sound(void)
+{
+    sound = estimator;
+    sound_model = model;
+}
+
+/* As it was kept, but for one bit. */
+static void turn_over(size_t at, unsigned bit)
+{
+    estimator = sound;
+    model = sound_model;
+    ((uint8_t *)&estimator)[at] ^= (uint8_t)(1u << bit);
+    (void)snprintf(where, sizeof where, "byte %u, bit %u", (unsigned)at, bit);
+}
+
+static void expect_begun_anew(void)
+{
+    TEST_ASSERT_FALSE_MESSAGE(spring_estimator_update(&estimator, &model, 0), where);
+    TEST_ASSERT_EQUAL_UINT8_MESSAGE(SPRING_PHASE_ANY, INSIDE.possible, where);
+    TEST_ASSERT_EQUAL_FLOAT_MESSAGE(SPRING_ESTIMATOR_HOTTEST_C, INSIDE.hottest_c, where);
+    TEST_ASSERT_EQUAL_FLOAT_MESSAGE(0.0f, INSIDE.learnt.austenite_ohm, where);
+    TEST_ASSERT_EQUAL_FLOAT_MESSAGE(sound.change, INSIDE.learnt.change, where);
+    TEST_ASSERT_FLOAT_WITHIN(1e-5f, sound.spring[0].declared_stiffness_w_per_k,
+                             INSIDE.declared_stiffness_w_per_k);
+    TEST_ASSERT_FALSE_MESSAGE(INSIDE.heating, where);
+    TEST_ASSERT_EQUAL_UINT8_MESSAGE(1, estimator.broken_seals, where);
+    TEST_ASSERT_TRUE_MESSAGE(is_noted(SPRING_SIGHT_ANEW), where);
+    TEST_ASSERT_TRUE_MESSAGE(spring_estimator_update(&estimator, &model, 0), where);
+}
+
+static void whatever_bit_of_a_belief_turns_over_nothing_is_known_from_its_next_turn_on(void)
+{
+    for (unsigned held = 0; held < 2; held++) {
+        begin_cold();
+        if (held != 0) {
+            (void)heat_then_hold(60.0);
+        } else {
+            spring_estimator_begin_heating(&estimator, &model, 0);
+        }
+        ticks(2.0, 5.0);
+        keep_sound();
+        const size_t begin =
+            offsetof(spring_estimator_t, spring) + offsetof(spring_belief_t, variance_k2);
+        const size_t end = offsetof(spring_estimator_t, spring) + sizeof(spring_belief_t);
+        for (size_t at = begin; at < end; at++) {
+            for (unsigned bit = 0; bit < 8; bit++) {
+                turn_over(at, bit);
+                expect_begun_anew();
+            }
+        }
+    }
+    begin_cold();
+}
+
+static void whatever_bit_of_what_springs_share_turns_over_that_begins_anew(void)
+{
+    (void)heat_then_hold(60.0);
+    keep_sound();
+    TEST_ASSERT_TRUE(estimator.sights.count > 2);
+    const size_t end = offsetof(spring_estimator_t, sights.count);
+    for (size_t at = offsetof(spring_estimator_t, stepped_turns); at <= end; at++) {
+        for (unsigned bit = 0; bit < 8; bit++) {
+            turn_over(at, bit);
+            TEST_ASSERT_TRUE_MESSAGE(spring_estimator_update(&estimator, &model, 0), where);
+            TEST_ASSERT_EQUAL_UINT8_MESSAGE(0, estimator.sights.count, where);
+            TEST_ASSERT_EQUAL_UINT16_MESSAGE(0, estimator.stepped_turns, where);
+            TEST_ASSERT_EQUAL_UINT8_MESSAGE(0, estimator.stepped_spring, where);
+            TEST_ASSERT_EQUAL_UINT8_MESSAGE(SPRING_PHASE_AUSTENITE, INSIDE.possible, where);
+            TEST_ASSERT_TRUE_MESSAGE(spring_estimator_update(&estimator, &model, 0), where);
+        }
+    }
+    begin_cold();
+}
+
+/* What is done to a spring before its next turn. */
+static void and_is_left(void)
+{
+    spring_estimator_leave(&estimator, 0);
+}
+static void and_is_told(void)
+{
+    spring_estimator_trust_model(&estimator, &model);
+}
+static void and_forgets(void)
+{
+    spring_estimator_forget(&estimator, 0);
+}
+static void and_forgets_loss(void)
+{
+    spring_estimator_forget_loss(&estimator, 0);
+}
+static void and_is_restored(void)
+{
+    spring_estimator_restore(&estimator, 0, &sound.spring[0].learnt);
+}
+static void and_is_prepared(void)
+{
+    spring_estimator_prepare(&estimator, &model, true);
+}
+static void and_is_disturbed(void)
+{
+    spring_estimator_disturb(&estimator, 0);
+}
+
+static void change_before_its_turn_hides_no_bit(void)
+{
+    static void (*const changes[])(void) = {and_is_left,      and_is_told,     and_forgets,
+                                            and_forgets_loss, and_is_restored, and_is_prepared,
+                                            and_is_disturbed};
+    (void)heat_then_hold(60.0);
+    spring_estimator_begin_heating(&estimator, &model, 0);
+    ticks(2.0, 1.0);
+    keep_sound();
+    for (unsigned n = 0; n < sizeof changes / sizeof changes[0]; n++) {
+        turn_over(offsetof(spring_estimator_t, spring) + offsetof(spring_belief_t, slow_ohm) + 2u,
+                  5);
+        changes[n]();
+        expect_begun_anew();
+        turn_over(0, 0); /* and is none itself */
+        estimator = sound;
+        changes[n]();
+        TEST_ASSERT_TRUE_MESSAGE(spring_estimator_update(&estimator, &model, 0), where);
+    }
+    turn_over(offsetof(spring_estimator_t, spring) + offsetof(spring_belief_t, learnt), 6);
+    spring_estimator_restart(&estimator, &model);
+    TEST_ASSERT_EQUAL_FLOAT(0.0f, INSIDE.learnt.austenite_ohm);
+    estimator = sound;
+    spring_estimator_restart(&estimator, &model);
+    TEST_ASSERT_TRUE(INSIDE.learnt.austenite_ohm > 0.0f);
+    begin_cold();
+}
+
+void run_seals(void)
+{
+    RUN_TEST(whatever_bit_of_a_belief_turns_over_nothing_is_known_from_its_next_turn_on);
+    RUN_TEST(whatever_bit_of_what_springs_share_turns_over_that_begins_anew);
+    RUN_TEST(change_before_its_turn_hides_no_bit);
+}
