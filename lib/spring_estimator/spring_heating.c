@@ -19,7 +19,6 @@
 #define CAPACITY_BOUND  1.25f /* 2.6 standard deviations of a heat capacity more */
 #define CAPACITY_LIKELY 1.12f /* 1.3 of them */
 #define LEAST_PART      0.5f  /* of a known change: a contact's step, flat afterwards, is less */
-#define LONE_PART       0.7f  /* where its resistance is not its austenite's either */
 #define LEAST_HEAT      0.74f /* latent heat 15 % less than declared, heat capacity 15 % more */
 /* Of a declared martensite's resistance: 15 %, a sensor's gain of 3 %, a contact of 30 mohm, a
  * coefficient in print over 68 K: 0.81 to 1.53. */
@@ -182,10 +181,10 @@ static bool may_transform(const spring_belief_t *b, const thermal_model_t *model
 }
 
 /* By as much as a transformation does: one whose change is known, by so much of it at least. */
-static bool has_changed(const spring_belief_t *b, float part)
+static bool has_changed(const spring_belief_t *b)
 {
     const float least = b->learnt.austenite_ohm > 0.0f
-                            ? part * fabsf(b->learnt.change) * b->run.heat.begun_missing
+                            ? LEAST_PART * fabsf(b->learnt.change) * b->run.heat.begun_missing
                             : CHANGE_LEAST;
     return fabsf(b->ohm / b->run.heat.onset_ohm - 1.0f) > fmaxf(least, CHANGE_LEAST);
 }
@@ -214,9 +213,8 @@ static bool is_over(const spring_estimator_t *e, const spring_belief_t *b,
     if (flat_k < unseen_k) {
         return false;
     }
-    return has_taken_enough(e, b, model, k)
-               ? spring_has_grown(b) && has_changed(b, LEAST_PART)
-               : flat_k >= SHIFT_BOUND_K && spring_has_grown(b) && has_changed(b, LONE_PART);
+    return (flat_k >= SHIFT_BOUND_K || has_taken_enough(e, b, model, k)) && spring_has_grown(b) &&
+           has_changed(b);
 }
 
 /* What no temperature coefficient makes of a change over step_k of heat: one in print, and while it
