@@ -222,7 +222,8 @@ void spring_estimator_disturb(spring_belief_t *belief);
 /* Once in a turn: takes the readings, and moves the model's temperature and phase to what they say.
  * False if and only if what was believed of it has changed by itself, as RAM may, since this module
  * wrote it: then nothing is known of it from here, as when the power comes on, nor of its own
- * numbers, and it is as if no heating or hold had begun. */
+ * numbers, and it is as if no heating or hold had begun. What else is called here before that turn
+ * leaves such a spring as it is. */
 bool spring_estimator_update(spring_estimator_t *estimator, thermal_model_t *model, uint8_t spring);
 
 /* What the spring gives off per kelvin, as the model has it by now: to be called once in some
