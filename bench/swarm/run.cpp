@@ -35,6 +35,7 @@ constexpr double WELDED_OFF_S = 0.5;
 constexpr double UNFED_S = 0.25; /* of what gives no pulses: 0.21 s (docs/safety.md) and a tick */
 constexpr double STOPPED_S = 0.003; /* '!': a byte, and 1 ms */
 constexpr double HEALED_S = 0.05; /* a register is written again in each tick; and a stop's byte */
+constexpr double DONE_S = 0.05;   /* what a line has changed is done in the tick after its answer */
 constexpr double ANSWER_S = 12.0; /* the longest: selftest, nine springs of 0.6 s; $save 3.4 s */
 constexpr double QUIET_S = 0.5;   /* after garbage */
 /* Then it is asked this, and every answer before this one's is to what was garbage: telemetry may
@@ -627,7 +628,8 @@ private:
             return;
         }
         const bool off = starts(status_, "<off|") || starts(status_, "<locked|");
-        if (off && !pending_ && !board_all_off(board_.get()) && now_s() - flip_s_ > HEALED_S &&
+        const bool done = !pending_ && now_s() - asked_s_ > DONE_S;
+        if (off && done && !board_all_off(board_.get()) && now_s() - flip_s_ > HEALED_S &&
             !hanging_) {
             breaks("on", "and it says " + status_);
         }
