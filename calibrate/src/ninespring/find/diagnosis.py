@@ -195,7 +195,7 @@ def with_effects_of(spec: Spec, model: Model, known: Sequence[effects.Candidate]
             continue
         one = max(options, key=matches)
         free = [replace(f, start=next((given[n] for n in f.names if n in given), f.start)) for f in one.free]
-        spec = spec.with_effect(effect, free, one.fixed, one.variant, one.also_on)
+        spec = replace(one, free=tuple(free)).added_to(spec)
     return spec
 
 

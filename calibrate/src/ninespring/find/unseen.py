@@ -163,9 +163,8 @@ class Unseen:
         self.lag = next((one for one in self.found.candidates if one.effect == LAG), None)
         self.lagged = self.base
         if self.lag is not None and LAG not in self.base.spec.effects:
-            lag = self.lag
-            spec = self.base.spec.with_effect(lag.effect, lag.free, lag.fixed, lag.variant, lag.also_on)
-            start = self.base.as_dict() | lag.start_at(1.0)
+            spec = self.lag.added_to(self.base.spec)
+            start = self.base.as_dict() | self.lag.start_at(1.0)
             self.lagged = replace(self.base, spec=spec, values=np.array([start[f.key] for f in spec.free]))
 
     def errors(self, fit: Fit, colour: Colour | None = None) -> np.ndarray:

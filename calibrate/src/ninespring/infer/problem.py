@@ -523,7 +523,7 @@ class Problem:
         free = fit.spec.free
         z = np.array([f.inner(v) for f, v in zip(free, fit.values, strict=True)])
         low, high = np.array([f.inner(f.low) for f in free]), np.array([f.inner(f.high) for f in free])
-        trust = np.array([1.0 / f.prior if f.prior else 0.0 for f in free])
+        trust = np.array([f.trust for f in free])
         believed = trust * (z - np.array([f.inner(f.start) for f in free]))
         slopes = self.plain_slopes(fit)
         left = np.concatenate(self.scaled(fit.residual))
@@ -581,7 +581,7 @@ class Problem:
             fit.factor = statistics.correlation_factor(series, self.longest_lag())
         if used:
             spread = max(1.0, fit.chi2 / max(1, fit.count - len(used)))
-            trust = np.array([1.0 / f.prior if f.prior else 0.0 for f in fit.spec.free])[used]
+            trust = np.array([f.trust for f in fit.spec.free])[used]
             inner = np.linalg.pinv(jac[:, used].T @ jac[:, used] + spread * np.diag(trust**2), rcond=1e-12)
             white = inner * spread
             blocks = self._block_of_samples()
