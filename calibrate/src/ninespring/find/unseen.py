@@ -37,6 +37,8 @@ COMES_TRUE = 0.75
 better than without it. What only takes something else's place is between the two or below."""
 HARDLY = 0.1
 """Part of what all runs tell of a declared number (its information) below which some of them leave it as all had it."""
+PINNED = 1e-5
+"""Spread, in a number's inner coordinate, that leaves it where it is."""
 STEPS = 25
 """Of one fit, at most: it begins where the whole data had it."""
 LAG = "sensor_lag"
@@ -117,6 +119,16 @@ def _hardly_shown(whole: Fit, part: Fit, kept: Sequence[int]) -> list[str]:
     ]
 
 
+def pinned(fit: Fit) -> Fit:
+    """Return a fit, made beside what has no name, whose effects stay as large as they were found: only the declared numbers,
+    and those of a run alone, are free to take that up."""
+    free = [
+        f if f.effect is None or f.run is not None else replace(f, start=float(v), prior=PINNED)
+        for f, v in zip(fit.spec.free, fit.values, strict=True)
+    ]
+    return replace(fit, spec=replace(fit.spec, free=tuple(free)))
+
+
 def errors(split: Split, fit: Fit, colour: Colour | None) -> np.ndarray:
     """Return by how much what is left out differs from what a model fitted to a split's runs predicts, degC, where that counts."""
     problem, kept = split.problem, list(split.kept)
@@ -169,7 +181,7 @@ class Unseen:
 
     def errors(self, fit: Fit, colour: Colour | None = None) -> np.ndarray:
         """Return the errors, degC, of runs left out, the others fitted by how errors last; empty where none can be."""
-        key = fit.spec.variant, colour
+        key = fit.spec.variant, tuple(free.prior for free in fit.spec.free), colour
         if key not in self.known:
             self.known[key] = np.concatenate([np.zeros(0), *(errors(one, fit, colour) for one in self.splits)])
         return self.known[key]
@@ -187,6 +199,15 @@ class Unseen:
     def better(self) -> Fit:
         """The better one of both that know no physics but the declared, by least squares as anybody fits them."""
         return min((self.base, self.lagged), key=self.rmse)
+
+    @property
+    def plain(self) -> Fit:
+        """What is given where nothing that was found foretells as well: the declared model, with a lag where that is worth it."""
+        return self.lagged if self.rmse(self.lagged) <= self.rmse(self.base) / WORSE else self.base
+
+    def worse(self, fit: Fit) -> bool:
+        """Return whether something foretells the unseen worse than the better of both baselines."""
+        return self.own(fit) > WORSE * self.rmse(self.better)
 
     def tells(self, fit: Fit, without: Fit) -> bool:
         """Return whether most of what is off in the unseen without an effect is foretold with it: no stand-in does that."""
@@ -208,10 +229,10 @@ class Unseen:
         while self.splits:
             found = [e for e in fit.spec.effects if e not in self.base.spec.effects]
             names = [e for e in found if e not in OF_THAT_DAY]
-            if not names and (found or self.own(fit) <= WORSE * self.rmse(self.better)):
+            if not names and (found or not self.worse(fit)):
                 break  # what is of that day no other tells
             fewer = {effect: reduced(fit, effect) for effect in names}
-            if self.own(fit) <= WORSE * self.rmse(self.better):
+            if not self.worse(fit):
                 true = {effect: self.comes_true(fit, fewer[effect]) for effect in names}
                 out = min(true, key=true.__getitem__)
                 if true[out] >= COMES_TRUE:
@@ -228,9 +249,9 @@ class Unseen:
             fit = fewer[out]
         return fit, said
 
-    def plain(self, found: Search) -> Fit:
-        """Return the better one of both, fitted to everything in a search that begins at the declared model."""
-        if self.lag is None or self.rmse(self.lagged) > self.rmse(self.base) / WORSE:
+    def refitted(self, found: Search) -> Fit:
+        """Return the plain model fitted to everything, by least squares as anybody fits it, in a search that begins at the declared."""
+        if self.lag is None or self.plain is self.base:
             return found.base
         return found.refit(found.base, [self.lag], [1.0])
 
@@ -245,8 +266,8 @@ class Unseen:
         alone = self.splits[0].alone
         return "the last part of the run (a half and a third of it)" if alone else "a run that the fit did not see"
 
-    def told(self, fit: Fit, instead: str = "") -> results.Unseen | None:
-        """Return what diagnosis.json says of it, None where nothing can be left out; `instead`: what else is to be said first."""
+    def told(self, fit: Fit, why: str = "") -> results.Unseen | None:
+        """Return what diagnosis.json says of the model that is given, None where nothing can be left out; `why` it is the plain one."""
         if not self.splits or not math.isfinite(self.own(fit)):
             return None
         mine, declared, lagged = self.own(fit), self.rmse(self.base), self.rmse(self.lagged)
@@ -256,5 +277,9 @@ class Unseen:
             declared_rmse_c=declared,
             with_lag_rmse_c=lagged,
             text=f"{self._what} is predicted to {mine:.2f} K (declared model, fitted: {declared:.2f}, with a lag: {lagged:.2f})"
-            + instead,
+            + (
+                f". The model is the declared model{WITH_LAG * (self.plain is not self.base)}, by least squares: {why}"
+                if why
+                else ""
+            ),
         )
