@@ -100,6 +100,22 @@ def test_a_lag_that_foretells_no_better_is_left_out_of_the_baseline(lag: float, 
     assert (told.refitted(search) is told.lagged) == taken  # type: ignore[arg-type]
 
 
+@pytest.mark.parametrize("worth", [True, False])
+def test_a_lag_that_foretells_better_is_in_the_model_and_a_name_only_where_it_explains_what_a_name_must(
+    monkeypatch: pytest.MonkeyPatch, worth: bool
+) -> None:
+    told = Told({"": 1.0, "lag": 0.8})
+    search = SimpleNamespace(base=told.base, refit=lambda *_: told.lagged, worth=lambda *_: worth, reduced=without)
+    monkeypatch.setattr(diagnosis.search, "Search", lambda *_: search)
+    monkeypatch.setattr(diagnosis, "_finish", lambda problem, fit: fit)
+    case: Any = SimpleNamespace(final=told.base, declared=told.base, search=SimpleNamespace(candidates=[]), plain=False)
+    case.hidden, case.adopted, case.progress = [], [], None
+    case.problem = SimpleNamespace(take_for=lambda colour: None)
+    headline = diagnosis._foretold(case, search, told)  # type: ignore[arg-type]
+    assert headline is not None and headline.rmse_c == 0.8 and "declared model with a lag" in headline.text
+    assert case.final is (told.lagged if worth else told.base) and case.plain != worth
+
+
 def test_an_effect_without_which_most_is_not_foretold_is_no_stand_in() -> None:
     told = Told({"": 2.0, "lag": 2.0, "latent_heat": 1.3, "shared_air": 1.6})
     assert told.tells(model("latent_heat"), model())

@@ -458,12 +458,15 @@ def _foretold(case: _Case, judge: search.Search, judged_by: unseen.Unseen) -> re
         case.search = judge = search.Search(problem, case.search.candidates, case.base, case.progress)
         kept, case.contenders = judged_by.refitted(judge), []
         why = "nothing else that was tried predicts as well"
+        # a lag that foretells better is in the model; a name it is where it explains what a name must
+        case.plain = kept is not case.base and not judge.worth(kept, case.base)
+        kept = case.base if case.plain else kept
     if case.not_kept or why:
         case.final = _finish(problem, kept)
         case.without = {effect: judge.reduced(case.final, effect) for effect in case.adopted}
         for effect, without in case.without.items():
             case.witnesses.setdefault(effect, witness(problem, case.final, effect, without, False))
-    return judged_by.told(case.final, why) if why else _given(case, judged_by, case.final)
+    return judged_by.told(judged_by.plain, why) if why else _given(case, judged_by, case.final)
 
 
 def _given(case: _Case, judged_by: unseen.Unseen, fit: Fit) -> results.Unseen | None:
