@@ -193,15 +193,7 @@ def _often(windows: Sequence[Cause], every: int) -> list[Cause]:
             next((p.profiles[r] for p in parts if p.profiles[r] is not None), None)
             for r in range(len(parts[0].profiles))
         ]
-        out.append(
-            Cause(
-                kind,
-                text,
-                tuple(merged),
-                np.column_stack(columns).astype(np.float32),
-                bumps=tuple(bumps),
-            )
-        )
+        out.append(Cause(kind, text, tuple(merged), np.column_stack(columns).astype(np.float32), bumps=tuple(bumps)))
     return out
 
 

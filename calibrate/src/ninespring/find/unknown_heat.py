@@ -103,13 +103,9 @@ class UnknownHeat:
 
 def find(problem: Problem, fit: Fit, say: Callable[[str], None] = lambda text: None) -> UnknownHeat:
     """Find the pieces of unknown heat in what a fit leaves."""
-    usual = np.zeros(problem.array.springs)
-    driven = np.zeros(problem.array.springs)
-    for r in range(len(problem.runs)):
-        power = power_of(problem, fit, r)
-        usual += power.sum(axis=0)
-        driven += (power > 0).sum(axis=0)
-    usual_w = np.where(driven > 0, usual / np.maximum(driven, 1), np.nan)
+    power = np.concatenate([power_of(problem, fit, r) for r in range(len(problem.runs))])
+    driven = (power > 0).sum(axis=0)
+    usual_w = np.where(driven > 0, power.sum(axis=0) / np.maximum(driven, 1), np.nan)
     typical = float(np.nanmean(usual_w)) if np.isfinite(usual_w).any() else 1.0
     factor = fit_factor(problem, fit)
     found = UnknownHeat([], [], [], usual_w)

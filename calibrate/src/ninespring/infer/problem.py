@@ -472,7 +472,8 @@ class Problem:
         values = np.array([(start or {}).get(f.key, f.start) for f in free], dtype=float)
         values = np.array([min(f.high, max(f.low, v)) for f, v in zip(free, values, strict=True)], dtype=float)
         if not free:
-            return self._as_it_is(spec, values)
+            nothing = np.zeros((self.count, 0)), None, np.zeros((0, 0))
+            return self.evaluate(Fit(spec, values, math.nan, self.count, [], *nothing))
 
         def show(numbers: np.ndarray) -> Shown:
             shown = self.predictions(spec, numbers)
@@ -501,13 +502,6 @@ class Problem:
             self.add_errors(fit)
         fit.simulations = self.simulations - begun
         return fit
-
-    def _as_it_is(self, spec: Spec, values: np.ndarray) -> Fit:
-        """Return the fit of a spec that has nothing free."""
-        left = self.residuals(self.predictions(spec, values))
-        vector = self.vector(left)
-        nothing = np.zeros((self.count, 0)), vector, np.zeros((0, 0))
-        return Fit(spec, values, float(vector @ vector), self.count, left, *nothing, sse=self.plain(left))
 
     def holdout_rmse(self, fit: Fit, colour: Colour | None = None) -> float:
         """Return the rms error, degC, on blocks held out of the fit, one fold after the other.
