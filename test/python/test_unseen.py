@@ -93,6 +93,20 @@ def test_what_is_of_that_day_is_not_judged_by_another() -> None:
         assert kept is not None and kept.spec.effects == (effect,) and not said
 
 
+def test_what_is_of_the_array_is_judged_without_what_is_of_that_day() -> None:
+    """One run less tells of a drift too little to tell the rest beside it: that is no fault of the rest."""
+    errors = {"": 1.0, "lag": 1.0, "radiation": 0.8, "ambient_drift": 2.2, "radiation ambient_drift": 1.7}
+    both = model("radiation", "ambient_drift")
+    kept, said = Told(errors).kept(both, without)
+    assert kept is both and not said
+    assert Told(errors).carried(both, without).spec.effects == ("radiation",)
+    kept, said = Told(errors | {"radiation": 1.2}).kept(both, without)
+    assert kept is not None and kept.spec.effects == ("ambient_drift",), (
+        "what foretells worse by itself goes, the drift stays"
+    )
+    assert len(said) == 1 and said[0].startswith("radiation is not named")
+
+
 @pytest.mark.parametrize(("lag", "taken"), [(0.99, False), (0.9, True)])
 def test_a_lag_that_foretells_no_better_is_left_out_of_the_baseline(lag: float, taken: bool) -> None:
     told = Told({"": 1.0, "lag": lag})

@@ -448,7 +448,7 @@ def _foretold(case: _Case, judge: search.Search, judged_by: unseen.Unseen) -> re
     """Drop what foretells a run that the fit never saw worse; return how well such a run is foretold."""
     problem = case.problem
     if case.hidden:
-        return _given(case, judged_by, unseen.pinned(case.final))
+        return _given(case, judged_by, unseen.pinned(judged_by.carried(case.final, judge.reduced)))
     why = ""
     kept, case.not_kept = judged_by.kept(case.final, judge.reduced)
     if kept is None:
@@ -466,7 +466,9 @@ def _foretold(case: _Case, judge: search.Search, judged_by: unseen.Unseen) -> re
         case.without = {effect: judge.reduced(case.final, effect) for effect in case.adopted}
         for effect, without in case.without.items():
             case.witnesses.setdefault(effect, witness(problem, case.final, effect, without, False))
-    return judged_by.told(judged_by.plain, why) if why else _given(case, judged_by, case.final)
+    if why:
+        return judged_by.told(judged_by.plain, why)
+    return _given(case, judged_by, judged_by.carried(case.final, judge.reduced))
 
 
 def _given(case: _Case, judged_by: unseen.Unseen, fit: Fit) -> results.Unseen | None:

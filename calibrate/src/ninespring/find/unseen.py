@@ -222,18 +222,26 @@ class Unseen:
             return math.inf
         return float(off @ moved) / float(moved @ moved)
 
+    def carried(self, fit: Fit, reduced: Callable[[Fit, str], Fit]) -> Fit:
+        """Return a fit without what is of that day: no other run tells that, and beside it a part of the runs tells little of
+        the rest."""
+        for effect in fit.spec.effects:
+            if effect in OF_THAT_DAY and effect not in self.base.spec.effects:
+                fit = reduced(fit, effect)
+        return fit
+
     def kept(self, fit: Fit, reduced: Callable[[Fit, str], Fit]) -> tuple[Fit | None, list[str]]:
         """Return what predicts no worse than the better of both, names left out one by one, None where nothing of it does; and
         what is to be said of the names. Each is judged by itself, too: others may carry it along."""
         said: list[str] = []
         while self.splits:
-            found = [e for e in fit.spec.effects if e not in self.base.spec.effects]
-            names = [e for e in found if e not in OF_THAT_DAY]
-            if not names and (found or not self.worse(fit)):
-                break  # what is of that day no other tells
-            fewer = {effect: reduced(fit, effect) for effect in names}
-            if not self.worse(fit):
-                true = {effect: self.comes_true(fit, fewer[effect]) for effect in names}
+            bare = self.carried(fit, reduced)
+            names = [e for e in bare.spec.effects if e not in self.base.spec.effects]
+            if not names and (bare is not fit or not self.worse(fit)):
+                break
+            fewer = {effect: reduced(bare, effect) for effect in names}
+            if not self.worse(bare):
+                true = {effect: self.comes_true(bare, fewer[effect]) for effect in names}
                 out = min(true, key=true.__getitem__)
                 if true[out] >= COMES_TRUE:
                     break
@@ -242,11 +250,11 @@ class Unseen:
                 )
             else:
                 out = min(fewer, key=lambda effect: self.own(fewer[effect]), default="")
-                if not out or self.own(fewer[out]) >= self.own(fit):
-                    said += [self._left_out(e, fit, self.better) for e in names if e not in self.better.spec.effects]
+                if not out or self.own(fewer[out]) >= self.own(bare):
+                    said += [self._left_out(e, bare, self.better) for e in names if e not in self.better.spec.effects]
                     return None, said
-                said.append(self._left_out(out, fit, fewer[out]))
-            fit = fewer[out]
+                said.append(self._left_out(out, bare, fewer[out]))
+            fit = reduced(fit, out)
         return fit, said
 
     def refitted(self, found: Search) -> Fit:
