@@ -100,6 +100,8 @@ def test_what_is_of_the_array_is_judged_without_what_is_of_that_day() -> None:
     kept, said = Told(errors).kept(both, without)
     assert kept is both and not said
     assert Told(errors).carried(both, without).spec.effects == ("radiation",)
+    kept, said = Told(errors, {"radiation": -1.2}).kept(both, without)
+    assert kept is both and not said, "another day's drift is in what comes true of it"
     kept, said = Told(errors | {"radiation": 1.2}).kept(both, without)
     assert kept is not None and kept.spec.effects == ("ambient_drift",), (
         "what foretells worse by itself goes, the drift stays"

@@ -241,6 +241,8 @@ class Unseen:
                 break
             fewer = {effect: reduced(bare, effect) for effect in names}
             if not self.worse(bare):
+                if bare is not fit:
+                    break  # the unseen has that day's, too: it says too little of what comes true
                 true = {effect: self.comes_true(bare, fewer[effect]) for effect in names}
                 out = min(true, key=true.__getitem__)
                 if true[out] >= COMES_TRUE:
