@@ -96,6 +96,21 @@ def test_where_nothing_found_predicts_as_well_the_model_is_the_better_baseline_a
     assert off[0] <= 1.05 * off[1]
 
 
+def test_beside_a_cause_without_a_name_the_model_is_the_better_baseline_where_that_foretells_better(
+    measured: Path, tmp_path: Path
+) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text(importing.import_table(measured / "tclab_apm" / "energy_balance_600.txt", "tclab"))
+    run = read_log(path, 2)
+    later = run.part(run.time_s > run.time_s[-1] / 2.0)
+    found = diagnosis.diagnose(Array(1, 2), [replace(later, time_s=later.time_s - later.time_s[0])], model=declared())
+    unseen = found.told.unseen
+    assert isinstance(unseen, results.Unseen) and found.told.unnamed
+    assert unseen.rmse_c <= 1.05 * min(unseen.declared_rmse_c, unseen.with_lag_rmse_c)
+    assert found.effects, "what was found is told all the same"
+    assert not found.model.effects and "The model is the declared model, by least squares" in unseen.text
+
+
 @pytest.mark.parametrize(("file", "share"), [("AB0", 0.5), ("AB1", 0.75)])
 def test_the_latent_heat_of_a_real_actuator_is_named_with_its_alloy_declared_roughly(
     tmp_path: Path, file: str, share: float

@@ -7,11 +7,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from ninespring.find import diagnosis
 from ninespring.find.diagnosis import first_fit
 from ninespring.find.evidence import likelihood
 from ninespring.find.lasting import likeliest
-from ninespring.find.unseen import LAG, Unseen, _hardly_shown, splits
+from ninespring.find.unseen import LAG, Unseen, _hardly_shown, pinned, splits
 from ninespring.infer.declared import base_spec
+from ninespring.infer.fit import Fit
 from ninespring.infer.problem import Problem
 from ninespring.io.logs.run import Run
 from ninespring.model.models import Array
@@ -26,13 +28,13 @@ class Told(Unseen):
     """Errors of models as they are told, K, by their effects; 'lag' is the baseline's."""
 
     def __init__(self, errors: dict[str, float], true: dict[str, float] | None = None) -> None:
-        self.told, self.true = errors, true or {}
+        self.known_k, self.true = errors, true or {}
         self.splits = [SimpleNamespace(alone=True)]  # type: ignore[list-item]
         self.base, self.lagged = model(), model(LAG)
         self.lag = SimpleNamespace(effect=LAG)  # type: ignore[assignment]
 
     def rmse(self, fit: Any, colour: Any = None) -> float:
-        return self.told["lag" if fit is self.lagged else " ".join(fit.spec.effects)]
+        return self.known_k["lag" if fit is self.lagged else " ".join(fit.spec.effects)]
 
     def own(self, fit: Any) -> float:
         return self.rmse(fit)
@@ -91,17 +93,77 @@ def test_what_is_of_that_day_is_not_judged_by_another() -> None:
         assert kept is not None and kept.spec.effects == (effect,) and not said
 
 
+def test_what_is_of_the_array_is_judged_without_what_is_of_that_day() -> None:
+    """One run less tells of a drift too little to tell the rest beside it: that is no fault of the rest."""
+    errors = {"": 1.0, "lag": 1.0, "radiation": 0.8, "ambient_drift": 2.2, "radiation ambient_drift": 1.7}
+    both = model("radiation", "ambient_drift")
+    kept, said = Told(errors).kept(both, without)
+    assert kept is both and not said
+    assert Told(errors).carried(both, without).spec.effects == ("radiation",)
+    kept, said = Told(errors, {"radiation": -1.2}).kept(both, without)
+    assert kept is both and not said, "another day's drift is in what comes true of it"
+    kept, said = Told(errors | {"radiation": 1.2}).kept(both, without)
+    assert kept is not None and kept.spec.effects == ("ambient_drift",), (
+        "what foretells worse by itself goes, the drift stays"
+    )
+    assert len(said) == 1 and said[0].startswith("radiation is not named")
+
+
 @pytest.mark.parametrize(("lag", "taken"), [(0.99, False), (0.9, True)])
 def test_a_lag_that_foretells_no_better_is_left_out_of_the_baseline(lag: float, taken: bool) -> None:
     told = Told({"": 1.0, "lag": lag})
     search = SimpleNamespace(base=told.base, refit=lambda fit, added, sizes: told.lagged)
-    assert (told.plain(search) is told.lagged) == taken  # type: ignore[arg-type]
+    assert (told.refitted(search) is told.lagged) == taken  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("worth", [True, False])
+def test_a_lag_that_foretells_better_is_in_the_model_and_a_name_only_where_it_explains_what_a_name_must(
+    monkeypatch: pytest.MonkeyPatch, worth: bool
+) -> None:
+    told = Told({"": 1.0, "lag": 0.8})
+    search = SimpleNamespace(base=told.base, refit=lambda *_: told.lagged, worth=lambda *_: worth, reduced=without)
+    monkeypatch.setattr(diagnosis.search, "Search", lambda *_: search)
+    monkeypatch.setattr(diagnosis, "_finish", lambda problem, fit: fit)
+    case: Any = SimpleNamespace(final=told.base, declared=told.base, search=SimpleNamespace(candidates=[]), plain=False)
+    case.hidden, case.adopted, case.progress = [], [], None
+    case.problem = SimpleNamespace(take_for=lambda colour: None)
+    headline = diagnosis._foretold(case, search, told)  # type: ignore[arg-type]
+    assert headline is not None and headline.rmse_c == 0.8 and "declared model with a lag" in headline.text
+    assert case.final is (told.lagged if worth else told.base) and case.plain != worth
 
 
 def test_an_effect_without_which_most_is_not_foretold_is_no_stand_in() -> None:
     told = Told({"": 2.0, "lag": 2.0, "latent_heat": 1.3, "shared_air": 1.6})
     assert told.tells(model("latent_heat"), model())
     assert not told.tells(model("shared_air"), model())
+
+
+@pytest.mark.parametrize(("found_k", "plain"), [(1.04, False), (1.2, True)])
+def test_what_foretells_worse_than_the_better_baseline_keeps_its_name_and_the_baseline_is_the_model(
+    found_k: float, plain: bool
+) -> None:
+    """Beside a cause without a name, or of that day alone: no name is judged there."""
+    told = Told({"": 2.0, "lag": 1.0, "shared_air": found_k})
+    case: Any = SimpleNamespace(plain=None)
+    headline = diagnosis._given(case, told, model("shared_air"))
+    assert headline is not None and case.plain == plain
+    assert headline.rmse_c == (1.0 if plain else found_k), "it is the error of the model that is given"
+    assert (
+        "declared model with a lag, by least squares: with what was found it would be 1.20 K" in headline.text
+    ) == plain
+
+
+def test_what_was_found_beside_a_cause_without_a_name_stays_as_large_where_it_foretells() -> None:
+    """In the runs that are fitted the cause still acts: there its size would be another."""
+    free = (
+        Free("loss_w_per_k", 0.01, 1e-4, 1.0, "W/K", log=True),
+        Free("air", 2.0, 0.0, 9.0, "J/K", effect="shared_air"),
+    )
+    stays = Free("ambient_offset_k@1", 0.0, -9.0, 9.0, "K", effect=RUN_AMBIENT, run=0)
+    fit = Fit(Spec(("shared_air", RUN_AMBIENT), (), (*free, stays)), np.array([0.02, 5.0, 1.0]), 0.0, 1, [])
+    loss, air, room = pinned(fit).spec.free
+    assert (loss, room) == (free[0], stays), "declared numbers and those of a run alone are fitted as ever"
+    assert air.start == 5.0 and air.prior is not None and air.prior < 1e-3
 
 
 def one_node(wander_k: float, seed: int = 1) -> Run:

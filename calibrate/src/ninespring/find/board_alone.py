@@ -186,7 +186,7 @@ def of_the_array(
             if one.effect in chosen.spec.effects or one.variant.startswith("spring "):
                 continue
             search.progress(f"could it be {one.effect} instead of {name}?")
-            spec = chosen.spec.without(name).with_effect(one.effect, one.free, one.fixed, one.variant, one.also_on)
+            spec = one.added_to(chosen.spec.without(name))
             other = problem.fit(spec, chosen.as_dict() | one.start_at(1.0), tolerance=1e-3, max_steps=14)
             search.fits[search.key(spec)] = other
             if search.preferred(other, chosen):

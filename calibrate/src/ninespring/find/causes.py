@@ -15,6 +15,7 @@ from ..infer.heat import THIN, answers, power_of, step_answers, thin
 from ..infer.problem import Problem
 from ..io.logs.run import Run
 from ..model.simulate import simulate_run
+from .windows import steps_up
 
 GRID_S = 15.0
 """Times at which something may begin or end."""
@@ -192,15 +193,7 @@ def _often(windows: Sequence[Cause], every: int) -> list[Cause]:
             next((p.profiles[r] for p in parts if p.profiles[r] is not None), None)
             for r in range(len(parts[0].profiles))
         ]
-        out.append(
-            Cause(
-                kind,
-                text,
-                tuple(merged),
-                np.column_stack(columns).astype(np.float32),
-                bumps=tuple(bumps),
-            )
-        )
+        out.append(Cause(kind, text, tuple(merged), np.column_stack(columns).astype(np.float32), bumps=tuple(bumps)))
     return out
 
 
@@ -305,9 +298,7 @@ def _windows(
         warmer += shaped(k, loss_w_per_k)
         driven = shaped(k, power[:, k])
         everything_driven += driven
-        jumps = np.zeros((len(edges), rows, springs))
-        for number, edge in enumerate(edges):
-            jumps[number, edge:, k] = 1.0
+        jumps = steps_up(edges, rows, springs, k)
         out.append(cause("contact", f"the drive of spring {k + 1} changes", _only(k, power[:, k], springs), driven))
         out.append(cause("heat", f"spring {k + 1} is given heat", _only(k, one, springs), answer["heat", k]))
         out.append(cause("sensor", f"thermometer {k + 1} jumps", _only(k, one, springs), jumps))
@@ -317,9 +308,7 @@ def _windows(
     out.append(cause("gust", "all losses change", -lost, everything_lost))
     out.append(cause("surroundings", "the surroundings are warmer", np.outer(loss_w_per_k, np.ones(springs)), warmer))
     if springs > 1:
-        every = np.zeros((len(edges), rows, springs))
-        for number, edge in enumerate(edges):
-            every[number, edge:] = 1.0
+        every = steps_up(edges, rows, springs, slice(None))
         out.append(cause("sensor", "all thermometers jump", np.ones((rows, springs)), every))
         out.append(cause("supply", "all drives change", power, everything_driven))
     return out

@@ -50,8 +50,6 @@ LEAST_PART = 0.01
 """Of a drive or a reading, less is not told as a cause: a board measures power no better, its voltages step by 4 mV."""
 PROBABLE = CERTAIN - 0.01
 """The most that an effect is sure with a number at its bound."""
-PINNED = 1e-5
-"""Spread, in a number's inner coordinate, that leaves it where it is."""
 
 
 @dataclass
@@ -115,17 +113,12 @@ def with_everything(problem: Problem, clean: Fit, base: Fit) -> Fit:
 
     All are fitted again where that would leave more than the declared model alone does.
     """
-    own = np.array([free.effect is None or free.run is not None for free in clean.spec.free])
-    pinned = [
-        free if mine else replace(free, start=float(value), prior=PINNED)
-        for free, value, mine in zip(clean.spec.free, clean.values, own, strict=True)
-    ]
-    spec = replace(clean.spec, free=tuple(pinned))
-    fit = problem.fit(spec, clean.as_dict(), tolerance=1e-4, errors=True)
+    fit = problem.fit(unseen.pinned(clean).spec, clean.as_dict(), tolerance=1e-4, errors=True)
     if fit.sse > base.sse:
         return problem.fit(clean.spec, clean.as_dict(), tolerance=1e-4, errors=True)
     covariance = fit.covariance
     if clean.covariance is not None and covariance is not None:
+        own = np.array([free.effect is None or free.run is not None for free in clean.spec.free])
         together = np.outer(own, own)
         covariance = np.where(together, covariance, np.where(np.outer(~own, ~own), clean.covariance, 0.0))
     return replace(fit, spec=clean.spec, covariance=covariance)
@@ -195,7 +188,7 @@ def with_effects_of(spec: Spec, model: Model, known: Sequence[effects.Candidate]
             continue
         one = max(options, key=matches)
         free = [replace(f, start=next((given[n] for n in f.names if n in given), f.start)) for f in one.free]
-        spec = spec.with_effect(effect, free, one.fixed, one.variant, one.also_on)
+        spec = replace(one, free=tuple(free)).added_to(spec)
     return spec
 
 
@@ -293,6 +286,8 @@ class _Case:
     witnesses: dict[str, Witness] = field(default_factory=dict)
     not_kept: list[str] = field(default_factory=list)
     """Effects that foretell a run no better, in words."""
+    plain: bool = False
+    """The model that is given is the better baseline: it foretells better than what was found, whose names stay."""
 
     @property
     def adopted(self) -> list[str]:
@@ -342,7 +337,9 @@ def _diagnose(
         problem.take_for(None)
         case.final = replace(case.final, jacobian=slopes)
     heat = unknown_heat.find(problem, case.final, progress)
-    final = case.final
+    final = given = case.final
+    if case.plain:
+        given = _finish(problem, judged_by.refitted(search.Search(problem, case.search.candidates, case.declared)))
     told = results.Diagnosis(
         logs=[results.Read(file=Path(r.name).name, sha256=r.sha256, rows=len(r.time_s)) for r in runs],
         baseline=baseline,
@@ -363,9 +360,9 @@ def _diagnose(
         seconds=round(time.monotonic() - begun, 2),
         simulations=problem.simulations,
     )
-    made = model_of(problem, final, as_shown(problem, final), baseline.rmse_c, absent)
+    made = model_of(problem, given, as_shown(problem, given), baseline.rmse_c, absent if given is final else None)
     resistance.into_model(made, second)
-    doubt.into_model(made, problem, final, doubts)
+    doubt.into_model(made, problem, given, doubts)
     judged(told.effects, made)
     results.checked(told)
     return Diagnosis(told, made, problem, case.base, final, heat)
@@ -451,23 +448,36 @@ def _foretold(case: _Case, judge: search.Search, judged_by: unseen.Unseen) -> re
     """Drop what foretells a run that the fit never saw worse; return how well such a run is foretold."""
     problem = case.problem
     if case.hidden:
-        return judged_by.told(case.final)
-    instead = ""
+        return _given(case, judged_by, unseen.pinned(judged_by.carried(case.final, judge.reduced)))
+    why = ""
     kept, case.not_kept = judged_by.kept(case.final, judge.reduced)
     if kept is None:
         # as anybody fits it, by least squares: nothing that is known of its errors predicts better
         problem.take_for(None)
         case.base = case.declared
         case.search = judge = search.Search(problem, case.search.candidates, case.base, case.progress)
-        kept, case.contenders = judged_by.plain(judge), []
-        which = f"the declared model{unseen.WITH_LAG * (kept is not case.base)}, by least squares"
-        instead = f". The model is {which}: nothing else that was tried predicts as well"
-    if case.not_kept or instead:
+        kept, case.contenders = judged_by.refitted(judge), []
+        why = "nothing else that was tried predicts as well"
+        # a lag that foretells better is in the model; a name it is where it explains what a name must
+        case.plain = kept is not case.base and not judge.worth(kept, case.base)
+        kept = case.base if case.plain else kept
+    if case.not_kept or why:
         case.final = _finish(problem, kept)
         case.without = {effect: judge.reduced(case.final, effect) for effect in case.adopted}
         for effect, without in case.without.items():
             case.witnesses.setdefault(effect, witness(problem, case.final, effect, without, False))
-    return judged_by.told(case.final, instead)
+    if why:
+        return judged_by.told(judged_by.plain, why)
+    return _given(case, judged_by, judged_by.carried(case.final, judge.reduced))
+
+
+def _given(case: _Case, judged_by: unseen.Unseen, fit: Fit) -> results.Unseen | None:
+    """Return how well a run is foretold by what was found or, where that foretells worse, by the better baseline."""
+    case.plain = judged_by.worse(fit)
+    if not case.plain:
+        return judged_by.told(fit)
+    why = f"with what was found it would be {judged_by.own(fit):.2f} K"
+    return judged_by.told(judged_by.plain, why)
 
 
 def _with_what_has_no_name(case: _Case, steps: list[tuple[str, Fit]]) -> list[tuple[str, Fit]]:

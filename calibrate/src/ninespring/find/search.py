@@ -82,13 +82,7 @@ class Search:
         runs = range(len(problem.runs))
         for k, candidate in enumerate(open_):
             for probe in candidate.probes:
-                spec = fit.spec.with_effect(
-                    candidate.effect,
-                    candidate.free,
-                    candidate.fixed,
-                    candidate.variant,
-                    candidate.also_on,
-                )
+                spec = candidate.added_to(fit.spec)
                 start = fit.as_dict() | dict(probe)
                 values = [start.get(f.key, f.start) for f in spec.free]
                 jobs += [(spec, values, r) for r in runs]
@@ -145,13 +139,7 @@ class Search:
         spec = fit.spec
         start = fit.as_dict()
         for candidate, size in zip(added, sizes, strict=True):
-            spec = spec.with_effect(
-                candidate.effect,
-                candidate.free,
-                candidate.fixed,
-                candidate.variant,
-                candidate.also_on,
-            )
+            spec = candidate.added_to(spec)
             start |= candidate.start_at(size, self.places(fit, candidate)[0])
         key = self.key(spec)
         if key in self.fits:
@@ -303,16 +291,7 @@ class Search:
                 continue
             done.add(names)
             self.progress(f"fitting {' + '.join(sorted(names))}")
-            out.append(
-                (
-                    self.refit(
-                        fit,
-                        [screen.candidates[a], screen.candidates[b]],
-                        [sizes[a], sizes[b]],
-                    ),
-                    2,
-                )
-            )
+            out.append((self.refit(fit, [screen.candidates[a], screen.candidates[b]], [sizes[a], sizes[b]]), 2))
         return out
 
     def forward(self, current: Fit) -> Fit:
@@ -396,12 +375,7 @@ class Search:
                     continue
                 seen.add(name)
                 self.progress(f"could it be {name} instead of {effect}?")
-                out.append(
-                    (
-                        effect,
-                        self.refit(other, [screen.candidates[k]], [sizes.get(k, 1.0)]),
-                    )
-                )
+                out.append((effect, self.refit(other, [screen.candidates[k]], [sizes.get(k, 1.0)])))
         return out
 
     def settle(

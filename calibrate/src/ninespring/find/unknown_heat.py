@@ -18,6 +18,7 @@ from ..infer.fit import Fit
 from ..infer.heat import THIN, power_of, step_answers, thin
 from ..infer.problem import Problem
 from ..io import results
+from . import windows
 from .evidence import fit_factor
 
 GRID_S = 15.0
@@ -102,13 +103,9 @@ class UnknownHeat:
 
 def find(problem: Problem, fit: Fit, say: Callable[[str], None] = lambda text: None) -> UnknownHeat:
     """Find the pieces of unknown heat in what a fit leaves."""
-    usual = np.zeros(problem.array.springs)
-    driven = np.zeros(problem.array.springs)
-    for r in range(len(problem.runs)):
-        power = power_of(problem, fit, r)
-        usual += power.sum(axis=0)
-        driven += (power > 0).sum(axis=0)
-    usual_w = np.where(driven > 0, usual / np.maximum(driven, 1), np.nan)
+    power = np.concatenate([power_of(problem, fit, r) for r in range(len(problem.runs))])
+    driven = (power > 0).sum(axis=0)
+    usual_w = np.where(driven > 0, power.sum(axis=0) / np.maximum(driven, 1), np.nan)
     typical = float(np.nanmean(usual_w)) if np.isfinite(usual_w).any() else 1.0
     factor = fit_factor(problem, fit)
     found = UnknownHeat([], [], [], usual_w)
@@ -157,10 +154,7 @@ def _pieces_of(problem: Problem, fit: Fit, r: int, slopes: np.ndarray, factor: f
         """Return what a unit step that begins at each edge adds to the readings, (samples, edges)."""
         if kind != "sensor":
             return thinned(answers.pop((kind, k)))
-        fields = np.zeros((len(edges), rows, springs))
-        for number, edge in enumerate(edges):
-            fields[number, edge:, k] = 1.0
-        return thinned(fields)
+        return thinned(windows.steps_up(edges, rows, springs, k))
 
     used = slopes[:, np.linalg.norm(slopes, axis=0) > 1e-6] if slopes.size else slopes
     spread_out = np.zeros((*mask.shape, used.shape[1]))
@@ -169,39 +163,19 @@ def _pieces_of(problem: Problem, fit: Fit, r: int, slopes: np.ndarray, factor: f
     left = thinned(problem.without_errors(fit.residual)[r][None])[:, 0].astype(float)
     left = left - basis @ (basis.T @ left)
     steps = {one: columns_of(*one) for one in kinds}
-    grams = {}
-    for one, block in steps.items():
-        inside = basis.T @ block
-        grams[one] = (block.T @ block - inside.T @ inside).astype(float)
+    grams = {one: windows.products(block, basis) for one, block in steps.items()}
     chosen: list[tuple[str, int, int, int]] = []
     columns: list[np.ndarray] = []
     shortest = max(1, round(SHORTEST_S / (grid * step)))
     tried = len(kinds) * len(edges) ** 2 / 2
     rest, sizes, gains = left, np.zeros(0), []
     while len(chosen) < MOST:
-        best = (0.0, None)
-        for one in kinds:
-            moment = steps[one].T @ rest
-            gram = grams[one]
-            diagonal = np.diag(gram)
-            # a piece is a step up less a step down; the last edge stands for the end of the run
-            top = np.append(moment, 0.0)
-            square = np.append(diagonal, 0.0)
-            cross = np.pad(gram, ((0, 0), (0, 1)))
-            power = diagonal[:, None] + square[None, :] - 2.0 * cross
-            gain = (moment[:, None] - top[None, :]) ** 2 / np.maximum(power, 1e-9)
-            long = np.arange(len(edges) + 1)[None, :] - np.arange(len(edges))[:, None] >= shortest
-            gain = np.where(long & (power > 1e-6), gain, 0.0)
-            a, b = np.unravel_index(int(np.argmax(gain)), gain.shape)
-            if gain[a, b] > best[0]:
-                best = (float(gain[a, b]), (*one, int(a), int(b)))
-        if best[1] is None:
-            break
+        found = ((windows.best(steps[one].T @ rest, grams[one], shortest), one) for one in kinds)
+        (gain, a, b), (kind, k) = max(found, key=lambda one: one[0][0])
         # what it gains, in nats, correlated samples counted for what they are, less the price of its choice
-        nats = 0.5 * best[0] / factor - math.log(tried)
+        nats = 0.5 * gain / factor - math.log(tried)
         if nats < 0.5 * math.log(max(2.0, len(left) / factor)):
             break
-        kind, k, a, b = best[1]
         vector = steps[kind, k][:, a] - (steps[kind, k][:, b] if b < len(edges) else 0.0)
         vector = vector - basis @ (basis.T @ vector)
         chosen.append((kind, k, a, b))

@@ -23,6 +23,7 @@ from ..io.statistics import correlation_factor
 from ..model.effects.effect import sized
 from ..model.spec import RUNS_OWN
 from . import evidence
+from . import windows as windows_of
 from .causes import SHORTEST, Cause, bump, column_of, library, thinned, typical_power
 from .evidence import fit_factor, unexplained
 from .search import MIN_GAIN, MIN_SHARE, Search
@@ -59,8 +60,6 @@ LEAST_NATS = 3.0
 """Evidence after all prices: one in twenty."""
 AGAIN = 2
 """Times that heat without a name is simulated with the sizes found beside it: once where it is, once as large as it is there."""
-LEAST_LEFT = 1e-3
-"""Of the squares of what a cause adds, the part that must be left beside what is taken out: of less, rounding is the most."""
 UNDONE = 0.5
 """Of what a name shows, the part that an unnamed cause takes back for a while where it may be the same cause, come or gone:
 the greater one."""
@@ -142,12 +141,6 @@ def _starts(problem: Problem) -> list[np.ndarray]:
     return out
 
 
-def _gram(columns: np.ndarray, basis: np.ndarray) -> np.ndarray:
-    """Return the products of columns with one another, a basis projected out."""
-    inside = basis.T @ columns
-    return (columns.T @ columns - inside.T @ inside).astype(float)
-
-
 def _least_squares(gram: np.ndarray, moment: np.ndarray) -> tuple[np.ndarray, int]:
     """Return the least squares of these products, and how many numbers the data fix."""
     scale = np.sqrt(np.maximum(np.diag(gram), 1e-12))
@@ -202,12 +195,12 @@ def find(
     named = np.array([one.kind == NAMED for one in single])
     whole = (matrix**2).sum(axis=0)
     power = whole - ((basis.T @ matrix) ** 2).sum(axis=0)
-    grams, often_grams = [_gram(one.columns, basis) for one in windows], []
-    powers = [_powers((one.columns.T @ one.columns).astype(float)) for one in windows]
+    grams, often_grams = [windows_of.products(one.columns, basis) for one in windows], []
+    powers = [windows_of.powers((one.columns.T @ one.columns).astype(float)) for one in windows]
     tried = len(single) + sum(one.columns.shape[1] ** 2 / 2 for one in windows)
     while len(found) < most:
         moment = matrix.T @ left
-        possible = (power > LEAST_LEFT * whole) & (either | (moment > 0))
+        possible = (power > windows_of.LEAST_LEFT * whole) & (either | (moment > 0))
         gain = np.where(possible, moment**2 / np.maximum(power, 1e-12), 0.0)
         names = float(gain[named].max(initial=0.0))
         k = int(np.argmax(np.where(named, 0.0, gain)))
@@ -215,7 +208,7 @@ def find(
         for one, gram, of_all in zip(windows, grams, powers, strict=True):
             if _within(one, found):
                 continue
-            value, a, b = _best_window(one.columns.T @ left, gram, of_all)
+            value, a, b = windows_of.best(one.columns.T @ left, gram, SHORTEST, of_all)
             if value > drop:
                 vector = one.columns[:, a] - (0.0 if b == len(gram) else one.columns[:, b])
                 drop, best, span = value, one, (one.edges[a], one.edges[b])
@@ -227,7 +220,7 @@ def find(
         # the half that one window leaves may be many more like it, and one where another was found says that there are more
         many = drop < 0.5 * (rest - len(left)) or any(one.cause.text == best.text and best.edges for one in found)
         if many and not often_grams:
-            often_grams = [_gram(one.columns, basis) for one in often]
+            often_grams = [windows_of.products(one.columns, basis) for one in often]
         for one, gram in zip(often, often_grams, strict=True) if many else ():
             moment = one.columns.T @ left
             size, numbers = _least_squares(gram, moment)
@@ -546,23 +539,3 @@ def _search_beside(problem: Problem, first: Search, final: Fit) -> Beside | None
         final = replace(final, jacobian=None)
     problem.unnamed, problem.heat = left_out
     return out
-
-
-def _powers(gram: np.ndarray) -> np.ndarray:
-    """Return the squares of every step up and down, (edges, edges + 1), from the products of steps up; the last edge is the end."""
-    square = np.append(np.diag(gram), 0.0)
-    return np.diag(gram)[:, None] + square[None, :] - 2.0 * np.pad(gram, ((0, 0), (0, 1)))
-
-
-def _best_window(moment: np.ndarray, gram: np.ndarray, of_all: np.ndarray) -> tuple[float, int, int]:
-    """Return what the best step up and down would explain, and its edges, of those that are not taken out nearly whole by now.
-
-    `of_all` are their squares with nothing taken out; the last edge is the end of the run.
-    """
-    power = _powers(gram)
-    gain = (moment[:, None] - np.append(moment, 0.0)[None, :]) ** 2 / np.maximum(power, 1e-9)
-    count = len(moment)
-    long = np.arange(count + 1)[None, :] - np.arange(count)[:, None] >= SHORTEST
-    gain = np.where(long & (power > LEAST_LEFT * of_all) & (power > 1e-6), gain, 0.0)
-    a, b = np.unravel_index(int(np.argmax(gain)), gain.shape)
-    return float(gain[a, b]), int(a), int(b)

@@ -37,6 +37,8 @@ COMES_TRUE = 0.75
 better than without it. What only takes something else's place is between the two or below."""
 HARDLY = 0.1
 """Part of what all runs tell of a declared number (its information) below which some of them leave it as all had it."""
+PINNED = 1e-5
+"""Spread, in a number's inner coordinate, that leaves it where it is."""
 STEPS = 25
 """Of one fit, at most: it begins where the whole data had it."""
 LAG = "sensor_lag"
@@ -117,6 +119,16 @@ def _hardly_shown(whole: Fit, part: Fit, kept: Sequence[int]) -> list[str]:
     ]
 
 
+def pinned(fit: Fit) -> Fit:
+    """Return a fit, made beside what has no name, whose effects stay as large as they were found: only the declared numbers,
+    and those of a run alone, are free to take that up."""
+    free = [
+        f if f.effect is None or f.run is not None else replace(f, start=float(v), prior=PINNED)
+        for f, v in zip(fit.spec.free, fit.values, strict=True)
+    ]
+    return replace(fit, spec=replace(fit.spec, free=tuple(free)))
+
+
 def errors(split: Split, fit: Fit, colour: Colour | None) -> np.ndarray:
     """Return by how much what is left out differs from what a model fitted to a split's runs predicts, degC, where that counts."""
     problem, kept = split.problem, list(split.kept)
@@ -163,14 +175,13 @@ class Unseen:
         self.lag = next((one for one in self.found.candidates if one.effect == LAG), None)
         self.lagged = self.base
         if self.lag is not None and LAG not in self.base.spec.effects:
-            lag = self.lag
-            spec = self.base.spec.with_effect(lag.effect, lag.free, lag.fixed, lag.variant, lag.also_on)
-            start = self.base.as_dict() | lag.start_at(1.0)
+            spec = self.lag.added_to(self.base.spec)
+            start = self.base.as_dict() | self.lag.start_at(1.0)
             self.lagged = replace(self.base, spec=spec, values=np.array([start[f.key] for f in spec.free]))
 
     def errors(self, fit: Fit, colour: Colour | None = None) -> np.ndarray:
         """Return the errors, degC, of runs left out, the others fitted by how errors last; empty where none can be."""
-        key = fit.spec.variant, colour
+        key = fit.spec.variant, tuple(free.prior for free in fit.spec.free), colour
         if key not in self.known:
             self.known[key] = np.concatenate([np.zeros(0), *(errors(one, fit, colour) for one in self.splits)])
         return self.known[key]
@@ -189,6 +200,15 @@ class Unseen:
         """The better one of both that know no physics but the declared, by least squares as anybody fits them."""
         return min((self.base, self.lagged), key=self.rmse)
 
+    @property
+    def plain(self) -> Fit:
+        """What is given where nothing that was found foretells as well: the declared model, with a lag where that is worth it."""
+        return self.lagged if self.rmse(self.lagged) <= self.rmse(self.base) / WORSE else self.base
+
+    def worse(self, fit: Fit) -> bool:
+        """Return whether something foretells the unseen worse than the better of both baselines."""
+        return self.own(fit) > WORSE * self.rmse(self.better)
+
     def tells(self, fit: Fit, without: Fit) -> bool:
         """Return whether most of what is off in the unseen without an effect is foretold with it: no stand-in does that."""
         return bool(self.splits) and self.own(fit) ** 2 <= FORETOLD * self.own(without) ** 2
@@ -202,18 +222,28 @@ class Unseen:
             return math.inf
         return float(off @ moved) / float(moved @ moved)
 
+    def carried(self, fit: Fit, reduced: Callable[[Fit, str], Fit]) -> Fit:
+        """Return a fit without what is of that day: no other run tells that, and beside it a part of the runs tells little of
+        the rest."""
+        for effect in fit.spec.effects:
+            if effect in OF_THAT_DAY and effect not in self.base.spec.effects:
+                fit = reduced(fit, effect)
+        return fit
+
     def kept(self, fit: Fit, reduced: Callable[[Fit, str], Fit]) -> tuple[Fit | None, list[str]]:
         """Return what predicts no worse than the better of both, names left out one by one, None where nothing of it does; and
         what is to be said of the names. Each is judged by itself, too: others may carry it along."""
         said: list[str] = []
         while self.splits:
-            found = [e for e in fit.spec.effects if e not in self.base.spec.effects]
-            names = [e for e in found if e not in OF_THAT_DAY]
-            if not names and (found or self.own(fit) <= WORSE * self.rmse(self.better)):
-                break  # what is of that day no other tells
-            fewer = {effect: reduced(fit, effect) for effect in names}
-            if self.own(fit) <= WORSE * self.rmse(self.better):
-                true = {effect: self.comes_true(fit, fewer[effect]) for effect in names}
+            bare = self.carried(fit, reduced)
+            names = [e for e in bare.spec.effects if e not in self.base.spec.effects]
+            if not names and (bare is not fit or not self.worse(fit)):
+                break
+            fewer = {effect: reduced(bare, effect) for effect in names}
+            if not self.worse(bare):
+                if bare is not fit:
+                    break  # the unseen has that day's, too: it says too little of what comes true
+                true = {effect: self.comes_true(bare, fewer[effect]) for effect in names}
                 out = min(true, key=true.__getitem__)
                 if true[out] >= COMES_TRUE:
                     break
@@ -222,16 +252,16 @@ class Unseen:
                 )
             else:
                 out = min(fewer, key=lambda effect: self.own(fewer[effect]), default="")
-                if not out or self.own(fewer[out]) >= self.own(fit):
-                    said += [self._left_out(e, fit, self.better) for e in names if e not in self.better.spec.effects]
+                if not out or self.own(fewer[out]) >= self.own(bare):
+                    said += [self._left_out(e, bare, self.better) for e in names if e not in self.better.spec.effects]
                     return None, said
-                said.append(self._left_out(out, fit, fewer[out]))
-            fit = fewer[out]
+                said.append(self._left_out(out, bare, fewer[out]))
+            fit = reduced(fit, out)
         return fit, said
 
-    def plain(self, found: Search) -> Fit:
-        """Return the better one of both, fitted to everything in a search that begins at the declared model."""
-        if self.lag is None or self.rmse(self.lagged) > self.rmse(self.base) / WORSE:
+    def refitted(self, found: Search) -> Fit:
+        """Return the plain model fitted to everything, by least squares as anybody fits it, in a search that begins at the declared."""
+        if self.lag is None or self.plain is self.base:
             return found.base
         return found.refit(found.base, [self.lag], [1.0])
 
@@ -246,8 +276,8 @@ class Unseen:
         alone = self.splits[0].alone
         return "the last part of the run (a half and a third of it)" if alone else "a run that the fit did not see"
 
-    def told(self, fit: Fit, instead: str = "") -> results.Unseen | None:
-        """Return what diagnosis.json says of it, None where nothing can be left out; `instead`: what else is to be said first."""
+    def told(self, fit: Fit, why: str = "") -> results.Unseen | None:
+        """Return what diagnosis.json says of the model that is given, None where nothing can be left out; `why` it is the plain one."""
         if not self.splits or not math.isfinite(self.own(fit)):
             return None
         mine, declared, lagged = self.own(fit), self.rmse(self.base), self.rmse(self.lagged)
@@ -257,5 +287,9 @@ class Unseen:
             declared_rmse_c=declared,
             with_lag_rmse_c=lagged,
             text=f"{self._what} is predicted to {mine:.2f} K (declared model, fitted: {declared:.2f}, with a lag: {lagged:.2f})"
-            + instead,
+            + (
+                f". The model is the declared model{WITH_LAG * (self.plain is not self.base)}, by least squares: {why}"
+                if why
+                else ""
+            ),
         )

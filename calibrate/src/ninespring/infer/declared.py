@@ -53,19 +53,7 @@ def base_spec(problem: Problem, frozen: bool = False, extra: Mapping[str, float]
             guess = float(np.nanmedian(first)) if np.isfinite(first).any() else 20.0
             coldest = float(np.nanmin(run.temperature_c))
             guess = min(guess, coldest + 3.0) if not np.any(run.drive[0] > 0) else min(guess, 25.0)
-            free.append(
-                Free(
-                    f"ambient_c@{r + 1}",
-                    float(np.clip(guess, -20.0, 60.0)),
-                    -35.0,
-                    75.0,
-                    "degC",
-                    (),
-                    False,
-                    run=r,
-                    scale=1.0,
-                )
-            )
+            free.append(Free(f"ambient_c@{r + 1}", float(np.clip(guess, -20.0, 60.0)), -35.0, 75.0, "degC", run=r))
     return Spec((), tuple(fixed.items()), tuple(free), ())
 
 

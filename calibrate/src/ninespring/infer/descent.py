@@ -40,7 +40,7 @@ class Descent:
         self.high = np.array([f.inner(f.high) for f in free])
         # what is believed before, as further residuals: (z - believed) / its standard deviation
         self.believed = np.array([f.inner(f.start) for f in free])
-        self.trust = np.array([1.0 / f.prior if f.prior else 0.0 for f in free])
+        self.trust = np.array([f.trust for f in free])
         self.mended = False
         """Slopes were mended, not simulated: the end may lie before the minimum."""
         self._cache: dict[bytes, Shown] = {}

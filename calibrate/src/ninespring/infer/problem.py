@@ -472,7 +472,8 @@ class Problem:
         values = np.array([(start or {}).get(f.key, f.start) for f in free], dtype=float)
         values = np.array([min(f.high, max(f.low, v)) for f, v in zip(free, values, strict=True)], dtype=float)
         if not free:
-            return self._as_it_is(spec, values)
+            nothing = np.zeros((self.count, 0)), None, np.zeros((0, 0))
+            return self.evaluate(Fit(spec, values, math.nan, self.count, [], *nothing))
 
         def show(numbers: np.ndarray) -> Shown:
             shown = self.predictions(spec, numbers)
@@ -502,13 +503,6 @@ class Problem:
         fit.simulations = self.simulations - begun
         return fit
 
-    def _as_it_is(self, spec: Spec, values: np.ndarray) -> Fit:
-        """Return the fit of a spec that has nothing free."""
-        left = self.residuals(self.predictions(spec, values))
-        vector = self.vector(left)
-        nothing = np.zeros((self.count, 0)), vector, np.zeros((0, 0))
-        return Fit(spec, values, float(vector @ vector), self.count, left, *nothing, sse=self.plain(left))
-
     def holdout_rmse(self, fit: Fit, colour: Colour | None = None) -> float:
         """Return the rms error, degC, on blocks held out of the fit, one fold after the other.
 
@@ -523,7 +517,7 @@ class Problem:
         free = fit.spec.free
         z = np.array([f.inner(v) for f, v in zip(free, fit.values, strict=True)])
         low, high = np.array([f.inner(f.low) for f in free]), np.array([f.inner(f.high) for f in free])
-        trust = np.array([1.0 / f.prior if f.prior else 0.0 for f in free])
+        trust = np.array([f.trust for f in free])
         believed = trust * (z - np.array([f.inner(f.start) for f in free]))
         slopes = self.plain_slopes(fit)
         left = np.concatenate(self.scaled(fit.residual))
@@ -581,7 +575,7 @@ class Problem:
             fit.factor = statistics.correlation_factor(series, self.longest_lag())
         if used:
             spread = max(1.0, fit.chi2 / max(1, fit.count - len(used)))
-            trust = np.array([1.0 / f.prior if f.prior else 0.0 for f in fit.spec.free])[used]
+            trust = np.array([f.trust for f in fit.spec.free])[used]
             inner = np.linalg.pinv(jac[:, used].T @ jac[:, used] + spread * np.diag(trust**2), rcond=1e-12)
             white = inner * spread
             blocks = self._block_of_samples()

@@ -39,6 +39,11 @@ class Free:
     ends: bool = False
     """Its bounds are the ends of what there is (none, all): a number that lies there is as good as any."""
 
+    @property
+    def trust(self) -> float:
+        """Return the inverse of `prior`, 0 where nothing is believed."""
+        return 1.0 / self.prior if self.prior else 0.0
+
     def inner(self, value: float) -> float:
         """Map to the coordinate the optimiser works in."""
         return math.log(value) if self.log else value / self.scale

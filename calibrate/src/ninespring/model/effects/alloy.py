@@ -27,34 +27,19 @@ def numbers(scene: Scene) -> tuple[Free, ...]:
     everything = tuple((name, 1.0) for name in (*start, *finish))
     opened = tuple((name, 0.5 if name.startswith("austenite") else -0.5) for name in (*start, *finish))
     # what is believed before: batches and loads shift a declared alloy by some 15 K, its hysteresis by a third of that
+    ends = ("austenite_finish_c", 1.0), ("martensite_finish_c", -1.0)
     return (
-        Free(SHIFT, 0.0, -FARTHEST_K, FARTHEST_K, "K", (), False, scale=3.0, shifts=everything, prior=5.0),
-        Free(HYSTERESIS, 0.0, 0.1 - gap, 40.0, "K", (), False, scale=2.0, shifts=opened, prior=2.5),
-        Free(
-            HEATING,
-            0.0,
-            0.5 - heating,
-            40.0,
-            "K",
-            (),
-            False,
-            scale=2.0,
-            shifts=(("austenite_finish_c", 1.0),),
-            prior=WIDTHS,
-        ),
-        Free(
-            COOLING,
-            0.0,
-            0.5 - cooling,
-            40.0,
-            "K",
-            (),
-            False,
-            scale=2.0,
-            shifts=(("martensite_finish_c", -1.0),),
-            prior=WIDTHS,
-        ),
+        _change(SHIFT, -FARTHEST_K, FARTHEST_K, everything, 5.0, 3.0),
+        _change(HYSTERESIS, 0.1 - gap, 40.0, opened, 2.5),
+        _change(HEATING, 0.5 - heating, 40.0, ends[:1], WIDTHS),
+        _change(COOLING, 0.5 - cooling, 40.0, ends[1:], WIDTHS),
     )
+
+
+def _change(
+    key: str, low: float, high: float, shifts: tuple[tuple[str, float], ...], prior: float, scale: float = 2.0
+) -> Free:
+    return Free(key, 0.0, low, high, "K", scale=scale, shifts=shifts, prior=prior)
 
 
 def places(scene: Scene) -> list[float]:

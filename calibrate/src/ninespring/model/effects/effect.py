@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 
 from ...io.results import Parameters
 from .. import native
-from ..spec import Free
+from ..spec import Free, Spec
 
 
 @dataclass(frozen=True)
@@ -38,6 +38,10 @@ class Candidate:
     """Its probes are places to start from, not directions to be combined: the best one counts."""
     slow_node: bool = False
     """A slow cause that a flexible one hides: tried in its place whatever the forecast says."""
+
+    def added_to(self, spec: Spec) -> Spec:
+        """Return a model with this effect on."""
+        return spec.with_effect(self.effect, self.free, self.fixed, self.variant, self.also_on)
 
     def start_at(self, size: float, probe: int = 0) -> dict[str, float]:
         """Return starting values for a forecast size (1: as probed)."""
