@@ -248,6 +248,7 @@ static inline void spring_estimator_take(spring_estimator_t *estimator, uint8_t 
         belief->readings++;
     }
 }
+
 /* Once in a turn: takes the readings, and moves the model's temperature and phase to what they say.
  * False if and only if it has begun anew (spring_estimator_has_begun_anew). */
 bool spring_estimator_update(spring_estimator_t *estimator, thermal_model_t *model, uint8_t spring);
