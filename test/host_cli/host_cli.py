@@ -68,6 +68,7 @@ at 16 = fail nack 1
 at 16 = fail sda_low
 at 18 = repair sda_low
 at 18 = clear
+at 18 = supply on
 at 18 = on all
 at 20 = repair nack 1
 at 20 = clear
