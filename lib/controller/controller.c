@@ -14,7 +14,6 @@
 #define SUPPLY_TICKS         3u /* the relay closes 10 ms after the second pulse */
 #define FLOOR_TURNS          (CIRCUIT_CHECK_TICKS - CIRCUIT_CHECK_TICKS / TICKS_PER_STEP)
 #define TIME_CONSTANT_MOST_S 3600ul
-#define CURRENT_MOST_MA      4095 /* the sensor ends at 3200: a step's sum of power fits 32 bits */
 
 void controller_settings_default(controller_settings_t *settings)
 {
@@ -240,20 +239,6 @@ bool controller_restart(controller_t *controller, const controller_settings_t *s
     return true;
 }
 
-/* What flows, 0..CURRENT_MOST_MA. */
-static uint16_t flowing_ma(int16_t current_ma)
-{
-    if (current_ma <= 0) {
-        return 0;
-    }
-    return current_ma > CURRENT_MOST_MA ? CURRENT_MOST_MA : (uint16_t)current_ma;
-}
-
-static uint16_t positive_mv(int16_t voltage_mv)
-{
-    return voltage_mv > 0 ? (uint16_t)voltage_mv : 0u;
-}
-
 /* The most that a duty brings to a spring, and a quarter more for a supply that is another one. */
 static uint16_t most_mv(const controller_t *controller, uint8_t spring, uint16_t duty)
 {
@@ -289,10 +274,10 @@ static uint32_t take_sensors(controller_t *controller, const controller_sensor_t
         } else if (duty == 0) {
             continue;
         }
-        sum_ma += flowing_ma(controller->measured_ma[k]);
-        const uint32_t heating_uw =
-            thermal_model_heating_uw(&controller->model, k, flowing_ma(controller->measured_ma[k]),
-                                     positive_mv(controller->measured_mv[k]));
+        sum_ma += controller_flowing_ma(controller->measured_ma[k]);
+        const uint32_t heating_uw = thermal_model_heating_uw(
+            &controller->model, k, controller_flowing_ma(controller->measured_ma[k]),
+            controller_positive_mv(controller->measured_mv[k]));
         controller->power_sum_uw[k] += heating_uw;
         controller->heat_sum_uw[k] += heating_uw;
     }
@@ -678,68 +663,6 @@ void controller_set_temperature(controller_t *controller, int16_t temperature_c7
     tell_resistances(controller);
 }
 
-bool controller_is_warm(const controller_t *controller, uint8_t spring)
-{
-    return temperature_ceiling_is_warm(&controller->ceiling, spring);
-}
-
-float controller_delivered_c(const controller_t *controller, uint8_t spring)
-{
-    return temperature_ceiling_c(&controller->ceiling, spring);
-}
-
-uint16_t controller_rest_s(const controller_t *controller, uint8_t spring)
-{
-    return temperature_ceiling_rest_s(&controller->ceiling, spring);
-}
-
-spring_bounds_t controller_temperature_bounds_c(const controller_t *controller, uint8_t spring)
-{
-    return spring_estimator_temperature_c(&controller->estimator, &controller->model, spring);
-}
-
-spring_bounds_t controller_distance_bounds_k(const controller_t *controller, uint8_t spring)
-{
-    return spring_estimator_distance_k(&controller->estimator, &controller->model, spring);
-}
-
-spring_bounds_t controller_austenite_bounds(const controller_t *controller, uint8_t spring)
-{
-    return spring_estimator_austenite(&controller->estimator, &controller->model, spring);
-}
-
-bool controller_losses(const controller_t *controller, float *factor, float *sd)
-{
-    return spring_estimator_losses(&controller->estimator, factor, sd);
-}
-
-float controller_shift_k(const controller_t *controller, uint8_t spring)
-{
-    return spring_estimator_shift_k(spring_estimator_of(&controller->estimator, spring));
-}
-
-uint16_t controller_belief_mark(const controller_t *controller, uint8_t spring)
-{
-    return spring_estimator_mark(&controller->estimator, &controller->model, spring);
-}
-
-uint8_t controller_broken_seals(const controller_t *controller)
-{
-    return spring_estimator_broken_seals(&controller->estimator);
-}
-
-const spring_sights_t *controller_sights(const controller_t *controller)
-{
-    return spring_estimator_sights(&controller->estimator);
-}
-
-float controller_cooling_s(const controller_t *controller, uint8_t spring)
-{
-    const float cooling_s =
-        spring_estimator_cooling_s(&controller->estimator, &controller->model, spring);
-    return cooling_s < CONTROLLER_COOLING_MOST_S ? cooling_s : CONTROLLER_COOLING_MOST_S;
-}
-
 spring_learnt_t controller_learnt(const controller_t *controller, uint8_t spring)
 {
     return spring_estimator_learnt(&controller->estimator, spring);
@@ -772,96 +695,4 @@ uint16_t controller_model_mark(const controller_t *controller)
         }
     }
     return crc;
-}
-
-uint8_t controller_springs(const controller_t *controller)
-{
-    return controller->springs;
-}
-
-uint16_t controller_level_permille(const controller_t *controller, uint8_t spring)
-{
-    return controller->level_permille[spring];
-}
-
-uint16_t controller_target_ma(const controller_t *controller, uint8_t spring)
-{
-    return controller->policy.spring[spring].target_ma;
-}
-
-int16_t controller_measured_ma(const controller_t *controller, uint8_t spring)
-{
-    return controller->measured_ma[spring];
-}
-
-int16_t controller_measured_mv(const controller_t *controller, uint8_t spring)
-{
-    return controller->measured_mv[spring];
-}
-
-uint32_t controller_power_uw(const controller_t *controller, uint8_t spring)
-{
-    if (controller->current.channel[spring].blind_ticks != 0 &&
-        controller_duty(controller, spring) == 0) {
-        return 0;
-    }
-    const uint32_t measured_uw = (uint32_t)flowing_ma(controller->measured_ma[spring]) *
-                                 positive_mv(controller->measured_mv[spring]);
-    return measured_uw < THERMAL_MODEL_HIGHEST_POWER_UW ? measured_uw
-                                                        : THERMAL_MODEL_HIGHEST_POWER_UW;
-}
-
-uint16_t controller_duty(const controller_t *controller, uint8_t spring)
-{
-    return current_control_duty(&controller->current, spring);
-}
-
-int16_t controller_temperature_c7(const controller_t *controller, uint8_t spring)
-{
-    return thermal_model_temperature_c7(&controller->model, spring);
-}
-
-uint16_t controller_austenite_permille(const controller_t *controller, uint8_t spring)
-{
-    return (uint16_t)((thermal_model_austenite(&controller->model, spring) * 1000ul) >> 15);
-}
-
-safety_fault_t controller_fault(const controller_t *controller, uint8_t spring)
-{
-    return safety_fault(&controller->safety, spring);
-}
-
-safety_fault_t controller_board_fault(const controller_t *controller)
-{
-    return safety_board_fault(&controller->safety);
-}
-
-uint16_t controller_limits(const controller_t *controller, uint8_t spring)
-{
-    return drive_policy_limits(&controller->policy, spring);
-}
-
-uint16_t controller_cut_ma(const controller_t *controller, uint8_t spring)
-{
-    return drive_policy_cut_ma(&controller->policy, spring);
-}
-
-drive_policy_stage_t controller_stage(const controller_t *controller, uint8_t spring)
-{
-    return drive_policy_stage(&controller->policy, spring);
-}
-
-bool controller_is_locked(const controller_t *controller)
-{
-    return safety_is_locked(&controller->safety);
-}
-
-uint8_t controller_fan_percent(const controller_t *controller)
-{
-    return controller->fan_percent;
-}
-
-drive_policy_kind_t controller_policy(const controller_t *controller)
-{
-    return (drive_policy_kind_t)controller->policy.parameters.policy;
 }

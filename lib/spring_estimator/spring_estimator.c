@@ -13,7 +13,6 @@
 #define LOSS_DRIFT_SD  0.0005f /* of the declared loss, in a second: 3 % in an hour */
 #define LOSS_DRIFT     (SPRING_ESTIMATOR_TURN_S * LOSS_DRIFT_SD * LOSS_DRIFT_SD)
 #define SHIFT_MOST_K   30.0f
-#define TRUST_SD_K     5.0f    /* of ambient, or of what a reset has kept */
 #define LEAST_SD_K     0.6f    /* parts of one spring differ by so much */
 #define KNOWN_SD_K     8.0f    /* farther off than a touch or another batch moves it */
 #define UNIFORM_SD     0.29f   /* of a width */
@@ -36,12 +35,6 @@ float spring_clamp(float value, float low, float high)
     return value < low ? low : value > high ? high : value;
 }
 
-spring_bounds_t spring_around(float value, float sd)
-{
-    const float most = SPRING_ESTIMATOR_BOUND_SDS * sd;
-    return (spring_bounds_t){value, value - most, value + most};
-}
-
 float spring_c(int16_t temperature_c7)
 {
     return (float)temperature_c7 * (1.0f / 128.0f);
@@ -62,7 +55,7 @@ float spring_ambient_c(const thermal_model_t *model)
     return spring_c(thermal_model_ambient_c7(model));
 }
 
-static float above_ambient_k(const thermal_model_t *model, uint8_t k)
+float spring_above_ambient_k(const thermal_model_t *model, uint8_t k)
 {
     return spring_c(
         (int16_t)(thermal_model_temperature_c7(model, k) - thermal_model_ambient_c7(model)));
@@ -232,7 +225,7 @@ static float predict(const spring_estimator_t *e, spring_belief_t *b, const ther
     const float rise_k = spring_c((int16_t)(now_c7 - b->last_c7));
     const float balance_w = 1e-6f * (float)thermal_model_power_to_hold_uw(model, k, now_c7);
     const float per_w = e->turn_k_per_w;
-    const float above_k = above_ambient_k(model, k);
+    const float above_k = spring_above_ambient_k(model, k);
     const float by_loss = -per_w * above_k;
     const float extra_w = b->learnt.loss_w_per_k * above_k;
     b->extra_loss_uw = (int32_t)(1e6f * extra_w);
@@ -650,22 +643,6 @@ bool spring_estimator_knows(const spring_belief_t *b)
            spring_distance_k2(b) < KNOWN_SD_K * KNOWN_SD_K;
 }
 
-float spring_estimator_sd_k(const spring_belief_t *b)
-{
-    return sqrtf(spring_distance_k2(b));
-}
-
-float spring_estimator_hold_sd_k(const spring_estimator_t *e, const thermal_model_t *model,
-                                 uint8_t k)
-{
-    const spring_belief_t *b = &e->spring[k];
-    const float above_k = above_ambient_k(model, k);
-    const float stiffness = spring_stiffness_w_per_k(b);
-    const float settles_k2 =
-        above_k * above_k * b->loss_variance / (stiffness * stiffness + 1e-12f);
-    return sqrtf(fmaxf(spring_distance_k2(b), settles_k2));
-}
-
 float spring_estimator_cooling_s(const spring_estimator_t *e, const thermal_model_t *model,
                                  uint8_t k)
 {
@@ -684,45 +661,6 @@ float spring_estimator_cooling_s(const spring_estimator_t *e, const thermal_mode
     return e->heat_capacity_j_per_k / loss * logf((hot_c - ambient_c) / (start_c - ambient_c)) +
            hottest_capacity_j_per_k(e, &transforming, &t) / loss *
                logf((left_c - ambient_c) / (finish_c - ambient_c));
-}
-
-/* What moved it lately, a gust for one, may do so again, either way. */
-static spring_bounds_t disturbed(const spring_belief_t *b, spring_bounds_t bounds)
-{
-    return (spring_bounds_t){bounds.value, bounds.low - b->disturbance_k,
-                             bounds.high + b->disturbance_k};
-}
-
-spring_bounds_t spring_estimator_temperature_c(const spring_estimator_t *e,
-                                               const thermal_model_t *model, uint8_t k)
-{
-    const spring_belief_t *b = &e->spring[k];
-    const float now_c = spring_now_c(model, k) + b->shift_k;
-    float others_k2 = SHIFT_SD_K * SHIFT_SD_K; /* where it was seen, its transformation was */
-    if (b->possible == SPRING_PHASE_ANY) {
-        const float coldest_c = spring_ambient_c(model) - SPRING_ESTIMATOR_BOUND_SDS * TRUST_SD_K;
-        return (spring_bounds_t){now_c, coldest_c, b->hottest_c};
-    }
-    if (b->possible == SPRING_PHASE_MARTENSITE) { /* as warm as room and neighbours make it */
-        const float neighbours_k =
-            SPRING_ESTIMATOR_NEIGHBOUR_SD * (now_c - spring_ambient_c(model));
-        others_k2 = TRUST_SD_K * TRUST_SD_K + neighbours_k * neighbours_k;
-    }
-    spring_bounds_t bounds =
-        disturbed(b, spring_around(now_c, sqrtf(spring_distance_k2(b) + others_k2)));
-    bounds.high += fmaxf(b->gone_k, 0.0f);
-    return bounds;
-}
-
-spring_bounds_t spring_estimator_distance_k(const spring_estimator_t *e,
-                                            const thermal_model_t *model, uint8_t k)
-{
-    const int16_t start_c7 = thermal_model_transformation(model, k).martensite_start_c7;
-    const float away_k = spring_c((int16_t)(thermal_model_temperature_c7(model, k) - start_c7));
-    const spring_belief_t *b = &e->spring[k];
-    /* what has cooled is known by the room; where it transforms is no more known than it was */
-    const float place_k2 = b->possible == SPRING_PHASE_MARTENSITE ? b->shift_variance_k2 : 0.0f;
-    return disturbed(b, spring_around(away_k, sqrtf(spring_distance_k2(b) + place_k2)));
 }
 
 uint32_t spring_estimator_model_power_uw(const spring_estimator_t *e, uint8_t k, uint32_t power_uw)

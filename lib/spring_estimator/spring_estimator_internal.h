@@ -27,6 +27,8 @@
 #define SHIFT_SD_K    3.0f /* of declared transformation temperatures */
 #define SHIFT_BOUND_K 8.0f /* 2.6 of it, or a load */
 
+#define TRUST_SD_K 5.0f /* of ambient, or of what a reset has kept */
+
 #define SLOW_TURNS 16 /* of the average: 4 s, six periods of the dither */
 #define SLOW_SHARE (1.0f / SLOW_TURNS)
 /* Of an average that is worth comparing: three times as sure as one. */
@@ -73,6 +75,7 @@ float spring_clamp(float value, float low, float high);
 spring_bounds_t spring_around(float value, float sd);
 float spring_now_c(const thermal_model_t *model, uint8_t spring);
 float spring_ambient_c(const thermal_model_t *model);
+float spring_above_ambient_k(const thermal_model_t *model, uint8_t spring);
 
 /* The model's temperature, its phase as if it came there from martensite, or from austenite
  * (SPRING_PHASE_MARTENSITE or _AUSTENITE). */
