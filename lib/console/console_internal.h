@@ -32,6 +32,7 @@ void console_out_start(console_out_t *out);
 void console_out_end(const console_t *console, console_out_t *out);
 
 /* One line of an answer that has several, by console->step; false after the last one. */
+bool console_help_line(const console_t *console, console_out_t *out);
 bool console_version_line(const console_t *console, console_out_t *out);
 bool console_model_line(const console_t *console, console_out_t *out);
 bool console_warm_line(const console_t *console, console_out_t *out);
@@ -58,6 +59,10 @@ void console_hint_text(console_t *console, const char *text, int32_t first, int3
 void console_hint_setting(console_t *console, console_hint_t hint, uint16_t row, uint8_t element);
 void console_add_setting_hint(const console_t *console, text_line_t *line);
 
+/* The line that was typed: a word with its arguments, or a setting. */
+console_error_t console_execute(console_t *console);
+/* "write on K|all [0..100]": how a word, by its number, is written. */
+void console_add_usage(text_line_t *line, uint16_t word);
 /* A line that starts with '$'. */
 console_error_t console_settings_line(console_t *console, char *line);
 /* Around each change of the settings. */
