@@ -18,7 +18,7 @@ RETURN_ADDRESS = 3  # bytes, on a chip with more than 128 KB of flash
 SAVED_BY_HELPER = 18  # registers that __prologue_saves__ can push
 
 # Who calls through a pointer, and what can be behind it. The functions behind text_output_t and
-# record_storage_t are in firmware/main.cpp, a record's bytes in settings_record.c, a word's in console.c, what scrub looks through in
+# record_storage_t are in firmware/main.cpp, a record's bytes in settings_record.c, a word's in console_words.c, what scrub looks through in
 # controller_fixed.c and console_settings.c; nothing attaches to Wire as a slave.
 OUTPUT = (r"serial_room", r"serial_write")
 STORAGE = (r"eeprom_read", r"eeprom_ready", r"eeprom_write", r"record_byte")
@@ -26,7 +26,7 @@ STRETCHES = (r"^controller_fixed$", r"^stretch_of")
 WORDS = (r"^word_\w+",)
 NOTHING = (r"twi_onSlave\w+",)
 INDIRECT: tuple[tuple[str, tuple[str, ...]], ...] = (
-    (r"^(execute|console_receive|take_input)", WORDS + OUTPUT),
+    (r"^(console_execute|console_receive|take_input)", WORDS + OUTPUT),
     (r"^(main|setup|loop|run_tick)", WORDS + OUTPUT + STORAGE),  # the linker's optimiser moves what is called once
     (
         r"^(console_|out_end|echo|answer|room_for|list_settings|selftest|start_telemetry|end_job|save|print_|apply_settings)",
