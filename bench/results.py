@@ -76,9 +76,9 @@ SECTIONS: tuple[Section, ...] = (
     Section(
         "board_swarm",
         "The board in everything at once",
-        f"{HOST}/bench/swarm/bench_swarm --runs 667 --seed 5000000 --resume build/results/board_swarm.txt",
+        f"{HOST}/bench/swarm/bench_swarm --runs 356 --seed 7000000 --resume build/results/board_swarm.txt",
     ),
-    Section("flips", "Bits that turn over", f"{HOST}/bench/swarm/bench_flips --runs 50 --boards 12 --seed 7501"),
+    Section("flips", "Bits that turn over", f"{HOST}/bench/swarm/bench_flips --runs 50 --boards 40 --seed 8001"),
     Section("mutate", "What the tests notice", "script/mutate"),
     Section("replay", "Measured logs through the on-chip model", f"{PYTHON} script/replay_fit.py"),
     Section("measured", "Measured data", f"{PYTHON} bench/diagnose/measured.py", json=False, markdown=True),
