@@ -113,7 +113,7 @@ SECTIONS: tuple[Section, ...] = (
         f"{PYTHON} bench/diagnose/real_logs.py --first 311300 --resume build/results/real_logs.json",
     ),
     Section("actuator", "A real actuator, each run alone", f"{PYTHON} bench/diagnose/actuator.py"),
-    Section("package", "How much there is to read", f"{PYTHON} bench/package.py"),
+    Section("size", "How much there is to read", f"{PYTHON} bench/size.py"),
     Section("dashboard", "The live page", f"{PYTHON} bench/dashboard/run.py"),
 )
 

@@ -1,6 +1,6 @@
 """How much there is to read: the Python package without the exploration, its long functions, belief and drive, the tests.
 
-.venv/bin/python bench/package.py [--json FILE]
+.venv/bin/python bench/size.py [--json FILE]
 """
 
 from __future__ import annotations
@@ -55,9 +55,7 @@ def figures() -> list[dict[str, Any]]:
         ("words of docs/believing.md", len((ROOT / "docs" / "believing.md").read_text("utf-8").split()), "<= 3078"),
         ("lines of test/", lines(tests), "<= 21000"),
     )
-    return [
-        {"figure": f, "value": v, "unit": "1", "target": t, "command": "python bench/package.py"} for f, v, t in rows
-    ]
+    return [{"figure": f, "value": v, "unit": "1", "target": t, "command": "python bench/size.py"} for f, v, t in rows]
 
 
 def main() -> int:
