@@ -88,7 +88,7 @@ def record(
         "port": port,
         "tool": f"ninespring {__version__}",
     }
-    with told_to_stop() as stopped:
+    with told_to_stop(last=True) as stopped:
         with (
             working(f"recording from {port}", duration) as say,
             Board(port, stopped=stopped, off_at_end=False) as board,

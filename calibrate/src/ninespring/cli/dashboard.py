@@ -100,6 +100,6 @@ def dashboard(
         source = BoardSource(port or SIMULATED, hz, folder, thermometers)
     here = listen(host.strip("[]"), int(number))
     door = door_of(here, host_names)
-    with told_to_stop() as stopped:
+    with told_to_stop(last=True) as stopped:
         out.print(f"{address_of(here, door, host_names)}   (Ctrl-C ends it)", soft_wrap=True, markup=False)
         serve(source, here, stopped, door)

@@ -298,10 +298,11 @@ class LogFile:
 
 
 @contextlib.contextmanager
-def told_to_stop() -> Iterator[Callable[[], bool]]:
+def told_to_stop(last: bool = False) -> Iterator[Callable[[], bool]]:
     """Have SIGINT, SIGTERM and SIGHUP (a closed terminal) only be noted, and tell whether one came.
 
-    What is under way is then ended in order. A signal that is ignored (nohup) stays so.
+    What is under way is then ended in order. A signal that is ignored (nohup) stays so. `last`: nothing follows but the end of
+    the program, which an impatient second signal does not turn into a failure.
     """
     told: list[int] = []
     before = {}
@@ -312,7 +313,7 @@ def told_to_stop() -> Iterator[Callable[[], bool]]:
         yield lambda: bool(told)
     finally:
         for one, handler in before.items():
-            signal.signal(one, handler)
+            signal.signal(one, signal.SIG_IGN if told and last else handler)
 
 
 def record(
