@@ -223,6 +223,7 @@ HEADLINES: tuple[tuple[str, tuple[tuple[str, str, str], ...]], ...] = (
             ("... and nothing said", "swarm", "all: the same, and nothing said for so long"),
             ("time at 95 % austenite or above", "swarm", "all: time at 95 %"),
             ("... where nothing steps", "swarm", "nothing steps: time at 95 %"),
+            ("... of it said to be away for nothing", "swarm", "all: of that, said to be away"),
             ("back at 95 % two minutes after a draught, a door, a fan", "swarm", "all: after a lasting step"),
             ("temperature and phase within their bounds", "swarm", "all: time in which true"),
         ),

@@ -31,7 +31,11 @@ static void look_for_loss(losses_spring_t *spring, double now_s, double austenit
 {
     const bool low = austenite < SCORE_LOST;
     spring->judged_s += SAMPLE_S;
-    spring->there_s += austenite >= SCORE_REACHED ? SAMPLE_S : 0.0;
+    if (austenite >= SCORE_REACHED) {
+        spring->there_s += SAMPLE_S;
+        const unsigned away = said & (BELIEF_SAID_AWAY | BELIEF_SAID_BLIND);
+        spring->away_there_s += away == BELIEF_SAID_AWAY ? SAMPLE_S : 0.0;
+    }
     last(&spring->low_s, low);
     keep_silence(&spring->unsaid_s, &spring->said_s, low, said != 0u);
     keep_silence(&spring->unreported_s, &spring->reported_s, low,

@@ -21,10 +21,11 @@ typedef enum { LOSSES_NOT_JUDGED = 0, LOSSES_BACK, LOSSES_NOT_BACK } losses_back
 
 typedef struct {
     double judged_s, there_s; /* driven and due; of that at SCORE_REACHED or above */
-    double low_s;             /* due and below SCORE_LOST on end, now */
-    double unsaid_s;          /* of that on end: nothing at all is said */
-    double unreported_s;      /* of that on end: nothing is said but that it is blind */
-    double said_s;            /* for so long something is said, on end, now */
+    double away_there_s; /* of that in which it is said to be away, though its resistance tells */
+    double low_s;        /* due and below SCORE_LOST on end, now */
+    double unsaid_s;     /* of that on end: nothing at all is said */
+    double unreported_s; /* of that on end: nothing is said but that it is blind */
+    double said_s;       /* for so long something is said, on end, now */
     double reported_s;
     double lost_at_s;   /* when it was first lost; NaN: never */
     double silent_at_s; /* when a silence first lasted LOSSES_LOST_S; NaN: never */

@@ -210,6 +210,12 @@ const figure_t figures[] = {
              r, [](const spring_t &s) { return s.losses.there_s; },
              [](const spring_t &s) { return s.losses.judged_s; });
      }},
+    {"of that, said to be away for nothing: not `blind` either", "%", "", nullptr, nullptr, 2,
+     [](const run_t &r) {
+         return sums(
+             r, [](const spring_t &s) { return s.losses.away_there_s; },
+             [](const spring_t &s) { return s.losses.there_s; });
+     }},
     {"after a lasting step of the surroundings: back at 95 % and settled within 120 s", "%",
      ">= 99", nullptr, nullptr, 2,
      [](const run_t &r) {

@@ -15,16 +15,13 @@
 #define LEVEL_BAND          0.05f /* a held level may be off by so much before it is sought again */
 #define LEVEL_POWER_W       0.4f  /* beyond the hold: heating to a level slows down */
 
-#define LOST_AT_ONCE  0.03f  /* phase lost: it is heated back */
-#define LOST_SETTLED  0.004f /* the same once the hold is at rest: a search has cost it */
-#define SETTLED_TURNS 45     /* of a hold at rest: the estimator has a line to compare with */
+#define LOST          0.004f /* phase lost: it is heated back */
 #define SEARCH_SD_K   3.0f   /* a distance known so badly is worth a search */
 #define SEARCH_END_K  (-1.0f)
 #define MARGIN_PER_SD 1.6f /* 95 % of a normal distribution, one side */
 #define MARGIN_SD_K   1.5f /* that hold_margin_k itself allows for */
 #define BLIND_BEGIN_K 4.0f /* above austenite finish: it has transformed at the likely worst */
 #define BLIND_K_PER_S (1.0f / 40.0f) /* slower than its time constant, C / G = 52 s, follows */
-#define SUSPECTED_W   0.038f         /* stops a fall of 0.1 K/s */
 #define FOLLOW_S      4.0f           /* a distance from the held temperature is closed in */
 /* Of its power, at the most, is off on the last of the way down, where it is to be read. */
 #define COOLS_SHARE         0.4f
@@ -37,7 +34,6 @@
 #define GOES_ON_C7          (4 * 128) /* below austenite start: keeps its turn */
 #define LOOK_MA             2000u /* of a spring of which much was learnt and nothing is known */
 #define LOWER_MA            800u  /* the least at which a resistance tells the phase */
-#define UNDRIVEN_SDS        2.0f
 #define RISE_SHARE          0.25f /* of a turn in the average */
 
 #define THERE 0.95f
@@ -180,9 +176,8 @@ static bool is_limited(const drive_policy_t *policy, const drive_policy_input_t 
         return false;
     }
     const float finish_c = spring_c(thermal_model_transformation(in->model, k).austenite_finish_c7);
-    return (now_c(in, k) > finish_c && !spring_estimator_lacks_phase(b, in->model, k)) ||
-           (s->rise_k_per_s < STILL_K_PER_S &&
-            spring_estimator_hottest_c(b, in->model, k) > finish_c);
+    return now_c(in, k) > finish_c || (s->rise_k_per_s < STILL_K_PER_S &&
+                                       spring_estimator_hottest_c(b, in->model, k) > finish_c);
 }
 
 static void heat(drive_policy_t *policy, const drive_policy_input_t *in, uint8_t k,
@@ -247,10 +242,10 @@ static void hold(drive_policy_t *policy, const drive_policy_input_t *in, uint8_t
     const bool full = is_full(level_permille);
     const bool sees = spring_estimator_sees(b);
     const float level = full ? 1.0f : 0.001f * (float)level_permille;
-    const bool settled = spring_estimator_rest_turns(b) >= SETTLED_TURNS;
+    const bool settled = spring_estimator_rests(b);
     const bool losing = spring_estimator_seems_to_lose(b);
     const bool lost = full && spring_estimator_possible(b) == SPRING_PHASE_AUSTENITE
-                          ? spring_estimator_lost(b) > (settled ? LOST_SETTLED : LOST_AT_ONCE)
+                          ? spring_estimator_lost(b) > LOST
                           : phase_of(in, k) < level - 2.0f * LEVEL_BAND;
     if (lost && spring_away_try(&s->away)) {
         enter(policy, in, k, DRIVE_POLICY_STAGE_HEAT, level_permille);
@@ -272,8 +267,8 @@ static void hold(drive_policy_t *policy, const drive_policy_input_t *in, uint8_t
     }
     const int16_t start_c7 = thermal_model_transformation(in->model, k).martensite_start_c7;
     const int16_t below_c7 = (int16_t)(start_c7 - thermal_model_temperature_c7(in->model, k));
-    const uint16_t holds_ma = hold_current_ma(policy, in, k, spring_c(below_c7) + s->margin_k,
-                                              losing ? SUSPECTED_W : 0.0f);
+    const uint16_t holds_ma =
+        hold_current_ma(policy, in, k, spring_c(below_c7) + s->margin_k, 0.0f);
     const uint16_t wanted_ma = (uint16_t)(holds_ma + policy->parameters.dither_ma / 2u);
     s->wanted_ma = wanted_ma < policy->parameters.probe_current_ma
                        ? policy->parameters.probe_current_ma
@@ -299,7 +294,7 @@ static bool is_there(const drive_policy_input_t *in, uint8_t k, uint16_t level_p
     const float level = 0.001f * (float)level_permille;
     if (is_full(level_permille)) {
         return spring_estimator_possible(b) == SPRING_PHASE_AUSTENITE &&
-               spring_estimator_lost(b) < LOST_AT_ONCE &&
+               spring_estimator_lost(b) < LOST &&
                spring_estimator_distance_k(in->belief, in->model, k).low > 0.0f;
     }
     return phase_of(in, k) >= level - LEVEL_BAND;
@@ -338,7 +333,8 @@ static float severity(const drive_policy_t *policy, const drive_policy_input_t *
     const float c = now_c(in, k);
     const float rise_k = c - spring_c(thermal_model_ambient_c7(in->model));
     const float highest_c =
-        c + UNDRIVEN_SDS * (spring_estimator_sd_k(b) + SPRING_ESTIMATOR_NEIGHBOUR_SD * rise_k);
+        c + SPRING_ESTIMATOR_LIKELY_SDS *
+                (spring_estimator_sd_k(b) + SPRING_ESTIMATOR_NEIGHBOUR_SD * rise_k);
     /* as it is released it falls faster than it is going to: that does not end it */
     const float rise_k_per_s = s->released ? fmaxf(s->rise_k_per_s, 0.0f) : s->rise_k_per_s;
     const float severe = derating_severity(highest_c, rise_k_per_s, limit_c);

@@ -9,24 +9,20 @@
 
 #define NOISE_FIRST 0.002f
 
-#define CAPACITY_SD    0.09f   /* of a declared heat capacity: 15 %, uniform */
-#define LOSS_DRIFT_SD  0.0005f /* of the declared loss, in a second: 3 % in an hour */
-#define LOSS_DRIFT     (SPRING_ESTIMATOR_TURN_S * LOSS_DRIFT_SD * LOSS_DRIFT_SD)
-#define SHIFT_MOST_K   30.0f
-#define LEAST_SD_K     0.6f    /* parts of one spring differ by so much */
-#define KNOWN_SD_K     8.0f    /* farther off than a touch or another batch moves it */
-#define UNIFORM_SD     0.29f   /* of a width */
-#define OFFSET_SD_V    0.005f  /* 8 mV, and 5 mA in 0.2 ohm: evenly */
-#define OFFSET_AGAIN_V 0.001f  /* by the next hold it may have moved by so much */
-#define FORGETS        0.9998f /* a turn's: a disturbance is forgotten within 20 minutes */
+#define LOSS_DRIFT_SD 0.0005f /* of the declared loss, in a second: 3 % in an hour */
+#define LOSS_DRIFT    (SPRING_ESTIMATOR_TURN_S * LOSS_DRIFT_SD * LOSS_DRIFT_SD)
+#define SHIFT_MOST_K  30.0f
+#define LEAST_SD_K    0.6f    /* parts of one spring differ by so much */
+#define OFFSET_SD_V   0.005f  /* 8 mV, and 5 mA in 0.2 ohm: evenly */
+#define FORGETS       0.9998f /* a turn's: a disturbance is forgotten within 20 minutes */
 
 #define TRUST_STILL_SDS 0.7f /* where the transformation may never show: probably over */
 #define TRUST_ONSET_SDS 1.3f /* where its beginning was seen: certainly, but for 10 % */
 
 #define EXPLAINED_LEAST 0.005f /* of a resistance: what a sensor's steps leave in one turn */
 
-#define LOOK_SD    0.12f /* by resistances that were learnt at another current */
-#define LOOK_SDS   3.0f
+#define UNPROVEN_LEAST 0.03f /* of the phase: 95 % is promised */
+
 #define LOOK_MOST  0.4f
 #define LOOK_TURNS 3
 
@@ -242,10 +238,7 @@ static float predict(const spring_estimator_t *e, spring_belief_t *b, const ther
     }
     const float heat_k = per_w * (power_w - b->gives_w);
     if (b->gone_k > 0.0f) {
-        /* where a contact has moved, what it takes up to transform may warm it */
-        const bool by_contact = b->heating && b->unsteady != 0;
-        const float latent_k = by_contact ? fmaxf(heat_k - rise_k, 0.0f) : 0.0f;
-        b->gone_k = keeps * b->gone_k + per_w * above_k * b->gone_w_per_k + latent_k;
+        b->gone_k = keeps * b->gone_k + per_w * above_k * b->gone_w_per_k;
     }
     b->last_c7 = now_c7;
     return heat_k;
@@ -316,7 +309,7 @@ static void look(spring_estimator_t *e, thermal_model_t *model, uint8_t k)
         return;
     }
     b->told = false;
-    const float unsure = LOOK_SD + LOOK_SDS * b->noise / fabsf(l->change);
+    const float unsure = LOOK_SD + SPRING_ESTIMATOR_BOUND_SDS * b->noise / fabsf(l->change);
     if (unsure > LOOK_MOST) {
         return;
     }
@@ -415,13 +408,6 @@ static void take_turn(spring_estimator_t *e, thermal_model_t *model, uint8_t k)
             spring_holding_watch(e, b, model, k, moved_k, share);
         }
     } else {
-        if (spring_is_loose(b)) {
-            if (b->full_ohm > 0.0f) { /* what it seemed to lose was the contact */
-                spring_take_back(e, b, model, k);
-                spring_is_back(b);
-            }
-            b->unproven = true; /* and so may have been what it seemed to gain */
-        }
         if (b->heating) {
             b->run.heat.mark_ohm = 0.0f;
             b->steep = false;
@@ -516,24 +502,22 @@ bool spring_estimator_lacks_phase(const spring_belief_t *b, const thermal_model_
     const int16_t finish_c7 = thermal_model_transformation(model, k).austenite_finish_c7;
     const float above_k = fabsf(spring_now_c(model, k) - spring_c(finish_c7));
     const float explained =
-        EXPLAINED_LEAST + LOOK_SDS * b->noise + COEFFICIENT_MOST_PER_K * above_k;
+        EXPLAINED_LEAST + SPRING_ESTIMATOR_BOUND_SDS * b->noise + COEFFICIENT_MOST_PER_K * above_k;
     const float less = 1.0f - b->ohm / l->austenite_ohm;
     return (l->change < 0.0f ? -less : less) > explained;
 }
 
-/* By its temperature. Where what it reads says otherwise, a load may have moved the rest away. */
+/* By its temperature. */
 static bool surely_finished(const spring_belief_t *b, const thermal_model_t *model, uint8_t k,
-                            float sds, bool lacks)
+                            float sds)
 {
-    const float unsure_k = sds * spring_estimator_sd_k(b);
-    return spring_now_c(model, k) - (lacks ? fmaxf(unsure_k, SHIFT_BOUND_K) : unsure_k) >
+    return spring_now_c(model, k) - sds * spring_estimator_sd_k(b) >
            spring_c(thermal_model_transformation(model, k).austenite_finish_c7);
 }
 
 /* It is over, by what it reads in two turns above austenite start: what its austenite read when it
  * had transformed last, or beyond; from above, what the largest coefficient makes of that where it
- * is colder. What had gone the other way, as an intermediate phase does, is back well below
- * austenite start; what is not, was none. */
+ * is colder. */
 static bool reads_austenite(const spring_belief_t *b, const thermal_model_t *model, uint8_t k)
 {
     const spring_learnt_t *l = &b->learnt;
@@ -543,14 +527,9 @@ static bool reads_austenite(const spring_belief_t *b, const thermal_model_t *mod
         b->current_a < STRONG_A || b->ohm_before[1] == 0.0f || now_c7 < t.austenite_start_c7) {
         return false;
     }
-    const bool other_way = b->full_ohm > 0.0f && b->gone * l->change > 0.0f;
-    if (other_way && !spring_comes_back(b, b->ohm / b->full_ohm - 1.0f)) {
-        return true;
-    }
     const float more = 0.5f * (b->ohm_before[0] + b->ohm_before[1]) / l->austenite_ohm - 1.0f;
     const float colder_k = fmaxf(spring_c((int16_t)(t.austenite_finish_c7 - now_c7)), 0.0f);
-    return (l->change > 0.0f) != other_way ? more > 0.0f
-                                           : more < -COEFFICIENT_MOST_PER_K * colder_k;
+    return l->change > 0.0f ? more > 0.0f : more < -COEFFICIENT_MOST_PER_K * colder_k;
 }
 
 bool spring_estimator_has_transformed(const spring_estimator_t *e, const thermal_model_t *model,
@@ -560,14 +539,10 @@ bool spring_estimator_has_transformed(const spring_estimator_t *e, const thermal
     if (b->possible == SPRING_PHASE_AUSTENITE || reads_austenite(b, model, k)) {
         return true;
     }
-    if (b->steep && b->reads) {
-        return false;
-    }
-    const bool lacks = spring_estimator_lacks_phase(b, model, k);
-    const float sds = lacks      ? SPRING_ESTIMATOR_BOUND_SDS
-                      : b->onset ? TRUST_ONSET_SDS
-                                 : TRUST_STILL_SDS;
-    return surely_finished(b, model, k, sds, lacks);
+    const float sds = spring_estimator_lacks_phase(b, model, k) ? SPRING_ESTIMATOR_BOUND_SDS
+                      : b->onset                                ? TRUST_ONSET_SDS
+                                                                : TRUST_STILL_SDS;
+    return surely_finished(b, model, k, sds);
 }
 
 void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, uint8_t k,
@@ -580,12 +555,13 @@ void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, 
     const float phase = lacks ? spring_phase_by_resistance(b) : 1.0f; /* as it read last */
     const spring_before_t before = spring_before(b, model, k);
     const bool unseen = full && b->heating && b->possible != SPRING_PHASE_AUSTENITE;
-    b->unproven = full && b->gone_k > 0.0f && b->possible != SPRING_PHASE_AUSTENITE &&
+    /* a loss too small to matter is none to prove */
+    b->unproven = full && b->lost > UNPROVEN_LEAST && b->gone_k > 0.0f &&
+                  b->possible != SPRING_PHASE_AUSTENITE &&
                   thermal_model_temperature_c7(model, k) <
                       thermal_model_transformation(model, k).austenite_finish_c7;
     if (full && b->possible != SPRING_PHASE_AUSTENITE) {
-        b->blind = b->blind || b->possible == SPRING_PHASE_MARTENSITE ||
-                   (!lacks && b->heating && b->onset && !spring_has_grown(b));
+        b->blind = b->blind || b->possible == SPRING_PHASE_MARTENSITE;
         b->possible = SPRING_PHASE_AUSTENITE;
         spring_set_temperature(model, k, now_c, SPRING_PHASE_AUSTENITE);
     } else if (!full && b->possible == SPRING_PHASE_AUSTENITE) {
@@ -594,7 +570,7 @@ void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, 
     /* as hot as it takes whatever it reads, or ended twice by a limit: what it reads tells nothing
      */
     const bool certain = lacks && ((b->heating && spring_heated_enough(e, b, model, k)) ||
-                                   surely_finished(b, model, k, SPRING_ESTIMATOR_BOUND_SDS, true));
+                                   surely_finished(b, model, k, SPRING_ESTIMATOR_BOUND_SDS));
     const bool wrong = certain || (lacks && b->doubted);
     b->blind = b->blind || wrong;
     b->doubted = lacks && !b->blind;
@@ -609,9 +585,6 @@ void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, 
     b->losing = 0;
     const bool strong = full && b->reads && b->current_a > STRONG_A;
     spring_begin_hold_line(b, strong);
-    if (strong) {
-        b->offset_sd_v = fmaxf(b->offset_sd_v, OFFSET_AGAIN_V);
-    }
     if (unseen) {
         spring_note(e, model, k, SPRING_SIGHT_UNSEEN, &before, 0.0f, 0.0f);
     }
@@ -640,7 +613,7 @@ bool spring_estimator_blind(const spring_belief_t *b)
 bool spring_estimator_knows(const spring_belief_t *b)
 {
     return spring_estimator_sees(b) && !b->unproven &&
-           spring_distance_k2(b) < KNOWN_SD_K * KNOWN_SD_K;
+           spring_distance_k2(b) < SHIFT_BOUND_K * SHIFT_BOUND_K;
 }
 
 float spring_estimator_cooling_s(const spring_estimator_t *e, const thermal_model_t *model,

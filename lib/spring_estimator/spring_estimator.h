@@ -22,7 +22,9 @@ extern "C" {
 #define SPRING_ESTIMATOR_MAX_SPRINGS  THERMAL_MODEL_MAX_SPRINGS
 #define SPRING_ESTIMATOR_TURN_S       0.25f  /* between two updates of a spring */
 #define SPRING_ESTIMATOR_HOTTEST_C    120.0f /* that a spring may be when the power comes on */
+#define SPRING_ESTIMATOR_REST_TURNS   40u    /* 10 s: the average of the readings has settled */
 #define SPRING_ESTIMATOR_BOUND_SDS    2.6f  /* standard deviations: 99 % of a normal distribution */
+#define SPRING_ESTIMATOR_LIKELY_SDS   2.0f  /* 95 % */
 #define SPRING_ESTIMATOR_NEIGHBOUR_SD 0.15f /* of the rise of a spring that its neighbours heat */
 /* Ticks with a turn, each of one spring in ten; in every fifth tick, as the model steps, is none.
  */
@@ -54,19 +56,16 @@ typedef struct {
 
 /* Of the running heating. */
 typedef struct {
-    float begun_c;       /* where it began, at the coldest */
-    float begun_missing; /* what was still to transform then, at the most, 0..1 */
-    float heat_k;        /* taken up, over heat capacity; less while it waits for its turn */
-    float peak_k;        /* the most of it */
-    float mark_k;        /* where the resistance was last compared, and what it was */
-    float mark_ohm;      /* 0: nowhere yet */
-    float mark_a;        /* at this current */
+    float begun_c;  /* where it began, at the coldest */
+    float heat_k;   /* taken up, over heat capacity; less while it waits for its turn */
+    float peak_k;   /* the most of it */
+    float mark_k;   /* where the resistance was last compared, and what it was */
+    float mark_ohm; /* 0: nowhere yet */
+    float mark_a;   /* at this current */
     float onset_ohm;
     float onset_k;  /* heat taken up until then; until it is seen, until its change began */
     float cold_ohm; /* at its beginning, martensite; 0: it was not */
     float cold_c;
-    float cold_k; /* heat taken up until then */
-    float cold_a;
     float excess; /* change that no temperature coefficient explains; signed */
     float flat_k; /* heat since, without such a change */
 } spring_heat_t;
@@ -78,8 +77,6 @@ typedef struct {
     float variance;   /* of the line itself, relative */
     float way_k;      /* how far its temperature has moved since */
     float slow_k;     /* the same, averaged as the readings are */
-    float from_ohm;   /* what it read on the way down first; 0: nothing yet */
-    float from_k;     /* and how far it had moved from there when the line began */
     float rise_per_k; /* what a kelvin adds to it, relative */
     float rise_sd_per_k;
     float was_ohm[2]; /* its average 4 and 8 s earlier; 0: it was begun anew since */
@@ -150,9 +147,7 @@ typedef struct {
     float noise;         /* standard deviation of one turn's, relative */
     int16_t last_c7;     /* the model's temperature a turn ago */
     int16_t moved_c7;    /* by how much the last turn has moved it */
-    /* the last loss, until its heating has brought it back */
-    float full_ohm;     /* what it read before, at martensite start; 0: no such loss */
-    float gone;         /* and by how much less it read then, relative, signed */
+    /* doubt: what it lost may have been none */
     float gone_k;       /* what its distance */
     float gone_w_per_k; /* and loss were moved by */
     /* it heats, or it does not */
@@ -307,9 +302,9 @@ static inline bool spring_estimator_seems_to_lose(const spring_belief_t *belief)
     return belief->losing != 0;
 }
 /* Turns for which its temperature has hardly moved in its hold, saturating. */
-static inline uint8_t spring_estimator_rest_turns(const spring_belief_t *belief)
+static inline bool spring_estimator_rests(const spring_belief_t *belief)
 {
-    return belief->quiet;
+    return belief->quiet > SPRING_ESTIMATOR_REST_TURNS;
 }
 /* By how much its temperature has moved in its last turn, 1/128 K. */
 static inline int16_t spring_estimator_moved_c7(const spring_belief_t *belief)

@@ -24,7 +24,11 @@
 /* Currents that differ by less of them show a sensor's offset, and its noise, alike. */
 #define SAME_CURRENT 0.1f
 
-#define SHIFT_SD_K    3.0f /* of declared transformation temperatures */
+#define SURE_SDS 5.0f /* what noise never does in months */
+
+#define UNIFORM_SD 0.29f /* of a width that is evenly filled: 1 / sqrt(12) */
+
+#define SHIFT_SD_K    3.0f /* of declared transformation temperatures; a seen one's place */
 #define SHIFT_BOUND_K 8.0f /* 2.6 of it, or a load */
 
 #define TRUST_SD_K 5.0f /* of ambient, or of what a reset has kept */
@@ -34,11 +38,16 @@
 /* Of an average that is worth comparing: three times as sure as one. */
 #define ANCHOR_TURNS 8
 
+#define LOOK_SD                                                                                    \
+    0.12f /* of a phase by resistances that were learnt at another current, or declared */
+
 #define LEARNT_AT_C 20.0f /* a learnt martensite's resistance is that at this temperature */
 
-#define LOSS_SD    0.12f /* of a declared loss: 20 % */
-#define LEAST_LOSS 0.8f  /* of a declared loss: with it the hottest possible spring cools */
-#define LOSS_MOST  0.45f /* of the declared loss: no more is ever believed */
+#define LOSS_TOLERANCE 0.2f  /* of a declared loss, either way; a draught, a door */
+#define LOSS_SD        0.12f /* of that, evenly */
+#define LEAST_LOSS     (1.0f - LOSS_TOLERANCE)
+#define CAPACITY_SD    0.09f /* of a declared heat capacity: 15 %, evenly */
+#define LOSS_MOST      0.45f /* of the declared loss: no more is ever believed */
 
 #define OFFSET_MOST_V 0.012f /* no sensor's is larger */
 
@@ -125,9 +134,6 @@ bool spring_is_loose(const spring_belief_t *belief);
 void spring_jump(spring_belief_t *belief, float by);
 /* Told by its own resistances, both of which were learnt, 0..1. */
 float spring_phase_by_resistance(const spring_belief_t *belief);
-/* What looked like martensite's onset went on as only a transformation does: it was no contact's
- * step. */
-bool spring_has_grown(const spring_belief_t *belief);
 /* It has transformed: what it reads now is its own austenite's, and the way there its change. */
 void spring_learn_austenite(spring_belief_t *belief);
 
@@ -136,13 +142,6 @@ void spring_begin_hold_line(spring_belief_t *belief, bool now);
 /* Even the coldest and heaviest spring has transformed by the heat of this heating. */
 bool spring_heated_enough(const spring_estimator_t *estimator, const spring_belief_t *belief,
                           const thermal_model_t *model, uint8_t spring);
-/* What it had lost was none: it is as hot as if it had not. */
-void spring_take_back(spring_estimator_t *estimator, spring_belief_t *belief,
-                      thermal_model_t *model, uint8_t spring);
-/* Of what it had gone by, missing (relative, signed) is still gone: nearer to being back. */
-bool spring_comes_back(const spring_belief_t *belief, float missing);
-/* What it had lost was phase: it comes back. */
-void spring_is_back(spring_belief_t *belief);
 /* What the sensor's offset may add to a resistance from one current to another, relative. */
 float spring_offset_may_show(const spring_belief_t *belief, float ohm, float from_a, float to_a);
 /* While it heats: what heat does to its resistance. */

@@ -7,39 +7,29 @@
 #define STEP_PER_NOISE 1600.0f /* so that a slope's noise is half of the largest coefficient */
 #define EXCESS_SEEN    0.01f   /* a change that no coefficient explains, and that is no noise */
 #define EXCESS_SDS     4.0f
-#define STEEP_SDS      2.0f
 #define CHANGE_LEAST   0.03f /* of a whole transformation, else it is none */
-#define CHANGE_PART    0.15f /* of a transformation: less to come may not show */
 #define FLAT_K         4.0f  /* of heat without a change: it is over */
 /* The last of a cosine is flatter than the largest coefficient, the longer the less it changes:
  * 2 (0.0015 / 0.85) H^2 / pi^2, H = 47 K of heat from its start to its finish. */
-#define FLAT_CHANGE_K   0.8f
-#define ONSET_K         2.0f /* beyond austenite start it is noticed */
-#define PLACE_SD_K      3.0f
-#define CAPACITY_BOUND  1.25f /* 2.6 standard deviations of a heat capacity more */
-#define CAPACITY_LIKELY 1.12f /* 1.3 of them */
-#define LEAST_PART      0.5f  /* of a known change: a contact's step, flat afterwards, is less */
-#define LEAST_HEAT      0.74f /* latent heat 15 % less than declared, heat capacity 15 % more */
+#define FLAT_CHANGE_K  0.8f
+#define ONSET_K        2.0f  /* beyond austenite start it is noticed */
+#define CAPACITY_BOUND 1.25f /* 2.6 standard deviations of a heat capacity more */
 /* Of a declared martensite's resistance: 15 %, a sensor's gain of 3 %, a contact of 30 mohm, a
  * coefficient in print over 68 K: 0.81 to 1.53. */
-#define UNLIKE_LEAST    0.75f
-#define UNLIKE_MOST     1.6f
-#define COLD_SPAN_K     20.0f   /* least, over which a coefficient is learnt */
-#define OWN_SDS         3.7f    /* 2.6 standard deviations of a difference of two turns */
-#define OWN_LEAST_PER_K 0.0002f /* a martensite's line is as straight as that */
+#define UNLIKE_LEAST 0.75f
+#define UNLIKE_MOST  1.6f
+#define COLD_SPAN_K  20.0f /* least, over which a coefficient is learnt */
 
 void spring_estimator_begin_heating(spring_estimator_t *e, const thermal_model_t *model, uint8_t k)
 {
     spring_belief_t *b = &e->spring[k];
     if (b->possible == SPRING_PHASE_AUSTENITE) {
-        b->possible = b->lost < CHANGE_PART ? SPRING_PHASE_BETWEEN | SPRING_PHASE_AUSTENITE
-                                            : SPRING_PHASE_BETWEEN;
+        b->possible = SPRING_PHASE_BETWEEN | SPRING_PHASE_AUSTENITE;
     }
     const float coldest_c =
         spring_now_c(model, k) - SPRING_ESTIMATOR_BOUND_SDS * spring_estimator_sd_k(b);
     b->run.heat = (spring_heat_t){
         .begun_c = fmaxf(coldest_c, spring_ambient_c(model)),
-        .begun_missing = 1.0f - spring_estimator_austenite(e, model, k).low,
     };
     b->onset = b->steep = b->unlike = false;
     b->heating = true;
@@ -63,9 +53,8 @@ static void see_onset(spring_estimator_t *e, spring_belief_t *b, thermal_model_t
     const spring_before_t before = spring_before(b, model, k);
     const float now_c = spring_now_c(model, k);
     b->onset = true;
-    if (b->unsteady == 0) { /* else it may be the contact again */
-        spring_is_back(b);
-    }
+    b->gone_k = b->gone_w_per_k = 0.0f; /* what it had lost was phase: it comes back */
+    b->unproven = false;
     if (b->possible == SPRING_PHASE_MARTENSITE) {
         spring_learnt_t *l = &b->learnt;
         if (b->run.heat.cold_ohm > 0.0f && now_c > b->run.heat.cold_c + COLD_SPAN_K) {
@@ -77,13 +66,11 @@ static void see_onset(spring_estimator_t *e, spring_belief_t *b, thermal_model_t
             if (rise_per_k > COEFFICIENT_LEAST_PER_K && rise_per_k < COEFFICIENT_MOST_PER_HEAT_K) {
                 l->martensite_rise_per_k = rise_per_k;
                 l->martensite_ohm = martensite_ohm;
-            } else if (rise_per_k * l->change > 0.0f) { /* it had begun while nothing was read */
-                b->run.heat.onset_ohm = b->run.heat.cold_ohm;
             } /* else a contact has moved */
         }
         const float seen_c = onset_c(e, b, model, k);
-        (void)spring_see(e, b, model, k, seen_c, PLACE_SD_K, SPRING_PHASE_MARTENSITE);
-        spring_note(e, model, k, SPRING_SIGHT_ONSET, &before, seen_c, PLACE_SD_K);
+        (void)spring_see(e, b, model, k, seen_c, SHIFT_SD_K, SPRING_PHASE_MARTENSITE);
+        spring_note(e, model, k, SPRING_SIGHT_ONSET, &before, seen_c, SHIFT_SD_K);
     } else {
         spring_note(e, model, k, SPRING_SIGHT_ONSET, &before, 0.0f, 0.0f);
     }
@@ -112,25 +99,18 @@ static void see_finish(spring_estimator_t *e, spring_belief_t *b, thermal_model_
     b->lost = 0.0f;
     const int16_t finish_c7 = thermal_model_transformation(model, k).austenite_finish_c7;
     const float seen_c = spring_c(finish_c7) + beyond_k;
-    (void)spring_see(e, b, model, k, seen_c, PLACE_SD_K, SPRING_PHASE_AUSTENITE);
-    spring_note(e, model, k, SPRING_SIGHT_FINISH, &before, seen_c, PLACE_SD_K);
+    (void)spring_see(e, b, model, k, seen_c, SHIFT_SD_K, SPRING_PHASE_AUSTENITE);
+    spring_note(e, model, k, SPRING_SIGHT_FINISH, &before, seen_c, SHIFT_SD_K);
 }
 
 /* Heat by which even the coldest and heaviest spring has come so far. */
 static float most_heat_k(const spring_estimator_t *e, const spring_belief_t *b, int16_t limit_c7)
 {
     /* what does not show takes no latent heat */
-    const float latent_k = b->onset ? b->run.heat.begun_missing * e->latent_k : 0.0f;
+    const float latent_k = b->onset ? e->latent_k : 0.0f;
     /* where some austenite is left for certain, its transformation is where it was */
     const float shift_k = (b->possible & SPRING_PHASE_AUSTENITE) != 0 ? 0.0f : SHIFT_BOUND_K;
     return (spring_c(limit_c7) + shift_k - b->run.heat.begun_c + latent_k) * CAPACITY_BOUND;
-}
-
-/* The same of one that has lost phase in a hold, and is heated again: where it was is known, and
- * so is how much it lacks. Beyond it a contact is as likely. */
-static float again_heat_k(const spring_estimator_t *e, const spring_belief_t *b, int16_t limit_c7)
-{
-    return (spring_c(limit_c7) - b->run.heat.begun_c + b->lost * e->latent_k) * CAPACITY_LIKELY;
 }
 
 bool spring_heated_enough(const spring_estimator_t *e, const spring_belief_t *b,
@@ -153,19 +133,13 @@ static void hold_back(spring_estimator_t *e, spring_belief_t *b, thermal_model_t
     if (thermal_model_temperature_c7(model, k) <= limit_c7) {
         return;
     }
-    const bool again = !martensite && b->full_ohm > 0.0f &&
-                       spring_estimator_hottest_c(b, model, k) < spring_c(limit_c7) + SHIFT_BOUND_K;
     /* after a look its temperature is a guess; once its transformation was seen, it is known, but
      * for what the surroundings have done since */
     const bool guess = b->shift_variance_k2 >= SHIFT_SD_K * SHIFT_SD_K;
-    const bool waits = martensite || ((b->onset ? b->run.heat.flat_k < FLAT_K : guess || again) &&
+    const bool waits = martensite || ((b->onset ? b->run.heat.flat_k < FLAT_K : guess) &&
                                       spring_estimator_lacks_phase(b, model, k));
     const bool shows = b->steep || (b->learnt.austenite_ohm > 0.0f && !b->blind && waits);
-    const float most_k = again ? again_heat_k(e, b, limit_c7) : most_heat_k(e, b, limit_c7);
-    if (shows && b->run.heat.heat_k < most_k) {
-        if (again) { /* if nothing was lost, it is warmer by that */
-            b->gone_k += spring_now_c(model, k) - spring_c(limit_c7);
-        }
+    if (shows && b->run.heat.heat_k < most_heat_k(e, b, limit_c7)) {
         const spring_before_t before = spring_before(b, model, k);
         spring_set_temperature(model, k, spring_c(limit_c7), SPRING_PHASE_MARTENSITE);
         spring_note_on(e, model, k, SPRING_SIGHT_TRANSFORMS, &before, spring_c(limit_c7), 0.0f);
@@ -180,64 +154,26 @@ static bool may_transform(const spring_belief_t *b, const thermal_model_t *model
                spring_c(thermal_model_transformation(model, k).austenite_start_c7);
 }
 
-/* By as much as a transformation does: one whose change is known, by so much of it at least. */
-static bool has_changed(const spring_belief_t *b)
+/* It changes no more, in more heat than the last of its change may hide in; and what it changed by
+ * since its onset was no contact's step: it went on, as only a transformation does, by no less than
+ * any. */
+static bool is_over(const spring_belief_t *b, float unseen_k)
 {
-    const float least = b->learnt.austenite_ohm > 0.0f
-                            ? LEAST_PART * fabsf(b->learnt.change) * b->run.heat.begun_missing
-                            : CHANGE_LEAST;
-    return fabsf(b->ohm / b->run.heat.onset_ohm - 1.0f) > fmaxf(least, CHANGE_LEAST);
+    const bool grown = b->run.heat.cold_ohm == 0.0f || fabsf(b->run.heat.excess) > EXCESS_SEEN;
+    return b->run.heat.flat_k >= FLAT_K + unseen_k && grown &&
+           fabsf(b->ohm / b->run.heat.onset_ohm - 1.0f) > CHANGE_LEAST;
 }
 
-bool spring_has_grown(const spring_belief_t *b)
-{
-    return b->run.heat.cold_ohm == 0.0f || fabsf(b->run.heat.excess) > EXCESS_SEEN;
-}
-
-/* Else it may only pause: a load may have moved the rest of its transformation away. */
-static bool has_taken_enough(const spring_estimator_t *e, const spring_belief_t *b,
-                             const thermal_model_t *model, uint8_t k)
-{
-    if (b->learnt.austenite_ohm > 0.0f) {
-        return !spring_estimator_lacks_phase(b, model, k);
-    }
-    const float latent_k = b->run.heat.begun_missing * e->latent_k;
-    return b->run.heat.heat_k - b->run.heat.onset_k > LEAST_HEAT * latent_k;
-}
-
-/* unseen_k: heat in which the last of its change may hide. */
-static bool is_over(const spring_estimator_t *e, const spring_belief_t *b,
-                    const thermal_model_t *model, uint8_t k, float unseen_k)
-{
-    const float flat_k = b->run.heat.flat_k - FLAT_K;
-    if (flat_k < unseen_k) {
-        return false;
-    }
-    return (flat_k >= SHIFT_BOUND_K || has_taken_enough(e, b, model, k)) && spring_has_grown(b) &&
-           has_changed(b);
-}
-
-/* What no temperature coefficient makes of a change over step_k of heat: one in print, and while it
- * is martensite, as it has shown since it was cold, or less, as heat that transforms it warms it
- * less. */
+/* What no temperature coefficient in print makes of a change over step_k of heat. */
 static float unexplained(const spring_belief_t *b, float change, float step_k)
 {
     const spring_heat_t *heat = &b->run.heat;
-    float least_per_k = COEFFICIENT_LEAST_PER_HEAT_K;
-    float most_per_k = COEFFICIENT_MOST_PER_HEAT_K;
-    const float way_k = heat->mark_k - heat->cold_k;
-    if (b->possible == SPRING_PHASE_MARTENSITE && heat->cold_ohm > 0.0f && way_k > COLD_SPAN_K) {
-        const float own_per_k = (heat->mark_ohm / heat->cold_ohm - 1.0f) / way_k;
-        const float unsure_per_k = OWN_SDS * b->noise / way_k + OWN_LEAST_PER_K;
-        least_per_k = fmaxf(least_per_k, fminf(own_per_k, 0.0f) - unsure_per_k);
-        most_per_k = fminf(most_per_k, fmaxf(own_per_k, 0.0f) + unsure_per_k);
-    }
     float offset = 0.0f;
     if (fabsf(b->current_a - heat->mark_a) > SAME_CURRENT * b->current_a) {
         offset = spring_offset_may_show(b, b->ohm, heat->mark_a, b->current_a);
     }
-    const float more = change - (most_per_k * step_k + offset);
-    const float less = change - (least_per_k * step_k - offset);
+    const float more = change - (COEFFICIENT_MOST_PER_HEAT_K * step_k + offset);
+    const float less = change - (COEFFICIENT_LEAST_PER_HEAT_K * step_k - offset);
     return more > 0.0f ? more : less < 0.0f ? less : 0.0f;
 }
 
@@ -255,13 +191,9 @@ void spring_heating_watch(spring_estimator_t *e, spring_belief_t *b, thermal_mod
         b->run.heat.mark_ohm = 0.0f;
         return;
     }
-    if (b->possible == SPRING_PHASE_MARTENSITE &&
-        (b->run.heat.cold_ohm == 0.0f ||
-         b->current_a > (1.0f + SAME_CURRENT) * b->run.heat.cold_a)) {
+    if (b->possible == SPRING_PHASE_MARTENSITE && b->run.heat.cold_ohm == 0.0f) {
         b->run.heat.cold_ohm = b->ohm;
-        b->run.heat.cold_a = b->current_a;
         b->run.heat.cold_c = spring_now_c(model, k);
-        b->run.heat.cold_k = b->run.heat.heat_k;
         b->unlike =
             b->ohm < UNLIKE_LEAST * e->martensite_ohm || b->ohm > UNLIKE_MOST * e->martensite_ohm;
     }
@@ -288,10 +220,8 @@ void spring_heating_watch(spring_estimator_t *e, spring_belief_t *b, thermal_mod
         b->run.heat.onset_ohm = b->run.heat.mark_ohm;
         b->run.heat.onset_k = b->run.heat.mark_k;
     }
-    /* a jump in mid-turn shows half in each: an onset's next step may be the rest of it */
-    const bool rest = b->onset && b->run.heat.mark_k <= b->run.heat.onset_k;
-    b->run.heat.excess += against || rest ? 0.0f : excess;
-    b->steep = b->onset && fabsf(excess) > STEEP_SDS * b->noise;
+    b->run.heat.excess += against ? 0.0f : excess;
+    b->steep = b->onset && fabsf(excess) > SPRING_ESTIMATOR_LIKELY_SDS * b->noise;
     if (b->steep || !b->onset) {
         b->run.heat.flat_k = 0.0f;
     }
@@ -312,7 +242,7 @@ void spring_heating_watch(spring_estimator_t *e, spring_belief_t *b, thermal_mod
                                       : b->ohm / b->run.heat.onset_ohm - 1.0f;
         const float unseen_k = spring_clamp(FLAT_CHANGE_K / (fabsf(change_seen) + 0.001f) - FLAT_K,
                                             0.0f, SHIFT_BOUND_K);
-        if (is_over(e, b, model, k, unseen_k)) {
+        if (is_over(b, unseen_k)) {
             see_finish(e, b, model, k, b->run.heat.flat_k - unseen_k);
             spring_note_read(e, k, change, b->noise);
         }

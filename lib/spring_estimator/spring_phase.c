@@ -1,9 +1,7 @@
 #include "spring_estimator_internal.h"
 
-#define PHASE_SD       0.02f
-#define PHASE_READ_SD  0.08f /* by its own resistances */
-#define PHASE_ONE_SD   0.12f /* by one of its own, the other declared */
-#define PHASE_BLIND_SD 0.3f
+#define PHASE_SD      0.02f
+#define PHASE_READ_SD 0.08f /* by its own resistances */
 
 /* What the phase is told by: the best that there is. */
 typedef enum { BY_MODEL, BY_LOSS, BY_RESISTANCE, BY_MARTENSITE } phase_source_t;
@@ -60,11 +58,11 @@ static float phase_sd(const spring_estimator_t *e, const thermal_model_t *model,
     const spring_belief_t *b = &e->spring[k];
     switch (phase_source(b)) {
     case BY_LOSS:
-        return spring_estimator_blind(b) ? PHASE_BLIND_SD : PHASE_SD;
+        return spring_estimator_blind(b) ? UNIFORM_SD : PHASE_SD;
     case BY_RESISTANCE:
         return PHASE_READ_SD;
     case BY_MARTENSITE:
-        return PHASE_ONE_SD;
+        return LOOK_SD;
     case BY_MODEL:
         break;
     }
@@ -72,7 +70,7 @@ static float phase_sd(const spring_estimator_t *e, const thermal_model_t *model,
     return b->possible == SPRING_PHASE_MARTENSITE &&
                    spring_estimator_temperature_c(e, model, k).high < spring_c(start_c7)
                ? PHASE_SD
-               : PHASE_BLIND_SD;
+               : UNIFORM_SD;
 }
 
 spring_bounds_t spring_estimator_austenite(const spring_estimator_t *e,

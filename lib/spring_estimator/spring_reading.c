@@ -9,11 +9,8 @@
 #define NOISE_SHARE    0.06f
 #define BEND_TO_SD     0.512f /* mean size of a second difference: 1 / (sqrt(6) sqrt(2 / pi)) */
 /* Of a resistance in a turn. */
-#define JUMP_OF_HOLD 0.01f  /* 0.4 W change 1 % of the phase, 0.3 % of it */
-#define HEATS_A_TURN 0.015f /* 2 W change 6 % of the phase */
-#define JUMP_ON_WAY  0.03f  /* 20 K since it was read, by the largest coefficient */
-#define JUMP_OF_LOAD 0.08f  /* 16 K at once, latent heat kept: 40 % of the phase */
-#define JUMP_SDS     5.0f
+#define JUMP_OF_HOLD 0.03f /* 20 K since it was read, by the largest coefficient */
+#define JUMP_OF_LOAD 0.08f /* 16 K at once, latent heat kept: 40 % of the phase */
 #define JUMP_TURNS   1024u /* a jump is forgotten in four minutes, one after the other */
 /* One jump has moved it, two went and came back: a third will come. */
 #define LOOSE_TURNS (2u * JUMP_TURNS)
@@ -36,11 +33,9 @@ void spring_jump(spring_belief_t *b, float by)
         b->run.heat.cold_ohm *= by;
     } else if (b->run.line.ohm > 0.0f) {
         b->run.line.ohm *= by;
-        b->run.line.from_ohm *= by;
         b->run.line.was_ohm[0] = b->run.line.was_ohm[1] = 0.0f;
         b->slow_ohm = b->run.line.ohm * (1.0f + b->run.line.rise_per_k * b->run.line.slow_k);
     }
-    b->full_ohm *= by;
     b->learnt.austenite_ohm *= by;
     b->learnt.martensite_ohm *= by;
     b->ohm_before[0] = b->ohm_before[1] = 0.0f;
@@ -61,8 +56,7 @@ static bool leave_out(spring_estimator_t *e, const thermal_model_t *model, uint8
 {
     spring_belief_t *b = &e->spring[k];
     const bool holds = !b->heating && b->run.line.ohm > 0.0f;
-    const bool half_way = b->ohm_before[1] > 0.0f; /* the turn between may have been */
-    const float was_ohm = holds ? b->slow_ohm : b->ohm_before[half_way];
+    const float was_ohm = holds ? b->slow_ohm : b->ohm_before[0];
     const float step = ohm - was_ohm;
     const float likely = holds ? JUMP_OF_HOLD : JUMP_OF_LOAD;
     if (fabsf(step) <= likely * was_ohm || b->fresh == 0 || was_ohm <= 0.0f) {
@@ -76,13 +70,11 @@ static bool leave_out(spring_estimator_t *e, const thermal_model_t *model, uint8
               : current_a > STRONG_A && b->current_a > fmaxf(STRONG_A, 0.5f * current_a);
     /* no hold gains phase at once; it loses it by a load, where no contact has moved lately */
     const bool by_load = step * b->learnt.change < 0.0f && b->unsteady == 0;
-    const float least = !holds || by_load             ? JUMP_OF_LOAD
-                        : b->averaged >= ANCHOR_TURNS ? JUMP_OF_HOLD
-                                                      : JUMP_ON_WAY;
+    const float least = !holds || by_load ? JUMP_OF_LOAD : JUMP_OF_HOLD;
     const float noise = b->noise * fmaxf(b->current_a / current_a, 1.0f); /* it is the voltage's */
-    const float explained = holds ? spring_offset_may_show(b, was_ohm, b->run.line.a, current_a)
-                                  : HEATS_A_TURN * (float)(b->unread + half_way);
-    const float most = least + JUMP_SDS * noise + explained;
+    const float offset =
+        holds ? spring_offset_may_show(b, was_ohm, b->run.line.a, current_a) : 0.0f;
+    const float most = least + SURE_SDS * noise + offset;
     const bool jumps = compares && fabsf(step) > most * was_ohm;
     if (jumps && b->odd) {
         spring_jump(b, ohm / was_ohm);

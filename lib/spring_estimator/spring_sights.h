@@ -26,8 +26,6 @@ typedef enum {
     SPRING_SIGHT_LOST,       /* held, it began to lose phase */
     SPRING_SIGHT_KEPT,       /* held, it lost none: it is no colder than that lets it be */
     SPRING_SIGHT_TRANSFORMS, /* heated, it still transforms: it is no hotter than that lets it be */
-    SPRING_SIGHT_BACK,       /* what it had lost came back: it was phase */
-    SPRING_SIGHT_TAKEN_BACK, /* what it had lost did not come back: it was none */
     SPRING_SIGHT_JUMPED,     /* a contact or the sensor jumped: no phase changes so fast */
     SPRING_SIGHT_LOOKED, /* nothing was known; by what was learnt its resistance tells a phase */
     SPRING_SIGHT_TOLD,   /* a hint, or what a reset has kept */

@@ -2,8 +2,6 @@
 
 #include "spring_estimator_internal.h"
 
-#define STEP_SDS      2.0f  /* farther off than 95 % of what is known explains, it has stepped */
-#define STEP_OF_LOSS  0.2f  /* of the declared loss: a draught, a door; a standard deviation */
 #define STEP_LASTS    0.8f  /* how much of such an error a step that lasts makes: a correlation */
 #define STEP_LATELY_S 60.0f /* a spring's time constant, C / G = 52 s */
 
@@ -11,12 +9,13 @@ bool spring_open_to_step(spring_estimator_t *e, spring_belief_t *b, uint8_t k, f
                          float sd_k)
 {
     const float known_k2 = spring_distance_k2(b) + sd_k * sd_k;
-    if (error_k >= 0.0f || error_k * error_k < STEP_SDS * STEP_SDS * known_k2) {
+    if (error_k >= 0.0f ||
+        error_k * error_k < SPRING_ESTIMATOR_LIKELY_SDS * SPRING_ESTIMATOR_LIKELY_SDS * known_k2) {
         return false;
     }
     const bool opens = e->stepped_turns > 0 && e->stepped_spring != k;
     if (opens) {
-        const float step_w_per_k = STEP_OF_LOSS * e->loss_w_per_k;
+        const float step_w_per_k = LOSS_TOLERANCE * e->loss_w_per_k;
         spring_belief_t *other = &e->spring[e->stepped_spring];
         if (spring_is_sound(e, e->stepped_spring)) { /* else its turn finds it so */
             other->loss_variance = fmaxf(other->loss_variance, step_w_per_k * step_w_per_k);

@@ -226,7 +226,7 @@ static void add_sight(piece_t *piece, const spring_sight_t *sight, const text_ti
 {
     /* as spring_sight_kind_t and SPRING_DID_ have them */
     static const char kinds[] FLASH_MEMORY =
-        "onset\0finish\0unseen\0lost\0kept\0transforms\0back\0taken_back\0jumped\0looked\0told\0"
+        "onset\0finish\0unseen\0lost\0kept\0transforms\0jumped\0looked\0told\0"
         "cooled\0anew";
     static const char deeds[] FLASH_MEMORY = "heated\0held\0blind\0opened\0doubted";
     text_line_t *const line = &piece->line;

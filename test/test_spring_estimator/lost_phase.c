@@ -37,38 +37,7 @@ void phase_lost_on_the_way_to_the_hold_is_counted(void)
     (void)snprintf(where, sizeof where, "lost %.3f of %.3f", (double)spring_estimator_lost(BELIEF),
                    1.0 - truth.austenite);
     TEST_ASSERT_TRUE_MESSAGE(truth.austenite < 0.85, where);
-    TEST_ASSERT_FLOAT_WITHIN_MESSAGE(0.05f, (float)(1.0 - truth.austenite),
-                                     spring_estimator_lost(BELIEF), where);
-}
-
-/* The austenite's own coefficient, whatever the martensite's, before any phase may be lost; but not
- * by a current that hardly reads. */
-void slope_is_told_on_the_way_down(void)
-{
-    static const double rise_per_k[] = {-0.0003, 0.0, 0.0006, 0.0012};
-    for (unsigned n = 0; n < 4; n++) {
-        for (unsigned weak = 0; weak < 2; weak++) {
-            unsigned t = 0; /* the dither */
-            begin_cold();
-            truth.apart_per_k = rise_per_k[n];
-            truth.offset_v = 0.008; /* told first */
-            (void)heat_then_hold(60.0);
-            ticks(1.6, 1.0); /* too near to the boost to tell the offset */
-            for (double s = 0.0; s < 60.0 && distance_k() > 4.0; s += TICK_S) {
-                (void)tick((weak != 0 ? 0.5 : 1.0) + 0.05 * (double)(t++ % 8u) / 8.0);
-            }
-            const spring_line_t *line = &INSIDE.run.line;
-            (void)snprintf(where, sizeof where, "%.4f /K: %.5f give or take %.5f", rise_per_k[n],
-                           (double)line->rise_per_k, (double)line->rise_sd_per_k);
-            TEST_ASSERT_EQUAL_MESSAGE(weak == 0, line->rise_sd_per_k < 0.0003f, where);
-            if (weak == 0) {
-                TEST_ASSERT_TRUE_MESSAGE(
-                    fabs((double)line->rise_per_k - truth.rise_per_k - truth.apart_per_k) <
-                        (double)SPRING_ESTIMATOR_BOUND_SDS * (double)line->rise_sd_per_k,
-                    where);
-            }
-        }
-    }
+    TEST_ASSERT_TRUE_MESSAGE(spring_estimator_lost(BELIEF) > ACTED_ON, where);
 }
 
 /* A coefficient in print is no loss where none is possible, whatever the change of the alloy. */
@@ -76,7 +45,7 @@ void coefficient_is_no_loss_above_the_transformation(void)
 {
     static const struct {
         double ratio, rise_per_k;
-    } cases[] = {{1.25, 0.0014}, {1.4, 0.0014}, {0.85, -0.0002}, {0.85, 0.0}};
+    } cases[] = {{1.25, 0.0012}, {1.4, 0.0012}, {0.85, -0.0002}, {0.85, 0.0}};
     for (unsigned n = 0; n < 4; n++) {
         unsigned t = 0; /* the dither */
         begin_cold();
@@ -121,7 +90,7 @@ void contact_is_not_taken_for_phase(void)
  * one is told by its steps up: no hold gains phase at once. */
 void contact_that_comes_and_goes_is_blind_for_a_while(void)
 {
-    static const double step_ohm[] = {0.03, 0.008};
+    static const double step_ohm[] = {0.03, 0.02};
     for (unsigned small = 0; small < 2; small++) {
         begin_cold();
         (void)heat_then_hold(60.0);
@@ -133,24 +102,9 @@ void contact_that_comes_and_goes_is_blind_for_a_while(void)
         }
         TEST_ASSERT_TRUE(spring_estimator_blind(BELIEF));
         TEST_ASSERT_FALSE(spring_estimator_sees(BELIEF));
-        TEST_ASSERT_TRUE(INSIDE.unproven);
         hold(12.0, 256.0);
         TEST_ASSERT_FALSE(spring_estimator_blind(BELIEF));
     }
-}
-
-/* Half of it shows in that turn, half in the next: each less than a load might take. */
-void jump_in_the_middle_of_a_turn_is_a_jump(void)
-{
-    begin_cold();
-    spring_estimator_begin_heating(&estimator, &model, 0);
-    ticks(3.0, 2.0);
-    while (!tick(3.0)) {
-    }
-    ticks(3.0, 6 * TICK_S);
-    truth.contact_ohm = 0.14 * truth.martensite_ohm;
-    ticks(3.0, 1.0);
-    TEST_ASSERT_TRUE(INSIDE.unsteady > 0);
 }
 
 /* A sensor's gain falls by a quarter while the current is too weak to tell: that is no phase. */
@@ -188,49 +142,6 @@ void load_that_comes_within_a_second_is_no_contact(void)
 static float believed_c(void)
 {
     return (float)thermal_model_temperature_c7(&model, 0) / 128.0f;
-}
-
-/* A contact gets better by 5 %, as if phase was lost; then it goes and comes. It was not. */
-void what_a_loose_contact_seemed_to_lose_is_taken_back(void)
-{
-    begin_cold();
-    truth.contact_ohm = 0.012;
-    (void)heat_then_hold(60.0);
-    for (double s = 0.0; s < 90.0; s += TICK_S) {
-        truth.contact_ohm = s < 60.0 ? 0.012 : 0.0;
-        (void)tick(hold_current_a(8.0));
-    }
-    TEST_ASSERT_TRUE(spring_estimator_doubt_k(BELIEF) > 4.0f);
-    for (double s = 0.0; s < 60.0; s += TICK_S) {
-        truth.contact_ohm = fmod(s, 10.0) < 5.0 ? 0.012 : 0.0;
-        (void)tick(hold_current_a(8.0));
-    }
-    (void)snprintf(where, sizeof where, "%.1f degC, true %.1f", (double)believed_c(),
-                   truth.temperature_c);
-    TEST_ASSERT_TRUE(spring_estimator_blind(BELIEF));
-    TEST_ASSERT_EQUAL_FLOAT(0.0f, spring_estimator_doubt_k(BELIEF));
-    TEST_ASSERT_FLOAT_WITHIN_MESSAGE(7.0f, (float)truth.temperature_c, believed_c(), where);
-}
-
-/* It seemed to lose phase where a contact had jumped: what the heating seems to take up to
- * transform may have warmed it. Where none had, it was phase that a load took. */
-void doubt_grows_with_a_heating_after_a_jump(void)
-{
-    for (unsigned jumped = 0; jumped < 2; jumped++) {
-        begin_cold();
-        (void)heat_then_hold(60.0);
-        INSIDE.possible = SPRING_PHASE_BETWEEN; /* as after a loss of half of it */
-        INSIDE.gone_k = 5.0f;
-        INSIDE.unsteady = jumped != 0 ? 1000u : 0u;
-        thermal_model_set_temperature(&model, 0, 20 * 128);
-        thermal_model_set_temperature(&model, 0, 92 * 128);
-        spring_estimator_begin_heating(&estimator, &model, 0);
-        ticks(3.0, 2.0);
-        (void)snprintf(where, sizeof where, "%.1f K", (double)spring_estimator_doubt_k(BELIEF));
-        TEST_ASSERT_TRUE_MESSAGE(jumped != 0 ? spring_estimator_doubt_k(BELIEF) > 10.0f
-                                             : spring_estimator_doubt_k(BELIEF) < 5.0f,
-                                 where);
-    }
 }
 
 /* In the hold a contact gets better by 5 %, as if phase was lost, and no heat brings it back: the
@@ -296,21 +207,6 @@ static void hold_for(double seconds)
     }
 }
 
-/* Heated again, and held until the first line at rest has looked back at what was lost before. */
-static void heat_and_look_back(void)
-{
-    (void)heat_then_hold(60.0);
-    TEST_ASSERT_TRUE_MESSAGE(spring_estimator_doubt_k(BELIEF) > 5.0f,
-                             "ended as if it had come back, or might have");
-    for (double s = 0.0; s < 60.0 && INSIDE.full_ohm > 0.0f; s += TICK_S) {
-        (void)tick(hold_current_a(8.0));
-    }
-    TEST_ASSERT_EQUAL_FLOAT(0.0f, INSIDE.full_ohm);
-    (void)snprintf(where, sizeof where, "%.1f K in doubt; %.1f degC, true %.1f",
-                   (double)spring_estimator_doubt_k(BELIEF), (double)believed_c(),
-                   truth.temperature_c);
-}
-
 static void hold_with_contact(double contact_ohm, double noise_v)
 {
     begin_cold();
@@ -320,85 +216,20 @@ static void hold_with_contact(double contact_ohm, double noise_v)
     hold_for(60.0);
 }
 
-/* A contact that gets better by 1.4 %: with such noise a coefficient may have made as much, and the
- * heating ends as if phase had come back. At rest it is seen that it has not. */
-void loss_that_is_still_missing_at_rest_is_taken_back(void)
-{
-    hold_with_contact(0.003, 0.016);
-    truth.contact_ohm = 0.0;
-    while (spring_estimator_lost(BELIEF) < 0.03f) {
-        (void)tick(hold_current_a(8.0));
-    }
-    heat_and_look_back();
-    TEST_ASSERT_TRUE_MESSAGE(is_noted(SPRING_SIGHT_TAKEN_BACK), where);
-    TEST_ASSERT_EQUAL_FLOAT_MESSAGE(0.0f, spring_estimator_doubt_k(BELIEF), where);
-    TEST_ASSERT_FLOAT_WITHIN_MESSAGE(4.0f, (float)truth.temperature_c, believed_c(), where);
-}
-
-/* The near miss: it was phase, and has come back. */
-void loss_that_is_back_at_rest_is_not_taken_back(void)
-{
-    hold_with_contact(0.0, 0.016);
-    truth.shift_k = 7.0; /* a load */
-    while (spring_estimator_lost(BELIEF) < 0.03f) {
-        (void)tick(hold_current_a(3.0));
-    }
-    heat_and_look_back();
-    TEST_ASSERT_TRUE_MESSAGE(is_noted(SPRING_SIGHT_BACK), where);
-    TEST_ASSERT_EQUAL_FLOAT_MESSAGE(0.0f, spring_estimator_doubt_k(BELIEF), where);
-    TEST_ASSERT_FLOAT_WITHIN_MESSAGE(4.0f, (float)(truth.temperature_c - truth.shift_k),
-                                     believed_c(), where);
-}
-
-/* A limit ends the heating before it could come back: that it has not tells nothing. */
-void loss_that_a_limit_left_is_not_taken_back(void)
-{
-    hold_with_contact(0.0, 0.016);
-    while (spring_estimator_lost(BELIEF) < 0.05f) {
-        truth.shift_k += 0.1 * TICK_S; /* a load that grows */
-        (void)tick(hold_current_a(3.0));
-    }
-    spring_estimator_begin_heating(&estimator, &model, 0);
-    ticks(3.0, 1.0);
-    spring_estimator_begin_hold(&estimator, &model, 0, true);
-    TEST_ASSERT_TRUE(INSIDE.unproven && !INSIDE.doubted);
-    hold(12.0, 60.0);
-    (void)snprintf(where, sizeof where, "%.1f K in doubt; %.1f degC, true %.1f",
-                   (double)spring_estimator_doubt_k(BELIEF), (double)believed_c(),
-                   truth.temperature_c);
-    TEST_ASSERT_TRUE_MESSAGE(INSIDE.unproven && spring_estimator_doubt_k(BELIEF) > 0.0f, where);
-}
-
 /* Less than 1 % tells nothing: what may be hotter stays so. */
 void loss_too_small_to_tell_stays_in_doubt(void)
 {
     hold_with_contact(0.0012, 0.004);
     truth.contact_ohm = 0.0;
     hold_for(60.0);
-    heat_and_look_back();
+    (void)heat_then_hold(60.0);
+    hold_for(30.0);
+    (void)snprintf(where, sizeof where, "%.1f K in doubt; %.1f degC, true %.1f",
+                   (double)spring_estimator_doubt_k(BELIEF), (double)believed_c(),
+                   truth.temperature_c);
     TEST_ASSERT_TRUE_MESSAGE(spring_estimator_doubt_k(BELIEF) > 5.0f, where);
     TEST_ASSERT_FLOAT_WITHIN_MESSAGE(4.0f, (float)truth.temperature_c,
                                      spring_estimator_hottest_c(BELIEF, &model, 0), where);
-}
-
-/* What was lost comes back, but on the way down from that heating more is lost, as in a gust. */
-void loss_on_the_way_down_from_a_heating_is_seen_at_rest(void)
-{
-    hold_with_contact(0.0, 0.004);
-    for (double margin_k = 3.0; spring_estimator_lost(BELIEF) == 0.0f; margin_k -= 0.05 * TICK_S) {
-        (void)tick(hold_current_a(margin_k));
-    }
-    (void)heat_then_hold(60.0);
-    while (truth.austenite > 0.9) { /* by a current that does not read */
-        (void)tick(0.2);
-    }
-    for (double s = 0.0; s < 60.0 && spring_estimator_lost(BELIEF) == 0.0f; s += TICK_S) {
-        (void)tick(hold_current_a(8.0));
-    }
-    (void)snprintf(where, sizeof where, "lost %.3f of %.3f", (double)spring_estimator_lost(BELIEF),
-                   1.0 - truth.austenite);
-    TEST_ASSERT_FLOAT_WITHIN_MESSAGE(0.05f, (float)(1.0 - truth.austenite),
-                                     spring_estimator_lost(BELIEF), where);
 }
 
 /* A contact that gets better by more than a line forgives looks like half of the phase. Heat goes
@@ -444,7 +275,7 @@ void noise_of_an_average_is_known_after_a_minute_of_rest(void)
     begin_cold();
     truth.noise_v = 0.001;
     (void)heat_then_hold(60.0);
-    for (double s = 0.0; s < 120.0 && spring_estimator_rest_turns(BELIEF) < 40; s += TICK_S) {
+    for (double s = 0.0; s < 120.0 && !spring_estimator_rests(BELIEF); s += TICK_S) {
         (void)tick(hold_current_a(6.0));
     }
     hold(6.0, 60.0);

@@ -48,10 +48,9 @@ static void search(double from_k)
 {
     double margin_k = from_k;
     for (double s = 0.0; s < 300.0 && spring_estimator_lost(BELIEF) == 0.0f; s += TICK_S) {
-        margin_k -=
-            spring_estimator_rest_turns(BELIEF) > 45 && !spring_estimator_seems_to_lose(BELIEF)
-                ? 0.08 * TICK_S
-                : 0.0;
+        margin_k -= spring_estimator_rests(BELIEF) && !spring_estimator_seems_to_lose(BELIEF)
+                        ? 0.08 * TICK_S
+                        : 0.0;
         (void)tick(hold_current_a(margin_k));
     }
     TEST_ASSERT_TRUE(spring_estimator_lost(BELIEF) > 0.0f);
