@@ -177,6 +177,29 @@ def test_a_glitch_is_left_out_and_nothing_else(make_log) -> None:
     assert np.flatnonzero(np.isnan(run.temperature_c[:, 0])).tolist() == [250]
 
 
+@pytest.mark.parametrize("shows", [0.0, 85.0])
+def test_rows_before_the_first_reading_are_no_readings(make_log, shows: float) -> None:
+    def nothing_yet(columns: dict[str, np.ndarray]) -> None:
+        for k in range(1, 10):
+            columns[f"t{k}_c"][:4] = shows
+
+    clean, run = read_log(make_log("clean.csv")), read_log(make_log(change=nothing_yet))
+    assert np.array_equal(run.temperature_c[0], clean.temperature_c[4])
+    assert np.isnan(run.temperature_c[1:4]).all()
+    assert np.array_equal(run.temperature_c[4:], clean.temperature_c[4:])
+    assert any("first 4 row(s)" in note for note in run.notes)
+
+
+def test_a_log_that_begins_at_rest_and_is_then_driven_has_no_rows_before_its_first_reading(make_log) -> None:
+    def coarse(columns: dict[str, np.ndarray]) -> None:
+        for k in range(1, 10):
+            columns[f"t{k}_c"] = np.round(columns[f"t{k}_c"] * 2.0) / 2.0
+
+    for change in (None, coarse):
+        run = read_log(make_log(noise=0.0, change=change))
+        assert np.isfinite(run.temperature_c).all() and not any("first" in note for note in run.notes)
+
+
 def test_offsets_of_the_sensors_about_zero_heat_nothing(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     path.write_text("time_s,i1_a,v1_v,t1_c\n0,-0.005,0.004,20\n1,1,0.2,20\n2,0.005,-0.004,20\n")

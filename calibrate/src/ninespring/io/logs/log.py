@@ -193,6 +193,7 @@ def read_log(
     without = [str(k) for k in range(1, count + 1) if f"t{k}_c" not in frame]
     if without and temperatures and len(without) < count:
         notes.append(f"no temperature of spring {', '.join(without)}: simulated, but not compared")
+    mending.mend_placeholders(run)
     mending.refuse_wrong_units(run, table)
     mending.mask_bad_sensors(run)
     mending.mask_glitches(run)

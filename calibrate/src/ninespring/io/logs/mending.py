@@ -1,6 +1,6 @@
 """What is mended of a log without guessing, and what is doubted of it: both are said in `Run.notes`.
 
-Repeated rows, gaps, glitches, a saturated, dead or frozen sensor are mended; wrong units are refused or doubted.
+Repeated rows, placeholders, gaps, glitches, a saturated, dead or frozen sensor are mended; wrong units are refused or doubted.
 """
 
 from __future__ import annotations
@@ -186,6 +186,27 @@ def _longest_run(flags: np.ndarray) -> int:
         return 0
     edges = np.flatnonzero(np.diff(np.concatenate(([0], flags.astype(np.int8), [0]))))
     return int((edges[1::2] - edges[::2]).max())
+
+
+def mend_placeholders(run: Run) -> None:
+    """A logger that has read nothing yet shows the same in all its first rows; then all thermometers jump at once, as no spring can.
+
+    The run starts at what is read then.
+    """
+    seen = np.flatnonzero(np.isfinite(run.temperature_c[0]))
+    values = run.temperature_c[:, seen]
+    moved = np.flatnonzero((values[:-1] != values[1:]).any(axis=1))
+    if not seen.size or not moved.size or moved[0] + 1 > 0.1 * len(values):
+        return
+    first = int(moved[0]) + 1
+    noise = np.maximum(np.nan_to_num(noise_floor(values)), 0.02)
+    usual = np.quantile(np.nan_to_num(np.abs(np.diff(values[first:], axis=0))), 0.99, axis=0)
+    if (np.abs(values[first] - values[0]) > 10.0 * noise + 3.0 * usual).all():
+        run.temperature_c[0, seen] = values[first]
+        run.temperature_c[1:first, seen] = np.nan
+        run.notes.append(
+            f"all thermometers jump at once after the first {first} row(s): those are no readings, left out"
+        )
 
 
 def mask_glitches(run: Run) -> None:
