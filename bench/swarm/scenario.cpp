@@ -17,10 +17,15 @@ namespace
 {
 
 constexpr std::array<const char *, static_cast<std::size_t>(kind::count)> names = {
-    "say",       "bytes",     "open",    "shorted", "closed",  "absent",     "stale",
-    "frozen",    "scaled",    "swapped", "unset",   "sda",     "worn",       "torn",
-    "power",     "brown_out", "button",  "hang",    "crystal", "enable_low", "enable_high",
-    "fan_stops", "interrupt", "flip",    "stress",  "supply",  "ambient"};
+    "say",         "bytes",         "open",         "shorted",     "closed",      "absent",
+    "stale",       "frozen",        "scaled",       "swapped",     "unset",       "sda",
+    "worn",        "torn",          "power",        "brown_out",   "button",      "hang",
+    "crystal",     "enable_low",    "enable_high",  "fan_stops",   "interrupt",   "flip",
+    "stress",      "supply",        "ambient",      "leaks",       "slow_switch", "welds_hot",
+    "diode_open",  "bridged",       "warm_contact", "chatters",    "ground",      "ripple",
+    "clock",       "gates_swapped", "thermistor",   "volt_scaled", "stuck_bit",   "drifts",
+    "saturates",   "offset",        "lifted",       "bursts",      "nacks",       "garbled",
+    "answers_too", "slow_bus"};
 
 class dice
 {
@@ -132,7 +137,7 @@ void last(dice &d, scenario &s, const event &one)
 
 void fault(dice &d, scenario &s)
 {
-    const auto what = static_cast<kind>(1 + d.below(static_cast<unsigned>(kind::count) - 1));
+    const auto what = static_cast<kind>(1 + d.below(static_cast<unsigned>(kind::ambient)));
     event one{d.uniform(2.0, s.duration_s), what, d.spring(), true, 0.0, ""};
     switch (what) {
     case kind::bytes:
