@@ -131,7 +131,7 @@ static void start(controller_t *controller, const controller_settings_t *setting
     controller->springs = (uint8_t)(settings->model.rows * settings->model.columns);
     thermal_model_set_ambient(model, ambient_c7);
     thermal_model_reset(model, ambient_c7);
-    temperature_ceiling_prepare(&controller->ceiling, model, &settings->current);
+    temperature_ceiling_prepare(&controller->drive, model, &settings->current);
     (void)current_control_init(&controller->current, &settings->current, NULL);
     (void)safety_init(&controller->safety, &settings->safety, controller->springs, NULL);
     spring_estimator_restart(&controller->estimator, model);
@@ -204,7 +204,7 @@ bool controller_apply_settings(controller_t *controller, const controller_settin
                 temperature_ceiling_hold_uw(&controller->ceiling, &controller->model, k));
         }
         (void)current_control_apply(&controller->current, &settings->current, NULL);
-        temperature_ceiling_prepare(&controller->ceiling, &controller->model, &settings->current);
+        temperature_ceiling_prepare(&controller->drive, &controller->model, &settings->current);
         (void)safety_apply(&controller->safety, &settings->safety, NULL);
         (void)apply_policy(controller, &settings->policy);
         const bool other_model = mark != controller_model_mark(controller);
@@ -298,7 +298,7 @@ static void raise_ceiling(controller_t *controller, uint8_t k)
 {
     const float measured_w = 1e-6f / (float)CIRCUIT_CHECK_TICKS * (float)controller->heat_sum_uw[k];
     const float driven_w = temperature_ceiling_power_w(
-        &controller->ceiling, 1.0f / (float)CIRCUIT_CHECK_TICKS * (float)controller->duty_sum[k]);
+        &controller->drive, 1.0f / (float)CIRCUIT_CHECK_TICKS * (float)controller->duty_sum[k]);
     temperature_ceiling_step(&controller->ceiling, &controller->model, k,
                              measured_w > driven_w ? measured_w : driven_w);
     controller->heat_sum_uw[k] = 0;
@@ -632,11 +632,7 @@ void controller_get_delivered(const controller_t *controller, temperature_ceilin
 
 void controller_set_delivered(controller_t *controller, const temperature_ceiling_t *delivered)
 {
-    scrub_open(&controller->scrub, controller_fixed, controller);
     controller->ceiling = *delivered;
-    temperature_ceiling_prepare(&controller->ceiling, &controller->model,
-                                &controller->current.parameters);
-    scrub_seal(&controller->scrub, controller_fixed, controller);
 }
 
 /* By way of martensite. */

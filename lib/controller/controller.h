@@ -64,6 +64,7 @@ typedef struct {
 typedef struct {
     thermal_model_t model;
     temperature_ceiling_t ceiling;
+    temperature_ceiling_drive_t drive;
     bool supply_off;           /* until controller_set_supply */
     uint8_t supply_ticks;      /* that the supply has been held, up to those that a relay takes */
     current_control_t current; /* what is before it outlives another size of the array */
