@@ -203,6 +203,10 @@ bool controller_apply_settings(controller_t *controller, const controller_settin
                 &controller->ceiling, &controller->model, k, held_uw[k],
                 temperature_ceiling_hold_uw(&controller->ceiling, &controller->model, k));
         }
+        if (memcmp(&controller->current.parameters, &settings->current, sizeof settings->current) !=
+            0) {
+            controller->peers = (circuit_peers_t){0}; /* it is another circuit */
+        }
         (void)current_control_apply(&controller->current, &settings->current, NULL);
         temperature_ceiling_prepare(&controller->drive, &controller->model, &settings->current);
         (void)safety_apply(&controller->safety, &settings->safety, NULL);
@@ -288,7 +292,12 @@ static uint32_t take_sensors(controller_t *controller, const controller_sensor_t
 /* What no belief can talk away: is it a circuit, and how hot could it be by now? */
 static void judge_circuit(controller_t *controller, uint8_t k)
 {
-    if (circuit_check_judge(&controller->circuit[k], &controller->current.parameters) ||
+    const current_control_parameters_t *parameters = &controller->current.parameters;
+    circuit_window_t window;
+    const bool is_none = circuit_check_judge(&controller->circuit[k], parameters, &window);
+    const bool is_odd =
+        circuit_peers_judge(&controller->peers, controller->springs, k, &window, parameters);
+    if (is_none || is_odd ||
         spring_estimator_is_unlike(spring_estimator_of(&controller->estimator, k))) {
         safety_trip(&controller->safety, k, SAFETY_FAULT_SENSOR_MISMATCH);
     }
@@ -573,6 +582,10 @@ void controller_host_heard(controller_t *controller)
 void controller_clear_faults(controller_t *controller)
 {
     controller_stop(controller);
+    for (uint8_t k = 0; k < controller->springs; k++) {
+        circuit_peers_clear(&controller->peers, k,
+                            safety_fault(&controller->safety, k) == SAFETY_FAULT_SENSOR_MISMATCH);
+    }
     safety_clear(&controller->safety);
     memset(controller->circuit, 0, sizeof controller->circuit);
     drive_policy_clear(&controller->policy);
