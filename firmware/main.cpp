@@ -29,6 +29,10 @@
 // once into its caller, here main, whose frame lies below all others for ever.
 #define OWN_FRAME __attribute__((noinline))
 
+// Ticks that are due: a loop that cannot keep up takes its own time for the world's, and what heats
+// in it is hotter than it believes.
+#define BEHIND_MOST (500u / BOARD_TICK_MS)
+
 // Not static: debugger and simulator look at it by name.
 controller_t controller;
 settings_t settings;
@@ -160,6 +164,9 @@ static void follow_averaging()
 OWN_FRAME static void run_tick(uint8_t behind)
 {
     const uint32_t begin_us = board_time_us();
+    if (behind >= BEHIND_MOST) {
+        board_end(PSTR("overload: the control loop was half a second late"));
+    }
     if (behind > 0 && status.ticks_late < UINT16_MAX) {
         status.ticks_late++;
     }
