@@ -444,6 +444,27 @@ private:
             closed_s_[e.channel] = e.on ? now_s() : -1.0;
             welded_ = true;
             break;
+        case kind::welds_hot: /* when, nobody knows */
+            welded_ = true;
+            break;
+        case kind::gates_swapped:
+        case kind::answers_too:
+        case kind::slow_bus:
+        case kind::ground:
+        case kind::ripple:
+            blind_.fill(true);
+            break;
+        case kind::volt_scaled:
+        case kind::stuck_bit:
+        case kind::drifts:
+        case kind::saturates:
+        case kind::offset:
+        case kind::lifted:
+        case kind::bursts:
+        case kind::nacks:
+        case kind::garbled:
+            blind_[e.channel] = true;
+            break;
         case kind::swapped:
             blind_[e.channel] = blind_[static_cast<unsigned>(e.value)] = true;
             break;
