@@ -4,6 +4,7 @@
 
 #define SHARE_Q7 128.0f
 #define OWN_Q12  4096.0f
+#define OWN_MOST 8191.0f
 #define LEAST_MV 100.0f /* below it, offsets are most of what differs */
 /* Offsets of both readings; a diode's drop moves with current and heat. */
 #define OFFSETS_MV 25.0f
@@ -44,7 +45,7 @@ static void learn(circuit_peer_t *own, float beside)
     const float was = (float)own->own_q12;
     const float now = beside * OWN_Q12;
     const float next = (own->own_q12 == 0 ? now : was + (now - was) * LEARN_PART) + 0.5f;
-    own->own_q12 = (uint16_t)next & 0x3FFFu;
+    own->own_q12 = next < OWN_MOST ? (uint16_t)next & 0x1FFFu : 0x1FFFu;
 }
 
 bool circuit_peers_judge(circuit_peers_t *peers, uint8_t springs, uint8_t k,
@@ -82,6 +83,7 @@ bool circuit_peers_judge(circuit_peers_t *peers, uint8_t springs, uint8_t k,
     if (!odd) {
         own->was_q7 = own->share_q7;
         own->odd = 0;
+        own->agreed = 1;
     } else if (own->odd < CIRCUIT_PEERS_WINDOWS) {
         own->odd = (own->odd + 1u) & 3u;
     }
@@ -91,9 +93,10 @@ bool circuit_peers_judge(circuit_peers_t *peers, uint8_t springs, uint8_t k,
 void circuit_peers_clear(circuit_peers_t *peers, uint8_t spring, bool doubted)
 {
     circuit_peer_t *own = &peers->spring[spring];
-    if (doubted && own->odd < CIRCUIT_PEERS_WINDOWS) {
+    if (doubted && own->agreed && own->odd < CIRCUIT_PEERS_WINDOWS) {
         *own = (circuit_peer_t){0};
     }
     own->share_q7 = 0;
     own->odd = 0;
+    own->agreed = 0;
 }

@@ -28,8 +28,9 @@ extern "C" {
 
 /* Shares: voltage found behind a switch, of the voltage that its duty should bring. */
 typedef struct {
-    uint16_t own_q12 : 14; /* its share of the others'; 0: not known */
+    uint16_t own_q12 : 13; /* its share of the others'; 0: not known */
     uint16_t odd : 2;      /* windows on end */
+    uint16_t agreed : 1;   /* a window that was not odd, since the last clear */
     uint8_t share_q7;      /* of the last window; 0: it told nothing */
     uint8_t was_q7;        /* of the last one that was not odd; 0: none was */
 } circuit_peer_t;
@@ -52,8 +53,8 @@ bool circuit_peers_judge(circuit_peers_t *peers, uint8_t springs, uint8_t spring
                          const current_control_parameters_t *circuit);
 
 /* A fault is cleared: the spring's row ends. What is known of it stays, as nobody mends a sensor by
- * clearing; but not where its readings were doubted for another reason than that they had changed:
- * then it is of a sensor that was wrong from the first, and may be another one now. */
+ * clearing; but not where its readings were doubted though they agreed with it: then it is of a
+ * sensor that was wrong from the first, and may be another one now. */
 void circuit_peers_clear(circuit_peers_t *peers, uint8_t spring, bool doubted);
 
 #ifdef __cplusplus

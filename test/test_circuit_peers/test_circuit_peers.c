@@ -157,6 +157,18 @@ static void a_sensor_that_was_wrong_from_the_first_may_be_another_one_after_a_cl
     }
 }
 
+/* Cleared, and found by others before it told anything: it is the same sensor. */
+static void what_was_not_agreed_with_since_a_clear_stays_known(void)
+{
+    TEST_ASSERT_EQUAL_HEX(0, rounds(5, SPRINGS, HEATS_MV, 1.0f, 1.0f));
+    TEST_ASSERT_EQUAL_HEX(1, rounds(3, SPRINGS, HEATS_MV, 0.86f, 1.0f));
+    circuit_peers_clear(&peers, 0, true);
+    circuit_peers_clear(&peers, 0, true);
+    TEST_ASSERT_EQUAL_HEX(0, rounds(1, SPRINGS, HEATS_MV, 0.86f, 1.0f));
+    circuit_peers_clear(&peers, 0, true);
+    TEST_ASSERT_EQUAL_HEX(1, rounds(3, SPRINGS, HEATS_MV, 0.86f, 1.0f));
+}
+
 static void what_tells_nothing_ends_a_row(void)
 {
     TEST_ASSERT_EQUAL_HEX(0, rounds(5, SPRINGS, HEATS_MV, 1.0f, 1.0f));
@@ -217,6 +229,7 @@ int main(void)
     RUN_TEST(what_is_known_outlives_who_clears);
     RUN_TEST(what_is_found_stays_found_until_cleared);
     RUN_TEST(a_sensor_that_was_wrong_from_the_first_may_be_another_one_after_a_clear);
+    RUN_TEST(what_was_not_agreed_with_since_a_clear_stays_known);
     RUN_TEST(what_tells_nothing_ends_a_row);
     RUN_TEST(a_drift_is_found_where_it_is_faster_than_wiring);
     RUN_TEST(a_diode_may_be_another_one);
