@@ -55,8 +55,7 @@ bool circuit_peers_judge(circuit_peers_t *peers, uint8_t springs, uint8_t k,
     circuit_peer_t *own = &peers->spring[k];
     if (!window->tells || window->expected_mv < LEAST_MV) {
         own->share_q7 = 0;
-        own->odd = own->odd < CIRCUIT_PEERS_WINDOWS ? 0 : CIRCUIT_PEERS_WINDOWS;
-        return own->odd != 0;
+        return own->odd >= CIRCUIT_PEERS_WINDOWS;
     }
     const float expected_mv = window->expected_mv;
     const float share = window->found_mv / expected_mv;
@@ -97,6 +96,6 @@ void circuit_peers_clear(circuit_peers_t *peers, uint8_t spring, bool doubted)
         *own = (circuit_peer_t){0};
     }
     own->share_q7 = 0;
-    own->odd = 0;
+    own->odd = own->odd < CIRCUIT_PEERS_WINDOWS ? 0 : CIRCUIT_PEERS_WINDOWS - 1u;
     own->agreed = 0;
 }

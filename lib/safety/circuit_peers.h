@@ -46,15 +46,16 @@ typedef struct {
  * own share is not known, by 18 % (its wiring, its gains); where fewer than CIRCUIT_PEERS_LEAST
  * others are driven, from what it showed before by 20 % (its supply may move). Its own share is
  * learnt in the windows that are not odd, over minutes. A window that tells nothing, or of less
- * than 0.1 V, ends a row that is not full yet. springs at most CIRCUIT_PEERS_MAX, spring below
- * springs. */
+ * than 0.1 V, changes nothing. springs at most CIRCUIT_PEERS_MAX, spring below springs. */
 bool circuit_peers_judge(circuit_peers_t *peers, uint8_t springs, uint8_t spring,
                          const circuit_window_t *window,
                          const current_control_parameters_t *circuit);
 
-/* A fault is cleared: the spring's row ends. What is known of it stays, as nobody mends a sensor by
- * clearing; but not where its readings were doubted though they agreed with it: then it is of a
- * sensor that was wrong from the first, and may be another one now. */
+/* A fault is cleared: the spring's row ends, but for its last window where it was full: the next
+ * window is enough then, as a heating of a sensor that lies costs 12 K a second. What is known of
+ * it stays, as nobody mends a sensor by clearing; but not where its readings were doubted though
+ * they agreed with it: then it is of a sensor that was wrong from the first, and may be another one
+ * now. */
 void circuit_peers_clear(circuit_peers_t *peers, uint8_t spring, bool doubted);
 
 #ifdef __cplusplus

@@ -193,7 +193,7 @@ void a_control_loop_that_cannot_keep_up_ends_in_a_reset_that_says_so()
     constexpr unsigned TIMER2_COMPA = 13;
     rig mega;
     heat(mega);
-    for (int n = 0; n < 4000 && board_reset_count(mega.raw()) == 0; ++n) {
+    for (int n = 0; n < 20000 && board_reset_count(mega.raw()) == 0; ++n) {
         TEST_ASSERT_TRUE(board_raise_interrupt(mega.raw(), TIMER2_COMPA));
         mega.run_ms(0.05); /* 20 times as fast as it should */
     }
