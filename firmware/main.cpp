@@ -25,6 +25,14 @@
 #define NINESPRING_VERSION "unknown"
 #endif
 
+// What it needs is on the stack only as long as it runs: the linker's optimiser puts what is called
+// once into its caller, here main, whose frame lies below all others for ever.
+#define OWN_FRAME __attribute__((noinline))
+
+// Ticks that are due: a loop that cannot keep up takes its own time for the world's, and what heats
+// in it is hotter than it believes.
+#define BEHIND_MOST (500u / BOARD_TICK_MS)
+
 // Not static: debugger and simulator look at it by name.
 controller_t controller;
 settings_t settings;
@@ -153,9 +161,12 @@ static void follow_averaging()
     }
 }
 
-static void run_tick(uint8_t behind)
+OWN_FRAME static void run_tick(uint8_t behind)
 {
     const uint32_t begin_us = board_time_us();
+    if (behind >= BEHIND_MOST) {
+        board_end(PSTR("overload: the control loop was half a second late"));
+    }
     if (behind > 0 && status.ticks_late < UINT16_MAX) {
         status.ticks_late++;
     }
@@ -245,7 +256,7 @@ static void take_stop(void)
     }
 }
 
-static void take_input(void)
+OWN_FRAME static void take_input(void)
 {
     if (board_serial_lost_take()) {
         console_break_line(&console, CONSOLE_ERROR_INPUT_LOST);
@@ -270,7 +281,7 @@ static void take_input(void)
     }
 }
 
-static void each_second(void)
+OWN_FRAME static void each_second(void)
 {
     static uint32_t second_ms;
     const uint32_t now_ms = board_time_ms();
@@ -284,7 +295,7 @@ static void each_second(void)
     learnt_store_second(&learnt, &controller);
 }
 
-static void start(void)
+OWN_FRAME static void start(void)
 {
 #ifdef NINESPRING_SENSOR_ADAFRUIT
     init(); // Arduino's clock, which that library's timeouts need
@@ -324,18 +335,16 @@ static void start(void)
     }
 }
 
-static void turn(void)
+OWN_FRAME static void serve(void)
 {
-    uint8_t behind;
-    take_stop();
-    if (board_tick_take(&behind)) {
-        run_tick(behind);
-    }
     console_service(&console);
     if (!console_busy(&console)) { // a save of the settings comes first
         (void)learnt_store_step(&learnt);
     }
-    take_input();
+}
+
+OWN_FRAME static void tell_status(void)
+{
     if (board_serial_status_take()) {
         controller_host_heard(&controller);
         status_wanted = true;
@@ -344,6 +353,18 @@ static void turn(void)
         status_wanted = false;
         console_print_status(&console);
     }
+}
+
+static void turn(void)
+{
+    uint8_t behind;
+    take_stop();
+    if (board_tick_take(&behind)) {
+        run_tick(behind);
+    }
+    serve();
+    take_input();
+    tell_status();
     each_second();
     board_idle(console_busy(&console) || status_wanted);
 }

@@ -47,7 +47,7 @@ controller_sensor_status_t two_wire_transfer(uint8_t address, two_wire_direction
 #include <util/twi.h>
 
 /* A turn of the loops that wait takes 8 cycles or more. */
-#define TIMEOUT_TURNS (TWO_WIRE_TIMEOUT_US * (F_CPU / 1000000ul) / 8u)
+#define TIMEOUT_TURNS (TWO_WIRE_STEP_US * (F_CPU / 1000000ul) / 8u)
 
 void two_wire_begin(void)
 {

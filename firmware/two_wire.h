@@ -1,6 +1,6 @@
 /* What it is for: I2C transfers of a few bytes, as the only master on the bus, at 400 kHz.
  * What it owns: the two-wire unit and its pins, D21 (SCL) and D20 (SDA).
- * What it never does: wait longer than TWO_WIRE_TIMEOUT_US for one step, use an interrupt. */
+ * What it never does: wait longer than TWO_WIRE_STEP_US for one step, use an interrupt. */
 #ifndef TWO_WIRE_H
 #define TWO_WIRE_H
 
@@ -14,6 +14,7 @@ extern "C" {
 
 #define TWO_WIRE_HZ         400000ul
 #define TWO_WIRE_TIMEOUT_US 400ul /* a transfer of ours takes 0.1 ms */
+#define TWO_WIRE_STEP_US    100ul /* a byte of it 23 us: four times as slow is stuck */
 
 void two_wire_begin(void);
 /* After BUS: clocks a device that holds SDA low until it lets go, and starts the bus again. */

@@ -27,7 +27,10 @@ WORDS = (r"^word_\w+",)
 NOTHING = (r"twi_onSlave\w+",)
 INDIRECT: tuple[tuple[str, tuple[str, ...]], ...] = (
     (r"^(console_execute|console_receive|take_input)", WORDS + OUTPUT),
-    (r"^(main|setup|loop|run_tick)", WORDS + OUTPUT + STORAGE),  # the linker's optimiser moves what is called once
+    (
+        r"^(main|setup|loop|run_tick|_ZL\d+(take_input|serve|tell_status|run_tick|start))",
+        WORDS + OUTPUT + STORAGE,
+    ),  # the linker's optimiser moves what is called once
     (
         r"^(console_|out_end|echo|answer|room_for|list_settings|selftest|start_telemetry|end_job|save|print_|apply_settings)",
         OUTPUT,

@@ -16,6 +16,7 @@
 #include "board.h"
 #include "board_view.h"
 #include "drive_policy.h"
+#include "faulty_board.hpp"
 #include "safety.h"
 #include "truth.h"
 
@@ -46,13 +47,6 @@ constexpr double UNSAID_S = 5.0;
 
 using values = std::map<std::string, std::string>;
 
-struct truth_deleter {
-    void operator()(truth_t *t) const { truth_destroy(t); }
-};
-struct board_deleter {
-    void operator()(board_t *b) const { board_destroy(b); }
-};
-
 std::string lower(std::string text)
 {
     for (char &c : text) {
@@ -69,35 +63,12 @@ bool starts(const std::string &text, const char *with)
 class life
 {
 public:
-    life(const scenario &s, const std::string &elf, bool trace) : s_(s), trace_(trace)
+    life(const scenario &s, const std::string &elf, bool trace)
+        : s_(s), trace_(trace),
+          board_(s, elf, this, [](void *context, std::uint64_t, std::uint8_t octet) {
+              static_cast<life *>(context)->heard(static_cast<char>(octet));
+          })
     {
-        std::vector<truth_event_t> happens;
-        for (const event &e : s.events) {
-            if (e.what == kind::stress || e.what == kind::supply || e.what == kind::ambient) {
-                const truth_event_kind_t what = e.what == kind::stress   ? TRUTH_STRESS
-                                                : e.what == kind::supply ? TRUTH_SUPPLY
-                                                                         : TRUTH_AMBIENT;
-                happens.push_back({what, e.at_s, static_cast<int>(e.channel), e.value});
-            }
-        }
-        truth_.reset(truth_create(s.seed, s.tolerance, s.ambient_c, happens.data(),
-                                  static_cast<unsigned>(happens.size())));
-        const board_array_t array = truth_array(truth_.get());
-        char error[512] = "";
-        board_options_t options{};
-        options.elf = elf.c_str();
-        options.array = &array;
-        options.seed = s.seed;
-        options.shunt_noise_v = 30e-6;
-        options.bus_noise_v = 1e-3;
-        options.context = this;
-        options.on_uart = [](void *context, std::uint64_t, std::uint8_t octet) {
-            static_cast<life *>(context)->heard(static_cast<char>(octet));
-        };
-        board_.reset(board_create(&options, error, sizeof error));
-        if (board_ == nullptr) {
-            throw std::runtime_error(error);
-        }
         wait_for_greeting();
     }
 
@@ -118,12 +89,12 @@ public:
             end();
         }
         v_.simulated_s = now_s();
-        v_.resets = board_reset_count(board_.get());
+        v_.resets = board_reset_count(board_.raw());
         return v_;
     }
 
 private:
-    double now_s() const { return board_time_s(board_.get()); }
+    double now_s() const { return board_time_s(board_.raw()); }
 
     void breaks(const char *what, const std::string &detail)
     {
@@ -137,20 +108,20 @@ private:
     void run_until(double at_s)
     {
         const auto cycle = static_cast<std::uint64_t>(at_s * BOARD_FREQUENCY_HZ);
-        if (cycle <= board_cycle(board_.get()) || !v_.broken.empty()) {
+        if (cycle <= board_cycle(board_.raw()) || !v_.broken.empty()) {
             return;
         }
-        const unsigned resets = board_reset_count(board_.get());
-        const board_state_t state = board_run_until(board_.get(), cycle);
+        const unsigned resets = board_reset_count(board_.raw());
+        const board_state_t state = board_run_until(board_.raw(), cycle);
         if (state != BOARD_RUNNING) {
             if (!flipped_) { /* a stack pointer or a sleep register is anything then */
-                breaks("crashed", board_complaint(board_.get()));
+                breaks("crashed", board_complaint(board_.raw()));
             } else {
-                board_reset(board_.get(), BOARD_RESET_POWER_ON);
+                board_reset(board_.raw(), BOARD_RESET_POWER_ON);
                 was_reset();
             }
         }
-        if (board_reset_count(board_.get()) != resets) {
+        if (board_reset_count(board_.raw()) != resets) {
             if (!reset_is_due_) {
                 breaks("reset", "the watchdog bit, and nothing was wrong");
             }
@@ -202,7 +173,7 @@ private:
         }
     }
 
-    void send(const std::string &text) { board_send(board_.get(), text.data(), text.size()); }
+    void send(const std::string &text) { board_send(board_.raw(), text.data(), text.size()); }
 
     void type()
     {
@@ -223,7 +194,7 @@ private:
         }
         pending_ = next;
         asked_s_ = now_s();
-        was_fed_ = board_is_fed(board_.get());
+        was_fed_ = board_is_fed(board_.raw());
         answer_.clear();
         if (next == "selftest") {
             tested_s_ = now_s();
@@ -384,7 +355,7 @@ private:
     void wait_for_greeting()
     {
         for (int ms = 0; ms < 1500 && !greeted_; ++ms) {
-            board_run_ms(board_.get(), 1.0);
+            board_run_ms(board_.raw(), 1.0);
         }
         if (!greeted_) {
             breaks("silent", "it does not greet");
@@ -430,18 +401,19 @@ private:
         unsure_.clear();
     }
 
-    void switch_fault(board_fault_t fault, const event &e)
-    {
-        board_set_fault(board_.get(), fault, e.channel, e.on);
-    }
-
     void happen(const event &e)
     {
-        board_t *board = board_.get();
         if (trace_ && e.what != kind::say) {
             std::fprintf(stderr, "%9.3f  * %s %u %d %g %s\n", now_s(), name_of(e.what), e.channel,
                          e.on, e.value, e.text.c_str());
         }
+        before(e);
+        board_.inflict(e);
+        after(e);
+    }
+
+    void before(const event &e)
+    {
         switch (e.what) {
         case kind::say:
             waiting_.push_back(e.text);
@@ -449,75 +421,78 @@ private:
         case kind::bytes:
             raw(e.text);
             break;
-        case kind::open:
-            switch_fault(BOARD_FAULT_OPEN, e);
+        case kind::flip:
+            flip_s_ = now_s();
+            flipped_ = reset_is_due_ = true;
             break;
-        case kind::shorted:
-            switch_fault(BOARD_FAULT_SHORT, e);
-            break;
-        case kind::closed:
-            switch_fault(BOARD_FAULT_CLOSED, e);
-            closed_s_[e.channel] = e.on ? now_s() : -1.0;
-            welded_ = true;
-            break;
-        case kind::absent:
-            switch_fault(BOARD_FAULT_NACK, e);
-            blind_[e.channel] = true;
-            break;
-        case kind::stale:
-            switch_fault(BOARD_FAULT_STALE, e);
-            blind_[e.channel] = true;
-            break;
-        case kind::frozen:
-            switch_fault(e.value < 0.5   ? BOARD_FAULT_FREEZE
-                         : e.value < 1.5 ? BOARD_FAULT_FREEZE_CURRENT
-                                         : BOARD_FAULT_FREEZE_VOLTAGE,
-                         e);
-            blind_[e.channel] = true;
-            break;
-        case kind::scaled:
-            board_scale_sensor(board, e.channel, e.value, 1.0);
-            blind_[e.channel] = true;
-            break;
-        case kind::swapped:
-            board_swap_sensors(board, e.channel, static_cast<unsigned>(e.value));
-            blind_[e.channel] = blind_[static_cast<unsigned>(e.value)] = true;
-            break;
-        case kind::unset:
-            board_reset_sensor(board, e.channel);
-            break;
-        case kind::sda:
-            switch_fault(BOARD_FAULT_SDA_LOW, e);
-            blind_.fill(true);
-            break;
-        case kind::worn:
-            switch_fault(BOARD_FAULT_EEPROM, e);
-            eeprom_worn_ = e.on;
-            break;
-        case kind::torn:
-            board_eeprom(board)[static_cast<unsigned>(e.value)] ^= 0x5Au;
-            torn_ = true;
+        case kind::interrupt: /* a flag of a peripheral that is in use may come twice */
+            flipped_ = reset_is_due_ = true;
             break;
         case kind::power:
             reset_is_due_ = true;
-            board_reset(board, BOARD_RESET_POWER_ON);
-            was_reset();
             break;
+        default:
+            break;
+        }
+    }
+
+    /* What the host, or who judges, has to know of it. */
+    void after(const event &e)
+    {
+        switch (e.what) {
+        case kind::closed:
+            closed_s_[e.channel] = e.on ? now_s() : -1.0;
+            welded_ = true;
+            break;
+        case kind::welds_hot: /* when, nobody knows */
+            welded_ = true;
+            break;
+        case kind::gates_swapped:
+        case kind::answers_too:
+        case kind::slow_bus:
+        case kind::ground:
+        case kind::ripple:
+            blind_.fill(true);
+            break;
+        case kind::volt_scaled:
+        case kind::stuck_bit:
+        case kind::drifts:
+        case kind::saturates:
+        case kind::offset:
+        case kind::lifted:
+        case kind::bursts:
+        case kind::nacks:
+        case kind::garbled:
+            blind_[e.channel] = true;
+            break;
+        case kind::swapped:
+            blind_[e.channel] = blind_[static_cast<unsigned>(e.value)] = true;
+            break;
+        case kind::absent:
+        case kind::stale:
+        case kind::frozen:
+        case kind::scaled:
+            blind_[e.channel] = true;
+            break;
+        case kind::sda:
+            blind_.fill(true);
+            break;
+        case kind::worn:
+            eeprom_worn_ = e.on;
+            break;
+        case kind::torn:
+            torn_ = true;
+            break;
+        case kind::power:
         case kind::brown_out:
-            board_reset(board, BOARD_RESET_BROWN_OUT);
-            was_reset();
-            break;
         case kind::button:
-            board_reset(board, BOARD_RESET_EXTERNAL);
             was_reset();
             break;
         case kind::hang:
-            board_hang(board);
             reset_is_due_ = hanging_ = true;
             hang_s_ = now_s();
             break;
         case kind::crystal:
-            board_stop_oscillator(board);
             pending_.reset();
             waiting_.clear();
             quiet_until_s_ = 1e9;
@@ -525,28 +500,10 @@ private:
             hang_s_ = now_s();
             break;
         case kind::enable_low:
-            switch_fault(BOARD_FAULT_ENABLE_LOW, e);
-            unfed_s_ = e.on ? now_s() : -1.0;
-            break;
         case kind::enable_high:
-            switch_fault(BOARD_FAULT_ENABLE_HIGH, e);
             unfed_s_ = e.on ? now_s() : -1.0;
             break;
-        case kind::fan_stops:
-            switch_fault(BOARD_FAULT_FAN, e);
-            break;
-        case kind::interrupt:
-            reset_is_due_ = true;
-            flipped_ = true; /* a flag of a peripheral that is in use may come twice */
-            board_raise_interrupt(board, static_cast<unsigned>(e.value));
-            break;
-        case kind::flip:
-            flipped_ = reset_is_due_ = true;
-            flip_s_ = now_s();
-            board_flip(board, static_cast<unsigned>(e.value),
-                       static_cast<std::uint8_t>(1u << e.channel));
-            break;
-        default: /* the truth knows of it since it was made */
+        default:
             break;
         }
     }
@@ -559,7 +516,7 @@ private:
         }
         if (bytes == "!" || bytes == "!!") {
             const double took_s = 1e-3 *
-                                  (static_cast<double>(board_send_backlog(board_.get())) +
+                                  (static_cast<double>(board_send_backlog(board_.raw())) +
                                    static_cast<double>(bytes.size())) /
                                   11.52;
             stopped_ = true;
@@ -583,10 +540,10 @@ private:
         }
         double hottest_c = -300.0;
         for (unsigned k = 0; k < SPRINGS; ++k) {
-            hottest_c = std::fmax(hottest_c, truth_hottest_c(truth_.get(), k));
+            hottest_c = std::fmax(hottest_c, truth_hottest_c(board_.truth(), k));
         }
         v_.hottest_c = std::fmax(v_.hottest_c, hottest_c);
-        const bool fed = board_is_fed(board_.get());
+        const bool fed = board_is_fed(board_.raw());
         fed_s_ = fed ? fed_s_ : now_s(); /* since */
         char text[160];
         if (hottest_c > HOTTEST_C + (welded_ ? WELDED_K : 0.0)) {
@@ -608,7 +565,7 @@ private:
             breaks("fed", "no pulse passes");
         }
         const bool heals = now_s() - flip_s_ < HEALED_S;
-        if (stopped_ && now_s() > stop_s_ + STOPPED_S && !board_all_off(board_.get()) && !heals &&
+        if (stopped_ && now_s() > stop_s_ + STOPPED_S && !board_all_off(board_.raw()) && !heals &&
             !flipped_ && !hanging_) {
             breaks("on", "after a stop that was not cleared");
         }
@@ -629,7 +586,7 @@ private:
         }
         const bool off = starts(status_, "<off|") || starts(status_, "<locked|");
         const bool done = !pending_ && now_s() - asked_s_ > DONE_S;
-        if (off && done && !board_all_off(board_.get()) && now_s() - flip_s_ > HEALED_S &&
+        if (off && done && !board_all_off(board_.raw()) && now_s() - flip_s_ > HEALED_S &&
             !hanging_) {
             breaks("on", "and it says " + status_);
         }
@@ -646,13 +603,13 @@ private:
             return;
         }
         board_view_t seen{};
-        if (!board_view(board_.get(), "controller", &seen)) {
+        if (!board_view(board_.raw(), "controller", &seen)) {
             return;
         }
         for (unsigned k = 0; k < SPRINGS; ++k) {
             char text[120];
             const board_view_spring_t &spring = seen.spring[k];
-            if (!wish_[k] && board_duty(board_.get(), k) > 0.0) {
+            if (!wish_[k] && board_duty(board_.raw(), k) > 0.0) {
                 if (now_s() - forgotten_s_ > 0.1) {
                     std::snprintf(text, sizeof text, "spring %u is driven, and nobody asked",
                                   k + 1);
@@ -661,8 +618,8 @@ private:
                 continue;
             }
             const bool said = spring.fault != 0 || seen.board_fault != 0 || seen.locked ||
-                              spring.limits != 0 || !board_is_fed(board_.get());
-            if (!wish_[k] || said || board_duty(board_.get(), k) > 0.0) {
+                              spring.limits != 0 || !board_is_fed(board_.raw());
+            if (!wish_[k] || said || board_duty(board_.raw(), k) > 0.0) {
                 silent_s_[k] = now_s();
             } else if (now_s() - silent_s_[k] > UNSAID_S) {
                 std::snprintf(text, sizeof text, "spring %u gets nothing, and nothing is said%s",
@@ -675,7 +632,7 @@ private:
     /* Whatever was, it answers; and its settings are whole. */
     void end()
     {
-        board_t *board = board_.get();
+        board_t *board = board_.raw();
         for (unsigned k = 0; k < SPRINGS; ++k) {
             board_set_fault(board, BOARD_FAULT_CLOSED, k, false);
             closed_s_[k] = -1.0;
@@ -707,8 +664,7 @@ private:
 
     const scenario &s_;
     bool trace_;
-    std::unique_ptr<truth_t, truth_deleter> truth_;
-    std::unique_ptr<board_t, board_deleter> board_;
+    faulty_board board_;
     verdict v_;
     /* host */
     std::string line_, status_, said_broken_;

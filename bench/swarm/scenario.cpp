@@ -17,10 +17,15 @@ namespace
 {
 
 constexpr std::array<const char *, static_cast<std::size_t>(kind::count)> names = {
-    "say",       "bytes",     "open",    "shorted", "closed",  "absent",     "stale",
-    "frozen",    "scaled",    "swapped", "unset",   "sda",     "worn",       "torn",
-    "power",     "brown_out", "button",  "hang",    "crystal", "enable_low", "enable_high",
-    "fan_stops", "interrupt", "flip",    "stress",  "supply",  "ambient"};
+    "say",         "bytes",         "open",         "shorted",     "closed",      "absent",
+    "stale",       "frozen",        "scaled",       "swapped",     "unset",       "sda",
+    "worn",        "torn",          "power",        "brown_out",   "button",      "hang",
+    "crystal",     "enable_low",    "enable_high",  "fan_stops",   "interrupt",   "flip",
+    "stress",      "supply",        "ambient",      "leaks",       "slow_switch", "welds_hot",
+    "diode_open",  "bridged",       "warm_contact", "chatters",    "ground",      "ripple",
+    "clock",       "gates_swapped", "thermistor",   "volt_scaled", "stuck_bit",   "drifts",
+    "saturates",   "offset",        "lifted",       "bursts",      "nacks",       "garbled",
+    "answers_too", "slow_bus"};
 
 class dice
 {
@@ -118,6 +123,68 @@ std::string hex(dice &d, unsigned count)
     return text;
 }
 
+double logarithmic(dice &d, double low, double high)
+{
+    return std::exp(d.uniform(std::log(low), std::log(high)));
+}
+
+double either_way(dice &d, double size)
+{
+    return d.chance(0.5) ? size : -size;
+}
+
+/* Of what a circuit or a sensor may have, how much; NAN where that is no number. */
+double amount(dice &d, kind what, unsigned channel)
+{
+    const double other = (channel + 1 + d.below(8)) % 9;
+    switch (what) {
+    case kind::leaks:
+        return logarithmic(d, 0.02, 1.5);
+    case kind::slow_switch:
+        return either_way(d, logarithmic(d, 0.005, 0.2));
+    case kind::welds_hot:
+        return d.uniform(40.0, 100.0);
+    case kind::bridged:
+    case kind::gates_swapped:
+        return other;
+    case kind::answers_too:
+        return other + 1.0;
+    case kind::warm_contact:
+        return logarithmic(d, 0.01, 0.3);
+    case kind::chatters:
+        return logarithmic(d, 0.3, 20.0);
+    case kind::ground:
+        return logarithmic(d, 0.001, 0.03);
+    case kind::ripple:
+        return d.uniform(0.02, 0.2);
+    case kind::clock:
+        return d.uniform(0.98, 1.02);
+    case kind::thermistor:
+        return d.uniform(0.0, 5.0);
+    case kind::volt_scaled:
+        return d.uniform(0.3, 2.0);
+    case kind::stuck_bit:
+        return either_way(d, 1.0 + d.below(32));
+    case kind::drifts:
+        return either_way(d, logarithmic(d, 0.01, 1.0));
+    case kind::saturates:
+        return d.uniform(0.3, 3.2);
+    case kind::offset:
+        return either_way(d, logarithmic(d, 0.005, 0.4));
+    case kind::lifted:
+        return either_way(d, logarithmic(d, 0.005, 0.3));
+    case kind::bursts:
+        return logarithmic(d, 0.02, 2.0);
+    case kind::nacks:
+    case kind::garbled:
+        return logarithmic(d, 2.0, 300.0);
+    case kind::slow_bus:
+        return logarithmic(d, 1.5, 30.0);
+    default:
+        return NAN;
+    }
+}
+
 /* What lasts ends again, sooner or later, in three of four cases. */
 void last(dice &d, scenario &s, const event &one)
 {
@@ -134,6 +201,19 @@ void fault(dice &d, scenario &s)
 {
     const auto what = static_cast<kind>(1 + d.below(static_cast<unsigned>(kind::count) - 1));
     event one{d.uniform(2.0, s.duration_s), what, d.spring(), true, 0.0, ""};
+    const double size = amount(d, what, one.channel);
+    if (!std::isnan(size)) {
+        one.value = size;
+        if (what == kind::thermistor) {
+            s.events.push_back({1.0, kind::say, 0, true, 0.0, "$ambient_source=1"});
+        }
+        if (what == kind::volt_scaled || what == kind::gates_swapped || what == kind::thermistor) {
+            s.events.push_back(one); /* for good */
+        } else {
+            last(d, s, one);
+        }
+        return;
+    }
     switch (what) {
     case kind::bytes:
         one.text = hex(d, 1 + d.below(300));

@@ -41,6 +41,31 @@ enum class kind {
     stress,      /* channel, value MPa: a finger */
     supply,      /* value V: sags and comes back */
     ambient,     /* value degC: the room */
+    /* the circuit (truth_upset_t) */
+    leaks,         /* channel, value A: through a switch that is off */
+    slow_switch,   /* channel, value share of the period: on later (below 0), or off later */
+    welds_hot,     /* channel, value degC: its switch, as its spring gets there */
+    diode_open,    /* channel */
+    bridged,       /* channel, value: another spring that it touches */
+    warm_contact,  /* channel, value ohm for each 100 K */
+    chatters,      /* channel, value Hz: its crimp */
+    ground,        /* value ohm that all currents lift */
+    ripple,        /* value share of the supply; channel: how fast */
+    clock,         /* value: the world's seconds in one of the board's */
+    gates_swapped, /* channel, value: another one */
+    thermistor,    /* value V */
+    /* sensors that answer (lie) */
+    volt_scaled, /* channel, value: it shows so many times the voltage */
+    stuck_bit,   /* channel, value */
+    drifts,      /* channel, value share a minute */
+    saturates,   /* channel, value A */
+    offset,      /* channel, value A */
+    lifted,      /* channel, value V */
+    bursts,      /* channel, value A and V of noise, now and then */
+    nacks,       /* channel, value: one in so many */
+    garbled,     /* channel, value: one in so many */
+    answers_too, /* channel, value 1..9: whose sensor has its address */
+    slow_bus,    /* value: times as slow */
     count
 };
 

@@ -131,7 +131,7 @@ static void start(controller_t *controller, const controller_settings_t *setting
     controller->springs = (uint8_t)(settings->model.rows * settings->model.columns);
     thermal_model_set_ambient(model, ambient_c7);
     thermal_model_reset(model, ambient_c7);
-    temperature_ceiling_prepare(&controller->ceiling, model, &settings->current);
+    temperature_ceiling_prepare(&controller->drive, model, &settings->current);
     (void)current_control_init(&controller->current, &settings->current, NULL);
     (void)safety_init(&controller->safety, &settings->safety, controller->springs, NULL);
     spring_estimator_restart(&controller->estimator, model);
@@ -203,8 +203,12 @@ bool controller_apply_settings(controller_t *controller, const controller_settin
                 &controller->ceiling, &controller->model, k, held_uw[k],
                 temperature_ceiling_hold_uw(&controller->ceiling, &controller->model, k));
         }
+        if (memcmp(&controller->current.parameters, &settings->current, sizeof settings->current) !=
+            0) {
+            controller->peers = (circuit_peers_t){0}; /* it is another circuit */
+        }
         (void)current_control_apply(&controller->current, &settings->current, NULL);
-        temperature_ceiling_prepare(&controller->ceiling, &controller->model, &settings->current);
+        temperature_ceiling_prepare(&controller->drive, &controller->model, &settings->current);
         (void)safety_apply(&controller->safety, &settings->safety, NULL);
         (void)apply_policy(controller, &settings->policy);
         const bool other_model = mark != controller_model_mark(controller);
@@ -288,7 +292,12 @@ static uint32_t take_sensors(controller_t *controller, const controller_sensor_t
 /* What no belief can talk away: is it a circuit, and how hot could it be by now? */
 static void judge_circuit(controller_t *controller, uint8_t k)
 {
-    if (circuit_check_judge(&controller->circuit[k], &controller->current.parameters) ||
+    const current_control_parameters_t *parameters = &controller->current.parameters;
+    circuit_window_t window;
+    const bool is_none = circuit_check_judge(&controller->circuit[k], parameters, &window);
+    const bool is_odd =
+        circuit_peers_judge(&controller->peers, controller->springs, k, &window, parameters);
+    if (is_none || is_odd ||
         spring_estimator_is_unlike(spring_estimator_of(&controller->estimator, k))) {
         safety_trip(&controller->safety, k, SAFETY_FAULT_SENSOR_MISMATCH);
     }
@@ -298,7 +307,7 @@ static void raise_ceiling(controller_t *controller, uint8_t k)
 {
     const float measured_w = 1e-6f / (float)CIRCUIT_CHECK_TICKS * (float)controller->heat_sum_uw[k];
     const float driven_w = temperature_ceiling_power_w(
-        &controller->ceiling, 1.0f / (float)CIRCUIT_CHECK_TICKS * (float)controller->duty_sum[k]);
+        &controller->drive, 1.0f / (float)CIRCUIT_CHECK_TICKS * (float)controller->duty_sum[k]);
     temperature_ceiling_step(&controller->ceiling, &controller->model, k,
                              measured_w > driven_w ? measured_w : driven_w);
     controller->heat_sum_uw[k] = 0;
@@ -573,6 +582,10 @@ void controller_host_heard(controller_t *controller)
 void controller_clear_faults(controller_t *controller)
 {
     controller_stop(controller);
+    for (uint8_t k = 0; k < controller->springs; k++) {
+        circuit_peers_clear(&controller->peers, k,
+                            safety_fault(&controller->safety, k) == SAFETY_FAULT_SENSOR_MISMATCH);
+    }
     safety_clear(&controller->safety);
     memset(controller->circuit, 0, sizeof controller->circuit);
     drive_policy_clear(&controller->policy);
@@ -632,11 +645,7 @@ void controller_get_delivered(const controller_t *controller, temperature_ceilin
 
 void controller_set_delivered(controller_t *controller, const temperature_ceiling_t *delivered)
 {
-    scrub_open(&controller->scrub, controller_fixed, controller);
     controller->ceiling = *delivered;
-    temperature_ceiling_prepare(&controller->ceiling, &controller->model,
-                                &controller->current.parameters);
-    scrub_seal(&controller->scrub, controller_fixed, controller);
 }
 
 /* By way of martensite. */

@@ -8,6 +8,7 @@
 #include <stdint.h>
 
 #include "circuit_check.h"
+#include "circuit_peers.h"
 #include "current_control.h"
 #include "drive_policy.h"
 #include "safety.h"
@@ -64,6 +65,7 @@ typedef struct {
 typedef struct {
     thermal_model_t model;
     temperature_ceiling_t ceiling;
+    temperature_ceiling_drive_t drive;
     bool supply_off;           /* until controller_set_supply */
     uint8_t supply_ticks;      /* that the supply has been held, up to those that a relay takes */
     current_control_t current; /* what is before it outlives another size of the array */
@@ -82,6 +84,7 @@ typedef struct {
     int16_t measured_mv[CONTROLLER_MAX_SPRINGS];
     uint32_t power_sum_uw[CONTROLLER_MAX_SPRINGS]; /* over the ticks of the running model step */
     circuit_check_t circuit[CONTROLLER_MAX_SPRINGS];
+    circuit_peers_t peers;
     uint32_t heat_sum_uw[CONTROLLER_MAX_SPRINGS]; /* over the ticks of the ceiling's running step */
     uint16_t duty_sum[CONTROLLER_MAX_SPRINGS];    /* the same */
     scrub_t scrub;                                /* of what settings decide */

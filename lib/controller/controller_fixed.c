@@ -15,9 +15,7 @@ scrub_stretch_t controller_fixed(const void *owner, uint8_t index)
     case 2:
         return (scrub_stretch_t){&model->plate, offsetof(thermal_model_slow_node_t, midstep_c6)};
     case 3:
-        return (scrub_stretch_t){&c->ceiling.v_per_step,
-                                 offsetof(temperature_ceiling_t, spared_w) -
-                                     offsetof(temperature_ceiling_t, v_per_step)};
+        return (scrub_stretch_t){&c->drive, sizeof c->drive};
     case 4:
         return (scrub_stretch_t){&c->current, offsetof(current_control_t, even_turn)};
     case 5:

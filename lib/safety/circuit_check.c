@@ -1,6 +1,7 @@
 #include "circuit_check.h"
 
 #include <math.h>
+#include <stddef.h>
 
 #define LEAST_READINGS 12u /* where a current rises, every other tick gives one */
 #define DUTY_STEPS     800.0f
@@ -50,13 +51,12 @@ void circuit_check_take(circuit_check_t *c, uint16_t fixed_mohm, uint16_t duty, 
     c->duty_voltage += (uint32_t)duty * behind_mv;
 }
 
-static void count(uint8_t *windows, bool bad)
+static uint8_t counted(uint8_t windows, bool bad)
 {
     if (!bad) {
-        *windows = 0;
-    } else if (*windows < UINT8_MAX) {
-        (*windows)++;
+        return 0;
     }
+    return windows < 15u ? (uint8_t)(windows + 1u) : windows;
 }
 
 /* What is swept moves by two deviations at least: a register that shows none of it is frozen, if
@@ -69,10 +69,14 @@ static bool stands(const circuit_check_t *c, float swept_mv2, float found_mv)
            (!c->voltage_moved && swept_mv2 * own_mv * own_mv > half_mv * half_mv);
 }
 
-bool circuit_check_judge(circuit_check_t *c, const current_control_parameters_t *p)
+bool circuit_check_judge(circuit_check_t *c, const current_control_parameters_t *p,
+                         circuit_window_t *window)
 {
     bool astray = false;
     bool unbalanced = false;
+    if (window != NULL) {
+        *window = (circuit_window_t){.tells = false};
+    }
     if (c->readings >= LEAST_READINGS) {
         const float share = 1.0f / (float)c->readings;
         const float drop_mv = (float)p->freewheel_mv;
@@ -91,9 +95,12 @@ bool circuit_check_judge(circuit_check_t *c, const current_control_parameters_t 
         astray = (tells && other) ||
                  (variance >= LEAST_VARIANCE && stands(c, should_mv * step_mv, found_mv));
         unbalanced = fabsf(found_mv - expected_mv) > BALANCE_SHARE * expected_mv + BALANCE_MV;
+        if (window != NULL) {
+            *window = (circuit_window_t){found_mv, expected_mv, true};
+        }
     }
-    count(&c->astray, astray);
-    count(&c->unbalanced, unbalanced);
+    c->astray = counted(c->astray, astray) & 15u;
+    c->unbalanced = counted(c->unbalanced, unbalanced) & 15u;
     *c = (circuit_check_t){.last_duty = c->last_duty,
                            .last_ma = c->last_ma,
                            .last_mv = c->last_mv,

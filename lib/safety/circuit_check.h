@@ -32,9 +32,16 @@ typedef struct {
     uint8_t readings : 6;
     bool current_moved : 1; /* in this window */
     bool voltage_moved : 1;
-    uint8_t astray;     /* windows on end in which the voltage did not follow the duty */
-    uint8_t unbalanced; /* windows on end in which it was not what the duty should bring */
+    uint8_t astray : 4;     /* windows on end in which the voltage did not follow the duty */
+    uint8_t unbalanced : 4; /* windows on end in which it was not what the duty should bring */
 } circuit_check_t;
+
+/* What a window's voltages were, in the mean. */
+typedef struct {
+    float found_mv;    /* behind the switch */
+    float expected_mv; /* by duty and declared supply */
+    bool tells;        /* there were readings enough */
+} circuit_window_t;
 
 /* One tick: the duty (steps of 800) that was applied in it and, if valid, what was read at its end.
  * Above CIRCUIT_CHECK_MOST counts as that, below 0 as 0. fixed_mohm: shunt and wiring. */
@@ -44,8 +51,9 @@ void circuit_check_take(circuit_check_t *check, uint16_t fixed_mohm, uint16_t du
 /* Ends the window, begins the next one: at most CIRCUIT_CHECK_TICKS ticks after the last. True if
  * and only if what was read has not been a circuit for CIRCUIT_CHECK_WINDOWS windows on end, or
  * CIRCUIT_CHECK_BALANCE_WINDOWS. A window that can tell nothing (few readings; for the first, a
- * duty that hardly moves) ends such a row. */
-bool circuit_check_judge(circuit_check_t *check, const current_control_parameters_t *circuit);
+ * duty that hardly moves) ends such a row. window may be NULL. */
+bool circuit_check_judge(circuit_check_t *check, const current_control_parameters_t *circuit,
+                         circuit_window_t *window);
 
 #ifdef __cplusplus
 }

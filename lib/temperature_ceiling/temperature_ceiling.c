@@ -225,19 +225,19 @@ bool temperature_ceiling_trips(const temperature_ceiling_t *ceiling, uint8_t k, 
                (128 * (int32_t)trip_cc - ambient) * RISE_SHARE_DENOMINATOR;
 }
 
-void temperature_ceiling_prepare(temperature_ceiling_t *ceiling, const thermal_model_t *model,
+void temperature_ceiling_prepare(temperature_ceiling_drive_t *drive, const thermal_model_t *model,
                                  const current_control_parameters_t *circuit)
 {
     const float ohm = 1e-6f * (float)model->parameters.resistance_austenite_uohm;
     const float fixed_ohm = 1e-3f * (float)((int32_t)circuit->shunt_mohm + circuit->wiring_mohm);
-    ceiling->drop_v = 1e-3f * (float)circuit->freewheel_mv;
-    ceiling->v_per_step =
+    drive->drop_v = 1e-3f * (float)circuit->freewheel_mv;
+    drive->v_per_step =
         1e-3f / 800.0f * (float)((int32_t)circuit->supply_mv + circuit->freewheel_mv);
-    ceiling->w_per_v2 = POWER_SHARE * ohm / ((ohm + fixed_ohm) * (ohm + fixed_ohm));
+    drive->w_per_v2 = POWER_SHARE * ohm / ((ohm + fixed_ohm) * (ohm + fixed_ohm));
 }
 
-float temperature_ceiling_power_w(const temperature_ceiling_t *ceiling, float duty)
+float temperature_ceiling_power_w(const temperature_ceiling_drive_t *drive, float duty)
 {
-    const float behind_v = ceiling->v_per_step * duty - ceiling->drop_v;
-    return behind_v > 0.0f ? ceiling->w_per_v2 * behind_v * behind_v : 0.0f;
+    const float behind_v = drive->v_per_step * duty - drive->drop_v;
+    return behind_v > 0.0f ? drive->w_per_v2 * behind_v * behind_v : 0.0f;
 }

@@ -22,9 +22,6 @@ extern "C" {
 typedef struct {
     int32_t temperature_c23[THERMAL_MODEL_MAX_SPRINGS]; /* Q9.23 degC */
     float austenite[THERMAL_MODEL_MAX_SPRINGS];         /* 0..1 */
-    float v_per_step;                                   /* of duty */
-    float drop_v;                                       /* of the freewheeling diode */
-    float w_per_v2; /* least power of a spring, by the voltage behind its switch */
     /* what the heat that was there at a change of the losses gives off less than is declared now,
      * and the share of it that is over in a second */
     float spared_w[THERMAL_MODEL_MAX_SPRINGS];
@@ -33,6 +30,13 @@ typedef struct {
     int16_t ambient_c7; /* the highest that was told since the springs were cold */
     bool delivered;     /* power was given since then */
 } temperature_ceiling_t;
+
+/* What duty and supply give at least, by the settings. */
+typedef struct {
+    float v_per_step; /* of duty */
+    float drop_v;     /* of the freewheeling diode */
+    float w_per_v2;   /* least power of a spring, by the voltage behind its switch */
+} temperature_ceiling_drive_t;
 
 /* Power-on: nothing was given yet. Also for springs that only another size of the array has. */
 void temperature_ceiling_begin(temperature_ceiling_t *ceiling, int16_t ambient_c7);
@@ -64,13 +68,12 @@ float temperature_ceiling_c(const temperature_ceiling_t *ceiling, uint8_t spring
 bool temperature_ceiling_trips(const temperature_ceiling_t *ceiling, uint8_t spring,
                                int16_t trip_cc);
 
-/* Takes what it needs of the settings; where it is stays. */
-void temperature_ceiling_prepare(temperature_ceiling_t *ceiling, const thermal_model_t *model,
+void temperature_ceiling_prepare(temperature_ceiling_drive_t *drive, const thermal_model_t *model,
                                  const current_control_parameters_t *circuit);
 
 /* Power, W, that the duty (steps of 800) must at least bring, whatever is read: the supply may be a
  * fifth lower than declared. */
-float temperature_ceiling_power_w(const temperature_ceiling_t *ceiling, float duty);
+float temperature_ceiling_power_w(const temperature_ceiling_drive_t *drive, float duty);
 
 #ifdef __cplusplus
 }

@@ -187,6 +187,9 @@ board_t *board_create(const board_options_t *options, char *error, size_t error_
         board->array = *options->array;
         board->springs = options->array->springs;
     }
+    if (options->bus != NULL) {
+        board->bus = *options->bus;
+    }
     complaining = board;
     avr_global_logger_set(on_log);
     if (!make_core(board)) {

@@ -69,10 +69,19 @@ typedef struct {
     void (*step)(void *context, double seconds);
     void (*drive)(void *context, unsigned channel, double duty); /* 0 where the supply is off */
     void (*fan)(void *context, double fraction);
+    void (*feed)(void *context, bool fed); /* whether the stages have their supply; may be NULL */
     void (*fault)(void *context, unsigned channel, plant_fault_t fault);
     double (*current_a)(void *context, unsigned channel); /* now, with that duty */
     double (*voltage_v)(void *context, unsigned channel); /* across the spring */
 } board_array_t;
+
+/* What a bus makes of a sensor that is sound. Either may be NULL. */
+typedef struct {
+    void *context;
+    bool (*acknowledges)(void *context, unsigned channel); /* where the sensor does */
+    /* The register (0..5) as the program gets it. */
+    uint16_t (*reads)(void *context, unsigned channel, unsigned number, uint16_t value);
+} board_bus_t;
 
 typedef struct {
     const char *elf; /* path of the program */
@@ -82,10 +91,11 @@ typedef struct {
     uint64_t seed;              /* of what RAM holds at power-on, and of the sensors' noise */
     double shunt_noise_v;       /* standard deviation of one conversion of an INA219 */
     double bus_noise_v;
-    bool without_cut_off; /* the stages have their supply whatever the program does */
-    void *context;        /* of the two functions below, both optional */
-    board_byte_t on_uart; /* a byte has left USART0 */
-    board_mark_t on_mark; /* the program wrote general purpose register 0, 1 or 2 */
+    bool without_cut_off;   /* the stages have their supply whatever the program does */
+    void *context;          /* of the two functions below, both optional */
+    board_byte_t on_uart;   /* a byte has left USART0 */
+    board_mark_t on_mark;   /* the program wrote general purpose register 0, 1 or 2 */
+    const board_bus_t *bus; /* what else happens on it, copied; NULL: nothing */
 } board_options_t;
 
 /* Powers the board on, with an erased EEPROM. Fails (NULL, one line in `error`) if and only if the
@@ -145,6 +155,8 @@ void board_scale_sensor(board_t *board, unsigned channel, double current_scale,
 void board_swap_sensors(board_t *board, unsigned a, unsigned b);
 /* The pins' wires to the gates of two channels change places; done twice, they are back. */
 void board_swap_gates(board_t *board, unsigned a, unsigned b);
+/* Each bit on the I2C bus takes so many times as long: its clock is stretched. 1: as it is set. */
+void board_stretch_bus(board_t *board, double factor);
 /* The INA219 loses its configuration. */
 void board_reset_sensor(board_t *board, unsigned channel);
 /* A register (0..5) of an INA219, without side effects. */

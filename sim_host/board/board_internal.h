@@ -28,6 +28,7 @@ struct board {
     plant_t *plant;
     board_array_t array; /* without a context's functions: the plant */
     unsigned springs;
+    board_bus_t bus;
     board_twi_t twi;
     board_uart_t uart;
     board_eeprom_t eeprom;

@@ -84,6 +84,9 @@ static void move_array(board_t *board, double seconds, bool fed)
         array->step(array->context, seconds);
     }
     array->fan(array->context, fan_of(board));
+    if (array->feed != NULL) {
+        array->feed(array->context, fed);
+    }
     for (unsigned k = 0; k < board->springs; k++) {
         array->drive(array->context, k, fed ? switched_on(board, k) : 0.0);
         board->current_a[k] = array->current_a(array->context, k);
@@ -193,8 +196,13 @@ static ina219_t *sensor_at(board_t *board, uint8_t address)
 
 bool board_sensor_begin(void *context, uint8_t address, bool read)
 {
+    const board_t *board = context;
     ina219_t *sensor = sensor_at(context, address);
-    return sensor != NULL && ina219_begin(sensor, read);
+    if (sensor == NULL || !ina219_begin(sensor, read)) {
+        return false;
+    }
+    return board->bus.acknowledges == NULL ||
+           board->bus.acknowledges(board->bus.context, address - SENSOR_ADDRESS);
 }
 
 void board_sensor_write(void *context, uint8_t address, uint8_t byte)
@@ -215,7 +223,15 @@ uint8_t board_sensor_read(void *context, uint8_t address)
 {
     board_t *board = context;
     board_handle_events(board, board->avr->cycle);
-    return ina219_read(sensor_at(board, address));
+    ina219_t *const sensor = sensor_at(board, address);
+    const bool first = sensor->byte_count == 0;
+    const uint8_t byte = ina219_read(sensor);
+    if (!first || board->bus.reads == NULL) {
+        return byte;
+    }
+    sensor->shift = board->bus.reads(board->bus.context, address - SENSOR_ADDRESS, sensor->pointer,
+                                     sensor->shift); /* both bytes come of it */
+    return (uint8_t)(sensor->shift >> 8);
 }
 
 void board_sensors_power_on(board_t *board)
@@ -343,6 +359,11 @@ void board_swap_gates(board_t *board, unsigned a, unsigned b)
     board->pin_of_stage[b] = pin;
     board_move_plant(board, board->avr->cycle);
     board_schedule(board);
+}
+
+void board_stretch_bus(board_t *board, double factor)
+{
+    board->twi.stretch = factor;
 }
 
 void board_reset_sensor(board_t *board, unsigned channel)

@@ -30,8 +30,9 @@ static avr_cycle_count_t operation_done(avr_t *avr, avr_cycle_count_t when, void
 static avr_cycle_count_t bit_cycles(const board_twi_t *twi)
 {
     const uint8_t *data = twi->avr->data;
-    return 16u +
-           2u * (avr_cycle_count_t)data[REGISTER_TWBR] * (1u << (2u * (data[REGISTER_TWSR] & 3u)));
+    const avr_cycle_count_t set = 16u + 2u * (avr_cycle_count_t)data[REGISTER_TWBR] *
+                                            (1u << (2u * (data[REGISTER_TWSR] & 3u)));
+    return twi->stretch > 1.0 ? (avr_cycle_count_t)((double)set * twi->stretch) : set;
 }
 
 static void begin(board_twi_t *twi, board_twi_operation_t operation, unsigned bits)
@@ -191,7 +192,7 @@ static void write_status(avr_t *avr, avr_io_addr_t address, uint8_t value, void 
 
 void board_twi_attach(board_twi_t *twi, avr_t *avr, const board_twi_devices_t *devices)
 {
-    *twi = (board_twi_t){.avr = avr, .devices = *devices};
+    *twi = (board_twi_t){.avr = avr, .devices = *devices, .stretch = 1.0};
     twi->vector = board_find_vector(avr, VECTOR_TWI);
     board_take_register(avr, REGISTER_TWCR, NULL, write_control, twi);
     board_take_register(avr, REGISTER_TWDR, NULL, board_plain_write, NULL);

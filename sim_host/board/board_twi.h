@@ -44,6 +44,7 @@ typedef struct {
     bool acknowledge; /* TWEA when the byte began */
     uint8_t address;
     bool sda_stuck_low;
+    double stretch; /* of the clock */
 } board_twi_t;
 
 /* Takes the registers over from simavr's own model. */

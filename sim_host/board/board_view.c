@@ -2,6 +2,7 @@
 #define THERMAL_MODEL_MAX_SPRINGS    9
 #define SAFETY_MAX_SPRINGS           9
 #define CURRENT_CONTROL_MAX_CHANNELS 9
+#define CIRCUIT_PEERS_MAX            9
 #pragma pack(push, 1)
 #include "controller.h"
 #pragma pack(pop)

@@ -187,6 +187,22 @@ void a_belief_that_turns_over_by_itself_begins_anew_and_says_so()
     TEST_ASSERT_TRUE_MESSAGE(contains(version, "in what was believed: 1, "), version.c_str());
 }
 
+/* Ticks become due faster than they are done: the board's time is not the world's any more. */
+void a_control_loop_that_cannot_keep_up_ends_in_a_reset_that_says_so()
+{
+    constexpr unsigned TIMER2_COMPA = 13;
+    rig mega;
+    heat(mega);
+    for (int n = 0; n < 20000 && board_reset_count(mega.raw()) == 0; ++n) {
+        TEST_ASSERT_TRUE(board_raise_interrupt(mega.raw(), TIMER2_COMPA));
+        mega.run_ms(0.05); /* 20 times as fast as it should */
+    }
+    TEST_ASSERT_EQUAL_UINT(1, board_reset_count(mega.raw()));
+    const std::string greeting = mega.boot(false);
+    TEST_ASSERT_TRUE_MESSAGE(contains(greeting, "overload"), greeting.c_str());
+    off_until_unlocked(mega);
+}
+
 void a_brown_out_leaves_the_board_locked()
 {
     rig mega;
@@ -287,6 +303,7 @@ int main()
     RUN_TEST(whatever_bit_turns_over_the_board_answers_and_nothing_stays_hot);
     RUN_TEST(a_setting_that_turns_over_by_itself_ends_in_a_reset_that_says_so);
     RUN_TEST(a_belief_that_turns_over_by_itself_begins_anew_and_says_so);
+    RUN_TEST(a_control_loop_that_cannot_keep_up_ends_in_a_reset_that_says_so);
     RUN_TEST(a_brown_out_leaves_the_board_locked);
     RUN_TEST(the_reset_button_keeps_the_models_temperatures);
     RUN_TEST(a_watchdog_reset_keeps_the_models_temperatures);

@@ -26,6 +26,6 @@ void main(void)
             circuit_check_take(&check, any_u16(), (uint16_t)any_between(0, 800), any_bool(),
                                any_s16(), any_s16());
         }
-        (void)circuit_check_judge(&check, &settings);
+        (void)circuit_check_judge(&check, &settings, 0);
     }
 }

@@ -87,7 +87,7 @@ static uint32_t found_after(const circuit_t *c, uint16_t duty, uint16_t steps, s
             (int16_t)(4 * lround((mv + c->voltage_offset_mv + c->noise_mv * noise()) / 4.0));
         circuit_check_take(&check, parameters.shunt_mohm + parameters.wiring_mohm,
                            swept(duty, steps, tick), tick % 97u != 13u, read_ma, read_mv);
-        if (tick % CIRCUIT_CHECK_TICKS == 17u && circuit_check_judge(&check, &parameters)) {
+        if (tick % CIRCUIT_CHECK_TICKS == 17u && circuit_check_judge(&check, &parameters, NULL)) {
             return tick + 1u;
         }
     }
@@ -123,7 +123,7 @@ static void resistance_that_changes_is_no_mismatch(void)
         circuit_check_take(&check, 180, duty, true, (int16_t)lround(ma),
                            (int16_t)(4 * lround(ma * spring_ohm / 4.0)));
         if (tick % CIRCUIT_CHECK_TICKS == 29u) {
-            TEST_ASSERT_FALSE(circuit_check_judge(&check, &parameters));
+            TEST_ASSERT_FALSE(circuit_check_judge(&check, &parameters, NULL));
         }
     }
 }
@@ -153,7 +153,8 @@ static void frozen_register_is_found_within_two_seconds(void)
             const double shown_mv = mv + (current_stands ? c.noise_mv * noise() : 0.0);
             circuit_check_take(&check, 180, duty, true, (int16_t)lround(ma),
                                (int16_t)(4 * lround(shown_mv / 4.0)));
-            found = tick % CIRCUIT_CHECK_TICKS == 29u && circuit_check_judge(&check, &parameters);
+            found =
+                tick % CIRCUIT_CHECK_TICKS == 29u && circuit_check_judge(&check, &parameters, NULL);
         }
     }
 }
@@ -178,7 +179,7 @@ static void supply_that_moves_is_none(void)
             circuit_check_take(&check, 180, duty, true, (int16_t)lround(ma),
                                (int16_t)(4 * lround(ma * 0.2 / 4.0)));
             if (tick % CIRCUIT_CHECK_TICKS == 29u) {
-                TEST_ASSERT_FALSE(circuit_check_judge(&check, &parameters));
+                TEST_ASSERT_FALSE(circuit_check_judge(&check, &parameters, NULL));
             }
         }
     }
@@ -205,7 +206,7 @@ static void pulses_read_late_are_none(void)
         const double ma = current_ma(&declared, was, 0);
         circuit_check_take(&check, 180, duty, true, (int16_t)ma, (int16_t)(ma * 0.2));
         if (tick % CIRCUIT_CHECK_TICKS == 0u) { /* the first tick of a pulse is the window's last */
-            TEST_ASSERT_FALSE(circuit_check_judge(&check, &parameters));
+            TEST_ASSERT_FALSE(circuit_check_judge(&check, &parameters, NULL));
         }
     }
 }
@@ -236,7 +237,7 @@ static void any_reading_is_taken_without_overflow(void)
                                word[n % 5u]);
         }
         TEST_ASSERT_EQUAL_UINT8(29, check.readings); /* the first one jumps */
-        (void)circuit_check_judge(&check, &parameters);
+        (void)circuit_check_judge(&check, &parameters, NULL);
     }
 }
 
@@ -253,7 +254,7 @@ static bool judged(uint16_t duty, uint16_t steps, double share, double beyond_mv
         circuit_check_take(&check, 180, given, tick < readings, (int16_t)lround(ma),
                            (int16_t)lround(ma * 0.2));
     }
-    return circuit_check_judge(&check, &parameters);
+    return circuit_check_judge(&check, &parameters, NULL);
 }
 
 /* Windows on end until it is found; 9: it is not. */
@@ -305,7 +306,8 @@ static void the_drop_counts_and_what_is_found_stays_found(void)
                 circuit_check_take(&check, 180, 400, true, (int16_t)fmin(ma, 4095.0),
                                    (int16_t)lround(behind_mv - fmin(ma, 4095.0) * 180.0 / 1024.0));
             }
-            TEST_ASSERT_EQUAL(off_mv != 0 && window >= 2, circuit_check_judge(&check, &parameters));
+            TEST_ASSERT_EQUAL(off_mv != 0 && window >= 2,
+                              circuit_check_judge(&check, &parameters, NULL));
         }
     }
 }
@@ -322,7 +324,7 @@ static void voltage_that_should_move_by_more_than_half_a_step_is_frozen(void)
             const double ma = 5000.0 / 800.0 * given / (0.2 + 180.0 / 1024.0);
             circuit_check_take(&check, 180, given, true, (int16_t)lround(ma), 404);
         }
-        found = circuit_check_judge(&check, &parameters);
+        found = circuit_check_judge(&check, &parameters, NULL);
     }
 }
 

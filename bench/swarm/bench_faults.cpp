@@ -1,0 +1,448 @@
+/* One fault at a time in a board that heats, holds, or has switched off: how hot, how soon safe,
+ * how soon said, and in which words. Beside the same board without it. */
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <fmt/format.h>
+#include <fstream>
+#include <functional>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <regex>
+
+#include "board_view.h"
+#include "faulty_board.hpp"
+#include "simulated_board.h"
+
+using namespace swarm;
+
+namespace
+{
+
+constexpr unsigned SPRINGS = TRUTH_SPRINGS;
+constexpr unsigned OFF_SPRING = 4; /* the middle one; the others are driven */
+constexpr double SLICE_S = 0.02, HOTTER_K = 10.0;
+constexpr double QUIET_S = 20.0; /* before the user clears, three times */
+constexpr double AGAIN_S = 8.0;
+const char *const PATTERN = "pattern 111101111";
+
+using events = std::vector<event>; /* at_s from the fault on */
+
+struct injected {
+    std::string name;
+    events what;
+};
+
+event at(double at_s, kind what, unsigned channel = 0, double value = 0.0, bool on = true)
+{
+    return {at_s, what, channel, on, value, ""};
+}
+
+event say(double at_s, const std::string &text)
+{
+    return {at_s, kind::say, 0, true, 0.0, text};
+}
+
+events every(double period_s, double until_s, event one)
+{
+    events all;
+    for (; one.at_s < until_s; one.at_s += period_s) {
+        all.push_back(one);
+    }
+    return all;
+}
+
+events flood()
+{
+    events all;
+    for (double at_s = 0.0; at_s < 10.0; at_s += 0.1) {
+        event one = at(at_s, kind::bytes);
+        for (int k = 0; k < 1150; ++k) {
+            one.text += "6162630a"[(2 * k) % 8];
+            one.text += "6162630a"[(2 * k) % 8 + 1];
+        }
+        all.push_back(one);
+    }
+    return all;
+}
+
+event octets(double at_s, const std::string &text)
+{
+    event one = at(at_s, kind::bytes);
+    for (const char c : text) {
+        one.text += fmt::format("{:02x}", static_cast<unsigned char>(c));
+    }
+    return one;
+}
+
+events half_lines()
+{
+    events all = every(1.0, 10.0, octets(0.0, "off"));
+    all.push_back(octets(12.0, "\n"));
+    return all;
+}
+
+events upload()
+{
+    events all;
+    const char *const lines[] = {
+        "$loss_w_per_k=0.0070",  "$heat_capacity_j_per_k=0.330",    "$austenite_start_c=85",
+        "$latent_heat_j=9",      "$resistance_austenite_ohm=0.225", "$loss_scale_1=1.1",
+        "$martensite_start_c=76"};
+    for (int n = 0; n < 70; ++n) {
+        all.push_back(say(0.1 * n, lines[n % 7]));
+    }
+    return all;
+}
+
+/* Its start takes 0.3 s: a cut in each phase of it. */
+events cuts_in_the_start(kind what)
+{
+    events all;
+    double at_s = 0.0;
+    for (double run_s = 0.005; run_s < 0.6; run_s *= 1.25) {
+        all.push_back(at(at_s, what));
+        at_s += run_s;
+    }
+    return all;
+}
+
+std::vector<injected> catalogue()
+{
+    using k = kind;
+    const unsigned off = OFF_SPRING;
+    return {
+        {"none", {}},
+        /* switches and circuit */
+        {"switch welded", {at(0, k::closed)}},
+        {"switch welded, spring off", {at(0, k::closed, off)}},
+        {"switch welds at 70 degC", {at(0, k::welds_hot, 0, 70)}},
+        {"switch leaks 0.05 A", {at(0, k::leaks, 0, 0.05)}},
+        {"switch leaks 0.3 A", {at(0, k::leaks, 0, 0.3)}},
+        {"switch leaks 1 A", {at(0, k::leaks, 0, 1.0)}},
+        {"switch leaks 0.08 A, spring off", {at(0, k::leaks, off, 0.08)}},
+        {"switch leaks 0.3 A, spring off", {at(0, k::leaks, off, 0.3)}},
+        {"on 3 us late", {at(0, k::slow_switch, 0, -0.06)}},
+        {"off 3 us late", {at(0, k::slow_switch, 0, 0.06)}},
+        {"off 10 us late", {at(0, k::slow_switch, 0, 0.2)}},
+        {"diode open", {at(0, k::diode_open)}},
+        {"gates swapped with a driven one", {at(0, k::gates_swapped, 0, 1)}},
+        {"gates swapped with one that is off", {at(0, k::gates_swapped, 0, off)}},
+        {"spring broken", {at(0, k::open)}},
+        {"crimp chatters, 1 Hz", {at(0, k::chatters, 0, 1.0)}},
+        {"crimp chatters, 7 Hz", {at(0, k::chatters, 0, 7.0)}},
+        {"contact +0.05 ohm / 100 K", {at(0, k::warm_contact, 0, 0.05)}},
+        {"contact +0.2 ohm / 100 K", {at(0, k::warm_contact, 0, 0.2)}},
+        {"short across a spring", {at(0, k::shorted)}},
+        {"touches a driven neighbour", {at(0, k::bridged, 0, 1)}},
+        {"touches one that is off", {at(0, k::bridged, 0, off)}},
+        {"ground lifts 5 mohm", {at(0, k::ground, 0, 0.005)}},
+        {"ground lifts 20 mohm", {at(0, k::ground, 0, 0.02)}},
+        {"supply 5 V -> 4.2 V", {at(0, k::supply, 0, 4.2)}},
+        {"supply 5 V -> 6.5 V", {at(0, k::supply, 0, 6.5)}},
+        {"supply 5 V -> 8 V", {at(0, k::supply, 0, 8.0)}},
+        {"supply +-10 %, 0.2 Hz", {at(0, k::ripple, 0, 0.1)}},
+        {"supply +-15 %, 2 Hz", {at(0, k::ripple, 3, 0.15)}},
+        {"supply +-15 %, 10 Hz", {at(0, k::ripple, 5, 0.15)}},
+        {"supply +-20 %, 25 Hz", {at(0, k::ripple, 7, 0.2)}},
+        {"fan stops", {at(0, k::fan_stops)}},
+        /* sensors */
+        {"sensor shows 0.3 of its current", {at(0, k::scaled, 0, 0.3)}},
+        {"sensor shows 0.52", {at(0, k::scaled, 0, 0.52)}},
+        {"sensor shows 0.6", {at(0, k::scaled, 0, 0.6)}},
+        {"sensor shows 0.7", {at(0, k::scaled, 0, 0.7)}},
+        {"sensor shows 0.8", {at(0, k::scaled, 0, 0.8)}},
+        {"sensor shows 1.3", {at(0, k::scaled, 0, 1.3)}},
+        {"sensor shows 2", {at(0, k::scaled, 0, 2.0)}},
+        {"sensor shows 0.5 of its voltage", {at(0, k::volt_scaled, 0, 0.5)}},
+        {"sensor shows 0.8 of its voltage", {at(0, k::volt_scaled, 0, 0.8)}},
+        {"sensor shows 1.3 of its voltage", {at(0, k::volt_scaled, 0, 1.3)}},
+        {"drifts -1 % a minute", {at(0, k::drifts, 0, -0.01)}},
+        {"drifts -60 % a minute", {at(0, k::drifts, 0, -0.6)}},
+        {"drifts +60 % a minute", {at(0, k::drifts, 0, 0.6)}},
+        {"saturates at 0.5 A", {at(0, k::saturates, 0, 0.5)}},
+        {"saturates at 1.6 A", {at(0, k::saturates, 0, 1.6)}},
+        {"offset -0.2 A", {at(0, k::offset, 0, -0.2)}},
+        {"offset +0.09 A", {at(0, k::offset, 0, 0.09)}},
+        {"offset +0.3 A", {at(0, k::offset, 0, 0.3)}},
+        {"offset +0.3 A, spring off", {at(0, k::offset, off, 0.3)}},
+        {"offset -0.1 V", {at(0, k::lifted, 0, -0.1)}},
+        {"offset +0.1 V", {at(0, k::lifted, 0, 0.1)}},
+        {"bursts of 0.3 A, V", {at(0, k::bursts, 0, 0.3)}},
+        {"bursts of 2 A, V", {at(0, k::bursts, 0, 2.0)}},
+        {"bursts of 2 A, V, spring off", {at(0, k::bursts, off, 2.0)}},
+        {"NACKs one in 100", {at(0, k::nacks, 0, 100)}},
+        {"NACKs one in 10", {at(0, k::nacks, 0, 10)}},
+        {"NACKs one in 3", {at(0, k::nacks, 0, 3)}},
+        {"one bit in 100 reads", {at(0, k::garbled, 0, 100)}},
+        {"one bit in 10 reads", {at(0, k::garbled, 0, 10)}},
+        {"one bit in 2 reads", {at(0, k::garbled, 0, 2)}},
+        {"one bit in 10 reads, spring off", {at(0, k::garbled, off, 10)}},
+        {"bit 11 of the current stuck at 1", {at(0, k::stuck_bit, 0, 12)}},
+        {"bit 13 of the current stuck at 0", {at(0, k::stuck_bit, 0, -14)}},
+        {"bit 14 of the current stuck at 0", {at(0, k::stuck_bit, 0, -15)}},
+        {"bit 15 of the current stuck at 1", {at(0, k::stuck_bit, 0, 16)}},
+        {"bit 8 of the voltage stuck at 0", {at(0, k::stuck_bit, 0, -25)}},
+        {"bit 9 of the voltage stuck at 1", {at(0, k::stuck_bit, 0, 26)}},
+        {"ready bit stuck at 0", {at(0, k::stuck_bit, 0, -18)}},
+        {"ready bit stuck at 1", {at(0, k::stuck_bit, 0, 18)}},
+        {"bit 11 of the current stuck at 1, spring off", {at(0, k::stuck_bit, off, 12)}},
+        {"answers at a driven one's address", {at(0, k::answers_too, 1, 1)}},
+        {"answers at the address of one that is off", {at(0, k::answers_too, off, 1)}},
+        {"swapped with a driven one", {at(0, k::swapped, 0, 1)}},
+        {"swapped with one that is off", {at(0, k::swapped, 0, off)}},
+        {"frozen", {at(0, k::frozen)}},
+        {"current frozen", {at(0, k::frozen, 0, 1)}},
+        {"voltage frozen", {at(0, k::frozen, 0, 2)}},
+        {"absent", {at(0, k::absent)}},
+        {"stale", {at(0, k::stale)}},
+        {"loses its configuration", {at(0, k::unset)}},
+        {"... every 0.5 s", every(0.5, 40.0, at(0, k::unset))},
+        {"... every 0.05 s", every(0.05, 40.0, at(0, k::unset))},
+        {"bus hangs", {at(0, k::sda)}},
+        {"bus hangs 60 ms, each 0.3 s", {}},
+        {"bus 3 times as slow", {at(0, k::slow_bus, 0, 3)}},
+        {"bus 8 times as slow", {at(0, k::slow_bus, 0, 8)}},
+        {"bus 15 times as slow", {at(0, k::slow_bus, 0, 15)}},
+        /* board and host */
+        {"world 2 % faster", {at(0, k::clock, 0, 1.02)}},
+        {"world 2 % slower", {at(0, k::clock, 0, 0.98)}},
+        {"brown-outs in the start", cuts_in_the_start(k::brown_out)},
+        {"power cuts in the start", cuts_in_the_start(k::power)},
+        {"watchdog in a loop, 1 s", every(1.0, 20.0, at(0, k::hang))},
+        {"thermistor open", {at(0, k::thermistor, 0, 5.0)}},
+        {"thermistor shorted", {at(0, k::thermistor, 0, 0.0)}},
+        {"thermistor says -5 degC", {at(0, k::thermistor, 0, 4.0)}},
+        {"thermistor says 60 degC", {at(0, k::thermistor, 0, 1.0)}},
+        {"console flooded", flood()},
+        {"half lines", half_lines()},
+        {"settings uploaded", upload()},
+    };
+}
+
+struct result {
+    double hottest_c = -300.0;                        /* in the quiet time, of any spring */
+    double cleared_c = -300.0;                        /* while the user clears and tries again */
+    std::array<double, SPRINGS> peak_c{}, unsaid_c{}; /* of each; before anything was said */
+    std::optional<double> said_s, off_s;
+    std::string words;
+    unsigned resets = 0;
+    bool crashed = false;
+};
+
+class trial
+{
+public:
+    trial(const injected &one, const std::string &phase, std::uint64_t seed, const std::string &elf)
+        : scenario_(life(one, phase, seed)),
+          board_(scenario_, elf, this, [](void *context, std::uint64_t, std::uint8_t octet) {
+              static_cast<trial *>(context)->heard_ += static_cast<char>(octet);
+          })
+    {
+        board_set_analog_v(board_.raw(), 0, 2.74); /* 20 degC, where a thermistor is set */
+    }
+
+    result run()
+    {
+        std::size_t next = 0;
+        r_.peak_c.fill(-300.0);
+        r_.unsaid_c.fill(-300.0);
+        for (double end_s = SLICE_S; end_s < scenario_.duration_s && !r_.crashed;
+             end_s += SLICE_S) {
+            while (next < scenario_.events.size() && scenario_.events[next].at_s < end_s) {
+                const event &e = scenario_.events[next++];
+                run_until(e.at_s);
+                happen(e);
+            }
+            run_until(end_s);
+            look();
+        }
+        r_.resets = board_reset_count(board_.raw());
+        return r_;
+    }
+
+private:
+    static constexpr double START_S = 1.2;
+
+    scenario life(const injected &one, const std::string &phase, std::uint64_t seed)
+    {
+        scenario s;
+        s.seed = seed;
+        s.tolerance = 0.05;
+        s.events = {say(0.6, "model cold"), say(0.8, PATTERN)};
+        from_s_ = phase == "heats" ? START_S + 0.5 : phase == "off" ? 62.0 : 60.0;
+        if (phase == "off") {
+            s.events.push_back(say(60.0, "off all"));
+            s.events.push_back(say(70.0, PATTERN));
+        }
+        if (one.name.rfind("thermistor", 0) == 0) {
+            s.events.push_back(say(0.5, "$ambient_source=1"));
+        }
+        for (event e : one.what) {
+            e.at_s += from_s_;
+            s.events.push_back(e);
+        }
+        if (one.name.rfind("bus hangs 60", 0) == 0) {
+            for (double t = 0.0; t < 40.0; t += 0.3) {
+                s.events.push_back(at(from_s_ + t, kind::sda));
+                s.events.push_back(at(from_s_ + t + 0.06, kind::sda, 0, 0.0, false));
+            }
+        }
+        again_s_ = from_s_ + QUIET_S;
+        s.events.push_back(say(again_s_ - 0.5, "faults"));
+        for (int n = 0; n < 3; ++n) {
+            const double t = again_s_ + n * AGAIN_S;
+            s.events.push_back(say(t, "unlock"));
+            s.events.push_back(say(t + 0.1, "clear"));
+            s.events.push_back(say(t + 0.2, "supply on"));
+            s.events.push_back(say(t + 0.4, PATTERN));
+        }
+        s.duration_s = again_s_ + 3 * AGAIN_S;
+        std::stable_sort(s.events.begin(), s.events.end(),
+                         [](const event &a, const event &b) { return a.at_s < b.at_s; });
+        return s;
+    }
+
+    double now_s() const { return board_time_s(board_.raw()); }
+
+    void run_until(double at_s)
+    {
+        const auto cycle = static_cast<std::uint64_t>(at_s * BOARD_FREQUENCY_HZ);
+        if (cycle > board_cycle(board_.raw())) {
+            r_.crashed = board_run_until(board_.raw(), cycle) != BOARD_RUNNING;
+        }
+    }
+
+    void happen(const event &e)
+    {
+        if (e.what == kind::say) {
+            if (e.text == "faults") {
+                heard_.clear();
+                asked_ = true;
+            }
+            const std::string line = e.text + "\n";
+            board_send(board_.raw(), line.data(), line.size());
+        } else if (e.what == kind::bytes) {
+            std::string octets;
+            for (std::size_t k = 0; k + 1 < e.text.size(); k += 2) {
+                octets += static_cast<char>(std::strtoul(e.text.substr(k, 2).c_str(), nullptr, 16));
+            }
+            board_send(board_.raw(), octets.data(), octets.size());
+        } else {
+            board_.inflict(e);
+        }
+    }
+
+    void look()
+    {
+        if (now_s() < from_s_) {
+            resets_ = board_reset_count(board_.raw());
+            return;
+        }
+        board_view_t seen{};
+        bool said = !board_view(board_.raw(), "controller", &seen) || seen.locked ||
+                    seen.board_fault != 0 || board_reset_count(board_.raw()) != resets_;
+        for (const board_view_spring_t &spring : seen.spring) {
+            said = said || spring.fault != 0;
+        }
+        if (said && !r_.said_s) {
+            r_.said_s = now_s() - from_s_;
+        }
+        const bool off = !board_is_fed(board_.raw()) || board_duty(board_.raw(), 0) == 0.0;
+        if (!off || (!r_.said_s && seen.spring[0].level_permille == 0)) {
+            r_.off_s.reset();
+        } else if (!r_.off_s && now_s() < again_s_) {
+            r_.off_s = now_s() - from_s_;
+        }
+        double &hottest_c = now_s() < again_s_ ? r_.hottest_c : r_.cleared_c;
+        for (unsigned k = 0; k < SPRINGS; ++k) {
+            const double c = truth_hottest_c(board_.truth(), k);
+            hottest_c = std::fmax(hottest_c, c);
+            r_.peak_c[k] = std::fmax(r_.peak_c[k], c);
+            if (!r_.said_s) {
+                r_.unsaid_c[k] = std::fmax(r_.unsaid_c[k], c);
+            }
+        }
+        if (asked_ && now_s() > again_s_ - 0.1) {
+            asked_ = false;
+            r_.words = words();
+        }
+        if (now_s() < again_s_) {
+            off_at_clear_ = r_.off_s;
+        } else {
+            r_.off_s = off_at_clear_;
+        }
+    }
+
+    std::string words() const
+    {
+        std::string text;
+        for (const char c : heard_) {
+            text += c == '\n' ? '/' : c;
+        }
+        text.erase(std::remove(text.begin(), text.end(), '\r'), text.end());
+        text = std::regex_replace(text, std::regex("<[^/]*/"), "");
+        return text;
+    }
+
+    double from_s_ = 0.0, again_s_ = 0.0;
+    scenario scenario_;
+    std::string heard_;
+    faulty_board board_;
+    result r_;
+    unsigned resets_ = 0;
+    bool asked_ = false;
+    std::optional<double> off_at_clear_;
+};
+
+std::string seconds(const std::optional<double> &s)
+{
+    return s ? fmt::format("{:.2f}", *s) : "-";
+}
+
+} // namespace
+
+int main(int argc, char **argv)
+{
+    CLI::App app{"One fault at a time: how hot, how soon safe, how soon said."};
+    std::string elf = ninespring::default_elf("firmware.elf"), json, only;
+    std::uint64_t seed = 7;
+    std::vector<std::string> phases{"heats", "holds", "off"};
+    app.add_option("--elf", elf)->capture_default_str();
+    app.add_option("--seed", seed, "of the array")->capture_default_str();
+    app.add_option("--only", only, "faults in whose names this is");
+    app.add_option("--phase", phases, "heats, holds, off: what the board does as it happens");
+    app.add_option("--json", json, "the figures, for programs");
+    CLI11_PARSE(app, argc, argv);
+    nlohmann::json figures = nlohmann::json::array();
+    fmt::print("phase | fault | hottest | cleared 3 times | hotter unsaid by K | safe s | said s | "
+               "said\n");
+    for (const std::string &phase : phases) {
+        const result without = trial(catalogue()[0], phase, seed, elf).run();
+        for (const injected &one : catalogue()) {
+            if (one.name.find(only) == std::string::npos) {
+                continue;
+            }
+            const result r = trial(one, phase, seed, elf).run();
+            double unsaid_k = 0.0;
+            for (unsigned k = 0; k < SPRINGS; ++k) {
+                unsaid_k = std::fmax(unsaid_k, r.unsaid_c[k] - without.peak_c[k]);
+            }
+            fmt::print("{} | {} | {:.1f}{} | {:.1f}{} | {:.1f}{} | {} | {} | {}{}\n", phase,
+                       one.name, r.hottest_c, r.hottest_c > 120.0 ? " !" : "", r.cleared_c,
+                       r.cleared_c > 120.0 ? " !" : "", unsaid_k, unsaid_k > HOTTER_K ? " !" : "",
+                       seconds(r.off_s), seconds(r.said_s), r.words, r.crashed ? " CRASHED" : "");
+            std::fflush(stdout);
+            figures.push_back({{"figure", phase + ": " + one.name + ": hottest"},
+                               {"value", std::max(r.hottest_c, r.cleared_c)},
+                               {"unit", "degC"},
+                               {"target", "<= 120"},
+                               {"command", fmt::format("bench_faults --seed {}", seed)}});
+        }
+    }
+    if (!json.empty()) {
+        std::ofstream(json) << figures.dump(1) << '\n';
+    }
+    return 0;
+}

@@ -1,0 +1,103 @@
+#include "upset_bus.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace swarm
+{
+
+namespace
+{
+
+constexpr unsigned CURRENT = 1, VOLTAGE = 2;
+constexpr double A_OF_BIT = 1e-4, V_OF_BIT = 4e-3;
+constexpr double BURST_EVERY_S = 3.0, BURST_S = 0.2;
+constexpr double SHUNT_END = 32000.0, BUS_END = 4000.0;
+
+std::uint16_t current_register(double current_a)
+{
+    const double bits = std::clamp(current_a / A_OF_BIT, -SHUNT_END, SHUNT_END);
+    return static_cast<std::uint16_t>(static_cast<std::int16_t>(std::lround(bits)));
+}
+
+/* Its lowest bits say whether it is ready. */
+std::uint16_t voltage_register(double voltage_v, std::uint16_t was)
+{
+    const double bits = std::clamp(voltage_v / V_OF_BIT, 0.0, BUS_END);
+    return static_cast<std::uint16_t>(static_cast<unsigned>(std::lround(bits)) << 3 | (was & 7u));
+}
+
+} // namespace
+
+board_bus_t upset_bus::hooks()
+{
+    return {this,
+            [](void *context, unsigned channel) {
+                return static_cast<upset_bus *>(context)->acknowledges(channel);
+            },
+            [](void *context, unsigned channel, unsigned number, std::uint16_t value) {
+                return static_cast<upset_bus *>(context)->reads(channel, number, value);
+            }};
+}
+
+void upset_bus::set(lie what, unsigned channel, double value)
+{
+    value_[static_cast<std::size_t>(what)][channel] = value;
+    since_s_[channel] = board_time_s(board_);
+}
+
+bool upset_bus::one_in(double n)
+{
+    return n > 0.0 && random_uniform(&dice_, 0.0, n) < 1.0;
+}
+
+bool upset_bus::acknowledges(unsigned k)
+{
+    for (unsigned j = 0; j < BOARD_CHANNELS; ++j) {
+        if (of(lie::answers_too, j) == k + 1.0) {
+            return false; /* it answers there */
+        }
+    }
+    return !one_in(of(lie::nacks, k));
+}
+
+double upset_bus::lied_a(unsigned k, double current_a) const
+{
+    const double minutes = (board_time_s(board_) - since_s_[k]) / 60.0;
+    const double lied_a = current_a * (1.0 + of(lie::drifts, k) * minutes) + of(lie::offset, k);
+    const double end_a = of(lie::saturates, k);
+    return end_a > 0.0 ? std::clamp(lied_a, -end_a, end_a) : lied_a;
+}
+
+std::uint16_t upset_bus::reads(unsigned k, unsigned number, std::uint16_t value)
+{
+    double noise = 0.0;
+    if (of(lie::bursts, k) > 0.0 && std::fmod(board_time_s(board_), BURST_EVERY_S) < BURST_S) {
+        noise = of(lie::bursts, k);
+    }
+    if (number == CURRENT) {
+        const double read_a = A_OF_BIT * static_cast<std::int16_t>(value);
+        const double lied = lied_a(k, read_a) + noise * random_noise(&dice_);
+        value = lied == read_a ? value : current_register(lied);
+    } else if (number == VOLTAGE) {
+        const double lift_v = of(lie::lifted, k) + noise * random_noise(&dice_);
+        value = lift_v == 0.0 ? value : voltage_register(V_OF_BIT * (value >> 3) + lift_v, value);
+    }
+    const double bit = std::fabs(of(lie::stuck_bit, k));
+    if (bit > 0.0 && number == (bit <= 16.0 ? CURRENT : VOLTAGE)) {
+        const auto mask =
+            static_cast<std::uint16_t>(1u << (static_cast<unsigned>(bit - 1.0) % 16u));
+        value =
+            static_cast<std::uint16_t>(of(lie::stuck_bit, k) > 0.0 ? value | mask : value & ~mask);
+    }
+    if (of(lie::answers_too, k) > 0.0) { /* a low bit of either pulls the line down */
+        value &= board_sensor_register(board_, static_cast<unsigned>(of(lie::answers_too, k)) - 1u,
+                                       number);
+    }
+    if (one_in(of(lie::garbled, k))) {
+        value ^= static_cast<std::uint16_t>(1u << (random_bits(&dice_) % 16u));
+    }
+    return value;
+}
+
+} // namespace swarm

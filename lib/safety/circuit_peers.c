@@ -1,0 +1,101 @@
+#include "circuit_peers.h"
+
+#include <math.h>
+
+#define SHARE_Q7 128.0f
+#define OWN_Q12  4096.0f
+#define OWN_MOST 8191.0f
+#define LEAST_MV 100.0f /* below it, offsets are most of what differs */
+/* Offsets of both readings; a diode's drop moves with current and heat. */
+#define OFFSETS_MV 25.0f
+#define DROP_PART  0.15f
+
+#define KNOWN_PART 0.08f           /* as others switch, one end of a cable moves by 5 % */
+#define OTHER_PART 0.18f           /* 0.04 ohm of wiring in 0.36, gains of 3 % */
+#define ALONE_PART 0.20f           /* the supply */
+#define LEARN_PART (1.0f / 256.0f) /* of a window: 2.5 minutes */
+
+/* The middle one of the others that are driven; 0: too few. */
+static uint8_t middle_q7(const circuit_peers_t *peers, uint8_t springs, uint8_t k)
+{
+    uint8_t sorted[CIRCUIT_PEERS_MAX];
+    uint8_t count = 0;
+    for (uint8_t j = 0; j < springs; j++) {
+        const uint8_t share = peers->spring[j].share_q7;
+        if (j == k || share == 0) {
+            continue;
+        }
+        uint8_t at = count++;
+        for (; at > 0 && sorted[at - 1u] > share; at--) {
+            sorted[at] = sorted[at - 1u];
+        }
+        sorted[at] = share;
+    }
+    return count < CIRCUIT_PEERS_LEAST ? 0 : sorted[count / 2u];
+}
+
+static uint8_t to_q7(float share)
+{
+    const float rounded = share * SHARE_Q7 + 0.5f;
+    return rounded < 1.0f ? 1u : rounded > 255.0f ? 255u : (uint8_t)rounded;
+}
+
+static void learn(circuit_peer_t *own, float beside)
+{
+    const float was = (float)own->own_q12;
+    const float now = beside * OWN_Q12;
+    const float next = (own->own_q12 == 0 ? now : was + (now - was) * LEARN_PART) + 0.5f;
+    own->own_q12 = next < OWN_MOST ? (uint16_t)next & 0x1FFFu : 0x1FFFu;
+}
+
+bool circuit_peers_judge(circuit_peers_t *peers, uint8_t springs, uint8_t k,
+                         const circuit_window_t *window,
+                         const current_control_parameters_t *circuit)
+{
+    circuit_peer_t *own = &peers->spring[k];
+    if (!window->tells || window->expected_mv < LEAST_MV) {
+        own->share_q7 = 0;
+        return own->odd >= CIRCUIT_PEERS_WINDOWS;
+    }
+    const float expected_mv = window->expected_mv;
+    const float share = window->found_mv / expected_mv;
+    const float offsets_mv = OFFSETS_MV + DROP_PART * (float)circuit->freewheel_mv;
+    const uint8_t others_q7 = middle_q7(peers, springs, k);
+    own->share_q7 = to_q7(share);
+    bool odd = false;
+    if (others_q7 != 0) {
+        const float others = (float)others_q7 / SHARE_Q7;
+        const float off_mv = fabsf(share - others) * expected_mv;
+        odd = off_mv > OTHER_PART * others * expected_mv + offsets_mv;
+        if (own->own_q12 != 0) {
+            const float like = others * (float)own->own_q12 / OWN_Q12;
+            odd = odd ||
+                  fabsf(share - like) * expected_mv > KNOWN_PART * like * expected_mv + offsets_mv;
+        }
+        if (!odd) {
+            learn(own, share / others);
+        }
+    } else if (own->was_q7 != 0) {
+        const float was = (float)own->was_q7 / SHARE_Q7;
+        odd = fabsf(share - was) * expected_mv > ALONE_PART * was * expected_mv + offsets_mv;
+    }
+    if (!odd) {
+        own->was_q7 = own->share_q7;
+        own->odd = 0;
+        own->agreed = 1;
+    } else if (own->odd < CIRCUIT_PEERS_WINDOWS) {
+        own->odd = (own->odd + 1u) & 3u;
+    }
+    return own->odd >= CIRCUIT_PEERS_WINDOWS;
+}
+
+void circuit_peers_clear(circuit_peers_t *peers, uint8_t spring, bool doubted)
+{
+    circuit_peer_t *own = &peers->spring[spring];
+    if (doubted && own->agreed && own->odd < CIRCUIT_PEERS_WINDOWS) {
+        *own = (circuit_peer_t){0};
+    }
+    own->share_q7 = 0;
+    own->odd = own->odd < CIRCUIT_PEERS_WINDOWS ? 0 : CIRCUIT_PEERS_WINDOWS - 1u;
+    own->agreed = 0;
+}

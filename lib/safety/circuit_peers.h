@@ -1,0 +1,64 @@
+/* What it is for: springs share a supply: tells whether one's circuit shows another share of it
+ * than those of the others do, or than its own did.
+ * What it owns: of each spring, what its last window showed, and what it shows beside the others.
+ * What it never does: know the supply, latch a fault. It uses floating point, once in a window. */
+#ifndef CIRCUIT_PEERS_H
+#define CIRCUIT_PEERS_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "circuit_check.h"
+#include "parameters.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#ifndef CIRCUIT_PEERS_MAX
+#ifdef __AVR__
+#define CIRCUIT_PEERS_MAX 9
+#else
+#define CIRCUIT_PEERS_MAX 64
+#endif
+#endif
+
+#define CIRCUIT_PEERS_LEAST   3u /* others: one that lies is outvoted */
+#define CIRCUIT_PEERS_WINDOWS 3u /* on end */
+
+/* Shares: voltage found behind a switch, of the voltage that its duty should bring. */
+typedef struct {
+    uint16_t own_q12 : 13; /* its share of the others'; 0: not known */
+    uint16_t odd : 2;      /* windows on end */
+    uint16_t agreed : 1;   /* a window that was not odd, since the last clear */
+    uint8_t share_q7;      /* of the last window; 0: it told nothing */
+    uint8_t was_q7;        /* of the last one that was not odd; 0: none was */
+} circuit_peer_t;
+
+/* All zero: nothing is known. */
+typedef struct {
+    circuit_peer_t spring[CIRCUIT_PEERS_MAX];
+} circuit_peers_t;
+
+/* Takes a spring's window. True if and only if for CIRCUIT_PEERS_WINDOWS on end the voltage that
+ * was found is off from the expected one, times the middle share of the other springs that are
+ * driven and times its own share of theirs, by more than 8 % and what offsets make. As long as its
+ * own share is not known, by 18 % (its wiring, its gains); where fewer than CIRCUIT_PEERS_LEAST
+ * others are driven, from what it showed before by 20 % (its supply may move). Its own share is
+ * learnt in the windows that are not odd, over minutes. A window that tells nothing, or of less
+ * than 0.1 V, changes nothing. springs at most CIRCUIT_PEERS_MAX, spring below springs. */
+bool circuit_peers_judge(circuit_peers_t *peers, uint8_t springs, uint8_t spring,
+                         const circuit_window_t *window,
+                         const current_control_parameters_t *circuit);
+
+/* A fault is cleared: the spring's row ends, but for its last window where it was full: the next
+ * window is enough then, as a heating of a sensor that lies costs 12 K a second. What is known of
+ * it stays, as nobody mends a sensor by clearing; but not where its readings were doubted though
+ * they agreed with it: then it is of a sensor that was wrong from the first, and may be another one
+ * now. */
+void circuit_peers_clear(circuit_peers_t *peers, uint8_t spring, bool doubted);
+
+#ifdef __cplusplus
+}
+#endif
+#endif
