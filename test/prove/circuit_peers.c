@@ -1,0 +1,33 @@
+/* sources: lib/safety/circuit_peers.c
+ * defines: -DCIRCUIT_PEERS_MAX=9 -DCURRENT_CONTROL_MAX_CHANNELS=9 */
+#include "circuit_peers.h"
+
+#include "prove.h"
+
+#define MOST_MV 20000.0f /* 4.1 A and wiring beside 4.1 V; the highest declared supply */
+
+static void any_settings(current_control_parameters_t *values)
+{
+#define CURRENT PROVE_ANY
+#include "parameters.def"
+}
+
+void main(void)
+{
+    circuit_peers_t peers = {0};
+    current_control_parameters_t settings;
+    any_settings(&settings);
+    while (any_bool()) {
+        const circuit_window_t window = {
+            .found_mv = Frama_C_float_interval(0.0f, MOST_MV),
+            .expected_mv = Frama_C_float_interval(0.0f, MOST_MV),
+            .tells = any_bool(),
+        };
+        const uint8_t springs = (uint8_t)any_between(1, CIRCUIT_PEERS_MAX);
+        const uint8_t spring = (uint8_t)any_between(0, springs - 1);
+        (void)circuit_peers_judge(&peers, springs, spring, &window, &settings);
+        if (any_bool()) {
+            circuit_peers_clear(&peers, spring, any_bool());
+        }
+    }
+}
