@@ -311,6 +311,9 @@ private:
         const auto cycle = static_cast<std::uint64_t>(at_s * BOARD_FREQUENCY_HZ);
         if (cycle > board_cycle(board_.raw())) {
             r_.crashed = board_run_until(board_.raw(), cycle) != BOARD_RUNNING;
+            if (r_.crashed) {
+                r_.words += fmt::format("CRASHED: {}", board_complaint(board_.raw()));
+            }
         }
     }
 
@@ -429,10 +432,10 @@ int main(int argc, char **argv)
             for (unsigned k = 0; k < SPRINGS; ++k) {
                 unsaid_k = std::fmax(unsaid_k, r.unsaid_c[k] - without.peak_c[k]);
             }
-            fmt::print("{} | {} | {:.1f}{} | {:.1f}{} | {:.1f}{} | {} | {} | {}{}\n", phase,
+            fmt::print("{} | {} | {:.1f}{} | {:.1f}{} | {:.1f}{} | {} | {} | {}\n", phase,
                        one.name, r.hottest_c, r.hottest_c > 120.0 ? " !" : "", r.cleared_c,
                        r.cleared_c > 120.0 ? " !" : "", unsaid_k, unsaid_k > HOTTER_K ? " !" : "",
-                       seconds(r.off_s), seconds(r.said_s), r.words, r.crashed ? " CRASHED" : "");
+                       seconds(r.off_s), seconds(r.said_s), r.words);
             std::fflush(stdout);
             figures.push_back({{"figure", phase + ": " + one.name + ": hottest"},
                                {"value", std::max(r.hottest_c, r.cleared_c)},

@@ -61,11 +61,12 @@ static void begin_line(spring_belief_t *b, bool rough, float share)
     b->losing = 0;
 }
 
-static void see_crossing(spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model,
-                         uint8_t k, float lost, float lost_sd)
+/* In a frame of its own: inlined, avr-gcc 5.4 tears a pointer (test/board_code). */
+__attribute__((noinline)) static void see_crossing(spring_estimator_t *e, spring_belief_t *b,
+                                                   thermal_model_t *model, uint8_t k, float lost,
+                                                   float lost_sd)
 {
     const spring_before_t before = spring_before(b, model, k);
-    const float was_w_per_k = b->learnt.loss_w_per_k;
     const bool searched = spring_estimator_sd_k(b) > 3.0f * CROSSING_SD_K;
     const bool first = b->lost == 0.0f;
     b->lost = fminf(b->lost + lost, 1.0f);
@@ -76,13 +77,13 @@ static void see_crossing(spring_estimator_t *e, spring_belief_t *b, thermal_mode
     const bool opened =
         first && spring_open_to_step(e, b, k, seen_c - spring_now_c(model, k), sd_k);
     const float error_k = spring_see(e, b, model, k, seen_c, sd_k, SPRING_PHASE_AUSTENITE);
+    b->gone_k -= error_k;
+    b->gone_w_per_k += b->learnt.loss_w_per_k - before.loss_w_per_k;
     spring_note(e, model, k, SPRING_SIGHT_LOST, &before, seen_c, sd_k);
     spring_note_did(e, k, opened ? SPRING_DID_OPEN : 0);
     if (!searched && -error_k > b->disturbance_k) {
         b->disturbance_k = -error_k;
     }
-    b->gone_k -= error_k;
-    b->gone_w_per_k += b->learnt.loss_w_per_k - was_w_per_k;
 }
 
 /* The current has dropped, the spring is what it was a moment ago: what reads otherwise is the
