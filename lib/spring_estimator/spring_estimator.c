@@ -21,8 +21,6 @@
 
 #define EXPLAINED_LEAST 0.005f /* of a resistance: what a sensor's steps leave in one turn */
 
-#define UNPROVEN_LEAST 0.03f /* of the phase: 95 % is promised */
-
 #define LOOK_MOST  0.4f
 #define LOOK_TURNS 3
 
@@ -238,7 +236,10 @@ static float predict(const spring_estimator_t *e, spring_belief_t *b, const ther
     }
     const float heat_k = per_w * (power_w - b->gives_w);
     if (b->gone_k > 0.0f) {
-        b->gone_k = keeps * b->gone_k + per_w * above_k * b->gone_w_per_k;
+        /* where a contact has moved, what it takes up to transform may warm it */
+        const bool by_contact = b->heating && b->unsteady != 0;
+        const float latent_k = by_contact ? fmaxf(heat_k - rise_k, 0.0f) : 0.0f;
+        b->gone_k = keeps * b->gone_k + per_w * above_k * b->gone_w_per_k + latent_k;
     }
     b->last_c7 = now_c7;
     return heat_k;
@@ -385,6 +386,26 @@ static void end_what_was_left(spring_belief_t *b)
     b->left = false;
 }
 
+/* What it seemed to lose was the contact: it is where it was believed before, as unsure as it was
+ * found wrong. */
+static void take_back(const spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model,
+                      uint8_t k)
+{
+    const float more_k = b->gone_k;
+    const float less_w_per_k = b->gone_w_per_k;
+    if (more_k <= 0.0f) {
+        return;
+    }
+    spring_set_temperature(model, k, spring_now_c(model, k) + more_k, SPRING_PHASE_AUSTENITE);
+    b->last_c7 = thermal_model_temperature_c7(model, k);
+    b->seen = true;
+    spring_correct_loss(e, b, -less_w_per_k);
+    b->variance_k2 += more_k * more_k;
+    b->loss_variance += less_w_per_k * less_w_per_k;
+    b->covariance -= more_k * less_w_per_k;
+    b->gone_k = b->gone_w_per_k = 0.0f;
+}
+
 static void take_turn(spring_estimator_t *e, thermal_model_t *model, uint8_t k)
 {
     spring_belief_t *b = &e->spring[k];
@@ -408,6 +429,10 @@ static void take_turn(spring_estimator_t *e, thermal_model_t *model, uint8_t k)
             spring_holding_watch(e, b, model, k, moved_k, share);
         }
     } else {
+        if (spring_is_loose(b)) {
+            take_back(e, b, model, k);
+            b->unproven = true; /* what it seemed to gain may have been the contact, too */
+        }
         if (b->heating) {
             b->run.heat.mark_ohm = 0.0f;
             b->steep = false;
@@ -555,9 +580,7 @@ void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, 
     const float phase = lacks ? spring_phase_by_resistance(b) : 1.0f; /* as it read last */
     const spring_before_t before = spring_before(b, model, k);
     const bool unseen = full && b->heating && b->possible != SPRING_PHASE_AUSTENITE;
-    /* a loss too small to matter is none to prove */
-    b->unproven = full && b->lost > UNPROVEN_LEAST && b->gone_k > 0.0f &&
-                  b->possible != SPRING_PHASE_AUSTENITE &&
+    b->unproven = full && b->gone_k > 0.0f && b->possible != SPRING_PHASE_AUSTENITE &&
                   thermal_model_temperature_c7(model, k) <
                       thermal_model_transformation(model, k).austenite_finish_c7;
     if (full && b->possible != SPRING_PHASE_AUSTENITE) {

@@ -53,8 +53,10 @@ static void see_onset(spring_estimator_t *e, spring_belief_t *b, thermal_model_t
     const spring_before_t before = spring_before(b, model, k);
     const float now_c = spring_now_c(model, k);
     b->onset = true;
-    b->gone_k = b->gone_w_per_k = 0.0f; /* what it had lost was phase: it comes back */
-    b->unproven = false;
+    if (b->unsteady == 0) {                 /* else it may be the contact again */
+        b->gone_k = b->gone_w_per_k = 0.0f; /* what it had lost was phase: it comes back */
+        b->unproven = false;
+    }
     if (b->possible == SPRING_PHASE_MARTENSITE) {
         spring_learnt_t *l = &b->learnt;
         if (b->run.heat.cold_ohm > 0.0f && now_c > b->run.heat.cold_c + COLD_SPAN_K) {

@@ -144,6 +144,49 @@ static float believed_c(void)
     return (float)thermal_model_temperature_c7(&model, 0) / 128.0f;
 }
 
+/* A contact gets better by 5 %, as if phase was lost; then it goes and comes. It was not. */
+void what_a_loose_contact_seemed_to_lose_is_taken_back(void)
+{
+    begin_cold();
+    truth.contact_ohm = 0.012;
+    (void)heat_then_hold(60.0);
+    for (double s = 0.0; s < 90.0; s += TICK_S) {
+        truth.contact_ohm = s < 60.0 ? 0.012 : 0.0;
+        (void)tick(hold_current_a(8.0));
+    }
+    TEST_ASSERT_TRUE(spring_estimator_doubt_k(BELIEF) > 4.0f);
+    for (double s = 0.0; s < 60.0; s += TICK_S) {
+        truth.contact_ohm = fmod(s, 10.0) < 5.0 ? 0.012 : 0.0;
+        (void)tick(hold_current_a(8.0));
+    }
+    (void)snprintf(where, sizeof where, "%.1f degC, true %.1f", (double)believed_c(),
+                   truth.temperature_c);
+    TEST_ASSERT_TRUE(spring_estimator_blind(BELIEF));
+    TEST_ASSERT_EQUAL_FLOAT(0.0f, spring_estimator_doubt_k(BELIEF));
+    TEST_ASSERT_FLOAT_WITHIN_MESSAGE(7.0f, (float)truth.temperature_c, believed_c(), where);
+}
+
+/* It seemed to lose phase where a contact had jumped: what the heating seems to take up to
+ * transform may have warmed it. Where none had, it was phase that a load took. */
+void doubt_grows_with_a_heating_after_a_jump(void)
+{
+    for (unsigned jumped = 0; jumped < 2; jumped++) {
+        begin_cold();
+        (void)heat_then_hold(60.0);
+        INSIDE.possible = SPRING_PHASE_BETWEEN; /* as after a loss of half of it */
+        INSIDE.gone_k = 5.0f;
+        INSIDE.unsteady = jumped != 0 ? 1000u : 0u;
+        thermal_model_set_temperature(&model, 0, 20 * 128);
+        thermal_model_set_temperature(&model, 0, 92 * 128);
+        spring_estimator_begin_heating(&estimator, &model, 0);
+        ticks(3.0, 2.0);
+        (void)snprintf(where, sizeof where, "%.1f K", (double)spring_estimator_doubt_k(BELIEF));
+        TEST_ASSERT_TRUE_MESSAGE(jumped != 0 ? spring_estimator_doubt_k(BELIEF) > 10.0f
+                                             : spring_estimator_doubt_k(BELIEF) < 5.0f,
+                                 where);
+    }
+}
+
 /* In the hold a contact gets better by 5 %, as if phase was lost, and no heat brings it back: the
  * reading tells nothing any more. It may still have been phase, of a spring that loses more heat
  * than was counted: it is held as if it was, and doubted as if it was not. */
