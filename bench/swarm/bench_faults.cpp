@@ -432,8 +432,8 @@ int main(int argc, char **argv)
             for (unsigned k = 0; k < SPRINGS; ++k) {
                 unsaid_k = std::fmax(unsaid_k, r.unsaid_c[k] - without.peak_c[k]);
             }
-            fmt::print("{} | {} | {:.1f}{} | {:.1f}{} | {:.1f}{} | {} | {} | {}\n", phase,
-                       one.name, r.hottest_c, r.hottest_c > 120.0 ? " !" : "", r.cleared_c,
+            fmt::print("{} | {} | {:.1f}{} | {:.1f}{} | {:.1f}{} | {} | {} | {}\n", phase, one.name,
+                       r.hottest_c, r.hottest_c > 120.0 ? " !" : "", r.cleared_c,
                        r.cleared_c > 120.0 ? " !" : "", unsaid_k, unsaid_k > HOTTER_K ? " !" : "",
                        seconds(r.off_s), seconds(r.said_s), r.words);
             std::fflush(stdout);
