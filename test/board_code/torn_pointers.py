@@ -51,7 +51,9 @@ def torn(listing: str) -> list[str]:
         address, name, operands = code[1], code[2], code[3].strip()
         first = operands.split(",")[0]
         for pair, (low, high) in PAIRS.items():
-            points = re.search(rf"(?<![A-Za-z]){pair}(?![a-z])", operands) or (name in ("adiw", "sbiw") and first == f"r{low}")
+            points = re.search(rf"(?<![A-Za-z]){pair}(?![a-z])", operands) or (
+                name in ("adiw", "sbiw") and first == f"r{low}"
+            )
             if scratch.get(pair) and points:
                 found.append(f"{function}, {address}: {name} {operands}")
                 scratch[pair] = False
@@ -78,7 +80,9 @@ def main() -> int:
         sys.exit(f"torn_pointers: no ELF in {sys.argv[1]}")
     bad = 0
     for elf in elves:
-        dump = subprocess.run(["avr-objdump", "-d", "--no-show-raw-insn", str(elf)], check=True, capture_output=True, text=True)
+        dump = subprocess.run(
+            ["avr-objdump", "-d", "--no-show-raw-insn", str(elf)], check=True, capture_output=True, text=True
+        )
         for one in torn(dump.stdout):
             print(f"{elf}: a pointer of which half was overwritten: {one}. Write that function otherwise.")
             bad += 1
