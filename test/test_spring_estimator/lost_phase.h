@@ -14,6 +14,7 @@ void what_a_loose_contact_seemed_to_lose_is_taken_back(void);
 void doubt_grows_with_a_heating_after_a_jump(void);
 void loss_that_does_not_come_back_stays_in_doubt(void);
 void heating_ends_where_it_reads_what_it_did_when_it_had_transformed(void);
+void heating_that_a_limit_ended_proves_nothing(void);
 void loss_too_small_to_tell_stays_in_doubt(void);
 void heating_for_a_loss_that_was_none_ends(void);
 void noise_slower_than_a_turn_is_no_loss(void);
