@@ -46,7 +46,8 @@ typedef struct {
  * own share is not known, by 18 % (its wiring, its gains); where fewer than CIRCUIT_PEERS_LEAST
  * others are driven, from what it showed before by 20 % (its supply may move). Its own share is
  * learnt in the windows that are not odd, over minutes. A window that tells nothing, or of less
- * than 0.1 V, changes nothing. springs at most CIRCUIT_PEERS_MAX, spring below springs. */
+ * than 0.1 V, is no witness for the others, and changes nothing else. springs at most
+ * CIRCUIT_PEERS_MAX, spring below springs. */
 bool circuit_peers_judge(circuit_peers_t *peers, uint8_t springs, uint8_t spring,
                          const circuit_window_t *window,
                          const current_control_parameters_t *circuit);

@@ -118,7 +118,6 @@ typedef struct {
     uint8_t quiet;      /* turns in which its temperature hardly moved; saturating */
     uint8_t losing;     /* turns on end in which it seems to lose phase */
     uint8_t averaged;   /* turns in slow_ohm, saturating */
-    uint8_t unread;     /* turns since the last that had readings fit for use, saturating */
     uint16_t unsteady;  /* turns, of all that a contact or the sensor has jumped lately */
     /* bits: of nine springs they are a good part of the RAM that is spare */
     bool doubted : 1;  /* its last heating ended before its resistance said so */
@@ -126,6 +125,7 @@ typedef struct {
                         * or its contact came and went */
     bool odd : 1;      /* the turn before read what no phase changes to so fast */
     bool reads : 1;    /* the last turn had readings fit for use */
+    bool unread : 1;   /* a turn without them lies before those that it goes by */
     bool anew : 1;     /* the last turn has found it changed by itself, and began it anew */
     bool seen : 1;     /* the last turn has moved it to where it was seen */
     bool blind : 1;    /* a heating that must have transformed it did not show */

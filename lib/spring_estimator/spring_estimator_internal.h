@@ -38,8 +38,8 @@
 /* Of an average that is worth comparing: three times as sure as one. */
 #define ANCHOR_TURNS 8
 
-#define LOOK_SD                                                                                    \
-    0.12f /* of a phase by resistances that were learnt at another current, or declared */
+/* Of a phase, by resistances that were learnt at another current, or declared. */
+#define LOOK_SD 0.12f
 
 #define LEARNT_AT_C 20.0f /* a learnt martensite's resistance is that at this temperature */
 

@@ -132,10 +132,11 @@ static float may_move_squared(const spring_belief_t *b)
 }
 
 /* It keeps its phase: how what it reads goes with a moving temperature is its slope. */
-static void tell_slope(spring_line_t *line, float way_k, float left, float variance)
+static void tell_slope(spring_line_t *line, float left)
 {
+    const float way_k = line->slow_k;
     const float prior = line->rise_sd_per_k * line->rise_sd_per_k;
-    const float gain = prior * way_k / (prior * way_k * way_k + variance);
+    const float gain = prior * way_k / (prior * way_k * way_k + LINE_VARIANCE);
     line->rise_per_k = spring_clamp(line->rise_per_k + gain * left, -COEFFICIENT_MOST_PER_K,
                                     COEFFICIENT_MOST_PER_K);
     line->rise_sd_per_k = sqrtf(prior * (1.0f - gain * way_k));
@@ -159,7 +160,7 @@ void spring_begin_hold_line(spring_belief_t *b, bool now)
 static void follow(spring_belief_t *b, float left)
 {
     if (fabsf(b->run.line.slow_k) > CROSSING_SD_K && fabsf(left) < LOSS_LEAST) {
-        tell_slope(&b->run.line, b->run.line.slow_k, left, LINE_VARIANCE);
+        tell_slope(&b->run.line, left);
     }
     b->run.line.ohm += b->run.line.ohm * left * LINE_SHARE;
     b->run.line.way_k -= b->run.line.slow_k * LINE_SHARE;

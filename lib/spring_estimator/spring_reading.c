@@ -110,7 +110,7 @@ static void take_noise(spring_belief_t *b, float ohm, float current_a)
         const float bend = fabsf(ohm - 2.0f * b->ohm_before[0] + b->ohm_before[1]) / ohm;
         b->noise += (fminf(BEND_TO_SD * bend, NOISE_MOST) - b->noise) * NOISE_SHARE;
     }
-    b->ohm_before[1] = same && b->unread == 0 ? b->ohm_before[0] : 0.0f;
+    b->ohm_before[1] = same && !b->unread ? b->ohm_before[0] : 0.0f;
     b->ohm_before[0] = ohm;
 }
 
@@ -122,7 +122,7 @@ static float take_reading(spring_belief_t *b, float ohm, float current_a)
     const float share = b->averaged < SLOW_TURNS ? 1.0f / (float)b->averaged : SLOW_SHARE;
     b->slow_ohm += (ohm - b->slow_ohm) * share;
     b->slow_a += (current_a - b->slow_a) * share;
-    b->unread = 0;
+    b->unread = false;
     b->current_a = current_a;
     b->ohm = ohm;
     b->phase_ohm = current_a > STRONG_A || b->fresh == 0 ? ohm : b->phase_ohm;
@@ -149,7 +149,7 @@ float spring_take_readings(spring_estimator_t *e, const thermal_model_t *model, 
             share = take_reading(b, ohm, current_a);
         }
     } else {
-        b->unread = b->unread < UINT8_MAX ? (uint8_t)(b->unread + 1) : UINT8_MAX;
+        b->unread = true;
         b->ohm_before[1] = 0.0f;
         if (b->current_sum_ma < LEAST_MEAN_MA && !b->cut_short) {
             b->fresh = 0; /* no current, or no sensor */
