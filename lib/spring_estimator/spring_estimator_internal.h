@@ -132,6 +132,10 @@ float spring_take_readings(spring_estimator_t *estimator, const thermal_model_t 
 bool spring_is_loose(const spring_belief_t *belief);
 /* All that readings are compared with jumps along: a contact, or the sensor. */
 void spring_jump(spring_belief_t *belief, float by);
+/* So they do, by `by` of what it read (below 0: less), where no phase can have: it counts as a
+ * jump. */
+void spring_misread(spring_estimator_t *estimator, const thermal_model_t *model, uint8_t spring,
+                    float by, float noise);
 /* Told by its own resistances, both of which were learnt, 0..1. */
 float spring_phase_by_resistance(const spring_belief_t *belief);
 /* It has transformed: what it reads now is its own austenite's, and the way there its change. */

@@ -13,7 +13,7 @@
 #define SLOW_NOISE_SHARE ((float)SLOW_TURNS * LINE_SHARE) /* as the line follows */
 #define ANCHOR_K         3.0f /* 0.45 % of the resistance by the largest coefficient */
 #define SUSPECTED        0.6f /* of what is sure: 3 of 5 */
-#define OTHER_WAY        3.0f /* times as much: an intermediate phase, where drifts go either way */
+#define OTHER_WAY        2.0f /* times as much: an intermediate phase, where drifts go either way */
 #define LASTING_TURNS    60   /* 15 s of suspicion are as sure */
 #define CROSSING_SD_K    1.0f
 #define APART_PER_A      0.5f    /* between two currents, as of 3 and 1.2 A */
@@ -84,6 +84,16 @@ __attribute__((noinline)) static void see_crossing(spring_estimator_t *e, spring
     if (!searched && -error_k > b->disturbance_k) {
         b->disturbance_k = -error_k;
     }
+}
+
+/* To have lost so much it would be colder than a load on top of all that was not known of it makes
+ * it: rather it is the sensor that reads otherwise, or a contact that crept. */
+static bool is_misread(const spring_belief_t *b, const thermal_model_t *model, uint8_t k,
+                       float lost)
+{
+    const float colder_k = spring_now_c(model, k) - lost_at_c(model, k, b->lost + lost);
+    const float unsure_k = sqrtf(spring_distance_k2(b) + CROSSING_SD_K * CROSSING_SD_K);
+    return colder_k > SHIFT_BOUND_K + SPRING_ESTIMATOR_LIKELY_SDS * unsure_k;
 }
 
 /* The current has dropped, the spring is what it was a moment ago: what reads otherwise is the
@@ -269,6 +279,11 @@ void spring_holding_watch(spring_estimator_t *e, spring_belief_t *b, thermal_mod
     if (changed2 > sure2 || b->losing >= LASTING_TURNS) {
         const float per_change = 1.0f / fabsf(b->learnt.change);
         const float sd = sqrtf(may_move_squared(b)) / SPRING_ESTIMATOR_BOUND_SDS;
+        if (is_misread(b, model, k, changed * per_change)) {
+            spring_misread(e, model, k, left, sqrtf(noise2 + sd * sd));
+            b->losing = 0;
+            return;
+        }
         see_crossing(e, b, model, k, changed * per_change, sd * per_change);
         spring_note_read(e, k, left, sqrtf(noise2 + sd * sd));
         begin_line(b, true, share); /* the average still falls */

@@ -94,6 +94,16 @@ static bool leave_out(spring_estimator_t *e, const thermal_model_t *model, uint8
     return b->odd;
 }
 
+void spring_misread(spring_estimator_t *e, const thermal_model_t *model, uint8_t k, float by,
+                    float noise)
+{
+    spring_belief_t *b = &e->spring[k];
+    spring_jump(b, 1.0f + by);
+    b->unsteady = (uint16_t)(b->unsteady + JUMP_TURNS);
+    note_jump(e, model, k, by, noise);
+    spring_note_did(e, k, spring_is_loose(b) ? SPRING_DID_BLIND : 0);
+}
+
 bool spring_is_loose(const spring_belief_t *b)
 {
     return b->unsteady > LOOSE_TURNS;

@@ -167,6 +167,30 @@ void what_a_loose_contact_seemed_to_lose_is_taken_back(void)
     TEST_ASSERT_FLOAT_WITHIN_MESSAGE(7.0f, (float)truth.temperature_c, believed_c(), where);
 }
 
+/* Far above its martensite start a contact gets better by 7 %, as no load does to phase: to have
+ * lost so much it would be colder than a load and all that is not known of it make it. */
+void loss_that_is_too_far_off_is_misread(void)
+{
+    begin_cold();
+    truth.contact_ohm = 0.018;
+    (void)heat_then_hold(60.0);
+    hold(16.0, 25.0);
+    truth.contact_ohm = 0.0;
+    const float before_c = believed_c();
+    hold(16.0, 30.0);
+    const spring_sight_t *last = spring_sights_from(
+        spring_estimator_sights(&estimator), 0, spring_estimator_sights(&estimator)->numbers - 1u);
+    (void)snprintf(where, sizeof where, "lost %.3f: %.1f, then %.1f degC, sight %u",
+                   (double)spring_estimator_lost(BELIEF), (double)before_c, (double)believed_c(),
+                   last->kind);
+    TEST_ASSERT_EQUAL_FLOAT_MESSAGE(0.0f, spring_estimator_lost(BELIEF), where);
+    TEST_ASSERT_FLOAT_WITHIN_MESSAGE(2.0f, before_c, believed_c(), where);
+    TEST_ASSERT_EQUAL_FLOAT_MESSAGE(0.0f, spring_estimator_doubt_k(BELIEF), where);
+    TEST_ASSERT_TRUE_MESSAGE(INSIDE.unsteady > 0, where); /* a second and third time: loose */
+    TEST_ASSERT_EQUAL_UINT8_MESSAGE(SPRING_SIGHT_JUMPED, last->kind, where);
+    TEST_ASSERT_TRUE_MESSAGE(last->read < -100, where);
+}
+
 /* It seemed to lose phase where a contact had jumped: what the heating seems to take up to
  * transform may have warmed it. Where none had, it was phase that a load took. */
 void doubt_grows_with_a_heating_after_a_jump(void)

@@ -11,6 +11,7 @@ void contact_that_comes_and_goes_is_blind_for_a_while(void);
 void jump_on_the_way_to_a_hold_is_a_jump(void);
 void load_that_comes_within_a_second_is_no_contact(void);
 void what_a_loose_contact_seemed_to_lose_is_taken_back(void);
+void loss_that_is_too_far_off_is_misread(void);
 void doubt_grows_with_a_heating_after_a_jump(void);
 void loss_that_does_not_come_back_stays_in_doubt(void);
 void heating_ends_where_it_reads_what_it_did_when_it_had_transformed(void);

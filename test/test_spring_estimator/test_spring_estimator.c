@@ -768,6 +768,7 @@ int main(void)
     RUN_TEST(jump_on_the_way_to_a_hold_is_a_jump);
     RUN_TEST(load_that_comes_within_a_second_is_no_contact);
     RUN_TEST(what_a_loose_contact_seemed_to_lose_is_taken_back);
+    RUN_TEST(loss_that_is_too_far_off_is_misread);
     RUN_TEST(doubt_grows_with_a_heating_after_a_jump);
     RUN_TEST(loss_that_does_not_come_back_stays_in_doubt);
     RUN_TEST(heating_ends_where_it_reads_what_it_did_when_it_had_transformed);
