@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -12,6 +13,7 @@ from ninespring.find import diagnosis
 from ninespring.find.diagnosis import first_fit
 from ninespring.find.evidence import likelihood
 from ninespring.find.lasting import likeliest
+from ninespring.find.residual import depends_on
 from ninespring.find.unseen import LAG, Unseen, _hardly_shown, errors, pinned, splits
 from ninespring.infer.declared import base_spec
 from ninespring.infer.fit import Fit
@@ -264,3 +266,15 @@ def test_models_are_judged_by_what_a_room_that_was_not_logged_does_not_explain()
     by = Told({"": 1.0, "lag": 2.0})
     by.errors = lambda fit, colour=None: (np.full(4, 3.0), np.full(4, 1.0))  # type: ignore[method-assign]
     assert Unseen.rmse(by, model()) == 1.0 and Unseen.foretells(by, model()) == 3.0
+
+
+def test_a_spring_that_was_never_measured_and_a_gap_are_no_warning() -> None:
+    run = heaters(22.0, 1)
+    shown = run.temperature_c.copy()
+    shown[:, 1] = shown[300:340] = np.nan
+    problem = Problem(Array(1, 2), [replace(run, temperature_c=shown)], HEATERS)
+    fit = first_fit(problem, base_spec(problem))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        named, said = depends_on(problem, fit)
+    assert named and "spring 1" in said
