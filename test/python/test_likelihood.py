@@ -207,6 +207,9 @@ def test_a_run_that_was_heated_before_says_nothing_of_its_room() -> None:
     runs = [cold, near, apart, hot, replace(cold, warm=True)]
     assert room.rested(runs) == [True, True, False, False, False]
     assert room.rested(runs[:1]) == [False], "one run alone may have begun as no other does"
+    assert room.rested([hot, replace(hot, temperature_c=hot.temperature_c + 1.0)]) == [False, False], (
+        "no room is so hot"
+    )
     assert room.over_first(runs, [22.1, 22.9, 10.0, 10.0, 10.0]) == pytest.approx((0.1, 0.3 * math.sqrt(1.5)), abs=0.01)
 
 

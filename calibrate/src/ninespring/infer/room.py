@@ -39,7 +39,9 @@ MOVES_K = 1.0
 """How far from where a rested run begins its room is, one sigma: it moves in the run, and what drives the springs warms it. A fit takes
 it for twice that at most."""
 TOGETHER_K = 3.0
-"""Thermometers at rest in one room differ by less."""
+"""Thermometers at rest in one room differ by less ..."""
+HOTTEST_C = 35.0
+"""... and show less: nobody works in a hotter room, whatever all runs begin at."""
 
 
 @dataclass(frozen=True)
@@ -79,13 +81,14 @@ def _begins_at(run: Run) -> tuple[float, float]:
 
 
 def rested(runs: Sequence[Run]) -> list[bool]:
-    """Return which runs began at their room: thermometers together, and no hotter than rooms differ from the coldest such start.
+    """Return which runs began at their room: thermometers together, no hotter than rooms are nor than they differ from the coldest such start.
 
     None of one such run alone: it may have begun as no other does.
     """
     begins = [(math.nan, math.inf) if run.warm else _begins_at(run) for run in runs]
-    alike = [first for first, apart in begins if apart <= TOGETHER_K]
-    found = [apart <= TOGETHER_K and first <= min(alike) + 4.0 * ROOMS_K for first, apart in begins]
+    together = [first for first, apart in begins if apart <= TOGETHER_K]
+    most = min(HOTTEST_C, min(together, default=HOTTEST_C) + 4.0 * ROOMS_K)
+    found = [apart <= TOGETHER_K and first <= most for first, apart in begins]
     return found if sum(found) > 1 else [False] * len(runs)
 
 
