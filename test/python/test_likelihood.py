@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -195,3 +196,34 @@ def test_the_likeliest_errors_are_found_on_whichever_hill_they_are(seed: int) ->
     weighed = Weighed([walk], [readings.ravel()])
     truth = np.log([2.5**2, 144.0, 2.5**2 + 2 * 1.5**2, 144.0 + 800.0, quick_s, 650.0])
     assert nats > -weighed.at(truth)[0] - 0.5 * readings.size - 0.01
+
+
+def test_a_run_that_was_heated_before_says_nothing_of_its_room() -> None:
+    """It begins with its springs apart, far hotter than another does, or driven and steady."""
+    cold = one_run(22.0, 22.0, 0.0)
+    cold = replace(cold, temperature_c=np.column_stack([cold.temperature_c, cold.temperature_c]))
+    apart, hot = (replace(cold, temperature_c=cold.temperature_c + up) for up in (np.array([0.0, 6.0]), 18.0))
+    near = replace(cold, temperature_c=cold.temperature_c + np.array([0.8, 2.0]))
+    runs = [cold, near, apart, hot, replace(cold, warm=True)]
+    assert room.rested(runs) == [True, True, False, False, False]
+    assert room.rested(runs[:1]) == [False], "one run alone may have begun as no other does"
+    assert room.rested([hot, replace(hot, temperature_c=hot.temperature_c + 1.0)]) == [False, False], (
+        "no room is so hot"
+    )
+    assert room.over_first(runs, [22.1, 22.9, 10.0, 10.0, 10.0]) == pytest.approx((0.1, 0.3 * math.sqrt(1.5)), abs=0.01)
+
+
+def test_a_fit_looks_for_a_room_where_its_run_began_or_where_others_were() -> None:
+    runs = [one_run(at, at, 0.0) for at in (18.0, 24.0, 45.0)]
+    bounds = room.believed(runs)
+    assert bounds[:2] == [pytest.approx((at - 2.0, at + 2.0), abs=0.01) for at in (18.0, 24.0)]
+    assert bounds[2] == pytest.approx((12.0, 30.0), abs=0.01)
+    assert room.believed(runs[:1]) == [(-math.inf, math.inf)]
+
+
+def test_what_a_room_explains_is_taken_out_as_far_as_it_is_unknown() -> None:
+    moves, other = 1.0 - np.exp(-np.arange(600.0) / 200.0), 0.2 * np.sin(np.arange(600.0) / 10.0)
+    off = 2.0 * moves + other
+    assert room.without(off, moves, 3.0, 10.0) == pytest.approx(other, abs=0.05)
+    assert room.without(off, moves, 0.01, 10.0) == pytest.approx(off, abs=0.05)
+    assert room.without(other, 0.0 * moves, 3.0, 10.0) == pytest.approx(other)

@@ -60,6 +60,14 @@ def test_bad_logs_are_refused_where_they_are_bad(tmp_path: Path, text: str, line
     assert word in error.message
 
 
+def test_a_run_that_begins_warm_in_degc_is_no_fahrenheit(tmp_path: Path) -> None:
+    """Two springs from an earlier run, above 45 degC to the end: they fall below where they began, which a room does not."""
+    path = tmp_path / "warm.csv"
+    rows = [f"{t},{float(t >= 30)},{69.6 - 0.3 * min(t, 30):.1f}" for t in range(60)]
+    path.write_text(HEADER + "\n".join(rows) + "\n")
+    assert read_log(path).temperature_c[0, 0] == pytest.approx(69.6)
+
+
 @pytest.mark.parametrize(
     ("header", "column", "advice"),
     [

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -11,7 +13,8 @@ from ninespring.find import diagnosis
 from ninespring.find.diagnosis import first_fit
 from ninespring.find.evidence import likelihood
 from ninespring.find.lasting import likeliest
-from ninespring.find.unseen import LAG, Unseen, _hardly_shown, pinned, splits
+from ninespring.find.residual import depends_on
+from ninespring.find.unseen import LAG, Unseen, _hardly_shown, errors, pinned, splits
 from ninespring.infer.declared import base_spec
 from ninespring.infer.fit import Fit
 from ninespring.infer.problem import Problem
@@ -29,6 +32,7 @@ class Told(Unseen):
 
     def __init__(self, errors: dict[str, float], true: dict[str, float] | None = None) -> None:
         self.known_k, self.true = errors, true or {}
+        self.problem = SimpleNamespace(colour=None)  # type: ignore[assignment]
         self.splits = [SimpleNamespace(alone=True)]  # type: ignore[list-item]
         self.base, self.lagged = model(), model(LAG)
         self.lag = SimpleNamespace(effect=LAG)  # type: ignore[assignment]
@@ -37,6 +41,9 @@ class Told(Unseen):
         return self.known_k["lag" if fit is self.lagged else " ".join(fit.spec.effects)]
 
     def own(self, fit: Any) -> float:
+        return self.rmse(fit)
+
+    def foretells(self, fit: Any, colour: Any = None) -> float:
         return self.rmse(fit)
 
     def comes_true(self, fit: Any, without: Any) -> float:
@@ -70,7 +77,8 @@ def test_what_comes_true_of_an_effect_is_what_of_its_change_is_in_the_unseen(the
     told = Told({})
     told.problem = SimpleNamespace(colour=None, noise_c=0.3)  # type: ignore[assignment]
     left = {"": there * shift, "shared_air": (there - 1.0) * shift}
-    told.errors = lambda fit, colour=None: left[" ".join(fit.spec.effects)]  # type: ignore[method-assign]
+    # by what is left when rooms are apart, whatever else is off
+    told.errors = lambda fit, colour=None: (shift + 9.0, left[" ".join(fit.spec.effects)])  # type: ignore[method-assign]
     assert Unseen.comes_true(told, model("shared_air"), model()) == pytest.approx(there)
     told.problem.noise_c = 3.0
     assert Unseen.comes_true(told, model("shared_air"), model()) == np.inf, (
@@ -211,3 +219,62 @@ def test_a_declared_number_that_a_part_hardly_shows_stays_as_all_had_it() -> Non
     assert _hardly_shown(told(100.0, 100.0, 100.0), told(50.0, 50.0, 2.0), [0]) == [], (
         "an effect's own number is judged"
     )
+
+
+def heaters(
+    room_c: float, seed: int, warm_k: float = 0.0, later_k: float = 0.0, late_s: float = 25.0, bent: float = 0.02
+) -> Run:
+    """Return 720 s of two heaters, the first driven: late thermometers, a loss that grows with what is lost, no ambient logged; the
+    room becomes so much warmer after a minute."""
+    rng = np.random.default_rng(seed)
+    drive, shown = np.zeros((720, 2)), np.empty((720, 2))
+    drive[70:230, 0] = drive[430:590, 0] = 1.0
+    warm = room_c + warm_k * np.array([1.0, 0.6])
+    read = warm.copy()
+    for n in range(720):
+        shown[n] = read
+        above = warm - room_c - later_k * (n >= 60)
+        flow = drive[n] - 0.012 * above * (1.0 + bent * above) + 0.006 * (warm[::-1] - warm)
+        read, warm = read + (warm - read) / late_s, warm + flow / 2.0
+    shown = np.round((shown + rng.normal(0.0, 0.05, shown.shape)) / 0.1) * 0.1
+    return Run("heater", "", np.arange(720.0), "command", drive, shown, np.zeros(720), None)
+
+
+HEATERS = {"heat_capacity_j_per_k": 2.0, "loss_w_per_k": 0.012, "command_power_w": 1.0}
+
+
+@pytest.mark.parametrize("warm_k", [0.0, 18.0])
+def test_rooms_that_were_not_logged_do_not_stand_in_for_what_a_model_lacks(warm_k: float) -> None:
+    """The declared model has neither lag nor that loss: free, rooms are 5 K off."""
+    problem = Problem(Array(1, 2), [heaters(22.0, 1, warm_k), heaters(20.0, 2), heaters(21.0, 3)], HEATERS)
+    fit = first_fit(problem, base_spec(problem))
+    assert np.sqrt(np.nanmean(np.concatenate(fit.residual) ** 2)) > 1.0
+    for run, (room_c, off) in enumerate(((22.0, 9.0 if warm_k else 2.2), (20.0, 2.2), (21.0, 2.2))):
+        assert fit.value(f"ambient_c@{run + 1}") == pytest.approx(room_c, abs=off)
+
+
+def test_models_are_judged_by_what_a_room_that_was_not_logged_does_not_explain() -> None:
+    """The room of the run that is left out changed after the minute that tells it: no model is to blame for that."""
+    plain = {"late_s": 1.0, "bent": 0.0}
+    runs = [heaters(22.0, 1, **plain), heaters(20.0, 2, **plain), heaters(21.0, 3, later_k=-2.0, **plain)]
+    problem = Problem(Array(1, 2), runs, HEATERS)
+    fit = first_fit(problem, base_spec(problem))
+    told, judged = errors(splits(problem)[-1], fit, None)
+    logged = Problem(Array(1, 2), [replace(run, ambient_c=np.full(720, 21.0)) for run in runs], HEATERS)
+    same = errors(splits(logged)[-1], first_fit(logged, base_spec(logged)), None)
+    assert np.mean(judged**2) < 0.5 * np.mean(told**2) and same[0] is same[1]
+    by = Told({"": 1.0, "lag": 2.0})
+    by.errors = lambda fit, colour=None: (np.full(4, 3.0), np.full(4, 1.0))  # type: ignore[method-assign]
+    assert Unseen.rmse(by, model()) == 1.0 and Unseen.foretells(by, model()) == 3.0
+
+
+def test_a_spring_that_was_never_measured_and_a_gap_are_no_warning() -> None:
+    run = heaters(22.0, 1)
+    shown = run.temperature_c.copy()
+    shown[:, 1] = shown[300:340] = np.nan
+    problem = Problem(Array(1, 2), [replace(run, temperature_c=shown)], HEATERS)
+    fit = first_fit(problem, base_spec(problem))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        named, said = depends_on(problem, fit)
+    assert named and "spring 1" in said

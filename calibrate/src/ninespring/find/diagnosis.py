@@ -476,7 +476,7 @@ def _given(case: _Case, judged_by: unseen.Unseen, fit: Fit) -> results.Unseen | 
     case.plain = judged_by.worse(fit)
     if not case.plain:
         return judged_by.told(fit)
-    why = f"with what was found it would be {judged_by.own(fit):.2f} K"
+    why = f"with what was found it would be {judged_by.foretells(fit, judged_by.problem.colour):.2f} K"
     return judged_by.told(judged_by.plain, why)
 
 

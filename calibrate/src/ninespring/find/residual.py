@@ -30,7 +30,8 @@ def depends_on(problem: Problem, fit: Fit) -> tuple[list[str], str]:
     if structure < WHITE**2:
         return [], ""
     out: list[tuple[float, str]] = []
-    per_spring = np.nanmean([np.nanmean(b**2, axis=0) - 1.0 / width for b in blocks], axis=0)
+    squares = np.array([statistics.mean_there(b**2, 0) for b in blocks])
+    per_spring = statistics.mean_there(squares, 0) - 1.0 / width
     share = np.maximum(per_spring, 0) / max(1e-12, float(np.nansum(np.maximum(per_spring, 0))))
     spread = 1.0 / len(share)
     for k in np.argsort(-share)[:2]:
@@ -45,7 +46,7 @@ def depends_on(problem: Problem, fit: Fit) -> tuple[list[str], str]:
         series.setdefault("total drive", []).append(drive.sum(axis=1))
         series.setdefault("fan", []).append(fan)
         series.setdefault("time", []).append(times[r] - times[r].mean())
-    largest = max(1e-12, float(np.nanmax(np.nanmean([np.nanmean(b**2, axis=0) for b in blocks], axis=0))))
+    largest = max(1e-12, float(np.nanmax(statistics.mean_there(squares, 0))))
     for name, parts in series.items():
         best = (0.0, 0.0, 0, -1)
         if all(np.ptp(p) < 1e-12 for p in parts):
@@ -69,7 +70,7 @@ def depends_on(problem: Problem, fit: Fit) -> tuple[list[str], str]:
             step = float(np.median(np.diff(problem.runs[0].time_s))) * width
             lag_text = f", {best[2] * step:.0f} s later" if best[2] else ""
             out.append((best[0], f"{name} (seen at spring {best[3] + 1}{lag_text}, r = {best[1]:+.2f})"))
-    together = [np.nanmean(b, axis=1) for b in blocks]
+    together = [statistics.mean_there(b, 1) for b in blocks]
     common = np.mean([np.nanmean(t**2) for t in together]) / max(1e-12, np.mean([np.nanmean(b**2) for b in blocks]))
     if common > 0.4 and problem.runs[0].springs > 2:
         out.append((float(common), f"all springs move together ({100 * common:.0f} % of it is common)"))

@@ -1,7 +1,8 @@
 """A run that the fit never saw, predicted: by what was found, by the declared model and by that with a lag, each fitted to the rest.
 
 Of several runs each is left out in turn (MOST of them); of one alone its last part, a half and a third of it. What is a run's own (its room where none
-was logged, its drift) is not carried over: a room is told by the run's first minute, as `predict` does.
+was logged, its drift) is not carried over: a room is told by the run's first minute, as `predict` does. What is then off because the room is
+known no better counts in what is told, not in what models are judged by.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ import numpy as np
 from ..infer import room
 from ..infer.fit import Fit
 from ..infer.likelihood import Colour
-from ..infer.problem import Problem
+from ..infer.problem import BLOCK_S, Problem
 from ..io import results
 from ..io.logs.run import Run
 from ..model.simulate import simulate_run
@@ -129,8 +130,9 @@ def pinned(fit: Fit) -> Fit:
     return replace(fit, spec=replace(fit.spec, free=tuple(free)))
 
 
-def errors(split: Split, fit: Fit, colour: Colour | None) -> np.ndarray:
-    """Return by how much what is left out differs from what a model fitted to a split's runs predicts, degC, where that counts."""
+def errors(split: Split, fit: Fit, colour: Colour | None) -> tuple[np.ndarray, np.ndarray]:
+    """Return by how much what is left out differs from what a model fitted to a split's runs predicts, degC, where that counts; and
+    that without what a room explains that nobody logged."""
     problem, kept = split.problem, list(split.kept)
     spec, start = _of_these(fit, kept)
     problem.colour = None
@@ -143,22 +145,33 @@ def errors(split: Split, fit: Fit, colour: Colour | None) -> np.ndarray:
     fitted.values = np.array([known.get(f.key, value) for f, value in zip(spec.free, fitted.values, strict=True)])
     run, values = split.left_out, fitted.as_dict()
     if split.alone:
-        shown = problem.simulate(spec, fitted.values, 0)
-    else:
-        plant = problem.plant_for(spec, fitted.values)
-        ambient = run.ambient_c
-        if ambient is None:
-            ambient = np.full(len(run.time_s), _room(problem, run, values, plant))
-        shown = simulate_run(plant, run, ambient, {})
-    return (run.temperature_c - shown)[split.counts]
+        off = (run.temperature_c - problem.simulate(spec, fitted.values, 0))[split.counts]
+        return off, off
+    plant = problem.plant_for(spec, fitted.values)
+
+    def off_in(ambient: np.ndarray) -> np.ndarray:
+        return (run.temperature_c - simulate_run(plant.copy(), run, ambient, {}))[split.counts]
+
+    if run.ambient_c is not None:
+        off = off_in(run.ambient_c)
+        return off, off
+    told, sigma = _room(problem, run, values, plant)
+    ambient = np.full(len(run.time_s), told)
+    off = off_in(ambient)
+    alike = max(1.0, BLOCK_S / float(np.median(np.diff(run.time_s))))
+    return off, room.without(off, off - off_in(ambient + 1.0), math.hypot(sigma, room.MOVES_K), alike)
 
 
-def _room(problem: Problem, run: Run, values: dict[str, float], plant: Any) -> float:
-    """Return how warm the room of a run was, as `predict` tells it by the runs that were fitted."""
+def _room(problem: Problem, run: Run, values: dict[str, float], plant: Any) -> tuple[float, float]:
+    """Return how warm the room of a run was and one sigma of it, as `predict` tells it by the runs that were fitted."""
     rooms = {r: values[f"ambient_c@{r + 1}"] for r in range(len(problem.runs)) if f"ambient_c@{r + 1}" in values}
     usual = float(np.mean(list(rooms.values()))) if rooms else plant.get("ambient_c")
     over = room.over_first([problem.runs[r] for r in rooms], list(rooms.values())) if rooms else None
-    return room.by_plant(run, plant, usual, over)[0]
+    return room.by_plant(run, plant, usual, over)
+
+
+def _rms(off: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(off**2))) if off.size else math.nan
 
 
 @dataclass
@@ -171,7 +184,7 @@ class Unseen:
 
     def __post_init__(self) -> None:
         self.splits = splits(self.problem)
-        self.known: dict[Any, np.ndarray] = {}
+        self.known: dict[Any, tuple[np.ndarray, np.ndarray]] = {}
         self.lag = next((one for one in self.found.candidates if one.effect == LAG), None)
         self.lagged = self.base
         if self.lag is not None and LAG not in self.base.spec.effects:
@@ -179,17 +192,23 @@ class Unseen:
             start = self.base.as_dict() | self.lag.start_at(1.0)
             self.lagged = replace(self.base, spec=spec, values=np.array([start[f.key] for f in spec.free]))
 
-    def errors(self, fit: Fit, colour: Colour | None = None) -> np.ndarray:
-        """Return the errors, degC, of runs left out, the others fitted by how errors last; empty where none can be."""
+    def errors(self, fit: Fit, colour: Colour | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Return the errors, degC, of runs left out, the others fitted by how errors last, and those without what their rooms
+        explain; empty where none can be."""
         key = fit.spec.variant, tuple(free.prior for free in fit.spec.free), colour
         if key not in self.known:
-            self.known[key] = np.concatenate([np.zeros(0), *(errors(one, fit, colour) for one in self.splits)])
+            each = [(np.zeros(0), np.zeros(0)), *(errors(one, fit, colour) for one in self.splits)]
+            off, judged = (np.concatenate(one) for one in zip(*each, strict=True))
+            self.known[key] = off, judged
         return self.known[key]
 
     def rmse(self, fit: Fit, colour: Colour | None = None) -> float:
-        """Return the error, degC rms, of runs left out, the others fitted by how errors last; NaN where none can be."""
-        off = self.errors(fit, colour)
-        return float(np.sqrt(np.mean(off**2))) if off.size else math.nan
+        """Return the error, degC rms, that a model is judged by: of runs left out, their rooms apart; NaN where none can be."""
+        return _rms(self.errors(fit, colour)[1])
+
+    def foretells(self, fit: Fit, colour: Colour | None = None) -> float:
+        """Return the error, degC rms, of runs left out, their rooms told by their first minutes."""
+        return _rms(self.errors(fit, colour)[0])
 
     def own(self, fit: Fit) -> float:
         """Return the error of what was found, or a part of it, its numbers as likely as the problem's colour has them."""
@@ -216,8 +235,8 @@ class Unseen:
     def comes_true(self, fit: Fit, without: Fit) -> float:
         """Return what part of that by which an effect changes what is foretold of the unseen is there: 1 of a cause, 0.5 where it
         is foretold no better than without. Infinite where it changes next to nothing."""
-        off = self.errors(without, self.problem.colour)
-        moved = off - self.errors(fit, self.problem.colour)
+        off = self.errors(without, self.problem.colour)[1]
+        moved = off - self.errors(fit, self.problem.colour)[1]
         if float(moved @ moved) < (EQUIVALENT * self.problem.noise_c) ** 2 * moved.size:
             return math.inf
         return float(off @ moved) / float(moved @ moved)
@@ -268,7 +287,7 @@ class Unseen:
     def _left_out(self, effect: str, fit: Fit, other: Fit) -> str:
         return (
             f"{effect} is not named: {self._what} is predicted to {self.own(fit):.2f} K with it and to "
-            f"{min(self.own(other), self.rmse(other)):.2f} K without"
+            f"{min(self.own(other), self.rmse(other)):.2f} K without, its room apart"
         )
 
     @property
@@ -278,9 +297,10 @@ class Unseen:
 
     def told(self, fit: Fit, why: str = "") -> results.Unseen | None:
         """Return what diagnosis.json says of the model that is given, None where nothing can be left out; `why` it is the plain one."""
-        if not self.splits or not math.isfinite(self.own(fit)):
+        mine = self.foretells(fit, self.problem.colour)
+        if not math.isfinite(mine):
             return None
-        mine, declared, lagged = self.own(fit), self.rmse(self.base), self.rmse(self.lagged)
+        declared, lagged = self.foretells(self.base), self.foretells(self.lagged)
         return results.Unseen(
             what="last part" if self.splits[0].alone else "each run left out in turn",
             rmse_c=mine,

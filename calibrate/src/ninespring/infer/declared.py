@@ -7,8 +7,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from ..io.logs.run import Run
 from ..model import native
 from ..model.spec import Free, Spec
+from . import room
 from .problem import Problem
 
 BELIEVED = math.log(3.0)
@@ -47,14 +49,21 @@ def base_spec(problem: Problem, frozen: bool = False, extra: Mapping[str, float]
                 if any(np.any(run.drive[:, k] > 0) for run in runs):
                     key = f"command_power_w[{k + 1}]"
                     free.append(Free(key, get("command_power_w"), 1e-4, 100.0, "W", (key,), True))
-    for r, run in enumerate(runs):
+    for r, (run, (low, high)) in enumerate(zip(runs, room.believed(runs), strict=True)):
         if run.ambient_c is None:
-            first = run.temperature_c[: max(3, len(run.time_s) // 200)]
-            guess = float(np.nanmedian(first)) if np.isfinite(first).any() else 20.0
-            coldest = float(np.nanmin(run.temperature_c))
-            guess = min(guess, coldest + 3.0) if not np.any(run.drive[0] > 0) else min(guess, 25.0)
-            free.append(Free(f"ambient_c@{r + 1}", float(np.clip(guess, -20.0, 60.0)), -35.0, 75.0, "degC", run=r))
+            guess = 0.5 * (low + high) if math.isfinite(high) else _first_guess(run)
+            start, low, high = (float(np.clip(one, -35.0, 75.0)) for one in (guess, low, high))
+            free.append(Free(f"ambient_c@{r + 1}", start, low, high, "degC", run=r))
     return Spec((), tuple(fixed.items()), tuple(free), ())
+
+
+def _first_guess(run: Run) -> float:
+    """Return a first guess of a room of which nothing is known but how its run begins, degC."""
+    first = run.temperature_c[: max(3, len(run.time_s) // 200)]
+    guess = float(np.nanmedian(first)) if np.isfinite(first).any() else 20.0
+    coldest = float(np.nanmin(run.temperature_c))
+    guess = min(guess, coldest + 3.0) if not np.any(run.drive[0] > 0) else min(guess, 25.0)
+    return float(np.clip(guess, -20.0, 60.0))
 
 
 def _declared(problem: Problem, name: str, low: float, high: float) -> Free:

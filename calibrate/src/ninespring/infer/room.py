@@ -1,7 +1,9 @@
 """Where a log has no ambient: how warm its room was, told by its first minute.
 
 A run's first readings say how warm its springs are, and how they move from there says what they lose heat to. Beside that stands
-what the runs of the fit were like: so much warmer than their coldest spring was at first, and so far apart in that.
+what the runs of the fit were like: so much warmer than their coldest spring was at first, and so far apart in that. Where several runs
+begin alike they begin at their rooms, and a fit may move those by what rooms move in a run and no further: free, they stand in for what a
+model lacks.
 """
 
 from __future__ import annotations
@@ -33,6 +35,13 @@ AS_OTHERS = 0.9
 """How likely a run begins as those did that were fitted, before it is seen."""
 SAME_K = 0.3
 """How well runs that agree know how much warmer than its first reading a room is, at best."""
+MOVES_K = 1.0
+"""How far from where a rested run begins its room is, one sigma: it moves in the run, and what drives the springs warms it. A fit takes
+it for twice that at most."""
+TOGETHER_K = 3.0
+"""Thermometers at rest in one room differ by less ..."""
+HOTTEST_C = 35.0
+"""... and show less: nobody works in a hotter room, whatever all runs begin at."""
 
 
 @dataclass(frozen=True)
@@ -57,24 +66,67 @@ class Guess:
 
 def first_c(run: Run) -> float:
     """Return what a run's coldest spring shows before anything is driven, within a first minute, or in its first 5 s, degC."""
+    return _begins_at(run)[0]
+
+
+def _begins_at(run: Run) -> tuple[float, float]:
+    """Return that, and how far the warmest is above it, K."""
     since = run.time_s - run.time_s[0]
     driven = np.flatnonzero((run.drive != 0.0).any(axis=1))
     rests_s = min(FIRST_S, since[driven[0]] if driven.size else FIRST_S)
     first = run.temperature_c[: max(3, int(np.searchsorted(since, max(5.0, rests_s))))]
     # a mean: where thermometers step, it is finer than any of them; without what is nonsense
     middle = [statistics.trimmed_mean(one[np.isfinite(one)], 0.1) for one in first.T if np.isfinite(one).any()]
-    return float(min(middle)) if middle else math.nan
+    return (float(min(middle)), float(max(middle) - min(middle))) if middle else (math.nan, math.nan)
+
+
+def rested(runs: Sequence[Run]) -> list[bool]:
+    """Return which runs began at their room: thermometers together, no hotter than rooms are nor than they differ from the coldest such start.
+
+    None of one such run alone: it may have begun as no other does.
+    """
+    begins = [(math.nan, math.inf) if run.warm else _begins_at(run) for run in runs]
+    together = [first for first, apart in begins if apart <= TOGETHER_K]
+    most = min(HOTTEST_C, min(together, default=HOTTEST_C) + 4.0 * ROOMS_K)
+    found = [apart <= TOGETHER_K and first <= most for first, apart in begins]
+    return found if sum(found) > 1 else [False] * len(runs)
+
+
+def believed(runs: Sequence[Run]) -> list[tuple[float, float]]:
+    """Return between which temperatures, degC, a fit may look for each run's room; infinite where nothing is known of it.
+
+    A run that began warm was in a room as warm as those of the others were.
+    """
+    began = rested(runs)
+    rooms = [first_c(run) for run, cold in zip(runs, began, strict=True) if cold]
+    if not rooms:
+        return [(-math.inf, math.inf)] * len(runs)
+    usual, off = float(np.mean(rooms)), 3.0 * ROOMS_K
+    about = [(first_c(run), 2.0 * MOVES_K) if cold else (usual, off) for run, cold in zip(runs, began, strict=True)]
+    return [(middle - off, middle + off) for middle, off in about]
 
 
 def over_first(runs: Sequence[Run], ambient_c: Sequence[float]) -> tuple[float, float] | None:
-    """Return by how much rooms are warmer than what their runs begin at, K, and one sigma of that for another run; None of one
-    run alone: it may have begun as no other does."""
-    over = np.array([room - first_c(run) for run, room in zip(runs, ambient_c, strict=True)])
-    over = over[np.isfinite(over)]
-    if over.size < 2:
+    """Return by how much rooms are warmer than what their runs begin at, K, and one sigma of that for another run; None where nothing
+    says that runs began at rest."""
+    parts = zip(runs, ambient_c, rested(runs), strict=True)
+    over = np.array([room - first_c(run) for run, room, cold in parts if cold])
+    if not over.size:
         return None
     apart = max(SAME_K, float(np.std(over, ddof=1)))
     return float(np.mean(over)), apart * math.sqrt(1.0 + 1.0 / over.size)
+
+
+def without(off: np.ndarray, moves: np.ndarray, sigma_k: float, alike: float) -> np.ndarray:
+    """Return errors of a prediction, K, less what its room explains, known to `sigma_k`; `moves` is what one kelvin of it changes.
+
+    So many errors as are `alike` count as one.
+    """
+    shift = 0.0
+    for _ in range(5):  # what is left says how much an error weighs
+        weight = 1.0 / (alike * max(float(np.mean((off - shift * moves) ** 2)), 1e-12))
+        shift = weight * float(moves @ off) / (weight * float(moves @ moves) + 1.0 / sigma_k**2)
+    return off - shift * moves
 
 
 def guessed(run: Run, usual_c: float, over: tuple[float, float] | None) -> list[Guess]:

@@ -144,6 +144,12 @@ def block_means(series: np.ndarray, width: int, starts: Sequence[int] = (0,)) ->
         return np.where(count > 0, total / np.maximum(count, 1), np.nan), count, begins
 
 
+def mean_there(values: np.ndarray, axis: int) -> np.ndarray:
+    """Return the mean along an axis of what is there, NaN where nothing is."""
+    count = np.isfinite(values).sum(axis=axis)
+    return np.where(count > 0, np.nansum(values, axis=axis) / np.maximum(count, 1), np.nan)
+
+
 def structure(
     series: Sequence[np.ndarray],
     noise: Sequence[np.ndarray],

@@ -19,6 +19,8 @@ LONGEST_S = 60.0 * 86400.0
 SPARSE_S = 100.0
 """Rows so far apart show no spring's warming, which takes a minute: of days of them, none is a second's."""
 DAY_S = 86400.0
+RESTED_K = 3.0
+"""How far below its first readings a spring may come that began at its room: a room drifts, in Fahrenheit twice as far."""
 RUN_IN_S = 120.0
 """After a gap: how long the noise of the temperatures that the simulation starts from is still felt."""
 
@@ -76,7 +78,9 @@ def refuse_wrong_units(run: Run, table: Table) -> None:
     if coldest > 240.0:
         raise refuse(int(seen[0]), f"{begins} kelvin")
     together = float(np.nanmax(first) - np.nanmin(first)) < 8.0
-    if quiet and coldest > 45.0 and together and (ambient is None or abs(coldest - ambient) > 20.0):
+    # nothing is colder than its room: springs that fall below where they began were warm
+    rested = float(np.nanmax(first - lowest)) < RESTED_K
+    if quiet and coldest > 45.0 and together and rested and (ambient is None or abs(coldest - ambient) > 20.0):
         raise refuse(int(seen[0]), f"{begins} degrees Fahrenheit")
     for k in seen:
         others = first[seen[seen != k]]
