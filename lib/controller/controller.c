@@ -297,7 +297,11 @@ static void judge_circuit(controller_t *controller, uint8_t k)
     const bool is_none = circuit_check_judge(&controller->circuit[k], parameters, &window);
     const bool is_odd =
         circuit_peers_judge(&controller->peers, controller->springs, k, &window, parameters);
-    if (is_none || is_odd ||
+    const bool steps = circuit_step_judge(&controller->step[k], &window, parameters);
+    if (steps) {
+        circuit_peers_suspect(&controller->peers, k);
+    }
+    if (is_none || is_odd || steps ||
         spring_estimator_is_unlike(spring_estimator_of(&controller->estimator, k))) {
         safety_trip(&controller->safety, k, SAFETY_FAULT_SENSOR_MISMATCH);
     }
@@ -588,6 +592,7 @@ void controller_clear_faults(controller_t *controller)
     }
     safety_clear(&controller->safety);
     memset(controller->circuit, 0, sizeof controller->circuit);
+    memset(controller->step, 0, sizeof controller->step);
     drive_policy_clear(&controller->policy);
 }
 

@@ -9,6 +9,7 @@
 
 #include "circuit_check.h"
 #include "circuit_peers.h"
+#include "circuit_step.h"
 #include "current_control.h"
 #include "drive_policy.h"
 #include "safety.h"
@@ -85,6 +86,7 @@ typedef struct {
     uint32_t power_sum_uw[CONTROLLER_MAX_SPRINGS]; /* over the ticks of the running model step */
     circuit_check_t circuit[CONTROLLER_MAX_SPRINGS];
     circuit_peers_t peers;
+    circuit_step_t step[CONTROLLER_MAX_SPRINGS];
     uint32_t heat_sum_uw[CONTROLLER_MAX_SPRINGS]; /* over the ticks of the ceiling's running step */
     uint16_t duty_sum[CONTROLLER_MAX_SPRINGS];    /* the same */
     scrub_t scrub;                                /* of what settings decide */

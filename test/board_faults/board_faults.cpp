@@ -234,14 +234,21 @@ void a_sensor_that_begins_to_lie_is_found_beside_the_others_however_often_it_is_
 {
     static const struct {
         double current, voltage, after_ms;
-    } lies[] = {{0.52, 1.0, 4000.0}, {0.7, 1.0, 4000.0}, {1.0, 0.5, 4000.0}, {0.52, 1.0, 130e3}};
+        const char *pattern = "pattern 111101111";
+    } lies[] = {{0.52, 1.0, 4000.0},
+                {1.0, 0.5, 4000.0},
+                {0.52, 1.0, 130e3},
+                {0.8, 1.0, 4000.0},
+                {1.0, 0.8, 4000.0},
+                {0.8, 1.0, 130e3},
+                {0.8, 1.0, 4000.0, "pattern 100000000"}};
     for (const auto &lie : lies) {
         rig mega;
         make_niti(mega.plant.get());
         mega.boot();
         mega.expect_ok("model cold");
         mega.expect_ok("policy precompensate");
-        mega.expect_ok("pattern 111101111");
+        mega.expect_ok(lie.pattern);
         mega.run_ms(lie.after_ms);
         board_scale_sensor(mega.raw(), 0, lie.current, lie.voltage);
         double highest_c = -300.0;
@@ -259,7 +266,7 @@ void a_sensor_that_begins_to_lie_is_found_beside_the_others_however_often_it_is_
                 TEST_ASSERT_EQUAL_INT(SAFETY_FAULT_NONE, mega.view().spring[k].fault);
             }
             mega.expect_ok("clear");
-            mega.expect_ok("pattern 111101111");
+            mega.expect_ok(lie.pattern);
         }
         std::printf("    hottest %.1f degC\n", highest_c);
         TEST_ASSERT_TRUE(highest_c < 110.0);
