@@ -307,6 +307,10 @@ bool console_faults_line(const console_t *console, console_out_t *out)
         if (fault != SAFETY_FAULT_NONE) {
             add_spring(line, k);
             add_fault(line, fault);
+            const int32_t wait_s = controller_clear_wait_s(controller, k);
+            if (wait_s != 0) {
+                text_add_values(line, FLASH_TEXT(": clear again in #0 s"), &wait_s);
+            }
         }
     }
     return true;

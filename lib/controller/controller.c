@@ -206,6 +206,7 @@ bool controller_apply_settings(controller_t *controller, const controller_settin
         if (memcmp(&controller->current.parameters, &settings->current, sizeof settings->current) !=
             0) {
             controller->peers = (circuit_peers_t){0}; /* it is another circuit */
+            memset(controller->mistrusted, 0, sizeof controller->mistrusted);
         }
         (void)current_control_apply(&controller->current, &settings->current, NULL);
         temperature_ceiling_prepare(&controller->drive, &controller->model, &settings->current);
@@ -583,14 +584,41 @@ void controller_host_heard(controller_t *controller)
     controller->silent_ticks = 0;
 }
 
+uint16_t controller_clear_wait_s(const controller_t *controller, uint8_t spring)
+{
+    const thermal_model_parameters_t *const p = &controller->model.parameters;
+    if (!controller->mistrusted[spring] ||
+        safety_fault(&controller->safety, spring) != SAFETY_FAULT_SENSOR_MISMATCH) {
+        return 0;
+    }
+    /* at most TIME_CONSTANT_MOST_S: check_time_constants */
+    const uint32_t capacity_uj_per_k =
+        (uint32_t)p->heat_capacity_mj_per_k * p->heat_capacity_scale_permille[spring];
+    const uint32_t loss_uw_per_k =
+        (uint32_t)p->loss_uw_per_k * p->loss_scale_permille[spring] / 1000u;
+    const uint16_t whole_s = (uint16_t)(capacity_uj_per_k / loss_uw_per_k);
+    const uint16_t rest_s = controller_rest_s(controller, spring);
+    return rest_s < whole_s ? (uint16_t)(whole_s - rest_s) : 0;
+}
+
 void controller_clear_faults(controller_t *controller)
 {
+    bool stays[CONTROLLER_MAX_SPRINGS];
     controller_stop(controller);
     for (uint8_t k = 0; k < controller->springs; k++) {
-        circuit_peers_clear(&controller->peers, k,
-                            safety_fault(&controller->safety, k) == SAFETY_FAULT_SENSOR_MISMATCH);
+        const bool odd = safety_fault(&controller->safety, k) == SAFETY_FAULT_SENSOR_MISMATCH;
+        stays[k] = controller_clear_wait_s(controller, k) != 0;
+        controller->mistrusted[k] = controller->mistrusted[k] || odd;
+        if (!stays[k]) {
+            circuit_peers_clear(&controller->peers, k, odd);
+        }
     }
     safety_clear(&controller->safety);
+    for (uint8_t k = 0; k < controller->springs; k++) {
+        if (stays[k]) {
+            safety_trip(&controller->safety, k, SAFETY_FAULT_SENSOR_MISMATCH);
+        }
+    }
     memset(controller->circuit, 0, sizeof controller->circuit);
     memset(controller->step, 0, sizeof controller->step);
     drive_policy_clear(&controller->policy);
