@@ -283,6 +283,11 @@ private:
             e.at_s += from_s_;
             s.events.push_back(e);
         }
+        for (double t = 0.1; t < QUIET_S - 1.0; t += 0.5) { /* what it says of itself */
+            event asks = at(from_s_ + t, kind::bytes);
+            asks.text = "3f";
+            s.events.push_back(asks);
+        }
         if (one.name.rfind("bus hangs 60", 0) == 0) {
             for (double t = 0.0; t < 40.0; t += 0.3) {
                 s.events.push_back(at(from_s_ + t, kind::sda));
@@ -349,6 +354,7 @@ private:
         for (const board_view_spring_t &spring : seen.spring) {
             said = said || spring.fault != 0;
         }
+        said = said || heard_.find("|ambient:held>") != std::string::npos;
         if (said && !r_.said_s) {
             r_.said_s = now_s() - from_s_;
         }
