@@ -23,9 +23,9 @@ typedef struct {
     int16_t before_c7; /* a second before that */
     uint8_t tick;
     uint8_t bad; /* ticks on end without a temperature that a room can have, to AMBIENT_BAD */
-    bool known;
-    bool settled; /* and has been for a second: before, a jump begins anew, as where a wire is put
-                     right and a filter is on its way there */
+    bool known : 1;
+    bool settled : 1; /* and has been for a second: before, a jump begins anew, as where a wire is
+                     put right and a filter is on its way there */
 } ambient_t;
 
 /* One tick of 20 ms; reads: the thermistor gives a temperature at all. Returns the room's. A

@@ -584,10 +584,15 @@ void controller_host_heard(controller_t *controller)
     controller->silent_ticks = 0;
 }
 
+static uint8_t bit_of(uint8_t spring)
+{
+    return (uint8_t)(1u << (spring & 7u));
+}
+
 uint16_t controller_clear_wait_s(const controller_t *controller, uint8_t spring)
 {
     const thermal_model_parameters_t *const p = &controller->model.parameters;
-    if (!controller->mistrusted[spring] ||
+    if ((controller->mistrusted[spring / 8u] & bit_of(spring)) == 0 ||
         safety_fault(&controller->safety, spring) != SAFETY_FAULT_SENSOR_MISMATCH) {
         return 0;
     }
@@ -608,7 +613,9 @@ void controller_clear_faults(controller_t *controller)
     for (uint8_t k = 0; k < controller->springs; k++) {
         const bool odd = safety_fault(&controller->safety, k) == SAFETY_FAULT_SENSOR_MISMATCH;
         stays[k] = controller_clear_wait_s(controller, k) != 0;
-        controller->mistrusted[k] = controller->mistrusted[k] || odd;
+        if (odd) {
+            controller->mistrusted[k / 8u] |= bit_of(k);
+        }
         if (!stays[k]) {
             circuit_peers_clear(&controller->peers, k, odd);
         }

@@ -87,8 +87,8 @@ typedef struct {
     circuit_check_t circuit[CONTROLLER_MAX_SPRINGS];
     circuit_peers_t peers;
     circuit_step_t step[CONTROLLER_MAX_SPRINGS];
-    bool mistrusted[CONTROLLER_MAX_SPRINGS]; /* its sensor had SAFETY_FAULT_SENSOR_MISMATCH, cleared
-                                                since */
+    /* a bit a spring: its sensor had SAFETY_FAULT_SENSOR_MISMATCH, cleared since */
+    uint8_t mistrusted[(CONTROLLER_MAX_SPRINGS + 7) / 8];
     uint32_t heat_sum_uw[CONTROLLER_MAX_SPRINGS]; /* over the ticks of the ceiling's running step */
     uint16_t duty_sum[CONTROLLER_MAX_SPRINGS];    /* the same */
     scrub_t scrub;                                /* of what settings decide */

@@ -25,8 +25,8 @@ extern "C" {
 typedef struct {
     uint32_t duty_square;
     uint32_t duty_voltage;
-    uint32_t voltage_mv; /* behind the switch */
-    uint32_t current_ma;
+    uint32_t voltage_mv;  /* behind the switch */
+    uint16_t current_2ma; /* in 2 mA: CIRCUIT_CHECK_TICKS of them fit */
     uint16_t duty;
     uint16_t last_duty;
     int16_t last_ma, last_mv;

@@ -17,9 +17,9 @@ static uint16_t to_q12(float value)
 }
 
 /* At about the same current: offsets of the readings make another resistance at another one. */
-static bool is_like(uint16_t now_ma, uint16_t was_ma)
+static bool is_like(uint8_t now, uint8_t was)
 {
-    return 3ul * now_ma >= 2ul * was_ma && 2ul * now_ma <= 3ul * was_ma;
+    return 3u * now >= 2u * was && 2u * now <= 3u * was;
 }
 
 static bool is_off(uint16_t now, uint16_t was, float most_part)
@@ -39,14 +39,14 @@ bool circuit_step_judge(circuit_step_t *step, const circuit_window_t *window,
     }
     const circuit_shown_t now = {to_q12(window->found_mv / window->expected_mv),
                                  to_q12(spring_mv / window->current_ma),
-                                 (uint16_t)window->current_ma};
+                                 (uint8_t)fminf(window->current_ma / 16.0f, 255.0f)};
     const float share_part = SHARE_PART + NOISE_MV / window->expected_mv;
     const float change_part = CHANGE_PART + NOISE_MV / spring_mv;
     bool odd = false, like = true;
     for (uint8_t n = 0; n < CIRCUIT_STEP_BACK; n++) {
         const circuit_shown_t *const was = &step->was[n];
         if (was->share_q12 != 0) {
-            like = like && is_like(now.current_ma, was->current_ma);
+            like = like && is_like(now.current_16ma, was->current_16ma);
             odd = odd || (is_off(now.share_q12, was->share_q12, share_part) &&
                           is_off(now.ohm_q12, was->ohm_q12, change_part));
         }

@@ -22,7 +22,7 @@ extern "C" {
 typedef struct {
     uint16_t share_q12; /* voltage found behind the switch, of the expected; 0: it told nothing */
     uint16_t ohm_q12;
-    uint16_t current_ma;
+    uint8_t current_16ma;
 } circuit_shown_t;
 
 /* Of one spring; all zero: nothing is known. */
