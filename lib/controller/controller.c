@@ -300,7 +300,7 @@ static void judge_circuit(controller_t *controller, uint8_t k)
         circuit_peers_judge(&controller->peers, controller->springs, k, &window, parameters);
     const bool steps = circuit_step_judge(&controller->step[k], &window, parameters);
     if (steps) {
-        circuit_peers_suspect(&controller->peers, k);
+        circuit_peers_suspect(&controller->peers, k, circuit_step_before_q12(&controller->step[k]));
     }
     if (is_none || is_odd || steps ||
         spring_estimator_is_unlike(spring_estimator_of(&controller->estimator, k))) {
@@ -589,11 +589,17 @@ static uint8_t bit_of(uint8_t spring)
     return (uint8_t)(1u << (spring & 7u));
 }
 
+/* What a clear may not end at once a second time: as long as its cause stays, each time heats. */
+static bool heats_when_cleared(safety_fault_t fault)
+{
+    return fault == SAFETY_FAULT_SENSOR_MISMATCH || fault == SAFETY_FAULT_STUCK_ON;
+}
+
 uint16_t controller_clear_wait_s(const controller_t *controller, uint8_t spring)
 {
     const thermal_model_parameters_t *const p = &controller->model.parameters;
     if ((controller->mistrusted[spring / 8u] & bit_of(spring)) == 0 ||
-        safety_fault(&controller->safety, spring) != SAFETY_FAULT_SENSOR_MISMATCH) {
+        !heats_when_cleared(safety_fault(&controller->safety, spring))) {
         return 0;
     }
     /* at most TIME_CONSTANT_MOST_S: check_time_constants */
@@ -606,28 +612,30 @@ uint16_t controller_clear_wait_s(const controller_t *controller, uint8_t spring)
     return rest_s < whole_s ? (uint16_t)(whole_s - rest_s) : 0;
 }
 
+/* Of a spring without a fault nothing is forgotten: who clears each second would else see that its
+ * circuit is never judged. */
 void controller_clear_faults(controller_t *controller)
 {
-    bool stays[CONTROLLER_MAX_SPRINGS];
+    safety_fault_t stays[CONTROLLER_MAX_SPRINGS];
     controller_stop(controller);
     for (uint8_t k = 0; k < controller->springs; k++) {
-        const bool odd = safety_fault(&controller->safety, k) == SAFETY_FAULT_SENSOR_MISMATCH;
-        stays[k] = controller_clear_wait_s(controller, k) != 0;
-        if (odd) {
+        const safety_fault_t fault = safety_fault(&controller->safety, k);
+        stays[k] = controller_clear_wait_s(controller, k) != 0 ? fault : SAFETY_FAULT_NONE;
+        if (heats_when_cleared(fault)) {
             controller->mistrusted[k / 8u] |= bit_of(k);
         }
-        if (!stays[k]) {
-            circuit_peers_clear(&controller->peers, k, odd);
+        if (fault != SAFETY_FAULT_NONE && stays[k] == SAFETY_FAULT_NONE) {
+            circuit_peers_clear(&controller->peers, k, fault == SAFETY_FAULT_SENSOR_MISMATCH);
+            controller->circuit[k] = (circuit_check_t){0};
+            controller->step[k] = (circuit_step_t){0};
         }
     }
     safety_clear(&controller->safety);
     for (uint8_t k = 0; k < controller->springs; k++) {
-        if (stays[k]) {
-            safety_trip(&controller->safety, k, SAFETY_FAULT_SENSOR_MISMATCH);
+        if (stays[k] != SAFETY_FAULT_NONE) {
+            safety_trip(&controller->safety, k, stays[k]);
         }
     }
-    memset(controller->circuit, 0, sizeof controller->circuit);
-    memset(controller->step, 0, sizeof controller->step);
     drive_policy_clear(&controller->policy);
 }
 

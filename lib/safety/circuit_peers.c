@@ -79,7 +79,8 @@ bool circuit_peers_judge(circuit_peers_t *peers, uint8_t springs, uint8_t k,
         }
     } else if (own->was_q7 != 0) {
         const float was = (float)own->was_q7 / SHARE_Q7;
-        odd = fabsf(share - was) * expected_mv > ALONE_PART * was * expected_mv + offsets_mv;
+        const float part = own->odd >= CIRCUIT_PEERS_WINDOWS - 1u ? KNOWN_PART : ALONE_PART;
+        odd = fabsf(share - was) * expected_mv > part * was * expected_mv + offsets_mv;
     }
     if (!odd) {
         own->was_q7 = own->share_q7;
@@ -91,9 +92,13 @@ bool circuit_peers_judge(circuit_peers_t *peers, uint8_t springs, uint8_t k,
     return own->odd >= CIRCUIT_PEERS_WINDOWS;
 }
 
-void circuit_peers_suspect(circuit_peers_t *peers, uint8_t spring)
+void circuit_peers_suspect(circuit_peers_t *peers, uint8_t spring, uint16_t before_q12)
 {
-    peers->spring[spring].odd = CIRCUIT_PEERS_WINDOWS;
+    circuit_peer_t *own = &peers->spring[spring];
+    if (own->odd < CIRCUIT_PEERS_WINDOWS) {
+        own->odd = CIRCUIT_PEERS_WINDOWS;
+        own->was_q7 = to_q7((float)before_q12 / 4096.0f);
+    }
 }
 
 void circuit_peers_clear(circuit_peers_t *peers, uint8_t spring, bool doubted)

@@ -43,6 +43,13 @@ typedef struct {
 bool circuit_step_judge(circuit_step_t *step, const circuit_window_t *window,
                         const current_control_parameters_t *circuit);
 
+/* The share that the oldest of the windows before showed; 0: none is known. */
+static inline uint16_t circuit_step_before_q12(const circuit_step_t *step)
+{
+    const circuit_shown_t *const oldest = &step->was[CIRCUIT_STEP_BACK - 1u];
+    return oldest->share_q12 != 0 ? oldest->share_q12 : step->was[0].share_q12;
+}
+
 #ifdef __cplusplus
 }
 #endif

@@ -288,19 +288,23 @@ static void what_is_learnt_is_the_mean_of_its_windows(void)
     TEST_ASSERT_EQUAL_HEX(0, rounds(3, SPRINGS, HEATS_MV, 0.935f, 1.0f));
 }
 
-/* Found by another rule: as if by this one; a good window after the clear acquits it. */
+/* Found by another rule: as if by this one; a good window after the clear acquits it. Alone, too:
+ * its supply is what it was. */
 static void who_is_suspected_is_found_in_one_window_after_a_clear(void)
 {
-    for (unsigned honest = 0; honest < 2; honest++) {
+    for (unsigned n = 0; n < 4; n++) {
+        const bool honest = n % 2u != 0;
+        const uint8_t driven = n < 2 ? SPRINGS : 1;
         setUp();
-        TEST_ASSERT_EQUAL_HEX(0, rounds(5, SPRINGS, HEATS_MV, 1.0f, 1.0f));
-        circuit_peers_suspect(&peers, 0);
-        for (unsigned n = 0; n < 10; n++) {
-            TEST_ASSERT_EQUAL_HEX(1, rounds(1, SPRINGS, HEATS_MV, 0.9f, 1.0f));
+        TEST_ASSERT_EQUAL_HEX(0, rounds(5, driven, HEATS_MV, 1.0f, 1.0f));
+        TEST_ASSERT_EQUAL_HEX(0, rounds(2, driven, HEATS_MV, 0.9f, 1.0f));
+        for (unsigned times = 0; times < 10; times++) {
+            circuit_peers_suspect(&peers, 0, times == 0 ? 4096 : 2048); /* once is enough */
+            TEST_ASSERT_EQUAL_HEX(1, rounds(1, driven, HEATS_MV, 0.9f, 1.0f));
         }
         circuit_peers_clear(&peers, 0, true);
-        TEST_ASSERT_EQUAL_HEX(0, honest != 0 ? rounds(1, SPRINGS, HEATS_MV, 1.0f, 1.0f) : 0);
-        TEST_ASSERT_EQUAL_HEX(honest == 0, rounds(1, SPRINGS, HEATS_MV, 0.9f, 1.0f));
+        TEST_ASSERT_EQUAL_HEX(0, honest ? rounds(1, driven, HEATS_MV, 1.0f, 1.0f) : 0);
+        TEST_ASSERT_EQUAL_HEX(!honest, rounds(1, driven, HEATS_MV, 0.9f, 1.0f));
     }
 }
 

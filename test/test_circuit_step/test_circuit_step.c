@@ -162,6 +162,17 @@ static void windows_must_follow_on_each_other(void)
     }
 }
 
+static void what_it_showed_before_is_known(void)
+{
+    TEST_ASSERT_EQUAL_UINT(0, circuit_step_before_q12(&step));
+    TEST_ASSERT_FALSE(takes(honest));
+    TEST_ASSERT_EQUAL_UINT(4096, circuit_step_before_q12(&step));
+    TEST_ASSERT_FALSE(takes(with(0.9f, CURRENT_GAIN, 0.93f)));
+    TEST_ASSERT_FALSE(takes(with(0.9f, CURRENT_GAIN, 0.8f)));
+    TEST_ASSERT_TRUE(takes(with(0.9f, CURRENT_GAIN, 0.8f)));
+    TEST_ASSERT_EQUAL_UINT(4096, circuit_step_before_q12(&step));
+}
+
 /* As it lies now it was never seen at this current: what was before another one is long ago. */
 static void another_current_ends_what_was_known(void)
 {
@@ -202,6 +213,9 @@ static void windows_that_tell_are_kept_within_16_bits(void)
         TEST_ASSERT_FALSE(circuit_step_judge(&step, &kept[n].window, &circuit));
         TEST_ASSERT_EQUAL_UINT(kept[n].share_q12, step.was[0].share_q12);
         TEST_ASSERT_UINT_WITHIN(1, kept[n].ohm_q12, step.was[0].ohm_q12);
+        TEST_ASSERT_EQUAL_UINT(kept[n].share_q12 != 0 ? (unsigned)kept[n].window.current_ma / 16u
+                                                      : 0u,
+                               step.was[0].current_16ma);
     }
 }
 
@@ -212,6 +226,7 @@ int main(void)
     RUN_TEST(what_is_no_lie_passes);
     RUN_TEST(a_small_voltage_tells_less);
     RUN_TEST(windows_must_follow_on_each_other);
+    RUN_TEST(what_it_showed_before_is_known);
     RUN_TEST(another_current_ends_what_was_known);
     RUN_TEST(found_stays_found_until_it_begins_anew);
     RUN_TEST(windows_that_tell_are_kept_within_16_bits);
