@@ -4,6 +4,7 @@
 #include <stddef.h>
 #include <string.h>
 
+#include "ambient.h"
 #include "board.h"
 #include "console.h"
 #include "controller.h"
@@ -42,6 +43,7 @@ static learnt_store_t learnt;
 static telemetry_t telemetry;
 static console_t console;
 static console_status_t status;
+static ambient_t ambient;
 static controller_inputs_t inputs;
 static controller_outputs_t outputs;
 
@@ -104,14 +106,14 @@ static const char *reset_text(uint8_t cause)
 
 static int16_t ambient_c7(void)
 {
-    if (settings.board.ambient_source == SETTINGS_AMBIENT_NTC) {
-        int16_t measured_c7;
-        if (ntc_temperature_c7(board_ambient_adc(), &measured_c7)) {
-            return measured_c7;
-        }
-        // wire off or short: the setting is the better guess
+    const int16_t set_c7 = fixed_point_c7_from_cc(settings.board.ambient_cc);
+    if (settings.board.ambient_source != SETTINGS_AMBIENT_NTC) {
+        ambient = ambient_t();
+        return set_c7;
     }
-    return fixed_point_c7_from_cc(settings.board.ambient_cc);
+    int16_t measured_c7 = 0;
+    const bool reads = ntc_temperature_c7(board_ambient_adc(), &measured_c7);
+    return ambient_take(&ambient, reads, measured_c7, set_c7);
 }
 
 static uint16_t crc_of_kept(void)
@@ -188,6 +190,7 @@ OWN_FRAME static void run_tick(uint8_t behind)
     current_sensor_hil_ambient(&inputs.ambient_c7);
 #endif
     status.ambient_c7 = inputs.ambient_c7;
+    status.ambient_is_held = ambient_is_held(&ambient);
     inputs.fan_percent = outputs.fan_percent;
 
     controller_tick(&controller, &inputs, &outputs);

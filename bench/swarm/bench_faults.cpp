@@ -96,6 +96,48 @@ events upload()
     return all;
 }
 
+/* It begins and ends again. */
+events pulses(double period_s, double lasts_s, event one)
+{
+    events all;
+    for (double at_s = 0.0; at_s < 40.0; at_s += period_s) {
+        one.at_s = at_s;
+        one.on = true;
+        all.push_back(one);
+        one.at_s += lasts_s;
+        one.on = false;
+        all.push_back(one);
+    }
+    return all;
+}
+
+/* The fault stays, and who uses the board says this again and again. */
+events insists(event fault, double period_s, std::initializer_list<const char *> lines)
+{
+    events all{fault};
+    for (double at_s = 1.0; at_s < QUIET_S - 1.0; at_s += period_s) {
+        double then_s = at_s;
+        for (const char *const line : lines) {
+            all.push_back(say(then_s, line));
+            then_s += 0.05;
+        }
+    }
+    return all;
+}
+
+events cuts_in_save(kind what)
+{
+    events all;
+    double at_s = 0.0;
+    for (const double run_s : {0.002, 0.02, 0.1, 0.4, 1.0, 2.0}) {
+        all.push_back(say(at_s, "$loss_w_per_k=0.0060"));
+        all.push_back(say(at_s + 0.1, "$save"));
+        all.push_back(at(at_s + 0.12 + run_s, what));
+        at_s += 3.0;
+    }
+    return all;
+}
+
 /* Its start takes 0.3 s: a cut in each phase of it. */
 events cuts_in_the_start(kind what)
 {
@@ -215,6 +257,24 @@ std::vector<injected> catalogue()
         {"thermistor shorted", {at(0, k::thermistor, 0, 0.0)}},
         {"thermistor says -5 degC", {at(0, k::thermistor, 0, 4.0)}},
         {"thermistor says 60 degC", {at(0, k::thermistor, 0, 1.0)}},
+        /* what comes and goes, and who does not let be */
+        {"switch closes for 20 ms, each 0.1 s", pulses(0.1, 0.02, at(0, k::closed))},
+        {"switch closes for 40 ms, each 0.3 s", pulses(0.3, 0.04, at(0, k::closed))},
+        {"switch closes for 40 ms, spring off", pulses(0.3, 0.04, at(0, k::closed, off))},
+        {"absent for 60 ms, each 0.3 s", pulses(0.3, 0.06, at(0, k::absent))},
+        {"stale for 0.2 s, each 0.5 s", pulses(0.5, 0.2, at(0, k::stale))},
+        {"frozen for 0.5 s, each 0.7 s", pulses(0.7, 0.5, at(0, k::frozen))},
+        {"open for 50 ms, each 0.3 s", pulses(0.3, 0.05, at(0, k::open))},
+        {"thermistor loose", every(0.4, 19.0, at(0, k::thermistor, 0, 5.0))},
+        {"shows 0.52, cleared each second",
+         insists(at(0, k::scaled, 0, 0.52), 1.0, {"clear", "on 1"})},
+        {"shows 0.52, cleared each 2.2 s",
+         insists(at(0, k::scaled, 0, 0.52), 2.2, {"clear", "on 1"})},
+        {"welded, the supply insisted on",
+         insists(at(0, k::closed), 0.5, {"clear", "supply on", "on 1"})},
+        {"broken, cleared each second", insists(at(0, k::open), 1.0, {"clear", "on 1"})},
+        {"brown-outs in $save", cuts_in_save(k::brown_out)},
+        {"power cuts in $save", cuts_in_save(k::power)},
         {"console flooded", flood()},
         {"half lines", half_lines()},
         {"settings uploaded", upload()},
@@ -283,6 +343,11 @@ private:
             e.at_s += from_s_;
             s.events.push_back(e);
         }
+        for (double t = 0.1; t < QUIET_S - 1.0; t += 0.5) { /* what it says of itself */
+            event asks = at(from_s_ + t, kind::bytes);
+            asks.text = "3f";
+            s.events.push_back(asks);
+        }
         if (one.name.rfind("bus hangs 60", 0) == 0) {
             for (double t = 0.0; t < 40.0; t += 0.3) {
                 s.events.push_back(at(from_s_ + t, kind::sda));
@@ -349,6 +414,7 @@ private:
         for (const board_view_spring_t &spring : seen.spring) {
             said = said || spring.fault != 0;
         }
+        said = said || heard_.find("|ambient:held>") != std::string::npos;
         if (said && !r_.said_s) {
             r_.said_s = now_s() - from_s_;
         }

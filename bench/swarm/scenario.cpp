@@ -185,9 +185,27 @@ double amount(dice &d, kind what, unsigned channel)
     }
 }
 
+/* Or it comes and goes. */
+void pulse(dice &d, scenario &s, event one)
+{
+    const double period_s = logarithmic(d, 0.08, 3.0), lasts_s = period_s * d.uniform(0.05, 0.8);
+    for (unsigned n = 5 + d.below(40); n > 0; --n) {
+        one.on = true;
+        s.events.push_back(one);
+        one.on = false;
+        one.at_s += lasts_s;
+        s.events.push_back(one);
+        one.at_s += period_s - lasts_s;
+    }
+}
+
 /* What lasts ends again, sooner or later, in three of four cases. */
 void last(dice &d, scenario &s, const event &one)
 {
+    if (d.chance(0.15)) {
+        pulse(d, s, one);
+        return;
+    }
     s.events.push_back(one);
     if (d.chance(0.75)) {
         event end = one;

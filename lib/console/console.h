@@ -34,10 +34,11 @@ typedef struct {
     uint8_t load_percent;     /* time not asleep, over the last second */
     uint16_t stack_unused_bytes;
     int16_t ambient_c7;
-    const char *reset_cause;        /* words in flash, "power-on" ... */
-    const char *version;            /* in flash */
-    const char *sensors;            /* which driver, in flash */
-    settings_loaded_t loaded;       /* what the boot found in the EEPROM */
+    bool ambient_is_held;     /* the thermistor says what no room does: ambient_c7 is of before */
+    const char *reset_cause;  /* words in flash, "power-on" ... */
+    const char *version;      /* in flash */
+    const char *sensors;      /* which driver, in flash */
+    settings_loaded_t loaded; /* what the boot found in the EEPROM */
     bool settings_conflict_at_boot; /* the stored settings do not fit together: defaults are active
                                      */
     uint8_t sensor_status[CONTROLLER_MAX_SPRINGS]; /* controller_sensor_status_t of the last tick */

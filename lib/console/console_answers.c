@@ -281,7 +281,8 @@ static void add_fault(text_line_t *line, safety_fault_t fault)
     }
 }
 
-/* Steps: the lock and the supply, the board, each spring; lines only where there is something. */
+/* Steps: the lock and the supply, the board, each spring, the thermistor; lines only where there is
+ * something. */
 bool console_faults_line(const console_t *console, console_out_t *out)
 {
     const controller_t *const controller = console->controller;
@@ -300,6 +301,12 @@ bool console_faults_line(const console_t *console, console_out_t *out)
         }
     } else {
         const uint8_t k = (uint8_t)(console->step - 2u);
+        if (k == controller_springs(controller) && console->status->ambient_is_held) {
+            const int32_t ambient_cc = text_centi_from_c7(console->status->ambient_c7);
+            text_add_values(line, FLASH_TEXT("thermistor: no room is as it says, #2 degC holds"),
+                            &ambient_cc);
+            return true;
+        }
         if (k >= controller_springs(controller)) {
             return false;
         }
@@ -307,6 +314,10 @@ bool console_faults_line(const console_t *console, console_out_t *out)
         if (fault != SAFETY_FAULT_NONE) {
             add_spring(line, k);
             add_fault(line, fault);
+            const int32_t wait_s = controller_clear_wait_s(controller, k);
+            if (wait_s != 0) {
+                text_add_values(line, FLASH_TEXT(": clear again in #0 s"), &wait_s);
+            }
         }
     }
     return true;
@@ -394,8 +405,12 @@ void console_print_status(const console_t *console)
     text_add_values(line,
                     FLASH_TEXT("|sum_a:#3|hottest_c:#2@#0|fan:#0|fault:#0|late:#0|load:#0|supply:"),
                     values);
-    text_add_flash(line, !controller_supply_is_fitted(controller) ? FLASH_TEXT("none>")
-                         : !controller_supply_is_held(controller) ? FLASH_TEXT("off>")
-                                                                  : FLASH_TEXT("on>"));
+    text_add_flash(line, !controller_supply_is_fitted(controller) ? FLASH_TEXT("none")
+                         : !controller_supply_is_held(controller) ? FLASH_TEXT("off")
+                                                                  : FLASH_TEXT("on"));
+    if (console->status->ambient_is_held) {
+        text_add_flash(line, FLASH_TEXT("|ambient:held"));
+    }
+    text_add_char(line, '>');
     console_out_end(console, &out);
 }

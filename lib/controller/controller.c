@@ -206,6 +206,7 @@ bool controller_apply_settings(controller_t *controller, const controller_settin
         if (memcmp(&controller->current.parameters, &settings->current, sizeof settings->current) !=
             0) {
             controller->peers = (circuit_peers_t){0}; /* it is another circuit */
+            memset(controller->mistrusted, 0, sizeof controller->mistrusted);
         }
         (void)current_control_apply(&controller->current, &settings->current, NULL);
         temperature_ceiling_prepare(&controller->drive, &controller->model, &settings->current);
@@ -297,7 +298,11 @@ static void judge_circuit(controller_t *controller, uint8_t k)
     const bool is_none = circuit_check_judge(&controller->circuit[k], parameters, &window);
     const bool is_odd =
         circuit_peers_judge(&controller->peers, controller->springs, k, &window, parameters);
-    if (is_none || is_odd ||
+    const bool steps = circuit_step_judge(&controller->step[k], &window, parameters);
+    if (steps) {
+        circuit_peers_suspect(&controller->peers, k, circuit_step_before_q12(&controller->step[k]));
+    }
+    if (is_none || is_odd || steps ||
         spring_estimator_is_unlike(spring_estimator_of(&controller->estimator, k))) {
         safety_trip(&controller->safety, k, SAFETY_FAULT_SENSOR_MISMATCH);
     }
@@ -579,15 +584,58 @@ void controller_host_heard(controller_t *controller)
     controller->silent_ticks = 0;
 }
 
+static uint8_t bit_of(uint8_t spring)
+{
+    return (uint8_t)(1u << (spring & 7u));
+}
+
+/* What a clear may not end at once a second time: as long as its cause stays, each time heats. */
+static bool heats_when_cleared(safety_fault_t fault)
+{
+    return fault == SAFETY_FAULT_SENSOR_MISMATCH || fault == SAFETY_FAULT_STUCK_ON;
+}
+
+uint16_t controller_clear_wait_s(const controller_t *controller, uint8_t spring)
+{
+    const thermal_model_parameters_t *const p = &controller->model.parameters;
+    if ((controller->mistrusted[spring / 8u] & bit_of(spring)) == 0 ||
+        !heats_when_cleared(safety_fault(&controller->safety, spring))) {
+        return 0;
+    }
+    /* at most TIME_CONSTANT_MOST_S: check_time_constants */
+    const uint32_t capacity_uj_per_k =
+        (uint32_t)p->heat_capacity_mj_per_k * p->heat_capacity_scale_permille[spring];
+    const uint32_t loss_uw_per_k =
+        (uint32_t)p->loss_uw_per_k * p->loss_scale_permille[spring] / 1000u;
+    const uint16_t whole_s = (uint16_t)(capacity_uj_per_k / loss_uw_per_k);
+    const uint16_t rest_s = controller_rest_s(controller, spring);
+    return rest_s < whole_s ? (uint16_t)(whole_s - rest_s) : 0;
+}
+
+/* Of a spring without a fault nothing is forgotten: who clears each second would else see that its
+ * circuit is never judged. */
 void controller_clear_faults(controller_t *controller)
 {
+    safety_fault_t stays[CONTROLLER_MAX_SPRINGS];
     controller_stop(controller);
     for (uint8_t k = 0; k < controller->springs; k++) {
-        circuit_peers_clear(&controller->peers, k,
-                            safety_fault(&controller->safety, k) == SAFETY_FAULT_SENSOR_MISMATCH);
+        const safety_fault_t fault = safety_fault(&controller->safety, k);
+        stays[k] = controller_clear_wait_s(controller, k) != 0 ? fault : SAFETY_FAULT_NONE;
+        if (heats_when_cleared(fault)) {
+            controller->mistrusted[k / 8u] |= bit_of(k);
+        }
+        if (fault != SAFETY_FAULT_NONE && stays[k] == SAFETY_FAULT_NONE) {
+            circuit_peers_clear(&controller->peers, k, fault == SAFETY_FAULT_SENSOR_MISMATCH);
+            controller->circuit[k] = (circuit_check_t){0};
+            controller->step[k] = (circuit_step_t){0};
+        }
     }
     safety_clear(&controller->safety);
-    memset(controller->circuit, 0, sizeof controller->circuit);
+    for (uint8_t k = 0; k < controller->springs; k++) {
+        if (stays[k] != SAFETY_FAULT_NONE) {
+            safety_trip(&controller->safety, k, stays[k]);
+        }
+    }
     drive_policy_clear(&controller->policy);
 }
 

@@ -9,6 +9,7 @@
 
 #include "circuit_check.h"
 #include "circuit_peers.h"
+#include "circuit_step.h"
 #include "current_control.h"
 #include "drive_policy.h"
 #include "safety.h"
@@ -85,6 +86,9 @@ typedef struct {
     uint32_t power_sum_uw[CONTROLLER_MAX_SPRINGS]; /* over the ticks of the running model step */
     circuit_check_t circuit[CONTROLLER_MAX_SPRINGS];
     circuit_peers_t peers;
+    circuit_step_t step[CONTROLLER_MAX_SPRINGS];
+    /* a bit a spring: it had SAFETY_FAULT_SENSOR_MISMATCH or _STUCK_ON, cleared since */
+    uint8_t mistrusted[(CONTROLLER_MAX_SPRINGS + 7) / 8];
     uint32_t heat_sum_uw[CONTROLLER_MAX_SPRINGS]; /* over the ticks of the ceiling's running step */
     uint16_t duty_sum[CONTROLLER_MAX_SPRINGS];    /* the same */
     scrub_t scrub;                                /* of what settings decide */
@@ -170,8 +174,13 @@ bool controller_supply_is_off(const controller_t *controller);
 /* Whoever asked for the springs is still there. host_timeout_s (0: never) after the last call, in
  * the tick in which a spring is wanted, all levels are set to 0 with SAFETY_FAULT_HOST_SILENT. */
 void controller_host_heard(controller_t *controller);
-/* Faults are forgotten and all levels set to 0: nothing starts by clearing. */
+/* Faults are forgotten and all levels set to 0: nothing starts by clearing. But for
+ * SAFETY_FAULT_SENSOR_MISMATCH and _STUCK_ON of a spring that had one of them before: each time it
+ * took up to 2.4 s of any heat until the sensor was found again, or 0.1 s of all that the supply
+ * gives, so it stays until the spring has been given none for its time constant, as declared. */
 void controller_clear_faults(controller_t *controller);
+/* How long a clear will leave such a fault, s; 0: it takes it, or there is none. */
+uint16_t controller_clear_wait_s(const controller_t *controller, uint8_t spring);
 void controller_lock(controller_t *controller);
 /* Levels are set to 0: nothing starts by unlocking. */
 void controller_unlock(controller_t *controller);

@@ -49,7 +49,9 @@ uint16_t controller_belief_mark(const controller_t *controller, uint8_t spring)
 
 uint8_t controller_broken_seals(const controller_t *controller)
 {
-    return spring_estimator_broken_seals(&controller->estimator);
+    const uint8_t beliefs = spring_estimator_broken_seals(&controller->estimator);
+    const uint8_t ceilings = temperature_ceiling_broken_seals(&controller->ceiling);
+    return beliefs < UINT8_MAX - ceilings ? (uint8_t)(beliefs + ceilings) : UINT8_MAX;
 }
 
 const spring_sights_t *controller_sights(const controller_t *controller)

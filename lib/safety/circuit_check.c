@@ -47,6 +47,7 @@ void circuit_check_take(circuit_check_t *c, uint16_t fixed_mohm, uint16_t duty, 
     c->readings = (c->readings + 1u) & 63u;
     c->duty = (uint16_t)(c->duty + duty);
     c->voltage_mv += behind_mv;
+    c->current_2ma = (uint16_t)(c->current_2ma + (amount(current_ma) >> 1));
     c->duty_square += (uint32_t)duty * duty;
     c->duty_voltage += (uint32_t)duty * behind_mv;
 }
@@ -96,7 +97,8 @@ bool circuit_check_judge(circuit_check_t *c, const current_control_parameters_t 
                  (variance >= LEAST_VARIANCE && stands(c, should_mv * step_mv, found_mv));
         unbalanced = fabsf(found_mv - expected_mv) > BALANCE_SHARE * expected_mv + BALANCE_MV;
         if (window != NULL) {
-            *window = (circuit_window_t){found_mv, expected_mv, true};
+            *window = (circuit_window_t){found_mv, expected_mv,
+                                         2.0f * share * (float)c->current_2ma, true};
         }
     }
     c->astray = counted(c->astray, astray) & 15u;

@@ -25,7 +25,8 @@ extern "C" {
 typedef struct {
     uint32_t duty_square;
     uint32_t duty_voltage;
-    uint32_t voltage_mv;
+    uint32_t voltage_mv;  /* behind the switch */
+    uint16_t current_2ma; /* in 2 mA: CIRCUIT_CHECK_TICKS of them fit */
     uint16_t duty;
     uint16_t last_duty;
     int16_t last_ma, last_mv;
@@ -40,7 +41,8 @@ typedef struct {
 typedef struct {
     float found_mv;    /* behind the switch */
     float expected_mv; /* by duty and declared supply */
-    bool tells;        /* there were readings enough */
+    float current_ma;
+    bool tells; /* there were readings enough */
 } circuit_window_t;
 
 /* One tick: the duty (steps of 800) that was applied in it and, if valid, what was read at its end.

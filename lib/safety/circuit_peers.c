@@ -10,10 +10,10 @@
 #define OFFSETS_MV 25.0f
 #define DROP_PART  0.15f
 
-#define KNOWN_PART 0.08f           /* as others switch, one end of a cable moves by 5 % */
-#define OTHER_PART 0.18f           /* 0.04 ohm of wiring in 0.36, gains of 3 % */
-#define ALONE_PART 0.20f           /* the supply */
-#define LEARN_PART (1.0f / 256.0f) /* of a window: 2.5 minutes */
+#define KNOWN_PART 0.05f /* as others switch, so much does one end of a cable move */
+#define OTHER_PART 0.18f /* 0.04 ohm of wiring in 0.36, gains of 3 % */
+#define ALONE_PART 0.20f /* the supply */
+#define LEARN_MOST 255u  /* windows: 2.5 minutes. What is soldered stays what it is */
 
 /* The middle one of the others that are driven; 0: too few. */
 static uint8_t middle_q7(const circuit_peers_t *peers, uint8_t springs, uint8_t k)
@@ -44,8 +44,10 @@ static void learn(circuit_peer_t *own, float beside)
 {
     const float was = (float)own->own_q12;
     const float now = beside * OWN_Q12;
-    const float next = (own->own_q12 == 0 ? now : was + (now - was) * LEARN_PART) + 0.5f;
+    const float known = (float)own->learnt;
+    const float next = (was * known + now) / (known + 1.0f) + 0.5f;
     own->own_q12 = next < OWN_MOST ? (uint16_t)next & 0x1FFFu : 0x1FFFu;
+    own->learnt++;
 }
 
 bool circuit_peers_judge(circuit_peers_t *peers, uint8_t springs, uint8_t k,
@@ -72,12 +74,13 @@ bool circuit_peers_judge(circuit_peers_t *peers, uint8_t springs, uint8_t k,
             odd = odd ||
                   fabsf(share - like) * expected_mv > KNOWN_PART * like * expected_mv + offsets_mv;
         }
-        if (!odd) {
+        if (!odd && own->learnt < LEARN_MOST) {
             learn(own, share / others);
         }
     } else if (own->was_q7 != 0) {
         const float was = (float)own->was_q7 / SHARE_Q7;
-        odd = fabsf(share - was) * expected_mv > ALONE_PART * was * expected_mv + offsets_mv;
+        const float part = own->odd >= CIRCUIT_PEERS_WINDOWS - 1u ? KNOWN_PART : ALONE_PART;
+        odd = fabsf(share - was) * expected_mv > part * was * expected_mv + offsets_mv;
     }
     if (!odd) {
         own->was_q7 = own->share_q7;
@@ -87,6 +90,15 @@ bool circuit_peers_judge(circuit_peers_t *peers, uint8_t springs, uint8_t k,
         own->odd = (own->odd + 1u) & 3u;
     }
     return own->odd >= CIRCUIT_PEERS_WINDOWS;
+}
+
+void circuit_peers_suspect(circuit_peers_t *peers, uint8_t spring, uint16_t before_q12)
+{
+    circuit_peer_t *own = &peers->spring[spring];
+    if (own->odd < CIRCUIT_PEERS_WINDOWS) {
+        own->odd = CIRCUIT_PEERS_WINDOWS;
+        own->was_q7 = to_q7((float)before_q12 / 4096.0f);
+    }
 }
 
 void circuit_peers_clear(circuit_peers_t *peers, uint8_t spring, bool doubted)

@@ -33,6 +33,7 @@ typedef struct {
     uint16_t agreed : 1;   /* a window that was not odd, since the last clear */
     uint8_t share_q7;      /* of the last window; 0: it told nothing */
     uint8_t was_q7;        /* of the last one that was not odd; 0: none was */
+    uint8_t learnt;        /* windows that its own share is the mean of; at its most it stays */
 } circuit_peer_t;
 
 /* All zero: nothing is known. */
@@ -42,15 +43,20 @@ typedef struct {
 
 /* Takes a spring's window. True if and only if for CIRCUIT_PEERS_WINDOWS on end the voltage that
  * was found is off from the expected one, times the middle share of the other springs that are
- * driven and times its own share of theirs, by more than 8 % and what offsets make. As long as its
+ * driven and times its own share of theirs, by more than 5 % and what offsets make. As long as its
  * own share is not known, by 18 % (its wiring, its gains); where fewer than CIRCUIT_PEERS_LEAST
- * others are driven, from what it showed before by 20 % (its supply may move). Its own share is
- * learnt in the windows that are not odd, over minutes. A window that tells nothing, or of less
- * than 0.1 V, is no witness for the others, and changes nothing else. springs at most
- * CIRCUIT_PEERS_MAX, spring below springs. */
+ * others are driven, from what it showed before by 20 % (its supply may move), but by 5 % once it
+ * was found and cleared. Its own share is the mean of the first 255 windows that are not odd, and
+ * stays: so a drift is found, however slow. A window that tells nothing, or of less than 0.1 V, is
+ * no witness for the others, and changes nothing else. springs at most CIRCUIT_PEERS_MAX, spring
+ * below springs. */
 bool circuit_peers_judge(circuit_peers_t *peers, uint8_t springs, uint8_t spring,
                          const circuit_window_t *window,
                          const current_control_parameters_t *circuit);
+
+/* Another rule has found that the spring's sensor began to lie: as if three windows had been odd.
+ * before_q12: the share that it showed until then, above 0. */
+void circuit_peers_suspect(circuit_peers_t *peers, uint8_t spring, uint16_t before_q12);
 
 /* A fault is cleared: the spring's row ends, but for its last window where it was full: the next
  * window is enough then, as a heating of a sensor that lies costs 12 K a second. What is known of

@@ -172,8 +172,14 @@ static void count_stuck(safety_t *safety, safety_spring_t *s, const safety_sampl
     const uint8_t limit =
         p->bad_samples < SAFETY_STUCK_TICKS ? p->bad_samples : (uint8_t)SAFETY_STUCK_TICKS;
     if (!flows_without_duty(p, sample) && !flows_beyond_duty(p, sample)) {
-        s->stuck = 0;
-    } else if (++s->stuck >= limit) {
+        if (s->stuck != 0 && ++s->unstuck > SAFETY_FORGET_TICKS) {
+            s->unstuck = 1;
+            s->stuck--;
+        }
+        return;
+    }
+    s->unstuck = 0;
+    if (++s->stuck >= limit) {
         s->stuck = limit;
         s->fault = SAFETY_FAULT_STUCK_ON;
         safety->board_fault = SAFETY_FAULT_STUCK_ON;
@@ -288,7 +294,8 @@ bool safety_doubts_supply(const safety_t *safety)
 {
     bool doubts = false;
     for (uint8_t k = 0; k < safety->springs; k++) {
-        doubts = doubts || (safety->spring[k].stuck != 0 && safety->spring[k].sensor == 0);
+        doubts = doubts || (safety->spring[k].stuck != 0 && safety->spring[k].unstuck == 0 &&
+                            safety->spring[k].sensor == 0);
     }
     return doubts;
 }
@@ -341,6 +348,9 @@ void safety_clear(safety_t *safety)
 void safety_trip(safety_t *safety, uint8_t spring, safety_fault_t fault)
 {
     latch(&safety->spring[spring], fault);
+    if (fault == SAFETY_FAULT_STUCK_ON) {
+        latch_board(safety, fault);
+    }
 }
 
 void safety_host_silent(safety_t *safety)

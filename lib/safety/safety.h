@@ -21,8 +21,12 @@ extern "C" {
 #endif
 #endif
 
-/* Readings in a row: by the fourth the supply has gone, and the current with it. */
-#define SAFETY_STUCK_TICKS 3u
+/* Readings: by the fourth the supply has gone, and the current with it. One is forgotten for each 2
+ * s without any: a switch that closes for a tick gives 2.4 K, and a spring at 100 degC loses 1.5
+ * K/s.
+ */
+#define SAFETY_STUCK_TICKS  3u
+#define SAFETY_FORGET_TICKS 100u
 
 /* Ticks on end in which no sensor answers. A welded switch gives 120 K/s, which then nothing shows:
  * 12 K, and 9 K more until the relay has opened. */
@@ -62,6 +66,7 @@ typedef struct {
     uint8_t suspects;    /* electrical conditions, bits: found in every tick that is counted */
     uint8_t electrical;  /* ticks */
     uint8_t stuck;       /* ticks with current that no duty gives */
+    uint8_t unstuck;     /* readings without it since, to SAFETY_FORGET_TICKS */
     uint8_t frozen;      /* ticks without duty that showed what was shown with it */
     uint8_t sensor;      /* ticks */
     uint8_t temperature; /* ticks */
@@ -122,7 +127,8 @@ void safety_tick_board(safety_t *safety, uint32_t sum_ma);
 
 /* True if and only if a spring's last reading was current that no duty gives: one that is off, or
  * above over_current_ma at more than most_mv. Whoever holds the supply lets go at the first such
- * reading; SAFETY_STUCK_TICKS in a row, or bad_samples if that is less, are SAFETY_FAULT_STUCK_ON.
+ * reading; SAFETY_STUCK_TICKS of them, one forgotten for each 2 s without, or bad_samples if that
+ * is less, are SAFETY_FAULT_STUCK_ON.
  */
 bool safety_doubts_supply(const safety_t *safety);
 
@@ -149,7 +155,7 @@ const char *safety_fault_name(safety_fault_t fault);
  * Not the lock, nor what a frozen sensor shows. */
 void safety_clear(safety_t *safety);
 /* Latches a fault of one spring that others have found, at once: SAFETY_FAULT_OVER_TEMPERATURE,
- * _LIMIT_TRIP or _SENSOR_MISMATCH. */
+ * _LIMIT_TRIP or _SENSOR_MISMATCH; or _STUCK_ON, that of the board with it. */
 void safety_trip(safety_t *safety, uint8_t spring, safety_fault_t fault);
 /* Latches SAFETY_FAULT_HOST_SILENT: whoever asked for the springs has not been heard for too long.
  */

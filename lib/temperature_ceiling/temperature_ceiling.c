@@ -31,6 +31,63 @@ static int16_t c7_of(int32_t temperature_c23)
     return (int16_t)(temperature_c23 >> 16);
 }
 
+static uint16_t add_bytes(uint16_t sum, const void *bytes, uint8_t length)
+{
+    const uint8_t *const octet = bytes;
+    for (uint8_t n = 0; n < length;
+         n = (uint8_t)(n + 2u)) { /* halves of what is 2 or 4 bytes long */
+        const uint16_t two = (uint16_t)(octet[n] | (uint16_t)octet[n + 1u] << 8u);
+        sum = (uint16_t)((uint16_t)(sum << 1u | sum >> 15u) + two);
+    }
+    return sum;
+}
+
+/* Any one bit shows, and bytes that are all 0 were never sealed. */
+static uint16_t checksum(const temperature_ceiling_t *c, uint8_t k)
+{
+    uint16_t sum = 0x5EA1u;
+    sum = add_bytes(sum, &c->temperature_c23[k], sizeof c->temperature_c23[k]);
+    sum = add_bytes(sum, &c->austenite[k], sizeof c->austenite[k]);
+    sum = add_bytes(sum, &c->spared_w[k], sizeof c->spared_w[k]);
+    sum = add_bytes(sum, &c->spared_per_s[k], sizeof c->spared_per_s[k]);
+    return add_bytes(sum, &c->rest_turns[k], sizeof c->rest_turns[k]);
+}
+
+static void seal(temperature_ceiling_t *c, uint8_t k)
+{
+    c->seal[k] = checksum(c, k);
+}
+
+static void set_ambient(temperature_ceiling_t *c, int16_t ambient_c7)
+{
+    c->ambient_c7 = ambient_c7;
+    c->not_ambient_c7 = (int16_t)~ambient_c7;
+}
+
+static void count_broken(temperature_ceiling_t *c)
+{
+    if (c->broken_seals < UINT8_MAX) {
+        c->broken_seals++;
+    }
+}
+
+/* To be called before what is kept of a spring is used for what is kept next. */
+static void open_spring(temperature_ceiling_t *c, const thermal_model_t *model, uint8_t k)
+{
+    if (c->not_ambient_c7 != (int16_t)~c->ambient_c7) {
+        set_ambient(c, thermal_model_ambient_c7(model));
+        count_broken(c);
+    }
+    if (c->seal[k] != checksum(c, k)) {
+        c->temperature_c23[k] = (int32_t)TEMPERATURE_CEILING_BROKEN_C * 8388608;
+        c->austenite[k] = 1.0f;
+        c->spared_w[k] = c->spared_per_s[k] = 0.0f;
+        c->rest_turns[k] = 0;
+        c->delivered = true;
+        count_broken(c);
+    }
+}
+
 void temperature_ceiling_begin(temperature_ceiling_t *ceiling, int16_t ambient_c7)
 {
     for (uint8_t k = 0; k < THERMAL_MODEL_MAX_SPRINGS; k++) {
@@ -38,9 +95,11 @@ void temperature_ceiling_begin(temperature_ceiling_t *ceiling, int16_t ambient_c
         ceiling->austenite[k] = 0.0f;
         ceiling->spared_w[k] = ceiling->spared_per_s[k] = 0.0f;
         ceiling->rest_turns[k] = TEMPERATURE_CEILING_NEVER;
+        seal(ceiling, k);
     }
-    ceiling->ambient_c7 = ambient_c7;
+    set_ambient(ceiling, ambient_c7);
     ceiling->delivered = false;
+    ceiling->broken_seals = 0;
 }
 
 static bool is_above_ambient(const temperature_ceiling_t *ceiling, uint8_t k)
@@ -57,6 +116,7 @@ bool temperature_ceiling_is_warm(const temperature_ceiling_t *ceiling, uint8_t k
 void temperature_ceiling_raise(temperature_ceiling_t *ceiling, const thermal_model_t *model)
 {
     for (uint8_t k = 0; k < model->springs; k++) {
+        open_spring(ceiling, model, k);
         const int32_t model_c23 = (int32_t)thermal_model_temperature_c7(model, k) * 65536;
         if (model_c23 > ceiling->temperature_c23[k]) {
             ceiling->temperature_c23[k] = model_c23;
@@ -67,6 +127,7 @@ void temperature_ceiling_raise(temperature_ceiling_t *ceiling, const thermal_mod
                 ceiling->delivered = true;
             }
         }
+        seal(ceiling, k);
     }
 }
 
@@ -91,11 +152,13 @@ static void account(temperature_ceiling_t *ceiling, const thermal_model_t *model
         if (!warm) {
             ceiling->delivered = false;
             for (uint8_t j = 0; j < model->springs; j++) {
+                open_spring(ceiling, model, j);
                 ceiling->spared_w[j] = 0.0f;
+                seal(ceiling, j);
             }
         }
         if (!warm || ambient_c7 > ceiling->ambient_c7) {
-            ceiling->ambient_c7 = ambient_c7;
+            set_ambient(ceiling, ambient_c7);
         }
     }
     if (power_w > GIVEN_W) {
@@ -131,6 +194,7 @@ static float latent_k(const thermal_model_t *model)
 void temperature_ceiling_keep_loss(temperature_ceiling_t *ceiling, const thermal_model_t *model,
                                    uint8_t k, int32_t before_uw, int32_t now_uw)
 {
+    open_spring(ceiling, model, k);
     const float before_w = 1e-6f * (float)before_uw - ceiling->spared_w[k];
     const float spared_w = 1e-6f * (float)now_uw - before_w;
     ceiling->spared_w[k] = 0.0f;
@@ -142,6 +206,7 @@ void temperature_ceiling_keep_loss(temperature_ceiling_t *ceiling, const thermal
         ceiling->spared_w[k] = spared_w;
         ceiling->spared_per_s[k] = before_w / heat_j;
     }
+    seal(ceiling, k);
 }
 
 /* What it gives off, W: of what was there before a change of the losses no more than then. */
@@ -192,6 +257,7 @@ void temperature_ceiling_step(temperature_ceiling_t *ceiling, const thermal_mode
                               uint8_t k, float power_w)
 {
     const thermal_model_parameters_t *p = &model->parameters;
+    open_spring(ceiling, model, k);
     account(ceiling, model, k, power_w);
     const float loss_w = given_off_w(ceiling, model, k);
     /* What the model's neighbours take beyond those of the ceiling, uW / 128: a spring's couplings
@@ -214,6 +280,7 @@ void temperature_ceiling_step(temperature_ceiling_t *ceiling, const thermal_mode
                          (capacity_j_per_k(model, k) +
                           1e-6f * TEMPERATURE_CEILING_TURN_S * (float)stiffness_uw_per_k);
     add_heat(ceiling, model, k, gain_k);
+    seal(ceiling, k);
 }
 
 bool temperature_ceiling_trips(const temperature_ceiling_t *ceiling, uint8_t k, int16_t trip_cc)

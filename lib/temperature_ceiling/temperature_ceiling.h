@@ -27,8 +27,11 @@ typedef struct {
     float spared_w[THERMAL_MODEL_MAX_SPRINGS];
     float spared_per_s[THERMAL_MODEL_MAX_SPRINGS];
     uint16_t rest_turns[THERMAL_MODEL_MAX_SPRINGS]; /* since it was given power */
-    int16_t ambient_c7; /* the highest that was told since the springs were cold */
-    bool delivered;     /* power was given since then */
+    uint16_t seal[THERMAL_MODEL_MAX_SPRINGS];       /* checksum of all that, of this spring */
+    int16_t ambient_c7;     /* the highest that was told since the springs were cold */
+    int16_t not_ambient_c7; /* its complement */
+    bool delivered;         /* power was given since then */
+    uint8_t broken_seals;   /* found so far, saturating */
 } temperature_ceiling_t;
 
 /* What duty and supply give at least, by the settings. */
@@ -59,6 +62,15 @@ void temperature_ceiling_keep_loss(temperature_ceiling_t *ceiling, const thermal
  * declared numbers, but of its state only air and plate, which nothing corrects. */
 void temperature_ceiling_step(temperature_ceiling_t *ceiling, const thermal_model_t *model,
                               uint8_t spring, float power_w);
+
+/* How often a spring's record was found to have changed by itself, as RAM may: in its next step it
+ * counts as hot as a spring can be when the power comes on, SPRING_ESTIMATOR_HOTTEST_C, with power
+ * just given. */
+#define TEMPERATURE_CEILING_BROKEN_C 120
+static inline uint8_t temperature_ceiling_broken_seals(const temperature_ceiling_t *ceiling)
+{
+    return ceiling->broken_seals;
+}
 
 /* degC. */
 float temperature_ceiling_c(const temperature_ceiling_t *ceiling, uint8_t spring);

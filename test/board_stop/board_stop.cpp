@@ -231,7 +231,7 @@ void a_driven_spring_has_its_current_again_whatever_bit_turns_over()
             continue; /* some, as each takes its time */
         }
         board_flip(mega.raw(), one.address, one.mask);
-        mega.run_ms(1300.0); /* two windows of the circuit's check */
+        mega.run_ms(4200.0); /* readings of it are forgotten, one each 2 s */
         for (unsigned k = 0; k < BOARD_CHANNELS; ++k) {
             TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(0.2, 0.75, board_current_a(mega.raw(), k),
                                               text_of(one).c_str());

@@ -29,5 +29,8 @@ void main(void)
         if (any_bool()) {
             circuit_peers_clear(&peers, spring, any_bool());
         }
+        if (any_bool()) {
+            circuit_peers_suspect(&peers, spring, (uint16_t)any_between(1, UINT16_MAX));
+        }
     }
 }

@@ -241,6 +241,22 @@ static void any_reading_is_taken_without_overflow(void)
     }
 }
 
+static void a_window_says_what_its_readings_were(void)
+{
+    for (uint8_t readings = 11; readings <= 29; readings = (uint8_t)(readings + 1u)) {
+        circuit_window_t window = {7.0f, 7.0f, 7.0f, readings < 12};
+        setUp();
+        for (unsigned tick = 0; tick < 30; tick++) { /* the first one jumps */
+            circuit_check_take(&check, 180, 120, tick <= readings, 1000, 200);
+        }
+        TEST_ASSERT_FALSE(circuit_check_judge(&check, &parameters, &window));
+        TEST_ASSERT_EQUAL(readings >= 12, window.tells);
+        TEST_ASSERT_FLOAT_WITHIN(0.01f, window.tells ? 375.0f : 0.0f, window.found_mv);
+        TEST_ASSERT_FLOAT_WITHIN(0.01f, window.tells ? 750.0f : 0.0f, window.expected_mv);
+        TEST_ASSERT_FLOAT_WITHIN(0.01f, window.tells ? 1000.0f : 0.0f, window.current_ma);
+    }
+}
+
 /* A window's readings: `share` of the sweep of so many steps shows, and the mean of all is as it
  * should be but for beyond_mv. What is read is exact. */
 static bool judged(uint16_t duty, uint16_t steps, double share, double beyond_mv, uint8_t readings)
@@ -386,6 +402,7 @@ int main(void)
     RUN_TEST(reading_of_another_output_is_found_within_two_seconds);
     RUN_TEST(one_bad_window_is_none);
     RUN_TEST(any_reading_is_taken_without_overflow);
+    RUN_TEST(a_window_says_what_its_readings_were);
     RUN_TEST(what_follows_too_little_or_too_much_is_found_after_its_windows);
     RUN_TEST(the_drop_counts_and_what_is_found_stays_found);
     RUN_TEST(voltage_that_should_move_by_more_than_half_a_step_is_frozen);

@@ -716,6 +716,32 @@ static void status_is_one_line(void)
     TEST_ASSERT_EQUAL_PTR(said + said_length - 1u, strchr(said, '\n'));
 }
 
+static void what_the_thermistor_cannot_mean_is_said(void)
+{
+    for (unsigned held = 0; held < 2; held++) {
+        status.ambient_is_held = held != 0;
+        expect_ok("faults");
+        TEST_ASSERT_EQUAL(held != 0,
+                          strstr(said, "thermistor: no room is as it says, 20.00 degC holds\r\n") !=
+                              NULL);
+        said_length = 0;
+        console_print_status(&console);
+        TEST_ASSERT_EQUAL(held != 0, strstr(said, "|ambient:held>\r\n") != NULL);
+    }
+}
+
+static void a_fault_that_a_clear_leaves_says_for_how_long(void)
+{
+    controller_set_temperature(&controller, 60 * 128); /* it was heated just now */
+    for (unsigned n = 0; n < 2; n++) {
+        safety_trip(&controller.safety, 3, SAFETY_FAULT_SENSOR_MISMATCH);
+        expect_ok("faults");
+        TEST_ASSERT_NOT_NULL(strstr(said, "spring 4: fault 15 sensor_mismatch"));
+        TEST_ASSERT_EQUAL(n != 0, strstr(said, "mismatch: clear again in 5") != NULL);
+        expect_ok("clear");
+    }
+}
+
 static void status_says_whether_the_stages_have_their_supply(void)
 {
     const char *const lines[] = {"supply on", "supply off", "$cut_off=0", "$cut_off=1"};
@@ -1191,6 +1217,8 @@ int main(void)
     RUN_TEST(empty_lines_are_not_answered);
     RUN_TEST(nothing_is_said_without_room);
     RUN_TEST(status_is_one_line);
+    RUN_TEST(what_the_thermistor_cannot_mean_is_said);
+    RUN_TEST(a_fault_that_a_clear_leaves_says_for_how_long);
     RUN_TEST(status_says_whether_the_stages_have_their_supply);
     RUN_TEST(model_says_with_which_bounds);
     RUN_TEST(model_says_what_the_surroundings_take);

@@ -282,13 +282,14 @@ static void current_in_an_output_that_is_off_stops_the_board(void)
     TEST_ASSERT_TRUE(all_off());
 }
 
-/* One or two readings of current, a glitch, take a pulse or two and switch nothing off. */
+/* One or two readings of current, a glitch each four seconds, take a pulse or two and switch
+ * nothing off. */
 static void a_glitch_of_current_takes_a_pulse_and_no_more(void)
 {
     controller_set_target(&controller, 0, 1000);
     run(100);
     for (unsigned length = 1; length < SAFETY_STUCK_TICKS; length++) {
-        for (int n = 0; n < 50; n++) {
+        for (int n = 0; n < 10; n++) {
             inputs.sensor[5].current_ma = 400;
             for (unsigned tick = 0; tick < length; tick++) {
                 controller_tick(&controller, &inputs, &outputs);
@@ -297,6 +298,7 @@ static void a_glitch_of_current_takes_a_pulse_and_no_more(void)
             inputs.sensor[5].current_ma = 0;
             run(1);
             TEST_ASSERT_TRUE(outputs.supply);
+            run(2u * SAFETY_FORGET_TICKS);
         }
     }
     TEST_ASSERT_NOT_EQUAL(0, outputs.duty[0]);
@@ -531,6 +533,83 @@ static void another_shunt_is_found_before_it_is_hot(void)
     run(300);
     TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, controller_fault(&controller, 4));
     TEST_ASSERT_GREATER_THAN_INT16(2000, controller_measured_ma(&controller, 4));
+}
+
+/* A sensor that shows half from 4 s on, and a user who clears and tries again each second: the
+ * first time at once, then when the spring has rested for its time constant (52 s). */
+static void who_clears_again_and_again_heats_no_spring_whose_sensor_lies(void)
+{
+    settings.policy.policy = DRIVE_POLICY_PRECOMPENSATE;
+    start();
+    controller_set_temperature(&controller, AMBIENT_C7);
+    controller_set_target(&controller, 4, 1000);
+    run(200);
+    uint32_t heated = 0, cleared = 0, last = 0, rested = UINT32_MAX;
+    for (uint32_t tick = 0; tick < 120u * 50u; tick++) {
+        controller_tick(&controller, &inputs, &outputs);
+        respond();
+        inputs.sensor[4].current_ma = (int16_t)(inputs.sensor[4].current_ma / 2);
+        if (outputs.duty[4] != 0) {
+            rested = heated > 0 && tick - last > 100 && tick - last < rested ? tick - last : rested;
+            heated++;
+            last = tick;
+        }
+        if (tick % 50u == 49u && controller_fault(&controller, 4) != SAFETY_FAULT_NONE) {
+            const uint16_t wait_s = controller_clear_wait_s(&controller, 4);
+            TEST_ASSERT_LESS_OR_EQUAL_UINT16(52, wait_s);
+            controller_clear_faults(&controller);
+            TEST_ASSERT_EQUAL(wait_s == 0 ? SAFETY_FAULT_NONE : SAFETY_FAULT_SENSOR_MISMATCH,
+                              controller_fault(&controller, 4));
+            cleared += wait_s == 0;
+            controller_set_target(&controller, 4, 1000);
+        }
+    }
+    TEST_ASSERT_EQUAL_UINT32(3, cleared);
+    TEST_ASSERT_LESS_THAN_UINT32(4u * 120u, heated);
+    TEST_ASSERT_EQUAL_UINT16(0, controller_clear_wait_s(&controller, 0));
+    settings.current.wiring_mohm = 90; /* the circuit was declared wrongly: nothing to wait for */
+    for (unsigned n = 0; n < 2; n++) {
+        safety_trip(&controller.safety, 4, SAFETY_FAULT_SENSOR_MISMATCH);
+        TEST_ASSERT_EQUAL(n == 0, controller_clear_wait_s(&controller, 4) != 0);
+        TEST_ASSERT_TRUE(controller_apply_settings(&controller, &settings, NULL));
+    }
+}
+
+/* Nothing is forgotten of a spring that has no fault: the first is found as if nobody cleared. */
+static void who_clears_each_second_hides_no_sensor_that_lies(void)
+{
+    settings.policy.policy = DRIVE_POLICY_PRECOMPENSATE;
+    start();
+    controller_set_temperature(&controller, AMBIENT_C7);
+    controller_set_target(&controller, 4, 1000);
+    run(200);
+    uint32_t ticks = 0;
+    for (; controller_fault(&controller, 4) == SAFETY_FAULT_NONE && ticks < 400; ticks++) {
+        controller_tick(&controller, &inputs, &outputs);
+        respond();
+        inputs.sensor[4].current_ma = (int16_t)(inputs.sensor[4].current_ma / 2);
+        if (ticks % 50u == 25u) {
+            controller_clear_faults(&controller);
+            controller_set_target(&controller, 4, 1000);
+        }
+    }
+    TEST_ASSERT_LESS_THAN_UINT32(200, ticks);
+}
+
+/* A welded switch: the first clear closes the supply again, the second one when it has rested. */
+static void who_clears_a_welded_switch_again_waits(void)
+{
+    for (unsigned n = 0; n < 3; n++) {
+        safety_trip(&controller.safety, 4, SAFETY_FAULT_STUCK_ON);
+        controller.ceiling.rest_turns[4] = 10;
+        controller_clear_faults(&controller);
+        TEST_ASSERT_EQUAL(n == 0, controller_board_fault(&controller) == SAFETY_FAULT_NONE);
+        TEST_ASSERT_EQUAL(n == 0, controller_set_supply(&controller, true));
+    }
+    controller.ceiling.rest_turns[4] = 100;
+    controller_clear_faults(&controller);
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, controller_board_fault(&controller));
+    TEST_ASSERT_TRUE(controller_set_supply(&controller, true));
 }
 
 /* Above the policy's limit, below safety's: after trip_time_s it is off, and says why. */
@@ -894,6 +973,9 @@ int main(void)
     RUN_TEST(a_drive_after_other_losses_goes_by_them);
     RUN_TEST(frozen_sensor_is_found_within_two_seconds_and_stops_its_spring_alone);
     RUN_TEST(another_shunt_is_found_before_it_is_hot);
+    RUN_TEST(who_clears_again_and_again_heats_no_spring_whose_sensor_lies);
+    RUN_TEST(who_clears_each_second_hides_no_sensor_that_lies);
+    RUN_TEST(who_clears_a_welded_switch_again_waits);
     RUN_TEST(limit_that_stays_is_a_fault_until_cleared);
     RUN_TEST(stop_acts_in_the_next_tick);
     RUN_TEST(locked_board_drives_nothing_until_unlocked);

@@ -52,7 +52,8 @@ static void trips(safety_fault_t fault, const safety_sample_t *sample)
     uint8_t limit = fault == SAFETY_FAULT_STUCK_ON ? SAFETY_STUCK_TICKS : parameters.bad_samples;
     ticks(4, sample, limit - 1u);
     TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, safety_fault(&safety, 4));
-    ticks(4, &running, 1); /* one good tick in between: counted anew */
+    /* one good tick in between, of what no switch can end two seconds for each: counted anew */
+    ticks(4, &running, fault == SAFETY_FAULT_STUCK_ON ? 2u * SAFETY_FORGET_TICKS + 1u : 1u);
     ticks(4, sample, limit - 1u);
     TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, safety_fault(&safety, 4));
     TEST_ASSERT_TRUE(safety_allows(&safety, 4));
@@ -278,6 +279,9 @@ static void current_that_no_output_gives_is_no_frozen_sensor(void)
 static void current_without_duty_overrides_every_other_fault(void)
 {
     for (int fault = 0; fault < SAFETY_FAULT_COUNT; fault++) {
+        if (fault == SAFETY_FAULT_STUCK_ON) {
+            continue;
+        }
         const uint8_t k = (uint8_t)(fault % 9); /* whichever spring it is */
         setUp();
         ticks(k, &running, 10);
@@ -314,15 +318,57 @@ static void what_is_no_current_without_duty_is_no_fault(void)
         sample = off;
         sample.current_ma = 90;
         ticks(4, &sample, 20);
-        for (uint8_t n = 0; n < 100; n++) {
-            sample.current_ma = n % SAFETY_STUCK_TICKS == 0 ? 95 : 300;
+        for (uint8_t n = 0; n < 5; n++) { /* a reading that is disturbed now and then */
+            sample.current_ma = 300;
             ticks(4, &sample, 1);
+            sample.current_ma = 95;
+            ticks(4, &sample, SAFETY_FORGET_TICKS + 1u);
         }
         sample.current_ma = -2000;
         ticks(4, &sample, 20);
     }
     TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, safety_board_fault(&safety));
     TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, safety_fault(&safety, 4));
+}
+
+static void what_is_tripped_as_stuck_is_of_the_board_too(void)
+{
+    safety_trip(&safety, 4, SAFETY_FAULT_SENSOR_MISMATCH);
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, safety_board_fault(&safety));
+    safety_trip(&safety, 3, SAFETY_FAULT_STUCK_ON);
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_STUCK_ON, safety_board_fault(&safety));
+    TEST_ASSERT_TRUE(safety_cuts_supply(&safety));
+}
+
+/* A switch that closes for a tick now and then: by the third the supply goes, however many good
+ * readings lie between, if it is less than two seconds. */
+static void a_switch_that_chatters_is_current_without_duty(void)
+{
+    safety_sample_t sample = off;
+    sample.current_ma = 3190;
+    sample.voltage_mv = 1200;
+    for (uint32_t pause = 0; pause <= SAFETY_FORGET_TICKS; pause += 20) {
+        setUp();
+        for (unsigned n = 1; n <= SAFETY_STUCK_TICKS; n++) {
+            TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, safety_board_fault(&safety));
+            ticks(4, &sample, 1);
+            TEST_ASSERT_TRUE(safety_doubts_supply(&safety));
+            if (pause > 0) {
+                ticks(4, &off, pause);
+                TEST_ASSERT_FALSE(safety_doubts_supply(&safety)); /* it was let go for a tick */
+            }
+        }
+        TEST_ASSERT_EQUAL(SAFETY_FAULT_STUCK_ON, safety_board_fault(&safety));
+        TEST_ASSERT_TRUE(safety_cuts_supply(&safety));
+    }
+    setUp(); /* one more is forgotten for each two seconds, not all of them */
+    ticks(4, &sample, 2);
+    ticks(4, &off, SAFETY_FORGET_TICKS + 1u);
+    ticks(4, &sample, 1);
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, safety_board_fault(&safety));
+    ticks(4, &off, SAFETY_FORGET_TICKS);
+    ticks(4, &sample, 1);
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_STUCK_ON, safety_board_fault(&safety));
 }
 
 /* A driven spring: the current alone may be a short's, the voltage alone an open spring's. */
@@ -543,9 +589,11 @@ static void the_supply_is_cut_where_nothing_else_helps(void)
         for (uint8_t k = 0; k < 9; k += 4) {
             setUp();
             safety_trip(&safety, k, (safety_fault_t)fault);
-            TEST_ASSERT_EQUAL(fault == SAFETY_FAULT_OVER_TEMPERATURE, safety_cuts_supply(&safety));
+            const bool cuts =
+                fault == SAFETY_FAULT_OVER_TEMPERATURE || fault == SAFETY_FAULT_STUCK_ON;
+            TEST_ASSERT_EQUAL(cuts, safety_cuts_supply(&safety));
             safety_emergency_stop(&safety);
-            TEST_ASSERT_EQUAL(fault == SAFETY_FAULT_OVER_TEMPERATURE, safety_cuts_supply(&safety));
+            TEST_ASSERT_EQUAL(cuts, safety_cuts_supply(&safety));
             safety_clear(&safety);
             TEST_ASSERT_FALSE(safety_cuts_supply(&safety));
         }
@@ -710,6 +758,8 @@ int main(void)
     RUN_TEST(current_that_no_output_gives_is_no_frozen_sensor);
     RUN_TEST(current_without_duty_overrides_every_other_fault);
     RUN_TEST(what_is_no_current_without_duty_is_no_fault);
+    RUN_TEST(what_is_tripped_as_stuck_is_of_the_board_too);
+    RUN_TEST(a_switch_that_chatters_is_current_without_duty);
     RUN_TEST(a_voltage_that_no_duty_gives_is_current_without_duty);
     RUN_TEST(a_sensor_that_is_silent_holds_no_supply_back);
     RUN_TEST(one_bad_sample_is_enough_where_that_is_set);

@@ -19,7 +19,27 @@ void setUp(void)
     temperature_ceiling_begin(&ceiling, 20 * 128);
 }
 
-void tearDown(void) {}
+void tearDown(void)
+{
+    TEST_ASSERT_EQUAL_UINT8(0, temperature_ceiling_broken_seals(&ceiling));
+}
+
+/* What a test has written is as if it had been kept. */
+static void seal_all(void)
+{
+    for (unsigned k = 0; k < THERMAL_MODEL_MAX_SPRINGS; k++) {
+        uint16_t halves[9], sum = 0x5EA1u;
+        memcpy(&halves[0], &ceiling.temperature_c23[k], 4);
+        memcpy(&halves[2], &ceiling.austenite[k], 4);
+        memcpy(&halves[4], &ceiling.spared_w[k], 4);
+        memcpy(&halves[6], &ceiling.spared_per_s[k], 4);
+        memcpy(&halves[8], &ceiling.rest_turns[k], 2);
+        for (unsigned n = 0; n < 9; n++) {
+            sum = (uint16_t)((uint16_t)(sum << 1u | sum >> 15u) + halves[n]);
+        }
+        ceiling.seal[k] = sum;
+    }
+}
 
 /* power_w into every spring of the ceiling; the model is stepped with its own. */
 static void run(float power_w, uint32_t model_uw, float seconds)
@@ -199,9 +219,11 @@ static void one_step_is_the_implicit_one(void)
         for (uint8_t k = 0; k < 9; k++) { /* far from the ceiling's: much flows */
             thermal_model_set_temperature(&model, k, (int16_t)((k == 1 ? 30 : -20) * 128));
         }
+        thermal_model_t warmer = model;
         for (uint8_t k = 0; k < 9; k++) {
-            ceiling.temperature_c23[k] = (25 + 4 * k) * 128 * 65536;
+            thermal_model_set_temperature(&warmer, k, (int16_t)((25 + 4 * k) * 128));
         }
+        temperature_ceiling_raise(&ceiling, &warmer);
         const uint8_t k = (uint8_t)(n % 9);
         const double power_w = 0.1 * n;
         double stiffness_w_per_k =
@@ -292,6 +314,50 @@ static void rest_is_counted_from_the_last_power(void)
     TEST_ASSERT_EQUAL_UINT16(2, temperature_ceiling_rest_s(&ceiling, 4)); /* 2.4 s */
 }
 
+/* Each bit of each spring's record, and of the ambient: it is as hot as it may be, and counted. */
+static void whatever_bit_turns_over_it_is_taken_to_be_hot(void)
+{
+    uint8_t *const fields[] = {
+        (uint8_t *)&ceiling.temperature_c23[4], (uint8_t *)&ceiling.austenite[4],
+        (uint8_t *)&ceiling.spared_w[4],        (uint8_t *)&ceiling.spared_per_s[4],
+        (uint8_t *)&ceiling.rest_turns[4],      (uint8_t *)&ceiling.seal[4],
+        (uint8_t *)&ceiling.ambient_c7,         (uint8_t *)&ceiling.not_ambient_c7,
+    };
+    const uint8_t bytes[] = {4, 4, 4, 4, 2, 2, 2, 2};
+    for (unsigned field = 0; field < 8; field++) {
+        for (unsigned bit = 0; bit < 8u * bytes[field]; bit++) {
+            setUp();
+            run(0.6f, 600000u, 30.0f);
+            run(0.0f, 0u, 12.0f);
+            const float was_c = temperature_ceiling_c(&ceiling, 4);
+            ceiling.delivered = field >= 6; /* as of springs that are cold */
+            fields[field][bit / 8u] ^= (uint8_t)(1u << bit % 8u);
+            temperature_ceiling_step(&ceiling, &model, 4, 0.0f);
+            TEST_ASSERT_EQUAL_UINT8(1, temperature_ceiling_broken_seals(&ceiling));
+            TEST_ASSERT_FLOAT_WITHIN(0.5f, field < 6 ? 118.5f : was_c - 0.5f,
+                                     temperature_ceiling_c(&ceiling, 4));
+            TEST_ASSERT_EQUAL_UINT16(field < 6 ? 0 : 12, temperature_ceiling_rest_s(&ceiling, 4));
+            TEST_ASSERT_TRUE(temperature_ceiling_is_warm(&ceiling, 4));
+            TEST_ASSERT_EQUAL_INT16(thermal_model_ambient_c7(&model), ceiling.ambient_c7);
+            run(0.6f, 0u, 60.0f); /* and goes on from there */
+            TEST_ASSERT_EQUAL_UINT8(1, temperature_ceiling_broken_seals(&ceiling));
+        }
+    }
+    for (unsigned n = 0; n < 600;
+         n++) { /* whoever else uses it looks at it, too; 255 is the most */
+        ceiling.temperature_c23[n % 9u] ^= 1;
+        if (n % 2u == 0) {
+            temperature_ceiling_raise(&ceiling, &model);
+        } else {
+            temperature_ceiling_keep_loss(&ceiling, &model, (uint8_t)(n % 9u), 1000, 1000);
+        }
+        TEST_ASSERT_EQUAL_UINT8(n + 2u < 255u ? n + 2u : 255u,
+                                temperature_ceiling_broken_seals(&ceiling));
+    }
+    temperature_ceiling_begin(&ceiling, 20 * 128);
+    TEST_ASSERT_EQUAL_UINT8(0, temperature_ceiling_broken_seals(&ceiling));
+}
+
 static void begin_forgets_all_that_was(void)
 {
     run(0.6f, 600000u, 60.0f);
@@ -343,6 +409,7 @@ static void a_hotter_model_raises_it_and_a_colder_one_does_not(void)
         TEST_ASSERT_TRUE(temperature_ceiling_is_warm(&ceiling, k));
         TEST_ASSERT_EQUAL_UINT16(TEMPERATURE_CEILING_NEVER, ceiling.rest_turns[(k + 1) % 9]);
         ceiling.austenite[k] = 0.5f; /* one that is as hot changes nothing */
+        seal_all();
         temperature_ceiling_raise(&ceiling, &model);
         TEST_ASSERT_EQUAL_FLOAT(0.5f, ceiling.austenite[k]);
         thermal_model_set_temperature(&model, k, 30 * 128);
@@ -360,6 +427,7 @@ static void warmest_air_counts_until_all_are_cold(void)
         ceiling.delivered = true;
         ceiling.spared_w[k] = 0.01f;
         thermal_model_set_ambient(&model, 30 * 128);
+        seal_all();
         temperature_ceiling_step(&ceiling, &model, 0, 0.0f);
         TEST_ASSERT_EQUAL_INT16(30 * 128, ceiling.ambient_c7);
         thermal_model_set_ambient(&model, 15 * 128);
@@ -373,6 +441,7 @@ static void warmest_air_counts_until_all_are_cold(void)
             temperature_ceiling_hold_uw(&ceiling, &model, 8));
         TEST_ASSERT_TRUE(ceiling.delivered);
         ceiling.temperature_c23[k] = 20 * 128 * 65536;
+        seal_all();
         temperature_ceiling_step(&ceiling, &model, 1, 0.0f); /* looked at once a round */
         TEST_ASSERT_TRUE(ceiling.delivered);
         temperature_ceiling_step(&ceiling, &model, 0, 0.0f);
@@ -385,6 +454,7 @@ static void warmest_air_counts_until_all_are_cold(void)
     ceiling.temperature_c23[9] = 100 * 128 * 65536;
     ceiling.spared_w[9] = 0.01f;
     ceiling.delivered = true;
+    seal_all();
     temperature_ceiling_step(&ceiling, &model, 0, 0.0f);
     TEST_ASSERT_FALSE(ceiling.delivered);
     TEST_ASSERT_EQUAL_FLOAT(0.01f, ceiling.spared_w[9]);
@@ -409,12 +479,14 @@ static void what_a_larger_loss_would_spare_goes_with_the_heat_of_before(void)
     ceiling.delivered = true;
     ceiling.temperature_c23[4] = 120 * 128 * 65536;
     ceiling.austenite[4] = 1.0f;
+    seal_all();
     temperature_ceiling_keep_loss(&ceiling, &model, 4, 500000, 700000);
     const float latent_j = 1e-3f * (float)parameters.latent_heat_mj;
     const float heat_j = 1e-3f * (float)parameters.heat_capacity_mj_per_k * 100.0f + latent_j;
     TEST_ASSERT_FLOAT_WITHIN(1e-6f, 0.2f, ceiling.spared_w[4]);
     TEST_ASSERT_FLOAT_WITHIN(0.01f * 0.5f / heat_j, 0.5f / heat_j, ceiling.spared_per_s[4]);
     ceiling.spared_per_s[4] = 5.0f;
+    seal_all();
     temperature_ceiling_step(&ceiling, &model, 4, 0.0f);
     TEST_ASSERT_EQUAL_FLOAT(0.0f, ceiling.spared_w[4]);
     temperature_ceiling_keep_loss(&ceiling, &model, 4, 0, 100); /* what lost nothing spares none */
@@ -438,6 +510,7 @@ int main(void)
     RUN_TEST(it_trips_a_ninth_above_the_rise_that_trips_the_model);
     RUN_TEST(it_ends_at_its_highest_and_lowest);
     RUN_TEST(rest_is_counted_from_the_last_power);
+    RUN_TEST(whatever_bit_turns_over_it_is_taken_to_be_hot);
     RUN_TEST(begin_forgets_all_that_was);
     RUN_TEST(warm_is_what_was_heated_and_has_not_cooled);
     RUN_TEST(a_hotter_model_raises_it_and_a_colder_one_does_not);

@@ -1,0 +1,62 @@
+#include "circuit_step.h"
+
+#include <math.h>
+
+#define Q12         4096.0f
+#define MOST        65535.0f
+#define LEAST_MV    100.0f
+#define NOISE_MV    4.0f  /* a step of the voltage's register */
+#define CHANGE_PART 0.10f /* of its resistance, that a spring makes in three windows */
+/* As others switch, and what a contact makes of it where the wiring is not as declared. */
+#define SHARE_PART 0.04f
+
+/* Of what is above 0. */
+static uint16_t to_q12(float value)
+{
+    return (uint16_t)fminf(value * Q12, MOST);
+}
+
+/* At about the same current: offsets of the readings make another resistance at another one. */
+static bool is_like(uint8_t now, uint8_t was)
+{
+    return 3u * now >= 2u * was && 2u * now <= 3u * was;
+}
+
+static bool is_off(uint16_t now, uint16_t was, float most_part)
+{
+    return fabsf((float)now - (float)was) > most_part * (float)was;
+}
+
+bool circuit_step_judge(circuit_step_t *step, const circuit_window_t *window,
+                        const current_control_parameters_t *circuit)
+{
+    const float fixed_ohm = 1e-3f * (float)((uint32_t)circuit->shunt_mohm + circuit->wiring_mohm);
+    const float spring_mv = window->found_mv - fixed_ohm * window->current_ma;
+    if (!window->tells || window->expected_mv < LEAST_MV || spring_mv < NOISE_MV ||
+        window->current_ma < 1.0f) {
+        *step = (circuit_step_t){0};
+        return false;
+    }
+    const circuit_shown_t now = {to_q12(window->found_mv / window->expected_mv),
+                                 to_q12(spring_mv / window->current_ma),
+                                 (uint8_t)fminf(window->current_ma / 16.0f, 255.0f)};
+    const float share_part = SHARE_PART + NOISE_MV / window->expected_mv;
+    const float change_part = CHANGE_PART + NOISE_MV / spring_mv;
+    bool odd = false, like = true;
+    for (uint8_t n = 0; n < CIRCUIT_STEP_BACK; n++) {
+        const circuit_shown_t *const was = &step->was[n];
+        if (was->share_q12 != 0) {
+            like = like && is_like(now.current_16ma, was->current_16ma);
+            odd = odd || (is_off(now.share_q12, was->share_q12, share_part) &&
+                          is_off(now.ohm_q12, was->ohm_q12, change_part));
+        }
+    }
+    if (!like) {
+        *step = (circuit_step_t){.was = {now}};
+    } else if (odd) {
+        step->odd = step->odd < CIRCUIT_STEP_WINDOWS ? (uint8_t)(step->odd + 1u) : step->odd;
+    } else {
+        *step = (circuit_step_t){.was = {now, step->was[0]}};
+    }
+    return step->odd >= CIRCUIT_STEP_WINDOWS;
+}

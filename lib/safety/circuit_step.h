@@ -1,0 +1,56 @@
+/* What it is for: tells whether a spring's circuit has changed as a sensor does that begins to lie,
+ * and no spring, contact or supply.
+ * What it owns: what the last windows of one spring showed.
+ * What it never does: look at another spring, latch a fault. It uses floating point, once in a
+ * window. */
+#ifndef CIRCUIT_STEP_H
+#define CIRCUIT_STEP_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "circuit_check.h"
+#include "parameters.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define CIRCUIT_STEP_BACK    2u /* windows: the one in which it began shows a part of it */
+#define CIRCUIT_STEP_WINDOWS 2u /* on end */
+
+typedef struct {
+    uint16_t share_q12; /* voltage found behind the switch, of the expected; 0: it told nothing */
+    uint16_t ohm_q12;
+    uint8_t current_16ma;
+} circuit_shown_t;
+
+/* Of one spring; all zero: nothing is known. */
+typedef struct {
+    circuit_shown_t was[CIRCUIT_STEP_BACK]; /* the last one first */
+    uint8_t odd;                            /* windows on end, which were not kept */
+} circuit_step_t;
+
+/* Takes a spring's window. True if and only if for CIRCUIT_STEP_WINDOWS on end, at a current within
+ * a half of what it was, resistance is off by more than 10 % AND the share of the expected voltage
+ * that is found behind the switch by more than 4 % (and what 4 mV make of either) from what one of
+ * the CIRCUIT_STEP_BACK windows before them showed. Supply and wiring change the share and not the
+ * resistance; a contact changes the resistance and hardly the share; a spring changes its
+ * resistance by a tenth in 1.8 s at the most (3 A, the least latent heat in print), and never the
+ * share. A sensor that begins to show another part of its current changes the share by about half
+ * of the lie. A window that tells nothing, of less than 0.1 V or another current ends what is
+ * known. */
+bool circuit_step_judge(circuit_step_t *step, const circuit_window_t *window,
+                        const current_control_parameters_t *circuit);
+
+/* The share that the oldest of the windows before showed; 0: none is known. */
+static inline uint16_t circuit_step_before_q12(const circuit_step_t *step)
+{
+    const circuit_shown_t *const oldest = &step->was[CIRCUIT_STEP_BACK - 1u];
+    return oldest->share_q12 != 0 ? oldest->share_q12 : step->was[0].share_q12;
+}
+
+#ifdef __cplusplus
+}
+#endif
+#endif

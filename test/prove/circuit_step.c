@@ -1,0 +1,32 @@
+/* sources: lib/safety/circuit_step.c */
+#include "circuit_step.h"
+
+#include "prove.h"
+
+static void any_settings(current_control_parameters_t *values)
+{
+#define CURRENT PROVE_ANY
+#include "parameters.def"
+}
+
+/* Frama-C knows its declaration only. */
+float fminf(float a, float b)
+{
+    return a < b ? a : b;
+}
+
+void main(void)
+{
+    circuit_step_t step = {0};
+    current_control_parameters_t settings;
+    any_settings(&settings);
+    while (any_bool()) {
+        const circuit_window_t window = {
+            .found_mv = Frama_C_float_interval(0.0f, 13000.0f),
+            .expected_mv = Frama_C_float_interval(0.0f, 17000.0f),
+            .current_ma = Frama_C_float_interval(0.0f, 4095.0f),
+            .tells = any_bool(),
+        };
+        (void)circuit_step_judge(&step, &window, &settings);
+    }
+}

@@ -1,0 +1,234 @@
+/* What a spring, its contacts, its wiring and the supply can do within two windows passes; a sensor
+ * that begins to show another current or voltage is found. */
+#include <math.h>
+#include <string.h>
+
+#include "circuit_step.h"
+#include "unity.h"
+
+static circuit_step_t step;
+static current_control_parameters_t circuit;
+
+void setUp(void)
+{
+    memset(&step, 0, sizeof step);
+    current_control_parameters_default(&circuit);
+}
+
+void tearDown(void) {}
+
+/* A circuit whose current is kept at what its sensor shows. */
+typedef struct {
+    float shown_a, spring_ohm, wiring_ohm; /* shunt included */
+    float supply, current_gain, voltage_gain;
+    float offset_a, offset_mv;
+} shown_t;
+
+static const shown_t honest = {0.9f, 0.219f, 0.18f, 1.0f, 1.0f, 1.0f, 0.0f, 0.0f};
+
+static bool takes(shown_t s)
+{
+    const float a = (s.shown_a - s.offset_a) / s.current_gain;
+    const float behind_mv = 1e3f * a * (s.spring_ohm + s.wiring_ohm);
+    const float read_mv = 1e3f * a * s.spring_ohm * s.voltage_gain + s.offset_mv;
+    const circuit_window_t window = {read_mv + 1e3f * s.shown_a * 0.18f, behind_mv / s.supply,
+                                     1e3f * s.shown_a, true};
+    return circuit_step_judge(&step, &window, &circuit);
+}
+
+static void is_silent(void)
+{
+    const circuit_window_t window = {.tells = false};
+    TEST_ASSERT_FALSE(circuit_step_judge(&step, &window, &circuit));
+}
+
+/* Windows until it is found, the one in which it began the first; 0: never. part: how much of the
+ * change that one shows. */
+static unsigned found_after(shown_t before, shown_t after, float part)
+{
+    setUp();
+    for (unsigned n = 0; n < 5; n++) {
+        TEST_ASSERT_FALSE(takes(before));
+    }
+    const float *const from = (const float *)&before, *const to = (const float *)&after;
+    shown_t between;
+    for (unsigned k = 0; k < sizeof between / sizeof(float); k++) {
+        ((float *)&between)[k] = from[k] + part * (to[k] - from[k]);
+    }
+    if (takes(between)) {
+        return 1;
+    }
+    for (unsigned n = 2; n < 10; n++) {
+        if (takes(after)) {
+            return n;
+        }
+    }
+    return 0;
+}
+
+static shown_t with(float shown_a, unsigned field, float value)
+{
+    shown_t s = honest;
+    s.shown_a = shown_a;
+    ((float *)&s)[field] = value;
+    return s;
+}
+enum { SHOWN, SPRING, WIRING, SUPPLY, CURRENT_GAIN, VOLTAGE_GAIN, OFFSET_A, OFFSET_MV };
+
+/* As it holds and as it heats; by the third window, of whatever part the first was. */
+static void a_sensor_that_begins_to_lie_is_found(void)
+{
+    static const struct {
+        unsigned field;
+        float honest, lies, passes, shown_a;
+    } lies[] = {
+        {CURRENT_GAIN, 1.0f, 0.85f, 0.92f, 0.9f}, {CURRENT_GAIN, 1.0f, 1.17f, 1.08f, 0.9f},
+        {VOLTAGE_GAIN, 1.0f, 0.85f, 0.92f, 0.9f}, {VOLTAGE_GAIN, 1.0f, 1.16f, 1.08f, 0.9f},
+        {CURRENT_GAIN, 1.0f, 0.87f, 0.92f, 2.5f}, {CURRENT_GAIN, 1.0f, 1.14f, 1.08f, 2.5f},
+        {VOLTAGE_GAIN, 1.0f, 0.87f, 0.92f, 2.5f}, {VOLTAGE_GAIN, 1.0f, 1.13f, 1.08f, 2.5f},
+        {OFFSET_A, 0.0f, -0.17f, -0.06f, 0.9f},   {OFFSET_A, 0.0f, 0.14f, 0.06f, 0.9f},
+        {OFFSET_MV, 0.0f, -30.0f, -12.0f, 0.9f},  {OFFSET_MV, 0.0f, 30.0f, 12.0f, 0.9f},
+    };
+    for (unsigned n = 0; n < sizeof lies / sizeof lies[0]; n++) {
+        const shown_t before = with(lies[n].shown_a, lies[n].field, lies[n].honest);
+        for (unsigned tenths = 0; tenths <= 10; tenths++) {
+            const float part = 0.1f * (float)tenths;
+            const unsigned found =
+                found_after(before, with(lies[n].shown_a, lies[n].field, lies[n].lies), part);
+            TEST_ASSERT_TRUE(found == 2 || found == 3);
+            TEST_ASSERT_EQUAL(
+                0, found_after(before, with(lies[n].shown_a, lies[n].field, lies[n].passes), part));
+        }
+    }
+}
+
+/* One thing at a time, however much: with wiring that is not as declared, too. */
+static void what_is_no_lie_passes(void)
+{
+    for (unsigned wired = 0; wired < 3; wired++) {
+        shown_t before = honest;
+        before.wiring_ohm = 0.14f + 0.04f * (float)wired;
+        for (unsigned n = 0; n < 8; n++) {
+            shown_t after = before;
+            const float more = 0.6f + 0.1f * (float)n;
+            after.supply *= more;
+            TEST_ASSERT_EQUAL(0, found_after(before, after, 0.5f));
+            after = before;
+            after.wiring_ohm *= more;
+            TEST_ASSERT_EQUAL(0, found_after(before, after, 0.5f));
+            after = before; /* a contact */
+            after.spring_ohm += 0.01f * (float)n;
+            TEST_ASSERT_EQUAL(0, found_after(before, after, 0.5f));
+        }
+        shown_t after = before; /* it transforms as others switch */
+        after.spring_ohm *= 1.09f;
+        after.supply *= 0.95f;
+        TEST_ASSERT_EQUAL(0, found_after(before, after, 0.5f));
+    }
+}
+
+/* Of little voltage a step of its register is much. */
+static void a_small_voltage_tells_less(void)
+{
+    const shown_t before = with(0.27f, CURRENT_GAIN, 1.0f);
+    TEST_ASSERT_EQUAL(0, found_after(before, with(0.27f, CURRENT_GAIN, 0.85f), 1.0f));
+    TEST_ASSERT_TRUE(found_after(before, with(0.27f, CURRENT_GAIN, 0.7f), 1.0f) != 0);
+    const shown_t less = with(0.24f, CURRENT_GAIN, 1.0f); /* below 0.1 V none is told */
+    TEST_ASSERT_EQUAL(0, found_after(less, with(0.24f, CURRENT_GAIN, 2.0f), 1.0f));
+}
+
+/* A row ends what is compared; another current begins it anew. */
+static void windows_must_follow_on_each_other(void)
+{
+    const shown_t lies = with(0.9f, CURRENT_GAIN, 0.8f);
+    TEST_ASSERT_FALSE(takes(honest));
+    TEST_ASSERT_FALSE(takes(lies));
+    TEST_ASSERT_FALSE(takes(honest)); /* it was noise */
+    TEST_ASSERT_FALSE(takes(lies));
+    is_silent();
+    for (unsigned n = 0; n < 5; n++) {
+        TEST_ASSERT_FALSE(takes(lies));
+    }
+    for (unsigned less = 0; less < 2; less++) {
+        for (unsigned other = 0; other < 2; other++) {
+            setUp();
+            TEST_ASSERT_FALSE(takes(honest));
+            TEST_ASSERT_FALSE(takes(honest));
+            const float like[2][2] = {{0.9f * 1.48f, 0.9f * 0.68f}, {0.9f * 1.52f, 0.9f * 0.65f}};
+            const shown_t now = with(like[other][less], CURRENT_GAIN, 0.75f);
+            TEST_ASSERT_FALSE(takes(now));
+            TEST_ASSERT_EQUAL(other == 0, takes(now));
+        }
+    }
+}
+
+static void what_it_showed_before_is_known(void)
+{
+    TEST_ASSERT_EQUAL_UINT(0, circuit_step_before_q12(&step));
+    TEST_ASSERT_FALSE(takes(honest));
+    TEST_ASSERT_EQUAL_UINT(4096, circuit_step_before_q12(&step));
+    TEST_ASSERT_FALSE(takes(with(0.9f, CURRENT_GAIN, 0.93f)));
+    TEST_ASSERT_FALSE(takes(with(0.9f, CURRENT_GAIN, 0.8f)));
+    TEST_ASSERT_TRUE(takes(with(0.9f, CURRENT_GAIN, 0.8f)));
+    TEST_ASSERT_EQUAL_UINT(4096, circuit_step_before_q12(&step));
+}
+
+/* As it lies now it was never seen at this current: what was before another one is long ago. */
+static void another_current_ends_what_was_known(void)
+{
+    TEST_ASSERT_FALSE(takes(honest));
+    TEST_ASSERT_FALSE(takes(with(2.5f, CURRENT_GAIN, 1.0f)));
+    for (unsigned n = 0; n < 5; n++) {
+        TEST_ASSERT_FALSE(takes(with(0.9f, CURRENT_GAIN, 0.8f)));
+    }
+}
+
+static void found_stays_found_until_it_begins_anew(void)
+{
+    TEST_ASSERT_FALSE(takes(honest));
+    for (unsigned n = 0; n < 300; n++) {
+        TEST_ASSERT_EQUAL(n != 0, takes(with(0.9f, CURRENT_GAIN, 0.8f)));
+        TEST_ASSERT_TRUE(step.odd <= CIRCUIT_STEP_WINDOWS);
+    }
+}
+
+static void windows_that_tell_are_kept_within_16_bits(void)
+{
+    static const struct {
+        circuit_window_t window;
+        uint16_t share_q12, ohm_q12;
+    } kept[] = {
+        {{400.0f, 400.0f, 1000.0f, true}, 4096, 901},
+        {{400.0f, 100.0f, 1000.0f, true}, 16384, 901},
+        {{400.0f, 99.9f, 1000.0f, true}, 0, 0},
+        {{184.0f, 200.0f, 1000.0f, true}, 3768, 16}, /* a step of the register */
+        {{183.9f, 200.0f, 1000.0f, true}, 0, 0},
+        {{200.0f, 200.0f, 1.0f, true}, 4096, UINT16_MAX},
+        {{200.0f, 200.0f, 0.9f, true}, 0, 0},
+        {{60000.0f, 200.0f, 4095.0f, true}, UINT16_MAX, 59277},
+        {{400.0f, 400.0f, 1000.0f, false}, 0, 0},
+    };
+    for (unsigned n = 0; n < sizeof kept / sizeof kept[0]; n++) {
+        setUp();
+        TEST_ASSERT_FALSE(circuit_step_judge(&step, &kept[n].window, &circuit));
+        TEST_ASSERT_EQUAL_UINT(kept[n].share_q12, step.was[0].share_q12);
+        TEST_ASSERT_UINT_WITHIN(1, kept[n].ohm_q12, step.was[0].ohm_q12);
+        TEST_ASSERT_EQUAL_UINT(kept[n].share_q12 != 0 ? (unsigned)kept[n].window.current_ma / 16u
+                                                      : 0u,
+                               step.was[0].current_16ma);
+    }
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(a_sensor_that_begins_to_lie_is_found);
+    RUN_TEST(what_is_no_lie_passes);
+    RUN_TEST(a_small_voltage_tells_less);
+    RUN_TEST(windows_must_follow_on_each_other);
+    RUN_TEST(what_it_showed_before_is_known);
+    RUN_TEST(another_current_ends_what_was_known);
+    RUN_TEST(found_stays_found_until_it_begins_anew);
+    RUN_TEST(windows_that_tell_are_kept_within_16_bits);
+    return UNITY_END();
+}
