@@ -46,6 +46,18 @@ bool controller_settings_pair(const controller_settings_t *settings, uint16_t pa
     return true;
 }
 
+static uint32_t capacity_uj_per_k(const thermal_model_parameters_t *p, spring_index_t spring)
+{
+    return (uint32_t)p->heat_capacity_mj_per_k * p->heat_capacity_scale_permille[spring];
+}
+
+/* Of a loss as declared for all. */
+static uint32_t own_loss_uw_per_k(const thermal_model_parameters_t *p, spring_index_t spring,
+                                  uint16_t loss_uw_per_k)
+{
+    return (uint32_t)loss_uw_per_k * p->loss_scale_permille[spring] / 1000u;
+}
+
 /* Every spring cools to a part of its excess within TIME_CONSTANT_MOST_S: else what waits for it
  * waits for ever. */
 static bool check_time_constants(const thermal_model_parameters_t *p, uint16_t *bad)
@@ -53,13 +65,10 @@ static bool check_time_constants(const thermal_model_parameters_t *p, uint16_t *
     for (spring_index_t k = 0;
          k < (spring_index_t)(p->rows * p->columns) && k < (spring_index_t)CONTROLLER_MAX_SPRINGS;
          k++) {
-        const uint32_t capacity_uj_per_k =
-            (uint32_t)p->heat_capacity_mj_per_k * p->heat_capacity_scale_permille[k];
         const uint16_t losses_uw_per_k[] = {p->loss_uw_per_k, p->loss_fan_uw_per_k};
         for (uint8_t n = 0; n < 2; n++) {
-            const uint32_t loss_uw_per_k =
-                (uint32_t)losses_uw_per_k[n] * p->loss_scale_permille[k] / 1000u;
-            if (capacity_uj_per_k > TIME_CONSTANT_MOST_S * loss_uw_per_k) {
+            if (capacity_uj_per_k(p, k) >
+                TIME_CONSTANT_MOST_S * own_loss_uw_per_k(p, k, losses_uw_per_k[n])) {
                 if (bad != NULL) {
                     *bad = n == 0 ? PARAMETER_loss_w_per_k : PARAMETER_loss_fan_w_per_k;
                 }
@@ -603,11 +612,8 @@ uint16_t controller_clear_wait_s(const controller_t *controller, uint8_t spring)
         return 0;
     }
     /* at most TIME_CONSTANT_MOST_S: check_time_constants */
-    const uint32_t capacity_uj_per_k =
-        (uint32_t)p->heat_capacity_mj_per_k * p->heat_capacity_scale_permille[spring];
-    const uint32_t loss_uw_per_k =
-        (uint32_t)p->loss_uw_per_k * p->loss_scale_permille[spring] / 1000u;
-    const uint16_t whole_s = (uint16_t)(capacity_uj_per_k / loss_uw_per_k);
+    const uint16_t whole_s =
+        (uint16_t)(capacity_uj_per_k(p, spring) / own_loss_uw_per_k(p, spring, p->loss_uw_per_k));
     const uint16_t rest_s = controller_rest_s(controller, spring);
     return rest_s < whole_s ? (uint16_t)(whole_s - rest_s) : 0;
 }

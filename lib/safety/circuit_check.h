@@ -45,6 +45,14 @@ typedef struct {
     bool tells; /* there were readings enough */
 } circuit_window_t;
 
+/* Below it, offsets are most of what differs. */
+#define CIRCUIT_WINDOW_LEAST_MV 100.0f
+/* It tells what a spring's circuit shows of the voltage that its duty should bring. */
+static inline bool circuit_window_compares(const circuit_window_t *window)
+{
+    return window->tells && window->expected_mv >= CIRCUIT_WINDOW_LEAST_MV;
+}
+
 /* One tick: the duty (steps of 800) that was applied in it and, if valid, what was read at its end.
  * Above CIRCUIT_CHECK_MOST counts as that, below 0 as 0. fixed_mohm: shunt and wiring. */
 void circuit_check_take(circuit_check_t *check, uint16_t fixed_mohm, uint16_t duty, bool valid,

@@ -5,7 +5,6 @@
 #define SHARE_Q7 128.0f
 #define OWN_Q12  4096.0f
 #define OWN_MOST 8191.0f
-#define LEAST_MV 100.0f /* below it, offsets are most of what differs */
 /* Offsets of both readings; a diode's drop moves with current and heat. */
 #define OFFSETS_MV 25.0f
 #define DROP_PART  0.15f
@@ -55,7 +54,7 @@ bool circuit_peers_judge(circuit_peers_t *peers, uint8_t springs, uint8_t k,
                          const current_control_parameters_t *circuit)
 {
     circuit_peer_t *own = &peers->spring[k];
-    if (!window->tells || window->expected_mv < LEAST_MV) {
+    if (!circuit_window_compares(window)) {
         own->share_q7 = 0;
         return own->odd >= CIRCUIT_PEERS_WINDOWS;
     }
@@ -97,7 +96,7 @@ void circuit_peers_suspect(circuit_peers_t *peers, uint8_t spring, uint16_t befo
     circuit_peer_t *own = &peers->spring[spring];
     if (own->odd < CIRCUIT_PEERS_WINDOWS) {
         own->odd = CIRCUIT_PEERS_WINDOWS;
-        own->was_q7 = to_q7((float)before_q12 / 4096.0f);
+        own->was_q7 = to_q7((float)before_q12 / OWN_Q12);
     }
 }
 

@@ -4,7 +4,6 @@
 
 #define Q12         4096.0f
 #define MOST        65535.0f
-#define LEAST_MV    100.0f
 #define NOISE_MV    4.0f  /* a step of the voltage's register */
 #define CHANGE_PART 0.10f /* of its resistance, that a spring makes in three windows */
 /* As others switch, and what a contact makes of it where the wiring is not as declared. */
@@ -32,8 +31,7 @@ bool circuit_step_judge(circuit_step_t *step, const circuit_window_t *window,
 {
     const float fixed_ohm = 1e-3f * (float)((uint32_t)circuit->shunt_mohm + circuit->wiring_mohm);
     const float spring_mv = window->found_mv - fixed_ohm * window->current_ma;
-    if (!window->tells || window->expected_mv < LEAST_MV || spring_mv < NOISE_MV ||
-        window->current_ma < 1.0f) {
+    if (!circuit_window_compares(window) || spring_mv < NOISE_MV || window->current_ma < 1.0f) {
         *step = (circuit_step_t){0};
         return false;
     }

@@ -1,5 +1,7 @@
 #include "temperature_ceiling.h"
 
+#include "sum16.h"
+
 /* The rise that trips the model is this share of the one that trips the ceiling: as hot as declared
  * numbers make an array whose heat capacity, losses, couplings and transformation are off by as
  * much as bench/worlds draws them, the ceiling stays a tenth below. */
@@ -31,26 +33,14 @@ static int16_t c7_of(int32_t temperature_c23)
     return (int16_t)(temperature_c23 >> 16);
 }
 
-static uint16_t add_bytes(uint16_t sum, const void *bytes, uint8_t length)
-{
-    const uint8_t *const octet = bytes;
-    for (uint8_t n = 0; n < length;
-         n = (uint8_t)(n + 2u)) { /* halves of what is 2 or 4 bytes long */
-        const uint16_t two = (uint16_t)(octet[n] | (uint16_t)octet[n + 1u] << 8u);
-        sum = (uint16_t)((uint16_t)(sum << 1u | sum >> 15u) + two);
-    }
-    return sum;
-}
-
-/* Any one bit shows, and bytes that are all 0 were never sealed. */
 static uint16_t checksum(const temperature_ceiling_t *c, uint8_t k)
 {
-    uint16_t sum = 0x5EA1u;
-    sum = add_bytes(sum, &c->temperature_c23[k], sizeof c->temperature_c23[k]);
-    sum = add_bytes(sum, &c->austenite[k], sizeof c->austenite[k]);
-    sum = add_bytes(sum, &c->spared_w[k], sizeof c->spared_w[k]);
-    sum = add_bytes(sum, &c->spared_per_s[k], sizeof c->spared_per_s[k]);
-    return add_bytes(sum, &c->rest_turns[k], sizeof c->rest_turns[k]);
+    uint16_t sum = SUM16_START;
+    sum = sum16_add_bytes(sum, &c->temperature_c23[k], sizeof c->temperature_c23[k]);
+    sum = sum16_add_bytes(sum, &c->austenite[k], sizeof c->austenite[k]);
+    sum = sum16_add_bytes(sum, &c->spared_w[k], sizeof c->spared_w[k]);
+    sum = sum16_add_bytes(sum, &c->spared_per_s[k], sizeof c->spared_per_s[k]);
+    return sum16_add_bytes(sum, &c->rest_turns[k], sizeof c->rest_turns[k]);
 }
 
 static void seal(temperature_ceiling_t *c, uint8_t k)

@@ -4,12 +4,6 @@
 
 #include "prove.h"
 
-static void any_settings(current_control_parameters_t *values)
-{
-#define CURRENT PROVE_ANY
-#include "parameters.def"
-}
-
 /* Frama-C knows its declaration only. */
 float fmaxf(float a, float b)
 {
@@ -20,7 +14,7 @@ void main(void)
 {
     circuit_check_t check = {0};
     current_control_parameters_t settings;
-    any_settings(&settings);
+    any_circuit(&settings);
     while (any_bool()) {
         for (uint8_t tick = 0; tick < CIRCUIT_CHECK_TICKS; tick++) {
             circuit_check_take(&check, any_u16(), (uint16_t)any_between(0, 800), any_bool(),

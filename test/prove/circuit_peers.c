@@ -6,17 +6,11 @@
 
 #define MOST_MV 20000.0f /* 4.1 A and wiring beside 4.1 V; the highest declared supply */
 
-static void any_settings(current_control_parameters_t *values)
-{
-#define CURRENT PROVE_ANY
-#include "parameters.def"
-}
-
 void main(void)
 {
     circuit_peers_t peers = {0};
     current_control_parameters_t settings;
-    any_settings(&settings);
+    any_circuit(&settings);
     while (any_bool()) {
         const circuit_window_t window = {
             .found_mv = Frama_C_float_interval(0.0f, MOST_MV),

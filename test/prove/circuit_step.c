@@ -3,12 +3,6 @@
 
 #include "prove.h"
 
-static void any_settings(current_control_parameters_t *values)
-{
-#define CURRENT PROVE_ANY
-#include "parameters.def"
-}
-
 /* Frama-C knows its declaration only. */
 float fminf(float a, float b)
 {
@@ -19,7 +13,7 @@ void main(void)
 {
     circuit_step_t step = {0};
     current_control_parameters_t settings;
-    any_settings(&settings);
+    any_circuit(&settings);
     while (any_bool()) {
         const circuit_window_t window = {
             .found_mv = Frama_C_float_interval(0.0f, 13000.0f),

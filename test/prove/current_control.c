@@ -6,12 +6,6 @@
 
 #include "prove.h"
 
-static void any_settings(current_control_parameters_t *values)
-{
-#define CURRENT PROVE_ANY
-#include "parameters.def"
-}
-
 void main(void)
 {
     current_control_t control;
@@ -19,7 +13,7 @@ void main(void)
     uint16_t target_ma[CURRENT_CONTROL_MAX_CHANNELS], duty[CURRENT_CONTROL_MAX_CHANNELS];
     int16_t measured_ma[CURRENT_CONTROL_MAX_CHANNELS];
     bool valid[CURRENT_CONTROL_MAX_CHANNELS];
-    any_settings(&settings);
+    any_circuit(&settings);
     if (!current_control_init(&control, &settings, NULL)) {
         return;
     }
@@ -27,7 +21,7 @@ void main(void)
         const uint8_t channel = (uint8_t)any_between(0, CURRENT_CONTROL_MAX_CHANNELS - 1);
         switch (any_u8()) {
         case 0:
-            any_settings(&settings);
+            any_circuit(&settings);
             (void)current_control_apply(&control, &settings, NULL);
             break;
         case 1:

@@ -60,4 +60,11 @@ static inline int32_t any_s32(void)
             PROVE_WHOLE(low, decimals), PROVE_WHOLE(high, decimals));                              \
     }
 
+/* Those of the circuit: shunt, wiring, supply, diode. */
+static inline void any_circuit(current_control_parameters_t *values)
+{
+#define CURRENT PROVE_ANY
+#include "parameters.def"
+}
+
 #endif

@@ -178,17 +178,15 @@ void loss_that_is_too_far_off_is_misread(void)
     truth.contact_ohm = 0.0;
     const float before_c = believed_c();
     hold(16.0, 30.0);
-    const spring_sight_t *last = spring_sights_from(
-        spring_estimator_sights(&estimator), 0, spring_estimator_sights(&estimator)->numbers - 1u);
     (void)snprintf(where, sizeof where, "lost %.3f: %.1f, then %.1f degC, sight %u",
                    (double)spring_estimator_lost(BELIEF), (double)before_c, (double)believed_c(),
-                   last->kind);
+                   newest()->kind);
     TEST_ASSERT_EQUAL_FLOAT_MESSAGE(0.0f, spring_estimator_lost(BELIEF), where);
     TEST_ASSERT_FLOAT_WITHIN_MESSAGE(2.0f, before_c, believed_c(), where);
     TEST_ASSERT_EQUAL_FLOAT_MESSAGE(0.0f, spring_estimator_doubt_k(BELIEF), where);
     TEST_ASSERT_TRUE_MESSAGE(INSIDE.unsteady > 0, where); /* a second and third time: loose */
-    TEST_ASSERT_EQUAL_UINT8_MESSAGE(SPRING_SIGHT_JUMPED, last->kind, where);
-    TEST_ASSERT_TRUE_MESSAGE(last->read < -100, where);
+    TEST_ASSERT_EQUAL_UINT8_MESSAGE(SPRING_SIGHT_JUMPED, newest()->kind, where);
+    TEST_ASSERT_TRUE_MESSAGE(newest()->read < -100, where);
 }
 
 /* It seemed to lose phase where a contact had jumped: what the heating seems to take up to

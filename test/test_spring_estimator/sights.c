@@ -15,7 +15,7 @@ static const spring_sight_t *sight_at(unsigned at)
     return &spring_estimator_sights(&estimator)->sight[at];
 }
 
-static const spring_sight_t *newest(void)
+const spring_sight_t *newest(void)
 {
     return sight_at(spring_estimator_sights(&estimator)->count - 1u);
 }

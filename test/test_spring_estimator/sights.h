@@ -6,6 +6,8 @@
 
 #include "spring_sights.h"
 
+/* The last one that was noted; there must be one. */
+const spring_sight_t *newest(void);
 /* A sight of that kind is among those that are kept. */
 bool is_noted(spring_sight_kind_t kind);
 

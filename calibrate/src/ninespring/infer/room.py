@@ -97,12 +97,12 @@ def believed(runs: Sequence[Run]) -> list[tuple[float, float]]:
 
     A run that began warm was in a room as warm as those of the others were.
     """
-    began = rested(runs)
-    rooms = [first_c(run) for run, cold in zip(runs, began, strict=True) if cold]
+    began = list(zip(map(first_c, runs), rested(runs), strict=True))
+    rooms = [first for first, cold in began if cold]
     if not rooms:
         return [(-math.inf, math.inf)] * len(runs)
     usual, off = float(np.mean(rooms)), 3.0 * ROOMS_K
-    about = [(first_c(run), 2.0 * MOVES_K) if cold else (usual, off) for run, cold in zip(runs, began, strict=True)]
+    about = [(first, 2.0 * MOVES_K) if cold else (usual, off) for first, cold in began]
     return [(middle - off, middle + off) for middle, off in about]
 
 
