@@ -202,14 +202,18 @@ static void heat(drive_policy_t *policy, const drive_policy_input_t *in, uint8_t
         return;
     }
     const bool slows = !full && c7 > points.austenite_start_c7 - 128;
-    /* what it keeps it keeps until its turn: else what its current reads could take it away */
+    /* what it keeps it keeps until its turn: else what its current reads could take it away. It may
+     * have begun to lose phase: then it waits where it loses no more */
     const bool keeps =
         waits_for_supply(s) && (s->floor_ma != 0 || c7 > points.austenite_start_c7 + KEPT_C7 ||
                                 phase_of(in, k) > 0.5f * level);
     s->floor_ma = 0;
     if (slows || keeps) {
+        const float safe_c =
+            spring_c(points.martensite_start_c7) + kelvin(policy->parameters.hold_margin_cc);
+        const float short_k = full ? fmaxf(safe_c - now_c(in, k), 0.0f) : 0.0f;
         const uint16_t keeps_ma =
-            hold_current_ma(policy, in, k, 0.0f, slows ? LEVEL_POWER_W : 0.0f);
+            hold_current_ma(policy, in, k, short_k, slows ? LEVEL_POWER_W : 0.0f);
         if (slows && keeps_ma < s->wanted_ma) {
             s->wanted_ma = keeps_ma;
         }

@@ -525,9 +525,11 @@ bool spring_estimator_lacks_phase(const spring_belief_t *b, const thermal_model_
         return false;
     }
     const int16_t finish_c7 = thermal_model_transformation(model, k).austenite_finish_c7;
-    const float above_k = fabsf(spring_now_c(model, k) - spring_c(finish_c7));
-    const float explained =
-        EXPLAINED_LEAST + SPRING_ESTIMATOR_BOUND_SDS * b->noise + COEFFICIENT_MOST_PER_K * above_k;
+    const float hotter_k = spring_now_c(model, k) - spring_c(finish_c7);
+    /* a coefficient makes it more where it is hotter */
+    const float explains_k = fmaxf(l->change < 0.0f ? hotter_k : -hotter_k, 0.0f);
+    const float explained = EXPLAINED_LEAST + SPRING_ESTIMATOR_BOUND_SDS * b->noise +
+                            COEFFICIENT_MOST_PER_K * explains_k;
     const float less = 1.0f - b->ohm / l->austenite_ohm;
     return (l->change < 0.0f ? -less : less) > explained;
 }
@@ -570,6 +572,13 @@ bool spring_estimator_has_transformed(const spring_estimator_t *e, const thermal
     return surely_finished(b, model, k, sds);
 }
 
+/* Its own austenite's resistance, and nothing beyond it that a contact may have added. */
+static bool reads_as_learnt(const spring_belief_t *b)
+{
+    const float austenite_ohm = b->learnt.austenite_ohm;
+    return fabsf(b->ohm - austenite_ohm) < SPRING_ESTIMATOR_BOUND_SDS * b->noise * austenite_ohm;
+}
+
 void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, uint8_t k,
                                  bool full)
 {
@@ -581,6 +590,7 @@ void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, 
     const spring_before_t before = spring_before(b, model, k);
     const bool unseen = full && b->heating && b->possible != SPRING_PHASE_AUSTENITE;
     b->unproven = full && b->gone_k > 0.0f && b->possible != SPRING_PHASE_AUSTENITE &&
+                  !reads_as_learnt(b) &&
                   thermal_model_temperature_c7(model, k) <
                       thermal_model_transformation(model, k).austenite_finish_c7;
     if (full && b->possible != SPRING_PHASE_AUSTENITE) {

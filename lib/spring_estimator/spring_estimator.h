@@ -176,7 +176,9 @@ typedef struct {
     uint8_t stiffness_turn; /* whose stiffness is looked at next */
     uint16_t seal[SPRING_ESTIMATOR_MAX_SPRINGS]; /* checksums, of each belief and what is shared */
     uint16_t shared_seal;
-    /* what all springs share: one was found colder than anything known explains */
+    /* what all springs share */
+    float r_phase_odds; /* that cooling leads through an intermediate phase: log of them */
+    /* one was found colder than anything known explains */
     uint16_t stepped_turns; /* of all springs: for so many more it counts as lately */
     uint8_t stepped_spring;
     uint8_t broken_seals;   /* found so far, saturating: what was believed had changed by itself */

@@ -178,12 +178,16 @@ static void follow(spring_belief_t *b, float left)
     b->run.line.variance -= 2.0f * b->run.line.variance * LINE_SHARE;
 }
 
+static bool is_other_way(const spring_belief_t *b, float left)
+{
+    return left * b->learnt.change > 0.0f;
+}
+
 /* Of what the resistance has left its line by, the part that lost phase may explain; the other way
  * it is an intermediate phase's. */
 static float as_lost(const spring_belief_t *b, float left)
 {
-    const float less = b->learnt.change < 0.0f ? left : -left;
-    return less > 0.0f ? less : -less * (1.0f / OTHER_WAY);
+    return is_other_way(b, left) ? fabsf(left) * (1.0f / OTHER_WAY) : fabsf(left);
 }
 
 /* Noise that the average does not take away, as it is slower than a turn. Second differences, 4 s
@@ -277,6 +281,11 @@ void spring_holding_watch(spring_estimator_t *e, spring_belief_t *b, thermal_mod
     }
     b->losing = b->losing < UINT8_MAX ? (uint8_t)(b->losing + 1) : UINT8_MAX;
     if (changed2 > sure2 || b->losing >= LASTING_TURNS) {
+        const bool other_way = is_other_way(b, left);
+        if (!spring_other_way_is_phase(e, other_way) && other_way) {
+            begin_line(b, true, share);
+            return;
+        }
         const float per_change = 1.0f / fabsf(b->learnt.change);
         const float sd = sqrtf(may_move_squared(b)) / SPRING_ESTIMATOR_BOUND_SDS;
         if (is_misread(b, model, k, changed * per_change)) {

@@ -15,9 +15,9 @@ static uint16_t checksum_of(const spring_estimator_t *e, uint8_t k)
 /* Of the sights what finds them: their own words decide nothing. */
 static uint16_t checksum_of_shared(const spring_estimator_t *e)
 {
-    return sum16_add_bytes(SUM16_START, &e->stepped_turns,
+    return sum16_add_bytes(SUM16_START, &e->r_phase_odds,
                            offsetof(spring_estimator_t, sights) + offsetof(spring_sights_t, sight) -
-                               offsetof(spring_estimator_t, stepped_turns));
+                               offsetof(spring_estimator_t, r_phase_odds));
 }
 
 bool spring_is_sound(const spring_estimator_t *e, uint8_t k)
@@ -37,6 +37,7 @@ void spring_count_broken(spring_estimator_t *e)
 
 void spring_begin_shared(spring_estimator_t *e)
 {
+    spring_begin_alloy(e);
     e->stepped_turns = 0;
     e->stepped_spring = 0;
     e->sights.turn = 0;
