@@ -206,6 +206,12 @@ void thermal_model_get_state(const thermal_model_t *model, thermal_model_state_t
  */
 bool thermal_model_set_state(thermal_model_t *model, const thermal_model_state_t *state);
 
+/* What a model of as many springs but other parameters remembered, with the austenite that it had
+ * of each (thermal_model_austenite): temperatures stay, and phases, as far as the parameters have
+ * them there. O(n); divides. */
+void thermal_model_take_over(thermal_model_t *model, const thermal_model_state_t *state,
+                             const uint16_t austenite[]);
+
 /* What the fan decides is taken from those anew. O(n), no division. */
 void thermal_model_refresh(thermal_model_t *model);
 
