@@ -174,14 +174,38 @@ static bool apply_policy(controller_t *controller, const drive_policy_parameters
     return true;
 }
 
-/* The remembered state suits the new parameters as it is, or temperature by temperature. */
-static void restore(thermal_model_t *model, const thermal_model_state_t *state, uint8_t springs)
+/* By the model that is declared until now. */
+typedef struct {
+    thermal_model_state_t state;
+    uint8_t fan_percent;
+    uint16_t austenite[CONTROLLER_MAX_SPRINGS];
+    float gives_w[CONTROLLER_MAX_SPRINGS];
+    temperature_ceiling_declared_t declared[CONTROLLER_MAX_SPRINGS];
+} before_t;
+
+static void look_at_model(const thermal_model_t *model, before_t *before)
 {
-    if (thermal_model_set_state(model, state)) {
-        return;
+    thermal_model_get_state(model, &before->state);
+    before->fan_percent = model->fan_percent;
+    for (uint8_t k = 0; k < model->springs; k++) {
+        before->austenite[k] = thermal_model_austenite(model, k);
+        before->gives_w[k] = spring_estimator_declared_w(model, k);
+        before->declared[k] = temperature_ceiling_declared(model, k);
     }
-    for (uint8_t k = 0; k < springs; k++) {
-        thermal_model_set_temperature(model, k, (int16_t)(state->spring[k].temperature_c23 >> 16));
+}
+
+/* Other parameters, or the same anew: the springs are what they were. */
+static void go_on(controller_t *controller, const before_t *before, bool same_model)
+{
+    thermal_model_t *model = &controller->model;
+    thermal_model_set_ambient(model, controller->ambient_c7);
+    thermal_model_set_fan(model, before->fan_percent);
+    if (!thermal_model_set_state(model, &before->state)) {
+        thermal_model_take_over(model, &before->state, before->austenite);
+    }
+    for (uint8_t k = 0; !same_model && k < controller->springs; k++) {
+        temperature_ceiling_declare(&controller->ceiling, model, k, &before->declared[k]);
+        spring_estimator_keep_loss(&controller->estimator, model, k, before->gives_w[k]);
     }
 }
 
@@ -193,25 +217,15 @@ bool controller_apply_settings(controller_t *controller, const controller_settin
         return false; /* not even how many springs there are is known */
     }
     const thermal_model_parameters_t *old = &controller->model.parameters;
-    const uint16_t mark = controller_model_mark(controller);
     bool same_size = settings->model.rows == old->rows && settings->model.columns == old->columns;
-    thermal_model_state_t state;
-    int32_t held_uw[CONTROLLER_MAX_SPRINGS];
-    thermal_model_get_state(&controller->model, &state);
-    for (uint8_t k = 0; k < controller->springs; k++) {
-        held_uw[k] = temperature_ceiling_hold_uw(&controller->ceiling, &controller->model, k);
-    }
+    bool same_model = memcmp(&settings->model, old, sizeof *old) == 0;
+    before_t before;
+    look_at_model(&controller->model, &before);
     if (!check(settings, bad) || !init_model(&controller->model, &settings->model, bad)) {
         return false;
     }
     if (same_size) {
-        thermal_model_set_ambient(&controller->model, controller->ambient_c7);
-        restore(&controller->model, &state, controller->springs);
-        for (uint8_t k = 0; k < controller->springs; k++) {
-            temperature_ceiling_keep_loss(
-                &controller->ceiling, &controller->model, k, held_uw[k],
-                temperature_ceiling_hold_uw(&controller->ceiling, &controller->model, k));
-        }
+        go_on(controller, &before, same_model);
         if (memcmp(&controller->current.parameters, &settings->current, sizeof settings->current) !=
             0) {
             controller->peers = (circuit_peers_t){0}; /* it is another circuit */
@@ -221,10 +235,6 @@ bool controller_apply_settings(controller_t *controller, const controller_settin
         temperature_ceiling_prepare(&controller->drive, &controller->model, &settings->current);
         (void)safety_apply(&controller->safety, &settings->safety, NULL);
         (void)apply_policy(controller, &settings->policy);
-        const bool other_model = mark != controller_model_mark(controller);
-        for (uint8_t k = 0; other_model && k < controller->springs; k++) {
-            controller_forget_loss(controller, k);
-        }
         tell_resistances(controller);
         scrub_seal(&controller->scrub, controller_fixed, controller); /* all of it is new */
         return true;
