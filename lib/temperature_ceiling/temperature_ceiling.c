@@ -13,7 +13,9 @@
 
 #define GIVEN_W 0.01f /* more than a sensor's offset makes of nothing */
 
-#define WHOLE_SHARE 255u /* of loss_share, capacity_share */
+#define WHOLE_SHARE 255u       /* of loss_share, capacity_share */
+#define ODD_SHARE   170u       /* two thirds: a fifth less of one, and a fifth more of the other */
+#define ODD_C7      (20 * 128) /* of air, in a hold: a fifth of the losses is 13 K of it */
 /* Between these the declared loss is compared. */
 #define COOL_C 20
 #define HOT_C  120
@@ -215,6 +217,13 @@ void temperature_ceiling_declare(temperature_ceiling_t *ceiling, const thermal_m
             share_of(ceiling->capacity_share[k], before->capacity_j_per_k, now.capacity_j_per_k);
     }
     seal(ceiling, k);
+}
+
+bool temperature_ceiling_contradicts(const temperature_ceiling_t *ceiling,
+                                     const thermal_model_t *model, uint8_t k)
+{
+    return ceiling->loss_share[k] < ODD_SHARE || ceiling->capacity_share[k] < ODD_SHARE ||
+           thermal_model_ambient_c7(model) < ceiling->ambient_c7 - ODD_C7;
 }
 
 /* What is declared that it gives off, beside the model's neighbours, W. */

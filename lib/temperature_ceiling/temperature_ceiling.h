@@ -63,6 +63,11 @@ temperature_ceiling_declared_t temperature_ceiling_declared(const thermal_model_
 void temperature_ceiling_declare(temperature_ceiling_t *ceiling, const thermal_model_t *model,
                                  uint8_t spring, const temperature_ceiling_declared_t *before);
 
+/* What is declared now is not what was since the springs were cold: a loss or heat capacity of half
+ * as much again, or air that is 20 K colder. No tolerance explains both. */
+bool temperature_ceiling_contradicts(const temperature_ceiling_t *ceiling,
+                                     const thermal_model_t *model, uint8_t spring);
+
 /* One spring's step of TEMPERATURE_CEILING_TURN_S with the mean power of that time: the model's
  * declared numbers, but of its state only air and plate, which nothing corrects. */
 void temperature_ceiling_step(temperature_ceiling_t *ceiling, const thermal_model_t *model,

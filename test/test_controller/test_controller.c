@@ -484,6 +484,45 @@ static void a_drive_after_larger_losses_goes_by_the_smaller_until_all_are_cold(v
     TEST_ASSERT_FLOAT_WITHIN(10.0f, controller_delivered_c(&controller, 4) + 8.0f, warm_c);
 }
 
+/* 2.35 A take it beyond 120 degC by what was declared as it became warm, and the belief is talked
+ * away: the ceiling ends that at the trip, or a ninth above temperature_limit_c where another
+ * declaration contradicts. */
+static void where_declarations_contradict_the_ceiling_trips_at_the_limit(void)
+{
+    static const struct {
+        float loss, capacity;
+        int16_t air_c7;
+        bool trips;
+    } row[] = {{1.0f, 1.0f, AMBIENT_C7, false},
+               {2.0f, 1.0f, AMBIENT_C7, true},
+               {1.0f, 4.0f, AMBIENT_C7, true},
+               {1.0f, 1.0f, -30 * 128, true}};
+    for (unsigned n = 0; n < sizeof row / sizeof row[0]; n++) {
+        setUp();
+        settings.policy.open_current_ma = 2350;
+        start();
+        controller_set_target(&controller, 4, 1000);
+        run(50u * 60u);
+        settings.model.loss_uw_per_k = (uint16_t)(row[n].loss * settings.model.loss_uw_per_k);
+        settings.model.heat_capacity_mj_per_k =
+            (uint16_t)(row[n].capacity * settings.model.heat_capacity_mj_per_k);
+        TEST_ASSERT_TRUE(controller_apply_settings(&controller, &settings, NULL));
+        inputs.ambient_c7 = row[n].air_c7;
+        for (uint32_t m = 0; m < 50u * 240u; m++) {
+            thermal_model_set_temperature(&controller.model, 4, 30 * 128);
+            run(1);
+            if (controller_fault(&controller, 4) != SAFETY_FAULT_NONE) {
+                break;
+            }
+        }
+        const float limit_c = 20.0f + 90.0f / 0.9f;
+        TEST_ASSERT_EQUAL(row[n].trips ? SAFETY_FAULT_OVER_TEMPERATURE : SAFETY_FAULT_NONE,
+                          controller_fault(&controller, 4));
+        TEST_ASSERT_TRUE(controller_delivered_c(&controller, 4) > limit_c - 0.5f);
+        TEST_ASSERT_TRUE(!row[n].trips || controller_delivered_c(&controller, 4) < limit_c + 3.0f);
+    }
+}
+
 /* It answers, converts, and shows the same for ever. */
 static void frozen_sensor_is_found_within_two_seconds_and_stops_its_spring_alone(void)
 {
@@ -1019,6 +1058,7 @@ int main(void)
     RUN_TEST(a_hint_is_taken_once_it_has_cooled);
     RUN_TEST(ceiling_lets_a_current_pass_that_cannot_overheat);
     RUN_TEST(a_drive_after_larger_losses_goes_by_the_smaller_until_all_are_cold);
+    RUN_TEST(where_declarations_contradict_the_ceiling_trips_at_the_limit);
     RUN_TEST(frozen_sensor_is_found_within_two_seconds_and_stops_its_spring_alone);
     RUN_TEST(another_shunt_is_found_before_it_is_hot);
     RUN_TEST(who_clears_again_and_again_heats_no_spring_whose_sensor_lies);

@@ -178,6 +178,29 @@ static void what_flows_to_neighbours_and_plate_is_no_declared_loss(void)
     TEST_ASSERT_EQUAL_FLOAT(0.3f, temperature_ceiling_declared(&model, 4).capacity_j_per_k);
 }
 
+/* Each alone, from the edge on. */
+static void two_declarations_contradict_where_no_tolerance_explains_both(void)
+{
+    static const struct {
+        float loss, capacity;
+        int16_t air_c7;
+        bool contradicts;
+    } row[] = {{1.0f, 1.0f, 20 * 128, false}, {1.48f, 1.48f, 20 * 128, false},
+               {1.55f, 1.0f, 20 * 128, true}, {1.0f, 1.55f, 20 * 128, true},
+               {1.0f, 1.0f, 0, false},        {1.0f, 1.0f, -1, true},
+               {0.3f, 0.5f, 45 * 128, false}};
+    for (unsigned n = 0; n < sizeof row / sizeof row[0]; n++) {
+        setUp();
+        run(0.6f, 600000u, 60.0f);
+        declare(row[n].loss, row[n].capacity);
+        thermal_model_set_ambient(&model, row[n].air_c7);
+        for (uint8_t k = 0; k < 9; k++) {
+            TEST_ASSERT_EQUAL(row[n].contradicts,
+                              temperature_ceiling_contradicts(&ceiling, &model, k));
+        }
+    }
+}
+
 /* As hot as the model may be at rest, it does not trip; with a fifth more power it does. */
 static void it_trips_a_ninth_above_the_model(void)
 {
@@ -505,6 +528,7 @@ int main(void)
     RUN_TEST(no_correction_of_the_model_lowers_it);
     RUN_TEST(of_warm_springs_the_more_careful_numbers_count);
     RUN_TEST(what_was_declared_is_over_when_it_is_taken_back_or_all_are_cold);
+    RUN_TEST(two_declarations_contradict_where_no_tolerance_explains_both);
     RUN_TEST(what_flows_to_neighbours_and_plate_is_no_declared_loss);
     RUN_TEST(it_trips_a_ninth_above_the_model);
     RUN_TEST(a_trip_beyond_the_model_still_trips);
