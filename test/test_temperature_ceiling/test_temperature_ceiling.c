@@ -199,6 +199,16 @@ static void two_declarations_contradict_where_no_tolerance_explains_both(void)
                               temperature_ceiling_contradicts(&ceiling, &model, k));
         }
     }
+    temperature_ceiling_begin(&ceiling, 20 * 128);
+    for (uint8_t share = 168; share < 173; share++) { /* two thirds of 255 are still none */
+        uint8_t *const shares[] = {&ceiling.loss_share[1], &ceiling.capacity_share[2]};
+        for (uint8_t k = 0; k < 2; k++) {
+            *shares[k] = share;
+            TEST_ASSERT_EQUAL(share < 170,
+                              temperature_ceiling_contradicts(&ceiling, &model, (uint8_t)(k + 1u)));
+            *shares[k] = 255;
+        }
+    }
 }
 
 /* As hot as the model may be at rest, it does not trip; with a fifth more power it does. */
@@ -456,6 +466,7 @@ static void a_hotter_model_raises_it_and_a_colder_one_does_not(void)
         TEST_ASSERT_EQUAL_UINT16(0, ceiling.rest_turns[k]);
         TEST_ASSERT_TRUE(temperature_ceiling_is_warm(&ceiling, k));
         TEST_ASSERT_EQUAL_UINT16(TEMPERATURE_CEILING_NEVER, ceiling.rest_turns[(k + 1) % 9]);
+        TEST_ASSERT_EQUAL_INT32(20 * 128 * 65536, ceiling.temperature_c23[9]); /* of no spring */
         ceiling.austenite[k] = 5000; /* one that is as hot changes nothing */
         seal_all();
         temperature_ceiling_raise(&ceiling, &model);
