@@ -178,6 +178,22 @@ static void what_flows_to_neighbours_and_plate_is_no_declared_loss(void)
     TEST_ASSERT_EQUAL_FLOAT(0.3f, temperature_ceiling_declared(&model, 4).capacity_j_per_k);
 }
 
+/* Half a kelvin of heat beyond austenite start is 0.5 of the 38.8 that a whole transformation
+ * takes. */
+static void transformation_begins_at_its_start(void)
+{
+    for (int side = -1; side <= 1; side += 2) {
+        setUp();
+        ceiling.temperature_c23[4] = (int32_t)((88.0 + 0.5 * side) * 8388608.0);
+        ceiling.delivered = true;
+        seal_all();
+        const int32_t held_uw =
+            thermal_model_power_to_hold_uw(&model, 4, (int16_t)(ceiling.temperature_c23[4] >> 16));
+        temperature_ceiling_step(&ceiling, &model, 4, 1e-6f * (float)held_uw);
+        TEST_ASSERT_UINT16_WITHIN(4, side > 0 ? 422 : 0, ceiling.austenite[4]);
+    }
+}
+
 /* Each alone, from the edge on. */
 static void two_declarations_contradict_where_no_tolerance_explains_both(void)
 {
@@ -539,6 +555,7 @@ int main(void)
     RUN_TEST(no_correction_of_the_model_lowers_it);
     RUN_TEST(of_warm_springs_the_more_careful_numbers_count);
     RUN_TEST(what_was_declared_is_over_when_it_is_taken_back_or_all_are_cold);
+    RUN_TEST(transformation_begins_at_its_start);
     RUN_TEST(two_declarations_contradict_where_no_tolerance_explains_both);
     RUN_TEST(what_flows_to_neighbours_and_plate_is_no_declared_loss);
     RUN_TEST(it_trips_a_ninth_above_the_model);
