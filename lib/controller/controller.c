@@ -174,39 +174,30 @@ static bool apply_policy(controller_t *controller, const drive_policy_parameters
     return true;
 }
 
-/* By the model that is declared until now. */
+/* Of a spring, by the model that is declared until now. */
 typedef struct {
-    thermal_model_state_t state;
-    uint8_t fan_percent;
-    uint16_t austenite[CONTROLLER_MAX_SPRINGS];
-    float gives_w[CONTROLLER_MAX_SPRINGS];
-    temperature_ceiling_declared_t declared[CONTROLLER_MAX_SPRINGS];
-} before_t;
+    temperature_ceiling_declared_t ceiling;
+    float gives_w;
+} declared_t;
 
-static void look_at_model(const thermal_model_t *model, before_t *before)
+/* Other parameters of the model: the springs are what they were. */
+static bool declare(controller_t *controller, const thermal_model_parameters_t *parameters,
+                    uint16_t *bad)
 {
-    thermal_model_get_state(model, &before->state);
-    before->fan_percent = model->fan_percent;
-    for (uint8_t k = 0; k < model->springs; k++) {
-        before->austenite[k] = thermal_model_austenite(model, k);
-        before->gives_w[k] = spring_estimator_declared_w(model, k);
-        before->declared[k] = temperature_ceiling_declared(model, k);
+    thermal_model_t *const model = &controller->model;
+    declared_t before[CONTROLLER_MAX_SPRINGS];
+    for (uint8_t k = 0; k < controller->springs; k++) {
+        before[k].ceiling = temperature_ceiling_declared(model, k);
+        before[k].gives_w = spring_estimator_declared_w(model, k);
     }
-}
-
-/* Other parameters, or the same anew: the springs are what they were. */
-static void go_on(controller_t *controller, const before_t *before, bool same_model)
-{
-    thermal_model_t *model = &controller->model;
-    thermal_model_set_ambient(model, controller->ambient_c7);
-    thermal_model_set_fan(model, before->fan_percent);
-    if (!thermal_model_set_state(model, &before->state)) {
-        thermal_model_take_over(model, &before->state, before->austenite);
+    if (thermal_model_declare(model, parameters, bad) != THERMAL_MODEL_OK) {
+        return false;
     }
-    for (uint8_t k = 0; !same_model && k < controller->springs; k++) {
-        temperature_ceiling_declare(&controller->ceiling, model, k, &before->declared[k]);
-        spring_estimator_keep_loss(&controller->estimator, model, k, before->gives_w[k]);
+    for (uint8_t k = 0; k < controller->springs; k++) {
+        temperature_ceiling_declare(&controller->ceiling, model, k, &before[k].ceiling);
+        spring_estimator_keep_loss(&controller->estimator, model, k, before[k].gives_w);
     }
+    return true;
 }
 
 bool controller_apply_settings(controller_t *controller, const controller_settings_t *settings,
@@ -217,15 +208,14 @@ bool controller_apply_settings(controller_t *controller, const controller_settin
         return false; /* not even how many springs there are is known */
     }
     const thermal_model_parameters_t *old = &controller->model.parameters;
-    bool same_size = settings->model.rows == old->rows && settings->model.columns == old->columns;
-    bool same_model = memcmp(&settings->model, old, sizeof *old) == 0;
-    before_t before;
-    look_at_model(&controller->model, &before);
-    if (!check(settings, bad) || !init_model(&controller->model, &settings->model, bad)) {
+    if (!check(settings, bad)) {
         return false;
     }
-    if (same_size) {
-        go_on(controller, &before, same_model);
+    if (settings->model.rows == old->rows && settings->model.columns == old->columns) {
+        if (memcmp(&settings->model, old, sizeof *old) != 0 &&
+            !declare(controller, &settings->model, bad)) {
+            return false;
+        }
         if (memcmp(&controller->current.parameters, &settings->current, sizeof settings->current) !=
             0) {
             controller->peers = (circuit_peers_t){0}; /* it is another circuit */
@@ -238,6 +228,9 @@ bool controller_apply_settings(controller_t *controller, const controller_settin
         tell_resistances(controller);
         scrub_seal(&controller->scrub, controller_fixed, controller); /* all of it is new */
         return true;
+    }
+    if (!init_model(&controller->model, &settings->model, bad)) {
+        return false;
     }
     uint8_t board_fault = controller->safety.board_fault;
     bool locked = controller->safety.locked;

@@ -569,18 +569,16 @@ static void place(const thermal_model_t *model, const thermal_model_transformati
     state->cooling_c7 = heats || rests ? points->martensite_start_c7 : temperature_c7;
 }
 
-void thermal_model_take_over(thermal_model_t *model, const thermal_model_state_t *state,
-                             const uint16_t austenite[])
+void thermal_model_fit_state(thermal_model_t *model, const uint16_t austenite[])
 {
-    model->state.air_c23 = state->air_c23;
-    model->state.plate_c23 = state->plate_c23;
-    model->air.midstep_c6 = c6_of(c7_of(state->air_c23));
-    model->plate.midstep_c6 = c6_of(c7_of(state->plate_c23));
     thermal_model_set_ambient(model, model->ambient_c7); /* where there is no air or plate */
     for (spring_index_t i = 0; i < model->springs; i++) {
         const thermal_model_transformation_t points = thermal_model_transformation(model, i);
         thermal_model_spring_state_t *const own = &model->state.spring[i];
-        const int16_t was_c7 = c7_of(state->spring[i].temperature_c23);
+        if (spring_is_consistent(model, i, own)) {
+            continue;
+        }
+        const int16_t was_c7 = c7_of(own->temperature_c23);
         const int16_t now_c7 = was_c7 < model->highest_c7 ? was_c7 : model->highest_c7;
         place(model, &points, own, now_c7, austenite[i]);
         own->temperature_c23 = c23_of(now_c7);

@@ -150,6 +150,12 @@ thermal_model_status_t thermal_model_init(thermal_model_t *model,
                                           const thermal_model_parameters_t *parameters,
                                           uint16_t *bad);
 
+/* Other parameters of the same rows and columns: ambient, fan and temperatures stay, and phases, as
+ * far as the parameters have them there. Refuses as thermal_model_init. O(n); divides. */
+thermal_model_status_t thermal_model_declare(thermal_model_t *model,
+                                             const thermal_model_parameters_t *parameters,
+                                             uint16_t *bad);
+
 /* Springs, air and plate to one temperature, reached from cold: martensite below austenite start.
  * O(n). */
 void thermal_model_reset(thermal_model_t *model, int16_t temperature_c7);
@@ -205,12 +211,6 @@ void thermal_model_get_state(const thermal_model_t *model, thermal_model_state_t
 /* False, and the model unchanged, if and only if the state is not one this model could be in. O(n).
  */
 bool thermal_model_set_state(thermal_model_t *model, const thermal_model_state_t *state);
-
-/* What a model of as many springs but other parameters remembered, with the austenite that it had
- * of each (thermal_model_austenite): temperatures stay, and phases, as far as the parameters have
- * them there. O(n); divides. */
-void thermal_model_take_over(thermal_model_t *model, const thermal_model_state_t *state,
-                             const uint16_t austenite[]);
 
 /* What the fan decides is taken from those anew. O(n), no division. */
 void thermal_model_refresh(thermal_model_t *model);
