@@ -278,6 +278,11 @@ std::vector<injected> catalogue()
         {"console flooded", flood()},
         {"half lines", half_lines()},
         {"settings uploaded", upload()},
+        /* numbers that no spring has, of springs that are driven */
+        {"martensite start 2 K lower declared", {say(0, "$martensite_start_c=76")}},
+        {"losses x 3.4 declared", {say(0, "$loss_w_per_k=0.0197")}},
+        {"heat capacity x 10 declared", {say(0, "$heat_capacity_j_per_k=3")}},
+        {"air of -40 degC declared", {say(0, "ambient -40")}},
     };
 }
 

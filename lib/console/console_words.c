@@ -168,10 +168,12 @@ static console_error_t word_fan(console_t *console, const arguments_t *arguments
 
 static console_error_t word_ambient(console_t *console, const arguments_t *arguments)
 {
+    char name[SETTINGS_NAME_SIZE];
+    settings_name(PARAMETER_ambient_c, 0, name);
     console_hint_setting(console, CONSOLE_HINT_RANGE, PARAMETER_ambient_c, 0);
     console_open_settings(console);
     const console_error_t error =
-        console_error_of(settings_assign(console->settings, "ambient_c", arguments->argument[0]));
+        console_error_of(settings_assign(console->settings, name, arguments->argument[0]));
     console_seal_settings(console);
     return error;
 }

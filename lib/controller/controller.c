@@ -174,15 +174,30 @@ static bool apply_policy(controller_t *controller, const drive_policy_parameters
     return true;
 }
 
-/* The remembered state suits the new parameters as it is, or temperature by temperature. */
-static void restore(thermal_model_t *model, const thermal_model_state_t *state, uint8_t springs)
+/* Of a spring, by the model that is declared until now. */
+typedef struct {
+    temperature_ceiling_declared_t ceiling;
+    float gives_w;
+} declared_t;
+
+/* Other parameters of the model: the springs are what they were. */
+static bool declare(controller_t *controller, const thermal_model_parameters_t *parameters,
+                    uint16_t *bad)
 {
-    if (thermal_model_set_state(model, state)) {
-        return;
+    thermal_model_t *const model = &controller->model;
+    declared_t before[CONTROLLER_MAX_SPRINGS];
+    for (uint8_t k = 0; k < controller->springs; k++) {
+        before[k].ceiling = temperature_ceiling_declared(model, k);
+        before[k].gives_w = spring_estimator_declared_w(model, k);
     }
-    for (uint8_t k = 0; k < springs; k++) {
-        thermal_model_set_temperature(model, k, (int16_t)(state->spring[k].temperature_c23 >> 16));
+    if (thermal_model_declare(model, parameters, bad) != THERMAL_MODEL_OK) {
+        return false;
     }
+    for (uint8_t k = 0; k < controller->springs; k++) {
+        temperature_ceiling_declare(&controller->ceiling, model, k, &before[k].ceiling);
+        spring_estimator_keep_loss(&controller->estimator, model, k, before[k].gives_w);
+    }
+    return true;
 }
 
 bool controller_apply_settings(controller_t *controller, const controller_settings_t *settings,
@@ -193,24 +208,13 @@ bool controller_apply_settings(controller_t *controller, const controller_settin
         return false; /* not even how many springs there are is known */
     }
     const thermal_model_parameters_t *old = &controller->model.parameters;
-    const uint16_t mark = controller_model_mark(controller);
-    bool same_size = settings->model.rows == old->rows && settings->model.columns == old->columns;
-    thermal_model_state_t state;
-    int32_t held_uw[CONTROLLER_MAX_SPRINGS];
-    thermal_model_get_state(&controller->model, &state);
-    for (uint8_t k = 0; k < controller->springs; k++) {
-        held_uw[k] = temperature_ceiling_hold_uw(&controller->ceiling, &controller->model, k);
-    }
-    if (!check(settings, bad) || !init_model(&controller->model, &settings->model, bad)) {
+    if (!check(settings, bad)) {
         return false;
     }
-    if (same_size) {
-        thermal_model_set_ambient(&controller->model, controller->ambient_c7);
-        restore(&controller->model, &state, controller->springs);
-        for (uint8_t k = 0; k < controller->springs; k++) {
-            temperature_ceiling_keep_loss(
-                &controller->ceiling, &controller->model, k, held_uw[k],
-                temperature_ceiling_hold_uw(&controller->ceiling, &controller->model, k));
+    if (settings->model.rows == old->rows && settings->model.columns == old->columns) {
+        if (memcmp(&settings->model, old, sizeof *old) != 0 &&
+            !declare(controller, &settings->model, bad)) {
+            return false;
         }
         if (memcmp(&controller->current.parameters, &settings->current, sizeof settings->current) !=
             0) {
@@ -221,13 +225,12 @@ bool controller_apply_settings(controller_t *controller, const controller_settin
         temperature_ceiling_prepare(&controller->drive, &controller->model, &settings->current);
         (void)safety_apply(&controller->safety, &settings->safety, NULL);
         (void)apply_policy(controller, &settings->policy);
-        const bool other_model = mark != controller_model_mark(controller);
-        for (uint8_t k = 0; other_model && k < controller->springs; k++) {
-            controller_forget_loss(controller, k);
-        }
         tell_resistances(controller);
         scrub_seal(&controller->scrub, controller_fixed, controller); /* all of it is new */
         return true;
+    }
+    if (!init_model(&controller->model, &settings->model, bad)) {
+        return false;
     }
     uint8_t board_fault = controller->safety.board_fault;
     bool locked = controller->safety.locked;
@@ -326,8 +329,12 @@ static void raise_ceiling(controller_t *controller, uint8_t k)
                              measured_w > driven_w ? measured_w : driven_w);
     controller->heat_sum_uw[k] = 0;
     controller->duty_sum[k] = 0;
-    if (temperature_ceiling_trips(&controller->ceiling, k,
-                                  controller->safety.parameters.temperature_trip_cc)) {
+    /* where one of two declarations must be wrong, no belief by either of them is waited for */
+    const int16_t trip_cc =
+        temperature_ceiling_contradicts(&controller->ceiling, &controller->model, k)
+            ? controller->policy.parameters.temperature_limit_cc
+            : controller->safety.parameters.temperature_trip_cc;
+    if (temperature_ceiling_trips(&controller->ceiling, k, trip_cc)) {
         safety_trip(&controller->safety, k, SAFETY_FAULT_OVER_TEMPERATURE);
     }
 }

@@ -109,8 +109,8 @@ bool controller_init(controller_t *controller, const controller_settings_t *sett
                      int16_t ambient_c7, uint16_t *bad);
 
 /* Replaces the settings while running. If rows and columns stay, so do temperatures, phases,
- * current loops, faults, levels and fan, and what was learnt of the springs; but not of their
- * losses where the model's parameters differ, beside which these were learnt. Else as
+ * current loops, faults, levels and fan, and what was learnt of the springs: of their losses, that
+ * they give off as much as they did, whatever the model declares now. Else as
  * controller_init at the last ambient, but faults of the board, lock and fan stay. Fails as
  * controller_init does, and where controller_is_sound is false; then nothing is changed. Divides.
  */

@@ -55,7 +55,7 @@ float spring_above_ambient_k(const thermal_model_t *model, uint8_t k)
         (int16_t)(thermal_model_temperature_c7(model, k) - thermal_model_ambient_c7(model)));
 }
 
-static float hold_w(const thermal_model_t *model, uint8_t k, float temperature_c)
+float spring_declared_w(const thermal_model_t *model, uint8_t k, float temperature_c)
 {
     return 1e-6f * (float)thermal_model_power_to_hold_uw(model, k, as_c7(temperature_c));
 }
@@ -128,7 +128,9 @@ static void open_anew(spring_estimator_t *e, uint8_t k, bool keeps_learnt)
 static void begin_unknown(spring_estimator_t *e, thermal_model_t *model, uint8_t k)
 {
     spring_belief_t *b = &e->spring[k];
-    const spring_learnt_t learnt = b->learnt;
+    const float most_w_per_k = LOSS_MOST * e->loss_w_per_k;
+    spring_learnt_t learnt = b->learnt;
+    learnt.loss_w_per_k = spring_clamp(learnt.loss_w_per_k, -most_w_per_k, most_w_per_k);
     const float coldest_c = spring_ambient_c(model);
     const float width_k = SPRING_ESTIMATOR_HOTTEST_C - coldest_c;
     const float middle_c = coldest_c + 0.5f * width_k;
@@ -201,7 +203,8 @@ void spring_estimator_look_at_stiffness(spring_estimator_t *e, const thermal_mod
     if (spring_is_sound(e, k)) { /* else its turn finds it so */
         const float now_c = spring_now_c(model, k);
         e->spring[k].declared_stiffness_w_per_k =
-            (hold_w(model, k, now_c + 8.0f) - hold_w(model, k, now_c)) * 0.125f;
+            (spring_declared_w(model, k, now_c + 8.0f) - spring_declared_w(model, k, now_c)) *
+            0.125f;
         spring_seal(e, k);
     }
 }
@@ -248,7 +251,8 @@ static float predict(const spring_estimator_t *e, spring_belief_t *b, const ther
 void spring_correct_loss(const spring_estimator_t *e, spring_belief_t *b, float more_w_per_k)
 {
     const float most = LOSS_MOST * e->loss_w_per_k;
-    b->learnt.loss_w_per_k = spring_clamp(b->learnt.loss_w_per_k + more_w_per_k, -most, most);
+    const float now = b->learnt.loss_w_per_k; /* beyond it after another declaration: no farther */
+    b->learnt.loss_w_per_k = spring_clamp(now + more_w_per_k, fminf(now, -most), fmaxf(now, most));
 }
 
 float spring_see(const spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model, uint8_t k,

@@ -212,8 +212,17 @@ void spring_estimator_restore(spring_estimator_t *estimator, uint8_t spring,
                               const spring_learnt_t *learnt);
 /* Nothing is known of its own numbers but the declared ones. */
 void spring_estimator_forget(spring_estimator_t *estimator, uint8_t spring);
-/* Its loss beyond the declared one is no more known than of any spring: another model is declared.
- */
+/* What the model declares the spring to give off where it is; of a colder one, 60 K above ambient,
+ * W. */
+float spring_estimator_declared_w(const thermal_model_t *model, uint8_t spring);
+/* Another model is declared, of as many springs, and each is where it was; before_w is
+ * spring_estimator_declared_w by the one until now. What was seen of a spring's loss was seen of
+ * all that it gives off: that stays, as unsure as it was, beside what is declared now; where
+ * nothing was seen, that is believed. To be called before spring_estimator_prepare. */
+void spring_estimator_keep_loss(spring_estimator_t *estimator, const thermal_model_t *model,
+                                uint8_t spring, float before_w);
+/* Its loss beyond the declared one is no more known than of any spring: it was learnt beside a
+ * model that nobody knows. */
 void spring_estimator_forget_loss(spring_estimator_t *estimator, uint8_t spring);
 /* What has been learnt, with how surely. */
 spring_learnt_t spring_estimator_learnt(const spring_estimator_t *estimator, uint8_t spring);

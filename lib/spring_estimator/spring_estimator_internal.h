@@ -90,6 +90,8 @@ float spring_above_ambient_k(const thermal_model_t *model, uint8_t spring);
  * (SPRING_PHASE_MARTENSITE or _AUSTENITE). */
 void spring_set_temperature(thermal_model_t *model, uint8_t spring, float temperature_c,
                             uint8_t from);
+/* What the model declares it to give off there, beside its neighbours as they are. */
+float spring_declared_w(const thermal_model_t *model, uint8_t spring, float temperature_c);
 /* Variance of the distance. */
 float spring_distance_k2(const spring_belief_t *belief);
 /* What 1 K more gives off, with what was found to be lost beyond the declared loss. */

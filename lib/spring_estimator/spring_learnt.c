@@ -4,7 +4,14 @@
 
 #define LEARNT_OHM_LEAST 0.01f
 #define LEARNT_OHM_MOST  16.0f
+#define DRIVEN_ABOVE_K   60.0f
 #define SLOW_NOISE_FIRST 0.0007f /* 0.2 mV of 0.3 V, a twentieth of a step */
+
+/* Of one that is not driven as if it were. */
+static float driven_above_k(const thermal_model_t *model, uint8_t k)
+{
+    return fmaxf(spring_above_ambient_k(model, k), DRIVEN_ABOVE_K);
+}
 
 void spring_estimator_forget_loss(spring_estimator_t *e, uint8_t k)
 {
@@ -18,6 +25,39 @@ void spring_estimator_forget_loss(spring_estimator_t *e, uint8_t k)
     b->loss_variance = sd * sd;
     b->covariance = 0.0f;
     b->gone_w_per_k = b->kept_w_per_k = 0.0f;
+    spring_seal(e, k);
+}
+
+float spring_estimator_declared_w(const thermal_model_t *model, uint8_t k)
+{
+    const float ambient_c = spring_ambient_c(model);
+    return spring_declared_w(model, k, ambient_c + driven_above_k(model, k));
+}
+
+void spring_estimator_keep_loss(spring_estimator_t *e, const thermal_model_t *model, uint8_t k,
+                                float before_w)
+{
+    if (!spring_is_sound(e, k)) {
+        return; /* its turn finds it so */
+    }
+    spring_belief_t *b = &e->spring[k];
+    const float sd = LOSS_SD * e->loss_w_per_k;
+    const float declared_sd = LOSS_SD * 1e-6f * (float)model->parameters.loss_uw_per_k;
+    /* of what is known of it, the share that was seen: the rest was the declaration of before */
+    const float seen = 1.0f - b->loss_variance / (sd * sd);
+    if (seen > 0.0f) {
+        const float less_w_per_k =
+            (before_w - spring_estimator_declared_w(model, k)) / driven_above_k(model, k);
+        const float variance = declared_sd * declared_sd;
+        const float gain = variance / (seen * variance + b->loss_variance);
+        b->learnt.loss_w_per_k = gain * (b->learnt.loss_w_per_k + seen * less_w_per_k);
+        b->loss_variance *= gain;
+        b->covariance *= fminf(gain, 1.0f);
+    } else {
+        b->loss_variance = fmaxf(b->loss_variance, declared_sd * declared_sd);
+    }
+    b->learnt.loss_sd_w_per_k = fminf(sqrtf(b->loss_variance), declared_sd);
+    b->extra_loss_uw = (int32_t)(1e6f * b->learnt.loss_w_per_k * spring_above_ambient_k(model, k));
     spring_seal(e, k);
 }
 

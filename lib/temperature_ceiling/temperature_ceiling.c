@@ -13,6 +13,13 @@
 
 #define GIVEN_W 0.01f /* more than a sensor's offset makes of nothing */
 
+#define WHOLE_SHARE 255u       /* of loss_share, capacity_share */
+#define ODD_SHARE   170u       /* two thirds: a fifth less of one, and a fifth more of the other */
+#define ODD_C7      (20 * 128) /* of air, in a hold: a fifth of the losses is 13 K of it */
+/* Between these the declared loss is compared. */
+#define COOL_C 20
+#define HOT_C  120
+
 #define HIGHEST_C7 (215 * 128)
 #define HIGHEST_C  215.0f
 #define LOWEST_C   (-40.0f)
@@ -38,8 +45,8 @@ static uint16_t checksum(const temperature_ceiling_t *c, uint8_t k)
     uint16_t sum = SUM16_START;
     sum = sum16_add_bytes(sum, &c->temperature_c23[k], sizeof c->temperature_c23[k]);
     sum = sum16_add_bytes(sum, &c->austenite[k], sizeof c->austenite[k]);
-    sum = sum16_add_bytes(sum, &c->spared_w[k], sizeof c->spared_w[k]);
-    sum = sum16_add_bytes(sum, &c->spared_per_s[k], sizeof c->spared_per_s[k]);
+    const uint8_t shares[] = {c->loss_share[k], c->capacity_share[k]};
+    sum = sum16_add_bytes(sum, shares, sizeof shares);
     return sum16_add_bytes(sum, &c->rest_turns[k], sizeof c->rest_turns[k]);
 }
 
@@ -70,8 +77,8 @@ static void open_spring(temperature_ceiling_t *c, const thermal_model_t *model, 
     }
     if (c->seal[k] != checksum(c, k)) {
         c->temperature_c23[k] = (int32_t)TEMPERATURE_CEILING_BROKEN_C * 8388608;
-        c->austenite[k] = 1.0f;
-        c->spared_w[k] = c->spared_per_s[k] = 0.0f;
+        c->austenite[k] = THERMAL_MODEL_AUSTENITE_FULL;
+        c->loss_share[k] = c->capacity_share[k] = WHOLE_SHARE;
         c->rest_turns[k] = 0;
         c->delivered = true;
         count_broken(c);
@@ -82,8 +89,8 @@ void temperature_ceiling_begin(temperature_ceiling_t *ceiling, int16_t ambient_c
 {
     for (uint8_t k = 0; k < THERMAL_MODEL_MAX_SPRINGS; k++) {
         ceiling->temperature_c23[k] = (int32_t)ambient_c7 * 65536;
-        ceiling->austenite[k] = 0.0f;
-        ceiling->spared_w[k] = ceiling->spared_per_s[k] = 0.0f;
+        ceiling->austenite[k] = 0;
+        ceiling->loss_share[k] = ceiling->capacity_share[k] = WHOLE_SHARE;
         ceiling->rest_turns[k] = TEMPERATURE_CEILING_NEVER;
         seal(ceiling, k);
     }
@@ -110,8 +117,7 @@ void temperature_ceiling_raise(temperature_ceiling_t *ceiling, const thermal_mod
         const int32_t model_c23 = (int32_t)thermal_model_temperature_c7(model, k) * 65536;
         if (model_c23 > ceiling->temperature_c23[k]) {
             ceiling->temperature_c23[k] = model_c23;
-            ceiling->austenite[k] =
-                (float)thermal_model_austenite(model, k) / (float)THERMAL_MODEL_AUSTENITE_FULL;
+            ceiling->austenite[k] = thermal_model_austenite(model, k);
             if (is_above_ambient(ceiling, k)) {
                 ceiling->rest_turns[k] = 0;
                 ceiling->delivered = true;
@@ -143,7 +149,7 @@ static void account(temperature_ceiling_t *ceiling, const thermal_model_t *model
             ceiling->delivered = false;
             for (uint8_t j = 0; j < model->springs; j++) {
                 open_spring(ceiling, model, j);
-                ceiling->spared_w[j] = 0.0f;
+                ceiling->loss_share[j] = ceiling->capacity_share[j] = WHOLE_SHARE;
                 seal(ceiling, j);
             }
         }
@@ -159,16 +165,6 @@ static void account(temperature_ceiling_t *ceiling, const thermal_model_t *model
     }
 }
 
-int32_t temperature_ceiling_hold_uw(const temperature_ceiling_t *ceiling,
-                                    const thermal_model_t *model, uint8_t k)
-{
-    /* as in the warmest air that was told: not colder by what was said since */
-    const int16_t dropped_c7 = (int16_t)(ceiling->ambient_c7 - thermal_model_ambient_c7(model));
-    return thermal_model_power_to_hold_uw(
-        model, k,
-        (int16_t)(c7_of(ceiling->temperature_c23[k]) - (dropped_c7 > 0 ? dropped_c7 : 0)));
-}
-
 static float capacity_j_per_k(const thermal_model_t *model, uint8_t k)
 {
     const thermal_model_parameters_t *p = &model->parameters;
@@ -176,37 +172,69 @@ static float capacity_j_per_k(const thermal_model_t *model, uint8_t k)
            (float)((uint32_t)p->heat_capacity_scale_permille[k] * p->heat_capacity_mj_per_k);
 }
 
-static float latent_k(const thermal_model_t *model)
+/* What joins it with neighbours and plate. */
+static uint32_t couplings_uw_per_k(const thermal_model_t *model, uint8_t k)
 {
-    return (float)model->latent_full_c8 * (1.0f / 256.0f);
+    uint32_t sum_uw_per_k = model->parameters.plate_coupling_uw_per_k;
+    for (uint8_t j = 0; j < model->springs; j++) {
+        sum_uw_per_k += thermal_model_coupling_uw_per_k(model, k, j);
+    }
+    return sum_uw_per_k;
 }
 
-void temperature_ceiling_keep_loss(temperature_ceiling_t *ceiling, const thermal_model_t *model,
-                                   uint8_t k, int32_t before_uw, int32_t now_uw)
+temperature_ceiling_declared_t temperature_ceiling_declared(const thermal_model_t *model, uint8_t k)
+{
+    /* the difference: what flows at one temperature is its neighbours', too */
+    const int32_t more_uw = thermal_model_power_to_hold_uw(model, k, HOT_C * 128) -
+                            thermal_model_power_to_hold_uw(model, k, COOL_C * 128);
+    const int32_t loss_uw = more_uw - (HOT_C - COOL_C) * (int32_t)couplings_uw_per_k(model, k);
+    return (temperature_ceiling_declared_t){.loss_w_per_k =
+                                                1e-6f / (float)(HOT_C - COOL_C) * (float)loss_uw,
+                                            .capacity_j_per_k = capacity_j_per_k(model, k)};
+}
+
+static float of_share(float value, uint8_t share)
+{
+    return 1.0f / (float)WHOLE_SHARE * (float)share * value;
+}
+
+/* As much as before, or all of what is declared now. */
+static uint8_t share_of(uint8_t share, float before, float now)
+{
+    const float kept = now > 0.0f ? (float)share * (before / now) : (float)WHOLE_SHARE;
+    return (uint8_t)clamp(kept + 0.5f, 1.0f, (float)WHOLE_SHARE);
+}
+
+void temperature_ceiling_declare(temperature_ceiling_t *ceiling, const thermal_model_t *model,
+                                 uint8_t k, const temperature_ceiling_declared_t *before)
 {
     open_spring(ceiling, model, k);
-    const float before_w = 1e-6f * (float)before_uw - ceiling->spared_w[k];
-    const float spared_w = 1e-6f * (float)now_uw - before_w;
-    ceiling->spared_w[k] = 0.0f;
-    if (temperature_ceiling_is_warm(ceiling, k) && before_w > 0.0f && spared_w > 0.0f) {
-        /* all that it holds, its latent heat, too, leaves as it did */
-        const float rise_k = temperature_ceiling_c(ceiling, k) - from_c7(ceiling->ambient_c7);
-        const float heat_j =
-            capacity_j_per_k(model, k) * (rise_k + latent_k(model) * ceiling->austenite[k]);
-        ceiling->spared_w[k] = spared_w;
-        ceiling->spared_per_s[k] = before_w / heat_j;
+    if (ceiling->delivered) {
+        const temperature_ceiling_declared_t now = temperature_ceiling_declared(model, k);
+        ceiling->loss_share[k] =
+            share_of(ceiling->loss_share[k], before->loss_w_per_k, now.loss_w_per_k);
+        ceiling->capacity_share[k] =
+            share_of(ceiling->capacity_share[k], before->capacity_j_per_k, now.capacity_j_per_k);
     }
     seal(ceiling, k);
 }
 
-/* What it gives off, W: of what was there before a change of the losses no more than then. */
-static float given_off_w(temperature_ceiling_t *ceiling, const thermal_model_t *model, uint8_t k)
+bool temperature_ceiling_contradicts(const temperature_ceiling_t *ceiling,
+                                     const thermal_model_t *model, uint8_t k)
 {
-    const float declared_w = 1e-6f * (float)temperature_ceiling_hold_uw(ceiling, model, k);
-    const float spared_w = ceiling->spared_w[k];
-    ceiling->spared_w[k] -=
-        spared_w * clamp(TEMPERATURE_CEILING_TURN_S * ceiling->spared_per_s[k], 0.0f, 1.0f);
-    return declared_w > 0.0f ? clamp(declared_w - spared_w, 0.0f, declared_w) : declared_w;
+    return ceiling->loss_share[k] < ODD_SHARE || ceiling->capacity_share[k] < ODD_SHARE ||
+           thermal_model_ambient_c7(model) < ceiling->ambient_c7 - ODD_C7;
+}
+
+/* What is declared that it gives off, beside the model's neighbours, W. */
+static float given_off_w(const temperature_ceiling_t *ceiling, const thermal_model_t *model,
+                         uint8_t k)
+{
+    /* as in the warmest air that was told: not colder by what was said since */
+    const int16_t dropped_c7 = (int16_t)(ceiling->ambient_c7 - thermal_model_ambient_c7(model));
+    const int16_t at_c7 =
+        (int16_t)(c7_of(ceiling->temperature_c23[k]) - (dropped_c7 > 0 ? dropped_c7 : 0));
+    return 1e-6f * (float)thermal_model_power_to_hold_uw(model, k, at_c7);
 }
 
 float temperature_ceiling_c(const temperature_ceiling_t *ceiling, uint8_t k)
@@ -215,32 +243,39 @@ float temperature_ceiling_c(const temperature_ceiling_t *ceiling, uint8_t k)
 }
 
 /* Along the line from none at low to all at high, with the heat that there is. */
-static float phase_on(int16_t low_c7, int16_t high_c7, float heat_c, float latent_k)
+static uint16_t phase_on(int16_t low_c7, int16_t high_c7, float heat_c, float latent_k)
 {
     const float beyond_k = heat_c - from_c7(low_c7);
     if (beyond_k <= 0.0f) { /* as a rule: no division */
-        return 0.0f;
+        return 0;
     }
     const float width_k = from_c7((int16_t)(high_c7 - low_c7)) + latent_k;
-    return beyond_k < width_k ? beyond_k / width_k : 1.0f;
+    return beyond_k < width_k
+               ? (uint16_t)((float)THERMAL_MODEL_AUSTENITE_FULL * (beyond_k / width_k))
+               : THERMAL_MODEL_AUSTENITE_FULL;
 }
 
 static void add_heat(temperature_ceiling_t *ceiling, const thermal_model_t *model, uint8_t k,
                      float gain_k)
 {
-    const float whole_k = latent_k(model);
+    const uint8_t share = ceiling->capacity_share[k];
+    float whole_k = (float)model->latent_full_c8 * (1.0f / 256.0f);
+    if (share != WHOLE_SHARE) { /* the same heat */
+        whole_k = whole_k * (float)WHOLE_SHARE / (float)share;
+    }
+    const float per_q15 = whole_k * (1.0f / (float)THERMAL_MODEL_AUSTENITE_FULL);
     const thermal_model_transformation_t t = thermal_model_transformation(model, k);
-    const float before = ceiling->austenite[k];
-    const float heat_c = temperature_ceiling_c(ceiling, k) + gain_k + whole_k * before;
-    float after = phase_on(t.austenite_start_c7, t.austenite_finish_c7, heat_c, whole_k);
-    if (after <= before && before > 0.0f) {
-        const float cooled =
+    const uint16_t before = ceiling->austenite[k];
+    const float heat_c = temperature_ceiling_c(ceiling, k) + gain_k + per_q15 * (float)before;
+    uint16_t after = phase_on(t.austenite_start_c7, t.austenite_finish_c7, heat_c, whole_k);
+    if (after <= before && before > 0) {
+        const uint16_t cooled =
             phase_on(t.martensite_finish_c7, t.martensite_start_c7, heat_c, whole_k);
         after = cooled < before ? cooled : before;
     }
     ceiling->austenite[k] = after;
     ceiling->temperature_c23[k] =
-        (int32_t)(clamp(heat_c - whole_k * after, LOWEST_C, HIGHEST_C) * 8388608.0f);
+        (int32_t)(clamp(heat_c - per_q15 * (float)after, LOWEST_C, HIGHEST_C) * 8388608.0f);
 }
 
 void temperature_ceiling_step(temperature_ceiling_t *ceiling, const thermal_model_t *model,
@@ -249,7 +284,6 @@ void temperature_ceiling_step(temperature_ceiling_t *ceiling, const thermal_mode
     const thermal_model_parameters_t *p = &model->parameters;
     open_spring(ceiling, model, k);
     account(ceiling, model, k, power_w);
-    const float loss_w = given_off_w(ceiling, model, k);
     /* What the model's neighbours take beyond those of the ceiling, uW / 128: a spring's couplings
      * and the span of temperatures keep it within 32 bits. */
     int32_t colder = 0;
@@ -264,10 +298,12 @@ void temperature_ceiling_step(temperature_ceiling_t *ceiling, const thermal_mode
                                               (int32_t)thermal_model_temperature_c7(model, j));
         }
     }
-    const float into_w = power_w + 1e-6f * (float)(colder / 128) - loss_w;
+    const float leaves_w = given_off_w(ceiling, model, k) - 1e-6f * (float)(colder / 128);
+    const float into_w =
+        power_w - (leaves_w > 0.0f ? of_share(leaves_w, ceiling->loss_share[k]) : leaves_w);
     /* stable whatever the heat capacity: the flow's own change is taken at the end of the step */
     const float gain_k = into_w * TEMPERATURE_CEILING_TURN_S /
-                         (capacity_j_per_k(model, k) +
+                         (of_share(capacity_j_per_k(model, k), ceiling->capacity_share[k]) +
                           1e-6f * TEMPERATURE_CEILING_TURN_S * (float)stiffness_uw_per_k);
     add_heat(ceiling, model, k, gain_k);
     seal(ceiling, k);

@@ -21,11 +21,11 @@ extern "C" {
 
 typedef struct {
     int32_t temperature_c23[THERMAL_MODEL_MAX_SPRINGS]; /* Q9.23 degC */
-    float austenite[THERMAL_MODEL_MAX_SPRINGS];         /* 0..1 */
-    /* what the heat that was there at a change of the losses gives off less than is declared now,
-     * and the share of it that is over in a second */
-    float spared_w[THERMAL_MODEL_MAX_SPRINGS];
-    float spared_per_s[THERMAL_MODEL_MAX_SPRINGS];
+    uint16_t austenite[THERMAL_MODEL_MAX_SPRINGS];      /* Q0.15, 0..THERMAL_MODEL_AUSTENITE_FULL */
+    /* of the loss and the heat capacity that are declared now, the share that it goes by, in
+     * 255ths: the least that was declared since the springs were cold */
+    uint8_t loss_share[THERMAL_MODEL_MAX_SPRINGS];
+    uint8_t capacity_share[THERMAL_MODEL_MAX_SPRINGS];
     uint16_t rest_turns[THERMAL_MODEL_MAX_SPRINGS]; /* since it was given power */
     uint16_t seal[THERMAL_MODEL_MAX_SPRINGS];       /* checksum of all that, of this spring */
     int16_t ambient_c7;     /* the highest that was told since the springs were cold */
@@ -50,13 +50,23 @@ bool temperature_ceiling_is_warm(const temperature_ceiling_t *ceiling, uint8_t s
 /* Since it was given power itself, s; TEMPERATURE_CEILING_NEVER: not since power-on, or so long. */
 uint16_t temperature_ceiling_rest_s(const temperature_ceiling_t *ceiling, uint8_t spring);
 
-/* Another model is declared: power, uW, that holds the spring where the ceiling is, of the model
- * before and now. Heat that was given before goes no faster than it would have gone; what is given
- * from now on goes by what is declared now. */
-int32_t temperature_ceiling_hold_uw(const temperature_ceiling_t *ceiling,
-                                    const thermal_model_t *model, uint8_t spring);
-void temperature_ceiling_keep_loss(temperature_ceiling_t *ceiling, const thermal_model_t *model,
-                                   uint8_t spring, int32_t before_uw, int32_t now_uw);
+/* What a model declares of a spring, whatever moves. */
+typedef struct {
+    float loss_w_per_k; /* to the air: what flows to neighbours and plate stays in the array */
+    float capacity_j_per_k;
+} temperature_ceiling_declared_t;
+temperature_ceiling_declared_t temperature_ceiling_declared(const thermal_model_t *model,
+                                                            uint8_t spring);
+/* Another model is declared; before: by the one until now. Until all springs are cold, of both the
+ * smaller loss and heat capacity count: a spring that is hot by the numbers of before is not colder
+ * by what is said of it. */
+void temperature_ceiling_declare(temperature_ceiling_t *ceiling, const thermal_model_t *model,
+                                 uint8_t spring, const temperature_ceiling_declared_t *before);
+
+/* What is declared now is not what was since the springs were cold: a loss or heat capacity of half
+ * as much again, or air that is 20 K colder. No tolerance explains both. */
+bool temperature_ceiling_contradicts(const temperature_ceiling_t *ceiling,
+                                     const thermal_model_t *model, uint8_t spring);
 
 /* One spring's step of TEMPERATURE_CEILING_TURN_S with the mean power of that time: the model's
  * declared numbers, but of its state only air and plate, which nothing corrects. */

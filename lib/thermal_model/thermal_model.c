@@ -540,6 +540,54 @@ bool thermal_model_set_state(thermal_model_t *model, const thermal_model_state_t
     return true;
 }
 
+/* So much of a whole that shape makes this part of it. */
+static uint16_t whole_of(uint16_t part, uint16_t shape_q15)
+{
+    return part >= shape_q15 ? (uint16_t)THERMAL_MODEL_AUSTENITE_FULL
+                             : (uint16_t)(((uint32_t)part << 15) / shape_q15);
+}
+
+/* A spring of that temperature and phase, as if it had come there slowly. */
+static void place(const thermal_model_t *model, const thermal_model_transformation_t *points,
+                  thermal_model_spring_state_t *state, int16_t temperature_c7, uint16_t austenite)
+{
+    const bool heats = temperature_c7 > points->austenite_start_c7;
+    const int16_t into_c7 = (int16_t)(heats ? temperature_c7 - points->austenite_start_c7
+                                            : points->martensite_start_c7 - temperature_c7);
+    const uint16_t left = shape(into_c7, heats ? model->heating_position : model->cooling_position);
+    const uint16_t part = heats ? (uint16_t)(THERMAL_MODEL_AUSTENITE_FULL - austenite) : austenite;
+    const bool rests = !heats && into_c7 <= 0;
+    const bool is_done = heats ? temperature_c7 >= points->austenite_finish_c7
+                               : temperature_c7 <= points->martensite_finish_c7;
+    if (part == 0 || left == 0 || is_done || (rests && part == THERMAL_MODEL_AUSTENITE_FULL)) {
+        complete(model, points, state, heats || (rests && part != 0));
+        return;
+    }
+    state->branch = heats ? THERMAL_MODEL_BRANCH_HEATING : THERMAL_MODEL_BRANCH_COOLING;
+    state->amplitude = whole_of(part, left);
+    state->heating_c7 = heats ? temperature_c7 : points->austenite_start_c7;
+    state->cooling_c7 = heats || rests ? points->martensite_start_c7 : temperature_c7;
+}
+
+void thermal_model_fit_state(thermal_model_t *model, const uint16_t austenite[])
+{
+    thermal_model_set_ambient(model, model->ambient_c7); /* where there is no air or plate */
+    for (spring_index_t i = 0; i < model->springs; i++) {
+        const thermal_model_transformation_t points = thermal_model_transformation(model, i);
+        thermal_model_spring_state_t *const own = &model->state.spring[i];
+        if (spring_is_consistent(model, i, own)) {
+            continue;
+        }
+        const int16_t was_c7 = c7_of(own->temperature_c23);
+        const int16_t now_c7 = was_c7 < model->highest_c7 ? was_c7 : model->highest_c7;
+        place(model, &points, own, now_c7, austenite[i]);
+        own->temperature_c23 = c23_of(now_c7);
+        own->latent_c23 = latent_c23_of(model, austenite_of(model, &points, own));
+        model->spring[i].midstep_c6 = c6_of(now_c7);
+        INVARIANT(spring_is_consistent(model, i, own));
+    }
+}
+
 bool thermal_model_is_consistent(const thermal_model_t *model)
 {
     if (model->springs == 0 || model->springs > THERMAL_MODEL_MAX_SPRINGS ||

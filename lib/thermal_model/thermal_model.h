@@ -150,6 +150,12 @@ thermal_model_status_t thermal_model_init(thermal_model_t *model,
                                           const thermal_model_parameters_t *parameters,
                                           uint16_t *bad);
 
+/* Other parameters of the same rows and columns: ambient, fan and temperatures stay, and phases, as
+ * far as the parameters have them there. Refuses as thermal_model_init. O(n); divides. */
+thermal_model_status_t thermal_model_declare(thermal_model_t *model,
+                                             const thermal_model_parameters_t *parameters,
+                                             uint16_t *bad);
+
 /* Springs, air and plate to one temperature, reached from cold: martensite below austenite start.
  * O(n). */
 void thermal_model_reset(thermal_model_t *model, int16_t temperature_c7);

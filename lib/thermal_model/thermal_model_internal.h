@@ -33,6 +33,10 @@ uint32_t thermal_model_derive_flows(thermal_model_t *model);
 /* Every conductance that depends on the fan; model->fan_percent says how fast it is. */
 void thermal_model_apply_fan(thermal_model_t *model);
 
+/* What it remembers is of other parameters, with the austenite that it had of each spring by those:
+ * temperatures stay, and phases, as far as the parameters have them there. */
+void thermal_model_fit_state(thermal_model_t *model, const uint16_t austenite[]);
+
 /* All but its own heating, were the spring at that temperature and all else as it is now. */
 typedef struct {
     int32_t into_spring;

@@ -188,16 +188,22 @@ static void derive(thermal_model_t *model)
                 p->plate_loss_uw_per_k, p->step_ms);
 }
 
+static thermal_model_status_t judged(const thermal_model_parameters_t *parameters, uint16_t *bad)
+{
+    const thermal_model_refusal_t refusal = check(parameters);
+    if (refusal != 0 && bad != NULL) {
+        *bad = refusal >> 8;
+    }
+    return (thermal_model_status_t)(-(int)(refusal & 0xFFu));
+}
+
 thermal_model_status_t thermal_model_init(thermal_model_t *model,
                                           const thermal_model_parameters_t *parameters,
                                           uint16_t *bad)
 {
-    const thermal_model_refusal_t refusal = check(parameters);
-    if (refusal != 0) {
-        if (bad != NULL) {
-            *bad = refusal >> 8;
-        }
-        return (thermal_model_status_t)(-(int)(refusal & 0xFFu));
+    const thermal_model_status_t status = judged(parameters, bad);
+    if (status != THERMAL_MODEL_OK) {
+        return status;
     }
     const thermal_model_parameters_t taken = *parameters; /* may be the model's own */
     memset(model, 0, sizeof *model);
@@ -206,5 +212,24 @@ thermal_model_status_t thermal_model_init(thermal_model_t *model,
     thermal_model_apply_fan(model);
     model->ambient_c7 = 20 * 128;
     thermal_model_reset(model, 20 * 128);
+    return THERMAL_MODEL_OK;
+}
+
+thermal_model_status_t thermal_model_declare(thermal_model_t *model,
+                                             const thermal_model_parameters_t *parameters,
+                                             uint16_t *bad)
+{
+    const thermal_model_status_t status = judged(parameters, bad);
+    if (status != THERMAL_MODEL_OK) {
+        return status;
+    }
+    uint16_t austenite[THERMAL_MODEL_MAX_SPRINGS];
+    for (spring_index_t i = 0; i < model->springs; i++) {
+        austenite[i] = thermal_model_austenite(model, i);
+    }
+    model->parameters = *parameters;
+    derive(model);
+    thermal_model_apply_fan(model);
+    thermal_model_fit_state(model, austenite);
     return THERMAL_MODEL_OK;
 }

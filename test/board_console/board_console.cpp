@@ -1,5 +1,5 @@
-/* Console sessions on the board: every word, every error code, and that a refused line changes
- * nothing. */
+/* What the console needs the board for: its clock, its load, its rates, its EEPROM, its springs;
+ * words and refusals are in test/test_console. */
 #include <algorithm>
 #include <cstring>
 #include <fstream>
@@ -24,8 +24,6 @@ int code_of(const std::string &line)
     return line.rfind("error:", 0) == 0 ? std::atoi(line.c_str() + 6) : -1;
 }
 
-std::set<int> seen_codes;
-
 /* Every answer ends with exactly one ok or error. */
 int code(rig &mega, const std::string &line)
 {
@@ -43,25 +41,12 @@ int code(rig &mega, const std::string &line)
     mega.run_ms(50.0);
     const std::string after = mega.board.take_output();
     TEST_ASSERT_EQUAL_STRING_MESSAGE("", after.c_str(), line.c_str());
-    seen_codes.insert(last);
     return last;
 }
 
 void expect_code(rig &mega, console_error_t wanted, const std::string &line)
 {
     TEST_ASSERT_EQUAL_INT_MESSAGE(wanted, code(mega, line), line.c_str());
-}
-
-/* What the board holds, as far as a line can change it. */
-std::string state_of(rig &mega)
-{
-    const board_view_t seen = mega.view();
-    std::string text =
-        mega.say("$$", 10000.0) + std::to_string(seen.fan_percent) + (seen.locked ? "locked" : "");
-    for (const board_view_spring_t &spring : seen.spring) {
-        text += " " + std::to_string(spring.level_permille);
-    }
-    return text;
 }
 
 std::unique_ptr<rig> booted()
@@ -130,46 +115,6 @@ void time_goes_on_for_years()
     }
 }
 
-void every_word_does_what_it_says()
-{
-    auto mega = booted();
-    for (const char *line : {"help",          "version",
-                             "model",         "faults",
-                             "clear",         "unlock",
-                             "policy open",   "model cold",
-                             "fan 40",        "ambient 21.5",
-                             "on 1",          "on 2 50",
-                             "off 1",         "on all",
-                             "off all",       "pattern 111101111",
-                             "telemetry off", "$loss_w_per_k=0.0061",
-                             "$loss_w_per_k", "$$"}) {
-        TEST_ASSERT_EQUAL_INT_MESSAGE(0, code(*mega, line), line);
-    }
-    mega->run_ms(100.0);
-    const board_view_t seen = mega->view();
-    for (unsigned k = 0; k < BOARD_CHANNELS; ++k) {
-        TEST_ASSERT_EQUAL_UINT(k == 4 ? 0 : 1000, seen.spring[k].level_permille);
-    }
-    TEST_ASSERT_EQUAL_UINT8(40, seen.fan_percent);
-    TEST_ASSERT_DOUBLE_WITHIN(0.02, 0.4, board_fan(mega->raw()));
-    TEST_ASSERT_INT_WITHIN(2, static_cast<int>(21.5 * 128), seen.ambient_c7);
-    TEST_ASSERT_TRUE(contains(mega->say("$loss_w_per_k"), "$loss_w_per_k=0.006100"));
-    TEST_ASSERT_EQUAL_INT(0, code(*mega, "$defaults"));
-    TEST_ASSERT_FALSE(contains(mega->say("$loss_w_per_k"), "0.006100"));
-    TEST_ASSERT_EQUAL_INT(0, code(*mega, "off all"));
-    TEST_ASSERT_EQUAL_INT(0, code(*mega, "$save"));
-}
-
-void a_level_is_a_share_of_the_full_current()
-{
-    auto mega = booted();
-    mega->expect_ok("on 2 50");
-    mega->run_ms(500.0);
-    const board_view_t seen = mega->view();
-    TEST_ASSERT_INT_WITHIN(30, 750, seen.spring[1].measured_ma);
-    TEST_ASSERT_DOUBLE_WITHIN(0.03, 0.75, board_current_a(mega->raw(), 1));
-}
-
 void selftest_passes_on_a_whole_board_and_leaves_it_off()
 {
     auto mega = booted();
@@ -177,25 +122,6 @@ void selftest_passes_on_a_whole_board_and_leaves_it_off()
     TEST_ASSERT_TRUE_MESSAGE(contains(text, "ok\r\n"), text.c_str());
     mega->run_ms(100.0);
     TEST_ASSERT_TRUE(board_all_off(mega->raw()));
-}
-
-void a_question_mark_gets_one_line_and_no_ok()
-{
-    auto mega = booted();
-    mega->board.send("?");
-    mega->run_ms(100.0);
-    const std::string text = mega->board.take_output();
-    TEST_ASSERT_EQUAL_INT(1, std::count(text.begin(), text.end(), '\n'));
-    TEST_ASSERT_FALSE(contains(text, "ok\r\n"));
-}
-
-int occurrences(const std::string &text, const std::string &part)
-{
-    int count = 0;
-    for (std::size_t at = 0; (at = text.find(part, at)) != std::string::npos; ++at) {
-        ++count;
-    }
-    return count;
 }
 
 /* The chip counts its sleep with a timer whose interrupt also wakes it. */
@@ -215,35 +141,6 @@ void load_is_what_it_did_not_sleep()
     TEST_ASSERT_TRUE_MESSAGE(load != std::string::npos, status.c_str());
     TEST_ASSERT_DOUBLE_WITHIN(2.0, 100.0 * (1.0 - slept / passed),
                               std::atof(status.c_str() + load + std::strlen("|load:")));
-}
-
-void telemetry_csv_has_a_header_and_lines_at_its_rate()
-{
-    auto mega = booted();
-    mega->say("telemetry csv 10");
-    mega->board.take_output();
-    mega->run_ms(2000.0);
-    const std::string text = mega->board.take_output();
-    /* and one more for each spring: that it was said to be cold */
-    TEST_ASSERT_EQUAL_UINT(9, occurrences(text, "<sight|spring:"));
-    TEST_ASSERT_INT_WITHIN(1, 20 + 9, std::count(text.begin(), text.end(), '\n'));
-}
-
-void telemetry_teleplot_lines_have_its_form()
-{
-    auto mega = booted();
-    mega->say("telemetry teleplot 5");
-    mega->board.take_output();
-    mega->run_ms(1000.0);
-    const std::string text = mega->board.take_output();
-    TEST_ASSERT_TRUE_MESSAGE(text.rfind('>', 0) == 0 || contains(text, "\n>"), text.c_str());
-    std::istringstream stream(text.substr(text.find('>')));
-    std::string line;
-    std::getline(stream, line);
-    TEST_ASSERT_EQUAL_INT_MESSAGE(2, std::count(line.begin(), line.end(), ':'), line.c_str());
-    for (const char *name : {">i1:", ">m1:", ">i9:", ">m9:", ">fan:", ">fault:"}) {
-        TEST_ASSERT_INT_WITHIN_MESSAGE(1, 5, occurrences(text, name), name);
-    }
 }
 
 /* Telemetry at 50 Hz while limits act, then `telemetry off`: does the console answer? */
@@ -282,100 +179,6 @@ void teleplot_at_its_fastest_leaves_the_console_usable()
     TEST_ASSERT_TRUE_MESSAGE(contains(text, "ticks late 0,"), text.c_str());
 }
 
-void a_refused_line_changes_nothing()
-{
-    auto mega = booted();
-    mega->expect_ok("fan 30");
-    const std::string before = state_of(*mega);
-    for (const char *line : {"frobnicate",
-                             "on",
-                             "on 0",
-                             "on 10",
-                             "on 1 101",
-                             "on 1 -1",
-                             "on one",
-                             "on 1 2 3",
-                             "off",
-                             "off 1 2",
-                             "pattern 11110111",
-                             "pattern 1111011112",
-                             "pattern",
-                             "policy",
-                             "policy closed",
-                             "fan",
-                             "fan 101",
-                             "fan -1",
-                             "fan 1e2",
-                             "ambient",
-                             "ambient hot",
-                             "ambient 200",
-                             "telemetry",
-                             "telemetry xml",
-                             "telemetry csv 0",
-                             "telemetry csv 51",
-                             "$nope=1",
-                             "$loss_w_per_k=",
-                             "$loss_w_per_k=x",
-                             "$loss_w_per_k=9",
-                             "$loss_w_per_k=0.00000001",
-                             "$rows=0",
-                             "$",
-                             "$=",
-                             "help me",
-                             "on1"}) {
-        TEST_ASSERT_TRUE_MESSAGE(code(*mega, line) > 0, line);
-    }
-    const std::string after = state_of(*mega);
-    TEST_ASSERT_EQUAL_STRING(before.c_str(), after.c_str());
-}
-
-void simple_errors_have_their_codes()
-{
-    auto mega = booted();
-    expect_code(*mega, CONSOLE_ERROR_UNKNOWN_WORD, "frobnicate");
-    expect_code(*mega, CONSOLE_ERROR_MISSING_ARGUMENT, "on");
-    expect_code(*mega, CONSOLE_ERROR_SURPLUS_ARGUMENT, "help me");
-    expect_code(*mega, CONSOLE_ERROR_BAD_ARGUMENT, "on x");
-    expect_code(*mega, CONSOLE_ERROR_OUT_OF_RANGE, "on 10");
-    expect_code(*mega, CONSOLE_ERROR_LINE_TOO_LONG, std::string(100, 'x'));
-    expect_code(*mega, CONSOLE_ERROR_BAD_CHARACTER, "on\x81 1");
-    expect_code(*mega, CONSOLE_ERROR_UNKNOWN_SETTING, "$nope=1");
-    mega->expect_ok("version");
-}
-
-void settings_that_do_not_fit_are_not_saved()
-{
-    auto mega = booted();
-    const std::uint64_t writes = board_eeprom_writes(mega->raw());
-    mega->expect_ok("$martensite_start_c=120");
-    expect_code(*mega, CONSOLE_ERROR_SETTINGS_CONFLICT, "$save");
-    TEST_ASSERT_EQUAL_UINT64(writes, board_eeprom_writes(mega->raw()));
-}
-
-void a_locked_board_refuses_to_drive()
-{
-    auto mega = booted();
-    board_reset(mega->raw(), BOARD_RESET_BROWN_OUT);
-    mega->boot(false);
-    expect_code(*mega, CONSOLE_ERROR_LOCKED, "on 1");
-    expect_code(*mega, CONSOLE_ERROR_LOCKED, "pattern 100000000");
-    TEST_ASSERT_EQUAL_INT(0, code(*mega, "off all"));
-}
-
-void a_latched_fault_refuses_its_spring()
-{
-    auto mega = booted();
-    mega->expect_ok("on 5");
-    mega->run_ms(500.0);
-    board_set_fault(mega->raw(), BOARD_FAULT_OPEN, 4, true);
-    mega->run_ms(1000.0);
-    mega->board.take_output();
-    expect_code(*mega, CONSOLE_ERROR_FAULT, "on 5");
-    TEST_ASSERT_EQUAL_INT(0, code(*mega, "on 4"));
-    const std::string text = mega->say("faults");
-    TEST_ASSERT_TRUE_MESSAGE(contains(text, "spring 5") && contains(text, "2"), text.c_str());
-}
-
 /* Sends and waits until the board is silent; gives what came. */
 std::string pour(rig &mega, const std::string &bytes, double ms)
 {
@@ -385,14 +188,6 @@ std::string pour(rig &mega, const std::string &bytes, double ms)
     return mega.board.take_output();
 }
 
-void note_codes(const std::string &text)
-{
-    for (std::size_t at = text.find("error:"); at != std::string::npos;
-         at = text.find("error:", at + 1)) {
-        seen_codes.insert(std::atoi(text.c_str() + at + 6));
-    }
-}
-
 void a_stop_ends_the_answer_under_way()
 {
     auto mega = booted();
@@ -400,7 +195,6 @@ void a_stop_ends_the_answer_under_way()
     mega->run_ms(30.0);
     mega->board.take_output();
     const std::string text = pour(*mega, "!", 1000.0);
-    note_codes(text);
     TEST_ASSERT_TRUE_MESSAGE(contains(text, "error:12 "), text.c_str());
 }
 
@@ -413,7 +207,6 @@ void bytes_that_found_no_room_are_reported()
         flood += "on 1\noff 1\n";
     }
     const std::string text = pour(*mega, flood, 3000.0);
-    note_codes(text);
     TEST_ASSERT_TRUE_MESSAGE(contains(text, "error:13 "), text.c_str());
     pour(*mega, "\n", 500.0); /* ends what is left of the last line */
     mega->expect_ok("version");
@@ -435,7 +228,6 @@ void selftest_wants_everything_off_and_finds_an_open_spring()
     mega->expect_ok("off 3");
     board_set_fault(mega->raw(), BOARD_FAULT_OPEN, 6, true);
     const std::string text = mega->say("selftest", 20000.0);
-    note_codes(text);
     TEST_ASSERT_TRUE_MESSAGE(contains(text, "error:17 "), text.c_str());
     TEST_ASSERT_TRUE_MESSAGE(contains(text, "spring 7"), text.c_str());
 }
@@ -450,40 +242,6 @@ void selftest_finds_a_resistance_beyond_its_limits()
                              text.c_str());
 }
 
-void what_this_version_lacks_says_so()
-{
-    auto mega = booted();
-    mega->expect_ok("$cut_off=0");
-    TEST_ASSERT_EQUAL_INT(CONSOLE_ERROR_NOT_AVAILABLE, code(*mega, "supply on"));
-}
-
-void nothing_is_driven_while_the_supply_is_off()
-{
-    auto mega = booted();
-    mega->expect_ok("supply off");
-    TEST_ASSERT_EQUAL_INT(CONSOLE_ERROR_SUPPLY_OFF, code(*mega, "on 1"));
-    TEST_ASSERT_EQUAL_INT(CONSOLE_ERROR_SUPPLY_OFF, code(*mega, "selftest"));
-    mega->expect_ok("supply on");
-    mega->expect_ok("on 1");
-}
-
-/* After all others. */
-void no_error_of_the_table_was_left_out()
-{
-    std::ifstream file(NINESPRING_SOURCE_DIR "/docs/codes.csv");
-    TEST_ASSERT_TRUE_MESSAGE(file.good(), "docs/codes.csv");
-    unsigned errors = 0;
-    for (std::string line; std::getline(file, line);) {
-        if (line.rfind("error,", 0) != 0) {
-            continue;
-        }
-        const int number = std::atoi(line.c_str() + 6);
-        ++errors;
-        TEST_ASSERT_TRUE_MESSAGE(seen_codes.count(number) == 1, line.c_str());
-    }
-    TEST_ASSERT_EQUAL_UINT(CONSOLE_ERROR_END - 1, errors);
-}
-
 } // namespace
 
 void setUp() {}
@@ -493,28 +251,15 @@ int main()
 {
     need_elf(elf());
     UNITY_BEGIN();
-    RUN_TEST(every_word_does_what_it_says);
-    RUN_TEST(a_level_is_a_share_of_the_full_current);
     RUN_TEST(selftest_passes_on_a_whole_board_and_leaves_it_off);
-    RUN_TEST(a_question_mark_gets_one_line_and_no_ok);
     RUN_TEST(load_is_what_it_did_not_sleep);
-    RUN_TEST(telemetry_csv_has_a_header_and_lines_at_its_rate);
-    RUN_TEST(telemetry_teleplot_lines_have_its_form);
     RUN_TEST(csv_at_its_fastest_leaves_the_console_usable);
     RUN_TEST(teleplot_at_its_fastest_leaves_the_console_usable);
-    RUN_TEST(a_refused_line_changes_nothing);
-    RUN_TEST(simple_errors_have_their_codes);
-    RUN_TEST(settings_that_do_not_fit_are_not_saved);
-    RUN_TEST(a_locked_board_refuses_to_drive);
-    RUN_TEST(a_latched_fault_refuses_its_spring);
     RUN_TEST(time_goes_on_for_years);
     RUN_TEST(a_stop_ends_the_answer_under_way);
     RUN_TEST(bytes_that_found_no_room_are_reported);
     RUN_TEST(an_eeprom_that_keeps_nothing_fails_the_save);
     RUN_TEST(selftest_wants_everything_off_and_finds_an_open_spring);
     RUN_TEST(selftest_finds_a_resistance_beyond_its_limits);
-    RUN_TEST(what_this_version_lacks_says_so);
-    RUN_TEST(nothing_is_driven_while_the_supply_is_off);
-    RUN_TEST(no_error_of_the_table_was_left_out);
     return UNITY_END();
 }

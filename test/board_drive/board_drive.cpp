@@ -116,43 +116,6 @@ void pattern_of_the_readme_is_there_after_power_on()
     }
 }
 
-void boosts_of_nine_are_in_turn_within_the_supply()
-{
-    auto mega = powered();
-    mega->expect_ok("on all");
-    run(*mega, 4.0); /* currents have risen */
-    const board_view_t seen = mega->view();
-    unsigned full = 0, waiting = 0;
-    for (const board_view_spring_t &spring : seen.spring) {
-        full += spring.target_ma > 2900;
-        waiting += spring.target_ma == 0;
-        if (spring.target_ma < 2900) {
-            TEST_ASSERT_BITS_HIGH(DRIVE_POLICY_LIMIT_SUPPLY, spring.limits);
-            TEST_ASSERT_UINT_WITHIN(30, 3000, spring.wanted_ma);
-        }
-    }
-    TEST_ASSERT_EQUAL_UINT(4, full); /* of 14.8 A; what is left goes to one more */
-    TEST_ASSERT_EQUAL_UINT(4, waiting);
-    TEST_ASSERT_TRUE(run(*mega, 76.0) < 110.0);
-    for (unsigned k = 0; k < SPRINGS; ++k) {
-        TEST_ASSERT_TRUE(phase(*mega, k) >= 0.98);
-        TEST_ASSERT_EQUAL_UINT8(SAFETY_FAULT_NONE, mega->view().spring[k].fault);
-    }
-    TEST_ASSERT_EQUAL_UINT8(SAFETY_FAULT_NONE, mega->view().board_fault);
-}
-
-void half_a_level_is_half_a_phase()
-{
-    auto mega = powered();
-    mega->expect_ok("on 1 50");
-    run(*mega, 45.0);
-    for (int n = 0; n < 3; ++n) {
-        run(*mega, 5.0);
-        TEST_ASSERT_DOUBLE_WITHIN(0.12, 0.5, phase(*mega, 0));
-        TEST_ASSERT_BITS_LOW(DRIVE_POLICY_LIMIT_BLIND, mega->view().spring[0].limits);
-    }
-}
-
 void own_temperature_derates_then_trips_until_cleared()
 {
     auto mega = powered("$temperature_limit_c=60 $trip_time_s=2");
@@ -196,60 +159,6 @@ void own_temperature_derates_then_trips_until_cleared()
     mega->expect_ok("on 1");
     run(*mega, 2.0);
     TEST_ASSERT_TRUE(mega->view().spring[0].target_ma > 2900);
-}
-
-void springs_around_an_undriven_one_derate_before_it_acts()
-{
-    auto mega = powered("$undriven_margin_k=50"); /* 38 degC */
-    mega->expect_ok("pattern 111101111");
-    bool limited = false;
-    for (int n = 0; n < 50 * 50; ++n) {
-        const board_view_t seen = tick(*mega);
-        for (unsigned k = 0; k < SPRINGS; ++k) {
-            limited |= k != CENTRE && seen.spring[k].target_ma < seen.spring[k].wanted_ma &&
-                       (seen.spring[k].limits & DRIVE_POLICY_LIMIT_UNDRIVEN) != 0;
-        }
-        TEST_ASSERT_EQUAL_UINT16(0, seen.spring[CENTRE].target_ma);
-        TEST_ASSERT_TRUE(temperature(*mega, CENTRE) < 39.0);
-    }
-    TEST_ASSERT_TRUE(limited);
-    TEST_ASSERT_TRUE(temperature(*mega, CENTRE) >
-                     27.0); /* derated by its upper bound, not given up */
-}
-
-/* After `policy` no target moves by more than 20 mA in a tick until all have arrived. */
-void change_policy(rig &mega, const char *line, int ticks)
-{
-    board_view_t before = mega.view();
-    mega.board.take_output();
-    mega.board.send(line);
-    for (int n = 0; n < ticks; ++n) {
-        const board_view_t now = tick(mega);
-        for (unsigned k = 0; k < SPRINGS; ++k) {
-            TEST_ASSERT_INT_WITHIN(20, before.spring[k].target_ma, now.spring[k].target_ma);
-        }
-        before = now;
-    }
-    TEST_ASSERT_TRUE(contains(mega.board.take_output(), "ok"));
-}
-
-void policy_is_switched_without_a_jump()
-{
-    auto mega = powered("$dither_a=0.1");
-    mega->expect_ok("pattern 110100001");
-    run(*mega, 10.0); /* four heat */
-    change_policy(*mega, "policy open\n", 100);
-    for (unsigned k : {0u, 1u, 3u, 8u}) {
-        TEST_ASSERT_EQUAL_UINT16(1500, mega->view().spring[k].target_ma);
-    }
-    run(*mega, 1.0);
-    change_policy(*mega, "policy precompensate\n", 70);
-    run(*mega, 20.0); /* they hold */
-    change_policy(*mega, "policy open\n", 100);
-    change_policy(*mega, "policy precompensate\n", 30);
-    for (unsigned k = 0; k < SPRINGS; ++k) {
-        TEST_ASSERT_EQUAL_UINT8(SAFETY_FAULT_NONE, mega->view().spring[k].fault);
-    }
 }
 
 void readings_lost_in_a_hold_cost_neither_safety_nor_the_neighbours()
@@ -305,11 +214,7 @@ int main()
     UNITY_BEGIN();
     RUN_TEST(heats_then_holds_above_martensite_start_then_lets_go);
     RUN_TEST(pattern_of_the_readme_is_there_after_power_on);
-    RUN_TEST(boosts_of_nine_are_in_turn_within_the_supply);
-    RUN_TEST(half_a_level_is_half_a_phase);
     RUN_TEST(own_temperature_derates_then_trips_until_cleared);
-    RUN_TEST(springs_around_an_undriven_one_derate_before_it_acts);
-    RUN_TEST(policy_is_switched_without_a_jump);
     RUN_TEST(readings_lost_in_a_hold_cost_neither_safety_nor_the_neighbours);
     return UNITY_END();
 }

@@ -118,11 +118,6 @@ static unsigned target(int spring)
 }
 
 /* What the policy would give the spring without its limits. */
-static unsigned wanted(int spring)
-{
-    return target(spring) + drive_policy_cut_ma(&loop_controller(loop)->policy, (uint8_t)spring);
-}
-
 static void eight_are_held_in_the_band_and_the_centre_stays_cold(void)
 {
     power_on();
@@ -182,41 +177,6 @@ static void all_nine_are_there_after_power_on_with_no_hint(void)
     check_all_nine_are_there();
     for (int k = 0; k < SPRINGS; k++) {
         TEST_ASSERT_FALSE(limited_by(k, DRIVE_POLICY_LIMIT_COOLING));
-    }
-}
-
-static void boosts_come_in_the_order_in_which_they_were_asked_for(void)
-{
-    settings.safety.supply_limit_ma = 5000;
-    settings.policy.overload_current_ma = 5000;
-    start_cold();
-    want(7, 1000);
-    run(1.0);
-    want(5, 1000);
-    run(1.0);
-    want(2, 1000);
-    want(0, 1000);
-    run(4.0);
-    TEST_ASSERT_TRUE(target(7) > 2900 && target(5) > 1500);
-    TEST_ASSERT_EQUAL_UINT(0, target(2));
-    while (drive_policy_stage(&loop_controller(loop)->policy, 7) != DRIVE_POLICY_STAGE_HOLD) {
-        run(0.1);
-        TEST_ASSERT_TRUE(loop_time_s(loop) < 40.0);
-        TEST_ASSERT_TRUE(target(2) <= target(5));
-    }
-    run(1.0);
-    TEST_ASSERT_TRUE(target(5) > 2900);
-}
-
-static void last_ones_to_heat_take_turns(void)
-{
-    start_cold();
-    for (int k = 0; k < 6; k++) {
-        want(k, 1000);
-    }
-    run(44.0); /* one after the other the sixth would be there at 48 s */
-    for (int k = 0; k < 6; k++) {
-        TEST_ASSERT_TRUE(phase(k) > 0.99);
     }
 }
 
@@ -359,16 +319,6 @@ static void resistance_that_rises_where_a_fall_is_declared_is_learnt(void)
     check_wrong_sign();
 }
 
-static void resistance_that_never_changes_falls_back_to_the_model(void)
-{
-    plant_set_effect(plant, "resistance_phase", false);
-    power_on();
-    want(CENTRE, 1000);
-    TEST_ASSERT_TRUE(run(300.0) < 125.0); /* the model is the only one to ask, and asked late */
-    TEST_ASSERT_TRUE(phase(CENTRE) > 0.98);
-    TEST_ASSERT_TRUE(is_blind(CENTRE));
-}
-
 /* Of one conversion, 1 mV by default. Up to 35 mV no board of 24 tells it, with 50 mV one does. */
 static void noisy_voltage_is_borne_or_told(void)
 {
@@ -383,156 +333,7 @@ static void noisy_voltage_is_borne_or_told(void)
     }
 }
 
-static void half_a_level_is_half_a_phase(void)
-{
-    start_cold();
-    want(CENTRE, 500);
-    run(150.0);
-    TEST_ASSERT_DOUBLE_WITHIN(0.1, 0.5, phase(CENTRE));
-    TEST_ASSERT_FALSE(is_blind(CENTRE));
-    want(CENTRE, 250);
-    run(100.0);
-    TEST_ASSERT_DOUBLE_WITHIN(0.1, 0.25, phase(CENTRE));
-    want(CENTRE, 800);
-    run(100.0);
-    TEST_ASSERT_DOUBLE_WITHIN(0.1, 0.8, phase(CENTRE));
-}
-
-static bool is_at_open_current(void)
-{
-    for (int k = 0; k < SPRINGS; k++) {
-        if (target(k) != (k == CENTRE ? 0u : settings.policy.open_current_ma)) {
-            return false;
-        }
-    }
-    return true;
-}
-
-/* After the change no target moves by more than 20 mA in a tick: to open until all have its
- * current, to precompensate in the first ticks. Later jumps are the policy's own, from heating to
- * holding and from waiting to heating. A current that was still rising to its target goes on. */
-static void change_policy(drive_policy_kind_t kind)
-{
-    TEST_ASSERT_TRUE(controller_set_policy(loop_controller(loop), kind));
-    settings.policy.policy = (uint8_t)kind;
-    bool arrived = false;
-    for (int n = 0; !arrived; n++) {
-        TEST_ASSERT_LESS_THAN_INT(1000, n);
-        unsigned before_ma[SPRINGS];
-        double before_a[SPRINGS];
-        for (int k = 0; k < SPRINGS; k++) {
-            before_ma[k] = target(k);
-            before_a[k] = loop_current_a(loop, k);
-        }
-        run(LOOP_TICK_S);
-        for (int k = 0; k < SPRINGS; k++) {
-            TEST_ASSERT_UINT_WITHIN(20, before_ma[k], target(k));
-            TEST_ASSERT_TRUE(loop_current_a(loop, k) >= before_a[k] - 0.12);
-            TEST_ASSERT_TRUE(loop_current_a(loop, k) <=
-                             fmax(before_a[k], target(k) / 1000.0) + 0.12);
-        }
-        arrived = kind == DRIVE_POLICY_OPEN ? is_at_open_current() : n == 12;
-    }
-}
-
-static void policy_is_switched_at_any_moment_without_a_jump(void)
-{
-    settings.policy.dither_ma = 100;
-    for (double moment_s = 0.02; moment_s < 200.0; moment_s = moment_s * 1.07 + 0.02) {
-        settings.policy.policy = DRIVE_POLICY_PRECOMPENSATE;
-        start_cold();
-        want_all_but(CENTRE);
-        run(moment_s);
-        change_policy(DRIVE_POLICY_OPEN);
-        run(fmod(37.0 * moment_s, 11.0));
-        change_policy(DRIVE_POLICY_PRECOMPENSATE);
-        run(fmod(61.0 * moment_s, 17.0));
-        change_policy(DRIVE_POLICY_OPEN);
-    }
-}
-
 /* ---- limits ---- */
-
-static void own_temperature_derates_and_is_never_exceeded(void)
-{
-    settings.policy.temperature_limit_cc = 7000;
-    start_cold();
-    want_all_but(CENTRE);
-    TEST_ASSERT_TRUE(run(60.0) < 70.0);
-    for (int k = 0; k < SPRINGS; k++) {
-        if (k != CENTRE) {
-            TEST_ASSERT_TRUE(limited_by(k, DRIVE_POLICY_LIMIT_TEMPERATURE));
-            TEST_ASSERT_TRUE(temperature(k) > 60.0); /* derated, not off */
-            TEST_ASSERT_TRUE(target(k) > 500 && target(k) < 2000);
-            TEST_ASSERT_UINT_WITHIN(30, settings.policy.boost_current_ma, wanted(k));
-        }
-    }
-}
-
-static void limit_that_takes_everything_trips_that_spring_until_cleared(void)
-{
-    settings.policy.trip_time_s = 3;
-    settings.policy.temperature_limit_cc = 7000;
-    start_cold();
-    want(0, 1000);
-    run(30.0);
-    settings.policy.temperature_limit_cc = 5000;
-    TEST_ASSERT_TRUE(controller_apply_settings(loop_controller(loop), &settings, NULL));
-    want(8, 1000);
-    run(2.0);
-    TEST_ASSERT_EQUAL_UINT(0, target(0));
-    TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, controller_fault(loop_controller(loop), 0));
-    run(2.0);
-    TEST_ASSERT_EQUAL(SAFETY_FAULT_LIMIT_TRIP, controller_fault(loop_controller(loop), 0));
-    TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, controller_fault(loop_controller(loop), 8));
-    settings.policy.temperature_limit_cc = 11000; /* the cause is gone, the latch stays */
-    TEST_ASSERT_TRUE(controller_apply_settings(loop_controller(loop), &settings, NULL));
-    run(10.0);
-    TEST_ASSERT_EQUAL_UINT(0, target(0));
-    TEST_ASSERT_TRUE(target(8) > 2900);
-    controller_clear_faults(loop_controller(loop));
-    want(0, 1000);
-    run(1.0);
-    TEST_ASSERT_TRUE(target(0) > 2900);
-}
-
-static void undriven_spring_stays_below_its_limit_whatever_its_neighbours_want(void)
-{
-    settings.policy.undriven_margin_cc = 5000; /* 38 degC; unlimited the centre comes to 43 */
-    settings.policy.trip_time_s = 0;
-    start_cold();
-    want_all_but(CENTRE);
-    bool limited = false;
-    for (int n = 0; n < 600; n++) {
-        run(0.5);
-        TEST_ASSERT_TRUE(temperature(CENTRE) < 38.5);
-        for (int k = 0; k < SPRINGS; k++) {
-            limited |= limited_by(k, DRIVE_POLICY_LIMIT_UNDRIVEN) && wanted(k) > target(k);
-        }
-    }
-    TEST_ASSERT_TRUE(limited);
-    TEST_ASSERT_TRUE(temperature(CENTRE) > 27.0); /* derated by its upper bound, not given up */
-}
-
-static void board_is_above_its_continuous_current_no_longer_than_it_may(void)
-{
-    settings.policy.overload_current_ma = 5000;
-    settings.policy.overload_time_s = 20;
-    start_cold();
-    want_all_but(-1);
-    double above_s = 0.0;
-    bool said = false;
-    for (int n = 0; n < 50 * 200; n++) {
-        run(LOOP_TICK_S);
-        above_s = loop_sum_current_a(loop) > 5.3 ? above_s + LOOP_TICK_S : 0.0;
-        TEST_ASSERT_TRUE(above_s < 21.0);
-        for (int k = 0; k < SPRINGS; k++) {
-            said |= limited_by(k, DRIVE_POLICY_LIMIT_OVERLOAD);
-        }
-    }
-    TEST_ASSERT_TRUE(said);
-    TEST_ASSERT_TRUE(above_s == 0.0);
-}
 
 /* ---- release and return ---- */
 
@@ -687,8 +488,6 @@ int main(void)
     RUN_TEST(held_spring_does_not_feel_its_neighbours);
     RUN_TEST(all_nine_transform_in_turn_within_the_supply);
     RUN_TEST(all_nine_are_there_after_power_on_with_no_hint);
-    RUN_TEST(boosts_come_in_the_order_in_which_they_were_asked_for);
-    RUN_TEST(last_ones_to_heat_take_turns);
     RUN_TEST(spring_that_loses_its_turn_keeps_what_it_has);
     RUN_TEST(array_that_loses_more_is_held_in_the_band);
     RUN_TEST(array_that_loses_less_is_held_in_the_band);
@@ -697,14 +496,7 @@ int main(void)
     RUN_TEST(heats_and_holds_an_alloy_whose_resistance_falls);
     RUN_TEST(resistance_that_falls_where_a_rise_is_declared_is_learnt);
     RUN_TEST(resistance_that_rises_where_a_fall_is_declared_is_learnt);
-    RUN_TEST(resistance_that_never_changes_falls_back_to_the_model);
     RUN_TEST(noisy_voltage_is_borne_or_told);
-    RUN_TEST(half_a_level_is_half_a_phase);
-    RUN_TEST(policy_is_switched_at_any_moment_without_a_jump);
-    RUN_TEST(own_temperature_derates_and_is_never_exceeded);
-    RUN_TEST(limit_that_takes_everything_trips_that_spring_until_cleared);
-    RUN_TEST(undriven_spring_stays_below_its_limit_whatever_its_neighbours_want);
-    RUN_TEST(board_is_above_its_continuous_current_no_longer_than_it_may);
     RUN_TEST(released_spring_is_martensite_sooner_than_from_105_degrees);
     RUN_TEST(spring_switched_on_again_after_seconds_is_austenite_again);
     RUN_TEST(full_is_reached_from_any_level_at_any_moment);

@@ -227,44 +227,6 @@ static void missing_readings_keep_the_last_power_while_the_output_is_on(void)
     TEST_ASSERT_INT_WITHIN(30, 1500, controller_measured_ma(&controller, 4));
 }
 
-static void failing_sensor_is_a_fault_of_its_spring_alone(void)
-{
-    all_on();
-    run(200);
-    inputs.sensor[2].status = CONTROLLER_SENSOR_STALE;
-    run(settings.safety.bad_samples);
-    TEST_ASSERT_EQUAL(SAFETY_FAULT_SENSOR_STALE, controller_fault(&controller, 2));
-    TEST_ASSERT_EQUAL_UINT16(0, outputs.duty[2]); /* in the same tick */
-    TEST_ASSERT_EQUAL_UINT8(DRIVE_POLICY_LIMIT_SAFETY,
-                            controller_limits(&controller, 2) & DRIVE_POLICY_LIMIT_SAFETY);
-    run(100);
-    TEST_ASSERT_INT_WITHIN(30, 1500, controller_measured_ma(&controller, 3));
-    inputs.sensor[2].status = CONTROLLER_SENSOR_OK;
-    run(100);
-    TEST_ASSERT_EQUAL_UINT16(0, outputs.duty[2]); /* it does not start again by itself */
-    controller_clear_faults(&controller);
-    run(100);
-    TEST_ASSERT_TRUE(all_off()); /* nor by clearing */
-    controller_set_target(&controller, 2, 1000);
-    run(100);
-    TEST_ASSERT_INT_WITHIN(30, 1500, controller_measured_ma(&controller, 2));
-}
-
-static void open_and_shorted_springs_are_told_apart(void)
-{
-    all_on();
-    run(200);
-    spring_mohm[0] = -1;
-    spring_mohm[8] = 5;
-    run(40);
-    TEST_ASSERT_EQUAL(SAFETY_FAULT_OPEN_SPRING, controller_fault(&controller, 0));
-    TEST_ASSERT_EQUAL(SAFETY_FAULT_SHORT_SPRING, controller_fault(&controller, 8));
-    for (uint8_t k = 1; k < 8; k++) {
-        TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, controller_fault(&controller, k));
-        TEST_ASSERT_NOT_EQUAL(0, outputs.duty[k]);
-    }
-}
-
 static void current_in_an_output_that_is_off_stops_the_board(void)
 {
     controller_set_target(&controller, 0, 1000);
@@ -459,80 +421,68 @@ static void ceiling_lets_a_current_pass_that_cannot_overheat(void)
     TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, controller_fault(&controller, 4));
 }
 
-/* Settings with a larger loss arrive at warm springs, and they are driven at once: minutes later
- * the ceiling is where that drive takes it from cold. */
-static void a_drive_after_other_losses_goes_by_them(void)
+/* Settings with a larger loss arrive at warm springs, and they are driven at once: until they have
+ * been cold, the ceiling is where that drive takes it by the smaller one. */
+static void a_drive_after_larger_losses_goes_by_the_smaller_until_all_are_cold(void)
 {
-    const uint16_t loss_uw_per_k = settings.model.loss_uw_per_k;
-    settings.policy.open_current_ma = 1800;
-    settings.model.loss_uw_per_k = (uint16_t)(loss_uw_per_k / 2u);
+    settings.policy.open_current_ma = 1300;
     start();
     controller_set_target(&controller, 4, 1000);
     run(50u * 45u);
-    settings.model.loss_uw_per_k = loss_uw_per_k;
+    settings.model.loss_uw_per_k *= 2u;
     TEST_ASSERT_TRUE(controller_apply_settings(&controller, &settings, NULL));
-    TEST_ASSERT_TRUE(controller_is_warm(&controller, 4));
     run(50u * 600u);
     const float warm_c = controller_delivered_c(&controller, 4);
+    controller_stop(&controller);
+    run(50u * 900u);
+    controller_set_target(&controller, 4, 1000);
+    run(50u * 600u);
+    const float cold_c = controller_delivered_c(&controller, 4);
+    TEST_ASSERT_TRUE(cold_c - 20.0f < 0.65f * (warm_c - 20.0f)); /* neighbours take a part */
+    settings.model.loss_uw_per_k /= 2u;
     start();
     controller_set_target(&controller, 4, 1000);
     run(50u * 645u);
-    TEST_ASSERT_FLOAT_WITHIN(2.0f, controller_delivered_c(&controller, 4), warm_c);
+    TEST_ASSERT_FLOAT_WITHIN(10.0f, controller_delivered_c(&controller, 4) + 8.0f, warm_c);
 }
 
-/* It answers, converts, and shows the same for ever. */
-static void frozen_sensor_is_found_within_two_seconds_and_stops_its_spring_alone(void)
+/* 2.35 A take it beyond 120 degC by what was declared as it became warm, and the belief is talked
+ * away: the ceiling ends that at the trip, or a ninth above temperature_limit_c where another
+ * declaration contradicts. */
+static void where_declarations_contradict_the_ceiling_trips_at_the_limit(void)
 {
-    settings.policy.policy = DRIVE_POLICY_PRECOMPENSATE;
-    start();
-    controller_set_temperature(&controller, AMBIENT_C7); /* heats at once */
-    controller_set_target(&controller, 4, 1000);
-    controller_set_target(&controller, 0, 1000);
-    run(300);
-    TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, controller_fault(&controller, 4));
-    const controller_sensor_t shown = inputs.sensor[4];
-    TEST_ASSERT_GREATER_THAN_INT16(500, shown.current_ma);
-    uint32_t ticks = 0;
-    while (controller_fault(&controller, 4) == SAFETY_FAULT_NONE && ticks < 200) {
-        inputs.sensor[4] = shown;
-        run(1);
-        ticks++;
+    static const struct {
+        float loss, capacity;
+        int16_t air_c7;
+        bool trips;
+    } row[] = {{1.0f, 1.0f, AMBIENT_C7, false},
+               {2.0f, 1.0f, AMBIENT_C7, true},
+               {1.0f, 4.0f, AMBIENT_C7, true},
+               {1.0f, 1.0f, -30 * 128, true}};
+    for (unsigned n = 0; n < sizeof row / sizeof row[0]; n++) {
+        setUp();
+        settings.policy.open_current_ma = 2350;
+        start();
+        controller_set_target(&controller, 4, 1000);
+        run(50u * 60u);
+        settings.model.loss_uw_per_k = (uint16_t)(row[n].loss * settings.model.loss_uw_per_k);
+        settings.model.heat_capacity_mj_per_k =
+            (uint16_t)(row[n].capacity * settings.model.heat_capacity_mj_per_k);
+        TEST_ASSERT_TRUE(controller_apply_settings(&controller, &settings, NULL));
+        inputs.ambient_c7 = row[n].air_c7;
+        for (uint32_t m = 0; m < 50u * 240u; m++) {
+            thermal_model_set_temperature(&controller.model, 4, 30 * 128);
+            run(1);
+            if (controller_fault(&controller, 4) != SAFETY_FAULT_NONE) {
+                break;
+            }
+        }
+        const float limit_c = 20.0f + 90.0f / 0.9f;
+        TEST_ASSERT_EQUAL(row[n].trips ? SAFETY_FAULT_OVER_TEMPERATURE : SAFETY_FAULT_NONE,
+                          controller_fault(&controller, 4));
+        TEST_ASSERT_TRUE(controller_delivered_c(&controller, 4) > limit_c - 0.5f);
+        TEST_ASSERT_TRUE(!row[n].trips || controller_delivered_c(&controller, 4) < limit_c + 3.0f);
     }
-    TEST_ASSERT_LESS_OR_EQUAL_UINT32(100, ticks);
-    for (int n = 0; n < 200; n++) {
-        inputs.sensor[4] = shown;
-        run(1);
-    }
-    TEST_ASSERT_EQUAL(SAFETY_FAULT_SENSOR_MISMATCH, controller_fault(&controller, 4));
-    TEST_ASSERT_EQUAL_UINT16(0, outputs.duty[4]);
-    TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, controller_board_fault(&controller));
-    TEST_ASSERT_NOT_EQUAL(0, outputs.duty[0]);
-}
-
-/* Half of the shunt shows half of the current, of which the loop makes twice as much. The right one
- * is put in, the fault cleared: it heats as any. */
-static void another_shunt_is_found_before_it_is_hot(void)
-{
-    settings.policy.policy = DRIVE_POLICY_PRECOMPENSATE;
-    start();
-    controller_set_temperature(&controller, AMBIENT_C7);
-    controller_set_target(&controller, 4, 1000);
-    uint32_t ticks = 0;
-    for (; controller_fault(&controller, 4) == SAFETY_FAULT_NONE && ticks < 500; ticks++) {
-        run(1);
-        inputs.sensor[4].current_ma = (int16_t)(inputs.sensor[4].current_ma / 2);
-    }
-    TEST_ASSERT_LESS_THAN_UINT32(100, ticks);
-    TEST_ASSERT_EQUAL(SAFETY_FAULT_SENSOR_MISMATCH, controller_fault(&controller, 4));
-    controller_set_target(&controller, 4, 0);
-    run(50);
-    controller_clear_faults(&controller);
-    run(50);
-    TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, controller_fault(&controller, 4));
-    controller_set_target(&controller, 4, 1000);
-    run(300);
-    TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, controller_fault(&controller, 4));
-    TEST_ASSERT_GREATER_THAN_INT16(2000, controller_measured_ma(&controller, 4));
 }
 
 /* A sensor that shows half from 4 s on, and a user who clears and tries again each second: the
@@ -743,29 +693,73 @@ static void accepted_settings_keep_temperatures_currents_and_faults(void)
     TEST_ASSERT_INT_WITHIN(30, 1400, controller_measured_ma(&controller, 4));
 }
 
-/* What was learnt beside a model is what that one lacks: another one declares it, or lacks
- * something else. */
-static void another_model_forgets_the_losses_and_only_these(void)
+/* What was learnt of a loss was learnt of all that the spring gives off, whatever is declared of
+ * it; of the rest nothing changes. */
+static void another_model_keeps_what_a_spring_gives_off(void)
 {
     const spring_learnt_t own = {.austenite_ohm = 0.22f,
                                  .change = 0.2f,
                                  .martensite_ohm = 0.176f,
-                                 .loss_w_per_k = 0.0008f,
+                                 .loss_w_per_k = -0.0008f,
                                  .loss_sd_w_per_k = 0.0001f};
     controller_restore_learnt(&controller, 3, &own);
     settings.policy.hold_margin_cc++;
     settings.safety.temperature_trip_cc--;
     TEST_ASSERT_TRUE(controller_apply_settings(&controller, &settings, NULL));
-    TEST_ASSERT_EQUAL_FLOAT(0.0008f, controller_learnt(&controller, 3).loss_w_per_k);
+    TEST_ASSERT_EQUAL_FLOAT(-0.0008f, controller_learnt(&controller, 3).loss_w_per_k);
+    settings.model.martensite_start_cc -= 200;
+    TEST_ASSERT_TRUE(controller_apply_settings(&controller, &settings, NULL));
+    TEST_ASSERT_FLOAT_WITHIN(1e-6f, -0.0008f, controller_learnt(&controller, 3).loss_w_per_k);
     settings.model.loss_uw_per_k += 800;
     TEST_ASSERT_TRUE(controller_apply_settings(&controller, &settings, NULL));
     const spring_learnt_t left = controller_learnt(&controller, 3);
-    TEST_ASSERT_EQUAL_FLOAT(0.0f, left.loss_w_per_k);
-    TEST_ASSERT_EQUAL_FLOAT(controller_learnt(&controller, 4).loss_sd_w_per_k,
-                            left.loss_sd_w_per_k);
+    TEST_ASSERT_FLOAT_WITHIN(5e-5f, -0.0016f, left.loss_w_per_k);
+    TEST_ASSERT_FLOAT_WITHIN(2e-6f, 0.0001f, left.loss_sd_w_per_k);
     TEST_ASSERT_EQUAL_FLOAT(0.22f, left.austenite_ohm);
     TEST_ASSERT_EQUAL_FLOAT(0.176f, left.martensite_ohm);
     TEST_ASSERT_EQUAL_FLOAT(0.2f, left.change);
+    /* of another nothing was learnt: it is as declared, within the tolerance of that */
+    TEST_ASSERT_FLOAT_WITHIN(1e-6f, 0.0f, controller_learnt(&controller, 4).loss_w_per_k);
+    TEST_ASSERT_FLOAT_WITHIN(1e-6f, 0.12f * 0.0066f,
+                             controller_learnt(&controller, 4).loss_sd_w_per_k);
+}
+
+/* Nothing that a setting says of a fan that turns is a loss that changed. */
+static void settings_beside_a_fan_that_turns_leave_the_losses(void)
+{
+    inputs.fan_percent = 100;
+    run(10);
+    const spring_learnt_t own = {
+        .austenite_ohm = 0.22f, .change = 0.2f, .loss_w_per_k = 0.0008f, .loss_sd_w_per_k = 1e-4f};
+    controller_restore_learnt(&controller, 3, &own);
+    settings.model.martensite_start_cc -= 200;
+    TEST_ASSERT_TRUE(controller_apply_settings(&controller, &settings, NULL));
+    TEST_ASSERT_FLOAT_WITHIN(2e-5f, 0.0008f, controller_learnt(&controller, 3).loss_w_per_k);
+}
+
+/* Whatever transformation is declared: what had transformed is not to be heated through it again.
+ */
+static void another_transformation_keeps_phase_and_temperature(void)
+{
+    settings.model.air_exchange_uw_per_k = 5000;
+    start();
+    thermal_model_set_temperature(&controller.model, 2, 110 * 128);
+    thermal_model_set_temperature(&controller.model, 2, 83 * 128);
+    thermal_model_set_temperature(&controller.model, 5, 83 * 128);
+    thermal_model_set_temperature(&controller.model, 6, 93 * 128);
+    thermal_model_set_temperature(&controller.model, 6, 80 * 128);
+    const uint16_t part = controller_austenite_permille(&controller, 6);
+    controller.model.state.air_c23 = 40 * 128 * 65536;
+    settings.model.martensite_start_cc = 7600;
+    settings.model.austenite_start_cc = 8500;
+    settings.model.latent_heat_mj += 350;
+    TEST_ASSERT_TRUE(controller_apply_settings(&controller, &settings, NULL));
+    TEST_ASSERT_EQUAL_UINT16(1000, controller_austenite_permille(&controller, 2));
+    TEST_ASSERT_EQUAL_UINT16(0, controller_austenite_permille(&controller, 5));
+    TEST_ASSERT_UINT16_WITHIN(1, part, controller_austenite_permille(&controller, 6));
+    TEST_ASSERT_EQUAL_INT16(83 * 128, controller_temperature_c7(&controller, 2));
+    TEST_ASSERT_EQUAL_INT16(80 * 128, controller_temperature_c7(&controller, 6));
+    TEST_ASSERT_EQUAL_INT16(40 * 128, thermal_model_air_c7(&controller.model));
 }
 
 static void each_number_of_the_model_changes_its_mark(void)
@@ -816,48 +810,6 @@ static void another_size_starts_anew_but_stays_locked(void)
     run(100);
     TEST_ASSERT_INT_WITHIN(30, 1500, controller_measured_ma(&controller, 1));
     TEST_ASSERT_EQUAL_UINT16(0, outputs.duty[2]);
-}
-
-/* Any readings, any status, commands at any moment: duties in range, no undefined behaviour, and
- * twice the same. */
-static void any_input_is_taken_and_the_same_input_gives_the_same_output(void)
-{
-    const int16_t word[] = {INT16_MIN, -4000, -1, 0, 1, 300, 1500, 3200, INT16_MAX};
-    controller_t other = controller;
-    controller_outputs_t others;
-    memset(&others, 0, sizeof others); /* compared as a whole, padding included */
-    uint32_t random = 11;
-    for (int n = 0; n < 20000; n++) {
-        for (int k = 0; k < CONTROLLER_MAX_SPRINGS; k++) {
-            random = random * 1664525u + 1013904223u;
-            inputs.sensor[k].status =
-                (controller_sensor_status_t)((random >> 28) < 5 ? random >> 28 : 0);
-            inputs.sensor[k].current_ma = word[(random >> 8) % 9];
-            inputs.sensor[k].voltage_mv = word[(random >> 16) % 9];
-        }
-        inputs.ambient_c7 = word[(random >> 12) % 9];
-        inputs.fan_percent = (uint8_t)(random >> 20);
-        if (random % 13 == 0) {
-            controller_clear_faults(&controller);
-            controller_clear_faults(&other);
-        }
-        uint8_t spring = (uint8_t)((random >> 9) % 9);
-        controller_set_target(&controller, spring, 1000);
-        controller_set_target(&other, spring, 1000);
-        controller_set_policy(&controller, (drive_policy_kind_t)(random >> 31));
-        controller_set_policy(&other, (drive_policy_kind_t)(random >> 31));
-        controller_tick(&controller, &inputs, &outputs);
-        controller_tick(&other, &inputs, &others);
-        TEST_ASSERT_EQUAL_MEMORY(&outputs, &others, sizeof outputs);
-        for (int k = 0; k < CONTROLLER_MAX_SPRINGS; k++) {
-            TEST_ASSERT_LESS_OR_EQUAL_UINT16(k < 9 ? settings.current.maximum_duty_steps : 0,
-                                             outputs.duty[k]);
-        }
-        TEST_ASSERT_TRUE(thermal_model_is_consistent(&controller.model));
-        TEST_ASSERT_TRUE(
-            controller_temperature_c7(&controller, spring) >= THERMAL_MODEL_LOWEST_C7 &&
-            controller_temperature_c7(&controller, spring) <= THERMAL_MODEL_HIGHEST_C7);
-    }
 }
 
 /* ---- RAM that turns over ---- */
@@ -959,8 +911,6 @@ int main(void)
     RUN_TEST(model_is_fed_with_the_measured_power_of_each_tick);
     RUN_TEST(each_current_loop_is_told_its_springs_resistance);
     RUN_TEST(missing_readings_keep_the_last_power_while_the_output_is_on);
-    RUN_TEST(failing_sensor_is_a_fault_of_its_spring_alone);
-    RUN_TEST(open_and_shorted_springs_are_told_apart);
     RUN_TEST(current_in_an_output_that_is_off_stops_the_board);
     RUN_TEST(a_glitch_of_current_takes_a_pulse_and_no_more);
     RUN_TEST(hot_model_trips);
@@ -970,9 +920,8 @@ int main(void)
     RUN_TEST(no_hint_takes_heat_that_was_given);
     RUN_TEST(a_hint_is_taken_once_it_has_cooled);
     RUN_TEST(ceiling_lets_a_current_pass_that_cannot_overheat);
-    RUN_TEST(a_drive_after_other_losses_goes_by_them);
-    RUN_TEST(frozen_sensor_is_found_within_two_seconds_and_stops_its_spring_alone);
-    RUN_TEST(another_shunt_is_found_before_it_is_hot);
+    RUN_TEST(a_drive_after_larger_losses_goes_by_the_smaller_until_all_are_cold);
+    RUN_TEST(where_declarations_contradict_the_ceiling_trips_at_the_limit);
     RUN_TEST(who_clears_again_and_again_heats_no_spring_whose_sensor_lies);
     RUN_TEST(who_clears_each_second_hides_no_sensor_that_lies);
     RUN_TEST(who_clears_a_welded_switch_again_waits);
@@ -982,13 +931,14 @@ int main(void)
     RUN_TEST(commands_out_of_range_change_nothing);
     RUN_TEST(refused_settings_change_nothing_and_are_found);
     RUN_TEST(accepted_settings_keep_temperatures_currents_and_faults);
-    RUN_TEST(another_model_forgets_the_losses_and_only_these);
+    RUN_TEST(another_model_keeps_what_a_spring_gives_off);
+    RUN_TEST(settings_beside_a_fan_that_turns_leave_the_losses);
+    RUN_TEST(another_transformation_keeps_phase_and_temperature);
     RUN_TEST(each_number_of_the_model_changes_its_mark);
     RUN_TEST(another_declared_resistance_is_taken_where_none_was_learnt);
     RUN_TEST(another_size_starts_anew_but_stays_locked);
     RUN_TEST(what_settings_decide_and_a_bit_turned_over_drives_nothing);
     RUN_TEST(what_writes_settings_is_no_bit_that_turned_over);
     RUN_TEST(a_conductance_of_the_fan_that_turned_over_comes_back);
-    RUN_TEST(any_input_is_taken_and_the_same_input_gives_the_same_output);
     return UNITY_END();
 }

@@ -176,19 +176,6 @@ static void supply_that_comes_back_is_met_before_it_is_a_fault(void)
     }
 }
 
-/* What the sensor can still read is learnt as ever: nothing is taken back. */
-static void supply_that_comes_back_a_little_is_learnt_as_ever(void)
-{
-    int above;
-    int32_t lowest_ua;
-    load.spring_mohm = 219;
-    supply_comes_back(4350, 2700, 0, &above, &lowest_ua);
-    TEST_ASSERT_GREATER_THAN_INT32(2640000, lowest_ua);
-    supply_comes_back(4800, 3000, 0, &above, &lowest_ua);
-    TEST_ASSERT_GREATER_THAN_INT32(2940000, lowest_ua);
-    TEST_ASSERT_LESS_OR_EQUAL_INT(2, above);
-}
-
 static void mean_current_is_the_target(void)
 {
     for (int32_t spring_mohm = 120; spring_mohm <= 300; spring_mohm += 30) {
@@ -208,27 +195,6 @@ static void freewheel_drop_is_fed_forward(void)
     TEST_ASSERT_INT32_WITHIN(5000, 1500000, mean_ua(1500, 50));
     TEST_ASSERT_INT32_WITHIN(current_control_reference_ma(&control, 0), 0,
                              control.channel[0].trim_q24);
-}
-
-/* Blind, so that nothing moves the wanted duty: 1000 mA x 0.37 ohm / 5 V x 800 = 59.2 steps. */
-static void dithering_has_the_mean_of_the_wanted_duty(void)
-{
-    parameters.hold_ticks = 250;
-    TEST_ASSERT_TRUE(current_control_init(&control, &parameters, NULL));
-    mean_ua(1000, 100);
-    control.channel[0].trim_q24 = 0;
-    uint32_t sum = 0;
-    uint16_t lowest = UINT16_MAX;
-    uint16_t highest = 0;
-    for (int n = 0; n < 200; n++) {
-        uint16_t duty = tick_with(1000, 190, false, true);
-        sum += duty;
-        lowest = duty < lowest ? duty : lowest;
-        highest = duty > highest ? duty : highest;
-    }
-    TEST_ASSERT_INT_WITHIN(4, 11840, sum); /* 0.02 step in the mean */
-    TEST_ASSERT_EQUAL_UINT16(59, lowest);
-    TEST_ASSERT_EQUAL_UINT16(60, highest);
 }
 
 static void reference_rises_by_the_slew_and_falls_at_once(void)
@@ -269,26 +235,6 @@ static void old_readings_teach_nothing_false(void)
     }
 }
 
-/* The policy's sweep: 18 mA a tick, down and up. */
-static void small_changes_do_not_wait_and_do_not_keep_it_from_learning(void)
-{
-    for (int32_t old_percent = 0; old_percent <= 100; old_percent += 50) {
-        setUp();
-        load.spring_mohm = 150; /* 12 % of the loop less than estimated */
-        load.old_percent = old_percent;
-        mean_ua(100, 10);
-        for (uint16_t n = 0; n < 600; n++) {
-            uint16_t place = n % 32u;
-            uint16_t target_ma = (uint16_t)(800u - 18u * (place < 16 ? place : 31u - place));
-            tick(target_ma);
-            if (n >= 64) {
-                TEST_ASSERT_EQUAL_UINT16(target_ma, current_control_reference_ma(&control, 0));
-                TEST_ASSERT_INT32_WITHIN(45000, target_ma * 1000, load.now_ua);
-            }
-        }
-    }
-}
-
 static void channels_have_their_turns_in_alternate_ticks(void)
 {
     uint16_t target_ma[9], duty[9], before_ma[9] = {0};
@@ -311,20 +257,6 @@ static void channels_have_their_turns_in_alternate_ticks(void)
         }
     }
     TEST_ASSERT_EQUAL_INT(8 * 9 / 2, rises);
-}
-
-static void fall_of_target_has_no_kick_when_resistance_is_far_off(void)
-{
-    const int32_t spring_mohm[] = {120, 300};
-    for (size_t r = 0; r < 2; r++) {
-        setUp();
-        load.spring_mohm = spring_mohm[r];
-        mean_ua(3000, 100);
-        for (int n = 0; n < 20; n++) {
-            tick(500);
-            TEST_ASSERT_INT32_WITHIN(60000, 500000, load.now_ua);
-        }
-    }
 }
 
 /* 0.95 x 0.9 V reaches 2.3 A of the 3 A wanted; then the supply recovers to 1.2 V, which just
@@ -358,25 +290,6 @@ static void recovers_from_a_duty_limit_within_ten_ticks(void)
         TEST_ASSERT_LESS_THAN_INT32(1050000, load.now_ua);
     }
     TEST_ASSERT_INT32_WITHIN(20000, 1000000, load.now_ua);
-}
-
-static void open_spring_raises_the_duty_by_the_trim_limit_at_most(void)
-{
-    mean_ua(1500, 100);
-    load.spring_mohm = -1;
-    uint16_t duty = 0;
-    for (int n = 0; n < 500; n++) {
-        duty = tick(1500);
-        TEST_ASSERT_LESS_OR_EQUAL_UINT16(125, duty); /* (370 + 150) mohm x 1.5 A = 124.8 steps */
-    }
-    load.spring_mohm = 190; /* the wire touches again */
-    int32_t highest_ua = 0;
-    for (int n = 0; n < 20; n++) {
-        tick(1500);
-        highest_ua = load.now_ua > highest_ua ? load.now_ua : highest_ua;
-    }
-    TEST_ASSERT_LESS_THAN_INT32(2600000, highest_ua);
-    TEST_ASSERT_INT32_WITHIN(45000, 1500000, load.now_ua);
 }
 
 static void shorted_spring_lowers_the_duty_at_once(void)
@@ -581,29 +494,6 @@ static void drop_and_limits_are_exact(void)
     TEST_ASSERT_EQUAL_INT32(8191 * 256, control.trim_limit_q24);
 }
 
-/* A reading beyond 4095 mA counts as that, to the last bit of what is learnt of it. */
-static void readings_beyond_the_sensor_count_as_its_limit(void)
-{
-    static const int16_t beyond_ma[] = {4096, 4500, INT16_MAX, -4096, -4500, -INT16_MAX};
-    parameters.shunt_mohm = parameters.wiring_mohm = 0;
-    for (size_t n = 0; n < 6; n++) {
-        TEST_ASSERT_TRUE(current_control_init(&control, &parameters, NULL));
-        current_control_t by_limit = control;
-        for (int turn = 0; turn < 40; turn++) {
-            const uint16_t target_ma = 100;
-            const bool valid = true;
-            const int16_t limit_ma = beyond_ma[n] > 0 ? 4095 : -4095;
-            uint16_t duty, limit_duty;
-            current_control_set_resistance(&control, 0, 20);
-            current_control_set_resistance(&by_limit, 0, 20);
-            current_control_tick(&control, 1, &target_ma, &beyond_ma[n], &valid, true, &duty);
-            current_control_tick(&by_limit, 1, &target_ma, &limit_ma, &valid, true, &limit_duty);
-            TEST_ASSERT_EQUAL_UINT16(limit_duty, duty);
-            TEST_ASSERT_EQUAL_MEMORY(&by_limit, &control, sizeof control);
-        }
-    }
-}
-
 /* A circuit that nothing is declared of is given a step in 65536 a milliampere: it still answers.
  */
 static void no_resistance_at_all_gives_the_least_there_is(void)
@@ -693,19 +583,6 @@ static void off_is_nothing_and_small_ends_at_25_ma(void)
     }
 }
 
-/* A target above the limit is the limit; a channel without readings that its limit of ticks
- * passed is off; the count of them ends. */
-static void target_is_cut_to_the_most_and_blindness_does_not_wrap(void)
-{
-    mean_ua(UINT16_MAX, 60);
-    TEST_ASSERT_EQUAL_UINT16(parameters.maximum_current_ma,
-                             current_control_reference_ma(&control, 0));
-    for (int n = 0; n < 600; n++) {
-        const uint16_t duty = tick_with(1500, 190, false, true);
-        TEST_ASSERT_EQUAL(n < parameters.hold_ticks, duty != 0);
-    }
-}
-
 /* What still flows from before is no answer to a duty that was not given. */
 static void what_is_read_before_the_start_teaches_nothing(void)
 {
@@ -738,18 +615,13 @@ int main(void)
     UNITY_BEGIN();
     RUN_TEST(step_settles_without_much_overshoot);
     RUN_TEST(supply_that_comes_back_is_met_before_it_is_a_fault);
-    RUN_TEST(supply_that_comes_back_a_little_is_learnt_as_ever);
     RUN_TEST(mean_current_is_the_target);
     RUN_TEST(freewheel_drop_is_fed_forward);
-    RUN_TEST(dithering_has_the_mean_of_the_wanted_duty);
     RUN_TEST(reference_rises_by_the_slew_and_falls_at_once);
     RUN_TEST(old_readings_teach_nothing_false);
-    RUN_TEST(small_changes_do_not_wait_and_do_not_keep_it_from_learning);
     RUN_TEST(channels_have_their_turns_in_alternate_ticks);
-    RUN_TEST(fall_of_target_has_no_kick_when_resistance_is_far_off);
     RUN_TEST(saturation_does_not_wind_up);
     RUN_TEST(recovers_from_a_duty_limit_within_ten_ticks);
-    RUN_TEST(open_spring_raises_the_duty_by_the_trim_limit_at_most);
     RUN_TEST(shorted_spring_lowers_the_duty_at_once);
     RUN_TEST(blind_channel_holds_then_goes_off_then_returns);
     RUN_TEST(blind_channel_does_not_start_and_follows_a_fall);
@@ -760,12 +632,10 @@ int main(void)
     RUN_TEST(reset_forgets_what_was_learnt_but_not_the_estimate);
     RUN_TEST(what_is_fed_forward_is_ohm_s_law);
     RUN_TEST(drop_and_limits_are_exact);
-    RUN_TEST(readings_beyond_the_sensor_count_as_its_limit);
     RUN_TEST(no_resistance_at_all_gives_the_least_there_is);
     RUN_TEST(an_error_is_taken_in_full_up_to_its_end);
     RUN_TEST(a_new_one_is_off_and_has_the_numbers_of_its_circuit);
     RUN_TEST(off_is_nothing_and_small_ends_at_25_ma);
-    RUN_TEST(target_is_cut_to_the_most_and_blindness_does_not_wrap);
     RUN_TEST(what_is_read_before_the_start_teaches_nothing);
     RUN_TEST(a_small_start_has_its_turn_and_one_mA_is_given);
     return UNITY_END();

@@ -40,34 +40,6 @@ static void share_falls_linearly_over_the_band(void)
     TEST_ASSERT_EQUAL_FLOAT(0.0f, derating_share(NAN, 110.0f, 10.0f));
 }
 
-static void undriven_spring_is_judged_by_where_it_is_going(void)
-{
-    TEST_ASSERT_EQUAL_FLOAT(0.0f, derating_severity(70.0f, 0.0f, 83.0f));
-    TEST_ASSERT_FLOAT_WITHIN(1e-6f, 0.4f, derating_severity(80.0f, 0.0f, 83.0f));
-    TEST_ASSERT_EQUAL_FLOAT(1.0f, derating_severity(83.0f, 0.0f, 83.0f));
-    /* 0.5 K/s for 6 s are 3 K */
-    TEST_ASSERT_FLOAT_WITHIN(1e-6f, derating_severity(80.0f, 0.0f, 83.0f),
-                             derating_severity(77.0f, 0.5f, 83.0f));
-    TEST_ASSERT_EQUAL_FLOAT(0.0f, derating_severity(82.0f, -1.0f, 83.0f));
-    TEST_ASSERT_EQUAL_FLOAT(1.0f, derating_severity(NAN, 0.0f, 83.0f));
-}
-
-static void overload_is_free_for_half_of_its_time(void)
-{
-    TEST_ASSERT_EQUAL_UINT16(14800, derating_overload_ma(14800, 6000, 0, 80));
-    TEST_ASSERT_EQUAL_UINT16(14800, derating_overload_ma(14800, 6000, 40, 80));
-    TEST_ASSERT_EQUAL_UINT16(10400, derating_overload_ma(14800, 6000, 60, 80));
-    TEST_ASSERT_EQUAL_UINT16(6000, derating_overload_ma(14800, 6000, 80, 80));
-    TEST_ASSERT_EQUAL_UINT16(6000, derating_overload_ma(14800, 6000, UINT16_MAX, 80));
-    TEST_ASSERT_EQUAL_UINT16(5000, derating_overload_ma(5000, 6000, 80, 80));
-    TEST_ASSERT_EQUAL_UINT16(6000, derating_overload_ma(14800, 6000, 1, 1));
-    for (uint16_t quarters = 0; quarters < 100; quarters++) { /* never back up */
-        TEST_ASSERT_LESS_OR_EQUAL_UINT16(
-            derating_overload_ma(14800, 6000, quarters, 80),
-            derating_overload_ma(14800, 6000, (uint16_t)(quarters + 1u), 80));
-    }
-}
-
 /* Wherever it is: the eight around it, and no other. */
 static void all_around_an_undriven_spring_are_derated(void)
 {
@@ -387,19 +359,6 @@ static void boosts_are_served_in_turn_after_what_is_secured(void)
     TEST_ASSERT_EQUAL_UINT16(0, granted_ma[5]);
 }
 
-static void no_budget_is_no_current(void)
-{
-    supply_queue_t queue = {0};
-    supply_claim_t claim[SPRINGS];
-    uint16_t granted_ma[SPRINGS];
-    for (uint8_t k = 0; k < SPRINGS; k++) {
-        claim[k] = (supply_claim_t){3000, k % 2u == 0 ? 3000 : 0};
-        supply_queue_add(&queue, k);
-    }
-    supply_share(&queue, claim, SPRINGS, 0, granted_ma);
-    TEST_ASSERT_EQUAL_UINT32(0, sum_of(granted_ma));
-}
-
 /* What is secured is cut alike where it is too much, to less than 1 mA each below what fits. */
 static void cap_fits_and_wastes_less_than_a_milliampere_each(void)
 {
@@ -432,8 +391,6 @@ void run_limit_tests(void)
 {
     Unity.TestFile = __FILE__;
     RUN_TEST(share_falls_linearly_over_the_band);
-    RUN_TEST(undriven_spring_is_judged_by_where_it_is_going);
-    RUN_TEST(overload_is_free_for_half_of_its_time);
     RUN_TEST(all_around_an_undriven_spring_are_derated);
     RUN_TEST(undriven_spring_is_judged_as_hot_as_it_may_be);
     RUN_TEST(doubt_that_others_share_derates_nobody);
@@ -447,6 +404,5 @@ void run_limit_tests(void)
     RUN_TEST(restart_leaves_nothing_driven_and_nothing_owed);
     RUN_TEST(queue_keeps_each_once_in_order);
     RUN_TEST(boosts_are_served_in_turn_after_what_is_secured);
-    RUN_TEST(no_budget_is_no_current);
     RUN_TEST(cap_fits_and_wastes_less_than_a_milliampere_each);
 }

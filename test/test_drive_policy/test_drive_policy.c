@@ -162,17 +162,6 @@ static void resistance_without_a_change_is_driven_by_the_model_and_said(void)
     TEST_ASSERT_BITS_HIGH(DRIVE_POLICY_LIMIT_BLIND, drive_policy_limits(&policy, 0));
 }
 
-static void level_is_held(void)
-{
-    begin_cold(1, 2);
-    level[0] = 500;
-    (void)run(120.0);
-    for (unsigned second = 0; second < 120; second++) {
-        (void)run(1.0);
-        TEST_ASSERT_DOUBLE_WITHIN(0.12, 0.5, truth[0].austenite);
-    }
-}
-
 /* Whichever way it came there, and never fully on: by its own martensite's resistance. */
 static void levels_one_after_the_other_are_held(void)
 {
@@ -492,35 +481,6 @@ static void spring_just_released_is_no_false_actuation(void)
     }
 }
 
-/* Its power is gone: it falls fast, then, as it gives off its latent heat, slowly. */
-static void spring_just_released_is_none_while_it_transforms_either(void)
-{
-    begin_cold(3, 3);
-    believe(1, 80, true);
-    level[0] = level[1] = 1000;
-    decisions(2u * TURN_TICKS);
-    level[1] = 0;
-    for (unsigned n = 0; n < 8u * TURN_TICKS; n++) {
-        policy.spring[1].rise_k_per_s = n < 2u * TURN_TICKS ? -8.0f : -0.2f;
-        (void)decide();
-        TEST_ASSERT_BITS_LOW(DRIVE_POLICY_LIMIT_UNDRIVEN, drive_policy_limits(&policy, 0));
-    }
-}
-
-static void spring_released_from_the_other_policy_is_none_either(void)
-{
-    parameters.policy = DRIVE_POLICY_OPEN;
-    begin_cold(3, 3);
-    believe(1, 95, true);
-    level[0] = level[1] = 1000;
-    decisions(2u * TURN_TICKS);
-    level[1] = 0;
-    parameters.policy = DRIVE_POLICY_PRECOMPENSATE;
-    apply(&parameters);
-    decisions(3u * TURN_TICKS);
-    TEST_ASSERT_BITS_LOW(DRIVE_POLICY_LIMIT_UNDRIVEN, drive_policy_limits(&policy, 0));
-}
-
 static void what_was_driven_open_and_is_off_again_trips_no_neighbour(void)
 {
     parameters.policy = DRIVE_POLICY_OPEN;
@@ -633,7 +593,6 @@ int main(void)
     RUN_TEST(spring_that_has_lost_its_phase_is_heated_back_or_that_is_said);
     RUN_TEST(spring_of_which_nothing_is_known_any_more_waits_and_is_heated_anew);
     RUN_TEST(resistance_without_a_change_is_driven_by_the_model_and_said);
-    RUN_TEST(level_is_held);
     RUN_TEST(levels_one_after_the_other_are_held);
     RUN_TEST(spring_that_cannot_get_there_is_said_to_be_away);
     RUN_TEST(spring_whose_distance_is_lost_is_said_to_be_away);
@@ -650,8 +609,6 @@ int main(void)
     RUN_TEST(limited_heating_ends_where_it_may_be_hot_enough);
     RUN_TEST(undriven_spring_derates_its_neighbours_only);
     RUN_TEST(spring_just_released_is_no_false_actuation);
-    RUN_TEST(spring_just_released_is_none_while_it_transforms_either);
-    RUN_TEST(spring_released_from_the_other_policy_is_none_either);
     RUN_TEST(what_was_driven_open_and_is_off_again_trips_no_neighbour);
     RUN_TEST(overload_takes_the_excess_away_in_time);
     RUN_TEST(budget_holds_in_every_tick_whatever_is_asked);

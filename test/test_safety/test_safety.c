@@ -212,18 +212,6 @@ static void sum_above_the_supply_trips_everything(void)
     TEST_ASSERT_TRUE(safety_allows(&safety, 0));
 }
 
-static void limit_trip_is_of_its_spring_alone_until_cleared(void)
-{
-    safety_trip(&safety, 4, SAFETY_FAULT_LIMIT_TRIP);
-    ticks(4, &running, 100);
-    TEST_ASSERT_EQUAL(SAFETY_FAULT_LIMIT_TRIP, safety_fault(&safety, 4));
-    TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, safety_board_fault(&safety));
-    TEST_ASSERT_FALSE(safety_allows(&safety, 4));
-    TEST_ASSERT_TRUE(safety_allows(&safety, 3));
-    safety_clear(&safety);
-    TEST_ASSERT_TRUE(safety_allows(&safety, 4));
-}
-
 /* Frozen at what flowed: neither a current in a spring that is off nor a fault of the board, until
  * it shows another. */
 static void frozen_sensor_is_no_current_in_a_spring_that_is_off(void)
@@ -331,15 +319,6 @@ static void what_is_no_current_without_duty_is_no_fault(void)
     TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, safety_fault(&safety, 4));
 }
 
-static void what_is_tripped_as_stuck_is_of_the_board_too(void)
-{
-    safety_trip(&safety, 4, SAFETY_FAULT_SENSOR_MISMATCH);
-    TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, safety_board_fault(&safety));
-    safety_trip(&safety, 3, SAFETY_FAULT_STUCK_ON);
-    TEST_ASSERT_EQUAL(SAFETY_FAULT_STUCK_ON, safety_board_fault(&safety));
-    TEST_ASSERT_TRUE(safety_cuts_supply(&safety));
-}
-
 /* A switch that closes for a tick now and then: by the third the supply goes, however many good
  * readings lie between, if it is less than two seconds. */
 static void a_switch_that_chatters_is_current_without_duty(void)
@@ -408,44 +387,11 @@ static void a_sensor_that_is_silent_holds_no_supply_back(void)
     TEST_ASSERT_FALSE(safety_doubts_supply(&safety));
 }
 
-static void one_bad_sample_is_enough_where_that_is_set(void)
-{
-    parameters.bad_samples = 1;
-    TEST_ASSERT_TRUE(safety_apply(&safety, &parameters, NULL));
-    safety_sample_t sample = off;
-    sample.current_ma = 900;
-    ticks(4, &sample, 1);
-    TEST_ASSERT_EQUAL(SAFETY_FAULT_STUCK_ON, safety_board_fault(&safety));
-}
-
-static void other_faults_do_not_silence_a_sensor(void)
-{
-    ticks(4, &running, 10);
-    safety_trip(&safety, 4, SAFETY_FAULT_LIMIT_TRIP);
-    safety_sample_t sample = running;
-    sample.current_ma++;
-    sample.expected_ma = 0;
-    sample.off = true;
-    ticks(4, &sample, SAFETY_STUCK_TICKS);
-    TEST_ASSERT_EQUAL(SAFETY_FAULT_STUCK_ON, safety_board_fault(&safety));
-}
-
 static void silent_host_stops_the_board_until_cleared(void)
 {
     safety_host_silent(&safety);
     ticks(4, &running, 100);
     TEST_ASSERT_EQUAL(SAFETY_FAULT_HOST_SILENT, safety_board_fault(&safety));
-    for (uint8_t k = 0; k < 9; k++) {
-        TEST_ASSERT_FALSE(safety_allows(&safety, k));
-    }
-    safety_clear(&safety);
-    TEST_ASSERT_TRUE(safety_allows(&safety, 4));
-}
-
-static void emergency_stop_holds_until_cleared(void)
-{
-    safety_emergency_stop(&safety);
-    ticks(4, &running, 100);
     for (uint8_t k = 0; k < 9; k++) {
         TEST_ASSERT_FALSE(safety_allows(&safety, k));
     }
@@ -520,42 +466,6 @@ static void resistance_trips_at_its_limits_and_nowhere_else(void)
             }
         }
     }
-}
-
-static void any_sample_is_taken_without_overflow(void)
-{
-    const int16_t word[] = {INT16_MIN, -1, 0, 1, 300, INT16_MAX};
-    parameters.resistance_minimum_mohm = 9999;
-    parameters.resistance_maximum_mohm = 10000;
-    TEST_ASSERT_TRUE(safety_apply(&safety, &parameters, NULL));
-    for (uint32_t n = 0; n < 6u * 6u * 6u * 7u; n++) {
-        safety_sample_t sample = {.sensor_status = (uint8_t)(n % 7u == 6u ? 255u : n % 7u),
-                                  .current_ma = word[n / 7u % 6u],
-                                  .voltage_mv = word[n / 42u % 6u],
-                                  .expected_ma = (uint16_t)word[(n + 3u) % 6u],
-                                  .temperature_c7 = word[n / 252u % 6u]};
-        for (int repeat = 0; repeat < 300; repeat++) {
-            safety_tick_spring(&safety, 8, &sample);
-        }
-        TEST_ASSERT_LESS_THAN(SAFETY_FAULT_COUNT, safety_fault(&safety, 8));
-        TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, safety_fault(&safety, 7));
-        if (sample.sensor_status != 0) {
-            TEST_ASSERT_FALSE(safety_allows(&safety, 8));
-        }
-        safety_clear(&safety);
-    }
-}
-
-static void every_fault_has_a_name_of_its_own(void)
-{
-    for (int fault = 0; fault < SAFETY_FAULT_COUNT; fault++) {
-        TEST_ASSERT_TRUE(strcmp("unknown", safety_fault_name((safety_fault_t)fault)) != 0);
-        for (int other = 0; other < fault; other++) {
-            TEST_ASSERT_TRUE(strcmp(safety_fault_name((safety_fault_t)other),
-                                    safety_fault_name((safety_fault_t)fault)) != 0);
-        }
-    }
-    TEST_ASSERT_EQUAL_STRING("unknown", safety_fault_name(SAFETY_FAULT_COUNT));
 }
 
 static void refuses(const safety_parameters_t *changed, uint16_t row)
@@ -752,25 +662,18 @@ int main(void)
     RUN_TEST(condition_that_follows_another_trips_in_its_own_time);
     RUN_TEST(the_first_fault_is_kept);
     RUN_TEST(sum_above_the_supply_trips_everything);
-    RUN_TEST(limit_trip_is_of_its_spring_alone_until_cleared);
     RUN_TEST(frozen_sensor_is_no_current_in_a_spring_that_is_off);
     RUN_TEST(sensor_that_goes_on_showing_what_flowed_is_frozen);
     RUN_TEST(current_that_no_output_gives_is_no_frozen_sensor);
     RUN_TEST(current_without_duty_overrides_every_other_fault);
     RUN_TEST(what_is_no_current_without_duty_is_no_fault);
-    RUN_TEST(what_is_tripped_as_stuck_is_of_the_board_too);
     RUN_TEST(a_switch_that_chatters_is_current_without_duty);
     RUN_TEST(a_voltage_that_no_duty_gives_is_current_without_duty);
     RUN_TEST(a_sensor_that_is_silent_holds_no_supply_back);
-    RUN_TEST(one_bad_sample_is_enough_where_that_is_set);
-    RUN_TEST(other_faults_do_not_silence_a_sensor);
     RUN_TEST(silent_host_stops_the_board_until_cleared);
-    RUN_TEST(emergency_stop_holds_until_cleared);
     RUN_TEST(lock_holds_until_unlocked_and_is_no_fault);
     RUN_TEST(on_time_is_limited_only_where_it_is_set);
     RUN_TEST(resistance_trips_at_its_limits_and_nowhere_else);
-    RUN_TEST(any_sample_is_taken_without_overflow);
-    RUN_TEST(every_fault_has_a_name_of_its_own);
     RUN_TEST(parameters_that_do_not_fit_are_refused_and_found);
     RUN_TEST(the_supply_is_cut_where_nothing_else_helps);
     RUN_TEST(supply_that_no_sensor_watches_is_cut);

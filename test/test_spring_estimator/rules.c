@@ -338,6 +338,109 @@ static void disturbance_is_forgotten_and_loss_is_known_less_and_less(void)
     TEST_ASSERT_FLOAT_WITHIN(0.02f * sd, sd, sqrtf(INSIDE.loss_variance) / estimator.loss_w_per_k);
 }
 
+/* Other losses are declared of a spring that is where it is. */
+static void declare(double factor)
+{
+    const float before_w = spring_estimator_declared_w(&model, 0);
+    thermal_model_parameters_t now = model.parameters;
+    thermal_model_state_t state;
+    thermal_model_get_state(&model, &state);
+    now.loss_uw_per_k = (uint16_t)(factor * now.loss_uw_per_k);
+    TEST_ASSERT_EQUAL(THERMAL_MODEL_OK, thermal_model_init(&model, &now, NULL));
+    TEST_ASSERT_TRUE(thermal_model_set_state(&model, &state));
+    spring_estimator_keep_loss(&estimator, &model, 0, before_w);
+    spring_estimator_prepare(&estimator, &model, true);
+}
+
+/* By the model, and what it is told to lose beyond that. */
+static float gives_off_w(void)
+{
+    return spring_estimator_declared_w(&model, 0) + 5.0f -
+           1e-6f * (float)spring_estimator_model_power_uw(&estimator, 0, 5000000u);
+}
+
+/* Of one that loses far less than declared, and was held until that was seen: it is held on where
+ * it is, whatever is declared of it then, and how often. */
+static void spring_whose_loss_was_seen_is_held_on_whatever_is_declared(void)
+{
+    static const double factors[] = {1.0, 1.2, 0.8, 3.4};
+    for (size_t n = 0; n < ROWS(factors); n++) {
+        for (int often = 0; often < 2; often++) {
+            begin_cold();
+            truth.loss_w_per_k *= 0.7;
+            (void)heat_then_hold(60.0);
+            hold(4.0, 30.0);
+            for (int fall = 0; fall < 12; fall++) { /* it is lost once: that is seen */
+                hold(4.0 - fall, 10.0);
+            }
+            (void)heat_then_hold(60.0);
+            hold(6.0, 120.0);
+            const double before_k = distance_k();
+            const double was_c = truth.temperature_c;
+            (void)snprintf(where, sizeof where, "x %.1f, %d: %.1f K", factors[n], often, before_k);
+            const float gave_w = gives_off_w();
+            declare(factors[n]);
+            TEST_ASSERT_FLOAT_WITHIN_MESSAGE(0.03f * gave_w, gave_w, gives_off_w(), where);
+            for (int m = 0; m < 10 * often; m++) {
+                declare(m % 2 == 0 ? 1.0 / factors[n] : factors[n]);
+            }
+            hold(6.0, 200.0);
+            TEST_ASSERT_TRUE_MESSAGE(fabs(truth.temperature_c - was_c) < 4.0, where);
+        }
+    }
+}
+
+/* Where nothing was seen, the new declaration is as good as the old one was. */
+static void loss_that_was_never_seen_is_the_declared_one(void)
+{
+    declare(1.5);
+    TEST_ASSERT_FLOAT_WITHIN(1e-7f, 0.0f, LEARNT.loss_w_per_k);
+    TEST_ASSERT_FLOAT_WITHIN(1e-6f, 0.12f * 0.0087f, LEARNT.loss_sd_w_per_k);
+    begin_cold(); /* half seen: half of what stays is the declaration's */
+    INSIDE.loss_variance *= 0.5f;
+    INSIDE.covariance = -1e-3f;
+    spring_seal(&estimator, 0);
+    declare(2.0);
+    TEST_ASSERT_FLOAT_WITHIN(1e-5f, -0.8f * 0.0058f, LEARNT.loss_w_per_k);
+    TEST_ASSERT_FLOAT_WITHIN(1e-5f, 0.8944f * 0.12f * 0.0058f, LEARNT.loss_sd_w_per_k);
+    TEST_ASSERT_EQUAL_FLOAT(-1e-3f, INSIDE.covariance);
+    declare(0.5);
+    TEST_ASSERT_TRUE(INSIDE.covariance > -1e-3f);
+    begin_cold();
+    /* and one that is known less by now than any declared one stays as it is */
+    INSIDE.loss_variance = 4e-6f;
+    INSIDE.learnt.loss_w_per_k = 5e-4f;
+    spring_seal(&estimator, 0);
+    declare(0.8);
+    TEST_ASSERT_EQUAL_FLOAT(5e-4f, LEARNT.loss_w_per_k);
+    TEST_ASSERT_EQUAL_FLOAT(4e-6f, INSIDE.loss_variance);
+    declare(4.0);
+    TEST_ASSERT_EQUAL_FLOAT(5e-4f, LEARNT.loss_w_per_k);
+    TEST_ASSERT_FLOAT_WITHIN(2e-8f, 0.00223f * 0.00223f, INSIDE.loss_variance);
+}
+
+/* What was kept may be farther from what is declared than anything that is learnt: it is not moved
+ * by that, and no sight moves it farther. */
+static void loss_beyond_what_is_ever_learnt_comes_nearer_only(void)
+{
+    INSIDE.loss_variance = 1e-8f;
+    spring_seal(&estimator, 0);
+    declare(3.0);
+    const float kept = LEARNT.loss_w_per_k;
+    TEST_ASSERT_FLOAT_WITHIN(0.0003f, -0.0116f, kept);
+    spring_correct_loss(&estimator, belief_inside(&estimator, 0), -0.001f);
+    TEST_ASSERT_EQUAL_FLOAT(kept, INSIDE.learnt.loss_w_per_k);
+    spring_correct_loss(&estimator, belief_inside(&estimator, 0), 0.001f);
+    TEST_ASSERT_FLOAT_WITHIN(1e-6f, kept + 0.001f, INSIDE.learnt.loss_w_per_k);
+    spring_seal(&estimator, 0);
+    INSIDE.learnt.austenite_ohm = 0.22f;
+    INSIDE.learnt.change = 0.2f;
+    spring_seal(&estimator, 0);
+    spring_estimator_restart(&estimator, &model); /* what was learnt is not lost by it */
+    TEST_ASSERT_EQUAL_FLOAT(0.22f, LEARNT.austenite_ohm);
+    TEST_ASSERT_FLOAT_WITHIN(1e-6f, -0.45f * 0.0174f, LEARNT.loss_w_per_k);
+}
+
 static void temperature_that_no_model_holds_is_its_nearest(void)
 {
     static const float wanted_c[] = {-100.0f, -39.0f, 214.0f, 500.0f};
@@ -362,5 +465,8 @@ void run_rules(void)
     RUN_TEST(all_that_is_compared_with_jumps_along);
     RUN_TEST(declared_change_stands_in_until_one_is_learnt);
     RUN_TEST(disturbance_is_forgotten_and_loss_is_known_less_and_less);
+    RUN_TEST(spring_whose_loss_was_seen_is_held_on_whatever_is_declared);
+    RUN_TEST(loss_that_was_never_seen_is_the_declared_one);
+    RUN_TEST(loss_beyond_what_is_ever_learnt_comes_nearer_only);
     RUN_TEST(temperature_that_no_model_holds_is_its_nearest);
 }

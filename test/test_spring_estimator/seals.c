@@ -101,6 +101,10 @@ static void and_forgets_loss(void)
 {
     spring_estimator_forget_loss(&estimator, 0);
 }
+static void and_keeps_loss(void)
+{
+    spring_estimator_keep_loss(&estimator, &model, 0, 0.5f);
+}
 static void and_is_restored(void)
 {
     spring_estimator_restore(&estimator, 0, &sound.spring[0].learnt);
@@ -117,8 +121,8 @@ static void and_is_disturbed(void)
 static void change_before_its_turn_hides_no_bit(void)
 {
     static void (*const changes[])(void) = {and_is_left,      and_is_told,     and_forgets,
-                                            and_forgets_loss, and_is_restored, and_is_prepared,
-                                            and_is_disturbed};
+                                            and_forgets_loss, and_keeps_loss,  and_is_restored,
+                                            and_is_prepared,  and_is_disturbed};
     (void)heat_then_hold(60.0);
     spring_estimator_begin_heating(&estimator, &model, 0);
     ticks(2.0, 1.0);

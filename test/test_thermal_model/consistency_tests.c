@@ -1,4 +1,6 @@
 /* Whatever the parameters, the pattern and the state: nothing wraps, nothing comes from nothing. */
+#include <stddef.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "driven_model.h"
@@ -395,6 +397,68 @@ static void state_survives_and_garbage_does_not_enter(void)
     TEST_ASSERT_TRUE(taken < 2000u);
 }
 
+/* From any phase and temperature of one transformation into any other: where that has room for it,
+ * all is as it was; what it cannot be is at its nearest. */
+static void another_declaration_keeps_phase_and_temperature(void)
+{
+    static const int16_t points_cc[][4] = {
+        {6800, 7800, 8800, 9800}, {6600, 7600, 8500, 9800}, {4000, 9000, 9000, 12000}};
+    unsigned kept = 0;
+    parameters.air_exchange_uw_per_k = 60000;
+    for (unsigned n = 0; n < 6000; n++) {
+        uint16_t austenite = 0;
+        int16_t was_c7 = 0;
+        for (unsigned side = 0; side < 2; side++) {
+            const int16_t *const cc = points_cc[random_bits() % 3u];
+            parameters.martensite_finish_cc = cc[0];
+            parameters.martensite_start_cc = cc[1];
+            parameters.austenite_start_cc = cc[2];
+            parameters.austenite_finish_cc = cc[3];
+            parameters.latent_heat_mj = (uint16_t)(random_bits() % 9000u);
+            if (side == 0) {
+                TEST_ASSERT_EQUAL(THERMAL_MODEL_OK, thermal_model_init(&model, &parameters, NULL));
+                thermal_model_set_ambient(&model, 30 * 128);
+                thermal_model_set_fan(&model, 60);
+                for (unsigned turn = 0; turn < 4; turn++) {
+                    was_c7 = (int16_t)(30 * 128 + random_bits() % 14000u);
+                    thermal_model_set_temperature(&model, 8, was_c7);
+                }
+                was_c7 = thermal_model_temperature_c7(&model, 8);
+                austenite = thermal_model_austenite(&model, 8);
+                model.state.air_c23 = 45 * 128 * 65536;
+            }
+        }
+        TEST_ASSERT_EQUAL(THERMAL_MODEL_OK, thermal_model_declare(&model, &parameters, NULL));
+        TEST_ASSERT_TRUE(thermal_model_is_consistent(&model));
+        TEST_ASSERT_EQUAL_INT16(was_c7, thermal_model_temperature_c7(&model, 8));
+        TEST_ASSERT_EQUAL_INT16(45 * 128, thermal_model_air_c7(&model));
+        TEST_ASSERT_EQUAL_INT16(30 * 128, thermal_model_ambient_c7(&model));
+        const uint16_t now = thermal_model_austenite(&model, 8);
+        thermal_model_t end = model; /* the most, or least, that there is at that temperature */
+        thermal_model_set_temperature(&end, 8, now > austenite ? -40 * 128 : 150 * 128);
+        thermal_model_set_temperature(&end, 8, was_c7);
+        if (abs(now - austenite) <= 4) {
+            kept++;
+        } else {
+            TEST_ASSERT_UINT16_WITHIN(4, thermal_model_austenite(&end, 8), now);
+        }
+        thermal_model_set_temperature(&model, 8, was_c7); /* and rests there */
+        TEST_ASSERT_UINT16_WITHIN(1, now, thermal_model_austenite(&model, 8));
+        thermal_model_t anew; /* all that is derived is that of these parameters */
+        TEST_ASSERT_EQUAL(THERMAL_MODEL_OK, thermal_model_init(&anew, &parameters, NULL));
+        thermal_model_set_fan(&anew, 60);
+        thermal_model_set_ambient(&anew, 30 * 128);
+        TEST_ASSERT_TRUE(thermal_model_set_state(&anew, &model.state));
+        TEST_ASSERT_EQUAL_MEMORY(&anew, &model, offsetof(thermal_model_t, state));
+        TEST_ASSERT_EQUAL_MEMORY(anew.spring, model.spring, sizeof anew.spring);
+    }
+    TEST_ASSERT_TRUE(kept > 4500u);
+    parameters.latent_heat_mj = 60000; /* refused: nothing is changed */
+    const thermal_model_t before = model;
+    TEST_ASSERT_EQUAL(THERMAL_MODEL_ERROR_RANGE, thermal_model_declare(&model, &parameters, NULL));
+    TEST_ASSERT_EQUAL_MEMORY(&before, &model, sizeof before);
+}
+
 static void temperatures_saturate(void)
 {
     start();
@@ -419,5 +483,6 @@ void run_consistency_tests(void)
     RUN_TEST(too_much_power_counts_as_the_highest);
     RUN_TEST(what_does_not_fit_together_is_refused_by_name);
     RUN_TEST(state_survives_and_garbage_does_not_enter);
+    RUN_TEST(another_declaration_keeps_phase_and_temperature);
     RUN_TEST(temperatures_saturate);
 }
