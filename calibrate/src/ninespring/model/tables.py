@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import functools
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TypeVar
@@ -104,6 +105,12 @@ def settings() -> dict[str, Setting]:
         )
         for row in _rows("table_parameter", _Parameter)
     }
+
+
+def setting(name: str) -> Setting | None:
+    """Return the row of a setting as a board names it (`name`, or of one spring `name_3`), None where it is not known."""
+    known, bare = settings(), re.sub(r"_\d+$", "", name)
+    return known.get(name) or known.get(f"{bare}_K") or known.get(bare)
 
 
 @functools.cache
