@@ -17,7 +17,7 @@ from ..io.logs import read_bytes, read_table, sha256_of
 from ..io.statistics import rms
 from ..model import effects, native
 from ..model.effects import Effect
-from ..model.models import Array, Model, read_array
+from ..model.models import Array, Model
 from .search import TOLD_APART
 
 
@@ -334,10 +334,9 @@ def separate(array: Array, declared: Mapping[str, float], like: State, a: _Tried
 
 
 def diagnose_table(
-    path: Path, model: Model | None, array_path: Path | None, frozen: bool, progress: Callable[[str], None]
+    path: Path, model: Model | None, array: Array, frozen: bool, progress: Callable[[str], None]
 ) -> tuple[results.SteadyDiagnosis, Model]:
     """Diagnose a steady table by the declared (frozen) model; without one, by the paper's."""
-    array = model.array if model else read_array(array_path) if array_path else Array()
     array.one_layer("diagnose knows")
     states = read_steady(path, array.springs)
     declared = dict(model.parameters) if model else {}

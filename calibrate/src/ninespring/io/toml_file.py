@@ -65,10 +65,6 @@ class TomlFile:
                 return line + ahead, column + 1
         return line, key if name else value
 
-    def line_of(self, word: str) -> int | None:
-        """Return the first line that holds `word`."""
-        return next((k for k, line in enumerate(self.text.splitlines(), 1) if word in line), None)
-
     def refuse(self, message: str, at: At, name: bool = False, word: str = "") -> InputError:
         """Return a refusal at that place."""
         return InputError(message, self.path, *self.place(at, name, word))
