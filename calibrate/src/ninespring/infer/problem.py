@@ -458,7 +458,6 @@ class Problem:
         hundredths off changes the way to the minimum, not the minimum. `near` is a fit whose slopes serve to begin with.
         Without `settle` it may end before the minimum: for what is only begun. It then has no slopes for another to begin with.
         """
-        begun = self.simulations
         free = list(spec.free)
         values = np.array([(start or {}).get(f.key, f.start) for f in free], dtype=float)
         values = np.array([min(f.high, max(f.low, v)) for f, v in zip(free, values, strict=True)], dtype=float)
@@ -491,7 +490,6 @@ class Problem:
         fit.stuck = [f.key for f, norm, one in zip(free, norms, span, strict=True) if norm * one < 1.0]
         if errors:
             self.add_errors(fit)
-        fit.simulations = self.simulations - begun
         return fit
 
     def holdout_rmse(self, fit: Fit, colour: Colour | None = None) -> float:
