@@ -5,14 +5,17 @@
 
 from __future__ import annotations
 
+import math
 import os
 import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from ninespring.find import steady
 from ninespring.io import results
+from ninespring.io.logs import read_table
 from ninespring.model.models import Array
 from ninespring.say import page
 
@@ -28,11 +31,36 @@ def data() -> Path:
     return folder
 
 
+def paper_states(path: Path, source: str) -> list[steady.State]:
+    """Return the paper's six cases of one source (comsol or camera) as steady states."""
+    table = read_table(path, text_columns=("source",))
+    out = []
+    for _, row in table.frame.iterrows():
+        if row["source"] != source:
+            continue
+        hold = np.full(9, float(row["t_hot_c"]))
+        hold[4] = math.nan
+        measured = np.full(9, math.nan)
+        measured[4] = float(row["t_centre_c"])
+        out.append(
+            steady.State(
+                f"{source} {row['pitch_mm']:g} mm{', fan' if row['fan'] else ''}",
+                float(row["pitch_mm"]),
+                float(row["fan"]),
+                float(row["ambient_c"]),
+                hold,
+                np.full(9, math.nan),
+                measured,
+            )
+        )
+    return out
+
+
 def section() -> tuple[str, list[dict[str, Any]]]:
     """Return the section as Markdown, and its figures."""
     table = data() / "paper" / "steady.csv"
-    camera = steady.paper_states(table, "camera")
-    comsol = steady.paper_states(table, "comsol")
+    camera = paper_states(table, "camera")
+    comsol = paper_states(table, "comsol")
     told = steady.diagnose_states(Array(), {}, camera)
     fitted = float((steady.errors(Array(), {}, {}, comsol) ** 2).mean() ** 0.5)
     # the same six model values against the camera's, hot springs at 105 as in COMSOL

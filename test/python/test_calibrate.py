@@ -22,7 +22,6 @@ from ninespring.cli.calibration.cut import left_of
 from ninespring.cli.calibration.progress import Progress
 from ninespring.cli.main import cli
 from ninespring.errors import InputError, WorkError
-from ninespring.export.drive import Drive
 from ninespring.io.board import Board
 from ninespring.io.recording import Fault, Recording, Step
 from ninespring.model.models import Array
@@ -247,7 +246,7 @@ def test_settings_that_became_others_meanwhile_are_refused(tmp_path: Path) -> No
 def measured(**more: float) -> judged.Judged:
     numbers = {"held": 0.95, "heating_s": 40.0, "hottest_c": 100.0, "enough_c": 110.0, "undriven": 0.0, "done": 0.9}
     error = more.pop("error_c", 2.0)
-    return judged.Judged(Drive(**numbers | more), error, 1, error)
+    return judged.Judged(**numbers | more, error_c=error, worst_spring=1, worst_c=error)
 
 
 def until_export(

@@ -20,9 +20,12 @@ from ninespring.say.page import verdict
 
 
 def test_six_camera_values_are_explained_by_one_number_and_rivals_have_experiments(
-    measured: Path,
+    measured: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    states = steady.paper_states(measured / "paper" / "steady.csv", "camera")
+    monkeypatch.syspath_prepend(str(Path(__file__).parents[2] / "bench" / "diagnose"))
+    from paper import paper_states
+
+    states = paper_states(measured / "paper" / "steady.csv", "camera")
     result = results.plain(steady.diagnose_states(Array(), {}, states))
     assert result["baseline"]["rmse_c"] > 13.0
     assert result["after"]["holdout_rmse_c"] < 1.5

@@ -310,12 +310,12 @@ def test_the_experiment_that_separates_is_one_in_which_both_models_differ(make_l
     latent = next(c for c in effects.candidates(scene_of(problem)) if c.effect == "latent_heat")
     spec = base.spec.with_effect(latent.effect, latent.free, latent.fixed, latent.variant)
     with_heat = problem.fit(spec, base.as_dict())
-    same = experiments.separate(problem, base, base)
-    assert same.difference_c == 0.0 and "too little to see" in same.text
-    told = experiments.separate(problem, base, with_heat)
+    same, words = experiments.separate(problem, base, base)
+    assert same.difference_c == 0.0 and "too little to see" in words
+    told, words = experiments.separate(problem, base, with_heat)
     assert told.difference_c > 3.0 and 1 <= told.spring <= 9 and 0 < told.at_s <= told.duration_s
-    assert told.name in told.text and f"spring {told.spring}" in told.text
-    planned = plan_experiment(Array(), told.told(), 14.0, 105.0)
+    assert told.name in words and f"spring {told.spring}" in words
+    planned = plan_experiment(Array(), told, 14.0, 105.0)
     assert script_lines("\n".join(planned.steps), "steps.txt", told.duration_s + 10.0)[-1].at_s
 
 

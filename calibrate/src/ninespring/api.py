@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable, Sequence
-from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
@@ -27,7 +26,6 @@ from .find import plan as planning
 from .find.diagnosis import Diagnosis
 from .find.plan import Plan
 from .infer import predict as prediction
-from .infer.predict import predict_by_chip
 from .io import history, ranges, recording
 from .io.board import Board, settings_lines
 from .io.importing import import_table
@@ -160,7 +158,6 @@ def record(
     ranges.RECORD_S.check("duration_s", duration_s)
     ranges.RECORD_HZ.check("hz", hz)
     script = recording.script_lines("\n".join(steps), "steps", duration_s)
-    keys = {"port": port, "tool": f"ninespring {version('ninespring')}"}
     with contextlib.ExitStack() as stack:
         log = recording.LogFile(Path(output), force)
         stack.callback(log.close)
@@ -168,7 +165,7 @@ def record(
         logger = Thermometers(thermometers) if thermometers else None
         if logger:
             stack.callback(logger.close)
-        return recording.record(board, log, hz, duration_s, script, keys=keys, thermometers=logger)
+        return recording.record(board, log, hz, duration_s, script, keys=recording.about(port), thermometers=logger)
 
 
 def import_log(table: str | Path, mapping: str | Path, output: str | Path, force: bool = False) -> Run:
@@ -219,10 +216,9 @@ def verify(model: Model | str | Path, log: Log, before: str = "") -> tuple[float
     if any(one.get("sha256") == run.sha256 for one in model.provenance.get("logs", [])):
         raise InputError("the model was fitted to this log: give one that the fit never saw", run.name)
 
-    def error_c(lines: str) -> float:
-        return float(np.sqrt(np.nanmean((run.temperature_c - predict_by_chip(model, lines, run)) ** 2)))
-
-    return error_c(before), error_c(f"{before}\n{settings_of(model).lines}")
+    both = before, f"{before}\n{settings_of(model).lines}"
+    old, new = (prediction.chip_error(model, lines, [run]).rmse_c for lines in both)
+    return old, new
 
 
 def replay(model: Model | str | Path, log: Log) -> tuple[np.ndarray, np.ndarray]:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
-import datetime
 import os
 import time
 from pathlib import Path
@@ -11,12 +9,11 @@ from pathlib import Path
 import click
 from rich.live import Live
 
-from .. import __version__
 from ..errors import InputError, WorkError
 from ..io import history, ranges, results
 from ..io.board import Board, settings_lines
 from ..io.logs import check_folder, read_bytes
-from ..io.recording import LogFile, Recording, script_lines, told_to_stop
+from ..io.recording import LogFile, Recording, about, script_lines, told_to_stop
 from ..io.recording import record as record_board
 from ..io.tape import record_tape
 from ..io.thermometers import Thermometers
@@ -83,11 +80,6 @@ def record(
         raise InputError(f"--thermometers {thermometers}: that is the board's port, a logger has its own")
     text = read_bytes(script).decode("utf-8", "replace") if script else ""
     steps = script_lines(text, str(script), duration)
-    keys = {
-        "recorded": datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%dT%H:%M:%SZ"),
-        "port": port,
-        "tool": f"ninespring {__version__}",
-    }
     with told_to_stop(last=True) as stopped:
         with (
             working(f"recording from {port}", duration) as say,
@@ -101,23 +93,17 @@ def record(
                 tell = lambda rows, seconds: say(f"{rows} rows", seconds)  # noqa: E731
                 remark = lambda words: err.print(words, markup=False)  # noqa: E731
                 if tape:
-                    got.ended = record_tape(board, log, duration, steps, tell, keys, remark)
+                    got.ended = record_tape(board, log, duration, steps, tell, about(port), remark)
                 else:
-                    got = record_board(board, log, hz, duration, steps, tell, keys, logger, alarm, remark)
+                    got = record_board(board, log, hz, duration, steps, tell, about(port), logger, alarm, remark)
             finally:
                 log.close()
                 if logger:
                     logger.close()
         if not log.rows:
             raise WorkError(got.ended or "stopped before the first row came")
-        faults = [results.Fault(**dataclasses.asdict(one)) for one in got.faults]
-        write(
-            {
-                json_path: results.checked(
-                    results.Record(rows=log.rows, dropped_lines=got.dropped, ended=got.ended, faults=faults)
-                )
-            }
-        )
+        result = results.Record(rows=log.rows, dropped_lines=got.dropped, ended=got.ended, faults=got.faults)
+        write({json_path: results.checked(result)})
         lines = f", {got.dropped} corrupt lines dropped" if got.dropped else ""
         if got.offset_s is not None:
             lines += f"; the thermometers' clock was {got.offset_s:+.2f} s from the board's"

@@ -20,7 +20,7 @@ from ..errors import InputError
 from ..io import results
 from ..io.logs import Run, read_log, sha256_of, write_atomically
 from ..io.ranges import Range
-from ..model.models import array_of, read_array
+from ..model.models import Array, Model, array_of, read_array, read_model
 
 WIDE = 160
 """Columns of a table that goes to a file or a pipe."""
@@ -124,14 +124,17 @@ def write(files: Mapping[Path | None, str | bytes], force: bool = False) -> None
     write_atomically({path: text for path, text in files.items() if path}, force)
 
 
-def array_and_runs(
-    array_path: Path | None, logs: tuple[Path, ...], model: Any = None, or_resistance: bool = False
-) -> tuple[Any, list[Run]]:
+def model_and_array(model_path: Path | None, array_path: Path | None) -> tuple[Model | None, Array | None]:
+    """Return a command's model, and its array: the model's, else that of array.toml; None where neither is given."""
+    model = read_model(model_path) if model_path else None
+    return model, model.array if model else read_array(array_path) if array_path else None
+
+
+def array_and_runs(array: Array | None, logs: tuple[Path, ...], or_resistance: bool = False) -> tuple[Array, list[Run]]:
     """Read logs of one array; refuse what does not go together or is no measurement.
 
     `or_resistance`: logs of currents and voltages need no temperature.
     """
-    array = model.array if model else read_array(array_path) if array_path else None
     runs = [read_log(path, array.springs if array else None, or_resistance=or_resistance) for path in logs]
     array = array_of(array, runs)
     if len({bool(np.isfinite(run.temperature_c).any()) for run in runs}) > 1:

@@ -14,8 +14,8 @@ from ..io import ranges
 from ..io.logs import read_log
 from ..io.recording import told_to_stop
 from ..io.simulated import simulator
-from ..model.models import array_of, read_array, read_model
-from .console import ARRAY, FILE, Real, Whole, notes_of, out
+from ..model.models import array_of
+from .console import ARRAY, FILE, Real, Whole, model_and_array, notes_of, out
 
 USUAL = "127.0.0.1:8765"
 
@@ -87,8 +87,7 @@ def dashboard(
     if replay:
         from ..dashboard.replay_source import ReplaySource
 
-        model = read_model(model_path) if model_path else None
-        array = model.array if model else read_array(array_path) if array_path else None
+        model, array = model_and_array(model_path, array_path)
         run = read_log(replay, array.springs if array else None, temperatures=False)
         notes_of([run])
         array = array_of(array, [run])

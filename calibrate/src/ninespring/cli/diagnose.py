@@ -12,9 +12,9 @@ from ..find import board_alone, diagnosis, steady
 from ..infer import from_resistance
 from ..io import results
 from ..io.logs import check_folder
-from ..model.models import model_text, read_model
+from ..model.models import Array, model_text
 from ..say import page as report
-from .console import ARRAY, FILE, IN_A_FOLDER, Command, array_and_runs, out, working, write
+from .console import ARRAY, FILE, IN_A_FOLDER, Command, array_and_runs, model_and_array, out, working, write
 
 
 @click.command(
@@ -58,15 +58,15 @@ def diagnose(
         check_folder(*(output / name for name in IN_A_FOLDER))
     if frozen and not model_path:
         raise InputError("--frozen needs --model")
-    model = read_model(model_path) if model_path else None
+    model, array = model_and_array(model_path, array_path)
     if any(steady.is_steady(path) for path in logs):
         if len(logs) > 1:
             raise InputError("give one steady table, or logs")
         with working("fitting") as say:
-            told, made = steady.diagnose_table(logs[0], model, array_path, frozen, say)
+            told, made = steady.diagnose_table(logs[0], model, array or Array(), frozen, say)
         page = report.steady_report(told)
     else:
-        array, runs = array_and_runs(array_path, logs, model, or_resistance=True)
+        array, runs = array_and_runs(array, logs, or_resistance=True)
         if from_resistance.has_none(runs):
             if model_path:
                 raise InputError("without a thermometer give logs and an array only, no --model", logs[0])

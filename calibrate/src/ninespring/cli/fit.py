@@ -27,6 +27,7 @@ from .console import (
     array_and_runs,
     beside,
     logs_of,
+    model_and_array,
     notes,
     notes_of,
     print_parameters,
@@ -66,7 +67,7 @@ def fit(logs: tuple[Path, ...], array_path: Path | None, effects: str, output: P
     for path in logs:
         if steady.is_steady(path):
             raise InputError("a steady table: `ninespring diagnose` fits it, effect by effect", path, 1)
-    array, runs = array_and_runs(array_path, logs, or_resistance=True)
+    array, runs = array_and_runs(model_and_array(None, array_path)[1], logs, or_resistance=True)
     notes_of(runs)
     if from_resistance.has_none(runs):
         if wanted:
@@ -80,19 +81,9 @@ def fit(logs: tuple[Path, ...], array_path: Path | None, effects: str, output: P
         say("is the log to be doubted?")
         model, suspect = doubt.model_of_fit(problem, chosen, runs)
     model.provenance["rmse_before_c"] = rms(base.residual)
-    result = results.Fit(
-        logs=logs_of(runs),
-        rmse_before_c=rms(base.residual),
-        rmse_c=rms(chosen.residual),
-        holdout_rmse_c=held,
-        noise_c=problem.noise_c,
-        effects=list(chosen.spec.effects),
-        parameters=_numbers(problem, chosen),
-        correlations=_correlations(chosen),
-        not_identifiable=sorted(chosen.stuck),
-        at_bounds=chosen.at_bounds(),
-        warnings=suspect,
-    )
+    result = _result(problem, chosen, runs, suspect)
+    result.rmse_before_c, result.rmse_c = rms(base.residual), rms(chosen.residual)
+    result.holdout_rmse_c, result.noise_c = held, problem.noise_c
     write({output: model_text(model), json_path: results.checked(result)})
     notes("", suspect)
     print_parameters(beside(output), result.parameters)
@@ -104,16 +95,24 @@ def fit(logs: tuple[Path, ...], array_path: Path | None, effects: str, output: P
         beside(output).print(f"{effect}: not for the chip: {why}", markup=False)
 
 
-def _numbers(problem: Problem, found: Fit) -> results.Parameters:
-    """Return a fit's numbers, each with the interval in which it lies in 95 of 100 cases."""
-    out = {k: v for e in (None, *found.spec.effects) for k, v in parameters_of(problem, found, e).items()}
+def _result(problem: Problem, found: Fit, runs: list[Run], warnings: list[str]) -> results.Fit:
+    """Return a fit's numbers, each with the interval in which it lies in 95 of 100 cases; errors are still open."""
+    numbers = {k: v for e in (None, *found.spec.effects) for k, v in parameters_of(problem, found, e).items()}
     for name, ends in intervals(found).items():
-        out[name].interval_95 = ends
-    return out
-
-
-def _correlations(found: Fit) -> list[results.Correlation]:
-    return [results.Correlation(a=a, b=b, correlation=value) for a, b, value in correlations(found)]
+        numbers[name].interval_95 = ends
+    return results.Fit(
+        logs=logs_of(runs),
+        rmse_before_c=None,
+        rmse_c=None,
+        holdout_rmse_c=None,
+        noise_c=None,
+        effects=list(found.spec.effects),
+        parameters=numbers,
+        correlations=[results.Correlation(a=a, b=b, correlation=value) for a, b, value in correlations(found)],
+        not_identifiable=sorted(found.stuck),
+        at_bounds=found.at_bounds(),
+        warnings=warnings,
+    )
 
 
 def _print_correlations(output: Path, found: list[results.Correlation]) -> None:
@@ -131,22 +130,9 @@ def _fit_from_resistance(array: Array, runs: list[Run], output: Path, json_path:
         problem, found, first = from_resistance.fit(array, runs)
         found, witnesses = board_alone.with_effects(problem, found, say)
     model = from_resistance.model_of_fit(problem, found)
-    errors = {"rmse_before_v": first.residual, "rmse_v": found.residual}
-    result = results.Fit(
-        logs=logs_of(runs),
-        rmse_before_c=None,
-        rmse_c=None,
-        holdout_rmse_c=None,
-        noise_c=None,
-        **{name: 1e-3 * rms(left) for name, left in errors.items()},
-        noise_v=1e-3 * problem.noise_c,
-        effects=list(found.spec.effects),
-        parameters=_numbers(problem, found),
-        correlations=_correlations(found),
-        not_identifiable=sorted(found.stuck),
-        at_bounds=found.at_bounds(),
-        warnings=[from_resistance.SCALE],
-    )
+    result = _result(problem, found, runs, [from_resistance.SCALE])
+    result.rmse_before_v, result.rmse_v = 1e-3 * rms(first.residual), 1e-3 * rms(found.residual)
+    result.noise_v = 1e-3 * problem.noise_c
     write({output: model_text(model), json_path: results.checked(result)})
     print_parameters(beside(output), result.parameters)
     _print_correlations(output, result.correlations)

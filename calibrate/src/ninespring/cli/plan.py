@@ -11,8 +11,8 @@ from ..errors import InputError
 from ..find.plan import FIRST_S, THROUGH_S, make_plan, plan_experiment, plan_through
 from ..io import ranges, results
 from ..io.logs import check_folder, read_bytes
-from ..model.models import Array, read_array, read_model
-from .console import ARRAY, FILE, Command, Real, Whole, beside, write
+from ..model.models import Array
+from .console import ARRAY, FILE, Command, Real, Whole, beside, model_and_array, write
 
 
 @click.command(
@@ -79,8 +79,8 @@ def plan(
         raise InputError("--through and --model go together")
     if through and (diagnosis or array_path or board_alone or duration or current):
         raise InputError("--through takes the array, the current and the time from the model: no other of these")
-    model = read_model(model_path) if model_path else None
-    array = model.array if model else read_array(array_path) if array_path else Array()
+    model, given = model_and_array(model_path, array_path)
+    array = given or Array()
     array.one_layer("a plan is for")
     head = []
     duration = duration or (1800.0 if board_alone else 900.0)

@@ -10,9 +10,9 @@ from ..errors import InputError
 from ..infer.predict import predict
 from ..io import ranges
 from ..io.logs import check_folder, read_log
-from ..model.models import array_of, read_array, read_model
+from ..model.models import array_of
 from ..say import plotting
-from .console import ARRAY, FILE, Command, Real, notes_of, out, working, write
+from .console import ARRAY, FILE, Command, Real, model_and_array, notes_of, out, working, write
 
 PICTURES = (".png", ".svg", ".pdf", ".gif")
 
@@ -40,8 +40,7 @@ def plot(log: Path, model_path: Path | None, array_path: Path | None, at_s: floa
     if kind not in PICTURES:
         raise InputError(f"'{kind}' is none of {', '.join(PICTURES)}", output)
     check_folder(output)
-    model = read_model(model_path) if model_path else None
-    array = model.array if model else read_array(array_path) if array_path else None
+    model, array = model_and_array(model_path, array_path)
     run = read_log(log, array.springs if array else None, temperatures=False)
     notes_of([run])
     with working("drawing"):

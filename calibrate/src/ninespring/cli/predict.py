@@ -13,14 +13,10 @@ from ..find import plausibility
 from ..infer import predict as prediction
 from ..io import results
 from ..io.logs import check_folder, log_text, read_log
+from ..io.statistics import rms_there
 from ..model import effects
 from ..model.models import read_model
 from .console import FILE, JSON, MODEL, Command, beside, logs_of, notes_of, source_of, working, write
-
-
-def _rms(left: np.ndarray) -> float | None:
-    seen = left[np.isfinite(left)]
-    return float(np.sqrt(np.mean(seen**2))) if seen.size else None
 
 
 @click.command(
@@ -52,7 +48,7 @@ def predict(log: Path, model_path: Path, output: Path, chip: bool, json_path: Pa
         shown = prediction.predict(model, run, chip)
     columns = {f"t{k + 1}_c": shown[:, k] for k in range(run.springs)}
     left = shown - run.temperature_c
-    rmse, each = _rms(left), [_rms(one) for one in left.T]
+    rmse, each = rms_there(left), [rms_there(one) for one in left.T]
     note = model.provenance.get("note")
     keys = {"tool": f"ninespring {__version__} predict", "model": model_path.name}
     result = results.Predict(
@@ -116,10 +112,10 @@ def replay(log: Path, model_path: Path, output: Path, json_path: Path | None) ->
         results.Replayed(
             spring=k + 1,
             samples=int(np.isfinite(one).sum()),
-            rmse_c=_rms(one),
+            rmse_c=rms_there(one),
             mean_error_c=float(np.nanmean(one)) if np.isfinite(one).any() else None,
             largest_error_c=float(np.nanmax(np.abs(one))) if np.isfinite(one).any() else None,
-            shown_rmse_c=_rms(seen_left[:, k]),
+            shown_rmse_c=rms_there(seen_left[:, k]),
         )
         for k, one in enumerate(left.T)
     ]
@@ -128,8 +124,8 @@ def replay(log: Path, model_path: Path, output: Path, json_path: Path | None) ->
         model=source_of(model_path),
         rows=len(run.time_s),
         duration_s=run.duration_s,
-        rmse_c=_rms(left),
-        shown_rmse_c=_rms(seen_left),
+        rmse_c=rms_there(left),
+        shown_rmse_c=rms_there(seen_left),
         left_out=left_out,
         springs=springs,
     )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
 import click
@@ -22,9 +21,7 @@ def settings() -> None:
 
 def _default(name: str) -> str | None:
     """Return a setting's built-in value, None where this version does not know it."""
-    known = tables.settings()
-    bare = re.sub(r"_\d+$", "", name)
-    row = known.get(name) or known.get(f"{bare}_K") or known.get(bare)
+    row = tables.setting(name)
     return f"{row.default:.{row.decimals}f}" if row else None
 
 

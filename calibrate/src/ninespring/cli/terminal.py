@@ -73,10 +73,7 @@ class Known(Completer):
 
     def about(self, name: str) -> str:
         """Return what a setting is, in a line."""
-        known = tables.settings()
-        bare = re.sub(r"_\d+$", "", name)
-        row = known.get(name) or known.get(f"{bare}_K") or known.get(bare)
-        if not row:
+        if not (row := tables.setting(name)):
             return ""
         number = f"{{:.{row.decimals}f}}"
         span = f"{number.format(row.minimum)} .. {number.format(row.maximum)} {row.unit}".rstrip()

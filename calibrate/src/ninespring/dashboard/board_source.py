@@ -17,13 +17,12 @@ from typing import Any
 
 import numpy as np
 
-from .. import __version__
 from ..errors import InputError, RefusedError, WorkError
 from ..io import words
 from ..io.belief import beliefs
 from ..io.board import HOST_TIMEOUT_S, PATIENCE, SIMULATED, Board, reading
 from ..io.port import pseudo_terminal
-from ..io.recording import SILENT_S, LogFile, Row, RowCheck, RowSink, telemetry_names, write_head
+from ..io.recording import SILENT_S, LogFile, Row, RowCheck, RowSink, about, telemetry_names, write_head
 from ..io.thermometers import Thermometers
 from ..model import tables
 from .source import Source, at_once
@@ -115,12 +114,10 @@ class BoardSource(Source):
 
     def settings(self) -> list[dict[str, Any]]:
         """Return the board's settings with value, unit and range."""
-        known = tables.settings()
         out = []
         for name, value in self._settings.items():
-            row = known.get(name) or known.get(re.sub(r"_\d+$", "_K", name)) or known.get(re.sub(r"_\d+$", "", name))
             one: dict[str, Any] = {"name": name, "value": value}
-            if row:
+            if row := tables.setting(name):
                 one |= {"unit": row.unit, "low": row.minimum, "high": row.maximum, "default": row.default}
                 one["what"] = row.sentence
             out.append(one)
@@ -461,11 +458,10 @@ class BoardSource(Source):
             log = LogFile(path)
         except InputError as error:
             raise RefusedError(f"'record' refused: {error}") from None
-        keys = {"recorded": f"{now:%Y-%m-%dT%H:%M:%SZ}", "port": board.port, "tool": f"ninespring {__version__}"}
         self._log = log
         self._change(recording={"file": path.name, "rows": 0})
         try:
-            write_head(board, log, keys)
+            write_head(board, log, about(board.port))
             self._sink = RowSink(log, self._thermometers)
             self._sink.begin(self._names)
         except WorkError as error:

@@ -122,10 +122,7 @@ def _bumps(problem: Problem, fit: Fit, cause: Cause, r: int, typical_w: float) -
         return np.zeros((problem.count, 0))
     shown = answers(problem, fit, r, [bump(*one, len(profile)) * profile for one in bumps], typical_w)
     out = np.zeros((problem.count, len(bumps)))
-    begin = sum(int(mask.sum()) for mask in problem.mask[:r])
-    here = slice(begin, begin + int(problem.mask[r].sum()))
-    for k, field in enumerate(shown):
-        out[here, k] = (field / problem.noise[r])[problem.mask[r]]
+    problem.by_run(out)[r][:] = np.column_stack([(field / problem.noise[r])[problem.mask[r]] for field in shown])
     return out
 
 

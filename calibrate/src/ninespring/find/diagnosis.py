@@ -213,7 +213,7 @@ def rivals_of(
             continue
         seen.add((instead, extra[0]))
         progress(f"how to tell {extra[0]} from {instead}")
-        trial = experiments.separate(problem, final, other)
+        experiment, in_words = experiments.separate(problem, final, other)
         other = _finish(problem, other)
         rivals.append(
             results.Rival(
@@ -225,8 +225,8 @@ def rivals_of(
                 evidence=ahead,
                 predictions_differ_c=apart * problem.noise_c,
                 parameters=parameters_of(problem, other, extra[0]),
-                separating_experiment=trial.text,
-                experiment=trial.told(),
+                separating_experiment=in_words,
+                experiment=experiment,
             )
         )
     return rivals

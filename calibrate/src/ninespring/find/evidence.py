@@ -80,10 +80,7 @@ def _pooled(problem: Problem, structures: Sequence[np.ndarray]) -> float:
 
 def difference(problem: Problem, a: Fit, b: Fit) -> float:
     """Return the rms difference of what two fits predict, in units of the noise."""
-    total = 0.0
-    for one, two, noise, mask in zip(a.residual, b.residual, problem.noise, problem.mask, strict=True):
-        total += float((((one - two) / noise)[mask] ** 2).sum())
-    return math.sqrt(total / a.count)
+    return math.sqrt(problem.plain([one - two for one, two in zip(a.residual, b.residual, strict=True)]) / a.count)
 
 
 def unexplained(problem: Problem, fit: Fit) -> bool:

@@ -236,20 +236,17 @@ def _simulated(
 
 def _temperatures(array: Array, drive: np.ndarray, fan: np.ndarray) -> np.ndarray:
     """Return (s, springs) degC of an array as declared, given currents (s, springs) and fan (s,) each second."""
-    time_s = np.arange(0.0, len(drive))
     plant = native.Plant(array.rows, array.cols)
     plant.set_all(array_parameters(array))
     plant.set_effects(["latent_heat", "resistance_phase"])
-    plant.reset()
-    ambient = np.full(len(time_s), plant.get("ambient_c"))
-    return plant.simulate(time_s, native.CURRENT, drive, fan, ambient)
+    return _temperatures_of(plant, drive, fan)
 
 
-def _temperatures_of(plant: native.Plant, drive: np.ndarray) -> np.ndarray:
-    """Return (s, springs) degC of a plant from rest, in still air, given currents (s, springs) each second."""
+def _temperatures_of(plant: native.Plant, drive: np.ndarray, fan: np.ndarray | None = None) -> np.ndarray:
+    """Return (s, springs) degC of a plant from rest, given currents (s, springs) and fan (s,; None: off) each second."""
     plant.reset()
-    still = np.zeros(len(drive))
-    return plant.simulate(np.arange(0.0, len(drive)), native.CURRENT, drive, still, still + plant.get("ambient_c"))
+    around = np.full(len(drive), plant.get("ambient_c"))
+    return plant.simulate(np.arange(0.0, len(drive)), native.CURRENT, drive, fan, around)
 
 
 def _lines(

@@ -54,7 +54,6 @@ class Search:
     progress: Callable[[str], None] = lambda text: None
     fits: dict[tuple[tuple[str, str], ...], Fit] = field(default_factory=dict)
     screens: dict[tuple[tuple[str, str], ...], Screen] = field(default_factory=dict)
-    thorough: bool = True
     until: int = field(init=False)
     """Simulations of the problem after which no further step is begun."""
 
@@ -147,8 +146,7 @@ class Search:
         starts = [start]
         for candidate in added:
             others = [candidate.start_at(1.0, place) for place in self.places(fit, candidate)[1:]]
-            if self.thorough or len(added) == 1:
-                starts += [start | other for other in (*candidate.more_starts, *others)]
+            starts += [start | other for other in (*candidate.more_starts, *others)]
         # several starts race: all begin, the one that is ahead goes on
         race = len(starts) > 1
         steps = SPRINT if race else STEPS

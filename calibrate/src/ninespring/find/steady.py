@@ -14,9 +14,10 @@ from ..errors import InputError
 from ..export.settings import judged
 from ..io import results
 from ..io.logs import read_bytes, read_table, sha256_of
+from ..io.statistics import rms
 from ..model import effects, native
 from ..model.effects import Effect
-from ..model.models import Array, Model, read_array
+from ..model.models import Array, Model
 from .search import TOLD_APART
 
 
@@ -87,31 +88,6 @@ def read_steady(path: Path, springs: int = 9) -> list[State]:
     return states
 
 
-def paper_states(path: Path, source: str) -> list[State]:
-    """Return the paper's six cases of one source (comsol or camera) as steady states."""
-    table = read_table(path, text_columns=("source",))
-    out = []
-    for _, row in table.frame.iterrows():
-        if row["source"] != source:
-            continue
-        hold = np.full(9, float(row["t_hot_c"]))
-        hold[4] = math.nan
-        measured = np.full(9, math.nan)
-        measured[4] = float(row["t_centre_c"])
-        out.append(
-            State(
-                f"{source} {row['pitch_mm']:g} mm{', fan' if row['fan'] else ''}",
-                float(row["pitch_mm"]),
-                float(row["fan"]),
-                float(row["ambient_c"]),
-                hold,
-                np.full(9, math.nan),
-                measured,
-            )
-        )
-    return out
-
-
 def settle(
     array: Array, declared: Mapping[str, float], on: Mapping[str, Mapping[str, float]], state: State
 ) -> np.ndarray:
@@ -148,10 +124,6 @@ def errors(
         seen = np.isfinite(state.measured_c)
         out.append((state.measured_c - shown)[seen])
     return np.concatenate(out)
-
-
-def _rms(values: np.ndarray) -> float:
-    return float(np.sqrt(np.mean(values**2)))
 
 
 def set_by(effect: Effect, value: float, watched: int) -> dict[str, float]:
@@ -227,7 +199,7 @@ def _tried(
     name, steady = effect.name, effect.steady
     if steady is None:
         note = "cannot show in a steady state of given temperatures"
-        rmse = _rms(before)
+        rmse = rms([before])
         return _Tried(results.SteadyCandidate(name=name, rmse_c=rmse, holdout_rmse_c=rmse, note=note))
     value, on = fit_one(array, declared, effect, states, watched)
     left = errors(array, declared, {name: on}, states)
@@ -247,8 +219,8 @@ def _tried(
         value=value,
         stderr=spread / steep if steep > 0 else None,
         unit=native.parameter_table()[steady.number].unit,
-        rmse_c=_rms(left),
-        holdout_rmse_c=_rms(np.concatenate(held)),
+        rmse_c=rms([left]),
+        holdout_rmse_c=rms(held),
         evidence=0.5 * n * gained - 0.5 * math.log(n),
         at_bound=bool(value - low < 1e-3 * (high - low) or high - value < 1e-3 * (high - low)),
         note="changes nothing here" if np.abs(left - before).max() < 1e-6 else steady.against,
@@ -270,7 +242,7 @@ def diagnose_states(
         progress(f"fitting {effect.name}")
         tried.append(_tried(array, declared, effect, states, watched, before))
     tried.sort(key=lambda one: one.told.holdout_rmse_c)
-    rmse = _rms(before)
+    rmse = rms([before])
     useful = [
         one
         for one in tried
@@ -362,10 +334,9 @@ def separate(array: Array, declared: Mapping[str, float], like: State, a: _Tried
 
 
 def diagnose_table(
-    path: Path, model: Model | None, array_path: Path | None, frozen: bool, progress: Callable[[str], None]
+    path: Path, model: Model | None, array: Array, frozen: bool, progress: Callable[[str], None]
 ) -> tuple[results.SteadyDiagnosis, Model]:
     """Diagnose a steady table by the declared (frozen) model; without one, by the paper's."""
-    array = model.array if model else read_array(array_path) if array_path else Array()
     array.one_layer("diagnose knows")
     states = read_steady(path, array.springs)
     declared = dict(model.parameters) if model else {}

@@ -20,6 +20,7 @@ from ..infer.likelihood import Colour
 from ..infer.problem import BLOCK_S, Problem
 from ..io import results
 from ..io.logs.run import Run
+from ..io.statistics import rms
 from ..model.simulate import simulate_run
 from ..model.spec import RUNS_OWN, Free, Spec
 from .evidence import EQUIVALENT
@@ -170,10 +171,6 @@ def _room(problem: Problem, run: Run, values: dict[str, float], plant: Any) -> t
     return room.by_plant(run, plant, usual, over)
 
 
-def _rms(off: np.ndarray) -> float:
-    return float(np.sqrt(np.mean(off**2))) if off.size else math.nan
-
-
 @dataclass
 class Unseen:
     """How well models predict runs that they were not fitted to."""
@@ -204,11 +201,11 @@ class Unseen:
 
     def rmse(self, fit: Fit, colour: Colour | None = None) -> float:
         """Return the error, degC rms, that a model is judged by: of runs left out, their rooms apart; NaN where none can be."""
-        return _rms(self.errors(fit, colour)[1])
+        return rms([self.errors(fit, colour)[1]])
 
     def foretells(self, fit: Fit, colour: Colour | None = None) -> float:
         """Return the error, degC rms, of runs left out, their rooms told by their first minutes."""
-        return _rms(self.errors(fit, colour)[0])
+        return rms([self.errors(fit, colour)[0]])
 
     def own(self, fit: Fit) -> float:
         """Return the error of what was found, or a part of it, its numbers as likely as the problem's colour has them."""

@@ -39,7 +39,6 @@ class Fit:
     """... and the logarithm of its likelihood with that."""
     holdout: float = math.nan
     """Held-out rms error, degC, where it has been computed."""
-    simulations: int = 0
 
     def value(self, key: str) -> float:
         """Return a fitted number by key."""

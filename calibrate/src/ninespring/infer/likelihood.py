@@ -8,8 +8,6 @@ difference of two of them is what the data say for one model against another, an
 
 from __future__ import annotations
 
-import ctypes
-import functools
 import itertools
 import math
 from collections.abc import Sequence
@@ -35,7 +33,6 @@ BEGIN_SLOW = (0.02, 0.5, 0.98)
 """... and what of all that lasts is then slow."""
 FULL = 0.9
 """Part of the rows with readings that must have all of them for thermometers to be told apart from their mean."""
-_double_p = ctypes.POINTER(ctypes.c_double)
 
 
 @dataclass(frozen=True)
@@ -56,27 +53,6 @@ class Colour:
         return max(sum(self.apart), sum(self.together))
 
 
-@functools.cache
-def _whiten() -> ctypes._CFuncPtr:
-    call = native.library().whiten
-    call.restype = ctypes.c_double
-    size = ctypes.c_size_t
-    call.argtypes = (
-        *(size, size, _double_p, ctypes.c_char_p, _double_p, _double_p),
-        *(size, _double_p, _double_p),
-    )
-    return call
-
-
-@functools.cache
-def _weigh() -> ctypes._CFuncPtr:
-    call = native.library().weigh
-    call.restype = ctypes.c_double
-    size = ctypes.c_size_t
-    call.argtypes = (size, _double_p, _double_p, ctypes.c_char_p, _double_p, size, _double_p, _double_p, _double_p)
-    return call
-
-
 def _filtered(
     step_s: np.ndarray, there: bytes, variance: Sequence[float], time_s: Sequence[float], fields: np.ndarray
 ) -> float:
@@ -84,9 +60,8 @@ def _filtered(
     rows, columns = fields.shape
     sizes, lasts = np.asarray(variance, dtype=float), np.asarray(time_s, dtype=float)
     states = np.empty(len(sizes) * columns)
-    pointers = [one.ctypes.data_as(_double_p) for one in (step_s, sizes, lasts, states, fields)]
-    step, size, last, room, data = pointers
-    return float(_whiten()(rows, len(sizes), step, there, size, last, columns, room, data))
+    step, size, last, room, data = (native.doubles(one) for one in (step_s, sizes, lasts, states, fields))
+    return float(native.library().whiten(rows, len(sizes), step, there, size, last, columns, room, data))
 
 
 def _smoothed(
@@ -223,21 +198,12 @@ class Weighed:
     def of(self, which: int, variance: np.ndarray, keeps: list[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
         """Return squares and logarithms of one kind of fields, and the slopes of both: (10,), as whiten.c has them."""
         total, out = np.zeros(10), np.empty(10)
-        pointers = [one.ctypes.data_as(_double_p) for one in (self.states, variance, out)]
+        states, size, told = (native.doubles(one) for one in (self.states, variance, out))
+        weigh = native.library().weigh
         for r, there, field in self.parts[which]:
-            keep, fade = (one.ctypes.data_as(_double_p) for one in keeps[r])
+            keep, fade = map(native.doubles, keeps[r])
             rows, columns = field.shape
-            _weigh()(
-                rows,
-                keep,
-                fade,
-                there,
-                pointers[1],
-                columns,
-                pointers[0],
-                field.ctypes.data_as(_double_p),
-                pointers[2],
-            )
+            weigh(rows, keep, fade, there, size, columns, states, native.doubles(field), told)
             out[[1, 6, 7, 8, 9]] *= columns
             total += out
         return total

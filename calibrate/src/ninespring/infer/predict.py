@@ -11,6 +11,7 @@ import numpy as np
 from ..errors import InputError, WorkError
 from ..io import results
 from ..io.logs.run import Run
+from ..io.statistics import rms_there
 from ..model import effects, native
 from ..model.models import Model
 from ..model.simulate import array_parameters, simulate_run
@@ -101,9 +102,4 @@ def chip_trace(model: Model, lines: str, run: Run) -> tuple[np.ndarray, np.ndarr
 def chip_error(model: Model, lines: str, runs: Sequence[Run]) -> results.ChipError:
     """Return the error of a chip with these lines on logs, K rms: of all, and of each spring (None: not measured)."""
     left = np.concatenate([run.temperature_c - predict_by_chip(model, lines, run) for run in runs])
-    seen = np.isfinite(left)
-    each = [
-        float(np.sqrt(np.mean(one[mask] ** 2))) if mask.any() else None
-        for one, mask in zip(left.T, seen.T, strict=True)
-    ]
-    return results.ChipError(rmse_c=float(np.sqrt(np.mean(left[seen] ** 2))), rmse_per_spring_c=each)
+    return results.ChipError(rmse_c=rms_there(left), rmse_per_spring_c=[rms_there(one) for one in left.T])

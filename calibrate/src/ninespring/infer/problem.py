@@ -126,10 +126,7 @@ class Problem:
     @property
     def noise_c(self) -> float:
         """Noise floor over everything measured, degC rms."""
-        total = sum(
-            float((mask.sum(axis=0) * noise**2).sum()) for mask, noise in zip(self.mask, self.noise, strict=True)
-        )
-        return math.sqrt(total / max(1, self.count))
+        return math.sqrt(float((self.of_samples(self.noise) ** 2).sum()) / max(1, self.count))
 
     def mask_spikes(self, residual: Sequence[np.ndarray]) -> int:
         """Leave isolated outliers of a residual out of everything that follows; return how many."""
@@ -263,12 +260,9 @@ class Problem:
         out = [run.temperature_c - p for run, p in zip(self.runs, predicted, strict=True)]
         if self.unnamed is None:
             return out
-        pieces = self.scaled(out)
-        taken = self.unnamed @ (self.unnamed.T @ np.concatenate(pieces))
-        begin = 0
-        for left, mask, noise, piece in zip(out, self.mask, self.noise, pieces, strict=True):
-            left[mask] -= taken[begin : begin + len(piece)] * np.broadcast_to(noise, mask.shape)[mask]
-            begin += len(piece)
+        taken = self.by_run(self.unnamed @ (self.unnamed.T @ np.concatenate(self.scaled(out))))
+        for left, mask, noise, part in zip(out, self.mask, self.noise, taken, strict=True):
+            left[mask] -= part * np.broadcast_to(noise, mask.shape)[mask]
         return out
 
     def scaled(self, fields: Sequence[np.ndarray]) -> list[np.ndarray]:
@@ -306,20 +300,22 @@ class Problem:
     def vectors(self, several: Sequence[Sequence[np.ndarray | None]]) -> np.ndarray:
         """Return several fields (per run, degC; None: zero) as vectors, (fields, count): together, which is far quicker."""
         out = np.zeros((len(several), self.count))
-        begin = 0
-        for r, (mask, noise) in enumerate(zip(self.mask, self.noise, strict=True)):
-            end = begin + int(mask.sum())
-            for row, fields in zip(out, several, strict=True):
-                if (field := fields[r]) is not None:
-                    row[begin:end] = (field / noise)[mask]
-            begin = end
+        for row, fields in zip(out, several, strict=True):
+            parts = zip(self.by_run(row), fields, self.mask, self.noise, strict=True)
+            for part, field, mask, noise in parts:
+                if field is not None:
+                    part[:] = (field / noise)[mask]
         if self.unnamed is not None:
             out -= (out @ self.unnamed) @ self.unnamed.T
         return self._whitened(self.filtered(out.T)).T
 
     def by_run(self, columns: np.ndarray) -> list[np.ndarray]:
-        """Return columns (count, ...) as one piece a run."""
+        """Return columns (count, ...) as one piece a run, views of them."""
         return np.split(columns, np.cumsum([int(mask.sum()) for mask in self.mask])[:-1])
+
+    def of_samples(self, values: Sequence[np.ndarray]) -> np.ndarray:
+        """Return what is so per run, of each row (rows, 1) or spring (springs,), for each sample, (count,)."""
+        return np.concatenate([np.broadcast_to(v, m.shape)[m] for v, m in zip(values, self.mask, strict=True)])
 
     def filtered(self, columns: np.ndarray) -> np.ndarray:
         """Return columns (count, n), in units of the noise, as innovations of a filter that knows how errors last, if any is known."""
@@ -330,21 +326,16 @@ class Problem:
 
     def _whitened(self, columns: np.ndarray, back: bool = False) -> np.ndarray:
         """Return columns (count, n) with errors of the first readings whitened out, or `back` from there."""
-        out, begin = columns.copy(), 0
-        for mask, basis in zip(self.mask, self.basis, strict=True):
-            end = begin + int(mask.sum())
+        out = columns.copy()
+        for part, basis in zip(self.by_run(out), self.basis, strict=True):
             if basis is not None:
                 left = 1.0 - (basis**2).sum(axis=0)
-                out[begin:end] += (basis / left if back else -basis) @ (basis.T @ out[begin:end])
-            begin = end
+                part += (basis / left if back else -basis) @ (basis.T @ part)
         return out
 
     def plain(self, residual: Sequence[np.ndarray]) -> float:
         """Return the sum of squared residuals in units of the noise."""
-        return sum(
-            float((((left / noise)[mask]) ** 2).sum())
-            for left, noise, mask in zip(residual, self.noise, self.mask, strict=True)
-        )
+        return sum(float((part**2).sum()) for part in self.scaled(residual))
 
     def learn_starts(self, spec: Spec, values: Sequence[float]) -> None:
         """Find how an error of each starting temperature dies out, to keep it out of all that follows.
@@ -467,7 +458,6 @@ class Problem:
         hundredths off changes the way to the minimum, not the minimum. `near` is a fit whose slopes serve to begin with.
         Without `settle` it may end before the minimum: for what is only begun. It then has no slopes for another to begin with.
         """
-        begun = self.simulations
         free = list(spec.free)
         values = np.array([(start or {}).get(f.key, f.start) for f in free], dtype=float)
         values = np.array([min(f.high, max(f.low, v)) for f, v in zip(free, values, strict=True)], dtype=float)
@@ -500,7 +490,6 @@ class Problem:
         fit.stuck = [f.key for f, norm, one in zip(free, norms, span, strict=True) if norm * one < 1.0]
         if errors:
             self.add_errors(fit)
-        fit.simulations = self.simulations - begun
         return fit
 
     def holdout_rmse(self, fit: Fit, colour: Colour | None = None) -> float:
@@ -521,13 +510,8 @@ class Problem:
         believed = trust * (z - np.array([f.inner(f.start) for f in free]))
         slopes = self.plain_slopes(fit)
         left = np.concatenate(self.scaled(fit.residual))
-        fold = np.concatenate(
-            [
-                np.broadcast_to(fold_of_rows(run)[:, None], mask.shape)[mask]
-                for run, mask in zip(self.runs, self.mask, strict=True)
-            ]
-        )
-        noise = np.concatenate([np.broadcast_to(n, m.shape)[m] for n, m in zip(self.noise, self.mask, strict=True)])
+        fold = self.of_samples([fold_of_rows(run)[:, None] for run in self.runs])
+        noise = self.of_samples(self.noise)
         both = np.column_stack([slopes, left])
         total = 0.0
         for number in range(FOLDS):
@@ -563,10 +547,7 @@ class Problem:
         A sandwich: J'J inverse around the long-run covariance of J'r over blocks in time (all springs of a block
         together), never less than what white noise alone would give.
         """
-        predicted = [run.temperature_c - left for run, left in zip(self.runs, fit.residual, strict=True)]
-        shown = self.predictions(fit.spec, fit.values) if predicted else []
-        jac = self.jacobian(fit.spec, fit.values, shown)
-        fit.jacobian = jac
+        jac = fit.jacobian = self.jacobian(fit.spec, fit.values, self.predictions(fit.spec, fit.values))
         used = [k for k, f in enumerate(fit.spec.free) if f.key not in fit.stuck]
         covariance = np.full((jac.shape[1], jac.shape[1]), 0.0)
         fit.factor = 1.0  # innovations are white
@@ -591,15 +572,12 @@ class Problem:
             if fit.factor < 1.5:
                 ratio = np.ones_like(ratio)
             covariance[np.ix_(used, used)] = white * np.outer(ratio, ratio)
-            begin = 0
-            for r, (mask, response) in enumerate(zip(self.mask, self.power_response, strict=True)):
-                end = begin + int(mask.sum())
+            for rows, part, response in zip(self.rows, self.by_run(jac[:, used]), self.power_response, strict=True):
                 if response is not None:
                     if self.colour is not None:
-                        response = self.rows[r].whitened(response, self.colour)[0]
-                    moved = inner @ (jac[begin:end, used].T @ response)
+                        response = rows.whitened(response, self.colour)[0]
+                    moved = inner @ (part.T @ response)
                     covariance[np.ix_(used, used)] += moved @ moved.T
-                begin = end
         fit.covariance = covariance
 
     def longest_lag(self) -> int:
@@ -608,9 +586,5 @@ class Problem:
 
     def _block_of_samples(self) -> np.ndarray:
         """Return the block number of every sample of the residual vector: 20 blocks in time a run."""
-        out, base = [], 0
-        for run, mask in zip(self.runs, self.mask, strict=True):
-            rows = np.broadcast_to((np.arange(len(run.time_s)) * 20 // len(run.time_s))[:, None], mask.shape)
-            out.append(rows[mask] + base)
-            base += 20
-        return np.concatenate(out)
+        lengths = [len(run.time_s) for run in self.runs]
+        return self.of_samples([20 * r + (np.arange(n) * 20 // n)[:, None] for r, n in enumerate(lengths)])

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import html
-import json
 import re
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
+import msgspec
 import numpy as np
 
 from .. import __version__
 from ..errors import InputError, RefusedError, WorkError
+from . import results
 from .board import Board, Reading, reading
 from .logs import check_folder, write_atomically
 
@@ -37,7 +38,6 @@ COLD_SHARE = (0.75, 1.6)
 APART = 0.1
 """By which share a spring may differ from the others."""
 HEATING_S, WARM_C = 12.0, 60.0
-SCHEMA = "ninespring.bringup/1"
 JUMPERS = ("GND", "V+", "SDA", "SCL")
 PINS = (5, 2, 3, 6, 7, 8, 46, 45, 44)
 """The Mega's, of channels 1 to 9."""
@@ -46,19 +46,25 @@ Hands = Callable[[str], bool]
 """Asks whoever is at the bench, and waits: True where it is done, or so."""
 
 
-@dataclass
-class Step:
+class Step(msgspec.Struct):
     """What a step found: numbers as (what, value, what it should be), findings in words, none where all is well."""
 
     name: str
-    numbers: list[tuple[str, str, str]] = field(default_factory=list)
-    found: list[str] = field(default_factory=list)
+    numbers: list[tuple[str, str, str]] = []
+    found: list[str] = []
     at: str = ""
 
     @property
     def passed(self) -> bool:
         """Whether nothing was found."""
         return not self.found
+
+
+class Kept(msgspec.Struct, kw_only=True, tag_field="schema", tag="ninespring.bringup/1"):
+    """What lies beside the page: the steps that a conversation has done."""
+
+    tool: str = results.TOOL
+    steps: list[Step]
 
 
 @dataclass(frozen=True)
@@ -560,13 +566,10 @@ def load(output: Path) -> dict[str, Step]:
             raise InputError("this is not a page that bringup has begun: name another one", output)
         return {}
     try:
-        before = json.loads(kept.read_text(encoding="utf-8"))
-        if before["schema"] != SCHEMA:
-            raise ValueError
-        steps = [Step(**one | {"numbers": [tuple(row) for row in one["numbers"]]}) for one in before["steps"]]
-    except (ValueError, KeyError, TypeError):
+        before = results.read(Kept, kept.read_bytes())
+    except msgspec.MsgspecError:
         raise InputError("this is no conversation that bringup has begun: name another page", kept) from None
-    return {one.name: one for one in steps if one.name in STEPS}
+    return {one.name: one for one in before.steps if one.name in STEPS}
 
 
 def page(steps: dict[str, Step]) -> str:
@@ -597,8 +600,8 @@ def page(steps: dict[str, Step]) -> str:
 
 def save(output: Path, steps: dict[str, Step]) -> None:
     """Write the page and, beside it, what the next conversation goes on from."""
-    kept = {"schema": SCHEMA, "tool": f"ninespring {__version__}", "steps": [asdict(one) for one in steps.values()]}
-    write_atomically({output: page(steps), output.with_suffix(".json"): json.dumps(kept, indent=1) + "\n"}, force=True)
+    kept = results.checked(Kept(steps=list(steps.values())))
+    write_atomically({output: page(steps), output.with_suffix(".json"): kept}, force=True)
 
 
 def do_step(board: Board, name: str, hands: Hands | None) -> Step:

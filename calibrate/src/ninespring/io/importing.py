@@ -6,16 +6,15 @@ import io
 import math
 import re
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from ..errors import InputError
 from .logs import COLUMN, LIMITS, MAX_SPRINGS, log_text, read_bytes, read_table
-from .toml_file import TomlFile
+from .toml_file import At, TomlFile
 
 UNITS: dict[str, tuple[float, float]] = {
     "": (1.0, 0.0),
@@ -34,29 +33,11 @@ UNITS: dict[str, tuple[float, float]] = {
 }
 """Factor and offset from a unit to the log's own."""
 
+FINITE = 1e300
 COLDEST_ROOM_K = LIMITS["ambient_c"][0] + 273.15
 """Springs that are never colder than this number are in kelvin: even the coldest room is above it, in kelvin."""
 
-BUILT_IN: dict[str, dict[str, Any]] = {
-    "tclab": {
-        "columns": {
-            "time_s": "Time (sec)",
-            "u1": {"column": ["Heater 1 (%)", "Heater 1"], "unit": "%"},
-            "u2": {"column": ["Heater 2 (%)", "Heater 2"], "unit": "%"},
-            "t1_c": ["Temperature 1 (degC)", "Temperature 1"],
-            "t2_c": ["Temperature 2 (degC)", "Temperature 2"],
-        }
-    },
-    "tclab-prbs": {
-        "columns": {
-            "time_s": "t_s",
-            "u1": {"column": "Q1_pct", "unit": "%"},
-            "u2": {"column": "Q2_pct", "unit": "%"},
-            "t1_c": "T1_C",
-            "t2_c": "T2_C",
-        }
-    },
-}
+BUILT_IN = {path.stem: path for path in Path(__file__).with_name("mappings").glob("*.toml")}
 """Mappings that come with the tool: `--map tclab`."""
 
 
@@ -74,79 +55,57 @@ class _Rule:
 class _Mapping:
     """A mapping, checked."""
 
-    columns: dict[str, _Rule]
-    constants: dict[str, float]
+    columns: dict[str, _Rule] = field(default_factory=dict)
+    constants: dict[str, float] = field(default_factory=dict)
     separator: str = ","
     decimal: str = "."
     skip_lines: int = 0
 
 
 def _read_mapping(mapping: str | Path) -> _Mapping:
-    """Read a mapping file, or take a built-in mapping; refused with file and line where it is wrong."""
-    built_in = str(mapping) in BUILT_IN
-    file = None if built_in else TomlFile(mapping)
-    rules = file.data if file else BUILT_IN[str(mapping)]
-
-    def refuse(message: str, near: str) -> InputError:
-        return InputError(message, mapping, file and file.line_of(near), 1)
-
-    def number(value: Any, what: str, near: str) -> float:
-        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-            raise refuse(f"{what} must be a number, without quotes", near)
-        return float(value)
-
-    def known(table: Any, names: tuple[str, ...], what: str) -> dict[str, Any]:
-        if not isinstance(table, dict):
-            raise refuse(f"{what} must be a table", what.strip("[]"))
-        for key in table:
-            if key not in names:
-                raise refuse(f"{what} has no key '{key}'; it has {', '.join(names)}", key)
-        return table
-
-    for name in rules:
-        if name not in ("columns", "file", "constants"):
-            raise refuse(f"unknown table [{name}]: a mapping has [columns], [file], [constants]", name)
-    given = known(rules.get("file", {}), ("separator", "decimal", "skip_lines"), "[file]")
-    for key, default in (("separator", ","), ("decimal", ".")):
-        if not isinstance(given.get(key, default), str) or len(given.get(key, default)) != 1:
-            raise refuse(f'{key} must be one character in quotes, as in {key} = "{default}"', key)
-    out = _Mapping({}, {}, given.get("separator", ","), given.get("decimal", "."))
+    """Read a mapping file, or a built-in mapping; refused with file, line and column where it is wrong."""
+    file, out = TomlFile(BUILT_IN.get(str(mapping), mapping)), _Mapping()
+    file.table((), ("columns", "file", "constants"))
+    given = file.table(("file",), ("separator", "decimal", "skip_lines"))
+    for key in ("separator", "decimal"):
+        if key in given and len(file.text_at(("file", key))) != 1:
+            raise file.refuse(f"{key} must be one character in quotes", ("file", key))
+    out.separator, out.decimal = given.get("separator", ","), given.get("decimal", ".")
     if out.separator == out.decimal:
-        raise refuse("separator and decimal cannot be the same", "separator")
-    skip = number(given.get("skip_lines", 0), "skip_lines", "skip_lines")
-    if skip < 0 or skip != int(skip):
-        raise refuse("skip_lines must be a whole number of lines", "skip_lines")
-    out.skip_lines = int(skip)
+        raise file.refuse("separator and decimal cannot be the same", ("file", "separator"))
+    if "skip_lines" in given:
+        out.skip_lines = file.whole(("file", "skip_lines"), 0, 10**9)
     for kind in ("columns", "constants"):
-        table = rules.get(kind, {})
-        if not isinstance(table, dict):
-            raise refuse(f"[{kind}] must be a table", kind)
-        for name, rule in table.items():
+        for name in file.table((kind,), file.get((kind,)) or ()):
             if not COLUMN.match(name):
-                raise refuse(f"'{name}' is not a log's column (time_s, i1_a, v1_v, u1, t1_c, fan, ambient_c)", name)
-            if kind == "constants":
-                out.constants[name] = number(rule, name, name)
-                continue
-            full = (
-                known(rule, ("column", "unit", "scale", "offset"), name) if isinstance(rule, dict) else {"column": rule}
-            )
-            sources = full.get("column")
-            sources = sources if isinstance(sources, list) else [sources]
-            if not sources or not all(isinstance(one, str) for one in sources):
-                raise refuse(f'{name} needs the source\'s column: {name} = {{ column = "its name" }}', name)
-            unit = full.get("unit", "")
-            iso = name == "time_s" and unit == "iso"
-            if unit not in UNITS and not iso:
-                raise refuse(
-                    f"unknown unit '{unit}' for {name}: " + ", ".join(filter(None, UNITS)) + "; time_s: iso", name
-                )
-            factor, offset = (1.0, 0.0) if iso else UNITS[unit]
-            scale = number(full.get("scale", 1.0), "scale", name)
-            shift = number(full.get("offset", 0.0), "offset", name)
-            out.columns[name] = _Rule(sources, factor * scale, offset + shift, iso)
+                said = f"'{name}' is not a log's column (time_s, i1_a, v1_v, u1, t1_c, fan, ambient_c)"
+                raise file.refuse(said, (kind, name), True)
+            if kind == "columns":
+                out.columns[name] = _read_rule(file, name)
+            else:
+                out.constants[name] = file.number((kind, name), -FINITE, FINITE, name)
     if "time_s" not in out.columns:
-        raise refuse("the mapping has no time_s under [columns]", "[columns]")
+        raise file.refuse("the mapping has no time_s under [columns]", ("columns",))
     return out
+
+
+def _read_rule(file: TomlFile, name: str) -> _Rule:
+    at = ("columns", name)
+    rule = file.get(at)
+    given = file.table(at, ("column", "unit", "scale", "offset")) if isinstance(rule, dict) else {"column": rule}
+    sources = given.get("column")
+    sources = sources if isinstance(sources, list) else [sources]
+    if not sources or not all(isinstance(one, str) for one in sources):
+        raise file.refuse(f'{name} needs the source\'s column: {name} = {{ column = "its name" }}', at)
+    unit = str(given.get("unit", ""))
+    iso = name == "time_s" and unit == "iso"
+    if unit not in UNITS and not iso:
+        known = ", ".join(filter(None, UNITS))
+        raise file.refuse(f"unknown unit '{unit}' for {name}: {known}; time_s: iso", at)
+    factor, offset = (1.0, 0.0) if iso else UNITS[unit]
+    scale = file.number((*at, "scale"), -FINITE, FINITE, "scale") if "scale" in given else 1.0
+    shift = file.number((*at, "offset"), -FINITE, FINITE, "offset") if "offset" in given else 0.0
+    return _Rule(sources, factor * scale, offset + shift, iso)
 
 
 def _split(path: str | Path, rules: _Mapping) -> tuple[pd.DataFrame, list[str], list[int]]:
@@ -258,39 +217,28 @@ def read_regions(path: str | Path) -> list[Region]:
     `[grid]`: rows, cols, left, top (centre of spring 1, pixels), step_x, step_y (pixels), width, height.
     """
     file = TomlFile(path)
-    data = file.data
     regions: list[Region] = []
 
-    def number(table: dict[str, Any], key: str, where: str, low: float) -> float:
-        value = table.get(key)
-        if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= 1e5:
-            what = "" if key not in table else f", not {value!r}"
-            raise InputError(
-                f"{where} needs a number '{key}' from {low:g} to 100000{what}", path, file.line_of(where), 1
-            )
-        return float(value)
+    def pixels(at: At, least: float, *keys: str) -> list[float]:
+        """Return numbers of a table, from the least that they may be."""
+        file.table(at, file.get(at))
+        return [file.number((*at, key), least, 1e5) for key in keys]
 
-    grid, boxes = data.get("grid"), data.get("region", [])
-    if grid is not None and not isinstance(grid, dict):
-        raise InputError("grid must be a table: [grid]", path, file.line_of("grid"), 1)
-    if not isinstance(boxes, list) or not all(isinstance(one, dict) for one in boxes):
-        raise InputError("region must be a list of tables: [[region]]", path, file.line_of("region"), 1)
-    if grid:
-        rows, cols = (int(number(grid, key, "[grid]", 1)) for key in ("rows", "cols"))
+    if file.get(grid := ("grid",)):
+        rows, cols = (int(one) for one in pixels(grid, 1, "rows", "cols"))
         if rows * cols > MAX_SPRINGS:
-            raise InputError(f"{rows} x {cols} are more than {MAX_SPRINGS} springs", path, file.line_of("rows"), 1)
-        half_w, half_h = (number(grid, key, "[grid]", 1) / 2 for key in ("width", "height"))
-        left, top = (number(grid, key, "[grid]", 0) for key in ("left", "top"))
-        step_x = number(grid, "step_x", "[grid]", 1) if cols > 1 else 0.0
-        step_y = number(grid, "step_y", "[grid]", 1) if rows > 1 else 0.0
+            raise file.refuse(f"{rows} x {cols} are more than {MAX_SPRINGS} springs", (*grid, "rows"))
+        half_w, half_h = (one / 2 for one in pixels(grid, 1, "width", "height"))
+        left, top = pixels(grid, 0, "left", "top")
+        (step_x,) = pixels(grid, 1, "step_x") if cols > 1 else (0.0,)
+        (step_y,) = pixels(grid, 1, "step_y") if rows > 1 else (0.0,)
         for k in range(rows * cols):
             x, y = left + (k % cols) * step_x, top + (k // cols) * step_y
             x0, y0 = round(x - half_w), round(y - half_h)
             regions.append(Region(k + 1, x0, y0, max(round(x + half_w), x0 + 1), max(round(y + half_h), y0 + 1)))
-    for one in boxes:
-        left, top = (int(number(one, key, "[[region]]", 0)) for key in ("left", "top"))
-        width, height = (int(number(one, key, "[[region]]", 1)) for key in ("width", "height"))
-        spring = int(number(one, "spring", "[[region]]", 1))
+    for at in file.tables(("region",)):
+        left, top = (int(one) for one in pixels(at, 0, "left", "top"))
+        width, height, spring = (int(one) for one in pixels(at, 1, "width", "height", "spring"))
         regions.append(Region(spring, left, top, left + width, top + height))
     if not regions:
         raise InputError("no region: give [grid] or [[region]] tables", path, 1)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import datetime
 import math
 import os
 import re
@@ -15,7 +16,9 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from .. import __version__
 from ..errors import InputError, WorkError
+from . import results
 from .board import Board
 from .logs import COLUMN, EXTRA, LIMITS, check_folder
 from .thermometers import Thermometers
@@ -45,16 +48,8 @@ class Step:
     at_s: float | None = None
 
 
-@dataclass(frozen=True)
-class Fault:
-    """A fault that the board has latched."""
-
-    time_s: float | None
-    """By the board's clock, as in the log; None: after its last row."""
-    spring: int | None
-    """None: of the board, and all springs are off."""
-    number: int
-    name: str
+class Fault(results.Fault):
+    """A fault that the board has latched, in words."""
 
     def __str__(self) -> str:
         when = "at the end" if self.time_s is None else f"at {self.time_s:.1f} s"
@@ -499,6 +494,12 @@ def _head(
             send(step)
     board.guard(write_head(board, log, keys))
     return board.ask("faults")
+
+
+def about(port: str, by: str = "") -> dict[str, str]:
+    """Return what a log says of itself first: when, where and by what it was recorded."""
+    now = datetime.datetime.now(datetime.UTC)
+    return {"recorded": f"{now:%Y-%m-%dT%H:%M:%SZ}", "port": port, "tool": f"ninespring {__version__}{by}"}
 
 
 def write_head(board: Board, log: LogFile, keys: Mapping[str, str]) -> dict[str, str]:

@@ -469,7 +469,9 @@ class Fault(Part):
     """A fault that the board told of."""
 
     time_s: float | None
+    """By the board's clock, as in the log; None: after its last row."""
     spring: int | None
+    """None: of the board, and all springs are off."""
     number: int
     name: str
 

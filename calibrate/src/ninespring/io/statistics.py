@@ -187,6 +187,11 @@ def rms(series: Sequence[np.ndarray]) -> float:
     return float(np.sqrt(total / count)) if count else float("nan")
 
 
+def rms_there(values: np.ndarray) -> float | None:
+    """Return the root mean square of what is there, None where nothing is (JSON has no NaN)."""
+    return rms([values]) if np.isfinite(values).any() else None
+
+
 def spikes(residual: np.ndarray, noise: np.ndarray, limit: float = 6.0) -> np.ndarray:
     """Return a mask (rows, columns) of isolated outliers: far from the median of the eight around them."""
     rows, columns = residual.shape

@@ -6,7 +6,7 @@ import difflib
 import functools
 import re
 import tomllib
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -65,10 +65,6 @@ class TomlFile:
                 return line + ahead, column + 1
         return line, key if name else value
 
-    def line_of(self, word: str) -> int | None:
-        """Return the first line that holds `word`."""
-        return next((k for k, line in enumerate(self.text.splitlines(), 1) if word in line), None)
-
     def refuse(self, message: str, at: At, name: bool = False, word: str = "") -> InputError:
         """Return a refusal at that place."""
         return InputError(message, self.path, *self.place(at, name, word))
@@ -97,6 +93,21 @@ class TomlFile:
                     f"{where} has no key '{key}'{did_you_mean(key, known)}; it has {', '.join(known)}", (*at, key), True
                 )
         return table
+
+    def values(
+        self, at: At, numbers: Mapping[str, tuple[float, float]], words: Mapping[str, Sequence[str]] | None = None
+    ) -> dict[str, Any]:
+        """Return the table there: numbers within their limits, and keys whose value is one of some words."""
+        words = words or {}
+        where = f"[{'.'.join(map(str, at))}]"
+        out = dict(self.table(at, (*numbers, *words)))
+        for key, value in out.items():
+            if key in numbers:
+                out[key] = self.number((*at, key), *numbers[key], f"{where} {key}")
+            elif value not in words[key]:
+                has = f"{did_you_mean(str(value), words[key])}; it has {', '.join(words[key])}"
+                raise self.refuse(f"{where} {key} has no '{value}'{has}", (*at, key))
+        return out
 
     def tables(self, at: At) -> list[At]:
         """Return where the tables of a list stand."""

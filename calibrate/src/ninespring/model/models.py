@@ -163,7 +163,8 @@ def _array(file: TomlFile) -> Array:
         raise file.refuse("there is no [array] table; add rows and cols", ())
     file.table(("array",), ("rows", "cols", "pitch_mm", "board_rows", "board_cols"))
     array = Array(*(file.whole(("array", key), 1, native.MAX_SPRINGS) for key in ("rows", "cols")))
-    array.stiffness = _stiffness(file)
+    if file.get(("stiffness",)) is not None:
+        array.stiffness = file.values(("stiffness",), STIFFNESS_KEYS, stiffness.WORDS)
     if array.springs > native.MAX_SPRINGS:
         two = " in two layers" if array.layers == 2 else ""
         said = f"{array.rows} x {array.cols}{two} are more than {native.MAX_SPRINGS} springs"
@@ -171,29 +172,14 @@ def _array(file: TomlFile) -> Array:
     _boards(file, array)
     if file.get(("array", "pitch_mm")) is not None:
         array.pitch_mm = file.number(("array", "pitch_mm"), 0.1, 1000.0)
-    for name, keys in (("spring", SPRING_KEYS), ("material", MATERIAL_KEYS)):
-        given = file.table((name,), keys)
-        getattr(array, name).update({key: file.number((name, key), *keys[key]) for key in given})
+    array.spring = file.values(("spring",), SPRING_KEYS)
+    array.material = file.values(("material",), MATERIAL_KEYS)
     array.sensor = dict(file.table(("sensor",), ("kind", "noise_c")))
     if "kind" in array.sensor:
         file.text_at(("sensor", "kind"))
     if "noise_c" in array.sensor:
         file.number(("sensor", "noise_c"), 0.0, 50.0)
     return array
-
-
-def _stiffness(file: TomlFile) -> dict[str, Any] | None:
-    if file.get(("stiffness",)) is None:
-        return None
-    given = dict(file.table(("stiffness",), (*STIFFNESS_KEYS, *stiffness.WORDS)))
-    for key, value in given.items():
-        at = ("stiffness", key)
-        if key in STIFFNESS_KEYS:
-            given[key] = file.number(at, *STIFFNESS_KEYS[key])
-        elif value not in (words := stiffness.WORDS[key]):
-            has = f"{did_you_mean(str(value), words)}; it has {', '.join(words)}"
-            raise file.refuse(f"[stiffness] {key} has no '{value}'{has}", at)
-    return given
 
 
 def _boards(file: TomlFile, array: Array) -> None:
@@ -210,21 +196,7 @@ def _boards(file: TomlFile, array: Array) -> None:
     for number in file.table(("board",), file.get(("board",)) or ()):
         if not number.isdecimal() or not 1 <= int(number) <= count or number.startswith("0"):
             raise file.refuse(f"[board.{number}], but the array has board 1 to {count}", ("board", number))
-        own = file.table(("board", number), BOARD_KEYS)
-        limits = {key: file.number(("board", number, key), *BOARD_KEYS[key], f"[board.{number}] {key}") for key in own}
-        array.boards[int(number)] = limits
-
-
-def _cooling(file: TomlFile) -> dict[str, Any]:
-    given = dict(file.table(("cooling",), cooling.KEYS))
-    for key, value in given.items():
-        at = ("cooling", key)
-        if key in cooling.NUMBERS:
-            given[key] = file.number(at, *cooling.NUMBERS[key])
-        elif value not in (words := cooling.WORDS[key]):
-            has = f"{did_you_mean(str(value), words)}; it has {', '.join(words)}"
-            raise file.refuse(f"[cooling] {key} has no '{value}'{has}", at)
-    return given
+        array.boards[int(number)] = file.values(("board", number), BOARD_KEYS)
 
 
 def read_array(path: str | Path) -> Array:
@@ -232,7 +204,7 @@ def read_array(path: str | Path) -> Array:
     file = TomlFile(path)
     file.table((), (*TABLES, "cooling"))
     array = _array(file)
-    array.cooling = _cooling(file)
+    array.cooling = file.values(("cooling",), cooling.NUMBERS, cooling.WORDS)
     return array
 
 

@@ -10,6 +10,7 @@ import functools
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import resources
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -48,18 +49,23 @@ class _Parameter(ctypes.Structure):
         ("unit", ctypes.c_char_p),
         ("effect", ctypes.c_char_p),
         ("description", ctypes.c_char_p),
-        ("default_value", ctypes.c_double),
+        ("default", ctypes.c_double),
         ("minimum", ctypes.c_double),
         ("maximum", ctypes.c_double),
         ("per_spring", ctypes.c_bool),
     )
 
 
+def fields_of(row: ctypes.Structure) -> dict[str, Any]:
+    """Return what a row of a table of the C code holds, by name."""
+    values = {name: getattr(row, name) for name, *_ in row._fields_}
+    return {name: one.decode() if isinstance(one, bytes) else one for name, one in values.items()}
+
+
 @dataclass(frozen=True)
 class PlantParameter:
     """One entry of the plant's parameter table."""
 
-    index: int
     name: str
     unit: str
     effect: str | None
@@ -79,13 +85,10 @@ def library() -> ctypes.CDLL:
         lib = ctypes.CDLL(str(path))
     except OSError as error:
         raise RuntimeError(f"the compiled part of ninespring is missing ({error}): run `pip install .`") from None
-    pointer, integer, size, real = (
-        ctypes.c_void_p,
-        ctypes.c_int,
-        ctypes.c_size_t,
-        ctypes.c_double,
+    pointer, integer, size, real, text = (
+        *(ctypes.c_void_p, ctypes.c_int, ctypes.c_size_t),
+        *(ctypes.c_double, ctypes.c_char_p),
     )
-    text = ctypes.c_char_p
     signatures: dict[str, tuple[object, Sequence[object]]] = {
         "plant_parameter_count": (size, ()),
         "plant_parameter": (ctypes.POINTER(_Parameter), (size,)),
@@ -106,20 +109,7 @@ def library() -> ctypes.CDLL:
         "plant_set_ambient": (integer, (pointer, real)),
         "plant_step": (integer, (pointer, real)),
         "plant_settle": (integer, (pointer, real)),
-        "plant_simulate": (
-            integer,
-            (
-                pointer,
-                size,
-                _double_p,
-                _int_p,
-                _double_p,
-                _double_p,
-                _double_p,
-                _double_p,
-                _double_p,
-            ),
-        ),
+        "plant_simulate": (integer, (pointer, size, _double_p, _int_p, *(_double_p,) * 5)),
         "plant_temperature_c": (real, (pointer, integer)),
         "plant_measured_c": (real, (pointer, integer)),
         "plant_austenite": (real, (pointer, integer)),
@@ -127,6 +117,10 @@ def library() -> ctypes.CDLL:
         "plant_power_w": (real, (pointer, integer)),
         "plant_air_c": (real, (pointer,)),
         "plant_plate_c": (real, (pointer,)),
+        "plant_readings": (integer, (pointer, size, *(_double_p,) * 6)),
+        "paper_configure": (integer, (pointer, real)),
+        "whiten": (real, (size, size, _double_p, text, _double_p, _double_p, size, _double_p, _double_p)),
+        "weigh": (real, (size, _double_p, _double_p, text, _double_p, size, _double_p, _double_p, _double_p)),
     }
     for function, (result, arguments) in signatures.items():
         entry = getattr(lib, function)
@@ -139,22 +133,8 @@ def library() -> ctypes.CDLL:
 def parameter_table() -> dict[str, PlantParameter]:
     """Return the plant's parameters by name, in its order."""
     lib = library()
-    table = {}
-    for k in range(lib.plant_parameter_count()):
-        one = lib.plant_parameter(k).contents
-        name = one.name.decode()
-        table[name] = PlantParameter(
-            k,
-            name,
-            one.unit.decode() if one.unit else "",
-            one.effect.decode() if one.effect else None,
-            one.description.decode() if one.description else "",
-            one.default_value,
-            one.minimum,
-            one.maximum,
-            one.per_spring,
-        )
-    return table
+    rows = (fields_of(lib.plant_parameter(k).contents) for k in range(lib.plant_parameter_count()))
+    return {one["name"]: PlantParameter(**one | {"unit": one["unit"] or ""}) for one in rows}
 
 
 @functools.cache
@@ -164,7 +144,8 @@ def effect_names() -> tuple[str, ...]:
     return tuple(lib.plant_effect_name(k).decode() for k in range(lib.plant_effect_count()))
 
 
-def _pointer(array: np.ndarray | None) -> object:
+def doubles(array: np.ndarray | None) -> object:
+    """Return where the doubles of an array stand, as the C code takes them."""
     return None if array is None else array.ctypes.data_as(_double_p)
 
 
@@ -336,11 +317,8 @@ class Plant:
         """Run a whole log; return what a board would read of each spring as v / i, (rows, springs), ohm."""
         log = _log(self.springs, time_s, power_w, fan, ambient_c)
         ohm, temperature = np.empty_like(log[1]), np.empty_like(log[1])
-        call = self._lib.plant_readings
-        call.restype = ctypes.c_int
-        call.argtypes = (ctypes.c_void_p, ctypes.c_size_t, *(_double_p,) * 6)
-        pointers = [_pointer(one) for one in (*log, ohm, temperature)]
-        self._check(call(self._plant, len(log[0]), *pointers), "readings")
+        pointers = [doubles(one) for one in (*log, ohm, temperature)]
+        self._check(self._lib.plant_readings(self._plant, len(log[0]), *pointers), "readings")
         return ohm
 
     def trace(
@@ -387,13 +365,13 @@ class Plant:
             self._lib.plant_simulate(
                 self._plant,
                 rows,
-                _pointer(time_s),
+                doubles(time_s),
                 modes,
-                _pointer(drive),
-                _pointer(fan),
-                _pointer(ambient_c),
-                None if true_c else _pointer(out),
-                _pointer(out) if true_c else None,
+                doubles(drive),
+                doubles(fan),
+                doubles(ambient_c),
+                None if true_c else doubles(out),
+                doubles(out) if true_c else None,
             ),
             "simulation",
         )
@@ -469,9 +447,9 @@ def chip_simulate(
         lines.encode(),
         *shape,
         ctypes.c_size_t(len(times)),
-        _pointer(times),
+        doubles(times),
         mode,
-        *(_pointer(one) for one in (drive, power, *along, first, temperature, austenite)),
+        *(doubles(one) for one in (drive, power, *along, first, temperature, austenite)),
     )
     return temperature, austenite
 
@@ -492,8 +470,8 @@ def chip_drive(
         _switches(pattern, plant.springs),
         ctypes.c_size_t(rows),
         ctypes.c_size_t(on_rows),
-        _pointer(temperature),
-        _pointer(austenite),
+        doubles(temperature),
+        doubles(austenite),
     )
     return temperature, austenite
 
@@ -531,7 +509,7 @@ def chip_run(
         ctypes.c_uint64(seed),
         ctypes.c_size_t(rows),
         ctypes.c_size_t(on_rows),
-        *(_pointer(one) for one in (temperature, austenite, power, current)),
+        *(doubles(one) for one in (temperature, austenite, power, current)),
         ctypes.byref(faults),
     )
     return temperature, austenite, power, current, faults.value
@@ -539,8 +517,5 @@ def chip_run(
 
 def paper_configure(plant: Plant, pitch_mm: float) -> None:
     """Give a plant the paper's loss and couplings at a pitch (sim_host/plant/paper.h)."""
-    call = library().paper_configure
-    call.restype = ctypes.c_int
-    call.argtypes = (ctypes.c_void_p, ctypes.c_double)
-    if status := call(plant._plant, float(pitch_mm)):
+    if status := library().paper_configure(plant._plant, float(pitch_mm)):
         raise NativeError(status, f"pitch {pitch_mm:g} mm")

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import ctypes
 import functools
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TypeVar
 
-from .native import library
+from .native import fields_of, library
 
 PARTS = ("model", "current", "safety", "policy", "board")
 ACTS = ("array", "supply", "measurement")
@@ -23,7 +24,7 @@ class _Parameter(ctypes.Structure):
         ("sentence", ctypes.c_char_p),
         ("minimum", ctypes.c_double),
         ("maximum", ctypes.c_double),
-        ("standard", ctypes.c_double),
+        ("default", ctypes.c_double),
         ("resolution", ctypes.c_double),
         ("part", ctypes.c_int),
         ("decimals", ctypes.c_int),
@@ -80,36 +81,21 @@ def _rows(function: str, kind: type[_Row]) -> Iterator[_Row]:
         k += 1
 
 
-def _text(raw: bytes | None) -> str | None:
-    return None if raw is None else raw.decode()
-
-
 @functools.cache
 def settings() -> dict[str, Setting]:
     """Return the chip's settings by name, in the order of `$$`."""
-    return {
-        row.name.decode(): Setting(
-            row.name.decode(),
-            row.unit.decode(),
-            _text(row.effect),
-            row.sentence.decode(),
-            row.minimum,
-            row.maximum,
-            row.standard,
-            row.resolution,
-            PARTS[row.part],
-            row.decimals,
-            row.id,
-            row.per_spring,
-        )
-        for row in _rows("table_parameter", _Parameter)
-    }
+    rows = map(fields_of, _rows("table_parameter", _Parameter))
+    return {one["name"]: Setting(**one | {"part": PARTS[one["part"]]}) for one in rows}
+
+
+def setting(name: str) -> Setting | None:
+    """Return the row of a setting as a board names it (`name`, or of one spring `name_3`), None where it is not known."""
+    known, bare = settings(), re.sub(r"_\d+$", "", name)
+    return known.get(name) or known.get(f"{bare}_K") or known.get(bare)
 
 
 @functools.cache
 def effects() -> dict[str, TableEffect]:
     """Return the effects by name, in the plant's order."""
-    return {
-        row.name.decode(): TableEffect(row.name.decode(), row.sentence.decode(), _text(row.not_on_chip), ACTS[row.acts])
-        for row in _rows("table_effect", _Effect)
-    }
+    rows = map(fields_of, _rows("table_effect", _Effect))
+    return {one["name"]: TableEffect(**one | {"acts": ACTS[one["acts"]]}) for one in rows}

@@ -45,7 +45,7 @@ def traces(found: Diagnosis) -> list[tuple[str, str]]:
         pick = _thin(len(run.time_s))
         since = (run.time_s - run.time_s[0])[pick]
         # a line across a gap or a stretch left out would be invented
-        breaks = np.unique([0, *(np.searchsorted(_rows_of(run, pick), run.starts))])
+        breaks = np.unique([0, *(np.searchsorted(np.arange(len(run.time_s))[pick], run.starts))])
         pair = []
         for residual in (False, True):
             figure, axes = plt.subplots(
@@ -99,25 +99,32 @@ def _shade_inputs(axis: Any, run: Run, k: int, pick: slice) -> None:
     axis.fill_between(since, 0.0, run.fan[pick] / 40.0, transform=across, color="#5b8fd0", alpha=0.7, lw=0, step="post")
 
 
+def _tiles(
+    axis: Any, values: np.ndarray, shape: tuple[int, int], colours: str, low: float, high: float, form: str
+) -> Any:
+    """Draw numbers (springs,) on the array, NaN where nothing was measured; return the picture."""
+    shown = axis.imshow(values.reshape(shape), cmap=colours, vmin=low, vmax=high)
+    for k, value in enumerate(values):
+        known = math.isfinite(value)
+        dark = known and abs(value) - max(low, 0.0) > (0.55 if low < 0 else 0.7) * (high - max(low, 0.0))
+        place = {"va": "center", "ha": "center", "color": "white" if dark else INK, "fontsize": 9 if known else 7}
+        words = form.format(value) if known else "not\nmeasured"
+        axis.text(k % shape[1], k // shape[1], words, **place)
+        corner = place | {"fontsize": 6, "alpha": 0.8}
+        axis.text(k % shape[1] - 0.44, k // shape[1] - 0.42, str(k + 1), **corner | {"ha": "left", "va": "top"})
+    axis.set_xticks([])
+    axis.set_yticks([])
+    return shown
+
+
 def array_map(found: Diagnosis) -> str:
     """Draw what is left at each spring in multiples of its sensor's noise, with a colour bar."""
     problem = found.problem
     shape = (problem.array.rows, problem.array.cols)
-    scaled = [left / noise for left, noise in zip(found.final.residual, problem.noise, strict=True)]
-    joined = np.concatenate(scaled)
-    seen = np.isfinite(joined)
-    rms = np.sqrt(np.nansum(joined**2, axis=0) / np.where(seen.any(axis=0), seen.sum(axis=0), np.nan))
+    joined = np.concatenate([left / noise for left, noise in zip(found.final.residual, problem.noise, strict=True)])
+    rms = np.sqrt(statistics.mean_there(joined**2, 0))
     figure, axis = plt.subplots(figsize=(4.2, min(4.2, 0.8 + 3.4 * shape[0] / shape[1])))
-    high = max(3.0, float(np.nanmax(rms)))
-    shown = axis.imshow(rms.reshape(shape), cmap="YlOrRd", vmin=1.0, vmax=high)
-    for k, value in enumerate(rms):
-        text = f"{k + 1}" if not math.isfinite(value) else f"{k + 1}\n{value:.1f}"
-        dark = math.isfinite(value) and value > 1.0 + 0.7 * (high - 1.0)
-        axis.text(
-            k % shape[1], k // shape[1], text, ha="center", va="center", fontsize=9, color="white" if dark else INK
-        )
-    axis.set_xticks([])
-    axis.set_yticks([])
+    shown = _tiles(axis, rms, shape, "YlOrRd", 1.0, max(3.0, float(np.nanmax(rms))), "{:.1f}")
     figure.colorbar(shown, ax=axis, shrink=0.8, label="rms error / noise")
     return as_svg(figure)
 
@@ -167,11 +174,6 @@ def error_bars(told: results.Diagnosis) -> str:
     return as_svg(figure)
 
 
-def _rows_of(run: Run, pick: slice) -> np.ndarray:
-    """Return the numbers of the rows that a slice picks."""
-    return np.arange(len(run.time_s))[pick]
-
-
 def maps(found: Diagnosis) -> str:
     """Draw where the error sits: rms and mean of each spring, before and after."""
     problem = found.problem
@@ -179,27 +181,13 @@ def maps(found: Diagnosis) -> str:
     pictures = []
     for fit, label in ((found.baseline, "before"), (found.final, "after")):
         left = np.concatenate(fit.residual)
-        seen = np.isfinite(left)
-        count = np.where(seen.any(axis=0), seen.sum(axis=0), np.nan)
-        square, mean = np.nansum(left**2, axis=0) / count, np.nansum(left, axis=0) / count
-        pictures.append((np.sqrt(square), f"rms error {label}, K", "YlOrRd", False))
-        pictures.append((mean, f"mean error {label}, K", "RdBu_r", True))
-    top = [max(float(np.nanmax(np.abs(pictures[k + 2 * j][0]))) for j in (0, 1)) for k in (0, 1)]
+        pictures.append((np.sqrt(statistics.mean_there(left**2, 0)), f"rms error {label}, K", "YlOrRd", "{:.2f}"))
+        pictures.append((statistics.mean_there(left, 0), f"mean error {label}, K", "RdBu_r", "{:+.2f}"))
+    most = [max(1e-9, *(float(np.nanmax(np.abs(pictures[k + j][0]))) for j in (0, 2))) for k in (0, 1)]
     figure, axes = plt.subplots(1, 4, figsize=(12, min(3.2, 0.6 + 2.6 * shape[0] / shape[1])))
-    for axis, (values, title, colours, signed) in zip(axes, pictures, strict=True):
-        high = max(top[signed], 1e-9)
-        axis.imshow(values.reshape(shape), cmap=colours, vmin=-high if signed else 0.0, vmax=high)
-        for k, value in enumerate(values):
-            known = math.isfinite(value)
-            dark = known and abs(value) > (0.55 if signed else 0.7) * high
-            x, y = k % shape[1], k // shape[1]
-            shown = (f"{value:+.2f}" if signed else f"{value:.2f}") if known else "not\nmeasured"
-            colour = "white" if dark else INK
-            axis.text(x, y, shown, ha="center", va="center", fontsize=9 if known else 7, color=colour)
-            axis.text(x - 0.44, y - 0.42, str(k + 1), ha="left", va="top", fontsize=6, color=colour, alpha=0.8)
+    for k, (axis, (values, title, colours, form)) in enumerate(zip(axes, pictures, strict=True)):
+        _tiles(axis, values, shape, colours, -most[1] if k % 2 else 0.0, most[k % 2], form)
         axis.set_title(title, fontsize=9)
-        axis.set_xticks([])
-        axis.set_yticks([])
     figure.tight_layout()
     return as_svg(figure)
 

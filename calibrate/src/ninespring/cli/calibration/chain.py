@@ -7,12 +7,13 @@ worse with them in simulation, and drove no worse with them when it was measured
 from __future__ import annotations
 
 import contextlib
-import datetime
 import time
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict
 from typing import Any
 
-from ... import __version__
+import msgspec
+
 from ...errors import InputError, WorkError
 from ...export.drive import checked_settings
 from ...export.settings import settings_of, together
@@ -23,7 +24,7 @@ from ...io import history, results
 from ...io.board import ROW_TIME, Board, send_settings, settings_that_differ
 from ...io.logs import Run, read_bytes, read_log, write_atomically
 from ...io.logs.mending import RUN_IN_S
-from ...io.recording import LogFile, Recording, Step, record, script_lines, told_to_stop
+from ...io.recording import LogFile, Recording, Step, about, record, script_lines, told_to_stop
 from ...io.thermometers import Thermometers
 from ...model.models import Array, Model, model_text, read_model
 from ...say import page
@@ -221,11 +222,6 @@ class Calibration:
 
     def _record(self, log: str, steps: Sequence[Step], duration_s: float, words: str) -> Recording:
         """Record into the folder; the springs are off afterwards and the board has its own settings."""
-        keys = {
-            "recorded": datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%dT%H:%M:%SZ"),
-            "port": self.board.port,
-            "tool": f"ninespring {__version__} calibrate",
-        }
         with told_to_stop() as stopped, working(words, duration_s) as say, self._logger() as logger:
             file = LogFile(self.folder / log)
             self.board.stopped = stopped
@@ -237,7 +233,7 @@ class Calibration:
                     duration_s,
                     steps,
                     lambda rows, seconds: say(f"{words}, {max(0.0, duration_s - seconds):.0f} s left", seconds),
-                    keys,
+                    about(self.board.port, " calibrate"),
                     logger,
                 )
             finally:
@@ -411,8 +407,8 @@ class Calibration:
         if "before" not in self.progress.done:
             log, got = self._drive("before", pattern)
             made = judged.judge(model, self.folder / log, pattern)
-            self.progress.keep("before", {"log": log, "faults": list(map(str, got.faults)), **made.as_dict()}, log)
-            self._tell("drive", _words("as the board was", made.as_dict(), got.faults))
+            self.progress.keep("before", {"log": log, "faults": list(map(str, got.faults)), **asdict(made)}, log)
+            self._tell("drive", _words("as the board was", asdict(made), got.faults))
             if got.faults:
                 raise WorkError(
                     f"{got.ended}: `clear` the fault, then the same command goes on (the drive is kept as it was)"
@@ -427,11 +423,11 @@ class Calibration:
             for _ in range(DRIVES):
                 log, got = self._drive("after", pattern)
                 made = judged.judge(model, self.folder / log, pattern)
-                worse = judged.worse_than(judged.of(before), made, noise)
+                worse = judged.worse_than(msgspec.convert(before, judged.Judged), made, noise)
                 if got.faults and not before["faults"]:
                     worse.append(f"it ended in {got.faults[0]}")
-                drives.append({"log": log, "faults": list(map(str, got.faults)), "worse": worse, **made.as_dict()})
-                self._tell("drive", _words("with the new settings", made.as_dict(), got.faults))
+                drives.append({"log": log, "faults": list(map(str, got.faults)), "worse": worse, **asdict(made)})
+                self._tell("drive", _words("with the new settings", asdict(made), got.faults))
                 if not worse or got.faults:
                     break
             if not worse:

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from ...export import drive as tried
 from ...export.settings import best_plant
 from ...io.logs import Run, read_log, read_table
+from ...io.statistics import rms
 from ...model import native
 from ...model.models import Model
 from ...model.simulate import started
@@ -21,24 +20,15 @@ FLOWING_A = 0.3
 
 
 @dataclass
-class Judged:
+class Judged(tried.Drive):
     """A measured drive."""
 
-    drive: tried.Drive
     error_c: float
     """The chip's temperatures less the thermometers', K rms."""
     worst_spring: int
     """1 = top left: the one that the chip knows worst."""
     worst_c: float
     """Its error, K rms."""
-
-    def as_dict(self) -> dict[str, float]:
-        """Return all numbers."""
-        return {name: float(value) for name, value in asdict(self.drive).items()} | {
-            "error_c": self.error_c,
-            "worst_spring": self.worst_spring,
-            "worst_c": self.worst_c,
-        }
 
 
 def believed(log: Path, run: Run) -> np.ndarray:
@@ -82,7 +72,9 @@ def judge(model: Model, log: Path, springs_on: str) -> Judged:
     heated = np.minimum.reduce(on, axis=1) >= tried.TRANSFORMED
     off = austenite[:, ~pattern]
     plant = best_plant(model)
-    made = tried.Drive(
+    left = believed(log, run) - measured
+    each = np.sqrt(np.nanmean(left**2, axis=0))
+    return Judged(
         held=float(on[len(on) // 2 :].mean()),
         heating_s=float(run.time_s[first + int(np.argmax(heated))] - run.time_s[first])
         if heated.any()
@@ -91,10 +83,10 @@ def judge(model: Model, log: Path, springs_on: str) -> Judged:
         enough_c=plant.get("austenite_finish_c") + tried.ENOUGH_K,
         undriven=float(off.max()) if off.size else 0.0,
         done=float(on.mean()),
+        error_c=rms([left]),
+        worst_spring=int(np.nanargmax(each)) + 1,
+        worst_c=float(np.nanmax(each)),
     )
-    left = believed(log, run) - measured
-    each = np.sqrt(np.nanmean(left**2, axis=0))
-    return Judged(made, float(np.sqrt(np.nanmean(left**2))), int(np.nanargmax(each)) + 1, float(np.nanmax(each)))
 
 
 def worse_than(before: Judged, after: Judged, noise_c: float) -> list[str]:
@@ -103,18 +95,10 @@ def worse_than(before: Judged, after: Judged, noise_c: float) -> list[str]:
     By the measures of `export`, without those of which one drive tells nothing; and by the chip's error, where it grew by
     more than a thermometer's noise.
     """
-    found = [one for one in tried.worse_than(before.drive, after.drive) if not tried.WORSE[one].chance]
-    out = [
-        tried.WORSE[one].words.format(old=getattr(before.drive, one), new=getattr(after.drive, one)) for one in found
-    ]
+    found = [one for one in tried.worse_than(before, after) if not tried.WORSE[one].chance]
+    out = [tried.WORSE[one].words.format(old=getattr(before, one), new=getattr(after, one)) for one in found]
     if after.error_c > before.error_c + noise_c:
         out.append(
             f"the chip was {before.error_c:.2f} K wrong (rms), and is {after.error_c:.2f} K with the new settings"
         )
     return out
-
-
-def of(found: Mapping[str, Any]) -> Judged:
-    """Return what `as_dict` told."""
-    made = tried.Drive(**{one.name: found[one.name] for one in fields(tried.Drive)})
-    return Judged(made, found["error_c"], int(found["worst_spring"]), found["worst_c"])
