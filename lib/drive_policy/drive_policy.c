@@ -147,6 +147,13 @@ static void enter(drive_policy_t *policy, const drive_policy_input_t *in, uint8_
     }
 }
 
+/* How far it is below a place so much above martensite start. */
+static float below_k(const drive_policy_input_t *in, uint8_t k, float margin_k)
+{
+    const int16_t start_c7 = thermal_model_transformation(in->model, k).martensite_start_c7;
+    return spring_c((int16_t)(start_c7 - thermal_model_temperature_c7(in->model, k))) + margin_k;
+}
+
 /* What holds a spring so much above where it is now, and takes it there. */
 static uint16_t hold_current_ma(const drive_policy_t *policy, const drive_policy_input_t *in,
                                 uint8_t k, float short_k, float more_w)
@@ -209,9 +216,8 @@ static void heat(drive_policy_t *policy, const drive_policy_input_t *in, uint8_t
                                 phase_of(in, k) > 0.5f * level);
     s->floor_ma = 0;
     if (slows || keeps) {
-        const float safe_c =
-            spring_c(points.martensite_start_c7) + kelvin(policy->parameters.hold_margin_cc);
-        const float short_k = full ? fmaxf(safe_c - now_c(in, k), 0.0f) : 0.0f;
+        const float margin_k = kelvin(policy->parameters.hold_margin_cc);
+        const float short_k = full ? fmaxf(below_k(in, k, margin_k), 0.0f) : 0.0f;
         const uint16_t keeps_ma =
             hold_current_ma(policy, in, k, short_k, slows ? LEVEL_POWER_W : 0.0f);
         if (slows && keeps_ma < s->wanted_ma) {
@@ -269,10 +275,7 @@ static void hold(drive_policy_t *policy, const drive_policy_input_t *in, uint8_t
     } else if (settled && !losing && s->margin_k > SEARCH_END_K) {
         s->margin_k -= 0.001f * TURN_S * (float)policy->parameters.search_mk_per_s;
     }
-    const int16_t start_c7 = thermal_model_transformation(in->model, k).martensite_start_c7;
-    const int16_t below_c7 = (int16_t)(start_c7 - thermal_model_temperature_c7(in->model, k));
-    const uint16_t holds_ma =
-        hold_current_ma(policy, in, k, spring_c(below_c7) + s->margin_k, 0.0f);
+    const uint16_t holds_ma = hold_current_ma(policy, in, k, below_k(in, k, s->margin_k), 0.0f);
     const uint16_t wanted_ma = (uint16_t)(holds_ma + policy->parameters.dither_ma / 2u);
     s->wanted_ma = wanted_ma < policy->parameters.probe_current_ma
                        ? policy->parameters.probe_current_ma

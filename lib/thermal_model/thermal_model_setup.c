@@ -186,6 +186,7 @@ static void derive(thermal_model_t *model)
                 p->air_exchange_uw_per_k, p->step_ms);
     derive_node(&model->plate, p->plate_heat_capacity_mj_per_k, plate_conductance(p),
                 p->plate_loss_uw_per_k, p->step_ms);
+    thermal_model_apply_fan(model);
 }
 
 static thermal_model_status_t judged(const thermal_model_parameters_t *parameters, uint16_t *bad)
@@ -209,7 +210,6 @@ thermal_model_status_t thermal_model_init(thermal_model_t *model,
     memset(model, 0, sizeof *model);
     model->parameters = taken;
     derive(model);
-    thermal_model_apply_fan(model);
     model->ambient_c7 = 20 * 128;
     thermal_model_reset(model, 20 * 128);
     return THERMAL_MODEL_OK;
@@ -229,7 +229,6 @@ thermal_model_status_t thermal_model_declare(thermal_model_t *model,
     }
     model->parameters = *parameters;
     derive(model);
-    thermal_model_apply_fan(model);
     thermal_model_fit_state(model, austenite);
     return THERMAL_MODEL_OK;
 }

@@ -327,6 +327,25 @@ static void who_waits_longest_is_next(void)
     TEST_ASSERT_EQUAL_UINT16(0, target_ma[3]);
 }
 
+/* It has begun to lose phase, and another one heats: it waits where it loses no more. */
+static void spring_that_waits_is_kept_where_it_loses_no_more(void)
+{
+    supply_limit_ma = 3500;
+    begin_cold(3, 3);
+    level[0] = 1000;
+    decisions(TURN_TICKS);
+    believe(8, 77, true);
+    level[8] = 1000;
+    decisions(3u * TURN_TICKS);
+    TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_HEAT, drive_policy_stage(&policy, 8));
+    const float below_k = 78.0f - 77.0f + 2.5f; /* of martensite start and its margin */
+    const float power_w = spring_estimator_hold_w(&belief, 8, below_k) +
+                          spring_estimator_follow_w(&belief, below_k, 4.0f);
+    TEST_ASSERT_UINT16_WITHIN(parameters.dither_ma,
+                              spring_estimator_current_ma(&belief, 8, power_w), target_ma[8]);
+    TEST_ASSERT_BITS_HIGH(DRIVE_POLICY_LIMIT_SUPPLY, drive_policy_limits(&policy, 8));
+}
+
 static void holds_come_before_boosts(void)
 {
     supply_limit_ma = 4000;
@@ -603,6 +622,7 @@ int main(void)
     RUN_TEST(who_waits_longest_is_next);
     RUN_TEST(what_is_kept_while_waiting_does_not_come_and_go);
     RUN_TEST(heating_that_another_policy_interrupts_is_over);
+    RUN_TEST(spring_that_waits_is_kept_where_it_loses_no_more);
     RUN_TEST(holds_come_before_boosts);
     RUN_TEST(own_temperature_derates_linearly_then_trips);
     RUN_TEST(spring_that_may_be_hotter_is_derated_by_that);
