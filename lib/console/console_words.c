@@ -168,7 +168,7 @@ static console_error_t word_fan(console_t *console, const arguments_t *arguments
 
 static console_error_t word_ambient(console_t *console, const arguments_t *arguments)
 {
-    char name[SETTINGS_NAME_SIZE];
+    char name[SETTINGS_NAME_SIZE]; /* written out it would lie in RAM */
     settings_name(PARAMETER_ambient_c, 0, name);
     console_hint_setting(console, CONSOLE_HINT_RANGE, PARAMETER_ambient_c, 0);
     console_open_settings(console);

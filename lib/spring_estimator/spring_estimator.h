@@ -218,7 +218,8 @@ float spring_estimator_declared_w(const thermal_model_t *model, uint8_t spring);
 /* Another model is declared, of as many springs, and each is where it was; before_w is
  * spring_estimator_declared_w by the one until now. What was seen of a spring's loss was seen of
  * all that it gives off: that stays, as unsure as it was, beside what is declared now; where
- * nothing was seen, that is believed. To be called before spring_estimator_prepare. */
+ * nothing was seen, or so long ago that it is no surer than a declaration, what is lost beyond the
+ * declared stays. To be called before spring_estimator_prepare. */
 void spring_estimator_keep_loss(spring_estimator_t *estimator, const thermal_model_t *model,
                                 uint8_t spring, float before_w);
 /* Its loss beyond the declared one is no more known than of any spring: it was learnt beside a

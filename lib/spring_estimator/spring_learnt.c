@@ -7,7 +7,8 @@
 #define DRIVEN_ABOVE_K   60.0f
 #define SLOW_NOISE_FIRST 0.0007f /* 0.2 mV of 0.3 V, a twentieth of a step */
 
-/* Of one that is not driven as if it were. */
+/* Above ambient; of a spring that is cooler, as far as one is that is driven: there its loss
+ * counts, and is a quotient of two that are not small. */
 static float driven_above_k(const thermal_model_t *model, uint8_t k)
 {
     return fmaxf(spring_above_ambient_k(model, k), DRIVEN_ABOVE_K);

@@ -23,7 +23,8 @@ typedef struct {
     int32_t temperature_c23[THERMAL_MODEL_MAX_SPRINGS]; /* Q9.23 degC */
     uint16_t austenite[THERMAL_MODEL_MAX_SPRINGS];      /* Q0.15, 0..THERMAL_MODEL_AUSTENITE_FULL */
     /* of the loss and the heat capacity that are declared now, the share that it goes by, in
-     * 255ths: the least that was declared since the springs were cold */
+     * 255ths, to the nearest: what makes it the least that was declared since the springs were cold
+     */
     uint8_t loss_share[THERMAL_MODEL_MAX_SPRINGS];
     uint8_t capacity_share[THERMAL_MODEL_MAX_SPRINGS];
     uint16_t rest_turns[THERMAL_MODEL_MAX_SPRINGS]; /* since it was given power */
@@ -50,7 +51,7 @@ bool temperature_ceiling_is_warm(const temperature_ceiling_t *ceiling, uint8_t s
 /* Since it was given power itself, s; TEMPERATURE_CEILING_NEVER: not since power-on, or so long. */
 uint16_t temperature_ceiling_rest_s(const temperature_ceiling_t *ceiling, uint8_t spring);
 
-/* What a model declares of a spring, whatever moves. */
+/* What a model declares of a spring, wherever it and its neighbours are. */
 typedef struct {
     float loss_w_per_k; /* to the air: what flows to neighbours and plate stays in the array */
     float capacity_j_per_k;

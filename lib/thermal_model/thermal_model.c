@@ -575,15 +575,15 @@ void thermal_model_fit_state(thermal_model_t *model, const uint16_t austenite[])
     for (spring_index_t i = 0; i < model->springs; i++) {
         const thermal_model_transformation_t points = thermal_model_transformation(model, i);
         thermal_model_spring_state_t *const own = &model->state.spring[i];
-        if (spring_is_consistent(model, i, own)) {
-            continue;
+        if (!spring_is_consistent(model, i, own) ||
+            austenite_of(model, &points, own) != austenite[i]) {
+            const int16_t was_c7 = c7_of(own->temperature_c23);
+            const int16_t now_c7 = was_c7 < model->highest_c7 ? was_c7 : model->highest_c7;
+            place(model, &points, own, now_c7, austenite[i]);
+            own->temperature_c23 = c23_of(now_c7);
+            model->spring[i].midstep_c6 = c6_of(now_c7);
         }
-        const int16_t was_c7 = c7_of(own->temperature_c23);
-        const int16_t now_c7 = was_c7 < model->highest_c7 ? was_c7 : model->highest_c7;
-        place(model, &points, own, now_c7, austenite[i]);
-        own->temperature_c23 = c23_of(now_c7);
         own->latent_c23 = latent_c23_of(model, austenite_of(model, &points, own));
-        model->spring[i].midstep_c6 = c6_of(now_c7);
         INVARIANT(spring_is_consistent(model, i, own));
     }
 }

@@ -434,6 +434,8 @@ static void another_declaration_keeps_phase_and_temperature(void)
         TEST_ASSERT_EQUAL_INT16(45 * 128, thermal_model_air_c7(&model));
         TEST_ASSERT_EQUAL_INT16(30 * 128, thermal_model_ambient_c7(&model));
         const uint16_t now = thermal_model_austenite(&model, 8);
+        const int32_t latent_c23 = (int32_t)((uint32_t)model.latent_full_c8 * now);
+        TEST_ASSERT_EQUAL_INT32(latent_c23, model.state.spring[8].latent_c23);
         thermal_model_t end = model; /* the most, or least, that there is at that temperature */
         thermal_model_set_temperature(&end, 8, now > austenite ? -40 * 128 : 150 * 128);
         thermal_model_set_temperature(&end, 8, was_c7);
