@@ -13,8 +13,8 @@
 
 #define GIVEN_W 0.01f /* more than a sensor's offset makes of nothing */
 
-#define WHOLE_SHARE 255u       /* of loss_share, capacity_share */
-#define ODD_SHARE   170u       /* two thirds: a fifth less of one, and a fifth more of the other */
+#define WHOLE_SHARE TEMPERATURE_CEILING_WHOLE_SHARE
+#define ODD_SHARE   43690u     /* two thirds: a fifth less of one, and a fifth more of the other */
 #define ODD_C7      (20 * 128) /* of air, in a hold: a fifth of the losses is 13 K of it */
 /* Between these the declared loss is compared. */
 #define COOL_C 20
@@ -45,7 +45,7 @@ static uint16_t checksum(const temperature_ceiling_t *c, uint8_t k)
     uint16_t sum = SUM16_START;
     sum = sum16_add_bytes(sum, &c->temperature_c23[k], sizeof c->temperature_c23[k]);
     sum = sum16_add_bytes(sum, &c->austenite[k], sizeof c->austenite[k]);
-    const uint8_t shares[] = {c->loss_share[k], c->capacity_share[k]};
+    const uint16_t shares[] = {c->loss_share[k], c->capacity_share[k]};
     sum = sum16_add_bytes(sum, shares, sizeof shares);
     return sum16_add_bytes(sum, &c->rest_turns[k], sizeof c->rest_turns[k]);
 }
@@ -193,16 +193,17 @@ temperature_ceiling_declared_t temperature_ceiling_declared(const thermal_model_
                                             .capacity_j_per_k = capacity_j_per_k(model, k)};
 }
 
-static float of_share(float value, uint8_t share)
+static float of_share(float value, uint16_t share)
 {
     return 1.0f / (float)WHOLE_SHARE * (float)share * value;
 }
 
-/* As much as before, or all of what is declared now. */
-static uint8_t share_of(uint8_t share, float before, float now)
+/* As much as before, or all of what is declared now; rounded to the careful side: declarations that
+ * raise it by less than a share's step would raise what it goes by. */
+static uint16_t share_of(uint16_t share, float before, float now)
 {
     const float kept = now > 0.0f ? (float)share * (before / now) : (float)WHOLE_SHARE;
-    return (uint8_t)clamp(kept + 0.5f, 1.0f, (float)WHOLE_SHARE);
+    return (uint16_t)clamp(kept, 1.0f, (float)WHOLE_SHARE);
 }
 
 void temperature_ceiling_declare(temperature_ceiling_t *ceiling, const thermal_model_t *model,
@@ -258,7 +259,7 @@ static uint16_t phase_on(int16_t low_c7, int16_t high_c7, float heat_c, float la
 static void add_heat(temperature_ceiling_t *ceiling, const thermal_model_t *model, uint8_t k,
                      float gain_k)
 {
-    const uint8_t share = ceiling->capacity_share[k];
+    const uint16_t share = ceiling->capacity_share[k];
     float whole_k = (float)model->latent_full_c8 * (1.0f / 256.0f);
     if (share != WHOLE_SHARE) { /* the same heat */
         whole_k = whole_k * (float)WHOLE_SHARE / (float)share;

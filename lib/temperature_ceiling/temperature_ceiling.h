@@ -15,18 +15,20 @@
 extern "C" {
 #endif
 
-#define TEMPERATURE_CEILING_TURN_S 0.6f /* between two steps of a spring */
-#define TEMPERATURE_CEILING_WARM_K 5.0f /* above ambient, that who says 'cold' may be off by */
-#define TEMPERATURE_CEILING_NEVER  UINT16_MAX
+#define TEMPERATURE_CEILING_TURN_S      0.6f /* between two steps of a spring */
+#define TEMPERATURE_CEILING_WARM_K      5.0f /* above ambient, that who says 'cold' may be off by */
+#define TEMPERATURE_CEILING_NEVER       UINT16_MAX
+#define TEMPERATURE_CEILING_WHOLE_SHARE UINT16_MAX
 
 typedef struct {
     int32_t temperature_c23[THERMAL_MODEL_MAX_SPRINGS]; /* Q9.23 degC */
     uint16_t austenite[THERMAL_MODEL_MAX_SPRINGS];      /* Q0.15, 0..THERMAL_MODEL_AUSTENITE_FULL */
-    /* of the loss and the heat capacity that are declared now, the share that it goes by, in
-     * 255ths, to the nearest: what makes it the least that was declared since the springs were cold
-     */
-    uint8_t loss_share[THERMAL_MODEL_MAX_SPRINGS];
-    uint8_t capacity_share[THERMAL_MODEL_MAX_SPRINGS];
+    /* of the loss and the heat capacity that are declared now, the share that it goes by, of
+     * TEMPERATURE_CEILING_WHOLE_SHARE, rounded down: what makes it the least that was declared
+     * since the springs were cold. Finer than any step of a declared number: what is rounded down
+     * again and again costs nothing that shows. */
+    uint16_t loss_share[THERMAL_MODEL_MAX_SPRINGS];
+    uint16_t capacity_share[THERMAL_MODEL_MAX_SPRINGS];
     uint16_t rest_turns[THERMAL_MODEL_MAX_SPRINGS]; /* since it was given power */
     uint16_t seal[THERMAL_MODEL_MAX_SPRINGS];       /* checksum of all that, of this spring */
     int16_t ambient_c7;     /* the highest that was told since the springs were cold */

@@ -7,6 +7,8 @@
 #include "temperature_ceiling.h"
 #include "unity.h"
 
+#define WHOLE TEMPERATURE_CEILING_WHOLE_SHARE
+
 static thermal_model_parameters_t parameters;
 static thermal_model_t model;
 static temperature_ceiling_t ceiling;
@@ -28,12 +30,13 @@ void tearDown(void)
 static void seal_all(void)
 {
     for (unsigned k = 0; k < THERMAL_MODEL_MAX_SPRINGS; k++) {
-        uint16_t halves[5], sum = 0x5EA1u;
+        uint16_t halves[6], sum = 0x5EA1u;
         memcpy(&halves[0], &ceiling.temperature_c23[k], 4);
         halves[2] = ceiling.austenite[k];
-        halves[3] = (uint16_t)(ceiling.loss_share[k] | ceiling.capacity_share[k] << 8u);
-        halves[4] = ceiling.rest_turns[k];
-        for (unsigned n = 0; n < 5; n++) {
+        halves[3] = ceiling.loss_share[k];
+        halves[4] = ceiling.capacity_share[k];
+        halves[5] = ceiling.rest_turns[k];
+        for (unsigned n = 0; n < 6; n++) {
             sum = (uint16_t)((uint16_t)(sum << 1u | sum >> 15u) + halves[n]);
         }
         ceiling.seal[k] = sum;
@@ -139,28 +142,49 @@ static void of_warm_springs_the_more_careful_numbers_count(void)
     }
 }
 
-/* Back to what it was, all is as before, to a 255th; and what never was warm goes by what is
+/* What is declared by so little more at a time that no single step shows: it goes by the least of
+ * all, or up to a fiftieth below it. */
+static void many_small_declarations_escape_no_more_than_one_large_one(void)
+{
+    static const float step[][2] = {{0.001f, 0.0f}, {0.0005f, 0.002f}, {0.0f, 0.001f}};
+    for (unsigned n = 0; n < sizeof step / sizeof step[0]; n++) {
+        setUp();
+        run(0.6f, 600000u, 60.0f);
+        const temperature_ceiling_declared_t least = temperature_ceiling_declared(&model, 4);
+        for (unsigned m = 1; m <= 1000; m++) {
+            declare(1.0f + step[n][0] * (float)m, 1.0f + step[n][1] * (float)m);
+        }
+        const temperature_ceiling_declared_t now = temperature_ceiling_declared(&model, 4);
+        const float loss = now.loss_w_per_k / least.loss_w_per_k * (float)ceiling.loss_share[4];
+        const float heat =
+            now.capacity_j_per_k / least.capacity_j_per_k * (float)ceiling.capacity_share[4];
+        TEST_ASSERT_FLOAT_WITHIN(0.01f, 0.99f, loss / (float)WHOLE);
+        TEST_ASSERT_FLOAT_WITHIN(0.01f, 0.99f, heat / (float)WHOLE);
+    }
+}
+
+/* Back to what it was, all is as before, to a thousandth; and what never was warm goes by what is
  * declared. */
 static void what_was_declared_is_over_when_it_is_taken_back_or_all_are_cold(void)
 {
     declare(3.4f, 10.0f);
-    TEST_ASSERT_EQUAL_UINT8(255, ceiling.loss_share[4]);
-    TEST_ASSERT_EQUAL_UINT8(255, ceiling.capacity_share[4]);
+    TEST_ASSERT_EQUAL_UINT16(WHOLE, ceiling.loss_share[4]);
+    TEST_ASSERT_EQUAL_UINT16(WHOLE, ceiling.capacity_share[4]);
     declare(1.0f, 1.0f);
     run(0.6f, 600000u, 60.0f);
     for (int n = 0; n < 20; n++) {
         declare(n % 2 == 0 ? 3.4f : 1.0f, n % 3 == 0 ? 10.0f : 1.0f);
     }
     declare(1.0f, 1.0f);
-    TEST_ASSERT_UINT8_WITHIN(6, 255, ceiling.loss_share[4]);
-    TEST_ASSERT_UINT8_WITHIN(6, 255, ceiling.capacity_share[4]);
+    TEST_ASSERT_UINT16_WITHIN(66, WHOLE, ceiling.loss_share[4]);
+    TEST_ASSERT_UINT16_WITHIN(66, WHOLE, ceiling.capacity_share[4]);
     declare(3.4f, 10.0f);
-    TEST_ASSERT_UINT8_WITHIN(2, 75, ceiling.loss_share[4]);
-    TEST_ASSERT_UINT8_WITHIN(2, 25, ceiling.capacity_share[4]);
+    TEST_ASSERT_UINT16_WITHIN(66, WHOLE / 3.4f, ceiling.loss_share[4]);
+    TEST_ASSERT_UINT16_WITHIN(66, WHOLE / 10, ceiling.capacity_share[4]);
     run(0.0f, 0, 600.0f);
     TEST_ASSERT_FALSE(temperature_ceiling_is_warm(&ceiling, 4));
-    TEST_ASSERT_EQUAL_UINT8(255, ceiling.loss_share[4]);
-    TEST_ASSERT_EQUAL_UINT8(255, ceiling.capacity_share[4]);
+    TEST_ASSERT_EQUAL_UINT16(WHOLE, ceiling.loss_share[4]);
+    TEST_ASSERT_EQUAL_UINT16(WHOLE, ceiling.capacity_share[4]);
 }
 
 static void what_flows_to_neighbours_and_plate_is_no_declared_loss(void)
@@ -216,13 +240,13 @@ static void two_declarations_contradict_where_no_tolerance_explains_both(void)
         }
     }
     temperature_ceiling_begin(&ceiling, 20 * 128);
-    for (uint8_t share = 168; share < 173; share++) { /* two thirds of 255 are still none */
-        uint8_t *const shares[] = {&ceiling.loss_share[1], &ceiling.capacity_share[2]};
+    for (int off = -2; off < 3; off++) { /* two thirds are still none */
+        uint16_t *const shares[] = {&ceiling.loss_share[1], &ceiling.capacity_share[2]};
         for (uint8_t k = 0; k < 2; k++) {
-            *shares[k] = share;
-            TEST_ASSERT_EQUAL(share < 170,
+            *shares[k] = (uint16_t)(WHOLE / 3 * 2 + off);
+            TEST_ASSERT_EQUAL(off < 0,
                               temperature_ceiling_contradicts(&ceiling, &model, (uint8_t)(k + 1u)));
-            *shares[k] = 255;
+            *shares[k] = WHOLE;
         }
     }
 }
@@ -387,16 +411,12 @@ static void rest_is_counted_from_the_last_power(void)
 static void whatever_bit_turns_over_it_is_taken_to_be_hot(void)
 {
     uint8_t *const fields[] = {
-        (uint8_t *)&ceiling.temperature_c23[4],
-        (uint8_t *)&ceiling.austenite[4],
-        &ceiling.loss_share[4],
-        &ceiling.capacity_share[4],
-        (uint8_t *)&ceiling.rest_turns[4],
-        (uint8_t *)&ceiling.seal[4],
-        (uint8_t *)&ceiling.ambient_c7,
-        (uint8_t *)&ceiling.not_ambient_c7,
+        (uint8_t *)&ceiling.temperature_c23[4], (uint8_t *)&ceiling.austenite[4],
+        (uint8_t *)&ceiling.loss_share[4],      (uint8_t *)&ceiling.capacity_share[4],
+        (uint8_t *)&ceiling.rest_turns[4],      (uint8_t *)&ceiling.seal[4],
+        (uint8_t *)&ceiling.ambient_c7,         (uint8_t *)&ceiling.not_ambient_c7,
     };
-    const uint8_t bytes[] = {4, 2, 1, 1, 2, 2, 2, 2};
+    const uint8_t bytes[] = {4, 2, 2, 2, 2, 2, 2, 2};
     for (unsigned field = 0; field < 8; field++) {
         for (unsigned bit = 0; bit < 8u * bytes[field]; bit++) {
             setUp();
@@ -444,8 +464,8 @@ static void begin_forgets_all_that_was(void)
     for (uint8_t k = 0; k < THERMAL_MODEL_MAX_SPRINGS; k++) {
         TEST_ASSERT_EQUAL_INT32(25 * 128 * 65536, ceiling.temperature_c23[k]);
         TEST_ASSERT_EQUAL_UINT16(0, ceiling.austenite[k]);
-        TEST_ASSERT_EQUAL_UINT8(255, ceiling.loss_share[k]);
-        TEST_ASSERT_EQUAL_UINT8(255, ceiling.capacity_share[k]);
+        TEST_ASSERT_EQUAL_UINT16(WHOLE, ceiling.loss_share[k]);
+        TEST_ASSERT_EQUAL_UINT16(WHOLE, ceiling.capacity_share[k]);
         TEST_ASSERT_EQUAL_UINT16(TEMPERATURE_CEILING_NEVER, ceiling.rest_turns[k]);
     }
 }
@@ -515,8 +535,8 @@ static void warmest_air_counts_until_all_are_cold(void)
         TEST_ASSERT_TRUE(ceiling.delivered);
         temperature_ceiling_step(&ceiling, &model, 0, 0.0f);
         TEST_ASSERT_FALSE(ceiling.delivered);
-        TEST_ASSERT_EQUAL_UINT8(255, ceiling.loss_share[k]);
-        TEST_ASSERT_EQUAL_UINT8(255, ceiling.capacity_share[k]);
+        TEST_ASSERT_EQUAL_UINT16(WHOLE, ceiling.loss_share[k]);
+        TEST_ASSERT_EQUAL_UINT16(WHOLE, ceiling.capacity_share[k]);
         TEST_ASSERT_EQUAL_INT16(15 * 128, ceiling.ambient_c7);
     }
     /* what only another size of the array has is neither looked at nor touched */
@@ -527,7 +547,7 @@ static void warmest_air_counts_until_all_are_cold(void)
     seal_all();
     temperature_ceiling_step(&ceiling, &model, 0, 0.0f);
     TEST_ASSERT_FALSE(ceiling.delivered);
-    TEST_ASSERT_EQUAL_UINT8(100, ceiling.loss_share[9]);
+    TEST_ASSERT_EQUAL_UINT16(100, ceiling.loss_share[9]);
 }
 
 /* It loses what is declared where it is, less what the air has cooled by since: as fast as a twin
@@ -554,6 +574,7 @@ int main(void)
     RUN_TEST(it_follows_the_declared_network);
     RUN_TEST(no_correction_of_the_model_lowers_it);
     RUN_TEST(of_warm_springs_the_more_careful_numbers_count);
+    RUN_TEST(many_small_declarations_escape_no_more_than_one_large_one);
     RUN_TEST(what_was_declared_is_over_when_it_is_taken_back_or_all_are_cold);
     RUN_TEST(transformation_begins_at_its_start);
     RUN_TEST(two_declarations_contradict_where_no_tolerance_explains_both);
