@@ -11,9 +11,13 @@ void spring_begin_alloy(spring_estimator_t *e)
     e->r_phase_odds = R_PHASE_ODDS;
 }
 
-bool spring_other_way_is_phase(spring_estimator_t *e, bool other_way)
+void spring_alloy_sees(spring_estimator_t *e, bool other_way)
 {
     const float more = other_way ? R_PHASE_OTHER_WAY : R_PHASE_STRAIGHT;
     e->r_phase_odds = spring_clamp(e->r_phase_odds + more, -R_PHASE_MOST_ODDS, R_PHASE_MOST_ODDS);
+}
+
+bool spring_alloy_has_r_phase(const spring_estimator_t *e)
+{
     return e->r_phase_odds >= 0.0f;
 }

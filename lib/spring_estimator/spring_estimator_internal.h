@@ -118,10 +118,11 @@ bool spring_open_to_step(spring_estimator_t *estimator, spring_belief_t *belief,
 
 /* What springs of one wire have in common: nothing is known of it yet. */
 void spring_begin_alloy(spring_estimator_t *estimator);
-/* A resistance has left its line for certain, the way of lost phase or the other one: whether that
- * is an intermediate phase's, by all that were seen so far; else it is a temperature's or a
- * contact's. */
-bool spring_other_way_is_phase(spring_estimator_t *estimator, bool other_way);
+/* A resistance has left its line for certain, the way of lost phase or the other one. */
+void spring_alloy_sees(spring_estimator_t *estimator, bool other_way);
+/* By all that were seen so far the other way is an intermediate phase's; else it is a temperature's
+ * or a contact's. */
+bool spring_alloy_has_r_phase(const spring_estimator_t *estimator);
 
 /* What is believed of a spring, or shared, is as it was sealed: before it is used in a turn, and
  * before a change of it is sealed, as else what has changed by itself would count as right.

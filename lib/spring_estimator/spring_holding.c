@@ -282,7 +282,8 @@ void spring_holding_watch(spring_estimator_t *e, spring_belief_t *b, thermal_mod
     b->losing = b->losing < UINT8_MAX ? (uint8_t)(b->losing + 1) : UINT8_MAX;
     if (changed2 > sure2 || b->losing >= LASTING_TURNS) {
         const bool other_way = is_other_way(b, left);
-        if (!spring_other_way_is_phase(e, other_way) && other_way) {
+        spring_alloy_sees(e, other_way);
+        if (other_way && !spring_alloy_has_r_phase(e)) {
             begin_line(b, true, share);
             return;
         }

@@ -144,26 +144,28 @@ static void more_than_its_austenite_proves_nothing(void)
 
 /* ---- what all springs share ---- */
 
-/* One alloy in ten has one. Without it three sights of four lose phase straight away. */
+/* One alloy in ten has one. Without it three sights of four lose phase straight away; three to the
+ * contrary turn it, however many were before. */
 static void intermediate_phase_is_believed_by_what_was_seen(void)
 {
-    spring_begin_alloy(&estimator);
-    TEST_ASSERT_TRUE(spring_other_way_is_phase(&estimator, true));
-    spring_begin_alloy(&estimator);
-    TEST_ASSERT_FALSE(spring_other_way_is_phase(&estimator, false));
-    TEST_ASSERT_FALSE(spring_other_way_is_phase(&estimator, true)); /* -2.2 - 1.4 + 2.9 */
-    TEST_ASSERT_TRUE(spring_other_way_is_phase(&estimator, true));
-    for (unsigned n = 0; n < 100; n++) {
-        (void)spring_other_way_is_phase(&estimator, false);
-    }
-    for (unsigned n = 0; n < 3; n++) { /* three more turn it, however many were before */
-        TEST_ASSERT_EQUAL(n == 2, spring_other_way_is_phase(&estimator, true));
-    }
-    for (unsigned n = 0; n < 100; n++) {
-        (void)spring_other_way_is_phase(&estimator, true);
-    }
-    for (unsigned n = 0; n < 5; n++) {
-        TEST_ASSERT_EQUAL(n < 4, spring_other_way_is_phase(&estimator, false));
+    static const struct {
+        unsigned straight, other_way, straight_then;
+        bool is_phase;
+    } table[] = {{0, 0, 0, false},  {0, 1, 0, true},    {1, 1, 0, false},
+                 {1, 2, 0, true},   {100, 2, 0, false}, {100, 3, 0, true},
+                 {0, 100, 4, true}, {0, 100, 5, false}, {0, 2, 2, true}};
+    for (size_t n = 0; n < ROWS(table); n++) {
+        spring_begin_alloy(&estimator);
+        for (unsigned m = 0; m < table[n].straight; m++) {
+            spring_alloy_sees(&estimator, false);
+        }
+        for (unsigned m = 0; m < table[n].other_way; m++) {
+            spring_alloy_sees(&estimator, true);
+        }
+        for (unsigned m = 0; m < table[n].straight_then; m++) {
+            spring_alloy_sees(&estimator, false);
+        }
+        TEST_ASSERT_EQUAL(table[n].is_phase, spring_alloy_has_r_phase(&estimator));
     }
 }
 
