@@ -68,7 +68,7 @@ int belief_fault(const controller_t *controller, int spring)
 void belief_keep(const controller_t *controller, belief_memory_t *memory)
 {
     for (uint8_t k = 0; k < controller_springs(controller); k++) {
-        memory->learnt[k] = controller_learnt(controller, k);
+        memory->learnt[k] = controller_to_keep(controller, k);
     }
     memory->valid = true;
 }

@@ -11,7 +11,7 @@ bool console_inputs_line(console_t *console, console_out_t *out)
         return false;
     }
     if (k < controller_springs(controller)) {
-        const spring_learnt_t learnt = controller_learnt(controller, k);
+        const spring_learnt_t learnt = controller_to_keep(controller, k);
         const int32_t number = k + 1;
         controller_restore_learnt(controller, k, &learnt); /* to begin with this, and no later */
         text_add_values(line, FLASH_TEXT("<learnt|spring:#0|"), &number);

@@ -738,6 +738,11 @@ spring_learnt_t controller_learnt(const controller_t *controller, uint8_t spring
     return spring_estimator_learnt(&controller->estimator, spring);
 }
 
+spring_learnt_t controller_to_keep(const controller_t *controller, uint8_t spring)
+{
+    return spring_estimator_to_keep(&controller->estimator, spring);
+}
+
 void controller_restore_learnt(controller_t *controller, uint8_t spring,
                                const spring_learnt_t *learnt)
 {

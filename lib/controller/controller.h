@@ -230,9 +230,11 @@ const spring_sights_t *controller_sights(const controller_t *controller);
  * CONTROLLER_COOLING_MOST_S; 0 where that is over. */
 #define CONTROLLER_COOLING_MOST_S 86400.0f
 float controller_cooling_s(const controller_t *controller, uint8_t spring);
-/* The spring's own numbers, to be kept over power-off. Those that no spring has are not restored.
- */
+/* The spring's own numbers, as they are. */
 spring_learnt_t controller_learnt(const controller_t *controller, uint8_t spring);
+/* The same, to be kept over power-off: within what is restored. */
+spring_learnt_t controller_to_keep(const controller_t *controller, uint8_t spring);
+/* All of a spring's numbers; none of them if one is such as no spring has. */
 void controller_restore_learnt(controller_t *controller, uint8_t spring,
                                const spring_learnt_t *learnt);
 void controller_forget_learnt(controller_t *controller, uint8_t spring);

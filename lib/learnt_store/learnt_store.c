@@ -45,7 +45,7 @@ static uint8_t byte_of(void *context, uint16_t position)
     const uint8_t within = (uint8_t)(position % sizeof store->written);
     if (within == 0) {
         store->written =
-            controller_learnt(store->controller, (uint8_t)(position / sizeof store->written));
+            controller_to_keep(store->controller, (uint8_t)(position / sizeof store->written));
     }
     return ((const uint8_t *)&store->written)[within];
 }
@@ -67,7 +67,7 @@ typedef enum { WORTH_NOTHING, WORTH_REFINES, WORTH_NEW } worth_t;
 
 static worth_t worth_of(const learnt_store_t *store, const controller_t *controller, uint8_t spring)
 {
-    const spring_learnt_t now = controller_learnt(controller, spring);
+    const spring_learnt_t now = controller_to_keep(controller, spring);
     spring_learnt_t kept;
     if (!(now.austenite_ohm > 0.0f)) {
         return WORTH_NOTHING;
@@ -164,6 +164,9 @@ record_found_t learnt_store_open(learnt_store_t *store, const record_storage_t *
     const bool fits = fits_model(store, controller);
     for (uint8_t k = 0; k < controller_springs(controller); k++) {
         if (unpack(&store->record, k, &learnt)) {
+            if (!fits) { /* before: beside this model it may be none that a spring has */
+                learnt.loss_w_per_k = learnt.loss_sd_w_per_k = 0.0f;
+            }
             controller_restore_learnt(controller, k, &learnt);
             if (!fits) {
                 controller_forget_loss(controller, k);

@@ -227,6 +227,9 @@ void spring_estimator_keep_loss(spring_estimator_t *estimator, const thermal_mod
 void spring_estimator_forget_loss(spring_estimator_t *estimator, uint8_t spring);
 /* What has been learnt, with how surely. */
 spring_learnt_t spring_estimator_learnt(const spring_estimator_t *estimator, uint8_t spring);
+/* The same as spring_estimator_restore takes it: a loss that another declaration left beyond the
+ * most that is ever believed is that. */
+spring_learnt_t spring_estimator_to_keep(const spring_estimator_t *estimator, uint8_t spring);
 
 /* One tick of 20 ms: takes the readings, of springs of which they are valid (NULL: nothing is
  * measured), and of those whose turn it is believes what they say. */

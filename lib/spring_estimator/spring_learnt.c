@@ -97,3 +97,11 @@ spring_learnt_t spring_estimator_learnt(const spring_estimator_t *e, uint8_t k)
     learnt.loss_sd_w_per_k = sd < LOSS_SD * e->loss_w_per_k ? sd : LOSS_SD * e->loss_w_per_k;
     return learnt;
 }
+
+spring_learnt_t spring_estimator_to_keep(const spring_estimator_t *e, uint8_t k)
+{
+    const float most_w_per_k = LOSS_MOST * e->loss_w_per_k;
+    spring_learnt_t learnt = spring_estimator_learnt(e, k);
+    learnt.loss_w_per_k = spring_clamp(learnt.loss_w_per_k, -most_w_per_k, most_w_per_k);
+    return learnt;
+}

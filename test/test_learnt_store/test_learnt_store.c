@@ -254,6 +254,40 @@ static void a_loss_that_was_learnt_beside_another_model_is_left_out(void)
     TEST_ASSERT_EQUAL_UINT(0, writes);
 }
 
+/* What a spring gives off is seen to be far from what is declared of it then, or since: all else
+ * that was learnt is as good as before. */
+static void no_declaration_of_the_losses_costs_what_else_was_learnt(void)
+{
+    static const float declared[] = {3.0f, 0.4f, 1.0f}; /* while it is on; off: as much again */
+    for (unsigned n = 0; n < 2u * sizeof declared / sizeof declared[0]; n++) {
+        controller_settings_t settings;
+        controller_settings_default(&settings);
+        const float loss_uw_per_k = settings.model.loss_uw_per_k;
+        setUp();
+        hold(0, DRIVE_POLICY_STAGE_HOLD);
+        learn(0, &numbers);
+        settings.model.loss_uw_per_k = (uint16_t)(declared[n / 2u] * loss_uw_per_k);
+        TEST_ASSERT_TRUE(controller_apply_settings(&controller, &settings, NULL));
+        seconds(LEARNT_STORE_HELD_S);
+        writes = 0;
+        seconds(2u * LEARNT_STORE_PAUSE_S); /* what was saved is not saved again */
+        TEST_ASSERT_EQUAL_UINT(0, writes);
+        const float believed_w_per_k = controller_learnt(&controller, 0).loss_w_per_k;
+        const float most_w_per_k = 0.45e-6f * (float)settings.model.loss_uw_per_k;
+        if (n % 2u != 0) {
+            settings.model.loss_uw_per_k = (uint16_t)(0.3f * loss_uw_per_k);
+        }
+        power_on_with(&settings);
+        const spring_learnt_t back = controller_learnt(&controller, 0);
+        TEST_ASSERT_EQUAL_FLOAT(numbers.austenite_ohm, back.austenite_ohm);
+        TEST_ASSERT_EQUAL_FLOAT(n % 2u != 0                        ? 0.0f
+                                : believed_w_per_k < -most_w_per_k ? -most_w_per_k
+                                : believed_w_per_k > most_w_per_k  ? most_w_per_k
+                                                                   : believed_w_per_k,
+                                back.loss_w_per_k);
+    }
+}
+
 static void what_lies_at_its_limit_is_taken_back(void)
 {
     spring_learnt_t most = numbers;
@@ -352,6 +386,7 @@ int main(void)
     RUN_TEST(wherever_the_power_is_cut_the_old_or_the_new_is_whole);
     RUN_TEST(clear_forgets_in_memory_and_over_power_off);
     RUN_TEST(a_loss_that_was_learnt_beside_another_model_is_left_out);
+    RUN_TEST(no_declaration_of_the_losses_costs_what_else_was_learnt);
     RUN_TEST(what_lies_at_its_limit_is_taken_back);
     RUN_TEST(a_second_that_is_not_held_begins_the_minute_anew);
     RUN_TEST(the_last_springs_first_numbers_are_saved_after_the_shortest_pause);
