@@ -82,7 +82,7 @@ void apply(const drive_policy_parameters_t *other)
     spring_estimator_prepare(&belief, &model, other->observer != 0);
 }
 
-uint32_t decide(void)
+void policy_tick(void)
 {
     const drive_policy_input_t input = {.belief = &belief,
                                         .model = &model,
@@ -90,9 +90,14 @@ uint32_t decide(void)
                                         .allowed = allowed,
                                         .maximum_current_ma = maximum_current_ma,
                                         .supply_limit_ma = supply_limit_ma};
+    drive_policy_tick(&policy, &input, target_ma);
+}
+
+uint32_t decide(void)
+{
     uint32_t sum_ma = 0;
     spring_estimator_tick(&belief, &model, measured_ma, measured_mv, valid);
-    drive_policy_tick(&policy, &input, target_ma);
+    policy_tick();
     for (uint8_t k = 0; k < policy.springs; k++) {
         sum_ma += target_ma[k];
     }

@@ -47,6 +47,10 @@ double run(double seconds);
 uint32_t decide(void);
 void decisions(unsigned count);
 
+/* And without the belief, either: what is believed is what a test says. */
+void policy_tick(void);
+
 void run_limit_tests(void);
+void run_decision_tests(void);
 
 #endif

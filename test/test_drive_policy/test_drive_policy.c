@@ -195,77 +195,6 @@ static void spring_that_cannot_get_there_is_said_to_be_away(void)
     TEST_ASSERT_EQUAL_UINT16(0, drive_policy_limits(&policy, 0));
 }
 
-/* Held, and nobody knows how near to its transformation: who knows whether it is there. */
-static void spring_whose_distance_is_lost_is_said_to_be_away(void)
-{
-    begin_cold(1, 2);
-    level[0] = 1000;
-    (void)run(120.0);
-    TEST_ASSERT_BITS_LOW(DRIVE_POLICY_LIMIT_AWAY, drive_policy_limits(&policy, 0));
-    for (double s = 0.0; s < 16.0; s += TICK_S) {
-        belief_inside(&belief, 0)->variance_k2 = 81.0f;
-        spring_seal(&belief, 0);
-        (void)tick();
-    }
-    TEST_ASSERT_BITS_HIGH(DRIVE_POLICY_LIMIT_AWAY, drive_policy_limits(&policy, 0));
-    for (double s = 0.0; s < 1.0; s += TICK_S) {
-        belief_inside(&belief, 0)->variance_k2 = 49.0f; /* the near miss */
-        spring_seal(&belief, 0);
-        (void)tick();
-    }
-    TEST_ASSERT_BITS_LOW(DRIVE_POLICY_LIMIT_AWAY, drive_policy_limits(&policy, 0));
-}
-
-/* Heatings of spring 1 that begin while each of them is lost again at once. */
-static unsigned heatings_in_vain(double seconds)
-{
-    unsigned begun = 0;
-    bool heated = drive_policy_stage(&policy, 0) == DRIVE_POLICY_STAGE_HEAT;
-    for (double s = 0.0; s < seconds; s += TICK_S) {
-        (void)tick();
-        const bool heats = drive_policy_stage(&policy, 0) == DRIVE_POLICY_STAGE_HEAT;
-        begun += heats && !heated ? 1u : 0u;
-        heated = heats;
-        if (!heats &&
-            spring_estimator_possible(spring_estimator_of(&belief, 0)) == SPRING_PHASE_AUSTENITE) {
-            belief_inside(&belief, 0)->lost = 0.5f;
-            spring_seal(&belief, 0);
-        }
-    }
-    return begun;
-}
-
-static void tries_are_bounded_and_then_it_is_said_to_be_away(void)
-{
-    begin_cold(1, 2);
-    level[0] = 1000;
-    TEST_ASSERT_EQUAL_UINT(1 + 4, heatings_in_vain(500.0));
-    TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_HOLD, drive_policy_stage(&policy, 0));
-    TEST_ASSERT_BITS_HIGH(DRIVE_POLICY_LIMIT_AWAY, drive_policy_limits(&policy, 0));
-    TEST_ASSERT_EQUAL_UINT(2, heatings_in_vain(1200.0)); /* one in ten minutes */
-    level[0] = 0;
-    (void)run(60.0);
-    level[0] = 1000; /* asked anew */
-    TEST_ASSERT_EQUAL_UINT(1 + 4, heatings_in_vain(500.0));
-}
-
-/* The near miss: one that loses its phase every minute, and gets it back, is heated each time. */
-static void tries_that_bring_it_back_are_not_counted(void)
-{
-    begin_cold(1, 2);
-    level[0] = 1000;
-    (void)run(120.0);
-    for (unsigned n = 0; n < 8; n++) {
-        belief_inside(&belief, 0)->lost = 0.05f;
-        spring_seal(&belief, 0);
-        (void)run(1.0);
-        TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_HEAT, drive_policy_stage(&policy, 0));
-        (void)run(60.0);
-        TEST_ASSERT_TRUE(truth[0].austenite > 0.95);
-        TEST_ASSERT_BITS_LOW(DRIVE_POLICY_LIMIT_AWAY, drive_policy_limits(&policy, 0));
-    }
-}
-
 /* ---- the inverse: what is believed stands still ---- */
 
 static void two_springs_hold_by_the_hand_computed_inverse(void)
@@ -327,43 +256,6 @@ static void who_waits_longest_is_next(void)
     TEST_ASSERT_EQUAL_UINT16(0, target_ma[3]);
 }
 
-/* It has begun to lose phase, and another one heats: it waits where it loses no more. */
-static void spring_that_waits_is_kept_where_it_loses_no_more(void)
-{
-    supply_limit_ma = 3500;
-    begin_cold(3, 3);
-    level[0] = 1000;
-    decisions(TURN_TICKS);
-    believe(8, 77, true);
-    level[8] = 1000;
-    decisions(3u * TURN_TICKS);
-    TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_HEAT, drive_policy_stage(&policy, 8));
-    const float below_k = 78.0f - 77.0f + 2.5f; /* of martensite start and its margin */
-    const float power_w = spring_estimator_hold_w(&belief, 8, below_k) +
-                          spring_estimator_follow_w(&belief, below_k, 4.0f);
-    TEST_ASSERT_UINT16_WITHIN(parameters.dither_ma,
-                              spring_estimator_current_ma(&belief, 8, power_w), target_ma[8]);
-    TEST_ASSERT_BITS_HIGH(DRIVE_POLICY_LIMIT_SUPPLY, drive_policy_limits(&policy, 8));
-}
-
-static void holds_come_before_boosts(void)
-{
-    supply_limit_ma = 4000;
-    begin_cold(3, 3);
-    level[8] = 1000;
-    (void)run(60.0);
-    TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_HOLD, drive_policy_stage(&policy, 8));
-    level[0] = level[1] = 1000;
-    unsigned cut = 0;
-    for (unsigned n = 0; n < 500; n++) {
-        TEST_ASSERT_LESS_OR_EQUAL_UINT32(3800, tick());
-        cut += (drive_policy_limits(&policy, 8) & DRIVE_POLICY_LIMIT_SUPPLY) != 0;
-    }
-    TEST_ASSERT_EQUAL_UINT(0, cut);
-    TEST_ASSERT_GREATER_THAN_UINT16(1000, target_ma[8]);
-    TEST_ASSERT_GREATER_THAN_UINT16(1500, target_ma[0]);
-}
-
 /* It is taken for half transformed, and what its current reads says that it is not: the one
  * that heats would read nothing either if that current came and went. */
 static void what_is_kept_while_waiting_does_not_come_and_go(void)
@@ -388,103 +280,6 @@ static void what_is_kept_while_waiting_does_not_come_and_go(void)
     TEST_ASSERT_TRUE_MESSAGE(jumps <= 3, where);
 }
 
-/* Its heating has not gone on since: by that of before it would be held back from its warmth. */
-static void heating_that_another_policy_interrupts_is_over(void)
-{
-    begin_cold(1, 2);
-    level[0] = 1000;
-    (void)run(5.0);
-    TEST_ASSERT_TRUE(belief_inside(&belief, 0)->heating);
-    drive_policy_parameters_t other = parameters;
-    other.policy = DRIVE_POLICY_OPEN;
-    apply(&other);
-    (void)run(1.0);
-    TEST_ASSERT_FALSE(belief_inside(&belief, 0)->heating);
-    TEST_ASSERT_EQUAL_FLOAT(0.0f, belief_inside(&belief, 0)->run.line.ohm);
-}
-
-static void own_temperature_derates_linearly_then_trips(void)
-{
-    parameters.dither_ma = 0;
-    parameters.trip_time_s = 2;
-    parameters.temperature_limit_cc = 9200;
-    begin_cold(3, 3);
-    level[0] = 1000;
-    believe(0, 87, false); /* half of the band of 10 K is left */
-    decisions(2u * TURN_TICKS);
-    TEST_ASSERT_UINT16_WITHIN(20, FULL_BOOST_MA / 2, target_ma[0]);
-    TEST_ASSERT_BITS_HIGH(DRIVE_POLICY_LIMIT_TEMPERATURE, drive_policy_limits(&policy, 0));
-    parameters.temperature_limit_cc = 8000;
-    apply(&parameters);
-    decisions(2u * TURN_TICKS);
-    TEST_ASSERT_EQUAL_UINT16(0, target_ma[0]);
-    TEST_ASSERT_BITS_LOW(DRIVE_POLICY_LIMIT_TRIP, drive_policy_limits(&policy, 0));
-    decisions(10u * TURN_TICKS);
-    parameters.temperature_limit_cc = 11000; /* the cause is gone, the latch stays */
-    apply(&parameters);
-    decisions(4u * TURN_TICKS);
-    TEST_ASSERT_EQUAL_UINT16(0, target_ma[0]);
-    TEST_ASSERT_BITS_HIGH(DRIVE_POLICY_LIMIT_TRIP, drive_policy_limits(&policy, 0));
-    drive_policy_clear(&policy);
-    decisions(2u * TURN_TICKS);
-    TEST_ASSERT_GREATER_THAN_UINT16(2900, target_ma[0]);
-}
-
-/* What it has lost may have been no phase: then it is as much hotter. Half of the band is left to
- * such doubts. */
-static void spring_that_may_be_hotter_is_derated_by_that(void)
-{
-    parameters.dither_ma = 0;
-    parameters.temperature_limit_cc = 9200;
-    begin_cold(3, 3);
-    level[0] = 1000;
-    believe(0, 80, false);
-    for (unsigned n = 0; n < 2; n++) {
-        belief_inside(&belief, 0)->gone_k = n == 0 ? 6.9f : 12.0f; /* counted as 2 and 7 K */
-        spring_seal(&belief, 0);
-        decisions(2u * TURN_TICKS);
-        TEST_ASSERT_UINT16_WITHIN(60, n == 0 ? FULL_BOOST_MA : FULL_BOOST_MA / 2, target_ma[0]);
-        TEST_ASSERT_EQUAL(n == 1,
-                          (drive_policy_limits(&policy, 0) & DRIVE_POLICY_LIMIT_TEMPERATURE) != 0);
-    }
-}
-
-/* A heating that the limit has slowed down to nothing ends where the spring may have transformed.
- */
-static void limited_heating_ends_where_it_may_be_hot_enough(void)
-{
-    parameters.temperature_limit_cc = 9200;
-    for (unsigned n = 0; n < 2; n++) {
-        begin_cold(3, 3);
-        level[0] = 1000;
-        decisions(TURN_TICKS);
-        believe(0, 85, false);
-        for (unsigned turn = 0; turn < 40; turn++) { /* until its rise has worn off */
-            belief_inside(&belief, 0)->gone_k = n == 0 ? 11.0f : 15.0f;
-            spring_seal(&belief, 0);
-            decisions(TURN_TICKS);
-        }
-        TEST_ASSERT_EQUAL(n == 0 ? DRIVE_POLICY_STAGE_HEAT : DRIVE_POLICY_STAGE_HOLD,
-                          drive_policy_stage(&policy, 0));
-    }
-}
-
-/* By the upper bound: the wider it is, the colder the spring from which on. */
-static void undriven_spring_derates_its_neighbours_only(void)
-{
-    parameters.dither_ma = 0;
-    begin_cold(3, 3);
-    level[0] = level[8] = 1000;
-    decisions(2u * TURN_TICKS);
-    TEST_ASSERT_BITS_LOW(DRIVE_POLICY_LIMIT_UNDRIVEN, drive_policy_limits(&policy, 0));
-    believe(1, 80, false); /* limit 83, band 5 */
-    decisions(2u * TURN_TICKS);
-    TEST_ASSERT_BITS_HIGH(DRIVE_POLICY_LIMIT_UNDRIVEN, drive_policy_limits(&policy, 0));
-    TEST_ASSERT_LESS_THAN_UINT16(FULL_BOOST_MA * 3 / 5, target_ma[0]);
-    TEST_ASSERT_BITS_LOW(DRIVE_POLICY_LIMIT_UNDRIVEN, drive_policy_limits(&policy, 8));
-    TEST_ASSERT_GREATER_THAN_UINT16(2900, target_ma[8]);
-}
-
 static void spring_just_released_is_no_false_actuation(void)
 {
     for (unsigned wait = 0; wait < TURN_TICKS; wait++) { /* one of them is the tick of its turn */
@@ -498,40 +293,6 @@ static void spring_just_released_is_no_false_actuation(void)
             TEST_ASSERT_BITS_LOW(DRIVE_POLICY_LIMIT_UNDRIVEN, drive_policy_limits(&policy, 0));
         }
     }
-}
-
-static void what_was_driven_open_and_is_off_again_trips_no_neighbour(void)
-{
-    parameters.policy = DRIVE_POLICY_OPEN;
-    parameters.trip_time_s = 2;
-    begin_cold(3, 3);
-    level[0] = level[1] = 1000;
-    decisions(2u * TURN_TICKS);
-    believe(1, 95, true);
-    level[1] = 0;
-    for (unsigned n = 0; n < 10; n++) {
-        believe(1, 95, true); /* cools more slowly than the limit's patience */
-        decisions(3u * TURN_TICKS);
-    }
-    TEST_ASSERT_BITS_LOW(DRIVE_POLICY_LIMIT_TRIP, drive_policy_limits(&policy, 0));
-    TEST_ASSERT_GREATER_THAN_UINT16(1400, target_ma[0]);
-}
-
-static void overload_takes_the_excess_away_in_time(void)
-{
-    parameters.overload_current_ma = 6000;
-    parameters.overload_time_s = 4;
-    begin_cold(3, 3);
-    want_all(1000);
-    decisions(100);
-    TEST_ASSERT_GREATER_THAN_UINT32(14000, decide()); /* half of the time is free */
-    decisions(60);
-    const uint32_t sum_ma = decide();
-    TEST_ASSERT_LESS_THAN_UINT32(12500, sum_ma);
-    TEST_ASSERT_GREATER_THAN_UINT32(6500, sum_ma);
-    decisions(100);
-    TEST_ASSERT_LESS_OR_EQUAL_UINT32(6200, decide());
-    TEST_ASSERT_BITS_HIGH(DRIVE_POLICY_LIMIT_OVERLOAD, drive_policy_limits(&policy, 8));
 }
 
 static void budget_holds_in_every_tick_whatever_is_asked(void)
@@ -561,26 +322,6 @@ static void budget_holds_in_every_tick_whatever_is_asked(void)
         }
     }
     TEST_ASSERT_TRUE(thermal_model_is_consistent(&model));
-}
-
-static void policy_switch_never_jumps(void)
-{
-    parameters.dither_ma = 0;
-    begin_cold(3, 3);
-    level[0] = level[4] = level[5] = 1000;
-    for (unsigned at = 1; at < 300; at += 37) {
-        decisions(at);
-        uint16_t last[SPRINGS];
-        parameters.policy ^= 1u;
-        apply(&parameters);
-        for (unsigned n = 0; n < 60; n++) {
-            memcpy(last, target_ma, sizeof last);
-            (void)decide();
-            for (uint8_t k = 0; k < SPRINGS; k++) {
-                TEST_ASSERT_UINT16_WITHIN(20, last[k], target_ma[k]);
-            }
-        }
-    }
 }
 
 static void parameters_outside_their_range_are_refused_whole(void)
@@ -614,26 +355,14 @@ int main(void)
     RUN_TEST(resistance_without_a_change_is_driven_by_the_model_and_said);
     RUN_TEST(levels_one_after_the_other_are_held);
     RUN_TEST(spring_that_cannot_get_there_is_said_to_be_away);
-    RUN_TEST(spring_whose_distance_is_lost_is_said_to_be_away);
-    RUN_TEST(tries_are_bounded_and_then_it_is_said_to_be_away);
-    RUN_TEST(tries_that_bring_it_back_are_not_counted);
     RUN_TEST(two_springs_hold_by_the_hand_computed_inverse);
     RUN_TEST(boosts_are_staggered_not_diluted);
     RUN_TEST(who_waits_longest_is_next);
     RUN_TEST(what_is_kept_while_waiting_does_not_come_and_go);
-    RUN_TEST(heating_that_another_policy_interrupts_is_over);
-    RUN_TEST(spring_that_waits_is_kept_where_it_loses_no_more);
-    RUN_TEST(holds_come_before_boosts);
-    RUN_TEST(own_temperature_derates_linearly_then_trips);
-    RUN_TEST(spring_that_may_be_hotter_is_derated_by_that);
-    RUN_TEST(limited_heating_ends_where_it_may_be_hot_enough);
-    RUN_TEST(undriven_spring_derates_its_neighbours_only);
     RUN_TEST(spring_just_released_is_no_false_actuation);
-    RUN_TEST(what_was_driven_open_and_is_off_again_trips_no_neighbour);
-    RUN_TEST(overload_takes_the_excess_away_in_time);
     RUN_TEST(budget_holds_in_every_tick_whatever_is_asked);
-    RUN_TEST(policy_switch_never_jumps);
     RUN_TEST(parameters_outside_their_range_are_refused_whole);
     run_limit_tests();
+    run_decision_tests();
     return UNITY_END();
 }
