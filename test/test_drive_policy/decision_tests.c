@@ -236,10 +236,10 @@ static void heating_ends_at_its_phase_or_where_a_limit_ends_it(void)
                  {92.0f, B, 0.501f, 1000, 3000, 4.0f, 0.0f, HEAT},
                  {98.1f, B, 0.5f, 900, 2250, 4.0f, 0.0f, HEAT},
                  {98.1f, B, 0.5f, 900, 2249, 4.0f, 0.0f, HOLD},
-                 {97.9f, B, 0.5f, 900, 0, 4.0f, 0.0f, HEAT},
+                 {98.0f, B, 0.5f, 900, 0, 4.0f, 0.0f, HEAT},
                  {90.0f, B, 0.5f, 900, 0, 0.29f, 8.1f, HOLD},
                  {90.0f, B, 0.5f, 900, 0, 0.31f, 8.1f, HEAT},
-                 {90.0f, B, 0.5f, 900, 0, 0.29f, 7.9f, HEAT}};
+                 {90.0f, B, 0.5f, 900, 0, 0.29f, 8.0f, HEAT}};
     for (size_t n = 0; n < ROWS(table); n++) {
         begin(1, 2);
         believed(0, table[n].c, table[n].possible, table[n].phase);
@@ -279,7 +279,7 @@ static void heating_slows_to_a_level_and_keeps_what_waits(void)
                  {91.01f, B, 0.1f, 1000, 0, 0, -1.0f, GIVES_W},
                  {60.0f, M, 0.0f, 1000, 0, 0, -1.0f, -1.0f},
                  {80.0f, B, 0.1f, 1000, 0, 1, -1.0f, GIVES_W + 0.5f * FOLLOW_W},
-                 {91.1f, B, 0.6f, 1000, 3000, 1, -1.0f, -1.0f}};
+                 {91.1f, B, 0.6f, 1000, 3000, 900, -1.0f, -1.0f}};
     for (size_t n = 0; n < ROWS(table); n++) {
         begin(1, 2);
         believed(0, table[n].c, table[n].possible, table[n].phase);
@@ -291,7 +291,7 @@ static void heating_slows_to_a_level_and_keeps_what_waits(void)
         const int asks_ma = table[n].asks_w < 0.0f ? BOOST_MA : ma_of(table[n].asks_w);
         const int keeps_ma = table[n].keeps_w < 0.0f ? 0 : ma_of(table[n].keeps_w);
         TEST_ASSERT_INT_WITHIN_MESSAGE(1, asks_ma, policy.spring[0].wanted_ma, where);
-        TEST_ASSERT_INT_WITHIN_MESSAGE(1, keeps_ma, policy.spring[0].floor_ma, where);
+        TEST_ASSERT_INT_WITHIN_MESSAGE(keeps_ma != 0, keeps_ma, policy.spring[0].floor_ma, where);
     }
     /* what holds it already is above the boost: no more than that */
     begin(1, 2);
@@ -505,10 +505,10 @@ static void who_is_warmer_lets_the_colder_heat_while_few_wait(void)
                  {{30, 20, 20, 20}, {3000, 0, NONE, NONE}, {0, 1}},
                  {{30, 50, 20, 20}, {3000, 3000, 0, NONE}, {0, 2, 1}},
                  {{26, 26, 20, 20}, {3000, 3000, 3000, 0}, {0, 1, 2, 3}},
-                 {{26.1f, 26, 20, 20}, {3000, 3000, 3000, 0}, {1, 2, 3, 0}},
-                 {{20, 26.1f, 20, 20}, {0, 3000, 3000, 3000}, {0, 2, 3, 1}},
+                 {{26.02f, 26, 20, 20}, {3000, 3000, 3000, 0}, {1, 2, 3, 0}},
+                 {{20, 26.02f, 20, 20}, {0, 3000, 3000, 3000}, {0, 2, 3, 1}},
                  {{60, 84, 20, 20}, {3000, 3000, 3000, 0}, {1, 2, 3, 0}},
-                 {{60, 83.9f, 20, 20}, {3000, 3000, 3000, 0}, {0, 2, 3, 1}},
+                 {{60, 83.99f, 20, 20}, {3000, 3000, 3000, 0}, {0, 2, 3, 1}},
                  {{-10, -20, -30, -30}, {3000, 3000, 3000, 0}, {1, 2, 3, 0}},
                  {{50, 30, 40, 20}, {3000, 0, 3000, 3000}, {1, 2, 3, 0}},
                  {{50, 40, 47, 20}, {3000, 0, 3000, 3000}, {1, 2, 3, 0}}};
@@ -753,6 +753,7 @@ static void dither_is_a_triangle_at_another_place_for_each_spring(void)
         }
         int last_ma[SPRINGS], first_ma[SPRINGS][32];
         uint32_t seen = 0;
+        uint16_t least_ma = 1000;
         for (int tick = 0; tick < 64; tick++) {
             int sum_ma = 0;
             policy_tick();
@@ -772,10 +773,10 @@ static void dither_is_a_triangle_at_another_place_for_each_spring(void)
             if (n == 0) {
                 seen |= 1u << ((1000 - target_ma[0]) / 10);
                 TEST_ASSERT_INT_WITHIN(200, 9 * 1000 - 9 * 155, sum_ma);
-            } else {
-                TEST_ASSERT_INT_WITHIN(39, 1000 - 39, target_ma[0]);
             }
+            least_ma = target_ma[0] < least_ma ? target_ma[0] : least_ma;
         }
+        TEST_ASSERT_EQUAL_UINT16(n == 0 ? 1000 - 310 : 1000 - 77, least_ma);
         TEST_ASSERT_EQUAL_HEX32(n == 0 ? 0xFFFFFFFFu : 0, seen);
         for (uint8_t k = 1; k < SPRINGS; k++) { /* 7 ticks ahead of the one before */
             TEST_ASSERT_EQUAL_INT(first_ma[k - 1u][7], first_ma[k][0]);
@@ -801,7 +802,7 @@ static void targets_walk_until_two_rounds_after_the_last(void)
     } table[] = {{1000, 1000, 15000, 1000}, {1000, 1020, 15000, 1020}, {1000, 1021, 15000, 1020},
                  {1000, 980, 15000, 980},   {1000, 979, 15000, 980},   {1000, 3000, 1212, 1012},
                  {1000, 3000, 1200, 1000},  {1000, 3000, 1199, 999},   {0, 3000, 15000, 20},
-                 {1000, 0, 15000, 980}};
+                 {1000, 0, 15000, 980},     {1000, 500, 1200, 980}};
     for (size_t n = 0; n < ROWS(table); n++) {
         for (unsigned walks = 0; walks < 2; walks++) {
             begin(1, 2);

@@ -72,28 +72,29 @@ static void doubt_that_others_share_derates_nobody(void)
         bool driven[2];
         float counts_k;
     } table[] = {
-        {5.0f, {0.0f, 0.0f}, {true, true}, 0.0f},  {5.9f, {0.0f, 0.0f}, {true, true}, 0.9f},
-        {12.0f, {0.0f, 0.0f}, {true, true}, 7.0f}, {12.0f, {4.0f, 4.0f}, {true, true}, 3.0f},
-        {12.0f, {6.0f, 0.0f}, {true, true}, 4.0f}, {12.0f, {6.0f, 90.0f}, {true, false}, 1.0f},
-        {12.0f, {9.0f, 9.0f}, {true, true}, 0.0f}, {12.0f, {90.0f, 90.0f}, {false, false}, 7.0f},
+        {5.0f, {0.0f, 0.0f}, {true, true}, 0.0f},      {5.9f, {0.0f, 0.0f}, {true, true}, 0.9f},
+        {12.0f, {0.0f, 0.0f}, {true, true}, 7.0f},     {12.0f, {4.0f, 4.0f}, {true, true}, 3.0f},
+        {5.9f, {0.5f, 0.5f}, {true, true}, 0.4f},      {12.0f, {6.0f, 0.0f}, {true, true}, 4.0f},
+        {12.0f, {6.0f, 90.0f}, {true, false}, 1.0f},   {12.0f, {9.0f, 9.0f}, {true, true}, 0.0f},
+        {12.0f, {90.0f, 90.0f}, {false, false}, 7.0f},
     };
     for (size_t n = 0; n < ROWS(table); n++) {
         parameters.dither_ma = 0;
         parameters.temperature_limit_cc = 9200;
         begin_cold(3, 3);
-        level[0] = 1000;
-        believe(0, 82, false);
-        belief_inside(&belief, 0)->gone_k = table[n].gone_k;
-        spring_seal(&belief, 0);
+        level[4] = 1000;
+        believe(4, 82, false);
+        belief_inside(&belief, 4)->gone_k = table[n].gone_k;
+        spring_seal(&belief, 4);
         for (uint8_t k = 0; k < 2; k++) {
-            level[7 + k] = table[n].driven[k] ? 1000 : 0;
-            belief_inside(&belief, (uint8_t)(7 + k))->disturbance_k = table[n].others_k[k];
-            spring_seal(&belief, (uint8_t)(7 + k));
+            level[8u * k] = table[n].driven[k] ? 1000 : 0;
+            belief_inside(&belief, (uint8_t)(8u * k))->disturbance_k = table[n].others_k[k];
+            spring_seal(&belief, (uint8_t)(8u * k));
         }
         decisions(ROUND_TICKS);
         row(n);
         TEST_ASSERT_INT_WITHIN_MESSAGE(60, FULL_MA * (1.0f - table[n].counts_k / 10.0f),
-                                       target_ma[0], where);
+                                       target_ma[4], where);
     }
 }
 
@@ -121,7 +122,7 @@ static void overload_is_worked_off_once_nobody_waits(void)
         policy.overload_quarters = table[n].quarters;
         for (unsigned tick = 0; tick < ROUND_TICKS; tick++) {
             policy.sum_ma = table[n].sum_ma;
-            policy.spring[1].limits = table[n].limits;
+            policy.spring[n % 2u].limits = table[n].limits;
             (void)decide();
         }
         row(n);
@@ -159,6 +160,7 @@ static void restart_leaves_nothing_driven_and_nothing_owed(void)
     for (uint8_t k = 0; k < SPRINGS; k++) {
         TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_OFF, drive_policy_stage(&policy, k));
         TEST_ASSERT_EQUAL_UINT16(0, policy.spring[k].granted_ma);
+        TEST_ASSERT_EQUAL_UINT16(FULL_MA, policy.spring[k].ceiling_ma);
     }
 }
 
