@@ -9,21 +9,6 @@
 
 #define ACTED_ON 0.03f /* by the drive, which heats it then */
 
-void offset_is_learnt_where_the_current_drops(void)
-{
-    for (double offset_v = -0.008; offset_v < 0.009; offset_v += 0.004) {
-        begin_cold();
-        truth.offset_v = offset_v;
-        truth.rise_per_k = 0.0004;
-        (void)heat_then_hold(60.0);
-        ticks(0.4, 2.0);
-        (void)snprintf(where, sizeof where, "%.4f V: %.4f V give or take %.4f", offset_v,
-                       (double)LEARNT.offset_v, (double)INSIDE.offset_sd_v);
-        TEST_ASSERT_TRUE_MESSAGE(fabs((double)LEARNT.offset_v - offset_v) < 0.0015, where);
-        TEST_ASSERT_FLOAT_WITHIN(0.002f, (float)resistance_ohm(), LEARNT.austenite_ohm);
-    }
-}
-
 /* From the first second of a hold, before it has come to rest, and all of it. */
 void phase_lost_on_the_way_to_the_hold_is_counted(void)
 {
@@ -165,49 +150,6 @@ void what_a_loose_contact_seemed_to_lose_is_taken_back(void)
     TEST_ASSERT_TRUE(spring_estimator_blind(BELIEF));
     TEST_ASSERT_EQUAL_FLOAT(0.0f, spring_estimator_doubt_k(BELIEF));
     TEST_ASSERT_FLOAT_WITHIN_MESSAGE(7.0f, (float)truth.temperature_c, believed_c(), where);
-}
-
-/* Far above its martensite start a contact gets better by 7 %, as no load does to phase: to have
- * lost so much it would be colder than a load and all that is not known of it make it. */
-void loss_that_is_too_far_off_is_misread(void)
-{
-    begin_cold();
-    truth.contact_ohm = 0.018;
-    (void)heat_then_hold(60.0);
-    hold(16.0, 25.0);
-    truth.contact_ohm = 0.0;
-    const float before_c = believed_c();
-    hold(16.0, 30.0);
-    (void)snprintf(where, sizeof where, "lost %.3f: %.1f, then %.1f degC, sight %u",
-                   (double)spring_estimator_lost(BELIEF), (double)before_c, (double)believed_c(),
-                   newest()->kind);
-    TEST_ASSERT_EQUAL_FLOAT_MESSAGE(0.0f, spring_estimator_lost(BELIEF), where);
-    TEST_ASSERT_FLOAT_WITHIN_MESSAGE(2.0f, before_c, believed_c(), where);
-    TEST_ASSERT_EQUAL_FLOAT_MESSAGE(0.0f, spring_estimator_doubt_k(BELIEF), where);
-    TEST_ASSERT_TRUE_MESSAGE(INSIDE.unsteady > 0, where); /* a second and third time: loose */
-    TEST_ASSERT_EQUAL_UINT8_MESSAGE(SPRING_SIGHT_JUMPED, newest()->kind, where);
-    TEST_ASSERT_TRUE_MESSAGE(newest()->read < -100, where);
-}
-
-/* It seemed to lose phase where a contact had jumped: what the heating seems to take up to
- * transform may have warmed it. Where none had, it was phase that a load took. */
-void doubt_grows_with_a_heating_after_a_jump(void)
-{
-    for (unsigned jumped = 0; jumped < 2; jumped++) {
-        begin_cold();
-        (void)heat_then_hold(60.0);
-        INSIDE.possible = SPRING_PHASE_BETWEEN; /* as after a loss of half of it */
-        INSIDE.gone_k = 5.0f;
-        INSIDE.unsteady = jumped != 0 ? 1000u : 0u;
-        thermal_model_set_temperature(&model, 0, 20 * 128);
-        thermal_model_set_temperature(&model, 0, 92 * 128);
-        spring_estimator_begin_heating(&estimator, &model, 0);
-        ticks(3.0, 2.0);
-        (void)snprintf(where, sizeof where, "%.1f K", (double)spring_estimator_doubt_k(BELIEF));
-        TEST_ASSERT_TRUE_MESSAGE(jumped != 0 ? spring_estimator_doubt_k(BELIEF) > 10.0f
-                                             : spring_estimator_doubt_k(BELIEF) < 5.0f,
-                                 where);
-    }
 }
 
 /* In the hold a contact gets better by 5 %, as if phase was lost, and no heat brings it back: the
@@ -352,20 +294,6 @@ void noise_slower_than_a_turn_is_no_loss(void)
     }
     (void)snprintf(where, sizeof where, "%u, noise %.5f", losses, (double)LEARNT.slow_noise);
     TEST_ASSERT_TRUE_MESSAGE(losses <= 2, where);
-}
-
-/* Steps of 4 mV and little more leave 0.03 % in it. */
-void noise_of_an_average_is_known_after_a_minute_of_rest(void)
-{
-    begin_cold();
-    truth.noise_v = 0.001;
-    (void)heat_then_hold(60.0);
-    for (double s = 0.0; s < 120.0 && !spring_estimator_rests(BELIEF); s += TICK_S) {
-        (void)tick(hold_current_a(6.0));
-    }
-    hold(6.0, 60.0);
-    (void)snprintf(where, sizeof where, "%.5f", (double)LEARNT.slow_noise);
-    TEST_ASSERT_TRUE_MESSAGE(LEARNT.slow_noise < 0.0005f, where);
 }
 
 /* A whole percent that stays for a second. */

@@ -31,33 +31,6 @@ static void begin_three(void)
 
 /* ---- heat that is enough whatever is read: what bounds a heating that shows nothing ---- */
 
-static void heat_of_the_coldest_and_heaviest_spring_ends_a_heating(void)
-{
-    const float latent_k = 8.65f / 0.3f;
-    const struct {
-        float begun_c;
-        bool onset;
-        uint8_t possible;
-        float most_k;
-    } table[] = {
-        {20.0f, false, SPRING_PHASE_MARTENSITE, 1.25f * (98.0f + 8.0f - 20.0f)},
-        {20.0f, true, SPRING_PHASE_BETWEEN, 1.25f * (98.0f + 8.0f - 20.0f + latent_k)},
-        {60.0f, true, SPRING_PHASE_BETWEEN, 1.25f * (98.0f + 8.0f - 60.0f + latent_k)},
-        {60.0f, true, SPRING_PHASE_BETWEEN | SPRING_PHASE_AUSTENITE,
-         1.25f * (98.0f - 60.0f + latent_k)},
-    };
-    for (size_t n = 0; n < ROWS(table); n++) {
-        row(n);
-        INSIDE.run.heat = (spring_heat_t){.begun_c = table[n].begun_c};
-        INSIDE.onset = table[n].onset;
-        INSIDE.possible = table[n].possible;
-        INSIDE.run.heat.heat_k = table[n].most_k - 0.1f;
-        TEST_ASSERT_FALSE_MESSAGE(spring_heated_enough(&estimator, &INSIDE, &model, 0), where);
-        INSIDE.run.heat.heat_k = table[n].most_k + 0.1f;
-        TEST_ASSERT_TRUE_MESSAGE(spring_heated_enough(&estimator, &INSIDE, &model, 0), where);
-    }
-}
-
 /* ---- what is read against what it read when it had transformed last ---- */
 
 /* A heated spring that read 0.2 ohm then, a fifth more than its martensite. */
@@ -117,28 +90,6 @@ static void heating_is_over_where_its_austenite_is_read_twice(void)
         INSIDE.ohm_before[1] = table[n].before_ohm;
         TEST_ASSERT_EQUAL_MESSAGE(table[n].over,
                                   spring_estimator_has_transformed(&estimator, &model, 0), where);
-    }
-}
-
-/* What it had lost is in doubt, and its heating ended below austenite finish, as it read its
- * austenite: by 2.6 sd more may be a contact's. */
-static void more_than_its_austenite_proves_nothing(void)
-{
-    static const struct {
-        float temperature_c, less, gone_k;
-        bool known;
-    } table[] = {{92.0f, 0.0025f, 5.0f, true},
-                 {92.0f, -0.0025f, 5.0f, true},
-                 {92.0f, -0.0027f, 5.0f, false},
-                 {92.0f, -0.0027f, 0.0f, true},
-                 {99.0f, -0.0027f, 5.0f, true}};
-    for (size_t n = 0; n < ROWS(table); n++) {
-        row(n);
-        begin_heated(table[n].temperature_c, 0.2f, 0.2f * (1.0f - table[n].less));
-        INSIDE.variance_k2 = 4.0f;
-        INSIDE.gone_k = table[n].gone_k;
-        spring_estimator_begin_hold(&estimator, &model, 0, true);
-        TEST_ASSERT_EQUAL_MESSAGE(table[n].known, spring_estimator_knows(&INSIDE), where);
     }
 }
 
@@ -234,6 +185,9 @@ static void two_springs_that_are_found_colder_are_a_step(void)
         TEST_ASSERT_FLOAT_WITHIN_MESSAGE(1e-9f, variance, estimator.spring[1].loss_variance, where);
         TEST_ASSERT_FLOAT_WITHIN_MESSAGE(
             1e-6f, table[n].opens ? 0.8f * table[n].error_k * sd : 0.0f, b->covariance, where);
+        TEST_ASSERT_FLOAT_WITHIN_MESSAGE(
+            1e-3f, 9.0f + (table[n].opens ? table[n].error_k * table[n].error_k : 0.0f),
+            b->variance_k2, where);
         TEST_ASSERT_TRUE_MESSAGE(spring_is_sound(&estimator, 0) || k == 0, where);
     }
 }
@@ -325,19 +279,6 @@ static void declared_change_stands_in_until_one_is_learnt(void)
         spring_estimator_prepare(&estimator, &model, true);
         TEST_ASSERT_FLOAT_WITHIN(1e-6f, learnt != 0 ? 0.1f : 0.25f, INSIDE.learnt.change);
     }
-}
-
-static void disturbance_is_forgotten_and_loss_is_known_less_and_less(void)
-{
-    INSIDE.disturbance_k = 10.0f;
-    INSIDE.loss_variance = 0.0f;
-    spring_seal(&estimator, 0);
-    for (unsigned n = 0; n < 4800; n++) { /* 20 minutes, without a current */
-        TEST_ASSERT_TRUE(spring_estimator_update(&estimator, &model, 0));
-    }
-    TEST_ASSERT_FLOAT_WITHIN(0.1f, 10.0f * expf(-0.96f), INSIDE.disturbance_k);
-    const float sd = 0.0005f * sqrtf(1200.0f); /* of the declared loss */
-    TEST_ASSERT_FLOAT_WITHIN(0.02f * sd, sd, sqrtf(INSIDE.loss_variance) / estimator.loss_w_per_k);
 }
 
 /* Other losses are declared of a spring that is where it is. */
@@ -455,10 +396,8 @@ static void temperature_that_no_model_holds_is_its_nearest(void)
 
 void run_rules(void)
 {
-    RUN_TEST(heat_of_the_coldest_and_heaviest_spring_ends_a_heating);
     RUN_TEST(phase_is_missing_beyond_what_steps_noise_and_coefficient_explain);
     RUN_TEST(heating_is_over_where_its_austenite_is_read_twice);
-    RUN_TEST(more_than_its_austenite_proves_nothing);
     RUN_TEST(intermediate_phase_is_believed_by_what_was_seen);
     RUN_TEST(losses_are_those_that_held_springs_have_in_common);
     RUN_TEST(two_springs_that_are_found_colder_are_a_step);
@@ -466,7 +405,6 @@ void run_rules(void)
     RUN_TEST(phase_is_told_by_the_best_that_there_is);
     RUN_TEST(all_that_is_compared_with_jumps_along);
     RUN_TEST(declared_change_stands_in_until_one_is_learnt);
-    RUN_TEST(disturbance_is_forgotten_and_loss_is_known_less_and_less);
     RUN_TEST(spring_whose_loss_was_seen_is_held_on_whatever_is_declared);
     RUN_TEST(loss_that_was_never_seen_is_the_declared_one);
     RUN_TEST(loss_beyond_what_is_ever_learnt_comes_nearer_only);

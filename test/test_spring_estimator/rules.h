@@ -5,5 +5,7 @@
 #define RULES_H
 
 void run_rules(void);
+void run_law(void);
+void run_watch(void);
 
 #endif

@@ -1,0 +1,678 @@
+/* The equations of docs/believing.md, written down once more: a row is what is believed before, and
+ * what must be believed after one turn, one sight, one beginning. */
+#include <math.h>
+#include <stdio.h>
+
+#include "one_spring.h"
+#include "rules.h"
+#include "spring_estimator_internal.h"
+#include "unity.h"
+
+#define ROWS(table) (sizeof(table) / sizeof((table)[0]))
+#define M           SPRING_PHASE_MARTENSITE
+#define B           SPRING_PHASE_BETWEEN
+#define A           SPRING_PHASE_AUSTENITE
+#define ANY         SPRING_PHASE_ANY
+#define CAPACITY    0.3    /* J/K, declared */
+#define LOSS        0.0058 /* W/K */
+#define TURN_S      0.25
+#define LEAST_K2    0.36 /* of a distance: 0.6 K within a spring */
+
+static void row(size_t n)
+{
+    (void)snprintf(where, sizeof where, "row %u", (unsigned)n);
+}
+
+#define NEAR(is, value)                                                                            \
+    TEST_ASSERT_FLOAT_WITHIN_MESSAGE(1e-6f + 2e-4f * fabsf((float)(is)), (float)(is), (value),     \
+                                     where)
+
+/* As the model has it. */
+static double in_128ths(double c)
+{
+    return (double)lround(c * 128.0) / 128.0;
+}
+
+static void put(double c)
+{
+    thermal_model_set_temperature(&model, 0, (int16_t)lround(c * 128.0));
+}
+
+static float put_c(void)
+{
+    return spring_now_c(&model, 0);
+}
+
+/* A turn's readings, 12 of them, of a resistance: to 1/24 mohm at 2 A. */
+static void give(double current_a, double ohm)
+{
+    double sum_mv = 0.0;
+    int given_mv = 0;
+    for (int n = 0; n < 12 && current_a > 0.0; n++) {
+        sum_mv += 1e3 * current_a * ohm;
+        const int mv = (int)lround(sum_mv) - given_mv;
+        given_mv += mv;
+        spring_estimator_take(&estimator, 0, (int16_t)lround(1e3 * current_a), (int16_t)mv);
+    }
+}
+
+static void turn(void)
+{
+    const uint16_t stepped_turns = estimator.stepped_turns;
+    spring_seal(&estimator, 0);
+    TEST_ASSERT_TRUE(spring_estimator_update(&estimator, &model, 0));
+    TEST_ASSERT_FALSE(spring_estimator_has_begun_anew(BELIEF));
+    TEST_ASSERT_EQUAL_UINT16(stepped_turns > 0 ? stepped_turns - 1 : 0, estimator.stepped_turns);
+}
+
+/* ---- the law ---- */
+
+static void errors_of_distance_and_loss_go_on_by_the_law(void)
+{
+    static const struct {
+        double was_c, c, current_a;
+        double var_k2, cov_w, loss_sd, more_loss, capacity_k;
+        double gone_k, gone_w_per_k;
+        bool heating, unsteady;
+    } table[] = {
+        {60.0, 60.0, 0.0, 9.0, 0.0, 7e-4, 0.0, 0.0, 0.0, 0.0, false, false},
+        {60.0, 60.5, 2.0, 9.0, 0.0, 7e-4, 1e-3, 2.0, 0.0, 0.0, false, false},
+        {60.5, 60.0, 2.0, 4.0, -2e-3, 3e-4, -1e-3, 2.0, 5.0, -1e-4, false, true},
+        {60.5, 60.0, 2.0, 4.0, 2e-3, 3e-4, -1e-3, -2.0, 5.0, 1e-4, true, false},
+        {80.0, 80.1, 3.0, 4.0, -2e-3, 3e-4, 2e-3, -2.0, 5.0, 1e-4, true, true},
+        {80.0, 81.0, 1.0, 4.0, -2e-3, 3e-4, 2e-3, -2.0, 5.0, 1e-4, true, true},
+        {20.0, 20.0, 0.0, 0.3, 0.0, 7e-4, 0.0, 0.0, 0.0, 1.0, true, false},
+        {80.0, 79.0, 0.0, 9.0, 1e-3, 7e-4, 1e-3, 3.0, -1.0, 1.0, true, true},
+    };
+    for (size_t n = 0; n < ROWS(table); n++) {
+        begin_cold();
+        row(n);
+        put(table[n].was_c);
+        INSIDE.last_c7 = thermal_model_temperature_c7(&model, 0);
+        put(table[n].c);
+        INSIDE.variance_k2 = (float)table[n].var_k2;
+        INSIDE.covariance = (float)table[n].cov_w;
+        INSIDE.loss_variance = (float)(table[n].loss_sd * table[n].loss_sd);
+        INSIDE.learnt.loss_w_per_k = (float)table[n].more_loss;
+        INSIDE.declared_stiffness_w_per_k = 0.006f;
+        INSIDE.capacity_k = (float)table[n].capacity_k;
+        INSIDE.gone_k = (float)table[n].gone_k;
+        INSIDE.gone_w_per_k = (float)table[n].gone_w_per_k;
+        INSIDE.heating = table[n].heating;
+        INSIDE.unsteady = table[n].unsteady ? 9 : 0;
+        INSIDE.run.heat = (spring_heat_t){.heat_k = 10.0f, .flat_k = 1.0f};
+        INSIDE.disturbance_k = 5.0f;
+        give(table[n].current_a, 0.2);
+        const double h = TURN_S / CAPACITY, above_k = in_128ths(table[n].c) - 20.0;
+        const double rise_k = in_128ths(table[n].c) - in_128ths(table[n].was_c);
+        const double k = 1.0 - h * (0.006 + table[n].more_loss), l = -h * above_k;
+        const double var_g = table[n].loss_sd * table[n].loss_sd;
+        const double extra_w = table[n].more_loss * above_k;
+        const double gives_w = 1e-6 * thermal_model_power_to_hold_uw(
+                                          &model, 0, thermal_model_temperature_c7(&model, 0)) +
+                               extra_w;
+        const double heat_k = h * (table[n].current_a * table[n].current_a * 0.2 - gives_w);
+        estimator.stepped_turns = (uint16_t)n;
+        spring_seal_shared(&estimator);
+        const bool warms = table[n].heating && table[n].unsteady && heat_k > rise_k;
+        turn();
+        NEAR(fmax(k * k * table[n].var_k2 + 2.0 * k * l * table[n].cov_w + l * l * var_g, LEAST_K2),
+             INSIDE.variance_k2);
+        NEAR(1e3 * (k * table[n].cov_w + l * var_g), 1e3f * INSIDE.covariance);
+        NEAR(1e6 * (var_g + TURN_S * pow(0.0005 * LOSS, 2)), 1e6f * INSIDE.loss_variance);
+        NEAR(k * table[n].capacity_k + 0.09 * rise_k, INSIDE.capacity_k);
+        NEAR(gives_w, INSIDE.gives_w);
+        NEAR(extra_w, 1e-6f * (float)INSIDE.extra_loss_uw);
+        NEAR(table[n].gone_k <= 0.0 ? table[n].gone_k
+                                    : k * table[n].gone_k + h * above_k * table[n].gone_w_per_k +
+                                          (warms ? heat_k - rise_k : 0.0),
+             INSIDE.gone_k);
+        NEAR(5.0 * 0.9998, INSIDE.disturbance_k);
+        TEST_ASSERT_EQUAL_INT16(lround(128.0 * rise_k), spring_estimator_moved_c7(BELIEF));
+        if (table[n].heating) { /* one that waits cools by the least loss, one that may lose more */
+            NEAR(10.0 + (heat_k < 0.0 ? 0.8 : 1.0) * heat_k, INSIDE.run.heat.heat_k);
+            NEAR(1.0 + heat_k - 0.2 * h * gives_w, INSIDE.run.heat.flat_k);
+        }
+    }
+}
+
+/* e = what is seen less what was believed; D and S are variances of the distance, without and with
+ * that of the sight. */
+static void sight_moves_all_by_what_each_is_known_to(void)
+{
+    static const struct {
+        double seen_c, sd_k; /* from 80 degC */
+        double var_k2, cov_w, capacity_k, loss_sd, more_loss, shift_k, shift_sd;
+    } table[] = {
+        {84.0, 2.0, 9.0, 0.0, 0.0, 7e-4, 0.0, 0.0, 3.0},
+        {76.0, 2.0, 9.0, -1.5e-3, 2.0, 7e-4, 1e-4, 1.0, 2.0},
+        {76.0, 1.0, 4.0, -1e-3, -2.0, 7e-4, 1e-4, -1.0, 9.0},
+        {82.0, 0.0, 1.0, 5e-4, 0.0, 7e-4, 2e-3, 0.0, 0.5},
+        {20.0, 1.0, 9.0, -1.9e-3, 0.0, 7e-4, 0.0, 25.0, 3.0},
+        {140.0, 1.0, 9.0, -1.9e-3, 0.0, 7e-4, 0.0, -25.0, 3.0},
+    };
+    for (size_t n = 0; n < ROWS(table); n++) {
+        begin_cold();
+        row(n);
+        put(80.0);
+        INSIDE.variance_k2 = (float)table[n].var_k2;
+        INSIDE.covariance = (float)table[n].cov_w;
+        INSIDE.capacity_k = (float)table[n].capacity_k;
+        INSIDE.loss_variance = (float)(table[n].loss_sd * table[n].loss_sd);
+        INSIDE.learnt.loss_w_per_k = (float)table[n].more_loss;
+        INSIDE.shift_k = (float)table[n].shift_k;
+        INSIDE.shift_variance_k2 = (float)(table[n].shift_sd * table[n].shift_sd);
+        INSIDE.kept_w_per_k = 1e-3f;
+        const double e = table[n].seen_c - 80.0;
+        const double d = table[n].var_k2 + table[n].capacity_k * table[n].capacity_k;
+        const double s = d + table[n].sd_k * table[n].sd_k;
+        const double left = 1.0 - d / s, by_loss = table[n].cov_w / s;
+        const double shift_k2 = table[n].shift_sd * table[n].shift_sd;
+        const double most = 0.45 * LOSS;
+        NEAR(e, spring_see(&estimator, &INSIDE, &model, 0, (float)table[n].seen_c,
+                           (float)table[n].sd_k, n == 0 ? M : A));
+        TEST_ASSERT_FLOAT_WITHIN_MESSAGE(0.01f, (float)(80.0 + d / s * e), put_c(), where);
+        TEST_ASSERT_EQUAL_MESSAGE(
+            n != 0 && put_c() > 78.0f,
+            thermal_model_austenite(&model, 0) == THERMAL_MODEL_AUSTENITE_FULL, where);
+        NEAR(fmin(fmax(table[n].shift_k - fmin(shift_k2 / s, d / s) * e, -30.0), 30.0),
+             INSIDE.shift_k);
+        NEAR(1e3 * fmin(fmax(table[n].more_loss + by_loss * e, -most), most),
+             1e3f * INSIDE.learnt.loss_w_per_k);
+        NEAR(1e6 * (table[n].loss_sd * table[n].loss_sd - by_loss * table[n].cov_w),
+             1e6f * INSIDE.loss_variance);
+        NEAR(1e3 * left * table[n].cov_w, 1e3f * INSIDE.covariance);
+        NEAR(left * table[n].capacity_k, INSIDE.capacity_k);
+        NEAR(left * shift_k2, INSIDE.shift_variance_k2);
+        NEAR(fmax(left * table[n].var_k2, LEAST_K2), INSIDE.variance_k2);
+        TEST_ASSERT_EQUAL_FLOAT(0.0f, INSIDE.kept_w_per_k);
+        TEST_ASSERT_EQUAL_INT16(thermal_model_temperature_c7(&model, 0), INSIDE.last_c7);
+        TEST_ASSERT_TRUE(spring_estimator_has_just_seen(BELIEF));
+    }
+}
+
+/* It is no colder than 80 degC: as much as that teaches of the loss, but no surer; by more than
+ * 2.6 sd of the loss without a sight what it reads is no phase. */
+static void what_keeps_its_phase_is_no_colder_and_tells_of_its_loss(void)
+{
+    static const struct {
+        double c, cov_w, loss_sd, kept;
+        bool moves, blind;
+    } table[] = {
+        {78.0, -1e-3, 7e-4, 0.0, true, false},      {80.0, -1e-3, 7e-4, 0.0, false, false},
+        {82.0, -1e-3, 7e-4, 0.0, false, false},     {78.0, -1e-3, 7e-4, -1.65e-3, true, true},
+        {78.0, -1e-3, 7e-4, -1.55e-3, true, false}, {79.0, 1e-3, 1e-4, 2e-4, true, true}};
+    for (size_t n = 0; n < ROWS(table); n++) {
+        begin_cold();
+        row(n);
+        put(table[n].c);
+        INSIDE.variance_k2 = 5.0f;
+        INSIDE.capacity_k = 2.0f;
+        INSIDE.covariance = (float)table[n].cov_w;
+        INSIDE.loss_variance = (float)(table[n].loss_sd * table[n].loss_sd);
+        INSIDE.kept_w_per_k = (float)table[n].kept;
+        INSIDE.learnt.loss_w_per_k = 1e-4f;
+        const double less = table[n].moves ? table[n].cov_w / 9.0 * (80.0 - table[n].c) : 0.0;
+        spring_keep_above(&estimator, &INSIDE, &model, 0, 80.0f);
+        NEAR(1e3 * (1e-4 + less), 1e3f * INSIDE.learnt.loss_w_per_k);
+        NEAR(1e3 * (table[n].kept + less), 1e3f * INSIDE.kept_w_per_k);
+        NEAR(table[n].moves ? 80.0 : table[n].c, put_c());
+        NEAR(5.0, INSIDE.variance_k2);
+        TEST_ASSERT_EQUAL_MESSAGE(table[n].blind, INSIDE.blind, where);
+        TEST_ASSERT_EQUAL_FLOAT(table[n].blind ? 1.0f : 0.0f, INSIDE.lost);
+        TEST_ASSERT_EQUAL_MESSAGE(
+            table[n].moves,
+            sights_inside(&estimator)->sight[sights_inside(&estimator)->count - 1u].kind ==
+                SPRING_SIGHT_KEPT,
+            where);
+        if (table[n].moves) { /* from austenite, and all of it is one sight */
+            const spring_sight_t *const sight = spring_sights_newest(sights_inside(&estimator), 0);
+            TEST_ASSERT_TRUE(thermal_model_austenite(&model, 0) == THERMAL_MODEL_AUSTENITE_FULL);
+            TEST_ASSERT_INT_WITHIN(1, lround(1e4 * (table[n].kept + less) / LOSS), sight->loss);
+            TEST_ASSERT_EQUAL_INT16(thermal_model_temperature_c7(&model, 0), INSIDE.last_c7);
+        }
+    }
+}
+
+/* ---- from power-on ---- */
+
+/* Three turns at 0.8 A or more tell a phase by what was learnt: 12 % and 2.6 sd of a turn's noise,
+ * but no more than 40 %. The temperature is even over the phase's width. */
+static void look_tells_a_phase_and_a_temperature_evenly_over_its_width(void)
+{
+    static const struct {
+        uint8_t possible;
+        bool told;
+        double phase, noise, current_a, change;
+        uint8_t fresh; /* before */
+        bool heating;
+        uint8_t then;
+        double low_c, high_c, begun_c;
+    } table[] = {
+        {ANY, false, 0.14, 0.002, 2.0, 0.2, 2, false, M, 20.0, 88.0, 0.0},
+        {ANY, false, 0.15, 0.002, 2.0, 0.2, 2, true, B, 68.0, 98.0, 20.0},
+        {ANY, false, 0.49, 0.002, 2.0, 0.2, 2, true, B, 68.0, 98.0, 20.0},
+        {ANY, false, 0.51, 0.002, 2.0, -0.2, 2, false, B, 68.0, 98.0, 0.0},
+        {ANY, false, 0.85, 0.002, 2.0, 0.2, 9, false, B, 68.0, 98.0, 0.0},
+        {ANY, false, 0.86, 0.002, 2.0, 0.2, 9, true, A | B, 78.0, 98.0, 78.0},
+        {ANY, false, 0.0, 0.021, 2.0, 0.2, 9, true, M, 20.0, 88.0, 20.0},
+        {ANY, false, 0.0, 0.022, 2.0, 0.2, 9, true, ANY, 0.0, 0.0, 0.0},
+        {ANY, false, 0.0, 0.002, 2.0, 0.2, 1, true, ANY, 0.0, 0.0, 0.0},
+        {ANY, false, 0.0, 0.002, 0.79, 0.2, 9, true, ANY, 0.0, 0.0, 0.0},
+        {ANY, false, 0.0, 0.002, 0.8, 0.2, 9, true, M, 20.0, 88.0, 20.0},
+        {M, true, 0.85, 0.002, 2.0, 0.2, 9, false, M, 0.0, 0.0, 0.0},
+        {M, true, 0.86, 0.002, 2.0, 0.2, 9, false, A, 78.0, 98.0, 0.0},
+        {M, false, 0.86, 0.002, 2.0, 0.2, 9, false, M, 0.0, 0.0, 0.0},
+        {B, true, 0.86, 0.002, 2.0, 0.2, 9, false, B, 0.0, 0.0, 0.0},
+    };
+    for (size_t n = 0; n < ROWS(table); n++) {
+        begin_cold();
+        row(n);
+        put(75.0);
+        INSIDE.possible = table[n].possible;
+        INSIDE.told = table[n].told;
+        INSIDE.hottest_c = 110.0f;
+        INSIDE.noise = (float)table[n].noise;
+        INSIDE.fresh = table[n].fresh;
+        INSIDE.current_a = (float)table[n].current_a;
+        INSIDE.heating = table[n].heating;
+        INSIDE.learnt.austenite_ohm = 0.25f;
+        INSIDE.learnt.change = (float)table[n].change;
+        const double ohm = 0.25 * (1.0 - table[n].change * (1.0 - table[n].phase));
+        INSIDE.slow_ohm = (float)ohm;
+        INSIDE.averaged = 16;
+        give(table[n].current_a, ohm);
+        turn();
+        const bool looked = table[n].high_c > 0.0;
+        TEST_ASSERT_EQUAL_UINT8_MESSAGE(table[n].then, INSIDE.possible, where);
+        TEST_ASSERT_EQUAL_UINT8_MESSAGE(table[n].fresh + 1, INSIDE.fresh, where);
+        TEST_ASSERT_EQUAL_MESSAGE(looked, spring_estimator_has_just_seen(BELIEF), where);
+        TEST_ASSERT_FLOAT_WITHIN_MESSAGE(
+            0.01f, looked ? (float)(table[n].low_c + table[n].high_c) / 2.0f : 75.0f, put_c(),
+            where);
+        if (looked) {
+            const float sd_k = 0.29f * (float)(table[n].high_c - table[n].low_c);
+            TEST_ASSERT_FLOAT_WITHIN_MESSAGE(0.01f, sd_k * sd_k + 9.0f, INSIDE.variance_k2, where);
+            TEST_ASSERT_FLOAT_WITHIN(0.01f, 9.0f, INSIDE.shift_variance_k2);
+            TEST_ASSERT_EQUAL_MESSAGE(
+                table[n].phase > 0.5 && put_c() > 78.0f,
+                thermal_model_austenite(&model, 0) == THERMAL_MODEL_AUSTENITE_FULL, where);
+            TEST_ASSERT_EQUAL_MESSAGE(table[n].heating, INSIDE.heating, where);
+            if (table[n].heating) {
+                NEAR(table[n].begun_c, INSIDE.run.heat.begun_c);
+            }
+        }
+    }
+}
+
+/* The hottest possible gives off 0.8 of the declared loss; below martensite start its whole latent
+ * heat, too. Below martensite finish it is cold. */
+static void hottest_possible_cools_by_the_least_loss_with_its_latent_heat(void)
+{
+    static const double hottest_c[] = {120.0, 90.0, 78.1, 77.9, 70.0, 68.05, 68.0};
+    for (size_t n = 0; n < 2u * ROWS(hottest_c); n++) {
+        const double c = hottest_c[n / 2u], current_a = n % 2u == 0 ? 0.0 : 1.0;
+        power_comes_on();
+        row(n);
+        INSIDE.hottest_c = (float)c;
+        give(current_a, 0.2);
+        turn();
+        const double capacity = CAPACITY + (c > 78.0 ? 0.0 : 8.65 / 10.0);
+        const double is_c =
+            c + TURN_S * (current_a * current_a * 0.2 - 0.8 * LOSS * (c - 20.0)) / capacity;
+        NEAR(is_c, INSIDE.hottest_c);
+        TEST_ASSERT_EQUAL_MESSAGE(is_c < 68.0 ? M : ANY, INSIDE.possible, where);
+        power_comes_on();
+        INSIDE.hottest_c = (float)c; /* and how long that takes, by small steps */
+        double s = 0.0;
+        for (double now_c = c; now_c > 68.0; s += 1e-3) {
+            now_c -= 1e-3 * 0.8 * LOSS * (now_c - 20.0) /
+                     (CAPACITY + (now_c > 78.0 ? 0.0 : 8.65 / 10.0));
+        }
+        TEST_ASSERT_FLOAT_WITHIN_MESSAGE(0.01f + 0.001f * (float)s, (float)s,
+                                         spring_estimator_cooling_s(&estimator, &model, 0), where);
+    }
+    thermal_model_set_ambient(&model, 68 * 128); /* as warm as that: nothing to wait for */
+    TEST_ASSERT_EQUAL_FLOAT(0.0f, spring_estimator_cooling_s(&estimator, &model, 0));
+}
+
+/* ---- what a turn ends with ---- */
+
+/* Colder than martensite finish by 2.6 sd it is martensite; austenite of which nothing is read may
+ * have begun to go once its bound is below martensite start. */
+static void phase_is_what_temperature_leaves(void)
+{
+    static const struct {
+        uint8_t possible;
+        double c, sd_k, current_a;
+        uint8_t then;
+    } table[] = {
+        {B, 66.0, 1.0, 0.0, B},     {B, 65.0, 1.0, 0.0, M},     {A | B, 64.0, 2.0, 0.0, A | B},
+        {A | B, 62.0, 2.0, 0.0, M}, {A, 80.0, 1.0, 0.0, A | B}, {A, 81.0, 1.0, 0.0, A},
+        {A, 80.0, 1.0, 2.0, A},
+    };
+    for (size_t n = 0; n < ROWS(table); n++) {
+        begin_cold();
+        row(n);
+        put(table[n].c);
+        INSIDE.last_c7 = thermal_model_temperature_c7(&model, 0);
+        INSIDE.possible = table[n].possible;
+        INSIDE.variance_k2 = (float)(table[n].sd_k * table[n].sd_k);
+        INSIDE.loss_variance = 0.0f;
+        INSIDE.lost = 0.5f;
+        give(table[n].current_a, 0.2);
+        turn();
+        TEST_ASSERT_EQUAL_UINT8_MESSAGE(table[n].then, INSIDE.possible, where);
+        TEST_ASSERT_EQUAL_FLOAT(table[n].then == M ? 0.0f : 0.5f, INSIDE.lost);
+    }
+}
+
+/* Loose: what it seemed to lose was its contact, and is given back, as unsure as it was wrong. */
+static void what_a_loose_contact_took_is_given_back(void)
+{
+    static const double gone_k[] = {6.0, 0.0};
+    for (size_t n = 0; n < ROWS(gone_k); n++) {
+        begin_cold();
+        row(n);
+        put(80.0);
+        INSIDE.last_c7 = thermal_model_temperature_c7(&model, 0);
+        INSIDE.possible = A;
+        INSIDE.unsteady = 2050;
+        INSIDE.declared_stiffness_w_per_k = 0.0f; /* nothing fades in the turn */
+        INSIDE.variance_k2 = 4.0f;
+        INSIDE.loss_variance = 1e-8f;
+        INSIDE.gone_k = (float)gone_k[n];
+        INSIDE.gone_w_per_k = 1e-4f;
+        INSIDE.learnt.loss_w_per_k = 2e-4f;
+        INSIDE.run.line.ohm = 0.2f;
+        INSIDE.quiet = 9;
+        give(2.0, 0.2);
+        const double h = TURN_S / CAPACITY;
+        const double more_k = n == 0 ? (1.0 - h * 2e-4) * 6.0 + h * 60.0 * 1e-4 : 0.0;
+        const double cov = -h * 60.0 * 1e-8, var_g = n == 0 ? 2e-8 : 1e-8;
+        turn();
+        TEST_ASSERT_FLOAT_WITHIN_MESSAGE(0.01f, 80.0f + (float)more_k, put_c(), where);
+        TEST_ASSERT_FLOAT_WITHIN(0.02f, 4.0f + (float)(more_k * more_k), INSIDE.variance_k2);
+        NEAR(1e4 * (n == 0 ? 1e-4 : 2e-4), 1e4f * INSIDE.learnt.loss_w_per_k);
+        TEST_ASSERT_FLOAT_WITHIN(1e-10f, (float)var_g, INSIDE.loss_variance);
+        TEST_ASSERT_FLOAT_WITHIN(1e-6f, (float)(cov - more_k * (n == 0 ? 1e-4 : 0.0)),
+                                 INSIDE.covariance);
+        TEST_ASSERT_EQUAL_FLOAT(0.0f, INSIDE.gone_k);
+        TEST_ASSERT_EQUAL_FLOAT(n == 0 ? 0.0f : 1e-4f, INSIDE.gone_w_per_k);
+        TEST_ASSERT_EQUAL_MESSAGE(n == 0, spring_estimator_has_just_seen(BELIEF), where);
+        TEST_ASSERT_TRUE(INSIDE.unproven);
+        TEST_ASSERT_EQUAL_FLOAT(0.0f, INSIDE.run.line.ohm);
+        TEST_ASSERT_EQUAL_UINT8(0, INSIDE.quiet);
+        TEST_ASSERT_EQUAL_INT16(thermal_model_temperature_c7(&model, 0), INSIDE.last_c7);
+    }
+}
+
+/* What was left is over in the next turn, and only that. */
+static void heating_that_was_left_is_over_in_the_next_turn(void)
+{
+    for (unsigned n = 0; n < 3; n++) {
+        begin_cold();
+        row(n);
+        INSIDE.heating = n != 2;
+        INSIDE.onset = INSIDE.steep = INSIDE.unlike = true;
+        INSIDE.run.heat.cold_ohm = 0.2f;
+        if (n != 1) {
+            spring_estimator_leave(&estimator, 0);
+        }
+        turn();
+        TEST_ASSERT_EQUAL_MESSAGE(n == 1, INSIDE.heating, where);
+        TEST_ASSERT_EQUAL_MESSAGE(n != 0, INSIDE.onset && INSIDE.unlike, where);
+        TEST_ASSERT_FALSE(INSIDE.left);
+    }
+}
+
+/* ---- a hold begins ---- */
+
+/* Fully on it is taken for austenite. What lacks phase (0.5 % and 2.6 sd, at 0.8 A) is doubted, by
+ * the phase that it reads; the second time, or where it was surely hot enough, it is blind. What it
+ * had lost and was not proven stays so below austenite finish. */
+static void hold_begins_by_what_its_heating_showed(void)
+{
+    static const struct {
+        uint8_t possible;
+        bool full, heating, onset;
+        double c, sd_k, ohm, current_a, heat_k, gone_k; /* 0.25 ohm was learnt */
+        bool doubted;
+        uint8_t then;
+        bool blind, doubts, unproven;
+        double learns_ohm, lost;
+    } table[] = {
+        {B, true, true, true, 95, 2, 0.25, 2, 0, 0, false, A, false, false, false, 0.25, 0.0},
+        {B, true, true, true, 95, 2, 0.252, 2, 0, 0, false, A, false, false, false, 0.252, 0.0},
+        {B, true, true, true, 95, 2, 0.252, 0.8, 0, 0, false, A, false, false, false, 0.25, 0.0},
+        {B, true, true, false, 95, 2, 0.252, 2, 0, 0, false, A, false, false, false, 0.25, 0.0},
+        {B, true, false, true, 95, 2, 0.252, 2, 0, 0, false, A, false, false, false, 0.25, 0.0},
+        {A, true, true, true, 95, 2, 0.252, 2, 0, 0, false, A, false, false, false, 0.252, 0.0},
+        {M, true, true, false, 95, 2, 0.25, 2, 0, 0, false, A, true, false, false, 0.25, 0.0},
+        {B, true, true, true, 95, 2, 0.24, 2, 0, 0, false, A, false, true, false, 0.25, 0.2},
+        {B, true, true, true, 95, 2, 0.24, 2, 0, 0, true, A, true, false, false, 0.25, 0.0},
+        {B, true, true, true, 95, 2, 0.24, 2, 143.7, 0, false, A, true, false, false, 0.25, 0.0},
+        {B, true, true, true, 95, 2, 0.24, 2, 133.4, 0, false, A, false, true, false, 0.25, 0.2},
+        {B, true, true, true, 95, 2, 0.2512, 2, 0, 5, false, A, false, false, false, 0.2512, 0.0},
+        {B, true, true, true, 95, 2, 0.2514, 2, 0, 5, false, A, false, false, true, 0.2514, 0.0},
+        {B, true, false, true, 95, 2, 0.24, 2, 200, 0, false, A, false, true, false, 0.25, 0.2},
+        {B, true, true, true, 104, 2, 0.24, 2, 0, 0, false, A, true, false, false, 0.25, 0.0},
+        {B, true, true, true, 103, 2, 0.24, 2, 0, 0, false, A, false, true, false, 0.25, 0.2},
+        {B, true, true, true, 95, 2, 0.252, 2, 0, 5, false, A, false, false, true, 0.252, 0.0},
+        {B, true, true, true, 98, 2, 0.252, 2, 0, 5, false, A, false, false, false, 0.252, 0.0},
+        {A, true, true, true, 95, 2, 0.252, 2, 0, 5, false, A, false, false, false, 0.252, 0.0},
+        {A, false, false, false, 95, 2, 0.24, 2, 0, 5, true, A | B, false, false, false, 0.25, 0.0},
+        {B, false, true, true, 95, 2, 0.24, 2, 0, 5, true, B, false, false, false, 0.25, 0.0},
+        {M, false, true, false, 95, 2, 0.24, 2, 0, 5, true, M, false, false, false, 0.25, 0.0},
+    };
+    for (size_t n = 0; n < ROWS(table); n++) {
+        begin_cold();
+        row(n);
+        put(table[n].c);
+        INSIDE.possible = table[n].possible;
+        INSIDE.heating = table[n].heating;
+        INSIDE.run.heat =
+            (spring_heat_t){.begun_c = 20.0f, .heat_k = (float)table[n].heat_k, .onset_ohm = 0.2f};
+        INSIDE.onset = table[n].onset;
+        INSIDE.variance_k2 = (float)(table[n].sd_k * table[n].sd_k);
+        INSIDE.reads = true;
+        INSIDE.fresh = 20;
+        INSIDE.ohm = INSIDE.phase_ohm = (float)table[n].ohm;
+        INSIDE.slow_ohm = 0.3f;
+        INSIDE.current_a = (float)table[n].current_a;
+        INSIDE.gone_k = (float)table[n].gone_k;
+        INSIDE.doubted = table[n].doubted;
+        INSIDE.learnt.austenite_ohm = 0.25f;
+        INSIDE.learnt.change = 0.2f;
+        INSIDE.quiet = INSIDE.losing = 9;
+        INSIDE.lost = 0.7f;
+        INSIDE.kept_w_per_k = 1e-3f;
+        INSIDE.left = true;
+        spring_estimator_begin_hold(&estimator, &model, 0, table[n].full);
+        TEST_ASSERT_EQUAL_UINT8_MESSAGE(table[n].then, INSIDE.possible, where);
+        TEST_ASSERT_EQUAL_MESSAGE(table[n].blind, INSIDE.blind, where);
+        TEST_ASSERT_EQUAL_MESSAGE(table[n].doubts, INSIDE.doubted, where);
+        TEST_ASSERT_EQUAL_MESSAGE(table[n].unproven, INSIDE.unproven, where);
+        NEAR(table[n].learns_ohm, INSIDE.learnt.austenite_ohm);
+        NEAR(table[n].lost, INSIDE.lost);
+        TEST_ASSERT_FALSE(INSIDE.heating || INSIDE.left || INSIDE.quiet || INSIDE.losing);
+        TEST_ASSERT_EQUAL_FLOAT(0.0f, INSIDE.kept_w_per_k);
+        /* at a strong current the line begins where it was read last */
+        const bool strong = table[n].full && table[n].current_a > 0.8;
+        NEAR(strong ? table[n].ohm : 0.0, INSIDE.run.line.ohm);
+        NEAR(strong ? 0.002 * 0.002 * 1e6 : 0.0, 1e6f * INSIDE.run.line.variance);
+        NEAR(0.0006, INSIDE.run.line.rise_per_k);
+        NEAR(0.0009 / 2.6, INSIDE.run.line.rise_sd_per_k);
+        TEST_ASSERT_EQUAL_MESSAGE(
+            table[n].full && table[n].possible != A,
+            thermal_model_austenite(&model, 0) == THERMAL_MODEL_AUSTENITE_FULL, where);
+        const spring_sight_t *const sight = spring_sights_newest(sights_inside(&estimator), 0);
+        const bool unseen = table[n].full && table[n].heating && table[n].possible != A;
+        TEST_ASSERT_EQUAL_MESSAGE(unseen, sight->kind == SPRING_SIGHT_UNSEEN, where);
+        TEST_ASSERT_EQUAL_UINT8_MESSAGE(SPRING_DID_HOLD | (table[n].doubts ? SPRING_DID_DOUBT : 0) |
+                                            (unseen && table[n].blind ? SPRING_DID_BLIND : 0),
+                                        sight->did & ~SPRING_DID_HEAT, where);
+    }
+}
+
+/* A sight's numbers are rounded to the nearest; what there is at all is no less than 1, and ends at
+ * what a byte holds. */
+static void sight_is_noted_in_tenths_and_hundredths(void)
+{
+    static const struct {
+        double read, sd;
+        int16_t read_then;
+        uint8_t sd_then;
+    } table[] = {{1.4e-4, 0.0, 1, 0},      {1.6e-4, 0.2e-4, 2, 1},      {-1.4e-4, 1.4e-4, -1, 1},
+                 {-1.6e-4, 1.6e-4, -2, 2}, {9.0, 254.4e-4, 32767, 254}, {-9.0, 9.0, -32767, 255}};
+    for (size_t n = 0; n < ROWS(table); n++) {
+        begin_cold();
+        row(n);
+        spring_note_read(&estimator, 0, (float)table[n].read, (float)table[n].sd);
+        const spring_sight_t *const sight = spring_sights_newest(sights_inside(&estimator), 0);
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(table[n].read_then, sight->read, where);
+        TEST_ASSERT_EQUAL_UINT8_MESSAGE(table[n].sd_then, sight->read_sd, where);
+    }
+    put(80.0);
+    INSIDE.variance_k2 = 4.0f;
+    INSIDE.shift_k = 1.26f;
+    INSIDE.learnt.loss_w_per_k = (float)(0.0127 * LOSS);
+    const spring_before_t before = {
+        .distance_c7 = -147, .sd_k = 3.26f, .shift_k = 1.0f, .loss_w_per_k = (float)(0.01 * LOSS)};
+    spring_note(&estimator, &model, 0, SPRING_SIGHT_LOST, &before, 75.04f, 1.26f);
+    const spring_sight_t *const sight = spring_sights_newest(sights_inside(&estimator), 0);
+    TEST_ASSERT_EQUAL_INT16(-11, sight->believed); /* -1.148 K */
+    TEST_ASSERT_EQUAL_UINT8(33, sight->believed_sd);
+    TEST_ASSERT_EQUAL_INT16(-30, sight->seen);
+    TEST_ASSERT_EQUAL_UINT8(13, sight->seen_sd);
+    TEST_ASSERT_EQUAL_INT16(20, sight->now);
+    TEST_ASSERT_EQUAL_UINT8(20, sight->now_sd);
+    TEST_ASSERT_EQUAL_INT16(3, sight->shift);
+    TEST_ASSERT_EQUAL_INT16(27, sight->loss);
+    TEST_ASSERT_EQUAL_UINT8(0, sight->did);
+    spring_note_did(&estimator, 0, SPRING_DID_OPEN);
+    spring_note_did(&estimator, 0, SPRING_DID_HOLD);
+    TEST_ASSERT_EQUAL_UINT8(SPRING_DID_OPEN | SPRING_DID_HOLD, sight->did);
+}
+
+/* Nothing of its own is known, but what is declared; or its loss alone. */
+static void what_is_forgotten_is_as_declared(void)
+{
+    for (int all = 0; all < 2; all++) {
+        begin_cold();
+        INSIDE.learnt = (spring_learnt_t){
+            .austenite_ohm = 0.25f, .change = 0.1f, .loss_w_per_k = 1e-3f, .slow_noise = 0.002f};
+        INSIDE.covariance = 1e-3f;
+        INSIDE.loss_variance = 1e-8f;
+        INSIDE.gone_w_per_k = INSIDE.kept_w_per_k = 1e-4f;
+        spring_seal(&estimator, 0);
+        if (all != 0) {
+            spring_estimator_forget(&estimator, 0);
+        } else {
+            spring_estimator_forget_loss(&estimator, 0);
+        }
+        NEAR(all ? 0.0 : 0.25, INSIDE.learnt.austenite_ohm);
+        NEAR(all ? 1.0 - 0.175 / 0.219 : 0.1, INSIDE.learnt.change);
+        NEAR(all ? 0.0007 : 0.002, INSIDE.learnt.slow_noise);
+        NEAR(0.12 * LOSS, INSIDE.learnt.loss_sd_w_per_k);
+        NEAR(1e6 * 0.12 * LOSS * 0.12 * LOSS, 1e6f * INSIDE.loss_variance);
+        TEST_ASSERT_TRUE(INSIDE.learnt.loss_w_per_k == 0.0f && INSIDE.covariance == 0.0f &&
+                         INSIDE.gone_w_per_k == 0.0f && INSIDE.kept_w_per_k == 0.0f);
+        TEST_ASSERT_TRUE(spring_is_sound(&estimator, 0));
+    }
+}
+
+/* Ten turns in twelve and a half ticks, none in each fifth; of twelve springs two are in one turn.
+ * With each round the next one's stiffness is looked at. */
+static void each_spring_has_a_turn_in_a_quarter_of_a_second(void)
+{
+    static const uint8_t turn_of_tick[] = {
+        0, 1, 2, 3, SPRING_ESTIMATOR_NO_TURN, 4, 5, 6, 7, SPRING_ESTIMATOR_NO_TURN, 8, 9, 0};
+    int16_t ma[12], mv[12];
+    bool valid[12];
+    thermal_model_parameters_t p = model.parameters;
+    p.rows = 3;
+    p.columns = 4;
+    TEST_ASSERT_EQUAL(THERMAL_MODEL_OK, thermal_model_init(&model, &p, NULL));
+    spring_estimator_init(&estimator, &model);
+    for (uint8_t k = 0; k < 12; k++) {
+        ma[k] = 1000;
+        mv[k] = 200;
+        valid[k] = k != 5;
+        belief_inside(&estimator, k)->unsteady = 100;
+        belief_inside(&estimator, k)->declared_stiffness_w_per_k = 0.0f;
+        spring_seal(&estimator, k);
+    }
+    for (size_t tick = 0; tick < ROWS(turn_of_tick); tick++) {
+        row(tick);
+        spring_estimator_tick(&estimator, &model, ma, mv, tick < 4 ? valid : NULL);
+        TEST_ASSERT_EQUAL_UINT8_MESSAGE(turn_of_tick[tick], spring_estimator_turn(&estimator),
+                                        where);
+        for (uint8_t k = 0; k < 12; k++) {
+            const spring_belief_t *const b = belief_inside(&estimator, k);
+            const unsigned turns = 100u - b->unsteady;
+            unsigned had = 0;
+            for (size_t before = 0; before <= tick; before++) {
+                had += turn_of_tick[before] == k % 10u;
+            }
+            TEST_ASSERT_EQUAL_UINT_MESSAGE(had, turns, where);
+            TEST_ASSERT_EQUAL_MESSAGE(tick >= 11 && k == 1, b->declared_stiffness_w_per_k > 0.0f,
+                                      where);
+            if (tick == 3 && k >= 4) {
+                TEST_ASSERT_EQUAL_UINT8_MESSAGE(k == 5    ? 0
+                                                : k < 10  ? 4
+                                                : k == 10 ? 3
+                                                          : 2,
+                                                b->readings, where);
+            }
+        }
+    }
+    for (unsigned n = 0; n < 25u * 12u; n++) { /* all of them, and the first one again */
+        spring_estimator_tick(&estimator, &model, ma, mv, NULL);
+    }
+    for (uint8_t k = 0; k < 12; k++) {
+        TEST_ASSERT_TRUE(belief_inside(&estimator, k)->declared_stiffness_w_per_k > 0.005f);
+    }
+}
+
+/* What holds it: what it gave off in its last turn, and what a kelvin more gives off; the current
+ * of that in what it reads now, or in declared martensite. */
+static void power_and_current_of_a_hold_are_of_what_it_gives_off(void)
+{
+    INSIDE.gives_w = 0.5f;
+    INSIDE.declared_stiffness_w_per_k = 0.006f;
+    INSIDE.learnt.loss_w_per_k = -0.001f;
+    INSIDE.slow_ohm = 0.2f;
+    TEST_ASSERT_FLOAT_WITHIN(1e-6f, 0.55f, spring_estimator_hold_w(&estimator, 0, 10.0f));
+    TEST_ASSERT_FLOAT_WITHIN(1e-6f, 0.15f, spring_estimator_follow_w(&estimator, 2.0f, 4.0f));
+    TEST_ASSERT_UINT16_WITHIN(1, 1000u * sqrt(0.5 / 0.175),
+                              spring_estimator_current_ma(&estimator, 0, 0.5f));
+    INSIDE.fresh = 1;
+    TEST_ASSERT_UINT16_WITHIN(1, 1000u * sqrt(0.5 / 0.2),
+                              spring_estimator_current_ma(&estimator, 0, 0.5f));
+    TEST_ASSERT_EQUAL_UINT16(3200, spring_estimator_current_ma(&estimator, 0, 3.0f));
+    TEST_ASSERT_EQUAL_UINT16(0, spring_estimator_current_ma(&estimator, 0, 0.0f));
+    TEST_ASSERT_EQUAL_UINT16(0, spring_estimator_current_ma(&estimator, 0, -1.0f));
+    INSIDE.extra_loss_uw = 200000;
+    TEST_ASSERT_EQUAL_UINT32(300000, spring_estimator_model_power_uw(&estimator, 0, 500000));
+    TEST_ASSERT_EQUAL_UINT32(0, spring_estimator_model_power_uw(&estimator, 0, 100000));
+    INSIDE.extra_loss_uw = -200000;
+    TEST_ASSERT_EQUAL_UINT32(300000, spring_estimator_model_power_uw(&estimator, 0, 100000));
+}
+
+void run_law(void)
+{
+    RUN_TEST(errors_of_distance_and_loss_go_on_by_the_law);
+    RUN_TEST(sight_moves_all_by_what_each_is_known_to);
+    RUN_TEST(what_keeps_its_phase_is_no_colder_and_tells_of_its_loss);
+    RUN_TEST(look_tells_a_phase_and_a_temperature_evenly_over_its_width);
+    RUN_TEST(hottest_possible_cools_by_the_least_loss_with_its_latent_heat);
+    RUN_TEST(phase_is_what_temperature_leaves);
+    RUN_TEST(what_a_loose_contact_took_is_given_back);
+    RUN_TEST(heating_that_was_left_is_over_in_the_next_turn);
+    RUN_TEST(hold_begins_by_what_its_heating_showed);
+    RUN_TEST(sight_is_noted_in_tenths_and_hundredths);
+    RUN_TEST(what_is_forgotten_is_as_declared);
+    RUN_TEST(each_spring_has_a_turn_in_a_quarter_of_a_second);
+    RUN_TEST(power_and_current_of_a_hold_are_of_what_it_gives_off);
+}
