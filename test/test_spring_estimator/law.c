@@ -76,6 +76,7 @@ static void errors_of_distance_and_loss_go_on_by_the_law(void)
         bool heating, unsteady;
     } table[] = {
         {60.0, 60.0, 0.0, 9.0, 0.0, 7e-4, 0.0, 0.0, 0.0, 0.0, false, false},
+        {60.0, 60.0, 0.0, 9.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, false, false},
         {60.0, 60.5, 2.0, 9.0, 0.0, 7e-4, 1e-3, 2.0, 0.0, 0.0, false, false},
         {60.5, 60.0, 2.0, 4.0, -2e-3, 3e-4, -1e-3, 2.0, 5.0, -1e-4, false, true},
         {60.5, 60.0, 2.0, 4.0, 2e-3, 3e-4, -1e-3, -2.0, 5.0, 1e-4, true, false},
@@ -119,7 +120,7 @@ static void errors_of_distance_and_loss_go_on_by_the_law(void)
         NEAR(fmax(k * k * table[n].var_k2 + 2.0 * k * l * table[n].cov_w + l * l * var_g, LEAST_K2),
              INSIDE.variance_k2);
         NEAR(1e3 * (k * table[n].cov_w + l * var_g), 1e3f * INSIDE.covariance);
-        NEAR(1e6 * (var_g + TURN_S * pow(0.0005 * LOSS, 2)), 1e6f * INSIDE.loss_variance);
+        NEAR(1e12 * (var_g + TURN_S * pow(0.0005 * LOSS, 2)), 1e12f * INSIDE.loss_variance);
         NEAR(k * table[n].capacity_k + 0.09 * rise_k, INSIDE.capacity_k);
         NEAR(gives_w, INSIDE.gives_w);
         NEAR(extra_w, 1e-6f * (float)INSIDE.extra_loss_uw);
@@ -229,6 +230,7 @@ static void what_keeps_its_phase_is_no_colder_and_tells_of_its_loss(void)
             const spring_sight_t *const sight = spring_sights_newest(sights_inside(&estimator), 0);
             TEST_ASSERT_TRUE(thermal_model_austenite(&model, 0) == THERMAL_MODEL_AUSTENITE_FULL);
             TEST_ASSERT_INT_WITHIN(1, lround(1e4 * (table[n].kept + less) / LOSS), sight->loss);
+            TEST_ASSERT_EQUAL_UINT8(0, sight->seen_sd);
             TEST_ASSERT_EQUAL_INT16(thermal_model_temperature_c7(&model, 0), INSIDE.last_c7);
         }
     }
@@ -555,6 +557,46 @@ static void sight_is_noted_in_tenths_and_hundredths(void)
     TEST_ASSERT_EQUAL_UINT8(SPRING_DID_OPEN | SPRING_DID_HOLD, sight->did);
 }
 
+/* It goes on as the last one, whatever another spring had meanwhile, with the next number. */
+static void sight_that_goes_on_is_the_newest_again(void)
+{
+    spring_sights_t sights = {.numbers = 7};
+    spring_sight_t *const first = spring_sights_add(&sights, 0);
+    first->believed = 33;
+    (void)spring_sights_add(&sights, 1);
+    spring_sights_turn(&sights);
+    const spring_sight_t *const renewed = spring_sights_renew(&sights, first);
+    TEST_ASSERT_EQUAL_PTR(&sights.sight[1], renewed);
+    TEST_ASSERT_EQUAL_UINT8(2, sights.count);
+    TEST_ASSERT_EQUAL_UINT8(0, renewed->spring);
+    TEST_ASSERT_EQUAL_INT16(33, renewed->believed);
+    TEST_ASSERT_EQUAL_UINT32(9, renewed->number);
+    TEST_ASSERT_EQUAL_UINT16(0, spring_sights_age_turns(&sights, renewed));
+    TEST_ASSERT_EQUAL_UINT16(1, spring_sights_age_turns(&sights, &sights.sight[0]));
+}
+
+/* Read, proven, not blind, and its distance known to 8 K. */
+static void where_it_is_is_known_where_all_is(void)
+{
+    static const struct {
+        bool reads, unproven, blind;
+        uint16_t unsteady;
+        float variance_k2;
+        bool known;
+    } table[] = {{true, false, false, 2048, 63.9f, true}, {true, false, false, 0, 64.0f, false},
+                 {false, false, false, 0, 9.0f, false},   {true, true, false, 0, 9.0f, false},
+                 {true, false, true, 0, 9.0f, false},     {true, false, false, 2049, 9.0f, false}};
+    for (size_t n = 0; n < ROWS(table); n++) {
+        row(n);
+        INSIDE.reads = table[n].reads;
+        INSIDE.unproven = table[n].unproven;
+        INSIDE.blind = table[n].blind;
+        INSIDE.unsteady = table[n].unsteady;
+        INSIDE.variance_k2 = table[n].variance_k2;
+        TEST_ASSERT_EQUAL_MESSAGE(table[n].known, spring_estimator_knows(&INSIDE), where);
+    }
+}
+
 /* Nothing of its own is known, but what is declared; or its loss alone. */
 static void what_is_forgotten_is_as_declared(void)
 {
@@ -672,6 +714,8 @@ void run_law(void)
     RUN_TEST(heating_that_was_left_is_over_in_the_next_turn);
     RUN_TEST(hold_begins_by_what_its_heating_showed);
     RUN_TEST(sight_is_noted_in_tenths_and_hundredths);
+    RUN_TEST(sight_that_goes_on_is_the_newest_again);
+    RUN_TEST(where_it_is_is_known_where_all_is);
     RUN_TEST(what_is_forgotten_is_as_declared);
     RUN_TEST(each_spring_has_a_turn_in_a_quarter_of_a_second);
     RUN_TEST(power_and_current_of_a_hold_are_of_what_it_gives_off);

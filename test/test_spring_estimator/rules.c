@@ -82,7 +82,8 @@ static void heating_is_over_where_its_austenite_is_read_twice(void)
         {89.0f, 0.2f, 0.201f, 0.2f, true},    {89.0f, 0.2f, 0.199f, 0.2f, false},
         {87.0f, 0.2f, 0.201f, 0.2f, false},   {89.0f, 0.2f, 0.201f, 0.0f, false},
         {89.0f, 0.2f, 0.201f, 0.198f, false}, {89.0f, -0.2f, 0.199f, 0.198f, false},
-        {89.0f, -0.2f, 0.197f, 0.196f, true},
+        {89.0f, -0.2f, 0.197f, 0.196f, true}, {89.0f, -0.2f, 0.197f, 0.0f, false},
+        {88.0f, 0.2f, 0.201f, 0.2f, true},
     };
     for (size_t n = 0; n < ROWS(table); n++) {
         row(n);
@@ -150,6 +151,11 @@ static void losses_are_those_that_held_springs_have_in_common(void)
                                   where);
         TEST_ASSERT_FLOAT_WITHIN_MESSAGE(1e-4f, table[n].factor, factor, where);
         TEST_ASSERT_FLOAT_WITHIN_MESSAGE(1e-4f, table[n].factor_sd, sd, where);
+        if (n < 2) { /* of what is not read, or heated, nothing is seen */
+            estimator.spring[n].fresh = n == 0 ? 0 : 1;
+            estimator.spring[n].heating = n == 1;
+            TEST_ASSERT_FALSE(spring_estimator_losses(&estimator, &factor, &sd));
+        }
     }
 }
 
@@ -162,7 +168,7 @@ static void two_springs_that_are_found_colder_are_a_step(void)
         uint8_t second;
         unsigned turns_between;
         bool opens;
-    } table[] = {{-10.1f, 1, 0, true},  {-9.9f, 1, 0, false},  {10.1f, 1, 0, false},
+    } table[] = {{-10.0f, 1, 0, true},  {-9.9f, 1, 0, false},  {10.1f, 1, 0, false},
                  {-10.1f, 0, 0, false}, {-10.1f, 1, 79, true}, {-10.1f, 1, 80, false}};
     for (size_t n = 0; n < ROWS(table); n++) {
         begin_three();
@@ -188,6 +194,7 @@ static void two_springs_that_are_found_colder_are_a_step(void)
         TEST_ASSERT_FLOAT_WITHIN_MESSAGE(
             1e-3f, 9.0f + (table[n].opens ? table[n].error_k * table[n].error_k : 0.0f),
             b->variance_k2, where);
+        TEST_ASSERT_EQUAL_UINT8(table[n].error_k <= -10.0f ? k : 0, estimator.stepped_spring);
         TEST_ASSERT_TRUE_MESSAGE(spring_is_sound(&estimator, 0) || k == 0, where);
     }
 }
@@ -257,7 +264,17 @@ static void all_that_is_compared_with_jumps_along(void)
         for (size_t n = 0; n < ROWS(both) + owned; n++) {
             *(n < ROWS(both) ? both[n] : own[n - ROWS(both)]) = 0.2f;
         }
+        if (heating == 0) {
+            INSIDE.run.line.was_ohm[0] = INSIDE.run.line.was_ohm[1] = 0.2f;
+            INSIDE.run.line.rise_per_k = 0.001f;
+            INSIDE.run.line.slow_k = 5.0f;
+        }
         spring_jump(&INSIDE, 1.1f);
+        if (heating == 0) { /* and what it would read where it is */
+            TEST_ASSERT_EQUAL_FLOAT(0.0f, INSIDE.run.line.was_ohm[0] + INSIDE.run.line.was_ohm[1]);
+            TEST_ASSERT_FLOAT_WITHIN(1e-5f, 0.2211f, INSIDE.slow_ohm);
+            INSIDE.slow_ohm = 0.22f;
+        }
         for (size_t n = 0; n < ROWS(both) + owned; n++) {
             row(n);
             TEST_ASSERT_FLOAT_WITHIN_MESSAGE(

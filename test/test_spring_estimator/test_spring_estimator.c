@@ -562,8 +562,8 @@ static void distance_of_a_cold_spring_has_the_tolerance_of_its_transformation(vo
 static void numbers_that_no_spring_has_are_not_restored(void)
 {
     const spring_learnt_t good = {.austenite_ohm = 0.22f, .change = 0.2f, .loss_sd_w_per_k = 1e-4f};
-    spring_learnt_t bad[10];
-    for (unsigned n = 0; n < 10; n++) {
+    spring_learnt_t bad[15];
+    for (unsigned n = 0; n < 15; n++) {
         bad[n] = good;
     }
     bad[0].austenite_ohm = NAN;
@@ -576,14 +576,28 @@ static void numbers_that_no_spring_has_are_not_restored(void)
     bad[7].loss_sd_w_per_k = NAN;
     bad[8].slow_noise = NAN;
     bad[9].slow_noise = 0.02f;
-    for (unsigned n = 0; n < 10; n++) {
+    bad[10].austenite_ohm = 0.0099f;
+    bad[11].change = 0.0f;
+    bad[12].offset_v = 0.013f;
+    bad[13].loss_w_per_k = -0.46f * 0.0058f;
+    bad[14].loss_sd_w_per_k = 0.121f * 0.0058f;
+    for (unsigned n = 0; n < 15; n++) {
         power_comes_on();
         spring_estimator_restore(&estimator, 0, &bad[n]);
         (void)snprintf(where, sizeof where, "%u", n);
         TEST_ASSERT_EQUAL_FLOAT_MESSAGE(0.0f, LEARNT.austenite_ohm, where);
     }
-    spring_estimator_restore(&estimator, 0, &good);
-    TEST_ASSERT_EQUAL_FLOAT(0.22f, LEARNT.austenite_ohm);
+    static const float possible_ohm[] = {0.0101f, 0.22f, 15.9f};
+    for (unsigned n = 0; n < 3; n++) {
+        spring_learnt_t own = good;
+        own.austenite_ohm = possible_ohm[n];
+        spring_estimator_restore(&estimator, 0, &own);
+        TEST_ASSERT_EQUAL_FLOAT(possible_ohm[n], LEARNT.austenite_ohm);
+        TEST_ASSERT_EQUAL_FLOAT(1e-8f, INSIDE.loss_variance);
+    }
+    INSIDE.loss_variance = 1e-4f; /* known less than a declared one is, it is that one */
+    TEST_ASSERT_FLOAT_WITHIN(1e-7f, 0.12f * 0.0058f, LEARNT.loss_sd_w_per_k);
+    INSIDE.loss_variance = 1e-8f;
 }
 
 /* ---- readings that are none ---- */

@@ -542,6 +542,7 @@ static void what_still_transforms_is_no_hotter_than_that_lets_it_be(void)
         NEAR(table[n].then_c, spring_now_c(&model, 0));
         TEST_ASSERT_EQUAL_MESSAGE(table[n].then_c < table[n].c,
                                   sight()->kind == SPRING_SIGHT_TRANSFORMS, where);
+        TEST_ASSERT_TRUE(sight()->loss == 0 && sight()->seen == 0 && sight()->seen_sd == 0);
     }
 }
 
@@ -664,6 +665,11 @@ static void phase_is_lost_where_nothing_else_explains_what_is_read(void)
             TEST_ASSERT_UINT8_WITHIN(1, lround(10.0 * sqrt(1.0 + unsure_k * unsure_k)),
                                      sight()->seen_sd);
             TEST_ASSERT_INT_WITHIN(1, lround(-1e4 * table[n].less), sight()->read);
+            const double turns_noise = table[n].noise * (table[n].averaged < 16 ? 0.25 : 0.18);
+            const double read_sd = sqrt(pow(fmax(turns_noise, table[n].slow_noise), 2) +
+                                        pow(table[n].line_sd, 2) + pow(0.2 * sd, 2));
+            TEST_ASSERT_UINT8_WITHIN_MESSAGE(1, lround(fmax(1e4 * read_sd, 1.0)), sight()->read_sd,
+                                             where);
             TEST_ASSERT_TRUE(INSIDE.rough);
             NEAR(0.25 * (1.0 - table[n].less), INSIDE.run.line.ohm);
         }
@@ -679,6 +685,7 @@ static void lost_phase_is_doubted_and_too_much_of_it_is_the_sensors(void)
         bool lost, jumps, disturbs;
     } table[] = {
         {84.0, 2.9, 0.01, 0.0, -2.2, true, false, true},
+        {84.0, 3.0, 0.01, 0.0, -2.2, true, false, true},
         {84.0, 3.1, 0.01, 0.0, -2.2, true, false, false},
         {84.0, 2.9, 0.01, 0.2, -2.2, true, false, true},
         {76.0, 1.0, 0.01, 0.0, -2.2, true, false, false}, /* colder than that: found hotter */
@@ -709,6 +716,8 @@ static void lost_phase_is_doubted_and_too_much_of_it_is_the_sensors(void)
             TEST_ASSERT_EQUAL_UINT8(table[n].lost ? SPRING_SIGHT_LOST : SPRING_SIGHT_JUMPED,
                                     sight()->kind);
             TEST_ASSERT_INT_WITHIN(1, -100, sight()->read);
+            TEST_ASSERT_EQUAL_UINT8(5, sight()->read_sd);
+            TEST_ASSERT_EQUAL_UINT8(0, sight()->did);
         }
         NEAR(0.25 * (1.0 - table[n].less), INSIDE.run.line.ohm);
         TEST_ASSERT_EQUAL_UINT8(0, INSIDE.losing);
@@ -878,6 +887,7 @@ static void slow_noise_is_told_by_averages_four_seconds_apart(void)
         uint16_t turns_then;
     } table[] = {
         {50, 16, 15, {0.2502, 0.25}, 5e-4 + (0.68 * 0.0004 / 0.25 - 5e-4) / 15, 0.2502, 16},
+        {0, 16, 15, {0.2502, 0.25}, 5e-4 + (0.68 * 0.0004 / 0.25 - 5e-4) / 15, 0.2502, 16},
         {50, 16, 14, {0.2502, 0.25}, 5e-4, 0.25, 15},
         {50, 16, 31, {0.26, 0.25}, 5e-4 + (0.01 - 5e-4) / 15, 0.26, 32},
         {50, 16, 15, {0.2502, 0.0}, 5e-4, 0.2502, 16},
