@@ -11,6 +11,12 @@ static inline spring_belief_t *belief_inside(spring_estimator_t *estimator, uint
     return &estimator->spring[spring];
 }
 
+/* As if this turn had just been had, or none. */
+static inline void turn_inside(spring_estimator_t *estimator, uint8_t turn)
+{
+    estimator->last_turn = turn;
+}
+
 static inline spring_sights_t *sights_inside(spring_estimator_t *estimator)
 {
     return &estimator->sights;

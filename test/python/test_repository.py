@@ -58,7 +58,7 @@ def test_each_test_that_the_page_of_failures_names_is_run() -> None:
 INSIDE = (
     "lib/spring_estimator/",
     "test/fakes/belief_inside.h",
-    *(f"test/test_spring_estimator/{name}.c" for name in ("rules", "seals")),
+    *(f"test/test_spring_estimator/{name}.c" for name in ("law", "rules", "seals", "watch")),
 )
 BELIEF = r"\bspring_(?:belief|estimator)_t"
 TOLD = {"spring_estimator_" + what for what in ("begin_heating", "begin_hold", "leave", "disturb")}

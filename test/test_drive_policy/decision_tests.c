@@ -87,9 +87,9 @@ static void turn_of(uint8_t k)
         spring_seal(&belief, j);
     }
     spring_seal_shared(&belief);
-    belief.last_turn = k;
+    turn_inside(&belief, k);
     policy_tick();
-    belief.last_turn = SPRING_ESTIMATOR_NO_TURN;
+    turn_inside(&belief, SPRING_ESTIMATOR_NO_TURN);
 }
 
 static int ma_of(float power_w)
@@ -309,7 +309,7 @@ static void what_is_not_known_waits_or_looks(void)
         begin(1, 2);
         believed(0, 70.0f, SPRING_PHASE_ANY, 1.0f);
         of(0)->learnt.austenite_ohm = n == 1 ? 0.0f : 0.25f;
-        belief.observes = n != 2;
+        spring_estimator_prepare(&belief, &model, n != 2);
         stands(0, HEAT, 1000);
         turn_of(0);
         TEST_ASSERT_EQUAL_UINT16(n == 0 ? 2000 : 0, target_ma[0]);
