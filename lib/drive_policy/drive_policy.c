@@ -26,10 +26,8 @@
 /* Of its power, at the most, is off on the last of the way down, where it is to be read. */
 #define COOLS_SHARE         0.4f
 #define TELLS_K             10.0f
-#define TELLS_NOISE         0.015f /* with more, what is sure is a tenth of the phase */
-#define STILL_K_PER_S       0.3f
+#define TELLS_NOISE         0.015f    /* with more, what is sure is a tenth of the phase */
 #define RISE_BEGINS_K_PER_S 4.0f      /* with the boost, until it is measured */
-#define KEPT_C7             (3 * 128) /* above austenite start what was reached is worth keeping */
 #define TURN_C7             (6 * 128) /* colder than one that heats: it is its turn */
 #define GOES_ON_C7          (4 * 128) /* below austenite start: keeps its turn */
 #define LOOK_MA             2000u /* of a spring of which much was learnt and nothing is known */
@@ -172,19 +170,13 @@ static bool waits_for_supply(const drive_policy_spring_t *s)
     return s->granted_ma < s->wanted_ma - (s->wanted_ma >> 2);
 }
 
-/* Its own limit leaves too little to go on, and it is hot enough to have transformed; or it may be,
- * and rises no more. */
+/* Its own limit leaves too little to go on, and it is hot enough to have transformed. */
 static bool is_limited(const drive_policy_t *policy, const drive_policy_input_t *in, uint8_t k)
 {
-    const drive_policy_spring_t *s = &policy->spring[k];
-    const spring_belief_t *b = belief_of(in, k);
     const uint16_t boost_ma = policy->parameters.boost_current_ma;
-    if (s->ceiling_ma >= boost_ma - (boost_ma >> 2)) {
-        return false;
-    }
-    const float finish_c = spring_c(thermal_model_transformation(in->model, k).austenite_finish_c7);
-    return now_c(in, k) > finish_c || (s->rise_k_per_s < STILL_K_PER_S &&
-                                       spring_estimator_hottest_c(b, in->model, k) > finish_c);
+    return policy->spring[k].ceiling_ma < boost_ma - (boost_ma >> 2) &&
+           thermal_model_temperature_c7(in->model, k) >
+               thermal_model_transformation(in->model, k).austenite_finish_c7;
 }
 
 static void heat(drive_policy_t *policy, const drive_policy_input_t *in, uint8_t k,
@@ -211,9 +203,7 @@ static void heat(drive_policy_t *policy, const drive_policy_input_t *in, uint8_t
     const bool slows = !full && c7 > points.austenite_start_c7 - 128;
     /* what it keeps it keeps until its turn: else what its current reads could take it away. It may
      * have begun to lose phase: then it waits where it loses no more */
-    const bool keeps =
-        waits_for_supply(s) && (s->floor_ma != 0 || c7 > points.austenite_start_c7 + KEPT_C7 ||
-                                phase_of(in, k) > 0.5f * level);
+    const bool keeps = waits_for_supply(s) && (s->floor_ma != 0 || phase_of(in, k) > 0.5f * level);
     s->floor_ma = 0;
     if (slows || keeps) {
         const float margin_k = kelvin(policy->parameters.hold_margin_cc);

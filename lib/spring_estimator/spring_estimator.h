@@ -382,9 +382,6 @@ float spring_estimator_sd_k(const spring_belief_t *belief);
  * within minutes. */
 float spring_estimator_hold_sd_k(const spring_estimator_t *estimator, const thermal_model_t *model,
                                  uint8_t spring);
-/* As hot as it is if what it seems to have lost was no phase, degC. */
-float spring_estimator_hottest_c(const spring_belief_t *belief, const thermal_model_t *model,
-                                 uint8_t spring);
 /* How long it may still be hot from before power-on, s; 0 where that is over. */
 float spring_estimator_cooling_s(const spring_estimator_t *estimator, const thermal_model_t *model,
                                  uint8_t spring);

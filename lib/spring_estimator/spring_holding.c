@@ -299,8 +299,3 @@ void spring_holding_watch(spring_estimator_t *e, spring_belief_t *b, thermal_mod
         begin_line(b, true, share); /* the average still falls */
     }
 }
-
-float spring_estimator_hottest_c(const spring_belief_t *b, const thermal_model_t *model, uint8_t k)
-{
-    return spring_now_c(model, k) + b->gone_k;
-}
