@@ -128,9 +128,8 @@ static void open_anew(spring_estimator_t *e, uint8_t k, bool keeps_learnt)
 static void begin_unknown(spring_estimator_t *e, thermal_model_t *model, uint8_t k)
 {
     spring_belief_t *b = &e->spring[k];
-    const float most_w_per_k = LOSS_MOST * e->loss_w_per_k;
     spring_learnt_t learnt = b->learnt;
-    learnt.loss_w_per_k = spring_clamp(learnt.loss_w_per_k, -most_w_per_k, most_w_per_k);
+    learnt.loss_w_per_k = spring_loss_ever(e, learnt.loss_w_per_k);
     const float coldest_c = spring_ambient_c(model);
     const float width_k = SPRING_ESTIMATOR_HOTTEST_C - coldest_c;
     const float middle_c = coldest_c + 0.5f * width_k;

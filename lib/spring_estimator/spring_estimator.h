@@ -121,8 +121,8 @@ typedef struct {
     uint16_t unsteady;  /* turns, of all that a contact or the sensor has jumped lately */
     /* bits: of nine springs they are a good part of the RAM that is spare */
     bool doubted : 1;  /* its last heating ended before its resistance said so */
-    bool unproven : 1; /* it may not have transformed: what it may be hotter by has spared it heat,
-                        * or its contact came and went */
+    bool unproven : 1; /* it may not have transformed: what it lost is in doubt, and it reads beyond
+                        * its austenite; or its contact came and went */
     bool odd : 1;      /* the turn before read what no phase changes to so fast */
     bool reads : 1;    /* the last turn had readings fit for use */
     bool unread : 1;   /* a turn without them lies before those that it goes by */

@@ -101,6 +101,8 @@ float spring_stiffness_w_per_k(const spring_belief_t *belief);
  * (SPRING_PHASE_MARTENSITE or _AUSTENITE). Returns the error found, K. */
 float spring_see(const spring_estimator_t *estimator, spring_belief_t *belief,
                  thermal_model_t *model, uint8_t spring, float seen_c, float sd_k, uint8_t from);
+/* A loss beyond the declared one, within what is ever believed. */
+float spring_loss_ever(const spring_estimator_t *estimator, float loss_w_per_k);
 /* Of its loss beyond the declared one, within what is ever believed. */
 void spring_correct_loss(const spring_estimator_t *estimator, spring_belief_t *belief,
                          float more_w_per_k);

@@ -98,10 +98,15 @@ spring_learnt_t spring_estimator_learnt(const spring_estimator_t *e, uint8_t k)
     return learnt;
 }
 
-spring_learnt_t spring_estimator_to_keep(const spring_estimator_t *e, uint8_t k)
+float spring_loss_ever(const spring_estimator_t *e, float loss_w_per_k)
 {
     const float most_w_per_k = LOSS_MOST * e->loss_w_per_k;
+    return spring_clamp(loss_w_per_k, -most_w_per_k, most_w_per_k);
+}
+
+spring_learnt_t spring_estimator_to_keep(const spring_estimator_t *e, uint8_t k)
+{
     spring_learnt_t learnt = spring_estimator_learnt(e, k);
-    learnt.loss_w_per_k = spring_clamp(learnt.loss_w_per_k, -most_w_per_k, most_w_per_k);
+    learnt.loss_w_per_k = spring_loss_ever(e, learnt.loss_w_per_k);
     return learnt;
 }

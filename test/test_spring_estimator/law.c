@@ -8,20 +8,11 @@
 #include "spring_estimator_internal.h"
 #include "unity.h"
 
-#define ROWS(table) (sizeof(table) / sizeof((table)[0]))
-#define M           SPRING_PHASE_MARTENSITE
-#define B           SPRING_PHASE_BETWEEN
-#define A           SPRING_PHASE_AUSTENITE
-#define ANY         SPRING_PHASE_ANY
-#define CAPACITY    0.3    /* J/K, declared */
-#define LOSS        0.0058 /* W/K */
-#define TURN_S      0.25
-#define LEAST_K2    0.36 /* of a distance: 0.6 K within a spring */
-
-static void row(size_t n)
-{
-    (void)snprintf(where, sizeof where, "row %u", (unsigned)n);
-}
+#define ANY      SPRING_PHASE_ANY
+#define CAPACITY 0.3    /* J/K, declared */
+#define LOSS     0.0058 /* W/K */
+#define TURN_S   0.25
+#define LEAST_K2 0.36 /* of a distance: 0.6 K within a spring */
 
 #define NEAR(is, value)                                                                            \
     TEST_ASSERT_FLOAT_WITHIN_MESSAGE(1e-6f + 2e-4f * fabsf((float)(is)), (float)(is), (value),     \
@@ -43,16 +34,10 @@ static float put_c(void)
     return spring_now_c(&model, 0);
 }
 
-/* A turn's readings, 12 of them, of a resistance: to 1/24 mohm at 2 A. */
 static void give(double current_a, double ohm)
 {
-    double sum_mv = 0.0;
-    int given_mv = 0;
-    for (int n = 0; n < 12 && current_a > 0.0; n++) {
-        sum_mv += 1e3 * current_a * ohm;
-        const int mv = (int)lround(sum_mv) - given_mv;
-        given_mv += mv;
-        spring_estimator_take(&estimator, 0, (int16_t)lround(1e3 * current_a), (int16_t)mv);
+    if (current_a > 0.0) {
+        give_readings(12, current_a, ohm);
     }
 }
 

@@ -8,12 +8,23 @@
 #include "spring_estimator_internal.h"
 #include "unity.h"
 
-#define SPRINGS     3
-#define ROWS(table) (sizeof(table) / sizeof((table)[0]))
+#define SPRINGS 3
 
-static void row(size_t n)
+void row(size_t n)
 {
     (void)snprintf(where, sizeof where, "row %u", (unsigned)n);
+}
+
+void give_readings(int readings, double current_a, double ohm)
+{
+    double sum_mv = 0.0;
+    int given_mv = 0;
+    for (int n = 0; n < readings; n++) {
+        sum_mv += 1e3 * current_a * ohm;
+        const int mv = (int)lround(sum_mv) - given_mv;
+        given_mv += mv;
+        spring_estimator_take(&estimator, 0, (int16_t)lround(1e3 * current_a), (int16_t)mv);
+    }
 }
 
 /* Several springs, all known to be cold. */

@@ -8,18 +8,9 @@
 #include "spring_estimator_internal.h"
 #include "unity.h"
 
-#define ROWS(table) (sizeof(table) / sizeof((table)[0]))
-#define M           SPRING_PHASE_MARTENSITE
-#define B           SPRING_PHASE_BETWEEN
-#define A           SPRING_PHASE_AUSTENITE
 #define OHM         0.25
 #define MOST_PER_K  (0.0015 / 0.85) /* the largest coefficient, of a spring that is 15 % lighter */
 #define LEAST_PER_K (-0.0003 / 0.85)
-
-static void row(size_t n)
-{
-    (void)snprintf(where, sizeof where, "row %u", (unsigned)n);
-}
 
 #define NEAR(is, value)                                                                            \
     TEST_ASSERT_FLOAT_WITHIN_MESSAGE(1e-6f + 3e-4f * fabsf((float)(is)), (float)(is), (value),     \
@@ -36,17 +27,9 @@ static const spring_sight_t *sight(void)
     return spring_sights_newest(sights_inside(&estimator), 0);
 }
 
-/* 15 readings of a resistance. */
 static void give(double current_a, double ohm)
 {
-    double sum_mv = 0.0;
-    int given_mv = 0;
-    for (int n = 0; n < 15; n++) {
-        sum_mv += 1e3 * current_a * ohm;
-        const int mv = (int)lround(sum_mv) - given_mv;
-        given_mv += mv;
-        spring_estimator_take(&estimator, 0, (int16_t)lround(1e3 * current_a), (int16_t)mv);
-    }
+    give_readings(15, current_a, ohm);
 }
 
 /* ---- readings ---- */
