@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -20,6 +21,7 @@ from ninespring.io.logs import log_text, read_log
 from ninespring.io.recording import script_lines
 from ninespring.model import effects, native
 from ninespring.model.models import Array, Model
+from ninespring.model.spec import Spec
 from two_heaters import levels
 
 
@@ -46,6 +48,27 @@ def heaters() -> Model:
     model = Model(Array(1, 2))
     model.parameters = {"heat_capacity_j_per_k": 2.0, "loss_w_per_k": 0.01, "command_power_w": 0.6}
     return model
+
+
+def test_what_is_better_and_fitted_takes_its_place_though_nothing_further_may_be_begun() -> None:
+    one, better = (Fit(Spec((name,)), np.array([]), chi2, 1, []) for name, chi2 in (("one", 2.0), ("better", 1.0)))
+
+    class Ended(search.Search):
+        def goes_on(self) -> bool:
+            return False
+
+        def backward(self, fit: Fit, share: float = 0.0) -> tuple[Fit, dict[str, Fit]]:
+            return fit, {fit.spec.effects[0]: one}
+
+        def rivals(self, fit: Fit, without: dict[str, Fit], most: int = 3) -> list[tuple[str, Fit]]:
+            return [("one", better)] if fit is one else []
+
+        def preferred(self, fit: Fit, other: Fit) -> bool:
+            return fit is better
+
+    problem = SimpleNamespace(budget=budget.Budget())
+    found, without, contenders = Ended(problem, [], one).settle(one, grow=False)  # type: ignore[arg-type]
+    assert found is better and without == {"better": one} and not contenders
 
 
 @pytest.mark.parametrize("beyond", [0.0, 1.0])

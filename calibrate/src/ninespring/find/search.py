@@ -387,7 +387,7 @@ class Search:
             fit, without = self.backward(fit, share)
             contenders = self.rivals(fit, without)
             better = [(other.chi2, k) for k, (_, other) in enumerate(contenders) if self.preferred(other, fit)]
-            if turn == 3 or not better or not self.goes_on():
+            if turn == 3 or not better:
                 break
             fit = contenders[min(better)[1]][1]
             if grow:
