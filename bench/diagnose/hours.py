@@ -1,8 +1,8 @@
 """Hours of log: is a run that the fit never saw predicted, and is nothing named where heat only wanders?
 
-    .venv/bin/python bench/diagnose/hours.py [--cases N] [--first SEED] [--parts unseen,wander,halves,half_a_day] [--json FILE]
+    .venv/bin/python bench/diagnose/hours.py [--cases N] [--first SEED] [--parts unseen,finned,wander,halves,half_a_day] [--json FILE]
 
-The data are of `boards.py`, which shares nothing with the product, and the boards in data/.
+The data are of `boards.py` and `finned.py`, which share nothing with the product, and the boards in data/.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 import boards
+import finned as fins
 import numpy as np
 import pandas as pd
 from cases import NOISE_C
@@ -41,14 +42,14 @@ NONSENSE_K = 20.0
 """A thermometer that is so far off shows nonsense: no model is to blame."""
 FIGURES = Figures("python bench/diagnose/hours.py")
 row, percent = FIGURES.row, FIGURES.percent
+PARTS = "unseen", "finned", "wander", "halves", "half_a_day"
 BOXES = ("shared_air", "plate_conduction")
 """Effects that are heat kept beside the heaters."""
 
 
 def read(columns: dict[str, np.ndarray], folder: Path, name: str) -> Run:
     """Return a log of a board as it is read from its file."""
-    rows = len(columns["u1"])
-    table = pd.DataFrame({"time_s": np.arange(float(rows))} | columns)
+    table = pd.DataFrame({"time_s": np.arange(float(len(columns["u1"])))} | columns)
     path = folder / f"{name}.csv"
     path.write_text(table.to_csv(index=False))
     return read_log(path, boards.HEATERS)
@@ -102,6 +103,36 @@ def unseen(seed: int) -> dict[str, Any]:
         "error": off(other, predict(found.model, other)),
         "true_model": true_model,
         "cpu_s": time.process_time() - begun,
+    }
+
+
+def finned(seed: int) -> dict[str, Any]:
+    """Fit three runs of a finned board in a box; return how well two others are predicted, by both baselines too."""
+    rng = np.random.default_rng([seed, 7])
+    board, runs, usual = fins.random_board(rng), [], []
+    with tempfile.TemporaryDirectory() as folder:
+        for number, which in enumerate(((0,), (1,), (0, 1), (0, 1), (0, 1))):
+            columns, shown = fins.log_of(rng, board, which)
+            runs.append(read(columns, Path(folder), f"run{number}"))
+            usual.append(shown)
+
+    def error(model: Model) -> float:
+        return float(np.sqrt(np.mean([off(run, predict(model, run)) ** 2 for run in runs[3:]])))
+
+    found = diagnosis.diagnose(Array(1, fins.HEATERS), runs[:3], model=declared())
+    baselines = []
+    for effects in ([], ["sensor_lag"]):
+        problem, fit, _ = diagnosis.fit_effects(
+            Array(1, fins.HEATERS), runs[:3], effects, declared=declared().parameters
+        )
+        baselines.append(error(model_of(problem, fit, runs[:3])))
+    return {
+        "part": "finned",
+        "seed": seed,
+        "names": [one["name"] for one in found.result["effects"]],
+        "error": error(found.model),
+        "baseline": min(baselines),
+        "true_model": float(np.sqrt(np.mean([off(r, s) ** 2 for r, s in zip(runs[3:], usual[3:], strict=True)]))),
     }
 
 
@@ -174,7 +205,7 @@ def half_a_day(seed: int) -> dict[str, Any]:
 def figures(done: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """Return the figures of what was done."""
     out = []
-    of = {part: [one for one in done if one["part"] == part] for part in ("unseen", "wander", "halves", "half_a_day")}
+    of = {part: [one for one in done if one["part"] == part] for part in PARTS}
     if sets := of["unseen"]:
         out.append(percent("two-hour logs: the lag named", [one["lag"] for one in sets], ">= 90"))
         out.append(percent("two-hour logs: the box named", [one["box"] for one in sets], ">= 90"))
@@ -187,6 +218,21 @@ def figures(done: list[dict[str, Any]]) -> list[dict[str, Any]]:
         out.append(
             row("two-hour logs: a diagnosis, longest", max(one["cpu_s"] for one in sets), "s of one core", "<= 20")
         )
+    if sets := of["finned"]:
+        better = np.array([one["error"] / one["baseline"] for one in sets])
+        out.append(
+            percent("finned boards in a box: unseen runs no worse than the better baseline", list(better <= 1.05), "")
+        )
+        out.append(
+            row(
+                "finned boards in a box: unseen runs, of the better baseline's error, median",
+                float(np.median(better)),
+                "x",
+            )
+        )
+        for who, key in (("", "error"), ("; the true model's", "true_model"), ("; the better baseline's", "baseline")):
+            said = f"finned boards in a box: unseen runs, error, median{who}"
+            out.append(row(said, float(np.median([one[key] for one in sets])), "K"))
     if sets := of["wander"]:
         out.append(
             percent("heat that wanders and nothing else: nothing named", [not one["names"] for one in sets], ">= 97")
@@ -206,17 +252,25 @@ def figures(done: list[dict[str, Any]]) -> list[dict[str, Any]]:
 def main() -> int:
     """Run the benchmark."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--cases", type=int, default=30, help="of unseen; of wander twice as many")
+    parser.add_argument("--cases", type=int, default=30, help="of unseen and finned; of wander twice as many")
     parser.add_argument("--first", type=int, default=320000)
-    parser.add_argument("--parts", default="unseen,wander,halves,half_a_day")
+    parser.add_argument("--parts", default=",".join(PARTS))
     parser.add_argument("--processes", type=int, default=os.cpu_count() or 2)
     parser.add_argument("--json", type=Path)
     parser.add_argument(
         "--resume", type=Path, help="keep each case here; what it has of this very code is not done again"
     )
     options = parser.parse_args()
-    seeds = {"unseen": options.cases, "wander": 2 * options.cases, "halves": len(LOGS), "half_a_day": 1}
-    parts: dict[str, Callable[[int], dict[str, Any]]] = {f.__name__: f for f in (unseen, wander, halves, half_a_day)}
+    seeds = {
+        "unseen": options.cases,
+        "finned": options.cases,
+        "wander": 2 * options.cases,
+        "halves": len(LOGS),
+        "half_a_day": 1,
+    }
+    parts: dict[str, Callable[[int], dict[str, Any]]] = {
+        f.__name__: f for f in (unseen, finned, wander, halves, half_a_day)
+    }
     wanted = {
         f"{name} {seed}": (parts[name], seed)
         for name in options.parts.split(",")
