@@ -14,7 +14,7 @@ from ninespring.find.diagnosis import first_fit
 from ninespring.find.evidence import likelihood
 from ninespring.find.lasting import likeliest
 from ninespring.find.residual import depends_on
-from ninespring.find.unseen import LAG, Unseen, _hardly_shown, errors, pinned, splits
+from ninespring.find.unseen import LAG, OF_THAT_DAY, Unseen, _hardly_shown, errors, pinned, splits
 from ninespring.infer.declared import base_spec
 from ninespring.infer.fit import Fit
 from ninespring.infer.problem import Problem
@@ -144,6 +144,106 @@ def test_an_effect_without_which_most_is_not_foretold_is_no_stand_in() -> None:
     told = Told({"": 2.0, "lag": 2.0, "latent_heat": 1.3, "shared_air": 1.6})
     assert told.tells(model("latent_heat"), model())
     assert not told.tells(model("shared_air"), model())
+
+
+@pytest.mark.parametrize(
+    ("told", "given_k", "without_k", "true", "alone"),
+    [
+        (True, 1.42, 1.23, 0.76, False),
+        (False, 1.41, 1.23, 0.76, False),  # all that was found foretells less than half
+        (False, 1.42, 1.22, 0.76, False),  # less than a third is foretold with it
+        (False, 1.42, 1.23, 0.74, False),  # what it changes does not come true
+        (False, 1.42, 1.23, np.inf, False),  # it changes nothing
+        (False, 1.42, 1.23, 0.76, True),  # its last part is the same run's
+    ],
+)
+def test_of_many_that_are_there_none_foretells_most(
+    told: bool, given_k: float, without_k: float, true: float, alone: bool
+) -> None:
+    found = Told({"": given_k, "lag": 2.0, "shared_air": without_k, "shared_air supply_sag": 1.0}, {"supply_sag": true})
+    found.splits = [SimpleNamespace(alone=alone)]  # type: ignore[list-item]
+    assert found.tells(model("shared_air", "supply_sag"), model("shared_air")) == told
+
+
+@pytest.mark.parametrize(
+    ("taken", "left", "names", "bends", "off_k"),
+    [
+        ("same", False, ["shared_air"], ["ambient_drift"], 2.0),  # nothing is left: nobody looks for more
+        ("same", True, ["shared_air"], ["ambient_drift"], 1.06),
+        ("found", True, ["shared_air"], ["ambient_drift"], 1.04),
+        ("found", True, [], ["ambient_drift"], 2.0),  # no name takes the place of what bends
+        ("found", True, ["shared_air"], ["shared_air", "ambient_drift"], 2.0),
+        ("found", True, ["shared_air"], ["radiation"], 2.0),  # it does not bend
+        ("same", True, ["sensor_lag"], ["hidden"], 2.0),
+    ],
+)
+def test_what_bends_as_it_likes_gives_way_to_a_name_that_foretells_better(
+    monkeypatch: pytest.MonkeyPatch, taken: str, left: bool, names: list[str], bends: list[str], off_k: float
+) -> None:
+    hidden = "hidden" in bends
+    cases = {
+        True: SimpleNamespace(adopted=names, hidden=[], fits={1: "a"}, off_k=1.0),
+        False: SimpleNamespace(adopted=[] if hidden else bends, hidden=bends if hidden else [], fits={}, off_k=off_k),
+    }
+    for case in cases.values():
+        case.problem = case.final = case.search = case.declared = None
+    given: list[Any] = []
+
+    def searched(problem: Any, model: Any, frozen: bool, progress: Any, alike: bool, fits: Any = None) -> Any:
+        given.append(fits)
+        return cases[alike]
+
+    monkeypatch.setattr(diagnosis, "prepare", lambda *_: None)
+    monkeypatch.setattr(diagnosis, "_searched", searched)
+    monkeypatch.setattr(diagnosis, "_judged", lambda *_: None)
+    monkeypatch.setattr(diagnosis, "unexplained", lambda *_: left)
+    monkeypatch.setattr(diagnosis.unseen, "Unseen", lambda *_: None)
+    monkeypatch.setattr(diagnosis, "_off", lambda case, *_: case.off_k)
+
+    def silent(text: str) -> None:
+        pass
+
+    runs: Any = [None, None]
+    case: Any = diagnosis._foretelling(Array(1, 2), runs, None, False, silent)[0]
+    assert case is cases[taken == "same"]
+    assert given == ([None, {1: "a"}] if left else [None]), "what one search fitted serves the other"
+    assert diagnosis._foretelling(Array(1, 2), runs[:1], None, False, silent)[0] is cases[False], "a run alone"
+    assert diagnosis._foretelling(Array(1, 2), runs, None, True, silent)[0] is cases[False], "as it is given"
+
+
+@pytest.mark.parametrize("alike", [True, False])
+def test_what_is_the_same_in_all_runs_is_no_drift_and_nothing_of_a_run_alone(
+    monkeypatch: pytest.MonkeyPatch, alike: bool
+) -> None:
+    class Begun(Exception):
+        pass
+
+    def begin(problem: Any, candidates: Any, *_: Any) -> None:
+        raise Begun({one.effect for one in candidates})
+
+    monkeypatch.setattr(diagnosis.search, "Search", begin)
+    runs = [replace(one_node(0.0, seed), ambient_c=ambient) for seed, ambient in ((1, None), (2, np.full(600, 20.0)))]
+    with pytest.raises(Begun) as begun:
+        diagnosis._searched(Problem(Array(1, 1), runs), None, False, lambda text: None, alike)
+    (effects,) = begun.value.args
+    assert "natural_convection" in effects
+    assert ("ambient_drift" in effects, bool(effects & set(OF_THAT_DAY))) == (not alike, not alike)
+
+
+@pytest.mark.parametrize("named", [True, False])
+def test_what_has_no_name_is_not_looked_for_where_only_names_count(
+    monkeypatch: pytest.MonkeyPatch, named: bool
+) -> None:
+    looked: list[str] = []
+    monkeypatch.setattr(diagnosis.unnamed, "search_beside", lambda *_: looked.append("beside"))
+    monkeypatch.setattr(diagnosis.lasting, "search_lasting", lambda *_: ("again", ("lasting", {}, [])))
+    monkeypatch.setattr(diagnosis.lasting, "nats_beside", lambda problem, fit, *_: 2.0 if fit == "lasting" else 1.0)
+    problem: Any = SimpleNamespace(unnamed=None, heat=None, leave_out=lambda what: None)
+    first: Any = SimpleNamespace(progress=lambda text: None)
+    final: Any = "final"
+    found = diagnosis._where_something_is_left(problem, first, final, {}, [], named)
+    assert found == ("again", ("lasting", {}, []), [])
+    assert looked == ([] if named else ["beside"])
 
 
 @pytest.mark.parametrize(("found_k", "plain"), [(1.04, False), (1.2, True)])

@@ -283,6 +283,8 @@ class _Case:
     swapped: list[str]
     """Columns that are, in words."""
     hidden: list[unnamed.Hidden]
+    fits: Mapping[Any, Fit]
+    """By least squares, of the first search."""
     witnesses: dict[str, Witness] = field(default_factory=dict)
     not_kept: list[str] = field(default_factory=list)
     """Effects that foretell a run no better, in words."""
@@ -299,10 +301,8 @@ def _diagnose(
     array: Array, runs: Sequence[Run], model: Model | None, frozen: bool, progress: Callable[[str], None]
 ) -> Diagnosis:
     begun = time.monotonic()
-    problem = prepare(model.array if model else array, runs, dict(model.parameters) if model else {})
-    case = _searched(problem, model, frozen, progress)
-    judged_by = unseen.Unseen(problem, case.search, case.declared)
-    judge = _judged(case, judged_by)
+    case, judge, judged_by = _foretelling(array, runs, model, frozen, progress)
+    problem = case.problem
     progress("a run that the fit never saw")
     headline = _foretold(case, judge, judged_by)
     case.final = runs_apart.with_spread(problem, case.final)
@@ -368,8 +368,51 @@ def _diagnose(
     return Diagnosis(told, made, problem, case.base, final, heat)
 
 
-def _searched(problem: Problem, model: Model | None, frozen: bool, progress: Callable[[str], None]) -> _Case:
-    """Fit what is declared, and search the library; again where contacts changed, and where something is left."""
+def _foretelling(
+    array: Array, runs: Sequence[Run], model: Model | None, frozen: bool, progress: Callable[[str], None]
+) -> tuple[_Case, search.Search, unseen.Unseen]:
+    """Search by what has a name and is the same in all runs; where that leaves something, by all there is.
+
+    What is of one day, or has no name, bends as it likes: it is the better account only where a run that was left out is not
+    foretold better without it.
+    """
+
+    def account(alike: bool, fits: Mapping[Any, Fit] | None = None) -> tuple[_Case, search.Search, unseen.Unseen]:
+        problem = prepare(model.array if model else array, runs, dict(model.parameters) if model else {})
+        case = _searched(problem, model, frozen, progress, alike, fits)
+        judged_by = unseen.Unseen(problem, case.search, case.declared)
+        return case, _judged(case, judged_by), judged_by
+
+    if len(runs) == 1 or frozen:
+        return account(False)
+    same = account(True)
+    if not unexplained(same[0].problem, same[0].final):
+        return same
+    progress("what is of one day, or has no name")
+    found = account(False, same[0].fits)
+    bends = found[0].hidden or set(found[0].adopted) & set(unseen.OF_THAT_DAY)
+    instead = set(same[0].adopted) - set(found[0].adopted)
+    return same if bends and instead and _off(*same) * unseen.WORSE < _off(*found) else found
+
+
+def _off(case: _Case, judge: search.Search, judged_by: unseen.Unseen) -> float:
+    """Return the error, degC rms, by which an account foretells runs left out, without what no other run tells."""
+    fit = judged_by.carried(case.final, judge.reduced)
+    return judged_by.own(unseen.pinned(fit) if case.hidden else fit)
+
+
+def _searched(
+    problem: Problem,
+    model: Model | None,
+    frozen: bool,
+    progress: Callable[[str], None],
+    alike: bool,
+    fits: Mapping[Any, Fit] | None = None,
+) -> _Case:
+    """Fit what is declared, and search the library; again where contacts changed, and where something is left.
+
+    `alike` by what has a name and is the same in all runs; `fits` were made by another search of these logs.
+    """
     progress("fitting what is declared")
     spec = base_spec(problem, frozen)
     scene = scene_of(problem)
@@ -378,8 +421,12 @@ def _searched(problem: Problem, model: Model | None, frozen: bool, progress: Cal
         spec = with_effects_of(spec, model, known, frozen)
     base = first_fit(problem, spec)
     own = effects.of_runs(scene)
-    found = search.Search(problem, [c for c in (*known, *own) if c.effect not in spec.effects], base, progress)
+    everything = known = [c for c in (*known, *own) if c.effect not in spec.effects]
+    if alike:
+        known = [c for c in known if c.effect not in unseen.OF_THAT_DAY]
+    found = search.Search(problem, known, base, progress, dict(fits or {}))
     final, without, contenders = found.run()
+    fits = found.fits
     progress("what v / i says")
     swapped = plausibility.swapped(problem.runs)
     # beside another spring's temperature v / i would only accuse contacts
@@ -390,16 +437,20 @@ def _searched(problem: Problem, model: Model | None, frozen: bool, progress: Cal
         base = first_fit(problem, spec)
         found = search.Search(problem, found.candidates, base, progress)
         final, without, contenders = found.run()
+        fits = {}
     problem.learn_power(final.spec, final.values)
     hidden: list[unnamed.Hidden] = []
     if not swapped and unexplained(problem, final):
         found, (final, without, contenders), hidden = _where_something_is_left(
-            problem, found, final, without, contenders
+            problem, found, final, without, contenders, alike
         )
+    if alike and not unexplained(problem, final):
+        # what is of one day may show the same, or the little that is left
+        found = search.Search(problem, everything, found.base, progress, found.fits)
+        final, without, contenders = found.settle(found.forward(final), grow=False)
     progress("held-out blocks")
-    return _Case(
-        problem, progress, found, base, found.base, _finish(problem, final), without, contenders, swapped, hidden
-    )
+    final = _finish(problem, final)
+    return _Case(problem, progress, found, base, found.base, final, without, contenders, swapped, hidden, fits)
 
 
 def _judged(case: _Case, judged_by: unseen.Unseen) -> search.Search:
@@ -599,11 +650,17 @@ def identifiability_of(fit: Fit) -> results.Identifiability:
 
 
 def _where_something_is_left(
-    problem: Problem, first: search.Search, final: Fit, without: dict[str, Fit], contenders: list[tuple[str, Fit]]
+    problem: Problem,
+    first: search.Search,
+    final: Fit,
+    without: dict[str, Fit],
+    contenders: list[tuple[str, Fit]],
+    named: bool,
 ) -> unnamed.Beside:
-    """Search again, beside causes without a name and with what is left taken for noise that lasts: the likeliest of all."""
+    """Search again, beside causes without a name (unless only what is named counts) and with what is left taken for noise that
+    lasts: the likeliest of all."""
     plain: unnamed.Beside = (first, (final, without, contenders), [])
-    beside = unnamed.search_beside(problem, first, final) or plain
+    beside = (None if named else unnamed.search_beside(problem, first, final)) or plain
     if not all(one.possible for one in beside[2]):
         problem.leave_out(None)
         beside = plain

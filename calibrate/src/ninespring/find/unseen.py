@@ -34,6 +34,8 @@ WORSE = 1.05
 """Of an error, so much more is worse; less is chance."""
 FORETOLD = 0.5
 """Part of the squared error in the unseen that is left at most with an effect that is there, whatever else is said of it."""
+PART = 2.0 / 3.0
+"""The same of one of many effects that are there."""
 COMES_TRUE = 0.75
 """Part of what an effect changes in the unseen that must come true: all of it does of a cause, a half where the unseen is foretold no
 better than without it. What only takes something else's place is between the two or below."""
@@ -226,8 +228,16 @@ class Unseen:
         return self.own(fit) > WORSE * self.rmse(self.better)
 
     def tells(self, fit: Fit, without: Fit) -> bool:
-        """Return whether most of what is off in the unseen without an effect is foretold with it: no stand-in does that."""
-        return bool(self.splits) and self.own(fit) ** 2 <= FORETOLD * self.own(without) ** 2
+        """Return whether most of what is off in the unseen without an effect is foretold with it: no stand-in does that. Or, in runs
+        left out, a part of it, where all that was found foretells most of what the given model does not and what the effect changes
+        comes true: of many that are there, none foretells most."""
+        if not self.splits:
+            return False
+        off, bare = self.own(fit) ** 2, self.own(without) ** 2
+        if off <= FORETOLD * bare:
+            return True
+        of_many = off <= PART * bare and off <= FORETOLD * self.rmse(self.better) ** 2
+        return of_many and not self.splits[0].alone and COMES_TRUE <= self.comes_true(fit, without) < math.inf
 
     def comes_true(self, fit: Fit, without: Fit) -> float:
         """Return what part of that by which an effect changes what is foretold of the unseen is there: 1 of a cause, 0.5 where it
