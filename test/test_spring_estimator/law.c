@@ -5,6 +5,7 @@
 
 #include "one_spring.h"
 #include "rules.h"
+#include "sights.h"
 #include "spring_estimator_internal.h"
 #include "unity.h"
 
@@ -273,11 +274,13 @@ static void look_tells_a_phase_and_a_temperature_evenly_over_its_width(void)
         const bool looked = table[n].high_c > 0.0;
         TEST_ASSERT_EQUAL_UINT8_MESSAGE(table[n].then, INSIDE.possible, where);
         TEST_ASSERT_EQUAL_UINT8_MESSAGE(table[n].fresh + 1, INSIDE.fresh, where);
+        TEST_ASSERT_EQUAL_MESSAGE(table[n].told && table[n].possible != M, INSIDE.told, where);
         TEST_ASSERT_EQUAL_MESSAGE(looked, spring_estimator_has_just_seen(BELIEF), where);
         TEST_ASSERT_FLOAT_WITHIN_MESSAGE(
             0.01f, looked ? (float)(table[n].low_c + table[n].high_c) / 2.0f : 75.0f, put_c(),
             where);
         if (looked) {
+            TEST_ASSERT_TRUE(is_noted(SPRING_SIGHT_LOOKED));
             const float sd_k = 0.29f * (float)(table[n].high_c - table[n].low_c);
             TEST_ASSERT_FLOAT_WITHIN_MESSAGE(0.01f, sd_k * sd_k + 9.0f, INSIDE.variance_k2, where);
             TEST_ASSERT_FLOAT_WITHIN(0.01f, 9.0f, INSIDE.shift_variance_k2);
@@ -309,6 +312,7 @@ static void hottest_possible_cools_by_the_least_loss_with_its_latent_heat(void)
             c + TURN_S * (current_a * current_a * 0.2 - 0.8 * LOSS * (c - 20.0)) / capacity;
         NEAR(is_c, INSIDE.hottest_c);
         TEST_ASSERT_EQUAL_MESSAGE(is_c < 68.0 ? M : ANY, INSIDE.possible, where);
+        TEST_ASSERT_EQUAL_MESSAGE(is_c < 68.0, is_noted(SPRING_SIGHT_COOLED), where);
         power_comes_on();
         INSIDE.hottest_c = (float)c; /* and how long that takes, by small steps */
         double s = 0.0;
