@@ -114,7 +114,7 @@ static void errors_of_distance_and_loss_go_on_by_the_law(void)
                                     : k * table[n].gone_k + h * above_k * table[n].gone_w_per_k +
                                           (warms ? heat_k - rise_k : 0.0),
              INSIDE.gone_k);
-        NEAR(5.0 * 0.9998, INSIDE.disturbance_k);
+        TEST_ASSERT_FLOAT_WITHIN(1e-4f, 5.0f * 0.9998f, INSIDE.disturbance_k);
         TEST_ASSERT_EQUAL_INT16(lround(128.0 * rise_k), spring_estimator_moved_c7(BELIEF));
         if (table[n].heating) { /* one that waits cools by the least loss, one that may lose more */
             NEAR(10.0 + (heat_k < 0.0 ? 0.8 : 1.0) * heat_k, INSIDE.run.heat.heat_k);
@@ -218,6 +218,9 @@ static void what_keeps_its_phase_is_no_colder_and_tells_of_its_loss(void)
             TEST_ASSERT_INT_WITHIN(1, lround(1e4 * (table[n].kept + less) / LOSS), sight->loss);
             TEST_ASSERT_EQUAL_UINT8(0, sight->seen_sd);
             TEST_ASSERT_EQUAL_INT16(thermal_model_temperature_c7(&model, 0), INSIDE.last_c7);
+            const unsigned count = sights_inside(&estimator)->count; /* and goes on in it */
+            spring_keep_above(&estimator, &INSIDE, &model, 0, 81.0f);
+            TEST_ASSERT_EQUAL_UINT(count + table[n].blind, sights_inside(&estimator)->count);
         }
     }
 }

@@ -330,7 +330,7 @@ static void numbers_that_no_spring_has_are_not_restored(void)
     bad[0].austenite_ohm = NAN;
     bad[1].austenite_ohm = 20.0f;
     bad[2].change = NAN;
-    bad[3].change = 1.5f;
+    bad[3].change = 1.0f;
     bad[4].loss_w_per_k = 1.0f;
     bad[5].loss_sd_w_per_k = -1e-4f;
     bad[6].martensite_rise_per_k = INFINITY;
