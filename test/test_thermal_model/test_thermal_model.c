@@ -27,28 +27,29 @@ static void row_of_springs_comes_to_what_is_computed_by_hand(void)
     };
     static const struct {
         uint8_t columns, fan_percent;
-        uint32_t steps, mw[2];
+        uint32_t steps, uw[2];
         struct {
             uint16_t name;
             int32_t value;
         } set[3];                    /* up to the first 0, which is the rows */
         double c[3], air_c, plate_c; /* 0: not looked at */
     } table[] = {
-        {1, 0, 10000, {290}, {{0, 0}}, {70}, 0, 0},
-        {1, 0, 517, {290}, {{0, 0}}, {20 + 31.61}, 0, 0}, /* 1 - 1 / e of 50 K */
-        {1, 100, 10000, {226}, {{0, 0}}, {40}, 0, 0},
-        {1, 50, 10000, {226}, {{0, 0}}, {20 + 0.226 / 0.00855}, 0, 0},
-        {1, 50, 10000, {226}, {{HALF, 735}}, {20 + 0.226 / (0.0058 + 0.735 * 0.0055)}, 0, 0},
+        {1, 0, 10000, {290000}, {{0, 0}}, {70}, 0, 0},
+        {1, 0, 517, {290000}, {{0, 0}}, {20 + 31.61}, 0, 0}, /* 1 - 1 / e of 50 K */
+        {1, 100, 10000, {226000}, {{0, 0}}, {40}, 0, 0},
+        {1, 50, 10000, {226000}, {{0, 0}}, {20 + 0.226 / 0.00855}, 0, 0},
+        {1, 50, 10000, {226000}, {{HALF, 735}}, {20 + 0.226 / (0.0058 + 0.735 * 0.0055)}, 0, 0},
         /* half of 0.3 W / 5.8 mW/K and of 0.3 W / (5.8 + 2 x 0.586) mW/K: their sum, difference */
-        {2, 0, 20000, {300}, {{0, 0}}, {20 + 47.377, 20 + 4.347}, 0, 0},
+        {2, 0, 20000, {300000}, {{0, 0}}, {20 + 47.377, 20 + 4.347}, 0, 0},
         /* 5.8 mW/K x 50 K x 1.2; 1.108e-4 m2 sigma (343.15^4 - 293.15^4) = 40.71 mW */
-        {1, 0, 10000, {389}, {{RISE, 4000}, {AREA, 11080}}, {70}, 0, 0},
-        {1, 0, 20000, {145}, {{AIR, 5800}, {AIR_J, 100}}, {70}, 45, 0}, /* two equal resistances */
-        {1, 0, 60000, {340}, {{PLATE, 2000}, {PLATE_W, 2000}, {PLATE_J, 1000}}, {70}, 0, 45},
-        {3, 100, 10000, {0, 565}, {{WAKE, 1130}, {BESIDE, 0}}, {20, 70, 25}, 0, 0}, /* a tenth */
-        {3, 100, 10000, {0, 565}, {{WAKE, 1130}, {BESIDE, 0}, {TO, 2}}, {25, 70, 20}, 0, 0},
+        {1, 0, 10000, {388710}, {{RISE, 4000}, {AREA, 11080}}, {70}, 0, 0},
+        /* two equal resistances in a row */
+        {1, 0, 20000, {145000}, {{AIR, 5800}, {AIR_J, 100}}, {70}, 45, 0},
+        {1, 0, 60000, {340000}, {{PLATE, 2000}, {PLATE_W, 2000}, {PLATE_J, 1000}}, {70}, 0, 45},
+        {3, 100, 10000, {0, 565000}, {{WAKE, 1130}, {BESIDE, 0}}, {20, 70, 25}, 0, 0}, /* a tenth */
+        {3, 100, 10000, {0, 565000}, {{WAKE, 1130}, {BESIDE, 0}, {TO, 2}}, {25, 70, 20}, 0, 0},
         /* what the wake brings was taken from the air: 0.5 W / 20 mW/K */
-        {3, 100, 20000, {500}, {{AIR, 20000}, {WAKE, 5000}}, {0}, 45, 0},
+        {3, 100, 20000, {500000}, {{AIR, 20000}, {WAKE, 5000}}, {0}, 45, 0},
     };
     for (size_t n = 0; n < sizeof table / sizeof table[0]; n++) {
         setUp();
@@ -60,12 +61,12 @@ static void row_of_springs_comes_to_what_is_computed_by_hand(void)
         }
         start();
         thermal_model_set_fan(&model, table[n].fan_percent);
-        power_uw[0] = 1000u * table[n].mw[0];
-        power_uw[1] = 1000u * table[n].mw[1];
+        power_uw[0] = table[n].uw[0];
+        power_uw[1] = table[n].uw[1];
         run(table[n].steps);
         (void)snprintf(where, sizeof where, "row %u", (unsigned)n);
         for (uint8_t k = 0; k < 3 && table[n].c[k] > 0.0; k++) {
-            TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(0.05, table[n].c[k], degrees(k), where);
+            TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(0.03, table[n].c[k], degrees(k), where);
         }
         if (table[n].air_c > 0.0) {
             TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(0.03, table[n].air_c,
