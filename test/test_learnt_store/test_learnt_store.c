@@ -165,26 +165,6 @@ static void what_never_settles_is_saved_ever_less_often(void)
     TEST_ASSERT_GREATER_OR_EQUAL_UINT(1, saves[1]);
 }
 
-static void wherever_the_power_is_cut_the_old_or_the_new_is_whole(void)
-{
-    spring_learnt_t next = numbers;
-    next.austenite_ohm = 0.25f;
-    for (unsigned cut = 0; cut < LEARNT_STORE_BYTES(9) + RECORD_OVERHEAD_BYTES; cut++) {
-        setUp();
-        hold(0, DRIVE_POLICY_STAGE_HOLD);
-        learn(0, &numbers);
-        seconds(LEARNT_STORE_HELD_S);
-        power_on();
-        hold(0, DRIVE_POLICY_STAGE_HOLD);
-        learn(0, &next);
-        writes_left = cut;
-        seconds(LEARNT_STORE_HELD_S);
-        power_on();
-        const float back = controller_learnt(&controller, 0).austenite_ohm;
-        TEST_ASSERT_TRUE(back > 0.2190f && (back < 0.2192f || back > 0.2499f));
-    }
-}
-
 static void clear_forgets_in_memory_and_over_power_off(void)
 {
     hold(0, DRIVE_POLICY_STAGE_HOLD);
@@ -367,7 +347,6 @@ int main(void)
     RUN_TEST(nothing_driven_or_nothing_learnt_writes_nothing);
     RUN_TEST(what_is_worth_a_save_is_saved_once_in_ten_minutes);
     RUN_TEST(what_never_settles_is_saved_ever_less_often);
-    RUN_TEST(wherever_the_power_is_cut_the_old_or_the_new_is_whole);
     RUN_TEST(clear_forgets_in_memory_and_over_power_off);
     RUN_TEST(a_loss_that_was_learnt_beside_another_model_is_left_out);
     RUN_TEST(no_declaration_of_the_losses_costs_what_else_was_learnt);
