@@ -697,6 +697,9 @@ static void each_limit_is_said_where_it_cuts(void)
         TEST_ASSERT_EQUAL_UINT16_MESSAGE(table[n].limits, drive_policy_limits(&policy, 0), where);
         TEST_ASSERT_EQUAL_UINT16_MESSAGE(table[n].wanted_ma - table[n].gets_ma,
                                          drive_policy_cut_ma(&policy, 0), where);
+        level[0] = 0; /* and no longer */
+        policy_tick();
+        TEST_ASSERT_EQUAL_UINT16_MESSAGE(0, drive_policy_limits(&policy, 0), where);
     }
 }
 
