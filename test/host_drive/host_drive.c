@@ -112,11 +112,6 @@ static bool is_blind(int spring)
     return limited_by(spring, DRIVE_POLICY_LIMIT_BLIND);
 }
 
-static unsigned target(int spring)
-{
-    return controller_target_ma(loop_controller(loop), (uint8_t)spring);
-}
-
 /* What the policy would give the spring without its limits. */
 static void eight_are_held_in_the_band_and_the_centre_stays_cold(void)
 {
@@ -145,24 +140,6 @@ static void held_spring_does_not_feel_its_neighbours(void)
         TEST_ASSERT_DOUBLE_WITHIN(3.0, alone_c, temperature(CENTRE));
     }
     TEST_ASSERT_TRUE(phase(CENTRE) > 0.98);
-}
-
-/* The first start ever: it waits until even a spring of 120 degC would be martensite, and says so.
- */
-static void all_nine_are_there_after_power_on_with_no_hint(void)
-{
-    power_on();
-    want_all_but(-1);
-    run(1.0);
-    for (int k = 0; k < SPRINGS; k++) {
-        TEST_ASSERT_EQUAL_UINT(0, target(k));
-        TEST_ASSERT_TRUE(limited_by(k, DRIVE_POLICY_LIMIT_COOLING));
-    }
-    run(209.0);
-    for (int k = 0; k < SPRINGS; k++) {
-        TEST_ASSERT_TRUE(phase(k) > 0.99);
-        TEST_ASSERT_FALSE(limited_by(k, DRIVE_POLICY_LIMIT_COOLING));
-    }
 }
 
 static void spring_that_loses_its_turn_keeps_what_it_has(void)
@@ -436,7 +413,6 @@ int main(void)
     UNITY_BEGIN();
     RUN_TEST(eight_are_held_in_the_band_and_the_centre_stays_cold);
     RUN_TEST(held_spring_does_not_feel_its_neighbours);
-    RUN_TEST(all_nine_are_there_after_power_on_with_no_hint);
     RUN_TEST(spring_that_loses_its_turn_keeps_what_it_has);
     RUN_TEST(array_that_loses_more_or_less_is_held_in_the_band);
     RUN_TEST(toggling_at_any_period_stays_within_the_limits);

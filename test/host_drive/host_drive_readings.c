@@ -28,13 +28,7 @@ void tearDown(void)
     plant_destroy(plant);
 }
 
-typedef enum {
-    HONEST,
-    STUCK_VOLTAGE,
-    NOISY_VOLTAGE,
-    NOISIER_VOLTAGE,
-    ABSENT_NOW_AND_THEN
-} lie_t;
+typedef enum { HONEST, STUCK_VOLTAGE, NOISY_VOLTAGE, NOISIER_VOLTAGE, ABSENT_NOW_AND_THEN } lie_t;
 
 static struct {
     controller_t controller;
@@ -54,8 +48,7 @@ static void start_liar(void)
     TEST_ASSERT_TRUE(controller_init(&liar.controller, &settings, liar.inputs.ambient_c7, NULL));
     controller_set_temperature(&liar.controller, 20 * 128);
     for (uint8_t k = 0; k < SPRINGS; k++) {
-        TEST_ASSERT_TRUE(
-            controller_set_target(&liar.controller, k, k == CENTRE ? 1000 : 0));
+        TEST_ASSERT_TRUE(controller_set_target(&liar.controller, k, k == CENTRE ? 1000 : 0));
     }
 }
 

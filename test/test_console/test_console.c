@@ -745,9 +745,13 @@ static void model_says_how_long_a_spring_waits_and_when_it_is_away(void)
     TEST_ASSERT_NULL(strstr(waits + 8, "  waits ")); /* nobody else is driven */
     expect_ok("off all");
     controller.policy.spring[4].limits = DRIVE_POLICY_LIMIT_AWAY;
+    controller.policy.spring[5].limits = DRIVE_POLICY_LIMIT_SUPPLY | DRIVE_POLICY_LIMIT_TEMPERATURE;
+    controller.policy.spring[5].wanted_ma = 3000;
+    controller.policy.spring[5].target_ma = 1800;
     room = CONSOLE_ROOM_BYTES * 2u;
     ask_at_once("model"); /* a tick would judge the spring anew */
     TEST_ASSERT_NOT_NULL(strstr(said, ", limits away\r\n  away: not where it was asked to be"));
+    TEST_ASSERT_NOT_NULL(strstr(said, ", limits supply temperature: 1.200 A less\r\n"));
 }
 
 static void why_says_the_last_sights_of_a_spring_in_words(void)
