@@ -167,16 +167,12 @@ std::string version_under(const std::string &format)
     return mega->say("version");
 }
 
-void csv_at_its_fastest_leaves_the_console_usable()
+void telemetry_at_its_fastest_leaves_the_console_usable()
 {
-    const std::string text = version_under("csv");
-    TEST_ASSERT_TRUE_MESSAGE(contains(text, "ticks late 0,"), text.c_str());
-}
-
-void teleplot_at_its_fastest_leaves_the_console_usable()
-{
-    const std::string text = version_under("teleplot");
-    TEST_ASSERT_TRUE_MESSAGE(contains(text, "ticks late 0,"), text.c_str());
+    for (const char *const format : {"csv", "teleplot"}) {
+        const std::string text = version_under(format);
+        TEST_ASSERT_TRUE_MESSAGE(contains(text, "ticks late 0,"), text.c_str());
+    }
 }
 
 /* Sends and waits until the board is silent; gives what came. */
@@ -186,16 +182,6 @@ std::string pour(rig &mega, const std::string &bytes, double ms)
     mega.board.send(bytes);
     mega.run_ms(ms);
     return mega.board.take_output();
-}
-
-void a_stop_ends_the_answer_under_way()
-{
-    auto mega = booted();
-    mega->board.send("$$\n");
-    mega->run_ms(30.0);
-    mega->board.take_output();
-    const std::string text = pour(*mega, "!", 1000.0);
-    TEST_ASSERT_TRUE_MESSAGE(contains(text, "error:12 "), text.c_str());
 }
 
 void bytes_that_found_no_room_are_reported()
@@ -220,7 +206,7 @@ void an_eeprom_that_keeps_nothing_fails_the_save()
     expect_code(*mega, CONSOLE_ERROR_SAVE_FAILED, "$save");
 }
 
-void selftest_wants_everything_off_and_finds_an_open_spring()
+void selftest_wants_everything_off_and_finds_what_is_beyond_its_limits()
 {
     auto mega = booted();
     mega->expect_ok("on 3");
@@ -230,16 +216,11 @@ void selftest_wants_everything_off_and_finds_an_open_spring()
     const std::string text = mega->say("selftest", 20000.0);
     TEST_ASSERT_TRUE_MESSAGE(contains(text, "error:17 "), text.c_str());
     TEST_ASSERT_TRUE_MESSAGE(contains(text, "spring 7"), text.c_str());
-}
-
-void selftest_finds_a_resistance_beyond_its_limits()
-{
-    auto mega = booted();
     mega->expect_ok("$resistance_minimum_ohm=0.3");
-    const std::string text = mega->say("selftest", 20000.0);
-    TEST_ASSERT_TRUE_MESSAGE(contains(text, "error:17 "), text.c_str());
-    TEST_ASSERT_TRUE_MESSAGE(contains(text, "spring 1: sensor ok, fault 3 short_spring"),
-                             text.c_str());
+    const std::string limits = mega->say("selftest", 20000.0);
+    TEST_ASSERT_TRUE_MESSAGE(contains(limits, "error:17 "), limits.c_str());
+    TEST_ASSERT_TRUE_MESSAGE(contains(limits, "spring 1: sensor ok, fault 3 short_spring"),
+                             limits.c_str());
 }
 
 } // namespace
@@ -253,13 +234,10 @@ int main()
     UNITY_BEGIN();
     RUN_TEST(selftest_passes_on_a_whole_board_and_leaves_it_off);
     RUN_TEST(load_is_what_it_did_not_sleep);
-    RUN_TEST(csv_at_its_fastest_leaves_the_console_usable);
-    RUN_TEST(teleplot_at_its_fastest_leaves_the_console_usable);
+    RUN_TEST(telemetry_at_its_fastest_leaves_the_console_usable);
     RUN_TEST(time_goes_on_for_years);
-    RUN_TEST(a_stop_ends_the_answer_under_way);
     RUN_TEST(bytes_that_found_no_room_are_reported);
     RUN_TEST(an_eeprom_that_keeps_nothing_fails_the_save);
-    RUN_TEST(selftest_wants_everything_off_and_finds_an_open_spring);
-    RUN_TEST(selftest_finds_a_resistance_beyond_its_limits);
+    RUN_TEST(selftest_wants_everything_off_and_finds_what_is_beyond_its_limits);
     return UNITY_END();
 }

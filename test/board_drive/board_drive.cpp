@@ -98,69 +98,6 @@ void heats_then_holds_above_martensite_start_then_lets_go()
     TEST_ASSERT_TRUE(phase(*mega, CENTRE) <= 0.01);
 }
 
-/* What the README says to type, and nothing else: a first start, nothing learnt, no hint. */
-void pattern_of_the_readme_is_there_after_power_on()
-{
-    auto mega = std::make_unique<rig>();
-    make_niti(mega->plant.get());
-    mega->boot(false);
-    mega->expect_ok("pattern 111101111");
-    mega->expect_ok("policy precompensate");
-    run(*mega, 2.0);
-    TEST_ASSERT_EQUAL_UINT16(0, mega->view().spring[0].target_ma);
-    const std::string said = mega->say("model");
-    TEST_ASSERT_TRUE_MESSAGE(contains(said, "cooling"), said.c_str());
-    TEST_ASSERT_TRUE(run(*mega, 178.0) < 115.0);
-    for (unsigned k = 0; k < SPRINGS; ++k) {
-        TEST_ASSERT_TRUE(k == CENTRE ? phase(*mega, k) < 0.05 : phase(*mega, k) >= 0.95);
-    }
-}
-
-void own_temperature_derates_then_trips_until_cleared()
-{
-    auto mega = powered("$temperature_limit_c=60 $trip_time_s=2");
-    mega->expect_ok("on 1");
-    run(*mega, 2.0);
-    TEST_ASSERT_BITS_LOW(DRIVE_POLICY_LIMIT_TEMPERATURE, mega->view().spring[0].limits);
-    TEST_ASSERT_TRUE(run(*mega, 15.0) < 60.0);
-    TEST_ASSERT_TRUE(temperature(*mega, 0) > 52.0); /* derated, not off */
-    const board_view_spring_t derated = mega->view().spring[0];
-    TEST_ASSERT_BITS_HIGH(DRIVE_POLICY_LIMIT_TEMPERATURE, derated.limits);
-    TEST_ASSERT_TRUE(derated.target_ma > 500 && derated.target_ma < 2000);
-    TEST_ASSERT_UINT_WITHIN(30, 3000, derated.wanted_ma);
-    const std::string said = mega->say("model");
-    TEST_ASSERT_TRUE_MESSAGE(contains(said, "A, limits temperature: 1."), said.c_str());
-    TEST_ASSERT_TRUE_MESSAGE(contains(said, " A less"), said.c_str());
-    mega->expect_ok("telemetry csv 5");
-    mega->board.take_output();
-    run(*mega, 2.0);
-    const std::string status = mega->board.take_output();
-    TEST_ASSERT_TRUE_MESSAGE(contains(status, "\r\n<limits|spring:1|t:"), status.c_str());
-    TEST_ASSERT_TRUE_MESSAGE(contains(status, "|temperature|cut_a:1."), status.c_str());
-    TEST_ASSERT_EQUAL_UINT(status.find("<limits"), status.rfind("<limits")); /* told once */
-
-    mega->expect_ok("$temperature_limit_c=40");
-    run(*mega, 1.0);
-    TEST_ASSERT_EQUAL_UINT16(0, mega->view().spring[0].target_ma);
-    TEST_ASSERT_EQUAL_UINT8(SAFETY_FAULT_NONE, mega->view().spring[0].fault);
-    run(*mega, 2.0);
-    TEST_ASSERT_EQUAL_UINT8(SAFETY_FAULT_LIMIT_TRIP, mega->view().spring[0].fault);
-    const std::string tripped = mega->board.take_output();
-    TEST_ASSERT_TRUE_MESSAGE(contains(tripped, "|temperature|cut_a:3.000>\r\n"), tripped.c_str());
-    TEST_ASSERT_TRUE_MESSAGE(contains(tripped, ",fault_14\r\n"), tripped.c_str());
-    mega->expect_ok("telemetry off");
-    TEST_ASSERT_TRUE(contains(mega->say("faults"), "limit_trip"));
-
-    mega->expect_ok("$temperature_limit_c=110"); /* the cause is gone, the latch stays */
-    run(*mega, 1.0);
-    TEST_ASSERT_EQUAL_UINT16(0, mega->view().spring[0].target_ma);
-    TEST_ASSERT_EQUAL_STRING("error:11", mega->answer("on 1").substr(0, 8).c_str());
-    mega->expect_ok("clear");
-    mega->expect_ok("on 1");
-    run(*mega, 2.0);
-    TEST_ASSERT_TRUE(mega->view().spring[0].target_ma > 2900);
-}
-
 void readings_lost_in_a_hold_cost_neither_safety_nor_the_neighbours()
 {
     auto mega = powered();
@@ -213,8 +150,6 @@ int main()
     need_elf(elf());
     UNITY_BEGIN();
     RUN_TEST(heats_then_holds_above_martensite_start_then_lets_go);
-    RUN_TEST(pattern_of_the_readme_is_there_after_power_on);
-    RUN_TEST(own_temperature_derates_then_trips_until_cleared);
     RUN_TEST(readings_lost_in_a_hold_cost_neither_safety_nor_the_neighbours);
     return UNITY_END();
 }

@@ -96,41 +96,28 @@ void expect(const char *wanted, const std::string &got)
 
 /* --- resets --- */
 
-void power_on_sets_its_flag_alone_and_ram_is_garbage()
+/* The flag, and what is counted in .noinit: only the power's coming on loses it. */
+void each_reset_sets_its_flag_and_noinit_survives_but_power_off()
 {
     probe mega;
     expect("0101", mega.ask("m"));
-}
-
-void watchdog_resets_after_its_time_with_its_flag_and_noinit_survives()
-{
-    probe mega;
     mega.send("w");
     board_run_ms(mega.board, 249.0);
     TEST_ASSERT_EQUAL_UINT(0, board_reset_count(mega.board));
     board_run_ms(mega.board, 10.0);
     TEST_ASSERT_EQUAL_UINT(1, board_reset_count(mega.board));
     expect("0802", mega.ask("m"));
-}
-
-void reset_button_and_brown_out_set_their_flags_and_noinit_survives()
-{
-    probe mega;
-    board_reset(mega.board, BOARD_RESET_EXTERNAL);
-    board_run_ms(mega.board, 2.0);
-    expect("0202", mega.ask("m"));
-    board_reset(mega.board, BOARD_RESET_BROWN_OUT);
-    board_run_ms(mega.board, 2.0);
-    expect("0403", mega.ask("m"));
-}
-
-void power_on_again_loses_the_ram()
-{
-    probe mega;
-    board_reset(mega.board, BOARD_RESET_EXTERNAL);
-    board_reset(mega.board, BOARD_RESET_POWER_ON);
-    board_run_ms(mega.board, 2.0);
-    expect("0101", mega.ask("m"));
+    static const struct {
+        board_reset_t cause;
+        const char *says;
+    } table[] = {{BOARD_RESET_EXTERNAL, "0203"},
+                 {BOARD_RESET_BROWN_OUT, "0404"},
+                 {BOARD_RESET_POWER_ON, "0101"}};
+    for (const auto &row : table) {
+        board_reset(mega.board, row.cause);
+        board_run_ms(mega.board, 2.0);
+        expect(row.says, mega.ask("m"));
+    }
 }
 
 /* --- I2C --- */
@@ -206,24 +193,17 @@ void bytes_that_come_while_three_wait_are_lost_and_said_to_be()
 
 /* --- outputs --- */
 
-void compare_zero_still_gives_a_pulse_of_one_clock()
-{
-    probe mega;
-    mega.pwm(0, true);
-    TEST_ASSERT_EQUAL_DOUBLE(1.0 / 800.0, board_duty(mega.board, 0));
-    TEST_ASSERT_FALSE(board_all_off(mega.board));
-    mega.pwm(0, false);
-    TEST_ASSERT_EQUAL_DOUBLE(0.0, board_duty(mega.board, 0));
-    TEST_ASSERT_TRUE(board_all_off(mega.board));
-}
-
 void duty_is_compare_plus_one_over_the_period()
 {
     probe mega;
-    mega.pwm(399, true);
-    TEST_ASSERT_EQUAL_DOUBLE(0.5, board_duty(mega.board, 0));
-    mega.pwm(799, true);
-    TEST_ASSERT_EQUAL_DOUBLE(1.0, board_duty(mega.board, 0));
+    for (const unsigned compare : {0u, 399u, 799u}) {
+        mega.pwm(static_cast<std::uint16_t>(compare), true);
+        TEST_ASSERT_EQUAL_DOUBLE((compare + 1.0) / 800.0, board_duty(mega.board, 0));
+        TEST_ASSERT_FALSE(board_all_off(mega.board));
+    }
+    mega.pwm(0, false);
+    TEST_ASSERT_EQUAL_DOUBLE(0.0, board_duty(mega.board, 0));
+    TEST_ASSERT_TRUE(board_all_off(mega.board));
 }
 
 void a_plain_pin_that_is_high_is_an_output_that_is_on()
@@ -378,17 +358,13 @@ int main()
 {
     need_elf(elf("test/avr/board_probe/board_probe.elf"));
     UNITY_BEGIN();
-    RUN_TEST(power_on_sets_its_flag_alone_and_ram_is_garbage);
-    RUN_TEST(watchdog_resets_after_its_time_with_its_flag_and_noinit_survives);
-    RUN_TEST(reset_button_and_brown_out_set_their_flags_and_noinit_survives);
-    RUN_TEST(power_on_again_loses_the_ram);
+    RUN_TEST(each_reset_sets_its_flag_and_noinit_survives_but_power_off);
     RUN_TEST(a_sensor_read_gives_the_statuses_of_the_data_sheet);
     RUN_TEST(the_bus_has_its_true_speed);
     RUN_TEST(an_absent_address_is_not_acknowledged);
     RUN_TEST(nothing_starts_while_sda_is_held_low_and_the_bus_works_again_after);
     RUN_TEST(a_byte_takes_its_ten_bits);
     RUN_TEST(bytes_that_come_while_three_wait_are_lost_and_said_to_be);
-    RUN_TEST(compare_zero_still_gives_a_pulse_of_one_clock);
     RUN_TEST(duty_is_compare_plus_one_over_the_period);
     RUN_TEST(a_plain_pin_that_is_high_is_an_output_that_is_on);
     RUN_TEST(a_reset_switches_the_outputs_off_at_once);

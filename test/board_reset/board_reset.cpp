@@ -52,16 +52,32 @@ void a_new_board_starts_unlocked_and_off()
     TEST_ASSERT_TRUE(board_all_off(mega.raw()));
 }
 
-void a_hang_ends_with_the_watchdog_and_leaves_the_board_locked()
+/* After a hang, too; what the model knows outlives what does not take the power away. */
+void each_reset_leaves_the_board_off_and_locked_and_keeps_what_it_may()
 {
-    rig mega;
-    heat(mega);
-    board_hang(mega.raw());
-    mega.run_ms(WATCHDOG_MS + 20.0);
-    TEST_ASSERT_EQUAL_UINT(1, board_reset_count(mega.raw()));
-    TEST_ASSERT_TRUE(board_all_off(mega.raw()));
-    mega.boot(false);
-    off_until_unlocked(mega);
+    enum { HANG = -1 };
+    for (const int cause : {static_cast<int>(HANG), static_cast<int>(BOARD_RESET_BROWN_OUT),
+                            static_cast<int>(BOARD_RESET_EXTERNAL)}) {
+        rig mega;
+        heat(mega);
+        const int before_c7 = mega.view().spring[4].temperature_c7;
+        if (cause == HANG) {
+            board_hang(mega.raw());
+            mega.run_ms(WATCHDOG_MS + 20.0);
+            TEST_ASSERT_EQUAL_UINT(1, board_reset_count(mega.raw()));
+        } else {
+            board_reset(mega.raw(), static_cast<board_reset_t>(cause));
+        }
+        TEST_ASSERT_TRUE(board_all_off(mega.raw()));
+        mega.boot(false);
+        if (cause != BOARD_RESET_BROWN_OUT) {
+            TEST_ASSERT_INT_WITHIN(128, before_c7, mega.view().spring[4].temperature_c7);
+        }
+        if (cause != BOARD_RESET_EXTERNAL) { /* who pressed the button knows of it */
+            off_until_unlocked(mega);
+        }
+        TEST_ASSERT_TRUE(cause != BOARD_RESET_EXTERNAL || board_all_off(mega.raw()));
+    }
 }
 
 /* Timer 2 compares, a conversion is complete, timer 1 overflows: nobody has asked for them. */
@@ -203,37 +219,6 @@ void a_control_loop_that_cannot_keep_up_ends_in_a_reset_that_says_so()
     off_until_unlocked(mega);
 }
 
-void a_brown_out_leaves_the_board_locked()
-{
-    rig mega;
-    heat(mega);
-    board_reset(mega.raw(), BOARD_RESET_BROWN_OUT);
-    mega.boot(false);
-    off_until_unlocked(mega);
-}
-
-void the_reset_button_keeps_the_models_temperatures()
-{
-    rig mega;
-    heat(mega);
-    const int before_c7 = mega.view().spring[4].temperature_c7;
-    board_reset(mega.raw(), BOARD_RESET_EXTERNAL);
-    mega.boot(false);
-    TEST_ASSERT_INT_WITHIN(128, before_c7, mega.view().spring[4].temperature_c7);
-    TEST_ASSERT_TRUE(board_all_off(mega.raw()));
-}
-
-void a_watchdog_reset_keeps_the_models_temperatures()
-{
-    rig mega;
-    heat(mega);
-    const int before_c7 = mega.view().spring[4].temperature_c7;
-    board_hang(mega.raw());
-    mega.run_ms(WATCHDOG_MS + 20.0);
-    mega.boot(false);
-    TEST_ASSERT_INT_WITHIN(128, before_c7, mega.view().spring[4].temperature_c7);
-}
-
 /* In the first 90 s the model's temperatures are guesses, which a reset must not make certain: what
  * open loop gave meanwhile is none. */
 void a_reset_keeps_the_heat_that_was_given_before_anything_was_known()
@@ -298,15 +283,12 @@ int main()
     need_elf(elf());
     UNITY_BEGIN();
     RUN_TEST(a_new_board_starts_unlocked_and_off);
-    RUN_TEST(a_hang_ends_with_the_watchdog_and_leaves_the_board_locked);
+    RUN_TEST(each_reset_leaves_the_board_off_and_locked_and_keeps_what_it_may);
     RUN_TEST(an_interrupt_that_nobody_has_ends_as_a_hang_does);
     RUN_TEST(whatever_bit_turns_over_the_board_answers_and_nothing_stays_hot);
     RUN_TEST(a_setting_that_turns_over_by_itself_ends_in_a_reset_that_says_so);
     RUN_TEST(a_belief_that_turns_over_by_itself_begins_anew_and_says_so);
     RUN_TEST(a_control_loop_that_cannot_keep_up_ends_in_a_reset_that_says_so);
-    RUN_TEST(a_brown_out_leaves_the_board_locked);
-    RUN_TEST(the_reset_button_keeps_the_models_temperatures);
-    RUN_TEST(a_watchdog_reset_keeps_the_models_temperatures);
     RUN_TEST(a_reset_keeps_the_heat_that_was_given_before_anything_was_known);
     RUN_TEST(after_power_on_a_spring_waits_until_it_cannot_be_hot);
     RUN_TEST(the_watchdog_is_never_hungry_in_normal_work);

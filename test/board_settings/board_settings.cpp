@@ -59,17 +59,6 @@ void save(rig &mega)
     TEST_FAIL_MESSAGE("the save does not end");
 }
 
-void every_line_can_be_pasted_back()
-{
-    rig mega;
-    mega.boot();
-    const std::vector<std::string> before = settings_of(mega);
-    for (const std::string &line : before) {
-        mega.expect_ok(line.substr(0, line.find_first_of(" #;")));
-    }
-    same(before, settings_of(mega));
-}
-
 void settings_of_one_board_make_another_the_same()
 {
     rig one;
@@ -154,47 +143,6 @@ void power_cut_in_a_save_leaves_old_or_new()
     TEST_ASSERT_TRUE_MESSAGE(seen_new, "no save was complete");
 }
 
-/* How far the chip's model is off the array after a minute of all springs at half the fan, K. */
-double off_at_half_a_fan(rig &mega)
-{
-    mega.expect_ok("$observer=0"); /* the resistance would mend it */
-    mega.expect_ok("fan 50");
-    mega.expect_ok("on all");
-    mega.run_ms(60000.0);
-    const board_view_t seen = mega.view();
-    double worst = 0.0;
-    for (unsigned k = 0; k < BOARD_CHANNELS; ++k) {
-        const double off = seen.spring[k].temperature_c7 / 128.0 -
-                           plant_temperature_c(mega.plant.get(), static_cast<int>(k));
-        worst = std::fabs(off) > std::fabs(worst) ? off : worst;
-    }
-    return worst;
-}
-
-/* A fan as in print: without having been told the model takes the springs for hotter than they are;
- * told it is right, and stays so. */
-void what_half_a_fan_gives_is_kept_and_cools_the_model()
-{
-    rig untold;
-    switch_on(untold.plant.get(), "fan_curve");
-    TEST_ASSERT_EQUAL(PLANT_OK, plant_set(untold.plant.get(), "fan_half_share", 0.735));
-    untold.boot();
-    TEST_ASSERT_TRUE(off_at_half_a_fan(untold) > 2.0);
-
-    rig told;
-    switch_on(told.plant.get(), "fan_curve");
-    TEST_ASSERT_EQUAL(PLANT_OK, plant_set(told.plant.get(), "fan_half_share", 0.735));
-    told.boot();
-    told.expect_ok("$fan_half_share=0.735");
-    save(told);
-    board_reset(told.raw(), BOARD_RESET_POWER_ON);
-    told.boot();
-    TEST_ASSERT_DOUBLE_WITHIN(0.5, 0.0, off_at_half_a_fan(told));
-    told.expect_ok("off all");
-    TEST_ASSERT_TRUE(contains(told.say("$fan_half_share=0.95"), "error:"));
-    TEST_ASSERT_TRUE(contains(told.say("$$", 10000.0), "$fan_half_share=0.735"));
-}
-
 /* At once and while springs are driven, without a fault. */
 void averaging_is_set_while_it_runs()
 {
@@ -224,11 +172,9 @@ int main()
 {
     need_elf(elf());
     UNITY_BEGIN();
-    RUN_TEST(every_line_can_be_pasted_back);
     RUN_TEST(settings_of_one_board_make_another_the_same);
     RUN_TEST(what_is_not_saved_is_gone_after_power_off);
     RUN_TEST(power_cut_in_a_save_leaves_old_or_new);
-    RUN_TEST(what_half_a_fan_gives_is_kept_and_cools_the_model);
     RUN_TEST(averaging_is_set_while_it_runs);
     return UNITY_END();
 }

@@ -43,12 +43,35 @@ void off_and_stays_off(rig &mega, const std::string &before = "")
     }
 }
 
-void stops_while_it_drives()
+/* As it drives, prints, tells; in the middle of a command, behind others that it drops, and behind
+ * a line of garbage. Afterwards the console answers, and the board can be cleared. */
+void stops_whatever_is_sent_before()
 {
-    rig mega;
-    all_on(mega);
-    off_and_stays_off(mega);
-    TEST_ASSERT_EQUAL_UINT8(SAFETY_FAULT_EMERGENCY_STOP, mega.view().board_fault);
+    static const struct {
+        const char *sent; /* so long before */
+        double ms;
+        std::string before; /* right before */
+    } table[] = {{"", 0.0, ""},
+                 {"", 0.0, "on a"},
+                 {"$$\n", 20.0, ""},
+                 {"telemetry csv 50\n", 200.0, ""},
+                 {"", 0.0, "on 1\non 2\non 3\n"},
+                 {"", 0.0, std::string(300, 'x')}};
+    for (const auto &row : table) {
+        rig mega;
+        all_on(mega);
+        mega.board.send(row.sent);
+        mega.run_ms(row.ms);
+        off_and_stays_off(mega, row.before);
+        TEST_ASSERT_EQUAL_UINT8(SAFETY_FAULT_EMERGENCY_STOP, mega.view().board_fault);
+        mega.board.send("\ntelemetry off\n"); /* and ends what is left of a line */
+        mega.run_ms(300.0);
+        mega.board.take_output();
+        mega.expect_ok("clear");
+        mega.expect_ok("on 1");
+        mega.run_ms(200.0);
+        TEST_ASSERT_FALSE(board_all_off(mega.raw()));
+    }
 }
 
 void stops_at_any_moment_of_a_tick()
@@ -60,22 +83,6 @@ void stops_at_any_moment_of_a_tick()
         const double ms = off_after_ms(mega);
         TEST_ASSERT_TRUE(ms <= LIMIT_MS);
     }
-}
-
-void stops_in_the_middle_of_a_command()
-{
-    rig mega;
-    all_on(mega);
-    off_and_stays_off(mega, "on a");
-}
-
-void stops_while_it_prints_every_setting()
-{
-    rig mega;
-    all_on(mega);
-    mega.board.send("$$\n");
-    mega.run_ms(20.0);
-    off_and_stays_off(mega);
 }
 
 void stops_while_it_writes_the_eeprom()
@@ -103,29 +110,6 @@ void stops_while_the_i2c_bus_hangs()
     }
     TEST_ASSERT_FALSE_MESSAGE(board_all_off(mega.raw()), "off before the stop: nothing is tested");
     off_and_stays_off(mega);
-}
-
-void stops_behind_a_full_line_of_garbage()
-{
-    rig mega;
-    all_on(mega);
-    off_and_stays_off(mega, std::string(300, 'x'));
-}
-
-void stops_in_the_middle_of_telemetry()
-{
-    rig mega;
-    all_on(mega);
-    mega.board.send("telemetry csv 50\n");
-    mega.run_ms(200.0);
-    off_and_stays_off(mega);
-}
-
-void what_was_sent_before_the_stop_does_not_start_anything_after()
-{
-    rig mega;
-    all_on(mega);
-    off_and_stays_off(mega, "on 1\non 2\non 3\n");
 }
 
 /* Sent in one go: what comes behind the stop is none of what it drops. */
@@ -240,18 +224,6 @@ void a_driven_spring_has_its_current_again_whatever_bit_turns_over()
     TEST_ASSERT_EQUAL_UINT8(SAFETY_FAULT_NONE, mega.view().board_fault);
 }
 
-void the_console_still_answers_and_the_board_can_be_cleared()
-{
-    rig mega;
-    all_on(mega);
-    off_and_stays_off(mega);
-    mega.board.take_output();
-    mega.expect_ok("clear");
-    mega.expect_ok("on 1");
-    mega.run_ms(200.0);
-    TEST_ASSERT_FALSE(board_all_off(mega.raw()));
-}
-
 } // namespace
 
 void setUp() {}
@@ -261,19 +233,13 @@ int main()
 {
     need_elf(elf());
     UNITY_BEGIN();
-    RUN_TEST(stops_while_it_drives);
+    RUN_TEST(stops_whatever_is_sent_before);
     RUN_TEST(stops_at_any_moment_of_a_tick);
-    RUN_TEST(stops_in_the_middle_of_a_command);
-    RUN_TEST(stops_while_it_prints_every_setting);
     RUN_TEST(stops_while_it_writes_the_eeprom);
     RUN_TEST(stops_while_the_i2c_bus_hangs);
-    RUN_TEST(stops_behind_a_full_line_of_garbage);
-    RUN_TEST(stops_in_the_middle_of_telemetry);
-    RUN_TEST(what_was_sent_before_the_stop_does_not_start_anything_after);
     RUN_TEST(a_line_right_behind_the_stop_is_obeyed_at_any_moment_of_a_tick);
     RUN_TEST(stops_whatever_bit_of_an_output_has_turned_over);
     RUN_TEST(off_is_off_again_within_a_tick_whatever_bit_turns_over);
     RUN_TEST(a_driven_spring_has_its_current_again_whatever_bit_turns_over);
-    RUN_TEST(the_console_still_answers_and_the_board_can_be_cleared);
     return UNITY_END();
 }

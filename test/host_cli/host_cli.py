@@ -193,6 +193,8 @@ class Arguments(Case):
     def test_standard_output_holds_one_thing(self) -> None:
         for command in (("paper", "-o", self.output), ("parameters",)):
             json.loads(self.works(*command, "--json", "-"))
+        self.file("s.ini", SCENARIO)
+        self.assertTrue(self.works("run", "s.ini", "-o", "-").startswith("# tool: ninespring-sim"))
 
     def test_a_disk_that_refuses_is_failed_work(self) -> None:
         if not Path("/dev/full").exists():
@@ -497,26 +499,15 @@ class Run(Case):
         for path in shipped:
             self.works("run", path, "-o", self.output)
 
-    def test_to_standard_output(self) -> None:
-        self.file("s.ini", SCENARIO)
-        self.assertTrue(self.works("run", "s.ini", "-o", "-").startswith("# tool: ninespring-sim"))
-
 
 class BadScenario(Case):
     def test_refused_with_place(self) -> None:
+        """As the reader says it; each of its refusals is in test/host_files."""
         refused = self.scenario_refused
         refused("s.ini:17:1: ", "appears twice", SCENARIO + "[chip]\nopen_current_a = 1\n")
-        refused("s.ini:7:1: ", "no key", SCENARIO.replace("[plant]", "[array]"))
-        refused("s.ini:16:1: ", "there is no section", SCENARIO + "[plants]\n")
-        refused("s.ini:2:14: ", "decimal comma", SCENARIO.replace("= 20", "= 20,5"))
-        refused("s.ini:2:14: ", "not a number", SCENARIO.replace("= 20", "= 20 min"))
-        refused("s.ini:2:14: ", "finite", SCENARIO.replace("= 20", "= nan"))
-        refused("s.ini:15:", "no word 'dance'", SCENARIO.replace("off all", "dance"))
-        refused("s.ini:1:1: ", "empty", "")
-        refused("s.ini:16:198: ", "at most 197", SCENARIO + "x" * 1000000)
-        refused("s.ini:16:1: ", "neither", SCENARIO + "at 16")
         refused("s.ini:1:1: ", "UTF-16", SCENARIO.encode("utf-16"))
-        refused("s.ini:16:1: ", "zero byte", SCENARIO.encode() + b"\0")
+        refused("--set 'ambient_cc=3': ", "ambient_c", SCENARIO, "--set", "ambient_cc=3")
+        self.refused("none.ini: ", "cannot be read", "run", "none.ini", "-o", self.output)
 
     def test_names_of_the_plant_and_the_chip(self) -> None:
         plant = "[plant]\n{}\n[scenario]\nduration_s = 1\n"
@@ -555,20 +546,6 @@ class BadScenario(Case):
     def test_a_log_that_memory_could_not_hold(self) -> None:
         long = SCENARIO.replace("= 20", "= 1000000").replace("= 0.5", "= 0.02")
         self.scenario_refused("s.ini:1:1: ", "make log_interval_s longer", long)
-
-    def test_missing_file(self) -> None:
-        self.refused("none.ini: ", "cannot be read", "run", "none.ini", "-o", self.output)
-
-    def test_set_arguments(self) -> None:
-        self.scenario_refused("--set 'ambient_c': ", "key=value", SCENARIO, "--set", "ambient_c")
-        self.scenario_refused("--set 'ambient_cc=3': ", "ambient_c", SCENARIO, "--set", "ambient_cc=3")
-        self.scenario_refused(
-            "--set 'ambient_c=1,5': ",
-            "decimal comma",
-            SCENARIO,
-            "--set",
-            "ambient_c=1,5",
-        )
 
 
 def rows_of_text(content: bytes) -> list[dict[str, str]]:

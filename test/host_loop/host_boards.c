@@ -21,7 +21,6 @@ void setUp(void)
 {
     for (int k = 0; k < 4; k++) {
         controller_settings_default(&settings[k]);
-        settings[k].policy.policy = DRIVE_POLICY_OPEN;
         settings[k].policy.policy = DRIVE_POLICY_PRECOMPENSATE;
     }
     plant = NULL;

@@ -157,41 +157,6 @@ static void estimate_follows_through_the_transformation(void)
     TEST_ASSERT_TRUE(worst_c < 0.5);
 }
 
-static void same_seed_same_run_other_seed_other_noise(void)
-{
-    loop_options_t options;
-    loop_options_default(&options);
-    options.shunt_noise_v = 100e-6;
-    start_with(&options, 5);
-    loop_t *twin = loop_create(&settings, plant, &options, 5, NULL);
-    loop_t *other = loop_create(&settings, plant, &options, 6, NULL);
-    TEST_ASSERT_NOT_NULL(twin);
-    TEST_ASSERT_NOT_NULL(other);
-    command(0x155);
-    TEST_ASSERT_TRUE(controller_set_target(loop_controller(twin), 0, 1000));
-    loop_t *ours = loop;
-    loop = twin;
-    command(0x155);
-    loop = other;
-    command(0x155);
-    loop = ours;
-    bool differs = false;
-    for (int n = 0; n < 5000; n++) {
-        loop_tick(loop);
-        loop_tick(twin);
-        loop_tick(other);
-        TEST_ASSERT_EQUAL_MEMORY(loop_inputs(loop), loop_inputs(twin), sizeof(controller_inputs_t));
-        TEST_ASSERT_EQUAL_MEMORY(loop_outputs(loop), loop_outputs(twin),
-                                 sizeof(controller_outputs_t));
-        TEST_ASSERT_TRUE(true_c(4) == plant_temperature_c(loop_plant(twin), 4)); /* to the bit */
-        differs = differs ||
-                  memcmp(loop_inputs(loop), loop_inputs(other), sizeof(controller_inputs_t)) != 0;
-    }
-    TEST_ASSERT_TRUE(differs);
-    loop_destroy(twin);
-    loop_destroy(other);
-}
-
 static void coarser_plant_steps_change_little(void)
 {
     loop_options_t options;
@@ -351,20 +316,6 @@ static void switch_that_fails_closed_is_named_within_15_ticks(void)
     }
 }
 
-static void a_contact_in_mid_run_takes_voltage_and_heats_nothing(void)
-{
-    start();
-    TEST_ASSERT_EQUAL(PLANT_OK, plant_set_effect(loop_plant(loop), "contact_resistance", true));
-    command(0x1FF);
-    loop_advance(loop, 400.0);
-    const int before_mv = loop_inputs(loop)->sensor[2].voltage_mv;
-    const double before_c = true_c(2);
-    TEST_ASSERT_EQUAL(PLANT_OK, plant_set(loop_plant(loop), "contact_ohm[3]", 0.03));
-    loop_advance(loop, 60.0);
-    TEST_ASSERT_INT_WITHIN(8, before_mv + 45, loop_inputs(loop)->sensor[2].voltage_mv); /* 1.5 A */
-    TEST_ASSERT_DOUBLE_WITHIN(0.5, before_c, true_c(2));
-}
-
 static void the_chip_believes_the_ambient_that_it_is_told(void)
 {
     start();
@@ -376,24 +327,6 @@ static void the_chip_believes_the_ambient_that_it_is_told(void)
     TEST_ASSERT_TRUE(loop_tell_ambient(loop, (double)NAN));
     loop_tick(loop);
     TEST_ASSERT_EQUAL_INT16(30 * 128, loop_inputs(loop)->ambient_c7);
-}
-
-static void stopped_fan_makes_the_springs_hotter_than_the_chip_believes(void)
-{
-    settings.policy.open_current_ma = 1300;
-    start();
-    TEST_ASSERT_TRUE(controller_set_fan(loop_controller(loop), 100));
-    command(0x1FF);
-    loop_advance(loop, 300.0);
-    double cooled_c = true_c(4);
-    TEST_ASSERT_DOUBLE_WITHIN(1.0, cooled_c, chip_c(4));
-    TEST_ASSERT_TRUE(loop_act(loop, LOOP_ACTION_FAN_STOP, -1));
-    loop_advance(loop, 300.0);
-    TEST_ASSERT_TRUE(true_c(4) > cooled_c + 10.0);
-    TEST_ASSERT_DOUBLE_WITHIN(1.0, cooled_c, chip_c(4));
-    TEST_ASSERT_TRUE(loop_act(loop, LOOP_ACTION_FAN_GOOD, -1));
-    loop_advance(loop, 300.0);
-    TEST_ASSERT_DOUBLE_WITHIN(1.0, cooled_c, true_c(4));
 }
 
 static void after_a_reset_nothing_runs_until_unlocked(void)
@@ -506,16 +439,13 @@ int main(void)
     UNITY_BEGIN();
     RUN_TEST(plain_current_follows_the_patterns);
     RUN_TEST(estimate_follows_through_the_transformation);
-    RUN_TEST(same_seed_same_run_other_seed_other_noise);
     RUN_TEST(coarser_plant_steps_change_little);
     RUN_TEST(sagging_supply_still_gives_the_current);
     RUN_TEST(each_failure_is_found_and_is_of_its_spring);
     RUN_TEST(a_repair_ends_its_own_failure_only);
     RUN_TEST(frozen_lying_and_swapped_sensors_show_what_they_should_not);
     RUN_TEST(switch_that_fails_closed_is_named_within_15_ticks);
-    RUN_TEST(a_contact_in_mid_run_takes_voltage_and_heats_nothing);
     RUN_TEST(the_chip_believes_the_ambient_that_it_is_told);
-    RUN_TEST(stopped_fan_makes_the_springs_hotter_than_the_chip_believes);
     RUN_TEST(after_a_reset_nothing_runs_until_unlocked);
     RUN_TEST(watchdog_keeps_the_model_as_it_is);
     RUN_TEST(ambient_reaches_plant_and_chip_with_its_error);

@@ -93,20 +93,6 @@ static void a_taxel_alone_is_two_nodes_and_a_joint(void)
     plant_destroy(taxel);
 }
 
-/* Spring 6 above heats 18 below, and that heats its neighbours there: nothing else of the layer
- * below is nearer. */
-static void heat_goes_down_its_own_taxel(void)
-{
-    OK(plant_drive(both, 5, PLANT_DRIVE_POWER, 0.5));
-    OK(plant_settle(both, 1e5));
-    for (int i = 1; i < SPRINGS; i++)
-        TEST_ASSERT_TRUE(plant_temperature_c(both, SPRINGS + 5) >
-                         plant_temperature_c(both, SPRINGS + (5 + i) % SPRINGS) + 0.5);
-    TEST_ASSERT_TRUE(plant_temperature_c(both, SPRINGS + 4) > 20.1);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-4, plant_temperature_c(both, SPRINGS + 1),
-                              plant_temperature_c(both, SPRINGS + 9)); /* above and below it */
-}
-
 static void energy_closes(void)
 {
     dress(both);
@@ -140,7 +126,6 @@ int main(void)
     UNITY_BEGIN();
     RUN_TEST(without_the_joint_each_layer_is_an_array);
     RUN_TEST(a_taxel_alone_is_two_nodes_and_a_joint);
-    RUN_TEST(heat_goes_down_its_own_taxel);
     RUN_TEST(energy_closes);
     RUN_TEST(sizes);
     return UNITY_END();

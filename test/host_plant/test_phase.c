@@ -91,35 +91,6 @@ static void latent_heat_delays_by_its_energy_and_changes_no_steady_state(void)
     TEST_ASSERT_DOUBLE_WITHIN(1e-4, 20.0 + 0.5 / 0.0058, at(0));
 }
 
-static void cooling_gives_back_its_own_share(void)
-{
-    uncouple();
-    set("loss_w_per_k", 0.0);
-    on("latent_heat");
-    set("latent_cooling_ratio", 0.336);
-    hold(0, 100.0);
-    OK(plant_step(plant, 1.0));
-    const double in = plant_energy_input_j(plant);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.3 * 80 + 8.65, in);
-    hold(0, 20.0);
-    OK(plant_step(plant, 1.0));
-    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 8.65 * (1 - 0.336), plant_energy_input_j(plant));
-}
-
-static void a_load_moves_all_four_temperatures(void)
-{
-    on("transformation_shift");
-    set("transformation_shift_k[1]", 6.0);
-    static const double path[][2] = {{94, 0}, {99, 0.5}, {104, 1}, {84, 1}, {79, 0.5}, {74, 0}};
-    for (int k = 0; k < 6; k++) {
-        lead(path[k][0]);
-        TEST_ASSERT_DOUBLE_WITHIN(1e-9, path[k][1], plant_austenite(plant, 0));
-    }
-    hold(1, 93.0); /* without a load */
-    OK(plant_step(plant, 0.01));
-    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.5, plant_austenite(plant, 1));
-}
-
 static void a_logged_load_moves_them_by_so_much_a_newton(void)
 {
     on("transformation_shift");
@@ -200,8 +171,6 @@ int main(void)
     RUN_TEST(overlapping_bands_stay_within_the_outer_loop);
     RUN_TEST(turning_within_overlapping_bands_does_not_jump);
     RUN_TEST(latent_heat_delays_by_its_energy_and_changes_no_steady_state);
-    RUN_TEST(cooling_gives_back_its_own_share);
-    RUN_TEST(a_load_moves_all_four_temperatures);
     RUN_TEST(a_logged_load_moves_them_by_so_much_a_newton);
     RUN_TEST(a_load_on_a_hot_spring_warms_it_by_what_it_gives_back);
     RUN_TEST(a_load_on_a_held_spring_leaves_its_heat_with_whatever_holds_it);

@@ -48,8 +48,7 @@ void switch_on(plant_t *plant, const char *effect)
 class world
 {
 public:
-    explicit world(const differs_t &differs = {}, double shunt_noise_v = 0.0,
-                   double bus_noise_v = 0.0, double ambient_error_c = 0.0)
+    explicit world(const differs_t &differs = {}, double ambient_error_c = 0.0)
     {
         std::unique_ptr<plant_t, deleter> drawn(plant_create(3, 3));
         switch_on(drawn.get(), "latent_heat");
@@ -63,8 +62,6 @@ public:
         settings.policy.policy = DRIVE_POLICY_PRECOMPENSATE;
         loop_options_t options;
         loop_options_default(&options);
-        options.shunt_noise_v = shunt_noise_v;
-        options.bus_noise_v = bus_noise_v;
         options.ambient_error_c = ambient_error_c;
         loop.reset(loop_create(&settings, drawn.get(), &options, 1, nullptr));
         TEST_ASSERT_NOT_NULL(loop.get());
@@ -174,11 +171,10 @@ private:
 
 /* ---- arrays and rooms ---- */
 
-void eight_come_and_stay(const differs_t &differs, unsigned by_s, unsigned end_s,
-                         double shunt_noise_v = 0.0, double bus_noise_v = 0.0)
+void eight_come_and_stay(const differs_t &differs, unsigned end_s)
 {
-    world w(differs, shunt_noise_v, bus_noise_v);
-    w.until(by_s);
+    world w(differs);
+    w.until(FIRST_START_S);
     w.expect_eight_on();
     w.until(end_s);
     w.expect_only_the_first(SAFETY_FAULT_NONE);
@@ -194,35 +190,21 @@ void a_resistance_that_rises_with_temperature_overheats_nothing()
                 set(plant, "resistance_martensite_rise_per_k", rise_per_k);
                 set(plant, "resistance_austenite_rise_per_k", rise_per_k);
             },
-            FIRST_START_S, 300);
+            300);
     }
-}
-
-void a_resistance_that_falls_where_it_should_rise_is_no_loss_of_phase()
-{
-    eight_come_and_stay(
-        [](plant_t *plant) { set(plant, "resistance_austenite_ohm", 0.85 * 0.175); }, FIRST_START_S,
-        400);
-}
-
-/* One conversion: 4 mV, and 0.4 mV on the shunt, 4 mA. */
-void noise_of_a_step_of_the_sensor_is_no_loss_of_phase()
-{
-    eight_come_and_stay({}, FIRST_START_S, 300, 0.4e-3, 4e-3);
 }
 
 /* A supply at either end of what is declared. */
 void another_supply_is_no_fault()
 {
     for (const double supply_v : {4.2, 5.5}) {
-        eight_come_and_stay([supply_v](plant_t *plant) { set(plant, "supply_v", supply_v); },
-                            FIRST_START_S, 200);
+        eight_come_and_stay([supply_v](plant_t *plant) { set(plant, "supply_v", supply_v); }, 200);
     }
 }
 
 void a_room_ten_kelvin_warmer_than_the_setting_leaves_no_spring_unsettled()
 {
-    world w([](plant_t *plant) { set(plant, "ambient_c", 30.0); }, 0.0, 0.0, -10.0);
+    world w([](plant_t *plant) { set(plant, "ambient_c", 30.0); }, -10.0);
     w.until(600);
     w.expect_eight_on();
     const unsigned before = w.heatings();
@@ -247,21 +229,6 @@ void a_fingertip_on_every_spring_is_lived_with_within_bounds()
 }
 
 /* ---- sensors ---- */
-
-/* It acknowledges, converts, and shows the same for ever. */
-void a_sensor_that_freezes_while_its_spring_is_driven_is_found_in_two_seconds()
-{
-    for (const unsigned frozen_s : {112u, 250u}) { /* it heats; it is held */
-        world w;
-        w.until(frozen_s);
-        TEST_ASSERT_TRUE(w.driven(0));
-        TEST_ASSERT_TRUE(loop_act(w.loop.get(), LOOP_ACTION_SENSOR_FREEZE, 0));
-        loop_advance(w.loop.get(), FAULT_S);
-        TEST_ASSERT_EQUAL(SAFETY_FAULT_SENSOR_MISMATCH, w.fault(0));
-        w.until(300);
-        w.expect_only_the_first(SAFETY_FAULT_SENSOR_MISMATCH);
-    }
-}
 
 /* It shows no current, and so it does for ever: as a broken spring would. */
 void a_sensor_that_froze_while_the_board_waited_is_found_when_its_spring_is_driven()
@@ -306,11 +273,11 @@ void a_sensor_that_shows_a_fifth_too_little_overheats_nothing()
     w.until(300);
 }
 
-/* The near miss of all of them: gains and offsets as its data sheet allows. */
-void a_sensor_within_its_data_sheet_is_no_fault()
+/* The near miss of all of them: both numbers off by as much as a bad sensor's may be. */
+void a_sensor_that_is_a_little_off_is_no_fault()
 {
     world w;
-    TEST_ASSERT_TRUE(loop_scale_sensor(w.loop.get(), 0, 0.97, 1.03));
+    TEST_ASSERT_TRUE(loop_scale_sensor(w.loop.get(), 0, 0.95, 1.05));
     w.until(FIRST_START_S);
     w.expect_eight_on();
     w.until(400);
@@ -326,15 +293,12 @@ int main()
 {
     UNITY_BEGIN();
     RUN_TEST(a_resistance_that_rises_with_temperature_overheats_nothing);
-    RUN_TEST(a_resistance_that_falls_where_it_should_rise_is_no_loss_of_phase);
-    RUN_TEST(noise_of_a_step_of_the_sensor_is_no_loss_of_phase);
     RUN_TEST(another_supply_is_no_fault);
     RUN_TEST(a_room_ten_kelvin_warmer_than_the_setting_leaves_no_spring_unsettled);
     RUN_TEST(a_fingertip_on_every_spring_is_lived_with_within_bounds);
-    RUN_TEST(a_sensor_that_freezes_while_its_spring_is_driven_is_found_in_two_seconds);
     RUN_TEST(a_sensor_that_froze_while_the_board_waited_is_found_when_its_spring_is_driven);
     RUN_TEST(sensors_that_are_swapped_switch_their_springs_off_in_two_seconds);
     RUN_TEST(a_sensor_that_shows_a_fifth_too_little_overheats_nothing);
-    RUN_TEST(a_sensor_within_its_data_sheet_is_no_fault);
+    RUN_TEST(a_sensor_that_is_a_little_off_is_no_fault);
     return UNITY_END();
 }

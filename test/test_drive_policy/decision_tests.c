@@ -8,28 +8,20 @@
 #include "spring_estimator_internal.h"
 #include "unity.h"
 
-#define ROWS(table) (sizeof(table) / sizeof((table)[0]))
-#define OHM         0.2f
-#define GIVES_W     0.4f
-#define FOLLOW_W    0.075f /* for 1 K in 4 s: 0.3 J/K */
-#define BOOST_MA    3000
-#define PROBE_MA    400
-#define OFF         DRIVE_POLICY_STAGE_OFF
-#define HEAT        DRIVE_POLICY_STAGE_HEAT
-#define HOLD        DRIVE_POLICY_STAGE_HOLD
-#define LOWER       DRIVE_POLICY_STAGE_LOWER
-#define HOT         DRIVE_POLICY_LIMIT_TEMPERATURE
-#define BESIDE      DRIVE_POLICY_LIMIT_UNDRIVEN
-#define M           SPRING_PHASE_MARTENSITE
-#define B           SPRING_PHASE_BETWEEN
-#define A           SPRING_PHASE_AUSTENITE
-
-static char where[80];
-
-static void row(size_t n)
-{
-    (void)snprintf(where, sizeof where, "row %u", (unsigned)n);
-}
+#define OHM      0.2f
+#define GIVES_W  0.4f
+#define FOLLOW_W 0.075f /* for 1 K in 4 s: 0.3 J/K */
+#define BOOST_MA 3000
+#define PROBE_MA 400
+#define OFF      DRIVE_POLICY_STAGE_OFF
+#define HEAT     DRIVE_POLICY_STAGE_HEAT
+#define HOLD     DRIVE_POLICY_STAGE_HOLD
+#define LOWER    DRIVE_POLICY_STAGE_LOWER
+#define HOT      DRIVE_POLICY_LIMIT_TEMPERATURE
+#define BESIDE   DRIVE_POLICY_LIMIT_UNDRIVEN
+#define M        SPRING_PHASE_MARTENSITE
+#define B        SPRING_PHASE_BETWEEN
+#define A        SPRING_PHASE_AUSTENITE
 
 static spring_belief_t *of(uint8_t k)
 {
@@ -705,6 +697,9 @@ static void each_limit_is_said_where_it_cuts(void)
         TEST_ASSERT_EQUAL_UINT16_MESSAGE(table[n].limits, drive_policy_limits(&policy, 0), where);
         TEST_ASSERT_EQUAL_UINT16_MESSAGE(table[n].wanted_ma - table[n].gets_ma,
                                          drive_policy_cut_ma(&policy, 0), where);
+        level[0] = 0; /* and no longer */
+        policy_tick();
+        TEST_ASSERT_EQUAL_UINT16_MESSAGE(0, drive_policy_limits(&policy, 0), where);
     }
 }
 

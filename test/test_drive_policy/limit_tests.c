@@ -11,21 +11,6 @@
 
 #define ROUND_TICKS 25u /* two rounds of turns: each spring has had two */
 #define FULL_MA     3000
-#define ROWS(table) (sizeof(table) / sizeof((table)[0]))
-
-static char where[80];
-
-static void row(size_t n)
-{
-    (void)snprintf(where, sizeof where, "row %u", (unsigned)n);
-}
-
-static uint32_t random_state = 7;
-static uint32_t random_below(uint32_t limit)
-{
-    random_state = random_state * 1664525u + 1013904223u;
-    return (random_state >> 8) % limit;
-}
 
 /* ---- derating ---- */
 
@@ -97,8 +82,6 @@ static void doubt_that_others_share_derates_nobody(void)
                                        target_ma[4], where);
     }
 }
-
-/* ---- the hold's margin ---- */
 
 /* ---- supply ---- */
 

@@ -7,8 +7,9 @@
 #include "../fakes/belief_inside.h"
 #include "drive_policy.h"
 
-#define SPRINGS 9
-#define TICK_S  0.02
+#define SPRINGS     9
+#define TICK_S      0.02
+#define ROWS(table) (sizeof(table) / sizeof((table)[0]))
 
 typedef struct {
     double temperature_c, austenite;
@@ -24,9 +25,13 @@ extern drive_policy_t policy;
 extern drive_policy_parameters_t parameters; /* what make takes; defaults at a test's begin */
 extern uint16_t level[SPRINGS];
 extern bool allowed[SPRINGS];
-extern bool deaf; /* no readings */
 extern uint16_t target_ma[SPRINGS];
 extern uint16_t supply_limit_ma, maximum_current_ma;
+
+extern char where[120]; /* to be said where a test fails */
+/* What a failing test says: the row of its table. */
+void row(size_t n);
+uint32_t random_below(uint32_t limit);
 
 void set_defaults(void);
 /* So many springs at 20 degC; the power has come on, and nothing is known. */

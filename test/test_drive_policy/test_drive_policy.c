@@ -13,8 +13,6 @@
 #define FULL_BOOST_MA 3000u
 #define TURN_TICKS    13u /* in which each spring is decided on once, rounded up */
 
-static char where[120];
-
 void setUp(void)
 {
     set_defaults();
@@ -30,13 +28,6 @@ static void want_all(uint16_t permille)
     for (uint8_t k = 0; k < SPRINGS; k++) {
         level[k] = permille;
     }
-}
-
-static uint32_t random_state = 7;
-static uint32_t random_below(uint32_t limit)
-{
-    random_state = random_state * 1664525u + 1013904223u;
-    return (random_state >> 8) % limit;
 }
 
 /* ---- from power-on ---- */
@@ -94,21 +85,6 @@ static void jump_of_the_current_forgets_no_phase(void)
     }
 }
 
-static void spring_that_had_to_wait_half_transformed_goes_on_to_the_end(void)
-{
-    begin_cold(1, 2);
-    level[0] = 1000;
-    while (truth[0].austenite < 0.3) {
-        (void)tick();
-    }
-    supply_limit_ma = 0;
-    (void)run(12.0);
-    supply_limit_ma = 15000;
-    (void)run(30.0);
-    (void)snprintf(where, sizeof where, "%.3f", truth[0].austenite);
-    TEST_ASSERT_TRUE_MESSAGE(truth[0].austenite > 0.99, where);
-}
-
 /* A touch, slower than a contact's jump. The largest would need more heat than a spring is allowed:
  * that is said. */
 static void spring_that_has_lost_its_phase_is_heated_back_or_that_is_said(void)
@@ -123,7 +99,7 @@ static void spring_that_has_lost_its_phase_is_heated_back_or_that_is_said(void)
             (void)run(1.0);
             least = fmin(least, truth[0].austenite);
         }
-        const bool says = spring_away_says(&policy.spring[0].away);
+        const bool says = (drive_policy_limits(&policy, 0) & DRIVE_POLICY_LIMIT_AWAY) != 0;
         (void)snprintf(where, sizeof where, "%.0f K: %.3f, %.1f degC, %.3f, says %d", touch_k,
                        least, truth[0].temperature_c, truth[0].austenite, says);
         TEST_ASSERT_TRUE_MESSAGE(least < 0.95, where); /* it did lose */
@@ -180,42 +156,6 @@ static void levels_one_after_the_other_are_held(void)
     }
 }
 
-static void spring_that_cannot_get_there_is_said_to_be_away(void)
-{
-    maximum_current_ma = 1000; /* 50 degC at most */
-    begin_cold(1, 2);
-    level[0] = 1000;
-    (void)run(30.0);
-    TEST_ASSERT_BITS_LOW(DRIVE_POLICY_LIMIT_AWAY, drive_policy_limits(&policy, 0));
-    TEST_ASSERT_BITS_HIGH(DRIVE_POLICY_LIMIT_CURRENT, drive_policy_limits(&policy, 0));
-    (void)run(90.0);
-    TEST_ASSERT_BITS_HIGH(DRIVE_POLICY_LIMIT_AWAY, drive_policy_limits(&policy, 0));
-    level[0] = 0;
-    (void)run(1.0);
-    TEST_ASSERT_EQUAL_UINT16(0, drive_policy_limits(&policy, 0));
-}
-
-/* ---- the inverse: what is believed stands still ---- */
-
-static void two_springs_hold_by_the_hand_computed_inverse(void)
-{
-    parameters.hold_margin_cc = parameters.unsure_margin_cc = 200; /* holds at 80 degC */
-    parameters.dither_ma = 0;
-    parameters.observer = 0;
-    begin_cold(1, 2);
-    believe(0, 95, true);
-    level[0] = 1000;
-    decisions(3u * TURN_TICKS);
-    TEST_ASSERT_EQUAL(DRIVE_POLICY_STAGE_HOLD, drive_policy_stage(&policy, 0));
-    thermal_model_set_temperature(&model, 0, 80 * 128);
-    decisions(50u * 60u * 25u); /* without readings the margin narrows by 1 K a minute */
-    /* 60 K x (5.8 + 0.586) mW/K = 0.38316 W through 0.175 ohm: 1.4797 A */
-    TEST_ASSERT_UINT16_WITHIN(4, 1480, target_ma[0]);
-    thermal_model_set_temperature(&model, 1, 30 * 128); /* 50 K x 0.586 mW/K: 0.3773 W, 1.4683 A */
-    decisions(40u * TURN_TICKS);                        /* that jump is no rise any more */
-    TEST_ASSERT_UINT16_WITHIN(4, 1468, target_ma[0]);
-}
-
 /* ---- limits ---- */
 
 static void boosts_are_staggered_not_diluted(void)
@@ -235,64 +175,6 @@ static void boosts_are_staggered_not_diluted(void)
     }
     TEST_ASSERT_EQUAL_UINT(4, full);
     TEST_ASSERT_EQUAL_UINT(4, none); /* the ninth has what is left */
-}
-
-static void who_waits_longest_is_next(void)
-{
-    supply_limit_ma = 3300;
-    begin_cold(3, 3);
-    level[7] = 1000;
-    decisions(TURN_TICKS);
-    level[1] = 1000;
-    decisions(2u * TURN_TICKS);
-    TEST_ASSERT_GREATER_THAN_UINT16(2900, target_ma[7]);
-    TEST_ASSERT_EQUAL_UINT16(0, target_ma[1]);
-    level[3] = 1000;
-    decisions(2u * TURN_TICKS);
-    level[7] = 0;
-    decisions(TURN_TICKS);
-    TEST_ASSERT_EQUAL_UINT16(0, target_ma[7]);
-    TEST_ASSERT_GREATER_THAN_UINT16(2900, target_ma[1]);
-    TEST_ASSERT_EQUAL_UINT16(0, target_ma[3]);
-}
-
-/* It is taken for half transformed, and what its current reads says that it is not: the one
- * that heats would read nothing either if that current came and went. */
-static void what_is_kept_while_waiting_does_not_come_and_go(void)
-{
-    begin_cold(1, 2);
-    level[1] = 1000;
-    (void)run(60.0); /* both its resistances are learnt */
-    level[1] = 0;
-    (void)run(400.0);
-    believe(1, 75, true);
-    supply_limit_ma = 3300;
-    level[0] = level[1] = 1000;
-    unsigned jumps = 0;
-    uint16_t last_ma = 0;
-    for (unsigned n = 0; n < 250; n++) {
-        (void)tick();
-        const uint16_t granted_ma = policy.spring[0].granted_ma;
-        jumps += granted_ma + 100 < last_ma || granted_ma > last_ma + 100;
-        last_ma = granted_ma;
-    }
-    (void)snprintf(where, sizeof where, "%u jumps", jumps);
-    TEST_ASSERT_TRUE_MESSAGE(jumps <= 3, where);
-}
-
-static void spring_just_released_is_no_false_actuation(void)
-{
-    for (unsigned wait = 0; wait < TURN_TICKS; wait++) { /* one of them is the tick of its turn */
-        begin_cold(3, 3);
-        believe(1, 95, true);
-        level[0] = level[1] = 1000;
-        decisions(2u * TURN_TICKS + wait);
-        level[1] = 0;
-        for (unsigned n = 0; n < 3u * TURN_TICKS; n++) {
-            (void)decide();
-            TEST_ASSERT_BITS_LOW(DRIVE_POLICY_LIMIT_UNDRIVEN, drive_policy_limits(&policy, 0));
-        }
-    }
 }
 
 static void budget_holds_in_every_tick_whatever_is_asked(void)
@@ -349,17 +231,11 @@ int main(void)
     RUN_TEST(after_power_on_it_waits_says_so_and_then_holds_all_nine);
     RUN_TEST(held_spring_stays_on_near_martensite_start);
     RUN_TEST(jump_of_the_current_forgets_no_phase);
-    RUN_TEST(spring_that_had_to_wait_half_transformed_goes_on_to_the_end);
     RUN_TEST(spring_that_has_lost_its_phase_is_heated_back_or_that_is_said);
     RUN_TEST(spring_of_which_nothing_is_known_any_more_waits_and_is_heated_anew);
     RUN_TEST(resistance_without_a_change_is_driven_by_the_model_and_said);
     RUN_TEST(levels_one_after_the_other_are_held);
-    RUN_TEST(spring_that_cannot_get_there_is_said_to_be_away);
-    RUN_TEST(two_springs_hold_by_the_hand_computed_inverse);
     RUN_TEST(boosts_are_staggered_not_diluted);
-    RUN_TEST(who_waits_longest_is_next);
-    RUN_TEST(what_is_kept_while_waiting_does_not_come_and_go);
-    RUN_TEST(spring_just_released_is_no_false_actuation);
     RUN_TEST(budget_holds_in_every_tick_whatever_is_asked);
     RUN_TEST(parameters_outside_their_range_are_refused_whole);
     run_limit_tests();

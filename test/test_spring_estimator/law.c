@@ -5,6 +5,7 @@
 
 #include "one_spring.h"
 #include "rules.h"
+#include "sights.h"
 #include "spring_estimator_internal.h"
 #include "unity.h"
 
@@ -113,7 +114,7 @@ static void errors_of_distance_and_loss_go_on_by_the_law(void)
                                     : k * table[n].gone_k + h * above_k * table[n].gone_w_per_k +
                                           (warms ? heat_k - rise_k : 0.0),
              INSIDE.gone_k);
-        NEAR(5.0 * 0.9998, INSIDE.disturbance_k);
+        TEST_ASSERT_FLOAT_WITHIN(1e-4f, 5.0f * 0.9998f, INSIDE.disturbance_k);
         TEST_ASSERT_EQUAL_INT16(lround(128.0 * rise_k), spring_estimator_moved_c7(BELIEF));
         if (table[n].heating) { /* one that waits cools by the least loss, one that may lose more */
             NEAR(10.0 + (heat_k < 0.0 ? 0.8 : 1.0) * heat_k, INSIDE.run.heat.heat_k);
@@ -217,6 +218,9 @@ static void what_keeps_its_phase_is_no_colder_and_tells_of_its_loss(void)
             TEST_ASSERT_INT_WITHIN(1, lround(1e4 * (table[n].kept + less) / LOSS), sight->loss);
             TEST_ASSERT_EQUAL_UINT8(0, sight->seen_sd);
             TEST_ASSERT_EQUAL_INT16(thermal_model_temperature_c7(&model, 0), INSIDE.last_c7);
+            const unsigned count = sights_inside(&estimator)->count; /* and goes on in it */
+            spring_keep_above(&estimator, &INSIDE, &model, 0, 81.0f);
+            TEST_ASSERT_EQUAL_UINT(count + table[n].blind, sights_inside(&estimator)->count);
         }
     }
 }
@@ -273,11 +277,13 @@ static void look_tells_a_phase_and_a_temperature_evenly_over_its_width(void)
         const bool looked = table[n].high_c > 0.0;
         TEST_ASSERT_EQUAL_UINT8_MESSAGE(table[n].then, INSIDE.possible, where);
         TEST_ASSERT_EQUAL_UINT8_MESSAGE(table[n].fresh + 1, INSIDE.fresh, where);
+        TEST_ASSERT_EQUAL_MESSAGE(table[n].told && table[n].possible != M, INSIDE.told, where);
         TEST_ASSERT_EQUAL_MESSAGE(looked, spring_estimator_has_just_seen(BELIEF), where);
         TEST_ASSERT_FLOAT_WITHIN_MESSAGE(
             0.01f, looked ? (float)(table[n].low_c + table[n].high_c) / 2.0f : 75.0f, put_c(),
             where);
         if (looked) {
+            TEST_ASSERT_TRUE(is_noted(SPRING_SIGHT_LOOKED));
             const float sd_k = 0.29f * (float)(table[n].high_c - table[n].low_c);
             TEST_ASSERT_FLOAT_WITHIN_MESSAGE(0.01f, sd_k * sd_k + 9.0f, INSIDE.variance_k2, where);
             TEST_ASSERT_FLOAT_WITHIN(0.01f, 9.0f, INSIDE.shift_variance_k2);
@@ -309,6 +315,7 @@ static void hottest_possible_cools_by_the_least_loss_with_its_latent_heat(void)
             c + TURN_S * (current_a * current_a * 0.2 - 0.8 * LOSS * (c - 20.0)) / capacity;
         NEAR(is_c, INSIDE.hottest_c);
         TEST_ASSERT_EQUAL_MESSAGE(is_c < 68.0 ? M : ANY, INSIDE.possible, where);
+        TEST_ASSERT_EQUAL_MESSAGE(is_c < 68.0, is_noted(SPRING_SIGHT_COOLED), where);
         power_comes_on();
         INSIDE.hottest_c = (float)c; /* and how long that takes, by small steps */
         double s = 0.0;

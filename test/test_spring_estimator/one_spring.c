@@ -181,6 +181,20 @@ void hold(double margin_k, double seconds)
     }
 }
 
+float search(double from_k)
+{
+    float sd_k = spring_estimator_sd_k(BELIEF);
+    double margin_k = from_k;
+    for (double s = 0.0; s < 400.0 && spring_estimator_lost(BELIEF) == 0.0f; s += TICK_S) {
+        sd_k = spring_estimator_sd_k(BELIEF);
+        margin_k -= spring_estimator_rests(BELIEF) && !spring_estimator_seems_to_lose(BELIEF)
+                        ? 0.08 * TICK_S
+                        : 0.0;
+        (void)tick(hold_current_a(margin_k));
+    }
+    return sd_k;
+}
+
 double heat_then_hold(double most_s)
 {
     const double took_s = heat(most_s);

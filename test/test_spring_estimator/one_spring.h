@@ -52,6 +52,9 @@ double heat_then_hold(double most_s);
  * of the drive. */
 double hold_current_a(double margin_k);
 void hold(double margin_k, double seconds);
+/* Holds it nearer and nearer until phase is seen to be lost; returns the sd of the distance in the
+ * turn before, K. */
+float search(double from_k);
 double resistance_ohm(void);
 double distance_k(void); /* true, to the true martensite start */
 

@@ -40,8 +40,6 @@ static void begin_three(void)
     spring_estimator_trust_model(&estimator, &model);
 }
 
-/* ---- heat that is enough whatever is read: what bounds a heating that shows nothing ---- */
-
 /* ---- what is read against what it read when it had transformed last ---- */
 
 /* A heated spring that read 0.2 ohm then, a fifth more than its martensite. */

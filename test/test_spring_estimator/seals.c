@@ -37,7 +37,9 @@ static void expect_begun_anew(void)
     TEST_ASSERT_FALSE_MESSAGE(INSIDE.heating, where);
     TEST_ASSERT_EQUAL_UINT8_MESSAGE(1, estimator.broken_seals, where);
     TEST_ASSERT_TRUE_MESSAGE(is_noted(SPRING_SIGHT_ANEW), where);
+    TEST_ASSERT_TRUE_MESSAGE(spring_estimator_has_begun_anew(BELIEF), where);
     TEST_ASSERT_TRUE_MESSAGE(spring_estimator_update(&estimator, &model, 0), where);
+    TEST_ASSERT_FALSE_MESSAGE(spring_estimator_has_begun_anew(BELIEF), where);
 }
 
 static void whatever_bit_of_a_belief_turns_over_nothing_is_known_from_its_next_turn_on(void)

@@ -1,8 +1,6 @@
 #include "sights.h"
 
-#include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "one_spring.h"
@@ -43,19 +41,6 @@ static void expect_kinds(const spring_sight_kind_t kinds[], unsigned count)
     }
 }
 
-/* Held nearer and nearer until phase is seen to be lost. */
-static void search(double from_k)
-{
-    double margin_k = from_k;
-    for (double s = 0.0; s < 300.0 && spring_estimator_lost(BELIEF) == 0.0f; s += TICK_S) {
-        margin_k -= spring_estimator_rests(BELIEF) && !spring_estimator_seems_to_lose(BELIEF)
-                        ? 0.08 * TICK_S
-                        : 0.0;
-        (void)tick(hold_current_a(margin_k));
-    }
-    TEST_ASSERT_TRUE(spring_estimator_lost(BELIEF) > 0.0f);
-}
-
 void each_sight_of_a_life_is_noted_with_what_was_done(void)
 {
     static const spring_sight_kind_t kinds[] = {SPRING_SIGHT_TOLD, SPRING_SIGHT_ONSET,
@@ -73,7 +58,7 @@ void each_sight_of_a_life_is_noted_with_what_was_done(void)
     TEST_ASSERT_TRUE(still);
     spring_estimator_begin_hold(&estimator, &model, 0, true);
     hold(4.0, 20.0);
-    search(4.0);
+    (void)search(4.0);
     static const uint8_t did[] = {SPRING_DID_HEAT, 0, SPRING_DID_HOLD, 0};
     expect_kinds(kinds, 4);
     for (unsigned i = 0; i < 4; i++) {
@@ -84,110 +69,6 @@ void each_sight_of_a_life_is_noted_with_what_was_done(void)
     const double ago_s =
         0.25 * spring_sights_age_turns(spring_estimator_sights(&estimator), sight_at(2));
     TEST_ASSERT_TRUE(ago_s > 20.0 && ago_s < 330.0);
-}
-
-void sight_says_what_was_believed_read_and_moved(void)
-{
-    begin_cold();
-    (void)heat_then_hold(60.0);
-    hold(4.0, 20.0);
-    const float shift_k = spring_estimator_shift_k(BELIEF);
-    search(4.0);
-    const spring_sight_t *s = newest();
-    (void)snprintf(where, sizeof where,
-                   "believed %d (%u), seen %d (%u), now %d (%u), read %d (%u), shift %d, loss %d",
-                   s->believed, s->believed_sd, s->seen, s->seen_sd, s->now, s->now_sd, s->read,
-                   s->read_sd, s->shift, s->loss);
-    TEST_ASSERT_EQUAL_UINT8_MESSAGE(SPRING_SIGHT_LOST, s->kind, where);
-    /* where it is believed now is between both, nearer to what is surer, and surer than either */
-    TEST_ASSERT_TRUE_MESSAGE((s->believed - s->now) * (s->now - s->seen) >= 0, where);
-    TEST_ASSERT_TRUE_MESSAGE(s->now_sd <= s->believed_sd && s->now_sd <= s->seen_sd, where);
-    TEST_ASSERT_TRUE_MESSAGE(s->seen <= 0 && s->seen_sd >= 10, where);
-    /* its change is 20 %: what is lost of it is read as less, and that for certain */
-    TEST_ASSERT_TRUE_MESSAGE(s->read < 0 && s->read > -400 && s->read_sd > 0, where);
-    TEST_ASSERT_TRUE_MESSAGE(s->read < -2 * s->read_sd, where);
-    TEST_ASSERT_INT_WITHIN_MESSAGE(
-        1, (int)lround(10.0 * (double)(spring_estimator_shift_k(BELIEF) - shift_k)), s->shift,
-        where);
-    const spring_bounds_t k = spring_estimator_distance_k(&estimator, &model, 0);
-    TEST_ASSERT_INT_WITHIN_MESSAGE(2, (int)lround(10.0 * (double)k.value), s->now, where);
-}
-
-/* Turn after turn the same: it is told once, with all that it has moved. */
-void hold_that_loses_nothing_is_one_sight(void)
-{
-    begin_cold();
-    truth.loss_w_per_k *= 0.85; /* it is warmer than it is believed to be */
-    (void)heat_then_hold(60.0);
-    hold(3.0, 20.0);
-    double margin_k = 3.0;
-    for (unsigned s = 0; s < 400 && newest()->kind != SPRING_SIGHT_LOST; s++) {
-        margin_k -= 0.05;
-        hold(margin_k, 1.0);
-    }
-    const spring_sight_t *const s = sight_at(spring_estimator_sights(&estimator)->count - 2u);
-    TEST_ASSERT_EQUAL_UINT8(SPRING_SIGHT_LOST, newest()->kind);
-    TEST_ASSERT_EQUAL_UINT8(SPRING_SIGHT_KEPT, s->kind);
-    (void)snprintf(where, sizeof where, "%u turns ago, loss %d, %d to %d, newest %d",
-                   spring_sights_age_turns(spring_estimator_sights(&estimator), s), s->loss,
-                   s->believed, s->now, newest()->loss);
-    TEST_ASSERT_TRUE_MESSAGE(spring_sights_age_turns(spring_estimator_sights(&estimator), s) < 240,
-                             where);
-    TEST_ASSERT_TRUE_MESSAGE(s->loss < -100,
-                             where); /* of the declared loss, a hundredth less at least */
-    TEST_ASSERT_TRUE(sight_at(spring_estimator_sights(&estimator)->count - 3u)->kind !=
-                     SPRING_SIGHT_KEPT);
-}
-
-void contact_that_jumps_is_noted_and_blind_is_said(void)
-{
-    begin_cold();
-    (void)heat_then_hold(60.0);
-    hold(4.0, 20.0);
-    for (unsigned n = 0; n < 3; n++) {
-        truth.contact_ohm = truth.contact_ohm > 0.0 ? 0.0 : 0.02;
-        hold(4.0, 5.0);
-        (void)snprintf(where, sizeof where, "%u: kind %u, read %d", n, newest()->kind,
-                       newest()->read);
-        const spring_sight_t *s = newest();
-        TEST_ASSERT_EQUAL_UINT8_MESSAGE(SPRING_SIGHT_JUMPED, s->kind, where);
-        TEST_ASSERT_TRUE_MESSAGE(n % 2u == 0 ? s->read > 500 : s->read < -500, where);
-        TEST_ASSERT_EQUAL_UINT8(0, s->seen_sd); /* it puts it nowhere */
-        TEST_ASSERT_EQUAL_INT16(s->believed, s->now);
-        TEST_ASSERT_EQUAL(n == 2, (s->did & SPRING_DID_BLIND) != 0);
-    }
-}
-
-void time_and_look_after_power_on_are_noted(void)
-{
-    power_comes_on();
-    ticks(0.0, 100.0);
-    TEST_ASSERT_EQUAL_UINT8(SPRING_SIGHT_COOLED, newest()->kind);
-    TEST_ASSERT_EQUAL_UINT8(0, newest()->believed_sd); /* nothing was known */
-
-    (void)heat_then_hold(60.0);
-    hold(4.0, 20.0);
-    const spring_learnt_t learnt = spring_estimator_learnt(&estimator, 0);
-    const truth_t was = truth;
-    power_comes_on();
-    truth = was;
-    spring_estimator_restore(&estimator, 0, &learnt);
-    spring_estimator_begin_heating(&estimator, &model, 0);
-    ticks(2.0, 2.0);
-    TEST_ASSERT_EQUAL_UINT8(SPRING_SIGHT_LOOKED, newest()->kind);
-    TEST_ASSERT_TRUE(newest()->seen_sd > 30); /* from martensite start to austenite finish */
-    TEST_ASSERT_EQUAL_UINT8(SPRING_DID_HEAT, newest()->did);
-}
-
-/* An alloy that shows nothing: hot enough by the model, and blind from there on. */
-void heating_that_shows_no_finish_is_noted(void)
-{
-    begin_cold();
-    truth.ratio = 1.0;
-    (void)heat_then_hold(60.0);
-    TEST_ASSERT_EQUAL_UINT8(SPRING_SIGHT_UNSEEN, newest()->kind);
-    TEST_ASSERT_EQUAL_UINT8(SPRING_DID_HOLD | SPRING_DID_BLIND, newest()->did);
-    TEST_ASSERT_EQUAL_INT16(newest()->believed, newest()->now);
 }
 
 /* ---- the records themselves ---- */

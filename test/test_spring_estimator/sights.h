@@ -12,11 +12,6 @@ const spring_sight_t *newest(void);
 bool is_noted(spring_sight_kind_t kind);
 
 void each_sight_of_a_life_is_noted_with_what_was_done(void);
-void sight_says_what_was_believed_read_and_moved(void);
-void hold_that_loses_nothing_is_one_sight(void);
-void contact_that_jumps_is_noted_and_blind_is_said(void);
-void time_and_look_after_power_on_are_noted(void);
-void heating_that_shows_no_finish_is_noted(void);
 void spring_that_has_most_gives_way(void);
 void sights_are_found_by_number_and_forgotten_after_four_hours(void);
 

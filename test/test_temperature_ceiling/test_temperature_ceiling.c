@@ -78,23 +78,6 @@ static void it_follows_the_declared_network(void)
     }
 }
 
-static void no_correction_of_the_model_lowers_it(void)
-{
-    run(0.6f, 600000u, 60.0f);
-    temperature_ceiling_t untouched = ceiling;
-    for (int n = 0; n < 100; n++) {
-        for (uint8_t k = 0; k < 9; k++) {
-            thermal_model_set_temperature(&model, k, 20 * 128); /* it is talked away */
-        }
-        for (uint8_t k = 0; k < 9; k++) {
-            temperature_ceiling_step(&ceiling, &model, k, 0.6f);
-        }
-    }
-    for (uint8_t k = 0; k < 9; k++) {
-        TEST_ASSERT_TRUE(temperature_ceiling_c(&ceiling, k) > temperature_ceiling_c(&untouched, k));
-    }
-}
-
 /* Other numbers are declared, by settings that arrive now. */
 static void declare(float loss, float capacity)
 {
@@ -249,42 +232,6 @@ static void two_declarations_contradict_where_no_tolerance_explains_both(void)
             *shares[k] = WHOLE;
         }
     }
-}
-
-/* As hot as the model may be at rest, it does not trip; with a fifth more power it does. */
-static void it_trips_a_ninth_above_the_model(void)
-{
-    run(0.0058f * 110.0f, 638000u, 1200.0f); /* all alike: nothing flows between them */
-    TEST_ASSERT_FLOAT_WITHIN(0.5f, 130.0f, temperature_ceiling_c(&ceiling, 4));
-    TEST_ASSERT_FALSE(temperature_ceiling_trips(&ceiling, 4, 13000));
-    TEST_ASSERT_FALSE(temperature_ceiling_trips(&ceiling, 4, 12000)); /* 131.1 degC */
-    TEST_ASSERT_TRUE(temperature_ceiling_trips(&ceiling, 4, 11800));  /* 128.9 degC */
-    run(1.2f * 0.0058f * 110.0f, 638000u, 1200.0f);
-    TEST_ASSERT_TRUE(temperature_ceiling_trips(&ceiling, 4, 13000));
-}
-
-static void a_trip_beyond_the_model_still_trips(void)
-{
-    TEST_ASSERT_FALSE(temperature_ceiling_trips(&ceiling, 0, 25000));
-    run(8.0f, 0, 600.0f);
-    TEST_ASSERT_TRUE(temperature_ceiling_trips(&ceiling, 0, 25000));
-}
-
-/* 0.64 of I^2 R with 5 V, 0.18 ohm and the austenite's 0.219. */
-static void duty_and_supply_bound_the_power_from_below(void)
-{
-    current_control_parameters_t circuit;
-    current_control_parameters_default(&circuit);
-    temperature_ceiling_prepare(&drive, &model, &circuit);
-    const float power_w = temperature_ceiling_power_w(&drive, 100.0f);
-    TEST_ASSERT_FLOAT_WITHIN(1e-3f, 0.64f * 0.219f * 1.5664f * 1.5664f, power_w);
-    TEST_ASSERT_EQUAL_FLOAT(0.0f, temperature_ceiling_power_w(&drive, 0.0f));
-    /* an honest reading at 4.2 V, 0.22 ohm is a tenth below */
-    const float least_a = 4.2f / 8.0f / (0.219f + 0.22f);
-    TEST_ASSERT_TRUE(least_a * least_a * 0.219f > 0.85f * power_w);
-    circuit.freewheel_mv = 500;
-    temperature_ceiling_prepare(&drive, &model, &circuit);
-    TEST_ASSERT_EQUAL_FLOAT(0.0f, temperature_ceiling_power_w(&drive, 10.0f));
 }
 
 /* The smallest heat capacity that the model takes: a step of 0.6 s is far longer than its time. */
@@ -572,16 +519,12 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(it_follows_the_declared_network);
-    RUN_TEST(no_correction_of_the_model_lowers_it);
     RUN_TEST(of_warm_springs_the_more_careful_numbers_count);
     RUN_TEST(many_small_declarations_escape_no_more_than_one_large_one);
     RUN_TEST(what_was_declared_is_over_when_it_is_taken_back_or_all_are_cold);
     RUN_TEST(transformation_begins_at_its_start);
     RUN_TEST(two_declarations_contradict_where_no_tolerance_explains_both);
     RUN_TEST(what_flows_to_neighbours_and_plate_is_no_declared_loss);
-    RUN_TEST(it_trips_a_ninth_above_the_model);
-    RUN_TEST(a_trip_beyond_the_model_still_trips);
-    RUN_TEST(duty_and_supply_bound_the_power_from_below);
     RUN_TEST(it_is_stable_whatever_the_heat_capacity);
     RUN_TEST(one_step_is_the_implicit_one);
     RUN_TEST(power_of_a_duty_is_of_the_declared_circuit);

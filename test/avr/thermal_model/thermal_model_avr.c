@@ -1,6 +1,5 @@
-/* Counts cycles of one model step on the target, and of the same network in float. */
+/* Counts cycles of one model step on the target. */
 #include "../report.h"
-#include "float_network.h"
 #include "thermal_model.h"
 
 static thermal_model_t model;
@@ -96,10 +95,6 @@ int main(void)
     if (hold < 0) {
         failures = 1;
     }
-    float_network_reset();
-    COUNT("step_float");
-    float_network_step();
-    COUNTED();
     report_text("#ram_bytes ");
     report_number(sizeof model);
     report_text("\n");
