@@ -55,7 +55,7 @@ thermal_model_transformation_t thermal_model_transformation(const thermal_model_
     (void)model;
     (void)spring;
     const int16_t low_c7 = any_c7(-70 * 128, 198 * 128), first_c7 = any_c7(-70 * 128, 198 * 128);
-    return (thermal_model_transformation_t){
-        low_c7, any_c7((int16_t)(low_c7 + 2 * 128), 200 * 128), first_c7,
-        any_c7((int16_t)(first_c7 + 2 * 128), 200 * 128)};
+    return (thermal_model_transformation_t){low_c7, any_c7((int16_t)(low_c7 + 2 * 128), 200 * 128),
+                                            first_c7,
+                                            any_c7((int16_t)(first_c7 + 2 * 128), 200 * 128)};
 }
