@@ -3,8 +3,9 @@
 #include <math.h>
 #include <stddef.h>
 
-#define LEAST_READINGS 12u /* where a current rises, every other tick gives one */
-#define DUTY_STEPS     800.0f
+#define LEAST_READINGS  12u /* where a current rises, every other tick gives one */
+#define DUTY_STEPS      800.0f
+#define SQUARED_MOST_MV 11965u /* a window of these fits 32 bits; no sensor shows as much */
 
 /* Of the duty, steps^2. A quarter of the default dither gives 1; below that, four times a sensor's
  * noise (6 mV) would be more than an eighth of what the window should show. */
@@ -20,6 +21,12 @@
 /* Off by more than the same tolerances, and the offsets of both readings. */
 #define BALANCE_SHARE 0.3f
 #define BALANCE_MV    15.0f
+/* Deviation of what no duty explains, of the voltage. A supply that others load and leave moves by
+ * 5 % from end to end, which deviates by half of it at the most. Current and voltage are not read
+ * at once: what they make of a resistance is off by as much, and more than any rule that reads it
+ * allows for. */
+#define RESTLESS_SHARE 0.05f
+#define RESTLESS_MV    12.0f /* twice four times a sensor's noise */
 
 static uint16_t amount(int16_t value)
 {
@@ -50,6 +57,8 @@ void circuit_check_take(circuit_check_t *c, uint16_t fixed_mohm, uint16_t duty, 
     c->current_2ma = (uint16_t)(c->current_2ma + (amount(current_ma) >> 1));
     c->duty_square += (uint32_t)duty * duty;
     c->duty_voltage += (uint32_t)duty * behind_mv;
+    const uint16_t squared_mv = behind_mv < SQUARED_MOST_MV ? behind_mv : SQUARED_MOST_MV;
+    c->voltage_square += (uint32_t)squared_mv * squared_mv;
 }
 
 static uint8_t counted(uint8_t windows, bool bad)
@@ -70,11 +79,22 @@ static bool stands(const circuit_check_t *c, float swept_mv2, float found_mv)
            (!c->voltage_moved && swept_mv2 * own_mv * own_mv > half_mv * half_mv);
 }
 
+/* What of its voltage does not go with the duty, as far as that moves. */
+static bool moves_alone(float voltage_variance, float follows_mv, float duty_variance,
+                        float found_mv)
+{
+    const float by_duty_mv2 =
+        duty_variance >= LEAST_VARIANCE ? follows_mv * follows_mv / duty_variance : 0.0f;
+    const float likely_mv = RESTLESS_SHARE * found_mv;
+    return voltage_variance - by_duty_mv2 > likely_mv * likely_mv + RESTLESS_MV * RESTLESS_MV;
+}
+
 bool circuit_check_judge(circuit_check_t *c, const current_control_parameters_t *p,
                          circuit_window_t *window)
 {
     bool astray = false;
     bool unbalanced = false;
+    bool restless = false;
     if (window != NULL) {
         *window = (circuit_window_t){.tells = false};
     }
@@ -96,6 +116,8 @@ bool circuit_check_judge(circuit_check_t *c, const current_control_parameters_t 
         astray = (tells && other) ||
                  (variance >= LEAST_VARIANCE && stands(c, should_mv * step_mv, found_mv));
         unbalanced = fabsf(found_mv - expected_mv) > BALANCE_SHARE * expected_mv + BALANCE_MV;
+        const float square_mv2 = share * (float)c->voltage_square;
+        restless = moves_alone(square_mv2 - found_mv * found_mv, follows_mv, variance, found_mv);
         if (window != NULL) {
             *window = (circuit_window_t){found_mv, expected_mv,
                                          2.0f * share * (float)c->current_2ma, true};
@@ -103,10 +125,13 @@ bool circuit_check_judge(circuit_check_t *c, const current_control_parameters_t 
     }
     c->astray = counted(c->astray, astray) & 15u;
     c->unbalanced = counted(c->unbalanced, unbalanced) & 15u;
+    c->restless = counted(c->restless, restless);
     *c = (circuit_check_t){.last_duty = c->last_duty,
                            .last_ma = c->last_ma,
                            .last_mv = c->last_mv,
                            .astray = c->astray,
-                           .unbalanced = c->unbalanced};
-    return c->astray >= CIRCUIT_CHECK_WINDOWS || c->unbalanced >= CIRCUIT_CHECK_BALANCE_WINDOWS;
+                           .unbalanced = c->unbalanced,
+                           .restless = c->restless};
+    return c->astray >= CIRCUIT_CHECK_WINDOWS || c->unbalanced >= CIRCUIT_CHECK_BALANCE_WINDOWS ||
+           c->restless >= CIRCUIT_CHECK_BALANCE_WINDOWS;
 }

@@ -14,18 +14,21 @@
 extern "C" {
 #endif
 
-#define CIRCUIT_CHECK_TICKS           30u   /* of a window: three of them fit in 2 s */
-#define CIRCUIT_CHECK_MOST            4095u /* mA and mV: the sums fit 32 bits */
-#define CIRCUIT_CHECK_JUMP            2u /* steps: after more, a reading may be of the duty before */
-#define CIRCUIT_CHECK_WINDOWS         2u /* on end in which the voltage did not follow the duty */
-#define CIRCUIT_CHECK_BALANCE_WINDOWS 3u /* on end whose voltages did not add up */
+#define CIRCUIT_CHECK_TICKS   30u   /* of a window: three of them fit in 2 s */
+#define CIRCUIT_CHECK_MOST    4095u /* mA and mV: the sums fit 32 bits */
+#define CIRCUIT_CHECK_JUMP    2u    /* steps: after more, a reading may be of the duty before */
+#define CIRCUIT_CHECK_WINDOWS 2u    /* on end in which the voltage did not follow the duty */
+#define CIRCUIT_CHECK_BALANCE_WINDOWS                                                              \
+    3u /* on end whose voltages did not add up, or stand still                                     \
+        */
 
 /* Of one spring. The voltage is that behind the switch: the spring's, and what its current drops
  * over shunt and wiring. It is duty times supply, whatever the spring's resistance does. */
 typedef struct {
     uint32_t duty_square;
     uint32_t duty_voltage;
-    uint32_t voltage_mv;  /* behind the switch */
+    uint32_t voltage_mv; /* behind the switch */
+    uint32_t voltage_square;
     uint16_t current_2ma; /* in 2 mA: CIRCUIT_CHECK_TICKS of them fit */
     uint16_t duty;
     uint16_t last_duty;
@@ -35,6 +38,7 @@ typedef struct {
     bool voltage_moved : 1;
     uint8_t astray : 4;     /* windows on end in which the voltage did not follow the duty */
     uint8_t unbalanced : 4; /* windows on end in which it was not what the duty should bring */
+    uint8_t restless;       /* windows on end in which it moved without the duty */
 } circuit_check_t;
 
 /* What a window's voltages were, in the mean. */
@@ -60,8 +64,9 @@ void circuit_check_take(circuit_check_t *check, uint16_t fixed_mohm, uint16_t du
 
 /* Ends the window, begins the next one: at most CIRCUIT_CHECK_TICKS ticks after the last. True if
  * and only if what was read has not been a circuit for CIRCUIT_CHECK_WINDOWS windows on end, or
- * CIRCUIT_CHECK_BALANCE_WINDOWS. A window that can tell nothing (few readings; for the first, a
- * duty that hardly moves) ends such a row. window may be NULL. */
+ * CIRCUIT_CHECK_BALANCE_WINDOWS: its voltage is not what the duty should bring, or moves beside it
+ * as no supply does. A window that can tell nothing (few readings; for the first, a duty that
+ * hardly moves) ends such a row. window may be NULL. */
 bool circuit_check_judge(circuit_check_t *check, const current_control_parameters_t *circuit,
                          circuit_window_t *window);
 

@@ -178,6 +178,37 @@ static void supply_that_moves_is_none(void)
     }
 }
 
+/* Its voltage is read 4 ms after its current. */
+static void supply_that_swings_is_found_within_two_seconds(void)
+{
+    static const struct {
+        double hz, share;
+        bool found;
+    } swings[] = {{0.2, 0.1, false}, {2.0, 0.15, true},   {10.0, 0.06, false}, {10.0, 0.1, true},
+                  {24.7, 0.2, true}, {24.7, 0.06, false}, {41.3, 0.1, true}};
+    for (unsigned n = 0; n < 2u * sizeof swings / sizeof swings[0]; n++) {
+        const double turn = 6.283185307179586 * swings[n / 2u].hz;
+        const double share = swings[n / 2u].share;
+        uint32_t tick = 0;
+        bool found = false;
+        setUp();
+        for (; tick < 3000u && !found; tick++) {
+            const uint16_t duty = swept(n % 2u != 0 ? 190 : 60, n % 2u != 0 ? 3 : 16, tick);
+            const double at_s = 0.02 * tick;
+            const double ma = current_ma(&declared, duty, 0);
+            circuit_check_take(
+                &check, 180, duty, true, (int16_t)lround(ma * (1.0 + share * sin(turn * at_s))),
+                (int16_t)(4 * lround(ma * (1.0 + share * sin(turn * (at_s + 0.004))) * 0.2 / 4.0)));
+            found =
+                tick % CIRCUIT_CHECK_TICKS == 29u && circuit_check_judge(&check, &parameters, NULL);
+        }
+        char which[20];
+        (void)snprintf(which, sizeof which, "case %u", n);
+        TEST_ASSERT_EQUAL_MESSAGE(swings[n / 2u].found, found && tick <= 100u, which);
+        TEST_ASSERT_EQUAL_MESSAGE(swings[n / 2u].found, found, which);
+    }
+}
+
 /* Nothing moves: it may well be so. */
 static void reading_that_stands_still_with_its_duty_is_none(void)
 {
@@ -236,13 +267,16 @@ static void a_window_says_what_its_readings_were(void)
 }
 
 /* A window's readings: `share` of the sweep of so many steps shows, and the mean of all is as it
- * should be but for beyond_mv. What is read is exact. */
-static bool judged(uint16_t duty, uint16_t steps, double share, double beyond_mv, uint8_t readings)
+ * should be but for beyond_mv. From tick to tick it swings by swing_mv either way. What is read is
+ * exact. */
+static bool judged(uint16_t duty, uint16_t steps, double share, double beyond_mv, double swing_mv,
+                   uint8_t readings)
 {
     for (uint32_t tick = 0; tick < 30u; tick++) {
         const uint16_t given = tick < readings ? swept(duty, steps, tick) : duty;
         const double middle = duty + 0.47 * steps;
-        const double behind_mv = 5000.0 / 800.0 * (middle + share * (given - middle)) + beyond_mv;
+        const double behind_mv = 5000.0 / 800.0 * (middle + share * (given - middle)) + beyond_mv +
+                                 ((tick & 1u) != 0 ? swing_mv : -swing_mv);
         /* the spring's half, and what 180 mohm drop of the current, rounded as the check does */
         const double ma = behind_mv / (0.2 + 180.0 / 1024.0);
         circuit_check_take(&check, 180, given, tick < readings, (int16_t)lround(ma),
@@ -252,11 +286,11 @@ static bool judged(uint16_t duty, uint16_t steps, double share, double beyond_mv
 }
 
 /* Windows on end until it is found; 9: it is not. */
-static int windows(uint16_t duty, uint16_t steps, double share, double beyond_mv)
+static int windows(uint16_t duty, uint16_t steps, double share, double beyond_mv, double swing_mv)
 {
     setUp();
     for (int n = 1; n < 9; n++) {
-        if (judged(duty, steps, share, beyond_mv, 30)) {
+        if (judged(duty, steps, share, beyond_mv, swing_mv, 30)) {
             return n;
         }
     }
@@ -268,19 +302,37 @@ static void what_follows_too_little_or_too_much_is_found_after_its_windows(void)
 {
     static const struct {
         uint16_t duty, steps;
-        double share, beyond_mv;
+        double share, beyond_mv, swing_mv;
         int windows;
     } cases[] = {
-        {120, 30, 1.0, 0.0, 9},    {120, 30, 0.30, 0.0, 9},  {120, 30, 0.20, 0.0, 2},
-        {120, 30, 2.3, 0.0, 9},    {120, 30, 2.7, 0.0, 2},   {120, 30, -1.0, 0.0, 2},
-        {120, 30, 1.0, 220.0, 9},  {120, 30, 1.0, 300.0, 3}, {120, 30, 1.0, -220.0, 9},
-        {120, 30, 1.0, -300.0, 3}, {190, 3, 0.0, 0.0, 3},    {120, 0, 0.0, 0.0, 9},
-        {120, 0, 0.0, 300.0, 3},   {3, 0, 0.0, 10.0, 9},     {3, 0, 0.0, 30.0, 3},
-        {400, 3, 3.2, 0.0, 9}, /* too little of it moves to tell by how much */
+        {120, 30, 1.0, 0.0, 0.0, 9},
+        {120, 30, 0.30, 0.0, 0.0, 9},
+        {120, 30, 0.20, 0.0, 0.0, 2},
+        {120, 30, 2.3, 0.0, 0.0, 9},
+        {120, 30, 2.7, 0.0, 0.0, 2},
+        {120, 30, -1.0, 0.0, 0.0, 2},
+        {120, 30, 1.0, 220.0, 0.0, 9},
+        {120, 30, 1.0, 300.0, 0.0, 3},
+        {120, 30, 1.0, -220.0, 0.0, 9},
+        {120, 30, 1.0, -300.0, 0.0, 3},
+        {190, 3, 0.0, 0.0, 0.0, 3},
+        {120, 0, 0.0, 0.0, 0.0, 9},
+        {120, 0, 0.0, 300.0, 0.0, 3},
+        {3, 0, 0.0, 10.0, 0.0, 9},
+        {3, 0, 0.0, 30.0, 0.0, 3},
+        {400, 3, 3.2, 0.0, 0.0, 9}, /* too little of it moves to tell by how much */
+        {120, 0, 0.0, 0.0, 38.0, 9},
+        {120, 0, 0.0, 0.0, 41.0, 3},
+        {120, 30, 1.0, 0.0, 40.0, 9},
+        {120, 30, 1.0, 0.0, 46.0, 3},
+        {200, 0, 0.0, 0.0, 61.0, 9},
+        {200, 0, 0.0, 0.0, 66.0, 3},
+        {3, 0, 0.0, 0.0, 11.0, 9},
+        {3, 0, 0.0, 0.0, 13.5, 3},
     };
     for (size_t n = 0; n < sizeof cases / sizeof cases[0]; n++) {
-        const int found =
-            windows(cases[n].duty, cases[n].steps, cases[n].share, cases[n].beyond_mv);
+        const int found = windows(cases[n].duty, cases[n].steps, cases[n].share, cases[n].beyond_mv,
+                                  cases[n].swing_mv);
         char which[20];
         (void)snprintf(which, sizeof which, "case %u", (unsigned)n);
         TEST_ASSERT_EQUAL_INT_MESSAGE(cases[n].windows, found, which);
@@ -326,12 +378,16 @@ static void voltage_that_should_move_by_more_than_half_a_step_is_frozen(void)
 static void eleven_readings_tell_nothing(void)
 {
     for (int n = 0; n < 6; n++) {
-        TEST_ASSERT_FALSE(judged(120, 30, -1.0, 300.0, 11));
+        TEST_ASSERT_FALSE(judged(120, 30, -1.0, 300.0, 100.0, 11));
     }
-    TEST_ASSERT_FALSE(judged(120, 30, -1.0, 0.0, 12));
-    TEST_ASSERT_FALSE(judged(120, 30, -1.0, 0.0, 11));
-    TEST_ASSERT_FALSE(judged(120, 30, -1.0, 0.0, 12));
-    TEST_ASSERT_TRUE(judged(120, 30, -1.0, 0.0, 12));
+    TEST_ASSERT_FALSE(judged(120, 30, -1.0, 0.0, 0.0, 12));
+    TEST_ASSERT_FALSE(judged(120, 30, -1.0, 0.0, 0.0, 11));
+    TEST_ASSERT_FALSE(judged(120, 30, -1.0, 0.0, 0.0, 12));
+    TEST_ASSERT_TRUE(judged(120, 30, -1.0, 0.0, 0.0, 12));
+    setUp();
+    for (int n = 0; n < 6; n++) { /* every third one is quiet */
+        TEST_ASSERT_FALSE(judged(120, 0, 0.0, 0.0, n % 3 == 2 ? 0.0 : 100.0, 30));
+    }
 }
 
 /* After a jump a reading may be of the duty before: it is none. */
@@ -363,6 +419,11 @@ static void readings_beyond_the_sensor_count_as_its_ends(void)
     TEST_ASSERT_EQUAL_UINT32(2 + 4095, check.voltage_mv);
     circuit_check_take(&check, 1024, 0, true, 4096, 5000);
     TEST_ASSERT_EQUAL_UINT32(2 + 3 * 4095, check.voltage_mv);
+    check.voltage_square = 0;
+    for (unsigned n = 0; n < CIRCUIT_CHECK_TICKS; n++) { /* as many as fit */
+        circuit_check_take(&check, 2000, 0, true, 4095, 4095);
+    }
+    TEST_ASSERT_EQUAL_UINT32(30u * 11965u * 11965u, check.voltage_square);
 }
 
 int main(void)
@@ -373,6 +434,7 @@ int main(void)
     RUN_TEST(frozen_register_is_found_within_two_seconds);
     RUN_TEST(voltage_too_small_to_show_the_sweep_is_none);
     RUN_TEST(supply_that_moves_is_none);
+    RUN_TEST(supply_that_swings_is_found_within_two_seconds);
     RUN_TEST(reading_that_stands_still_with_its_duty_is_none);
     RUN_TEST(reading_of_one_tick_earlier_is_none);
     RUN_TEST(pulses_read_late_are_none);

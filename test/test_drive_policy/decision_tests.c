@@ -651,6 +651,32 @@ static void nothing_beyond_the_array_is_decided(void)
 }
 
 /* A tick of springs that ask: what is said, asked of the supply and given. */
+/* Of more springs than a round has turns, each tenth. */
+static void springs_that_share_a_turn_are_decided_in_it(void)
+{
+    enum { MANY = 12 };
+    uint16_t levels[MANY], targets[MANY];
+    bool may[MANY];
+    const drive_policy_input_t input = {.belief = &belief,
+                                        .model = &model,
+                                        .level_permille = levels,
+                                        .allowed = may,
+                                        .maximum_current_ma = 3000,
+                                        .supply_limit_ma = supply_limit_ma};
+    begin(2, 6);
+    for (uint8_t k = 0; k < MANY; k++) {
+        levels[k] = 1000;
+        may[k] = true;
+        spring_seal(&belief, k);
+    }
+    turn_inside(&belief, 1);
+    drive_policy_tick(&policy, &input, targets);
+    for (uint8_t k = 0; k < MANY; k++) {
+        row(k);
+        TEST_ASSERT_EQUAL_UINT8_MESSAGE(k % 10u == 1u ? HEAT : OFF, policy.spring[k].stage, where);
+    }
+}
+
 static void each_limit_is_said_where_it_cuts(void)
 {
     enum {
@@ -904,6 +930,7 @@ void run_decision_tests(void)
     RUN_TEST(trip_stays_until_cleared);
     RUN_TEST(turn_notes_how_fast_it_warms_and_whether_it_is_driven);
     RUN_TEST(nothing_beyond_the_array_is_decided);
+    RUN_TEST(springs_that_share_a_turn_are_decided_in_it);
     RUN_TEST(each_limit_is_said_where_it_cuts);
     RUN_TEST(open_current_is_its_share_of_the_level);
     RUN_TEST(dither_is_a_triangle_at_another_place_for_each_spring);

@@ -694,8 +694,74 @@ static void power_and_current_of_a_hold_are_of_what_it_gives_off(void)
     TEST_ASSERT_EQUAL_UINT32(300000, spring_estimator_model_power_uw(&estimator, 0, 100000));
 }
 
+/* 2.6 standard deviations either way: of the distance, and of what hides where a spring is beside
+ * it. */
+static void bounds_are_what_is_known_of_distance_place_and_room(void)
+{
+    static const struct {
+        double c, var_k2, capacity_k, shift_k, disturbance_k, gone_k;
+        uint8_t possible;
+        double more_k2; /* beside the distance's; below 0: nothing is known */
+    } table[] = {
+        {80.0, 4.0, 1.0, 0.0, 0.0, 0.0, SPRING_PHASE_AUSTENITE, 9.0},
+        {80.0, 4.0, 1.0, 3.0, 2.0, 0.0, SPRING_PHASE_AUSTENITE, 9.0},
+        {80.0, 4.0, -1.0, -3.0, 0.0, 7.0, SPRING_PHASE_AUSTENITE, 9.0},
+        {80.0, 4.0, 1.0, -3.0, 2.0, -7.0, SPRING_PHASE_AUSTENITE, 9.0},
+        {60.0, 4.0, 0.0, 4.0, 1.0, 0.0, SPRING_PHASE_MARTENSITE, 25.0 + 0.0225 * 44.0 * 44.0},
+        {20.0, 0.5, 0.0, 0.0, 0.0, 0.0, SPRING_PHASE_MARTENSITE, 25.0},
+        {60.0, 4.0, 1.0, 2.0, 3.0, 1.0, ANY, -1.0},
+    };
+    for (size_t n = 0; n < ROWS(table); n++) {
+        begin_cold();
+        row(n);
+        put(table[n].c);
+        INSIDE.variance_k2 = (float)table[n].var_k2;
+        INSIDE.capacity_k = (float)table[n].capacity_k;
+        INSIDE.shift_k = (float)table[n].shift_k;
+        INSIDE.disturbance_k = (float)table[n].disturbance_k;
+        INSIDE.gone_k = (float)table[n].gone_k;
+        INSIDE.possible = table[n].possible;
+        INSIDE.hottest_c = 97.0f;
+        const double distance_k2 = table[n].var_k2 + pow(table[n].capacity_k, 2);
+        const double c = in_128ths(table[n].c) + table[n].shift_k;
+        const double most_k = 2.6 * sqrt(distance_k2 + table[n].more_k2) + table[n].disturbance_k;
+        const bool any = table[n].possible == ANY;
+        const spring_bounds_t is = spring_estimator_temperature_c(&estimator, &model, 0);
+        NEAR(c, is.value);
+        NEAR(any ? 20.0 - 2.6 * 5.0 : c - most_k, is.low);
+        NEAR(any ? 97.0 : c + most_k + fmax(table[n].gone_k, 0.0), is.high);
+    }
+}
+
+/* As far as it was found by its turns; or where the loss, as unsure as it is, would leave it in the
+ * end. */
+static void hold_is_as_unsure_as_where_its_loss_leads(void)
+{
+    static const struct {
+        double c, var_k2, loss_sd, more_loss;
+    } table[] = {{80.0, 4.0, 7e-4, 0.0},    {80.0, 100.0, 7e-4, 0.0}, {80.0, 4.0, 7e-4, 2e-3},
+                 {80.0, 4.0, 1.4e-3, 2e-3}, {50.0, 4.0, 7e-4, 0.0},   {80.0, 4.0, 7e-4, -0.006}};
+    for (size_t n = 0; n < ROWS(table); n++) {
+        begin_cold();
+        row(n);
+        put(table[n].c);
+        INSIDE.variance_k2 = (float)table[n].var_k2;
+        INSIDE.loss_variance = (float)pow(table[n].loss_sd, 2);
+        INSIDE.declared_stiffness_w_per_k = 0.006f;
+        INSIDE.learnt.loss_w_per_k = (float)table[n].more_loss;
+        const double stiffness = (double)spring_stiffness_w_per_k(BELIEF);
+        const double above_k = in_128ths(table[n].c) - 20.0;
+        const double settles_k2 =
+            pow(above_k * table[n].loss_sd, 2) / (stiffness * stiffness + 1e-12);
+        NEAR(sqrt(fmax(table[n].var_k2, settles_k2)),
+             spring_estimator_hold_sd_k(&estimator, &model, 0));
+    }
+}
+
 void run_law(void)
 {
+    RUN_TEST(bounds_are_what_is_known_of_distance_place_and_room);
+    RUN_TEST(hold_is_as_unsure_as_where_its_loss_leads);
     RUN_TEST(errors_of_distance_and_loss_go_on_by_the_law);
     RUN_TEST(sight_moves_all_by_what_each_is_known_to);
     RUN_TEST(what_keeps_its_phase_is_no_colder_and_tells_of_its_loss);

@@ -86,6 +86,67 @@ static void whatever_bit_of_what_springs_share_turns_over_that_begins_anew(void)
     begin_cold();
 }
 
+/* Bytes of a belief, from the first on and up to the last. */
+typedef struct {
+    size_t from, to;
+    bool counts;
+} part_t;
+
+#define PART(from, to, counts)                                                                     \
+    {                                                                                              \
+        offsetof(spring_belief_t, from), offsetof(spring_belief_t, to), counts                     \
+    }
+
+static void expect_marks(const part_t parts[], size_t count)
+{
+    keep_sound();
+    const uint16_t mark = spring_estimator_mark(&estimator, &model, 0);
+    for (size_t n = 0; n < count; n++) {
+        for (size_t at = parts[n].from; at < parts[n].to; at++) {
+            turn_over(offsetof(spring_estimator_t, spring) + at, (unsigned)at % 8u);
+            TEST_ASSERT_EQUAL_MESSAGE(parts[n].counts,
+                                      spring_estimator_mark(&estimator, &model, 0) != mark, where);
+        }
+    }
+    turn_over(offsetof(spring_estimator_t, r_phase_odds), 3);
+    TEST_ASSERT_TRUE(spring_estimator_mark(&estimator, &model, 0) != mark);
+    estimator = sound;
+    model.state.spring[0].temperature_c23 ^= 1;
+    TEST_ASSERT_TRUE(spring_estimator_mark(&estimator, &model, 0) != mark);
+    model = sound_model;
+    model.state.spring[1].temperature_c23 ^= 1; /* another spring's */
+    TEST_ASSERT_EQUAL_UINT16(mark, spring_estimator_mark(&estimator, &model, 0));
+}
+
+/* What counts is what a rerun must find again: no number of what is read just now, no bit. */
+static void mark_is_of_every_number_that_is_believed(void)
+{
+    static const part_t heats[] = {
+        PART(readings, variance_k2, false),
+        PART(variance_k2, averaged, true),
+        PART(averaged, unsteady, false),
+        PART(learnt, last_c7, true),
+        PART(last_c7, gone_k, false),
+        PART(gone_k, run, true),
+        {offsetof(spring_belief_t, unsteady), offsetof(spring_belief_t, unsteady) + 2u, true},
+        {offsetof(spring_belief_t, run), offsetof(spring_belief_t, run) + sizeof(spring_heat_t),
+         true}};
+    static const part_t holds[] = {{offsetof(spring_belief_t, run),
+                                    offsetof(spring_belief_t, run) + offsetof(spring_line_t, turns),
+                                    true},
+                                   {offsetof(spring_belief_t, run) + offsetof(spring_line_t, turns),
+                                    sizeof(spring_belief_t), false},
+                                   PART(variance_k2, averaged, true)};
+    begin_cold();
+    spring_estimator_begin_heating(&estimator, &model, 0);
+    ticks(2.0, 5.0);
+    expect_marks(heats, sizeof heats / sizeof heats[0]);
+    begin_cold();
+    (void)heat_then_hold(60.0);
+    expect_marks(holds, sizeof holds / sizeof holds[0]);
+    begin_cold();
+}
+
 /* What is done to a spring before its next turn. */
 static void and_is_left(void)
 {
@@ -153,4 +214,5 @@ void run_seals(void)
     RUN_TEST(whatever_bit_of_a_belief_turns_over_nothing_is_known_from_its_next_turn_on);
     RUN_TEST(whatever_bit_of_what_springs_share_turns_over_that_begins_anew);
     RUN_TEST(change_before_its_turn_hides_no_bit);
+    RUN_TEST(mark_is_of_every_number_that_is_believed);
 }

@@ -25,7 +25,7 @@ FAULTS = {
     12: "sum of currents above supply_limit_a",
     13: "stopped",
     14: "held at no current by a temperature limit for trip_time_s",
-    15: "what its sensor reads cannot be the circuit of its output: frozen or swapped or of another shunt; or supply_v or the declared resistance is wrong",
+    15: "what its sensor reads cannot be the circuit of its output: frozen or swapped or of another shunt; or supply_v or the declared resistance is wrong; or the supply swings",
     16: "the host has been silent for host_timeout_s",
     17: "no current sensor answers and nothing shows that current is off: cut the supply",
 }
