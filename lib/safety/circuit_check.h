@@ -18,9 +18,8 @@ extern "C" {
 #define CIRCUIT_CHECK_MOST    4095u /* mA and mV: the sums fit 32 bits */
 #define CIRCUIT_CHECK_JUMP    2u    /* steps: after more, a reading may be of the duty before */
 #define CIRCUIT_CHECK_WINDOWS 2u    /* on end in which the voltage did not follow the duty */
-#define CIRCUIT_CHECK_BALANCE_WINDOWS                                                              \
-    3u /* on end whose voltages did not add up, or stand still                                     \
-        */
+/* On end whose voltages did not add up, or moved without the duty. */
+#define CIRCUIT_CHECK_BALANCE_WINDOWS 3u
 
 /* Of one spring. The voltage is that behind the switch: the spring's, and what its current drops
  * over shunt and wiring. It is duty times supply, whatever the spring's resistance does. */
