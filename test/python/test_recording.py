@@ -632,8 +632,8 @@ def test_a_port_without_thermometers_is_said_before_anything_is_driven(
 
 
 def test_monitor_shows_the_array_as_a_grid_with_totals_limits_and_trend() -> None:
-    screen = Screen({"rows": "1", "columns": "2", "supply_limit_a": "15.000"})
-    assert not screen.take("time_s,i1_a,v1_v,m1_c,d1,i2_a,v2_v,m2_c,d2,fan,ambient_c,state")
+    names = ["time_s", "i1_a", "v1_v", "m1_c", "d1", "i2_a", "v2_v", "m2_c", "d2", "fan", "ambient_c", "state"]
+    screen = Screen({"rows": "1", "columns": "2", "supply_limit_a": "15.000"}, names)
     assert screen.take("1.000,1.500,0.300,20.00,0.100,0.000,0.000,20.00,0.000,0.50,21.00,ok")
     assert not screen.take("2.000,1.5x0,0.300")
     assert screen.take("<limits|spring:1|t:1.500|supply|cut_a:0.500>")

@@ -18,15 +18,13 @@ from ..io.recording import record as record_board
 from ..io.tape import record_tape
 from ..io.thermometers import Thermometers
 from ..say.monitoring import Screen
-from .console import FILE, FORCE, JSON, PORT, Command, Real, Whole, beside, err, out, working, write
+from .console import FILE, FORCE, JSON, PORT, Real, Whole, beside, command, err, out, working, write
 
 HZ = Whole(ranges.RECORD_HZ)
 SECONDS = Real(ranges.RECORD_S)
 
 
-@click.command(
-    cls=Command,
-    epilog="""\b
+@command("""\b
 Example:
   ninespring record --port /dev/ttyACM0 --hz 1 --duration 900 --run steps.txt -o board1.csv
 \b
@@ -35,8 +33,7 @@ steps.txt (console words; `at S =` waits until so many seconds after the first r
   at 5 = pattern 101000101
   at 300 = fan 100
   at 600 = off all
-""",
-)
+""")
 @PORT
 @click.option("-o", "--output", type=FILE, required=True, help="log to write; - is standard output")
 @click.option("--hz", type=HZ, default=1, show_default=True, help="rows a second")
@@ -112,14 +109,11 @@ def record(
         raise WorkError(f"{got.ended}; what came is in {output}")
 
 
-@click.command(
-    cls=Command,
-    epilog="""\b
+@command("""\b
 Examples:
   ninespring upload --port /dev/ttyACM0 settings.txt
   ninespring upload --port /dev/ttyACM0 --undo
-""",
-)
+""")
 @click.argument("settings", type=FILE, required=False)
 @PORT
 @click.option("--undo", is_flag=True, help="give the board back what it had before the last upload from this computer")
@@ -152,13 +146,10 @@ def upload(settings: Path | None, port: str, undo: bool, save: bool, json_path: 
     out.print(f"{len(lines)} settings sent and read back{', saved' if save else ''}")
 
 
-@click.command(
-    cls=Command,
-    epilog="""\b
+@command("""\b
 Example:
   ninespring monitor --port /dev/ttyACM0
-""",
-)
+""")
 @PORT
 @click.option("--hz", type=HZ, default=2, show_default=True, help="updates a second")
 @click.option("--duration", type=SECONDS, default=ranges.RECORD_S.high, help="s; Ctrl-C ends it")
@@ -167,10 +158,8 @@ def monitor(port: str, hz: int, duration: float) -> None:
     with Board(port, off_at_end=False) as board:
         until = time.monotonic() + duration
         try:
-            screen = Screen(board.settings())
+            screen = Screen(board.settings(), board.telemetry(hz))
             with Live(console=out, refresh_per_second=8) as live:
-                for line in board.ask(f"telemetry csv {hz}"):
-                    screen.take(line)
                 while (line := board.next_line(min(until, time.monotonic() + 5.0))) is not None:
                     if screen.take(line):
                         live.update(screen.picture())

@@ -21,7 +21,7 @@ from ..model.pattern import pattern_of
 from .calibration.chain import Calibration
 from .calibration.progress import FILE, Progress
 from .calibration.report import page
-from .console import ARRAY, JSON, Command, Real, out, write
+from .console import ARRAY, JSON, Real, command, out, write
 
 FROM = {"duration": 900.0, "drive_for": 300.0, "current": 2.0, "supply": 14.0, "hottest": 105.0}
 """What is taken where nothing is said."""
@@ -31,15 +31,12 @@ UNKNOWN += ("--set", "plant.edge_loss_fraction=0.25")
 REPORT, ARRAY_FILE = "report.html", "array.toml"
 
 
-@click.command(
-    cls=Command,
-    epilog="""\b
+@command("""\b
 Examples:
   ninespring calibrate --simulate
   ninespring calibrate --port /dev/ttyACM0 --thermometers /dev/ttyUSB0
   ninespring calibrate --port /dev/ttyACM0 --thermometers /dev/ttyUSB0 -o second --array array.toml --supply 10 --yes
-""",
-)
+""")
 @click.option("--port", help="serial port of the board, e.g. /dev/ttyACM0")
 @click.option("--thermometers", help="port of a thermocouple logger, one thermometer a spring; with --port")
 @click.option(

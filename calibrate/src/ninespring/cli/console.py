@@ -67,6 +67,13 @@ class Command(click.Command):
         return super().invoke(ctx)
 
 
+def command(
+    epilog: str, name: str | None = None, of: click.Group | None = None
+) -> Callable[[Callable[..., None]], click.Command]:
+    """Return what makes a function a command, of a group where it is one of several: its examples stand below its options."""
+    return (of.command if of else click.command)(name, cls=Command, epilog=epilog + "\n")
+
+
 def _names_a_file(value: Any) -> bool:
     return isinstance(value, Path) or (isinstance(value, str) and Path(value).is_file())
 

@@ -14,19 +14,16 @@ from ..io import results
 from ..io.logs import check_folder
 from ..model.models import Array, model_text
 from ..say import page as report
-from .console import ARRAY, FILE, IN_A_FOLDER, Command, array_and_runs, model_and_array, out, working, write
+from .console import ARRAY, FILE, IN_A_FOLDER, array_and_runs, command, model_and_array, out, working, write
 
 
-@click.command(
-    cls=Command,
-    epilog="""\b
+@command("""\b
 Examples:
   ninespring diagnose run1.csv run2.csv -o diagnosis
   ninespring diagnose --array array.toml tclab.csv -o diagnosis
   ninespring diagnose --model model.toml --frozen run3.csv -o check
   ninespring diagnose --model model.toml --frozen steady.csv -o steady
-""",
-)
+""")
 @click.argument("logs", nargs=-1, required=True, type=FILE)
 @ARRAY
 @click.option("--model", "model_path", type=FILE, help="model.toml: declared values and effects already on")

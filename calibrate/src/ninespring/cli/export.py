@@ -16,7 +16,7 @@ from ..io.logs import check_folder, read_bytes, read_log
 from ..model.models import Model, model_of_layer, read_model
 from ..model.stiffness import LAYERS
 from ..say.verified import with_verification
-from .console import FILE, JSON, MODEL, Command, beside, logs_of, notes_of, out, source_of, working, write
+from .console import FILE, JSON, MODEL, beside, command, logs_of, notes_of, out, source_of, working, write
 
 CHIP = click.option(
     "--chip",
@@ -42,14 +42,11 @@ def _chip_lines(path: Path | None) -> str:
     return "\n".join(console_lines(path)) if path else ""
 
 
-@click.command(
-    cls=Command,
-    epilog="""\b
+@command("""\b
 Examples:
   ninespring export --model diagnosis/model.toml -o settings.txt
   ninespring export --model diagnosis/model.toml --chip now.txt -o -
-""",
-)
+""")
 @MODEL
 @click.option("-o", "--output", type=FILE, required=True, help="console lines to write, `$name=value`; - prints them")
 @CHIP
@@ -98,14 +95,11 @@ def export(
     said.print(f"{len(made.written)} settings -> {output} (`ninespring upload` sends them)")
 
 
-@click.command(
-    cls=Command,
-    epilog="""\b
+@command("""\b
 Examples:
   ninespring verify --model diagnosis/model.toml run3.csv --report diagnosis/report.html
   ninespring verify --model diagnosis/model.toml --port /dev/ttyACM0 run3.csv
-""",
-)
+""")
 @click.argument("log", type=FILE)
 @MODEL
 @CHIP

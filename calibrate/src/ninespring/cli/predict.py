@@ -16,17 +16,14 @@ from ..io.logs import check_folder, log_text, read_log
 from ..io.statistics import rms_there
 from ..model import effects
 from ..model.models import read_model
-from .console import FILE, JSON, MODEL, Command, beside, logs_of, notes_of, source_of, working, write
+from .console import FILE, JSON, MODEL, beside, command, logs_of, notes_of, source_of, working, write
 
 
-@click.command(
-    cls=Command,
-    epilog="""\b
+@command("""\b
 Examples:
   ninespring predict --model diagnosis/model.toml run3.csv -o predicted.csv
   ninespring predict --chip --model diagnosis/model.toml run3.csv -o predicted.csv
-""",
-)
+""")
 @click.argument("log", type=FILE)
 @MODEL
 @click.option("-o", "--output", type=FILE, required=True, help="log to write: time_s (s), t1_c..tn_c (degC)")
@@ -68,13 +65,10 @@ def predict(log: Path, model_path: Path, output: Path, chip: bool, json_path: Pa
         beside(output).print(f"note: {note}", markup=False)
 
 
-@click.command(
-    cls=Command,
-    epilog="""\b
+@command("""\b
 Examples:
   ninespring replay --model diagnosis/model.toml run3.csv -o replay.csv
-""",
-)
+""")
 @click.argument("log", type=FILE)
 @MODEL
 @click.option("-o", "--output", type=FILE, required=True, help="log to write, with m1_c, x1, ... of the chip's model")

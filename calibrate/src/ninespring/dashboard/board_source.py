@@ -20,9 +20,9 @@ import numpy as np
 from ..errors import InputError, RefusedError, WorkError
 from ..io import words
 from ..io.belief import beliefs
-from ..io.board import HOST_TIMEOUT_S, PATIENCE, SIMULATED, Board, reading
+from ..io.board import HOST_TIMEOUT_S, PATIENCE, SIMULATED, Board, reading, shape_of
 from ..io.port import pseudo_terminal
-from ..io.recording import SILENT_S, LogFile, Row, RowCheck, RowSink, about, telemetry_names, write_head
+from ..io.recording import SILENT_S, LogFile, Row, RowCheck, RowSink, about, write_head
 from ..io.thermometers import Thermometers
 from ..model import tables
 from .source import Source, at_once
@@ -224,12 +224,10 @@ class BoardSource(Source):
         board.guard(self._settings)
         if logger := self._thermometers_port or board.thermometers:
             self._thermometers = Thermometers(logger)
-        self._names = names = self._begin_telemetry(board)
+        self._names = names = board.telemetry(self._hz)
         self._check = RowCheck(names, self._hz)
-        rows, columns = (int(float(self._settings.get(one, 0))) for one in ("rows", "columns"))
         springs = sum(re.fullmatch(r"i\d+_a", name) is not None for name in names)
-        if rows * columns != springs:
-            rows, columns = 1, springs
+        rows, columns = shape_of(self._settings, springs)
         self._change(
             connected=True,
             trouble="",
@@ -274,13 +272,7 @@ class BoardSource(Source):
             elif time.monotonic() > again_s:
                 again_s += LATE_S * board.patience
                 with contextlib.suppress(RefusedError):
-                    self._begin_telemetry(board)
-
-    def _begin_telemetry(self, board: Board) -> list[str]:
-        names = next(filter(None, map(telemetry_names, board.ask(f"telemetry csv {self._hz}"))), None)
-        if not names:
-            raise WorkError(f"{board.port}: the board's telemetry has no header that can be read")
-        return names
+                    board.telemetry(self._hz)
 
     def _read_settings(self, board: Board) -> None:
         settings = board.settings()
@@ -349,7 +341,7 @@ class BoardSource(Source):
             self._read_settings(board)
         if word.startswith("$"):  # it may have ended what this page needs of the board
             board.guard(self._settings)
-            self._begin_telemetry(board)
+            board.telemetry(self._hz)
 
     def _play_on(self, board: Board, now: float) -> None:
         play = self._play

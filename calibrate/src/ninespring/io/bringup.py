@@ -109,24 +109,15 @@ def springs_of(board: Board) -> int:
 
 def rows(board: Board, seconds: float, line: str = "", early: list[Reading] | None = None) -> list[Reading]:
     """Return telemetry of so many of the board's seconds after a line was obeyed; what came before that goes to `early`."""
-    names = next((one.split(",") for one in board.ask(f"telemetry csv {ROWS_HZ}") if one.startswith("time_s,")), [])
-
-    def next_row(until_s: float) -> Reading | None:
-        while (text := board.next_line(until_s)) is not None:
-            cells = text.split(",")
-            if text[:1].isdigit() and len(cells) == len(names):
-                return reading(dict(zip(names, cells, strict=True)))
-        return None
-
-    out: list[Reading] = []
+    names, out = board.telemetry(ROWS_HZ), []
     try:
         if line:
             board.ask(line)
-            while (one := next_row(0.0)) is not None:
+            while (row := board.next_row(names, 0.0)) is not None:
                 if early is not None:
-                    early.append(one)
-        while (one := next_row(time.monotonic() + 5.0 * board.patience)) is not None:
-            out.append(one)
+                    early.append(reading(row))
+        while (row := board.next_row(names, time.monotonic() + 5.0 * board.patience)) is not None:
+            out.append(one := reading(row))
             if one.time_s - out[0].time_s >= seconds:
                 return out
     finally:

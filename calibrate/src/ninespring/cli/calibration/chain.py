@@ -21,7 +21,7 @@ from ...find import diagnosis
 from ...find.plan import make_plan
 from ...infer.predict import chip_error
 from ...io import history, results
-from ...io.board import ROW_TIME, Board, send_settings, settings_that_differ
+from ...io.board import Board, send_settings, settings_that_differ
 from ...io.logs import Run, read_bytes, read_log, write_atomically
 from ...io.logs.mending import RUN_IN_S
 from ...io.recording import LogFile, Recording, Step, about, record, script_lines, told_to_stop
@@ -266,12 +266,10 @@ class Calibration:
         """Wait until the thermometers have stopped falling: two drives are only alike from the same temperature."""
         seen: list[tuple[float, float]] = []
         with self._logger() as logger, working("waiting until the springs are cold") as say:
-            self.board.ask("telemetry csv 1")
+            names = self.board.telemetry(1)
             try:
-                while (line := self.board.next_line(time.monotonic() + 10.0 * self.board.patience)) is not None:
-                    if not (match := ROW_TIME.match(line)):
-                        continue
-                    now_s, hottest = float(match[1]), max(logger.latest.values())
+                while row := self.board.next_row(names, time.monotonic() + 10.0 * self.board.patience):
+                    now_s, hottest = float(row["time_s"]), max(logger.latest.values())
                     seen.append((now_s, hottest))
                     say(f"waiting until the springs are cold: the hottest is at {hottest:.0f} degC")
                     before = [one for at_s, one in seen if at_s <= now_s - COOLED_S]
