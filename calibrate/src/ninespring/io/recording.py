@@ -155,6 +155,8 @@ class RowCheck:
         self.restarted = False
         """Time began anew: the board was reset."""
         self._longest_step_s = max(1.0, 3.0 / hz)
+        self._before: Row | None = None
+        """The row before the last."""
         self._last: Row | None = None
         self._held: Row | None = None
 
@@ -169,13 +171,16 @@ class RowCheck:
             good = [row]
         elif self._held and self._follows(self._held, row):
             if self._last and self._held.time_s <= self._last.time_s:
-                self.restarted = True
+                self.dropped += 1
+                self.restarted = not (self._before and self._follows(self._before, self._held))
+                self._held = row  # that the last was corrupt is seen too late: what follows waits for its time
                 return []
             good = [self._held, row]
         else:
             self.dropped += self._held is not None
             self._held = row
             return []
+        self._before = (self._last, *good)[-2]
         self._held, self._last = None, row
         return good
 
