@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import time
 from pathlib import Path
 
@@ -18,7 +17,7 @@ from ..io.recording import record as record_board
 from ..io.tape import record_tape
 from ..io.thermometers import Thermometers
 from ..say.monitoring import Screen
-from .console import FILE, FORCE, JSON, PORT, Real, Whole, beside, command, err, out, working, write
+from .console import FILE, FORCE, JSON, PORT, Real, Whole, beside, command, err, out, two_ports, working, write
 
 HZ = Whole(ranges.RECORD_HZ)
 SECONDS = Real(ranges.RECORD_S)
@@ -73,8 +72,7 @@ def record(
     check_folder(json_path)
     if tape and (thermometers or hz != 1):
         raise InputError("a tape has each tick and no thermometers: leave out --hz and --thermometers")
-    if thermometers and os.path.realpath(thermometers) == os.path.realpath(port):
-        raise InputError(f"--thermometers {thermometers}: that is the board's port, a logger has its own")
+    two_ports(port, thermometers)
     text = read_bytes(script).decode("utf-8", "replace") if script else ""
     steps = script_lines(text, str(script), duration)
     with told_to_stop(last=True) as stopped:
@@ -133,10 +131,8 @@ def upload(settings: Path | None, port: str, undo: bool, save: bool, json_path: 
         with working("giving back"), Board(port, off_at_end=False) as board:
             last = history.undo(board, save)
         write({json_path: results.checked(results.Upload(settings=len(last.sent), saved=save, undone=last.by))})
-        for line in last.words():
-            name, _, change = line.partition(": ")
-            old, _, new = change.partition(" -> ")
-            out.print(f"{name}: {new} -> {old}", markup=False)
+        for line in last.words(back=True):
+            out.print(line, markup=False)
         out.print(f"`{last.by}` of {last.when} is taken back{', saved' if save else ''}", markup=False)
         return
     lines = settings_lines(read_bytes(settings).decode("utf-8", "replace"), str(settings))

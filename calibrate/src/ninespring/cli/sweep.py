@@ -114,7 +114,7 @@ def _evaluate(spec: Any, results: Any, output: Path, result: Sweep) -> None:
         out.print(
             f"best {spec.metric}: {best[spec.metric]:.4g} {UNITS[spec.metric]} at {words}", soft_wrap=True, markup=False
         )
-        result.best = {axis.key: _plain(best[axis.key]) for axis in spec.axes} | {spec.metric: best[spec.metric]}
+        result.best = {axis.key: best[axis.key] for axis in spec.axes} | {spec.metric: best[spec.metric]}
         return
     found = indices_of(spec, table)
     shown = Table("metric", *(axis.key for axis in spec.axes), title="Sobol indices, total (+- 95 %)")
@@ -125,7 +125,3 @@ def _evaluate(spec: Any, results: Any, output: Path, result: Sweep) -> None:
         {output / "indices.json": json.dumps(found, indent=1) + "\n"}, force=True
     )  # the folder is a sweep's
     result.indices = found
-
-
-def _plain(value: Any) -> Any:
-    return value.item() if hasattr(value, "item") else value
