@@ -13,6 +13,12 @@ from unittest.mock import patch
 from ninespring.cli import main as cli
 
 
+def ended(*words: object) -> tuple[int, str]:
+    """Return a command's exit code, and what it says to whoever looks: its error, or else what it found."""
+    done = ninespring(*words)
+    return done.returncode, (done.stderr.removeprefix("ninespring: ") or done.stdout).rstrip("\n")
+
+
 def ninespring(*words: object) -> subprocess.CompletedProcess[str]:
     """Return how the command ends, as subprocess.run would."""
     out, errors, code = StringIO(), StringIO(), 0

@@ -18,16 +18,18 @@ def row(time_s: float, current_a: float = 1.0) -> str:
 
 
 class FakeBoard:
-    def __init__(self, answers: dict[str, list[str]] | None = None) -> None:
+    def __init__(
+        self, answers: dict[str, list[str]] | None = None, stream: Iterable[str] = (), every_s: float = 0.0
+    ) -> None:
         self.master, self.slave = pty.openpty()
         tty.setraw(self.slave)
         self.port = os.ttyname(self.slave)
         self.answers = {"version": VERSION, "faults": ["ok"]} | (answers or {})
         self.seen: list[str] = []
         self.settings: dict[str, str] = {}
-        self.stream: Iterable[str] = ()
+        self.stream = stream
         """Lines that follow the answer to `telemetry csv`, until `telemetry off` or a pull; `FAULT ...`: latched from then on."""
-        self.every_s = 0.0
+        self.every_s = every_s
         self._streaming = 0
         """Which stream runs; 0 none."""
         self.gone = False

@@ -1,10 +1,43 @@
-"""Results as a diagnosis would say them, for the tests of what is made of them."""
+"""What several tests begin with: programs that may not be built, a search of a log, results as a diagnosis would say them."""
 
 from __future__ import annotations
 
+import os
+from pathlib import Path
 from typing import Any
 
+import numpy as np
+import pytest
+from ninespring.find import diagnosis, search
+from ninespring.infer.declared import base_spec
+from ninespring.infer.problem import Problem
+from ninespring.infer.scene import scene_of
 from ninespring.io import results
+from ninespring.io.logs.run import Run
+from ninespring.model import effects
+from ninespring.model.models import Array
+
+ROOT = Path(__file__).resolve().parents[2]
+SIM = Path(os.environ.get("NINESPRING_SIM", ROOT / "build" / "host" / "ninespring-sim"))
+ELF = Path(os.environ.get("NINESPRING_AVR_DIR", ROOT / "build" / "avr")) / "firmware.elf"
+needs_simulator = pytest.mark.skipif(not SIM.exists(), reason=f"SKIPPED: {SIM} is not there: script/build makes it")
+needs_board = pytest.mark.skipif(
+    not (SIM.exists() and ELF.exists()), reason=f"SKIPPED: {SIM} or {ELF} is not there: script/build makes them"
+)
+
+
+def searched(run: Run) -> search.Search:
+    """Return a search on a log of the paper's array, the declared model fitted."""
+    problem = Problem(Array(), [run])
+    base = diagnosis.first_fit(problem, base_spec(problem))
+    return search.Search(problem, effects.candidates(scene_of(problem)), base)
+
+
+def keep_rows(columns: dict[str, np.ndarray], rows: np.ndarray) -> None:
+    """Leave only some rows in a log that is made."""
+    columns["time_s"] = np.arange(float(len(columns["fan"])))
+    for name in list(columns):
+        columns[name] = columns[name][rows]
 
 
 def an_effect(name: str, **fields: Any) -> results.Effect:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 from pathlib import Path
 
@@ -11,10 +10,9 @@ import numpy as np
 import pytest
 from command import ninespring
 from fake_board import FakeBoard, row
+from made import ROOT, SIM
 from ninespring.cli.main import COMMANDS
 
-ROOT = Path(__file__).resolve().parents[2]
-SIM = Path(os.environ.get("NINESPRING_SIM", ROOT / "build" / "host" / "ninespring-sim"))
 LATENT = {"latent_heat": {"latent_heat_j": 8.0}}
 
 
@@ -58,8 +56,7 @@ def test_fit_takes_what_read_log_gave_or_a_path(make_log) -> None:
 
 
 def test_a_board_is_off_after_its_block_also_after_an_error() -> None:
-    fake = FakeBoard({"on 9 100": ["error:10 locked after a reset; type unlock"]})
-    fake.stream = [row(1.0, 0.5)] * 3
+    fake = FakeBoard({"on 9 100": ["error:10 locked after a reset; type unlock"]}, stream=[row(1.0, 0.5)] * 3)
     with pytest.raises(ns.WorkError, match="locked after a reset"), ns.Board(fake.port) as board:
         board.on(1, 50)
         assert board.read().current_a.tolist() == [0.5]
@@ -78,8 +75,7 @@ BELIEVED = [
 
 
 def test_a_stream_has_bounds_and_phase_once_a_second_and_ends_telemetry_with_the_loop() -> None:
-    fake = FakeBoard({"model": BELIEVED})
-    fake.stream = [row(1.0 + 0.2 * k) for k in range(60)]
+    fake = FakeBoard({"model": BELIEVED}, stream=[row(1.0 + 0.2 * k) for k in range(60)])
     with ns.Board(fake.port) as board:
         seen = list(board.stream(hz=5, seconds=3.0))
         assert [one.time_s for one in seen] == pytest.approx([1.0 + 0.2 * k for k in range(16)])
@@ -93,26 +89,14 @@ def test_a_stream_has_bounds_and_phase_once_a_second_and_ends_telemetry_with_the
         with pytest.raises(ns.InputError, match="hz"):
             next(board.stream(hz=0))
     table = ns.to_pandas(seen)
-    assert list(table.columns) == [
-        "time_s",
-        "i1_a",
-        "v1_v",
-        "m1_c",
-        "low1_c",
-        "high1_c",
-        "x1",
-        "d1",
-        "fan",
-        "ambient_c",
-        "state",
-    ]
+    columns = "time_s i1_a v1_v m1_c low1_c high1_c x1 d1 fan ambient_c state"
+    assert list(table.columns) == columns.split()
     assert len(table) == 16
     assert table["x1"].iloc[-1] == 0.125
 
 
 def test_a_board_that_tells_nothing_of_its_springs_still_streams() -> None:
-    fake = FakeBoard({"model": ["error:1 no such word"]})
-    fake.stream = [row(1.0)] * 3
+    fake = FakeBoard({"model": ["error:1 no such word"]}, stream=[row(1.0)] * 3)
     with ns.Board(fake.port) as board:
         now = next(board.stream())
         assert np.isnan(now.low_c).all() and now.current_a.tolist() == [1.0]
@@ -155,8 +139,7 @@ def test_what_the_commands_do_can_be_called(make_log, tmp_path: Path) -> None:
         "Time (sec),Heater 1,Heater 2,Temperature 1,Temperature 2\n0,0,0,21,21\n1,50,0,21,21\n2,50,0,22,21\n"
     )
     assert ns.import_log(table, "tclab", tmp_path / "tclab.csv").springs == 2
-    fake = FakeBoard({})
-    fake.stream = [row(float(k), 0.5) for k in range(1, 8)]
+    fake = FakeBoard({}, stream=[row(float(k), 0.5) for k in range(1, 8)])
     got = ns.record(fake.port, tmp_path / "board.csv", duration_s=3.0)
     assert not got.ended and (tmp_path / "board.csv").exists()
     with pytest.raises(ns.InputError, match="never written over"):

@@ -8,8 +8,7 @@ import click
 import ninespring as ns
 import numpy as np
 import pytest
-from click.testing import CliRunner
-from command import ninespring
+from command import ended
 from ninespring.cli.console import Real, Whole
 from ninespring.cli.main import COMMANDS, cli
 from ninespring.io import ranges
@@ -25,18 +24,6 @@ NUMBERS = [
 ]
 
 
-def ended(*words: object) -> tuple[int, str]:
-    """Return exit code and message as the terminal shows them."""
-    done = CliRunner().invoke(cli, [str(one) for one in words], standalone_mode=False)
-    if isinstance(done.exception, click.UsageError):
-        return 2, done.exception.format_message()
-    if isinstance(done.exception, ns.InputError):
-        return 2, str(done.exception)
-    if done.exception and not isinstance(done.exception, SystemExit):
-        raise done.exception
-    return done.exit_code, done.output
-
-
 def test_every_number_of_every_command_is_refused_beyond_its_range() -> None:
     assert len(NUMBERS) >= 15
     for name, option in NUMBERS:
@@ -48,15 +35,6 @@ def test_every_number_of_every_command_is_refused_beyond_its_range() -> None:
             code, said = ended(name, option.opts[0], value)
             assert code == 2 and option.opts[0] in said and "\n" not in said, (name, option.opts, value, said)
         assert np.isfinite([low, high]).all()
-
-
-@pytest.mark.parametrize(
-    "words",
-    [["plan", "--hottest", "nan"], ["record", "--duration", "nan"], ["dashboard", "--speed", "nan"]],
-)
-def test_nan_ends_with_exit_code_2_and_one_line(words: list[str]) -> None:
-    done = ninespring(*words)
-    assert done.returncode == 2 and done.stderr.count("\n") == 1 and words[1] in done.stderr and not done.stdout
 
 
 @pytest.mark.parametrize("bad", [float("nan"), float("inf"), -1.0, 1e308, "900", None, True])

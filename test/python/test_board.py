@@ -6,7 +6,6 @@ Needs `ninespring-sim` and the firmware's ELF: NINESPRING_SIM and NINESPRING_AVR
 from __future__ import annotations
 
 import json
-import os
 import signal
 import subprocess
 import sys
@@ -17,13 +16,10 @@ from pathlib import Path
 import command
 import numpy as np
 import pytest
+from made import ELF, SIM, needs_board
 from ninespring.io.board import Board
 from ninespring.io.logs import read_log, read_table
 from websockets.sync.client import connect
-
-ROOT = Path(__file__).resolve().parents[2]
-SIM = Path(os.environ.get("NINESPRING_SIM", ROOT / "build" / "host" / "ninespring-sim"))
-ELF = Path(os.environ.get("NINESPRING_AVR_DIR", ROOT / "build" / "avr")) / "firmware.elf"
 
 LAB = """
 [scenario]
@@ -87,8 +83,7 @@ def settings_of(port: str) -> dict[str, float]:
 
 
 @pytest.mark.nightly
-@pytest.mark.skipif(not SIM.exists(), reason=f"SKIPPED: {SIM} is not there: build it, or set NINESPRING_SIM")
-@pytest.mark.skipif(not ELF.exists(), reason=f"SKIPPED: {ELF} is not there: build the avr target first")
+@needs_board
 def test_an_effect_found_in_a_log_is_in_the_model_of_the_chip_that_it_was_uploaded_to(
     board: str, tmp_path: Path
 ) -> None:
@@ -157,7 +152,7 @@ def known_in(connection: Board) -> list[str]:
     return [line for line in lines if not line.endswith("nothing yet")]
 
 
-@pytest.mark.skipif(not (SIM.exists() and ELF.exists()), reason=f"SKIPPED: {SIM} or {ELF} is not there")
+@needs_board
 def test_an_upload_makes_the_board_forget_what_it_has_learnt(board: str, tmp_path: Path) -> None:
     def learnt() -> list[str]:
         with Board(board, off_at_end=False) as connection:
@@ -182,7 +177,7 @@ def faults_of(port: str) -> list[str]:
         return connection.ask("faults")
 
 
-@pytest.mark.skipif(not (SIM.exists() and ELF.exists()), reason=f"SKIPPED: {SIM} or {ELF} is not there")
+@needs_board
 @pytest.mark.parametrize("board", ["4"], indirect=True)
 @pytest.mark.parametrize("program", ["record", "dashboard", "script"])
 def test_a_program_that_is_killed_leaves_no_spring_on(board: str, tmp_path: Path, program: str) -> None:
@@ -222,7 +217,7 @@ def test_a_program_that_is_killed_leaves_no_spring_on(board: str, tmp_path: Path
     assert any("host_silent" in line for line in faults)
 
 
-@pytest.mark.skipif(not (SIM.exists() and ELF.exists()), reason=f"SKIPPED: {SIM} or {ELF} is not there")
+@needs_board
 @pytest.mark.parametrize("board", ["4"], indirect=True)
 def test_a_script_that_sleeps_keeps_its_springs_and_gives_the_timeout_back(board: str) -> None:
     with Board(board) as connection:

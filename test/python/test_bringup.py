@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import re
 import subprocess
 from collections.abc import Callable, Iterator
@@ -11,18 +10,14 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
+from made import ELF, SIM, needs_board
 from ninespring.cli import main as cli
 from ninespring.errors import InputError
 from ninespring.io import bringup
 from ninespring.io.board import PATIENCE, Board
 from ninespring.io.bringup import converse, do_step
 
-ROOT = Path(__file__).resolve().parents[2]
-SIM = Path(os.environ.get("NINESPRING_SIM", ROOT / "build" / "host" / "ninespring-sim"))
-ELF = Path(os.environ.get("NINESPRING_AVR_DIR", ROOT / "build" / "avr")) / "firmware.elf"
-pytestmark = pytest.mark.skipif(
-    not (SIM.exists() and ELF.exists()), reason=f"SKIPPED: {SIM} or {ELF} is not there: script/build makes them"
-)
+pytestmark = needs_board
 
 
 class Bench:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import signal
 import subprocess
 import sys
@@ -15,6 +14,7 @@ import click
 import pytest
 from click.testing import CliRunner
 from fake_board import FakeBoard
+from made import ELF, SIM, needs_board
 from ninespring.cli.calibrate import FROM
 from ninespring.cli.calibration import chain, judged
 from ninespring.cli.calibration.chain import Calibration
@@ -26,9 +26,6 @@ from ninespring.io.board import Board
 from ninespring.io.recording import Fault, Recording, Step
 from ninespring.model.models import Array
 
-ROOT = Path(__file__).resolve().parents[2]
-SIM = Path(os.environ.get("NINESPRING_SIM", ROOT / "build" / "host" / "ninespring-sim"))
-ELF = Path(os.environ.get("NINESPRING_AVR_DIR", ROOT / "build" / "avr")) / "firmware.elf"
 HAD = {"rows": "3", "columns": "3", "loss_w_per_k": "0.005800", "policy": "1", "open_current_a": "1.500"}
 FOUND = {"loss_w_per_k": "0.006100"}
 
@@ -78,8 +75,7 @@ def interrupted(folder: Path, name: str, rows: int, how: signal.Signals, *words:
 
 
 @pytest.mark.nightly
-@pytest.mark.skipif(not SIM.exists(), reason=f"SKIPPED: {SIM} is not there: build it, or set NINESPRING_SIM")
-@pytest.mark.skipif(not ELF.exists(), reason=f"SKIPPED: {ELF} is not there: build the avr target first")
+@needs_board
 def test_a_board_learns_its_array_in_one_command_that_is_stopped_and_killed_on_the_way(
     ports: tuple[str, str], tmp_path: Path
 ) -> None:

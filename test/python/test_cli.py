@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from command import ninespring
+from made import keep_rows
 from ninespring.cli import main as cli
 from ninespring.errors import WorkError
 from ninespring.find import doubt
@@ -111,14 +112,8 @@ def test_every_result_is_held_to_its_schema(make_log, tmp_path: Path) -> None:
 
 
 def test_the_chip_starts_again_after_gaps_and_is_seen_by_the_same_sensors(make_log) -> None:
-    def gap(columns: dict[str, np.ndarray]) -> None:
-        keep = np.r_[0:250, 400:600]
-        for name in list(columns):
-            columns[name] = columns[name][keep]
-        columns["time_s"] = np.arange(600.0)[keep]
-
     true = {"sensor_lag": {"sensor_lag_s": 8.0}, "edge_loss": {"edge_loss_fraction": 0.2}}
-    run = read_log(make_log(effects=true, change=gap))
+    run = read_log(make_log(effects=true, change=lambda columns: keep_rows(columns, np.r_[0:250, 400:600])))
     model = Model(Array(), list(true), {k: v for one in true.values() for k, v in one.items()})
     plant, chip = predict(model, run), predict(model, run, chip=True)
     assert np.abs(plant - chip).max() < 0.1
@@ -243,30 +238,11 @@ def test_files_are_written_together_or_not_at_all(tmp_path: Path) -> None:
     assert sorted(one.name for one in tmp_path.iterdir()) == ["a", "b"]
 
 
-@pytest.mark.parametrize(
-    "command",
-    [
-        "fit",
-        "diagnose",
-        "predict",
-        "export",
-        "import",
-        "record",
-        "upload",
-        "calibrate",
-        "monitor",
-        "plan",
-        "plot",
-        "dashboard",
-        "couplings",
-        "sweep",
-    ],
-)
+@pytest.mark.parametrize("command", sorted(set(cli.COMMANDS) - {"settings"}))
 def test_help_says_what_it_does_with_an_example(command: str) -> None:
-    runner = CliRunner()
-    text = runner.invoke(cli.cli, [command, "--help"]).output
+    text = CliRunner().invoke(cli.cli, [command, "--help"]).output
     assert f"ninespring {command} " in text.partition("Example")[2]
-    assert "  -o, --output" in text or command in ("upload", "monitor", "dashboard")
+    assert "  -o, --output" in text or command in ("upload", "monitor", "dashboard", "console", "verify")
     for line in re.findall(r"^  (?:-\w, )?--.*(?:\n {10,}.*)*", text, re.MULTILINE):
         assert re.search(r"  +\S.*\w", line.lstrip().partition("  ")[1] + line.lstrip().partition("  ")[2]), line
 

@@ -286,13 +286,6 @@ def test_the_chips_error_is_told_before_and_after_on_a_log_that_was_not_fitted(m
         run("verify", "--model", tmp_path / "d" / "model.toml", fitted)
 
 
-def test_an_output_that_is_an_input_is_refused(cold: Path) -> None:
-    text = cold.read_text()
-    with pytest.raises(InputError, match="would be written over"):
-        run("export", "--model", cold, "-o", cold)
-    assert cold.read_text() == text
-
-
 def test_a_link_stays_a_link_a_device_a_device_and_a_dash_is_standard_output(
     tmp_path: Path, capsys: pytest.CaptureFixture
 ) -> None:

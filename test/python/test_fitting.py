@@ -8,7 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from ninespring.find import diagnosis, evidence, search
+from made import searched
+from ninespring.find import diagnosis, evidence
 from ninespring.infer.declared import base_spec
 from ninespring.infer.fit import Fit
 from ninespring.infer.problem import FOLDS, Problem, fold_of_rows
@@ -128,10 +129,7 @@ def test_a_wrong_first_reading_is_kept_out_of_the_fit(make_log) -> None:
 
     true = read_log(make_log("a.csv", seed=8))
     wrong = read_log(make_log("b.csv", seed=8, change=off))
-    values = []
-    for run in (true, wrong):
-        problem = Problem(Array(), [run])
-        values.append(diagnosis.first_fit(problem, base_spec(problem)))
+    values = [searched(run).base for run in (true, wrong)]
     errors = values[0].stderr()
     for key, one in values[0].as_dict().items():
         assert abs(one - values[1].value(key)) < errors[key], key
@@ -158,12 +156,6 @@ def test_bounds_hold_and_are_reported(make_log) -> None:
     assert fit.at_bounds() == ["edge_loss_fraction"]
 
 
-def test_what_is_said_of_all_springs_does_not_undo_what_is_said_of_one() -> None:
-    plant = native.Plant(1, 2)
-    plant.set_all({"loss_w_per_k[2]": 0.02, "loss_w_per_k": 0.01})
-    assert (plant.get("loss_w_per_k[1]"), plant.get("loss_w_per_k[2]")) == (0.01, 0.02)
-
-
 def test_a_copy_of_a_plant_leads_its_own_life() -> None:
     plant = native.Plant(1, 1)
     twin = plant.copy()
@@ -183,19 +175,18 @@ def test_springs_start_where_the_sensors_would_show_the_first_row() -> None:
 
 
 def test_a_number_that_explains_nothing_costs(make_log) -> None:
-    problem = Problem(Array(), [read_log(make_log(seed=2))])
-    base = diagnosis.first_fit(problem, base_spec(problem))
-    known = effects.candidates(scene_of(problem))
-    found = search.Search(problem, known, base)
-    lag = next(c for c in known if c.effect == "sensor_lag")
-    spare = found.refit(base, [lag], [0.1])
-    assert evidence.log_evidence(problem, spare, base) < -3.0  # half the logarithm of 5400 samples, less what it found
+    found = searched(read_log(make_log(seed=2)))
+    lag = next(c for c in found.candidates if c.effect == "sensor_lag")
+    spare = found.refit(found.base, [lag], [0.1])
+    assert (
+        evidence.log_evidence(found.problem, spare, found.base) < -3.0
+    )  # half the logarithm of 5400 samples, less what it found
 
 
 def test_a_thermometer_that_wanders_says_less_of_what_is_slow_than_of_what_is_quick(make_log) -> None:
     """Of two causes that leave as much behind, the quick one is clear where the slow one is the thermometer's own way."""
-    problem = Problem(Array(), [read_log(make_log(seed=2))])
-    base = diagnosis.first_fit(problem, base_spec(problem))
+    found = searched(read_log(make_log(seed=2)))
+    problem, base = found.problem, found.base
     rows = len(problem.runs[0].time_s)
     rng = np.random.default_rng(3)
     wander = 0.3 * np.cumsum(rng.standard_normal((rows, 9)), axis=0)
@@ -216,8 +207,8 @@ def test_a_thermometer_that_wanders_says_less_of_what_is_slow_than_of_what_is_qu
 
 
 def test_only_what_the_noise_of_a_first_reading_leaves_is_taken_away(make_log) -> None:
-    problem = Problem(Array(), [read_log(make_log(seed=9))])
-    fit = diagnosis.first_fit(problem, base_spec(problem))
+    found = searched(read_log(make_log(seed=9)))
+    problem, fit = found.problem, found.base
     response = problem.simulate(fit.spec, fit.values, 0, np.eye(9)[3]) - problem.simulate(fit.spec, fit.values, 0)
     rest = problem.without_errors(fit.residual)[0]
     for off, left in ((0.6, 0.0), (6.0, 6.0 - 0.9)):  # K: twice the noise, twenty times the noise

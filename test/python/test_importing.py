@@ -28,20 +28,6 @@ ambient_c = 21.5
 """
 
 
-def test_percent_fahrenheit_and_decimal_commas_are_imported(tmp_path: Path) -> None:
-    source = tmp_path / "logger.csv"
-    source.write_text("t/min;heat;temp\n0;50;68,0\n0,5;50;69,8\n1;0;71,6\n")
-    mapping = tmp_path / "map.toml"
-    mapping.write_text(
-        '[file]\nseparator = ";"\ndecimal = ","\n[columns]\ntime_s = {column = "t/min", unit = "min"}\n'
-        'u1 = {column = "heat", unit = "%"}\nt1_c = {column = "temp", unit = "degF"}\n'
-    )
-    rows = [line.split(",") for line in importing.import_table(source, mapping).splitlines()[-3:]]
-    assert [float(r[0]) for r in rows] == [0, 30, 60]
-    assert [float(r[1]) for r in rows] == [0.5, 0.5, 0.0]
-    assert [float(r[2]) for r in rows] == pytest.approx([20.0, 21.0, 22.0])
-
-
 def test_frames_of_any_size_become_a_temperature_a_spring(tmp_path: Path) -> None:
     frames = np.full((5, 24, 32), 20.0)
     for k in range(9):

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from made import keep_rows
 from ninespring.errors import InputError
 from ninespring.io.logs import condense, log_text, read_log, read_table
 from ninespring.model import native
@@ -120,13 +121,7 @@ def test_repeated_rows_are_dropped_and_said(tmp_path: Path) -> None:
 
 
 def test_a_gap_starts_the_simulation_again(make_log) -> None:
-    def cut(columns: dict[str, np.ndarray]) -> None:
-        keep = np.r_[0:200, 320:600]
-        for name in list(columns):
-            columns[name] = columns[name][keep]
-        columns["time_s"] = np.arange(600.0)[keep]
-
-    run = read_log(make_log(change=cut))
+    run = read_log(make_log(change=lambda columns: keep_rows(columns, np.r_[0:200, 320:600])))
     assert run.starts == [0, 200]
     assert any("gap" in note for note in run.notes)
     # the reading at the start is kept, the two minutes after it do not count
@@ -301,13 +296,8 @@ def test_no_row_of_a_log_that_is_switched_all_the_time_is_left_out(make_log) -> 
 
 
 def test_rows_here_and_there_that_are_missing_are_said(make_log) -> None:
-    def lose(columns: dict[str, np.ndarray]) -> None:
-        keep = np.random.default_rng(0).random(600) > 0.1
-        for name in list(columns):
-            columns[name] = columns[name][keep]
-        columns["time_s"] = np.arange(600.0)[keep]
-
-    run = read_log(make_log(change=lose))
+    here = np.random.default_rng(0).random(600) > 0.1
+    run = read_log(make_log(change=lambda columns: keep_rows(columns, here)))
     assert run.starts == [0]
     assert any("rows are missing" in note for note in run.notes)
 

@@ -10,7 +10,7 @@ from html.parser import HTMLParser
 import msgspec
 import numpy as np
 import pytest
-from made import an_effect
+from made import an_effect, keep_rows
 from ninespring.cli import diagnose as command
 from ninespring.find import diagnosis
 from ninespring.io import results
@@ -72,15 +72,9 @@ def found(make_log) -> diagnosis.Diagnosis:
     """Return a diagnosis of two runs: phase change, a slow sensor, a spring that is not measured, a gap."""
     effects = {"latent_heat": {"latent_heat_j": 8.0}, "sensor_lag": {"sensor_lag_s": 5.0}}
 
-    def gap(columns: dict[str, np.ndarray]) -> None:
-        keep = np.r_[0:250, 320:600]
-        for name in list(columns):
-            columns[name] = columns[name][keep]
-        columns["time_s"] = np.arange(600.0)[keep]
-
     logs = [
         make_log("a<b.csv", effects, seed=1, change=lambda c: c.pop("t5_c")),
-        make_log("gap.csv", effects, seed=2, change=lambda c: (gap(c), c.pop("t5_c"))),
+        make_log("gap.csv", effects, seed=2, change=lambda c: (keep_rows(c, np.r_[0:250, 320:600]), c.pop("t5_c"))),
     ]
     return diagnosis.diagnose(Array(), [read_log(log) for log in logs])
 

@@ -15,9 +15,9 @@ import nbformat
 import ninespring
 import pytest
 from jupyter_client import AsyncKernelManager
+from made import ROOT, SIM, needs_simulator
 from nbclient import NotebookClient
 
-ROOT = Path(__file__).resolve().parents[2]
 VERSION = re.search(r"project\(ninespring VERSION ([0-9.]+)", (ROOT / "CMakeLists.txt").read_text())[1]
 
 
@@ -103,11 +103,9 @@ def test_the_results_first_page_has_a_figure_for_each_of_its_lines() -> None:
     assert page.split("Page written")[0] == results.first_page().split("Page written")[0]  # by nobody's hand
 
 
+@needs_simulator
 @pytest.mark.nightly
 def test_the_notebook_runs_from_its_first_cell_to_its_last(tmp_path: Path) -> None:
-    sim = Path(os.environ.get("NINESPRING_SIM", ROOT / "build" / "host" / "ninespring-sim"))
-    if not sim.exists():
-        pytest.skip(f"SKIPPED: {sim} is not there: script/build makes it")
     book = nbformat.read(ROOT / "docs" / "first-hour.ipynb", 4)
     for cell in book.cells:
         assert (
@@ -119,7 +117,7 @@ def test_the_notebook_runs_from_its_first_cell_to_its_last(tmp_path: Path) -> No
     ways = os.pathsep.join((str(Path(sys.executable).parent), os.environ["PATH"]))
     kernel = AsyncKernelManager(kernel_name="python3")
     client = NotebookClient(book, km=kernel, timeout=300, resources={"metadata": {"path": str(tmp_path / "docs")}})
-    client.execute(env=os.environ | {"PATH": ways, "NINESPRING_SIM": str(sim)})  # an error in a cell is raised here
+    client.execute(env=os.environ | {"PATH": ways, "NINESPRING_SIM": str(SIM)})  # an error in a cell is raised here
     said = "".join(str(output) for cell in book.cells for output in cell.get("outputs", []))
     assert "<diagnosis: " in said and "image/png" in said and "hottest spring 5" in said
 

@@ -8,6 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from made import searched
 from ninespring.find import diagnosis, evidence, experiments, search
 from ninespring.find.plan import plan_experiment
 from ninespring.infer import budget
@@ -206,9 +207,7 @@ def test_every_probe_is_within_its_bounds_and_moves_what_is_seen(make_log, tmp_p
 @pytest.fixture
 def plain(make_log) -> search.Search:
     """Return a search on a log of the declared model and nothing else."""
-    problem = Problem(Array(), [read_log(make_log(seed=11))])
-    base = diagnosis.first_fit(problem, base_spec(problem))
-    return search.Search(problem, effects.candidates(scene_of(problem)), base)
+    return searched(read_log(make_log(seed=11)))
 
 
 def with_effect(found: search.Search, effect: str, variant: str) -> Fit:
@@ -245,19 +244,16 @@ def test_slow_nodes_are_tried_in_the_place_of_a_drift_whatever_the_forecast_says
 
 
 def test_another_variant_of_an_adopted_effect_is_tried(make_log) -> None:
-    problem = Problem(Array(), [read_log(make_log(effects={"spring_mismatch": {"loss_scale[4]": 1.4}}, seed=3))])
-    base = diagnosis.first_fit(problem, base_spec(problem))
-    found = search.Search(problem, effects.candidates(scene_of(problem)), base)
+    found = searched(read_log(make_log(effects={"spring_mismatch": {"loss_scale[4]": 1.4}}, seed=3)))
     wrong = with_effect(found, "spring_mismatch", "spring 5")
-    contenders = [other for _, other in found.rivals(wrong, {"spring_mismatch": base})]
+    contenders = [other for _, other in found.rivals(wrong, {"spring_mismatch": found.base})]
     right = next(other for other in contenders if dict(other.spec.variant) == {"spring_mismatch": "spring 4"})
     assert found.preferred(right, wrong) and not found.preferred(wrong, right)
 
 
 def test_a_search_that_has_had_its_simulations_begins_no_further_step(make_log) -> None:
-    problem = Problem(Array(), [read_log(make_log(effects={"edge_loss": {"edge_loss_fraction": 0.2}}, seed=3))])
-    base = diagnosis.first_fit(problem, base_spec(problem))
-    found = search.Search(problem, effects.candidates(scene_of(problem)), base)
+    found = searched(read_log(make_log(effects={"edge_loss": {"edge_loss_fraction": 0.2}}, seed=3)))
+    problem, base = found.problem, found.base
     found.until = problem.simulations - 1
     assert found.forward(base) is base and not problem.budget.short
     found.until = problem.simulations + 1000
@@ -265,16 +261,16 @@ def test_a_search_that_has_had_its_simulations_begins_no_further_step(make_log) 
 
 
 def test_all_searches_draw_from_one_budget(make_log) -> None:
-    problem = Problem(Array(), [read_log(make_log(effects={"edge_loss": {"edge_loss_fraction": 0.2}}, seed=3))])
-    base = diagnosis.first_fit(problem, base_spec(problem))
+    found = searched(read_log(make_log(effects={"edge_loss": {"edge_loss_fraction": 0.2}}, seed=3)))
+    problem, base = found.problem, found.base
     problem.budget.enough = problem.simulations + 400
     shares = []
     for _ in range(2):
-        shares.append(search.Search(problem, effects.candidates(scene_of(problem)), base).until - problem.simulations)
+        shares.append(search.Search(problem, found.candidates, base).until - problem.simulations)
         problem.budget.take(200)
     assert shares == [100, 50] and not problem.budget.short
     problem.budget.take()
-    assert search.Search(problem, effects.candidates(scene_of(problem)), base).forward(base) is base
+    assert search.Search(problem, found.candidates, base).forward(base) is base
     assert problem.budget.short
 
 

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import click
 import ninespring as ns
 import pytest
-from click.testing import CliRunner
+from command import ended as ninespring
 from fake_board import FakeBoard
-from ninespring.cli.main import cli
 from ninespring.io import history
 
 HAD = {"rows": "3", "loss_w_per_k": "0.005800", "loss_scale_1": "1.000", "ambient_c": "21.00"}
@@ -27,17 +25,6 @@ def fake() -> FakeBoard:
     board = FakeBoard()
     board.settings = dict(HAD)
     return board
-
-
-def ninespring(*words: object) -> tuple[int, str]:
-    """Return how a command ended and what it said."""
-    done = CliRunner().invoke(cli, list(map(str, words)), standalone_mode=False)
-    if isinstance(done.exception, click.exceptions.Exit):
-        return done.exception.exit_code, done.output
-    if done.exception is None:
-        return int(done.return_value or 0), done.output
-    assert isinstance(done.exception, ns.WorkError | ns.InputError), done.exception
-    return 1 if isinstance(done.exception, ns.WorkError) else 2, str(done.exception)
 
 
 def upload(fake: FakeBoard, tmp_path: Path, *lines: str) -> None:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-import os
 import subprocess
 from pathlib import Path
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from made import SIM, needs_simulator
 from ninespring.cli import main as cli
 from ninespring.errors import InputError
 from ninespring.explore.point import run_point
@@ -22,8 +22,6 @@ from ninespring.model.pattern import pattern_of
 from ninespring.model.simulate import array_parameters
 from ninespring.say import plotting
 
-ROOT = Path(__file__).resolve().parents[2]
-SIM = Path(os.environ.get("NINESPRING_SIM", ROOT / "build" / "host" / "ninespring-sim"))
 HEAD = "[array]\nrows = 3\ncols = 3\npitch_mm = 5\n"
 
 
@@ -189,13 +187,14 @@ def test_what_knows_one_layer_refuses_two(tmp_path: Path) -> None:
         read_log(log)
 
 
+@needs_simulator
 def test_a_picture_has_both_layers_side_by_side(tmp_path: Path) -> None:
     ini = tmp_path / "two.ini"
     ini.write_text(
         "[scenario]\nduration_s = 30\npolicy = open\n[array]\nrows = 1\ncols = 2\nlayers = 2\n"
         "[plant]\neffects = latent_heat, resistance_phase\n[events]\nat 1 = pattern 10/01\n"
     )
-    subprocess.run([simulator(), "run", str(ini), "-o", str(tmp_path / "two.csv")], check=True, capture_output=True)
+    subprocess.run([SIM, "run", str(ini), "-o", str(tmp_path / "two.csv")], check=True, capture_output=True)
     log = read_log(tmp_path / "two.csv")
     assert (log.layers, log.springs) == (2, 4)
     assert (log.temperature_c[-1, [0, 3]] > 40).all() and (log.temperature_c[-1, [1, 2]] < 40).all()
@@ -207,18 +206,12 @@ def test_a_picture_has_both_layers_side_by_side(tmp_path: Path) -> None:
     assert [one.partition(":")[0] for one in words] == ["1", "2", "3", "4"]
 
 
-def simulator() -> str:
-    if not SIM.exists():
-        pytest.skip(f"SKIPPED: {SIM} is missing: script/setup")
-    return str(SIM)
-
-
+@needs_simulator
 @pytest.mark.nightly
 def test_from_geometry_to_a_picture(tmp_path: Path) -> None:
     """The journey of docs/exploring.md, in small."""
     pytest.importorskip("skfem", reason="SKIPPED: scikit-fem is missing: pip install 'ninespring[explore]'")
     pytest.importorskip("gmsh", reason="SKIPPED: gmsh is missing", exc_type=Exception)
-    sim = simulator()
     at = {name: tmp_path / name for name in ("array.toml", "model.toml", "run.ini", "run.csv", "run.png", "map.png")}
     at["array.toml"].write_text(
         '[array]\nrows = 1\ncols = 2\npitch_mm = 6\n[cooling]\nplate = "none"\n'
@@ -234,7 +227,7 @@ def test_from_geometry_to_a_picture(tmp_path: Path) -> None:
     assert 2e-4 < values["series_w_per_k"] < 5e-4 < values["loss_w_per_k[3]"]
     done = run("scenario", "--model", at["model.toml"], "--pattern", "11/01", "--duration", 120, "-o", at["run.ini"])
     assert done.exit_code == 0, done.output
-    subprocess.run([sim, "run", str(at["run.ini"]), "-o", str(at["run.csv"])], check=True, capture_output=True)
+    subprocess.run([SIM, "run", str(at["run.ini"]), "-o", str(at["run.csv"])], check=True, capture_output=True)
     log = read_log(at["run.csv"])
     assert log.springs == 4
     assert log.current_a is not None and log.current_a[:, 3].max() < 2.1  # its board's own limit

@@ -13,13 +13,11 @@ from pathlib import Path
 
 import pytest
 from fake_board import FakeBoard, row
+from made import needs_board
 from ninespring.cli.terminal import Known, words_of
 from prompt_toolkit.completion import CompleteEvent
 from prompt_toolkit.document import Document
 
-ROOT = Path(__file__).resolve().parents[2]
-SIM = Path(os.environ.get("NINESPRING_SIM", ROOT / "build" / "host" / "ninespring-sim"))
-ELF = Path(os.environ.get("NINESPRING_AVR_DIR", ROOT / "build" / "avr")) / "firmware.elf"
 HELP = [
     "help  this list",
     "on K|all [0..100]  drive a spring or all, at a level in percent",
@@ -144,8 +142,7 @@ def test_lines_from_a_pipe_are_answered_one_after_the_other() -> None:
     assert "1 of these lines was refused" in done.stderr
 
 
-@pytest.mark.skipif(not SIM.exists(), reason=f"SKIPPED: {SIM} is not there: build it, or set NINESPRING_SIM")
-@pytest.mark.skipif(not ELF.exists(), reason=f"SKIPPED: {ELF} is not there: build the avr target first")
+@needs_board
 def test_the_words_of_the_board_itself_are_known() -> None:
     done = subprocess.run(
         [sys.executable, "-m", "ninespring", "console", "--simulate"],

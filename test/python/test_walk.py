@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import re
 import shlex
 import shutil
@@ -12,12 +11,10 @@ import sys
 from pathlib import Path
 
 import pytest
+from made import ELF, ROOT, SIM, needs_board, needs_simulator
 
 pytestmark = pytest.mark.nightly
 
-ROOT = Path(__file__).resolve().parents[2]
-SIM = Path(os.environ.get("NINESPRING_SIM", ROOT / "build" / "host" / "ninespring-sim"))
-ELF = Path(os.environ.get("NINESPRING_AVR_DIR", ROOT / "build" / "avr")) / "firmware.elf"
 PROGRAMS = {
     ".venv/bin/ninespring": [sys.executable, "-m", "ninespring"],
     ".venv/bin/python": [sys.executable],
@@ -33,9 +30,7 @@ def commands(page: str) -> list[list[str]]:
     return [shlex.split(line, comments=True) for line in lines]
 
 
-@pytest.mark.skipif(
-    not (SIM.exists() and ELF.exists()), reason=f"SKIPPED: {SIM} or {ELF} is not there: script/build makes them"
-)
+@needs_board
 def test_the_page_is_walked_to_its_end(tmp_path: Path) -> None:
     said: dict[str, str] = {}
     board, *walk = (words for words in commands("calibrating.md") if words[1] in WALKED)
@@ -86,7 +81,7 @@ def smaller(text: str) -> str:
     return text
 
 
-@pytest.mark.skipif(not SIM.exists(), reason=f"SKIPPED: {SIM} is not there: script/build makes it")
+@needs_simulator
 def test_exploring_is_walked_to_its_end(tmp_path: Path) -> None:
     import pandas as pd
     from ninespring.explore.spec import read_spec

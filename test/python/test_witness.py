@@ -69,13 +69,13 @@ def test_a_step_of_heat_is_told_by_its_place_time_sign_and_size(tmp_path: Path) 
 
     problem, fit = array_log(tmp_path / "log.csv", heat=less)
     found = unknown_heat.find(problem, fit)
-    heat = [piece for piece in found.pieces if piece.kind == "heat"]
-    assert heat and all(piece.spring == 2 and piece.size < 0 for piece in heat)
-    joules = sum(piece.size * (piece.end_s - piece.begin_s) for piece in heat)
+    heat = [one for one in found.events if one.kind == "heat"]
+    assert heat and all(one.spring == 3 and one.size < 0 for one in heat)
+    joules = sum(one.size * (one.to_s - one.from_s) for one in heat)
     assert joules == pytest.approx(-0.045 * 180.0, rel=0.25)
-    assert min(piece.begin_s for piece in heat) == pytest.approx(305, abs=30)
-    assert max(piece.end_s for piece in heat) == pytest.approx(485, abs=30)
-    assert "spring 3: " in heat[0].words(None) and "less than known" in heat[0].words(None)
+    assert min(one.from_s for one in heat) == pytest.approx(305, abs=30)
+    assert max(one.to_s for one in heat) == pytest.approx(485, abs=30)
+    assert "spring 3: " in heat[0].text and "less than known" in heat[0].text
 
 
 def test_a_thermometer_that_jumps_is_no_heat(tmp_path: Path) -> None:
@@ -83,14 +83,14 @@ def test_a_thermometer_that_jumps_is_no_heat(tmp_path: Path) -> None:
         shown[400:, 6] += 2.5
 
     problem, fit = array_log(tmp_path / "log.csv", thermometers=jump)
-    pieces = unknown_heat.find(problem, fit).pieces
-    assert [(p.kind, p.spring) for p in pieces] == [("sensor", 6)]
-    assert pieces[0].size == pytest.approx(2.5, abs=0.3) and pieces[0].begin_s == pytest.approx(400, abs=15)
+    (one,) = unknown_heat.find(problem, fit).events
+    assert (one.kind, one.spring) == ("sensor", 7)
+    assert one.size == pytest.approx(2.5, abs=0.3) and one.from_s == pytest.approx(400, abs=15)
 
 
 def test_nothing_is_told_where_nothing_is(tmp_path: Path) -> None:
     problem, fit = array_log(tmp_path / "log.csv")
-    assert unknown_heat.find(problem, fit).pieces == []
+    assert unknown_heat.find(problem, fit).events == []
     second = resistance.witness(problem, fit)
     assert second is not None
     assert {one.name for one in second.effects} <= {"resistance_phase"}

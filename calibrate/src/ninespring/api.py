@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -20,7 +21,7 @@ from .explore.spec import read_spec
 from .explore.sweep import local_cluster
 from .explore.sweep import sweep as run_sweep
 from .export.drive import checked_settings
-from .export.settings import Settings, settings_of
+from .export.settings import Settings
 from .find import diagnosis, doubt
 from .find import plan as planning
 from .find.diagnosis import Diagnosis
@@ -39,28 +40,25 @@ from .say.plotting import figure
 Log = Run | str | Path
 
 
+def _given(given: Any, kind: type, read: Callable[..., Any], words: str, *more: object) -> Any:
+    """Return what is given as itself, or as a path that is read."""
+    if isinstance(given, str | Path):
+        return read(given, *more)
+    if not isinstance(given, kind):
+        raise InputError(f"{words}, not {given!r}")
+    return given
+
+
 def _model(model: Model | str | Path) -> Model:
-    if isinstance(model, str | Path):
-        return read_model(model)
-    if not isinstance(model, Model):
-        raise InputError(f"a model is wanted, or a path to model.toml, not {model!r}")
-    return model
+    return _given(model, Model, read_model, "a model is wanted, or a path to model.toml")
 
 
 def _run(log: Log, springs: int | None = None, temperatures: bool = True) -> Run:
-    if isinstance(log, str | Path):
-        return read_log(log, springs, temperatures)
-    if not isinstance(log, Run):
-        raise InputError(f"a log is wanted, as read_log returns it, or a path, not {log!r}")
-    return log
+    return _given(log, Run, read_log, "a log is wanted, as read_log returns it, or a path", springs, temperatures)
 
 
 def _array(array: Array | str | Path | None) -> Array | None:
-    if isinstance(array, str | Path):
-        return read_array(array)
-    if not isinstance(array, Array | None):
-        raise InputError(f"an array is wanted, or a path to array.toml, not {array!r}")
-    return array
+    return None if array is None else _given(array, Array, read_array, "an array is wanted, or a path to array.toml")
 
 
 def _array_and_runs(
@@ -213,12 +211,9 @@ def verify(model: Model | str | Path, log: Log, before: str = "") -> tuple[float
     """
     model = _model(model)
     run = _run(log, model.array.springs)
-    if any(one.get("sha256") == run.sha256 for one in model.provenance.get("logs", [])):
-        raise InputError("the model was fitted to this log: give one that the fit never saw", run.name)
-
-    both = before, f"{before}\n{settings_of(model).lines}"
-    old, new = (prediction.chip_error(model, lines, [run]).rmse_c for lines in both)
-    return old, new
+    prediction.refuse_seen(model, run)
+    old, new = prediction.chip_errors(model, before, [run])
+    return old.rmse_c, new.rmse_c
 
 
 def replay(model: Model | str | Path, log: Log) -> tuple[np.ndarray, np.ndarray]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import time
 from pathlib import Path
 
@@ -18,15 +17,13 @@ from ..io.recording import record as record_board
 from ..io.tape import record_tape
 from ..io.thermometers import Thermometers
 from ..say.monitoring import Screen
-from .console import FILE, FORCE, JSON, PORT, Command, Real, Whole, beside, err, out, working, write
+from .console import FILE, FORCE, JSON, PORT, Real, Whole, beside, command, err, out, two_ports, working, write
 
 HZ = Whole(ranges.RECORD_HZ)
 SECONDS = Real(ranges.RECORD_S)
 
 
-@click.command(
-    cls=Command,
-    epilog="""\b
+@command("""\b
 Example:
   ninespring record --port /dev/ttyACM0 --hz 1 --duration 900 --run steps.txt -o board1.csv
 \b
@@ -35,8 +32,7 @@ steps.txt (console words; `at S =` waits until so many seconds after the first r
   at 5 = pattern 101000101
   at 300 = fan 100
   at 600 = off all
-""",
-)
+""")
 @PORT
 @click.option("-o", "--output", type=FILE, required=True, help="log to write; - is standard output")
 @click.option("--hz", type=HZ, default=1, show_default=True, help="rows a second")
@@ -76,8 +72,7 @@ def record(
     check_folder(json_path)
     if tape and (thermometers or hz != 1):
         raise InputError("a tape has each tick and no thermometers: leave out --hz and --thermometers")
-    if thermometers and os.path.realpath(thermometers) == os.path.realpath(port):
-        raise InputError(f"--thermometers {thermometers}: that is the board's port, a logger has its own")
+    two_ports(port, thermometers)
     text = read_bytes(script).decode("utf-8", "replace") if script else ""
     steps = script_lines(text, str(script), duration)
     with told_to_stop(last=True) as stopped:
@@ -112,14 +107,11 @@ def record(
         raise WorkError(f"{got.ended}; what came is in {output}")
 
 
-@click.command(
-    cls=Command,
-    epilog="""\b
+@command("""\b
 Examples:
   ninespring upload --port /dev/ttyACM0 settings.txt
   ninespring upload --port /dev/ttyACM0 --undo
-""",
-)
+""")
 @click.argument("settings", type=FILE, required=False)
 @PORT
 @click.option("--undo", is_flag=True, help="give the board back what it had before the last upload from this computer")
@@ -139,10 +131,8 @@ def upload(settings: Path | None, port: str, undo: bool, save: bool, json_path: 
         with working("giving back"), Board(port, off_at_end=False) as board:
             last = history.undo(board, save)
         write({json_path: results.checked(results.Upload(settings=len(last.sent), saved=save, undone=last.by))})
-        for line in last.words():
-            name, _, change = line.partition(": ")
-            old, _, new = change.partition(" -> ")
-            out.print(f"{name}: {new} -> {old}", markup=False)
+        for line in last.words(back=True):
+            out.print(line, markup=False)
         out.print(f"`{last.by}` of {last.when} is taken back{', saved' if save else ''}", markup=False)
         return
     lines = settings_lines(read_bytes(settings).decode("utf-8", "replace"), str(settings))
@@ -152,13 +142,10 @@ def upload(settings: Path | None, port: str, undo: bool, save: bool, json_path: 
     out.print(f"{len(lines)} settings sent and read back{', saved' if save else ''}")
 
 
-@click.command(
-    cls=Command,
-    epilog="""\b
+@command("""\b
 Example:
   ninespring monitor --port /dev/ttyACM0
-""",
-)
+""")
 @PORT
 @click.option("--hz", type=HZ, default=2, show_default=True, help="updates a second")
 @click.option("--duration", type=SECONDS, default=ranges.RECORD_S.high, help="s; Ctrl-C ends it")
@@ -167,10 +154,8 @@ def monitor(port: str, hz: int, duration: float) -> None:
     with Board(port, off_at_end=False) as board:
         until = time.monotonic() + duration
         try:
-            screen = Screen(board.settings())
+            screen = Screen(board.settings(), board.telemetry(hz))
             with Live(console=out, refresh_per_second=8) as live:
-                for line in board.ask(f"telemetry csv {hz}"):
-                    screen.take(line)
                 while (line := board.next_line(min(until, time.monotonic() + 5.0))) is not None:
                     if screen.take(line):
                         live.update(screen.picture())

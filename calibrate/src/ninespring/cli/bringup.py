@@ -10,18 +10,15 @@ import click
 from ..errors import InputError, WorkError
 from ..io.board import Board
 from ..io.bringup import STEPS, converse
-from .console import FILE, PORT, Command, out
+from .console import FILE, PORT, command, out
 
 
-@click.command(
-    cls=Command,
-    epilog="""\b
+@command("""\b
 Examples:
   ninespring bringup --port /dev/ttyACM0
   ninespring bringup --port /dev/ttyACM0 --again channels
   ninespring-sim board --without-springs --wiring addresses=3,4     # a board to try it at
-""",
-)
+""")
 @PORT
 @click.option(
     "-o",

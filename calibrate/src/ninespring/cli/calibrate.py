@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import os
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -21,7 +20,7 @@ from ..model.pattern import pattern_of
 from .calibration.chain import Calibration
 from .calibration.progress import FILE, Progress
 from .calibration.report import page
-from .console import ARRAY, JSON, Command, Real, out, write
+from .console import ARRAY, JSON, Real, command, out, two_ports, write
 
 FROM = {"duration": 900.0, "drive_for": 300.0, "current": 2.0, "supply": 14.0, "hottest": 105.0}
 """What is taken where nothing is said."""
@@ -31,15 +30,12 @@ UNKNOWN += ("--set", "plant.edge_loss_fraction=0.25")
 REPORT, ARRAY_FILE = "report.html", "array.toml"
 
 
-@click.command(
-    cls=Command,
-    epilog="""\b
+@command("""\b
 Examples:
   ninespring calibrate --simulate
   ninespring calibrate --port /dev/ttyACM0 --thermometers /dev/ttyUSB0
   ninespring calibrate --port /dev/ttyACM0 --thermometers /dev/ttyUSB0 -o second --array array.toml --supply 10 --yes
-""",
-)
+""")
 @click.option("--port", help="serial port of the board, e.g. /dev/ttyACM0")
 @click.option("--thermometers", help="port of a thermocouple logger, one thermometer a spring; with --port")
 @click.option(
@@ -93,8 +89,7 @@ def calibrate(
             "--thermometers is missing: degrees come from one thermometer a spring. Without any: `ninespring plan "
             "--no-thermometer`, `record`, `diagnose`, as docs/calibrating.md says"
         )
-    if port and thermometers and os.path.realpath(thermometers) == os.path.realpath(port):
-        raise InputError(f"--thermometers {thermometers}: that is the board's port, a logger has its own")
+    two_ports(port, thermometers)
     if not yes and not sys.stdin.isatty():
         raise InputError("it asks before it heats and before it writes, and nobody can answer here: give --yes")
     check_folder(json_path)

@@ -39,8 +39,6 @@ PORT = click.option("--port", required=True, help="serial port, e.g. /dev/ttyACM
 FORCE = click.option("--force", is_flag=True, help="write over a file that is there, whatever it is")
 OUTPUTS = ("output", "json_path")
 """Parameters of commands that name files to write; every other path is an input."""
-IN_A_FOLDER = ("diagnosis.json", "report.html", "model.toml")
-"""What is written where the output is a folder."""
 
 
 class Command(click.Command):
@@ -53,7 +51,7 @@ class Command(click.Command):
         for name, value in ctx.params.items():
             paths = [Path(one) for one in (value if isinstance(value, tuple) else (value,)) if _names_a_file(one)]
             if name in OUTPUTS:
-                written += [path / one for path in paths for one in IN_A_FOLDER] if _is_folder(ctx, name) else paths
+                written += [path / one for path in paths for one in results.FILES] if _is_folder(ctx, name) else paths
             else:
                 read += paths
         for number, path in enumerate(written):
@@ -65,6 +63,13 @@ class Command(click.Command):
             if any(_same(path, other) for other in written[:number]):
                 raise InputError("two results cannot be written into one file", path)
         return super().invoke(ctx)
+
+
+def command(
+    epilog: str, name: str | None = None, of: click.Group | None = None
+) -> Callable[[Callable[..., None]], click.Command]:
+    """Return what makes a function a command, of a group where it is one of several: its examples stand below its options."""
+    return (of.command if of else click.command)(name, cls=Command, epilog=epilog + "\n")
 
 
 def _names_a_file(value: Any) -> bool:
@@ -128,6 +133,19 @@ def model_and_array(model_path: Path | None, array_path: Path | None) -> tuple[M
     """Return a command's model, and its array: the model's, else that of array.toml; None where neither is given."""
     model = read_model(model_path) if model_path else None
     return model, model.array if model else read_array(array_path) if array_path else None
+
+
+def log_of(model: Model, log: Path, temperatures: bool = True) -> Run:
+    """Return a log of a model's array."""
+    array = model.array
+    why = f"{Path(model.name).name} is of {array.rows} x {array.cols}"
+    return read_log(log, array.springs, temperatures, why)
+
+
+def two_ports(port: str | None, thermometers: str | None) -> None:
+    """Refuse a board and a logger of temperatures at one port."""
+    if port and thermometers and os.path.realpath(thermometers) == os.path.realpath(port):
+        raise InputError(f"--thermometers {thermometers}: that is the board's port, a logger has its own")
 
 
 def array_and_runs(array: Array | None, logs: tuple[Path, ...], or_resistance: bool = False) -> tuple[Array, list[Run]]:

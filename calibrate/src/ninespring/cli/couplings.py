@@ -15,7 +15,7 @@ from ..io import results
 from ..io.logs import check_folder
 from ..model.models import model_text, read_array
 from ..model.native import parameter_table
-from .console import FILE, JSON, Command, beside, working, write
+from .console import FILE, JSON, beside, command, working, write
 
 MESHES = ("coarse", "normal", "fine")
 
@@ -33,14 +33,11 @@ def need(*modules: str) -> None:
             raise WorkError(f"{name} does not load ({error}): docs/exploring.md names the system's libraries") from None
 
 
-@click.command(
-    cls=Command,
-    epilog="""\b
+@command("""\b
 Examples:
   ninespring couplings array.toml -o model.toml
   ninespring couplings array.toml --mesh fine --json couplings.json -o model.toml
-""",
-)
+""")
 @click.argument("array_path", metavar="ARRAY.TOML", type=FILE)
 @click.option("--mesh", type=click.Choice(MESHES), default="normal", show_default=True, help="size of the elements")
 @click.option("-o", "--output", type=FILE, required=True, help="model.toml to write; - prints it")

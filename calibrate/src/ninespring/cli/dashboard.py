@@ -15,19 +15,17 @@ from ..io.logs import read_log
 from ..io.recording import told_to_stop
 from ..io.simulated import simulator
 from ..model.models import array_of
-from .console import ARRAY, FILE, Real, Whole, model_and_array, notes_of, out
+from .console import ARRAY, FILE, Real, Whole, command, model_and_array, notes_of, out
 
 USUAL = "127.0.0.1:8765"
 
 
-@click.command(
-    epilog="""\b
+@command("""\b
 Examples:
   ninespring dashboard --simulate
   ninespring dashboard --port /dev/ttyACM0
   ninespring dashboard --replay run1.csv --model diagnosis/model.toml
-""",
-)
+""")
 @click.option("--port", help="serial port of a board, e.g. /dev/ttyACM0")
 @click.option("--simulate", is_flag=True, help="start a simulated board and show that")
 @click.option("--thermometers", help="port of a thermocouple logger: what it measures is shown beside the estimate")

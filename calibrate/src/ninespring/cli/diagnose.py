@@ -12,21 +12,18 @@ from ..find import board_alone, diagnosis, steady
 from ..infer import from_resistance
 from ..io import results
 from ..io.logs import check_folder
-from ..model.models import Array, model_text
+from ..model.models import Array
 from ..say import page as report
-from .console import ARRAY, FILE, IN_A_FOLDER, Command, array_and_runs, model_and_array, out, working, write
+from .console import ARRAY, FILE, array_and_runs, command, model_and_array, out, working, write
 
 
-@click.command(
-    cls=Command,
-    epilog="""\b
+@command("""\b
 Examples:
   ninespring diagnose run1.csv run2.csv -o diagnosis
   ninespring diagnose --array array.toml tclab.csv -o diagnosis
   ninespring diagnose --model model.toml --frozen run3.csv -o check
   ninespring diagnose --model model.toml --frozen steady.csv -o steady
-""",
-)
+""")
 @click.argument("logs", nargs=-1, required=True, type=FILE)
 @ARRAY
 @click.option("--model", "model_path", type=FILE, help="model.toml: declared values and effects already on")
@@ -55,7 +52,7 @@ def diagnose(
     """
     check_folder(json_path)
     if output.is_dir():
-        check_folder(*(output / name for name in IN_A_FOLDER))
+        check_folder(*(output / name for name in results.FILES))
     if frozen and not model_path:
         raise InputError("--frozen needs --model")
     model, array = model_and_array(model_path, array_path)
@@ -79,18 +76,11 @@ def diagnose(
                 say("writing the report")
                 page = report.html_report(found, str(output))
             told, made = found.told, found.model
-    text = results.checked(told)
-    files: dict[Path | None, str] = {
-        output / "diagnosis.json": text,
-        output / "report.html": page,
-        output / "model.toml": model_text(made),
-        json_path: text,
-    }
     try:
         output.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"cannot be made a folder: {error.strerror}", output) from None
-    write(files)
+    write(report.files_of(output, told, page, made) | {json_path: results.checked(told)})
     for note in told.warnings:
         if "isolated spike" not in note:
             out.print(f"note: {note}", style="yellow", markup=False)

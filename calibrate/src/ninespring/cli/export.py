@@ -8,15 +8,15 @@ import click
 
 from ..errors import InputError, WorkError
 from ..export.drive import checked_settings
-from ..export.settings import left_out, settings_of, together
-from ..infer.predict import chip_error
+from ..export.settings import left_out, together
+from ..infer.predict import chip_errors, refuse_seen
 from ..io import results
 from ..io.board import Board, console_lines
-from ..io.logs import check_folder, read_bytes, read_log
+from ..io.logs import check_folder, read_bytes
 from ..model.models import Model, model_of_layer, read_model
 from ..model.stiffness import LAYERS
 from ..say.verified import with_verification
-from .console import FILE, JSON, MODEL, Command, beside, logs_of, notes_of, out, source_of, working, write
+from .console import FILE, JSON, MODEL, beside, command, log_of, logs_of, notes_of, out, source_of, working, write
 
 CHIP = click.option(
     "--chip",
@@ -42,14 +42,11 @@ def _chip_lines(path: Path | None) -> str:
     return "\n".join(console_lines(path)) if path else ""
 
 
-@click.command(
-    cls=Command,
-    epilog="""\b
+@command("""\b
 Examples:
   ninespring export --model diagnosis/model.toml -o settings.txt
   ninespring export --model diagnosis/model.toml --chip now.txt -o -
-""",
-)
+""")
 @MODEL
 @click.option("-o", "--output", type=FILE, required=True, help="console lines to write, `$name=value`; - prints them")
 @CHIP
@@ -98,14 +95,11 @@ def export(
     said.print(f"{len(made.written)} settings -> {output} (`ninespring upload` sends them)")
 
 
-@click.command(
-    cls=Command,
-    epilog="""\b
+@command("""\b
 Examples:
   ninespring verify --model diagnosis/model.toml run3.csv --report diagnosis/report.html
   ninespring verify --model diagnosis/model.toml --port /dev/ttyACM0 run3.csv
-""",
-)
+""")
 @click.argument("log", type=FILE)
 @MODEL
 @CHIP
@@ -134,19 +128,12 @@ def verify(
     if port and chip_path:
         raise InputError("give either --port or --chip: what the board has now")
     model = _model(model_path, layer)
-    shape = f"{model_path.name} is of {model.array.rows} x {model.array.cols}"
-    run = read_log(log, model.array.springs, why=shape)
-    if any(one.get("sha256") == run.sha256 for one in model.provenance.get("logs", [])):
-        raise InputError("the model was fitted to this log: give one that the fit never saw", log)
+    run = log_of(model, log)
+    refuse_seen(model, run)
     notes_of([run])
     old = _port_lines(port) if port else _chip_lines(chip_path)
-    made = settings_of(model)
-    result = results.Verify(
-        logs=logs_of([run]),
-        model=source_of(model_path),
-        before=chip_error(model, old, [run]),
-        after=chip_error(model, f"{old}\n{made.lines}", [run]),
-    )
+    before, after = chip_errors(model, old, [run])
+    result = results.Verify(logs=logs_of([run]), model=source_of(model_path), before=before, after=after)
     write({json_path: results.checked(result), report_path: with_verification(report, result)})
     out.print(
         f"the chip's model on {log.name}: error {result.before.rmse_c:.2f} K rms as it is, "

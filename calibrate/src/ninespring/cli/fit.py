@@ -23,9 +23,9 @@ from .console import (
     ARRAY,
     FILE,
     JSON,
-    Command,
     array_and_runs,
     beside,
+    command,
     logs_of,
     model_and_array,
     notes,
@@ -39,14 +39,11 @@ MOST_TOLD = 8
 """Correlations that are printed."""
 
 
-@click.command(
-    cls=Command,
-    epilog="""\b
+@command("""\b
 Examples:
   ninespring fit run1.csv run2.csv -o model.toml
   ninespring fit --effects latent_heat,shared_air run1.csv -o model.toml
-""",
-)
+""")
 @click.argument("logs", nargs=-1, required=True, type=FILE)
 @ARRAY
 @click.option("--effects", default="", help="effects to switch on and fit, comma-separated")

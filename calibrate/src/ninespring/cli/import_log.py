@@ -10,13 +10,11 @@ import numpy as np
 from ..errors import InputError
 from ..io import importing, ranges, results
 from ..io.logs import check_folder, log_text
-from .console import FILE, FORCE, JSON, Command, Real, beside, working, write
+from .console import FILE, FORCE, JSON, Real, beside, command, working, write
 
 
-@click.command(
-    "import",
-    cls=Command,
-    epilog="""\b
+@command(
+    """\b
 Examples:
   ninespring import logger.csv --map map.toml -o run1.csv
   ninespring import data.txt --map tclab -o tclab.csv
@@ -34,6 +32,7 @@ map.toml:                                          regions.toml (pixels):
   [constants]                                        width = 6
   ambient_c = 21.5                                   height = 6
 """,
+    name="import",
 )
 @click.argument("source", type=click.Path(path_type=Path))
 @click.option("--map", "mapping", help="mapping file (TOML) of columns and units, or built in: tclab, tclab-prbs")

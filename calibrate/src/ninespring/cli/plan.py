@@ -12,12 +12,10 @@ from ..find.plan import FIRST_S, THROUGH_S, make_plan, plan_experiment, plan_thr
 from ..io import ranges, results
 from ..io.logs import check_folder, read_bytes
 from ..model.models import Array
-from .console import ARRAY, FILE, Command, Real, Whole, beside, model_and_array, write
+from .console import ARRAY, FILE, Real, Whole, beside, command, model_and_array, write
 
 
-@click.command(
-    cls=Command,
-    epilog="""\b
+@command("""\b
 Examples:
   ninespring plan -o steps.txt
   ninespring plan --array array.toml --supply 10 --duration 1200 -o steps.txt
@@ -25,8 +23,7 @@ Examples:
   ninespring plan --no-thermometer -o steps.txt
   ninespring plan --through 5 --model diagnosis/model.toml -o steps.txt
   ninespring plan --for diagnosis/diagnosis.json -o steps.txt
-""",
-)
+""")
 @ARRAY
 @click.option("--for", "diagnosis", type=FILE, help="diagnosis.json: the experiment that it asks for first")
 @click.option(

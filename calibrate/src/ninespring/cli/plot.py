@@ -12,21 +12,18 @@ from ..io import ranges
 from ..io.logs import check_folder, read_log
 from ..model.models import array_of
 from ..say import plotting
-from .console import ARRAY, FILE, Command, Real, model_and_array, notes_of, out, working, write
+from .console import ARRAY, FILE, Real, command, model_and_array, notes_of, out, working, write
 
 PICTURES = (".png", ".svg", ".pdf", ".gif")
 
 
-@click.command(
-    cls=Command,
-    epilog="""\b
+@command("""\b
 Examples:
   ninespring plot run1.csv -o run1.png
   ninespring plot run1.csv --model diagnosis/model.toml -o run1.svg
   ninespring plot run1.csv -o run1.gif
   ninespring plot run1.csv --at 240 -o array.png
-""",
-)
+""")
 @click.argument("log", type=FILE)
 @click.option("--model", "model_path", type=FILE, help="model.toml: what it makes of the log, dashed")
 @ARRAY

@@ -12,21 +12,18 @@ from .. import __version__
 from ..find import plausibility
 from ..infer import predict as prediction
 from ..io import results
-from ..io.logs import check_folder, log_text, read_log
+from ..io.logs import check_folder, log_text
 from ..io.statistics import rms_there
 from ..model import effects
 from ..model.models import read_model
-from .console import FILE, JSON, MODEL, Command, beside, logs_of, notes_of, source_of, working, write
+from .console import FILE, JSON, MODEL, beside, command, log_of, logs_of, notes_of, source_of, working, write
 
 
-@click.command(
-    cls=Command,
-    epilog="""\b
+@command("""\b
 Examples:
   ninespring predict --model diagnosis/model.toml run3.csv -o predicted.csv
   ninespring predict --chip --model diagnosis/model.toml run3.csv -o predicted.csv
-""",
-)
+""")
 @click.argument("log", type=FILE)
 @MODEL
 @click.option("-o", "--output", type=FILE, required=True, help="log to write: time_s (s), t1_c..tn_c (degC)")
@@ -39,8 +36,7 @@ def predict(log: Path, model_path: Path, output: Path, chip: bool, json_path: Pa
     """
     check_folder(output, json_path)
     model = read_model(model_path)
-    array = model.array
-    run = read_log(log, array.springs, temperatures=False, why=f"{model_path.name} is of {array.rows} x {array.cols}")
+    run = log_of(model, log, temperatures=False)
     run.notes += plausibility.swapped([run]) + plausibility.undriven_but_hottest(run)
     run = prediction.in_its_room(model, run)
     notes_of([run])
@@ -68,13 +64,10 @@ def predict(log: Path, model_path: Path, output: Path, chip: bool, json_path: Pa
         beside(output).print(f"note: {note}", markup=False)
 
 
-@click.command(
-    cls=Command,
-    epilog="""\b
+@command("""\b
 Examples:
   ninespring replay --model diagnosis/model.toml run3.csv -o replay.csv
-""",
-)
+""")
 @click.argument("log", type=FILE)
 @MODEL
 @click.option("-o", "--output", type=FILE, required=True, help="log to write, with m1_c, x1, ... of the chip's model")
@@ -86,13 +79,7 @@ def replay(log: Path, model_path: Path, output: Path, json_path: Path | None) ->
     """
     check_folder(output, json_path)
     model = read_model(model_path)
-    run = read_log(
-        log,
-        model.array.springs,
-        temperatures=False,
-        why=f"{model_path.name} is of {model.array.rows} x {model.array.cols}",
-    )
-    run = prediction.in_its_room(model, run)
+    run = prediction.in_its_room(model, log_of(model, log, temperatures=False))
     notes_of([run])
     lines, left_out = prediction.chip_lines(model)
     believed, austenite = prediction.chip_trace(model, lines, run)

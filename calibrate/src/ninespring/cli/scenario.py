@@ -12,7 +12,7 @@ from ..io.logs import check_folder
 from ..model.models import Model, read_model
 from ..model.pattern import pattern_of
 from ..model.simulate import array_parameters, board_settings
-from .console import FILE, MODEL, Command, Real, Whole, beside, write
+from .console import FILE, MODEL, Real, Whole, beside, command, write
 
 ALWAYS = ("latent_heat", "resistance_phase")
 """What every NiTi spring does, whether a model was fitted where it shows or not."""
@@ -20,15 +20,12 @@ LONGEST = 190
 """Characters of a line of a scenario, nearly."""
 
 
-@click.command(
-    cls=Command,
-    epilog="""\b
+@command("""\b
 Examples:
   ninespring scenario --model model.toml --pattern 111101111 -o run.ini
   ninespring scenario --model stack.toml --pattern 111101111/000010000 --fan 100 -o run.ini
   ninespring-sim run run.ini -o run.csv
-""",
-)
+""")
 @MODEL
 @click.option(
     "--pattern", help="springs that are on from 1 s: 111101111; of two layers elongation/stiffness; default: none"

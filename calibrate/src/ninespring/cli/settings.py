@@ -11,7 +11,7 @@ from ..io import history as kept
 from ..io.board import Board, console_lines
 from ..io.logs import check_folder
 from ..model import tables
-from .console import FILE, PORT, Command, beside, out, write
+from .console import FILE, PORT, beside, command, out, write
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
@@ -34,13 +34,13 @@ def _of_port(port: str) -> tuple[str, dict[str, str]]:
         return board.version[0], board.settings()
 
 
-@settings.command(
-    cls=Command,
-    epilog="""\b
+@command(
+    """\b
 Examples:
   ninespring settings read --port /dev/ttyACM0 -o board.txt
   ninespring settings read --port /dev/ttyACM0 --changed
 """,
+    of=settings,
 )
 @PORT
 @click.option("-o", "--output", type=FILE, default=Path("-"), help="file to write; left out, it is printed")
@@ -65,13 +65,13 @@ def read(port: str, output: Path, changed: bool) -> None:
         beside(output).print(f"{count} settings -> {output}", markup=False, soft_wrap=True)
 
 
-@settings.command(
-    cls=Command,
-    epilog="""\b
+@command(
+    """\b
 Examples:
   ninespring settings diff before.txt after.txt
   ninespring settings diff board.txt --port /dev/ttyACM0
 """,
+    of=settings,
 )
 @click.argument("files", nargs=-1, type=FILE, required=True)
 @click.option("--port", help="serial port of a board: what it has now is the second")
@@ -96,12 +96,12 @@ def diff(files: tuple[Path, ...], port: str | None) -> None:
         raise click.exceptions.Exit(1)
 
 
-@settings.command(
-    cls=Command,
-    epilog="""\b
+@command(
+    """\b
 Example:
   ninespring settings history --port /dev/ttyACM0
 """,
+    of=settings,
 )
 @PORT
 def history(port: str) -> None:

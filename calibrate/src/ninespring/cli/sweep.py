@@ -21,22 +21,19 @@ from ..explore.sweep import sweep as run
 from ..io import ranges
 from ..io.logs import check_folder, write_atomically
 from ..io.results import Sweep, checked
-from .console import FILE, JSON, Command, Whole, err, out, write
+from .console import FILE, JSON, Whole, command, err, out, write
 from .couplings import need
 
 CONNECT_S = 10
 
 
-@click.command(
-    cls=Command,
-    epilog="""\b
+@command("""\b
 Examples:
   ninespring sweep pitch.toml -o pitch
   ninespring sweep pitch.toml -o pitch --check
   ninespring sweep pitch.toml -o pitch --scheduler tcp://192.168.1.5:8786
 Read the results: pandas.read_parquet("pitch/points")
-""",
-)
+""")
 @click.argument("spec_path", metavar="SPEC.TOML", type=FILE)
 @click.option("-o", "--output", type=click.Path(file_okay=False, path_type=Path), required=True, help="folder to write")
 @click.option("--scheduler", help="a Dask cluster as it stands, tcp://host:8786; left out: this machine's cores")
@@ -117,7 +114,7 @@ def _evaluate(spec: Any, results: Any, output: Path, result: Sweep) -> None:
         out.print(
             f"best {spec.metric}: {best[spec.metric]:.4g} {UNITS[spec.metric]} at {words}", soft_wrap=True, markup=False
         )
-        result.best = {axis.key: _plain(best[axis.key]) for axis in spec.axes} | {spec.metric: best[spec.metric]}
+        result.best = {axis.key: best[axis.key] for axis in spec.axes} | {spec.metric: best[spec.metric]}
         return
     found = indices_of(spec, table)
     shown = Table("metric", *(axis.key for axis in spec.axes), title="Sobol indices, total (+- 95 %)")
@@ -128,7 +125,3 @@ def _evaluate(spec: Any, results: Any, output: Path, result: Sweep) -> None:
         {output / "indices.json": json.dumps(found, indent=1) + "\n"}, force=True
     )  # the folder is a sweep's
     result.indices = found
-
-
-def _plain(value: Any) -> Any:
-    return value.item() if hasattr(value, "item") else value

@@ -22,7 +22,7 @@ from ..errors import InputError, WorkError
 from ..io.board import SIMULATED, Board
 from ..io.history import home
 from ..model import tables
-from .console import Command, out
+from .console import command, out
 
 LONGEST_S = 12.0
 """An answer's next line is awaited so long: `$save` reads back for 2 s, `selftest` takes 0.6 s a spring."""
@@ -215,15 +215,12 @@ def talk_from_a_pipe(board: Board, lines: Iterable[str]) -> None:
         raise WorkError(f"{talk.refused} of these lines {'was' if talk.refused == 1 else 'were'} refused")
 
 
-@click.command(
-    cls=Command,
-    epilog="""\b
+@command("""\b
 Examples:
   ninespring console --port /dev/ttyACM0
   ninespring console --simulate
   echo faults | ninespring console --port /dev/ttyACM0
-""",
-)
+""")
 @click.option("--port", help="serial port, e.g. /dev/ttyACM0; 115200 baud")
 @click.option("--simulate", is_flag=True, help="start a simulated board and talk to that")
 def console(port: str | None, simulate: bool) -> None:

@@ -15,17 +15,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from ..errors import InputError, RefusedError, WorkError
 from ..io import words
 from ..io.belief import beliefs
-from ..io.board import HOST_TIMEOUT_S, PATIENCE, SIMULATED, Board, reading
+from ..io.board import HOST_TIMEOUT_S, PATIENCE, SIMULATED, Board, reading, shape_of
 from ..io.port import pseudo_terminal
-from ..io.recording import SILENT_S, LogFile, Row, RowCheck, RowSink, about, telemetry_names, write_head
+from ..io.recording import SILENT_S, LogFile, Row, RowCheck, RowSink, about, write_head
 from ..io.thermometers import Thermometers
 from ..model import tables
-from .source import Source, at_once
+from .source import Source, at_once, plain
 from .wishes import WISHES, drives, switches_off
 
 LOOK_EVERY_S = 1.0
@@ -224,12 +222,10 @@ class BoardSource(Source):
         board.guard(self._settings)
         if logger := self._thermometers_port or board.thermometers:
             self._thermometers = Thermometers(logger)
-        self._names = names = self._begin_telemetry(board)
+        self._names = names = board.telemetry(self._hz)
         self._check = RowCheck(names, self._hz)
-        rows, columns = (int(float(self._settings.get(one, 0))) for one in ("rows", "columns"))
         springs = sum(re.fullmatch(r"i\d+_a", name) is not None for name in names)
-        if rows * columns != springs:
-            rows, columns = 1, springs
+        rows, columns = shape_of(self._settings, springs)
         self._change(
             connected=True,
             trouble="",
@@ -274,13 +270,7 @@ class BoardSource(Source):
             elif time.monotonic() > again_s:
                 again_s += LATE_S * board.patience
                 with contextlib.suppress(RefusedError):
-                    self._begin_telemetry(board)
-
-    def _begin_telemetry(self, board: Board) -> list[str]:
-        names = next(filter(None, map(telemetry_names, board.ask(f"telemetry csv {self._hz}"))), None)
-        if not names:
-            raise WorkError(f"{board.port}: the board's telemetry has no header that can be read")
-        return names
+                    board.telemetry(self._hz)
 
     def _read_settings(self, board: Board) -> None:
         settings = board.settings()
@@ -349,7 +339,7 @@ class BoardSource(Source):
             self._read_settings(board)
         if word.startswith("$"):  # it may have ended what this page needs of the board
             board.guard(self._settings)
-            self._begin_telemetry(board)
+            board.telemetry(self._hz)
 
     def _play_on(self, board: Board, now: float) -> None:
         play = self._play
@@ -399,22 +389,16 @@ class BoardSource(Source):
 
     def _take(self, line: str) -> None:
         """Take a line of telemetry: a row, which limits act on a spring, or that there is a new sight of it."""
-        if match := words.SIGHT.fullmatch(line):
-            sights, k = list(self._state["sights"]), int(match[1]) - 1
-            if k < len(sights):
-                sights[k] += 1
-                self._change(sights=sights)
-            with self._recording():
-                if self._sink:
-                    self._sink.comment(line)
-            return
-        if match := words.ACTING.fullmatch(line):
+        sight, acting = words.SIGHT.fullmatch(line), words.ACTING.fullmatch(line)
+        if match := sight or acting:
             k = int(match[1]) - 1
-            limits, cut = list(self._state["limits"]), list(self._state["cut_a"])
-            if k < len(limits):
+            sights, limits, cut = (list(self._state[name]) for name in ("sights", "limits", "cut_a"))
+            if k < len(sights) and sight:
+                sights[k] += 1
+            elif k < len(sights):
                 limits[k] = [words.LIMITS.get(one, one) for one in match[2][1:].split("|") if one != "none"]
                 cut[k] = float(match[3])
-                self._change(limits=limits, cut_a=cut)
+            self._change(sights=sights, limits=limits, cut_a=cut)
             with self._recording():
                 if self._sink:
                     self._sink.comment(line)
@@ -426,11 +410,11 @@ class BoardSource(Source):
             now = reading(dict(zip(self._names, row.text.split(","), strict=True)))
             values: dict[str, Any] = {
                 "time_s": now.time_s,
-                "current_a": _plain(now.current_a),
-                "voltage_v": _plain(now.voltage_v),
-                "power_w": _plain(now.current_a * now.voltage_v),
-                "temperature_c": _plain(now.temperature_c),
-                "duty": _plain(now.duty),
+                "current_a": plain(now.current_a),
+                "voltage_v": plain(now.voltage_v),
+                "power_w": plain(now.current_a * now.voltage_v),
+                "temperature_c": plain(now.temperature_c),
+                "duty": plain(now.duty),
                 "fan": now.fan,
                 "ambient_c": now.ambient_c,
                 "state": now.state,
@@ -501,31 +485,21 @@ class BoardSource(Source):
         self._change(recording=None, said=f"{why}; {said}" if why else said)
 
 
+LINES = {
+    "pattern": "pattern {springs}",
+    "policy": "policy {policy}",
+    "fan": "fan {percent:.0f}",
+    "ambient": "ambient {celsius:.2f}",
+    "set": "${name}={value}",
+    "cold": "model cold",
+    "say": "{line}",
+}
+"""Wishes as the console's lines; what is not here is its word (clear, unlock)."""
+
+
 def _line(wish: dict[str, Any]) -> str:
     """Return a wish as the console's line."""
-    match wish["do"]:
-        case "level":
-            return f"on {int(wish['spring'])} {int(wish['level'])}" if wish["level"] else f"off {int(wish['spring'])}"
-        case "all":
-            return f"on all {int(wish['level'])}" if wish["level"] else "off all"
-        case "pattern":
-            return f"pattern {wish['springs']}"
-        case "policy":
-            return f"policy {wish['policy']}"
-        case "fan":
-            return f"fan {int(wish['percent'])}"
-        case "ambient":
-            return f"ambient {wish['celsius']:.2f}"
-        case "set":
-            return f"${wish['name']}={wish['value']}"
-        case "cold":
-            return "model cold"
-        case "say":
-            return str(wish["line"])
-        case word:
-            return str(word)  # clear, unlock
-
-
-def _plain(values: np.ndarray) -> list[float | None]:
-    """Return numbers as JSON has them: it has no NaN."""
-    return [None if np.isnan(one) else round(float(one), 4) for one in values]
+    if wish["do"] in ("level", "all"):
+        where = int(wish["spring"]) if wish["do"] == "level" else "all"
+        return f"on {where} {int(wish['level'])}" if wish["level"] else f"off {where}"
+    return LINES.get(wish["do"], wish["do"]).format(**wish)

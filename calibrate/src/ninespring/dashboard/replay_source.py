@@ -14,7 +14,7 @@ from ..infer.predict import predict
 from ..io.logs import Run
 from ..model.models import Model
 from ..say.plotting import believed
-from .source import Source, at_once
+from .source import Source, at_once, plain
 
 TICK_S = 0.1
 
@@ -98,11 +98,9 @@ class ReplaySource(Source):
         return at_once("")
 
     def _values(self, row: int) -> dict[str, Any]:
-        each = {
-            name: [None if np.isnan(one) else round(float(one), 4) for one in values[row]]
-            for name, values in self._columns.items()
+        return {name: plain(values[row]) for name, values in self._columns.items()} | {
+            "time_s": float(self._run.time_s[row])
         }
-        return each | {"time_s": float(self._run.time_s[row])}
 
     def _show(self, row: int) -> None:
         values = self._values(row)

@@ -8,6 +8,8 @@ from collections import deque
 from concurrent.futures import Future
 from typing import Any
 
+import numpy as np
+
 RECENT_S, HISTORY_S = 600.0, 3600.0
 """Every row is kept for ten minutes, one in OLD_EVERY_S for an hour."""
 OLD_EVERY_S = 1.0
@@ -113,3 +115,8 @@ def at_once(said: str) -> Future[str]:
     answer: Future[str] = Future()
     answer.set_result(said)
     return answer
+
+
+def plain(values: np.ndarray) -> list[float | None]:
+    """Return numbers as JSON has them: it has no NaN."""
+    return [None if np.isnan(one) else round(float(one), 4) for one in values]

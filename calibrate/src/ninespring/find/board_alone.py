@@ -23,7 +23,7 @@ from ..model import effects
 from ..model.models import Array, Model
 from ..model.simulate import simulate_run
 from . import contacts, resistance
-from .certainty import CERTAIN, NAMED, Witness, witness
+from .certainty import NAMED, Witness, witness
 from .diagnosis import identifiability_of, share_with
 from .evidence import unexplained
 from .readings import REFERENCE_C, Readings, settled
@@ -105,7 +105,10 @@ def diagnose(
             else:
                 problem, alone, found, witnesses, left_over = other, cleared, again, seen, False
         depends, note = depends_on(problem, found)
-    listed = [_named(problem, found, name, one) for name, one in witnesses.items()]
+    listed = []
+    for name, one in witnesses.items():
+        numbers, variant = parameters_of(problem, found, name), dict(found.spec.variant).get(name, "")
+        listed.append(resistance.told(name, float(one.nats), numbers, 1, variant, one.probability()))
     listed += [resistance.of_contact(one) for one in steps]
     share_with(listed, middle_instead(array, listed), math.inf)
     listed.sort(key=lambda one: -one.evidence)
@@ -140,16 +143,6 @@ def diagnose(
     judged(told.effects, made)
     results.checked(told)
     return told, made
-
-
-def _named(problem: from_resistance.Resistances, found: Fit, name: str, sure: Witness) -> results.Effect:
-    """Return an effect that the search named, as sure as v / i is of it."""
-    variant, numbers = dict(found.spec.variant).get(name, ""), parameters_of(problem, found, name)
-    probability = sure.probability()
-    one = resistance.told(name, float(sure.nats), numbers, variant=variant)
-    one.probability = probability
-    one.certainty = "certain" if probability >= CERTAIN else "probable"
-    return one
 
 
 def with_effects(

@@ -38,13 +38,19 @@ class Second:
 
 
 def told(
-    name: str, nats: float, parameters: results.Parameters, chosen_from: int = 1, variant: str = ""
+    name: str,
+    nats: float,
+    parameters: results.Parameters,
+    chosen_from: int = 1,
+    variant: str = "",
+    probability: float | None = None,
 ) -> results.Effect:
-    """Return an effect that v / i names; certain or probable by the evidence that is left after the price of choosing.
+    """Return an effect that v / i names; as likely as is said, else by the evidence that is left after the price of choosing.
 
     Of temperatures it explains nothing: their errors stay as they are.
     """
-    probability = 1.0 / (1.0 + math.exp(-min(nats - math.log(chosen_from), 50.0)))
+    if probability is None:
+        probability = 1.0 / (1.0 + math.exp(-min(nats - math.log(chosen_from), 50.0)))
     return results.Effect(
         name=name,
         rmse_c=None,

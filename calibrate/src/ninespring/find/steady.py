@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from ..errors import InputError
 from ..export.settings import judged
 from ..io import results
 from ..io.logs import read_bytes, read_table, sha256_of
@@ -19,6 +18,9 @@ from ..model import effects, native
 from ..model.effects import Effect
 from ..model.models import Array, Model
 from .search import TOLD_APART
+
+KINDS = (("hold", "_c"), ("i", "_a"), ("t", "_c"))
+"""Columns of each spring: held, driven, measured."""
 
 
 @dataclass
@@ -46,45 +48,26 @@ def is_steady(path: Path) -> bool:
 def read_steady(path: Path, springs: int = 9) -> list[State]:
     """Read a steady table; refused with file, line and column where it is wrong."""
     table = read_table(path, text_columns=("case",))
-    known = {"case", "pitch_mm", "fan", "ambient_c"}
-    for kind, end in (("hold", "_c"), ("i", "_a"), ("t", "_c")):
-        known |= {f"{kind}{k}{end}" for k in range(1, springs + 1)}
-    for name, at in zip(table.names, table.header_columns, strict=True):
+    kinds = {kind: [f"{kind}{k}{end}" for k in range(1, springs + 1)] for kind, end in KINDS}
+    known = {"case", "pitch_mm", "fan", "ambient_c"}.union(*kinds.values())
+    for name in table.names:
         if name not in known:
-            raise InputError(
-                f"unknown column '{name}': a steady table has case, pitch_mm, fan, ambient_c, hold1_c, i1_a, t1_c ...",
-                path,
-                table.header_line,
-                at,
-            )
+            said = "a steady table has case, pitch_mm, fan, ambient_c, hold1_c, i1_a, t1_c ..."
+            raise table.refuse_header(f"unknown column '{name}': {said}", name)
     frame = table.frame
+    hold, current, measured = (frame.reindex(columns=names).to_numpy(float) for names in kinds.values())
+    for row, k in np.argwhere(np.isfinite(hold) & np.isfinite(current) & (current != 0)):
+        said = f"spring {k + 1} has both a current and a prescribed temperature"
+        raise table.refuse_cell(said, row, f"hold{k + 1}_c")
 
-    def column(name: str, default: float) -> np.ndarray:
-        return frame[name].to_numpy(float) if name in frame else np.full(len(frame), default)
+    def column(name: str, default: float) -> list[float]:
+        return frame[name].tolist() if name in frame else [default] * len(frame)
 
-    states = []
-    for row in range(len(frame)):
-        hold, current, measured = (
-            np.array([column(f"{kind}{k}{end}", math.nan)[row] for k in range(1, springs + 1)])
-            for kind, end in (("hold", "_c"), ("i", "_a"), ("t", "_c"))
-        )
-        both = np.flatnonzero(np.isfinite(hold) & np.isfinite(current) & (current != 0))
-        if both.size:
-            line, at = table.where(row, f"hold{both[0] + 1}_c")
-            raise InputError(f"spring {both[0] + 1} has both a current and a prescribed temperature", path, line, at)
-        states.append(
-            State(
-                str(frame["case"].iloc[row]) if "case" in frame else f"row {row + 1}",
-                float(column("pitch_mm", math.nan)[row]),
-                float(column("fan", 0.0)[row]),
-                float(column("ambient_c", 20.0)[row]),
-                hold,
-                current,
-                measured,
-            )
-        )
-    if not any(np.isfinite(s.measured_c).any() for s in states):
-        raise InputError("no measured temperature (t1_c ...)", path, table.header_line, 1)
+    cases = map(str, frame["case"]) if "case" in frame else [f"row {row + 1}" for row in range(len(frame))]
+    numbers = column("pitch_mm", math.nan), column("fan", 0.0), column("ambient_c", 20.0)
+    states = [State(*one) for one in zip(cases, *numbers, hold, current, measured, strict=True)]
+    if not np.isfinite(measured).any():
+        raise table.refuse_header("no measured temperature (t1_c ...)")
     return states
 
 
@@ -126,34 +109,16 @@ def errors(
     return np.concatenate(out)
 
 
-def set_by(effect: Effect, value: float, watched: int) -> dict[str, float]:
-    """Return all that an effect's one number sets; of a number per spring only the watched one's is meant."""
-    steady = effect.steady
-    assert steady is not None
-    return (
-        dict(steady.also)
-        | {key_of(effect, watched): value}
-        | {name: share * value for name, share in steady.follows.items()}
-    )
-
-
-def key_of(effect: Effect, watched: int) -> str:
-    """Return the parameter that an effect's one number is, of the watched spring where it is one of a spring's own."""
-    assert effect.steady is not None
-    return f"{effect.steady.number}[{watched + 1}]" if effect.steady.of_one_spring else effect.steady.number
-
-
 def fit_one(
     array: Array, declared: Mapping[str, float], effect: Effect, states: list[State], watched: int
 ) -> tuple[float, dict[str, float]]:
     """Fit an effect's one number; return it and all that is set with it."""
     steady = effect.steady
-    assert steady is not None
     log = steady.low > 0 and steady.high / steady.low > 100
     inner = (math.log(steady.low), math.log(steady.high)) if log else (steady.low, steady.high)
 
     def cost(z: float) -> float:
-        on = set_by(effect, math.exp(z) if log else z, watched)
+        on = steady.sets(math.exp(z) if log else z, watched)
         return float((errors(array, declared, {effect.name: on}, states) ** 2).sum())
 
     grid = np.linspace(*inner, 25)
@@ -162,7 +127,7 @@ def fit_one(
     found = minimize_scalar(cost, bounds=(grid[max(0, k - 1)], grid[min(24, k + 1)]), method="bounded")
     z = float(found.x) if found.fun < values[k] else float(grid[k])
     value = math.exp(z) if log else z
-    return value, set_by(effect, value, watched)
+    return value, steady.sets(value, watched)
 
 
 @dataclass
@@ -209,13 +174,13 @@ def _tried(
         held.append(errors(array, declared, {name: other}, [states[k]]))
     low, high = steady.low, steady.high
     at = min(high, value + max(1e-6, 1e-3 * (high - low)))
-    slope = (errors(array, declared, {name: set_by(effect, at, watched)}, states) - left) / max(1e-12, at - value)
+    slope = (errors(array, declared, {name: steady.sets(at, watched)}, states) - left) / max(1e-12, at - value)
     spread = math.sqrt(float((left**2).sum()) / max(1, len(left) - 1))
     n, steep = len(left), float(np.linalg.norm(slope))
     gained = math.log(max(float((before**2).sum()), 1e-9) / max(float((left**2).sum()), 1e-9))
     told = results.SteadyCandidate(
         name=name,
-        parameter=key_of(effect, watched),
+        parameter=steady.key(watched),
         value=value,
         stderr=spread / steep if steep > 0 else None,
         unit=native.parameter_table()[steady.number].unit,

@@ -33,48 +33,6 @@ EDGES = 80
 """Edges of one run, at most: a longer run has a coarser grid."""
 
 
-@dataclass(frozen=True)
-class Piece:
-    """One piece of unknown heat, or a sensor's jump, in one run."""
-
-    run: int
-    kind: str
-    """heat (at one spring), common (all springs alike) or sensor (a reading that jumps)."""
-    spring: int
-    """0-based; -1 for common."""
-    begin_s: float
-    end_s: float
-    size: float
-    """W, or K for a sensor."""
-    error: float
-    nats: float
-
-    def told(self, share: float | None) -> results.Event:
-        """Return what diagnosis.json says of it; `share` is its size in parts of the spring's usual power."""
-        return results.Event(
-            run=self.run + 1,
-            kind=self.kind,
-            spring=self.spring + 1 if self.spring >= 0 else None,
-            from_s=self.begin_s,
-            to_s=self.end_s,
-            size=self.size,
-            stderr=self.error,
-            unit="K" if self.kind == "sensor" else "W",
-            share=share,
-            evidence=self.nats,
-            text=self.words(share),
-        )
-
-    def words(self, share: float | None) -> str:
-        """Return it as a sentence."""
-        when = f"{self.begin_s:.0f} to {self.end_s:.0f} s of run {self.run + 1}"
-        if self.kind == "sensor":
-            return f"thermometer {self.spring + 1} reads {abs(self.size):.1f} K {'more' if self.size > 0 else 'less'}, {when}"
-        where = "each spring" if self.kind == "common" else f"spring {self.spring + 1}"
-        part = f" ({100 * abs(share):.0f} % of what it is usually given)" if share else ""
-        return f"{where}: {abs(self.size):.2g} W {'more' if self.size > 0 else 'less'} than known{part}, {when}"
-
-
 @dataclass
 class UnknownHeat:
     """What a fit leaves, as heat: watts over time and the events that they are made of."""
@@ -83,22 +41,44 @@ class UnknownHeat:
     """Per run, times of the rows of `watts`."""
     watts: list[np.ndarray]
     """Per run (times, springs)."""
-    pieces: list[Piece]
+    events: list[results.Event]
     usual_w: np.ndarray
     """Per spring: mean power while it is driven, W."""
-
-    def share(self, piece: Piece) -> float | None:
-        """Return a piece's size in parts of the usual power of its spring, None where there is none."""
-        usual = float(self.usual_w[piece.spring]) if piece.spring >= 0 else float(np.nanmean(self.usual_w))
-        return piece.size / usual if piece.kind != "sensor" and usual > 0 else None
 
     def told(self) -> results.UnknownHeat:
         """Return what diagnosis.json says of it."""
         return results.UnknownHeat(
-            events=[piece.told(self.share(piece)) for piece in self.pieces],
+            events=self.events,
             mean_w=[[float(v) for v in run.mean(axis=0)] for run in self.watts],
             usual_w=[float(v) if math.isfinite(v) else None for v in self.usual_w],
         )
+
+
+def event(
+    r: int, kind: str, k: int, span_s: tuple[float, float], size: float, error: float, nats: float, usual_w: np.ndarray
+) -> results.Event:
+    """Return one piece: heat (W, at spring k from 0), common (at all springs alike, k = -1) or sensor (a reading that jumps, K)."""
+    usual = float(usual_w[k]) if k >= 0 else float(np.nanmean(usual_w))
+    share = size / usual if kind != "sensor" and usual > 0 else None
+    when = f"{span_s[0]:.0f} to {span_s[1]:.0f} s of run {r + 1}"
+    where = "each spring" if kind == "common" else f"spring {k + 1}"
+    part = f" ({100 * abs(share):.0f} % of what it is usually given)" if share else ""
+    text = f"{where}: {abs(size):.2g} W {'more' if size > 0 else 'less'} than known{part}, {when}"
+    if kind == "sensor":
+        text = f"thermometer {k + 1} reads {abs(size):.1f} K {'more' if size > 0 else 'less'}, {when}"
+    return results.Event(
+        run=r + 1,
+        kind=kind,
+        spring=k + 1 if k >= 0 else None,
+        from_s=span_s[0],
+        to_s=span_s[1],
+        size=size,
+        stderr=error,
+        unit="K" if kind == "sensor" else "W",
+        share=share,
+        evidence=nats,
+        text=text,
+    )
 
 
 def find(problem: Problem, fit: Fit, say: Callable[[str], None] = lambda text: None) -> UnknownHeat:
@@ -117,22 +97,22 @@ def find(problem: Problem, fit: Fit, say: Callable[[str], None] = lambda text: N
         count = int(mask.sum())
         slopes = jacobian[begin : begin + count]
         begin += count
-        pieces = _pieces_of(problem, fit, r, slopes, factor, typical)
+        events = _events_of(problem, fit, r, slopes, factor, typical, usual_w)
         watts = np.zeros((len(run.time_s), run.springs))
         since = run.time_s - run.time_s[0]
-        for piece in pieces:
-            here = (since >= piece.begin_s) & (since < piece.end_s)
-            if piece.kind == "heat":
-                watts[here, piece.spring] += piece.size
-            elif piece.kind == "common":
-                watts[here] += piece.size
+        for one in events:
+            here = (since >= one.from_s) & (since < one.to_s)
+            if one.kind != "sensor":
+                watts[here, slice(None) if one.spring is None else one.spring - 1] += one.size
         found.times_s.append(run.time_s)
         found.watts.append(watts)
-        found.pieces += pieces
+        found.events += events
     return found
 
 
-def _pieces_of(problem: Problem, fit: Fit, r: int, slopes: np.ndarray, factor: float, typical_w: float) -> list[Piece]:
+def _events_of(
+    problem: Problem, fit: Fit, r: int, slopes: np.ndarray, factor: float, typical_w: float, usual_w: np.ndarray
+) -> list[results.Event]:
     """Return the pieces of one run: chosen one by one, the best first, all sizes fitted again with each."""
     run, mask, noise = problem.runs[r], problem.mask[r], problem.noise[r]
     springs, rows = run.springs, len(run.time_s)
@@ -190,12 +170,11 @@ def _pieces_of(problem: Problem, fit: Fit, r: int, slopes: np.ndarray, factor: f
     spread = max(1.0, float(rest @ rest) / max(1, len(rest)) * factor)
     errors = np.sqrt(np.diag(np.linalg.pinv(matrix.T @ matrix)) * spread)
     out = []
-    end = float(run.time_s[-1] - run.time_s[0])
+    since = [float(run.time_s[row] - run.time_s[0]) for row in (*edges, -1)]
     for (kind, k, a, b), size, error, nats in zip(chosen, sizes, errors, gains, strict=True):
-        begin_s = float(run.time_s[edges[a]] - run.time_s[0])
-        end_s = float(run.time_s[edges[b]] - run.time_s[0]) if b < len(edges) else end
+        span_s = (since[a], since[b])
         small = abs(size) < (SMALLEST * typical_w if kind != "sensor" else 3.0 * float(noise[k]))
         if small or abs(size) < 3.0 * error:
             continue
-        out.append(Piece(r, kind, k, begin_s, end_s, float(size), float(error), float(nats)))
+        out.append(event(r, kind, k, span_s, float(size), float(error), float(nats), usual_w))
     return out

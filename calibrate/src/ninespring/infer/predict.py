@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..errors import InputError, WorkError
+from ..export.settings import settings_of
 from ..io import results
 from ..io.logs.run import Run
 from ..io.statistics import rms_there
@@ -97,6 +98,18 @@ def chip_trace(model: Model, lines: str, run: Run) -> tuple[np.ndarray, np.ndarr
             first,
         )
     return temperature, austenite
+
+
+def refuse_seen(model: Model, run: Run) -> None:
+    """Refuse a log that a model was fitted to."""
+    if any(one.get("sha256") == run.sha256 for one in model.provenance.get("logs", [])):
+        raise InputError("the model was fitted to this log: give one that the fit never saw", run.name)
+
+
+def chip_errors(model: Model, old: str, runs: Sequence[Run]) -> tuple[results.ChipError, results.ChipError]:
+    """Return the errors of a chip on logs with the lines `old`, and with a model's settings over them."""
+    new = f"{old}\n{settings_of(model).lines}"
+    return chip_error(model, old, runs), chip_error(model, new, runs)
 
 
 def chip_error(model: Model, lines: str, runs: Sequence[Run]) -> results.ChipError:

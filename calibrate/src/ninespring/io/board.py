@@ -12,7 +12,6 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
 
 import numpy as np
 import pandas as pd
@@ -20,7 +19,7 @@ import pandas as pd
 from ..errors import InputError, RefusedError, WorkError
 from . import ranges
 from .belief import Belief, beliefs
-from .logs import read_bytes
+from .logs import COLUMN, EXTRA, read_bytes
 from .port import Port
 from .simulated import simulated_board
 
@@ -132,9 +131,7 @@ class Board:
     def __enter__(self) -> Board:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def close(self) -> None:
@@ -255,6 +252,21 @@ class Board:
             if time.monotonic() >= until_s:
                 return None
 
+    def telemetry(self, hz: int) -> list[str]:
+        """Have the board send rows, so many a second; return their columns. WorkError where it names none that can be read."""
+        for _ in range(3):
+            if names := next(filter(None, map(telemetry_names, self.ask(f"telemetry csv {hz}"))), None):
+                return names
+        raise WorkError(f"{self.port}: the board's telemetry has no header that can be read")
+
+    def next_row(self, names: list[str], until_s: float) -> dict[str, str] | None:
+        """Return the next row of telemetry that is whole, by column; None where none came until that monotonic time."""
+        while (line := self.next_line(until_s)) is not None:
+            cells = line.split(",")
+            if line[:1].isdigit() and len(cells) == len(names):
+                return dict(zip(names, cells, strict=True))
+        return None
+
     def _show_life(self) -> None:
         self._alive_s = time.monotonic()
         self._port.write("\n")  # an empty line is not answered, but shows that this end lives
@@ -364,14 +376,10 @@ class Board:
         ranges.RECORD_HZ.check("hz", hz)
         if not seconds > 0.0:
             raise InputError(f"seconds = {seconds!r}: not a number above 0")
-        names = next((line.split(",") for line in self.ask(f"telemetry csv {hz}") if line.startswith("time_s,")), [])
+        names = self.telemetry(hz)
         begins_s, looked_s, believed = math.nan, -math.inf, None
         try:
-            while (line := self.next_line(time.monotonic() + 3.0 * self.patience)) is not None:
-                cells = line.split(",")
-                if not line[:1].isdigit() or len(cells) != len(names):
-                    continue
-                row = dict(zip(names, cells, strict=True))
+            while (row := self.next_row(names, time.monotonic() + 3.0 * self.patience)) is not None:
                 now_s = float(row["time_s"])
                 begins_s = now_s if math.isnan(begins_s) else begins_s
                 if now_s - begins_s > seconds:
@@ -386,6 +394,21 @@ class Board:
                 self.ask("telemetry off")
             self._telemetry.clear()
         raise WorkError(f"{self.port}: no telemetry came")
+
+
+def telemetry_names(header: str) -> list[str] | None:
+    """Return the columns of a telemetry header, None where it is none or corrupt."""
+    names = header.split(",")
+    springs = sum(re.fullmatch(r"i\d+_a", name) is not None for name in names)
+    wanted = {"time_s", *(f"i{k}_a" for k in range(1, springs + 1))}
+    whole = all(COLUMN.match(name) or EXTRA.match(name) for name in names) and len(set(names)) == len(names)
+    return names if springs and whole and wanted <= set(names) else None
+
+
+def shape_of(settings: Mapping[str, str], springs: int) -> tuple[int, int]:
+    """Return rows and columns of a board's springs, by its settings; all in a row where these are of another number."""
+    rows, columns = (int(float(settings.get(name, 0))) for name in ("rows", "columns"))
+    return (rows, columns) if rows * columns == springs else (1, springs)
 
 
 def to_pandas(readings: Iterable[Reading]) -> pd.DataFrame:

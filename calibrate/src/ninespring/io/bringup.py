@@ -54,6 +54,10 @@ class Step(msgspec.Struct):
     found: list[str] = []
     at: str = ""
 
+    def tell(self, what: str, value: str, wanted: str) -> None:
+        """Note a number."""
+        self.numbers.append((what, value, wanted))
+
     @property
     def passed(self) -> bool:
         """Whether nothing was found."""
@@ -109,24 +113,15 @@ def springs_of(board: Board) -> int:
 
 def rows(board: Board, seconds: float, line: str = "", early: list[Reading] | None = None) -> list[Reading]:
     """Return telemetry of so many of the board's seconds after a line was obeyed; what came before that goes to `early`."""
-    names = next((one.split(",") for one in board.ask(f"telemetry csv {ROWS_HZ}") if one.startswith("time_s,")), [])
-
-    def next_row(until_s: float) -> Reading | None:
-        while (text := board.next_line(until_s)) is not None:
-            cells = text.split(",")
-            if text[:1].isdigit() and len(cells) == len(names):
-                return reading(dict(zip(names, cells, strict=True)))
-        return None
-
-    out: list[Reading] = []
+    names, out = board.telemetry(ROWS_HZ), []
     try:
         if line:
             board.ask(line)
-            while (one := next_row(0.0)) is not None:
+            while (row := board.next_row(names, 0.0)) is not None:
                 if early is not None:
-                    early.append(one)
-        while (one := next_row(time.monotonic() + 5.0 * board.patience)) is not None:
-            out.append(one)
+                    early.append(reading(row))
+        while (row := board.next_row(names, time.monotonic() + 5.0 * board.patience)) is not None:
+            out.append(one := reading(row))
             if one.time_s - out[0].time_s >= seconds:
                 return out
     finally:
@@ -227,11 +222,11 @@ def which_swap(board: Board, spring: int, other: int, hands: Hands) -> str:
     )
 
 
-def told(step: Step, hands: Hands | None, what: str, question: str) -> bool:
-    """Ask what no sensor tells, and note the answer; True where nobody is there to be asked."""
+def ask(step: Step, hands: Hands | None, what: str, question: str, wrong: str) -> None:
+    """Ask what no sensor tells, where somebody is there to be asked; note the answer, and what is wrong where it is no."""
     answer = None if hands is None else hands(question)
-    step.numbers.append((what, "nobody was asked" if answer is None else "yes" if answer else "no", "yes"))
-    return answer is not False
+    step.tell(what, "nobody was asked" if answer is None else "yes" if answer else "no", "yes")
+    step.found += [wrong] * (answer is False)
 
 
 def step_board(board: Board, step: Step, hands: Hands | None) -> None:
@@ -241,7 +236,7 @@ def step_board(board: Board, step: Step, hands: Hands | None) -> None:
     step.numbers += [
         (("firmware", "start", "load")[k] if k < 3 else "", one, "") for k, one in enumerate(board.version)
     ]
-    step.numbers.append(("fuses", "cannot be read over USB: a programmer reads them", "docs/flashing.md"))
+    step.tell("fuses", "cannot be read over USB: a programmer reads them", "docs/flashing.md")
     if "mega2560" not in board.version[0]:
         step.found.append(f"this is no Mega 2560: {board.version[0]}")
 
@@ -253,7 +248,7 @@ def step_sensors(board: Board, step: Step, hands: Hands | None) -> None:
     rows(board, 0.3)
     faults = board.ask("faults")
     bad = {int(k): int(number) for one in faults for k, number in re.findall(r"^spring (\d+): fault (\d+)", one)}
-    step.numbers.append(("sensors that answer", f"{springs - len(bad)}", f"{springs}"))
+    step.tell("sensors that answer", f"{springs - len(bad)}", f"{springs}")
     if any("fault 6 " in one for one in faults):
         step.found.append(
             "the bus hangs: SDA (D20) or SCL (D21) has no pull-up (4.7 k from each to 5 V), is held low, or the two are exchanged"
@@ -264,7 +259,7 @@ def step_sensors(board: Board, step: Step, hands: Hands | None) -> None:
         step.found.append("no sensor answers: their 5 V, their ground, or SDA (D20) and SCL (D21) are not connected")
         return
     for k in range(1, springs + 1):
-        step.numbers.append((f"sensor {k}", "silent" if k in bad else "answers", jumpers(k)))
+        step.tell(f"sensor {k}", "silent" if k in bad else "answers", jumpers(k))
     step.found += [f"sensor {k} does not answer at {jumpers(k)}: its jumpers, or its wires" for k in silent]
     step.found += [one for one in faults if one.startswith("spring") and "fault 5 " not in one]
     if step.found:
@@ -274,7 +269,7 @@ def step_sensors(board: Board, step: Step, hands: Hands | None) -> None:
         ("noise", still.std(axis=0), QUIET_A),
         ("current with nothing on", abs(still.mean(axis=0)), NOTHING_A),
     ):
-        step.numbers.append((f"{what}, the largest", f"{1e3 * values.max():.1f} mA", f"below {1e3 * most:.0f}"))
+        step.tell(f"{what}, the largest", f"{1e3 * values.max():.1f} mA", f"below {1e3 * most:.0f}")
         if values.max() > most:
             step.found.append(
                 f"sensor {int(values.argmax()) + 1}: {what} is {1e3 * values.max():.0f} mA: its ground, long wires"
@@ -284,7 +279,7 @@ def step_sensors(board: Board, step: Step, hands: Hands | None) -> None:
 def step_supply(board: Board, step: Step, hands: Hands | None) -> None:
     """The cut-off opens and closes by a word."""
     if float(board.settings().get("cut_off", 0)) == 0.0:
-        step.numbers.append(("cut-off", "not fitted ($cut_off=0)", "fitted"))
+        step.tell("cut-off", "not fitted ($cut_off=0)", "fitted")
         return
     for word in ("off", "on"):
         board.ask("clear")
@@ -295,18 +290,12 @@ def step_supply(board: Board, step: Step, hands: Hands | None) -> None:
             return
         rows(board, 0.5)
         said = re.search(r"supply:(\w+)", board.status())
-        step.numbers.append((f"after `supply {word}`", said[1] if said else "not told", word))
+        step.tell(f"after `supply {word}`", said[1] if said else "not told", word)
         if not said or said[1] != word:
             step.found.append(f"the supply is {said[1] if said else 'not told'} after `supply {word}`: see `faults`")
-    if not told(
-        step,
-        hands,
-        "the relay's clicks, and 0 V and 5 V at STAGES",
-        "Did the relay click twice, and did a meter at STAGES show 0 V and then 5 V",
-    ):
-        step.found.append(
-            "the relay does not follow: D12, the pump's diodes and capacitors, its transistor (docs/hardware.md)"
-        )
+    question = "Did the relay click twice, and did a meter at STAGES show 0 V and then 5 V"
+    wrong = "the relay does not follow: D12, the pump's diodes and capacitors, its transistor (docs/hardware.md)"
+    ask(step, hands, "the relay's clicks, and 0 V and 5 V at STAGES", question, wrong)
 
 
 def supply_and_drop(driven: list[tuple[int, Driven]]) -> tuple[float, float]:
@@ -344,7 +333,7 @@ def step_channels(board: Board, step: Step, hands: Hands | None) -> None:
         noise = 1e3 * float(np.std([one.current_a[k - 1] for one in got.settled] or [0.0]))
         text = f"{own[0]:.3f} A, {own[1]:.3f} V, {got.ohm(k):.3f} ohm, duty {own[2]:.3f}, noise {noise:.0f} mA"
         text = text if own[0] > NOTHING_A else "no current"
-        step.numbers.append((f"channel {k}", text, f"{TEST_A:g} A, {TEST_A * DUMMY_OHM:.3f} V, {DUMMY_OHM:g} ohm"))
+        step.tell(f"channel {k}", text, f"{TEST_A:g} A, {TEST_A * DUMMY_OHM:.3f} V, {DUMMY_OHM:g} ohm")
     if all(got.current_a.max() < NOTHING_A and not got.faults_of(k, (11, 15)) for k, got in driven):
         step.found.append(
             "no channel has current: the supply is off, its fuse is open, or the relay does not hold (D12 to the pump; docs/hardware.md)"
@@ -389,8 +378,8 @@ def step_air(board: Board, step: Step, hands: Hands | None) -> None:
     """Fan and thermistor."""
     rows(board, 2.0, "fan 100")
     board.ask("fan 0")
-    if not told(step, hands, "the fan blows", "Did the fan blow, and has it stopped"):
-        step.found.append("the fan does not follow D11: its transistor, its own supply, its diode (docs/hardware.md)")
+    wrong = "the fan does not follow D11: its transistor, its own supply, its diode (docs/hardware.md)"
+    ask(step, hands, "the fan blows", "Did the fan blow, and has it stopped", wrong)
     settings = board.settings()
     source, believed = settings["ambient_source"], float(settings["ambient_c"])
     board.ask("$ambient_source=1")
@@ -402,17 +391,15 @@ def step_air(board: Board, step: Step, hands: Hands | None) -> None:
         board.ask(f"ambient {believed:g}")
         board.ask(f"$ambient_source={source}")
     if not follows:
-        step.numbers.append(("thermistor", f"{air:.1f} degC", "as a thermometer says, within 2"))
+        step.tell("thermistor", f"{air:.1f} degC", "as a thermometer says, within 2")
         if not 0.0 <= air <= 50.0:
             step.found.append(
                 f"the thermistor says {air:.1f} degC: it is not 10 k at 25 degC, or its 10 k to 5 V is another one"
             )
         elif source == "0":
-            step.numbers.append(("ambient_source", "0: it is not used", "1: `$ambient_source=1`, `$save`"))
+            step.tell("ambient_source", "0: it is not used", "1: `$ambient_source=1`, `$save`")
     else:
-        step.numbers.append(
-            ("thermistor", "none is read", f"none, or one at A0 (`ambient_c` {believed:g} is believed)")
-        )
+        step.tell("thermistor", "none is read", f"none, or one at A0 (`ambient_c` {believed:g} is believed)")
         if source != "0":
             step.found.append("no thermistor is read at A0: its wire is open or shorted, or `$ambient_source=0`")
 
@@ -438,7 +425,7 @@ def step_one_spring(board: Board, step: Step, hands: Hands | None) -> None:
     settings = board.settings()
     declared = float(settings["resistance_martensite_ohm"])
     got = drive(board, 1, low=False)
-    step.numbers.append(("spring 1 cold", f"{got.ohm(1):.3f} ohm", f"{declared:.3f} ohm"))
+    step.tell("spring 1 cold", f"{got.ohm(1):.3f} ohm", f"{declared:.3f} ohm")
     step.found += judge_spring(1, got, declared)
     if step.found:
         return
@@ -470,10 +457,8 @@ def step_one_spring(board: Board, step: Step, hands: Hands | None) -> None:
         step.found.append(
             f"the resistance of spring 1 moves from {ohms.min():.3f} to {ohms.max():.3f} ohm: a crimp that is loose"
         )
-    if not told(
-        step, hands, "spring 1 is warm", "Is spring 1 warm, and only spring 1 (a thermometer, or a hand near it)"
-    ):
-        step.found.append("another spring is warm, or none: the springs' wires are exchanged")
+    question = "Is spring 1 warm, and only spring 1 (a thermometer, or a hand near it)"
+    ask(step, hands, "spring 1 is warm", question, "another spring is warm, or none: the springs' wires are exchanged")
 
 
 def step_all_springs(board: Board, step: Step, hands: Hands | None) -> None:
@@ -484,9 +469,7 @@ def step_all_springs(board: Board, step: Step, hands: Hands | None) -> None:
     ohms = np.array([got.ohm(k) for k, got in driven])
     middle = float(np.nanmedian(ohms)) if np.isfinite(ohms).any() else float("nan")
     for k, got in driven:
-        step.numbers.append(
-            (f"spring {k} cold", f"{ohms[k - 1]:.3f} ohm", f"{declared:.3f} ohm; the others {middle:.3f}")
-        )
+        step.tell(f"spring {k} cold", f"{ohms[k - 1]:.3f} ohm", f"{declared:.3f} ohm; the others {middle:.3f}")
         wrong = judge_spring(k, got, declared)
         if not wrong and abs(ohms[k - 1] / middle - 1.0) > APART:
             wrong = [
@@ -501,12 +484,10 @@ def step_all_springs(board: Board, step: Step, hands: Hands | None) -> None:
     board.ask("off all")
     last = np.mean([one.current_a for one in together[-ROWS_HZ:]], axis=0)
     share = min(1.0, float(settings["supply_limit_a"]) / (springs * TEST_A))
-    step.numbers.append(
-        (
-            "all together",
-            f"{last.sum():.2f} A, {last.min():.3f} to {last.max():.3f} A each",
-            f"{share * TEST_A:.2f} A each",
-        )
+    step.tell(
+        "all together",
+        f"{last.sum():.2f} A, {last.min():.3f} to {last.max():.3f} A each",
+        f"{share * TEST_A:.2f} A each",
     )
     step.found += faults
     if not faults and abs(last - share * TEST_A).max() > 0.1:

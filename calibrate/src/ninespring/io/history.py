@@ -34,12 +34,13 @@ class Entry:
     before: dict[str, str]
     sent: dict[str, str]
 
-    def words(self) -> list[str]:
-        """Return what it changed, a line each."""
+    def words(self, back: bool = False) -> list[str]:
+        """Return what it changed, or what taking it back does, a line each."""
+        pairs = {name: (self.before.get(name, "not there"), value) for name, value in self.sent.items()}
         return [
-            f"${name}: {self.before.get(name, 'not there')} -> {value}"
-            for name, value in self.sent.items()
-            if name not in self.before or float(self.before[name]) != float(value)
+            f"${name}: {' -> '.join(reversed(pair) if back else pair)}"
+            for name, pair in pairs.items()
+            if name not in self.before or float(pair[0]) != float(pair[1])
         ]
 
 

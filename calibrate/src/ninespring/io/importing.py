@@ -377,7 +377,7 @@ def merge_into_log(
     """
     table = read_table(log_path)
     if "time_s" not in table.names:
-        raise InputError("no column time_s", log_path, table.header_line, 1)
+        raise table.refuse_header("no column time_s")
     time_s = table.frame["time_s"].to_numpy(float)
     count = len(next(iter(columns.values())))
     when = time_s[0] + np.arange(count) * interval_s if times_s is None else times_s

@@ -20,7 +20,7 @@ from .. import __version__
 from ..errors import InputError, WorkError
 from . import results
 from .board import Board
-from .logs import COLUMN, EXTRA, LIMITS, check_folder
+from .logs import LIMITS, check_folder
 from .thermometers import Thermometers
 from .words import FAULTS
 
@@ -155,6 +155,8 @@ class RowCheck:
         self.restarted = False
         """Time began anew: the board was reset."""
         self._longest_step_s = max(1.0, 3.0 / hz)
+        self._before: Row | None = None
+        """The row before the last."""
         self._last: Row | None = None
         self._held: Row | None = None
 
@@ -169,13 +171,16 @@ class RowCheck:
             good = [row]
         elif self._held and self._follows(self._held, row):
             if self._last and self._held.time_s <= self._last.time_s:
-                self.restarted = True
+                self.dropped += 1
+                self.restarted = not (self._before and self._follows(self._before, self._held))
+                self._held = row  # that the last was corrupt is seen too late: what follows waits for its time
                 return []
             good = [self._held, row]
         else:
             self.dropped += self._held is not None
             self._held = row
             return []
+        self._before = (self._last, *good)[-2]
         self._held, self._last = None, row
         return good
 
@@ -200,15 +205,6 @@ class RowCheck:
 
     def _follows(self, before: Row, row: Row) -> bool:
         return row.form == before.form and 0.0 < row.time_s - before.time_s <= self._longest_step_s
-
-
-def telemetry_names(header: str) -> list[str] | None:
-    """Return the columns of a telemetry header, None where it is none or corrupt."""
-    names = header.split(",")
-    springs = sum(re.fullmatch(r"i\d+_a", name) is not None for name in names)
-    wanted = {"time_s", *(f"i{k}_a" for k in range(1, springs + 1))}
-    whole = all(COLUMN.match(name) or EXTRA.match(name) for name in names) and len(set(names)) == len(names)
-    return names if springs and whole and wanted <= set(names) else None
 
 
 class LogFile:
@@ -528,12 +524,7 @@ def _rows(
     send: Callable[[Step], None],
 ) -> None:
     waiting = [step for step in steps if step.at_s is not None]
-    for _ in range(3):
-        names = next(filter(None, map(telemetry_names, board.ask(f"telemetry csv {hz}"))), None)
-        if names:
-            break
-    else:
-        raise WorkError(f"{board.port}: the board's telemetry has no header that can be read")
+    names = board.telemetry(hz)
     sink.begin(names)
     check = RowCheck(names, hz)
     state = names.index("state") if "state" in names else None

@@ -355,6 +355,10 @@ class SteadyDiagnosis(Told, tag="ninespring.diagnosis/1"):
     cases: list[Case]
 
 
+FILES = ("diagnosis.json", "report.html", "model.toml")
+"""What a diagnosis writes into its folder."""
+
+
 # ---- what --json writes
 
 

@@ -40,7 +40,6 @@ class Lines:
         """Spring of each column, None where it is none."""
         self.clock: int | None = None
         """Column of the logger's own clock."""
-        self.dropped = 0
         self.heard = 0
         self._first: list[list[float | None]] = []
 
@@ -58,7 +57,9 @@ class Lines:
             self._guess(numbers)
             return None
         if len(cells) != len(self.springs):
-            self.dropped += 1
+            return None
+        stamp = None if self.clock is None else numbers[self.clock]
+        if self.clock is not None and stamp is None:
             return None
         low, high = LIMITS["t"][:2]
         values = {
@@ -66,10 +67,6 @@ class Lines:
             for spring, value in zip(self.springs, numbers, strict=True)
             if spring is not None and value is not None and low <= value <= high
         }
-        stamp = None if self.clock is None else numbers[self.clock]
-        if self.clock is not None and stamp is None:
-            self.dropped += 1
-            return None
         return stamp, values
 
     def _guess(self, numbers: list[float | None]) -> None:
@@ -88,11 +85,9 @@ class Lines:
 
     def _header(self, cells: list[str]) -> None:
         springs = [int(match[1]) if (match := SPRING.fullmatch(cell)) else None for cell in cells]
-        if not any(springs):
-            self.dropped += 1
-            return
-        self.springs = springs
-        self.clock = next((k for k, cell in enumerate(cells) if cell.lower().startswith("time")), None)
+        if any(springs):
+            self.springs = springs
+            self.clock = next((k for k, cell in enumerate(cells) if cell.lower().startswith("time")), None)
 
 
 def _number(cell: str) -> float | None:
@@ -135,11 +130,6 @@ class Thermometers:
         if not self.count:
             self.close()
             raise WorkError(self.trouble or f"{port}: no temperatures come: is it the thermometers' port?")
-
-    @property
-    def dropped(self) -> int:
-        """Lines that were no readings."""
-        return self._lines.dropped
 
     @property
     def offset_s(self) -> float | None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import ctypes
 import functools
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from importlib import resources
 from typing import Any
 
@@ -43,17 +43,19 @@ class NativeError(RuntimeError):
         super().__init__(f"{what}: {_ERRORS.get(status, f'status {status}')}")
 
 
-class _Parameter(ctypes.Structure):
-    _fields_ = (
-        ("name", ctypes.c_char_p),
-        ("unit", ctypes.c_char_p),
-        ("effect", ctypes.c_char_p),
-        ("description", ctypes.c_char_p),
-        ("default", ctypes.c_double),
-        ("minimum", ctypes.c_double),
-        ("maximum", ctypes.c_double),
-        ("per_spring", ctypes.c_bool),
-    )
+_C_TYPES = {
+    "str": ctypes.c_char_p,
+    "str | None": ctypes.c_char_p,
+    "float": ctypes.c_double,
+    "int": ctypes.c_int,
+    "bool": ctypes.c_bool,
+}
+
+
+def structure(row: type, **other: type) -> type[ctypes.Structure]:
+    """Return how the C code lays out the rows of a table, given the dataclass of one; `other`: fields that C has otherwise."""
+    layout = [(one.name, other.get(one.name) or _C_TYPES[str(one.type)]) for one in fields(row)]
+    return type(row.__name__, (ctypes.Structure,), {"_fields_": layout})
 
 
 def fields_of(row: ctypes.Structure) -> dict[str, Any]:
@@ -91,7 +93,7 @@ def library() -> ctypes.CDLL:
     )
     signatures: dict[str, tuple[object, Sequence[object]]] = {
         "plant_parameter_count": (size, ()),
-        "plant_parameter": (ctypes.POINTER(_Parameter), (size,)),
+        "plant_parameter": (ctypes.POINTER(structure(PlantParameter)), (size,)),
         "plant_effect_count": (size, ()),
         "plant_effect_name": (text, (size,)),
         "plant_create_layers": (pointer, (integer, integer, integer)),

@@ -4,42 +4,16 @@ from __future__ import annotations
 
 import ctypes
 import functools
+import itertools
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import Any
 
-from .native import fields_of, library
+from .native import fields_of, library, structure
 
 PARTS = ("model", "current", "safety", "policy", "board")
 ACTS = ("array", "supply", "measurement")
-_Row = TypeVar("_Row", bound=ctypes.Structure)
-
-
-class _Parameter(ctypes.Structure):
-    _fields_ = (
-        ("name", ctypes.c_char * 40),
-        ("unit", ctypes.c_char * 5),
-        ("effect", ctypes.c_char_p),
-        ("sentence", ctypes.c_char_p),
-        ("minimum", ctypes.c_double),
-        ("maximum", ctypes.c_double),
-        ("default", ctypes.c_double),
-        ("resolution", ctypes.c_double),
-        ("part", ctypes.c_int),
-        ("decimals", ctypes.c_int),
-        ("id", ctypes.c_int),
-        ("per_spring", ctypes.c_bool),
-    )
-
-
-class _Effect(ctypes.Structure):
-    _fields_ = (
-        ("name", ctypes.c_char_p),
-        ("sentence", ctypes.c_char_p),
-        ("not_on_chip", ctypes.c_char_p),
-        ("acts", ctypes.c_int),
-    )
 
 
 @dataclass(frozen=True)
@@ -70,21 +44,22 @@ class TableEffect:
     acts: str
 
 
-def _rows(function: str, kind: type[_Row]) -> Iterator[_Row]:
-    call = getattr(library(), function)
+def _rows(function: str, kind: type[ctypes.Structure]) -> Iterator[dict[str, Any]]:
+    call, row = getattr(library(), function), kind()
     call.restype = ctypes.c_bool
     call.argtypes = (ctypes.c_size_t, ctypes.POINTER(kind))
-    row = kind()
-    k = 0
-    while call(k, ctypes.byref(row)):
-        yield row
-        k += 1
+    for k in itertools.count():
+        if not call(k, ctypes.byref(row)):
+            return
+        yield fields_of(row)
 
 
 @functools.cache
 def settings() -> dict[str, Setting]:
     """Return the chip's settings by name, in the order of `$$`."""
-    rows = map(fields_of, _rows("table_parameter", _Parameter))
+    rows = _rows(
+        "table_parameter", structure(Setting, name=ctypes.c_char * 40, unit=ctypes.c_char * 5, part=ctypes.c_int)
+    )
     return {one["name"]: Setting(**one | {"part": PARTS[one["part"]]}) for one in rows}
 
 
@@ -97,5 +72,5 @@ def setting(name: str) -> Setting | None:
 @functools.cache
 def effects() -> dict[str, TableEffect]:
     """Return the effects by name, in the plant's order."""
-    rows = map(fields_of, _rows("table_effect", _Effect))
+    rows = _rows("table_effect", structure(TableEffect, acts=ctypes.c_int))
     return {one["name"]: TableEffect(**one | {"acts": ACTS[one["acts"]]}) for one in rows}

@@ -11,8 +11,7 @@ from rich.table import Table
 from rich.text import Text
 
 from ..io import words
-from ..io.board import Reading, reading
-from ..io.recording import telemetry_names
+from ..io.board import Reading, reading, shape_of
 
 TREND_S = 10.0
 """Over so long a temperature's trend is taken."""
@@ -21,11 +20,10 @@ STEADY_K_PER_S = 0.02
 
 
 class Screen:
-    """Takes lines of telemetry, and draws what they say."""
+    """Takes lines of telemetry with these columns, and draws what they say."""
 
-    def __init__(self, settings: Mapping[str, str]) -> None:
-        self._settings = settings
-        self._names: list[str] = []
+    def __init__(self, settings: Mapping[str, str], names: list[str]) -> None:
+        self._settings, self._names = settings, names
         self._past: deque[Reading] = deque()
         self._limits: dict[int, str] = {}
 
@@ -35,13 +33,9 @@ class Screen:
             named = [one for one in match[2][1:].split("|") if one != "none"]
             self._limits[int(match[1])] = f"{' '.join(named)} -{float(match[3]):.2f} A" if named else ""
             return bool(self._past)
-        self._names = telemetry_names(line) or self._names
-        cells = line.split(",")
-        if len(cells) != len(self._names) or cells == self._names:
-            return False
         try:
-            now = reading(dict(zip(self._names, cells, strict=True)))
-        except ValueError:
+            now = reading(dict(zip(self._names, line.split(","), strict=True)))
+        except ValueError:  # another line, or half a row
             return False
         if self._past and now.time_s < self._past[-1].time_s:
             self._past.clear()
@@ -54,9 +48,7 @@ class Screen:
         """Return the grid, with what is true of all springs above it."""
         now, before = self._past[-1], self._past[0]
         springs = len(now.current_a)
-        rows, cols = (int(float(self._settings.get(name, 0))) for name in ("rows", "columns"))
-        if rows * cols != springs:
-            rows, cols = 1, springs
+        rows, cols = shape_of(self._settings, springs)
         elapsed = now.time_s - before.time_s
         rise = (now.temperature_c - before.temperature_c) / elapsed if elapsed > 0 else np.zeros(springs)
         grid = Table(show_header=False, show_lines=True, padding=(0, 1))

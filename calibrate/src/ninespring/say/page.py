@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import jinja2
@@ -14,6 +15,7 @@ from ..find.diagnosis import Diagnosis
 from ..io import results
 from ..io.logs import CUT_SHORT
 from ..model import effects, native
+from ..model.models import Model, model_text
 from . import figures
 
 HEADER = ("effect", "its one number", "error, K", "left one out, K", "what speaks against it")
@@ -142,6 +144,12 @@ def _undetermined(told: results.Diagnosis) -> list[str]:
     lines += [f"{n}: at its bound" for n in told.identifiability.at_bounds]
     tied = sorted({name for one in told.identifiability.correlated for name in (one.a, one.b)})
     return lines + ([f"determined in combination only: {', '.join(tied)}"] if tied else [])
+
+
+def files_of(folder: Path, told: results.Told, page: str, model: Model) -> dict[Path, str]:
+    """Return what a diagnosis writes into a folder: result, report, model."""
+    texts = results.checked(told), page, model_text(model)
+    return {folder / name: text for name, text in zip(results.FILES, texts, strict=True)}
 
 
 def html_report(found: Diagnosis, folder: str = "diagnosis") -> str:

@@ -16,17 +16,17 @@ import msgspec
 
 from ...errors import InputError, WorkError
 from ...export.drive import checked_settings
-from ...export.settings import settings_of, together
+from ...export.settings import together
 from ...find import diagnosis
 from ...find.plan import make_plan
-from ...infer.predict import chip_error
+from ...infer.predict import chip_errors
 from ...io import history, results
-from ...io.board import ROW_TIME, Board, send_settings, settings_that_differ
+from ...io.board import Board, send_settings, settings_that_differ
 from ...io.logs import Run, read_bytes, read_log, write_atomically
 from ...io.logs.mending import RUN_IN_S
 from ...io.recording import LogFile, Recording, Step, about, record, script_lines, told_to_stop
 from ...io.thermometers import Thermometers
-from ...model.models import Array, Model, model_text, read_model
+from ...model.models import Array, Model, read_model
 from ...say import page
 from ..console import working
 from . import judged
@@ -266,12 +266,10 @@ class Calibration:
         """Wait until the thermometers have stopped falling: two drives are only alike from the same temperature."""
         seen: list[tuple[float, float]] = []
         with self._logger() as logger, working("waiting until the springs are cold") as say:
-            self.board.ask("telemetry csv 1")
+            names = self.board.telemetry(1)
             try:
-                while (line := self.board.next_line(time.monotonic() + 10.0 * self.board.patience)) is not None:
-                    if not (match := ROW_TIME.match(line)):
-                        continue
-                    now_s, hottest = float(match[1]), max(logger.latest.values())
+                while row := self.board.next_row(names, time.monotonic() + 10.0 * self.board.patience):
+                    now_s, hottest = float(row["time_s"]), max(logger.latest.values())
                     seen.append((now_s, hottest))
                     say(f"waiting until the springs are cold: the hottest is at {hottest:.0f} degC")
                     before = [one for at_s, one in seen if at_s <= now_s - COOLED_S]
@@ -296,13 +294,8 @@ class Calibration:
                 say("writing its report")
                 folder = self.folder / DIAGNOSIS
                 folder.mkdir(exist_ok=True)
-                write_atomically(
-                    {
-                        folder / "diagnosis.json": results.checked(found.told),
-                        folder / "report.html": page.html_report(found, DIAGNOSIS),
-                        folder / "model.toml": model_text(found.model),
-                    }
-                )
+                report = page.html_report(found, DIAGNOSIS)
+                write_atomically(page.files_of(folder, found.told, report, found.model))
             told = found.told
             self.progress.keep(
                 "diagnose",
@@ -325,18 +318,11 @@ class Calibration:
         self.progress.refuse(why)
         raise WorkError(f"nothing is saved on the board: {why}")
 
-    def _old_lines(self) -> str:
-        return as_lines(self.had)
-
     def _verify(self) -> None:
         if "verify" not in self.progress.done:
-            model, old, runs = self.model(), self._old_lines(), self._runs("run2")
-            lines = settings_of(model).lines
             with working("verifying on the second run"):
-                errors = {
-                    "before": results.plain(chip_error(model, old, runs)),
-                    "after": results.plain(chip_error(model, f"{old}\n{lines}", runs)),
-                }
+                each = chip_errors(self.model(), as_lines(self.had), self._runs("run2"))
+            errors = {when: results.plain(one) for when, one in zip(("before", "after"), each, strict=True)}
             self.progress.keep("verify", errors)
             self._tell(
                 "verify",
@@ -350,7 +336,7 @@ class Calibration:
     def _export(self) -> None:
         if "export" not in self.progress.done:
             with working("driving the old and the new settings in simulation") as say:
-                made, worse, _ = checked_settings(self.model(), self._old_lines(), True, say)
+                made, worse, _ = checked_settings(self.model(), as_lines(self.had), True, say)
             head = ["# from model.toml, by `ninespring calibrate`"]
             write_atomically({self.folder / SETTINGS: "\n".join([*head, made.lines])})
             self.progress.keep(

@@ -9,11 +9,12 @@ import numpy as np
 
 from ...export import drive as tried
 from ...export.settings import best_plant
-from ...io.logs import Run, read_log, read_table
+from ...io.logs import Run, read_log
 from ...io.statistics import rms
 from ...model import native
 from ...model.models import Model
 from ...model.simulate import started
+from ...say.plotting import believed
 
 FLOWING_A = 0.3
 """From the first row with this much a spring counts as driven: after power-on a board first waits until it knows its springs."""
@@ -29,13 +30,6 @@ class Judged(tried.Drive):
     """1 = top left: the one that the chip knows worst."""
     worst_c: float
     """Its error, K rms."""
-
-
-def believed(log: Path, run: Run) -> np.ndarray:
-    """Return the chip's temperatures at a recorded log's rows, (rows, springs), degC."""
-    frame = read_table(log, ("state",)).frame
-    rows = np.searchsorted(frame["time_s"].to_numpy(float), run.time_s)
-    return frame[[f"m{k + 1}_c" for k in range(run.springs)]].to_numpy(float)[rows]
 
 
 def austenite_of(model: Model, run: Run) -> np.ndarray:
@@ -72,7 +66,7 @@ def judge(model: Model, log: Path, springs_on: str) -> Judged:
     heated = np.minimum.reduce(on, axis=1) >= tried.TRANSFORMED
     off = austenite[:, ~pattern]
     plant = best_plant(model)
-    left = believed(log, run) - measured
+    left = believed(run) - measured
     each = np.sqrt(np.nanmean(left**2, axis=0))
     return Judged(
         held=float(on[len(on) // 2 :].mean()),

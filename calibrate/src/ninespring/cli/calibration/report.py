@@ -17,9 +17,9 @@ from ...io.logs import read_log
 from ...model.models import Array
 from ...say.figures import AFTER, BEFORE, INK, MEASURED, as_svg
 from ...say.page import render
+from ...say.plotting import believed
 from ...say.verified import error_rows
 from .chain import DIAGNOSIS, OLD_SETTINGS, SETTINGS
-from .judged import believed
 from .progress import Progress
 
 COLOURS = [BEFORE, AFTER, "#8a6d3b"]
@@ -83,9 +83,8 @@ def _drives(progress: Progress, array: Array, drives: Sequence[dict[str, Any]]) 
 
 def _picture(progress: Progress, array: Array, shown: Sequence[dict[str, Any]], names: Sequence[str]) -> str:
     """Draw the worst and the best known spring and one that is off, measured and believed, a panel a drive."""
-    logs = [progress.folder / one["log"] for one in shown]
-    runs = [read_log(log, array.springs) for log in logs]
-    thought = [believed(log, run) for log, run in zip(logs, runs, strict=True)]
+    runs = [read_log(progress.folder / one["log"], array.springs) for one in shown]
+    thought = [believed(run) for run in runs]
     error = np.sqrt(np.nanmean((thought[0] - runs[0].temperature_c) ** 2, axis=0))
     on = [k for k, one in enumerate(progress.option("pattern")) if one == "1"]
     off = [k for k in range(array.springs) if k not in on]

@@ -11,12 +11,11 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from ...errors import InputError
 from ..ranges import LOG_TIME_S
 from ..statistics import rounding
 from . import mending
 from .run import DriveMode, Run
-from .table import Table, read_table
+from .table import Table
 from .writing import sha256_of
 
 MAX_SPRINGS = 64
@@ -84,76 +83,55 @@ def _check_range(table: Table, name: str, kind: str) -> None:
     values = table.frame[name].to_numpy()
     bad = np.flatnonzero((values < low) | (values > high))
     if bad.size:
-        line, column = table.where(int(bad[0]), name)
         if values[bad[0]] < low and abs(values[bad[0]]) <= high:
             advice = BELOW.get(kind, advice)
-        raise InputError(f"{name} = {values[bad[0]]:g} {unit}".rstrip() + f": {advice}", table.path, line, column)
+        said = f"{name} = {values[bad[0]]:g} {unit}".rstrip()
+        raise table.refuse_cell(f"{said}: {advice}", int(bad[0]), name)
 
 
-def _driving_columns(
-    path: str | Path, names: list[str], line: int, columns: list[int], springs: int | None, temperatures: bool, why: str
-) -> tuple[str, int, bool]:
+def _driving_columns(table: Table, springs: int | None, temperatures: bool, why: str) -> tuple[str, int, bool]:
     """Return by what a log is driven ('i' or 'u'), its number of springs, whether it has voltages; refuse a wrong header."""
     groups: dict[str, set[int]] = {"i": set(), "v": set(), "t": set(), "u": set(), "f": set()}
     because = f" ({why})" if why else ""
-    for name, at in zip(names, columns, strict=True):
+    for name in table.names:
         if EXTRA.match(name):
             continue
         match = COLUMN.match(name)
-        kind, number = None, 0
-        if match and match[1]:
-            kind, number = match[1], int(match[2])
-            if UNIT_OF.get(kind) != match[3]:
-                match = None
-        elif match and match[4]:
-            kind, number = "u", int(match[4])
-        if not match:
-            raise InputError(
-                f"unknown column '{name}': {_advice(name)} (`ninespring import --map` converts and renames)",
-                path,
-                line,
-                at,
-            )
-        if kind is not None:
-            if number > MAX_SPRINGS or (springs is not None and number > springs):
-                raise InputError(
-                    f"column '{name}' but the array has {springs or MAX_SPRINGS} springs{because}", path, line, at
-                )
-            groups[kind].add(number)
-    if "time_s" not in names:
-        raise InputError("no column time_s", path, line, 1)
+        if not match or (match[1] and UNIT_OF.get(match[1]) != match[3]):
+            said = f"unknown column '{name}': {_advice(name)} (`ninespring import --map` converts and renames)"
+            raise table.refuse_header(said, name)
+        if number := int(match[2] or match[4] or 0):
+            if number > min(springs or MAX_SPRINGS, MAX_SPRINGS):
+                said = f"column '{name}' but the array has {springs or MAX_SPRINGS} springs{because}"
+                raise table.refuse_header(said, name)
+            groups[match[1] or "u"].add(number)
+    if "time_s" not in table.names:
+        raise table.refuse_header("no column time_s")
     if temperatures and not groups["t"]:
         more = ": with currents and voltages alone, `ninespring fit` tells what they do" if groups["v"] else ""
-        raise InputError(f"no temperature column (t1_c ...){more}", path, line, 1)
+        raise table.refuse_header(f"no temperature column (t1_c ...){more}")
     count = springs or max(set().union(*groups.values()), default=0)
     everyone = set(range(1, count + 1))
     letter = "i" if groups["i"] else "u"
     if not groups[letter]:
-        raise InputError("neither currents (i1_a ...) nor commands (u1 ...)", path, line, 1)
+        raise table.refuse_header("neither currents (i1_a ...) nor commands (u1 ...)")
     if missing := sorted(everyone - groups[letter]):
         example = f"i{missing[0]}_a" if letter == "i" else f"u{missing[0]}"
-        raise InputError(
-            f"spring {missing[0]} has no column {example}: add it (0 where the spring is not driven){because}",
-            path,
-            line,
-            1,
-        )
+        said = f"spring {missing[0]} has no column {example}: add it (0 where the spring is not driven){because}"
+        raise table.refuse_header(said)
     if letter == "i" and groups["v"] and (missing := sorted(everyone - groups["v"])):
-        raise InputError(
-            f"spring {missing[0]} has no column v{missing[0]}_v but others have: log all voltages or none",
-            path,
-            line,
-            1,
-        )
+        said = f"spring {missing[0]} has no column v{missing[0]}_v but others have: log all voltages or none"
+        raise table.refuse_header(said)
     return letter, count, bool(groups["v"])
 
 
-def _layers(table: Table, springs: int, path: str | Path) -> int:
-    if table.keys.get("layers", "1") not in ("1", "2"):
-        raise InputError(f"layers: {table.keys['layers']}; there are 1 or 2", path, 1)
-    if table.keys.get("layers") == "2" and springs % 2:
-        raise InputError(f"layers: 2, but {springs} springs: a stiffness spring below each is an even number", path, 1)
-    return int(table.keys.get("layers", "1"))
+def _layers(table: Table, springs: int) -> int:
+    given = table.keys.get("layers", "1")
+    if given not in ("1", "2"):
+        raise table.refuse(f"layers: {given}; there are 1 or 2", 1)
+    if given == "2" and springs % 2:
+        raise table.refuse(f"layers: 2, but {springs} springs: a stiffness spring below each is an even number", 1)
+    return int(given)
 
 
 CUT_SHORT = "a fault cut this run short"
@@ -178,14 +156,10 @@ def read_log(
 
     `temperatures`: refuse a log without any, unless `or_resistance` and it has currents and voltages.
     """
-    found: list[tuple[str, int, bool]] = []
-
-    def check(names: list[str], line: int, columns: list[int]) -> None:
-        needed = temperatures and not (or_resistance and any(COLUMN.match(n) and n[0] == "v" for n in names))
-        found.append(_driving_columns(path, names, line, columns, springs, needed, why))
-
-    table = read_table(path, header_check=check)
-    letter, count, has_voltages = found[0]
+    table = Table(path)
+    needed = temperatures and not (or_resistance and any(COLUMN.match(n) and n[0] == "v" for n in table.names))
+    letter, count, has_voltages = _driving_columns(table, springs, needed, why)
+    table.read_rows()
     _check_cells(table)
     notes: list[str] = []
     frame = _kept_rows(table, notes)
@@ -207,7 +181,7 @@ def read_log(
         and not np.isfinite(run.temperature_c).any()
     ):
         why = f" ({notes[-1]})" if notes else ""
-        raise InputError(f"no usable temperature in the whole log{why}", path)
+        raise table.refuse(f"no usable temperature in the whole log{why}")
     return run
 
 
@@ -220,8 +194,8 @@ def _check_cells(table: Table) -> None:
         if name == "time_s" or name[0] in "iuvf":
             holes = np.flatnonzero(table.frame[name].isna().to_numpy())
             if holes.size:
-                line, column = table.where(int(holes[0]), name)
-                raise InputError(f"{name} is empty: only temperatures and ambient_c may be", table.path, line, column)
+                said = f"{name} is empty: only temperatures and ambient_c may be"
+                raise table.refuse_cell(said, int(holes[0]), name)
 
 
 def _kept_rows(table: Table, notes: list[str]) -> pd.DataFrame:
@@ -235,7 +209,7 @@ def _kept_rows(table: Table, notes: list[str]) -> pd.DataFrame:
     frame = table.frame.iloc[keep]
     notes[:0] = _cut_short(table, frame)
     if len(frame) < 3:
-        raise InputError(f"{len(frame)} rows: too short to say anything", table.path, int(table.lines[-1]))
+        raise table.refuse(f"{len(frame)} rows: too short to say anything", int(table.lines[-1]))
     return frame
 
 
@@ -278,7 +252,7 @@ def _run_of(table: Table, frame: pd.DataFrame, letter: str, count: int, has_volt
         ambient_c=ambient,
         current_a=current,
         voltage_v=voltage,
-        layers=_layers(table, count, table.path),
+        layers=_layers(table, count),
         load_n=load,
         notes=notes,
         of_board=table.keys.get("version", "").startswith("ninespring "),

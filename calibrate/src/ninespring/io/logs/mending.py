@@ -37,13 +37,12 @@ def rising_rows(table: Table, notes: list[str]) -> np.ndarray:
     if (step <= 0).any():
         at = int(np.flatnonzero(step <= 0)[0])
         before, now = time_s[rows[at]], time_s[rows[at + 1]]
-        line, column = table.where(int(rows[at + 1]), "time_s")
         said = (
             f"time_s repeats {now:.10g} with other values"
             if now == before
             else f"time_s falls from {before:.10g} to {now:.10g}"
         )
-        raise InputError(f"{said}: times must rise strictly", table.path, line, column)
+        raise table.refuse_cell(f"{said}: times must rise strictly", int(rows[at + 1]), "time_s")
     notes.append(f"{int((~keep).sum())} repeated rows dropped")
     return keep
 
@@ -52,13 +51,12 @@ def refuse_wrong_units(run: Run, table: Table) -> None:
     """Months in one log, or days of rows minutes apart: milliseconds. Springs above 45 degC though nothing is driven: Fahrenheit or kelvin."""
     usual = float(np.median(np.diff(run.time_s)))
     if run.duration_s > LONGEST_S or (usual > SPARSE_S and run.duration_s > DAY_S):
-        line, column = table.where(len(table.lines) - 1, "time_s")
         days = run.duration_s / DAY_S
         said = (
             f"the log spans {days:.3g} days, its rows {usual:g} s apart: if its time is in ms, divide by 1000 "
             "(`ninespring import --map` converts)"
         )
-        raise InputError(said, run.name, line, column)
+        raise table.refuse_cell(said, len(table.lines) - 1, "time_s")
     if not np.isfinite(run.temperature_c[:5]).any():
         return
     with warnings.catch_warnings():
@@ -69,8 +67,7 @@ def refuse_wrong_units(run: Run, table: Table) -> None:
     ambient = None if run.ambient_c is None else float(run.ambient_c[0])
 
     def refuse(k: int, said: str) -> InputError:
-        line, column = table.where(0, f"t{k + 1}_c")
-        return InputError(f"{said}, a log has degC (`ninespring import --map` converts)", run.name, line, column)
+        return table.refuse_cell(f"{said}, a log has degC (`ninespring import --map` converts)", 0, f"t{k + 1}_c")
 
     seen = np.flatnonzero(np.isfinite(lowest))
     coldest = float(lowest[seen].min())

@@ -70,6 +70,15 @@ class Steady:
     against: str = ""
     """What speaks against it in a table of the paper's kind."""
 
+    def key(self, watched: int) -> str:
+        """Return the parameter that the number is, of the watched spring (from 0) where it is one of a spring's own."""
+        return f"{self.number}[{watched + 1}]" if self.of_one_spring else self.number
+
+    def sets(self, value: float, watched: int) -> dict[str, float]:
+        """Return all that the number sets; of a number per spring only the watched one's is meant."""
+        follow = {name: share * value for name, share in self.follows.items()}
+        return dict(self.also) | {self.key(watched): value} | follow
+
 
 @dataclass(frozen=True)
 class Scene:
@@ -153,6 +162,11 @@ def sized(value: float, error: float | None, unit: str = "", factor: float = 1.0
     order = math.floor(math.log10(error))
     digits = max(0, min(6, -order + (error / 10.0**order < 2.0)))
     return f"{value:.{digits}f}{unit} (+-{error:.{digits}f})"
+
+
+def says(words: str, name: str, unit: str = "", factor: float = 1.0) -> Callable[[Numbers, str], str]:
+    """Return what says a finding of one number in words, `{}` for its size and `{variant}` for its variant."""
+    return lambda numbers, variant: words.format(sized(*numbers[name], unit, factor), variant=variant)
 
 
 def percent(value: float, error: float | None, more: str = "more", less: str = "less") -> str:

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from .effect import Candidate, Effect, Numbers, Scene, linear, sized
+from .effect import Candidate, Effect, Scene, linear, says
 
 NAME = "fan_half_share"
 
@@ -18,8 +18,8 @@ def _candidates(scene: Scene) -> Iterator[Candidate]:
         )
 
 
-def _says(numbers: Numbers, variant: str) -> str:
-    return f"At half its command the fan gives {sized(*numbers[NAME], '%', 100.0)} of what it adds at full."
-
-
-EFFECT = Effect("fan_curve", _candidates, says=_says)
+EFFECT = Effect(
+    "fan_curve",
+    _candidates,
+    says=says("At half its command the fan gives {} of what it adds at full.", NAME, "%", 100.0),
+)

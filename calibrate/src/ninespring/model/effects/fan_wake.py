@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from .effect import Candidate, Effect, Numbers, Scene, Steady, linear, sized
+from .effect import Candidate, Effect, Scene, Steady, linear, says
 
 NAME = "wake_w_per_k"
 
@@ -23,13 +23,9 @@ def _candidates(scene: Scene) -> Iterator[Candidate]:
             )
 
 
-def _says(numbers: Numbers, variant: str) -> str:
-    return f"The fan's air carries {sized(*numbers[NAME], 'mW/K', 1e3)} from spring to spring, to the {variant}."
-
-
 EFFECT = Effect(
     "fan_wake",
     _candidates,
     Steady(NAME, 0.0, 0.0113, {"wake_direction": 0.0}, against="it needs the fan, yet the error is there without it"),
-    says=_says,
+    says=says("The fan's air carries {} from spring to spring, to the {variant}.", NAME, "mW/K", 1e3),
 )

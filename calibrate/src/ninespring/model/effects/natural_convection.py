@@ -2,18 +2,12 @@
 
 from collections.abc import Iterator
 
-from .effect import Candidate, Effect, Numbers, Scene, Steady, linear, sized
+from .effect import Candidate, Effect, Scene, Steady, linear, says
 
 
 def _candidates(scene: Scene) -> Iterator[Candidate]:
     name = "convection_exponent"
     yield Candidate("", (linear(name, 0.0, 0.6, 0.2, 0.2),), ({name: 0.2},))
-
-
-def _says(numbers: Numbers, variant: str) -> str:
-    return (
-        f"In still air the loss rises with the temperature, to the power of {sized(*numbers['convection_exponent'])}."
-    )
 
 
 EFFECT = Effect(
@@ -25,5 +19,5 @@ EFFECT = Effect(
         1.0,
         against="with the fan on the loss is forced and depends little on temperature, yet the error is as large",
     ),
-    says=_says,
+    says=says("In still air the loss rises with the temperature, to the power of {}.", "convection_exponent"),
 )

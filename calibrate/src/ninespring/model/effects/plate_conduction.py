@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from .effect import Candidate, Effect, Numbers, Scene, Steady, positive, sized
+from .effect import Candidate, Effect, Scene, Steady, positive, says
 
 
 def _candidates(scene: Scene) -> Iterator[Candidate]:
@@ -23,13 +23,9 @@ def _candidates(scene: Scene) -> Iterator[Candidate]:
     )
 
 
-def _says(numbers: Numbers, variant: str) -> str:
-    return f"The springs share a plate: {sized(*numbers['plate_coupling_w_per_k'], 'mW/K', 1e3)} from each to it."
-
-
 EFFECT = Effect(
     "plate_conduction",
     _candidates,
     Steady("plate_coupling_w_per_k", 0.0, 0.05, {"plate_loss_w_per_k": 0.01}),
-    says=_says,
+    says=says("The springs share a plate: {} from each to it.", "plate_coupling_w_per_k", "mW/K", 1e3),
 )

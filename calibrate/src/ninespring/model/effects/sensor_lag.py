@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from .effect import Candidate, Effect, Numbers, Scene, positive, sized
+from .effect import Candidate, Effect, Scene, positive, says
 
 
 def _candidates(scene: Scene) -> Iterator[Candidate]:
@@ -16,8 +16,4 @@ def _candidates(scene: Scene) -> Iterator[Candidate]:
     )
 
 
-def _says(numbers: Numbers, variant: str) -> str:
-    return f"The thermometers lag {sized(*numbers['sensor_lag_s'], 's')}."
-
-
-EFFECT = Effect("sensor_lag", _candidates, says=_says)
+EFFECT = Effect("sensor_lag", _candidates, says=says("The thermometers lag {}.", "sensor_lag_s", "s"))

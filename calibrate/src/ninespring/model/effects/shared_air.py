@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from .effect import Candidate, Effect, Numbers, Scene, Steady, positive, sized
+from .effect import Candidate, Effect, Scene, Steady, positive, says
 
 
 def _candidates(scene: Scene) -> Iterator[Candidate]:
@@ -21,10 +21,6 @@ def _candidates(scene: Scene) -> Iterator[Candidate]:
     )
 
 
-def _says(numbers: Numbers, variant: str) -> str:
-    return f"The air between the springs warms: {sized(*numbers['air_exchange_w_per_k'], 'mW/K', 1e3)} to the room."
-
-
 EFFECT = Effect(
     "shared_air",
     _candidates,
@@ -34,5 +30,5 @@ EFFECT = Effect(
         10.0,
         against="a fan flushes the air between the springs, yet the error is as large with the fan as without",
     ),
-    says=_says,
+    says=says("The air between the springs warms: {} to the room.", "air_exchange_w_per_k", "mW/K", 1e3),
 )

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from .effect import Candidate, Effect, Numbers, Scene, linear, sized
+from .effect import Candidate, Effect, Scene, linear, says
 
 
 def _candidates(scene: Scene) -> Iterator[Candidate]:
@@ -22,8 +22,8 @@ def _candidates(scene: Scene) -> Iterator[Candidate]:
         )
 
 
-def _says(numbers: Numbers, variant: str) -> str:
-    return f"The supply sags under load: {sized(*numbers['supply_resistance_ohm'], 'ohm')} in front of {variant}."
-
-
-EFFECT = Effect("supply_sag", _candidates, says=_says)
+EFFECT = Effect(
+    "supply_sag",
+    _candidates,
+    says=says("The supply sags under load: {} in front of {variant}.", "supply_resistance_ohm", "ohm"),
+)
