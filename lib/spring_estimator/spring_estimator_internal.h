@@ -11,7 +11,7 @@
 #define COEFFICIENT_MOST_PER_K      0.0015f
 #define COEFFICIENT_MOST_PER_HEAT_K (COEFFICIENT_MOST_PER_K / 0.85f)
 
-/* And the least; learnt with what noise and offset add over 20 K. */
+/* And the least; learnt with what noise and offset add. */
 #define COEFFICIENT_IN_PRINT_PER_K   (-0.0003f)
 #define COEFFICIENT_LEAST_PER_K      (COEFFICIENT_IN_PRINT_PER_K - 0.00025f)
 #define COEFFICIENT_LEAST_PER_HEAT_K (COEFFICIENT_IN_PRINT_PER_K / 0.85f)

@@ -18,7 +18,6 @@
  * coefficient in print over 68 K: 0.81 to 1.53. */
 #define UNLIKE_LEAST 0.75f
 #define UNLIKE_MOST  1.6f
-#define COLD_SPAN_K  20.0f /* least, over which a coefficient is learnt */
 
 void spring_estimator_begin_heating(spring_estimator_t *e, const thermal_model_t *model, uint8_t k)
 {
@@ -59,7 +58,7 @@ static void see_onset(spring_estimator_t *e, spring_belief_t *b, thermal_model_t
     }
     if (b->possible == SPRING_PHASE_MARTENSITE) {
         spring_learnt_t *l = &b->learnt;
-        if (b->run.heat.cold_ohm > 0.0f && now_c > b->run.heat.cold_c + COLD_SPAN_K) {
+        if (b->run.heat.cold_ohm > 0.0f && now_c > b->run.heat.cold_c) {
             const float ohm_per_k =
                 (b->run.heat.onset_ohm - b->run.heat.cold_ohm) / (now_c - b->run.heat.cold_c);
             const float martensite_ohm =

@@ -376,8 +376,7 @@ static void heating_that_cannot_be_compared_is_marked_anew(void)
 }
 
 /* Martensite's onset is seen at austenite start and 2 K, or as far on as it took up heat; more than
- * 2.6 sd below, it was a contact's. What led there over 20 K is its coefficient, as any metal has.
- */
+ * 2.6 sd below, it was a contact's. What led there is its coefficient, as any metal has. */
 static void onset_puts_it_at_its_start_and_teaches_its_martensite(void)
 {
     static const struct {
