@@ -25,10 +25,8 @@ void spring_estimator_begin_heating(spring_estimator_t *e, const thermal_model_t
     if (b->possible == SPRING_PHASE_AUSTENITE) {
         b->possible = SPRING_PHASE_BETWEEN | SPRING_PHASE_AUSTENITE;
     }
-    const float coldest_c =
-        spring_now_c(model, k) - SPRING_ESTIMATOR_BOUND_SDS * spring_estimator_sd_k(b);
     b->run.heat = (spring_heat_t){
-        .begun_c = fmaxf(coldest_c, spring_ambient_c(model)),
+        .begun_c = spring_now_c(model, k) - SPRING_ESTIMATOR_BOUND_SDS * spring_estimator_sd_k(b),
     };
     b->onset = b->steep = b->unlike = false;
     b->heating = true;
