@@ -62,7 +62,6 @@ typedef struct {
     float peak_k;   /* the most of it */
     float mark_k;   /* where the resistance was last compared, and what it was */
     float mark_ohm; /* 0: nowhere yet */
-    float mark_a;   /* at this current */
     float onset_ohm;
     float onset_k;  /* heat taken up until then; until it is seen, until its change began */
     float cold_ohm; /* at its beginning, martensite; 0: it was not */

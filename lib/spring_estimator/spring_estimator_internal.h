@@ -21,9 +21,6 @@
 /* The same on the way down to a hold, where what noise and steps do at more is counted. */
 #define WEAK_A 0.6f
 
-/* Currents that differ by less of them show a sensor's offset, and its noise, alike. */
-#define SAME_CURRENT 0.1f
-
 #define SURE_SDS 5.0f /* what noise never does in months */
 
 #define UNIFORM_SD 0.29f /* of a width that is evenly filled: 1 / sqrt(12) */

@@ -164,15 +164,10 @@ static bool is_over(const spring_belief_t *b, float unseen_k)
 }
 
 /* What no temperature coefficient in print makes of a change over step_k of heat. */
-static float unexplained(const spring_belief_t *b, float change, float step_k)
+static float unexplained(float change, float step_k)
 {
-    const spring_heat_t *heat = &b->run.heat;
-    float offset = 0.0f;
-    if (fabsf(b->current_a - heat->mark_a) > SAME_CURRENT * b->current_a) {
-        offset = spring_offset_may_show(b, b->ohm, heat->mark_a, b->current_a);
-    }
-    const float more = change - (COEFFICIENT_MOST_PER_HEAT_K * step_k + offset);
-    const float less = change - (COEFFICIENT_LEAST_PER_HEAT_K * step_k - offset);
+    const float more = change - COEFFICIENT_MOST_PER_HEAT_K * step_k;
+    const float less = change - COEFFICIENT_LEAST_PER_HEAT_K * step_k;
     return more > 0.0f ? more : less < 0.0f ? less : 0.0f;
 }
 
@@ -202,7 +197,6 @@ void spring_heating_watch(spring_estimator_t *e, spring_belief_t *b, thermal_mod
     b->run.heat.peak_k = b->run.heat.heat_k;
     if (b->run.heat.mark_ohm == 0.0f) {
         b->run.heat.mark_ohm = b->ohm;
-        b->run.heat.mark_a = b->current_a;
         b->run.heat.mark_k = b->run.heat.heat_k;
         return;
     }
@@ -211,7 +205,7 @@ void spring_heating_watch(spring_estimator_t *e, spring_belief_t *b, thermal_mod
         return;
     }
     const float change = b->ohm / b->run.heat.mark_ohm - 1.0f;
-    const float excess = unexplained(b, change, step_k);
+    const float excess = unexplained(change, step_k);
     /* a spring whose change is known changes that way */
     const bool against = b->learnt.austenite_ohm > 0.0f && excess * b->learnt.change < 0.0f;
     if (!b->onset && (against || excess * b->run.heat.excess <= 0.0f)) {
@@ -247,6 +241,5 @@ void spring_heating_watch(spring_estimator_t *e, spring_belief_t *b, thermal_mod
         }
     }
     b->run.heat.mark_ohm = b->ohm;
-    b->run.heat.mark_a = b->current_a;
     b->run.heat.mark_k = b->run.heat.heat_k;
 }
