@@ -7,8 +7,7 @@
 #define STEP_PER_NOISE 1600.0f /* so that a slope's noise is half of the largest coefficient */
 #define EXCESS_SEEN    0.01f   /* a change that no coefficient explains, and that is no noise */
 #define EXCESS_SDS     4.0f
-#define CHANGE_LEAST   0.03f /* of a whole transformation, else it is none */
-#define FLAT_K         4.0f  /* of heat without a change: it is over */
+#define FLAT_K         4.0f /* of heat without a change: it is over */
 /* The last of a cosine is flatter than the largest coefficient, the longer the less it changes:
  * 2 (0.0015 / 0.85) H^2 / pi^2, H = 47 K of heat from its start to its finish. */
 #define FLAT_CHANGE_K  0.8f
@@ -154,13 +153,12 @@ static bool may_transform(const spring_belief_t *b, const thermal_model_t *model
 }
 
 /* It changes no more, in more heat than the last of its change may hide in; and what it changed by
- * since its onset was no contact's step: it went on, as only a transformation does, by no less than
- * any. */
+ * since its onset was no contact's step: it went on, as only a transformation does, and shows. */
 static bool is_over(const spring_belief_t *b, float unseen_k)
 {
     const bool grown = b->run.heat.cold_ohm == 0.0f || fabsf(b->run.heat.excess) > EXCESS_SEEN;
     return b->run.heat.flat_k >= FLAT_K + unseen_k && grown &&
-           fabsf(b->ohm / b->run.heat.onset_ohm - 1.0f) > CHANGE_LEAST;
+           fabsf(b->ohm / b->run.heat.onset_ohm - 1.0f) > EXCESS_SEEN;
 }
 
 /* What no temperature coefficient in print makes of a change over step_k of heat. */
