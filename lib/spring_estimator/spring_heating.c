@@ -2,8 +2,7 @@
 
 #include "spring_estimator_internal.h"
 
-#define STEP_LEAST_K   2.0f /* of heat between two comparisons */
-#define STEP_MOST_K    15.0f
+#define STEP_LEAST_K   2.0f    /* of heat between two comparisons */
 #define STEP_PER_NOISE 1600.0f /* so that a slope's noise is half of the largest coefficient */
 #define EXCESS_SEEN    0.01f   /* a change that no coefficient explains, and that is no noise */
 #define EXCESS_SDS     4.0f
@@ -199,7 +198,7 @@ void spring_heating_watch(spring_estimator_t *e, spring_belief_t *b, thermal_mod
         return;
     }
     const float step_k = b->run.heat.heat_k - b->run.heat.mark_k;
-    if (step_k < fminf(fmaxf(STEP_LEAST_K, STEP_PER_NOISE * b->noise), STEP_MOST_K)) {
+    if (step_k < fmaxf(STEP_LEAST_K, STEP_PER_NOISE * b->noise)) {
         return;
     }
     const float change = b->ohm / b->run.heat.mark_ohm - 1.0f;
