@@ -6,7 +6,7 @@
 #include "derating.h"
 #include "invariant.h"
 
-#define TURNS_PER_S SPRING_AWAY_TURNS_PER_S
+#define TURNS_PER_S SPRING_SIGHTS_TURNS_PER_S
 #define TURN_S      SPRING_ESTIMATOR_TURN_S
 
 /* A spring counts as wanted fully on from here: the last percent of a transformation has no level.
@@ -33,8 +33,6 @@
 #define LOOK_MA             2000u /* of a spring of which much was learnt and nothing is known */
 #define LOWER_MA            800u  /* the least at which a resistance tells the phase */
 #define RISE_SHARE          0.25f /* of a turn in the average */
-
-#define THERE 0.95f
 
 #define WALK_MA     20                                 /* a tick, after a change of policy */
 #define WALK_TURNS  (2u * SPRING_ESTIMATOR_ROUND + 1u) /* every spring has had two */
@@ -434,7 +432,7 @@ static void watch_away(drive_policy_t *policy, const drive_policy_input_t *in, u
 {
     drive_policy_spring_t *s = &policy->spring[k];
     const float level = is_full(level_permille) ? 1.0f : 0.001f * (float)level_permille;
-    const float band = 1.0f - THERE + (is_full(level_permille) ? 0.0f : LEVEL_BAND);
+    const float band = is_full(level_permille) ? LEVEL_BAND : 2.0f * LEVEL_BAND;
     const spring_belief_t *b = belief_of(in, k);
     const bool there = s->stage == DRIVE_POLICY_STAGE_HOLD && spring_estimator_knows(b) &&
                        fabsf(phase_of(in, k) - level) < band;

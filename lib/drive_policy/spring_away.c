@@ -1,12 +1,14 @@
 #include "spring_away.h"
 
+#include "spring_sights.h"
+
 /* What is promised is 90 and 20 s. */
-#define FIRST_TURNS (85u * SPRING_AWAY_TURNS_PER_S)
-#define LEFT_TURNS  (15u * SPRING_AWAY_TURNS_PER_S)
+#define FIRST_TURNS (85u * SPRING_SIGHTS_TURNS_PER_S)
+#define LEFT_TURNS  (15u * SPRING_SIGHTS_TURNS_PER_S)
 
 #define TRIES     4u
-#define TRY_TURNS (600u * SPRING_AWAY_TURNS_PER_S) /* that one counts, while it is away */
-#define FORGIVES  (TRY_TURNS / LEFT_TURNS)         /* a turn in which it is there */
+#define TRY_TURNS (600u * SPRING_SIGHTS_TURNS_PER_S) /* that one counts, while it is away */
+#define FORGIVES  (TRY_TURNS / LEFT_TURNS)           /* a turn in which it is there */
 
 void spring_away_turn(spring_away_t *away, bool there)
 {

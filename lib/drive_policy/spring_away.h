@@ -12,8 +12,6 @@
 extern "C" {
 #endif
 
-#define SPRING_AWAY_TURNS_PER_S 4u
-
 /* Zero: nothing was asked of it yet. */
 typedef struct {
     uint16_t turns; /* since it was asked for; ahead by FIRST - LEFT once it was there */

@@ -553,8 +553,8 @@ static bool reads_austenite(const spring_belief_t *b, const thermal_model_t *mod
     const spring_learnt_t *l = &b->learnt;
     const thermal_model_transformation_t t = thermal_model_transformation(model, k);
     const int16_t now_c7 = thermal_model_temperature_c7(model, k);
-    if (!spring_estimator_sees(b) || l->austenite_ohm == 0.0f || b->unsteady != 0 ||
-        b->current_a < STRONG_A || b->ohm_before[1] == 0.0f || now_c7 < t.austenite_start_c7) {
+    if (!spring_estimator_sees(b) || l->austenite_ohm == 0.0f || b->current_a < STRONG_A ||
+        b->ohm_before[1] == 0.0f || now_c7 < t.austenite_start_c7) {
         return false;
     }
     const float more = 0.5f * (b->ohm_before[0] + b->ohm_before[1]) / l->austenite_ohm - 1.0f;

@@ -19,8 +19,9 @@
 extern "C" {
 #endif
 
-#define SPRING_ESTIMATOR_MAX_SPRINGS  THERMAL_MODEL_MAX_SPRINGS
-#define SPRING_ESTIMATOR_TURN_S       0.25f  /* between two updates of a spring */
+#define SPRING_ESTIMATOR_MAX_SPRINGS THERMAL_MODEL_MAX_SPRINGS
+/* between two updates of a spring */
+#define SPRING_ESTIMATOR_TURN_S       (1.0f / SPRING_SIGHTS_TURNS_PER_S)
 #define SPRING_ESTIMATOR_HOTTEST_C    120.0f /* that a spring may be when the power comes on */
 #define SPRING_ESTIMATOR_REST_TURNS   40u    /* 10 s: the average of the readings has settled */
 #define SPRING_ESTIMATOR_BOUND_SDS    2.6f  /* standard deviations: 99 % of a normal distribution */
@@ -61,7 +62,6 @@ typedef struct {
     float peak_k;   /* the most of it */
     float mark_k;   /* where the resistance was last compared, and what it was */
     float mark_ohm; /* 0: nowhere yet */
-    float mark_a;   /* at this current */
     float onset_ohm;
     float onset_k;  /* heat taken up until then; until it is seen, until its change began */
     float cold_ohm; /* at its beginning, martensite; 0: it was not */

@@ -11,7 +11,7 @@
 #define COEFFICIENT_MOST_PER_K      0.0015f
 #define COEFFICIENT_MOST_PER_HEAT_K (COEFFICIENT_MOST_PER_K / 0.85f)
 
-/* And the least; learnt with what noise and offset add over 20 K. */
+/* And the least; learnt with what noise and offset add. */
 #define COEFFICIENT_IN_PRINT_PER_K   (-0.0003f)
 #define COEFFICIENT_LEAST_PER_K      (COEFFICIENT_IN_PRINT_PER_K - 0.00025f)
 #define COEFFICIENT_LEAST_PER_HEAT_K (COEFFICIENT_IN_PRINT_PER_K / 0.85f)
@@ -20,9 +20,6 @@
 #define STRONG_A 0.8f
 /* The same on the way down to a hold, where what noise and steps do at more is counted. */
 #define WEAK_A 0.6f
-
-/* Currents that differ by less of them show a sensor's offset, and its noise, alike. */
-#define SAME_CURRENT 0.1f
 
 #define SURE_SDS 5.0f /* what noise never does in months */
 

@@ -2,13 +2,11 @@
 
 #include "spring_estimator_internal.h"
 
-#define STEP_LEAST_K   2.0f /* of heat between two comparisons */
-#define STEP_MOST_K    15.0f
+#define STEP_LEAST_K   2.0f    /* of heat between two comparisons */
 #define STEP_PER_NOISE 1600.0f /* so that a slope's noise is half of the largest coefficient */
 #define EXCESS_SEEN    0.01f   /* a change that no coefficient explains, and that is no noise */
 #define EXCESS_SDS     4.0f
-#define CHANGE_LEAST   0.03f /* of a whole transformation, else it is none */
-#define FLAT_K         4.0f  /* of heat without a change: it is over */
+#define FLAT_K         4.0f /* of heat without a change: it is over */
 /* The last of a cosine is flatter than the largest coefficient, the longer the less it changes:
  * 2 (0.0015 / 0.85) H^2 / pi^2, H = 47 K of heat from its start to its finish. */
 #define FLAT_CHANGE_K  0.8f
@@ -18,7 +16,6 @@
  * coefficient in print over 68 K: 0.81 to 1.53. */
 #define UNLIKE_LEAST 0.75f
 #define UNLIKE_MOST  1.6f
-#define COLD_SPAN_K  20.0f /* least, over which a coefficient is learnt */
 
 void spring_estimator_begin_heating(spring_estimator_t *e, const thermal_model_t *model, uint8_t k)
 {
@@ -26,10 +23,8 @@ void spring_estimator_begin_heating(spring_estimator_t *e, const thermal_model_t
     if (b->possible == SPRING_PHASE_AUSTENITE) {
         b->possible = SPRING_PHASE_BETWEEN | SPRING_PHASE_AUSTENITE;
     }
-    const float coldest_c =
-        spring_now_c(model, k) - SPRING_ESTIMATOR_BOUND_SDS * spring_estimator_sd_k(b);
     b->run.heat = (spring_heat_t){
-        .begun_c = fmaxf(coldest_c, spring_ambient_c(model)),
+        .begun_c = spring_now_c(model, k) - SPRING_ESTIMATOR_BOUND_SDS * spring_estimator_sd_k(b),
     };
     b->onset = b->steep = b->unlike = false;
     b->heating = true;
@@ -59,7 +54,7 @@ static void see_onset(spring_estimator_t *e, spring_belief_t *b, thermal_model_t
     }
     if (b->possible == SPRING_PHASE_MARTENSITE) {
         spring_learnt_t *l = &b->learnt;
-        if (b->run.heat.cold_ohm > 0.0f && now_c > b->run.heat.cold_c + COLD_SPAN_K) {
+        if (b->run.heat.cold_ohm > 0.0f && now_c > b->run.heat.cold_c) {
             const float ohm_per_k =
                 (b->run.heat.onset_ohm - b->run.heat.cold_ohm) / (now_c - b->run.heat.cold_c);
             const float martensite_ohm =
@@ -157,25 +152,19 @@ static bool may_transform(const spring_belief_t *b, const thermal_model_t *model
 }
 
 /* It changes no more, in more heat than the last of its change may hide in; and what it changed by
- * since its onset was no contact's step: it went on, as only a transformation does, by no less than
- * any. */
+ * since its onset was no contact's step: it went on, as only a transformation does, and shows. */
 static bool is_over(const spring_belief_t *b, float unseen_k)
 {
     const bool grown = b->run.heat.cold_ohm == 0.0f || fabsf(b->run.heat.excess) > EXCESS_SEEN;
     return b->run.heat.flat_k >= FLAT_K + unseen_k && grown &&
-           fabsf(b->ohm / b->run.heat.onset_ohm - 1.0f) > CHANGE_LEAST;
+           fabsf(b->ohm / b->run.heat.onset_ohm - 1.0f) > EXCESS_SEEN;
 }
 
 /* What no temperature coefficient in print makes of a change over step_k of heat. */
-static float unexplained(const spring_belief_t *b, float change, float step_k)
+static float unexplained(float change, float step_k)
 {
-    const spring_heat_t *heat = &b->run.heat;
-    float offset = 0.0f;
-    if (fabsf(b->current_a - heat->mark_a) > SAME_CURRENT * b->current_a) {
-        offset = spring_offset_may_show(b, b->ohm, heat->mark_a, b->current_a);
-    }
-    const float more = change - (COEFFICIENT_MOST_PER_HEAT_K * step_k + offset);
-    const float less = change - (COEFFICIENT_LEAST_PER_HEAT_K * step_k - offset);
+    const float more = change - COEFFICIENT_MOST_PER_HEAT_K * step_k;
+    const float less = change - COEFFICIENT_LEAST_PER_HEAT_K * step_k;
     return more > 0.0f ? more : less < 0.0f ? less : 0.0f;
 }
 
@@ -205,16 +194,15 @@ void spring_heating_watch(spring_estimator_t *e, spring_belief_t *b, thermal_mod
     b->run.heat.peak_k = b->run.heat.heat_k;
     if (b->run.heat.mark_ohm == 0.0f) {
         b->run.heat.mark_ohm = b->ohm;
-        b->run.heat.mark_a = b->current_a;
         b->run.heat.mark_k = b->run.heat.heat_k;
         return;
     }
     const float step_k = b->run.heat.heat_k - b->run.heat.mark_k;
-    if (step_k < fminf(fmaxf(STEP_LEAST_K, STEP_PER_NOISE * b->noise), STEP_MOST_K)) {
+    if (step_k < fmaxf(STEP_LEAST_K, STEP_PER_NOISE * b->noise)) {
         return;
     }
     const float change = b->ohm / b->run.heat.mark_ohm - 1.0f;
-    const float excess = unexplained(b, change, step_k);
+    const float excess = unexplained(change, step_k);
     /* a spring whose change is known changes that way */
     const bool against = b->learnt.austenite_ohm > 0.0f && excess * b->learnt.change < 0.0f;
     if (!b->onset && (against || excess * b->run.heat.excess <= 0.0f)) {
@@ -250,6 +238,5 @@ void spring_heating_watch(spring_estimator_t *e, spring_belief_t *b, thermal_mod
         }
     }
     b->run.heat.mark_ohm = b->ohm;
-    b->run.heat.mark_a = b->current_a;
     b->run.heat.mark_k = b->run.heat.heat_k;
 }

@@ -8,6 +8,7 @@
 #define NOISE_MOST     0.05f
 #define NOISE_SHARE    0.06f
 #define BEND_TO_SD     0.512f /* mean size of a second difference: 1 / (sqrt(6) sqrt(2 / pi)) */
+#define SAME_CURRENT   0.1f /* currents that differ by less of them show a sensor's offset alike */
 /* Of a resistance in a turn. */
 #define JUMP_OF_HOLD 0.01f /* 0.4 W change 1 % of the phase, 0.3 % of it */
 #define JUMP_ON_WAY  0.03f /* 20 K since it was read, by the largest coefficient */
