@@ -53,7 +53,7 @@ GUARDED = {
     ("__fp_splitA", "__fp_splitA"),
 }
 # The same of a routine that is entered by either label: it jumps back behind the call, never to it.
-ENTERED_BY_BOTH = {("__mulsf3", "__mulsf3x")}
+ENTERED_BY_BOTH = {("__mulsf3", "__mulsf3x"), ("__addsf3", "__addsf3x")}
 
 
 @dataclass
@@ -175,7 +175,7 @@ def _deepest(nodes: dict[str, Node], start: str) -> tuple[int, list[str]]:
         node = nodes.get(name, Node(name))
         path.append(name)
         best: tuple[int, list[str]] = (0, [])
-        for callee in node.calls:
+        for callee in sorted(node.calls):
             if (name, callee) in GUARDED:
                 best = max(best, (nodes[callee].own + RETURN_ADDRESS, [callee]))
                 continue
@@ -185,7 +185,7 @@ def _deepest(nodes: dict[str, Node], start: str) -> tuple[int, list[str]]:
                 raise ValueError(f"recursion: {' > '.join(path)} > {callee}: its stack has no bound")
             depth, way = visit(callee)
             best = max(best, (depth + RETURN_ADDRESS, way))
-        for target in node.jumps:
+        for target in sorted(node.jumps):
             if target not in path:  # a loop through a label of its own holds nothing more
                 best = max(best, visit(target))
         path.pop()
