@@ -373,8 +373,8 @@ def _foretelling(
 ) -> tuple[_Case, search.Search, unseen.Unseen]:
     """Search by what has a name and is the same in all runs; where that leaves something, by all there is.
 
-    What is of one day, or has no name, bends as it likes: it is the better account only where a run that was left out is not
-    foretold better without it.
+    What is of one day bends as it likes: it is the better account only where a run that was left out is not foretold better
+    without it. (A cause without a name is in no model: what it leaves in such a run speaks for no stand-in.)
     """
 
     def account(alike: bool, fits: Mapping[Any, Fit] | None = None) -> tuple[_Case, search.Search, unseen.Unseen]:
@@ -390,15 +390,14 @@ def _foretelling(
         return same
     progress("what is of one day, or has no name")
     found = account(False, same[0].fits)
-    bends = found[0].hidden or set(found[0].adopted) & set(unseen.OF_THAT_DAY)
+    bends = not found[0].hidden and set(found[0].adopted) & set(unseen.OF_THAT_DAY)
     instead = set(same[0].adopted) - set(found[0].adopted)
     return same if bends and instead and _off(*same) * unseen.WORSE < _off(*found) else found
 
 
 def _off(case: _Case, judge: search.Search, judged_by: unseen.Unseen) -> float:
     """Return the error, degC rms, by which an account foretells runs left out, without what no other run tells."""
-    fit = judged_by.carried(case.final, judge.reduced)
-    return judged_by.own(unseen.pinned(fit) if case.hidden else fit)
+    return judged_by.own(judged_by.carried(case.final, judge.reduced))
 
 
 def _searched(
