@@ -67,15 +67,21 @@ def random_steps(rng: np.random.Generator, rows: int, which: tuple[int, ...]) ->
     return out
 
 
+def wandering(rng: np.random.Generator, rows: int, size: float, lasts_s: float, columns: int) -> np.ndarray:
+    """Return what wanders about zero and remembers, (rows, columns) of a second each; `size` is its rms."""
+    keep = np.exp(-1.0 / lasts_s)
+    out = np.empty((rows, columns))
+    now = rng.normal(0.0, size, columns)
+    for n in range(rows):
+        now = keep * now + np.sqrt(1.0 - keep**2) * rng.normal(0.0, size, columns)
+        out[n] = now
+    return out
+
+
 def _walk(rng: np.random.Generator, steps: int, board: Board) -> np.ndarray:
     """Return two heat flows (steps, 2) about zero, in parts of the usual heat: each wanders, remembers, and flickers."""
-    keep = np.exp(-1.0 / board.wander_s)
     seconds = -(-steps // round(1.0 / STEP_S))
-    slow = np.zeros((seconds, HEATERS))
-    now = rng.normal(0.0, board.wander, HEATERS)
-    for n in range(seconds):
-        now = keep * now + np.sqrt(1.0 - keep**2) * rng.normal(0.0, board.wander, HEATERS)
-        slow[n] = now
+    slow = wandering(rng, seconds, board.wander, board.wander_s, HEATERS)
     slow += rng.normal(0.0, board.flicker, slow.shape)
     return np.repeat(slow, round(1.0 / STEP_S), axis=0)[:steps]
 

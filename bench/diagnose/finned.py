@@ -10,9 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from boards import HEATERS, wandering
 
 STEP_S = 0.25
-HEATERS = 2
 WARM = 0.2
 """Of the runs, those that begin warm."""
 EXPONENT = 1.25
@@ -72,17 +72,6 @@ def random_steps(rng: np.random.Generator, rows: int, which: tuple[int, ...]) ->
         while at < rows:
             out[at:, k] = rng.choice([0.0, 0.2, 0.4, 0.5, 0.7, 0.8, 1.0])
             at += int(rng.integers(100, 500))
-    return out
-
-
-def wandering(rng: np.random.Generator, rows: int, size: float, lasts_s: float, columns: int) -> np.ndarray:
-    """Return what wanders about zero, (rows, columns) of a second each."""
-    keep = np.exp(-1.0 / lasts_s)
-    out = np.empty((rows, columns))
-    now = rng.normal(0.0, size, columns)
-    for n in range(rows):
-        now = keep * now + np.sqrt(1.0 - keep**2) * rng.normal(0.0, size, columns)
-        out[n] = now
     return out
 
 

@@ -74,6 +74,15 @@ def declared() -> Model:
     return model
 
 
+def baseline(runs: list[Run], given: Model, error: Callable[[Model], float]) -> float:
+    """Return the error of the better of two models fitted to runs: the given one, and that with a lag."""
+    array = Array(1, boards.HEATERS)
+    fits = [
+        diagnosis.fit_effects(array, runs, wanted, declared=given.parameters)[:2] for wanted in ([], ["sensor_lag"])
+    ]
+    return min(error(model_of(problem, fit, runs)) for problem, fit in fits)
+
+
 def set_of(seed: int, part: int, wander: float, board: boards.Board | None = None) -> tuple[list[Run], Run, float]:
     """Return three runs of a board (each heater, both), another of both, and the true model's own error of that."""
     rng = np.random.default_rng([seed, part])
@@ -119,19 +128,13 @@ def finned(seed: int) -> dict[str, Any]:
     def error(model: Model) -> float:
         return float(np.sqrt(np.mean([off(run, predict(model, run)) ** 2 for run in runs[3:]])))
 
-    found = diagnosis.diagnose(Array(1, fins.HEATERS), runs[:3], model=declared())
-    baselines = []
-    for effects in ([], ["sensor_lag"]):
-        problem, fit, _ = diagnosis.fit_effects(
-            Array(1, fins.HEATERS), runs[:3], effects, declared=declared().parameters
-        )
-        baselines.append(error(model_of(problem, fit, runs[:3])))
+    found = diagnosis.diagnose(Array(1, boards.HEATERS), runs[:3], model=declared())
     return {
         "part": "finned",
         "seed": seed,
         "names": [one["name"] for one in found.result["effects"]],
         "error": error(found.model),
-        "baseline": min(baselines),
+        "baseline": baseline(runs[:3], declared(), error),
         "true_model": float(np.sqrt(np.mean([off(r, s) ** 2 for r, s in zip(runs[3:], usual[3:], strict=True)]))),
     }
 
@@ -161,19 +164,17 @@ def halves(number: int) -> dict[str, Any]:
         path.write_text(importing.import_table(data() / file, mapping))
         run = read_log(path, boards.HEATERS)
     first, second = part_of(run, 0.0, 0.5), part_of(run, 0.5, 1.0)
+
+    def error(model: Model) -> float:
+        return off(second, predict(model, second))
+
     found = diagnosis.diagnose(Array(1, boards.HEATERS), [first], model=textbook())
-    baselines = []
-    for effects in ([], ["sensor_lag"]):
-        problem, fit, _ = diagnosis.fit_effects(
-            Array(1, boards.HEATERS), [first], effects, declared=textbook().parameters
-        )
-        baselines.append(off(second, predict(model_of(problem, fit, [first]), second)))
     return {
         "part": "halves",
         "name": name,
         "names": [one["name"] for one in found.result["effects"]],
-        "error": off(second, predict(found.model, second)),
-        "baseline": min(baselines),
+        "error": error(found.model),
+        "baseline": baseline([first], textbook(), error),
     }
 
 
