@@ -89,8 +89,7 @@ def test_every_result_is_held_to_its_schema(make_log, tmp_path: Path) -> None:
         '[columns]\ntime_s = "time_s"\n' + "".join(f'i{k}_a = "i{k}_a"\nt{k}_c = "t{k}_c"\n' for k in range(1, 10))
     )
     model = tmp_path / "m.toml"
-    schema = json.loads((Path(results.__file__).parents[1] / "results.schema.json").read_text())
-    published = jsonschema.Draft202012Validator(schema)
+    published = jsonschema.Draft202012Validator(json.loads(results.schema("results")))
     commands = {
         "fit": (log, "-o", model),
         "predict": ("--model", model, log, "-o", tmp_path / "p.csv"),
@@ -242,7 +241,7 @@ def test_files_are_written_together_or_not_at_all(tmp_path: Path) -> None:
 def test_help_says_what_it_does_with_an_example(command: str) -> None:
     text = CliRunner().invoke(cli.cli, [command, "--help"]).output
     assert f"ninespring {command} " in text.partition("Example")[2]
-    assert "  -o, --output" in text or command in ("upload", "monitor", "dashboard", "console", "verify")
+    assert "  -o, --output" in text or command in ("upload", "monitor", "dashboard", "console", "verify", "schema")
     for line in re.findall(r"^  (?:-\w, )?--.*(?:\n {10,}.*)*", text, re.MULTILINE):
         assert re.search(r"  +\S.*\w", line.lstrip().partition("  ")[1] + line.lstrip().partition("  ")[2]), line
 

@@ -28,6 +28,7 @@ COMMANDS = {
     "couplings": "couplings",
     "sweep": "sweep",
     "scenario": "scenario",
+    "schema": "schema",
     "dashboard": "dashboard",
     "calibrate": "calibrate",
     "bringup": "bringup",

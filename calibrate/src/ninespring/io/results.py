@@ -1,7 +1,6 @@
 """What commands find, as --json and diagnosis.json have it: fields, units, ranges.
 
-A result is built of these, and what is written is held to them. The published schemas, `results.schema.json` and
-`diagnosis.schema.json`, are made of them (`script/schemas`).
+A result is built of these, and what is written is held to them. `ninespring schema` prints the JSON Schemas that are made of them.
 """
 
 from __future__ import annotations
@@ -573,19 +572,16 @@ def read(kind: type[msgspec.Struct], data: bytes | Mapping[str, Any]) -> Any:
     return msgspec.json.decode(data, type=kind) if isinstance(data, bytes) else msgspec.convert(data, kind)
 
 
-def schemas() -> dict[str, str]:
-    """Return the published schemas, by file name."""
-    out = {}
-    for file, title, kinds in (
-        ("results.schema.json", "What --json writes (diagnose: diagnosis.schema.json)", COMMANDS),
-        ("diagnosis.schema.json", "diagnosis.json", DIAGNOSES),
-    ):
-        parts, named = msgspec.json.schema_components(kinds, ref_template="#/$defs/{name}")
-        schema = {
-            "$schema": "https://json-schema.org/draft/2020-12/schema",
-            "title": title,
-            "anyOf": list(parts),
-            "$defs": named,
-        }
-        out[file] = json.dumps(schema, indent=1) + "\n"
-    return out
+SCHEMAS: dict[str, tuple[str, tuple[type, ...]]] = {
+    "results": ("What --json writes (diagnose: the schema `diagnosis`)", COMMANDS),
+    "diagnosis": ("diagnosis.json", DIAGNOSES),
+}
+"""What there is a JSON Schema of: its title, and what it may be."""
+
+
+def schema(of: str) -> str:
+    """Return one of SCHEMAS as JSON text."""
+    title, kinds = SCHEMAS[of]
+    parts, named = msgspec.json.schema_components(kinds, ref_template="#/$defs/{name}")
+    head = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": title}
+    return json.dumps(head | {"anyOf": list(parts), "$defs": named}, indent=1) + "\n"
