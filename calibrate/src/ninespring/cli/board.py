@@ -17,10 +17,7 @@ from ..io.recording import record as record_board
 from ..io.tape import record_tape
 from ..io.thermometers import Thermometers
 from ..say.monitoring import Screen
-from .console import FILE, FORCE, JSON, PORT, Real, Whole, beside, command, err, out, two_ports, working, write
-
-HZ = Whole(ranges.RECORD_HZ)
-SECONDS = Real(ranges.RECORD_S)
+from .console import FILE, FORCE, JSON, PORT, beside, command, err, number, out, output, two_ports, working, write
 
 
 @command("""\b
@@ -34,11 +31,9 @@ steps.txt (console words; `at S =` waits until so many seconds after the first r
   at 600 = off all
 """)
 @PORT
-@click.option("-o", "--output", type=FILE, required=True, help="log to write; - is standard output")
-@click.option("--hz", type=HZ, default=1, show_default=True, help="rows a second")
-@click.option(
-    "--duration", type=SECONDS, default=900.0, show_default=True, help="s by the board's clock; Ctrl-C ends it earlier"
-)
+@output("log to write; - is standard output")
+@number("--hz", ranges.RECORD_HZ, "rows a second", 1)
+@number("--duration", ranges.RECORD_S, "s by the board's clock; Ctrl-C ends it earlier", 900.0)
 @click.option("--run", "script", type=FILE, help="console lines to send, one a line, each at its time")
 @click.option(
     "--tape",
@@ -84,9 +79,9 @@ def record(
             log = LogFile(output, force)
             got = Recording()
             try:
-                alarm = lambda fault: err.print(f"fault {fault}", style="bold red", markup=False)  # noqa: E731
+                alarm = lambda fault: err.print(f"fault {fault}", style="bold red")  # noqa: E731
                 tell = lambda rows, seconds: say(f"{rows} rows", seconds)  # noqa: E731
-                remark = lambda words: err.print(words, markup=False)  # noqa: E731
+                remark = lambda words: err.print(words)  # noqa: E731
                 if tape:
                     got.ended = record_tape(board, log, duration, steps, tell, about(port), remark)
                 else:
@@ -102,7 +97,7 @@ def record(
         lines = f", {got.dropped} corrupt lines dropped" if got.dropped else ""
         if got.offset_s is not None:
             lines += f"; the thermometers' clock was {got.offset_s:+.2f} s from the board's"
-        beside(output).print(f"{log.rows} rows -> {output}{lines}", markup=False)
+        beside(output).print(f"{log.rows} rows -> {output}{lines}")
     if got.ended:
         raise WorkError(f"{got.ended}; what came is in {output}")
 
@@ -115,7 +110,7 @@ Examples:
 @click.argument("settings", type=FILE, required=False)
 @PORT
 @click.option("--undo", is_flag=True, help="give the board back what it had before the last upload from this computer")
-@click.option("--save/--no-save", default=True, show_default=True, help="keep them in the EEPROM")
+@click.option("--save/--no-save", default=True, help="keep them in the EEPROM")
 @JSON
 def upload(settings: Path | None, port: str, undo: bool, save: bool, json_path: Path | None) -> None:
     """Send exported settings to a board, read them back, save them.
@@ -132,8 +127,8 @@ def upload(settings: Path | None, port: str, undo: bool, save: bool, json_path: 
             last = history.undo(board, save)
         write({json_path: results.checked(results.Upload(settings=len(last.sent), saved=save, undone=last.by))})
         for line in last.words(back=True):
-            out.print(line, markup=False)
-        out.print(f"`{last.by}` of {last.when} is taken back{', saved' if save else ''}", markup=False)
+            out.print(line)
+        out.print(f"`{last.by}` of {last.when} is taken back{', saved' if save else ''}")
         return
     lines = settings_lines(read_bytes(settings).decode("utf-8", "replace"), str(settings))
     with working("sending", len(lines)) as say:
@@ -147,12 +142,12 @@ Example:
   ninespring monitor --port /dev/ttyACM0
 """)
 @PORT
-@click.option("--hz", type=HZ, default=2, show_default=True, help="updates a second")
-@click.option("--duration", type=SECONDS, default=ranges.RECORD_S.high, help="s; Ctrl-C ends it")
-def monitor(port: str, hz: int, duration: float) -> None:
+@number("--hz", ranges.RECORD_HZ, "updates a second", 2)
+@number("--duration", ranges.RECORD_S, "s; left out: until Ctrl-C")
+def monitor(port: str, hz: int, duration: float | None) -> None:
     """Show a board's array as it is: per spring the model's temperature (degC) and its trend, current (A), limits."""
     with Board(port, off_at_end=False) as board:
-        until = time.monotonic() + duration
+        until = time.monotonic() + (duration or ranges.RECORD_S.high)
         try:
             screen = Screen(board.settings(), board.telemetry(hz))
             with Live(console=out, refresh_per_second=8) as live:

@@ -10,7 +10,7 @@ import click
 from ..errors import InputError, WorkError
 from ..io.board import Board
 from ..io.bringup import STEPS, converse
-from .console import FILE, PORT, command, out
+from .console import PORT, command, out, output
 
 
 @command("""\b
@@ -20,16 +20,9 @@ Examples:
   ninespring-sim board --without-springs --wiring addresses=3,4     # a board to try it at
 """)
 @PORT
-@click.option(
-    "-o",
-    "--output",
-    type=FILE,
-    default=Path("bringup.html"),
-    show_default=True,
-    help="page to write; beside it a .json, from which the next conversation goes on",
-)
+@output("page to write; beside it a .json, from which the next conversation goes on", default=Path("bringup.html"))
 @click.option("--again", metavar="STEP", help="from this step on, though it was right before")
-@click.option("--to", "last", metavar="STEP", default="springs", show_default=True, help="the last step")
+@click.option("--to", "last", metavar="STEP", default="springs", help="the last step")
 @click.option("--yes", is_flag=True, help="ask nothing: for scripts; what only a hand or an eye can tell is left out")
 def bringup(port: str, output: Path, again: str | None, last: str, yes: bool) -> None:
     """Bring up a new board in a conversation: what to do, what is measured, what is wrong and where, in the order of docs/building.md.
@@ -49,7 +42,7 @@ def bringup(port: str, output: Path, again: str | None, last: str, yes: bool) ->
             board,
             output,
             None if yes else hands,
-            lambda line: out.print(line, markup=False, highlight=False, soft_wrap=True),
+            lambda line: out.print(line, soft_wrap=True),
             again,
             last,
         )
@@ -60,4 +53,4 @@ def bringup(port: str, output: Path, again: str | None, last: str, yes: bool) ->
             )
     left = [one for one in STEPS if one not in done]
     next_one = f"; next: {STEPS[left[0]].title.lower()}" if left else ""
-    out.print(f"\n{len(done)} of {len(STEPS)} steps are right -> {output}{next_one}", markup=False)
+    out.print(f"\n{len(done)} of {len(STEPS)} steps are right -> {output}{next_one}")

@@ -20,7 +20,7 @@ from ..model.pattern import pattern_of
 from .calibration.chain import Calibration
 from .calibration.progress import FILE, Progress
 from .calibration.report import page
-from .console import ARRAY, JSON, Real, command, out, two_ports, write
+from .console import ARRAY, FOLDER, JSON, command, make_folder, number, out, output, two_ports, write
 
 FROM = {"duration": 900.0, "drive_for": 300.0, "current": 2.0, "supply": 14.0, "hottest": 105.0}
 """What is taken where nothing is said."""
@@ -41,21 +41,14 @@ Examples:
 @click.option(
     "--simulate", is_flag=True, help="a simulated board with thermometers, whose array nobody has told the chip"
 )
-@click.option(
-    "-o",
-    "--output",
-    type=click.Path(file_okay=False, path_type=Path),
-    default=Path("calibration"),
-    show_default=True,
-    help="folder for all that is measured and found; one that was begun is gone on with",
-)
+@output("folder for all that is measured and found; one that was begun is gone on with", FOLDER, Path("calibration"))
 @ARRAY
-@click.option("--duration", type=Real(ranges.PLAN_S), help="s, each of the two measured runs  [default: 900]")
-@click.option("--drive-for", type=Real(ranges.DRIVE_S), help="s, the drive before and the one after  [default: 300]")
+@number("--duration", ranges.PLAN_S, "s, each of the two measured runs  [default: 900]")
+@number("--drive-for", ranges.DRIVE_S, "s, the drive before and the one after  [default: 300]")
 @click.option("--pattern", help="what is driven before and after  [default: all but the middle, 111101111]")
-@click.option("--current", type=Real(ranges.PLAN_CURRENT_A), help="A, one spring at full level  [default: 2.0]")
-@click.option("--supply", type=Real(ranges.PLAN_SUPPLY_A), help="A, all springs together  [default: 14]")
-@click.option("--hottest", type=Real(ranges.PLAN_HOTTEST_C), help="degC, of any spring, as declared  [default: 105]")
+@number("--current", ranges.PLAN_CURRENT_A, "A, one spring at full level  [default: 2.0]")
+@number("--supply", ranges.PLAN_SUPPLY_A, "A, all springs together  [default: 14]")
+@number("--hottest", ranges.PLAN_HOTTEST_C, "degC, of any spring, as declared  [default: 105]")
 @click.option("--yes", is_flag=True, help="do not ask before heating and before writing: for scripts")
 @JSON
 def calibrate(
@@ -115,16 +108,13 @@ def calibrate(
         middle = "".join("1" if one else "0" for one in patterns(array.springs)[0])
         given = FROM | {"pattern": middle} | {name: value for name, value in given.items() if value is not None}
     progress = Progress(output, given)
-    try:
-        output.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"cannot be made a folder: {error.strerror}", output) from None
+    make_folder(output)
     if array_path and not begun:
         (output / ARRAY_FILE).write_text(array_path.read_text("utf-8"), "utf-8")
 
     def tell(step: str, text: str) -> None:
-        out.print(f"[bold]{step:>9}[/bold]  " if step else " " * 11, end="")
-        out.print(text, markup=False, soft_wrap=True)
+        out.print(f"{step:>9}  ", style="bold", end="")
+        out.print(text, soft_wrap=True)
 
     def ask(text: str) -> bool:
         return yes or click.confirm(text, default=False)
@@ -137,7 +127,7 @@ def calibrate(
     finally:
         if "diagnose" in progress.done:
             write_atomically({output / REPORT: page(progress, array)})
-            out.print(f"-> {output / REPORT}", soft_wrap=True, markup=False)
+            out.print(f"-> {output / REPORT}", soft_wrap=True)
         write({json_path: progress.text()})
 
 

@@ -27,9 +27,10 @@ WIDE = 160
 FEWEST_ROWS = 50
 """Logs with fewer rows than this, all together, are no measurement to fit to."""
 
-out = Console(highlight=False, width=None if sys.stdout.isatty() else WIDE)
-err = Console(stderr=True, highlight=False, width=None if sys.stderr.isatty() else WIDE)
+out = Console(markup=False, highlight=False, width=None if sys.stdout.isatty() else WIDE)
+err = Console(stderr=True, markup=False, highlight=False, width=None if sys.stderr.isatty() else WIDE)
 FILE = click.Path(dir_okay=False, path_type=Path)
+FOLDER = click.Path(file_okay=False, path_type=Path)
 JSON = click.option("--json", "json_path", type=FILE, help="write the result for programs")
 ARRAY = click.option(
     "--array", "array_path", type=FILE, help="array.toml; left out: a square (or 1 x 2) of the paper's spring"
@@ -37,6 +38,7 @@ ARRAY = click.option(
 MODEL = click.option("--model", "model_path", type=FILE, required=True, help="model.toml that fit or diagnose wrote")
 PORT = click.option("--port", required=True, help="serial port, e.g. /dev/ttyACM0; 115200 baud")
 FORCE = click.option("--force", is_flag=True, help="write over a file that is there, whatever it is")
+Decorator = Callable[[Callable[..., None]], Callable[..., None]]
 OUTPUTS = ("output", "json_path")
 """Parameters of commands that name files to write; every other path is an input."""
 
@@ -108,6 +110,16 @@ class Whole(click.IntRange):
         super().__init__(int(within.low), int(within.high))
 
 
+def number(name: str, within: Range, says: str, default: float | None = None) -> Decorator:
+    """Return an option that takes a number of a range."""
+    return click.option(name, type=Whole(within) if within.whole else Real(within), default=default, help=says)
+
+
+def output(says: str, kind: click.Path = FILE, default: Path | None = None) -> Decorator:
+    """Return the option that names what is written: a file, or a folder."""
+    return click.option("-o", "--output", type=kind, required=default is None, default=default, help=says)
+
+
 @contextmanager
 def working(text: str, total: float | None = None) -> Iterator[Callable[..., None]]:
     """Show that work goes on, on the terminal's error stream: say(words), say(words, done) with a total."""
@@ -127,6 +139,14 @@ def working(text: str, total: float | None = None) -> Iterator[Callable[..., Non
 def write(files: Mapping[Path | None, str | bytes], force: bool = False) -> None:
     """Write a command's files, all or none as far as a file system goes; a file named None is not wanted."""
     write_atomically({path: text for path, text in files.items() if path}, force)
+
+
+def make_folder(path: Path) -> None:
+    """Make a folder, with those that it lies in, unless it is there."""
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"cannot be made a folder: {error.strerror}", path) from None
 
 
 def model_and_array(model_path: Path | None, array_path: Path | None) -> tuple[Model | None, Array | None]:
@@ -178,7 +198,7 @@ def notes_of(runs: list[Run]) -> None:
 def notes(where: str, lines: list[str]) -> None:
     """Print lines about the data, each behind `where`."""
     for note in lines:
-        err.print(where + note, style="yellow", markup=False)
+        err.print(where + note, style="yellow")
 
 
 def beside(output: Path) -> Console:

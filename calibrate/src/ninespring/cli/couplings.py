@@ -15,7 +15,7 @@ from ..io import results
 from ..io.logs import check_folder
 from ..model.models import model_text, read_array
 from ..model.native import parameter_table
-from .console import FILE, JSON, beside, command, working, write
+from .console import FILE, JSON, beside, command, output, working, write
 
 MESHES = ("coarse", "normal", "fine")
 
@@ -39,8 +39,8 @@ Examples:
   ninespring couplings array.toml --mesh fine --json couplings.json -o model.toml
 """)
 @click.argument("array_path", metavar="ARRAY.TOML", type=FILE)
-@click.option("--mesh", type=click.Choice(MESHES), default="normal", show_default=True, help="size of the elements")
-@click.option("-o", "--output", type=FILE, required=True, help="model.toml to write; - prints it")
+@click.option("--mesh", type=click.Choice(MESHES), default="normal", help="size of the elements")
+@output("model.toml to write; - prints it")
 @JSON
 def couplings(array_path: Path, mesh: str, output: Path, json_path: Path | None) -> None:
     """Reckon loss and couplings of an array from its geometry: a field solution, reduced to the model's numbers.
@@ -89,7 +89,7 @@ def couplings(array_path: Path, mesh: str, output: Path, json_path: Path | None)
             f"{1e3 * found.pairs.series:.3f} mW/K",
         )
     for line in lines:
-        talk.print(line, soft_wrap=True, markup=False)
+        talk.print(line, soft_wrap=True)
     result = results.Couplings(
         mesh=mesh,
         unknowns=found.still.unknowns,
@@ -102,7 +102,7 @@ def couplings(array_path: Path, mesh: str, output: Path, json_path: Path | None)
     )
     write({output: model_text(found.model), json_path: results.checked(result)})
     if str(output) != "-":
-        talk.print(f"-> {output}", soft_wrap=True, markup=False)
+        talk.print(f"-> {output}", soft_wrap=True)
 
 
 def _found(full: str) -> str:

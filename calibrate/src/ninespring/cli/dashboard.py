@@ -15,7 +15,7 @@ from ..io.logs import read_log
 from ..io.recording import told_to_stop
 from ..io.simulated import simulator
 from ..model.models import array_of
-from .console import ARRAY, FILE, Real, Whole, command, model_and_array, notes_of, out
+from .console import ARRAY, FILE, command, model_and_array, notes_of, number, out
 
 USUAL = "127.0.0.1:8765"
 
@@ -32,21 +32,10 @@ Examples:
 @click.option("--replay", type=FILE, help="log to play again")
 @click.option("--model", "model_path", type=FILE, help="with --replay: model.toml, shown beside what was measured")
 @ARRAY
-@click.option(
-    "--speed", type=Real(ranges.REPLAY_SPEED), default=1.0, show_default=True, help="with --replay: times real time"
-)
-@click.option(
-    "--hz", type=Whole(ranges.DASHBOARD_HZ), default=10, show_default=True, help="rows a second from the board"
-)
-@click.option(
-    "--folder",
-    type=click.Path(file_okay=False, exists=True, path_type=Path),
-    default=Path(),
-    help="where recordings go; left out: here",
-)
-@click.option(
-    "--listen", "address", default=USUAL, show_default=True, help="HOST:PORT of the page; port 0: any free one"
-)
+@number("--speed", ranges.REPLAY_SPEED, "with --replay: times real time", 1.0)
+@number("--hz", ranges.DASHBOARD_HZ, "rows a second from the board", 10)
+@click.option("--folder", type=click.Path(True, False, path_type=Path), default=Path(), help="where recordings go")
+@click.option("--listen", "address", default=USUAL, help="HOST:PORT of the page; port 0: any free one")
 @click.option(
     "--host-name",
     "host_names",
@@ -98,5 +87,5 @@ def dashboard(
     here = listen(host.strip("[]"), int(number))
     door = door_of(here, host_names)
     with told_to_stop(last=True) as stopped:
-        out.print(f"{address_of(here, door, host_names)}   (Ctrl-C ends it)", soft_wrap=True, markup=False)
+        out.print(f"{address_of(here, door, host_names)}   (Ctrl-C ends it)", soft_wrap=True)
         serve(source, here, stopped, door)

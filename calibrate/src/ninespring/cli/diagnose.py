@@ -14,7 +14,19 @@ from ..io import results
 from ..io.logs import check_folder
 from ..model.models import Array
 from ..say import page as report
-from .console import ARRAY, FILE, array_and_runs, command, model_and_array, out, working, write
+from .console import (
+    ARRAY,
+    FILE,
+    FOLDER,
+    array_and_runs,
+    command,
+    make_folder,
+    model_and_array,
+    out,
+    output,
+    working,
+    write,
+)
 
 
 @command("""\b
@@ -28,13 +40,7 @@ Examples:
 @ARRAY
 @click.option("--model", "model_path", type=FILE, help="model.toml: declared values and effects already on")
 @click.option("--frozen", is_flag=True, help="keep the model's values as they are; fit effects only")
-@click.option(
-    "-o",
-    "--output",
-    type=click.Path(file_okay=False, path_type=Path),
-    required=True,
-    help="folder for diagnosis.json, report.html, model.toml",
-)
+@output("folder for diagnosis.json, report.html, model.toml", FOLDER)
 @click.option("--json", "json_path", type=FILE, help="write diagnosis.json here too")
 def diagnose(
     logs: tuple[Path, ...],
@@ -76,19 +82,16 @@ def diagnose(
                 say("writing the report")
                 page = report.html_report(found, str(output))
             told, made = found.told, found.model
-    try:
-        output.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"cannot be made a folder: {error.strerror}", output) from None
+    make_folder(output)
     write(report.files_of(output, told, page, made) | {json_path: results.checked(told)})
     for note in told.warnings:
         if "isolated spike" not in note:
-            out.print(f"note: {note}", style="yellow", markup=False)
+            out.print(f"note: {note}", style="yellow")
     if isinstance(told, results.SteadyDiagnosis):
         _print_steady(told)
     elif isinstance(told, results.BoardDiagnosis):
         for line in (report.board_verdict(told), *(one.text for one in told.effects)):
-            out.print(line, markup=False)
+            out.print(line)
     else:
         _print_diagnosis(told, report.verdict(told))
     out.print(f"-> {output / 'report.html'}", soft_wrap=True)
@@ -105,7 +108,7 @@ def _print_steady(told: results.SteadyDiagnosis) -> None:
 
 
 def _print_diagnosis(told: results.Diagnosis, verdict: str) -> None:
-    out.print(verdict, style="bold", markup=False)
+    out.print(verdict, style="bold")
     if told.effects:
         table = Table("effect", "error, K", "held out, K", "evidence, nats", "numbers", "chip")
         for one in told.effects:
@@ -127,4 +130,4 @@ def _print_diagnosis(told: results.Diagnosis, verdict: str) -> None:
         lines.append(f"unexplained: {told.residual.note}")
     lines += [f"{one.name} is not exported: {one.why_not_on_chip}" for one in told.effects if one.why_not_on_chip]
     for line in lines:
-        out.print(line, markup=False)
+        out.print(line)

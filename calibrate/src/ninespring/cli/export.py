@@ -16,7 +16,21 @@ from ..io.logs import check_folder, read_bytes
 from ..model.models import Model, model_of_layer, read_model
 from ..model.stiffness import LAYERS
 from ..say.verified import with_verification
-from .console import FILE, JSON, MODEL, beside, command, log_of, logs_of, notes_of, out, source_of, working, write
+from .console import (
+    FILE,
+    JSON,
+    MODEL,
+    beside,
+    command,
+    log_of,
+    logs_of,
+    notes_of,
+    out,
+    output,
+    source_of,
+    working,
+    write,
+)
 
 CHIP = click.option(
     "--chip",
@@ -48,7 +62,7 @@ Examples:
   ninespring export --model diagnosis/model.toml --chip now.txt -o -
 """)
 @MODEL
-@click.option("-o", "--output", type=FILE, required=True, help="console lines to write, `$name=value`; - prints them")
+@output("console lines to write, `$name=value`; - prints them")
 @CHIP
 @LAYER
 @click.option(
@@ -89,9 +103,9 @@ def export(
     write({output: "\n".join([*head, made.lines]), json_path: results.checked(result)})
     said = beside(output)
     if made.remarks:
-        said.print(made.remarks, markup=False)
+        said.print(made.remarks)
     for line in head[1:]:
-        said.print(line[2:], markup=False)
+        said.print(line[2:])
     said.print(f"{len(made.written)} settings -> {output} (`ninespring upload` sends them)")
 
 
@@ -138,7 +152,6 @@ def verify(
     out.print(
         f"the chip's model on {log.name}: error {result.before.rmse_c:.2f} K rms as it is, "
         f"{result.after.rmse_c:.2f} K with the model's settings",
-        markup=False,
     )
     if result.after.rmse_c > result.before.rmse_c:
         raise WorkError("the model's settings make the chip's error larger on this log: do not upload them")

@@ -30,6 +30,7 @@ from .console import (
     model_and_array,
     notes,
     notes_of,
+    output,
     print_parameters,
     working,
     write,
@@ -47,7 +48,7 @@ Examples:
 @click.argument("logs", nargs=-1, required=True, type=FILE)
 @ARRAY
 @click.option("--effects", default="", help="effects to switch on and fit, comma-separated")
-@click.option("-o", "--output", type=FILE, required=True, help="model.toml to write")
+@output("model.toml to write")
 @JSON
 def fit(logs: tuple[Path, ...], array_path: Path | None, effects: str, output: Path, json_path: Path | None) -> None:
     """Fit the declared model, with the effects named, to logs.
@@ -89,7 +90,7 @@ def fit(logs: tuple[Path, ...], array_path: Path | None, effects: str, output: P
         f"error {result.rmse_c:.3f} K, held out {held:.3f} K, noise {problem.noise_c:.3f} K -> {output}"
     )
     for effect, why in left_out(model).items():
-        beside(output).print(f"{effect}: not for the chip: {why}", markup=False)
+        beside(output).print(f"{effect}: not for the chip: {why}")
 
 
 def _result(problem: Problem, found: Fit, runs: list[Run], warnings: list[str]) -> results.Fit:
@@ -117,9 +118,9 @@ def _print_correlations(output: Path, found: list[results.Correlation]) -> None:
     if not found:
         return
     said = beside(output)
-    said.print(f"errors that go together, of {len(found)} pairs beyond {TOLD:g} (--json has all):", markup=False)
+    said.print(f"errors that go together, of {len(found)} pairs beyond {TOLD:g} (--json has all):")
     for one in found[:MOST_TOLD]:
-        said.print(f"  {one.correlation:+.2f}  {one.a}, {one.b}", markup=False)
+        said.print(f"  {one.correlation:+.2f}  {one.a}, {one.b}")
 
 
 def _fit_from_resistance(array: Array, runs: list[Run], output: Path, json_path: Path | None) -> None:
@@ -139,5 +140,5 @@ def _fit_from_resistance(array: Array, runs: list[Run], output: Path, json_path:
     )
     for name, one in witnesses.items():
         said = effects.sentence(name, parameters_of(problem, found, name), dict(found.spec.variant)[name])
-        beside(output).print(f"{said} ({100 * one.probability():.0f} %)", markup=False)
+        beside(output).print(f"{said} ({100 * one.probability():.0f} %)")
     notes("", [from_resistance.SCALE])

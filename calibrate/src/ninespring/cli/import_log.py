@@ -10,7 +10,7 @@ import numpy as np
 from ..errors import InputError
 from ..io import importing, ranges, results
 from ..io.logs import check_folder, log_text
-from .console import FILE, FORCE, JSON, Real, beside, command, working, write
+from .console import FILE, FORCE, JSON, beside, command, number, output, working, write
 
 
 @command(
@@ -37,20 +37,12 @@ map.toml:                                          regions.toml (pixels):
 @click.argument("source", type=click.Path(path_type=Path))
 @click.option("--map", "mapping", help="mapping file (TOML) of columns and units, or built in: tclab, tclab-prbs")
 @click.option("--regions", type=FILE, help="regions file (TOML) for thermal-camera frames: pixels of each spring")
-@click.option("--interval", type=Real(ranges.FRAME_S), default=1.0, show_default=True, help="s a frame")
-@click.option(
-    "--unit", type=click.Choice(["degC", "degF", "K"]), default="degC", show_default=True, help="of the frames"
-)
+@number("--interval", ranges.FRAME_S, "s a frame", 1.0)
+@click.option("--unit", type=click.Choice(["degC", "degF", "K"]), default="degC", help="of the frames")
 @click.option("--times", type=FILE, help="times of the frames, s on the log's clock, one a line")
+@number("--offset", ranges.OFFSET_S, "s to add to the frames' times", 0.0)
 @click.option(
-    "--offset", type=Real(ranges.OFFSET_S), default=0.0, show_default=True, help="s to add to the frames' times"
-)
-@click.option(
-    "--statistic",
-    type=click.Choice(["mean", "median", "max"]),
-    default="mean",
-    show_default=True,
-    help="of the pixels of a region",
+    "--statistic", type=click.Choice(["mean", "median", "max"]), default="mean", help="of the pixels of a region"
 )
 @click.option(
     "--log",
@@ -58,7 +50,7 @@ map.toml:                                          regions.toml (pixels):
     type=FILE,
     help="log of currents to put the frames' temperatures into; without --times the first frame is at its first row",
 )
-@click.option("-o", "--output", type=FILE, required=True, help="log to write")
+@output("log to write")
 @FORCE
 @JSON
 def import_(
@@ -108,4 +100,4 @@ def import_(
     write({output: text}, force)
     write({json_path: results.checked(result)})
     seen = sum(name.startswith("t") for name in result.columns[1:])
-    beside(output).print(f"{len(rows)} rows, temperatures of {seen} springs -> {output}", soft_wrap=True, markup=False)
+    beside(output).print(f"{len(rows)} rows, temperatures of {seen} springs -> {output}", soft_wrap=True)

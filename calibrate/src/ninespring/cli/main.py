@@ -58,7 +58,7 @@ class Group(click.Group):
 
 @click.group(
     cls=Group,
-    context_settings={"help_option_names": ["-h", "--help"]},
+    context_settings={"help_option_names": ["-h", "--help"], "show_default": True},
     epilog="Logs, models and their units: docs/files.md. From bench to calibrated chip in one page: docs/calibrating.md. "
     "Exit code 0: done; 1: the work failed; 2: the input or the arguments are wrong, and one line says what and where.",
 )
@@ -68,7 +68,7 @@ def cli() -> None:
 
 
 def _end(message: str, code: int) -> NoReturn:
-    err.print(f"ninespring: {message}", style="red", soft_wrap=True, markup=False)
+    err.print(f"ninespring: {message}", style="red", soft_wrap=True)
     sys.exit(code)
 
 

@@ -12,7 +12,7 @@ from ..find.plan import FIRST_S, THROUGH_S, make_plan, plan_experiment, plan_thr
 from ..io import ranges, results
 from ..io.logs import check_folder, read_bytes
 from ..model.models import Array
-from .console import ARRAY, FILE, Real, Whole, beside, command, model_and_array, write
+from .console import ARRAY, FILE, beside, command, model_and_array, number, output, write
 
 
 @command("""\b
@@ -32,28 +32,18 @@ Examples:
     is_flag=True,
     help="for the board's own v and i alone: every turn crosses the transformation, and a little current always flows",
 )
-@click.option(
-    "--through", type=Whole(ranges.SPRING), help="drive this spring alone through its transformation; needs --model"
-)
+@number("--through", ranges.SPRING, "drive this spring alone through its transformation; needs --model")
 @click.option("--model", "model_path", type=FILE, help="with --through: model.toml that says where that ends")
-@click.option("--duration", type=Real(ranges.PLAN_S), help="s  [default: 900; without a thermometer 1800]")
-@click.option(
+@number("--duration", ranges.PLAN_S, "s  [default: 900; without a thermometer 1800]")
+@number(
     "--current",
-    type=Real(ranges.PLAN_CURRENT_A),
-    help="A, one spring at full level  [default: 2.0; without a thermometer 2.6, to transform in the fan's air too]",
+    ranges.PLAN_CURRENT_A,
+    "A, one spring at full level  [default: 2.0; without a thermometer 2.6, to transform in the fan's air too]",
 )
-@click.option(
-    "--supply", type=Real(ranges.PLAN_SUPPLY_A), default=14.0, show_default=True, help="A, all springs together"
-)
-@click.option(
-    "--hottest",
-    type=Real(ranges.PLAN_HOTTEST_C),
-    default=105.0,
-    show_default=True,
-    help="degC, of any spring, as declared",
-)
-@click.option("--seed", type=Whole(ranges.SEED), default=1, show_default=True, help="another one: another plan")
-@click.option("-o", "--output", type=FILE, required=True, help="steps.txt to write; - prints it")
+@number("--supply", ranges.PLAN_SUPPLY_A, "A, all springs together", 14.0)
+@number("--hottest", ranges.PLAN_HOTTEST_C, "degC, of any spring, as declared", 105.0)
+@number("--seed", ranges.SEED, "another one: another plan", 1)
+@output("steps.txt to write; - prints it")
 def plan(
     array_path: Path | None,
     diagnosis: Path | None,
@@ -104,7 +94,6 @@ def plan(
         f"{len(made.steps)} steps -> {output}: at most {made.most_a:.2f} A, {made.hottest_c:.0f} degC; each spring is on "
         f"for {100 * made.share_on.min():.0f} to {100 * made.share_on.max():.0f} % of the time",
         soft_wrap=True,
-        markup=False,
     )
 
 

@@ -12,7 +12,7 @@ from ..io import ranges
 from ..io.logs import check_folder, read_log
 from ..model.models import array_of
 from ..say import plotting
-from .console import ARRAY, FILE, Real, command, model_and_array, notes_of, out, working, write
+from .console import ARRAY, FILE, command, model_and_array, notes_of, number, out, output, working, write
 
 PICTURES = (".png", ".svg", ".pdf", ".gif")
 
@@ -27,12 +27,12 @@ Examples:
 @click.argument("log", type=FILE)
 @click.option("--model", "model_path", type=FILE, help="model.toml: what it makes of the log, dashed")
 @ARRAY
-@click.option("--at", "at_s", type=Real(ranges.PICTURE_S), help="s: the array at that time instead, spring by spring")
-@click.option("-o", "--output", type=FILE, required=True, help="picture: .png, .svg, .pdf; .gif: the array in motion")
-def plot(log: Path, model_path: Path | None, array_path: Path | None, at_s: float | None, output: Path) -> None:
+@number("--at", ranges.PICTURE_S, "s: the array at that time instead, spring by spring")
+@output("picture: .png, .svg, .pdf; .gif: the array in motion")
+def plot(log: Path, model_path: Path | None, array_path: Path | None, at: float | None, output: Path) -> None:
     """Draw a log: each spring's temperature (degC) and what it was given."""
     kind = output.suffix.lower()
-    if kind == ".gif" and at_s is not None:
+    if kind == ".gif" and at is not None:
         raise InputError("--at is one picture: .png, .svg or .pdf", output)
     if kind not in PICTURES:
         raise InputError(f"'{kind}' is none of {', '.join(PICTURES)}", output)
@@ -41,15 +41,15 @@ def plot(log: Path, model_path: Path | None, array_path: Path | None, at_s: floa
     run = read_log(log, array.springs if array else None, temperatures=False)
     notes_of([run])
     with working("drawing"):
-        if kind == ".gif" or at_s is not None:
+        if kind == ".gif" or at is not None:
             array = array_of(array, [run])
         if array is not None:
             run.layers = array.layers
         if kind == ".gif":
             picture = plotting.animation_of(run, array.rows, array.cols)
-        elif at_s is not None:
-            picture = plotting.drawn(plotting.map_at(run, array.rows, array.cols, at_s), kind)
+        elif at is not None:
+            picture = plotting.drawn(plotting.map_at(run, array.rows, array.cols, at), kind)
         else:
             picture = plotting.drawn(plotting.figure(run, predict(model, run) if model else None), kind)
     write({output: picture})
-    out.print(f"{len(run.time_s)} rows -> {output}", soft_wrap=True, markup=False)
+    out.print(f"{len(run.time_s)} rows -> {output}", soft_wrap=True)

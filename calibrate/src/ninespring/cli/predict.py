@@ -16,7 +16,7 @@ from ..io.logs import check_folder, log_text
 from ..io.statistics import rms_there
 from ..model import effects
 from ..model.models import read_model
-from .console import FILE, JSON, MODEL, beside, command, log_of, logs_of, notes_of, source_of, working, write
+from .console import FILE, JSON, MODEL, beside, command, log_of, logs_of, notes_of, output, source_of, working, write
 
 
 @command("""\b
@@ -26,7 +26,7 @@ Examples:
 """)
 @click.argument("log", type=FILE)
 @MODEL
-@click.option("-o", "--output", type=FILE, required=True, help="log to write: time_s (s), t1_c..tn_c (degC)")
+@output("log to write: time_s (s), t1_c..tn_c (degC)")
 @click.option("--chip", is_flag=True, help="by the on-chip fixed-point model instead of the plant")
 @JSON
 def predict(log: Path, model_path: Path, output: Path, chip: bool, json_path: Path | None) -> None:
@@ -61,7 +61,7 @@ def predict(log: Path, model_path: Path, output: Path, chip: bool, json_path: Pa
         f"{len(run.time_s)} rows" + ("" if rmse is None else f", error {rmse:.3f} K rms") + f" -> {output}"
     )
     if note:
-        beside(output).print(f"note: {note}", markup=False)
+        beside(output).print(f"note: {note}")
 
 
 @command("""\b
@@ -70,7 +70,7 @@ Examples:
 """)
 @click.argument("log", type=FILE)
 @MODEL
-@click.option("-o", "--output", type=FILE, required=True, help="log to write, with m1_c, x1, ... of the chip's model")
+@output("log to write, with m1_c, x1, ... of the chip's model")
 @JSON
 def replay(log: Path, model_path: Path, output: Path, json_path: Path | None) -> None:
     """Drive the on-chip fixed-point model with a measured log, and tell its error spring by spring.
@@ -128,4 +128,4 @@ def replay(log: Path, model_path: Path, output: Path, json_path: Path | None) ->
     rms = result.rmse_c
     said.print("the log holds no temperature to compare with" if rms is None else f"all: {rms:.3f} K rms")
     if left_out:
-        said.print(left_out, markup=False)
+        said.print(left_out)

@@ -12,7 +12,7 @@ from ..io.logs import check_folder
 from ..model.models import Model, read_model
 from ..model.pattern import pattern_of
 from ..model.simulate import array_parameters, board_settings
-from .console import FILE, MODEL, Real, Whole, beside, command, write
+from .console import MODEL, beside, command, number, output, write
 
 ALWAYS = ("latent_heat", "resistance_phase")
 """What every NiTi spring does, whether a model was fitted where it shows or not."""
@@ -30,9 +30,9 @@ Examples:
 @click.option(
     "--pattern", help="springs that are on from 1 s: 111101111; of two layers elongation/stiffness; default: none"
 )
-@click.option("--fan", type=Whole(ranges.FAN_PERCENT), default=0, show_default=True, help="percent")
-@click.option("--duration", type=Real(ranges.SCENARIO_S), default=300.0, show_default=True, help="s")
-@click.option("-o", "--output", type=FILE, required=True, help="scenario.ini to write; - prints it")
+@number("--fan", ranges.FAN_PERCENT, "percent", 0)
+@number("--duration", ranges.SCENARIO_S, "s", 300.0)
+@output("scenario.ini to write; - prints it")
 def scenario(model_path: Path, pattern: str | None, fan: int, duration: float, output: Path) -> None:
     """Write a model as a scenario that `ninespring-sim run` runs: its array, boards and numbers, and one pattern.
 
@@ -44,7 +44,7 @@ def scenario(model_path: Path, pattern: str | None, fan: int, duration: float, o
     if len(model.array.parts) == 1 and model.array.springs > 64:
         raise InputError("more than 64 springs on a board: give [array] board_rows and board_cols", model_path)
     write({output: scenario_text(model, on, pattern or "", fan, duration)})
-    beside(output).print(f"-> {output} (`ninespring-sim run` runs it)", soft_wrap=True, markup=False)
+    beside(output).print(f"-> {output} (`ninespring-sim run` runs it)", soft_wrap=True)
 
 
 def scenario_text(model: Model, on: list[bool], pattern: str, fan: int, duration_s: float) -> str:
@@ -62,8 +62,8 @@ def scenario_text(model: Model, on: list[bool], pattern: str, fan: int, duration
     lines += [f"{name} = {value:.7g}" for name, value in values.items()]
     if settings := board_settings(array):
         lines += ["[chip]", *(f"{name} = {value:.3f}" for name, value in settings.items())]
-    for number, own in array.boards.items():
-        lines += [f"[board.{number}]", *(f"{key} = {value:g}" for key, value in own.items())]
+    for board, own in array.boards.items():
+        lines += [f"[board.{board}]", *(f"{key} = {value:g}" for key, value in own.items())]
     lines += ["[events]", f"at 0 = fan {fan}"]
     if len(pattern) > LONGEST:
         lines += [f"at 1 = on {k + 1}" for k, one in enumerate(on) if one]

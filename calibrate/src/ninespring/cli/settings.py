@@ -11,10 +11,10 @@ from ..io import history as kept
 from ..io.board import Board, console_lines
 from ..io.logs import check_folder
 from ..model import tables
-from .console import FILE, PORT, beside, command, out, write
+from .console import FILE, PORT, beside, command, out, output, write
 
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+@click.group()
 def settings() -> None:
     """A board's settings: as a file, what differs between two, what it had before each upload."""
 
@@ -43,7 +43,7 @@ Examples:
     of=settings,
 )
 @PORT
-@click.option("-o", "--output", type=FILE, default=Path("-"), help="file to write; left out, it is printed")
+@output("file to write; - prints it", default=Path("-"))
 @click.option("--changed", is_flag=True, help="only those that are not as built in")
 def read(port: str, output: Path, changed: bool) -> None:
     """Write a board's settings as console lines, one a line and in the board's order: two such files diff, `upload` takes one.
@@ -62,7 +62,7 @@ def read(port: str, output: Path, changed: bool) -> None:
             count += 1
     write({output: "\n".join(lines) + "\n"})
     if str(output) != "-":
-        beside(output).print(f"{count} settings -> {output}", markup=False, soft_wrap=True)
+        beside(output).print(f"{count} settings -> {output}", soft_wrap=True)
 
 
 @command(
@@ -87,11 +87,11 @@ def diff(files: tuple[Path, ...], port: str | None) -> None:
     apart = {name for name in first.keys() & second.keys() if float(first[name]) != float(second[name])}
     for name in first:
         if name in apart:
-            out.print(f"${name}: {first[name]} -> {second[name]}", markup=False)
+            out.print(f"${name}: {first[name]} -> {second[name]}")
     for here, there, where in ((first, second, files[0]), (second, first, port or files[-1])):
         if count := len(here.keys() - there.keys()):
-            out.print(f"{count} only in {where}", markup=False)
-    out.print(f"{len(apart)} of {len(first.keys() & second.keys())} differ", markup=False)
+            out.print(f"{count} only in {where}")
+    out.print(f"{len(apart)} of {len(first.keys() & second.keys())} differ")
     if apart:
         raise click.exceptions.Exit(1)
 
@@ -111,9 +111,9 @@ def history(port: str) -> None:
     """
     found = kept.entries(port)
     for one in found:
-        out.print(f"{one.when}  {one.by}: {len(one.sent)} sent, {len(one.words())} changed", markup=False)
+        out.print(f"{one.when}  {one.by}: {len(one.sent)} sent, {len(one.words())} changed")
         for line in one.words():
-            out.print(f"    {line}", markup=False)
-        out.print(f"    what it had: {one.path}", markup=False, soft_wrap=True)
+            out.print(f"    {line}")
+        out.print(f"    what it had: {one.path}", soft_wrap=True)
     if not found:
-        out.print(f"no upload to the board at {port} is kept on this computer", markup=False)
+        out.print(f"no upload to the board at {port} is kept on this computer")

@@ -21,7 +21,7 @@ from ..explore.sweep import sweep as run
 from ..io import ranges
 from ..io.logs import check_folder, write_atomically
 from ..io.results import Sweep, checked
-from .console import FILE, JSON, Whole, command, err, out, write
+from .console import FILE, FOLDER, JSON, command, err, number, out, output, write
 from .couplings import need
 
 CONNECT_S = 10
@@ -35,9 +35,9 @@ Examples:
 Read the results: pandas.read_parquet("pitch/points")
 """)
 @click.argument("spec_path", metavar="SPEC.TOML", type=FILE)
-@click.option("-o", "--output", type=click.Path(file_okay=False, path_type=Path), required=True, help="folder to write")
+@output("folder to write", FOLDER)
 @click.option("--scheduler", help="a Dask cluster as it stands, tcp://host:8786; left out: this machine's cores")
-@click.option("--workers", type=Whole(ranges.WORKERS), help="processes on this machine; left out: one a core")
+@number("--workers", ranges.WORKERS, "processes on this machine; left out: one a core")
 @click.option("--check", is_flag=True, help="look at the spec and every point of it, and run nothing")
 @JSON
 def sweep(
@@ -66,7 +66,6 @@ def sweep(
         f"{points} points in {output}/points ({before} were there), {took:.1f} s"
         + (f"; {failed} could not be run: column error says why" if failed else ""),
         soft_wrap=True,
-        markup=False,
     )
     result = Sweep(spec=spec_path.name, sha256=spec.sha256, points=points, done_before=before, failed=failed)
     _evaluate(spec, results, output, result)
@@ -96,7 +95,7 @@ def _run(spec: Any, results: Any, done: Any, scheduler: str | None, workers: int
                 disable=not err.is_terminal,
             )
         )
-        out.print(f"Dask's dashboard: {client.dashboard_link}", soft_wrap=True, markup=False)
+        out.print(f"Dask's dashboard: {client.dashboard_link}", soft_wrap=True)
         task = progress.add_task("points", total=spec.points, completed=int(done.sum()))
         run(client, spec, results, done, lambda count: progress.update(task, completed=count))
 
@@ -111,9 +110,7 @@ def _evaluate(spec: Any, results: Any, output: Path, result: Sweep) -> None:
         if best is None:
             raise WorkError(f"no point keeps the limits and has {spec.metric}: all {len(table)} are in {output}/points")
         words = named({axis.key: best[axis.key] for axis in spec.axes})
-        out.print(
-            f"best {spec.metric}: {best[spec.metric]:.4g} {UNITS[spec.metric]} at {words}", soft_wrap=True, markup=False
-        )
+        out.print(f"best {spec.metric}: {best[spec.metric]:.4g} {UNITS[spec.metric]} at {words}", soft_wrap=True)
         result.best = {axis.key: best[axis.key] for axis in spec.axes} | {spec.metric: best[spec.metric]}
         return
     found = indices_of(spec, table)

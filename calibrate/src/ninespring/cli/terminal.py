@@ -207,7 +207,7 @@ def talk_at_a_terminal(board: Board, file: Path | None) -> None:
 
 def talk_from_a_pipe(board: Board, lines: Iterable[str]) -> None:
     """Send lines one after the other and print the answers; WorkError where the board refused some."""
-    talk = Talk(board, lambda line: out.print(line, markup=False, soft_wrap=True))
+    talk = Talk(board, lambda line: out.print(line, soft_wrap=True))
     for line in lines:
         if line.strip():
             talk.say(line.strip())
@@ -235,14 +235,14 @@ def console(port: str | None, simulate: bool) -> None:
         board.guard({})  # who types looks: nothing goes off because a minute was thought
         try:
             if sys.stdin.isatty():
-                out.print(board.version[0], markup=False)
+                out.print(board.version[0])
                 talk_at_a_terminal(board, _history_file())
             else:
                 talk_from_a_pipe(board, sys.stdin)
         finally:
             board.ask("telemetry off")
             if board.status().startswith("<on"):
-                out.print("springs are on, and stay on", markup=False)
+                out.print("springs are on, and stay on")
 
 
 def _history_file() -> Path | None:

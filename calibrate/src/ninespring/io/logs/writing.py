@@ -22,11 +22,8 @@ KEPT = "what was measured is never written over"
 
 def sha256_of(path: str | Path) -> str:
     """Return the SHA-256 of a file, hexadecimal."""
-    digest = hashlib.sha256()
     with open(path, "rb") as stream:
-        while block := stream.read(1 << 20):
-            digest.update(block)
-    return digest.hexdigest()
+        return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
 _OF_TOOL = re.compile(rb"(?:#[^\n]*\n)*?# tool: ninespring \S+ (predict|replay)\n")
