@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import functools
 import json
 import re
-from typing import Any
+import typing
+from typing import Annotated, Any, Literal
 
-import jsonschema
+import msgspec
+from msgspec import Meta
 
 from ..errors import InputError
 
@@ -16,67 +19,46 @@ OFF_LINE = re.compile(r"off\s+(all|\d{1,2})(\.0*)?", re.IGNORECASE)
 SWITCHING = ("on", "off", "pattern", "clear", "selftest")
 """Words of the console that switch springs."""
 
-_LEVEL = {"type": "integer", "minimum": 0, "maximum": 100, "description": "0 to 100 percent"}
-_PATTERN = {"type": "string", "pattern": r"^[01]{1,64}\Z", "description": "0 and 1, one for each spring"}
 
-
-def _number(low: float, high: float, unit: str = "") -> dict[str, Any]:
+def _number(low: float, high: float, unit: str = "") -> Any:
     description = f"a number from {low:g} to {high:g}{unit and ' ' + unit}"
-    return {"type": "number", "minimum": low, "maximum": high, "description": description}
+    return Annotated[float, Meta(ge=low, le=high, description=description)]
 
 
-def _wish(**properties: Any) -> jsonschema.Draft202012Validator:
-    return jsonschema.Draft202012Validator(
-        {
-            "properties": {"do": True, "id": True} | properties,
-            "required": ["do", *properties],
-            "additionalProperties": False,
-        }
-    )
+def _text(pattern: str, description: str) -> Any:
+    return Annotated[str, Meta(pattern=rf"^(?:{pattern})\Z", description=description)]
 
 
-WISHES = {
-    **{
-        name: _wish()
-        for name in ("stop", "clear", "unlock", "cold", "record", "end_recording", "end_play", "settings", "pause")
+Level = Annotated[int, Meta(ge=0, le=100, description="0 to 100 percent")]
+Spring = Annotated[int, Meta(ge=1, le=64, description="the number of a spring")]
+Pattern = _text("[01]{1,64}", "0 and 1, one for each spring")
+WISHES: dict[str, dict[str, Any]] = {
+    **{name: {} for name in ("stop", "clear", "unlock", "cold", "record", "end_recording", "end_play", "settings")},
+    "pause": {},
+    "level": {"spring": Spring, "level": Level},
+    "all": {"level": Level},
+    "pattern": {"springs": Pattern},
+    "play": {
+        "patterns": Annotated[list[Pattern], Meta(min_length=1, max_length=100, description="1 to 100 patterns")],
+        "seconds": _number(0.5, 3600, "s"),
     },
-    "level": _wish(
-        spring={"type": "integer", "minimum": 1, "maximum": 64, "description": "the number of a spring"}, level=_LEVEL
-    ),
-    "all": _wish(level=_LEVEL),
-    "pattern": _wish(springs=_PATTERN),
-    "play": _wish(
-        patterns={
-            "type": "array",
-            "items": _PATTERN,
-            "minItems": 1,
-            "maxItems": 100,
-            "description": "1 to 100 patterns",
-        },
-        seconds=_number(0.5, 3600, "s"),
-    ),
-    "policy": _wish(policy={"enum": ["open", "precompensate"], "description": "open or precompensate"}),
-    "fan": _wish(percent=_LEVEL),
-    "ambient": _wish(celsius=_number(-40, 85, "degC")),
-    "set": _wish(
-        name={"type": "string", "pattern": r"^[a-z0-9_]{1,40}\Z", "description": "the name of a setting"},
-        value={
-            "type": "string",
-            "pattern": r"^-?[0-9]{1,9}(\.[0-9]{1,9})?\Z",
-            "description": "a number with a point and without an exponent, as 0.006",
-        },
-    ),
-    "say": _wish(
-        line={
-            "type": "string",
-            "pattern": r"^[!-~][ -~]{0,62}\Z",
-            "description": "one line of at most 63 plain characters",
-        }
-    ),
-    "seek": _wish(time_s=_number(-1e9, 1e9, "s")),
-    "speed": _wish(speed=_number(0.1, 1000)),
+    "policy": {"policy": Annotated[Literal["open", "precompensate"], Meta(description="open or precompensate")]},
+    "fan": {"percent": Level},
+    "ambient": {"celsius": _number(-40, 85, "degC")},
+    "set": {
+        "name": _text("[a-z0-9_]{1,40}", "the name of a setting"),
+        "value": _text(r"-?[0-9]{1,9}(\.[0-9]{1,9})?", "a number with a point and without an exponent, as 0.006"),
+    },
+    "say": {"line": _text("[!-~][ -~]{0,62}", "one line of at most 63 plain characters")},
+    "seek": {"time_s": _number(-1e9, 1e9, "s")},
+    "speed": {"speed": _number(0.1, 1000)},
 }
-"""Everything that a page may wish, exactly; what is not one of these changes nothing."""
+"""Everything that a page may wish, exactly, and what goes with it; what is not one of these changes nothing."""
+
+
+@functools.cache
+def _kind(do: str) -> type[msgspec.Struct]:
+    return msgspec.defstruct(do, [("do", str), *WISHES[do].items(), ("id", Any, None)], forbid_unknown_fields=True)
 
 
 def _no_number(text: str) -> float:
@@ -100,13 +82,15 @@ def validated(wish: dict[str, Any]) -> dict[str, Any]:
     do = wish.get("do")
     if not isinstance(do, str) or do not in WISHES:
         raise InputError("not a wish that this page can have")
-    if error := next(WISHES[do].iter_errors(wish), None):
-        what = next((one for one in error.absolute_path if isinstance(one, str)), None)
-        if what is None:
-            raise InputError(f"not a wish that this page can have: {do} has {_names(do)}")
-        shown = json.dumps(wish[what]) if not isinstance(wish[what], str) else f"'{wish[what]}'"
-        described = WISHES[do].schema["properties"][what]["description"]
-        raise InputError(f"{shown[:40]} is not {described}" if shown != "''" else f"nothing is not {described}")
+    try:
+        msgspec.convert(wish, _kind(do))
+    except msgspec.ValidationError as error:
+        where = re.search(r"`\$\.(\w+)", str(error))
+        if not where:
+            raise InputError(f"not a wish that this page can have: {do} has {_names(do)}") from None
+        given = wish[where[1]]
+        shown = "nothing" if given == "" else f"'{given}'" if isinstance(given, str) else json.dumps(given)
+        raise InputError(f"{shown[:40]} is not {_described(WISHES[do][where[1]])}") from None
     return _typed(wish["line"].strip()) if do == "say" else wish
 
 
@@ -127,8 +111,11 @@ def _typed(line: str) -> dict[str, Any]:
 
 
 def _names(do: str) -> str:
-    names = [one for one in WISHES[do].schema["required"] if one != "do"]
-    return " and ".join(names) if names else "nothing with it"
+    return " and ".join(WISHES[do]) or "nothing with it"
+
+
+def _described(kind: Any) -> str:
+    return next(one.description for one in typing.get_args(kind) if isinstance(one, Meta))
 
 
 def switches_off(wish: dict[str, Any]) -> bool:
