@@ -81,16 +81,12 @@ class PlantParameter:
 @functools.cache
 def library() -> ctypes.CDLL:
     """Load the shared library that the package was built with."""
-    name = "libninespring_native.so"
-    path = resources.files("ninespring") / name
     try:
-        lib = ctypes.CDLL(str(path))
+        lib = ctypes.CDLL(str(resources.files("ninespring") / "libninespring_native.so"))
     except OSError as error:
         raise RuntimeError(f"the compiled part of ninespring is missing ({error}): run `pip install .`") from None
-    pointer, integer, size, real, text = (
-        *(ctypes.c_void_p, ctypes.c_int, ctypes.c_size_t),
-        *(ctypes.c_double, ctypes.c_char_p),
-    )
+    pointer, integer, size = ctypes.c_void_p, ctypes.c_int, ctypes.c_size_t
+    real, text = ctypes.c_double, ctypes.c_char_p
     signatures: dict[str, tuple[object, Sequence[object]]] = {
         "plant_parameter_count": (size, ()),
         "plant_parameter": (ctypes.POINTER(structure(PlantParameter)), (size,)),
@@ -116,18 +112,14 @@ def library() -> ctypes.CDLL:
         "plant_measured_c": (real, (pointer, integer)),
         "plant_austenite": (real, (pointer, integer)),
         "plant_resistance_ohm": (real, (pointer, integer)),
-        "plant_power_w": (real, (pointer, integer)),
-        "plant_air_c": (real, (pointer,)),
-        "plant_plate_c": (real, (pointer,)),
         "plant_readings": (integer, (pointer, size, *(_double_p,) * 6)),
         "paper_configure": (integer, (pointer, real)),
         "whiten": (real, (size, size, _double_p, text, _double_p, _double_p, size, _double_p, _double_p)),
         "weigh": (real, (size, _double_p, _double_p, text, _double_p, size, _double_p, _double_p, _double_p)),
     }
-    for function, (result, arguments) in signatures.items():
+    for function, signature in signatures.items():
         entry = getattr(lib, function)
-        entry.restype = result
-        entry.argtypes = arguments
+        entry.restype, entry.argtypes = signature
     return lib
 
 
@@ -259,10 +251,8 @@ class Plant:
 
     def set_temperature(self, spring: int, temperature_c: float) -> None:
         """Put a spring (0-based) to a temperature, degC."""
-        self._check(
-            self._lib.plant_set_temperature(self._plant, spring, float(temperature_c)),
-            f"temperature {temperature_c:g}",
-        )
+        status = self._lib.plant_set_temperature(self._plant, spring, float(temperature_c))
+        self._check(status, f"temperature {temperature_c:g}")
 
     def drive(self, spring: int, mode: int, quantity: float) -> None:
         """Drive a spring (0-based) by POWER (W), CURRENT (A), COMMAND (0..1) or TEMPERATURE (degC)."""
@@ -336,8 +326,7 @@ class Plant:
         rows, n = drive.shape
         out = np.empty((rows, n, 2))
         for row in range(rows):
-            for k in range(n):
-                out[row, k] = self._lib.plant_temperature_c(self._plant, k), self._lib.plant_austenite(self._plant, k)
+            out[row] = np.column_stack((self.temperature_c(), self.austenite()))
             if row + 1 == rows:
                 break
             for k in range(n):
@@ -346,7 +335,7 @@ class Plant:
                 self.set_fan(float(fan[row]))
             if ambient_c is not None:
                 self.set_ambient(float(ambient_c[row]))
-            self._check(self._lib.plant_step(self._plant, float(time_s[row + 1] - time_s[row])), "step")
+            self.step(float(time_s[row + 1] - time_s[row]))
         return out
 
     def simulate(
@@ -363,20 +352,9 @@ class Plant:
         rows, n = drive.shape
         modes = (ctypes.c_int * n)(*([mode] * n))
         out = np.empty((rows, n))
-        self._check(
-            self._lib.plant_simulate(
-                self._plant,
-                rows,
-                doubles(time_s),
-                modes,
-                doubles(drive),
-                doubles(fan),
-                doubles(ambient_c),
-                None if true_c else doubles(out),
-                doubles(out) if true_c else None,
-            ),
-            "simulation",
-        )
+        pointers = [doubles(time_s), modes, *(doubles(one) for one in (drive, fan, ambient_c))]
+        shown = (None, doubles(out)) if true_c else (doubles(out), None)
+        self._check(self._lib.plant_simulate(self._plant, rows, *pointers, *shown), "simulation")
         return out
 
 

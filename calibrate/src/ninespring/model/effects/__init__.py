@@ -11,16 +11,18 @@ import importlib
 import pkgutil
 
 from ...io.results import Parameters
-from .. import native
+from .. import native, tables
 from . import runs_differ
 from .effect import Candidate as Candidate
 from .effect import Effect as Effect
 from .effect import Scene as Scene
 from .effect import Steady as Steady
-from .names import IN_WORDS as IN_WORDS
-from .names import MEASUREMENT as MEASUREMENT
-from .names import ON_CHIP as ON_CHIP
-from .names import WHY_NOT_ON_CHIP as WHY_NOT_ON_CHIP
+
+IN_WORDS = {name: row.sentence for name, row in tables.effects().items()}
+MEASUREMENT = frozenset(name for name, row in tables.effects().items() if row.acts == "measurement")
+WHY_NOT_ON_CHIP = {name: row.not_on_chip for name, row in tables.effects().items() if row.not_on_chip}
+ON_CHIP = frozenset(tables.effects()) - set(WHY_NOT_ON_CHIP)
+"""What the table of effects (lib/parameters/effects.def) says of each: its sentence, where it acts, why not on the chip."""
 
 
 @functools.cache
