@@ -11,14 +11,13 @@ import socket
 import time
 from collections.abc import AsyncIterator, Callable, Iterator
 from dataclasses import dataclass, field
-from http.cookies import CookieError, SimpleCookie
 from pathlib import Path
 from typing import Any
-from urllib.parse import parse_qs
 
 import plotly
 import uvicorn
 from starlette.applications import Starlette
+from starlette.requests import HTTPConnection
 from starlette.responses import FileResponse, PlainTextResponse, RedirectResponse, Response
 from starlette.routing import Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
@@ -87,12 +86,12 @@ class OwnPagesOnly:
         if scope["type"] not in ("http", "websocket"):
             await self.app(scope, receive, send)
             return
-        headers = [(name, value.decode("latin-1")) for name, value in scope["headers"]]
+        asked = HTTPConnection(scope)
         answer: Response | None = None
-        if not self._own(scope, headers):
+        if not self._own(asked):
             answer = PlainTextResponse("not from here: --host-name NAME adds a name of this machine", 403)
-        elif not self.door.fits(self._token(headers)):
-            answer = self._let_in(scope)
+        elif not self.door.fits(asked.cookies.get(self.door.cookie)):
+            answer = self._let_in(asked)
         if answer is None:
             await self.app(scope, receive, send)
         elif scope["type"] == "websocket":
@@ -100,29 +99,18 @@ class OwnPagesOnly:
         else:
             await answer(scope, receive, send)
 
-    def _own(self, scope: Scope, headers: list[tuple[bytes, str]]) -> bool:
-        hosts = [value for name, value in headers if name == b"host"]
-        origins = [value for name, value in headers if name == b"origin"]
+    def _own(self, asked: HTTPConnection) -> bool:
+        hosts, origins = asked.headers.getlist("host"), asked.headers.getlist("origin")
         if len(hosts) != 1 or len(origins) > 1 or not self.door.knows(hosts[0]):
             return False
-        if scope["type"] == "websocket" and not origins:
-            return False
-        return not origins or origins[0] == f"http://{hosts[0]}"
+        return origins[0] == f"http://{hosts[0]}" if origins else asked.scope["type"] == "http"
 
-    def _token(self, headers: list[tuple[bytes, str]]) -> str | None:
-        for name, value in headers:
-            if name == b"cookie":
-                with contextlib.suppress(CookieError):
-                    if morsel := SimpleCookie(value).get(self.door.cookie):
-                        return morsel.value
-        return None
-
-    def _let_in(self, scope: Scope) -> Response:
+    def _let_in(self, asked: HTTPConnection) -> Response:
         """Keep the token of the printed address in a cookie, so that it stands in no address bar."""
-        query = parse_qs(scope.get("query_string", b"").decode("latin-1"))
-        if scope.get("path") == "/" and "token" in query and self.door.fits(query["token"][0]):
+        token = asked.query_params.get("token")
+        if asked.scope["path"] == "/" and token and self.door.fits(token):
             answer = RedirectResponse("/", 303, headers={"cache-control": "no-store", "referrer-policy": "no-referrer"})
-            answer.set_cookie(self.door.cookie, query["token"][0], httponly=True, samesite="lax")
+            answer.set_cookie(self.door.cookie, token, httponly=True, samesite="lax")
             return answer
         return PlainTextResponse("open the address that the dashboard printed, with its token", 403)
 
