@@ -28,11 +28,11 @@ from .find.diagnosis import Diagnosis
 from .find.plan import Plan
 from .infer import predict as prediction
 from .io import history, ranges, recording
-from .io.board import Board, settings_lines
+from .io.board import Board, settings_in
 from .io.importing import import_table
 from .io.logs import Run, check_folder, read_log, write_atomically
 from .io.recording import Recording
-from .io.thermometers import Thermometers
+from .io.thermometers import measuring
 from .model import native
 from .model.models import Array, Model, array_of, model_text, read_array, read_model
 from .say.plotting import figure
@@ -156,13 +156,11 @@ def record(
     ranges.RECORD_S.check("duration_s", duration_s)
     ranges.RECORD_HZ.check("hz", hz)
     script = recording.script_lines("\n".join(steps), "steps", duration_s)
-    with contextlib.ExitStack() as stack:
-        log = recording.LogFile(Path(output), force)
-        stack.callback(log.close)
-        board = stack.enter_context(Board(port, off_at_end=False))
-        logger = Thermometers(thermometers) if thermometers else None
-        if logger:
-            stack.callback(logger.close)
+    with (
+        contextlib.closing(recording.LogFile(Path(output), force)) as log,
+        Board(port, off_at_end=False) as board,
+        measuring(thermometers) as logger,
+    ):
         return recording.record(board, log, hz, duration_s, script, keys=recording.about(port), thermometers=logger)
 
 
@@ -193,9 +191,9 @@ def upload(
     Return how many. WorkError, and nothing is saved, where the board refuses one or shows another value. What was saved can be
     taken back: `undo_upload`; `by` is what the history calls it.
     """
-    lines = settings_lines(settings, "settings")
-    history.send(port, lines, by, save, say)
-    return len(lines)
+    given = settings_in(settings, "settings")
+    history.send(port, given, by, save, say)
+    return len(given)
 
 
 def undo_upload(port: str, save: bool = True) -> list[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from contextlib import closing
 from pathlib import Path
 
 import click
@@ -10,12 +11,12 @@ from rich.live import Live
 
 from ..errors import InputError, WorkError
 from ..io import history, ranges, results
-from ..io.board import Board, settings_lines
-from ..io.logs import check_folder, read_bytes
+from ..io.board import Board, settings_in
+from ..io.logs import read_bytes
 from ..io.recording import LogFile, Recording, about, script_lines, told_to_stop
 from ..io.recording import record as record_board
 from ..io.tape import record_tape
-from ..io.thermometers import Thermometers
+from ..io.thermometers import measuring
 from ..say.monitoring import Screen
 from .console import FILE, FORCE, JSON, PORT, beside, command, err, number, out, output, two_ports, working, write
 
@@ -63,33 +64,25 @@ def record(
     setting that is not active yet, springs that are still warm) is said and logged likewise, and is no failure.
     With --tape what the board knows of its springs begins anew, as after power-on; what it has learnt of them stays.
     """
-    check_folder(output, measured=True, force=force)
-    check_folder(json_path)
     if tape and (thermometers or hz != 1):
         raise InputError("a tape has each tick and no thermometers: leave out --hz and --thermometers")
     two_ports(port, thermometers)
     text = read_bytes(script).decode("utf-8", "replace") if script else ""
     steps = script_lines(text, str(script), duration)
+    got = Recording()
     with told_to_stop(last=True) as stopped:
         with (
             working(f"recording from {port}", duration) as say,
             Board(port, stopped=stopped, off_at_end=False) as board,
+            measuring(thermometers) as logger,
+            closing(LogFile(output, force)) as log,
         ):
-            logger = Thermometers(thermometers) if thermometers else None
-            log = LogFile(output, force)
-            got = Recording()
-            try:
-                alarm = lambda fault: err.print(f"fault {fault}", style="bold red")  # noqa: E731
-                tell = lambda rows, seconds: say(f"{rows} rows", seconds)  # noqa: E731
-                remark = lambda words: err.print(words)  # noqa: E731
-                if tape:
-                    got.ended = record_tape(board, log, duration, steps, tell, about(port), remark)
-                else:
-                    got = record_board(board, log, hz, duration, steps, tell, about(port), logger, alarm, remark)
-            finally:
-                log.close()
-                if logger:
-                    logger.close()
+            alarm = lambda fault: err.print(f"fault {fault}", style="bold red")  # noqa: E731
+            tell = lambda rows, seconds: say(f"{rows} rows", seconds)  # noqa: E731
+            if tape:
+                got.ended = record_tape(board, log, duration, steps, tell, about(port), err.print)
+            else:
+                got = record_board(board, log, hz, duration, steps, tell, about(port), logger, alarm, err.print)
         if not log.rows:
             raise WorkError(got.ended or "stopped before the first row came")
         result = results.Record(rows=log.rows, dropped_lines=got.dropped, ended=got.ended, faults=got.faults)
@@ -121,7 +114,6 @@ def upload(settings: Path | None, port: str, undo: bool, save: bool, json_path: 
     """
     if (settings is None) != undo:
         raise InputError("give either a file of settings or --undo")
-    check_folder(json_path)
     if settings is None:
         with working("giving back"), Board(port, off_at_end=False) as board:
             last = history.undo(board, save)
@@ -130,11 +122,11 @@ def upload(settings: Path | None, port: str, undo: bool, save: bool, json_path: 
             out.print(line)
         out.print(f"`{last.by}` of {last.when} is taken back{', saved' if save else ''}")
         return
-    lines = settings_lines(read_bytes(settings).decode("utf-8", "replace"), str(settings))
-    with working("sending", len(lines)) as say:
-        history.send(port, lines, f"upload {settings.name}", save, say)
-    write({json_path: results.checked(results.Upload(settings=len(lines), saved=save))})
-    out.print(f"{len(lines)} settings sent and read back{', saved' if save else ''}")
+    given = settings_in(read_bytes(settings).decode("utf-8", "replace"), str(settings))
+    with working("sending", len(given)) as say:
+        history.send(port, given, f"upload {settings.name}", save, say)
+    write({json_path: results.checked(results.Upload(settings=len(given), saved=save))})
+    out.print(f"{len(given)} settings sent and read back{', saved' if save else ''}")
 
 
 @command("""\b

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import contextlib
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import click
@@ -12,9 +10,8 @@ import click
 from ..errors import InputError, WorkError
 from ..export.drive import patterns
 from ..io import ranges
-from ..io.board import Board
-from ..io.logs import check_folder, write_atomically
-from ..io.simulated import simulated_board
+from ..io.board import SIMULATED, Board
+from ..io.logs import write_atomically
 from ..model.models import Array, read_array
 from ..model.pattern import pattern_of
 from .calibration.chain import Calibration
@@ -85,7 +82,6 @@ def calibrate(
     two_ports(port, thermometers)
     if not yes and not sys.stdin.isatty():
         raise InputError("it asks before it heats and before it writes, and nobody can answer here: give --yes")
-    check_folder(json_path)
     begun = (output / FILE).exists()
     kept = output / ARRAY_FILE if begun and (output / ARRAY_FILE).exists() else array_path
     array = read_array(kept) if kept else Array()
@@ -96,7 +92,8 @@ def calibrate(
         raise InputError("is there, and no calibration was begun in it: give another folder, -o", output)
     given = {
         "simulate": simulate,
-        "array": _text(array_path),
+        # another one in its place would be another calibration
+        "array": array_path.read_text("utf-8") if array_path else None,
         "duration": duration,
         "drive_for": drive_for,
         "pattern": pattern,
@@ -120,8 +117,8 @@ def calibrate(
         return yes or click.confirm(text, default=False)
 
     try:
-        with _ports(port, thermometers) as (at, logger), Board(at) as board:
-            Calibration(progress, array, board, logger, ask, tell).run()
+        with Board(port or SIMULATED, simulated=UNKNOWN) as board:
+            Calibration(progress, array, board, thermometers or board.thermometers, ask, tell).run()
     except KeyboardInterrupt:
         raise WorkError(f"stopped; what was measured is in {output}: the same command goes on from there") from None
     finally:
@@ -129,22 +126,3 @@ def calibrate(
             write_atomically({output / REPORT: page(progress, array)})
             out.print(f"-> {output / REPORT}", soft_wrap=True)
         write({json_path: progress.text()})
-
-
-def _text(path: Path | None) -> str | None:
-    """Return what an array.toml says: another one in its place would be another calibration."""
-    return path.read_text("utf-8") if path else None
-
-
-@contextlib.contextmanager
-def _ports(port: str | None, thermometers: str | None) -> Iterator[tuple[str, str]]:
-    """Yield the ports of a board and its thermometers; of a simulated board where none is named."""
-    if port and thermometers:
-        yield port, thermometers
-        return
-    process, board, logger = simulated_board(UNKNOWN)
-    try:
-        yield board, logger
-    finally:
-        process.terminate()
-        process.communicate(timeout=10)

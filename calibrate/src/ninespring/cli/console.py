@@ -13,12 +13,12 @@ from typing import Any
 import click
 import numpy as np
 from rich.console import Console
-from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
 
 from ..errors import InputError
 from ..io import results
-from ..io.logs import Run, read_log, sha256_of, write_atomically
+from ..io.logs import Run, check_folder, read_log, sha256_of, write_atomically
 from ..io.ranges import Range
 from ..model.models import Array, Model, array_of, read_array, read_model
 
@@ -38,24 +38,28 @@ ARRAY = click.option(
 MODEL = click.option("--model", "model_path", type=FILE, required=True, help="model.toml that fit or diagnose wrote")
 PORT = click.option("--port", required=True, help="serial port, e.g. /dev/ttyACM0; 115200 baud")
 FORCE = click.option("--force", is_flag=True, help="write over a file that is there, whatever it is")
+"""Of commands whose output was measured: without it that takes no file's place."""
 Decorator = Callable[[Callable[..., None]], Callable[..., None]]
 OUTPUTS = ("output", "json_path")
 """Parameters of commands that name files to write; every other path is an input."""
 
 
 class Command(click.Command):
-    """A command that never writes over what it reads, nor two results into one file."""
+    """A command that refuses, before any work, what could not be written, and never writes over what it reads."""
 
     def invoke(self, ctx: click.Context) -> Any:
-        """Compare the command's paths before any work is done."""
+        """Compare the command's paths, and look at what would be written."""
         written: list[Path] = []
         read: list[Path] = []
+        kinds = {one.name: one.type for one in self.params}
         for name, value in ctx.params.items():
             paths = [Path(one) for one in (value if isinstance(value, tuple) else (value,)) if _names_a_file(one)]
-            if name in OUTPUTS:
-                written += [path / one for path in paths for one in results.FILES] if _is_folder(ctx, name) else paths
-            else:
+            if name not in OUTPUTS:
                 read += paths
+            elif kinds[name] is FOLDER:
+                written += [path / one for path in paths if path.is_dir() for one in results.FILES]
+            else:
+                written += paths
         for number, path in enumerate(written):
             if str(path) == "-" or (path.exists() and not path.is_file()):
                 continue  # standard output, a device
@@ -64,6 +68,9 @@ class Command(click.Command):
                     raise InputError("would be written over, and it is read: give the result another name", path)
             if any(_same(path, other) for other in written[:number]):
                 raise InputError("two results cannot be written into one file", path)
+        for path in written:
+            measured = "force" in ctx.params and path == ctx.params["output"]
+            check_folder(path, measured=measured, force=measured and ctx.params["force"])
         return super().invoke(ctx)
 
 
@@ -76,11 +83,6 @@ def command(
 
 def _names_a_file(value: Any) -> bool:
     return isinstance(value, Path) or (isinstance(value, str) and Path(value).is_file())
-
-
-def _is_folder(ctx: click.Context, name: str) -> bool:
-    kinds = {one.name: one.type for one in ctx.command.params}
-    return isinstance(kinds[name], click.Path) and not kinds[name].file_okay
 
 
 def _same(one: Path, other: Path) -> bool:
@@ -125,7 +127,7 @@ def working(text: str, total: float | None = None) -> Iterator[Callable[..., Non
     """Show that work goes on, on the terminal's error stream: say(words), say(words, done) with a total."""
     with Progress(
         SpinnerColumn(),
-        *(() if total is None else (BarColumn(),)),
+        *(() if total is None else (BarColumn(), TimeRemainingColumn())),
         TextColumn("{task.description}"),
         TimeElapsedColumn(),
         console=err,

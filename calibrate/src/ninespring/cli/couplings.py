@@ -12,7 +12,6 @@ from ..errors import InputError, WorkError
 from ..explore.couplings import couplings as find
 from ..explore.geometry import geometry_of
 from ..io import results
-from ..io.logs import check_folder
 from ..model.models import model_text, read_array
 from ..model.native import parameter_table
 from .console import FILE, JSON, beside, command, output, working, write
@@ -47,7 +46,6 @@ def couplings(array_path: Path, mesh: str, output: Path, json_path: Path | None)
 
     What cools it stands in [cooling] of array.toml. Nothing measured goes in: docs/exploring.md says how far that carries.
     """
-    check_folder(output, json_path)
     array = read_array(array_path)
     try:
         geometry_of(array)

@@ -11,7 +11,6 @@ from ..errors import InputError
 from ..find import board_alone, diagnosis, steady
 from ..infer import from_resistance
 from ..io import results
-from ..io.logs import check_folder
 from ..model.models import Array
 from ..say import page as report
 from .console import (
@@ -56,9 +55,6 @@ def diagnose(
     temperature, are diagnosed from v / i: degrees stay open. Errors are root mean squares in K; evidence is in
     nats, the logarithm of how many times likelier the data are with the effect.
     """
-    check_folder(json_path)
-    if output.is_dir():
-        check_folder(*(output / name for name in results.FILES))
     if frozen and not model_path:
         raise InputError("--frozen needs --model")
     model, array = model_and_array(model_path, array_path)

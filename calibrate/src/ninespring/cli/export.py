@@ -11,7 +11,7 @@ from ..export.drive import checked_settings
 from ..export.settings import left_out, together
 from ..infer.predict import chip_errors, refuse_seen
 from ..io import results
-from ..io.board import Board, console_lines
+from ..io.board import Board, as_lines, read_settings
 from ..io.logs import check_folder, read_bytes
 from ..model.models import Model, model_of_layer, read_model
 from ..model.stiffness import LAYERS
@@ -53,7 +53,7 @@ def _model(path: Path, layer: str | None) -> Model:
 
 
 def _chip_lines(path: Path | None) -> str:
-    return "\n".join(console_lines(path)) if path else ""
+    return as_lines(read_settings(path)) if path else ""
 
 
 @command("""\b
@@ -66,11 +66,14 @@ Examples:
 @CHIP
 @LAYER
 @click.option(
-    "--force", is_flag=True, help="write even settings of a doubted log, or that drive worse than the board's own"
+    "--force",
+    "doubted",
+    is_flag=True,
+    help="write even settings of a doubted log, or that drive worse than the board's own",
 )
 @JSON
 def export(
-    model_path: Path, output: Path, chip_path: Path | None, layer: str | None, force: bool, json_path: Path | None
+    model_path: Path, output: Path, chip_path: Path | None, layer: str | None, doubted: bool, json_path: Path | None
 ) -> None:
     """Write the console lines that put a model into the chip.
 
@@ -79,11 +82,10 @@ def export(
     less, heat later, get hotter than transforming takes or disturb the ones that are off are refused. So is a model of a log
     that the diagnosis doubted.
     """
-    check_folder(output, json_path)
     model = _model(model_path, layer)
     doubts = list(model.provenance.get("doubts", []))
     with working("driving the old and the new settings") as say:
-        made, worse, drives = checked_settings(model, _chip_lines(chip_path), force, say)
+        made, worse, drives = checked_settings(model, _chip_lines(chip_path), doubted, say)
     left = left_out(model)
     head = [
         f"# from {model_path.name}, by `ninespring export`",
@@ -135,7 +137,7 @@ def verify(
     Before: the settings that the board has (--port, --chip) or the firmware's defaults. After: with what `export` writes
     of the model over them.
     """
-    check_folder(report_path, json_path)
+    check_folder(report_path)
     report = read_bytes(report_path).decode("utf-8", "replace") if report_path else ""
     if report and "</main>" not in report:
         raise InputError("is no report of `ninespring diagnose`", report_path)
@@ -159,4 +161,4 @@ def verify(
 
 def _port_lines(port: str) -> str:
     with Board(port, off_at_end=False) as board:
-        return "\n".join(f"${name}={value}" for name, value in board.settings().items())
+        return as_lines(board.settings())

@@ -15,7 +15,7 @@ from ..infer.intervals import TOLD, correlations, intervals
 from ..infer.problem import Problem
 from ..infer.result import parameters_of
 from ..io import results
-from ..io.logs import Run, check_folder
+from ..io.logs import Run
 from ..io.statistics import rms
 from ..model import effects, native
 from ..model.models import Array, model_text
@@ -57,7 +57,6 @@ def fit(logs: tuple[Path, ...], array_path: Path | None, effects: str, output: P
     is a fixed point of its temperature, and effects of the array that it shows are looked for and named. Errors are root mean squares in K (of v / i: in mohm); numbers are in J/K, W/K, J, s as the table says. Held out: on blocks of two and a
     half minutes that the numbers were not fitted to.
     """
-    check_folder(output, json_path)
     wanted = list(dict.fromkeys(e.strip() for e in effects.split(",") if e.strip()))
     for name in wanted:
         if name not in native.effect_names():

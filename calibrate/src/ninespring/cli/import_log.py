@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..io import importing, ranges, results
-from ..io.logs import check_folder, log_text
+from ..io.logs import log_text
 from .console import FILE, FORCE, JSON, beside, command, number, output, working, write
 
 
@@ -71,8 +71,6 @@ def import_(
 
     SOURCE is a table with a header; or frames: a .npy of (frames, height, width), a .csv, or a folder of .csv.
     """
-    check_folder(output, measured=True, force=force)
-    check_folder(json_path)
     if bool(mapping) == bool(regions):
         raise InputError("give either --map (a table) or --regions (camera frames)")
     if mapping and (log_path or times):

@@ -10,7 +10,7 @@ import click
 from ..errors import InputError
 from ..find.plan import FIRST_S, THROUGH_S, make_plan, plan_experiment, plan_through
 from ..io import ranges, results
-from ..io.logs import check_folder, read_bytes
+from ..io.logs import read_bytes
 from ..model.models import Array
 from .console import ARRAY, FILE, beside, command, model_and_array, number, output, write
 
@@ -61,7 +61,6 @@ def plan(
 
     The springs' temperatures are those of the declared array; the board's own limits hold all the same.
     """
-    check_folder(output)
     if (through is None) != (model_path is None):
         raise InputError("--through and --model go together")
     if through and (diagnosis or array_path or board_alone or duration or current):

@@ -9,7 +9,7 @@ import click
 from ..errors import InputError
 from ..infer.predict import predict
 from ..io import ranges
-from ..io.logs import check_folder, read_log
+from ..io.logs import read_log
 from ..model.models import array_of
 from ..say import plotting
 from .console import ARRAY, FILE, command, model_and_array, notes_of, number, out, output, working, write
@@ -36,7 +36,6 @@ def plot(log: Path, model_path: Path | None, array_path: Path | None, at: float 
         raise InputError("--at is one picture: .png, .svg or .pdf", output)
     if kind not in PICTURES:
         raise InputError(f"'{kind}' is none of {', '.join(PICTURES)}", output)
-    check_folder(output)
     model, array = model_and_array(model_path, array_path)
     run = read_log(log, array.springs if array else None, temperatures=False)
     notes_of([run])

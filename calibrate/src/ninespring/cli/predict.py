@@ -12,7 +12,7 @@ from .. import __version__
 from ..find import plausibility
 from ..infer import predict as prediction
 from ..io import results
-from ..io.logs import check_folder, log_text
+from ..io.logs import log_text
 from ..io.statistics import rms_there
 from ..model import effects
 from ..model.models import read_model
@@ -34,7 +34,6 @@ def predict(log: Path, model_path: Path, output: Path, chip: bool, json_path: Pa
 
     The array is the model's; the log needs no temperatures, and starts at the first ones where it has them.
     """
-    check_folder(output, json_path)
     model = read_model(model_path)
     run = log_of(model, log, temperatures=False)
     run.notes += plausibility.swapped([run]) + plausibility.undriven_but_hottest(run)
@@ -77,7 +76,6 @@ def replay(log: Path, model_path: Path, output: Path, json_path: Path | None) ->
 
     m1_c is what the chip believes, x1 its austenite; y1_c is what the model's sensors would make of m1_c.
     """
-    check_folder(output, json_path)
     model = read_model(model_path)
     run = prediction.in_its_room(model, log_of(model, log, temperatures=False))
     notes_of([run])

@@ -8,7 +8,6 @@ import click
 
 from ..errors import InputError
 from ..io import ranges
-from ..io.logs import check_folder
 from ..model.models import Model, read_model
 from ..model.pattern import pattern_of
 from ..model.simulate import array_parameters, board_settings
@@ -38,7 +37,6 @@ def scenario(model_path: Path, pattern: str | None, fan: int, duration: float, o
 
     Edit it as you like: docs/files.md has the words.
     """
-    check_folder(output)
     model = read_model(model_path)
     on = pattern_of(pattern, model.array) if pattern is not None else [False] * model.array.springs
     if len(model.array.parts) == 1 and model.array.springs > 64:

@@ -8,8 +8,7 @@ import click
 
 from ..errors import InputError
 from ..io import history as kept
-from ..io.board import Board, console_lines
-from ..io.logs import check_folder
+from ..io.board import Board, read_settings
 from ..model import tables
 from .console import FILE, PORT, beside, command, out, output, write
 
@@ -23,10 +22,6 @@ def _default(name: str) -> str | None:
     """Return a setting's built-in value, None where this version does not know it."""
     row = tables.setting(name)
     return f"{row.default:.{row.decimals}f}" if row else None
-
-
-def _of_file(path: Path) -> dict[str, str]:
-    return dict(line[1:].split("=", 1) for line in console_lines(path))
 
 
 def _of_port(port: str) -> tuple[str, dict[str, str]]:
@@ -50,7 +45,6 @@ def read(port: str, output: Path, changed: bool) -> None:
 
     Behind each stands what is built in, where it is another.
     """
-    check_folder(output)
     version, has = _of_port(port)
     lines = [f"# from {port}: {version}"]
     count = 0
@@ -82,8 +76,8 @@ def diff(files: tuple[Path, ...], port: str | None) -> None:
     """
     if len(files) + (port is not None) != 2:
         raise InputError("give two files, or one file and --port")
-    first = _of_file(files[0])
-    second = _of_port(port)[1] if port else _of_file(files[1])
+    first = read_settings(files[0])
+    second = _of_port(port)[1] if port else read_settings(files[1])
     apart = {name for name in first.keys() & second.keys() if float(first[name]) != float(second[name])}
     for name in first:
         if name in apart:

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import click
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
 
 from ..errors import WorkError
@@ -19,9 +18,9 @@ from ..explore.spec import UNITS, named, read_spec
 from ..explore.sweep import best_of, indices_of, local_cluster
 from ..explore.sweep import sweep as run
 from ..io import ranges
-from ..io.logs import check_folder, write_atomically
+from ..io.logs import write_atomically
 from ..io.results import Sweep, checked
-from .console import FILE, FOLDER, JSON, command, err, number, out, output, write
+from .console import FILE, FOLDER, JSON, command, number, out, output, working, write
 from .couplings import need
 
 CONNECT_S = 10
@@ -47,7 +46,6 @@ def sweep(
 
     Stopped or killed, the same command carries on where it was: no point is lost or done twice.
     """
-    check_folder(json_path)
     spec = read_spec(spec_path)
     if check:
         out.print(f"{spec_path}: {spec.points} points, {', '.join(axis.key for axis in spec.axes)}", soft_wrap=True)
@@ -83,21 +81,11 @@ def _run(spec: Any, results: Any, done: Any, scheduler: str | None, workers: int
             raise WorkError(f"no Dask scheduler at {scheduler}: {error}") from None
         if not client.nthreads():
             raise WorkError(f"the Dask scheduler at {scheduler} has no workers: dask worker {scheduler}")
-        progress = stack.enter_context(
-            Progress(
-                TextColumn("points"),
-                BarColumn(),
-                MofNCompleteColumn(),
-                TimeElapsedColumn(),
-                TextColumn("left"),
-                TimeRemainingColumn(),
-                console=err,
-                disable=not err.is_terminal,
-            )
-        )
         out.print(f"Dask's dashboard: {client.dashboard_link}", soft_wrap=True)
-        task = progress.add_task("points", total=spec.points, completed=int(done.sum()))
-        run(client, spec, results, done, lambda count: progress.update(task, completed=count))
+        say = stack.enter_context(working("points", spec.points))
+        tell = lambda count: say(f"{count} of {spec.points} points", count)  # noqa: E731
+        tell(int(done.sum()))
+        run(client, spec, results, done, tell)
 
 
 def _evaluate(spec: Any, results: Any, output: Path, result: Sweep) -> None:

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..model import stiffness
-from ..model.cooling import MATERIALS, Cooling, Material, cooling_of
+from ..model.cooling import MATERIALS, Cooling, Material
 from ..model.models import Array
 from ..model.simulate import array_parameters
 from .mesh import ring_mesh
@@ -134,7 +134,7 @@ def spring_of(array: Array, cooling: Cooling) -> Spring:
 
 def geometry_of(array: Array, rows: int | None = None, cols: int | None = None) -> Geometry:
     """Return an array's geometry, of as many springs as asked; what cannot exist is refused by its numbers."""
-    cooling = cooling_of(array.cooling)
+    cooling = Cooling(**array.cooling)
     springs = {"": spring_of(array, cooling)}
     below = None
     if array.stiffness is not None:

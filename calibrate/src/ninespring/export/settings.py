@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from ..io import results
+from ..io.board import as_lines
 from ..model import effects, native
 from ..model.models import Model
 from ..model.simulate import array_parameters, board_settings
@@ -42,7 +43,7 @@ class Settings:
     @property
     def lines(self) -> str:
         """Console lines, one a setting."""
-        return "".join(f"${name}={value}\n" for name, value in self.written.items())
+        return as_lines(self.written)
 
 
 def best_plant(model: Model, numbers: dict[str, float] | None = None) -> native.Plant:

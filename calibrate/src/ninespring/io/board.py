@@ -9,7 +9,7 @@ import subprocess
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -90,8 +90,12 @@ class Board:
         *,
         stopped: Callable[[], bool] = lambda: False,
         off_at_end: bool = True,
+        simulated: Sequence[str] = (),
     ) -> None:
-        """Open the port and find the board; `stopped` is asked while waiting, and ends it with KeyboardInterrupt."""
+        """Open the port and find the board; `stopped` is asked while waiting, and ends it with KeyboardInterrupt.
+
+        `simulated`: further words for the simulator, where it is started.
+        """
         self.off_at_end = off_at_end
         self.stopped = stopped
         self.version: list[str] = []
@@ -106,13 +110,13 @@ class Board:
         self._guards = False
         """Whether somebody has seen to that setting."""
         self._script_ends = threading.Event()
-        self.thermometers: str | None = None
+        self.thermometers = ""
         """Port of the simulated board's thermometers."""
         self._simulated: subprocess.Popen[str] | None = None
         self.patience = PATIENCE if port == SIMULATED else 1.0
         """Times as long as usual everything may take."""
         if port == SIMULATED:
-            self._simulated, port, self.thermometers = simulated_board()
+            self._simulated, port, self.thermometers = simulated_board(simulated)
         self.port = port
         try:
             self._port = Port(port)
@@ -411,62 +415,52 @@ def shape_of(settings: Mapping[str, str], springs: int) -> tuple[int, int]:
     return (rows, columns) if rows * columns == springs else (1, springs)
 
 
+EACH = {"current_a": "i{}_a", "voltage_v": "v{}_v", "temperature_c": "m{}_c"}
+EACH |= {"low_c": "low{}_c", "high_c": "high{}_c", "austenite": "x{}", "duty": "d{}"}
+"""What a Reading has of each spring, and how its columns are called."""
+BELIEVED = frozenset({"low_c", "high_c", "austenite"})
+"""What of it telemetry does not tell."""
+
+
 def to_pandas(readings: Iterable[Reading]) -> pd.DataFrame:
     """Return readings as a table, a row each, with a log's columns; `low1_c`, `high1_c` and `x1` (0..1) are bounds and phase."""
-    each = {
-        "i{}_a": "current_a",
-        "v{}_v": "voltage_v",
-        "m{}_c": "temperature_c",
-        "low{}_c": "low_c",
-        "high{}_c": "high_c",
-    }
-    each |= {"x{}": "austenite", "d{}": "duty"}
     return pd.DataFrame(
         {"time_s": one.time_s}
         | {
-            column.format(k + 1): value
-            for column, name in each.items()
-            for k, value in enumerate(getattr(one, name).tolist())
+            column.format(k): value
+            for name, column in EACH.items()
+            for k, value in enumerate(getattr(one, name).tolist(), 1)
         }
         | {"fan": one.fan, "ambient_c": one.ambient_c, "state": one.state}
         for one in readings
     )
 
 
-def reading(cells: dict[str, str], believed: Mapping[int, Belief] | None = None) -> Reading:
+def reading(cells: Mapping[str, str], believed: Mapping[int, Belief] | None = None) -> Reading:
     """Return a row of telemetry, and what is believed beside it, as numbers; ValueError where it is none."""
-    springs = sum(re.fullmatch(r"i\d+_a", name) is not None for name in cells)
-
-    def each(name: str) -> np.ndarray:
-        return np.array([float(cells.get(name.format(k), "nan")) for k in range(1, springs + 1)])
+    springs = range(1, 1 + sum(re.fullmatch(r"i\d+_a", name) is not None for name in cells))
 
     def of_each(name: str) -> np.ndarray:
-        return np.array([getattr((believed or {}).get(k), name, math.nan) for k in range(1, springs + 1)])
+        if name in BELIEVED:
+            return np.array([getattr((believed or {}).get(k), name, math.nan) for k in springs])
+        return np.array([float(cells.get(EACH[name].format(k), "nan")) for k in springs])
 
-    return Reading(
-        time_s=float(cells["time_s"]),
-        current_a=each("i{}_a"),
-        voltage_v=each("v{}_v"),
-        temperature_c=each("m{}_c"),
-        duty=each("d{}"),
-        fan=float(cells["fan"]),
-        ambient_c=float(cells["ambient_c"]),
-        state=cells["state"],
-        low_c=of_each("low_c"),
-        high_c=of_each("high_c"),
-        austenite=of_each("austenite"),
-    )
+    of_all = {name: float(cells[name]) for name in ("time_s", "fan", "ambient_c")}
+    return Reading(**of_all, state=cells["state"], **{name: of_each(name) for name in EACH})
 
 
 def send_settings(
-    board: Board, lines: list[str], save: bool = True, say: Callable[[str, int], None] = lambda line, count: None
+    board: Board,
+    settings: Mapping[str, str],
+    save: bool = True,
+    say: Callable[[str, int], None] = lambda line, count: None,
 ) -> None:
-    """Send `$name=value` lines, read them back, save them; what the board has learnt beside its old numbers it forgets.
+    """Send settings, read them back, save them; what the board has learnt beside its old numbers it forgets.
 
     WorkError, and nothing is saved, where the board refuses one or shows another value.
     """
     remarks = board.ask("learnt clear", 10.0)
-    for k, line in enumerate(lines):
+    for k, line in enumerate(as_lines(settings).splitlines()):
         say(line, k)
         try:
             remarks = board.ask(line)
@@ -474,18 +468,17 @@ def send_settings(
             raise WorkError(f"{error}: nothing is saved, a reset of the board gives back what it had") from None
     if remarks:
         raise WorkError(f"the board does not take them together: {remarks[-1]}")
-    say("reading back", len(lines))
-    if wrong := settings_that_differ(lines, board.settings()):
+    say("reading back", len(settings))
+    if wrong := settings_that_differ(settings, board.settings()):
         raise WorkError(f"the board shows other values than were sent, nothing is saved: {'; '.join(wrong)}")
     if save:
         board.ask("$save", 10.0)
 
 
-def settings_that_differ(sent: list[str], has: dict[str, str]) -> list[str]:
-    """Return what a board shows otherwise than it was sent (`$name=value`), in words."""
+def settings_that_differ(sent: Mapping[str, str], has: Mapping[str, str]) -> list[str]:
+    """Return what a board shows otherwise than it was sent, in words."""
     out = []
-    for line in sent:
-        name, value = line[1:].split("=", 1)
+    for name, value in sent.items():
         if name not in has:
             out.append(f"{name} is missing")
         elif float(has[name]) != float(value):
@@ -493,22 +486,27 @@ def settings_that_differ(sent: list[str], has: dict[str, str]) -> list[str]:
     return out
 
 
-def settings_lines(text: str, name: str) -> list[str]:
-    """Return the `$name=value` lines of an exported file; anything else is refused."""
-    out = []
+def as_lines(settings: Mapping[str, str]) -> str:
+    """Return settings as console lines, `$name=value`."""
+    return "".join(f"${name}={value}\n" for name, value in settings.items())
+
+
+def settings_in(text: str, name: str) -> dict[str, str]:
+    """Return the settings of console lines, `$name=value`; anything else is refused."""
+    out = {}
     for number, line in enumerate(text.splitlines(), start=1):
         line = line.partition("#")[0].strip()
         if not line:
             continue
-        if not re.fullmatch(r"\$[a-z0-9_]+=-?\d+(\.\d+)?", line):
+        if not (match := re.fullmatch(r"\$([a-z0-9_]+)=(-?\d+(?:\.\d+)?)", line)):
             raise InputError(f"'{line[:40]}' is not a setting, `$name=value`", name, number, 1)
-        out.append(line)
+        out[match[1]] = match[2]
     if not out:
         raise InputError("no setting in it", name)
     return out
 
 
-def console_lines(path: Path) -> list[str]:
-    """Return the `$name=value` lines of a file, also where `$$` told units behind the values; anything else is refused."""
+def read_settings(path: Path) -> dict[str, str]:
+    """Return the settings of a file of console lines, also where `$$` told units behind the values; anything else is refused."""
     text = re.sub(r"^(\$\S+=\S+)[ \t].*$", r"\1", read_bytes(path).decode("utf-8", "replace"), flags=re.M)
-    return settings_lines(text, str(path))
+    return settings_in(text, str(path))

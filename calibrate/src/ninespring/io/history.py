@@ -14,7 +14,7 @@ from serial.tools import list_ports
 
 from .. import __version__
 from ..errors import InputError, WorkError
-from .board import Board, send_settings, settings_that_differ
+from .board import Board, as_lines, send_settings, settings_that_differ
 from .logs import read_bytes, write_atomically
 
 HOME = "NINESPRING_HOME"
@@ -73,8 +73,7 @@ def keep(port: str, version: str, by: str, before: Mapping[str, str], sent: Mapp
         f"# tool: ninespring {__version__}",
     ]
     lines += [f"# sent ${name}={value}" for name, value in sent.items()]
-    lines += [f"${name}={value}" for name, value in before.items()]
-    write_atomically({path: "\n".join(lines) + "\n"})
+    write_atomically({path: "\n".join([*lines, as_lines(before)])})
     return path
 
 
@@ -94,17 +93,17 @@ def _read(path: Path) -> Entry:
 
 def send(
     port: str,
-    lines: list[str],
+    settings: Mapping[str, str],
     by: str,
     save: bool = True,
     say: Callable[[str, int], None] = lambda line, count: None,
 ) -> None:
-    """Send `$name=value` lines to a board, read them back, save them; what it had before is kept, where they are saved."""
+    """Send settings to a board, read them back, save them; what it had before is kept, where they are saved."""
     with Board(port, off_at_end=False) as board:
         before = board.settings()
-        send_settings(board, lines, save, say)
+        send_settings(board, settings, save, say)
         if save:
-            keep(port, board.version[0], by, before, dict(line[1:].split("=", 1) for line in lines))
+            keep(port, board.version[0], by, before, settings)
 
 
 def undo(board: Board, save: bool = True) -> Entry:
@@ -117,11 +116,11 @@ def undo(board: Board, save: bool = True) -> Entry:
         raise WorkError(f"{board.port}: no upload to this board is kept on this computer ({of_board(board.port)})")
     last = kept[-1]
     now = board.settings()
-    if other := settings_that_differ([f"${name}={value}" for name, value in last.sent.items()], now):
+    if other := settings_that_differ(last.sent, now):
         raise WorkError(
             f"the board has not what `{last.by}` sent on {last.when}: {'; '.join(other[:3])}. It is another board, or was set "
             f"since; {last.path} holds what was kept, `ninespring upload` takes it"
         )
-    send_settings(board, [f"${name}={last.before[name]}" for name in last.sent if name in last.before], save)
+    send_settings(board, {name: last.before[name] for name in last.sent if name in last.before}, save)
     last.path.rename(last.path.with_suffix(UNDONE))
     return last

@@ -14,6 +14,8 @@ import statistics
 import threading
 import time
 from collections import deque
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
 
 from ..errors import WorkError
 from .logs import LIMITS
@@ -202,3 +204,13 @@ class Thermometers:
         self._closing.set()
         self._thread.join(2)
         self._port.close()
+
+
+@contextmanager
+def measuring(port: str | None) -> Iterator[Thermometers | None]:
+    """Yield a logger's thermometers while they are needed; None where no port is given."""
+    if not port:
+        yield None
+    else:
+        with closing(Thermometers(port)) as thermometers:
+            yield thermometers

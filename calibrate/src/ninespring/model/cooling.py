@@ -5,9 +5,7 @@ Nothing heavy is imported here: every reader of array.toml knows these keys.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 DIRECTIONS = ("east", "south", "west", "north")
 """Where the fan's air goes, in the order of the plant's `wake_direction`."""
@@ -67,8 +65,3 @@ class Cooling:
     """From one plate; left out: from plate to plate."""
     surface_c: float = 105.0
     """Of the springs, where the coefficients of convection and radiation are taken."""
-
-
-def cooling_of(table: Mapping[str, Any]) -> Cooling:
-    """Return a checked `[cooling]` table with its defaults."""
-    return Cooling(**table)

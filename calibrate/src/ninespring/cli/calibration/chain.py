@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -21,7 +21,7 @@ from ...find import diagnosis
 from ...find.plan import make_plan
 from ...infer.predict import chip_errors
 from ...io import history, results
-from ...io.board import Board, send_settings, settings_that_differ
+from ...io.board import Board, as_lines, send_settings, settings_that_differ
 from ...io.logs import Run, read_bytes, read_log, write_atomically
 from ...io.logs.mending import RUN_IN_S
 from ...io.recording import LogFile, Recording, Step, about, record, script_lines, told_to_stop
@@ -222,22 +222,15 @@ class Calibration:
 
     def _record(self, log: str, steps: Sequence[Step], duration_s: float, words: str) -> Recording:
         """Record into the folder; the springs are off afterwards and the board has its own settings."""
-        with told_to_stop() as stopped, working(words, duration_s) as say, self._logger() as logger:
-            file = LogFile(self.folder / log)
+        with (
+            told_to_stop() as stopped,
+            working(words, duration_s) as say,
+            self._logger() as logger,
+            contextlib.closing(LogFile(self.folder / log)) as file,
+        ):
+            left = lambda rows, seconds: say(f"{words}, {max(0.0, duration_s - seconds):.0f} s left", seconds)  # noqa: E731
             self.board.stopped = stopped
-            try:
-                got = record(
-                    self.board,
-                    file,
-                    1,
-                    duration_s,
-                    steps,
-                    lambda rows, seconds: say(f"{words}, {max(0.0, duration_s - seconds):.0f} s left", seconds),
-                    about(self.board.port, " calibrate"),
-                    logger,
-                )
-            finally:
-                file.close()
+            got = record(self.board, file, 1, duration_s, steps, left, about(self.board.port, " calibrate"), logger)
             self.board.stopped = lambda: False
             told = stopped()
         if not file.rows:
@@ -250,8 +243,7 @@ class Calibration:
 
     @contextlib.contextmanager
     def _logger(self) -> Iterator[Thermometers]:
-        logger = Thermometers(self._thermometers)
-        try:
+        with contextlib.closing(Thermometers(self._thermometers)) as logger:
             missing = set(range(1, self.array.springs + 1)) - set(logger.springs)
             if missing:
                 raise WorkError(
@@ -259,8 +251,6 @@ class Calibration:
                     "the logger's columns are t1_c, t2_c, ... (docs/calibrating.md)"
                 )
             yield logger
-        finally:
-            logger.close()
 
     def _cool(self) -> None:
         """Wait until the thermometers have stopped falling: two drives are only alike from the same temperature."""
@@ -346,15 +336,15 @@ class Calibration:
             )
             self._tell(
                 "export",
-                f"{len(made.written)} settings were determined, {len(settings_that_differ(self._lines(), self.had))} of "
+                f"{len(made.written)} settings were determined, {len(settings_that_differ(self._found(), self.had))} of "
                 "them are others than the board has; in simulation they drive "
                 + ("worse: " + "; ".join(worse) if worse else "no worse"),
             )
         if worse := self.progress.done["export"]["worse"]:
             self._refuse(f"the new settings would drive worse: {'; '.join(worse)}")
 
-    def _lines(self) -> list[str]:
-        return [f"${name}={value}" for name, value in self.progress.done["export"]["settings"].items()]
+    def _found(self) -> dict[str, str]:
+        return self.progress.done["export"]["settings"]
 
     # ---- onto the board
 
@@ -376,9 +366,9 @@ class Calibration:
         if "after" in self.progress.done:
             self._say_how_it_ended()
             return
-        lines = self._lines()
+        settings = self._found()
         pattern, seconds = self.progress.option("pattern"), self.progress.option("drive_for")
-        changed = settings_that_differ(lines, self.had)
+        changed = settings_that_differ(settings, self.had)
         if not changed:
             self.progress.keep("after", {"saved": False, "worse": [], "drives": []})
             self._tell("upload", "the board has these settings already: nothing is written")
@@ -402,9 +392,9 @@ class Calibration:
         before = self.progress.done["before"]
         saved = False
         try:
-            with working("sending the settings", len(lines)) as say:
-                send_settings(self.board, lines, False, say)
-            self._tell("upload", f"{len(lines)} settings sent and read back, not yet saved")
+            with working("sending the settings", len(settings)) as say:
+                send_settings(self.board, settings, False, say)
+            self._tell("upload", f"{len(settings)} settings sent and read back, not yet saved")
             drives, worse = [], []
             for _ in range(DRIVES):
                 log, got = self._drive("after", pattern)
@@ -419,12 +409,11 @@ class Calibration:
             if not worse:
                 self.board.ask("$save", 10.0)
                 saved = True
-                sent = dict(line[1:].split("=", 1) for line in lines)
                 by = f"calibrate -o {self.folder.name}"
-                history.keep(self.board.port, self.board.version[0], by, self.had, sent)
+                history.keep(self.board.port, self.board.version[0], by, self.had, settings)
         finally:
             if not saved:
-                self._take_back(lines)
+                self._take_back(settings)
         self.progress.keep("after", {"saved": saved, "worse": worse, "drives": drives}, *(one["log"] for one in drives))
         self._say_how_it_ended()
 
@@ -436,12 +425,11 @@ class Calibration:
             )
         self._tell("upload", "the new settings are saved" if after["saved"] else "there was nothing to write")
 
-    def _take_back(self, lines: Sequence[str]) -> None:
+    def _take_back(self, settings: Mapping[str, str]) -> None:
         """Give the board back the settings that it had in place of these: nothing of them was saved."""
-        names = [line[1:].partition("=")[0] for line in lines]
-        old = [f"${name}={self.had[name]}" for name in names if name in self.had]
+        old = {name: self.had[name] for name in settings if name in self.had}
         try:
-            for line in old:
+            for line in as_lines(old).splitlines():
                 self.board.ask(line)
             wrong = settings_that_differ(old, self.board.settings())
         except (WorkError, KeyboardInterrupt):
@@ -452,11 +440,6 @@ class Calibration:
             )
         else:
             self._tell("", "the board has its own settings again; none was saved")
-
-
-def as_lines(settings: dict[str, str]) -> str:
-    """Return settings as console lines."""
-    return "".join(f"${name}={value}\n" for name, value in settings.items())
 
 
 def _words(how: str, found: dict[str, float], faults: Sequence[Any]) -> str:

@@ -45,6 +45,8 @@ def page(progress: Progress, array: Array) -> str:
     """Return the report of what is done so far, as HTML."""
     done = progress.done
     drives = [one for one in (done.get("before"), *done.get("after", {}).get("drives", [])) if one]
+    verified = done.get("verify", {})
+    errors = [results.read(results.ChipError, verified[when]) for when in ("before", "after") if when in verified]
     return render(
         "calibration.html",
         title="Ninespring calibration",
@@ -54,7 +56,7 @@ def page(progress: Progress, array: Array) -> str:
         drives=_drives(progress, array, drives) if drives else None,
         diagnosed=done["diagnose"],
         diagnosis=DIAGNOSIS,
-        verified=_verified(done["verify"]) if "verify" in done else None,
+        verified=error_rows(*errors) if errors else None,
         exported=_exported(progress) if "export" in done else None,
         measured=_measured(progress),
         tool=progress.data["tool"],
@@ -103,10 +105,6 @@ def _picture(progress: Progress, array: Array, shown: Sequence[dict[str, Any]], 
     axes[0][0].legend(fontsize=8, frameon=False, loc="lower right")
     figure.tight_layout()
     return as_svg(figure)
-
-
-def _verified(errors: dict[str, Any]) -> list[tuple[str, str, str]]:
-    return error_rows(*(results.read(results.ChipError, errors[when]) for when in ("before", "after")))
 
 
 def _exported(progress: Progress) -> dict[str, Any]:
