@@ -8,8 +8,8 @@ import click
 import ninespring as ns
 import numpy as np
 import pytest
-from command import ended
-from ninespring.cli.console import Real, Whole
+from command import ended, ninespring
+from ninespring.cli.console import Command, Real, Whole
 from ninespring.cli.main import COMMANDS, cli
 from ninespring.io import ranges
 from ninespring.io.logs import kind_of, write_atomically
@@ -55,6 +55,7 @@ def derived(make_log, tmp_path: Path) -> dict[str, list[str]]:
         "p.csv": ["predict", str(log), *given],
         "steps.txt": ["plan", "--duration", "300"],
         "run.ini": ["scenario", *given],
+        "s.txt": ["export", *given],
         "p.png": ["plot", str(log)],
         "p.gif": ["plot", str(log)],
     }
@@ -67,12 +68,38 @@ def test_what_is_derived_replaces_its_like_and_nothing_else(derived, tmp_path: P
         for _ in range(2):
             assert ended(*words, "-o", output)[0] == 0
         kinds.append(kind_of(output.read_bytes()))
-    assert kinds == ["what predict wrote", "a plan", "a scenario", "a picture of a log", "a picture of a log"]
+    pictures = ["a picture of a log"] * 2
+    assert kinds == ["what predict wrote", "a plan", "a scenario", "settings", *pictures]
     before = (tmp_path / "steps.txt").read_bytes()
     code, said = ended(*derived["run.ini"], "-o", tmp_path / "steps.txt")
     assert code == 2 and "is a plan, and a scenario would take its place" in said
     assert (tmp_path / "steps.txt").read_bytes() == before
     assert not [one for one in tmp_path.iterdir() if one.name.startswith(".")]
+
+
+def test_an_input_is_never_written_over_by_name_link_or_second_name(derived, tmp_path: Path) -> None:
+    for name in set(COMMANDS) - {"settings"}:
+        assert isinstance(cli.get_command(click.Context(cli), name), Command)
+    for number, one in enumerate((tmp_path / "run.csv", tmp_path / "m.toml")):
+        before = one.read_bytes()
+        link, second = tmp_path / f"link{number}", tmp_path / f"second{number}"
+        link.symlink_to(one)
+        second.hardlink_to(one)
+        for output in (one, link, second, tmp_path / "." / one.name):
+            code, said = ended(*derived["p.csv"], "-o", output)
+            assert code == 2 and "it is read" in said
+        assert one.read_bytes() == before and link.is_symlink()
+    code, said = ended(*derived["p.csv"], "-o", tmp_path / "p.csv", "--json", tmp_path / "p.csv")
+    assert code == 2 and "cannot be written into one file" in said
+
+
+def test_a_dash_prints_the_result_and_nothing_else(derived, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name in ("p.csv", "steps.txt", "run.ini", "s.txt"):
+        printed = ninespring(*derived[name], "-o", "-").stdout
+        assert ended(*derived[name], "-o", name)[0] == 0
+        assert printed.replace("record --run -", f"record --run {name}") == Path(name).read_text()
+    assert not Path("-").exists()
 
 
 def test_a_log_or_somebodys_own_file_is_never_replaced(derived, tmp_path: Path) -> None:

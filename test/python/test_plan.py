@@ -8,8 +8,7 @@ from pathlib import Path
 import ninespring as ns
 import numpy as np
 import pytest
-from click.testing import CliRunner
-from ninespring.cli import main as cli
+from command import ended
 from ninespring.errors import InputError
 from ninespring.find import plan
 from ninespring.io import results
@@ -92,8 +91,7 @@ def test_what_cannot_be_planned_is_refused(tmp_path: Path) -> None:
         plan.make_plan(Array(), 100.0, 1.7, 14.0, 105.0)
     with pytest.raises(InputError, match="do not drive one spring"):
         plan.make_plan(Array(), 900.0, 1.7, 1.0, 105.0)
-    done = CliRunner().invoke(cli.cli, ["plan", "-o", str(tmp_path / "steps.txt")])
-    assert done.exit_code == 0, done.output
+    assert ended("plan", "-o", tmp_path / "steps.txt")[0] == 0
     text = (tmp_path / "steps.txt").read_text()
     assert "at most" in text and script_lines(text, "steps.txt", 900.0)[0].line == "policy open"
 
@@ -120,8 +118,7 @@ ASKED = {
 def test_the_experiment_that_a_diagnosis_asks_for_is_planned_within_the_limits(tmp_path: Path) -> None:
     told, steps = tmp_path / "diagnosis.json", tmp_path / "steps.txt"
     told.write_text(json.dumps({"rivals": [{"experiment": {"name": "of a table"}}, ASKED]}))
-    done = CliRunner().invoke(cli.cli, ["plan", "--for", str(told), "-o", str(steps)])
-    assert done.exit_code == 0, done.output
+    assert ended("plan", "--for", told, "-o", steps)[0] == 0
     text = steps.read_text()
     assert text.startswith("# staircase: all springs on; watch spring 5\n") and "--duration 610" in text
     lines = script_lines(text, "steps.txt", 610.0)
@@ -141,8 +138,5 @@ def test_the_experiment_that_a_diagnosis_asks_for_is_planned_within_the_limits(t
 )
 def test_what_asks_for_no_experiment_is_said(tmp_path: Path, text: str, said: str) -> None:
     (tmp_path / "diagnosis.json").write_text(text)
-    done = CliRunner().invoke(
-        cli.cli, ["plan", "--for", str(tmp_path / "diagnosis.json"), "-o", str(tmp_path / "x.txt")]
-    )
-    assert isinstance(done.exception, InputError) and said in str(done.exception)
-    assert not (tmp_path / "x.txt").exists()
+    code, told = ended("plan", "--for", tmp_path / "diagnosis.json", "-o", tmp_path / "x.txt")
+    assert code == 2 and said in told and not (tmp_path / "x.txt").exists()

@@ -8,9 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
+from command import ended
 from made import SIM, needs_simulator
-from ninespring.cli import main as cli
 from ninespring.errors import InputError
 from ninespring.explore.point import run_point
 from ninespring.explore.spec import read_spec
@@ -23,10 +22,6 @@ from ninespring.model.simulate import array_parameters
 from ninespring.say import plotting
 
 HEAD = "[array]\nrows = 3\ncols = 3\npitch_mm = 5\n"
-
-
-def run(*words: object) -> object:
-    return CliRunner().invoke(cli.cli, [str(one) for one in words])
 
 
 def array_of(folder: Path, text: str) -> Array:
@@ -134,8 +129,8 @@ def test_a_bad_pattern_is_refused(tmp_path: Path, text: str, says: str) -> None:
     with pytest.raises(InputError, match=says):
         pattern_of(text, Array(stiffness={}))
     (tmp_path / "model.toml").write_text(model_text(Model(Array(stiffness={}))))
-    done = run("scenario", "--model", tmp_path / "model.toml", "--pattern", text, "-o", tmp_path / "run.ini")
-    assert isinstance(done.exception, InputError) and not (tmp_path / "run.ini").exists()
+    assert ended("scenario", "--model", tmp_path / "model.toml", "--pattern", text, "-o", tmp_path / "run.ini")[0] == 2
+    assert not (tmp_path / "run.ini").exists()
 
 
 def test_patterns_of_both_layers() -> None:
@@ -173,15 +168,15 @@ def test_a_layers_model_is_what_its_board_exports() -> None:
 
 def test_what_knows_one_layer_refuses_two(tmp_path: Path) -> None:
     (tmp_path / "model.toml").write_text(model_text(Model(Array(stiffness={}))))
-    done = run("export", "--model", tmp_path / "model.toml", "-o", tmp_path / "s.txt")
-    assert isinstance(done.exception, InputError) and "--layer elongation or --layer stiffness" in str(done.exception)
+    code, said = ended("export", "--model", tmp_path / "model.toml", "-o", tmp_path / "s.txt")
+    assert code == 2 and "--layer elongation or --layer stiffness" in said
     columns = [f"i{k}_a" for k in range(1, 19)] + [f"t{k}_c" for k in range(1, 19)]
     rows = [",".join([str(second)] + ["1"] * 18 + [f"{20 + second / 10:.2f}"] * 18) for second in range(60)]
     log = tmp_path / "log.csv"
     log.write_text("# layers: 2\n" + ",".join(["time_s", *columns]) + "\n" + "\n".join(rows) + "\n")
     assert read_log(log).layers == 2
-    done = run("diagnose", log, "-o", tmp_path / "d")
-    assert isinstance(done.exception, InputError) and "fit and diagnose know one layer" in str(done.exception)
+    code, said = ended("diagnose", log, "-o", tmp_path / "d")
+    assert code == 2 and "fit and diagnose know one layer" in said
     log.write_text(log.read_text().replace("layers: 2", "layers: 3"))
     with pytest.raises(InputError, match="there are 1 or 2"):
         read_log(log)
@@ -217,16 +212,15 @@ def test_from_geometry_to_a_picture(tmp_path: Path) -> None:
         '[array]\nrows = 1\ncols = 2\npitch_mm = 6\n[cooling]\nplate = "none"\n'
         "[stiffness]\ncoil_diameter_mm = 2.8\n[board.2]\nsupply_limit_a = 2\n"
     )
-    done = run("couplings", at["array.toml"], "--mesh", "coarse", "-o", at["model.toml"])
-    assert done.exit_code == 0, done.output
+    assert ended("couplings", at["array.toml"], "--mesh", "coarse", "-o", at["model.toml"])[0] == 0
     values = read_model(at["model.toml"]).parameters
     # a thinner coil of as many turns: less wire, less to the air, less from one to the other
     assert values["loss_w_per_k[3]"] < 0.95 * values["loss_w_per_k"]
     assert values["heat_capacity_j_per_k[4]"] == pytest.approx(0.82 * values["heat_capacity_j_per_k"], rel=0.03)
     assert values["stiffness_coupling_scale"] < 0.9
     assert 2e-4 < values["series_w_per_k"] < 5e-4 < values["loss_w_per_k[3]"]
-    done = run("scenario", "--model", at["model.toml"], "--pattern", "11/01", "--duration", 120, "-o", at["run.ini"])
-    assert done.exit_code == 0, done.output
+    words = ("--model", at["model.toml"], "--pattern", "11/01", "--duration", 120)
+    assert ended("scenario", *words, "-o", at["run.ini"])[0] == 0
     subprocess.run([SIM, "run", str(at["run.ini"]), "-o", str(at["run.csv"])], check=True, capture_output=True)
     log = read_log(at["run.csv"])
     assert log.springs == 4
@@ -235,8 +229,7 @@ def test_from_geometry_to_a_picture(tmp_path: Path) -> None:
     # driven above only, the stiffness spring is warmed and does not move
     assert 22 < log.temperature_c[:, 2].max() < 60
     for output, more in ((at["run.png"], ()), (at["map.png"], ("--at", 100))):
-        done = run("plot", at["run.csv"], "--model", at["model.toml"], *more, "-o", output)
-        assert done.exit_code == 0, done.output
+        assert ended("plot", at["run.csv"], "--model", at["model.toml"], *more, "-o", output)[0] == 0
         assert output.read_bytes()[:4] == b"\x89PNG"
 
 

@@ -6,16 +6,13 @@ import itertools
 import json
 import os
 import signal
-import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
-from ninespring.cli import main as cli
+from command import alone, ended
 from ninespring.errors import InputError
 from ninespring.explore import point, sweep
 from ninespring.explore.results import Results
@@ -321,47 +318,27 @@ def test_every_pattern_is_a_point_of_its_own(tmp_path: Path) -> None:
 )
 def test_a_bad_spec_is_refused_whole(tmp_path: Path, text: str, says: str) -> None:
     (tmp_path / "spec.toml").write_text(text)
-    done = CliRunner().invoke(cli.cli, ["sweep", str(tmp_path / "spec.toml"), "-o", str(tmp_path / "out")])
-    assert isinstance(done.exception, InputError), done.output
-    assert says in str(done.exception) and str(tmp_path / "spec.toml") in str(done.exception)
+    code, said = ended("sweep", tmp_path / "spec.toml", "-o", tmp_path / "out")
+    assert code == 2 and says in said and str(tmp_path / "spec.toml") in said
     assert not (tmp_path / "out").exists()
 
 
 def test_the_command_runs_and_says_where_the_dashboard_is(tmp_path: Path) -> None:
     (tmp_path / "spec.toml").write_text(GRID)
-    words = [sys.executable, "-m", "ninespring", "sweep", "spec.toml", "-o", "out"]
-    looked = subprocess.run([*words, "--check"], cwd=tmp_path, capture_output=True, text=True, check=True, timeout=60)
+    looked = alone("sweep", "spec.toml", "-o", "out", "--check", cwd=tmp_path)
     assert "6 points, pitch_mm, fan" in looked.stdout and not (tmp_path / "out").exists()
-    done = subprocess.run(
-        [*words, "--workers", "1", "--json", "r.json"],
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=600,
-    )
+    done = alone("sweep", "spec.toml", "-o", "out", "--workers", 1, "--json", "r.json", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert "Dask's dashboard: http://127.0.0.1:" in done.stdout and "6 points in out/points" in done.stdout
     assert json.loads((tmp_path / "r.json").read_text())["points"] == 6
-    nowhere = subprocess.run(
-        [*words[:-1], "other", "--scheduler", "tcp://127.0.0.1:9"],
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=600,
-    )
+    nowhere = alone("sweep", "spec.toml", "-o", "other", "--scheduler", "tcp://127.0.0.1:9", cwd=tmp_path)
     assert nowhere.returncode == 1 and "no Dask scheduler" in nowhere.stderr
 
 
 def test_a_cluster_as_it_stands_is_used(tmp_path: Path, client: Any) -> None:
-    (tmp_path / "spec.toml").write_text(GRID)
-    words = ["sweep", str(tmp_path / "spec.toml"), "-o", str(tmp_path / "out"), "--scheduler"]
-    done = CliRunner().invoke(cli.cli, [*words, client.scheduler.address])
-    assert done.exit_code == 0, done.output
-    assert (
-        client.dashboard_link in done.output and len(Results(tmp_path / "out", read_spec(Path(words[1]))).read()) == 6
-    )
+    spec = spec_of(tmp_path, GRID)
+    code, said = ended("sweep", tmp_path / "spec.toml", "-o", tmp_path / "out", "--scheduler", client.scheduler.address)
+    assert code == 0 and client.dashboard_link in said and len(Results(tmp_path / "out", spec).read()) == 6
 
 
 def test_one_point_is_what_the_controller_does(tmp_path: Path) -> None:

@@ -7,11 +7,11 @@ import pty
 import re
 import select
 import subprocess
-import sys
 import time
 from pathlib import Path
 
 import pytest
+from command import alone, process
 from fake_board import FakeBoard, row
 from made import needs_board
 from ninespring.cli.terminal import Known, words_of
@@ -72,8 +72,8 @@ def at_a_terminal(port: str, typed: list[str], until: str, seconds: float = 40.0
     """Type at `ninespring console` in a terminal of its own, each text when the last was answered; return how it ended."""
     master, slave = pty.openpty()
     environment = os.environ | {"TERM": "xterm", "COLUMNS": "120", "LINES": "40"}
-    command = [sys.executable, "-m", "ninespring", "console", "--port", port]
-    with subprocess.Popen(command, stdin=slave, stdout=slave, stderr=slave, env=environment) as process:
+    command = process("console", "--port", port)
+    with subprocess.Popen(command, stdin=slave, stdout=slave, stderr=slave, env=environment) as running:
         os.close(slave)
         seen, ends = "", time.monotonic() + seconds
 
@@ -96,13 +96,13 @@ def at_a_terminal(port: str, typed: list[str], until: str, seconds: float = 40.0
         while not re.search(until, seen) and time.monotonic() < ends:
             read()
         os.write(master, b"\x04")
-        while process.poll() is None and time.monotonic() < ends:
+        while running.poll() is None and time.monotonic() < ends:
             read()
         read()
-        if process.poll() is None:
-            process.kill()
+        if running.poll() is None:
+            running.kill()
     os.close(master)
-    return process.returncode, seen
+    return running.returncode, seen
 
 
 def test_what_is_typed_is_completed_sent_and_answered_and_a_stop_acts_as_it_is_pressed() -> None:
@@ -125,18 +125,13 @@ def test_what_is_typed_is_completed_sent_and_answered_and_a_stop_acts_as_it_is_p
     assert "+telemetry csv 1" in history.read_text()
 
 
-def piped(port: str, text: str) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "ninespring", "console", "--port", port]
-    return subprocess.run(command, input=text, capture_output=True, text=True, timeout=60, check=False)
-
-
 def test_lines_from_a_pipe_are_answered_one_after_the_other() -> None:
     fake = FakeBoard({"faults": ["spring 2: fault 2 open", "ok"], "on 99": ["error:5 out of range", "ok"][:1]})
-    done = piped(fake.port, "faults\n\n?\n")
+    done = alone("console", "--port", fake.port, input="faults\n\n?\n")
     assert done.returncode == 0, done.stderr
     assert done.stdout.splitlines() == ["spring 2: fault 2 open", "ok", *done.stdout.splitlines()[2:3]]
     assert done.stdout.splitlines()[2].startswith("<off|")
-    done = piped(fake.port, "on 99\nfaults\n")
+    done = alone("console", "--port", fake.port, input="on 99\nfaults\n")
     assert done.returncode == 1
     assert "refused: error 5" in done.stdout
     assert "1 of these lines was refused" in done.stderr
@@ -144,14 +139,7 @@ def test_lines_from_a_pipe_are_answered_one_after_the_other() -> None:
 
 @needs_board
 def test_the_words_of_the_board_itself_are_known() -> None:
-    done = subprocess.run(
-        [sys.executable, "-m", "ninespring", "console", "--simulate"],
-        input="help\n",
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=False,
-    )
+    done = alone("console", "--simulate", input="help\n")
     assert done.returncode == 0, done.stderr
     words = words_of(done.stdout.splitlines())
     assert {"on", "off", "pattern", "model", "supply", "telemetry"} <= set(words)
