@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
+import json
 import os
 from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
+from command import ended
 from made import an_effect
-from ninespring.cli.main import cli
-from ninespring.errors import InputError, WorkError
 from ninespring.export import drive
 from ninespring.export.settings import judged, left_out, settings_of, together
 from ninespring.find import diagnosis
@@ -18,13 +17,6 @@ from ninespring.infer.predict import predict_by_chip
 from ninespring.io.logs import read_log, write_atomically
 from ninespring.model import native
 from ninespring.model.models import Array, Model, model_text, read_model
-
-
-def run(*words: object) -> str:
-    done = CliRunner().invoke(cli, [str(w) for w in words], catch_exceptions=True)
-    if done.exception and not isinstance(done.exception, SystemExit):
-        raise done.exception
-    return done.output
 
 
 def lukewarm(columns: dict[str, np.ndarray]) -> None:
@@ -45,7 +37,7 @@ def cold(make_log, tmp_path: Path) -> Path:
 
 
 def test_what_the_log_never_reached_is_not_written_and_the_file_says_so(cold: Path, tmp_path: Path) -> None:
-    run("export", "--model", cold, "-o", tmp_path / "s.txt")
+    ended("export", "--model", cold, "-o", tmp_path / "s.txt")
     lines = (tmp_path / "s.txt").read_text().splitlines()
     names = {line[1:].split("=")[0] for line in lines if line.startswith("$")}
     assert {"heat_capacity_j_per_k", "loss_w_per_k", "orthogonal_w_per_k"} <= names
@@ -132,10 +124,9 @@ def test_settings_that_drive_worse_are_refused_and_written_only_by_force(
     made = settings_of(read_model(path))
     made.written |= {"loss_w_per_k": "0.002000"}  # too little power to hold anything
     monkeypatch.setattr("ninespring.export.drive.settings_of", lambda model: made)
-    with pytest.raises(WorkError) as refused:
-        run("export", "--model", path, "-o", out)
-    assert "would drive worse" in str(refused.value) and not out.exists()
-    run("export", "--model", path, "-o", out, "--force")
+    code, said = ended("export", "--model", path, "-o", out)
+    assert code == 1 and "would drive worse" in said and not out.exists()
+    ended("export", "--model", path, "-o", out, "--force")
     assert "$loss_w_per_k=0.002000" in out.read_text() and "# worse, written by --force" in out.read_text()
 
 
@@ -204,8 +195,8 @@ def test_a_spring_that_differs_is_written(make_log) -> None:
 
 def test_what_rests_on_a_declared_resistance_is_said_and_not_written(make_log, tmp_path: Path) -> None:
     log = make_log(columns="i", effects={"latent_heat": {"latent_heat_j": 8.0}})
-    assert "in proportion to the declared 0.175 ohm only" in run("diagnose", log, "-o", tmp_path / "d")
-    run("export", "--model", tmp_path / "d" / "model.toml", "-o", tmp_path / "s.txt")
+    assert "in proportion to the declared 0.175 ohm only" in ended("diagnose", log, "-o", tmp_path / "d")[1]
+    ended("export", "--model", tmp_path / "d" / "model.toml", "-o", tmp_path / "s.txt")
     lines = (tmp_path / "s.txt").read_text().splitlines()
     assert {line.split("=")[0] for line in lines if line.startswith("$")} == {"$rows", "$columns"}
     assert any("no voltages were logged" in line for line in lines)
@@ -221,14 +212,13 @@ def test_a_model_of_a_doubted_log_is_refused_and_written_only_by_force(make_log,
 
     log, out = make_log(change=swap), tmp_path / "s.txt"
     for made in (["diagnose", log, "-o", tmp_path / "d"], ["fit", log, "-o", tmp_path / "d" / "model.toml"]):
-        run(*made)
-        with pytest.raises(WorkError) as refused:
-            run("export", "--model", tmp_path / "d" / "model.toml", "-o", out)
-        assert "the log of this model is doubted" in str(refused.value) and "columns swapped?" in str(refused.value)
+        ended(*made)
+        code, said = ended("export", "--model", tmp_path / "d" / "model.toml", "-o", out)
+        assert code == 1 and "the log of this model is doubted" in said and "columns swapped?" in said
         assert not out.exists()
     page = (tmp_path / "d" / "report.html").read_text()
     assert "ninespring export" not in page and "# t1_c follows the drive of spring 2" in page
-    run("export", "--model", tmp_path / "d" / "model.toml", "-o", out, "--force")
+    ended("export", "--model", tmp_path / "d" / "model.toml", "-o", out, "--force")
     assert "# doubted, written by --force: t2_c follows the drive of spring 1" in out.read_text()
 
 
@@ -269,21 +259,20 @@ def test_heating_takes_longer_where_it_does_each_time_and_nothing_makes_up_for_i
 def test_the_chips_error_is_told_before_and_after_on_a_log_that_was_not_fitted(make_log, tmp_path: Path) -> None:
     other = {"spring_mismatch": {"loss_scale[5]": 1.3}}
     fitted, fresh = make_log("fitted.csv", effects=other, seed=1), make_log("fresh.csv", effects=other, seed=2)
-    run("diagnose", fitted, "-o", tmp_path / "d")
-    said = run("verify", "--model", tmp_path / "d" / "model.toml", fresh, "--json", tmp_path / "v.json")
+    ended("diagnose", fitted, "-o", tmp_path / "d")
+    said = ended("verify", "--model", tmp_path / "d" / "model.toml", fresh, "--json", tmp_path / "v.json")[1]
     assert "as it is" in said
-    result = __import__("json").loads((tmp_path / "v.json").read_text())
+    result = json.loads((tmp_path / "v.json").read_text())
     assert result["after"]["rmse_c"] < 0.5 < result["before"]["rmse_c"]
     report = tmp_path / "d" / "report.html"
     for _ in range(2):
-        run("verify", "--model", tmp_path / "d" / "model.toml", fresh, "--report", report)
+        ended("verify", "--model", tmp_path / "d" / "model.toml", fresh, "--report", report)
     page = report.read_text()
     assert page.count("The chip on fresh.csv, which the fit never saw") == 1, "what was said before is replaced"
     assert f"{result['after']['rmse_c']:.2f}" in page and page.rstrip().endswith("</html>")
-    with pytest.raises(InputError, match="is there already"):
-        run("verify", "--model", tmp_path / "d" / "model.toml", fresh, "--report", fresh)
-    with pytest.raises(InputError, match="never saw"):
-        run("verify", "--model", tmp_path / "d" / "model.toml", fitted)
+    for more, why in (((fresh, "--report", fresh), "is there already"), ((fitted,), "never saw")):
+        code, told = ended("verify", "--model", tmp_path / "d" / "model.toml", *more)
+        assert code == 2 and why in told
 
 
 def test_a_link_stays_a_link_a_device_a_device_and_a_dash_is_standard_output(
@@ -313,8 +302,7 @@ def test_one_judgement_says_what_goes_into_the_chip_and_how_to_have_it_go(tmp_pa
     words = said[said.index("ninespring plan") :].split()[1:]
     (tmp_path / "model.toml").write_text(model_text(model))
     words = [str(tmp_path / one) if "." in one else one for one in words]
-    done = CliRunner().invoke(cli, words, standalone_mode=False)
-    assert done.exception is None, done.output
+    assert ended(*words)[0] == 0
     assert "on 5 100" in (tmp_path / "steps.txt").read_text()
 
 
