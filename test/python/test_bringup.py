@@ -9,9 +9,8 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
+from command import ended
 from made import ELF, SIM, needs_board
-from ninespring.cli import main as cli
 from ninespring.errors import InputError
 from ninespring.io import bringup
 from ninespring.io.board import PATIENCE, Board
@@ -177,8 +176,8 @@ def test_a_word_that_is_no_wiring_is_refused(words: list[str], said: str) -> Non
 
 
 def test_nobody_who_could_answer_is_said(tmp_path: Path) -> None:
-    done = CliRunner().invoke(cli.cli, ["bringup", "--port", "/dev/null", "-o", str(tmp_path / "b.html")])
-    assert isinstance(done.exception, InputError) and "--yes" in str(done.exception)
+    code, said = ended("bringup", "--port", "/dev/null", "-o", tmp_path / "b.html")
+    assert code == 2 and "--yes" in said
     assert not list(tmp_path.iterdir())
 
 

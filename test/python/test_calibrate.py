@@ -5,14 +5,12 @@ from __future__ import annotations
 import json
 import signal
 import subprocess
-import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
 
-import click
 import pytest
-from click.testing import CliRunner
+from command import alone, ended, process
 from fake_board import FakeBoard
 from made import ELF, SIM, needs_board
 from ninespring.cli.calibrate import FROM
@@ -20,7 +18,6 @@ from ninespring.cli.calibration import chain, judged
 from ninespring.cli.calibration.chain import Calibration
 from ninespring.cli.calibration.cut import left_of
 from ninespring.cli.calibration.progress import Progress
-from ninespring.cli.main import cli
 from ninespring.errors import InputError, WorkError
 from ninespring.io.board import Board
 from ninespring.io.recording import Fault, Recording, Step
@@ -30,18 +27,11 @@ HAD = {"rows": "3", "columns": "3", "loss_w_per_k": "0.005800", "policy": "1", "
 FOUND = {"loss_w_per_k": "0.006100"}
 
 
-def calibrate(*words: object, timeout: float = 900) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "ninespring", "calibrate", *map(str, words)]
-    return subprocess.run(
-        command, capture_output=True, text=True, timeout=timeout, check=False, stdin=subprocess.DEVNULL
-    )
-
-
 def refused(*words: object) -> str:
     """Return what is said of arguments that are wrong."""
-    error = CliRunner().invoke(cli, ["calibrate", *map(str, words)], standalone_mode=False).exception
-    assert isinstance(error, InputError | click.UsageError)
-    return error.format_message() if isinstance(error, click.UsageError) else str(error)
+    code, said = ended("calibrate", *words)
+    assert code == 2
+    return said
 
 
 @pytest.fixture
@@ -63,15 +53,16 @@ def rows_in(folder: Path, name: str) -> int:
 
 def interrupted(folder: Path, name: str, rows: int, how: signal.Signals, *words: object) -> tuple[int, str]:
     """Begin a calibration, and end it by a signal once a log has so many rows; return how it ended and what it said."""
-    command = [sys.executable, "-m", "ninespring", "calibrate", *map(str, words)]
-    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, stdin=subprocess.DEVNULL) as process:
+    with subprocess.Popen(
+        process("calibrate", *words), stderr=subprocess.PIPE, text=True, stdin=subprocess.DEVNULL
+    ) as running:
         until = time.monotonic() + 600
         while rows_in(folder, name) < rows:
-            assert process.poll() is None and time.monotonic() < until
+            assert running.poll() is None and time.monotonic() < until
             time.sleep(0.1)
-        process.send_signal(how)
-        said = process.communicate(timeout=120)[1]
-    return process.returncode, said
+        running.send_signal(how)
+        said = running.communicate(timeout=120)[1]
+    return running.returncode, said
 
 
 @pytest.mark.nightly
@@ -94,7 +85,7 @@ def test_a_board_learns_its_array_in_one_command_that_is_stopped_and_killed_on_t
     code, _ = interrupted(folder, "run1-2", 130, signal.SIGKILL, *words)
     assert code == -signal.SIGKILL
 
-    done = calibrate(*words, "--json", tmp_path / "result.json")
+    done = alone("calibrate", *words, "--json", tmp_path / "result.json", stdin=subprocess.DEVNULL)
     assert done.returncode == 0, done.stderr
     found = json.loads((tmp_path / "result.json").read_text())["done"]
     pieces = found["run1"]["pieces"]
@@ -120,7 +111,7 @@ def test_a_board_learns_its_array_in_one_command_that_is_stopped_and_killed_on_t
 
     # done: nothing is heated again
     before = time.monotonic()
-    again = calibrate(*words)
+    again = alone("calibrate", *words, stdin=subprocess.DEVNULL)
     assert again.returncode == 0, again.stderr
     assert "saved" in again.stdout
     assert time.monotonic() - before < 60
@@ -272,51 +263,34 @@ def until_export(
     return told
 
 
-def test_settings_with_which_the_board_drives_no_worse_are_saved(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    told = until_export(tmp_path, [measured(), measured(error_c=0.5)], monkeypatch)
-    assert told.run() == ""
-    assert told.fake.settings == HAD | FOUND
-    assert "$save" in told.fake.sent()
-    assert ((tmp_path / "before.csv").read_text(), (tmp_path / "after.csv").read_text()) == ("0.005800", "0.006100")
+BETTER = {"error_c": 0.5}
 
 
 @pytest.mark.parametrize(
-    ("after", "says"),
+    ("drives", "fault", "says"),
     [
-        ({"error_c": 2.4}, "was 2.00 K wrong (rms), and is 2.40 K"),
-        ({"held": 0.9, "error_c": 0.5}, "hold 95% austenite as the chip is now, 90% with the new"),
-        ({"hottest_c": 118.0, "error_c": 0.5}, "reaches 100 degC as the chip is now, 118"),
-        ({"undriven": 0.2, "error_c": 0.5}, "springs that are off reach"),
+        ([BETTER], False, ""),
+        ([{"held": 0.85}, BETTER], False, ""),  # the first finds where the springs transform: it is not the last word
+        ([BETTER], True, "spring 2: fault 4 open"),
+        ([{"error_c": 2.4}] * 2, False, "was 2.00 K wrong (rms), and is 2.40 K"),
+        ([BETTER | {"held": 0.9}] * 2, False, "hold 95% austenite as the chip is now, 90% with the new"),
+        ([BETTER | {"hottest_c": 118.0}] * 2, False, "reaches 100 degC as the chip is now, 118"),
+        ([BETTER | {"undriven": 0.2}] * 2, False, "springs that are off reach"),
     ],
 )
-def test_settings_with_which_the_board_drives_worse_are_taken_back(
-    after: dict[str, float], says: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_settings_are_saved_if_the_board_drives_no_worse_with_them_and_taken_back_if_it_does(
+    drives: list[dict[str, float]], fault: bool, says: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    told = until_export(tmp_path, [measured(), measured(**after), measured(**after)], monkeypatch)
-    assert says in told.run()
-    assert told.fake.settings == HAD
-    assert "$save" not in told.fake.sent()
-    assert told.progress.data["refused"]
+    told = until_export(tmp_path, [measured(), *(measured(**one) for one in drives)], monkeypatch, fault)
+    ended = told.run()
+    assert says in ended and bool(says) == bool(ended)
+    assert told.fake.settings == (HAD if says else HAD | FOUND)
+    assert ("$save" in told.fake.sent()) == (not says)
+    assert ((tmp_path / "before.csv").read_text(), (tmp_path / "after.csv").read_text()) == ("0.005800", "0.006100")
+    assert bool(told.progress.data["refused"]) == bool(says)
     # asked again it says the same, and drives nothing
-    told = Told(tmp_path)
-    assert says in told.run()
-    assert not told.asked
-
-
-def test_a_fault_with_the_new_settings_is_worse(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    told = until_export(tmp_path, [measured(), measured(error_c=0.5)], monkeypatch, fault=True)
-    assert "spring 2: fault 4 open" in told.run()
-    assert told.fake.settings == HAD
-
-
-def test_a_first_drive_that_finds_where_the_springs_transform_is_not_the_last_word(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    told = until_export(tmp_path, [measured(), measured(held=0.85), measured(error_c=0.5)], monkeypatch)
-    assert told.run() == ""
-    assert "$save" in told.fake.sent()
+    again = Told(tmp_path)
+    assert says in again.run() and not again.asked
 
 
 def test_a_stop_between_upload_and_save_gives_the_board_its_own_settings(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 import re
 import time
 from collections.abc import Callable
@@ -10,6 +9,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
+import jinja2
 import msgspec
 import numpy as np
 
@@ -555,28 +555,13 @@ def load(output: Path) -> dict[str, Step]:
 
 def page(steps: dict[str, Step]) -> str:
     """Return bringup.html."""
-    e = html.escape
-    parts = []
-    for name, deed in STEPS.items():
-        step = steps.get(name)
-        state = "not done" if not step else "right" if step.passed else "wrong"
-        parts.append(f'<h2>{e(deed.title)} <span class="{state.split()[0]}">{state}</span></h2><p>{e(deed.what)}</p>')
-        if step:
-            parts += [f'<p class="wrong">{e(one)}</p>' for one in step.found]
-            body = "".join("<tr>" + "".join(f"<td>{e(cell)}</td>" for cell in row) + "</tr>" for row in step.numbers)
-            parts.append(
-                f"<div><table><tr><th>what</th><th>found</th><th>should be</th></tr>{body}</table></div><p><small>{e(step.at)}</small></p>"
-            )
-    right = sum(one.passed for one in steps.values())
-    return (
-        '<!doctype html><html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">'
-        "<title>First power-up</title><style>:root{color-scheme:light dark}body{font:16px/1.5 system-ui,sans-serif;max-width:56rem;"
-        "margin:2rem auto;padding:0 1rem}div{overflow-x:auto}table{border-collapse:collapse;font-size:14px}td,th{padding:.2rem 1rem .2rem 0;"
-        "text-align:left;vertical-align:top;border-bottom:1px solid #8884}h2{font-size:1.15rem;margin:2rem 0 0}h2 span{font-size:.9rem;"
-        "font-weight:normal}.right{color:#2a8a3e}.wrong{color:#d03b2a}.not{color:#888}@media(prefers-color-scheme:dark){.right{color:#5fc77a}"
-        ".wrong{color:#ff7b6b}}</style></head>"
-        f"<body><h1>First power-up</h1><p>{right} of {len(STEPS)} steps are right. ninespring {e(__version__)}</p>{''.join(parts)}</body></html>\n"
+    pages = jinja2.Environment(
+        loader=jinja2.PackageLoader("ninespring.io"),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
     )
+    return pages.get_template("bringup.html").render(steps=steps, deeds=STEPS, version=__version__)
 
 
 def save(output: Path, steps: dict[str, Step]) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import io
+import csv
 import math
 import re
 from collections.abc import Callable, Iterator
@@ -124,36 +124,21 @@ def _split(path: str | Path, rules: _Mapping) -> tuple[pd.DataFrame, list[str], 
     numbers, lines = [n for n, _ in kept], [one for _, one in kept]
     if len(lines) < 2:
         raise InputError("there is a header but no row", path, numbers[0])
-    wanted = lines[0].count(rules.separator)
-    if '"' not in text:
-        for number, line in kept:
-            if (found := line.count(rules.separator)) != wanted:
-                raise InputError(
-                    f"{found + 1} cells where the header has {wanted + 1} (separator '{rules.separator}')",
-                    path,
-                    number,
-                    len(line) + 1,
-                )
-    try:
-        frame = pd.read_csv(
-            io.StringIO("\n".join(lines)),
-            sep=re.escape(rules.separator) if rules.separator in "|.^$*+?" else rules.separator,
-            header=None,
-            skipinitialspace=True,
-            dtype=str,
-            keep_default_na=False,
-            index_col=False,
-        )
-    except (pd.errors.ParserError, pd.errors.EmptyDataError, ValueError) as error:
-        match = re.search(r"line (\d+)", str(error))
-        at = numbers[min(int(match[1]), len(numbers)) - 1] if match else numbers[0]
-        raise InputError(f"other cells than the header has (separator '{rules.separator}')", path, at, 1) from None
-    names = [str(name).strip() for name in frame.iloc[0]]
+    rows: list[list[str]] = []
+    for number, line in kept:
+        try:
+            (cells,) = csv.reader([line], delimiter=rules.separator, skipinitialspace=True, strict=True)
+        except csv.Error as error:
+            raise InputError(f"{error} (separator '{rules.separator}')", path, number, 1) from None
+        rows.append(cells)
+        if len(cells) != len(rows[0]):
+            said = f"{len(cells)} cells where the header has {len(rows[0])} (separator '{rules.separator}')"
+            raise InputError(said, path, number, len(line) + 1)
+    names = [name.strip() for name in rows[0]]
     for name in names:
         if names.count(name) > 1 and any(name in rule.sources for rule in rules.columns.values()):
             raise InputError(f"column '{name}' is there twice", path, numbers[0], 1)
-    frame.columns = names
-    return frame.iloc[1:], lines, numbers
+    return pd.DataFrame(rows[1:], columns=names, dtype=str), lines, numbers
 
 
 def import_table(path: str | Path, mapping: str | Path) -> str:

@@ -8,17 +8,17 @@ from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
-from matplotlib import animation
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from PIL import Image
 
 from ..io.logs import Run, read_table
 from ..model.stiffness import LAYERS
 
 UNIT = {"power": "power, W", "current": "current, A", "command": "command"}
-FRAMES = 200
-"""Most frames of an animation."""
+FRAMES, FRAME_MS = 200, 100
+"""Most frames of an animation, and how long each is shown."""
 
 
 def believed(run: Run) -> np.ndarray | None:
@@ -130,25 +130,16 @@ def drawn(figure: Figure, kind: str) -> bytes:
     return out.getvalue()
 
 
-class _Gif(animation.PillowWriter):
-    """Writes into memory, and says in the file who wrote it, as matplotlib does in all other kinds."""
-
-    made = b""
-
-    def finish(self) -> None:
-        out = io.BytesIO()
-        first, *more = self._frames
-        duration = int(1000 / self.fps)
-        first.save(
-            out, "GIF", save_all=True, append_images=more, duration=duration, loop=0, comment="Matplotlib, ninespring"
-        )
-        self.made = out.getvalue()
-
-
 def animation_of(run: Run, rows: int, cols: int) -> bytes:
-    """Return an animation (GIF) of the array's temperatures."""
+    """Return an animation (GIF) of the array's temperatures; the file says who wrote it, as matplotlib does in all other kinds."""
     pick = np.unique(np.linspace(0, len(run.time_s) - 1, min(FRAMES, len(run.time_s))).astype(int))
-    out, draw = _map(run, rows, cols)
-    writer = _Gif(fps=10)
-    animation.FuncAnimation(out, draw, frames=list(pick), blit=False).save("array.gif", writer=writer)
-    return writer.made
+    drawing, draw = _map(run, rows, cols)
+    frames = []
+    for row in pick:
+        draw(row)
+        drawing.canvas.draw()
+        frames.append(Image.fromarray(np.array(drawing.canvas.buffer_rgba())).convert("RGB"))
+    out = io.BytesIO()
+    more = {"append_images": frames[1:], "duration": FRAME_MS, "loop": 0, "comment": "Matplotlib, ninespring"}
+    frames[0].save(out, "GIF", save_all=True, **more)
+    return out.getvalue()
