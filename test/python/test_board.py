@@ -190,10 +190,8 @@ def test_a_program_that_is_killed_leaves_no_spring_on(board: str, tmp_path: Path
         "script": [],
     }[program]
     script = "from ninespring import Board; import sys, time; b = Board(sys.argv[1]); b.on(5, 50); print('on', flush=True); time.sleep(99)"
-    command = [sys.executable, "-m", "ninespring", *map(str, words), "--port", board]
-    if program == "script":
-        command = [sys.executable, "-c", script, board]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+    own = [sys.executable, "-c", script, board] if program == "script" else command.process(*words, "--port", board)
+    with subprocess.Popen(own, stdout=subprocess.PIPE, text=True) as process:
         if program == "dashboard":
             url = process.stdout.readline().split()[0].rstrip("/")
             with connect(f"{url.replace('http', 'ws')}/ws", additional_headers={"origin": url}) as page:

@@ -9,10 +9,9 @@ import re
 import shutil
 import signal
 import subprocess
-import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
@@ -20,7 +19,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from command import ninespring
+from command import ninespring, process
 from fake_board import FakeBoard, row
 from made import ROOT, needs_board
 from ninespring.dashboard import server, source
@@ -44,11 +43,9 @@ class Dashboard:
         self, folder: Path, *words: object, at: str = "127.0.0.1", ends: signal.Signals = signal.SIGINT
     ) -> None:
         self.ends = ends
-        command = [sys.executable, "-m", "ninespring", "dashboard", "--listen", f"{at}:0", "--folder", str(folder)]
+        command = process("dashboard", "--listen", f"{at}:0", "--folder", folder, *words)
         self.errors = tempfile.TemporaryFile("w+")  # noqa: SIM115 - closed with this
-        self.process = subprocess.Popen(
-            [*command, *map(str, words)], stdout=subprocess.PIPE, stderr=self.errors, text=True
-        )
+        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=self.errors, text=True)
         assert self.process.stdout is not None
         self.url = self.process.stdout.readline().split()[0]
         assert self.url.startswith("http://")
@@ -399,12 +396,19 @@ def test_a_list_that_is_played_outlives_a_reload_and_can_be_ended(browser: Brows
         expect(page.locator("#list li")).to_have_count(2)
 
 
+def awaited(
+    socket: ClientConnection, holds: Callable[[dict[str, Any]], bool], within_s: float = 60.0
+) -> dict[str, Any]:
+    """Return the first of what a page is told of which that holds."""
+    ends = time.monotonic() + within_s
+    while not holds(told := json.loads(socket.recv(ends - time.monotonic()))):
+        pass
+    return told
+
+
 def answer_to(socket: ClientConnection, wish: dict[str, object], within_s: float = 20.0) -> dict[str, object]:
     socket.send(json.dumps(wish))
-    until = time.monotonic() + within_s
-    while (got := json.loads(socket.recv(until - time.monotonic()))).get("id") != wish["id"]:
-        pass
-    return got
+    return awaited(socket, lambda got: got.get("id") == wish["id"], within_s)
 
 
 def test_a_wish_that_fails_as_nobody_thought_of_is_answered() -> None:
@@ -441,8 +445,8 @@ def test_foreign_pages_are_refused_and_malformed_messages_change_nothing(tmp_pat
         with dashboard.page() as socket:
             for one in MALFORMED:
                 socket.send(one)
-                while (kind := json.loads(socket.recv(10))["kind"]) != "refused":
-                    assert kind in ("state", "history", "settings"), one
+                told = awaited(socket, lambda told: told["kind"] not in ("state", "history", "settings"))
+                assert told["kind"] == "refused", one
             assert answer_to(socket, {"do": "level", "spring": 1, "level": 50, "id": 7})["kind"] == "done"
         with dashboard.page() as socket:
             socket.send(b"\x00\x01")  # not text: this page is gone, nobody else's
@@ -456,8 +460,7 @@ def page_of(board: FakeBoard, folder: Path, every_s: float = 0.1) -> Iterator[Cl
     """Yield a page's socket once its dashboard has found the board, which streams rows; the dashboard ends well."""
     board.stream, board.every_s = (row(0.1 * k) for k in range(10, 99999)), every_s
     with Dashboard(folder, "--port", board.port) as dashboard, dashboard.page() as socket:
-        while not json.loads(socket.recv(10)).get("connected"):
-            pass
+        awaited(socket, lambda state: state.get("connected"))
         yield socket
 
 
@@ -465,8 +468,7 @@ def test_the_board_that_gets_the_number_of_a_lost_terminal_is_left_alone(tmp_pat
     first = FakeBoard()
     with page_of(first, tmp_path) as socket:
         first.pull()
-        while json.loads(socket.recv(10)).get("connected", True):
-            pass
+        awaited(socket, lambda state: not state.get("connected", True))
         second = FakeBoard()  # somebody else's, beside it
         assert second.port == first.port
         trouble, until = "", time.monotonic() + 60.0
@@ -622,11 +624,10 @@ def test_whatever_pages_send_the_board_stays_and_off_is_answered(kind: str, tmp_
     with Dashboard(tmp_path, *(("--port", board.port) if kind == "fake" else ("--simulate",))) as dashboard:
         slowest_s, offs, version, times = 0.0, 0, None, []
         with ExitStack() as stack, dashboard.page() as calm:
-            while not (state := json.loads(calm.recv(60))).get("connected"):
-                pass
-            version, until = state["version"], time.monotonic() + 6.0
+            version = awaited(calm, lambda state: state.get("connected"))["version"]
+            ends = time.monotonic() + 6.0
             wild = stack.enter_context(dashboard.page())
-            while time.monotonic() < until:
+            while time.monotonic() < ends:
                 for _ in range(draw.randint(1, 40)):
                     try:
                         wild.send(anything(draw) if draw.random() < 0.99 else draw.randbytes(20))
@@ -650,11 +651,9 @@ def test_whatever_pages_send_the_board_stays_and_off_is_answered(kind: str, tmp_
 def test_a_full_disk_ends_the_recording_and_nothing_else(small_disk: Path) -> None:
     with page_of(FakeBoard(), small_disk, 0.01) as socket:
         socket.send('{"do": "record"}')
-        while "No space left on device" not in (state := json.loads(socket.recv(30))).get("said", ""):
-            pass
+        state = awaited(socket, lambda state: "No space left on device" in state.get("said", ""))
         assert state["connected"] and state["recording"] is None
-        while json.loads(socket.recv(10)).get("time_s", 0.0) <= state["time_s"]:
-            pass  # the array is shown as before
+        awaited(socket, lambda now: now.get("time_s", 0.0) > state["time_s"])  # the array is shown as before
     (log,) = small_disk.iterdir()
     assert log.suffix == ".csv" and log.read_text().endswith("\n")
     assert len(read_table(log, ("state",)).frame) > 50
@@ -671,8 +670,7 @@ def test_a_stop_that_drops_what_is_being_answered_loses_no_board(tmp_path: Path)
 
 def test_what_a_board_believes_reaches_the_page(tmp_path: Path) -> None:
     with page_of(FakeBoard({"model": UNKNOWN}), tmp_path) as socket:
-        while not (state := json.loads(socket.recv(10))).get("unknown_s", [None])[0]:
-            pass
+        state = awaited(socket, lambda state: state.get("unknown_s", [None])[0])
         assert state["unknown_s"] == [75.0] and state["target_a"] == [0.0]
         assert state["doing"] == ["not known for 75 s: it may still be hot from before power-on"]
 
@@ -682,13 +680,10 @@ def test_a_sight_reaches_the_page_and_the_log_and_counts_as_no_corrupt_line(tmp_
     sight = "<sight|spring:1|t:96.250|lost|read:-1.32|read_sd:0.05|now_k:0.1|now_sd:1.0|shift_k:0.4|loss:1.20|heated|opened>"
     with page_of(board, tmp_path) as socket:
         socket.send(json.dumps({"do": "record", "id": 1}))
-        while not json.loads(socket.recv(10)).get("recording"):
-            pass
+        awaited(socket, lambda state: state.get("recording"))
         board.say(sight)
-        while (state := json.loads(socket.recv(10))).get("sights") != [1]:
-            pass
-        while (now := json.loads(socket.recv(10))).get("time_s", 0.0) < state.get("time_s", 0.0) + 0.3:
-            pass
+        state = awaited(socket, lambda state: state.get("sights") == [1])
+        now = awaited(socket, lambda now: now.get("time_s", 0.0) >= state.get("time_s", 0.0) + 0.3)
         assert now["corrupt"] == 0
     (log,) = tmp_path.iterdir()
     assert f"# {sight}\n" in log.read_text()
@@ -736,13 +731,13 @@ def test_faults_and_states_in_words_are_those_of_the_table() -> None:
 
 
 def test_what_hinders_is_said_in_the_terminal_too(tmp_path: Path) -> None:
-    words = [sys.executable, "-m", "ninespring", "dashboard", "--listen", "127.0.0.1:0", "--port", str(tmp_path / "no")]
-    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
-        assert process.stderr is not None
-        said = process.stderr.readline()
-        process.send_signal(signal.SIGINT)
+    words = process("dashboard", "--listen", "127.0.0.1:0", "--port", tmp_path / "no")
+    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as running:
+        assert running.stderr is not None
+        said = running.stderr.readline()
+        running.send_signal(signal.SIGINT)
     assert "no: cannot be opened (No such file or directory)" in said
-    assert process.returncode == 0
+    assert running.returncode == 0
 
 
 @pytest.mark.parametrize(
