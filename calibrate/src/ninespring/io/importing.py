@@ -127,7 +127,7 @@ def _split(path: str | Path, rules: _Mapping) -> tuple[pd.DataFrame, list[str], 
     rows: list[list[str]] = []
     for number, line in kept:
         try:
-            (cells,) = csv.reader([line], delimiter=rules.separator, skipinitialspace=True, strict=True)
+            (cells,) = csv.reader([line], delimiter=rules.separator, skipinitialspace=True)
         except csv.Error as error:
             raise InputError(f"{error} (separator '{rules.separator}')", path, number, 1) from None
         rows.append(cells)
