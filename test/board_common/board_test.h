@@ -13,7 +13,7 @@
 #include <string>
 #include <unistd.h>
 
-#include <unity.h>
+#include "../run_tests.h"
 
 #include "board_view.h"
 #include "controller.h"
@@ -31,12 +31,13 @@ inline std::string elf(const char *name = "firmware.elf")
 }
 
 /* Tests of an ELF that was not built are skipped, loudly. */
-inline void need_elf(const std::string &path)
+inline const std::string &need_elf(const std::string &path)
 {
     if (access(path.c_str(), R_OK) != 0) {
         std::printf("SKIPPED: %s is not there: build the avr target first\n", path.c_str());
         std::exit(EXIT_SKIPPED);
     }
+    return path;
 }
 
 struct plant_deleter {
@@ -48,7 +49,8 @@ class rig
 public:
     explicit rig(const std::string &firmware = elf(), std::uint64_t seed = 1,
                  double shunt_noise_v = 0.0, double bus_noise_v = 0.0)
-        : plant(plant_create(3, 3)), board(firmware, plant.get(), seed, shunt_noise_v, bus_noise_v)
+        : plant(plant_create(3, 3)),
+          board(need_elf(firmware), plant.get(), seed, shunt_noise_v, bus_noise_v)
     {
     }
 

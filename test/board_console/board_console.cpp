@@ -85,7 +85,7 @@ std::vector<double> times_in(const std::string &text, char begin, char end)
     return times;
 }
 
-void time_goes_on_for_years()
+TEST(time_goes_on_for_years)
 {
     for (const double turn_ms : {2147483648.0, 4294967296.0}) {
         for (const bool csv : {true, false}) {
@@ -115,7 +115,7 @@ void time_goes_on_for_years()
     }
 }
 
-void selftest_passes_on_a_whole_board_and_leaves_it_off()
+TEST(selftest_passes_on_a_whole_board_and_leaves_it_off)
 {
     auto mega = booted();
     const std::string text = mega->say("selftest", 20000.0);
@@ -125,7 +125,7 @@ void selftest_passes_on_a_whole_board_and_leaves_it_off()
 }
 
 /* The chip counts its sleep with a timer whose interrupt also wakes it. */
-void load_is_what_it_did_not_sleep()
+TEST(load_is_what_it_did_not_sleep)
 {
     auto mega = booted();
     mega->run_ms(1500.0);
@@ -167,7 +167,7 @@ std::string version_under(const std::string &format)
     return mega->say("version");
 }
 
-void telemetry_at_its_fastest_leaves_the_console_usable()
+TEST(telemetry_at_its_fastest_leaves_the_console_usable)
 {
     for (const char *const format : {"csv", "teleplot"}) {
         const std::string text = version_under(format);
@@ -184,7 +184,7 @@ std::string pour(rig &mega, const std::string &bytes, double ms)
     return mega.board.take_output();
 }
 
-void bytes_that_found_no_room_are_reported()
+TEST(bytes_that_found_no_room_are_reported)
 {
     auto mega = booted();
     /* while the long answer goes out nobody takes lines in */
@@ -198,7 +198,7 @@ void bytes_that_found_no_room_are_reported()
     mega->expect_ok("version");
 }
 
-void an_eeprom_that_keeps_nothing_fails_the_save()
+TEST(an_eeprom_that_keeps_nothing_fails_the_save)
 {
     auto mega = booted();
     mega->expect_ok("$loss_w_per_k=0.006543");
@@ -206,7 +206,7 @@ void an_eeprom_that_keeps_nothing_fails_the_save()
     expect_code(*mega, CONSOLE_ERROR_SAVE_FAILED, "$save");
 }
 
-void selftest_wants_everything_off_and_finds_what_is_beyond_its_limits()
+TEST(selftest_wants_everything_off_and_finds_what_is_beyond_its_limits)
 {
     auto mega = booted();
     mega->expect_ok("on 3");
@@ -224,20 +224,3 @@ void selftest_wants_everything_off_and_finds_what_is_beyond_its_limits()
 }
 
 } // namespace
-
-void setUp() {}
-void tearDown() {}
-
-int main()
-{
-    need_elf(elf());
-    UNITY_BEGIN();
-    RUN_TEST(selftest_passes_on_a_whole_board_and_leaves_it_off);
-    RUN_TEST(load_is_what_it_did_not_sleep);
-    RUN_TEST(telemetry_at_its_fastest_leaves_the_console_usable);
-    RUN_TEST(time_goes_on_for_years);
-    RUN_TEST(bytes_that_found_no_room_are_reported);
-    RUN_TEST(an_eeprom_that_keeps_nothing_fails_the_save);
-    RUN_TEST(selftest_wants_everything_off_and_finds_what_is_beyond_its_limits);
-    return UNITY_END();
-}

@@ -47,7 +47,7 @@ double off_after_ms(rig &mega, const char *what, double limit_ms)
     return ms;
 }
 
-void a_welded_switch_heats_until_the_supply_is_off()
+TEST(a_welded_switch_heats_until_the_supply_is_off)
 {
     for (const bool driven : {true, false}) {
         rig mega;
@@ -92,7 +92,7 @@ void a_welded_switch_heats_until_the_supply_is_off()
 }
 
 /* Whenever in a tick it fails, and however much the spring was given. */
-void a_welded_switch_is_cut_at_any_moment_of_a_tick()
+TEST(a_welded_switch_is_cut_at_any_moment_of_a_tick)
 {
     double longest_ms = 0.0;
     for (const char *level : {"off 5", "on 5 30", "on 5 100"}) {
@@ -112,7 +112,7 @@ void a_welded_switch_is_cut_at_any_moment_of_a_tick()
 }
 
 /* Nothing can be read, so nothing shows it. */
-void a_switch_that_welds_while_the_bus_hangs_is_cut()
+TEST(a_switch_that_welds_while_the_bus_hangs_is_cut)
 {
     for (const bool driven : {true, false}) {
         for (double weld_ms = 0.0; weld_ms < 100.0; weld_ms += 40.0) {
@@ -135,7 +135,7 @@ void a_switch_that_welds_while_the_bus_hangs_is_cut()
 
 /* Contacts that chatter and springs that are plugged in give no current that their duty does not.
  */
-void a_spring_that_is_plugged_in_leaves_the_supply()
+TEST(a_spring_that_is_plugged_in_leaves_the_supply)
 {
     rig mega;
     make_niti(mega.plant.get());
@@ -156,7 +156,7 @@ void a_spring_that_is_plugged_in_leaves_the_supply()
 }
 
 /* With a closed switch, too: nothing of the program is needed. */
-void a_program_that_hangs_holds_nothing()
+TEST(a_program_that_hangs_holds_nothing)
 {
     for (const bool closed : {false, true}) {
         rig mega;
@@ -174,7 +174,7 @@ void a_program_that_hangs_holds_nothing()
     }
 }
 
-void what_stops_its_pulses_stops_the_supply()
+TEST(what_stops_its_pulses_stops_the_supply)
 {
     const struct {
         const char *what;
@@ -202,7 +202,7 @@ void what_stops_its_pulses_stops_the_supply()
     }
 }
 
-void one_stop_leaves_the_supply_and_two_take_it()
+TEST(one_stop_leaves_the_supply_and_two_take_it)
 {
     rig mega;
     heat(mega);
@@ -224,7 +224,7 @@ void one_stop_leaves_the_supply_and_two_take_it()
 }
 
 /* PORT, DDR and the timer that can drive the pin: the next tick writes them. */
-void a_bit_of_the_pin_that_turns_over_is_written_again()
+TEST(a_bit_of_the_pin_that_turns_over_is_written_again)
 {
     constexpr struct {
         unsigned address;
@@ -246,7 +246,7 @@ void a_bit_of_the_pin_that_turns_over_is_written_again()
     TEST_ASSERT_EQUAL_INT(SAFETY_FAULT_NONE, mega.view().spring[0].fault);
 }
 
-void without_a_cut_off_there_are_no_pulses()
+TEST(without_a_cut_off_there_are_no_pulses)
 {
     rig mega;
     mega.boot();
@@ -258,22 +258,3 @@ void without_a_cut_off_there_are_no_pulses()
 }
 
 } // namespace
-
-void setUp() {}
-void tearDown() {}
-
-int main()
-{
-    need_elf(elf());
-    UNITY_BEGIN();
-    RUN_TEST(a_welded_switch_heats_until_the_supply_is_off);
-    RUN_TEST(a_welded_switch_is_cut_at_any_moment_of_a_tick);
-    RUN_TEST(a_switch_that_welds_while_the_bus_hangs_is_cut);
-    RUN_TEST(a_spring_that_is_plugged_in_leaves_the_supply);
-    RUN_TEST(a_program_that_hangs_holds_nothing);
-    RUN_TEST(what_stops_its_pulses_stops_the_supply);
-    RUN_TEST(one_stop_leaves_the_supply_and_two_take_it);
-    RUN_TEST(a_bit_of_the_pin_that_turns_over_is_written_again);
-    RUN_TEST(without_a_cut_off_there_are_no_pulses);
-    return UNITY_END();
-}

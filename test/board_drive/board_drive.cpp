@@ -75,7 +75,7 @@ double run(rig &mega, double seconds)
     return highest_c;
 }
 
-void heats_then_holds_above_martensite_start_then_lets_go()
+TEST(heats_then_holds_above_martensite_start_then_lets_go)
 {
     auto mega = powered("$unsure_margin_k=3");
     mega->expect_ok("on 5");
@@ -98,7 +98,7 @@ void heats_then_holds_above_martensite_start_then_lets_go()
     TEST_ASSERT_TRUE(phase(*mega, CENTRE) <= 0.01);
 }
 
-void readings_lost_in_a_hold_cost_neither_safety_nor_the_neighbours()
+TEST(readings_lost_in_a_hold_cost_neither_safety_nor_the_neighbours)
 {
     auto mega = powered();
     mega->expect_ok("pattern 100010001");
@@ -141,15 +141,3 @@ void readings_lost_in_a_hold_cost_neither_safety_nor_the_neighbours()
 }
 
 } // namespace
-
-void setUp() {}
-void tearDown() {}
-
-int main()
-{
-    need_elf(elf());
-    UNITY_BEGIN();
-    RUN_TEST(heats_then_holds_above_martensite_start_then_lets_go);
-    RUN_TEST(readings_lost_in_a_hold_cost_neither_safety_nor_the_neighbours);
-    return UNITY_END();
-}

@@ -40,7 +40,7 @@ void only(rig &mega, unsigned spring, safety_fault_t fault)
 }
 
 /* And in a sensor that fails, no failed read becomes a number. */
-void each_fault_is_of_its_spring_and_its_neighbours_go_on()
+TEST(each_fault_is_of_its_spring_and_its_neighbours_go_on)
 {
     static const struct {
         board_fault_t fault;
@@ -95,7 +95,7 @@ unsigned named_after(rig &mega)
 
 /* Driven (one and eight springs more), off, and after a stop: what is found first is what the
  * current does while it is driven; without duty it is named. */
-void a_switch_that_fails_closed_is_named_and_everything_is_off()
+TEST(a_switch_that_fails_closed_is_named_and_everything_is_off)
 {
     for (const char *const pattern : {"000010000", "010010000", "111111111", "000000000"}) {
         for (const bool stopped : {false, true}) {
@@ -132,7 +132,7 @@ unsigned shown_4mv(rig &mega, unsigned k)
 
 /* What these sensors show is wrong and looks right: what the firmware makes of it is another
  * test's. */
-void frozen_lying_and_swapped_sensors_show_what_they_should_not()
+TEST(frozen_lying_and_swapped_sensors_show_what_they_should_not)
 {
     auto mega = driven();
     board_set_fault(mega->raw(), BOARD_FAULT_FREEZE, 3, true);
@@ -160,7 +160,7 @@ void frozen_lying_and_swapped_sensors_show_what_they_should_not()
 
 /* The policy sweeps the current; the sensor, or one of its registers, answers, converts, and shows
  * the same for ever: while it heats, and in a hold. */
-void a_frozen_sensor_is_found_within_two_seconds_and_its_neighbours_go_on()
+TEST(a_frozen_sensor_is_found_within_two_seconds_and_its_neighbours_go_on)
 {
     for (const board_fault_t fault :
          {BOARD_FAULT_FREEZE, BOARD_FAULT_FREEZE_CURRENT, BOARD_FAULT_FREEZE_VOLTAGE}) {
@@ -189,7 +189,7 @@ void a_frozen_sensor_is_found_within_two_seconds_and_its_neighbours_go_on()
 }
 
 /* Half of the shunt, as R050 for R100. */
-void another_shunt_is_found_as_its_spring_begins_to_heat()
+TEST(another_shunt_is_found_as_its_spring_begins_to_heat)
 {
     auto mega = std::make_unique<rig>();
     make_niti(mega->plant.get());
@@ -209,7 +209,7 @@ void another_shunt_is_found_as_its_spring_begins_to_heat()
  * on: no resistance is out of its limits, but beside the others it takes another share of the
  * supply than it did. Who clears the fault has mended nothing: heated, it is found again; with the
  * little current of a probe it may not be, and stays cool. */
-void a_sensor_that_begins_to_lie_is_found_beside_the_others_however_often_it_is_cleared()
+TEST(a_sensor_that_begins_to_lie_is_found_beside_the_others_however_often_it_is_cleared)
 {
     static const struct {
         double current, voltage, after_ms;
@@ -249,7 +249,7 @@ void a_sensor_that_begins_to_lie_is_found_beside_the_others_however_often_it_is_
 
 /* Its clock is stretched: in ticks that take longer than they may, the springs would heat on while
  * the board's time stands still. */
-void a_bus_that_is_too_slow_is_a_bus_that_hangs()
+TEST(a_bus_that_is_too_slow_is_a_bus_that_hangs)
 {
     auto slow = driven();
     board_stretch_bus(slow->raw(), 3.0);
@@ -269,7 +269,7 @@ void a_bus_that_is_too_slow_is_a_bus_that_hangs()
     }
 }
 
-void a_stuck_bus_switches_everything_off_without_missing_the_watchdog()
+TEST(a_stuck_bus_switches_everything_off_without_missing_the_watchdog)
 {
     auto mega = driven();
     board_set_fault(mega->raw(), BOARD_FAULT_SDA_LOW, 0, true);
@@ -284,7 +284,7 @@ void a_stuck_bus_switches_everything_off_without_missing_the_watchdog()
 
 /* For a moment, from any place of a tick on, nothing comes of it; for longer the supply is off, and
  * it is for whoever clears it to switch it on. */
-void the_bus_comes_back_when_it_is_released()
+TEST(the_bus_comes_back_when_it_is_released)
 {
     auto mega = driven();
     for (double at_ms = 0.0; at_ms < 20.0; at_ms += 3.0) {
@@ -313,7 +313,7 @@ void the_bus_comes_back_when_it_is_released()
     only(*mega, BOARD_CHANNELS, SAFETY_FAULT_NONE);
 }
 
-void a_sensor_that_lost_its_configuration_gets_it_again()
+TEST(a_sensor_that_lost_its_configuration_gets_it_again)
 {
     auto mega = driven();
     const std::uint16_t config = board_sensor_register(mega->raw(), 6, 0);
@@ -327,7 +327,7 @@ void a_sensor_that_lost_its_configuration_gets_it_again()
     only(*mega, BOARD_CHANNELS, SAFETY_FAULT_NONE);
 }
 
-void a_stopped_fan_does_not_cool()
+TEST(a_stopped_fan_does_not_cool)
 {
     auto turning = driven();
     auto stopped = driven();
@@ -343,7 +343,7 @@ void a_stopped_fan_does_not_cool()
 }
 
 /* The divider's voltage: 20.8 degC, and what is no room's or no step of one. */
-void a_thermistor_that_says_what_no_room_does_is_said_and_not_believed()
+TEST(a_thermistor_that_says_what_no_room_does_is_said_and_not_believed)
 {
     for (const double lies_v : {4.0 /* -5 degC */, 0.9 /* 61 */, 5.0, 0.0}) {
         auto mega = driven();
@@ -366,25 +366,3 @@ void a_thermistor_that_says_what_no_room_does_is_said_and_not_believed()
 }
 
 } // namespace
-
-void setUp() {}
-void tearDown() {}
-
-int main()
-{
-    need_elf(elf());
-    UNITY_BEGIN();
-    RUN_TEST(each_fault_is_of_its_spring_and_its_neighbours_go_on);
-    RUN_TEST(a_switch_that_fails_closed_is_named_and_everything_is_off);
-    RUN_TEST(frozen_lying_and_swapped_sensors_show_what_they_should_not);
-    RUN_TEST(a_frozen_sensor_is_found_within_two_seconds_and_its_neighbours_go_on);
-    RUN_TEST(another_shunt_is_found_as_its_spring_begins_to_heat);
-    RUN_TEST(a_sensor_that_begins_to_lie_is_found_beside_the_others_however_often_it_is_cleared);
-    RUN_TEST(a_bus_that_is_too_slow_is_a_bus_that_hangs);
-    RUN_TEST(a_stuck_bus_switches_everything_off_without_missing_the_watchdog);
-    RUN_TEST(the_bus_comes_back_when_it_is_released);
-    RUN_TEST(a_sensor_that_lost_its_configuration_gets_it_again);
-    RUN_TEST(a_stopped_fan_does_not_cool);
-    RUN_TEST(a_thermistor_that_says_what_no_room_does_is_said_and_not_believed);
-    return UNITY_END();
-}

@@ -75,7 +75,7 @@ std::unique_ptr<rig> new_board(const std::uint8_t *eeprom = nullptr)
     return mega;
 }
 
-void the_readmes_words_bring_eight_springs_up_and_hold_them()
+TEST(the_readmes_words_bring_eight_springs_up_and_hold_them)
 {
     const auto mega = new_board();
     type_what_the_readme_says(*mega);
@@ -133,7 +133,7 @@ double hottest_of(const std::vector<typed> &order)
     return hottest_c;
 }
 
-void any_order_of_the_readmes_words_is_safe()
+TEST(any_order_of_the_readmes_words_is_safe)
 {
     constexpr double limit_c = 110.0;
     const std::vector<std::vector<typed>> orders = {
@@ -154,7 +154,7 @@ void any_order_of_the_readmes_words_is_safe()
     }
 }
 
-void a_host_that_leaves_takes_its_springs_with_it()
+TEST(a_host_that_leaves_takes_its_springs_with_it)
 {
     const auto mega = new_board();
     mega->expect_ok("$host_timeout_s=2");
@@ -172,16 +172,3 @@ void a_host_that_leaves_takes_its_springs_with_it()
 }
 
 } // namespace
-
-void setUp() {}
-void tearDown() {}
-
-int main()
-{
-    need_elf(elf());
-    UNITY_BEGIN();
-    RUN_TEST(the_readmes_words_bring_eight_springs_up_and_hold_them);
-    RUN_TEST(any_order_of_the_readmes_words_is_safe);
-    RUN_TEST(a_host_that_leaves_takes_its_springs_with_it);
-    return UNITY_END();
-}

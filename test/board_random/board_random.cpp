@@ -38,13 +38,13 @@ std::string random_bytes(std::uint64_t &state, std::size_t count)
         } else if (kind % 4 == 1) {
             bytes += static_cast<char>(' ' + (kind >> 8) % 95);
         } else {
-            bytes += words[(kind >> 8) % (sizeof words / sizeof words[0])];
+            bytes += words[(kind >> 8) % ROWS(words)];
         }
     }
     return bytes;
 }
 
-void keeps_its_schedule_for_ten_minutes()
+TEST(keeps_its_schedule_for_ten_minutes)
 {
     rig mega;
     mega.boot();
@@ -74,14 +74,3 @@ void keeps_its_schedule_for_ten_minutes()
 }
 
 } // namespace
-
-void setUp() {}
-void tearDown() {}
-
-int main()
-{
-    need_elf(elf());
-    UNITY_BEGIN();
-    RUN_TEST(keeps_its_schedule_for_ten_minutes);
-    return UNITY_END();
-}

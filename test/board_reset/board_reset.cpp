@@ -43,7 +43,7 @@ void off_until_unlocked(rig &mega)
     TEST_ASSERT_TRUE(board_duty(mega.raw(), 0) > 0.0);
 }
 
-void a_new_board_starts_unlocked_and_off()
+TEST(a_new_board_starts_unlocked_and_off)
 {
     rig mega;
     const std::string greeting = mega.boot();
@@ -53,7 +53,7 @@ void a_new_board_starts_unlocked_and_off()
 }
 
 /* After a hang, too; what the model knows outlives what does not take the power away. */
-void each_reset_leaves_the_board_off_and_locked_and_keeps_what_it_may()
+TEST(each_reset_leaves_the_board_off_and_locked_and_keeps_what_it_may)
 {
     enum { HANG = -1 };
     for (const int cause : {static_cast<int>(HANG), static_cast<int>(BOARD_RESET_BROWN_OUT),
@@ -81,7 +81,7 @@ void each_reset_leaves_the_board_off_and_locked_and_keeps_what_it_may()
 }
 
 /* Timer 2 compares, a conversion is complete, timer 1 overflows: nobody has asked for them. */
-void an_interrupt_that_nobody_has_ends_as_a_hang_does()
+TEST(an_interrupt_that_nobody_has_ends_as_a_hang_does)
 {
     for (const unsigned vector : {14U, 29U, 20U}) {
         rig mega;
@@ -101,7 +101,7 @@ void an_interrupt_that_nobody_has_ends_as_a_hang_does()
 
 /* Clock, serial port, ADC, I2C: the board answers, its second is one, and its springs have what
  * they should or are off and locked. */
-void whatever_bit_turns_over_the_board_answers_and_nothing_stays_hot()
+TEST(whatever_bit_turns_over_the_board_answers_and_nothing_stays_hot)
 {
     constexpr unsigned registers[] = {
         0x37, 0x38, 0x39, 0x3A, 0x3B, 0x3C, 0x3D, 0x43, 0x44, 0x45, 0x47, 0x48, 0x64, 0x65,
@@ -148,7 +148,7 @@ void whatever_bit_turns_over_the_board_answers_and_nothing_stays_hot()
 /* A bit of RAM, in what the user set and in what the controller made of it: never driven by it for
  * longer than two passes, never saved, and afterwards all is as it was saved and nothing is known.
  */
-void a_setting_that_turns_over_by_itself_ends_in_a_reset_that_says_so()
+TEST(a_setting_that_turns_over_by_itself_ends_in_a_reset_that_says_so)
 {
     struct place {
         const char *variable;
@@ -181,7 +181,7 @@ void a_setting_that_turns_over_by_itself_ends_in_a_reset_that_says_so()
 
 /* A bit of what is believed of a spring: no reset, the others go on, and this one waits until it
  * cannot be hot. */
-void a_belief_that_turns_over_by_itself_begins_anew_and_says_so()
+TEST(a_belief_that_turns_over_by_itself_begins_anew_and_says_so)
 {
     rig mega;
     heat(mega);
@@ -204,7 +204,7 @@ void a_belief_that_turns_over_by_itself_begins_anew_and_says_so()
 }
 
 /* Ticks become due faster than they are done: the board's time is not the world's any more. */
-void a_control_loop_that_cannot_keep_up_ends_in_a_reset_that_says_so()
+TEST(a_control_loop_that_cannot_keep_up_ends_in_a_reset_that_says_so)
 {
     constexpr unsigned TIMER2_COMPA = 13;
     rig mega;
@@ -221,7 +221,7 @@ void a_control_loop_that_cannot_keep_up_ends_in_a_reset_that_says_so()
 
 /* In the first 90 s the model's temperatures are guesses, which a reset must not make certain: what
  * open loop gave meanwhile is none. */
-void a_reset_keeps_the_heat_that_was_given_before_anything_was_known()
+TEST(a_reset_keeps_the_heat_that_was_given_before_anything_was_known)
 {
     rig mega;
     mega.boot(false);
@@ -242,7 +242,7 @@ void a_reset_keeps_the_heat_that_was_given_before_anything_was_known()
 }
 
 /* Nobody knows how long it was off: the springs may be as hot as they ever get. */
-void after_power_on_a_spring_waits_until_it_cannot_be_hot()
+TEST(after_power_on_a_spring_waits_until_it_cannot_be_hot)
 {
     rig mega;
     heat(mega);
@@ -262,7 +262,7 @@ void after_power_on_a_spring_waits_until_it_cannot_be_hot()
     TEST_ASSERT_TRUE_MESSAGE(board_duty(mega.raw(), 4) > 0.0, "it waits though it is cold");
 }
 
-void the_watchdog_is_never_hungry_in_normal_work()
+TEST(the_watchdog_is_never_hungry_in_normal_work)
 {
     rig mega;
     heat(mega);
@@ -274,23 +274,3 @@ void the_watchdog_is_never_hungry_in_normal_work()
 }
 
 } // namespace
-
-void setUp() {}
-void tearDown() {}
-
-int main()
-{
-    need_elf(elf());
-    UNITY_BEGIN();
-    RUN_TEST(a_new_board_starts_unlocked_and_off);
-    RUN_TEST(each_reset_leaves_the_board_off_and_locked_and_keeps_what_it_may);
-    RUN_TEST(an_interrupt_that_nobody_has_ends_as_a_hang_does);
-    RUN_TEST(whatever_bit_turns_over_the_board_answers_and_nothing_stays_hot);
-    RUN_TEST(a_setting_that_turns_over_by_itself_ends_in_a_reset_that_says_so);
-    RUN_TEST(a_belief_that_turns_over_by_itself_begins_anew_and_says_so);
-    RUN_TEST(a_control_loop_that_cannot_keep_up_ends_in_a_reset_that_says_so);
-    RUN_TEST(a_reset_keeps_the_heat_that_was_given_before_anything_was_known);
-    RUN_TEST(after_power_on_a_spring_waits_until_it_cannot_be_hot);
-    RUN_TEST(the_watchdog_is_never_hungry_in_normal_work);
-    return UNITY_END();
-}

@@ -59,7 +59,7 @@ void save(rig &mega)
     TEST_FAIL_MESSAGE("the save does not end");
 }
 
-void settings_of_one_board_make_another_the_same()
+TEST(settings_of_one_board_make_another_the_same)
 {
     rig one;
     one.boot();
@@ -80,7 +80,7 @@ void settings_of_one_board_make_another_the_same()
     same(wanted, settings_of(other));
 }
 
-void what_is_not_saved_is_gone_after_power_off()
+TEST(what_is_not_saved_is_gone_after_power_off)
 {
     rig mega;
     mega.boot();
@@ -93,7 +93,7 @@ void what_is_not_saved_is_gone_after_power_off()
 
 /* The power fails at a sample of the bytes of a save (every byte: test_settings): afterwards the
  * board has the old settings or the new ones, whole. */
-void power_cut_in_a_save_leaves_old_or_new()
+TEST(power_cut_in_a_save_leaves_old_or_new)
 {
     rig first;
     first.boot();
@@ -144,7 +144,7 @@ void power_cut_in_a_save_leaves_old_or_new()
 }
 
 /* At once and while springs are driven, without a fault. */
-void averaging_is_set_while_it_runs()
+TEST(averaging_is_set_while_it_runs)
 {
     rig mega;
     mega.boot();
@@ -164,17 +164,3 @@ void averaging_is_set_while_it_runs()
 }
 
 } // namespace
-
-void setUp() {}
-void tearDown() {}
-
-int main()
-{
-    need_elf(elf());
-    UNITY_BEGIN();
-    RUN_TEST(settings_of_one_board_make_another_the_same);
-    RUN_TEST(what_is_not_saved_is_gone_after_power_off);
-    RUN_TEST(power_cut_in_a_save_leaves_old_or_new);
-    RUN_TEST(averaging_is_set_while_it_runs);
-    return UNITY_END();
-}

@@ -45,7 +45,7 @@ void off_and_stays_off(rig &mega, const std::string &before = "")
 
 /* As it drives, prints, tells; in the middle of a command, behind others that it drops, and behind
  * a line of garbage. Afterwards the console answers, and the board can be cleared. */
-void stops_whatever_is_sent_before()
+TEST(stops_whatever_is_sent_before)
 {
     static const struct {
         const char *sent; /* so long before */
@@ -74,7 +74,7 @@ void stops_whatever_is_sent_before()
     }
 }
 
-void stops_at_any_moment_of_a_tick()
+TEST(stops_at_any_moment_of_a_tick)
 {
     for (int k = 0; k < 20; ++k) {
         rig mega;
@@ -85,7 +85,7 @@ void stops_at_any_moment_of_a_tick()
     }
 }
 
-void stops_while_it_writes_the_eeprom()
+TEST(stops_while_it_writes_the_eeprom)
 {
     rig mega;
     all_on(mega);
@@ -97,7 +97,7 @@ void stops_while_it_writes_the_eeprom()
     off_and_stays_off(mega);
 }
 
-void stops_while_the_i2c_bus_hangs()
+TEST(stops_while_the_i2c_bus_hangs)
 {
     rig mega;
     all_on(mega);
@@ -113,7 +113,7 @@ void stops_while_the_i2c_bus_hangs()
 }
 
 /* Sent in one go: what comes behind the stop is none of what it drops. */
-void a_line_right_behind_the_stop_is_obeyed_at_any_moment_of_a_tick()
+TEST(a_line_right_behind_the_stop_is_obeyed_at_any_moment_of_a_tick)
 {
     for (int k = 0; k < 20; ++k) {
         rig mega;
@@ -165,7 +165,7 @@ std::string text_of(const bit &one)
     return text;
 }
 
-void stops_whatever_bit_of_an_output_has_turned_over()
+TEST(stops_whatever_bit_of_an_output_has_turned_over)
 {
     rig mega;
     all_on(mega);
@@ -184,7 +184,7 @@ void stops_whatever_bit_of_an_output_has_turned_over()
     }
 }
 
-void off_is_off_again_within_a_tick_whatever_bit_turns_over()
+TEST(off_is_off_again_within_a_tick_whatever_bit_turns_over)
 {
     rig mega;
     mega.boot();
@@ -203,7 +203,7 @@ void off_is_off_again_within_a_tick_whatever_bit_turns_over()
 }
 
 /* 14 A may flow for a tick, from which the current loop has to recover: nothing is latched. */
-void a_driven_spring_has_its_current_again_whatever_bit_turns_over()
+TEST(a_driven_spring_has_its_current_again_whatever_bit_turns_over)
 {
     rig mega;
     all_on(mega);
@@ -225,21 +225,3 @@ void a_driven_spring_has_its_current_again_whatever_bit_turns_over()
 }
 
 } // namespace
-
-void setUp() {}
-void tearDown() {}
-
-int main()
-{
-    need_elf(elf());
-    UNITY_BEGIN();
-    RUN_TEST(stops_whatever_is_sent_before);
-    RUN_TEST(stops_at_any_moment_of_a_tick);
-    RUN_TEST(stops_while_it_writes_the_eeprom);
-    RUN_TEST(stops_while_the_i2c_bus_hangs);
-    RUN_TEST(a_line_right_behind_the_stop_is_obeyed_at_any_moment_of_a_tick);
-    RUN_TEST(stops_whatever_bit_of_an_output_has_turned_over);
-    RUN_TEST(off_is_off_again_within_a_tick_whatever_bit_turns_over);
-    RUN_TEST(a_driven_spring_has_its_current_again_whatever_bit_turns_over);
-    return UNITY_END();
-}

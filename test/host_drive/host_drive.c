@@ -2,8 +2,8 @@
 #include <math.h>
 #include <stdio.h>
 
+#include "../run_tests.h"
 #include "loop.h"
-#include "unity.h"
 
 #define SPRINGS   9
 #define CENTRE    4
@@ -118,7 +118,7 @@ static void expect_in_the_band(int spring)
     TEST_ASSERT_TRUE(temperature(spring) > 77.0 && temperature(spring) < 84.0);
 }
 
-static void eight_are_held_in_the_band_and_the_centre_stays_cold(void)
+TEST(eight_are_held_in_the_band_and_the_centre_stays_cold)
 {
     power_on();
     want_all_but(CENTRE);
@@ -132,7 +132,7 @@ static void eight_are_held_in_the_band_and_the_centre_stays_cold(void)
     TEST_ASSERT_TRUE(temperature(CENTRE) < 44.5);
 }
 
-static void held_spring_does_not_feel_its_neighbours(void)
+TEST(held_spring_does_not_feel_its_neighbours)
 {
     start_cold();
     want(CENTRE, 1000);
@@ -146,7 +146,7 @@ static void held_spring_does_not_feel_its_neighbours(void)
     TEST_ASSERT_TRUE(phase(CENTRE) > 0.98);
 }
 
-static void spring_that_loses_its_turn_keeps_what_it_has(void)
+TEST(spring_that_loses_its_turn_keeps_what_it_has)
 {
     start_cold();
     for (int k = 0; k < 4; k++) {
@@ -172,7 +172,7 @@ static void spring_that_loses_its_turn_keeps_what_it_has(void)
 }
 
 /* Martensite start is found in the resistance, whatever the loss. */
-static void array_that_loses_more_or_less_is_held_in_the_band(void)
+TEST(array_that_loses_more_or_less_is_held_in_the_band)
 {
     for (double loss = 0.85; loss < 1.2; loss += 0.3) {
         plant_set(plant, "loss_w_per_k", 5.8e-3 * loss);
@@ -194,7 +194,7 @@ static void array_that_loses_more_or_less_is_held_in_the_band(void)
 }
 
 /* Neither sign nor size of the declared change is believed: what is seen is learnt. */
-static void change_of_resistance_is_learnt_whatever_is_declared(void)
+TEST(change_of_resistance_is_learnt_whatever_is_declared)
 {
     for (unsigned n = 1; n < 4; n++) { /* it falls, a fall is declared, or both */
         plant_set(plant, "resistance_martensite_ohm", (n & 1u) != 0 ? 0.219 : 0.175);
@@ -225,7 +225,7 @@ static void toggle(double period_s, double seconds, double limit_c)
 }
 
 /* As declared, and an array that is not the declared one. */
-static void toggling_at_any_period_stays_within_the_limits(void)
+TEST(toggling_at_any_period_stays_within_the_limits)
 {
     static const double period_s[] = {0.1,  0.3,  0.7,  1.5,   3.0,  10.0,
                                       20.0, 40.0, 80.0, 120.0, 300.0};
@@ -242,7 +242,7 @@ static void toggling_at_any_period_stays_within_the_limits(void)
         options.ambient_error_c = other ? -3.0 : 0.0;
         plant_reset(plant);
         power_on();
-        for (unsigned n = 0; n < sizeof period_s / sizeof period_s[0]; n++) {
+        for (unsigned n = 0; n < ROWS(period_s); n++) {
             toggle(period_s[n], 120.0, HOTTEST_C);
         }
         for (uint8_t k = 0; k < SPRINGS; k++) {
@@ -252,7 +252,7 @@ static void toggling_at_any_period_stays_within_the_limits(void)
 }
 
 /* Of one conversion, 1 mV by default. Up to 35 mV no board of 24 tells it, with 50 mV one does. */
-static void noisy_voltage_is_borne_or_told(void)
+TEST(noisy_voltage_is_borne_or_told)
 {
     for (int told = 0; told < 2; told++) {
         options.bus_noise_v = told != 0 ? 0.2 : 0.035;
@@ -267,7 +267,7 @@ static void noisy_voltage_is_borne_or_told(void)
 
 /* ---- release and return ---- */
 
-static void released_spring_is_martensite_sooner_than_from_105_degrees(void)
+TEST(released_spring_is_martensite_sooner_than_from_105_degrees)
 {
     start_cold();
     want_all_but(-1);
@@ -288,7 +288,7 @@ static void check_full_in_a_minute(const char *format, double first, double seco
     TEST_ASSERT_TRUE_MESSAGE(phase(CENTRE) > 0.98, where);
 }
 
-static void spring_switched_on_again_after_seconds_is_austenite_again(void)
+TEST(spring_switched_on_again_after_seconds_is_austenite_again)
 {
     for (int alone = 0; alone < 2; alone++) {
         for (double off_s = 0.02; off_s <= 200.0; off_s = 1.3 * off_s + 1.0) {
@@ -306,7 +306,7 @@ static void spring_switched_on_again_after_seconds_is_austenite_again(void)
 }
 
 /* From a level the phase goes on only where it left the transformation. */
-static void full_is_reached_from_any_level_at_any_moment(void)
+TEST(full_is_reached_from_any_level_at_any_moment)
 {
     for (uint16_t level = 300; level <= 800; level = (uint16_t)(level + 250u)) {
         for (double from_s = 80.0; from_s < 290.0; from_s += 14.0) {
@@ -338,14 +338,14 @@ static void check_stuck_resistance(double ohm)
     }
 }
 
-static void resistance_that_sticks_in_a_hold_is_not_passed_over(void)
+TEST(resistance_that_sticks_in_a_hold_is_not_passed_over)
 {
     check_stuck_resistance(0.219); /* austenite's */
     check_stuck_resistance(0.175); /* martensite's */
     check_stuck_resistance(0.190);
 }
 
-static void smaller_change_of_resistance_does_not_overheat(void)
+TEST(smaller_change_of_resistance_does_not_overheat)
 {
     for (double change = 0.85; change < 1.16; change += 0.05) { /* of the declared one */
         plant_set(plant, "resistance_austenite_ohm", 0.175 + 0.044 * change);
@@ -398,7 +398,7 @@ static double hottest_of_everything(uint32_t seed)
 }
 
 /* Of twenty draws, each more than an hour long: most below 120 degC, none far above. */
-static void everything_at_once_stays_within_the_limits(void)
+TEST(everything_at_once_stays_within_the_limits)
 {
     unsigned hot = 0;
     for (uint32_t seed = 11; seed < 31; seed++) {
@@ -409,23 +409,4 @@ static void everything_at_once_stays_within_the_limits(void)
         hot += hottest_c > 120.0;
     }
     TEST_ASSERT_LESS_OR_EQUAL_UINT(8, hot);
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(eight_are_held_in_the_band_and_the_centre_stays_cold);
-    RUN_TEST(held_spring_does_not_feel_its_neighbours);
-    RUN_TEST(spring_that_loses_its_turn_keeps_what_it_has);
-    RUN_TEST(array_that_loses_more_or_less_is_held_in_the_band);
-    RUN_TEST(toggling_at_any_period_stays_within_the_limits);
-    RUN_TEST(change_of_resistance_is_learnt_whatever_is_declared);
-    RUN_TEST(noisy_voltage_is_borne_or_told);
-    RUN_TEST(released_spring_is_martensite_sooner_than_from_105_degrees);
-    RUN_TEST(spring_switched_on_again_after_seconds_is_austenite_again);
-    RUN_TEST(full_is_reached_from_any_level_at_any_moment);
-    RUN_TEST(smaller_change_of_resistance_does_not_overheat);
-    RUN_TEST(resistance_that_sticks_in_a_hold_is_not_passed_over);
-    RUN_TEST(everything_at_once_stays_within_the_limits);
-    return UNITY_END();
 }

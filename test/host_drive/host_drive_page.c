@@ -3,8 +3,8 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "../run_tests.h"
 #include "settings.h"
-#include "unity.h"
 
 static char page[65536];
 
@@ -17,9 +17,7 @@ void setUp(void)
     page[length] = '\0';
 }
 
-void tearDown(void) {}
-
-static void every_setting_of_the_policy_is_there_with_unit_and_default(void)
+TEST(every_setting_of_the_policy_is_there_with_unit_and_default)
 {
     settings_t defaults;
     settings_default(&defaults);
@@ -42,7 +40,7 @@ static void every_setting_of_the_policy_is_there_with_unit_and_default(void)
     TEST_ASSERT_GREATER_THAN_UINT(10, found);
 }
 
-static void every_limit_is_there_with_its_bit(void)
+TEST(every_limit_is_there_with_its_bit)
 {
     static const struct {
         drive_policy_limit_t bit;
@@ -52,18 +50,10 @@ static void every_limit_is_there_with_its_bit(void)
         {DRIVE_POLICY_LIMIT_SUPPLY, "supply"},     {DRIVE_POLICY_LIMIT_TEMPERATURE, "temperature"},
         {DRIVE_POLICY_LIMIT_UNDRIVEN, "undriven"}, {DRIVE_POLICY_LIMIT_OVERLOAD, "overload"},
         {DRIVE_POLICY_LIMIT_TRIP, "trip"},         {DRIVE_POLICY_LIMIT_BLIND, "blind"}};
-    for (unsigned k = 0; k < sizeof limits / sizeof limits[0]; k++) {
+    for (unsigned k = 0; k < ROWS(limits); k++) {
         char wanted[40];
         (void)snprintf(wanted, sizeof wanted, "| %u | `%s` |", (unsigned)limits[k].bit,
                        limits[k].name);
         TEST_ASSERT_NOT_NULL_MESSAGE(strstr(page, wanted), wanted);
     }
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(every_setting_of_the_policy_is_there_with_unit_and_default);
-    RUN_TEST(every_limit_is_there_with_its_bit);
-    return UNITY_END();
 }

@@ -3,9 +3,9 @@
 #include <math.h>
 #include <stdio.h>
 
+#include "../run_tests.h"
 #include "controller.h"
 #include "plant.h"
-#include "unity.h"
 
 #define SPRINGS 9
 #define CENTRE  4
@@ -116,10 +116,10 @@ static bool liar_is_blind(void)
     return (controller_limits(&liar.controller, CENTRE) & DRIVE_POLICY_LIMIT_BLIND) != 0;
 }
 
-static void readings_that_fail_now_and_then_do_no_harm(void)
+TEST(readings_that_fail_now_and_then_do_no_harm)
 {
     static const double from_s[] = {1.0, 20.0, 40.0, 150.0};
-    for (unsigned n = 0; n < sizeof from_s / sizeof from_s[0]; n++) {
+    for (unsigned n = 0; n < ROWS(from_s); n++) {
         plant_reset(plant);
         start_liar();
         run_liar(from_s[n], HONEST);
@@ -132,7 +132,7 @@ static void readings_that_fail_now_and_then_do_no_harm(void)
 /* +-40 mV is four times the noise that a circuit is told through: it may be taken for none. Then
  * that is said and the spring is off; if not, it is held, no hotter than a heating makes it: what
  * was learnt of it meanwhile is as bad as its readings. +-12 mV is no more than that noise. */
-static void voltage_that_was_noisy_is_no_false_crossing(void)
+TEST(voltage_that_was_noisy_is_no_false_crossing)
 {
     static const lie_t lies[] = {NOISY_VOLTAGE, NOISIER_VOLTAGE};
     for (unsigned n = 0; n < 2; n++) {
@@ -160,12 +160,4 @@ static void voltage_that_was_noisy_is_no_false_crossing(void)
             TEST_ASSERT_FALSE_MESSAGE(n == 0 && liar_is_blind(), where);
         }
     }
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(readings_that_fail_now_and_then_do_no_harm);
-    RUN_TEST(voltage_that_was_noisy_is_no_false_crossing);
-    return UNITY_END();
 }

@@ -5,8 +5,8 @@
 #include <stddef.h>
 #include <string.h>
 
+#include "../run_tests.h"
 #include "loop.h"
-#include "unity.h"
 
 static controller_settings_t settings;
 static plant_t *plant;
@@ -96,7 +96,7 @@ static double mean_current_a(int spring, int ticks)
 static void hold_patterns(uint16_t current_ma, double plant_limit_c, double chip_limit_c)
 {
     settings.policy.open_current_ma = current_ma;
-    for (size_t p = 0; p < sizeof patterns / sizeof patterns[0]; p++) {
+    for (size_t p = 0; p < ROWS(patterns); p++) {
         start_cold();
         command(patterns[p]);
         plant_t *alone = plant_copy(plant);
@@ -129,13 +129,13 @@ static void hold_patterns(uint16_t current_ma, double plant_limit_c, double chip
 }
 
 /* The ramp of 0.5 s and 12 mA of a duty step are the difference. */
-static void plain_current_follows_the_patterns(void)
+TEST(plain_current_follows_the_patterns)
 {
     hold_patterns(1500, 0.6, 0.5);
 }
 
 /* The model alone: what readings correct is test_spring_estimator's. */
-static void estimate_follows_through_the_transformation(void)
+TEST(estimate_follows_through_the_transformation)
 {
     settings.policy.observer = 0;
     settings.policy.open_current_ma = 1800;
@@ -157,7 +157,7 @@ static void estimate_follows_through_the_transformation(void)
     TEST_ASSERT_TRUE(worst_c < 0.5);
 }
 
-static void coarser_plant_steps_change_little(void)
+TEST(coarser_plant_steps_change_little)
 {
     loop_options_t options;
     loop_options_default(&options);
@@ -179,7 +179,7 @@ static void coarser_plant_steps_change_little(void)
     loop_destroy(coarse);
 }
 
-static void sagging_supply_still_gives_the_current(void)
+TEST(sagging_supply_still_gives_the_current)
 {
     TEST_ASSERT_EQUAL(PLANT_OK, plant_set_effect(plant, "supply_sag", true));
     start();
@@ -188,7 +188,7 @@ static void sagging_supply_still_gives_the_current(void)
     TEST_ASSERT_DOUBLE_WITHIN(0.005, 1.5, mean_current_a(4, 100));
 }
 
-static void each_failure_is_found_and_is_of_its_spring(void)
+TEST(each_failure_is_found_and_is_of_its_spring)
 {
     const struct {
         loop_action_t action;
@@ -197,7 +197,7 @@ static void each_failure_is_found_and_is_of_its_spring(void)
                     {LOOP_ACTION_SHORT_SPRING, SAFETY_FAULT_SHORT_SPRING},
                     {LOOP_ACTION_SENSOR_NACK, SAFETY_FAULT_SENSOR_ABSENT},
                     {LOOP_ACTION_SENSOR_STALE, SAFETY_FAULT_SENSOR_STALE}};
-    for (size_t f = 0; f < sizeof failures / sizeof failures[0]; f++) {
+    for (size_t f = 0; f < ROWS(failures); f++) {
         start();
         command(0x1FF);
         loop_advance(loop, 5.0);
@@ -218,7 +218,7 @@ static void each_failure_is_found_and_is_of_its_spring(void)
     }
 }
 
-static void a_repair_ends_its_own_failure_only(void)
+TEST(a_repair_ends_its_own_failure_only)
 {
     start();
     TEST_ASSERT_TRUE(loop_act(loop, LOOP_ACTION_SENSOR_NACK, 0));
@@ -235,7 +235,7 @@ static void a_repair_ends_its_own_failure_only(void)
 
 /* What looks right and is not: the loop only provokes it; what the controller makes of it is not
  * judged here. */
-static void frozen_lying_and_swapped_sensors_show_what_they_should_not(void)
+TEST(frozen_lying_and_swapped_sensors_show_what_they_should_not)
 {
     start();
     command(0x1FF);
@@ -289,7 +289,7 @@ static uint32_t ticks_until_named(void)
 }
 
 /* Driven alone, with all others, not at all; and after a stop. */
-static void switch_that_fails_closed_is_named_within_15_ticks(void)
+TEST(switch_that_fails_closed_is_named_within_15_ticks)
 {
     static const unsigned driven[] = {0x010, 0x1FF, 0x000};
     for (unsigned n = 0; n < 6; n++) {
@@ -316,7 +316,7 @@ static void switch_that_fails_closed_is_named_within_15_ticks(void)
     }
 }
 
-static void the_chip_believes_the_ambient_that_it_is_told(void)
+TEST(the_chip_believes_the_ambient_that_it_is_told)
 {
     start();
     TEST_ASSERT_TRUE(loop_tell_ambient(loop, 10.0));
@@ -329,7 +329,7 @@ static void the_chip_believes_the_ambient_that_it_is_told(void)
     TEST_ASSERT_EQUAL_INT16(30 * 128, loop_inputs(loop)->ambient_c7);
 }
 
-static void after_a_reset_nothing_runs_until_unlocked(void)
+TEST(after_a_reset_nothing_runs_until_unlocked)
 {
     const loop_action_t resets[] = {LOOP_ACTION_WATCHDOG, LOOP_ACTION_BROWN_OUT};
     for (size_t r = 0; r < 2; r++) {
@@ -359,7 +359,7 @@ static void after_a_reset_nothing_runs_until_unlocked(void)
 }
 
 /* At any moment of heating and cooling, the phase half transformed or not. */
-static void watchdog_keeps_the_model_as_it_is(void)
+TEST(watchdog_keeps_the_model_as_it_is)
 {
     settings.policy.open_current_ma = 2000;
     start();
@@ -384,7 +384,7 @@ static void watchdog_keeps_the_model_as_it_is(void)
     }
 }
 
-static void ambient_reaches_plant_and_chip_with_its_error(void)
+TEST(ambient_reaches_plant_and_chip_with_its_error)
 {
     loop_options_t options;
     loop_options_default(&options);
@@ -403,7 +403,7 @@ static void ambient_reaches_plant_and_chip_with_its_error(void)
     TEST_ASSERT_DOUBLE_WITHIN(1e-6, 1000.0, plant_time_s(loop_plant(loop)));
 }
 
-static void what_does_not_fit_is_refused(void)
+TEST(what_does_not_fit_is_refused)
 {
     uint16_t bad = 0;
     loop_options_t options;
@@ -432,23 +432,4 @@ static void what_does_not_fit_is_refused(void)
     TEST_ASSERT_FALSE(loop_act(loop, LOOP_ACTION_OPEN_SPRING, -1));
     TEST_ASSERT_FALSE(loop_act(loop, LOOP_ACTION_COUNT, 0));
     TEST_ASSERT_TRUE(loop_current_a(loop, 9) == 0.0);
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(plain_current_follows_the_patterns);
-    RUN_TEST(estimate_follows_through_the_transformation);
-    RUN_TEST(coarser_plant_steps_change_little);
-    RUN_TEST(sagging_supply_still_gives_the_current);
-    RUN_TEST(each_failure_is_found_and_is_of_its_spring);
-    RUN_TEST(a_repair_ends_its_own_failure_only);
-    RUN_TEST(frozen_lying_and_swapped_sensors_show_what_they_should_not);
-    RUN_TEST(switch_that_fails_closed_is_named_within_15_ticks);
-    RUN_TEST(the_chip_believes_the_ambient_that_it_is_told);
-    RUN_TEST(after_a_reset_nothing_runs_until_unlocked);
-    RUN_TEST(watchdog_keeps_the_model_as_it_is);
-    RUN_TEST(ambient_reaches_plant_and_chip_with_its_error);
-    RUN_TEST(what_does_not_fit_is_refused);
-    return UNITY_END();
 }

@@ -2,7 +2,7 @@
 #include "convection.h"
 #include "plant_rig.h"
 
-static void correlations_against_the_table(void)
+TEST(correlations_against_the_table)
 {
     /* Incropera and DeWitt, table A.4 */
     TEST_ASSERT_DOUBLE_WITHIN(0.005 * 20.92e-6, 20.92e-6, convection_air_viscosity_m2_per_s(350));
@@ -24,11 +24,4 @@ static void correlations_against_the_table(void)
     OK(plant_set_fan(plant, 1.0));
     settle();
     TEST_ASSERT_DOUBLE_WITHIN(0.2e-3 * 85, 11.3e-3 * 85, plant_power_w(plant, 0));
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(correlations_against_the_table);
-    return UNITY_END();
 }

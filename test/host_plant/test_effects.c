@@ -3,7 +3,7 @@
 #include "plant_rig.h"
 
 /* Which effects touch the temperatures in which drive modes, and which only the picture of them. */
-static void each_effect_changes_what_it_should_and_only_that(void)
+TEST(each_effect_changes_what_it_should_and_only_that)
 {
     enum { POWER = 1, CURRENT = 2, DUTY = 4, COMMAND = 8, HEAT = 15, PICTURE = 16 };
     static const struct {
@@ -30,7 +30,7 @@ static void each_effect_changes_what_it_should_and_only_that(void)
         {"fan_curve", HEAT},
     };
     static const double largest[4] = {0.8, 2.2, 0.2, 1.0};
-    TEST_ASSERT_EQUAL_UINT(plant_effect_count(), sizeof expected / sizeof expected[0]);
+    TEST_ASSERT_EQUAL_UINT(plant_effect_count(), ROWS(expected));
     set("loss_scale[3]", 1.2);
     set("command_power_w", 0.8);
     set("resistance_martensite_rise_per_k", 1e-3);
@@ -54,7 +54,7 @@ static void each_effect_changes_what_it_should_and_only_that(void)
     }
 }
 
-static void a_hot_spring_radiates_a_seventh_of_its_loss(void)
+TEST(a_hot_spring_radiates_a_seventh_of_its_loss)
 {
     uncouple();
     hold(0, 105.0);
@@ -65,7 +65,7 @@ static void a_hot_spring_radiates_a_seventh_of_its_loss(void)
     TEST_ASSERT_DOUBLE_WITHIN(0.002, 0.082, plant_power_w(plant, 0) - without);
 }
 
-static void natural_convection_loses_less_where_it_is_cooler_and_leaves_the_fan_alone(void)
+TEST(natural_convection_loses_less_where_it_is_cooler_and_leaves_the_fan_alone)
 {
     uncouple();
     for (int windy = 0; windy < 2; windy++) {
@@ -84,7 +84,7 @@ static void natural_convection_loses_less_where_it_is_cooler_and_leaves_the_fan_
     }
 }
 
-static void resistance_follows_phase_and_each_phase_its_temperature(void)
+TEST(resistance_follows_phase_and_each_phase_its_temperature)
 {
     on("resistance_phase");
     const double martensite = get("resistance_martensite_ohm");
@@ -106,7 +106,7 @@ static void resistance_follows_phase_and_each_phase_its_temperature(void)
 }
 
 /* A sensor at the terminals sees the contact; the spring does not feel it. */
-static void a_contact_takes_voltage_and_keeps_its_heat(void)
+TEST(a_contact_takes_voltage_and_keeps_its_heat)
 {
     uncouple();
     on("contact_resistance");
@@ -130,15 +130,4 @@ static void a_contact_takes_voltage_and_keeps_its_heat(void)
     set("contact_ohm[1]", 0.0);
     OK(plant_step(plant, 0.02));
     TEST_ASSERT_EQUAL_DOUBLE(plant_current_a(plant, 1), plant_current_a(plant, 0));
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(each_effect_changes_what_it_should_and_only_that);
-    RUN_TEST(a_hot_spring_radiates_a_seventh_of_its_loss);
-    RUN_TEST(natural_convection_loses_less_where_it_is_cooler_and_leaves_the_fan_alone);
-    RUN_TEST(resistance_follows_phase_and_each_phase_its_temperature);
-    RUN_TEST(a_contact_takes_voltage_and_keeps_its_heat);
-    return UNITY_END();
 }

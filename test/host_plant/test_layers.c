@@ -1,20 +1,20 @@
 /* Two layers: each is the array that it would be alone, but for what passes between the springs of
  * a taxel. */
+#include "../run_tests.h"
 #include <math.h>
-#include <unity.h>
 
 #include "plant.h"
 
-#define ROWS     3
-#define COLUMNS  4
-#define SPRINGS  (ROWS * COLUMNS)
-#define OK(call) TEST_ASSERT_EQUAL_INT(PLANT_OK, (call))
+#define LAYERS_ROWS 3
+#define COLUMNS     4
+#define SPRINGS     (LAYERS_ROWS * COLUMNS)
+#define OK(call)    TEST_ASSERT_EQUAL_INT(PLANT_OK, (call))
 
 static plant_t *both;
 
 void setUp(void)
 {
-    both = plant_create_layers(ROWS, COLUMNS, 2);
+    both = plant_create_layers(LAYERS_ROWS, COLUMNS, 2);
 }
 void tearDown(void)
 {
@@ -25,7 +25,7 @@ static void dress(plant_t *plant)
 {
     static const char *const effects[] = {"latent_heat", "edge_loss", "fan_wake",
                                           "plate_conduction", "radiation"};
-    for (size_t k = 0; k < sizeof effects / sizeof effects[0]; k++)
+    for (size_t k = 0; k < ROWS(effects); k++)
         OK(plant_set_effect(plant, effects[k], true));
     OK(plant_set(plant, "second_w_per_k", 1e-4));
     OK(plant_set(plant, "second_fan_w_per_k", 1e-4));
@@ -34,7 +34,7 @@ static void dress(plant_t *plant)
 }
 
 /* Without the joint, each layer is a plant of one layer, to the last bit that the steps allow. */
-static void without_the_joint_each_layer_is_an_array(void)
+TEST(without_the_joint_each_layer_is_an_array)
 {
     plant_t *one[2];
     dress(both);
@@ -42,13 +42,13 @@ static void without_the_joint_each_layer_is_an_array(void)
     OK(plant_set(both, "series_fan_w_per_k", 0.0));
     OK(plant_set(both, "stiffness_coupling_scale", 0.5));
     for (int layer = 0; layer < 2; layer++) {
-        one[layer] = plant_create(ROWS, COLUMNS);
+        one[layer] = plant_create(LAYERS_ROWS, COLUMNS);
         dress(one[layer]);
     }
     static const char *const scaled[] = {
         "orthogonal_w_per_k", "orthogonal_fan_w_per_k", "diagonal_w_per_k", "diagonal_fan_w_per_k",
         "second_w_per_k",     "second_fan_w_per_k",     "wake_w_per_k"};
-    for (size_t k = 0; k < sizeof scaled / sizeof scaled[0]; k++) {
+    for (size_t k = 0; k < ROWS(scaled); k++) {
         double value;
         OK(plant_get(one[1], scaled[k], &value));
         OK(plant_set(one[1], scaled[k], 0.5 * value));
@@ -73,7 +73,7 @@ static void without_the_joint_each_layer_is_an_array(void)
 }
 
 /* Two nodes: P = (G + S) a - S b, 0 = (G + S) b - S a. */
-static void a_taxel_alone_is_two_nodes_and_a_joint(void)
+TEST(a_taxel_alone_is_two_nodes_and_a_joint)
 {
     const double loss = 5e-3, series = 1e-3, power = 0.4;
     plant_t *taxel = plant_create_layers(1, 1, 2);
@@ -93,7 +93,7 @@ static void a_taxel_alone_is_two_nodes_and_a_joint(void)
     plant_destroy(taxel);
 }
 
-static void energy_closes(void)
+TEST(energy_closes)
 {
     dress(both);
     OK(plant_set_effect(both, "shared_air", true));
@@ -106,10 +106,10 @@ static void energy_closes(void)
     TEST_ASSERT_DOUBLE_WITHIN(1e-6 * plant_energy_input_j(both), 0.0, plant_energy_balance_j(both));
 }
 
-static void sizes(void)
+TEST(sizes)
 {
     TEST_ASSERT_EQUAL_INT(2 * SPRINGS, plant_spring_count(both));
-    TEST_ASSERT_EQUAL_INT(ROWS, plant_rows(both));
+    TEST_ASSERT_EQUAL_INT(LAYERS_ROWS, plant_rows(both));
     TEST_ASSERT_EQUAL_INT(2, plant_layers(both));
     TEST_ASSERT_NULL(plant_create_layers(3, 3, 3));
     TEST_ASSERT_NULL(plant_create_layers(3, 3, 0));
@@ -119,14 +119,4 @@ static void sizes(void)
     OK(plant_get(both, "loss_w_per_k[24]", &value));
     TEST_ASSERT_EQUAL_DOUBLE(0.01, value);
     TEST_ASSERT_EQUAL_INT(PLANT_ERROR_INDEX, plant_set(both, "loss_w_per_k[25]", 0.01));
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(without_the_joint_each_layer_is_an_array);
-    RUN_TEST(a_taxel_alone_is_two_nodes_and_a_joint);
-    RUN_TEST(energy_closes);
-    RUN_TEST(sizes);
-    return UNITY_END();
 }

@@ -2,7 +2,7 @@
 #include "paper.h"
 #include "plant_rig.h"
 
-static void balance_of_design_section_1(void)
+TEST(balance_of_design_section_1)
 {
     /* 1.5 A in austenite, 0.219 ohm, against 5.8 mW/K: 105 degC, time constant 52 s */
     set("resistance_ohm", 0.219);
@@ -17,8 +17,7 @@ static void balance_of_design_section_1(void)
     TEST_ASSERT_TRUE(at(4) < 64.0);
 }
 
-static void
-constant_current_from_cold_never_transforms_at_1_5_a_but_runs_past_at_a_little_more(void)
+TEST(constant_current_from_cold_never_transforms_at_1_5_a_but_runs_past_at_a_little_more)
 {
     on("latent_heat");
     on("resistance_phase");
@@ -41,7 +40,7 @@ constant_current_from_cold_never_transforms_at_1_5_a_but_runs_past_at_a_little_m
     TEST_ASSERT_TRUE(at(0) > 108.0);
 }
 
-static void no_current_holds_a_spring_within_the_transformation(void)
+TEST(no_current_holds_a_spring_within_the_transformation)
 {
     /* dP/dT beats the loss there: steady states exist only (nearly) all martensite or all austenite
      */
@@ -67,7 +66,7 @@ static void no_current_holds_a_spring_within_the_transformation(void)
     TEST_ASSERT_TRUE(between > 3);
 }
 
-static void holding_above_martensite_start_saves_a_quarter(void)
+TEST(holding_above_martensite_start_saves_a_quarter)
 {
     uncouple();
     hold(0, 105.0);
@@ -79,7 +78,7 @@ static void holding_above_martensite_start_saves_a_quarter(void)
     TEST_ASSERT_DOUBLE_WITHIN(1e-9, 60.0 / 85.0, plant_power_w(plant, 0) / hot); /* -29 % */
 }
 
-static void six_paper_conditions_within_1_5_degrees(void)
+TEST(six_paper_conditions_within_1_5_degrees)
 {
     double squares[2] = {0.0, 0.0};
     for (int k = 0; k < PAPER_CASE_COUNT; k++) {
@@ -102,15 +101,4 @@ static void six_paper_conditions_within_1_5_degrees(void)
     TEST_ASSERT_EQUAL_INT(PLANT_ERROR_SIZE, paper_centre_c(small, &paper_cases[0], &centre));
     TEST_ASSERT_EQUAL_INT(PLANT_ERROR_RANGE, paper_configure(plant, (double)NAN));
     plant_destroy(small);
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(balance_of_design_section_1);
-    RUN_TEST(constant_current_from_cold_never_transforms_at_1_5_a_but_runs_past_at_a_little_more);
-    RUN_TEST(no_current_holds_a_spring_within_the_transformation);
-    RUN_TEST(holding_above_martensite_start_saves_a_quarter);
-    RUN_TEST(six_paper_conditions_within_1_5_degrees);
-    return UNITY_END();
 }

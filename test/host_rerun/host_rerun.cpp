@@ -5,9 +5,9 @@
 #include <sstream>
 #include <string>
 
+#include "../run_tests.h"
 #include "loop.h"
 #include "rerun.h"
-#include "unity.h"
 
 using ninespring::rerun;
 
@@ -166,7 +166,7 @@ void live(recorder &board)
     board.run(60.0);
 }
 
-void the_same_day_again_is_believed_to_the_last_bit()
+TEST(the_same_day_again_is_believed_to_the_last_bit)
 {
     recorder board(3);
     board.begin();
@@ -191,7 +191,7 @@ void the_same_day_again_is_believed_to_the_last_bit()
 }
 
 /* It begins in mid-life: what was learnt is on it. */
-void a_tape_begins_with_what_was_learnt()
+TEST(a_tape_begins_with_what_was_learnt)
 {
     recorder board(4);
     board.type("model cold");
@@ -213,7 +213,7 @@ void a_tape_begins_with_what_was_learnt()
     TEST_ASSERT_EQUAL_STRING("ok\r\n", again.ask("faults").c_str());
 }
 
-void what_a_tape_lacks_or_another_reading_is_said()
+TEST(what_a_tape_lacks_or_another_reading_is_said)
 {
     recorder board(5);
     board.begin();
@@ -243,7 +243,7 @@ void what_a_tape_lacks_or_another_reading_is_said()
     TEST_ASSERT_TRUE(wrong.so_far().other_spring == 5 || wrong.so_far().other_spring == 6);
 }
 
-void a_tape_without_a_beginning_is_refused()
+TEST(a_tape_without_a_beginning_is_refused)
 {
     rerun again;
     bool refused = false;
@@ -263,16 +263,3 @@ void a_tape_without_a_beginning_is_refused()
 }
 
 } // namespace
-
-void setUp(void) {}
-void tearDown(void) {}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(the_same_day_again_is_believed_to_the_last_bit);
-    RUN_TEST(a_tape_begins_with_what_was_learnt);
-    RUN_TEST(what_a_tape_lacks_or_another_reading_is_said);
-    RUN_TEST(a_tape_without_a_beginning_is_refused);
-    return UNITY_END();
-}

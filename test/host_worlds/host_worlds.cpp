@@ -6,7 +6,7 @@
 #include <memory>
 #include <string>
 
-#include <unity.h>
+#include "../run_tests.h"
 
 #include "loop.h"
 
@@ -181,7 +181,7 @@ void eight_come_and_stay(const differs_t &differs, unsigned end_s)
     w.expect_truth_within_bounds();
 }
 
-void a_resistance_that_rises_with_temperature_overheats_nothing()
+TEST(a_resistance_that_rises_with_temperature_overheats_nothing)
 {
     for (const double rise_per_k : {0.0004, 0.0006, 0.001}) {
         eight_come_and_stay(
@@ -195,14 +195,14 @@ void a_resistance_that_rises_with_temperature_overheats_nothing()
 }
 
 /* A supply at either end of what is declared. */
-void another_supply_is_no_fault()
+TEST(another_supply_is_no_fault)
 {
     for (const double supply_v : {4.2, 5.5}) {
         eight_come_and_stay([supply_v](plant_t *plant) { set(plant, "supply_v", supply_v); }, 200);
     }
 }
 
-void a_room_ten_kelvin_warmer_than_the_setting_leaves_no_spring_unsettled()
+TEST(a_room_ten_kelvin_warmer_than_the_setting_leaves_no_spring_unsettled)
 {
     world w([](plant_t *plant) { set(plant, "ambient_c", 30.0); }, -10.0);
     w.until(600);
@@ -215,7 +215,7 @@ void a_room_ten_kelvin_warmer_than_the_setting_leaves_no_spring_unsettled()
 
 /* ---- a touch ---- */
 
-void a_fingertip_on_every_spring_is_lived_with_within_bounds()
+TEST(a_fingertip_on_every_spring_is_lived_with_within_bounds)
 {
     world w;
     w.until(200);
@@ -231,7 +231,7 @@ void a_fingertip_on_every_spring_is_lived_with_within_bounds()
 /* ---- sensors ---- */
 
 /* It shows no current, and so it does for ever: as a broken spring would. */
-void a_sensor_that_froze_while_the_board_waited_is_found_when_its_spring_is_driven()
+TEST(a_sensor_that_froze_while_the_board_waited_is_found_when_its_spring_is_driven)
 {
     for (const unsigned frozen_s : {45u, 100u}) {
         world w;
@@ -249,7 +249,7 @@ void a_sensor_that_froze_while_the_board_waited_is_found_when_its_spring_is_driv
     }
 }
 
-void sensors_that_are_swapped_switch_their_springs_off_in_two_seconds()
+TEST(sensors_that_are_swapped_switch_their_springs_off_in_two_seconds)
 {
     for (const int other : {1, CENTRE}) { /* a driven one; one that is off */
         world w;
@@ -266,7 +266,7 @@ void sensors_that_are_swapped_switch_their_springs_off_in_two_seconds()
 }
 
 /* Within what can be a circuit, and bounded: a fifth too little of either. */
-void a_sensor_that_shows_a_fifth_too_little_overheats_nothing()
+TEST(a_sensor_that_shows_a_fifth_too_little_overheats_nothing)
 {
     world w;
     TEST_ASSERT_TRUE(loop_scale_sensor(w.loop.get(), 0, 0.8, 0.8));
@@ -274,7 +274,7 @@ void a_sensor_that_shows_a_fifth_too_little_overheats_nothing()
 }
 
 /* The near miss of all of them: both numbers off by as much as a bad sensor's may be. */
-void a_sensor_that_is_a_little_off_is_no_fault()
+TEST(a_sensor_that_is_a_little_off_is_no_fault)
 {
     world w;
     TEST_ASSERT_TRUE(loop_scale_sensor(w.loop.get(), 0, 0.95, 1.05));
@@ -285,20 +285,3 @@ void a_sensor_that_is_a_little_off_is_no_fault()
 }
 
 } // namespace
-
-void setUp() {}
-void tearDown() {}
-
-int main()
-{
-    UNITY_BEGIN();
-    RUN_TEST(a_resistance_that_rises_with_temperature_overheats_nothing);
-    RUN_TEST(another_supply_is_no_fault);
-    RUN_TEST(a_room_ten_kelvin_warmer_than_the_setting_leaves_no_spring_unsettled);
-    RUN_TEST(a_fingertip_on_every_spring_is_lived_with_within_bounds);
-    RUN_TEST(a_sensor_that_froze_while_the_board_waited_is_found_when_its_spring_is_driven);
-    RUN_TEST(sensors_that_are_swapped_switch_their_springs_off_in_two_seconds);
-    RUN_TEST(a_sensor_that_shows_a_fifth_too_little_overheats_nothing);
-    RUN_TEST(a_sensor_that_is_a_little_off_is_no_fault);
-    return UNITY_END();
-}

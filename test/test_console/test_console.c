@@ -2,8 +2,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "../run_tests.h"
 #include "console.h"
-#include "unity.h"
 
 #include "../fakes/belief_inside.h"
 #include "../fakes/eeprom.h"
@@ -67,8 +67,6 @@ void setUp(void)
     said_length = 0;
     said[0] = '\0';
 }
-
-void tearDown(void) {}
 
 /* One control tick with every spring's current exactly as wanted. */
 static void tick(void)
@@ -165,7 +163,7 @@ static void expect_ok(const char *line)
                              said);
 }
 
-static void each_word_is_obeyed(void)
+TEST(each_word_is_obeyed)
 {
     expect_ok("on 3");
     TEST_ASSERT_EQUAL_UINT16(1000, controller_level_permille(&controller, 2));
@@ -212,7 +210,7 @@ static void each_word_is_obeyed(void)
     TEST_ASSERT_EQUAL_UINT16(0, controller_level_permille(&controller, 8));
 }
 
-static void what_else_is_refused_changes_nothing_either(void)
+TEST(what_else_is_refused_changes_nothing_either)
 {
     char longest[CONSOLE_LINE_BYTES + 2u];
     expect_error("telemetry inputs 5", CONSOLE_ERROR_SURPLUS_ARGUMENT);
@@ -246,7 +244,7 @@ static void what_else_is_refused_changes_nothing_either(void)
 }
 
 /* Every word, and every way to write it wrong; settings, too: its number, and its cure. */
-static void every_refusal_says_what_would_be_right(void)
+TEST(every_refusal_says_what_would_be_right)
 {
     static const struct {
         console_error_t error;
@@ -315,7 +313,7 @@ static void every_refusal_says_what_would_be_right(void)
         {8, "$loss_scale_99", ": did you mean $loss_scale_1?\r\n"},
         {8, "$nonsense=1", "no such setting; $$ lists them\r\n"},
     };
-    for (unsigned k = 0; k < sizeof cases / sizeof cases[0]; k++) {
+    for (unsigned k = 0; k < ROWS(cases); k++) {
         expect_error(cases[k].line, cases[k].error);
         TEST_ASSERT_NOT_NULL_MESSAGE(strstr(said, cases[k].says), said);
     }
@@ -330,7 +328,7 @@ static void every_refusal_says_what_would_be_right(void)
     for (char *line = strtok(listed, "\r\n"); line != NULL; line = strtok(NULL, "\r\n")) {
         const size_t length = strcspn(line, " ");
         bool found = line[0] < 'a' || line[0] > 'z' || strcmp(line, "ok") == 0;
-        for (unsigned k = 0; k < sizeof cases / sizeof cases[0]; k++) {
+        for (unsigned k = 0; k < ROWS(cases); k++) {
             found = found || strncmp(cases[k].line, line, length) == 0;
         }
         TEST_ASSERT_TRUE_MESSAGE(found, line);
@@ -338,7 +336,7 @@ static void every_refusal_says_what_would_be_right(void)
 }
 
 /* What else is wrong says its own cure, and not how the word is written. */
-static void a_line_of_the_right_form_is_told_no_form(void)
+TEST(a_line_of_the_right_form_is_told_no_form)
 {
     controller_lock(&controller);
     ask("pattern 111111111");
@@ -349,7 +347,7 @@ static void a_line_of_the_right_form_is_told_no_form(void)
     TEST_ASSERT_EQUAL_STRING("error:11 a fault is latched; see faults and type clear\r\n", said);
 }
 
-static void large_letters_are_as_good(void)
+TEST(large_letters_are_as_good)
 {
     expect_ok("ON 5 30");
     TEST_ASSERT_EQUAL_UINT16(300, controller_level_permille(&controller, 4));
@@ -359,7 +357,7 @@ static void large_letters_are_as_good(void)
     TEST_ASSERT_EQUAL_UINT16(6000, settings.controller.current.supply_mv);
 }
 
-static void backspace_and_delete_edit_the_line(void)
+TEST(backspace_and_delete_edit_the_line)
 {
     expect_ok("om\b\x7Fon 55\b 45\b0");
     TEST_ASSERT_EQUAL_UINT16(400, controller_level_permille(&controller, 4));
@@ -369,7 +367,7 @@ static void backspace_and_delete_edit_the_line(void)
     expect_ok("\boff all");
 }
 
-static void echo_shows_what_is_typed_and_one_answer_comes_as_ever(void)
+TEST(echo_shows_what_is_typed_and_one_answer_comes_as_ever)
 {
     expect_ok("echo on");
     TEST_ASSERT_EQUAL_STRING("fan 71\b \b0\r\nok\r\n", ask("fan 71\b0"));
@@ -383,7 +381,7 @@ static void echo_shows_what_is_typed_and_one_answer_comes_as_ever(void)
     TEST_ASSERT_EQUAL_STRING("ok\r\n", ask("fan 7"));
 }
 
-static void the_longest_line_is_taken(void)
+TEST(the_longest_line_is_taken)
 {
     char line[CONSOLE_LINE_BYTES + 1u];
     memset(line, ' ', sizeof line);
@@ -393,7 +391,7 @@ static void the_longest_line_is_taken(void)
     TEST_ASSERT_EQUAL_UINT8(7, controller_fan_percent(&controller));
 }
 
-static void settings_that_do_not_fit_wait_until_they_do(void)
+TEST(settings_that_do_not_fit_wait_until_they_do)
 {
     expect_ok("$martensite_finish_c=80"); /* above its start, 78 */
     static const char both[] = "[not active yet: martensite_start_c=78.00 does not fit "
@@ -401,7 +399,7 @@ static void settings_that_do_not_fit_wait_until_they_do(void)
     static const char *const words[] = {"$save", "on 1", "pattern 100000000", "selftest"};
     TEST_ASSERT_EQUAL_STRING_LEN(both, said, sizeof both - 1u);
     TEST_ASSERT_EQUAL_INT16(6800, controller.model.parameters.martensite_finish_cc);
-    for (unsigned k = 0; k < sizeof words / sizeof words[0]; k++) {
+    for (unsigned k = 0; k < ROWS(words); k++) {
         ask(words[k]); /* neither kept nor driven with */
         TEST_ASSERT_EQUAL_STRING_LEN(both, said, sizeof both - 1u);
         TEST_ASSERT_EQUAL_STRING_LEN("error:9 ", said + sizeof both - 1u, 8);
@@ -416,7 +414,7 @@ static void settings_that_do_not_fit_wait_until_they_do(void)
     expect_ok("$save");
 }
 
-static void what_was_heated_is_not_cold_because_someone_says_so(void)
+TEST(what_was_heated_is_not_cold_because_someone_says_so)
 {
     by_duty = true;
     expect_ok("model cold"); /* nothing was given yet */
@@ -441,7 +439,7 @@ static void what_was_heated_is_not_cold_because_someone_says_so(void)
 
 /* Whatever order a restore has, what it ends with is the same, and in between nothing is refused.
  */
-static void a_listing_pasted_backwards_makes_it_the_same(void)
+TEST(a_listing_pasted_backwards_makes_it_the_same)
 {
     static char listing[32768];
     static char *lines[1024];
@@ -451,7 +449,7 @@ static void a_listing_pasted_backwards_makes_it_the_same(void)
         "$martensite_start_c=40", "$austenite_start_c=44",     "$austenite_finish_c=50",
         "$unsure_margin_k=2",     "$hold_margin_k=1",          "$supply_limit_a=1",
         "$supply_reserve_a=0.1",  "$resistance_minimum_ohm=1", "$resistance_maximum_ohm=2"};
-    for (unsigned k = 0; k < sizeof wanted_lines / sizeof wanted_lines[0]; k++) {
+    for (unsigned k = 0; k < ROWS(wanted_lines); k++) {
         expect_ok(wanted_lines[k]);
     }
     TEST_ASSERT_FALSE(console.conflict);
@@ -474,7 +472,7 @@ static void a_listing_pasted_backwards_makes_it_the_same(void)
 
 /* Every setting at either end, alone and with one other at either end: what is said stays finite.
  */
-static void every_corner_of_the_settings_is_answered_in_numbers(void)
+TEST(every_corner_of_the_settings_is_answered_in_numbers)
 {
     static const char *const never[] = {"nan", "inf", "2147483648", "2147483647", "214748364."};
     unsigned active = 0;
@@ -520,7 +518,7 @@ static void every_corner_of_the_settings_is_answered_in_numbers(void)
                 static const char *const words[] = {"model", "learnt", "model cold", "$$"};
                 for (unsigned w = 0; w < 4u; w++) {
                     ask(words[w]);
-                    for (unsigned n = 0; n < sizeof never / sizeof never[0]; n++) {
+                    for (unsigned n = 0; n < ROWS(never); n++) {
                         TEST_ASSERT_NULL_MESSAGE(strstr(said, never[n]), said);
                     }
                 }
@@ -530,7 +528,7 @@ static void every_corner_of_the_settings_is_answered_in_numbers(void)
     TEST_ASSERT_GREATER_THAN_UINT(400, active);
 }
 
-static void a_loss_that_never_cools_is_refused_with_what_it_would_have_to_cool(void)
+TEST(a_loss_that_never_cools_is_refused_with_what_it_would_have_to_cool)
 {
     expect_error("$loss_w_per_k=0", CONSOLE_ERROR_OUT_OF_RANGE);
     expect_ok("$loss_w_per_k=0.00001");
@@ -538,7 +536,7 @@ static void a_loss_that_never_cools_is_refused_with_what_it_would_have_to_cool(v
         strstr(said, "loss_w_per_k=0.000010 does not fit heat_capacity_j_per_k=0.300]"));
 }
 
-static void version_says_what_became_of_the_stored_settings(void)
+TEST(version_says_what_became_of_the_stored_settings)
 {
     static const struct {
         settings_loaded_t loaded;
@@ -552,14 +550,14 @@ static void version_says_what_became_of_the_stored_settings(void)
         {{RECORD_DAMAGED, PARAMETER_COUNT, 0, 0}, "settings stored ones damaged, defaults\r"},
         {{RECORD_FOREIGN, PARAMETER_COUNT, 0, 0}, "settings stored by another version, defaults\r"},
     };
-    for (unsigned k = 0; k < sizeof cases / sizeof cases[0]; k++) {
+    for (unsigned k = 0; k < ROWS(cases); k++) {
         status.loaded = cases[k].loaded;
         ask("version");
         TEST_ASSERT_NOT_NULL_MESSAGE(strstr(said, cases[k].text), said);
     }
 }
 
-static void selftest_says_which_spring_has_too_little_current(void)
+TEST(selftest_says_which_spring_has_too_little_current)
 {
     expect_ok("selftest");
     TEST_ASSERT_NOT_NULL(strstr(said, "spring 3: sensor ok, 0.180 ohm\r"));
@@ -570,7 +568,7 @@ static void selftest_says_which_spring_has_too_little_current(void)
     TEST_ASSERT_NOT_NULL(strstr(said, "spring 4: sensor ok, 0.180 ohm\r"));
 }
 
-static void selftest_gives_the_policy_back_also_when_it_is_stopped(void)
+TEST(selftest_gives_the_policy_back_also_when_it_is_stopped)
 {
     expect_ok("policy precompensate");
     expect_ok("selftest");
@@ -586,7 +584,7 @@ static void selftest_gives_the_policy_back_also_when_it_is_stopped(void)
     TEST_ASSERT_EQUAL_UINT16(0, controller_level_permille(&controller, 0));
 }
 
-static void stop_drops_the_line_that_had_begun(void)
+TEST(stop_drops_the_line_that_had_begun)
 {
     said_length = 0;
     type("on a");
@@ -598,7 +596,7 @@ static void stop_drops_the_line_that_had_begun(void)
     expect_ok("on 1"); /* what is typed afterwards counts again */
 }
 
-static void stop_ends_a_long_answer(void)
+TEST(stop_ends_a_long_answer)
 {
     said_length = 0;
     for (const char *c = "$$\n"; *c != '\0'; c++) {
@@ -611,7 +609,7 @@ static void stop_ends_a_long_answer(void)
     TEST_ASSERT_NOT_NULL(strstr(said, "error:12 "));
 }
 
-static void empty_lines_are_not_answered(void)
+TEST(empty_lines_are_not_answered)
 {
     ask("");
     ask("\r");
@@ -619,7 +617,7 @@ static void empty_lines_are_not_answered(void)
     expect_ok("   ");
 }
 
-static void nothing_is_said_without_room(void)
+TEST(nothing_is_said_without_room)
 {
     room = CONSOLE_ROOM_BYTES - 1u;
     TEST_ASSERT_FALSE(console_ready(&console));
@@ -632,7 +630,7 @@ static void nothing_is_said_without_room(void)
     TEST_ASSERT_EQUAL_UINT(0, said_length);
 }
 
-static void status_is_one_line(void)
+TEST(status_is_one_line)
 {
     expect_ok("model cold");
     said_length = 0;
@@ -642,7 +640,7 @@ static void status_is_one_line(void)
     TEST_ASSERT_EQUAL_PTR(said + said_length - 1u, strchr(said, '\n'));
 }
 
-static void what_the_thermistor_cannot_mean_is_said(void)
+TEST(what_the_thermistor_cannot_mean_is_said)
 {
     for (unsigned held = 0; held < 2; held++) {
         status.ambient_is_held = held != 0;
@@ -656,7 +654,7 @@ static void what_the_thermistor_cannot_mean_is_said(void)
     }
 }
 
-static void a_fault_that_a_clear_leaves_says_for_how_long(void)
+TEST(a_fault_that_a_clear_leaves_says_for_how_long)
 {
     controller_set_temperature(&controller, 60 * 128); /* it was heated just now */
     for (unsigned n = 0; n < 2; n++) {
@@ -668,7 +666,7 @@ static void a_fault_that_a_clear_leaves_says_for_how_long(void)
     }
 }
 
-static void status_says_whether_the_stages_have_their_supply(void)
+TEST(status_says_whether_the_stages_have_their_supply)
 {
     const char *const lines[] = {"supply on", "supply off", "$cut_off=0", "$cut_off=1"};
     const char *const ends[] = {"|supply:on>\r\n", "|supply:off>\r\n", "|supply:none>\r\n",
@@ -682,7 +680,7 @@ static void status_says_whether_the_stages_have_their_supply(void)
     }
 }
 
-static void model_says_with_which_bounds(void)
+TEST(model_says_with_which_bounds)
 {
     char wanted[160];
     expect_ok("model cold");
@@ -701,7 +699,7 @@ static void model_says_with_which_bounds(void)
 }
 
 /* What the held springs have in common; one alone has nothing in common. */
-static void model_says_what_the_surroundings_take(void)
+TEST(model_says_what_the_surroundings_take)
 {
     static const float more[] = {0.28f, 0.34f};
     expect_ok("model cold");
@@ -723,7 +721,7 @@ static void model_says_what_the_surroundings_take(void)
     }
 }
 
-static void model_says_how_long_a_spring_waits_and_when_it_is_away(void)
+TEST(model_says_how_long_a_spring_waits_and_when_it_is_away)
 {
     expect_ok("model"); /* before anybody asks for a spring, too */
     const char *const unknown = strstr(said, ", target 0.000 A\r\n  not known for ");
@@ -754,7 +752,7 @@ static void model_says_how_long_a_spring_waits_and_when_it_is_away(void)
     TEST_ASSERT_NOT_NULL(strstr(said, ", limits supply temperature: 1.200 A less\r\n"));
 }
 
-static void why_says_the_last_sights_of_a_spring_in_words(void)
+TEST(why_says_the_last_sights_of_a_spring_in_words)
 {
     spring_sights_t *const sights = sights_inside(&controller.estimator);
     ask_at_once("why 5");
@@ -797,7 +795,7 @@ static void why_says_the_last_sights_of_a_spring_in_words(void)
 }
 
 /* As a spring is driven, its lines come one by one; others have much to tell meanwhile. */
-static void why_goes_on_with_what_is_left_where_sights_give_way(void)
+TEST(why_goes_on_with_what_is_left_where_sights_give_way)
 {
     spring_sights_t *const sights = sights_inside(&controller.estimator);
     for (unsigned n = 0; n < SPRING_SIGHTS_KEPT; n++) {
@@ -829,7 +827,7 @@ static void why_goes_on_with_what_is_left_where_sights_give_way(void)
     TEST_ASSERT_EQUAL_UINT(1, answers());
 }
 
-static void the_longest_why_fits_its_lines(void)
+TEST(the_longest_why_fits_its_lines)
 {
     spring_sight_t *const sight = spring_sights_add(sights_inside(&controller.estimator), 8);
     *sight = (spring_sight_t){.spring = 8,
@@ -855,7 +853,7 @@ static void the_longest_why_fits_its_lines(void)
 }
 
 /* All begins anew but what was learnt; then each line is told where it takes effect. */
-static void inputs_begin_anew_with_what_was_learnt(void)
+TEST(inputs_begin_anew_with_what_was_learnt)
 {
     const spring_learnt_t numbers = {
         .austenite_ohm = 0.219f, .change = 0.2f, .loss_sd_w_per_k = 0.000058f};
@@ -884,7 +882,7 @@ static void inputs_begin_anew_with_what_was_learnt(void)
     expect_error("telemetry inputs", CONSOLE_ERROR_LOCKED);
 }
 
-static void learnt_says_what_is_known_and_clear_forgets_it(void)
+TEST(learnt_says_what_is_known_and_clear_forgets_it)
 {
     const spring_learnt_t numbers = {.austenite_ohm = 0.219f,
                                      .change = 0.2f,
@@ -924,7 +922,7 @@ static char *read_file(const char *name)
     return text;
 }
 
-static void codes_table_holds_what_the_code_says(void)
+TEST(codes_table_holds_what_the_code_says)
 {
     unsigned errors = 0;
     unsigned faults = 0;
@@ -952,7 +950,7 @@ static void codes_table_holds_what_the_code_says(void)
     TEST_ASSERT_EQUAL_UINT(SAFETY_FAULT_COUNT - 1, faults);
 }
 
-static void documentation_names_every_error_fault_and_word(void)
+TEST(documentation_names_every_error_fault_and_word)
 {
     char wanted[120];
     const char *const text = read_file("docs/console.md");
@@ -977,11 +975,11 @@ static void documentation_names_every_error_fault_and_word(void)
 }
 
 /* What the console works on: its words would land beside it. */
-static void a_pointer_that_turned_over_is_found(void)
+TEST(a_pointer_that_turned_over_is_found)
 {
     uint8_t *const bytes[] = {(uint8_t *)&console.controller, (uint8_t *)&console.output.context,
                               (uint8_t *)&console.status};
-    for (size_t k = 0; k < sizeof bytes / sizeof *bytes; k++) {
+    for (size_t k = 0; k < ROWS(bytes); k++) {
         setUp();
         TEST_ASSERT_TRUE(console_hold_settings(&console));
         *bytes[k] ^= 2u;
@@ -994,7 +992,7 @@ static void a_pointer_that_turned_over_is_found(void)
 }
 
 /* `$save` would keep what nobody set. */
-static void a_setting_that_turned_over_is_found_and_never_saved(void)
+TEST(a_setting_that_turned_over_is_found_and_never_saved)
 {
     for (size_t at = 0; at < sizeof settings; at += 5) {
         setUp();
@@ -1015,53 +1013,11 @@ static void a_setting_that_turned_over_is_found_and_never_saved(void)
     }
     static const char *const writers[] = {"$loss_w_per_k=0.006", "$defaults", "policy open",
                                           "ambient 21"};
-    for (size_t n = 0; n < sizeof writers / sizeof writers[0]; n++) {
+    for (size_t n = 0; n < ROWS(writers); n++) {
         setUp();
         settings.board.sensor_averaging ^= 8u;
         type(writers[n]);
         console_receive(&console, '\n');
         TEST_ASSERT_FALSE_MESSAGE(console_hold_settings(&console), writers[n]);
     }
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(each_word_is_obeyed);
-    RUN_TEST(what_else_is_refused_changes_nothing_either);
-    RUN_TEST(every_refusal_says_what_would_be_right);
-    RUN_TEST(a_line_of_the_right_form_is_told_no_form);
-    RUN_TEST(large_letters_are_as_good);
-    RUN_TEST(backspace_and_delete_edit_the_line);
-    RUN_TEST(echo_shows_what_is_typed_and_one_answer_comes_as_ever);
-    RUN_TEST(the_longest_line_is_taken);
-    RUN_TEST(settings_that_do_not_fit_wait_until_they_do);
-    RUN_TEST(what_was_heated_is_not_cold_because_someone_says_so);
-    RUN_TEST(a_listing_pasted_backwards_makes_it_the_same);
-    RUN_TEST(every_corner_of_the_settings_is_answered_in_numbers);
-    RUN_TEST(a_loss_that_never_cools_is_refused_with_what_it_would_have_to_cool);
-    RUN_TEST(version_says_what_became_of_the_stored_settings);
-    RUN_TEST(selftest_says_which_spring_has_too_little_current);
-    RUN_TEST(selftest_gives_the_policy_back_also_when_it_is_stopped);
-    RUN_TEST(stop_drops_the_line_that_had_begun);
-    RUN_TEST(stop_ends_a_long_answer);
-    RUN_TEST(empty_lines_are_not_answered);
-    RUN_TEST(nothing_is_said_without_room);
-    RUN_TEST(status_is_one_line);
-    RUN_TEST(what_the_thermistor_cannot_mean_is_said);
-    RUN_TEST(a_fault_that_a_clear_leaves_says_for_how_long);
-    RUN_TEST(status_says_whether_the_stages_have_their_supply);
-    RUN_TEST(model_says_with_which_bounds);
-    RUN_TEST(model_says_what_the_surroundings_take);
-    RUN_TEST(inputs_begin_anew_with_what_was_learnt);
-    RUN_TEST(why_says_the_last_sights_of_a_spring_in_words);
-    RUN_TEST(why_goes_on_with_what_is_left_where_sights_give_way);
-    RUN_TEST(the_longest_why_fits_its_lines);
-    RUN_TEST(model_says_how_long_a_spring_waits_and_when_it_is_away);
-    RUN_TEST(learnt_says_what_is_known_and_clear_forgets_it);
-    RUN_TEST(a_pointer_that_turned_over_is_found);
-    RUN_TEST(a_setting_that_turned_over_is_found_and_never_saved);
-    RUN_TEST(codes_table_holds_what_the_code_says);
-    RUN_TEST(documentation_names_every_error_fault_and_word);
-    return UNITY_END();
 }

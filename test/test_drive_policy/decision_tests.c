@@ -4,9 +4,9 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "../run_tests.h"
 #include "small_array.h"
 #include "spring_estimator_internal.h"
-#include "unity.h"
 
 #define OHM      0.2f
 #define GIVES_W  0.4f
@@ -94,7 +94,7 @@ static int ma_of(float power_w)
 /* What it gives off and what takes it where it is to be within 4 s; on the last 10 K of the way
  * down no more than 0.4 of it is off, so that it can be read: but where nothing can be, or others
  * want the current. Never less than a current that reads, and half of the dither more. */
-static void hold_asks_for_what_takes_it_to_its_place(void)
+TEST(hold_asks_for_what_takes_it_to_its_place)
 {
     static const struct {
         float below_k, noise; /* its place */
@@ -132,7 +132,7 @@ static void hold_asks_for_what_takes_it_to_its_place(void)
 
 /* Fully on from 96 %: 0.4 % lost is lost. A level is left by more than 5 points above, by more
  * than 10 below. A try is taken of those that are left. */
-static void hold_is_left_where_the_phase_is_not_what_was_asked(void)
+TEST(hold_is_left_where_the_phase_is_not_what_was_asked)
 {
     static const struct {
         uint16_t permille;
@@ -167,7 +167,7 @@ static void hold_is_left_where_the_phase_is_not_what_was_asked(void)
 /* Above martensite start: as far as its distance is unsure and it was disturbed, 2.5 to 12 K; what
  * is unsure to 3 K is searched for at rest, by 0.08 K/s, to a kelvin below. Where phase is not seen
  * it comes down by 1.5 K a minute to what is safe; a level is in the middle between both starts. */
-static void margin_is_what_is_not_known_and_narrows_at_rest(void)
+TEST(margin_is_what_is_not_known_and_narrows_at_rest)
 {
     static const struct {
         float sd_k, disturbance_k, from_k;
@@ -212,7 +212,7 @@ static void margin_is_what_is_not_known_and_narrows_at_rest(void)
 
 /* It ends with the phase that was asked for, or where a limit leaves less than three quarters of
  * the boost and it is hot enough; or may be, and rises no more. */
-static void heating_ends_at_its_phase_or_where_a_limit_ends_it(void)
+TEST(heating_ends_at_its_phase_or_where_a_limit_ends_it)
 {
     static const struct {
         float c;
@@ -239,7 +239,7 @@ static void heating_ends_at_its_phase_or_where_a_limit_ends_it(void)
 /* From 1 K below austenite start on a level is heated to with 0.4 W beyond what holds it. Who waits
  * for the supply keeps what it has, if that is half of its phase or 3 K above austenite start:
  * fully on not below its place. */
-static void heating_slows_to_a_level_and_keeps_what_waits(void)
+TEST(heating_slows_to_a_level_and_keeps_what_waits)
 {
     static const struct {
         float c;
@@ -284,7 +284,7 @@ static void heating_slows_to_a_level_and_keeps_what_waits(void)
 }
 
 /* Nothing is known: it waits and says so, or looks with 2 A, where its own numbers would tell. */
-static void what_is_not_known_waits_or_looks(void)
+TEST(what_is_not_known_waits_or_looks)
 {
     for (unsigned n = 0; n < 3; n++) {
         begin(1, 2);
@@ -305,7 +305,7 @@ static void what_is_not_known_waits_or_looks(void)
 
 /* Down at 0.8 A and the dither, until it is there; 5 points below it is heated, while there are
  * tries. A hold that is lost keeps its current until its turn to heat. */
-static void way_down_ends_at_its_level(void)
+TEST(way_down_ends_at_its_level)
 {
     static const struct {
         drive_policy_stage_t from;
@@ -345,7 +345,7 @@ static void way_down_ends_at_its_level(void)
 
 /* Asked for fully, it is there where it is austenite, has lost less than 0.4 %, and is surely (99
  * %) above martensite start. */
-static void what_is_asked_for_fully_is_there_where_it_surely_is(void)
+TEST(what_is_asked_for_fully_is_there_where_it_surely_is)
 {
     static const struct {
         uint8_t possible;
@@ -368,7 +368,7 @@ static void what_is_asked_for_fully_is_there_where_it_surely_is(void)
 
 /* What was just seen, or an open policy, decides nothing in this turn; what began anew begins as if
  * it were asked for just now; what is not asked for is off, and nothing is owed. */
-static void turn_decides_nothing_of_what_was_just_seen(void)
+TEST(turn_decides_nothing_of_what_was_just_seen)
 {
     for (unsigned n = 0; n < 5; n++) {
         begin(1, 2);
@@ -403,7 +403,7 @@ static void turn_decides_nothing_of_what_was_just_seen(void)
 }
 
 /* There: held, known, and within 5 % of fully on, 10 points of a level. */
-static void away_is_what_is_not_within_its_band(void)
+TEST(away_is_what_is_not_within_its_band)
 {
     static const struct {
         drive_policy_stage_t stage;
@@ -434,7 +434,7 @@ static void away_is_what_is_not_within_its_band(void)
 
 /* 85 s after it was asked for, or 15 s after it left; four tries, one more in ten minutes, or for
  * each 15 s in which it is there. */
-static void away_is_said_in_time_and_tries_come_back(void)
+TEST(away_is_said_in_time_and_tries_come_back)
 {
     spring_away_t away = {0, 0};
     for (unsigned turn = 1; turn <= 400; turn++) {
@@ -471,7 +471,7 @@ static void away_is_said_in_time_and_tries_come_back(void)
 
 /* A row of springs: one that heats and waits is served before another that is 6 K warmer and has
  * not begun to transform (4 K below austenite start), where no more than half as many wait. */
-static void who_is_warmer_lets_the_colder_heat_while_few_wait(void)
+TEST(who_is_warmer_lets_the_colder_heat_while_few_wait)
 {
     enum { NONE = 9999 };
     static const struct {
@@ -516,7 +516,7 @@ static void who_is_warmer_lets_the_colder_heat_while_few_wait(void)
 
 /* An undriven one, by how hot it may be (2 sd, and 0.15 of its rise), 6 s ahead, over the last 5 K
  * below 5 K below austenite start. One that was just released counts once it has cooled. */
-static void undriven_spring_is_as_severe_as_hot_as_it_comes(void)
+TEST(undriven_spring_is_as_severe_as_hot_as_it_comes)
 {
     static const struct {
         float c, sd_k, rise_k_per_s;
@@ -549,7 +549,7 @@ static void undriven_spring_is_as_severe_as_hot_as_it_comes(void)
 
 /* Over the last 10 K below 110 degC; of a neighbour's severity and that the lower one acts, and the
  * neighbour's where both are alike. Fully derated for as long as is set it trips; 0: never. */
-static void current_is_derated_by_the_lower_of_both(void)
+TEST(current_is_derated_by_the_lower_of_both)
 {
     static const struct {
         float c, severe;
@@ -587,7 +587,7 @@ static void current_is_derated_by_the_lower_of_both(void)
 }
 
 /* What tripped stays off, and says so, until cleared. */
-static void trip_stays_until_cleared(void)
+TEST(trip_stays_until_cleared)
 {
     begin(1, 2);
     for (uint8_t k = 0; k < 2; k++) {
@@ -617,7 +617,7 @@ static void trip_stays_until_cleared(void)
 
 /* Of what a turn has moved it by a quarter, K/s; what is driven, by whatever policy, is no false
  * actuation once it is off. */
-static void turn_notes_how_fast_it_warms_and_whether_it_is_driven(void)
+TEST(turn_notes_how_fast_it_warms_and_whether_it_is_driven)
 {
     for (unsigned n = 0; n < 3; n++) {
         parameters.policy = n == 2 ? DRIVE_POLICY_OPEN : DRIVE_POLICY_PRECOMPENSATE;
@@ -637,7 +637,7 @@ static void turn_notes_how_fast_it_warms_and_whether_it_is_driven(void)
 }
 
 /* An array of two has no third spring, and no fault of one is decided of it. */
-static void nothing_beyond_the_array_is_decided(void)
+TEST(nothing_beyond_the_array_is_decided)
 {
     drive_policy_spring_t none[2];
     begin(1, 2);
@@ -652,7 +652,7 @@ static void nothing_beyond_the_array_is_decided(void)
 
 /* A tick of springs that ask: what is said, asked of the supply and given. */
 /* Of more springs than a round has turns, each tenth. */
-static void springs_that_share_a_turn_are_decided_in_it(void)
+TEST(springs_that_share_a_turn_are_decided_in_it)
 {
     enum { MANY = 12 };
     uint16_t levels[MANY], targets[MANY];
@@ -677,7 +677,7 @@ static void springs_that_share_a_turn_are_decided_in_it(void)
     }
 }
 
-static void each_limit_is_said_where_it_cuts(void)
+TEST(each_limit_is_said_where_it_cuts)
 {
     enum {
         CURRENT = DRIVE_POLICY_LIMIT_CURRENT,
@@ -730,7 +730,7 @@ static void each_limit_is_said_where_it_cuts(void)
 }
 
 /* To the nearest milliampere, whatever the level. */
-static void open_current_is_its_share_of_the_level(void)
+TEST(open_current_is_its_share_of_the_level)
 {
     static const uint16_t open_ma[] = {1500, 3200, 7};
     parameters.policy = DRIVE_POLICY_OPEN;
@@ -750,7 +750,7 @@ static void open_current_is_its_share_of_the_level(void)
 /* 32 ticks, evenly from nothing to nearly all of it, each step once, no neighbouring ones far
  * apart; of a heating a quarter. Nine springs are at different places, so that their sum hardly
  * moves. */
-static void dither_is_a_triangle_at_another_place_for_each_spring(void)
+TEST(dither_is_a_triangle_at_another_place_for_each_spring)
 {
     for (unsigned n = 0; n < 2; n++) {
         begin(3, 3);
@@ -805,7 +805,7 @@ static void dither_is_a_triangle_at_another_place_for_each_spring(void)
 
 /* After a change of policy by 20 mA a tick at the most, up as far as the budget has room, until for
  * 21 turns nothing had to. */
-static void targets_walk_until_two_rounds_after_the_last(void)
+TEST(targets_walk_until_two_rounds_after_the_last)
 {
     static const struct {
         uint16_t from_ma, wanted_ma, supply_ma, gets_ma;
@@ -870,7 +870,7 @@ static void targets_walk_until_two_rounds_after_the_last(void)
 }
 
 /* A current that changes by more than 100 mA: what is read on the way is left out. */
-static void jump_of_what_is_granted_is_told(void)
+TEST(jump_of_what_is_granted_is_told)
 {
     static const int by_ma[] = {0, 100, -100, 101, -101, 900, -900};
     for (size_t n = 0; n < ROWS(by_ma); n++) {
@@ -886,7 +886,7 @@ static void jump_of_what_is_granted_is_told(void)
 
 /* What is secured comes first: a hold, and of what heats no more than it asks for. Who is off
  * leaves the queue. */
-static void what_a_heating_keeps_comes_before_other_boosts(void)
+TEST(what_a_heating_keeps_comes_before_other_boosts)
 {
     static const struct {
         drive_policy_stage_t stage;
@@ -909,32 +909,4 @@ static void what_a_heating_keeps_comes_before_other_boosts(void)
         TEST_ASSERT_EQUAL_MESSAGE(table[n].permille != 0 && table[n].stage == HEAT,
                                   policy.queue.count == 2, where);
     }
-}
-
-void run_decision_tests(void)
-{
-    RUN_TEST(hold_asks_for_what_takes_it_to_its_place);
-    RUN_TEST(hold_is_left_where_the_phase_is_not_what_was_asked);
-    RUN_TEST(margin_is_what_is_not_known_and_narrows_at_rest);
-    RUN_TEST(heating_ends_at_its_phase_or_where_a_limit_ends_it);
-    RUN_TEST(heating_slows_to_a_level_and_keeps_what_waits);
-    RUN_TEST(what_is_not_known_waits_or_looks);
-    RUN_TEST(way_down_ends_at_its_level);
-    RUN_TEST(what_is_asked_for_fully_is_there_where_it_surely_is);
-    RUN_TEST(turn_decides_nothing_of_what_was_just_seen);
-    RUN_TEST(away_is_what_is_not_within_its_band);
-    RUN_TEST(away_is_said_in_time_and_tries_come_back);
-    RUN_TEST(who_is_warmer_lets_the_colder_heat_while_few_wait);
-    RUN_TEST(undriven_spring_is_as_severe_as_hot_as_it_comes);
-    RUN_TEST(current_is_derated_by_the_lower_of_both);
-    RUN_TEST(trip_stays_until_cleared);
-    RUN_TEST(turn_notes_how_fast_it_warms_and_whether_it_is_driven);
-    RUN_TEST(nothing_beyond_the_array_is_decided);
-    RUN_TEST(springs_that_share_a_turn_are_decided_in_it);
-    RUN_TEST(each_limit_is_said_where_it_cuts);
-    RUN_TEST(open_current_is_its_share_of_the_level);
-    RUN_TEST(dither_is_a_triangle_at_another_place_for_each_spring);
-    RUN_TEST(targets_walk_until_two_rounds_after_the_last);
-    RUN_TEST(jump_of_what_is_granted_is_told);
-    RUN_TEST(what_a_heating_keeps_comes_before_other_boosts);
 }

@@ -7,9 +7,8 @@
 #include "../fakes/belief_inside.h"
 #include "drive_policy.h"
 
-#define SPRINGS     9
-#define TICK_S      0.02
-#define ROWS(table) (sizeof(table) / sizeof((table)[0]))
+#define SPRINGS 9
+#define TICK_S  0.02
 
 typedef struct {
     double temperature_c, austenite;
@@ -54,8 +53,5 @@ void decisions(unsigned count);
 
 /* And without the belief, either: what is believed is what a test says. */
 void policy_tick(void);
-
-void run_limit_tests(void);
-void run_decision_tests(void);
 
 #endif

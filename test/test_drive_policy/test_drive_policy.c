@@ -5,9 +5,9 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "../run_tests.h"
 #include "small_array.h"
 #include "spring_estimator_internal.h"
-#include "unity.h"
 
 #define RESERVED_MA   14800u /* supply 15 A less the default reserve */
 #define FULL_BOOST_MA 3000u
@@ -32,7 +32,7 @@ static void want_all(uint16_t permille)
 
 /* ---- from power-on ---- */
 
-static void after_power_on_it_waits_says_so_and_then_holds_all_nine(void)
+TEST(after_power_on_it_waits_says_so_and_then_holds_all_nine)
 {
     power_on(3, 3);
     want_all(1000);
@@ -50,7 +50,7 @@ static void after_power_on_it_waits_says_so_and_then_holds_all_nine(void)
     }
 }
 
-static void held_spring_stays_on_near_martensite_start(void)
+TEST(held_spring_stays_on_near_martensite_start)
 {
     static const double loss[] = {0.85, 1.0, 1.15};
     for (unsigned n = 0; n < 3; n++) {
@@ -72,7 +72,7 @@ static void held_spring_stays_on_near_martensite_start(void)
     }
 }
 
-static void jump_of_the_current_forgets_no_phase(void)
+TEST(jump_of_the_current_forgets_no_phase)
 {
     begin_cold(1, 2);
     level[0] = 1000;
@@ -87,7 +87,7 @@ static void jump_of_the_current_forgets_no_phase(void)
 
 /* A touch, slower than a contact's jump. The largest would need more heat than a spring is allowed:
  * that is said. */
-static void spring_that_has_lost_its_phase_is_heated_back_or_that_is_said(void)
+TEST(spring_that_has_lost_its_phase_is_heated_back_or_that_is_said)
 {
     for (double touch_k = 4.0; touch_k < 8.5; touch_k += 1.0) {
         begin_cold(1, 2);
@@ -108,7 +108,7 @@ static void spring_that_has_lost_its_phase_is_heated_back_or_that_is_said(void)
 }
 
 /* What is believed of it has changed by itself: as after power-on it waits, whatever it did. */
-static void spring_of_which_nothing_is_known_any_more_waits_and_is_heated_anew(void)
+TEST(spring_of_which_nothing_is_known_any_more_waits_and_is_heated_anew)
 {
     for (double at_s = 6.0; at_s < 200.0; at_s += 97.0) { /* heated, held */
         begin_cold(1, 2);
@@ -128,7 +128,7 @@ static void spring_of_which_nothing_is_known_any_more_waits_and_is_heated_anew(v
     begin_cold(1, 2);
 }
 
-static void resistance_without_a_change_is_driven_by_the_model_and_said(void)
+TEST(resistance_without_a_change_is_driven_by_the_model_and_said)
 {
     begin_cold(1, 2);
     truth[0].ratio = 1.0;
@@ -139,7 +139,7 @@ static void resistance_without_a_change_is_driven_by_the_model_and_said(void)
 }
 
 /* Whichever way it came there, and never fully on: by its own martensite's resistance. */
-static void levels_one_after_the_other_are_held(void)
+TEST(levels_one_after_the_other_are_held)
 {
     static const uint16_t levels[] = {500, 250, 800, 400, 600};
     for (int n = 0; n < 3; n++) {
@@ -158,7 +158,7 @@ static void levels_one_after_the_other_are_held(void)
 
 /* ---- limits ---- */
 
-static void boosts_are_staggered_not_diluted(void)
+TEST(boosts_are_staggered_not_diluted)
 {
     begin_cold(3, 3);
     want_all(1000);
@@ -177,7 +177,7 @@ static void boosts_are_staggered_not_diluted(void)
     TEST_ASSERT_EQUAL_UINT(4, none); /* the ninth has what is left */
 }
 
-static void budget_holds_in_every_tick_whatever_is_asked(void)
+TEST(budget_holds_in_every_tick_whatever_is_asked)
 {
     power_on(3, 3);
     for (unsigned n = 0; n < 40000; n++) {
@@ -206,7 +206,7 @@ static void budget_holds_in_every_tick_whatever_is_asked(void)
     TEST_ASSERT_TRUE(thermal_model_is_consistent(&model));
 }
 
-static void parameters_outside_their_range_are_refused_whole(void)
+TEST(parameters_outside_their_range_are_refused_whole)
 {
     begin_cold(3, 3);
     drive_policy_parameters_t wrong = parameters;
@@ -223,22 +223,4 @@ static void parameters_outside_their_range_are_refused_whole(void)
     wrong.policy = 2;
     TEST_ASSERT_FALSE(drive_policy_check(&wrong, &bad));
     TEST_ASSERT_FALSE(drive_policy_init(&policy, &wrong, &model, NULL));
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(after_power_on_it_waits_says_so_and_then_holds_all_nine);
-    RUN_TEST(held_spring_stays_on_near_martensite_start);
-    RUN_TEST(jump_of_the_current_forgets_no_phase);
-    RUN_TEST(spring_that_has_lost_its_phase_is_heated_back_or_that_is_said);
-    RUN_TEST(spring_of_which_nothing_is_known_any_more_waits_and_is_heated_anew);
-    RUN_TEST(resistance_without_a_change_is_driven_by_the_model_and_said);
-    RUN_TEST(levels_one_after_the_other_are_held);
-    RUN_TEST(boosts_are_staggered_not_diluted);
-    RUN_TEST(budget_holds_in_every_tick_whatever_is_asked);
-    RUN_TEST(parameters_outside_their_range_are_refused_whole);
-    run_limit_tests();
-    run_decision_tests();
-    return UNITY_END();
 }

@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include <unity.h>
+#include "../run_tests.h"
 
 #include "descriptions.h"
 #include "parameters.h"
@@ -39,9 +39,6 @@ static void take_defaults(uint8_t part)
     }
 }
 
-void setUp(void) {}
-void tearDown(void) {}
-
 /* Highest and lowest that a field of that type can hold at all. */
 static int32_t most_of(uint8_t type)
 {
@@ -56,7 +53,7 @@ static int32_t least_of(uint8_t type)
     return type == PARAMETER_S16 ? -32768 : 0;
 }
 
-static void each_value_is_kept_at_its_limits_and_refused_beyond(void)
+TEST(each_value_is_kept_at_its_limits_and_refused_beyond)
 {
     for (uint16_t k = 0; k < PARAMETER_COUNT; k++) {
         const parameter_row_t row = parameter_row(k);
@@ -87,14 +84,14 @@ static void each_value_is_kept_at_its_limits_and_refused_beyond(void)
     }
 }
 
-static void a_value_beyond_what_is_read_is_refused(void)
+TEST(a_value_beyond_what_is_read_is_refused)
 {
     take_defaults(PARAMETER_PART_MODEL);
     values.model.contact_uohm[0] = UINT32_MAX;
     TEST_ASSERT_FALSE(parameter_check(PARAMETER_PART_MODEL, &values, NULL));
 }
 
-static void names_and_ids_are_used_once(void)
+TEST(names_and_ids_are_used_once)
 {
     for (uint16_t k = 0; k < PARAMETER_COUNT; k++) {
         const parameter_row_t row = parameter_row(k);
@@ -109,7 +106,7 @@ static void names_and_ids_are_used_once(void)
 }
 
 /* A name of a setting is not the beginning of another one's with a number: `name_3`. */
-static void a_number_after_a_name_is_always_a_spring(void)
+TEST(a_number_after_a_name_is_always_a_spring)
 {
     for (uint16_t k = 0; k < PARAMETER_COUNT; k++) {
         const char *const name = parameter_row(k).name;
@@ -161,7 +158,7 @@ static void expect_table(const char *path, const char *titles, const char *wante
     }
 }
 
-static void the_settings_page_says_what_the_table_says(void)
+TEST(the_settings_page_says_what_the_table_says)
 {
     static const char titles[] =
         "| name | unit | default | range | what |\n|---|---|---|---|---|\n";
@@ -181,7 +178,7 @@ static void the_settings_page_says_what_the_table_says(void)
     expect_table(NINESPRING_SOURCE_DIR "/docs/console.md", titles, wanted);
 }
 
-static void the_effects_page_says_what_the_table_says(void)
+TEST(the_effects_page_says_what_the_table_says)
 {
     static const char titles[] = "| effect | what it is | on the chip |\n|---|---|---|\n";
     static char wanted[10000];
@@ -195,7 +192,7 @@ static void the_effects_page_says_what_the_table_says(void)
     expect_table(NINESPRING_SOURCE_DIR "/docs/adding-an-effect.md", titles, wanted);
 }
 
-static void each_effect_has_its_law_in_the_physics_page(void)
+TEST(each_effect_has_its_law_in_the_physics_page)
 {
     read_page(NINESPRING_SOURCE_DIR "/docs/physics.md");
     for (size_t k = 0; k < EFFECT_COUNT; k++) {
@@ -203,17 +200,4 @@ static void each_effect_has_its_law_in_the_physics_page(void)
         (void)snprintf(row, sizeof row, "\n| `%s` | ", effect_row(k)->name);
         TEST_ASSERT_NOT_NULL_MESSAGE(strstr(page, row), row);
     }
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(each_value_is_kept_at_its_limits_and_refused_beyond);
-    RUN_TEST(a_value_beyond_what_is_read_is_refused);
-    RUN_TEST(names_and_ids_are_used_once);
-    RUN_TEST(a_number_after_a_name_is_always_a_spring);
-    RUN_TEST(the_settings_page_says_what_the_table_says);
-    RUN_TEST(the_effects_page_says_what_the_table_says);
-    RUN_TEST(each_effect_has_its_law_in_the_physics_page);
-    return UNITY_END();
 }

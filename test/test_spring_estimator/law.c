@@ -3,11 +3,11 @@
 #include <math.h>
 #include <stdio.h>
 
+#include "../run_tests.h"
 #include "one_spring.h"
 #include "rules.h"
 #include "sights.h"
 #include "spring_estimator_internal.h"
-#include "unity.h"
 
 #define ANY      SPRING_PHASE_ANY
 #define CAPACITY 0.3    /* J/K, declared */
@@ -53,7 +53,7 @@ static void turn(void)
 
 /* ---- the law ---- */
 
-static void errors_of_distance_and_loss_go_on_by_the_law(void)
+TEST(errors_of_distance_and_loss_go_on_by_the_law)
 {
     static const struct {
         double was_c, c, current_a;
@@ -125,7 +125,7 @@ static void errors_of_distance_and_loss_go_on_by_the_law(void)
 
 /* e = what is seen less what was believed; D and S are variances of the distance, without and with
  * that of the sight. */
-static void sight_moves_all_by_what_each_is_known_to(void)
+TEST(sight_moves_all_by_what_each_is_known_to)
 {
     static const struct {
         double seen_c, sd_k; /* from 80 degC */
@@ -180,7 +180,7 @@ static void sight_moves_all_by_what_each_is_known_to(void)
 
 /* It is no colder than 80 degC: as much as that teaches of the loss, but no surer; by more than
  * 2.6 sd of the loss without a sight what it reads is no phase. */
-static void what_keeps_its_phase_is_no_colder_and_tells_of_its_loss(void)
+TEST(what_keeps_its_phase_is_no_colder_and_tells_of_its_loss)
 {
     static const struct {
         double c, cov_w, loss_sd, kept;
@@ -229,7 +229,7 @@ static void what_keeps_its_phase_is_no_colder_and_tells_of_its_loss(void)
 
 /* Three turns at 0.8 A or more tell a phase by what was learnt: 12 % and 2.6 sd of a turn's noise,
  * but no more than 40 %. The temperature is even over the phase's width. */
-static void look_tells_a_phase_and_a_temperature_evenly_over_its_width(void)
+TEST(look_tells_a_phase_and_a_temperature_evenly_over_its_width)
 {
     static const struct {
         uint8_t possible;
@@ -300,7 +300,7 @@ static void look_tells_a_phase_and_a_temperature_evenly_over_its_width(void)
 
 /* The hottest possible gives off 0.8 of the declared loss; below martensite start its whole latent
  * heat, too. Below martensite finish it is cold. */
-static void hottest_possible_cools_by_the_least_loss_with_its_latent_heat(void)
+TEST(hottest_possible_cools_by_the_least_loss_with_its_latent_heat)
 {
     static const double hottest_c[] = {120.0, 90.0, 78.1, 77.9, 70.0, 68.05, 68.0};
     for (size_t n = 0; n < 2u * ROWS(hottest_c); n++) {
@@ -334,7 +334,7 @@ static void hottest_possible_cools_by_the_least_loss_with_its_latent_heat(void)
 
 /* Colder than martensite finish by 2.6 sd it is martensite; austenite of which nothing is read may
  * have begun to go once its bound is below martensite start. */
-static void phase_is_what_temperature_leaves(void)
+TEST(phase_is_what_temperature_leaves)
 {
     static const struct {
         uint8_t possible;
@@ -362,7 +362,7 @@ static void phase_is_what_temperature_leaves(void)
 }
 
 /* Loose: what it seemed to lose was its contact, and is given back, as unsure as it was wrong. */
-static void what_a_loose_contact_took_is_given_back(void)
+TEST(what_a_loose_contact_took_is_given_back)
 {
     static const double gone_k[] = {6.0, 0.0};
     for (size_t n = 0; n < ROWS(gone_k); n++) {
@@ -402,7 +402,7 @@ static void what_a_loose_contact_took_is_given_back(void)
 }
 
 /* What was left is over in the next turn, and only that. */
-static void heating_that_was_left_is_over_in_the_next_turn(void)
+TEST(heating_that_was_left_is_over_in_the_next_turn)
 {
     for (unsigned n = 0; n < 3; n++) {
         begin_cold();
@@ -425,7 +425,7 @@ static void heating_that_was_left_is_over_in_the_next_turn(void)
 /* Fully on it is taken for austenite. What lacks phase (0.5 % and 2.6 sd, at 0.8 A) is doubted, by
  * the phase that it reads; the second time, or where it was surely hot enough, it is blind. What it
  * had lost and was not proven stays so below austenite finish. */
-static void hold_begins_by_what_its_heating_showed(void)
+TEST(hold_begins_by_what_its_heating_showed)
 {
     static const struct {
         uint8_t possible;
@@ -511,7 +511,7 @@ static void hold_begins_by_what_its_heating_showed(void)
 
 /* A sight's numbers are rounded to the nearest; what there is at all is no less than 1, and ends at
  * what a byte holds. */
-static void sight_is_noted_in_tenths_and_hundredths(void)
+TEST(sight_is_noted_in_tenths_and_hundredths)
 {
     static const struct {
         double read, sd;
@@ -550,7 +550,7 @@ static void sight_is_noted_in_tenths_and_hundredths(void)
 }
 
 /* It goes on as the last one, whatever another spring had meanwhile, with the next number. */
-static void sight_that_goes_on_is_the_newest_again(void)
+TEST(sight_that_goes_on_is_the_newest_again)
 {
     spring_sights_t sights = {.numbers = 7};
     spring_sight_t *const first = spring_sights_add(&sights, 0);
@@ -568,7 +568,7 @@ static void sight_that_goes_on_is_the_newest_again(void)
 }
 
 /* Read, proven, not blind, and its distance known to 8 K. */
-static void where_it_is_is_known_where_all_is(void)
+TEST(where_it_is_is_known_where_all_is)
 {
     static const struct {
         bool reads, unproven, blind;
@@ -590,7 +590,7 @@ static void where_it_is_is_known_where_all_is(void)
 }
 
 /* Nothing of its own is known, but what is declared; or its loss alone. */
-static void what_is_forgotten_is_as_declared(void)
+TEST(what_is_forgotten_is_as_declared)
 {
     for (int all = 0; all < 2; all++) {
         begin_cold();
@@ -618,7 +618,7 @@ static void what_is_forgotten_is_as_declared(void)
 
 /* Ten turns in twelve and a half ticks, none in each fifth; of twelve springs two are in one turn.
  * With each round the next one's stiffness is looked at. */
-static void each_spring_has_a_turn_in_a_quarter_of_a_second(void)
+TEST(each_spring_has_a_turn_in_a_quarter_of_a_second)
 {
     static const uint8_t turn_of_tick[] = {
         0, 1, 2, 3, SPRING_ESTIMATOR_NO_TURN, 4, 5, 6, 7, SPRING_ESTIMATOR_NO_TURN, 8, 9, 0};
@@ -671,7 +671,7 @@ static void each_spring_has_a_turn_in_a_quarter_of_a_second(void)
 
 /* What holds it: what it gave off in its last turn, and what a kelvin more gives off; the current
  * of that in what it reads now, or in declared martensite. */
-static void power_and_current_of_a_hold_are_of_what_it_gives_off(void)
+TEST(power_and_current_of_a_hold_are_of_what_it_gives_off)
 {
     INSIDE.gives_w = 0.5f;
     INSIDE.declared_stiffness_w_per_k = 0.006f;
@@ -696,7 +696,7 @@ static void power_and_current_of_a_hold_are_of_what_it_gives_off(void)
 
 /* 2.6 standard deviations either way: of the distance, and of what hides where a spring is beside
  * it. */
-static void bounds_are_what_is_known_of_distance_place_and_room(void)
+TEST(bounds_are_what_is_known_of_distance_place_and_room)
 {
     static const struct {
         double c, var_k2, capacity_k, shift_k, disturbance_k, gone_k;
@@ -735,7 +735,7 @@ static void bounds_are_what_is_known_of_distance_place_and_room(void)
 
 /* As far as it was found by its turns; or where the loss, as unsure as it is, would leave it in the
  * end. */
-static void hold_is_as_unsure_as_where_its_loss_leads(void)
+TEST(hold_is_as_unsure_as_where_its_loss_leads)
 {
     static const struct {
         double c, var_k2, loss_sd, more_loss;
@@ -756,25 +756,4 @@ static void hold_is_as_unsure_as_where_its_loss_leads(void)
         NEAR(sqrt(fmax(table[n].var_k2, settles_k2)),
              spring_estimator_hold_sd_k(&estimator, &model, 0));
     }
-}
-
-void run_law(void)
-{
-    RUN_TEST(bounds_are_what_is_known_of_distance_place_and_room);
-    RUN_TEST(hold_is_as_unsure_as_where_its_loss_leads);
-    RUN_TEST(errors_of_distance_and_loss_go_on_by_the_law);
-    RUN_TEST(sight_moves_all_by_what_each_is_known_to);
-    RUN_TEST(what_keeps_its_phase_is_no_colder_and_tells_of_its_loss);
-    RUN_TEST(look_tells_a_phase_and_a_temperature_evenly_over_its_width);
-    RUN_TEST(hottest_possible_cools_by_the_least_loss_with_its_latent_heat);
-    RUN_TEST(phase_is_what_temperature_leaves);
-    RUN_TEST(what_a_loose_contact_took_is_given_back);
-    RUN_TEST(heating_that_was_left_is_over_in_the_next_turn);
-    RUN_TEST(hold_begins_by_what_its_heating_showed);
-    RUN_TEST(sight_is_noted_in_tenths_and_hundredths);
-    RUN_TEST(sight_that_goes_on_is_the_newest_again);
-    RUN_TEST(where_it_is_is_known_where_all_is);
-    RUN_TEST(what_is_forgotten_is_as_declared);
-    RUN_TEST(each_spring_has_a_turn_in_a_quarter_of_a_second);
-    RUN_TEST(power_and_current_of_a_hold_are_of_what_it_gives_off);
 }

@@ -4,9 +4,9 @@
 #include <stddef.h>
 #include <stdio.h>
 
+#include "../run_tests.h"
 #include "one_spring.h"
 #include "spring_estimator_internal.h"
-#include "unity.h"
 
 #define SPRINGS 3
 
@@ -58,7 +58,7 @@ static void begin_heated(float temperature_c, float change, float ohm)
     INSIDE.ohm = INSIDE.ohm_before[0] = INSIDE.ohm_before[1] = ohm;
 }
 
-static void phase_is_missing_beyond_what_steps_noise_and_coefficient_explain(void)
+TEST(phase_is_missing_beyond_what_steps_noise_and_coefficient_explain)
 {
     static const struct {
         float temperature_c, change, less;
@@ -82,7 +82,7 @@ static void phase_is_missing_beyond_what_steps_noise_and_coefficient_explain(voi
 }
 
 /* From austenite start on. */
-static void heating_is_over_where_its_austenite_is_read_twice(void)
+TEST(heating_is_over_where_its_austenite_is_read_twice)
 {
     static const struct {
         float temperature_c, change, ohm, before_ohm;
@@ -107,7 +107,7 @@ static void heating_is_over_where_its_austenite_is_read_twice(void)
 
 /* One alloy in ten has one. Without it three sights of four lose phase straight away; three to the
  * contrary turn it, however many were before. */
-static void intermediate_phase_is_believed_by_what_was_seen(void)
+TEST(intermediate_phase_is_believed_by_what_was_seen)
 {
     static const struct {
         unsigned straight, other_way, straight_then;
@@ -130,7 +130,7 @@ static void intermediate_phase_is_believed_by_what_was_seen(void)
     }
 }
 
-static void losses_are_those_that_held_springs_have_in_common(void)
+TEST(losses_are_those_that_held_springs_have_in_common)
 {
     static const struct {
         float more[SPRINGS], sd[SPRINGS]; /* of the declared loss */
@@ -170,7 +170,7 @@ static void losses_are_those_that_held_springs_have_in_common(void)
 
 /* Colder than two standard deviations of what is known, two springs within a minute: both losses
  * are opened by a fifth of the declared one. */
-static void two_springs_that_are_found_colder_are_a_step(void)
+TEST(two_springs_that_are_found_colder_are_a_step)
 {
     static const struct {
         float error_k; /* of the second, known to 3 and seen to 4 K */
@@ -210,7 +210,7 @@ static void two_springs_that_are_found_colder_are_a_step(void)
 
 /* ---- what is believed of one ---- */
 
-static void upper_bound_has_what_lost_phase_may_hide(void)
+TEST(upper_bound_has_what_lost_phase_may_hide)
 {
     static const float gone_k[] = {-3.0f, 0.0f, 0.5f, 12.0f};
     const float high_c = spring_estimator_temperature_c(&estimator, &model, 0).high;
@@ -221,7 +221,7 @@ static void upper_bound_has_what_lost_phase_may_hide(void)
     }
 }
 
-static void phase_is_told_by_the_best_that_there_is(void)
+TEST(phase_is_told_by_the_best_that_there_is)
 {
     static const struct {
         uint8_t possible;
@@ -258,7 +258,7 @@ static void phase_is_told_by_the_best_that_there_is(void)
 }
 
 /* A contact's step: the spring is what it was, so all that it is compared with steps along. */
-static void all_that_is_compared_with_jumps_along(void)
+TEST(all_that_is_compared_with_jumps_along)
 {
     for (int heating = 0; heating < 2; heating++) {
         begin_cold();
@@ -293,7 +293,7 @@ static void all_that_is_compared_with_jumps_along(void)
 }
 
 /* What is declared stands in for a change that is not learnt, and for no other. */
-static void declared_change_stands_in_until_one_is_learnt(void)
+TEST(declared_change_stands_in_until_one_is_learnt)
 {
     for (int learnt = 0; learnt < 2; learnt++) {
         begin_cold();
@@ -330,7 +330,7 @@ static float gives_off_w(void)
 
 /* Of one that loses far less than declared, and was held until that was seen: it is held on where
  * it is, whatever is declared of it then, and how often. */
-static void spring_whose_loss_was_seen_is_held_on_whatever_is_declared(void)
+TEST(spring_whose_loss_was_seen_is_held_on_whatever_is_declared)
 {
     static const double factors[] = {1.0, 1.2, 0.8, 3.4};
     for (size_t n = 0; n < ROWS(factors); n++) {
@@ -360,7 +360,7 @@ static void spring_whose_loss_was_seen_is_held_on_whatever_is_declared(void)
 }
 
 /* Where nothing was seen, the new declaration is as good as the old one was. */
-static void loss_that_was_never_seen_is_the_declared_one(void)
+TEST(loss_that_was_never_seen_is_the_declared_one)
 {
     declare(1.5);
     TEST_ASSERT_FLOAT_WITHIN(1e-7f, 0.0f, LEARNT.loss_w_per_k);
@@ -390,7 +390,7 @@ static void loss_that_was_never_seen_is_the_declared_one(void)
 
 /* What was kept may be farther from what is declared than anything that is learnt: it is not moved
  * by that, and no sight moves it farther. */
-static void loss_beyond_what_is_ever_learnt_comes_nearer_only(void)
+TEST(loss_beyond_what_is_ever_learnt_comes_nearer_only)
 {
     INSIDE.loss_variance = 1e-8f;
     spring_seal(&estimator, 0);
@@ -410,7 +410,7 @@ static void loss_beyond_what_is_ever_learnt_comes_nearer_only(void)
     TEST_ASSERT_FLOAT_WITHIN(1e-6f, -0.45f * 0.0174f, LEARNT.loss_w_per_k);
 }
 
-static void temperature_that_no_model_holds_is_its_nearest(void)
+TEST(temperature_that_no_model_holds_is_its_nearest)
 {
     static const float wanted_c[] = {-100.0f, -39.0f, 214.0f, 500.0f};
     static const float is_c[] = {-40.0f, -39.0f, 214.0f, 215.0f};
@@ -418,21 +418,4 @@ static void temperature_that_no_model_holds_is_its_nearest(void)
         spring_set_temperature(&model, 0, wanted_c[n], SPRING_PHASE_MARTENSITE);
         TEST_ASSERT_FLOAT_WITHIN(0.02f, is_c[n], spring_now_c(&model, 0));
     }
-}
-
-void run_rules(void)
-{
-    RUN_TEST(phase_is_missing_beyond_what_steps_noise_and_coefficient_explain);
-    RUN_TEST(heating_is_over_where_its_austenite_is_read_twice);
-    RUN_TEST(intermediate_phase_is_believed_by_what_was_seen);
-    RUN_TEST(losses_are_those_that_held_springs_have_in_common);
-    RUN_TEST(two_springs_that_are_found_colder_are_a_step);
-    RUN_TEST(upper_bound_has_what_lost_phase_may_hide);
-    RUN_TEST(phase_is_told_by_the_best_that_there_is);
-    RUN_TEST(all_that_is_compared_with_jumps_along);
-    RUN_TEST(declared_change_stands_in_until_one_is_learnt);
-    RUN_TEST(spring_whose_loss_was_seen_is_held_on_whatever_is_declared);
-    RUN_TEST(loss_that_was_never_seen_is_the_declared_one);
-    RUN_TEST(loss_beyond_what_is_ever_learnt_comes_nearer_only);
-    RUN_TEST(temperature_that_no_model_holds_is_its_nearest);
 }

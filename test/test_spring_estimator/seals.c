@@ -1,11 +1,10 @@
-#include "seals.h"
-
+/* Bits of RAM that turn over in what is believed of a spring. */
 #include <stddef.h>
 #include <stdio.h>
 
+#include "../run_tests.h"
 #include "one_spring.h"
 #include "sights.h"
-#include "unity.h"
 
 static spring_estimator_t sound;
 static thermal_model_t sound_model;
@@ -42,7 +41,7 @@ static void expect_begun_anew(void)
     TEST_ASSERT_FALSE_MESSAGE(spring_estimator_has_begun_anew(BELIEF), where);
 }
 
-static void whatever_bit_of_a_belief_turns_over_nothing_is_known_from_its_next_turn_on(void)
+TEST(whatever_bit_of_a_belief_turns_over_nothing_is_known_from_its_next_turn_on)
 {
     for (unsigned held = 0; held < 2; held++) {
         begin_cold();
@@ -66,7 +65,7 @@ static void whatever_bit_of_a_belief_turns_over_nothing_is_known_from_its_next_t
     begin_cold();
 }
 
-static void whatever_bit_of_what_springs_share_turns_over_that_begins_anew(void)
+TEST(whatever_bit_of_what_springs_share_turns_over_that_begins_anew)
 {
     (void)heat_then_hold(60.0);
     keep_sound();
@@ -119,7 +118,7 @@ static void expect_marks(const part_t parts[], size_t count)
 }
 
 /* What counts is what a rerun must find again: no number of what is read just now, no bit. */
-static void mark_is_of_every_number_that_is_believed(void)
+TEST(mark_is_of_every_number_that_is_believed)
 {
     static const part_t heats[] = {
         PART(readings, variance_k2, false),
@@ -140,10 +139,10 @@ static void mark_is_of_every_number_that_is_believed(void)
     begin_cold();
     spring_estimator_begin_heating(&estimator, &model, 0);
     ticks(2.0, 5.0);
-    expect_marks(heats, sizeof heats / sizeof heats[0]);
+    expect_marks(heats, ROWS(heats));
     begin_cold();
     (void)heat_then_hold(60.0);
-    expect_marks(holds, sizeof holds / sizeof holds[0]);
+    expect_marks(holds, ROWS(holds));
     begin_cold();
 }
 
@@ -181,7 +180,7 @@ static void and_is_disturbed(void)
     spring_estimator_disturb(&estimator, 0);
 }
 
-static void change_before_its_turn_hides_no_bit(void)
+TEST(change_before_its_turn_hides_no_bit)
 {
     static void (*const changes[])(void) = {and_is_left,      and_is_told,     and_forgets,
                                             and_forgets_loss, and_keeps_loss,  and_is_restored,
@@ -190,7 +189,7 @@ static void change_before_its_turn_hides_no_bit(void)
     spring_estimator_begin_heating(&estimator, &model, 0);
     ticks(2.0, 1.0);
     keep_sound();
-    for (unsigned n = 0; n < sizeof changes / sizeof changes[0]; n++) {
+    for (unsigned n = 0; n < ROWS(changes); n++) {
         turn_over(offsetof(spring_estimator_t, spring) + offsetof(spring_belief_t, slow_ohm) + 2u,
                   5);
         changes[n]();
@@ -207,12 +206,4 @@ static void change_before_its_turn_hides_no_bit(void)
     spring_estimator_restart(&estimator, &model);
     TEST_ASSERT_TRUE(INSIDE.learnt.austenite_ohm > 0.0f);
     begin_cold();
-}
-
-void run_seals(void)
-{
-    RUN_TEST(whatever_bit_of_a_belief_turns_over_nothing_is_known_from_its_next_turn_on);
-    RUN_TEST(whatever_bit_of_what_springs_share_turns_over_that_begins_anew);
-    RUN_TEST(change_before_its_turn_hides_no_bit);
-    RUN_TEST(mark_is_of_every_number_that_is_believed);
 }

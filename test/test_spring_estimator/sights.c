@@ -3,8 +3,8 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "../run_tests.h"
 #include "one_spring.h"
-#include "unity.h"
 
 static const spring_sight_t *sight_at(unsigned at)
 {
@@ -41,7 +41,7 @@ static void expect_kinds(const spring_sight_kind_t kinds[], unsigned count)
     }
 }
 
-void each_sight_of_a_life_is_noted_with_what_was_done(void)
+TEST(each_sight_of_a_life_is_noted_with_what_was_done)
 {
     static const spring_sight_kind_t kinds[] = {SPRING_SIGHT_TOLD, SPRING_SIGHT_ONSET,
                                                 SPRING_SIGHT_FINISH, SPRING_SIGHT_LOST};
@@ -73,7 +73,7 @@ void each_sight_of_a_life_is_noted_with_what_was_done(void)
 
 /* ---- the records themselves ---- */
 
-void spring_that_has_most_gives_way(void)
+TEST(spring_that_has_most_gives_way)
 {
     static spring_sights_t sights;
     memset(&sights, 0, sizeof sights);
@@ -97,7 +97,7 @@ void spring_that_has_most_gives_way(void)
     TEST_ASSERT_EQUAL_UINT32(7, spring_sights_newest(&sights, 3)->number);
 }
 
-void sights_are_found_by_number_and_forgotten_after_four_hours(void)
+TEST(sights_are_found_by_number_and_forgotten_after_four_hours)
 {
     static spring_sights_t sights;
     memset(&sights, 0, sizeof sights);

@@ -3,12 +3,11 @@
 #include <math.h>
 #include <stdio.h>
 
+#include "../run_tests.h"
 #include "one_spring.h"
 #include "rules.h"
-#include "seals.h"
 #include "sights.h"
 #include "spring_estimator_internal.h"
-#include "unity.h"
 
 #define ACTED_ON 0.03f /* lost, by the drive: it heats it back then */
 
@@ -33,7 +32,7 @@ static void begin_cold_as_learnt(void)
 
 /* ---- power-on ---- */
 
-static void at_power_on_everything_is_possible(void)
+TEST(at_power_on_everything_is_possible)
 {
     power_comes_on();
     TEST_ASSERT_EQUAL_UINT8(SPRING_PHASE_ANY, spring_estimator_possible(BELIEF));
@@ -44,7 +43,7 @@ static void at_power_on_everything_is_possible(void)
 }
 
 /* From the hottest that it may be, with its latent heat. */
-static void it_is_cold_only_after_the_time_that_physics_needs(void)
+TEST(it_is_cold_only_after_the_time_that_physics_needs)
 {
     for (double loss = 0.85; loss < 1.2; loss += 0.15) {
         power_comes_on();
@@ -69,7 +68,7 @@ static void it_is_cold_only_after_the_time_that_physics_needs(void)
 
 /* Whatever its sign and size, at the lower current of a spring that waits, through noise, in a
  * gust: it is heated until it has transformed and no farther, and its numbers are learnt. */
-static void transformation_is_seen_in_any_spring(void)
+TEST(transformation_is_seen_in_any_spring)
 {
     static const struct {
         double ratio, rise_per_k, noise_v, loss, low_a;
@@ -108,7 +107,7 @@ static void transformation_is_seen_in_any_spring(void)
 
 /* A change of some percent shows late, and its last is flatter than a coefficient may be: that is
  * waited for, and no more than that; also once it is known. */
-static void small_change_is_heated_to_its_end(void)
+TEST(small_change_is_heated_to_its_end)
 {
     for (double ratio = 1.06; ratio < 1.3; ratio += 0.01) {
         begin_cold();
@@ -126,7 +125,7 @@ static void small_change_is_heated_to_its_end(void)
 
 /* Far below its transformation, just below it, in a turn or between two: a contact or a gain that
  * steps is no transformation, nor its end, and what came after it is. */
-static void step_of_a_contact_ends_no_heating(void)
+TEST(step_of_a_contact_ends_no_heating)
 {
     static const double steps[] = {-0.06, -0.045, 0.045, 0.07};
     for (unsigned n = 0; n < 4 * 10 + 4 * 7; n++) { /* once more below 70 degC, as learnt */
@@ -160,7 +159,7 @@ static bool holds(spring_bounds_t bounds, double value)
 
 /* 15 % off in capacity and loss, 5 K off in the transformation, with a coefficient: heated, held
  * nearer and nearer, and off, where nobody reads it. */
-static void spring_is_within_its_bounds(void)
+TEST(spring_is_within_its_bounds)
 {
     static const double off[] = {0.85, 1.0, 1.15};
     unsigned seen = 0, distance = 0, temperature = 0, phase = 0;
@@ -204,7 +203,7 @@ static void spring_is_within_its_bounds(void)
 
 /* ---- a hold ---- */
 
-static void crossing_is_seen_and_makes_the_distance_sure(void)
+TEST(crossing_is_seen_and_makes_the_distance_sure)
 {
     static const double loss[] = {0.85, 1.0, 1.15};
     for (unsigned n = 0; n < 3; n++) {
@@ -234,7 +233,7 @@ static void crossing_is_seen_and_makes_the_distance_sure(void)
 
 /* A coefficient in print, whatever the change; a contact that steps or ages; noise that stays for a
  * second: nothing of that is phase, and the spring is not heated back. */
-static void nothing_else_is_taken_for_lost_phase(void)
+TEST(nothing_else_is_taken_for_lost_phase)
 {
     static const struct {
         double ratio, rise_per_k, apart_per_k, contact_ohm, step_ohm, age_ohm_per_s, slow_noise_v;
@@ -269,7 +268,7 @@ static void nothing_else_is_taken_for_lost_phase(void)
 
 /* A touch in mid-hold, at once or within a second: all four temperatures rise by 8 K, and phase
  * goes, as fast as a contact steps. */
-static void transformation_that_moves_is_noticed(void)
+TEST(transformation_that_moves_is_noticed)
 {
     for (int slow = 0; slow < 2; slow++) {
         const double margin_k = slow ? 3.0 : 5.0;
@@ -293,7 +292,7 @@ static void transformation_that_moves_is_noticed(void)
 /* In the hold a contact gets better, as if phase was lost; no heat brings that back, and the
  * heating ends all the same. It may be what it was taken for: it is held as if it was, and may be
  * as hot as if it was not. */
-static void loss_that_was_none_stays_in_doubt_and_heats_no_further(void)
+TEST(loss_that_was_none_stays_in_doubt_and_heats_no_further)
 {
     static const double contact_ohm[] = {0.0012, 0.012, 0.015};
     for (unsigned n = 0; n < 3; n++) {
@@ -320,7 +319,7 @@ static void loss_that_was_none_stays_in_doubt_and_heats_no_further(void)
 
 /* ---- learnt before ---- */
 
-static void numbers_that_no_spring_has_are_not_restored(void)
+TEST(numbers_that_no_spring_has_are_not_restored)
 {
     const spring_learnt_t good = {.austenite_ohm = 0.22f, .change = 0.2f, .loss_sd_w_per_k = 1e-4f};
     spring_learnt_t bad[15];
@@ -363,7 +362,7 @@ static void numbers_that_no_spring_has_are_not_restored(void)
 
 /* Power off in mid-hold: what was learnt holds only beside the sensor's offset, and a spring that
  * reads as austenite cannot have been cold, though a contact is a little better than it was. */
-static void restored_spring_is_not_overheated(void)
+TEST(restored_spring_is_not_overheated)
 {
     static const struct {
         double offset_v, contact_ohm;
@@ -412,7 +411,7 @@ static void check_is_sound(void)
     TEST_ASSERT_TRUE(thermal_model_is_consistent(&model));
 }
 
-static void bad_readings_leave_a_belief_that_can_be_believed(void)
+TEST(bad_readings_leave_a_belief_that_can_be_believed)
 {
     static const sensor_t bad[] = {SENSOR_SILENT, SENSOR_FROZEN, SENSOR_ZERO, SENSOR_WILD};
     for (unsigned n = 0; n < 4; n++) {
@@ -434,30 +433,4 @@ static void bad_readings_leave_a_belief_that_can_be_believed(void)
             TEST_ASSERT_TRUE_MESSAGE(heat(60.0) < 60.0 && truth.austenite > 0.99, where);
         }
     }
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(at_power_on_everything_is_possible);
-    RUN_TEST(it_is_cold_only_after_the_time_that_physics_needs);
-    RUN_TEST(transformation_is_seen_in_any_spring);
-    RUN_TEST(small_change_is_heated_to_its_end);
-    RUN_TEST(step_of_a_contact_ends_no_heating);
-    RUN_TEST(spring_is_within_its_bounds);
-    RUN_TEST(crossing_is_seen_and_makes_the_distance_sure);
-    RUN_TEST(nothing_else_is_taken_for_lost_phase);
-    RUN_TEST(transformation_that_moves_is_noticed);
-    RUN_TEST(loss_that_was_none_stays_in_doubt_and_heats_no_further);
-    RUN_TEST(numbers_that_no_spring_has_are_not_restored);
-    RUN_TEST(restored_spring_is_not_overheated);
-    RUN_TEST(bad_readings_leave_a_belief_that_can_be_believed);
-    RUN_TEST(each_sight_of_a_life_is_noted_with_what_was_done);
-    RUN_TEST(spring_that_has_most_gives_way);
-    RUN_TEST(sights_are_found_by_number_and_forgotten_after_four_hours);
-    run_seals();
-    run_rules();
-    run_law();
-    run_watch();
-    return UNITY_END();
 }

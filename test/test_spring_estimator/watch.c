@@ -3,10 +3,10 @@
 #include <math.h>
 #include <stdio.h>
 
+#include "../run_tests.h"
 #include "one_spring.h"
 #include "rules.h"
 #include "spring_estimator_internal.h"
-#include "unity.h"
 
 #define OHM         0.25
 #define MOST_PER_K  (0.0015 / 0.85) /* the largest coefficient, of a spring that is 15 % lighter */
@@ -36,7 +36,7 @@ static void give(double current_a, double ohm)
 
 /* Four of 50 mA and of any voltage make one, less the sensor's offset; without current it begins
  * anew. */
-static void reading_is_the_mean_of_enough_of_them(void)
+TEST(reading_is_the_mean_of_enough_of_them)
 {
     static const struct {
         unsigned count;
@@ -79,7 +79,7 @@ static void reading_is_the_mean_of_enough_of_them(void)
 
 /* Not below 0, nor beyond what a sum of 15 holds; eight after a jump of the current are left out.
  */
-static void readings_that_no_sensor_gives_are_left_out(void)
+TEST(readings_that_no_sensor_gives_are_left_out)
 {
     static const struct {
         int16_t ma, mv;
@@ -104,7 +104,7 @@ static void readings_that_no_sensor_gives_are_left_out(void)
 
 /* Second differences at one current tell it, by 6 % a turn; at another one it is the voltage's. The
  * average takes a sixteenth, young ones evenly; the phase is told at more than 0.8 A. */
-static void turn_tells_noise_and_goes_into_the_average(void)
+TEST(turn_tells_noise_and_goes_into_the_average)
 {
     static const struct {
         double current_a, was_a, before[2], noise; /* 0.25 ohm is read */
@@ -173,7 +173,7 @@ static void turn_tells_noise_and_goes_into_the_average(void)
 
 /* A step beyond 1 % in a hold (3 % of a young average, 8 % as a load may), 8 % in a heating, and 5
  * sd of noise, and what the offset may show: the first is left out, the second is a jump. */
-static void what_no_phase_does_so_fast_is_a_jump(void)
+TEST(what_no_phase_does_so_fast_is_a_jump)
 {
     static const struct {
         bool heating;
@@ -287,7 +287,7 @@ static void begin_heating_at(double c, uint8_t possible, double heat_k)
 
 /* Over 2 K of heat or more (1600 times the noise) more than any coefficient makes: 1 % and 4 sd of
  * that, added up, is an onset; of a spring whose change is known, that way alone. */
-static void onset_is_a_change_that_no_coefficient_makes(void)
+TEST(onset_is_a_change_that_no_coefficient_makes)
 {
     static const struct {
         double step_k, change, noise, learnt_change, excess;
@@ -338,7 +338,7 @@ static void onset_is_a_change_that_no_coefficient_makes(void)
 }
 
 /* Where nothing can be compared, nothing is: the mark is begun anew, or stays. */
-static void heating_that_cannot_be_compared_is_marked_anew(void)
+TEST(heating_that_cannot_be_compared_is_marked_anew)
 {
     static const struct {
         uint8_t possible, settling;
@@ -366,7 +366,7 @@ static void heating_that_cannot_be_compared_is_marked_anew(void)
 
 /* Martensite's onset is seen at austenite start and 2 K, or as far on as it took up heat; more than
  * 2.6 sd below, it was a contact's. What led there is its coefficient, as any metal has. */
-static void onset_puts_it_at_its_start_and_teaches_its_martensite(void)
+TEST(onset_puts_it_at_its_start_and_teaches_its_martensite)
 {
     static const struct {
         double c, cold_ohm, cold_c, heat_k;
@@ -420,7 +420,7 @@ static void onset_puts_it_at_its_start_and_teaches_its_martensite(void)
 
 /* 4 K of heat without a change, 0.8 K / change to 12 K: it is over, if it has changed by 1 %, and
  * by 1 % since its onset. It is seen at austenite finish and that heat. */
-static void finish_is_heat_without_a_change(void)
+TEST(finish_is_heat_without_a_change)
 {
     static const struct {
         double learnt_change, flat_k, ohm, cold_ohm, excess;
@@ -470,7 +470,7 @@ static void finish_is_heat_without_a_change(void)
 
 /* While it still changes, or lacks phase that it is known to have, it is no hotter than austenite
  * finish (martensite: its onset), until the coldest and heaviest would be. */
-static void what_still_transforms_is_no_hotter_than_that_lets_it_be(void)
+TEST(what_still_transforms_is_no_hotter_than_that_lets_it_be)
 {
     static const struct {
         uint8_t possible;
@@ -518,7 +518,7 @@ static void what_still_transforms_is_no_hotter_than_that_lets_it_be(void)
 }
 
 /* Cold martensite of 0.75 to 1.6 of the declared resistance is this circuit's. */
-static void cold_martensite_is_compared_with_the_declared_one(void)
+TEST(cold_martensite_is_compared_with_the_declared_one)
 {
     static const struct {
         uint8_t possible;
@@ -577,7 +577,7 @@ static double lost_at_c(double lost)
 /* Beyond 5 sd, or 0.12 %, it has lost phase; beyond 0.6 of that for 15 s, too; the other way it
  * takes twice as much, and an R-phase. Noise, the line's own, a temperature that is not known or
  * moves, another current each explain a part. */
-static void phase_is_lost_where_nothing_else_explains_what_is_read(void)
+TEST(phase_is_lost_where_nothing_else_explains_what_is_read)
 {
     static const struct {
         double less, noise, slow_noise, line_sd, rise_sd, slow_k, offset_sd_v;
@@ -649,7 +649,7 @@ static void phase_is_lost_where_nothing_else_explains_what_is_read(void)
 
 /* A sight of lost phase: what was moved stays in doubt, and as a disturbance where the distance was
  * known to 3 K; the first one opens a step. Too far off, it is the sensor's. */
-static void lost_phase_is_doubted_and_too_much_of_it_is_the_sensors(void)
+TEST(lost_phase_is_doubted_and_too_much_of_it_is_the_sensors)
 {
     static const struct {
         double c, sd_k, less, was_lost, odds;
@@ -712,7 +712,7 @@ static void lost_phase_is_doubted_and_too_much_of_it_is_the_sensors(void)
 
 /* It keeps its phase: the line follows in 60 s, tells its slope from 1 K on, and the spring is no
  * colder than half a kelvin below where its loss would be seen. */
-static void line_follows_what_keeps_its_phase(void)
+TEST(line_follows_what_keeps_its_phase)
 {
     static const struct {
         double more, slow_k, rise_sd;
@@ -750,7 +750,7 @@ static void line_follows_what_keeps_its_phase(void)
 }
 
 /* As the current drops the spring is what it was: what reads otherwise is the sensor's offset. */
-static void drop_of_the_current_tells_the_offset(void)
+TEST(drop_of_the_current_tells_the_offset)
 {
     static const struct {
         double line_a, current_a, way_k, offset_v, more_ohm;
@@ -801,7 +801,7 @@ static void drop_of_the_current_tells_the_offset(void)
 
 /* The line begins at rest (10 s below 0.3 K/s), or anew with eight turns and each 3 K until then;
  * too weak a current on the way tells nothing. */
-static void line_begins_at_rest_or_with_eight_turns(void)
+TEST(line_begins_at_rest_or_with_eight_turns)
 {
     static const struct {
         double line_ohm, moved_k, current_a, slow_k;
@@ -851,7 +851,7 @@ static void line_begins_at_rest_or_with_eight_turns(void)
 }
 
 /* What is slower than a turn: second differences of averages 4 s apart, at rest. */
-static void slow_noise_is_told_by_averages_four_seconds_apart(void)
+TEST(slow_noise_is_told_by_averages_four_seconds_apart)
 {
     static const struct {
         uint8_t quiet, averaged;
@@ -884,24 +884,4 @@ static void slow_noise_is_told_by_averages_four_seconds_apart(void)
     INSIDE.heating = true;
     spring_holding_watch(&estimator, &INSIDE, &model, 0, 0.0f, 0.0625f);
     TEST_ASSERT_EQUAL_UINT8(0, INSIDE.quiet);
-}
-
-void run_watch(void)
-{
-    RUN_TEST(reading_is_the_mean_of_enough_of_them);
-    RUN_TEST(readings_that_no_sensor_gives_are_left_out);
-    RUN_TEST(turn_tells_noise_and_goes_into_the_average);
-    RUN_TEST(what_no_phase_does_so_fast_is_a_jump);
-    RUN_TEST(onset_is_a_change_that_no_coefficient_makes);
-    RUN_TEST(heating_that_cannot_be_compared_is_marked_anew);
-    RUN_TEST(onset_puts_it_at_its_start_and_teaches_its_martensite);
-    RUN_TEST(finish_is_heat_without_a_change);
-    RUN_TEST(what_still_transforms_is_no_hotter_than_that_lets_it_be);
-    RUN_TEST(cold_martensite_is_compared_with_the_declared_one);
-    RUN_TEST(phase_is_lost_where_nothing_else_explains_what_is_read);
-    RUN_TEST(lost_phase_is_doubted_and_too_much_of_it_is_the_sensors);
-    RUN_TEST(line_follows_what_keeps_its_phase);
-    RUN_TEST(drop_of_the_current_tells_the_offset);
-    RUN_TEST(line_begins_at_rest_or_with_eight_turns);
-    RUN_TEST(slow_noise_is_told_by_averages_four_seconds_apart);
 }

@@ -2,8 +2,8 @@
 #include <string.h>
 
 #include "../fakes/belief_inside.h"
+#include "../run_tests.h"
 #include "telemetry.h"
-#include "unity.h"
 
 static char said[8192];
 static uint16_t said_length;
@@ -42,8 +42,6 @@ void setUp(void)
     room = 8000;
 }
 
-void tearDown(void) {}
-
 static void tick_at(uint32_t time_ms, int16_t ambient_c7)
 {
     const text_time_t time = {time_ms / 1000u, (uint16_t)(time_ms % 1000u)};
@@ -59,7 +57,7 @@ static unsigned lines(void)
     return count;
 }
 
-static void header_and_line_have_as_many_columns(void)
+TEST(header_and_line_have_as_many_columns)
 {
     char header[512];
     text_line_t line;
@@ -91,7 +89,7 @@ static void header_and_line_have_as_many_columns(void)
     TEST_ASSERT_NOT_NULL(strstr(said, ",0.00,20.00,ok\r\n"));
 }
 
-static void the_longest_line_fits_what_is_asked_for(void)
+TEST(the_longest_line_fits_what_is_asked_for)
 {
     for (uint8_t k = 0; k < 9; k++) {
         controller.measured_ma[k] = -32768;
@@ -109,7 +107,7 @@ static void the_longest_line_fits_what_is_asked_for(void)
     TEST_ASSERT_EQUAL_UINT16(0, telemetry.dropped);
 }
 
-static void a_line_without_room_is_dropped_whole_and_counted(void)
+TEST(a_line_without_room_is_dropped_whole_and_counted)
 {
     TEST_ASSERT_TRUE(telemetry_set(&telemetry, TELEMETRY_CSV, 50));
     room = (uint16_t)(TELEMETRY_LINE_BYTES(9) - 1u);
@@ -121,7 +119,7 @@ static void a_line_without_room_is_dropped_whole_and_counted(void)
     TEST_ASSERT_EQUAL_UINT16(65535, telemetry.dropped);
 }
 
-static void every_rate_gives_that_many_lines_a_second(void)
+TEST(every_rate_gives_that_many_lines_a_second)
 {
     for (uint8_t hz = 1; hz <= 50; hz++) {
         TEST_ASSERT_TRUE(telemetry_set(&telemetry, TELEMETRY_CSV, hz));
@@ -136,7 +134,7 @@ static void every_rate_gives_that_many_lines_a_second(void)
     }
 }
 
-static void teleplot_lines_are_name_ms_value(void)
+TEST(teleplot_lines_are_name_ms_value)
 {
     controller.measured_ma[1] = 1500;
     TEST_ASSERT_TRUE(telemetry_set(&telemetry, TELEMETRY_TELEPLOT, 50));
@@ -162,7 +160,7 @@ static void forget(void)
     said[0] = '\0';
 }
 
-static void a_round_of_teleplot_goes_on_where_it_found_no_room(void)
+TEST(a_round_of_teleplot_goes_on_where_it_found_no_room)
 {
     TEST_ASSERT_TRUE(telemetry_set(&telemetry, TELEMETRY_TELEPLOT, 5));
     for (uint32_t tick = 1; tick <= 14; tick++) { /* due in the tenth */
@@ -177,7 +175,7 @@ static void a_round_of_teleplot_goes_on_where_it_found_no_room(void)
     TEST_ASSERT_EQUAL_UINT16(0, telemetry.dropped);
 }
 
-static void what_of_a_round_found_no_room_is_dropped_and_every_spring_has_its_turn(void)
+TEST(what_of_a_round_found_no_room_is_dropped_and_every_spring_has_its_turn)
 {
     TEST_ASSERT_TRUE(telemetry_set(&telemetry, TELEMETRY_TELEPLOT, 50));
     for (uint32_t tick = 1; tick <= 45; tick++) {
@@ -211,7 +209,7 @@ static void ticks(unsigned count, uint32_t time_ms)
     }
 }
 
-static void csv_tells_a_limit_once_when_it_begins_and_once_when_it_ends(void)
+TEST(csv_tells_a_limit_once_when_it_begins_and_once_when_it_ends)
 {
     TEST_ASSERT_TRUE(telemetry_set(&telemetry, TELEMETRY_CSV, 5));
     ticks(50, 20);
@@ -228,7 +226,7 @@ static void csv_tells_a_limit_once_when_it_begins_and_once_when_it_ends(void)
     TEST_ASSERT_EQUAL_UINT(15, occurrences(",ok\r\n"));
 }
 
-static void csv_tells_again_when_the_cut_has_changed_by_half_an_ampere(void)
+TEST(csv_tells_again_when_the_cut_has_changed_by_half_an_ampere)
 {
     TEST_ASSERT_TRUE(telemetry_set(&telemetry, TELEMETRY_CSV, 50));
     for (uint16_t cut_ma = 10; cut_ma <= 1800; cut_ma = (uint16_t)(cut_ma + 10u)) {
@@ -259,7 +257,7 @@ static void pass(unsigned turns)
 }
 
 /* In setUp each spring was told to be cold. */
-static void csv_tells_each_sight_once_when_it_is_known_what_was_done(void)
+TEST(csv_tells_each_sight_once_when_it_is_known_what_was_done)
 {
     TEST_ASSERT_TRUE(telemetry_set(&telemetry, TELEMETRY_CSV, 5));
     pass(8);
@@ -298,7 +296,7 @@ static void csv_tells_each_sight_once_when_it_is_known_what_was_done(void)
     TEST_ASSERT_EQUAL_UINT(11, occurrences("<sight|"));
 }
 
-static void longest_sight_is_told_whole_and_waits_for_room(void)
+TEST(longest_sight_is_told_whole_and_waits_for_room)
 {
     spring_sights_t *const sights = sights_inside(&controller.estimator);
     sights->count = 0;
@@ -333,7 +331,7 @@ static void longest_sight_is_told_whole_and_waits_for_room(void)
     TEST_ASSERT_EQUAL_UINT(1, lines());
 }
 
-static void limits_that_find_no_room_are_told_later(void)
+TEST(limits_that_find_no_room_are_told_later)
 {
     TEST_ASSERT_TRUE(telemetry_set(&telemetry, TELEMETRY_CSV, 5));
     for (uint8_t k = 0; k < 9; k++) {
@@ -358,7 +356,7 @@ static void limits_that_find_no_room_are_told_later(void)
     TEST_ASSERT_EQUAL_UINT(9, occurrences("<"));
 }
 
-static void limits_that_toggle_are_told_once_a_period_and_take_no_other_springs_turn(void)
+TEST(limits_that_toggle_are_told_once_a_period_and_take_no_other_springs_turn)
 {
     for (uint8_t hz = 1; hz <= 50; hz = (uint8_t)(hz + 7u)) {
         TEST_ASSERT_TRUE(telemetry_set(&telemetry, TELEMETRY_CSV, hz));
@@ -387,7 +385,7 @@ static void limits_that_toggle_are_told_once_a_period_and_take_no_other_springs_
     }
 }
 
-static void all_limits_at_once_fit_and_are_told_whole(void)
+TEST(all_limits_at_once_fit_and_are_told_whole)
 {
     TEST_ASSERT_TRUE(telemetry_set(&telemetry, TELEMETRY_CSV, 1));
     limit(8, 1023, 3000);
@@ -397,7 +395,7 @@ static void all_limits_at_once_fit_and_are_told_whole(void)
                                           "trip|blind|cooling|away|cut_a:3.000>\r\n"));
 }
 
-static void telemetry_that_starts_tells_what_acts(void)
+TEST(telemetry_that_starts_tells_what_acts)
 {
     limit(1, DRIVE_POLICY_LIMIT_BLIND, 0);
     for (unsigned n = 1; n <= 3; n++) {
@@ -407,7 +405,7 @@ static void telemetry_that_starts_tells_what_acts(void)
     }
 }
 
-static void teleplot_has_limits_while_they_act_and_once_when_they_have_ended(void)
+TEST(teleplot_has_limits_while_they_act_and_once_when_they_have_ended)
 {
     TEST_ASSERT_TRUE(telemetry_set(&telemetry, TELEMETRY_TELEPLOT, 5));
     ticks(55, 0); /* the last round needs two ticks */
@@ -429,7 +427,7 @@ static void teleplot_has_limits_while_they_act_and_once_when_they_have_ended(voi
 }
 
 /* The longest piece of it, whole. */
-static void teleplots_longest_lines_are_whole(void)
+TEST(teleplots_longest_lines_are_whole)
 {
     controller.measured_ma[8] = -32768;
     controller.model.state.spring[8].temperature_c23 = -40 * 8388608;
@@ -452,7 +450,7 @@ static void teleplots_longest_lines_are_whole(void)
     TEST_ASSERT_EQUAL_UINT(40, lines());
 }
 
-static void teleplot_has_the_bounds_of_temperature_once_a_second(void)
+TEST(teleplot_has_the_bounds_of_temperature_once_a_second)
 {
     TEST_ASSERT_TRUE(telemetry_set(&telemetry, TELEMETRY_TELEPLOT, 5));
     ticks(49, 1000);
@@ -470,7 +468,7 @@ static void teleplot_has_the_bounds_of_temperature_once_a_second(void)
     TEST_ASSERT_EQUAL_UINT(3u * 9u, occurrences(">low"));
 }
 
-static void off_says_nothing_and_bad_settings_are_refused(void)
+TEST(off_says_nothing_and_bad_settings_are_refused)
 {
     tick_at(0, 0);
     TEST_ASSERT_EQUAL_UINT(0, said_length);
@@ -478,29 +476,4 @@ static void off_says_nothing_and_bad_settings_are_refused(void)
     TEST_ASSERT_FALSE(telemetry_set(&telemetry, TELEMETRY_CSV, 0));
     TEST_ASSERT_FALSE(telemetry_set(&telemetry, TELEMETRY_CSV, 51));
     TEST_ASSERT_EQUAL_UINT8(TELEMETRY_OFF, telemetry.format);
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(header_and_line_have_as_many_columns);
-    RUN_TEST(the_longest_line_fits_what_is_asked_for);
-    RUN_TEST(a_line_without_room_is_dropped_whole_and_counted);
-    RUN_TEST(every_rate_gives_that_many_lines_a_second);
-    RUN_TEST(teleplot_lines_are_name_ms_value);
-    RUN_TEST(a_round_of_teleplot_goes_on_where_it_found_no_room);
-    RUN_TEST(what_of_a_round_found_no_room_is_dropped_and_every_spring_has_its_turn);
-    RUN_TEST(csv_tells_a_limit_once_when_it_begins_and_once_when_it_ends);
-    RUN_TEST(csv_tells_again_when_the_cut_has_changed_by_half_an_ampere);
-    RUN_TEST(csv_tells_each_sight_once_when_it_is_known_what_was_done);
-    RUN_TEST(longest_sight_is_told_whole_and_waits_for_room);
-    RUN_TEST(limits_that_find_no_room_are_told_later);
-    RUN_TEST(limits_that_toggle_are_told_once_a_period_and_take_no_other_springs_turn);
-    RUN_TEST(all_limits_at_once_fit_and_are_told_whole);
-    RUN_TEST(telemetry_that_starts_tells_what_acts);
-    RUN_TEST(teleplot_has_limits_while_they_act_and_once_when_they_have_ended);
-    RUN_TEST(teleplots_longest_lines_are_whole);
-    RUN_TEST(teleplot_has_the_bounds_of_temperature_once_a_second);
-    RUN_TEST(off_says_nothing_and_bad_settings_are_refused);
-    return UNITY_END();
 }
