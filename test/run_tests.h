@@ -4,6 +4,8 @@
 #ifndef RUN_TESTS_H
 #define RUN_TESTS_H
 
+#include <stddef.h>
+
 #include "unity.h"
 
 #ifdef __cplusplus
@@ -31,6 +33,10 @@ int run_tests(void);
         add_test(&test);                                                                           \
     }                                                                                              \
     static void what_it_shows(void)
+
+/* What a test says beside its line where it fails: the row of its table, or whatever it is at. */
+void row(size_t n);
+void here(const char *format, ...) __attribute__((format(printf, 1, 2)));
 
 #define ROWS(table) (sizeof(table) / sizeof *(table))
 

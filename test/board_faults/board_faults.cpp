@@ -177,10 +177,8 @@ TEST(a_frozen_sensor_is_found_within_two_seconds_and_its_neighbours_go_on)
             board_set_fault(mega->raw(), fault, 4, true);
             mega->run_ms(2000.0);
             const board_view_t seen = mega->view();
-            const std::string where =
-                "fault " + std::to_string(fault) + " after " + std::to_string(after_ms);
-            TEST_ASSERT_EQUAL_INT_MESSAGE(SAFETY_FAULT_SENSOR_MISMATCH, seen.spring[4].fault,
-                                          where.c_str());
+            here("fault %d after %.0f ms", fault, after_ms);
+            TEST_ASSERT_EQUAL_INT(SAFETY_FAULT_SENSOR_MISMATCH, seen.spring[4].fault);
             TEST_ASSERT_EQUAL_DOUBLE(0.0, board_duty(mega->raw(), 4));
             TEST_ASSERT_EQUAL_INT(SAFETY_FAULT_NONE, seen.spring[0].fault);
             TEST_ASSERT_TRUE(board_duty(mega->raw(), 0) > 0.0);

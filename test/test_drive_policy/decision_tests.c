@@ -125,8 +125,7 @@ TEST(hold_asks_for_what_takes_it_to_its_place)
         turn_of(0);
         row(n);
         const int asks_ma = table[n].asks_w < 0.0f ? PROBE_MA : ma_of(table[n].asks_w);
-        TEST_ASSERT_INT_WITHIN_MESSAGE(1, asks_ma + table[n].dither_ma / 2,
-                                       policy.spring[0].wanted_ma, where);
+        TEST_ASSERT_INT_WITHIN(1, asks_ma + table[n].dither_ma / 2, policy.spring[0].wanted_ma);
     }
 }
 
@@ -153,11 +152,11 @@ TEST(hold_is_left_where_the_phase_is_not_what_was_asked)
         policy.spring[0].away.tried = table[n].tried;
         turn_of(0);
         row(n);
-        TEST_ASSERT_EQUAL_MESSAGE(table[n].stage, drive_policy_stage(&policy, 0), where);
+        TEST_ASSERT_EQUAL(table[n].stage, drive_policy_stage(&policy, 0));
         const bool heats = table[n].stage == HEAT;
-        TEST_ASSERT_EQUAL_MESSAGE(heats, policy.queue.count == 1, where);
-        TEST_ASSERT_EQUAL_MESSAGE(heats, of(0)->heating, where);
-        TEST_ASSERT_EQUAL_MESSAGE(heats, policy.spring[0].away.tried > table[n].tried, where);
+        TEST_ASSERT_EQUAL(heats, policy.queue.count == 1);
+        TEST_ASSERT_EQUAL(heats, of(0)->heating);
+        TEST_ASSERT_EQUAL(heats, policy.spring[0].away.tried > table[n].tried);
         if (table[n].stage == LOWER) {
             TEST_ASSERT_BITS_HIGH(B, of(0)->possible);
         }
@@ -204,7 +203,7 @@ TEST(margin_is_what_is_not_known_and_narrows_at_rest)
         policy.spring[0].margin_k = table[n].from_k;
         turn_of(0);
         row(n);
-        TEST_ASSERT_FLOAT_WITHIN_MESSAGE(1e-4f, table[n].to_k, policy.spring[0].margin_k, where);
+        TEST_ASSERT_FLOAT_WITHIN(1e-4f, table[n].to_k, policy.spring[0].margin_k);
     }
 }
 
@@ -231,8 +230,8 @@ TEST(heating_ends_at_its_phase_or_where_a_limit_ends_it)
         policy.spring[0].ceiling_ma = table[n].ceiling_ma;
         turn_of(0);
         row(n);
-        TEST_ASSERT_EQUAL_MESSAGE(table[n].stage, drive_policy_stage(&policy, 0), where);
-        TEST_ASSERT_EQUAL_MESSAGE(table[n].stage == HEAT, policy.queue.count == 1, where);
+        TEST_ASSERT_EQUAL(table[n].stage, drive_policy_stage(&policy, 0));
+        TEST_ASSERT_EQUAL(table[n].stage == HEAT, policy.queue.count == 1);
     }
 }
 
@@ -271,8 +270,8 @@ TEST(heating_slows_to_a_level_and_keeps_what_waits)
         row(n);
         const int asks_ma = table[n].asks_w < 0.0f ? BOOST_MA : ma_of(table[n].asks_w);
         const int keeps_ma = table[n].keeps_w < 0.0f ? 0 : ma_of(table[n].keeps_w);
-        TEST_ASSERT_INT_WITHIN_MESSAGE(1, asks_ma, policy.spring[0].wanted_ma, where);
-        TEST_ASSERT_INT_WITHIN_MESSAGE(keeps_ma != 0, keeps_ma, policy.spring[0].floor_ma, where);
+        TEST_ASSERT_INT_WITHIN(1, asks_ma, policy.spring[0].wanted_ma);
+        TEST_ASSERT_INT_WITHIN(keeps_ma != 0, keeps_ma, policy.spring[0].floor_ma);
     }
     /* what holds it already is above the boost: no more than that */
     begin(1, 2);
@@ -330,15 +329,15 @@ TEST(way_down_ends_at_its_level)
         turn_of(0);
         row(n);
         const drive_policy_spring_t *const s = &policy.spring[0];
-        TEST_ASSERT_EQUAL_MESSAGE(table[n].stage, drive_policy_stage(&policy, 0), where);
-        TEST_ASSERT_EQUAL_UINT16_MESSAGE(table[n].asks_ma, s->wanted_ma, where);
-        TEST_ASSERT_EQUAL_UINT16_MESSAGE(table[n].floor_ma, s->floor_ma, where);
+        TEST_ASSERT_EQUAL(table[n].stage, drive_policy_stage(&policy, 0));
+        TEST_ASSERT_EQUAL_UINT16(table[n].asks_ma, s->wanted_ma);
+        TEST_ASSERT_EQUAL_UINT16(table[n].floor_ma, s->floor_ma);
         if (table[n].stage == HOLD) {
-            TEST_ASSERT_FLOAT_WITHIN_MESSAGE(0.01f, 24.0f, s->margin_k, where);
-            TEST_ASSERT_EQUAL_MESSAGE(B, of(0)->possible, where);
+            TEST_ASSERT_FLOAT_WITHIN(0.01f, 24.0f, s->margin_k);
+            TEST_ASSERT_EQUAL(B, of(0)->possible);
         }
         if (table[n].stage == HEAT) {
-            TEST_ASSERT_FLOAT_WITHIN_MESSAGE(0.01f, 4.0f, s->rise_k_per_s, where);
+            TEST_ASSERT_FLOAT_WITHIN(0.01f, 4.0f, s->rise_k_per_s);
         }
     }
 }
@@ -361,8 +360,8 @@ TEST(what_is_asked_for_fully_is_there_where_it_surely_is)
         stands(0, OFF, 1000);
         turn_of(0);
         row(n);
-        TEST_ASSERT_EQUAL_MESSAGE(table[n].stage, drive_policy_stage(&policy, 0), where);
-        TEST_ASSERT_EQUAL_MESSAGE(table[n].stage == HOLD ? A : A | B, of(0)->possible, where);
+        TEST_ASSERT_EQUAL(table[n].stage, drive_policy_stage(&policy, 0));
+        TEST_ASSERT_EQUAL(table[n].stage == HOLD ? A : A | B, of(0)->possible);
     }
 }
 
@@ -383,22 +382,13 @@ TEST(turn_decides_nothing_of_what_was_just_seen)
         row(n);
         const spring_away_t away = policy.spring[0].away;
         const uint16_t asks_ma = n == 0 ? PROBE_MA : n == 1 ? 700 : n == 2 ? BOOST_MA : 0;
-        TEST_ASSERT_EQUAL_MESSAGE(n < 2    ? HOLD
-                                  : n == 2 ? HEAT
-                                           : OFF,
-                                  drive_policy_stage(&policy, 0), where);
-        TEST_ASSERT_TRUE_MESSAGE(n == 0 ? policy.spring[0].wanted_ma >= asks_ma
-                                        : policy.spring[0].wanted_ma == asks_ma,
-                                 where);
-        TEST_ASSERT_EQUAL_UINT16_MESSAGE(n == 0 || n == 1 ? 700 : 0, policy.spring[0].floor_ma,
-                                         where);
-        TEST_ASSERT_EQUAL_UINT16_MESSAGE(n == 0   ? 301
-                                         : n == 1 ? 300
-                                         : n == 2 ? 1
-                                                  : 0,
-                                         away.turns, where);
-        TEST_ASSERT_EQUAL_UINT16_MESSAGE(n == 0 ? 8999 : n == 1 ? 9000 : 0, away.tried, where);
-        TEST_ASSERT_EQUAL_MESSAGE(n > 1, of(0)->left || n == 2, where);
+        TEST_ASSERT_EQUAL(n < 2 ? HOLD : n == 2 ? HEAT : OFF, drive_policy_stage(&policy, 0));
+        TEST_ASSERT_TRUE(n == 0 ? policy.spring[0].wanted_ma >= asks_ma
+                                : policy.spring[0].wanted_ma == asks_ma);
+        TEST_ASSERT_EQUAL_UINT16(n == 0 || n == 1 ? 700 : 0, policy.spring[0].floor_ma);
+        TEST_ASSERT_EQUAL_UINT16(n == 0 ? 301 : n == 1 ? 300 : n == 2 ? 1 : 0, away.turns);
+        TEST_ASSERT_EQUAL_UINT16(n == 0 ? 8999 : n == 1 ? 9000 : 0, away.tried);
+        TEST_ASSERT_EQUAL(n > 1, of(0)->left || n == 2);
     }
 }
 
@@ -425,10 +415,8 @@ TEST(away_is_what_is_not_within_its_band)
         policy.spring[0].away = (spring_away_t){100, 9000}; /* no try is left */
         turn_of(0);
         row(n);
-        TEST_ASSERT_EQUAL_UINT16_MESSAGE(table[n].there ? 280 : 101, policy.spring[0].away.turns,
-                                         where);
-        TEST_ASSERT_EQUAL_UINT16_MESSAGE(table[n].there ? 8960 : 8999, policy.spring[0].away.tried,
-                                         where);
+        TEST_ASSERT_EQUAL_UINT16(table[n].there ? 280 : 101, policy.spring[0].away.turns);
+        TEST_ASSERT_EQUAL_UINT16(table[n].there ? 8960 : 8999, policy.spring[0].away.tried);
     }
 }
 
@@ -509,8 +497,7 @@ TEST(who_is_warmer_lets_the_colder_heat_while_few_wait)
             turn_of(turn);
         }
         row(n);
-        TEST_ASSERT_EQUAL_UINT8_ARRAY_MESSAGE(table[n].order, policy.queue.spring,
-                                              policy.queue.count, where);
+        TEST_ASSERT_EQUAL_UINT8_ARRAY(table[n].order, policy.queue.spring, policy.queue.count);
     }
 }
 
@@ -542,8 +529,8 @@ TEST(undriven_spring_is_as_severe_as_hot_as_it_comes)
         policy.spring[0].released = table[n].released;
         turn_of(0);
         row(n);
-        TEST_ASSERT_FLOAT_WITHIN_MESSAGE(2e-3f, table[n].severe, policy.spring[0].severity, where);
-        TEST_ASSERT_EQUAL_MESSAGE(table[n].then, policy.spring[0].released, where);
+        TEST_ASSERT_FLOAT_WITHIN(2e-3f, table[n].severe, policy.spring[0].severity);
+        TEST_ASSERT_EQUAL(table[n].then, policy.spring[0].released);
     }
 }
 
@@ -579,10 +566,10 @@ TEST(current_is_derated_by_the_lower_of_both)
         turn_of(0);
         row(n);
         const drive_policy_spring_t *const s = &policy.spring[0];
-        TEST_ASSERT_UINT16_WITHIN_MESSAGE(1, table[n].ceiling_ma, s->ceiling_ma, where);
-        TEST_ASSERT_EQUAL_UINT16_MESSAGE(table[n].limits, s->derating, where);
-        TEST_ASSERT_EQUAL_UINT16_MESSAGE(table[n].then, s->derated_turns, where);
-        TEST_ASSERT_EQUAL_MESSAGE(table[n].trips, s->tripped, where);
+        TEST_ASSERT_UINT16_WITHIN(1, table[n].ceiling_ma, s->ceiling_ma);
+        TEST_ASSERT_EQUAL_UINT16(table[n].limits, s->derating);
+        TEST_ASSERT_EQUAL_UINT16(table[n].then, s->derated_turns);
+        TEST_ASSERT_EQUAL(table[n].trips, s->tripped);
     }
 }
 
@@ -673,7 +660,7 @@ TEST(springs_that_share_a_turn_are_decided_in_it)
     drive_policy_tick(&policy, &input, targets);
     for (uint8_t k = 0; k < MANY; k++) {
         row(k);
-        TEST_ASSERT_EQUAL_UINT8_MESSAGE(k % 10u == 1u ? HEAT : OFF, policy.spring[k].stage, where);
+        TEST_ASSERT_EQUAL_UINT8(k % 10u == 1u ? HEAT : OFF, policy.spring[k].stage);
     }
 }
 
@@ -719,13 +706,13 @@ TEST(each_limit_is_said_where_it_cuts)
         supply_limit_ma = table[n].supply_ma;
         policy_tick();
         row(n);
-        TEST_ASSERT_EQUAL_UINT16_MESSAGE(table[n].gets_ma, target_ma[0], where);
-        TEST_ASSERT_EQUAL_UINT16_MESSAGE(table[n].limits, drive_policy_limits(&policy, 0), where);
-        TEST_ASSERT_EQUAL_UINT16_MESSAGE(table[n].wanted_ma - table[n].gets_ma,
-                                         drive_policy_cut_ma(&policy, 0), where);
+        TEST_ASSERT_EQUAL_UINT16(table[n].gets_ma, target_ma[0]);
+        TEST_ASSERT_EQUAL_UINT16(table[n].limits, drive_policy_limits(&policy, 0));
+        TEST_ASSERT_EQUAL_UINT16(table[n].wanted_ma - table[n].gets_ma,
+                                 drive_policy_cut_ma(&policy, 0));
         level[0] = 0; /* and no longer */
         policy_tick();
-        TEST_ASSERT_EQUAL_UINT16_MESSAGE(0, drive_policy_limits(&policy, 0), where);
+        TEST_ASSERT_EQUAL_UINT16(0, drive_policy_limits(&policy, 0));
     }
 }
 
@@ -826,12 +813,11 @@ TEST(targets_walk_until_two_rounds_after_the_last)
             const uint16_t budget_ma = (uint16_t)(table[n].supply_ma - 200);
             const uint16_t grants_ma =
                 table[n].wanted_ma < budget_ma ? table[n].wanted_ma : budget_ma;
-            TEST_ASSERT_EQUAL_UINT16_MESSAGE(walks ? table[n].gets_ma : grants_ma, target_ma[0],
-                                             where);
-            TEST_ASSERT_EQUAL_UINT8_MESSAGE(!walks                          ? 0
-                                            : table[n].gets_ma == grants_ma ? 1
-                                                                            : 21,
-                                            policy.walks, where);
+            TEST_ASSERT_EQUAL_UINT16(walks ? table[n].gets_ma : grants_ma, target_ma[0]);
+            TEST_ASSERT_EQUAL_UINT8(!walks                          ? 0
+                                    : table[n].gets_ma == grants_ma ? 1
+                                                                    : 21,
+                                    policy.walks);
         }
     }
     begin(1, 2); /* who is off is off at once */
@@ -880,7 +866,7 @@ TEST(jump_of_what_is_granted_is_told)
         policy.spring[0].wanted_ma = (uint16_t)(1000 + by_ma[n]);
         policy_tick();
         row(n);
-        TEST_ASSERT_EQUAL_MESSAGE(by_ma[n] * by_ma[n] > 10000, of(0)->settling != 0, where);
+        TEST_ASSERT_EQUAL(by_ma[n] * by_ma[n] > 10000, of(0)->settling != 0);
     }
 }
 
@@ -904,9 +890,9 @@ TEST(what_a_heating_keeps_comes_before_other_boosts)
         supply_limit_ma = 1900;
         policy_tick();
         row(n);
-        TEST_ASSERT_EQUAL_UINT16_MESSAGE(table[n].gets_ma, target_ma[0], where);
-        TEST_ASSERT_EQUAL_UINT16_MESSAGE(table[n].other_ma, target_ma[1], where);
-        TEST_ASSERT_EQUAL_MESSAGE(table[n].permille != 0 && table[n].stage == HEAT,
-                                  policy.queue.count == 2, where);
+        TEST_ASSERT_EQUAL_UINT16(table[n].gets_ma, target_ma[0]);
+        TEST_ASSERT_EQUAL_UINT16(table[n].other_ma, target_ma[1]);
+        TEST_ASSERT_EQUAL(table[n].permille != 0 && table[n].stage == HEAT,
+                          policy.queue.count == 2);
     }
 }

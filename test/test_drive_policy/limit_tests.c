@@ -39,11 +39,9 @@ TEST(all_around_an_undriven_spring_are_derated)
         for (int k = 0; k < SPRINGS; k++) {
             const int rows = k / 3 - warm / 3, columns = k % 3 - warm % 3;
             const bool beside = k != warm && rows * rows <= 1 && columns * columns <= 1;
-            (void)snprintf(where, sizeof where, "spring %d warm, %d", warm + 1, k + 1);
-            TEST_ASSERT_EQUAL_MESSAGE(
-                beside,
-                (drive_policy_limits(&policy, (uint8_t)k) & DRIVE_POLICY_LIMIT_UNDRIVEN) != 0,
-                where);
+            here("spring %d warm, %d", warm + 1, k + 1);
+            TEST_ASSERT_EQUAL(beside, (drive_policy_limits(&policy, (uint8_t)k) &
+                                       DRIVE_POLICY_LIMIT_UNDRIVEN) != 0);
         }
     }
 }
@@ -78,8 +76,7 @@ TEST(doubt_that_others_share_derates_nobody)
         }
         decisions(ROUND_TICKS);
         row(n);
-        TEST_ASSERT_INT_WITHIN_MESSAGE(60, FULL_MA * (1.0f - table[n].counts_k / 10.0f),
-                                       target_ma[4], where);
+        TEST_ASSERT_INT_WITHIN(60, FULL_MA * (1.0f - table[n].counts_k / 10.0f), target_ma[4]);
     }
 }
 
@@ -109,7 +106,7 @@ TEST(overload_is_worked_off_once_nobody_waits)
             (void)decide();
         }
         row(n);
-        TEST_ASSERT_EQUAL_UINT16_MESSAGE(table[n].then, policy.overload_quarters, where);
+        TEST_ASSERT_EQUAL_UINT16(table[n].then, policy.overload_quarters);
     }
 }
 

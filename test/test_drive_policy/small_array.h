@@ -27,9 +27,6 @@ extern bool allowed[SPRINGS];
 extern uint16_t target_ma[SPRINGS];
 extern uint16_t supply_limit_ma, maximum_current_ma;
 
-extern char where[120]; /* to be said where a test fails */
-/* What a failing test says: the row of its table. */
-void row(size_t n);
 uint32_t random_below(uint32_t limit);
 
 void set_defaults(void);

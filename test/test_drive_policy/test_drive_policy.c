@@ -43,9 +43,9 @@ TEST(after_power_on_it_waits_says_so_and_then_holds_all_nine)
     }
     const double highest_c = run(209.0); /* the figure for a first start */
     for (uint8_t k = 0; k < SPRINGS; k++) {
-        (void)snprintf(where, sizeof where, "spring %d: %.1f degC, %.3f; highest %.1f", k + 1,
-                       truth[k].temperature_c, truth[k].austenite, highest_c);
-        TEST_ASSERT_TRUE_MESSAGE(truth[k].austenite > 0.95 && highest_c < 115.0, where);
+        here("spring %d: %.1f degC, %.3f; highest %.1f", k + 1, truth[k].temperature_c,
+             truth[k].austenite, highest_c);
+        TEST_ASSERT_TRUE(truth[k].austenite > 0.95 && highest_c < 115.0);
         TEST_ASSERT_BITS_LOW(DRIVE_POLICY_LIMIT_COOLING, drive_policy_limits(&policy, k));
     }
 }
@@ -67,8 +67,8 @@ TEST(held_spring_stays_on_near_martensite_start)
             sum_c += truth[4].temperature_c;
             TEST_ASSERT_LESS_OR_EQUAL_UINT(20, away);
         }
-        (void)snprintf(where, sizeof where, "loss x %.2f: mean %.1f degC", loss[n], sum_c / 600.0);
-        TEST_ASSERT_TRUE_MESSAGE(sum_c / 600.0 < 86.0, where);
+        here("loss x %.2f: mean %.1f degC", loss[n], sum_c / 600.0);
+        TEST_ASSERT_TRUE(sum_c / 600.0 < 86.0);
     }
 }
 
@@ -100,10 +100,10 @@ TEST(spring_that_has_lost_its_phase_is_heated_back_or_that_is_said)
             least = fmin(least, truth[0].austenite);
         }
         const bool says = (drive_policy_limits(&policy, 0) & DRIVE_POLICY_LIMIT_AWAY) != 0;
-        (void)snprintf(where, sizeof where, "%.0f K: %.3f, %.1f degC, %.3f, says %d", touch_k,
-                       least, truth[0].temperature_c, truth[0].austenite, says);
-        TEST_ASSERT_TRUE_MESSAGE(least < 0.95, where); /* it did lose */
-        TEST_ASSERT_TRUE_MESSAGE(truth[0].austenite > 0.9 || says, where);
+        here("%.0f K: %.3f, %.1f degC, %.3f, says %d", touch_k, least, truth[0].temperature_c,
+             truth[0].austenite, says);
+        TEST_ASSERT_TRUE(least < 0.95); /* it did lose */
+        TEST_ASSERT_TRUE(truth[0].austenite > 0.9 || says);
     }
 }
 
@@ -120,9 +120,8 @@ TEST(spring_of_which_nothing_is_known_any_more_waits_and_is_heated_anew)
         TEST_ASSERT_EQUAL_UINT16(0, target_ma[0]);
         TEST_ASSERT_EQUAL_UINT16(DRIVE_POLICY_LIMIT_COOLING, drive_policy_limits(&policy, 0));
         const double highest_c = run(209.0);
-        (void)snprintf(where, sizeof where, "%.0f s: %.3f, highest %.1f", at_s, truth[0].austenite,
-                       highest_c);
-        TEST_ASSERT_TRUE_MESSAGE(truth[0].austenite > 0.95 && highest_c < 115.0, where);
+        here("%.0f s: %.3f, highest %.1f", at_s, truth[0].austenite, highest_c);
+        TEST_ASSERT_TRUE(truth[0].austenite > 0.95 && highest_c < 115.0);
         TEST_ASSERT_EQUAL_UINT16(0, drive_policy_limits(&policy, 0));
     }
     begin_cold(1, 2);
@@ -149,9 +148,8 @@ TEST(levels_one_after_the_other_are_held)
         for (unsigned j = 0; j < 5; j++) {
             level[0] = levels[j];
             (void)run(120.0);
-            (void)snprintf(where, sizeof where, "loss %d, %u permille: %.3f", n, levels[j],
-                           truth[0].austenite);
-            TEST_ASSERT_TRUE_MESSAGE(fabs(truth[0].austenite - 0.001 * levels[j]) < 0.1, where);
+            here("loss %d, %u permille: %.3f", n, levels[j], truth[0].austenite);
+            TEST_ASSERT_TRUE(fabs(truth[0].austenite - 0.001 * levels[j]) < 0.1);
         }
     }
 }
@@ -219,6 +217,8 @@ TEST(parameters_outside_their_range_are_refused_whole)
     wrong.unsure_margin_cc = (uint16_t)(wrong.hold_margin_cc - 1);
     TEST_ASSERT_FALSE(drive_policy_check(&wrong, &bad));
     TEST_ASSERT_EQUAL_UINT16(PARAMETER_unsure_margin_k, bad);
+    wrong.unsure_margin_cc = wrong.hold_margin_cc;
+    TEST_ASSERT_TRUE(drive_policy_check(&wrong, &bad));
     wrong = parameters;
     wrong.policy = 2;
     TEST_ASSERT_FALSE(drive_policy_check(&wrong, &bad));

@@ -16,8 +16,7 @@
 #define LEAST_K2 0.36 /* of a distance: 0.6 K within a spring */
 
 #define NEAR(is, value)                                                                            \
-    TEST_ASSERT_FLOAT_WITHIN_MESSAGE(1e-6f + 2e-4f * fabsf((float)(is)), (float)(is), (value),     \
-                                     where)
+    TEST_ASSERT_FLOAT_WITHIN(1e-6f + 2e-4f * fabsf((float)(is)), (float)(is), (value))
 
 /* As the model has it. */
 static double in_128ths(double c)
@@ -158,10 +157,9 @@ TEST(sight_moves_all_by_what_each_is_known_to)
         const double most = 0.45 * LOSS;
         NEAR(e, spring_see(&estimator, &INSIDE, &model, 0, (float)table[n].seen_c,
                            (float)table[n].sd_k, n == 0 ? M : A));
-        TEST_ASSERT_FLOAT_WITHIN_MESSAGE(0.01f, (float)(80.0 + d / s * e), put_c(), where);
-        TEST_ASSERT_EQUAL_MESSAGE(
-            n != 0 && put_c() > 78.0f,
-            thermal_model_austenite(&model, 0) == THERMAL_MODEL_AUSTENITE_FULL, where);
+        TEST_ASSERT_FLOAT_WITHIN(0.01f, (float)(80.0 + d / s * e), put_c());
+        TEST_ASSERT_EQUAL(n != 0 && put_c() > 78.0f,
+                          thermal_model_austenite(&model, 0) == THERMAL_MODEL_AUSTENITE_FULL);
         NEAR(fmin(fmax(table[n].shift_k - fmin(shift_k2 / s, d / s) * e, -30.0), 30.0),
              INSIDE.shift_k);
         NEAR(1e3 * fmin(fmax(table[n].more_loss + by_loss * e, -most), most),
@@ -205,13 +203,12 @@ TEST(what_keeps_its_phase_is_no_colder_and_tells_of_its_loss)
         NEAR(1e3 * (table[n].kept + less), 1e3f * INSIDE.kept_w_per_k);
         NEAR(table[n].moves ? 80.0 : table[n].c, put_c());
         NEAR(5.0, INSIDE.variance_k2);
-        TEST_ASSERT_EQUAL_MESSAGE(table[n].blind, INSIDE.blind, where);
+        TEST_ASSERT_EQUAL(table[n].blind, INSIDE.blind);
         TEST_ASSERT_EQUAL_FLOAT(table[n].blind ? 1.0f : 0.0f, INSIDE.lost);
-        TEST_ASSERT_EQUAL_MESSAGE(
+        TEST_ASSERT_EQUAL(
             table[n].moves,
             sights_inside(&estimator)->sight[sights_inside(&estimator)->count - 1u].kind ==
-                SPRING_SIGHT_KEPT,
-            where);
+                SPRING_SIGHT_KEPT);
         if (table[n].moves) { /* from austenite, and all of it is one sight */
             const spring_sight_t *const sight = spring_sights_newest(sights_inside(&estimator), 0);
             TEST_ASSERT_TRUE(thermal_model_austenite(&model, 0) == THERMAL_MODEL_AUSTENITE_FULL);
@@ -275,22 +272,20 @@ TEST(look_tells_a_phase_and_a_temperature_evenly_over_its_width)
         give(table[n].current_a, ohm);
         turn();
         const bool looked = table[n].high_c > 0.0;
-        TEST_ASSERT_EQUAL_UINT8_MESSAGE(table[n].then, INSIDE.possible, where);
-        TEST_ASSERT_EQUAL_UINT8_MESSAGE(table[n].fresh + 1, INSIDE.fresh, where);
-        TEST_ASSERT_EQUAL_MESSAGE(table[n].told && table[n].possible != M, INSIDE.told, where);
-        TEST_ASSERT_EQUAL_MESSAGE(looked, spring_estimator_has_just_seen(BELIEF), where);
-        TEST_ASSERT_FLOAT_WITHIN_MESSAGE(
-            0.01f, looked ? (float)(table[n].low_c + table[n].high_c) / 2.0f : 75.0f, put_c(),
-            where);
+        TEST_ASSERT_EQUAL_UINT8(table[n].then, INSIDE.possible);
+        TEST_ASSERT_EQUAL_UINT8(table[n].fresh + 1, INSIDE.fresh);
+        TEST_ASSERT_EQUAL(table[n].told && table[n].possible != M, INSIDE.told);
+        TEST_ASSERT_EQUAL(looked, spring_estimator_has_just_seen(BELIEF));
+        TEST_ASSERT_FLOAT_WITHIN(
+            0.01f, looked ? (float)(table[n].low_c + table[n].high_c) / 2.0f : 75.0f, put_c());
         if (looked) {
             TEST_ASSERT_TRUE(is_noted(SPRING_SIGHT_LOOKED));
             const float sd_k = 0.29f * (float)(table[n].high_c - table[n].low_c);
-            TEST_ASSERT_FLOAT_WITHIN_MESSAGE(0.01f, sd_k * sd_k + 9.0f, INSIDE.variance_k2, where);
+            TEST_ASSERT_FLOAT_WITHIN(0.01f, sd_k * sd_k + 9.0f, INSIDE.variance_k2);
             TEST_ASSERT_FLOAT_WITHIN(0.01f, 9.0f, INSIDE.shift_variance_k2);
-            TEST_ASSERT_EQUAL_MESSAGE(
-                table[n].phase > 0.5 && put_c() > 78.0f,
-                thermal_model_austenite(&model, 0) == THERMAL_MODEL_AUSTENITE_FULL, where);
-            TEST_ASSERT_EQUAL_MESSAGE(table[n].heating, INSIDE.heating, where);
+            TEST_ASSERT_EQUAL(table[n].phase > 0.5 && put_c() > 78.0f,
+                              thermal_model_austenite(&model, 0) == THERMAL_MODEL_AUSTENITE_FULL);
+            TEST_ASSERT_EQUAL(table[n].heating, INSIDE.heating);
             if (table[n].heating) {
                 NEAR(table[n].begun_c, INSIDE.run.heat.begun_c);
             }
@@ -314,8 +309,8 @@ TEST(hottest_possible_cools_by_the_least_loss_with_its_latent_heat)
         const double is_c =
             c + TURN_S * (current_a * current_a * 0.2 - 0.8 * LOSS * (c - 20.0)) / capacity;
         NEAR(is_c, INSIDE.hottest_c);
-        TEST_ASSERT_EQUAL_MESSAGE(is_c < 68.0 ? M : ANY, INSIDE.possible, where);
-        TEST_ASSERT_EQUAL_MESSAGE(is_c < 68.0, is_noted(SPRING_SIGHT_COOLED), where);
+        TEST_ASSERT_EQUAL(is_c < 68.0 ? M : ANY, INSIDE.possible);
+        TEST_ASSERT_EQUAL(is_c < 68.0, is_noted(SPRING_SIGHT_COOLED));
         power_comes_on();
         INSIDE.hottest_c = (float)c; /* and how long that takes, by small steps */
         double s = 0.0;
@@ -323,8 +318,8 @@ TEST(hottest_possible_cools_by_the_least_loss_with_its_latent_heat)
             now_c -= 1e-3 * 0.8 * LOSS * (now_c - 20.0) /
                      (CAPACITY + (now_c > 78.0 ? 0.0 : 8.65 / 10.0));
         }
-        TEST_ASSERT_FLOAT_WITHIN_MESSAGE(0.01f + 0.001f * (float)s, (float)s,
-                                         spring_estimator_cooling_s(&estimator, &model, 0), where);
+        TEST_ASSERT_FLOAT_WITHIN(0.01f + 0.001f * (float)s, (float)s,
+                                 spring_estimator_cooling_s(&estimator, &model, 0));
     }
     thermal_model_set_ambient(&model, 68 * 128); /* as warm as that: nothing to wait for */
     TEST_ASSERT_EQUAL_FLOAT(0.0f, spring_estimator_cooling_s(&estimator, &model, 0));
@@ -356,7 +351,7 @@ TEST(phase_is_what_temperature_leaves)
         INSIDE.lost = 0.5f;
         give(table[n].current_a, 0.2);
         turn();
-        TEST_ASSERT_EQUAL_UINT8_MESSAGE(table[n].then, INSIDE.possible, where);
+        TEST_ASSERT_EQUAL_UINT8(table[n].then, INSIDE.possible);
         TEST_ASSERT_EQUAL_FLOAT(table[n].then == M ? 0.0f : 0.5f, INSIDE.lost);
     }
 }
@@ -385,7 +380,7 @@ TEST(what_a_loose_contact_took_is_given_back)
         const double more_k = n == 0 ? (1.0 - h * 2e-4) * 6.0 + h * 60.0 * 1e-4 : 0.0;
         const double cov = -h * 60.0 * 1e-8, var_g = n == 0 ? 2e-8 : 1e-8;
         turn();
-        TEST_ASSERT_FLOAT_WITHIN_MESSAGE(0.01f, 80.0f + (float)more_k, put_c(), where);
+        TEST_ASSERT_FLOAT_WITHIN(0.01f, 80.0f + (float)more_k, put_c());
         TEST_ASSERT_FLOAT_WITHIN(0.02f, 4.0f + (float)(more_k * more_k), INSIDE.variance_k2);
         NEAR(1e4 * (n == 0 ? 1e-4 : 2e-4), 1e4f * INSIDE.learnt.loss_w_per_k);
         TEST_ASSERT_FLOAT_WITHIN(1e-10f, (float)var_g, INSIDE.loss_variance);
@@ -393,7 +388,7 @@ TEST(what_a_loose_contact_took_is_given_back)
                                  INSIDE.covariance);
         TEST_ASSERT_EQUAL_FLOAT(0.0f, INSIDE.gone_k);
         TEST_ASSERT_EQUAL_FLOAT(n == 0 ? 0.0f : 1e-4f, INSIDE.gone_w_per_k);
-        TEST_ASSERT_EQUAL_MESSAGE(n == 0, spring_estimator_has_just_seen(BELIEF), where);
+        TEST_ASSERT_EQUAL(n == 0, spring_estimator_has_just_seen(BELIEF));
         TEST_ASSERT_TRUE(INSIDE.unproven);
         TEST_ASSERT_EQUAL_FLOAT(0.0f, INSIDE.run.line.ohm);
         TEST_ASSERT_EQUAL_UINT8(0, INSIDE.quiet);
@@ -414,8 +409,8 @@ TEST(heating_that_was_left_is_over_in_the_next_turn)
             spring_estimator_leave(&estimator, 0);
         }
         turn();
-        TEST_ASSERT_EQUAL_MESSAGE(n == 1, INSIDE.heating, where);
-        TEST_ASSERT_EQUAL_MESSAGE(n != 0, INSIDE.onset && INSIDE.unlike, where);
+        TEST_ASSERT_EQUAL(n == 1, INSIDE.heating);
+        TEST_ASSERT_EQUAL(n != 0, INSIDE.onset && INSIDE.unlike);
         TEST_ASSERT_FALSE(INSIDE.left);
     }
 }
@@ -483,10 +478,10 @@ TEST(hold_begins_by_what_its_heating_showed)
         INSIDE.kept_w_per_k = 1e-3f;
         INSIDE.left = true;
         spring_estimator_begin_hold(&estimator, &model, 0, table[n].full);
-        TEST_ASSERT_EQUAL_UINT8_MESSAGE(table[n].then, INSIDE.possible, where);
-        TEST_ASSERT_EQUAL_MESSAGE(table[n].blind, INSIDE.blind, where);
-        TEST_ASSERT_EQUAL_MESSAGE(table[n].doubts, INSIDE.doubted, where);
-        TEST_ASSERT_EQUAL_MESSAGE(table[n].unproven, INSIDE.unproven, where);
+        TEST_ASSERT_EQUAL_UINT8(table[n].then, INSIDE.possible);
+        TEST_ASSERT_EQUAL(table[n].blind, INSIDE.blind);
+        TEST_ASSERT_EQUAL(table[n].doubts, INSIDE.doubted);
+        TEST_ASSERT_EQUAL(table[n].unproven, INSIDE.unproven);
         NEAR(table[n].learns_ohm, INSIDE.learnt.austenite_ohm);
         NEAR(table[n].lost, INSIDE.lost);
         TEST_ASSERT_FALSE(INSIDE.heating || INSIDE.left || INSIDE.quiet || INSIDE.losing);
@@ -497,15 +492,14 @@ TEST(hold_begins_by_what_its_heating_showed)
         NEAR(strong ? 0.002 * 0.002 * 1e6 : 0.0, 1e6f * INSIDE.run.line.variance);
         NEAR(0.0006, INSIDE.run.line.rise_per_k);
         NEAR(0.0009 / 2.6, INSIDE.run.line.rise_sd_per_k);
-        TEST_ASSERT_EQUAL_MESSAGE(
-            table[n].full && table[n].possible != A,
-            thermal_model_austenite(&model, 0) == THERMAL_MODEL_AUSTENITE_FULL, where);
+        TEST_ASSERT_EQUAL(table[n].full && table[n].possible != A,
+                          thermal_model_austenite(&model, 0) == THERMAL_MODEL_AUSTENITE_FULL);
         const spring_sight_t *const sight = spring_sights_newest(sights_inside(&estimator), 0);
         const bool unseen = table[n].full && table[n].heating && table[n].possible != A;
-        TEST_ASSERT_EQUAL_MESSAGE(unseen, sight->kind == SPRING_SIGHT_UNSEEN, where);
-        TEST_ASSERT_EQUAL_UINT8_MESSAGE(SPRING_DID_HOLD | (table[n].doubts ? SPRING_DID_DOUBT : 0) |
-                                            (unseen && table[n].blind ? SPRING_DID_BLIND : 0),
-                                        sight->did & ~SPRING_DID_HEAT, where);
+        TEST_ASSERT_EQUAL(unseen, sight->kind == SPRING_SIGHT_UNSEEN);
+        TEST_ASSERT_EQUAL_UINT8(SPRING_DID_HOLD | (table[n].doubts ? SPRING_DID_DOUBT : 0) |
+                                    (unseen && table[n].blind ? SPRING_DID_BLIND : 0),
+                                sight->did & ~SPRING_DID_HEAT);
     }
 }
 
@@ -524,8 +518,8 @@ TEST(sight_is_noted_in_tenths_and_hundredths)
         row(n);
         spring_note_read(&estimator, 0, (float)table[n].read, (float)table[n].sd);
         const spring_sight_t *const sight = spring_sights_newest(sights_inside(&estimator), 0);
-        TEST_ASSERT_EQUAL_INT16_MESSAGE(table[n].read_then, sight->read, where);
-        TEST_ASSERT_EQUAL_UINT8_MESSAGE(table[n].sd_then, sight->read_sd, where);
+        TEST_ASSERT_EQUAL_INT16(table[n].read_then, sight->read);
+        TEST_ASSERT_EQUAL_UINT8(table[n].sd_then, sight->read_sd);
     }
     put(80.0);
     INSIDE.variance_k2 = 4.0f;
@@ -585,7 +579,7 @@ TEST(where_it_is_is_known_where_all_is)
         INSIDE.blind = table[n].blind;
         INSIDE.unsteady = table[n].unsteady;
         INSIDE.variance_k2 = table[n].variance_k2;
-        TEST_ASSERT_EQUAL_MESSAGE(table[n].known, spring_estimator_knows(&INSIDE), where);
+        TEST_ASSERT_EQUAL(table[n].known, spring_estimator_knows(&INSIDE));
     }
 }
 
@@ -640,8 +634,7 @@ TEST(each_spring_has_a_turn_in_a_quarter_of_a_second)
     for (size_t tick = 0; tick < ROWS(turn_of_tick); tick++) {
         row(tick);
         spring_estimator_tick(&estimator, &model, ma, mv, tick < 4 ? valid : NULL);
-        TEST_ASSERT_EQUAL_UINT8_MESSAGE(turn_of_tick[tick], spring_estimator_turn(&estimator),
-                                        where);
+        TEST_ASSERT_EQUAL_UINT8(turn_of_tick[tick], spring_estimator_turn(&estimator));
         for (uint8_t k = 0; k < 12; k++) {
             const spring_belief_t *const b = belief_inside(&estimator, k);
             const unsigned turns = 100u - b->unsteady;
@@ -649,15 +642,10 @@ TEST(each_spring_has_a_turn_in_a_quarter_of_a_second)
             for (size_t before = 0; before <= tick; before++) {
                 had += turn_of_tick[before] == k % 10u;
             }
-            TEST_ASSERT_EQUAL_UINT_MESSAGE(had, turns, where);
-            TEST_ASSERT_EQUAL_MESSAGE(tick >= 11 && k == 1, b->declared_stiffness_w_per_k > 0.0f,
-                                      where);
+            TEST_ASSERT_EQUAL_UINT(had, turns);
+            TEST_ASSERT_EQUAL(tick >= 11 && k == 1, b->declared_stiffness_w_per_k > 0.0f);
             if (tick == 3 && k >= 4) {
-                TEST_ASSERT_EQUAL_UINT8_MESSAGE(k == 5    ? 0
-                                                : k < 10  ? 4
-                                                : k == 10 ? 3
-                                                          : 2,
-                                                b->readings, where);
+                TEST_ASSERT_EQUAL_UINT8(k == 5 ? 0 : k < 10 ? 4 : k == 10 ? 3 : 2, b->readings);
             }
         }
     }

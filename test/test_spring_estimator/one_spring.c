@@ -8,7 +8,6 @@ truth_t truth;
 sensor_t sensor;
 spring_estimator_t estimator;
 thermal_model_t model;
-char where[120];
 
 static unsigned count;
 static double power_sum_w;

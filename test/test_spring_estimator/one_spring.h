@@ -30,7 +30,6 @@ extern truth_t truth;
 extern sensor_t sensor;
 extern spring_estimator_t estimator;
 extern thermal_model_t model;
-extern char where[120]; /* to be said where a test fails */
 #define BELIEF spring_estimator_of(&estimator, 0)
 #define LEARNT spring_estimator_learnt(&estimator, 0)
 /* What nobody else may see. */

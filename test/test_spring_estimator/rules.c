@@ -10,11 +10,6 @@
 
 #define SPRINGS 3
 
-void row(size_t n)
-{
-    (void)snprintf(where, sizeof where, "row %u", (unsigned)n);
-}
-
 void give_readings(int readings, double current_a, double ohm)
 {
     double sum_mv = 0.0;
@@ -38,6 +33,7 @@ static void begin_three(void)
     spring_estimator_init(&estimator, &model);
     thermal_model_reset(&model, 20 * 128);
     spring_estimator_trust_model(&estimator, &model);
+    TEST_ASSERT_EQUAL_UINT8(M, estimator.spring[SPRINGS - 1].possible);
 }
 
 /* ---- what is read against what it read when it had transformed last ---- */
@@ -74,10 +70,9 @@ TEST(phase_is_missing_beyond_what_steps_noise_and_coefficient_explain)
     for (size_t n = 0; n < ROWS(table); n++) {
         row(n);
         begin_heated(table[n].temperature_c, table[n].change, 0.2f * (1.0f - table[n].less));
-        TEST_ASSERT_EQUAL_MESSAGE(table[n].lacks, spring_estimator_lacks_phase(&INSIDE, &model, 0),
-                                  where);
+        TEST_ASSERT_EQUAL(table[n].lacks, spring_estimator_lacks_phase(&INSIDE, &model, 0));
         INSIDE.current_a = 0.79f; /* too weak to tell */
-        TEST_ASSERT_FALSE_MESSAGE(spring_estimator_lacks_phase(&INSIDE, &model, 0), where);
+        TEST_ASSERT_FALSE(spring_estimator_lacks_phase(&INSIDE, &model, 0));
     }
 }
 
@@ -98,8 +93,7 @@ TEST(heating_is_over_where_its_austenite_is_read_twice)
         row(n);
         begin_heated(table[n].temperature_c, table[n].change, table[n].ohm);
         INSIDE.ohm_before[1] = table[n].before_ohm;
-        TEST_ASSERT_EQUAL_MESSAGE(table[n].over,
-                                  spring_estimator_has_transformed(&estimator, &model, 0), where);
+        TEST_ASSERT_EQUAL(table[n].over, spring_estimator_has_transformed(&estimator, &model, 0));
     }
 }
 
@@ -156,10 +150,9 @@ TEST(losses_are_those_that_held_springs_have_in_common)
         }
         float factor = 0.0f, sd = 0.0f;
         row(n);
-        TEST_ASSERT_EQUAL_MESSAGE(table[n].known, spring_estimator_losses(&estimator, &factor, &sd),
-                                  where);
-        TEST_ASSERT_FLOAT_WITHIN_MESSAGE(1e-4f, table[n].factor, factor, where);
-        TEST_ASSERT_FLOAT_WITHIN_MESSAGE(1e-4f, table[n].factor_sd, sd, where);
+        TEST_ASSERT_EQUAL(table[n].known, spring_estimator_losses(&estimator, &factor, &sd));
+        TEST_ASSERT_FLOAT_WITHIN(1e-4f, table[n].factor, factor);
+        TEST_ASSERT_FLOAT_WITHIN(1e-4f, table[n].factor_sd, sd);
         if (n < 2) { /* of what is not read, or heated, nothing is seen */
             estimator.spring[n].fresh = n == 0 ? 0 : 1;
             estimator.spring[n].heating = n == 1;
@@ -177,8 +170,8 @@ TEST(two_springs_that_are_found_colder_are_a_step)
         uint8_t second;
         unsigned turns_between;
         bool opens;
-    } table[] = {{-10.0f, 1, 0, true},  {-9.9f, 1, 0, false},  {10.1f, 1, 0, false},
-                 {-10.1f, 0, 0, false}, {-10.1f, 1, 79, true}, {-10.1f, 1, 80, false}};
+    } table[] = {{-10.0f, 1, 0, true},  {-9.9f, 1, 0, false},   {10.1f, 1, 0, false},
+                 {-10.1f, 0, 0, false}, {-10.1f, 1, 719, true}, {-10.1f, 1, 720, false}};
     for (size_t n = 0; n < ROWS(table); n++) {
         begin_three();
         row(n);
@@ -189,22 +182,22 @@ TEST(two_springs_that_are_found_colder_are_a_step)
             spring_seal(&estimator, k);
         }
         TEST_ASSERT_FALSE(spring_open_to_step(&estimator, &estimator.spring[0], 0, -10.1f, 4.0f));
-        estimator.stepped_turns = (uint16_t)(estimator.stepped_turns - 9u * table[n].turns_between);
+        estimator.stepped_turns = (uint16_t)(estimator.stepped_turns - table[n].turns_between);
         const uint8_t k = table[n].second;
         spring_belief_t *const b = &estimator.spring[k];
-        TEST_ASSERT_EQUAL_MESSAGE(
-            table[n].opens, spring_open_to_step(&estimator, b, k, table[n].error_k, 4.0f), where);
+        TEST_ASSERT_EQUAL(table[n].opens,
+                          spring_open_to_step(&estimator, b, k, table[n].error_k, 4.0f));
         const float sd = 0.2f * estimator.loss_w_per_k;
         const float variance = table[n].opens ? sd * sd : 0.0f;
-        TEST_ASSERT_FLOAT_WITHIN_MESSAGE(1e-9f, variance, estimator.spring[0].loss_variance, where);
-        TEST_ASSERT_FLOAT_WITHIN_MESSAGE(1e-9f, variance, estimator.spring[1].loss_variance, where);
-        TEST_ASSERT_FLOAT_WITHIN_MESSAGE(
-            1e-6f, table[n].opens ? 0.8f * table[n].error_k * sd : 0.0f, b->covariance, where);
-        TEST_ASSERT_FLOAT_WITHIN_MESSAGE(
+        TEST_ASSERT_FLOAT_WITHIN(1e-9f, variance, estimator.spring[0].loss_variance);
+        TEST_ASSERT_FLOAT_WITHIN(1e-9f, variance, estimator.spring[1].loss_variance);
+        TEST_ASSERT_FLOAT_WITHIN(1e-6f, table[n].opens ? 0.8f * table[n].error_k * sd : 0.0f,
+                                 b->covariance);
+        TEST_ASSERT_FLOAT_WITHIN(
             1e-3f, 9.0f + (table[n].opens ? table[n].error_k * table[n].error_k : 0.0f),
-            b->variance_k2, where);
+            b->variance_k2);
         TEST_ASSERT_EQUAL_UINT8(table[n].error_k <= -10.0f ? k : 0, estimator.stepped_spring);
-        TEST_ASSERT_TRUE_MESSAGE(spring_is_sound(&estimator, 0) || k == 0, where);
+        TEST_ASSERT_TRUE(spring_is_sound(&estimator, 0) || k == 0);
     }
 }
 
@@ -249,11 +242,9 @@ TEST(phase_is_told_by_the_best_that_there_is)
                                           .martensite_ohm = table[n].martensite_ohm,
                                           .change = 0.2f};
         const spring_bounds_t is = spring_estimator_austenite(&estimator, &model, 0);
-        TEST_ASSERT_FLOAT_WITHIN_MESSAGE(1e-3f, table[n].value, is.value, where);
-        TEST_ASSERT_FLOAT_WITHIN_MESSAGE(1e-3f, fmaxf(table[n].value - 2.6f * table[n].sd, 0.0f),
-                                         is.low, where);
-        TEST_ASSERT_FLOAT_WITHIN_MESSAGE(1e-3f, fminf(table[n].value + 2.6f * table[n].sd, 1.0f),
-                                         is.high, where);
+        TEST_ASSERT_FLOAT_WITHIN(1e-3f, table[n].value, is.value);
+        TEST_ASSERT_FLOAT_WITHIN(1e-3f, fmaxf(table[n].value - 2.6f * table[n].sd, 0.0f), is.low);
+        TEST_ASSERT_FLOAT_WITHIN(1e-3f, fminf(table[n].value + 2.6f * table[n].sd, 1.0f), is.high);
     }
 }
 
@@ -286,8 +277,8 @@ TEST(all_that_is_compared_with_jumps_along)
         }
         for (size_t n = 0; n < ROWS(both) + owned; n++) {
             row(n);
-            TEST_ASSERT_FLOAT_WITHIN_MESSAGE(
-                1e-5f, 0.22f, *(n < ROWS(both) ? both[n] : own[n - ROWS(both)]), where);
+            TEST_ASSERT_FLOAT_WITHIN(1e-5f, 0.22f,
+                                     *(n < ROWS(both) ? both[n] : own[n - ROWS(both)]));
         }
     }
 }
@@ -346,15 +337,15 @@ TEST(spring_whose_loss_was_seen_is_held_on_whatever_is_declared)
             hold(6.0, 120.0);
             const double before_k = distance_k();
             const double was_c = truth.temperature_c;
-            (void)snprintf(where, sizeof where, "x %.1f, %d: %.1f K", factors[n], often, before_k);
+            here("x %.1f, %d: %.1f K", factors[n], often, before_k);
             const float gave_w = gives_off_w();
             declare(factors[n]);
-            TEST_ASSERT_FLOAT_WITHIN_MESSAGE(0.03f * gave_w, gave_w, gives_off_w(), where);
+            TEST_ASSERT_FLOAT_WITHIN(0.03f * gave_w, gave_w, gives_off_w());
             for (int m = 0; m < 10 * often; m++) {
                 declare(m % 2 == 0 ? 1.0 / factors[n] : factors[n]);
             }
             hold(6.0, 200.0);
-            TEST_ASSERT_TRUE_MESSAGE(fabs(truth.temperature_c - was_c) < 4.0, where);
+            TEST_ASSERT_TRUE(fabs(truth.temperature_c - was_c) < 4.0);
         }
     }
 }

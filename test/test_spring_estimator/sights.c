@@ -30,14 +30,10 @@ bool is_noted(spring_sight_kind_t kind)
 
 static void expect_kinds(const spring_sight_kind_t kinds[], unsigned count)
 {
-    size_t length = 0;
-    for (unsigned i = 0;
-         i < spring_estimator_sights(&estimator)->count && length < sizeof where - 8u; i++) {
-        length += (size_t)snprintf(where + length, sizeof where - length, "%u ", sight_at(i)->kind);
-    }
-    TEST_ASSERT_EQUAL_UINT_MESSAGE(count, spring_estimator_sights(&estimator)->count, where);
+    TEST_ASSERT_EQUAL_UINT(count, spring_estimator_sights(&estimator)->count);
     for (unsigned i = 0; i < count; i++) {
-        TEST_ASSERT_EQUAL_UINT_MESSAGE(kinds[i], sight_at(i)->kind, where);
+        row(i);
+        TEST_ASSERT_EQUAL_UINT(kinds[i], sight_at(i)->kind);
     }
 }
 

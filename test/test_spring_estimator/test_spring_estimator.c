@@ -56,10 +56,10 @@ TEST(it_is_cold_only_after_the_time_that_physics_needs)
             (void)tick(0.0);
             took_s += TICK_S;
         }
-        (void)snprintf(where, sizeof where, "loss x %.2f: said %.0f s, took %.0f s: %.1f degC",
-                       loss, said_s, took_s, truth.temperature_c);
-        TEST_ASSERT_TRUE_MESSAGE(truth.temperature_c < 68.0 && truth.austenite == 0.0, where);
-        TEST_ASSERT_TRUE_MESSAGE(took_s < 100.0 && fabs(said_s - took_s) < 0.25 * took_s, where);
+        here("loss x %.2f: said %.0f s, took %.0f s: %.1f degC", loss, said_s, took_s,
+             truth.temperature_c);
+        TEST_ASSERT_TRUE(truth.temperature_c < 68.0 && truth.austenite == 0.0);
+        TEST_ASSERT_TRUE(took_s < 100.0 && fabs(said_s - took_s) < 0.25 * took_s);
         TEST_ASSERT_EQUAL_FLOAT(0.0f, spring_estimator_cooling_s(&estimator, &model, 0));
     }
 }
@@ -90,18 +90,16 @@ TEST(transformation_is_seen_in_any_spring)
             (void)tick(fmod(s, 2.0) < 1.0 ? 3.0 : table[n].low_a);
             began_at = began_at < 0.0 && INSIDE.onset ? truth.austenite : began_at;
         }
-        (void)snprintf(where, sizeof where, "row %u: onset at %.2f, end at %.3f, %.1f C",
-                       (unsigned)n, began_at, truth.austenite, truth.temperature_c);
-        TEST_ASSERT_TRUE_MESSAGE(began_at > 0.0 && began_at < 0.5, where);
-        TEST_ASSERT_TRUE_MESSAGE(truth.austenite > 0.97 && truth.temperature_c < 115.0, where);
+        here("row %u: onset at %.2f, end at %.3f, %.1f C", (unsigned)n, began_at, truth.austenite,
+             truth.temperature_c);
+        TEST_ASSERT_TRUE(began_at > 0.0 && began_at < 0.5);
+        TEST_ASSERT_TRUE(truth.austenite > 0.97 && truth.temperature_c < 115.0);
         spring_estimator_begin_hold(&estimator, &model, 0, true);
-        TEST_ASSERT_FALSE_MESSAGE(spring_estimator_blind(BELIEF), where);
-        TEST_ASSERT_EQUAL_UINT8_MESSAGE(SPRING_PHASE_AUSTENITE, spring_estimator_possible(BELIEF),
-                                        where);
-        TEST_ASSERT_FLOAT_WITHIN_MESSAGE(0.02f * (float)resistance_ohm(), (float)resistance_ohm(),
-                                         LEARNT.austenite_ohm, where);
-        TEST_ASSERT_FLOAT_WITHIN_MESSAGE(0.04f, (float)(1.0 - 1.0 / table[n].ratio), LEARNT.change,
-                                         where);
+        TEST_ASSERT_FALSE(spring_estimator_blind(BELIEF));
+        TEST_ASSERT_EQUAL_UINT8(SPRING_PHASE_AUSTENITE, spring_estimator_possible(BELIEF));
+        TEST_ASSERT_FLOAT_WITHIN(0.02f * (float)resistance_ohm(), (float)resistance_ohm(),
+                                 LEARNT.austenite_ohm);
+        TEST_ASSERT_FLOAT_WITHIN(0.04f, (float)(1.0 - 1.0 / table[n].ratio), LEARNT.change);
     }
 }
 
@@ -115,9 +113,9 @@ TEST(small_change_is_heated_to_its_end)
             truth.cosine = true;
             truth.ratio = ratio;
             (void)heat_then_hold(60.0);
-            (void)snprintf(where, sizeof where, "ratio %.2f, known %d: %.3f at %.1f C", ratio,
-                           known, truth.austenite, truth.temperature_c);
-            TEST_ASSERT_TRUE_MESSAGE(truth.austenite > 0.95 && truth.temperature_c < 115.0, where);
+            here("ratio %.2f, known %d: %.3f at %.1f C", ratio, known, truth.austenite,
+                 truth.temperature_c);
+            TEST_ASSERT_TRUE(truth.austenite > 0.95 && truth.temperature_c < 115.0);
             begin_cold_as_learnt();
         }
     }
@@ -144,9 +142,9 @@ TEST(step_of_a_contact_ends_no_heating)
              s += TICK_S) {
             (void)tick(3.0);
         }
-        (void)snprintf(where, sizeof where, "%u, step of %.3f at %.0f degC: %.3f at %.1f degC", n,
-                       steps[n % 4], at_c, truth.austenite, truth.temperature_c);
-        TEST_ASSERT_TRUE_MESSAGE(truth.austenite > 0.95 && truth.temperature_c < 120.0, where);
+        here("%u, step of %.3f at %.0f degC: %.3f at %.1f degC", n, steps[n % 4], at_c,
+             truth.austenite, truth.temperature_c);
+        TEST_ASSERT_TRUE(truth.austenite > 0.95 && truth.temperature_c < 120.0);
     }
 }
 
@@ -194,11 +192,10 @@ TEST(spring_is_within_its_bounds)
             }
         }
     }
-    (void)snprintf(where, sizeof where, "of %u: distance %u, temperature %u, phase %u", seen,
-                   distance, temperature, phase);
-    TEST_ASSERT_TRUE_MESSAGE(distance >= 0.99 * seen, where);
-    TEST_ASSERT_TRUE_MESSAGE(temperature >= 0.99 * seen, where);
-    TEST_ASSERT_TRUE_MESSAGE(phase >= 0.99 * seen, where);
+    here("of %u: distance %u, temperature %u, phase %u", seen, distance, temperature, phase);
+    TEST_ASSERT_TRUE(distance >= 0.99 * seen);
+    TEST_ASSERT_TRUE(temperature >= 0.99 * seen);
+    TEST_ASSERT_TRUE(phase >= 0.99 * seen);
 }
 
 /* ---- a hold ---- */
@@ -212,22 +209,20 @@ TEST(crossing_is_seen_and_makes_the_distance_sure)
         (void)heat_then_hold(60.0);
         const float before_k = search(12.0);
         const float after_k = spring_estimator_sd_k(BELIEF);
-        (void)snprintf(where, sizeof where,
-                       "loss x %.2f: lost %.3f of %.3f, sd %.2f -> %.2f, distance %.2f", loss[n],
-                       (double)spring_estimator_lost(BELIEF), 1.0 - truth.austenite,
-                       (double)before_k, (double)after_k, distance_k());
-        TEST_ASSERT_TRUE_MESSAGE(spring_estimator_lost(BELIEF) > 0.0f, where);
-        TEST_ASSERT_TRUE_MESSAGE(distance_k() > -3.0 && distance_k() < 1.0, where);
-        TEST_ASSERT_TRUE_MESSAGE(after_k < before_k && after_k < 2.0f, where);
-        TEST_ASSERT_TRUE_MESSAGE(
-            holds(spring_estimator_distance_k(&estimator, &model, 0), distance_k()), where);
+        here("loss x %.2f: lost %.3f of %.3f, sd %.2f -> %.2f, distance %.2f", loss[n],
+             (double)spring_estimator_lost(BELIEF), 1.0 - truth.austenite, (double)before_k,
+             (double)after_k, distance_k());
+        TEST_ASSERT_TRUE(spring_estimator_lost(BELIEF) > 0.0f);
+        TEST_ASSERT_TRUE(distance_k() > -3.0 && distance_k() < 1.0);
+        TEST_ASSERT_TRUE(after_k < before_k && after_k < 2.0f);
+        TEST_ASSERT_TRUE(holds(spring_estimator_distance_k(&estimator, &model, 0), distance_k()));
         /* and what was learnt of the loss is right within what it says of itself */
         const spring_learnt_t learnt = spring_estimator_learnt(&estimator, 0);
         const double off_w_per_k = (double)learnt.loss_w_per_k - 5.8e-3 * (loss[n] - 1.0);
-        (void)snprintf(where, sizeof where, "loss x %.2f: off by %.6f, sd %.6f", loss[n],
-                       off_w_per_k, (double)learnt.loss_sd_w_per_k);
-        TEST_ASSERT_TRUE_MESSAGE(fabs(off_w_per_k) <= 3.0 * (double)learnt.loss_sd_w_per_k, where);
-        TEST_ASSERT_TRUE_MESSAGE((double)learnt.loss_sd_w_per_k < 0.12 * 5.8e-3, where);
+        here("loss x %.2f: off by %.6f, sd %.6f", loss[n], off_w_per_k,
+             (double)learnt.loss_sd_w_per_k);
+        TEST_ASSERT_TRUE(fabs(off_w_per_k) <= 3.0 * (double)learnt.loss_sd_w_per_k);
+        TEST_ASSERT_TRUE((double)learnt.loss_sd_w_per_k < 0.12 * 5.8e-3);
     }
 }
 
@@ -257,12 +252,11 @@ TEST(nothing_else_is_taken_for_lost_phase)
             truth.contact_ohm += t == 5000 ? table[n].step_ohm : 0.0;
             truth.contact_ohm += table[n].age_ohm_per_s * TICK_S;
             (void)tick(hold_current_a(8.0));
-            (void)snprintf(where, sizeof where, "row %u, %ld: lost %.3f of %.3f at %.1f degC",
-                           (unsigned)n, t, (double)spring_estimator_lost(BELIEF),
-                           1.0 - truth.austenite, truth.temperature_c);
-            TEST_ASSERT_TRUE_MESSAGE(spring_estimator_lost(BELIEF) < ACTED_ON, where);
+            here("row %u, %ld: lost %.3f of %.3f at %.1f degC", (unsigned)n, t,
+                 (double)spring_estimator_lost(BELIEF), 1.0 - truth.austenite, truth.temperature_c);
+            TEST_ASSERT_TRUE(spring_estimator_lost(BELIEF) < ACTED_ON);
         }
-        TEST_ASSERT_TRUE_MESSAGE(truth.austenite > 0.97 && !spring_estimator_blind(BELIEF), where);
+        TEST_ASSERT_TRUE(truth.austenite > 0.97 && !spring_estimator_blind(BELIEF));
     }
 }
 
@@ -281,11 +275,11 @@ TEST(transformation_that_moves_is_noticed)
             truth.shift_k = slow ? fmin(8.0, 8.0 * s) : 8.0;
             (void)tick(hold_current_a(margin_k));
         }
-        (void)snprintf(where, sizeof where, "after %.1f s, lost %.3f of %.3f, shift %.2f", s,
-                       (double)spring_estimator_lost(BELIEF), 1.0 - truth.austenite,
-                       (double)spring_estimator_shift_k(BELIEF));
-        TEST_ASSERT_TRUE_MESSAGE(s < 20.0 && spring_estimator_shift_k(BELIEF) > before_k, where);
-        TEST_ASSERT_EQUAL_UINT16_MESSAGE(0, INSIDE.unsteady, where);
+        here("after %.1f s, lost %.3f of %.3f, shift %.2f", s,
+             (double)spring_estimator_lost(BELIEF), 1.0 - truth.austenite,
+             (double)spring_estimator_shift_k(BELIEF));
+        TEST_ASSERT_TRUE(s < 20.0 && spring_estimator_shift_k(BELIEF) > before_k);
+        TEST_ASSERT_EQUAL_UINT16(0, INSIDE.unsteady);
     }
 }
 
@@ -308,12 +302,11 @@ TEST(loss_that_was_none_stays_in_doubt_and_heats_no_further)
         const double highest_c = truth.temperature_c;
         hold(12.0, 60.0);
         const float hottest_c = spring_now_c(&model, 0) + spring_estimator_doubt_k(BELIEF);
-        (void)snprintf(where, sizeof where, "%.4f ohm: %.1f degC; %.1f to %.1f, true %.1f",
-                       contact_ohm[n], highest_c, (double)spring_now_c(&model, 0),
-                       (double)hottest_c, truth.temperature_c);
-        TEST_ASSERT_TRUE_MESSAGE(highest_c < 122.0, where);
-        TEST_ASSERT_TRUE_MESSAGE((double)hottest_c > truth.temperature_c - 4.0, where);
-        TEST_ASSERT_TRUE_MESSAGE(n == 0 || spring_estimator_blind(BELIEF), where); /* it is said */
+        here("%.4f ohm: %.1f degC; %.1f to %.1f, true %.1f", contact_ohm[n], highest_c,
+             (double)spring_now_c(&model, 0), (double)hottest_c, truth.temperature_c);
+        TEST_ASSERT_TRUE(highest_c < 122.0);
+        TEST_ASSERT_TRUE((double)hottest_c > truth.temperature_c - 4.0);
+        TEST_ASSERT_TRUE(n == 0 || spring_estimator_blind(BELIEF)); /* it is said */
     }
 }
 
@@ -344,8 +337,8 @@ TEST(numbers_that_no_spring_has_are_not_restored)
     for (unsigned n = 0; n < 15; n++) {
         power_comes_on();
         spring_estimator_restore(&estimator, 0, &bad[n]);
-        (void)snprintf(where, sizeof where, "%u", n);
-        TEST_ASSERT_EQUAL_FLOAT_MESSAGE(0.0f, LEARNT.austenite_ohm, where);
+        here("%u", n);
+        TEST_ASSERT_EQUAL_FLOAT(0.0f, LEARNT.austenite_ohm);
     }
     static const float possible_ohm[] = {0.0101f, 0.22f, 15.9f};
     for (unsigned n = 0; n < 3; n++) {
@@ -388,9 +381,9 @@ TEST(restored_spring_is_not_overheated)
                            ? 3.0
                            : 1.5); /* the drive derates from 100 degC on */
         }
-        (void)snprintf(where, sizeof where, "%.3f V, %.3f ohm: %.1f degC", cases[n].offset_v,
-                       cases[n].contact_ohm, truth.temperature_c);
-        TEST_ASSERT_TRUE_MESSAGE(truth.temperature_c < 118.0, where);
+        here("%.3f V, %.3f ohm: %.1f degC", cases[n].offset_v, cases[n].contact_ohm,
+             truth.temperature_c);
+        TEST_ASSERT_TRUE(truth.temperature_c < 118.0);
     }
 }
 
@@ -401,13 +394,12 @@ static void check_is_sound(void)
     const spring_bounds_t c = spring_estimator_temperature_c(&estimator, &model, 0);
     const spring_bounds_t distance = spring_estimator_distance_k(&estimator, &model, 0);
     const spring_bounds_t austenite = spring_estimator_austenite(&estimator, &model, 0);
-    TEST_ASSERT_TRUE_MESSAGE(isfinite(c.low) && isfinite(c.high) && c.low < c.high, where);
-    TEST_ASSERT_TRUE_MESSAGE(isfinite(distance.low) && distance.low < distance.high, where);
-    TEST_ASSERT_TRUE_MESSAGE(austenite.low >= 0.0f && austenite.low <= austenite.value &&
-                                 austenite.value <= austenite.high && austenite.high <= 1.0f,
-                             where);
-    TEST_ASSERT_TRUE_MESSAGE(INSIDE.loss_variance >= 0.0f, where);
-    TEST_ASSERT_TRUE_MESSAGE(isfinite(LEARNT.loss_w_per_k), where);
+    TEST_ASSERT_TRUE(isfinite(c.low) && isfinite(c.high) && c.low < c.high);
+    TEST_ASSERT_TRUE(isfinite(distance.low) && distance.low < distance.high);
+    TEST_ASSERT_TRUE(austenite.low >= 0.0f && austenite.low <= austenite.value &&
+                     austenite.value <= austenite.high && austenite.high <= 1.0f);
+    TEST_ASSERT_TRUE(INSIDE.loss_variance >= 0.0f);
+    TEST_ASSERT_TRUE(isfinite(LEARNT.loss_w_per_k));
     TEST_ASSERT_TRUE(thermal_model_is_consistent(&model));
 }
 
@@ -417,7 +409,7 @@ TEST(bad_readings_leave_a_belief_that_can_be_believed)
     for (unsigned n = 0; n < 4; n++) {
         for (int held = 0; held < 2; held++) {
             begin_cold();
-            (void)snprintf(where, sizeof where, "sensor %u, held %d", n, held);
+            here("sensor %u, held %d", n, held);
             if (held) {
                 (void)heat_then_hold(60.0);
                 ticks(1.4, 60.0);
@@ -430,7 +422,7 @@ TEST(bad_readings_leave_a_belief_that_can_be_believed)
             }
             sensor = SENSOR_GOOD; /* off and cold, it transforms as before */
             ticks(0.0, 400.0);
-            TEST_ASSERT_TRUE_MESSAGE(heat(60.0) < 60.0 && truth.austenite > 0.99, where);
+            TEST_ASSERT_TRUE(heat(60.0) < 60.0 && truth.austenite > 0.99);
         }
     }
 }

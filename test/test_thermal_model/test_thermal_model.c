@@ -2,8 +2,6 @@
 
 #include "driven_model.h"
 
-static char where[40];
-
 /* ---- figures by hand ---------------------------------------------------------------------------
  */
 
@@ -64,17 +62,16 @@ TEST(row_of_springs_comes_to_what_is_computed_by_hand)
         power_uw[0] = table[n].uw[0];
         power_uw[1] = table[n].uw[1];
         run(table[n].steps);
-        (void)snprintf(where, sizeof where, "row %u", (unsigned)n);
+        here("row %u", (unsigned)n);
         for (uint8_t k = 0; k < 3 && table[n].c[k] > 0.0; k++) {
-            TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(0.03, table[n].c[k], degrees(k), where);
+            TEST_ASSERT_DOUBLE_WITHIN(0.03, table[n].c[k], degrees(k));
         }
         if (table[n].air_c > 0.0) {
-            TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(0.03, table[n].air_c,
-                                              thermal_model_air_c7(&model) / 128.0, where);
+            TEST_ASSERT_DOUBLE_WITHIN(0.03, table[n].air_c, thermal_model_air_c7(&model) / 128.0);
         }
         if (table[n].plate_c > 0.0) {
-            TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(0.1, table[n].plate_c,
-                                              thermal_model_plate_c7(&model) / 128.0, where);
+            TEST_ASSERT_DOUBLE_WITHIN(0.1, table[n].plate_c,
+                                      thermal_model_plate_c7(&model) / 128.0);
         }
     }
 }
@@ -159,8 +156,8 @@ TEST(phase_follows_the_cosine_and_its_minor_loops)
                                 thermal_model_transformation(&model, k).austenite_start_c7);
         for (size_t n = 0; n < ROWS(path); n++) {
             thermal_model_set_temperature(&model, k, c7(path[n][0] + shift_k[k]));
-            (void)snprintf(where, sizeof where, "spring %d at %.1f", k + 1, path[n][0]);
-            TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(0.002, path[n][1], phase(k), where);
+            here("spring %d at %.1f", k + 1, path[n][0]);
+            TEST_ASSERT_DOUBLE_WITHIN(0.002, path[n][1], phase(k));
         }
     }
 }
@@ -191,9 +188,9 @@ TEST(resistance_follows_phase_and_temperature)
         parameters.resistance_austenite_rise_ppm_per_k = table[n].rise_ppm[1];
         start();
         thermal_model_set_temperature(&model, 0, c7(table[n].c));
-        (void)snprintf(where, sizeof where, "row %u", (unsigned)n);
-        TEST_ASSERT_UINT32_WITHIN_MESSAGE(20u + table[n].is_uohm / 1000u, table[n].is_uohm,
-                                          thermal_model_resistance_uohm(&model, 0), where);
+        here("row %u", (unsigned)n);
+        TEST_ASSERT_UINT32_WITHIN(20u + table[n].is_uohm / 1000u, table[n].is_uohm,
+                                  thermal_model_resistance_uohm(&model, 0));
     }
     parameters.resistance_austenite_uohm = 219000; /* half of each, at 60 degC */
     parameters.resistance_martensite_rise_ppm_per_k = 1500;
