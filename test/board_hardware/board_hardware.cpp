@@ -264,16 +264,6 @@ TEST(power_that_fails_in_a_write_leaves_a_byte_that_is_neither)
     TEST_ASSERT_TRUE(board_eeprom(mega.board)[5] != 0xFF);
 }
 
-TEST(eeprom_survives_power_off)
-{
-    probe mega;
-    mega.ask({'E', 9, 'k'});
-    mega.ask("W");
-    board_reset(mega.board, BOARD_RESET_POWER_ON);
-    board_run_ms(mega.board, 2.0);
-    expect("6B", mega.ask({'R', 9}));
-}
-
 TEST(eeprom_ready_interrupt_is_a_level)
 {
     probe mega;
@@ -300,22 +290,6 @@ TEST(sleep_is_counted_as_idle_and_costs_its_time)
         static_cast<double>(board_idle_cycles(mega.board) - idle) / CYCLES_PER_MS;
     TEST_ASSERT_DOUBLE_WITHIN(2.0, 102.4, passed_ms);
     TEST_ASSERT_TRUE(slept_ms > 100.0);
-}
-
-TEST(two_boards_do_the_same_to_the_cycle)
-{
-    probe one;
-    probe other;
-    for (probe *mega : {&one, &other}) {
-        mega->pwm(300, true);
-        mega->ask_sensor(0x40, 1);
-        mega->ask({'E', 5, 'x'});
-        mega->ask("W");
-    }
-    TEST_ASSERT_EQUAL_UINT64(one.marks.size(), other.marks.size());
-    for (std::size_t k = 0; k < one.marks.size(); ++k) {
-        TEST_ASSERT_EQUAL_UINT64(one.marks[k].cycle, other.marks[k].cycle);
-    }
 }
 
 TEST(how_it_is_cut_into_runs_changes_nothing)

@@ -43,15 +43,6 @@ void off_until_unlocked(rig &mega)
     TEST_ASSERT_TRUE(board_duty(mega.raw(), 0) > 0.0);
 }
 
-TEST(a_new_board_starts_unlocked_and_off)
-{
-    rig mega;
-    const std::string greeting = mega.boot();
-    TEST_ASSERT_TRUE_MESSAGE(contains(greeting, "ninespring"), greeting.c_str());
-    TEST_ASSERT_FALSE(mega.view().locked);
-    TEST_ASSERT_TRUE(board_all_off(mega.raw()));
-}
-
 /* After a hang, too; what the model knows outlives what does not take the power away. */
 TEST(each_reset_leaves_the_board_off_and_locked_and_keeps_what_it_may)
 {
@@ -87,14 +78,13 @@ TEST(an_interrupt_that_nobody_has_ends_as_a_hang_does)
         rig mega;
         heat(mega);
         const unsigned before = board_reset_count(mega.raw());
-        char message[40];
-        std::snprintf(message, sizeof message, "vector %u", vector);
-        TEST_ASSERT_TRUE_MESSAGE(board_raise_interrupt(mega.raw(), vector), message);
+        here("vector %u", vector);
+        TEST_ASSERT_TRUE(board_raise_interrupt(mega.raw(), vector));
         mega.run_ms(WATCHDOG_MS + 20.0);
-        TEST_ASSERT_EQUAL_UINT_MESSAGE(before + 1, board_reset_count(mega.raw()), message);
+        TEST_ASSERT_EQUAL_UINT(before + 1, board_reset_count(mega.raw()));
         TEST_ASSERT_TRUE(board_all_off(mega.raw()));
         const std::string greeting = mega.boot(false);
-        TEST_ASSERT_TRUE_MESSAGE(contains(greeting, "watchdog"), greeting.c_str());
+        expect_in(greeting, "watchdog");
         off_until_unlocked(mega);
     }
 }
@@ -111,8 +101,7 @@ TEST(whatever_bit_turns_over_the_board_answers_and_nothing_stays_hot)
     mega.boot();
     for (const unsigned address : registers) {
         for (unsigned k = 0; k < 8; ++k) {
-            char message[40];
-            std::snprintf(message, sizeof message, "register 0x%02X, bit %u", address, k);
+            here("register 0x%02X, bit %u", address, k);
             mega.say("unlock");
             mega.say("clear");
             mega.say("policy open"); /* which a reset forgets */
@@ -131,15 +120,14 @@ TEST(whatever_bit_turns_over_the_board_answers_and_nothing_stays_hot)
             }
             const std::uint32_t begins_ms = time_ms(mega);
             if (was_reset) {
-                TEST_ASSERT_TRUE_MESSAGE(mega.view().locked, message);
-                TEST_ASSERT_TRUE_MESSAGE(board_all_off(mega.raw()), message);
+                TEST_ASSERT_TRUE(mega.view().locked);
+                TEST_ASSERT_TRUE(board_all_off(mega.raw()));
                 continue;
             }
             mega.run_ms(170.0);
-            TEST_ASSERT_INT_WITHIN_MESSAGE(21, 200, static_cast<int>(time_ms(mega) - begins_ms),
-                                           message);
+            TEST_ASSERT_INT_WITHIN(21, 200, static_cast<int>(time_ms(mega) - begins_ms));
             for (unsigned spring = 0; spring < BOARD_CHANNELS; ++spring) {
-                TEST_ASSERT_TRUE_MESSAGE(board_current_a(mega.raw(), spring) < 1.0, message);
+                TEST_ASSERT_TRUE(board_current_a(mega.raw(), spring) < 1.0);
             }
         }
     }
@@ -169,7 +157,7 @@ TEST(a_setting_that_turns_over_by_itself_ends_in_a_reset_that_says_so)
         TEST_ASSERT_EQUAL_UINT_MESSAGE(1, board_reset_count(mega.raw()), where.variable);
         TEST_ASSERT_TRUE(board_all_off(mega.raw()));
         const std::string greeting = mega.boot(false) + mega.say("version");
-        TEST_ASSERT_TRUE_MESSAGE(contains(greeting, "memory"), greeting.c_str());
+        expect_in(greeting, "memory");
         TEST_ASSERT_TRUE(mega.view().locked);
         mega.expect_ok("unlock");
         mega.expect_ok("on 5");
@@ -197,10 +185,8 @@ TEST(a_belief_that_turns_over_by_itself_begins_anew_and_says_so)
     TEST_ASSERT_BITS_HIGH(DRIVE_POLICY_LIMIT_COOLING, mega.view().spring[4].limits);
     TEST_ASSERT_EQUAL_UINT16(0, mega.view().spring[4].target_ma);
     TEST_ASSERT_TRUE(mega.view().spring[0].target_ma > 0);
-    const std::string why = mega.say("why 5");
-    TEST_ASSERT_TRUE_MESSAGE(contains(why, "had changed by itself: it begins anew"), why.c_str());
-    const std::string version = mega.say("version");
-    TEST_ASSERT_TRUE_MESSAGE(contains(version, "in what was believed: 1, "), version.c_str());
+    mega.expect_says("why 5", "had changed by itself: it begins anew");
+    mega.expect_says("version", "in what was believed: 1, ");
 }
 
 /* Ticks become due faster than they are done: the board's time is not the world's any more. */
@@ -215,7 +201,7 @@ TEST(a_control_loop_that_cannot_keep_up_ends_in_a_reset_that_says_so)
     }
     TEST_ASSERT_EQUAL_UINT(1, board_reset_count(mega.raw()));
     const std::string greeting = mega.boot(false);
-    TEST_ASSERT_TRUE_MESSAGE(contains(greeting, "overload"), greeting.c_str());
+    expect_in(greeting, "overload");
     off_until_unlocked(mega);
 }
 
@@ -232,7 +218,7 @@ TEST(a_reset_keeps_the_heat_that_was_given_before_anything_was_known)
         board_reset(mega.raw(), cause);
         mega.boot(false);
         const std::string hinted = mega.say("model cold");
-        TEST_ASSERT_TRUE_MESSAGE(contains(hinted, "spring 5 was heated"), hinted.c_str());
+        expect_in(hinted, "spring 5 was heated");
         TEST_ASSERT_FALSE_MESSAGE(contains(hinted, "spring 1 "), hinted.c_str());
     }
     board_reset(mega.raw(), BOARD_RESET_POWER_ON);
@@ -253,24 +239,12 @@ TEST(after_power_on_a_spring_waits_until_it_cannot_be_hot)
     mega.run_ms(5000.0);
     TEST_ASSERT_TRUE(board_all_off(mega.raw()));
     TEST_ASSERT_BITS_HIGH(DRIVE_POLICY_LIMIT_COOLING, mega.view().spring[4].limits);
-    const std::string before = mega.say("model");
-    TEST_ASSERT_TRUE_MESSAGE(contains(before, "  waits "), before.c_str());
+    mega.expect_says("model", "  waits ");
     mega.expect_ok("off all");
     mega.expect_ok("model cold");
     mega.expect_ok("on 5");
     mega.run_ms(2000.0);
     TEST_ASSERT_TRUE_MESSAGE(board_duty(mega.raw(), 4) > 0.0, "it waits though it is cold");
-}
-
-TEST(the_watchdog_is_never_hungry_in_normal_work)
-{
-    rig mega;
-    heat(mega);
-    mega.board.send("$$\n");
-    mega.run_ms(1000.0);
-    mega.expect_ok("$save");
-    mega.run_ms(4000.0);
-    TEST_ASSERT_EQUAL_UINT(0, board_reset_count(mega.raw()));
 }
 
 } // namespace

@@ -34,9 +34,8 @@ double off_after_ms(rig &mega, const std::string &before = "")
 void off_and_stays_off(rig &mega, const std::string &before = "")
 {
     const double ms = off_after_ms(mega, before);
-    char message[80];
-    std::snprintf(message, sizeof message, "off after %.3f ms", ms);
-    TEST_ASSERT_TRUE_MESSAGE(ms <= LIMIT_MS, message);
+    here("off after %.3f ms", ms);
+    TEST_ASSERT_TRUE(ms <= LIMIT_MS);
     for (int k = 0; k < 300; ++k) {
         mega.run_ms(1.0);
         TEST_ASSERT_TRUE_MESSAGE(board_all_off(mega.raw()), "an output came on again");
@@ -158,11 +157,10 @@ std::vector<bit> bits_of_the_outputs()
     return all;
 }
 
-std::string text_of(const bit &one)
+void turn_over(rig &mega, const bit &one)
 {
-    char text[40];
-    std::snprintf(text, sizeof text, "register 0x%03X, bits 0x%02X", one.address, one.mask);
-    return text;
+    here("register 0x%03X, bits 0x%02X", one.address, one.mask);
+    board_flip(mega.raw(), one.address, one.mask);
 }
 
 TEST(stops_whatever_bit_of_an_output_has_turned_over)
@@ -170,16 +168,16 @@ TEST(stops_whatever_bit_of_an_output_has_turned_over)
     rig mega;
     all_on(mega);
     for (const bit &one : bits_of_the_outputs()) {
-        board_flip(mega.raw(), one.address, one.mask);
+        turn_over(mega, one);
         const double ms = off_after_ms(mega);
-        TEST_ASSERT_TRUE_MESSAGE(ms <= LIMIT_MS, text_of(one).c_str());
+        TEST_ASSERT_TRUE(ms <= LIMIT_MS);
         mega.run_ms(2.0 * TICK_MS);
-        TEST_ASSERT_TRUE_MESSAGE(board_all_off(mega.raw()), text_of(one).c_str());
+        TEST_ASSERT_TRUE(board_all_off(mega.raw()));
         mega.expect_ok("clear");
         mega.expect_ok("on all 30");
         mega.run_ms(2.0 * TICK_MS);
         for (unsigned k = 0; k < BOARD_CHANNELS; ++k) {
-            TEST_ASSERT_TRUE_MESSAGE(board_duty(mega.raw(), k) > 0.0, text_of(one).c_str());
+            TEST_ASSERT_TRUE(board_duty(mega.raw(), k) > 0.0);
         }
     }
 }
@@ -189,9 +187,9 @@ TEST(off_is_off_again_within_a_tick_whatever_bit_turns_over)
     rig mega;
     mega.boot();
     for (const bit &one : bits_of_the_outputs()) {
-        board_flip(mega.raw(), one.address, one.mask);
+        turn_over(mega, one);
         mega.run_ms(TICK_MS);
-        TEST_ASSERT_TRUE_MESSAGE(board_all_off(mega.raw()), text_of(one).c_str());
+        TEST_ASSERT_TRUE(board_all_off(mega.raw()));
     }
     mega.run_ms(500.0);
     TEST_ASSERT_EQUAL_UINT8(SAFETY_FAULT_NONE, mega.view().board_fault);
@@ -214,11 +212,10 @@ TEST(a_driven_spring_has_its_current_again_whatever_bit_turns_over)
         if (!port_h_or_timer_4 || (one.mask & 0x29u) == 0) {
             continue; /* some, as each takes its time */
         }
-        board_flip(mega.raw(), one.address, one.mask);
+        turn_over(mega, one);
         mega.run_ms(4200.0); /* readings of it are forgotten, one each 2 s */
         for (unsigned k = 0; k < BOARD_CHANNELS; ++k) {
-            TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(0.2, 0.75, board_current_a(mega.raw(), k),
-                                              text_of(one).c_str());
+            TEST_ASSERT_DOUBLE_WITHIN(0.2, 0.75, board_current_a(mega.raw(), k));
         }
     }
     TEST_ASSERT_EQUAL_UINT8(SAFETY_FAULT_NONE, mega.view().board_fault);

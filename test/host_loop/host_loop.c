@@ -12,8 +12,6 @@ static controller_settings_t settings;
 static plant_t *plant;
 static loop_t *loop;
 
-static const unsigned patterns[] = {0x1EF /* all but the centre */, 0x1FF, 0x010, 0x155, 0x007};
-
 /* The chip's default parameters in the plant: pitch 4 mm, with phase. */
 void setUp(void)
 {
@@ -80,60 +78,6 @@ static safety_fault_t fault(int spring)
     return controller_fault(loop_controller(loop), (uint8_t)spring);
 }
 
-static double mean_current_a(int spring, int ticks)
-{
-    double sum_a = 0.0;
-    for (int n = 0; n < ticks; n++) {
-        loop_tick(loop);
-        sum_a += loop_current_a(loop, spring);
-    }
-    return sum_a / ticks;
-}
-
-/* Ten minutes of each pattern at the given current: mean current within 5 mA, temperatures as the
- * same currents give in the plant alone within plant_c, the chip's estimate within chip_limit_c of
- * what is. */
-static void hold_patterns(uint16_t current_ma, double plant_limit_c, double chip_limit_c)
-{
-    settings.policy.open_current_ma = current_ma;
-    for (size_t p = 0; p < ROWS(patterns); p++) {
-        start_cold();
-        command(patterns[p]);
-        plant_t *alone = plant_copy(plant);
-        TEST_ASSERT_NOT_NULL(alone);
-        for (int k = 0; k < 9; k++) {
-            double current_a = (patterns[p] >> k & 1u) != 0 ? current_ma / 1000.0 : 0.0;
-            TEST_ASSERT_EQUAL(PLANT_OK, plant_drive(alone, k, PLANT_DRIVE_CURRENT, current_a));
-        }
-        double worst_plant_c = 0.0;
-        double worst_chip_c = 0.0;
-        for (int second = 0; second < 600; second += 10) {
-            loop_advance(loop, 10.0);
-            TEST_ASSERT_EQUAL(PLANT_OK, plant_step(alone, 10.0));
-            for (int k = 0; k < 9; k++) {
-                worst_plant_c =
-                    fmax(worst_plant_c, fabs(true_c(k) - plant_temperature_c(alone, k)));
-                worst_chip_c = fmax(worst_chip_c, fabs(chip_c(k) - true_c(k)));
-            }
-        }
-        plant_destroy(alone);
-        TEST_ASSERT_TRUE(worst_plant_c < plant_limit_c);
-        TEST_ASSERT_TRUE(worst_chip_c < chip_limit_c);
-        for (int k = 0; k < 9; k++) {
-            bool on = (patterns[p] >> k & 1u) != 0;
-            TEST_ASSERT_DOUBLE_WITHIN(0.005, on ? current_ma / 1000.0 : 0.0,
-                                      mean_current_a(k, 100));
-            TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, fault(k));
-        }
-    }
-}
-
-/* The ramp of 0.5 s and 12 mA of a duty step are the difference. */
-TEST(plain_current_follows_the_patterns)
-{
-    hold_patterns(1500, 0.6, 0.5);
-}
-
 /* The model alone: what readings correct is test_spring_estimator's. */
 TEST(estimate_follows_through_the_transformation)
 {
@@ -177,15 +121,6 @@ TEST(coarser_plant_steps_change_little)
         }
     }
     loop_destroy(coarse);
-}
-
-TEST(sagging_supply_still_gives_the_current)
-{
-    TEST_ASSERT_EQUAL(PLANT_OK, plant_set_effect(plant, "supply_sag", true));
-    start();
-    command(0x1FF);
-    loop_advance(loop, 10.0);
-    TEST_ASSERT_DOUBLE_WITHIN(0.005, 1.5, mean_current_a(4, 100));
 }
 
 TEST(each_failure_is_found_and_is_of_its_spring)
@@ -355,32 +290,6 @@ TEST(after_a_reset_nothing_runs_until_unlocked)
         command(0x1FF);
         loop_advance(loop, 2.0);
         TEST_ASSERT_DOUBLE_WITHIN(0.03, 1.5, loop_current_a(loop, 4));
-    }
-}
-
-/* At any moment of heating and cooling, the phase half transformed or not. */
-TEST(watchdog_keeps_the_model_as_it_is)
-{
-    settings.policy.open_current_ma = 2000;
-    start();
-    controller_t *controller = loop_controller(loop);
-    controller_set_temperature(controller, 20 * 128); /* a guess would not be kept */
-    for (int n = 0; n < 60; n++) {
-        controller_unlock(controller);
-        command(n % 20 < 14 ? 0x1EF : 0);
-        loop_advance(loop, 5.0);
-        int16_t temperature_c7[9];
-        uint16_t austenite[9];
-        for (uint8_t k = 0; k < 9; k++) {
-            temperature_c7[k] = thermal_model_temperature_c7(&controller->model, k);
-            austenite[k] = thermal_model_austenite(&controller->model, k);
-        }
-        TEST_ASSERT_TRUE(loop_act(loop, LOOP_ACTION_WATCHDOG, -1));
-        for (uint8_t k = 0; k < 9; k++) {
-            TEST_ASSERT_EQUAL_INT16(temperature_c7[k],
-                                    thermal_model_temperature_c7(&controller->model, k));
-            TEST_ASSERT_EQUAL_UINT16(austenite[k], thermal_model_austenite(&controller->model, k));
-        }
     }
 }
 

@@ -45,11 +45,6 @@ static inline void drive(int spring, plant_drive_mode_t mode, double quantity)
 {
     OK(plant_drive(plant, spring, mode, quantity));
 }
-static inline void drive_all(plant_drive_mode_t mode, double quantity)
-{
-    for (int i = 0; i < plant_spring_count(plant); i++)
-        drive(i, mode, quantity);
-}
 static inline void hold(int spring, double t)
 {
     drive(spring, PLANT_DRIVE_TEMPERATURE, t);

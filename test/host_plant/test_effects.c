@@ -54,57 +54,6 @@ TEST(each_effect_changes_what_it_should_and_only_that)
     }
 }
 
-TEST(a_hot_spring_radiates_a_seventh_of_its_loss)
-{
-    uncouple();
-    hold(0, 105.0);
-    settle();
-    const double without = plant_power_w(plant, 0);
-    on("radiation");
-    settle();
-    TEST_ASSERT_DOUBLE_WITHIN(0.002, 0.082, plant_power_w(plant, 0) - without);
-}
-
-TEST(natural_convection_loses_less_where_it_is_cooler_and_leaves_the_fan_alone)
-{
-    uncouple();
-    for (int windy = 0; windy < 2; windy++) {
-        double per_k[2][2];
-        OK(plant_set_fan(plant, windy));
-        for (int k = 0; k < 2; k++) {
-            OK(plant_set_effect(plant, "natural_convection", k));
-            hold(0, 20.0 + get("convection_reference_k"));
-            hold(1, 40.0);
-            settle();
-            per_k[k][0] = plant_power_w(plant, 0) / get("convection_reference_k");
-            per_k[k][1] = plant_power_w(plant, 1) / 20.0;
-        }
-        TEST_ASSERT_DOUBLE_WITHIN(1e-12, per_k[0][0], per_k[1][0]); /* there it holds */
-        TEST_ASSERT_TRUE(windy ? per_k[1][1] == per_k[0][1] : per_k[1][1] < 0.8 * per_k[0][1]);
-    }
-}
-
-TEST(resistance_follows_phase_and_each_phase_its_temperature)
-{
-    on("resistance_phase");
-    const double martensite = get("resistance_martensite_ohm");
-    const double austenite = get("resistance_austenite_ohm");
-    TEST_ASSERT_EQUAL_DOUBLE(martensite, plant_resistance_ohm(plant, 0));
-    hold(0, 93.0); /* half way */
-    TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.5 * (martensite + austenite),
-                              plant_resistance_ohm(plant, 0));
-    on("resistance_temperature");
-    set("resistance_martensite_rise_per_k", 0.0012);
-    set("resistance_austenite_rise_per_k", -0.0003);
-    hold(1, 70.0);
-    hold(2, 120.0);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.5 * (1.0876 * martensite + 0.9781 * austenite),
-                              plant_resistance_ohm(plant, 0));
-    TEST_ASSERT_DOUBLE_WITHIN(1e-12, 1.06 * martensite, plant_resistance_ohm(plant, 1));
-    TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.97 * austenite, plant_resistance_ohm(plant, 2));
-    TEST_ASSERT_EQUAL_DOUBLE(martensite, plant_resistance_ohm(plant, 3));
-}
-
 /* A sensor at the terminals sees the contact; the spring does not feel it. */
 TEST(a_contact_takes_voltage_and_keeps_its_heat)
 {

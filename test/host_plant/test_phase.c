@@ -9,21 +9,6 @@ static void lead(double t)
     OK(plant_step(plant, 0.01));
 }
 
-TEST(outer_loop_is_liang_and_rogers_cosine)
-{
-    const double up[][2] = {
-        {87, 0}, {90.5, 0.5 - 0.35355339}, {93, 0.5}, {95.5, 0.85355339}, {98, 1}, {120, 1}};
-    const double down[][2] = {{98, 1}, {79, 1}, {75.5, 0.85355339}, {73, 0.5}, {68, 0}, {20, 0}};
-    for (int k = 0; k < 6; k++) {
-        lead(up[k][0]);
-        TEST_ASSERT_DOUBLE_WITHIN(1e-7, up[k][1], plant_austenite(plant, 0));
-    }
-    for (int k = 0; k < 6; k++) {
-        lead(down[k][0]);
-        TEST_ASSERT_DOUBLE_WITHIN(1e-7, down[k][1], plant_austenite(plant, 0));
-    }
-}
-
 TEST(minor_loops_by_hand)
 {
     static const double path[][2] = {
@@ -76,21 +61,6 @@ TEST(turning_within_overlapping_bands_does_not_jump)
     TEST_ASSERT_DOUBLE_WITHIN(3e-4, 0.85355339, plant_austenite(plant, 0));
 }
 
-TEST(latent_heat_delays_by_its_energy_and_changes_no_steady_state)
-{
-    uncouple();
-    set("loss_w_per_k", 0.0);
-    on("latent_heat");
-    drive(0, PLANT_DRIVE_POWER, 0.5);
-    /* 20 -> 100 degC: 24 J and 8.65 J at 0.5 W */
-    OK(plant_step(plant, (24.0 + 8.65) / 0.5));
-    TEST_ASSERT_DOUBLE_WITHIN(2e-3, 100.0, at(0));
-    TEST_ASSERT_EQUAL_DOUBLE(1.0, plant_austenite(plant, 0));
-    set("loss_w_per_k", 0.0058);
-    settle();
-    TEST_ASSERT_DOUBLE_WITHIN(1e-4, 20.0 + 0.5 / 0.0058, at(0));
-}
-
 TEST(a_logged_load_moves_them_by_so_much_a_newton)
 {
     on("transformation_shift");
@@ -105,33 +75,6 @@ TEST(a_logged_load_moves_them_by_so_much_a_newton)
     hold(1, 93.0);
     OK(plant_step(plant, 0.01));
     TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.5, plant_austenite(plant, 1));
-}
-
-/* A finger presses on a hot spring: it transforms at once as far as the heat that this sets free
- * lets it. */
-TEST(a_load_on_a_hot_spring_warms_it_by_what_it_gives_back)
-{
-    uncouple();
-    set("loss_w_per_k", 0.0);
-    on("latent_heat");
-    on("transformation_shift");
-    lead(100.0);
-    lead(82.0);
-    drive(0, PLANT_DRIVE_POWER, 0.0);
-    OK(plant_step(plant, 1.0));
-    TEST_ASSERT_EQUAL_DOUBLE(1.0, plant_austenite(plant, 0));
-    set("transformation_shift_k[1]", 10.0); /* martensite starts at 88 */
-    OK(plant_step(plant, 1.0));
-    const double x = plant_austenite(plant, 0), warmer = at(0) - 82.0;
-    TEST_ASSERT_TRUE(x > 0.8 && x < 0.99 && at(0) < 88.0);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-9, get("latent_heat_j") * (1.0 - x),
-                              get("heat_capacity_j_per_k") * warmer);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.5 - 0.5 * cos(PI * (at(0) - 78.0) / 10.0), x);
-    /* the finger leaves: below austenite start nothing comes back */
-    set("transformation_shift_k[1]", 0.0);
-    OK(plant_step(plant, 1.0));
-    TEST_ASSERT_DOUBLE_WITHIN(1e-9, x, plant_austenite(plant, 0));
-    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 82.0 + warmer, at(0));
 }
 
 TEST(a_load_on_a_held_spring_leaves_its_heat_with_whatever_holds_it)

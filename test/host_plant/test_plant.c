@@ -2,69 +2,6 @@
 #include "electrics.h"
 #include "plant_rig.h"
 
-/* Each effect alone, all together, and 4,000 of the other combinations. */
-TEST(energy_closes_whatever_is_on)
-{
-    const size_t effects = plant_effect_count();
-    make_log(PLANT_DRIVE_CURRENT, 2.6, 11);
-    log_mode[1] = PLANT_DRIVE_DUTY;
-    log_mode[2] = PLANT_DRIVE_COMMAND;
-    log_mode[3] = PLANT_DRIVE_TEMPERATURE;
-    log_mode[4] = PLANT_DRIVE_POWER;
-    for (int r = 0; r < LOG_ROWS; r++) {
-        log_drive[r * 9 + 1] *= 0.1;
-        log_drive[r * 9 + 2] *= 0.35;
-        log_drive[r * 9 + 3] = 40.0 + 25.0 * log_drive[r * 9 + 3];
-        log_drive[r * 9 + 4] *= 0.3;
-        log_fan[r] = r < 50 ? 0.0 : 0.7;
-    }
-    set("latent_cooling_ratio", 0.336);
-    set("loss_scale[2]", 1.3);
-    set("resistance_martensite_rise_per_k", 0.001);
-    set("contact_ohm[5]", 0.05);
-    double worst = 0.0;
-    int transformed = 0;
-    for (unsigned n = 0; n < 4000 + effects; n++) {
-        const unsigned mask = n == 0         ? ~0u
-                              : n <= effects ? 1u << (n - 1)
-                                             : (unsigned)(uniform() * 4294967296.0);
-        for (size_t k = 0; k < effects; k++)
-            OK(plant_set_effect_index(plant, k, (mask >> k) & 1u));
-        plant_reset(plant);
-        OK(plant_simulate(plant, 70, log_time, log_mode, log_drive, log_fan, NULL, NULL, NULL));
-        set("transformation_shift_k", 9.0); /* a load in mid-run */
-        OK(plant_simulate(plant, 60, log_time + 70, log_mode, log_drive + 630, log_fan + 70, NULL,
-                          NULL, NULL));
-        worst = fmax(worst, fabs(plant_energy_balance_j(plant)) / plant_energy_input_j(plant));
-        TEST_ASSERT_TRUE(plant_energy_input_j(plant) > 10.0);
-        for (int i = 0; i < 9; i++)
-            transformed += plant_austenite(plant, i) > 0.0;
-        set("transformation_shift_k", 0.0);
-    }
-    TEST_ASSERT_TRUE(transformed > 4000);
-    TEST_ASSERT_TRUE_MESSAGE(worst < 1e-9, "energy balance");
-}
-
-TEST(default_tolerance_is_within_a_hundredth_of_a_degree)
-{
-    for (int kind = 0; kind < 4; kind++) {
-        for (size_t k = 0; k < plant_effect_count(); k++)
-            OK(plant_set_effect_index(plant, k,
-                                      kind == 3 || (kind > 0 && k == 2) || (kind > 1 && k == 3)));
-        make_log(PLANT_DRIVE_CURRENT, 2.4, 17u + (unsigned)kind);
-        set("integration_tolerance_c", 1e-3);
-        run_log(0);
-        set("integration_tolerance_c", 1e-8);
-        run_log(1);
-        double top = 0.0;
-        for (int k = 0; k < LOG_ROWS * 9; k++)
-            top = fmax(top, real[1][k]);
-        TEST_ASSERT_TRUE(top > 100.0); /* the transformation took part */
-        TEST_ASSERT_TRUE(largest_difference(real[0], real[1]) < 0.01);
-        TEST_ASSERT_TRUE(largest_difference(shown[0], shown[1]) < 0.01);
-    }
-}
-
 TEST(tolerance_governs_the_error)
 {
     double error[2];
@@ -372,4 +309,57 @@ TEST(a_copy_shares_nothing)
     OK(plant_step(copy, 50.0));
     TEST_ASSERT_TRUE(plant_temperature_c(copy, 34) > 50.0);
     plant_destroy(copy);
+}
+
+TEST(two_layers_are_one_plant_of_twice_as_many_springs)
+{
+    plant_t *both = plant_create_layers(3, 4, 2);
+    TEST_ASSERT_EQUAL_INT(24, plant_spring_count(both));
+    TEST_ASSERT_EQUAL_INT(3, plant_rows(both));
+    TEST_ASSERT_EQUAL_INT(2, plant_layers(both));
+    OK(plant_set(both, "loss_w_per_k[24]", 0.01));
+    TEST_ASSERT_EQUAL_INT(PLANT_ERROR_INDEX, plant_set(both, "loss_w_per_k[25]", 0.01));
+    plant_destroy(both);
+    TEST_ASSERT_NULL(plant_create_layers(3, 3, 3));
+    TEST_ASSERT_NULL(plant_create_layers(3, 3, 0));
+    TEST_ASSERT_NULL(plant_create_layers(32, 32, 2));
+}
+
+/* Figures of docs/physics.md. */
+TEST(balance_of_design_section_1)
+{
+    /* 1.5 A in austenite, 0.219 ohm, against 5.8 mW/K: 105 degC, time constant 52 s */
+    set("resistance_ohm", 0.219);
+    for (int i = 0; i < 9; i++)
+        drive(i, PLANT_DRIVE_CURRENT, 1.5);
+    settle();
+    TEST_ASSERT_DOUBLE_WITHIN(0.1, 105.0, at(4));
+    /* the fan's 11.3 mW/K at the same current: far from 105 */
+    OK(plant_set_fan(plant, 1.0));
+    settle();
+    TEST_ASSERT_DOUBLE_WITHIN(0.1, 20.0 + 2.25 * 0.219 / 0.0113, at(4));
+    TEST_ASSERT_TRUE(at(4) < 64.0);
+}
+
+TEST(constant_current_from_cold_never_transforms_at_1_5_a_but_runs_past_at_a_little_more)
+{
+    on("latent_heat");
+    on("resistance_phase");
+    drive(0, PLANT_DRIVE_CURRENT, 1.5); /* one corner alone: its neighbours cool it */
+    settle();
+    TEST_ASSERT_DOUBLE_WITHIN(1.0, 75.0, at(0));
+    for (int i = 0; i < 9; i++)
+        if (i != 4)
+            drive(i, PLANT_DRIVE_CURRENT, 1.5);
+    settle();
+    TEST_ASSERT_DOUBLE_WITHIN(1.0, 85.0, at(0));
+    TEST_ASSERT_EQUAL_DOUBLE(0.0, plant_austenite(plant, 0));
+    drive(4, PLANT_DRIVE_CURRENT, 1.5);
+    settle();
+    TEST_ASSERT_DOUBLE_WITHIN(0.1, 87.9, at(0)); /* 0.394 W / 5.8 mW/K, all alike */
+    for (int i = 0; i < 9; i++)
+        drive(i, PLANT_DRIVE_CURRENT, 1.53);
+    settle();
+    TEST_ASSERT_EQUAL_DOUBLE(1.0, plant_austenite(plant, 0));
+    TEST_ASSERT_TRUE(at(0) > 108.0);
 }

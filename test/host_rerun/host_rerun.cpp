@@ -5,7 +5,7 @@
 #include <sstream>
 #include <string>
 
-#include "../run_tests.h"
+#include "../fakes/eeprom.h"
 #include "loop.h"
 #include "rerun.h"
 
@@ -21,20 +21,6 @@ struct plant_deleter {
     void operator()(plant_t *plant) const { plant_destroy(plant); }
 };
 
-std::uint8_t eeprom[SETTINGS_LEARNT_BASE + 2u * SETTINGS_LEARNT_SLOT_BYTES];
-
-std::uint8_t read(void *, std::uint16_t address)
-{
-    return eeprom[address];
-}
-bool ready(void *)
-{
-    return true;
-}
-void write(void *, std::uint16_t address, std::uint8_t value)
-{
-    eeprom[address] = value;
-}
 std::uint16_t room(void *)
 {
     return 60000;
@@ -50,19 +36,19 @@ class recorder
 public:
     explicit recorder(std::uint64_t seed)
     {
-        std::memset(eeprom, 0xFF, sizeof eeprom);
+        std::memset(memory, 0xFF, sizeof memory);
         loop_options_t options;
         loop_options_default(&options);
         options.bus_noise_v = 0.004;
         options.shunt_noise_v = 1e-5;
         status_.version = status_.sensors = status_.reset_cause = "test";
-        status_.loaded = settings_load(&store_, &storage_, &settings_);
+        status_.loaded = settings_load(&store_, &storage, &settings_);
         plant_.reset(plant_create(3, 3));
         TEST_ASSERT_EQUAL(PLANT_OK, plant_set_effect(plant_.get(), "latent_heat", true));
         TEST_ASSERT_EQUAL(PLANT_OK, plant_set_effect(plant_.get(), "resistance_phase", true));
         loop_.reset(loop_create(&settings_.controller, plant_.get(), &options, seed, nullptr));
         TEST_ASSERT_NOT_NULL(loop_.get());
-        (void)learnt_store_open(&learnt_, &storage_, SETTINGS_LEARNT_BASE,
+        (void)learnt_store_open(&learnt_, &storage, SETTINGS_LEARNT_BASE,
                                 SETTINGS_LEARNT_SLOT_BYTES, loop_controller(loop_.get()));
         telemetry_init(&telemetry_);
         console_init(&console_, &output_, loop_controller(loop_.get()), &settings_, &store_,
@@ -124,7 +110,6 @@ public:
     std::string tape;
 
 private:
-    const record_storage_t storage_{nullptr, read, ready, write};
     const text_output_t output_{&tape, room, say};
     settings_t settings_{};
     settings_store_t store_{};

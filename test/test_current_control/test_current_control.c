@@ -275,33 +275,6 @@ TEST(saturation_does_not_wind_up)
     TEST_ASSERT_INT32_WITHIN(30000, 2000000, load.now_ua);
 }
 
-TEST(recovers_from_a_duty_limit_within_ten_ticks)
-{
-    parameters.maximum_duty_steps = 80; /* 0.5 V: 1.35 A at most */
-    TEST_ASSERT_TRUE(current_control_init(&control, &parameters, NULL));
-    for (int n = 0; n < 1000; n++) {
-        TEST_ASSERT_LESS_OR_EQUAL_UINT16(80, tick(3000));
-    }
-    TEST_ASSERT_INT32_WITHIN(10000, 1351000, load.now_ua);
-    for (int n = 0; n < 10; n++) {
-        tick(1000);
-        TEST_ASSERT_LESS_THAN_INT32(1050000, load.now_ua);
-    }
-    TEST_ASSERT_INT32_WITHIN(20000, 1000000, load.now_ua);
-}
-
-TEST(shorted_spring_lowers_the_duty_at_once)
-{
-    mean_ua(1500, 100);
-    load.spring_mohm = 5;
-    tick(1500);
-    TEST_ASSERT_GREATER_THAN_INT32(2500000, load.now_ua); /* the tick in which nobody can know */
-    for (int n = 0; n < 12; n++) {
-        tick(1500);
-    }
-    TEST_ASSERT_LESS_THAN_INT32(1900000, load.now_ua); /* the trim's limit: 220 of 185 mohm */
-}
-
 TEST(blind_channel_holds_then_goes_off_then_returns)
 {
     mean_ua(1500, 100);
@@ -331,15 +304,6 @@ TEST(blind_channel_does_not_start_and_follows_a_fall)
     for (int n = 0; n < 4; n++) { /* by little or by much */
         tick_with(n < 2 ? 810 : 1500, 190, false, true);
         TEST_ASSERT_EQUAL_UINT16(800, current_control_reference_ma(&control, 0));
-    }
-}
-
-TEST(reference_waits_while_it_may_not_rise)
-{
-    mean_ua(600, 30);
-    for (int n = 0; n < 10; n++) {
-        tick_with(n < 5 ? 610 : 1500, 190, true, false);
-        TEST_ASSERT_EQUAL_UINT16(600, current_control_reference_ma(&control, 0));
     }
 }
 

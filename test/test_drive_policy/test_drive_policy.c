@@ -32,46 +32,6 @@ static void want_all(uint16_t permille)
 
 /* ---- from power-on ---- */
 
-TEST(after_power_on_it_waits_says_so_and_then_holds_all_nine)
-{
-    power_on(3, 3);
-    want_all(1000);
-    (void)run(1.0);
-    for (uint8_t k = 0; k < SPRINGS; k++) {
-        TEST_ASSERT_EQUAL_UINT16(0, target_ma[k]);
-        TEST_ASSERT_BITS_HIGH(DRIVE_POLICY_LIMIT_COOLING, drive_policy_limits(&policy, k));
-    }
-    const double highest_c = run(209.0); /* the figure for a first start */
-    for (uint8_t k = 0; k < SPRINGS; k++) {
-        here("spring %d: %.1f degC, %.3f; highest %.1f", k + 1, truth[k].temperature_c,
-             truth[k].austenite, highest_c);
-        TEST_ASSERT_TRUE(truth[k].austenite > 0.95 && highest_c < 115.0);
-        TEST_ASSERT_BITS_LOW(DRIVE_POLICY_LIMIT_COOLING, drive_policy_limits(&policy, k));
-    }
-}
-
-TEST(held_spring_stays_on_near_martensite_start)
-{
-    static const double loss[] = {0.85, 1.0, 1.15};
-    for (unsigned n = 0; n < 3; n++) {
-        set_defaults();
-        loss_w_per_k *= loss[n];
-        begin_cold(3, 3);
-        level[4] = 1000;
-        (void)run(300.0);
-        unsigned away = 0;
-        double sum_c = 0.0;
-        for (unsigned second = 0; second < 600; second++) {
-            (void)run(1.0);
-            away = truth[4].austenite < 0.9 ? away + 1 : 0;
-            sum_c += truth[4].temperature_c;
-            TEST_ASSERT_LESS_OR_EQUAL_UINT(20, away);
-        }
-        here("loss x %.2f: mean %.1f degC", loss[n], sum_c / 600.0);
-        TEST_ASSERT_TRUE(sum_c / 600.0 < 86.0);
-    }
-}
-
 TEST(jump_of_the_current_forgets_no_phase)
 {
     begin_cold(1, 2);
@@ -83,58 +43,6 @@ TEST(jump_of_the_current_forgets_no_phase)
         TEST_ASSERT_EQUAL_UINT8(SPRING_PHASE_AUSTENITE,
                                 spring_estimator_possible(spring_estimator_of(&belief, 0)));
     }
-}
-
-/* A touch, slower than a contact's jump. The largest would need more heat than a spring is allowed:
- * that is said. */
-TEST(spring_that_has_lost_its_phase_is_heated_back_or_that_is_said)
-{
-    for (double touch_k = 4.0; touch_k < 8.5; touch_k += 1.0) {
-        begin_cold(1, 2);
-        level[0] = 1000;
-        (void)run(260.0);
-        double least = 1.0;
-        for (unsigned second = 0; second < 90; second++) {
-            truth[0].shift_k = fmin(touch_k, (double)second);
-            (void)run(1.0);
-            least = fmin(least, truth[0].austenite);
-        }
-        const bool says = (drive_policy_limits(&policy, 0) & DRIVE_POLICY_LIMIT_AWAY) != 0;
-        here("%.0f K: %.3f, %.1f degC, %.3f, says %d", touch_k, least, truth[0].temperature_c,
-             truth[0].austenite, says);
-        TEST_ASSERT_TRUE(least < 0.95); /* it did lose */
-        TEST_ASSERT_TRUE(truth[0].austenite > 0.9 || says);
-    }
-}
-
-/* What is believed of it has changed by itself: as after power-on it waits, whatever it did. */
-TEST(spring_of_which_nothing_is_known_any_more_waits_and_is_heated_anew)
-{
-    for (double at_s = 6.0; at_s < 200.0; at_s += 97.0) { /* heated, held */
-        begin_cold(1, 2);
-        level[0] = 1000;
-        (void)run(at_s);
-        belief_inside(&belief, 0)->slow_ohm *= 2.0f;
-        (void)run(1.0);
-        TEST_ASSERT_EQUAL_UINT8(1, spring_estimator_broken_seals(&belief));
-        TEST_ASSERT_EQUAL_UINT16(0, target_ma[0]);
-        TEST_ASSERT_EQUAL_UINT16(DRIVE_POLICY_LIMIT_COOLING, drive_policy_limits(&policy, 0));
-        const double highest_c = run(209.0);
-        here("%.0f s: %.3f, highest %.1f", at_s, truth[0].austenite, highest_c);
-        TEST_ASSERT_TRUE(truth[0].austenite > 0.95 && highest_c < 115.0);
-        TEST_ASSERT_EQUAL_UINT16(0, drive_policy_limits(&policy, 0));
-    }
-    begin_cold(1, 2);
-}
-
-TEST(resistance_without_a_change_is_driven_by_the_model_and_said)
-{
-    begin_cold(1, 2);
-    truth[0].ratio = 1.0;
-    level[0] = 1000;
-    TEST_ASSERT_TRUE(run(300.0) < 120.0);
-    TEST_ASSERT_TRUE(truth[0].austenite > 0.98);
-    TEST_ASSERT_BITS_HIGH(DRIVE_POLICY_LIMIT_BLIND, drive_policy_limits(&policy, 0));
 }
 
 /* Whichever way it came there, and never fully on: by its own martensite's resistance. */

@@ -7,6 +7,7 @@
 #include "../run_tests.h"
 
 #include "descriptions.h"
+#include "drive_policy.h"
 #include "parameters.h"
 #include "text.h"
 
@@ -57,28 +58,28 @@ TEST(each_value_is_kept_at_its_limits_and_refused_beyond)
 {
     for (uint16_t k = 0; k < PARAMETER_COUNT; k++) {
         const parameter_row_t row = parameter_row(k);
+        here("%s", row.name);
         const parameter_part_t part = (parameter_part_t)row.part;
         const uint8_t last = (uint8_t)(row.count - 1u);
         const int32_t inside[] = {row.minimum, row.maximum, row.standard};
         uint16_t bad = UINT16_MAX;
         take_defaults(row.part);
-        TEST_ASSERT_TRUE_MESSAGE(row.minimum < row.maximum, row.name);
+        TEST_ASSERT_TRUE(row.minimum < row.maximum);
         for (unsigned i = 0; i < 3; i++) {
             parameter_set(&values, &row, last, inside[i]);
-            TEST_ASSERT_EQUAL_INT32_MESSAGE(inside[i], parameter_get(&values, &row, last),
-                                            row.name);
-            TEST_ASSERT_TRUE_MESSAGE(parameter_check(part, &values, &bad), row.name);
+            TEST_ASSERT_EQUAL_INT32(inside[i], parameter_get(&values, &row, last));
+            TEST_ASSERT_TRUE(parameter_check(part, &values, &bad));
         }
         TEST_ASSERT_EQUAL_UINT16(UINT16_MAX, bad);
         if (row.minimum > least_of(row.type)) {
             parameter_set(&values, &row, last, row.minimum - 1);
-            TEST_ASSERT_FALSE_MESSAGE(parameter_check(part, &values, &bad), row.name);
-            TEST_ASSERT_EQUAL_UINT16_MESSAGE(k, bad, row.name);
+            TEST_ASSERT_FALSE(parameter_check(part, &values, &bad));
+            TEST_ASSERT_EQUAL_UINT16(k, bad);
         }
         if (row.maximum < most_of(row.type)) {
             parameter_set(&values, &row, last, row.maximum + 1);
-            TEST_ASSERT_FALSE_MESSAGE(parameter_check(part, &values, &bad), row.name);
-            TEST_ASSERT_EQUAL_UINT16_MESSAGE(k, bad, row.name);
+            TEST_ASSERT_FALSE(parameter_check(part, &values, &bad));
+            TEST_ASSERT_EQUAL_UINT16(k, bad);
             TEST_ASSERT_FALSE(parameter_check(part, &values, NULL));
         }
     }
@@ -95,12 +96,13 @@ TEST(names_and_ids_are_used_once)
 {
     for (uint16_t k = 0; k < PARAMETER_COUNT; k++) {
         const parameter_row_t row = parameter_row(k);
+        here("%s", row.name);
         TEST_ASSERT_NOT_EQUAL(0, row.id);
-        TEST_ASSERT_TRUE_MESSAGE(strlen(row.name) < PARAMETER_NAME_SIZE - 1u, row.name);
+        TEST_ASSERT_TRUE(strlen(row.name) < PARAMETER_NAME_SIZE - 1u);
         for (uint16_t other = 0; other < k; other++) {
             const parameter_row_t earlier = parameter_row(other);
-            TEST_ASSERT_NOT_EQUAL_MESSAGE(earlier.id, row.id, row.name);
-            TEST_ASSERT_TRUE_MESSAGE(strcmp(earlier.name, row.name) != 0, row.name);
+            TEST_ASSERT_NOT_EQUAL(earlier.id, row.id);
+            TEST_ASSERT_TRUE(strcmp(earlier.name, row.name) != 0);
         }
     }
 }
@@ -110,8 +112,9 @@ TEST(a_number_after_a_name_is_always_a_spring)
 {
     for (uint16_t k = 0; k < PARAMETER_COUNT; k++) {
         const char *const name = parameter_row(k).name;
+        here("%s", name);
         const char *const last = strrchr(name, '_');
-        TEST_ASSERT_TRUE_MESSAGE(last == NULL || last[1] < '0' || last[1] > '9', name);
+        TEST_ASSERT_TRUE(last == NULL || last[1] < '0' || last[1] > '9');
     }
 }
 
@@ -199,5 +202,30 @@ TEST(each_effect_has_its_law_in_the_physics_page)
         char row[80];
         (void)snprintf(row, sizeof row, "\n| `%s` | ", effect_row(k)->name);
         TEST_ASSERT_NOT_NULL_MESSAGE(strstr(page, row), row);
+    }
+}
+
+TEST(the_driving_page_has_each_setting_of_the_policy_and_each_limit)
+{
+    static const struct {
+        drive_policy_limit_t bit;
+        const char *name;
+    } limits[] = {
+        {DRIVE_POLICY_LIMIT_SAFETY, "safety"},     {DRIVE_POLICY_LIMIT_CURRENT, "current"},
+        {DRIVE_POLICY_LIMIT_SUPPLY, "supply"},     {DRIVE_POLICY_LIMIT_TEMPERATURE, "temperature"},
+        {DRIVE_POLICY_LIMIT_UNDRIVEN, "undriven"}, {DRIVE_POLICY_LIMIT_OVERLOAD, "overload"},
+        {DRIVE_POLICY_LIMIT_TRIP, "trip"},         {DRIVE_POLICY_LIMIT_BLIND, "blind"}};
+    char wanted[120], number[TEXT_DECIMAL_SIZE];
+    read_page(NINESPRING_SOURCE_DIR "/docs/driving.md");
+    for (uint16_t k = 0; k < PARAMETER_COUNT; k++) {
+        const parameter_row_t row = parameter_row(k);
+        (void)text_format_decimal(row.standard, row.decimals, number);
+        (void)snprintf(wanted, sizeof wanted, "| `%s` |%s%s | %s |", row.name,
+                       row.unit[0] != '\0' ? " " : "", row.unit, number);
+        TEST_ASSERT_TRUE_MESSAGE(row.part != PARAMETER_PART_POLICY || strstr(page, wanted), wanted);
+    }
+    for (size_t k = 0; k < ROWS(limits); k++) {
+        (void)snprintf(wanted, sizeof wanted, "| %u | `%s` |", limits[k].bit, limits[k].name);
+        TEST_ASSERT_NOT_NULL_MESSAGE(strstr(page, wanted), wanted);
     }
 }

@@ -22,14 +22,6 @@ void tearDown(void)
     TEST_ASSERT_EQUAL_UINT8(0, spring_estimator_broken_seals(&estimator));
 }
 
-/* Off until it is cold; the estimator keeps what it has learnt. */
-static void begin_cold_as_learnt(void)
-{
-    const spring_learnt_t learnt = spring_estimator_learnt(&estimator, 0);
-    begin_cold();
-    spring_estimator_restore(&estimator, 0, &learnt);
-}
-
 /* ---- power-on ---- */
 
 TEST(at_power_on_everything_is_possible)
@@ -40,28 +32,6 @@ TEST(at_power_on_everything_is_possible)
     TEST_ASSERT_TRUE(c.low <= 20.0f && c.high >= SPRING_ESTIMATOR_HOTTEST_C);
     const spring_bounds_t austenite = spring_estimator_austenite(&estimator, &model, 0);
     TEST_ASSERT_TRUE(austenite.low == 0.0f && austenite.high == 1.0f);
-}
-
-/* From the hottest that it may be, with its latent heat. */
-TEST(it_is_cold_only_after_the_time_that_physics_needs)
-{
-    for (double loss = 0.85; loss < 1.2; loss += 0.15) {
-        power_comes_on();
-        truth.temperature_c = SPRING_ESTIMATOR_HOTTEST_C;
-        truth.austenite = 1.0;
-        truth.loss_w_per_k *= loss;
-        const double said_s = spring_estimator_cooling_s(&estimator, &model, 0);
-        double took_s = 0.0;
-        while (spring_estimator_possible(BELIEF) != SPRING_PHASE_MARTENSITE && took_s < 300.0) {
-            (void)tick(0.0);
-            took_s += TICK_S;
-        }
-        here("loss x %.2f: said %.0f s, took %.0f s: %.1f degC", loss, said_s, took_s,
-             truth.temperature_c);
-        TEST_ASSERT_TRUE(truth.temperature_c < 68.0 && truth.austenite == 0.0);
-        TEST_ASSERT_TRUE(took_s < 100.0 && fabs(said_s - took_s) < 0.25 * took_s);
-        TEST_ASSERT_EQUAL_FLOAT(0.0f, spring_estimator_cooling_s(&estimator, &model, 0));
-    }
 }
 
 /* ---- a heating ---- */
@@ -100,51 +70,6 @@ TEST(transformation_is_seen_in_any_spring)
         TEST_ASSERT_FLOAT_WITHIN(0.02f * (float)resistance_ohm(), (float)resistance_ohm(),
                                  LEARNT.austenite_ohm);
         TEST_ASSERT_FLOAT_WITHIN(0.04f, (float)(1.0 - 1.0 / table[n].ratio), LEARNT.change);
-    }
-}
-
-/* A change of some percent shows late, and its last is flatter than a coefficient may be: that is
- * waited for, and no more than that; also once it is known. */
-TEST(small_change_is_heated_to_its_end)
-{
-    for (double ratio = 1.06; ratio < 1.3; ratio += 0.01) {
-        begin_cold();
-        for (int known = 0; known < 2; known++) {
-            truth.cosine = true;
-            truth.ratio = ratio;
-            (void)heat_then_hold(60.0);
-            here("ratio %.2f, known %d: %.3f at %.1f C", ratio, known, truth.austenite,
-                 truth.temperature_c);
-            TEST_ASSERT_TRUE(truth.austenite > 0.95 && truth.temperature_c < 115.0);
-            begin_cold_as_learnt();
-        }
-    }
-}
-
-/* Far below its transformation, just below it, in a turn or between two: a contact or a gain that
- * steps is no transformation, nor its end, and what came after it is. */
-TEST(step_of_a_contact_ends_no_heating)
-{
-    static const double steps[] = {-0.06, -0.045, 0.045, 0.07};
-    for (unsigned n = 0; n < 4 * 10 + 4 * 7; n++) { /* once more below 70 degC, as learnt */
-        const double at_c = 35.0 + 5.0 * (n / 4 % 10);
-        begin_cold();
-        if (n >= 40) {
-            (void)heat_then_hold(60.0);
-            begin_cold_as_learnt();
-        }
-        spring_estimator_begin_heating(&estimator, &model, 0);
-        while (truth.temperature_c < at_c) {
-            (void)tick(3.0);
-        }
-        truth.contact_ohm = steps[n % 4] * resistance_ohm();
-        for (double s = 0.0; s < 60.0 && !spring_estimator_has_transformed(&estimator, &model, 0);
-             s += TICK_S) {
-            (void)tick(3.0);
-        }
-        here("%u, step of %.3f at %.0f degC: %.3f at %.1f degC", n, steps[n % 4], at_c,
-             truth.austenite, truth.temperature_c);
-        TEST_ASSERT_TRUE(truth.austenite > 0.95 && truth.temperature_c < 120.0);
     }
 }
 
@@ -283,33 +208,6 @@ TEST(transformation_that_moves_is_noticed)
     }
 }
 
-/* In the hold a contact gets better, as if phase was lost; no heat brings that back, and the
- * heating ends all the same. It may be what it was taken for: it is held as if it was, and may be
- * as hot as if it was not. */
-TEST(loss_that_was_none_stays_in_doubt_and_heats_no_further)
-{
-    static const double contact_ohm[] = {0.0012, 0.012, 0.015};
-    for (unsigned n = 0; n < 3; n++) {
-        begin_cold();
-        truth.contact_ohm = contact_ohm[n];
-        (void)heat_then_hold(60.0);
-        hold(12.0, 60.0);
-        truth.contact_ohm = 0.0;
-        for (double s = 0.0; s < 60.0 && spring_estimator_lost(BELIEF) < ACTED_ON; s += TICK_S) {
-            (void)tick(hold_current_a(12.0));
-        }
-        (void)heat_then_hold(60.0);
-        const double highest_c = truth.temperature_c;
-        hold(12.0, 60.0);
-        const float hottest_c = spring_now_c(&model, 0) + spring_estimator_doubt_k(BELIEF);
-        here("%.4f ohm: %.1f degC; %.1f to %.1f, true %.1f", contact_ohm[n], highest_c,
-             (double)spring_now_c(&model, 0), (double)hottest_c, truth.temperature_c);
-        TEST_ASSERT_TRUE(highest_c < 122.0);
-        TEST_ASSERT_TRUE((double)hottest_c > truth.temperature_c - 4.0);
-        TEST_ASSERT_TRUE(n == 0 || spring_estimator_blind(BELIEF)); /* it is said */
-    }
-}
-
 /* ---- learnt before ---- */
 
 TEST(numbers_that_no_spring_has_are_not_restored)
@@ -353,76 +251,4 @@ TEST(numbers_that_no_spring_has_are_not_restored)
     INSIDE.loss_variance = 1e-8f;
 }
 
-/* Power off in mid-hold: what was learnt holds only beside the sensor's offset, and a spring that
- * reads as austenite cannot have been cold, though a contact is a little better than it was. */
-TEST(restored_spring_is_not_overheated)
-{
-    static const struct {
-        double offset_v, contact_ohm;
-    } cases[] = {{-0.008, 0.0}, {0.0, 0.0}, {0.008, 0.0}, {0.0, 0.003}};
-    for (size_t n = 0; n < ROWS(cases); n++) {
-        begin_cold();
-        truth.offset_v = cases[n].offset_v;
-        truth.contact_ohm = cases[n].contact_ohm;
-        (void)heat_then_hold(60.0);
-        ticks(0.4, 2.0);
-        hold(8.0, 60.0);
-        const spring_learnt_t learnt = spring_estimator_learnt(&estimator, 0);
-        const truth_t before = truth;
-        power_comes_on();
-        truth = before;
-        truth.contact_ohm = 0.0;
-        spring_estimator_restore(&estimator, 0, &learnt);
-        spring_estimator_begin_heating(&estimator, &model, 0);
-        ticks(1.0, 1.5); /* the look */
-        for (double s = 0.0; s < 60.0 && !spring_estimator_has_transformed(&estimator, &model, 0);
-             s += TICK_S) {
-            (void)tick(spring_now_c(&model, 0) < 104.0f
-                           ? 3.0
-                           : 1.5); /* the drive derates from 100 degC on */
-        }
-        here("%.3f V, %.3f ohm: %.1f degC", cases[n].offset_v, cases[n].contact_ohm,
-             truth.temperature_c);
-        TEST_ASSERT_TRUE(truth.temperature_c < 118.0);
-    }
-}
-
 /* ---- readings that are none ---- */
-
-static void check_is_sound(void)
-{
-    const spring_bounds_t c = spring_estimator_temperature_c(&estimator, &model, 0);
-    const spring_bounds_t distance = spring_estimator_distance_k(&estimator, &model, 0);
-    const spring_bounds_t austenite = spring_estimator_austenite(&estimator, &model, 0);
-    TEST_ASSERT_TRUE(isfinite(c.low) && isfinite(c.high) && c.low < c.high);
-    TEST_ASSERT_TRUE(isfinite(distance.low) && distance.low < distance.high);
-    TEST_ASSERT_TRUE(austenite.low >= 0.0f && austenite.low <= austenite.value &&
-                     austenite.value <= austenite.high && austenite.high <= 1.0f);
-    TEST_ASSERT_TRUE(INSIDE.loss_variance >= 0.0f);
-    TEST_ASSERT_TRUE(isfinite(LEARNT.loss_w_per_k));
-    TEST_ASSERT_TRUE(thermal_model_is_consistent(&model));
-}
-
-TEST(bad_readings_leave_a_belief_that_can_be_believed)
-{
-    static const sensor_t bad[] = {SENSOR_SILENT, SENSOR_FROZEN, SENSOR_ZERO, SENSOR_WILD};
-    for (unsigned n = 0; n < 4; n++) {
-        for (int held = 0; held < 2; held++) {
-            begin_cold();
-            here("sensor %u, held %d", n, held);
-            if (held) {
-                (void)heat_then_hold(60.0);
-                ticks(1.4, 60.0);
-            }
-            sensor = bad[n];
-            for (double s = 0.0; s < 600.0; s += TICK_S) {
-                if (tick(held ? 1.4 : 0.0)) {
-                    check_is_sound();
-                }
-            }
-            sensor = SENSOR_GOOD; /* off and cold, it transforms as before */
-            ticks(0.0, 400.0);
-            TEST_ASSERT_TRUE(heat(60.0) < 60.0 && truth.austenite > 0.99);
-        }
-    }
-}

@@ -169,26 +169,6 @@ TEST(transforming_takes_the_latent_heat)
     TEST_ASSERT_DOUBLE_WITHIN(0.02, 0.300 * (world_mean_c(world, 0) - 20.0) + 8.65, supplied_j);
 }
 
-/* docs/physics.md: near 5.8 mW/K holds 105 degC at 0.493 W; by convection's law less per kelvin
- * lower. */
-TEST(loss_is_as_declared_at_105_and_less_per_kelvin_below)
-{
-    single_spring();
-    make_world();
-    double w_per_k[2];
-    const double power_w[2] = {0.0058 * 85.0, 0.20};
-    for (int i = 0; i < 2; i++) {
-        for (int s = 0; s < 900; s++) {
-            hold_power_w(power_w[i]);
-            run_s(1.0);
-        }
-        w_per_k[i] = wire_w(0.0) / (world_mean_c(world, 0) - 20.0);
-    }
-    TEST_ASSERT_DOUBLE_WITHIN(0.00003, 0.0058, w_per_k[0]);
-    /* at about 38 K: convection (38/85)^0.148 of 89 %, radiation 0.8 of 8 % */
-    TEST_ASSERT_DOUBLE_WITHIN(0.0001, 0.00522, w_per_k[1]);
-}
-
 /* Steady, below the transformation (in it the middle's higher resistance would add to this): all
  * thirds make the same heat. An end is colder by what its crimp takes, over what the difference
  * brings it: less loss of its own, and the wire, thrice, for the middle gives to both ends. */
@@ -219,33 +199,6 @@ TEST(a_heated_spring_warms_orthogonal_neighbours_most)
     TEST_ASSERT_TRUE(side_k > 1.2 * corner_k);
     TEST_ASSERT_DOUBLE_WITHIN(1e-9, world_mean_c(world, 1), world_mean_c(world, 7));
     TEST_ASSERT_DOUBLE_WITHIN(1e-9, world_mean_c(world, 0), world_mean_c(world, 8));
-}
-
-static void hold_current_a(int first, int last, double a, double seconds)
-{
-    for (double s = 0.0; s < seconds; s += 1.0) {
-        for (int k = first; k <= last; k++) {
-            double ohm = world_resistance_ohm(world, k) + parameters.loop_ohm;
-            outputs.duty[k] = (uint16_t)lround(a * ohm / parameters.supply_v * 800.0);
-        }
-        run_s(1.0);
-    }
-}
-
-/* docs/physics.md: 1.5 A settles a cold spring alone in the array at 63 to 75 degC. All nine
- * have a current that does not transform them, and with slightly more they run past 104. */
-TEST(constant_current_is_unstable_through_the_transformation)
-{
-    make_world();
-    hold_current_a(4, 4, 1.5, 1800.0);
-    TEST_ASSERT_DOUBLE_WITHIN(6.0, 69.0, world_mean_c(world, 4));
-    TEST_ASSERT_EQUAL_DOUBLE(0.0, world_austenite(world, 4));
-    make_world();
-    hold_current_a(0, 8, 1.42, 1800.0);
-    TEST_ASSERT_TRUE(world_mean_c(world, 4) < 88.0 && world_austenite(world, 4) < 0.05);
-    make_world();
-    hold_current_a(0, 8, 1.5, 1800.0);
-    TEST_ASSERT_TRUE(world_mean_c(world, 4) > 104.0 && world_austenite(world, 4) > 0.99);
 }
 
 /* A tenth of the step changes next to nothing: heating, transforming, cooling, a minor loop. */
