@@ -216,14 +216,6 @@ TEST(a_plain_pin_that_is_high_is_an_output_that_is_on)
     TEST_ASSERT_EQUAL_DOUBLE(0.0, board_duty(mega.board, 1));
 }
 
-TEST(a_reset_switches_the_outputs_off_at_once)
-{
-    probe mega;
-    mega.pwm(399, true);
-    board_reset(mega.board, BOARD_RESET_EXTERNAL);
-    TEST_ASSERT_TRUE(board_all_off(mega.board));
-}
-
 TEST(current_flows_as_the_duty_says_and_the_sensor_shows_it)
 {
     probe mega;
@@ -277,19 +269,6 @@ TEST(analog_input_reads_its_voltage)
     probe mega;
     board_set_analog_v(mega.board, 0, 2.5);
     expect("01FF", mega.ask("a"));
-}
-
-TEST(sleep_is_counted_as_idle_and_costs_its_time)
-{
-    probe mega;
-    const std::uint64_t idle = board_idle_cycles(mega.board);
-    const std::uint64_t begin = board_cycle(mega.board);
-    mega.ask("s", 300.0);
-    const double passed_ms = static_cast<double>(board_cycle(mega.board) - begin) / CYCLES_PER_MS;
-    const double slept_ms =
-        static_cast<double>(board_idle_cycles(mega.board) - idle) / CYCLES_PER_MS;
-    TEST_ASSERT_DOUBLE_WITHIN(2.0, 102.4, passed_ms);
-    TEST_ASSERT_TRUE(slept_ms > 100.0);
 }
 
 TEST(how_it_is_cut_into_runs_changes_nothing)

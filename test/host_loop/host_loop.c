@@ -73,11 +73,6 @@ static double true_c(int spring)
     return plant_temperature_c(loop_plant(loop), spring);
 }
 
-static safety_fault_t fault(int spring)
-{
-    return controller_fault(loop_controller(loop), (uint8_t)spring);
-}
-
 /* The model alone: what readings correct is test_spring_estimator's. */
 TEST(estimate_follows_through_the_transformation)
 {
@@ -121,36 +116,6 @@ TEST(coarser_plant_steps_change_little)
         }
     }
     loop_destroy(coarse);
-}
-
-TEST(each_failure_is_found_and_is_of_its_spring)
-{
-    const struct {
-        loop_action_t action;
-        safety_fault_t fault;
-    } failures[] = {{LOOP_ACTION_OPEN_SPRING, SAFETY_FAULT_OPEN_SPRING},
-                    {LOOP_ACTION_SHORT_SPRING, SAFETY_FAULT_SHORT_SPRING},
-                    {LOOP_ACTION_SENSOR_NACK, SAFETY_FAULT_SENSOR_ABSENT},
-                    {LOOP_ACTION_SENSOR_STALE, SAFETY_FAULT_SENSOR_STALE}};
-    for (size_t f = 0; f < ROWS(failures); f++) {
-        start();
-        command(0x1FF);
-        loop_advance(loop, 5.0);
-        TEST_ASSERT_TRUE(loop_act(loop, failures[f].action, 3));
-        loop_advance(loop, 1.0);
-        TEST_ASSERT_EQUAL(failures[f].fault, fault(3));
-        TEST_ASSERT_TRUE(loop_current_a(loop, 3) == 0.0);
-        TEST_ASSERT_DOUBLE_WITHIN(0.03, 1.5, loop_current_a(loop, 4));
-        TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, fault(4));
-
-        TEST_ASSERT_TRUE(loop_act(loop, LOOP_ACTION_SPRING_GOOD, 3));
-        TEST_ASSERT_TRUE(loop_act(loop, LOOP_ACTION_SENSOR_GOOD, 3));
-        controller_clear_faults(loop_controller(loop));
-        command(0x1FF);
-        loop_advance(loop, 2.0);
-        TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, fault(3));
-        TEST_ASSERT_DOUBLE_WITHIN(0.03, 1.5, loop_current_a(loop, 3));
-    }
 }
 
 TEST(a_repair_ends_its_own_failure_only)

@@ -87,14 +87,6 @@ static bool all_off(void)
     return true;
 }
 
-TEST(nothing_is_driven_without_a_command)
-{
-    for (int n = 0; n < 500; n++) {
-        run(1);
-        TEST_ASSERT_TRUE(all_off());
-    }
-}
-
 TEST(a_driven_spring_gets_its_current_and_only_that_one)
 {
     TEST_ASSERT_TRUE(controller_set_target(&controller, 4, 1000));
