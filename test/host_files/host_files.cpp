@@ -8,18 +8,13 @@
 #include <functional>
 #include <string>
 
-extern "C" {
 #include "../run_tests.h"
-}
 
 #include "log_writer.h"
 #include "scenario_file.h"
 #include "text_file.h"
 
 using namespace ninespring;
-
-extern "C" void setUp(void) {}
-extern "C" void tearDown(void) {}
 
 namespace
 {

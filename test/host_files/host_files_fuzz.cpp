@@ -5,16 +5,11 @@
 #include <string>
 #include <vector>
 
-extern "C" {
 #include "../run_tests.h"
-}
 
 #include "scenario_file.h"
 
 using namespace ninespring;
-
-extern "C" void setUp(void) {}
-extern "C" void tearDown(void) {}
 
 namespace
 {

@@ -88,6 +88,7 @@ TEST(errors_of_distance_and_loss_go_on_by_the_law)
         INSIDE.unsteady = table[n].unsteady ? 9 : 0;
         INSIDE.run.heat = (spring_heat_t){.heat_k = 10.0f, .flat_k = 1.0f};
         INSIDE.disturbance_k = 5.0f;
+        INSIDE.seen = true; /* in the turn before */
         give(table[n].current_a, 0.2);
         const double h = TURN_S / CAPACITY, above_k = in_128ths(table[n].c) - 20.0;
         const double rise_k = in_128ths(table[n].c) - in_128ths(table[n].was_c);
@@ -114,6 +115,7 @@ TEST(errors_of_distance_and_loss_go_on_by_the_law)
                                           (warms ? heat_k - rise_k : 0.0),
              INSIDE.gone_k);
         TEST_ASSERT_FLOAT_WITHIN(1e-4f, 5.0f * 0.9998f, INSIDE.disturbance_k);
+        TEST_ASSERT_FALSE(spring_estimator_has_just_seen(BELIEF));
         TEST_ASSERT_EQUAL_INT16(lround(128.0 * rise_k), spring_estimator_moved_c7(BELIEF));
         if (table[n].heating) { /* one that waits cools by the least loss, one that may lose more */
             NEAR(10.0 + (heat_k < 0.0 ? 0.8 : 1.0) * heat_k, INSIDE.run.heat.heat_k);
@@ -279,7 +281,8 @@ TEST(look_tells_a_phase_and_a_temperature_evenly_over_its_width)
         TEST_ASSERT_FLOAT_WITHIN(
             0.01f, looked ? (float)(table[n].low_c + table[n].high_c) / 2.0f : 75.0f, put_c());
         if (looked) {
-            TEST_ASSERT_TRUE(is_noted(SPRING_SIGHT_LOOKED));
+            TEST_ASSERT_EQUAL_UINT8(SPRING_SIGHT_LOOKED, newest()->kind);
+            TEST_ASSERT_EQUAL(table[n].possible == ANY, newest()->believed_sd == 0);
             const float sd_k = 0.29f * (float)(table[n].high_c - table[n].low_c);
             TEST_ASSERT_FLOAT_WITHIN(0.01f, sd_k * sd_k + 9.0f, INSIDE.variance_k2);
             TEST_ASSERT_FLOAT_WITHIN(0.01f, 9.0f, INSIDE.shift_variance_k2);
@@ -323,6 +326,23 @@ TEST(hottest_possible_cools_by_the_least_loss_with_its_latent_heat)
     }
     thermal_model_set_ambient(&model, 68 * 128); /* as warm as that: nothing to wait for */
     TEST_ASSERT_EQUAL_FLOAT(0.0f, spring_estimator_cooling_s(&estimator, &model, 0));
+}
+
+/* Where it is told that, it is as the model has it. */
+TEST(what_is_told_is_the_models_phase)
+{
+    static const struct {
+        double c;
+        uint8_t then;
+    } table[] = {{20.0, M}, {93.0, B}, {110.0, A}};
+    for (size_t n = 0; n < ROWS(table); n++) {
+        begin_cold();
+        row(n);
+        put(table[n].c);
+        spring_estimator_trust_model(&estimator, &model);
+        TEST_ASSERT_EQUAL_UINT8(table[n].then, INSIDE.possible);
+        TEST_ASSERT_EQUAL(table[n].then == M, INSIDE.told);
+    }
 }
 
 /* ---- what a turn ends with ---- */
@@ -511,8 +531,9 @@ TEST(sight_is_noted_in_tenths_and_hundredths)
         double read, sd;
         int16_t read_then;
         uint8_t sd_then;
-    } table[] = {{1.4e-4, 0.0, 1, 0},      {1.6e-4, 0.2e-4, 2, 1},      {-1.4e-4, 1.4e-4, -1, 1},
-                 {-1.6e-4, 1.6e-4, -2, 2}, {9.0, 254.4e-4, 32767, 254}, {-9.0, 9.0, -32767, 255}};
+    } table[] = {{0.6e-4, 0.0, 1, 0},      {1.4e-4, 0.0, 1, 0},      {1.6e-4, 0.2e-4, 2, 1},
+                 {-1.4e-4, 1.4e-4, -1, 1}, {-1.6e-4, 1.6e-4, -2, 2}, {9.0, 254.4e-4, 32767, 254},
+                 {-9.0, 9.0, -32767, 255}};
     for (size_t n = 0; n < ROWS(table); n++) {
         begin_cold();
         row(n);
@@ -708,6 +729,7 @@ TEST(bounds_are_what_is_known_of_distance_place_and_room)
         INSIDE.shift_k = (float)table[n].shift_k;
         INSIDE.disturbance_k = (float)table[n].disturbance_k;
         INSIDE.gone_k = (float)table[n].gone_k;
+        INSIDE.shift_variance_k2 = 2.0f;
         INSIDE.possible = table[n].possible;
         INSIDE.hottest_c = 97.0f;
         const double distance_k2 = table[n].var_k2 + pow(table[n].capacity_k, 2);
@@ -718,6 +740,11 @@ TEST(bounds_are_what_is_known_of_distance_place_and_room)
         NEAR(c, is.value);
         NEAR(any ? 20.0 - 2.6 * 5.0 : c - most_k, is.low);
         NEAR(any ? 97.0 : c + most_k + fmax(table[n].gone_k, 0.0), is.high);
+        const double place_k2 = table[n].possible == M ? 2.0 : 0.0;
+        const double away_k = 2.6 * sqrt(distance_k2 + place_k2) + table[n].disturbance_k;
+        const spring_bounds_t distance = spring_estimator_distance_k(&estimator, &model, 0);
+        NEAR(in_128ths(table[n].c) - 78.0 - away_k, distance.low);
+        NEAR(in_128ths(table[n].c) - 78.0 + away_k, distance.high);
     }
 }
 

@@ -205,5 +205,8 @@ TEST(change_before_its_turn_hides_no_bit)
     estimator = sound;
     spring_estimator_restart(&estimator, &model);
     TEST_ASSERT_TRUE(INSIDE.learnt.austenite_ohm > 0.0f);
+    turn_over(offsetof(spring_estimator_t, stepped_turns), 3); /* nor of what they share */
+    spring_estimator_trust_model(&estimator, &model);
+    TEST_ASSERT_EQUAL_UINT8(1, estimator.sights.count);
     begin_cold();
 }

@@ -26,7 +26,9 @@ void tearDown(void)
 
 TEST(at_power_on_everything_is_possible)
 {
+    turn_inside(&estimator, 3);
     power_comes_on();
+    TEST_ASSERT_EQUAL_UINT8(SPRING_ESTIMATOR_NO_TURN, spring_estimator_turn(&estimator));
     TEST_ASSERT_EQUAL_UINT8(SPRING_PHASE_ANY, spring_estimator_possible(BELIEF));
     const spring_bounds_t c = spring_estimator_temperature_c(&estimator, &model, 0);
     TEST_ASSERT_TRUE(c.low <= 20.0f && c.high >= SPRING_ESTIMATOR_HOTTEST_C);

@@ -302,6 +302,7 @@ TEST(onset_is_a_change_that_no_coefficient_makes)
             table[n].compares && (table[n].excess == 0.0 || n == 5 || n == 8 || n == 9);
         TEST_ASSERT_EQUAL(table[n].onset, INSIDE.onset);
         TEST_ASSERT_EQUAL(table[n].onset, INSIDE.steep);
+        TEST_ASSERT_EQUAL(table[n].onset, sight()->kind == SPRING_SIGHT_ONSET);
         TEST_ASSERT_FLOAT_WITHIN(3e-5f, (float)table[n].excess_then, INSIDE.run.heat.excess);
         NEAR(table[n].compares ? 10.0 + table[n].step_k : 10.0, INSIDE.run.heat.mark_k);
         NEAR(table[n].compares ? (double)INSIDE.ohm : 0.2, INSIDE.run.heat.mark_ohm);
@@ -358,6 +359,7 @@ TEST(onset_puts_it_at_its_start_and_teaches_its_martensite)
         {85.0, 0.17, 25.0, 12.0, 0, true, 90.0, 0.0, 0.0},
         {85.0, 0.21, 25.0, 12.0, 0, true, 90.0, 0.0, 0.0},
         {85.0, 0.0, 25.0, 12.0, 0, true, 90.0, 0.0, 0.0},
+        {85.0, 0.2005, 90.0, 12.0, 0, true, 90.0, 0.0, 0.0}, /* it has cooled since */
         {80.3, 0.19, 25.0, 12.0, 0, true, 90.0, 0.19 - 5 * 0.01 / 55.3, 0.01 / 55.3 / 0.189096},
         {80.1, 0.19, 25.0, 12.0, 0, false, 0.0, 0.0, 0.0},
     };
@@ -820,6 +822,15 @@ TEST(line_begins_at_rest_or_with_eight_turns)
         TEST_ASSERT_EQUAL(table[n].rough_then, INSIDE.rough);
         TEST_ASSERT_EQUAL_UINT8(0, INSIDE.losing);
     }
+    begin_line_at(0.2502); /* too weak: it reads what its way has led it to */
+    INSIDE.current_a = 0.59f;
+    INSIDE.quiet = 0;
+    INSIDE.run.line.rise_per_k = 0.001f;
+    INSIDE.run.line.way_k = 2.0f;
+    spring_holding_watch(&estimator, &INSIDE, &model, 0, 0.5f, 0.5f);
+    NEAR(0.25 * (1.0 + 0.001 * (double)INSIDE.run.line.way_k), INSIDE.slow_ohm);
+    TEST_ASSERT_EQUAL_FLOAT(INSIDE.run.line.way_k, INSIDE.run.line.slow_k);
+    TEST_ASSERT_TRUE(INSIDE.run.line.slow_k > 1.9f);
 }
 
 /* What is slower than a turn: second differences of averages 4 s apart, at rest. */
