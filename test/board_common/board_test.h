@@ -9,11 +9,12 @@
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
+#include <initializer_list>
 #include <memory>
 #include <string>
 #include <unistd.h>
 
-#include <unity.h>
+#include "../run_tests.h"
 
 #include "board_view.h"
 #include "controller.h"
@@ -31,12 +32,35 @@ inline std::string elf(const char *name = "firmware.elf")
 }
 
 /* Tests of an ELF that was not built are skipped, loudly. */
-inline void need_elf(const std::string &path)
+inline const std::string &need_elf(const std::string &path)
 {
     if (access(path.c_str(), R_OK) != 0) {
         std::printf("SKIPPED: %s is not there: build the avr target first\n", path.c_str());
         std::exit(EXIT_SKIPPED);
     }
+    return path;
+}
+
+inline bool contains(const std::string &text, const std::string &part)
+{
+    return text.find(part) != std::string::npos;
+}
+
+inline void expect_in(const std::string &text, const std::string &part)
+{
+    TEST_ASSERT_TRUE_MESSAGE(contains(text, part), text.c_str());
+}
+
+inline void switch_on(plant_t *plant, const char *effect)
+{
+    TEST_ASSERT_EQUAL_MESSAGE(PLANT_OK, plant_set_effect(plant, effect, true), effect);
+}
+
+/* The springs are of NiTi: they take up latent heat, and their resistance shows their phase. */
+inline void make_niti(plant_t *plant)
+{
+    switch_on(plant, "latent_heat");
+    switch_on(plant, "resistance_phase");
 }
 
 struct plant_deleter {
@@ -48,7 +72,8 @@ class rig
 public:
     explicit rig(const std::string &firmware = elf(), std::uint64_t seed = 1,
                  double shunt_noise_v = 0.0, double bus_noise_v = 0.0)
-        : plant(plant_create(3, 3)), board(firmware, plant.get(), seed, shunt_noise_v, bus_noise_v)
+        : plant(plant_create(3, 3)),
+          board(need_elf(firmware), plant.get(), seed, shunt_noise_v, bus_noise_v)
     {
     }
 
@@ -73,6 +98,16 @@ public:
         return text;
     }
 
+    /* Around the paper's springs, all cold, and then told that. */
+    void boot_niti(std::initializer_list<const char *> lines = {})
+    {
+        make_niti(plant.get());
+        boot();
+        for (const char *line : lines) {
+            expect_ok(line);
+        }
+    }
+
     std::string say(const std::string &line, double limit_ms = 3000.0)
     {
         return board.command(line, limit_ms);
@@ -93,6 +128,20 @@ public:
     {
         const std::string end = answer(line);
         TEST_ASSERT_EQUAL_STRING_MESSAGE("ok", end.c_str(), line.c_str());
+    }
+
+    /* Its answer has that in it. */
+    void expect_says(const std::string &line, const std::string &part)
+    {
+        expect_in(say(line), part);
+    }
+
+    void expect_error(const std::string &line, int number)
+    {
+        const std::string end = answer(line, 20000.0);
+        const std::string wanted = "error:" + std::to_string(number) + " ";
+        TEST_ASSERT_EQUAL_STRING_MESSAGE(wanted.c_str(), end.substr(0, wanted.size()).c_str(),
+                                         line.c_str());
     }
 
     void run_ms(double ms)
@@ -132,18 +181,6 @@ private:
     double ahead_ms_ = 0.0; /* that looks have taken: the next run is shorter by it */
 };
 
-inline void switch_on(plant_t *plant, const char *effect)
-{
-    TEST_ASSERT_EQUAL_MESSAGE(PLANT_OK, plant_set_effect(plant, effect, true), effect);
-}
-
-/* The springs are of NiTi: they take up latent heat, and their resistance shows their phase. */
-inline void make_niti(plant_t *plant)
-{
-    switch_on(plant, "latent_heat");
-    switch_on(plant, "resistance_phase");
-}
-
 inline double hottest_c(const rig &mega)
 {
     double highest = -300.0;
@@ -157,11 +194,6 @@ inline double hottest_c(const rig &mega)
 inline double phase(const rig &mega, unsigned spring)
 {
     return plant_austenite(mega.plant.get(), static_cast<int>(spring));
-}
-
-inline bool contains(const std::string &text, const std::string &part)
-{
-    return text.find(part) != std::string::npos;
 }
 
 } // namespace board_test

@@ -1,9 +1,6 @@
 /* What the console needs the board for: its clock, its load, its rates, its EEPROM, its springs;
  * words and refusals are in test/test_console. */
-#include <algorithm>
 #include <cstring>
-#include <fstream>
-#include <set>
 #include <sstream>
 #include <vector>
 
@@ -14,40 +11,6 @@ using namespace board_test;
 
 namespace
 {
-
-/* The number of `error:N text`, 0 for `ok`, -1 for anything else. */
-int code_of(const std::string &line)
-{
-    if (line == "ok") {
-        return 0;
-    }
-    return line.rfind("error:", 0) == 0 ? std::atoi(line.c_str() + 6) : -1;
-}
-
-/* Every answer ends with exactly one ok or error. */
-int code(rig &mega, const std::string &line)
-{
-    const std::string text = mega.say(line, 10000.0);
-    std::istringstream stream(text);
-    int ends = 0;
-    int last = -1;
-    for (std::string one; std::getline(stream, one);) {
-        one.erase(std::remove(one.begin(), one.end(), '\r'), one.end());
-        last = code_of(one);
-        ends += last >= 0 ? 1 : 0;
-    }
-    TEST_ASSERT_EQUAL_INT_MESSAGE(1, ends, (line + " -> " + text).c_str());
-    TEST_ASSERT_TRUE_MESSAGE(last >= 0, (line + " -> " + text).c_str());
-    mega.run_ms(50.0);
-    const std::string after = mega.board.take_output();
-    TEST_ASSERT_EQUAL_STRING_MESSAGE("", after.c_str(), line.c_str());
-    return last;
-}
-
-void expect_code(rig &mega, console_error_t wanted, const std::string &line)
-{
-    TEST_ASSERT_EQUAL_INT_MESSAGE(wanted, code(mega, line), line.c_str());
-}
 
 std::unique_ptr<rig> booted()
 {
@@ -85,7 +48,7 @@ std::vector<double> times_in(const std::string &text, char begin, char end)
     return times;
 }
 
-void time_goes_on_for_years()
+TEST(time_goes_on_for_years)
 {
     for (const double turn_ms : {2147483648.0, 4294967296.0}) {
         for (const bool csv : {true, false}) {
@@ -115,17 +78,16 @@ void time_goes_on_for_years()
     }
 }
 
-void selftest_passes_on_a_whole_board_and_leaves_it_off()
+TEST(selftest_passes_on_a_whole_board_and_leaves_it_off)
 {
     auto mega = booted();
-    const std::string text = mega->say("selftest", 20000.0);
-    TEST_ASSERT_TRUE_MESSAGE(contains(text, "ok\r\n"), text.c_str());
+    expect_in(mega->say("selftest", 20000.0), "ok\r\n");
     mega->run_ms(100.0);
     TEST_ASSERT_TRUE(board_all_off(mega->raw()));
 }
 
 /* The chip counts its sleep with a timer whose interrupt also wakes it. */
-void load_is_what_it_did_not_sleep()
+TEST(load_is_what_it_did_not_sleep)
 {
     auto mega = booted();
     mega->run_ms(1500.0);
@@ -167,24 +129,14 @@ std::string version_under(const std::string &format)
     return mega->say("version");
 }
 
-void telemetry_at_its_fastest_leaves_the_console_usable()
+TEST(telemetry_at_its_fastest_leaves_the_console_usable)
 {
     for (const char *const format : {"csv", "teleplot"}) {
-        const std::string text = version_under(format);
-        TEST_ASSERT_TRUE_MESSAGE(contains(text, "ticks late 0,"), text.c_str());
+        expect_in(version_under(format), "ticks late 0,");
     }
 }
 
-/* Sends and waits until the board is silent; gives what came. */
-std::string pour(rig &mega, const std::string &bytes, double ms)
-{
-    mega.board.take_output();
-    mega.board.send(bytes);
-    mega.run_ms(ms);
-    return mega.board.take_output();
-}
-
-void bytes_that_found_no_room_are_reported()
+TEST(bytes_that_found_no_room_are_reported)
 {
     auto mega = booted();
     /* while the long answer goes out nobody takes lines in */
@@ -192,52 +144,37 @@ void bytes_that_found_no_room_are_reported()
     for (int k = 0; k < 60; ++k) {
         flood += "on 1\noff 1\n";
     }
-    const std::string text = pour(*mega, flood, 3000.0);
-    TEST_ASSERT_TRUE_MESSAGE(contains(text, "error:13 "), text.c_str());
-    pour(*mega, "\n", 500.0); /* ends what is left of the last line */
+    mega->board.send(flood);
+    mega->run_ms(3000.0);
+    expect_in(mega->board.take_output(), "error:13 ");
+    mega->board.send("\n"); /* ends what is left of the last line */
+    mega->run_ms(500.0);
+    mega->board.take_output();
     mega->expect_ok("version");
 }
 
-void an_eeprom_that_keeps_nothing_fails_the_save()
+TEST(an_eeprom_that_keeps_nothing_fails_the_save)
 {
     auto mega = booted();
     mega->expect_ok("$loss_w_per_k=0.006543");
     board_set_fault(mega->raw(), BOARD_FAULT_EEPROM, 0, true);
-    expect_code(*mega, CONSOLE_ERROR_SAVE_FAILED, "$save");
+    mega->expect_error("$save", CONSOLE_ERROR_SAVE_FAILED);
 }
 
-void selftest_wants_everything_off_and_finds_what_is_beyond_its_limits()
+TEST(selftest_wants_everything_off_and_finds_what_is_beyond_its_limits)
 {
     auto mega = booted();
     mega->expect_ok("on 3");
-    expect_code(*mega, CONSOLE_ERROR_SPRINGS_ON, "selftest");
+    mega->expect_error("selftest", CONSOLE_ERROR_SPRINGS_ON);
     mega->expect_ok("off 3");
     board_set_fault(mega->raw(), BOARD_FAULT_OPEN, 6, true);
     const std::string text = mega->say("selftest", 20000.0);
-    TEST_ASSERT_TRUE_MESSAGE(contains(text, "error:17 "), text.c_str());
-    TEST_ASSERT_TRUE_MESSAGE(contains(text, "spring 7"), text.c_str());
+    expect_in(text, "error:17 ");
+    expect_in(text, "spring 7");
     mega->expect_ok("$resistance_minimum_ohm=0.3");
     const std::string limits = mega->say("selftest", 20000.0);
-    TEST_ASSERT_TRUE_MESSAGE(contains(limits, "error:17 "), limits.c_str());
-    TEST_ASSERT_TRUE_MESSAGE(contains(limits, "spring 1: sensor ok, fault 3 short_spring"),
-                             limits.c_str());
+    expect_in(limits, "error:17 ");
+    expect_in(limits, "spring 1: sensor ok, fault 3 short_spring");
 }
 
 } // namespace
-
-void setUp() {}
-void tearDown() {}
-
-int main()
-{
-    need_elf(elf());
-    UNITY_BEGIN();
-    RUN_TEST(selftest_passes_on_a_whole_board_and_leaves_it_off);
-    RUN_TEST(load_is_what_it_did_not_sleep);
-    RUN_TEST(telemetry_at_its_fastest_leaves_the_console_usable);
-    RUN_TEST(time_goes_on_for_years);
-    RUN_TEST(bytes_that_found_no_room_are_reported);
-    RUN_TEST(an_eeprom_that_keeps_nothing_fails_the_save);
-    RUN_TEST(selftest_wants_everything_off_and_finds_what_is_beyond_its_limits);
-    return UNITY_END();
-}

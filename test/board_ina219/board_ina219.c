@@ -1,7 +1,7 @@
 /* The sensor's registers against its data sheet (TI SBOS448G): no simulator, no firmware. */
 #include "ina219.h"
 
-#include <unity.h>
+#include "../run_tests.h"
 
 #define US                INA219_CYCLES_PER_US
 #define CONFIG_8_SAMPLES  0x1DDFu /* 16 V, gain /8, 8 samples each, continuous */
@@ -59,9 +59,7 @@ void setUp(void)
     ina219_power_on(&sensor, &inputs);
 }
 
-void tearDown(void) {}
-
-static void power_on_values_are_the_data_sheets(void)
+TEST(power_on_values_are_the_data_sheets)
 {
     TEST_ASSERT_EQUAL_HEX16(0x399F, read_register(INA219_REGISTER_CONFIG));
     TEST_ASSERT_EQUAL_HEX16(0, read_register(INA219_REGISTER_CALIBRATION));
@@ -70,7 +68,7 @@ static void power_on_values_are_the_data_sheets(void)
 }
 
 /* 10 uV and 4 mV, two's complement, ends by gain and range; with fewer bits coarser. */
-static void results_are_in_the_data_sheets_steps_and_end_where_it_says(void)
+TEST(results_are_in_the_data_sheets_steps_and_end_where_it_says)
 {
     static const struct {
         uint16_t config;
@@ -83,7 +81,7 @@ static void results_are_in_the_data_sheets_steps_and_end_where_it_says(void)
         {0x219F, 1.0, 30.0, 4000, 7500},  /* 32 V, /1 */
         {0x1807, 0.00013, 0.0, 16, 0},    /* 9 bit */
     };
-    for (size_t n = 0; n < sizeof table / sizeof table[0]; n++) {
+    for (size_t n = 0; n < ROWS(table); n++) {
         setUp();
         pass_us(2 * 532);
         TEST_ASSERT_TRUE(ready());
@@ -97,7 +95,7 @@ static void results_are_in_the_data_sheets_steps_and_end_where_it_says(void)
     }
 }
 
-static void a_result_is_ready_at_its_true_time_and_not_before(void)
+TEST(a_result_is_ready_at_its_true_time_and_not_before)
 {
     write_register(INA219_REGISTER_CONFIG, CONFIG_8_SAMPLES);
     pass_us(PAIR_8_SAMPLES_US - 1);
@@ -106,7 +104,7 @@ static void a_result_is_ready_at_its_true_time_and_not_before(void)
     TEST_ASSERT_TRUE(ready());
 }
 
-static void reading_the_power_register_clears_ready_and_reading_the_bus_does_not(void)
+TEST(reading_the_power_register_clears_ready_and_reading_the_bus_does_not)
 {
     pass_us(2 * 532);
     TEST_ASSERT_TRUE(ready());
@@ -117,7 +115,7 @@ static void reading_the_power_register_clears_ready_and_reading_the_bus_does_not
     TEST_ASSERT_TRUE(ready());
 }
 
-static void a_result_is_the_mean_over_its_own_window(void)
+TEST(a_result_is_the_mean_over_its_own_window)
 {
     write_register(INA219_REGISTER_CONFIG, CONFIG_8_SAMPLES);
     shunt_v = 0.1;
@@ -132,7 +130,7 @@ static void a_result_is_the_mean_over_its_own_window(void)
     TEST_ASSERT_EQUAL_UINT16(250, read_register(INA219_REGISTER_BUS) >> 3);
 }
 
-static void conversion_times_are_the_data_sheets(void)
+TEST(conversion_times_are_the_data_sheets)
 {
     static const uint32_t expected_us[16] = {84,  148,  276,  532,  84,   148,   276,   532,
                                              532, 1060, 2130, 4260, 8510, 17020, 34050, 68100};
@@ -141,7 +139,7 @@ static void conversion_times_are_the_data_sheets(void)
     }
 }
 
-static void triggered_mode_converts_once(void)
+TEST(triggered_mode_converts_once)
 {
     write_register(INA219_REGISTER_CONFIG, CONFIG_TRIGGERED);
     bus_v = 1.0;
@@ -153,7 +151,7 @@ static void triggered_mode_converts_once(void)
     TEST_ASSERT_EQUAL_UINT64(INA219_NEVER, sensor.conversion_end_cycle);
 }
 
-static void current_and_power_need_a_calibration(void)
+TEST(current_and_power_need_a_calibration)
 {
     shunt_v = 0.15;
     bus_v = 0.32;
@@ -165,7 +163,7 @@ static void current_and_power_need_a_calibration(void)
     TEST_ASSERT_EQUAL_UINT16(15000u * 80u / 5000u, read_register(INA219_REGISTER_POWER));
 }
 
-static void an_impossible_calibration_sets_overflow(void)
+TEST(an_impossible_calibration_sets_overflow)
 {
     shunt_v = 0.3;
     bus_v = 4.0;
@@ -175,7 +173,7 @@ static void an_impossible_calibration_sets_overflow(void)
     TEST_ASSERT_EQUAL_UINT16(1, read_register(INA219_REGISTER_BUS) & 1u);
 }
 
-static void reset_bit_restores_the_power_on_values(void)
+TEST(reset_bit_restores_the_power_on_values)
 {
     write_register(INA219_REGISTER_CALIBRATION, 4096);
     write_register(INA219_REGISTER_CONFIG, 0x8000u | CONFIG_8_SAMPLES);
@@ -183,7 +181,7 @@ static void reset_bit_restores_the_power_on_values(void)
     TEST_ASSERT_EQUAL_HEX16(0, read_register(INA219_REGISTER_CALIBRATION));
 }
 
-static void a_stale_sensor_shows_old_values_and_is_never_ready(void)
+TEST(a_stale_sensor_shows_old_values_and_is_never_ready)
 {
     bus_v = 1.0;
     pass_us(2 * 532);
@@ -195,7 +193,7 @@ static void a_stale_sensor_shows_old_values_and_is_never_ready(void)
     TEST_ASSERT_EQUAL_UINT16(250, read_register(INA219_REGISTER_BUS) >> 3);
 }
 
-static void a_frozen_sensor_is_ready_again_and_again_with_the_same_result(void)
+TEST(a_frozen_sensor_is_ready_again_and_again_with_the_same_result)
 {
     bus_v = 1.0;
     pass_us(2 * 532);
@@ -213,7 +211,7 @@ static void a_frozen_sensor_is_ready_again_and_again_with_the_same_result(void)
     TEST_ASSERT_EQUAL_UINT16(500, read_register(INA219_REGISTER_BUS) >> 3);
 }
 
-static void a_gain_error_scales_what_is_shown(void)
+TEST(a_gain_error_scales_what_is_shown)
 {
     bus_v = 1.0;
     sensor.bus_gain_error = -0.2;
@@ -221,37 +219,16 @@ static void a_gain_error_scales_what_is_shown(void)
     TEST_ASSERT_EQUAL_UINT16(200, read_register(INA219_REGISTER_BUS) >> 3);
 }
 
-static void an_absent_sensor_acknowledges_nothing(void)
+TEST(an_absent_sensor_acknowledges_nothing)
 {
     sensor.absent = true;
     TEST_ASSERT_FALSE(ina219_begin(&sensor, false));
 }
 
-static void the_pointer_stays_for_the_next_read(void)
+TEST(the_pointer_stays_for_the_next_read)
 {
     write_register(INA219_REGISTER_CALIBRATION, 4096);
     TEST_ASSERT_TRUE(ina219_begin(&sensor, true));
     unsigned high = ina219_read(&sensor);
     TEST_ASSERT_EQUAL_HEX16(4096, high << 8 | ina219_read(&sensor));
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(power_on_values_are_the_data_sheets);
-    RUN_TEST(results_are_in_the_data_sheets_steps_and_end_where_it_says);
-    RUN_TEST(a_result_is_ready_at_its_true_time_and_not_before);
-    RUN_TEST(reading_the_power_register_clears_ready_and_reading_the_bus_does_not);
-    RUN_TEST(a_result_is_the_mean_over_its_own_window);
-    RUN_TEST(conversion_times_are_the_data_sheets);
-    RUN_TEST(triggered_mode_converts_once);
-    RUN_TEST(current_and_power_need_a_calibration);
-    RUN_TEST(an_impossible_calibration_sets_overflow);
-    RUN_TEST(reset_bit_restores_the_power_on_values);
-    RUN_TEST(a_stale_sensor_shows_old_values_and_is_never_ready);
-    RUN_TEST(a_frozen_sensor_is_ready_again_and_again_with_the_same_result);
-    RUN_TEST(a_gain_error_scales_what_is_shown);
-    RUN_TEST(an_absent_sensor_acknowledges_nothing);
-    RUN_TEST(the_pointer_stays_for_the_next_read);
-    return UNITY_END();
 }

@@ -1,7 +1,6 @@
 /* From power-on to eight springs held, with the README's words and nothing else: nobody tells the
  * board anything of its springs. */
 #include <algorithm>
-#include <vector>
 
 #include "board_test.h"
 
@@ -75,15 +74,14 @@ std::unique_ptr<rig> new_board(const std::uint8_t *eeprom = nullptr)
     return mega;
 }
 
-void the_readmes_words_bring_eight_springs_up_and_hold_them()
+TEST(the_readmes_words_bring_eight_springs_up_and_hold_them)
 {
     const auto mega = new_board();
     type_what_the_readme_says(*mega);
     mega->run_ms(2000.0);
     const std::string waits = mega->say("model");
-    TEST_ASSERT_TRUE_MESSAGE(contains(waits, ", limits cooling\r\n  waits "), waits.c_str());
-    TEST_ASSERT_TRUE_MESSAGE(contains(waits, " s: it may still be hot from before power-on"),
-                             waits.c_str());
+    expect_in(waits, ", limits cooling\r\n  waits ");
+    expect_in(waits, " s: it may still be hot from before power-on");
     expect_on_within(*mega, FIRST_START_S);
 
     for (unsigned s = 0; s < HELD_S; ++s) {
@@ -93,10 +91,10 @@ void the_readmes_words_bring_eight_springs_up_and_hold_them()
     expect_no_fault(*mega);
     const std::string model = mega->say("model");
     TEST_ASSERT_FALSE_MESSAGE(contains(model, "waits"), model.c_str());
-    TEST_ASSERT_TRUE_MESSAGE(contains(model, " K above martensite start (+-"), model.c_str());
-    TEST_ASSERT_TRUE_MESSAGE(contains(model, ", hold\r\n"), model.c_str());
+    expect_in(model, " K above martensite start (+-");
+    expect_in(model, ", hold\r\n");
     const std::string learnt = mega->say("learnt");
-    TEST_ASSERT_TRUE_MESSAGE(contains(learnt, "spring 5: nothing yet\r\n"), learnt.c_str());
+    expect_in(learnt, "spring 5: nothing yet\r\n");
     std::printf("%s", learnt.c_str());
 
     /* the same board a day later: of what it had only the EEPROM is left */
@@ -106,55 +104,7 @@ void the_readmes_words_bring_eight_springs_up_and_hold_them()
     expect_no_fault(*later);
 }
 
-/* What is typed, and for how many seconds nothing is typed after it. */
-struct typed {
-    const char *line;
-    unsigned then_s;
-};
-
-/* The hottest that a spring becomes. */
-double hottest_of(const std::vector<typed> &order)
-{
-    const auto mega = new_board();
-    double hottest_c = -273.0;
-    for (const typed &one : order) {
-        const std::string said = mega->say(one.line);
-        for (unsigned s = 0; s < one.then_s; ++s) {
-            mega->run_ms(1000.0);
-            for (unsigned k = 0; k < SPRINGS; ++k) {
-                hottest_c = std::max(hottest_c,
-                                     plant_temperature_c(mega->plant.get(), static_cast<int>(k)));
-            }
-        }
-        std::printf("  %s -> %s", one.line, said.c_str());
-    }
-    expect_no_fault(*mega);
-    std::printf("hottest: %.1f degC\n", hottest_c);
-    return hottest_c;
-}
-
-void any_order_of_the_readmes_words_is_safe()
-{
-    constexpr double limit_c = 110.0;
-    const std::vector<std::vector<typed>> orders = {
-        {{"pattern 111101111", 2}, {"model", 30}, {"policy precompensate", 90}},
-        {{"model cold", 1},
-         {"pattern 111101111", 60},
-         {"off all", 1},
-         {"model cold", 1},
-         {"pattern 111101111", 50}},
-        {{"policy open", 1},
-         {"pattern 111101111", 40},
-         {"off all", 1},
-         {"policy precompensate", 1},
-         {"model cold", 1},
-         {"pattern 111111111", 60}}};
-    for (const std::vector<typed> &order : orders) {
-        TEST_ASSERT_TRUE(hottest_of(order) < limit_c);
-    }
-}
-
-void a_host_that_leaves_takes_its_springs_with_it()
+TEST(a_host_that_leaves_takes_its_springs_with_it)
 {
     const auto mega = new_board();
     mega->expect_ok("$host_timeout_s=2");
@@ -166,22 +116,9 @@ void a_host_that_leaves_takes_its_springs_with_it()
     TEST_ASSERT_TRUE_MESSAGE(board_duty(mega->raw(), 0) > 0.0, "a ? was not taken for a host");
     mega->run_ms(200.0);
     TEST_ASSERT_TRUE(board_all_off(mega->raw()));
-    TEST_ASSERT_TRUE(contains(mega->say("faults"), "board: fault 16 host_silent"));
+    mega->expect_says("faults", "board: fault 16 host_silent");
     mega->expect_ok("clear");
     mega->expect_ok("on 1");
 }
 
 } // namespace
-
-void setUp() {}
-void tearDown() {}
-
-int main()
-{
-    need_elf(elf());
-    UNITY_BEGIN();
-    RUN_TEST(the_readmes_words_bring_eight_springs_up_and_hold_them);
-    RUN_TEST(any_order_of_the_readmes_words_is_safe);
-    RUN_TEST(a_host_that_leaves_takes_its_springs_with_it);
-    return UNITY_END();
-}

@@ -51,7 +51,7 @@ void play(rerun &again, const std::string &tape)
     }
 }
 
-void the_flashed_elf_believes_what_this_machine_does()
+TEST(the_flashed_elf_believes_what_this_machine_does)
 {
     rig mega(elf(), 1, 1e-5, 0.004);
     make_niti(mega.plant.get());
@@ -89,14 +89,3 @@ void the_flashed_elf_believes_what_this_machine_does()
 }
 
 } // namespace
-
-void setUp() {}
-void tearDown() {}
-
-int main()
-{
-    need_elf(elf());
-    UNITY_BEGIN();
-    RUN_TEST(the_flashed_elf_believes_what_this_machine_does);
-    return UNITY_END();
-}

@@ -43,17 +43,8 @@ void off_until_unlocked(rig &mega)
     TEST_ASSERT_TRUE(board_duty(mega.raw(), 0) > 0.0);
 }
 
-void a_new_board_starts_unlocked_and_off()
-{
-    rig mega;
-    const std::string greeting = mega.boot();
-    TEST_ASSERT_TRUE_MESSAGE(contains(greeting, "ninespring"), greeting.c_str());
-    TEST_ASSERT_FALSE(mega.view().locked);
-    TEST_ASSERT_TRUE(board_all_off(mega.raw()));
-}
-
 /* After a hang, too; what the model knows outlives what does not take the power away. */
-void each_reset_leaves_the_board_off_and_locked_and_keeps_what_it_may()
+TEST(each_reset_leaves_the_board_off_and_locked_and_keeps_what_it_may)
 {
     enum { HANG = -1 };
     for (const int cause : {static_cast<int>(HANG), static_cast<int>(BOARD_RESET_BROWN_OUT),
@@ -81,27 +72,26 @@ void each_reset_leaves_the_board_off_and_locked_and_keeps_what_it_may()
 }
 
 /* Timer 2 compares, a conversion is complete, timer 1 overflows: nobody has asked for them. */
-void an_interrupt_that_nobody_has_ends_as_a_hang_does()
+TEST(an_interrupt_that_nobody_has_ends_as_a_hang_does)
 {
     for (const unsigned vector : {14U, 29U, 20U}) {
         rig mega;
         heat(mega);
         const unsigned before = board_reset_count(mega.raw());
-        char message[40];
-        std::snprintf(message, sizeof message, "vector %u", vector);
-        TEST_ASSERT_TRUE_MESSAGE(board_raise_interrupt(mega.raw(), vector), message);
+        here("vector %u", vector);
+        TEST_ASSERT_TRUE(board_raise_interrupt(mega.raw(), vector));
         mega.run_ms(WATCHDOG_MS + 20.0);
-        TEST_ASSERT_EQUAL_UINT_MESSAGE(before + 1, board_reset_count(mega.raw()), message);
+        TEST_ASSERT_EQUAL_UINT(before + 1, board_reset_count(mega.raw()));
         TEST_ASSERT_TRUE(board_all_off(mega.raw()));
         const std::string greeting = mega.boot(false);
-        TEST_ASSERT_TRUE_MESSAGE(contains(greeting, "watchdog"), greeting.c_str());
+        expect_in(greeting, "watchdog");
         off_until_unlocked(mega);
     }
 }
 
 /* Clock, serial port, ADC, I2C: the board answers, its second is one, and its springs have what
  * they should or are off and locked. */
-void whatever_bit_turns_over_the_board_answers_and_nothing_stays_hot()
+TEST(whatever_bit_turns_over_the_board_answers_and_nothing_stays_hot)
 {
     constexpr unsigned registers[] = {
         0x37, 0x38, 0x39, 0x3A, 0x3B, 0x3C, 0x3D, 0x43, 0x44, 0x45, 0x47, 0x48, 0x64, 0x65,
@@ -111,8 +101,7 @@ void whatever_bit_turns_over_the_board_answers_and_nothing_stays_hot()
     mega.boot();
     for (const unsigned address : registers) {
         for (unsigned k = 0; k < 8; ++k) {
-            char message[40];
-            std::snprintf(message, sizeof message, "register 0x%02X, bit %u", address, k);
+            here("register 0x%02X, bit %u", address, k);
             mega.say("unlock");
             mega.say("clear");
             mega.say("policy open"); /* which a reset forgets */
@@ -131,15 +120,14 @@ void whatever_bit_turns_over_the_board_answers_and_nothing_stays_hot()
             }
             const std::uint32_t begins_ms = time_ms(mega);
             if (was_reset) {
-                TEST_ASSERT_TRUE_MESSAGE(mega.view().locked, message);
-                TEST_ASSERT_TRUE_MESSAGE(board_all_off(mega.raw()), message);
+                TEST_ASSERT_TRUE(mega.view().locked);
+                TEST_ASSERT_TRUE(board_all_off(mega.raw()));
                 continue;
             }
             mega.run_ms(170.0);
-            TEST_ASSERT_INT_WITHIN_MESSAGE(21, 200, static_cast<int>(time_ms(mega) - begins_ms),
-                                           message);
+            TEST_ASSERT_INT_WITHIN(21, 200, static_cast<int>(time_ms(mega) - begins_ms));
             for (unsigned spring = 0; spring < BOARD_CHANNELS; ++spring) {
-                TEST_ASSERT_TRUE_MESSAGE(board_current_a(mega.raw(), spring) < 1.0, message);
+                TEST_ASSERT_TRUE(board_current_a(mega.raw(), spring) < 1.0);
             }
         }
     }
@@ -148,7 +136,7 @@ void whatever_bit_turns_over_the_board_answers_and_nothing_stays_hot()
 /* A bit of RAM, in what the user set and in what the controller made of it: never driven by it for
  * longer than two passes, never saved, and afterwards all is as it was saved and nothing is known.
  */
-void a_setting_that_turns_over_by_itself_ends_in_a_reset_that_says_so()
+TEST(a_setting_that_turns_over_by_itself_ends_in_a_reset_that_says_so)
 {
     struct place {
         const char *variable;
@@ -169,7 +157,7 @@ void a_setting_that_turns_over_by_itself_ends_in_a_reset_that_says_so()
         TEST_ASSERT_EQUAL_UINT_MESSAGE(1, board_reset_count(mega.raw()), where.variable);
         TEST_ASSERT_TRUE(board_all_off(mega.raw()));
         const std::string greeting = mega.boot(false) + mega.say("version");
-        TEST_ASSERT_TRUE_MESSAGE(contains(greeting, "memory"), greeting.c_str());
+        expect_in(greeting, "memory");
         TEST_ASSERT_TRUE(mega.view().locked);
         mega.expect_ok("unlock");
         mega.expect_ok("on 5");
@@ -181,7 +169,7 @@ void a_setting_that_turns_over_by_itself_ends_in_a_reset_that_says_so()
 
 /* A bit of what is believed of a spring: no reset, the others go on, and this one waits until it
  * cannot be hot. */
-void a_belief_that_turns_over_by_itself_begins_anew_and_says_so()
+TEST(a_belief_that_turns_over_by_itself_begins_anew_and_says_so)
 {
     rig mega;
     heat(mega);
@@ -197,14 +185,12 @@ void a_belief_that_turns_over_by_itself_begins_anew_and_says_so()
     TEST_ASSERT_BITS_HIGH(DRIVE_POLICY_LIMIT_COOLING, mega.view().spring[4].limits);
     TEST_ASSERT_EQUAL_UINT16(0, mega.view().spring[4].target_ma);
     TEST_ASSERT_TRUE(mega.view().spring[0].target_ma > 0);
-    const std::string why = mega.say("why 5");
-    TEST_ASSERT_TRUE_MESSAGE(contains(why, "had changed by itself: it begins anew"), why.c_str());
-    const std::string version = mega.say("version");
-    TEST_ASSERT_TRUE_MESSAGE(contains(version, "in what was believed: 1, "), version.c_str());
+    mega.expect_says("why 5", "had changed by itself: it begins anew");
+    mega.expect_says("version", "in what was believed: 1, ");
 }
 
 /* Ticks become due faster than they are done: the board's time is not the world's any more. */
-void a_control_loop_that_cannot_keep_up_ends_in_a_reset_that_says_so()
+TEST(a_control_loop_that_cannot_keep_up_ends_in_a_reset_that_says_so)
 {
     constexpr unsigned TIMER2_COMPA = 13;
     rig mega;
@@ -215,13 +201,13 @@ void a_control_loop_that_cannot_keep_up_ends_in_a_reset_that_says_so()
     }
     TEST_ASSERT_EQUAL_UINT(1, board_reset_count(mega.raw()));
     const std::string greeting = mega.boot(false);
-    TEST_ASSERT_TRUE_MESSAGE(contains(greeting, "overload"), greeting.c_str());
+    expect_in(greeting, "overload");
     off_until_unlocked(mega);
 }
 
 /* In the first 90 s the model's temperatures are guesses, which a reset must not make certain: what
  * open loop gave meanwhile is none. */
-void a_reset_keeps_the_heat_that_was_given_before_anything_was_known()
+TEST(a_reset_keeps_the_heat_that_was_given_before_anything_was_known)
 {
     rig mega;
     mega.boot(false);
@@ -232,7 +218,7 @@ void a_reset_keeps_the_heat_that_was_given_before_anything_was_known()
         board_reset(mega.raw(), cause);
         mega.boot(false);
         const std::string hinted = mega.say("model cold");
-        TEST_ASSERT_TRUE_MESSAGE(contains(hinted, "spring 5 was heated"), hinted.c_str());
+        expect_in(hinted, "spring 5 was heated");
         TEST_ASSERT_FALSE_MESSAGE(contains(hinted, "spring 1 "), hinted.c_str());
     }
     board_reset(mega.raw(), BOARD_RESET_POWER_ON);
@@ -242,7 +228,7 @@ void a_reset_keeps_the_heat_that_was_given_before_anything_was_known()
 }
 
 /* Nobody knows how long it was off: the springs may be as hot as they ever get. */
-void after_power_on_a_spring_waits_until_it_cannot_be_hot()
+TEST(after_power_on_a_spring_waits_until_it_cannot_be_hot)
 {
     rig mega;
     heat(mega);
@@ -253,8 +239,7 @@ void after_power_on_a_spring_waits_until_it_cannot_be_hot()
     mega.run_ms(5000.0);
     TEST_ASSERT_TRUE(board_all_off(mega.raw()));
     TEST_ASSERT_BITS_HIGH(DRIVE_POLICY_LIMIT_COOLING, mega.view().spring[4].limits);
-    const std::string before = mega.say("model");
-    TEST_ASSERT_TRUE_MESSAGE(contains(before, "  waits "), before.c_str());
+    mega.expect_says("model", "  waits ");
     mega.expect_ok("off all");
     mega.expect_ok("model cold");
     mega.expect_ok("on 5");
@@ -262,35 +247,4 @@ void after_power_on_a_spring_waits_until_it_cannot_be_hot()
     TEST_ASSERT_TRUE_MESSAGE(board_duty(mega.raw(), 4) > 0.0, "it waits though it is cold");
 }
 
-void the_watchdog_is_never_hungry_in_normal_work()
-{
-    rig mega;
-    heat(mega);
-    mega.board.send("$$\n");
-    mega.run_ms(1000.0);
-    mega.expect_ok("$save");
-    mega.run_ms(4000.0);
-    TEST_ASSERT_EQUAL_UINT(0, board_reset_count(mega.raw()));
-}
-
 } // namespace
-
-void setUp() {}
-void tearDown() {}
-
-int main()
-{
-    need_elf(elf());
-    UNITY_BEGIN();
-    RUN_TEST(a_new_board_starts_unlocked_and_off);
-    RUN_TEST(each_reset_leaves_the_board_off_and_locked_and_keeps_what_it_may);
-    RUN_TEST(an_interrupt_that_nobody_has_ends_as_a_hang_does);
-    RUN_TEST(whatever_bit_turns_over_the_board_answers_and_nothing_stays_hot);
-    RUN_TEST(a_setting_that_turns_over_by_itself_ends_in_a_reset_that_says_so);
-    RUN_TEST(a_belief_that_turns_over_by_itself_begins_anew_and_says_so);
-    RUN_TEST(a_control_loop_that_cannot_keep_up_ends_in_a_reset_that_says_so);
-    RUN_TEST(a_reset_keeps_the_heat_that_was_given_before_anything_was_known);
-    RUN_TEST(after_power_on_a_spring_waits_until_it_cannot_be_hot);
-    RUN_TEST(the_watchdog_is_never_hungry_in_normal_work);
-    return UNITY_END();
-}

@@ -59,28 +59,7 @@ void save(rig &mega)
     TEST_FAIL_MESSAGE("the save does not end");
 }
 
-void settings_of_one_board_make_another_the_same()
-{
-    rig one;
-    one.boot();
-    one.expect_ok("$heat_capacity_j_per_k=0.321");
-    one.expect_ok("$loss_w_per_k=0.006543");
-    one.expect_ok("$loss_scale_5=0.975");
-    const std::vector<std::string> wanted = settings_of(one);
-    rig other;
-    other.boot();
-    TEST_ASSERT_TRUE(settings_of(other) != wanted);
-    for (const std::string &line : wanted) {
-        other.expect_ok(line);
-    }
-    same(wanted, settings_of(other));
-    save(other);
-    board_reset(other.raw(), BOARD_RESET_POWER_ON);
-    other.boot();
-    same(wanted, settings_of(other));
-}
-
-void what_is_not_saved_is_gone_after_power_off()
+TEST(what_is_not_saved_is_gone_after_power_off)
 {
     rig mega;
     mega.boot();
@@ -93,7 +72,7 @@ void what_is_not_saved_is_gone_after_power_off()
 
 /* The power fails at a sample of the bytes of a save (every byte: test_settings): afterwards the
  * board has the old settings or the new ones, whole. */
-void power_cut_in_a_save_leaves_old_or_new()
+TEST(power_cut_in_a_save_leaves_old_or_new)
 {
     rig first;
     first.boot();
@@ -132,10 +111,8 @@ void power_cut_in_a_save_leaves_old_or_new()
         board_reset(mega.raw(), BOARD_RESET_POWER_ON);
         mega.boot();
         const std::vector<std::string> got = settings_of(mega);
-        char message[60];
-        std::snprintf(message, sizeof message, "a mixture after a cut in byte %u",
-                      static_cast<unsigned>(cut));
-        TEST_ASSERT_TRUE_MESSAGE(got == old_settings || got == new_settings, message);
+        here("a mixture after a cut in byte %u", static_cast<unsigned>(cut));
+        TEST_ASSERT_TRUE(got == old_settings || got == new_settings);
         seen_old = seen_old || got == old_settings;
         seen_new = seen_new || got == new_settings;
     }
@@ -144,7 +121,7 @@ void power_cut_in_a_save_leaves_old_or_new()
 }
 
 /* At once and while springs are driven, without a fault. */
-void averaging_is_set_while_it_runs()
+TEST(averaging_is_set_while_it_runs)
 {
     rig mega;
     mega.boot();
@@ -164,17 +141,3 @@ void averaging_is_set_while_it_runs()
 }
 
 } // namespace
-
-void setUp() {}
-void tearDown() {}
-
-int main()
-{
-    need_elf(elf());
-    UNITY_BEGIN();
-    RUN_TEST(settings_of_one_board_make_another_the_same);
-    RUN_TEST(what_is_not_saved_is_gone_after_power_off);
-    RUN_TEST(power_cut_in_a_save_leaves_old_or_new);
-    RUN_TEST(averaging_is_set_while_it_runs);
-    return UNITY_END();
-}

@@ -34,9 +34,8 @@ double off_after_ms(rig &mega, const std::string &before = "")
 void off_and_stays_off(rig &mega, const std::string &before = "")
 {
     const double ms = off_after_ms(mega, before);
-    char message[80];
-    std::snprintf(message, sizeof message, "off after %.3f ms", ms);
-    TEST_ASSERT_TRUE_MESSAGE(ms <= LIMIT_MS, message);
+    here("off after %.3f ms", ms);
+    TEST_ASSERT_TRUE(ms <= LIMIT_MS);
     for (int k = 0; k < 300; ++k) {
         mega.run_ms(1.0);
         TEST_ASSERT_TRUE_MESSAGE(board_all_off(mega.raw()), "an output came on again");
@@ -45,7 +44,7 @@ void off_and_stays_off(rig &mega, const std::string &before = "")
 
 /* As it drives, prints, tells; in the middle of a command, behind others that it drops, and behind
  * a line of garbage. Afterwards the console answers, and the board can be cleared. */
-void stops_whatever_is_sent_before()
+TEST(stops_whatever_is_sent_before)
 {
     static const struct {
         const char *sent; /* so long before */
@@ -74,7 +73,7 @@ void stops_whatever_is_sent_before()
     }
 }
 
-void stops_at_any_moment_of_a_tick()
+TEST(stops_at_any_moment_of_a_tick)
 {
     for (int k = 0; k < 20; ++k) {
         rig mega;
@@ -85,7 +84,7 @@ void stops_at_any_moment_of_a_tick()
     }
 }
 
-void stops_while_it_writes_the_eeprom()
+TEST(stops_while_it_writes_the_eeprom)
 {
     rig mega;
     all_on(mega);
@@ -97,7 +96,7 @@ void stops_while_it_writes_the_eeprom()
     off_and_stays_off(mega);
 }
 
-void stops_while_the_i2c_bus_hangs()
+TEST(stops_while_the_i2c_bus_hangs)
 {
     rig mega;
     all_on(mega);
@@ -113,7 +112,7 @@ void stops_while_the_i2c_bus_hangs()
 }
 
 /* Sent in one go: what comes behind the stop is none of what it drops. */
-void a_line_right_behind_the_stop_is_obeyed_at_any_moment_of_a_tick()
+TEST(a_line_right_behind_the_stop_is_obeyed_at_any_moment_of_a_tick)
 {
     for (int k = 0; k < 20; ++k) {
         rig mega;
@@ -158,40 +157,39 @@ std::vector<bit> bits_of_the_outputs()
     return all;
 }
 
-std::string text_of(const bit &one)
+void turn_over(rig &mega, const bit &one)
 {
-    char text[40];
-    std::snprintf(text, sizeof text, "register 0x%03X, bits 0x%02X", one.address, one.mask);
-    return text;
+    here("register 0x%03X, bits 0x%02X", one.address, one.mask);
+    board_flip(mega.raw(), one.address, one.mask);
 }
 
-void stops_whatever_bit_of_an_output_has_turned_over()
+TEST(stops_whatever_bit_of_an_output_has_turned_over)
 {
     rig mega;
     all_on(mega);
     for (const bit &one : bits_of_the_outputs()) {
-        board_flip(mega.raw(), one.address, one.mask);
+        turn_over(mega, one);
         const double ms = off_after_ms(mega);
-        TEST_ASSERT_TRUE_MESSAGE(ms <= LIMIT_MS, text_of(one).c_str());
+        TEST_ASSERT_TRUE(ms <= LIMIT_MS);
         mega.run_ms(2.0 * TICK_MS);
-        TEST_ASSERT_TRUE_MESSAGE(board_all_off(mega.raw()), text_of(one).c_str());
+        TEST_ASSERT_TRUE(board_all_off(mega.raw()));
         mega.expect_ok("clear");
         mega.expect_ok("on all 30");
         mega.run_ms(2.0 * TICK_MS);
         for (unsigned k = 0; k < BOARD_CHANNELS; ++k) {
-            TEST_ASSERT_TRUE_MESSAGE(board_duty(mega.raw(), k) > 0.0, text_of(one).c_str());
+            TEST_ASSERT_TRUE(board_duty(mega.raw(), k) > 0.0);
         }
     }
 }
 
-void off_is_off_again_within_a_tick_whatever_bit_turns_over()
+TEST(off_is_off_again_within_a_tick_whatever_bit_turns_over)
 {
     rig mega;
     mega.boot();
     for (const bit &one : bits_of_the_outputs()) {
-        board_flip(mega.raw(), one.address, one.mask);
+        turn_over(mega, one);
         mega.run_ms(TICK_MS);
-        TEST_ASSERT_TRUE_MESSAGE(board_all_off(mega.raw()), text_of(one).c_str());
+        TEST_ASSERT_TRUE(board_all_off(mega.raw()));
     }
     mega.run_ms(500.0);
     TEST_ASSERT_EQUAL_UINT8(SAFETY_FAULT_NONE, mega.view().board_fault);
@@ -203,7 +201,7 @@ void off_is_off_again_within_a_tick_whatever_bit_turns_over()
 }
 
 /* 14 A may flow for a tick, from which the current loop has to recover: nothing is latched. */
-void a_driven_spring_has_its_current_again_whatever_bit_turns_over()
+TEST(a_driven_spring_has_its_current_again_whatever_bit_turns_over)
 {
     rig mega;
     all_on(mega);
@@ -214,32 +212,13 @@ void a_driven_spring_has_its_current_again_whatever_bit_turns_over()
         if (!port_h_or_timer_4 || (one.mask & 0x29u) == 0) {
             continue; /* some, as each takes its time */
         }
-        board_flip(mega.raw(), one.address, one.mask);
+        turn_over(mega, one);
         mega.run_ms(4200.0); /* readings of it are forgotten, one each 2 s */
         for (unsigned k = 0; k < BOARD_CHANNELS; ++k) {
-            TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(0.2, 0.75, board_current_a(mega.raw(), k),
-                                              text_of(one).c_str());
+            TEST_ASSERT_DOUBLE_WITHIN(0.2, 0.75, board_current_a(mega.raw(), k));
         }
     }
     TEST_ASSERT_EQUAL_UINT8(SAFETY_FAULT_NONE, mega.view().board_fault);
 }
 
 } // namespace
-
-void setUp() {}
-void tearDown() {}
-
-int main()
-{
-    need_elf(elf());
-    UNITY_BEGIN();
-    RUN_TEST(stops_whatever_is_sent_before);
-    RUN_TEST(stops_at_any_moment_of_a_tick);
-    RUN_TEST(stops_while_it_writes_the_eeprom);
-    RUN_TEST(stops_while_the_i2c_bus_hangs);
-    RUN_TEST(a_line_right_behind_the_stop_is_obeyed_at_any_moment_of_a_tick);
-    RUN_TEST(stops_whatever_bit_of_an_output_has_turned_over);
-    RUN_TEST(off_is_off_again_within_a_tick_whatever_bit_turns_over);
-    RUN_TEST(a_driven_spring_has_its_current_again_whatever_bit_turns_over);
-    return UNITY_END();
-}

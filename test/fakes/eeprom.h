@@ -6,8 +6,8 @@
 
 #include <limits.h>
 
+#include "../run_tests.h"
 #include "settings.h"
-#include "unity.h"
 
 #define EEPROM_BYTES (SETTINGS_LEARNT_BASE + 2u * SETTINGS_LEARNT_SLOT_BYTES)
 

@@ -206,15 +206,7 @@ class Paper(Case):
     def test_comsol_within_one_and_a_half_degrees(self) -> None:
         table = self.works("paper", "-o", self.output, "--json", self.json)
         rows = rows_of(self.output)
-        header = [
-            "pitch_mm",
-            "fan",
-            "source",
-            "t_hot_c",
-            "t_centre_c",
-            "model_centre_c",
-        ]
-        self.assertEqual(list(rows[0]), header)
+        self.assertEqual(list(rows[0]), ["pitch_mm", "fan", "source", "t_hot_c", "t_centre_c", "model_centre_c"])
         comsol = {
             (float(row["pitch_mm"]), float(row["fan"])): float(row["model_centre_c"])
             for row in rows
@@ -255,17 +247,7 @@ class Run(Case):
         self.assertEqual(len(rows), 41)
         self.assertEqual(rows[0]["time_s"], "0.00")
         self.assertEqual(rows[-1]["time_s"], "20.00")
-        for column in (
-            "i1_a",
-            "v9_v",
-            "t5_c",
-            "fan",
-            "ambient_c",
-            "m1_c",
-            "x9",
-            "p5_c",
-        ):
-            self.assertIn(column, rows[0])
+        self.assertLessEqual({"i1_a", "v9_v", "t5_c", "fan", "ambient_c", "m1_c", "x9", "p5_c"}, set(rows[0]))
         self.assertEqual({row["ambient_c"] for row in rows}, {"20.000"})
         for column, decimals in {"time_s": 2, "i1_a": 4, "v9_v": 4, "t5_c": 3, "m1_c": 3, "p5_c": 3}.items():
             self.assertEqual({len(row[column].split(".")[1]) for row in rows}, {decimals}, column)
@@ -283,10 +265,7 @@ class Run(Case):
         quiet = SCENARIO.replace("temperature_c = 0.3\ncurrent_a = 0.001", "temperature_c = 0")
         self.run_it("a.csv", scenario=quiet)
         effects = 'effects = ["latent_heat", "resistance_phase"]\n'
-        model = self.file(
-            "m.toml",
-            f'schema = "ninespring.model/1"\n{effects}[array]\nrows = 3\ncols = 3\n',
-        )
+        model = self.file("m.toml", f'schema = "ninespring.model/1"\n{effects}[array]\nrows = 3\ncols = 3\n')
         done = self.sim("replay", "a.csv", "--model", model, "-o", self.output, "--json", self.json)
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertLess(json.loads(self.json.read_text())["rmse_c"], 0.3)
@@ -510,28 +489,17 @@ class BadScenario(Case):
         self.refused("none.ini: ", "cannot be read", "run", "none.ini", "-o", self.output)
 
     def test_names_of_the_plant_and_the_chip(self) -> None:
-        plant = "[plant]\n{}\n[scenario]\nduration_s = 1\n"
-        self.scenario_refused(
-            "s.ini:2:1: ",
-            "did you mean loss_w_per_k?",
-            plant.format("loss_w_per_kk = 0.01"),
-        )
-        self.scenario_refused("s.ini:2:16: ", "must be 0 to 10 W/K", plant.format("loss_w_per_k = 5800"))
-        self.scenario_refused("s.ini:2:16: ", "not a number", plant.format("loss_w_per_k = 5.8m"))
-        self.scenario_refused("s.ini:2:20: ", "no such spring", plant.format("loss_w_per_k[10] = 0.01"))
-        self.scenario_refused(
-            "s.ini:2:11: ",
-            "did you mean latent_heat?",
-            plant.format("effects = latent_heet"),
-        )
-        chip = "[chip]\n{}\n[scenario]\nduration_s = 1\n"
-        self.scenario_refused(
-            "s.ini:2:",
-            "did you mean open_current_a?",
-            chip.format("open_current_ma = 1"),
-        )
-        self.scenario_refused("s.ini:2:", "must be", chip.format("open_current_a = 1500"))
-        self.scenario_refused("none.txt: ", "cannot be read", chip.format("model = none.txt"))
+        for place, said, line in (
+            ("s.ini:2:1: ", "did you mean loss_w_per_k?", "[plant]\nloss_w_per_kk = 0.01"),
+            ("s.ini:2:16: ", "must be 0 to 10 W/K", "[plant]\nloss_w_per_k = 5800"),
+            ("s.ini:2:16: ", "not a number", "[plant]\nloss_w_per_k = 5.8m"),
+            ("s.ini:2:20: ", "no such spring", "[plant]\nloss_w_per_k[10] = 0.01"),
+            ("s.ini:2:11: ", "did you mean latent_heat?", "[plant]\neffects = latent_heet"),
+            ("s.ini:2:", "did you mean open_current_a?", "[chip]\nopen_current_ma = 1"),
+            ("s.ini:2:", "must be", "[chip]\nopen_current_a = 1500"),
+            ("none.txt: ", "cannot be read", "[chip]\nmodel = none.txt"),
+        ):
+            self.scenario_refused(place, said, f"{line}\n[scenario]\nduration_s = 1\n")
 
     def test_what_the_chip_cannot_hold(self) -> None:
         plant = "[plant]\nplate_loss_w_per_k = 1\n{}\n[scenario]\nduration_s = 1\n"

@@ -2,8 +2,8 @@
 #include <math.h>
 #include <stdio.h>
 
+#include "../run_tests.h"
 #include "loop.h"
-#include "unity.h"
 
 #define SPRINGS   9
 #define CENTRE    4
@@ -118,83 +118,86 @@ static void expect_in_the_band(int spring)
     TEST_ASSERT_TRUE(temperature(spring) > 77.0 && temperature(spring) < 84.0);
 }
 
-static void eight_are_held_in_the_band_and_the_centre_stays_cold(void)
+static safety_fault_t fault(int spring)
 {
+    return controller_fault(loop_controller(loop), (uint8_t)spring);
+}
+
+/* From power-on, all but the centre; gives the highest temperature. */
+static double hold_eight(double seconds)
+{
+    plant_reset(plant);
     power_on();
     want_all_but(CENTRE);
-    TEST_ASSERT_TRUE(run(400.0) < 106.0);
+    const double highest_c = run(seconds);
     for (int k = 0; k < SPRINGS; k++) {
+        row((size_t)k);
+        TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, fault(k));
         if (k != CENTRE) {
             expect_in_the_band(k);
+            TEST_ASSERT_FALSE(is_blind(k));
+            TEST_ASSERT_DOUBLE_WITHIN(3.0, temperature(k),
+                                      controller_temperature_c7(loop_controller(loop), (uint8_t)k) /
+                                          128.0);
         }
     }
     TEST_ASSERT_TRUE(phase(CENTRE) < 0.01);
+    return highest_c;
+}
+
+TEST(eight_are_held_in_the_band_and_the_centre_stays_cold)
+{
+    TEST_ASSERT_TRUE(hold_eight(400.0) < 106.0);
     TEST_ASSERT_TRUE(temperature(CENTRE) < 44.5);
 }
 
-static void held_spring_does_not_feel_its_neighbours(void)
-{
-    start_cold();
-    want(CENTRE, 1000);
-    run(400.0);
-    double alone_c = temperature(CENTRE);
-    want_all_but(-1);
-    for (int n = 0; n < 60; n++) {
-        run(5.0);
-        TEST_ASSERT_DOUBLE_WITHIN(3.0, alone_c, temperature(CENTRE));
-    }
-    TEST_ASSERT_TRUE(phase(CENTRE) > 0.98);
-}
-
-static void spring_that_loses_its_turn_keeps_what_it_has(void)
-{
-    start_cold();
-    for (int k = 0; k < 4; k++) {
-        want(k, 1000);
-    }
-    do {
-        run(0.1);
-        TEST_ASSERT_TRUE(loop_time_s(loop) < 40.0);
-    } while (fmin(fmin(phase(0), phase(1)), fmin(phase(2), phase(3))) < 0.6);
-    settings.safety.supply_limit_ma = 7000; /* little more than what holds them */
-    TEST_ASSERT_TRUE(controller_apply_settings(loop_controller(loop), &settings, NULL));
-    run(1.0); /* currents have fallen */
-    for (int n = 0; n < 40; n++) {
-        run(0.2);
-        for (int k = 0; k < 4; k++) {
-            TEST_ASSERT_TRUE(phase(k) > 0.6);
-            if (drive_policy_stage(&loop_controller(loop)->policy, (uint8_t)k) ==
-                DRIVE_POLICY_STAGE_HEAT) {
-                TEST_ASSERT_TRUE(temperature(k) > 89.0);
-            }
-        }
-    }
-}
-
 /* Martensite start is found in the resistance, whatever the loss. */
-static void array_that_loses_more_or_less_is_held_in_the_band(void)
+TEST(array_that_loses_more_or_less_is_held_in_the_band)
 {
     for (double loss = 0.85; loss < 1.2; loss += 0.3) {
         plant_set(plant, "loss_w_per_k", 5.8e-3 * loss);
         plant_set(plant, "heat_capacity_j_per_k", 0.300 * loss);
-        plant_reset(plant);
-        power_on();
-        want_all_but(CENTRE);
-        TEST_ASSERT_TRUE(run(500.0) < 115.0);
-        for (uint8_t k = 0; k < SPRINGS; k++) {
-            if (k != CENTRE) {
-                expect_in_the_band(k);
-                TEST_ASSERT_FALSE(is_blind(k));
-                TEST_ASSERT_DOUBLE_WITHIN(3.0, temperature(k),
-                                          controller_temperature_c7(loop_controller(loop), k) /
-                                              128.0);
-            }
-        }
+        TEST_ASSERT_TRUE(hold_eight(500.0) < 115.0);
     }
 }
 
+/* At either end of what is declared. */
+TEST(another_supply_is_no_fault)
+{
+    for (double supply_v = 4.2; supply_v < 6.0; supply_v += 1.3) {
+        plant_set(plant, "supply_v", supply_v);
+        TEST_ASSERT_TRUE(hold_eight(400.0) < HOTTEST_C);
+    }
+}
+
+/* A driven one, and one that is off: then current where nothing is driven switches all off, before
+ * the other is named. */
+TEST(sensors_that_are_swapped_switch_their_springs_off_in_two_seconds)
+{
+    for (int other = 1; other <= CENTRE; other += CENTRE - 1) {
+        power_on();
+        want_all_but(CENTRE);
+        (void)run(200.0);
+        TEST_ASSERT_TRUE(loop_swap_sensors(loop, 0, other));
+        loop_advance(loop, 2.0);
+        TEST_ASSERT_TRUE(fault(other) != SAFETY_FAULT_NONE);
+        TEST_ASSERT_TRUE(fault(0) != SAFETY_FAULT_NONE || fault(other) == SAFETY_FAULT_STUCK_ON);
+        TEST_ASSERT_EQUAL_UINT16(0, controller_duty(loop_controller(loop), 0));
+        TEST_ASSERT_EQUAL_UINT16(0, controller_duty(loop_controller(loop), (uint8_t)other));
+    }
+}
+
+/* Within what can be a circuit, and bounded: a fifth too little of either. */
+TEST(a_sensor_that_shows_a_fifth_too_little_overheats_nothing)
+{
+    power_on();
+    want_all_but(CENTRE);
+    TEST_ASSERT_TRUE(loop_scale_sensor(loop, 0, 0.8, 0.8));
+    TEST_ASSERT_TRUE(run(300.0) < HOTTEST_C);
+}
+
 /* Neither sign nor size of the declared change is believed: what is seen is learnt. */
-static void change_of_resistance_is_learnt_whatever_is_declared(void)
+TEST(change_of_resistance_is_learnt_whatever_is_declared)
 {
     for (unsigned n = 1; n < 4; n++) { /* it falls, a fall is declared, or both */
         plant_set(plant, "resistance_martensite_ohm", (n & 1u) != 0 ? 0.219 : 0.175);
@@ -225,7 +228,7 @@ static void toggle(double period_s, double seconds, double limit_c)
 }
 
 /* As declared, and an array that is not the declared one. */
-static void toggling_at_any_period_stays_within_the_limits(void)
+TEST(toggling_at_any_period_stays_within_the_limits)
 {
     static const double period_s[] = {0.1,  0.3,  0.7,  1.5,   3.0,  10.0,
                                       20.0, 40.0, 80.0, 120.0, 300.0};
@@ -242,53 +245,27 @@ static void toggling_at_any_period_stays_within_the_limits(void)
         options.ambient_error_c = other ? -3.0 : 0.0;
         plant_reset(plant);
         power_on();
-        for (unsigned n = 0; n < sizeof period_s / sizeof period_s[0]; n++) {
+        for (unsigned n = 0; n < ROWS(period_s); n++) {
             toggle(period_s[n], 120.0, HOTTEST_C);
         }
-        for (uint8_t k = 0; k < SPRINGS; k++) {
-            TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, controller_fault(loop_controller(loop), k));
+        for (int k = 0; k < SPRINGS; k++) {
+            TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, fault(k));
         }
-    }
-}
-
-/* Of one conversion, 1 mV by default. Up to 35 mV no board of 24 tells it, with 50 mV one does. */
-static void noisy_voltage_is_borne_or_told(void)
-{
-    for (int told = 0; told < 2; told++) {
-        options.bus_noise_v = told != 0 ? 0.2 : 0.035;
-        power_on();
-        want(CENTRE, 1000);
-        TEST_ASSERT_TRUE(run(300.0) < 115.0);
-        TEST_ASSERT_EQUAL(told != 0 ? SAFETY_FAULT_SENSOR_MISMATCH : SAFETY_FAULT_NONE,
-                          controller_fault(loop_controller(loop), CENTRE));
-        TEST_ASSERT_EQUAL(told == 0, phase(CENTRE) > 0.98);
     }
 }
 
 /* ---- release and return ---- */
-
-static void released_spring_is_martensite_sooner_than_from_105_degrees(void)
-{
-    start_cold();
-    want_all_but(-1);
-    run(400.0);
-    want(CENTRE, 0);
-    run(55.0); /* one that was kept at 105 among eight at 105 takes 82 s */
-    TEST_ASSERT_TRUE(phase(CENTRE) < 0.01);
-    TEST_ASSERT_TRUE(phase(0) > 0.98);
-}
 
 /* The message has two numbers that say which case it is, and the phase. */
 static void check_full_in_a_minute(const char *format, double first, double second)
 {
     want(CENTRE, 1000);
     run(60.0);
-    char where[80];
-    (void)snprintf(where, sizeof where, format, first, second, phase(CENTRE));
-    TEST_ASSERT_TRUE_MESSAGE(phase(CENTRE) > 0.98, where);
+    here(format, first, second, phase(CENTRE));
+    TEST_ASSERT_TRUE(phase(CENTRE) > 0.98);
 }
 
-static void spring_switched_on_again_after_seconds_is_austenite_again(void)
+TEST(spring_switched_on_again_after_seconds_is_austenite_again)
 {
     for (int alone = 0; alone < 2; alone++) {
         for (double off_s = 0.02; off_s <= 200.0; off_s = 1.3 * off_s + 1.0) {
@@ -306,7 +283,7 @@ static void spring_switched_on_again_after_seconds_is_austenite_again(void)
 }
 
 /* From a level the phase goes on only where it left the transformation. */
-static void full_is_reached_from_any_level_at_any_moment(void)
+TEST(full_is_reached_from_any_level_at_any_moment)
 {
     for (uint16_t level = 300; level <= 800; level = (uint16_t)(level + 250u)) {
         for (double from_s = 80.0; from_s < 290.0; from_s += 14.0) {
@@ -338,24 +315,11 @@ static void check_stuck_resistance(double ohm)
     }
 }
 
-static void resistance_that_sticks_in_a_hold_is_not_passed_over(void)
+TEST(resistance_that_sticks_in_a_hold_is_not_passed_over)
 {
     check_stuck_resistance(0.219); /* austenite's */
     check_stuck_resistance(0.175); /* martensite's */
     check_stuck_resistance(0.190);
-}
-
-static void smaller_change_of_resistance_does_not_overheat(void)
-{
-    for (double change = 0.85; change < 1.16; change += 0.05) { /* of the declared one */
-        plant_set(plant, "resistance_austenite_ohm", 0.175 + 0.044 * change);
-        power_on();
-        want(CENTRE, 1000);
-        double highest_c = run(600.0);
-        char where[80];
-        (void)snprintf(where, sizeof where, "change %.2f: highest %.1f", change, highest_c);
-        TEST_ASSERT_TRUE_MESSAGE(highest_c < 115.0, where);
-    }
 }
 
 /* ---- all together ---- */
@@ -398,34 +362,14 @@ static double hottest_of_everything(uint32_t seed)
 }
 
 /* Of twenty draws, each more than an hour long: most below 120 degC, none far above. */
-static void everything_at_once_stays_within_the_limits(void)
+TEST(everything_at_once_stays_within_the_limits)
 {
     unsigned hot = 0;
     for (uint32_t seed = 11; seed < 31; seed++) {
         const double hottest_c = hottest_of_everything(seed);
-        char where[60];
-        (void)snprintf(where, sizeof where, "draw %u: %.1f degC", (unsigned)seed, hottest_c);
-        TEST_ASSERT_TRUE_MESSAGE(hottest_c < 130.0, where);
+        here("draw %u: %.1f degC", (unsigned)seed, hottest_c);
+        TEST_ASSERT_TRUE(hottest_c < 130.0);
         hot += hottest_c > 120.0;
     }
     TEST_ASSERT_LESS_OR_EQUAL_UINT(8, hot);
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(eight_are_held_in_the_band_and_the_centre_stays_cold);
-    RUN_TEST(held_spring_does_not_feel_its_neighbours);
-    RUN_TEST(spring_that_loses_its_turn_keeps_what_it_has);
-    RUN_TEST(array_that_loses_more_or_less_is_held_in_the_band);
-    RUN_TEST(toggling_at_any_period_stays_within_the_limits);
-    RUN_TEST(change_of_resistance_is_learnt_whatever_is_declared);
-    RUN_TEST(noisy_voltage_is_borne_or_told);
-    RUN_TEST(released_spring_is_martensite_sooner_than_from_105_degrees);
-    RUN_TEST(spring_switched_on_again_after_seconds_is_austenite_again);
-    RUN_TEST(full_is_reached_from_any_level_at_any_moment);
-    RUN_TEST(smaller_change_of_resistance_does_not_overheat);
-    RUN_TEST(resistance_that_sticks_in_a_hold_is_not_passed_over);
-    RUN_TEST(everything_at_once_stays_within_the_limits);
-    return UNITY_END();
 }

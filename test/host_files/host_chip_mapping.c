@@ -4,7 +4,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include <unity.h>
+#include "../run_tests.h"
 
 #include "chip_mapping.h"
 #include "descriptions.h"
@@ -65,7 +65,7 @@ static void expect_shared(uint16_t k)
     TEST_ASSERT_EQUAL_MEMORY_MESSAGE(&before, &chip, sizeof chip, row.name);
 }
 
-static void what_plant_and_chip_share_maps_number_by_number(void)
+TEST(what_plant_and_chip_share_maps_number_by_number)
 {
     unsigned shared = 0;
     for (uint16_t k = 0; k < PARAMETER_COUNT; k++) {
@@ -84,7 +84,7 @@ static void what_plant_and_chip_share_maps_number_by_number(void)
     TEST_ASSERT_EQUAL(3, chip.columns);
 }
 
-static void effects_that_are_off_cost_nothing(void)
+TEST(effects_that_are_off_cost_nothing)
 {
     TEST_ASSERT_EQUAL(CHIP_MAPPING_OK, map());
     TEST_ASSERT_EQUAL(0, chip.latent_heat_mj);
@@ -100,7 +100,7 @@ static void effects_that_are_off_cost_nothing(void)
     }
 }
 
-static void what_the_plant_has_in_two_numbers_becomes_one(void)
+TEST(what_the_plant_has_in_two_numbers_becomes_one)
 {
     on("radiation");
     TEST_ASSERT_EQUAL(CHIP_MAPPING_OK, map());
@@ -108,7 +108,7 @@ static void what_the_plant_has_in_two_numbers_becomes_one(void)
 }
 
 /* One value on the chip, one for each spring in the plant: the mean, and it is said. */
-static void what_the_chip_averages_is_said(void)
+TEST(what_the_chip_averages_is_said)
 {
     const struct {
         const char *effect, *name;
@@ -116,7 +116,7 @@ static void what_the_chip_averages_is_said(void)
     } cases[] = {{"plate_conduction", "plate_coupling_w_per_k", 0.0024},
                  {"latent_heat", "latent_heat_j", 13.15},
                  {"resistance_phase", "resistance_austenite_ohm", 0.264}};
-    for (size_t k = 0; k < sizeof cases / sizeof cases[0]; k++) {
+    for (size_t k = 0; k < ROWS(cases); k++) {
         tearDown();
         setUp();
         on(cases[k].effect);
@@ -148,7 +148,7 @@ static void what_the_chip_averages_is_said(void)
 
 /* The middle column of 3 x 3 as a board of its own: the edges' losses of the whole array, nothing
  * to springs that it does not have, a third of the plate. */
-static void a_part_knows_its_own_springs_alone(void)
+TEST(a_part_knows_its_own_springs_alone)
 {
     on("edge_loss");
     on("plate_conduction");
@@ -169,7 +169,7 @@ static void a_part_knows_its_own_springs_alone(void)
 }
 
 /* Each layer's board has its own losses and couplings, the plate at its end, half of the air. */
-static void a_layer_has_its_own_numbers(void)
+TEST(a_layer_has_its_own_numbers)
 {
     plant_destroy(plant);
     plant = plant_create_layers(2, 2, 2);
@@ -201,7 +201,7 @@ static void a_layer_has_its_own_numbers(void)
 }
 
 /* 3 x 3: six pairs two apart, twelve beside each other. */
-static void second_neighbours_are_counted_to_the_first(void)
+TEST(second_neighbours_are_counted_to_the_first)
 {
     set("orthogonal_w_per_k", 0.0005);
     set("second_w_per_k", 0.0001);
@@ -211,7 +211,7 @@ static void second_neighbours_are_counted_to_the_first(void)
 }
 
 /* What each spring loses on the chip is what it loses in the plant, to the permille. */
-static void edge_and_mismatch_become_scales(void)
+TEST(edge_and_mismatch_become_scales)
 {
     on("edge_loss");
     on("spring_mismatch");
@@ -231,7 +231,7 @@ static void edge_and_mismatch_become_scales(void)
 
 /* The straight line keeps the heat flow of the power law within 2 % of the flow at 85 K, over 0 to
  * 90 K. */
-static void natural_convection_becomes_a_rising_loss(void)
+TEST(natural_convection_becomes_a_rising_loss)
 {
     on("natural_convection");
     TEST_ASSERT_EQUAL(CHIP_MAPPING_OK, map());
@@ -249,7 +249,7 @@ static void natural_convection_becomes_a_rising_loss(void)
     TEST_ASSERT_TRUE(chip.loss_fan_uw_per_k > 8000 && chip.loss_fan_uw_per_k < 15000);
 }
 
-static void what_is_not_on_the_chip_is_left_out_and_said(void)
+TEST(what_is_not_on_the_chip_is_left_out_and_said)
 {
     thermal_model_parameters_t plain;
     TEST_ASSERT_EQUAL(CHIP_MAPPING_OK, map());
@@ -270,7 +270,7 @@ static void what_is_not_on_the_chip_is_left_out_and_said(void)
                                  message);
 }
 
-static void what_does_not_fit_is_refused_by_name(void)
+TEST(what_does_not_fit_is_refused_by_name)
 {
     const struct {
         const char *name;
@@ -282,7 +282,7 @@ static void what_does_not_fit_is_refused_by_name(void)
                  {"loss_fan_w_per_k", 0.0655, CHIP_MAPPING_ERROR_MODEL},
                  {"resistance_ohm", 900.0, CHIP_MAPPING_ERROR_RANGE},
                  {"austenite_finish_c", 89.0, CHIP_MAPPING_ERROR_MODEL}};
-    for (size_t k = 0; k < sizeof cases / sizeof cases[0]; k++) {
+    for (size_t k = 0; k < ROWS(cases); k++) {
         tearDown();
         setUp();
         set(cases[k].name, cases[k].value);
@@ -301,7 +301,7 @@ static void what_does_not_fit_is_refused_by_name(void)
     }
 }
 
-static void message_never_outgrows_its_buffer(void)
+TEST(message_never_outgrows_its_buffer)
 {
     on("sensor_lag");
     on("sensor_gain");
@@ -310,22 +310,4 @@ static void message_never_outgrows_its_buffer(void)
     TEST_ASSERT_EQUAL(CHIP_MAPPING_OK, chip_mapping_from_plant(plant, &chip, small, 10));
     TEST_ASSERT_TRUE(strlen(small) < 10);
     TEST_ASSERT_EQUAL('x', small[10]);
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(what_plant_and_chip_share_maps_number_by_number);
-    RUN_TEST(effects_that_are_off_cost_nothing);
-    RUN_TEST(what_the_plant_has_in_two_numbers_becomes_one);
-    RUN_TEST(what_the_chip_averages_is_said);
-    RUN_TEST(a_part_knows_its_own_springs_alone);
-    RUN_TEST(a_layer_has_its_own_numbers);
-    RUN_TEST(second_neighbours_are_counted_to_the_first);
-    RUN_TEST(edge_and_mismatch_become_scales);
-    RUN_TEST(natural_convection_becomes_a_rising_loss);
-    RUN_TEST(what_is_not_on_the_chip_is_left_out_and_said);
-    RUN_TEST(what_does_not_fit_is_refused_by_name);
-    RUN_TEST(message_never_outgrows_its_buffer);
-    return UNITY_END();
 }

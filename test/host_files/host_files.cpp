@@ -8,18 +8,13 @@
 #include <functional>
 #include <string>
 
-extern "C" {
-#include <unity.h>
-}
+#include "../run_tests.h"
 
 #include "log_writer.h"
 #include "scenario_file.h"
 #include "text_file.h"
 
 using namespace ninespring;
-
-extern "C" void setUp(void) {}
-extern "C" void tearDown(void) {}
 
 namespace
 {
@@ -47,7 +42,7 @@ void refuses_scenario(const std::string &text, const std::string &begin, const s
     expect(error_of([&] { parse_scenario(make_text_file("s.ini", text, 197)); }), begin, part);
 }
 
-void files_that_are_not_text_are_refused(void)
+TEST(files_that_are_not_text_are_refused)
 {
     expect(error_of([] { make_text_file("a", "x\n" + std::string(1000000, '1')); }),
            "a:2:65537: ", "1000000 characters");
@@ -60,7 +55,7 @@ void files_that_are_not_text_are_refused(void)
     expect(error_of([] { read_text_file("."); }), ".: ", "is a folder");
 }
 
-void number_is_refused_with_advice(void)
+TEST(number_is_refused_with_advice)
 {
     const auto problem = [](const char *text) {
         double value = 0.0;
@@ -76,7 +71,7 @@ void number_is_refused_with_advice(void)
     TEST_ASSERT_EQUAL_STRING("", problem("+1.5e0").c_str());
 }
 
-void log_is_written_with_fixed_decimals(void)
+TEST(log_is_written_with_fixed_decimals)
 {
     log_writer writer;
     writer.comment("scenario", "x\ny");
@@ -89,7 +84,7 @@ void log_is_written_with_fixed_decimals(void)
                              writer.text().c_str());
 }
 
-void file_is_written_whole_or_not_at_all(void)
+TEST(file_is_written_whole_or_not_at_all)
 {
     namespace fs = std::filesystem;
     const fs::path folder =
@@ -115,7 +110,7 @@ void file_is_written_whole_or_not_at_all(void)
 
 const std::string SCENARIO = "[scenario]\nduration_s = 60\n";
 
-void scenario_is_read(void)
+TEST(scenario_is_read)
 {
     const scenario s = parse_scenario(
         make_text_file("s.ini", "; comment\r\n[scenario]\r\nduration_s = 60\r\nseed=7\r\n"
@@ -145,7 +140,7 @@ void scenario_is_read(void)
 }
 
 /* Spring 9 + k is the stiffness spring below k; each layer has boards of its own. */
-void scenario_of_two_layers_is_read(void)
+TEST(scenario_of_two_layers_is_read)
 {
     const scenario s = parse_scenario(
         make_text_file("s.ini", SCENARIO + "[array]\nlayers = 2\n[board.2]\nsupply_limit_a = 5\n"
@@ -161,7 +156,7 @@ void scenario_of_two_layers_is_read(void)
 }
 
 /* Every other word of the console's help goes to a board that has a console. */
-void scenario_takes_the_words_of_the_console(void)
+TEST(scenario_takes_the_words_of_the_console)
 {
     for (const std::string word : {"help", "version", "model cold", "learnt clear", "faults",
                                    "selftest", "telemetry csv 5", "$$", "?"}) {
@@ -171,7 +166,7 @@ void scenario_takes_the_words_of_the_console(void)
     }
 }
 
-void scenario_with_errors_is_refused(void)
+TEST(scenario_with_errors_is_refused)
 {
     refuses_scenario(SCENARIO + "colour = 3\n", "s.ini:3:1: ", "no key 'colour'");
     refuses_scenario(SCENARIO + "duration_s = 3\n", "s.ini:3:1: ", "appears twice");
@@ -201,7 +196,7 @@ void scenario_with_errors_is_refused(void)
     refuses_scenario(SCENARIO + "[board.0]\nsupply_limit_a=5\n", "s.ini:3:", "no section");
 }
 
-void scenario_events_with_errors_are_refused(void)
+TEST(scenario_events_with_errors_are_refused)
 {
     const auto refuses = [](const char *line, const char *begin, const char *part) {
         refuses_scenario(SCENARIO + "[events]\n" + line + "\n", begin, part);
@@ -238,7 +233,7 @@ void scenario_events_with_errors_are_refused(void)
     refuses("at 61 = on 1", "s.ini:4:1: ", "after the end");
 }
 
-void scenario_arguments_with_errors_are_refused(void)
+TEST(scenario_arguments_with_errors_are_refused)
 {
     const auto refuses = [](const char *argument, const char *part) {
         expect(error_of([&] { parse_scenario(make_text_file("s.ini", SCENARIO), {argument}); }),
@@ -252,19 +247,3 @@ void scenario_arguments_with_errors_are_refused(void)
 }
 
 } // namespace
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(number_is_refused_with_advice);
-    RUN_TEST(log_is_written_with_fixed_decimals);
-    RUN_TEST(files_that_are_not_text_are_refused);
-    RUN_TEST(file_is_written_whole_or_not_at_all);
-    RUN_TEST(scenario_is_read);
-    RUN_TEST(scenario_of_two_layers_is_read);
-    RUN_TEST(scenario_takes_the_words_of_the_console);
-    RUN_TEST(scenario_with_errors_is_refused);
-    RUN_TEST(scenario_events_with_errors_are_refused);
-    RUN_TEST(scenario_arguments_with_errors_are_refused);
-    return UNITY_END();
-}

@@ -5,16 +5,11 @@
 #include <string>
 #include <vector>
 
-extern "C" {
-#include <unity.h>
-}
+#include "../run_tests.h"
 
 #include "scenario_file.h"
 
 using namespace ninespring;
-
-extern "C" void setUp(void) {}
-extern "C" void tearDown(void) {}
 
 namespace
 {
@@ -88,7 +83,7 @@ void attack(const std::string &valid, const std::function<void(const text_file &
     }
 }
 
-void scenario_reader_survives(void)
+TEST(scenario_reader_survives)
 {
     attack("[scenario]\nduration_s = 60\nseed=7\n[array]\nrows = 1\ncols = 3 ; inline\n"
            "[plant]\neffects = latent_heat,\n    radiation\nx[2] = 0.01\n[chip]\n$a = 1500\n"
@@ -98,10 +93,3 @@ void scenario_reader_survives(void)
 }
 
 } // namespace
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(scenario_reader_survives);
-    return UNITY_END();
-}

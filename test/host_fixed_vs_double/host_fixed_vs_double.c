@@ -2,15 +2,12 @@
  * and 0.15 at most. The argument is how many of the sets. */
 #include <stdlib.h>
 
+#include "../run_tests.h"
 #include "comparison.h"
-#include "unity.h"
 
 #define SETS 200u
 
 static uint32_t sets = SETS;
-
-void setUp(void) {}
-void tearDown(void) {}
 
 static void hold_to_the_figure(uint32_t count, bool latent)
 {
@@ -23,11 +20,11 @@ static void hold_to_the_figure(uint32_t count, bool latent)
     TEST_ASSERT_TRUE_MESSAGE(result.max_parted_c <= 1.0, "max after histories parted");
 }
 
-static void an_hour_of_random_drive_with_latent_heat(void)
+TEST(an_hour_of_random_drive_with_latent_heat)
 {
     hold_to_the_figure(sets, true);
 }
-static void an_hour_of_random_drive_without_latent_heat(void)
+TEST(an_hour_of_random_drive_without_latent_heat)
 {
     hold_to_the_figure(sets >= 50 ? sets / 5 : sets, false); /* fewer do not reach 120 degC */
 }
@@ -37,8 +34,5 @@ int main(int argc, char **argv)
     if (argc > 1) {
         sets = (uint32_t)strtoul(argv[1], NULL, 10);
     }
-    UNITY_BEGIN();
-    RUN_TEST(an_hour_of_random_drive_with_latent_heat);
-    RUN_TEST(an_hour_of_random_drive_without_latent_heat);
-    return UNITY_END();
+    return run_tests();
 }

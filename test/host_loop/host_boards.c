@@ -2,8 +2,8 @@
 #include <math.h>
 #include <stdbool.h>
 
+#include "../run_tests.h"
 #include "boards.h"
-#include "unity.h"
 
 static controller_settings_t settings[4];
 static plant_t *plant;
@@ -59,7 +59,7 @@ static void drive_all(int k)
     controller_set_pattern(loop_controller(boards_loop(boards, k)), on);
 }
 
-static void one_board_is_the_loop(void)
+TEST(one_board_is_the_loop)
 {
     make(3, 3);
     cut(3, 3);
@@ -81,7 +81,7 @@ static void one_board_is_the_loop(void)
 
 /* 5 x 4 on boards of 3 x 3: what is left at the edges is smaller, and each spring has one board; of
  * a second layer, too, whose springs are no board's of the first. */
-static void every_spring_has_one_board(void)
+TEST(every_spring_has_one_board)
 {
     TEST_ASSERT_EQUAL(4, boards_count(5, 4, 3, 3));
     int seen[40] = {0};
@@ -98,7 +98,7 @@ static void every_spring_has_one_board(void)
 
 /* The right half is driven: its springs rise, each board keeps its own limit, and heat reaches the
  * left half, which draws nothing. */
-static void boards_meet_in_the_heat_alone(void)
+TEST(boards_meet_in_the_heat_alone)
 {
     make(2, 4);
     settings[1].safety.supply_limit_ma = 10000;
@@ -121,7 +121,7 @@ static void boards_meet_in_the_heat_alone(void)
 
 /* A board for each layer: the elongation layer's heats its springs within its own limit, and the
  * stiffness layer's, which draws nothing, finds its springs warmer. */
-static void a_layer_has_its_own_board(void)
+TEST(a_layer_has_its_own_board)
 {
     plant = plant_create_layers(2, 2, 2);
     TEST_ASSERT_EQUAL(PLANT_OK, plant_set_effect(plant, "latent_heat", true));
@@ -143,7 +143,7 @@ static void a_layer_has_its_own_board(void)
 }
 
 /* Neither a board nor a loop of one board spans the layers. */
-static void no_board_spans_the_layers(void)
+TEST(no_board_spans_the_layers)
 {
     uint16_t bad = 0;
     plant = plant_create_layers(2, 2, 2);
@@ -155,7 +155,7 @@ static void no_board_spans_the_layers(void)
     TEST_ASSERT_NULL(loop_create(&settings[0], plant, NULL, 1, &bad));
 }
 
-static void the_board_that_does_not_fit_is_named(void)
+TEST(the_board_that_does_not_fit_is_named)
 {
     make(2, 4);
     int board = 0;
@@ -166,16 +166,4 @@ static void the_board_that_does_not_fit_is_named(void)
     TEST_ASSERT_NULL(boards_create(settings, plant, 2, 2, NULL, 1, &board, &bad));
     TEST_ASSERT_EQUAL(1, board);
     TEST_ASSERT_EQUAL(PARAMETER_rows, bad);
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(one_board_is_the_loop);
-    RUN_TEST(every_spring_has_one_board);
-    RUN_TEST(boards_meet_in_the_heat_alone);
-    RUN_TEST(a_layer_has_its_own_board);
-    RUN_TEST(no_board_spans_the_layers);
-    RUN_TEST(the_board_that_does_not_fit_is_named);
-    return UNITY_END();
 }

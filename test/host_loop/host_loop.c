@@ -5,14 +5,12 @@
 #include <stddef.h>
 #include <string.h>
 
+#include "../run_tests.h"
 #include "loop.h"
-#include "unity.h"
 
 static controller_settings_t settings;
 static plant_t *plant;
 static loop_t *loop;
-
-static const unsigned patterns[] = {0x1EF /* all but the centre */, 0x1FF, 0x010, 0x155, 0x007};
 
 /* The chip's default parameters in the plant: pitch 4 mm, with phase. */
 void setUp(void)
@@ -75,67 +73,8 @@ static double true_c(int spring)
     return plant_temperature_c(loop_plant(loop), spring);
 }
 
-static safety_fault_t fault(int spring)
-{
-    return controller_fault(loop_controller(loop), (uint8_t)spring);
-}
-
-static double mean_current_a(int spring, int ticks)
-{
-    double sum_a = 0.0;
-    for (int n = 0; n < ticks; n++) {
-        loop_tick(loop);
-        sum_a += loop_current_a(loop, spring);
-    }
-    return sum_a / ticks;
-}
-
-/* Ten minutes of each pattern at the given current: mean current within 5 mA, temperatures as the
- * same currents give in the plant alone within plant_c, the chip's estimate within chip_limit_c of
- * what is. */
-static void hold_patterns(uint16_t current_ma, double plant_limit_c, double chip_limit_c)
-{
-    settings.policy.open_current_ma = current_ma;
-    for (size_t p = 0; p < sizeof patterns / sizeof patterns[0]; p++) {
-        start_cold();
-        command(patterns[p]);
-        plant_t *alone = plant_copy(plant);
-        TEST_ASSERT_NOT_NULL(alone);
-        for (int k = 0; k < 9; k++) {
-            double current_a = (patterns[p] >> k & 1u) != 0 ? current_ma / 1000.0 : 0.0;
-            TEST_ASSERT_EQUAL(PLANT_OK, plant_drive(alone, k, PLANT_DRIVE_CURRENT, current_a));
-        }
-        double worst_plant_c = 0.0;
-        double worst_chip_c = 0.0;
-        for (int second = 0; second < 600; second += 10) {
-            loop_advance(loop, 10.0);
-            TEST_ASSERT_EQUAL(PLANT_OK, plant_step(alone, 10.0));
-            for (int k = 0; k < 9; k++) {
-                worst_plant_c =
-                    fmax(worst_plant_c, fabs(true_c(k) - plant_temperature_c(alone, k)));
-                worst_chip_c = fmax(worst_chip_c, fabs(chip_c(k) - true_c(k)));
-            }
-        }
-        plant_destroy(alone);
-        TEST_ASSERT_TRUE(worst_plant_c < plant_limit_c);
-        TEST_ASSERT_TRUE(worst_chip_c < chip_limit_c);
-        for (int k = 0; k < 9; k++) {
-            bool on = (patterns[p] >> k & 1u) != 0;
-            TEST_ASSERT_DOUBLE_WITHIN(0.005, on ? current_ma / 1000.0 : 0.0,
-                                      mean_current_a(k, 100));
-            TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, fault(k));
-        }
-    }
-}
-
-/* The ramp of 0.5 s and 12 mA of a duty step are the difference. */
-static void plain_current_follows_the_patterns(void)
-{
-    hold_patterns(1500, 0.6, 0.5);
-}
-
 /* The model alone: what readings correct is test_spring_estimator's. */
-static void estimate_follows_through_the_transformation(void)
+TEST(estimate_follows_through_the_transformation)
 {
     settings.policy.observer = 0;
     settings.policy.open_current_ma = 1800;
@@ -157,7 +96,7 @@ static void estimate_follows_through_the_transformation(void)
     TEST_ASSERT_TRUE(worst_c < 0.5);
 }
 
-static void coarser_plant_steps_change_little(void)
+TEST(coarser_plant_steps_change_little)
 {
     loop_options_t options;
     loop_options_default(&options);
@@ -179,46 +118,7 @@ static void coarser_plant_steps_change_little(void)
     loop_destroy(coarse);
 }
 
-static void sagging_supply_still_gives_the_current(void)
-{
-    TEST_ASSERT_EQUAL(PLANT_OK, plant_set_effect(plant, "supply_sag", true));
-    start();
-    command(0x1FF);
-    loop_advance(loop, 10.0);
-    TEST_ASSERT_DOUBLE_WITHIN(0.005, 1.5, mean_current_a(4, 100));
-}
-
-static void each_failure_is_found_and_is_of_its_spring(void)
-{
-    const struct {
-        loop_action_t action;
-        safety_fault_t fault;
-    } failures[] = {{LOOP_ACTION_OPEN_SPRING, SAFETY_FAULT_OPEN_SPRING},
-                    {LOOP_ACTION_SHORT_SPRING, SAFETY_FAULT_SHORT_SPRING},
-                    {LOOP_ACTION_SENSOR_NACK, SAFETY_FAULT_SENSOR_ABSENT},
-                    {LOOP_ACTION_SENSOR_STALE, SAFETY_FAULT_SENSOR_STALE}};
-    for (size_t f = 0; f < sizeof failures / sizeof failures[0]; f++) {
-        start();
-        command(0x1FF);
-        loop_advance(loop, 5.0);
-        TEST_ASSERT_TRUE(loop_act(loop, failures[f].action, 3));
-        loop_advance(loop, 1.0);
-        TEST_ASSERT_EQUAL(failures[f].fault, fault(3));
-        TEST_ASSERT_TRUE(loop_current_a(loop, 3) == 0.0);
-        TEST_ASSERT_DOUBLE_WITHIN(0.03, 1.5, loop_current_a(loop, 4));
-        TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, fault(4));
-
-        TEST_ASSERT_TRUE(loop_act(loop, LOOP_ACTION_SPRING_GOOD, 3));
-        TEST_ASSERT_TRUE(loop_act(loop, LOOP_ACTION_SENSOR_GOOD, 3));
-        controller_clear_faults(loop_controller(loop));
-        command(0x1FF);
-        loop_advance(loop, 2.0);
-        TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, fault(3));
-        TEST_ASSERT_DOUBLE_WITHIN(0.03, 1.5, loop_current_a(loop, 3));
-    }
-}
-
-static void a_repair_ends_its_own_failure_only(void)
+TEST(a_repair_ends_its_own_failure_only)
 {
     start();
     TEST_ASSERT_TRUE(loop_act(loop, LOOP_ACTION_SENSOR_NACK, 0));
@@ -235,7 +135,7 @@ static void a_repair_ends_its_own_failure_only(void)
 
 /* What looks right and is not: the loop only provokes it; what the controller makes of it is not
  * judged here. */
-static void frozen_lying_and_swapped_sensors_show_what_they_should_not(void)
+TEST(frozen_lying_and_swapped_sensors_show_what_they_should_not)
 {
     start();
     command(0x1FF);
@@ -289,7 +189,7 @@ static uint32_t ticks_until_named(void)
 }
 
 /* Driven alone, with all others, not at all; and after a stop. */
-static void switch_that_fails_closed_is_named_within_15_ticks(void)
+TEST(switch_that_fails_closed_is_named_within_15_ticks)
 {
     static const unsigned driven[] = {0x010, 0x1FF, 0x000};
     for (unsigned n = 0; n < 6; n++) {
@@ -316,7 +216,7 @@ static void switch_that_fails_closed_is_named_within_15_ticks(void)
     }
 }
 
-static void the_chip_believes_the_ambient_that_it_is_told(void)
+TEST(the_chip_believes_the_ambient_that_it_is_told)
 {
     start();
     TEST_ASSERT_TRUE(loop_tell_ambient(loop, 10.0));
@@ -329,7 +229,7 @@ static void the_chip_believes_the_ambient_that_it_is_told(void)
     TEST_ASSERT_EQUAL_INT16(30 * 128, loop_inputs(loop)->ambient_c7);
 }
 
-static void after_a_reset_nothing_runs_until_unlocked(void)
+TEST(after_a_reset_nothing_runs_until_unlocked)
 {
     const loop_action_t resets[] = {LOOP_ACTION_WATCHDOG, LOOP_ACTION_BROWN_OUT};
     for (size_t r = 0; r < 2; r++) {
@@ -358,33 +258,7 @@ static void after_a_reset_nothing_runs_until_unlocked(void)
     }
 }
 
-/* At any moment of heating and cooling, the phase half transformed or not. */
-static void watchdog_keeps_the_model_as_it_is(void)
-{
-    settings.policy.open_current_ma = 2000;
-    start();
-    controller_t *controller = loop_controller(loop);
-    controller_set_temperature(controller, 20 * 128); /* a guess would not be kept */
-    for (int n = 0; n < 60; n++) {
-        controller_unlock(controller);
-        command(n % 20 < 14 ? 0x1EF : 0);
-        loop_advance(loop, 5.0);
-        int16_t temperature_c7[9];
-        uint16_t austenite[9];
-        for (uint8_t k = 0; k < 9; k++) {
-            temperature_c7[k] = thermal_model_temperature_c7(&controller->model, k);
-            austenite[k] = thermal_model_austenite(&controller->model, k);
-        }
-        TEST_ASSERT_TRUE(loop_act(loop, LOOP_ACTION_WATCHDOG, -1));
-        for (uint8_t k = 0; k < 9; k++) {
-            TEST_ASSERT_EQUAL_INT16(temperature_c7[k],
-                                    thermal_model_temperature_c7(&controller->model, k));
-            TEST_ASSERT_EQUAL_UINT16(austenite[k], thermal_model_austenite(&controller->model, k));
-        }
-    }
-}
-
-static void ambient_reaches_plant_and_chip_with_its_error(void)
+TEST(ambient_reaches_plant_and_chip_with_its_error)
 {
     loop_options_t options;
     loop_options_default(&options);
@@ -403,7 +277,7 @@ static void ambient_reaches_plant_and_chip_with_its_error(void)
     TEST_ASSERT_DOUBLE_WITHIN(1e-6, 1000.0, plant_time_s(loop_plant(loop)));
 }
 
-static void what_does_not_fit_is_refused(void)
+TEST(what_does_not_fit_is_refused)
 {
     uint16_t bad = 0;
     loop_options_t options;
@@ -432,23 +306,4 @@ static void what_does_not_fit_is_refused(void)
     TEST_ASSERT_FALSE(loop_act(loop, LOOP_ACTION_OPEN_SPRING, -1));
     TEST_ASSERT_FALSE(loop_act(loop, LOOP_ACTION_COUNT, 0));
     TEST_ASSERT_TRUE(loop_current_a(loop, 9) == 0.0);
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(plain_current_follows_the_patterns);
-    RUN_TEST(estimate_follows_through_the_transformation);
-    RUN_TEST(coarser_plant_steps_change_little);
-    RUN_TEST(sagging_supply_still_gives_the_current);
-    RUN_TEST(each_failure_is_found_and_is_of_its_spring);
-    RUN_TEST(a_repair_ends_its_own_failure_only);
-    RUN_TEST(frozen_lying_and_swapped_sensors_show_what_they_should_not);
-    RUN_TEST(switch_that_fails_closed_is_named_within_15_ticks);
-    RUN_TEST(the_chip_believes_the_ambient_that_it_is_told);
-    RUN_TEST(after_a_reset_nothing_runs_until_unlocked);
-    RUN_TEST(watchdog_keeps_the_model_as_it_is);
-    RUN_TEST(ambient_reaches_plant_and_chip_with_its_error);
-    RUN_TEST(what_does_not_fit_is_refused);
-    return UNITY_END();
 }

@@ -4,9 +4,9 @@
 #ifndef PLANT_RIG_H
 #define PLANT_RIG_H
 
+#include "../run_tests.h"
 #include <math.h>
 #include <string.h>
-#include <unity.h>
 
 #include "plant.h"
 
@@ -45,11 +45,6 @@ static inline void drive(int spring, plant_drive_mode_t mode, double quantity)
 {
     OK(plant_drive(plant, spring, mode, quantity));
 }
-static inline void drive_all(plant_drive_mode_t mode, double quantity)
-{
-    for (int i = 0; i < plant_spring_count(plant); i++)
-        drive(i, mode, quantity);
-}
 static inline void hold(int spring, double t)
 {
     drive(spring, PLANT_DRIVE_TEMPERATURE, t);
@@ -73,15 +68,15 @@ static inline double uniform(void) /* the same numbers everywhere */
     return (double)(random_state >> 8) / 16777216.0;
 }
 
-#define ROWS 600
-static double log_time[ROWS], log_drive[ROWS * 9], log_fan[ROWS], log_ambient[ROWS];
-static double shown[2][ROWS * 9], real[2][ROWS * 9];
+#define LOG_ROWS 600
+static double log_time[LOG_ROWS], log_drive[LOG_ROWS * 9], log_fan[LOG_ROWS], log_ambient[LOG_ROWS];
+static double shown[2][LOG_ROWS * 9], real[2][LOG_ROWS * 9];
 static plant_drive_mode_t log_mode[9];
 
 static inline void make_log(plant_drive_mode_t mode, double largest, unsigned seed)
 {
     random_state = seed;
-    for (int r = 0; r < ROWS; r++) {
+    for (int r = 0; r < LOG_ROWS; r++) {
         log_time[r] = r;
         log_fan[r] = r < 300 ? 0.0 : 0.7;
         log_ambient[r] = 20.0;
@@ -96,14 +91,14 @@ static inline void make_log(plant_drive_mode_t mode, double largest, unsigned se
 static inline void run_log(int k)
 {
     plant_reset(plant);
-    OK(plant_simulate(plant, ROWS, log_time, log_mode, log_drive, log_fan, log_ambient, shown[k],
-                      real[k]));
+    OK(plant_simulate(plant, LOG_ROWS, log_time, log_mode, log_drive, log_fan, log_ambient,
+                      shown[k], real[k]));
 }
 
 static inline double largest_difference(const double *a, const double *b)
 {
     double largest = 0.0;
-    for (int k = 0; k < ROWS * 9; k++)
+    for (int k = 0; k < LOG_ROWS * 9; k++)
         largest = fmax(largest, fabs(a[k] - b[k]));
     return largest;
 }

@@ -1,9 +1,10 @@
 /* What each effect touches. Their equations are held to a second implementation by
  * against_scipy.py; here is what that does not look at. */
+#include "convection.h"
 #include "plant_rig.h"
 
 /* Which effects touch the temperatures in which drive modes, and which only the picture of them. */
-static void each_effect_changes_what_it_should_and_only_that(void)
+TEST(each_effect_changes_what_it_should_and_only_that)
 {
     enum { POWER = 1, CURRENT = 2, DUTY = 4, COMMAND = 8, HEAT = 15, PICTURE = 16 };
     static const struct {
@@ -30,7 +31,7 @@ static void each_effect_changes_what_it_should_and_only_that(void)
         {"fan_curve", HEAT},
     };
     static const double largest[4] = {0.8, 2.2, 0.2, 1.0};
-    TEST_ASSERT_EQUAL_UINT(plant_effect_count(), sizeof expected / sizeof expected[0]);
+    TEST_ASSERT_EQUAL_UINT(plant_effect_count(), ROWS(expected));
     set("loss_scale[3]", 1.2);
     set("command_power_w", 0.8);
     set("resistance_martensite_rise_per_k", 1e-3);
@@ -54,59 +55,8 @@ static void each_effect_changes_what_it_should_and_only_that(void)
     }
 }
 
-static void a_hot_spring_radiates_a_seventh_of_its_loss(void)
-{
-    uncouple();
-    hold(0, 105.0);
-    settle();
-    const double without = plant_power_w(plant, 0);
-    on("radiation");
-    settle();
-    TEST_ASSERT_DOUBLE_WITHIN(0.002, 0.082, plant_power_w(plant, 0) - without);
-}
-
-static void natural_convection_loses_less_where_it_is_cooler_and_leaves_the_fan_alone(void)
-{
-    uncouple();
-    for (int windy = 0; windy < 2; windy++) {
-        double per_k[2][2];
-        OK(plant_set_fan(plant, windy));
-        for (int k = 0; k < 2; k++) {
-            OK(plant_set_effect(plant, "natural_convection", k));
-            hold(0, 20.0 + get("convection_reference_k"));
-            hold(1, 40.0);
-            settle();
-            per_k[k][0] = plant_power_w(plant, 0) / get("convection_reference_k");
-            per_k[k][1] = plant_power_w(plant, 1) / 20.0;
-        }
-        TEST_ASSERT_DOUBLE_WITHIN(1e-12, per_k[0][0], per_k[1][0]); /* there it holds */
-        TEST_ASSERT_TRUE(windy ? per_k[1][1] == per_k[0][1] : per_k[1][1] < 0.8 * per_k[0][1]);
-    }
-}
-
-static void resistance_follows_phase_and_each_phase_its_temperature(void)
-{
-    on("resistance_phase");
-    const double martensite = get("resistance_martensite_ohm");
-    const double austenite = get("resistance_austenite_ohm");
-    TEST_ASSERT_EQUAL_DOUBLE(martensite, plant_resistance_ohm(plant, 0));
-    hold(0, 93.0); /* half way */
-    TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.5 * (martensite + austenite),
-                              plant_resistance_ohm(plant, 0));
-    on("resistance_temperature");
-    set("resistance_martensite_rise_per_k", 0.0012);
-    set("resistance_austenite_rise_per_k", -0.0003);
-    hold(1, 70.0);
-    hold(2, 120.0);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.5 * (1.0876 * martensite + 0.9781 * austenite),
-                              plant_resistance_ohm(plant, 0));
-    TEST_ASSERT_DOUBLE_WITHIN(1e-12, 1.06 * martensite, plant_resistance_ohm(plant, 1));
-    TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.97 * austenite, plant_resistance_ohm(plant, 2));
-    TEST_ASSERT_EQUAL_DOUBLE(martensite, plant_resistance_ohm(plant, 3));
-}
-
 /* A sensor at the terminals sees the contact; the spring does not feel it. */
-static void a_contact_takes_voltage_and_keeps_its_heat(void)
+TEST(a_contact_takes_voltage_and_keeps_its_heat)
 {
     uncouple();
     on("contact_resistance");
@@ -132,13 +82,26 @@ static void a_contact_takes_voltage_and_keeps_its_heat(void)
     TEST_ASSERT_EQUAL_DOUBLE(plant_current_a(plant, 1), plant_current_a(plant, 0));
 }
 
-int main(void)
+TEST(correlations_against_the_table)
 {
-    UNITY_BEGIN();
-    RUN_TEST(each_effect_changes_what_it_should_and_only_that);
-    RUN_TEST(a_hot_spring_radiates_a_seventh_of_its_loss);
-    RUN_TEST(natural_convection_loses_less_where_it_is_cooler_and_leaves_the_fan_alone);
-    RUN_TEST(resistance_follows_phase_and_each_phase_its_temperature);
-    RUN_TEST(a_contact_takes_voltage_and_keeps_its_heat);
-    return UNITY_END();
+    /* Incropera and DeWitt, table A.4 */
+    TEST_ASSERT_DOUBLE_WITHIN(0.005 * 20.92e-6, 20.92e-6, convection_air_viscosity_m2_per_s(350));
+    TEST_ASSERT_DOUBLE_WITHIN(0.005 * 26.41e-6, 26.41e-6, convection_air_viscosity_m2_per_s(400));
+    TEST_ASSERT_DOUBLE_WITHIN(0.005 * 30.0e-3, 30.0e-3, convection_air_conductivity_w_per_mk(350));
+    /* worked out by hand at a film of 62.5 degC: nu 19.4e-6, k 29.1e-3, Ra 2.37 */
+    TEST_ASSERT_DOUBLE_WITHIN(0.3, 34.1, convection_natural_w_per_m2k(8e-4, 105, 20));
+    /* Re 25.9, Nu 2.76 */
+    TEST_ASSERT_DOUBLE_WITHIN(0.8, 100.3, convection_forced_w_per_m2k(8e-4, 0.63, 105, 20));
+    TEST_ASSERT_EQUAL_DOUBLE(0.0, convection_forced_w_per_m2k(8e-4, 0.0, 105, 20));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, 10.0, convection_mixed(10.0, 0.0));
+
+    uncouple();
+    on("natural_convection");
+    set("convection_correlation", 1);
+    hold(0, 105.0);
+    settle();
+    TEST_ASSERT_DOUBLE_WITHIN(0.1e-3 * 85, 5.8e-3 * 85, plant_power_w(plant, 0));
+    OK(plant_set_fan(plant, 1.0));
+    settle();
+    TEST_ASSERT_DOUBLE_WITHIN(0.2e-3 * 85, 11.3e-3 * 85, plant_power_w(plant, 0));
 }

@@ -1,12 +1,9 @@
+#include "../run_tests.h"
 #include <math.h>
-#include <unity.h>
 
 #include "electrics.h"
 
-void setUp(void) {}
-void tearDown(void) {}
-
-static void compare_register_zero_is_a_pulse_of_one_clock(void)
+TEST(compare_register_zero_is_a_pulse_of_one_clock)
 {
     TEST_ASSERT_EQUAL_DOUBLE(0.0, electrics_pwm_fraction(false, 0, 799));
     TEST_ASSERT_EQUAL_DOUBLE(1.0 / 800.0, electrics_pwm_fraction(true, 0, 799));
@@ -16,7 +13,7 @@ static void compare_register_zero_is_a_pulse_of_one_clock(void)
     TEST_ASSERT_EQUAL_DOUBLE(1.0, electrics_pwm_fraction(true, 5000, 799));
 }
 
-static void mean_current_follows_from_the_loop(void)
+TEST(mean_current_follows_from_the_loop)
 {
     /* 5 V, 0.219 + 0.18 ohm: full duty 12.5 A; one step of 800 is 15.7 mA */
     TEST_ASSERT_DOUBLE_WITHIN(1e-9, 5.0 / 0.399,
@@ -29,7 +26,7 @@ static void mean_current_follows_from_the_loop(void)
     TEST_ASSERT_EQUAL_DOUBLE(0.0, electrics_buck_current_a(0.05, 5.0, 0.4, 0.22, 0.18));
 }
 
-static void supply_sags_to_where_source_and_load_agree(void)
+TEST(supply_sags_to_where_source_and_load_agree)
 {
     const double v = electrics_supply_v(5.0, 0.2, 0.5, 2.0);
     TEST_ASSERT_DOUBLE_WITHIN(1e-12, v, 5.0 - 0.2 * (0.5 * v + 2.0 / v));
@@ -38,7 +35,7 @@ static void supply_sags_to_where_source_and_load_agree(void)
     TEST_ASSERT_DOUBLE_WITHIN(1e-12, 2.5, electrics_supply_v(5.0, 1.0, 0.0, 100.0));
 }
 
-static void registers_have_the_data_sheets_steps_and_ends(void)
+TEST(registers_have_the_data_sheets_steps_and_ends)
 {
     TEST_ASSERT_EQUAL_INT16(15000, electrics_ina219_shunt_register(1.5));
     TEST_ASSERT_EQUAL_INT16(1, electrics_ina219_shunt_register(0.00014));
@@ -54,7 +51,7 @@ static void registers_have_the_data_sheets_steps_and_ends(void)
     TEST_ASSERT_EQUAL_UINT16(0, electrics_ina219_bus_register(-1.0));
 }
 
-static void sensor_reports_the_mean_over_its_own_windows(void)
+TEST(sensor_reports_the_mean_over_its_own_windows)
 {
     electrics_ina219_t sensor;
     double current, voltage;
@@ -71,7 +68,7 @@ static void sensor_reports_the_mean_over_its_own_windows(void)
     TEST_ASSERT_FALSE(electrics_ina219_take(&sensor, &current, &voltage));
 }
 
-static void averaging_takes_the_root_of_n_off_the_noise(void)
+TEST(averaging_takes_the_root_of_n_off_the_noise)
 {
     double spread[2], bus_spread[2];
     for (int k = 0; k < 2; k++) {
@@ -97,7 +94,7 @@ static void averaging_takes_the_root_of_n_off_the_noise(void)
     TEST_ASSERT_DOUBLE_WITHIN(0.3, 4.0, spread[0] / spread[1]);
 }
 
-static void same_seed_gives_the_same_noise(void)
+TEST(same_seed_gives_the_same_noise)
 {
     electrics_noise_t a, b, c;
     electrics_noise_seed(&a, 5);
@@ -112,7 +109,7 @@ static void same_seed_gives_the_same_noise(void)
     TEST_ASSERT_TRUE(differs);
 }
 
-static void bad_sensor_settings_are_refused(void)
+TEST(bad_sensor_settings_are_refused)
 {
     electrics_ina219_t sensor;
     TEST_ASSERT_FALSE(electrics_ina219_init(&sensor, 0, 0, 0, 1));
@@ -121,18 +118,4 @@ static void bad_sensor_settings_are_refused(void)
     TEST_ASSERT_FALSE(electrics_ina219_init(&sensor, 8, -1e-6, 0, 1));
     TEST_ASSERT_FALSE(electrics_ina219_init(&sensor, 8, 0, (double)NAN, 1));
     TEST_ASSERT_FALSE(electrics_ina219_init(&sensor, 8, (double)INFINITY, 0, 1));
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(compare_register_zero_is_a_pulse_of_one_clock);
-    RUN_TEST(mean_current_follows_from_the_loop);
-    RUN_TEST(supply_sags_to_where_source_and_load_agree);
-    RUN_TEST(registers_have_the_data_sheets_steps_and_ends);
-    RUN_TEST(sensor_reports_the_mean_over_its_own_windows);
-    RUN_TEST(averaging_takes_the_root_of_n_off_the_noise);
-    RUN_TEST(same_seed_gives_the_same_noise);
-    RUN_TEST(bad_sensor_settings_are_refused);
-    return UNITY_END();
 }

@@ -1,9 +1,9 @@
 /* Plant and chip model of the largest array, one against the other. */
 #include <math.h>
 
+#include "../run_tests.h"
 #include "plant.h"
 #include "thermal_model.h"
-#include "unity.h"
 
 #define SIDE    32
 #define SPRINGS (SIDE * SIDE)
@@ -17,8 +17,6 @@ void setUp(void)
     parameters.rows = parameters.columns = SIDE;
 }
 
-void tearDown(void) {}
-
 static unsigned state = 7;
 static unsigned random_bits(void)
 {
@@ -28,7 +26,7 @@ static unsigned random_bits(void)
 
 /* Ten minutes, other powers every half minute, the fan on after five: through the transformation
  * and back. */
-static void chip_follows_the_plant(void)
+TEST(chip_follows_the_plant)
 {
     static uint32_t power_uw[SPRINGS];
     plant_t *plant = plant_create(SIDE, SIDE);
@@ -60,7 +58,7 @@ static void chip_follows_the_plant(void)
 }
 
 /* The plate's own sum has 32 bits: refused, not wrapped round. */
-static void a_plate_that_takes_too_much_is_refused(void)
+TEST(a_plate_that_takes_too_much_is_refused)
 {
     uint16_t bad = 0;
     parameters.plate_heat_capacity_mj_per_k = 2000000;
@@ -71,17 +69,8 @@ static void a_plate_that_takes_too_much_is_refused(void)
     TEST_ASSERT_EQUAL(PARAMETER_plate_coupling_w_per_k, bad);
 }
 
-static void more_springs_are_refused(void)
+TEST(more_springs_are_refused)
 {
     parameters.columns = SIDE + 1;
     TEST_ASSERT_EQUAL(THERMAL_MODEL_ERROR_RANGE, thermal_model_init(&model, &parameters, NULL));
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(chip_follows_the_plant);
-    RUN_TEST(a_plate_that_takes_too_much_is_refused);
-    RUN_TEST(more_springs_are_refused);
-    return UNITY_END();
 }

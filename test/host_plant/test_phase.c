@@ -9,22 +9,7 @@ static void lead(double t)
     OK(plant_step(plant, 0.01));
 }
 
-static void outer_loop_is_liang_and_rogers_cosine(void)
-{
-    const double up[][2] = {
-        {87, 0}, {90.5, 0.5 - 0.35355339}, {93, 0.5}, {95.5, 0.85355339}, {98, 1}, {120, 1}};
-    const double down[][2] = {{98, 1}, {79, 1}, {75.5, 0.85355339}, {73, 0.5}, {68, 0}, {20, 0}};
-    for (int k = 0; k < 6; k++) {
-        lead(up[k][0]);
-        TEST_ASSERT_DOUBLE_WITHIN(1e-7, up[k][1], plant_austenite(plant, 0));
-    }
-    for (int k = 0; k < 6; k++) {
-        lead(down[k][0]);
-        TEST_ASSERT_DOUBLE_WITHIN(1e-7, down[k][1], plant_austenite(plant, 0));
-    }
-}
-
-static void minor_loops_by_hand(void)
+TEST(minor_loops_by_hand)
 {
     static const double path[][2] = {
         {93, 0.5},                      /* half way up */
@@ -36,13 +21,13 @@ static void minor_loops_by_hand(void)
         {93, 0.5238728757}, /* the heating branch starts at what is left */
         {98, 1.0},          {73, 0.5},  {93, 0.75}, {78, 0.75}, {73, 0.375}, {60, 0.0},
     };
-    for (size_t k = 0; k < sizeof path / sizeof path[0]; k++) {
+    for (size_t k = 0; k < ROWS(path); k++) {
         lead(path[k][0]);
         TEST_ASSERT_DOUBLE_WITHIN(1e-9, path[k][1], plant_austenite(plant, 0));
     }
 }
 
-static void overlapping_bands_stay_within_the_outer_loop(void)
+TEST(overlapping_bands_stay_within_the_outer_loop)
 {
     set("austenite_start_c", 72.0); /* below M_s */
     on("latent_heat");
@@ -63,7 +48,7 @@ static void overlapping_bands_stay_within_the_outer_loop(void)
     }
 }
 
-static void turning_within_overlapping_bands_does_not_jump(void)
+TEST(turning_within_overlapping_bands_does_not_jump)
 {
     set("austenite_start_c", 72.0);
     lead(120.0);
@@ -76,22 +61,7 @@ static void turning_within_overlapping_bands_does_not_jump(void)
     TEST_ASSERT_DOUBLE_WITHIN(3e-4, 0.85355339, plant_austenite(plant, 0));
 }
 
-static void latent_heat_delays_by_its_energy_and_changes_no_steady_state(void)
-{
-    uncouple();
-    set("loss_w_per_k", 0.0);
-    on("latent_heat");
-    drive(0, PLANT_DRIVE_POWER, 0.5);
-    /* 20 -> 100 degC: 24 J and 8.65 J at 0.5 W */
-    OK(plant_step(plant, (24.0 + 8.65) / 0.5));
-    TEST_ASSERT_DOUBLE_WITHIN(2e-3, 100.0, at(0));
-    TEST_ASSERT_EQUAL_DOUBLE(1.0, plant_austenite(plant, 0));
-    set("loss_w_per_k", 0.0058);
-    settle();
-    TEST_ASSERT_DOUBLE_WITHIN(1e-4, 20.0 + 0.5 / 0.0058, at(0));
-}
-
-static void a_logged_load_moves_them_by_so_much_a_newton(void)
+TEST(a_logged_load_moves_them_by_so_much_a_newton)
 {
     on("transformation_shift");
     set("transformation_shift_k[1]", 2.0);
@@ -107,34 +77,7 @@ static void a_logged_load_moves_them_by_so_much_a_newton(void)
     TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.5, plant_austenite(plant, 1));
 }
 
-/* A finger presses on a hot spring: it transforms at once as far as the heat that this sets free
- * lets it. */
-static void a_load_on_a_hot_spring_warms_it_by_what_it_gives_back(void)
-{
-    uncouple();
-    set("loss_w_per_k", 0.0);
-    on("latent_heat");
-    on("transformation_shift");
-    lead(100.0);
-    lead(82.0);
-    drive(0, PLANT_DRIVE_POWER, 0.0);
-    OK(plant_step(plant, 1.0));
-    TEST_ASSERT_EQUAL_DOUBLE(1.0, plant_austenite(plant, 0));
-    set("transformation_shift_k[1]", 10.0); /* martensite starts at 88 */
-    OK(plant_step(plant, 1.0));
-    const double x = plant_austenite(plant, 0), warmer = at(0) - 82.0;
-    TEST_ASSERT_TRUE(x > 0.8 && x < 0.99 && at(0) < 88.0);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-9, get("latent_heat_j") * (1.0 - x),
-                              get("heat_capacity_j_per_k") * warmer);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.5 - 0.5 * cos(PI * (at(0) - 78.0) / 10.0), x);
-    /* the finger leaves: below austenite start nothing comes back */
-    set("transformation_shift_k[1]", 0.0);
-    OK(plant_step(plant, 1.0));
-    TEST_ASSERT_DOUBLE_WITHIN(1e-9, x, plant_austenite(plant, 0));
-    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 82.0 + warmer, at(0));
-}
-
-static void a_load_on_a_held_spring_leaves_its_heat_with_whatever_holds_it(void)
+TEST(a_load_on_a_held_spring_leaves_its_heat_with_whatever_holds_it)
 {
     uncouple();
     set("loss_w_per_k", 0.0);
@@ -152,7 +95,7 @@ static void a_load_on_a_held_spring_leaves_its_heat_with_whatever_holds_it(void)
 }
 
 /* Another parameter that is set in mid-run is no load: the minor loop goes on as it was. */
-static void what_is_no_load_leaves_the_memory_alone(void)
+TEST(what_is_no_load_leaves_the_memory_alone)
 {
     on("contact_resistance");
     lead(93.0);
@@ -161,19 +104,4 @@ static void what_is_no_load_leaves_the_memory_alone(void)
     set("contact_ohm[1]", 0.05);
     lead(70.0);
     TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.0477457514, plant_austenite(plant, 0));
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(outer_loop_is_liang_and_rogers_cosine);
-    RUN_TEST(minor_loops_by_hand);
-    RUN_TEST(overlapping_bands_stay_within_the_outer_loop);
-    RUN_TEST(turning_within_overlapping_bands_does_not_jump);
-    RUN_TEST(latent_heat_delays_by_its_energy_and_changes_no_steady_state);
-    RUN_TEST(a_logged_load_moves_them_by_so_much_a_newton);
-    RUN_TEST(a_load_on_a_hot_spring_warms_it_by_what_it_gives_back);
-    RUN_TEST(a_load_on_a_held_spring_leaves_its_heat_with_whatever_holds_it);
-    RUN_TEST(what_is_no_load_leaves_the_memory_alone);
-    return UNITY_END();
 }

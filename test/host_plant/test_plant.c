@@ -2,70 +2,7 @@
 #include "electrics.h"
 #include "plant_rig.h"
 
-/* Each effect alone, all together, and 4,000 of the other combinations. */
-static void energy_closes_whatever_is_on(void)
-{
-    const size_t effects = plant_effect_count();
-    make_log(PLANT_DRIVE_CURRENT, 2.6, 11);
-    log_mode[1] = PLANT_DRIVE_DUTY;
-    log_mode[2] = PLANT_DRIVE_COMMAND;
-    log_mode[3] = PLANT_DRIVE_TEMPERATURE;
-    log_mode[4] = PLANT_DRIVE_POWER;
-    for (int r = 0; r < ROWS; r++) {
-        log_drive[r * 9 + 1] *= 0.1;
-        log_drive[r * 9 + 2] *= 0.35;
-        log_drive[r * 9 + 3] = 40.0 + 25.0 * log_drive[r * 9 + 3];
-        log_drive[r * 9 + 4] *= 0.3;
-        log_fan[r] = r < 50 ? 0.0 : 0.7;
-    }
-    set("latent_cooling_ratio", 0.336);
-    set("loss_scale[2]", 1.3);
-    set("resistance_martensite_rise_per_k", 0.001);
-    set("contact_ohm[5]", 0.05);
-    double worst = 0.0;
-    int transformed = 0;
-    for (unsigned n = 0; n < 4000 + effects; n++) {
-        const unsigned mask = n == 0         ? ~0u
-                              : n <= effects ? 1u << (n - 1)
-                                             : (unsigned)(uniform() * 4294967296.0);
-        for (size_t k = 0; k < effects; k++)
-            OK(plant_set_effect_index(plant, k, (mask >> k) & 1u));
-        plant_reset(plant);
-        OK(plant_simulate(plant, 70, log_time, log_mode, log_drive, log_fan, NULL, NULL, NULL));
-        set("transformation_shift_k", 9.0); /* a load in mid-run */
-        OK(plant_simulate(plant, 60, log_time + 70, log_mode, log_drive + 630, log_fan + 70, NULL,
-                          NULL, NULL));
-        worst = fmax(worst, fabs(plant_energy_balance_j(plant)) / plant_energy_input_j(plant));
-        TEST_ASSERT_TRUE(plant_energy_input_j(plant) > 10.0);
-        for (int i = 0; i < 9; i++)
-            transformed += plant_austenite(plant, i) > 0.0;
-        set("transformation_shift_k", 0.0);
-    }
-    TEST_ASSERT_TRUE(transformed > 4000);
-    TEST_ASSERT_TRUE_MESSAGE(worst < 1e-9, "energy balance");
-}
-
-static void default_tolerance_is_within_a_hundredth_of_a_degree(void)
-{
-    for (int kind = 0; kind < 4; kind++) {
-        for (size_t k = 0; k < plant_effect_count(); k++)
-            OK(plant_set_effect_index(plant, k,
-                                      kind == 3 || (kind > 0 && k == 2) || (kind > 1 && k == 3)));
-        make_log(PLANT_DRIVE_CURRENT, 2.4, 17u + (unsigned)kind);
-        set("integration_tolerance_c", 1e-3);
-        run_log(0);
-        set("integration_tolerance_c", 1e-8);
-        run_log(1);
-        double top = 0.0;
-        for (int k = 0; k < ROWS * 9; k++)
-            top = fmax(top, real[1][k]);
-        TEST_ASSERT_TRUE(top > 100.0); /* the transformation took part */
-        TEST_ASSERT_TRUE(largest_difference(real[0], real[1]) < 0.01);
-        TEST_ASSERT_TRUE(largest_difference(shown[0], shown[1]) < 0.01);
-    }
-}
-
-static void tolerance_governs_the_error(void)
+TEST(tolerance_governs_the_error)
 {
     double error[2];
     on("latent_heat");
@@ -89,7 +26,7 @@ static void tolerance_governs_the_error(void)
     TEST_ASSERT_TRUE(error[1] < 1e-5);
 }
 
-static void everything_is_off_by_default(void)
+TEST(everything_is_off_by_default)
 {
     for (size_t k = 0; k < plant_effect_count(); k++) {
         TEST_ASSERT_FALSE(plant_effect_is_on(plant, k));
@@ -105,7 +42,7 @@ static void everything_is_off_by_default(void)
 }
 
 /* Parameters of an effect that is off, moved anywhere, change nothing to the last bit. */
-static void parameters_of_an_effect_that_is_off_do_nothing(void)
+TEST(parameters_of_an_effect_that_is_off_do_nothing)
 {
     make_log(PLANT_DRIVE_DUTY, 0.2, 8);
     run_log(0);
@@ -120,7 +57,7 @@ static void parameters_of_an_effect_that_is_off_do_nothing(void)
     }
 }
 
-static void faults_stop_the_heat(void)
+TEST(faults_stop_the_heat)
 {
     for (int i = 0; i < 3; i++)
         drive(i, PLANT_DRIVE_DUTY, 0.1);
@@ -147,7 +84,7 @@ static void faults_stop_the_heat(void)
     TEST_ASSERT_EQUAL_INT(PLANT_ERROR_INDEX, plant_set_fault(plant, 9, PLANT_FAULT_OPEN));
 }
 
-static void every_bad_parameter_is_refused_and_changes_nothing(void)
+TEST(every_bad_parameter_is_refused_and_changes_nothing)
 {
     for (size_t k = 0; k < plant_parameter_count(); k++) {
         const plant_parameter_t *parameter = plant_parameter(k);
@@ -157,7 +94,7 @@ static void every_bad_parameter_is_refused_and_changes_nothing(void)
         double value;
         TEST_ASSERT_TRUE(parameter->default_value >= parameter->minimum &&
                          parameter->default_value <= parameter->maximum);
-        for (size_t j = 0; j < sizeof bad / sizeof bad[0]; j++) {
+        for (size_t j = 0; j < ROWS(bad); j++) {
             TEST_ASSERT_EQUAL_INT_MESSAGE(
                 PLANT_ERROR_RANGE, plant_set(plant, parameter->name, bad[j]), parameter->name);
             OK(plant_get(plant, parameter->name, &value));
@@ -171,14 +108,14 @@ static void every_bad_parameter_is_refused_and_changes_nothing(void)
     }
     static const char *const names[] = {"",    "nonsense", "loss", "loss_w_per_kk",
                                         "[1]", "Ambient_c"};
-    for (size_t k = 0; k < sizeof names / sizeof names[0]; k++)
+    for (size_t k = 0; k < ROWS(names); k++)
         TEST_ASSERT_EQUAL_INT(PLANT_ERROR_NAME, plant_set(plant, names[k], 1.0));
     static const char *const springs[] = {"loss_w_per_k[0]",  "loss_w_per_k[10]",
                                           "loss_w_per_k[",    "loss_w_per_k[1",
                                           "loss_w_per_k[1]x", "loss_w_per_k[x]",
                                           "loss_w_per_k[-1]", "ambient_c[1]",
                                           "loss_w_per_k[]",   "loss_w_per_k[99999999999999999999]"};
-    for (size_t k = 0; k < sizeof springs / sizeof springs[0]; k++)
+    for (size_t k = 0; k < ROWS(springs); k++)
         TEST_ASSERT_EQUAL_INT_MESSAGE(PLANT_ERROR_INDEX, plant_set(plant, springs[k], 0.01),
                                       springs[k]);
     TEST_ASSERT_EQUAL_INT(PLANT_ERROR_RANGE, plant_set(plant, "wake_direction", 0.5));
@@ -193,7 +130,7 @@ static void every_bad_parameter_is_refused_and_changes_nothing(void)
     TEST_ASSERT_NULL(plant_effect_name(plant_effect_count()));
 }
 
-static void per_spring_values_stay_with_their_spring(void)
+TEST(per_spring_values_stay_with_their_spring)
 {
     double value;
     const double standard = get("loss_w_per_k");
@@ -210,7 +147,7 @@ static void per_spring_values_stay_with_their_spring(void)
     TEST_ASSERT_EQUAL_DOUBLE(0.03, value);
 }
 
-static void transformation_temperatures_out_of_order_stop_the_step(void)
+TEST(transformation_temperatures_out_of_order_stop_the_step)
 {
     static const struct {
         const char *name;
@@ -219,7 +156,7 @@ static void transformation_temperatures_out_of_order_stop_the_step(void)
                  {"austenite_finish_c", 88, 98},
                  {"austenite_start_c", 68, 88},
                  {"martensite_start_c", 98, 78}};
-    for (size_t k = 0; k < sizeof cases / sizeof cases[0]; k++) {
+    for (size_t k = 0; k < ROWS(cases); k++) {
         const char *message;
         set(cases[k].name, cases[k].bad);
         TEST_ASSERT_EQUAL_INT(PLANT_ERROR_RANGE, plant_check(plant, &message));
@@ -234,7 +171,7 @@ static void transformation_temperatures_out_of_order_stop_the_step(void)
     OK(plant_step(plant, 1.0));
 }
 
-static void bad_drives_and_steps_are_refused(void)
+TEST(bad_drives_and_steps_are_refused)
 {
     static const double top[5] = {100, 20, 1, 1, 300}, bottom[5] = {-100, 0, 0, 0, -60};
     for (int mode = 0; mode < 5; mode++) {
@@ -267,22 +204,22 @@ static void bad_drives_and_steps_are_refused(void)
     TEST_ASSERT_NULL(plant_create(65536, 65536));
 }
 
-static void a_log_in_one_call_equals_the_same_by_steps(void)
+TEST(a_log_in_one_call_equals_the_same_by_steps)
 {
     on("latent_heat");
     on("sensor_lag");
     make_log(PLANT_DRIVE_POWER, 0.8, 4);
-    for (int r = 0; r < ROWS; r++)
+    for (int r = 0; r < LOG_ROWS; r++)
         for (int i = 0; i < 9; i++)
             if (r % 40 && r % 7)
                 log_drive[r * 9 + i] = (double)NAN; /* keeps */
-    for (int r = 0; r < ROWS; r++)
+    for (int r = 0; r < LOG_ROWS; r++)
         log_ambient[r] = r % 100 ? (double)NAN : 20.0 + r / 100;
     plant_reset(plant);
     plant_t *other = plant_copy(plant);
-    OK(plant_simulate(plant, ROWS, log_time, log_mode, log_drive, log_fan, log_ambient, shown[0],
-                      real[0]));
-    for (int r = 0; r < ROWS; r++) {
+    OK(plant_simulate(plant, LOG_ROWS, log_time, log_mode, log_drive, log_fan, log_ambient,
+                      shown[0], real[0]));
+    for (int r = 0; r < LOG_ROWS; r++) {
         for (int i = 0; i < 9; i++) {
             TEST_ASSERT_EQUAL_DOUBLE(shown[0][r * 9 + i], plant_measured_c(other, i));
             TEST_ASSERT_EQUAL_DOUBLE(real[0][r * 9 + i], plant_temperature_c(other, i));
@@ -297,35 +234,35 @@ static void a_log_in_one_call_equals_the_same_by_steps(void)
     plant_destroy(other);
 }
 
-static void a_bad_log_is_refused_whole(void)
+TEST(a_bad_log_is_refused_whole)
 {
     make_log(PLANT_DRIVE_POWER, 0.8, 4);
     shown[0][0] = -1.0;
     const double good_time = log_time[599], good_drive = log_drive[4000];
     log_time[599] = log_time[598];
-    TEST_ASSERT_EQUAL_INT(PLANT_ERROR_TIME, plant_simulate(plant, ROWS, log_time, log_mode,
+    TEST_ASSERT_EQUAL_INT(PLANT_ERROR_TIME, plant_simulate(plant, LOG_ROWS, log_time, log_mode,
                                                            log_drive, NULL, NULL, shown[0], NULL));
     log_time[599] = (double)NAN;
-    TEST_ASSERT_EQUAL_INT(PLANT_ERROR_TIME, plant_simulate(plant, ROWS, log_time, log_mode,
+    TEST_ASSERT_EQUAL_INT(PLANT_ERROR_TIME, plant_simulate(plant, LOG_ROWS, log_time, log_mode,
                                                            log_drive, NULL, NULL, shown[0], NULL));
     log_time[599] = good_time;
     log_drive[4000] = -100.1;
-    TEST_ASSERT_EQUAL_INT(PLANT_ERROR_RANGE, plant_simulate(plant, ROWS, log_time, log_mode,
+    TEST_ASSERT_EQUAL_INT(PLANT_ERROR_RANGE, plant_simulate(plant, LOG_ROWS, log_time, log_mode,
                                                             log_drive, NULL, NULL, shown[0], NULL));
     log_drive[4000] = good_drive;
     log_fan[599] = 2.0;
-    TEST_ASSERT_EQUAL_INT(
-        PLANT_ERROR_RANGE,
-        plant_simulate(plant, ROWS, log_time, log_mode, log_drive, log_fan, NULL, shown[0], NULL));
+    TEST_ASSERT_EQUAL_INT(PLANT_ERROR_RANGE,
+                          plant_simulate(plant, LOG_ROWS, log_time, log_mode, log_drive, log_fan,
+                                         NULL, shown[0], NULL));
     log_ambient[599] = 99.0;
     TEST_ASSERT_EQUAL_INT(PLANT_ERROR_RANGE,
-                          plant_simulate(plant, ROWS, log_time, log_mode, log_drive, NULL,
+                          plant_simulate(plant, LOG_ROWS, log_time, log_mode, log_drive, NULL,
                                          log_ambient, shown[0], NULL));
     TEST_ASSERT_EQUAL_DOUBLE(-1.0, shown[0][0]);
     TEST_ASSERT_EQUAL_DOUBLE(0.0, plant_time_s(plant));
 }
 
-static void reset_starts_anew(void)
+TEST(reset_starts_anew)
 {
     for (size_t k = 0; k < plant_effect_count(); k++)
         OK(plant_set_effect_index(plant, k, true));
@@ -341,7 +278,7 @@ static void reset_starts_anew(void)
     TEST_ASSERT_EQUAL_MEMORY(shown[0], shown[1], sizeof shown[0]);
 }
 
-static void any_size_from_1_x_1_to_32_x_32(void)
+TEST(any_size_from_1_x_1_to_32_x_32)
 {
     static const int sizes[][2] = {{1, 1}, {1, 2}, {2, 1}, {1, 1024}, {32, 32}};
     for (int k = 0; k < 5; k++) {
@@ -362,7 +299,7 @@ static void any_size_from_1_x_1_to_32_x_32(void)
 }
 
 /* A copy goes its own way, whatever its size. */
-static void a_copy_shares_nothing(void)
+TEST(a_copy_shares_nothing)
 {
     plant_t *p = plant_create(5, 7), *copy = plant_copy(p);
     OK(plant_drive(copy, 34, PLANT_DRIVE_POWER, 0.5));
@@ -374,23 +311,55 @@ static void a_copy_shares_nothing(void)
     plant_destroy(copy);
 }
 
-int main(void)
+TEST(two_layers_are_one_plant_of_twice_as_many_springs)
 {
-    UNITY_BEGIN();
-    RUN_TEST(energy_closes_whatever_is_on);
-    RUN_TEST(default_tolerance_is_within_a_hundredth_of_a_degree);
-    RUN_TEST(tolerance_governs_the_error);
-    RUN_TEST(everything_is_off_by_default);
-    RUN_TEST(parameters_of_an_effect_that_is_off_do_nothing);
-    RUN_TEST(faults_stop_the_heat);
-    RUN_TEST(every_bad_parameter_is_refused_and_changes_nothing);
-    RUN_TEST(per_spring_values_stay_with_their_spring);
-    RUN_TEST(transformation_temperatures_out_of_order_stop_the_step);
-    RUN_TEST(bad_drives_and_steps_are_refused);
-    RUN_TEST(a_log_in_one_call_equals_the_same_by_steps);
-    RUN_TEST(a_bad_log_is_refused_whole);
-    RUN_TEST(reset_starts_anew);
-    RUN_TEST(any_size_from_1_x_1_to_32_x_32);
-    RUN_TEST(a_copy_shares_nothing);
-    return UNITY_END();
+    plant_t *both = plant_create_layers(3, 4, 2);
+    TEST_ASSERT_EQUAL_INT(24, plant_spring_count(both));
+    TEST_ASSERT_EQUAL_INT(3, plant_rows(both));
+    TEST_ASSERT_EQUAL_INT(2, plant_layers(both));
+    OK(plant_set(both, "loss_w_per_k[24]", 0.01));
+    TEST_ASSERT_EQUAL_INT(PLANT_ERROR_INDEX, plant_set(both, "loss_w_per_k[25]", 0.01));
+    plant_destroy(both);
+    TEST_ASSERT_NULL(plant_create_layers(3, 3, 3));
+    TEST_ASSERT_NULL(plant_create_layers(3, 3, 0));
+    TEST_ASSERT_NULL(plant_create_layers(32, 32, 2));
+}
+
+/* Figures of docs/physics.md. */
+TEST(balance_of_design_section_1)
+{
+    /* 1.5 A in austenite, 0.219 ohm, against 5.8 mW/K: 105 degC, time constant 52 s */
+    set("resistance_ohm", 0.219);
+    for (int i = 0; i < 9; i++)
+        drive(i, PLANT_DRIVE_CURRENT, 1.5);
+    settle();
+    TEST_ASSERT_DOUBLE_WITHIN(0.1, 105.0, at(4));
+    /* the fan's 11.3 mW/K at the same current: far from 105 */
+    OK(plant_set_fan(plant, 1.0));
+    settle();
+    TEST_ASSERT_DOUBLE_WITHIN(0.1, 20.0 + 2.25 * 0.219 / 0.0113, at(4));
+    TEST_ASSERT_TRUE(at(4) < 64.0);
+}
+
+TEST(constant_current_from_cold_never_transforms_at_1_5_a_but_runs_past_at_a_little_more)
+{
+    on("latent_heat");
+    on("resistance_phase");
+    drive(0, PLANT_DRIVE_CURRENT, 1.5); /* one corner alone: its neighbours cool it */
+    settle();
+    TEST_ASSERT_DOUBLE_WITHIN(1.0, 75.0, at(0));
+    for (int i = 0; i < 9; i++)
+        if (i != 4)
+            drive(i, PLANT_DRIVE_CURRENT, 1.5);
+    settle();
+    TEST_ASSERT_DOUBLE_WITHIN(1.0, 85.0, at(0));
+    TEST_ASSERT_EQUAL_DOUBLE(0.0, plant_austenite(plant, 0));
+    drive(4, PLANT_DRIVE_CURRENT, 1.5);
+    settle();
+    TEST_ASSERT_DOUBLE_WITHIN(0.1, 87.9, at(0)); /* 0.394 W / 5.8 mW/K, all alike */
+    for (int i = 0; i < 9; i++)
+        drive(i, PLANT_DRIVE_CURRENT, 1.53);
+    settle();
+    TEST_ASSERT_EQUAL_DOUBLE(1.0, plant_austenite(plant, 0));
+    TEST_ASSERT_TRUE(at(0) > 108.0);
 }

@@ -5,9 +5,9 @@
 #include <sstream>
 #include <string>
 
+#include "../fakes/eeprom.h"
 #include "loop.h"
 #include "rerun.h"
-#include "unity.h"
 
 using ninespring::rerun;
 
@@ -21,20 +21,6 @@ struct plant_deleter {
     void operator()(plant_t *plant) const { plant_destroy(plant); }
 };
 
-std::uint8_t eeprom[SETTINGS_LEARNT_BASE + 2u * SETTINGS_LEARNT_SLOT_BYTES];
-
-std::uint8_t read(void *, std::uint16_t address)
-{
-    return eeprom[address];
-}
-bool ready(void *)
-{
-    return true;
-}
-void write(void *, std::uint16_t address, std::uint8_t value)
-{
-    eeprom[address] = value;
-}
 std::uint16_t room(void *)
 {
     return 60000;
@@ -50,19 +36,19 @@ class recorder
 public:
     explicit recorder(std::uint64_t seed)
     {
-        std::memset(eeprom, 0xFF, sizeof eeprom);
+        std::memset(memory, 0xFF, sizeof memory);
         loop_options_t options;
         loop_options_default(&options);
         options.bus_noise_v = 0.004;
         options.shunt_noise_v = 1e-5;
         status_.version = status_.sensors = status_.reset_cause = "test";
-        status_.loaded = settings_load(&store_, &storage_, &settings_);
+        status_.loaded = settings_load(&store_, &storage, &settings_);
         plant_.reset(plant_create(3, 3));
         TEST_ASSERT_EQUAL(PLANT_OK, plant_set_effect(plant_.get(), "latent_heat", true));
         TEST_ASSERT_EQUAL(PLANT_OK, plant_set_effect(plant_.get(), "resistance_phase", true));
         loop_.reset(loop_create(&settings_.controller, plant_.get(), &options, seed, nullptr));
         TEST_ASSERT_NOT_NULL(loop_.get());
-        (void)learnt_store_open(&learnt_, &storage_, SETTINGS_LEARNT_BASE,
+        (void)learnt_store_open(&learnt_, &storage, SETTINGS_LEARNT_BASE,
                                 SETTINGS_LEARNT_SLOT_BYTES, loop_controller(loop_.get()));
         telemetry_init(&telemetry_);
         console_init(&console_, &output_, loop_controller(loop_.get()), &settings_, &store_,
@@ -124,7 +110,6 @@ public:
     std::string tape;
 
 private:
-    const record_storage_t storage_{nullptr, read, ready, write};
     const text_output_t output_{&tape, room, say};
     settings_t settings_{};
     settings_store_t store_{};
@@ -166,7 +151,7 @@ void live(recorder &board)
     board.run(60.0);
 }
 
-void the_same_day_again_is_believed_to_the_last_bit()
+TEST(the_same_day_again_is_believed_to_the_last_bit)
 {
     recorder board(3);
     board.begin();
@@ -191,7 +176,7 @@ void the_same_day_again_is_believed_to_the_last_bit()
 }
 
 /* It begins in mid-life: what was learnt is on it. */
-void a_tape_begins_with_what_was_learnt()
+TEST(a_tape_begins_with_what_was_learnt)
 {
     recorder board(4);
     board.type("model cold");
@@ -213,7 +198,7 @@ void a_tape_begins_with_what_was_learnt()
     TEST_ASSERT_EQUAL_STRING("ok\r\n", again.ask("faults").c_str());
 }
 
-void what_a_tape_lacks_or_another_reading_is_said()
+TEST(what_a_tape_lacks_or_another_reading_is_said)
 {
     recorder board(5);
     board.begin();
@@ -243,7 +228,7 @@ void what_a_tape_lacks_or_another_reading_is_said()
     TEST_ASSERT_TRUE(wrong.so_far().other_spring == 5 || wrong.so_far().other_spring == 6);
 }
 
-void a_tape_without_a_beginning_is_refused()
+TEST(a_tape_without_a_beginning_is_refused)
 {
     rerun again;
     bool refused = false;
@@ -263,16 +248,3 @@ void a_tape_without_a_beginning_is_refused()
 }
 
 } // namespace
-
-void setUp(void) {}
-void tearDown(void) {}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(the_same_day_again_is_believed_to_the_last_bit);
-    RUN_TEST(a_tape_begins_with_what_was_learnt);
-    RUN_TEST(what_a_tape_lacks_or_another_reading_is_said);
-    RUN_TEST(a_tape_without_a_beginning_is_refused);
-    return UNITY_END();
-}

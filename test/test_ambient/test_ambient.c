@@ -1,8 +1,8 @@
 /* What a room does is believed at once; what no room does holds what was before, and is said. */
 #include <string.h>
 
+#include "../run_tests.h"
 #include "ambient.h"
-#include "unity.h"
 
 #define SET_C7 (21 * 128)
 
@@ -13,8 +13,6 @@ void setUp(void)
     memset(&ambient, 0, sizeof ambient);
 }
 
-void tearDown(void) {}
-
 static int16_t takes(int ticks, bool reads, double c)
 {
     int16_t is_c7 = 0;
@@ -24,7 +22,7 @@ static int16_t takes(int ticks, bool reads, double c)
     return is_c7;
 }
 
-static void a_room_is_believed_at_once(void)
+TEST(a_room_is_believed_at_once)
 {
     const double rooms_c[] = {-10.0, 0.0, 21.0, 50.0};
     for (int n = 0; n < 4; n++) {
@@ -41,7 +39,7 @@ static void a_room_is_believed_at_once(void)
     }
 }
 
-static void what_no_room_can_be_is_not(void)
+TEST(what_no_room_can_be_is_not)
 {
     const double not_c[] = {-10.1, 50.1, 80.0, -20.0};
     for (int n = 0; n < 5; n++) {
@@ -56,14 +54,14 @@ static void what_no_room_can_be_is_not(void)
     }
 }
 
-static void a_step_that_no_room_makes_holds_what_was_before(void)
+TEST(a_step_that_no_room_makes_holds_what_was_before)
 {
     static const struct {
         double step_k;
         bool reads, is_room;
     } steps[] = {{10.0, true, true},   {-10.0, true, true},  {10.1, true, false},
                  {-10.1, true, false}, {-25.0, true, false}, {0.0, false, false}};
-    for (unsigned n = 0; n < sizeof steps / sizeof steps[0]; n++) {
+    for (unsigned n = 0; n < ROWS(steps); n++) {
         for (int before = 51; before < 210; before += 13) {
             setUp();
             (void)takes(before, true, 20.0);
@@ -80,7 +78,7 @@ static void a_step_that_no_room_makes_holds_what_was_before(void)
 }
 
 /* As a filter makes it of a step, whenever it begins: what holds is of before. */
-static void a_step_that_is_filtered_holds_what_was_before(void)
+TEST(a_step_that_is_filtered_holds_what_was_before)
 {
     for (int before = 51; before < 210; before++) {
         setUp();
@@ -97,7 +95,7 @@ static void a_step_that_is_filtered_holds_what_was_before(void)
 }
 
 /* A wire is put right, and a filter goes through all that lies between. */
-static void what_jumps_within_its_first_second_begins_anew(void)
+TEST(what_jumps_within_its_first_second_begins_anew)
 {
     for (int before = 0; before < 60; before++) {
         setUp();
@@ -126,7 +124,7 @@ static void what_jumps_within_its_first_second_begins_anew(void)
 }
 
 /* What holds is of the second before the last: rises of a kelvin a second. */
-static void what_holds_is_of_one_to_two_seconds_before(void)
+TEST(what_holds_is_of_one_to_two_seconds_before)
 {
     for (int second = 2; second < 6; second++) {
         setUp();
@@ -136,16 +134,4 @@ static void what_holds_is_of_one_to_two_seconds_before(void)
         }
         TEST_ASSERT_EQUAL_INT16(128 * (20 + second - 1), takes(100, false, 0.0));
     }
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(a_room_is_believed_at_once);
-    RUN_TEST(what_no_room_can_be_is_not);
-    RUN_TEST(a_step_that_no_room_makes_holds_what_was_before);
-    RUN_TEST(a_step_that_is_filtered_holds_what_was_before);
-    RUN_TEST(what_jumps_within_its_first_second_begins_anew);
-    RUN_TEST(what_holds_is_of_one_to_two_seconds_before);
-    return UNITY_END();
 }

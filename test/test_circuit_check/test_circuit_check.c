@@ -5,8 +5,8 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "../run_tests.h"
 #include "circuit_check.h"
-#include "unity.h"
 
 #define SHUNT_OHM 0.1
 
@@ -26,8 +26,6 @@ void setUp(void)
     memset(&check, 0, sizeof check);
     random_state = 1;
 }
-
-void tearDown(void) {}
 
 /* Mean 0, deviation 1, up to 3.4. */
 static double noise(void)
@@ -96,7 +94,7 @@ static uint32_t found_after(const circuit_t *c, uint16_t duty, uint16_t steps, s
 
 #define HOUR (50u * 3600u)
 
-static void every_corner_of_the_tolerances_is_a_circuit(void)
+TEST(every_corner_of_the_tolerances_is_a_circuit)
 {
     for (unsigned corner = 0; corner < 64u; corner++) {
         circuit_t c = declared;
@@ -114,7 +112,7 @@ static void every_corner_of_the_tolerances_is_a_circuit(void)
 }
 
 /* 40 % in 3 s: a current that is kept meanwhile takes ever more duty. */
-static void resistance_that_changes_is_no_mismatch(void)
+TEST(resistance_that_changes_is_no_mismatch)
 {
     for (uint32_t tick = 0; tick < 150; tick++) {
         const double spring_ohm = 0.175 * (1.0 + 0.4 * tick / 150.0);
@@ -129,7 +127,7 @@ static void resistance_that_changes_is_no_mismatch(void)
 }
 
 /* One of its registers still reads, and follows. */
-static void frozen_register_is_found_within_two_seconds(void)
+TEST(frozen_register_is_found_within_two_seconds)
 {
     for (unsigned n = 0; n < 8; n++) {
         const bool heats = (n & 1u) != 0;
@@ -153,7 +151,7 @@ static void frozen_register_is_found_within_two_seconds(void)
 }
 
 /* Of a thick wire a step of the register hides the sweep: it may well stand. */
-static void voltage_too_small_to_show_the_sweep_is_none(void)
+TEST(voltage_too_small_to_show_the_sweep_is_none)
 {
     circuit_t c = declared;
     c.spring_ohm = 0.03;
@@ -161,7 +159,7 @@ static void voltage_too_small_to_show_the_sweep_is_none(void)
 }
 
 /* As others switch, a supply with a long cable moves by 5 %. */
-static void supply_that_moves_is_none(void)
+TEST(supply_that_moves_is_none)
 {
     for (unsigned heats = 0; heats < 2; heats++) {
         setUp();
@@ -179,14 +177,14 @@ static void supply_that_moves_is_none(void)
 }
 
 /* Its voltage is read 4 ms after its current. */
-static void supply_that_swings_is_found_within_two_seconds(void)
+TEST(supply_that_swings_is_found_within_two_seconds)
 {
     static const struct {
         double hz, share;
         bool found;
     } swings[] = {{0.2, 0.1, false}, {2.0, 0.15, true},   {10.0, 0.06, false}, {10.0, 0.1, true},
                   {24.7, 0.2, true}, {24.7, 0.06, false}, {41.3, 0.1, true}};
-    for (unsigned n = 0; n < 2u * sizeof swings / sizeof swings[0]; n++) {
+    for (unsigned n = 0; n < 2u * ROWS(swings); n++) {
         const double turn = 6.283185307179586 * swings[n / 2u].hz;
         const double share = swings[n / 2u].share;
         uint32_t tick = 0;
@@ -210,19 +208,19 @@ static void supply_that_swings_is_found_within_two_seconds(void)
 }
 
 /* Nothing moves: it may well be so. */
-static void reading_that_stands_still_with_its_duty_is_none(void)
+TEST(reading_that_stands_still_with_its_duty_is_none)
 {
     TEST_ASSERT_EQUAL_UINT32(HOUR / 20u, found_after(&declared, 120, 0, frozen, HOUR / 20u));
 }
 
-static void reading_of_one_tick_earlier_is_none(void)
+TEST(reading_of_one_tick_earlier_is_none)
 {
     TEST_ASSERT_EQUAL_UINT32(HOUR / 20u, found_after(&declared, 60, 16, tick_late, HOUR / 20u));
     TEST_ASSERT_EQUAL_UINT32(HOUR / 20u, found_after(&declared, 190, 3, tick_late, HOUR / 20u));
 }
 
 /* A pulse in every window, each read a tick late. */
-static void pulses_read_late_are_none(void)
+TEST(pulses_read_late_are_none)
 {
     for (uint32_t tick = 0; tick < 3000; tick++) {
         const uint16_t duty = tick % CIRCUIT_CHECK_TICKS < 5u ? 100 : 0;
@@ -235,14 +233,14 @@ static void pulses_read_late_are_none(void)
     }
 }
 
-static void reading_of_another_output_is_found_within_two_seconds(void)
+TEST(reading_of_another_output_is_found_within_two_seconds)
 {
     TEST_ASSERT_LESS_OR_EQUAL_UINT32(100, found_after(&declared, 60, 16, higher, 1000));
     setUp();
     TEST_ASSERT_LESS_OR_EQUAL_UINT32(100, found_after(&declared, 120, 0, higher, 1000));
 }
 
-static void one_bad_window_is_none(void)
+TEST(one_bad_window_is_none)
 {
     for (int n = 0; n < 100; n++) {
         (void)found_after(&declared, 60, 16, frozen, 18); /* judged once, at its end */
@@ -250,7 +248,7 @@ static void one_bad_window_is_none(void)
     }
 }
 
-static void a_window_says_what_its_readings_were(void)
+TEST(a_window_says_what_its_readings_were)
 {
     for (uint8_t readings = 11; readings <= 29; readings = (uint8_t)(readings + 1u)) {
         circuit_window_t window = {7.0f, 7.0f, 7.0f, readings < 12};
@@ -298,7 +296,7 @@ static int windows(uint16_t duty, uint16_t steps, double share, double beyond_mv
 }
 
 /* Each share and balance at both sides of its limit, and after how many windows on end. */
-static void what_follows_too_little_or_too_much_is_found_after_its_windows(void)
+TEST(what_follows_too_little_or_too_much_is_found_after_its_windows)
 {
     static const struct {
         uint16_t duty, steps;
@@ -330,7 +328,7 @@ static void what_follows_too_little_or_too_much_is_found_after_its_windows(void)
         {3, 0, 0.0, 0.0, 11.0, 9},
         {3, 0, 0.0, 0.0, 13.5, 3},
     };
-    for (size_t n = 0; n < sizeof cases / sizeof cases[0]; n++) {
+    for (size_t n = 0; n < ROWS(cases); n++) {
         const int found = windows(cases[n].duty, cases[n].steps, cases[n].share, cases[n].beyond_mv,
                                   cases[n].swing_mv);
         char which[20];
@@ -340,7 +338,7 @@ static void what_follows_too_little_or_too_much_is_found_after_its_windows(void)
 }
 
 /* The diode's drop takes its part of the voltage, and it stays found however long it lasts. */
-static void the_drop_counts_and_what_is_found_stays_found(void)
+TEST(the_drop_counts_and_what_is_found_stays_found)
 {
     parameters.freewheel_mv = 1000;
     for (int off_mv = 0; off_mv <= 800; off_mv += 800) {
@@ -360,7 +358,7 @@ static void the_drop_counts_and_what_is_found_stays_found(void)
 
 /* A voltage that stands though the sweep moves it by 3.2 mV, more than half a step of its register.
  */
-static void voltage_that_should_move_by_more_than_half_a_step_is_frozen(void)
+TEST(voltage_that_should_move_by_more_than_half_a_step_is_frozen)
 {
     int window = 0;
     for (bool found = false; !found; window++) {
@@ -375,7 +373,7 @@ static void voltage_that_should_move_by_more_than_half_a_step_is_frozen(void)
 }
 
 /* Too few readings tell nothing, and end the row. */
-static void eleven_readings_tell_nothing(void)
+TEST(eleven_readings_tell_nothing)
 {
     for (int n = 0; n < 6; n++) {
         TEST_ASSERT_FALSE(judged(120, 30, -1.0, 300.0, 100.0, 11));
@@ -391,7 +389,7 @@ static void eleven_readings_tell_nothing(void)
 }
 
 /* After a jump a reading may be of the duty before: it is none. */
-static void a_reading_after_a_jump_is_left_out(void)
+TEST(a_reading_after_a_jump_is_left_out)
 {
     static const uint16_t duty[] = {2, 4, 2, 5, 5, 2, 1, 3};
     static const uint8_t readings[] = {1, 2, 3, 3, 4, 4, 5, 6};
@@ -407,7 +405,7 @@ static void a_reading_after_a_jump_is_left_out(void)
     TEST_ASSERT_EQUAL_UINT32(17u * (20u + (100u * 180u >> 10)), check.duty_voltage);
 }
 
-static void readings_beyond_the_sensor_count_as_its_ends(void)
+TEST(readings_beyond_the_sensor_count_as_its_ends)
 {
     circuit_check_take(&check, 1024, 0, true, -1, -1);
     TEST_ASSERT_EQUAL_UINT32(0, check.voltage_mv);
@@ -424,28 +422,4 @@ static void readings_beyond_the_sensor_count_as_its_ends(void)
         circuit_check_take(&check, 2000, 0, true, 4095, 4095);
     }
     TEST_ASSERT_EQUAL_UINT32(30u * 11965u * 11965u, check.voltage_square);
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(every_corner_of_the_tolerances_is_a_circuit);
-    RUN_TEST(resistance_that_changes_is_no_mismatch);
-    RUN_TEST(frozen_register_is_found_within_two_seconds);
-    RUN_TEST(voltage_too_small_to_show_the_sweep_is_none);
-    RUN_TEST(supply_that_moves_is_none);
-    RUN_TEST(supply_that_swings_is_found_within_two_seconds);
-    RUN_TEST(reading_that_stands_still_with_its_duty_is_none);
-    RUN_TEST(reading_of_one_tick_earlier_is_none);
-    RUN_TEST(pulses_read_late_are_none);
-    RUN_TEST(reading_of_another_output_is_found_within_two_seconds);
-    RUN_TEST(one_bad_window_is_none);
-    RUN_TEST(a_window_says_what_its_readings_were);
-    RUN_TEST(what_follows_too_little_or_too_much_is_found_after_its_windows);
-    RUN_TEST(the_drop_counts_and_what_is_found_stays_found);
-    RUN_TEST(voltage_that_should_move_by_more_than_half_a_step_is_frozen);
-    RUN_TEST(eleven_readings_tell_nothing);
-    RUN_TEST(a_reading_after_a_jump_is_left_out);
-    RUN_TEST(readings_beyond_the_sensor_count_as_its_ends);
-    return UNITY_END();
 }

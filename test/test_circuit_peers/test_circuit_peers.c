@@ -3,8 +3,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "../run_tests.h"
 #include "circuit_peers.h"
-#include "unity.h"
 
 #define SPRINGS  9
 #define HEATS_MV 1140.0f /* 3 A in 0.38 ohm */
@@ -18,8 +18,6 @@ void setUp(void)
     memset(&peers, 0, sizeof peers);
     current_control_parameters_default(&circuit);
 }
-
-void tearDown(void) {}
 
 static bool takes(uint8_t spring, float expected_mv, float share)
 {
@@ -45,7 +43,7 @@ static unsigned rounds(unsigned count, uint8_t driven, float expected_mv, float 
     return found;
 }
 
-static void one_that_changes_is_found_in_three_windows_and_the_others_are_not(void)
+TEST(one_that_changes_is_found_in_three_windows_and_the_others_are_not)
 {
     const float expected_mv[] = {HEATS_MV, HOLDS_MV};
     const float changed[2][2] = {{0.88f, 1.12f}, {0.83f, 1.17f}}; /* offsets are more of less */
@@ -61,7 +59,7 @@ static void one_that_changes_is_found_in_three_windows_and_the_others_are_not(vo
     }
 }
 
-static void what_all_show_is_the_supply(void)
+TEST(what_all_show_is_the_supply)
 {
     for (float share = 0.5f; share < 1.6f; share += 0.1f) {
         TEST_ASSERT_EQUAL_HEX(0, rounds(4, SPRINGS, HEATS_MV, 1.0f, 1.0f));
@@ -71,7 +69,7 @@ static void what_all_show_is_the_supply(void)
 
 /* 4.2 V and 0.04 ohm more for one, and it is known from then on: what it may have otherwise at
  * first is a change later. */
-static void wiring_of_its_own_is_none_but_another_one_later_is(void)
+TEST(wiring_of_its_own_is_none_but_another_one_later_is)
 {
     TEST_ASSERT_EQUAL_HEX(0, rounds(100, SPRINGS, HEATS_MV, 0.84f * 0.88f, 0.84f));
     TEST_ASSERT_EQUAL_HEX(0, rounds(2, SPRINGS, HEATS_MV, 0.84f, 0.84f));
@@ -79,7 +77,7 @@ static void wiring_of_its_own_is_none_but_another_one_later_is(void)
 }
 
 /* Fewer than three others: it may be the supply; as much as none may be that. */
-static void alone_more_is_let_pass(void)
+TEST(alone_more_is_let_pass)
 {
     for (uint8_t driven = 1; driven <= 3; driven++) {
         setUp();
@@ -94,7 +92,7 @@ static void alone_more_is_let_pass(void)
 }
 
 /* Those that are off or clear say nothing of a supply as it is now. */
-static void who_is_off_is_no_peer(void)
+TEST(who_is_off_is_no_peer)
 {
     TEST_ASSERT_EQUAL_HEX(0, rounds(5, SPRINGS, HEATS_MV, 0.85f, 0.85f)); /* all on a long cable */
     for (uint8_t k = 1; k < SPRINGS; k++) {
@@ -104,7 +102,7 @@ static void who_is_off_is_no_peer(void)
 }
 
 /* And one window is enough then; a good one makes it three again. */
-static void what_is_known_outlives_who_clears(void)
+TEST(what_is_known_outlives_who_clears)
 {
     for (uint8_t driven = 1; driven <= SPRINGS; driven = (uint8_t)(driven + 8u)) {
         const float share = driven == 1 ? 0.7f : 0.86f;
@@ -123,7 +121,7 @@ static void what_is_known_outlives_who_clears(void)
 }
 
 /* Found as it is off, and until it is cleared. */
-static void what_is_found_stays_found_until_cleared(void)
+TEST(what_is_found_stays_found_until_cleared)
 {
     const circuit_window_t nothing = {.tells = false};
     TEST_ASSERT_EQUAL_HEX(0, rounds(5, SPRINGS, HEATS_MV, 1.0f, 1.0f));
@@ -139,7 +137,7 @@ static void what_is_found_stays_found_until_cleared(void)
 }
 
 /* Found by others: from the first it was of another shunt, and the right one is put in. */
-static void a_sensor_that_was_wrong_from_the_first_may_be_another_one_after_a_clear(void)
+TEST(a_sensor_that_was_wrong_from_the_first_may_be_another_one_after_a_clear)
 {
     for (uint8_t driven = 1; driven <= SPRINGS; driven = (uint8_t)(driven + 8u)) {
         setUp();
@@ -154,7 +152,7 @@ static void a_sensor_that_was_wrong_from_the_first_may_be_another_one_after_a_cl
 }
 
 /* Cleared, and found by others before it told anything: it is the same sensor. */
-static void what_was_not_agreed_with_since_a_clear_stays_known(void)
+TEST(what_was_not_agreed_with_since_a_clear_stays_known)
 {
     TEST_ASSERT_EQUAL_HEX(0, rounds(5, SPRINGS, HEATS_MV, 1.0f, 1.0f));
     TEST_ASSERT_EQUAL_HEX(1, rounds(3, SPRINGS, HEATS_MV, 0.86f, 1.0f));
@@ -163,7 +161,7 @@ static void what_was_not_agreed_with_since_a_clear_stays_known(void)
     TEST_ASSERT_EQUAL_HEX(1, rounds(3, SPRINGS, HEATS_MV, 0.86f, 1.0f));
 }
 
-static void what_tells_nothing_changes_nothing(void)
+TEST(what_tells_nothing_changes_nothing)
 {
     TEST_ASSERT_EQUAL_HEX(0, rounds(5, SPRINGS, HEATS_MV, 1.0f, 1.0f));
     TEST_ASSERT_EQUAL_HEX(0, rounds(2, SPRINGS, HEATS_MV, 0.7f, 1.0f));
@@ -178,7 +176,7 @@ static void what_tells_nothing_changes_nothing(void)
 /* However slow: what is soldered stays what it is, and its share is no more learnt after 255
  * windows.
  */
-static void a_drift_is_found_however_slow(void)
+TEST(a_drift_is_found_however_slow)
 {
     for (unsigned slow = 0; slow < 2; slow++) {
         setUp();
@@ -195,7 +193,7 @@ static void a_drift_is_found_however_slow(void)
 }
 
 /* The drop that is declared moves with current and heat by a sixth: 60 mV of 400. */
-static void a_diode_may_be_another_one(void)
+TEST(a_diode_may_be_another_one)
 {
     circuit.freewheel_mv = 400;
     TEST_ASSERT_EQUAL_HEX(0, rounds(5, SPRINGS, HOLDS_MV, 1.0f, 1.0f));
@@ -205,7 +203,7 @@ static void a_diode_may_be_another_one(void)
 
 /* At each limit: a share that passes and one that is found. was: learnt before, 0: nothing; driven:
  * how many; the others show `others` all along. */
-static void limits_are_where_they_are_stated(void)
+TEST(limits_are_where_they_are_stated)
 {
     static const struct {
         float expected_mv, was, others, passes, found;
@@ -224,7 +222,7 @@ static void limits_are_where_they_are_stated(void)
         {HEATS_MV, 0.75f, 0.75f, 0.580f, 0.575f, 3},
         {100.0f, 1.0f, 1.0f, 0.75f, 0.65f, SPRINGS}, /* of 0.1 V it tells */
     };
-    for (unsigned n = 0; n < sizeof limits / sizeof limits[0]; n++) {
+    for (unsigned n = 0; n < ROWS(limits); n++) {
         for (unsigned found = 0; found < 2; found++) {
             setUp();
             if (limits[n].was > 0.0f) {
@@ -246,7 +244,7 @@ static void limits_are_where_they_are_stated(void)
 }
 
 /* In whatever order they come, and whoever is asked; who is not of the array has no voice. */
-static void the_middle_one_of_the_others_counts(void)
+TEST(the_middle_one_of_the_others_counts)
 {
     static const float shares[6][3] = {{0.5f, 1.0f, 1.5f}, {0.5f, 1.5f, 1.0f}, {1.0f, 0.5f, 1.5f},
                                        {1.0f, 1.5f, 0.5f}, {1.5f, 0.5f, 1.0f}, {1.5f, 1.0f, 0.5f}};
@@ -275,7 +273,7 @@ static void the_middle_one_of_the_others_counts(void)
     }
 }
 
-static void what_is_learnt_is_the_mean_of_its_windows(void)
+TEST(what_is_learnt_is_the_mean_of_its_windows)
 {
     TEST_ASSERT_EQUAL_HEX(0, rounds(1, SPRINGS, HEATS_MV, 0.95f, 1.0f)); /* it comes first: alone */
     for (unsigned n = 0; n < 50; n++) {
@@ -290,7 +288,7 @@ static void what_is_learnt_is_the_mean_of_its_windows(void)
 
 /* Found by another rule: as if by this one; a good window after the clear acquits it. Alone, too:
  * its supply is what it was. */
-static void who_is_suspected_is_found_in_one_window_after_a_clear(void)
+TEST(who_is_suspected_is_found_in_one_window_after_a_clear)
 {
     for (unsigned n = 0; n < 4; n++) {
         const bool honest = n % 2u != 0;
@@ -309,19 +307,19 @@ static void who_is_suspected_is_found_in_one_window_after_a_clear(void)
 }
 
 /* 0 is for who says nothing; more than 255 / 128 is as much. */
-static void a_share_is_kept_to_the_nearest_128th(void)
+TEST(a_share_is_kept_to_the_nearest_128th)
 {
     static const float shares[][2] = {{0.0f, 1},     {0.4f, 1},     {1.4f, 1},
                                       {1.6f, 2},     {2.4f, 2},     {254.4f, 254},
                                       {254.6f, 255}, {300.0f, 255}, {600.0f, 255}};
-    for (unsigned n = 0; n < sizeof shares / sizeof shares[0]; n++) {
+    for (unsigned n = 0; n < ROWS(shares); n++) {
         (void)takes(0, 1e5f, shares[n][0] / 128.0f);
         TEST_ASSERT_EQUAL_UINT(shares[n][1], peers.spring[0].share_q7);
     }
 }
 
 /* A clear ends what its last window said for others, and a row that was not full. */
-static void a_clear_ends_what_was_counted(void)
+TEST(a_clear_ends_what_was_counted)
 {
     TEST_ASSERT_EQUAL_HEX(0, rounds(5, 4, HEATS_MV, 1.0f, 1.0f));
     TEST_ASSERT_EQUAL_HEX(0, rounds(1, 4, HEATS_MV, 0.88f, 1.0f));
@@ -331,28 +329,4 @@ static void a_clear_ends_what_was_counted(void)
     for (unsigned n = 0; n < 5; n++) { /* two others are too few: it may be the supply */
         TEST_ASSERT_FALSE(takes(0, HEATS_MV, 0.88f));
     }
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(one_that_changes_is_found_in_three_windows_and_the_others_are_not);
-    RUN_TEST(what_all_show_is_the_supply);
-    RUN_TEST(wiring_of_its_own_is_none_but_another_one_later_is);
-    RUN_TEST(alone_more_is_let_pass);
-    RUN_TEST(who_is_off_is_no_peer);
-    RUN_TEST(what_is_known_outlives_who_clears);
-    RUN_TEST(what_is_found_stays_found_until_cleared);
-    RUN_TEST(a_sensor_that_was_wrong_from_the_first_may_be_another_one_after_a_clear);
-    RUN_TEST(what_was_not_agreed_with_since_a_clear_stays_known);
-    RUN_TEST(what_tells_nothing_changes_nothing);
-    RUN_TEST(a_drift_is_found_however_slow);
-    RUN_TEST(a_diode_may_be_another_one);
-    RUN_TEST(limits_are_where_they_are_stated);
-    RUN_TEST(the_middle_one_of_the_others_counts);
-    RUN_TEST(what_is_learnt_is_the_mean_of_its_windows);
-    RUN_TEST(who_is_suspected_is_found_in_one_window_after_a_clear);
-    RUN_TEST(a_clear_ends_what_was_counted);
-    RUN_TEST(a_share_is_kept_to_the_nearest_128th);
-    return UNITY_END();
 }

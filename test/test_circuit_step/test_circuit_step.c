@@ -3,8 +3,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "../run_tests.h"
 #include "circuit_step.h"
-#include "unity.h"
 
 static circuit_step_t step;
 static current_control_parameters_t circuit;
@@ -14,8 +14,6 @@ void setUp(void)
     memset(&step, 0, sizeof step);
     current_control_parameters_default(&circuit);
 }
-
-void tearDown(void) {}
 
 /* A circuit whose current is kept at what its sensor shows. */
 typedef struct {
@@ -76,7 +74,7 @@ static shown_t with(float shown_a, unsigned field, float value)
 enum { SHOWN, SPRING, WIRING, SUPPLY, CURRENT_GAIN, VOLTAGE_GAIN, OFFSET_A, OFFSET_MV };
 
 /* As it holds and as it heats; by the third window, of whatever part the first was. */
-static void a_sensor_that_begins_to_lie_is_found(void)
+TEST(a_sensor_that_begins_to_lie_is_found)
 {
     static const struct {
         unsigned field;
@@ -89,7 +87,7 @@ static void a_sensor_that_begins_to_lie_is_found(void)
         {OFFSET_A, 0.0f, -0.17f, -0.06f, 0.9f},   {OFFSET_A, 0.0f, 0.14f, 0.06f, 0.9f},
         {OFFSET_MV, 0.0f, -30.0f, -12.0f, 0.9f},  {OFFSET_MV, 0.0f, 30.0f, 12.0f, 0.9f},
     };
-    for (unsigned n = 0; n < sizeof lies / sizeof lies[0]; n++) {
+    for (unsigned n = 0; n < ROWS(lies); n++) {
         const shown_t before = with(lies[n].shown_a, lies[n].field, lies[n].honest);
         for (unsigned tenths = 0; tenths <= 10; tenths++) {
             const float part = 0.1f * (float)tenths;
@@ -103,7 +101,7 @@ static void a_sensor_that_begins_to_lie_is_found(void)
 }
 
 /* One thing at a time, however much: with wiring that is not as declared, too. */
-static void what_is_no_lie_passes(void)
+TEST(what_is_no_lie_passes)
 {
     for (unsigned wired = 0; wired < 3; wired++) {
         shown_t before = honest;
@@ -128,7 +126,7 @@ static void what_is_no_lie_passes(void)
 }
 
 /* Of little voltage a step of its register is much. */
-static void a_small_voltage_tells_less(void)
+TEST(a_small_voltage_tells_less)
 {
     const shown_t before = with(0.27f, CURRENT_GAIN, 1.0f);
     TEST_ASSERT_EQUAL(0, found_after(before, with(0.27f, CURRENT_GAIN, 0.85f), 1.0f));
@@ -138,7 +136,7 @@ static void a_small_voltage_tells_less(void)
 }
 
 /* A row ends what is compared; another current begins it anew. */
-static void windows_must_follow_on_each_other(void)
+TEST(windows_must_follow_on_each_other)
 {
     const shown_t lies = with(0.9f, CURRENT_GAIN, 0.8f);
     TEST_ASSERT_FALSE(takes(honest));
@@ -162,7 +160,7 @@ static void windows_must_follow_on_each_other(void)
     }
 }
 
-static void what_it_showed_before_is_known(void)
+TEST(what_it_showed_before_is_known)
 {
     TEST_ASSERT_EQUAL_UINT(0, circuit_step_before_q12(&step));
     TEST_ASSERT_FALSE(takes(honest));
@@ -174,7 +172,7 @@ static void what_it_showed_before_is_known(void)
 }
 
 /* As it lies now it was never seen at this current: what was before another one is long ago. */
-static void another_current_ends_what_was_known(void)
+TEST(another_current_ends_what_was_known)
 {
     TEST_ASSERT_FALSE(takes(honest));
     TEST_ASSERT_FALSE(takes(with(2.5f, CURRENT_GAIN, 1.0f)));
@@ -183,7 +181,7 @@ static void another_current_ends_what_was_known(void)
     }
 }
 
-static void found_stays_found_until_it_begins_anew(void)
+TEST(found_stays_found_until_it_begins_anew)
 {
     TEST_ASSERT_FALSE(takes(honest));
     for (unsigned n = 0; n < 300; n++) {
@@ -192,7 +190,7 @@ static void found_stays_found_until_it_begins_anew(void)
     }
 }
 
-static void windows_that_tell_are_kept_within_16_bits(void)
+TEST(windows_that_tell_are_kept_within_16_bits)
 {
     static const struct {
         circuit_window_t window;
@@ -208,7 +206,7 @@ static void windows_that_tell_are_kept_within_16_bits(void)
         {{60000.0f, 200.0f, 4095.0f, true}, UINT16_MAX, 59277},
         {{400.0f, 400.0f, 1000.0f, false}, 0, 0},
     };
-    for (unsigned n = 0; n < sizeof kept / sizeof kept[0]; n++) {
+    for (unsigned n = 0; n < ROWS(kept); n++) {
         setUp();
         TEST_ASSERT_FALSE(circuit_step_judge(&step, &kept[n].window, &circuit));
         TEST_ASSERT_EQUAL_UINT(kept[n].share_q12, step.was[0].share_q12);
@@ -217,18 +215,4 @@ static void windows_that_tell_are_kept_within_16_bits(void)
                                                       : 0u,
                                step.was[0].current_16ma);
     }
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(a_sensor_that_begins_to_lie_is_found);
-    RUN_TEST(what_is_no_lie_passes);
-    RUN_TEST(a_small_voltage_tells_less);
-    RUN_TEST(windows_must_follow_on_each_other);
-    RUN_TEST(what_it_showed_before_is_known);
-    RUN_TEST(another_current_ends_what_was_known);
-    RUN_TEST(found_stays_found_until_it_begins_anew);
-    RUN_TEST(windows_that_tell_are_kept_within_16_bits);
-    return UNITY_END();
 }

@@ -6,8 +6,8 @@
 #include <stdint.h>
 #include <string.h>
 
+#include "../run_tests.h"
 #include "controller.h"
-#include "unity.h"
 
 #define AMBIENT_C7 (20 * 128)
 
@@ -36,8 +36,6 @@ void setUp(void)
     }
     start();
 }
-
-void tearDown(void) {}
 
 /* What the duties bring: 5 V, 180 mohm beyond the spring. Failing sensors are left as they are. */
 static void respond(void)
@@ -89,15 +87,7 @@ static bool all_off(void)
     return true;
 }
 
-static void nothing_is_driven_without_a_command(void)
-{
-    for (int n = 0; n < 500; n++) {
-        run(1);
-        TEST_ASSERT_TRUE(all_off());
-    }
-}
-
-static void a_driven_spring_gets_its_current_and_only_that_one(void)
+TEST(a_driven_spring_gets_its_current_and_only_that_one)
 {
     TEST_ASSERT_TRUE(controller_set_target(&controller, 4, 1000));
     run(200);
@@ -111,7 +101,7 @@ static void a_driven_spring_gets_its_current_and_only_that_one(void)
 
 /* 9 x 3 A are asked for, 15 A are there, 14.7 A are given: in every tick, whatever the springs'
  * resistance. */
-static void sum_of_currents_never_exceeds_the_supply(void)
+TEST(sum_of_currents_never_exceeds_the_supply)
 {
     settings.policy.open_current_ma = 3000;
     for (int32_t mohm = 120; mohm <= 300; mohm += 45) {
@@ -143,7 +133,7 @@ static void sum_of_currents_never_exceeds_the_supply(void)
     }
 }
 
-static void model_is_fed_with_the_measured_power_of_each_tick(void)
+TEST(model_is_fed_with_the_measured_power_of_each_tick)
 {
     thermal_model_t model;
     TEST_ASSERT_EQUAL(THERMAL_MODEL_OK, thermal_model_init(&model, &settings.model, NULL));
@@ -177,7 +167,7 @@ static void model_is_fed_with_the_measured_power_of_each_tick(void)
 }
 
 /* From martensite to austenite, whichever has more. */
-static void each_current_loop_is_told_its_springs_resistance(void)
+TEST(each_current_loop_is_told_its_springs_resistance)
 {
     for (int falling = 0; falling < 2; falling++) {
         if (falling) {
@@ -201,7 +191,7 @@ static void each_current_loop_is_told_its_springs_resistance(void)
 
 /* A sensor lost for hold_ticks: the heat goes on being counted at its last value; then the output
  * is off and none is. */
-static void missing_readings_keep_the_last_power_while_the_output_is_on(void)
+TEST(missing_readings_keep_the_last_power_while_the_output_is_on)
 {
     settings.safety.bad_samples = 50;
     start();
@@ -227,7 +217,7 @@ static void missing_readings_keep_the_last_power_while_the_output_is_on(void)
     TEST_ASSERT_INT_WITHIN(30, 1500, controller_measured_ma(&controller, 4));
 }
 
-static void current_in_an_output_that_is_off_stops_the_board(void)
+TEST(current_in_an_output_that_is_off_stops_the_board)
 {
     controller_set_target(&controller, 0, 1000);
     run(100);
@@ -246,7 +236,7 @@ static void current_in_an_output_that_is_off_stops_the_board(void)
 
 /* One or two readings of current, a glitch each four seconds, take a pulse or two and switch
  * nothing off. */
-static void a_glitch_of_current_takes_a_pulse_and_no_more(void)
+TEST(a_glitch_of_current_takes_a_pulse_and_no_more)
 {
     controller_set_target(&controller, 0, 1000);
     run(100);
@@ -268,7 +258,7 @@ static void a_glitch_of_current_takes_a_pulse_and_no_more(void)
     TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, controller_board_fault(&controller));
 }
 
-static void hot_model_trips(void)
+TEST(hot_model_trips)
 {
     controller_set_target(&controller, 4, 1000);
     run(100);
@@ -280,7 +270,7 @@ static void hot_model_trips(void)
 
 /* What is believed is cold for ever, what is measured goes on: the ceiling ends it, and lets a
  * current pass that keeps it below the trip for ever. It begins where it was given nothing yet. */
-static void ceiling_trips_whatever_is_believed(void)
+TEST(ceiling_trips_whatever_is_believed)
 {
     for (int trips = 0; trips < 2; trips++) {
         settings.policy.open_current_ma = trips ? 3000 : 1500;
@@ -301,7 +291,7 @@ static void ceiling_trips_whatever_is_believed(void)
 }
 
 /* All that can be said of a spring which this board has heated: none of it takes a kelvin away. */
-static void no_hint_takes_heat_that_was_given(void)
+TEST(no_hint_takes_heat_that_was_given)
 {
     controller_settings_t other;
     thermal_model_state_t cold;
@@ -374,7 +364,7 @@ static void no_hint_takes_heat_that_was_given(void)
 
 /* Open loop heats springs of which nobody knows anything, so their model is no more than a guess:
  * what they were given is known all the same. */
-static void heat_that_was_given_is_kept_over_a_warm_reset(void)
+TEST(heat_that_was_given_is_kept_over_a_warm_reset)
 {
     settings.policy.policy = DRIVE_POLICY_OPEN;
     start();
@@ -397,7 +387,7 @@ static void heat_that_was_given_is_kept_over_a_warm_reset(void)
 /* 2.35 A take it beyond 120 degC by what was declared as it became warm, and the belief is talked
  * away: the ceiling ends that at the trip, or a ninth above temperature_limit_c where another
  * declaration contradicts. */
-static void where_declarations_contradict_the_ceiling_trips_at_the_limit(void)
+TEST(where_declarations_contradict_the_ceiling_trips_at_the_limit)
 {
     static const struct {
         float loss, capacity;
@@ -407,7 +397,7 @@ static void where_declarations_contradict_the_ceiling_trips_at_the_limit(void)
                {2.0f, 1.0f, AMBIENT_C7, true},
                {1.0f, 4.0f, AMBIENT_C7, true},
                {1.0f, 1.0f, -30 * 128, true}};
-    for (unsigned n = 0; n < sizeof row / sizeof row[0]; n++) {
+    for (unsigned n = 0; n < ROWS(row); n++) {
         setUp();
         settings.policy.open_current_ma = 2350;
         start();
@@ -435,7 +425,7 @@ static void where_declarations_contradict_the_ceiling_trips_at_the_limit(void)
 
 /* A sensor that shows half from 4 s on, and a user who clears and tries again each second: the
  * first time at once, then when the spring has rested for its time constant (52 s). */
-static void who_clears_again_and_again_heats_no_spring_whose_sensor_lies(void)
+TEST(who_clears_again_and_again_heats_no_spring_whose_sensor_lies)
 {
     settings.policy.policy = DRIVE_POLICY_PRECOMPENSATE;
     start();
@@ -474,7 +464,7 @@ static void who_clears_again_and_again_heats_no_spring_whose_sensor_lies(void)
 }
 
 /* Nothing is forgotten of a spring that has no fault: the first is found as if nobody cleared. */
-static void who_clears_each_second_hides_no_sensor_that_lies(void)
+TEST(who_clears_each_second_hides_no_sensor_that_lies)
 {
     settings.policy.policy = DRIVE_POLICY_PRECOMPENSATE;
     start();
@@ -495,7 +485,7 @@ static void who_clears_each_second_hides_no_sensor_that_lies(void)
 }
 
 /* A welded switch: the first clear closes the supply again, the second one when it has rested. */
-static void who_clears_a_welded_switch_again_waits(void)
+TEST(who_clears_a_welded_switch_again_waits)
 {
     for (unsigned n = 0; n < 3; n++) {
         safety_trip(&controller.safety, 4, SAFETY_FAULT_STUCK_ON);
@@ -511,7 +501,7 @@ static void who_clears_a_welded_switch_again_waits(void)
 }
 
 /* Above the policy's limit, below safety's: after trip_time_s it is off, and says why. */
-static void limit_that_stays_is_a_fault_until_cleared(void)
+TEST(limit_that_stays_is_a_fault_until_cleared)
 {
     settings.policy.trip_time_s = 2;
     start();
@@ -538,7 +528,7 @@ static void limit_that_stays_is_a_fault_until_cleared(void)
     TEST_ASSERT_INT_WITHIN(30, 1500, controller_measured_ma(&controller, 4));
 }
 
-static void stop_acts_in_the_next_tick(void)
+TEST(stop_acts_in_the_next_tick)
 {
     all_on();
     run(100);
@@ -561,7 +551,7 @@ static void stop_acts_in_the_next_tick(void)
     TEST_ASSERT_FALSE(all_off());
 }
 
-static void locked_board_drives_nothing_until_unlocked(void)
+TEST(locked_board_drives_nothing_until_unlocked)
 {
     controller_lock(&controller);
     all_on();
@@ -576,7 +566,7 @@ static void locked_board_drives_nothing_until_unlocked(void)
     TEST_ASSERT_FALSE(all_off());
 }
 
-static void commands_out_of_range_change_nothing(void)
+TEST(commands_out_of_range_change_nothing)
 {
     controller_t before = controller;
     TEST_ASSERT_FALSE(controller_set_target(&controller, 9, 1000));
@@ -602,7 +592,7 @@ static void refuses(const controller_settings_t *changed, uint16_t row)
     TEST_ASSERT_EQUAL_MEMORY(&before, &controller, sizeof controller);
 }
 
-static void refused_settings_change_nothing_and_are_found(void)
+TEST(refused_settings_change_nothing_and_are_found)
 {
     all_on();
     run(100);
@@ -621,7 +611,7 @@ static void refused_settings_change_nothing_and_are_found(void)
 #undef REFUSES
 }
 
-static void accepted_settings_keep_temperatures_currents_and_faults(void)
+TEST(accepted_settings_keep_temperatures_currents_and_faults)
 {
     all_on();
     spring_mohm[8] = 5;
@@ -643,7 +633,7 @@ static void accepted_settings_keep_temperatures_currents_and_faults(void)
 
 /* What was learnt of a loss was learnt of all that the spring gives off, whatever is declared of
  * it; of the rest nothing changes. */
-static void another_model_keeps_what_a_spring_gives_off(void)
+TEST(another_model_keeps_what_a_spring_gives_off)
 {
     const spring_learnt_t own = {.austenite_ohm = 0.22f,
                                  .change = 0.2f,
@@ -684,7 +674,7 @@ static void another_model_keeps_what_a_spring_gives_off(void)
 
 /* Whatever transformation is declared: what had transformed is not to be heated through it again.
  */
-static void another_transformation_keeps_phase_and_temperature(void)
+TEST(another_transformation_keeps_phase_and_temperature)
 {
     settings.model.air_exchange_uw_per_k = 5000;
     start();
@@ -707,7 +697,7 @@ static void another_transformation_keeps_phase_and_temperature(void)
     TEST_ASSERT_EQUAL_INT16(40 * 128, thermal_model_air_c7(&controller.model));
 }
 
-static void each_number_of_the_model_changes_its_mark(void)
+TEST(each_number_of_the_model_changes_its_mark)
 {
     thermal_model_parameters_t *const values = &controller.model.parameters;
     const uint16_t mark = controller_model_mark(&controller);
@@ -723,7 +713,7 @@ static void each_number_of_the_model_changes_its_mark(void)
     TEST_ASSERT_EQUAL_UINT16(mark, controller_model_mark(&controller));
 }
 
-static void another_size_starts_anew_but_stays_locked(void)
+TEST(another_size_starts_anew_but_stays_locked)
 {
     all_on();
     run(500);
@@ -751,7 +741,7 @@ static void another_size_starts_anew_but_stays_locked(void)
 #define PASSES_TICKS 700 /* two passes over 64 springs */
 
 /* One byte of each part; the last one of a stretch, where there is a choice. */
-static void what_settings_decide_and_a_bit_turned_over_drives_nothing(void)
+TEST(what_settings_decide_and_a_bit_turned_over_drives_nothing)
 {
     void *const places[] = {&controller.model.parameters.rows,
                             &controller.model.parameters.step_ms,
@@ -773,7 +763,7 @@ static void what_settings_decide_and_a_bit_turned_over_drives_nothing(void)
                             &controller.estimator,
                             (uint8_t *)&controller.estimator + SPRING_ESTIMATOR_FIXED_BYTES - 4};
     settings.safety.cut_off = 1;
-    for (size_t n = 0; n < sizeof places / sizeof places[0]; n++) {
+    for (size_t n = 0; n < ROWS(places); n++) {
         start();
         TEST_ASSERT_TRUE(controller_set_target(&controller, 0, 1000));
         run(60);
@@ -801,7 +791,7 @@ static void what_settings_decide_and_a_bit_turned_over_drives_nothing(void)
     TEST_ASSERT_TRUE(controller_is_sound(&controller));
 }
 
-static void what_writes_settings_is_no_bit_that_turned_over(void)
+TEST(what_writes_settings_is_no_bit_that_turned_over)
 {
     controller_set_pattern(&controller, (bool[CONTROLLER_MAX_SPRINGS]){true, true});
     run(100);
@@ -827,46 +817,11 @@ static void what_writes_settings_is_no_bit_that_turned_over(void)
 }
 
 /* What the fan decides of the conductances is taken anew with each pass. */
-static void a_conductance_of_the_fan_that_turned_over_comes_back(void)
+TEST(a_conductance_of_the_fan_that_turned_over_comes_back)
 {
     const uint16_t loss_uw_per_k = controller.model.spring[1].loss_uw_per_k;
     controller.model.spring[1].loss_uw_per_k ^= 0x1000u;
     run(PASSES_TICKS);
     TEST_ASSERT_EQUAL_UINT(loss_uw_per_k, controller.model.spring[1].loss_uw_per_k);
     TEST_ASSERT_TRUE(controller_is_sound(&controller));
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(nothing_is_driven_without_a_command);
-    RUN_TEST(a_driven_spring_gets_its_current_and_only_that_one);
-    RUN_TEST(sum_of_currents_never_exceeds_the_supply);
-    RUN_TEST(model_is_fed_with_the_measured_power_of_each_tick);
-    RUN_TEST(each_current_loop_is_told_its_springs_resistance);
-    RUN_TEST(missing_readings_keep_the_last_power_while_the_output_is_on);
-    RUN_TEST(current_in_an_output_that_is_off_stops_the_board);
-    RUN_TEST(a_glitch_of_current_takes_a_pulse_and_no_more);
-    RUN_TEST(hot_model_trips);
-    RUN_TEST(ceiling_trips_whatever_is_believed);
-    RUN_TEST(heat_that_was_given_is_kept_over_a_warm_reset);
-    RUN_TEST(no_hint_takes_heat_that_was_given);
-    RUN_TEST(where_declarations_contradict_the_ceiling_trips_at_the_limit);
-    RUN_TEST(who_clears_again_and_again_heats_no_spring_whose_sensor_lies);
-    RUN_TEST(who_clears_each_second_hides_no_sensor_that_lies);
-    RUN_TEST(who_clears_a_welded_switch_again_waits);
-    RUN_TEST(limit_that_stays_is_a_fault_until_cleared);
-    RUN_TEST(stop_acts_in_the_next_tick);
-    RUN_TEST(locked_board_drives_nothing_until_unlocked);
-    RUN_TEST(commands_out_of_range_change_nothing);
-    RUN_TEST(refused_settings_change_nothing_and_are_found);
-    RUN_TEST(accepted_settings_keep_temperatures_currents_and_faults);
-    RUN_TEST(another_model_keeps_what_a_spring_gives_off);
-    RUN_TEST(another_transformation_keeps_phase_and_temperature);
-    RUN_TEST(each_number_of_the_model_changes_its_mark);
-    RUN_TEST(another_size_starts_anew_but_stays_locked);
-    RUN_TEST(what_settings_decide_and_a_bit_turned_over_drives_nothing);
-    RUN_TEST(what_writes_settings_is_no_bit_that_turned_over);
-    RUN_TEST(a_conductance_of_the_fan_that_turned_over_comes_back);
-    return UNITY_END();
 }

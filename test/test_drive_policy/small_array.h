@@ -7,9 +7,8 @@
 #include "../fakes/belief_inside.h"
 #include "drive_policy.h"
 
-#define SPRINGS     9
-#define TICK_S      0.02
-#define ROWS(table) (sizeof(table) / sizeof((table)[0]))
+#define SPRINGS 9
+#define TICK_S  0.02
 
 typedef struct {
     double temperature_c, austenite;
@@ -28,9 +27,6 @@ extern bool allowed[SPRINGS];
 extern uint16_t target_ma[SPRINGS];
 extern uint16_t supply_limit_ma, maximum_current_ma;
 
-extern char where[120]; /* to be said where a test fails */
-/* What a failing test says: the row of its table. */
-void row(size_t n);
 uint32_t random_below(uint32_t limit);
 
 void set_defaults(void);
@@ -54,8 +50,5 @@ void decisions(unsigned count);
 
 /* And without the belief, either: what is believed is what a test says. */
 void policy_tick(void);
-
-void run_limit_tests(void);
-void run_decision_tests(void);
 
 #endif

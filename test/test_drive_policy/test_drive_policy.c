@@ -5,9 +5,9 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "../run_tests.h"
 #include "small_array.h"
 #include "spring_estimator_internal.h"
-#include "unity.h"
 
 #define RESERVED_MA   14800u /* supply 15 A less the default reserve */
 #define FULL_BOOST_MA 3000u
@@ -32,47 +32,7 @@ static void want_all(uint16_t permille)
 
 /* ---- from power-on ---- */
 
-static void after_power_on_it_waits_says_so_and_then_holds_all_nine(void)
-{
-    power_on(3, 3);
-    want_all(1000);
-    (void)run(1.0);
-    for (uint8_t k = 0; k < SPRINGS; k++) {
-        TEST_ASSERT_EQUAL_UINT16(0, target_ma[k]);
-        TEST_ASSERT_BITS_HIGH(DRIVE_POLICY_LIMIT_COOLING, drive_policy_limits(&policy, k));
-    }
-    const double highest_c = run(209.0); /* the figure for a first start */
-    for (uint8_t k = 0; k < SPRINGS; k++) {
-        (void)snprintf(where, sizeof where, "spring %d: %.1f degC, %.3f; highest %.1f", k + 1,
-                       truth[k].temperature_c, truth[k].austenite, highest_c);
-        TEST_ASSERT_TRUE_MESSAGE(truth[k].austenite > 0.95 && highest_c < 115.0, where);
-        TEST_ASSERT_BITS_LOW(DRIVE_POLICY_LIMIT_COOLING, drive_policy_limits(&policy, k));
-    }
-}
-
-static void held_spring_stays_on_near_martensite_start(void)
-{
-    static const double loss[] = {0.85, 1.0, 1.15};
-    for (unsigned n = 0; n < 3; n++) {
-        set_defaults();
-        loss_w_per_k *= loss[n];
-        begin_cold(3, 3);
-        level[4] = 1000;
-        (void)run(300.0);
-        unsigned away = 0;
-        double sum_c = 0.0;
-        for (unsigned second = 0; second < 600; second++) {
-            (void)run(1.0);
-            away = truth[4].austenite < 0.9 ? away + 1 : 0;
-            sum_c += truth[4].temperature_c;
-            TEST_ASSERT_LESS_OR_EQUAL_UINT(20, away);
-        }
-        (void)snprintf(where, sizeof where, "loss x %.2f: mean %.1f degC", loss[n], sum_c / 600.0);
-        TEST_ASSERT_TRUE_MESSAGE(sum_c / 600.0 < 86.0, where);
-    }
-}
-
-static void jump_of_the_current_forgets_no_phase(void)
+TEST(jump_of_the_current_forgets_no_phase)
 {
     begin_cold(1, 2);
     level[0] = 1000;
@@ -85,61 +45,8 @@ static void jump_of_the_current_forgets_no_phase(void)
     }
 }
 
-/* A touch, slower than a contact's jump. The largest would need more heat than a spring is allowed:
- * that is said. */
-static void spring_that_has_lost_its_phase_is_heated_back_or_that_is_said(void)
-{
-    for (double touch_k = 4.0; touch_k < 8.5; touch_k += 1.0) {
-        begin_cold(1, 2);
-        level[0] = 1000;
-        (void)run(260.0);
-        double least = 1.0;
-        for (unsigned second = 0; second < 90; second++) {
-            truth[0].shift_k = fmin(touch_k, (double)second);
-            (void)run(1.0);
-            least = fmin(least, truth[0].austenite);
-        }
-        const bool says = (drive_policy_limits(&policy, 0) & DRIVE_POLICY_LIMIT_AWAY) != 0;
-        (void)snprintf(where, sizeof where, "%.0f K: %.3f, %.1f degC, %.3f, says %d", touch_k,
-                       least, truth[0].temperature_c, truth[0].austenite, says);
-        TEST_ASSERT_TRUE_MESSAGE(least < 0.95, where); /* it did lose */
-        TEST_ASSERT_TRUE_MESSAGE(truth[0].austenite > 0.9 || says, where);
-    }
-}
-
-/* What is believed of it has changed by itself: as after power-on it waits, whatever it did. */
-static void spring_of_which_nothing_is_known_any_more_waits_and_is_heated_anew(void)
-{
-    for (double at_s = 6.0; at_s < 200.0; at_s += 97.0) { /* heated, held */
-        begin_cold(1, 2);
-        level[0] = 1000;
-        (void)run(at_s);
-        belief_inside(&belief, 0)->slow_ohm *= 2.0f;
-        (void)run(1.0);
-        TEST_ASSERT_EQUAL_UINT8(1, spring_estimator_broken_seals(&belief));
-        TEST_ASSERT_EQUAL_UINT16(0, target_ma[0]);
-        TEST_ASSERT_EQUAL_UINT16(DRIVE_POLICY_LIMIT_COOLING, drive_policy_limits(&policy, 0));
-        const double highest_c = run(209.0);
-        (void)snprintf(where, sizeof where, "%.0f s: %.3f, highest %.1f", at_s, truth[0].austenite,
-                       highest_c);
-        TEST_ASSERT_TRUE_MESSAGE(truth[0].austenite > 0.95 && highest_c < 115.0, where);
-        TEST_ASSERT_EQUAL_UINT16(0, drive_policy_limits(&policy, 0));
-    }
-    begin_cold(1, 2);
-}
-
-static void resistance_without_a_change_is_driven_by_the_model_and_said(void)
-{
-    begin_cold(1, 2);
-    truth[0].ratio = 1.0;
-    level[0] = 1000;
-    TEST_ASSERT_TRUE(run(300.0) < 120.0);
-    TEST_ASSERT_TRUE(truth[0].austenite > 0.98);
-    TEST_ASSERT_BITS_HIGH(DRIVE_POLICY_LIMIT_BLIND, drive_policy_limits(&policy, 0));
-}
-
 /* Whichever way it came there, and never fully on: by its own martensite's resistance. */
-static void levels_one_after_the_other_are_held(void)
+TEST(levels_one_after_the_other_are_held)
 {
     static const uint16_t levels[] = {500, 250, 800, 400, 600};
     for (int n = 0; n < 3; n++) {
@@ -149,16 +56,15 @@ static void levels_one_after_the_other_are_held(void)
         for (unsigned j = 0; j < 5; j++) {
             level[0] = levels[j];
             (void)run(120.0);
-            (void)snprintf(where, sizeof where, "loss %d, %u permille: %.3f", n, levels[j],
-                           truth[0].austenite);
-            TEST_ASSERT_TRUE_MESSAGE(fabs(truth[0].austenite - 0.001 * levels[j]) < 0.1, where);
+            here("loss %d, %u permille: %.3f", n, levels[j], truth[0].austenite);
+            TEST_ASSERT_TRUE(fabs(truth[0].austenite - 0.001 * levels[j]) < 0.1);
         }
     }
 }
 
 /* ---- limits ---- */
 
-static void boosts_are_staggered_not_diluted(void)
+TEST(boosts_are_staggered_not_diluted)
 {
     begin_cold(3, 3);
     want_all(1000);
@@ -177,7 +83,7 @@ static void boosts_are_staggered_not_diluted(void)
     TEST_ASSERT_EQUAL_UINT(4, none); /* the ninth has what is left */
 }
 
-static void budget_holds_in_every_tick_whatever_is_asked(void)
+TEST(budget_holds_in_every_tick_whatever_is_asked)
 {
     power_on(3, 3);
     for (unsigned n = 0; n < 40000; n++) {
@@ -206,7 +112,7 @@ static void budget_holds_in_every_tick_whatever_is_asked(void)
     TEST_ASSERT_TRUE(thermal_model_is_consistent(&model));
 }
 
-static void parameters_outside_their_range_are_refused_whole(void)
+TEST(parameters_outside_their_range_are_refused_whole)
 {
     begin_cold(3, 3);
     drive_policy_parameters_t wrong = parameters;
@@ -219,26 +125,10 @@ static void parameters_outside_their_range_are_refused_whole(void)
     wrong.unsure_margin_cc = (uint16_t)(wrong.hold_margin_cc - 1);
     TEST_ASSERT_FALSE(drive_policy_check(&wrong, &bad));
     TEST_ASSERT_EQUAL_UINT16(PARAMETER_unsure_margin_k, bad);
+    wrong.unsure_margin_cc = wrong.hold_margin_cc;
+    TEST_ASSERT_TRUE(drive_policy_check(&wrong, &bad));
     wrong = parameters;
     wrong.policy = 2;
     TEST_ASSERT_FALSE(drive_policy_check(&wrong, &bad));
     TEST_ASSERT_FALSE(drive_policy_init(&policy, &wrong, &model, NULL));
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(after_power_on_it_waits_says_so_and_then_holds_all_nine);
-    RUN_TEST(held_spring_stays_on_near_martensite_start);
-    RUN_TEST(jump_of_the_current_forgets_no_phase);
-    RUN_TEST(spring_that_has_lost_its_phase_is_heated_back_or_that_is_said);
-    RUN_TEST(spring_of_which_nothing_is_known_any_more_waits_and_is_heated_anew);
-    RUN_TEST(resistance_without_a_change_is_driven_by_the_model_and_said);
-    RUN_TEST(levels_one_after_the_other_are_held);
-    RUN_TEST(boosts_are_staggered_not_diluted);
-    RUN_TEST(budget_holds_in_every_tick_whatever_is_asked);
-    RUN_TEST(parameters_outside_their_range_are_refused_whole);
-    run_limit_tests();
-    run_decision_tests();
-    return UNITY_END();
 }

@@ -1,8 +1,5 @@
+#include "../run_tests.h"
 #include "fixed_point.h"
-#include "unity.h"
-
-void setUp(void) {}
-void tearDown(void) {}
 
 static uint32_t random_state = 7;
 
@@ -14,7 +11,7 @@ static uint32_t random_bits(void)
     return random_state;
 }
 
-static void products_accumulate_modulo_2_32(void)
+TEST(products_accumulate_modulo_2_32)
 {
     TEST_ASSERT_EQUAL_UINT32(7u + 65535u * 65535u, fixed_point_mac_u16(7, 65535, 65535));
     TEST_ASSERT_EQUAL_UINT32(0, fixed_point_mac_u16(0xffffffffu, 1, 1));
@@ -22,7 +19,7 @@ static void products_accumulate_modulo_2_32(void)
     TEST_ASSERT_EQUAL_INT32(-1, (int32_t)fixed_point_mac_s16_u16(0, -1, 1));
 }
 
-static void scale_rounds_to_the_nearest(void)
+TEST(scale_rounds_to_the_nearest)
 {
     TEST_ASSERT_EQUAL_INT32(0, fixed_point_scale_q31(0, INT32_MAX));
     TEST_ASSERT_EQUAL_INT32(1, fixed_point_scale_q31(1, 0x40000000));
@@ -33,7 +30,7 @@ static void scale_rounds_to_the_nearest(void)
     TEST_ASSERT_EQUAL_INT32(INT32_MAX, fixed_point_scale_q31(INT32_MIN, -INT32_MAX));
 }
 
-static void add_holds_at_the_ends(void)
+TEST(add_holds_at_the_ends)
 {
     TEST_ASSERT_EQUAL_INT32(INT32_MAX, fixed_point_add_saturated(INT32_MAX, 1));
     TEST_ASSERT_EQUAL_INT32(INT32_MIN, fixed_point_add_saturated(INT32_MIN, -1));
@@ -41,7 +38,7 @@ static void add_holds_at_the_ends(void)
     TEST_ASSERT_EQUAL_INT32(-1, fixed_point_add_saturated(INT32_MAX, INT32_MIN));
 }
 
-static void multiply_divide_rounds_and_says_what_does_not_fit(void)
+TEST(multiply_divide_rounds_and_says_what_does_not_fit)
 {
     TEST_ASSERT_EQUAL_UINT32(3, fixed_point_multiply_divide(5, 1, 2));
     TEST_ASSERT_EQUAL_UINT32(UINT32_MAX, fixed_point_multiply_divide(1, 1, 0));
@@ -55,14 +52,4 @@ static void multiply_divide_rounds_and_says_what_does_not_fit(void)
         uint32_t wanted = exact > UINT32_MAX ? UINT32_MAX : (uint32_t)exact;
         TEST_ASSERT_EQUAL_UINT32(wanted, fixed_point_multiply_divide(a, b, c));
     }
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(products_accumulate_modulo_2_32);
-    RUN_TEST(scale_rounds_to_the_nearest);
-    RUN_TEST(add_holds_at_the_ends);
-    RUN_TEST(multiply_divide_rounds_and_says_what_does_not_fit);
-    return UNITY_END();
 }

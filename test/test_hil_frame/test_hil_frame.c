@@ -1,11 +1,8 @@
 #include <string.h>
 
+#include "../run_tests.h"
 #include "crc16.h"
 #include "hil_frame.h"
-#include "unity.h"
-
-void setUp(void) {}
-void tearDown(void) {}
 
 static hil_frame_sensors_t some_sensors(void)
 {
@@ -31,12 +28,12 @@ static hil_frame_event_t feed(hil_frame_decoder_t *decoder, const char *line, ui
     return event;
 }
 
-static void checksum_is_the_published_one(void)
+TEST(checksum_is_the_published_one)
 {
     TEST_ASSERT_EQUAL_HEX16(0x29B1, crc16_add_bytes(CRC16_START, "123456789", 9));
 }
 
-static void sensors_survive_the_line(void)
+TEST(sensors_survive_the_line)
 {
     char line[HIL_FRAME_MAX_LINE];
     const hil_frame_sensors_t sent = some_sensors();
@@ -51,7 +48,7 @@ static void sensors_survive_the_line(void)
     TEST_ASSERT_EQUAL_MEMORY(&sent, &got, sizeof sent);
 }
 
-static void duties_survive_the_line(void)
+TEST(duties_survive_the_line)
 {
     for (uint8_t springs = 1; springs <= 9; springs++) {
         hil_frame_duties_t sent;
@@ -75,7 +72,7 @@ static void duties_survive_the_line(void)
 }
 
 /* Written by hand from the description, so that another program can be held to it. */
-static void frame_is_as_described(void)
+TEST(frame_is_as_described)
 {
     hil_frame_duties_t duties = {
         .tick = 0x0102, .fan_percent = 0x32, .springs = 1, .duty = {0x0320}};
@@ -86,7 +83,7 @@ static void frame_is_as_described(void)
     TEST_ASSERT_EQUAL('\n', line[16]);
 }
 
-static void no_frame_holds_a_realtime_byte(void)
+TEST(no_frame_holds_a_realtime_byte)
 {
     hil_frame_sensors_t sensors = some_sensors();
     char line[HIL_FRAME_MAX_LINE];
@@ -99,7 +96,7 @@ static void no_frame_holds_a_realtime_byte(void)
     }
 }
 
-static void every_flipped_bit_is_detected(void)
+TEST(every_flipped_bit_is_detected)
 {
     char line[HIL_FRAME_MAX_LINE];
     const hil_frame_sensors_t sent = some_sensors();
@@ -121,7 +118,7 @@ static void every_flipped_bit_is_detected(void)
     }
 }
 
-static void every_cut_is_detected(void)
+TEST(every_cut_is_detected)
 {
     char line[HIL_FRAME_MAX_LINE];
     const hil_frame_sensors_t sent = some_sensors();
@@ -135,7 +132,7 @@ static void every_cut_is_detected(void)
     }
 }
 
-static void endless_frame_is_dropped_and_does_not_overflow(void)
+TEST(endless_frame_is_dropped_and_does_not_overflow)
 {
     hil_frame_decoder_t decoder;
     hil_frame_decoder_init(&decoder);
@@ -149,7 +146,7 @@ static void endless_frame_is_dropped_and_does_not_overflow(void)
     TEST_ASSERT_EQUAL(HIL_FRAME_BAD, hil_frame_decode(&decoder, '\n'));
 }
 
-static void console_lines_pass_by(void)
+TEST(console_lines_pass_by)
 {
     hil_frame_decoder_t decoder;
     hil_frame_decoder_init(&decoder);
@@ -158,7 +155,7 @@ static void console_lines_pass_by(void)
     TEST_ASSERT_EQUAL(HIL_FRAME_BAD, feed(&decoder, "~X00\n", 5));
 }
 
-static void wrong_number_of_springs_is_refused(void)
+TEST(wrong_number_of_springs_is_refused)
 {
     char line[HIL_FRAME_MAX_LINE];
     hil_frame_sensors_t sensors = some_sensors();
@@ -170,20 +167,4 @@ static void wrong_number_of_springs_is_refused(void)
     TEST_ASSERT_EQUAL_UINT8(0, hil_frame_encode_duties(&duties, line));
     duties.springs = 0;
     TEST_ASSERT_EQUAL_UINT8(0, hil_frame_encode_duties(&duties, line));
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(checksum_is_the_published_one);
-    RUN_TEST(sensors_survive_the_line);
-    RUN_TEST(duties_survive_the_line);
-    RUN_TEST(frame_is_as_described);
-    RUN_TEST(no_frame_holds_a_realtime_byte);
-    RUN_TEST(every_flipped_bit_is_detected);
-    RUN_TEST(every_cut_is_detected);
-    RUN_TEST(endless_frame_is_dropped_and_does_not_overflow);
-    RUN_TEST(console_lines_pass_by);
-    RUN_TEST(wrong_number_of_springs_is_refused);
-    return UNITY_END();
 }

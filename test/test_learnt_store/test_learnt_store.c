@@ -3,9 +3,9 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "../run_tests.h"
 #include "learnt_store.h"
 #include "settings.h"
-#include "unity.h"
 
 #include "../fakes/eeprom.h"
 
@@ -62,15 +62,13 @@ void setUp(void)
     writes = 0;
 }
 
-void tearDown(void) {}
-
 static void expect_numbers(uint8_t spring)
 {
     const spring_learnt_t back = controller_learnt(&controller, spring);
     TEST_ASSERT_EQUAL_MEMORY(&numbers, &back, sizeof back);
 }
 
-static void what_was_learnt_is_there_after_power_on(void)
+TEST(what_was_learnt_is_there_after_power_on)
 {
     hold(0, DRIVE_POLICY_STAGE_HOLD);
     learn(0, &numbers);
@@ -83,7 +81,7 @@ static void what_was_learnt_is_there_after_power_on(void)
     TEST_ASSERT_TRUE(learnt_store_keeps(&store));
 }
 
-static void it_is_saved_a_minute_after_all_that_are_driven_are_held_and_no_sooner(void)
+TEST(it_is_saved_a_minute_after_all_that_are_driven_are_held_and_no_sooner)
 {
     hold(0, DRIVE_POLICY_STAGE_HOLD);
     hold(1, DRIVE_POLICY_STAGE_HEAT);
@@ -97,7 +95,7 @@ static void it_is_saved_a_minute_after_all_that_are_driven_are_held_and_no_soone
     TEST_ASSERT_TRUE(learnt_store_keeps(&store));
 }
 
-static void nothing_driven_or_nothing_learnt_writes_nothing(void)
+TEST(nothing_driven_or_nothing_learnt_writes_nothing)
 {
     learn(0, &numbers);
     seconds(2000);
@@ -117,7 +115,7 @@ static unsigned saved_after(const spring_learnt_t *change)
     return writes;
 }
 
-static void what_is_worth_a_save_is_saved_once_in_ten_minutes(void)
+TEST(what_is_worth_a_save_is_saved_once_in_ten_minutes)
 {
     spring_learnt_t next = numbers;
     hold(0, DRIVE_POLICY_STAGE_HOLD);
@@ -140,7 +138,7 @@ static void what_is_worth_a_save_is_saved_once_in_ten_minutes(void)
 }
 
 /* Learning that never settles: 7 saves in the first day, fewer in those that follow. */
-static void what_never_settles_is_saved_ever_less_often(void)
+TEST(what_never_settles_is_saved_ever_less_often)
 {
     spring_learnt_t next = numbers;
     unsigned saves[2] = {0, 0};
@@ -165,7 +163,7 @@ static void what_never_settles_is_saved_ever_less_often(void)
     TEST_ASSERT_GREATER_OR_EQUAL_UINT(1, saves[1]);
 }
 
-static void clear_forgets_in_memory_and_over_power_off(void)
+TEST(clear_forgets_in_memory_and_over_power_off)
 {
     hold(0, DRIVE_POLICY_STAGE_HOLD);
     learn(0, &numbers);
@@ -188,7 +186,7 @@ static void power_on_with(const controller_settings_t *settings)
 }
 
 /* A calibration declares what was learnt beside the old numbers: it is not to count twice. */
-static void a_loss_that_was_learnt_beside_another_model_is_left_out(void)
+TEST(a_loss_that_was_learnt_beside_another_model_is_left_out)
 {
     controller_settings_t settings;
     controller_settings_default(&settings);
@@ -218,10 +216,10 @@ static void a_loss_that_was_learnt_beside_another_model_is_left_out(void)
 
 /* What a spring gives off is seen to be far from what is declared of it then, or since: all else
  * that was learnt is as good as before. */
-static void no_declaration_of_the_losses_costs_what_else_was_learnt(void)
+TEST(no_declaration_of_the_losses_costs_what_else_was_learnt)
 {
     static const float declared[] = {3.0f, 0.4f, 1.0f}; /* while it is on; off: as much again */
-    for (unsigned n = 0; n < 2u * sizeof declared / sizeof declared[0]; n++) {
+    for (unsigned n = 0; n < 2u * ROWS(declared); n++) {
         controller_settings_t settings;
         controller_settings_default(&settings);
         const float loss_uw_per_k = settings.model.loss_uw_per_k;
@@ -250,7 +248,7 @@ static void no_declaration_of_the_losses_costs_what_else_was_learnt(void)
     }
 }
 
-static void what_lies_at_its_limit_is_taken_back(void)
+TEST(what_lies_at_its_limit_is_taken_back)
 {
     spring_learnt_t most = numbers;
     controller_forget_learnt(&controller, 0);
@@ -263,7 +261,7 @@ static void what_lies_at_its_limit_is_taken_back(void)
 }
 
 /* The minute is on end: one second that a spring is not held in begins it anew. */
-static void a_second_that_is_not_held_begins_the_minute_anew(void)
+TEST(a_second_that_is_not_held_begins_the_minute_anew)
 {
     hold(0, DRIVE_POLICY_STAGE_HOLD);
     learn(0, &numbers);
@@ -279,7 +277,7 @@ static void a_second_that_is_not_held_begins_the_minute_anew(void)
 }
 
 /* The last spring counts as the first does, and what is new is worth a save at once. */
-static void the_last_springs_first_numbers_are_saved_after_the_shortest_pause(void)
+TEST(the_last_springs_first_numbers_are_saved_after_the_shortest_pause)
 {
     hold(0, DRIVE_POLICY_STAGE_HOLD);
     learn(0, &numbers);
@@ -302,7 +300,7 @@ static void the_last_springs_first_numbers_are_saved_after_the_shortest_pause(vo
 }
 
 /* The clock of the pause stays where it ends: it would begin anew after 18 hours. */
-static void a_day_without_a_save_puts_none_off(void)
+TEST(a_day_without_a_save_puts_none_off)
 {
     for (uint32_t s = 0; s < 65000u; s++) {
         learnt_store_second(&store, &controller);
@@ -314,7 +312,7 @@ static void a_day_without_a_save_puts_none_off(void)
 }
 
 /* Each number by itself: a little less than what is worth a save, and a little more. */
-static void each_number_is_worth_a_save_at_its_own_limit(void)
+TEST(each_number_is_worth_a_save_at_its_own_limit)
 {
     const float rise = 0.02f / 80.0f;
     for (int n = 0; n < 7; n++) {
@@ -337,23 +335,4 @@ static void each_number_is_worth_a_save_at_its_own_limit(void)
             TEST_ASSERT_EQUAL_MESSAGE(more, saved_after(&next) > 0, which);
         }
     }
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(what_was_learnt_is_there_after_power_on);
-    RUN_TEST(it_is_saved_a_minute_after_all_that_are_driven_are_held_and_no_sooner);
-    RUN_TEST(nothing_driven_or_nothing_learnt_writes_nothing);
-    RUN_TEST(what_is_worth_a_save_is_saved_once_in_ten_minutes);
-    RUN_TEST(what_never_settles_is_saved_ever_less_often);
-    RUN_TEST(clear_forgets_in_memory_and_over_power_off);
-    RUN_TEST(a_loss_that_was_learnt_beside_another_model_is_left_out);
-    RUN_TEST(no_declaration_of_the_losses_costs_what_else_was_learnt);
-    RUN_TEST(what_lies_at_its_limit_is_taken_back);
-    RUN_TEST(a_second_that_is_not_held_begins_the_minute_anew);
-    RUN_TEST(the_last_springs_first_numbers_are_saved_after_the_shortest_pause);
-    RUN_TEST(a_day_without_a_save_puts_none_off);
-    RUN_TEST(each_number_is_worth_a_save_at_its_own_limit);
-    return UNITY_END();
 }

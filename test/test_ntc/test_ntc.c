@@ -1,12 +1,9 @@
 #include <math.h>
 
+#include "../run_tests.h"
 #include "ntc.h"
-#include "unity.h"
 
-void setUp(void) {}
-void tearDown(void) {}
-
-static void follows_the_b_equation(void)
+TEST(follows_the_b_equation)
 {
     for (double celsius = -19.5; celsius < 79.5; celsius += 0.1) {
         const double ratio = exp(3950.0 * (1.0 / (celsius + 273.15) - 1.0 / 298.15));
@@ -17,19 +14,11 @@ static void follows_the_b_equation(void)
     }
 }
 
-static void a_broken_wire_is_no_temperature(void)
+TEST(a_broken_wire_is_no_temperature)
 {
     int16_t temperature_c7 = 1234;
     TEST_ASSERT_FALSE(ntc_temperature_c7(0, &temperature_c7));
     TEST_ASSERT_FALSE(ntc_temperature_c7(1023, &temperature_c7));
     TEST_ASSERT_FALSE(ntc_temperature_c7(65535, &temperature_c7));
     TEST_ASSERT_EQUAL_INT16(1234, temperature_c7);
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(follows_the_b_equation);
-    RUN_TEST(a_broken_wire_is_no_temperature);
-    return UNITY_END();
 }

@@ -4,9 +4,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include <unity.h>
+#include "../run_tests.h"
 
 #include "descriptions.h"
+#include "drive_policy.h"
 #include "parameters.h"
 #include "text.h"
 
@@ -39,9 +40,6 @@ static void take_defaults(uint8_t part)
     }
 }
 
-void setUp(void) {}
-void tearDown(void) {}
-
 /* Highest and lowest that a field of that type can hold at all. */
 static int32_t most_of(uint8_t type)
 {
@@ -56,65 +54,67 @@ static int32_t least_of(uint8_t type)
     return type == PARAMETER_S16 ? -32768 : 0;
 }
 
-static void each_value_is_kept_at_its_limits_and_refused_beyond(void)
+TEST(each_value_is_kept_at_its_limits_and_refused_beyond)
 {
     for (uint16_t k = 0; k < PARAMETER_COUNT; k++) {
         const parameter_row_t row = parameter_row(k);
+        here("%s", row.name);
         const parameter_part_t part = (parameter_part_t)row.part;
         const uint8_t last = (uint8_t)(row.count - 1u);
         const int32_t inside[] = {row.minimum, row.maximum, row.standard};
         uint16_t bad = UINT16_MAX;
         take_defaults(row.part);
-        TEST_ASSERT_TRUE_MESSAGE(row.minimum < row.maximum, row.name);
+        TEST_ASSERT_TRUE(row.minimum < row.maximum);
         for (unsigned i = 0; i < 3; i++) {
             parameter_set(&values, &row, last, inside[i]);
-            TEST_ASSERT_EQUAL_INT32_MESSAGE(inside[i], parameter_get(&values, &row, last),
-                                            row.name);
-            TEST_ASSERT_TRUE_MESSAGE(parameter_check(part, &values, &bad), row.name);
+            TEST_ASSERT_EQUAL_INT32(inside[i], parameter_get(&values, &row, last));
+            TEST_ASSERT_TRUE(parameter_check(part, &values, &bad));
         }
         TEST_ASSERT_EQUAL_UINT16(UINT16_MAX, bad);
         if (row.minimum > least_of(row.type)) {
             parameter_set(&values, &row, last, row.minimum - 1);
-            TEST_ASSERT_FALSE_MESSAGE(parameter_check(part, &values, &bad), row.name);
-            TEST_ASSERT_EQUAL_UINT16_MESSAGE(k, bad, row.name);
+            TEST_ASSERT_FALSE(parameter_check(part, &values, &bad));
+            TEST_ASSERT_EQUAL_UINT16(k, bad);
         }
         if (row.maximum < most_of(row.type)) {
             parameter_set(&values, &row, last, row.maximum + 1);
-            TEST_ASSERT_FALSE_MESSAGE(parameter_check(part, &values, &bad), row.name);
-            TEST_ASSERT_EQUAL_UINT16_MESSAGE(k, bad, row.name);
+            TEST_ASSERT_FALSE(parameter_check(part, &values, &bad));
+            TEST_ASSERT_EQUAL_UINT16(k, bad);
             TEST_ASSERT_FALSE(parameter_check(part, &values, NULL));
         }
     }
 }
 
-static void a_value_beyond_what_is_read_is_refused(void)
+TEST(a_value_beyond_what_is_read_is_refused)
 {
     take_defaults(PARAMETER_PART_MODEL);
     values.model.contact_uohm[0] = UINT32_MAX;
     TEST_ASSERT_FALSE(parameter_check(PARAMETER_PART_MODEL, &values, NULL));
 }
 
-static void names_and_ids_are_used_once(void)
+TEST(names_and_ids_are_used_once)
 {
     for (uint16_t k = 0; k < PARAMETER_COUNT; k++) {
         const parameter_row_t row = parameter_row(k);
+        here("%s", row.name);
         TEST_ASSERT_NOT_EQUAL(0, row.id);
-        TEST_ASSERT_TRUE_MESSAGE(strlen(row.name) < PARAMETER_NAME_SIZE - 1u, row.name);
+        TEST_ASSERT_TRUE(strlen(row.name) < PARAMETER_NAME_SIZE - 1u);
         for (uint16_t other = 0; other < k; other++) {
             const parameter_row_t earlier = parameter_row(other);
-            TEST_ASSERT_NOT_EQUAL_MESSAGE(earlier.id, row.id, row.name);
-            TEST_ASSERT_TRUE_MESSAGE(strcmp(earlier.name, row.name) != 0, row.name);
+            TEST_ASSERT_NOT_EQUAL(earlier.id, row.id);
+            TEST_ASSERT_TRUE(strcmp(earlier.name, row.name) != 0);
         }
     }
 }
 
 /* A name of a setting is not the beginning of another one's with a number: `name_3`. */
-static void a_number_after_a_name_is_always_a_spring(void)
+TEST(a_number_after_a_name_is_always_a_spring)
 {
     for (uint16_t k = 0; k < PARAMETER_COUNT; k++) {
         const char *const name = parameter_row(k).name;
+        here("%s", name);
         const char *const last = strrchr(name, '_');
-        TEST_ASSERT_TRUE_MESSAGE(last == NULL || last[1] < '0' || last[1] > '9', name);
+        TEST_ASSERT_TRUE(last == NULL || last[1] < '0' || last[1] > '9');
     }
 }
 
@@ -161,7 +161,7 @@ static void expect_table(const char *path, const char *titles, const char *wante
     }
 }
 
-static void the_settings_page_says_what_the_table_says(void)
+TEST(the_settings_page_says_what_the_table_says)
 {
     static const char titles[] =
         "| name | unit | default | range | what |\n|---|---|---|---|---|\n";
@@ -181,7 +181,7 @@ static void the_settings_page_says_what_the_table_says(void)
     expect_table(NINESPRING_SOURCE_DIR "/docs/console.md", titles, wanted);
 }
 
-static void the_effects_page_says_what_the_table_says(void)
+TEST(the_effects_page_says_what_the_table_says)
 {
     static const char titles[] = "| effect | what it is | on the chip |\n|---|---|---|\n";
     static char wanted[10000];
@@ -195,7 +195,7 @@ static void the_effects_page_says_what_the_table_says(void)
     expect_table(NINESPRING_SOURCE_DIR "/docs/adding-an-effect.md", titles, wanted);
 }
 
-static void each_effect_has_its_law_in_the_physics_page(void)
+TEST(each_effect_has_its_law_in_the_physics_page)
 {
     read_page(NINESPRING_SOURCE_DIR "/docs/physics.md");
     for (size_t k = 0; k < EFFECT_COUNT; k++) {
@@ -205,15 +205,27 @@ static void each_effect_has_its_law_in_the_physics_page(void)
     }
 }
 
-int main(void)
+TEST(the_driving_page_has_each_setting_of_the_policy_and_each_limit)
 {
-    UNITY_BEGIN();
-    RUN_TEST(each_value_is_kept_at_its_limits_and_refused_beyond);
-    RUN_TEST(a_value_beyond_what_is_read_is_refused);
-    RUN_TEST(names_and_ids_are_used_once);
-    RUN_TEST(a_number_after_a_name_is_always_a_spring);
-    RUN_TEST(the_settings_page_says_what_the_table_says);
-    RUN_TEST(the_effects_page_says_what_the_table_says);
-    RUN_TEST(each_effect_has_its_law_in_the_physics_page);
-    return UNITY_END();
+    static const struct {
+        drive_policy_limit_t bit;
+        const char *name;
+    } limits[] = {
+        {DRIVE_POLICY_LIMIT_SAFETY, "safety"},     {DRIVE_POLICY_LIMIT_CURRENT, "current"},
+        {DRIVE_POLICY_LIMIT_SUPPLY, "supply"},     {DRIVE_POLICY_LIMIT_TEMPERATURE, "temperature"},
+        {DRIVE_POLICY_LIMIT_UNDRIVEN, "undriven"}, {DRIVE_POLICY_LIMIT_OVERLOAD, "overload"},
+        {DRIVE_POLICY_LIMIT_TRIP, "trip"},         {DRIVE_POLICY_LIMIT_BLIND, "blind"}};
+    char wanted[120], number[TEXT_DECIMAL_SIZE];
+    read_page(NINESPRING_SOURCE_DIR "/docs/driving.md");
+    for (uint16_t k = 0; k < PARAMETER_COUNT; k++) {
+        const parameter_row_t row = parameter_row(k);
+        (void)text_format_decimal(row.standard, row.decimals, number);
+        (void)snprintf(wanted, sizeof wanted, "| `%s` |%s%s | %s |", row.name,
+                       row.unit[0] != '\0' ? " " : "", row.unit, number);
+        TEST_ASSERT_TRUE_MESSAGE(row.part != PARAMETER_PART_POLICY || strstr(page, wanted), wanted);
+    }
+    for (size_t k = 0; k < ROWS(limits); k++) {
+        (void)snprintf(wanted, sizeof wanted, "| %u | `%s` |", limits[k].bit, limits[k].name);
+        TEST_ASSERT_NOT_NULL_MESSAGE(strstr(page, wanted), wanted);
+    }
 }

@@ -5,8 +5,8 @@
 #include <stdint.h>
 #include <string.h>
 
+#include "../run_tests.h"
 #include "safety.h"
-#include "unity.h"
 
 static safety_t safety;
 static safety_parameters_t parameters;
@@ -24,8 +24,6 @@ void setUp(void)
     safety_parameters_default(&parameters);
     TEST_ASSERT_TRUE(safety_init(&safety, &parameters, 9, NULL));
 }
-
-void tearDown(void) {}
 
 static void ticks(uint8_t spring, const safety_sample_t *sample, uint32_t count)
 {
@@ -76,7 +74,7 @@ static void trips(safety_fault_t fault, const safety_sample_t *sample)
 }
 
 /* And what is at its limit is good. */
-static void each_condition_trips_its_own_fault(void)
+TEST(each_condition_trips_its_own_fault)
 {
     static const struct {
         int16_t ma, mv, limit_ma, limit_mv; /* of an expected 1.5 A */
@@ -88,7 +86,7 @@ static void each_condition_trips_its_own_fault(void)
                  {1500, 751, 1500, 750, SAFETY_FAULT_HIGH_RESISTANCE}, /* 500 mohm */
                  {3150, 1576, 3150, 1575, SAFETY_FAULT_HIGH_RESISTANCE}};
     safety_sample_t sample;
-    for (size_t n = 0; n < sizeof table / sizeof table[0]; n++) {
+    for (size_t n = 0; n < ROWS(table); n++) {
         sample = running;
         sample.current_ma = table[n].ma;
         sample.voltage_mv = table[n].mv;
@@ -121,7 +119,7 @@ static void each_condition_trips_its_own_fault(void)
     TEST_ASSERT_TRUE(safety_allows(&safety, 4));
 }
 
-static void too_little_current_says_nothing_about_the_resistance(void)
+TEST(too_little_current_says_nothing_about_the_resistance)
 {
     safety_sample_t sample = {
         .current_ma = 299, .voltage_mv = 0, .expected_ma = 299, .temperature_c7 = 0};
@@ -134,7 +132,7 @@ static void too_little_current_says_nothing_about_the_resistance(void)
 }
 
 /* What was counted before stays: a sensor that fails every other tick does not hide a short. */
-static void missing_readings_neither_count_nor_forgive(void)
+TEST(missing_readings_neither_count_nor_forgive)
 {
     safety_sample_t bad = running;
     bad.voltage_mv = 0;
@@ -150,7 +148,7 @@ static void missing_readings_neither_count_nor_forgive(void)
 }
 
 /* A condition that takes over from another is counted from where that one ends. */
-static void condition_that_follows_another_trips_in_its_own_time(void)
+TEST(condition_that_follows_another_trips_in_its_own_time)
 {
     safety_sample_t low = running;
     low.voltage_mv = 0;
@@ -171,7 +169,7 @@ static void condition_that_follows_another_trips_in_its_own_time(void)
     TEST_ASSERT_EQUAL(SAFETY_FAULT_SHORT_SPRING, safety_fault(&safety, 4));
 }
 
-static void the_first_fault_is_kept(void)
+TEST(the_first_fault_is_kept)
 {
     safety_sample_t sample = running;
     sample.voltage_mv = 0;
@@ -186,7 +184,7 @@ static void the_first_fault_is_kept(void)
     TEST_ASSERT_EQUAL(SAFETY_FAULT_EMERGENCY_STOP, safety_board_fault(&safety));
 }
 
-static void sum_above_the_supply_trips_everything(void)
+TEST(sum_above_the_supply_trips_everything)
 {
     for (uint8_t n = 0; n < 100; n++) {
         ends_with(15000);
@@ -203,7 +201,7 @@ static void sum_above_the_supply_trips_everything(void)
 
 /* Frozen at what flowed: neither a current in a spring that is off nor a fault of the board, until
  * it shows another. */
-static void frozen_sensor_is_no_current_in_a_spring_that_is_off(void)
+TEST(frozen_sensor_is_no_current_in_a_spring_that_is_off)
 {
     ticks(4, &running, 10);
     safety_trip(&safety, 4, SAFETY_FAULT_SENSOR_MISMATCH);
@@ -221,7 +219,7 @@ static void frozen_sensor_is_no_current_in_a_spring_that_is_off(void)
 }
 
 /* Switched off before anything was noticed; and it freezes no less for being cleared. */
-static void sensor_that_goes_on_showing_what_flowed_is_frozen(void)
+TEST(sensor_that_goes_on_showing_what_flowed_is_frozen)
 {
     safety_sample_t sample = running;
     ticks(4, &sample, 10);
@@ -242,7 +240,7 @@ static void sensor_that_goes_on_showing_what_flowed_is_frozen(void)
 }
 
 /* A switch that is closed shows the end of the sensor, on and off alike. */
-static void current_that_no_output_gives_is_no_frozen_sensor(void)
+TEST(current_that_no_output_gives_is_no_frozen_sensor)
 {
     safety_sample_t sample = {
         .current_ma = 3200, .voltage_mv = 2450, .expected_ma = 1500, .temperature_c7 = 0};
@@ -253,7 +251,7 @@ static void current_that_no_output_gives_is_no_frozen_sensor(void)
 }
 
 /* Whatever was found before it, of the spring and of the board, and while that goes on. */
-static void current_without_duty_overrides_every_other_fault(void)
+TEST(current_without_duty_overrides_every_other_fault)
 {
     for (int fault = 0; fault < SAFETY_FAULT_COUNT; fault++) {
         if (fault == SAFETY_FAULT_STUCK_ON) {
@@ -284,7 +282,7 @@ static void current_without_duty_overrides_every_other_fault(void)
 /* Near misses: a reading of which a part is of the moment before, an offset, noise around the
  * limit.
  */
-static void what_is_no_current_without_duty_is_no_fault(void)
+TEST(what_is_no_current_without_duty_is_no_fault)
 {
     safety_sample_t sample = running;
     for (uint8_t pulse = 0; pulse < 20; pulse++) {
@@ -310,7 +308,7 @@ static void what_is_no_current_without_duty_is_no_fault(void)
 
 /* A switch that closes for a tick now and then: by the third the supply goes, however many good
  * readings lie between, if it is less than two seconds. */
-static void a_switch_that_chatters_is_current_without_duty(void)
+TEST(a_switch_that_chatters_is_current_without_duty)
 {
     safety_sample_t sample = off;
     sample.current_ma = 3190;
@@ -340,7 +338,7 @@ static void a_switch_that_chatters_is_current_without_duty(void)
 }
 
 /* A driven spring: the current alone may be a short's, the voltage alone an open spring's. */
-static void a_voltage_that_no_duty_gives_is_current_without_duty(void)
+TEST(a_voltage_that_no_duty_gives_is_current_without_duty)
 {
     safety_sample_t sample = running;
     sample.current_ma = 3190;
@@ -365,7 +363,7 @@ static void a_voltage_that_no_duty_gives_is_current_without_duty(void)
 
 /* What was doubted by a sensor that then tells nothing is that sensor's fault, and not the
  * supply's. */
-static void a_sensor_that_is_silent_holds_no_supply_back(void)
+TEST(a_sensor_that_is_silent_holds_no_supply_back)
 {
     safety_sample_t sample = off;
     sample.current_ma = 900;
@@ -376,7 +374,7 @@ static void a_sensor_that_is_silent_holds_no_supply_back(void)
     TEST_ASSERT_FALSE(safety_doubts_supply(&safety));
 }
 
-static void silent_host_stops_the_board_until_cleared(void)
+TEST(silent_host_stops_the_board_until_cleared)
 {
     safety_host_silent(&safety);
     ticks(4, &running, 100);
@@ -388,7 +386,7 @@ static void silent_host_stops_the_board_until_cleared(void)
     TEST_ASSERT_TRUE(safety_allows(&safety, 4));
 }
 
-static void lock_holds_until_unlocked_and_is_no_fault(void)
+TEST(lock_holds_until_unlocked_and_is_no_fault)
 {
     safety_lock(&safety);
     safety_clear(&safety);
@@ -402,7 +400,7 @@ static void lock_holds_until_unlocked_and_is_no_fault(void)
     TEST_ASSERT_TRUE(safety_allows(&safety, 4));
 }
 
-static void on_time_is_limited_only_where_it_is_set(void)
+TEST(on_time_is_limited_only_where_it_is_set)
 {
     ticks(4, &running, 50u * 3600u);
     TEST_ASSERT_TRUE(safety_allows(&safety, 4));
@@ -424,18 +422,18 @@ static void on_time_is_limited_only_where_it_is_set(void)
 }
 
 /* The quick look lets nothing pass that is beyond a limit, whatever the limits are. */
-static void resistance_trips_at_its_limits_and_nowhere_else(void)
+TEST(resistance_trips_at_its_limits_and_nowhere_else)
 {
     const uint16_t limits_mohm[][2] = {{80, 500},    {0, 0},       {1, 2},       {175, 176},
                                        {0, 1250},    {1250, 1251}, {1251, 9999}, {80, 0},
                                        {2039, 2041}, {9999, 10000}};
     const uint16_t steps[] = {299, 300, 301, 447, 1500, 1503, 2999, 3149, 3150};
     parameters.bad_samples = 1;
-    for (size_t n = 0; n < sizeof limits_mohm / sizeof limits_mohm[0]; n++) {
+    for (size_t n = 0; n < ROWS(limits_mohm); n++) {
         parameters.resistance_minimum_mohm = limits_mohm[n][0];
         parameters.resistance_maximum_mohm = limits_mohm[n][1];
         TEST_ASSERT_TRUE(safety_apply(&safety, &parameters, NULL));
-        for (size_t i = 0; i < sizeof steps / sizeof steps[0]; i++) {
+        for (size_t i = 0; i < ROWS(steps); i++) {
             int32_t current_ma = steps[i];
             for (int32_t voltage_mv = -5; voltage_mv < 32000;
                  voltage_mv += voltage_mv < 2500 ? 1 : 37) {
@@ -469,7 +467,7 @@ static void refuses(const safety_parameters_t *changed, uint16_t row)
 }
 
 /* Each limit: test_parameters. */
-static void parameters_that_do_not_fit_are_refused_and_found(void)
+TEST(parameters_that_do_not_fit_are_refused_and_found)
 {
     safety_parameters_t changed = parameters;
     changed.bad_samples = 0;
@@ -482,7 +480,7 @@ static void parameters_that_do_not_fit_are_refused_and_found(void)
 }
 
 /* Fault 11 of the board and fault 9 of any spring, and no other: only the supply's switch helps. */
-static void the_supply_is_cut_where_nothing_else_helps(void)
+TEST(the_supply_is_cut_where_nothing_else_helps)
 {
     TEST_ASSERT_FALSE(safety_cuts_supply(&safety));
     for (int fault = 1; fault < SAFETY_FAULT_COUNT; fault++) {
@@ -519,7 +517,7 @@ static void unread(uint8_t status, uint8_t but, uint32_t count)
 /* Where no sensor acknowledges, or the bus hangs, no reading shows that current is off. One that
  * answers at all is enough: each switch has another sensor, but the bus is there. Whatever a fault
  * takes to be one, and whatever was latched before. */
-static void supply_that_no_sensor_watches_is_cut(void)
+TEST(supply_that_no_sensor_watches_is_cut)
 {
     enum { NOBODY = 255, ABSENT = 1, HANGS = 2, STALE = 3, RESET = 4 };
     for (uint8_t samples = 1; samples < 250; samples = (uint8_t)(samples + 83u)) {
@@ -557,7 +555,7 @@ static void supply_that_no_sensor_watches_is_cut(void)
 }
 
 /* Every count is of ticks in a row: a good one, and clear, begin it anew. */
-static void a_good_tick_and_clear_begin_every_count_anew(void)
+TEST(a_good_tick_and_clear_begin_every_count_anew)
 {
     const uint8_t almost = (uint8_t)(parameters.bad_samples - 1u);
     for (int round = 0; round < 4; round++) {
@@ -584,7 +582,7 @@ static void a_good_tick_and_clear_begin_every_count_anew(void)
     TEST_ASSERT_EQUAL(SAFETY_FAULT_SENSOR_MISMATCH, safety_fault(&safety, 4));
 }
 
-static void only_a_reading_that_is_one_is_said_to_be_valid(void)
+TEST(only_a_reading_that_is_one_is_said_to_be_valid)
 {
     safety_sample_t sample = running;
     TEST_ASSERT_TRUE(safety_tick_spring(&safety, 4, &sample));
@@ -596,7 +594,7 @@ static void only_a_reading_that_is_one_is_said_to_be_valid(void)
 
 /* One tick that shows another current, and what it shows after that flows, though it be the same as
  * before; and the largest current that an output may give can be frozen, too. */
-static void a_sensor_that_moved_once_is_not_frozen(void)
+TEST(a_sensor_that_moved_once_is_not_frozen)
 {
     safety_sample_t sample = running;
     ticks(4, &sample, 10);
@@ -620,7 +618,7 @@ static void a_sensor_that_moved_once_is_not_frozen(void)
     TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, safety_board_fault(&safety));
 }
 
-static void limits_are_as_they_are_written(void)
+TEST(limits_are_as_they_are_written)
 {
     safety_sample_t sample = {.current_ma = 74, .voltage_mv = 15, .expected_ma = 300};
     ticks(4, &sample, parameters.bad_samples);
@@ -629,35 +627,4 @@ static void limits_are_as_they_are_written(void)
     ticks(3, &sample, parameters.bad_samples);
     TEST_ASSERT_EQUAL(SAFETY_FAULT_SENSOR_ABSENT, safety_fault(&safety, 3));
     TEST_ASSERT_TRUE(safety_init(&safety, &parameters, SAFETY_MAX_SPRINGS, NULL));
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(each_condition_trips_its_own_fault);
-    RUN_TEST(too_little_current_says_nothing_about_the_resistance);
-    RUN_TEST(missing_readings_neither_count_nor_forgive);
-    RUN_TEST(condition_that_follows_another_trips_in_its_own_time);
-    RUN_TEST(the_first_fault_is_kept);
-    RUN_TEST(sum_above_the_supply_trips_everything);
-    RUN_TEST(frozen_sensor_is_no_current_in_a_spring_that_is_off);
-    RUN_TEST(sensor_that_goes_on_showing_what_flowed_is_frozen);
-    RUN_TEST(current_that_no_output_gives_is_no_frozen_sensor);
-    RUN_TEST(current_without_duty_overrides_every_other_fault);
-    RUN_TEST(what_is_no_current_without_duty_is_no_fault);
-    RUN_TEST(a_switch_that_chatters_is_current_without_duty);
-    RUN_TEST(a_voltage_that_no_duty_gives_is_current_without_duty);
-    RUN_TEST(a_sensor_that_is_silent_holds_no_supply_back);
-    RUN_TEST(silent_host_stops_the_board_until_cleared);
-    RUN_TEST(lock_holds_until_unlocked_and_is_no_fault);
-    RUN_TEST(on_time_is_limited_only_where_it_is_set);
-    RUN_TEST(resistance_trips_at_its_limits_and_nowhere_else);
-    RUN_TEST(parameters_that_do_not_fit_are_refused_and_found);
-    RUN_TEST(the_supply_is_cut_where_nothing_else_helps);
-    RUN_TEST(supply_that_no_sensor_watches_is_cut);
-    RUN_TEST(a_good_tick_and_clear_begin_every_count_anew);
-    RUN_TEST(a_sensor_that_moved_once_is_not_frozen);
-    RUN_TEST(limits_are_as_they_are_written);
-    RUN_TEST(only_a_reading_that_is_one_is_said_to_be_valid);
-    return UNITY_END();
 }

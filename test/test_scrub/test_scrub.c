@@ -3,8 +3,8 @@
 #include <stddef.h>
 #include <string.h>
 
+#include "../run_tests.h"
 #include "scrub.h"
-#include "unity.h"
 
 typedef struct {
     uint8_t before; /* not watched, as what is between */
@@ -35,8 +35,6 @@ void setUp(void)
     scrub_start(&scrub, stretches, &owner);
 }
 
-void tearDown(void) {}
-
 static unsigned steps_of_a_pass(uint8_t bytes)
 {
     unsigned steps = 1;
@@ -51,7 +49,7 @@ static bool is_watched(size_t at)
     return (at >= 1 && at < 6) || (at >= 7 && at < 27);
 }
 
-static void a_pass_takes_all_bytes_in_steps_of_any_size(void)
+TEST(a_pass_takes_all_bytes_in_steps_of_any_size)
 {
     TEST_ASSERT_EQUAL_UINT(26, steps_of_a_pass(1));
     TEST_ASSERT_EQUAL_UINT(2, steps_of_a_pass(16));
@@ -59,7 +57,7 @@ static void a_pass_takes_all_bytes_in_steps_of_any_size(void)
     TEST_ASSERT_TRUE(scrub_is_sound(&scrub));
 }
 
-static void every_bit_that_turns_over_is_found_and_no_other(void)
+TEST(every_bit_that_turns_over_is_found_and_no_other)
 {
     for (size_t at = 0; at < sizeof owner; at++) {
         for (uint8_t bit = 0; bit < 8; bit++) {
@@ -73,7 +71,7 @@ static void every_bit_that_turns_over_is_found_and_no_other(void)
     }
 }
 
-static void a_sealed_change_is_right_and_what_was_found_stays_found(void)
+TEST(a_sealed_change_is_right_and_what_was_found_stays_found)
 {
     scrub_open(&scrub, stretches, &owner);
     owner.second[3] ^= 1u;
@@ -92,7 +90,7 @@ static void a_sealed_change_is_right_and_what_was_found_stays_found(void)
 }
 
 /* Its own bytes are RAM, too: at worst it finds what is not there. */
-static void any_bit_of_its_own_that_turns_over_ends_no_program(void)
+TEST(any_bit_of_its_own_that_turns_over_ends_no_program)
 {
     for (size_t at = 0; at < sizeof scrub; at++) {
         for (uint8_t bit = 0; bit < 8; bit++) {
@@ -105,14 +103,4 @@ static void any_bit_of_its_own_that_turns_over_ends_no_program(void)
             (void)steps_of_a_pass(16);
         }
     }
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(a_pass_takes_all_bytes_in_steps_of_any_size);
-    RUN_TEST(every_bit_that_turns_over_is_found_and_no_other);
-    RUN_TEST(a_sealed_change_is_right_and_what_was_found_stays_found);
-    RUN_TEST(any_bit_of_its_own_that_turns_over_ends_no_program);
-    return UNITY_END();
 }

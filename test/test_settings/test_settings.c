@@ -3,10 +3,10 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "../run_tests.h"
 #include "crc16.h"
 #include "settings.h"
 #include "text.h"
-#include "unity.h"
 
 #include "../fakes/eeprom.h"
 
@@ -25,8 +25,6 @@ void setUp(void)
     memory_end = MEMORY_BYTES;
     settings_load(&store, &storage, &settings);
 }
-
-void tearDown(void) {}
 
 static record_save_t save(void)
 {
@@ -85,7 +83,7 @@ static void expect_defaults(void)
     TEST_ASSERT_TRUE(same(&loaded, &defaults));
 }
 
-static void every_setting_is_found_by_its_name(void)
+TEST(every_setting_is_found_by_its_name)
 {
     char name[SETTINGS_NAME_SIZE];
     uint16_t row = UINT16_MAX;
@@ -111,7 +109,7 @@ static void every_setting_is_found_by_its_name(void)
     TEST_ASSERT_FALSE(settings_find("", &row, &at));
 }
 
-static void assigns_fixed_decimals(void)
+TEST(assigns_fixed_decimals)
 {
     TEST_ASSERT_EQUAL(SETTINGS_OK, settings_assign(&settings, "loss_w_per_k", "0.0058"));
     TEST_ASSERT_EQUAL_UINT16(5800, settings.controller.model.loss_uw_per_k);
@@ -128,7 +126,7 @@ static void assigns_fixed_decimals(void)
 }
 
 /* What lies between them, too: it is under the checksum of the scrub. */
-static void defaults_are_the_same_in_every_byte(void)
+TEST(defaults_are_the_same_in_every_byte)
 {
     static settings_t one, other;
     memset(&one, 0xA5, sizeof one);
@@ -138,7 +136,7 @@ static void defaults_are_the_same_in_every_byte(void)
     TEST_ASSERT_EQUAL_MEMORY(&one, &other, sizeof one);
 }
 
-static void a_refused_value_changes_nothing(void)
+TEST(a_refused_value_changes_nothing)
 {
     static const struct {
         const char *name;
@@ -159,7 +157,7 @@ static void a_refused_value_changes_nothing(void)
         {"telemetry_hz", "51", SETTINGS_OUT_OF_RANGE},
     };
     const settings_t before = settings;
-    for (unsigned i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+    for (unsigned i = 0; i < ROWS(cases); i++) {
         TEST_ASSERT_EQUAL_MESSAGE(cases[i].result,
                                   settings_assign(&settings, cases[i].name, cases[i].value),
                                   cases[i].value);
@@ -169,7 +167,7 @@ static void a_refused_value_changes_nothing(void)
 
 /* --- the record ----------------------------------------------------------------------------- */
 
-static void a_saved_record_is_loaded(void)
+TEST(a_saved_record_is_loaded)
 {
     TEST_ASSERT_EQUAL(RECORD_EMPTY, load().found);
     for (uint32_t seed = 1; seed < 6; seed++) {
@@ -193,7 +191,7 @@ static void a_saved_record_is_loaded(void)
 
 /* What lies in boards: an id never means another row, nor another number of decimals. Who drops or
  * adds a row states the new sum; who changes one gives it a new id instead. */
-static void ids_keep_their_meaning(void)
+TEST(ids_keep_their_meaning)
 {
     uint16_t sum = CRC16_START;
     for (unsigned id = 1; id <= 76u; id++) {
@@ -208,7 +206,7 @@ static void ids_keep_their_meaning(void)
     TEST_ASSERT_EQUAL_HEX16(0x2D64, sum);
 }
 
-static void sequence_numbers_may_wrap(void)
+TEST(sequence_numbers_may_wrap)
 {
     fill(1);
     expect_saved();
@@ -225,7 +223,7 @@ static void sequence_numbers_may_wrap(void)
 
 /* For every number of bytes that still reach the memory, the byte under way at the cut being left
  * or holding anything: the old record or the new one, whole. */
-static void a_cut_at_any_byte_leaves_the_old_or_the_new_record(void)
+TEST(a_cut_at_any_byte_leaves_the_old_or_the_new_record)
 {
     static uint8_t before[MEMORY_BYTES];
     fill(1);
@@ -264,7 +262,7 @@ static void a_cut_at_any_byte_leaves_the_old_or_the_new_record(void)
     }
 }
 
-static void every_flipped_bit_is_detected(void)
+TEST(every_flipped_bit_is_detected)
 {
     fill(7);
     expect_saved();
@@ -280,7 +278,7 @@ static void every_flipped_bit_is_detected(void)
     TEST_ASSERT_EQUAL(RECORD_LOADED, load().found);
 }
 
-static void a_damaged_newest_record_falls_back_to_the_older_and_says_so(void)
+TEST(a_damaged_newest_record_falls_back_to_the_older_and_says_so)
 {
     fill(1);
     expect_saved();
@@ -306,7 +304,7 @@ static void put_record(const uint8_t *entries, uint16_t length)
 }
 
 /* The bytes of each type as they have lain since ids were given. They may not change. */
-static void a_record_of_an_earlier_version_keeps_what_it_knows(void)
+TEST(a_record_of_an_earlier_version_keeps_what_it_knows)
 {
     static const uint8_t entries[] = {
         1,  0,    2,                                  /* rows, U8 */
@@ -331,7 +329,7 @@ static void a_record_of_an_earlier_version_keeps_what_it_knows(void)
     TEST_ASSERT_TRUE(same(&wanted, &loaded));
 }
 
-static void a_record_of_a_later_version_says_what_was_dropped(void)
+TEST(a_record_of_a_later_version_says_what_was_dropped)
 {
     static const uint8_t entries[] = {
         251, 0x06, 1,    2,    3, 4, /* two of a setting that this version does not know */
@@ -355,7 +353,7 @@ static void a_record_of_a_later_version_says_what_was_dropped(void)
 
 /* Whole by its CRC, but its last entry claims more than there is; and one that is cut in its head.
  */
-static void an_entry_that_leaves_the_record_is_not_read(void)
+TEST(an_entry_that_leaves_the_record_is_not_read)
 {
     static const uint8_t entries[] = {50, 2, 0x18, 0xFC, 26, 0xFD, 1, 2};
     for (uint16_t length = 5; length <= sizeof entries; length++) {
@@ -372,7 +370,7 @@ static void an_entry_that_leaves_the_record_is_not_read(void)
     expect_defaults();
 }
 
-static void a_record_in_another_format_gives_defaults_and_says_so(void)
+TEST(a_record_in_another_format_gives_defaults_and_says_so)
 {
     fill(9);
     expect_saved();
@@ -381,7 +379,7 @@ static void a_record_in_another_format_gives_defaults_and_says_so(void)
     expect_defaults();
 }
 
-static void a_memory_that_does_not_keep_is_reported(void)
+TEST(a_memory_that_does_not_keep_is_reported)
 {
     fill(4);
     expect_saved();
@@ -410,7 +408,7 @@ static uint8_t short_byte(void *context, uint16_t position)
     return ((const uint8_t *)context)[position];
 }
 
-static void another_record_has_its_own_slots(void)
+TEST(another_record_has_its_own_slots)
 {
     uint8_t bytes[248];
     record_store_t other;
@@ -435,7 +433,7 @@ static void another_record_has_its_own_slots(void)
 
 /* A record that claims more than its slot holds is damaged, whatever its CRC says: what lies behind
  * the slot is another's. The longest that fits is one. */
-static void a_length_beyond_the_slot_is_no_record(void)
+TEST(a_length_beyond_the_slot_is_no_record)
 {
     uint8_t bytes[256];
     const uint16_t base = 100;
@@ -451,27 +449,4 @@ static void a_length_beyond_the_slot_is_no_record(void)
         TEST_ASSERT_EQUAL(length <= 248 ? RECORD_LOADED : RECORD_DAMAGED,
                           record_store_open(&other, &storage, base, 256, 3));
     }
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(every_setting_is_found_by_its_name);
-    RUN_TEST(assigns_fixed_decimals);
-    RUN_TEST(defaults_are_the_same_in_every_byte);
-    RUN_TEST(a_refused_value_changes_nothing);
-    RUN_TEST(a_saved_record_is_loaded);
-    RUN_TEST(ids_keep_their_meaning);
-    RUN_TEST(sequence_numbers_may_wrap);
-    RUN_TEST(a_cut_at_any_byte_leaves_the_old_or_the_new_record);
-    RUN_TEST(every_flipped_bit_is_detected);
-    RUN_TEST(a_damaged_newest_record_falls_back_to_the_older_and_says_so);
-    RUN_TEST(a_record_of_an_earlier_version_keeps_what_it_knows);
-    RUN_TEST(a_record_of_a_later_version_says_what_was_dropped);
-    RUN_TEST(an_entry_that_leaves_the_record_is_not_read);
-    RUN_TEST(a_record_in_another_format_gives_defaults_and_says_so);
-    RUN_TEST(a_memory_that_does_not_keep_is_reported);
-    RUN_TEST(another_record_has_its_own_slots);
-    RUN_TEST(a_length_beyond_the_slot_is_no_record);
-    return UNITY_END();
 }

@@ -2,17 +2,12 @@
 
 #include <math.h>
 
-#define PI 3.14159265358979
-
 truth_t truth;
-sensor_t sensor;
 spring_estimator_t estimator;
 thermal_model_t model;
-char where[120];
 
 static unsigned count;
 static double power_sum_w;
-static int16_t frozen_ma, frozen_mv;
 static uint32_t random_state;
 
 static uint32_t random_bits(void)
@@ -35,7 +30,6 @@ void power_comes_on(void)
                       .ratio = 1.25,
                       .noise_v = 0.004,
                       .temperature_c = 20.0};
-    sensor = SENSOR_GOOD;
     count = 0;
     power_sum_w = 0.0;
     random_state = 5;
@@ -51,8 +45,7 @@ void begin_cold(void)
 static double share(double from_c, double to_c)
 {
     const double at = (truth.temperature_c - truth.shift_k - from_c) / (to_c - from_c);
-    const double line = at < 0.0 ? 0.0 : at > 1.0 ? 1.0 : at;
-    return truth.cosine ? 0.5 - 0.5 * cos(PI * line) : line;
+    return at < 0.0 ? 0.0 : at > 1.0 ? 1.0 : at;
 }
 
 static void live(double power_w)
@@ -96,26 +89,9 @@ static void read_sensor(double current_a, int16_t *ma, int16_t *mv)
         slow = slow * 0.98 + 0.345 * one_to_minus_one();
         noise_v += truth.slow_noise_v * slow;
     }
-    switch (sensor) {
-    case SENSOR_GOOD:
-        frozen_ma = (int16_t)lround(1000.0 * current_a);
-        frozen_mv =
-            (int16_t)(4 * lround(250.0 * (current_a * (resistance_ohm() + truth.contact_ohm) +
-                                          truth.offset_v + noise_v)));
-        break;
-    case SENSOR_FROZEN:
-        break;
-    case SENSOR_SILENT:
-    case SENSOR_ZERO:
-        *ma = *mv = 0;
-        return;
-    case SENSOR_WILD:
-        *ma = (int16_t)((int32_t)(random_bits() % 65536u) - 32768);
-        *mv = (int16_t)((int32_t)(random_bits() % 65536u) - 32768);
-        return;
-    }
-    *ma = frozen_ma;
-    *mv = frozen_mv;
+    *ma = (int16_t)lround(1000.0 * current_a);
+    *mv = (int16_t)(4 *
+                    lround(250.0 * (current_a * (resistance_ohm() + truth.contact_ohm) + noise_v)));
 }
 
 bool tick(double current_a)
@@ -123,9 +99,7 @@ bool tick(double current_a)
     int16_t ma, mv;
     live(current_a * current_a * resistance_ohm());
     read_sensor(current_a, &ma, &mv);
-    if (sensor != SENSOR_SILENT) {
-        spring_estimator_take(&estimator, 0, ma, mv);
-    }
+    spring_estimator_take(&estimator, 0, ma, mv);
     power_sum_w += ma > 0 && mv > 0 ? 1e-6 * ma * mv : 0.0;
     count++;
     if (count % 5u == 0) {

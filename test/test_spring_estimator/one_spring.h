@@ -17,20 +17,14 @@ typedef struct {
     double apart_per_k;    /* austenite's, beyond that */
     double shift_k;        /* of all four transformation temperatures */
     double contact_ohm;    /* in series, read with it */
-    double offset_v;       /* of what is read of the voltage */
     double noise_v;        /* evenly within +- so much, of one reading of the voltage */
     double slow_noise_v;   /* standard deviation of a noise of it that lasts for a second */
-    bool cosine;           /* its phase over temperature: it ends gently */
     double temperature_c, austenite;
 } truth_t;
 
-typedef enum { SENSOR_GOOD, SENSOR_SILENT, SENSOR_FROZEN, SENSOR_ZERO, SENSOR_WILD } sensor_t;
-
 extern truth_t truth;
-extern sensor_t sensor;
 extern spring_estimator_t estimator;
 extern thermal_model_t model;
-extern char where[120]; /* to be said where a test fails */
 #define BELIEF spring_estimator_of(&estimator, 0)
 #define LEARNT spring_estimator_learnt(&estimator, 0)
 /* What nobody else may see. */

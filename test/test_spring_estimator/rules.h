@@ -6,18 +6,11 @@
 
 #include <stddef.h>
 
-#define ROWS(table) (sizeof(table) / sizeof((table)[0]))
-#define M           SPRING_PHASE_MARTENSITE
-#define B           SPRING_PHASE_BETWEEN
-#define A           SPRING_PHASE_AUSTENITE
+#define M SPRING_PHASE_MARTENSITE
+#define B SPRING_PHASE_BETWEEN
+#define A SPRING_PHASE_AUSTENITE
 
-/* What a failing test says: the row of its table. */
-void row(size_t n);
 /* A turn's readings of a resistance: 12 of them tell it to 1/24 mohm at 2 A. */
 void give_readings(int readings, double current_a, double ohm);
-
-void run_rules(void);
-void run_law(void);
-void run_watch(void);
 
 #endif

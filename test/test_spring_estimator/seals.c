@@ -1,11 +1,10 @@
-#include "seals.h"
-
+/* Bits of RAM that turn over in what is believed of a spring. */
 #include <stddef.h>
 #include <stdio.h>
 
+#include "../run_tests.h"
 #include "one_spring.h"
 #include "sights.h"
-#include "unity.h"
 
 static spring_estimator_t sound;
 static thermal_model_t sound_model;
@@ -22,27 +21,27 @@ static void turn_over(size_t at, unsigned bit)
     estimator = sound;
     model = sound_model;
     ((uint8_t *)&estimator)[at] ^= (uint8_t)(1u << bit);
-    (void)snprintf(where, sizeof where, "byte %u, bit %u", (unsigned)at, bit);
+    here("byte %u, bit %u", (unsigned)at, bit);
 }
 
 static void expect_begun_anew(void)
 {
-    TEST_ASSERT_FALSE_MESSAGE(spring_estimator_update(&estimator, &model, 0), where);
-    TEST_ASSERT_EQUAL_UINT8_MESSAGE(SPRING_PHASE_ANY, INSIDE.possible, where);
-    TEST_ASSERT_EQUAL_FLOAT_MESSAGE(SPRING_ESTIMATOR_HOTTEST_C, INSIDE.hottest_c, where);
-    TEST_ASSERT_EQUAL_FLOAT_MESSAGE(0.0f, INSIDE.learnt.austenite_ohm, where);
-    TEST_ASSERT_EQUAL_FLOAT_MESSAGE(sound.change, INSIDE.learnt.change, where);
+    TEST_ASSERT_FALSE(spring_estimator_update(&estimator, &model, 0));
+    TEST_ASSERT_EQUAL_UINT8(SPRING_PHASE_ANY, INSIDE.possible);
+    TEST_ASSERT_EQUAL_FLOAT(SPRING_ESTIMATOR_HOTTEST_C, INSIDE.hottest_c);
+    TEST_ASSERT_EQUAL_FLOAT(0.0f, INSIDE.learnt.austenite_ohm);
+    TEST_ASSERT_EQUAL_FLOAT(sound.change, INSIDE.learnt.change);
     TEST_ASSERT_FLOAT_WITHIN(1e-5f, sound.spring[0].declared_stiffness_w_per_k,
                              INSIDE.declared_stiffness_w_per_k);
-    TEST_ASSERT_FALSE_MESSAGE(INSIDE.heating, where);
-    TEST_ASSERT_EQUAL_UINT8_MESSAGE(1, estimator.broken_seals, where);
-    TEST_ASSERT_TRUE_MESSAGE(is_noted(SPRING_SIGHT_ANEW), where);
-    TEST_ASSERT_TRUE_MESSAGE(spring_estimator_has_begun_anew(BELIEF), where);
-    TEST_ASSERT_TRUE_MESSAGE(spring_estimator_update(&estimator, &model, 0), where);
-    TEST_ASSERT_FALSE_MESSAGE(spring_estimator_has_begun_anew(BELIEF), where);
+    TEST_ASSERT_FALSE(INSIDE.heating);
+    TEST_ASSERT_EQUAL_UINT8(1, estimator.broken_seals);
+    TEST_ASSERT_TRUE(is_noted(SPRING_SIGHT_ANEW));
+    TEST_ASSERT_TRUE(spring_estimator_has_begun_anew(BELIEF));
+    TEST_ASSERT_TRUE(spring_estimator_update(&estimator, &model, 0));
+    TEST_ASSERT_FALSE(spring_estimator_has_begun_anew(BELIEF));
 }
 
-static void whatever_bit_of_a_belief_turns_over_nothing_is_known_from_its_next_turn_on(void)
+TEST(whatever_bit_of_a_belief_turns_over_nothing_is_known_from_its_next_turn_on)
 {
     for (unsigned held = 0; held < 2; held++) {
         begin_cold();
@@ -66,7 +65,7 @@ static void whatever_bit_of_a_belief_turns_over_nothing_is_known_from_its_next_t
     begin_cold();
 }
 
-static void whatever_bit_of_what_springs_share_turns_over_that_begins_anew(void)
+TEST(whatever_bit_of_what_springs_share_turns_over_that_begins_anew)
 {
     (void)heat_then_hold(60.0);
     keep_sound();
@@ -75,12 +74,12 @@ static void whatever_bit_of_what_springs_share_turns_over_that_begins_anew(void)
     for (size_t at = offsetof(spring_estimator_t, stepped_turns); at <= end; at++) {
         for (unsigned bit = 0; bit < 8; bit++) {
             turn_over(at, bit);
-            TEST_ASSERT_TRUE_MESSAGE(spring_estimator_update(&estimator, &model, 0), where);
-            TEST_ASSERT_EQUAL_UINT8_MESSAGE(0, estimator.sights.count, where);
-            TEST_ASSERT_EQUAL_UINT16_MESSAGE(0, estimator.stepped_turns, where);
-            TEST_ASSERT_EQUAL_UINT8_MESSAGE(0, estimator.stepped_spring, where);
-            TEST_ASSERT_EQUAL_UINT8_MESSAGE(SPRING_PHASE_AUSTENITE, INSIDE.possible, where);
-            TEST_ASSERT_TRUE_MESSAGE(spring_estimator_update(&estimator, &model, 0), where);
+            TEST_ASSERT_TRUE(spring_estimator_update(&estimator, &model, 0));
+            TEST_ASSERT_EQUAL_UINT8(0, estimator.sights.count);
+            TEST_ASSERT_EQUAL_UINT16(0, estimator.stepped_turns);
+            TEST_ASSERT_EQUAL_UINT8(0, estimator.stepped_spring);
+            TEST_ASSERT_EQUAL_UINT8(SPRING_PHASE_AUSTENITE, INSIDE.possible);
+            TEST_ASSERT_TRUE(spring_estimator_update(&estimator, &model, 0));
         }
     }
     begin_cold();
@@ -104,8 +103,8 @@ static void expect_marks(const part_t parts[], size_t count)
     for (size_t n = 0; n < count; n++) {
         for (size_t at = parts[n].from; at < parts[n].to; at++) {
             turn_over(offsetof(spring_estimator_t, spring) + at, (unsigned)at % 8u);
-            TEST_ASSERT_EQUAL_MESSAGE(parts[n].counts,
-                                      spring_estimator_mark(&estimator, &model, 0) != mark, where);
+            TEST_ASSERT_EQUAL(parts[n].counts,
+                              spring_estimator_mark(&estimator, &model, 0) != mark);
         }
     }
     turn_over(offsetof(spring_estimator_t, r_phase_odds), 3);
@@ -119,7 +118,7 @@ static void expect_marks(const part_t parts[], size_t count)
 }
 
 /* What counts is what a rerun must find again: no number of what is read just now, no bit. */
-static void mark_is_of_every_number_that_is_believed(void)
+TEST(mark_is_of_every_number_that_is_believed)
 {
     static const part_t heats[] = {
         PART(readings, variance_k2, false),
@@ -140,10 +139,10 @@ static void mark_is_of_every_number_that_is_believed(void)
     begin_cold();
     spring_estimator_begin_heating(&estimator, &model, 0);
     ticks(2.0, 5.0);
-    expect_marks(heats, sizeof heats / sizeof heats[0]);
+    expect_marks(heats, ROWS(heats));
     begin_cold();
     (void)heat_then_hold(60.0);
-    expect_marks(holds, sizeof holds / sizeof holds[0]);
+    expect_marks(holds, ROWS(holds));
     begin_cold();
 }
 
@@ -181,7 +180,7 @@ static void and_is_disturbed(void)
     spring_estimator_disturb(&estimator, 0);
 }
 
-static void change_before_its_turn_hides_no_bit(void)
+TEST(change_before_its_turn_hides_no_bit)
 {
     static void (*const changes[])(void) = {and_is_left,      and_is_told,     and_forgets,
                                             and_forgets_loss, and_keeps_loss,  and_is_restored,
@@ -190,7 +189,7 @@ static void change_before_its_turn_hides_no_bit(void)
     spring_estimator_begin_heating(&estimator, &model, 0);
     ticks(2.0, 1.0);
     keep_sound();
-    for (unsigned n = 0; n < sizeof changes / sizeof changes[0]; n++) {
+    for (unsigned n = 0; n < ROWS(changes); n++) {
         turn_over(offsetof(spring_estimator_t, spring) + offsetof(spring_belief_t, slow_ohm) + 2u,
                   5);
         changes[n]();
@@ -198,7 +197,7 @@ static void change_before_its_turn_hides_no_bit(void)
         turn_over(0, 0); /* and is none itself */
         estimator = sound;
         changes[n]();
-        TEST_ASSERT_TRUE_MESSAGE(spring_estimator_update(&estimator, &model, 0), where);
+        TEST_ASSERT_TRUE(spring_estimator_update(&estimator, &model, 0));
     }
     turn_over(offsetof(spring_estimator_t, spring) + offsetof(spring_belief_t, learnt), 6);
     spring_estimator_restart(&estimator, &model);
@@ -206,13 +205,8 @@ static void change_before_its_turn_hides_no_bit(void)
     estimator = sound;
     spring_estimator_restart(&estimator, &model);
     TEST_ASSERT_TRUE(INSIDE.learnt.austenite_ohm > 0.0f);
+    turn_over(offsetof(spring_estimator_t, stepped_turns), 3); /* nor of what they share */
+    spring_estimator_trust_model(&estimator, &model);
+    TEST_ASSERT_EQUAL_UINT8(1, estimator.sights.count);
     begin_cold();
-}
-
-void run_seals(void)
-{
-    RUN_TEST(whatever_bit_of_a_belief_turns_over_nothing_is_known_from_its_next_turn_on);
-    RUN_TEST(whatever_bit_of_what_springs_share_turns_over_that_begins_anew);
-    RUN_TEST(change_before_its_turn_hides_no_bit);
-    RUN_TEST(mark_is_of_every_number_that_is_believed);
 }

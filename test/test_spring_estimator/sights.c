@@ -3,8 +3,8 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "../run_tests.h"
 #include "one_spring.h"
-#include "unity.h"
 
 static const spring_sight_t *sight_at(unsigned at)
 {
@@ -30,18 +30,14 @@ bool is_noted(spring_sight_kind_t kind)
 
 static void expect_kinds(const spring_sight_kind_t kinds[], unsigned count)
 {
-    size_t length = 0;
-    for (unsigned i = 0;
-         i < spring_estimator_sights(&estimator)->count && length < sizeof where - 8u; i++) {
-        length += (size_t)snprintf(where + length, sizeof where - length, "%u ", sight_at(i)->kind);
-    }
-    TEST_ASSERT_EQUAL_UINT_MESSAGE(count, spring_estimator_sights(&estimator)->count, where);
+    TEST_ASSERT_EQUAL_UINT(count, spring_estimator_sights(&estimator)->count);
     for (unsigned i = 0; i < count; i++) {
-        TEST_ASSERT_EQUAL_UINT_MESSAGE(kinds[i], sight_at(i)->kind, where);
+        row(i);
+        TEST_ASSERT_EQUAL_UINT(kinds[i], sight_at(i)->kind);
     }
 }
 
-void each_sight_of_a_life_is_noted_with_what_was_done(void)
+TEST(each_sight_of_a_life_is_noted_with_what_was_done)
 {
     static const spring_sight_kind_t kinds[] = {SPRING_SIGHT_TOLD, SPRING_SIGHT_ONSET,
                                                 SPRING_SIGHT_FINISH, SPRING_SIGHT_LOST};
@@ -73,7 +69,7 @@ void each_sight_of_a_life_is_noted_with_what_was_done(void)
 
 /* ---- the records themselves ---- */
 
-void spring_that_has_most_gives_way(void)
+TEST(spring_that_has_most_gives_way)
 {
     static spring_sights_t sights;
     memset(&sights, 0, sizeof sights);
@@ -97,7 +93,7 @@ void spring_that_has_most_gives_way(void)
     TEST_ASSERT_EQUAL_UINT32(7, spring_sights_newest(&sights, 3)->number);
 }
 
-void sights_are_found_by_number_and_forgotten_after_four_hours(void)
+TEST(sights_are_found_by_number_and_forgotten_after_four_hours)
 {
     static spring_sights_t sights;
     memset(&sights, 0, sizeof sights);

@@ -11,8 +11,4 @@ const spring_sight_t *newest(void);
 /* A sight of that kind is among those that are kept. */
 bool is_noted(spring_sight_kind_t kind);
 
-void each_sight_of_a_life_is_noted_with_what_was_done(void);
-void spring_that_has_most_gives_way(void);
-void sights_are_found_by_number_and_forgotten_after_four_hours(void);
-
 #endif

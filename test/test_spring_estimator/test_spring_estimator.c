@@ -3,12 +3,11 @@
 #include <math.h>
 #include <stdio.h>
 
+#include "../run_tests.h"
 #include "one_spring.h"
 #include "rules.h"
-#include "seals.h"
 #include "sights.h"
 #include "spring_estimator_internal.h"
-#include "unity.h"
 
 #define ACTED_ON 0.03f /* lost, by the drive: it heats it back then */
 
@@ -23,19 +22,13 @@ void tearDown(void)
     TEST_ASSERT_EQUAL_UINT8(0, spring_estimator_broken_seals(&estimator));
 }
 
-/* Off until it is cold; the estimator keeps what it has learnt. */
-static void begin_cold_as_learnt(void)
-{
-    const spring_learnt_t learnt = spring_estimator_learnt(&estimator, 0);
-    begin_cold();
-    spring_estimator_restore(&estimator, 0, &learnt);
-}
-
 /* ---- power-on ---- */
 
-static void at_power_on_everything_is_possible(void)
+TEST(at_power_on_everything_is_possible)
 {
+    turn_inside(&estimator, 3);
     power_comes_on();
+    TEST_ASSERT_EQUAL_UINT8(SPRING_ESTIMATOR_NO_TURN, spring_estimator_turn(&estimator));
     TEST_ASSERT_EQUAL_UINT8(SPRING_PHASE_ANY, spring_estimator_possible(BELIEF));
     const spring_bounds_t c = spring_estimator_temperature_c(&estimator, &model, 0);
     TEST_ASSERT_TRUE(c.low <= 20.0f && c.high >= SPRING_ESTIMATOR_HOTTEST_C);
@@ -43,33 +36,11 @@ static void at_power_on_everything_is_possible(void)
     TEST_ASSERT_TRUE(austenite.low == 0.0f && austenite.high == 1.0f);
 }
 
-/* From the hottest that it may be, with its latent heat. */
-static void it_is_cold_only_after_the_time_that_physics_needs(void)
-{
-    for (double loss = 0.85; loss < 1.2; loss += 0.15) {
-        power_comes_on();
-        truth.temperature_c = SPRING_ESTIMATOR_HOTTEST_C;
-        truth.austenite = 1.0;
-        truth.loss_w_per_k *= loss;
-        const double said_s = spring_estimator_cooling_s(&estimator, &model, 0);
-        double took_s = 0.0;
-        while (spring_estimator_possible(BELIEF) != SPRING_PHASE_MARTENSITE && took_s < 300.0) {
-            (void)tick(0.0);
-            took_s += TICK_S;
-        }
-        (void)snprintf(where, sizeof where, "loss x %.2f: said %.0f s, took %.0f s: %.1f degC",
-                       loss, said_s, took_s, truth.temperature_c);
-        TEST_ASSERT_TRUE_MESSAGE(truth.temperature_c < 68.0 && truth.austenite == 0.0, where);
-        TEST_ASSERT_TRUE_MESSAGE(took_s < 100.0 && fabs(said_s - took_s) < 0.25 * took_s, where);
-        TEST_ASSERT_EQUAL_FLOAT(0.0f, spring_estimator_cooling_s(&estimator, &model, 0));
-    }
-}
-
 /* ---- a heating ---- */
 
 /* Whatever its sign and size, at the lower current of a spring that waits, through noise, in a
  * gust: it is heated until it has transformed and no farther, and its numbers are learnt. */
-static void transformation_is_seen_in_any_spring(void)
+TEST(transformation_is_seen_in_any_spring)
 {
     static const struct {
         double ratio, rise_per_k, noise_v, loss, low_a;
@@ -91,63 +62,16 @@ static void transformation_is_seen_in_any_spring(void)
             (void)tick(fmod(s, 2.0) < 1.0 ? 3.0 : table[n].low_a);
             began_at = began_at < 0.0 && INSIDE.onset ? truth.austenite : began_at;
         }
-        (void)snprintf(where, sizeof where, "row %u: onset at %.2f, end at %.3f, %.1f C",
-                       (unsigned)n, began_at, truth.austenite, truth.temperature_c);
-        TEST_ASSERT_TRUE_MESSAGE(began_at > 0.0 && began_at < 0.5, where);
-        TEST_ASSERT_TRUE_MESSAGE(truth.austenite > 0.97 && truth.temperature_c < 115.0, where);
+        here("row %u: onset at %.2f, end at %.3f, %.1f C", (unsigned)n, began_at, truth.austenite,
+             truth.temperature_c);
+        TEST_ASSERT_TRUE(began_at > 0.0 && began_at < 0.5);
+        TEST_ASSERT_TRUE(truth.austenite > 0.97 && truth.temperature_c < 115.0);
         spring_estimator_begin_hold(&estimator, &model, 0, true);
-        TEST_ASSERT_FALSE_MESSAGE(spring_estimator_blind(BELIEF), where);
-        TEST_ASSERT_EQUAL_UINT8_MESSAGE(SPRING_PHASE_AUSTENITE, spring_estimator_possible(BELIEF),
-                                        where);
-        TEST_ASSERT_FLOAT_WITHIN_MESSAGE(0.02f * (float)resistance_ohm(), (float)resistance_ohm(),
-                                         LEARNT.austenite_ohm, where);
-        TEST_ASSERT_FLOAT_WITHIN_MESSAGE(0.04f, (float)(1.0 - 1.0 / table[n].ratio), LEARNT.change,
-                                         where);
-    }
-}
-
-/* A change of some percent shows late, and its last is flatter than a coefficient may be: that is
- * waited for, and no more than that; also once it is known. */
-static void small_change_is_heated_to_its_end(void)
-{
-    for (double ratio = 1.06; ratio < 1.3; ratio += 0.01) {
-        begin_cold();
-        for (int known = 0; known < 2; known++) {
-            truth.cosine = true;
-            truth.ratio = ratio;
-            (void)heat_then_hold(60.0);
-            (void)snprintf(where, sizeof where, "ratio %.2f, known %d: %.3f at %.1f C", ratio,
-                           known, truth.austenite, truth.temperature_c);
-            TEST_ASSERT_TRUE_MESSAGE(truth.austenite > 0.95 && truth.temperature_c < 115.0, where);
-            begin_cold_as_learnt();
-        }
-    }
-}
-
-/* Far below its transformation, just below it, in a turn or between two: a contact or a gain that
- * steps is no transformation, nor its end, and what came after it is. */
-static void step_of_a_contact_ends_no_heating(void)
-{
-    static const double steps[] = {-0.06, -0.045, 0.045, 0.07};
-    for (unsigned n = 0; n < 4 * 10 + 4 * 7; n++) { /* once more below 70 degC, as learnt */
-        const double at_c = 35.0 + 5.0 * (n / 4 % 10);
-        begin_cold();
-        if (n >= 40) {
-            (void)heat_then_hold(60.0);
-            begin_cold_as_learnt();
-        }
-        spring_estimator_begin_heating(&estimator, &model, 0);
-        while (truth.temperature_c < at_c) {
-            (void)tick(3.0);
-        }
-        truth.contact_ohm = steps[n % 4] * resistance_ohm();
-        for (double s = 0.0; s < 60.0 && !spring_estimator_has_transformed(&estimator, &model, 0);
-             s += TICK_S) {
-            (void)tick(3.0);
-        }
-        (void)snprintf(where, sizeof where, "%u, step of %.3f at %.0f degC: %.3f at %.1f degC", n,
-                       steps[n % 4], at_c, truth.austenite, truth.temperature_c);
-        TEST_ASSERT_TRUE_MESSAGE(truth.austenite > 0.95 && truth.temperature_c < 120.0, where);
+        TEST_ASSERT_FALSE(spring_estimator_blind(BELIEF));
+        TEST_ASSERT_EQUAL_UINT8(SPRING_PHASE_AUSTENITE, spring_estimator_possible(BELIEF));
+        TEST_ASSERT_FLOAT_WITHIN(0.02f * (float)resistance_ohm(), (float)resistance_ohm(),
+                                 LEARNT.austenite_ohm);
+        TEST_ASSERT_FLOAT_WITHIN(0.04f, (float)(1.0 - 1.0 / table[n].ratio), LEARNT.change);
     }
 }
 
@@ -160,7 +84,7 @@ static bool holds(spring_bounds_t bounds, double value)
 
 /* 15 % off in capacity and loss, 5 K off in the transformation, with a coefficient: heated, held
  * nearer and nearer, and off, where nobody reads it. */
-static void spring_is_within_its_bounds(void)
+TEST(spring_is_within_its_bounds)
 {
     static const double off[] = {0.85, 1.0, 1.15};
     unsigned seen = 0, distance = 0, temperature = 0, phase = 0;
@@ -195,16 +119,15 @@ static void spring_is_within_its_bounds(void)
             }
         }
     }
-    (void)snprintf(where, sizeof where, "of %u: distance %u, temperature %u, phase %u", seen,
-                   distance, temperature, phase);
-    TEST_ASSERT_TRUE_MESSAGE(distance >= 0.99 * seen, where);
-    TEST_ASSERT_TRUE_MESSAGE(temperature >= 0.99 * seen, where);
-    TEST_ASSERT_TRUE_MESSAGE(phase >= 0.99 * seen, where);
+    here("of %u: distance %u, temperature %u, phase %u", seen, distance, temperature, phase);
+    TEST_ASSERT_TRUE(distance >= 0.99 * seen);
+    TEST_ASSERT_TRUE(temperature >= 0.99 * seen);
+    TEST_ASSERT_TRUE(phase >= 0.99 * seen);
 }
 
 /* ---- a hold ---- */
 
-static void crossing_is_seen_and_makes_the_distance_sure(void)
+TEST(crossing_is_seen_and_makes_the_distance_sure)
 {
     static const double loss[] = {0.85, 1.0, 1.15};
     for (unsigned n = 0; n < 3; n++) {
@@ -213,28 +136,26 @@ static void crossing_is_seen_and_makes_the_distance_sure(void)
         (void)heat_then_hold(60.0);
         const float before_k = search(12.0);
         const float after_k = spring_estimator_sd_k(BELIEF);
-        (void)snprintf(where, sizeof where,
-                       "loss x %.2f: lost %.3f of %.3f, sd %.2f -> %.2f, distance %.2f", loss[n],
-                       (double)spring_estimator_lost(BELIEF), 1.0 - truth.austenite,
-                       (double)before_k, (double)after_k, distance_k());
-        TEST_ASSERT_TRUE_MESSAGE(spring_estimator_lost(BELIEF) > 0.0f, where);
-        TEST_ASSERT_TRUE_MESSAGE(distance_k() > -3.0 && distance_k() < 1.0, where);
-        TEST_ASSERT_TRUE_MESSAGE(after_k < before_k && after_k < 2.0f, where);
-        TEST_ASSERT_TRUE_MESSAGE(
-            holds(spring_estimator_distance_k(&estimator, &model, 0), distance_k()), where);
+        here("loss x %.2f: lost %.3f of %.3f, sd %.2f -> %.2f, distance %.2f", loss[n],
+             (double)spring_estimator_lost(BELIEF), 1.0 - truth.austenite, (double)before_k,
+             (double)after_k, distance_k());
+        TEST_ASSERT_TRUE(spring_estimator_lost(BELIEF) > 0.0f);
+        TEST_ASSERT_TRUE(distance_k() > -3.0 && distance_k() < 1.0);
+        TEST_ASSERT_TRUE(after_k < before_k && after_k < 2.0f);
+        TEST_ASSERT_TRUE(holds(spring_estimator_distance_k(&estimator, &model, 0), distance_k()));
         /* and what was learnt of the loss is right within what it says of itself */
         const spring_learnt_t learnt = spring_estimator_learnt(&estimator, 0);
         const double off_w_per_k = (double)learnt.loss_w_per_k - 5.8e-3 * (loss[n] - 1.0);
-        (void)snprintf(where, sizeof where, "loss x %.2f: off by %.6f, sd %.6f", loss[n],
-                       off_w_per_k, (double)learnt.loss_sd_w_per_k);
-        TEST_ASSERT_TRUE_MESSAGE(fabs(off_w_per_k) <= 3.0 * (double)learnt.loss_sd_w_per_k, where);
-        TEST_ASSERT_TRUE_MESSAGE((double)learnt.loss_sd_w_per_k < 0.12 * 5.8e-3, where);
+        here("loss x %.2f: off by %.6f, sd %.6f", loss[n], off_w_per_k,
+             (double)learnt.loss_sd_w_per_k);
+        TEST_ASSERT_TRUE(fabs(off_w_per_k) <= 3.0 * (double)learnt.loss_sd_w_per_k);
+        TEST_ASSERT_TRUE((double)learnt.loss_sd_w_per_k < 0.12 * 5.8e-3);
     }
 }
 
 /* A coefficient in print, whatever the change; a contact that steps or ages; noise that stays for a
  * second: nothing of that is phase, and the spring is not heated back. */
-static void nothing_else_is_taken_for_lost_phase(void)
+TEST(nothing_else_is_taken_for_lost_phase)
 {
     static const struct {
         double ratio, rise_per_k, apart_per_k, contact_ohm, step_ohm, age_ohm_per_s, slow_noise_v;
@@ -258,18 +179,17 @@ static void nothing_else_is_taken_for_lost_phase(void)
             truth.contact_ohm += t == 5000 ? table[n].step_ohm : 0.0;
             truth.contact_ohm += table[n].age_ohm_per_s * TICK_S;
             (void)tick(hold_current_a(8.0));
-            (void)snprintf(where, sizeof where, "row %u, %ld: lost %.3f of %.3f at %.1f degC",
-                           (unsigned)n, t, (double)spring_estimator_lost(BELIEF),
-                           1.0 - truth.austenite, truth.temperature_c);
-            TEST_ASSERT_TRUE_MESSAGE(spring_estimator_lost(BELIEF) < ACTED_ON, where);
+            here("row %u, %ld: lost %.3f of %.3f at %.1f degC", (unsigned)n, t,
+                 (double)spring_estimator_lost(BELIEF), 1.0 - truth.austenite, truth.temperature_c);
+            TEST_ASSERT_TRUE(spring_estimator_lost(BELIEF) < ACTED_ON);
         }
-        TEST_ASSERT_TRUE_MESSAGE(truth.austenite > 0.97 && !spring_estimator_blind(BELIEF), where);
+        TEST_ASSERT_TRUE(truth.austenite > 0.97 && !spring_estimator_blind(BELIEF));
     }
 }
 
 /* A touch in mid-hold, at once or within a second: all four temperatures rise by 8 K, and phase
  * goes, as fast as a contact steps. */
-static void transformation_that_moves_is_noticed(void)
+TEST(transformation_that_moves_is_noticed)
 {
     for (int slow = 0; slow < 2; slow++) {
         const double margin_k = slow ? 3.0 : 5.0;
@@ -282,45 +202,17 @@ static void transformation_that_moves_is_noticed(void)
             truth.shift_k = slow ? fmin(8.0, 8.0 * s) : 8.0;
             (void)tick(hold_current_a(margin_k));
         }
-        (void)snprintf(where, sizeof where, "after %.1f s, lost %.3f of %.3f, shift %.2f", s,
-                       (double)spring_estimator_lost(BELIEF), 1.0 - truth.austenite,
-                       (double)spring_estimator_shift_k(BELIEF));
-        TEST_ASSERT_TRUE_MESSAGE(s < 20.0 && spring_estimator_shift_k(BELIEF) > before_k, where);
-        TEST_ASSERT_EQUAL_UINT16_MESSAGE(0, INSIDE.unsteady, where);
-    }
-}
-
-/* In the hold a contact gets better, as if phase was lost; no heat brings that back, and the
- * heating ends all the same. It may be what it was taken for: it is held as if it was, and may be
- * as hot as if it was not. */
-static void loss_that_was_none_stays_in_doubt_and_heats_no_further(void)
-{
-    static const double contact_ohm[] = {0.0012, 0.012, 0.015};
-    for (unsigned n = 0; n < 3; n++) {
-        begin_cold();
-        truth.contact_ohm = contact_ohm[n];
-        (void)heat_then_hold(60.0);
-        hold(12.0, 60.0);
-        truth.contact_ohm = 0.0;
-        for (double s = 0.0; s < 60.0 && spring_estimator_lost(BELIEF) < ACTED_ON; s += TICK_S) {
-            (void)tick(hold_current_a(12.0));
-        }
-        (void)heat_then_hold(60.0);
-        const double highest_c = truth.temperature_c;
-        hold(12.0, 60.0);
-        const float hottest_c = spring_now_c(&model, 0) + spring_estimator_doubt_k(BELIEF);
-        (void)snprintf(where, sizeof where, "%.4f ohm: %.1f degC; %.1f to %.1f, true %.1f",
-                       contact_ohm[n], highest_c, (double)spring_now_c(&model, 0),
-                       (double)hottest_c, truth.temperature_c);
-        TEST_ASSERT_TRUE_MESSAGE(highest_c < 122.0, where);
-        TEST_ASSERT_TRUE_MESSAGE((double)hottest_c > truth.temperature_c - 4.0, where);
-        TEST_ASSERT_TRUE_MESSAGE(n == 0 || spring_estimator_blind(BELIEF), where); /* it is said */
+        here("after %.1f s, lost %.3f of %.3f, shift %.2f", s,
+             (double)spring_estimator_lost(BELIEF), 1.0 - truth.austenite,
+             (double)spring_estimator_shift_k(BELIEF));
+        TEST_ASSERT_TRUE(s < 20.0 && spring_estimator_shift_k(BELIEF) > before_k);
+        TEST_ASSERT_EQUAL_UINT16(0, INSIDE.unsteady);
     }
 }
 
 /* ---- learnt before ---- */
 
-static void numbers_that_no_spring_has_are_not_restored(void)
+TEST(numbers_that_no_spring_has_are_not_restored)
 {
     const spring_learnt_t good = {.austenite_ohm = 0.22f, .change = 0.2f, .loss_sd_w_per_k = 1e-4f};
     spring_learnt_t bad[15];
@@ -345,8 +237,8 @@ static void numbers_that_no_spring_has_are_not_restored(void)
     for (unsigned n = 0; n < 15; n++) {
         power_comes_on();
         spring_estimator_restore(&estimator, 0, &bad[n]);
-        (void)snprintf(where, sizeof where, "%u", n);
-        TEST_ASSERT_EQUAL_FLOAT_MESSAGE(0.0f, LEARNT.austenite_ohm, where);
+        here("%u", n);
+        TEST_ASSERT_EQUAL_FLOAT(0.0f, LEARNT.austenite_ohm);
     }
     static const float possible_ohm[] = {0.0101f, 0.22f, 15.9f};
     for (unsigned n = 0; n < 3; n++) {
@@ -361,103 +253,4 @@ static void numbers_that_no_spring_has_are_not_restored(void)
     INSIDE.loss_variance = 1e-8f;
 }
 
-/* Power off in mid-hold: what was learnt holds only beside the sensor's offset, and a spring that
- * reads as austenite cannot have been cold, though a contact is a little better than it was. */
-static void restored_spring_is_not_overheated(void)
-{
-    static const struct {
-        double offset_v, contact_ohm;
-    } cases[] = {{-0.008, 0.0}, {0.0, 0.0}, {0.008, 0.0}, {0.0, 0.003}};
-    for (size_t n = 0; n < ROWS(cases); n++) {
-        begin_cold();
-        truth.offset_v = cases[n].offset_v;
-        truth.contact_ohm = cases[n].contact_ohm;
-        (void)heat_then_hold(60.0);
-        ticks(0.4, 2.0);
-        hold(8.0, 60.0);
-        const spring_learnt_t learnt = spring_estimator_learnt(&estimator, 0);
-        const truth_t before = truth;
-        power_comes_on();
-        truth = before;
-        truth.contact_ohm = 0.0;
-        spring_estimator_restore(&estimator, 0, &learnt);
-        spring_estimator_begin_heating(&estimator, &model, 0);
-        ticks(1.0, 1.5); /* the look */
-        for (double s = 0.0; s < 60.0 && !spring_estimator_has_transformed(&estimator, &model, 0);
-             s += TICK_S) {
-            (void)tick(spring_now_c(&model, 0) < 104.0f
-                           ? 3.0
-                           : 1.5); /* the drive derates from 100 degC on */
-        }
-        (void)snprintf(where, sizeof where, "%.3f V, %.3f ohm: %.1f degC", cases[n].offset_v,
-                       cases[n].contact_ohm, truth.temperature_c);
-        TEST_ASSERT_TRUE_MESSAGE(truth.temperature_c < 118.0, where);
-    }
-}
-
 /* ---- readings that are none ---- */
-
-static void check_is_sound(void)
-{
-    const spring_bounds_t c = spring_estimator_temperature_c(&estimator, &model, 0);
-    const spring_bounds_t distance = spring_estimator_distance_k(&estimator, &model, 0);
-    const spring_bounds_t austenite = spring_estimator_austenite(&estimator, &model, 0);
-    TEST_ASSERT_TRUE_MESSAGE(isfinite(c.low) && isfinite(c.high) && c.low < c.high, where);
-    TEST_ASSERT_TRUE_MESSAGE(isfinite(distance.low) && distance.low < distance.high, where);
-    TEST_ASSERT_TRUE_MESSAGE(austenite.low >= 0.0f && austenite.low <= austenite.value &&
-                                 austenite.value <= austenite.high && austenite.high <= 1.0f,
-                             where);
-    TEST_ASSERT_TRUE_MESSAGE(INSIDE.loss_variance >= 0.0f, where);
-    TEST_ASSERT_TRUE_MESSAGE(isfinite(LEARNT.loss_w_per_k), where);
-    TEST_ASSERT_TRUE(thermal_model_is_consistent(&model));
-}
-
-static void bad_readings_leave_a_belief_that_can_be_believed(void)
-{
-    static const sensor_t bad[] = {SENSOR_SILENT, SENSOR_FROZEN, SENSOR_ZERO, SENSOR_WILD};
-    for (unsigned n = 0; n < 4; n++) {
-        for (int held = 0; held < 2; held++) {
-            begin_cold();
-            (void)snprintf(where, sizeof where, "sensor %u, held %d", n, held);
-            if (held) {
-                (void)heat_then_hold(60.0);
-                ticks(1.4, 60.0);
-            }
-            sensor = bad[n];
-            for (double s = 0.0; s < 600.0; s += TICK_S) {
-                if (tick(held ? 1.4 : 0.0)) {
-                    check_is_sound();
-                }
-            }
-            sensor = SENSOR_GOOD; /* off and cold, it transforms as before */
-            ticks(0.0, 400.0);
-            TEST_ASSERT_TRUE_MESSAGE(heat(60.0) < 60.0 && truth.austenite > 0.99, where);
-        }
-    }
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(at_power_on_everything_is_possible);
-    RUN_TEST(it_is_cold_only_after_the_time_that_physics_needs);
-    RUN_TEST(transformation_is_seen_in_any_spring);
-    RUN_TEST(small_change_is_heated_to_its_end);
-    RUN_TEST(step_of_a_contact_ends_no_heating);
-    RUN_TEST(spring_is_within_its_bounds);
-    RUN_TEST(crossing_is_seen_and_makes_the_distance_sure);
-    RUN_TEST(nothing_else_is_taken_for_lost_phase);
-    RUN_TEST(transformation_that_moves_is_noticed);
-    RUN_TEST(loss_that_was_none_stays_in_doubt_and_heats_no_further);
-    RUN_TEST(numbers_that_no_spring_has_are_not_restored);
-    RUN_TEST(restored_spring_is_not_overheated);
-    RUN_TEST(bad_readings_leave_a_belief_that_can_be_believed);
-    RUN_TEST(each_sight_of_a_life_is_noted_with_what_was_done);
-    RUN_TEST(spring_that_has_most_gives_way);
-    RUN_TEST(sights_are_found_by_number_and_forgotten_after_four_hours);
-    run_seals();
-    run_rules();
-    run_law();
-    run_watch();
-    return UNITY_END();
-}

@@ -2,31 +2,9 @@
 #include <string.h>
 
 #include "../fakes/belief_inside.h"
+#include "../fakes/said.h"
 #include "telemetry.h"
-#include "unity.h"
 
-static char said[8192];
-static uint16_t said_length;
-static uint16_t room;
-
-static uint16_t out_room(void *context)
-{
-    (void)context;
-    return room;
-}
-
-static void out_write(void *context, const char *bytes, uint8_t length)
-{
-    (void)context;
-    TEST_ASSERT_LESS_OR_EQUAL_UINT(room, length);
-    TEST_ASSERT_LESS_THAN_UINT(sizeof said, said_length + (unsigned)length);
-    memcpy(said + said_length, bytes, length);
-    said_length = (uint16_t)(said_length + length);
-    said[said_length] = '\0';
-    room = (uint16_t)(room - length);
-}
-
-static const text_output_t output = {NULL, out_room, out_write};
 static controller_t controller;
 static telemetry_t telemetry;
 
@@ -37,12 +15,10 @@ void setUp(void)
     TEST_ASSERT_TRUE(controller_init(&controller, &settings, 20 * 128, NULL));
     controller_set_temperature(&controller, 20 * 128);
     telemetry_init(&telemetry);
-    said_length = 0;
-    said[0] = '\0';
+    forget();
     room = 8000;
+    room_fills = true;
 }
-
-void tearDown(void) {}
 
 static void tick_at(uint32_t time_ms, int16_t ambient_c7)
 {
@@ -52,14 +28,10 @@ static void tick_at(uint32_t time_ms, int16_t ambient_c7)
 
 static unsigned lines(void)
 {
-    unsigned count = 0;
-    for (uint16_t i = 0; i < said_length; i++) {
-        count += said[i] == '\n';
-    }
-    return count;
+    return occurrences("\n");
 }
 
-static void header_and_line_have_as_many_columns(void)
+TEST(header_and_line_have_as_many_columns)
 {
     char header[512];
     text_line_t line;
@@ -88,10 +60,10 @@ static void header_and_line_have_as_many_columns(void)
     }
     TEST_ASSERT_EQUAL_UINT(columns, fields);
     TEST_ASSERT_EQUAL_STRING_LEN("12.345,0.000,0.000,20.00,0.000,", said, 31);
-    TEST_ASSERT_NOT_NULL(strstr(said, ",0.00,20.00,ok\r\n"));
+    expect_said(",0.00,20.00,ok\r\n");
 }
 
-static void the_longest_line_fits_what_is_asked_for(void)
+TEST(the_longest_line_fits_what_is_asked_for)
 {
     for (uint8_t k = 0; k < 9; k++) {
         controller.measured_ma[k] = -32768;
@@ -105,11 +77,11 @@ static void the_longest_line_fits_what_is_asked_for(void)
     const text_time_t years = {INT32_MAX, 999};
     telemetry_tick(&telemetry, &controller, &years, -40 * 128, &output);
     TEST_ASSERT_EQUAL_UINT(1, lines());
-    TEST_ASSERT_NOT_NULL(strstr(said, ",fault_13\r\n"));
+    expect_said(",fault_13\r\n");
     TEST_ASSERT_EQUAL_UINT16(0, telemetry.dropped);
 }
 
-static void a_line_without_room_is_dropped_whole_and_counted(void)
+TEST(a_line_without_room_is_dropped_whole_and_counted)
 {
     TEST_ASSERT_TRUE(telemetry_set(&telemetry, TELEMETRY_CSV, 50));
     room = (uint16_t)(TELEMETRY_LINE_BYTES(9) - 1u);
@@ -121,7 +93,7 @@ static void a_line_without_room_is_dropped_whole_and_counted(void)
     TEST_ASSERT_EQUAL_UINT16(65535, telemetry.dropped);
 }
 
-static void every_rate_gives_that_many_lines_a_second(void)
+TEST(every_rate_gives_that_many_lines_a_second)
 {
     for (uint8_t hz = 1; hz <= 50; hz++) {
         TEST_ASSERT_TRUE(telemetry_set(&telemetry, TELEMETRY_CSV, hz));
@@ -136,33 +108,18 @@ static void every_rate_gives_that_many_lines_a_second(void)
     }
 }
 
-static void teleplot_lines_are_name_ms_value(void)
+TEST(teleplot_lines_are_name_ms_value)
 {
     controller.measured_ma[1] = 1500;
     TEST_ASSERT_TRUE(telemetry_set(&telemetry, TELEMETRY_TELEPLOT, 50));
     tick_at(1234, 0);
-    TEST_ASSERT_NOT_NULL(strstr(said, ">i2:1234:1.500\r\n"));
-    TEST_ASSERT_NOT_NULL(strstr(said, ">m9:1234:20.00\r\n"));
-    TEST_ASSERT_NOT_NULL(strstr(said, ">fault:1234:0\r\n"));
+    expect_said(">i2:1234:1.500\r\n");
+    expect_said(">m9:1234:20.00\r\n");
+    expect_said(">fault:1234:0\r\n");
     TEST_ASSERT_EQUAL_UINT(20, lines());
 }
 
-static unsigned occurrences(const char *part)
-{
-    unsigned count = 0;
-    for (const char *at = said; (at = strstr(at, part)) != NULL; at++) {
-        count++;
-    }
-    return count;
-}
-
-static void forget(void)
-{
-    said_length = 0;
-    said[0] = '\0';
-}
-
-static void a_round_of_teleplot_goes_on_where_it_found_no_room(void)
+TEST(a_round_of_teleplot_goes_on_where_it_found_no_room)
 {
     TEST_ASSERT_TRUE(telemetry_set(&telemetry, TELEMETRY_TELEPLOT, 5));
     for (uint32_t tick = 1; tick <= 14; tick++) { /* due in the tenth */
@@ -171,13 +128,13 @@ static void a_round_of_teleplot_goes_on_where_it_found_no_room(void)
         TEST_ASSERT_TRUE(room >= TELEMETRY_LEAVES_FREE_BYTES);
         TEST_ASSERT_EQUAL_UINT(tick < 10 ? 0 : tick < 14 ? (tick - 9u) * 4u : 20u, lines());
     }
-    TEST_ASSERT_NOT_NULL(strstr(said, ">i2:200:0.000\r\n"));
-    TEST_ASSERT_NOT_NULL(strstr(said, ">i3:220:0.000\r\n"));
-    TEST_ASSERT_NOT_NULL(strstr(said, ">fault:280:0\r\n"));
+    expect_said(">i2:200:0.000\r\n");
+    expect_said(">i3:220:0.000\r\n");
+    expect_said(">fault:280:0\r\n");
     TEST_ASSERT_EQUAL_UINT16(0, telemetry.dropped);
 }
 
-static void what_of_a_round_found_no_room_is_dropped_and_every_spring_has_its_turn(void)
+TEST(what_of_a_round_found_no_room_is_dropped_and_every_spring_has_its_turn)
 {
     TEST_ASSERT_TRUE(telemetry_set(&telemetry, TELEMETRY_TELEPLOT, 50));
     for (uint32_t tick = 1; tick <= 45; tick++) {
@@ -211,7 +168,7 @@ static void ticks(unsigned count, uint32_t time_ms)
     }
 }
 
-static void csv_tells_a_limit_once_when_it_begins_and_once_when_it_ends(void)
+TEST(csv_tells_a_limit_once_when_it_begins_and_once_when_it_ends)
 {
     TEST_ASSERT_TRUE(telemetry_set(&telemetry, TELEMETRY_CSV, 5));
     ticks(50, 20);
@@ -219,16 +176,15 @@ static void csv_tells_a_limit_once_when_it_begins_and_once_when_it_ends(void)
     limit(4, DRIVE_POLICY_LIMIT_SUPPLY | DRIVE_POLICY_LIMIT_TEMPERATURE, 2610);
     ticks(50, 12000);
     TEST_ASSERT_EQUAL_UINT(1, occurrences("<"));
-    TEST_ASSERT_NOT_NULL(
-        strstr(said, "\r\n<limits|spring:5|t:12.180|supply|temperature|cut_a:2.610>\r\n"));
+    expect_said("\r\n<limits|spring:5|t:12.180|supply|temperature|cut_a:2.610>\r\n");
     limit(4, DRIVE_POLICY_LIMIT_NONE, 0);
     ticks(50, 13000);
     TEST_ASSERT_EQUAL_UINT(2, occurrences("<"));
-    TEST_ASSERT_NOT_NULL(strstr(said, "\r\n<limits|spring:5|t:13.180|none|cut_a:0.000>\r\n"));
+    expect_said("\r\n<limits|spring:5|t:13.180|none|cut_a:0.000>\r\n");
     TEST_ASSERT_EQUAL_UINT(15, occurrences(",ok\r\n"));
 }
 
-static void csv_tells_again_when_the_cut_has_changed_by_half_an_ampere(void)
+TEST(csv_tells_again_when_the_cut_has_changed_by_half_an_ampere)
 {
     TEST_ASSERT_TRUE(telemetry_set(&telemetry, TELEMETRY_CSV, 50));
     for (uint16_t cut_ma = 10; cut_ma <= 1800; cut_ma = (uint16_t)(cut_ma + 10u)) {
@@ -259,15 +215,14 @@ static void pass(unsigned turns)
 }
 
 /* In setUp each spring was told to be cold. */
-static void csv_tells_each_sight_once_when_it_is_known_what_was_done(void)
+TEST(csv_tells_each_sight_once_when_it_is_known_what_was_done)
 {
     TEST_ASSERT_TRUE(telemetry_set(&telemetry, TELEMETRY_CSV, 5));
     pass(8);
     ticks(50, 10000);
     TEST_ASSERT_EQUAL_UINT(9, occurrences("<sight|"));
-    TEST_ASSERT_NOT_NULL(strstr(said,
-                                "\r\n<sight|spring:9|t:8.340|told|now_k:-58.0|now_sd:5.8|shift_k:"
-                                "0.0|loss:0.00>\r\n"));
+    expect_said("\r\n<sight|spring:9|t:8.340|told|now_k:-58.0|now_sd:5.8|shift_k:"
+                "0.0|loss:0.00>\r\n");
     forget();
     spring_sight_t *const sight = spring_sights_add(sights_inside(&controller.estimator), 4);
     sight->kind = SPRING_SIGHT_LOST;
@@ -288,17 +243,15 @@ static void csv_tells_each_sight_once_when_it_is_known_what_was_done(void)
     pass(1);
     ticks(50, 13000);
     TEST_ASSERT_EQUAL_UINT(1, occurrences("<"));
-    TEST_ASSERT_NOT_NULL_MESSAGE(
-        strstr(said, "\r\n<sight|spring:5|t:12.500|lost|read:-1.32|read_sd:0.05|believed_k:2.4|"
-                     "believed_sd:1.8|seen_k:-0.8|seen_sd:1.2|now_k:0.1|now_sd:1.0|shift_k:0.4|"
-                     "loss:1.20|heated|opened>\r\n"),
-        said);
+    expect_said("\r\n<sight|spring:5|t:12.500|lost|read:-1.32|read_sd:0.05|believed_k:2.4|"
+                "believed_sd:1.8|seen_k:-0.8|seen_sd:1.2|now_k:0.1|now_sd:1.0|shift_k:0.4|"
+                "loss:1.20|heated|opened>\r\n");
     TEST_ASSERT_TRUE(telemetry_set(&telemetry, TELEMETRY_CSV, 5));
     ticks(50, 14000); /* to whoever comes anew, those that are kept */
     TEST_ASSERT_EQUAL_UINT(11, occurrences("<sight|"));
 }
 
-static void longest_sight_is_told_whole_and_waits_for_room(void)
+TEST(longest_sight_is_told_whole_and_waits_for_room)
 {
     spring_sights_t *const sights = sights_inside(&controller.estimator);
     sights->count = 0;
@@ -333,7 +286,7 @@ static void longest_sight_is_told_whole_and_waits_for_room(void)
     TEST_ASSERT_EQUAL_UINT(1, lines());
 }
 
-static void limits_that_find_no_room_are_told_later(void)
+TEST(limits_that_find_no_room_are_told_later)
 {
     TEST_ASSERT_TRUE(telemetry_set(&telemetry, TELEMETRY_CSV, 5));
     for (uint8_t k = 0; k < 9; k++) {
@@ -358,7 +311,7 @@ static void limits_that_find_no_room_are_told_later(void)
     TEST_ASSERT_EQUAL_UINT(9, occurrences("<"));
 }
 
-static void limits_that_toggle_are_told_once_a_period_and_take_no_other_springs_turn(void)
+TEST(limits_that_toggle_are_told_once_a_period_and_take_no_other_springs_turn)
 {
     for (uint8_t hz = 1; hz <= 50; hz = (uint8_t)(hz + 7u)) {
         TEST_ASSERT_TRUE(telemetry_set(&telemetry, TELEMETRY_CSV, hz));
@@ -387,7 +340,7 @@ static void limits_that_toggle_are_told_once_a_period_and_take_no_other_springs_
     }
 }
 
-static void all_limits_at_once_fit_and_are_told_whole(void)
+TEST(all_limits_at_once_fit_and_are_told_whole)
 {
     TEST_ASSERT_TRUE(telemetry_set(&telemetry, TELEMETRY_CSV, 1));
     limit(8, 1023, 3000);
@@ -397,7 +350,7 @@ static void all_limits_at_once_fit_and_are_told_whole(void)
                                           "trip|blind|cooling|away|cut_a:3.000>\r\n"));
 }
 
-static void telemetry_that_starts_tells_what_acts(void)
+TEST(telemetry_that_starts_tells_what_acts)
 {
     limit(1, DRIVE_POLICY_LIMIT_BLIND, 0);
     for (unsigned n = 1; n <= 3; n++) {
@@ -407,7 +360,7 @@ static void telemetry_that_starts_tells_what_acts(void)
     }
 }
 
-static void teleplot_has_limits_while_they_act_and_once_when_they_have_ended(void)
+TEST(teleplot_has_limits_while_they_act_and_once_when_they_have_ended)
 {
     TEST_ASSERT_TRUE(telemetry_set(&telemetry, TELEMETRY_TELEPLOT, 5));
     ticks(55, 0); /* the last round needs two ticks */
@@ -422,14 +375,14 @@ static void teleplot_has_limits_while_they_act_and_once_when_they_have_ended(voi
     forget();
     ticks(50, 2000);
     TEST_ASSERT_EQUAL_UINT(1, occurrences(">limits"));
-    TEST_ASSERT_NOT_NULL(strstr(said, ">limits9:2100:0\r\n"));
+    expect_said(">limits9:2100:0\r\n");
     TEST_ASSERT_EQUAL_UINT(1, occurrences(">cut"));
-    TEST_ASSERT_NOT_NULL(strstr(said, ">cut9:2100:0.000\r\n"));
+    expect_said(">cut9:2100:0.000\r\n");
     TEST_ASSERT_EQUAL_UINT16(0, telemetry.dropped);
 }
 
 /* The longest piece of it, whole. */
-static void teleplots_longest_lines_are_whole(void)
+TEST(teleplots_longest_lines_are_whole)
 {
     controller.measured_ma[8] = -32768;
     controller.model.state.spring[8].temperature_c23 = -40 * 8388608;
@@ -441,18 +394,18 @@ static void teleplots_longest_lines_are_whole(void)
     room = 8000;
     const text_time_t years = {INT32_MAX, 7};
     telemetry_tick(&telemetry, &controller, &years, 0, &output);
-    TEST_ASSERT_NOT_NULL(strstr(said, ">i9:2147483647007:-32.768\r\n"));
-    TEST_ASSERT_NOT_NULL(strstr(said, ">m9:2147483647007:-40.00\r\n"));
-    TEST_ASSERT_NOT_NULL(strstr(said, ">limits9:2147483647007:1023\r\n"));
-    TEST_ASSERT_NOT_NULL(strstr(said, ">cut9:2147483647007:3.000\r\n"));
-    TEST_ASSERT_NOT_NULL(strstr(said, ">fan:2147483647007:0.00\r\n"));
-    TEST_ASSERT_NOT_NULL(strstr(said, ">fault:2147483647007:13\r\n"));
-    TEST_ASSERT_NOT_NULL(strstr(said, ">low9:2147483647007:-1"));
-    TEST_ASSERT_NOT_NULL(strstr(said, ">high9:2147483647007:1"));
+    expect_said(">i9:2147483647007:-32.768\r\n");
+    expect_said(">m9:2147483647007:-40.00\r\n");
+    expect_said(">limits9:2147483647007:1023\r\n");
+    expect_said(">cut9:2147483647007:3.000\r\n");
+    expect_said(">fan:2147483647007:0.00\r\n");
+    expect_said(">fault:2147483647007:13\r\n");
+    expect_said(">low9:2147483647007:-1");
+    expect_said(">high9:2147483647007:1");
     TEST_ASSERT_EQUAL_UINT(40, lines());
 }
 
-static void teleplot_has_the_bounds_of_temperature_once_a_second(void)
+TEST(teleplot_has_the_bounds_of_temperature_once_a_second)
 {
     TEST_ASSERT_TRUE(telemetry_set(&telemetry, TELEMETRY_TELEPLOT, 5));
     ticks(49, 1000);
@@ -470,7 +423,7 @@ static void teleplot_has_the_bounds_of_temperature_once_a_second(void)
     TEST_ASSERT_EQUAL_UINT(3u * 9u, occurrences(">low"));
 }
 
-static void off_says_nothing_and_bad_settings_are_refused(void)
+TEST(off_says_nothing_and_bad_settings_are_refused)
 {
     tick_at(0, 0);
     TEST_ASSERT_EQUAL_UINT(0, said_length);
@@ -478,29 +431,4 @@ static void off_says_nothing_and_bad_settings_are_refused(void)
     TEST_ASSERT_FALSE(telemetry_set(&telemetry, TELEMETRY_CSV, 0));
     TEST_ASSERT_FALSE(telemetry_set(&telemetry, TELEMETRY_CSV, 51));
     TEST_ASSERT_EQUAL_UINT8(TELEMETRY_OFF, telemetry.format);
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(header_and_line_have_as_many_columns);
-    RUN_TEST(the_longest_line_fits_what_is_asked_for);
-    RUN_TEST(a_line_without_room_is_dropped_whole_and_counted);
-    RUN_TEST(every_rate_gives_that_many_lines_a_second);
-    RUN_TEST(teleplot_lines_are_name_ms_value);
-    RUN_TEST(a_round_of_teleplot_goes_on_where_it_found_no_room);
-    RUN_TEST(what_of_a_round_found_no_room_is_dropped_and_every_spring_has_its_turn);
-    RUN_TEST(csv_tells_a_limit_once_when_it_begins_and_once_when_it_ends);
-    RUN_TEST(csv_tells_again_when_the_cut_has_changed_by_half_an_ampere);
-    RUN_TEST(csv_tells_each_sight_once_when_it_is_known_what_was_done);
-    RUN_TEST(longest_sight_is_told_whole_and_waits_for_room);
-    RUN_TEST(limits_that_find_no_room_are_told_later);
-    RUN_TEST(limits_that_toggle_are_told_once_a_period_and_take_no_other_springs_turn);
-    RUN_TEST(all_limits_at_once_fit_and_are_told_whole);
-    RUN_TEST(telemetry_that_starts_tells_what_acts);
-    RUN_TEST(teleplot_has_limits_while_they_act_and_once_when_they_have_ended);
-    RUN_TEST(teleplots_longest_lines_are_whole);
-    RUN_TEST(teleplot_has_the_bounds_of_temperature_once_a_second);
-    RUN_TEST(off_says_nothing_and_bad_settings_are_refused);
-    return UNITY_END();
 }

@@ -4,8 +4,8 @@
 #include <stdint.h>
 #include <string.h>
 
+#include "../run_tests.h"
 #include "temperature_ceiling.h"
-#include "unity.h"
 
 #define WHOLE TEMPERATURE_CEILING_WHOLE_SHARE
 
@@ -67,7 +67,7 @@ static float model_c(uint8_t k)
 
 /* Heated through the transformation and cooled again: within 3 K of the exact network, whose
  * kinetics are a cosine. */
-static void it_follows_the_declared_network(void)
+TEST(it_follows_the_declared_network)
 {
     for (int phase = 0; phase < 40; phase++) {
         const bool heats = phase < 20;
@@ -99,13 +99,13 @@ static void declare(float loss, float capacity)
 
 /* Heated, then driven on for as long, beside a twin to which nothing was declared: what is declared
  * makes no warm spring colder, however often it arrives; but hotter, if it is. */
-static void of_warm_springs_the_more_careful_numbers_count(void)
+TEST(of_warm_springs_the_more_careful_numbers_count)
 {
     static const struct {
         float loss, capacity, twin_loss, twin_capacity;
     } row[] = {{1.4f, 1.0f, 1.0f, 1.0f}, {3.4f, 1.0f, 1.0f, 1.0f}, {1.0f, 10.0f, 1.0f, 1.0f},
                {3.4f, 4.0f, 1.0f, 1.0f}, {0.8f, 1.0f, 0.8f, 1.0f}, {1.0f, 0.5f, 1.0f, 0.5f}};
-    for (unsigned n = 0; n < sizeof row / sizeof row[0]; n++) {
+    for (unsigned n = 0; n < ROWS(row); n++) {
         float twin_c[60];
         for (int twin = 1; twin >= 0; twin--) {
             setUp();
@@ -127,10 +127,10 @@ static void of_warm_springs_the_more_careful_numbers_count(void)
 
 /* What is declared by so little more at a time that no single step shows: it goes by the least of
  * all, or up to a fiftieth below it. */
-static void many_small_declarations_escape_no_more_than_one_large_one(void)
+TEST(many_small_declarations_escape_no_more_than_one_large_one)
 {
     static const float step[][2] = {{0.001f, 0.0f}, {0.0005f, 0.002f}, {0.0f, 0.001f}};
-    for (unsigned n = 0; n < sizeof step / sizeof step[0]; n++) {
+    for (unsigned n = 0; n < ROWS(step); n++) {
         setUp();
         run(0.6f, 600000u, 60.0f);
         const temperature_ceiling_declared_t least = temperature_ceiling_declared(&model, 4);
@@ -148,7 +148,7 @@ static void many_small_declarations_escape_no_more_than_one_large_one(void)
 
 /* Back to what it was, all is as before, to a thousandth; and what never was warm goes by what is
  * declared. */
-static void what_was_declared_is_over_when_it_is_taken_back_or_all_are_cold(void)
+TEST(what_was_declared_is_over_when_it_is_taken_back_or_all_are_cold)
 {
     declare(3.4f, 10.0f);
     TEST_ASSERT_EQUAL_UINT16(WHOLE, ceiling.loss_share[4]);
@@ -170,7 +170,7 @@ static void what_was_declared_is_over_when_it_is_taken_back_or_all_are_cold(void
     TEST_ASSERT_EQUAL_UINT16(WHOLE, ceiling.capacity_share[4]);
 }
 
-static void what_flows_to_neighbours_and_plate_is_no_declared_loss(void)
+TEST(what_flows_to_neighbours_and_plate_is_no_declared_loss)
 {
     parameters.plate_coupling_uw_per_k = 700;
     parameters.plate_heat_capacity_mj_per_k = 13000;
@@ -187,7 +187,7 @@ static void what_flows_to_neighbours_and_plate_is_no_declared_loss(void)
 
 /* Half a kelvin of heat beyond austenite start is 0.5 of the 38.8 that a whole transformation
  * takes. */
-static void transformation_begins_at_its_start(void)
+TEST(transformation_begins_at_its_start)
 {
     for (int side = -1; side <= 1; side += 2) {
         setUp();
@@ -202,7 +202,7 @@ static void transformation_begins_at_its_start(void)
 }
 
 /* Each alone, from the edge on. */
-static void two_declarations_contradict_where_no_tolerance_explains_both(void)
+TEST(two_declarations_contradict_where_no_tolerance_explains_both)
 {
     static const struct {
         float loss, capacity;
@@ -212,7 +212,7 @@ static void two_declarations_contradict_where_no_tolerance_explains_both(void)
                {1.55f, 1.0f, 20 * 128, true}, {1.0f, 1.55f, 20 * 128, true},
                {1.0f, 1.0f, 0, false},        {1.0f, 1.0f, -1, true},
                {0.3f, 0.5f, 45 * 128, false}};
-    for (unsigned n = 0; n < sizeof row / sizeof row[0]; n++) {
+    for (unsigned n = 0; n < ROWS(row); n++) {
         setUp();
         run(0.6f, 600000u, 60.0f);
         declare(row[n].loss, row[n].capacity);
@@ -235,7 +235,7 @@ static void two_declarations_contradict_where_no_tolerance_explains_both(void)
 }
 
 /* The smallest heat capacity that the model takes: a step of 0.6 s is far longer than its time. */
-static void it_is_stable_whatever_the_heat_capacity(void)
+TEST(it_is_stable_whatever_the_heat_capacity)
 {
     parameters.heat_capacity_mj_per_k = 20;
     parameters.latent_heat_mj = 0;
@@ -247,7 +247,7 @@ static void it_is_stable_whatever_the_heat_capacity(void)
 
 /* Each number of one step by the equation of the header's network, in double: power in, losses out
  * as the model declares them, the neighbours' excess, the flow's own change taken at its end. */
-static void one_step_is_the_implicit_one(void)
+TEST(one_step_is_the_implicit_one)
 {
     for (int n = 0; n < 12; n++) {
         setUp();
@@ -288,7 +288,7 @@ static void one_step_is_the_implicit_one(void)
 }
 
 /* 0.64 of what the declared circuit gives an austenite, less the diode's drop. */
-static void power_of_a_duty_is_of_the_declared_circuit(void)
+TEST(power_of_a_duty_is_of_the_declared_circuit)
 {
     current_control_parameters_t circuit;
     current_control_parameters_default(&circuit);
@@ -310,7 +310,7 @@ static void power_of_a_duty_is_of_the_declared_circuit(void)
 
 /* Nine tenths: the rise that trips the ceiling over the one that trips the model; and its own end.
  */
-static void it_trips_a_ninth_above_the_rise_that_trips_the_model(void)
+TEST(it_trips_a_ninth_above_the_rise_that_trips_the_model)
 {
     static const int16_t ambient_c[] = {0, 20, 35};
     for (int n = 0; n < 3; n++) {
@@ -328,7 +328,7 @@ static void it_trips_a_ninth_above_the_rise_that_trips_the_model(void)
     }
 }
 
-static void it_ends_at_its_highest_and_lowest(void)
+TEST(it_ends_at_its_highest_and_lowest)
 {
     run(50.0f, 0, 120.0f);
     TEST_ASSERT_EQUAL_FLOAT(215.0f, temperature_ceiling_c(&ceiling, 0));
@@ -337,7 +337,7 @@ static void it_ends_at_its_highest_and_lowest(void)
 }
 
 /* Since power above a sensor's offset: turns of its own; and never before there was any. */
-static void rest_is_counted_from_the_last_power(void)
+TEST(rest_is_counted_from_the_last_power)
 {
     TEST_ASSERT_EQUAL_UINT16(TEMPERATURE_CEILING_NEVER, temperature_ceiling_rest_s(&ceiling, 4));
     run(0.01f, 0, 6.0f);
@@ -355,7 +355,7 @@ static void rest_is_counted_from_the_last_power(void)
 }
 
 /* Each bit of each spring's record, and of the ambient: it is as hot as it may be, and counted. */
-static void whatever_bit_turns_over_it_is_taken_to_be_hot(void)
+TEST(whatever_bit_turns_over_it_is_taken_to_be_hot)
 {
     uint8_t *const fields[] = {
         (uint8_t *)&ceiling.temperature_c23[4], (uint8_t *)&ceiling.austenite[4],
@@ -399,7 +399,7 @@ static void whatever_bit_turns_over_it_is_taken_to_be_hot(void)
     TEST_ASSERT_EQUAL_UINT8(0, temperature_ceiling_broken_seals(&ceiling));
 }
 
-static void begin_forgets_all_that_was(void)
+TEST(begin_forgets_all_that_was)
 {
     run(0.6f, 600000u, 60.0f);
     for (uint8_t k = 0; k < 9; k++) {
@@ -418,7 +418,7 @@ static void begin_forgets_all_that_was(void)
 }
 
 /* Warm is what power was given to and is still so far above the warmest air that was told. */
-static void warm_is_what_was_heated_and_has_not_cooled(void)
+TEST(warm_is_what_was_heated_and_has_not_cooled)
 {
     for (uint8_t k = 0; k < 9; k += 4) {
         temperature_ceiling_begin(&ceiling, 20 * 128);
@@ -437,7 +437,7 @@ static void warm_is_what_was_heated_and_has_not_cooled(void)
 
 /* A model that is told to be hotter takes the ceiling with it, spring by spring, and that is heat.
  */
-static void a_hotter_model_raises_it_and_a_colder_one_does_not(void)
+TEST(a_hotter_model_raises_it_and_a_colder_one_does_not)
 {
     for (uint8_t k = 0; k < 9; k += 4) {
         setUp();
@@ -461,7 +461,7 @@ static void a_hotter_model_raises_it_and_a_colder_one_does_not(void)
 }
 
 /* The air's warmest counts while anything is warm, and what is told after that. */
-static void warmest_air_counts_until_all_are_cold(void)
+TEST(warmest_air_counts_until_all_are_cold)
 {
     for (uint8_t k = 0; k < 9; k += 4) {
         setUp();
@@ -499,7 +499,7 @@ static void warmest_air_counts_until_all_are_cold(void)
 
 /* It loses what is declared where it is, less what the air has cooled by since: as fast as a twin
  * that is colder by as much. */
-static void it_gives_off_what_is_declared_in_the_warmest_air(void)
+TEST(it_gives_off_what_is_declared_in_the_warmest_air)
 {
     for (int16_t cooler_c7 = -256; cooler_c7 <= 256; cooler_c7 = (int16_t)(cooler_c7 + 128)) {
         setUp();
@@ -513,29 +513,4 @@ static void it_gives_off_what_is_declared_in_the_warmest_air(void)
         temperature_ceiling_step(&ceiling, &model, 4, (float)held_w);
         TEST_ASSERT_FLOAT_WITHIN(1e-4f, 60.0f, temperature_ceiling_c(&ceiling, 4));
     }
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(it_follows_the_declared_network);
-    RUN_TEST(of_warm_springs_the_more_careful_numbers_count);
-    RUN_TEST(many_small_declarations_escape_no_more_than_one_large_one);
-    RUN_TEST(what_was_declared_is_over_when_it_is_taken_back_or_all_are_cold);
-    RUN_TEST(transformation_begins_at_its_start);
-    RUN_TEST(two_declarations_contradict_where_no_tolerance_explains_both);
-    RUN_TEST(what_flows_to_neighbours_and_plate_is_no_declared_loss);
-    RUN_TEST(it_is_stable_whatever_the_heat_capacity);
-    RUN_TEST(one_step_is_the_implicit_one);
-    RUN_TEST(power_of_a_duty_is_of_the_declared_circuit);
-    RUN_TEST(it_trips_a_ninth_above_the_rise_that_trips_the_model);
-    RUN_TEST(it_ends_at_its_highest_and_lowest);
-    RUN_TEST(rest_is_counted_from_the_last_power);
-    RUN_TEST(whatever_bit_turns_over_it_is_taken_to_be_hot);
-    RUN_TEST(begin_forgets_all_that_was);
-    RUN_TEST(warm_is_what_was_heated_and_has_not_cooled);
-    RUN_TEST(a_hotter_model_raises_it_and_a_colder_one_does_not);
-    RUN_TEST(warmest_air_counts_until_all_are_cold);
-    RUN_TEST(it_gives_off_what_is_declared_in_the_warmest_air);
-    return UNITY_END();
 }

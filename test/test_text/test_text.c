@@ -1,13 +1,10 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "../run_tests.h"
 #include "text.h"
-#include "unity.h"
 
-void setUp(void) {}
-void tearDown(void) {}
-
-static void formats_fixed_decimals(void)
+TEST(formats_fixed_decimals)
 {
     static const struct {
         int32_t value;
@@ -22,7 +19,7 @@ static void formats_fixed_decimals(void)
                  {INT32_MAX, 0, "2147483647"},
                  {INT32_MIN, 0, "-2147483648"},
                  {INT32_MIN, 9, "-2.147483648"}};
-    for (unsigned i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+    for (unsigned i = 0; i < ROWS(cases); i++) {
         char text[TEXT_DECIMAL_SIZE];
         TEST_ASSERT_EQUAL_UINT8(strlen(cases[i].text),
                                 text_format_decimal(cases[i].value, cases[i].decimals, text));
@@ -30,7 +27,7 @@ static void formats_fixed_decimals(void)
     }
 }
 
-static void what_is_formatted_parses_back(void)
+TEST(what_is_formatted_parses_back)
 {
     uint32_t seed = 1;
     for (unsigned i = 0; i < 100000; i++) {
@@ -49,11 +46,11 @@ static void what_is_formatted_parses_back(void)
     }
 }
 
-static void refuses_what_is_no_number(void)
+TEST(refuses_what_is_no_number)
 {
     static const char *const bad[] = {"",   "-",  "+",   ".",      "1.2.3", "1e3", "0x1",   "nan",
                                       " 1", "1 ", "--1", "1.2345", "1,5",   "inf", "1.0001"};
-    for (unsigned i = 0; i < sizeof bad / sizeof bad[0]; i++) {
+    for (unsigned i = 0; i < ROWS(bad); i++) {
         int32_t value = 77;
         TEST_ASSERT_EQUAL_MESSAGE(TEXT_NOT_A_NUMBER, text_parse_decimal(bad[i], 3, &value), bad[i]);
         TEST_ASSERT_EQUAL_INT32(77, value);
@@ -68,7 +65,7 @@ static void refuses_what_is_no_number(void)
     TEST_ASSERT_EQUAL_INT32(1500, value);
 }
 
-static void a_full_line_is_cut_not_overrun(void)
+TEST(a_full_line_is_cut_not_overrun)
 {
     char bytes[9];
     text_line_t line;
@@ -81,7 +78,7 @@ static void a_full_line_is_cut_not_overrun(void)
     TEST_ASSERT_EQUAL_STRING_LEN("abc-123.#", bytes, 9);
 }
 
-static void values_stand_where_the_text_has_marks(void)
+TEST(values_stand_where_the_text_has_marks)
 {
     char bytes[40] = {0};
     text_line_t line;
@@ -92,7 +89,7 @@ static void values_stand_where_the_text_has_marks(void)
     TEST_ASSERT_EQUAL_STRING("-5|t:1.234 s, 0.7% #1", bytes);
 }
 
-static void an_item_is_found_by_counting(void)
+TEST(an_item_is_found_by_counting)
 {
     static const char texts[] FLASH_MEMORY = "one\0\0three";
     TEST_ASSERT_EQUAL_STRING("one", text_item(texts, 0));
@@ -100,23 +97,10 @@ static void an_item_is_found_by_counting(void)
     TEST_ASSERT_EQUAL_STRING("three", text_item(texts, 2));
 }
 
-static void q97_becomes_hundredths(void)
+TEST(q97_becomes_hundredths)
 {
     TEST_ASSERT_EQUAL_INT16(2000, text_centi_from_c7(20 * 128));
     TEST_ASSERT_EQUAL_INT16(-4000, text_centi_from_c7(-40 * 128));
     TEST_ASSERT_EQUAL_INT16(1, text_centi_from_c7(1));
     TEST_ASSERT_EQUAL_INT16(21500, text_centi_from_c7(215 * 128));
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(formats_fixed_decimals);
-    RUN_TEST(what_is_formatted_parses_back);
-    RUN_TEST(refuses_what_is_no_number);
-    RUN_TEST(a_full_line_is_cut_not_overrun);
-    RUN_TEST(values_stand_where_the_text_has_marks);
-    RUN_TEST(an_item_is_found_by_counting);
-    RUN_TEST(q97_becomes_hundredths);
-    return UNITY_END();
 }

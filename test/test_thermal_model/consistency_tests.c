@@ -8,7 +8,7 @@
 /* ---- conservation, symmetry --------------------------------------------------------------------
  */
 
-static void no_heat_from_nothing(void)
+TEST(no_heat_from_nothing)
 {
     parameters.loss_rise_ppm_per_k = 3000;
     parameters.radiating_area_cmm2 = 11080;
@@ -24,7 +24,7 @@ static void no_heat_from_nothing(void)
     TEST_ASSERT_EQUAL_MEMORY(&before, &after, sizeof before);
 }
 
-static void rotating_the_pattern_rotates_the_temperatures(void)
+TEST(rotating_the_pattern_rotates_the_temperatures)
 {
     parameters.air_exchange_uw_per_k = 60000;
     parameters.plate_coupling_uw_per_k = 500;
@@ -69,7 +69,7 @@ static void rotating_the_pattern_rotates_the_temperatures(void)
     }
 }
 
-static void equal_springs_stay_equal_whatever_the_size(void)
+TEST(equal_springs_stay_equal_whatever_the_size)
 {
     for (uint8_t rows = 1; rows <= 8; rows++) {
         for (uint8_t columns = 1; columns <= 8; columns++) {
@@ -95,7 +95,7 @@ static void equal_springs_stay_equal_whatever_the_size(void)
 /* ---- an effect at zero is no effect ------------------------------------------------------------
  */
 
-static void an_absent_effect_leaves_no_trace(void)
+TEST(an_absent_effect_leaves_no_trace)
 {
     thermal_model_state_t state[5];
     for (int k = 0; k < 5; k++) {
@@ -165,7 +165,7 @@ static void corner(unsigned bits)
 
 /* Hot neighbours must not cool a spring, cold ones not heat it, whatever the parameters: a wrapped
  * flow would. */
-static void no_accepted_corner_wraps(void)
+TEST(no_accepted_corner_wraps)
 {
     unsigned accepted = 0;
     for (unsigned bits = 0; bits < 65536u; bits++) {
@@ -203,7 +203,7 @@ static void no_accepted_corner_wraps(void)
     TEST_ASSERT_TRUE(accepted > 5000u);
 }
 
-static void random_corners_for_long_stay_consistent(void)
+TEST(random_corners_for_long_stay_consistent)
 {
     for (unsigned round = 0; round < 2000; round++) {
         corner(random_bits());
@@ -227,7 +227,7 @@ static void random_corners_for_long_stay_consistent(void)
     }
 }
 
-static void too_much_power_counts_as_the_highest(void)
+TEST(too_much_power_counts_as_the_highest)
 {
     static const uint32_t much[] = {THERMAL_MODEL_HIGHEST_POWER_UW + 1u, 0x01000000u, 0x04000001u,
                                     UINT32_MAX};
@@ -263,7 +263,7 @@ static void refused(thermal_model_status_t status, uint16_t row)
     refused(THERMAL_MODEL_ERROR_##status, PARAMETER_##name)
 
 /* A value outside its own limits: test_parameters has each of them. */
-static void what_does_not_fit_together_is_refused_by_name(void)
+TEST(what_does_not_fit_together_is_refused_by_name)
 {
     start();
     REFUSED(RANGE, rows, rows, 0);
@@ -315,7 +315,7 @@ static void what_does_not_fit_together_is_refused_by_name(void)
     refused(THERMAL_MODEL_ERROR_UNSTABLE, PARAMETER_heat_capacity_j_per_k);
 }
 
-static void state_survives_and_garbage_does_not_enter(void)
+TEST(state_survives_and_garbage_does_not_enter)
 {
     start();
     power_uw[0] = 600000;
@@ -354,7 +354,7 @@ static void state_survives_and_garbage_does_not_enter(void)
 
 /* From any phase and temperature of one transformation into any other: where that has room for it,
  * all is as it was; what it cannot be is at its nearest. */
-static void another_declaration_keeps_phase_and_temperature(void)
+TEST(another_declaration_keeps_phase_and_temperature)
 {
     static const int16_t points_cc[][4] = {
         {6800, 7800, 8800, 9800}, {6600, 7600, 8500, 9800}, {4000, 9000, 9000, 12000}};
@@ -414,19 +414,4 @@ static void another_declaration_keeps_phase_and_temperature(void)
     const thermal_model_t before = model;
     TEST_ASSERT_EQUAL(THERMAL_MODEL_ERROR_RANGE, thermal_model_declare(&model, &parameters, NULL));
     TEST_ASSERT_EQUAL_MEMORY(&before, &model, sizeof before);
-}
-
-void run_consistency_tests(void)
-{
-    Unity.TestFile = __FILE__;
-    RUN_TEST(no_heat_from_nothing);
-    RUN_TEST(rotating_the_pattern_rotates_the_temperatures);
-    RUN_TEST(equal_springs_stay_equal_whatever_the_size);
-    RUN_TEST(an_absent_effect_leaves_no_trace);
-    RUN_TEST(no_accepted_corner_wraps);
-    RUN_TEST(random_corners_for_long_stay_consistent);
-    RUN_TEST(too_much_power_counts_as_the_highest);
-    RUN_TEST(what_does_not_fit_together_is_refused_by_name);
-    RUN_TEST(state_survives_and_garbage_does_not_enter);
-    RUN_TEST(another_declaration_keeps_phase_and_temperature);
 }

@@ -13,7 +13,6 @@ void setUp(void)
     memset(power_uw, 0, sizeof power_uw);
     random_state = 11;
 }
-void tearDown(void) {}
 
 uint32_t random_bits(void)
 {

@@ -4,8 +4,8 @@
 #ifndef DRIVEN_MODEL_H
 #define DRIVEN_MODEL_H
 
+#include "../run_tests.h"
 #include "thermal_model.h"
-#include "unity.h"
 
 extern thermal_model_parameters_t parameters;
 extern thermal_model_t model;
@@ -19,7 +19,5 @@ void run(uint32_t steps);
 double degrees(uint8_t spring);
 double phase(uint8_t spring);
 int16_t c7(double temperature_c);
-
-void run_consistency_tests(void);
 
 #endif

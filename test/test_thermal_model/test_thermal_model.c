@@ -2,15 +2,13 @@
 
 #include "driven_model.h"
 
-static char where[40];
-
 /* ---- figures by hand ---------------------------------------------------------------------------
  */
 
 /* A row of springs, and what each power makes of it: where it settles, and after one time constant,
  * 0.3 J/K / 5.8 mW/K = 51.7 s. Random arrays against another integration:
  * test/host_fixed_vs_double. */
-static void row_of_springs_comes_to_what_is_computed_by_hand(void)
+TEST(row_of_springs_comes_to_what_is_computed_by_hand)
 {
     enum {
         HALF = PARAMETER_fan_half_share,
@@ -51,7 +49,7 @@ static void row_of_springs_comes_to_what_is_computed_by_hand(void)
         /* what the wake brings was taken from the air: 0.5 W / 20 mW/K */
         {3, 100, 20000, {500000}, {{AIR, 20000}, {WAKE, 5000}}, {0}, 45, 0},
     };
-    for (size_t n = 0; n < sizeof table / sizeof table[0]; n++) {
+    for (size_t n = 0; n < ROWS(table); n++) {
         setUp();
         parameters.rows = 1;
         parameters.columns = table[n].columns;
@@ -64,23 +62,22 @@ static void row_of_springs_comes_to_what_is_computed_by_hand(void)
         power_uw[0] = table[n].uw[0];
         power_uw[1] = table[n].uw[1];
         run(table[n].steps);
-        (void)snprintf(where, sizeof where, "row %u", (unsigned)n);
+        here("row %u", (unsigned)n);
         for (uint8_t k = 0; k < 3 && table[n].c[k] > 0.0; k++) {
-            TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(0.03, table[n].c[k], degrees(k), where);
+            TEST_ASSERT_DOUBLE_WITHIN(0.03, table[n].c[k], degrees(k));
         }
         if (table[n].air_c > 0.0) {
-            TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(0.03, table[n].air_c,
-                                              thermal_model_air_c7(&model) / 128.0, where);
+            TEST_ASSERT_DOUBLE_WITHIN(0.03, table[n].air_c, thermal_model_air_c7(&model) / 128.0);
         }
         if (table[n].plate_c > 0.0) {
-            TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(0.1, table[n].plate_c,
-                                              thermal_model_plate_c7(&model) / 128.0, where);
+            TEST_ASSERT_DOUBLE_WITHIN(0.1, table[n].plate_c,
+                                      thermal_model_plate_c7(&model) / 128.0);
         }
     }
 }
 
 /* Whatever the curve: what was declared at 0 and 100 %, between ever more. */
-static void a_fan_that_blows_harder_never_cools_less(void)
+TEST(a_fan_that_blows_harder_never_cools_less)
 {
     parameters.rows = parameters.columns = 1;
     parameters.wake_uw_per_k = 1000;
@@ -104,7 +101,7 @@ static void a_fan_that_blows_harder_never_cools_less(void)
     }
 }
 
-static void air_without_capacity_follows_at_once(void)
+TEST(air_without_capacity_follows_at_once)
 {
     parameters.air_exchange_uw_per_k = 60000;
     parameters.air_heat_capacity_mj_per_k = 0;
@@ -117,7 +114,7 @@ static void air_without_capacity_follows_at_once(void)
 }
 
 /* the air's own time is 0.07 s, a step 0.1 s: it must neither overshoot nor ring */
-static void air_quicker_than_a_step_does_not_ring(void)
+TEST(air_quicker_than_a_step_does_not_ring)
 {
     parameters.air_exchange_uw_per_k = 60000;
     parameters.air_heat_capacity_mj_per_k = 8;
@@ -138,7 +135,7 @@ static void air_quicker_than_a_step_does_not_ring(void)
 
 /* Liang and Rogers: 78, 88 and 68, 98: halfway up at 93, halfway down at 73; and so much higher
  * where a spring's loop is shifted. */
-static void phase_follows_the_cosine_and_its_minor_loops(void)
+TEST(phase_follows_the_cosine_and_its_minor_loops)
 {
     static const double path[][2] = {
         {87.9, 0},      {93, 0.5},   {95.5, 0.85355}, /* (1 - cos 135) / 2 */
@@ -157,17 +154,17 @@ static void phase_follows_the_cosine_and_its_minor_loops(void)
                                 thermal_model_transformation(&model, k).martensite_finish_c7);
         TEST_ASSERT_EQUAL_INT16(c7(88 + shift_k[k]),
                                 thermal_model_transformation(&model, k).austenite_start_c7);
-        for (size_t n = 0; n < sizeof path / sizeof path[0]; n++) {
+        for (size_t n = 0; n < ROWS(path); n++) {
             thermal_model_set_temperature(&model, k, c7(path[n][0] + shift_k[k]));
-            (void)snprintf(where, sizeof where, "spring %d at %.1f", k + 1, path[n][0]);
-            TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(0.002, path[n][1], phase(k), where);
+            here("spring %d at %.1f", k + 1, path[n][0]);
+            TEST_ASSERT_DOUBLE_WITHIN(0.002, path[n][1], phase(k));
         }
     }
 }
 
 /* By phase, with either sign; 1500 ppm/K of 175 mohm over 60 K is 15.75 mohm, 500 ppm/K of 219 mohm
  * over 90 K 9.855 mohm. */
-static void resistance_follows_phase_and_temperature(void)
+TEST(resistance_follows_phase_and_temperature)
 {
     static const struct {
         uint32_t martensite_uohm, austenite_uohm;
@@ -184,16 +181,16 @@ static void resistance_follows_phase_and_temperature(void)
                  {175000, 219000, {1500, 500}, 110, 228855},
                  {175000, 219000, {-3000, 500}, 80, 143500},
                  {175000, 175000, {0, 0}, 110, 175000}};
-    for (size_t n = 0; n < sizeof table / sizeof table[0]; n++) {
+    for (size_t n = 0; n < ROWS(table); n++) {
         parameters.resistance_martensite_uohm = table[n].martensite_uohm;
         parameters.resistance_austenite_uohm = table[n].austenite_uohm;
         parameters.resistance_martensite_rise_ppm_per_k = table[n].rise_ppm[0];
         parameters.resistance_austenite_rise_ppm_per_k = table[n].rise_ppm[1];
         start();
         thermal_model_set_temperature(&model, 0, c7(table[n].c));
-        (void)snprintf(where, sizeof where, "row %u", (unsigned)n);
-        TEST_ASSERT_UINT32_WITHIN_MESSAGE(20u + table[n].is_uohm / 1000u, table[n].is_uohm,
-                                          thermal_model_resistance_uohm(&model, 0), where);
+        here("row %u", (unsigned)n);
+        TEST_ASSERT_UINT32_WITHIN(20u + table[n].is_uohm / 1000u, table[n].is_uohm,
+                                  thermal_model_resistance_uohm(&model, 0));
     }
     parameters.resistance_austenite_uohm = 219000; /* half of each, at 60 degC */
     parameters.resistance_martensite_rise_ppm_per_k = 1500;
@@ -204,7 +201,7 @@ static void resistance_follows_phase_and_temperature(void)
 }
 
 /* 1 A through 20 mohm: 20 mV and 20 mW that the spring does not get. */
-static void contact_is_seen_in_the_resistance_and_not_in_the_heat(void)
+TEST(contact_is_seen_in_the_resistance_and_not_in_the_heat)
 {
     parameters.contact_uohm[2] = 20000;
     start();
@@ -215,7 +212,7 @@ static void contact_is_seen_in_the_resistance_and_not_in_the_heat(void)
     TEST_ASSERT_EQUAL_UINT32(0, thermal_model_heating_uw(&model, 2, 1000, 10));
 }
 
-static void power_to_hold_holds(void)
+TEST(power_to_hold_holds)
 {
     parameters.air_exchange_uw_per_k = 60000;
     parameters.plate_coupling_uw_per_k = 500;
@@ -238,19 +235,4 @@ static void power_to_hold_holds(void)
     }
     TEST_ASSERT_EQUAL_UINT16(THERMAL_MODEL_AUSTENITE_FULL, thermal_model_austenite(&model, 4));
     TEST_ASSERT_TRUE(thermal_model_power_to_hold_uw(&model, 4, c7(0)) < 0);
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(row_of_springs_comes_to_what_is_computed_by_hand);
-    RUN_TEST(a_fan_that_blows_harder_never_cools_less);
-    RUN_TEST(air_without_capacity_follows_at_once);
-    RUN_TEST(air_quicker_than_a_step_does_not_ring);
-    RUN_TEST(phase_follows_the_cosine_and_its_minor_loops);
-    RUN_TEST(resistance_follows_phase_and_temperature);
-    RUN_TEST(contact_is_seen_in_the_resistance_and_not_in_the_heat);
-    RUN_TEST(power_to_hold_holds);
-    run_consistency_tests();
-    return UNITY_END();
 }

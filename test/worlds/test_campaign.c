@@ -5,7 +5,7 @@
 #include <math.h>
 #include <string.h>
 
-#include <unity.h>
+#include "../run_tests.h"
 
 #include "campaign.h"
 #include "run.h"
@@ -62,7 +62,7 @@ static void heat_to_austenite(int spring)
     }
 }
 
-static void a_spring_that_falls_silently_is_counted_beyond_20_s(void)
+TEST(a_spring_that_falls_silently_is_counted_beyond_20_s)
 {
     heat_to_austenite(4);
     double reached_s = world_time_s(world);
@@ -76,7 +76,7 @@ static void a_spring_that_falls_silently_is_counted_beyond_20_s(void)
     TEST_ASSERT_DOUBLE_WITHIN(0.11, lost_s - 20.0, spring->silent_s);
 }
 
-static void a_spring_that_falls_with_a_fault_is_not_silent(void)
+TEST(a_spring_that_falls_with_a_fault_is_not_silent)
 {
     heat_to_austenite(4);
     controller_emergency_stop(&controller);
@@ -85,7 +85,7 @@ static void a_spring_that_falls_with_a_fault_is_not_silent(void)
     TEST_ASSERT_EQUAL_DOUBLE(0.0, score.spring[4].silent_s);
 }
 
-static void a_spring_that_is_never_heated_is_late_for_ever_and_silent_once_it_is_due(void)
+TEST(a_spring_that_is_never_heated_is_late_for_ever_and_silent_once_it_is_due)
 {
     run_s(4, 0, 100.0);
     score_end(&score);
@@ -93,7 +93,7 @@ static void a_spring_that_is_never_heated_is_late_for_ever_and_silent_once_it_is
     TEST_ASSERT_DOUBLE_WITHIN(0.3, 100.0 - ALLOWED_S - 20.0, score.spring[4].silent_s);
 }
 
-static void a_report_counts_from_where_it_stands_to_the_end(void)
+TEST(a_report_counts_from_where_it_stands_to_the_end)
 {
     run_s(4, 0, 10.0);
     controller_emergency_stop(&controller);
@@ -107,7 +107,7 @@ static void a_report_counts_from_where_it_stands_to_the_end(void)
     TEST_ASSERT_EQUAL_DOUBLE(0.0, score.spring[4].silent_s);
 }
 
-static void after_a_restart_it_must_be_reached_again(void)
+TEST(after_a_restart_it_must_be_reached_again)
 {
     heat_to_austenite(4);
     double first_s = score.spring[4].settled_s;
@@ -123,7 +123,7 @@ static void after_a_restart_it_must_be_reached_again(void)
                               score.spring[4].settled_s);
 }
 
-static void an_undriven_spring_that_transforms_is_seen(void)
+TEST(an_undriven_spring_that_transforms_is_seen)
 {
     run_s(0, 0, 1.0);
     TEST_ASSERT_EQUAL_DOUBLE(0.0, score.spring[0].undriven_most);
@@ -134,7 +134,7 @@ static void an_undriven_spring_that_transforms_is_seen(void)
 }
 
 /* Held below austenite start, then heated above it, again and again. */
-static void reheats_are_counted_once_settled(void)
+TEST(reheats_are_counted_once_settled)
 {
     heat_to_austenite(4);
     int cycles_late = 0;
@@ -167,7 +167,7 @@ static uint16_t duty_above(int spring, double current_a)
     return duty;
 }
 
-static void a_dither_across_the_limit_is_no_reheat(void)
+TEST(a_dither_across_the_limit_is_no_reheat)
 {
     heat_to_austenite(4);
     run_s(4, 93, SCORE_SETTLED_S);
@@ -184,7 +184,7 @@ static void a_dither_across_the_limit_is_no_reheat(void)
 }
 
 /* 'declared' is what every world is drawn from. */
-static void an_array_is_the_same_specimen_in_every_world(void)
+TEST(an_array_is_the_same_specimen_in_every_world)
 {
     run_case_t declared, other;
     campaign_draw(0, 1, 7, 900.0, &declared);
@@ -205,7 +205,7 @@ static void an_array_is_the_same_specimen_in_every_world(void)
                      other.world.spring[3].heat_capacity_j_per_k);
 }
 
-static void patterns_are_of_one_to_nine_springs(void)
+TEST(patterns_are_of_one_to_nine_springs)
 {
     int seen[10] = {0};
     run_case_t run;
@@ -223,7 +223,7 @@ static void patterns_are_of_one_to_nine_springs(void)
     }
 }
 
-static void every_world_runs_and_tells_the_same_twice(void)
+TEST(every_world_runs_and_tells_the_same_twice)
 {
     run_case_t run;
     run_result_t result[2];
@@ -249,7 +249,7 @@ static void hold_until(int spring, double until_s)
     }
 }
 
-static void a_spring_is_lost_after_a_minute_below_90_percent_and_silent_if_nothing_is_said(void)
+TEST(a_spring_is_lost_after_a_minute_below_90_percent_and_silent_if_nothing_is_said)
 {
     hold_until(4, LOSSES_DUE_S + 20.0);
     const losses_spring_t *spring = &losses.spring[4];
@@ -269,7 +269,7 @@ static void a_spring_is_lost_after_a_minute_below_90_percent_and_silent_if_nothi
     TEST_ASSERT_TRUE(isnan(losses.spring[0].lost_at_s)); /* not asked for */
 }
 
-static void a_spring_that_is_lost_with_a_fault_is_lost_but_not_silent(void)
+TEST(a_spring_that_is_lost_with_a_fault_is_lost_but_not_silent)
 {
     run_s(4, 0, LOSSES_DUE_S + 1.0);
     controller_emergency_stop(&controller);
@@ -279,7 +279,7 @@ static void a_spring_that_is_lost_with_a_fault_is_lost_but_not_silent(void)
     TEST_ASSERT_EQUAL_INT(SAFETY_FAULT_EMERGENCY_STOP, losses.spring[4].fault);
 }
 
-static void what_is_said_for_a_moment_ends_no_silence(void)
+TEST(what_is_said_for_a_moment_ends_no_silence)
 {
     run_s(4, 0, LOSSES_DUE_S);
     for (int i = 0; i < 8; i++) {
@@ -303,7 +303,7 @@ static losses_back_t let_go_after_a_step(double let_go_s, double again_s, double
     return losses.spring[4].back;
 }
 
-static void after_a_step_a_spring_is_back_in_two_minutes_and_stays(void)
+TEST(after_a_step_a_spring_is_back_in_two_minutes_and_stays)
 {
     TEST_ASSERT_EQUAL_INT(LOSSES_BACK, let_go_after_a_step(120.0, 160.0, 360.0));
     TEST_ASSERT_EQUAL_INT(LOSSES_NOT_BACK, let_go_after_a_step(120.0, 260.0, 360.0));
@@ -314,7 +314,7 @@ static void after_a_step_a_spring_is_back_in_two_minutes_and_stays(void)
 }
 
 /* Wilson 1927; the table of Newcombe 1998 (method 3). */
-static void shares_have_wilsons_interval(void)
+TEST(shares_have_wilsons_interval)
 {
     shares_t x = shares_wilson(81.0 / 263.0, 263.0);
     TEST_ASSERT_DOUBLE_WITHIN(5e-5, 0.2553, x.low);
@@ -325,7 +325,7 @@ static void shares_have_wilsons_interval(void)
 }
 
 /* Eight springs that are always lost together are one. */
-static void springs_of_a_run_that_go_together_count_for_one(void)
+TEST(springs_of_a_run_that_go_together_count_for_one)
 {
     enum { RUNS = 200 };
     shares_run_t together[RUNS], each[RUNS];
@@ -347,7 +347,7 @@ static void springs_of_a_run_that_go_together_count_for_one(void)
     TEST_ASSERT_TRUE(isnan(shares_share(together, 0).value));
 }
 
-static void a_mean_has_its_runs_scatter(void)
+TEST(a_mean_has_its_runs_scatter)
 {
     const shares_run_t run[] = {{80.0, 1.0}, {164.0, 2.0}, {84.0, 1.0}, {164.0, 2.0}};
     const shares_t x = shares_mean(run, 4);
@@ -360,7 +360,7 @@ static void a_mean_has_its_runs_scatter(void)
 }
 
 /* 900 s: what the events' times are drawn within. */
-static void every_disturbance_is_drawn_as_often_as_is_said(void)
+TEST(every_disturbance_is_drawn_as_often_as_is_said)
 {
     enum { RUNS = 3000 };
     static swarm_case_t swarm;
@@ -414,7 +414,7 @@ static double first_loss_w(world_parameters_t *parameters)
 }
 
 /* By the world itself: with its events of loss at the beginning, and without. */
-static void a_draught_changes_the_whole_loss_by_what_is_said(void)
+TEST(a_draught_changes_the_whole_loss_by_what_is_said)
 {
     static swarm_case_t swarm;
     int seen = 0;
@@ -459,7 +459,7 @@ static int lost_springs(bool gives_up, double *there_s)
     return lost;
 }
 
-static void a_controller_that_never_heats_again_is_seen_and_a_run_is_the_same_twice(void)
+TEST(a_controller_that_never_heats_again_is_seen_and_a_run_is_the_same_twice)
 {
     double there_s, again_s, given_up_s;
     const int lost = lost_springs(false, &there_s);
@@ -476,7 +476,7 @@ static void a_controller_that_never_heats_again_is_seen_and_a_run_is_the_same_tw
  * reheat did not bring back at once stayed lost, and a spring that was hotter than believed was
  * heated to 123 degC. A draught that stays is known by the second spring that it takes: nine were
  * lost, each believed alone. */
-static void what_the_swarm_lost_once_is_not_lost(void)
+TEST(what_the_swarm_lost_once_is_not_lost)
 {
     static const struct {
         uint64_t seed;
@@ -487,7 +487,7 @@ static void what_the_swarm_lost_once_is_not_lost(void)
                  {44, {24, 239, -1, -1, -1}, 2, 0}};
     static swarm_case_t drawn;
     static run_result_t result;
-    for (size_t n = 0; n < sizeof table / sizeof table[0]; n++) {
+    for (size_t n = 0; n < ROWS(table); n++) {
         int lost = 0, silent = 0;
         for (size_t r = 0; r < 5 && table[n].index[r] >= 0; r++) {
             swarm_draw(table[n].seed, table[n].index[r], SWARM_TEST_S, &drawn);
@@ -501,32 +501,4 @@ static void what_the_swarm_lost_once_is_not_lost(void)
         TEST_ASSERT_LESS_OR_EQUAL(table[n].lost, lost);
         TEST_ASSERT_LESS_OR_EQUAL(table[n].silent, silent);
     }
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(a_spring_that_falls_silently_is_counted_beyond_20_s);
-    RUN_TEST(a_spring_that_falls_with_a_fault_is_not_silent);
-    RUN_TEST(a_spring_that_is_never_heated_is_late_for_ever_and_silent_once_it_is_due);
-    RUN_TEST(a_report_counts_from_where_it_stands_to_the_end);
-    RUN_TEST(after_a_restart_it_must_be_reached_again);
-    RUN_TEST(an_undriven_spring_that_transforms_is_seen);
-    RUN_TEST(reheats_are_counted_once_settled);
-    RUN_TEST(a_dither_across_the_limit_is_no_reheat);
-    RUN_TEST(an_array_is_the_same_specimen_in_every_world);
-    RUN_TEST(patterns_are_of_one_to_nine_springs);
-    RUN_TEST(every_world_runs_and_tells_the_same_twice);
-    RUN_TEST(a_spring_is_lost_after_a_minute_below_90_percent_and_silent_if_nothing_is_said);
-    RUN_TEST(a_spring_that_is_lost_with_a_fault_is_lost_but_not_silent);
-    RUN_TEST(what_is_said_for_a_moment_ends_no_silence);
-    RUN_TEST(after_a_step_a_spring_is_back_in_two_minutes_and_stays);
-    RUN_TEST(shares_have_wilsons_interval);
-    RUN_TEST(springs_of_a_run_that_go_together_count_for_one);
-    RUN_TEST(a_mean_has_its_runs_scatter);
-    RUN_TEST(every_disturbance_is_drawn_as_often_as_is_said);
-    RUN_TEST(a_draught_changes_the_whole_loss_by_what_is_said);
-    RUN_TEST(what_the_swarm_lost_once_is_not_lost);
-    RUN_TEST(a_controller_that_never_heats_again_is_seen_and_a_run_is_the_same_twice);
-    return UNITY_END();
 }

@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include <unity.h>
+#include "../run_tests.h"
 
 #include "world.h"
 
@@ -66,7 +66,7 @@ static void hold_power_w(double w)
 
 /* Every heat path at once. What the wires hold, what came in and what went out must agree to what
  * the solver may leave in each node. */
-static void energy_closes_in_every_law(void)
+TEST(energy_closes_in_every_law)
 {
     for (int law = 0; law < KINETICS_COUNT; law++) {
         setUp();
@@ -118,7 +118,7 @@ static double given_off_w(world_convection_t convection, double rise_k, double m
     return w;
 }
 
-static void both_laws_of_convection_lose_what_is_declared_where_it_is_declared(void)
+TEST(both_laws_of_convection_lose_what_is_declared_where_it_is_declared)
 {
     for (int law = 0; law < WORLD_CONVECTION_COUNT; law++) {
         const world_convection_t convection = (world_convection_t)law;
@@ -132,7 +132,7 @@ static void both_laws_of_convection_lose_what_is_declared_where_it_is_declared(v
                           given_off_w(WORLD_CONVECTION_CHURCHILL, 30.0, 1.0)) > 1e-3);
 }
 
-static void moved_air_carries_off_as_much_more_as_is_said(void)
+TEST(moved_air_carries_off_as_much_more_as_is_said)
 {
     const double still_w = given_off_w(WORLD_CONVECTION_MORGAN, WORLD_LOSS_RISE_K, 1.0);
     const double none_w = given_off_w(WORLD_CONVECTION_MORGAN, WORLD_LOSS_RISE_K, 0.0);
@@ -152,7 +152,7 @@ static void moved_air_carries_off_as_much_more_as_is_said(void)
 }
 
 /* Without any loss, the heat that leads from 20 degC martensite to 110 degC austenite is known. */
-static void transforming_takes_the_latent_heat(void)
+TEST(transforming_takes_the_latent_heat)
 {
     single_spring();
     parameters.spring[0].loss_w_per_k = 0.0;
@@ -169,30 +169,10 @@ static void transforming_takes_the_latent_heat(void)
     TEST_ASSERT_DOUBLE_WITHIN(0.02, 0.300 * (world_mean_c(world, 0) - 20.0) + 8.65, supplied_j);
 }
 
-/* docs/physics.md: near 5.8 mW/K holds 105 degC at 0.493 W; by convection's law less per kelvin
- * lower. */
-static void loss_is_as_declared_at_105_and_less_per_kelvin_below(void)
-{
-    single_spring();
-    make_world();
-    double w_per_k[2];
-    const double power_w[2] = {0.0058 * 85.0, 0.20};
-    for (int i = 0; i < 2; i++) {
-        for (int s = 0; s < 900; s++) {
-            hold_power_w(power_w[i]);
-            run_s(1.0);
-        }
-        w_per_k[i] = wire_w(0.0) / (world_mean_c(world, 0) - 20.0);
-    }
-    TEST_ASSERT_DOUBLE_WITHIN(0.00003, 0.0058, w_per_k[0]);
-    /* at about 38 K: convection (38/85)^0.148 of 89 %, radiation 0.8 of 8 % */
-    TEST_ASSERT_DOUBLE_WITHIN(0.0001, 0.00522, w_per_k[1]);
-}
-
 /* Steady, below the transformation (in it the middle's higher resistance would add to this): all
  * thirds make the same heat. An end is colder by what its crimp takes, over what the difference
  * brings it: less loss of its own, and the wire, thrice, for the middle gives to both ends. */
-static void crimped_ends_are_colder_by_what_the_crimps_take(void)
+TEST(crimped_ends_are_colder_by_what_the_crimps_take)
 {
     single_spring();
     make_world();
@@ -209,7 +189,7 @@ static void crimped_ends_are_colder_by_what_the_crimps_take(void)
     TEST_ASSERT_EQUAL_DOUBLE(middle_c, world_hottest_c(world, 0));
 }
 
-static void a_heated_spring_warms_orthogonal_neighbours_most(void)
+TEST(a_heated_spring_warms_orthogonal_neighbours_most)
 {
     make_world();
     outputs.duty[4] = 80;
@@ -221,35 +201,8 @@ static void a_heated_spring_warms_orthogonal_neighbours_most(void)
     TEST_ASSERT_DOUBLE_WITHIN(1e-9, world_mean_c(world, 0), world_mean_c(world, 8));
 }
 
-static void hold_current_a(int first, int last, double a, double seconds)
-{
-    for (double s = 0.0; s < seconds; s += 1.0) {
-        for (int k = first; k <= last; k++) {
-            double ohm = world_resistance_ohm(world, k) + parameters.loop_ohm;
-            outputs.duty[k] = (uint16_t)lround(a * ohm / parameters.supply_v * 800.0);
-        }
-        run_s(1.0);
-    }
-}
-
-/* docs/physics.md: 1.5 A settles a cold spring alone in the array at 63 to 75 degC. All nine
- * have a current that does not transform them, and with slightly more they run past 104. */
-static void constant_current_is_unstable_through_the_transformation(void)
-{
-    make_world();
-    hold_current_a(4, 4, 1.5, 1800.0);
-    TEST_ASSERT_DOUBLE_WITHIN(6.0, 69.0, world_mean_c(world, 4));
-    TEST_ASSERT_EQUAL_DOUBLE(0.0, world_austenite(world, 4));
-    make_world();
-    hold_current_a(0, 8, 1.42, 1800.0);
-    TEST_ASSERT_TRUE(world_mean_c(world, 4) < 88.0 && world_austenite(world, 4) < 0.05);
-    make_world();
-    hold_current_a(0, 8, 1.5, 1800.0);
-    TEST_ASSERT_TRUE(world_mean_c(world, 4) > 104.0 && world_austenite(world, 4) > 0.99);
-}
-
 /* A tenth of the step changes next to nothing: heating, transforming, cooling, a minor loop. */
-static void a_finer_step_tells_the_same(void)
+TEST(a_finer_step_tells_the_same)
 {
     for (int law = 0; law < KINETICS_COUNT; law++) {
         double c[2][8], austenite[2][8];
@@ -300,7 +253,7 @@ static double austenite_after(kinetics_law_t law, const double path_c[], int poi
 
 /* What is left half way: cosine and the relays' distribution 1/2, a line 1/2, 1 % to the power 1/2.
  * A heating that is interrupted goes on where it was; nothing moves between the branches. */
-static void each_law_has_its_own_major_loop_and_rests_between_its_branches(void)
+TEST(each_law_has_its_own_major_loop_and_rests_between_its_branches)
 {
     const double full = 1.0 - pow(0.01, 3.2); /* of an exponential at 120 degC */
     const struct {
@@ -318,7 +271,7 @@ static void each_law_has_its_own_major_loop_and_rests_between_its_branches(void)
         {{20, 93, 80, 93}, 4, 0.5, 0.9},
     };
     for (int law = 0; law <= KINETICS_PREISACH; law++) {
-        for (size_t n = 0; n < sizeof table / sizeof table[0]; n++) {
+        for (size_t n = 0; n < ROWS(table); n++) {
             TEST_ASSERT_DOUBLE_WITHIN(
                 1e-9, law == KINETICS_EXPONENTIAL ? table[n].tails : table[n].straight,
                 austenite_after((kinetics_law_t)law, table[n].path_c, table[n].points));
@@ -342,7 +295,7 @@ static void each_law_has_its_own_major_loop_and_rests_between_its_branches(void)
 
 /* Return-point memory: loops within loops come back to where they left, and a wider swing forgets
  * them. Phase between the turning points differs, or the loop would be empty. */
-static void minor_loops_close_in_preisach(void)
+TEST(minor_loops_close_in_preisach)
 {
     const double outer[] = {20, 120, 72}, loop[] = {20, 120, 72, 94, 72};
     const double nested[] = {20, 120, 72, 94, 74, 92, 74, 94, 72};
@@ -358,7 +311,7 @@ static void minor_loops_close_in_preisach(void)
                           austenite_after(KINETICS_PREISACH, at_92, 6)) > 0.01);
 }
 
-static void the_r_phase_comes_on_cooling_only(void)
+TEST(the_r_phase_comes_on_cooling_only)
 {
     const double heating[] = {20, 93}, cooling[] = {20, 120, 68}, cold[] = {20, 120, 50};
     TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.0, grain_after(KINETICS_R_PHASE, heating, 2).r_phase);
@@ -374,7 +327,7 @@ static void the_r_phase_comes_on_cooling_only(void)
     TEST_ASSERT_TRUE(austenite_after(KINETICS_R_PHASE, back_6, 4) > at + 0.01);
 }
 
-static void resistance_peaks_on_cooling_through_the_r_phase(void)
+TEST(resistance_peaks_on_cooling_through_the_r_phase)
 {
     single_spring();
     parameters.spring[0].alloy.law = KINETICS_R_PHASE;
@@ -395,7 +348,7 @@ static void resistance_peaks_on_cooling_through_the_r_phase(void)
     TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0.175, world_resistance_ohm(world, 0));
 }
 
-static void resistance_follows_each_phases_own_coefficient(void)
+TEST(resistance_follows_each_phases_own_coefficient)
 {
     single_spring();
     parameters.spring[0].martensite_per_k = 0.0010;
@@ -411,7 +364,7 @@ static void resistance_follows_each_phases_own_coefficient(void)
 }
 
 /* 81 MPa: heating needs 10 K more, cooling begins 10.8 K sooner. */
-static void stress_shifts_heating_and_cooling_by_their_own(void)
+TEST(stress_shifts_heating_and_cooling_by_their_own)
 {
     single_spring();
     parameters.spring[0].start_c = 85.0;
@@ -431,7 +384,7 @@ static void stress_shifts_heating_and_cooling_by_their_own(void)
     TEST_ASSERT_TRUE(world_mean_c(world, 0) > before_c + 1.0);
 }
 
-static void the_sensor_reads_whole_steps_of_what_flowed_in_the_tick(void)
+TEST(the_sensor_reads_whole_steps_of_what_flowed_in_the_tick)
 {
     single_spring();
     parameters.spring[0].sensor = (ina219_t){.current_gain = 1.0, .voltage_gain = 1.0};
@@ -451,7 +404,7 @@ static void the_sensor_reads_whole_steps_of_what_flowed_in_the_tick(void)
     TEST_ASSERT_EQUAL_INT(3200, inputs.sensor[0].current_ma); /* full scale */
 }
 
-static void a_sensor_has_gain_offset_and_noise(void)
+TEST(a_sensor_has_gain_offset_and_noise)
 {
     ina219_t sensor = {1.03, 0.97, 0.005, -0.008, 0.0, 0.0, 0.0, 0.0, false, false};
     random_t random = random_seeded(3, 4);
@@ -483,7 +436,7 @@ static void a_sensor_has_gain_offset_and_noise(void)
     TEST_ASSERT_DOUBLE_WITHIN(3.0, 20.0, sqrt(apart / (10 * readings))); /* sqrt(2 * 0.02) */
 }
 
-static void a_frozen_sensor_keeps_its_last_registers_and_changes_no_other(void)
+TEST(a_frozen_sensor_keeps_its_last_registers_and_changes_no_other)
 {
     controller_inputs_t sound;
     for (int broken = 0; broken < 4; broken++) { /* none, both registers, either */
@@ -513,7 +466,7 @@ static void a_frozen_sensor_keeps_its_last_registers_and_changes_no_other(void)
     }
 }
 
-static void swapped_sensors_answer_for_each_other(void)
+TEST(swapped_sensors_answer_for_each_other)
 {
     parameters.events = 1;
     parameters.event[0] = (world_event_t){WORLD_SENSOR_SWAP, 0.0, 3, 7.0};
@@ -524,7 +477,7 @@ static void swapped_sensors_answer_for_each_other(void)
     TEST_ASSERT_GREATER_THAN(1000, inputs.sensor[7].current_ma);
 }
 
-static void contacts_and_supply_do_as_told(void)
+TEST(contacts_and_supply_do_as_told)
 {
     single_spring();
     parameters.events = 3;
@@ -543,7 +496,7 @@ static void contacts_and_supply_do_as_told(void)
     TEST_ASSERT_DOUBLE_WITHIN(1e-4, ohm * world_current_a(world, 0), world_voltage_v(world, 0));
 }
 
-static void gusts_come_and_go(void)
+TEST(gusts_come_and_go)
 {
     parameters.gust_every_s = 20.0;
     parameters.gust_lasts_s = 10.0;
@@ -557,7 +510,7 @@ static void gusts_come_and_go(void)
     TEST_ASSERT_DOUBLE_WITHIN(400.0, 2000.0, windy_s); /* 200 gusts: their sum +- 2 sigma */
 }
 
-static void the_same_seed_is_the_same_world(void)
+TEST(the_same_seed_is_the_same_world)
 {
     controller_inputs_t first;
     for (int i = 0; i < 3; i++) {
@@ -576,7 +529,7 @@ static void the_same_seed_is_the_same_world(void)
     }
 }
 
-static void a_drawing_stays_within_its_tolerance_and_uses_it(void)
+TEST(a_drawing_stays_within_its_tolerance_and_uses_it)
 {
     double least = 1.0, most = 1.0;
     for (uint64_t seed = 0; seed < 200; seed++) {
@@ -596,7 +549,7 @@ static void a_drawing_stays_within_its_tolerance_and_uses_it(void)
     TEST_ASSERT_DOUBLE_WITHIN(0.01, 1.14, most);
 }
 
-static void what_cannot_be_is_refused(void)
+TEST(what_cannot_be_is_refused)
 {
     parameters.step_s = 0.003; /* does not divide the tick */
     TEST_ASSERT_NULL(world_create(&parameters));
@@ -610,34 +563,4 @@ static void what_cannot_be_is_refused(void)
     world_parameters_default(&parameters);
     parameters.events = WORLD_EVENTS_MAX + 1;
     TEST_ASSERT_NULL(world_create(&parameters));
-}
-
-int main(void)
-{
-    UNITY_BEGIN();
-    RUN_TEST(energy_closes_in_every_law);
-    RUN_TEST(both_laws_of_convection_lose_what_is_declared_where_it_is_declared);
-    RUN_TEST(moved_air_carries_off_as_much_more_as_is_said);
-    RUN_TEST(transforming_takes_the_latent_heat);
-    RUN_TEST(loss_is_as_declared_at_105_and_less_per_kelvin_below);
-    RUN_TEST(crimped_ends_are_colder_by_what_the_crimps_take);
-    RUN_TEST(a_heated_spring_warms_orthogonal_neighbours_most);
-    RUN_TEST(constant_current_is_unstable_through_the_transformation);
-    RUN_TEST(a_finer_step_tells_the_same);
-    RUN_TEST(each_law_has_its_own_major_loop_and_rests_between_its_branches);
-    RUN_TEST(minor_loops_close_in_preisach);
-    RUN_TEST(the_r_phase_comes_on_cooling_only);
-    RUN_TEST(resistance_peaks_on_cooling_through_the_r_phase);
-    RUN_TEST(resistance_follows_each_phases_own_coefficient);
-    RUN_TEST(stress_shifts_heating_and_cooling_by_their_own);
-    RUN_TEST(the_sensor_reads_whole_steps_of_what_flowed_in_the_tick);
-    RUN_TEST(a_sensor_has_gain_offset_and_noise);
-    RUN_TEST(a_frozen_sensor_keeps_its_last_registers_and_changes_no_other);
-    RUN_TEST(swapped_sensors_answer_for_each_other);
-    RUN_TEST(contacts_and_supply_do_as_told);
-    RUN_TEST(gusts_come_and_go);
-    RUN_TEST(the_same_seed_is_the_same_world);
-    RUN_TEST(a_drawing_stays_within_its_tolerance_and_uses_it);
-    RUN_TEST(what_cannot_be_is_refused);
-    return UNITY_END();
 }

@@ -3,7 +3,6 @@
  * library. */
 #include <avr/interrupt.h>
 #include <avr/io.h>
-#include <avr/sleep.h>
 #include <avr/wdt.h>
 #include <stdint.h>
 #include <util/delay.h>
@@ -111,9 +110,6 @@ static uint8_t read_eeprom(uint16_t address)
     return EEDR;
 }
 
-/* Interrupt that only ends a sleep. */
-EMPTY_INTERRUPT(TIMER0_OVF_vect)
-
 static volatile uint8_t eeprom_interrupts;
 ISR(EE_READY_vect)
 {
@@ -185,17 +181,6 @@ static void obey(uint8_t letter)
         _delay_us(100);
         cli();
         put_hex(eeprom_interrupts);
-        break;
-    case 's': /* sleeps 100 overflows of timer 0, 1.024 ms each */
-        TCCR0B = _BV(CS01) | _BV(CS00);
-        TIMSK0 = _BV(TOIE0);
-        sei();
-        for (uint8_t k = 0; k < 100; k++) {
-            SMCR = _BV(SE); /* idle */
-            sleep_cpu();
-        }
-        cli();
-        TIMSK0 = 0;
         break;
     case 'a': /* voltage at A0 */
         ADMUX = _BV(REFS0);
