@@ -91,7 +91,7 @@ def diagnose(name: str) -> dict[str, Any]:
     plant.set_effects(found.model.effects)
     plant.set_all(found.model.parameters)
     third = logs[2]
-    off = third.temperature_c - simulate_run(plant, third, third.ambient_c, {})
+    off = third.temperature_c - simulate_run(plant, third, third.ambient_c)
     result = found.result
     return {
         "name": name,

@@ -110,7 +110,7 @@ def off(model: Model, run: Run) -> float:
     plant = native.Plant(3, 3)
     plant.set_effects(model.effects)
     plant.set_all(model.parameters)
-    shown = simulate_run(plant, run, run.ambient_c, {})
+    shown = simulate_run(plant, run, run.ambient_c)
     return float(np.sqrt(np.nanmean((run.temperature_c - shown) ** 2)))
 
 

@@ -71,7 +71,7 @@ def test_what_is_shown_as_a_load_moves_is_from_before(tmp_path: Path) -> None:
         plant.set("transformation_shift_k_per_n", K_PER_N)
         if lag_s is not None:
             plant.set("sensor_lag_s", lag_s)
-        shown.append(simulate_run(plant, run, run.ambient_c, {}))
+        shown.append(simulate_run(plant, run, run.ambient_c))
     # the spring itself jumps by kelvins with its load: a thermometer that is quick shows that in the row after
     assert np.abs(shown[0] - shown[1]).max() < 0.3
 

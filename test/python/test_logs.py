@@ -259,7 +259,7 @@ def test_endless_logs_are_averaged_where_nothing_happens_and_simulated_as_well_a
     plant.set_effects(true)
     for values in true.values():
         plant.set_all(values)
-    left = short.temperature_c - simulate_run(plant, short, short.ambient_c, {})
+    left = short.temperature_c - simulate_run(plant, short, short.ambient_c)
     assert np.isfinite(left).mean() > 0.99
     assert np.sqrt(np.nanmean(left**2)) < 0.06
     assert any("20000 rows averaged" in note for note in short.notes)

@@ -38,7 +38,7 @@ def changed_contacts(problem: from_resistance.Resistances, fit: Fit) -> list[con
     parts = []
     for r, run in enumerate(problem.boards):
         assert run.current_a is not None
-        traced = simulate_run(problem.plant_for(fit.spec, fit.values), run, run.ambient_c, {}, trace=True)
+        traced = simulate_run(problem.plant_for(fit.spec, fit.values), run, run.ambient_c, trace=True)
         here = settled(run, traced[:, :, 1]) & np.isfinite(fit.residual[r]) & (run.current_a > DRIVEN_A)
         rows, springs = np.nonzero(here)
         noise_mv = np.broadcast_to(problem.noise[r], here.shape)

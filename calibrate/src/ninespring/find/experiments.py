@@ -82,7 +82,7 @@ def _apart(problem: Problem, fits: tuple[Fit, Fit], inputs: Inputs, drive: np.nd
     """Return by how much two fits differ under inputs, (rows, springs), K, until a spring is too hot by either."""
     nothing, around = np.full(drive.shape, np.nan), np.full(len(drive), ambient_c)
     trial = Run("experiment", "", inputs.time_s, problem.runs[0].mode, drive, nothing, inputs.fan, around)
-    a, b = (simulate_run(problem.plant_for(fit.spec, fit.values), trial, around, {}) for fit in fits)
+    a, b = (simulate_run(problem.plant_for(fit.spec, fit.values), trial, around) for fit in fits)
     hottest = np.maximum.accumulate(np.maximum(a, b).max(axis=1))
     return np.where(hottest[:, None] > TOO_HOT_C, 0.0, a - b)
 

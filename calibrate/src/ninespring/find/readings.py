@@ -103,7 +103,7 @@ def _as_measured(problem: Problem, fit: Fit, r: int) -> tuple[np.ndarray, np.nda
     """
     run = problem.run_of(r, fit.as_dict())
     ambient = problem.ambient_of(r, fit.as_dict())
-    traced = simulate_run(problem.plant_for(fit.spec, fit.values, r), run, ambient, {}, trace=True)
+    traced = simulate_run(problem.plant_for(fit.spec, fit.values, r), run, ambient, trace=True)
     left = pd.DataFrame(fit.residual[r]).rolling(SMOOTHED, center=True, min_periods=1).mean().fillna(0.0).to_numpy()
     hot = np.clip(traced[:, :, 0] + left, COLDEST_C, HOTTEST_C)
     told = np.ones(len(run.time_s), dtype=bool)
@@ -125,7 +125,7 @@ def _driven_to(
     drive = run.drive.copy()
     drive[first] = was_c
     given = replace(run, mode="temperature", drive=drive, warm=False, starts=[0])
-    return simulate_run(problem.plant_for(fit.spec, fit.values), given, ambient, {}, trace=True)
+    return simulate_run(problem.plant_for(fit.spec, fit.values), given, ambient, trace=True)
 
 
 @dataclass

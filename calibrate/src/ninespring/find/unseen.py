@@ -153,7 +153,7 @@ def errors(split: Split, fit: Fit, colour: Colour | None) -> tuple[np.ndarray, n
     plant = problem.plant_for(spec, fitted.values)
 
     def off_in(ambient: np.ndarray) -> np.ndarray:
-        return (run.temperature_c - simulate_run(plant.copy(), run, ambient, {}))[split.counts]
+        return (run.temperature_c - simulate_run(plant.copy(), run, ambient))[split.counts]
 
     if run.ambient_c is not None:
         off = off_in(run.ambient_c)

@@ -163,7 +163,7 @@ def fit(array: Array, runs: Sequence[Run]) -> tuple[Resistances, Fit, Fit]:
 def model_of_fit(problem: Resistances, found: Fit) -> Model:
     """Return the model.toml of such a fit; its provenance says whose scale its temperatures have."""
     plant = problem.plant_for(found.spec, found.values)
-    shown = [replace(run, temperature_c=simulate_run(plant.copy(), run, run.ambient_c, {})) for run in problem.boards]
+    shown = [replace(run, temperature_c=simulate_run(plant.copy(), run, run.ambient_c)) for run in problem.boards]
     model = model_of(problem, found, shown)
     del model.provenance["rmse_after_c"]
     model.provenance["note"] = SCALE

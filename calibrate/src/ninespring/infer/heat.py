@@ -135,6 +135,6 @@ def _shown(problem: Problem, fit: Fit, r: int, extra_w: Sequence[np.ndarray]) ->
     def one(extra: np.ndarray) -> np.ndarray:
         problem.budget.take()
         plant = problem.plant_for(fit.spec, fit.values, r)
-        return simulate_run(plant, _with_heat(problem, fit, r, run, power, extra), ambient, {})
+        return simulate_run(plant, _with_heat(problem, fit, r, run, power, extra), ambient)
 
     return problem.each(one, extra_w)

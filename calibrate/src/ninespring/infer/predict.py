@@ -57,18 +57,18 @@ def predict(model: Model, run: Run, chip: bool = False) -> np.ndarray:
     run = in_its_room(model, run)
     if chip:
         return predict_by_chip(model, chip_lines(model)[0], run)
-    return simulate_run(plant_of(model), run, run.ambient_c, {})
+    return simulate_run(plant_of(model), run, run.ambient_c)
 
 
 def predict_by_chip(model: Model, lines: str, run: Run) -> np.ndarray:
     """Return what a chip with these console lines predicts, (rows, springs), degC, seen by the model's sensors."""
     run = in_its_room(model, run)
     plant = plant_of(model)
-    shown = simulate_run(plant, run, run.ambient_c, {})
+    shown = simulate_run(plant, run, run.ambient_c)
     # What lag, gain and mixing of the sensors add is the plant's: the chip has none of them.
     plant = plant_of(model)
     plant.set_effects([e for e in model.effects if e not in effects.MEASUREMENT])
-    seen_by = shown - simulate_run(plant, run, run.ambient_c, {})
+    seen_by = shown - simulate_run(plant, run, run.ambient_c)
     return chip_trace(model, lines, run)[0] + seen_by
 
 

@@ -229,7 +229,7 @@ class Problem:
             run = replace(run, drive=run.drive + power_w)
         try:
             plant = self.plant_for(spec, values, run_index)
-            shown = simulate_run(plant, run, self.ambient_of(run_index, by_key), by_key, start_offset)
+            shown = simulate_run(plant, run, self.ambient_of(run_index, by_key), start_offset)
             return shown + by_key.get(f"{SENSOR_OFFSET}@{run_index + 1}", 0.0)
         except native.NativeError:
             return np.full(run.temperature_c.shape, _BAD)

@@ -206,6 +206,6 @@ def by_plant(run: Run, plant: native.Plant, usual_c: float, over: tuple[float, f
     """Return how warm the room of a run is and one sigma of it, as a fitted plant shows its first minute; `over` as `over_first`."""
 
     def shows(part: Run, ambient_c: float, offset: np.ndarray) -> np.ndarray:
-        return simulate_run(plant.copy(), part, np.full(len(part.time_s), ambient_c), {}, offset)
+        return simulate_run(plant.copy(), part, np.full(len(part.time_s), ambient_c), offset)
 
     return of_run(run, guessed(run, usual_c, over), shows, fades_per_s(plant))

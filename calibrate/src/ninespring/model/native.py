@@ -264,10 +264,14 @@ class Plant:
 
     def settle_without(self, effect: str, limit_s: float) -> None:
         """Run to the steady state with one effect off meanwhile."""
-        on = self._lib.plant_effect_is_on(self._plant, effect_names().index(effect))
+        on = self.has(effect)
         self._check(self._lib.plant_set_effect(self._plant, effect.encode(), False), effect)
         self.settle(limit_s)
         self._check(self._lib.plant_set_effect(self._plant, effect.encode(), on), effect)
+
+    def has(self, effect: str) -> bool:
+        """Return whether an effect is on."""
+        return bool(self._lib.plant_effect_is_on(self._plant, effect_names().index(effect)))
 
     def measured_c(self) -> np.ndarray:
         """Return what the sensors show now, (springs,), degC."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 
 import numpy as np
 
@@ -23,6 +22,11 @@ EACH = (
 HIDES_S = 20.0
 """Of what a spring does, thermometers show this much later at most, about."""
 
+AROUND = "shared_air", "plate_conduction"
+"""Effects that keep heat around the springs."""
+WARM_K = 3.0
+"""A spring that begins so much above its room was driven before: air and plate are warm, too, as if it had been so warm for long."""
+
 SHIFT_PER_N = "transformation_shift_k_per_n"
 LOAD_STEP_N = 0.1
 """A change of load that counts: half a kelvin of the transformation (docs/physics.md: 4 K/N)."""
@@ -31,19 +35,30 @@ LOAD_STEP_N = 0.1
 def started(
     plant: native.Plant, run: Run, ambient: np.ndarray | None, begin: int, start_offset: np.ndarray | None = None
 ) -> native.Plant:
-    """Return the plant as it is where a log, or what follows a gap in it, begins."""
+    """Return the plant as it is where a log, or what follows a gap in it, begins.
+
+    Air and plate are in balance with springs that begin warm, or with the first inputs where a run begins warm and steady: nobody
+    saw what was before, but at ambient they were not.
+    """
     if ambient is not None:
         plant.set_ambient(float(ambient[begin]))
     plant.set_fan(float(run.fan[begin]))
     plant.reset()
     first = run.temperature_c[begin].copy()
+    room_c = plant.get("ambient_c") if ambient is None else float(ambient[begin])
     if run.warm:
-        for k in range(run.springs):
-            plant.drive(k, native.MODES[run.mode], float(run.drive[begin, k]))
-        # a drifting ambient has no balance: it begins at the run's first row
-        plant.settle_without("ambient_drift", 1e6)
+        _in_balance(plant, native.MODES[run.mode], run.drive[begin])
+    elif begin == 0 and any(map(plant.has, AROUND)) and np.nanmax(first, initial=room_c) > room_c + WARM_K:
+        _in_balance(plant, native.TEMPERATURE, np.clip(first, -60.0, 300.0))
     plant.start_from_measured(first + (0.0 if start_offset is None else start_offset))
     return plant
+
+
+def _in_balance(plant: native.Plant, mode: int, drive: np.ndarray) -> None:
+    for k in np.flatnonzero(np.isfinite(drive)):
+        plant.drive(int(k), mode, float(drive[k]))
+    # a drifting ambient has no balance: it begins at the run's first row
+    plant.settle_without("ambient_drift", 1e6)
 
 
 def hidden_k(run: Run, ambient_c: float, fades_per_s: float) -> np.ndarray:
@@ -65,7 +80,6 @@ def simulate_run(
     plant: native.Plant,
     run: Run,
     ambient: np.ndarray | None,
-    values: Mapping[str, float],
     start_offset: np.ndarray | None = None,
     trace: bool = False,
 ) -> np.ndarray:
@@ -74,7 +88,7 @@ def simulate_run(
     Return what the sensors show, (rows, springs), degC; `trace`: true temperatures and austenite, (rows, springs, 2).
 
     After a gap the springs start again from what was measured there; air and plate carry on.
-    Air and plate start at ambient, or, where the run begins warm and steady, in balance with its first inputs.
+    Air and plate start as `started` says.
     """
     along = _Along(plant, run, ambient, trace)
     along.lay_load(0)
