@@ -220,7 +220,7 @@ class Board:
             if got == "ok":
                 return answer
             if match:
-                raise RefusedError(f"'{line}' refused: error {match[1]} {match[2]}".rstrip())
+                raise RefusedError(f"'{line}' refused: error {match[1]} {match[2]}".rstrip(), answer)
             if TELEMETRY.match(got):
                 self._telemetry.append(got)
             elif got and got != line:  # that is the board's echo
