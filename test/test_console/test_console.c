@@ -570,6 +570,15 @@ static void selftest_says_which_spring_has_too_little_current(void)
     TEST_ASSERT_NOT_NULL(strstr(said, "spring 4: sensor ok, 0.180 ohm\r"));
 }
 
+/* Nine springs take longer than a program may be silent. */
+static void selftest_is_no_silence_of_the_host(void)
+{
+    expect_ok("$host_timeout_s=1");
+    expect_ok("selftest");
+    TEST_ASSERT_NOT_NULL(strstr(said, "spring 9: sensor ok, 0.180 ohm\r"));
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, controller_board_fault(&controller));
+}
+
 static void selftest_gives_the_policy_back_also_when_it_is_stopped(void)
 {
     expect_ok("policy precompensate");
@@ -1042,6 +1051,7 @@ int main(void)
     RUN_TEST(a_loss_that_never_cools_is_refused_with_what_it_would_have_to_cool);
     RUN_TEST(version_says_what_became_of_the_stored_settings);
     RUN_TEST(selftest_says_which_spring_has_too_little_current);
+    RUN_TEST(selftest_is_no_silence_of_the_host);
     RUN_TEST(selftest_gives_the_policy_back_also_when_it_is_stopped);
     RUN_TEST(stop_drops_the_line_that_had_begun);
     RUN_TEST(stop_ends_a_long_answer);
