@@ -458,6 +458,9 @@ def reading(cells: dict[str, str], believed: Mapping[int, Belief] | None = None)
     )
 
 
+UNSAVED = "nothing is saved, a reset of the board gives back what it had"
+
+
 def send_settings(
     board: Board, lines: list[str], save: bool = True, say: Callable[[str, int], None] = lambda line, count: None
 ) -> None:
@@ -471,12 +474,12 @@ def send_settings(
         try:
             remarks = board.ask(line)
         except WorkError as error:
-            raise WorkError(f"{error}: nothing is saved, a reset of the board gives back what it had") from None
+            raise WorkError(f"{error}: {UNSAVED}") from None
     if remarks:
-        raise WorkError(f"the board does not take them together: {remarks[-1]}")
+        raise WorkError(f"the board does not take them together: {remarks[-1]}: {UNSAVED}")
     say("reading back", len(lines))
     if wrong := settings_that_differ(lines, board.settings()):
-        raise WorkError(f"the board shows other values than were sent, nothing is saved: {'; '.join(wrong)}")
+        raise WorkError(f"the board shows other values than were sent: {'; '.join(wrong)}: {UNSAVED}")
     if save:
         board.ask("$save", 10.0)
 
