@@ -104,6 +104,7 @@ static void start_telemetry(console_t *console)
 static void selftest(console_t *console)
 {
     selftest_result_t result;
+    controller_host_heard(console->controller); /* it waits for the answer, which always ends */
     switch (selftest_step(&console->selftest, console->controller, console->status->ticks,
                           console->status->sensor_status, &result)) {
     case SELFTEST_WAITS:

@@ -36,12 +36,25 @@ def test_diagnose_predict_and_export_in_a_row(make_log, tmp_path: Path) -> None:
     page = (tmp_path / "out" / "report.html").read_text()
     assert "<svg" in page and "http-equiv" not in page and 'src="' not in page
     model = tmp_path / "out" / "model.toml"
+    typed = f"ninespring plan --through 5 --model {model} -o steps.txt"
+    assert typed in " ".join(done.stdout.split()) and typed in page
     assert ninespring("predict", "--model", model, log, "-o", tmp_path / "p.csv").returncode == 0
     assert "\ntime_s,t1_c," in (tmp_path / "p.csv").read_text()
     assert ninespring("export", "--model", model, "-o", tmp_path / "s.txt").returncode == 0
     text = (tmp_path / "s.txt").read_text()
     assert "$loss_w_per_k=" in text
     assert "reached 95.5 degC, which is not clearly beyond the end of the transformation (98.0 degC)" in text
+    assert typed in text
+
+
+def test_a_picture_of_a_time_that_the_log_does_not_have_is_refused(make_log, tmp_path: Path) -> None:
+    """A board's log begins at its clock's time, not at 0."""
+    log = make_log(seconds=100, change=lambda c: c.update(time_s=np.arange(100) + 540.5))
+    for at, code in ((539, 2), (600, 0), (640, 2)):
+        done = ninespring("plot", log, "--at", at, "-o", tmp_path / f"{at}.png")
+        assert done.returncode == code
+        assert (tmp_path / f"{at}.png").exists() == (code == 0)
+    assert done.stderr.endswith("run.csv: --at 640: its time_s runs from 540.5 to 639.5 s\n")
 
 
 def test_fit_with_an_effect_writes_a_model(make_log, tmp_path: Path) -> None:
@@ -156,6 +169,7 @@ def test_what_cannot_be_fitted_is_refused_before_any_work(make_log, tmp_path: Pa
         ((short,), "20 rows are too few"),
         ((idle,), "no spring is ever driven"),
         ((eight,), "8 springs: say how they are arranged"),
+        ((log, eight), f"{eight}: has 8 springs, {log} has 9: give logs of one array"),
         ((log, "--effects", "ghosts"), "there is no effect 'ghosts'"),
     ):
         done = ninespring("fit", *words, "-o", tmp_path / "m.toml")

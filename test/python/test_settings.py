@@ -58,6 +58,14 @@ def test_what_the_board_has_otherwise_than_sent_is_not_taken_back(fake: FakeBoar
     assert fake.settings["loss_w_per_k"] == "0.009000"
 
 
+def test_settings_that_do_not_fit_together_are_not_saved_and_it_says_so(fake: FakeBoard, tmp_path: Path) -> None:
+    fake.answers["$temperature_trip_c=60"] = ["[not active yet: temperature_trip_c=60.00 does not fit ...]", "ok"]
+    (tmp_path / "s.txt").write_text("$temperature_trip_c=60\n")
+    code, said = ninespring("upload", "--port", fake.port, tmp_path / "s.txt")
+    assert code == 1 and "nothing is saved, a reset of the board gives back what it had" in said
+    assert "$save" not in fake.sent()
+
+
 def test_what_a_board_had_is_a_file_that_upload_takes(fake: FakeBoard, tmp_path: Path, home: Path) -> None:
     upload(fake, tmp_path, "$loss_w_per_k=0.006000")
     (kept,) = home.rglob("*.txt")

@@ -539,6 +539,15 @@ TEST(selftest_says_which_spring_has_too_little_current)
     expect_said("spring 4: sensor ok, 0.180 ohm\r");
 }
 
+/* Nine springs take longer than a program may be silent. */
+TEST(selftest_is_no_silence_of_the_host)
+{
+    expect_ok("$host_timeout_s=1");
+    expect_ok("selftest");
+    expect_said("spring 9: sensor ok, 0.180 ohm\r");
+    TEST_ASSERT_EQUAL(SAFETY_FAULT_NONE, controller_board_fault(&controller));
+}
+
 TEST(selftest_gives_the_policy_back_also_when_it_is_stopped)
 {
     expect_ok("policy precompensate");

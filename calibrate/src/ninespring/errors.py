@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 
@@ -31,4 +32,12 @@ class WorkError(Exception):
 
 
 class RefusedError(WorkError):
-    """The board answered that it does not do what it was asked to: it is there, and goes on."""
+    """The board answered that it does not do what it was asked to: it is there, and goes on.
+
+    `said` are the lines that came before the refusal and belong to it: which settings do not fit, what a self-test found.
+    """
+
+    def __init__(self, refusal: str, said: Sequence[str] = ()) -> None:
+        self.refusal = refusal
+        self.said = list(said)
+        super().__init__("; ".join([refusal, *said]))

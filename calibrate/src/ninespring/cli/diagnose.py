@@ -8,6 +8,7 @@ import click
 from rich.table import Table
 
 from ..errors import InputError
+from ..export.settings import judged
 from ..find import board_alone, diagnosis, steady
 from ..infer import from_resistance
 from ..io import results
@@ -75,6 +76,8 @@ def diagnose(
         else:
             with working("fitting") as say:
                 found = diagnosis.diagnose(array, runs, model=model, frozen=frozen, progress=say)
+                found.model.name = str(output / "model.toml")
+                judged(found.told.effects, found.model)  # as commands that can be typed here
                 say("writing the report")
                 page = report.html_report(found, str(output))
             told, made = found.told, found.model

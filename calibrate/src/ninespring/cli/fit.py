@@ -82,6 +82,7 @@ def fit(logs: tuple[Path, ...], array_path: Path | None, effects: str, output: P
     result.rmse_before_c, result.rmse_c = rms(base.residual), rms(chosen.residual)
     result.holdout_rmse_c, result.noise_c = held, problem.noise_c
     write({output: model_text(model), json_path: results.checked(result)})
+    model.name = "model.toml" if str(output) == "-" else str(output)
     notes("", suspect)
     print_parameters(beside(output), result.parameters)
     _print_correlations(output, result.correlations)

@@ -18,7 +18,7 @@ from prompt_toolkit.history import FileHistory, InMemoryHistory
 from prompt_toolkit.key_binding import KeyBindings, KeyPressEvent
 from prompt_toolkit.patch_stdout import patch_stdout
 
-from ..errors import InputError, WorkError
+from ..errors import InputError, RefusedError, WorkError
 from ..io.board import SIMULATED, Board
 from ..io.history import home
 from ..model import tables
@@ -159,6 +159,9 @@ class Talk:
         except KeyboardInterrupt:
             self.stop()
             return
+        except RefusedError as error:
+            self.refused += 1
+            answer = [*error.said, error.refusal]
         except (WorkError, InputError) as error:
             self.refused += 1
             answer = [str(error)]

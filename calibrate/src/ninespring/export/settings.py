@@ -9,7 +9,6 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 
@@ -94,7 +93,7 @@ def not_crossed(model: Model) -> str:
     return (
         f"the log's hottest spring reached {hottest:.1f} degC, which is not clearly beyond the end of the transformation "
         f"({end}): transformation kept as it is. Drive one spring through it: "
-        f"ninespring plan --through {(model.array.springs + 1) // 2} --model {Path(model.name or 'model.toml').name} -o steps.txt"
+        f"ninespring plan --through {(model.array.springs + 1) // 2} --model {model.name or 'model.toml'} -o steps.txt"
     )
 
 

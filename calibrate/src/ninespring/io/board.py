@@ -224,7 +224,7 @@ class Board:
             if got == "ok":
                 return answer
             if match:
-                raise RefusedError(f"'{line}' refused: error {match[1]} {match[2]}".rstrip())
+                raise RefusedError(f"'{line}' refused: error {match[1]} {match[2]}".rstrip(), answer)
             if TELEMETRY.match(got):
                 self._telemetry.append(got)
             elif got and got != line:  # that is the board's echo
@@ -449,6 +449,9 @@ def reading(cells: Mapping[str, str], believed: Mapping[int, Belief] | None = No
     return Reading(**of_all, state=cells["state"], **{name: of_each(name) for name in EACH})
 
 
+UNSAVED = "nothing is saved, a reset of the board gives back what it had"
+
+
 def send_settings(
     board: Board,
     settings: Mapping[str, str],
@@ -465,12 +468,12 @@ def send_settings(
         try:
             remarks = board.ask(line)
         except WorkError as error:
-            raise WorkError(f"{error}: nothing is saved, a reset of the board gives back what it had") from None
+            raise WorkError(f"{error}: {UNSAVED}") from None
     if remarks:
-        raise WorkError(f"the board does not take them together: {remarks[-1]}")
+        raise WorkError(f"the board does not take them together: {remarks[-1]}: {UNSAVED}")
     say("reading back", len(settings))
     if wrong := settings_that_differ(settings, board.settings()):
-        raise WorkError(f"the board shows other values than were sent, nothing is saved: {'; '.join(wrong)}")
+        raise WorkError(f"the board shows other values than were sent: {'; '.join(wrong)}: {UNSAVED}")
     if save:
         board.ask("$save", 10.0)
 

@@ -336,11 +336,11 @@ def array_of(array: Array | None, runs: Sequence[Run]) -> Array:
         for other in runs[:k]:
             if run.sha256 == other.sha256:
                 raise InputError(f"is the same as {other.name}: it would count twice, give it once", run.name)
-    counts = {run.springs for run in runs}
-    if len(counts) > 1:
-        raise InputError(f"the logs have {' and '.join(map(str, sorted(counts)))} springs: give logs of one array")
+        if run.springs != runs[0].springs:
+            both = f"has {run.springs} springs, {runs[0].name} has {runs[0].springs}"
+            raise InputError(f"{both}: give logs of one array", run.name)
     if array is None:
-        count = counts.pop()
+        count = runs[0].springs
         below: dict[str, Any] | None = None
         if runs[0].layers == 2 and count % 2 == 0:
             count, below = count // 2, {}

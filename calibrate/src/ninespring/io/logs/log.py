@@ -74,7 +74,7 @@ NAMES_OF = (
 def _advice(name: str) -> str:
     for other, ours, todo in NAMES_OF:
         if found := re.fullmatch(other, name, re.IGNORECASE):
-            return f"{todo}, and name it {ours.format(*found.groups())}"
+            return f"{todo},{'' if todo.startswith('if ') else ' and'} name it {ours.format(*found.groups())}"
     return "a log has time_s, i1_a, v1_v, u1, t1_c, f1_n ..., fan, ambient_c; note_... is skipped"
 
 

@@ -179,6 +179,8 @@ class Table:
                 if name in words or not value or (_is_number(value) and np.isfinite(float(value)) and "_" not in value):
                     continue
                 advice = "leave the cell empty if not measured"
+                if re.fullmatch(r"[ivuf][0-9].*|fan", name):
+                    advice = "give the number that it was"
                 if name == "time_s":
                     advice = "times are seconds (`ninespring import --map`, unit = iso, reads clocks with a date)"
                 shown = value if len(value) <= 20 else value[:17] + "..."
