@@ -140,7 +140,7 @@ def test_lines_from_a_pipe_are_answered_one_after_the_other() -> None:
 def test_what_the_board_says_before_it_refuses_is_shown() -> None:
     found = ["spring 1: sensor ok, 0.178 ohm", "spring 2: sensor absent, fault 5 sensor_absent"]
     fake = FakeBoard({"selftest": [*found, "error:17 selftest found the faults above"]})
-    done = piped(fake.port, "selftest\n")
+    done = alone("console", "--port", fake.port, input="selftest\n")
     assert done.returncode == 1
     assert done.stdout.splitlines() == [*found, "'selftest' refused: error 17 selftest found the faults above"]
 

@@ -39,8 +39,8 @@ def plot(log: Path, model_path: Path | None, array_path: Path | None, at: float 
     model, array = model_and_array(model_path, array_path)
     run = read_log(log, array.springs if array else None, temperatures=False)
     notes_of([run])
-    if at_s is not None and not run.time_s[0] <= at_s <= run.time_s[-1]:
-        raise InputError(f"--at {at_s:g}: its time_s runs from {run.time_s[0]:g} to {run.time_s[-1]:g} s", log)
+    if at is not None and not run.time_s[0] <= at <= run.time_s[-1]:
+        raise InputError(f"--at {at:g}: its time_s runs from {run.time_s[0]:g} to {run.time_s[-1]:g} s", log)
     with working("drawing"):
         if kind == ".gif" or at is not None:
             array = array_of(array, [run])

@@ -43,7 +43,7 @@ def rising_rows(table: Table, notes: list[str]) -> np.ndarray:
             else f"time_s falls from {before:.10g} to {now:.10g}"
         )
         raise table.refuse_cell(f"{said}: times must rise strictly", int(rows[at + 1]), "time_s")
-    notes.append(f"{int((~keep).sum())} repeated row{'s' * ((~keep).sum() > 1)} dropped")
+    notes.append(f"{int((~keep).sum())} repeated row{'s' * int((~keep).sum() > 1)} dropped")
     return keep
 
 
