@@ -146,6 +146,19 @@ def test_the_first_minute_tells_a_room(room_c: float) -> None:
     assert abs(value - room_c) < abs(20.5 - room_c) + 0.5 and sigma < room.ROOMS_K
 
 
+def test_what_is_only_heated_does_not_begin_colder_than_its_room() -> None:
+    run = one_run(20.0, 20.0)
+    run.temperature_c[1:] += 4.0  # thermometers that show the drive itself
+
+    def shows(part: Run, ambient_c: float, offset: np.ndarray) -> np.ndarray:
+        warm = part.temperature_c[0] + offset
+        end = ambient_c + 80.0 * part.drive[0]
+        return end + (warm - end) * np.exp(-part.time_s[:, None] / 180.0)
+
+    value, _ = room.of_run(run, room.guessed(run, 30.0, None), shows, 1.0 / 180.0)
+    assert value == pytest.approx(room.first_c(run) + 2.0 * room.MOVES_K)
+
+
 def test_a_run_that_began_warm_is_not_taken_for_one_at_rest() -> None:
     def nothing(part: Run, ambient_c: float, offset: np.ndarray) -> np.ndarray:
         """A plant that a room does not change: the first minute says nothing."""

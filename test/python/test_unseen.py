@@ -261,6 +261,19 @@ def test_what_foretells_worse_than_the_better_baseline_keeps_its_name_and_the_ba
     ) == plain
 
 
+def test_the_model_that_is_given_foretells_in_the_rooms_that_first_minutes_tell() -> None:
+    """What would be better in rooms that nobody knows predicts no run."""
+
+    class InTheirRooms(Told):
+        def foretells(self, fit: Any, colour: Any = None) -> float:
+            return super().foretells(fit) + (2.0 if "shared_air" in fit.spec.effects else 0.5)
+
+    case: Any = SimpleNamespace(plain=None)
+    told = InTheirRooms({"": 2.0, "lag": 1.0, "shared_air": 0.9})
+    headline = diagnosis._given(case, told, model("shared_air"))
+    assert headline is not None and case.plain and headline.rmse_c == 1.5
+
+
 def test_what_was_found_beside_a_cause_without_a_name_stays_as_large_where_it_foretells() -> None:
     """In the runs that are fitted the cause still acts: there its size would be another."""
     free = (

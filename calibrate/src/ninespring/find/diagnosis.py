@@ -523,7 +523,7 @@ def _foretold(case: _Case, judge: search.Search, judged_by: unseen.Unseen) -> re
 
 def _given(case: _Case, judged_by: unseen.Unseen, fit: Fit) -> results.Unseen | None:
     """Return how well a run is foretold by what was found or, where that foretells worse, by the better baseline."""
-    case.plain = judged_by.worse(fit)
+    case.plain = judged_by.worse(fit) or judged_by.given_worse(fit)
     if not case.plain:
         return judged_by.told(fit)
     why = f"with what was found it would be {judged_by.foretells(fit, judged_by.problem.colour):.2f} K"

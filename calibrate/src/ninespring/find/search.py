@@ -62,7 +62,9 @@ class Search:
 
     def goes_on(self) -> bool:
         """Return whether another step may begin."""
-        return self.problem.budget.allows() and self.problem.simulations <= self.until
+        within = self.problem.budget.allows() and self.problem.simulations <= self.until
+        self.problem.budget.short |= not within
+        return within
 
     @staticmethod
     def key(spec: Spec) -> tuple[tuple[str, str], ...]:

@@ -227,6 +227,11 @@ class Unseen:
         """Return whether something foretells the unseen worse than the better of both baselines."""
         return self.own(fit) > WORSE * self.rmse(self.better)
 
+    def given_worse(self, fit: Fit) -> bool:
+        """Return whether runs left out, each in the room that its first minute tells, are foretold worse than by the plain model: a
+        model is given to predict such runs."""
+        return self.foretells(fit, self.problem.colour) > WORSE * self.foretells(self.plain)
+
     def tells(self, fit: Fit, without: Fit) -> bool:
         """Return whether most of what is off in the unseen without an effect is foretold with it: no stand-in does that. Or, in runs
         left out, a part of it, where all that was found foretells most of what the given model does not and what the effect changes
@@ -304,7 +309,7 @@ class Unseen:
 
     def told(self, fit: Fit, why: str = "") -> results.Unseen | None:
         """Return what diagnosis.json says of the model that is given, None where nothing can be left out; `why` it is the plain one."""
-        mine = self.foretells(fit, self.problem.colour)
+        mine = self.foretells(fit, None if why else self.problem.colour)
         if not math.isfinite(mine):
             return None
         declared, lagged = self.foretells(self.base), self.foretells(self.lagged)

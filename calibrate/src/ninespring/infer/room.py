@@ -188,7 +188,8 @@ def of_run(
         said = value + float((spread @ (columns.T @ left))[0])
         variance = float(spread[0, 0]) + (LOSS_OFF * max(0.0, np.nanmax(part.temperature_c[0]) - usual[0])) ** 2
         value, sigma = _moments([one.with_told(said, variance) for one in guess])
-        value = float(np.clip(value, -35.0, 75.0))
+        # what is only heated does not begin colder than its room, which moves no further
+        value = float(np.clip(value, -35.0, min(75.0, first_c(run) + 2.0 * MOVES_K)))
     return value, sigma
 
 
