@@ -62,9 +62,7 @@ class Search:
 
     def goes_on(self) -> bool:
         """Return whether another step may begin."""
-        within = self.problem.budget.allows() and self.problem.simulations <= self.until
-        self.problem.budget.short |= not within
-        return within
+        return self.problem.budget.allows() and self.problem.simulations <= self.until
 
     @staticmethod
     def key(spec: Spec) -> tuple[tuple[str, str], ...]:
