@@ -1,10 +1,13 @@
 #include "circuit_peers.h"
 
 #include <math.h>
+#include <stddef.h>
 
-#define SHARE_Q7 128.0f
-#define OWN_Q12  4096.0f
-#define OWN_MOST 8191.0f
+#define SHARE_Q7   128.0f
+#define OWN_Q12    4096.0f
+#define OWN_MOST   8191.0f
+#define VOLTS_MV   16.0f
+#define VOLTS_MOST 65535.0f
 /* Offsets of both readings; a diode's drop moves with current and heat. */
 #define OFFSETS_MV 25.0f
 #define DROP_PART  0.15f
@@ -14,8 +17,8 @@
 #define ALONE_PART 0.20f /* the supply */
 #define LEARN_MOST 255u  /* windows: 2.5 minutes. What is soldered stays what it is */
 
-/* The middle one of the others that are driven; 0: too few. */
-static uint8_t middle_q7(const circuit_peers_t *peers, uint8_t springs, uint8_t k)
+/* The middle one of the others that are driven; NULL: too few. */
+static const circuit_peer_t *middle(const circuit_peers_t *peers, uint8_t springs, uint8_t k)
 {
     uint8_t sorted[CIRCUIT_PEERS_MAX];
     uint8_t count = 0;
@@ -25,12 +28,12 @@ static uint8_t middle_q7(const circuit_peers_t *peers, uint8_t springs, uint8_t 
             continue;
         }
         uint8_t at = count++;
-        for (; at > 0 && sorted[at - 1u] > share; at--) {
+        for (; at > 0 && peers->spring[sorted[at - 1u]].share_q7 > share; at--) {
             sorted[at] = sorted[at - 1u];
         }
-        sorted[at] = share;
+        sorted[at] = j;
     }
-    return count < CIRCUIT_PEERS_LEAST ? 0 : sorted[count / 2u];
+    return count < CIRCUIT_PEERS_LEAST ? NULL : &peers->spring[sorted[count / 2u]];
 }
 
 static uint8_t to_q7(float share)
@@ -39,14 +42,21 @@ static uint8_t to_q7(float share)
     return rounded < 1.0f ? 1u : rounded > 255.0f ? 255u : (uint8_t)rounded;
 }
 
-static void learn(circuit_peer_t *own, float beside)
+/* A mean by volts: so it is the sum of what was found over that of what the others make of it. */
+static void learn(circuit_peer_t *own, float beside, float told)
 {
-    const float was = (float)own->own_q12;
-    const float now = beside * OWN_Q12;
-    const float known = (float)own->learnt;
-    const float next = (was * known + now) / (known + 1.0f) + 0.5f;
+    const float known = (float)own->volts;
+    const float all = known + told;
+    const float next = ((float)own->own_q12 * known + beside * OWN_Q12 * told) / all + 0.5f;
     own->own_q12 = next < OWN_MOST ? (uint16_t)next & 0x1FFFu : 0x1FFFu;
+    own->volts = all < VOLTS_MOST ? (uint16_t)(all + 0.5f) : UINT16_MAX;
     own->learnt++;
+}
+
+/* An offset keeps its sign: of two shares, the one that was read at fewer volts is off by more. */
+static bool is_off(float share, float like, float part, float expected_mv, float offsets_mv)
+{
+    return fabsf(share - like) * expected_mv > part * like * expected_mv + offsets_mv;
 }
 
 bool circuit_peers_judge(circuit_peers_t *peers, uint8_t springs, uint8_t k,
@@ -61,28 +71,32 @@ bool circuit_peers_judge(circuit_peers_t *peers, uint8_t springs, uint8_t k,
     const float expected_mv = window->expected_mv;
     const float share = window->found_mv / expected_mv;
     const float offsets_mv = OFFSETS_MV + DROP_PART * (float)circuit->freewheel_mv;
-    const uint8_t others_q7 = middle_q7(peers, springs, k);
-    own->share_q7 = to_q7(share);
+    const float own_part = own->own_q12 != 0 ? (float)own->own_q12 / OWN_Q12 : 1.0f;
+    const circuit_peer_t *const other = middle(peers, springs, k);
+    const float shown = expected_mv / VOLTS_MV;
+    own->share_q7 = to_q7(share / own_part);
+    own->shown_16mv = shown < 255.0f ? (uint8_t)shown : 255u;
     bool odd = false;
-    if (others_q7 != 0) {
-        const float others = (float)others_q7 / SHARE_Q7;
-        const float off_mv = fabsf(share - others) * expected_mv;
-        odd = off_mv > OTHER_PART * others * expected_mv + offsets_mv;
+    if (other != NULL) {
+        const float others = (float)other->share_q7 / SHARE_Q7;
+        const float told_mv = fminf(expected_mv, VOLTS_MV * (float)other->shown_16mv);
+        odd = is_off(share, others, OTHER_PART, expected_mv, offsets_mv * expected_mv / told_mv);
         if (own->own_q12 != 0) {
-            const float like = others * (float)own->own_q12 / OWN_Q12;
-            odd = odd ||
-                  fabsf(share - like) * expected_mv > KNOWN_PART * like * expected_mv + offsets_mv;
+            const float learnt_mv = VOLTS_MV * (float)own->volts / (float)own->learnt;
+            odd = odd || is_off(share, others * own_part, KNOWN_PART, expected_mv,
+                                offsets_mv * expected_mv / fminf(told_mv, learnt_mv));
         }
-        if (!odd && own->learnt < LEARN_MOST) {
-            learn(own, share / others);
+        /* Where offsets make more than what a share may be at the most, it teaches nothing. */
+        if (!odd && own->learnt < LEARN_MOST && offsets_mv <= OTHER_PART * told_mv) {
+            learn(own, share / others, told_mv / VOLTS_MV);
         }
     } else if (own->was_q7 != 0) {
         const float was = (float)own->was_q7 / SHARE_Q7;
         const float part = own->odd >= CIRCUIT_PEERS_WINDOWS - 1u ? KNOWN_PART : ALONE_PART;
-        odd = fabsf(share - was) * expected_mv > part * was * expected_mv + offsets_mv;
+        odd = is_off(share, was, part, expected_mv, offsets_mv);
     }
     if (!odd) {
-        own->was_q7 = own->share_q7;
+        own->was_q7 = to_q7(share);
         own->odd = 0;
         own->agreed = 1;
     } else if (own->odd < CIRCUIT_PEERS_WINDOWS) {

@@ -28,10 +28,12 @@ extern "C" {
 
 /* Shares: voltage found behind a switch, of the voltage that its duty should bring. */
 typedef struct {
+    uint16_t volts;        /* in 16 mV: the sum of those at which it was learnt */
     uint16_t own_q12 : 13; /* its share of the others'; 0: not known */
     uint16_t odd : 2;      /* windows on end */
     uint16_t agreed : 1;   /* a window that was not odd, since the last clear */
-    uint8_t share_q7;      /* of the last window; 0: it told nothing */
+    uint8_t share_q7;      /* of the last window, over its own share; 0: it told nothing */
+    uint8_t shown_16mv;    /* the voltage that should have been there then */
     uint8_t was_q7;        /* of the last one that was not odd; 0: none was */
     uint8_t learnt;        /* windows that its own share is the mean of; at its most it stays */
 } circuit_peer_t;
@@ -43,13 +45,15 @@ typedef struct {
 
 /* Takes a spring's window. True if and only if for CIRCUIT_PEERS_WINDOWS on end the voltage that
  * was found is off from the expected one, times the middle share of the other springs that are
- * driven and times its own share of theirs, by more than 5 % and what offsets make. As long as its
- * own share is not known, by 18 % (its wiring, its gains); where fewer than CIRCUIT_PEERS_LEAST
- * others are driven, from what it showed before by 20 % (its supply may move), but by 5 % once it
- * was found and cleared. Its own share is the mean of the first 255 windows that are not odd, and
- * stays: so a drift is found, however slow. A window that tells nothing, or of less than 0.1 V, is
- * no witness for the others, and changes nothing else. springs at most CIRCUIT_PEERS_MAX, spring
- * below springs. */
+ * driven and times its own share of theirs, by more than 5 % and what offsets make: at the least of
+ * the voltages at which the two were read and its own share was learnt. As long as its own share is
+ * not known, by 18 % (its wiring, its gains); where fewer than CIRCUIT_PEERS_LEAST others are
+ * driven, from what it showed before by 20 % (its supply may move), but by 5 % once it was found
+ * and cleared. Its own share is the mean, by volts, of the first 255 windows that are not odd and
+ * in which offsets make less than those 18 %, and stays. The others count each over its own share,
+ * so a set that changes moves nothing, and what is learnt stays: so a drift is found, however slow.
+ * A window that tells nothing, or of less than 0.1 V, is no witness for the others, and changes
+ * nothing else. springs at most CIRCUIT_PEERS_MAX, spring below springs. */
 bool circuit_peers_judge(circuit_peers_t *peers, uint8_t springs, uint8_t spring,
                          const circuit_window_t *window,
                          const current_control_parameters_t *circuit);
