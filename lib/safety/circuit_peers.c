@@ -53,6 +53,18 @@ static void learn(circuit_peer_t *own, float beside, float told)
     own->learnt++;
 }
 
+static float lesser(float a, float b)
+{
+    return a < b ? a : b;
+}
+
+/* Of so many times 16 mV, or of the least that is compared. */
+static float volts_mv(float shown)
+{
+    const float mv = VOLTS_MV * shown;
+    return mv > CIRCUIT_WINDOW_LEAST_MV ? mv : CIRCUIT_WINDOW_LEAST_MV;
+}
+
 /* An offset keeps its sign: of two shares, the one that was read at fewer volts is off by more. */
 static bool is_off(float share, float like, float part, float expected_mv, float offsets_mv)
 {
@@ -77,14 +89,15 @@ bool circuit_peers_judge(circuit_peers_t *peers, uint8_t springs, uint8_t k,
     own->share_q7 = to_q7(share / own_part);
     own->shown_16mv = shown < 255.0f ? (uint8_t)shown : 255u;
     bool odd = false;
-    if (other != NULL) {
-        const float others = (float)other->share_q7 / SHARE_Q7;
-        const float told_mv = fminf(expected_mv, VOLTS_MV * (float)other->shown_16mv);
+    const uint8_t others_q7 = other != NULL ? other->share_q7 : 0;
+    if (others_q7 != 0) {
+        const float others = (float)others_q7 / SHARE_Q7;
+        const float told_mv = lesser(expected_mv, volts_mv((float)other->shown_16mv));
         odd = is_off(share, others, OTHER_PART, expected_mv, offsets_mv * expected_mv / told_mv);
-        if (own->own_q12 != 0) {
-            const float learnt_mv = VOLTS_MV * (float)own->volts / (float)own->learnt;
+        if (own->learnt != 0) {
+            const float learnt_mv = volts_mv((float)own->volts / (float)own->learnt);
             odd = odd || is_off(share, others * own_part, KNOWN_PART, expected_mv,
-                                offsets_mv * expected_mv / fminf(told_mv, learnt_mv));
+                                offsets_mv * expected_mv / lesser(told_mv, learnt_mv));
         }
         /* Where offsets make more than what a share may be at the most, it teaches nothing. */
         if (!odd && own->learnt < LEARN_MOST && offsets_mv <= OTHER_PART * told_mv) {
