@@ -325,12 +325,39 @@ TEST(what_is_learnt_is_the_mean_of_its_windows)
     TEST_ASSERT_INT_WITHIN(26, 4096, peers.spring[0].own_q12);
     TEST_ASSERT_EQUAL_HEX(0, rounds(400, SPRINGS, HEATS_MV, 1.0f, 1.0f));
     TEST_ASSERT_INT_WITHIN(8, 4096, peers.spring[0].own_q12);
+    TEST_ASSERT_EQUAL_UINT(255, peers.spring[0].learnt);
     TEST_ASSERT_EQUAL_HEX(0, rounds(1000, SPRINGS, HEATS_MV, 1.06f, 1.0f)); /* no more of it */
     TEST_ASSERT_EQUAL_HEX(0, rounds(3, SPRINGS, HEATS_MV, 0.935f, 1.0f));
 }
 
 /* Found by another rule: as if by this one; a good window after the clear acquits it. Alone, too:
  * its supply is what it was. */
+/* What offsets may have made of a share is what they make of the mean voltage it was learnt at. */
+TEST(a_share_is_known_as_well_as_its_volts_tell)
+{
+    const circuit_peer_t *const own = &peers.spring[0];
+    TEST_ASSERT_EQUAL_HEX(0, rounds(1, SPRINGS, 1600.0f, 1.0f, 1.0f)); /* it comes first: alone */
+    TEST_ASSERT_FALSE(takes(0, 640.0f, 1.0f) || takes(0, 640.0f, 1.0f));
+    TEST_ASSERT_EQUAL_UINT(80, own->volts);
+    TEST_ASSERT_FALSE(takes(0, 1600.0f, 0.92f));
+    TEST_ASSERT_EQUAL_UINT(0, own->odd);
+    TEST_ASSERT_EQUAL_UINT(180, own->volts);
+    TEST_ASSERT_INT_WITHIN(2, (80 * 4096 + 100 * 3768) / 180, own->own_q12);
+    TEST_ASSERT_FALSE(takes(0, 5000.0f, 0.96f));
+    TEST_ASSERT_EQUAL_UINT(255, own->shown_16mv);
+    circuit_peers_clear(&peers, 0, true);
+    TEST_ASSERT_EQUAL_UINT(0, own->volts);
+}
+
+/* One window is no row: until it is full, the supply may move. */
+TEST(what_is_odd_once_is_not_yet_judged_as_if_it_were_known)
+{
+    TEST_ASSERT_FALSE(takes(0, HEATS_MV, 1.0f) || takes(0, HEATS_MV, 0.75f));
+    TEST_ASSERT_EQUAL_UINT(1, peers.spring[0].odd);
+    TEST_ASSERT_FALSE(takes(0, HEATS_MV, 0.88f));
+    TEST_ASSERT_EQUAL_UINT(0, peers.spring[0].odd);
+}
+
 TEST(who_is_suspected_is_found_in_one_window_after_a_clear)
 {
     for (unsigned n = 0; n < 4; n++) {
