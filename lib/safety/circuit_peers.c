@@ -65,10 +65,10 @@ static float volts_mv(float shown)
     return mv > CIRCUIT_WINDOW_LEAST_MV ? mv : CIRCUIT_WINDOW_LEAST_MV;
 }
 
-/* An offset keeps its sign: of two shares, the one that was read at fewer volts is off by more. */
-static bool is_off(float share, float like, float part, float expected_mv, float offsets_mv)
+/* By how much a share is off beyond so large a part. */
+static float beyond(float share, float like, float part)
 {
-    return fabsf(share - like) * expected_mv > part * like * expected_mv + offsets_mv;
+    return fabsf(share - like) - part * like;
 }
 
 bool circuit_peers_judge(circuit_peers_t *peers, uint8_t springs, uint8_t k,
@@ -93,11 +93,12 @@ bool circuit_peers_judge(circuit_peers_t *peers, uint8_t springs, uint8_t k,
     if (others_q7 != 0) {
         const float others = (float)others_q7 / SHARE_Q7;
         const float told_mv = lesser(expected_mv, volts_mv((float)other->shown_16mv));
-        odd = is_off(share, others, OTHER_PART, expected_mv, offsets_mv * expected_mv / told_mv);
+        odd = beyond(share, others, OTHER_PART) * told_mv > offsets_mv;
         if (own->learnt != 0) {
-            const float learnt_mv = volts_mv((float)own->volts / (float)own->learnt);
-            odd = odd || is_off(share, others * own_part, KNOWN_PART, expected_mv,
-                                offsets_mv * expected_mv / lesser(told_mv, learnt_mv));
+            /* An offset keeps its sign: of two shares, the one at fewer volts is off by more. */
+            const float off = beyond(share, others * own_part, KNOWN_PART);
+            odd = odd || (off * told_mv > offsets_mv &&
+                          off * (VOLTS_MV * (float)own->volts) > offsets_mv * (float)own->learnt);
         }
         /* Where offsets make more than what a share may be at the most, it teaches nothing. */
         if (!odd && own->learnt < LEARN_MOST && offsets_mv <= OTHER_PART * told_mv) {
@@ -106,7 +107,7 @@ bool circuit_peers_judge(circuit_peers_t *peers, uint8_t springs, uint8_t k,
     } else if (own->was_q7 != 0) {
         const float was = (float)own->was_q7 / SHARE_Q7;
         const float part = own->odd >= CIRCUIT_PEERS_WINDOWS - 1u ? KNOWN_PART : ALONE_PART;
-        odd = is_off(share, was, part, expected_mv, offsets_mv);
+        odd = beyond(share, was, part) * expected_mv > offsets_mv;
     }
     if (!odd) {
         own->was_q7 = to_q7(share);
