@@ -299,8 +299,9 @@ struct result {
 class trial
 {
 public:
-    trial(const injected &one, const std::string &phase, std::uint64_t seed, const std::string &elf)
-        : scenario_(life(one, phase, seed)),
+    trial(const injected &one, const std::string &phase, std::uint64_t seed, double freewheel_v,
+          const std::string &elf)
+        : scenario_(life(one, phase, seed, freewheel_v)),
           board_(scenario_, elf, this, [](void *context, std::uint64_t, std::uint8_t octet) {
               static_cast<trial *>(context)->heard_ += static_cast<char>(octet);
           })
@@ -330,9 +331,11 @@ public:
 private:
     static constexpr double START_S = 1.2;
 
-    scenario life(const injected &one, const std::string &phase, std::uint64_t seed)
+    scenario life(const injected &one, const std::string &phase, std::uint64_t seed,
+                  double freewheel_v)
     {
         scenario s;
+        s.freewheel_v = freewheel_v;
         s.seed = seed;
         s.tolerance = 0.05;
         s.events = {say(0.6, "model cold"), say(0.8, PATTERN)};
@@ -482,9 +485,12 @@ int main(int argc, char **argv)
     CLI::App app{"One fault at a time: how hot, how soon safe, how soon said."};
     std::string elf = ninespring::default_elf("firmware.elf"), json, only;
     std::uint64_t seed = 7;
+    double freewheel_v = 0.0;
     std::vector<std::string> phases{"heats", "holds", "off"};
     app.add_option("--elf", elf)->capture_default_str();
     app.add_option("--seed", seed, "of the array")->capture_default_str();
+    app.add_option("--freewheel", freewheel_v, "V that the diodes drop, and nobody declares")
+        ->capture_default_str();
     app.add_option("--only", only, "faults in whose names this is");
     app.add_option("--phase", phases, "heats, holds, off: what the board does as it happens");
     app.add_option("--json", json, "the figures, for programs");
@@ -493,12 +499,12 @@ int main(int argc, char **argv)
     fmt::print("phase | fault | hottest | cleared 3 times | hotter unsaid by K | safe s | said s | "
                "said\n");
     for (const std::string &phase : phases) {
-        const result without = trial(catalogue()[0], phase, seed, elf).run();
+        const result without = trial(catalogue()[0], phase, seed, freewheel_v, elf).run();
         for (const injected &one : catalogue()) {
             if (one.name.find(only) == std::string::npos) {
                 continue;
             }
-            const result r = trial(one, phase, seed, elf).run();
+            const result r = trial(one, phase, seed, freewheel_v, elf).run();
             double unsaid_k = 0.0;
             for (unsigned k = 0; k < SPRINGS; ++k) {
                 unsaid_k = std::fmax(unsaid_k, r.unsaid_c[k] - without.peak_c[k]);

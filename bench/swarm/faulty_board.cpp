@@ -30,6 +30,7 @@ faulty_board::faulty_board(const scenario &one, const std::string &elf, void *co
                            board_byte_t on_uart)
     : truth_(truth_of(one)), bus_(one.seed)
 {
+    truth_upset(truth_.get(), TRUTH_FREEWHEEL_V, 0, one.freewheel_v);
     const board_array_t array = truth_array(truth_.get());
     const board_bus_t bus = bus_.hooks();
     char error[512] = "";

@@ -30,7 +30,10 @@ constexpr std::array<const char *, static_cast<std::size_t>(kind::count)> names 
 class dice
 {
 public:
-    explicit dice(std::uint64_t seed) : state_(random_seeded(seed, 29)) {}
+    explicit dice(std::uint64_t seed, std::uint64_t stream = 29)
+        : state_(random_seeded(seed, stream))
+    {
+    }
     double uniform(double low, double high) { return random_uniform(&state_, low, high); }
     unsigned below(unsigned limit) { return static_cast<unsigned>(random_bits(&state_) % limit); }
     bool chance(double share) { return uniform(0.0, 1.0) < share; }
@@ -300,6 +303,21 @@ void fault(dice &d, scenario &s)
     }
 }
 
+/* Of half of the boards; of these, half say what it drops, within 0.05 V. */
+void diode(scenario &s)
+{
+    dice d(s.seed, 30);
+    if (d.chance(0.5)) {
+        return;
+    }
+    s.freewheel_v = d.uniform(0.30, 0.45);
+    const double declared_v = s.freewheel_v + d.uniform(-0.05, 0.05);
+    if (d.chance(0.5)) {
+        s.events.push_back({0.65, kind::say, 0, true, 0.0,
+                            "$freewheel_v=" + std::to_string(declared_v).substr(0, 5)});
+    }
+}
+
 } // namespace
 
 const char *name_of(kind what)
@@ -329,6 +347,7 @@ scenario draw(std::uint64_t seed)
     for (unsigned n = 1 + d.below(3); n > 0; --n) {
         fault(d, s);
     }
+    diode(s);
     std::stable_sort(s.events.begin(), s.events.end(),
                      [](const event &a, const event &b) { return a.at_s < b.at_s; });
     return s;
@@ -339,7 +358,8 @@ void write(std::ostream &out, const scenario &one)
     out.precision(17);
     out << "# swarm: replay with bench_swarm --replay FILE\n";
     out << "seed " << one.seed << "\nduration_s " << one.duration_s << "\ntolerance "
-        << one.tolerance << "\nambient_c " << one.ambient_c << '\n';
+        << one.tolerance << "\nambient_c " << one.ambient_c << "\nfreewheel_v " << one.freewheel_v
+        << '\n';
     for (const event &e : one.events) {
         out << e.at_s << ' ' << name_of(e.what) << ' ' << e.channel << ' ' << (e.on ? 1 : 0) << ' '
             << e.value << (e.text.empty() ? "" : " ") << e.text << '\n';
@@ -366,6 +386,8 @@ scenario read(std::istream &in)
             good = static_cast<bool>(words >> s.tolerance);
         } else if (first == "ambient_c") {
             good = static_cast<bool>(words >> s.ambient_c);
+        } else if (first == "freewheel_v") {
+            good = static_cast<bool>(words >> s.freewheel_v);
         } else {
             event e{};
             std::istringstream again(line_text);

@@ -85,6 +85,7 @@ struct scenario {
     double duration_s = 0.0;
     double tolerance = 0.0; /* of the array */
     double ambient_c = 20.0;
+    double freewheel_v = 0.0;  /* what the diodes drop; 0: synchronous */
     std::vector<event> events; /* by time */
 };
 

@@ -111,18 +111,23 @@ static bool is_open(const truth_t *truth, unsigned k)
     return truth->fault[k] == PLANT_FAULT_OPEN || (hz > 0.0 && fmod(hz * now_s(truth), 1.0) < 0.5);
 }
 
-/* Mean voltage behind the switch. */
-static double driven_v(const truth_t *truth, unsigned k)
+/* Mean voltage behind the switch; where current flows, its diode drops its part of that. */
+static double driven_v(const truth_t *truth, unsigned k, bool flows)
 {
     double duty = truth->duty[k];
     if (duty > 0.0 && duty < 1.0) {
         duty = fmin(fmax(duty + of(truth, TRUTH_SLOW_SHARE, k), 0.0), 1.0);
     }
+    double dropped_v = 0.0;
+    if (flows && duty > 0.0 && of(truth, TRUTH_DIODE_OPEN, k) <= 0.0) {
+        dropped_v = (1.0 - duty) * of(truth, TRUTH_FREEWHEEL_V, 0);
+    }
     if (truth->fed) {
         const double leak_v = of(truth, TRUTH_LEAK_A, k) * (spring_ohm(truth, k) + truth->loop_ohm);
+        dropped_v = truth->welded[k] ? 0.0 : dropped_v;
         duty = truth->welded[k] ? 1.0 : duty + (1.0 - duty) * leak_v / truth->supply_v;
     }
-    return supply_v(truth) * duty;
+    return fmax(supply_v(truth) * duty - dropped_v, 0.0);
 }
 
 /* Two springs whose hot ends touch: a stage that would have to take current lets none flow. */
@@ -130,14 +135,14 @@ static double joined_v(const truth_t *truth, unsigned a, unsigned b)
 {
     const double g = 1.0 / truth->loop_ohm;
     const double springs_g = 1.0 / spring_ohm(truth, a) + 1.0 / spring_ohm(truth, b);
-    const double a_v = driven_v(truth, a), b_v = driven_v(truth, b);
+    const double a_v = driven_v(truth, a, true), b_v = driven_v(truth, b, true);
     const double both_v = g * (a_v + b_v) / (2.0 * g + springs_g);
     return both_v <= fmin(a_v, b_v) ? both_v : g * fmax(a_v, b_v) / (g + springs_g);
 }
 
 static flow_t flow_of(const truth_t *truth, unsigned k)
 {
-    const double driving_v = driven_v(truth, k);
+    const double driving_v = driven_v(truth, k, !is_open(truth, k));
     const double ohm = spring_ohm(truth, k);
     const double other = of(truth, TRUTH_BRIDGE, k);
     if (other >= 0.0) {

@@ -34,6 +34,7 @@ typedef enum {
     TRUTH_CONTACT_OHM,  /* more for each 100 K of its spring */
     TRUTH_CHATTER_HZ,   /* its crimp opens and closes */
     TRUTH_GROUND_OHM,   /* of all: what their currents lift is read beside each voltage */
+    TRUTH_FREEWHEEL_V,  /* of all: what their diodes drop */
     TRUTH_RIPPLE_SHARE, /* of all: of the supply, up and down */
     TRUTH_RIPPLE_HZ,    /* of all */
     TRUTH_CLOCK         /* of all: the world's seconds in one of the board's; 0: 1 */

@@ -328,6 +328,19 @@ static void supply(draw_t *draw)
     say(draw, "supply %.2f V", draw->run->world.supply_v);
 }
 
+static void diodes(draw_t *draw)
+{
+    run_case_t *run = draw->run;
+    run->world.freewheel_v = uniform(draw, 0.30, 0.45);
+    const double declared_v = run->world.freewheel_v + uniform(draw, -0.05, 0.05);
+    draw->swarm->diode = chance(draw, 0.5) ? SWARM_DECLARED : SWARM_UNDECLARED;
+    if (draw->swarm->diode == SWARM_DECLARED) {
+        run->settings.current.freewheel_mv = (uint16_t)lround(1000.0 * declared_v);
+    }
+    say(draw, "diodes of %.2f V, %.2f declared", run->world.freewheel_v,
+        1e-3 * run->settings.current.freewheel_mv);
+}
+
 /* What happens. */
 
 static double moment_s(draw_t *draw)
@@ -592,6 +605,7 @@ static const disturbance_t drawn[] = {
     {0.03, broken_sensor, "a sensor freezes, lies by 8 to 30 %, is of another shunt, or swapped"},
     {0.06, habits, "up to three other patterns"},
     {0.04, reset, "power off and on"},
+    {0.40, diodes, "diodes that drop 0.30 to 0.45 V, declared within 0.05 V or, half of them, not"},
 };
 #define DECLARED ((int)(sizeof declared / sizeof declared[0]))
 #define DRAWN    ((int)(sizeof drawn / sizeof drawn[0]))

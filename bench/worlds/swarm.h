@@ -19,14 +19,22 @@ typedef enum {
     SWARM_GROUPS
 } swarm_group_t;
 
+typedef enum {
+    SWARM_SYNCHRONOUS = 0,
+    SWARM_DECLARED,
+    SWARM_UNDECLARED,
+    SWARM_DIODES
+} swarm_diode_t;
+
 typedef struct {
     run_case_t
         run; /* run.step_s is set where the step is of the size that must be come back from */
     swarm_group_t group;
-    bool steps;  /* anything at all changes in the run but the noise */
-    bool second; /* the second truth: other equations of transformation and convection */
-    bool told;   /* its alloy's temperatures are: the board knows another martensite start */
-    bool tells;  /* the resistance changes enough with the phase to tell it */
+    swarm_diode_t diode; /* that freewheels */
+    bool steps;          /* anything at all changes in the run but the noise */
+    bool second;         /* the second truth: other equations of transformation and convection */
+    bool told;  /* its alloy's temperatures are: the board knows another martensite start */
+    bool tells; /* the resistance changes enough with the phase to tell it */
     bool broken[WORLD_SPRINGS_MAX];       /* its sensor is: it is right to give it up */
     uint64_t drawn;                       /* a bit for each of swarm_says */
     double loss_change, ambient_change_k; /* the lasting step's; 0: none */

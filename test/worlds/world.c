@@ -403,8 +403,10 @@ static void heat(world_t *world, int k, uint16_t duty)
         part[n] = node_ohm(&world->parameters.spring[k], &spring->node[n]);
         ohm += part[n];
     }
+    const double share = (double)duty / CONTROLLER_DUTY_MAX;
+    const double dropped_v = duty > 0 ? (1.0 - share) * world->parameters.freewheel_v : 0.0;
     double current_a =
-        world->supply_v * duty / CONTROLLER_DUTY_MAX / (ohm + world->parameters.loop_ohm);
+        fmax(world->supply_v * share - dropped_v, 0.0) / (ohm + world->parameters.loop_ohm);
     for (int n = 0; n < WORLD_NODES; n++) {
         double contact_ohm = n == 1 ? 0.0 : 0.25 * spring->contact_ohm;
         spring->node[n].power_w = current_a * current_a * (part[n] + contact_ohm);

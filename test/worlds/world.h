@@ -78,6 +78,7 @@ typedef struct {
     double orthogonal_w_per_k, diagonal_w_per_k; /* between neighbouring springs */
     double fan_loss_factor;                      /* loss to the air with the fan full on */
     double supply_v;
+    double freewheel_v;       /* drop of the freewheel diodes; 0: synchronous */
     double loop_ohm;          /* beyond spring and contacts: shunt, switch, inductor */
     double ambient_c;         /* true */
     double ambient_setting_c; /* what the board is told */
