@@ -142,6 +142,7 @@ static void start(controller_t *controller, const controller_settings_t *setting
     thermal_model_reset(model, ambient_c7);
     temperature_ceiling_prepare(&controller->drive, model, &settings->current);
     (void)current_control_init(&controller->current, &settings->current, NULL);
+    circuit_source_begin(&controller->source, &settings->current);
     (void)safety_init(&controller->safety, &settings->safety, controller->springs, NULL);
     spring_estimator_restart(&controller->estimator, model);
     (void)drive_policy_init(&controller->policy, &settings->policy, model, NULL);
@@ -219,9 +220,11 @@ bool controller_apply_settings(controller_t *controller, const controller_settin
         if (memcmp(&controller->current.parameters, &settings->current, sizeof settings->current) !=
             0) {
             controller->peers = (circuit_peers_t){0}; /* it is another circuit */
+            circuit_source_begin(&controller->source, &settings->current);
             memset(controller->mistrusted, 0, sizeof controller->mistrusted);
         }
         (void)current_control_apply(&controller->current, &settings->current, NULL);
+        current_control_set_drop(&controller->current, controller->source.driven_drop_mv);
         temperature_ceiling_prepare(&controller->drive, &controller->model, &settings->current);
         (void)safety_apply(&controller->safety, &settings->safety, NULL);
         (void)apply_policy(controller, &settings->policy);
@@ -271,6 +274,7 @@ static uint32_t take_sensors(controller_t *controller, const controller_sensor_t
                              bool valid[])
 {
     uint32_t sum_ma = 0;
+    const uint8_t dead_steps = current_control_dead_steps(&controller->current);
     for (uint8_t k = 0; k < controller->springs; k++) {
         const uint16_t duty = controller_duty(controller, k);
         const safety_sample_t sample = {
@@ -282,8 +286,8 @@ static uint32_t take_sensors(controller_t *controller, const controller_sensor_t
             .most_mv = most_mv(controller, k, duty),
             .temperature_c7 = thermal_model_temperature_c7(&controller->model, k)};
         valid[k] = safety_tick_spring(&controller->safety, k, &sample);
-        circuit_check_take(&controller->circuit[k], controller->current.fixed_mohm, duty, valid[k],
-                           sensor[k].current_ma, sensor[k].voltage_mv);
+        circuit_check_take(&controller->circuit[k], controller->current.fixed_mohm, dead_steps,
+                           duty, valid[k], sensor[k].current_ma, sensor[k].voltage_mv);
         controller->duty_sum[k] = (uint16_t)(controller->duty_sum[k] + duty);
         if (valid[k]) {
             controller->measured_ma[k] = sensor[k].current_ma;
@@ -302,17 +306,33 @@ static uint32_t take_sensors(controller_t *controller, const controller_sensor_t
     return sum_ma;
 }
 
+/* What was held against a spring by another belief is of no use. */
+static void learn_source(controller_t *controller)
+{
+    const bool other = circuit_source_fit(&controller->source, &controller->current.parameters);
+    current_control_set_drop(&controller->current, controller->source.driven_drop_mv);
+    if (other) {
+        circuit_peers_renew(&controller->peers, controller->springs);
+        memset(controller->step, 0, sizeof controller->step);
+    }
+}
+
 /* What no belief can talk away: is it a circuit, and how hot could it be by now? */
 static void judge_circuit(controller_t *controller, uint8_t k)
 {
-    const current_control_parameters_t *parameters = &controller->current.parameters;
+    circuit_source_t *const source = &controller->source;
     circuit_window_t window;
-    const bool is_none = circuit_check_judge(&controller->circuit[k], parameters, &window);
+    const bool is_none = circuit_check_judge(&controller->circuit[k], source, &window);
     const bool is_odd =
-        circuit_peers_judge(&controller->peers, controller->springs, k, &window, parameters);
-    const bool steps = circuit_step_judge(&controller->step[k], &window, parameters);
+        circuit_peers_judge(&controller->peers, controller->springs, k, &window, source);
+    const bool steps =
+        circuit_step_judge(&controller->step[k], &window, source, &controller->current.parameters);
     if (steps) {
         circuit_peers_suspect(&controller->peers, k, circuit_step_before_q12(&controller->step[k]));
+    }
+    if (window.steady && window.found_mv >= CIRCUIT_WINDOW_LEAST_MV &&
+        controller->peers.spring[k].odd == 0 && controller->step[k].odd == 0) {
+        circuit_source_take(source, window.duty, window.found_mv);
     }
     if (is_none || is_odd || steps ||
         spring_estimator_is_unlike(spring_estimator_of(&controller->estimator, k))) {
@@ -324,7 +344,8 @@ static void raise_ceiling(controller_t *controller, uint8_t k)
 {
     const float measured_w = 1e-6f / (float)CIRCUIT_CHECK_TICKS * (float)controller->heat_sum_uw[k];
     const float driven_w = temperature_ceiling_power_w(
-        &controller->drive, 1.0f / (float)CIRCUIT_CHECK_TICKS * (float)controller->duty_sum[k]);
+        &controller->drive, 1.0f / (float)CIRCUIT_CHECK_TICKS * (float)controller->duty_sum[k],
+        controller->source.more_drop_v);
     temperature_ceiling_step(&controller->ceiling, &controller->model, k,
                              measured_w > driven_w ? measured_w : driven_w);
     controller->heat_sum_uw[k] = 0;
@@ -384,6 +405,9 @@ static void step_model(controller_t *controller, const controller_inputs_t *inpu
         return;
     }
     controller->model_tick = 0;
+    if (controller->floor_turn == FLOOR_TURNS / 2u) {
+        learn_source(controller);
+    }
     for (uint8_t k = 0; k < controller->springs; k++) {
         controller->power_sum_uw[k] = spring_estimator_model_power_uw(
             &controller->estimator, k, mean_of_step(controller->power_sum_uw[k]));

@@ -9,6 +9,7 @@
 
 #include "circuit_check.h"
 #include "circuit_peers.h"
+#include "circuit_source.h"
 #include "circuit_step.h"
 #include "current_control.h"
 #include "drive_policy.h"
@@ -86,6 +87,7 @@ typedef struct {
     uint32_t power_sum_uw[CONTROLLER_MAX_SPRINGS]; /* over the ticks of the running model step */
     circuit_check_t circuit[CONTROLLER_MAX_SPRINGS];
     circuit_peers_t peers;
+    circuit_source_t source;
     circuit_step_t step[CONTROLLER_MAX_SPRINGS];
     /* a bit a spring: it had SAFETY_FAULT_SENSOR_MISMATCH or _STUCK_ON, cleared since */
     uint8_t mistrusted[(CONTROLLER_MAX_SPRINGS + 7) / 8];

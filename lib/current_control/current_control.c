@@ -15,6 +15,12 @@ bool current_control_check(const current_control_parameters_t *p, uint16_t *bad)
     return parameter_check(PARAMETER_PART_CURRENT, p, bad);
 }
 
+void current_control_set_drop(current_control_t *control, uint16_t drop_mv)
+{
+    const uint16_t swing_mv = (uint16_t)(control->parameters.supply_mv + drop_mv);
+    control->offset_q16 = (int32_t)(drop_mv * 51200ul / swing_mv * 1024ul); /* 800 steps */
+}
+
 bool current_control_apply(current_control_t *control, const current_control_parameters_t *p,
                            uint16_t *bad)
 {
@@ -27,7 +33,7 @@ bool current_control_apply(current_control_t *control, const current_control_par
     /* 800 steps / (1000 x swing) per mA mohm, in Q24 */
     control->gain_q24_per_mohm = (uint16_t)(13421773ul / swing_mv);
     control->fixed_mohm = (uint16_t)(p->shunt_mohm + p->wiring_mohm);
-    control->offset_q16 = (int32_t)(p->freewheel_mv * 51200ul / swing_mv * 1024ul); /* 800 steps */
+    current_control_set_drop(control, p->freewheel_mv);
     uint32_t trim_q16 = ((uint32_t)p->trim_limit_mohm * control->gain_q24_per_mohm) >> 8;
     control->trim_limit_q24 = (int32_t)(trim_q16 > TRIM_LIMIT ? TRIM_LIMIT : trim_q16) * 256;
     control->integral_q16 = (uint16_t)(p->integral_permille * 65535ul / 1000u);

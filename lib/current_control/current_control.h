@@ -37,10 +37,10 @@ typedef struct {
     current_control_parameters_t parameters;
     uint16_t gain_q24_per_mohm; /* duty steps per mA and mohm */
     uint16_t fixed_mohm;        /* shunt and wiring */
-    int32_t offset_q16;         /* duty that only overcomes the freewheel drop */
     int32_t trim_limit_q24;
     uint16_t integral_q16;
-    bool even_turn; /* channels 0, 2, .. had their turn in the last tick */
+    bool even_turn;     /* channels 0, 2, .. had their turn in the last tick */
+    int32_t offset_q16; /* duty that only overcomes the freewheel drop */
     current_control_channel_t channel[CURRENT_CONTROL_MAX_CHANNELS];
 } current_control_t;
 
@@ -57,6 +57,16 @@ bool current_control_init(current_control_t *control,
  * current_control_check does. */
 bool current_control_apply(current_control_t *control,
                            const current_control_parameters_t *parameters, uint16_t *bad);
+
+/* The drop of the freewheel diodes, up to 1 V, in place of the declared one. */
+void current_control_set_drop(current_control_t *control, uint16_t drop_mv);
+
+/* Steps of duty that only overcome that drop: up to 255, which are more. */
+static inline uint8_t current_control_dead_steps(const current_control_t *control)
+{
+    const uint16_t steps = (uint16_t)((uint32_t)control->offset_q16 >> 16);
+    return (steps < UINT8_MAX ? steps : UINT8_MAX) & 0xFFu;
+}
 
 /* Estimate of the spring's resistance, without shunt and wiring; 0 after init. Call it when it
  * changes, and after apply. */

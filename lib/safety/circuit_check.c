@@ -3,8 +3,7 @@
 #include <math.h>
 #include <stddef.h>
 
-#define LEAST_READINGS  12u /* where a current rises, every other tick gives one */
-#define DUTY_STEPS      800.0f
+#define LEAST_READINGS  12u    /* where a current rises, every other tick gives one */
 #define SQUARED_MOST_MV 11965u /* a window of these fits 32 bits; no sensor shows as much */
 
 /* Of the duty, steps^2. A quarter of the default dither gives 1; below that, four times a sensor's
@@ -18,6 +17,8 @@
 /* Least deviation of the duty, of itself, that tells a slope: a supply that moves by 5 % beside it,
  * as others switch, adds half of it at the most. */
 #define SLOPE_SHARE 0.05f
+/* Deviation of a duty, of itself, at which voltages are still those of one duty. */
+#define STEADY_SHARE 0.15f
 /* Off by more than the same tolerances, and the offsets of both readings. */
 #define BALANCE_SHARE 0.3f
 #define BALANCE_MV    15.0f
@@ -36,12 +37,34 @@ static uint16_t amount(int16_t value)
     return (uint16_t)value > CIRCUIT_CHECK_MOST ? CIRCUIT_CHECK_MOST : (uint16_t)value;
 }
 
-void circuit_check_take(circuit_check_t *c, uint16_t fixed_mohm, uint16_t duty, bool valid,
-                        int16_t current_ma, int16_t voltage_mv)
+static circuit_check_t begun(const circuit_check_t *c)
+{
+    return (circuit_check_t){.last_duty = c->last_duty,
+                             .last_ma = c->last_ma,
+                             .last_mv = c->last_mv,
+                             .astray = c->astray,
+                             .unbalanced = c->unbalanced,
+                             .restless = c->restless};
+}
+
+/* The drop is no part of a voltage where nothing flows. */
+static bool is_of_one_kind(circuit_check_t *c, uint8_t dead_steps, uint16_t duty)
+{
+    if (dead_steps == 0) {
+        return true;
+    }
+    if (duty > dead_steps && c->duty == 0) {
+        *c = begun(c);
+    }
+    return duty > dead_steps || (duty == 0 && c->duty == 0);
+}
+
+void circuit_check_take(circuit_check_t *c, uint16_t fixed_mohm, uint8_t dead_steps, uint16_t duty,
+                        bool valid, int16_t current_ma, int16_t voltage_mv)
 {
     const uint16_t moved = (uint16_t)(duty - c->last_duty + CIRCUIT_CHECK_JUMP);
     c->last_duty = duty;
-    if (!valid || moved > 2u * CIRCUIT_CHECK_JUMP) {
+    if (!valid || moved > 2u * CIRCUIT_CHECK_JUMP || !is_of_one_kind(c, dead_steps, duty)) {
         return;
     }
     const uint16_t dropped_mv = (uint16_t)(((uint32_t)amount(current_ma) * fixed_mohm) >>
@@ -89,7 +112,7 @@ static bool moves_alone(float voltage_variance, float follows_mv, float duty_var
     return voltage_variance - by_duty_mv2 > likely_mv * likely_mv + RESTLESS_MV * RESTLESS_MV;
 }
 
-bool circuit_check_judge(circuit_check_t *c, const current_control_parameters_t *p,
+bool circuit_check_judge(circuit_check_t *c, const circuit_source_t *source,
                          circuit_window_t *window)
 {
     bool astray = false;
@@ -100,38 +123,41 @@ bool circuit_check_judge(circuit_check_t *c, const current_control_parameters_t 
     }
     if (c->readings >= LEAST_READINGS) {
         const float share = 1.0f / (float)c->readings;
-        const float drop_mv = (float)p->freewheel_mv;
-        const float step_mv = ((float)p->supply_mv + drop_mv) * (1.0f / DUTY_STEPS); /* of duty */
+        const float step_mv = source->step_mv;
         const float duty = share * (float)c->duty;
         const float found_mv = share * (float)c->voltage_mv;
         const float variance = share * (float)c->duty_square - duty * duty;
         const float follows_mv = share * (float)c->duty_voltage - duty * found_mv;
         const float should_mv = variance * step_mv;
-        const float driven_mv = duty * step_mv - drop_mv;
+        const float driven_mv = duty * step_mv - source->drop_mv;
         const float expected_mv = driven_mv > 0.0f ? driven_mv : 0.0f;
         const float slope_variance = SLOPE_SHARE * SLOPE_SHARE * duty * duty;
         const bool tells = variance >= fmaxf(LEAST_VARIANCE, slope_variance);
         const bool other =
             follows_mv < LEAST_SLOPE * should_mv || follows_mv > MOST_SLOPE * should_mv;
-        astray = (tells && other) ||
-                 (variance >= LEAST_VARIANCE && stands(c, should_mv * step_mv, found_mv));
-        unbalanced = fabsf(found_mv - expected_mv) > BALANCE_SHARE * expected_mv + BALANCE_MV;
+        /* else the drop may take all of it, and nothing follows */
+        const bool flows = expected_mv >= source->unsure_mv;
+        astray = flows && ((tells && other) || (variance >= LEAST_VARIANCE &&
+                                                stands(c, should_mv * step_mv, found_mv)));
+        const float off_mv = found_mv - expected_mv;
+        unbalanced = fabsf(off_mv) > BALANCE_SHARE * expected_mv + BALANCE_MV +
+                                         (off_mv < 0.0f ? source->more_mv : source->less_mv);
         const float square_mv2 = share * (float)c->voltage_square;
         restless = moves_alone(square_mv2 - found_mv * found_mv, follows_mv, variance, found_mv);
         if (window != NULL) {
-            *window = (circuit_window_t){found_mv, expected_mv,
-                                         2.0f * share * (float)c->current_2ma, true};
+            *window =
+                (circuit_window_t){.found_mv = found_mv,
+                                   .expected_mv = expected_mv,
+                                   .current_ma = 2.0f * share * (float)c->current_2ma,
+                                   .duty = duty,
+                                   .steady = variance < STEADY_SHARE * STEADY_SHARE * duty * duty,
+                                   .tells = true};
         }
     }
     c->astray = counted(c->astray, astray) & 15u;
     c->unbalanced = counted(c->unbalanced, unbalanced) & 15u;
     c->restless = counted(c->restless, restless);
-    *c = (circuit_check_t){.last_duty = c->last_duty,
-                           .last_ma = c->last_ma,
-                           .last_mv = c->last_mv,
-                           .astray = c->astray,
-                           .unbalanced = c->unbalanced,
-                           .restless = c->restless};
+    *c = begun(c);
     return c->astray >= CIRCUIT_CHECK_WINDOWS || c->unbalanced >= CIRCUIT_CHECK_BALANCE_WINDOWS ||
            c->restless >= CIRCUIT_CHECK_BALANCE_WINDOWS;
 }

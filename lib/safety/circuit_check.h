@@ -8,7 +8,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "parameters.h"
+#include "circuit_source.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -43,9 +43,11 @@ typedef struct {
 /* What a window's voltages were, in the mean. */
 typedef struct {
     float found_mv;    /* behind the switch */
-    float expected_mv; /* by duty and declared supply */
+    float expected_mv; /* by duty, supply and drop */
     float current_ma;
-    bool tells; /* there were readings enough */
+    bool tells;  /* there were readings enough */
+    bool steady; /* all at about the same duty */
+    float duty;  /* steps of 800 */
 } circuit_window_t;
 
 /* Below it, offsets are most of what differs. */
@@ -57,16 +59,18 @@ static inline bool circuit_window_compares(const circuit_window_t *window)
 }
 
 /* One tick: the duty (steps of 800) that was applied in it and, if valid, what was read at its end.
- * Above CIRCUIT_CHECK_MOST counts as that, below 0 as 0. fixed_mohm: shunt and wiring. */
-void circuit_check_take(circuit_check_t *check, uint16_t fixed_mohm, uint16_t duty, bool valid,
-                        int16_t current_ma, int16_t voltage_mv);
+ * Above CIRCUIT_CHECK_MOST counts as that, below 0 as 0. fixed_mohm: shunt and wiring. dead_steps:
+ * of duty, that only overcome the drop. Where there are any, a duty that is not more tells nothing;
+ * none at all tells something where none is given in all of the window. */
+void circuit_check_take(circuit_check_t *check, uint16_t fixed_mohm, uint8_t dead_steps,
+                        uint16_t duty, bool valid, int16_t current_ma, int16_t voltage_mv);
 
 /* Ends the window, begins the next one: at most CIRCUIT_CHECK_TICKS ticks after the last. True if
  * and only if what was read has not been a circuit for CIRCUIT_CHECK_WINDOWS windows on end, or
  * CIRCUIT_CHECK_BALANCE_WINDOWS: its voltage is not what the duty should bring, or moves beside it
  * as no supply does. A window that can tell nothing (few readings; for the first, a duty that
  * hardly moves) ends such a row. window may be NULL. */
-bool circuit_check_judge(circuit_check_t *check, const current_control_parameters_t *circuit,
+bool circuit_check_judge(circuit_check_t *check, const circuit_source_t *source,
                          circuit_window_t *window);
 
 #ifdef __cplusplus

@@ -71,9 +71,25 @@ static float beyond(float share, float like, float part)
     return fabsf(share - like) - part * like;
 }
 
+/* Its share beside that of the others, which was told at so few volts. */
+static bool is_odd(const circuit_peer_t *own, float share, float others, float told_mv,
+                   float offsets_mv)
+{
+    if (beyond(share, others, OTHER_PART) * told_mv > offsets_mv) {
+        return true;
+    }
+    if (own->learnt == 0) {
+        return false;
+    }
+    /* An offset keeps its sign: of two shares, the one at fewer volts is off by more. */
+    const float own_part = (float)own->own_q12 / OWN_Q12;
+    const float off = beyond(share, others * own_part, KNOWN_PART);
+    return off * told_mv > offsets_mv &&
+           off * (VOLTS_MV * (float)own->volts) > offsets_mv * (float)own->learnt;
+}
+
 bool circuit_peers_judge(circuit_peers_t *peers, uint8_t springs, uint8_t k,
-                         const circuit_window_t *window,
-                         const current_control_parameters_t *circuit)
+                         const circuit_window_t *window, const circuit_source_t *source)
 {
     circuit_peer_t *own = &peers->spring[k];
     if (!circuit_window_compares(window)) {
@@ -82,7 +98,7 @@ bool circuit_peers_judge(circuit_peers_t *peers, uint8_t springs, uint8_t k,
     }
     const float expected_mv = window->expected_mv;
     const float share = window->found_mv / expected_mv;
-    const float offsets_mv = OFFSETS_MV + DROP_PART * (float)circuit->freewheel_mv;
+    const float offsets_mv = OFFSETS_MV + DROP_PART * source->drop_mv;
     const float own_part = own->own_q12 != 0 ? (float)own->own_q12 / OWN_Q12 : 1.0f;
     const circuit_peer_t *const other = middle(peers, springs, k);
     const float shown = expected_mv / VOLTS_MV;
@@ -92,22 +108,25 @@ bool circuit_peers_judge(circuit_peers_t *peers, uint8_t springs, uint8_t k,
     const uint8_t others_q7 = other != NULL ? other->share_q7 : 0;
     if (others_q7 != 0) {
         const float others = (float)others_q7 / SHARE_Q7;
-        const float told_mv = lesser(expected_mv, volts_mv((float)other->shown_16mv));
-        odd = beyond(share, others, OTHER_PART) * told_mv > offsets_mv;
-        if (own->learnt != 0) {
-            /* An offset keeps its sign: of two shares, the one at fewer volts is off by more. */
-            const float off = beyond(share, others * own_part, KNOWN_PART);
-            odd = odd || (off * told_mv > offsets_mv &&
-                          off * (VOLTS_MV * (float)own->volts) > offsets_mv * (float)own->learnt);
-        }
+        const float other_mv = volts_mv((float)other->shown_16mv);
+        const float told_mv = lesser(expected_mv, other_mv);
+        /* What is wrong with the drop takes as much of both voltages. */
+        const float more_mv = expected_mv > other_mv ? expected_mv : other_mv;
+        /* One more than is believed makes the share at fewer volts the lower one. */
+        const bool is_more = (share < others * own_part) == (expected_mv < other_mv);
+        const float unsure_mv = is_more ? source->more_mv : source->less_mv;
+        odd = is_odd(own, share, others, told_mv, offsets_mv) &&
+              is_odd(own, share, others, told_mv,
+                     offsets_mv + unsure_mv * (1.0f - told_mv / more_mv));
         /* Where offsets make more than what a share may be at the most, it teaches nothing. */
-        if (!odd && own->learnt < LEARN_MOST && offsets_mv <= OTHER_PART * told_mv) {
+        if (!odd && own->learnt < LEARN_MOST &&
+            offsets_mv + source->unsure_mv <= OTHER_PART * told_mv) {
             learn(own, share / others, told_mv / VOLTS_MV);
         }
     } else if (own->was_q7 != 0) {
         const float was = (float)own->was_q7 / SHARE_Q7;
         const float part = own->odd >= CIRCUIT_PEERS_WINDOWS - 1u ? KNOWN_PART : ALONE_PART;
-        odd = beyond(share, was, part) * expected_mv > offsets_mv;
+        odd = beyond(share, was, part) * expected_mv > offsets_mv + source->unsure_mv;
     }
     if (!odd) {
         own->was_q7 = to_q7(share);
@@ -125,6 +144,14 @@ void circuit_peers_suspect(circuit_peers_t *peers, uint8_t spring, uint16_t befo
     if (own->odd < CIRCUIT_PEERS_WINDOWS) {
         own->odd = CIRCUIT_PEERS_WINDOWS;
         own->was_q7 = to_q7((float)before_q12 / OWN_Q12);
+    }
+}
+
+void circuit_peers_renew(circuit_peers_t *peers, uint8_t springs)
+{
+    for (uint8_t k = 0; k < springs; k++) {
+        peers->spring[k].share_q7 = 0;
+        peers->spring[k].was_q7 = 0;
     }
 }
 

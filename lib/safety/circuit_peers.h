@@ -55,12 +55,14 @@ typedef struct {
  * nothing, or of less than 0.1 V, is no witness for the others, and changes nothing else. springs
  * at most CIRCUIT_PEERS_MAX, spring below springs. */
 bool circuit_peers_judge(circuit_peers_t *peers, uint8_t springs, uint8_t spring,
-                         const circuit_window_t *window,
-                         const current_control_parameters_t *circuit);
+                         const circuit_window_t *window, const circuit_source_t *source);
 
 /* Another rule has found that the spring's sensor began to lie: as if three windows had been odd.
  * before_q12: the share that it showed until then, above 0. */
 void circuit_peers_suspect(circuit_peers_t *peers, uint8_t spring, uint16_t before_q12);
+
+/* Supply and drop are believed to be others: shares of before are of no use. */
+void circuit_peers_renew(circuit_peers_t *peers, uint8_t springs);
 
 /* A fault is cleared: the spring's row ends, but for its last window where it was full: the next
  * window is enough then, as a heating of a sensor that lies costs 12 K a second. What is known of

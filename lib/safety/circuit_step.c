@@ -27,7 +27,7 @@ static bool is_off(uint16_t now, uint16_t was, float most_part)
 }
 
 bool circuit_step_judge(circuit_step_t *step, const circuit_window_t *window,
-                        const current_control_parameters_t *circuit)
+                        const circuit_source_t *source, const current_control_parameters_t *circuit)
 {
     const float fixed_ohm = 1e-3f * (float)((uint32_t)circuit->shunt_mohm + circuit->wiring_mohm);
     const float spring_mv = window->found_mv - fixed_ohm * window->current_ma;
@@ -38,7 +38,9 @@ bool circuit_step_judge(circuit_step_t *step, const circuit_window_t *window,
     const circuit_shown_t now = {to_q12(window->found_mv / window->expected_mv),
                                  to_q12(spring_mv / window->current_ma),
                                  (uint8_t)fminf(window->current_ma / 16.0f, 255.0f)};
-    const float share_part = SHARE_PART + NOISE_MV / window->expected_mv;
+    /* at a current within a half of what it was */
+    const float share_part =
+        SHARE_PART + (NOISE_MV + 0.5f * source->unsure_mv) / window->expected_mv;
     const float change_part = CHANGE_PART + NOISE_MV / spring_mv;
     bool odd = false, like = true;
     for (uint8_t n = 0; n < CIRCUIT_STEP_BACK; n++) {

@@ -41,6 +41,7 @@ typedef struct {
  * of the lie. A window that tells nothing, of less than 0.1 V or another current ends what is
  * known. */
 bool circuit_step_judge(circuit_step_t *step, const circuit_window_t *window,
+                        const circuit_source_t *source,
                         const current_control_parameters_t *circuit);
 
 /* The share that the oldest of the windows before showed; 0: none is known. */

@@ -330,8 +330,10 @@ void temperature_ceiling_prepare(temperature_ceiling_drive_t *drive, const therm
     drive->w_per_v2 = POWER_SHARE * ohm / ((ohm + fixed_ohm) * (ohm + fixed_ohm));
 }
 
-float temperature_ceiling_power_w(const temperature_ceiling_drive_t *drive, float duty)
+float temperature_ceiling_power_w(const temperature_ceiling_drive_t *drive, float duty,
+                                  float more_drop_v)
 {
-    const float behind_v = drive->v_per_step * duty - drive->drop_v;
+    const float behind_v =
+        drive->v_per_step * duty - drive->drop_v - more_drop_v * (1.0f - duty * (1.0f / 800.0f));
     return behind_v > 0.0f ? drive->w_per_v2 * behind_v * behind_v : 0.0f;
 }

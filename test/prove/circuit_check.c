@@ -13,13 +13,12 @@ float fmaxf(float a, float b)
 void main(void)
 {
     circuit_check_t check = {0};
-    current_control_parameters_t settings;
-    any_circuit(&settings);
+    const circuit_source_t source = any_source();
     while (any_bool()) {
         for (uint8_t tick = 0; tick < CIRCUIT_CHECK_TICKS; tick++) {
-            circuit_check_take(&check, any_u16(), (uint16_t)any_between(0, 800), any_bool(),
-                               any_s16(), any_s16());
+            circuit_check_take(&check, any_u16(), any_u8(), (uint16_t)any_between(0, 800),
+                               any_bool(), any_s16(), any_s16());
         }
-        (void)circuit_check_judge(&check, &settings, 0);
+        (void)circuit_check_judge(&check, &source, 0);
     }
 }

@@ -9,8 +9,7 @@
 void main(void)
 {
     circuit_peers_t peers = {0};
-    current_control_parameters_t settings;
-    any_circuit(&settings);
+    const circuit_source_t source = any_source();
     while (any_bool()) {
         const circuit_window_t window = {
             .found_mv = Frama_C_float_interval(0.0f, MOST_MV),
@@ -19,9 +18,12 @@ void main(void)
         };
         const uint8_t springs = (uint8_t)any_between(1, CIRCUIT_PEERS_MAX);
         const uint8_t spring = (uint8_t)any_between(0, springs - 1);
-        (void)circuit_peers_judge(&peers, springs, spring, &window, &settings);
+        (void)circuit_peers_judge(&peers, springs, spring, &window, &source);
         if (any_bool()) {
             circuit_peers_clear(&peers, spring, any_bool());
+        }
+        if (any_bool()) {
+            circuit_peers_renew(&peers, springs);
         }
         if (any_bool()) {
             circuit_peers_suspect(&peers, spring, (uint16_t)any_between(1, UINT16_MAX));

@@ -14,6 +14,7 @@ void main(void)
     circuit_step_t step = {0};
     current_control_parameters_t settings;
     any_circuit(&settings);
+    const circuit_source_t source = any_source();
     while (any_bool()) {
         const circuit_window_t window = {
             .found_mv = Frama_C_float_interval(0.0f, 13000.0f),
@@ -21,6 +22,6 @@ void main(void)
             .current_ma = Frama_C_float_interval(0.0f, 4095.0f),
             .tells = any_bool(),
         };
-        (void)circuit_step_judge(&step, &window, &settings);
+        (void)circuit_step_judge(&step, &window, &source, &settings);
     }
 }

@@ -28,6 +28,9 @@ void main(void)
             current_control_reset(&control, channel);
             break;
         case 2:
+            current_control_set_drop(&control, (uint16_t)any_between(0, 1150));
+            break;
+        case 3:
             current_control_set_resistance(&control, channel, any_u16());
             break;
         default:

@@ -67,4 +67,18 @@ static inline void any_circuit(current_control_parameters_t *values)
 #include "parameters.def"
 }
 
+#ifdef CIRCUIT_SOURCE_H
+/* What may be believed of any circuit (circuit_source). */
+static inline circuit_source_t any_source(void)
+{
+    const circuit_source_t source = {.supply_mv = Frama_C_float_interval(840.0f, 17600.0f),
+                                     .drop_mv = Frama_C_float_interval(0.0f, 1150.0f),
+                                     .step_mv = Frama_C_float_interval(1.0f, 24.0f),
+                                     .unsure_mv = Frama_C_float_interval(0.0f, 600.0f),
+                                     .less_mv = Frama_C_float_interval(0.0f, 300.0f),
+                                     .more_mv = Frama_C_float_interval(0.0f, 600.0f)};
+    return source;
+}
+#endif
+
 #endif

@@ -49,7 +49,8 @@ void main(void)
             temperature_ceiling_prepare(&drive, &model, &circuit);
             temperature_ceiling_step(
                 &ceiling, &model, spring,
-                temperature_ceiling_power_w(&drive, Frama_C_float_interval(0.0f, 800.0f)));
+                temperature_ceiling_power_w(&drive, Frama_C_float_interval(0.0f, 800.0f),
+                                            Frama_C_float_interval(0.0f, 0.5f)));
             break;
         }
         (void)temperature_ceiling_c(&ceiling, spring);

@@ -11,24 +11,24 @@
 #define HOLDS_MV 400.0f
 
 static circuit_peers_t peers;
-static current_control_parameters_t circuit;
+static circuit_source_t source;
 
 void setUp(void)
 {
     memset(&peers, 0, sizeof peers);
-    current_control_parameters_default(&circuit);
+    source = (circuit_source_t){0};
 }
 
 static bool takes(uint8_t spring, float expected_mv, float share)
 {
-    const circuit_window_t window = {share * expected_mv, expected_mv, 0.0f, true};
-    return circuit_peers_judge(&peers, SPRINGS, spring, &window, &circuit);
+    const circuit_window_t window = {share * expected_mv, expected_mv, 0.0f, true, true, 0.0f};
+    return circuit_peers_judge(&peers, SPRINGS, spring, &window, &source);
 }
 
 static void is_off(uint8_t spring)
 {
     const circuit_window_t window = {.tells = false};
-    TEST_ASSERT_FALSE(circuit_peers_judge(&peers, SPRINGS, spring, &window, &circuit));
+    TEST_ASSERT_FALSE(circuit_peers_judge(&peers, SPRINGS, spring, &window, &source));
 }
 
 /* Windows of all that are driven, spring 0 first; those that are found, bit by bit. */
@@ -127,13 +127,13 @@ TEST(what_is_found_stays_found_until_cleared)
     TEST_ASSERT_EQUAL_HEX(0, rounds(5, SPRINGS, HEATS_MV, 1.0f, 1.0f));
     TEST_ASSERT_EQUAL_HEX(1, rounds(3, SPRINGS, HEATS_MV, 0.7f, 1.0f));
     for (unsigned n = 0; n < 100; n++) {
-        TEST_ASSERT_TRUE(circuit_peers_judge(&peers, SPRINGS, 0, &nothing, &circuit));
+        TEST_ASSERT_TRUE(circuit_peers_judge(&peers, SPRINGS, 0, &nothing, &source));
     }
     (void)rounds(500, SPRINGS, HEATS_MV, 0.7f, 1.0f); /* nor is it learnt */
     circuit_peers_clear(&peers, 0, true);
     TEST_ASSERT_EQUAL_HEX(1, rounds(1, SPRINGS, HEATS_MV, 0.7f, 1.0f));
     circuit_peers_clear(&peers, 0, true);
-    TEST_ASSERT_FALSE(circuit_peers_judge(&peers, SPRINGS, 0, &nothing, &circuit));
+    TEST_ASSERT_FALSE(circuit_peers_judge(&peers, SPRINGS, 0, &nothing, &source));
 }
 
 /* Found by others: from the first it was of another shunt, and the right one is put in. */
@@ -195,21 +195,57 @@ TEST(a_drift_is_found_however_slow)
 /* The drop that is declared moves with current and heat by a sixth: 60 mV of 400. */
 TEST(a_diode_may_be_another_one)
 {
-    circuit.freewheel_mv = 400;
+    source.drop_mv = 400.0f;
     TEST_ASSERT_EQUAL_HEX(0, rounds(5, SPRINGS, HOLDS_MV, 1.0f, 1.0f)); /* it teaches nothing */
     TEST_ASSERT_EQUAL_HEX(0, rounds(5, SPRINGS, HOLDS_MV, 0.62f, 1.0f));
     TEST_ASSERT_EQUAL_HEX(1, rounds(3, SPRINGS, HOLDS_MV, 0.58f, 1.0f));
     setUp();
-    circuit.freewheel_mv = 400;
+    source.drop_mv = 400.0f;
     TEST_ASSERT_EQUAL_HEX(0, rounds(5, SPRINGS, HEATS_MV, 1.0f, 1.0f));
     TEST_ASSERT_EQUAL_HEX(0, rounds(5, SPRINGS, HOLDS_MV, 0.8f, 1.0f));
     TEST_ASSERT_EQUAL_HEX(1, rounds(3, SPRINGS, HOLDS_MV, 0.7f, 1.0f));
 }
 
+/* As long as nobody knows it, a drop takes as much of what others show: at the same voltage it
+ * makes no difference, at another one it may be all of it. */
+TEST(what_is_not_known_of_the_drop_is_let_pass_where_others_are_driven_otherwise)
+{
+    source.unsure_mv = source.less_mv =
+        200.0f; /* of 1140 and 400 mV: 130 mV, a third of the lower one */
+    TEST_ASSERT_EQUAL_HEX(0, rounds(3, SPRINGS, HEATS_MV, 1.25f, 1.0f)); /* alone in the first */
+    TEST_ASSERT_EQUAL_HEX(1, rounds(1, SPRINGS, HEATS_MV, 1.25f, 1.0f));
+    const float shares[] = {1.5f, 1.65f};
+    for (unsigned n = 0; n < 2; n++) {
+        memset(&peers, 0, sizeof peers);
+        bool found = false;
+        for (unsigned round = 0; round < 3; round++) {
+            for (uint8_t k = 1; k < SPRINGS; k++) {
+                TEST_ASSERT_FALSE(takes(k, HEATS_MV, 1.0f));
+            }
+            found = takes(0, HOLDS_MV, shares[n]);
+        }
+        TEST_ASSERT_EQUAL(n == 1, found);
+        TEST_ASSERT_EQUAL_UINT(0, peers.spring[0].learnt);
+    }
+}
+
+/* Shares of before another belief would be held against those after it. */
+TEST(another_belief_begins_anew_and_keeps_what_is_each_ones_own)
+{
+    TEST_ASSERT_EQUAL_HEX(0, rounds(5, SPRINGS, HEATS_MV, 1.1f, 1.0f));
+    const uint16_t own_q12 = peers.spring[0].own_q12;
+    for (unsigned n = 0; n < 4; n++) {
+        circuit_peers_renew(&peers, SPRINGS);
+        TEST_ASSERT_FALSE(takes(0, HEATS_MV, 0.6f)); /* alone, and nothing is known of before */
+    }
+    TEST_ASSERT_EQUAL_UINT16(own_q12, peers.spring[0].own_q12);
+    TEST_ASSERT_EQUAL_HEX(1, rounds(4, SPRINGS, HEATS_MV, 0.6f, 1.0f));
+}
+
 /* Found with an offset of 60 mV that all of them have, at the volts of a ramp and then at all. */
 TEST(what_a_ramp_shows_is_held_against_nobody)
 {
-    circuit.freewheel_mv = 400;
+    source.drop_mv = 400.0f;
     for (unsigned ramp = 0; ramp < 30; ramp++) {
         for (uint8_t k = 0; k < SPRINGS; k++) {
             const float expected_mv = k == 0 ? 120.0f : HEATS_MV;
@@ -301,9 +337,10 @@ TEST(the_middle_one_of_the_others_counts)
             }
         }
         (void)takes(4, HEATS_MV, 1.95f);
-        const circuit_window_t window = {(odd ? 0.79f : 0.80f) * HEATS_MV, HEATS_MV, 0.0f, true};
+        const circuit_window_t window = {
+            (odd ? 0.79f : 0.80f) * HEATS_MV, HEATS_MV, 0.0f, true, true, 0.0f};
         for (unsigned times = 0; times < 3; times++) {
-            const bool found = circuit_peers_judge(&peers, 4, asked, &window, &circuit);
+            const bool found = circuit_peers_judge(&peers, 4, asked, &window, &source);
             TEST_ASSERT_EQUAL(odd && times == 2, found);
         }
     }

@@ -8,11 +8,13 @@
 
 static circuit_step_t step;
 static current_control_parameters_t circuit;
+static circuit_source_t source;
 
 void setUp(void)
 {
     memset(&step, 0, sizeof step);
     current_control_parameters_default(&circuit);
+    source = (circuit_source_t){0};
 }
 
 /* A circuit whose current is kept at what its sensor shows. */
@@ -29,15 +31,19 @@ static bool takes(shown_t s)
     const float a = (s.shown_a - s.offset_a) / s.current_gain;
     const float behind_mv = 1e3f * a * (s.spring_ohm + s.wiring_ohm);
     const float read_mv = 1e3f * a * s.spring_ohm * s.voltage_gain + s.offset_mv;
-    const circuit_window_t window = {read_mv + 1e3f * s.shown_a * 0.18f, behind_mv / s.supply,
-                                     1e3f * s.shown_a, true};
-    return circuit_step_judge(&step, &window, &circuit);
+    const circuit_window_t window = {read_mv + 1e3f * s.shown_a * 0.18f,
+                                     behind_mv / s.supply,
+                                     1e3f * s.shown_a,
+                                     true,
+                                     true,
+                                     0.0f};
+    return circuit_step_judge(&step, &window, &source, &circuit);
 }
 
 static void is_silent(void)
 {
     const circuit_window_t window = {.tells = false};
-    TEST_ASSERT_FALSE(circuit_step_judge(&step, &window, &circuit));
+    TEST_ASSERT_FALSE(circuit_step_judge(&step, &window, &source, &circuit));
 }
 
 /* Windows until it is found, the one in which it began the first; 0: never. part: how much of the
@@ -196,19 +202,19 @@ TEST(windows_that_tell_are_kept_within_16_bits)
         circuit_window_t window;
         uint16_t share_q12, ohm_q12;
     } kept[] = {
-        {{400.0f, 400.0f, 1000.0f, true}, 4096, 901},
-        {{400.0f, 100.0f, 1000.0f, true}, 16384, 901},
-        {{400.0f, 99.9f, 1000.0f, true}, 0, 0},
-        {{184.0f, 200.0f, 1000.0f, true}, 3768, 16}, /* a step of the register */
-        {{183.9f, 200.0f, 1000.0f, true}, 0, 0},
-        {{200.0f, 200.0f, 1.0f, true}, 4096, UINT16_MAX},
-        {{200.0f, 200.0f, 0.9f, true}, 0, 0},
-        {{60000.0f, 200.0f, 4095.0f, true}, UINT16_MAX, 59277},
-        {{400.0f, 400.0f, 1000.0f, false}, 0, 0},
+        {{400.0f, 400.0f, 1000.0f, true, true, 0.0f}, 4096, 901},
+        {{400.0f, 100.0f, 1000.0f, true, true, 0.0f}, 16384, 901},
+        {{400.0f, 99.9f, 1000.0f, true, true, 0.0f}, 0, 0},
+        {{184.0f, 200.0f, 1000.0f, true, true, 0.0f}, 3768, 16}, /* a step of the register */
+        {{183.9f, 200.0f, 1000.0f, true, true, 0.0f}, 0, 0},
+        {{200.0f, 200.0f, 1.0f, true, true, 0.0f}, 4096, UINT16_MAX},
+        {{200.0f, 200.0f, 0.9f, true, true, 0.0f}, 0, 0},
+        {{60000.0f, 200.0f, 4095.0f, true, true, 0.0f}, UINT16_MAX, 59277},
+        {{400.0f, 400.0f, 1000.0f, false, true, 0.0f}, 0, 0},
     };
     for (unsigned n = 0; n < ROWS(kept); n++) {
         setUp();
-        TEST_ASSERT_FALSE(circuit_step_judge(&step, &kept[n].window, &circuit));
+        TEST_ASSERT_FALSE(circuit_step_judge(&step, &kept[n].window, &source, &circuit));
         TEST_ASSERT_EQUAL_UINT(kept[n].share_q12, step.was[0].share_q12);
         TEST_ASSERT_UINT_WITHIN(1, kept[n].ohm_q12, step.was[0].ohm_q12);
         TEST_ASSERT_EQUAL_UINT(kept[n].share_q12 != 0 ? (unsigned)kept[n].window.current_ma / 16u

@@ -449,6 +449,11 @@ TEST(drop_and_limits_are_exact)
     parameters.freewheel_mv = 27;
     TEST_ASSERT_TRUE(current_control_init(&control, &parameters, NULL));
     TEST_ASSERT_EQUAL_INT32(27 * 51200 / 2027 * 1024, control.offset_q16);
+    current_control_set_drop(&control, 400);
+    TEST_ASSERT_EQUAL_INT32(400 * 51200 / 2400 * 1024, control.offset_q16);
+    TEST_ASSERT_EQUAL_UINT(133, current_control_dead_steps(&control));
+    current_control_set_drop(&control, 1000);
+    TEST_ASSERT_EQUAL_UINT(255, current_control_dead_steps(&control));
     parameters.supply_mv = 1000;
     parameters.freewheel_mv = 0;
     parameters.trim_limit_mohm = 1000;

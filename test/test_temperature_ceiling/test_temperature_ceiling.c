@@ -298,12 +298,15 @@ TEST(power_of_a_duty_is_of_the_declared_circuit)
         const double ohm = 1e-6 * parameters.resistance_austenite_uohm;
         const double loop_ohm = ohm + 1e-3 * (circuit.shunt_mohm + circuit.wiring_mohm);
         for (int duty = 0; duty <= 800; duty += 100) {
-            const double behind_v =
-                1e-3 * (circuit.supply_mv + drop_mv) * duty / 800.0 - 1e-3 * drop_mv;
-            const double amps = behind_v > 0.0 ? behind_v / loop_ohm : 0.0;
-            TEST_ASSERT_FLOAT_WITHIN(1e-3f * (float)(1.0 + amps * amps * ohm),
-                                     (float)(0.64 * amps * amps * ohm),
-                                     temperature_ceiling_power_w(&drive, (float)duty));
+            for (int more_mv = 0; more_mv <= 300; more_mv += 300) {
+                const double drops_v = 1e-3 * (drop_mv + more_mv);
+                const double behind_v =
+                    (1e-3 * circuit.supply_mv + drops_v) * duty / 800.0 - drops_v;
+                const double amps = behind_v > 0.0 ? behind_v / loop_ohm : 0.0;
+                TEST_ASSERT_FLOAT_WITHIN(
+                    1e-3f * (float)(1.0 + amps * amps * ohm), (float)(0.64 * amps * amps * ohm),
+                    temperature_ceiling_power_w(&drive, (float)duty, 1e-3f * (float)more_mv));
+            }
         }
     }
 }

@@ -1,0 +1,121 @@
+#include "circuit_source.h"
+
+#include <math.h>
+
+#define DUTY_STEPS 800.0f
+/* A window's variance, mV^2: not of noise, but of what wiring and gains make of it. */
+#define WINDOW_MV2  3000.0f
+#define MOST_BEFORE 30.0f     /* windows: four rounds of nine springs */
+#define MOST_SQUARE 200000.0f /* steps^2: some heatings */
+/* Deviations of what is declared. */
+#define SUPPLY_PART   0.08f
+#define DROP_MV       75.0f
+#define UNDECLARED_MV 300.0f
+/* Another belief begins here. */
+#define LEAST_DROP_MV  20.0f
+#define UNSURE_PART    0.25f
+#define LEAST_LEVEL_MV 5.0f
+#define LEVEL_PART     0.03f
+/* What no circuit gives, but RAM that has changed by itself. */
+#define MOST_MV       20000.0f
+#define MOST_STEP_MV2 (40.0f * MOST_SQUARE)
+
+/* What is no number counts as the least. */
+static float within(float value, float least, float most)
+{
+    return value > most ? most : value >= least ? value : least;
+}
+
+static bool is_near(float value, float to, float by)
+{
+    return fabsf(value - to) <= by;
+}
+
+/* What fits best: two equations, for the voltage of a step of the duty and for the drop; of how
+ * both moved, of their means, of the declared supply, which is all steps less the drop, and of the
+ * declared drop. */
+static bool believe(circuit_source_t *s, const current_control_parameters_t *p)
+{
+    const bool told = p->freewheel_mv != 0;
+    const float supply_mv = (float)p->supply_mv, drop_mv = (float)p->freewheel_mv;
+    const float supply_deviation_mv = SUPPLY_PART * supply_mv;
+    const float drop_deviation_mv = told ? DROP_MV : UNDECLARED_MV;
+    const float by_supply = WINDOW_MV2 / (supply_deviation_mv * supply_deviation_mv);
+    const float by_drop = WINDOW_MV2 / (drop_deviation_mv * drop_deviation_mv);
+    const float mean = s->mean_duty, rest = DUTY_STEPS - mean;
+    const float square = s->before * mean * mean + by_supply * DUTY_STEPS * DUTY_STEPS;
+    const float mixed = s->before * mean + by_supply * DUTY_STEPS;
+    const float by_step_mv =
+        s->duty_mv + s->before * mean * s->mean_mv + by_supply * DUTY_STEPS * supply_mv;
+    const float by_drop_mv = by_drop * drop_mv - by_supply * supply_mv - s->before * s->mean_mv;
+    const float share = 1.0f / (s->duty_square * (s->before + by_supply + by_drop) +
+                                s->before * by_supply * rest * rest + by_drop * square);
+    const float all = s->duty_square + square;
+    const float reach_mv =
+        told ? (float)CIRCUIT_SOURCE_DROP_MV : (float)CIRCUIT_SOURCE_UNDECLARED_MV;
+    const float least_mv = within(drop_mv - reach_mv, 0.0f, MOST_MV), most_mv = drop_mv + reach_mv;
+    const float found_drop_mv =
+        within(share * (all * by_drop_mv + mixed * by_step_mv), least_mv, most_mv);
+    const float found_mv =
+        within(DUTY_STEPS * (by_step_mv + mixed * found_drop_mv) / all - found_drop_mv,
+               0.01f * (float)CIRCUIT_SOURCE_LEAST_PERCENT * supply_mv,
+               0.01f * (float)CIRCUIT_SOURCE_MOST_PERCENT * supply_mv);
+    s->unsure_mv = 2.0f * sqrtf(WINDOW_MV2 * share * all);
+    const float more_mv = found_drop_mv - drop_mv - s->unsure_mv;
+    s->more_drop_v = more_mv > 0.0f ? 1e-3f * more_mv : 0.0f;
+    s->driven_drop_mv =
+        (uint16_t)(is_near(found_drop_mv, drop_mv, s->unsure_mv) ? drop_mv : found_drop_mv);
+    const float found_step_mv = (1.0f / DUTY_STEPS) * (found_mv + found_drop_mv);
+    const float drop_change_mv = within(UNSURE_PART * s->unsure_mv, LEAST_DROP_MV, MOST_MV);
+    const float level_mv = found_step_mv * mean - found_drop_mv;
+    const bool stays =
+        is_near(found_drop_mv, s->drop_mv, drop_change_mv) &&
+        is_near(level_mv, s->step_mv * mean - s->drop_mv, LEAST_LEVEL_MV + LEVEL_PART * s->mean_mv);
+    if (!stays) {
+        s->drop_mv = found_drop_mv;
+        s->supply_mv = found_mv;
+    }
+    s->step_mv = (1.0f / DUTY_STEPS) * (s->supply_mv + s->drop_mv);
+    s->less_mv = within(s->drop_mv - least_mv, 0.0f, s->unsure_mv);
+    s->more_mv = within(most_mv - s->drop_mv, 0.0f, s->unsure_mv);
+    return !stays;
+}
+
+void circuit_source_begin(circuit_source_t *source, const current_control_parameters_t *circuit)
+{
+    const float supply_mv = (float)circuit->supply_mv, drop_mv = (float)circuit->freewheel_mv;
+    *source = (circuit_source_t){.supply_mv = supply_mv,
+                                 .drop_mv = drop_mv,
+                                 .step_mv = (1.0f / DUTY_STEPS) * (supply_mv + drop_mv)};
+    (void)believe(source, circuit);
+}
+
+void circuit_source_take(circuit_source_t *source, float duty, float voltage_mv)
+{
+    source->windows++;
+    source->duty += duty;
+    source->voltage_mv += voltage_mv;
+}
+
+bool circuit_source_fit(circuit_source_t *s, const current_control_parameters_t *circuit)
+{
+    if (s->windows == 0) {
+        return false;
+    }
+    const float windows = (float)s->windows, before = within(s->before, 0.0f, MOST_BEFORE);
+    const float share = 1.0f / windows, part = windows / (before + windows);
+    const float duty = within(share * s->duty, 0.0f, DUTY_STEPS) - s->mean_duty;
+    const float mv = within(share * s->voltage_mv, 0.0f, MOST_MV) - s->mean_mv;
+    s->mean_duty = within(s->mean_duty + part * duty, 0.0f, DUTY_STEPS);
+    s->mean_mv = within(s->mean_mv + part * mv, 0.0f, MOST_MV);
+    s->before = within(before + windows, 0.0f, MOST_BEFORE);
+    const float weight = part * before;
+    const float square = within(s->duty_square + weight * duty * duty, 0.0f, 2.0f * MOST_SQUARE);
+    const float kept = square > MOST_SQUARE ? MOST_SQUARE / square : 1.0f;
+    s->duty_square = kept * square;
+    s->duty_mv = within(kept * (s->duty_mv + weight * duty * mv), -MOST_STEP_MV2, MOST_STEP_MV2);
+    s->windows = 0;
+    s->duty = 0.0f;
+    s->voltage_mv = 0.0f;
+    return believe(s, circuit);
+}

@@ -1,0 +1,196 @@
+/* What nine springs show of a supply and its diodes is found, as far as it can be and no further
+ * than tolerances go. */
+#include <math.h>
+
+#include "../run_tests.h"
+#include "circuit_source.h"
+
+static current_control_parameters_t circuit;
+static circuit_source_t source;
+
+void setUp(void)
+{
+    current_control_parameters_default(&circuit);
+    circuit_source_begin(&source, &circuit);
+}
+
+typedef struct {
+    float supply_mv, drop_mv;
+} true_t;
+
+static float behind_mv(true_t is, float duty)
+{
+    return is.supply_mv * duty / 800.0f - is.drop_mv * (1.0f - duty / 800.0f);
+}
+
+/* Rounds of so many springs, driven alike; whether the last one brought another belief. */
+static bool rounds(unsigned count, unsigned springs, true_t is, float duty)
+{
+    bool other = false;
+    for (unsigned n = 0; n < count; n++) {
+        for (unsigned k = 0; k < springs; k++) {
+            circuit_source_take(&source, duty, behind_mv(is, duty));
+        }
+        other = circuit_source_fit(&source, &circuit);
+    }
+    return other;
+}
+
+static float expected_mv(float duty)
+{
+    return source.step_mv * duty - source.drop_mv;
+}
+
+TEST(at_first_what_is_declared_is_believed)
+{
+    TEST_ASSERT_FLOAT_WITHIN(0.3f, 5000.0f, source.supply_mv);
+    TEST_ASSERT_FLOAT_WITHIN(0.3f, 0.0f, source.drop_mv);
+    TEST_ASSERT_FLOAT_WITHIN(0.001f, 5000.0f / 800.0f, source.step_mv);
+    TEST_ASSERT_FLOAT_WITHIN(1.0f, 600.0f, source.unsure_mv);
+    TEST_ASSERT_EQUAL_UINT(0, source.driven_drop_mv);
+    TEST_ASSERT_EQUAL_FLOAT(0.0f, source.more_drop_v);
+    circuit.freewheel_mv = 390;
+    circuit_source_begin(&source, &circuit);
+    TEST_ASSERT_FLOAT_WITHIN(0.3f, 5000.0f, source.supply_mv);
+    TEST_ASSERT_FLOAT_WITHIN(0.3f, 390.0f, source.drop_mv);
+    TEST_ASSERT_FLOAT_WITHIN(0.01f, 5390.0f / 800.0f, source.step_mv);
+    TEST_ASSERT_FLOAT_WITHIN(1.0f, 150.0f, source.unsure_mv);
+    TEST_ASSERT_EQUAL_UINT(390, source.driven_drop_mv);
+    TEST_ASSERT_EQUAL_FLOAT(0.0f, source.more_drop_v);
+}
+
+/* A heating and a hold, by one spring or by all: duties apart tell supply from drop. */
+TEST(a_heating_and_a_hold_tell_supply_and_drop)
+{
+    static const struct {
+        float supply_mv, drop_mv;
+        uint16_t declared_mv;
+    } cases[] = {{5000, 390, 0},   {4500, 390, 0}, {5400, 330, 0},   {4300, 0, 0},
+                 {5000, 0, 0},     {5500, 0, 0},   {5000, 450, 390}, {4500, 390, 390},
+                 {5300, 300, 390}, {5000, 500, 0}};
+    for (unsigned springs = 1; springs <= 9; springs += 4) {
+        for (unsigned n = 0; n < ROWS(cases); n++) {
+            const true_t is = {cases[n].supply_mv, cases[n].drop_mv};
+            circuit.freewheel_mv = cases[n].declared_mv;
+            circuit_source_begin(&source, &circuit);
+            rounds(10, springs, is, 230.0f);
+            /* what a round of it shows is expected at once, whatever makes it */
+            TEST_ASSERT_FLOAT_WITHIN(0.04f * behind_mv(is, 230.0f), behind_mv(is, 230.0f),
+                                     expected_mv(230.0f));
+            rounds(springs > 1 ? 4 : 20, springs, is, 110.0f);
+            TEST_ASSERT_FLOAT_WITHIN(springs > 1 ? 25.0f : 60.0f, is.drop_mv, source.drop_mv);
+            TEST_ASSERT_FLOAT_WITHIN(springs > 1 ? 100.0f : 300.0f, is.supply_mv, source.supply_mv);
+            TEST_ASSERT_FLOAT_WITHIN(15.0f, behind_mv(is, 110.0f), expected_mv(110.0f));
+            TEST_ASSERT_TRUE(source.unsure_mv < (springs > 1 ? 60.0f : 120.0f));
+        }
+    }
+}
+
+/* What may be no drop at all is not driven by, nor does the ceiling count on it. */
+TEST(what_is_driven_by_is_sure)
+{
+    rounds(2, 9, (true_t){4300, 0}, 230.0f);
+    TEST_ASSERT_TRUE(source.drop_mv > 50.0f); /* it may be the supply */
+    TEST_ASSERT_EQUAL_UINT(0, source.driven_drop_mv);
+    TEST_ASSERT_EQUAL_FLOAT(0.0f, source.more_drop_v);
+    setUp();
+    rounds(2, 9, (true_t){5000, 390}, 230.0f);
+    TEST_ASSERT_TRUE(source.unsure_mv > 200.0f);
+    TEST_ASSERT_UINT_WITHIN(1, (unsigned)source.drop_mv, source.driven_drop_mv);
+    TEST_ASSERT_TRUE(source.driven_drop_mv > 250u);
+    rounds(5, 9, (true_t){5000, 390}, 110.0f);
+    TEST_ASSERT_UINT_WITHIN(25, 390, source.driven_drop_mv);
+    TEST_ASSERT_TRUE(source.more_drop_v > 0.3f);
+    TEST_ASSERT_FLOAT_WITHIN(0.021f, 1e-3f * (source.drop_mv - source.unsure_mv),
+                             source.more_drop_v);
+    circuit.freewheel_mv = 390; /* declared, and a little less: it is what is declared */
+    circuit_source_begin(&source, &circuit);
+    rounds(5, 9, (true_t){5000, 370}, 230.0f);
+    rounds(5, 9, (true_t){5000, 370}, 110.0f);
+    TEST_ASSERT_EQUAL_UINT(390, source.driven_drop_mv);
+    TEST_ASSERT_EQUAL_FLOAT(0.0f, source.more_drop_v);
+    rounds(5, 9, (true_t){5000, 260}, 110.0f);
+    rounds(5, 9, (true_t){5000, 260}, 230.0f);
+    rounds(5, 9, (true_t){5000, 260}, 110.0f);
+    TEST_ASSERT_UINT_WITHIN(30, 260, source.driven_drop_mv);
+}
+
+/* All sensors lie, or it is no such supply: no further than tolerances go. */
+TEST(tolerances_bound_it)
+{
+    static const struct {
+        float supply_mv, drop_mv;
+        uint16_t declared_mv;
+        float believed_mv, believed_drop_mv;
+    } cases[] = {{2500, 0, 0, 4200, -1},    {9000, 0, 0, 5500, -1},  {5000, 1400, 0, -1, 500},
+                 {5000, 700, 390, -1, 540}, {5000, 0, 390, -1, 240}, {5000, 0, 100, -1, -1},
+                 {5000, -400, 100, -1, 0},  {5000, -400, 0, -1, 0}};
+    for (unsigned n = 0; n < ROWS(cases); n++) {
+        const true_t is = {cases[n].supply_mv, cases[n].drop_mv};
+        circuit.freewheel_mv = cases[n].declared_mv;
+        circuit_source_begin(&source, &circuit);
+        for (unsigned turn = 0; turn < 4; turn++) {
+            rounds(5, 9, is, 400.0f);
+            rounds(5, 9, is, 150.0f);
+        }
+        if (cases[n].believed_mv >= 0.0f) {
+            TEST_ASSERT_FLOAT_WITHIN(51.0f, cases[n].believed_mv, source.supply_mv);
+        }
+        if (cases[n].believed_drop_mv >= 0.0f) {
+            TEST_ASSERT_FLOAT_WITHIN(20.1f, cases[n].believed_drop_mv, source.drop_mv);
+        }
+        TEST_ASSERT_TRUE(source.supply_mv >= 4199.0f && source.supply_mv <= 5501.0f);
+        TEST_ASSERT_TRUE(source.drop_mv >= 0.0f);
+    }
+}
+
+/* It forgets levels within rounds, and how much both moved only by what moves. */
+TEST(a_hold_forgets_a_supply_and_keeps_a_drop)
+{
+    rounds(8, 9, (true_t){5000, 390}, 230.0f);
+    rounds(2000, 9, (true_t){5000, 390}, 110.0f);
+    TEST_ASSERT_FLOAT_WITHIN(20.0f, 390.0f, source.drop_mv);
+    TEST_ASSERT_FLOAT_WITHIN(60.0f, 5000.0f, source.supply_mv);
+    rounds(10, 9, (true_t){4800, 390}, 110.0f);
+    TEST_ASSERT_FLOAT_WITHIN(14.0f, behind_mv((true_t){4800, 390}, 110.0f), expected_mv(110.0f));
+    for (unsigned turn = 0; turn < 3; turn++) {
+        rounds(8, 9, (true_t){4500, 390}, 230.0f);
+        rounds(8, 9, (true_t){4500, 390}, 110.0f);
+    }
+    TEST_ASSERT_FLOAT_WITHIN(100.0f, 4500.0f, source.supply_mv);
+    TEST_ASSERT_FLOAT_WITHIN(25.0f, 390.0f, source.drop_mv);
+}
+
+/* Shares are of a belief: it does not change for a millivolt. */
+TEST(small_changes_are_not_worth_another_belief)
+{
+    TEST_ASSERT_FALSE(circuit_source_fit(&source, &circuit)); /* a round without a window */
+    TEST_ASSERT_TRUE(rounds(1, 9, (true_t){5000, 390}, 230.0f));
+    TEST_ASSERT_FALSE(rounds(9, 9, (true_t){5000, 390}, 230.0f));
+    TEST_ASSERT_TRUE(rounds(1, 9, (true_t){5000, 390}, 110.0f));
+    rounds(9, 9, (true_t){5000, 390}, 110.0f);
+    const circuit_source_t before = source;
+    TEST_ASSERT_FALSE(rounds(9, 9, (true_t){5020, 395}, 110.0f));
+    TEST_ASSERT_EQUAL_FLOAT(before.drop_mv, source.drop_mv);
+    TEST_ASSERT_EQUAL_FLOAT(before.supply_mv, source.supply_mv);
+    TEST_ASSERT_EQUAL_FLOAT(before.step_mv, source.step_mv);
+    TEST_ASSERT_TRUE(rounds(1, 9, (true_t){4500, 390}, 110.0f) ||
+                     rounds(1, 9, (true_t){4500, 390}, 110.0f));
+}
+
+/* One of nine shows a half of its voltage: the others hardly notice. */
+TEST(one_that_lies_moves_little)
+{
+    const true_t is = {5000, 390};
+    for (unsigned n = 0; n < 20; n++) {
+        const float duty = n < 8 ? 230.0f : 110.0f;
+        for (unsigned k = 0; k < 9; k++) {
+            circuit_source_take(&source, duty, (k == 0 ? 0.5f : 1.0f) * behind_mv(is, duty));
+        }
+        (void)circuit_source_fit(&source, &circuit);
+    }
+    TEST_ASSERT_FLOAT_WITHIN(0.07f * behind_mv(is, 230.0f), behind_mv(is, 230.0f),
+                             expected_mv(230.0f));
+    TEST_ASSERT_FLOAT_WITHIN(0.07f * behind_mv(is, 110.0f), behind_mv(is, 110.0f),
+                             expected_mv(110.0f));
+}
