@@ -4,6 +4,7 @@
 
 #define Q12         4096.0f
 #define MOST        65535.0f
+#define CURRENT_MA  16.0f
 #define NOISE_MV    4.0f  /* a step of the voltage's register */
 #define CHANGE_PART 0.10f /* of its resistance, that a spring makes in three windows */
 /* As others switch, and what a contact makes of it where the wiring is not as declared. */
@@ -21,9 +22,28 @@ static bool is_like(uint8_t now, uint8_t was)
     return 3u * now >= 2u * was && 2u * now <= 3u * was;
 }
 
-static bool is_off(uint16_t now, uint16_t was, float most_part)
+static bool is_off(uint16_t now, uint16_t was, float most_part, float most)
 {
-    return fabsf((float)now - (float)was) > most_part * (float)was;
+    return fabsf((float)now - (float)was) > most_part * (float)was + most;
+}
+
+/* A drop that is not the believed one takes as much of both voltages: one more than that makes the
+ * share at fewer volts the lower one. */
+static bool shares_differ(const circuit_shown_t *now, const circuit_shown_t *was, float expected_mv,
+                          float fixed_ohm, const circuit_source_t *source)
+{
+    const float noise_part = SHARE_PART + NOISE_MV / expected_mv;
+    if (!is_off(now->share_q12, was->share_q12, noise_part, 0.0f)) {
+        return false;
+    }
+    const float was_mv =
+        CURRENT_MA * (float)was->current_16ma * ((float)was->ohm_q12 + Q12 * fixed_ohm);
+    const float change = fabsf(1.0f - expected_mv * (float)was->share_q12 / (was_mv + 1.0f));
+    const bool is_more =
+        (now->share_q12 < was->share_q12) == (expected_mv * (float)was->share_q12 < was_mv);
+    const float unsure_mv = is_more ? source->more_mv : source->less_mv;
+    return is_off(now->share_q12, was->share_q12, noise_part,
+                  Q12 * unsure_mv * change / expected_mv);
 }
 
 bool circuit_step_judge(circuit_step_t *step, const circuit_window_t *window,
@@ -37,18 +57,15 @@ bool circuit_step_judge(circuit_step_t *step, const circuit_window_t *window,
     }
     const circuit_shown_t now = {to_q12(window->found_mv / window->expected_mv),
                                  to_q12(spring_mv / window->current_ma),
-                                 (uint8_t)fminf(window->current_ma / 16.0f, 255.0f)};
-    /* at a current within a half of what it was */
-    const float share_part =
-        SHARE_PART + (NOISE_MV + 0.5f * source->unsure_mv) / window->expected_mv;
+                                 (uint8_t)fminf(window->current_ma / CURRENT_MA, 255.0f)};
     const float change_part = CHANGE_PART + NOISE_MV / spring_mv;
     bool odd = false, like = true;
     for (uint8_t n = 0; n < CIRCUIT_STEP_BACK; n++) {
         const circuit_shown_t *const was = &step->was[n];
         if (was->share_q12 != 0) {
             like = like && is_like(now.current_16ma, was->current_16ma);
-            odd = odd || (is_off(now.share_q12, was->share_q12, share_part) &&
-                          is_off(now.ohm_q12, was->ohm_q12, change_part));
+            odd = odd || (is_off(now.ohm_q12, was->ohm_q12, change_part, 0.0f) &&
+                          shares_differ(&now, was, window->expected_mv, fixed_ohm, source));
         }
     }
     if (!like) {
