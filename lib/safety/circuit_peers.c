@@ -88,6 +88,22 @@ static bool is_odd(const circuit_peer_t *own, float share, float others, float t
            off * (VOLTS_MV * (float)own->volts) > offsets_mv * (float)own->learnt;
 }
 
+/* What a drop makes of a lower or higher share, as far as it is not known: it takes as much of both
+ * voltages, and one more than is believed makes the share at fewer volts the lower one. */
+static float drop_mv(const circuit_source_t *source, bool is_lower, float expected_mv,
+                     float other_mv)
+{
+    const bool is_less = expected_mv < other_mv;
+    const float part = is_less ? expected_mv / other_mv : other_mv / expected_mv;
+    return (is_lower == is_less ? source->more_mv : source->less_mv) * (1.0f - part);
+}
+
+/* Volts within an eighth: what is wrong with a drop makes an eighth of it. */
+static bool are_alike(uint8_t a, uint8_t b)
+{
+    return 8u * a >= 7u * b && 8u * b >= 7u * a;
+}
+
 bool circuit_peers_judge(circuit_peers_t *peers, uint8_t springs, uint8_t k,
                          const circuit_window_t *window, const circuit_source_t *source)
 {
@@ -110,17 +126,14 @@ bool circuit_peers_judge(circuit_peers_t *peers, uint8_t springs, uint8_t k,
         const float others = (float)others_q7 / SHARE_Q7;
         const float other_mv = volts_mv((float)other->shown_16mv);
         const float told_mv = lesser(expected_mv, other_mv);
-        /* What is wrong with the drop takes as much of both voltages. */
-        const float more_mv = expected_mv > other_mv ? expected_mv : other_mv;
-        /* One more than is believed makes the share at fewer volts the lower one. */
-        const bool is_more = (share < others * own_part) == (expected_mv < other_mv);
-        const float unsure_mv = is_more ? source->more_mv : source->less_mv;
-        odd = is_odd(own, share, others, told_mv, offsets_mv) &&
-              is_odd(own, share, others, told_mv,
-                     offsets_mv + unsure_mv * (1.0f - told_mv / more_mv));
+        odd =
+            is_odd(own, share, others, told_mv, offsets_mv) &&
+            is_odd(own, share, others, told_mv,
+                   offsets_mv + drop_mv(source, share < others * own_part, expected_mv, other_mv));
         /* Where offsets make more than what a share may be at the most, it teaches nothing. */
-        if (!odd && own->learnt < LEARN_MOST &&
-            offsets_mv + source->unsure_mv <= OTHER_PART * told_mv) {
+        const float unsure_mv =
+            are_alike(own->shown_16mv, other->shown_16mv) ? 0.0f : source->unsure_mv;
+        if (!odd && own->learnt < LEARN_MOST && offsets_mv + unsure_mv <= OTHER_PART * told_mv) {
             learn(own, share / others, told_mv / VOLTS_MV);
         }
     } else if (own->was_q7 != 0) {

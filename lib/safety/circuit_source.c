@@ -83,10 +83,8 @@ static bool believe(circuit_source_t *s, const current_control_parameters_t *p)
 
 void circuit_source_begin(circuit_source_t *source, const current_control_parameters_t *circuit)
 {
-    const float supply_mv = (float)circuit->supply_mv, drop_mv = (float)circuit->freewheel_mv;
-    *source = (circuit_source_t){.supply_mv = supply_mv,
-                                 .drop_mv = drop_mv,
-                                 .step_mv = (1.0f / DUTY_STEPS) * (supply_mv + drop_mv)};
+    *source = (circuit_source_t){.supply_mv = (float)circuit->supply_mv,
+                                 .drop_mv = (float)circuit->freewheel_mv};
     (void)believe(source, circuit);
 }
 

@@ -214,6 +214,7 @@ TEST(what_is_not_known_of_the_drop_is_let_pass_where_others_are_driven_otherwise
         200.0f; /* of 1140 and 400 mV: 130 mV, a third of the lower one */
     TEST_ASSERT_EQUAL_HEX(0, rounds(3, SPRINGS, HEATS_MV, 1.25f, 1.0f)); /* alone in the first */
     TEST_ASSERT_EQUAL_HEX(1, rounds(1, SPRINGS, HEATS_MV, 1.25f, 1.0f));
+    TEST_ASSERT_TRUE(peers.spring[1].learnt > 1);
     const float shares[] = {1.5f, 1.65f};
     for (unsigned n = 0; n < 2; n++) {
         memset(&peers, 0, sizeof peers);

@@ -144,11 +144,80 @@ TEST(tolerances_bound_it)
     }
 }
 
+/* One side of what is unsure ends where the tolerance does: no drop is below none. */
+TEST(what_is_unsure_ends_at_the_tolerance)
+{
+    static const struct {
+        uint16_t declared_mv;
+        float less_mv, more_mv;
+    } cases[] = {{0, 0, 500}, {390, 150, 150}, {100, 100, 150}};
+    for (unsigned n = 0; n < ROWS(cases); n++) {
+        circuit.freewheel_mv = cases[n].declared_mv;
+        circuit_source_begin(&source, &circuit);
+        TEST_ASSERT_FLOAT_WITHIN(0.4f, cases[n].less_mv, source.less_mv);
+        TEST_ASSERT_FLOAT_WITHIN(0.4f, cases[n].more_mv, source.more_mv);
+        TEST_ASSERT_EQUAL_FLOAT(source.supply_mv + source.drop_mv, 800.0f * source.step_mv);
+    }
+    circuit.freewheel_mv = 0;
+    circuit_source_begin(&source, &circuit);
+    rounds(8, 9, (true_t){5000, 390}, 230.0f);
+    rounds(8, 9, (true_t){5000, 390}, 110.0f);
+    TEST_ASSERT_EQUAL_FLOAT(source.unsure_mv, source.less_mv);
+    TEST_ASSERT_EQUAL_FLOAT(source.unsure_mv, source.more_mv);
+}
+
+/* Of 314 mV in a hold 14 are no other belief. */
+TEST(a_level_is_another_beyond_3_percent)
+{
+    for (unsigned n = 0; n < 2; n++) {
+        setUp();
+        rounds(8, 9, (true_t){5000, 0}, 230.0f);
+        rounds(40, 9, (true_t){5000, 0}, 50.0f); /* 312 mV */
+        const float believed_mv = expected_mv(50.0f);
+        const true_t other = {n == 0 ? 4810.0f : 4680.0f, 0};
+        TEST_ASSERT_FALSE(rounds(1, 9, (true_t){5000, 0}, 50.0f));
+        rounds(20, 9, other, 50.0f);
+        TEST_ASSERT_EQUAL(n == 0, fabsf(expected_mv(50.0f) - believed_mv) < 1e-3f);
+    }
+}
+
+/* A bit of RAM turns over in any number: within some heatings all is as it was. */
+TEST(whatever_turns_over_is_learnt_again)
+{
+    const true_t is = {5000, 390};
+    float *const numbers[] = {&source.supply_mv,   &source.drop_mv,   &source.step_mv,
+                              &source.unsure_mv,   &source.less_mv,   &source.more_mv,
+                              &source.more_drop_v, &source.duty,      &source.voltage_mv,
+                              &source.before,      &source.mean_duty, &source.mean_mv,
+                              &source.duty_square, &source.duty_mv};
+    const float wrong[] = {NAN, INFINITY, -INFINITY, -1e30f, 1e30f, 0.0f};
+    for (unsigned n = 0; n < ROWS(numbers); n++) {
+        for (unsigned k = 0; k < ROWS(wrong); k++) {
+            setUp();
+            rounds(8, 9, is, 230.0f);
+            rounds(8, 9, is, 110.0f);
+            *numbers[n] = wrong[k];
+            for (unsigned heating = 0; heating < 12; heating++) {
+                rounds(8, 9, is, 230.0f);
+                rounds(8, 9, is, 110.0f);
+            }
+            TEST_ASSERT_FLOAT_WITHIN(30.0f, 390.0f, source.drop_mv);
+            TEST_ASSERT_FLOAT_WITHIN(25.0f, behind_mv(is, 110.0f), expected_mv(110.0f));
+            TEST_ASSERT_TRUE(source.unsure_mv < 60.0f && source.less_mv < 60.0f);
+        }
+    }
+}
+
 /* It forgets levels within rounds, and how much both moved only by what moves. */
 TEST(a_hold_forgets_a_supply_and_keeps_a_drop)
 {
     rounds(8, 9, (true_t){5000, 390}, 230.0f);
+    rounds(20, 9, (true_t){5000, 390}, 110.0f);
+    const float moved = source.duty_square;
     rounds(2000, 9, (true_t){5000, 390}, 110.0f);
+    TEST_ASSERT_FLOAT_WITHIN(0.01f * moved, moved, source.duty_square);
+    TEST_ASSERT_EQUAL_FLOAT(0.0f, source.voltage_mv);
+    TEST_ASSERT_EQUAL_FLOAT(0.0f, source.duty);
     TEST_ASSERT_FLOAT_WITHIN(20.0f, 390.0f, source.drop_mv);
     TEST_ASSERT_FLOAT_WITHIN(60.0f, 5000.0f, source.supply_mv);
     rounds(10, 9, (true_t){4800, 390}, 110.0f);
