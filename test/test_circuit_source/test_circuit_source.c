@@ -158,6 +158,11 @@ TEST(what_is_unsure_ends_at_the_tolerance)
         TEST_ASSERT_FLOAT_WITHIN(0.4f, cases[n].more_mv, source.more_mv);
         TEST_ASSERT_EQUAL_FLOAT(source.supply_mv + source.drop_mv, 800.0f * source.step_mv);
     }
+    circuit.freewheel_mv = 390;
+    circuit_source_begin(&source, &circuit);
+    rounds(3, 9, (true_t){5000, 300}, 230.0f);
+    TEST_ASSERT_TRUE(source.drop_mv - 240.0f < source.unsure_mv);
+    TEST_ASSERT_FLOAT_WITHIN(0.1f, source.drop_mv - 240.0f, source.less_mv);
     circuit.freewheel_mv = 0;
     circuit_source_begin(&source, &circuit);
     rounds(8, 9, (true_t){5000, 390}, 230.0f);
@@ -174,11 +179,35 @@ TEST(a_level_is_another_beyond_3_percent)
         rounds(8, 9, (true_t){5000, 0}, 230.0f);
         rounds(40, 9, (true_t){5000, 0}, 50.0f); /* 312 mV */
         const float believed_mv = expected_mv(50.0f);
-        const true_t other = {n == 0 ? 4810.0f : 4680.0f, 0};
+        const true_t other = {n == 0 ? 4810.0f : 4720.0f, 0};
         TEST_ASSERT_FALSE(rounds(1, 9, (true_t){5000, 0}, 50.0f));
         rounds(20, 9, other, 50.0f);
         TEST_ASSERT_EQUAL(n == 0, fabsf(expected_mv(50.0f) - believed_mv) < 1e-3f);
     }
+}
+
+/* Nor is a drop, by less than a quarter of what is not known of it. */
+TEST(a_drop_is_another_beyond_a_quarter_of_what_is_unsure)
+{
+    rounds(8, 9, (true_t){5000, 390}, 230.0f);
+    const float believed_mv = source.drop_mv;
+    TEST_ASSERT_TRUE(source.unsure_mv > 200.0f);
+    rounds(12, 9, (true_t){5000, 430}, 230.0f);
+    TEST_ASSERT_EQUAL_FLOAT(believed_mv, source.drop_mv);
+    rounds(12, 9, (true_t){5000, 490}, 230.0f);
+    TEST_ASSERT_TRUE(source.drop_mv > believed_mv + 40.0f);
+}
+
+/* Nine springs forget nine tenths of a level in ten rounds, and nothing of how both moved. */
+TEST(it_forgets_a_level_in_time)
+{
+    rounds(20, 9, (true_t){5000, 0}, 120.0f);
+    rounds(20, 9, (true_t){5000, 0}, 110.0f);
+    const float moved = source.duty_square;
+    TEST_ASSERT_TRUE(moved > 500.0f);
+    rounds(10, 9, (true_t){4400, 0}, 110.0f);
+    TEST_ASSERT_FLOAT_WITHIN(8.0f, behind_mv((true_t){4400, 0}, 110.0f), source.mean_mv);
+    TEST_ASSERT_FLOAT_WITHIN(1.0f, moved, source.duty_square);
 }
 
 /* A bit of RAM turns over in any number: within some heatings all is as it was. */
