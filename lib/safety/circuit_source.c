@@ -11,6 +11,8 @@
 #define SUPPLY_PART   0.08f
 #define DROP_MV       75.0f
 #define UNDECLARED_MV 300.0f
+/* A supply that steps looks like as much of a drop, until it is learnt. */
+#define DRIVEN_MV 100.0f
 /* Another belief begins here. */
 #define LEAST_DROP_MV  20.0f
 #define UNSURE_PART    0.25f
@@ -63,8 +65,9 @@ static bool believe(circuit_source_t *s, const current_control_parameters_t *p)
     s->unsure_mv = 2.0f * sqrtf(WINDOW_MV2 * share * all);
     const float more_mv = found_drop_mv - drop_mv - s->unsure_mv;
     s->more_drop_v = more_mv > 0.0f ? 1e-3f * more_mv : 0.0f;
+    const float beside_mv = within(s->unsure_mv, DRIVEN_MV, MOST_MV);
     s->driven_drop_mv =
-        (uint16_t)(is_near(found_drop_mv, drop_mv, s->unsure_mv) ? drop_mv : found_drop_mv);
+        (uint16_t)(is_near(found_drop_mv, drop_mv, beside_mv) ? drop_mv : found_drop_mv);
     const float found_step_mv = (1.0f / DUTY_STEPS) * (found_mv + found_drop_mv);
     const float drop_change_mv = within(UNSURE_PART * s->unsure_mv, LEAST_DROP_MV, MOST_MV);
     const float level_mv = found_step_mv * mean - found_drop_mv;
