@@ -109,7 +109,7 @@ bool circuit_source_fit(circuit_source_t *s, const current_control_parameters_t 
     const float mv = within(share * s->voltage_mv, 0.0f, MOST_MV) - s->mean_mv;
     s->mean_duty = within(s->mean_duty + part * duty, 0.0f, DUTY_STEPS);
     s->mean_mv = within(s->mean_mv + part * mv, 0.0f, MOST_MV);
-    s->before = within(before + windows, 0.0f, MOST_BEFORE);
+    s->before = within(before + windows, before, MOST_BEFORE);
     const float weight = part * before;
     const float square = within(s->duty_square + weight * duty * duty, 0.0f, 2.0f * MOST_SQUARE);
     const float kept = square > MOST_SQUARE ? MOST_SQUARE / square : 1.0f;

@@ -177,6 +177,15 @@ TEST(what_is_unsure_ends_at_the_tolerance)
     rounds(3, 9, (true_t){5000, 300}, 230.0f);
     TEST_ASSERT_TRUE(source.drop_mv - 240.0f < source.unsure_mv);
     TEST_ASSERT_FLOAT_WITHIN(0.1f, source.drop_mv - 240.0f, source.less_mv);
+    circuit_source_begin(&source, &circuit);
+    rounds(3, 9, (true_t){5000, 480}, 230.0f);
+    TEST_ASSERT_TRUE(540.0f - source.drop_mv < source.unsure_mv);
+    TEST_ASSERT_FLOAT_WITHIN(0.1f, 540.0f - source.drop_mv, source.more_mv);
+    circuit.freewheel_mv = 0;
+    circuit_source_begin(&source, &circuit);
+    rounds(3, 9, (true_t){5000, 1400}, 400.0f);
+    TEST_ASSERT_EQUAL_FLOAT(500.0f, source.drop_mv);
+    TEST_ASSERT_EQUAL_FLOAT(0.0f, source.more_mv);
     circuit.freewheel_mv = 0;
     circuit_source_begin(&source, &circuit);
     rounds(8, 9, (true_t){5000, 390}, 230.0f);
@@ -200,6 +209,19 @@ TEST(a_level_is_another_beyond_3_percent)
     }
 }
 
+/* What the ceiling counts on begins where it is sure, with no step. */
+TEST(what_is_sure_of_a_drop_grows_from_nothing)
+{
+    float more_v = 0.0f;
+    for (float mv = 20.0f; mv < 100.0f && more_v == 0.0f; mv += 0.25f) {
+        setUp();
+        rounds(8, 9, (true_t){5000, mv}, 230.0f);
+        rounds(8, 9, (true_t){5000, mv}, 110.0f);
+        more_v = source.more_drop_v;
+    }
+    TEST_ASSERT_TRUE(more_v > 0.0f && more_v < 0.6e-3f);
+}
+
 /* Nor is a drop, by less than a quarter of what is not known of it. */
 TEST(a_drop_is_another_beyond_a_quarter_of_what_is_unsure)
 {
@@ -218,7 +240,7 @@ TEST(it_forgets_a_level_in_time)
     rounds(20, 9, (true_t){5000, 0}, 120.0f);
     rounds(20, 9, (true_t){5000, 0}, 110.0f);
     const float moved = source.duty_square;
-    TEST_ASSERT_TRUE(moved > 500.0f);
+    TEST_ASSERT_TRUE(moved > 500.0f && moved < 20000.0f);
     rounds(10, 9, (true_t){4400, 0}, 110.0f);
     TEST_ASSERT_FLOAT_WITHIN(8.0f, behind_mv((true_t){4400, 0}, 110.0f), source.mean_mv);
     TEST_ASSERT_FLOAT_WITHIN(1.0f, moved, source.duty_square);
