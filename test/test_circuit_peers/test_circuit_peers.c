@@ -230,6 +230,23 @@ TEST(what_is_not_known_of_the_drop_is_let_pass_where_others_are_driven_otherwise
     }
 }
 
+/* Within an eighth a share is learnt whatever the drop is. */
+TEST(beside_others_at_about_its_volts_a_share_is_learnt)
+{
+    static const float beside[][2] = {{0.90f, 1}, {0.86f, 0}, {1.12f, 1}, {1.17f, 0}};
+    for (unsigned n = 0; n < ROWS(beside); n++) {
+        setUp();
+        source.unsure_mv = 600.0f;
+        for (unsigned round = 0; round < 3; round++) {
+            for (uint8_t k = 1; k < SPRINGS; k++) {
+                (void)takes(k, HEATS_MV, 1.0f);
+            }
+            (void)takes(0, beside[n][0] * HEATS_MV, 1.0f);
+        }
+        TEST_ASSERT_EQUAL(beside[n][1] > 0.5f, peers.spring[0].learnt > 0);
+    }
+}
+
 /* Shares of before another belief would be held against those after it. */
 TEST(another_belief_begins_anew_and_keeps_what_is_each_ones_own)
 {
