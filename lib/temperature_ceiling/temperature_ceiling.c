@@ -118,10 +118,7 @@ void temperature_ceiling_raise(temperature_ceiling_t *ceiling, const thermal_mod
         if (model_c23 > ceiling->temperature_c23[k]) {
             ceiling->temperature_c23[k] = model_c23;
             ceiling->austenite[k] = thermal_model_austenite(model, k);
-            if (is_above_ambient(ceiling, k)) {
-                ceiling->rest_turns[k] = 0;
-                ceiling->delivered = true;
-            }
+            ceiling->delivered = ceiling->delivered || is_above_ambient(ceiling, k);
         }
         seal(ceiling, k);
     }
