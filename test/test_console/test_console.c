@@ -387,6 +387,14 @@ TEST(settings_that_do_not_fit_wait_until_they_do)
     expect_ok("$save");
 }
 
+TEST(cold_in_a_room_that_was_told_just_now_is_not_heated)
+{
+    status.ambient_c7 = 35 * 128; /* as after `ambient 35` in the same tick */
+    expect_ok("model cold");
+    TEST_ASSERT_EQUAL_STRING("ok\r\n", said);
+    TEST_ASSERT_INT16_WITHIN(64, 35 * 128, controller_temperature_c7(&controller, 1));
+}
+
 TEST(what_was_heated_is_not_cold_because_someone_says_so)
 {
     by_duty = true;

@@ -459,6 +459,20 @@ TEST(a_hotter_model_raises_it_and_a_colder_one_does_not)
     }
 }
 
+/* Until something was given the air is as it is now: springs that are said to be as warm are cold.
+ */
+TEST(air_that_is_told_to_be_warmer_is_no_heat)
+{
+    run(0.0f, 0, 6.0f);
+    thermal_model_set_ambient(&model, 35 * 128);
+    thermal_model_reset(&model, 35 * 128);
+    temperature_ceiling_raise(&ceiling, &model);
+    for (uint8_t k = 0; k < 9; k++) {
+        TEST_ASSERT_FALSE(temperature_ceiling_is_warm(&ceiling, k));
+        TEST_ASSERT_FLOAT_WITHIN(0.01f, 35.0f, temperature_ceiling_c(&ceiling, k));
+    }
+}
+
 /* The air's warmest counts while anything is warm, and what is told after that. */
 TEST(warmest_air_counts_until_all_are_cold)
 {
