@@ -68,6 +68,8 @@ def record(
         raise InputError("a tape has each tick and no thermometers: leave out --hz and --thermometers")
     two_ports(port, thermometers)
     steps = script_lines(read_text(script), str(script), duration) if script else []
+    if script and not steps:
+        raise InputError("no step in it", script)
     got = Recording()
     with told_to_stop(last=True) as stopped:
         with (
