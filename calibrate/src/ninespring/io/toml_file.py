@@ -33,7 +33,7 @@ class TomlFile:
             match = re.search(r"^(.*) \(at (?:line (\d+), column (\d+)|end of document)\)$", str(error))
             line, column = (int(match[2]), int(match[3])) if match and match[2] else (len(lines), len(lines[-1]) + 1)
             said = f"this is not TOML: {match[1] if match else error}"
-            if re.search(r"\d$", lines[line - 1][: column - 1]) and re.match(r",\d", lines[line - 1][column - 1 :]):
+            if re.search(r"=\s*-?\d+,\d", lines[line - 1]):
                 said += f": {DECIMAL_COMMA}"
             raise InputError(said, path, line, column) from None
 
