@@ -270,11 +270,14 @@ def _read_frame(file: Path) -> np.ndarray:
     for number, line in enumerate(lines, 1):
         if not line.strip() or line.startswith("#"):
             continue
-        cells = line.strip().strip(separator).split(separator)
-        try:
-            values = [float(cell.replace(",", ".") if separator == ";" else cell) for cell in cells]
-        except ValueError:
-            raise InputError("a pixel is not a number", file, number) from None
+        values: list[float] = []
+        column = 1 + len(line) - len(line.lstrip(f" \t{separator}"))
+        for cell in line.strip().strip(separator).split(separator):
+            try:
+                values.append(float(cell.replace(",", ".") if separator == ";" else cell))
+            except ValueError:
+                raise InputError(f"a pixel is '{cell[:20]}', not a number", file, number, column) from None
+            column += len(cell) + 1
         if frame and len(values) != len(frame[0]):
             raise InputError(f"{len(values)} pixels where the first row has {len(frame[0])}", file, number)
         frame.append(values)
