@@ -17,6 +17,8 @@ from circuit import ENABLE_PIN, FAN_PIN, HERE, PARTS, SCL_PIN, SDA_PIN, THERMIST
 
 schemdraw.use("svg")
 OUT = HERE.parent / "docs" / "hardware"
+NO_BREAK = "\u00a0"
+"""A blank that a browser does not make one of many of."""
 STYLE = {"fontsize": 11, "bgcolor": "white", "margin": 0.4}
 
 
@@ -82,7 +84,7 @@ def channel() -> schemdraw.Drawing:
         .theta(0)
         .anchor("N")
         .at(middle)
-        .label(f"INA219  0x{w.address:02X}\nIN+              IN−\nSDA, SCL to the bus")
+        .label(f"INA219  0x{w.address:02X}\nIN+{14 * NO_BREAK}IN−\nSDA, SCL to the bus")
     )
     for dot in (above, below):
         drawing += elm.Line().at(dot.center).to((dot.center[0], chip.N[1]))
@@ -104,7 +106,7 @@ def bus() -> schemdraw.Drawing:
             .at((0.6 + 1.1 * row, y))
             .up()
             .length(2.2 + 0.9 * row)
-            .label(value(PARTS["bus_resistor"]["ohm"]), fontsize=8)
+            .label(value(PARTS["bus_resistor"]["ohm"]), loc=("top", "bottom")[row], fontsize=8)
         )
         drawing += elm.Vdd().label("5 V")
     for index, w in enumerate(WIRING):

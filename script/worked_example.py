@@ -11,6 +11,7 @@ from __future__ import annotations
 import argparse
 import sys
 import tempfile
+import textwrap
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -24,7 +25,7 @@ from ninespring.infer.predict import predict
 from ninespring.infer.result import model_of
 from ninespring.io import importing
 from ninespring.io.logs import Run, read_log
-from ninespring.model.models import Array, Model
+from ninespring.model.models import Model, read_model
 
 ROOT = Path(__file__).resolve().parent.parent
 DATA = ROOT / "data" / "tclab_doe"
@@ -35,11 +36,23 @@ UNSEEN = ("step_50_run_2", "step_50_run_3", "sin_5_50_run_2", "sin_5_50_run_3")
 SHOWN = "sin_5_50_run_2"
 
 
-def declared() -> Model:
-    """Return what is known of a heater beforehand: 4 g of 500 J/kgK. The rest is where a fit begins."""
-    model = Model(Array(1, 2))
-    model.parameters = {"heat_capacity_j_per_k": 2.0, "loss_w_per_k": 0.012, "command_power_w": 1.0}
-    return model
+DECLARED = """\
+schema = "ninespring.model/1"
+array = {rows = 1, cols = 2}
+parameter = [
+    {name = "heat_capacity_j_per_k", value = 2, unit = "J/K"},
+    {name = "loss_w_per_k", value = 0.012, unit = "W/K"},    # from here on only where a fit begins
+    {name = "command_power_w", value = 1, unit = "W"},
+]
+"""
+"""What is known of a heater beforehand: 4 g of 500 J/kgK."""
+
+
+def declared(folder: Path) -> Model:
+    """Return that model."""
+    path = folder / "declared.toml"
+    path.write_text(DECLARED, encoding="utf-8")
+    return read_model(path)
 
 
 def log(name: str, folder: Path) -> Run:
@@ -102,7 +115,10 @@ Heater 1 steps to half its power, heater 2 stays off. Likewise `sin_2_50_run_1`,
 
     .venv/bin/ninespring diagnose --model declared.toml step.csv -o diagnosis
 
-`declared.toml` has a 1 x 2 array and one number that nothing in a command can tell, the heat capacity (4 g of 500 J/kgK: 2 J/K). Two nodes, their losses, their coupling, the
+`declared.toml` has a 1 x 2 array and one number that nothing in a command can tell, the heat capacity (4 g of 500 J/kgK: 2 J/K):
+
+{declared}
+Two nodes, their losses, their coupling, the
 heaters' strength and the day's room are fitted, and leave {step.before:.2f} K (rms); with what was found {step.after:.2f} K:
 
 {step.said}
@@ -145,9 +161,9 @@ class Learnt:
     """What was found, a line each."""
 
 
-def learn(runs: list[Run]) -> Learnt:
+def learn(model: Model, runs: list[Run]) -> Learnt:
     """Diagnose some runs."""
-    found = diagnosis.diagnose(Array(1, 2), runs, model=declared())
+    found = diagnosis.diagnose(model.array, runs, model=model)
     result = found.result
     said = [f"- **{one['name']}** ({one['certainty']}): {one['text']}" for one in result["effects"]]
     said += [f"- {one['text']}" for one in (*result["runs_differ"], *result["unnamed"]) if "text" in one]
@@ -170,7 +186,8 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         runs = {one: log(one, folder) for one in (*HOUR, *UNSEEN)}
-    step, hour = learn([runs[STEP]]), learn([runs[one] for one in HOUR])
+        model = declared(folder)
+    step, hour = learn(model, [runs[STEP]]), learn(model, [runs[one] for one in HOUR])
     models = (step.declared, step.diagnosed, hour.declared, hour.diagnosed)
     rows = [f"| `{one}` | {' | '.join(f'{error_k(model, runs[one]):.2f}' for model in models)} |" for one in UNSEEN]
     rises = [runs[one].temperature_c - runs[one].temperature_c[0] for one in ("step_50_run_2", "step_50_run_3")]
@@ -180,6 +197,7 @@ def main() -> int:
         PAGE_TEXT.format(
             step=step,
             hour=hour,
+            declared=textwrap.indent(DECLARED, "    "),
             rows="\n".join(rows),
             shown=SHOWN,
             spread=float(np.sqrt(np.nanmean((rises[0][:both] - rises[1][:both]) ** 2))),

@@ -70,7 +70,8 @@ void console_open_settings(console_t *console);
 void console_seal_settings(console_t *console);
 /* Activates the settings as they are set, or says which two of them do not fit together. */
 void console_apply_settings(console_t *console);
-console_error_t console_error_of(settings_result_t result);
+/* Sets one, without activating it. */
+console_error_t console_assign(console_t *console, const char *name, const char *value);
 /* As `$$` has it. */
 void console_print_setting(const console_t *console, uint16_t index, uint8_t element);
 void console_selftest_line(const console_t *console, const selftest_result_t *result);

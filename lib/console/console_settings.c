@@ -78,7 +78,7 @@ void console_apply_settings(console_t *console)
     }
 }
 
-console_error_t console_error_of(settings_result_t result)
+static console_error_t error_of(settings_result_t result)
 {
     switch (result) {
     case SETTINGS_OK:
@@ -160,14 +160,25 @@ static console_error_t refuse(console_t *console, const char *name, console_erro
     return error;
 }
 
+console_error_t console_assign(console_t *console, const char *name, const char *value)
+{
+    console_open_settings(console);
+    const settings_result_t result = settings_assign(console->settings, name, value);
+    console_seal_settings(console);
+    if (result == SETTINGS_NOT_A_NUMBER && strchr(value, ',') != NULL) {
+        console_hint_text(console, FLASH_TEXT("a decimal point, no comma"), 0, 0);
+        return CONSOLE_ERROR_BAD_ARGUMENT;
+    }
+    const console_error_t error = error_of(result);
+    return error == CONSOLE_OK ? error : refuse(console, name, error);
+}
+
 static console_error_t assign(console_t *console, const char *name, const char *value)
 {
     const settings_t before = *console->settings;
-    console_open_settings(console);
-    const console_error_t error = console_error_of(settings_assign(console->settings, name, value));
-    console_seal_settings(console);
+    const console_error_t error = console_assign(console, name, value);
     if (error != CONSOLE_OK) {
-        return refuse(console, name, error);
+        return error;
     }
     if (memcmp(&before.controller, &console->settings->controller, sizeof before.controller) != 0 ||
         console->conflict) {

@@ -170,12 +170,7 @@ static console_error_t word_ambient(console_t *console, const arguments_t *argum
 {
     char name[SETTINGS_NAME_SIZE]; /* written out it would lie in RAM */
     settings_name(PARAMETER_ambient_c, 0, name);
-    console_hint_setting(console, CONSOLE_HINT_RANGE, PARAMETER_ambient_c, 0);
-    console_open_settings(console);
-    const console_error_t error =
-        console_error_of(settings_assign(console->settings, name, arguments->argument[0]));
-    console_seal_settings(console);
-    return error;
+    return console_assign(console, name, arguments->argument[0]);
 }
 
 static bool any_spring_on(const console_t *console)

@@ -745,6 +745,7 @@ void controller_set_temperature(controller_t *controller, int16_t temperature_c7
 {
     if (!any_is_warm(controller)) { /* then air and plate are not, either */
         thermal_model_reset(&controller->model, temperature_c7);
+        thermal_model_set_ambient(&controller->model, temperature_c7); /* told with it, or before */
     }
     for (uint8_t k = 0; k < controller->springs; k++) {
         if (controller_is_warm(controller, k)) {

@@ -114,14 +114,14 @@ void temperature_ceiling_raise(temperature_ceiling_t *ceiling, const thermal_mod
 {
     for (uint8_t k = 0; k < model->springs; k++) {
         open_spring(ceiling, model, k);
+        if (!ceiling->delivered) { /* then warmer air that was told just now is no heat */
+            set_ambient(ceiling, thermal_model_ambient_c7(model));
+        }
         const int32_t model_c23 = (int32_t)thermal_model_temperature_c7(model, k) * 65536;
         if (model_c23 > ceiling->temperature_c23[k]) {
             ceiling->temperature_c23[k] = model_c23;
             ceiling->austenite[k] = thermal_model_austenite(model, k);
-            if (is_above_ambient(ceiling, k)) {
-                ceiling->rest_turns[k] = 0;
-                ceiling->delivered = true;
-            }
+            ceiling->delivered = ceiling->delivered || is_above_ambient(ceiling, k);
         }
         seal(ceiling, k);
     }

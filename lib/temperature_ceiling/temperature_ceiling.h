@@ -46,7 +46,8 @@ typedef struct {
 
 /* Power-on: nothing was given yet. Also for springs that only another size of the array has. */
 void temperature_ceiling_begin(temperature_ceiling_t *ceiling, int16_t ambient_c7);
-/* What the model has of before a warm reset was given by this board, too: raises, never lowers. */
+/* What the model has of before a warm reset was given by this board, too: raises, never lowers.
+ * Since when a spring has been given none itself is not in the model, and stays. */
 void temperature_ceiling_raise(temperature_ceiling_t *ceiling, const thermal_model_t *model);
 /* Of what was given so much is left that nobody can call the spring cold. */
 bool temperature_ceiling_is_warm(const temperature_ceiling_t *ceiling, uint8_t spring);

@@ -2,8 +2,6 @@
 
 #include <filesystem>
 #include <fmt/format.h>
-#include <fstream>
-#include <iterator>
 
 #include "text_file.h"
 
@@ -110,12 +108,14 @@ std::string simulated_board::command(const std::string &line, double limit_ms)
 
 eeprom_file::eeprom_file(std::string path, board_t *board) : path_(std::move(path)), board_(board)
 {
-    if (path_.empty() || !std::filesystem::exists(path_)) {
+    if (path_.empty()) {
         return;
     }
-    std::ifstream file(path_, std::ios::binary);
-    const std::string content((std::istreambuf_iterator<char>(file)),
-                              std::istreambuf_iterator<char>());
+    check_place(path_);
+    if (!std::filesystem::exists(path_)) {
+        return;
+    }
+    const std::string content = read_bytes(path_);
     if (content.size() != BOARD_EEPROM_BYTES) {
         throw input_error(path_, 0, 0,
                           fmt::format("has {} bytes, an EEPROM has {}; name another file",

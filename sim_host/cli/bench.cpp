@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
-#include <fstream>
 #include <sstream>
 
 namespace ninespring
@@ -113,10 +112,7 @@ std::vector<std::string> bench::words() const
             all.push_back(one);
             continue;
         }
-        std::ifstream file(one.substr(1));
-        if (!file) {
-            throw input_error(fmt::format("{}: cannot be read", one.substr(1)));
-        }
+        std::istringstream file(read_bytes(one.substr(1)));
         add_words(file, all);
     }
     std::for_each(all.begin(), all.end(), check);

@@ -60,13 +60,7 @@ bool check_outputs(const std::vector<std::string> &outputs, const std::vector<st
             table = false;
             continue;
         }
-        const fs::path folder = fs::absolute(output, ignored).parent_path();
-        if (!fs::is_directory(folder, ignored)) {
-            throw input_error(output, 0, 0, "its folder does not exist; make it first");
-        }
-        if (fs::is_directory(output, ignored)) {
-            throw input_error(output, 0, 0, "is a folder; name a file to write");
-        }
+        check_place(output);
         for (const std::string &input : inputs) {
             if (!input.empty() && fs::equivalent(output, input, ignored)) {
                 throw input_error(output, 0, 0,

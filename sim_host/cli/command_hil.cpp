@@ -63,6 +63,9 @@ public:
         settings.c_cflag |= CLOCAL | CREAD;
         cfsetspeed(&settings, B115200);
         tcsetattr(file_, TCSANOW, &settings);
+        while (!read_some().empty()) {
+            /* what has piled up is of ticks that are over */
+        }
     }
     ~serial_port() { close(file_); }
     serial_port(const serial_port &) = delete;

@@ -91,6 +91,7 @@ thermometers::thermometers(const thermometer_arguments &arguments, plant_t *plan
         name_ = pty_.name;
     } else {
         name_ = arguments.target;
+        check_place(name_);
         check_replaceable(name_);
         file_.open(name_, std::ios::trunc);
         if (!file_) {

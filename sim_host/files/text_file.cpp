@@ -29,6 +29,8 @@ std::string place_text(const std::string &file, std::size_t line, std::size_t co
     return fmt::format("{}:{}:{}", file, line, column);
 }
 
+} // namespace
+
 std::string read_bytes(const std::string &path)
 {
     std::error_code ignored;
@@ -53,8 +55,6 @@ std::string read_bytes(const std::string &path)
     }
     return bytes;
 }
-
-} // namespace
 
 input_error::input_error(const std::string &file, std::size_t line, std::size_t column,
                          const std::string &message)
@@ -227,6 +227,18 @@ bool is_own(const std::string &path)
 }
 
 } // namespace
+
+void check_place(const std::string &path)
+{
+    namespace fs = std::filesystem;
+    std::error_code ignored;
+    if (!fs::is_directory(fs::absolute(path, ignored).parent_path(), ignored)) {
+        throw input_error(path, 0, 0, "its folder does not exist; make it first");
+    }
+    if (fs::is_directory(path, ignored)) {
+        throw input_error(path, 0, 0, "is a folder; name a file to write");
+    }
+}
 
 void check_replaceable(const std::string &path)
 {

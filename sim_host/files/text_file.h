@@ -49,6 +49,8 @@ struct text_file {
     std::string text; /* UTF-8, without byte order mark */
 };
 
+/* Fails (input_error) if and only if the file cannot be read. */
+std::string read_bytes(const std::string &path);
 /* Fails (input_error) if and only if the file cannot be read, is empty, is UTF-16, holds a zero
  * byte, or has a line longer than max_line bytes. */
 text_file read_text_file(const std::string &path, std::size_t max_line = TEXT_FILE_MAX_LINE);
@@ -69,6 +71,10 @@ std::string parse_number(std::string_view text, double &value);
 
 /* The name in `names` nearest to `wrong`, as `; did you mean X?`, or an empty text. */
 std::string did_you_mean(std::string_view wrong, const std::vector<std::string> &names);
+
+/* Before the work: an output whose folder is not there, or that is one, is refused (input_error).
+ */
+void check_place(const std::string &path);
 
 /* An output may replace what this tool wrote before, by its first line, or an empty file: anything
  * else that is there is refused (input_error). */

@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -68,6 +69,24 @@ def a_closed_switch_is_found(program: str, elf: Path) -> None:
     assert summary["final_current_a"][1] == 0.0, summary
 
 
+def what_piled_up_before_is_left_out(program: str, elf: Path) -> None:
+    result = Path.cwd() / "board_hil_piled_up.json"
+    with Board(program, elf, "--speed", "0.1") as board:
+        time.sleep(3)  # some fifteen ticks
+        run = subprocess.run(
+            [
+                program, "hil", "--port", board.port, "--duration", "1", "--json", str(result),
+                "--set", "array.rows=1", "--set", "array.cols=2", "--send", "clear",
+            ],
+            check=False, capture_output=True, text=True, timeout=120,
+        )  # fmt: skip
+    print(run.stdout, run.stderr)
+    assert (run.returncode, "ok\n" in run.stdout) == (0, True), run
+    summary = json.loads(result.read_text())
+    result.unlink()
+    assert summary["max_lag_ticks"] <= summary["allowed_lag_ticks"], summary
+
+
 def a_port_that_is_not_there_is_said(program: str, elf: Path) -> None:
     missing = subprocess.run(
         [program, "hil", "--port", "/no/such/port"],
@@ -86,7 +105,12 @@ def main() -> int:
     if not elf.exists():
         print(f"SKIPPED: {elf} is not there: build the avr target first")
         return SKIPPED
-    tests = (goes_on_between_the_frames, a_closed_switch_is_found, a_port_that_is_not_there_is_said)
+    tests = (
+        goes_on_between_the_frames,
+        a_closed_switch_is_found,
+        what_piled_up_before_is_left_out,
+        a_port_that_is_not_there_is_said,
+    )
     with ThreadPoolExecutor(len(tests)) as pool:  # each has a board of its own, that goes slowly
         for done in [pool.submit(test, program, elf) for test in tests]:
             done.result()

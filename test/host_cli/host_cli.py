@@ -175,6 +175,9 @@ class Arguments(Case):
     def test_outputs_are_checked_before_the_work(self) -> None:
         scenario = self.file("s.ini", SCENARIO)
         self.refused("no/out.csv: ", "folder", "run", scenario, "-o", "no/out.csv")
+        for option in ("--eeprom", "--thermometers"):
+            self.refused("no/file: ", "folder", "board", option, "no/file", "--duration", 1)
+            self.refused(".: ", "is a folder", "board", option, ".", "--duration", 1)
         self.refused("s.ini: ", "is an input", "run", scenario, "-o", "s.ini")
         self.refused("a.csv: ", "two outputs", "run", scenario, "-o", "a.csv", "--json", "a.csv")
         self.refused("a.csv: ", "two outputs", "run", scenario, "-o", "a.csv", "--json", self.folder / "a.csv")

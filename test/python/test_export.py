@@ -307,5 +307,5 @@ def test_one_judgement_says_what_goes_into_the_chip_and_how_to_have_it_go(tmp_pa
 
 
 def test_what_is_not_written_never_names_a_spring_that_is() -> None:
-    kept = {"wire_1": "unknown", "wire_3": "unknown", "loss_1": "unknown", "loss_2": "unknown"}
-    assert together(kept, {"wire_2": "1"}) == {"unknown": ["wire_1", "wire_3", "loss"]}
+    kept = dict.fromkeys(("wire_1", "wire_3", "loss_1", "loss_2", "area_mm2"), "unknown")
+    assert together(kept, {"wire_2": "1"}) == {"unknown": ["wire_1", "wire_3", "loss", "area_mm2"]}

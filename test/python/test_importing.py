@@ -28,6 +28,12 @@ ambient_c = 21.5
 """
 
 
+def test_a_pixel_that_is_none_is_refused_where_it_stands(tmp_path: Path) -> None:
+    (tmp_path / "frame.csv").write_text("20.0,21.5\n20.0,warm\n")
+    with pytest.raises(InputError, match=r"frame.csv:2:6: a pixel is 'warm', not a number"):
+        importing.frames_of(tmp_path / "frame.csv")
+
+
 def test_frames_of_any_size_become_a_temperature_a_spring(tmp_path: Path) -> None:
     frames = np.full((5, 24, 32), 20.0)
     for k in range(9):

@@ -53,7 +53,7 @@ SLOW = "".join(f"{500 * n},{n // 100 % 2},{20.0 + 0.1 * (n % 7):g}\n" for n in r
         (HEADER + "0,1,20\n1,1,nan\n2,1,20\n", 3, "not a number: leave the cell empty"),
         (HEADER + "0,1,20\n1,,20\n2,1,20\n", 3, "empty"),
         (HEADER + "0,1,20\n1,1\n", 3, "cut off"),
-        (HEADER + "0,1,20\n1,1,20,5\n2,1,20\n", 3, "decimal commas"),
+        (HEADER + "0,1,20\n1,1,20,5\n2,1,20\n", 3, "a decimal comma? write 20.5, not 20,5"),
         ("time_s;i1_a;t1_c\n0;1,5;20,1\n", 1, "semicolons"),
         ("time_s,i1_ma,t1_c\n0,1,20\n", 1, "unknown column"),
         ("time_s,i1_a,t1_f\n0,1,68\n", 1, "unknown column"),

@@ -51,6 +51,8 @@ def refused(path: Path, read: Callable[[Path], object]) -> tuple[str, str]:
         ("[array]\nrows = 3\ncols =\n", "3:7", "this is not TOML"),
         (ARRAY + "rows = 2\n", "4:9", "this is not TOML"),
         (ARRAY + "[[param", "4:8", "this is not TOML"),
+        (ARRAY + "pitch_mm = 4,5\n", "4:13", "a decimal comma?"),
+        (ARRAY + "board = {2 = {supply_limit_a = 4,5}}\n", "4:35", "a decimal comma?"),
     ],
 )
 def test_a_wrong_array_is_refused_where_it_is_wrong(tmp_path: Path, text: str, place: str, words: str) -> None:

@@ -232,10 +232,10 @@ def test_steps_are_sent_in_their_time_and_status_is_kept_between_the_rows(tmp_pa
 
 def test_a_step_that_the_board_refuses_ends_the_recording(tmp_path: Path) -> None:
     board = FakeBoard({"on 9": ["error:11 a fault is latched"]}, stream=STREAM)
-    (tmp_path / "steps.txt").write_text("at 1 = on 9\n")
+    (tmp_path / "steps.txt").write_bytes(b"\xef\xbb\xbf# a text as editors write it\r\nat 1 = on 9\r\n")
     done = record(board, tmp_path, "--run", tmp_path / "steps.txt")
     assert done.returncode == 1
-    assert "'on 9' refused: error 11" in done.stderr
+    assert "steps.txt:2:1: 'on 9' refused: error 11" in done.stderr
     assert times(tmp_path / "log.csv")[0] == 0.5
 
 
@@ -254,6 +254,12 @@ def test_a_wrong_script_is_refused_with_its_line(tmp_path: Path, text: str, line
     done = ninespring("record", "--port", "x", "--run", tmp_path / "steps.txt", "-o", tmp_path / "x.csv")
     assert done.returncode == 2
     assert done.stderr.startswith(f"ninespring: {tmp_path / 'steps.txt'}:{line}:1: ")
+
+
+def test_a_script_without_a_step_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "steps.txt").write_text("# later\n")
+    done = ninespring("record", "--port", "x", "--run", tmp_path / "steps.txt", "-o", tmp_path / "x.csv")
+    assert (done.returncode, done.stderr) == (2, f"ninespring: {tmp_path / 'steps.txt'}: no step in it\n")
 
 
 def test_the_example_in_its_help_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -66,6 +66,35 @@ def test_settings_that_do_not_fit_together_are_not_saved_and_it_says_so(fake: Fa
     assert "$save" not in fake.sent()
 
 
+def test_what_a_board_refuses_is_told_with_its_line(fake: FakeBoard, tmp_path: Path) -> None:
+    fake.answers["$supply_v=900"] = ["error:5 a number is out of range: supply_v is 1.000 to 16.000 V"]
+    (tmp_path / "s.txt").write_text("# two\n$loss_w_per_k=0.006000\n\n  $supply_v=900\n")
+    code, said = ninespring("upload", "--port", fake.port, tmp_path / "s.txt")
+    assert (code, "s.txt:4:3: '$supply_v=900' refused: error 5" in said) == (1, True)
+    assert "$save" not in fake.sent()
+
+
+@pytest.mark.parametrize(
+    ("content", "code", "says"),
+    [
+        (b"\xef\xbb\xbf$rows=3\r\n$loss_w_per_k=0.006 W/K\r\n$loss_rise_per_k=0 1/K\r\n", 0, "3 settings sent"),
+        ("\ufeff$rows=3\n".encode("utf-16-le"), 2, "s.txt:1: UTF-16 text: save it as UTF-8"),
+        (b"$rows=3\n# 20 \xb0C\n", 2, "s.txt:2:6: not UTF-8 text"),
+        (b"$rows=3\n  $loss_w_per_k=0,006\n", 2, "s.txt:2:3: '$loss_w_per_k=0,006' is not a setting"),
+        (b"$rows=3\n$loss_w_per_k=0,006\n", 2, "a decimal comma?"),
+        (b"$loss_w_per_k=0.006 0.007\n", 2, "s.txt:1:1: '$loss_w_per_k=0.006 0.007' is not a setting"),
+        (b"", 2, "s.txt: no setting in it"),
+    ],
+)
+def test_settings_are_a_text_file_as_any_other(
+    content: bytes, code: int, says: str, fake: FakeBoard, tmp_path: Path
+) -> None:
+    (tmp_path / "s.txt").write_bytes(content)
+    got, said = ninespring("upload", "--port", fake.port, tmp_path / "s.txt")
+    assert (got, says in said) == (code, True), said
+    assert code == 0 or not fake.sent()
+
+
 def test_what_a_board_had_is_a_file_that_upload_takes(fake: FakeBoard, tmp_path: Path, home: Path) -> None:
     upload(fake, tmp_path, "$loss_w_per_k=0.006000")
     (kept,) = home.rglob("*.txt")

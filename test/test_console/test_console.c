@@ -292,8 +292,9 @@ TEST(every_refusal_says_what_would_be_right)
         {4, "echo loud", ": write echo on|off\r\n"},
         {4, "supply maybe", ": write supply on|off\r\n"},
         {5, "$supply_v=900", "a number is out of range: supply_v is 1.000 to 16.000 V\r\n"},
-        {4, "$supply_v=5,5",
-         "an argument is not of the right form: supply_v is 1.000 to 16.000 V\r\n"},
+        {4, "ambient 21,5", ": a decimal point, no comma\r\n"},
+        {4, "$supply_v=5,5", "an argument is not of the right form: a decimal point, no comma\r\n"},
+        {4, "$supply_v=5V", ": supply_v is 1.000 to 16.000 V\r\n"},
         {4, "$supply_v=", ": supply_v is 1.000 to 16.000 V\r\n"},
         {5, "$loss_scale_9=0", ": loss_scale_9 is 0.001 to 8.000\r\n"},
         {4, "$resistance_martensite_rise_per_k=1e-3",
@@ -386,6 +387,14 @@ TEST(settings_that_do_not_fit_wait_until_they_do)
     expect_ok("$save");
 }
 
+TEST(cold_in_a_room_that_was_told_just_now_is_not_heated)
+{
+    status.ambient_c7 = 35 * 128; /* as after `ambient 35` in the same tick */
+    expect_ok("model cold");
+    TEST_ASSERT_EQUAL_STRING("ok\r\n", said);
+    TEST_ASSERT_INT16_WITHIN(64, 35 * 128, controller_temperature_c7(&controller, 1));
+}
+
 TEST(what_was_heated_is_not_cold_because_someone_says_so)
 {
     by_duty = true;
@@ -407,6 +416,14 @@ TEST(what_was_heated_is_not_cold_because_someone_says_so)
     expect_said(" degC or more]\r\n");
     TEST_ASSERT_EQUAL_UINT(1, answers());
     TEST_ASSERT_INT16_WITHIN(128, before_c7, controller_temperature_c7(&controller, 1));
+    /* a belief above the account of heat is no heat that was given just now, nor to its neighbour
+     */
+    thermal_model_set_temperature(&controller.model, 1, 90 * 128);
+    thermal_model_set_temperature(&controller.model, 2, 60 * 128);
+    temperature_ceiling_raise(&controller.ceiling, &controller.model);
+    ask("model cold");
+    TEST_ASSERT_EQUAL_STRING_LEN("[spring 2 was heated 1", said, 22);
+    expect_said("[spring 3 was heated by others: 60 degC or more]\r\n");
 }
 
 /* Whatever order a restore has, what it ends with is the same, and in between nothing is refused.
@@ -636,7 +653,7 @@ TEST(what_the_thermistor_cannot_mean_is_said)
 
 TEST(a_fault_that_a_clear_leaves_says_for_how_long)
 {
-    controller_set_temperature(&controller, 60 * 128); /* it was heated just now */
+    temperature_ceiling_step(&controller.ceiling, &controller.model, 3, 1.0f); /* heated just now */
     for (unsigned n = 0; n < 2; n++) {
         safety_trip(&controller.safety, 3, SAFETY_FAULT_SENSOR_MISMATCH);
         expect_ok("faults");

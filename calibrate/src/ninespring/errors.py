@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+DECIMAL_COMMA = "a decimal comma? write 20.5, not 20,5"
+
 
 class InputError(Exception):
     """Input that cannot be used. Shown as one line; the program ends with exit code 2."""

@@ -11,8 +11,8 @@ from rich.live import Live
 
 from ..errors import InputError, WorkError
 from ..io import history, ranges, results
-from ..io.board import Board, settings_in
-from ..io.logs import read_bytes
+from ..io.board import Board, read_settings
+from ..io.logs import read_text
 from ..io.recording import LogFile, Recording, about, script_lines, told_to_stop
 from ..io.recording import record as record_board
 from ..io.tape import record_tape
@@ -67,8 +67,9 @@ def record(
     if tape and (thermometers or hz != 1):
         raise InputError("a tape has each tick and no thermometers: leave out --hz and --thermometers")
     two_ports(port, thermometers)
-    text = read_bytes(script).decode("utf-8", "replace") if script else ""
-    steps = script_lines(text, str(script), duration)
+    steps = script_lines(read_text(script), str(script), duration) if script else []
+    if script and not steps:
+        raise InputError("no step in it", script)
     got = Recording()
     with told_to_stop(last=True) as stopped:
         with (
@@ -122,7 +123,7 @@ def upload(settings: Path | None, port: str, undo: bool, save: bool, json_path: 
             out.print(line)
         out.print(f"`{last.by}` of {last.when} is taken back{', saved' if save else ''}")
         return
-    given = settings_in(read_bytes(settings).decode("utf-8", "replace"), str(settings))
+    given = read_settings(settings)
     with working("sending", len(given)) as say:
         history.send(port, given, f"upload {settings.name}", save, say)
     write({json_path: results.checked(results.Upload(settings=len(given), saved=save))})

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import re
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -16,7 +17,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
 
-from ..errors import InputError
+from ..errors import DECIMAL_COMMA, InputError
 from ..io import results
 from ..io.logs import Run, check_folder, read_log, sha256_of, write_atomically
 from ..io.ranges import Range
@@ -99,6 +100,8 @@ class Real(click.FloatRange):
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
         """Return the number; a comparison with NaN is never true, so that the range alone would let it through."""
+        if re.search(r"\d,\d", str(value)):
+            self.fail(f"{value} is no number: {DECIMAL_COMMA}", param, ctx)
         number = super().convert(value, param, ctx)
         if not math.isfinite(number):
             self.fail(f"{value} is not in the range {self._describe_range()}.", param, ctx)

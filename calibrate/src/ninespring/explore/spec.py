@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..io.logs import read_bytes
+from ..io.logs import read_text
 from ..io.toml_file import TomlFile, did_you_mean
 from ..model import cooling, native, stiffness
 from ..model.models import MATERIAL_KEYS, SPRING_KEYS, STIFFNESS_KEYS, Array
@@ -340,7 +340,7 @@ class _Reader:
                     raise self.refuse(f'{key}: the paper\'s law knows only pitch and fan; couplings = "field"', key)
         spec.boards = self.boards()
         self.optimise(spec)
-        spec.text = read_bytes(self.path).decode()
+        spec.text = read_text(self.path)
         spec.sha256 = hashlib.sha256(json.dumps(self.data, sort_keys=True).encode()).hexdigest()
         return spec
 

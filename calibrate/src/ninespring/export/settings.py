@@ -126,7 +126,7 @@ def judged(listed: Sequence[results.Effect], model: Model) -> None:
 
 def together(kept: Mapping[str, str], written: Mapping[str, str]) -> dict[str, list[str]]:
     """Return what is not written, by reason: settings of all springs as one name, of some of them by their numbers."""
-    base = lambda name: re.sub(r"_?\d+$", "", name)  # noqa: E731
+    base = lambda name: re.sub(r"_\d+$", "", name)  # noqa: E731
     mixed = {base(name) for name in written}
     out: dict[str, list[str]] = {}
     for name, why in kept.items():

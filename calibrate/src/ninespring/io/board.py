@@ -16,10 +16,10 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from ..errors import InputError, RefusedError, WorkError
+from ..errors import DECIMAL_COMMA, InputError, RefusedError, WorkError
 from . import ranges
 from .belief import Belief, beliefs
-from .logs import COLUMN, EXTRA, read_bytes
+from .logs import COLUMN, EXTRA, read_text
 from .port import Port
 from .simulated import simulated_board
 
@@ -463,12 +463,14 @@ def send_settings(
     WorkError, and nothing is saved, where the board refuses one or shows another value.
     """
     remarks = board.ask("learnt clear", 10.0)
-    for k, line in enumerate(as_lines(settings).splitlines()):
+    for k, (name, value) in enumerate(settings.items()):
+        line = f"${name}={value}"
         say(line, k)
         try:
             remarks = board.ask(line)
         except WorkError as error:
-            raise WorkError(f"{error}: {UNSAVED}") from None
+            where = settings.places[name] if isinstance(settings, Settings) else ""
+            raise WorkError(f"{where}{error}: {UNSAVED}") from None
     if remarks:
         raise WorkError(f"the board does not take them together: {remarks[-1]}: {UNSAVED}")
     say("reading back", len(settings))
@@ -494,22 +496,32 @@ def as_lines(settings: Mapping[str, str]) -> str:
     return "".join(f"${name}={value}\n" for name, value in settings.items())
 
 
-def settings_in(text: str, name: str) -> dict[str, str]:
-    """Return the settings of console lines, `$name=value`; anything else is refused."""
-    out = {}
-    for number, line in enumerate(text.splitlines(), start=1):
-        line = line.partition("#")[0].strip()
+class Settings(dict[str, str]):
+    """Settings of console lines, and where each stands: file, line, column."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.places: dict[str, str] = {}
+
+
+def settings_in(text: str, name: str) -> Settings:
+    """Return the settings of console lines, `$name=value`, also where `$$` told units behind the values; anything else is refused."""
+    out = Settings()
+    for number, raw in enumerate(text.splitlines(), start=1):
+        line = re.sub(r"^(\$\S+=\S+)\s+(?:1/)?[a-zA-Z]\S*$", r"\1", raw.partition("#")[0].strip())
         if not line:
             continue
+        column = 1 + len(raw) - len(raw.lstrip())
         if not (match := re.fullmatch(r"\$([a-z0-9_]+)=(-?\d+(?:\.\d+)?)", line)):
-            raise InputError(f"'{line[:40]}' is not a setting, `$name=value`", name, number, 1)
+            hint = f": {DECIMAL_COMMA}" if re.search(r"\d,\d", line) else ""
+            raise InputError(f"'{line[:40]}' is not a setting, `$name=value`{hint}", name, number, column)
         out[match[1]] = match[2]
+        out.places[match[1]] = f"{name}:{number}:{column}: "
     if not out:
         raise InputError("no setting in it", name)
     return out
 
 
-def read_settings(path: Path) -> dict[str, str]:
-    """Return the settings of a file of console lines, also where `$$` told units behind the values; anything else is refused."""
-    text = re.sub(r"^(\$\S+=\S+)[ \t].*$", r"\1", read_bytes(path).decode("utf-8", "replace"), flags=re.M)
-    return settings_in(text, str(path))
+def read_settings(path: Path) -> Settings:
+    """Return the settings of a file of console lines; anything else is refused."""
+    return settings_in(read_text(path), str(path))

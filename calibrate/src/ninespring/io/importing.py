@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 
 from ..errors import InputError
-from .logs import COLUMN, LIMITS, MAX_SPRINGS, log_text, read_bytes, read_table
+from .logs import COLUMN, LIMITS, MAX_SPRINGS, log_text, read_bytes, read_table, read_text
 from .toml_file import At, TomlFile
 
 UNITS: dict[str, tuple[float, float]] = {
@@ -264,17 +264,20 @@ def frames_of(path: str | Path) -> tuple[int, Iterator[np.ndarray]]:
 
 
 def _read_frame(file: Path) -> np.ndarray:
-    lines = read_bytes(file).decode("utf-8-sig", "replace").splitlines()
+    lines = read_text(file).splitlines()
     separator = ";" if any(";" in line for line in lines[:3]) else ","
     frame: list[list[float]] = []
     for number, line in enumerate(lines, 1):
         if not line.strip() or line.startswith("#"):
             continue
-        cells = line.strip().strip(separator).split(separator)
-        try:
-            values = [float(cell.replace(",", ".") if separator == ";" else cell) for cell in cells]
-        except ValueError:
-            raise InputError("a pixel is not a number", file, number) from None
+        values: list[float] = []
+        column = 1 + len(line) - len(line.lstrip(f" \t{separator}"))
+        for cell in line.strip().strip(separator).split(separator):
+            try:
+                values.append(float(cell.replace(",", ".") if separator == ";" else cell))
+            except ValueError:
+                raise InputError(f"a pixel is '{cell[:20]}', not a number", file, number, column) from None
+            column += len(cell) + 1
         if frame and len(values) != len(frame[0]):
             raise InputError(f"{len(values)} pixels where the first row has {len(frame[0])}", file, number)
         frame.append(values)
@@ -286,7 +289,7 @@ def _read_frame(file: Path) -> np.ndarray:
 def read_times(path: str | Path) -> np.ndarray:
     """Read times of frames, s, one a line, rising; # begins a comment."""
     out: list[float] = []
-    for number, raw in enumerate(read_bytes(path).decode("utf-8-sig", "replace").splitlines(), 1):
+    for number, raw in enumerate(read_text(path).splitlines(), 1):
         text = raw.partition("#")[0].strip()
         if not text:
             continue

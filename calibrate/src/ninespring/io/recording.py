@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from .. import __version__
-from ..errors import InputError, WorkError
+from ..errors import InputError, RefusedError, WorkError
 from . import results
 from .board import Board
 from .logs import LIMITS, check_folder
@@ -46,6 +46,15 @@ class Step:
 
     line: str
     at_s: float | None = None
+    place: str = field(default="", compare=False)
+    """File, line and column where it stands."""
+
+    def send(self, board: Board) -> list[str]:
+        """Return the board's answer; a refusal says where the line stands."""
+        try:
+            return board.ask(self.line)
+        except RefusedError as error:
+            raise RefusedError(f"{self.place}{error.refusal}", error.said) from None
 
 
 class Fault(results.Fault):
@@ -110,13 +119,14 @@ def script_lines(text: str, name: str, duration_s: float = math.inf) -> list[Ste
             continue
         if not line.isascii():
             raise InputError("the console takes plain ASCII", name, number, 1)
-        step = Step(line)
+        place = f"{name}:{number}:1: "
+        step = Step(line, place=place)
         if re.match(r"at\b", line):
             match = re.fullmatch(r"at\s+(\d+(?:\.\d*)?)\s*=\s*(\S.*)", line)
             if not match:
                 raise InputError(f"'{line[:40]}' is not `at SECONDS = console line`", name, number, 1)
             at_s = float(match[1])
-            step = Step(match[2], at_s)
+            step = Step(match[2], at_s, place)
             if steps and steps[-1].at_s is not None and steps[-1].at_s > at_s:
                 raise InputError("times of a script must not fall", name, number, 1)
             if at_s >= duration_s:
@@ -337,7 +347,7 @@ def record(
         alarm(fault)
 
     def send(step: Step) -> None:
-        for words in board.ask(step.line):
+        for words in step.send(board):
             sink.comment(f"'{step.line}': {words}")
             remark(f"'{step.line}': {words}")
 

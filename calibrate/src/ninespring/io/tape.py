@@ -85,5 +85,5 @@ def _ticks(
             )
         while log.rows and steps and (steps[0].at_s or 0.0) <= time_s:
             step = steps.pop(0)
-            for words in board.ask(step.line):
+            for words in step.send(board):
                 remark(f"'{step.line}': {words}")

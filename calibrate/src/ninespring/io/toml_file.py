@@ -10,8 +10,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from ..errors import InputError
-from .logs import read_bytes
+from ..errors import DECIMAL_COMMA, InputError
+from .logs import read_text
 
 At = tuple[str | int, ...]
 """A value's way from the root: ("array", "rows"), ("parameter", 0, "value")."""
@@ -26,15 +26,16 @@ class TomlFile:
     def __init__(self, path: str | Path) -> None:
         self.path = path
         try:
-            self.text = read_bytes(path).decode("utf-8-sig")
+            self.text = read_text(path)
             self.data: dict[str, Any] = tomllib.loads(self.text)
-        except UnicodeDecodeError:
-            raise InputError("not UTF-8 text", path, 1) from None
         except tomllib.TOMLDecodeError as error:
             lines = self.text.split("\n")
             match = re.search(r"^(.*) \(at (?:line (\d+), column (\d+)|end of document)\)$", str(error))
             line, column = (int(match[2]), int(match[3])) if match and match[2] else (len(lines), len(lines[-1]) + 1)
-            raise InputError(f"this is not TOML: {match[1] if match else error}", path, line, column) from None
+            said = f"this is not TOML: {match[1] if match else error}"
+            if re.search(r"=\s*-?\d+,\d", lines[line - 1]):
+                said += f": {DECIMAL_COMMA}"
+            raise InputError(said, path, line, column) from None
 
     @functools.cached_property
     def places(self) -> dict[At, tuple[int, int, int]]:

@@ -166,8 +166,9 @@ def error_bars(told: results.Diagnosis) -> str:
     figure, axis = plt.subplots(figsize=(4.2, 1.5))
     for at, (name, value, colour) in enumerate(rows):
         axis.barh(-at, value, color=colour, height=0.7)
-        axis.text(value, -at, f" {value:.2f} K", va="center", fontsize=9)
-        axis.text(0, -at, f"{name} ", va="center", ha="right", fontsize=9)
+        beside = {"textcoords": "offset points", "va": "center", "fontsize": 9}  # a browser drops blanks at the ends
+        axis.annotate(f"{value:.2f} K", (value, -at), (4, 0), **beside)
+        axis.annotate(name, (0, -at), (-4, 0), ha="right", **beside)
     axis.set_xlim(0, max(value for _, value, _ in rows) * 1.25)
     axis.set_axis_off()
     axis.set_title("error on held-out blocks", fontsize=9, loc="left")

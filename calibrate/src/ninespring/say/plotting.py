@@ -93,16 +93,15 @@ def _map(run: Run, rows: int, cols: int) -> tuple[Figure, Callable[[int], None]]
     out = Figure(figsize=(1.2 * cols * len(layers) + 1.5, 1.2 * rows + 0.8), layout="constrained")
     FigureCanvasAgg(out)
     axes = out.subplots(1, len(layers), squeeze=False)[0]
-    low, high = float(np.nanmin(temperature)), float(np.nanmax(temperature))
+    low, high = min(float(np.nanmin(temperature)), 20.0), max(float(np.nanmax(temperature)), 60.0)
+    bright = low + 0.7 * (high - low)  # white is not read on what is above
     pictures, words = [], []
     for at, (name, springs) in zip(axes, layers, strict=True):
-        colours = {"cmap": "inferno", "vmin": min(low, 20.0), "vmax": max(high, 60.0)}
-        pictures.append(at.imshow(temperature[0, springs].reshape(rows, cols), **colours))
-        at.set_xticks(range(cols), [])
-        at.set_yticks(range(rows), [])
+        pictures.append(at.imshow(temperature[0, springs].reshape(rows, cols), cmap="inferno", vmin=low, vmax=high))
+        at.set(xticks=[], yticks=[])
         at.set_xlabel(name)
         for k in range(len(springs)):
-            words.append(at.text(k % cols, k // cols, "", ha="center", va="center", color="white", fontsize=9))
+            words.append(at.text(k % cols, k // cols, "", ha="center", va="center", fontsize=9))
     out.colorbar(pictures[0], ax=list(axes), label=f"{what}, degC")
 
     def draw(row: int) -> None:
@@ -111,6 +110,7 @@ def _map(run: Run, rows: int, cols: int) -> tuple[Figure, Callable[[int], None]]
             picture.set_data(temperature[row, springs].reshape(rows, cols))
         for k, one in enumerate(words):
             one.set_text(f"{k + 1}: {temperature[row, k]:.0f}")
+            one.set_color("black" if temperature[row, k] > bright else "white")
             one.set_fontweight("bold" if run.drive[row, k] > 0 else "normal")
 
     return out, draw

@@ -15,5 +15,6 @@ from .writing import check_folder as check_folder
 from .writing import kind_of as kind_of
 from .writing import log_text as log_text
 from .writing import read_bytes as read_bytes
+from .writing import read_text as read_text
 from .writing import sha256_of as sha256_of
 from .writing import write_atomically as write_atomically

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from ...errors import InputError
-from .writing import read_bytes
+from ...errors import DECIMAL_COMMA, InputError
+from .writing import read_text
 
 MAX_LINE = 100_000
 """A line longer than this (characters) is not a log."""
@@ -75,7 +75,7 @@ class Table:
                 advice = (
                     "cut off here?"
                     if row == len(body) - 1
-                    else "decimal commas? write 20.5, not 20,5"
+                    else DECIMAL_COMMA
                     if found > cells
                     else "a cell is missing: leave it empty between two commas"
                 )
@@ -87,19 +87,11 @@ class Table:
         return self
 
     def _text(self) -> str:
-        """Return the file's text, lines ended by a line feed; what is no text of lines is refused."""
-        raw = read_bytes(self.path)
-        if not raw.strip():
+        """Return the file's text; an empty one is refused."""
+        text = read_text(self.path)
+        if not text.strip():
             raise self.refuse("the file is empty")
-        if b"\0" in raw:
-            kind = "UTF-16 text" if raw[:2] in (b"\xff\xfe", b"\xfe\xff") else "not a text file (it holds NUL bytes)"
-            raise self.refuse(f"{kind}: save the log as UTF-8 CSV", 1)
-        try:
-            text = raw.decode("utf-8-sig")
-        except UnicodeDecodeError as error:
-            line = raw.count(b"\n", 0, error.start) + 1
-            raise self.refuse("not UTF-8 text: save the log as UTF-8 CSV", line) from None
-        return text.replace("\r\n", "\n").replace("\r", "\n") if "\r" in text else text
+        return text
 
     def _kept(self, text: str) -> tuple[list[str], list[int]]:
         """Return the header and the rows, and the line of each; keep what the comments say."""

@@ -151,6 +151,21 @@ def read_bytes(path: str | Path) -> bytes:
         raise InputError(f"cannot be read: {error.strerror}", path) from None
 
 
+def read_text(path: str | Path) -> str:
+    """Return a text file, each line ended by a line feed; what is not UTF-8, with or without byte order mark, is refused."""
+    raw = read_bytes(path)
+    if b"\0" in raw:
+        kind = "UTF-16 text" if raw[:2] in (b"\xff\xfe", b"\xfe\xff") else "not a text file (it holds NUL bytes)"
+        raise InputError(f"{kind}: save it as UTF-8 text", path, 1)
+    try:
+        text = raw.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        before = raw[: error.start].decode("utf-8-sig").rpartition("\n")[2]
+        line = raw.count(b"\n", 0, error.start) + 1
+        raise InputError("not UTF-8 text: save it as UTF-8", path, line, len(before) + 1) from None
+    return text.replace("\r\n", "\n").replace("\r", "\n") if "\r" in text else text
+
+
 def log_text(
     time_s: np.ndarray,
     columns: dict[str, np.ndarray],
