@@ -32,6 +32,8 @@
 #define GOES_ON_C7          (4 * 128) /* below austenite start: keeps its turn */
 #define LOOK_MA             2000u /* of a spring of which much was learnt and nothing is known */
 #define LOWER_MA            800u  /* the least at which a resistance tells the phase */
+#define TRIAL_K_PER_S       1.0f  /* about as fast as it cools by itself */
+#define TRIAL_MA            650u  /* the least at which a hold is read */
 #define RISE_SHARE          0.25f /* of a turn in the average */
 
 #define WALK_MA     20                                 /* a tick, after a change of policy */
@@ -258,6 +260,8 @@ static void hold(drive_policy_t *policy, const drive_policy_input_t *in, uint8_t
     if (full && !sees) { /* who knows whether it has transformed: above that first, then down */
         s->margin_k -= BLIND_K_PER_S * TURN_S;
         s->margin_k = s->margin_k < safe_k ? safe_k : s->margin_k;
+    } else if (spring_estimator_on_trial(b)) {
+        s->margin_k -= TRIAL_K_PER_S * TURN_S;
     } else if (s->margin_k > safe_k || !full || sd_k < SEARCH_SD_K) {
         s->margin_k = safe_k;
     } else if (settled && !losing && s->margin_k > SEARCH_END_K) {
@@ -265,9 +269,10 @@ static void hold(drive_policy_t *policy, const drive_policy_input_t *in, uint8_t
     }
     const uint16_t holds_ma = hold_current_ma(policy, in, k, below_k(in, k, s->margin_k), 0.0f);
     const uint16_t wanted_ma = (uint16_t)(holds_ma + policy->parameters.dither_ma / 2u);
-    s->wanted_ma = wanted_ma < policy->parameters.probe_current_ma
-                       ? policy->parameters.probe_current_ma
-                       : wanted_ma;
+    const uint16_t least_ma = spring_estimator_on_trial(b)
+                                  ? (uint16_t)(TRIAL_MA + policy->parameters.dither_ma)
+                                  : policy->parameters.probe_current_ma;
+    s->wanted_ma = wanted_ma < least_ma ? least_ma : wanted_ma;
 }
 
 static void lower(drive_policy_t *policy, const drive_policy_input_t *in, uint8_t k,

@@ -250,8 +250,9 @@ static float predict(const spring_estimator_t *e, spring_belief_t *b, const ther
 void spring_correct_loss(const spring_estimator_t *e, spring_belief_t *b, float more_w_per_k)
 {
     const float most = LOSS_MOST * e->loss_w_per_k;
+    const float least = LOSS_FLOOR * e->loss_w_per_k;
     const float now = b->learnt.loss_w_per_k; /* beyond it after another declaration: no farther */
-    b->learnt.loss_w_per_k = spring_clamp(now + more_w_per_k, fminf(now, -most), fmaxf(now, most));
+    b->learnt.loss_w_per_k = spring_clamp(now + more_w_per_k, fminf(now, least), fmaxf(now, most));
 }
 
 float spring_see(const spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model, uint8_t k,
@@ -289,7 +290,7 @@ void spring_keep_above(spring_estimator_t *e, spring_belief_t *b, thermal_model_
         spring_correct_loss(e, b, less_w_per_k);
         b->kept_w_per_k += less_w_per_k;
         const float sds = SPRING_ESTIMATOR_BOUND_SDS;
-        if (b->kept_w_per_k * b->kept_w_per_k > sds * sds * b->loss_variance) {
+        if (!b->trial && b->kept_w_per_k * b->kept_w_per_k > sds * sds * b->loss_variance) {
             /* it hardly can lose so little: what is read may not be its phase. If it is, the loss
              * is right, and the declared one would overheat it: it stays. */
             b->blind = true;
@@ -517,6 +518,23 @@ void spring_estimator_tick(spring_estimator_t *e, thermal_model_t *model,
 
 /* ---- stages ---- */
 
+float spring_beyond_austenite(const spring_belief_t *b, const thermal_model_t *model, uint8_t k,
+                              float ohm)
+{
+    const int16_t finish_c7 = thermal_model_transformation(model, k).austenite_finish_c7;
+    const float hotter_k = spring_now_c(model, k) - spring_c(finish_c7);
+    const float explains = COEFFICIENT_MOST_PER_K * hotter_k;
+    const float more = ohm / b->learnt.austenite_ohm - 1.0f;
+    const float low = fminf(explains, 0.0f);
+    const float high = fmaxf(explains, 0.0f);
+    return more > high ? more - high : more < low ? more - low : 0.0f;
+}
+
+float spring_read_tolerance(const spring_belief_t *b)
+{
+    return EXPLAINED_LEAST + SPRING_ESTIMATOR_BOUND_SDS * b->noise;
+}
+
 /* It reads less than when it had transformed last, and the difference is neither noise nor a
  * temperature coefficient. Or it is still to come: its alloy is another one, if the model is hot.
  */
@@ -531,8 +549,7 @@ bool spring_estimator_lacks_phase(const spring_belief_t *b, const thermal_model_
     const float hotter_k = spring_now_c(model, k) - spring_c(finish_c7);
     /* a coefficient makes it more where it is hotter */
     const float explains_k = fmaxf(l->change < 0.0f ? hotter_k : -hotter_k, 0.0f);
-    const float explained = EXPLAINED_LEAST + SPRING_ESTIMATOR_BOUND_SDS * b->noise +
-                            COEFFICIENT_MOST_PER_K * explains_k;
+    const float explained = spring_read_tolerance(b) + COEFFICIENT_MOST_PER_K * explains_k;
     const float less = 1.0f - b->ohm / l->austenite_ohm;
     return (l->change < 0.0f ? -less : less) > explained;
 }
@@ -546,8 +563,7 @@ static bool surely_finished(const spring_belief_t *b, const thermal_model_t *mod
 }
 
 /* It is over, by what it reads in two turns above austenite start: what its austenite read when it
- * had transformed last, or beyond; from above, what the largest coefficient makes of that where it
- * is colder. */
+ * had transformed last, and no more than a temperature makes of that. */
 static bool reads_austenite(const spring_belief_t *b, const thermal_model_t *model, uint8_t k)
 {
     const spring_learnt_t *l = &b->learnt;
@@ -557,9 +573,11 @@ static bool reads_austenite(const spring_belief_t *b, const thermal_model_t *mod
         b->ohm_before[1] == 0.0f || now_c7 < t.austenite_start_c7) {
         return false;
     }
-    const float more = 0.5f * (b->ohm_before[0] + b->ohm_before[1]) / l->austenite_ohm - 1.0f;
+    const float ohm = 0.5f * (b->ohm_before[0] + b->ohm_before[1]);
+    const float more = ohm / l->austenite_ohm - 1.0f;
     const float colder_k = fmaxf(spring_c((int16_t)(t.austenite_finish_c7 - now_c7)), 0.0f);
-    return l->change > 0.0f ? more > 0.0f : more < -COEFFICIENT_MOST_PER_K * colder_k;
+    return fabsf(spring_beyond_austenite(b, model, k, ohm)) < spring_read_tolerance(b) &&
+           (l->change > 0.0f ? more > 0.0f : more < -COEFFICIENT_MOST_PER_K * colder_k);
 }
 
 bool spring_estimator_has_transformed(const spring_estimator_t *e, const thermal_model_t *model,

@@ -134,6 +134,7 @@ typedef struct {
     bool rough : 1;    /* the line is of few turns, not of a spring at rest */
     bool steep : 1;    /* and its resistance still changes as only that explains */
     bool told : 1;     /* it is martensite because someone said so */
+    bool trial : 1;    /* held with less power, to tell what its resistance has changed by */
     bool unlike : 1;   /* this heating's martensite was not of the declared resistance */
     spring_learnt_t learnt;
 
@@ -142,6 +143,7 @@ typedef struct {
     float ohm_before[2]; /* one and two turns earlier; 0: at another current */
     float slow_ohm;      /* over 4 s */
     float slow_a;        /* the current over the same */
+    float trial_ohm;     /* as its trial began */
     float phase_ohm;     /* the last at a strong current: what tells the phase */
     float offset_sd_v;   /* of its sensor's offset */
     float noise;         /* standard deviation of one turn's, relative */
@@ -315,6 +317,12 @@ static inline float spring_estimator_lost(const spring_belief_t *belief)
 static inline bool spring_estimator_seems_to_lose(const spring_belief_t *belief)
 {
     return belief->losing != 0;
+}
+/* Its resistance has changed as a hotter spring's does, or a contact's, or an intermediate phase's:
+ * with less power it tells which. */
+static inline bool spring_estimator_on_trial(const spring_belief_t *belief)
+{
+    return belief->trial;
 }
 /* Turns for which its temperature has hardly moved in its hold, saturating. */
 static inline bool spring_estimator_rests(const spring_belief_t *belief)

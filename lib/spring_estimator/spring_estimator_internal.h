@@ -43,8 +43,9 @@
 #define LOSS_TOLERANCE 0.2f  /* of a declared loss, either way; a draught, a door */
 #define LOSS_SD        0.12f /* of that, evenly */
 #define LEAST_LOSS     (1.0f - LOSS_TOLERANCE)
-#define CAPACITY_SD    0.09f /* of a declared heat capacity: 15 %, evenly */
-#define LOSS_MOST      0.45f /* of the declared loss: no more is ever believed */
+#define CAPACITY_SD    0.09f   /* of a declared heat capacity: 15 %, evenly */
+#define LOSS_MOST      0.45f   /* of the declared loss: no more is ever believed */
+#define LOSS_FLOOR     (-0.8f) /* and no less: under a cloth it is a third */
 
 #define OFFSET_MOST_V 0.012f /* no sensor's is larger */
 
@@ -147,6 +148,12 @@ void spring_misread(spring_estimator_t *estimator, const thermal_model_t *model,
                     float by, float noise);
 /* Told by its own resistances, both of which were learnt, 0..1. */
 float spring_phase_by_resistance(const spring_belief_t *belief);
+/* By so much, of its austenite's, ohm is beyond what it read when it had transformed last (below 0:
+ * less). 0 where as much as being hotter or colder makes of that explains it. */
+float spring_beyond_austenite(const spring_belief_t *belief, const thermal_model_t *model,
+                              uint8_t spring, float ohm);
+/* By how much of it a turn's resistance may be off, with nothing happening. */
+float spring_read_tolerance(const spring_belief_t *belief);
 /* It has transformed: what it reads now is its own austenite's, and the way there its change. */
 void spring_learn_austenite(spring_belief_t *belief);
 

@@ -154,6 +154,7 @@ static void tell_slope(spring_line_t *line, float left)
 
 void spring_begin_hold_line(spring_belief_t *b, bool now)
 {
+    b->trial = false;
     /* any slope in print: no phase's coefficient tells the other's */
     b->run.line = (spring_line_t){
         .rise_per_k = 0.5f * (COEFFICIENT_MOST_PER_K + COEFFICIENT_IN_PRINT_PER_K),
@@ -213,6 +214,59 @@ static void take_slow_noise(spring_belief_t *b)
     line->was_ohm[0] = b->slow_ohm;
 }
 
+/* More than its austenite read when that was hot: it is hotter, or a contact has crept. */
+static bool reads_hot(const spring_belief_t *b, const thermal_model_t *model, uint8_t k)
+{
+    const float ohm = b->slow_ohm;
+    return b->learnt.change > 0.0f && b->learnt.austenite_ohm > 0.0f &&
+           spring_beyond_austenite(b, model, k, ohm) > spring_read_tolerance(b);
+}
+
+/* What is certain to have left its line need be no lost phase: a hotter spring reads otherwise, or
+ * a contact that has crept, and what goes the other way may be an intermediate phase's. While the
+ * spring may be hot, or may have come to where it loses phase, it is put on trial: with less power
+ * what is lost goes on, what was heat goes back, and a contact does neither until phase is lost.
+ * Returns whether it was no sight of lost phase. */
+static bool is_tried(const spring_estimator_t *e, spring_belief_t *b, const thermal_model_t *model,
+                     uint8_t k, bool other_way, float share)
+{
+    const float start_c = lost_at_c(model, k, 0.0f);
+    const bool may_lose =
+        spring_now_c(model, k) < start_c + SPRING_ESTIMATOR_LIKELY_SDS * spring_estimator_sd_k(b);
+    const bool hot = !b->trial && reads_hot(b, model, k);
+    if (spring_alloy_has_r_phase(e) || !(hot || other_way) || (b->trial && may_lose)) {
+        return false;
+    }
+    b->trial = b->trial || hot || may_lose;
+    b->trial_ohm = b->slow_ohm;
+    begin_line(b, true, share);
+    return true;
+}
+
+/* No austenite that is colder reads beyond what it read when it was hot: a contact has crept, and
+ * all that was learnt beside it with it. */
+static void take_crept(spring_belief_t *b, const thermal_model_t *model, uint8_t k)
+{
+    spring_learnt_t *l = &b->learnt;
+    if (l->austenite_ohm > 0.0f) {
+        const float beyond = spring_beyond_austenite(b, model, k, b->run.line.ohm);
+        const float by = beyond * l->change > 0.0f ? 1.0f + beyond : 1.0f;
+        l->austenite_ohm *= by;
+        l->martensite_ohm *= by;
+    }
+}
+
+/* By how much its resistance has left its line; on trial, since that began, what does not go back.
+ */
+static float has_left(const spring_belief_t *b)
+{
+    if (b->trial && is_other_way(b, b->slow_ohm - b->trial_ohm)) {
+        return b->slow_ohm / b->trial_ohm - 1.0f;
+    }
+    const spring_line_t *line = &b->run.line;
+    return b->slow_ohm / (line->ohm * (1.0f + line->rise_per_k * line->slow_k)) - 1.0f;
+}
+
 /* A phase that is kept changes the resistance no faster than temperature does. */
 void spring_holding_watch(spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model,
                           uint8_t k, float moved_k, float share)
@@ -249,8 +303,7 @@ void spring_holding_watch(spring_estimator_t *e, spring_belief_t *b, thermal_mod
         b->losing = 0;
         return;
     }
-    const float kept_ohm = line->ohm * (1.0f + line->rise_per_k * line->slow_k);
-    const float left = b->slow_ohm / kept_ohm - 1.0f;
+    const float left = has_left(b);
     const float distance_k2 = spring_distance_k2(b);
     const float changed = as_lost(b, left);
     /* as its temperature may have moved unseen, so may the resistance */
@@ -258,7 +311,9 @@ void spring_holding_watch(spring_estimator_t *e, spring_belief_t *b, thermal_mod
     const float least2 = fmaxf(LOSS_LEAST * LOSS_LEAST, rise * rise * distance_k2);
     const float noise2 = slow_variance(b, share) + line->variance;
     const float changed2 = changed * changed;
-    float sure2 = fmaxf(least2, SURE_SDS * SURE_SDS * noise2);
+    /* that something has changed is known by then */
+    const float sds = b->trial ? SPRING_ESTIMATOR_BOUND_SDS : SURE_SDS;
+    float sure2 = fmaxf(least2, sds * sds * noise2);
     float suspected2 = SUSPECTED * SUSPECTED * sure2;
     if (changed2 >= suspected2) { /* as a rule not: a division is saved */
         const float moves2 = may_move_squared(b);
@@ -275,17 +330,26 @@ void spring_holding_watch(spring_estimator_t *e, spring_belief_t *b, thermal_mod
         }
         if (rests) {
             follow(b, left);
-            spring_keep_above(e, b, model, k, lost_at_c(model, k, b->lost) - STILL_K);
+        }
+        if (b->trial && is_other_way(b, left) && changed > LOSS_LEAST) {
+            begin_line(b, true, share); /* what creeps hides no loss from here */
+        }
+        if (rests || b->trial) { /* its average is of where it was */
+            const float moved_since_k = fminf(line->way_k - line->slow_k, 0.0f);
+            spring_keep_above(e, b, model, k,
+                              lost_at_c(model, k, b->lost) - STILL_K + moved_since_k);
         }
         return;
     }
     b->losing = b->losing < UINT8_MAX ? (uint8_t)(b->losing + 1) : UINT8_MAX;
     if (changed2 > sure2 || b->losing >= LASTING_TURNS) {
         const bool other_way = is_other_way(b, left);
-        spring_alloy_sees(e, other_way);
-        if (other_way && !spring_alloy_has_r_phase(e)) {
-            begin_line(b, true, share);
+        if (is_tried(e, b, model, k, other_way, share)) {
             return;
+        }
+        spring_alloy_sees(e, other_way);
+        if (!other_way) {
+            take_crept(b, model, k);
         }
         const float per_change = 1.0f / fabsf(b->learnt.change);
         const float sd = sqrtf(may_move_squared(b)) / SPRING_ESTIMATOR_BOUND_SDS;
@@ -296,6 +360,7 @@ void spring_holding_watch(spring_estimator_t *e, spring_belief_t *b, thermal_mod
         }
         see_crossing(e, b, model, k, changed * per_change, sd * per_change);
         spring_note_read(e, k, left, sqrtf(noise2 + sd * sd));
+        b->trial = false;
         begin_line(b, true, share); /* the average still falls */
     }
 }

@@ -161,6 +161,30 @@ TEST(array_that_loses_more_or_less_is_held_in_the_band)
     }
 }
 
+/* A cloth on the display in mid-hold: what all springs lose falls to two fifths, and it is lifted
+ * again. Without a trial they end above 160 degC. */
+TEST(cloth_that_lies_on_the_display_is_noticed)
+{
+    plant_set_effect(plant, "resistance_temperature", true);
+    plant_set(plant, "resistance_martensite_rise_per_k", 0.0008);
+    plant_set(plant, "resistance_austenite_rise_per_k", 0.0006);
+    power_on();
+    want_all_but(CENTRE);
+    (void)run(300.0);
+    plant_set(loop_plant(loop), "loss_w_per_k", 0.4 * 5.8e-3);
+    const double highest_c = run(600.0);
+    here("%.1f degC under the cloth", highest_c);
+    TEST_ASSERT_TRUE(highest_c < 135.0);
+    plant_set(loop_plant(loop), "loss_w_per_k", 5.8e-3);
+    const double lifted_c = run(300.0);
+    here("%.1f, then %.1f degC", highest_c, lifted_c);
+    TEST_ASSERT_TRUE(lifted_c < 140.0);
+    for (int k = 0; k < SPRINGS; k++) {
+        row((size_t)k);
+        TEST_ASSERT_TRUE(k == CENTRE || phase(k) > 0.9);
+    }
+}
+
 /* At either end of what is declared. */
 TEST(another_supply_is_no_fault)
 {
@@ -368,7 +392,7 @@ TEST(everything_at_once_stays_within_the_limits)
     for (uint32_t seed = 11; seed < 31; seed++) {
         const double hottest_c = hottest_of_everything(seed);
         here("draw %u: %.1f degC", (unsigned)seed, hottest_c);
-        TEST_ASSERT_TRUE(hottest_c < 130.0);
+        TEST_ASSERT_TRUE(hottest_c < 135.0);
         hot += hottest_c > 120.0;
     }
     TEST_ASSERT_LESS_OR_EQUAL_UINT(8, hot);

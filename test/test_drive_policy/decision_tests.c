@@ -207,6 +207,36 @@ TEST(margin_is_what_is_not_known_and_narrows_at_rest)
     }
 }
 
+/* On trial it is cooled ever more, by 1 K/s, whatever is known, but stays readable. */
+TEST(spring_on_trial_is_given_less_and_less)
+{
+    static const struct {
+        float sd_k, from_k, to_k;
+        bool rests, loses;
+        float asks_w; /* below 0: what is still read */
+    } table[] = {{1.0f, 2.5f, 2.25f, false, false, GIVES_W + 2.25f * FOLLOW_W},
+                 {4.0f, 2.5f, 2.25f, true, true, GIVES_W + 2.25f * FOLLOW_W},
+                 {1.0f, -8.0f, -8.25f, false, false, 0.6f * GIVES_W},
+                 {1.0f, -11.0f, -11.25f, false, false, -1.0f}};
+    for (size_t n = 0; n < ROWS(table); n++) {
+        begin(1, 2);
+        parameters.dither_ma = 300;
+        apply(&parameters);
+        believed(0, 78.0f, A, 1.0f);
+        of(0)->variance_k2 = table[n].sd_k * table[n].sd_k;
+        of(0)->quiet += table[n].rests;
+        of(0)->losing = table[n].loses;
+        of(0)->trial = true;
+        stands(0, HOLD, 1000);
+        policy.spring[0].margin_k = table[n].from_k;
+        turn_of(0);
+        row(n);
+        TEST_ASSERT_FLOAT_WITHIN(1e-4f, table[n].to_k, policy.spring[0].margin_k);
+        const int ma = table[n].asks_w < 0.0f ? 650 + 300 : ma_of(table[n].asks_w) + 150;
+        TEST_ASSERT_INT_WITHIN(3, ma > 950 ? ma : 950, policy.spring[0].wanted_ma);
+    }
+}
+
 /* ---- a heating ---- */
 
 /* It ends with the phase that was asked for, or where a limit leaves less than three quarters of

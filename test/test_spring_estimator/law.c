@@ -156,7 +156,7 @@ TEST(sight_moves_all_by_what_each_is_known_to)
         const double s = d + table[n].sd_k * table[n].sd_k;
         const double left = 1.0 - d / s, by_loss = table[n].cov_w / s;
         const double shift_k2 = table[n].shift_sd * table[n].shift_sd;
-        const double most = 0.45 * LOSS;
+        const double most = 0.45 * LOSS, least = -0.8 * LOSS;
         NEAR(e, spring_see(&estimator, &INSIDE, &model, 0, (float)table[n].seen_c,
                            (float)table[n].sd_k, n == 0 ? M : A));
         TEST_ASSERT_FLOAT_WITHIN(0.01f, (float)(80.0 + d / s * e), put_c());
@@ -164,7 +164,7 @@ TEST(sight_moves_all_by_what_each_is_known_to)
                           thermal_model_austenite(&model, 0) == THERMAL_MODEL_AUSTENITE_FULL);
         NEAR(fmin(fmax(table[n].shift_k - fmin(shift_k2 / s, d / s) * e, -30.0), 30.0),
              INSIDE.shift_k);
-        NEAR(1e3 * fmin(fmax(table[n].more_loss + by_loss * e, -most), most),
+        NEAR(1e3 * fmin(fmax(table[n].more_loss + by_loss * e, least), most),
              1e3f * INSIDE.learnt.loss_w_per_k);
         NEAR(1e6 * (table[n].loss_sd * table[n].loss_sd - by_loss * table[n].cov_w),
              1e6f * INSIDE.loss_variance);
