@@ -282,6 +282,7 @@ static uint32_t take_sensors(controller_t *controller, const controller_sensor_t
             .current_ma = sensor[k].current_ma,
             .voltage_mv = sensor[k].voltage_mv,
             .off = duty == 0 && controller->circuit[k].last_duty == 0,
+            .may_be_dead = duty <= controller->source.dead_steps,
             .expected_ma = current_control_reference_ma(&controller->current, k),
             .most_mv = most_mv(controller, k, duty),
             .temperature_c7 = thermal_model_temperature_c7(&controller->model, k)};

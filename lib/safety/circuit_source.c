@@ -81,6 +81,7 @@ static bool believe(circuit_source_t *s, const current_control_parameters_t *p)
     s->step_mv = (1.0f / DUTY_STEPS) * (s->supply_mv + s->drop_mv);
     s->less_mv = within(s->drop_mv - least_mv, 0.0f, s->unsure_mv);
     s->more_mv = within(most_mv - s->drop_mv, 0.0f, s->unsure_mv);
+    s->dead_steps = (uint16_t)within((s->drop_mv + s->more_mv) / s->step_mv, 0.0f, DUTY_STEPS);
     return !stays;
 }
 

@@ -34,6 +34,7 @@ typedef struct {
     /* what is driven by */
     float more_drop_v;       /* than is declared, which there is at least */
     uint16_t driven_drop_mv; /* the declared one, as long as it may be that */
+    uint16_t dead_steps;     /* of duty: so few may only overcome the drop, and nothing flows */
     uint8_t windows;         /* of the running round */
     float duty;              /* their sums; steps of 800 */
     float voltage_mv;

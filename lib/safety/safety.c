@@ -91,7 +91,8 @@ static uint8_t find_electrical(const safety_parameters_t *p, const safety_sample
 {
     int16_t current_ma = s->current_ma;
     uint8_t found = 0;
-    if (s->expected_ma >= p->check_current_ma && current_ma < (int16_t)(s->expected_ma >> 2)) {
+    if (s->expected_ma >= p->check_current_ma && current_ma < (int16_t)(s->expected_ma >> 2) &&
+        !s->may_be_dead) {
         found |= OPEN;
     }
     if (current_ma <= 0) {

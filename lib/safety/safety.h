@@ -97,6 +97,7 @@ typedef struct {
     int16_t voltage_mv;    /* any value; ignored unless valid */
     bool off;             /* no duty in the measured tick, nor in the one before, of which a reading
                              may still have a part */
+    bool may_be_dead;     /* so little duty that a diode's drop may take all of it */
     uint16_t expected_ma; /* reference of the current loop in the measured tick; 0: it was off */
     uint16_t most_mv;     /* the most that these duties can bring to the spring */
     int16_t temperature_c7; /* of the model, degC in Q9.7 */

@@ -17,6 +17,7 @@ static safety_sample_t any_sample(void)
                              .current_ma = any_s16(),
                              .voltage_mv = any_s16(),
                              .off = any_bool(),
+                             .may_be_dead = (any_u8() & 1u) != 0,
                              .expected_ma = any_u16(),
                              .temperature_c7 = any_s16()};
 }

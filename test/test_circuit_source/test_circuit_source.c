@@ -164,12 +164,14 @@ TEST(what_is_unsure_ends_at_the_tolerance)
     static const struct {
         uint16_t declared_mv;
         float less_mv, more_mv;
-    } cases[] = {{0, 0, 500}, {390, 150, 150}, {100, 100, 150}};
+        uint16_t dead_steps; /* of 5 V and the believed drop, 800 steps */
+    } cases[] = {{0, 0, 500, 80}, {390, 150, 150, 80}, {100, 100, 150, 39}};
     for (unsigned n = 0; n < ROWS(cases); n++) {
         circuit.freewheel_mv = cases[n].declared_mv;
         circuit_source_begin(&source, &circuit);
         TEST_ASSERT_FLOAT_WITHIN(0.4f, cases[n].less_mv, source.less_mv);
         TEST_ASSERT_FLOAT_WITHIN(0.4f, cases[n].more_mv, source.more_mv);
+        TEST_ASSERT_UINT16_WITHIN(1, cases[n].dead_steps, source.dead_steps);
         TEST_ASSERT_EQUAL_FLOAT(source.supply_mv + source.drop_mv, 800.0f * source.step_mv);
     }
     circuit.freewheel_mv = 390;

@@ -92,6 +92,11 @@ TEST(each_condition_trips_its_own_fault)
         sample.voltage_mv = table[n].mv;
         trips(table[n].fault, &sample);
         setUp();
+        sample.may_be_dead = true; /* then no current is none; else it is as before */
+        ticks(4, &sample, 50);
+        TEST_ASSERT_EQUAL(table[n].fault == SAFETY_FAULT_OPEN_SPRING, safety_allows(&safety, 4));
+        setUp();
+        sample.may_be_dead = false;
         sample.current_ma = table[n].limit_ma;
         sample.voltage_mv = table[n].limit_mv;
         ticks(4, &sample, 50);
