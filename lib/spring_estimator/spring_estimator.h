@@ -81,6 +81,7 @@ typedef struct {
     float rise_sd_per_k;
     float was_ohm[2]; /* its average 4 and 8 s earlier; 0: it was begun anew since */
     uint16_t turns;   /* since then */
+    float trial_ohm;  /* as its trial began */
 } spring_line_t;
 
 /* What is believed of one spring. Nobody but this module looks into it: what others may know of it
@@ -143,7 +144,6 @@ typedef struct {
     float ohm_before[2]; /* one and two turns earlier; 0: at another current */
     float slow_ohm;      /* over 4 s */
     float slow_a;        /* the current over the same */
-    float trial_ohm;     /* as its trial began */
     float phase_ohm;     /* the last at a strong current: what tells the phase */
     float offset_sd_v;   /* of its sensor's offset */
     float noise;         /* standard deviation of one turn's, relative */

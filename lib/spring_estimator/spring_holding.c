@@ -238,7 +238,7 @@ static bool is_tried(const spring_estimator_t *e, spring_belief_t *b, const ther
         return false;
     }
     b->trial = b->trial || hot || may_lose;
-    b->trial_ohm = b->slow_ohm;
+    b->run.line.trial_ohm = b->slow_ohm;
     begin_line(b, true, share);
     return true;
 }
@@ -260,8 +260,8 @@ static void take_crept(spring_belief_t *b, const thermal_model_t *model, uint8_t
  */
 static float has_left(const spring_belief_t *b)
 {
-    if (b->trial && is_other_way(b, b->slow_ohm - b->trial_ohm)) {
-        return b->slow_ohm / b->trial_ohm - 1.0f;
+    if (b->trial && is_other_way(b, b->slow_ohm - b->run.line.trial_ohm)) {
+        return b->slow_ohm / b->run.line.trial_ohm - 1.0f;
     }
     const spring_line_t *line = &b->run.line;
     return b->slow_ohm / (line->ohm * (1.0f + line->rise_per_k * line->slow_k)) - 1.0f;

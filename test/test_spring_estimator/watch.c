@@ -716,7 +716,7 @@ TEST(what_may_be_no_lost_phase_is_tried)
         INSIDE.run.line.ohm = table[n].ohm > 0.25 ? 0.2488f : 0.2512f;
         INSIDE.learnt.slow_noise = 0.0f;
         INSIDE.trial = table[n].trial;
-        INSIDE.trial_ohm = 0.25f;
+        INSIDE.run.line.trial_ohm = 0.25f;
         INSIDE.losing = 59;
         estimator.r_phase_odds = (float)table[n].odds;
         spring_holding_watch(&estimator, &INSIDE, &model, 0, 0.0f, 0.0625f);
@@ -724,7 +724,7 @@ TEST(what_may_be_no_lost_phase_is_tried)
         TEST_ASSERT_EQUAL(table[n].lost, INSIDE.lost > 0.0f);
         NEAR(table[n].ohm, INSIDE.run.line.ohm);
         if (table[n].tried && !table[n].trial) {
-            NEAR(table[n].ohm, INSIDE.trial_ohm);
+            NEAR(table[n].ohm, INSIDE.run.line.trial_ohm);
             NEAR(table[n].odds, estimator.r_phase_odds);
         }
     }
@@ -760,7 +760,7 @@ TEST(trial_counts_from_where_it_began)
         INSIDE.learnt.slow_noise = 0.0f;
         INSIDE.quiet = 0;
         INSIDE.trial = true;
-        INSIDE.trial_ohm = (float)table[n].trial_ohm;
+        INSIDE.run.line.trial_ohm = (float)table[n].trial_ohm;
         INSIDE.run.line.way_k = (float)table[n].way_k;
         spring_holding_watch(&estimator, &INSIDE, &model, 0, -1.0f, 0.0f);
         TEST_ASSERT_EQUAL(table[n].lost, INSIDE.lost > 0.0f);
