@@ -545,13 +545,8 @@ bool spring_estimator_lacks_phase(const spring_belief_t *b, const thermal_model_
         b->current_a < STRONG_A) {
         return false;
     }
-    const int16_t finish_c7 = thermal_model_transformation(model, k).austenite_finish_c7;
-    const float hotter_k = spring_now_c(model, k) - spring_c(finish_c7);
-    /* a coefficient makes it more where it is hotter */
-    const float explains_k = fmaxf(l->change < 0.0f ? hotter_k : -hotter_k, 0.0f);
-    const float explained = spring_read_tolerance(b) + COEFFICIENT_MOST_PER_K * explains_k;
-    const float less = 1.0f - b->ohm / l->austenite_ohm;
-    return (l->change < 0.0f ? -less : less) > explained;
+    const float beyond = spring_beyond_austenite(b, model, k, b->ohm);
+    return (l->change < 0.0f ? beyond : -beyond) > spring_read_tolerance(b);
 }
 
 /* By its temperature. */
@@ -574,10 +569,9 @@ static bool reads_austenite(const spring_belief_t *b, const thermal_model_t *mod
         return false;
     }
     const float ohm = 0.5f * (b->ohm_before[0] + b->ohm_before[1]);
-    const float more = ohm / l->austenite_ohm - 1.0f;
-    const float colder_k = fmaxf(spring_c((int16_t)(t.austenite_finish_c7 - now_c7)), 0.0f);
-    return fabsf(spring_beyond_austenite(b, model, k, ohm)) < spring_read_tolerance(b) &&
-           (l->change > 0.0f ? more > 0.0f : more < -COEFFICIENT_MOST_PER_K * colder_k);
+    const float beyond = spring_beyond_austenite(b, model, k, ohm);
+    return fabsf(beyond) < spring_read_tolerance(b) &&
+           (l->change > 0.0f ? ohm > l->austenite_ohm : beyond < 0.0f);
 }
 
 bool spring_estimator_has_transformed(const spring_estimator_t *e, const thermal_model_t *model,

@@ -98,7 +98,8 @@ void temperature_ceiling_prepare(temperature_ceiling_drive_t *drive, const therm
                                  const current_control_parameters_t *circuit);
 
 /* Power, W, that the duty (steps of 800) must at least bring, whatever is read: the supply may be a
- * fifth lower than declared. */
+ * fifth lower than declared. more_drop_v: of the diodes, than declared, which there is for certain.
+ */
 float temperature_ceiling_power_w(const temperature_ceiling_drive_t *drive, float duty,
                                   float more_drop_v);
 
