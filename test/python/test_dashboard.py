@@ -465,17 +465,21 @@ def page_of(board: FakeBoard, folder: Path, every_s: float = 0.1) -> Iterator[Cl
 
 
 def test_the_board_that_gets_the_number_of_a_lost_terminal_is_left_alone(tmp_path: Path) -> None:
-    first = FakeBoard()
-    with page_of(first, tmp_path) as socket:
-        first.pull()
-        awaited(socket, lambda state: not state.get("connected", True))
-        second = FakeBoard()  # somebody else's, beside it
-        assert second.port == first.port
-        trouble, until = "", time.monotonic() + 60.0
-        while "another one has that number now" not in trouble and time.monotonic() < until and not second.seen:
-            with suppress(TimeoutError):
-                trouble = json.loads(socket.recv(1)).get("trouble", "")
-    assert second.seen == [] and "another one has that number now" in trouble
+    for attempt in range(5):
+        first = FakeBoard()
+        with page_of(first, tmp_path) as socket:
+            first.pull()
+            awaited(socket, lambda state: not state.get("connected", True))
+            second = FakeBoard()  # somebody else's, beside it
+            if second.port != first.port:
+                continue  # another process on this machine has got the number
+            trouble, until = "", time.monotonic() + 60.0
+            while "another one has that number now" not in trouble and time.monotonic() < until and not second.seen:
+                with suppress(TimeoutError):
+                    trouble = json.loads(socket.recv(1)).get("trouble", "")
+        assert second.seen == [] and "another one has that number now" in trouble
+        return
+    pytest.fail(f"in {attempt + 1} attempts another process had the number first")
 
 
 def test_a_pages_wishes_are_carried_out_in_their_order(tmp_path: Path) -> None:
