@@ -1,3 +1,5 @@
+#include <math.h>
+
 #include "spring_estimator_internal.h"
 
 /* Odds are natural logarithms. */
@@ -6,9 +8,12 @@
 #define R_PHASE_STRAIGHT  (-1.4f) /* the others */
 #define R_PHASE_MOST_ODDS 6.0f    /* three sights to the contrary turn it */
 
+#define COMMON_SHARE 0.5f /* of the variance of a first heating's error */
+
 void spring_begin_alloy(spring_estimator_t *e)
 {
     e->r_phase_odds = R_PHASE_ODDS;
+    e->warms = 0.0f;
 }
 
 void spring_alloy_sees(spring_estimator_t *e, bool other_way)
@@ -20,4 +25,44 @@ void spring_alloy_sees(spring_estimator_t *e, bool other_way)
 bool spring_alloy_has_r_phase(const spring_estimator_t *e)
 {
     return e->r_phase_odds >= 0.0f;
+}
+
+static bool is_first_heating(const spring_belief_t *b)
+{
+    return b->possible == SPRING_PHASE_MARTENSITE && b->learnt.austenite_ohm == 0.0f;
+}
+
+void spring_begin_shared_heating(const spring_estimator_t *e, spring_belief_t *b,
+                                 const thermal_model_t *model, uint8_t k)
+{
+    b->shared_k = e->warms * spring_above_ambient_k(model, k);
+}
+
+void spring_heat_as_others(const spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model,
+                           uint8_t k)
+{
+    if (!is_first_heating(b)) {
+        return;
+    }
+    const float shared_k = e->warms * spring_above_ambient_k(model, k);
+    const float more_k = shared_k - b->shared_k;
+    if (fabsf(more_k) > LEAST_SD_K) {
+        spring_set_temperature(model, k, spring_now_c(model, k) + more_k, SPRING_PHASE_MARTENSITE);
+        b->last_c7 = thermal_model_temperature_c7(model, k);
+        b->shared_k = shared_k;
+        b->seen = true; /* it is acted on in the next turn */
+    }
+}
+
+void spring_share_onset(spring_estimator_t *e, spring_belief_t *b, const thermal_model_t *model,
+                        uint8_t k, float seen_c)
+{
+    if (!is_first_heating(b)) {
+        return;
+    }
+    const float moved = b->shared_k / spring_distance_k2(b);
+    b->shift_k -= b->shift_variance_k2 * moved;
+    spring_correct_loss(e, b, b->covariance * moved);
+    const float error_k = seen_c - spring_now_c(model, k);
+    e->warms += COMMON_SHARE * error_k / (seen_c - spring_ambient_c(model));
 }

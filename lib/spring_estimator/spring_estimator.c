@@ -12,7 +12,6 @@
 #define LOSS_DRIFT_SD 0.0005f /* of the declared loss, in a second: 3 % in an hour */
 #define LOSS_DRIFT    (SPRING_ESTIMATOR_TURN_S * LOSS_DRIFT_SD * LOSS_DRIFT_SD)
 #define SHIFT_MOST_K  30.0f
-#define LEAST_SD_K    0.6f    /* parts of one spring differ by so much */
 #define OFFSET_SD_V   0.005f  /* 8 mV, and 5 mA in 0.2 ohm: evenly */
 #define FORGETS       0.9998f /* a turn's: a disturbance is forgotten within 20 minutes */
 
@@ -376,6 +375,7 @@ static void cool(spring_estimator_t *e, spring_belief_t *b, const thermal_model_
     if (b->hottest_c < spring_c(t.martensite_finish_c7)) {
         const spring_before_t before = spring_before(b, model, k);
         b->possible = SPRING_PHASE_MARTENSITE;
+        spring_begin_shared_heating(e, b, model, k);
         spring_note(e, model, k, SPRING_SIGHT_COOLED, &before, 0.0f, 0.0f);
     }
 }

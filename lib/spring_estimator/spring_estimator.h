@@ -111,7 +111,10 @@ typedef struct {
     int32_t extra_loss_uw;            /* what it loses beyond the model, now */
     float gives_w;                    /* what it gives off in all, in the last turn */
     float disturbance_k;              /* how far it was found from where it was believed, lately */
-    float hottest_c;                  /* while nothing is known: the most that it can be by now */
+    union {
+        float hottest_c; /* while nothing is known: the most that it can be by now */
+        float shared_k;  /* in its first heating: how much hotter it is by what others showed */
+    };
     float kept_w_per_k; /* taken off the loss since it was last seen, as nothing was seen */
     float lost;         /* phase lost since it had transformed, 0..1 */
     uint8_t possible;   /* SPRING_PHASE_ bits */
@@ -180,6 +183,7 @@ typedef struct {
     uint16_t shared_seal;
     /* what all springs share */
     float r_phase_odds; /* that cooling leads through an intermediate phase: log of them */
+    float warms;        /* in a first heating, for a kelvin above ambient: more by so much */
     /* one was found colder than anything known explains */
     uint16_t stepped_turns; /* of all springs: for so many more it counts as lately */
     uint8_t stepped_spring;

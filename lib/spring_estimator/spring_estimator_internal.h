@@ -28,6 +28,8 @@
 #define SHIFT_SD_K    3.0f /* of declared transformation temperatures; a seen one's place */
 #define SHIFT_BOUND_K 8.0f /* 2.6 of it, or a load */
 
+#define LEAST_SD_K 0.6f /* parts of one spring differ by so much */
+
 #define TRUST_SD_K 5.0f /* of ambient, or of what a reset has kept */
 
 #define SLOW_TURNS 16 /* of the average: 4 s, six periods of the dither */
@@ -118,6 +120,18 @@ bool spring_open_to_step(spring_estimator_t *estimator, spring_belief_t *belief,
 
 /* What springs of one wire have in common: nothing is known of it yet. */
 void spring_begin_alloy(spring_estimator_t *estimator);
+/* In a first heating the errors of alloy, heat capacity, latent heat and room are largely common.
+ * It is martensite, and may be heated: what others have shown so far is in its temperature. */
+void spring_begin_shared_heating(const spring_estimator_t *estimator, spring_belief_t *belief,
+                                 const thermal_model_t *model, uint8_t spring);
+/* In a turn of its first heating: it is moved as others were found to be. No surer by that. */
+void spring_heat_as_others(const spring_estimator_t *estimator, spring_belief_t *belief,
+                           thermal_model_t *model, uint8_t spring);
+/* Its first heating begins to transform it, at seen_c: what others had moved it by tells of its
+ * loss and shift as if it had been seen; and what is left tells of the others. To be called before
+ * spring_see. */
+void spring_share_onset(spring_estimator_t *estimator, spring_belief_t *belief,
+                        const thermal_model_t *model, uint8_t spring, float seen_c);
 /* A resistance has left its line for certain, the way of lost phase or the other one. */
 void spring_alloy_sees(spring_estimator_t *estimator, bool other_way);
 /* By all that were seen so far the other way is an intermediate phase's; else it is a temperature's

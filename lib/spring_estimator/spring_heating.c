@@ -27,6 +27,9 @@ void spring_estimator_begin_heating(spring_estimator_t *e, const thermal_model_t
         .begun_c = spring_now_c(model, k) - SPRING_ESTIMATOR_BOUND_SDS * spring_estimator_sd_k(b),
     };
     b->onset = b->steep = b->unlike = false;
+    if (b->possible == SPRING_PHASE_MARTENSITE) {
+        spring_begin_shared_heating(e, b, model, k);
+    }
     b->heating = true;
     b->left = false;
     spring_note_did(e, k, SPRING_DID_HEAT);
@@ -66,6 +69,7 @@ static void see_onset(spring_estimator_t *e, spring_belief_t *b, thermal_model_t
             } /* else a contact has moved */
         }
         const float seen_c = onset_c(e, b, model, k);
+        spring_share_onset(e, b, model, k, seen_c);
         (void)spring_see(e, b, model, k, seen_c, SHIFT_SD_K, SPRING_PHASE_MARTENSITE);
         spring_note(e, model, k, SPRING_SIGHT_ONSET, &before, seen_c, SHIFT_SD_K);
     } else {
@@ -176,6 +180,7 @@ void spring_heating_watch(spring_estimator_t *e, spring_belief_t *b, thermal_mod
     if (!b->heating) {
         return;
     }
+    spring_heat_as_others(e, b, model, k);
     hold_back(e, b, model, k);
     if (b->current_a < STRONG_A || b->possible == SPRING_PHASE_AUSTENITE ||
         b->possible == SPRING_PHASE_ANY || b->settling != 0) {

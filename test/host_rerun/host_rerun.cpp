@@ -187,7 +187,11 @@ TEST(a_tape_begins_with_what_was_learnt)
     TEST_ASSERT_TRUE(learnt.austenite_ohm > 0.1f);
     board.begin();
     const spring_learnt_t after = controller_learnt(board.controller(), 3);
-    TEST_ASSERT_EQUAL_MEMORY(&learnt, &after, sizeof learnt);
+    spring_learnt_t expected = learnt;
+    expected.loss_sd_w_per_k = after.loss_sd_w_per_k; /* its drift goes on */
+    TEST_ASSERT_EQUAL_MEMORY(&expected, &after, sizeof expected);
+    TEST_ASSERT_FLOAT_WITHIN(0.02f * learnt.loss_sd_w_per_k, learnt.loss_sd_w_per_k,
+                             after.loss_sd_w_per_k);
     board.type("on 4");
     board.run(120.0);
     rerun again;

@@ -205,6 +205,95 @@ TEST(two_springs_that_are_found_colder_are_a_step)
     }
 }
 
+/* A spring is found at 88 degC where 98 were believed: any other in its first heating is taken to
+ * be off by half as much, as it is as far above the room. */
+TEST(first_heating_is_moved_by_half_of_what_another_has_shown)
+{
+    static const struct {
+        uint8_t possible;
+        float austenite_ohm; /* learnt: it is not its first */
+        float temperature_c, then_c;
+    } table[] = {
+        {M, 0.0f, 54.0f, 51.5f}, {M, 0.0f, 88.0f, 83.0f},  {M, 0.0f, 20.0f, 20.0f},
+        {M, 0.0f, 28.0f, 28.0f}, {M, 0.0f, 29.0f, 28.34f}, /* not worth it; worth it */
+        {M, 0.2f, 54.0f, 54.0f}, {B, 0.0f, 54.0f, 54.0f},
+    };
+    for (size_t n = 0; n < ROWS(table); n++) {
+        begin_three();
+        row(n);
+        thermal_model_set_temperature(&model, 0, 98 * 128);
+        spring_share_onset(&estimator, &estimator.spring[0], &model, 0, 88.0f);
+        TEST_ASSERT_FLOAT_WITHIN(1e-6f, -5.0f / 68.0f, estimator.warms);
+        spring_belief_t *const b = &estimator.spring[1];
+        spring_begin_shared_heating(&estimator, b, &model, 1);
+        TEST_ASSERT_EQUAL_FLOAT(0.0f, b->shared_k); /* cold: nothing is off yet */
+        b->possible = table[n].possible;
+        b->learnt.austenite_ohm = table[n].austenite_ohm;
+        thermal_model_set_temperature(&model, 1, (int16_t)(table[n].temperature_c * 128.0f));
+        const float variance_k2 = b->variance_k2, loss = b->learnt.loss_w_per_k;
+        for (int twice = 0; twice < 2; twice++) { /* the second time hardly anything is left */
+            spring_heat_as_others(&estimator, b, &model, 1);
+            TEST_ASSERT_FLOAT_WITHIN(0.01f, table[n].then_c, spring_now_c(&model, 1));
+        }
+        TEST_ASSERT_FLOAT_WITHIN(0.01f, spring_now_c(&model, 1) - table[n].temperature_c,
+                                 b->shared_k);
+        if (b->shared_k != 0.0f) {
+            TEST_ASSERT_EQUAL_INT16(thermal_model_temperature_c7(&model, 1), b->last_c7);
+        }
+        TEST_ASSERT_EQUAL(b->shared_k != 0.0f, b->seen);
+        TEST_ASSERT_EQUAL_FLOAT(variance_k2, b->variance_k2); /* that makes it no surer */
+        TEST_ASSERT_EQUAL_FLOAT(loss, b->learnt.loss_w_per_k);
+    }
+}
+
+/* Once its own onset is seen, what others had moved it by is told apart as what is seen is; and
+ * only what is left tells of the others. */
+TEST(own_onset_takes_over_what_others_have_shown)
+{
+    begin_three();
+    estimator.warms = -0.1f;
+    spring_belief_t *const b = &estimator.spring[1];
+    b->variance_k2 = 20.0f;
+    b->capacity_k = 4.0f;
+    b->covariance = -2e-3f;
+    b->loss_variance = 4e-7f;
+    b->shift_variance_k2 = 9.0f;
+    b->shift_k = 0.0f;
+    b->shared_k = -6.0f;
+    thermal_model_set_temperature(&model, 1, 92 * 128);
+    spring_share_onset(&estimator, b, &model, 1, 88.0f);
+    TEST_ASSERT_FLOAT_WITHIN(1e-4f, 9.0f * 6.0f / 36.0f, b->shift_k);
+    TEST_ASSERT_FLOAT_WITHIN(1e-7f, 2e-3f * 6.0f / 36.0f, b->learnt.loss_w_per_k);
+    TEST_ASSERT_FLOAT_WITHIN(1e-6f, -0.1f - 0.5f * 4.0f / 68.0f, estimator.warms);
+    b->learnt.austenite_ohm = 0.2f; /* it has been heated before: that tells of no other */
+    spring_share_onset(&estimator, b, &model, 1, 60.0f);
+    TEST_ASSERT_FLOAT_WITHIN(1e-4f, 1.5f, b->shift_k);
+    TEST_ASSERT_FLOAT_WITHIN(1e-6f, -0.1f - 0.5f * 4.0f / 68.0f, estimator.warms);
+    spring_begin_shared(&estimator);
+    TEST_ASSERT_EQUAL_FLOAT(0.0f, estimator.warms);
+}
+
+/* One that is warm when it is switched on was moved by then, as far as it was: it is not moved
+ * twice. */
+TEST(warm_spring_that_is_heated_is_moved_from_there_on)
+{
+    begin_three();
+    estimator.warms = -0.1f;
+    thermal_model_set_temperature(&model, 1, 60 * 128);
+    spring_estimator_begin_heating(&estimator, &model, 1);
+    spring_belief_t *const b = &estimator.spring[1];
+    TEST_ASSERT_EQUAL_FLOAT(-4.0f, b->shared_k);
+    spring_heat_as_others(&estimator, b, &model, 1);
+    TEST_ASSERT_EQUAL_INT16(60 * 128, thermal_model_temperature_c7(&model, 1));
+    thermal_model_set_temperature(&model, 1, 70 * 128);
+    spring_heat_as_others(&estimator, b, &model, 1);
+    TEST_ASSERT_EQUAL_INT16(69 * 128, thermal_model_temperature_c7(&model, 1));
+    b->possible = SPRING_PHASE_ANY;
+    b->hottest_c = 90.0f;
+    spring_estimator_begin_heating(&estimator, &model, 1);
+    TEST_ASSERT_EQUAL_FLOAT(90.0f, b->hottest_c); /* while nothing is known it is that */
+}
+
 /* ---- what is believed of one ---- */
 
 TEST(phase_is_told_by_the_best_that_there_is)
