@@ -137,7 +137,7 @@ TEST(tolerances_bound_it)
         float supply_mv, drop_mv;
         uint16_t declared_mv;
         float believed_mv, believed_drop_mv;
-    } cases[] = {{2500, 0, 0, 4200, -1},    {9000, 0, 0, 5500, -1},  {5000, 1400, 0, -1, 500},
+    } cases[] = {{2500, 0, 0, -1, -1},      {9000, 0, 0, 5500, -1},  {5000, 1400, 0, -1, 500},
                  {5000, 700, 390, -1, 540}, {5000, 0, 390, -1, 240}, {5000, 0, 100, -1, -1},
                  {5000, -400, 100, -1, 0},  {5000, -400, 0, -1, 0}};
     for (unsigned n = 0; n < ROWS(cases); n++) {
@@ -152,7 +152,7 @@ TEST(tolerances_bound_it)
             TEST_ASSERT_FLOAT_WITHIN(51.0f, cases[n].believed_mv, source.supply_mv);
         }
         if (cases[n].believed_drop_mv >= 0.0f) {
-            TEST_ASSERT_FLOAT_WITHIN(20.1f, cases[n].believed_drop_mv, source.drop_mv);
+            TEST_ASSERT_FLOAT_WITHIN(31.1f, cases[n].believed_drop_mv, source.drop_mv);
         }
         TEST_ASSERT_TRUE(source.supply_mv >= 4199.0f && source.supply_mv <= 5501.0f);
         TEST_ASSERT_TRUE(source.drop_mv >= 0.0f);
@@ -244,9 +244,35 @@ TEST(it_forgets_a_level_in_time)
     rounds(20, 9, (true_t){5000, 0}, 110.0f);
     const float moved = source.duty_square;
     TEST_ASSERT_TRUE(moved > 500.0f && moved < 20000.0f);
-    rounds(10, 9, (true_t){4400, 0}, 110.0f);
-    TEST_ASSERT_FLOAT_WITHIN(8.0f, behind_mv((true_t){4400, 0}, 110.0f), source.mean_mv);
+    rounds(10, 9, (true_t){4700, 0}, 110.0f);
+    TEST_ASSERT_FLOAT_WITHIN(8.0f, behind_mv((true_t){4700, 0}, 110.0f), source.mean_mv);
     TEST_ASSERT_FLOAT_WITHIN(1.0f, moved, source.duty_square);
+}
+
+/* A supply that steps by more than 8 % and 20 mV is another one: what was known of the old one
+ * makes no drop of it. Of an unsure drop another duty may show as much. */
+TEST(supply_that_steps_is_learnt_anew)
+{
+    static const struct {
+        float supply_mv, duty;
+        bool anew;
+    } cases[] = {{4400, 110, true}, {4500, 110, false}, {5500, 110, false}, {5590, 110, true},
+                 {4300, 330, true}, {4700, 330, false}, {5000, 330, false}, {5000, 40, false}};
+    for (unsigned n = 0; n < ROWS(cases); n++) {
+        circuit_source_begin(&source, &circuit);
+        rounds(20, 9, (true_t){5000, 0}, 230.0f);
+        rounds(20, 9, (true_t){5000, 0}, 110.0f);
+        const float moved = source.duty_square;
+        rounds(1, 9, (true_t){cases[n].supply_mv, 0}, cases[n].duty);
+        TEST_ASSERT_EQUAL(cases[n].anew, source.duty_square < 0.5f * moved);
+        rounds(20, 9, (true_t){cases[n].supply_mv, 0}, cases[n].duty);
+        if (cases[n].anew) { /* both are known no better than from the beginning */
+            TEST_ASSERT_TRUE(source.unsure_mv > 100.0f);
+            TEST_ASSERT_FLOAT_WITHIN(20.0f,
+                                     behind_mv((true_t){cases[n].supply_mv, 0}, cases[n].duty),
+                                     cases[n].duty * source.step_mv - source.drop_mv);
+        }
+    }
 }
 
 /* A bit of RAM turns over in any number: within some heatings all is as it was. */
