@@ -84,6 +84,12 @@ static bool is_odd(const circuit_peer_t *own, float share, float others, float t
            off * (VOLTS_MV * (float)own->volts) > offsets_mv * (float)own->learnt;
 }
 
+/* Its row was full, and no window has acquitted it since. */
+static bool was_found(const circuit_peer_t *own)
+{
+    return own->odd + (own->agreed == 0 ? 1u : 0u) >= CIRCUIT_PEERS_WINDOWS;
+}
+
 /* What a drop makes of a lower or higher share, as far as it is not known: it takes as much of both
  * voltages, and one more than is believed makes the share at fewer volts the lower one. */
 static float drop_mv(const circuit_source_t *source, bool is_lower, float expected_mv,
@@ -142,7 +148,7 @@ bool circuit_peers_judge(circuit_peers_t *peers, uint8_t springs, uint8_t k,
     }
     if (odd) {
         own->odd = own->odd < CIRCUIT_PEERS_WINDOWS ? (own->odd + 1u) & 3u : own->odd;
-    } else if (good || own->odd < CIRCUIT_PEERS_WINDOWS - 1u) { /* else it acquits nobody */
+    } else if (good || !was_found(own)) {
         own->was_q7 = to_q7(share);
         own->odd = 0;
         own->agreed = 1;
@@ -174,7 +180,7 @@ void circuit_peers_renew(circuit_peers_t *peers, uint8_t springs, const circuit_
 {
     for (uint8_t k = 0; k < springs; k++) {
         circuit_peer_t *own = &peers->spring[k];
-        const bool kept = own->odd >= CIRCUIT_PEERS_WINDOWS - 1u && own->was_q7 != 0;
+        const bool kept = was_found(own) && own->was_q7 != 0;
         own->was_q7 = kept ? believed_anew(own, before, now) : 0;
         own->share_q7 = 0;
     }
