@@ -192,20 +192,38 @@ static void add_surroundings(text_line_t *line, const controller_t *controller)
     }
 }
 
-/* Steps: three for each spring, the ambient, what all lose; lines only where there is something. */
+/* "found: supply 4.93 V, diodes 0.38 V +-0.03; declared: 5.00 V, 0.00 V": what all circuits share.
+ */
+static void add_source(text_line_t *line, const controller_t *controller)
+{
+    const circuit_source_t *const source = controller_source(controller);
+    const current_control_parameters_t *const declared = &controller->current.parameters;
+    const int32_t values[] = {rounded(0.1f * source->supply_mv), rounded(0.1f * source->drop_mv),
+                              rounded(0.05f * source->unsure_mv),
+                              rounded(0.1f * (float)declared->supply_mv),
+                              rounded(0.1f * (float)declared->freewheel_mv)};
+    text_add_values(line, FLASH_TEXT("found: supply #2 V, diodes #2 V +-#2; declared: #2 V, #2 V"),
+                    values);
+}
+
+/* Steps: three for each spring, the ambient, what all lose, what feeds them; lines only where there
+ * is something. */
 bool console_model_line(const console_t *console, console_out_t *out)
 {
     const controller_t *const controller = console->controller;
     text_line_t *const line = &out->line;
     const uint8_t k = console->step / 3u;
     if (k >= controller_springs(controller)) {
-        if (console->step % 3u == 0) {
+        const uint8_t last = (uint8_t)(console->step - 3u * controller_springs(controller));
+        if (last == 0) {
             const int32_t ambient_cc = text_centi_from_c7(console->status->ambient_c7);
             text_add_values(line, FLASH_TEXT("ambient: #2 degC"), &ambient_cc);
-        } else {
+        } else if (last == 1u) {
             add_surroundings(line, controller);
+        } else {
+            add_source(line, controller);
         }
-        return console->step % 3u < 2u;
+        return last < 3u;
     }
     if (console->step % 3u == 0) {
         add_belief(line, controller, k);
@@ -281,8 +299,17 @@ static void add_fault(text_line_t *line, safety_fault_t fault)
     }
 }
 
-/* Steps: the lock and the supply, the board, each spring, the thermistor; lines only where there is
- * something. */
+static bool any_is_no_circuit(const controller_t *controller)
+{
+    bool any = false;
+    for (uint8_t k = 0; k < controller_springs(controller); k++) {
+        any = any || controller_fault(controller, k) == SAFETY_FAULT_SENSOR_MISMATCH;
+    }
+    return any;
+}
+
+/* Steps: the lock and the supply, the board, each spring, the thermistor, what readings were held
+ * against; lines only where there is something. */
 bool console_faults_line(const console_t *console, console_out_t *out)
 {
     const controller_t *const controller = console->controller;
@@ -300,15 +327,16 @@ bool console_faults_line(const console_t *console, console_out_t *out)
             add_fault(line, fault);
         }
     } else {
-        const uint8_t k = (uint8_t)(console->step - 2u);
-        if (k == controller_springs(controller) && console->status->ambient_is_held) {
+        const uint8_t k = (uint8_t)(console->step - 2u), springs = controller_springs(controller);
+        if (k == springs && console->status->ambient_is_held) {
             const int32_t ambient_cc = text_centi_from_c7(console->status->ambient_c7);
             text_add_values(line, FLASH_TEXT("thermistor: no room is as it says, #2 degC holds"),
                             &ambient_cc);
-            return true;
+        } else if (k > springs && any_is_no_circuit(controller)) {
+            add_source(line, controller);
         }
-        if (k >= controller_springs(controller)) {
-            return false;
+        if (k >= springs) {
+            return k <= springs + 1u;
         }
         const safety_fault_t fault = controller_fault(controller, k);
         if (fault != SAFETY_FAULT_NONE) {

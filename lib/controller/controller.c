@@ -310,10 +310,11 @@ static uint32_t take_sensors(controller_t *controller, const controller_sensor_t
 /* What was held against a spring by another belief is of no use. */
 static void learn_source(controller_t *controller)
 {
+    const circuit_source_t before = controller->source;
     const bool other = circuit_source_fit(&controller->source, &controller->current.parameters);
     current_control_set_drop(&controller->current, controller->source.driven_drop_mv);
     if (other) {
-        circuit_peers_renew(&controller->peers, controller->springs);
+        circuit_peers_renew(&controller->peers, controller->springs, &before, &controller->source);
         memset(controller->step, 0, sizeof controller->step);
     }
 }
@@ -323,7 +324,8 @@ static void judge_circuit(controller_t *controller, uint8_t k)
 {
     circuit_source_t *const source = &controller->source;
     circuit_window_t window;
-    const bool is_none = circuit_check_judge(&controller->circuit[k], source, &window);
+    const bool is_none = circuit_check_judge(&controller->circuit[k], source,
+                                             controller->current.parameters.supply_mv, &window);
     const bool is_odd =
         circuit_peers_judge(&controller->peers, controller->springs, k, &window, source);
     const bool steps =
@@ -332,7 +334,8 @@ static void judge_circuit(controller_t *controller, uint8_t k)
         circuit_peers_suspect(&controller->peers, k, circuit_step_before_q12(&controller->step[k]));
     }
     if (window.steady && window.found_mv >= CIRCUIT_WINDOW_LEAST_MV &&
-        controller->peers.spring[k].odd == 0 && controller->step[k].odd == 0) {
+        circuit_check_is_sound(&controller->circuit[k]) && controller->peers.spring[k].odd == 0 &&
+        controller->step[k].odd == 0) {
         circuit_source_take(source, window.duty, window.found_mv);
     }
     if (is_none || is_odd || steps ||

@@ -221,6 +221,8 @@ float controller_shift_k(const controller_t *controller, uint8_t spring);
 /* What the held springs lose, of what is declared, with its standard deviation. False where fewer
  * than two are held. */
 bool controller_losses(const controller_t *controller, float *factor, float *sd);
+/* What was found of supply and diodes; what is declared of them is in the settings. */
+const circuit_source_t *controller_source(const controller_t *controller);
 /* A CRC-16 of all that is believed of a spring (spring_estimator_mark). */
 uint16_t controller_belief_mark(const controller_t *controller, uint8_t spring);
 /* How often what is believed had changed by itself, as RAM may, and began anew: of a spring as when

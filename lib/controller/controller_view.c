@@ -37,6 +37,11 @@ bool controller_losses(const controller_t *controller, float *factor, float *sd)
     return spring_estimator_losses(&controller->estimator, factor, sd);
 }
 
+const circuit_source_t *controller_source(const controller_t *controller)
+{
+    return &controller->source;
+}
+
 float controller_shift_k(const controller_t *controller, uint8_t spring)
 {
     return spring_estimator_shift_k(spring_estimator_of(&controller->estimator, spring));

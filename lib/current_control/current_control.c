@@ -76,7 +76,7 @@ void current_control_set_resistance(current_control_t *control, uint8_t channel,
 static inline uint16_t loop_gain_q16(int16_t estimate_q16, int32_t trim_q24)
 {
     int16_t gain = (int16_t)(estimate_q16 + (int16_t)((uint32_t)trim_q24 >> 8));
-    return gain < 1 ? 1u : (uint16_t)gain;
+    return gain > 0 ? (uint16_t)gain : 1u;
 }
 
 static inline int16_t to_q8(int32_t value_q16)

@@ -3,6 +3,7 @@
 #include <math.h>
 #include <stddef.h>
 
+#define DUTY_STEPS      800.0f
 #define LEAST_READINGS  12u    /* where a current rises, every other tick gives one */
 #define SQUARED_MOST_MV 11965u /* a window of these fits 32 bits; no sensor shows as much */
 
@@ -112,7 +113,13 @@ static bool moves_alone(float voltage_variance, float follows_mv, float duty_var
     return voltage_variance - by_duty_mv2 > likely_mv * likely_mv + RESTLESS_MV * RESTLESS_MV;
 }
 
-bool circuit_check_judge(circuit_check_t *c, const circuit_source_t *source,
+/* By so much duty of such a supply behind the drop. */
+static float expected(const circuit_source_t *source, float step_mv, float duty)
+{
+    return fmaxf(duty * step_mv - source->drop_mv, 0.0f);
+}
+
+bool circuit_check_judge(circuit_check_t *c, const circuit_source_t *source, uint16_t supply_mv,
                          circuit_window_t *window)
 {
     bool astray = false;
@@ -129,8 +136,9 @@ bool circuit_check_judge(circuit_check_t *c, const circuit_source_t *source,
         const float variance = share * (float)c->duty_square - duty * duty;
         const float follows_mv = share * (float)c->duty_voltage - duty * found_mv;
         const float should_mv = variance * step_mv;
-        const float driven_mv = duty * step_mv - source->drop_mv;
-        const float expected_mv = driven_mv > 0.0f ? driven_mv : 0.0f;
+        const float expected_mv = expected(source, step_mv, duty);
+        const float declared_mv =
+            expected(source, (1.0f / DUTY_STEPS) * ((float)supply_mv + source->drop_mv), duty);
         const float slope_variance = SLOPE_SHARE * SLOPE_SHARE * duty * duty;
         const bool tells = variance >= fmaxf(LEAST_VARIANCE, slope_variance);
         const bool other =
@@ -139,8 +147,8 @@ bool circuit_check_judge(circuit_check_t *c, const circuit_source_t *source,
         const bool flows = expected_mv >= source->unsure_mv;
         astray = flows && ((tells && other) || (variance >= LEAST_VARIANCE &&
                                                 stands(c, should_mv * step_mv, found_mv)));
-        const float off_mv = found_mv - expected_mv;
-        unbalanced = fabsf(off_mv) > BALANCE_SHARE * expected_mv + BALANCE_MV +
+        const float off_mv = found_mv - declared_mv;
+        unbalanced = fabsf(off_mv) > BALANCE_SHARE * declared_mv + BALANCE_MV +
                                          (off_mv < 0.0f ? source->more_mv : source->less_mv);
         const float square_mv2 = share * (float)c->voltage_square;
         restless = moves_alone(square_mv2 - found_mv * found_mv, follows_mv, variance, found_mv);

@@ -40,6 +40,12 @@ typedef struct {
     uint8_t restless;       /* windows on end in which it moved without the duty */
 } circuit_check_t;
 
+/* The last window was one of a circuit. */
+static inline bool circuit_check_is_sound(const circuit_check_t *check)
+{
+    return check->astray == 0 && check->unbalanced == 0 && check->restless == 0;
+}
+
 /* What a window's voltages were, in the mean. */
 typedef struct {
     float found_mv;    /* behind the switch */
@@ -69,8 +75,9 @@ void circuit_check_take(circuit_check_t *check, uint16_t fixed_mohm, uint8_t dea
  * and only if what was read has not been a circuit for CIRCUIT_CHECK_WINDOWS windows on end, or
  * CIRCUIT_CHECK_BALANCE_WINDOWS: its voltage is not what the duty should bring, or moves beside it
  * as no supply does. A window that can tell nothing (few readings; for the first, a duty that
- * hardly moves) ends such a row. window may be NULL. */
-bool circuit_check_judge(circuit_check_t *check, const circuit_source_t *source,
+ * hardly moves) ends such a row. supply_mv: the declared one; its tolerance counts once, not again
+ * around what was found of it. window may be NULL. */
+bool circuit_check_judge(circuit_check_t *check, const circuit_source_t *source, uint16_t supply_mv,
                          circuit_window_t *window);
 
 #ifdef __cplusplus

@@ -4,13 +4,16 @@
 #include <stddef.h>
 
 #define SHARE_Q7   128.0f
+#define SHARE_MOST 255.0f /* of 8 bits: what is shown, too */
 #define OWN_Q12    4096.0f
 #define OWN_MOST   8191.0f
 #define VOLTS_MV   16.0f
 #define VOLTS_MOST 65535.0f
-/* Offsets of both readings; a diode's drop moves with current and heat. */
-#define OFFSETS_MV 25.0f
-#define DROP_PART  0.15f
+/* Offsets of both readings; a diode's drop moves with current and heat, and at the same volts those
+ * of the others do so, too: there one is off by what it is of its own. */
+#define OFFSETS_MV      25.0f
+#define DROP_PART       0.15f
+#define DROP_PART_ALIKE 0.05f
 
 #define KNOWN_PART 0.05f /* as others switch, so much does one end of a cable move */
 #define OTHER_PART 0.18f /* 0.04 ohm of wiring in 0.36, gains of 3 % */
@@ -38,8 +41,7 @@ static const circuit_peer_t *middle(const circuit_peers_t *peers, uint8_t spring
 
 static uint8_t to_q7(float share)
 {
-    const float rounded = share * SHARE_Q7 + 0.5f;
-    return rounded < 1.0f ? 1u : rounded > 255.0f ? 255u : (uint8_t)rounded;
+    return (uint8_t)fminf(fmaxf(share * SHARE_Q7 + 0.5f, 1.0f), SHARE_MOST);
 }
 
 /* A mean by volts: so it is the sum of what was found over that of what the others make of it. */
@@ -48,21 +50,15 @@ static void learn(circuit_peer_t *own, float beside, float told)
     const float known = (float)own->volts;
     const float all = known + told;
     const float next = ((float)own->own_q12 * known + beside * OWN_Q12 * told) / all + 0.5f;
-    own->own_q12 = next < OWN_MOST ? (uint16_t)next & 0x1FFFu : 0x1FFFu;
-    own->volts = all < VOLTS_MOST ? (uint16_t)(all + 0.5f) : UINT16_MAX;
+    own->own_q12 = (uint16_t)fminf(next, OWN_MOST) & 0x1FFFu;
+    own->volts = (uint16_t)fminf(all + 0.5f, VOLTS_MOST);
     own->learnt++;
-}
-
-static float lesser(float a, float b)
-{
-    return a < b ? a : b;
 }
 
 /* Of so many times 16 mV, or of the least that is compared. */
 static float volts_mv(float shown)
 {
-    const float mv = VOLTS_MV * shown;
-    return mv > CIRCUIT_WINDOW_LEAST_MV ? mv : CIRCUIT_WINDOW_LEAST_MV;
+    return fmaxf(VOLTS_MV * shown, CIRCUIT_WINDOW_LEAST_MV);
 }
 
 /* By how much a share is off beyond so large a part. */
@@ -88,13 +84,19 @@ static bool is_odd(const circuit_peer_t *own, float share, float others, float t
            off * (VOLTS_MV * (float)own->volts) > offsets_mv * (float)own->learnt;
 }
 
+/* Its row was full, and no window has acquitted it since. */
+static bool was_found(const circuit_peer_t *own)
+{
+    return own->odd + (own->agreed == 0 ? 1u : 0u) >= CIRCUIT_PEERS_WINDOWS;
+}
+
 /* What a drop makes of a lower or higher share, as far as it is not known: it takes as much of both
  * voltages, and one more than is believed makes the share at fewer volts the lower one. */
 static float drop_mv(const circuit_source_t *source, bool is_lower, float expected_mv,
                      float other_mv)
 {
     const bool is_less = expected_mv < other_mv;
-    const float part = is_less ? expected_mv / other_mv : other_mv / expected_mv;
+    const float part = fminf(expected_mv / other_mv, other_mv / expected_mv);
     return (is_lower == is_less ? source->more_mv : source->less_mv) * (1.0f - part);
 }
 
@@ -114,39 +116,42 @@ bool circuit_peers_judge(circuit_peers_t *peers, uint8_t springs, uint8_t k,
     }
     const float expected_mv = window->expected_mv;
     const float share = window->found_mv / expected_mv;
-    const float offsets_mv = OFFSETS_MV + DROP_PART * source->drop_mv;
     const float own_part = own->own_q12 != 0 ? (float)own->own_q12 / OWN_Q12 : 1.0f;
     const circuit_peer_t *const other = middle(peers, springs, k);
-    const float shown = expected_mv / VOLTS_MV;
+    const float was_mv = volts_mv((float)own->shown_16mv);
     own->share_q7 = to_q7(share / own_part);
-    own->shown_16mv = shown < 255.0f ? (uint8_t)shown : 255u;
+    own->shown_16mv = (uint8_t)fminf(expected_mv / VOLTS_MV, SHARE_MOST);
+    const bool alike = other != NULL && are_alike(own->shown_16mv, other->shown_16mv);
+    const float offsets_mv = OFFSETS_MV + (alike ? DROP_PART_ALIKE : DROP_PART) * source->drop_mv;
+    bool good = true; /* nothing needs what is not known of the drop to explain it */
     bool odd = false;
     const uint8_t others_q7 = other != NULL ? other->share_q7 : 0;
     if (others_q7 != 0) {
         const float others = (float)others_q7 / SHARE_Q7;
         const float other_mv = volts_mv((float)other->shown_16mv);
-        const float told_mv = lesser(expected_mv, other_mv);
-        odd =
-            is_odd(own, share, others, told_mv, offsets_mv) &&
-            is_odd(own, share, others, told_mv,
-                   offsets_mv + drop_mv(source, share < others * own_part, expected_mv, other_mv));
+        const float told_mv = fminf(expected_mv, other_mv);
+        good = !is_odd(own, share, others, told_mv, offsets_mv);
+        odd = !good && is_odd(own, share, others, told_mv,
+                              offsets_mv + drop_mv(source, share < others * own_part, expected_mv,
+                                                   other_mv));
         /* Where offsets make more than what a share may be at the most, it teaches nothing. */
-        const float unsure_mv =
-            are_alike(own->shown_16mv, other->shown_16mv) ? 0.0f : source->unsure_mv;
+        const float unsure_mv = alike ? 0.0f : source->unsure_mv;
         if (!odd && own->learnt < LEARN_MOST && offsets_mv + unsure_mv <= OTHER_PART * told_mv) {
             learn(own, share / others, told_mv / VOLTS_MV);
         }
     } else if (own->was_q7 != 0) {
         const float was = (float)own->was_q7 / SHARE_Q7;
         const float part = own->odd >= CIRCUIT_PEERS_WINDOWS - 1u ? KNOWN_PART : ALONE_PART;
-        odd = beyond(share, was, part) * expected_mv > offsets_mv + source->unsure_mv;
+        const float off_mv = beyond(share, was, part) * expected_mv - offsets_mv;
+        good = off_mv <= 0.0f;
+        odd = off_mv > drop_mv(source, share < was, expected_mv, was_mv);
     }
-    if (!odd) {
+    if (odd) {
+        own->odd = own->odd < CIRCUIT_PEERS_WINDOWS ? (own->odd + 1u) & 3u : own->odd;
+    } else if (good || !was_found(own)) {
         own->was_q7 = to_q7(share);
         own->odd = 0;
         own->agreed = 1;
-    } else if (own->odd < CIRCUIT_PEERS_WINDOWS) {
-        own->odd = (own->odd + 1u) & 3u;
     }
     return own->odd >= CIRCUIT_PEERS_WINDOWS;
 }
@@ -160,11 +165,24 @@ void circuit_peers_suspect(circuit_peers_t *peers, uint8_t spring, uint16_t befo
     }
 }
 
-void circuit_peers_renew(circuit_peers_t *peers, uint8_t springs)
+/* The same voltage is another share of what its duty should bring by another belief. */
+static uint8_t believed_anew(const circuit_peer_t *own, const circuit_source_t *before,
+                             const circuit_source_t *now)
+{
+    const float was_mv = volts_mv((float)own->shown_16mv);
+    const float duty = (was_mv + before->drop_mv) / before->step_mv;
+    const float mv = fmaxf(duty * now->step_mv - now->drop_mv, CIRCUIT_WINDOW_LEAST_MV);
+    return to_q7((float)own->was_q7 / SHARE_Q7 * was_mv / mv);
+}
+
+void circuit_peers_renew(circuit_peers_t *peers, uint8_t springs, const circuit_source_t *before,
+                         const circuit_source_t *now)
 {
     for (uint8_t k = 0; k < springs; k++) {
-        peers->spring[k].share_q7 = 0;
-        peers->spring[k].was_q7 = 0;
+        circuit_peer_t *own = &peers->spring[k];
+        const bool kept = was_found(own) && own->was_q7 != 0;
+        own->was_q7 = kept ? believed_anew(own, before, now) : 0;
+        own->share_q7 = 0;
     }
 }
 

@@ -49,7 +49,8 @@ typedef struct {
  * the voltages at which the two were read and its own share was learnt. As long as its own share is
  * not known, by 18 % (its wiring, its gains); where fewer than CIRCUIT_PEERS_LEAST others are
  * driven, from what it showed before by 20 % (its supply may move), but by 5 % once it was found
- * and cleared. Its own share is the mean, by volts, of the first 255 windows that are not odd and
+ * and cleared. What is not known of the drop is let pass as far as volts differ, and acquits nobody
+ * who was found. Its own share is the mean, by volts, of the first 255 windows that are not odd and
  * in which offsets make less than those 18 %, and stays: so a drift is found, however slow. The
  * others count each over its own share: a set that changes moves nothing. A window that tells
  * nothing, or of less than 0.1 V, is no witness for the others, and changes nothing else. springs
@@ -61,8 +62,10 @@ bool circuit_peers_judge(circuit_peers_t *peers, uint8_t springs, uint8_t spring
  * before_q12: the share that it showed until then, above 0. */
 void circuit_peers_suspect(circuit_peers_t *peers, uint8_t spring, uint16_t before_q12);
 
-/* Supply and drop are believed to be others: shares of before are of no use. */
-void circuit_peers_renew(circuit_peers_t *peers, uint8_t springs);
+/* Supply and drop are believed to be others: shares of before are of no use, but for what one that
+ * was found showed until then. */
+void circuit_peers_renew(circuit_peers_t *peers, uint8_t springs, const circuit_source_t *before,
+                         const circuit_source_t *now);
 
 /* A fault is cleared: the spring's row ends, but for its last window where it was full: the next
  * window is enough then, as a heating of a sensor that lies costs 12 K a second. What is known of

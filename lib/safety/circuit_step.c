@@ -38,12 +38,11 @@ static bool shares_differ(const circuit_shown_t *now, const circuit_shown_t *was
     }
     const float was_mv =
         CURRENT_MA * (float)was->current_16ma * ((float)was->ohm_q12 + Q12 * fixed_ohm);
-    const float change = fabsf(1.0f - expected_mv * (float)was->share_q12 / (was_mv + 1.0f));
-    const bool is_more =
-        (now->share_q12 < was->share_q12) == (expected_mv * (float)was->share_q12 < was_mv);
+    const float change = expected_mv * (float)was->share_q12 / was_mv - 1.0f;
+    const bool is_more = (now->share_q12 > was->share_q12) == (change > 0.0f);
     const float unsure_mv = is_more ? source->more_mv : source->less_mv;
     return is_off(now->share_q12, was->share_q12, noise_part,
-                  Q12 * unsure_mv * change / expected_mv);
+                  Q12 * unsure_mv * fabsf(change) / expected_mv);
 }
 
 bool circuit_step_judge(circuit_step_t *step, const circuit_window_t *window,
@@ -51,7 +50,8 @@ bool circuit_step_judge(circuit_step_t *step, const circuit_window_t *window,
 {
     const float fixed_ohm = 1e-3f * (float)((uint32_t)circuit->shunt_mohm + circuit->wiring_mohm);
     const float spring_mv = window->found_mv - fixed_ohm * window->current_ma;
-    if (!circuit_window_compares(window) || spring_mv < NOISE_MV || window->current_ma < 1.0f) {
+    if (!circuit_window_compares(window) || spring_mv < NOISE_MV ||
+        window->current_ma < CURRENT_MA) {
         *step = (circuit_step_t){0};
         return false;
     }

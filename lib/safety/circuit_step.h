@@ -38,8 +38,8 @@ typedef struct {
  * resistance; a contact changes the resistance and hardly the share; a spring changes its
  * resistance by a tenth in 1.8 s at the most (3 A, the least latent heat in print), and never the
  * share. A sensor that begins to show another part of its current changes the share by about half
- * of the lie. A window that tells nothing, of less than 0.1 V or another current ends what is
- * known. */
+ * of the lie. A window that tells nothing, of less than 0.1 V, of less than 16 mA or another
+ * current ends what is known. */
 bool circuit_step_judge(circuit_step_t *step, const circuit_window_t *window,
                         const circuit_source_t *source,
                         const current_control_parameters_t *circuit);

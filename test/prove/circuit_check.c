@@ -19,6 +19,6 @@ void main(void)
             circuit_check_take(&check, any_u16(), any_u8(), (uint16_t)any_between(0, 800),
                                any_bool(), any_s16(), any_s16());
         }
-        (void)circuit_check_judge(&check, &source, 0);
+        (void)circuit_check_judge(&check, &source, any_u16(), 0);
     }
 }

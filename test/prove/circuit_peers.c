@@ -6,6 +6,17 @@
 
 #define MOST_MV 20000.0f /* 4.1 A and wiring beside 4.1 V; the highest declared supply */
 
+/* Frama-C knows their declarations only. */
+float fminf(float a, float b)
+{
+    return a < b ? a : b;
+}
+
+float fmaxf(float a, float b)
+{
+    return a > b ? a : b;
+}
+
 void main(void)
 {
     circuit_peers_t peers = {0};
@@ -23,7 +34,8 @@ void main(void)
             circuit_peers_clear(&peers, spring, any_bool());
         }
         if (any_bool()) {
-            circuit_peers_renew(&peers, springs);
+            const circuit_source_t now = any_source();
+            circuit_peers_renew(&peers, springs, &source, &now);
         }
         if (any_bool()) {
             circuit_peers_suspect(&peers, spring, (uint16_t)any_between(1, UINT16_MAX));

@@ -94,7 +94,8 @@ static uint32_t found_after(const circuit_t *c, uint16_t duty, uint16_t steps, s
             (int16_t)(4 * lround((mv + c->voltage_offset_mv + c->noise_mv * noise()) / 4.0));
         circuit_check_take(&check, parameters.shunt_mohm + parameters.wiring_mohm, 0,
                            swept(duty, steps, tick), tick % 97u != 13u, read_ma, read_mv);
-        if (tick % CIRCUIT_CHECK_TICKS == 17u && circuit_check_judge(&check, &source, NULL)) {
+        if (tick % CIRCUIT_CHECK_TICKS == 17u &&
+            circuit_check_judge(&check, &source, parameters.supply_mv, NULL)) {
             return tick + 1u;
         }
     }
@@ -130,7 +131,7 @@ TEST(resistance_that_changes_is_no_mismatch)
         circuit_check_take(&check, 180, 0, duty, true, (int16_t)lround(ma),
                            (int16_t)(4 * lround(ma * spring_ohm / 4.0)));
         if (tick % CIRCUIT_CHECK_TICKS == 29u) {
-            TEST_ASSERT_FALSE(circuit_check_judge(&check, &source, NULL));
+            TEST_ASSERT_FALSE(circuit_check_judge(&check, &source, parameters.supply_mv, NULL));
         }
     }
 }
@@ -153,7 +154,8 @@ TEST(frozen_register_is_found_within_two_seconds)
             const double shown_mv = mv + (current_stands ? c.noise_mv * noise() : 0.0);
             circuit_check_take(&check, 180, 0, duty, true, (int16_t)lround(ma),
                                (int16_t)(4 * lround(shown_mv / 4.0)));
-            found = tick % CIRCUIT_CHECK_TICKS == 29u && circuit_check_judge(&check, &source, NULL);
+            found = tick % CIRCUIT_CHECK_TICKS == 29u &&
+                    circuit_check_judge(&check, &source, parameters.supply_mv, NULL);
         }
     }
 }
@@ -178,7 +180,7 @@ TEST(supply_that_moves_is_none)
             circuit_check_take(&check, 180, 0, duty, true, (int16_t)lround(ma),
                                (int16_t)(4 * lround(ma * 0.2 / 4.0)));
             if (tick % CIRCUIT_CHECK_TICKS == 29u) {
-                TEST_ASSERT_FALSE(circuit_check_judge(&check, &source, NULL));
+                TEST_ASSERT_FALSE(circuit_check_judge(&check, &source, parameters.supply_mv, NULL));
             }
         }
     }
@@ -205,7 +207,8 @@ TEST(supply_that_swings_is_found_within_two_seconds)
             circuit_check_take(
                 &check, 180, 0, duty, true, (int16_t)lround(ma * (1.0 + share * sin(turn * at_s))),
                 (int16_t)(4 * lround(ma * (1.0 + share * sin(turn * (at_s + 0.004))) * 0.2 / 4.0)));
-            found = tick % CIRCUIT_CHECK_TICKS == 29u && circuit_check_judge(&check, &source, NULL);
+            found = tick % CIRCUIT_CHECK_TICKS == 29u &&
+                    circuit_check_judge(&check, &source, parameters.supply_mv, NULL);
         }
         char which[20];
         (void)snprintf(which, sizeof which, "case %u", n);
@@ -235,7 +238,7 @@ TEST(pulses_read_late_are_none)
         const double ma = current_ma(&declared, was, 0);
         circuit_check_take(&check, 180, 0, duty, true, (int16_t)ma, (int16_t)(ma * 0.2));
         if (tick % CIRCUIT_CHECK_TICKS == 0u) { /* the first tick of a pulse is the window's last */
-            TEST_ASSERT_FALSE(circuit_check_judge(&check, &source, NULL));
+            TEST_ASSERT_FALSE(circuit_check_judge(&check, &source, parameters.supply_mv, NULL));
         }
     }
 }
@@ -263,7 +266,7 @@ TEST(a_window_says_what_its_readings_were)
         for (unsigned tick = 0; tick < 30; tick++) { /* the first one jumps */
             circuit_check_take(&check, 180, 0, 120, tick <= readings, 1000, 200);
         }
-        TEST_ASSERT_FALSE(circuit_check_judge(&check, &source, &window));
+        TEST_ASSERT_FALSE(circuit_check_judge(&check, &source, parameters.supply_mv, &window));
         TEST_ASSERT_EQUAL(readings >= 12, window.tells);
         TEST_ASSERT_FLOAT_WITHIN(0.01f, window.tells ? 375.0f : 0.0f, window.found_mv);
         TEST_ASSERT_FLOAT_WITHIN(0.01f, window.tells ? 750.0f : 0.0f, window.expected_mv);
@@ -288,7 +291,7 @@ static bool judged(uint16_t duty, uint16_t steps, double share, double beyond_mv
         circuit_check_take(&check, 180, 0, given, tick < readings, (int16_t)lround(ma),
                            (int16_t)lround(ma * 0.2));
     }
-    return circuit_check_judge(&check, &source, NULL);
+    return circuit_check_judge(&check, &source, parameters.supply_mv, NULL);
 }
 
 /* Windows on end until it is found; 9: it is not. */
@@ -366,6 +369,40 @@ TEST(what_is_not_known_of_the_drop_is_let_pass)
     TEST_ASSERT_EQUAL_INT(9, windows(120, 30, 0.0, 0.0, 0.0));
 }
 
+/* What is declared of the supply has its tolerance, and that counts once. */
+TEST(what_was_found_of_the_supply_widens_nothing)
+{
+    static const float found_mv[] = {4200.0f, 5000.0f, 5500.0f};
+    for (size_t n = 0; n < ROWS(found_mv); n++) {
+        source.step_mv = found_mv[n] / 800.0f;
+        TEST_ASSERT_EQUAL_INT(9, windows(120, 0, 0.0, 230.0, 0.0));
+        TEST_ASSERT_EQUAL_INT(3, windows(120, 0, 0.0, 250.0, 0.0));
+        TEST_ASSERT_EQUAL_INT(9, windows(120, 0, 0.0, -230.0, 0.0));
+        TEST_ASSERT_EQUAL_INT(3, windows(120, 0, 0.0, -250.0, 0.0));
+    }
+}
+
+/* One window is enough to doubt it: 120 steps, how much of the sweep is followed, what is beyond.
+ */
+TEST(a_window_of_no_circuit_is_not_sound)
+{
+    static const struct {
+        double share, beyond_mv, swing_mv;
+        bool sound;
+    } table[] = {{1.0, 0.0, 0.0, true},
+                 {0.2, 0.0, 0.0, false},
+                 {1.0, 300.0, 0.0, false},
+                 {1.0, 0.0, 46.0, false}};
+    for (size_t n = 0; n < ROWS(table); n++) {
+        memset(&check, 0, sizeof check);
+        TEST_ASSERT_FALSE(
+            judged(120, 30, table[n].share, table[n].beyond_mv, table[n].swing_mv, 30));
+        TEST_ASSERT_EQUAL(table[n].sound, circuit_check_is_sound(&check));
+        TEST_ASSERT_FALSE(judged(120, 30, 1.0, 0.0, 0.0, 30));
+        TEST_ASSERT_TRUE(circuit_check_is_sound(&check));
+    }
+}
+
 /* A sweep of a quarter from end to end deviates by 0.07 of the duty; a ramp is none. */
 TEST(a_window_tells_whether_it_was_at_one_duty)
 {
@@ -379,7 +416,7 @@ TEST(a_window_tells_whether_it_was_at_one_duty)
             check.last_duty = tick < 15 ? 120 : ends[n].to;
             circuit_check_take(&check, 180, 0, check.last_duty, true, 1000, 200);
         }
-        (void)circuit_check_judge(&check, &source, &window);
+        (void)circuit_check_judge(&check, &source, parameters.supply_mv, &window);
         TEST_ASSERT_EQUAL(ends[n].steady, window.steady);
     }
 }
@@ -388,7 +425,7 @@ TEST(a_window_tells_whether_it_was_at_one_duty)
  * duty that only overcomes the drop. */
 TEST(where_nothing_flows_a_drop_takes_nothing)
 {
-    static const uint16_t rests[] = {0, 40};
+    static const uint16_t rests[] = {0, 57};
     parameters.freewheel_mv = 390;
     is_known();
     for (unsigned n = 0; n < 4; n++) {
@@ -401,15 +438,37 @@ TEST(where_nothing_flows_a_drop_takes_nothing)
                 circuit_check_take(&check, 180, 57, duty, true, (int16_t)lround(ma),
                                    (int16_t)lround(0.2 * ma));
             }
-            TEST_ASSERT_FALSE(circuit_check_judge(&check, &source, NULL));
+            circuit_window_t window;
+            TEST_ASSERT_FALSE(circuit_check_judge(&check, &source, parameters.supply_mv, &window));
+            TEST_ASSERT_TRUE(window.tells);
+            TEST_ASSERT_FLOAT_WITHIN(0.01f, 200.0f, window.duty);
         }
     }
     for (int round = 1; round <= 3; round++) { /* a voltage without a duty is found as ever */
         for (uint16_t tick = 0; tick < 30; tick++) {
-            circuit_check_take(&check, 180, 57, 0, true, 0, 40);
+            circuit_check_take(&check, 180, 57, tick < 20 ? 0 : 57, true, 0, 40);
         }
-        TEST_ASSERT_EQUAL(round == 3, circuit_check_judge(&check, &source, NULL));
+        TEST_ASSERT_EQUAL(round == 3,
+                          circuit_check_judge(&check, &source, parameters.supply_mv, NULL));
     }
+}
+
+/* And without one, duties and none are of one kind. */
+TEST(without_a_drop_all_of_a_window_counts)
+{
+    circuit_window_t window;
+    for (uint16_t tick = 0; tick < 30; tick++) {
+        const uint16_t duty = tick < 15 ? 0 : 200;
+        circuit_check_take(&check, 180, 0, duty, true, 0, 0);
+    }
+    (void)circuit_check_judge(&check, &source, parameters.supply_mv, &window);
+    TEST_ASSERT_FLOAT_WITHIN(5.0f, 100.0f, window.duty); /* but for the step itself */
+    for (uint16_t tick = 0; tick < 30; tick++) {
+        circuit_check_take(&check, 180, 0, 0, true, 0, 0);
+    }
+    (void)circuit_check_judge(&check, &source, parameters.supply_mv, &window);
+    TEST_ASSERT_TRUE(window.tells);
+    TEST_ASSERT_FALSE(window.steady); /* at no duty there is nothing to learn */
 }
 
 /* The diode's drop takes its part of the voltage, and it stays found however long it lasts. */
@@ -427,7 +486,7 @@ TEST(the_drop_counts_and_what_is_found_stays_found)
                                    (int16_t)lround(behind_mv - fmin(ma, 4095.0) * 180.0 / 1024.0));
             }
             TEST_ASSERT_EQUAL(off_mv != 0 && window >= 2,
-                              circuit_check_judge(&check, &source, NULL));
+                              circuit_check_judge(&check, &source, parameters.supply_mv, NULL));
         }
     }
 }
@@ -444,7 +503,7 @@ TEST(voltage_that_should_move_by_more_than_half_a_step_is_frozen)
             const double ma = 5000.0 / 800.0 * given / (0.2 + 180.0 / 1024.0);
             circuit_check_take(&check, 180, 0, given, true, (int16_t)lround(ma), 404);
         }
-        found = circuit_check_judge(&check, &source, NULL);
+        found = circuit_check_judge(&check, &source, parameters.supply_mv, NULL);
     }
 }
 

@@ -192,18 +192,47 @@ TEST(a_drift_is_found_however_slow)
     }
 }
 
-/* The drop that is declared moves with current and heat by a sixth: 60 mV of 400. */
+/* A drop moves with current and heat by a sixth: 60 mV of 400; at the same volts with those of the
+ * others, but for 20 mV. */
 TEST(a_diode_may_be_another_one)
 {
-    source.drop_mv = 400.0f;
-    TEST_ASSERT_EQUAL_HEX(0, rounds(5, SPRINGS, HOLDS_MV, 1.0f, 1.0f)); /* it teaches nothing */
-    TEST_ASSERT_EQUAL_HEX(0, rounds(5, SPRINGS, HOLDS_MV, 0.62f, 1.0f));
-    TEST_ASSERT_EQUAL_HEX(1, rounds(3, SPRINGS, HOLDS_MV, 0.58f, 1.0f));
-    setUp();
-    source.drop_mv = 400.0f;
-    TEST_ASSERT_EQUAL_HEX(0, rounds(5, SPRINGS, HEATS_MV, 1.0f, 1.0f));
-    TEST_ASSERT_EQUAL_HEX(0, rounds(5, SPRINGS, HOLDS_MV, 0.8f, 1.0f));
-    TEST_ASSERT_EQUAL_HEX(1, rounds(3, SPRINGS, HOLDS_MV, 0.7f, 1.0f));
+    static const struct {
+        float learnt_mv, own_mv, others_mv, passes, found;
+    } table[] = {
+        {0.0f, HOLDS_MV, HOLDS_MV, 0.72f, 0.69f}, /* 18 % and 45 mV */
+        {0.0f, HOLDS_MV, HEATS_MV, 0.62f, 0.58f}, /* 18 % and 85 mV */
+        {0.0f, HEATS_MV, HEATS_MV, 0.79f, 0.77f},     {HOLDS_MV, HOLDS_MV, HOLDS_MV, 0.85f, 0.82f},
+        {HEATS_MV, HOLDS_MV, HOLDS_MV, 0.85f, 0.82f}, {HEATS_MV, HOLDS_MV, HEATS_MV, 0.75f, 0.72f},
+        {HEATS_MV, HEATS_MV, HEATS_MV, 0.92f, 0.90f},
+    };
+    for (unsigned n = 0; n < ROWS(table); n++) {
+        for (unsigned found = 0; found < 2; found++) {
+            setUp();
+            source.drop_mv = 400.0f;
+            if (table[n].learnt_mv > 0.0f) {
+                TEST_ASSERT_EQUAL_HEX(0, rounds(5, SPRINGS, table[n].learnt_mv, 1.0f, 1.0f));
+            }
+            for (uint8_t k = 1; k < SPRINGS; k++) {
+                (void)takes(k, table[n].others_mv, 1.0f);
+            }
+            for (unsigned window = 0; window < CIRCUIT_PEERS_WINDOWS; window++) {
+                const float share = found != 0 ? table[n].found : table[n].passes;
+                const bool full = window + 1u == CIRCUIT_PEERS_WINDOWS;
+                TEST_ASSERT_EQUAL(found != 0 && full, takes(0, table[n].own_mv, share));
+            }
+        }
+    }
+}
+
+/* From 0.25 V on with that drop: below, offsets make more than what a share may be. */
+TEST(of_too_few_volts_no_share_is_learnt)
+{
+    for (unsigned more = 0; more < 2; more++) {
+        setUp();
+        source.drop_mv = 400.0f;
+        TEST_ASSERT_EQUAL_HEX(0, rounds(2, SPRINGS, more != 0 ? 260.0f : 240.0f, 1.0f, 1.0f));
+        TEST_ASSERT_EQUAL_UINT(more, peers.spring[SPRINGS - 1u].learnt != 0);
+    }
 }
 
 /* As long as nobody knows it, a drop takes as much of what others show: at the same voltage it
@@ -230,6 +259,167 @@ TEST(what_is_not_known_of_the_drop_is_let_pass_where_others_are_driven_otherwise
     }
 }
 
+/* A drop that is more than believed makes the share at fewer volts the lower one, whoever's they
+ * are: 200 mV of 1140 and 400 make 130, of the lower volts. */
+TEST(what_is_not_known_of_the_drop_is_let_pass_on_its_own_side)
+{
+    static const struct {
+        float own_mv, others_mv, more_mv, less_mv, passes, found;
+    } table[] = {
+        {HEATS_MV, HOLDS_MV, 0.0f, 200.0f, 0.46f, 0.41f},
+        {HEATS_MV, HOLDS_MV, 200.0f, 0.0f, 1.54f, 1.59f},
+        {HEATS_MV, HOLDS_MV, 200.0f, 0.0f, 0.77f, 0.74f}, /* the other side: 18 % and 25 mV */
+        {HOLDS_MV, HEATS_MV, 200.0f, 0.0f, 0.46f, 0.41f},
+        {HOLDS_MV, HEATS_MV, 0.0f, 200.0f, 0.77f, 0.74f},
+    };
+    for (unsigned n = 0; n < ROWS(table); n++) {
+        for (unsigned found = 0; found < 2; found++) {
+            setUp();
+            source.more_mv = table[n].more_mv;
+            source.less_mv = table[n].less_mv;
+            source.unsure_mv = 200.0f;
+            for (uint8_t k = 1; k < SPRINGS; k++) {
+                (void)takes(k, table[n].others_mv, 1.0f);
+            }
+            for (unsigned window = 0; window < CIRCUIT_PEERS_WINDOWS; window++) {
+                const float share = found != 0 ? table[n].found : table[n].passes;
+                const bool full = window + 1u == CIRCUIT_PEERS_WINDOWS;
+                TEST_ASSERT_EQUAL(found != 0 && full, takes(0, table[n].own_mv, share));
+            }
+        }
+    }
+}
+
+/* And of its own: lower than what it shows beside the others, if not than theirs. */
+TEST(what_is_not_known_of_the_drop_is_let_pass_on_the_side_of_its_own_share)
+{
+    for (unsigned is_less = 0; is_less < 2; is_less++) {
+        setUp();
+        TEST_ASSERT_EQUAL_HEX(0, rounds(5, SPRINGS, HEATS_MV, 1.1f, 1.0f));
+        *(is_less != 0 ? &source.less_mv : &source.more_mv) = 200.0f;
+        for (uint8_t k = 1; k < SPRINGS; k++) {
+            (void)takes(k, HOLDS_MV, 1.0f);
+        }
+        bool found = false;
+        for (unsigned window = 0; window < CIRCUIT_PEERS_WINDOWS; window++) {
+            found = takes(0, HEATS_MV, 0.95f);
+        }
+        TEST_ASSERT_EQUAL(is_less == 0, found);
+    }
+}
+
+/* Alone, as far as its volts are others than they were. */
+TEST(what_is_not_known_of_the_drop_is_let_pass_of_one_alone)
+{
+    static const struct {
+        float was_mv, own_mv, more_mv, less_mv, passes, found;
+    } table[] = {
+        {HEATS_MV, HEATS_MV, 200.0f, 200.0f, 0.79f, 0.76f}, /* 20 % and 25 mV */
+        {HEATS_MV, HOLDS_MV, 200.0f, 0.0f, 0.44f, 0.40f},   /* and 130 mV */
+        {HEATS_MV, HOLDS_MV, 0.0f, 200.0f, 0.75f, 0.72f},
+        {HEATS_MV, HOLDS_MV, 0.0f, 200.0f, 1.56f, 1.60f},
+        {HOLDS_MV, HEATS_MV, 0.0f, 200.0f, 0.68f, 0.65f},
+    };
+    for (unsigned n = 0; n < ROWS(table); n++) {
+        for (unsigned found = 0; found < 2; found++) {
+            setUp();
+            source.more_mv = table[n].more_mv;
+            source.less_mv = table[n].less_mv;
+            TEST_ASSERT_EQUAL_HEX(0, rounds(5, 1, table[n].was_mv, 1.0f, 0.0f));
+            const float share = found != 0 ? table[n].found : table[n].passes;
+            (void)rounds(1, 1, table[n].own_mv, share, 0.0f);
+            TEST_ASSERT_EQUAL_UINT(found, peers.spring[0].odd);
+        }
+    }
+}
+
+/* Found, cleared, and at volts at which the drop may make as much: it is not acquitted by that. */
+TEST(what_is_not_known_of_the_drop_acquits_nobody)
+{
+    for (unsigned driven = 1; driven <= SPRINGS; driven += 8u) {
+        setUp();
+        TEST_ASSERT_EQUAL_HEX(0, rounds(5, (uint8_t)driven, HEATS_MV, 1.0f, 1.0f));
+        TEST_ASSERT_FALSE(takes(0, HEATS_MV, 0.85f));
+        circuit_peers_suspect(&peers, 0, 4096);
+        circuit_peers_clear(&peers, 0, true);
+        source.more_mv = 200.0f;
+        for (unsigned n = 0; n < 3; n++) {
+            TEST_ASSERT_FALSE(takes(0, HOLDS_MV, 0.8f));
+            TEST_ASSERT_EQUAL_UINT(CIRCUIT_PEERS_WINDOWS - 1u, peers.spring[0].odd);
+            peers.spring[0].shown_16mv = 71; /* 1140 mV */
+        }
+        TEST_ASSERT_TRUE(takes(0, HEATS_MV, 0.85f));
+        TEST_ASSERT_FALSE(takes(0, HEATS_MV, 1.0f)); /* but this does */
+        TEST_ASSERT_EQUAL_UINT(0, peers.spring[0].odd);
+    }
+}
+
+/* 1140 mV of 211 steps of 5.4 mV are all of it; of other steps, or behind a diode, they are not. */
+TEST(what_one_that_was_found_showed_before_is_told_by_another_belief)
+{
+    static const float table[][5] = {{5.4f, 0.0f, 1.0f, 0.9f},
+                                     {5.4f, 0.0f, 0.884f, 0.80f, 150.0f},
+                                     {6.0f, 0.0f, 0.9f, 0.82f},
+                                     {5.4f, 150.0f, 1.151f, 1.05f},
+                                     {4.8f, 0.0f, 1.125f, 1.03f}};
+    for (unsigned n = 0; n < ROWS(table); n++) {
+        for (unsigned lies = 0; lies < 2; lies++) {
+            setUp();
+            source.step_mv = 5.4f;
+            source.drop_mv = table[n][4];
+            TEST_ASSERT_EQUAL_HEX(0, rounds(5, 1, HEATS_MV, 1.0f, 0.0f));
+            circuit_peers_suspect(&peers, 0, 4096);
+            circuit_peers_clear(&peers, 0, true);
+            circuit_source_t now = source;
+            now.step_mv = table[n][0];
+            now.drop_mv = table[n][1];
+            circuit_peers_renew(&peers, SPRINGS, &source, &now);
+            const float duty = (HEATS_MV + source.drop_mv) / source.step_mv;
+            const float mv = duty * now.step_mv - now.drop_mv;
+            TEST_ASSERT_EQUAL(lies, takes(0, mv, table[n][2 + lies]));
+        }
+    }
+}
+
+/* But it ends a row that is not full. */
+TEST(what_may_be_the_drop_is_not_odd)
+{
+    TEST_ASSERT_EQUAL_HEX(0, rounds(3, 1, HEATS_MV, 1.0f, 0.0f));
+    TEST_ASSERT_FALSE(takes(0, HEATS_MV, 0.5f) || takes(0, HEATS_MV, 0.5f));
+    source.more_mv = 300.0f;
+    TEST_ASSERT_FALSE(takes(0, HOLDS_MV, 0.5f));
+    TEST_ASSERT_EQUAL_UINT(0, peers.spring[0].odd);
+    setUp(); /* nor one that has just begun */
+    for (uint8_t k = 1; k < SPRINGS; k++) {
+        (void)takes(k, HEATS_MV, 1.0f);
+    }
+    TEST_ASSERT_FALSE(takes(0, HEATS_MV, 0.5f));
+    source.more_mv = 300.0f;
+    TEST_ASSERT_FALSE(takes(0, HOLDS_MV, 0.55f));
+    TEST_ASSERT_EQUAL_UINT(0, peers.spring[0].odd);
+}
+
+/* Who was not found, or of whom nothing is known, begins anew. */
+TEST(of_who_was_not_found_nothing_is_told_by_another_belief)
+{
+    TEST_ASSERT_EQUAL_HEX(0, rounds(3, 1, HEATS_MV, 1.0f, 0.0f));
+    TEST_ASSERT_FALSE(takes(0, HEATS_MV, 0.5f) || takes(0, HEATS_MV, 0.5f));
+    TEST_ASSERT_EQUAL_UINT(2, peers.spring[0].odd); /* a supply that steps: not full */
+    circuit_peers_renew(&peers, SPRINGS, &source, &source);
+    TEST_ASSERT_EQUAL_UINT(0, peers.spring[0].was_q7);
+    TEST_ASSERT_FALSE(takes(0, HEATS_MV, 0.5f));
+    TEST_ASSERT_EQUAL_UINT(0, peers.spring[0].odd);
+    setUp();
+    for (uint8_t k = 1; k < SPRINGS; k++) {
+        (void)takes(k, HEATS_MV, 1.0f);
+    }
+    for (unsigned window = 0; window < CIRCUIT_PEERS_WINDOWS; window++) {
+        TEST_ASSERT_EQUAL(window == 2u, takes(0, HEATS_MV, 0.5f));
+    }
+    circuit_peers_renew(&peers, SPRINGS, &source, &source);
+    TEST_ASSERT_EQUAL_UINT(0, peers.spring[0].was_q7);
+}
+
 /* Within an eighth a share is learnt whatever the drop is. */
 TEST(beside_others_at_about_its_volts_a_share_is_learnt)
 {
@@ -253,11 +443,14 @@ TEST(another_belief_begins_anew_and_keeps_what_is_each_ones_own)
     TEST_ASSERT_EQUAL_HEX(0, rounds(5, SPRINGS, HEATS_MV, 1.1f, 1.0f));
     const uint16_t own_q12 = peers.spring[0].own_q12;
     for (unsigned n = 0; n < 4; n++) {
-        circuit_peers_renew(&peers, SPRINGS);
+        circuit_peers_renew(&peers, SPRINGS, &source, &source);
         TEST_ASSERT_FALSE(takes(0, HEATS_MV, 0.6f)); /* alone, and nothing is known of before */
     }
     TEST_ASSERT_EQUAL_UINT16(own_q12, peers.spring[0].own_q12);
     TEST_ASSERT_EQUAL_HEX(1, rounds(4, SPRINGS, HEATS_MV, 0.6f, 1.0f));
+    circuit_peers_renew(&peers, SPRINGS - 1u, &source, &source); /* so many, and no more */
+    TEST_ASSERT_EQUAL_UINT(0, peers.spring[SPRINGS - 2u].share_q7);
+    TEST_ASSERT_EQUAL_UINT(128, peers.spring[SPRINGS - 1u].share_q7);
 }
 
 /* Found with an offset of 60 mV that all of them have, at the volts of a ramp and then at all. */

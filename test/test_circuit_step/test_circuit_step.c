@@ -207,9 +207,10 @@ TEST(windows_that_tell_are_kept_within_16_bits)
         {{400.0f, 99.9f, 1000.0f, true, true, 0.0f}, 0, 0},
         {{184.0f, 200.0f, 1000.0f, true, true, 0.0f}, 3768, 16}, /* a step of the register */
         {{183.9f, 200.0f, 1000.0f, true, true, 0.0f}, 0, 0},
-        {{200.0f, 200.0f, 1.0f, true, true, 0.0f}, 4096, UINT16_MAX},
-        {{200.0f, 200.0f, 0.9f, true, true, 0.0f}, 0, 0},
+        {{300.0f, 300.0f, 16.0f, true, true, 0.0f}, 4096, UINT16_MAX},
+        {{300.0f, 300.0f, 15.9f, true, true, 0.0f}, 0, 0},
         {{60000.0f, 200.0f, 4095.0f, true, true, 0.0f}, UINT16_MAX, 59277},
+        {{60000.0f, 200.0f, 4500.0f, true, true, 0.0f}, UINT16_MAX, 53876},
         {{400.0f, 400.0f, 1000.0f, false, true, 0.0f}, 0, 0},
     };
     for (unsigned n = 0; n < ROWS(kept); n++) {
@@ -217,9 +218,8 @@ TEST(windows_that_tell_are_kept_within_16_bits)
         TEST_ASSERT_FALSE(circuit_step_judge(&step, &kept[n].window, &source, &circuit));
         TEST_ASSERT_EQUAL_UINT(kept[n].share_q12, step.was[0].share_q12);
         TEST_ASSERT_UINT_WITHIN(1, kept[n].ohm_q12, step.was[0].ohm_q12);
-        TEST_ASSERT_EQUAL_UINT(kept[n].share_q12 != 0 ? (unsigned)kept[n].window.current_ma / 16u
-                                                      : 0u,
-                               step.was[0].current_16ma);
+        const float shown = kept[n].share_q12 != 0 ? kept[n].window.current_ma / 16.0f : 0.0f;
+        TEST_ASSERT_EQUAL_UINT(fminf(shown, 255.0f), step.was[0].current_16ma);
     }
 }
 

@@ -692,7 +692,30 @@ TEST(model_says_with_which_bounds)
              100.0 * (double)controller_austenite_bounds(&controller, 8).high);
     expect_said(wanted);
     expect_said("\r\n  0.000 A, 0.000 V, 0.000000 W, target 0.000 A\r\n"
-                "ambient: 20.00 degC\r\nok\r\n");
+                "ambient: 20.00 degC\r\n"
+                "found: supply 5.00 V, diodes 0.00 V +-0.30; declared: 5.00 V, 0.00 V\r\nok\r\n");
+}
+
+/* And `faults` where it was held against somebody. */
+TEST(what_feeds_the_springs_is_told_as_it_was_found)
+{
+    static const char wanted[] =
+        "\r\nfound: supply 4.86 V, diodes 0.38 V +-0.03; declared: 5.25 V, 0.30 V\r\nok\r\n";
+    expect_ok("$supply_v=5.25");
+    expect_ok("$freewheel_v=0.3");
+    controller.source.supply_mv = 4856.0f;
+    controller.source.drop_mv = 384.0f;
+    controller.source.unsure_mv = 62.0f;
+    ask_at_once("model");
+    expect_said(wanted);
+    ask_at_once("faults");
+    TEST_ASSERT_EQUAL_STRING("ok\r\n", said);
+    safety_trip(&controller.safety, 3, SAFETY_FAULT_SENSOR_MISMATCH);
+    safety_trip(&controller.safety, 4, SAFETY_FAULT_OPEN_SPRING);
+    ask_at_once("faults");
+    expect_said("spring 4: fault 15 sensor_mismatch");
+    expect_said(wanted);
+    TEST_ASSERT_NOT_NULL(strstr(said, "\r\nspring 5: fault 2 "));
 }
 
 /* What the held springs have in common; one alone has nothing in common. */
@@ -712,7 +735,7 @@ TEST(model_says_what_the_surroundings_take)
         ask_at_once("model"); /* in a tick no current would flow */
         TEST_ASSERT_EQUAL_MESSAGE(
             k == 1,
-            strstr(said, "surroundings: losses 1.31 +-0.05 of what is declared\r\nok\r\n") != NULL,
+            strstr(said, "surroundings: losses 1.31 +-0.05 of what is declared\r\nfound:") != NULL,
             said);
         expect_said("ok\r\n");
     }

@@ -17,6 +17,8 @@ static controller_inputs_t inputs;
 static controller_outputs_t outputs;
 static int32_t spring_mohm[CONTROLLER_MAX_SPRINGS];
 
+static int32_t supply_mv;
+
 static void start(void)
 {
     memset(&controller, 0xA5, sizeof controller); /* what was in memory must not matter */
@@ -34,10 +36,11 @@ void setUp(void)
     for (int k = 0; k < CONTROLLER_MAX_SPRINGS; k++) {
         spring_mohm[k] = 175;
     }
+    supply_mv = 5000;
     start();
 }
 
-/* What the duties bring: 5 V, 180 mohm beyond the spring. Failing sensors are left as they are. */
+/* What the duties bring, 180 mohm beyond the spring. Failing sensors are left as they are. */
 static void respond(void)
 {
     for (int k = 0; k < CONTROLLER_MAX_SPRINGS; k++) {
@@ -45,9 +48,11 @@ static void respond(void)
             continue;
         }
         int32_t current_ma =
-            spring_mohm[k] < 0 ? 0 : (int32_t)outputs.duty[k] * 6250 / (spring_mohm[k] + 180);
-        int32_t voltage_mv =
-            spring_mohm[k] < 0 ? 5000 * outputs.duty[k] / 800 : current_ma * spring_mohm[k] / 1000;
+            spring_mohm[k] < 0
+                ? 0
+                : (int32_t)outputs.duty[k] * (supply_mv + supply_mv / 4) / (spring_mohm[k] + 180);
+        int32_t voltage_mv = spring_mohm[k] < 0 ? supply_mv * outputs.duty[k] / 800
+                                                : current_ma * spring_mohm[k] / 1000;
         inputs.sensor[k].current_ma = (int16_t)(current_ma > 3200 ? 3200 : current_ma);
         inputs.sensor[k].voltage_mv = (int16_t)voltage_mv;
     }
@@ -97,6 +102,23 @@ TEST(a_driven_spring_gets_its_current_and_only_that_one)
     }
     TEST_ASSERT_INT_WITHIN(30, 265, controller_measured_mv(&controller, 4));
     TEST_ASSERT_EQUAL_UINT16(1500, controller_target_ma(&controller, 4));
+}
+
+/* Of one spring alone more supply is learnt, as far as it is within its tolerance; 7 V are none,
+ * and a switch that lets current pass beside its duty shows as much. */
+TEST(what_is_no_circuit_teaches_nothing_of_the_supply)
+{
+    for (unsigned wrong = 0; wrong < 2; wrong++) {
+        setUp();
+        supply_mv = wrong != 0 ? 7000 : 5400;
+        TEST_ASSERT_TRUE(controller_set_target(&controller, 4, 1000));
+        run(200);
+        const circuit_source_t *const source = controller_source(&controller);
+        TEST_ASSERT_EQUAL(wrong == 0, source->supply_mv > 5100.0f);
+        TEST_ASSERT_EQUAL(wrong != 0, source->before < 0.5f);
+        TEST_ASSERT_EQUAL(wrong != 0 ? SAFETY_FAULT_SENSOR_MISMATCH : SAFETY_FAULT_NONE,
+                          controller_fault(&controller, 4));
+    }
 }
 
 /* 9 x 3 A are asked for, 15 A are there, 14.7 A are given: in every tick, whatever the springs'

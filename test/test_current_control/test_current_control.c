@@ -275,6 +275,16 @@ TEST(saturation_does_not_wind_up)
     TEST_ASSERT_INT32_WITHIN(30000, 2000000, load.now_ua);
 }
 
+TEST(all_of_a_period_may_be_given)
+{
+    parameters.supply_mv = 1200;
+    parameters.maximum_duty_steps = CURRENT_CONTROL_DUTY_STEPS;
+    TEST_ASSERT_TRUE(current_control_init(&control, &parameters, NULL));
+    load.supply_mv = 900;
+    mean_ua(3000, 100);
+    TEST_ASSERT_EQUAL_UINT16(CURRENT_CONTROL_DUTY_STEPS, control.channel[0].duty);
+}
+
 TEST(blind_channel_holds_then_goes_off_then_returns)
 {
     mean_ua(1500, 100);
@@ -288,6 +298,7 @@ TEST(blind_channel_holds_then_goes_off_then_returns)
     for (int n = 0; n < 300; n++) {
         TEST_ASSERT_EQUAL_UINT16(0, tick_with(2500, 190, false, true));
     }
+    TEST_ASSERT_EQUAL_UINT8(UINT8_MAX, control.channel[0].blind_ticks);
     tick(2500);
     TEST_ASSERT_NOT_EQUAL(0, tick(2500)); /* one of the two is its turn */
     TEST_ASSERT_LESS_OR_EQUAL_UINT16(128, current_control_reference_ma(&control, 0));
@@ -481,27 +492,44 @@ TEST(no_resistance_at_all_gives_the_least_there_is)
     TEST_ASSERT_UINT_WITHIN(1, 3, given); /* 200 ticks x 1000 mA / 65536 */
 }
 
+/* What one reading teaches a channel that gives nothing. */
+static int32_t taken(uint16_t resistance_mohm, int16_t measured_ma)
+{
+    parameters.integral_permille = 1;
+    TEST_ASSERT_TRUE(current_control_init(&control, &parameters, NULL));
+    current_control_set_resistance(&control, 0, resistance_mohm);
+    control.channel[0].reference_ma = 1;
+    const uint16_t target_ma = 1;
+    const bool valid = true;
+    uint16_t duty;
+    current_control_tick(&control, 1, &target_ma, &measured_ma, &valid, true, &duty);
+    return control.channel[0].trim_q24;
+}
+
 /* Up to 128 steps each way an error is taken as it is, beyond as that. */
 TEST(an_error_is_taken_in_full_up_to_its_end)
 {
-    int32_t taken_q24[4];
-    static const int16_t measured_ma[] = {1690, 1694, 1698, 2600};
-    for (size_t n = 0; n < 4; n++) {
-        parameters.integral_permille = 1;
-        TEST_ASSERT_TRUE(current_control_init(&control, &parameters, NULL));
-        current_control_set_resistance(&control, 0, 290);
-        control.channel[0].reference_ma = 1;
-        control.channel[0].duty = 0;
-        const uint16_t target_ma = 1;
-        const bool valid = true;
-        uint16_t duty;
-        current_control_tick(&control, 1, &target_ma, &measured_ma[n], &valid, true, &duty);
-        taken_q24[n] = control.channel[0].trim_q24;
-    }
     /* 0.8 x 470 / 5000 steps a mA: 127.1, 127.4, 127.7, and all beyond 128 */
-    TEST_ASSERT_TRUE(taken_q24[0] < 0);
-    TEST_ASSERT_TRUE(taken_q24[0] > taken_q24[1] && taken_q24[1] > taken_q24[2] &&
-                     taken_q24[2] > taken_q24[3]);
+    static const int16_t measured_ma[] = {1690, 1694, 1698, 2600};
+    for (int sign = -1; sign <= 1; sign += 2) {
+        int32_t before_q24 = 0;
+        for (size_t n = 0; n < 4; n++) {
+            const int32_t taken_q24 = -sign * taken(290, (int16_t)(sign * measured_ma[n]));
+            TEST_ASSERT_GREATER_THAN_INT32(before_q24, taken_q24);
+            before_q24 = taken_q24;
+        }
+    }
+}
+
+/* A reading is one of up to 4095 mA, which are 124 steps of 190 mohm. */
+TEST(a_reading_counts_up_to_its_end)
+{
+    for (int sign = -1; sign <= 1; sign += 2) {
+        const int32_t most_q24 = taken(10, (int16_t)(sign * 4095));
+        TEST_ASSERT_EQUAL_INT32(most_q24, taken(10, (int16_t)(sign * 4096)));
+        TEST_ASSERT_EQUAL_INT32(most_q24, taken(10, sign < 0 ? INT16_MIN : INT16_MAX));
+    }
+    TEST_ASSERT_GREATER_THAN_INT32(taken(10, -4085), taken(10, -4095));
 }
 
 /* The same by hand for the declared circuit: 2684 millionths of a step, 180 mohm, 12.3 % of drop.
