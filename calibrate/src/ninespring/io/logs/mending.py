@@ -40,7 +40,7 @@ def rising_rows(table: Table, notes: list[str]) -> np.ndarray:
     if 0 < (none := int(np.count_nonzero(step == 0))) < FEW * step.size:
         keep[rows[:-1][step == 0]] = False
         rows, step = np.flatnonzero(keep), step[step != 0]
-        notes.append(f"{none} time{'s' * (none > 1)} there twice: the later row counts")
+        notes.append(f"{none} row{'s' * (none > 1)} at the next one's time dropped: a later row counts")
     if (step <= 0).any():
         at = int(np.flatnonzero(step <= 0)[0])
         before, now = time_s[rows[at]], time_s[rows[at + 1]]
