@@ -91,7 +91,13 @@ SECTIONS: tuple[Section, ...] = (
     Section(
         "hours",
         "Hours of log",
-        f"{PYTHON} bench/diagnose/hours.py --cases 10 --first 331000 --processes 1 --resume build/results/hours.json",
+        f"{PYTHON} bench/diagnose/hours.py --cases 10 --first 331000 --processes 1 --resume build/results/hours.json "
+        "--parts unseen,wander,halves,half_a_day",
+    ),
+    Section(
+        "finned",
+        "Finned boards in a box",
+        f"{PYTHON} bench/diagnose/hours.py --cases 6 --first 341000 --processes 1 --resume build/results/finned.json --parts finned",
     ),
     Section(
         "camera",

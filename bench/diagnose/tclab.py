@@ -29,7 +29,7 @@ LOGS = (
         "tclab",
         "1.23; with lag and ambient 0.58",
     ),
-    ("tclab_prbs", "tclab_mlid_prbs/tclab_prbs.csv", "tclab-prbs", ""),
+    ("tclab_prbs", "tclab_mlid_prbs/tclab_prbs.csv", "tclab", ""),
 )
 
 

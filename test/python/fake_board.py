@@ -104,12 +104,16 @@ class FakeBoard:
         self._busy = self.answers.get(text) == []
         if text.startswith("telemetry csv") and text not in self.answers:
             self.say(TELEMETRY, "ok")
+            if "telemetry_hz" in self.settings:
+                self.settings["telemetry_hz"] = text.split()[2]
             self._streaming = len(self.seen)
             threading.Thread(target=self._stream, args=(self._streaming,), daemon=True).start()
         elif text in self.answers:
             self.say(*self.answers[text])
         elif text == "$$":
             self.say(*(f"${name}={value}" for name, value in self.settings.items()), "ok")
+        elif text[1:] in self.settings:
+            self.say(f"{text}={self.settings[text[1:]]}", "ok")
         elif text:
             if text == "telemetry off":
                 self._streaming = 0

@@ -52,3 +52,11 @@ def test_what_is_around_springs_that_begin_hot_is_warm(around: dict[str, dict[st
     plant.start_from_measured(run.temperature_c[0])
     bare = plant.simulate(run.time_s, native.POWER, run.drive, run.fan, run.ambient_c)
     assert np.abs(run.temperature_c - bare).max() > 1.5
+
+
+def test_a_box_that_loses_next_to_nothing_is_as_warm_as_it_would_be_after_days() -> None:
+    """A fit may take it for one: it is in balance with nothing in twelve days, and simulated all the same."""
+    kept = {"air_heat_capacity_j_per_k": 1e4, "air_exchange_w_per_k": 1e-4}
+    model, run = cooling({"shared_air": kept | {"air_exchange_w_per_k": 1.0}})
+    model.parameters |= kept
+    assert np.isfinite(prediction.predict(model, run)).all()

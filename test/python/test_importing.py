@@ -153,6 +153,20 @@ def test_a_logger_with_dates_quotes_and_an_old_character_set_is_read(tmp_path: P
     assert [[float(cell) for cell in row] for row in rows] == [[0, 20.5, 0.5], [1.5, 21, 0]]
 
 
+@pytest.mark.parametrize(
+    "form",
+    [
+        "Time,Q1,Q2,T1,T2\n0,50,0,20.5,21\n",
+        "Time;Q1;Q2;T1;T2\n0;50;0;20,5;21\n",
+        "t_s\tH1\tH2\tT1\tT2\n0\t50\t0\t20.5\t21\n",
+    ],
+)
+def test_a_heater_boards_table_is_read_as_its_programs_write_it(tmp_path: Path, form: str) -> None:
+    (tmp_path / "logger.csv").write_text(form)
+    header, row = importing.import_table(tmp_path / "logger.csv", "tclab").splitlines()[-2:]
+    assert (header, row) == ("time_s,u1,u2,t1_c,t2_c", "0.00000,0.50000,0.00000,20.50000,21.00000")
+
+
 def test_scale_comes_before_the_unit_and_offset_after(tmp_path: Path) -> None:
     (tmp_path / "map.toml").write_text(
         '[columns]\ntime_s = "t"\nt1_c = { column = "T", unit = "degF", scale = 0.1, offset = -0.5 }\n'
@@ -176,6 +190,8 @@ def test_frames_are_put_into_a_log_on_its_clock(tmp_path: Path) -> None:
         assert "# board: 7" in merged.read_text()
     with pytest.raises(InputError, match="never meet"):
         importing.merge_into_log(log, None, 2.0, 900.0, rising)
+    with pytest.raises(InputError, match="only one of them is within"):
+        importing.merge_into_log(log, None, 20.0, 0.0, rising)
 
 
 def test_frames_that_are_not_in_degrees_are_refused(tmp_path: Path) -> None:

@@ -11,6 +11,8 @@ from ninespring.infer import room
 from ninespring.infer.likelihood import BROKEN, Colour, Rows, Weighed, fitted
 from ninespring.io import statistics
 from ninespring.io.logs.run import Run
+from ninespring.model import native
+from ninespring.model.simulate import simulate_run
 
 
 def lasting(rng: np.random.Generator, rows: int, columns: int, sigma: float, time_s: float) -> np.ndarray:
@@ -157,6 +159,24 @@ def test_what_is_only_heated_does_not_begin_colder_than_its_room() -> None:
 
     value, _ = room.of_run(run, room.guessed(run, 30.0, None), shows, 1.0 / 180.0)
     assert value == pytest.approx(room.first_c(run) + 2.0 * room.MOVES_K)
+
+
+def test_a_first_minute_counts_as_far_as_those_of_the_fitted_runs_told_their_rooms() -> None:
+    """A model without the lag of its thermometers has springs warm at once: what warms later is taken for a colder room."""
+    plain = native.Plant(1, 1)
+    plain.set("command_power_w[1]", 1.0)
+    lags = plain.copy()
+    lags.set_effects(["sensor_lag"])
+    lags.set("sensor_lag_s", 20.0)
+    rooms = (19.0, 21.0, 23.0, 25.0)
+    runs = [one_run(at, at) for at in rooms]
+    for run, at in zip(runs, rooms, strict=True):
+        run.temperature_c[:] = simulate_run(lags.copy(), run, np.full(len(run.time_s), at))
+    known = room.Rooms.of(runs[:3], rooms[:3], plain)
+    trusting = replace(known, misses_k=0.0).told(runs[3], plain)
+    value, sigma = known.told(runs[3], plain)
+    assert abs(value - 25.0) < 2.0 * sigma < 3.0 and 25.0 - trusting[0] > 5.0 * trusting[1]
+    assert room.Rooms.of(runs[:3], rooms[:3], lags).misses_k < 0.3 < 2.0 < known.misses_k
 
 
 def test_a_run_that_began_warm_is_not_taken_for_one_at_rest() -> None:

@@ -118,6 +118,18 @@ def test_repeated_rows_are_dropped_and_said(tmp_path: Path) -> None:
     assert again.time_s.tolist() == [0, 1, 2, 3]
 
 
+def test_of_a_time_that_is_there_twice_the_later_row_counts(tmp_path: Path) -> None:
+    """As programs write that simulate by steps: what is switched has the row before and the row after it at one time."""
+    rows = [f"{k},0.5,{20 + k / 10}" for k in range(200)]
+    run = read(tmp_path, "\n".join(["time_s,u1,t1_c", *rows[:100], "100,0,30.1", *rows[100:]]) + "\n")
+    assert (len(run.time_s), run.drive[100, 0]) == (200, 0.5)
+    assert "1 row at the next one's time dropped: a later row counts" in run.notes
+    with pytest.raises(InputError, match="repeats 1 with other values"):
+        read(tmp_path, "time_s,u1,t1_c\n0,0,20\n1,0,20\n1,1,20\n2,1,20\n")
+    with pytest.raises(InputError, match="two runs in one file"):
+        read(tmp_path, "time_s,u1,t1_c\n0,0,20\n1,0,20\n0,1,20\n1,1,20\n")
+
+
 def test_a_gap_starts_the_simulation_again(make_log) -> None:
     run = read_log(make_log(change=lambda columns: keep_rows(columns, np.r_[0:200, 320:600])))
     assert run.starts == [0, 200]

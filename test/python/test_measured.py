@@ -55,7 +55,7 @@ def test_the_laboratory_is_explained_far_better_than_by_the_textbook(measured: P
 def prbs(measured: Path, folder: Path) -> Run:
     """Return the board that is heated at random, its room not logged."""
     path = folder / "log.csv"
-    path.write_text(importing.import_table(measured / "tclab_mlid_prbs" / "tclab_prbs.csv", "tclab-prbs"))
+    path.write_text(importing.import_table(measured / "tclab_mlid_prbs" / "tclab_prbs.csv", "tclab"))
     return read_log(path, 2)
 
 

@@ -378,14 +378,15 @@ def test_a_host_that_was_held_up_does_not_blame_the_board(tmp_path: Path) -> Non
     port.close()
 
 
-def test_the_host_timeout_is_set_while_recording_and_given_back(tmp_path: Path) -> None:
+def test_settings_of_the_board_that_recording_needs_otherwise_are_given_back(tmp_path: Path) -> None:
     board = FakeBoard(stream=STREAM, every_s=0.3)
-    board.settings = {"host_timeout_s": "0"}
+    board.settings = {"host_timeout_s": "0", "telemetry_hz": "7"}
     assert record(board, tmp_path, "--duration", 4).returncode == 0
     sent = board.sent()
     begins, ends = sent.index("$host_timeout_s=5"), sent.index("$host_timeout_s=0")
     assert begins < sent.index("telemetry csv 20") < sent.index("off all") < ends
-    assert "# $host_timeout_s=0" in (tmp_path / "log.csv").read_text()
+    assert {"# $host_timeout_s=0", "# $telemetry_hz=7"} <= set((tmp_path / "log.csv").read_text().splitlines())
+    assert board.settings == {"host_timeout_s": "0", "telemetry_hz": "7"}
     # something goes to the board all the while, so that it knows that this end lives
     assert "" in board.seen[board.seen.index("telemetry csv 20") : board.seen.index("off all")]
 

@@ -151,4 +151,4 @@ def monitor(port: str, hz: int, duration: float | None) -> None:
                 raise WorkError(f"{port}: no telemetry for 5 s")
         except KeyboardInterrupt:
             pass
-        board.ask("telemetry off")
+        board.telemetry_off()

@@ -35,7 +35,7 @@ map.toml:                                          regions.toml (pixels):
     name="import",
 )
 @click.argument("source", type=click.Path(path_type=Path))
-@click.option("--map", "mapping", help="mapping file (TOML) of columns and units, or built in: tclab, tclab-prbs")
+@click.option("--map", "mapping", help="mapping file (TOML) of columns and units, or built in: tclab")
 @click.option("--regions", type=FILE, help="regions file (TOML) for thermal-camera frames: pixels of each spring")
 @number("--interval", ranges.FRAME_S, "s a frame", 1.0)
 @click.option("--unit", type=click.Choice(["degC", "degF", "K"]), default="degC", help="of the frames")

@@ -18,7 +18,7 @@ from typing import Any
 from ..errors import InputError, RefusedError, WorkError
 from ..io import words
 from ..io.belief import beliefs
-from ..io.board import HOST_TIMEOUT_S, PATIENCE, SIMULATED, Board, reading, shape_of
+from ..io.board import PATIENCE, SIMULATED, Board, reading, shape_of
 from ..io.port import pseudo_terminal
 from ..io.recording import SILENT_S, LogFile, Row, RowCheck, RowSink, about, write_head
 from ..io.thermometers import Thermometers
@@ -273,11 +273,9 @@ class BoardSource(Source):
                     board.telemetry(self._hz)
 
     def _read_settings(self, board: Board) -> None:
-        settings = board.settings()
-        if board.unguarded is not None and float(settings.get("host_timeout_s", 0)) == HOST_TIMEOUT_S:
-            settings["host_timeout_s"] = board.unguarded  # what it will be again
-        self._settings = settings
-        self._change(settings_read=time.time(), policy="precompensate" if settings.get("policy") == "1" else "open")
+        self._settings = board.as_lent(board.settings())
+        policy = "precompensate" if self._settings.get("policy") == "1" else "open"
+        self._change(settings_read=time.time(), policy=policy)
 
     def _switch_off(self, board: Board) -> None:
         while got := self._next_wish(off=True):
@@ -311,12 +309,12 @@ class BoardSource(Source):
         if line == "?":
             return board.status()
         if line == "$save":
-            board.unguard()  # what is saved is what was set, not what this page needs
+            board.give_back()  # what is saved is what was set, not what this page needs
         try:
             said = board.ask(line, 10.0)
         finally:
             if line == "$save":
-                board.guard(self._settings)
+                self._need_of(board)
         self._note(board, line)
         return "\n".join(said)
 
@@ -337,9 +335,13 @@ class BoardSource(Source):
             self._change(policy=rest[0])
         if word.startswith("$") or word == "ambient":
             self._read_settings(board)
-        if word.startswith("$"):  # it may have ended what this page needs of the board
-            board.guard(self._settings)
-            board.telemetry(self._hz)
+        if word.startswith("$"):  # it may have ended that
+            self._need_of(board)
+
+    def _need_of(self, board: Board) -> None:
+        """Have the board do what this page needs of it."""
+        board.guard(self._settings)
+        board.telemetry(self._hz)
 
     def _play_on(self, board: Board, now: float) -> None:
         play = self._play

@@ -168,9 +168,7 @@ def errors(split: Split, fit: Fit, colour: Colour | None) -> tuple[np.ndarray, n
 def _room(problem: Problem, run: Run, values: dict[str, float], plant: Any) -> tuple[float, float]:
     """Return how warm the room of a run was and one sigma of it, as `predict` tells it by the runs that were fitted."""
     rooms = {r: values[f"ambient_c@{r + 1}"] for r in range(len(problem.runs)) if f"ambient_c@{r + 1}" in values}
-    usual = float(np.mean(list(rooms.values()))) if rooms else plant.get("ambient_c")
-    over = room.over_first([problem.runs[r] for r in rooms], list(rooms.values())) if rooms else None
-    return room.by_plant(run, plant, usual, over)
+    return room.Rooms.of([problem.runs[r] for r in rooms], list(rooms.values()), plant).told(run, plant)
 
 
 @dataclass

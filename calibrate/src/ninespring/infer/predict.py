@@ -47,7 +47,8 @@ def in_its_room(model: Model, run: Run) -> Run:
     plant = plant_of(model)
     known = model.provenance
     over = known.get("room_over_first_k"), known.get("room_over_first_sigma_k")
-    value, sigma = room.by_plant(run, plant, plant.get("ambient_c"), None if None in over else over)
+    misses_k = known.get("room_first_minute_misses_k", 0.0)
+    value, sigma = room.Rooms(plant.get("ambient_c"), None if None in over else over, misses_k).told(run, plant)
     said = f"no ambient_c: by the first minute the room is at {value:.1f} degC (+-{sigma:.1f})"
     return replace(run, ambient_c=np.full(len(run.time_s), value), notes=[*run.notes, said])
 

@@ -94,8 +94,11 @@ def model_of(
         "rmse_after_c": statistics.rms(fit.residual),
         "hottest_c": max(float(np.nanmax(run.temperature_c)) for run in runs),
     }
-    if rooms and (over := room.over_first([problem.runs[r] for r in rooms], constants)):
-        model.provenance["room_over_first_k"], model.provenance["room_over_first_sigma_k"] = over
+    if rooms:
+        told = room.Rooms.of([problem.runs[r] for r in rooms], constants, problem.plant_for(fit.spec, fit.values))
+        model.provenance["room_first_minute_misses_k"] = told.misses_k
+        if told.over:
+            model.provenance["room_over_first_k"], model.provenance["room_over_first_sigma_k"] = told.over
     if rmse_before_c is not None:
         model.provenance["rmse_before_c"] = rmse_before_c
     if drifts:

@@ -29,6 +29,8 @@ LOSS_OFF = 0.1
 """Part of a warm spring's loss that may be another node's: a room is told so much worse by one that begins warm."""
 ROOMS_K = 3.0
 """How far a room is from what it was on another day, one sigma."""
+ANYWHERE_K = 100.0
+"""One sigma of a room of which nothing is believed."""
 WARM_K = 60.0
 """Within which a spring is of its room that was driven shortly before its run began."""
 AS_OTHERS = 0.9
@@ -158,9 +160,14 @@ def begun(run: Run) -> Run | None:
 
 
 def of_run(
-    run: Run, guess: Sequence[Guess], shows: Callable[[Run, float, np.ndarray], np.ndarray], fades: float
+    run: Run,
+    guess: Sequence[Guess],
+    shows: Callable[[Run, float, np.ndarray], np.ndarray],
+    fades: float,
+    misses_k: float = 0.0,
 ) -> tuple[float, float]:
-    """Return how warm the room of a run is and one sigma of it, by its first minute and guesses before it.
+    """Return how warm the room of a run is and one sigma of it, by its first minute, which tells rooms no better than to `misses_k`,
+    and guesses before it.
 
     `shows` simulates a run with a room (degC) and errors of the first readings (springs,), K. Least squares of the room, of the
     drive's errors, which are believed to be small, and of those of the start: noise, and what a thermometer that lags hides of a
@@ -186,7 +193,9 @@ def of_run(
         left = ((part.temperature_c - base) / scale)[there]
         spread = np.linalg.inv(columns.T @ columns + np.diag(trust**2))
         said = value + float((spread @ (columns.T @ left))[0])
-        variance = float(spread[0, 0]) + (LOSS_OFF * max(0.0, np.nanmax(part.temperature_c[0]) - usual[0])) ** 2
+        variance = (
+            float(spread[0, 0]) + (LOSS_OFF * max(0.0, np.nanmax(part.temperature_c[0]) - usual[0])) ** 2 + misses_k**2
+        )
         value, sigma = _moments([one.with_told(said, variance) for one in guess])
         # what is only heated does not begin colder than its room, which moves no further
         value = float(np.clip(value, -35.0, min(75.0, first_c(run) + 2.0 * MOVES_K)))
@@ -203,10 +212,35 @@ def _moments(parts: Sequence[Guess]) -> tuple[float, float]:
     return middle, math.sqrt(square)
 
 
-def by_plant(run: Run, plant: native.Plant, usual_c: float, over: tuple[float, float] | None) -> tuple[float, float]:
-    """Return how warm the room of a run is and one sigma of it, as a fitted plant shows its first minute; `over` as `over_first`."""
+@dataclass(frozen=True)
+class Rooms:
+    """What the runs that a model was fitted to tell of another run's room."""
 
+    usual_c: float
+    over: tuple[float, float] | None = None
+    """As `over_first` has it."""
+    misses_k: float = 0.0
+    """By how much their first minutes, as the model shows them, tell other rooms than all of them did, rms: a model is off by
+    more than noise, and mostly so where a spring begins to warm."""
+
+    @staticmethod
+    def of(runs: Sequence[Run], ambient_c: Sequence[float], plant: native.Plant) -> Rooms:
+        """Return that for runs whose rooms were fitted, and the plant that was."""
+        if not runs:
+            return Rooms(plant.get("ambient_c"))
+        usual = float(np.mean(ambient_c))
+        unknown = [Guess(0.0, usual, ANYWHERE_K)]
+        parts = zip(runs, ambient_c, strict=True)
+        off = [_shown(run, plant, unknown)[0] - fitted for run, fitted in parts if begun(run) is not None]
+        return Rooms(usual, over_first(runs, ambient_c), statistics.rms([np.array(off)]) if off else 0.0)
+
+    def told(self, run: Run, plant: native.Plant) -> tuple[float, float]:
+        """Return how warm the room of a run is and one sigma of it, as a fitted plant shows its first minute."""
+        return _shown(run, plant, guessed(run, self.usual_c, self.over), self.misses_k)
+
+
+def _shown(run: Run, plant: native.Plant, guess: Sequence[Guess], misses_k: float = 0.0) -> tuple[float, float]:
     def shows(part: Run, ambient_c: float, offset: np.ndarray) -> np.ndarray:
         return simulate_run(plant.copy(), part, np.full(len(part.time_s), ambient_c), offset)
 
-    return of_run(run, guessed(run, usual_c, over), shows, fades_per_s(plant))
+    return of_run(run, guess, shows, fades_per_s(plant), misses_k)

@@ -105,8 +105,8 @@ class Board:
         self._alive_board_s = 0.0
         self._owed = 0
         """Answers that are still to come."""
-        self._unguarded: str | None = None
-        """The setting host_timeout_s as it was."""
+        self._lent: dict[str, tuple[str, int]] = {}
+        """Settings that are this program's for a while: as they were, and as they are here."""
         self._guards = False
         """Whether somebody has seen to that setting."""
         self._script_ends = threading.Event()
@@ -257,7 +257,8 @@ class Board:
                 return None
 
     def telemetry(self, hz: int) -> list[str]:
-        """Have the board send rows, so many a second; return their columns. WorkError where it names none that can be read."""
+        """Have the board send rows, so many a second, until `telemetry_off`; return their columns. WorkError where it names none that can be read."""
+        self._borrow("telemetry_hz", hz, self._setting("telemetry_hz"))
         for _ in range(3):
             if names := next(filter(None, map(telemetry_names, self.ask(f"telemetry csv {hz}"))), None):
                 return names
@@ -289,16 +290,30 @@ class Board:
         pairs = (line[1:].split("=", 1) for line in self.ask("$$", 10.0) if line.startswith("$") and "=" in line)
         return {name: value.split()[0] for name, value in pairs if value.strip()}
 
-    @property
-    def unguarded(self) -> str | None:
-        """The setting host_timeout_s as it will be again when nothing guards any more; None where nothing does."""
-        return self._unguarded
+    def _setting(self, name: str) -> str:
+        """Return a setting, empty where the board has it not."""
+        with contextlib.suppress(RefusedError):
+            for line in self.ask(f"${name}"):
+                if line.startswith(f"${name}="):
+                    return line.partition("=")[2]
+        return ""
+
+    def _borrow(self, name: str, here: int, has: str) -> None:
+        """Note what a setting is, before it is another here; what was set here is not what the board has."""
+        was, mine = self._lent.get(name, ("", here))
+        if has:
+            self._lent[name] = was if was and float(has) == mine else has, here
+
+    def as_lent(self, settings: dict[str, str]) -> dict[str, str]:
+        """Return a board's settings as they will be when this program needs nothing of them any more."""
+        lent = {name: was for name, (was, here) in self._lent.items() if float(settings.get(name, math.nan)) == here}
+        return settings | lent
 
     def guard(self, settings: dict[str, str]) -> None:
         """Have the springs go off when this program falls silent, where the board can: ended by `make_safe`."""
         self._guards = True
         if "host_timeout_s" in settings:
-            self._unguarded = settings["host_timeout_s"]
+            self._borrow("host_timeout_s", HOST_TIMEOUT_S, settings["host_timeout_s"])
             self.ask(f"$host_timeout_s={HOST_TIMEOUT_S}")
 
     def _guard_script(self) -> None:
@@ -306,11 +321,7 @@ class Board:
         if self._guards:
             return
         self._guards = True
-        try:
-            said = self.ask("$host_timeout_s")
-        except RefusedError:  # a board without it
-            return
-        value = next((line.partition("=")[2] for line in said if line.startswith("$host_timeout_s=")), "")
+        value = self._setting("host_timeout_s")  # a board may be without it
         if value and not 0 < float(value) <= HOST_TIMEOUT_S:
             self.guard({"host_timeout_s": value})
         if value:
@@ -323,11 +334,18 @@ class Board:
             except WorkError:
                 return
 
-    def unguard(self) -> None:
-        """Give the board back the timeout that it had."""
-        if self._unguarded is not None:
-            self.ask(f"$host_timeout_s={self._unguarded}", 1.0)
-            self._unguarded = None
+    def give_back(self, *names: str) -> None:
+        """Give the board back its settings (left out: all) as they were before they were this program's."""
+        for name in names or tuple(self._lent):
+            if name in self._lent:
+                self.ask(f"${name}={self._lent[name][0]}", 1.0)
+                del self._lent[name]
+
+    def telemetry_off(self, timeout_s: float = 3.0) -> None:
+        """End telemetry; the board's own rate is what it was."""
+        self.ask("telemetry off", timeout_s)
+        self._telemetry.clear()
+        self.give_back("telemetry_hz")
 
     def make_safe(self) -> bool:
         """Switch telemetry and all springs off; True where the board confirms it. Never raises, and nothing stops it."""
@@ -338,9 +356,8 @@ class Board:
                     self._port.write("!")
                 else:
                     self.ask("off all", 1.0)
-                self.ask("telemetry off", 1.0)
-                self._telemetry.clear()
-                self.unguard()
+                self.telemetry_off(1.0)
+                self.give_back()
                 return True
         return False
 
@@ -395,8 +412,7 @@ class Board:
                 yield reading(row, believed)
         finally:
             with contextlib.suppress(WorkError):  # the loop may end after the board went away
-                self.ask("telemetry off")
-            self._telemetry.clear()
+                self.telemetry_off()
         raise WorkError(f"{self.port}: no telemetry came")
 
 

@@ -125,7 +125,7 @@ def rows(board: Board, seconds: float, line: str = "", early: list[Reading] | No
             if one.time_s - out[0].time_s >= seconds:
                 return out
     finally:
-        board.ask("telemetry off")
+        board.telemetry_off()
         while board.next_line(0.0) is not None:  # rows that came meanwhile are not the next one's
             pass
     raise WorkError(f"{board.port}: no telemetry came")

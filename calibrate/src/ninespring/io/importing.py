@@ -57,8 +57,9 @@ class _Mapping:
 
     columns: dict[str, _Rule] = field(default_factory=dict)
     constants: dict[str, float] = field(default_factory=dict)
-    separator: str = ","
-    decimal: str = "."
+    separator: str = ""
+    """As is the decimal sign: told by the header where it is empty."""
+    decimal: str = ""
     skip_lines: int = 0
 
 
@@ -70,8 +71,8 @@ def _read_mapping(mapping: str | Path) -> _Mapping:
     for key in ("separator", "decimal"):
         if key in given and len(file.text_at(("file", key))) != 1:
             raise file.refuse(f"{key} must be one character in quotes", ("file", key))
-    out.separator, out.decimal = given.get("separator", ","), given.get("decimal", ".")
-    if out.separator == out.decimal:
+    out.separator, out.decimal = given.get("separator", ""), given.get("decimal", "")
+    if out.decimal and out.separator == out.decimal:
         raise file.refuse("separator and decimal cannot be the same", ("file", "separator"))
     if "skip_lines" in given:
         out.skip_lines = file.whole(("file", "skip_lines"), 0, 10**9)
@@ -122,6 +123,8 @@ def _split(path: str | Path, rules: _Mapping) -> tuple[pd.DataFrame, list[str], 
     if not kept:
         raise InputError("only comments and skipped lines: there is no header", path, 1)
     numbers, lines = [n for n, _ in kept], [one for _, one in kept]
+    rules.separator = rules.separator or next((one for one in ";\t" if one in lines[0] and "," not in lines[0]), ",")
+    rules.decimal = rules.decimal or ("." if rules.separator == "," else ",")
     if len(lines) < 2:
         raise InputError("there is a header but no row", path, numbers[0])
     rows: list[list[str]] = []
@@ -370,10 +373,11 @@ def merge_into_log(
     count = len(next(iter(columns.values())))
     when = time_s[0] + np.arange(count) * interval_s if times_s is None else times_s
     when = when + offset_s
-    if when[0] > time_s[-1] or when[-1] < time_s[0]:
+    meet = int(np.count_nonzero((when >= time_s[0]) & (when <= time_s[-1])))
+    if meet < min(2, count):  # between two that are not of it a line says nothing
         raise InputError(
             f"its times are {time_s[0]:g} to {time_s[-1]:g} s, the frames' {when[0]:g} to {when[-1]:g} s: "
-            "they never meet, `--offset` moves the frames",
+            f"{('they never meet', 'only one of them is within')[meet]}, `--offset` moves the frames, `--interval` is between them",
             log_path,
         )
     merged = {name: table.frame[name] for name in table.names if name != "time_s"}

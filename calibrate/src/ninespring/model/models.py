@@ -20,7 +20,8 @@ from . import cooling, native, stiffness
 
 SCHEMA = "ninespring.model/1"
 TABLES = ("array", "spring", "material", "sensor", "stiffness", "board")
-ERRORS = ("rmse_before_c", "rmse_after_c", "hottest_c", "room_over_first_k", "room_over_first_sigma_k")
+ROOMS = ("room_over_first_k", "room_over_first_sigma_k", "room_first_minute_misses_k")
+ERRORS = ("rmse_before_c", "rmse_after_c", "hottest_c", *ROOMS)
 SPRING_KEYS = {
     "wire_diameter_mm": (0.01, 10.0),
     "coil_diameter_mm": (0.1, 100.0),

@@ -35,6 +35,10 @@ _double_p = ctypes.POINTER(ctypes.c_double)
 _int_p = ctypes.POINTER(ctypes.c_int)
 
 
+NOT_IN_TIME = -6
+"""Status of a plant that is not settled in so long."""
+
+
 class NativeError(RuntimeError):
     """The C code refused; `status` is its number."""
 
@@ -263,10 +267,11 @@ class Plant:
         self._check(self._lib.plant_settle(self._plant, float(limit_s)), "steady state")
 
     def settle_without(self, effect: str, limit_s: float) -> None:
-        """Run to the steady state with one effect off meanwhile."""
+        """Run, with one effect off meanwhile, to the steady state or, where that is further, for so long."""
         on = self.has(effect)
         self._check(self._lib.plant_set_effect(self._plant, effect.encode(), False), effect)
-        self.settle(limit_s)
+        status = self._lib.plant_settle(self._plant, float(limit_s))
+        self._check(0 if status == NOT_IN_TIME else status, "steady state")
         self._check(self._lib.plant_set_effect(self._plant, effect.encode(), on), effect)
 
     def has(self, effect: str) -> bool:

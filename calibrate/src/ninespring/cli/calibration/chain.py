@@ -268,7 +268,7 @@ class Calibration:
                     if now_s - seen[0][0] > COOLING_S:
                         break
             finally:
-                self.board.ask("telemetry off")
+                self.board.telemetry_off()
         raise WorkError(f"the springs do not cool: still {seen[-1][1] if seen else float('nan'):.0f} degC")
 
     # ---- what they tell

@@ -19,6 +19,8 @@ LONGEST_S = 60.0 * 86400.0
 SPARSE_S = 100.0
 """Rows so far apart show no spring's warming, which takes a minute: of days of them, none is a second's."""
 DAY_S = 86400.0
+FEW = 0.01
+"""Part of the rows: so many times may be there twice, as programs log that simulate by steps. More are of a clock that is too coarse."""
 RESTED_K = 3.0
 """How far below its first readings a spring may come that began at its room: a room drifts, in Fahrenheit twice as far."""
 RUN_IN_S = 120.0
@@ -26,24 +28,30 @@ RUN_IN_S = 120.0
 
 
 def rising_rows(table: Table, notes: list[str]) -> np.ndarray:
-    """Rows whose time rises. Exact repeats are dropped and said; anything else is refused."""
+    """Rows whose time rises. Exact repeats are dropped and said, and a few rows that hold for no time; anything else is refused."""
     time_s = table.frame["time_s"].to_numpy(float)
     keep = np.ones(len(time_s), dtype=bool)
     if (np.diff(time_s) > 0).all():
         return keep
-    keep = ~table.frame.duplicated().to_numpy()
+    again = table.frame.duplicated().to_numpy()
+    keep = ~again
     rows = np.flatnonzero(keep)
     step = np.diff(time_s[rows])
+    if 0 < (none := int(np.count_nonzero(step == 0))) < FEW * step.size:
+        keep[rows[:-1][step == 0]] = False
+        rows, step = np.flatnonzero(keep), step[step != 0]
+        notes.append(f"{none} row{'s' * (none > 1)} at the next one's time dropped: a later row counts")
     if (step <= 0).any():
         at = int(np.flatnonzero(step <= 0)[0])
         before, now = time_s[rows[at]], time_s[rows[at + 1]]
         said = (
             f"time_s repeats {now:.10g} with other values"
             if now == before
-            else f"time_s falls from {before:.10g} to {now:.10g}"
+            else f"time_s falls from {before:.10g} to {now:.10g} (two runs in one file? Make two files)"
         )
         raise table.refuse_cell(f"{said}: times must rise strictly", int(rows[at + 1]), "time_s")
-    notes.append(f"{int((~keep).sum())} repeated row{'s' * int((~keep).sum() > 1)} dropped")
+    if repeated := int(again.sum()):
+        notes.append(f"{repeated} repeated row{'s' * (repeated > 1)} dropped")
     return keep
 
 
