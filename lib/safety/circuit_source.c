@@ -103,9 +103,10 @@ void circuit_source_take(circuit_source_t *source, float duty, float voltage_mv)
  * has stepped by more than a deviation of what is declared. */
 static bool has_stepped(const circuit_source_t *s, float duty, float mv)
 {
-    const float more_duty = duty - s->mean_duty;
-    const float expected_mv = s->mean_mv + s->step_mv * more_duty;
-    const float by_drop_mv = s->unsure_mv / (s->mean_duty + 1.0f) * fabsf(more_duty);
+    const float mean = within(s->mean_duty, 0.0f, DUTY_STEPS), more_duty = duty - mean;
+    const float expected_mv =
+        within(s->mean_mv, 0.0f, MOST_MV) + within(s->step_mv, 0.0f, MOST_MV) * more_duty;
+    const float by_drop_mv = within(s->unsure_mv, 0.0f, MOST_MV) / (mean + 1.0f) * fabsf(more_duty);
     return s->before > 0.0f &&
            !is_near(mv, expected_mv, SUPPLY_PART * expected_mv + LEAST_DROP_MV + by_drop_mv);
 }
@@ -116,12 +117,14 @@ bool circuit_source_fit(circuit_source_t *s, const current_control_parameters_t 
         return false;
     }
     const float windows = (float)s->windows, share = 1.0f / windows;
-    if (has_stepped(s, share * s->duty, share * s->voltage_mv)) {
+    const float now_duty = within(share * s->duty, 0.0f, DUTY_STEPS);
+    const float now_mv = within(share * s->voltage_mv, 0.0f, MOST_MV);
+    if (has_stepped(s, now_duty, now_mv)) {
         s->before = s->duty_square = s->duty_mv = 0.0f;
     }
     const float before = within(s->before, 0.0f, MOST_BEFORE), part = windows / (before + windows);
-    const float duty = within(share * s->duty, 0.0f, DUTY_STEPS) - s->mean_duty;
-    const float mv = within(share * s->voltage_mv, 0.0f, MOST_MV) - s->mean_mv;
+    const float duty = now_duty - s->mean_duty;
+    const float mv = now_mv - s->mean_mv;
     s->mean_duty = within(s->mean_duty + part * duty, 0.0f, DUTY_STEPS);
     s->mean_mv = within(s->mean_mv + part * mv, 0.0f, MOST_MV);
     s->before = within(before + windows, before, MOST_BEFORE);
