@@ -28,6 +28,11 @@ static float within(float value, float least, float most)
     return value > most ? most : value >= least ? value : least;
 }
 
+static float up_to(float most, float value)
+{
+    return within(value, 0.0f, most);
+}
+
 static bool is_near(float value, float to, float by)
 {
     return fabsf(value - to) <= by;
@@ -55,7 +60,7 @@ static bool believe(circuit_source_t *s, const current_control_parameters_t *p)
     const float all = s->duty_square + square;
     const float reach_mv =
         told ? (float)CIRCUIT_SOURCE_DROP_MV : (float)CIRCUIT_SOURCE_UNDECLARED_MV;
-    const float least_mv = within(drop_mv - reach_mv, 0.0f, MOST_MV), most_mv = drop_mv + reach_mv;
+    const float least_mv = up_to(MOST_MV, drop_mv - reach_mv), most_mv = drop_mv + reach_mv;
     const float found_drop_mv =
         within(share * (all * by_drop_mv + mixed * by_step_mv), least_mv, most_mv);
     const float found_mv =
@@ -79,9 +84,9 @@ static bool believe(circuit_source_t *s, const current_control_parameters_t *p)
         s->supply_mv = found_mv;
     }
     s->step_mv = (1.0f / DUTY_STEPS) * (s->supply_mv + s->drop_mv);
-    s->less_mv = within(s->drop_mv - least_mv, 0.0f, s->unsure_mv);
-    s->more_mv = within(most_mv - s->drop_mv, 0.0f, s->unsure_mv);
-    s->dead_steps = (uint16_t)within((s->drop_mv + s->more_mv) / s->step_mv, 0.0f, DUTY_STEPS);
+    s->less_mv = up_to(s->unsure_mv, s->drop_mv - least_mv);
+    s->more_mv = up_to(s->unsure_mv, most_mv - s->drop_mv);
+    s->dead_steps = (uint16_t)up_to(DUTY_STEPS, (s->drop_mv + s->more_mv) / s->step_mv);
     return !stays;
 }
 
@@ -103,12 +108,10 @@ void circuit_source_take(circuit_source_t *source, float duty, float voltage_mv)
  * has stepped by more than a deviation of what is declared. */
 static bool has_stepped(const circuit_source_t *s, float duty, float mv)
 {
-    const float mean = within(s->mean_duty, 0.0f, DUTY_STEPS), more_duty = duty - mean;
-    const float expected_mv =
-        within(s->mean_mv, 0.0f, MOST_MV) + within(s->step_mv, 0.0f, MOST_MV) * more_duty;
-    const float by_drop_mv = within(s->unsure_mv, 0.0f, MOST_MV) / (mean + 1.0f) * fabsf(more_duty);
-    return s->before > 0.0f &&
-           !is_near(mv, expected_mv, SUPPLY_PART * expected_mv + LEAST_DROP_MV + by_drop_mv);
+    const float mean = up_to(DUTY_STEPS, s->mean_duty), more_duty = duty - mean;
+    const float expected_mv = up_to(MOST_MV, s->mean_mv) + up_to(MOST_MV, s->step_mv) * more_duty;
+    const float off_mv = fabsf(mv - expected_mv) - SUPPLY_PART * expected_mv - LEAST_DROP_MV;
+    return off_mv * mean > up_to(MOST_MV, s->unsure_mv) * fabsf(more_duty);
 }
 
 bool circuit_source_fit(circuit_source_t *s, const current_control_parameters_t *circuit)
@@ -117,19 +120,19 @@ bool circuit_source_fit(circuit_source_t *s, const current_control_parameters_t 
         return false;
     }
     const float windows = (float)s->windows, share = 1.0f / windows;
-    const float now_duty = within(share * s->duty, 0.0f, DUTY_STEPS);
-    const float now_mv = within(share * s->voltage_mv, 0.0f, MOST_MV);
+    const float now_duty = up_to(DUTY_STEPS, share * s->duty);
+    const float now_mv = up_to(MOST_MV, share * s->voltage_mv);
     if (has_stepped(s, now_duty, now_mv)) {
         s->before = s->duty_square = s->duty_mv = 0.0f;
     }
-    const float before = within(s->before, 0.0f, MOST_BEFORE), part = windows / (before + windows);
+    const float before = up_to(MOST_BEFORE, s->before), part = windows / (before + windows);
     const float duty = now_duty - s->mean_duty;
     const float mv = now_mv - s->mean_mv;
-    s->mean_duty = within(s->mean_duty + part * duty, 0.0f, DUTY_STEPS);
-    s->mean_mv = within(s->mean_mv + part * mv, 0.0f, MOST_MV);
+    s->mean_duty = up_to(DUTY_STEPS, s->mean_duty + part * duty);
+    s->mean_mv = up_to(MOST_MV, s->mean_mv + part * mv);
     s->before = within(before + windows, before, MOST_BEFORE);
     const float weight = part * before;
-    const float square = within(s->duty_square + weight * duty * duty, 0.0f, 2.0f * MOST_SQUARE);
+    const float square = up_to(2.0f * MOST_SQUARE, s->duty_square + weight * duty * duty);
     const float kept = square > MOST_SQUARE ? MOST_SQUARE / square : 1.0f;
     s->duty_square = kept * square;
     s->duty_mv = within(kept * (s->duty_mv + weight * duty * mv), -MOST_STEP_MV2, MOST_STEP_MV2);

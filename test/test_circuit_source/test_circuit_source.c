@@ -265,6 +265,7 @@ TEST(supply_that_steps_is_learnt_anew)
         const float moved = source.duty_square;
         rounds(1, 9, (true_t){cases[n].supply_mv, 0}, cases[n].duty);
         TEST_ASSERT_EQUAL(cases[n].anew, source.duty_square < 0.5f * moved);
+        TEST_ASSERT_EQUAL_FLOAT(cases[n].anew ? 9.0f : 30.0f, source.before);
         rounds(20, 9, (true_t){cases[n].supply_mv, 0}, cases[n].duty);
         if (cases[n].anew) { /* both are known no better than from the beginning */
             TEST_ASSERT_TRUE(source.unsure_mv > 100.0f);
