@@ -28,6 +28,7 @@ static float within(float value, float least, float most)
     return value > most ? most : value >= least ? value : least;
 }
 
+/* From 0. */
 static float up_to(float most, float value)
 {
     return within(value, 0.0f, most);
