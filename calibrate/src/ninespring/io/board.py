@@ -256,9 +256,13 @@ class Board:
             if time.monotonic() >= until_s:
                 return None
 
-    def telemetry(self, hz: int) -> list[str]:
-        """Have the board send rows, so many a second, until `telemetry_off`; return their columns. WorkError where it names none that can be read."""
-        self._borrow("telemetry_hz", hz, self._setting("telemetry_hz"))
+    def telemetry(self, hz: int, again: bool = False) -> list[str]:
+        """Have the board send rows, so many a second, until `telemetry_off`; return their columns. WorkError where it names none that can be read.
+
+        `again`: nobody has set another rate since the last time, so it is not asked for: a spring may be on meanwhile.
+        """
+        if not (again and "telemetry_hz" in self._lent):
+            self._borrow("telemetry_hz", hz, self._setting("telemetry_hz"))
         for _ in range(3):
             if names := next(filter(None, map(telemetry_names, self.ask(f"telemetry csv {hz}"))), None):
                 return names

@@ -113,7 +113,7 @@ def springs_of(board: Board) -> int:
 
 def rows(board: Board, seconds: float, line: str = "", early: list[Reading] | None = None) -> list[Reading]:
     """Return telemetry of so many of the board's seconds after a line was obeyed; what came before that goes to `early`."""
-    names, out = board.telemetry(ROWS_HZ), []
+    names, out = board.telemetry(ROWS_HZ, again=True), []
     try:
         if line:
             board.ask(line)
@@ -125,7 +125,7 @@ def rows(board: Board, seconds: float, line: str = "", early: list[Reading] | No
             if one.time_s - out[0].time_s >= seconds:
                 return out
     finally:
-        board.telemetry_off()
+        board.ask("telemetry off")  # its rate is given back at the end: what is driven goes off first
         while board.next_line(0.0) is not None:  # rows that came meanwhile are not the next one's
             pass
     raise WorkError(f"{board.port}: no telemetry came")
