@@ -192,6 +192,19 @@ TEST(a_drift_is_found_however_slow)
     }
 }
 
+/* Beside all others, who show what they should, the first one's share fills its row, or does not.
+ */
+static void odd_beside(float others_mv, float own_mv, float share, bool is_odd)
+{
+    for (uint8_t k = 1; k < SPRINGS; k++) {
+        (void)takes(k, others_mv, 1.0f);
+    }
+    for (unsigned window = 0; window < CIRCUIT_PEERS_WINDOWS; window++) {
+        const bool full = window + 1u == CIRCUIT_PEERS_WINDOWS;
+        TEST_ASSERT_EQUAL(is_odd && full, takes(0, own_mv, share));
+    }
+}
+
 /* A drop moves with current and heat by a sixth: 60 mV of 400; at the same volts with those of the
  * others, but for 20 mV. */
 TEST(a_diode_may_be_another_one)
@@ -212,14 +225,8 @@ TEST(a_diode_may_be_another_one)
             if (table[n].learnt_mv > 0.0f) {
                 TEST_ASSERT_EQUAL_HEX(0, rounds(5, SPRINGS, table[n].learnt_mv, 1.0f, 1.0f));
             }
-            for (uint8_t k = 1; k < SPRINGS; k++) {
-                (void)takes(k, table[n].others_mv, 1.0f);
-            }
-            for (unsigned window = 0; window < CIRCUIT_PEERS_WINDOWS; window++) {
-                const float share = found != 0 ? table[n].found : table[n].passes;
-                const bool full = window + 1u == CIRCUIT_PEERS_WINDOWS;
-                TEST_ASSERT_EQUAL(found != 0 && full, takes(0, table[n].own_mv, share));
-            }
+            odd_beside(table[n].others_mv, table[n].own_mv,
+                       found != 0 ? table[n].found : table[n].passes, found != 0);
         }
     }
 }
@@ -278,14 +285,8 @@ TEST(what_is_not_known_of_the_drop_is_let_pass_on_its_own_side)
             source.more_mv = table[n].more_mv;
             source.less_mv = table[n].less_mv;
             source.unsure_mv = 200.0f;
-            for (uint8_t k = 1; k < SPRINGS; k++) {
-                (void)takes(k, table[n].others_mv, 1.0f);
-            }
-            for (unsigned window = 0; window < CIRCUIT_PEERS_WINDOWS; window++) {
-                const float share = found != 0 ? table[n].found : table[n].passes;
-                const bool full = window + 1u == CIRCUIT_PEERS_WINDOWS;
-                TEST_ASSERT_EQUAL(found != 0 && full, takes(0, table[n].own_mv, share));
-            }
+            odd_beside(table[n].others_mv, table[n].own_mv,
+                       found != 0 ? table[n].found : table[n].passes, found != 0);
         }
     }
 }
