@@ -435,7 +435,7 @@ static void take_turn(spring_estimator_t *e, thermal_model_t *model, uint8_t k)
     } else {
         if (spring_is_loose(b)) {
             take_back(e, b, model, k);
-            b->unproven = true; /* what it seemed to gain may have been the contact, too */
+            b->unproven = true;
         }
         if (b->heating) {
             b->run.heat.mark_ohm = 0.0f;
@@ -558,14 +558,15 @@ static bool surely_finished(const spring_belief_t *b, const thermal_model_t *mod
 }
 
 /* It is over, by what it reads in two turns above austenite start: what its austenite read when it
- * had transformed last, and no more than a temperature makes of that. */
+ * had transformed last, and no more than a temperature makes of that; and heat changes it no more.
+ */
 static bool reads_austenite(const spring_belief_t *b, const thermal_model_t *model, uint8_t k)
 {
     const spring_learnt_t *l = &b->learnt;
     const thermal_model_transformation_t t = thermal_model_transformation(model, k);
     const int16_t now_c7 = thermal_model_temperature_c7(model, k);
     if (!spring_estimator_sees(b) || l->austenite_ohm == 0.0f || b->current_a < STRONG_A ||
-        b->ohm_before[1] == 0.0f || now_c7 < t.austenite_start_c7) {
+        b->changes || b->ohm_before[1] == 0.0f || now_c7 < t.austenite_start_c7) {
         return false;
     }
     const float ohm = 0.5f * (b->ohm_before[0] + b->ohm_before[1]);
@@ -587,13 +588,6 @@ bool spring_estimator_has_transformed(const spring_estimator_t *e, const thermal
     return surely_finished(b, model, k, sds);
 }
 
-/* Its own austenite's resistance, and nothing beyond it that a contact may have added. */
-static bool reads_as_learnt(const spring_belief_t *b)
-{
-    const float austenite_ohm = b->learnt.austenite_ohm;
-    return fabsf(b->ohm - austenite_ohm) < SPRING_ESTIMATOR_BOUND_SDS * b->noise * austenite_ohm;
-}
-
 void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, uint8_t k,
                                  bool full)
 {
@@ -604,10 +598,6 @@ void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, 
     const float phase = lacks ? spring_phase_by_resistance(b) : 1.0f; /* as it read last */
     const spring_before_t before = spring_before(b, model, k);
     const bool unseen = full && b->heating && b->possible != SPRING_PHASE_AUSTENITE;
-    b->unproven = full && b->gone_k > 0.0f && b->possible != SPRING_PHASE_AUSTENITE &&
-                  !reads_as_learnt(b) &&
-                  thermal_model_temperature_c7(model, k) <
-                      thermal_model_transformation(model, k).austenite_finish_c7;
     if (full && b->possible != SPRING_PHASE_AUSTENITE) {
         b->blind = b->blind || b->possible == SPRING_PHASE_MARTENSITE;
         b->possible = SPRING_PHASE_AUSTENITE;
@@ -626,7 +616,7 @@ void spring_estimator_begin_hold(spring_estimator_t *e, thermal_model_t *model, 
         b->current_a > STRONG_A) {
         spring_learn_austenite(b); /* hot enough, and its resistance had come to rest */
     }
-    b->heating = b->left = false;
+    b->heating = b->left = b->unproven = false;
     b->kept_w_per_k = 0.0f;
     b->lost = b->doubted ? 1.0f - phase : 0.0f;
     b->quiet = 0;

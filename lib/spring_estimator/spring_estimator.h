@@ -125,8 +125,8 @@ typedef struct {
     uint16_t unsteady;  /* turns, of all that a contact or the sensor has jumped lately */
     /* bits: of nine springs they are a good part of the RAM that is spare */
     bool doubted : 1;  /* its last heating ended before its resistance said so */
-    bool unproven : 1; /* it may not have transformed: what it lost is in doubt, and it reads beyond
-                        * its austenite; or its contact came and went */
+    bool unproven : 1; /* since its heating its contact came and went: what it seemed to gain may
+                        * have been that */
     bool odd : 1;      /* the turn before read what no phase changes to so fast */
     bool reads : 1;    /* the last turn had readings fit for use */
     bool unread : 1;   /* a turn without them lies before those that it goes by */
@@ -137,6 +137,7 @@ typedef struct {
     bool onset : 1;    /* this heating was seen to begin to transform it */
     bool rough : 1;    /* the line is of few turns, not of a spring at rest */
     bool steep : 1;    /* and its resistance still changes as only that explains */
+    bool changes : 1;  /* so it does, whether its beginning was seen or not */
     bool told : 1;     /* it is martensite because someone said so */
     bool trial : 1;    /* held with less power, to tell what its resistance has changed by */
     bool unlike : 1;   /* this heating's martensite was not of the declared resistance */

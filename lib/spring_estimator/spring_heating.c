@@ -27,6 +27,7 @@ void spring_estimator_begin_heating(spring_estimator_t *e, const thermal_model_t
         .begun_c = spring_now_c(model, k) - SPRING_ESTIMATOR_BOUND_SDS * spring_estimator_sd_k(b),
     };
     b->onset = b->steep = b->unlike = false;
+    b->changes = true; /* until a step of heat shows that it rests */
     if (b->possible == SPRING_PHASE_MARTENSITE) {
         spring_begin_shared_heating(e, b, model, k);
     }
@@ -53,7 +54,6 @@ static void see_onset(spring_estimator_t *e, spring_belief_t *b, thermal_model_t
     b->onset = true;
     if (b->unsteady == 0) {                 /* else it may be the contact again */
         b->gone_k = b->gone_w_per_k = 0.0f; /* what it had lost was phase: it comes back */
-        b->unproven = false;
     }
     if (b->possible == SPRING_PHASE_MARTENSITE) {
         spring_learnt_t *l = &b->learnt;
@@ -216,7 +216,8 @@ void spring_heating_watch(spring_estimator_t *e, spring_belief_t *b, thermal_mod
         b->run.heat.onset_k = b->run.heat.mark_k;
     }
     b->run.heat.excess += against ? 0.0f : excess;
-    b->steep = b->onset && fabsf(excess) > SPRING_ESTIMATOR_LIKELY_SDS * b->noise;
+    b->changes = fabsf(excess) > SPRING_ESTIMATOR_LIKELY_SDS * b->noise;
+    b->steep = b->onset && b->changes;
     if (b->steep || !b->onset) {
         b->run.heat.flat_k = 0.0f;
     }

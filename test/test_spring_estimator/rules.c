@@ -97,7 +97,13 @@ TEST(heating_is_over_where_its_austenite_is_read_twice)
         begin_heated(table[n].temperature_c, table[n].change, table[n].ohm);
         INSIDE.ohm_before[1] = table[n].before_ohm;
         TEST_ASSERT_EQUAL(table[n].over, spring_estimator_has_transformed(&estimator, &model, 0));
+        INSIDE.changes = true; /* what still transforms reads its austenite on its way past it */
+        TEST_ASSERT_EQUAL(table[n].temperature_c > 98.0f, /* hot enough by the model */
+                          spring_estimator_has_transformed(&estimator, &model, 0));
     }
+    INSIDE.changes = false;
+    spring_estimator_begin_heating(&estimator, &model, 0);
+    TEST_ASSERT_TRUE(INSIDE.changes); /* nothing is known of that yet */
 }
 
 /* ---- what all springs share ---- */
