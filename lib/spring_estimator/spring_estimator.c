@@ -390,26 +390,6 @@ static void end_what_was_left(spring_belief_t *b)
     b->left = false;
 }
 
-/* What it seemed to lose was the contact: it is where it was believed before, as unsure as it was
- * found wrong. */
-static void take_back(const spring_estimator_t *e, spring_belief_t *b, thermal_model_t *model,
-                      uint8_t k)
-{
-    const float more_k = b->gone_k;
-    const float less_w_per_k = b->gone_w_per_k;
-    if (more_k <= 0.0f) {
-        return;
-    }
-    spring_set_temperature(model, k, spring_now_c(model, k) + more_k, SPRING_PHASE_AUSTENITE);
-    b->last_c7 = thermal_model_temperature_c7(model, k);
-    b->seen = true;
-    spring_correct_loss(e, b, -less_w_per_k);
-    b->variance_k2 += more_k * more_k;
-    b->loss_variance += less_w_per_k * less_w_per_k;
-    b->covariance -= more_k * less_w_per_k;
-    b->gone_k = b->gone_w_per_k = 0.0f;
-}
-
 static void take_turn(spring_estimator_t *e, thermal_model_t *model, uint8_t k)
 {
     spring_belief_t *b = &e->spring[k];
@@ -433,10 +413,7 @@ static void take_turn(spring_estimator_t *e, thermal_model_t *model, uint8_t k)
             spring_holding_watch(e, b, model, k, moved_k, share);
         }
     } else {
-        if (spring_is_loose(b)) {
-            take_back(e, b, model, k);
-            b->unproven = true;
-        }
+        b->unproven = b->unproven || spring_is_loose(b);
         if (b->heating) {
             b->run.heat.mark_ohm = 0.0f;
             b->steep = false;
