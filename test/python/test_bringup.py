@@ -98,6 +98,16 @@ def test_swapped_channels_are_told_from_swapped_addresses_by_a_resistor_that_is_
     assert "Either their sensors' addresses or their gates' wires" in found
 
 
+def test_what_was_found_twice_is_right_once_it_is_mended(bench: Make) -> None:
+    """The board keeps the fault of a spring that was cleared of one before until that has rested."""
+    made = bench()
+    made.wire("resistor=all", "welded=7")
+    for _ in range(2):
+        assert not do_step(made.board, "channels", None).passed
+    made.wire("resistor=all")
+    assert do_step(made.board, "channels", None).found == []
+
+
 def test_a_diode_that_drops_more_than_declared_is_told_from_a_low_supply(bench: Make) -> None:
     made = bench("--set", "plant.freewheel_drop_v=0.39")
     (found,) = do_step(made.board, "channels", None).found

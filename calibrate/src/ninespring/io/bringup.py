@@ -131,9 +131,21 @@ def rows(board: Board, seconds: float, line: str = "", early: list[Reading] | No
     raise WorkError(f"{board.port}: no telemetry came")
 
 
-def make_ready(board: Board) -> None:
-    """Forget faults and hold the supply: what was found before is told, and must not hinder what comes."""
+def clear(board: Board) -> None:
+    """Forget faults: what was found before is told, and must not hinder what comes.
+
+    A fault 11 or 15 of a spring that was cleared of one before stays until that has rested: the board says how long.
+    """
     board.ask("clear")
+    rests = [int(s) for one in board.ask("faults") for s in re.findall(r": clear again in (\d+) s$", one)]
+    if rests:
+        rows(board, max(rests) + 1)  # it counts whole turns
+        board.ask("clear")
+
+
+def make_ready(board: Board) -> None:
+    """Forget faults and hold the supply."""
+    clear(board)
     with suppress(RefusedError):  # a board without a cut-off
         board.ask("supply on")
     rows(board, 0.12)  # the relay
@@ -244,7 +256,7 @@ def step_board(board: Board, step: Step, hands: Hands | None) -> None:
 def step_sensors(board: Board, step: Step, hands: Hands | None) -> None:
     """Each address answers, and nothing flows."""
     springs = springs_of(board)
-    board.ask("clear")
+    clear(board)
     rows(board, 0.3)
     faults = board.ask("faults")
     bad = {int(k): int(number) for one in faults for k, number in re.findall(r"^spring (\d+): fault (\d+)", one)}
@@ -282,7 +294,7 @@ def step_supply(board: Board, step: Step, hands: Hands | None) -> None:
         step.tell("cut-off", "not fitted ($cut_off=0)", "fitted")
         return
     for word in ("off", "on"):
-        board.ask("clear")
+        clear(board)
         try:
             board.ask(f"supply {word}")
         except RefusedError as error:
@@ -521,7 +533,8 @@ STEPS = {
     "channels": Deed(
         "Resistors in the springs' places",
         f"Supply off, a resistor of {DUMMY_OHM:g} ohm and 10 W in each channel, all fuses in, supply on. "
-        f"Each is driven by itself, with at most {TEST_A:g} A for a second.",
+        f"Each is driven by itself, with at most {TEST_A:g} A for a second. "
+        "One that has current without a duty for the second time rests for up to a minute after it.",
         step_channels,
     ),
     "air": Deed("Fan and thermistor", "The fan blows for two seconds.", step_air),
