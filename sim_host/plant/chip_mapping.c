@@ -299,6 +299,30 @@ static void map_rows_of_the_same_name(mapping_t *m)
     }
 }
 
+/* Bands whose starts overlap, narrowed about their middles until they touch: the chip's M_s lies
+ * not above its A_s, and where each transformation is half done matters most. */
+static void map_overlap(mapping_t *m)
+{
+    const double finish_m = array_value(m, "martensite_finish_c");
+    const double start_m = array_value(m, "martensite_start_c");
+    const double start_a = array_value(m, "austenite_start_c");
+    const double finish_a = array_value(m, "austenite_finish_c");
+    if (start_m <= start_a) {
+        return;
+    }
+    const double martensite = 0.5 * (finish_m + start_m), austenite = 0.5 * (start_a + finish_a);
+    const double share = 2.0 * (austenite - martensite) / (start_m - finish_m + finish_a - start_a);
+    const double start_c = martensite + 0.5 * share * (start_m - finish_m);
+    put(m, PARAMETER_martensite_finish_c, 0, 2.0 * martensite - start_c);
+    put(m, PARAMETER_martensite_start_c, 0, start_c);
+    put(m, PARAMETER_austenite_start_c, 0, start_c);
+    put(m, PARAMETER_austenite_finish_c, 0, 2.0 * austenite - start_c);
+    if (!m->failed) {
+        say(m, "heating and cooling overlap by %.1f K: the chip takes both narrower, to %.0f %%",
+            start_m - start_a, 100.0 * share);
+    }
+}
+
 /* The board of a layer has that layer's couplings, and takes the other's springs to be as warm as
  * its own: nothing flows there. */
 static void map_layer(mapping_t *m)
@@ -417,6 +441,7 @@ chip_mapping_status_t chip_mapping_from_part(const plant_t *plant, int row, int 
     map_loss(&m);
     map_resistance(&m);
     map_rows_of_the_same_name(&m);
+    map_overlap(&m);
     map_second_neighbours(&m);
     map_layer(&m);
     map_shares(&m);

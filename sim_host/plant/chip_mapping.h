@@ -25,9 +25,10 @@ typedef enum {
 /* The plant's declared model and those effects that the chip carries as chip
  * parameters, rounded to the nearest integer. message (message_size > 0) gets one line: on failure
  * which parameter, its value and the chip's limit; on success the effects that are on and were left
- * out, and why, or an empty text. Left out on purpose: sensor_lag, sensor_gain, optical_mixing,
- * ambient_drift (they belong to the measurement) and supply_sag (the chip measures v x i). Fails if
- * and only if a number does not fit; *parameters is unchanged then. */
+ * out, and why, bands that overlap and were narrowed, or an empty text. Left out on purpose:
+ * sensor_lag, sensor_gain, optical_mixing, ambient_drift (they belong to the measurement) and
+ * supply_sag (the chip measures v x i). Fails if and only if a number does not fit; *parameters is
+ * unchanged then. */
 chip_mapping_status_t chip_mapping_from_plant(const plant_t *plant,
                                               thermal_model_parameters_t *parameters, char *message,
                                               size_t message_size);

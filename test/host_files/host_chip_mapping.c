@@ -270,6 +270,20 @@ TEST(what_is_not_on_the_chip_is_left_out_and_said)
                                  message);
 }
 
+TEST(bands_that_overlap_are_narrowed_about_their_middles_and_it_is_said)
+{
+    set("martensite_finish_c", 36.0);
+    set("martensite_start_c", 56.0);
+    set("austenite_start_c", 48.0);
+    set("austenite_finish_c", 78.0);
+    TEST_ASSERT_EQUAL_MESSAGE(CHIP_MAPPING_OK, map(), message);
+    TEST_ASSERT_EQUAL_INT16(3920, chip.martensite_finish_cc); /* 46 degC +- 0.68 x 10 K */
+    TEST_ASSERT_EQUAL_INT16(5280, chip.martensite_start_cc);
+    TEST_ASSERT_EQUAL_INT16(5280, chip.austenite_start_cc);
+    TEST_ASSERT_EQUAL_INT16(7320, chip.austenite_finish_cc);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(message, "overlap by 8.0 K"), message);
+}
+
 TEST(what_does_not_fit_is_refused_by_name)
 {
     const struct {

@@ -54,6 +54,19 @@ def test_a_latent_heat_that_the_data_speak_against_is_written_as_what_it_is(make
     assert abs(float(made.written["latent_heat_j"])) < 0.6
 
 
+def test_bands_that_overlap_reach_the_chip_narrower_about_their_middles_and_it_is_said() -> None:
+    broad = {"austenite_start_c": 40.0, "austenite_finish_c": 60.0}
+    broad |= {"martensite_start_c": 46.0, "martensite_finish_c": 28.0}
+    found = Model(Array(1, 1), ["latent_heat"])
+    found.parameters, found.stderr = {"latent_heat_j": 5.0} | broad, dict.fromkeys(broad, 1.0)
+    made = settings_of(found)
+    assert made.written["austenite_start_c"] == made.written["martensite_start_c"]
+    assert "overlap by 6.0 K" in made.remarks
+    for start, finish in (("austenite_start_c", "austenite_finish_c"), ("martensite_start_c", "martensite_finish_c")):
+        middle = 0.5 * (float(made.written[start]) + float(made.written[finish]))
+        assert middle == pytest.approx(0.5 * (broad[start] + broad[finish]), abs=0.02)
+
+
 def test_a_fan_curve_is_written_where_it_was_found_and_stays_as_it_is_elsewhere() -> None:
     found = Model(Array(), ["fan_curve"])
     found.parameters, found.stderr = {"fan_half_share": 0.42}, {"fan_half_share": 0.01}
