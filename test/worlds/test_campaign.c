@@ -502,3 +502,22 @@ TEST(what_the_swarm_lost_once_is_not_lost)
         TEST_ASSERT_LESS_OR_EQUAL(table[n].silent, silent);
     }
 }
+
+/* Of runs in which reheats ended below austenite finish, beyond what austenite had read, and `away`
+ * was said for a quarter of the time that springs were there. */
+TEST(a_spring_that_is_there_is_not_said_to_be_away)
+{
+    static const int run[] = {27, 36, 58, 63, 85, 96};
+    static swarm_case_t drawn;
+    static run_result_t result;
+    double away_s = 0.0, there_s = 0.0;
+    for (size_t n = 0; n < ROWS(run); n++) {
+        swarm_draw(105, run[n], SWARM_TEST_S, &drawn);
+        TEST_ASSERT_TRUE(run_case(&drawn.run, &result, NULL));
+        for (int k = 0; k < WORLD_SPRINGS_MAX; k++) {
+            away_s += result.losses.spring[k].away_there_s;
+            there_s += result.losses.spring[k].there_s;
+        }
+    }
+    TEST_ASSERT_TRUE(away_s < 0.03 * there_s);
+}
