@@ -627,8 +627,7 @@ bool spring_estimator_blind(const spring_belief_t *b)
 
 bool spring_estimator_knows(const spring_belief_t *b)
 {
-    return spring_estimator_sees(b) && !b->unproven &&
-           spring_distance_k2(b) < SHIFT_BOUND_K * SHIFT_BOUND_K;
+    return spring_estimator_sees(b) && !b->unproven;
 }
 
 float spring_estimator_cooling_s(const spring_estimator_t *e, const thermal_model_t *model,

@@ -386,8 +386,8 @@ static inline bool spring_estimator_by_model(const spring_estimator_t *estimator
 {
     return spring_estimator_blind(&estimator->spring[spring]) || !estimator->observes;
 }
-/* Where it is is known: its resistance tells the phase, its distance to the transformation is known
- * at all, and nothing is left that speaks against its having transformed. */
+/* Its phase is known: its resistance tells it, and nothing is left that speaks against its having
+ * transformed. How far from its transformation it is need not be. */
 bool spring_estimator_knows(const spring_belief_t *belief);
 /* Of the distance to the transformation. */
 float spring_estimator_sd_k(const spring_belief_t *belief);

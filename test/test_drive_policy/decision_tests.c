@@ -422,7 +422,7 @@ TEST(turn_decides_nothing_of_what_was_just_seen)
     }
 }
 
-/* There: held, known, and within 5 % of fully on, 10 points of a level. */
+/* There: held, read, and within 5 % of fully on, 10 points of a level. */
 TEST(away_is_what_is_not_within_its_band)
 {
     static const struct {
@@ -430,12 +430,11 @@ TEST(away_is_what_is_not_within_its_band)
         uint16_t permille;
         float phase, sd_k;
         bool reads, there;
-    } table[] = {{HOLD, 1000, 1.0f, 1.0f, true, true},   {HOLD, 1000, 1.0f, 1.0f, false, false},
-                 {HOLD, 1000, 1.0f, 7.9f, true, true},   {HOLD, 1000, 1.0f, 8.1f, true, false},
-                 {HOLD, 1000, 0.951f, 1.0f, true, true}, {HOLD, 1000, 0.949f, 1.0f, true, false},
-                 {HOLD, 500, 0.549f, 1.0f, true, true},  {HOLD, 500, 0.401f, 1.0f, true, true},
-                 {HOLD, 500, 0.399f, 1.0f, true, false}, {LOWER, 500, 0.551f, 1.0f, true, false},
-                 {HEAT, 500, 0.4f, 1.0f, true, false}};
+    } table[] = {{HOLD, 1000, 1.0f, 1.0f, true, true},    {HOLD, 1000, 1.0f, 1.0f, false, false},
+                 {HOLD, 1000, 1.0f, 20.0f, true, true},   {HOLD, 1000, 0.951f, 1.0f, true, true},
+                 {HOLD, 1000, 0.949f, 1.0f, true, false}, {HOLD, 500, 0.549f, 1.0f, true, true},
+                 {HOLD, 500, 0.401f, 1.0f, true, true},   {HOLD, 500, 0.399f, 1.0f, true, false},
+                 {LOWER, 500, 0.551f, 1.0f, true, false}, {HEAT, 500, 0.4f, 1.0f, true, false}};
     for (size_t n = 0; n < ROWS(table); n++) {
         begin(1, 2);
         believed(0, 83.0f, table[n].permille == 500 ? B : A, table[n].phase);

@@ -556,7 +556,7 @@ TEST(sight_that_goes_on_is_the_newest_again)
     TEST_ASSERT_EQUAL_UINT16(1, spring_sights_age_turns(&sights, &sights.sight[0]));
 }
 
-/* Read, proven, not blind, and its distance known to 8 K. */
+/* Read, proven and not blind: how far from its transformation it is need not be known. */
 TEST(where_it_is_is_known_where_all_is)
 {
     static const struct {
@@ -564,9 +564,9 @@ TEST(where_it_is_is_known_where_all_is)
         uint16_t unsteady;
         float variance_k2;
         bool known;
-    } table[] = {{true, false, false, 2048, 63.9f, true}, {true, false, false, 0, 64.0f, false},
-                 {false, false, false, 0, 9.0f, false},   {true, true, false, 0, 9.0f, false},
-                 {true, false, true, 0, 9.0f, false},     {true, false, false, 2049, 9.0f, false}};
+    } table[] = {{true, false, false, 2048, 9.0f, true}, {true, false, false, 0, 400.0f, true},
+                 {false, false, false, 0, 9.0f, false},  {true, true, false, 0, 9.0f, false},
+                 {true, false, true, 0, 9.0f, false},    {true, false, false, 2049, 9.0f, false}};
     for (size_t n = 0; n < ROWS(table); n++) {
         row(n);
         INSIDE.reads = table[n].reads;

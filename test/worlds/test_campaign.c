@@ -519,5 +519,5 @@ TEST(a_spring_that_is_there_is_not_said_to_be_away)
             there_s += result.losses.spring[k].there_s;
         }
     }
-    TEST_ASSERT_TRUE(away_s < 0.03 * there_s);
+    TEST_ASSERT_TRUE(away_s < 0.015 * there_s);
 }
