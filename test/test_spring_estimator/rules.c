@@ -60,17 +60,24 @@ TEST(phase_is_missing_beyond_what_steps_noise_and_coefficient_explain)
         float temperature_c, change, less;
         bool lacks;
     } table[] = {
-        {98.0f, 0.2f, 0.0075f, false},    {98.0f, 0.2f, 0.0077f, true},
-        {90.0f, 0.2f, 0.0195f, false},    {90.0f, 0.2f, 0.0197f, true},
-        {106.0f, 0.2f, 0.0077f, true},    {98.0f, 0.2f, -0.1f, false},
-        {106.0f, -0.2f, -0.0195f, false}, {106.0f, -0.2f, -0.0197f, true},
-        {90.0f, -0.2f, -0.0077f, true},   {98.0f, -0.2f, -0.0077f, true},
-        {98.0f, -0.2f, -0.0075f, false},  {98.0f, -0.2f, 0.1f, false},
+        {98.0f, 0.2f, 0.0075f, false},   {98.0f, 0.2f, 0.0077f, true},
+        {90.0f, 0.2f, 0.0195f, false},   {90.0f, 0.2f, 0.0197f, true},
+        {106.0f, 0.2f, 0.0077f, true},   {98.0f, 0.2f, -0.1f, false},
+        {106.0f, 0.2f, 0.0075f, false},  {106.0f, -0.2f, -0.0195f, false},
+        {106.0f, -0.2f, -0.0197f, true}, {90.0f, -0.2f, -0.0077f, true},
+        {98.0f, -0.2f, -0.0077f, true},  {98.0f, -0.2f, -0.0075f, false},
+        {98.0f, -0.2f, 0.1f, false},
     };
     for (size_t n = 0; n < ROWS(table); n++) {
         row(n);
         begin_heated(table[n].temperature_c, table[n].change, 0.2f * (1.0f - table[n].less));
         TEST_ASSERT_EQUAL(table[n].lacks, spring_estimator_lacks_phase(&INSIDE, &model, 0));
+        INSIDE.fresh = 0;
+        TEST_ASSERT_FALSE(spring_estimator_lacks_phase(&INSIDE, &model, 0));
+        INSIDE.fresh = 20;
+        INSIDE.blind = true;
+        TEST_ASSERT_FALSE(spring_estimator_lacks_phase(&INSIDE, &model, 0));
+        INSIDE.blind = false;
         INSIDE.current_a = 0.79f; /* too weak to tell */
         TEST_ASSERT_FALSE(spring_estimator_lacks_phase(&INSIDE, &model, 0));
     }
@@ -97,8 +104,12 @@ TEST(heating_is_over_where_its_austenite_is_read_twice)
         begin_heated(table[n].temperature_c, table[n].change, table[n].ohm);
         INSIDE.ohm_before[1] = table[n].before_ohm;
         TEST_ASSERT_EQUAL(table[n].over, spring_estimator_has_transformed(&estimator, &model, 0));
-        INSIDE.changes = true; /* what still transforms reads its austenite on its way past it */
+        INSIDE.blind = true;
         TEST_ASSERT_EQUAL(table[n].temperature_c > 98.0f, /* hot enough by the model */
+                          spring_estimator_has_transformed(&estimator, &model, 0));
+        INSIDE.blind = false;
+        INSIDE.changes = true; /* what still transforms reads its austenite on its way past it */
+        TEST_ASSERT_EQUAL(table[n].temperature_c > 98.0f,
                           spring_estimator_has_transformed(&estimator, &model, 0));
     }
     INSIDE.changes = false;
