@@ -534,9 +534,9 @@ static bool surely_finished(const spring_belief_t *b, const thermal_model_t *mod
            spring_c(thermal_model_transformation(model, k).austenite_finish_c7);
 }
 
-/* It is over, by what it reads in two turns above austenite start: what its austenite read when it
- * had transformed last, and no more than a temperature makes of that; and heat changes it no more.
- */
+/* It is over, once heat changes it no more, by what it reads in two turns above austenite start:
+ * what its austenite read when it had transformed last, and no more than a temperature makes of
+ * that. */
 static bool reads_austenite(const spring_belief_t *b, const thermal_model_t *model, uint8_t k)
 {
     const spring_learnt_t *l = &b->learnt;
