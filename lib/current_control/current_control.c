@@ -15,10 +15,30 @@ bool current_control_check(const current_control_parameters_t *p, uint16_t *bad)
     return parameter_check(PARAMETER_PART_CURRENT, p, bad);
 }
 
+static int32_t offset_q16(const current_control_parameters_t *p, uint16_t drop_mv)
+{
+    const uint16_t swing_mv = (uint16_t)(p->supply_mv + drop_mv);
+    return (int32_t)(drop_mv * 51200ul / swing_mv * 1024ul); /* 800 steps */
+}
+
+static int32_t limited(int32_t value, int32_t most)
+{
+    return value > most ? most : value < -most ? -most : value;
+}
+
 void current_control_set_drop(current_control_t *control, uint16_t drop_mv)
 {
-    const uint16_t swing_mv = (uint16_t)(control->parameters.supply_mv + drop_mv);
-    control->offset_q16 = (int32_t)(drop_mv * 51200ul / swing_mv * 1024ul); /* 800 steps */
+    const int32_t before_q16 = control->offset_q16;
+    control->offset_q16 = offset_q16(&control->parameters, drop_mv);
+    const int32_t more_q16 = control->offset_q16 - before_q16;
+    for (uint8_t k = 0; k < CURRENT_CONTROL_MAX_CHANNELS; k++) {
+        current_control_channel_t *c = &control->channel[k];
+        if (c->reference_ma != 0) {
+            const int32_t of_gain_q16 =
+                limited(more_q16 / (int32_t)c->reference_ma, 2 * (int32_t)TRIM_LIMIT);
+            c->trim_q24 = limited(c->trim_q24 - of_gain_q16 * 256, control->trim_limit_q24);
+        }
+    }
 }
 
 bool current_control_apply(current_control_t *control, const current_control_parameters_t *p,
@@ -33,7 +53,7 @@ bool current_control_apply(current_control_t *control, const current_control_par
     /* 800 steps / (1000 x swing) per mA mohm, in Q24 */
     control->gain_q24_per_mohm = (uint16_t)(13421773ul / swing_mv);
     control->fixed_mohm = (uint16_t)(p->shunt_mohm + p->wiring_mohm);
-    current_control_set_drop(control, p->freewheel_mv);
+    control->offset_q16 = offset_q16(p, p->freewheel_mv);
     uint32_t trim_q16 = ((uint32_t)p->trim_limit_mohm * control->gain_q24_per_mohm) >> 8;
     control->trim_limit_q24 = (int32_t)(trim_q16 > TRIM_LIMIT ? TRIM_LIMIT : trim_q16) * 256;
     control->integral_q16 = (uint16_t)(p->integral_permille * 65535ul / 1000u);
@@ -108,15 +128,9 @@ static void learn(const current_control_t *control, current_control_channel_t *c
     }
     int32_t step_q23 = (int32_t)fixed_point_mac_s16_u16(0, error_q8, integral_q16) >> 8;
     int32_t kept_q24 = ends && c->trim_q24 > 0 ? 0 : c->trim_q24;
-    int32_t trim_q24 = kept_q24 + 2 * step_q23; /* 1 / FIRST_MA is 2 / 256 */
-    int32_t limit_q24 = control->trim_limit_q24;
-    if (trim_q24 > limit_q24) {
-        trim_q24 = limit_q24;
-    } else if (trim_q24 < -limit_q24) {
-        trim_q24 = -limit_q24;
-    }
-    c->trim_q24 = trim_q24;
-    INVARIANT(trim_q24 <= limit_q24 && trim_q24 >= -limit_q24);
+    /* 1 / FIRST_MA is 2 / 256 */
+    c->trim_q24 = limited(kept_q24 + 2 * step_q23, control->trim_limit_q24);
+    INVARIANT(c->trim_q24 <= control->trim_limit_q24 && c->trim_q24 >= -control->trim_limit_q24);
 }
 
 static uint16_t give(const current_control_t *control, current_control_channel_t *c)

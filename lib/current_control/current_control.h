@@ -58,7 +58,8 @@ bool current_control_init(current_control_t *control,
 bool current_control_apply(current_control_t *control,
                            const current_control_parameters_t *parameters, uint16_t *bad);
 
-/* The drop of the freewheel diodes, up to 1 V, in place of the declared one. */
+/* The drop of the freewheel diodes, up to 1 V, in place of the declared one. No duty jumps with it:
+ * what of a driven channel's duty the drop takes or leaves, its trim leaves or takes. */
 void current_control_set_drop(current_control_t *control, uint16_t drop_mv);
 
 /* Steps of duty that only overcome that drop: up to 255, which are more. */

@@ -472,6 +472,48 @@ TEST(drop_and_limits_are_exact)
     TEST_ASSERT_EQUAL_INT32(8191 * 256, control.trim_limit_q24);
 }
 
+/* What is found of the drop in mid-drive is no step of the current: trim and offset say the same of
+ * it, and from there on the loop goes on as before; a channel that is off keeps what it learnt. */
+TEST(another_drop_moves_no_duty)
+{
+    static const uint16_t drops_mv[] = {310, 0, 150, 300};
+    for (uint16_t target_ma = 1600; target_ma <= 2900; target_ma += 650) {
+        setUp();
+        load.supply_mv = 4210;
+        control.channel[1].trim_q24 = 900 * 256;
+        for (unsigned n = 0; n < sizeof drops_mv / sizeof *drops_mv; n++) {
+            mean_ua(target_ma, 100);
+            const uint16_t before = current_control_duty(&control, 0);
+            current_control_set_drop(&control, drops_mv[n]);
+            for (int m = 0; m < 20; m++) {
+                TEST_ASSERT_INT_WITHIN(1, before, tick(target_ma)); /* dither */
+            }
+            TEST_ASSERT_INT32_WITHIN(8000, target_ma * 1000, mean_ua(target_ma, 20));
+        }
+        TEST_ASSERT_EQUAL_INT32(900 * 256, control.channel[1].trim_q24);
+    }
+}
+
+/* To the last bit, of every channel that is driven, as far as its trim reaches. */
+TEST(another_drop_is_taken_from_every_trim)
+{
+    const int32_t most = control.trim_limit_q24;
+    control.channel[7].reference_ma = 2000;
+    control.channel[8].reference_ma = 128;
+    memset(owned.behind, 1, sizeof owned.behind);
+    current_control_set_drop(&control, 300);
+    TEST_ASSERT_EACH_EQUAL_UINT8(1, owned.behind, sizeof owned.behind);
+    TEST_ASSERT_EQUAL_INT32(control.offset_q16 / 2000 * -256, control.channel[7].trim_q24);
+    TEST_ASSERT_EQUAL_INT32(-most, control.channel[8].trim_q24);
+    control.channel[8].trim_q24 = 0;
+    current_control_set_drop(&control, 0);
+    TEST_ASSERT_EQUAL_INT32(0, control.channel[7].trim_q24);
+    TEST_ASSERT_EQUAL_INT32(most, control.channel[8].trim_q24);
+    control.channel[8].reference_ma = 1;
+    current_control_set_drop(&control, 1000);
+    TEST_ASSERT_EQUAL_INT32(-most, control.channel[8].trim_q24);
+}
+
 /* A circuit that nothing is declared of is given a step in 65536 a milliampere: it still answers.
  */
 TEST(no_resistance_at_all_gives_the_least_there_is)
