@@ -11,7 +11,6 @@
 #define SAME_CURRENT   0.1f /* currents that differ by less of them show a sensor's offset alike */
 /* Of a resistance in a turn. */
 #define JUMP_OF_HOLD 0.01f /* 0.4 W change 1 % of the phase, 0.3 % of it */
-#define JUMP_ON_WAY  0.03f /* 20 K since it was read, by the largest coefficient */
 #define JUMP_OF_LOAD 0.08f /* 16 K at once, latent heat kept: 40 % of the phase */
 #define JUMP_TURNS   1024u /* a jump is forgotten in four minutes, one after the other */
 /* One jump has moved it, two went and came back: a third will come. */
@@ -72,9 +71,7 @@ static bool leave_out(spring_estimator_t *e, const thermal_model_t *model, uint8
               : current_a > STRONG_A && b->current_a > fmaxf(STRONG_A, 0.5f * current_a);
     /* no hold gains phase at once; it loses it by a load, where no contact has moved lately */
     const bool by_load = step * b->learnt.change < 0.0f && b->unsteady == 0;
-    const float least = !holds || by_load             ? JUMP_OF_LOAD
-                        : b->averaged >= ANCHOR_TURNS ? JUMP_OF_HOLD
-                                                      : JUMP_ON_WAY;
+    const float least = !holds || by_load ? JUMP_OF_LOAD : JUMP_OF_HOLD;
     const float noise = b->noise * fmaxf(b->current_a / current_a, 1.0f); /* it is the voltage's */
     const float offset =
         holds ? spring_offset_may_show(b, was_ohm, b->run.line.a, current_a) : 0.0f;
