@@ -347,9 +347,7 @@ static void look(spring_estimator_t *e, thermal_model_t *model, uint8_t k)
     spring_note(e, model, k, SPRING_SIGHT_LOOKED, &before, middle_c, sd_k);
     if (heating) {
         spring_estimator_begin_heating(e, model, k);
-        /* a contact may have moved since, by less than would make it austenite */
-        b->run.heat.begun_c =
-            phase == SPRING_PHASE_AUSTENITE ? spring_c(low_c7) : spring_ambient_c(model);
+        b->run.heat.begun_c = spring_c(low_c7);
     }
 }
 
