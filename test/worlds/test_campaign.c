@@ -503,23 +503,22 @@ TEST(what_the_swarm_lost_once_is_not_lost)
     }
 }
 
-/* Of runs in which reheats ended below austenite finish, beyond what austenite had read, and `away`
- * was said for a quarter of the time that springs were there: now for less than a fifth of that. */
+/* Where a distance that is unsure, and a reheat that ended in doubt, counted as away, it was said
+ * for 5 % of the time that the springs of these runs were there. */
 TEST(a_spring_that_is_there_is_not_said_to_be_away)
 {
-    static const int run[] = {27, 36, 58, 63, 85, 96};
     static swarm_case_t drawn;
     static run_result_t result;
     double away_s = 0.0, there_s = 0.0;
-    for (size_t n = 0; n < ROWS(run); n++) {
-        swarm_draw(105, run[n], SWARM_TEST_S, &drawn);
+    for (int run = 0; run < 60; run++) {
+        swarm_draw(105, run, SWARM_TEST_S, &drawn);
         TEST_ASSERT_TRUE(run_case(&drawn.run, &result, NULL));
         for (int k = 0; k < WORLD_SPRINGS_MAX; k++) {
             away_s += result.losses.spring[k].away_there_s;
             there_s += result.losses.spring[k].there_s;
         }
     }
-    TEST_ASSERT_TRUE(away_s < 0.25 / 5.0 * there_s);
+    TEST_ASSERT_TRUE(away_s < 0.015 * there_s);
 }
 
 /* 4.21 V where 5 are declared: what is found of it in mid-drive was a tenth more current at once,
