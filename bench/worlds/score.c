@@ -36,6 +36,7 @@ static void settle(score_spring_t *spring)
 
 void score_restart(score_t *score, const world_t *world)
 {
+    score->next_sight = 0;
     for (int k = 0; k < score->springs; k++) {
         if (score->spring[k].driven && isnan(score->spring[k].reached_s)) {
             settle(&score->spring[k]);
@@ -131,10 +132,25 @@ static void score_bounds(score_spring_t *spring, const world_t *world, int k,
     spring->inside_s += inside_c && inside_phase ? SAMPLE_S : 0.0;
 }
 
+static void score_sights(score_t *score, const world_t *world, const controller_t *controller)
+{
+    for (int k = 0; k < score->springs; k++) {
+        int seen = belief_losses_seen(controller, k, score->next_sight);
+        bool whole = world_austenite(world, k) > SCORE_WHOLE &&
+                     world_mean_c(world, k) > world_martensite_start_c(world, k) + SCORE_FAR_K;
+        score->spring[k].losses_seen += seen;
+        score->spring[k].false_losses += whole ? seen : 0;
+    }
+    score->next_sight = belief_next_sight(controller);
+}
+
 void score_tick(score_t *score, const world_t *world, const controller_t *controller)
 {
     if (++score->ticks % SCORE_EVERY_TICKS != 0) {
         return;
+    }
+    if (controller != NULL) {
+        score_sights(score, world, controller);
     }
     for (int k = 0; k < score->springs; k++) {
         score_spring_t *spring = &score->spring[k];

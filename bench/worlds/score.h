@@ -18,6 +18,8 @@
 #define SCORE_SETTLED_S    600.0 /* from then on reheats count */
 #define SCORE_REHEAT_A     2.2   /* mean of a second, a reheat begins: no hold needs so much */
 #define SCORE_REHEATED_A   1.9   /* and ends: further down than a dither takes that mean */
+#define SCORE_WHOLE        0.995 /* austenite, and so far above martensite start: */
+#define SCORE_FAR_K        5.0   /* what is seen as lost phase is none */
 #define SCORE_REPORT_GAP_S 1.0   /* a report still stands over shorter gaps */
 
 typedef struct {
@@ -38,8 +40,9 @@ typedef struct {
     bool heats;            /* with the current of a heating */
     bool fault;            /* of its own, now */
     int reheats;
-    double settled_hold_s;    /* in which they were counted */
-    double known_s, inside_s; /* bounds were given; temperature and phase were within them */
+    int losses_seen, false_losses; /* sights of lost phase; of a spring that had lost none */
+    double settled_hold_s;         /* in which they were counted */
+    double known_s, inside_s;      /* bounds were given; temperature and phase were within them */
     double inside_c_s, inside_phase_s;    /* either alone */
     double half_width_k, half_distance_k; /* sums over hold_s */
 } score_spring_t;
@@ -48,6 +51,7 @@ typedef struct {
     int springs;
     double allowed_s; /* for a start: later a spring must be there or be reported */
     unsigned ticks;
+    uint32_t next_sight; /* that is not counted yet */
     score_spring_t spring[WORLD_SPRINGS_MAX];
 } score_t;
 

@@ -242,6 +242,13 @@ const figure_t figures[] = {
          return shares_run_t{inside_s < inside_least * known_s ? 1.0 : 0.0,
                              known_s > 0.0 ? 1.0 : 0.0};
      }},
+    {"sights of lost phase that are none: whole, 5 K or more above martensite start", "%", "",
+     nullptr, nullptr, 1,
+     [](const run_t &r) {
+         return sums(
+             r, [](const spring_t &s) { return s.score.false_losses; },
+             [](const spring_t &s) { return s.score.losses_seen; });
+     }},
     {"driven springs with a fault, their sensors sound", "%", "", nullptr, nullptr, 2,
      [](const run_t &r) {
          return springs(r, [](const spring_t &s) { return s.losses.fault != 0; });
@@ -674,6 +681,9 @@ void replay(const options_t &options, int index, const std::string &trace)
             line += fmt::format(", SILENT at {:.0f} s", s.losses.silent_at_s);
         if (s.losses.back != LOSSES_NOT_JUDGED)
             line += s.losses.back == LOSSES_BACK ? ", back" : ", NOT BACK";
+        if (s.score.losses_seen != 0)
+            line += fmt::format(", lost phase seen {} times, {} of them none", s.score.losses_seen,
+                                s.score.false_losses);
         if (s.losses.fault != 0)
             line += fmt::format(", fault {}", s.losses.fault);
         if (s.score.known_s > 0.0)

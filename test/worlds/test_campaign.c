@@ -123,6 +123,27 @@ TEST(after_a_restart_it_must_be_reached_again)
                               score.spring[4].settled_s);
 }
 
+/* As if the controller had seen it lose phase. */
+static void see_loss(int spring)
+{
+    spring_sights_add(&controller.estimator.sights, (uint8_t)spring)->kind = SPRING_SIGHT_LOST;
+    run_s(spring, 0, 0.1);
+}
+
+TEST(lost_phase_that_is_seen_of_a_whole_spring_is_none)
+{
+    heat_to_austenite(4);
+    run_s(4, 150, 2.0);
+    see_loss(4);
+    TEST_ASSERT_EQUAL_INT(1, score.spring[4].losses_seen);
+    TEST_ASSERT_EQUAL_INT(1, score.spring[4].false_losses);
+    run_s(4, 0, 60.0);
+    TEST_ASSERT_TRUE(world_austenite(world, 4) < 0.5);
+    see_loss(4);
+    TEST_ASSERT_EQUAL_INT(2, score.spring[4].losses_seen);
+    TEST_ASSERT_EQUAL_INT(1, score.spring[4].false_losses);
+}
+
 TEST(an_undriven_spring_that_transforms_is_seen)
 {
     run_s(0, 0, 1.0);
