@@ -87,8 +87,7 @@ def column_of(
     if cause.bumps:
         columns = np.column_stack([_bumps(problem, fit, cause, r, typical_w) for r in range(len(problem.runs))])
         # there all the time it would be a declared number that is off: that is left to the number, which nothing held else
-        basis = np.linalg.qr(_declared_slopes(problem, fit))[0]
-        return columns - basis @ (basis.T @ columns)
+        return _coming_and_going(columns, _declared_slopes(problem, fit))
     fields = []
     for r, (run, profile) in enumerate(zip(problem.runs, cause.profiles, strict=True)):
         if profile is None:
@@ -98,6 +97,18 @@ def column_of(
         within[begin:end] = profile[begin:end]
         fields.append(within if cause.shown else answers(problem, fit, r, [within], typical_w)[0])
     return np.concatenate(problem.scaled(fields))[:, None]
+
+
+def _coming_and_going(columns: np.ndarray, beside: np.ndarray | None = None) -> np.ndarray:
+    """Return columns of bumps (readings, bumps) less what all of them at once add, and what is beside it: a cause that comes and
+    goes is there all the time by no part.
+
+    All at once lose heat as the readings have it, and the declared loss as the model has it. The difference of both is what is
+    left to explain, and explains it, whatever acts: a model that is led by its own readings.
+    """
+    whole = columns.sum(axis=1, keepdims=True)
+    basis = np.linalg.qr(whole if beside is None else np.column_stack([beside, whole]))[0]
+    return columns - basis @ (basis.T @ columns)
 
 
 def _declared_slopes(problem: Problem, fit: Fit) -> np.ndarray:
@@ -190,7 +201,8 @@ def _often(windows: Sequence[Cause], every: int) -> list[Cause]:
             next((p.profiles[r] for p in parts if p.profiles[r] is not None), None)
             for r in range(len(parts[0].profiles))
         ]
-        out.append(Cause(kind, text, tuple(merged), np.column_stack(columns).astype(np.float32), bumps=tuple(bumps)))
+        thin_columns = _coming_and_going(np.column_stack(columns)).astype(np.float32)
+        out.append(Cause(kind, text, tuple(merged), thin_columns, bumps=tuple(bumps)))
     return out
 
 
