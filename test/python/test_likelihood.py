@@ -157,8 +157,13 @@ def test_what_is_only_heated_does_not_begin_colder_than_its_room() -> None:
         end = ambient_c + 80.0 * part.drive[0]
         return end + (warm - end) * np.exp(-part.time_s[:, None] / 180.0)
 
+    assert room.first_c(run) == pytest.approx(20.0, abs=0.1), "what the first row shows, nothing has heated yet"
     value, _ = room.of_run(run, room.guessed(run, 30.0, None), shows, 1.0 / 180.0)
     assert value == pytest.approx(room.first_c(run) + 2.0 * room.MOVES_K)
+    run.temperature_c[:2] = np.nan
+    assert room.first_c(run) == pytest.approx(24.0, abs=1.0), (
+        "of a logger that has read nothing yet, the first that it read"
+    )
 
 
 def test_a_first_minute_counts_as_far_as_those_of_the_fitted_runs_told_their_rooms() -> None:

@@ -274,6 +274,15 @@ def test_the_model_that_is_given_foretells_in_the_rooms_that_first_minutes_tell(
     assert headline is not None and case.plain and headline.rmse_c == 1.5
 
 
+def test_the_baseline_that_is_given_is_the_one_that_foretells_better_in_rooms_that_first_minutes_tell() -> None:
+    class InTheirRooms(Told):
+        def foretells(self, fit: Any, colour: Any = None) -> float:
+            return super().foretells(fit) + (3.0 if fit is self.lagged else 1.0)
+
+    told = InTheirRooms({"": 2.0, "lag": 1.0})
+    assert told.better is told.lagged and told.plain is told.base
+
+
 def test_what_was_found_beside_a_cause_without_a_name_stays_as_large_where_it_foretells() -> None:
     """In the runs that are fitted the cause still acts: there its size would be another."""
     free = (

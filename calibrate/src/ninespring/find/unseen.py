@@ -218,8 +218,9 @@ class Unseen:
 
     @property
     def plain(self) -> Fit:
-        """What is given where nothing that was found foretells as well: the declared model, with a lag where that is worth it."""
-        return self.lagged if self.rmse(self.lagged) <= self.rmse(self.base) / WORSE else self.base
+        """What is given where nothing that was found foretells as well: the declared model, with a lag where that is worth it in runs
+        left out, each in the room that its first minute tells: so it will be used."""
+        return self.lagged if self.foretells(self.lagged) <= self.foretells(self.base) / WORSE else self.base
 
     def worse(self, fit: Fit) -> bool:
         """Return whether something foretells the unseen worse than the better of both baselines."""

@@ -73,10 +73,12 @@ def first_c(run: Run) -> float:
 
 def _begins_at(run: Run) -> tuple[float, float]:
     """Return that, and how far the warmest is above it, K."""
-    since = run.time_s - run.time_s[0]
     driven = np.flatnonzero((run.drive != 0.0).any(axis=1))
-    rests_s = min(FIRST_S, since[driven[0]] if driven.size else FIRST_S)
-    first = run.temperature_c[: max(3, int(np.searchsorted(since, max(5.0, rests_s))))]
+    rests_s = min(FIRST_S, run.time_s[driven[0]] - run.time_s[0] if driven.size else FIRST_S)
+    read = np.flatnonzero(np.isfinite(run.temperature_c).any(axis=1))
+    # what is driven from a row on has not warmed what that row shows
+    end = int(np.searchsorted(run.time_s - run.time_s[0], rests_s, side="right"))
+    first = run.temperature_c[: max(end, 1 + read[0] if read.size else 1)]
     # a mean: where thermometers step, it is finer than any of them; without what is nonsense
     middle = [statistics.trimmed_mean(one[np.isfinite(one)], 0.1) for one in first.T if np.isfinite(one).any()]
     return (float(min(middle)), float(max(middle) - min(middle))) if middle else (math.nan, math.nan)
