@@ -77,6 +77,29 @@ def test_two_effects_that_hide_one_another_are_both_found(make_log) -> None:
     assert set(names(diagnosis.diagnose(Array(), runs).result)) == set(both)
 
 
+def test_each_spring_is_its_own_beside_a_law_of_all(make_log) -> None:
+    """Springs that lie 4 % apart: one name of one spring or its thermometer after the other stood in for them."""
+    losses = (1.04, 0.96, 0.97, 0.96, 1.02, 0.97, 1.06, 1.05, 0.97)
+    masses = (1.04, 0.99, 0.97, 1.03, 1.0, 1.02, 0.96, 1.01, 0.98)
+    each = {f"loss_scale[{k}]": one for k, one in enumerate(losses, 1)}
+    each |= {f"heat_capacity_scale[{k}]": one for k, one in enumerate(masses, 1)}
+    both = {"edge_loss": {"edge_loss_fraction": 0.2}, "spring_mismatch": each}
+    runs = [read_log(make_log(f"{k}.csv", both, seed=k, noise=0.2)) for k in (1, 2)]
+    found = diagnosis.diagnose(Array(), runs)
+    result = found.result
+    assert set(names(result)) == set(both) and not result["unexplained"] and not result["unnamed"]
+    by_name = {one["name"]: one for one in result["effects"]}
+    assert by_name["spring_mismatch"]["variant"] == "each its own"
+    assert by_name["spring_mismatch"]["text"].startswith("Each spring loses its own: ")
+    assert by_name["spring_mismatch"]["in_words"] == "each spring differs from the others"
+    numbers = {key: one["value"] for one in result["effects"] for key, one in one["parameters"].items()}
+    assert numbers["edge_loss_fraction"] == pytest.approx(0.2, abs=0.05)
+    assert [numbers[f"heat_capacity_scale[{k}]"] for k in range(1, 10)] == pytest.approx(masses, abs=0.02)
+    PUBLISHED.validate(result)
+    again = diagnosis.diagnose(Array(), runs, model=found.model).result
+    assert again["effects"] == [] and not again["unexplained"], "its model has all their numbers"
+
+
 def test_what_is_not_believed_leaves_its_place_to_another(make_log, monkeypatch: pytest.MonkeyPatch) -> None:
     judged = []
 

@@ -72,6 +72,26 @@ def test_what_is_better_and_fitted_takes_its_place_though_nothing_further_may_be
     assert found is better and without == {"better": one} and not contenders
 
 
+def test_what_took_a_place_and_did_not_stay_there_gives_it_back() -> None:
+    one, other, bare = (
+        Fit(Spec(names, variant=tuple((name, "") for name in names)), np.array([]), 1.0, 1, [])
+        for names in (("one",), ("other",), ())
+    )
+
+    class Swapped(search.Search):
+        def backward(self, fit: Fit, share: float = 0.0) -> tuple[Fit, dict[str, Fit]]:
+            return (bare, {}) if fit is other else (fit, {"one": bare})
+
+        def rivals(self, fit: Fit, without: dict[str, Fit], most: int = 3) -> list[tuple[str, Fit]]:
+            return [("one", other)] if fit is one else []
+
+        def preferred(self, fit: Fit, instead: Fit) -> bool:
+            return fit is other
+
+    found = Swapped(SimpleNamespace(budget=budget.Budget()), [], bare).settle(one, grow=False)  # type: ignore[arg-type]
+    assert found == (one, {"one": bare}, [("one", other)])
+
+
 @pytest.mark.parametrize("beyond", [0.0, 1.0])
 @pytest.mark.parametrize("width", [0.1, 0.9])
 def test_a_camera_that_sees_the_surroundings_beyond_the_array_makes_no_edge_loss(

@@ -14,7 +14,7 @@ import numpy as np
 from ..infer.fit import Fit
 from ..infer.problem import Problem
 from ..io import results, statistics
-from .evidence import excess, log_evidence
+from .evidence import excess, log_evidence, relief, strain
 
 STRETCHES = 4
 """Parts of a run in which an effect's size is estimated on its own."""
@@ -100,9 +100,15 @@ def witness(problem: Problem, fit: Fit, effect: str, without: Fit, flexible: boo
         for k in range(one.shape[1]):
             places[0].append(one[mask[:, k], k])
             places[1].append(scaled[mask[:, k], k])
+    share = (without.sse - fit.sse) / fit.count / beyond
+    if relief(fit, without) > 0.0:
+        # of how far random effects lie apart beyond what is believed, it explains a part, too
+        numbers = sum(free.effect is not None and free.trust > 0.0 for free in without.spec.free)
+        relieved = strain(without) - strain(fit)
+        share = max(share, relieved / max(relieved, strain(without) - 0.5 * numbers))
     return Witness(
         log_evidence(problem, fit, without),
-        min(1.0, max(0.0, (without.sse - fit.sse) / fit.count / beyond)),
+        min(1.0, max(0.0, share)),
         min(10.0, scatter(*times, factor)),
         min(10.0, scatter(*places, factor)),
         math.sqrt(excess(problem, fit)),

@@ -176,7 +176,7 @@ def with_effects_of(spec: Spec, model: Model, known: Sequence[effects.Candidate]
     given = model.parameters
 
     def matches(one: effects.Candidate) -> int:
-        numbers = sum(name in given for free in one.free for name in free.names)
+        numbers = sum(len({given.get(name) for name in free.names} - {None}) == 1 for free in one.free)
         return numbers + sum(1 if given.get(name) == value else -1 for name, value in one.fixed if name in given)
 
     for effect in model.effects:
@@ -417,7 +417,8 @@ def _searched(
     scene = scene_of(problem)
     known = effects.candidates(scene)
     if model:
-        spec = with_effects_of(spec, model, known, frozen)
+        each = effects.of_springs(scene)
+        spec = with_effects_of(spec, model, [*known, *([each] if each else [])], frozen)
     base = first_fit(problem, spec)
     own = effects.of_runs(scene)
     everything = known = [c for c in (*known, *own) if c.effect not in spec.effects]
@@ -439,6 +440,8 @@ def _searched(
         fits = {}
     problem.learn_power(final.spec, final.values)
     hidden: list[unnamed.Hidden] = []
+    if not swapped and unexplained(problem, final):
+        found, (final, without, contenders) = _springs_apart(problem, found, final, without, contenders)
     if not swapped and unexplained(problem, final):
         found, (final, without, contenders), hidden = _where_something_is_left(
             problem, found, final, without, contenders, alike
@@ -584,7 +587,7 @@ def _listed(
                 certainty="certain" if probability >= CERTAIN else "probable",
                 witness=sure,
                 on_chip=effect in effects.ON_CHIP,
-                in_words=effects.IN_WORDS[effect],
+                in_words=effects.in_words(effect, variant),
                 text=effects.sentence(effect, parameters, variant),
                 variant=variant or results.UNSET,
             )
@@ -646,6 +649,42 @@ def identifiability_of(fit: Fit) -> results.Identifiability:
         at_bounds=fit.at_bounds(),
         correlated=[results.Correlation(a=a, b=b, correlation=r) for a, b, r in fit.correlations()],
     )
+
+
+def _springs_apart(
+    problem: Problem,
+    first: search.Search,
+    final: Fit,
+    without: dict[str, Fit],
+    contenders: list[tuple[str, Fit]],
+) -> tuple[search.Search, unnamed.Found]:
+    """Search again beside springs of which each is its own, as far apart as they are found, instead of one that is; as it was where
+    that is not likelier.
+
+    Laws of all springs come first: they stay as long as springs would have to lie further apart without.
+    """
+    plain = first, (final, without, contenders)
+    scene = scene_of(problem)
+    each = effects.of_springs(scene)
+    if each is None or each.effect in first.base.spec.effects:
+        return plain
+    first.progress("each spring by itself")
+    bare = first.reduced(final, each.effect) if each.effect in final.spec.effects else final
+    found = search.Search(problem, first.candidates, first.base, first.progress, first.fits)
+    fit = found.refit(bare, [each], [1.0])
+    if log_evidence(problem, fit, final) < search.TOLD_APART:
+        return plain
+    each = effects.of_springs(scene, runs_apart.springs_apart(fit, each))
+    found = search.Search(
+        problem,
+        [*first.candidates, each],
+        first.base,
+        first.progress,
+        {key: one for key, one in first.fits.items() if (each.effect, each.variant) not in key},
+    )
+    fit = found.refit(bare, [each], [1.0])
+    result = found.settle(found.forward(found.backward(fit)[0]), grow=False)
+    return (found, result) if log_evidence(problem, result[0], final) > 0.0 else plain
 
 
 def _where_something_is_left(

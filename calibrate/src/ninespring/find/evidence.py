@@ -26,9 +26,21 @@ WIDTHS = (4, 12, 40)
 
 def log_evidence(problem: Problem, better: Fit, other: Fit) -> float:
     """Return by how many nats the data prefer `better`: the difference of likelihoods, each with what it leaves taken for noise that
-    lasts as long as it does, less half the logarithm of the readings for each number more (BIC)."""
+    lasts as long as it does, and of what is believed of random effects, less half the logarithm of the readings for each number more
+    (BIC)."""
+    return likelihood(problem, better) - likelihood(problem, other) + relief(better, other)
+
+
+def relief(better: Fit, other: Fit) -> float:
+    """Return the nats for `better` that no reading tells: random effects that need not lie so far apart, less the price of its numbers."""
     k = len(better.spec.free) - len(better.stuck) - (len(other.spec.free) - len(other.stuck))
-    return likelihood(problem, better) - likelihood(problem, other) - 0.5 * k * math.log(max(2, better.count))
+    return strain(other) - strain(better) - 0.5 * k * math.log(max(2, better.count))
+
+
+def strain(fit: Fit) -> float:
+    """Return the nats by which an effect's numbers are less likely than those in the middle of what is believed of them."""
+    pairs = zip(fit.spec.free, fit.values, strict=True)
+    return sum(0.5 * (f.trust * (f.inner(v) - f.inner(f.start))) ** 2 for f, v in pairs if f.effect is not None)
 
 
 def likelihood(problem: Problem, fit: Fit) -> float:

@@ -16,6 +16,8 @@ from .certainty import CERTAIN, Witness
 
 ROUNDS = 3
 """Of fitting the runs' numbers and their spread in turn (expectation maximisation): more moves neither."""
+LEAST_APART = 0.01
+"""Part by which springs lie apart at least: none are made better."""
 
 
 def _own(fit: Fit, effect: str) -> tuple[list[int], np.ndarray]:
@@ -39,6 +41,14 @@ def spread_of(fit: Fit, effect: str) -> float:
     at, covariance = _own(fit, effect)
     z = np.array([fit.spec.free[k].inner(fit.values[k]) - fit.spec.free[k].inner(fit.spec.free[k].start) for k in at])
     return float(np.sqrt(np.mean(z**2 + np.diag(covariance))))
+
+
+def springs_apart(fit: Fit, each: effects.Candidate) -> dict[str, float]:
+    """Return how far springs lie apart in each of their numbers in a fit that has each its own, about their mean, in logarithms."""
+    z: dict[str, list[float]] = {}
+    for free in each.free:
+        z.setdefault(free.key.partition("[")[0], []).append(free.inner(fit.value(free.key)))
+    return {name: max(LEAST_APART, float(np.std(of_each, ddof=1))) for name, of_each in z.items()}
 
 
 def with_spread(problem: Problem, fit: Fit) -> Fit:

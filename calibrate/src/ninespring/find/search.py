@@ -19,7 +19,7 @@ from ..infer.problem import Problem
 from ..model import effects
 from ..model.effects import Candidate
 from ..model.spec import RUNS_OWN, Spec
-from .evidence import difference, excess, fit_factor, gain, log_evidence
+from .evidence import difference, excess, fit_factor, gain, log_evidence, relief
 from .screen import Screen
 
 MIN_EVIDENCE = 3.0
@@ -181,19 +181,17 @@ class Search:
         fixed = {free.effect for free in better.spec.free if free.key not in better.stuck}
         if any(effect not in fixed for effect in better.spec.effects if effect not in other.spec.effects):
             return False
+        price = self.price(added)
+        if log_evidence(self.problem, better, other) - price < MIN_EVIDENCE:
+            return False
+        if relief(better, other) - price >= MIN_EVIDENCE:
+            return True  # springs of their own would explain as much, and would have to lie further apart than they do
         if self.problem.colour is not None:
             # what is taken for noise that lasts may be any part of the error: what counts is that predictions change
-            return (
-                log_evidence(self.problem, better, other) - self.price(added) >= MIN_EVIDENCE
-                and difference(self.problem, better, other) >= MIN_GAIN
-            )
+            return difference(self.problem, better, other) >= MIN_GAIN
         beyond = excess(self.problem, other)
         explained = (other.sse - better.sse) / better.count
-        return (
-            log_evidence(self.problem, better, other) - self.price(added) >= MIN_EVIDENCE
-            and gain(better, other) >= MIN_GAIN
-            and explained >= share * beyond
-        )
+        return gain(better, other) >= MIN_GAIN and explained >= share * beyond
 
     def preferred(self, one: Fit, other: Fit) -> bool:
         """Return whether `one` takes the place of `other`, which has as many effects.
@@ -383,12 +381,16 @@ class Search:
 
         Return the fit that stays, the fits without each effect, and the contenders.
         """
+        before: tuple[Fit, dict[str, Fit], list[tuple[str, Fit]]] | None = None
         for turn in range(4):
             fit, without = self.backward(fit, share)
+            if before is not None and set(fit.spec.effects) < set(before[0].spec.effects):
+                return before  # what took a place did not stay: it is no better there
             contenders = self.rivals(fit, without)
             better = [(other.chi2, k) for k, (_, other) in enumerate(contenders) if self.preferred(other, fit)]
             if turn == 3 or not better:
                 break
+            before = fit, without, contenders
             fit = contenders[min(better)[1]][1]
             if grow:
                 fit = self.forward(fit)

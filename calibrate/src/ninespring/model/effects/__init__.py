@@ -9,10 +9,11 @@ from __future__ import annotations
 import functools
 import importlib
 import pkgutil
+from collections.abc import Mapping
 
 from ...io.results import Parameters
 from .. import native, tables
-from . import runs_differ
+from . import runs_differ, spring_mismatch
 from .effect import Candidate as Candidate
 from .effect import Effect as Effect
 from .effect import Scene as Scene
@@ -23,6 +24,12 @@ MEASUREMENT = frozenset(name for name, row in tables.effects().items() if row.ac
 WHY_NOT_ON_CHIP = {name: row.not_on_chip for name, row in tables.effects().items() if row.not_on_chip}
 ON_CHIP = frozenset(tables.effects()) - set(WHY_NOT_ON_CHIP)
 """What the table of effects (lib/parameters/effects.def) says of each: its sentence, where it acts, why not on the chip."""
+
+
+def in_words(name: str, variant: str = "") -> str:
+    """Return what an effect is, in words."""
+    each = name == spring_mismatch.NAME and variant == spring_mismatch.EACH
+    return spring_mismatch.EACH_IN_WORDS if each else IN_WORDS[name]
 
 
 @functools.cache
@@ -46,3 +53,8 @@ def candidates(scene: Scene) -> list[Candidate]:
 def of_runs(scene: Scene) -> list[Candidate]:
     """Return what may be a run's own, and not the array's, in logs."""
     return runs_differ.candidates(scene)
+
+
+def of_springs(scene: Scene, apart: Mapping[str, float] | None = None) -> Candidate | None:
+    """Return how each spring may differ from what is the array's, None where there is one; as far as is known of each number."""
+    return spring_mismatch.each_its_own(scene, apart)
