@@ -13,7 +13,7 @@ from ..errors import InputError, WorkError
 from ..io import history, ranges, results
 from ..io.board import Board, read_settings
 from ..io.logs import read_text
-from ..io.recording import LogFile, Recording, about, script_lines, told_to_stop
+from ..io.recording import LogFile, about, script_lines, told_to_stop
 from ..io.recording import record as record_board
 from ..io.tape import record_tape
 from ..io.thermometers import measuring
@@ -70,7 +70,6 @@ def record(
     steps = script_lines(read_text(script), str(script), duration) if script else []
     if script and not steps:
         raise InputError("no step in it", script)
-    got = Recording()
     with told_to_stop(last=True) as stopped:
         with (
             working(f"recording from {port}", duration) as say,
@@ -81,7 +80,7 @@ def record(
             alarm = lambda fault: err.print(f"fault {fault}", style="bold red")  # noqa: E731
             tell = lambda rows, seconds: say(f"{rows} rows", seconds)  # noqa: E731
             if tape:
-                got.ended = record_tape(board, log, duration, steps, tell, about(port), err.print)
+                got = record_tape(board, log, duration, steps, tell, about(port), err.print)
             else:
                 got = record_board(board, log, hz, duration, steps, tell, about(port), logger, alarm, err.print)
         if not log.rows:

@@ -78,6 +78,8 @@ class Recording:
     ended: str = ""
     """Why it ended early, or drove less than it was asked to, where that was nobody's wish."""
     faults: list[Fault] = field(default_factory=list)
+    latched: list[str] = field(default_factory=list)
+    """What the board still had when all was off, in its words."""
 
 
 class FaultWatch:
@@ -338,7 +340,6 @@ def record(
     reading after it has come.
     """
     got = Recording()
-    answers = False
     finer_hz = max(hz, min(FINER * hz, FINEST_HZ))
     sink = RowSink(log, thermometers, 1.0 / hz if finer_hz > hz else 0.0)
 
@@ -353,21 +354,17 @@ def record(
 
     watch = FaultWatch(board, got.faults, note)
     before: list[str] = []
-    try:
-        before = _head(board, log, steps, keys or {}, send)
+    with switched_off_after(board, got):
+        for step in steps:
+            if step.at_s is None:
+                send(step)
+        board.guard(write_head(board, log, keys or {}))
+        before = board.ask("faults")
         _rows(board, finer_hz, duration_s, steps, got, say, sink, watch, send)
-    except KeyboardInterrupt:
-        pass
-    except WorkError as error:
-        got.ended = str(error)
-    finally:
-        answers, got.ended = end_safely(board, got.ended)
-    latched: list[str] = []
     with contextlib.suppress(WorkError):
         sink.flush()
-        latched = board.ask("faults") if answers else []
         watch.latched |= set(before)
-        watch.take(latched, None)
+        watch.take(got.latched, None)
     if got.faults:
         more = f" and {len(got.faults) - 1} more" if len(got.faults) > 1 else ""
         got.ended = f"a fault cut this run short, {got.faults[0]}{more}" + (f"; {got.ended}" if got.ended else "")
@@ -379,10 +376,7 @@ def record(
             got.ended = got.ended or thermometers.trouble
         if got.dropped:
             log.write(f"# dropped_lines: {got.dropped}")
-        if got.ended:
-            log.write(f"# ended: {got.ended}")
-        for line in latched:
-            log.write(f"# latched at the end: {line}")
+        write_end(log, got)
     return got
 
 
@@ -484,22 +478,22 @@ def mean_row(names: Sequence[str], first: str, rows: Sequence[str]) -> str:
     return ",".join(out)
 
 
-def end_safely(board: Board, ended: str) -> tuple[bool, str]:
-    """Switch all off. Return whether the board confirms it, and why a recording ended: that it does not is said there, too."""
-    if board.make_safe():
-        return True, ended
-    ended = ended or f"{board.port}: the board does not answer"
-    return False, f"{ended}; the springs could not be switched off from here: cut their supply"
-
-
-def _head(
-    board: Board, log: LogFile, steps: Sequence[Step], keys: Mapping[str, str], send: Callable[[Step], None]
-) -> list[str]:
-    for step in steps:
-        if step.at_s is None:
-            send(step)
-    board.guard(write_head(board, log, keys))
-    return board.ask("faults")
+@contextlib.contextmanager
+def switched_off_after(board: Board, got: Recording) -> Iterator[None]:
+    """Switch all off when the block ends, whatever ends it; `got` has why, and what is latched then."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        pass
+    except WorkError as error:
+        got.ended = str(error)
+    finally:
+        if board.make_safe():
+            with contextlib.suppress(WorkError):
+                got.latched = board.ask("faults")
+        else:
+            got.ended = got.ended or f"{board.port}: the board does not answer"
+            got.ended += "; the springs could not be switched off from here: cut their supply"
 
 
 def about(port: str, by: str = "") -> dict[str, str]:
@@ -520,6 +514,14 @@ def write_head(board: Board, log: LogFile, keys: Mapping[str, str]) -> dict[str,
     for name, value in settings.items():
         log.write(f"# ${name}={value}")
     return settings
+
+
+def write_end(log: LogFile, got: Recording) -> None:
+    """Write, as comments, why a log ended and what the board had latched then."""
+    if got.ended:
+        log.write(f"# ended: {got.ended}")
+    for line in got.latched:
+        log.write(f"# latched at the end: {line}")
 
 
 def _rows(

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 from ..errors import RefusedError, WorkError
 from .board import Board
-from .recording import SILENT_S, LogFile, Step, end_safely, write_head
+from .recording import SILENT_S, LogFile, Recording, Step, switched_off_after, write_end, write_head
 
 TICK_S = 0.02
 COUNTED = 1 << 16
@@ -22,34 +22,22 @@ def record_tape(
     say: Callable[[int, float], None] = lambda ticks, seconds: None,
     keys: Mapping[str, str] | None = None,
     remark: Callable[[str], None] = lambda words: None,
-) -> str:
-    """Record so many seconds by the board's clock; return why it ended early, where that was no wish.
+) -> Recording:
+    """Record so many seconds by the board's clock.
 
     The board begins anew: what it knows of its springs it forgets, but for what it has learnt of them. Steps without a time
     are sent when the tape has begun. Whatever ends it, the springs are off afterwards.
     """
-    ended = ""
-    latched: list[str] = []
-    try:
-        board.guard(board.settings())
-        write_head(board, log, keys or {})
-        board.ask("telemetry inputs", 10.0)
-        ended = _ticks(board, log, duration_s, list(steps), say, remark)
-    except KeyboardInterrupt:
-        pass
-    except RefusedError as error:
-        ended = f"{error}; a tape begins with all springs off and no fault"
-    except WorkError as error:
-        ended = str(error)
-    finally:
-        answers, ended = end_safely(board, ended)
-        if answers:
-            latched = board.ask("faults")
-    for line in latched:
-        log.write(f"# latched at the end: {line}")
-    if ended:
-        log.write(f"# ended: {ended}")
-    return ended
+    got = Recording()
+    with switched_off_after(board, got):
+        board.guard(write_head(board, log, keys or {}))
+        try:
+            board.ask("telemetry inputs", 10.0)
+        except RefusedError as error:
+            raise WorkError(f"{error}; a tape begins with all springs off and no fault") from None
+        got.ended = _ticks(board, log, duration_s, list(steps), say, remark)
+    write_end(log, got)
+    return got
 
 
 def _ticks(
