@@ -129,7 +129,7 @@ def test_an_effect_found_in_a_log_is_in_the_model_of_the_chip_that_it_was_upload
     (tmp_path / "steps.txt").write_text("policy open\nmodel cold\nat 2 = pattern 111101111\nat 45 = off all\n")
     record = ("record", "--port", board, "--hz", 2, "--duration", 60, "--run", tmp_path / "steps.txt")
     ninespring(*record, "-o", tmp_path / "board.csv")
-    got = read_table(tmp_path / "board.csv", ("state",)).frame
+    got = read_table(tmp_path / "board.csv").frame
     assert len(got) > 15
     assert read_log(tmp_path / "board.csv", 9, temperatures=False).current_a is not None
     run(SIM, "replay", tmp_path / "board.csv", "--model", model, "-o", tmp_path / "again.csv")

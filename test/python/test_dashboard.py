@@ -263,7 +263,7 @@ def test_a_lost_port_comes_back_without_a_reload(browser: Browser, tmp_path: Pat
         expect(page.locator("#trouble")).to_contain_text("Since then")  # how it was lost stays, while it is looked for
         expect(page.locator("#trouble")).to_contain_text("went away")
         (log,) = tmp_path.glob("*.csv")
-        assert len(read_table(log, ("state",)).frame) >= 10
+        assert len(read_table(log).frame) >= 10
         second = FakeBoard(stream=(row(0.1 * k) for k in range(10, 9999)), every_s=0.1)
         (tmp_path / "port").unlink()
         (tmp_path / "port").symlink_to(second.port)
@@ -660,7 +660,7 @@ def test_a_full_disk_ends_the_recording_and_nothing_else(small_disk: Path) -> No
         awaited(socket, lambda now: now.get("time_s", 0.0) > state["time_s"])  # the array is shown as before
     (log,) = small_disk.iterdir()
     assert log.suffix == ".csv" and log.read_text().endswith("\n")
-    assert len(read_table(log, ("state",)).frame) > 50
+    assert len(read_table(log).frame) > 50
 
 
 def test_a_stop_that_drops_what_is_being_answered_loses_no_board(tmp_path: Path) -> None:

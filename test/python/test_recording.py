@@ -45,7 +45,7 @@ def record(board: FakeBoard, folder: Path, *more: object) -> subprocess.Complete
 
 
 def times(log: Path) -> list[float]:
-    return read_table(log, ("state",)).frame["time_s"].tolist()
+    return read_table(log).frame["time_s"].tolist()
 
 
 def assert_off(board: FakeBoard) -> None:
@@ -582,7 +582,7 @@ def test_thermometers_are_merged_onto_the_boards_clock_and_the_offset_is_said(tm
     done = record(board, tmp_path, "--duration", 5, "--thermometers", logger.port)
     logger.gone = True
     assert done.returncode == 0, done.stderr
-    frame = read_table(tmp_path / "log.csv", ("state",)).frame
+    frame = read_table(tmp_path / "log.csv").frame
     assert "t9_c" not in frame
     left = (frame["t1_c"] - 20.0) - (frame["time_s"] - board_s)
     assert frame["t1_c"].notna().sum() >= len(frame) - 2
@@ -628,7 +628,7 @@ def test_a_rows_inputs_are_their_means_until_the_next_row(tmp_path: Path) -> Non
     done = record(board, tmp_path, "--duration", 3)
     assert done.returncode == 0, done.stderr
     assert "telemetry csv 20" in board.sent()
-    frame = read_table(tmp_path / "log.csv", ("state",)).frame
+    frame = read_table(tmp_path / "log.csv").frame
     assert frame["time_s"].tolist() == pytest.approx(np.arange(0.05, 3.1, 0.5))
     # first read at 1.75 s, so on since 1.70 s: in the row of 1.55 s for 0.35 of 0.5 s, as mean current and as mean power
     assert frame["i1_a"].tolist() == pytest.approx([0, 0, 0, 1.4, 2, 2, 2], abs=1e-3)

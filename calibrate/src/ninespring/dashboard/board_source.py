@@ -18,7 +18,7 @@ from typing import Any
 from ..errors import InputError, RefusedError, WorkError
 from ..io import words
 from ..io.belief import beliefs
-from ..io.board import PATIENCE, SIMULATED, Board, reading, shape_of
+from ..io.board import PATIENCE, SIMULATED, Board, reading, shape_of, springs_in
 from ..io.port import pseudo_terminal
 from ..io.recording import SILENT_S, LogFile, Row, RowCheck, RowSink, about, write_head
 from ..io.thermometers import Thermometers
@@ -224,7 +224,7 @@ class BoardSource(Source):
             self._thermometers = Thermometers(logger)
         self._names = names = board.telemetry(self._hz)
         self._check = RowCheck(names, self._hz)
-        springs = sum(re.fullmatch(r"i\d+_a", name) is not None for name in names)
+        springs = springs_in(names)
         rows, columns = shape_of(self._settings, springs)
         self._change(
             connected=True,
@@ -245,7 +245,6 @@ class BoardSource(Source):
             measured_c=[None] * springs,
             sights=[0] * springs,
             faults=[],
-            policy="precompensate" if self._settings.get("policy") == "1" else "open",
         )
         self._board = board
         heard_s = look_s = time.monotonic()

@@ -420,10 +420,15 @@ class Board:
         raise WorkError(f"{self.port}: no telemetry came")
 
 
+def springs_in(names: Iterable[str]) -> int:
+    """Return of how many springs columns of telemetry are."""
+    return sum(re.fullmatch(r"i\d+_a", name) is not None for name in names)
+
+
 def telemetry_names(header: str) -> list[str] | None:
     """Return the columns of a telemetry header, None where it is none or corrupt."""
     names = header.split(",")
-    springs = sum(re.fullmatch(r"i\d+_a", name) is not None for name in names)
+    springs = springs_in(names)
     wanted = {"time_s", *(f"i{k}_a" for k in range(1, springs + 1))}
     whole = all(COLUMN.match(name) or EXTRA.match(name) for name in names) and len(set(names)) == len(names)
     return names if springs and whole and wanted <= set(names) else None
@@ -458,7 +463,7 @@ def to_pandas(readings: Iterable[Reading]) -> pd.DataFrame:
 
 def reading(cells: Mapping[str, str], believed: Mapping[int, Belief] | None = None) -> Reading:
     """Return a row of telemetry, and what is believed beside it, as numbers; ValueError where it is none."""
-    springs = range(1, 1 + sum(re.fullmatch(r"i\d+_a", name) is not None for name in cells))
+    springs = range(1, 1 + springs_in(cells))
 
     def of_each(name: str) -> np.ndarray:
         if name in BELIEVED:

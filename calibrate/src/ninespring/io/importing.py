@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 
 from ..errors import InputError
-from .logs import COLUMN, LIMITS, MAX_SPRINGS, log_text, read_bytes, read_table, read_text
+from .logs import COLUMN, LIMITS, MAX_SPRINGS, log_text, number_in, read_bytes, read_table, read_text
 from .toml_file import At, TomlFile
 
 UNITS: dict[str, tuple[float, float]] = {
@@ -245,19 +245,12 @@ def frames_of(path: str | Path) -> tuple[int, Iterator[np.ndarray]]:
         files = sorted(path.glob("*.csv"))
         if not files:
             raise InputError("no .csv frame in this folder", path)
-
-        def read() -> Iterator[np.ndarray]:
-            for file in files:
-                yield _read_frame(file)
-
-        return len(files), read()
-    if path.suffix in (".npy", ".npz"):
+        return len(files), map(_read_frame, files)
+    if path.suffix == ".npy":
         try:
-            data = np.load(path, mmap_mode="r" if path.suffix == ".npy" else None)
+            data = np.load(path, mmap_mode="r")
         except (OSError, ValueError) as error:
             raise InputError(f"not a NumPy array: {error}", path) from None
-        if path.suffix == ".npz":
-            data = data[data.files[0]]
         if data.ndim == 2:
             data = data[None]
         if data.ndim != 3 or not np.issubdtype(data.dtype, np.number):
@@ -296,11 +289,8 @@ def read_times(path: str | Path) -> np.ndarray:
         text = raw.partition("#")[0].strip()
         if not text:
             continue
-        try:
-            value = float(text)
-        except ValueError:
-            value = math.nan
-        if not math.isfinite(value):
+        value = number_in(text)
+        if value is None:
             raise InputError(f"'{text[:20]}' is not a time in s", path, number, 1)
         if out and value <= out[-1]:
             raise InputError(f"{value:g} s after {out[-1]:g} s: times must rise strictly", path, number, 1)

@@ -8,7 +8,6 @@ by the same step each time is a clock, no temperature does that; the other colum
 
 from __future__ import annotations
 
-import math
 import re
 import statistics
 import threading
@@ -18,7 +17,7 @@ from collections.abc import Iterator
 from contextlib import closing, contextmanager
 
 from ..errors import WorkError
-from .logs import LIMITS
+from .logs import LIMITS, number_in
 from .port import Port
 
 FOUND_WITHIN_S = 5.0
@@ -51,7 +50,7 @@ class Lines:
         if line.startswith("#") or not line.strip():
             return None
         self.heard += 1
-        numbers = [_number(cell) for cell in cells]
+        numbers = [number_in(cell) for cell in cells]
         if all(one is None for one in numbers):
             self._header(cells)
             return None
@@ -90,14 +89,6 @@ class Lines:
         if any(springs):
             self.springs = springs
             self.clock = next((k for k, cell in enumerate(cells) if cell.lower().startswith("time")), None)
-
-
-def _number(cell: str) -> float | None:
-    try:
-        value = float(cell)
-    except ValueError:
-        return None
-    return value if math.isfinite(value) else None
 
 
 class Thermometers:

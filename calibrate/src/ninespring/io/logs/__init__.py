@@ -10,6 +10,7 @@ from .log import read_log as read_log
 from .run import DriveMode as DriveMode
 from .run import Run as Run
 from .table import Table as Table
+from .table import number_in as number_in
 from .table import read_table as read_table
 from .writing import check_folder as check_folder
 from .writing import kind_of as kind_of

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 import re
 from collections.abc import Iterable
 from pathlib import Path
@@ -126,7 +127,7 @@ class Table:
         """Return the names of a header and the column at which each begins."""
         cells = header.split(",")
         names = [cell.strip() for cell in cells]
-        if all(map(_is_number, names)):
+        if all(number_in(name) is not None for name in names):
             said = "the first line holds numbers: begin the file with a line of column names (time_s,i1_a,t1_c,...)"
             raise self.refuse(said, self.header_line, 1)
         starts = [1 + sum(len(cell) + 1 for cell in cells[:k]) for k in range(len(cells))]
@@ -168,7 +169,7 @@ class Table:
                 return self.refuse(said, self._numbers[row], 1)
             for name, cell in zip(self.names, line.split(","), strict=True):
                 value = cell.strip()
-                if name in words or not value or (_is_number(value) and np.isfinite(float(value)) and "_" not in value):
+                if name in words or not value or (number_in(value) is not None and "_" not in value):
                     continue
                 advice = "leave the cell empty if not measured"
                 if re.fullmatch(r"[ivuf][0-9].*|fan", name):
@@ -185,9 +186,10 @@ def read_table(path: str | Path, text_columns: Iterable[str] = ()) -> Table:
     return Table(path).read_rows(text_columns)
 
 
-def _is_number(text: str) -> bool:
+def number_in(text: str) -> float | None:
+    """Return the finite number that a text is, None where it is none."""
     try:
-        float(text)
+        value = float(text)
     except ValueError:
-        return False
-    return True
+        return None
+    return value if math.isfinite(value) else None
