@@ -43,6 +43,45 @@ def test_a_function_refuses_what_its_option_refuses(bad: object) -> None:
         ranges.PLAN_S.check("duration_s", bad)
 
 
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("nonsense", "No such command"),
+        ("fit", "Missing argument"),
+        ("fit no-such.csv -o m.toml", "no-such.csv: cannot be read"),
+        ("diagnose no-such.csv -o out --frozen", "--frozen needs --model"),
+        ("export --model no-such.toml -o s.txt", "no-such.toml: cannot be read"),
+        ("record --port /dev/x --thermometers /dev/../dev/x -o x.csv", "that is the board's port"),
+        ("record --port x --tape --hz 5 -o day.tape", "leave out --hz"),
+        ("upload --port x", "either a file of settings or --undo"),
+        ("upload --port x --undo s.txt", "either a file of settings or --undo"),
+        ("settings diff a.txt", "give two files"),
+        ("bringup --port /dev/null -o b.html", "give --yes"),
+        ("console", "give --port, or --simulate"),
+        ("dashboard", "give one of --port, --simulate, --replay"),
+        ("dashboard --simulate --port x", "give one of --port, --simulate, --replay"),
+        ("dashboard --simulate --listen here", "not HOST:PORT"),
+        ("dashboard --replay no-such.csv", "no-such.csv: cannot be read"),
+        ("calibrate", "give --port, or --simulate"),
+        ("calibrate --port /dev/x --simulate", "give --port, or --simulate"),
+        ("calibrate --port /dev/x", "--thermometers is missing"),
+        ("calibrate --port /dev/x --thermometers /dev/x", "a logger has its own"),
+        ("calibrate --simulate --thermometers /dev/x", "goes with --port"),
+        ("calibrate --simulate", "give --yes"),
+        ("calibrate --simulate --yes --duration 10", "300<=x"),
+        ("calibrate --simulate --yes --pattern 111", "pattern has 3 digits for 9 springs"),
+    ],
+)
+def test_arguments_that_do_not_go_together_are_refused_in_one_line_before_any_work(
+    words: str, said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    done = ninespring(*words.split())
+    assert done.returncode == 2 and said in done.stderr, done
+    assert len(done.stderr.strip().splitlines()) == 1
+    assert list(tmp_path.iterdir()) == []
+
+
 @pytest.fixture
 def derived(make_log, tmp_path: Path) -> dict[str, list[str]]:
     """Return, per command that derives a file, its words without the output."""

@@ -9,7 +9,6 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from command import ended
 from made import ELF, SIM, needs_board
 from ninespring.errors import InputError
 from ninespring.io import bringup
@@ -183,12 +182,6 @@ def test_from_nothing_to_nine_springs(bench: Make, tmp_path: Path) -> None:
 def test_a_word_that_is_no_wiring_is_refused(words: list[str], said: str) -> None:
     done = subprocess.run([str(SIM), "board", "--elf", str(ELF), *words], capture_output=True, text=True, check=False)
     assert done.returncode == 2 and said in done.stderr, done
-
-
-def test_nobody_who_could_answer_is_said(tmp_path: Path) -> None:
-    code, said = ended("bringup", "--port", "/dev/null", "-o", tmp_path / "b.html")
-    assert code == 2 and "--yes" in said
-    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize(

@@ -123,24 +123,6 @@ def test_a_board_learns_its_array_in_one_command_that_is_stopped_and_killed_on_t
 # ---- what is refused before anything is done
 
 
-@pytest.mark.parametrize(
-    ("words", "says"),
-    [
-        ((), "give --port, or --simulate"),
-        (("--port", "/dev/x", "--simulate"), "give --port, or --simulate"),
-        (("--port", "/dev/x"), "--thermometers is missing"),
-        (("--port", "/dev/x", "--thermometers", "/dev/x"), "a logger has its own"),
-        (("--simulate", "--thermometers", "/dev/x"), "goes with --port"),
-        (("--simulate",), "give --yes"),
-        (("--simulate", "--yes", "--duration", "10"), "300<=x"),
-        (("--simulate", "--yes", "--pattern", "111"), "pattern has 3 digits for 9 springs"),
-    ],
-)
-def test_what_cannot_be_done_is_said_before_anything_is(words: tuple[str, ...], says: str, tmp_path: Path) -> None:
-    assert says in refused(*words, "-o", tmp_path / "c")
-    assert not (tmp_path / "c").exists()
-
-
 def test_a_folder_with_something_else_in_it_is_left_alone(tmp_path: Path) -> None:
     (tmp_path / "mine.txt").write_text("mine")
     assert "no calibration was begun in it" in refused("--simulate", "--yes", "-o", tmp_path)

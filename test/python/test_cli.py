@@ -260,26 +260,6 @@ def test_help_says_what_it_does_with_an_example(command: str) -> None:
         assert re.search(r"  +\S.*\w", line.lstrip().partition("  ")[1] + line.lstrip().partition("  ")[2]), line
 
 
-@pytest.mark.parametrize(
-    "arguments",
-    [
-        ("fit", "no-such.csv", "-o", "m.toml"),
-        ("fit",),
-        ("diagnose", "no-such.csv", "-o", "out", "--frozen"),
-        ("export", "--model", "no-such.toml", "-o", "s.txt"),
-        ("nonsense",),
-    ],
-)
-def test_wrong_input_ends_with_two_and_one_line(
-    arguments: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    done = ninespring(*arguments)
-    assert done.returncode == 2
-    assert len(done.stderr.strip().splitlines()) == 1
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_a_bad_log_leaves_nothing_half_written(make_log, tmp_path: Path) -> None:
     log = make_log()
     log.write_text(log.read_text()[:5000].rsplit(",", 3)[0] + "\n")

@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from command import ninespring, process
+from command import process
 from fake_board import FakeBoard, row
 from made import ROOT, needs_board
 from ninespring.dashboard import server, source
@@ -742,15 +742,6 @@ def test_what_hinders_is_said_in_the_terminal_too(tmp_path: Path) -> None:
         running.send_signal(signal.SIGINT)
     assert "no: cannot be opened (No such file or directory)" in said
     assert running.returncode == 0
-
-
-@pytest.mark.parametrize(
-    "arguments", [(), ("--simulate", "--port", "x"), ("--simulate", "--listen", "here"), ("--replay", "no-such.csv")]
-)
-def test_arguments_that_do_not_go_together_are_refused(arguments: tuple[str, ...]) -> None:
-    done = ninespring("dashboard", *arguments)
-    assert done.returncode == 2
-    assert len(done.stderr.strip().splitlines()) == 1
 
 
 def test_an_hour_is_kept_every_row_for_ten_minutes_and_one_a_second_before() -> None:

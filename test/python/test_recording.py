@@ -44,6 +44,13 @@ def record(board: FakeBoard, folder: Path, *more: object) -> subprocess.Complete
     return ninespring("record", "--port", board.port, "--hz", 2, "-o", folder / "log.csv", *more)
 
 
+def recorded(board: FakeBoard, folder: Path, *more: object) -> Path:
+    """Return the log of a recording that ended well."""
+    done = record(board, folder, *more)
+    assert done.returncode == 0, done.stderr
+    return folder / "log.csv"
+
+
 def times(log: Path) -> list[float]:
     return read_table(log).frame["time_s"].tolist()
 
@@ -56,16 +63,15 @@ def assert_off(board: FakeBoard) -> None:
 def test_the_log_says_what_board_it_was_and_how_it_was_set(tmp_path: Path) -> None:
     board = FakeBoard({"faults": ["board: fault 13 emergency_stop", "ok"]}, STREAM)
     board.settings = {"loss_w_per_k": "0.005800", "rows": "1"}
-    done = record(board, tmp_path, "--duration", 3)
-    assert done.returncode == 0, done.stderr
-    text = (tmp_path / "log.csv").read_text()
+    log = recorded(board, tmp_path, "--duration", 3)
+    text = log.read_text()
     head = text[: text.index(TELEMETRY)].splitlines()
     assert "# version: ninespring 9.9.9 mega2560, sensors fake" in head
     assert "# fault: board: fault 13 emergency_stop" in head
     assert "# $loss_w_per_k=0.005800" in head and "# $rows=1" in head
     assert text.endswith("# latched at the end: board: fault 13 emergency_stop\n")
-    assert times(tmp_path / "log.csv") == [0.5 * k for k in range(1, 8)]
-    assert read_log(tmp_path / "log.csv", 1, temperatures=False).current_a is not None
+    assert times(log) == [0.5 * k for k in range(1, 8)]
+    assert read_log(log, 1, temperatures=False).current_a is not None
     assert_off(board)
 
 
@@ -172,11 +178,10 @@ CORRUPT = [
 @pytest.mark.parametrize("bad", CORRUPT)
 def test_a_corrupt_line_is_dropped_and_counted_and_the_log_is_readable(tmp_path: Path, bad: str) -> None:
     board = FakeBoard(stream=[*STREAM[:3], bad, *STREAM[4:8]])
-    done = record(board, tmp_path, "--duration", 3)
-    assert done.returncode == 0, done.stderr
-    assert "# dropped_lines: 1" in (tmp_path / "log.csv").read_text()
-    assert times(tmp_path / "log.csv") == [0.5, 1.0, 1.5, 2.5, 3.0, 3.5]
-    read_log(tmp_path / "log.csv", 1, temperatures=False)
+    log = recorded(board, tmp_path, "--duration", 3)
+    assert "# dropped_lines: 1" in log.read_text()
+    assert times(log) == [0.5, 1.0, 1.5, 2.5, 3.0, 3.5]
+    read_log(log, 1, temperatures=False)
 
 
 @example(7, 0, "5")  # it follows, so that what is true afterwards does not
@@ -220,9 +225,8 @@ def test_steps_are_sent_in_their_time_and_status_is_kept_between_the_rows(tmp_pa
     status = "<limits|spring:1|t:8.000|supply|cut_a:2.610>"
     board = FakeBoard(stream=[*STREAM[:3], status, *STREAM[3:8]])
     (tmp_path / "steps.txt").write_text("ambient 21.5\nat 0.5 = on 1   ; the first\nat 1.5 = fan 100\n")
-    done = record(board, tmp_path, "--duration", 3, "--run", tmp_path / "steps.txt")
-    assert done.returncode == 0, done.stderr
-    lines = (tmp_path / "log.csv").read_text().splitlines()
+    log = recorded(board, tmp_path, "--duration", 3, "--run", tmp_path / "steps.txt")
+    lines = log.read_text().splitlines()
     at = lines.index(f"# {status}")
     assert lines[at - 1 : at + 2] == [row(1.5), f"# {status}", row(2.0)]
     sent = board.sent()
@@ -240,26 +244,21 @@ def test_a_step_that_the_board_refuses_ends_the_recording(tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize(
-    ("text", "line"),
+    ("text", "said"),
     [
-        ("at 5 pattern 1\n", 1),
-        ("on 1\nat 5 = on 2\non 3\n", 3),
-        ("at 5 = on 1\nat 4 = on 2\n", 2),
-        ("fan ä\n", 1),
-        ("at 5 = on 1\nat 900 = off all\n", 2),
+        ("at 5 pattern 1\n", ":1:1: "),
+        ("on 1\nat 5 = on 2\non 3\n", ":3:1: "),
+        ("at 5 = on 1\nat 4 = on 2\n", ":2:1: "),
+        ("fan ä\n", ":1:1: "),
+        ("at 5 = on 1\nat 900 = off all\n", ":2:1: "),
+        ("# later\n", ": no step in it\n"),
     ],
 )
-def test_a_wrong_script_is_refused_with_its_line(tmp_path: Path, text: str, line: int) -> None:
+def test_a_wrong_script_is_refused_with_its_line(tmp_path: Path, text: str, said: str) -> None:
     (tmp_path / "steps.txt").write_text(text)
     done = ninespring("record", "--port", "x", "--run", tmp_path / "steps.txt", "-o", tmp_path / "x.csv")
     assert done.returncode == 2
-    assert done.stderr.startswith(f"ninespring: {tmp_path / 'steps.txt'}:{line}:1: ")
-
-
-def test_a_script_without_a_step_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "steps.txt").write_text("# later\n")
-    done = ninespring("record", "--port", "x", "--run", tmp_path / "steps.txt", "-o", tmp_path / "x.csv")
-    assert (done.returncode, done.stderr) == (2, f"ninespring: {tmp_path / 'steps.txt'}: no step in it\n")
+    assert done.stderr.startswith(f"ninespring: {tmp_path / 'steps.txt'}{said}")
 
 
 def test_the_example_in_its_help_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -465,12 +464,6 @@ def test_a_port_that_is_not_there_or_is_none_is_said(tmp_path: Path) -> None:
     assert [one.name for one in tmp_path.iterdir()] == ["file"]
 
 
-def test_thermometers_at_the_boards_own_port_are_refused(tmp_path: Path) -> None:
-    done = ninespring("record", "--port", "/dev/x", "--thermometers", "/dev/../dev/x", "-o", tmp_path / "x.csv")
-    assert done.returncode == 2
-    assert "that is the board's port" in done.stderr
-
-
 def test_a_port_that_is_not_this_users_says_how_to_be_allowed(monkeypatch: pytest.MonkeyPatch) -> None:
     def refused(*arguments: object, **more: object) -> None:
         raise serial.SerialException(errno.EACCES, "could not open port")
@@ -490,48 +483,6 @@ def test_telemetry_left_on_by_someone_else_does_not_confuse(tmp_path: Path) -> N
         assert found.version[0].startswith("ninespring 9.9.9")
         board.settings = {"rows": "1"}
         assert found.settings() == {"rows": "1"}
-
-
-# upload
-
-
-def test_upload_sends_settings_reads_them_back_and_saves(tmp_path: Path) -> None:
-    board = FakeBoard()
-    (tmp_path / "s.txt").write_text("# from model.toml\n$latent_heat_j=8.000\n$loss_w_per_k=0.005800\n")
-    done = ninespring("upload", "--port", board.port, tmp_path / "s.txt", "--json", tmp_path / "u.json")
-    assert done.returncode == 0, done.stderr
-    lines = ["learnt clear", "$latent_heat_j=8.000", "$loss_w_per_k=0.005800", "$$", "$save"]
-    assert board.sent()[-5:] == lines
-    assert json.loads((tmp_path / "u.json").read_text())["settings"] == 2
-
-
-@pytest.mark.parametrize(
-    ("answers", "said"),
-    [
-        ({"learnt clear": ["error:12 a spring is on"]}, "a spring is on"),
-        ({"$loss_w_per_k=9": ["error:4 out of range"]}, "error 4 out of range"),
-        ({"$loss_w_per_k=9": ["[not active yet: x]", "ok"]}, "not active yet"),
-        ({"$$": ["$loss_w_per_k=0.005800", "ok"]}, "loss_w_per_k is 0.005800, not 9"),
-        ({"$$": ["ok"]}, "loss_w_per_k is missing"),
-    ],
-)
-def test_what_the_board_does_not_take_is_said_and_nothing_saved(
-    tmp_path: Path, answers: dict[str, list[str]], said: str
-) -> None:
-    board = FakeBoard(answers)
-    (tmp_path / "s.txt").write_text("$loss_w_per_k=9\n")
-    done = ninespring("upload", "--port", board.port, tmp_path / "s.txt")
-    assert done.returncode == 1
-    assert said in done.stderr
-    assert "$save" not in board.seen
-
-
-@pytest.mark.parametrize("text", ["", "# nothing\n", "loss_w_per_k=1\n", "$loss=1;$save\n", "$x=nan\n", "$ä=1\n"])
-def test_a_file_that_is_no_settings_is_refused_before_the_board_is_asked(tmp_path: Path, text: str) -> None:
-    (tmp_path / "s.txt").write_text(text)
-    done = ninespring("upload", "--port", "/dev/no-such-port", tmp_path / "s.txt")
-    assert done.returncode == 2
-    assert done.stderr.startswith(f"ninespring: {tmp_path / 's.txt'}")
 
 
 def test_scripts_take_comments_and_units_as_scenarios_do() -> None:
@@ -589,7 +540,6 @@ def test_thermometers_are_merged_onto_the_boards_clock_and_the_offset_is_said(tm
     assert left.abs().max() < 0.35
     offset = float(re.search(r"thermometers_offset_s: (.*)", (tmp_path / "log.csv").read_text())[1])
     assert offset == pytest.approx(board_s - logger_s, abs=0.3)
-    assert "the thermometers' clock was" in done.stdout
 
 
 def test_a_port_without_thermometers_is_said_before_anything_is_driven(
@@ -625,10 +575,9 @@ def test_a_rows_inputs_are_their_means_until_the_next_row(tmp_path: Path) -> Non
         f"{0.05 * k:.2f},{0.0 if k < 35 else 2.0:.3f},{0.0 if k < 35 else 0.4:.3f},20.00,{float(k >= 35):.2f},20.00,ok"
         for k in range(1, 90)
     ]
-    done = record(board, tmp_path, "--duration", 3)
-    assert done.returncode == 0, done.stderr
+    log = recorded(board, tmp_path, "--duration", 3)
     assert "telemetry csv 20" in board.sent()
-    frame = read_table(tmp_path / "log.csv").frame
+    frame = read_table(log).frame
     assert frame["time_s"].tolist() == pytest.approx(np.arange(0.05, 3.1, 0.5))
     # first read at 1.75 s, so on since 1.70 s: in the row of 1.55 s for 0.35 of 0.5 s, as mean current and as mean power
     assert frame["i1_a"].tolist() == pytest.approx([0, 0, 0, 1.4, 2, 2, 2], abs=1e-3)

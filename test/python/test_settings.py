@@ -49,6 +49,31 @@ def test_an_upload_is_taken_back_and_the_one_before_it_next(fake: FakeBoard, tmp
     assert (code, "no upload to this board is kept" in said) == (1, True)
 
 
+def test_an_upload_sends_settings_reads_them_back_and_saves(fake: FakeBoard, tmp_path: Path) -> None:
+    upload(fake, tmp_path, "# from model.toml", "$loss_scale_1=1.100", "$loss_w_per_k=0.006000")
+    assert fake.sent()[-5:] == ["learnt clear", "$loss_scale_1=1.100", "$loss_w_per_k=0.006000", "$$", "$save"]
+
+
+@pytest.mark.parametrize(
+    ("answers", "said"),
+    [
+        ({"learnt clear": ["error:12 a spring is on"]}, "a spring is on"),
+        ({"$loss_w_per_k=9": ["error:4 out of range"]}, "s.txt:3:3: '$loss_w_per_k=9' refused: error 4 out of range"),
+        ({"$loss_w_per_k=9": ["[not active yet: x]", "ok"]}, "x]: nothing is saved, a reset of the board gives back"),
+        ({"$$": ["$loss_w_per_k=0.005800", "ok"]}, "loss_w_per_k is 0.005800, not 9"),
+        ({"$$": ["ok"]}, "loss_w_per_k is missing"),
+    ],
+)
+def test_what_the_board_does_not_take_is_said_and_nothing_saved(
+    tmp_path: Path, answers: dict[str, list[str]], said: str
+) -> None:
+    board = FakeBoard(answers)
+    (tmp_path / "s.txt").write_text("# one\n\n  $loss_w_per_k=9\n")
+    code, told = ninespring("upload", "--port", board.port, tmp_path / "s.txt")
+    assert (code, said in told) == (1, True), told
+    assert "$save" not in board.seen
+
+
 def test_what_the_board_has_otherwise_than_sent_is_not_taken_back(fake: FakeBoard, tmp_path: Path) -> None:
     upload(fake, tmp_path, "$loss_w_per_k=0.006000")
     fake.settings["loss_w_per_k"] = "0.009000"
@@ -56,22 +81,6 @@ def test_what_the_board_has_otherwise_than_sent_is_not_taken_back(fake: FakeBoar
     assert code == 1
     assert "loss_w_per_k is 0.009000, not 0.006000" in said
     assert fake.settings["loss_w_per_k"] == "0.009000"
-
-
-def test_settings_that_do_not_fit_together_are_not_saved_and_it_says_so(fake: FakeBoard, tmp_path: Path) -> None:
-    fake.answers["$temperature_trip_c=60"] = ["[not active yet: temperature_trip_c=60.00 does not fit ...]", "ok"]
-    (tmp_path / "s.txt").write_text("$temperature_trip_c=60\n")
-    code, said = ninespring("upload", "--port", fake.port, tmp_path / "s.txt")
-    assert code == 1 and "nothing is saved, a reset of the board gives back what it had" in said
-    assert "$save" not in fake.sent()
-
-
-def test_what_a_board_refuses_is_told_with_its_line(fake: FakeBoard, tmp_path: Path) -> None:
-    fake.answers["$supply_v=900"] = ["error:5 a number is out of range: supply_v is 1.000 to 16.000 V"]
-    (tmp_path / "s.txt").write_text("# two\n$loss_w_per_k=0.006000\n\n  $supply_v=900\n")
-    code, said = ninespring("upload", "--port", fake.port, tmp_path / "s.txt")
-    assert (code, "s.txt:4:3: '$supply_v=900' refused: error 5" in said) == (1, True)
-    assert "$save" not in fake.sent()
 
 
 @pytest.mark.parametrize(
@@ -83,7 +92,11 @@ def test_what_a_board_refuses_is_told_with_its_line(fake: FakeBoard, tmp_path: P
         (b"$rows=3\n  $loss_w_per_k=0,006\n", 2, "s.txt:2:3: '$loss_w_per_k=0,006' is not a setting"),
         (b"$rows=3\n$loss_w_per_k=0,006\n", 2, "a decimal comma?"),
         (b"$loss_w_per_k=0.006 0.007\n", 2, "s.txt:1:1: '$loss_w_per_k=0.006 0.007' is not a setting"),
-        (b"", 2, "s.txt: no setting in it"),
+        (b"# nothing\n", 2, "s.txt: no setting in it"),
+        (b"loss_w_per_k=1\n", 2, "s.txt:1:1: 'loss_w_per_k=1' is not a setting"),
+        (b"$loss=1;$save\n", 2, "is not a setting"),
+        (b"$x=nan\n", 2, "is not a setting"),
+        ("$ä=1\n".encode(), 2, "is not a setting"),
     ],
 )
 def test_settings_are_a_text_file_as_any_other(
@@ -106,12 +119,6 @@ def test_what_is_not_saved_is_not_kept(fake: FakeBoard, tmp_path: Path, home: Pa
     (tmp_path / "s.txt").write_text("$loss_w_per_k=0.006000\n")
     assert ninespring("upload", "--no-save", "--port", fake.port, tmp_path / "s.txt")[0] == 0
     assert not list(home.rglob("*.txt"))
-
-
-@pytest.mark.parametrize("words", [("--undo", "s.txt"), ()])
-def test_an_upload_is_of_a_file_or_taken_back(words: tuple[str, ...], fake: FakeBoard) -> None:
-    code, said = ninespring("upload", "--port", fake.port, *words)
-    assert (code, "either a file of settings or --undo" in said) == (2, True)
 
 
 def test_settings_as_a_file_that_diffs(fake: FakeBoard, tmp_path: Path) -> None:
@@ -140,9 +147,8 @@ def test_settings_as_a_file_that_diffs(fake: FakeBoard, tmp_path: Path) -> None:
     ]
 
 
-def test_a_diff_is_of_two(tmp_path: Path) -> None:
+def test_a_diff_is_of_settings(tmp_path: Path) -> None:
     (tmp_path / "a.txt").write_text("$rows=3\n")
-    assert ninespring("settings", "diff", tmp_path / "a.txt")[0] == 2
     (tmp_path / "b.txt").write_text("rows 3\n")
     code, said = ninespring("settings", "diff", tmp_path / "a.txt", tmp_path / "b.txt")
     assert code == 2

@@ -75,8 +75,3 @@ def test_ticks_that_are_lost_on_the_way_are_said(tmp_path: Path) -> None:
     assert got.returncode == 1
     assert "5 ticks were lost on the way here, the first after 0.1 s" in got.stdout + got.stderr
     assert "\n# ended: 5 ticks were lost" in tape.read_text()
-
-
-def test_a_tape_has_each_tick_and_no_thermometers(tmp_path: Path) -> None:
-    got = run("record", "--port", "nowhere", "--tape", "--hz", "5", "-o", tmp_path / "day.tape")
-    assert got.returncode == 2 and "leave out --hz" in got.stdout + got.stderr
