@@ -111,11 +111,6 @@ def test_plot_draws_a_log(make_log, tmp_path: Path, name: str, begins: bytes) ->
     assert sorted(one.name for one in tmp_path.iterdir()) == sorted([name, log.name])
 
 
-def test_plot_refuses_a_picture_that_it_cannot_make(make_log, tmp_path: Path) -> None:
-    done = ninespring("plot", make_log(seconds=60), "-o", tmp_path / "p.bmp")
-    assert done.returncode == 2 and ".png, .svg, .pdf, .gif" in done.stderr
-
-
 def test_a_log_where_a_model_belongs_is_said(make_log) -> None:
     run = ns.read_log(make_log(seconds=60))
     with pytest.raises(ns.InputError, match="a model is wanted"):

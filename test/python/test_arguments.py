@@ -51,6 +51,7 @@ def test_a_function_refuses_what_its_option_refuses(bad: object) -> None:
         ("fit no-such.csv -o m.toml", "no-such.csv: cannot be read"),
         ("diagnose no-such.csv -o out --frozen", "--frozen needs --model"),
         ("export --model no-such.toml -o s.txt", "no-such.toml: cannot be read"),
+        ("plot run.csv -o p.bmp", "'.bmp' is none of .png, .svg, .pdf, .gif"),
         ("record --port /dev/x --thermometers /dev/../dev/x -o x.csv", "that is the board's port"),
         ("record --port x --tape --hz 5 -o day.tape", "leave out --hz"),
         ("upload --port x", "either a file of settings or --undo"),

@@ -99,6 +99,30 @@ def opened(browser: Browser, dashboard: Dashboard) -> Page:
     return page
 
 
+def on_a_page(test: Callable[..., None]) -> Callable[..., None]:
+    """Mark a test that needs a browser and a simulated board."""
+    return needs_browser(needs_board(test))
+
+
+@pytest.fixture
+def page(browser: Browser, simulated: tuple[Dashboard, Path]) -> Iterator[Page]:
+    """Yield a page of the simulated board, in which nothing has gone wrong at its end."""
+    page = opened(browser, simulated[0])
+    yield page
+    assert page.problems == []
+    page.close()
+
+
+other = page
+"""A second one."""
+
+
+def enter(page: Page, line: str) -> None:
+    """Type a line into the page's console."""
+    page.fill("#line", line)
+    page.press("#line", "Enter")
+
+
 def spring(page: Page, number: int, part: str = "") -> object:
     return page.locator(f"#array button:nth-child({number}){' .' + part if part else ''}")
 
@@ -107,12 +131,8 @@ def sum_a(page: Page) -> float:
     return float(page.inner_text("#sum"))
 
 
-@needs_browser
-@needs_board
-def test_a_click_heats_a_spring_and_stop_ends_it_from_button_and_key(
-    browser: Browser, simulated: tuple[Dashboard, Path]
-) -> None:
-    page = opened(browser, simulated[0])
+@on_a_page
+def test_a_click_heats_a_spring_and_stop_ends_it_from_button_and_key(page: Page) -> None:
     page.select_option("#policy", "open")  # a set current at once: precompensate waits until nothing can be hot
     expect(page.locator("#policy")).to_have_value("open")
     for press in (lambda: page.click("#stop"), lambda: page.keyboard.press("Escape")):
@@ -129,22 +149,15 @@ def test_a_click_heats_a_spring_and_stop_ends_it_from_button_and_key(
         expect(spring(page, 5)).not_to_have_class(re.compile("on"))
     page.click("#clear")
     expect(page.locator("#state")).to_have_text(re.compile("^(ready|not known yet)$"))
-    assert page.problems == []
-    page.close()
 
 
-@needs_browser
-@needs_board
-def test_why_a_spring_is_believed_to_be_where_it_is_is_shown_and_follows(
-    browser: Browser, simulated: tuple[Dashboard, Path]
-) -> None:
-    page = opened(browser, simulated[0])
+@on_a_page
+def test_why_a_spring_is_believed_to_be_where_it_is_is_shown_and_follows(page: Page) -> None:
     page.click("#clear")
     page.click("#why-card summary")
     page.select_option("#why-spring", "7")
     expect(page.locator("#why")).to_contain_text("spring 7 in the last 4 hours")  # nothing yet
-    page.fill("#line", "model cold")
-    page.press("#line", "Enter")
+    enter(page, "model cold")
     expect(page.locator("#why")).to_contain_text("it is said to be known", timeout=30_000)
     expect(page.locator("#why")).to_contain_text("of martensite start: now ")
     page.select_option("#why-spring", "2")
@@ -152,47 +165,37 @@ def test_why_a_spring_is_believed_to_be_where_it_is_is_shown_and_follows(
     expect(page.locator("#log")).not_to_contain_text(
         "it is said to be known"
     )  # each is told once, where it was asked for
-    assert page.problems == []
-    page.close()
 
 
-@needs_browser
-@needs_board
-def test_two_pages_agree_and_patterns_are_drawn_and_played(browser: Browser, simulated: tuple[Dashboard, Path]) -> None:
-    one, other = opened(browser, simulated[0]), opened(browser, simulated[0])
-    one.click("[data-make=ring]")
-    for page in (one, other):
-        expect(page.locator("#array button.on")).to_have_count(8)
-        expect(spring(page, 5)).not_to_have_class(re.compile("on"))
+@on_a_page
+def test_two_pages_agree_and_patterns_are_drawn_and_played(page: Page, other: Page) -> None:
+    page.click("[data-make=ring]")
+    for one in (page, other):
+        expect(one.locator("#array button.on")).to_have_count(8)
+        expect(spring(one, 5)).not_to_have_class(re.compile("on"))
     other.click("#draw button:nth-child(1)")
     other.click("#draw button:nth-child(9)")
     other.click("#apply")
-    expect(one.locator("#array button.on")).to_have_count(2)
+    expect(page.locator("#array button.on")).to_have_count(2)
     other.click("#add")
     other.click("#draw button:nth-child(1)")
     other.click("#add")
     other.fill("#seconds", "1")
     other.click("#play")
     for count in (1, 2, 1):
-        expect(one.locator("#array button.on")).to_have_count(count)
-    one.click("[data-all=off]")
+        expect(page.locator("#array button.on")).to_have_count(count)
+    page.click("[data-all=off]")
     expect(other.locator("#array button.on")).to_have_count(0)
-    one.fill("#fan", "50")  # with its events, as when the slider is let go
+    page.fill("#fan", "50")  # with its events, as when the slider is let go
     expect(other.locator("#fan-shown")).to_have_text("50 %")
     other.select_option("#policy", "precompensate")
-    expect(one.locator("#policy")).to_have_value("precompensate")
+    expect(page.locator("#policy")).to_have_value("precompensate")
     other.select_option("#policy", "open")
-    one.fill("#fan", "0")
-    one.close()
-    other.close()
+    page.fill("#fan", "0")
 
 
-@needs_browser
-@needs_board
-def test_settings_have_units_and_ranges_and_a_refusal_is_in_the_boards_words(
-    browser: Browser, simulated: tuple[Dashboard, Path]
-) -> None:
-    page = opened(browser, simulated[0])
+@on_a_page
+def test_settings_have_units_and_ranges_and_a_refusal_is_in_the_boards_words(page: Page) -> None:
     page.click("#settings-card summary")
     line = page.locator("tr[data-name=supply_limit_a]")
     expect(line).to_contain_text("A")
@@ -216,36 +219,28 @@ def test_settings_have_units_and_ranges_and_a_refusal_is_in_the_boards_words(
     field.fill("12.5")
     field.press("Enter")
     expect(page.locator("#supply")).to_have_text("of 12.5 A")
-    page.fill("#line", "frobnicate")
-    page.press("#line", "Enter")
+    enter(page, "frobnicate")
     expect(page.locator("#log li.bad").first).to_contain_text("unknown word")
-    page.fill("#line", "version")
-    page.press("#line", "Enter")
+    enter(page, "version")
     expect(page.locator("#log li").first).to_contain_text("ninespring")
-    page.fill("#line", "$defaults")  # ends telemetry on the board
-    page.press("#line", "Enter")
+    enter(page, "$defaults")  # ends telemetry on the board
     expect(page.locator("#supply")).to_have_text("of 15.0 A")
     before = float(page.inner_text("#time"))
     until = time.monotonic() + 30.0
     while float(page.inner_text("#time")) <= before + 1.0:
         assert time.monotonic() < until
         time.sleep(0.1)
-    page.close()
 
 
-@needs_browser
-@needs_board
-def test_one_click_records_a_log_that_can_be_read(browser: Browser, simulated: tuple[Dashboard, Path]) -> None:
-    dashboard, folder = simulated
-    page = opened(browser, dashboard)
+@on_a_page
+def test_one_click_records_a_log_that_can_be_read(page: Page, simulated: tuple[Dashboard, Path]) -> None:
     page.click("#record")
     expect(page.locator("#recording")).to_contain_text(re.compile(r": [1-9]\d rows"))
     page.click("#record")
     expect(page.locator("#log li").first).to_contain_text("rows in")
-    (log,) = folder.glob("*.csv")
+    (log,) = simulated[1].glob("*.csv")
     assert log.read_text().startswith("# recorded: ") and "\n# $loss_w_per_k=" in log.read_text()
     assert read_log(log, 9, temperatures=False).duration_s > 0.9
-    page.close()
 
 
 @needs_browser
@@ -411,6 +406,11 @@ def answer_to(socket: ClientConnection, wish: dict[str, object], within_s: float
     return awaited(socket, lambda got: got.get("id") == wish["id"], within_s)
 
 
+def answers_of(socket: ClientConnection, count: int) -> list[dict[str, Any]]:
+    """Return the next so many answers to a page's wishes."""
+    return [awaited(socket, lambda got: got["kind"] in ("done", "refused"), 10.0) for _ in range(count)]
+
+
 def test_a_wish_that_fails_as_nobody_thought_of_is_answered() -> None:
     class Broken(source.Source):
         takes = frozenset({"level"})
@@ -487,10 +487,7 @@ def test_a_pages_wishes_are_carried_out_in_their_order(tmp_path: Path) -> None:
     with page_of(board, tmp_path) as socket:
         for level in range(1, 101):
             socket.send(json.dumps({"do": "level", "spring": 1, "level": level, "id": level}))
-        answered = []
-        while len(answered) < 100:
-            if (got := json.loads(socket.recv(10)))["kind"] in ("done", "refused"):
-                answered.append((got["kind"], got["id"]))
+        answered = [(got["kind"], got["id"]) for got in answers_of(socket, 100)]
     assert answered == [("done", level) for level in range(1, 101)]
     assert [line for line in board.sent() if line.startswith("on ")] == [f"on 1 {level}" for level in range(1, 101)]
 
@@ -533,10 +530,7 @@ def test_off_waits_behind_nothing(tmp_path: Path) -> None:
             begun_s = time.monotonic()
             assert answer_to(other, {"do": "level", "spring": 1, "level": 0, "id": 1})["kind"] == "done"
             assert time.monotonic() - begun_s < 3.0  # a queue of 15 s, on a machine that may be busy
-            answered = []
-            while len(answered) < 300:
-                if (got := json.loads(socket.recv(10)))["kind"] in ("done", "refused"):
-                    answered.append(got.get("why", ""))
+            answered = [got.get("why", "") for got in answers_of(socket, 300)]
             assert any("too many wishes" in one for one in answered)
             assert any("dropped by an off" in one for one in answered)
             assert board.sent().count("off 1") == 1 and "!" not in board.sent()
@@ -764,10 +758,8 @@ def test_an_hour_is_kept_every_row_for_ten_minutes_and_one_a_second_before() -> 
     assert kept_by.history()["time_s"] == [1.0]
 
 
-@needs_browser
-@needs_board
-def test_patterns_are_shared_by_a_link_that_drives_nothing(browser: Browser, simulated: tuple[Dashboard, Path]) -> None:
-    page = opened(browser, simulated[0])
+@on_a_page
+def test_patterns_are_shared_by_a_link_that_drives_nothing(page: Page) -> None:
     page.click("#draw button:nth-child(5)")
     page.click("#add")
     page.fill("#seconds", "7")
@@ -785,5 +777,3 @@ def test_patterns_are_shared_by_a_link_that_drives_nothing(browser: Browser, sim
     page.click("#own")
     expect(page.locator("#list li")).to_have_count(1)
     expect(page.locator("#list li").first).to_contain_text("000010000")
-    assert page.problems == []
-    page.close()

@@ -23,67 +23,50 @@ from .chain import DIAGNOSIS, OLD_SETTINGS, SETTINGS
 from .progress import Progress
 
 COLOURS = [BEFORE, AFTER, "#8a6d3b"]
-
-
-def verdict(progress: Progress) -> str:
-    """Return how it ended, in a sentence."""
-    done = progress.done
-    if progress.data["refused"]:
-        return f"Nothing was saved on the board: {progress.data['refused']}."
-    if "after" not in done:
-        return "Not finished: the same command goes on from here."
-    if not done["after"]["saved"]:
-        return "The board had these settings already: nothing was written."
-    before, after = done["before"], done["after"]["drives"][-1]
-    return (
-        f"The new settings are on the board. It was {before['error_c']:.1f} K wrong (rms) about its springs while it drove "
-        f"them, and is {after['error_c']:.1f} K wrong now."
-    )
+NAMES = ("as the board was", "with the new settings")
+MEASURES = (
+    ("the chip's error, K rms", "error_c", "{:.2f}"),
+    ("its worst spring's, K rms", "worst_c", "{:.1f}"),
+    ("springs that are on hold, % austenite", "held", "{:.0%}"),
+    ("springs that are off reach, % austenite", "undriven", "{:.0%}"),
+    ("hottest, degC", "hottest_c", "{:.0f}"),
+    ("from the first current until all have transformed, s", "heating_s", "{:.0f}"),
+)
+"""What is told of a drive: in words, its name in the progress, its form."""
 
 
 def page(progress: Progress, array: Array) -> str:
     """Return the report of what is done so far, as HTML."""
     done = progress.done
-    drives = [one for one in (done.get("before"), *done.get("after", {}).get("drives", [])) if one]
+    drives = [done["before"], *done.get("after", {}).get("drives", [])] if "before" in done else []
+    shown = [drives[0], drives[-1]] if len(drives) > 1 else drives
     verified = done.get("verify", {})
     errors = [results.read(results.ChipError, verified[when]) for when in ("before", "after") if when in verified]
+    found, had = done.get("export", {}).get("settings", {}), progress.data["board"]["settings"]
     return render(
         "calibration.html",
         title="Ninespring calibration",
-        refused=progress.data["refused"],
-        verdict=verdict(progress),
-        pattern=progress.option("pattern"),
-        drives=_drives(progress, array, drives) if drives else None,
-        diagnosed=done["diagnose"],
+        calibration=progress.data,
+        done=done,
+        drives=drives,
+        header=["", *NAMES[: len(shown)]],
+        rows=[[label, *(form.format(one[key]).rstrip("%") for one in shown)] for label, key, form in MEASURES],
+        figure=Markup(_picture(progress, array, shown)) if shown else None,
+        faults=[fault for one in drives for fault in one["faults"]],
         diagnosis=DIAGNOSIS,
         verified=error_rows(*errors) if errors else None,
-        exported=_exported(progress) if "export" in done else None,
-        measured=_measured(progress),
-        tool=progress.data["tool"],
-        version=progress.data["board"]["version"][0],
+        sent=[
+            (f"${name}", had.get(name, "–"), found[name])
+            for name in found
+            if float(had.get(name, "nan")) != float(found[name])
+        ],
+        new=SETTINGS,
+        old=OLD_SETTINGS,
+        folder=progress.folder,
     )
 
 
-def _drives(progress: Progress, array: Array, drives: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    names = ["as the board was", *(["with the new settings"] if len(drives) > 1 else [])]
-    shown = [drives[0], *drives[-1:]] if len(drives) > 1 else [drives[0]]
-    measures = (
-        ("the chip's error, K rms", "error_c", "{:.2f}"),
-        ("its worst spring's, K rms", "worst_c", "{:.1f}"),
-        ("springs that are on hold, % austenite", "held", "{:.0%}"),
-        ("springs that are off reach, % austenite", "undriven", "{:.0%}"),
-        ("hottest, degC", "hottest_c", "{:.0f}"),
-        ("from the first current until all have transformed, s", "heating_s", "{:.0f}"),
-    )
-    return {
-        "figure": Markup(_picture(progress, array, shown, names)),
-        "header": ["", *names],
-        "rows": [[label, *(form.format(one[key]).rstrip("%") for one in shown)] for label, key, form in measures],
-        "faults": [fault for one in drives for fault in one["faults"]],
-    }
-
-
-def _picture(progress: Progress, array: Array, shown: Sequence[dict[str, Any]], names: Sequence[str]) -> str:
+def _picture(progress: Progress, array: Array, shown: Sequence[dict[str, Any]]) -> str:
     """Draw the worst and the best known spring and one that is off, measured and believed, a panel a drive."""
     runs = [read_log(progress.folder / one["log"], array.springs) for one in shown]
     thought = [believed(run) for run in runs]
@@ -92,7 +75,7 @@ def _picture(progress: Progress, array: Array, shown: Sequence[dict[str, Any]], 
     off = [k for k in range(array.springs) if k not in on]
     picked = list(dict.fromkeys([max(on, key=lambda k: error[k]), min(on, key=lambda k: error[k]), *off[:1]]))
     figure, axes = plt.subplots(1, len(runs), figsize=(5.2 * len(runs), 3.6), sharey=True, squeeze=False)
-    for axis, run, belief, name in zip(axes[0], runs, thought, names, strict=True):
+    for axis, run, belief, name in zip(axes[0], runs, thought, NAMES, strict=False):
         since = run.time_s - run.time_s[0]
         for k, colour in zip(picked, COLOURS, strict=False):
             axis.plot(since, run.temperature_c[:, k], color=MEASURED, lw=3.0)
@@ -105,28 +88,3 @@ def _picture(progress: Progress, array: Array, shown: Sequence[dict[str, Any]], 
     axes[0][0].legend(fontsize=8, frameon=False, loc="lower right")
     figure.tight_layout()
     return as_svg(figure)
-
-
-def _exported(progress: Progress) -> dict[str, Any]:
-    export, had = progress.done["export"], progress.data["board"]["settings"]
-    sent = {name: value for name, value in export["settings"].items() if float(had.get(name, "nan")) != float(value)}
-    return {
-        "sent": [(f"${name}", had.get(name, "–"), value) for name, value in sent.items()],
-        "kept": export["kept"],
-        "new": SETTINGS,
-        "old": OLD_SETTINGS,
-        "old_path": progress.folder / OLD_SETTINGS,
-    }
-
-
-def _measured(progress: Progress) -> list[tuple[object, ...]]:
-    return [
-        (
-            one["log"],
-            f"{one['from_s']:.0f} to {one['to_s']:.0f}",
-            one["rows"],
-            one["ended"] or ("" if one["used"] else "too short to count"),
-        )
-        for name in ("run1", "run2")
-        for one in progress.done.get(name, {}).get("pieces", [])
-    ]
