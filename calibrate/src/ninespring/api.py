@@ -179,20 +179,14 @@ def chip_settings(model: Model | str | Path, force: bool = False) -> Settings:
     return checked_settings(_model(model), "", force)[0]
 
 
-def upload(
-    port: str,
-    settings: str,
-    save: bool = True,
-    say: Callable[[str, int], None] = lambda line, count: None,
-    by: str = "ns.upload",
-) -> int:
+def upload(port: str, settings: str, save: bool = True) -> int:
     """Send console lines (`chip_settings(model).lines`) to a board, read them back, save them: `ninespring upload`.
 
     Return how many. WorkError, and nothing is saved, where the board refuses one or shows another value. What was saved can be
-    taken back: `undo_upload`; `by` is what the history calls it.
+    taken back: `undo_upload`.
     """
     given = settings_in(settings, "settings")
-    history.send(port, given, by, save, say)
+    history.send(port, given, "ns.upload", save)
     return len(given)
 
 

@@ -18,7 +18,7 @@ from ..io import results
 from ..io.logs import Run
 from ..io.statistics import rms
 from ..model import effects, native
-from ..model.models import Array, model_text
+from ..model.models import Array, Model, model_text
 from .console import (
     ARRAY,
     FILE,
@@ -77,18 +77,14 @@ def fit(logs: tuple[Path, ...], array_path: Path | None, effects: str, output: P
         held = problem.holdout_rmse(chosen)
         say("is the log to be doubted?")
         model, suspect = doubt.model_of_fit(problem, chosen, runs)
-    model.provenance["rmse_before_c"] = rms(base.residual)
+    before, after = rms(base.residual), rms(chosen.residual)
+    model.provenance["rmse_before_c"] = before
     result = _result(problem, chosen, runs, suspect)
-    result.rmse_before_c, result.rmse_c = rms(base.residual), rms(chosen.residual)
-    result.holdout_rmse_c, result.noise_c = held, problem.noise_c
-    write({output: model_text(model), json_path: results.checked(result)})
-    model.name = "model.toml" if str(output) == "-" else str(output)
+    result.rmse_before_c, result.rmse_c, result.holdout_rmse_c, result.noise_c = before, after, held, problem.noise_c
     notes("", suspect)
-    print_parameters(beside(output), result.parameters)
-    _print_correlations(output, result.correlations)
-    beside(output).print(
-        f"error {result.rmse_c:.3f} K, held out {held:.3f} K, noise {problem.noise_c:.3f} K -> {output}"
-    )
+    _write(model, result, output, json_path)
+    model.name = "model.toml" if str(output) == "-" else str(output)
+    beside(output).print(f"error {after:.3f} K, held out {held:.3f} K, noise {problem.noise_c:.3f} K -> {output}")
     for effect, why in left_out(model).items():
         beside(output).print(f"{effect}: not for the chip: {why}")
 
@@ -113,11 +109,13 @@ def _result(problem: Problem, found: Fit, runs: list[Run], warnings: list[str]) 
     )
 
 
-def _print_correlations(output: Path, found: list[results.Correlation]) -> None:
-    """Print which numbers' errors go together, strongest first; all of them are in --json."""
+def _write(model: Model, result: results.Fit, output: Path, json_path: Path | None) -> None:
+    """Write a fit, and print its numbers, and which numbers' errors go together, strongest first: all of those are in --json."""
+    write({output: model_text(model), json_path: results.checked(result)})
+    said, found = beside(output), result.correlations
+    print_parameters(said, result.parameters)
     if not found:
         return
-    said = beside(output)
     said.print(f"errors that go together, of {len(found)} pairs beyond {TOLD:g} (--json has all):")
     for one in found[:MOST_TOLD]:
         said.print(f"  {one.correlation:+.2f}  {one.a}, {one.b}")
@@ -131,9 +129,7 @@ def _fit_from_resistance(array: Array, runs: list[Run], output: Path, json_path:
     result = _result(problem, found, runs, [from_resistance.SCALE])
     result.rmse_before_v, result.rmse_v = 1e-3 * rms(first.residual), 1e-3 * rms(found.residual)
     result.noise_v = 1e-3 * problem.noise_c
-    write({output: model_text(model), json_path: results.checked(result)})
-    print_parameters(beside(output), result.parameters)
-    _print_correlations(output, result.correlations)
+    _write(model, result, output, json_path)
     beside(output).print(
         f"no thermometer: fitted to v / i, error {1e3 * result.rmse_before_v:.1f} mV as declared, "
         f"{1e3 * result.rmse_v:.1f} fitted, readings are good for {1e3 * result.noise_v:.1f} -> {output}"

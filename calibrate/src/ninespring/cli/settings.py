@@ -18,12 +18,6 @@ def settings() -> None:
     """A board's settings: as a file, what differs between two, what it had before each upload."""
 
 
-def _default(name: str) -> str | None:
-    """Return a setting's built-in value, None where this version does not know it."""
-    row = tables.setting(name)
-    return f"{row.default:.{row.decimals}f}" if row else None
-
-
 def _of_port(port: str) -> tuple[str, dict[str, str]]:
     with Board(port, off_at_end=False) as board:
         return board.version[0], board.settings()
@@ -49,10 +43,11 @@ def read(port: str, output: Path, changed: bool) -> None:
     lines = [f"# from {port}: {version}"]
     count = 0
     for name, value in has.items():
-        usual = _default(name)
-        same = usual is not None and float(usual) == float(value)
+        row = tables.setting(name)  # None: this version does not know it
+        usual = f"{row.default:.{row.decimals}f}" if row else ""
+        same = bool(usual) and float(usual) == float(value)
         if not (changed and same):
-            lines.append(f"${name}={value}" + ("" if same or usual is None else f"  # built in: {usual}"))
+            lines.append(f"${name}={value}" + (f"  # built in: {usual}" if usual and not same else ""))
             count += 1
     write({output: "\n".join(lines) + "\n"})
     if str(output) != "-":

@@ -98,7 +98,16 @@ class Witness(Part):
     """It follows anything slow: as likely a stand-in as a cause, where what it says changed was logged."""
 
 
-class Effect(Part):
+class Named(Part):
+    """An effect, which may be one of several kinds: both have a `name` and a `variant`."""
+
+    @property
+    def called(self) -> str:
+        """Its name, and which of its kinds it is."""
+        return f"{self.name} ({self.variant})" if self.variant else self.name
+
+
+class Effect(Named):
     """An effect that the declared model lacks."""
 
     name: Name
@@ -115,11 +124,6 @@ class Effect(Part):
     variant: str | UnsetType = UNSET
     why_not_on_chip: Reason | UnsetType = UNSET
     seen_by: Literal["v / i"] | UnsetType = UNSET
-
-    @property
-    def called(self) -> str:
-        """Its name, and which of its kinds it is."""
-        return f"{self.name} ({self.variant})" if self.variant else self.name
 
 
 class Step(Part):
@@ -143,7 +147,7 @@ class Experiment(Part):
     steps: list[Step]
 
 
-class Rival(Part):
+class Rival(Named):
     """What these data cannot tell from an effect that was named."""
 
     instead_of: Name
@@ -157,11 +161,6 @@ class Rival(Part):
     predictions_differ_c: float | UnsetType = UNSET
     experiment: Experiment | UnsetType = UNSET
     against: str | UnsetType = UNSET
-
-    @property
-    def called(self) -> str:
-        """Its name, and which of its kinds it is."""
-        return f"{self.name} ({self.variant})" if self.variant else self.name
 
 
 class Spread(Part):

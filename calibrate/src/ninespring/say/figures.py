@@ -13,6 +13,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from ..find.diagnosis import Diagnosis
+from ..infer.fit import Fit
 from ..io import results, statistics
 from ..io.logs.run import Run
 
@@ -117,12 +118,15 @@ def _tiles(
     return shown
 
 
+def _in_noise(found: Diagnosis, fit: Fit) -> list[np.ndarray]:
+    """Return what a fit leaves, in multiples of each sensor's noise: (rows, springs) a run."""
+    return [left / noise for left, noise in zip(fit.residual, found.problem.noise, strict=True)]
+
+
 def array_map(found: Diagnosis) -> str:
     """Draw what is left at each spring in multiples of its sensor's noise, with a colour bar."""
-    problem = found.problem
-    shape = (problem.array.rows, problem.array.cols)
-    joined = np.concatenate([left / noise for left, noise in zip(found.final.residual, problem.noise, strict=True)])
-    rms = np.sqrt(statistics.mean_there(joined**2, 0))
+    shape = (found.problem.array.rows, found.problem.array.cols)
+    rms = np.sqrt(statistics.mean_there(np.concatenate(_in_noise(found, found.final)) ** 2, 0))
     figure, axis = plt.subplots(figsize=(4.2, min(4.2, 0.8 + 3.4 * shape[0] / shape[1])))
     shown = _tiles(axis, rms, shape, "YlOrRd", 1.0, max(3.0, float(np.nanmax(rms))), "{:.1f}")
     figure.colorbar(shown, ax=axis, shrink=0.8, label="rms error / noise")
@@ -200,13 +204,10 @@ def autocorrelation(found: Diagnosis) -> str:
     step = float(np.median(np.diff(problem.runs[0].time_s)))
     figure, axes = plt.subplots(1, 2, figsize=(12, 3.0))
     for fit, colour, label in ((found.baseline, BEFORE, "before"), (found.final, AFTER, "after")):
-        rho = statistics.autocorrelation(
-            [left / noise for left, noise in zip(fit.residual, problem.noise, strict=True)], lags
-        )
+        left = _in_noise(found, fit)
+        rho = statistics.autocorrelation(left, lags)
         axes[0].plot(np.arange(1, lags + 1) * step, rho[1:], color=colour, label=label)
-        values = np.concatenate(
-            [(left / noise)[np.isfinite(left)] for left, noise in zip(fit.residual, problem.noise, strict=True)]
-        )
+        values = np.concatenate([one[np.isfinite(one)] for one in left])
         axes[1].hist(values, bins=80, range=(-6, 6), density=True, histtype="step", color=colour, label=label)
     bound = 2 / math.sqrt(problem.count)
     axes[0].axhspan(-bound, bound, color="#dfe5ea")
